@@ -1,0 +1,3 @@
+//! From a rig file to a model, gains, the const table and a verdict on the closed loop.
+pub mod numerics;
+pub mod rig;

@@ -1,0 +1,213 @@
+//! Dense matrices of any size over any [`Real`].
+
+use core::ops::{Add, Index, IndexMut, Mul, Neg, Sub};
+
+use super::Real;
+
+/// A dense matrix, stored by rows.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Matrix<R> {
+    rows: usize,
+    cols: usize,
+    data: Vec<R>,
+}
+
+impl<R: Real> Matrix<R> {
+    /// The matrix whose entry at (row, column) is `entry(row, column)`.
+    pub fn from_fn(rows: usize, cols: usize, mut entry: impl FnMut(usize, usize) -> R) -> Self {
+        let mut data = Vec::with_capacity(rows * cols);
+        for i in 0..rows {
+            for j in 0..cols {
+                data.push(entry(i, j));
+            }
+        }
+        Self { rows, cols, data }
+    }
+
+    /// All zeros.
+    pub fn zeros(rows: usize, cols: usize) -> Self {
+        Self::from_fn(rows, cols, |_, _| R::zero())
+    }
+
+    /// The identity, `size`×`size`.
+    pub fn identity(size: usize) -> Self {
+        Self::from_fn(size, size, |i, j| if i == j { R::one() } else { R::zero() })
+    }
+
+    /// A square matrix with `diagonal` on its diagonal and zeros elsewhere.
+    pub fn from_diagonal(diagonal: &[R]) -> Self {
+        let size = diagonal.len();
+        Self::from_fn(size, size, |i, j| if i == j { diagonal[i].clone() } else { R::zero() })
+    }
+
+    /// A single column.
+    pub fn column(entries: &[R]) -> Self {
+        Self { rows: entries.len(), cols: 1, data: entries.to_vec() }
+    }
+
+    /// The exact values of rows of `f64`, all of the length of the first.
+    pub fn from_f64_rows(rows: &[Vec<f64>]) -> Self {
+        let cols = rows.first().map_or(0, Vec::len);
+        Self::from_fn(rows.len(), cols, |i, j| R::from_f64(rows[i][j]))
+    }
+
+    /// Every entry rounded to `f64`, row by row.
+    pub fn to_f64_rows(&self) -> Vec<Vec<f64>> {
+        (0..self.rows).map(|i| (0..self.cols).map(|j| self[(i, j)].to_f64()).collect()).collect()
+    }
+
+    /// Number of rows.
+    pub fn rows(&self) -> usize {
+        self.rows
+    }
+
+    /// Number of columns.
+    pub fn cols(&self) -> usize {
+        self.cols
+    }
+
+    /// All entries, row by row.
+    pub fn entries(&self) -> &[R] {
+        &self.data
+    }
+
+    /// Whether every entry is finite.
+    pub fn is_finite(&self) -> bool {
+        self.data.iter().all(R::is_finite)
+    }
+
+    /// Applies `f` to every entry.
+    pub fn map<S: Real>(&self, f: impl FnMut(&R) -> S) -> Matrix<S> {
+        Matrix { rows: self.rows, cols: self.cols, data: self.data.iter().map(f).collect() }
+    }
+
+    /// The transpose.
+    pub fn transpose(&self) -> Self {
+        Self::from_fn(self.cols, self.rows, |i, j| self[(j, i)].clone())
+    }
+
+    /// Every entry times `factor`.
+    pub fn scaled(&self, factor: &R) -> Self {
+        self.map(|entry| entry.clone() * factor)
+    }
+
+    /// `(X + Xᵀ) / 2`: removes the rounding errors that make a symmetric result unsymmetric.
+    pub fn symmetric_part(&self) -> Self {
+        Self::from_fn(self.rows, self.cols, |i, j| {
+            (self[(i, j)].clone() + &self[(j, i)]).scale_by_power_of_two(-1)
+        })
+    }
+
+    /// The `rows`×`cols` block whose first entry is at (`top`, `left`).
+    pub fn block(&self, top: usize, left: usize, rows: usize, cols: usize) -> Self {
+        Self::from_fn(rows, cols, |i, j| self[(top + i, left + j)].clone())
+    }
+
+    /// A copy with `block` written over the entries from (`top`, `left`).
+    pub fn with_block(mut self, top: usize, left: usize, block: &Self) -> Self {
+        for i in 0..block.rows {
+            for j in 0..block.cols {
+                self[(top + i, left + j)] = block[(i, j)].clone();
+            }
+        }
+        self
+    }
+
+    /// `[self right]`.
+    pub fn beside(&self, right: &Self) -> Self {
+        Self::zeros(self.rows, self.cols + right.cols).with_block(0, 0, self).with_block(0, self.cols, right)
+    }
+
+    /// `[self; below]`.
+    pub fn above(&self, below: &Self) -> Self {
+        Self::zeros(self.rows + below.rows, self.cols).with_block(0, 0, self).with_block(self.rows, 0, below)
+    }
+
+    /// The largest column sum of absolute values, ‖·‖₁.
+    pub fn norm(&self) -> R {
+        (0..self.cols).map(|j| (0..self.rows).fold(R::zero(), |sum, i| sum + &self[(i, j)].abs())).fold(R::zero(), R::max)
+    }
+
+    /// The largest absolute value of an entry.
+    pub fn largest_entry(&self) -> R {
+        self.data.iter().map(R::abs).fold(R::zero(), R::max)
+    }
+}
+
+impl<R> Index<(usize, usize)> for Matrix<R> {
+    type Output = R;
+    fn index(&self, (i, j): (usize, usize)) -> &R {
+        &self.data[i * self.cols + j]
+    }
+}
+
+impl<R> IndexMut<(usize, usize)> for Matrix<R> {
+    fn index_mut(&mut self, (i, j): (usize, usize)) -> &mut R {
+        &mut self.data[i * self.cols + j]
+    }
+}
+
+impl<R: Real> Mul for &Matrix<R> {
+    type Output = Matrix<R>;
+    fn mul(self, right: &Matrix<R>) -> Matrix<R> {
+        assert_eq!(self.cols, right.rows, "inner dimensions of a product");
+        let mut product = Matrix::zeros(self.rows, right.cols);
+        for i in 0..self.rows {
+            for k in 0..self.cols {
+                let factor = &self[(i, k)];
+                if factor.is_zero() {
+                    continue; // models are sparse, and a wide product is not cheap
+                }
+                for j in 0..right.cols {
+                    let term = right[(k, j)].clone() * factor;
+                    let entry = &mut product[(i, j)];
+                    *entry = term + entry;
+                }
+            }
+        }
+        product
+    }
+}
+
+impl<R: Real> Add for &Matrix<R> {
+    type Output = Matrix<R>;
+    fn add(self, right: &Matrix<R>) -> Matrix<R> {
+        assert_eq!((self.rows, self.cols), (right.rows, right.cols), "dimensions of a sum");
+        Matrix::from_fn(self.rows, self.cols, |i, j| self[(i, j)].clone() + &right[(i, j)])
+    }
+}
+
+impl<R: Real> Sub for &Matrix<R> {
+    type Output = Matrix<R>;
+    fn sub(self, right: &Matrix<R>) -> Matrix<R> {
+        assert_eq!((self.rows, self.cols), (right.rows, right.cols), "dimensions of a difference");
+        Matrix::from_fn(self.rows, self.cols, |i, j| self[(i, j)].clone() - &right[(i, j)])
+    }
+}
+
+impl<R: Real> Neg for &Matrix<R> {
+    type Output = Matrix<R>;
+    fn neg(self) -> Matrix<R> {
+        self.map(|entry| -entry.clone())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn matrix(rows: &[&[f64]]) -> Matrix<f64> {
+        Matrix::from_f64_rows(&rows.iter().map(|row| row.to_vec()).collect::<Vec<_>>())
+    }
+
+    #[test]
+    fn products_and_blocks_follow_the_textbook() {
+        let a = matrix(&[&[1.0, 2.0], &[3.0, 4.0]]);
+        let b = matrix(&[&[0.0, 1.0], &[1.0, 1.0]]);
+        assert_eq!(&a * &b, matrix(&[&[2.0, 3.0], &[4.0, 7.0]]));
+        assert_eq!(a.transpose(), matrix(&[&[1.0, 3.0], &[2.0, 4.0]]));
+        assert_eq!(a.beside(&b).above(&b.beside(&a)).block(0, 2, 2, 2), b);
+        assert_eq!(a.norm(), 6.0);
+        assert_eq!((&a - &a).largest_entry(), 0.0);
+    }
+}

@@ -1,0 +1,11 @@
+//! The dense numeric kernel: one set of routines over any [`Real`], run in `f64` and in extended precision.
+
+mod matrix;
+mod real;
+mod solve;
+mod wide;
+
+pub use matrix::Matrix;
+pub use real::Real;
+pub use solve::{Lu, Singular, solve, solve_right};
+pub use wide::Wide;
