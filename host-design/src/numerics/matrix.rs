@@ -2,7 +2,7 @@
 
 use core::ops::{Add, Index, IndexMut, Mul, Neg, Sub};
 
-use super::Real;
+use super::{Real, Wide};
 
 /// A dense matrix, stored by rows.
 #[derive(Clone, Debug, PartialEq)]
@@ -77,7 +77,7 @@ impl<R: Real> Matrix<R> {
     }
 
     /// Applies `f` to every entry.
-    pub fn map<S: Real>(&self, f: impl FnMut(&R) -> S) -> Matrix<S> {
+    pub fn map<S>(&self, f: impl FnMut(&R) -> S) -> Matrix<S> {
         Matrix { rows: self.rows, cols: self.cols, data: self.data.iter().map(f).collect() }
     }
 
@@ -125,12 +125,29 @@ impl<R: Real> Matrix<R> {
 
     /// The largest column sum of absolute values, ‖·‖₁.
     pub fn norm(&self) -> R {
-        (0..self.cols).map(|j| (0..self.rows).fold(R::zero(), |sum, i| sum + &self[(i, j)].abs())).fold(R::zero(), R::max)
+        (0..self.cols)
+            .map(|j| (0..self.rows).fold(R::zero(), |sum, i| sum + &self[(i, j)].abs()))
+            .fold(R::zero(), R::max)
     }
 
     /// The largest absolute value of an entry.
     pub fn largest_entry(&self) -> R {
         self.data.iter().map(R::abs).fold(R::zero(), R::max)
+    }
+}
+
+impl<const BITS: usize> Matrix<Wide<BITS>> {
+    /// The matrix that calculation meant, with every entry passed through `round`: entries that are nothing but
+    /// rounding error, `2^(-BITS/2)` times smaller than the largest, become zero first.
+    pub fn rounded<S>(&self, mut round: impl FnMut(&Wide<BITS>) -> S) -> Matrix<S> {
+        let noise = self.largest_entry().scale_by_power_of_two(-(BITS as i32) / 2);
+        let zero = Wide::zero();
+        self.map(|entry| round(if entry.abs() < noise { &zero } else { entry }))
+    }
+
+    /// Rows of the nearest `f64` values.
+    pub fn round_to_f64_rows(&self) -> Vec<Vec<f64>> {
+        self.rounded(Wide::round_to_f64).to_f64_rows()
     }
 }
 

@@ -1,10 +1,14 @@
 //! The dense numeric kernel: one set of routines over any [`Real`], run in `f64` and in extended precision.
 
+mod eigenvalues;
+mod exponential;
 mod matrix;
 mod real;
 mod solve;
 mod wide;
 
+pub use eigenvalues::{Complex, NoConvergence, eigenvalues, spectral_radius};
+pub use exponential::exponential;
 pub use matrix::Matrix;
 pub use real::Real;
 pub use solve::{Lu, Singular, solve, solve_right};

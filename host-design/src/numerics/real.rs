@@ -55,11 +55,7 @@ pub trait Real:
     }
     /// Absolute value.
     fn abs(&self) -> Self {
-        if *self < Self::zero() {
-            -self.clone()
-        } else {
-            self.clone()
-        }
+        if *self < Self::zero() { -self.clone() } else { self.clone() }
     }
     /// Exactly zero.
     fn is_zero(&self) -> bool {
