@@ -2,3 +2,4 @@
 pub mod design;
 pub mod numerics;
 pub mod rig;
+pub mod table;

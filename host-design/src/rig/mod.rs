@@ -200,4 +200,12 @@ impl Rig {
             PlantDescription::Model(model) => model.b.len(),
         }
     }
+
+    /// Index of the state that follows the set-point: the cart position, or the model's output.
+    pub fn output(&self) -> usize {
+        match &self.plant {
+            PlantDescription::Chain(_) => 0,
+            PlantDescription::Model(model) => model.output,
+        }
+    }
 }

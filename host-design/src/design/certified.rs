@@ -1,0 +1,70 @@
+//! The guard that makes every gain the correctly rounded exact answer.
+
+use super::error::DesignError;
+use super::synthesis::{Design, Poles};
+use crate::numerics::Wide;
+use crate::rig::Rig;
+
+/// A design whose every number came out the same at two precisions.
+///
+/// The problem is stated by the `f64` values of the rig file and solved with at least 256 bits; it is then solved again
+/// with twice as many. If any entry rounds to another `f64` or another `f32`, the precision is doubled, and so on.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Certified {
+    /// Every value rounded once to `f64`.
+    pub double: Design<f64>,
+    /// Every value rounded once to `f32` (not by way of `f64`): what goes into the table.
+    pub single: Design<f32>,
+    /// Poles of [continuous, sampled] × [LQR, pole placement].
+    pub poles: [[Option<Poles>; 2]; 2],
+    /// The two precisions that agreed (bits).
+    pub bits: [usize; 2],
+}
+
+type Attempt = Result<Certified, DesignError>;
+
+fn attempt<const BITS: usize>(rig: &Rig) -> Attempt {
+    let design = Design::<Wide<BITS>>::of(rig)?;
+    Ok(Certified {
+        double: design.rounded(Wide::round_to_f64),
+        single: design.rounded(Wide::round_to_f32),
+        poles: design.poles()?,
+        bits: [BITS / 2, BITS],
+    })
+}
+
+/// Designs what `rig` asks for and certifies it.
+///
+/// # Errors
+/// [`DesignError`]: the reason, on which two precisions agreed as well; [`DesignError::Disagreement`] if even the
+/// highest ones give different gains.
+pub fn design(rig: &Rig) -> Result<Certified, DesignError> {
+    let (first, second) = std::thread::scope(|scope| {
+        let first = scope.spawn(|| attempt::<256>(rig));
+        let second = attempt::<512>(rig);
+        (first.join(), second)
+    });
+    let first = first.unwrap_or_else(|panic| std::panic::resume_unwind(panic));
+    if agree(&first, &second) {
+        return second;
+    }
+    let mut before = second;
+    for next in [attempt::<1024>, attempt::<2048>, attempt::<4096>] {
+        let after = next(rig);
+        if agree(&before, &after) {
+            return after;
+        }
+        before = after;
+    }
+    Err(before.err().unwrap_or(DesignError::Disagreement(2048, 4096)))
+}
+
+fn agree(low: &Attempt, high: &Attempt) -> bool {
+    match (low, high) {
+        (Ok(low), Ok(high)) => low.double == high.double && low.single == high.single,
+        // Not resolved yet is no answer.
+        (_, Err(DesignError::Unresolved { .. })) => false,
+        (Err(low), Err(high)) => core::mem::discriminant(low) == core::mem::discriminant(high),
+        _ => false,
+    }
+}

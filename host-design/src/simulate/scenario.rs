@@ -1,0 +1,60 @@
+//! What happens to the rig during a run.
+
+use upright::table::Law;
+
+use crate::rig::{PlantDescription, Rig};
+
+/// One run: start, set-point, disturbances.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Scenario {
+    /// Control law.
+    pub law: Law,
+    /// Length of the run (s).
+    pub duration_s: f64,
+    /// State at the start (m, m/s, rad, rad/s …).
+    pub start: Vec<f64>,
+    /// Set-point from `step_at_s` on (m); 0 before.
+    pub step_m: f64,
+    /// When the set-point steps (s).
+    pub step_at_s: f64,
+    /// Standard deviation of the disturbing force, drawn anew each tick (N).
+    pub force_noise_n: f64,
+    /// Standard deviation of the disturbing torque at each joint, drawn anew each tick (N·m).
+    pub torque_noise_n_m: f64,
+    /// Seed of the disturbances.
+    pub seed: u64,
+    /// Integration steps per tick.
+    pub substeps: usize,
+}
+
+impl Scenario {
+    /// A run at rest, upright, at set-point 0, for 10 s.
+    pub fn at_rest(rig: &Rig, law: Law) -> Self {
+        Self {
+            law,
+            duration_s: 10.0,
+            start: vec![0.0; rig.states()],
+            step_m: 0.0,
+            step_at_s: 0.0,
+            force_noise_n: 0.0,
+            torque_noise_n_m: 0.0,
+            seed: 1,
+            substeps: 4,
+        }
+    }
+
+    /// The run that every freshly designed table has to pass: a small lean of the first link (or a small offset of a
+    /// model's output) together with a small step, for ten time constants of the slowest pole.
+    pub fn acceptance(rig: &Rig, law: Law, slowest_time_constant_s: f64) -> Self {
+        let mut scenario = Self::at_rest(rig, law);
+        scenario.duration_s = (10.0 * slowest_time_constant_s).clamp(2.0, 120.0).max(20.0 * rig.tick.period_s);
+        match &rig.plant {
+            PlantDescription::Chain(_) => {
+                scenario.start[2] = 0.002;
+                scenario.step_m = 0.05;
+            }
+            PlantDescription::Model(model) => scenario.start[model.output] = 0.05,
+        }
+        scenario
+    }
+}
