@@ -4,7 +4,19 @@
 //! uniform rod, its inertia, an encoder's step from its counts) stay `None` here and are worked out where they are
 //! used, in that place's precision.
 
+pub mod defaults;
+mod describe;
+mod error;
+mod load;
+mod node;
+mod parse;
+mod rule;
+
+pub use error::{Place, RigError, RigErrorKind};
+pub use load::MAX_BYTES;
+
 use serde::Serialize;
+use sha2::{Digest, Sha256};
 
 /// A rig file, read and checked.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -192,10 +204,16 @@ pub struct Limits {
     pub speed_m_per_s: Option<f64>,
 }
 
-impl Rig {
+impl Default for Tick {
+    fn default() -> Self {
+        Tick { period_s: defaults::PERIOD_S, delay_ticks: defaults::DELAY_TICKS }
+    }
+}
+
+impl PlantDescription {
     /// Number of states: 2n + 2 for n links, or the order of the model.
     pub fn states(&self) -> usize {
-        match &self.plant {
+        match self {
             PlantDescription::Chain(chain) => 2 * chain.links.len() + 2,
             PlantDescription::Model(model) => model.b.len(),
         }
@@ -207,5 +225,22 @@ impl Rig {
             PlantDescription::Chain(_) => 0,
             PlantDescription::Model(model) => model.output,
         }
+    }
+}
+
+impl Rig {
+    /// Number of states: 2n + 2 for n links, or the order of the model.
+    pub fn states(&self) -> usize {
+        self.plant.states()
+    }
+
+    /// The first eight bytes of the SHA-256 of the checked values, as a big-endian number.
+    ///
+    /// Comments, layout and the order of keys in the file do not change it; any value does. A gain table carries it, so
+    /// that a controller and a host can tell whether they speak of the same rig.
+    pub fn hash(&self) -> u64 {
+        // Serialising plain structs of numbers and strings into memory cannot fail.
+        let values = serde_json::to_vec(self).expect("a rig is representable as JSON");
+        Sha256::digest(values).iter().take(8).fold(0, |hash, &byte| hash << 8 | u64::from(byte))
     }
 }

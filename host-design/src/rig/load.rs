@@ -1,0 +1,59 @@
+//! From a path to a checked [`Rig`].
+
+use std::fs::File;
+use std::io::{self, Read};
+use std::path::Path;
+
+use super::error::{RigError, RigErrorKind};
+use super::node::Source;
+use super::{Rig, parse};
+
+/// Largest rig file accepted (bytes): a hundred times what the longest sensible one needs.
+pub const MAX_BYTES: u64 = 1 << 20;
+
+impl Rig {
+    /// Reads and checks the rig file at `file`.
+    pub fn from_path(file: &Path) -> Result<Rig, RigError> {
+        let bytes = read(file).map_err(|kind| RigError::of_file(file, kind))?;
+        match std::str::from_utf8(&bytes) {
+            Ok(text) => Rig::from_toml(text, file),
+            Err(error) => {
+                let offset = error.valid_up_to();
+                let readable = String::from_utf8_lossy(&bytes[..offset]);
+                let source = Source { file, text: &readable };
+                Err(source.error(offset, None, RigErrorKind::NotUtf8 { offset }))
+            }
+        }
+    }
+
+    /// Checks the text of a rig file; `file` is the name its errors carry.
+    pub fn from_toml(text: &str, file: &Path) -> Result<Rig, RigError> {
+        if text.len() as u64 > MAX_BYTES {
+            return Err(RigError::of_file(file, RigErrorKind::TooLarge));
+        }
+        parse::rig(&Source { file, text })
+    }
+}
+
+/// The bytes of a file that is small enough.
+fn read(file: &Path) -> Result<Vec<u8>, RigErrorKind> {
+    let about = std::fs::metadata(file).map_err(refusal)?;
+    if about.is_dir() {
+        return Err(RigErrorKind::Directory);
+    }
+    if about.len() > MAX_BYTES {
+        return Err(RigErrorKind::TooLarge);
+    }
+    // Pipes and devices have no size to look at beforehand: stop reading one byte past the limit.
+    let mut bytes = Vec::new();
+    File::open(file).and_then(|open| open.take(MAX_BYTES + 1).read_to_end(&mut bytes)).map_err(refusal)?;
+    if bytes.len() as u64 > MAX_BYTES { Err(RigErrorKind::TooLarge) } else { Ok(bytes) }
+}
+
+fn refusal(error: io::Error) -> RigErrorKind {
+    match error.kind() {
+        io::ErrorKind::NotFound => RigErrorKind::NoFile,
+        io::ErrorKind::IsADirectory => RigErrorKind::Directory,
+        _ => RigErrorKind::Unreadable { reason: error.to_string() },
+    }
+}

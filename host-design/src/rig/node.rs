@@ -1,0 +1,307 @@
+//! The values of a TOML document, each with its full key and its place, so that an error can name both.
+
+use std::ops::Range;
+use std::path::Path;
+
+use toml_edit::{ArrayOfTables, Document, Item, TableLike, Value};
+
+use super::error::{Place, RigError, RigErrorKind};
+use super::rule::Rule;
+
+/// A rig file's text and name.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Source<'a> {
+    /// Name of the file.
+    pub(super) file: &'a Path,
+    /// Its text.
+    pub(super) text: &'a str,
+}
+
+impl<'a> Source<'a> {
+    /// An error at a byte offset.
+    pub(super) fn error(&self, offset: usize, key: Option<String>, kind: RigErrorKind) -> RigError {
+        let before = &self.text.as_bytes()[..offset.min(self.text.len())];
+        let line_start = before.iter().rposition(|&byte| byte == b'\n').map_or(0, |newline| newline + 1);
+        let place = Place {
+            line: before.iter().filter(|&&byte| byte == b'\n').count() + 1,
+            column: String::from_utf8_lossy(&before[line_start..]).chars().count() + 1,
+        };
+        RigError { file: self.file.to_owned(), place: Some(place), key, kind: Box::new(kind) }
+    }
+
+    /// The document, or where it stops being TOML.
+    pub(super) fn document(&self) -> Result<Document<&'a str>, RigError> {
+        Document::parse(self.text).map_err(|error| {
+            let span = error.span().unwrap_or(0..0);
+            if error.message().starts_with("duplicate key") {
+                let key = self.text.get(span.clone()).map(excerpt);
+                return self.error(span.start, key, RigErrorKind::Duplicate);
+            }
+            let message = error.message().lines().collect::<Vec<_>>().join(", ");
+            self.error(span.start, self.key_before(span.start), RigErrorKind::NotToml { message })
+        })
+    }
+
+    /// The key on the line of a byte offset, if one stands before it.
+    fn key_before(&self, offset: usize) -> Option<String> {
+        let (key, _) = self.text.get(..offset)?.rsplit('\n').next()?.split_once('=')?;
+        let key = key.trim();
+        let is_bare = |c: char| c.is_ascii_alphanumeric() || "_-.".contains(c);
+        (!key.is_empty() && key.chars().all(is_bare)).then(|| excerpt(key))
+    }
+}
+
+/// A piece of the user's text, short and on one line.
+pub(super) fn excerpt(text: &str) -> String {
+    const LONGEST: usize = 40;
+    let escape = |part: &str| part.escape_debug().to_string().replace("\\\"", "\"").replace("\\'", "'");
+    match text.char_indices().nth(LONGEST) {
+        Some((end, _)) => format!("{}…", escape(&text[..end])),
+        None => escape(text),
+    }
+}
+
+/// What stands behind a key.
+#[derive(Clone, Copy)]
+enum Found<'a> {
+    Table(&'a dyn TableLike),
+    Tables(&'a ArrayOfTables),
+    Value(&'a Value),
+}
+
+/// A value with its key and place.
+#[derive(Clone)]
+pub(super) struct Node<'a> {
+    source: &'a Source<'a>,
+    /// Full key, such as `link[2].mass_kg`.
+    pub(super) key: String,
+    span: Range<usize>,
+    found: Found<'a>,
+}
+
+impl<'a> Node<'a> {
+    /// An error about this value.
+    pub(super) fn error(&self, kind: RigErrorKind) -> RigError {
+        self.source.error(self.span.start, Some(self.key.clone()), kind)
+    }
+
+    /// The value as the file has it.
+    pub(super) fn as_written(&self) -> String {
+        match self.found {
+            Found::Table(_) => "a table".to_owned(),
+            Found::Tables(_) => "a list of tables".to_owned(),
+            Found::Value(value) => {
+                let text = excerpt(self.source.text.get(self.span.clone()).unwrap_or_default());
+                format!("{text} ({})", value.type_name())
+            }
+        }
+    }
+
+    /// An error saying that this value is of another type.
+    pub(super) fn wrong_type(&self, accepts: &str, remedy: &str) -> RigError {
+        self.error(RigErrorKind::WrongType {
+            found: self.as_written(),
+            accepts: accepts.to_owned(),
+            remedy: remedy.to_owned(),
+        })
+    }
+
+    /// An error saying that this value is outside what is accepted.
+    pub(super) fn out_of_range(&self, accepts: &str, remedy: &str) -> RigError {
+        let found = self.source.text.get(self.span.clone()).map(excerpt).unwrap_or_default();
+        self.error(RigErrorKind::OutOfRange { found, accepts: accepts.to_owned(), remedy: remedy.to_owned() })
+    }
+
+    /// A number, integers included. `meaning` completes "give ...".
+    pub(super) fn number(&self, rule: Rule, meaning: &str) -> Result<f64, RigError> {
+        let remedy = format!("give {meaning}");
+        let value = match self.found {
+            // Rounds beyond 2^53, which the bound below rejects anyway.
+            Found::Value(Value::Integer(integer)) => *integer.value() as f64,
+            Found::Value(Value::Float(float)) => *float.value(),
+            _ => return Err(self.wrong_type(rule.accepts, &remedy)),
+        };
+        if !value.is_finite() {
+            let found = self.source.text.get(self.span.clone()).map(excerpt).unwrap_or_default();
+            return Err(self.error(RigErrorKind::NotFinite { found, remedy }));
+        }
+        if !Rule::SANE.admits(value) {
+            return Err(self.out_of_range(Rule::SANE.accepts, &remedy));
+        }
+        if !rule.admits(value) {
+            return Err(self.out_of_range(rule.accepts, &remedy));
+        }
+        // Adding zero turns -0.0 into 0.0, which are one value and must hash as one.
+        Ok(value + 0.0)
+    }
+
+    /// An integer from 0 to `last`.
+    pub(super) fn index(&self, last: usize, accepts: &str, meaning: &str) -> Result<usize, RigError> {
+        let remedy = format!("give {meaning}");
+        let Found::Value(Value::Integer(integer)) = self.found else {
+            return Err(self.wrong_type(accepts, &remedy));
+        };
+        usize::try_from(*integer.value())
+            .ok()
+            .filter(|&index| index <= last)
+            .ok_or_else(|| self.out_of_range(accepts, &remedy))
+    }
+
+    /// A text.
+    pub(super) fn text(&self, accepts: &str, meaning: &str) -> Result<&'a str, RigError> {
+        match self.found {
+            Found::Value(Value::String(text)) => Ok(text.value()),
+            _ => Err(self.wrong_type(accepts, &format!("give {meaning}"))),
+        }
+    }
+
+    /// The entries of a list, keyed `key[1]`, `key[2]`, ...
+    pub(super) fn list(&self, accepts: &str, meaning: &str) -> Result<Vec<Node<'a>>, RigError> {
+        let entry = |(index, span, found): (usize, Option<Range<usize>>, Found<'a>)| Node {
+            source: self.source,
+            key: format!("{}[{}]", self.key, index + 1),
+            span: span.unwrap_or_else(|| self.span.clone()),
+            found,
+        };
+        match self.found {
+            Found::Tables(tables) => Ok(tables
+                .iter()
+                .enumerate()
+                .map(|(index, table)| entry((index, table.span(), Found::Table(table))))
+                .collect()),
+            Found::Value(Value::Array(array)) => Ok(array
+                .iter()
+                .enumerate()
+                .map(|(index, value)| entry((index, value.span(), of_value(value))))
+                .collect()),
+            _ => Err(self.wrong_type(accepts, &format!("give {meaning}"))),
+        }
+    }
+
+    /// A list of exactly `length` numbers.
+    pub(super) fn numbers(&self, length: usize, rule: Rule, meaning: &str) -> Result<Vec<f64>, RigError> {
+        let entries = self.list(&format!("a list of {length} numbers"), meaning)?;
+        if entries.len() != length {
+            return Err(self.wrong_length(entries.len(), &format!("{length}"), meaning));
+        }
+        entries.iter().map(|entry| entry.number(rule, meaning)).collect()
+    }
+
+    /// An error saying that this list has the wrong number of entries.
+    pub(super) fn wrong_length(&self, found: usize, accepts: &str, meaning: &str) -> RigError {
+        self.error(RigErrorKind::WrongLength {
+            found,
+            accepts: accepts.to_owned(),
+            remedy: format!("give {meaning}"),
+        })
+    }
+
+    /// A table.
+    pub(super) fn section(&self, known: &[&str]) -> Result<Section<'a>, RigError> {
+        let Found::Table(table) = self.found else {
+            let remedy = format!("write it as [{0}] with its keys below", self.key);
+            return Err(self.wrong_type("a table", &remedy));
+        };
+        let section = Section { source: self.source, key: self.key.clone(), start: self.span.start, table };
+        section.only(known)?;
+        Ok(section)
+    }
+}
+
+fn of_value(value: &Value) -> Found<'_> {
+    match value {
+        Value::InlineTable(table) => Found::Table(table),
+        other => Found::Value(other),
+    }
+}
+
+/// A table with its key and place.
+pub(super) struct Section<'a> {
+    source: &'a Source<'a>,
+    key: String,
+    start: usize,
+    table: &'a dyn TableLike,
+}
+
+impl<'a> Section<'a> {
+    /// The document itself; `known` are the keys and tables it may hold.
+    pub(super) fn root(
+        source: &'a Source<'a>,
+        document: &'a Document<&'a str>,
+        known: &[&str],
+    ) -> Result<Self, RigError> {
+        let root = Section { source, key: String::new(), start: 0, table: document.as_table() };
+        root.only(known)?;
+        Ok(root)
+    }
+
+    /// Rejects keys that are not known. Called first, so that a misspelt key is not reported as a missing one.
+    fn only(&self, known: &[&str]) -> Result<(), RigError> {
+        let Some((name, _)) = self.table.iter().find(|(name, _)| !known.contains(name)) else {
+            return Ok(());
+        };
+        let closeness = |candidate: &str| strsim::jaro_winkler(candidate, name);
+        let suggestion = known
+            .iter()
+            .filter(|candidate| name.len() <= 64 && closeness(candidate) >= 0.8)
+            .max_by(|a, b| closeness(a).total_cmp(&closeness(b)))
+            .map(|candidate| (*candidate).to_owned());
+        let start = self.table.key(name).and_then(|key| key.span()).map_or(self.start, |span| span.start);
+        let kind = RigErrorKind::UnknownKey { suggestion, accepts: known.join(", ") };
+        Err(self.source.error(start, Some(self.full_key(&excerpt(name))), kind))
+    }
+
+    fn full_key(&self, name: &str) -> String {
+        if self.key.is_empty() { name.to_owned() } else { format!("{}.{name}", self.key) }
+    }
+
+    /// The value of a key, if given.
+    pub(super) fn get(&self, name: &str) -> Option<Node<'a>> {
+        let (key, item) = self.table.get_key_value(name)?;
+        let found = match item {
+            Item::Table(table) => Found::Table(table),
+            Item::ArrayOfTables(tables) => Found::Tables(tables),
+            Item::Value(value) => of_value(value),
+            Item::None => return None,
+        };
+        // Tables that only dotted keys imply have no place of their own.
+        let span = item.span().or_else(|| key.span()).unwrap_or(self.start..self.start);
+        Some(Node { source: self.source, key: self.full_key(name), span, found })
+    }
+
+    /// An error saying that a key is absent. `meaning` completes "add".
+    pub(super) fn missing(&self, name: &str, meaning: &str) -> RigError {
+        let remedy = meaning.to_owned();
+        self.source.error(self.start, Some(self.full_key(name)), RigErrorKind::MissingKey { remedy })
+    }
+
+    /// The value of a key that must be given.
+    pub(super) fn need(&self, name: &str, meaning: &str) -> Result<Node<'a>, RigError> {
+        self.get(name).ok_or_else(|| self.missing(name, meaning))
+    }
+
+    /// A number that must be given.
+    pub(super) fn number(&self, name: &str, rule: Rule, meaning: &str) -> Result<f64, RigError> {
+        self.need(name, meaning)?.number(rule, meaning)
+    }
+
+    /// A number that may be given.
+    pub(super) fn number_if_given(
+        &self,
+        name: &str,
+        rule: Rule,
+        meaning: &str,
+    ) -> Result<Option<f64>, RigError> {
+        self.get(name).map(|node| node.number(rule, meaning)).transpose()
+    }
+
+    /// Rejects two keys that exclude each other; the error stands at the second.
+    pub(super) fn not_both(&self, first: &str, second: &str, remedy: &str) -> Result<(), RigError> {
+        match (self.get(first), self.get(second)) {
+            (Some(first), Some(second)) => {
+                Err(second.error(RigErrorKind::Conflict { other: first.key, remedy: remedy.to_owned() }))
+            }
+            _ => Ok(()),
+        }
+    }
+}

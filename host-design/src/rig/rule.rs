@@ -1,0 +1,43 @@
+//! The ranges that numbers of a rig file must lie in.
+
+use std::f64::consts::PI;
+
+/// A condition on a number, and its wording.
+#[derive(Clone, Copy)]
+pub(super) struct Rule {
+    /// What is accepted, for messages.
+    pub(super) accepts: &'static str,
+    admits: fn(f64) -> bool,
+}
+
+impl Rule {
+    /// Every number of a rig file: squares and products of these stay far from overflow and underflow.
+    pub(super) const SANE: Rule = Rule {
+        accepts: "0, or a number of magnitude 1e-30 to 1e15",
+        admits: |x| x == 0.0 || (1e-30..=1e15).contains(&x.abs()),
+    };
+    /// No further condition.
+    pub(super) const ANY: Rule = Rule { accepts: "a number", admits: |_| true };
+    /// Above zero.
+    pub(super) const POSITIVE: Rule = Rule { accepts: "a number > 0", admits: |x| x > 0.0 };
+    /// Zero or above.
+    pub(super) const NOT_NEGATIVE: Rule = Rule { accepts: "a number >= 0", admits: |x| x >= 0.0 };
+    /// Below zero.
+    pub(super) const NEGATIVE: Rule = Rule { accepts: "a number < 0", admits: |x| x < 0.0 };
+    /// A control period (s).
+    pub(super) const PERIOD: Rule =
+        Rule { accepts: "a number from 1e-6 to 10 (s)", admits: |x| (1e-6..=10.0).contains(&x) };
+    /// An overshoot in percent.
+    pub(super) const PERCENT: Rule =
+        Rule { accepts: "a number > 0 and < 100 (%)", admits: |x| x > 0.0 && x < 100.0 };
+    /// An angle up to half a turn (rad).
+    pub(super) const ANGLE: Rule =
+        Rule { accepts: "a number > 0 and <= pi (rad)", admits: |x| x > 0.0 && x <= PI };
+    /// Encoder counts per revolution.
+    pub(super) const COUNTS: Rule = Rule { accepts: "a number >= 2", admits: |x| x >= 2.0 };
+
+    /// Whether a number is accepted.
+    pub(super) fn admits(self, x: f64) -> bool {
+        (self.admits)(x)
+    }
+}
