@@ -1,3 +1,4 @@
 //! From a rig file to a model, gains, the const table and a verdict on the closed loop.
 pub mod numerics;
+pub mod plant;
 pub mod rig;
