@@ -1,0 +1,97 @@
+//! Simulation of a plant that a rig file gives as a linear model.
+
+use super::{Energy, Plant};
+use crate::numerics::Matrix;
+use crate::rig;
+
+/// `ẋ = A x + B u + G w` with its present state; G holds the noise columns of the rig file, if it gives any.
+#[derive(Debug, Clone, PartialEq)]
+pub struct LinearSimulation {
+    a: Matrix<f64>,
+    inputs: Matrix<f64>,
+    state: Vec<f64>,
+}
+
+/// Terms of the series after which even the slowest convergence (`‖A‖ h = 1`) is far below rounding: 1/25! = 6e-26.
+const TERMS: u32 = 25;
+
+impl LinearSimulation {
+    /// A simulation of `model`, at its origin.
+    ///
+    /// # Panics
+    /// If rows or columns of the model differ in length from its number of states.
+    pub fn of(model: &rig::LinearPlant) -> Self {
+        let s = model.b.len();
+        let noise = model.noise_input.as_deref().unwrap_or_default();
+        assert!(model.a.len() == s && model.a.iter().all(|row| row.len() == s), "A is s×s");
+        assert!(noise.iter().all(|column| column.len() == s), "a noise column has s entries");
+        Self {
+            a: Matrix::from_fn(s, s, |i, j| model.a[i][j]),
+            inputs: Matrix::from_fn(s, 1 + noise.len(), |i, j| match j {
+                0 => model.b[i],
+                _ => noise[j - 1][i],
+            }),
+            state: vec![0.0; s],
+        }
+    }
+
+    /// `B u + G w`.
+    fn drive(&self, force: f64, disturbances: &[f64]) -> Matrix<f64> {
+        assert_eq!(disturbances.len(), self.disturbances(), "one disturbance per noise column");
+        &self.inputs
+            * &Matrix::from_fn(self.inputs.cols(), 1, |i, _| match i {
+                0 => force,
+                _ => disturbances[i - 1],
+            })
+    }
+}
+
+impl Plant for LinearSimulation {
+    fn links(&self) -> usize {
+        0
+    }
+
+    fn states(&self) -> usize {
+        self.state.len()
+    }
+
+    fn disturbances(&self) -> usize {
+        self.inputs.cols() - 1
+    }
+
+    fn write_state(&self, state: &mut [f64]) {
+        state.copy_from_slice(&self.state);
+    }
+
+    fn set_state(&mut self, state: &[f64]) {
+        self.state.copy_from_slice(state);
+    }
+
+    fn rate(&self, state: &[f64], force: f64, disturbances: &[f64], rate: &mut [f64]) {
+        assert_eq!(state.len(), self.states(), "length of the state");
+        let sum = &(&self.a * &Matrix::column(state)) + &self.drive(force, disturbances);
+        rate.copy_from_slice(sum.entries());
+    }
+
+    /// Exact to rounding with any number of substeps: with the input held,
+    /// `x(t + h) = x + Σ_{i>=1} h^i / i! A^(i-1) (A x + B u)`, summed over pieces with `‖A‖ h <= 1`.
+    fn advance(&mut self, force: f64, disturbances: &[f64], dt: f64, substeps: usize) {
+        let drive = self.drive(force, disturbances);
+        let pieces = (self.a.norm() * dt.abs()).ceil().max(substeps as f64).max(1.0);
+        let h = dt / pieces;
+        let mut x = Matrix::column(&self.state);
+        for _ in 0..pieces as u64 {
+            let mut term = (&(&self.a * &x) + &drive).scaled(&h);
+            x = &x + &term;
+            for i in 2..=TERMS {
+                term = (&self.a * &term).scaled(&(h / f64::from(i)));
+                x = &x + &term;
+            }
+        }
+        self.state.copy_from_slice(x.entries());
+    }
+
+    fn energy(&self) -> Option<Energy> {
+        None
+    }
+}

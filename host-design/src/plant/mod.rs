@@ -1,0 +1,53 @@
+//! The plant: links on a cart, or a given linear model, as equations of motion, linear models and simulations.
+//!
+//! Model (F. J. Ticona Coaquira, for n = 4; here any n >= 1). The joint angle `θ_i` of link i is relative to the
+//! link before it, counter-clockwise positive, 0 upright; `φ_i = θ_1 + … + θ_i` is the absolute angle. The centre of
+//! mass of link i is at
+//!
+//! ```text
+//! ( x - Σ_{j<i} l_j sin φ_j - c_i sin φ_i,   Σ_{j<i} l_j cos φ_j + c_i cos φ_i )
+//! ```
+//!
+//! Every state vector of this module is `x, ẋ, θ_1, θ̇_1, …, θ_n, θ̇_n` (m, m/s, rad, rad/s). Inside, the equations
+//! are written in `x, φ`, where the mass matrix is simple (see [`ChainParameters`]).
+//!
+//! - [`ChainParameters`]: the constants of the equations, in any precision.
+//! - [`linearise`]: the exact linear model about an equilibrium, in any precision.
+//! - [`ChainPlant`]: the nonlinear equations in `f64`, fast, with n in the type.
+//! - [`Plant`]: what a simulation of any size needs; [`chain_plant`] and [`LinearSimulation`] provide it.
+//! - [`reference::integrate`]: an adaptive integrator of high order, to judge the fast one by.
+
+mod chain;
+mod linear;
+mod linear_simulation;
+mod parameters;
+pub mod reference;
+mod rk4;
+mod simulation;
+mod sincos;
+
+pub use chain::{ChainPlant, ChainState, Energy};
+pub use linear::{Equilibrium, LinearModel, linearise};
+pub use linear_simulation::LinearSimulation;
+pub use parameters::ChainParameters;
+pub use simulation::{ChainSimulation, MAX_LINKS, Plant, chain_plant};
+pub use sincos::sin_cos;
+
+/// The plant cannot be built for this number of links.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum PlantError {
+    /// The number of links in the type is not that of the chain.
+    #[error("the chain has {links} links, but this plant was compiled for {compiled}")]
+    WrongLinks {
+        /// Links of the chain.
+        links: usize,
+        /// Links in the type.
+        compiled: usize,
+    },
+    /// No compiled plant has this many links.
+    #[error("a chain of {links} links cannot be simulated: give 1 to {MAX_LINKS} links")]
+    UnsupportedLinks {
+        /// Links of the chain.
+        links: usize,
+    },
+}

@@ -1,0 +1,97 @@
+//! The constants of a chain's equations of motion.
+
+use crate::numerics::{Matrix, Real};
+use crate::rig;
+
+/// The constants of the equations of motion in `x, φ` for n links.
+///
+/// With `h_ij = l_j` for `j < i`, `c_i` for `j = i` and 0 for `j > i`, so that link i's centre of mass is
+/// at `(x - Σ_j h_ij sin φ_j, Σ_j h_ij cos φ_j)`, Lagrange's equations (Goldstein, *Classical Mechanics*, §1.4) of
+///
+/// ```text
+/// a_j = Σ_i m_i h_ij,   b_jk = Σ_i m_i h_ij h_ik + δ_jk I_j,   V = g Σ_j a_j cos φ_j
+/// T = ½ M_t ẋ² - ẋ Σ_j a_j cos φ_j φ̇_j + ½ Σ_jk b_jk cos(φ_j - φ_k) φ̇_j φ̇_k
+/// ```
+///
+/// are
+///
+/// ```text
+/// M_t ẍ - Σ_j a_j cos φ_j φ̈_j + Σ_j a_j sin φ_j φ̇_j² = u - d_0 ẋ
+/// -a_j cos φ_j ẍ + Σ_k b_jk (cos(φ_j - φ_k) φ̈_k + sin(φ_j - φ_k) φ̇_k²) - g a_j sin φ_j = Q_j
+/// Q_j = τ_j - τ_{j+1},   τ_i = (torque given at joint i) - d_i θ̇_i,   τ_{n+1} = 0
+/// ```
+#[derive(Debug, Clone, PartialEq)]
+pub struct ChainParameters<R> {
+    /// `M_t`: mass of cart and links together (kg).
+    pub total_mass: R,
+    /// `a_j`, n entries (kg·m).
+    pub a: Vec<R>,
+    /// `b_jk`, n×n, symmetric (kg·m²).
+    pub b: Matrix<R>,
+    /// `g` (m/s²).
+    pub gravity: R,
+    /// `d_0`: viscous friction of the cart (N·s/m).
+    pub cart_friction: R,
+    /// `d_i`: viscous friction of each joint on its relative rate, n entries (N·m·s/rad).
+    pub joint_frictions: Vec<R>,
+}
+
+impl<R: Real> ChainParameters<R> {
+    /// Works out the constants from the exact values in a rig file. A centre of mass that is not given is `l/2`, an
+    /// inertia that is not given is that of a uniform rod, `m l²/12`, both rounded only in `R`.
+    pub fn of(chain: &rig::Chain) -> Self {
+        let n = chain.links.len();
+        let mass: Vec<R> = chain.links.iter().map(|link| R::from_f64(link.mass_kg)).collect();
+        let length: Vec<R> = chain.links.iter().map(|link| R::from_f64(link.length_m)).collect();
+        let h = |i: usize, j: usize| match j.cmp(&i) {
+            core::cmp::Ordering::Less => length[j].clone(),
+            core::cmp::Ordering::Equal => match chain.links[i].centre_of_mass_m {
+                Some(given) => R::from_f64(given),
+                None => length[i].scale_by_power_of_two(-1),
+            },
+            core::cmp::Ordering::Greater => R::zero(),
+        };
+        let inertia = |j: usize| match chain.links[j].inertia_kg_m2 {
+            Some(given) => R::from_f64(given),
+            None => mass[j].clone() * &length[j] * &length[j] / &R::from_f64(12.0),
+        };
+        Self {
+            total_mass: mass.iter().fold(R::from_f64(chain.cart.mass_kg), |sum, m| sum + m),
+            a: (0..n).map(|j| (j..n).fold(R::zero(), |sum, i| sum + &(h(i, j) * &mass[i]))).collect(),
+            b: Matrix::from_fn(n, n, |j, k| {
+                let of_rotation = if j == k { inertia(j) } else { R::zero() };
+                (j.max(k)..n).fold(of_rotation, |sum, i| sum + &(h(i, j) * &h(i, k) * &mass[i]))
+            }),
+            gravity: R::from_f64(chain.gravity_m_per_s2),
+            cart_friction: R::from_f64(chain.cart.friction_n_s_per_m),
+            joint_frictions: chain
+                .links
+                .iter()
+                .map(|link| R::from_f64(link.friction_n_m_s_per_rad))
+                .collect(),
+        }
+    }
+
+    /// Number of links, n.
+    pub fn links(&self) -> usize {
+        self.a.len()
+    }
+
+    /// The mass matrix in `x, φ_1, …, φ_n` at the absolute angles `phi` (n entries, rad): (n+1)×(n+1),
+    ///
+    /// ```text
+    /// [ M_t             -a_k cos φ_k           ]
+    /// [ -a_j cos φ_j    b_jk cos(φ_j - φ_k)    ]
+    /// ```
+    ///
+    /// # Panics
+    /// If `phi` has fewer than n entries.
+    pub fn mass_matrix(&self, phi: &[R]) -> Matrix<R> {
+        let coupling = |j: usize| -(phi[j].cos() * &self.a[j]);
+        Matrix::from_fn(self.links() + 1, self.links() + 1, |row, column| match (row, column) {
+            (0, 0) => self.total_mass.clone(),
+            (0, j) | (j, 0) => coupling(j - 1),
+            (j, k) => (phi[j - 1].clone() - &phi[k - 1]).cos() * &self.b[(j - 1, k - 1)],
+        })
+    }
+}

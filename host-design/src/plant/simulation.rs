@@ -1,0 +1,124 @@
+//! Simulation of a plant of any size behind one object-safe trait.
+
+use super::{ChainParameters, ChainPlant, ChainState, Energy, PlantError};
+use crate::rig;
+
+/// The largest number of links that [`chain_plant`] can simulate.
+pub const MAX_LINKS: usize = 14;
+
+/// A plant that can be moved forward in time.
+///
+/// States of a chain are in the order of this module: `x, ẋ, θ_1, θ̇_1, …` with relative angles; those of a linear
+/// model in the order of its matrices. A slice of another length than asked for is a mistake in the program: every
+/// method that takes a slice panics on it.
+pub trait Plant: Send {
+    /// Number of links; 0 for a linear model.
+    fn links(&self) -> usize;
+
+    /// Length of the state.
+    fn states(&self) -> usize;
+
+    /// Number of disturbance inputs: the n joint torques of a chain, the noise columns of a linear model.
+    fn disturbances(&self) -> usize;
+
+    /// Copies the state out ([`states`](Self::states) entries).
+    fn write_state(&self, state: &mut [f64]);
+
+    /// Puts the plant into a state ([`states`](Self::states) entries).
+    fn set_state(&mut self, state: &[f64]);
+
+    /// Writes the rate of change of `state` under `force` (N) and `disturbances` (joint torques in N·m) into `rate`.
+    /// Uses and changes nothing of the plant's own state.
+    fn rate(&self, state: &[f64], force: f64, disturbances: &[f64], rate: &mut [f64]);
+
+    /// Moves the plant forward by `dt` (s) in `substeps` equal steps (0 counts as 1) with `force` (N) and
+    /// `disturbances` (joint torques in N·m) held.
+    fn advance(&mut self, force: f64, disturbances: &[f64], dt: f64, substeps: usize);
+
+    /// Mechanical energy; none for a linear model.
+    fn energy(&self) -> Option<Energy>;
+}
+
+/// N links on a cart with their present state.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ChainSimulation<const N: usize> {
+    /// The equations of motion.
+    pub plant: ChainPlant<N>,
+    /// The present state.
+    pub state: ChainState<N>,
+}
+
+fn joint_torques<const N: usize>(disturbances: &[f64]) -> [f64; N] {
+    assert_eq!(disturbances.len(), N, "a chain of {N} links has {N} joint torques");
+    core::array::from_fn(|i| disturbances[i])
+}
+
+impl<const N: usize> Plant for ChainSimulation<N> {
+    fn links(&self) -> usize {
+        N
+    }
+
+    fn states(&self) -> usize {
+        2 * N + 2
+    }
+
+    fn disturbances(&self) -> usize {
+        N
+    }
+
+    fn write_state(&self, state: &mut [f64]) {
+        self.state.write_relative(state);
+    }
+
+    fn set_state(&mut self, state: &[f64]) {
+        self.state = ChainState::from_relative(state);
+    }
+
+    fn rate(&self, state: &[f64], force: f64, disturbances: &[f64], rate: &mut [f64]) {
+        // The way from absolute to relative angles is linear, so rates go the same way as states.
+        self.plant
+            .derivative(&ChainState::from_relative(state), force, &joint_torques(disturbances))
+            .write_relative(rate);
+    }
+
+    fn advance(&mut self, force: f64, disturbances: &[f64], dt: f64, substeps: usize) {
+        let torques = joint_torques(disturbances);
+        let substeps = substeps.max(1);
+        let step = dt / substeps as f64;
+        for _ in 0..substeps {
+            self.state = self.plant.rk4(&self.state, force, &torques, step);
+        }
+    }
+
+    fn energy(&self) -> Option<Energy> {
+        Some(self.plant.energy(&self.state))
+    }
+}
+
+/// A simulation of `chain`, at rest with every link upright.
+///
+/// # Errors
+/// [`PlantError::UnsupportedLinks`] unless the chain has 1 to [`MAX_LINKS`] links.
+pub fn chain_plant(chain: &rig::Chain) -> Result<Box<dyn Plant>, PlantError> {
+    fn boxed<const N: usize>(chain: &rig::Chain) -> Result<Box<dyn Plant>, PlantError> {
+        let plant = ChainPlant::<N>::new(&ChainParameters::of(chain))?;
+        Ok(Box::new(ChainSimulation { plant, state: ChainState::UPRIGHT }))
+    }
+    match chain.links.len() {
+        1 => boxed::<1>(chain),
+        2 => boxed::<2>(chain),
+        3 => boxed::<3>(chain),
+        4 => boxed::<4>(chain),
+        5 => boxed::<5>(chain),
+        6 => boxed::<6>(chain),
+        7 => boxed::<7>(chain),
+        8 => boxed::<8>(chain),
+        9 => boxed::<9>(chain),
+        10 => boxed::<10>(chain),
+        11 => boxed::<11>(chain),
+        12 => boxed::<12>(chain),
+        13 => boxed::<13>(chain),
+        14 => boxed::<14>(chain),
+        links => Err(PlantError::UnsupportedLinks { links }),
+    }
+}
