@@ -92,11 +92,15 @@ impl core::fmt::Display for TableError {
         f.write_str(match self {
             TableError::Format => "the table has another layout: run `upright design` of this version again",
             TableError::States => "the table's number of states is not that of this build",
-            TableError::Crc => "the table's checksum is wrong: it was changed or damaged, run `upright design` again",
+            TableError::Crc => {
+                "the table's checksum is wrong: it was changed or damaged, run `upright design` again"
+            }
             TableError::RigHash => "the table was designed for another rig",
             TableError::Tick => "the table was designed for another control period",
             TableError::Delay => "the table's delay is neither 0 nor 1 tick",
-            TableError::Value => "the table holds a value that is not finite or a force limit that is not positive",
+            TableError::Value => {
+                "the table holds a value that is not finite or a force limit that is not positive"
+            }
             TableError::NoLaw => "the table holds no control law",
         })
     }

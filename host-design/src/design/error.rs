@@ -36,7 +36,9 @@ impl fmt::Display for Task {
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum DesignError {
     /// Some motion moves no mass.
-    #[error("the mass matrix has no inverse: some motion of the chain moves no mass; give every link a mass and a centre of mass or an inertia")]
+    #[error(
+        "the mass matrix has no inverse: some motion of the chain moves no mass; give every link a mass and a centre of mass or an inertia"
+    )]
     MassMatrix,
     /// Poles cannot be placed because some modes do not feel the force.
     #[error("{task}: the force does not reach {}: these poles cannot be moved; choose another input b, or use [lqr] alone if they are stable", mode_list(.modes))]
@@ -71,7 +73,9 @@ pub enum DesignError {
         wanted: usize,
     },
     /// Unstable growth within one tick exceeds single precision.
-    #[error("tick.period_s = {tick_s} s is too long: the unstable pole at {pole:.4} 1/s grows {growth:.1e}-fold in one tick, more than single precision resolves (1.7e7); shorten the tick")]
+    #[error(
+        "tick.period_s = {tick_s} s is too long: the unstable pole at {pole:.4} 1/s grows {growth:.1e}-fold in one tick, more than single precision resolves (1.7e7); shorten the tick"
+    )]
     TickTooLong {
         /// Control period (s).
         tick_s: f64,
@@ -81,7 +85,9 @@ pub enum DesignError {
         growth: f64,
     },
     /// No solution was found and no reason is known.
-    #[error("{task}: no stabilising solution could be resolved with {bits} bits: the problem is degenerate (a closed-loop pole on the stability boundary) or extremely badly scaled; check weights and units")]
+    #[error(
+        "{task}: no stabilising solution could be resolved with {bits} bits: the problem is degenerate (a closed-loop pole on the stability boundary) or extremely badly scaled; check weights and units"
+    )]
     Unresolved {
         /// Which design.
         task: Task,
@@ -89,7 +95,9 @@ pub enum DesignError {
         bits: usize,
     },
     /// Two precisions gave different answers up to the highest one.
-    #[error("the gains still changed between {0} and {1} bits: the problem is extremely badly conditioned; check units and the tick")]
+    #[error(
+        "the gains still changed between {0} and {1} bits: the problem is extremely badly conditioned; check units and the tick"
+    )]
     Disagreement(usize, usize),
     /// The eigenvalue iteration failed.
     #[error("the poles could not be computed: the plant has entries of extreme size; check units")]

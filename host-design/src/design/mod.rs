@@ -1,5 +1,6 @@
 //! Control design: from a linear model to gains, each the correctly rounded exact answer.
 
+mod assessment;
 mod certified;
 mod controllability;
 mod doubling;
@@ -9,6 +10,7 @@ mod riccati;
 mod synthesis;
 mod zero_order_hold;
 
+pub use assessment::Assessment;
 pub use certified::{Certified, design};
 pub use controllability::Reach;
 pub use error::{DesignError, Task};

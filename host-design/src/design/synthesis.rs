@@ -46,7 +46,10 @@ pub struct Feedback<T> {
 
 impl<T> Laws<T> {
     fn try_map<S, E>(&self, mut f: impl FnMut(&Feedback<T>) -> Result<S, E>) -> Result<[Option<S>; 2], E> {
-        Ok([self.lqr.as_ref().map(&mut f).transpose()?, self.pole_placement.as_ref().map(&mut f).transpose()?])
+        Ok([
+            self.lqr.as_ref().map(&mut f).transpose()?,
+            self.pole_placement.as_ref().map(&mut f).transpose()?,
+        ])
     }
 }
 
@@ -89,7 +92,8 @@ impl<R: Real> Design<R> {
             let k = care(&a, &b, &cost).map_err(|_| why_no_lqr(Task::ContinuousLqr, &a, &b, &cost))?.k;
             design.continuous.lqr = Some(continuous_feedback(k));
             let tick_cost = sampled_cost(&a, &b, &cost, &period);
-            let k = dare(&ad, &bd, &tick_cost).map_err(|_| why_no_lqr(Task::SampledLqr, &ad, &bd, &tick_cost))?.k;
+            let k =
+                dare(&ad, &bd, &tick_cost).map_err(|_| why_no_lqr(Task::SampledLqr, &ad, &bd, &tick_cost))?.k;
             design.sampled.lqr = Some(sampled_feedback(k));
         }
         if let Some(placement) = &rig.pole_placement {
@@ -235,7 +239,11 @@ fn why_no_lqr<R: Real>(task: Task, a: &Matrix<R>, b: &Matrix<R>, cost: &Cost<R>)
     let fuzz = R::one().scale_by_power_of_two(-(R::BITS as i32) / 8);
     // How far outside the stability region a mode lies, relative to the size of the plant.
     let excess = |mode: &Complex<R>| {
-        if task.is_sampled() { mode.modulus() - &R::one() } else { mode.re.clone() / &a.norm().max(fuzz.clone()) }
+        if task.is_sampled() {
+            mode.modulus() - &R::one()
+        } else {
+            mode.re.clone() / &a.norm().max(fuzz.clone())
+        }
     };
     let named = |modes: Vec<&Complex<R>>| modes.into_iter().map(Complex::to_f64).collect::<Poles>();
     if let Ok(modes) = Reach::of(a, b).unreachable_modes() {

@@ -12,6 +12,33 @@ pub struct Matrix<R> {
     data: Vec<R>,
 }
 
+impl<R> Matrix<R> {
+    /// Number of rows.
+    pub fn rows(&self) -> usize {
+        self.rows
+    }
+
+    /// Number of columns.
+    pub fn cols(&self) -> usize {
+        self.cols
+    }
+
+    /// All entries, row by row.
+    pub fn entries(&self) -> &[R] {
+        &self.data
+    }
+
+    /// The rows as slices.
+    pub fn row_slices(&self) -> impl Iterator<Item = &[R]> {
+        (0..self.rows).map(|i| &self.data[i * self.cols..(i + 1) * self.cols])
+    }
+
+    /// Applies `f` to every entry.
+    pub fn map<S>(&self, f: impl FnMut(&R) -> S) -> Matrix<S> {
+        Matrix { rows: self.rows, cols: self.cols, data: self.data.iter().map(f).collect() }
+    }
+}
+
 impl<R: Real> Matrix<R> {
     /// The matrix whose entry at (row, column) is `entry(row, column)`.
     pub fn from_fn(rows: usize, cols: usize, mut entry: impl FnMut(usize, usize) -> R) -> Self {
@@ -56,29 +83,9 @@ impl<R: Real> Matrix<R> {
         (0..self.rows).map(|i| (0..self.cols).map(|j| self[(i, j)].to_f64()).collect()).collect()
     }
 
-    /// Number of rows.
-    pub fn rows(&self) -> usize {
-        self.rows
-    }
-
-    /// Number of columns.
-    pub fn cols(&self) -> usize {
-        self.cols
-    }
-
-    /// All entries, row by row.
-    pub fn entries(&self) -> &[R] {
-        &self.data
-    }
-
     /// Whether every entry is finite.
     pub fn is_finite(&self) -> bool {
         self.data.iter().all(R::is_finite)
-    }
-
-    /// Applies `f` to every entry.
-    pub fn map<S>(&self, f: impl FnMut(&R) -> S) -> Matrix<S> {
-        Matrix { rows: self.rows, cols: self.cols, data: self.data.iter().map(f).collect() }
     }
 
     /// The transpose.

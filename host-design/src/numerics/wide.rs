@@ -177,7 +177,6 @@ fn nearest(x: &BigFloat, format: &Format) -> u64 {
     let (Some(&top), rest) = (words.last(), &words[..words.len().saturating_sub(1)]) else {
         return sign;
     };
-    let top = top as u64;
     let sticky = rest.iter().any(|&word| word != 0);
     let exponent = i64::from(exponent) - 1;
     let min_exponent = 1 - format.max_exponent;

@@ -193,7 +193,7 @@ impl Page {
         self.value("supply", motor.supply_v, "V", "");
         self.value("dead zone", motor.dead_zone_v, "V", mark(motor.dead_zone_v == defaults::DEAD_ZONE_V));
         self.value_or_none("slew", motor.slew_v_per_s, "V/s");
-        self.value("force at standstill", force_per_volt * motor.supply_v, "N", "(largest)");
+        self.value("force at standstill", motor.stall_force_n(), "N", "(largest)");
         self.value("speed without load", speed_per_volt * motor.supply_v, "m/s", "(largest)");
         // Fb = (Kt N / r)^2 / R: what back-EMF takes away, seen by the cart as viscous friction.
         self.value("braking by back-EMF", force_per_volt / speed_per_volt, "N·s/m", "");

@@ -218,13 +218,13 @@ impl PlantDescription {
             PlantDescription::Model(model) => model.b.len(),
         }
     }
+}
 
-    /// Index of the state that follows the set-point: the cart position, or the model's output.
-    pub fn output(&self) -> usize {
-        match &self.plant {
-            PlantDescription::Chain(_) => 0,
-            PlantDescription::Model(model) => model.output,
-        }
+impl Motor {
+    /// Force on the cart at standstill and full supply, `gear Kt V / (R r)` (N).
+    pub fn stall_force_n(&self) -> f64 {
+        self.gear_ratio * self.torque_constant_n_m_per_a * self.supply_v
+            / (self.resistance_ohm * self.pulley_radius_m)
     }
 }
 
@@ -232,6 +232,24 @@ impl Rig {
     /// Number of states: 2n + 2 for n links, or the order of the model.
     pub fn states(&self) -> usize {
         self.plant.states()
+    }
+
+    /// The largest force on the cart (N): the limit the file gives, and what the motor can push at standstill, if there
+    /// is one; the smaller of the two. None: no limit.
+    pub fn force_limit_n(&self) -> Option<f64> {
+        let stall = self.actuator.motor.as_ref().map(Motor::stall_force_n);
+        match (self.actuator.force_limit_n, stall) {
+            (Some(limit), Some(stall)) => Some(limit.min(stall)),
+            (limit, stall) => limit.or(stall),
+        }
+    }
+
+    /// Index of the state that follows the set-point: the cart position, or the model's output.
+    pub fn output(&self) -> usize {
+        match &self.plant {
+            PlantDescription::Chain(_) => 0,
+            PlantDescription::Model(model) => model.output,
+        }
     }
 
     /// The first eight bytes of the SHA-256 of the checked values, as a big-endian number.

@@ -39,7 +39,11 @@ pub enum SimulationError {
 ///
 /// # Errors
 /// [`SimulationError`] if the firmware refuses the table or the scenario, or the plant cannot be built.
-pub fn simulate(rig: &Rig, table: &TableValues, scenario: &Scenario) -> Result<(Trace, Summary), SimulationError> {
+pub fn simulate(
+    rig: &Rig,
+    table: &TableValues,
+    scenario: &Scenario,
+) -> Result<(Trace, Summary), SimulationError> {
     let states = rig.states();
     let run = Run { rig, table, scenario };
     let (trace, fall) = with_states(states, run).ok_or(SimulationError::TooManyStates(states))??;

@@ -7,7 +7,7 @@ mod summary;
 mod trace;
 
 pub use closed_loop::{SimulationError, simulate};
-pub use plot::svg;
+pub use plot::{PlotError, svg};
 pub use scenario::Scenario;
 pub use summary::{Fall, FallKind, Summary};
 pub use trace::Trace;

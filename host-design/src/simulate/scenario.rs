@@ -47,7 +47,8 @@ impl Scenario {
     /// model's output) together with a small step, for ten time constants of the slowest pole.
     pub fn acceptance(rig: &Rig, law: Law, slowest_time_constant_s: f64) -> Self {
         let mut scenario = Self::at_rest(rig, law);
-        scenario.duration_s = (10.0 * slowest_time_constant_s).clamp(2.0, 120.0).max(20.0 * rig.tick.period_s);
+        scenario.duration_s =
+            (10.0 * slowest_time_constant_s).clamp(2.0, 120.0).max(20.0 * rig.tick.period_s);
         match &rig.plant {
             PlantDescription::Chain(_) => {
                 scenario.start[2] = 0.002;

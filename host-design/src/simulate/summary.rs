@@ -74,7 +74,11 @@ impl Summary {
         let band = (0.02 * step.abs()).max(1e-3);
         let is_chain = matches!(rig.plant, PlantDescription::Chain(_));
         let angles = |state: &[f64]| -> Vec<f64> {
-            if is_chain { state.iter().skip(2).step_by(2).map(|angle| angle.abs()).collect() } else { Vec::new() }
+            if is_chain {
+                state.iter().skip(2).step_by(2).map(|angle| angle.abs()).collect()
+            } else {
+                Vec::new()
+            }
         };
         let mut peak_angles_rad = angles(&scenario.start);
         let (mut peak_force_n, mut peak_requested_force_n) = (0.0f64, 0.0f64);
@@ -100,8 +104,8 @@ impl Summary {
         }
         let end = trace.samples().last().map_or(0.0, |sample| sample.t);
         let settled = fall.is_none() && last_outside != Some(end);
-        let settling_time_s =
-            settled.then(|| last_outside.map_or(0.0, |t| (t + rig.tick.period_s - scenario.step_at_s).max(0.0)));
+        let settling_time_s = settled
+            .then(|| last_outside.map_or(0.0, |t| (t + rig.tick.period_s - scenario.step_at_s).max(0.0)));
         let percent = |excursion: f64| (step != 0.0).then(|| 100.0 * excursion / step.abs());
         Self {
             fall,
@@ -135,7 +139,11 @@ impl fmt::Display for Summary {
         for (index, angle) in self.peak_angles_rad.iter().enumerate() {
             writeln!(f, "  peak theta{}    {:.4} rad ({:.2} deg)", index + 1, angle, angle.to_degrees())?;
         }
-        writeln!(f, "  peak force     {:.3} N (asked for: {:.3} N)", self.peak_force_n, self.peak_requested_force_n)?;
+        writeln!(
+            f,
+            "  peak force     {:.3} N (asked for: {:.3} N)",
+            self.peak_force_n, self.peak_requested_force_n
+        )?;
         write!(f, "  final error    {:.2e} m", self.final_error_m)
     }
 }

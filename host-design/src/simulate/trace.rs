@@ -71,13 +71,12 @@ impl Trace {
     ///
     /// # Errors
     /// Those of `out`.
-    pub fn write_csv(&self, out: impl Write) -> Result<(), csv::Error> {
+    pub fn write_csv(&self, out: impl Write) -> std::io::Result<()> {
         let mut csv = csv::Writer::from_writer(out);
         csv.write_record(&self.columns)?;
         for row in self.samples.chunks_exact(self.columns.len()) {
             csv.write_record(row.iter().map(f64::to_string))?;
         }
-        csv.flush()?;
-        Ok(())
+        csv.flush()
     }
 }

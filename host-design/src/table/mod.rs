@@ -7,7 +7,7 @@ mod write;
 use serde::Serialize;
 use upright::table::{Build, GainTable, LawGains, TABLE_FORMAT, column};
 
-use crate::design::{Certified, Feedback};
+use crate::design::{Feedback, Laws};
 use crate::rig::Rig;
 
 pub use any_size::{MAX_STATES, WithStates, with_states};
@@ -69,24 +69,28 @@ pub enum NoTable {
 }
 
 impl TableValues {
-    /// The table of a certified design: sampled gains, each rounded once to `f32`.
+    /// The table of a rig with these gains, each already rounded once to `f32`.
     ///
     /// # Errors
     /// [`NoTable`] if there is no law, a value does not fit, or there are too many states.
-    pub fn of(rig: &Rig, design: &Certified) -> Result<Self, NoTable> {
+    pub fn of(rig: &Rig, laws: &Laws<f32>) -> Result<Self, NoTable> {
         let states = rig.states();
         if states > MAX_STATES {
             return Err(NoTable::TooManyStates { states });
         }
-        let law = |feedback: &Option<Feedback<f32>>| feedback.as_ref().map(|law| LawValues::of(law, states)).transpose();
+        let law = |feedback: &Option<Feedback<f32>>| {
+            feedback.as_ref().map(|law| LawValues::of(law, states)).transpose()
+        };
         let values = Self {
             rig: rig.name.clone(),
             rig_hash: rig.hash(),
             tick_s: single("tick.period_s", rig.tick.period_s as f32)?,
             delay_ticks: u32::from(rig.tick.delay_ticks),
-            force_limit_n: rig.force_limit_n().map_or(Ok(f32::MAX), |limit| single("actuator.force_limit_n", limit as f32))?,
-            lqr: law(&design.single.sampled.lqr)?,
-            pole_placement: law(&design.single.sampled.pole_placement)?,
+            force_limit_n: rig
+                .force_limit_n()
+                .map_or(Ok(f32::MAX), |limit| single("actuator.force_limit_n", limit as f32))?,
+            lqr: law(&laws.lqr)?,
+            pole_placement: law(&laws.pole_placement)?,
         };
         if values.lqr.is_none() && values.pole_placement.is_none() {
             return Err(NoTable::NoLaw);
@@ -146,7 +150,8 @@ impl TableValues {
 
 impl LawValues {
     fn of(law: &Feedback<f32>, states: usize) -> Result<Self, NoTable> {
-        let entries: Vec<f32> = law.k.entries().iter().map(|&gain| single("a gain", gain)).collect::<Result<_, _>>()?;
+        let entries: Vec<f32> =
+            law.k.entries().iter().map(|&gain| single("a gain", gain)).collect::<Result<_, _>>()?;
         let (k, pending) = entries.split_at(states);
         Ok(Self {
             k: k.to_vec(),

@@ -24,7 +24,12 @@ fn write_source(out: &mut String, rig: &Rig, table: &TableValues) -> core::fmt::
         writeln!(out, "/// {doc}\npub const {name}: {kind} = {value};\n")
     };
     constant("Name of the rig.", "RIG", "&str", &format!("{:?}", table.rig))?;
-    constant("Version of the tool that designed the gains.", "TOOL_VERSION", "&str", &format!("{:?}", env!("CARGO_PKG_VERSION")))?;
+    constant(
+        "Version of the tool that designed the gains.",
+        "TOOL_VERSION",
+        "&str",
+        &format!("{:?}", env!("CARGO_PKG_VERSION")),
+    )?;
     constant("Hash of the rig file's values.", "RIG_HASH", "u64", &hexadecimal(table.rig_hash))?;
     constant("Control period (s).", "TICK_S", "f32", &literal(table.tick_s))?;
     constant("Number of states.", "STATES", "usize", &table.states().to_string())?;
@@ -35,12 +40,21 @@ fn write_source(out: &mut String, rig: &Rig, table: &TableValues) -> core::fmt::
     writeln!(out, "    // s: control period\n    tick_s: TICK_S,")?;
     writeln!(out, "    // ticks between a measurement and the force computed from it")?;
     writeln!(out, "    delay_ticks: {},", table.delay_ticks)?;
-    writeln!(out, "    // N: largest force on the cart\n    force_limit_n: {},", literal(table.force_limit_n))?;
+    writeln!(
+        out,
+        "    // N: largest force on the cart\n    force_limit_n: {},",
+        literal(table.force_limit_n)
+    )?;
     writeln!(out, "    // linear quadratic regulator")?;
     write_law(out, "lqr", &table.lqr, &states)?;
     writeln!(out, "    // pole placement")?;
     write_law(out, "pole_placement", &table.pole_placement, &states)?;
-    writeln!(out, "    // CRC-32 of all values above\n    crc: 0x{:04x}_{:04x},\n}};", crc >> 16, crc & 0xffff)
+    writeln!(
+        out,
+        "    // CRC-32 of all values above\n    crc: 0x{:04x}_{:04x},\n}};",
+        crc >> 16,
+        crc & 0xffff
+    )
 }
 
 fn write_law(out: &mut String, name: &str, law: &Option<LawValues>, states: &[Meaning]) -> core::fmt::Result {
@@ -54,7 +68,11 @@ fn write_law(out: &mut String, name: &str, law: &Option<LawValues>, states: &[Me
     writeln!(out, "        ]),")?;
     writeln!(out, "        // 1: gain on the force still on its way (0 without delay)")?;
     writeln!(out, "        k_pending: {},", literal(law.k_pending))?;
-    writeln!(out, "        // {}: precompensation gain on the set-point", states.first().map_or("1", |_| "N/m"))?;
+    writeln!(
+        out,
+        "        // {}: precompensation gain on the set-point",
+        states.first().map_or("1", |_| "N/m")
+    )?;
     writeln!(out, "        n: {},\n    }}),", literal(law.n))
 }
 
@@ -77,9 +95,9 @@ fn state_meanings(rig: &Rig) -> Vec<Meaning> {
             });
             cart.into_iter().chain(links).collect()
         }
-        PlantDescription::Model(model) => {
-            (0..model.b.len()).map(|i| Meaning { name: format!("state {i}"), gain_unit: "input/state" }).collect()
-        }
+        PlantDescription::Model(model) => (0..model.b.len())
+            .map(|i| Meaning { name: format!("state {i}"), gain_unit: "input/state" })
+            .collect(),
     }
 }
 

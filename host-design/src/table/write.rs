@@ -17,10 +17,10 @@ pub struct WriteError {
 ///
 /// # Errors
 /// [`WriteError`] with the reason of the file system.
-pub fn write_atomically(path: &Path, contents: &str) -> Result<(), WriteError> {
+pub fn write_atomically(path: &Path, contents: &[u8]) -> Result<(), WriteError> {
     let write = || {
         let mut file = AtomicWriteFile::open(path)?;
-        file.write_all(contents.as_bytes())?;
+        file.write_all(contents)?;
         file.commit()
     };
     write().map_err(|source| WriteError { path: path.to_owned(), source })
@@ -34,8 +34,8 @@ mod tests {
     fn a_file_is_replaced_whole() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("gains.rs");
-        write_atomically(&path, "first").unwrap();
-        write_atomically(&path, "second").unwrap();
+        write_atomically(&path, b"first").unwrap();
+        write_atomically(&path, b"second").unwrap();
         assert_eq!(std::fs::read_to_string(&path).unwrap(), "second");
         assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 1, "no temporary file is left");
     }
@@ -44,7 +44,7 @@ mod tests {
     fn a_folder_that_does_not_exist_is_an_error_that_leaves_nothing() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("missing/gains.rs");
-        assert!(write_atomically(&path, "x").unwrap_err().to_string().contains("missing/gains.rs"));
+        assert!(write_atomically(&path, b"x").unwrap_err().to_string().contains("missing/gains.rs"));
         assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 0);
     }
 }

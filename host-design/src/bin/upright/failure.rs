@@ -1,0 +1,60 @@
+//! Failures of the tool and their exit status.
+
+use std::process::ExitCode;
+
+use host_design::design::DesignError;
+use host_design::rig::RigError;
+use host_design::simulate::{PlotError, SimulationError};
+use host_design::table::{NoTable, WriteError};
+
+/// Why a command ends without success.
+#[derive(Debug, thiserror::Error)]
+pub(crate) enum Failure {
+    #[error(transparent)]
+    Rig(#[from] RigError),
+    #[error("{rig}: {source}")]
+    Design { rig: String, source: DesignError },
+    #[error("{rig}: {source}")]
+    NoTable { rig: String, source: NoTable },
+    #[error("{0}")]
+    NoSolution(String),
+    #[error(transparent)]
+    Simulation(#[from] SimulationError),
+    #[error(transparent)]
+    Plot(#[from] PlotError),
+    #[error(transparent)]
+    Write(#[from] WriteError),
+    #[error("the output cannot be written: {0}")]
+    Output(#[from] std::io::Error),
+    #[error("{0}")]
+    BadArgument(String),
+    #[error("{0}")]
+    CheckFailed(String),
+}
+
+impl Failure {
+    fn exit_status(&self) -> u8 {
+        match self {
+            Failure::CheckFailed(_) => 1,
+            Failure::Rig(error) => error.exit_code(),
+            Failure::Design { .. } | Failure::NoTable { .. } | Failure::NoSolution(_) => 3,
+            Failure::Simulation(_)
+            | Failure::Plot(_)
+            | Failure::Write(_)
+            | Failure::Output(_)
+            | Failure::BadArgument(_) => 2,
+        }
+    }
+
+    /// Tells the user and gives the exit status.
+    pub(crate) fn report(&self) -> ExitCode {
+        match self {
+            // The reader of a pipe has seen enough.
+            Failure::Output(error) if error.kind() == std::io::ErrorKind::BrokenPipe => {
+                return ExitCode::SUCCESS;
+            }
+            _ => eprintln!("upright: {self}"),
+        }
+        ExitCode::from(self.exit_status())
+    }
+}

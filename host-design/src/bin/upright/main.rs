@@ -1,0 +1,49 @@
+//! The command-line tool: from a rig file to gains, to the table, to a closed loop.
+
+mod check;
+mod design;
+mod failure;
+mod progress;
+mod simulate;
+
+use std::process::ExitCode;
+
+use clap::{Parser, Subcommand};
+
+const EXAMPLES: &str = "\
+Examples:
+  upright check rigs/quadruple-paper.toml       read a rig file and say how it was understood
+  upright design rigs/quadruple-paper.toml      design the gains, prove them, write src/gains.rs
+  upright design my.toml --json --no-write      the same as data, leaving all files alone
+  upright simulate rigs/quadruple-paper.toml --step 1 --svg step.svg
+
+Exit status:
+  0  done        1  a check failed: the pendulum falls, or a file differs
+  2  bad input   3  the design problem has no solution        4  a needed program is missing";
+
+/// Designs, emits and proves the gains that balance an n-link inverted pendulum on a cart.
+#[derive(Parser)]
+#[command(name = "upright", version, before_help = EXAMPLES, arg_required_else_help = true)]
+struct Arguments {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Subcommand)]
+enum Command {
+    Check(check::Check),
+    Design(design::Design),
+    Simulate(simulate::Simulate),
+}
+
+fn main() -> ExitCode {
+    let result = match Arguments::parse().command {
+        Command::Check(command) => command.run(),
+        Command::Design(command) => command.run(),
+        Command::Simulate(command) => command.run(),
+    };
+    match result {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(failure) => failure.report(),
+    }
+}

@@ -1,0 +1,241 @@
+//! `upright simulate`
+
+use std::io::Write;
+use std::path::PathBuf;
+
+use clap::{Args, ValueEnum};
+use host_design::design::design;
+use host_design::rig::{PlantDescription, Rig};
+use host_design::simulate::{Scenario, Summary, Trace, simulate, svg};
+use host_design::table::{TableValues, write_atomically};
+use serde_json::json;
+use upright::table::Law;
+
+use crate::failure::Failure;
+use crate::progress::with_spinner;
+
+/// Runs the firmware's own controller against the nonlinear plant; exit status 1 when it falls.
+#[derive(Args)]
+#[command(before_help = "\
+Examples:
+  upright simulate rigs/quadruple-paper.toml --step 1 --svg step.svg
+  upright simulate rigs/quadruple-paper.toml --law pole-placement --tilt 0.01,-0.01
+  upright simulate rigs/quadruple-paper.toml --disturbances paper --seed 7 --csv run.csv
+  upright simulate rigs/quadruple-paper.toml --tick 0.005 --gains continuous   falls
+  upright simulate rigs/quadruple-paper.toml --csv - | head")]
+pub(crate) struct Simulate {
+    /// Rig file (TOML)
+    rig: PathBuf,
+
+    /// Control law
+    #[arg(long, value_enum, default_value_t = LawName::Lqr)]
+    law: LawName,
+    /// Which gains: those designed for the tick, or those for continuous time
+    #[arg(long, value_enum, default_value_t = Gains::Sampled)]
+    gains: Gains,
+    /// Length of the run (s)
+    #[arg(long, default_value_t = 10.0, value_name = "S", value_parser = positive)]
+    duration: f64,
+    /// Step of the set-point (m)
+    #[arg(long, default_value_t = 0.0, value_name = "M", allow_negative_numbers = true, value_parser = finite)]
+    step: f64,
+    /// When the set-point steps (s)
+    #[arg(long, default_value_t = 0.0, value_name = "S", value_parser = not_negative)]
+    step_at: f64,
+    /// Angles of the links at the start, from the cart outwards (rad); missing ones are 0
+    #[arg(long, value_delimiter = ',', value_name = "RAD,…", allow_negative_numbers = true, value_parser = finite)]
+    tilt: Vec<f64>,
+    /// The whole state at the start: x, xdot, theta1, theta1dot … (SI), instead of --tilt
+    #[arg(long, value_delimiter = ',', value_name = "X,…", allow_negative_numbers = true, value_parser = finite, conflicts_with = "tilt")]
+    start: Vec<f64>,
+    /// Disturbances: none, or the paper's force of 0.1 N rms and joint torques of 3.16e-5 N·m rms
+    #[arg(long, value_enum, default_value_t = Disturbances::None)]
+    disturbances: Disturbances,
+    /// Disturbing force, drawn anew each tick (N rms)
+    #[arg(long, value_name = "N", value_parser = not_negative)]
+    force_noise: Option<f64>,
+    /// Disturbing torque at each joint, drawn anew each tick (N·m rms)
+    #[arg(long, value_name = "NM", value_parser = not_negative)]
+    torque_noise: Option<f64>,
+    /// Seed of the disturbances
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
+    /// Integration steps per tick
+    #[arg(long, default_value_t = 4, value_parser = clap::value_parser!(u16).range(1..=1000))]
+    substeps: u16,
+
+    /// Control period instead of the rig's (s); the gains are designed anew
+    #[arg(long, value_name = "S", value_parser = period)]
+    tick: Option<f64>,
+    /// Delay instead of the rig's (ticks); the gains are designed anew
+    #[arg(long, value_name = "TICKS", value_parser = clap::value_parser!(u8).range(0..=1))]
+    delay: Option<u8>,
+    /// Force limit instead of the rig's (N)
+    #[arg(long, value_name = "N", value_parser = positive)]
+    force_limit: Option<f64>,
+
+    /// Write every tick as CSV to a file, or to stdout with `-`
+    #[arg(long, value_name = "FILE")]
+    csv: Option<PathBuf>,
+    /// Draw position, angles and force into an SVG file
+    #[arg(long, value_name = "FILE")]
+    svg: Option<PathBuf>,
+    /// Print the summary as one JSON object
+    #[arg(long)]
+    json: bool,
+}
+
+#[derive(Clone, Copy, ValueEnum)]
+enum LawName {
+    Lqr,
+    PolePlacement,
+}
+
+#[derive(Clone, Copy, PartialEq, ValueEnum)]
+enum Gains {
+    Sampled,
+    Continuous,
+}
+
+#[derive(Clone, Copy, ValueEnum)]
+enum Disturbances {
+    None,
+    Paper,
+}
+
+fn finite(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(value) if value.is_finite() => Ok(value),
+        _ => Err("give a finite number".to_owned()),
+    }
+}
+
+fn positive(text: &str) -> Result<f64, String> {
+    finite(text)
+        .and_then(|value| if value > 0.0 { Ok(value) } else { Err("give a number above 0".to_owned()) })
+}
+
+fn not_negative(text: &str) -> Result<f64, String> {
+    finite(text).and_then(|value| {
+        if value >= 0.0 { Ok(value) } else { Err("give a number of at least 0".to_owned()) }
+    })
+}
+
+fn period(text: &str) -> Result<f64, String> {
+    finite(text).and_then(|value| {
+        if (1e-6..=10.0).contains(&value) {
+            Ok(value)
+        } else {
+            Err("give a period from 1e-6 to 10 s".to_owned())
+        }
+    })
+}
+
+impl Simulate {
+    pub(crate) fn run(self) -> Result<(), Failure> {
+        let mut rig = Rig::from_path(&self.rig)?;
+        rig.tick.period_s = self.tick.unwrap_or(rig.tick.period_s);
+        rig.tick.delay_ticks = self.delay.unwrap_or(rig.tick.delay_ticks);
+        rig.actuator.force_limit_n = self.force_limit.or(rig.actuator.force_limit_n);
+        let scenario = self.scenario(&rig)?;
+        let name = || self.rig.display().to_string();
+        let certified = with_spinner("designing", || design(&rig))
+            .map_err(|source| Failure::Design { rig: name(), source })?;
+        let laws = match self.gains {
+            Gains::Sampled => &certified.single.sampled,
+            Gains::Continuous => &certified.single.continuous,
+        };
+        let table = TableValues::of(&rig, laws).map_err(|source| Failure::NoTable { rig: name(), source })?;
+        let (trace, summary) = with_spinner("simulating", || simulate(&rig, &table, &scenario))?;
+        self.write(&rig, &trace, &summary)?;
+        match &summary.fall {
+            Some(fall) => Err(Failure::CheckFailed(format!("{}: {fall}", rig.name))),
+            None => Ok(()),
+        }
+    }
+
+    fn scenario(&self, rig: &Rig) -> Result<Scenario, Failure> {
+        let law = match self.law {
+            LawName::Lqr => Law::Lqr,
+            LawName::PolePlacement => Law::PolePlacement,
+        };
+        let mut scenario = Scenario::at_rest(rig, law);
+        let states = rig.states();
+        if !self.start.is_empty() {
+            if self.start.len() != states {
+                return Err(Failure::BadArgument(format!(
+                    "--start: {} values for {states} states; give {states}",
+                    self.start.len()
+                )));
+            }
+            scenario.start.clone_from(&self.start);
+        }
+        let links = match &rig.plant {
+            PlantDescription::Chain(chain) => chain.links.len(),
+            PlantDescription::Model(_) => 0,
+        };
+        if self.tilt.len() > links {
+            return Err(Failure::BadArgument(format!(
+                "--tilt: {} angles for {links} links; give at most {links}",
+                self.tilt.len()
+            )));
+        }
+        for (link, &angle) in self.tilt.iter().enumerate() {
+            scenario.start[2 + 2 * link] = angle;
+        }
+        // The paper's disturbances: F_d ~ N(0, 0.01), joint torques ~ N(0, 1e-9), given there as variances.
+        let (force, torque) = match self.disturbances {
+            Disturbances::None => (0.0, 0.0),
+            Disturbances::Paper => (0.01f64.sqrt(), 1e-9f64.sqrt()),
+        };
+        Ok(Scenario {
+            duration_s: self.duration,
+            step_m: self.step,
+            step_at_s: self.step_at,
+            force_noise_n: self.force_noise.unwrap_or(force),
+            torque_noise_n_m: self.torque_noise.unwrap_or(torque),
+            seed: self.seed,
+            substeps: self.substeps.into(),
+            ..scenario
+        })
+    }
+
+    fn write(&self, rig: &Rig, trace: &Trace, summary: &Summary) -> Result<(), Failure> {
+        let csv_on_stdout = self.csv.as_ref().is_some_and(|path| path.as_os_str() == "-");
+        let mut out = std::io::stdout().lock();
+        if let Some(path) = &self.csv {
+            let mut bytes = Vec::new();
+            trace.write_csv(&mut bytes)?;
+            if csv_on_stdout {
+                out.write_all(&bytes)?;
+            } else {
+                write_atomically(path, &bytes)?;
+            }
+        }
+        if let Some(path) = &self.svg {
+            let law = match self.law {
+                LawName::Lqr => "LQR",
+                LawName::PolePlacement => "pole placement",
+            };
+            let title = format!("{}, {law}, tick {} ms", rig.name, rig.tick.period_s * 1e3);
+            write_atomically(path, svg(rig, trace, &title)?.as_bytes())?;
+        }
+        let text = if self.json {
+            let mut object = json!({ "rig": rig.name, "hash": format!("{:016x}", rig.hash()), "stands": summary.stands() });
+            if let (Some(object), Ok(serde_json::Value::Object(figures))) =
+                (object.as_object_mut(), serde_json::to_value(summary))
+            {
+                object.extend(figures);
+            }
+            object.to_string()
+        } else {
+            summary.to_string()
+        };
+        if csv_on_stdout {
+            eprintln!("{text}");
+        } else {
+            writeln!(out, "{text}")?;
+        }
+        Ok(())
+    }
+}
