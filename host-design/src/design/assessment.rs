@@ -35,15 +35,16 @@ impl Certified {
                 continuous_at_tick: radius(&held)?,
             })
         };
-        let (continuous, sampled, single) = (&design.continuous, &design.sampled, &self.single.sampled);
-        let one = |laws: (&Option<Feedback<f64>>, &Option<Feedback<f64>>, &Option<Feedback<f32>>)| match laws
-        {
-            (Some(continuous), Some(sampled), Some(single)) => assess(continuous, sampled, single).map(Some),
-            _ => Ok(None),
-        };
-        Ok([
-            one((&continuous.lqr, &sampled.lqr, &single.lqr))?,
-            one((&continuous.pole_placement, &sampled.pole_placement, &single.pole_placement))?,
-        ])
+        let (continuous, sampled, single) =
+            (design.continuous.each(), design.sampled.each(), self.single.sampled.each());
+        let mut assessments = [None, None];
+        for (law, assessment) in assessments.iter_mut().enumerate() {
+            if let (Some(continuous), Some(sampled), Some(single)) =
+                (continuous[law], sampled[law], single[law])
+            {
+                *assessment = Some(assess(continuous, sampled, single)?);
+            }
+        }
+        Ok(assessments)
     }
 }

@@ -45,6 +45,11 @@ pub struct Feedback<T> {
 }
 
 impl<T> Laws<T> {
+    /// [LQR, pole placement].
+    pub fn each(&self) -> [Option<&Feedback<T>>; 2] {
+        [self.lqr.as_ref(), self.pole_placement.as_ref()]
+    }
+
     fn try_map<S, E>(&self, mut f: impl FnMut(&Feedback<T>) -> Result<S, E>) -> Result<[Option<S>; 2], E> {
         Ok([
             self.lqr.as_ref().map(&mut f).transpose()?,

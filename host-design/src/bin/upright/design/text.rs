@@ -31,16 +31,12 @@ fn write_design(
     )?;
     for report in reports {
         let index = report.index;
-        let laws = |laws: &host_design::design::Laws<f64>| match index {
-            0 => laws.lqr.clone(),
-            _ => laws.pole_placement.clone(),
-        };
         writeln!(out, "\n{}", report.name)?;
-        if let Some(law) = laws(&certified.double.continuous) {
-            write_law(out, "continuous", "s", &law, certified.poles[0][index].as_deref())?;
+        if let Some(law) = certified.double.continuous.each()[index] {
+            write_law(out, "continuous", "s", law, certified.poles[0][index].as_deref())?;
         }
-        if let Some(law) = laws(&certified.double.sampled) {
-            write_law(out, "sampled", "z", &law, certified.poles[1][index].as_deref())?;
+        if let Some(law) = certified.double.sampled.each()[index] {
+            write_law(out, "sampled", "z", law, certified.poles[1][index].as_deref())?;
         }
         let assessment = &report.assessment;
         writeln!(
@@ -114,7 +110,7 @@ pub(super) fn warnings(rig: &Rig, certified: &Certified, reports: &[LawReport]) 
         }
     }
     let sampled = &certified.double.sampled;
-    if [&sampled.lqr, &sampled.pole_placement].into_iter().flatten().any(|law| law.n.is_none()) {
+    if sampled.each().into_iter().flatten().any(|law| law.n.is_none()) {
         warnings.push(
             "no constant input holds the output away from 0: N is 0 in the table, set-points have no effect"
                 .to_owned(),
