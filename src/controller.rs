@@ -1,27 +1,41 @@
-//! The controller: one tick from state to force.
+//! The controller: one tick from encoder counts to motor duty.
 
 use nalgebra::SVector;
 
-use crate::state_feedback::{saturate, state_feedback};
-use crate::table::{Build, GainTable, Law, LawGains, TableError};
+use crate::actuator::Drive;
+use crate::encoder::{CounterWidth, Encoders};
+use crate::state_feedback::{LawGains, LawState, saturate};
+use crate::table::{Build, GainTable, Law, TableError};
 
-/// State feedback from a checked gain table.
+/// Observer, control law and actuator map of one gain table.
+///
+/// A tick has two halves. [`control`](Self::control) goes from counts to duty and is all that has to happen between
+/// reading the encoders and driving the motor; [`predict`](Self::predict) prepares the next tick and may follow after.
 #[derive(Debug, Clone)]
-pub struct Controller<'t, const NX: usize> {
-    table: &'t GainTable<NX>,
+pub struct Controller<'t, const NX: usize, const NY: usize> {
+    table: &'t GainTable<NX, NY>,
     law: Law,
     gains: &'t LawGains<NX>,
-    setpoint: f32,
-    pending: f32,
+    running: bool,
+    target: f32,
+    encoders: Encoders<NY>,
+    /// Current estimate x̂ within a tick, predicted estimate x̂⁻ between ticks.
+    estimate: SVector<f32, NX>,
+    innovation: SVector<f32, NY>,
+    state: LawState,
+    last_volts: f32,
+    command: Command,
 }
 
-/// A force on the cart (N), positive along +x.
+/// The outcome of a tick.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Force {
-    /// What the control law asks for.
+pub struct Command {
+    /// Force that the control law asks for (N).
     pub requested: f32,
-    /// What may be applied: the request within the force limit, 0 if the request is not a number.
-    pub limited: f32,
+    /// Force that will be applied, within all limits (N); 0 if the request is not a number.
+    pub applied: f32,
+    /// What goes to the power stage.
+    pub drive: Drive,
 }
 
 /// A request the controller does not follow; what was set before stays.
@@ -29,34 +43,61 @@ pub struct Force {
 pub enum Rejected {
     /// The table holds no gains for this law.
     NoSuchLaw,
+    /// The law can only be changed while the controller is stopped.
+    Running,
     /// The set-point is not a finite number.
     Setpoint,
+    /// The table holds no observer, so the controller cannot run from encoders.
+    NoObserver,
 }
 
 impl core::fmt::Display for Rejected {
     fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
         f.write_str(match self {
             Rejected::NoSuchLaw => "the gain table does not hold this control law",
+            Rejected::Running => "the control law can only be changed while disarmed",
             Rejected::Setpoint => "the set-point is not a finite number",
+            Rejected::NoObserver => {
+                "the gain table holds no observer: give the rig its encoders and [kalman]"
+            }
         })
     }
 }
 
 impl core::error::Error for Rejected {}
 
-impl<'t, const NX: usize> Controller<'t, NX> {
-    /// A controller at set-point 0 with the first law the table holds (LQR before pole placement).
+const OFF: Command = Command { requested: 0.0, applied: 0.0, drive: Drive::OFF };
+
+impl<'t, const NX: usize, const NY: usize> Controller<'t, NX, NY> {
+    /// A stopped controller at set-point 0 with the first law the table holds (LQR before pole placement), for encoder
+    /// counters of these widths.
     ///
     /// # Errors
     /// [`TableError`] if the table is damaged or was made for another build.
-    pub fn new(table: &'t GainTable<NX>, build: &Build) -> Result<Self, TableError> {
+    pub fn new(
+        table: &'t GainTable<NX, NY>,
+        build: &Build,
+        widths: [CounterWidth; NY],
+    ) -> Result<Self, TableError> {
         table.check(build)?;
         let (law, gains) = match (&table.lqr, &table.pole_placement) {
             (Some(gains), _) => (Law::Lqr, gains),
             (None, Some(gains)) => (Law::PolePlacement, gains),
             (None, None) => return Err(TableError::NoLaw),
         };
-        Ok(Self { table, law, gains, setpoint: 0.0, pending: 0.0 })
+        Ok(Self {
+            table,
+            law,
+            gains,
+            running: false,
+            target: 0.0,
+            encoders: Encoders::new(widths),
+            estimate: SVector::zeros(),
+            innovation: SVector::zeros(),
+            state: LawState::default(),
+            last_volts: 0.0,
+            command: OFF,
+        })
     }
 
     /// The law in use.
@@ -64,22 +105,27 @@ impl<'t, const NX: usize> Controller<'t, NX> {
         self.law
     }
 
-    /// Uses another law of the table. Only while disarmed: a change of gains in mid-balance is a jump of the force.
+    /// Uses another law of the table.
     ///
     /// # Errors
-    /// [`Rejected::NoSuchLaw`] if the table does not hold it.
+    /// [`Rejected::Running`] between [`start`](Self::start) and [`stop`](Self::stop): a change of gains in mid-balance is
+    /// a jump of the force. [`Rejected::NoSuchLaw`] if the table does not hold it.
     pub fn select(&mut self, law: Law) -> Result<(), Rejected> {
+        if self.running {
+            return Err(Rejected::Running);
+        }
         self.gains = self.table.law(law).ok_or(Rejected::NoSuchLaw)?;
         self.law = law;
         Ok(())
     }
 
-    /// Wanted cart position (m).
+    /// Wanted cart position (m), as asked for; the governed one that the law follows is in
+    /// [`law_state`](Self::law_state).
     pub fn setpoint(&self) -> f32 {
-        self.setpoint
+        self.target
     }
 
-    /// Asks for a cart position (m).
+    /// Asks for a cart position (m). The governor takes the law there no faster than the limits allow.
     ///
     /// # Errors
     /// [`Rejected::Setpoint`] if it is not finite.
@@ -87,98 +133,257 @@ impl<'t, const NX: usize> Controller<'t, NX> {
         if !position.is_finite() {
             return Err(Rejected::Setpoint);
         }
-        self.setpoint = position;
+        self.target = position;
         Ok(())
     }
 
-    /// One tick: the force for the state `x` (m, m/s, rad, rad/s …) measured at its start.
-    ///
-    /// With `delay_ticks = 0` the force is applied at once and held for one tick. With 1 it is applied, and held, from
-    /// the start of the next tick; the law then also feeds back the force that is still on its way:
-    ///
-    /// ```text
-    /// u = sat(N r - K x - k_pending u_pending)
-    /// ```
-    pub fn tick(&mut self, x: &SVector<f32, NX>) -> Force {
-        let LawGains { k, k_pending, n } = self.gains;
-        let requested = state_feedback(*n, self.setpoint, k, x) - k_pending * self.pending;
-        let limited = saturate(requested, self.table.force_limit_n);
-        self.pending = limited;
-        Force { requested, limited }
+    /// Governed set-point, integral and force on its way.
+    pub fn law_state(&self) -> &LawState {
+        &self.state
     }
 
-    /// Forgets the force on its way, as after the motor was off.
-    pub fn reset(&mut self) {
-        self.pending = 0.0;
+    /// The estimate: current x̂ after [`control`](Self::control), predicted x̂⁻ after [`predict`](Self::predict).
+    pub fn estimate(&self) -> &SVector<f32, NX> {
+        &self.estimate
+    }
+
+    /// What the sensors said in the last tick beyond the prediction (m or rad).
+    pub fn innovation(&self) -> &SVector<f32, NY> {
+        &self.innovation
+    }
+
+    /// The encoders, for homing.
+    pub fn encoders_mut(&mut self) -> &mut Encoders<NY> {
+        &mut self.encoders
+    }
+
+    /// Positions according to the encoders (m, rad); all 0 without observer.
+    pub fn positions(&self) -> SVector<f32, NY> {
+        self.table
+            .observer
+            .as_ref()
+            .map_or_else(SVector::zeros, |observer| self.encoders.positions(&observer.step))
+    }
+
+    /// Starts from rest where the encoders stand at `raw` counts: rates 0, governed set-point at the output, nothing on
+    /// its way.
+    ///
+    /// # Errors
+    /// [`Rejected::NoObserver`] if the table holds none.
+    pub fn start(&mut self, raw: &[u32; NY]) -> Result<(), Rejected> {
+        let observer = self.table.observer.as_ref().ok_or(Rejected::NoObserver)?;
+        self.encoders.update(raw);
+        let y = self.encoders.positions(&observer.step);
+        let mut x = SVector::<f32, NX>::zeros();
+        for (&state, &position) in observer.measured.iter().zip(y.iter()) {
+            if let Some(entry) = x.get_mut(state as usize) {
+                *entry = position;
+            }
+        }
+        self.start_in_state(&x);
+        Ok(())
+    }
+
+    /// Starts from the state `x` (m, m/s, rad, rad/s …).
+    pub fn start_in_state(&mut self, x: &SVector<f32, NX>) {
+        self.estimate = *x;
+        self.innovation = SVector::zeros();
+        self.state = LawState { setpoint: self.output(), ..LawState::default() };
+        self.last_volts = 0.0;
+        self.command = OFF;
+        self.running = true;
+    }
+
+    /// Stops: the next tick needs a new start.
+    pub fn stop(&mut self) {
+        self.running = false;
+        self.command = OFF;
+    }
+
+    /// First half of a tick: from raw encoder counts to the command for the motor.
+    ///
+    /// With `delay_ticks = 0` the command is carried out at once and held for one tick. With 1 it is carried out, and
+    /// held, from the start of the next tick; the law then also feeds back the force that is still on its way.
+    ///
+    /// ```text
+    /// e = y - C x̂⁻,   x̂ = x̂⁻ + L e,   u = sat(N r - K x̂ - k_pending u_pending - k_integral z)
+    /// ```
+    pub fn control(&mut self, raw: &[u32; NY]) -> Command {
+        self.encoders.update(raw);
+        if let Some(observer) = &self.table.observer {
+            let y = self.encoders.positions(&observer.step);
+            self.innovation = observer.innovation(&y, &self.estimate);
+            self.estimate = observer.correct(&self.estimate, &self.innovation);
+        }
+        self.act()
+    }
+
+    /// First half of a tick with the whole state measured: what the paper simulates.
+    pub fn control_from_state(&mut self, x: &SVector<f32, NX>) -> Command {
+        self.estimate = *x;
+        self.act()
+    }
+
+    fn act(&mut self) -> Command {
+        if !self.running {
+            return OFF;
+        }
+        self.state.govern(self.target, self.gains.setpoint_step);
+        let requested = self.state.force(self.gains, &self.estimate);
+        let limited = saturate(requested, self.table.force_limit_n);
+        let (applied, drive) = match &self.table.motor {
+            None => (limited, Drive::Force(limited)),
+            Some(motor) => {
+                // The speed of the cart is the state after its position.
+                let speed = self.estimate.get(1).copied().unwrap_or_default();
+                let (volts, force) = motor.drive(limited, speed, self.last_volts);
+                self.last_volts = volts;
+                (force, Drive::Duty(motor.duty(volts)))
+            }
+        };
+        self.command = Command { requested, applied, drive };
+        self.command
+    }
+
+    /// Second half of a tick: `x̂⁻ = Ad x̂ + Bd u` with the force really applied, and the integral.
+    pub fn predict(&mut self) {
+        if !self.running {
+            return;
+        }
+        let Command { requested, applied, .. } = self.command;
+        let during_this_tick = if self.table.delay_ticks == 1 { self.state.pending } else { applied };
+        let position = self.output();
+        self.state.advance(self.gains.k_integral, position, self.table.tick_s, requested, applied);
+        if let Some(observer) = &self.table.observer {
+            self.estimate = observer.predict(&self.estimate, during_this_tick);
+        }
+    }
+
+    fn output(&self) -> f32 {
+        self.estimate.get(self.table.output as usize).copied().unwrap_or_default()
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::table::{TABLE_FORMAT, column};
-    use nalgebra::vector;
+    use crate::observer::ObserverGains;
+    use crate::table::{TABLE_FORMAT, columns};
+    use nalgebra::{matrix, vector};
 
-    const BUILD: Build = Build { rig_hash: 7, tick_s: 0.001 };
+    const BUILD: Build = Build { rig_hash: 7, tick_s: 0.5 };
 
-    fn table() -> GainTable<2> {
+    /// A cart of 2 kg without friction, held for half a second.
+    fn table() -> GainTable<2, 1> {
+        let law = LawGains {
+            k: columns([[1.0, 2.0]]),
+            k_pending: 0.5,
+            k_integral: 0.0,
+            n: 1.0,
+            setpoint_step: 10.0,
+        };
         let mut table = GainTable {
             format: TABLE_FORMAT,
             states: 2,
+            sensors: 1,
+            output: 0,
             rig_hash: 7,
-            tick_s: 0.001,
+            tick_s: 0.5,
             delay_ticks: 1,
             force_limit_n: 5.0,
-            lqr: Some(LawGains { k: column([1.0, 2.0]), k_pending: 0.5, n: 1.0 }),
+            lqr: Some(law),
             pole_placement: None,
+            observer: Some(ObserverGains {
+                ad: matrix![1.0, 0.5; 0.0, 1.0],
+                bd: vector![0.0625, 0.25],
+                l: matrix![0.5; 1.0],
+                measured: [0],
+                step: vector![0.25],
+            }),
+            motor: None,
             crc: 0,
         };
         table.crc = table.checksum();
         table
     }
 
+    fn controller(table: &GainTable<2, 1>) -> Controller<'_, 2, 1> {
+        let mut controller = Controller::new(table, &BUILD, [CounterWidth::Bits16]).unwrap();
+        controller.start_in_state(&vector![0.0, 0.0]);
+        controller
+    }
+
     #[test]
     fn the_force_on_its_way_is_fed_back() {
         let table = table();
-        let mut controller = Controller::new(&table, &BUILD).unwrap();
+        let mut controller = controller(&table);
         let x = vector![-1.0, -1.0];
-        assert_eq!(controller.tick(&x).limited, 3.0);
-        assert_eq!(controller.tick(&x).limited, 1.5);
-        controller.reset();
-        assert_eq!(controller.tick(&x).limited, 3.0);
+        assert_eq!(controller.control_from_state(&x).applied, 3.0);
+        controller.predict();
+        assert_eq!(controller.control_from_state(&x).applied, 1.5);
     }
 
     #[test]
     fn a_limited_force_is_what_counts_as_on_its_way() {
         let table = table();
-        let mut controller = Controller::new(&table, &BUILD).unwrap();
-        assert_eq!(controller.tick(&vector![-100.0, 0.0]), Force { requested: 100.0, limited: 5.0 });
-        assert_eq!(controller.tick(&vector![0.0, 0.0]).requested, -2.5);
+        let mut controller = controller(&table);
+        let command = controller.control_from_state(&vector![-100.0, 0.0]);
+        assert_eq!((command.requested, command.applied), (100.0, 5.0));
+        controller.predict();
+        assert_eq!(controller.control_from_state(&vector![0.0, 0.0]).requested, -2.5);
+    }
+
+    #[test]
+    fn the_estimate_uses_the_force_that_is_applied_in_the_tick() {
+        let table = table();
+        let mut controller = controller(&table);
+        // 4 counts of 0.25 m: innovation 1, estimate (0.5, 1), request -(0.5 + 2).
+        let command = controller.control(&[4]);
+        assert_eq!(command.applied, -2.5);
+        controller.predict();
+        // With a tick of delay that force is still on its way: Ad x̂ alone.
+        assert_eq!(controller.estimate(), &vector![1.0, 1.0]);
+        controller.control(&[4]);
+        controller.predict();
+        assert_eq!(controller.estimate(), &vector![1.5 - 0.0625 * 2.5, 1.0 - 0.25 * 2.5]);
+    }
+
+    #[test]
+    fn a_stopped_controller_gives_no_force() {
+        let table = table();
+        let mut controller = controller(&table);
+        controller.stop();
+        assert_eq!(controller.control(&[400]), OFF);
+        assert_eq!(controller.control_from_state(&vector![9.0, 9.0]).drive, Drive::OFF);
     }
 
     #[test]
     fn a_request_that_makes_no_sense_leaves_everything_as_it_was() {
         let table = table();
-        let mut controller = Controller::new(&table, &BUILD).unwrap();
+        let mut controller = controller(&table);
         controller.set_setpoint(0.25).unwrap();
         assert_eq!(controller.set_setpoint(f32::NAN), Err(Rejected::Setpoint));
+        assert_eq!(controller.select(Law::Lqr), Err(Rejected::Running));
+        controller.stop();
         assert_eq!(controller.select(Law::PolePlacement), Err(Rejected::NoSuchLaw));
         assert_eq!((controller.setpoint(), controller.law()), (0.25, Law::Lqr));
     }
 
     #[test]
     fn a_table_that_does_not_fit_is_refused() {
-        let refused = |change: &dyn Fn(&mut GainTable<2>), sealed: bool| {
+        let refused = |change: &dyn Fn(&mut GainTable<2, 1>), sealed: bool| {
             let mut table = table();
             change(&mut table);
             if sealed {
                 table.crc = table.checksum();
             }
-            Controller::new(&table, &BUILD).err()
+            Controller::new(&table, &BUILD, [CounterWidth::Bits16]).err()
         };
         assert_eq!(refused(&|_| (), true), None);
         assert_eq!(refused(&|t| t.format += 1, true), Some(TableError::Format));
-        assert_eq!(refused(&|t| t.states = 3, true), Some(TableError::States));
+        assert_eq!(refused(&|t| t.states = 3, true), Some(TableError::Dimensions));
+        assert_eq!(refused(&|t| t.sensors = 2, true), Some(TableError::Dimensions));
+        assert_eq!(refused(&|t| t.output = 2, true), Some(TableError::Dimensions));
         assert_eq!(refused(&|t| t.rig_hash ^= 1, true), Some(TableError::RigHash));
         assert_eq!(refused(&|t| t.tick_s = 0.002, true), Some(TableError::Tick));
         assert_eq!(refused(&|t| t.delay_ticks = 2, true), Some(TableError::Delay));
@@ -191,8 +396,8 @@ mod tests {
     fn every_single_bit_of_a_gain_is_guarded_by_the_checksum() {
         for bit in 0..32 {
             let mut table = table();
-            if let Some(law) = &mut table.lqr {
-                law.k[1] = f32::from_bits(law.k[1].to_bits() ^ 1 << bit);
+            if let Some(observer) = &mut table.observer {
+                observer.ad[(1, 0)] = f32::from_bits(observer.ad[(1, 0)].to_bits() ^ 1 << bit);
             }
             assert_eq!(table.check(&BUILD), Err(TableError::Crc));
         }

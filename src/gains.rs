@@ -1,8 +1,10 @@
 //! Gains of the rig `quadruple-paper`, written by `upright design`; do not edit.
 //!
-//! Every value is the exact answer of the design problem, rounded once to f32.
+//! Every gain is the exact answer of its design problem, rounded once to f32.
 
-use crate::table::{GainTable, LawGains, TABLE_FORMAT, column};
+use crate::observer::ObserverGains;
+use crate::state_feedback::LawGains;
+use crate::table::{GainTable, TABLE_FORMAT, columns};
 
 /// Name of the rig.
 pub const RIG: &str = "quadruple-paper";
@@ -19,10 +21,16 @@ pub const TICK_S: f32 = 0.001;
 /// Number of states.
 pub const STATES: usize = 10;
 
+/// Number of sensors.
+pub const SENSORS: usize = 5;
+
 /// The gain table.
-pub static TABLE: GainTable<STATES> = GainTable {
+pub static TABLE: GainTable<STATES, SENSORS> = GainTable {
     format: TABLE_FORMAT,
     states: 10,
+    sensors: 5,
+    // index of the state that follows the set-point
+    output: 0,
     rig_hash: RIG_HASH,
     // s: control period
     tick_s: TICK_S,
@@ -32,7 +40,7 @@ pub static TABLE: GainTable<STATES> = GainTable {
     force_limit_n: 20.0,
     // linear quadratic regulator
     lqr: Some(LawGains {
-        k: column([
+        k: columns([[
             // N/m: cart position
             2.2781084,
             // N s/m: cart speed
@@ -53,15 +61,19 @@ pub static TABLE: GainTable<STATES> = GainTable {
             -423.12985,
             // N s/rad: angular rate of link 4
             -18.388689,
-        ]),
+        ]]),
         // 1: gain on the force still on its way (0 without delay)
         k_pending: 0.0,
+        // N/(m s): gain on the integrated position error (0 without integral action)
+        k_integral: 0.0,
         // N/m: precompensation gain on the set-point
         n: 2.2781084,
+        // m: largest change of the governed set-point in one tick
+        setpoint_step: 0.00089194486,
     }),
     // pole placement
     pole_placement: Some(LawGains {
-        k: column([
+        k: columns([[
             // N/m: cart position
             9.243705,
             // N s/m: cart speed
@@ -82,12 +94,410 @@ pub static TABLE: GainTable<STATES> = GainTable {
             -898.03656,
             // N s/rad: angular rate of link 4
             -46.97237,
-        ]),
+        ]]),
         // 1: gain on the force still on its way (0 without delay)
         k_pending: 0.0,
+        // N/(m s): gain on the integrated position error (0 without integral action)
+        k_integral: 0.0,
         // N/m: precompensation gain on the set-point
         n: 9.243705,
+        // m: largest change of the governed set-point in one tick
+        setpoint_step: 0.002020263,
     }),
+    // steady-state Kalman filter
+    observer: Some(ObserverGains {
+        // one column per state now, one entry per state a tick later
+        ad: columns([
+            // from cart position
+            [
+                // to cart position
+                1.0,
+                // to cart speed
+                0.0,
+                // to angle of link 1
+                0.0,
+                // to angular rate of link 1
+                0.0,
+                // to angle of link 2
+                0.0,
+                // to angular rate of link 2
+                0.0,
+                // to angle of link 3
+                0.0,
+                // to angular rate of link 3
+                0.0,
+                // to angle of link 4
+                0.0,
+                // to angular rate of link 4
+                0.0,
+            ],
+            // from cart speed
+            [
+                // to cart position
+                0.001,
+                // to cart speed
+                1.0,
+                // to angle of link 1
+                0.0,
+                // to angular rate of link 1
+                0.0,
+                // to angle of link 2
+                0.0,
+                // to angular rate of link 2
+                0.0,
+                // to angle of link 3
+                0.0,
+                // to angular rate of link 3
+                0.0,
+                // to angle of link 4
+                0.0,
+                // to angular rate of link 4
+                0.0,
+            ],
+            // from angle of link 1
+            [
+                // to cart position
+                1.4128755e-5,
+                // to cart speed
+                0.02826222,
+                // to angle of link 1
+                1.0008047,
+                // to angular rate of link 1
+                1.6098243,
+                // to angle of link 2
+                -0.00096670556,
+                // to angular rate of link 2
+                -1.9342524,
+                // to angle of link 3
+                0.00018730195,
+                // to angular rate of link 3
+                0.3750265,
+                // to angle of link 4
+                -3.1157782e-5,
+                // to angular rate of link 4
+                -0.062407725,
+            ],
+            // from angular rate of link 1
+            [
+                // to cart position
+                4.7092708e-9,
+                // to cart speed
+                1.4128755e-5,
+                // to angle of link 1
+                0.0010002682,
+                // to angular rate of link 1
+                1.0008047,
+                // to angle of link 2
+                -3.2217912e-7,
+                // to angular rate of link 2
+                -0.00096670556,
+                // to angle of link 3
+                6.240582e-8,
+                // to angular rate of link 3
+                0.00018730195,
+                // to angle of link 4
+                -1.0379784e-8,
+                // to angular rate of link 4
+                -3.1157782e-5,
+            ],
+            // from angle of link 2
+            [
+                // to cart position
+                -2.7692322e-6,
+                // to cart speed
+                -0.0055440892,
+                // to angle of link 1
+                -0.0008302946,
+                // to angular rate of link 1
+                -1.6613266,
+                // to angle of link 2
+                1.0016885,
+                // to angular rate of link 2
+                3.3784606,
+                // to angle of link 3
+                -0.0009920257,
+                // to angular rate of link 3
+                -1.9849415,
+                // to angle of link 4
+                0.00016502404,
+                // to angular rate of link 4
+                0.33031204,
+            ],
+            // from angular rate of link 2
+            [
+                // to cart position
+                -9.227024e-10,
+                // to cart speed
+                -2.7692322e-6,
+                // to angle of link 1
+                -2.7671572e-7,
+                // to angular rate of link 1
+                -0.0008302946,
+                // to angle of link 2
+                0.0010005628,
+                // to angular rate of link 2
+                1.0016885,
+                // to angle of link 3
+                -3.306159e-7,
+                // to angular rate of link 3
+                -0.0009920257,
+                // to angle of link 4
+                5.499042e-8,
+                // to angular rate of link 4
+                0.00016502404,
+            ],
+            // from angle of link 3
+            [
+                // to cart position
+                4.7155805e-7,
+                // to cart speed
+                0.00094447256,
+                // to angle of link 1
+                0.00014138655,
+                // to angular rate of link 1
+                0.28301826,
+                // to angle of link 2
+                -0.00060065096,
+                // to angular rate of link 2
+                -1.2018601,
+                // to angle of link 3
+                1.0008175,
+                // to angular rate of link 3
+                1.6355397,
+                // to angle of link 4
+                -0.00044188582,
+                // to angular rate of link 4
+                -0.8839706,
+            ],
+            // from angular rate of link 3
+            [
+                // to cart position
+                1.570956e-10,
+                // to cart speed
+                4.7155805e-7,
+                // to angle of link 1
+                4.7112508e-8,
+                // to angular rate of link 1
+                0.00014138655,
+                // to angle of link 2
+                -2.001798e-7,
+                // to angular rate of link 2
+                -0.00060065096,
+                // to angle of link 3
+                0.0010002725,
+                // to angular rate of link 3
+                1.0008175,
+                // to angle of link 4
+                -1.4728201e-7,
+                // to angular rate of link 4
+                -0.00044188582,
+            ],
+            // from angle of link 4
+            [
+                // to cart position
+                -5.8953347e-8,
+                // to cart speed
+                -0.00011809344,
+                // to angle of link 1
+                -1.7675895e-5,
+                // to angular rate of link 1
+                -0.035387587,
+                // to angle of link 2
+                7.509232e-5,
+                // to angular rate of link 2
+                0.1502763,
+                // to angle of link 3
+                -0.00018104115,
+                // to angular rate of link 3
+                -0.3621756,
+                // to angle of link 4
+                1.0002996,
+                // to angular rate of link 4
+                0.5993166,
+            ],
+            // from angular rate of link 4
+            [
+                // to cart position
+                -1.9638667e-11,
+                // to cart speed
+                -5.8953347e-8,
+                // to angle of link 1
+                -5.8895786e-9,
+                // to angular rate of link 1
+                -1.7675895e-5,
+                // to angle of link 2
+                2.5024663e-8,
+                // to angular rate of link 2
+                7.509232e-5,
+                // to angle of link 3
+                -6.034083e-8,
+                // to angular rate of link 3
+                -0.00018104115,
+                // to angle of link 4
+                0.0010000998,
+                // to angular rate of link 4
+                1.0002996,
+            ],
+        ]),
+        // per newton held for one tick
+        bd: columns([[
+            // to cart position
+            3.88048e-6,
+            // to cart speed
+            0.0077619203,
+            // to angle of link 1
+            0.00016405016,
+            // to angular rate of link 1
+            0.32820067,
+            // to angle of link 2
+            -0.00019708574,
+            // to angular rate of link 2
+            -0.394343,
+            // to angle of link 3
+            3.8185924e-5,
+            // to angular rate of link 3
+            0.076458,
+            // to angle of link 4
+            -6.3522493e-6,
+            // to angular rate of link 4
+            -0.012723288,
+        ]]),
+        // one column per sensor: what an innovation adds to each state
+        l: columns([
+            // from the sensor of cart position
+            [
+                // to cart position
+                0.30128407,
+                // to cart speed
+                78.597565,
+                // to angle of link 1
+                9.419247,
+                // to angular rate of link 1
+                3174.4602,
+                // to angle of link 2
+                -9.371412,
+                // to angular rate of link 2
+                -3678.5522,
+                // to angle of link 3
+                0.27738777,
+                // to angular rate of link 3
+                569.87256,
+                // to angle of link 4
+                -0.115396604,
+                // to angular rate of link 4
+                -78.603165,
+            ],
+            // from the sensor of angle of link 1
+            [
+                // to cart position
+                0.0016011659,
+                // to cart speed
+                0.53356355,
+                // to angle of link 1
+                0.102725096,
+                // to angular rate of link 1
+                23.910128,
+                // to angle of link 2
+                -0.10443017,
+                // to angular rate of link 2
+                -29.104786,
+                // to angle of link 3
+                0.012024196,
+                // to angular rate of link 3
+                5.9091587,
+                // to angle of link 4
+                -0.00026949373,
+                // to angular rate of link 4
+                -0.82096523,
+            ],
+            // from the sensor of angle of link 2
+            [
+                // to cart position
+                -0.0015930346,
+                // to cart speed
+                -0.60849375,
+                // to angle of link 1
+                -0.10443017,
+                // to angular rate of link 1
+                -28.878258,
+                // to angle of link 2
+                0.17308314,
+                // to angular rate of link 2
+                37.886154,
+                // to angle of link 3
+                -0.05711264,
+                // to angular rate of link 3
+                -10.563474,
+                // to angle of link 4
+                0.005013099,
+                // to angular rate of link 4
+                1.9986143,
+            ],
+            // from the sensor of angle of link 3
+            [
+                // to cart position
+                4.71528e-5,
+                // to cart speed
+                0.08840228,
+                // to angle of link 1
+                0.012024196,
+                // to angular rate of link 1
+                5.5009,
+                // to angle of link 2
+                -0.05711264,
+                // to angular rate of link 2
+                -9.910606,
+                // to angle of link 3
+                0.087297484,
+                // to angular rate of link 3
+                6.641664,
+                // to angle of link 4
+                -0.029635089,
+                // to angular rate of link 4
+                -2.7881665,
+            ],
+            // from the sensor of angle of link 4
+            [
+                // to cart position
+                -1.9616122e-5,
+                // to cart speed
+                -0.012380125,
+                // to angle of link 1
+                -0.00026949373,
+                // to angular rate of link 1
+                -0.73857456,
+                // to angle of link 2
+                0.005013099,
+                // to angular rate of link 2
+                1.812396,
+                // to angle of link 3
+                -0.029635089,
+                // to angular rate of link 3
+                -2.4369266,
+                // to angle of link 4
+                0.06442645,
+                // to angular rate of link 4
+                2.6573682,
+            ],
+        ]),
+        // index of the state that each sensor measures
+        measured: [0, 2, 4, 6, 8],
+        // m or rad per count
+        step: columns([[
+            // sensor of cart position
+            2e-5,
+            // sensor of angle of link 1
+            0.0015339808,
+            // sensor of angle of link 2
+            0.0015339808,
+            // sensor of angle of link 3
+            0.0015339808,
+            // sensor of angle of link 4
+            0.0015339808,
+        ]]),
+    }),
+    // motor, gear and pulley
+    motor: None,
     // CRC-32 of all values above
-    crc: 0xfa27_eb51,
+    crc: 0xa734_2cfa,
 };

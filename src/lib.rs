@@ -23,7 +23,10 @@
 
 #![no_std]
 
+pub mod actuator;
 pub mod controller;
+pub mod encoder;
 pub mod gains;
+pub mod observer;
 pub mod state_feedback;
 pub mod table;

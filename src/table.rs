@@ -1,21 +1,29 @@
 //! The gain table: everything the controller knows about the rig, and how it is checked.
 
-use crc::{CRC_32_ISO_HDLC, Crc, NoTable};
-use nalgebra::{ArrayStorage, SVector};
+use crc::{CRC_32_ISO_HDLC, Crc, Digest, NoTable};
+use nalgebra::{ArrayStorage, SMatrix};
+
+use crate::actuator::MotorMap;
+use crate::observer::ObserverGains;
+use crate::state_feedback::LawGains;
 
 /// Layout of [`GainTable`]; a table written for another layout is refused.
-pub const TABLE_FORMAT: u32 = 1;
+pub const TABLE_FORMAT: u32 = 2;
 
 /// Without a lookup table: a few cycles per byte slower, a kilobyte of flash smaller.
 const CRC: Crc<u32, NoTable> = Crc::<u32, NoTable>::new(&CRC_32_ISO_HDLC);
 
-/// The constants of a controller with `NX` states, as written by `upright design` into `src/gains.rs`.
+/// The constants of a controller with `NX` states and `NY` sensors, as written by `upright design` into `src/gains.rs`.
 #[derive(Debug, Clone, PartialEq)]
-pub struct GainTable<const NX: usize> {
+pub struct GainTable<const NX: usize, const NY: usize> {
     /// [`TABLE_FORMAT`] of the writer.
     pub format: u32,
     /// Number of states; equal to `NX` in a sound table.
     pub states: u32,
+    /// Number of sensors; equal to `NY` in a sound table.
+    pub sensors: u32,
+    /// Index of the state that follows the set-point.
+    pub output: u32,
     /// Hash of the rig file's values.
     pub rig_hash: u64,
     /// Control period (s).
@@ -28,24 +36,17 @@ pub struct GainTable<const NX: usize> {
     pub lqr: Option<LawGains<NX>>,
     /// Gains of the pole placement, if designed.
     pub pole_placement: Option<LawGains<NX>>,
+    /// The observer, if designed: without it the controller needs the whole state.
+    pub observer: Option<ObserverGains<NX, NY>>,
+    /// The motor, if described: without it the controller gives a force.
+    pub motor: Option<MotorMap>,
     /// CRC-32 (ISO-HDLC) of all fields above, see [`GainTable::checksum`].
     pub crc: u32,
 }
 
-/// Gains of one control law `u = N r - K x - k_pending u_pending`.
-#[derive(Debug, Clone, PartialEq)]
-pub struct LawGains<const NX: usize> {
-    /// K: one gain per state (N/m, N·s/m, N/rad, N·s/rad …).
-    pub k: SVector<f32, NX>,
-    /// Gain on the force still on its way to the motor (1); 0 without delay.
-    pub k_pending: f32,
-    /// N: precompensation gain (N/m).
-    pub n: f32,
-}
-
-/// A column of constants, usable in a `const`.
-pub const fn column<const N: usize>(entries: [f32; N]) -> SVector<f32, N> {
-    SVector::from_array_storage(ArrayStorage([entries]))
+/// A matrix of constants, given column by column, usable in a `const`.
+pub const fn columns<const R: usize, const C: usize>(entries: [[f32; R]; C]) -> SMatrix<f32, R, C> {
+    SMatrix::from_array_storage(ArrayStorage(entries))
 }
 
 /// Which of the table's control laws is used.
@@ -71,8 +72,8 @@ pub struct Build {
 pub enum TableError {
     /// Written for another layout of the table.
     Format,
-    /// The stored number of states is not that of the type.
-    States,
+    /// The stored number of states or sensors is not that of the type, or a state is named that does not exist.
+    Dimensions,
     /// The checksum does not fit the contents.
     Crc,
     /// Designed for another rig.
@@ -81,7 +82,7 @@ pub enum TableError {
     Tick,
     /// A delay other than 0 or 1 tick.
     Delay,
-    /// A gain or limit that is not finite, or a force limit that is not positive.
+    /// A value that is not finite, or a limit, supply or step that is not positive.
     Value,
     /// No control law in the table.
     NoLaw,
@@ -91,7 +92,7 @@ impl core::fmt::Display for TableError {
     fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
         f.write_str(match self {
             TableError::Format => "the table has another layout: run `upright design` of this version again",
-            TableError::States => "the table's number of states is not that of this build",
+            TableError::Dimensions => "the table's numbers of states and sensors are not those of this build",
             TableError::Crc => {
                 "the table's checksum is wrong: it was changed or damaged, run `upright design` again"
             }
@@ -99,7 +100,7 @@ impl core::fmt::Display for TableError {
             TableError::Tick => "the table was designed for another control period",
             TableError::Delay => "the table's delay is neither 0 nor 1 tick",
             TableError::Value => {
-                "the table holds a value that is not finite or a force limit that is not positive"
+                "the table holds a value that is not finite, or a limit that is not positive"
             }
             TableError::NoLaw => "the table holds no control law",
         })
@@ -108,24 +109,30 @@ impl core::fmt::Display for TableError {
 
 impl core::error::Error for TableError {}
 
-impl<const NX: usize> GainTable<NX> {
-    /// CRC-32 (ISO-HDLC) of every field but `crc`, in order, as little-endian bytes.
+impl<const NX: usize, const NY: usize> GainTable<NX, NY> {
+    /// CRC-32 (ISO-HDLC) of every field but `crc`, in order, as little-endian bytes; a missing part is one zero byte, a
+    /// part that is there is preceded by a one.
     pub fn checksum(&self) -> u32 {
         let mut digest = CRC.digest();
-        digest.update(&self.format.to_le_bytes());
-        digest.update(&self.states.to_le_bytes());
+        for word in [self.format, self.states, self.sensors, self.output] {
+            digest.update(&word.to_le_bytes());
+        }
         digest.update(&self.rig_hash.to_le_bytes());
-        digest.update(&self.tick_s.to_le_bytes());
+        update(&mut digest, [self.tick_s, self.force_limit_n]);
         digest.update(&self.delay_ticks.to_le_bytes());
-        digest.update(&self.force_limit_n.to_le_bytes());
         for law in [&self.lqr, &self.pole_placement] {
             digest.update(&[u8::from(law.is_some())]);
-            if let Some(law) = law {
-                for value in law.values() {
-                    digest.update(&value.to_le_bytes());
-                }
+            update(&mut digest, law.iter().flat_map(LawGains::values));
+        }
+        digest.update(&[u8::from(self.observer.is_some())]);
+        if let Some(observer) = &self.observer {
+            update(&mut digest, observer.values());
+            for state in observer.measured {
+                digest.update(&state.to_le_bytes());
             }
         }
+        digest.update(&[u8::from(self.motor.is_some())]);
+        update(&mut digest, self.motor.iter().flat_map(MotorMap::values));
         digest.finalize()
     }
 
@@ -145,8 +152,8 @@ impl<const NX: usize> GainTable<NX> {
         if self.format != TABLE_FORMAT {
             return Err(TableError::Format);
         }
-        if self.states as usize != NX {
-            return Err(TableError::States);
+        if self.states as usize != NX || self.sensors as usize != NY {
+            return Err(TableError::Dimensions);
         }
         if self.crc != self.checksum() {
             return Err(TableError::Crc);
@@ -160,12 +167,27 @@ impl<const NX: usize> GainTable<NX> {
         if self.delay_ticks > 1 {
             return Err(TableError::Delay);
         }
+        let states_exist =
+            |mut indices: core::slice::Iter<'_, u32>| indices.all(|&index| (index as usize) < NX);
+        if !states_exist([self.output].iter())
+            || !self.observer.iter().all(|observer| states_exist(observer.measured.iter()))
+        {
+            return Err(TableError::Dimensions);
+        }
         let mut laws = [&self.lqr, &self.pole_placement].into_iter().flatten().peekable();
         if laws.peek().is_none() {
             return Err(TableError::NoLaw);
         }
-        if !(self.force_limit_n > 0.0 && self.force_limit_n.is_finite())
-            || laws.any(|law| law.values().any(|value| !value.is_finite()))
+        let finite = |mut values: &mut dyn Iterator<Item = f32>| Iterator::all(&mut values, f32::is_finite);
+        let limit_is_sound = self.force_limit_n > 0.0 && self.force_limit_n.is_finite();
+        if !(limit_is_sound
+            && laws.all(|law| law.setpoint_step > 0.0 && finite(&mut law.values()))
+            && self.observer.iter().all(|observer| finite(&mut observer.values()))
+            && self.motor.iter().all(|motor| {
+                motor.volts_per_newton > 0.0
+                    && motor.supply_v > 0.0
+                    && finite(&mut motor.values().into_iter())
+            }))
         {
             return Err(TableError::Value);
         }
@@ -173,8 +195,8 @@ impl<const NX: usize> GainTable<NX> {
     }
 }
 
-impl<const NX: usize> LawGains<NX> {
-    fn values(&self) -> impl Iterator<Item = f32> {
-        self.k.iter().copied().chain([self.k_pending, self.n])
+fn update(digest: &mut Digest<'_, u32, NoTable>, values: impl IntoIterator<Item = f32>) {
+    for value in values {
+        digest.update(&value.to_le_bytes());
     }
 }

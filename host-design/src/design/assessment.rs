@@ -2,6 +2,7 @@
 
 use super::{Certified, DesignError, Feedback};
 use crate::numerics::{Matrix, spectral_radius};
+use crate::rig::Rig;
 
 /// Spectral radii of one law's loop at the tick (below 1: stable).
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -15,34 +16,33 @@ pub struct Assessment {
 }
 
 impl Certified {
-    /// Assesses [LQR, pole placement], where designed.
+    /// Assesses [LQR, pole placement] as they go into the table (LQR with its integral action, if it has one), where
+    /// designed.
     ///
     /// # Errors
     /// [`DesignError::Poles`] if the eigenvalue iteration fails.
-    pub fn assess(&self) -> Result<[Option<Assessment>; 2], DesignError> {
+    pub fn assess(&self, rig: &Rig) -> Result<[Option<Assessment>; 2], DesignError> {
         let design = &self.double;
-        let radius =
-            |k: &Matrix<f64>| spectral_radius(&design.sampled_loop(k)).map_err(|_| DesignError::Poles);
-        let assess = |continuous: &Feedback<f64>, sampled: &Feedback<f64>, single: &Feedback<f32>| {
-            // A continuous gain knows nothing of a force on its way.
-            let mut held = Matrix::zeros(1, sampled.k.cols());
-            for j in 0..continuous.k.cols() {
-                held[(0, j)] = continuous.k[(0, j)];
-            }
-            Ok(Assessment {
-                exact: radius(&sampled.k)?,
-                rounded: radius(&single.k.map(|&gain| f64::from(gain)))?,
-                continuous_at_tick: radius(&held)?,
-            })
+        let radius = |law: &Feedback<f64>| {
+            spectral_radius(&design.sampled_loop(rig, law)).map_err(|_| DesignError::Poles)
         };
-        let (continuous, sampled, single) =
-            (design.continuous.each(), design.sampled.each(), self.single.sampled.each());
         let mut assessments = [None, None];
         for (law, assessment) in assessments.iter_mut().enumerate() {
-            if let (Some(continuous), Some(sampled), Some(single)) =
-                (continuous[law], sampled[law], single[law])
+            let (exact, single) = (design.sampled.in_table()[law], self.single.sampled.in_table()[law]);
+            if let (Some(continuous), Some(exact), Some(single)) =
+                (design.continuous.each()[law], exact, single)
             {
-                *assessment = Some(assess(continuous, sampled, single)?);
+                let rounded = Feedback { k: single.k.map(|&gain| f64::from(gain)), ..exact.clone() };
+                // A continuous gain knows nothing of a force on its way.
+                let mut held = Matrix::zeros(1, design.ad.cols() + usize::from(rig.tick.delay_ticks));
+                for j in 0..continuous.k.cols() {
+                    held[(0, j)] = continuous.k[(0, j)];
+                }
+                *assessment = Some(Assessment {
+                    exact: radius(exact)?,
+                    rounded: radius(&rounded)?,
+                    continuous_at_tick: radius(&Feedback { k: held, n: None, integral: false })?,
+                });
             }
         }
         Ok(assessments)

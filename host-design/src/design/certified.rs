@@ -1,7 +1,7 @@
 //! The guard that makes every gain the correctly rounded exact answer.
 
 use super::error::DesignError;
-use super::synthesis::{Design, Poles};
+use super::synthesis::{Design, DesignPoles};
 use crate::numerics::Wide;
 use crate::rig::Rig;
 
@@ -15,8 +15,8 @@ pub struct Certified {
     pub double: Design<f64>,
     /// Every value rounded once to `f32` (not by way of `f64`): what goes into the table.
     pub single: Design<f32>,
-    /// Poles of [continuous, sampled] × [LQR, pole placement].
-    pub poles: [[Option<Poles>; 2]; 2],
+    /// Poles of the closed loops.
+    pub poles: DesignPoles,
     /// The two precisions that agreed (bits).
     pub bits: [usize; 2],
 }
@@ -28,7 +28,7 @@ fn attempt<const BITS: usize>(rig: &Rig) -> Attempt {
     Ok(Certified {
         double: design.rounded(Wide::round_to_f64),
         single: design.rounded(Wide::round_to_f32),
-        poles: design.poles()?,
+        poles: design.poles(rig)?,
         bits: [BITS / 2, BITS],
     })
 }
@@ -63,7 +63,7 @@ fn agree(low: &Attempt, high: &Attempt) -> bool {
     match (low, high) {
         (Ok(low), Ok(high)) => low.double == high.double && low.single == high.single,
         // Not resolved yet is no answer.
-        (_, Err(DesignError::Unresolved { .. })) => false,
+        (_, Err(DesignError::Unresolved { .. } | DesignError::NoKalman { .. })) => false,
         (Err(low), Err(high)) => core::mem::discriminant(low) == core::mem::discriminant(high),
         _ => false,
     }

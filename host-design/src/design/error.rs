@@ -13,11 +13,15 @@ pub enum Task {
     ContinuousPlacement,
     /// Pole placement for the tick.
     SampledPlacement,
+    /// LQR with integral action for continuous time.
+    ContinuousIntegral,
+    /// LQR with integral action for the tick.
+    SampledIntegral,
 }
 
 impl Task {
     pub(super) fn is_sampled(self) -> bool {
-        matches!(self, Task::SampledLqr | Task::SampledPlacement)
+        matches!(self, Task::SampledLqr | Task::SampledPlacement | Task::SampledIntegral)
     }
 }
 
@@ -28,6 +32,8 @@ impl fmt::Display for Task {
             Task::SampledLqr => "LQR (sampled)",
             Task::ContinuousPlacement => "pole placement (continuous)",
             Task::SampledPlacement => "pole placement (sampled)",
+            Task::ContinuousIntegral => "LQR with integral action (continuous)",
+            Task::SampledIntegral => "LQR with integral action (sampled)",
         })
     }
 }
@@ -63,6 +69,20 @@ pub enum DesignError {
         task: Task,
         /// The modes without weight, [re, im].
         modes: Vec<[f64; 2]>,
+    },
+    /// The sensors do not show a mode that does not decay by itself.
+    #[error("observer: no stable observer exists: the sensors do not show {}; measure another state", mode_list(.modes))]
+    Undetectable {
+        /// The modes out of sight, [re, im].
+        modes: Vec<[f64; 2]>,
+    },
+    /// The steady-state Kalman filter does not exist.
+    #[error(
+        "observer: no steady-state Kalman filter could be resolved with {bits} bits: a mode on the stability boundary feels no noise; give [kalman] noise that reaches every joint"
+    )]
+    NoKalman {
+        /// Working precision.
+        bits: usize,
     },
     /// The number of poles is not the number of states.
     #[error("pole_placement: {given} poles were given for {wanted} states; give exactly {wanted}")]

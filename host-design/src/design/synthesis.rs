@@ -1,13 +1,14 @@
 //! A whole design at one working precision: plant, sampled plant, and every gain the rig file asks for.
 
-use super::controllability::Reach;
+use super::diagnosis::{why_no_lqr, why_no_placement};
 use super::error::{DesignError, Task};
+use super::kalman::{Kalman, kalman};
 use super::place::{Pole, dominant_pair, place};
 use super::riccati::{Cost, care, dare};
 use super::zero_order_hold::{sampled_cost, zero_order_hold};
 use crate::numerics::{Complex, Matrix, Real, Wide, eigenvalues, solve};
-use crate::plant::{ChainParameters, Equilibrium, linearise};
-use crate::rig::{Lqr, PlantDescription, PolePlacement, Rig};
+use crate::plant::{ChainParameters, Equilibrium, LinearModel, linearise};
+use crate::rig::{LinearPlant, Lqr, PlantDescription, PolePlacement, Rig};
 
 /// Plant and gains with entries of type `T`: a working precision, or what it was rounded to.
 #[derive(Debug, Clone, PartialEq)]
@@ -24,6 +25,8 @@ pub struct Design<T> {
     pub continuous: Laws<T>,
     /// Gains for the tick. With one tick of delay K has one more entry, for the force still on its way.
     pub sampled: Laws<T>,
+    /// The observer, if the rig file asks for one.
+    pub kalman: Option<Kalman<T>>,
 }
 
 /// Both of the paper's control laws, where the rig file asks for them.
@@ -33,6 +36,8 @@ pub struct Laws<T> {
     pub lqr: Option<Feedback<T>>,
     /// Pole placement.
     pub pole_placement: Option<Feedback<T>>,
+    /// Linear quadratic regulator with integral action on the output: K over [x; z], or [x; z; force on its way].
+    pub integral: Option<Feedback<T>>,
 }
 
 /// `u = N r - K x`.
@@ -42,6 +47,8 @@ pub struct Feedback<T> {
     pub k: Matrix<T>,
     /// N; none if no constant force can hold the output away from 0.
     pub n: Option<T>,
+    /// Whether K is over [x; z] with the integral z of the output.
+    pub integral: bool,
 }
 
 impl<T> Laws<T> {
@@ -50,11 +57,13 @@ impl<T> Laws<T> {
         [self.lqr.as_ref(), self.pole_placement.as_ref()]
     }
 
-    fn try_map<S, E>(&self, mut f: impl FnMut(&Feedback<T>) -> Result<S, E>) -> Result<[Option<S>; 2], E> {
-        Ok([
-            self.lqr.as_ref().map(&mut f).transpose()?,
-            self.pole_placement.as_ref().map(&mut f).transpose()?,
-        ])
+    /// [LQR, pole placement] as they go into the table: LQR with integral action, if there is such a design.
+    pub fn in_table(&self) -> [Option<&Feedback<T>>; 2] {
+        [self.integral.as_ref().or(self.lqr.as_ref()), self.pole_placement.as_ref()]
+    }
+
+    fn none() -> Self {
+        Self { lqr: None, pole_placement: None, integral: None }
     }
 }
 
@@ -64,80 +73,95 @@ impl<R: Real> Design<R> {
     /// # Errors
     /// [`DesignError`] with the reason if some law has no solution.
     pub fn of(rig: &Rig) -> Result<Self, DesignError> {
-        let (a, b) = continuous_plant::<R>(rig)?;
+        let LinearModel { a, b, torque_inputs } = continuous_plant::<R>(rig)?;
         let period = R::from_f64(rig.tick.period_s);
         refuse_unbridgeable_tick(&a, rig)?;
         let (ad, bd) = zero_order_hold(&a, &b, &period);
         let output = rig.output();
+        let late = rig.tick.delay_ticks == 1;
 
-        let continuous_feedback = |k: Matrix<R>| {
-            // N = -1 / (C (A - B K)⁻¹ B): the paper's equation for the precompensation gain.
-            let n = precompensation(&-&(&a - &(&b * &k)), &b, output);
-            Feedback { k, n }
-        };
-        let sampled_feedback = |k: Matrix<R>| {
-            // The same steady state in sampled time: x = Ad x + Bd u.
-            let identity = Matrix::identity(ad.rows());
-            let n = precompensation(&(&identity - &(&ad - &(&bd * &k))), &bd, output);
-            // One tick of delay: u⁺ = N r - K (Ad x + Bd u), the gain on the state the force will meet.
-            let k = if rig.tick.delay_ticks == 1 { &k * &ad.beside(&bd) } else { k };
-            Feedback { k, n }
-        };
-
-        let mut design = Self {
-            continuous: Laws { lqr: None, pole_placement: None },
-            sampled: Laws { lqr: None, pole_placement: None },
-            a: a.clone(),
-            b: b.clone(),
-            ad: ad.clone(),
-            bd: bd.clone(),
-        };
+        let mut continuous = Laws::none();
+        let mut sampled = Laws::none();
         if let Some(weights) = &rig.lqr {
             let cost = lqr_cost(weights);
-            let k = care(&a, &b, &cost).map_err(|_| why_no_lqr(Task::ContinuousLqr, &a, &b, &cost))?.k;
-            design.continuous.lqr = Some(continuous_feedback(k));
+            let k = lqr(Task::ContinuousLqr, &a, &b, &cost)?;
+            continuous.lqr = Some(feedback(k, &a, &b, output));
             let tick_cost = sampled_cost(&a, &b, &cost, &period);
-            let k =
-                dare(&ad, &bd, &tick_cost).map_err(|_| why_no_lqr(Task::SampledLqr, &ad, &bd, &tick_cost))?.k;
-            design.sampled.lqr = Some(sampled_feedback(k));
+            let k = lqr(Task::SampledLqr, &ad, &bd, &tick_cost)?;
+            sampled.lqr = Some(sampled_feedback(k, &ad, &bd, output, late));
+            if let Some(integral) = &rig.integral {
+                let weight = R::from_f64(integral.position_weight);
+                let (a_z, b_z) = with_integral(&a, &b, output, &R::one(), &R::zero());
+                let k = lqr(Task::ContinuousIntegral, &a_z, &b_z, &with_integral_weight(&cost, &weight))?;
+                continuous.integral = Some(feedback(k, &a, &b, output));
+                let (a_z, b_z) = with_integral(&ad, &bd, output, &period, &R::one());
+                // z is constant during a tick: its cost over the tick is T w z².
+                let tick_cost = with_integral_weight(&tick_cost, &(weight * &period));
+                let k = lqr(Task::SampledIntegral, &a_z, &b_z, &tick_cost)?;
+                sampled.integral = Some(sampled_feedback_over(k, &ad, &bd, &a_z, &b_z, output, late));
+            }
         }
         if let Some(placement) = &rig.pole_placement {
             let poles = wanted_poles(placement, rig)?;
             let place = |task, a, b, poles: &[Pole<R>]| {
                 place(a, b, poles).map_err(|_| why_no_placement::<R>(task, a, b))
             };
-            design.continuous.pole_placement =
-                Some(continuous_feedback(place(Task::ContinuousPlacement, &a, &b, &poles)?));
+            let k = place(Task::ContinuousPlacement, &a, &b, &poles)?;
+            continuous.pole_placement = Some(feedback(k, &a, &b, output));
             let poles: Vec<Pole<R>> = poles.iter().map(|pole| pole.sampled(&period)).collect();
-            design.sampled.pole_placement =
-                Some(sampled_feedback(place(Task::SampledPlacement, &ad, &bd, &poles)?));
+            let k = place(Task::SampledPlacement, &ad, &bd, &poles)?;
+            sampled.pole_placement = Some(sampled_feedback(k, &ad, &bd, output, late));
         }
-        Ok(design)
+        let kalman = rig.kalman.as_ref().map(|noise| {
+            let inputs = noise_inputs(rig, &b, &torque_inputs);
+            kalman(&a, &ad, &inputs, noise, &rig.sensors(), &period)
+        });
+        Ok(Self { continuous, sampled, kalman: kalman.transpose()?, a, b, ad, bd })
     }
 
-    /// Poles of every closed loop, LQR and pole placement: continuous first, then sampled (with the delayed force as
-    /// a further state, if there is a delay).
+    /// Poles of every closed loop.
     ///
     /// # Errors
     /// [`DesignError::Poles`] if the eigenvalue iteration fails.
-    pub fn poles(&self) -> Result<[[Option<Poles>; 2]; 2], DesignError> {
-        let of_loop = |a: Matrix<R>| -> Result<Poles, DesignError> {
+    pub fn poles(&self, rig: &Rig) -> Result<DesignPoles, DesignError> {
+        let of = |a: Matrix<R>| -> Result<Poles, DesignError> {
             Ok(eigenvalues(&a).map_err(|_| DesignError::Poles)?.iter().map(Complex::to_f64).collect())
         };
-        Ok([
-            self.continuous.try_map(|law| of_loop(&self.a - &(&self.b * &law.k)))?,
-            self.sampled.try_map(|law| of_loop(self.sampled_loop(&law.k)))?,
-        ])
+        let continuous =
+            |law: &Option<Feedback<R>>| law.as_ref().map(|law| of(&self.a - &(&self.b * &law.k))).transpose();
+        let sampled =
+            |law: &Option<Feedback<R>>| law.as_ref().map(|law| of(self.sampled_loop(rig, law))).transpose();
+        Ok(DesignPoles {
+            continuous: [continuous(&self.continuous.lqr)?, continuous(&self.continuous.pole_placement)?],
+            sampled: [sampled(&self.sampled.lqr)?, sampled(&self.sampled.pole_placement)?],
+        })
     }
 
-    /// The closed loop of the sampled plant with gain `k`, 1×s without delay or 1×(s+1) with one tick of delay.
-    pub fn sampled_loop(&self, k: &Matrix<R>) -> Matrix<R> {
-        if k.cols() == self.ad.cols() {
-            return &self.ad - &(&self.bd * k);
+    /// The closed loop of the sampled plant with `law`: of x, and z with integral action, and the force on its way with
+    /// one tick of delay.
+    pub fn sampled_loop(&self, rig: &Rig, law: &Feedback<R>) -> Matrix<R> {
+        let period = R::from_f64(rig.tick.period_s);
+        let (a, b) = if law.integral {
+            with_integral(&self.ad, &self.bd, rig.output(), &period, &R::one())
+        } else {
+            (self.ad.clone(), self.bd.clone())
+        };
+        if law.k.cols() == a.cols() {
+            return &a - &(&b * &law.k);
         }
-        // State [x; u]: x⁺ = Ad x + Bd u, u⁺ = -k [x; u].
-        self.ad.beside(&self.bd).above(&-k)
+        // u⁺ = -K [x; u]
+        a.beside(&b).above(&-&law.k)
     }
+}
+
+/// Poles of each closed loop: [LQR, pole placement], where designed; with the delayed force as a further state, if there
+/// is a delay.
+#[derive(Debug, Clone, PartialEq)]
+pub struct DesignPoles {
+    /// Continuous loops (1/s).
+    pub continuous: [Option<Poles>; 2],
+    /// Sampled loops.
+    pub sampled: [Option<Poles>; 2],
 }
 
 /// Poles as [re, im], by real part.
@@ -148,9 +172,17 @@ impl<const BITS: usize> Design<Wide<BITS>> {
     pub fn rounded<S>(&self, round: fn(&Wide<BITS>) -> S) -> Design<S> {
         let laws = |laws: &Laws<Wide<BITS>>| {
             let feedback = |law: &Option<Feedback<Wide<BITS>>>| {
-                law.as_ref().map(|law| Feedback { k: law.k.rounded(round), n: law.n.as_ref().map(round) })
+                law.as_ref().map(|law| Feedback {
+                    k: law.k.rounded(round),
+                    n: law.n.as_ref().map(round),
+                    integral: law.integral,
+                })
             };
-            Laws { lqr: feedback(&laws.lqr), pole_placement: feedback(&laws.pole_placement) }
+            Laws {
+                lqr: feedback(&laws.lqr),
+                pole_placement: feedback(&laws.pole_placement),
+                integral: feedback(&laws.integral),
+            }
         };
         Design {
             a: self.a.rounded(round),
@@ -159,22 +191,36 @@ impl<const BITS: usize> Design<Wide<BITS>> {
             bd: self.bd.rounded(round),
             continuous: laws(&self.continuous),
             sampled: laws(&self.sampled),
+            kalman: self.kalman.as_ref().map(|kalman| Kalman {
+                l_filter: kalman.l_filter.rounded(round),
+                l_predictor: kalman.l_predictor.rounded(round),
+                steps: kalman.steps.map(round),
+            }),
         }
     }
 }
 
 /// The linear plant of the rig: the chain about upright, or the given model.
-fn continuous_plant<R: Real>(rig: &Rig) -> Result<(Matrix<R>, Matrix<R>), DesignError> {
+fn continuous_plant<R: Real>(rig: &Rig) -> Result<LinearModel<R>, DesignError> {
     match &rig.plant {
         PlantDescription::Chain(chain) => {
-            let model = linearise(&ChainParameters::of(chain), Equilibrium::Upright)
-                .map_err(|_| DesignError::MassMatrix)?;
-            Ok((model.a, model.b))
+            linearise(&ChainParameters::of(chain), Equilibrium::Upright).map_err(|_| DesignError::MassMatrix)
         }
-        PlantDescription::Model(model) => Ok((
-            Matrix::from_f64_rows(&model.a),
-            Matrix::from_fn(model.b.len(), 1, |i, _| R::from_f64(model.b[i])),
-        )),
+        PlantDescription::Model(model) => Ok(LinearModel {
+            a: Matrix::from_f64_rows(&model.a),
+            b: Matrix::from_fn(model.b.len(), 1, |i, _| R::from_f64(model.b[i])),
+            torque_inputs: Matrix::zeros(model.b.len(), 0),
+        }),
+    }
+}
+
+/// Columns through which the noise of `[kalman]` enters: force and joint torques, or those of the model.
+fn noise_inputs<R: Real>(rig: &Rig, b: &Matrix<R>, torque_inputs: &Matrix<R>) -> Matrix<R> {
+    match &rig.plant {
+        PlantDescription::Model(LinearPlant { noise_input: Some(columns), .. }) => {
+            Matrix::from_fn(b.rows(), columns.len(), |i, j| R::from_f64(columns[j][i]))
+        }
+        _ => b.beside(torque_inputs),
     }
 }
 
@@ -188,6 +234,71 @@ fn refuse_unbridgeable_tick<R: Real>(a: &Matrix<R>, rig: &Rig) -> Result<(), Des
         return Err(DesignError::TickTooLong { tick_s: rig.tick.period_s, pole: fastest, growth });
     }
     Ok(())
+}
+
+/// Gain K of the linear quadratic regulator of (a, b).
+fn lqr<R: Real>(task: Task, a: &Matrix<R>, b: &Matrix<R>, cost: &Cost<R>) -> Result<Matrix<R>, DesignError> {
+    let solution = if task.is_sampled() { dare(a, b, cost) } else { care(a, b, cost) };
+    Ok(solution.map_err(|_| why_no_lqr(task, a, b, cost))?.k)
+}
+
+/// Continuous feedback with N = -1 / (C (A - B K)⁻¹ B): the paper's equation for the precompensation gain. K is over x, or
+/// over [x; z]; N is that of the part over x, because with the right N the integral has nothing to do.
+fn feedback<R: Real>(k: Matrix<R>, a: &Matrix<R>, b: &Matrix<R>, output: usize) -> Feedback<R> {
+    let k_x = k.block(0, 0, 1, a.cols());
+    let n = precompensation(&-&(a - &(b * &k_x)), b, output);
+    Feedback { integral: k.cols() > a.cols(), k, n }
+}
+
+/// Sampled feedback K, made for the delay: one tick late, `u⁺ = N r - K (Ad x + Bd u)` acts on the state it will meet.
+fn sampled_feedback<R: Real>(
+    k: Matrix<R>,
+    ad: &Matrix<R>,
+    bd: &Matrix<R>,
+    output: usize,
+    late: bool,
+) -> Feedback<R> {
+    sampled_feedback_over(k, ad, bd, ad, bd, output, late)
+}
+
+/// As [`sampled_feedback`], with K over the states of a larger plant (`a_z`, `b_z`) that contains (`ad`, `bd`).
+fn sampled_feedback_over<R: Real>(
+    k: Matrix<R>,
+    ad: &Matrix<R>,
+    bd: &Matrix<R>,
+    a_z: &Matrix<R>,
+    b_z: &Matrix<R>,
+    output: usize,
+    late: bool,
+) -> Feedback<R> {
+    // The steady state of x = Ad x + Bd u.
+    let k_x = k.block(0, 0, 1, ad.cols());
+    let n = precompensation(&(&Matrix::identity(ad.rows()) - &(ad - &(bd * &k_x))), bd, output);
+    let k = if late { &k * &a_z.beside(b_z) } else { k };
+    Feedback { k, n, integral: a_z.rows() > ad.rows() }
+}
+
+/// The plant with the integral of its output as a further state: `ż = y` (`gain` 1, `kept` 0) or `z⁺ = z + T y`
+/// (`gain` T, `kept` 1).
+fn with_integral<R: Real>(
+    a: &Matrix<R>,
+    b: &Matrix<R>,
+    output: usize,
+    gain: &R,
+    kept: &R,
+) -> (Matrix<R>, Matrix<R>) {
+    let s = a.rows();
+    let mut a_z = Matrix::zeros(s + 1, s + 1).with_block(0, 0, a);
+    a_z[(s, output)] = gain.clone();
+    a_z[(s, s)] = kept.clone();
+    (a_z, b.above(&Matrix::zeros(1, 1)))
+}
+
+fn with_integral_weight<R: Real>(cost: &Cost<R>, weight: &R) -> Cost<R> {
+    let s = cost.q.rows();
+    let mut q = Matrix::zeros(s + 1, s + 1).with_block(0, 0, &cost.q);
+    q[(s, s)] = weight.clone();
+    Cost { q, r: cost.r.clone(), s: cost.s.above(&Matrix::zeros(1, 1)) }
 }
 
 /// `1 / (C M⁻¹ B)` with `C` picking the state `output`; none if `C M⁻¹ B` is zero, or nothing but rounding error.
@@ -227,41 +338,4 @@ fn wanted_poles<R: Real>(placement: &PolePlacement, rig: &Rig) -> Result<Vec<Pol
         return Err(DesignError::PoleCount { given, wanted: rig.states() });
     }
     Ok(poles)
-}
-
-fn why_no_placement<R: Real>(task: Task, a: &Matrix<R>, b: &Matrix<R>) -> DesignError {
-    let reach = Reach::of(a, b);
-    match reach.unreachable_modes() {
-        Ok(modes) if !modes.is_empty() => {
-            DesignError::Uncontrollable { task, modes: modes.iter().map(Complex::to_f64).collect() }
-        }
-        _ => DesignError::Unresolved { task, bits: R::BITS },
-    }
-}
-
-fn why_no_lqr<R: Real>(task: Task, a: &Matrix<R>, b: &Matrix<R>, cost: &Cost<R>) -> DesignError {
-    // A quarter of the bits: a repeated mode is only known to that many.
-    let fuzz = R::one().scale_by_power_of_two(-(R::BITS as i32) / 8);
-    // How far outside the stability region a mode lies, relative to the size of the plant.
-    let excess = |mode: &Complex<R>| {
-        if task.is_sampled() {
-            mode.modulus() - &R::one()
-        } else {
-            mode.re.clone() / &a.norm().max(fuzz.clone())
-        }
-    };
-    let named = |modes: Vec<&Complex<R>>| modes.into_iter().map(Complex::to_f64).collect::<Poles>();
-    if let Ok(modes) = Reach::of(a, b).unreachable_modes() {
-        let unstable = named(modes.iter().filter(|mode| excess(mode) > -fuzz.clone()).collect());
-        if !unstable.is_empty() {
-            return DesignError::NotStabilisable { task, modes: unstable };
-        }
-    }
-    if let Ok(modes) = Reach::of(&a.transpose(), &cost.q).unreachable_modes() {
-        let marginal = named(modes.iter().filter(|mode| excess(mode).abs() < fuzz).collect());
-        if !marginal.is_empty() {
-            return DesignError::Unweighted { task, modes: marginal };
-        }
-    }
-    DesignError::Unresolved { task, bits: R::BITS }
 }

@@ -20,6 +20,7 @@
 mod chain;
 mod linear;
 mod linear_simulation;
+mod motor;
 mod parameters;
 pub mod reference;
 mod rk4;
@@ -29,6 +30,7 @@ mod sincos;
 pub use chain::{ChainPlant, ChainState, Energy};
 pub use linear::{Equilibrium, LinearModel, linearise};
 pub use linear_simulation::LinearSimulation;
+pub use motor::MotorPlant;
 pub use parameters::ChainParameters;
 pub use simulation::{ChainSimulation, MAX_LINKS, Plant, chain_plant};
 pub use sincos::sin_cos;

@@ -11,9 +11,11 @@ mod load;
 mod node;
 mod parse;
 mod rule;
+mod sensors;
 
 pub use error::{Place, RigError, RigErrorKind};
 pub use load::MAX_BYTES;
+pub use sensors::Sensor;
 
 use serde::Serialize;
 use sha2::{Digest, Sha256};

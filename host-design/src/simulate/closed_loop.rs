@@ -1,18 +1,17 @@
 //! Ticks of the firmware's controller, plant in between.
 
 use nalgebra::SVector;
-use rand::SeedableRng;
-use rand_distr::{Distribution, Normal};
-use rand_pcg::Pcg64;
 use upright::controller::{Controller, Rejected};
+use upright::encoder::CounterWidth;
 use upright::table::TableError;
 
-use super::scenario::Scenario;
+use super::bench::Bench;
+use super::scenario::{Scenario, Sensing};
 use super::summary::{Fall, FallKind, Summary};
 use super::trace::{Sample, Trace};
-use crate::plant::{LinearSimulation, Plant, PlantError, chain_plant};
+use crate::plant::PlantError;
 use crate::rig::{PlantDescription, Rig};
-use crate::table::{MAX_STATES, TableValues, WithStates, with_states};
+use crate::table::{TableValues, WithSize, with_size};
 
 /// A run that cannot be started.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -29,9 +28,14 @@ pub enum SimulationError {
     /// A standard deviation that is negative or not finite.
     #[error("a noise level of {0} is not possible: give a number of at least 0")]
     Noise(f64),
-    /// More states than the firmware's types are made for.
-    #[error("{0} states are more than the {MAX_STATES} a gain table can hold")]
-    TooManyStates(usize),
+    /// Dimensions the firmware's types are not made for.
+    #[error("no firmware for {states} states and {sensors} sensors")]
+    Size {
+        /// States of the table.
+        states: usize,
+        /// Sensors of the table.
+        sensors: usize,
+    },
 }
 
 /// Runs `scenario`: the firmware's controller, built from `table`, against the nonlinear plant of `rig` (or the given
@@ -44,9 +48,10 @@ pub fn simulate(
     table: &TableValues,
     scenario: &Scenario,
 ) -> Result<(Trace, Summary), SimulationError> {
-    let states = rig.states();
+    let (states, sensors) = (table.states, table.sensors);
     let run = Run { rig, table, scenario };
-    let (trace, fall) = with_states(states, run).ok_or(SimulationError::TooManyStates(states))??;
+    let (trace, fall) =
+        with_size(states, sensors, run).ok_or(SimulationError::Size { states, sensors })??;
     let summary = Summary::of(rig, scenario, &trace, fall);
     Ok((trace, summary))
 }
@@ -57,49 +62,57 @@ struct Run<'a> {
     scenario: &'a Scenario,
 }
 
-impl WithStates for Run<'_> {
-    type Output = Result<(Trace, Option<Fall>), SimulationError>;
+impl WithSize for Run<'_> {
+    type Output = Result<Option<Fall>, SimulationError>;
 
-    fn run<const NX: usize>(self) -> Self::Output {
-        let Self { rig, table: values, scenario } = self;
-        let table = values.table::<NX>();
-        let mut controller = Controller::new(&table, &values.build())?;
+    fn run<const NX: usize, const NY: usize>(self) -> Self::Output {
+        let Self { rig, table: values, scenario, observe } = self;
+        let table = values.table::<NX, NY>();
+        // As on the board: the cart's counter has 32 bits, those of the links 16.
+        let widths =
+            core::array::from_fn(
+                |sensor| if sensor == 0 { CounterWidth::Bits32 } else { CounterWidth::Bits16 },
+            );
+        let mut controller = Controller::new(&table, &values.build(), widths)?;
         controller.select(scenario.law)?;
-        let mut plant: Box<dyn Plant> = match &rig.plant {
-            PlantDescription::Chain(chain) => chain_plant(chain)?,
-            PlantDescription::Model(model) => Box::new(LinearSimulation::of(model)),
-        };
-        plant.set_state(&scenario.start);
-
-        let mut random = Pcg64::seed_from_u64(scenario.seed);
-        let noise = |level: f64| Normal::new(0.0, level).map_err(|_| SimulationError::Noise(level));
-        let (force_noise, torque_noise) = (noise(scenario.force_noise_n)?, noise(scenario.torque_noise_n_m)?);
-        let mut torques = vec![0.0; plant.disturbances()];
-
-        let period = rig.tick.period_s;
-        let ticks = (scenario.duration_s / period).round() as usize;
-        let mut trace = Trace::new(rig);
-        let mut state = [0.0; NX];
-        let mut on_its_way = 0.0;
-        for tick in 0..=ticks {
-            let t = tick as f64 * period;
-            plant.write_state(&mut state);
-            let fall = Fall::of(rig, t, &state);
-            let setpoint = if t >= scenario.step_at_s { scenario.step_m } else { 0.0 };
-            controller.set_setpoint(setpoint as f32)?;
-            let force = controller.tick(&SVector::from_fn(|i, _| state[i] as f32));
-            let computed = f64::from(force.limited);
-            let applied = if values.delay_ticks == 1 { on_its_way } else { computed };
-            on_its_way = computed;
-            trace.push(Sample { t, setpoint, state: &state, requested: f64::from(force.requested), applied });
-            if fall.is_some() {
-                return Ok((trace, fall));
+        let mut bench = Bench::new(rig, scenario)?;
+        let full_state = |bench: &Bench| SVector::from_fn(|i, _| bench.state()[i] as f32);
+        match scenario.sensing {
+            Sensing::FullState => controller.start_in_state(&full_state(&bench)),
+            Sensing::Encoders => {
+                // Homed where the counters show `counter_start`.
+                controller.encoders_mut().home(&[scenario.counter_start; NY], &[0; NY]);
+                controller.start(&bench.counters())?;
             }
-            let disturbance = force_noise.sample(&mut random);
-            torques.fill_with(|| torque_noise.sample(&mut random));
-            plant.advance(applied + disturbance, &torques, period, scenario.substeps);
         }
-        Ok((trace, None))
+        let ticks = (scenario.duration_s / rig.tick.period_s).round() as usize;
+        for tick in 0..=ticks {
+            let t = tick as f64 * rig.tick.period_s;
+            let target = if t >= scenario.step_at_s { scenario.step_m } else { 0.0 };
+            controller.set_setpoint(target as f32)?;
+            let command = match scenario.sensing {
+                Sensing::FullState => controller.control_from_state(&full_state(&bench)),
+                Sensing::Encoders => controller.control(&bench.counters()),
+            };
+            let before: [f64; NX] = core::array::from_fn(|i| bench.state()[i]);
+            let estimate: [f64; NX] = core::array::from_fn(|i| f64::from(controller.estimate()[i]));
+            let fall = Fall::of(rig, t, &before);
+            let force = bench.tick(command.drive);
+            observe(&Sample {
+                t,
+                target,
+                setpoint: f64::from(controller.law_state().setpoint),
+                requested: f64::from(command.requested),
+                force,
+                state: &before,
+                estimate: &estimate,
+            });
+            if fall.is_some() {
+                return Ok(fall);
+            }
+            controller.predict();
+        }
+        Ok(None)
     }
 }
 

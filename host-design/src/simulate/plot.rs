@@ -21,13 +21,15 @@ const COLOURS: [RGBColor; 7] = [
     RGBColor(0, 0, 0),
 ];
 
+type Value<'a> = Box<dyn Fn(&Sample<&[f64]>) -> f64 + 'a>;
+
 struct Curve<'a> {
     name: String,
-    value: Box<dyn Fn(&Sample<'_>) -> f64 + 'a>,
+    value: Value<'a>,
 }
 
 impl<'a> Curve<'a> {
-    fn new(name: impl Into<String>, value: impl Fn(&Sample<'_>) -> f64 + 'a) -> Self {
+    fn new(name: impl Into<String>, value: impl Fn(&Sample<&[f64]>) -> f64 + 'a) -> Self {
         Self { name: name.into(), value: Box::new(value) }
     }
 }
@@ -41,7 +43,8 @@ pub fn svg(rig: &Rig, trace: &Trace, title: &str) -> Result<String, PlotError> {
     let mut panels = vec![(
         if matches!(rig.plant, PlantDescription::Chain(_)) { "position (m)" } else { "output" },
         vec![
-            Curve::new("set-point", |s| s.setpoint),
+            Curve::new("set-point", |s| s.target),
+            Curve::new("governed", |s| s.setpoint),
             Curve::new(if output == 0 { "x".to_owned() } else { format!("state {output}") }, move |s| {
                 s.state[output]
             }),
@@ -55,7 +58,7 @@ pub fn svg(rig: &Rig, trace: &Trace, title: &str) -> Result<String, PlotError> {
     }
     panels.push((
         "force (N)",
-        vec![Curve::new("asked for", |s| s.requested), Curve::new("applied", |s| s.applied)],
+        vec![Curve::new("asked for", |s| s.requested), Curve::new("applied", |s| s.force)],
     ));
 
     let mut document = String::new();

@@ -4,11 +4,13 @@ use upright::table::Law;
 
 use crate::rig::{PlantDescription, Rig};
 
-/// One run: start, set-point, disturbances.
+/// One run: start, set-point, disturbances, sensors.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Scenario {
     /// Control law.
     pub law: Law,
+    /// What the controller gets to see.
+    pub sensing: Sensing,
     /// Length of the run (s).
     pub duration_s: f64,
     /// State at the start (m, m/s, rad, rad/s …).
@@ -25,13 +27,25 @@ pub struct Scenario {
     pub seed: u64,
     /// Integration steps per tick.
     pub substeps: usize,
+    /// What the encoder counters show at position 0.
+    pub counter_start: u32,
+}
+
+/// What the controller gets to see.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Sensing {
+    /// The whole state, exactly: what the paper simulates.
+    FullState,
+    /// Encoder counts; the observer estimates the rest.
+    Encoders,
 }
 
 impl Scenario {
-    /// A run at rest, upright, at set-point 0, for 10 s.
+    /// A run at rest, upright, at set-point 0, for 10 s, from encoders if the rig asks for an observer.
     pub fn at_rest(rig: &Rig, law: Law) -> Self {
         Self {
             law,
+            sensing: if rig.kalman.is_some() { Sensing::Encoders } else { Sensing::FullState },
             duration_s: 10.0,
             start: vec![0.0; rig.states()],
             step_m: 0.0,
@@ -40,6 +54,7 @@ impl Scenario {
             torque_noise_n_m: 0.0,
             seed: 1,
             substeps: 4,
+            counter_start: 0,
         }
     }
 

@@ -59,7 +59,7 @@ pub struct Summary {
     pub undershoot_percent: Option<f64>,
     /// Largest absolute relative angle of each link (rad).
     pub peak_angles_rad: Vec<f64>,
-    /// Largest absolute force applied (N).
+    /// Largest absolute force on the cart (N).
     pub peak_force_n: f64,
     /// Largest absolute force asked for (N).
     pub peak_requested_force_n: f64,
@@ -89,10 +89,10 @@ impl Summary {
             for (peak, angle) in peak_angles_rad.iter_mut().zip(&lean) {
                 *peak = peak.max(*angle);
             }
-            peak_force_n = peak_force_n.max(sample.applied.abs());
+            peak_force_n = peak_force_n.max(sample.force.abs());
             peak_requested_force_n = peak_requested_force_n.max(sample.requested.abs());
             let y = sample.state[output];
-            final_error_m = sample.setpoint - y;
+            final_error_m = sample.target - y;
             if sample.t >= scenario.step_at_s {
                 beyond = beyond.max((y - step) * step.signum());
                 against = against.max(-y * step.signum());

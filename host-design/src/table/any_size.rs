@@ -1,26 +1,33 @@
-//! From a number of states known at run time to the firmware's types, which have it in the type.
+//! From numbers of states and sensors known at run time to the firmware's types, which have them in the type.
 
 /// The largest number of states a gain table can hold.
-pub const MAX_STATES: usize = 32;
+pub const MAX_STATES: usize = 30;
+/// The largest number of sensors for a `[model]` rig; a chain has one for the cart and one for each link.
+pub const MAX_MODEL_SENSORS: usize = 2;
 
-/// Something to be done with a number of states in the type.
-pub trait WithStates {
+/// Something to be done with the numbers of states and sensors in the type.
+pub trait WithSize {
     /// What comes out.
     type Output;
 
     /// Does it.
-    fn run<const NX: usize>(self) -> Self::Output;
+    fn run<const NX: usize, const NY: usize>(self) -> Self::Output;
 }
 
-/// Runs `action` with `NX = states`; none unless there are 1 to [`MAX_STATES`] states.
-pub fn with_states<A: WithStates>(states: usize, action: A) -> Option<A::Output> {
+/// Runs `action` with `NX = states` and `NY = sensors`; none unless the firmware's types are made for them on the host:
+/// 1 to [`MAX_STATES`] states with 1 to [`MAX_MODEL_SENSORS`] sensors, or 2n + 2 states with n + 1 sensors.
+pub fn with_size<A: WithSize>(states: usize, sensors: usize, action: A) -> Option<A::Output> {
     macro_rules! dispatch {
-        ($($n:literal)*) => {
-            match states {
-                $($n => Some(action.run::<$n>()),)*
+        ($($states:literal: $($sensors:literal)*;)*) => {
+            match (states, sensors) {
+                $($(($states, $sensors) => Some(action.run::<$states, $sensors>()),)*)*
                 _ => None,
             }
         };
     }
-    dispatch!(1 2 3 4 5 6 7 8 9 10 11 12 13 14 15 16 17 18 19 20 21 22 23 24 25 26 27 28 29 30 31 32)
+    dispatch! {
+        1: 1; 2: 1 2; 3: 1 2; 4: 1 2; 5: 1 2; 6: 1 2 3; 7: 1 2; 8: 1 2 4; 9: 1 2; 10: 1 2 5; 11: 1 2; 12: 1 2 6; 13: 1 2;
+        14: 1 2 7; 15: 1 2; 16: 1 2 8; 17: 1 2; 18: 1 2 9; 19: 1 2; 20: 1 2 10; 21: 1 2; 22: 1 2 11; 23: 1 2; 24: 1 2 12;
+        25: 1 2; 26: 1 2 13; 27: 1 2; 28: 1 2 14; 29: 1 2; 30: 1 2 15;
+    }
 }

@@ -7,7 +7,7 @@ use clap::Args;
 use host_design::design::{Assessment, Certified, design};
 use host_design::rig::Rig;
 use host_design::simulate::{Scenario, Summary, simulate};
-use host_design::table::{TableValues, gains_source, write_atomically};
+use host_design::table::{Gains, TableValues, gains_source, write_atomically};
 use upright::table::Law;
 
 use crate::failure::Failure;
@@ -58,15 +58,17 @@ impl Design {
         let (certified, reports, table) = with_spinner("designing", || -> Result<_, Failure> {
             let failed = |source| Failure::Design { rig: name(), source };
             let certified = design(&rig).map_err(failed)?;
-            let assessments = certified.assess().map_err(failed)?;
-            let table = TableValues::of(&rig, &certified.single.sampled);
+            let assessments = certified.assess(&rig).map_err(failed)?;
+            let table = TableValues::of(&rig, &certified, Gains::Sampled);
             let reports = report(&rig, &certified, assessments, table.as_ref().ok())?;
             Ok((certified, reports, table))
         })?;
 
         let mut out = std::io::stdout().lock();
         if self.json {
-            writeln!(out, "{}", data::design(&rig, &certified, table.as_ref().ok()))?;
+            serde_json::to_writer(&mut out, &data::DesignData::of(&rig, &certified, table.as_ref().ok()))
+                .map_err(std::io::Error::from)?;
+            writeln!(out)?;
         } else {
             write!(out, "{}", text::design(&rig, &certified, &reports))?;
         }
@@ -113,7 +115,7 @@ fn report(
 
 /// Of the continuous loop (s).
 fn slowest_time_constant(rig: &Rig, certified: &Certified, law: usize) -> f64 {
-    let poles = certified.poles[0][law].as_deref().unwrap_or_default();
+    let poles = certified.poles.continuous[law].as_deref().unwrap_or_default();
     let slowest = poles.iter().map(|pole| -pole[0]).fold(f64::INFINITY, f64::min);
     if slowest > 0.0 && slowest.is_finite() { 1.0 / slowest } else { rig.tick.period_s }
 }

@@ -6,8 +6,8 @@ use std::path::PathBuf;
 use clap::{Args, ValueEnum};
 use host_design::design::design;
 use host_design::rig::{PlantDescription, Rig};
-use host_design::simulate::{Scenario, Summary, Trace, simulate, svg};
-use host_design::table::{TableValues, write_atomically};
+use host_design::simulate::{Scenario, Sensing, Summary, Trace, simulate, svg};
+use host_design::table::{self, TableValues, write_atomically};
 use serde_json::json;
 use upright::table::Law;
 
@@ -42,6 +42,12 @@ pub(crate) struct Simulate {
     /// When the set-point steps (s)
     #[arg(long, default_value_t = 0.0, value_name = "S", value_parser = not_negative)]
     step_at: f64,
+    /// Let the set-point jump, without the governor
+    #[arg(long)]
+    raw_step: bool,
+    /// What the controller sees [default: encoders if the rig file has [kalman]]
+    #[arg(long, value_enum)]
+    sensing: Option<SensingName>,
     /// Angles of the links at the start, from the cart outwards (rad); missing ones are 0
     #[arg(long, value_delimiter = ',', value_name = "RAD,…", allow_negative_numbers = true, value_parser = finite)]
     tilt: Vec<f64>,
@@ -98,6 +104,12 @@ enum Gains {
 }
 
 #[derive(Clone, Copy, ValueEnum)]
+enum SensingName {
+    FullState,
+    Encoders,
+}
+
+#[derive(Clone, Copy, ValueEnum)]
 enum Disturbances {
     None,
     Paper,
@@ -141,11 +153,13 @@ impl Simulate {
         let name = || self.rig.display().to_string();
         let certified = with_spinner("designing", || design(&rig))
             .map_err(|source| Failure::Design { rig: name(), source })?;
-        let laws = match self.gains {
-            Gains::Sampled => &certified.single.sampled,
-            Gains::Continuous => &certified.single.continuous,
+        let gains = match self.gains {
+            Gains::Sampled => table::Gains::Sampled,
+            Gains::Continuous => table::Gains::Continuous,
         };
-        let table = TableValues::of(&rig, laws).map_err(|source| Failure::NoTable { rig: name(), source })?;
+        let table = TableValues::of(&rig, &certified, gains)
+            .map_err(|source| Failure::NoTable { rig: name(), source })?;
+        let table = if self.raw_step { table.without_governor() } else { table };
         let (trace, summary) = with_spinner("simulating", || simulate(&rig, &table, &scenario))?;
         self.write(&rig, &trace, &summary)?;
         match &summary.fall {
@@ -160,6 +174,12 @@ impl Simulate {
             LawName::PolePlacement => Law::PolePlacement,
         };
         let mut scenario = Scenario::at_rest(rig, law);
+        if let Some(sensing) = self.sensing {
+            scenario.sensing = match sensing {
+                SensingName::FullState => Sensing::FullState,
+                SensingName::Encoders => Sensing::Encoders,
+            };
+        }
         let states = rig.states();
         if !self.start.is_empty() {
             if self.start.len() != states {

@@ -33,10 +33,10 @@ fn write_design(
         let index = report.index;
         writeln!(out, "\n{}", report.name)?;
         if let Some(law) = certified.double.continuous.each()[index] {
-            write_law(out, "continuous", "s", law, certified.poles[0][index].as_deref())?;
+            write_law(out, "continuous", "s", law, certified.poles.continuous[index].as_deref())?;
         }
         if let Some(law) = certified.double.sampled.each()[index] {
-            write_law(out, "sampled", "z", law, certified.poles[1][index].as_deref())?;
+            write_law(out, "sampled", "z", law, certified.poles.sampled[index].as_deref())?;
         }
         let assessment = &report.assessment;
         writeln!(

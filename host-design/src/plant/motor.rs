@@ -1,0 +1,48 @@
+//! The DC motor that pushes the cart, as it really behaves: supply, back-EMF, dead zone.
+
+use crate::rig;
+
+/// Voltage to force through gear and pulley.
+#[derive(Debug, Clone, PartialEq)]
+pub struct MotorPlant {
+    newtons_per_volt: f64,
+    volts_per_speed: f64,
+    dead_zone_v: f64,
+    supply_v: f64,
+}
+
+impl MotorPlant {
+    /// The motor of a rig file.
+    pub fn of(motor: &rig::Motor) -> Self {
+        let volts_per_speed = motor.gear_ratio * motor.torque_constant_n_m_per_a / motor.pulley_radius_m;
+        Self {
+            newtons_per_volt: volts_per_speed / motor.resistance_ohm,
+            volts_per_speed,
+            dead_zone_v: motor.dead_zone_v,
+            supply_v: motor.supply_v,
+        }
+    }
+
+    /// Force on the cart (N) at `duty` (-1 to 1) and cart speed `speed` (m/s). The dead zone takes its share of the
+    /// voltage whichever way it points, and all of a smaller one.
+    pub fn force(&self, duty: f64, speed: f64) -> f64 {
+        let volts = duty.clamp(-1.0, 1.0) * self.supply_v;
+        let effective = volts.signum() * (volts.abs() - self.dead_zone_v).max(0.0);
+        self.newtons_per_volt * (effective - self.volts_per_speed * speed)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn force_follows_voltage_less_dead_zone_and_back_emf() {
+        let motor =
+            MotorPlant { newtons_per_volt: 0.5, volts_per_speed: 4.0, dead_zone_v: 1.0, supply_v: 12.0 };
+        assert_eq!(motor.force(0.5, 0.0), 2.5);
+        assert_eq!(motor.force(-0.5, 0.25), -3.0);
+        assert_eq!(motor.force(0.05, 0.0), 0.0);
+        assert_eq!(motor.force(2.0, 0.0), 5.5);
+    }
+}

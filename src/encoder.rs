@@ -1,0 +1,92 @@
+//! Incremental encoders: raw counters of any width to positions in SI units.
+
+use nalgebra::SVector;
+
+/// Width of a hardware counter.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum CounterWidth {
+    /// 16 bits: wraps after 65 536 counts.
+    Bits16,
+    /// 32 bits.
+    Bits32,
+}
+
+/// Follows hardware counters across their wrap-around and knows which count is position 0.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Encoders<const NY: usize> {
+    widths: [CounterWidth; NY],
+    last: [u32; NY],
+    /// Counts from position 0; wraps silently after 2³¹ counts, a hundred kilometres of any rail.
+    position: [i32; NY],
+}
+
+impl<const NY: usize> Encoders<NY> {
+    /// Encoders at position 0 with their counters at 0.
+    pub const fn new(widths: [CounterWidth; NY]) -> Self {
+        Self { widths, last: [0; NY], position: [0; NY] }
+    }
+
+    /// Declares that the counters stand at `raw` while the rig is at `position` (counts), as found by homing.
+    pub fn home(&mut self, raw: &[u32; NY], position: &[i32; NY]) {
+        self.last = *raw;
+        self.position = *position;
+    }
+
+    /// Takes new counter readings. Between two readings a counter may move by less than half its range.
+    pub fn update(&mut self, raw: &[u32; NY]) {
+        let follow = self.widths.iter().zip(&mut self.last).zip(&mut self.position).zip(raw);
+        for (((width, last), position), &raw) in follow {
+            let moved = raw.wrapping_sub(*last);
+            let moved = match width {
+                // The cast keeps the low 16 bits: the distance modulo the counter's range, with its sign.
+                CounterWidth::Bits16 => i32::from(moved as i16),
+                CounterWidth::Bits32 => moved as i32,
+            };
+            *last = raw;
+            *position = position.wrapping_add(moved);
+        }
+    }
+
+    /// Positions in counts.
+    pub fn counts(&self) -> &[i32; NY] {
+        &self.position
+    }
+
+    /// Positions in SI units; `step` holds the travel per count (m or rad).
+    pub fn positions(&self, step: &SVector<f32, NY>) -> SVector<f32, NY> {
+        let mut y = *step;
+        for (y, &counts) in y.iter_mut().zip(&self.position) {
+            *y *= counts as f32;
+        }
+        y
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    proptest! {
+        #[test]
+        fn a_wrap_of_the_counter_changes_nothing(start: u32, moves in prop::collection::vec(-30_000i32..30_000, 1..50)) {
+            let mut encoders = Encoders::new([CounterWidth::Bits16, CounterWidth::Bits32]);
+            let raw = |position: i32| [u32::from(start.wrapping_add(position as u32) as u16), start.wrapping_add(position as u32)];
+            encoders.home(&raw(0), &[0, 0]);
+            let mut position = 0;
+            for step in moves {
+                position += step;
+                encoders.update(&raw(position));
+                prop_assert_eq!(encoders.counts(), &[position, position]);
+            }
+        }
+    }
+
+    #[test]
+    fn counts_become_metres_and_radians() {
+        let mut encoders = Encoders::new([CounterWidth::Bits32; 2]);
+        encoders.home(&[100, 7], &[0, 50]);
+        encoders.update(&[98, 8]);
+        assert_eq!(encoders.positions(&SVector::from([0.5, 0.25])), SVector::from([-1.0, 12.75]));
+    }
+}
