@@ -48,18 +48,33 @@ pub fn simulate(
     table: &TableValues,
     scenario: &Scenario,
 ) -> Result<(Trace, Summary), SimulationError> {
-    let (states, sensors) = (table.states, table.sensors);
-    let run = Run { rig, table, scenario };
-    let (trace, fall) =
-        with_size(states, sensors, run).ok_or(SimulationError::Size { states, sensors })??;
+    let mut trace = Trace::new(rig, (scenario.duration_s / rig.tick.period_s).round() as usize);
+    let fall = run(rig, table, scenario, &mut |sample| trace.push(sample))?;
     let summary = Summary::of(rig, scenario, &trace, fall);
     Ok((trace, summary))
+}
+
+/// As [`simulate`], but keeps no record: `observe` sees every tick. The plant is that of `rig`, which need not be the one
+/// the table was designed for.
+///
+/// # Errors
+/// As for [`simulate`].
+pub fn run(
+    rig: &Rig,
+    table: &TableValues,
+    scenario: &Scenario,
+    observe: &mut dyn FnMut(&Sample<&[f64]>),
+) -> Result<Option<Fall>, SimulationError> {
+    let (states, sensors) = (table.states, table.sensors);
+    let run = Run { rig, table, scenario, observe };
+    with_size(states, sensors, run).ok_or(SimulationError::Size { states, sensors })?
 }
 
 struct Run<'a> {
     rig: &'a Rig,
     table: &'a TableValues,
     scenario: &'a Scenario,
+    observe: &'a mut dyn FnMut(&Sample<&[f64]>),
 }
 
 impl WithSize for Run<'_> {
