@@ -14,6 +14,9 @@ use crate::plant::{LinearSimulation, Plant, PlantError, chain_plant};
 use crate::rig::{PlantDescription, Rig};
 use crate::table::{MAX_STATES, TableValues, WithStates, with_states};
 
+/// Most ticks of a run: an hour at 1 ms, and a record of some 450 MB for a quadruple pendulum.
+const MAX_TICKS: u32 = 4_000_000;
+
 /// A run that cannot be started.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum SimulationError {
@@ -29,6 +32,14 @@ pub enum SimulationError {
     /// A standard deviation that is negative or not finite.
     #[error("a noise level of {0} is not possible: give a number of at least 0")]
     Noise(f64),
+    /// A run whose record would not fit into memory.
+    #[error("a run of {duration_s} s has more than {MAX_TICKS} ticks of {period_s} s: shorten it")]
+    TooLong {
+        /// Length of the run (s).
+        duration_s: f64,
+        /// Control period (s).
+        period_s: f64,
+    },
     /// More states than the firmware's types are made for.
     #[error("{0} states are more than the {MAX_STATES} a gain table can hold")]
     TooManyStates(usize),
@@ -77,7 +88,11 @@ impl WithStates for Run<'_> {
         let mut torques = vec![0.0; plant.disturbances()];
 
         let period = rig.tick.period_s;
-        let ticks = (scenario.duration_s / period).round() as usize;
+        let ticks = (scenario.duration_s / period).round();
+        if ticks > f64::from(MAX_TICKS) {
+            return Err(SimulationError::TooLong { duration_s: scenario.duration_s, period_s: period });
+        }
+        let ticks = ticks as usize;
         let mut trace = Trace::new(rig);
         let mut state = [0.0; NX];
         let mut on_its_way = 0.0;
