@@ -152,7 +152,7 @@ fn check(path: &Path, source: &str) -> Result<(), Failure> {
         return Ok(());
     }
     let differing = found.lines().zip(source.lines()).position(|(found, wanted)| found != wanted);
-    let line = differing.map_or_else(|| found.lines().count().min(source.lines().count()), |line| line) + 1;
+    let line = differing.unwrap_or_else(|| found.lines().count().min(source.lines().count())) + 1;
     Err(Failure::CheckFailed(format!(
         "{}:{line}: differs from what `upright design` would write; run it without --check",
         path.display()
