@@ -63,7 +63,11 @@ pub fn svg(rig: &Rig, trace: &Trace, title: &str) -> Result<String, PlotError> {
         panels.push(("angles (°)", angles));
     }
     let label = if is_chain { "force (N)" } else { "input" };
-    let asked_for = Curve::reference("asked for", |s| s.requested);
+    // A falling pendulum asks for a hundred times what there is: the rest should stay legible.
+    let most = 2.0 * trace.samples().fold(0.0f64, |most, s| most.max(s.applied.abs()));
+    let is_cut_off = trace.samples().any(|s| s.requested.abs() > most);
+    let name = if is_cut_off { "asked for (cut off)" } else { "asked for" };
+    let asked_for = Curve::reference(name, move |s| s.requested.clamp(-most, most));
     panels.push((label, vec![asked_for, Curve::new("applied", 0, |s| s.applied)]));
 
     let mut document = String::new();
