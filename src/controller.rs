@@ -117,7 +117,7 @@ impl<'t, const NX: usize> Controller<'t, NX> {
 mod tests {
     use super::*;
     use crate::table::{TABLE_FORMAT, column};
-    use nalgebra::Vector2;
+    use nalgebra::vector;
 
     const BUILD: Build = Build { rig_hash: 7, tick_s: 0.001 };
 
@@ -141,7 +141,7 @@ mod tests {
     fn the_force_on_its_way_is_fed_back() {
         let table = table();
         let mut controller = Controller::new(&table, &BUILD).unwrap();
-        let x = Vector2::new(-1.0, -1.0);
+        let x = vector![-1.0, -1.0];
         assert_eq!(controller.tick(&x).limited, 3.0);
         assert_eq!(controller.tick(&x).limited, 1.5);
         controller.reset();
@@ -152,8 +152,8 @@ mod tests {
     fn a_limited_force_is_what_counts_as_on_its_way() {
         let table = table();
         let mut controller = Controller::new(&table, &BUILD).unwrap();
-        assert_eq!(controller.tick(&Vector2::new(-100.0, 0.0)), Force { requested: 100.0, limited: 5.0 });
-        assert_eq!(controller.tick(&Vector2::new(0.0, 0.0)).requested, -2.5);
+        assert_eq!(controller.tick(&vector![-100.0, 0.0]), Force { requested: 100.0, limited: 5.0 });
+        assert_eq!(controller.tick(&vector![0.0, 0.0]).requested, -2.5);
     }
 
     #[test]

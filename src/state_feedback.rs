@@ -30,11 +30,11 @@ pub fn saturate(u: f32, limit: f32) -> f32 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use nalgebra::Vector2;
+    use nalgebra::vector;
 
     #[test]
     fn the_law_is_n_r_minus_k_x() {
-        assert_eq!(state_feedback(3.0, 2.0, &Vector2::new(1.0, 0.5), &Vector2::new(4.0, -2.0)), 3.0);
+        assert_eq!(state_feedback(3.0, 2.0, &vector![1.0, 0.5], &vector![4.0, -2.0]), 3.0);
     }
 
     #[test]
