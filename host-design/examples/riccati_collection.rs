@@ -15,6 +15,8 @@ use host_design::design::{Cost, NoStabilisingSolution, care, dare};
 use host_design::numerics::{Matrix, Wide};
 use serde::Deserialize;
 
+type Attempt = fn(&Problem) -> Result<Vec<Vec<f64>>, NoStabilisingSolution>;
+
 #[derive(Deserialize)]
 #[serde(rename_all = "UPPERCASE")]
 struct Problem {
@@ -58,7 +60,7 @@ impl Problem {
 
     /// Doubles the precision until two in a row round to the same gain; with it, the bits of the first of them.
     fn certified_gain(&self) -> Result<(Vec<Vec<f64>>, usize), NoStabilisingSolution> {
-        let attempts: [(usize, fn(&Self) -> Result<Vec<Vec<f64>>, NoStabilisingSolution>); 4] = [
+        let attempts: [(usize, Attempt); 4] = [
             (256, Self::gain::<256>),
             (512, Self::gain::<512>),
             (1024, Self::gain::<1024>),
