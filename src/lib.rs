@@ -1,20 +1,25 @@
 //! The control core of Upright: it balances an n-link inverted pendulum on a cart from a microcontroller.
 //!
-//! The way of data is `state → controller → force`. Gains come from a const table ([`gains`]) that the host tool
-//! `upright design RIG` writes from one rig file; nothing is tuned by hand here. The same code runs on the target, in
-//! simulations and in tests.
+//! The way of data is `encoder counts → estimate → force → motor duty`, once per tick, in the order of the modules
+//! [`encoder`], [`observer`], [`state_feedback`] and [`actuator`]; [`controller`] puts them together. All constants come
+//! from a gain table ([`gains`]) that the host tool `upright design RIG` writes from one rig file; nothing is tuned by
+//! hand here. The same code runs on the target, in simulations and in tests.
 //!
 //! ```
-//! use nalgebra::SVector;
-//! use upright::{controller::Controller, gains, table::Build};
+//! use upright::controller::Controller;
+//! use upright::encoder::CounterWidth;
+//! use upright::gains::{RIG_HASH, SENSORS, TABLE, TICK_S};
+//! use upright::table::Build;
 //!
-//! let build = Build { rig_hash: gains::RIG_HASH, tick_s: gains::TICK_S };
-//! let mut controller = Controller::new(&gains::TABLE, &build)?;
+//! let build = Build { rig_hash: RIG_HASH, tick_s: TICK_S };
+//! let mut controller = Controller::new(&TABLE, &build, [CounterWidth::Bits32; SENSORS])?;
+//! controller.start(&[0; SENSORS])?; // upright and at rest, all counters at 0
 //! controller.set_setpoint(0.1)?; // metres
-//! let mut x = SVector::<f32, { gains::STATES }>::zeros();
-//! x[2] = 0.01; // the first link leans by 0.01 rad
-//! let force = controller.tick(&x);
-//! assert!(force.limited.abs() <= gains::TABLE.force_limit_n);
+//! let mut counts = [0; SENSORS];
+//! counts[1] = 3; // the first link leans by three counts
+//! let command = controller.control(&counts); // at the start of a tick; then drive the motor
+//! controller.predict(); // any time before the next tick
+//! assert!(command.applied != 0.0 && command.applied.abs() <= TABLE.force_limit_n);
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!

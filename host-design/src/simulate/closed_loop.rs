@@ -13,6 +13,9 @@ use crate::plant::PlantError;
 use crate::rig::{PlantDescription, Rig};
 use crate::table::{TableValues, WithSize, with_size};
 
+/// Most ticks of a run: an hour at 1 ms, and a record of some 450 MB for a quadruple pendulum.
+const MAX_TICKS: u32 = 4_000_000;
+
 /// A run that cannot be started.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum SimulationError {
@@ -28,6 +31,14 @@ pub enum SimulationError {
     /// A standard deviation that is negative or not finite.
     #[error("a noise level of {0} is not possible: give a number of at least 0")]
     Noise(f64),
+    /// A run whose record would not fit into memory.
+    #[error("a run of {duration_s} s has more than {MAX_TICKS} ticks of {period_s} s: shorten it")]
+    TooLong {
+        /// Length of the run (s).
+        duration_s: f64,
+        /// Control period (s).
+        period_s: f64,
+    },
     /// Dimensions the firmware's types are not made for.
     #[error("no firmware for {states} states and {sensors} sensors")]
     Size {
@@ -48,7 +59,7 @@ pub fn simulate(
     table: &TableValues,
     scenario: &Scenario,
 ) -> Result<(Trace, Summary), SimulationError> {
-    let mut trace = Trace::new(rig, (scenario.duration_s / rig.tick.period_s).round() as usize);
+    let mut trace = Trace::new(rig, ticks(rig, scenario)?);
     let fall = run(rig, table, scenario, &mut |sample| trace.push(sample))?;
     let summary = Summary::of(rig, scenario, &trace, fall);
     Ok((trace, summary))
@@ -68,6 +79,16 @@ pub fn run(
     let (states, sensors) = (table.states, table.sensors);
     let run = Run { rig, table, scenario, observe };
     with_size(states, sensors, run).ok_or(SimulationError::Size { states, sensors })?
+}
+
+/// Number of the run's last tick.
+fn ticks(rig: &Rig, scenario: &Scenario) -> Result<usize, SimulationError> {
+    let (duration_s, period_s) = (scenario.duration_s, rig.tick.period_s);
+    let ticks = (duration_s / period_s).round();
+    if ticks > f64::from(MAX_TICKS) {
+        return Err(SimulationError::TooLong { duration_s, period_s });
+    }
+    Ok(ticks as usize)
 }
 
 struct Run<'a> {
@@ -100,8 +121,7 @@ impl WithSize for Run<'_> {
                 controller.start(&bench.counters())?;
             }
         }
-        let ticks = (scenario.duration_s / rig.tick.period_s).round() as usize;
-        for tick in 0..=ticks {
+        for tick in 0..=ticks(rig, scenario)? {
             let t = tick as f64 * rig.tick.period_s;
             let target = if t >= scenario.step_at_s { scenario.step_m } else { 0.0 };
             controller.set_setpoint(target as f32)?;

@@ -21,16 +21,27 @@ const COLOURS: [RGBColor; 7] = [
     RGBColor(0, 0, 0),
 ];
 
+/// What another curve is to be compared with.
+const REFERENCE: RGBColor = RGBColor(190, 190, 190);
+const FONT: (&str, u32) = ("sans-serif", 17);
+
 type Value<'a> = Box<dyn Fn(&Sample<&[f64]>) -> f64 + 'a>;
 
 struct Curve<'a> {
     name: String,
+    style: ShapeStyle,
     value: Value<'a>,
 }
 
 impl<'a> Curve<'a> {
-    fn new(name: impl Into<String>, value: impl Fn(&Sample<&[f64]>) -> f64 + 'a) -> Self {
-        Self { name: name.into(), value: Box::new(value) }
+    fn new(name: impl Into<String>, colour: usize, value: impl Fn(&Sample<&[f64]>) -> f64 + 'a) -> Self {
+        let style = COLOURS[colour % COLOURS.len()].stroke_width(2);
+        Self { name: name.into(), style, value: Box::new(value) }
+    }
+
+    /// A wide grey line that stays visible below the curve that should lie on it.
+    fn reference(name: &str, value: impl Fn(&Sample<&[f64]>) -> f64 + 'a) -> Self {
+        Self { name: name.to_owned(), style: REFERENCE.stroke_width(5), value: Box::new(value) }
     }
 }
 
@@ -40,26 +51,27 @@ impl<'a> Curve<'a> {
 /// [`PlotError`] from the drawing library.
 pub fn svg(rig: &Rig, trace: &Trace, title: &str) -> Result<String, PlotError> {
     let output = rig.output();
-    let mut panels = vec![(
-        if matches!(rig.plant, PlantDescription::Chain(_)) { "position (m)" } else { "output" },
-        vec![
-            Curve::new("set-point", |s| s.target),
-            Curve::new("governed", |s| s.setpoint),
-            Curve::new(if output == 0 { "x".to_owned() } else { format!("state {output}") }, move |s| {
-                s.state[output]
-            }),
-        ],
-    )];
+    let is_chain = matches!(rig.plant, PlantDescription::Chain(_));
+    let (label, name) =
+        if is_chain { ("position (m)", "cart".to_owned()) } else { ("output", format!("state {output}")) };
+    let setpoint = Curve::reference("set-point", |s| s.target);
+    let governed = Curve::new("governed", 1, |s| s.setpoint);
+    let mut panels = vec![(label, vec![setpoint, governed, Curve::new(name, 0, move |s| s.state[output])])];
     if let PlantDescription::Chain(chain) = &rig.plant {
         let angles = (0..chain.links.len())
-            .map(|link| Curve::new(format!("θ{}", link + 1), move |s| s.state[2 + 2 * link].to_degrees()))
+            .map(|link| {
+                Curve::new(format!("θ{}", link + 1), link, move |s| s.state[2 + 2 * link].to_degrees())
+            })
             .collect();
         panels.push(("angles (°)", angles));
     }
-    panels.push((
-        "force (N)",
-        vec![Curve::new("asked for", |s| s.requested), Curve::new("applied", |s| s.force)],
-    ));
+    let label = if is_chain { "force (N)" } else { "input" };
+    // A falling pendulum asks for a hundred times what there is: the rest should stay legible.
+    let most = 2.0 * trace.samples().fold(0.0f64, |most, s| most.max(s.force.abs()));
+    let is_cut_off = trace.samples().any(|s| s.requested.abs() > most);
+    let name = if is_cut_off { "asked for (cut off)" } else { "asked for" };
+    let asked_for = Curve::reference(name, move |s| s.requested.clamp(-most, most));
+    panels.push((label, vec![asked_for, Curve::new("applied", 0, |s| s.force)]));
 
     let mut document = String::new();
     {
@@ -67,10 +79,10 @@ pub fn svg(rig: &Rig, trace: &Trace, title: &str) -> Result<String, PlotError> {
             SVGBackend::with_string(&mut document, (900, 230 * panels.len() as u32 + 40)).into_drawing_area();
         let draw = || -> Result<(), Box<dyn std::error::Error>> {
             root.fill(&WHITE)?;
-            let root = root.titled(title, ("sans-serif", 20))?;
+            let root = root.margin(6, 0, 0, 0).titled(title, ("sans-serif", 22))?;
             let areas = root.split_evenly((panels.len(), 1));
-            for (area, (label, curves)) in areas.iter().zip(&panels) {
-                panel(area, trace, label, curves)?;
+            for (index, (area, (label, curves))) in areas.iter().zip(&panels).enumerate() {
+                panel(area, trace, label, curves, index + 1 == panels.len())?;
             }
             root.present()?;
             Ok(())
@@ -85,7 +97,9 @@ fn panel(
     trace: &Trace,
     label: &str,
     curves: &[Curve<'_>],
+    is_last: bool,
 ) -> Result<(), Box<dyn std::error::Error>> {
+    legend(area, curves)?;
     // More points than pixels only make the file large.
     let stride = trace.samples().len().div_ceil(1500).max(1);
     let end = trace.samples().last().map_or(1.0, |sample| sample.t).max(1e-9);
@@ -94,32 +108,55 @@ fn panel(
         .filter(|value| value.is_finite())
         .fold((0.0f64, 0.0f64), |(low, high), value| (low.min(value), high.max(value)));
     let margin = 0.06 * (high - low).max(1e-9);
+    let (time, value) = (-0.01 * end..end, low - margin..high + margin);
+    let (time_label, value_label) = (tick_label(end / 10.0), tick_label((high - low).max(1e-9) / 6.0));
     let mut chart = ChartBuilder::on(area)
+        .margin_left(12)
         .margin_right(24)
-        .x_label_area_size(34)
-        .y_label_area_size(70)
-        .build_cartesian_2d(0.0..end, low - margin..high + margin)?;
-    chart
-        .configure_mesh()
+        .margin_top(28)
+        .x_label_area_size(if is_last { 46 } else { 26 })
+        .y_label_area_size(76)
+        .build_cartesian_2d(time, value)?;
+    let mut mesh = chart.configure_mesh();
+    mesh.disable_x_mesh()
         .light_line_style(WHITE.mix(0.0))
-        .x_desc("time (s)")
         .y_desc(label)
         .x_labels(10)
         .y_labels(6)
-        .label_style(("sans-serif", 13))
-        .draw()?;
-    for (curve, colour) in curves.iter().zip(COLOURS.iter().cycle()) {
-        let points = trace.samples().step_by(stride).map(|sample| (sample.t, (curve.value)(&sample)));
-        chart
-            .draw_series(LineSeries::new(points, colour.stroke_width(2)))?
-            .label(curve.name.clone())
-            .legend(move |(x, y)| PathElement::new([(x, y), (x + 18, y)], colour.stroke_width(2)));
+        .x_label_formatter(&time_label)
+        .y_label_formatter(&value_label)
+        .label_style(FONT);
+    if is_last {
+        mesh.x_desc("time (s)");
     }
-    chart
-        .configure_series_labels()
-        .position(SeriesLabelPosition::UpperRight)
-        .background_style(WHITE.mix(0.8))
-        .label_font(("sans-serif", 13))
-        .draw()?;
+    mesh.draw()?;
+    for curve in curves {
+        let points = trace.samples().step_by(stride).map(|sample| (sample.t, (curve.value)(&sample)));
+        chart.draw_series(LineSeries::new(points, curve.style))?;
+    }
     Ok(())
+}
+
+/// Names the curves above the panel, where they hide none of them.
+fn legend(
+    area: &DrawingArea<SVGBackend<'_>, plotters::coord::Shift>,
+    curves: &[Curve<'_>],
+) -> Result<(), Box<dyn std::error::Error>> {
+    let mut left = 96;
+    for curve in curves {
+        area.draw(&PathElement::new([(left, 15), (left + 24, 15)], curve.style))?;
+        area.draw(&Text::new(curve.name.clone(), (left + 32, 8), FONT))?;
+        left += 64 + 8 * curve.name.chars().count() as i32;
+    }
+    Ok(())
+}
+
+/// Writes numbers with as many decimals as ticks this far apart need.
+fn tick_label(spacing: f64) -> impl Fn(&f64) -> String {
+    let decimals = (-spacing.log10().floor()).clamp(0.0, 12.0) as usize;
+    // Adding 0 turns a negative zero into a positive one.
+    move |value| {
+        let scale = 10f64.powi(decimals as i32);
+        format!("{:.decimals$}", (value * scale).round() / scale + 0.0)
+    }
 }

@@ -15,11 +15,20 @@ pub struct WriteError {
 
 /// Replaces the contents of `path` in one step: a reader sees the old file or the new one, never a half.
 ///
+/// A link is followed and stays a link. What is no file but, say, a device or a pipe is written to, not replaced.
+///
 /// # Errors
 /// [`WriteError`] with the reason of the file system.
 pub fn write_atomically(path: &Path, contents: &[u8]) -> Result<(), WriteError> {
     let write = || {
-        let mut file = AtomicWriteFile::open(path)?;
+        let file = match std::fs::metadata(path) {
+            Ok(about) if about.is_file() => std::fs::canonicalize(path)?,
+            Ok(about) if !about.is_dir() => {
+                return std::fs::OpenOptions::new().write(true).open(path)?.write_all(contents);
+            }
+            _ => path.to_owned(),
+        };
+        let mut file = AtomicWriteFile::open(file)?;
         file.write_all(contents)?;
         file.commit()
     };
@@ -38,6 +47,30 @@ mod tests {
         write_atomically(&path, b"second").unwrap();
         assert_eq!(std::fs::read_to_string(&path).unwrap(), "second");
         assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 1, "no temporary file is left");
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn a_link_stays_a_link_and_its_target_is_replaced() {
+        let folder = tempfile::tempdir().unwrap();
+        let (file, link) = (folder.path().join("gains.rs"), folder.path().join("link.rs"));
+        std::fs::write(&file, "old").unwrap();
+        std::os::unix::fs::symlink(&file, &link).unwrap();
+        write_atomically(&link, b"new").unwrap();
+        assert!(std::fs::symlink_metadata(&link).unwrap().is_symlink());
+        assert_eq!(std::fs::read_to_string(&file).unwrap(), "new");
+    }
+
+    /// By way of a link, so that a mistake here costs no device of the machine that runs the test.
+    #[cfg(target_os = "linux")]
+    #[test]
+    fn a_device_is_written_to_and_not_replaced() {
+        let folder = tempfile::tempdir().unwrap();
+        let link = folder.path().join("full");
+        std::os::unix::fs::symlink("/dev/full", &link).unwrap();
+        let error = write_atomically(&link, b"x").unwrap_err().to_string();
+        assert!(error.contains("No space left"), "{error}");
+        assert!(std::fs::symlink_metadata(&link).unwrap().is_symlink());
     }
 
     #[test]

@@ -21,7 +21,7 @@ Examples:
   upright simulate rigs/quadruple-paper.toml --step 1 --svg step.svg
   upright simulate rigs/quadruple-paper.toml --law pole-placement --tilt 0.01,-0.01
   upright simulate rigs/quadruple-paper.toml --disturbances paper --seed 7 --csv run.csv
-  upright simulate rigs/quadruple-paper.toml --tick 0.005 --gains continuous   falls
+  upright simulate rigs/quadruple-paper.toml --tick 0.005 --gains continuous --tilt 0.001   falls
   upright simulate rigs/quadruple-paper.toml --csv - | head")]
 pub(crate) struct Simulate {
     /// Rig file (TOML)
