@@ -138,7 +138,7 @@ fn the_papers_gains_survive_ticks_of_one_and_two_milliseconds_only() {
         [(0.001, 0, None), (0.002, 0, None), (0.003, 0, Some("1.08")), (0.002, 1, Some("1.29"))]
     {
         rig.tick = host_design::rig::Tick { period_s, delay_ticks };
-        let lqr = design(&rig).unwrap().assess().unwrap()[0].unwrap();
+        let lqr = design(&rig).unwrap().assess(&rig).unwrap()[0].unwrap();
         assert!(lqr.exact < 1.0 && lqr.rounded < 1.0, "redesigned for the tick it always holds");
         match wanted {
             None => assert!(lqr.continuous_at_tick < 1.0, "{period_s}: {lqr:?}"),
@@ -146,6 +146,6 @@ fn the_papers_gains_survive_ticks_of_one_and_two_milliseconds_only() {
         }
     }
     rig.tick = host_design::rig::Tick { period_s: 0.005, delay_ticks: 0 };
-    let lqr = design(&rig).unwrap().assess().unwrap()[0].unwrap();
+    let lqr = design(&rig).unwrap().assess(&rig).unwrap()[0].unwrap();
     assert_eq!(format!("{:.1}", lqr.continuous_at_tick), "3.1");
 }
