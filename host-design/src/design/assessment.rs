@@ -11,6 +11,8 @@ pub struct Assessment {
     pub exact: f64,
     /// With the sampled gains as the table holds them, rounded to `f32`.
     pub rounded: f64,
+    /// Largest relative change of a gain by rounding to `f32`.
+    pub largest_rounding: f64,
     /// With the gains for continuous time, used at the tick (and late by the delay) without redesign.
     pub continuous_at_tick: f64,
 }
@@ -41,10 +43,19 @@ impl Certified {
                 *assessment = Some(Assessment {
                     exact: radius(exact)?,
                     rounded: radius(&rounded)?,
+                    largest_rounding: largest_relative_difference(&exact.k, &rounded.k),
                     continuous_at_tick: radius(&Feedback { k: held, n: None, integral: false })?,
                 });
             }
         }
         Ok(assessments)
     }
+}
+
+fn largest_relative_difference(exact: &Matrix<f64>, rounded: &Matrix<f64>) -> f64 {
+    let pairs = exact.entries().iter().zip(rounded.entries());
+    pairs
+        .filter(|(exact, _)| **exact != 0.0)
+        .map(|(exact, rounded)| (rounded / exact - 1.0).abs())
+        .fold(0.0, f64::max)
 }

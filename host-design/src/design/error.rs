@@ -55,7 +55,7 @@ pub enum DesignError {
         modes: Vec<[f64; 2]>,
     },
     /// An unstable mode does not feel the force.
-    #[error("{task}: no stabilising gain exists: the force does not reach {}, which does not decay by itself; choose another input b", mode_list(.modes))]
+    #[error("{task}: no stabilising gain exists: the force does not reach {}, and it does not decay by itself; choose another input b", mode_list(.modes))]
     NotStabilisable {
         /// Which design.
         task: Task,
@@ -63,7 +63,7 @@ pub enum DesignError {
         modes: Vec<[f64; 2]>,
     },
     /// A mode on the stability boundary carries no weight.
-    #[error("{task}: no stabilising gain exists: {} lies on the stability boundary and costs nothing; give a state that shows it a positive entry in lqr.state_weights", mode_list(.modes))]
+    #[error("{task}: no stabilising gain exists: {} on the stability boundary costs nothing; give a state that shows it a positive entry in lqr.state_weights", mode_list(.modes))]
     Unweighted {
         /// Which design.
         task: Task,

@@ -85,6 +85,11 @@ impl Design {
         if self.check {
             return check(&path, &source);
         }
+        if std::fs::read_to_string(&path).is_ok_and(|found| found == source) {
+            // A new time stamp alone would have the firmware compiled again.
+            eprintln!("{} is up to date", path.display());
+            return Ok(());
+        }
         write_atomically(&path, source.as_bytes())?;
         eprintln!("wrote {}", path.display());
         Ok(())

@@ -34,7 +34,7 @@ pub(crate) struct Simulate {
     #[arg(long, value_enum, default_value_t = Gains::Sampled)]
     gains: Gains,
     /// Length of the run (s)
-    #[arg(long, default_value_t = 10.0, value_name = "S", value_parser = positive)]
+    #[arg(long, default_value_t = 10.0, value_name = "S", allow_negative_numbers = true, value_parser = positive)]
     duration: f64,
     /// Step of the set-point (m)
     #[arg(long, default_value_t = 0.0, value_name = "M", allow_negative_numbers = true, value_parser = finite)]
@@ -200,6 +200,18 @@ impl Simulate {
                 self.tilt.len()
             )));
         }
+        let pushed = self.step != 0.0
+            || !self.start.is_empty()
+            || !self.tilt.is_empty()
+            || !matches!(self.disturbances, Disturbances::None)
+            || self.force_noise.is_some()
+            || self.torque_noise.is_some();
+        if !pushed {
+            // At exact rest even a hopeless loop stands.
+            let acceptance = Scenario::acceptance(rig, law, 1.0);
+            scenario.start = acceptance.start;
+            eprintln!("no step, tilt or disturbance given: starting a little off balance");
+        }
         for (link, &angle) in self.tilt.iter().enumerate() {
             scenario.start[2 + 2 * link] = angle;
         }
@@ -237,7 +249,11 @@ impl Simulate {
                 LawName::Lqr => "LQR",
                 LawName::PolePlacement => "pole placement",
             };
-            let title = format!("{}, {law}, tick {} ms", rig.name, rig.tick.period_s * 1e3);
+            let title = format!(
+                "{}, {law}, tick {} ms",
+                rig.name,
+                format!("{:.4}", rig.tick.period_s * 1e3).trim_end_matches('0').trim_end_matches('.')
+            );
             write_atomically(path, svg(rig, trace, &title)?.as_bytes())?;
         }
         let text = if self.json {

@@ -26,7 +26,7 @@ fn write_design(
         out,
         "{} states, tick {} ms, delay {} ticks; every gain the same at {low} and {high} bits",
         rig.states(),
-        rig.tick.period_s * 1e3,
+        short(rig.tick.period_s * 1e3),
         rig.tick.delay_ticks
     )?;
     for report in reports {
@@ -41,8 +41,9 @@ fn write_design(
         let assessment = &report.assessment;
         writeln!(
             out,
-            "  spectral radius at the tick: {:.6} exact, {:.6} rounded to f32, {:.6} with the continuous gains",
-            assessment.exact, assessment.rounded, assessment.continuous_at_tick
+            "  spectral radius at the tick: {:.6} exact, {:.6} rounded to f32, {:.6} with the continuous gains\n  \
+             rounding to f32 moves no gain by more than {:.1e} of itself",
+            assessment.exact, assessment.rounded, assessment.continuous_at_tick, assessment.largest_rounding
         )?;
         match &report.run {
             Some(run) => writeln!(out, "  closed loop, firmware against nonlinear plant: {run}")?,
@@ -98,7 +99,7 @@ pub(super) fn warnings(rig: &Rig, certified: &Certified, reports: &[LawReport]) 
         if assessment.continuous_at_tick >= 1.0 {
             warnings.push(format!(
                 "{name}: the continuous gains would not survive the tick of {} ms (spectral radius {:.2}); the table holds the sampled ones",
-                rig.tick.period_s * 1e3,
+                short(rig.tick.period_s * 1e3),
                 assessment.continuous_at_tick
             ));
         }
