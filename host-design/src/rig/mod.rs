@@ -10,11 +10,13 @@ mod error;
 mod load;
 mod node;
 mod parse;
+mod requirements;
 mod rule;
 mod sensors;
 
 pub use error::{Place, RigError, RigErrorKind};
 pub use load::MAX_BYTES;
+pub use requirements::Requirements;
 pub use sensors::Sensor;
 
 use serde::Serialize;
@@ -41,6 +43,9 @@ pub struct Rig {
     pub integral: Option<Integral>,
     /// Limits the supervisor enforces.
     pub limits: Limits,
+    /// What `upright verify` requires.
+    #[serde(skip)]
+    pub verify: Requirements,
 }
 
 /// What is to be balanced.

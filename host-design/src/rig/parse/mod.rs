@@ -6,7 +6,7 @@ mod plant;
 use super::error::RigError;
 use super::node::{Node, Section, Source};
 use super::rule::Rule;
-use super::{Actuator, Limits, Motor, PlantDescription, Rig, Tick, defaults};
+use super::{Actuator, Limits, Motor, PlantDescription, Requirements, Rig, Tick, defaults};
 
 const TABLES: &[&str] = &[
     "name",
@@ -21,6 +21,7 @@ const TABLES: &[&str] = &[
     "kalman",
     "integral",
     "limits",
+    "verify",
 ];
 
 /// Checks a whole rig file.
@@ -42,6 +43,7 @@ pub(super) fn rig(source: &Source<'_>) -> Result<Rig, RigError> {
         kalman: root.get("kalman").map(|node| design::kalman(&node, &plant)).transpose()?,
         integral: root.get("integral").map(|node| design::integral(&node)).transpose()?,
         limits: root.get("limits").map_or(Ok(Limits::default()), |node| limits(&node))?,
+        verify: root.get("verify").map_or(Ok(Requirements::default()), |node| requirements(&node))?,
         plant,
     };
     if rig.kalman.is_some() {
@@ -142,6 +144,80 @@ fn limits(node: &Node<'_>) -> Result<Limits, RigError> {
             "speed_m_per_s",
             Rule::POSITIVE,
             "the largest speed of the cart in m/s, or leave it out",
+        )?,
+    })
+}
+
+fn requirements(node: &Node<'_>) -> Result<Requirements, RigError> {
+    let table = node.section(&[
+        "gain_margin",
+        "phase_margin_deg",
+        "delay_margin_ticks",
+        "peak_sensitivity",
+        "tilt_rad",
+        "spread_percent",
+        "corner_percent",
+        "success_percent",
+        "encoder_factor",
+    ])?;
+    let usual = Requirements::default();
+    let number = |name, rule, meaning: &str, usual| {
+        Ok::<f64, RigError>(table.number_if_given(name, rule, meaning)?.unwrap_or(usual))
+    };
+    Ok(Requirements {
+        gain_margin: number(
+            "gain_margin",
+            Rule::POSITIVE,
+            "the least gain margin, as a factor",
+            usual.gain_margin,
+        )?,
+        phase_margin_deg: number(
+            "phase_margin_deg",
+            Rule::NOT_NEGATIVE,
+            "the least phase margin in degrees",
+            usual.phase_margin_deg,
+        )?,
+        delay_margin_ticks: number(
+            "delay_margin_ticks",
+            Rule::NOT_NEGATIVE,
+            "the least delay margin in ticks",
+            usual.delay_margin_ticks,
+        )?,
+        peak_sensitivity: number(
+            "peak_sensitivity",
+            Rule::POSITIVE,
+            "the largest peak of the sensitivity",
+            usual.peak_sensitivity,
+        )?,
+        tilt_rad: number(
+            "tilt_rad",
+            Rule::ANGLE,
+            "the least tilt of any link to recover from, in rad",
+            usual.tilt_rad,
+        )?,
+        spread_percent: number(
+            "spread_percent",
+            Rule::PERCENT,
+            "the spread of the plant's parameters in percent",
+            usual.spread_percent,
+        )?,
+        corner_percent: number(
+            "corner_percent",
+            Rule::PERCENT,
+            "the spread of the masses at the corners in percent",
+            usual.corner_percent,
+        )?,
+        success_percent: number(
+            "success_percent",
+            Rule::PERCENT,
+            "the least share of runs that stand, in percent",
+            usual.success_percent,
+        )?,
+        encoder_factor: number(
+            "encoder_factor",
+            Rule::POSITIVE,
+            "the factor by which encoders may be coarser",
+            usual.encoder_factor,
         )?,
     })
 }
