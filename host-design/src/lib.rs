@@ -1,6 +1,6 @@
 //! From a rig file to a model, gains, the const table and a verdict on the closed loop.
 //!
-//! The way of data is the order of the modules: [`rig`] → [`plant`] → [`design`] → [`table`] → [`simulate`], on top of
+//! The way of data is the order of the modules: [`rig`] → [`plant`] → [`design`] → [`table`] → [`simulate`] → [`verify`], on top of
 //! [`numerics`]. The control law itself is not here: a simulation runs the firmware's own controller from the crate
 //! `upright`.
 
@@ -10,3 +10,4 @@ pub mod plant;
 pub mod rig;
 pub mod simulate;
 pub mod table;
+pub mod verify;

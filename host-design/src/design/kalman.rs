@@ -18,7 +18,7 @@ pub struct Kalman<T> {
     pub steps: Matrix<T>,
 }
 
-/// Kalman gains for process noise of the intensities in `noise`, entering through the columns of `inputs` and
+/// Kalman gains, and the relative residual of their Riccati equation, for process noise of the intensities in `noise`, entering through the columns of `inputs` and
 /// integrated over one tick (Van Loan), and a rounding error of variance step²/12 on each sensor.
 ///
 /// The error covariance P of the prediction solves the sampled Riccati equation of (Adᵀ, Cᵀ);
@@ -30,7 +30,7 @@ pub(super) fn kalman<R: Real>(
     noise: &rig::Kalman,
     sensors: &[Sensor],
     period: &R,
-) -> Result<Kalman<R>, DesignError> {
+) -> Result<(Kalman<R>, R), DesignError> {
     let intensities: Vec<R> = [noise.force_noise_n2_s]
         .iter()
         .chain(&noise.joint_noise)
@@ -50,11 +50,12 @@ pub(super) fn kalman<R: Real>(
         );
     let r = Matrix::from_diagonal(&variances);
     let (a_t, c_t) = (ad.transpose(), c.transpose());
-    let p = dare(&a_t, &c_t, &Cost::new(q, r.clone())).map_err(|_| why_no_kalman(&a_t, &c_t))?.x;
-    let p_c = &p * &c_t;
+    let solution = dare(&a_t, &c_t, &Cost::new(q, r.clone())).map_err(|_| why_no_kalman(&a_t, &c_t))?;
+    let p_c = &solution.x * &c_t;
     let l_filter =
         solve_right(&p_c, &(&(&c * &p_c) + &r)).map_err(|_| DesignError::NoKalman { bits: R::BITS })?;
-    Ok(Kalman { l_predictor: ad * &l_filter, l_filter, steps: Matrix::column(&steps) })
+    let gains = Kalman { l_predictor: ad * &l_filter, l_filter, steps: Matrix::column(&steps) };
+    Ok((gains, solution.residual))
 }
 
 fn why_no_kalman<R: Real>(a_t: &Matrix<R>, c_t: &Matrix<R>) -> DesignError {

@@ -73,7 +73,17 @@ impl<R: Real> Design<R> {
     /// # Errors
     /// [`DesignError`] with the reason if some law has no solution.
     pub fn of(rig: &Rig) -> Result<Self, DesignError> {
-        let LinearModel { a, b, torque_inputs } = continuous_plant::<R>(rig)?;
+        Self::of_plant(rig, continuous_plant::<R>(rig)?, &mut Vec::new())
+    }
+
+    /// As [`of`](Self::of), for another linear plant than that of the rig; notes the relative residual of each Riccati
+    /// equation under the name of its gain.
+    pub(crate) fn of_plant(
+        rig: &Rig,
+        plant: LinearModel<R>,
+        residuals: &mut Vec<(String, f64)>,
+    ) -> Result<Self, DesignError> {
+        let LinearModel { a, b, torque_inputs } = plant;
         let period = R::from_f64(rig.tick.period_s);
         refuse_unbridgeable_tick(&a, rig)?;
         let (ad, bd) = zero_order_hold(&a, &b, &period);
@@ -84,20 +94,20 @@ impl<R: Real> Design<R> {
         let mut sampled = Laws::none();
         if let Some(weights) = &rig.lqr {
             let cost = lqr_cost(weights);
-            let k = lqr(Task::ContinuousLqr, &a, &b, &cost)?;
+            let k = lqr(Task::ContinuousLqr, &a, &b, &cost, residuals)?;
             continuous.lqr = Some(feedback(k, &a, &b, output));
             let tick_cost = sampled_cost(&a, &b, &cost, &period);
-            let k = lqr(Task::SampledLqr, &ad, &bd, &tick_cost)?;
+            let k = lqr(Task::SampledLqr, &ad, &bd, &tick_cost, residuals)?;
             sampled.lqr = Some(sampled_feedback(k, &ad, &bd, output, late));
             if let Some(integral) = &rig.integral {
                 let weight = R::from_f64(integral.position_weight);
                 let (a_z, b_z) = with_integral(&a, &b, output, &R::one(), &R::zero());
-                let k = lqr(Task::ContinuousIntegral, &a_z, &b_z, &with_integral_weight(&cost, &weight))?;
+                let k = lqr(Task::ContinuousIntegral, &a_z, &b_z, &with_integral_weight(&cost, &weight), residuals)?;
                 continuous.integral = Some(feedback(k, &a, &b, output));
                 let (a_z, b_z) = with_integral(&ad, &bd, output, &period, &R::one());
                 // z is constant during a tick: its cost over the tick is T w z².
                 let tick_cost = with_integral_weight(&tick_cost, &(weight * &period));
-                let k = lqr(Task::SampledIntegral, &a_z, &b_z, &tick_cost)?;
+                let k = lqr(Task::SampledIntegral, &a_z, &b_z, &tick_cost, residuals)?;
                 sampled.integral = Some(sampled_feedback_over(k, &ad, &bd, &a_z, &b_z, output, late));
             }
         }
@@ -114,7 +124,9 @@ impl<R: Real> Design<R> {
         }
         let kalman = rig.kalman.as_ref().map(|noise| {
             let inputs = noise_inputs(rig, &b, &torque_inputs);
-            kalman(&a, &ad, &inputs, noise, &rig.sensors(), &period)
+            let (gains, residual) = kalman(&a, &ad, &inputs, noise, &rig.sensors(), &period)?;
+            residuals.push((OBSERVER.to_owned(), residual.to_f64()));
+            Ok(gains)
         });
         Ok(Self { continuous, sampled, kalman: kalman.transpose()?, a, b, ad, bd })
     }
@@ -200,8 +212,20 @@ impl<const BITS: usize> Design<Wide<BITS>> {
     }
 }
 
+/// Name of the observer's gain among the residuals.
+pub(crate) const OBSERVER: &str = "Kalman filter";
+
+/// The columns through which the noise of `[kalman]` enters, one per intensity.
+///
+/// # Errors
+/// [`DesignError::MassMatrix`] if the plant has no linear model.
+pub(crate) fn noise_columns(rig: &Rig) -> Result<Matrix<f64>, DesignError> {
+    let LinearModel { b, torque_inputs, .. } = continuous_plant::<Wide<256>>(rig)?;
+    Ok(noise_inputs(rig, &b, &torque_inputs).rounded(Wide::round_to_f64))
+}
+
 /// The linear plant of the rig: the chain about upright, or the given model.
-fn continuous_plant<R: Real>(rig: &Rig) -> Result<LinearModel<R>, DesignError> {
+pub(crate) fn continuous_plant<R: Real>(rig: &Rig) -> Result<LinearModel<R>, DesignError> {
     match &rig.plant {
         PlantDescription::Chain(chain) => {
             linearise(&ChainParameters::of(chain), Equilibrium::Upright).map_err(|_| DesignError::MassMatrix)
@@ -237,9 +261,17 @@ fn refuse_unbridgeable_tick<R: Real>(a: &Matrix<R>, rig: &Rig) -> Result<(), Des
 }
 
 /// Gain K of the linear quadratic regulator of (a, b).
-fn lqr<R: Real>(task: Task, a: &Matrix<R>, b: &Matrix<R>, cost: &Cost<R>) -> Result<Matrix<R>, DesignError> {
+fn lqr<R: Real>(
+    task: Task,
+    a: &Matrix<R>,
+    b: &Matrix<R>,
+    cost: &Cost<R>,
+    residuals: &mut Vec<(String, f64)>,
+) -> Result<Matrix<R>, DesignError> {
     let solution = if task.is_sampled() { dare(a, b, cost) } else { care(a, b, cost) };
-    Ok(solution.map_err(|_| why_no_lqr(task, a, b, cost))?.k)
+    let regulator = solution.map_err(|_| why_no_lqr(task, a, b, cost))?;
+    residuals.push((task.to_string(), regulator.residual.to_f64()));
+    Ok(regulator.k)
 }
 
 /// Continuous feedback with N = -1 / (C (A - B K)⁻¹ B): the paper's equation for the precompensation gain. K is over x, or
@@ -315,7 +347,7 @@ fn lqr_cost<R: Real>(weights: &Lqr) -> Cost<R> {
 }
 
 /// The poles the rig file asks for.
-fn wanted_poles<R: Real>(placement: &PolePlacement, rig: &Rig) -> Result<Vec<Pole<R>>, DesignError> {
+pub(crate) fn wanted_poles<R: Real>(placement: &PolePlacement, rig: &Rig) -> Result<Vec<Pole<R>>, DesignError> {
     let poles = match placement {
         PolePlacement::Response { overshoot_percent, settling_time_s, far_poles } => {
             let mut poles = vec![Pole::Pair(dominant_pair(*overshoot_percent, *settling_time_s))];

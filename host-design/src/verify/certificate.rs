@@ -1,0 +1,123 @@
+//! Why each gain can be believed: residual, agreeing precisions, condition.
+
+use rand::{RngExt, SeedableRng};
+use rand_pcg::Pcg64;
+use serde::Serialize;
+use upright::table::Law;
+
+use super::VerifyError;
+use crate::design::{Certified, Design, Laws, OBSERVER, Pole, Task, continuous_plant, wanted_poles};
+use crate::numerics::{Matrix, Real, Wide, eigenvalues};
+use crate::plant::LinearModel;
+use crate::rig::Rig;
+
+/// Evidence for one gain of the table.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Certificate {
+    /// Which gain.
+    pub gain: String,
+    /// The two precisions (bits) that gave the same `f32` and `f64`.
+    pub bits: [usize; 2],
+    /// Of an LQR or Kalman gain: what is left when the 256-bit solution is put into its Riccati equation, relative to
+    /// the sum of the norms of the terms. Of a pole placement: the largest distance of a requested pole from the
+    /// nearest pole of the 256-bit loop.
+    pub residual: f64,
+    /// Largest relative change of the gain per relative change of the plant: `max |ΔK| / max |K| / 1e-20` for
+    /// independent random changes up to 1e-20 (relative) of every entry of A and B that is neither 0 nor 1, the worst
+    /// of three draws at 256 bits. An estimate from below.
+    pub condition: f64,
+}
+
+type W = Wide<256>;
+const DRAWS: u64 = 3;
+const CHANGE: f64 = 1e-20;
+
+/// Certificates of all gains that the rig asks for, by law: those of LQR, of pole placement, and of the observer.
+pub(super) struct Certificates {
+    lqr: Option<Certificate>,
+    placement: Option<Certificate>,
+    observer: Option<Certificate>,
+}
+
+impl Certificates {
+    pub(super) fn of(rig: &Rig, certified: &Certified) -> Result<Self, VerifyError> {
+        let solve = |draw: Option<u64>| -> Result<(Design<W>, Vec<(String, f64)>), VerifyError> {
+            let mut plant = continuous_plant::<W>(rig)?;
+            if let Some(seed) = draw {
+                disturb(&mut plant, seed);
+            }
+            let mut residuals = Vec::new();
+            Ok((Design::of_plant(rig, plant, &mut residuals)?, residuals))
+        };
+        let (mut solved, mut disturbed) = (None, Vec::new());
+        std::thread::scope(|scope| {
+            let draws: Vec<_> = (0..DRAWS).map(|seed| scope.spawn(move || solve(Some(seed)))).collect();
+            solved = Some(solve(None));
+            disturbed.extend(
+                draws.into_iter().map(|d| d.join().unwrap_or_else(|p| std::panic::resume_unwind(p))),
+            );
+        });
+        let Some(solved) = solved else { return Err(VerifyError::Poles) };
+        let (nominal, residuals) = solved?;
+        let disturbed: Vec<Design<W>> =
+            disturbed.into_iter().map(|d| d.map(|(design, _)| design)).collect::<Result<_, _>>()?;
+        let certificate = |gain: String, residual: f64, k: &dyn Fn(&Design<W>) -> Option<Matrix<W>>| {
+            let base = k(&nominal)?;
+            let changes = disturbed.iter().filter_map(k).map(|changed| {
+                (&changed - &base).largest_entry().to_f64() / base.largest_entry().to_f64() / CHANGE
+            });
+            let condition = changes.fold(0.0, f64::max);
+            Some(Certificate { gain, bits: certified.bits, residual, condition })
+        };
+        let residual = |name: &str| residuals.iter().find(|(n, _)| n == name).map_or(f64::NAN, |(_, r)| *r);
+        let in_table = |index: usize| move |d: &Design<W>| d.sampled.in_table()[index].map(|law| law.k.clone());
+        let task = if nominal.sampled.integral.is_some() { Task::SampledIntegral } else { Task::SampledLqr };
+        Ok(Self {
+            lqr: certificate(task.to_string(), residual(&task.to_string()), &in_table(0)),
+            placement: certificate(
+                Task::SampledPlacement.to_string(),
+                pole_error(rig, &nominal)?,
+                &in_table(1),
+            ),
+            observer: certificate(OBSERVER.to_owned(), residual(OBSERVER), &|d| {
+                d.kalman.as_ref().map(|kalman| kalman.l_filter.clone())
+            }),
+        })
+    }
+
+    /// Those of the gains that run with `law`.
+    pub(super) fn of_law(&self, law: Law) -> Vec<Certificate> {
+        let law = if law == Law::Lqr { &self.lqr } else { &self.placement };
+        law.iter().chain(&self.observer).cloned().collect()
+    }
+}
+
+fn disturb(plant: &mut LinearModel<W>, seed: u64) {
+    let mut random = Pcg64::seed_from_u64(seed);
+    let mut change = |entry: &W| {
+        let factor: f64 = random.random_range(-1.0..1.0);
+        let kept = entry.is_zero() || *entry == W::one();
+        if kept { entry.clone() } else { entry.clone() * &(W::one() + &W::from_f64(factor * CHANGE)) }
+    };
+    plant.a = plant.a.map(&mut change);
+    plant.b = plant.b.map(&mut change);
+}
+
+fn pole_error(rig: &Rig, design: &Design<W>) -> Result<f64, VerifyError> {
+    let Laws { pole_placement: Some(law), .. } = &design.sampled else { return Ok(f64::NAN) };
+    let Some(placement) = &rig.pole_placement else { return Ok(f64::NAN) };
+    let period = W::from_f64(rig.tick.period_s);
+    let found = eigenvalues(&design.sampled_loop(rig, law)).map_err(|_| VerifyError::Poles)?;
+    let mut worst = 0.0f64;
+    for pole in wanted_poles::<W>(placement, rig)? {
+        let (re, im) = match pole.sampled(&period) {
+            Pole::Real(re) => (re, W::zero()),
+            Pole::Pair(p) => (p.re, p.im),
+        };
+        let distance = |p: &crate::numerics::Complex<W>| {
+            crate::numerics::Complex { re: p.re.clone() - &re, im: p.im.clone() - &im }.modulus().to_f64()
+        };
+        worst = worst.max(found.iter().map(distance).fold(f64::INFINITY, f64::min));
+    }
+    Ok(worst)
+}

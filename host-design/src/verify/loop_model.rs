@@ -1,0 +1,356 @@
+//! The loop as it will run, as matrices: sampled plant, delay, observer, control law. Only for analysis; a simulation
+//! runs the firmware's own controller, and a test holds this model against it.
+
+use nalgebra::Complex;
+use upright::table::Law;
+
+use crate::design::{Certified, Feedback, zero_order_hold};
+use crate::numerics::{Matrix, Real};
+use crate::rig::Rig;
+use crate::table::{LawValues, TableValues};
+
+/// The plant from force to measurement, `x⁺ = A x + B u`, `y = C x`, with forces on their way as further states.
+#[derive(Debug, Clone, PartialEq)]
+pub struct PlantModel<R> {
+    a: Matrix<R>,
+    b: Matrix<R>,
+    c: Matrix<R>,
+    states: usize,
+}
+
+/// The controller from measurement to force, `ξ⁺ = A ξ + B y`, `u = C ξ + D y`, with set-point 0.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ControllerModel<R> {
+    a: Matrix<R>,
+    b: Matrix<R>,
+    c: Matrix<R>,
+    d: Matrix<R>,
+}
+
+/// The closed loop `ζ⁺ = M ζ + E w + F v`, `u = C ζ + D v`, with w (N) added to the force and v to the measurement.
+/// The first entries of ζ are the plant's states.
+#[derive(Debug, Clone, PartialEq)]
+pub struct LoopModel<R> {
+    /// M.
+    pub matrix: Matrix<R>,
+    /// E: where a force enters.
+    pub force_input: Matrix<R>,
+    /// F: where the error of each sensor enters.
+    pub sensor_input: Matrix<R>,
+    /// C: the force that the law asks for.
+    pub force_output: Matrix<R>,
+    /// D: what a sensor's error does to the force in the same tick.
+    pub sensor_to_force: Matrix<R>,
+    /// Number of states of the plant.
+    pub states: usize,
+}
+
+/// The numbers of a control law and its observer, in a working precision.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Numbers<R> {
+    pub(super) k: Matrix<R>,
+    pub(super) k_pending: R,
+    pub(super) k_integral: R,
+    pub(super) n: R,
+    pub(super) observer: Option<ObserverNumbers<R>>,
+    pub(super) measured: Vec<usize>,
+    pub(super) output: usize,
+    pub(super) tick_s: R,
+    pub(super) delay_ticks: usize,
+}
+
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct ObserverNumbers<R> {
+    pub(super) ad: Matrix<R>,
+    pub(super) bd: Matrix<R>,
+    pub(super) l: Matrix<R>,
+    pub(super) step: Vec<R>,
+}
+
+/// The gains of `law` in the table.
+pub(super) fn law_values(table: &TableValues, law: Law) -> Option<&LawValues> {
+    match law {
+        Law::Lqr => table.lqr.as_ref(),
+        Law::PolePlacement => table.pole_placement.as_ref(),
+    }
+}
+
+impl<R: Real> Numbers<R> {
+    /// What the table holds.
+    pub(super) fn of_table(table: &TableValues, law: Law) -> Option<Self> {
+        let values = law_values(table, law)?;
+        let exact = |x: f32| R::from_f64(f64::from(x));
+        let column = |x: &[f32]| Matrix::from_fn(x.len(), 1, |i, _| exact(x[i]));
+        let rows = |x: &[Vec<f32>]| {
+            Matrix::from_fn(x.len(), x.first().map_or(0, Vec::len), |i, j| exact(x[i][j]))
+        };
+        Some(Self {
+            k: column(&values.k).transpose(),
+            k_pending: exact(values.k_pending),
+            k_integral: exact(values.k_integral),
+            n: exact(values.n),
+            observer: table.observer.as_ref().map(|observer| ObserverNumbers {
+                ad: rows(&observer.ad),
+                bd: column(&observer.bd),
+                l: rows(&observer.l),
+                step: observer.step.iter().map(|&step| exact(step)).collect(),
+            }),
+            measured: measured(table),
+            output: table.output,
+            tick_s: exact(table.tick_s),
+            delay_ticks: table.delay_ticks as usize,
+        })
+    }
+
+    /// What the table's numbers were rounded from (to `f64`), or none if the design does not know the table's gains.
+    pub(super) fn exact(rig: &Rig, certified: &Certified, table: &TableValues, law: Law) -> Option<Self> {
+        let feedback = exact_law(certified, table, law)?;
+        let (double, states) = (&certified.double, table.states);
+        let entries: Vec<R> = feedback.k.entries().iter().map(|&gain| R::from_f64(gain)).collect();
+        let (k, further) = entries.split_at_checked(states)?;
+        let (k_integral, k_pending) = match (further, feedback.integral) {
+            ([integral, pending], _) => (integral.clone(), pending.clone()),
+            ([integral], true) => (integral.clone(), R::zero()),
+            ([pending], false) => (R::zero(), pending.clone()),
+            _ => (R::zero(), R::zero()),
+        };
+        let exact = |m: &Matrix<f64>| m.map(|&entry| R::from_f64(entry));
+        let kalman = double.kalman.as_ref().filter(|_| table.observer.is_some());
+        Some(Self {
+            k: Matrix::column(k).transpose(),
+            k_pending,
+            k_integral,
+            n: R::from_f64(feedback.n.unwrap_or(0.0)),
+            observer: kalman.map(|kalman| ObserverNumbers {
+                ad: exact(&double.ad),
+                bd: exact(&double.bd),
+                l: exact(&kalman.l_filter),
+                step: rig.sensors().iter().map(crate::rig::Sensor::step).collect(),
+            }),
+            measured: measured(table),
+            output: table.output,
+            tick_s: R::from_f64(rig.tick.period_s),
+            delay_ticks: table.delay_ticks as usize,
+        })
+    }
+}
+
+/// The states that reach the controller: those of its encoders, or all.
+fn measured(table: &TableValues) -> Vec<usize> {
+    match &table.observer {
+        Some(observer) => observer.measured.iter().map(|&state| state as usize).collect(),
+        None => (0..table.states).collect(),
+    }
+}
+
+/// The certified feedback that rounds to the table's K: that for the tick or that for continuous time.
+pub(super) fn exact_law<'c>(
+    certified: &'c Certified,
+    table: &TableValues,
+    law: Law,
+) -> Option<&'c Feedback<f64>> {
+    let index = usize::from(law == Law::PolePlacement);
+    let k = &law_values(table, law)?.k;
+    let pairs = [
+        (certified.single.sampled.in_table(), certified.double.sampled.in_table()),
+        (certified.single.continuous.each(), certified.double.continuous.each()),
+    ];
+    pairs.into_iter().find_map(|(single, double)| {
+        single[index].filter(|single| single.k.entries().starts_with(k)).and(double[index])
+    })
+}
+
+impl<R: Real> PlantModel<R> {
+    /// The plant sampled at its tick, with a delay of whole ticks.
+    pub(super) fn held(ad: &Matrix<R>, bd: &Matrix<R>, delay_ticks: usize, measured: &[usize]) -> Self {
+        let mut taps = vec![Matrix::zeros(ad.rows(), 1); delay_ticks];
+        taps.push(bd.clone());
+        Self::with_taps(ad, &taps, measured)
+    }
+
+    /// `ẋ = a x + b u` sampled every `period` seconds, with a force that arrives `delay_ticks` (any real number) later:
+    /// a fraction f of a tick splits the tick into the old force for f and the new one for 1 - f (Åström & Wittenmark,
+    /// *Computer-Controlled Systems*, section 2.3).
+    pub(super) fn delayed(
+        a: &Matrix<R>,
+        b: &Matrix<R>,
+        period: f64,
+        delay_ticks: f64,
+        measured: &[usize],
+    ) -> Self {
+        let (ad, bd) = zero_order_hold(a, b, &R::from_f64(period));
+        let (whole, fraction) = (delay_ticks.floor(), delay_ticks - delay_ticks.floor());
+        if fraction == 0.0 {
+            return Self::held(&ad, &bd, whole as usize, measured);
+        }
+        let (transition, new) = zero_order_hold(a, b, &R::from_f64(period * (1.0 - fraction)));
+        let (_, old) = zero_order_hold(a, b, &R::from_f64(period * fraction));
+        let mut taps = vec![Matrix::zeros(a.rows(), 1); whole as usize];
+        taps.extend([new, &transition * &old]);
+        Self::with_taps(&ad, &taps, measured)
+    }
+
+    /// `x⁺ = Ad x + Σ taps[i] u(k - i)`.
+    fn with_taps(ad: &Matrix<R>, taps: &[Matrix<R>], measured: &[usize]) -> Self {
+        let (s, past) = (ad.rows(), taps.len() - 1);
+        let mut a = Matrix::zeros(s + past, s + past).with_block(0, 0, ad);
+        let mut b = Matrix::zeros(s + past, 1).with_block(0, 0, &taps[0]);
+        for (i, tap) in taps.iter().enumerate().skip(1) {
+            a = a.with_block(0, s + i - 1, tap);
+            let (row, one) = (s + i - 1, R::one());
+            if i == 1 { b[(row, 0)] = one } else { a[(row, row - 1)] = one }
+        }
+        let picks = |i: usize, j: usize| if measured[i] == j { R::one() } else { R::zero() };
+        Self { a, b, c: Matrix::from_fn(measured.len(), s + past, picks), states: s }
+    }
+}
+
+impl<R: Real> ControllerModel<R> {
+    /// The firmware's tick with nothing limited and set-point 0:
+    ///
+    /// ```text
+    /// x̂ = x̂⁻ + L (y - C x̂⁻),   u = -K x̂ - k_pending u_pending - k_integral z,
+    /// x̂⁻⁺ = Ad x̂ + Bd (u or u_pending),   z⁺ = z + T x̂_output,   u_pending⁺ = u
+    /// ```
+    pub(super) fn of(numbers: &Numbers<R>) -> Self {
+        let (s, p) = (numbers.k.cols(), numbers.measured.len());
+        let late = numbers.delay_ticks == 1;
+        let observed = if numbers.observer.is_some() { s } else { 0 };
+        let z = (!numbers.k_integral.is_zero()).then_some(observed);
+        let pending =
+            (late || !numbers.k_pending.is_zero()).then_some(observed + usize::from(z.is_some()));
+        let size = observed + usize::from(z.is_some()) + usize::from(pending.is_some());
+
+        // x̂ = from_memory ξ + from_sensors y
+        let mut from_memory = Matrix::zeros(s, size);
+        let mut from_sensors = Matrix::identity(s);
+        if let Some(observer) = &numbers.observer {
+            let picks = |i: usize, j: usize| if numbers.measured[i] == j { R::one() } else { R::zero() };
+            let l_c = &observer.l * &Matrix::from_fn(p, s, picks);
+            from_memory = from_memory.with_block(0, 0, &(&Matrix::identity(s) - &l_c));
+            from_sensors = observer.l.clone();
+        }
+        let mut c = -&(&numbers.k * &from_memory);
+        let d = -&(&numbers.k * &from_sensors);
+        for (index, gain) in [(z, &numbers.k_integral), (pending, &numbers.k_pending)] {
+            if let Some(index) = index {
+                c[(0, index)] = c[(0, index)].clone() - gain;
+            }
+        }
+        let (mut a, mut b) = (Matrix::zeros(size, size), Matrix::zeros(size, p));
+        if let Some(observer) = &numbers.observer {
+            let now = match pending.filter(|_| late) {
+                Some(pending) => {
+                    let pick = |_, j| if j == pending { R::one() } else { R::zero() };
+                    (Matrix::from_fn(1, size, pick), Matrix::zeros(1, p))
+                }
+                None => (c.clone(), d.clone()),
+            };
+            a = a.with_block(0, 0, &(&(&observer.ad * &from_memory) + &(&observer.bd * &now.0)));
+            b = b.with_block(0, 0, &(&(&observer.ad * &from_sensors) + &(&observer.bd * &now.1)));
+        }
+        if let Some(z) = z {
+            let moved = |m: &Matrix<R>| m.block(numbers.output, 0, 1, m.cols()).scaled(&numbers.tick_s);
+            a = a.with_block(z, 0, &moved(&from_memory));
+            a[(z, z)] = R::one();
+            b = b.with_block(z, 0, &moved(&from_sensors));
+        }
+        if let Some(pending) = pending {
+            a = a.with_block(pending, 0, &c);
+            b = b.with_block(pending, 0, &d);
+        }
+        Self { a, b, c, d }
+    }
+}
+
+impl<R: Real> LoopModel<R> {
+    /// Plant and controller in one loop.
+    pub fn of(plant: &PlantModel<R>, controller: &ControllerModel<R>) -> Self {
+        let (n, m) = (plant.a.rows(), controller.a.rows());
+        let force_output = (&controller.d * &plant.c).beside(&controller.c);
+        let top = &plant.a.beside(&Matrix::zeros(n, m)) + &(&plant.b * &force_output);
+        let below = (&controller.b * &plant.c).beside(&controller.a);
+        Self {
+            matrix: top.above(&below),
+            force_input: plant.b.above(&Matrix::zeros(m, 1)),
+            sensor_input: (&plant.b * &controller.d).above(&controller.b),
+            force_output,
+            sensor_to_force: controller.d.clone(),
+            states: plant.states,
+        }
+    }
+
+    /// The loop of the rig as it will run with `law` of the table; none if the table does not hold it.
+    pub fn as_it_runs(certified: &Certified, table: &TableValues, law: Law) -> Option<Self> {
+        Some(Self::with_numbers(certified, &Numbers::of_table(table, law)?))
+    }
+
+    pub(super) fn with_numbers(certified: &Certified, numbers: &Numbers<R>) -> Self {
+        let exact = |m: &Matrix<f64>| m.map(|&entry| R::from_f64(entry));
+        let (ad, bd) = (exact(&certified.double.ad), exact(&certified.double.bd));
+        let plant = PlantModel::held(&ad, &bd, numbers.delay_ticks, &numbers.measured);
+        Self::of(&plant, &ControllerModel::of(numbers))
+    }
+}
+
+/// The loop broken at the plant's input, at one frequency, with L(z) = - (controller · plant).
+#[derive(Debug, Clone, PartialEq)]
+pub struct Response {
+    /// S = 1 / (1 + L): from a force disturbance to the force on the plant.
+    pub s: Complex<f64>,
+    /// T = L / (1 + L).
+    pub t: Complex<f64>,
+    /// From a kick to each of the plant's states to the law's force.
+    pub kick_to_force: Vec<Complex<f64>>,
+}
+
+impl Response {
+    /// L = T / S.
+    pub fn l(&self) -> Complex<f64> {
+        self.t / self.s
+    }
+}
+
+impl LoopModel<f64> {
+    /// The response at `omega` rad per tick (0 to π), by one solve of `(z I - M)ᵀ h = Cᵀ`; none on a pole.
+    pub fn response(&self, omega: f64) -> Option<Response> {
+        let z = Complex::new(omega.cos(), omega.sin());
+        let n = self.matrix.rows();
+        // The matrix with its right side as last column, stored by rows.
+        let mut rows: Vec<Vec<Complex<f64>>> = (0..n)
+            .map(|i| {
+                let entry = |j: usize| {
+                    let diagonal = if i == j { z } else { Complex::new(0.0, 0.0) };
+                    diagonal - self.matrix[(j, i)]
+                };
+                (0..n).map(entry).chain([Complex::new(self.force_output[(0, i)], 0.0)]).collect()
+            })
+            .collect();
+        for k in 0..n {
+            let pivot =
+                (k..n).max_by(|&i, &j| rows[i][k].norm_sqr().total_cmp(&rows[j][k].norm_sqr()))?;
+            rows.swap(k, pivot);
+            let (upper, lower) = rows.split_at_mut(k + 1);
+            let pivot_row = &upper[k];
+            if pivot_row[k].norm_sqr() == 0.0 {
+                return None;
+            }
+            for row in lower {
+                let factor = row[k] / pivot_row[k];
+                if factor.norm_sqr() > 0.0 {
+                    for (entry, pivot) in row[k..].iter_mut().zip(&pivot_row[k..]) {
+                        *entry -= factor * pivot;
+                    }
+                }
+            }
+        }
+        let mut h = vec![Complex::new(0.0, 0.0); n];
+        for i in (0..n).rev() {
+            let known: Complex<f64> = (i + 1..n).map(|j| rows[i][j] * h[j]).sum();
+            h[i] = (rows[i][n] - known) / rows[i][i];
+        }
+        let t: Complex<f64> = -(0..n).map(|i| h[i] * self.force_input[(i, 0)]).sum::<Complex<f64>>();
+        h.truncate(self.states);
+        Some(Response { s: Complex::new(1.0, 0.0) - t, t, kick_to_force: h })
+    }
+}

@@ -1,0 +1,229 @@
+//! How far the loop is from instability: margins of gain, phase and delay, sensitivity, disk margin.
+
+use core::f64::consts::PI;
+
+use serde::Serialize;
+
+use super::loop_model::{ControllerModel, LoopModel, Numbers, PlantModel, Response};
+use super::{VerifyError, radius};
+use crate::design::Certified;
+use crate::numerics::eigenvalues;
+
+/// Margins of a stable loop, broken at the plant's input.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Margins {
+    /// Smallest factor on the force below 1 at which the loop is still stable: 0 if it is for any.
+    pub lowest_gain: f64,
+    /// Largest factor on the force above 1; none: no limit.
+    pub highest_gain: Option<f64>,
+    /// Phase margin (rad), to either side; none if |L| is never 1.
+    pub phase_margin_rad: Option<f64>,
+    /// Delay margin (s): the smallest further delay of the force that makes the loop unstable, of the sampled loop with
+    /// the delay as it is, fractions of a tick included; none if none was found.
+    pub delay_margin_s: Option<f64>,
+    /// The same in ticks.
+    pub delay_margin_ticks: Option<f64>,
+    /// Frequencies at which |L| = 1 (rad/s).
+    pub crossovers_rad_per_s: Vec<f64>,
+    /// Ms = max |S|.
+    pub peak_sensitivity: f64,
+    /// Where it is (rad/s).
+    pub peak_sensitivity_rad_per_s: f64,
+    /// Mt = max |T|.
+    pub peak_complementary_sensitivity: f64,
+    /// Balanced disk margin `α = 2 / max |S - T|`: stable for every factor `(1 + δ/2) / (1 - δ/2)` on the force with
+    /// complex |δ| < α (Seiler, Packard, Gahinet, *IEEE Control Systems* 40, 2020, with σ = 0).
+    pub disk_margin: f64,
+    /// Where it is smallest (rad/s).
+    pub disk_margin_rad_per_s: f64,
+}
+
+/// Frequencies to look at (rad per tick), dense around every pole of the loop.
+pub(super) struct Grid(Vec<f64>);
+
+impl Grid {
+    /// From a hundredth of the slowest pole to Nyquist.
+    pub(super) fn of(model: &LoopModel<f64>) -> Result<Self, VerifyError> {
+        const POINTS: usize = 1500;
+        let poles = eigenvalues(&model.matrix).map_err(|_| VerifyError::Poles)?;
+        // A pole p is at frequency arg p and as wide as its distance from the circle.
+        let shape = poles.iter().map(|pole| (pole.im.atan2(pole.re).abs(), (1.0 - pole.modulus()).abs()));
+        let shape: Vec<(f64, f64)> = shape.collect();
+        let slowest = shape.iter().map(|(angle, width)| angle.hypot(*width)).fold(PI, f64::min);
+        let low = (slowest * 1e-2).max(1e-9);
+        let step = (PI / low).ln() / POINTS as f64;
+        let mut omegas: Vec<f64> = (0..POINTS).map(|i| low * (step * i as f64).exp()).collect();
+        for (angle, width) in shape {
+            omegas.extend((-8..=8).map(|i| angle + 0.25 * f64::from(i) * width));
+        }
+        omegas.retain(|omega| (low..PI).contains(omega));
+        omegas.extend([0.0, PI]);
+        omegas.sort_by(f64::total_cmp);
+        Ok(Self(omegas))
+    }
+
+    /// The largest value of `f` and where it is, every local maximum near the top refined by golden section.
+    pub(super) fn maximum(
+        &self,
+        model: &LoopModel<f64>,
+        f: impl Fn(f64, &Response) -> f64,
+    ) -> (f64, f64) {
+        let at = |omega: f64| model.response(omega).map_or(f64::NAN, |r| f(omega, &r));
+        let values: Vec<f64> = self.0.iter().map(|&omega| at(omega)).collect();
+        let top = values.iter().copied().fold(0.0, f64::max);
+        let mut best = (0.0, 0.0);
+        for i in 0..values.len() {
+            let (before, after) = (i.saturating_sub(1), (i + 1).min(values.len() - 1));
+            if values[i] >= 0.8 * top && values[i] >= values[before] && values[i] >= values[after] {
+                let refined = golden(&at, self.0[before], self.0[after]);
+                for candidate in [refined, (self.0[i], values[i])] {
+                    if candidate.1 > best.1 {
+                        best = candidate;
+                    }
+                }
+            }
+        }
+        best
+    }
+
+    /// Where `f` changes its sign, by bisection.
+    fn zeros(&self, model: &LoopModel<f64>, f: impl Fn(&Response) -> f64) -> Vec<f64> {
+        let at = |omega: f64| model.response(omega).map_or(f64::NAN, |r| f(&r));
+        let values: Vec<f64> = self.0.iter().map(|&omega| at(omega)).collect();
+        let mut zeros = Vec::new();
+        for (omega, value) in self.0.windows(2).zip(values.windows(2)) {
+            if value[0] * value[1] < 0.0 {
+                let (mut low, mut high) = (omega[0], omega[1]);
+                while high - low > 1e-13 * high {
+                    let middle = 0.5 * (low + high);
+                    if middle <= low || middle >= high {
+                        break;
+                    }
+                    if at(middle) * value[0] > 0.0 { low = middle } else { high = middle }
+                }
+                zeros.push(0.5 * (low + high));
+            }
+        }
+        zeros
+    }
+}
+
+fn golden(f: &impl Fn(f64) -> f64, mut low: f64, mut high: f64) -> (f64, f64) {
+    const RATIO: f64 = 0.618_033_988_749_894_9;
+    let (mut a, mut b) = (high - RATIO * (high - low), low + RATIO * (high - low));
+    let (mut f_a, mut f_b) = (f(a), f(b));
+    for _ in 0..60 {
+        if f_a > f_b {
+            (high, b, f_b) = (b, a, f_a);
+            a = high - RATIO * (high - low);
+            f_a = f(a);
+        } else {
+            (low, a, f_a) = (a, b, f_b);
+            b = low + RATIO * (high - low);
+            f_b = f(b);
+        }
+    }
+    if f_a > f_b { (a, f_a) } else { (b, f_b) }
+}
+
+/// All margins of a stable loop. `numbers` are those of the controller, `tick_s` its period.
+pub(super) fn margins(
+    certified: &Certified,
+    numbers: &Numbers<f64>,
+    model: &LoopModel<f64>,
+    grid: &Grid,
+    tick_s: f64,
+) -> Result<Margins, VerifyError> {
+    // 1 + g L = 0 with g real where 1/L = S/T is.
+    let inverse = |r: &Response| r.s / r.t;
+    let mut factors = Vec::new();
+    for omega in grid.zeros(model, |r| inverse(r).im).into_iter().chain([0.0, PI]) {
+        if let Some(response) = model.response(omega) {
+            let q = inverse(&response);
+            // A sign change through a pole of 1/L is none through 0.
+            if q.im.abs() <= 1e-6 * q.re.abs() && -q.re > 1e-9 {
+                factors.push(-q.re);
+            }
+        }
+    }
+    let lowest_gain = factors.iter().copied().filter(|&g| g < 1.0).fold(0.0, f64::max);
+    let highest_gain = factors.iter().copied().filter(|&g| g > 1.0).min_by(f64::total_cmp);
+
+    let crossovers = grid.zeros(model, |r| r.t.norm_sqr() - r.s.norm_sqr());
+    let mut phase_margin_rad = None::<f64>;
+    let mut delay_guess = f64::INFINITY;
+    for &omega in &crossovers {
+        let Some(response) = model.response(omega) else { continue };
+        let l = -response.l();
+        let lag = l.im.atan2(l.re);
+        phase_margin_rad = Some(phase_margin_rad.map_or(lag.abs(), |least| least.min(lag.abs())));
+        delay_guess = delay_guess.min(lag.rem_euclid(2.0 * PI) / omega);
+    }
+    let delay_margin_ticks = delay_margin(certified, numbers, tick_s, delay_guess)?;
+    let sensitivity = grid.maximum(model, |_, r| r.s.norm_sqr().sqrt());
+    let complementary = grid.maximum(model, |_, r| r.t.norm_sqr().sqrt());
+    let disk = grid.maximum(model, |_, r| (r.s - r.t).norm_sqr().sqrt());
+    Ok(Margins {
+        lowest_gain,
+        highest_gain,
+        phase_margin_rad,
+        delay_margin_s: delay_margin_ticks.map(|ticks| ticks * tick_s),
+        delay_margin_ticks,
+        crossovers_rad_per_s: crossovers.iter().map(|omega| omega / tick_s).collect(),
+        peak_sensitivity: sensitivity.1,
+        peak_sensitivity_rad_per_s: sensitivity.0 / tick_s,
+        peak_complementary_sensitivity: complementary.1,
+        disk_margin: 2.0 / disk.1,
+        disk_margin_rad_per_s: disk.0 / tick_s,
+    })
+}
+
+/// The smallest further delay (ticks) at which the sampled loop is unstable, by a scan around what the phase at the
+/// crossovers suggests (`guess`, ticks) and bisection to 1e-9.
+fn delay_margin(
+    certified: &Certified,
+    numbers: &Numbers<f64>,
+    tick_s: f64,
+    guess: f64,
+) -> Result<Option<f64>, VerifyError> {
+    if !guess.is_finite() {
+        return Ok(None);
+    }
+    let unstable = |further: f64| Ok(radius(&delayed_loop(certified, numbers, tick_s, further))? >= 1.0);
+    let step = (guess / 24.0).max(1e-3);
+    first_failure(unstable, |i| step * f64::from(i), 72, 1e-9).map(|found| found.map(|bracket| bracket.1))
+}
+
+/// The loop with a further delay of the force, in ticks.
+pub(super) fn delayed_loop(
+    certified: &Certified,
+    numbers: &Numbers<f64>,
+    tick_s: f64,
+    further: f64,
+) -> LoopModel<f64> {
+    let delay = numbers.delay_ticks as f64 + further;
+    let (a, b) = (&certified.double.a, &certified.double.b);
+    let plant = PlantModel::delayed(a, b, tick_s, delay, &numbers.measured);
+    LoopModel::of(&plant, &ControllerModel::of(numbers))
+}
+
+/// The first of `point(1)`, `point(2)` … `point(most)` that fails, narrowed by bisection to a relative width
+/// `tolerance`: (last that holds, first that fails).
+pub(super) fn first_failure(
+    fails: impl Fn(f64) -> Result<bool, VerifyError>,
+    point: impl Fn(u32) -> f64,
+    most: u32,
+    tolerance: f64,
+) -> Result<Option<(f64, f64)>, VerifyError> {
+    for i in 1..=most {
+        if fails(point(i))? {
+            let (mut holds, mut failed) = (point(i - 1), point(i));
+            while (failed - holds).abs() > tolerance * failed.abs().max(holds.abs()) {
+                let middle = 0.5 * (holds + failed);
+                if fails(middle)? { failed = middle } else { holds = middle }
+            }
+            return Ok(Some((holds, failed)));
+        }
+    }
+    Ok(None)
+}
