@@ -10,3 +10,4 @@ pub mod plant;
 pub mod rig;
 pub mod simulate;
 pub mod table;
+pub mod verify;
