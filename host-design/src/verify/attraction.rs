@@ -170,7 +170,7 @@ fn search(
         let scenario = start(size);
         let position_m = settings.horizon.position_m.max(0.1 * scenario.step_m.abs());
         let outcome = trial(rig, table, &scenario, &Horizon { position_m, ..settings.horizon })?;
-        Ok::<_, SimulationError>(outcome.stands().then_some(outcome.peak_force_n))
+        Ok::<_, SimulationError>(outcome.comes_to_rest().then_some(outcome.peak_force_n))
     })?;
     Ok(match found {
         Some((size, peak_force_n)) => Edge { size, peak_force_n, at_largest_tried: size >= largest },

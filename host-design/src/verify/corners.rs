@@ -15,8 +15,8 @@ use crate::table::TableValues;
 /// The run that every wrong plant has to stand.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct CornerSettings {
-    /// Length of the run and what counts as back near rest.
-    pub horizon: Horizon,
+    /// Length of the run (s).
+    pub duration_s: f64,
     /// What disturbs it.
     pub disturbance: Disturbance,
     /// Angle from the vertical of every link at the start (rad): the whole chain leans.
@@ -28,7 +28,7 @@ pub struct CornerSettings {
 impl CornerSettings {
     /// 10 s from a lean of 0.5 mrad with the disturbances the rig file expects.
     pub fn of(rig: &Rig) -> Self {
-        Self { horizon: Horizon::default(), disturbance: Disturbance::of(rig), tilt_rad: 5e-4, seed: 1 }
+        Self { duration_s: 10.0, disturbance: Disturbance::of(rig), tilt_rad: 5e-4, seed: 1 }
     }
 }
 
@@ -98,7 +98,7 @@ fn run_of(rig: &Rig, law: Law, settings: &CornerSettings) -> Scenario {
         force_noise_n: settings.disturbance.force_n,
         torque_noise_n_m: settings.disturbance.torque_n_m,
         seed: settings.seed,
-        ..scenario(rig, law, settings.horizon.duration_s)
+        ..scenario(rig, law, settings.duration_s)
     }
 }
 
@@ -120,7 +120,7 @@ pub fn corners(
     let corner = |mask: u32| {
         let signs: Vec<i8> = (0..=links).map(|part| if mask >> part & 1 == 1 { 1 } else { -1 }).collect();
         let factors: Vec<f64> = signs.iter().copied().map(f64::from).collect();
-        let outcome = trial(&wrong_masses(rig, percent, &factors), table, &scenario, &settings.horizon)?;
+        let outcome = trial(&wrong_masses(rig, percent, &factors), table, &scenario, &Horizon::default())?;
         Ok(Corner { signs, outcome })
     };
     let all: Vec<Corner> =
@@ -193,7 +193,8 @@ pub fn mass_tolerances(
     let tolerated = |(part, side, largest): (usize, f64, f64)| {
         let found = edge([0.1, largest], 0.05, |percent| {
             let factors: Vec<f64> = (0..parts).map(|other| if other == part { side } else { 0.0 }).collect();
-            let outcome = trial(&wrong_masses(rig, percent, &factors), table, &scenario, &settings.horizon)?;
+            let outcome =
+                trial(&wrong_masses(rig, percent, &factors), table, &scenario, &Horizon::default())?;
             Ok::<_, SimulationError>(outcome.stands().then_some(()))
         })?;
         Ok(found.map_or(0.0, |(percent, ())| percent))

@@ -14,8 +14,8 @@ use crate::table::{Gains, TableValues};
 /// How the coarsest encoder is looked for.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct EncoderSettings {
-    /// Length of each run and what counts as near rest at its end.
-    pub horizon: Horizon,
+    /// Length of each run (s).
+    pub duration_s: f64,
     /// What disturbs the runs.
     pub disturbance: Disturbance,
     /// Runs that must all stand, with the seeds from 1.
@@ -30,7 +30,7 @@ impl EncoderSettings {
     /// 4 runs of 10 s with the disturbances the rig file expects, up to 1024 times coarser, to a tenth.
     pub fn of(rig: &Rig) -> Self {
         Self {
-            horizon: Horizon::default(),
+            duration_s: 10.0,
             disturbance: Disturbance::of(rig),
             seeds: 4,
             largest_factor: 1024.0,
@@ -100,9 +100,9 @@ pub fn coarsest_encoder(
                 force_noise_n: settings.disturbance.force_n,
                 torque_noise_n_m: settings.disturbance.torque_n_m,
                 seed,
-                ..scenario(&coarse, law, settings.horizon.duration_s)
+                ..scenario(&coarse, law, settings.duration_s)
             };
-            Ok(trial(&coarse, &table, &scenario, &settings.horizon)?.stands())
+            Ok(trial(&coarse, &table, &scenario, &Horizon::default())?.stands())
         };
         let all: Vec<bool> =
             (1..=settings.seeds).into_par_iter().map(stands).collect::<Result<_, SimulationError>>()?;
