@@ -12,7 +12,8 @@ use crate::table::TableValues;
 /// How the edges are looked for.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct AttractionSettings {
-    /// Length of each run and what counts as back near rest. The position's band is at least a tenth of a step.
+    /// Length of each run and what counts as back near rest, before it is [widened](Horizon::widened) for the law's own
+    /// unrest; the position's band is also at least a tenth of a step.
     pub horizon: Horizon,
     /// Width to which an edge is found, relative to it.
     pub relative: f64,
@@ -64,6 +65,8 @@ pub struct WorstTilt {
 pub struct Attraction {
     /// The law's name, as in the table.
     pub law: &'static str,
+    /// What counted as back near rest.
+    pub horizon: Horizon,
     /// For each link alone.
     pub tilts: Vec<Tilt>,
     /// For all links together; none for a model.
@@ -92,6 +95,8 @@ pub fn attraction(
     within("relative", settings.relative, 1e-6..=1.0, "a width from 1e-6 to 1")?;
     within("largest_angle_rad", settings.largest_angle_rad, 1e-6..=1.5, "an angle from 1e-6 to 1.5 rad")?;
     within("largest_step_m", settings.largest_step_m, 1e-6..=1e6, "a step from 1e-6 to 1e6 m")?;
+    let horizon = settings.horizon.widened(rig, table, law)?;
+    let settings = &AttractionSettings { horizon, ..*settings };
     let (tilts, worst) = match chain(rig, "links") {
         Ok(chain) => {
             let mirrored = chain.cart.travel_m[0] == -chain.cart.travel_m[1];
@@ -100,7 +105,13 @@ pub fn attraction(
         }
         Err(_) => (Vec::new(), None),
     };
-    Ok(Attraction { law: law_name(law), tilts, worst, raw_step: raw_step(rig, table, law, settings)? })
+    Ok(Attraction {
+        law: law_name(law),
+        horizon,
+        tilts,
+        worst,
+        raw_step: raw_step(rig, table, law, settings)?,
+    })
 }
 
 fn tilts(
@@ -225,7 +236,7 @@ pub struct Map {
     pub settled_s: Vec<Vec<Option<f64>>>,
 }
 
-/// Runs every start of the plane. `done` hears of each run that ends, from any thread.
+/// Runs every start of the plane, with `horizon` [widened](Horizon::widened) for the law's own unrest. `done` hears of each run that ends, from any thread.
 ///
 /// # Errors
 /// [`Unverifiable`] if the runs cannot be started or an axis names no state.
@@ -242,6 +253,7 @@ pub fn attraction_map(
         within("the axis' state", axis.state as f64, 0.0..=last, "the index of a state")?;
         within("the axis' points", axis.points as f64, 1.0..=1e4, "1 to 10000 points")?;
     }
+    let horizon = &horizon.widened(rig, table, law)?;
     let cell = |index: usize| {
         let mut scenario = scenario(rig, law, horizon.duration_s);
         scenario.start[down.state] = down.value(index / across.points);

@@ -75,9 +75,28 @@ pub struct Horizon {
 }
 
 impl Default for Horizon {
-    /// 10 s; 2° and 5 cm, which is wide enough for what encoder steps do and far inside of any fall.
+    /// 10 s; 2° and 5 cm, far inside of any fall.
     fn default() -> Self {
         Self { duration_s: 10.0, angle_rad: 0.035, position_m: 0.05 }
+    }
+}
+
+impl Horizon {
+    /// Wide enough for `law`'s own unrest: encoder steps keep some loops moving by far more than the steps, so that near
+    /// rest is at least twice what a run from rest without disturbances reaches.
+    ///
+    /// # Errors
+    /// Those of [`run`].
+    pub fn widened(self, rig: &Rig, table: &TableValues, law: Law) -> Result<Self, SimulationError> {
+        let rest = trial(rig, table, &scenario(rig, law, 2.0 * self.duration_s), &self)?;
+        if rest.fall.is_some() {
+            return Ok(self);
+        }
+        Ok(Self {
+            angle_rad: self.angle_rad.max(2.0 * rest.peak_angle_rad),
+            position_m: self.position_m.max(2.0 * rest.peak_error_m),
+            ..self
+        })
     }
 }
 
@@ -90,6 +109,8 @@ pub struct Outcome {
     pub at_rest_after_s: Option<f64>,
     /// Largest angle of any link from the vertical (rad); 0 for a model.
     pub peak_angle_rad: f64,
+    /// Largest distance from the set-point (m, or the unit of a model's output).
+    pub peak_error_m: f64,
     /// Largest force on the cart (N).
     pub peak_force_n: f64,
 }
@@ -117,19 +138,20 @@ pub fn trial(
     horizon: &Horizon,
 ) -> Result<Outcome, SimulationError> {
     let output = rig.output();
-    let (mut peak_angle_rad, mut peak_force_n) = (0.0f64, 0.0f64);
+    let (mut peak_angle_rad, mut peak_error_m, mut peak_force_n) = (0.0f64, 0.0f64, 0.0f64);
     let mut quiet_since = None;
     let fall = run(rig, table, scenario, &mut |sample| {
         let angle = largest_angle(rig, sample.state);
+        let error = (sample.state[output] - sample.target).abs();
         peak_angle_rad = peak_angle_rad.max(angle);
+        peak_error_m = peak_error_m.max(error);
         peak_force_n = peak_force_n.max(sample.force.abs());
         // Not written as "beyond": what is not a number is not near rest either.
-        let quiet =
-            angle <= horizon.angle_rad && (sample.state[output] - sample.target).abs() <= horizon.position_m;
+        let quiet = angle <= horizon.angle_rad && error <= horizon.position_m;
         quiet_since = if quiet { quiet_since.or(Some(sample.t)) } else { None };
     })?;
     let at_rest_after_s = quiet_since.filter(|_| fall.is_none());
-    Ok(Outcome { fall, at_rest_after_s, peak_angle_rad, peak_force_n })
+    Ok(Outcome { fall, at_rest_after_s, peak_angle_rad, peak_error_m, peak_force_n })
 }
 
 fn largest_angle(rig: &Rig, state: &[f64]) -> f64 {
