@@ -44,6 +44,7 @@ fn any_rig(links: core::ops::RangeInclusive<usize>) -> impl Strategy<Value = Rig
 
 fn bare(chain: Chain) -> Rig {
     Rig {
+        verify: Default::default(),
         name: "random".into(),
         plant: PlantDescription::Chain(chain),
         actuator: Actuator::default(),

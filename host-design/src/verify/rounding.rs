@@ -37,19 +37,16 @@ pub(super) fn rounding(
     law: Law,
     spectral_radius: f64,
 ) -> Result<Option<Rounding>, VerifyError> {
-    let (Some(exact), Some(single)) = (
-        Numbers::<f64>::exact(rig, certified, table, law),
-        Numbers::<f64>::of_table(table, law),
-    ) else {
+    let (Some(exact), Some(single)) =
+        (Numbers::<f64>::exact(rig, certified, table, law), Numbers::<f64>::of_table(table, law))
+    else {
         return Ok(None);
     };
     let pair = |exact: f64, single: f64| ulp(exact, single);
     let mut gain_ulp = largest_ulp(&exact.k, &single.k);
-    for (exact, single) in [
-        (exact.k_pending, single.k_pending),
-        (exact.k_integral, single.k_integral),
-        (exact.n, single.n),
-    ] {
+    for (exact, single) in
+        [(exact.k_pending, single.k_pending), (exact.k_integral, single.k_integral), (exact.n, single.n)]
+    {
         gain_ulp = gain_ulp.max(pair(exact, single));
     }
     let observers = exact.observer.as_ref().zip(single.observer.as_ref());
@@ -57,10 +54,11 @@ pub(super) fn rounding(
     let wide = |numbers: Option<Numbers<Wide<128>>>| {
         numbers.map(|numbers| radius(&LoopModel::with_numbers(certified, &numbers))).transpose()
     };
-    let change = match (wide(Numbers::of_table(table, law))?, wide(Numbers::exact(rig, certified, table, law))?) {
-        (Some(single), Some(exact)) => single - exact,
-        _ => 0.0,
-    };
+    let change =
+        match (wide(Numbers::of_table(table, law))?, wide(Numbers::exact(rig, certified, table, law))?) {
+            (Some(single), Some(exact)) => single - exact,
+            _ => 0.0,
+        };
     let difference = if spectral_radius < 1.0 {
         force_difference(rig, table, law, &exact, spectral_radius)?
     } else {
@@ -76,7 +74,12 @@ pub(super) fn rounding(
 }
 
 fn largest_ulp(exact: &Matrix<f64>, single: &Matrix<f64>) -> f64 {
-    exact.entries().iter().zip(single.entries()).map(|(&exact, &single)| ulp(exact, single)).fold(0.0, f64::max)
+    exact
+        .entries()
+        .iter()
+        .zip(single.entries())
+        .map(|(&exact, &single)| ulp(exact, single))
+        .fold(0.0, f64::max)
 }
 
 /// `|single - exact|` in units of the last place of an `f32` in the binade of `exact`. `exact` is itself rounded to
@@ -178,9 +181,10 @@ impl<'a> Shadow<'a> {
             self.integral += moved;
         }
         self.pending = applied;
-        self.predicted = numbers.observer.as_ref().map(|observer| {
-            &(&observer.ad * &x) + &observer.bd.scaled(&during_this_tick)
-        });
+        self.predicted = numbers
+            .observer
+            .as_ref()
+            .map(|observer| &(&observer.ad * &x) + &observer.bd.scaled(&during_this_tick));
         force
     }
 

@@ -6,6 +6,7 @@ use host_design::design::DesignError;
 use host_design::rig::RigError;
 use host_design::simulate::{PlotError, SimulationError};
 use host_design::table::{NoTable, WriteError};
+use host_design::verify::{Unverifiable, VerifyError};
 
 /// Why a command ends without success.
 #[derive(Debug, thiserror::Error)]
@@ -20,6 +21,10 @@ pub(crate) enum Failure {
     NoSolution(String),
     #[error(transparent)]
     Simulation(#[from] SimulationError),
+    #[error(transparent)]
+    Verify(#[from] VerifyError),
+    #[error(transparent)]
+    Unverifiable(#[from] Unverifiable),
     #[error(transparent)]
     Plot(#[from] PlotError),
     #[error(transparent)]
@@ -39,6 +44,8 @@ impl Failure {
             Failure::Rig(error) => error.exit_code(),
             Failure::Design { .. } | Failure::NoTable { .. } | Failure::NoSolution(_) => 3,
             Failure::Simulation(_)
+            | Failure::Verify(_)
+            | Failure::Unverifiable(_)
             | Failure::Plot(_)
             | Failure::Write(_)
             | Failure::Output(_)

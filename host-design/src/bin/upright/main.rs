@@ -5,6 +5,7 @@ mod design;
 mod failure;
 mod progress;
 mod simulate;
+mod verify;
 
 use std::process::ExitCode;
 
@@ -16,9 +17,10 @@ Examples:
   upright design rigs/quadruple-paper.toml      design the gains, prove them, write src/gains.rs
   upright design my.toml --json --no-write      the same as data, leaving all files alone
   upright simulate rigs/quadruple-paper.toml --step 1 --svg step.svg
+  upright verify rigs/quadruple-paper.toml      how far the loop can be trusted, in numbers
 
 Exit status:
-  0  done        1  a check failed: the pendulum falls, or a file differs
+  0  done        1  a check failed: the pendulum falls, a requirement is not met, a file differs
   2  bad input   3  the design problem has no solution        4  a needed program is missing";
 
 /// Designs, emits and proves the gains that balance an n-link inverted pendulum on a cart.
@@ -34,6 +36,7 @@ enum Command {
     Check(check::Check),
     Design(design::Design),
     Simulate(simulate::Simulate),
+    Verify(verify::Verify),
 }
 
 fn main() -> ExitCode {
@@ -41,6 +44,7 @@ fn main() -> ExitCode {
         Command::Check(command) => command.run(),
         Command::Design(command) => command.run(),
         Command::Simulate(command) => command.run(),
+        Command::Verify(command) => command.run(),
     };
     match result {
         Ok(()) => ExitCode::SUCCESS,

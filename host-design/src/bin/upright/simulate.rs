@@ -122,7 +122,7 @@ fn finite(text: &str) -> Result<f64, String> {
     }
 }
 
-fn positive(text: &str) -> Result<f64, String> {
+pub(crate) fn positive(text: &str) -> Result<f64, String> {
     finite(text)
         .and_then(|value| if value > 0.0 { Ok(value) } else { Err("give a number above 0".to_owned()) })
 }
@@ -133,7 +133,7 @@ fn not_negative(text: &str) -> Result<f64, String> {
     })
 }
 
-fn period(text: &str) -> Result<f64, String> {
+pub(crate) fn period(text: &str) -> Result<f64, String> {
     finite(text).and_then(|value| {
         if (1e-6..=10.0).contains(&value) {
             Ok(value)

@@ -1,0 +1,203 @@
+//! `upright verify`
+
+use std::io::Write;
+use std::path::PathBuf;
+
+use clap::{Args, ValueEnum};
+use host_design::design::design;
+use host_design::rig::Rig;
+use host_design::simulate::simulate;
+use host_design::table::{self, TableValues, write_atomically};
+use host_design::verify::{Axis, Effort, Horizon, TrustReport, attraction_map, sample, spread, trust};
+use indicatif::{ProgressBar, ProgressStyle};
+use upright::table::Law;
+
+use crate::failure::Failure;
+use crate::progress::with_spinner;
+
+mod text;
+
+/// How far the loop can be trusted before a motor is connected: exit status 1 when a requirement of the rig file's
+/// [verify] is not met.
+#[derive(Args)]
+#[command(before_help = "\
+Examples:
+  upright verify rigs/single-quanser-ip02.toml
+  upright verify rigs/quadruple-paper.toml --runs 1000 --seed 1 --json
+  upright verify rigs/quadruple-paper.toml --replay 17 --law lqr --csv worst.csv   the random plant of seed 17 again
+  upright verify rigs/single-quanser-ip02.toml --map tilt.csv       from which angle and rate of link 1 it recovers
+  upright verify rigs/quadruple-paper.toml --gains continuous --tick 0.003         fails: not even stable")]
+pub(crate) struct Verify {
+    /// Rig file (TOML)
+    rig: PathBuf,
+    /// Monte Carlo runs for each law
+    #[arg(long, default_value_t = 200, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
+    runs: u32,
+    /// Seed of the first run; each following run has the next one
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
+    /// Only this law
+    #[arg(long, value_enum)]
+    law: Option<LawName>,
+    /// Which gains: those designed for the tick, or those for continuous time
+    #[arg(long, value_enum, default_value_t = Gains::Sampled)]
+    gains: Gains,
+    /// Control period instead of the rig's (s); the gains are designed anew
+    #[arg(long, value_name = "S", value_parser = crate::simulate::period)]
+    tick: Option<f64>,
+    /// Delay instead of the rig's (ticks); the gains are designed anew
+    #[arg(long, value_name = "TICKS", value_parser = clap::value_parser!(u8).range(0..=1))]
+    delay: Option<u8>,
+    /// Force limit instead of the rig's (N)
+    #[arg(long, value_name = "N", value_parser = crate::simulate::positive)]
+    force_limit: Option<f64>,
+    /// Make no report, but the single Monte Carlo run of this seed again
+    #[arg(long, value_name = "SEED", requires = "law")]
+    replay: Option<u64>,
+    /// With --replay: write every tick as CSV
+    #[arg(long, value_name = "FILE", requires = "replay")]
+    csv: Option<PathBuf>,
+    /// Make no report, but a map of the starts (angle and rate of link 1) from which the loop recovers, as CSV
+    #[arg(long, value_name = "FILE", conflicts_with = "replay")]
+    map: Option<PathBuf>,
+    /// Print the report as one JSON object
+    #[arg(long)]
+    json: bool,
+}
+
+#[derive(Clone, Copy, PartialEq, ValueEnum)]
+enum LawName {
+    Lqr,
+    PolePlacement,
+}
+
+impl LawName {
+    fn law(self) -> Law {
+        match self {
+            LawName::Lqr => Law::Lqr,
+            LawName::PolePlacement => Law::PolePlacement,
+        }
+    }
+}
+
+#[derive(Clone, Copy, ValueEnum)]
+enum Gains {
+    Sampled,
+    Continuous,
+}
+
+impl Verify {
+    pub(crate) fn run(self) -> Result<(), Failure> {
+        let mut rig = Rig::from_path(&self.rig)?;
+        rig.tick.period_s = self.tick.unwrap_or(rig.tick.period_s);
+        rig.tick.delay_ticks = self.delay.unwrap_or(rig.tick.delay_ticks);
+        rig.actuator.force_limit_n = self.force_limit.or(rig.actuator.force_limit_n);
+        let name = || self.rig.display().to_string();
+        let certified = with_spinner("designing", || design(&rig))
+            .map_err(|source| Failure::Design { rig: name(), source })?;
+        let gains = match self.gains {
+            Gains::Sampled => table::Gains::Sampled,
+            Gains::Continuous => table::Gains::Continuous,
+        };
+        let mut table = TableValues::of(&rig, &certified, gains)
+            .map_err(|source| Failure::NoTable { rig: name(), source })?;
+        match self.law {
+            Some(LawName::Lqr) => table.pole_placement = None,
+            Some(LawName::PolePlacement) => table.lqr = None,
+            None => {}
+        }
+        if table.lqr.is_none() && table.pole_placement.is_none() {
+            return Err(Failure::BadArgument(
+                "--law: the rig file does not ask for this control law".to_owned(),
+            ));
+        }
+        if let (Some(seed), Some(law)) = (self.replay, self.law) {
+            return self.replay(&rig, &table, law.law(), seed);
+        }
+        if let Some(path) = &self.map {
+            return self.map(&rig, &table, path);
+        }
+        let laws = usize::from(table.lqr.is_some()) + usize::from(table.pole_placement.is_some());
+        let bar = ProgressBar::new((laws * self.runs as usize) as u64);
+        bar.set_style(
+            ProgressStyle::with_template("{spinner} {msg} {wide_bar} {pos}/{len} random plants {elapsed}")
+                .unwrap_or_else(|_| ProgressStyle::default_bar()),
+        );
+        bar.enable_steady_tick(std::time::Duration::from_millis(120));
+        let effort = Effort { runs: self.runs as usize, seed: self.seed };
+        let report =
+            trust(&rig, &certified, &table, effort, &|stage| bar.set_message(stage.to_owned()), &|| {
+                bar.inc(1)
+            });
+        bar.finish_and_clear();
+        self.print(&rig, &report?)
+    }
+
+    fn print(&self, rig: &Rig, report: &TrustReport) -> Result<(), Failure> {
+        let mut out = std::io::stdout().lock();
+        if self.json {
+            serde_json::to_writer(&mut out, report).map_err(std::io::Error::from)?;
+            writeln!(out)?;
+        } else {
+            write!(out, "{}", text::report(rig, report, &self.rig.display().to_string()))?;
+        }
+        let failed: Vec<String> = report
+            .checks
+            .iter()
+            .filter(|check| !check.holds)
+            .map(|check| format!("{}: {}", check.law, check.requirement))
+            .collect();
+        if failed.is_empty() {
+            return Ok(());
+        }
+        Err(Failure::CheckFailed(format!("{}: not met: {}", rig.name, failed.join("; "))))
+    }
+
+    fn replay(&self, rig: &Rig, table: &TableValues, law: Law, seed: u64) -> Result<(), Failure> {
+        let (plant, scenario) = sample(rig, law, &spread(rig), seed);
+        let (trace, summary) = with_spinner("simulating", || simulate(&plant, table, &scenario))?;
+        if let Some(path) = &self.csv {
+            let mut bytes = Vec::new();
+            trace.write_csv(&mut bytes)?;
+            write_atomically(path, &bytes)?;
+        }
+        let mut out = std::io::stdout().lock();
+        if self.json {
+            serde_json::to_writer(&mut out, &summary).map_err(std::io::Error::from)?;
+            writeln!(out)?;
+        } else {
+            writeln!(out, "{}\n{summary}", plant.describe())?;
+        }
+        match &summary.fall {
+            Some(fall) => Err(Failure::CheckFailed(format!("{}, seed {seed}: {fall}", rig.name))),
+            None => Ok(()),
+        }
+    }
+
+    /// Rows of rate, columns of angle; the time to come near rest, or nothing.
+    fn map(&self, rig: &Rig, table: &TableValues, path: &std::path::Path) -> Result<(), Failure> {
+        let law = if table.lqr.is_some() { Law::Lqr } else { Law::PolePlacement };
+        let axes = [
+            Axis { state: 2, range: [-0.5, 0.5], points: 41 },
+            Axis { state: 3, range: [-4.0, 4.0], points: 41 },
+        ];
+        let bar = ProgressBar::new(41 * 41).with_message("starts");
+        let map = attraction_map(rig, table, law, axes, &Horizon::default(), &|| bar.inc(1))?;
+        bar.finish_and_clear();
+        let [across, down] = axes.map(|axis| {
+            let step = (axis.range[1] - axis.range[0]) / (axis.points - 1) as f64;
+            (0..axis.points).map(|i| axis.range[0] + step * i as f64).collect::<Vec<f64>>()
+        });
+        let mut csv = String::from("theta1_rad,theta1dot_rad_per_s,settled_s\n");
+        for (rate, row) in down.iter().zip(&map.settled_s) {
+            for (angle, settled) in across.iter().zip(row) {
+                let settled = settled.map_or(String::new(), |time| time.to_string());
+                csv.push_str(&format!("{angle:.6},{rate:.6},{settled}\n"));
+            }
+        }
+        write_atomically(path, csv.as_bytes())?;
+        let recovered = map.settled_s.iter().flatten().flatten().count();
+        println!("recovers from {recovered} of {} starts; written to {}", 41 * 41, path.display());
+        Ok(())
+    }
+}

@@ -1,0 +1,293 @@
+//! How far the rig may lean or jump at the start and still come back, on the nonlinear plant.
+
+use rayon::prelude::*;
+use serde::Serialize;
+use upright::table::Law;
+
+use super::trial::{Horizon, Outcome, Unverifiable, chain, edge, leaning, scenario, trial, within};
+use crate::rig::Rig;
+use crate::simulate::{Scenario, SimulationError};
+use crate::table::TableValues;
+
+/// How the edges are looked for.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct AttractionSettings {
+    /// Length of each run and what counts as back near rest, before it is [widened](Horizon::widened) for the law's own
+    /// unrest; the position's band is also at least a tenth of a step.
+    pub horizon: Horizon,
+    /// Width to which an edge is found, relative to it.
+    pub relative: f64,
+    /// Largest angle tried (rad).
+    pub largest_angle_rad: f64,
+    /// Largest step tried (m).
+    pub largest_step_m: f64,
+}
+
+impl Default for AttractionSettings {
+    fn default() -> Self {
+        Self { horizon: Horizon::default(), relative: 0.01, largest_angle_rad: 1.0, largest_step_m: 2.0 }
+    }
+}
+
+/// The largest start from which a run still stands.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Edge {
+    /// Its size (rad or m); 0 if not even the smallest one tried (1/10000 of the largest) stands.
+    pub size: f64,
+    /// Largest force in the run from there (N).
+    pub peak_force_n: f64,
+    /// Whether it is the largest size that was tried.
+    pub at_largest_tried: bool,
+}
+
+/// Edge for one link leaning alone, all others upright (those above it stand beside their place, but vertical).
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Tilt {
+    /// The link, from 1.
+    pub link: usize,
+    /// Its largest angle from the vertical (rad) to the side that is worse.
+    pub edge: Edge,
+}
+
+/// Edge for all links leaning by the same angle, in the worst combination of sides.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct WorstTilt {
+    /// Side of each link, +1 or -1.
+    pub signs: Vec<i8>,
+    /// Largest angle of every link from the vertical (rad).
+    pub edge: Edge,
+    /// How many combinations were tried.
+    pub tried: usize,
+}
+
+/// How far the rig may be away from rest at the start.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Attraction {
+    /// The law's name, as in the table.
+    pub law: &'static str,
+    /// What counted as back near rest.
+    pub horizon: Horizon,
+    /// For each link alone.
+    pub tilts: Vec<Tilt>,
+    /// For all links together; none for a model.
+    pub worst: Option<WorstTilt>,
+    /// Largest jump of the set-point without the governor (m); none if the law cannot follow a set-point (N = 0).
+    pub raw_step: Option<Edge>,
+}
+
+/// With more links than this not every combination of sides is tried, but those of two neighbours with unlike sides,
+/// and all to one side or alternating.
+const LINKS_FOR_ALL_SIDES: usize = 7;
+
+/// Finds the edges for `law` by doubling and bisection (see [`AttractionSettings`]): no fall within the horizon, and
+/// near rest at its end. Runs are without noise, from encoders if the table has an observer.
+///
+/// Of two mirror images only one is tried if the rail is symmetric: then so is the loop.
+///
+/// # Errors
+/// [`Unverifiable`] if the runs cannot be started or a setting makes no sense.
+pub fn attraction(
+    rig: &Rig,
+    table: &TableValues,
+    law: Law,
+    settings: &AttractionSettings,
+) -> Result<Attraction, Unverifiable> {
+    within("relative", settings.relative, 1e-6..=1.0, "a width from 1e-6 to 1")?;
+    within("largest_angle_rad", settings.largest_angle_rad, 1e-6..=1.5, "an angle from 1e-6 to 1.5 rad")?;
+    within("largest_step_m", settings.largest_step_m, 1e-6..=1e6, "a step from 1e-6 to 1e6 m")?;
+    let horizon = settings.horizon.widened(rig, table, law)?;
+    let settings = &AttractionSettings { horizon, ..*settings };
+    let (tilts, worst) = match chain(rig, "links") {
+        Ok(chain) => {
+            let mirrored = chain.cart.travel_m[0] == -chain.cart.travel_m[1];
+            let sides = sides(chain.links.len(), mirrored);
+            tilts(rig, table, law, settings, mirrored, &sides)?
+        }
+        Err(_) => (Vec::new(), None),
+    };
+    Ok(Attraction {
+        law: law_name(law),
+        horizon,
+        tilts,
+        worst,
+        raw_step: raw_step(rig, table, law, settings)?,
+    })
+}
+
+fn tilts(
+    rig: &Rig,
+    table: &TableValues,
+    law: Law,
+    settings: &AttractionSettings,
+    mirrored: bool,
+    sides: &[Vec<i8>],
+) -> Result<(Vec<Tilt>, Option<WorstTilt>), SimulationError> {
+    let links = rig.states() / 2 - 1;
+    let lean = |direction: &[i8]| {
+        search(rig, table, settings, settings.largest_angle_rad, |size| {
+            let angles: Vec<f64> = direction.iter().map(|&side| size * f64::from(side)).collect();
+            Scenario { start: leaning(rig, &angles), ..scenario(rig, law, settings.horizon.duration_s) }
+        })
+    };
+    let alone = |(link, side): (usize, i8)| {
+        let direction: Vec<i8> = (0..links).map(|other| if other == link { side } else { 0 }).collect();
+        Ok(Tilt { link: link + 1, edge: lean(&direction)? })
+    };
+    let single: Vec<(usize, i8)> = (0..links)
+        .flat_map(|link| [(link, 1), (link, -1)])
+        .filter(|&(_, side)| side > 0 || !mirrored)
+        .collect();
+    let all: Vec<Tilt> = single.into_par_iter().map(alone).collect::<Result<_, SimulationError>>()?;
+    let tilts = all
+        .chunks(if mirrored { 1 } else { 2 })
+        .filter_map(|pair| pair.iter().min_by(|a, b| a.edge.size.total_cmp(&b.edge.size)).cloned())
+        .collect();
+    let edges: Vec<Edge> =
+        sides.par_iter().map(|signs| lean(signs)).collect::<Result<_, SimulationError>>()?;
+    let worst = sides.iter().zip(edges).min_by(|(_, a), (_, b)| a.size.total_cmp(&b.size));
+    let worst = worst.map(|(signs, edge)| WorstTilt { signs: signs.clone(), edge, tried: sides.len() });
+    Ok((tilts, worst))
+}
+
+fn raw_step(
+    rig: &Rig,
+    table: &TableValues,
+    law: Law,
+    settings: &AttractionSettings,
+) -> Result<Option<Edge>, SimulationError> {
+    let gains = match law {
+        Law::Lqr => &table.lqr,
+        Law::PolePlacement => &table.pole_placement,
+    };
+    if gains.as_ref().is_none_or(|gains| gains.n == 0.0) {
+        return Ok(None);
+    }
+    let raw = table.clone().without_governor();
+    search(rig, &raw, settings, settings.largest_step_m, |size| Scenario {
+        step_m: size,
+        ..scenario(rig, law, settings.horizon.duration_s)
+    })
+    .map(Some)
+}
+
+fn search(
+    rig: &Rig,
+    table: &TableValues,
+    settings: &AttractionSettings,
+    largest: f64,
+    start: impl Fn(f64) -> Scenario,
+) -> Result<Edge, SimulationError> {
+    let found = edge([1e-4 * largest, largest], settings.relative, |size| {
+        let scenario = start(size);
+        let position_m = settings.horizon.position_m.max(0.1 * scenario.step_m.abs());
+        let outcome = trial(rig, table, &scenario, &Horizon { position_m, ..settings.horizon })?;
+        Ok::<_, SimulationError>(outcome.comes_to_rest().then_some(outcome.peak_force_n))
+    })?;
+    Ok(match found {
+        Some((size, peak_force_n)) => Edge { size, peak_force_n, at_largest_tried: size >= largest },
+        None => Edge { size: 0.0, peak_force_n: 0.0, at_largest_tried: false },
+    })
+}
+
+/// Combinations of sides for `links` links; without mirror images if `mirrored`.
+fn sides(links: usize, mirrored: bool) -> Vec<Vec<i8>> {
+    let side = |negative: bool| if negative { -1 } else { 1 };
+    let first: Vec<Vec<i8>> = if links <= LINKS_FOR_ALL_SIDES {
+        (0..1u32 << (links - 1))
+            .map(|mask| (0..links).map(|link| side(link > 0 && mask >> (link - 1) & 1 == 1)).collect())
+            .collect()
+    } else {
+        let changed = (1..=links).map(|change| (0..links).map(|link| side(link >= change)).collect());
+        changed.chain([(0..links).map(|link| side(link % 2 == 1)).collect()]).collect()
+    };
+    if mirrored {
+        return first;
+    }
+    let other = first.clone().into_iter().map(|signs| signs.into_iter().map(|side| -side).collect());
+    first.iter().cloned().chain(other).collect()
+}
+
+/// One axis of a map: a state and the values it starts with.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Axis {
+    /// Index of the state (relative angles, as everywhere).
+    pub state: usize,
+    /// First and last value (SI).
+    pub range: [f64; 2],
+    /// How many values, at equal distances.
+    pub points: usize,
+}
+
+impl Axis {
+    fn value(&self, index: usize) -> f64 {
+        let [low, high] = self.range;
+        low + (high - low) * index as f64 / (self.points.max(2) - 1) as f64
+    }
+}
+
+/// The region of attraction in the plane of two states, all others 0 at the start.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Map {
+    /// From left to right.
+    pub across: Axis,
+    /// From the first row to the last.
+    pub down: Axis,
+    /// For each row the time after which each start has come near rest (s); none where it falls or does not.
+    pub settled_s: Vec<Vec<Option<f64>>>,
+}
+
+/// Runs every start of the plane, with `horizon` [widened](Horizon::widened) for the law's own unrest. `done` hears of each run that ends, from any thread.
+///
+/// # Errors
+/// [`Unverifiable`] if the runs cannot be started or an axis names no state.
+pub fn attraction_map(
+    rig: &Rig,
+    table: &TableValues,
+    law: Law,
+    [across, down]: [Axis; 2],
+    horizon: &Horizon,
+    done: &(dyn Fn() + Sync),
+) -> Result<Map, Unverifiable> {
+    for axis in [across, down] {
+        let last = rig.states() as f64 - 1.0;
+        within("the axis' state", axis.state as f64, 0.0..=last, "the index of a state")?;
+        within("the axis' points", axis.points as f64, 1.0..=1e4, "1 to 10000 points")?;
+    }
+    let horizon = &horizon.widened(rig, table, law)?;
+    let cell = |index: usize| {
+        let mut scenario = scenario(rig, law, horizon.duration_s);
+        scenario.start[down.state] = down.value(index / across.points);
+        scenario.start[across.state] = across.value(index % across.points);
+        let outcome: Outcome = trial(rig, table, &scenario, horizon)?;
+        done();
+        Ok(outcome.at_rest_after_s)
+    };
+    let cells: Vec<Option<f64>> =
+        (0..across.points * down.points).into_par_iter().map(cell).collect::<Result<_, SimulationError>>()?;
+    Ok(Map { across, down, settled_s: cells.chunks(across.points).map(<[_]>::to_vec).collect() })
+}
+
+/// The law's name, as in the table.
+pub(super) fn law_name(law: Law) -> &'static str {
+    match law {
+        Law::Lqr => "lqr",
+        Law::PolePlacement => "pole_placement",
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_combination_of_sides_comes_once() {
+        for links in 1..=4 {
+            let mut all = sides(links, false);
+            all.sort();
+            all.dedup();
+            assert_eq!(all.len(), 1 << links);
+            assert_eq!(sides(links, true).len(), 1 << (links - 1));
+        }
+        assert_eq!(sides(9, true).len(), 10);
+    }
+}

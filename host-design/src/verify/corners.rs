@@ -1,0 +1,217 @@
+//! Wrong masses: every combination of too light and too heavy, and each mass alone.
+
+use rayon::prelude::*;
+use serde::Serialize;
+use upright::table::Law;
+
+use super::monte_carlo::is_worse;
+use super::trial::{
+    Disturbance, Horizon, Outcome, Unverifiable, chain, edge, leaning, scenario, trial, within,
+};
+use crate::rig::{PlantDescription, Rig};
+use crate::simulate::{Scenario, SimulationError};
+use crate::table::TableValues;
+
+/// The run that every wrong plant has to stand.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct CornerSettings {
+    /// Length of the run (s).
+    pub duration_s: f64,
+    /// What disturbs it.
+    pub disturbance: Disturbance,
+    /// Angle from the vertical of every link at the start (rad): the whole chain leans.
+    pub tilt_rad: f64,
+    /// Seed of the disturbances, the same in every run.
+    pub seed: u64,
+}
+
+impl CornerSettings {
+    /// 10 s from a lean of 0.5 mrad with the disturbances the rig file expects.
+    pub fn of(rig: &Rig) -> Self {
+        Self { duration_s: 10.0, disturbance: Disturbance::of(rig), tilt_rad: 5e-4, seed: 1 }
+    }
+}
+
+/// The mass of a part.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Mass {
+    /// The cart's.
+    Cart,
+    /// That of this link, from 1.
+    Link(usize),
+}
+
+impl core::fmt::Display for Mass {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        match self {
+            Mass::Cart => f.write_str("cart"),
+            Mass::Link(link) => write!(f, "link {link}"),
+        }
+    }
+}
+
+/// One combination of wrong masses.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Corner {
+    /// For the cart and each link: +1 if the real mass is larger than in the rig file, -1 if smaller.
+    pub signs: Vec<i8>,
+    /// What became of the run.
+    pub outcome: Outcome,
+}
+
+/// All combinations of masses that are wrong by the same percentage.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Corners {
+    /// How wrong each mass is (%).
+    pub percent: f64,
+    /// 2^(n+1).
+    pub corners: usize,
+    /// Corners that stand.
+    pub stand: usize,
+    /// The corner that falls first; if none falls, that with the largest angle.
+    pub weakest: Corner,
+    /// Those that do not stand.
+    pub lost: Vec<Corner>,
+}
+
+/// With more links than this there are too many corners to try.
+const MOST_LINKS: usize = 9;
+
+/// The rig with its masses, cart first, changed by `percent` times `factors`. An inertia that the rig file gives stays; one that
+/// it leaves to the default follows the mass.
+pub fn wrong_masses(rig: &Rig, percent: f64, factors: &[f64]) -> Rig {
+    let mut wrong = rig.clone();
+    if let PlantDescription::Chain(chain) = &mut wrong.plant {
+        let masses = core::iter::once(&mut chain.cart.mass_kg)
+            .chain(chain.links.iter_mut().map(|link| &mut link.mass_kg));
+        for (mass, factor) in masses.zip(factors) {
+            *mass *= 1.0 + 0.01 * percent * factor;
+        }
+    }
+    wrong
+}
+
+fn run_of(rig: &Rig, law: Law, settings: &CornerSettings) -> Scenario {
+    Scenario {
+        start: leaning(rig, &vec![settings.tilt_rad; rig.states() / 2 - 1]),
+        force_noise_n: settings.disturbance.force_n,
+        torque_noise_n_m: settings.disturbance.torque_n_m,
+        seed: settings.seed,
+        ..scenario(rig, law, settings.duration_s)
+    }
+}
+
+/// Runs every corner of ±`percent` wrong cart and link masses; the controller stays the one of `table`.
+///
+/// # Errors
+/// [`Unverifiable`] for a model, a chain of more than 9 links, or runs that cannot be started.
+pub fn corners(
+    rig: &Rig,
+    table: &TableValues,
+    law: Law,
+    percent: f64,
+    settings: &CornerSettings,
+) -> Result<Corners, Unverifiable> {
+    let links = chain(rig, "masses")?.links.len();
+    within("percent", percent, 0.0..=90.0, "0 to 90 %")?;
+    within("links", links as f64, 1.0..=MOST_LINKS as f64, "a chain of at most 9 links")?;
+    let scenario = run_of(rig, law, settings);
+    let corner = |mask: u32| {
+        let signs: Vec<i8> = (0..=links).map(|part| if mask >> part & 1 == 1 { 1 } else { -1 }).collect();
+        let factors: Vec<f64> = signs.iter().copied().map(f64::from).collect();
+        let outcome = trial(&wrong_masses(rig, percent, &factors), table, &scenario, &Horizon::default())?;
+        Ok(Corner { signs, outcome })
+    };
+    let all: Vec<Corner> =
+        (0..2u32 << links).into_par_iter().map(corner).collect::<Result<_, SimulationError>>()?;
+    let mut weakest = &all[0];
+    for corner in &all {
+        if is_worse(&corner.outcome, &weakest.outcome) {
+            weakest = corner;
+        }
+    }
+    let lost: Vec<Corner> = all.iter().filter(|corner| !corner.outcome.stands()).cloned().collect();
+    Ok(Corners { percent, corners: all.len(), stand: all.len() - lost.len(), weakest: weakest.clone(), lost })
+}
+
+/// The largest percentage, a multiple of `step` up to `largest` (%), at which all corners stand, by bisection over those
+/// multiples; 0 if not even the first does.
+///
+/// # Errors
+/// As [`corners`].
+pub fn largest_percent(
+    rig: &Rig,
+    table: &TableValues,
+    law: Law,
+    settings: &CornerSettings,
+    step: f64,
+    largest: f64,
+) -> Result<f64, Unverifiable> {
+    within("largest", largest, 0.0..=90.0, "0 to 90 %")?;
+    within("step", step, 0.01..=90.0, "0.01 to 90 %")?;
+    let (mut held, mut lost) = (0, (largest / step).floor() as usize + 1);
+    while lost - held > 1 {
+        let middle = (held + lost) / 2;
+        let found = corners(rig, table, law, step * middle as f64, settings)?;
+        if found.lost.is_empty() { held = middle } else { lost = middle }
+    }
+    Ok(step * held as f64)
+}
+
+/// How wrong one mass alone may be.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct MassTolerance {
+    /// Which mass.
+    pub mass: Mass,
+    /// How much lighter than in the rig file it may be (%, at most 90).
+    pub lighter_percent: f64,
+    /// How much heavier (%, at most 900).
+    pub heavier_percent: f64,
+}
+
+impl MassTolerance {
+    /// The smaller of the two.
+    pub fn percent(&self) -> f64 {
+        self.lighter_percent.min(self.heavier_percent)
+    }
+}
+
+/// For each mass how wrong it alone may be, by doubling from 0.1 % and bisection to a twentieth; the one to weigh best comes
+/// first.
+///
+/// # Errors
+/// [`Unverifiable`] for a model, or runs that cannot be started.
+pub fn mass_tolerances(
+    rig: &Rig,
+    table: &TableValues,
+    law: Law,
+    settings: &CornerSettings,
+) -> Result<Vec<MassTolerance>, Unverifiable> {
+    let parts = chain(rig, "masses")?.links.len() + 1;
+    let scenario = run_of(rig, law, settings);
+    let tolerated = |(part, side, largest): (usize, f64, f64)| {
+        let found = edge([0.1, largest], 0.05, |percent| {
+            let factors: Vec<f64> = (0..parts).map(|other| if other == part { side } else { 0.0 }).collect();
+            let outcome =
+                trial(&wrong_masses(rig, percent, &factors), table, &scenario, &Horizon::default())?;
+            Ok::<_, SimulationError>(outcome.stands().then_some(()))
+        })?;
+        Ok(found.map_or(0.0, |(percent, ())| percent))
+    };
+    let cases: Vec<(usize, f64, f64)> =
+        (0..parts).flat_map(|part| [(part, -1.0, 90.0), (part, 1.0, 900.0)]).collect();
+    let found: Vec<f64> = cases.into_par_iter().map(tolerated).collect::<Result<_, SimulationError>>()?;
+    let mass = |part: usize| if part == 0 { Mass::Cart } else { Mass::Link(part) };
+    let mut tolerances: Vec<MassTolerance> = found
+        .chunks_exact(2)
+        .enumerate()
+        .map(|(part, sides)| MassTolerance {
+            mass: mass(part),
+            lighter_percent: sides[0],
+            heavier_percent: sides[1],
+        })
+        .collect();
+    tolerances.sort_by(|a, b| a.percent().total_cmp(&b.percent()));
+    Ok(tolerances)
+}

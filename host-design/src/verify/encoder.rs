@@ -1,0 +1,128 @@
+//! How coarse the encoders may be.
+
+use rayon::prelude::*;
+use serde::Serialize;
+use upright::table::Law;
+
+use super::attraction::law_name;
+use super::trial::{Disturbance, Horizon, Unverifiable, chain, edge, scenario, trial, within};
+use crate::design::design;
+use crate::rig::{LinkEncoder, PlantDescription, Rig};
+use crate::simulate::{Scenario, SimulationError};
+use crate::table::{Gains, TableValues};
+
+/// How the coarsest encoder is looked for.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct EncoderSettings {
+    /// Length of each run (s).
+    pub duration_s: f64,
+    /// What disturbs the runs.
+    pub disturbance: Disturbance,
+    /// Runs that must all stand, with the seeds from 1.
+    pub seeds: u64,
+    /// Largest factor tried, at least 1.
+    pub largest_factor: f64,
+    /// Width to which the factor is found, relative to it.
+    pub relative: f64,
+}
+
+impl EncoderSettings {
+    /// 4 runs of 10 s with the disturbances the rig file expects, up to 1024 times coarser, to a tenth.
+    pub fn of(rig: &Rig) -> Self {
+        Self {
+            duration_s: 10.0,
+            disturbance: Disturbance::of(rig),
+            seeds: 4,
+            largest_factor: 1024.0,
+            relative: 0.1,
+        }
+    }
+}
+
+/// The coarsest encoders with which a law still stands.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct CoarsestEncoder {
+    /// The law's name, as in the table.
+    pub law: &'static str,
+    /// How many times coarser than in the rig file, cart and links alike; none if the rig's own do not do.
+    pub factor: Option<f64>,
+    /// Whether the factor is the largest that was tried.
+    pub at_largest_tried: bool,
+    /// Step of the cart's encoder at that factor (m).
+    pub cart_step_m: Option<f64>,
+    /// Counts per revolution of each link's encoder at that factor.
+    pub counts_per_rev: Vec<f64>,
+}
+
+/// The rig with encoders `factor` times coarser. Counts per revolution stay whole, and at least 2.
+pub fn coarser(rig: &Rig, factor: f64) -> Rig {
+    let mut coarse = rig.clone();
+    match &mut coarse.plant {
+        PlantDescription::Chain(chain) => {
+            chain.cart.encoder_step_m = chain.cart.encoder_step_m.map(|step| step * factor);
+            for link in &mut chain.links {
+                link.encoder = link.encoder.map(|encoder| match encoder {
+                    LinkEncoder::StepRad(step) => LinkEncoder::StepRad(step * factor),
+                    LinkEncoder::CountsPerRev(counts) => {
+                        LinkEncoder::CountsPerRev((counts / factor).round().max(2.0))
+                    }
+                });
+            }
+        }
+        PlantDescription::Model(model) => {
+            model.measured_steps.iter_mut().for_each(|step| *step *= factor);
+        }
+    }
+    coarse
+}
+
+/// Looks for the coarsest encoders by doubling and bisection of a common factor. For every factor the gains are designed
+/// anew, as a user with such encoders would: the observer knows how coarse they are.
+///
+/// # Errors
+/// [`Unverifiable`] for a model or a rig without observer, and if a design or run fails.
+pub fn coarsest_encoder(
+    rig: &Rig,
+    law: Law,
+    settings: &EncoderSettings,
+) -> Result<CoarsestEncoder, Unverifiable> {
+    chain(rig, "encoders")?;
+    within("largest_factor", settings.largest_factor, 1.0..=1e6, "a factor from 1 to 1e6")?;
+    within("relative", settings.relative, 1e-3..=1.0, "a width from 0.001 to 1")?;
+    let found = edge([1.0, settings.largest_factor], settings.relative, |factor| {
+        let coarse = coarser(rig, factor);
+        let table = TableValues::of(&coarse, &design(&coarse)?, Gains::Sampled)?;
+        if table.observer.is_none() {
+            return Err(Unverifiable::NoObserver);
+        }
+        let stands = |seed: u64| {
+            let scenario = Scenario {
+                force_noise_n: settings.disturbance.force_n,
+                torque_noise_n_m: settings.disturbance.torque_n_m,
+                seed,
+                ..scenario(&coarse, law, settings.duration_s)
+            };
+            Ok(trial(&coarse, &table, &scenario, &Horizon::default())?.stands())
+        };
+        let all: Vec<bool> =
+            (1..=settings.seeds).into_par_iter().map(stands).collect::<Result<_, SimulationError>>()?;
+        Ok(all.iter().all(|&stands| stands).then_some(()))
+    })?;
+    let factor = found.map(|(factor, ())| factor);
+    let at_edge = coarser(rig, factor.unwrap_or(1.0));
+    let at_edge = chain(&at_edge, "encoders")?;
+    Ok(CoarsestEncoder {
+        law: law_name(law),
+        factor,
+        at_largest_tried: factor.is_some_and(|factor| factor >= settings.largest_factor),
+        cart_step_m: at_edge.cart.encoder_step_m,
+        counts_per_rev: at_edge
+            .links
+            .iter()
+            .filter_map(|link| match link.encoder? {
+                LinkEncoder::CountsPerRev(counts) => Some(counts),
+                LinkEncoder::StepRad(step) => Some(core::f64::consts::TAU / step),
+            })
+            .collect(),
+    })
+}

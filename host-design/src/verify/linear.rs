@@ -1,0 +1,105 @@
+//! What the linear model of the loop, as it will run, can tell.
+
+use serde::Serialize;
+use upright::table::Law;
+
+use crate::design::{Certified, DesignError};
+use crate::numerics::{Real, eigenvalues, spectral_radius};
+use crate::rig::Rig;
+use crate::simulate::SimulationError;
+use crate::table::TableValues;
+
+use super::{Certificate, LoopModel, Margins, NoiseShare, Rounding, TickLimits, Unverifiable};
+use super::{certificate, covariance, loop_model, margins, rounding, tick};
+
+/// Everything the linear model of the loop can tell about one law: sampled, delayed, with observer, with the table's
+/// `f32` values.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct LinearReport {
+    /// `lqr` or `pole_placement`.
+    pub law: &'static str,
+    /// Poles of the whole loop as [re, im], by real part.
+    pub poles: Vec<[f64; 2]>,
+    /// Largest absolute value of a pole: stable below 1.
+    pub spectral_radius: f64,
+    /// Whether it is below 1. The three parts that follow exist only for a stable loop.
+    pub stable: bool,
+    /// Margins at the plant's input.
+    pub margins: Option<Margins>,
+    /// Longer, shorter and uneven ticks.
+    pub tick: Option<TickLimits>,
+    /// RMS by source of noise, the total last; none without `[kalman]`.
+    pub noise: Option<Vec<NoiseShare>>,
+    /// What `f32` does; none if the table's gains are not those of the design.
+    pub rounding: Option<Rounding>,
+    /// Evidence for each gain; empty if the table's gains are not those designed for the tick.
+    pub certificates: Vec<Certificate>,
+}
+
+/// A report that cannot be made.
+#[derive(Debug, thiserror::Error)]
+pub enum VerifyError {
+    /// The eigenvalue iteration failed.
+    #[error("the poles of the loop could not be computed")]
+    Poles,
+    /// The noise grows without bound.
+    #[error("the loop is so close to instability that its noise has no computable steady state")]
+    NoStationaryState,
+    /// The design could not be repeated.
+    #[error(transparent)]
+    Design(#[from] DesignError),
+    /// The standard run could not be made.
+    #[error(transparent)]
+    Simulation(#[from] SimulationError),
+    /// Some runs could not be made.
+    #[error(transparent)]
+    Runs(#[from] Unverifiable),
+}
+
+/// The linear half of the trust report, one for each law in the table.
+///
+/// # Errors
+/// [`VerifyError`] if a figure cannot be computed; an unstable loop is no error.
+pub fn linear(
+    rig: &Rig,
+    certified: &Certified,
+    table: &TableValues,
+) -> Result<Vec<LinearReport>, VerifyError> {
+    let certificates = certificate::Certificates::of(rig, certified)?;
+    let laws = [(Law::Lqr, "lqr"), (Law::PolePlacement, "pole_placement")];
+    let mut reports = Vec::new();
+    for (law, name) in laws {
+        let Some(numbers) = loop_model::Numbers::<f64>::of_table(table, law) else { continue };
+        let model = LoopModel::with_numbers(certified, &numbers);
+        let poles = eigenvalues(&model.matrix).map_err(|_| VerifyError::Poles)?;
+        let poles: Vec<[f64; 2]> = poles.iter().map(crate::numerics::Complex::to_f64).collect();
+        let spectral_radius = poles.iter().map(|pole| pole[0].hypot(pole[1])).fold(0.0, f64::max);
+        let stable = spectral_radius < 1.0;
+        let tick_s = rig.tick.period_s;
+        let (mut margins, mut tick, mut noise) = (None, None, None);
+        if stable {
+            let grid = margins::Grid::of(&model)?;
+            margins = Some(margins::margins(certified, &numbers, &model, &grid, tick_s)?);
+            tick = Some(tick::limits(certified, &numbers, &model, &grid, tick_s)?);
+            noise = covariance::covariance(rig, certified, &model, table.observer.is_some())?;
+        }
+        let as_designed = loop_model::exact_law(certified, table, law)
+            .is_some_and(|exact| certified.double.sampled.in_table().contains(&Some(exact)));
+        reports.push(LinearReport {
+            law: name,
+            poles,
+            spectral_radius,
+            stable,
+            margins,
+            tick,
+            noise,
+            rounding: rounding::rounding(rig, certified, table, law, spectral_radius)?,
+            certificates: if as_designed { certificates.of_law(law) } else { Vec::new() },
+        });
+    }
+    Ok(reports)
+}
+
+pub(super) fn radius<R: Real>(model: &LoopModel<R>) -> Result<f64, VerifyError> {
+    spectral_radius(&model.matrix).map(|radius| radius.to_f64()).map_err(|_| VerifyError::Poles)
+}

@@ -1,0 +1,208 @@
+//! Many runs with everything a little wrong at once.
+
+use rand::{RngExt, SeedableRng};
+use rand_pcg::Pcg64;
+use rayon::prelude::*;
+use serde::Serialize;
+use upright::table::Law;
+
+use super::trial::{Disturbance, Horizon, Outcome, Unverifiable, leaning, scenario, trial, within};
+use crate::rig::{Chain, Link, PlantDescription, Rig};
+use crate::simulate::{Scenario, SimulationError};
+use crate::table::TableValues;
+
+/// From what range each run's plant and start are drawn, uniformly. A share of 0.02 means from -2 % to +2 %.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Spread {
+    /// Of the cart's and each link's mass.
+    pub mass: f64,
+    /// Of each link's length; its centre of mass moves along.
+    pub length: f64,
+    /// Of each link's inertia, beyond what follows from mass and length (m l²).
+    pub inertia: f64,
+    /// Of the cart's and each joint's friction.
+    pub friction: f64,
+    /// Share of runs in which the force acts one tick later than the table was designed for (0 to 1); a rig designed
+    /// for one tick of delay then has none.
+    pub other_delay: f64,
+    /// Each link starts with an angle from the vertical within ± this (rad).
+    pub tilt_rad: f64,
+    /// Disturbances in every run.
+    pub disturbance: Disturbance,
+    /// Length of a run (s).
+    pub duration_s: f64,
+}
+
+impl Spread {
+    /// ±2 % of masses, lengths and inertia, ±20 % of friction, what disturbances the rig file expects, and a start within
+    /// ±0.5 mrad.
+    pub fn of(rig: &Rig) -> Self {
+        Self {
+            mass: 0.02,
+            length: 0.02,
+            inertia: 0.02,
+            friction: 0.2,
+            other_delay: 0.0,
+            tilt_rad: 5e-4,
+            disturbance: Disturbance::of(rig),
+            duration_s: 10.0,
+        }
+    }
+}
+
+/// The run that went worst: the first to fall, or, if none falls, that with the largest angle.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct WorstCase {
+    /// Give it to [`sample`] to get plant and scenario again.
+    pub seed: u64,
+    /// What became of it.
+    pub outcome: Outcome,
+}
+
+/// Outcome of many runs.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct MonteCarlo {
+    /// Seed of the first run; each following run has the next one.
+    pub base_seed: u64,
+    /// Runs made.
+    pub runs: usize,
+    /// Runs without fall.
+    pub stood: usize,
+    /// Share of those.
+    pub success_rate: f64,
+    /// 95 % confidence interval of the success rate (Wilson).
+    pub interval: [f64; 2],
+    /// The run that went worst; none if there was none.
+    pub worst: Option<WorstCase>,
+}
+
+/// Plant and scenario of the run with this seed.
+///
+/// Masses and lengths are drawn first; a given centre of mass keeps its share of the length and a given inertia follows m l²,
+/// then gets its own factor.
+pub fn sample(rig: &Rig, law: Law, spread: &Spread, seed: u64) -> (Rig, Scenario) {
+    let mut random = Pcg64::seed_from_u64(seed);
+    let mut between = |share: f64| share * random.random_range(-1.0..=1.0);
+    let mut drawn = rig.clone();
+    if let PlantDescription::Chain(chain) = &mut drawn.plant {
+        draw_chain(chain, spread, &mut between);
+    }
+    let links = if matches!(rig.plant, PlantDescription::Chain(_)) { rig.states() / 2 - 1 } else { 0 };
+    let angles: Vec<f64> = (0..links).map(|_| between(spread.tilt_rad)).collect();
+    if 0.5 * (1.0 + between(1.0)) < spread.other_delay {
+        drawn.tick.delay_ticks = 1 - drawn.tick.delay_ticks.min(1);
+    }
+    let mut scenario = Scenario {
+        force_noise_n: spread.disturbance.force_n,
+        torque_noise_n_m: spread.disturbance.torque_n_m,
+        seed,
+        ..scenario(rig, law, spread.duration_s)
+    };
+    if links > 0 {
+        scenario.start = leaning(rig, &angles);
+    }
+    (drawn, scenario)
+}
+
+fn draw_chain(chain: &mut Chain, spread: &Spread, between: &mut impl FnMut(f64) -> f64) {
+    chain.cart.mass_kg *= 1.0 + between(spread.mass);
+    chain.cart.friction_n_s_per_m *= 1.0 + between(spread.friction);
+    for link in &mut chain.links {
+        let (mass, length) = (1.0 + between(spread.mass), 1.0 + between(spread.length));
+        let inertia = (1.0 + between(spread.inertia)) * mass * length * length;
+        let Link { mass_kg, length_m, inertia_kg_m2, .. } = link;
+        *inertia_kg_m2 = Some(inertia * inertia_kg_m2.unwrap_or(*mass_kg * *length_m * *length_m / 12.0));
+        *mass_kg *= mass;
+        *length_m *= length;
+        link.centre_of_mass_m = link.centre_of_mass_m.map(|centre| centre * length);
+        link.friction_n_m_s_per_rad *= 1.0 + between(spread.friction);
+    }
+}
+
+/// Makes `runs` runs with the seeds from `base_seed` on, on all threads; the outcome does not depend on their number. `done`
+/// hears of each run that ends, from any thread.
+///
+/// # Errors
+/// [`Unverifiable`] if a run cannot be started or a setting makes no sense.
+pub fn monte_carlo(
+    rig: &Rig,
+    table: &TableValues,
+    law: Law,
+    spread: &Spread,
+    base_seed: u64,
+    runs: usize,
+    done: &(dyn Fn() + Sync),
+) -> Result<MonteCarlo, Unverifiable> {
+    for (what, share) in [
+        ("mass", spread.mass),
+        ("length", spread.length),
+        ("inertia", spread.inertia),
+        ("friction", spread.friction),
+    ] {
+        within(what, share, 0.0..=0.9, "a share from 0 to 0.9")?;
+    }
+    within("other_delay", spread.other_delay, 0.0..=1.0, "a share from 0 to 1")?;
+    within("tilt_rad", spread.tilt_rad, 0.0..=1.5, "an angle from 0 to 1.5 rad")?;
+    let one = |index: usize| {
+        let seed = base_seed.wrapping_add(index as u64);
+        let (plant, scenario) = sample(rig, law, spread, seed);
+        let outcome = trial(&plant, table, &scenario, &Horizon::default())?;
+        done();
+        Ok(WorstCase { seed, outcome })
+    };
+    let all: Vec<WorstCase> = (0..runs).into_par_iter().map(one).collect::<Result<_, SimulationError>>()?;
+    let stood = all.iter().filter(|case| case.outcome.stands()).count();
+    Ok(MonteCarlo {
+        base_seed,
+        runs,
+        stood,
+        success_rate: stood as f64 / runs.max(1) as f64,
+        interval: wilson(stood, runs),
+        worst: all
+            .into_iter()
+            .reduce(|worst, case| if is_worse(&case.outcome, &worst.outcome) { case } else { worst }),
+    })
+}
+
+/// Whether `a` went worse than `b`: fell earlier, or fell where `b` stood, or, both standing, leaned further.
+pub(super) fn is_worse(a: &Outcome, b: &Outcome) -> bool {
+    match (&a.fall, &b.fall) {
+        (Some(a), Some(b)) => a.at_s < b.at_s,
+        (Some(_), None) => true,
+        (None, Some(_)) => false,
+        (None, None) => a.peak_angle_rad > b.peak_angle_rad,
+    }
+}
+
+/// The 95 % confidence interval of a share of which `successes` of `runs` were seen, after E. B. Wilson, "Probable inference,
+/// the law of succession, and statistical inference", J. Am. Stat. Assoc. 22 (1927) 209-212. It does not shrink to a point
+/// when every run succeeds.
+pub fn wilson(successes: usize, runs: usize) -> [f64; 2] {
+    if runs == 0 {
+        return [0.0, 1.0];
+    }
+    // Of the normal distribution, 95 % lie within ± this.
+    const Z: f64 = 1.959963984540054;
+    let (n, share) = (runs as f64, successes as f64 / runs as f64);
+    let z2 = Z * Z / n;
+    let centre = (share + 0.5 * z2) / (1.0 + z2);
+    let half = Z * (share * (1.0 - share) / n + 0.25 * z2 / n).sqrt() / (1.0 + z2);
+    // All or none seen: the bound there is exact, but for rounding.
+    let low = if successes == 0 { 0.0 } else { centre - half };
+    let high = if successes == runs { 1.0 } else { centre + half };
+    [low, high]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn wilsons_interval_has_its_known_values() {
+        // R: binom::binom.confint(x, n, methods = "wilson")
+        let close = |a: [f64; 2], b: [f64; 2]| (a[0] - b[0]).abs() < 1e-6 && (a[1] - b[1]).abs() < 1e-6;
+        assert!(close(wilson(8, 10), [0.490162, 0.943318]), "{:?}", wilson(8, 10));
+        assert!(close(wilson(10, 10), [0.722467, 1.0]), "{:?}", wilson(10, 10));
+        assert!(close(wilson(0, 10), [0.0, 0.277533]), "{:?}", wilson(0, 10));
+    }
+}

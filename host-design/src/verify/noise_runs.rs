@@ -1,0 +1,159 @@
+//! What encoder steps and disturbances do over a long run.
+
+use rayon::prelude::*;
+use serde::Serialize;
+use upright::table::Law;
+
+use super::trial::{Disturbance, Horizon, Unverifiable, chain, scenario, trial};
+use crate::rig::Rig;
+use crate::simulate::{Scenario, SimulationError, run};
+use crate::table::TableValues;
+
+/// Root mean squares over several runs at rest, after the first tenth of each.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct NoiseRun {
+    /// Runs, each with its own seed from 1.
+    pub seeds: u64,
+    /// How many of them stood to the end; the figures are those of all, up to the fall.
+    pub stood: u64,
+    /// Length of each (s).
+    pub duration_s: f64,
+    /// Force on the cart (N).
+    pub force_rms_n: f64,
+    /// Largest force on the cart (N).
+    pub force_peak_n: f64,
+    /// Each state: position (m) and speed (m/s) of the cart, angle of each joint (rad) and its rate (rad/s).
+    pub state_rms: Vec<f64>,
+    /// Each link's angle from the vertical (rad); empty for a model.
+    pub angle_rms_rad: Vec<f64>,
+    /// Estimate minus true state, each state.
+    pub estimate_error_rms: Vec<f64>,
+}
+
+#[derive(Default)]
+struct Sums {
+    ticks: f64,
+    force: f64,
+    peak: f64,
+    state: Vec<f64>,
+    angle: Vec<f64>,
+    error: Vec<f64>,
+    stands: bool,
+}
+
+/// Measures the root mean squares over runs of `duration_s` with the seeds 1 to `seeds`: nominal plant, set-point 0.
+///
+/// # Errors
+/// [`Unverifiable`] if the runs cannot be started.
+pub fn noise_run(
+    rig: &Rig,
+    table: &TableValues,
+    law: Law,
+    disturbance: &Disturbance,
+    seeds: u64,
+    duration_s: f64,
+) -> Result<NoiseRun, Unverifiable> {
+    let states = rig.states();
+    let links = if chain(rig, "links").is_ok() { states / 2 - 1 } else { 0 };
+    let one = |seed: u64| -> Result<Sums, SimulationError> {
+        let mut sums = Sums {
+            state: vec![0.0; states],
+            error: vec![0.0; states],
+            angle: vec![0.0; links],
+            ..Sums::default()
+        };
+        let fall = run(rig, table, &disturbed(rig, law, disturbance, seed, duration_s), &mut |sample| {
+            sums.peak = sums.peak.max(sample.force.abs());
+            if sample.t < 0.1 * duration_s {
+                return;
+            }
+            sums.ticks += 1.0;
+            sums.force += sample.force * sample.force;
+            for (sum, x) in sums.state.iter_mut().zip(sample.state) {
+                *sum += x * x;
+            }
+            for (sum, (x, estimate)) in sums.error.iter_mut().zip(sample.state.iter().zip(sample.estimate)) {
+                *sum += (estimate - x) * (estimate - x);
+            }
+            let mut phi = 0.0;
+            for (link, sum) in sums.angle.iter_mut().enumerate() {
+                phi += sample.state[2 + 2 * link];
+                *sum += phi * phi;
+            }
+        })?;
+        Ok(Sums { stands: fall.is_none(), ..sums })
+    };
+    let all: Vec<Sums> = (1..=seeds).into_par_iter().map(one).collect::<Result<_, SimulationError>>()?;
+    // In the order of the seeds, whichever thread made them.
+    let ticks: f64 = all.iter().map(|sums| sums.ticks).sum();
+    let rms = |part: &dyn Fn(&Sums) -> f64| (all.iter().map(part).sum::<f64>() / ticks.max(1.0)).sqrt();
+    Ok(NoiseRun {
+        seeds,
+        stood: all.iter().filter(|sums| sums.stands).count() as u64,
+        duration_s,
+        force_rms_n: rms(&|sums| sums.force),
+        force_peak_n: all.iter().map(|sums| sums.peak).fold(0.0, f64::max),
+        state_rms: (0..states).map(|i| rms(&|sums| sums.state[i])).collect(),
+        angle_rms_rad: (0..links).map(|i| rms(&|sums| sums.angle[i])).collect(),
+        estimate_error_rms: (0..states).map(|i| rms(&|sums| sums.error[i])).collect(),
+    })
+}
+
+fn disturbed(rig: &Rig, law: Law, disturbance: &Disturbance, seed: u64, duration_s: f64) -> Scenario {
+    Scenario {
+        force_noise_n: disturbance.force_n,
+        torque_noise_n_m: disturbance.torque_n_m,
+        seed,
+        ..scenario(rig, law, duration_s)
+    }
+}
+
+/// How many long runs stand.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Endurance {
+    /// Runs, with the seeds from 1.
+    pub seeds: u64,
+    /// How many stood to the end.
+    pub stood: u64,
+    /// Length of each (s).
+    pub duration_s: f64,
+    /// The seeds that fell.
+    pub fallen: Vec<u64>,
+    /// Largest angle of any link in any run (rad).
+    pub peak_angle_rad: f64,
+    /// Largest force in any run (N).
+    pub peak_force_n: f64,
+}
+
+/// Runs the nominal plant from rest for `duration_s` with each of the seeds 1 to `seeds`. `done` hears of each run that ends,
+/// from any thread.
+///
+/// # Errors
+/// [`Unverifiable`] if the runs cannot be started.
+pub fn endurance(
+    rig: &Rig,
+    table: &TableValues,
+    law: Law,
+    disturbance: &Disturbance,
+    seeds: u64,
+    duration_s: f64,
+    done: &(dyn Fn() + Sync),
+) -> Result<Endurance, Unverifiable> {
+    let one = |seed: u64| {
+        let scenario = disturbed(rig, law, disturbance, seed, duration_s);
+        let outcome = trial(rig, table, &scenario, &Horizon::default())?;
+        done();
+        Ok((seed, outcome))
+    };
+    let all: Vec<_> = (1..=seeds).into_par_iter().map(one).collect::<Result<_, SimulationError>>()?;
+    let fallen: Vec<u64> =
+        all.iter().filter(|(_, outcome)| outcome.fall.is_some()).map(|&(seed, _)| seed).collect();
+    Ok(Endurance {
+        seeds,
+        stood: seeds - fallen.len() as u64,
+        duration_s,
+        fallen,
+        peak_angle_rad: all.iter().map(|(_, outcome)| outcome.peak_angle_rad).fold(0.0, f64::max),
+        peak_force_n: all.iter().map(|(_, outcome)| outcome.peak_force_n).fold(0.0, f64::max),
+    })
+}

@@ -1,0 +1,252 @@
+//! One run of the loop as it will run, boiled down to what a verdict needs.
+
+use serde::Serialize;
+use upright::table::Law;
+
+use crate::design::DesignError;
+use crate::rig::{Chain, PlantDescription, Rig};
+use crate::simulate::{Fall, Scenario, SimulationError, run};
+use crate::table::{NoTable, TableValues};
+
+/// A question that cannot be put to this rig.
+#[derive(Debug, thiserror::Error)]
+pub enum Unverifiable {
+    /// The runs cannot be started.
+    #[error(transparent)]
+    Simulation(#[from] SimulationError),
+    /// A changed rig, for which gains would have to be made anew, has no design.
+    #[error(transparent)]
+    Design(#[from] DesignError),
+    /// A changed rig makes no table.
+    #[error(transparent)]
+    NoTable(#[from] NoTable),
+    /// Masses, angles and encoders of a `[model]` are not known.
+    #[error("a rig given by [model] has no {0}: describe it by [cart] and [[link]]")]
+    NotAChain(&'static str),
+    /// The controller does not run from encoders.
+    #[error("the rig has no observer: give it its encoders and [kalman]")]
+    NoObserver,
+    /// A setting without sense.
+    #[error("{what} = {value}: give {accepts}")]
+    Setting {
+        /// Which one.
+        what: &'static str,
+        /// Its value.
+        value: f64,
+        /// What would do.
+        accepts: &'static str,
+    },
+}
+
+/// What disturbs the rig in every tick, drawn anew and held for the tick.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Disturbance {
+    /// Force on the cart (N rms).
+    pub force_n: f64,
+    /// Torque at each joint (N·m rms).
+    pub torque_n_m: f64,
+}
+
+impl Disturbance {
+    /// None at all.
+    pub const NONE: Self = Self { force_n: 0.0, torque_n_m: 0.0 };
+
+    /// What the rig file's `[kalman]` expects: an intensity is variance times tick. The joint with the most noise
+    /// stands for all.
+    pub fn of(rig: &Rig) -> Self {
+        let Some(kalman) = &rig.kalman else { return Self::NONE };
+        let rms = |intensity: f64| (intensity / rig.tick.period_s).sqrt();
+        Self {
+            force_n: rms(kalman.force_noise_n2_s),
+            torque_n_m: rms(kalman.joint_noise.iter().copied().fold(0.0, f64::max)),
+        }
+    }
+}
+
+/// How long a run without disturbances lasts and what counts as being back near rest at its end.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Horizon {
+    /// Length of the run (s).
+    pub duration_s: f64,
+    /// Largest angle of any link from the vertical (rad).
+    pub angle_rad: f64,
+    /// Largest distance from the set-point (m, or the unit of a model's output).
+    pub position_m: f64,
+}
+
+impl Default for Horizon {
+    /// 10 s; 2° and 5 cm, far inside of any fall.
+    fn default() -> Self {
+        Self { duration_s: 10.0, angle_rad: 0.035, position_m: 0.05 }
+    }
+}
+
+impl Horizon {
+    /// Wide enough for `law`'s own unrest: encoder steps keep some loops moving by far more than the steps, so that near
+    /// rest is at least twice what a run from rest without disturbances reaches.
+    ///
+    /// # Errors
+    /// Those of [`run`].
+    pub fn widened(self, rig: &Rig, table: &TableValues, law: Law) -> Result<Self, SimulationError> {
+        let rest = trial(rig, table, &scenario(rig, law, 2.0 * self.duration_s), &self)?;
+        if rest.fall.is_some() {
+            return Ok(self);
+        }
+        Ok(Self {
+            angle_rad: self.angle_rad.max(2.0 * rest.peak_angle_rad),
+            position_m: self.position_m.max(2.0 * rest.peak_error_m),
+            ..self
+        })
+    }
+}
+
+/// What became of a run.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Outcome {
+    /// How it was lost, if it was.
+    pub fall: Option<Fall>,
+    /// Time from which on it stayed near rest (s); none if it was not there when the run ended.
+    pub at_rest_after_s: Option<f64>,
+    /// Largest angle of any link from the vertical (rad); 0 for a model.
+    pub peak_angle_rad: f64,
+    /// Largest distance from the set-point (m, or the unit of a model's output).
+    pub peak_error_m: f64,
+    /// Largest force on the cart (N).
+    pub peak_force_n: f64,
+}
+
+impl Outcome {
+    /// No fall: the question where disturbances never let the rig come to rest.
+    pub fn stands(&self) -> bool {
+        self.fall.is_none()
+    }
+
+    /// No fall, and near rest when the run ended.
+    pub fn comes_to_rest(&self) -> bool {
+        self.at_rest_after_s.is_some()
+    }
+}
+
+/// Runs `scenario` on the plant of `rig` with the controller of `table`.
+///
+/// # Errors
+/// Those of [`run`].
+pub fn trial(
+    rig: &Rig,
+    table: &TableValues,
+    scenario: &Scenario,
+    horizon: &Horizon,
+) -> Result<Outcome, SimulationError> {
+    let output = rig.output();
+    let (mut peak_angle_rad, mut peak_error_m, mut peak_force_n) = (0.0f64, 0.0f64, 0.0f64);
+    let mut quiet_since = None;
+    let fall = run(rig, table, scenario, &mut |sample| {
+        let angle = largest_angle(rig, sample.state);
+        let error = (sample.state[output] - sample.target).abs();
+        peak_angle_rad = peak_angle_rad.max(angle);
+        peak_error_m = peak_error_m.max(error);
+        peak_force_n = peak_force_n.max(sample.force.abs());
+        // Not written as "beyond": what is not a number is not near rest either.
+        let quiet = angle <= horizon.angle_rad && error <= horizon.position_m;
+        quiet_since = if quiet { quiet_since.or(Some(sample.t)) } else { None };
+    })?;
+    let at_rest_after_s = quiet_since.filter(|_| fall.is_none());
+    Ok(Outcome { fall, at_rest_after_s, peak_angle_rad, peak_error_m, peak_force_n })
+}
+
+fn largest_angle(rig: &Rig, state: &[f64]) -> f64 {
+    if !matches!(rig.plant, PlantDescription::Chain(_)) {
+        return 0.0;
+    }
+    let mut phi = 0.0;
+    state[2..].chunks_exact(2).fold(0.0, |largest, joint| {
+        phi += joint[0];
+        f64::max(largest, phi.abs())
+    })
+}
+
+/// The rig's run at rest for `horizon`, with integration steps of at most 1 ms: on the fastest rig a run then differs
+/// from one with steps of 0.25 ms by less than 1e-6. Behind a motor the steps are finer, because the back-EMF is held
+/// in each.
+pub(super) fn scenario(rig: &Rig, law: Law, duration_s: f64) -> Scenario {
+    let steps = (rig.tick.period_s / 1e-3 - 1e-9).ceil().clamp(1.0, 1e4) as usize;
+    let finer = if rig.actuator.motor.is_some() { 2 } else { 1 };
+    Scenario { duration_s, substeps: finer * steps, ..Scenario::at_rest(rig, law) }
+}
+
+/// A start at rest with these angles from the vertical (rad).
+pub(super) fn leaning(rig: &Rig, angles: &[f64]) -> Vec<f64> {
+    let mut start = vec![0.0; rig.states()];
+    let mut below = 0.0;
+    for (joint, &angle) in start[2..].chunks_exact_mut(2).zip(angles) {
+        joint[0] = angle - below;
+        below = angle;
+    }
+    start
+}
+
+/// The chain of a rig that has one.
+pub(super) fn chain<'a>(rig: &'a Rig, what: &'static str) -> Result<&'a Chain, Unverifiable> {
+    match &rig.plant {
+        PlantDescription::Chain(chain) => Ok(chain),
+        PlantDescription::Model(_) => Err(Unverifiable::NotAChain(what)),
+    }
+}
+
+/// Refuses a setting that is not within its range.
+pub(super) fn within(
+    what: &'static str,
+    value: f64,
+    range: core::ops::RangeInclusive<f64>,
+    accepts: &'static str,
+) -> Result<(), Unverifiable> {
+    if range.contains(&value) { Ok(()) } else { Err(Unverifiable::Setting { what, value, accepts }) }
+}
+
+/// The last size that stands before the first that was found not to: from `smallest` up by doubling to at most
+/// `largest`, then by bisection to within `relative` of the edge.
+///
+/// An island of standing sizes beyond the first that falls is not looked for: nobody should rely on one.
+pub(super) fn edge<T, E>(
+    [smallest, largest]: [f64; 2],
+    relative: f64,
+    mut stands: impl FnMut(f64) -> Result<Option<T>, E>,
+) -> Result<Option<(f64, T)>, E> {
+    let (mut held, mut size) = (None, smallest.min(largest));
+    let mut lost = loop {
+        match stands(size)? {
+            Some(outcome) => held = Some((size, outcome)),
+            None => break size,
+        }
+        if size >= largest {
+            return Ok(held);
+        }
+        size = (2.0 * size).min(largest);
+    };
+    while let Some(&(standing, _)) = held.as_ref()
+        && lost - standing > relative * standing
+    {
+        let middle = 0.5 * (standing + lost);
+        match stands(middle)? {
+            Some(outcome) => held = Some((middle, outcome)),
+            None => lost = middle,
+        }
+    }
+    Ok(held)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_edge_is_found() {
+        let find = |edge_at: f64| {
+            edge::<_, ()>([1e-3, 1.0], 1e-3, |size| Ok((size <= edge_at).then_some(()))).unwrap()
+        };
+        let (found, ()) = find(0.3).unwrap();
+        assert!((0.2997..=0.3).contains(&found));
+        assert_eq!(find(5.0), Some((1.0, ())));
+        assert_eq!(find(1e-4), None);
+    }
+}
