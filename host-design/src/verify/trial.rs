@@ -83,12 +83,16 @@ impl Default for Horizon {
 
 impl Horizon {
     /// Wide enough for `law`'s own unrest: encoder steps keep some loops moving by far more than the steps, so that near
-    /// rest is at least twice what a run from rest without disturbances reaches.
+    /// rest is at least twice what a run from (all but) rest without disturbances reaches.
     ///
     /// # Errors
     /// Those of [`run`].
     pub fn widened(self, rig: &Rig, table: &TableValues, law: Law) -> Result<Self, SimulationError> {
-        let rest = trial(rig, table, &scenario(rig, law, 2.0 * self.duration_s), &self)?;
+        // A start that no encoder sees, but off the equilibrium: there nothing would ever move.
+        let mut nudged = scenario(rig, law, 2.0 * self.duration_s);
+        let first = if matches!(rig.plant, PlantDescription::Chain(_)) { 2 } else { rig.output() };
+        nudged.start[first] = 1e-6;
+        let rest = trial(rig, table, &nudged, &self)?;
         if rest.fall.is_some() {
             return Ok(self);
         }
