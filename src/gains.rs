@@ -13,7 +13,7 @@ pub const RIG: &str = "quadruple-paper";
 pub const TOOL_VERSION: &str = "0.1.0";
 
 /// Hash of the rig file's values.
-pub const RIG_HASH: u64 = 0x79a2_f825_e0b2_41d0;
+pub const RIG_HASH: u64 = 0x4abd_0ba4_0358_14a6;
 
 /// Control period (s).
 pub const TICK_S: f32 = 0.001;
@@ -367,117 +367,117 @@ pub static TABLE: GainTable<STATES, SENSORS> = GainTable {
             // from the sensor of cart position
             [
                 // to cart position
-                0.30128407,
+                0.331619,
                 // to cart speed
-                78.597565,
+                83.491486,
                 // to angle of link 1
-                9.419247,
+                8.318105,
                 // to angular rate of link 1
-                3174.4602,
+                3026.575,
                 // to angle of link 2
-                -9.371412,
+                -6.682098,
                 // to angular rate of link 2
-                -3678.5522,
+                -3180.2903,
                 // to angle of link 3
-                0.27738777,
+                -1.4950343,
                 // to angular rate of link 3
-                569.87256,
+                135.5937,
                 // to angle of link 4
-                -0.115396604,
+                0.0020083564,
                 // to angular rate of link 4
-                -78.603165,
+                20.28479,
             ],
             // from the sensor of angle of link 1
             [
                 // to cart position
-                0.0016011659,
+                0.0014139842,
                 // to cart speed
-                0.53356355,
+                0.51311487,
                 // to angle of link 1
-                0.102725096,
+                0.11710298,
                 // to angular rate of link 1
-                23.910128,
+                26.379013,
                 // to angle of link 2
-                -0.10443017,
+                -0.1221828,
                 // to angular rate of link 2
-                -29.104786,
+                -34.074883,
                 // to angle of link 3
-                0.012024196,
+                0.011200503,
                 // to angular rate of link 3
-                5.9091587,
+                8.445939,
                 // to angle of link 4
-                -0.00026949373,
+                0.0031852596,
                 // to angular rate of link 4
-                -0.82096523,
+                -0.83744204,
             ],
             // from the sensor of angle of link 2
             [
                 // to cart position
-                -0.0015930346,
+                -0.0011358814,
                 // to cart speed
-                -0.60849375,
+                -0.5343166,
                 // to angle of link 1
-                -0.10443017,
+                -0.1221828,
                 // to angular rate of link 1
-                -28.878258,
+                -33.923145,
                 // to angle of link 2
-                0.17308314,
+                0.22384317,
                 // to angular rate of link 2
-                37.886154,
+                52.212807,
                 // to angle of link 3
-                -0.05711264,
+                -0.09525836,
                 // to angular rate of link 3
-                -10.563474,
+                -22.485628,
                 // to angle of link 4
-                0.005013099,
+                0.007694748,
                 // to angular rate of link 4
-                1.9986143,
+                5.1412654,
             ],
             // from the sensor of angle of link 3
             [
                 // to cart position
-                4.71528e-5,
+                -0.00025413898,
                 // to cart speed
-                0.08840228,
+                0.019720752,
                 // to angle of link 1
-                0.012024196,
+                0.011200503,
                 // to angular rate of link 1
-                5.5009,
+                8.207529,
                 // to angle of link 2
-                -0.05711264,
+                -0.09525836,
                 // to angular rate of link 2
-                -9.910606,
+                -22.10352,
                 // to angle of link 3
-                0.087297484,
+                0.15265201,
                 // to angular rate of link 3
-                6.641664,
+                21.2384,
                 // to angle of link 4
-                -0.029635089,
+                -0.058351077,
                 // to angular rate of link 4
-                -2.7881665,
+                -9.82073,
             ],
             // from the sensor of angle of link 4
             [
                 // to cart position
-                -1.9616122e-5,
+                3.4139796e-7,
                 // to cart speed
-                -0.012380125,
+                0.0034464304,
                 // to angle of link 1
-                -0.00026949373,
+                0.0031852596,
                 // to angular rate of link 1
-                -0.73857456,
+                -0.80105,
                 // to angle of link 2
-                0.005013099,
+                0.007694748,
                 // to angular rate of link 2
-                1.812396,
+                4.998352,
                 // to angle of link 3
-                -0.029635089,
+                -0.058351077,
                 // to angular rate of link 3
-                -2.4369266,
+                -9.568677,
                 // to angle of link 4
-                0.06442645,
+                0.12238921,
                 // to angular rate of link 4
-                2.6573682,
+                10.166408,
             ],
         ]),
         // index of the state that each sensor measures
@@ -499,5 +499,5 @@ pub static TABLE: GainTable<STATES, SENSORS> = GainTable {
     // motor, gear and pulley
     motor: None,
     // CRC-32 of all values above
-    crc: 0xa734_2cfa,
+    crc: 0x22d2_6415,
 };

@@ -23,6 +23,11 @@ pub struct Requirements {
     pub success_percent: f64,
     /// The encoders may be coarser by at least this factor.
     pub encoder_factor: f64,
+    /// Disturbing force, drawn anew each tick, in every simulated run (N rms); none: what `[kalman]` expects. The two
+    /// differ when the observer's noise is raised on purpose, to make it robust.
+    pub force_rms_n: Option<f64>,
+    /// Disturbing torque at each joint likewise (N·m rms).
+    pub torque_rms_n_m: Option<f64>,
 }
 
 impl Default for Requirements {
@@ -38,6 +43,8 @@ impl Default for Requirements {
             corner_percent: 2.0,
             success_percent: 95.0,
             encoder_factor: 1.5,
+            force_rms_n: None,
+            torque_rms_n_m: None,
         }
     }
 }

@@ -50,7 +50,11 @@ pub(super) fn covariance(
         }
     }
     let inputs = noise_columns(rig)?;
-    let intensities = [noise.force_noise_n2_s].into_iter().chain(noise.joint_noise.iter().copied());
+    // The disturbances that the runs of this report use, too; an rms per tick is an intensity over the tick.
+    let real = |rms: Option<f64>, expected: f64| rms.map_or(expected, |rms| rms * rms * rig.tick.period_s);
+    let force = real(rig.verify.force_rms_n, noise.force_noise_n2_s);
+    let joints = noise.joint_noise.iter().map(|&expected| real(rig.verify.torque_rms_n_m, expected));
+    let intensities = [force].into_iter().chain(joints);
     for (i, intensity) in intensities.take(inputs.cols()).enumerate() {
         let column = inputs.block(0, i, inputs.rows(), 1);
         let spread = (&column * &column.transpose()).scaled(&intensity);

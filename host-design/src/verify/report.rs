@@ -130,8 +130,11 @@ fn law_trust(
         tolerances.sort_by(|one, other| one.percent().total_cmp(&other.percent()));
         trust.mass_tolerances = tolerances;
     }
-    stage("random plants");
-    trust.monte_carlo = known(monte_carlo(rig, table, law, &spread(rig), effort.seed, effort.runs, done))?;
+    if is_chain {
+        stage("random plants");
+        trust.monte_carlo =
+            known(monte_carlo(rig, table, law, &spread(rig), effort.seed, effort.runs, done))?;
+    }
     Ok(trust)
 }
 

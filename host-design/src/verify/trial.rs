@@ -51,14 +51,17 @@ impl Disturbance {
     /// None at all.
     pub const NONE: Self = Self { force_n: 0.0, torque_n_m: 0.0 };
 
-    /// What the rig file's `[kalman]` expects: an intensity is variance times tick. The joint with the most noise
-    /// stands for all.
+    /// What the rig file gives in `[verify]`, or else what its `[kalman]` expects: an intensity is variance times tick.
+    /// The joint with the most noise stands for all.
     pub fn of(rig: &Rig) -> Self {
-        let Some(kalman) = &rig.kalman else { return Self::NONE };
         let rms = |intensity: f64| (intensity / rig.tick.period_s).sqrt();
-        Self {
+        let expected = rig.kalman.as_ref().map_or(Self::NONE, |kalman| Self {
             force_n: rms(kalman.force_noise_n2_s),
             torque_n_m: rms(kalman.joint_noise.iter().copied().fold(0.0, f64::max)),
+        });
+        Self {
+            force_n: rig.verify.force_rms_n.unwrap_or(expected.force_n),
+            torque_n_m: rig.verify.torque_rms_n_m.unwrap_or(expected.torque_n_m),
         }
     }
 }

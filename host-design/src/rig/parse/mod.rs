@@ -159,6 +159,8 @@ fn requirements(node: &Node<'_>) -> Result<Requirements, RigError> {
         "corner_percent",
         "success_percent",
         "encoder_factor",
+        "force_rms_n",
+        "torque_rms_n_m",
     ])?;
     let usual = Requirements::default();
     let number = |name, rule, meaning: &str, usual| {
@@ -218,6 +220,16 @@ fn requirements(node: &Node<'_>) -> Result<Requirements, RigError> {
             Rule::POSITIVE,
             "the factor by which encoders may be coarser",
             usual.encoder_factor,
+        )?,
+        force_rms_n: table.number_if_given(
+            "force_rms_n",
+            Rule::NOT_NEGATIVE,
+            "the disturbing force in N rms",
+        )?,
+        torque_rms_n_m: table.number_if_given(
+            "torque_rms_n_m",
+            Rule::NOT_NEGATIVE,
+            "the disturbing torque at each joint in N·m rms",
         )?,
     })
 }
