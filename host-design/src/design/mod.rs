@@ -21,6 +21,6 @@ pub use governor::setpoint_step;
 pub use kalman::Kalman;
 pub use place::{Pole, dominant_pair, place};
 pub use riccati::{Cost, NoStabilisingSolution, Regulator, care, dare, is_stable, is_stable_sampled};
-pub(crate) use synthesis::{OBSERVER, continuous_plant, noise_columns, wanted_poles};
 pub use synthesis::{Design, DesignPoles, Feedback, Laws, Poles};
+pub(crate) use synthesis::{OBSERVER, continuous_plant, noise_columns, wanted_poles};
 pub use zero_order_hold::{integrated_quadratic, sampled_cost, zero_order_hold};

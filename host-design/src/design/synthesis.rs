@@ -102,7 +102,13 @@ impl<R: Real> Design<R> {
             if let Some(integral) = &rig.integral {
                 let weight = R::from_f64(integral.position_weight);
                 let (a_z, b_z) = with_integral(&a, &b, output, &R::one(), &R::zero());
-                let k = lqr(Task::ContinuousIntegral, &a_z, &b_z, &with_integral_weight(&cost, &weight), residuals)?;
+                let k = lqr(
+                    Task::ContinuousIntegral,
+                    &a_z,
+                    &b_z,
+                    &with_integral_weight(&cost, &weight),
+                    residuals,
+                )?;
                 continuous.integral = Some(feedback(k, &a, &b, output));
                 let (a_z, b_z) = with_integral(&ad, &bd, output, &period, &R::one());
                 // z is constant during a tick: its cost over the tick is T w z².
@@ -347,7 +353,10 @@ fn lqr_cost<R: Real>(weights: &Lqr) -> Cost<R> {
 }
 
 /// The poles the rig file asks for.
-pub(crate) fn wanted_poles<R: Real>(placement: &PolePlacement, rig: &Rig) -> Result<Vec<Pole<R>>, DesignError> {
+pub(crate) fn wanted_poles<R: Real>(
+    placement: &PolePlacement,
+    rig: &Rig,
+) -> Result<Vec<Pole<R>>, DesignError> {
     let poles = match placement {
         PolePlacement::Response { overshoot_percent, settling_time_s, far_poles } => {
             let mut poles = vec![Pole::Pair(dominant_pair(*overshoot_percent, *settling_time_s))];

@@ -53,9 +53,8 @@ impl Certificates {
         std::thread::scope(|scope| {
             let draws: Vec<_> = (0..DRAWS).map(|seed| scope.spawn(move || solve(Some(seed)))).collect();
             solved = Some(solve(None));
-            disturbed.extend(
-                draws.into_iter().map(|d| d.join().unwrap_or_else(|p| std::panic::resume_unwind(p))),
-            );
+            disturbed
+                .extend(draws.into_iter().map(|d| d.join().unwrap_or_else(|p| std::panic::resume_unwind(p))));
         });
         let Some(solved) = solved else { return Err(VerifyError::Poles) };
         let (nominal, residuals) = solved?;
@@ -70,7 +69,8 @@ impl Certificates {
             Some(Certificate { gain, bits: certified.bits, residual, condition })
         };
         let residual = |name: &str| residuals.iter().find(|(n, _)| n == name).map_or(f64::NAN, |(_, r)| *r);
-        let in_table = |index: usize| move |d: &Design<W>| d.sampled.in_table()[index].map(|law| law.k.clone());
+        let in_table =
+            |index: usize| move |d: &Design<W>| d.sampled.in_table()[index].map(|law| law.k.clone());
         let task = if nominal.sampled.integral.is_some() { Task::SampledIntegral } else { Task::SampledLqr };
         Ok(Self {
             lqr: certificate(task.to_string(), residual(&task.to_string()), &in_table(0)),

@@ -81,9 +81,8 @@ impl<R: Real> Numbers<R> {
         let values = law_values(table, law)?;
         let exact = |x: f32| R::from_f64(f64::from(x));
         let column = |x: &[f32]| Matrix::from_fn(x.len(), 1, |i, _| exact(x[i]));
-        let rows = |x: &[Vec<f32>]| {
-            Matrix::from_fn(x.len(), x.first().map_or(0, Vec::len), |i, j| exact(x[i][j]))
-        };
+        let rows =
+            |x: &[Vec<f32>]| Matrix::from_fn(x.len(), x.first().map_or(0, Vec::len), |i, j| exact(x[i][j]));
         Some(Self {
             k: column(&values.k).transpose(),
             k_pending: exact(values.k_pending),
@@ -217,8 +216,7 @@ impl<R: Real> ControllerModel<R> {
         let late = numbers.delay_ticks == 1;
         let observed = if numbers.observer.is_some() { s } else { 0 };
         let z = (!numbers.k_integral.is_zero()).then_some(observed);
-        let pending =
-            (late || !numbers.k_pending.is_zero()).then_some(observed + usize::from(z.is_some()));
+        let pending = (late || !numbers.k_pending.is_zero()).then_some(observed + usize::from(z.is_some()));
         let size = observed + usize::from(z.is_some()) + usize::from(pending.is_some());
 
         // x̂ = from_memory ξ + from_sensors y
@@ -327,8 +325,7 @@ impl LoopModel<f64> {
             })
             .collect();
         for k in 0..n {
-            let pivot =
-                (k..n).max_by(|&i, &j| rows[i][k].norm_sqr().total_cmp(&rows[j][k].norm_sqr()))?;
+            let pivot = (k..n).max_by(|&i, &j| rows[i][k].norm_sqr().total_cmp(&rows[j][k].norm_sqr()))?;
             rows.swap(k, pivot);
             let (upper, lower) = rows.split_at_mut(k + 1);
             let pivot_row = &upper[k];

@@ -63,11 +63,7 @@ impl Grid {
     }
 
     /// The largest value of `f` and where it is, every local maximum near the top refined by golden section.
-    pub(super) fn maximum(
-        &self,
-        model: &LoopModel<f64>,
-        f: impl Fn(f64, &Response) -> f64,
-    ) -> (f64, f64) {
+    pub(super) fn maximum(&self, model: &LoopModel<f64>, f: impl Fn(f64, &Response) -> f64) -> (f64, f64) {
         let at = |omega: f64| model.response(omega).map_or(f64::NAN, |r| f(omega, &r));
         let values: Vec<f64> = self.0.iter().map(|&omega| at(omega)).collect();
         let top = values.iter().copied().fold(0.0, f64::max);

@@ -37,30 +37,27 @@ pub(super) fn rounding(
     law: Law,
     spectral_radius: f64,
 ) -> Result<Option<Rounding>, VerifyError> {
-    let (Some(exact), Some(single)) = (
-        Numbers::<f64>::exact(rig, certified, table, law),
-        Numbers::<f64>::of_table(table, law),
-    ) else {
+    let (Some(exact), Some(single)) =
+        (Numbers::<f64>::exact(rig, certified, table, law), Numbers::<f64>::of_table(table, law))
+    else {
         return Ok(None);
     };
-    let pair = |exact: f64, single: f64| ulp(exact, single);
     let mut gain_ulp = largest_ulp(&exact.k, &single.k);
-    for (exact, single) in [
-        (exact.k_pending, single.k_pending),
-        (exact.k_integral, single.k_integral),
-        (exact.n, single.n),
-    ] {
-        gain_ulp = gain_ulp.max(pair(exact, single));
+    for (exact, single) in
+        [(exact.k_pending, single.k_pending), (exact.k_integral, single.k_integral), (exact.n, single.n)]
+    {
+        gain_ulp = gain_ulp.max(ulp(exact, single));
     }
     let observers = exact.observer.as_ref().zip(single.observer.as_ref());
     // In f64 the eigenvalues of a loop this stiff are not good enough to see the change.
     let wide = |numbers: Option<Numbers<Wide<128>>>| {
         numbers.map(|numbers| radius(&LoopModel::with_numbers(certified, &numbers))).transpose()
     };
-    let change = match (wide(Numbers::of_table(table, law))?, wide(Numbers::exact(rig, certified, table, law))?) {
-        (Some(single), Some(exact)) => single - exact,
-        _ => 0.0,
-    };
+    let change =
+        match (wide(Numbers::of_table(table, law))?, wide(Numbers::exact(rig, certified, table, law))?) {
+            (Some(single), Some(exact)) => single - exact,
+            _ => 0.0,
+        };
     let difference = if spectral_radius < 1.0 {
         force_difference(rig, table, law, &exact, spectral_radius)?
     } else {
@@ -76,7 +73,12 @@ pub(super) fn rounding(
 }
 
 fn largest_ulp(exact: &Matrix<f64>, single: &Matrix<f64>) -> f64 {
-    exact.entries().iter().zip(single.entries()).map(|(&exact, &single)| ulp(exact, single)).fold(0.0, f64::max)
+    exact
+        .entries()
+        .iter()
+        .zip(single.entries())
+        .map(|(&exact, &single)| ulp(exact, single))
+        .fold(0.0, f64::max)
 }
 
 /// `|single - exact|` in units of the last place of an `f32` in the binade of `exact`. `exact` is itself rounded to
@@ -103,7 +105,7 @@ fn force_difference(
     if exact.observer.is_none() {
         scenario.sensing = crate::simulate::Sensing::FullState;
     }
-    let mut shadow = Shadow::new(exact, table, law);
+    let mut shadow = Shadow::new(exact, table);
     let (mut largest, mut peak) = (0.0f64, 0.0f64);
     let fall = run(rig, table, &scenario, &mut |sample| {
         let force = shadow.tick(sample);
@@ -125,7 +127,7 @@ struct Shadow<'a> {
 }
 
 impl<'a> Shadow<'a> {
-    fn new(numbers: &'a Numbers<f64>, table: &TableValues, _law: Law) -> Self {
+    fn new(numbers: &'a Numbers<f64>, table: &TableValues) -> Self {
         let motor = table.motor.map(|motor| MotorMap {
             volts_per_newton: motor.volts_per_newton,
             volts_per_speed: motor.volts_per_speed,
@@ -178,9 +180,10 @@ impl<'a> Shadow<'a> {
             self.integral += moved;
         }
         self.pending = applied;
-        self.predicted = numbers.observer.as_ref().map(|observer| {
-            &(&observer.ad * &x) + &observer.bd.scaled(&during_this_tick)
-        });
+        self.predicted = numbers
+            .observer
+            .as_ref()
+            .map(|observer| &(&observer.ad * &x) + &observer.bd.scaled(&during_this_tick));
         force
     }
 
