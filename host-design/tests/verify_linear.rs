@@ -82,6 +82,16 @@ fn radius_with_delay(model: &LoopModel<f64>, ticks: usize) -> f64 {
     spectral_radius(&late).unwrap()
 }
 
+/// Predicted RMS of the force caused by all encoders (N).
+fn encoder_force_n(rig: &Rig, certified: &Certified, table: &TableValues, of: Law) -> f64 {
+    let reports = linear(rig, certified, table).unwrap();
+    let report = reports.iter().find(|report| law(report) == of).unwrap();
+    let shares = report.noise.as_ref().unwrap().iter();
+    let squares =
+        shares.filter(|share| share.source.starts_with("encoder")).map(|share| share.force_n.powi(2));
+    squares.sum::<f64>().sqrt()
+}
+
 #[test]
 fn the_model_of_the_loop_moves_as_the_firmware_does() {
     for (delay, further) in [("0", ""), ("1", ""), ("1", "[integral]\nposition_weight = 50\n")] {
@@ -104,9 +114,15 @@ fn the_model_of_the_loop_moves_as_the_firmware_does() {
                 peak = peak.max(force.abs());
                 state = &model.matrix * &state;
             }
-            // Half an encoder step, 5e-9, times the filter's gain on rates (1/T = 200 1/s at most) and K: a few 1e-5 of
-            // the force; f32 is finer. A wrong tick of delay or a lost term is a hundred times more.
-            assert!(worst < 1e-3 * peak, "{law:?} {delay} {further}: {worst:e} of {peak}");
+            // All that is left is the encoders' rounding, with the RMS that the noise model predicts for it (f32 is finer).
+            // A wrong tick of delay or a lost term is a hundred times more.
+            let rounding = encoder_force_n(&rig, &certified, &table, law);
+            println!("{law:?} {delay} {further:?}: worst {worst:e}, rounding {rounding:e} rms, peak {peak}");
+            assert!(
+                worst < 8.0 * rounding,
+                "{law:?} {delay} {further}: {worst:e}, rounding {rounding:e} rms"
+            );
+            assert!(8.0 * rounding < 0.02 * peak, "{law:?} {delay} {further}: {rounding:e} of {peak}");
             assert!(peak > 0.01);
         }
     }
