@@ -117,7 +117,6 @@ fn the_model_of_the_loop_moves_as_the_firmware_does() {
             // All that is left is the encoders' rounding, with the RMS that the noise model predicts for it (f32 is finer).
             // A wrong tick of delay or a lost term is a hundred times more.
             let rounding = encoder_force_n(&rig, &certified, &table, law);
-            println!("{law:?} {delay} {further:?}: worst {worst:e}, rounding {rounding:e} rms, peak {peak}");
             assert!(
                 worst < 8.0 * rounding,
                 "{law:?} {delay} {further}: {worst:e}, rounding {rounding:e} rms"

@@ -4,6 +4,7 @@ mod certificate;
 mod covariance;
 mod loop_model;
 mod margins;
+mod response;
 mod rounding;
 mod tick;
 
@@ -18,8 +19,9 @@ use crate::table::TableValues;
 
 pub use certificate::Certificate;
 pub use covariance::NoiseShare;
-pub use loop_model::{ControllerModel, LoopModel, PlantModel, Response};
+pub use loop_model::{ControllerModel, LoopModel, PlantModel};
 pub use margins::Margins;
+pub use response::Response;
 pub use rounding::Rounding;
 pub use tick::TickLimits;
 
