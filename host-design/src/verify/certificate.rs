@@ -32,6 +32,8 @@ pub struct Certificate {
 }
 
 type W = Wide<256>;
+/// A design and the residual of each of its Riccati equations.
+type Solved = (Design<W>, Vec<(String, f64)>);
 const DRAWS: u64 = 3;
 const CHANGE: f64 = 1e-20;
 
@@ -44,7 +46,7 @@ pub(super) struct Certificates {
 
 impl Certificates {
     pub(super) fn of(rig: &Rig, certified: &Certified) -> Result<Self, VerifyError> {
-        let solve = |draw: Option<u64>| -> Result<(Design<W>, Named), VerifyError> {
+        let solve = |draw: Option<u64>| -> Result<Solved, VerifyError> {
             let mut plant = continuous_plant::<W>(rig)?;
             if let Some(seed) = draw {
                 disturb(&mut plant, seed);

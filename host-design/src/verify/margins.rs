@@ -4,7 +4,8 @@ use core::f64::consts::PI;
 
 use serde::Serialize;
 
-use super::loop_model::{ControllerModel, LoopModel, Numbers, PlantModel, Response};
+use super::loop_model::{ControllerModel, LoopModel, Numbers, PlantModel};
+use super::response::Response;
 use super::{VerifyError, radius};
 use crate::design::Certified;
 use crate::numerics::eigenvalues;

@@ -42,12 +42,11 @@ pub(super) fn rounding(
     else {
         return Ok(None);
     };
-    let pair = |exact: f64, single: f64| ulp(exact, single);
     let mut gain_ulp = largest_ulp(&exact.k, &single.k);
     for (exact, single) in
         [(exact.k_pending, single.k_pending), (exact.k_integral, single.k_integral), (exact.n, single.n)]
     {
-        gain_ulp = gain_ulp.max(pair(exact, single));
+        gain_ulp = gain_ulp.max(ulp(exact, single));
     }
     let observers = exact.observer.as_ref().zip(single.observer.as_ref());
     // In f64 the eigenvalues of a loop this stiff are not good enough to see the change.
@@ -106,7 +105,7 @@ fn force_difference(
     if exact.observer.is_none() {
         scenario.sensing = crate::simulate::Sensing::FullState;
     }
-    let mut shadow = Shadow::new(exact, table, law);
+    let mut shadow = Shadow::new(exact, table);
     let (mut largest, mut peak) = (0.0f64, 0.0f64);
     let fall = run(rig, table, &scenario, &mut |sample| {
         let force = shadow.tick(sample);
@@ -128,7 +127,7 @@ struct Shadow<'a> {
 }
 
 impl<'a> Shadow<'a> {
-    fn new(numbers: &'a Numbers<f64>, table: &TableValues, _law: Law) -> Self {
+    fn new(numbers: &'a Numbers<f64>, table: &TableValues) -> Self {
         let motor = table.motor.map(|motor| MotorMap {
             volts_per_newton: motor.volts_per_newton,
             volts_per_speed: motor.volts_per_speed,
