@@ -11,9 +11,6 @@ use crate::numerics::{Matrix, Real, Wide, eigenvalues};
 use crate::plant::LinearModel;
 use crate::rig::Rig;
 
-/// A figure for each gain by its name.
-type Named = Vec<(String, f64)>;
-
 /// Evidence for one gain of the table.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Certificate {
