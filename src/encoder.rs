@@ -36,12 +36,12 @@ impl<const NY: usize> Encoders<NY> {
     pub fn update(&mut self, raw: &[u32; NY]) {
         let follow = self.widths.iter().zip(&mut self.last).zip(&mut self.position).zip(raw);
         for (((width, last), position), &raw) in follow {
-            let unused = match width {
-                CounterWidth::Bits16 => 16,
-                CounterWidth::Bits32 => 0,
+            let moved = raw.wrapping_sub(*last);
+            let moved = match width {
+                // The cast keeps the low 16 bits: the distance modulo the counter's range, with its sign.
+                CounterWidth::Bits16 => i32::from(moved as i16),
+                CounterWidth::Bits32 => moved as i32,
             };
-            // The distance modulo the counter's range, with the sign of its highest bit.
-            let moved = (raw.wrapping_sub(*last) << unused) as i32 >> unused;
             *last = raw;
             *position = position.wrapping_add(moved);
         }

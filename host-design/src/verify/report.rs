@@ -57,18 +57,20 @@ pub struct Check {
 }
 
 /// How much effort goes into the report.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Effort {
     /// Monte Carlo runs for each law.
     pub runs: usize,
     /// Seed of the first of them.
     pub seed: u64,
+    /// Share of them in which the force comes one tick later than designed for.
+    pub late: f64,
 }
 
-/// How random plants are drawn for `rig`: by its `[verify]`.
-pub fn spread(rig: &Rig) -> Spread {
+/// How random plants are drawn for `rig`: by its `[verify]`, a share `late` of them with one more tick of delay.
+pub fn spread(rig: &Rig, late: f64) -> Spread {
     let share = rig.verify.spread_percent / 100.0;
-    Spread { mass: share, length: share, inertia: share, ..Spread::of(rig) }
+    Spread { mass: share, length: share, inertia: share, other_delay: late, ..Spread::of(rig) }
 }
 
 /// Makes the report. `done` is called after each Monte Carlo run, `stage` before each part.
@@ -133,7 +135,7 @@ fn law_trust(
     if is_chain {
         stage("random plants");
         trust.monte_carlo =
-            known(monte_carlo(rig, table, law, &spread(rig), effort.seed, effort.runs, done))?;
+            known(monte_carlo(rig, table, law, &spread(rig, effort.late), effort.seed, effort.runs, done))?;
     }
     Ok(trust)
 }

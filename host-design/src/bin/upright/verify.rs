@@ -57,9 +57,16 @@ pub(crate) struct Verify {
     /// With --replay: write every tick as CSV
     #[arg(long, value_name = "FILE", requires = "replay")]
     csv: Option<PathBuf>,
-    /// Make no report, but a map of the starts (angle and rate of link 1) from which the loop recovers, as CSV
+    /// Make no report, but a map of the starts from which the loop recovers, as CSV
     #[arg(long, value_name = "FILE", conflicts_with = "replay")]
     map: Option<PathBuf>,
+    /// With --map: its two states, as index:from:to (SI; state order x, xdot, theta1, theta1dot …)
+    #[arg(long, value_name = "S:A:B", num_args = 2, value_delimiter = ',', requires = "map", allow_negative_numbers = true,
+          value_parser = axis, default_values = ["2:-0.5:0.5", "3:-4:4"])]
+    axes: Vec<Axis>,
+    /// Share of the random plants in which the force comes one tick later than designed for (0 to 1)
+    #[arg(long, value_name = "SHARE", default_value_t = 0.0, value_parser = share)]
+    late: f64,
     /// Print the report as one JSON object
     #[arg(long)]
     json: bool,
@@ -84,6 +91,29 @@ impl LawName {
 enum Gains {
     Sampled,
     Continuous,
+}
+
+/// Starts along each axis of a map.
+const POINTS: usize = 41;
+
+fn axis(text: &str) -> Result<Axis, String> {
+    let accepted = || "give index:from:to, such as 2:-0.5:0.5".to_owned();
+    let mut parts = text.split(':');
+    let mut next = || parts.next().ok_or_else(accepted);
+    let state = next()?.parse().map_err(|_| accepted())?;
+    let from: f64 = next()?.parse().map_err(|_| accepted())?;
+    let to: f64 = next()?.parse().map_err(|_| accepted())?;
+    if !(from.is_finite() && to.is_finite() && from < to) {
+        return Err("give a range from a smaller to a larger finite number".to_owned());
+    }
+    Ok(Axis { state, range: [from, to], points: POINTS })
+}
+
+fn share(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(share) if (0.0..=1.0).contains(&share) => Ok(share),
+        _ => Err("give a number from 0 to 1".to_owned()),
+    }
 }
 
 impl Verify {
@@ -124,7 +154,7 @@ impl Verify {
                 .unwrap_or_else(|_| ProgressStyle::default_bar()),
         );
         bar.enable_steady_tick(std::time::Duration::from_millis(120));
-        let effort = Effort { runs: self.runs as usize, seed: self.seed };
+        let effort = Effort { runs: self.runs as usize, seed: self.seed, late: self.late };
         let report =
             trust(&rig, &certified, &table, effort, &|stage| bar.set_message(stage.to_owned()), &|| {
                 bar.inc(1)
@@ -154,7 +184,7 @@ impl Verify {
     }
 
     fn replay(&self, rig: &Rig, table: &TableValues, law: Law, seed: u64) -> Result<(), Failure> {
-        let (plant, scenario) = sample(rig, law, &spread(rig), seed);
+        let (plant, scenario) = sample(rig, law, &spread(rig, self.late), seed);
         let (trace, summary) = with_spinner("simulating", || simulate(&plant, table, &scenario))?;
         if let Some(path) = &self.csv {
             let mut bytes = Vec::new();
@@ -174,30 +204,36 @@ impl Verify {
         }
     }
 
-    /// Rows of rate, columns of angle; the time to come near rest, or nothing.
+    /// A line for each start: both states and the time to come near rest, or nothing.
     fn map(&self, rig: &Rig, table: &TableValues, path: &std::path::Path) -> Result<(), Failure> {
         let law = if table.lqr.is_some() { Law::Lqr } else { Law::PolePlacement };
-        let axes = [
-            Axis { state: 2, range: [-0.5, 0.5], points: 41 },
-            Axis { state: 3, range: [-4.0, 4.0], points: 41 },
-        ];
-        let bar = ProgressBar::new(41 * 41).with_message("starts");
+        let &[across, down] = self.axes.as_slice() else {
+            return Err(Failure::BadArgument("--axes: give two".to_owned()));
+        };
+        let axes = [across, down];
+        if axes.iter().any(|axis| axis.state >= rig.states()) || across.state == down.state {
+            return Err(Failure::BadArgument(format!(
+                "--axes: give two different states from 0 to {}",
+                rig.states() - 1
+            )));
+        }
+        let bar = ProgressBar::new((POINTS * POINTS) as u64).with_message("starts");
         let map = attraction_map(rig, table, law, axes, &Horizon::default(), &|| bar.inc(1))?;
         bar.finish_and_clear();
-        let [across, down] = axes.map(|axis| {
+        let [columns, rows] = axes.map(|axis| {
             let step = (axis.range[1] - axis.range[0]) / (axis.points - 1) as f64;
             (0..axis.points).map(|i| axis.range[0] + step * i as f64).collect::<Vec<f64>>()
         });
-        let mut csv = String::from("theta1_rad,theta1dot_rad_per_s,settled_s\n");
-        for (rate, row) in down.iter().zip(&map.settled_s) {
-            for (angle, settled) in across.iter().zip(row) {
+        let mut csv = format!("state{},state{},settled_s\n", across.state, down.state);
+        for (second, row) in rows.iter().zip(&map.settled_s) {
+            for (first, settled) in columns.iter().zip(row) {
                 let settled = settled.map_or(String::new(), |time| time.to_string());
-                csv.push_str(&format!("{angle:.6},{rate:.6},{settled}\n"));
+                csv.push_str(&format!("{first:.6},{second:.6},{settled}\n"));
             }
         }
         write_atomically(path, csv.as_bytes())?;
         let recovered = map.settled_s.iter().flatten().flatten().count();
-        println!("recovers from {recovered} of {} starts; written to {}", 41 * 41, path.display());
+        println!("recovers from {recovered} of {} starts; written to {}", POINTS * POINTS, path.display());
         Ok(())
     }
 }

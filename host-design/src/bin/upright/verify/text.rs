@@ -28,7 +28,7 @@ fn write_report(out: &mut String, rig: &Rig, report: &TrustReport, file: &str) -
     }
     writeln!(out, "\nrequirements")?;
     for check in &report.checks {
-        let found = check.found.map_or("no limit".to_owned(), number);
+        let found = check.found.map_or(if check.holds { "no limit" } else { "none" }.to_owned(), number);
         let verdict = if check.holds { "ok" } else { "FAILS" };
         writeln!(
             out,
