@@ -5,6 +5,7 @@ mod design;
 mod failure;
 mod progress;
 mod simulate;
+mod variation;
 mod verify;
 
 use std::process::ExitCode;

@@ -4,15 +4,14 @@ use std::io::Write;
 use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
-use host_design::design::design;
 use host_design::rig::{PlantDescription, Rig};
 use host_design::simulate::{Scenario, Sensing, Summary, Trace, simulate, svg};
-use host_design::table::{self, TableValues, write_atomically};
+use host_design::table::write_atomically;
 use serde_json::json;
-use upright::table::Law;
 
 use crate::failure::Failure;
 use crate::progress::with_spinner;
+use crate::variation::{LawName, Variation, finite, not_negative, positive};
 
 /// Runs the firmware's own controller against the nonlinear plant; exit status 1 when it falls.
 #[derive(Args)]
@@ -24,15 +23,12 @@ Examples:
   upright simulate rigs/quadruple-paper.toml --tick 0.005 --gains continuous --tilt 0.001   falls
   upright simulate rigs/quadruple-paper.toml --csv - | head")]
 pub(crate) struct Simulate {
-    /// Rig file (TOML)
-    rig: PathBuf,
+    #[command(flatten)]
+    variation: Variation,
 
     /// Control law
     #[arg(long, value_enum, default_value_t = LawName::Lqr)]
     law: LawName,
-    /// Which gains: those designed for the tick, or those for continuous time
-    #[arg(long, value_enum, default_value_t = Gains::Sampled)]
-    gains: Gains,
     /// Length of the run (s)
     #[arg(long, default_value_t = 10.0, value_name = "S", allow_negative_numbers = true, value_parser = positive)]
     duration: f64,
@@ -70,16 +66,6 @@ pub(crate) struct Simulate {
     #[arg(long, default_value_t = 4, value_parser = clap::value_parser!(u16).range(1..=1000))]
     substeps: u16,
 
-    /// Control period instead of the rig's (s); the gains are designed anew
-    #[arg(long, value_name = "S", value_parser = period)]
-    tick: Option<f64>,
-    /// Delay instead of the rig's (ticks); the gains are designed anew
-    #[arg(long, value_name = "TICKS", value_parser = clap::value_parser!(u8).range(0..=1))]
-    delay: Option<u8>,
-    /// Force limit instead of the rig's (N)
-    #[arg(long, value_name = "N", value_parser = positive)]
-    force_limit: Option<f64>,
-
     /// Write every tick as CSV to a file, or to stdout with `-`
     #[arg(long, value_name = "FILE")]
     csv: Option<PathBuf>,
@@ -89,18 +75,6 @@ pub(crate) struct Simulate {
     /// Print the summary as one JSON object
     #[arg(long)]
     json: bool,
-}
-
-#[derive(Clone, Copy, ValueEnum)]
-enum LawName {
-    Lqr,
-    PolePlacement,
-}
-
-#[derive(Clone, Copy, PartialEq, ValueEnum)]
-enum Gains {
-    Sampled,
-    Continuous,
 }
 
 #[derive(Clone, Copy, ValueEnum)]
@@ -115,50 +89,10 @@ enum Disturbances {
     Paper,
 }
 
-fn finite(text: &str) -> Result<f64, String> {
-    match text.parse::<f64>() {
-        Ok(value) if value.is_finite() => Ok(value),
-        _ => Err("give a finite number".to_owned()),
-    }
-}
-
-pub(crate) fn positive(text: &str) -> Result<f64, String> {
-    finite(text)
-        .and_then(|value| if value > 0.0 { Ok(value) } else { Err("give a number above 0".to_owned()) })
-}
-
-fn not_negative(text: &str) -> Result<f64, String> {
-    finite(text).and_then(|value| {
-        if value >= 0.0 { Ok(value) } else { Err("give a number of at least 0".to_owned()) }
-    })
-}
-
-pub(crate) fn period(text: &str) -> Result<f64, String> {
-    finite(text).and_then(|value| {
-        if (1e-6..=10.0).contains(&value) {
-            Ok(value)
-        } else {
-            Err("give a period from 1e-6 to 10 s".to_owned())
-        }
-    })
-}
-
 impl Simulate {
     pub(crate) fn run(self) -> Result<(), Failure> {
-        let mut rig = Rig::from_path(&self.rig)?;
-        rig.tick.period_s = self.tick.unwrap_or(rig.tick.period_s);
-        rig.tick.delay_ticks = self.delay.unwrap_or(rig.tick.delay_ticks);
-        rig.actuator.force_limit_n = self.force_limit.or(rig.actuator.force_limit_n);
+        let (rig, _, table) = self.variation.designed()?;
         let scenario = self.scenario(&rig)?;
-        let name = || self.rig.display().to_string();
-        let certified = with_spinner("designing", || design(&rig))
-            .map_err(|source| Failure::Design { rig: name(), source })?;
-        let gains = match self.gains {
-            Gains::Sampled => table::Gains::Sampled,
-            Gains::Continuous => table::Gains::Continuous,
-        };
-        let table = TableValues::of(&rig, &certified, gains)
-            .map_err(|source| Failure::NoTable { rig: name(), source })?;
         let table = if self.raw_step { table.without_governor() } else { table };
         let (trace, summary) = with_spinner("simulating", || simulate(&rig, &table, &scenario))?;
         self.write(&rig, &trace, &summary)?;
@@ -169,10 +103,7 @@ impl Simulate {
     }
 
     fn scenario(&self, rig: &Rig) -> Result<Scenario, Failure> {
-        let law = match self.law {
-            LawName::Lqr => Law::Lqr,
-            LawName::PolePlacement => Law::PolePlacement,
-        };
+        let law = self.law.law();
         let mut scenario = Scenario::at_rest(rig, law);
         if let Some(sensing) = self.sensing {
             scenario.sensing = match sensing {

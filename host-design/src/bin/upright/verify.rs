@@ -3,17 +3,17 @@
 use std::io::Write;
 use std::path::PathBuf;
 
-use clap::{Args, ValueEnum};
-use host_design::design::design;
+use clap::Args;
 use host_design::rig::Rig;
 use host_design::simulate::simulate;
-use host_design::table::{self, TableValues, write_atomically};
+use host_design::table::{TableValues, write_atomically};
 use host_design::verify::{Axis, Effort, Horizon, TrustReport, attraction_map, sample, spread, trust};
 use indicatif::{ProgressBar, ProgressStyle};
 use upright::table::Law;
 
 use crate::failure::Failure;
 use crate::progress::with_spinner;
+use crate::variation::{LawName, Variation};
 
 mod text;
 
@@ -28,8 +28,8 @@ Examples:
   upright verify rigs/single-quanser-ip02.toml --map tilt.csv       from which angle and rate of link 1 it recovers
   upright verify rigs/quadruple-paper.toml --gains continuous --tick 0.003         fails: not even stable")]
 pub(crate) struct Verify {
-    /// Rig file (TOML)
-    rig: PathBuf,
+    #[command(flatten)]
+    variation: Variation,
     /// Monte Carlo runs for each law
     #[arg(long, default_value_t = 200, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
     runs: u32,
@@ -39,18 +39,6 @@ pub(crate) struct Verify {
     /// Only this law
     #[arg(long, value_enum)]
     law: Option<LawName>,
-    /// Which gains: those designed for the tick, or those for continuous time
-    #[arg(long, value_enum, default_value_t = Gains::Sampled)]
-    gains: Gains,
-    /// Control period instead of the rig's (s); the gains are designed anew
-    #[arg(long, value_name = "S", value_parser = crate::simulate::period)]
-    tick: Option<f64>,
-    /// Delay instead of the rig's (ticks); the gains are designed anew
-    #[arg(long, value_name = "TICKS", value_parser = clap::value_parser!(u8).range(0..=1))]
-    delay: Option<u8>,
-    /// Force limit instead of the rig's (N)
-    #[arg(long, value_name = "N", value_parser = crate::simulate::positive)]
-    force_limit: Option<f64>,
     /// Make no report, but the single Monte Carlo run of this seed again
     #[arg(long, value_name = "SEED", requires = "law")]
     replay: Option<u64>,
@@ -70,27 +58,6 @@ pub(crate) struct Verify {
     /// Print the report as one JSON object
     #[arg(long)]
     json: bool,
-}
-
-#[derive(Clone, Copy, PartialEq, ValueEnum)]
-enum LawName {
-    Lqr,
-    PolePlacement,
-}
-
-impl LawName {
-    fn law(self) -> Law {
-        match self {
-            LawName::Lqr => Law::Lqr,
-            LawName::PolePlacement => Law::PolePlacement,
-        }
-    }
-}
-
-#[derive(Clone, Copy, ValueEnum)]
-enum Gains {
-    Sampled,
-    Continuous,
 }
 
 /// Starts along each axis of a map.
@@ -118,19 +85,7 @@ fn share(text: &str) -> Result<f64, String> {
 
 impl Verify {
     pub(crate) fn run(self) -> Result<(), Failure> {
-        let mut rig = Rig::from_path(&self.rig)?;
-        rig.tick.period_s = self.tick.unwrap_or(rig.tick.period_s);
-        rig.tick.delay_ticks = self.delay.unwrap_or(rig.tick.delay_ticks);
-        rig.actuator.force_limit_n = self.force_limit.or(rig.actuator.force_limit_n);
-        let name = || self.rig.display().to_string();
-        let certified = with_spinner("designing", || design(&rig))
-            .map_err(|source| Failure::Design { rig: name(), source })?;
-        let gains = match self.gains {
-            Gains::Sampled => table::Gains::Sampled,
-            Gains::Continuous => table::Gains::Continuous,
-        };
-        let mut table = TableValues::of(&rig, &certified, gains)
-            .map_err(|source| Failure::NoTable { rig: name(), source })?;
+        let (rig, certified, mut table) = self.variation.designed()?;
         match self.law {
             Some(LawName::Lqr) => table.pole_placement = None,
             Some(LawName::PolePlacement) => table.lqr = None,
@@ -169,7 +124,7 @@ impl Verify {
             serde_json::to_writer(&mut out, report).map_err(std::io::Error::from)?;
             writeln!(out)?;
         } else {
-            write!(out, "{}", text::report(rig, report, &self.rig.display().to_string()))?;
+            write!(out, "{}", text::report(rig, report, &self.variation.rig.display().to_string()))?;
         }
         let failed: Vec<String> = report
             .checks
