@@ -10,7 +10,7 @@ const SHARE: f64 = 0.5;
 const LINEAR_ZONE_RAD: f64 = 0.35;
 
 /// The largest change of the set-point per tick (m) with which, in the linear model, no motion of the set-point takes a
-/// link or the force beyond [`SHARE`] of its limit; none for a model that is not a chain, or without such a bound.
+/// link or the force beyond half of its limit; none for a model that is not a chain, or without such a bound.
 ///
 /// The set-point's path is a sum of small steps, one per tick, so the response is the same sum of step responses:
 /// `|θ(k)| <= step · Σ_j |s(j)|` with the unit step response s. This is the criterion the paper says is missing for
