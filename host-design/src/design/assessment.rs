@@ -32,11 +32,11 @@ impl Certified {
         for (law, assessment) in assessments.iter_mut().enumerate() {
             let (exact, single) = (design.sampled.in_table()[law], self.single.sampled.in_table()[law]);
             if let (Some(continuous), Some(exact), Some(single)) =
-                (design.continuous.each()[law], exact, single)
+                (design.continuous.in_table()[law], exact, single)
             {
                 let rounded = Feedback { k: single.k.map(|&gain| f64::from(gain)), ..exact.clone() };
                 // A continuous gain knows nothing of a force on its way.
-                let mut held = Matrix::zeros(1, design.ad.cols() + usize::from(rig.tick.delay_ticks));
+                let mut held = Matrix::zeros(1, continuous.k.cols() + usize::from(rig.tick.delay_ticks));
                 for j in 0..continuous.k.cols() {
                     held[(0, j)] = continuous.k[(0, j)];
                 }
@@ -44,7 +44,7 @@ impl Certified {
                     exact: radius(exact)?,
                     rounded: radius(&rounded)?,
                     largest_rounding: largest_relative_difference(&exact.k, &rounded.k),
-                    continuous_at_tick: radius(&Feedback { k: held, n: None, integral: false })?,
+                    continuous_at_tick: radius(&Feedback { k: held, ..continuous.clone() })?,
                 });
             }
         }

@@ -145,14 +145,26 @@ impl<R: Real> Design<R> {
         let of = |a: Matrix<R>| -> Result<Poles, DesignError> {
             Ok(eigenvalues(&a).map_err(|_| DesignError::Poles)?.iter().map(Complex::to_f64).collect())
         };
-        let continuous =
-            |law: &Option<Feedback<R>>| law.as_ref().map(|law| of(&self.a - &(&self.b * &law.k))).transpose();
+        let continuous = |law: &Option<Feedback<R>>| {
+            law.as_ref().map(|law| of(self.continuous_loop(rig, law))).transpose()
+        };
         let sampled =
             |law: &Option<Feedback<R>>| law.as_ref().map(|law| of(self.sampled_loop(rig, law))).transpose();
         Ok(DesignPoles {
             continuous: [continuous(&self.continuous.lqr)?, continuous(&self.continuous.pole_placement)?],
             sampled: [sampled(&self.sampled.lqr)?, sampled(&self.sampled.pole_placement)?],
+            integral: [continuous(&self.continuous.integral)?, sampled(&self.sampled.integral)?],
         })
+    }
+
+    /// The closed loop of the continuous plant with `law`: of x, and z with integral action.
+    fn continuous_loop(&self, rig: &Rig, law: &Feedback<R>) -> Matrix<R> {
+        let (a, b) = if law.integral {
+            with_integral(&self.a, &self.b, rig.output(), &R::one(), &R::zero())
+        } else {
+            (self.a.clone(), self.b.clone())
+        };
+        &a - &(&b * &law.k)
     }
 
     /// The closed loop of the sampled plant with `law`: of x, and z with integral action, and the force on its way with
@@ -180,6 +192,21 @@ pub struct DesignPoles {
     pub continuous: [Option<Poles>; 2],
     /// Sampled loops.
     pub sampled: [Option<Poles>; 2],
+    /// [continuous, sampled] loop of the LQR with integral action.
+    pub integral: [Option<Poles>; 2],
+}
+
+impl DesignPoles {
+    /// [continuous, sampled] poles of the law that is number `law` in the table (LQR with integral action, if there is
+    /// such a design).
+    pub fn in_table(&self, law: usize) -> [Option<&Poles>; 2] {
+        let with_integral = |integral: &'_ Option<Poles>| law == 0 && integral.is_some();
+        let [continuous, sampled] = &self.integral;
+        [
+            if with_integral(continuous) { continuous.as_ref() } else { self.continuous[law].as_ref() },
+            if with_integral(sampled) { sampled.as_ref() } else { self.sampled[law].as_ref() },
+        ]
+    }
 }
 
 /// Poles as [re, im], by real part.

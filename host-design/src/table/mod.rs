@@ -141,7 +141,7 @@ impl TableValues {
         let single = &design.single;
         let laws = match gains {
             Gains::Sampled => single.sampled.in_table(),
-            Gains::Continuous => single.continuous.each(),
+            Gains::Continuous => single.continuous.in_table(),
         };
         // The governor's step comes from the loop the law was designed for.
         let steps = design

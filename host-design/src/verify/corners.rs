@@ -76,7 +76,7 @@ pub struct Corners {
 }
 
 /// With more links than this there are too many corners to try.
-const MOST_LINKS: usize = 9;
+pub(super) const MOST_LINKS: usize = 9;
 
 /// The rig with its masses, cart first, changed by `percent` times `factors`. An inertia that the rig file gives stays; one that
 /// it leaves to the default follows the mass.

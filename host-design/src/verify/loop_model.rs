@@ -151,7 +151,7 @@ pub(super) fn exact_law<'c>(
     let k = &law_values(table, law)?.k;
     let pairs = [
         (certified.single.sampled.in_table(), certified.double.sampled.in_table()),
-        (certified.single.continuous.each(), certified.double.continuous.each()),
+        (certified.single.continuous.in_table(), certified.double.continuous.in_table()),
     ];
     pairs.into_iter().find_map(|(single, double)| {
         single[index].filter(|single| single.k.entries().starts_with(k)).and(double[index])

@@ -3,6 +3,7 @@
 use serde::Serialize;
 use upright::table::Law;
 
+use super::corners::MOST_LINKS;
 use super::{
     Attraction, AttractionSettings, CoarsestEncoder, CornerSettings, Corners, Disturbance, EncoderSettings,
     LinearReport, MassTolerance, MonteCarlo, NoiseRun, Spread, Unverifiable, VerifyError, attraction,
@@ -124,7 +125,8 @@ fn law_trust(
         stage("coarsest encoder");
         trust.coarsest_encoder = known(coarsest_encoder(rig, law, &EncoderSettings::of(rig)))?;
     }
-    if is_chain {
+    // Beyond that there are too many corners to try them all.
+    if is_chain && rig.states() / 2 - 1 <= MOST_LINKS {
         stage("wrong masses");
         let settings = CornerSettings::of(rig);
         trust.corners = known(corners(rig, table, law, rig.verify.corner_percent, &settings))?;

@@ -120,7 +120,7 @@ fn report(
 
 /// Of the continuous loop (s).
 fn slowest_time_constant(rig: &Rig, certified: &Certified, law: usize) -> f64 {
-    let poles = certified.poles.continuous[law].as_deref().unwrap_or_default();
+    let poles = certified.poles.in_table(law)[0].map(Vec::as_slice).unwrap_or_default();
     let slowest = poles.iter().map(|pole| -pole[0]).fold(f64::INFINITY, f64::min);
     if slowest > 0.0 && slowest.is_finite() { 1.0 / slowest } else { rig.tick.period_s }
 }

@@ -52,6 +52,23 @@ impl LawName {
 }
 
 impl Variation {
+    /// The rig file and all changes as they would be typed again.
+    pub(crate) fn as_typed(&self) -> String {
+        let mut typed = self.rig.display().to_string();
+        if let GainsName::Continuous = self.gains {
+            typed.push_str(" --gains continuous");
+        }
+        let mut option = |name: &str, value: Option<String>| {
+            if let Some(value) = value {
+                typed.push_str(&format!(" --{name} {value}"));
+            }
+        };
+        option("tick", self.tick.map(|tick| tick.to_string()));
+        option("delay", self.delay.map(|delay| delay.to_string()));
+        option("force-limit", self.force_limit.map(|limit| limit.to_string()));
+        typed
+    }
+
     /// The rig with its changes, its design, and the table with the gains asked for.
     pub(crate) fn designed(&self) -> Result<(Rig, Certified, TableValues), Failure> {
         let mut rig = Rig::from_path(&self.rig)?;

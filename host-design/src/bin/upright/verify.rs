@@ -118,13 +118,19 @@ impl Verify {
         self.print(&rig, &report?)
     }
 
+    /// What a replay has to repeat.
+    fn as_typed(&self) -> String {
+        let late = if self.late == 0.0 { String::new() } else { format!(" --late {}", self.late) };
+        self.variation.as_typed() + &late
+    }
+
     fn print(&self, rig: &Rig, report: &TrustReport) -> Result<(), Failure> {
         let mut out = std::io::stdout().lock();
         if self.json {
             serde_json::to_writer(&mut out, report).map_err(std::io::Error::from)?;
             writeln!(out)?;
         } else {
-            write!(out, "{}", text::report(rig, report, &self.variation.rig.display().to_string()))?;
+            write!(out, "{}", text::report(rig, report, &self.as_typed()))?;
         }
         let failed: Vec<String> = report
             .checks

@@ -32,11 +32,12 @@ fn write_design(
     for report in reports {
         let index = report.index;
         writeln!(out, "\n{}", report.name)?;
-        if let Some(law) = certified.double.continuous.each()[index] {
-            write_law(out, "continuous", "s", law, certified.poles.continuous[index].as_deref())?;
+        let [poles, sampled_poles] = certified.poles.in_table(index);
+        if let Some(law) = certified.double.continuous.in_table()[index] {
+            write_law(out, "continuous", "s", law, poles)?;
         }
-        if let Some(law) = certified.double.sampled.each()[index] {
-            write_law(out, "sampled", "z", law, certified.poles.sampled[index].as_deref())?;
+        if let Some(law) = certified.double.sampled.in_table()[index] {
+            write_law(out, "sampled", "z", law, sampled_poles)?;
         }
         let assessment = &report.assessment;
         writeln!(
@@ -58,7 +59,7 @@ fn write_law(
     name: &str,
     plane: &str,
     law: &Feedback<f64>,
-    poles: Option<&[[f64; 2]]>,
+    poles: Option<&Vec<[f64; 2]>>,
 ) -> core::fmt::Result {
     let k: Vec<String> = law.k.entries().iter().map(|&gain| short(gain)).collect();
     writeln!(out, "  {name}")?;
@@ -70,6 +71,7 @@ fn write_law(
     )?;
     // A conjugate pair is named once.
     let poles: Vec<String> = poles
+        .map(Vec::as_slice)
         .unwrap_or_default()
         .iter()
         .filter(|pole| pole[1] >= 0.0)
