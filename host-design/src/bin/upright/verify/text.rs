@@ -48,6 +48,15 @@ fn linear(out: &mut String, rig: &Rig, law: &LawTrust) -> core::fmt::Result {
         "spectral radius",
         &format!("{:.6}{}", part.spectral_radius, if part.stable { "" } else { "  NOT STABLE" }),
     )?;
+    let poles: Vec<String> = part
+        .poles
+        .iter()
+        .filter(|pole| pole[1] >= 0.0)
+        .map(|&[re, im]| if im == 0.0 { number(re) } else { format!("{}±{}i", number(re), number(im)) })
+        .collect();
+    for (index, poles) in poles.chunks(5).enumerate() {
+        line(out, if index == 0 { "poles" } else { "" }, &poles.join("  "))?;
+    }
     if let Some(margins) = &part.margins {
         let highest = margins.highest_gain.map_or("any".to_owned(), number);
         line(
