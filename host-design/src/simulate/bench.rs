@@ -19,6 +19,7 @@ pub struct Bench {
     random: Pcg64,
     force_noise: Normal<f64>,
     torque_noise: Normal<f64>,
+    force_offset: f64,
     torques: Vec<f64>,
     state: Vec<f64>,
     period_s: f64,
@@ -42,6 +43,8 @@ impl Bench {
             let possible = level.is_finite() && level >= 0.0;
             Normal::new(0.0, level).ok().filter(|_| possible).ok_or(SimulationError::Noise(level))
         };
+        let finite =
+            |offset: f64| if offset.is_finite() { Ok(offset) } else { Err(SimulationError::Offset(offset)) };
         Ok(Self {
             torques: vec![0.0; plant.disturbances()],
             plant,
@@ -51,6 +54,7 @@ impl Bench {
             random: Pcg64::seed_from_u64(scenario.seed),
             force_noise: noise(scenario.force_noise_n)?,
             torque_noise: noise(scenario.torque_noise_n_m)?,
+            force_offset: finite(scenario.force_offset_n)?,
             state: scenario.start.clone(),
             period_s: rig.tick.period_s,
             substeps: scenario.substeps.max(1),
@@ -78,7 +82,7 @@ impl Bench {
     /// without the disturbance (N).
     pub fn tick(&mut self, drive: Drive) -> f64 {
         let now = if self.delay { std::mem::replace(&mut self.on_its_way, drive) } else { drive };
-        let disturbance = self.force_noise.sample(&mut self.random);
+        let disturbance = self.force_offset + self.force_noise.sample(&mut self.random);
         let (torque_noise, random) = (&self.torque_noise, &mut self.random);
         self.torques.fill_with(|| torque_noise.sample(random));
         let at_start = self.force(now);

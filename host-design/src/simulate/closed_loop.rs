@@ -31,6 +31,9 @@ pub enum SimulationError {
     /// A standard deviation that is negative or not finite.
     #[error("a noise level of {0} is not possible: give a number of at least 0")]
     Noise(f64),
+    /// A disturbing force that is not finite.
+    #[error("a constant force of {0} N is not possible: give a finite number")]
+    Offset(f64),
     /// A run whose record would not fit into memory.
     #[error("a run of {duration_s} s has more than {MAX_TICKS} ticks of {period_s} s: shorten it")]
     TooLong {

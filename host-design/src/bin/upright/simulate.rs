@@ -63,6 +63,9 @@ pub(crate) struct Simulate {
     /// Disturbing torque at each joint, drawn anew each tick (N·m rms)
     #[arg(long, value_name = "NM", value_parser = not_negative)]
     torque_noise: Option<f64>,
+    /// Constant disturbing force on the cart, as from a tilted rail (N)
+    #[arg(long, default_value_t = 0.0, value_name = "N", allow_negative_numbers = true, value_parser = finite)]
+    force_offset: f64,
     /// Seed of the disturbances
     #[arg(long, default_value_t = 1)]
     seed: u64,
