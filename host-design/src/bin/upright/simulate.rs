@@ -208,7 +208,8 @@ impl Simulate {
             || !self.tilt.is_empty()
             || !matches!(self.disturbances, Disturbances::None)
             || self.force_noise.is_some()
-            || self.torque_noise.is_some();
+            || self.torque_noise.is_some()
+            || self.force_offset != 0.0;
         if !pushed {
             // At exact rest even a hopeless loop stands.
             let acceptance = Scenario::acceptance(rig, law, 1.0);
@@ -229,6 +230,7 @@ impl Simulate {
             step_at_s: self.step_at,
             force_noise_n: self.force_noise.unwrap_or(force),
             torque_noise_n_m: self.torque_noise.unwrap_or(torque),
+            force_offset_n: self.force_offset,
             seed: self.seed,
             substeps: self.substeps.into(),
             ..scenario
