@@ -126,6 +126,16 @@ fn too_small_a_force_fails_where_it_is_about_tilt_or_runs() {
 }
 
 #[test]
+fn a_requirement_without_any_value_that_meets_it_is_not_called_unlimited() {
+    let weak = ["--runs", "1", "--law", "lqr", "--force-limit", "0.05"];
+    let output = verify(&rig_path("quadruple-paper"), &weak, None);
+    let text = String::from_utf8(output.stdout).unwrap();
+    let encoder = text.lines().find(|line| line.contains("encoder_factor")).unwrap();
+    assert!(encoder.contains("FAILS") && encoder.contains("none"), "{encoder}");
+    assert!(!text.lines().any(|line| line.contains("FAILS") && line.contains("no limit")), "{text}");
+}
+
+#[test]
 fn a_threshold_of_the_rig_file_decides() {
     let text = "[limits]\nangle_rad = 0.35";
     let strict = format!("[verify]\nphase_margin_deg = 80\n{text}");

@@ -28,7 +28,8 @@ fn write_report(out: &mut String, rig: &Rig, report: &TrustReport, file: &str) -
     }
     writeln!(out, "\nrequirements")?;
     for check in &report.checks {
-        let found = check.found.map_or("no limit".to_owned(), number);
+        let missing = if check.holds { "no limit" } else { "none" };
+        let found = check.found.map_or(missing.to_owned(), number);
         let verdict = if check.holds { "ok" } else { "FAILS" };
         writeln!(
             out,
