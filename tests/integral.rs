@@ -34,6 +34,7 @@ fn pulled(rig: &Rig, sensing: Sensing, force_n: f64) -> Scenario {
         force_offset_n: force_n,
         step_m: 0.1,
         duration_s: 40.0,
+        substeps: 2,
         ..Scenario::at_rest(rig, Law::Lqr)
     }
 }
