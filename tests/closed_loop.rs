@@ -5,17 +5,14 @@ mod bench;
 use bench::*;
 use host_design::simulate::{Bench, Scenario, Summary, simulate};
 use upright::controller::Controller;
-use upright::encoder::CounterWidth;
-use upright::gains::{RIG_HASH, SENSORS, STATES, TABLE, TICK_S};
+use upright::gains::{RIG_HASH, STATES, TABLE, TICK_S};
 use upright::table::{Build, Law};
-
-const WIDTHS: [CounterWidth; SENSORS] = [CounterWidth::Bits32; SENSORS];
 
 /// `gains::TABLE` in the firmware's own controller, in the plainest loop there is; every state at every tick.
 fn firmware_alone(scenario: &Scenario) -> Vec<[f64; STATES]> {
     let rig = rig_of_the_firmware();
     let build = Build { rig_hash: RIG_HASH, tick_s: TICK_S };
-    let mut controller = Controller::new(&TABLE, &build, WIDTHS).unwrap();
+    let mut controller = Controller::new(&TABLE, &build, Bench::widths()).unwrap();
     let mut bench = Bench::new(&rig, scenario).unwrap();
     controller.select(scenario.law).unwrap();
     controller.set_setpoint(scenario.step_m as f32).unwrap();

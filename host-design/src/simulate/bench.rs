@@ -4,6 +4,7 @@ use rand::SeedableRng;
 use rand_distr::{Distribution, Normal};
 use rand_pcg::Pcg64;
 use upright::actuator::Drive;
+use upright::encoder::CounterWidth;
 
 use super::closed_loop::SimulationError;
 use super::scenario::Scenario;
@@ -19,6 +20,7 @@ pub struct Bench {
     random: Pcg64,
     force_noise: Normal<f64>,
     torque_noise: Normal<f64>,
+    force_offset: f64,
     torques: Vec<f64>,
     state: Vec<f64>,
     period_s: f64,
@@ -42,6 +44,8 @@ impl Bench {
             let possible = level.is_finite() && level >= 0.0;
             Normal::new(0.0, level).ok().filter(|_| possible).ok_or(SimulationError::Noise(level))
         };
+        let finite =
+            |offset: f64| if offset.is_finite() { Ok(offset) } else { Err(SimulationError::Offset(offset)) };
         Ok(Self {
             torques: vec![0.0; plant.disturbances()],
             plant,
@@ -51,6 +55,7 @@ impl Bench {
             random: Pcg64::seed_from_u64(scenario.seed),
             force_noise: noise(scenario.force_noise_n)?,
             torque_noise: noise(scenario.torque_noise_n_m)?,
+            force_offset: finite(scenario.force_offset_n)?,
             state: scenario.start.clone(),
             period_s: rig.tick.period_s,
             substeps: scenario.substeps.max(1),
@@ -64,21 +69,32 @@ impl Bench {
         &self.state
     }
 
-    /// What the hardware counters show, as many as the firmware reads; 16-bit counters show their low bits.
+    /// Widths of the hardware counters, as on the board: 32 bits for the cart, 16 for the links.
+    pub fn widths<const NY: usize>() -> [CounterWidth; NY] {
+        core::array::from_fn(|sensor| if sensor == 0 { CounterWidth::Bits32 } else { CounterWidth::Bits16 })
+    }
+
+    /// What the hardware counters show, as many as the firmware reads.
     pub fn counters<const NY: usize>(&self) -> [u32; NY] {
         let mut counters = [0; NY];
-        for (counter, &(state, step)) in counters.iter_mut().zip(&self.sensors) {
+        let shown = counters.iter_mut().zip(Self::widths::<NY>()).zip(&self.sensors);
+        for ((counter, width), &(state, step)) in shown {
             let counts = libm::round(self.state[state] / step) as i64;
-            *counter = self.counter_start.wrapping_add(counts as u32);
+            *counter = shown_by(width, self.counter_start.wrapping_add(counts as u32));
         }
         counters
+    }
+
+    /// What they show at position 0: where homing found them.
+    pub fn counters_at_zero<const NY: usize>(&self) -> [u32; NY] {
+        Self::widths::<NY>().map(|width| shown_by(width, self.counter_start))
     }
 
     /// Lets one tick pass with the command `drive` of its start; gives the force on the cart at the start of the tick,
     /// without the disturbance (N).
     pub fn tick(&mut self, drive: Drive) -> f64 {
         let now = if self.delay { std::mem::replace(&mut self.on_its_way, drive) } else { drive };
-        let disturbance = self.force_noise.sample(&mut self.random);
+        let disturbance = self.force_offset + self.force_noise.sample(&mut self.random);
         let (torque_noise, random) = (&self.torque_noise, &mut self.random);
         self.torques.fill_with(|| torque_noise.sample(random));
         let at_start = self.force(now);
@@ -108,5 +124,13 @@ impl Bench {
             }
             (Drive::Duty(_), None) => 0.0,
         }
+    }
+}
+
+/// The low bits that a counter of this width has.
+fn shown_by(width: CounterWidth, counts: u32) -> u32 {
+    match width {
+        CounterWidth::Bits16 => counts & 0xffff,
+        CounterWidth::Bits32 => counts,
     }
 }

@@ -2,7 +2,6 @@
 
 use nalgebra::SVector;
 use upright::controller::{Controller, Rejected};
-use upright::encoder::CounterWidth;
 use upright::table::TableError;
 
 use super::bench::Bench;
@@ -31,6 +30,9 @@ pub enum SimulationError {
     /// A standard deviation that is negative or not finite.
     #[error("a noise level of {0} is not possible: give a number of at least 0")]
     Noise(f64),
+    /// A disturbing force that is not finite.
+    #[error("a constant force of {0} N is not possible: give a finite number")]
+    Offset(f64),
     /// A run whose record would not fit into memory.
     #[error("a run of {duration_s} s has more than {MAX_TICKS} ticks of {period_s} s: shorten it")]
     TooLong {
@@ -104,12 +106,7 @@ impl WithSize for Run<'_> {
     fn run<const NX: usize, const NY: usize>(self) -> Self::Output {
         let Self { rig, table: values, scenario, observe } = self;
         let table = values.table::<NX, NY>();
-        // As on the board: the cart's counter has 32 bits, those of the links 16.
-        let widths =
-            core::array::from_fn(
-                |sensor| if sensor == 0 { CounterWidth::Bits32 } else { CounterWidth::Bits16 },
-            );
-        let mut controller = Controller::new(&table, &values.build(), widths)?;
+        let mut controller = Controller::new(&table, &values.build(), Bench::widths())?;
         controller.select(scenario.law)?;
         let mut bench = Bench::new(rig, scenario)?;
         let full_state = |bench: &Bench| SVector::from_fn(|i, _| bench.state()[i] as f32);
@@ -117,7 +114,7 @@ impl WithSize for Run<'_> {
             Sensing::FullState => controller.start_in_state(&full_state(&bench)),
             Sensing::Encoders => {
                 // Homed where the counters show `counter_start`.
-                controller.encoders_mut().home(&[scenario.counter_start; NY], &[0; NY]);
+                controller.encoders_mut().home(&bench.counters_at_zero(), &[0; NY]);
                 controller.start(&bench.counters())?;
             }
         }

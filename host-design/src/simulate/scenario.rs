@@ -23,6 +23,8 @@ pub struct Scenario {
     pub force_noise_n: f64,
     /// Standard deviation of the disturbing torque at each joint, drawn anew each tick (N·m).
     pub torque_noise_n_m: f64,
+    /// Constant disturbing force on the cart (N): a tilted rail, a cable that pulls.
+    pub force_offset_n: f64,
     /// Seed of the disturbances.
     pub seed: u64,
     /// Integration steps per tick.
@@ -52,6 +54,7 @@ impl Scenario {
             step_at_s: 0.0,
             force_noise_n: 0.0,
             torque_noise_n_m: 0.0,
+            force_offset_n: 0.0,
             seed: 1,
             substeps: 4,
             counter_start: 0,

@@ -72,7 +72,7 @@ impl Design {
         } else {
             write!(out, "{}", text::design(&rig, &certified, &reports))?;
         }
-        for warning in text::warnings(&rig, &certified, &reports) {
+        for warning in text::warnings(&rig, &certified, &reports, table.as_ref().ok()) {
             eprintln!("warning: {warning}");
         }
         if self.no_write {

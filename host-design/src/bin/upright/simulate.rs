@@ -59,6 +59,9 @@ pub(crate) struct Simulate {
     /// Disturbing torque at each joint, drawn anew each tick (N·m rms)
     #[arg(long, value_name = "NM", value_parser = not_negative)]
     torque_noise: Option<f64>,
+    /// Constant disturbing force on the cart, as from a tilted rail (N)
+    #[arg(long, default_value_t = 0.0, value_name = "N", allow_negative_numbers = true, value_parser = finite)]
+    force_offset: f64,
     /// Seed of the disturbances
     #[arg(long, default_value_t = 1)]
     seed: u64,
@@ -136,7 +139,8 @@ impl Simulate {
             || !self.tilt.is_empty()
             || !matches!(self.disturbances, Disturbances::None)
             || self.force_noise.is_some()
-            || self.torque_noise.is_some();
+            || self.torque_noise.is_some()
+            || self.force_offset != 0.0;
         if !pushed {
             // At exact rest even a hopeless loop stands.
             let acceptance = Scenario::acceptance(rig, law, 1.0);
@@ -157,6 +161,7 @@ impl Simulate {
             step_at_s: self.step_at,
             force_noise_n: self.force_noise.unwrap_or(force),
             torque_noise_n_m: self.torque_noise.unwrap_or(torque),
+            force_offset_n: self.force_offset,
             seed: self.seed,
             substeps: self.substeps.into(),
             ..scenario

@@ -3,7 +3,8 @@
 use core::fmt::Write;
 
 use host_design::design::{Certified, Feedback};
-use host_design::rig::Rig;
+use host_design::rig::{PlantDescription, Rig};
+use host_design::table::{LawValues, TableValues};
 
 use super::LawReport;
 
@@ -95,7 +96,12 @@ fn wrapped(items: &[String]) -> String {
 }
 
 /// What a user should know before flashing.
-pub(super) fn warnings(rig: &Rig, certified: &Certified, reports: &[LawReport]) -> Vec<String> {
+pub(super) fn warnings(
+    rig: &Rig,
+    certified: &Certified,
+    reports: &[LawReport],
+    table: Option<&TableValues>,
+) -> Vec<String> {
     let mut warnings = Vec::new();
     for LawReport { name, assessment, .. } in reports {
         if assessment.continuous_at_tick >= 1.0 {
@@ -117,6 +123,14 @@ pub(super) fn warnings(rig: &Rig, certified: &Certified, reports: &[LawReport]) 
         warnings.push(
             "no constant input holds the output away from 0: N is 0 in the table, set-points have no effect"
                 .to_owned(),
+        );
+    }
+    let ungoverned = |law: &LawValues| law.setpoint_step == f32::MAX && law.n != 0.0;
+    if let Some(table) = table.filter(|_| matches!(rig.plant, PlantDescription::Chain(_)))
+        && [&table.lqr, &table.pole_placement].into_iter().flatten().any(ungoverned)
+    {
+        warnings.push(
+            "the loop is too slow for a bound on its step response: the set-point is not governed".to_owned(),
         );
     }
     if rig.force_limit_n().is_none() {
