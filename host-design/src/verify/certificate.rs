@@ -18,19 +18,18 @@ pub struct Certificate {
     pub gain: String,
     /// The two precisions (bits) that gave the same `f32` and `f64`.
     pub bits: [usize; 2],
-    /// Of an LQR or Kalman gain: what is left when the 256-bit solution is put into its Riccati equation, relative to
+    /// Of an LQR or Kalman gain: what is left when the solution is put into its Riccati equation, relative to
     /// the sum of the norms of the terms. Of a pole placement: the largest distance of a requested pole from the
-    /// nearest pole of the 256-bit loop.
+    /// nearest pole of the loop.
     pub residual: f64,
     /// Largest relative change of the gain per relative change of the plant: `max |ΔK| / max |K| / 1e-20` for
     /// independent random changes up to 1e-20 (relative) of every entry of A and B that is neither 0 nor 1, the worst
-    /// of three draws at 256 bits. An estimate from below.
+    /// of three draws. An estimate from below.
     pub condition: f64,
 }
 
-type W = Wide<256>;
 /// A design and the residual of each of its Riccati equations.
-type Solved = (Design<W>, Vec<(String, f64)>);
+type Solved<const BITS: usize> = (Design<Wide<BITS>>, Vec<(String, f64)>);
 const DRAWS: u64 = 3;
 const CHANGE: f64 = 1e-20;
 
@@ -42,9 +41,19 @@ pub(super) struct Certificates {
 }
 
 impl Certificates {
+    /// Solves again at the lower of the two precisions that agreed.
     pub(super) fn of(rig: &Rig, certified: &Certified) -> Result<Self, VerifyError> {
-        let solve = |draw: Option<u64>| -> Result<Solved, VerifyError> {
-            let mut plant = continuous_plant::<W>(rig)?;
+        match certified.bits[0] {
+            256 => Self::at_precision::<256>(rig, certified),
+            512 => Self::at_precision::<512>(rig, certified),
+            1024 => Self::at_precision::<1024>(rig, certified),
+            _ => Self::at_precision::<2048>(rig, certified),
+        }
+    }
+
+    fn at_precision<const BITS: usize>(rig: &Rig, certified: &Certified) -> Result<Self, VerifyError> {
+        let solve = |draw: Option<u64>| -> Result<Solved<BITS>, VerifyError> {
+            let mut plant = continuous_plant::<Wide<BITS>>(rig)?;
             if let Some(seed) = draw {
                 disturb(&mut plant, seed);
             }
@@ -60,19 +69,20 @@ impl Certificates {
         });
         let Some(solved) = solved else { return Err(VerifyError::Poles) };
         let (nominal, residuals) = solved?;
-        let disturbed: Vec<Design<W>> =
+        let disturbed: Vec<Design<Wide<BITS>>> =
             disturbed.into_iter().map(|d| d.map(|(design, _)| design)).collect::<Result<_, _>>()?;
-        let certificate = |gain: String, residual: f64, k: &dyn Fn(&Design<W>) -> Option<Matrix<W>>| {
-            let base = k(&nominal)?;
-            let changes = disturbed.iter().filter_map(k).map(|changed| {
-                (&changed - &base).largest_entry().to_f64() / base.largest_entry().to_f64() / CHANGE
-            });
-            let condition = changes.fold(0.0, f64::max);
-            Some(Certificate { gain, bits: certified.bits, residual, condition })
-        };
+        let certificate =
+            |gain: String, residual: f64, k: &dyn Fn(&Design<Wide<BITS>>) -> Option<Matrix<Wide<BITS>>>| {
+                let base = k(&nominal)?;
+                let changes = disturbed.iter().filter_map(k).map(|changed| {
+                    (&changed - &base).largest_entry().to_f64() / base.largest_entry().to_f64() / CHANGE
+                });
+                let condition = changes.fold(0.0, f64::max);
+                Some(Certificate { gain, bits: certified.bits, residual, condition })
+            };
         let residual = |name: &str| residuals.iter().find(|(n, _)| n == name).map_or(f64::NAN, |(_, r)| *r);
         let in_table =
-            |index: usize| move |d: &Design<W>| d.sampled.in_table()[index].map(|law| law.k.clone());
+            |index: usize| move |d: &Design<Wide<BITS>>| d.sampled.in_table()[index].map(|law| law.k.clone());
         let task = if nominal.sampled.integral.is_some() { Task::SampledIntegral } else { Task::SampledLqr };
         Ok(Self {
             lqr: certificate(task.to_string(), residual(&task.to_string()), &in_table(0)),
@@ -94,29 +104,29 @@ impl Certificates {
     }
 }
 
-fn disturb(plant: &mut LinearModel<W>, seed: u64) {
+fn disturb<R: Real>(plant: &mut LinearModel<R>, seed: u64) {
     let mut random = Pcg64::seed_from_u64(seed);
-    let mut change = |entry: &W| {
+    let mut change = |entry: &R| {
         let factor: f64 = random.random_range(-1.0..1.0);
-        let kept = entry.is_zero() || *entry == W::one();
-        if kept { entry.clone() } else { entry.clone() * &(W::one() + &W::from_f64(factor * CHANGE)) }
+        let kept = entry.is_zero() || *entry == R::one();
+        if kept { entry.clone() } else { entry.clone() * &(R::one() + &R::from_f64(factor * CHANGE)) }
     };
     plant.a = plant.a.map(&mut change);
     plant.b = plant.b.map(&mut change);
 }
 
-fn pole_error(rig: &Rig, design: &Design<W>) -> Result<f64, VerifyError> {
+fn pole_error<R: Real>(rig: &Rig, design: &Design<R>) -> Result<f64, VerifyError> {
     let Laws { pole_placement: Some(law), .. } = &design.sampled else { return Ok(f64::NAN) };
     let Some(placement) = &rig.pole_placement else { return Ok(f64::NAN) };
-    let period = W::from_f64(rig.tick.period_s);
+    let period = R::from_f64(rig.tick.period_s);
     let found = eigenvalues(&design.sampled_loop(rig, law)).map_err(|_| VerifyError::Poles)?;
     let mut worst = 0.0f64;
-    for pole in wanted_poles::<W>(placement, rig)? {
+    for pole in wanted_poles::<R>(placement, rig)? {
         let (re, im) = match pole.sampled(&period) {
-            Pole::Real(re) => (re, W::zero()),
+            Pole::Real(re) => (re, R::zero()),
             Pole::Pair(p) => (p.re, p.im),
         };
-        let distance = |p: &crate::numerics::Complex<W>| {
+        let distance = |p: &crate::numerics::Complex<R>| {
             crate::numerics::Complex { re: p.re.clone() - &re, im: p.im.clone() - &im }.modulus().to_f64()
         };
         worst = worst.max(found.iter().map(distance).fold(f64::INFINITY, f64::min));
