@@ -1,7 +1,8 @@
 //! The guard that makes every gain the correctly rounded exact answer.
 
 use super::error::DesignError;
-use super::synthesis::{Design, DesignPoles};
+use super::loops::DesignPoles;
+use super::synthesis::Design;
 use crate::numerics::Wide;
 use crate::rig::Rig;
 
