@@ -1,5 +1,7 @@
 //! From force to motor duty, and back to the force that is really applied.
 
+use serde::{Deserialize, Serialize};
+
 use crate::state_feedback::saturate;
 
 /// A DC motor behind gear and pulley, as seen by the cart.
@@ -18,7 +20,7 @@ pub struct MotorMap {
 }
 
 /// What goes to the power stage.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub enum Drive {
     /// A force (N), for rigs without motor data.
     Force(f32),

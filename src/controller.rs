@@ -1,6 +1,7 @@
 //! The controller: one tick from encoder counts to motor duty.
 
 use nalgebra::SVector;
+use serde::{Deserialize, Serialize};
 
 use crate::actuator::Drive;
 use crate::encoder::{CounterWidth, Encoders};
@@ -39,7 +40,7 @@ pub struct Command {
 }
 
 /// A request the controller does not follow; what was set before stays.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Rejected {
     /// The table holds no gains for this law.
     NoSuchLaw,

@@ -28,10 +28,20 @@
 
 #![no_std]
 
+#[cfg(test)]
+extern crate std;
+
 pub mod actuator;
 pub mod controller;
 pub mod encoder;
+pub mod fault;
+pub mod firmware;
+pub mod frame;
 pub mod gains;
+pub mod io;
+pub mod link;
+pub mod message;
 pub mod observer;
 pub mod state_feedback;
+pub mod supervisor;
 pub mod table;

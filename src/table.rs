@@ -2,6 +2,7 @@
 
 use crc::{CRC_32_ISO_HDLC, Crc, Digest, NoTable};
 use nalgebra::{ArrayStorage, SMatrix};
+use serde::{Deserialize, Serialize};
 
 use crate::actuator::MotorMap;
 use crate::observer::ObserverGains;
@@ -50,7 +51,7 @@ pub const fn columns<const R: usize, const C: usize>(entries: [[f32; R]; C]) -> 
 }
 
 /// Which of the table's control laws is used.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Law {
     /// Linear quadratic regulator.
     Lqr,
