@@ -123,9 +123,10 @@ impl<const NY: usize> Detection<NY> {
         y: &[f32; NY],
         e: &mut [f32; NY],
     ) -> Option<Finding> {
-        let motor = self.motor(&thresholds.motor, e.first().copied().unwrap_or_default());
         let frozen = self.frozen(&thresholds.frozen, counts, y, e);
         let implausible = self.implausible(&thresholds.innovation, e);
+        // A measurement that was rejected says nothing about the motor.
+        let motor = self.motor(&thresholds.motor, e.first().copied().unwrap_or_default());
         implausible.or(frozen).or(motor)
     }
 
@@ -199,5 +200,114 @@ impl<const NY: usize> Detection<NY> {
     /// Counts rejected measurements from 0 again.
     pub fn forget_rejected(&mut self) {
         self.rejected = 0;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const THRESHOLDS: Thresholds<2> = Thresholds {
+        innovation: [1.0, 1.0],
+        frozen: [3.0, 3.0],
+        // A filter that follows the measurement at once, and a unit of way per newton and tick.
+        motor: MotorTest { a: [0.0; 4], b: [1.0, 0.0], ratio: 0.5, energy: 4.0 },
+    };
+
+    /// Innovations tick by tick, with counters that move; the tick of the first finding.
+    fn first(of: impl Fn(i32) -> [f32; 2]) -> Option<(i32, Finding)> {
+        let mut detection = Detection::default();
+        detection.start(&[0; 2], &[0.0; 2]);
+        (1..100).find_map(|tick| {
+            let found = detection.test(&THRESHOLDS, &[tick; 2], &[tick as f32; 2], &mut of(tick));
+            detection.end(&THRESHOLDS.motor, [tick as f32; 2], 0.0);
+            found.map(|finding| (tick, finding))
+        })
+    }
+
+    fn finding(fault: Fault, sensor: u8) -> Finding {
+        Finding { fault, sensor }
+    }
+
+    #[test]
+    fn the_third_implausible_measurement_in_a_row_is_a_fault_and_two_are_not() {
+        assert_eq!(first(|_| [0.9, -0.9]), None);
+        assert_eq!(first(|tick| [0.0, if tick % 3 == 0 { 0.0 } else { 5.0 }]), None);
+        let from_20 = |tick: i32| if tick >= 20 { -1.1 } else { 0.0 };
+        assert_eq!(first(|tick| [0.0, from_20(tick)]), Some((22, finding(Fault::Encoder, 1))));
+        assert_eq!(first(|tick| [from_20(tick), 0.0]), Some((22, finding(Fault::Encoder, 0))));
+        assert_eq!(first(|tick| [from_20(tick), from_20(tick)]), Some((22, finding(Fault::Motor, 0))));
+        assert_eq!(
+            first(|tick| [f32::NAN, f32::from(tick as i16) * 0.0]),
+            Some((3, finding(Fault::Encoder, 0)))
+        );
+    }
+
+    #[test]
+    fn a_rejected_measurement_has_no_innovation_and_is_counted() {
+        let mut detection = Detection::<2>::default();
+        let mut e = [7.0, 0.5];
+        assert_eq!(detection.test(&THRESHOLDS, &[7, 1], &[7.0, 1.0], &mut e), None);
+        assert_eq!((e, detection.rejected()), ([0.0, 0.5], 1));
+        detection.start(&[0; 2], &[0.0; 2]);
+        assert_eq!(detection.rejected(), 1, "a new start does not forget it");
+        detection.forget_rejected();
+        assert_eq!(detection.rejected(), 0);
+    }
+
+    /// The second counter stands still while the model moves it by `per_tick`; the tick of the finding.
+    fn frozen(per_tick: f32) -> Option<(i32, Finding)> {
+        let mut detection = Detection::<2>::default();
+        detection.start(&[0; 2], &[0.0; 2]);
+        (1..1000).find_map(|tick| {
+            // The observer holds on to the measurement: every tick it predicts the same motion again.
+            let mut e = [0.0, -per_tick];
+            let found = detection.test(&THRESHOLDS, &[tick, 0], &[tick as f32, 0.0], &mut e);
+            detection.end(&THRESHOLDS.motor, [tick as f32, 0.0], 0.0);
+            found.map(|finding| (tick, finding))
+        })
+    }
+
+    #[test]
+    fn a_counter_that_stands_still_while_the_model_moves_is_found() {
+        assert_eq!(frozen(0.4), Some((10, finding(Fault::Frozen, 1))));
+        assert_eq!(frozen(-0.4), Some((10, finding(Fault::Frozen, 1))));
+        // A small steady error of the model is no alarm, however long it lasts.
+        assert_eq!(frozen(0.18), None);
+    }
+
+    /// A motor of which a share is missing, pushed to and fro; the tick of the finding.
+    fn motor(missing: f32) -> Option<(i32, Finding)> {
+        let mut detection = Detection::<2>::default();
+        detection.start(&[0; 2], &[0.0; 2]);
+        let mut force = 0.0;
+        (1..1000).find_map(|tick| {
+            let mut e = [-missing * force, 0.0];
+            let found = detection.test(&THRESHOLDS, &[tick; 2], &[tick as f32; 2], &mut e);
+            force = if tick % 4 < 2 { 0.4 } else { -0.4 };
+            detection.end(&THRESHOLDS.motor, [tick as f32; 2], force);
+            found.map(|finding| (tick, finding))
+        })
+    }
+
+    #[test]
+    fn a_motor_of_which_more_than_half_is_missing_is_found() {
+        assert_eq!(motor(0.0), None);
+        assert_eq!(motor(0.45), None);
+        // Not enough has been moved for a verdict: 0.16 a tick gives at most 16 · 0.16 = 2.56.
+        assert_eq!(motor(1.0), None);
+        let found = |missing: f32| {
+            let mut detection = Detection::<2>::default();
+            (1..100).find_map(|tick| {
+                let mut e = [-missing * 0.6, 0.0];
+                let found = detection.test(&THRESHOLDS, &[tick; 2], &[tick as f32; 2], &mut e);
+                detection.end(&THRESHOLDS.motor, [tick as f32; 2], 0.6);
+                found.map(|finding| finding.fault)
+            })
+        };
+        assert_eq!(found(0.45), None);
+        assert_eq!(found(0.55), Some(Fault::Motor));
+        assert_eq!(found(1.0), Some(Fault::Motor));
+        assert_eq!(found(-1.0), None, "more force than asked for is not a missing one");
     }
 }

@@ -17,9 +17,6 @@ use crate::supervisor::{State, Supervisor};
 use crate::table::{Build, GainTable, Reading, TableError};
 use crate::watch::Watch;
 
-/// An arm command that comes again within so many ticks is still the same act.
-const HELD_TICKS: u32 = 500;
-
 /// Controller and supervisor, tick by tick. It knows neither registers nor frames.
 ///
 /// A tick is [`control`](Self::control), after which the motor is driven with its result, then
@@ -412,7 +409,7 @@ impl<'t, const NX: usize, const NY: usize> Firmware<'t, NX, NY> {
     fn arm(&mut self, id: u64) -> Result<(), Reasons> {
         // A key that is held since the fault sends one command after the other: none of them is a new act.
         if self.supervisor.state() == State::Fault || self.held > 0 {
-            self.held = HELD_TICKS;
+            self.held = self.table.limits.still_ticks;
         }
         let held = self.supervisor.state() != State::Fault && (self.held > 0 || id <= self.cleared_by);
         let further = self.against_arming().and(Reasons::HELD.when(held));

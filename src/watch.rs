@@ -57,7 +57,7 @@ impl Watch {
         commanded: bool,
     ) -> Option<Fault> {
         count(&mut self.silent, !heard);
-        (commanded && self.silent > limits.link_ticks).then_some(Fault::LinkLost)
+        (commanded && self.silent >= limits.link_ticks).then_some(Fault::LinkLost)
     }
 }
 
@@ -114,7 +114,7 @@ mod tests {
             inputs.supply_v = if tick % 5 == 0 { 12.0 } else { 5.0 };
             assert_eq!(watch.inputs(&LIMITS, &inputs), None);
             assert_eq!(watch.force(&LIMITS, tick % 6 != 0), None);
-            assert_eq!(watch.link(&LIMITS, tick % 7 == 0, true), None);
+            assert_eq!(watch.link(&LIMITS, tick % 6 == 0, true), None);
         }
     }
 
@@ -125,7 +125,7 @@ mod tests {
             (1..100).find_map(|tick| found().map(|fault| (tick, fault)))
         };
         assert_eq!(first(&mut || watch.force(&LIMITS, true)), Some((6, Fault::Saturated)));
-        assert_eq!(first(&mut || watch.link(&LIMITS, false, true)), Some((7, Fault::LinkLost)));
+        assert_eq!(first(&mut || watch.link(&LIMITS, false, true)), Some((6, Fault::LinkLost)));
         let mut watch = Watch::default();
         assert_eq!(first(&mut || watch.link(&LIMITS, false, false)), None);
     }

@@ -1,52 +1,40 @@
-//! The whole firmware, from power-up to balancing, and back.
+//! The whole firmware, from power-up to balancing.
 
-use host_design::design::design;
-use host_design::rig::Rig;
+mod supervised;
+
 use host_design::simulate::{Scenario, Session, SimulationError};
-use host_design::table::{Gains, TableValues, WithSize, with_size};
+use supervised::{ALL_RIGS, Supervised, rig, run, table};
+use upright::fault::Cause;
 use upright::supervisor::State;
 use upright::table::Law;
 
-fn rig(name: &str) -> Rig {
-    Rig::from_path(format!("{}/../rigs/{name}.toml", env!("CARGO_MANIFEST_DIR")).as_ref()).unwrap()
+struct Stands {
+    ticks: u32,
 }
 
-fn table(rig: &Rig) -> TableValues {
-    TableValues::of(rig, &design(rig).unwrap(), Gains::Sampled).unwrap()
-}
+impl Supervised for Stands {
+    type Output = (u32, State, Option<Cause>, u32);
 
-struct Stands<'a>(&'a Rig, &'a TableValues, Scenario, u32);
-
-impl WithSize for Stands<'_> {
-    type Output = Result<(u32, State, Option<upright::fault::Cause>, u32), SimulationError>;
-
-    fn run<const NX: usize, const NY: usize>(self) -> Self::Output {
-        let Self(rig, values, scenario, ticks) = self;
-        let table = values.table::<NX, NY>();
-        let mut session = Session::new(rig, values, &table, &scenario)?;
-        session.start(&mut ())?;
+    fn balancing<const NX: usize, const NY: usize>(self, mut session: Session<'_, NX, NY>) -> Self::Output {
         let begun = session.number();
-        for _ in 0..ticks {
+        for _ in 0..self.ticks {
             session.step(None, &mut ());
         }
         let firmware = session.firmware();
-        Ok((begun, firmware.state(), firmware.cause(), firmware.statistics().rejected_samples))
+        (begun, firmware.state(), firmware.cause(), firmware.statistics().rejected_samples)
     }
 }
 
 #[test]
 fn every_rig_is_homed_checked_raised_and_balanced_by_hand() {
-    for name in ["single-quanser-ip02", "double-quanser-dbpen", "triple-glueck-eder-kugi", "quadruple-paper"]
-    {
+    for name in ALL_RIGS {
         let rig = rig(name);
         let values = table(&rig);
         for law in [Law::Lqr, Law::PolePlacement] {
             let scenario = Scenario::at_rest(&rig, law);
-            let outcome =
-                with_size(values.states, values.sensors, Stands(&rig, &values, scenario, 10_000)).unwrap();
-            let (begun, state, cause, rejected) = outcome.unwrap();
-            println!("{name} {law:?}: begun after {begun} ticks, {rejected} rejected");
-            assert_eq!((state, cause), (State::Balancing, None), "{name} {law:?}");
+            let outcome: Result<_, SimulationError> = run(&rig, &values, &scenario, Stands { ticks: 10_000 });
+            let (_, state, cause, rejected) = outcome.unwrap();
+            assert_eq!((state, cause, rejected), (State::Balancing, None, 0), "{name} {law:?}");
         }
     }
 }

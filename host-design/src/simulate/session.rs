@@ -1,5 +1,6 @@
 //! The whole firmware, supervisor included, against the simulated rig: from power-up to whatever happens.
 
+use upright::detection::Thresholds;
 use upright::fault::Cause;
 use upright::firmware::Firmware;
 use upright::io::{Inputs, Output};
@@ -29,6 +30,7 @@ impl<const NY: usize> Interference<NY> for () {}
 /// Firmware and bench, tick by tick.
 pub struct Session<'t, const NX: usize, const NY: usize> {
     firmware: Firmware<'t, NX, NY>,
+    thresholds: &'t Thresholds<NY>,
     bench: Bench,
     hand: Hand,
     holding: bool,
@@ -65,7 +67,16 @@ impl<'t, const NX: usize, const NY: usize> Session<'t, NX, NY> {
         let mut bench = Bench::new(rig, scenario)?;
         bench.hold(hand.held());
         let supply_v = rig.actuator.motor.as_ref().map_or(0.0, |motor| motor.supply_v as f32);
-        let mut session = Self { firmware, bench, hand, holding: true, supply_v, tick: 0, commands: 0 };
+        let mut session = Self {
+            firmware,
+            thresholds: &table.thresholds,
+            bench,
+            hand,
+            holding: true,
+            supply_v,
+            tick: 0,
+            commands: 0,
+        };
         if let Some(Message::Reply { answer: Answer::Rejected(rejected), .. }) =
             session.step(Some(Request::Select(scenario.law)), &mut ()).reply
         {
@@ -77,6 +88,11 @@ impl<'t, const NX: usize, const NY: usize> Session<'t, NX, NY> {
     /// The firmware.
     pub fn firmware(&self) -> &Firmware<'t, NX, NY> {
         &self.firmware
+    }
+
+    /// The thresholds of its tests for encoders and motor.
+    pub fn thresholds(&self) -> &'t Thresholds<NY> {
+        self.thresholds
     }
 
     /// The rig.
