@@ -27,21 +27,30 @@
 //! positive, 0 upright; force positive along +x. SI units throughout.
 
 #![no_std]
+#![forbid(unsafe_code)]
 
 #[cfg(test)]
 extern crate std;
 
 pub mod actuator;
+pub mod control_task;
 pub mod controller;
 pub mod encoder;
 pub mod fault;
 pub mod firmware;
 pub mod frame;
+#[cfg(not(feature = "gains-from-env"))]
 pub mod gains;
+#[cfg(feature = "gains-from-env")]
+/// Gains of another rig than the committed one, for an image that the host tool builds to try them.
+pub mod gains {
+    include!(env!("UPRIGHT_GAINS"));
+}
 pub mod io;
 pub mod link;
 pub mod message;
 pub mod observer;
+pub mod pins;
 pub mod state_feedback;
 pub mod supervisor;
 pub mod table;

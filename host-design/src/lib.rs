@@ -4,6 +4,8 @@
 //! [`numerics`]. The control law itself is not here: a simulation runs the firmware's own controller from the crate
 //! `upright`.
 
+#![forbid(unsafe_code)]
+
 pub mod design;
 pub mod numerics;
 pub mod plant;
