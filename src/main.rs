@@ -19,7 +19,10 @@ use upright::gains;
 /// The gains are for this many cycles of the processor's clock per tick.
 const CYCLES_PER_TICK: u32 = {
     let cycles = gains::TICK_S as f64 * board::CLOCK_HZ as f64 + 0.5;
-    assert!(cycles >= 20_000.0 && cycles < 16_777_216.0, "tick.period_s: the board's timer cannot make this tick");
+    assert!(
+        cycles >= 20_000.0 && cycles < 16_777_216.0,
+        "tick.period_s: the board's timer cannot make this tick"
+    );
     cycles as u32
 };
 

@@ -7,7 +7,7 @@ const READ_BINARY: usize = 1;
 const WRITE_BINARY: usize = 5;
 
 /// The pins.
-pub struct Channel {
+pub(super) struct Channel {
     input: usize,
     output: usize,
     buffer: [u8; 256],
@@ -16,12 +16,12 @@ pub struct Channel {
 }
 
 /// The serial line.
-pub struct Serial {
+pub(super) struct Serial {
     output: usize,
 }
 
 /// Opens the files `pins.in`, `pins.out` and `serial.out` in the emulator's directory, in this order.
-pub fn open(_: Peripherals) -> (Channel, Serial) {
+pub(super) fn open(_: Peripherals) -> (Channel, Serial) {
     let input = open_file("pins.in\0", READ_BINARY);
     let output = open_file("pins.out\0", WRITE_BINARY);
     let serial = open_file("serial.out\0", WRITE_BINARY);
@@ -30,7 +30,7 @@ pub fn open(_: Peripherals) -> (Channel, Serial) {
 
 impl Channel {
     /// The next byte; waits for it. Ends the run when the host has closed the file.
-    pub fn read(&mut self) -> u8 {
+    pub(super) fn read(&mut self) -> u8 {
         loop {
             if let Some(&byte) = self.buffer.get(self.next).filter(|_| self.next < self.filled) {
                 self.next += 1;
@@ -47,20 +47,20 @@ impl Channel {
     }
 
     /// Sends bytes.
-    pub fn write(&mut self, bytes: &[u8]) {
+    pub(super) fn write(&mut self, bytes: &[u8]) {
         write(self.output, bytes);
     }
 }
 
 impl Serial {
     /// Sends bytes.
-    pub fn write(&mut self, bytes: &[u8]) {
+    pub(super) fn write(&mut self, bytes: &[u8]) {
         write(self.output, bytes);
     }
 }
 
 /// Ends the emulator, with status 0 or 1.
-pub fn exit(status: debug::ExitStatus) -> ! {
+pub(super) fn exit(status: debug::ExitStatus) -> ! {
     loop {
         debug::exit(status);
     }
