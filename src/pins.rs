@@ -9,7 +9,7 @@ use crate::io::{Contacts, Inputs, Output};
 pub const BYTES_PER_TICK: usize = 64;
 /// Longest frame of [`PinsIn`] for `NY` sensors up to 15.
 pub const MAX_PINS_IN: usize = 192;
-/// Longest frame of [`Output`].
+/// Longest frame of [`PinsOut`].
 pub const MAX_PINS_OUT: usize = 32;
 
 /// Host to image: the inputs of one tick.
@@ -41,7 +41,14 @@ pub enum Sabotage {
 }
 
 /// Image to host: the output of one tick.
-pub type PinsOut = Output;
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct PinsOut {
+    /// The output.
+    pub output: Output,
+    /// Bytes that were sent over the serial line before this tick. A host that reads just these hears the same in every
+    /// run, however fast it is.
+    pub sent: u32,
+}
 
 impl<const NY: usize> PinsIn<NY> {
     /// The inputs of a tick without commands and without sabotage.

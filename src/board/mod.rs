@@ -9,7 +9,7 @@
 mod in_the_loop;
 
 #[cfg(any(feature = "in-the-loop", feature = "in-the-loop-usart"))]
-pub use in_the_loop::{CLOCK_HZ, Hardware, Line, Receiver, set_up, stop};
+pub(crate) use in_the_loop::{CLOCK_HZ, Hardware, Line, Receiver, set_up, stop};
 
 /// Bytes from the host that may wait.
-pub const BYTES: usize = 128;
+pub(crate) const BYTES: usize = 128;

@@ -8,6 +8,7 @@ mod summary;
 mod trace;
 
 pub use bench::Bench;
+pub(crate) use closed_loop::ticks;
 pub use closed_loop::{SimulationError, run, simulate};
 pub use plot::{PlotError, svg};
 pub use scenario::{Scenario, Sensing};

@@ -1,6 +1,6 @@
 //! The board in the loop: a simulated rig on the host takes the place of timers and pins, in lock step.
 //!
-//! Every tick waits for the host's [`PinsIn`] and answers with an [`Output`]; telemetry and replies leave on a channel
+//! Every tick waits for the host's [`PinsIn`] and answers with a [`PinsOut`]; telemetry and replies leave on a channel
 //! of their own. When the host closes the pins, the image ends.
 
 #[cfg(feature = "in-the-loop")]
@@ -9,6 +9,7 @@ mod semihosting;
 mod usart;
 
 use core::panic::PanicInfo;
+use core::sync::atomic::{AtomicU32, Ordering};
 
 use cortex_m_rt::{ExceptionFrame, exception};
 use heapless::spsc::{Consumer, Producer};
@@ -18,7 +19,7 @@ use upright::frame::{self, Receiver as Frames};
 use upright::gains::SENSORS;
 use upright::io::{Board, Inputs, Output};
 use upright::message::Reset;
-use upright::pins::{MAX_PINS_IN, MAX_PINS_OUT, PinsIn, Sabotage};
+use upright::pins::{MAX_PINS_IN, MAX_PINS_OUT, PinsIn, PinsOut, Sabotage};
 
 #[cfg(feature = "in-the-loop")]
 use semihosting::{Channel, Serial, exit, open};
@@ -26,43 +27,48 @@ use semihosting::{Channel, Serial, exit, open};
 use usart::{Channel, Serial, exit, open};
 
 /// The emulator's core clock (Hz); no real time depends on it.
-pub const CLOCK_HZ: u32 = 168_000_000;
+pub(crate) const CLOCK_HZ: u32 = 168_000_000;
+
+/// Bytes sent over the serial line.
+static SENT: AtomicU32 = AtomicU32::new(0);
 
 /// The simulated pins.
-pub struct Hardware {
+pub(crate) struct Hardware {
     pins: Channel,
     frames: Frames<MAX_PINS_IN>,
     received: Producer<'static, u8>,
 }
 
 /// The serial line's interrupt never comes: its bytes come with the pins.
-pub struct Receiver;
+pub(crate) struct Receiver;
 
 impl Receiver {
     /// Nothing to do.
-    pub fn interrupt(&mut self) {}
+    pub(crate) fn interrupt(&mut self) {}
 }
 
 /// The serial line to the host.
-pub struct Line {
+pub(crate) struct Line {
     received: Consumer<'static, u8>,
     serial: Serial,
 }
 
 impl Line {
     /// The next byte from the host.
-    pub fn read(&mut self) -> Option<u8> {
+    pub(crate) fn read(&mut self) -> Option<u8> {
         self.received.dequeue()
     }
 
     /// Sends a frame to the host.
-    pub fn write(&mut self, frame: &[u8]) {
+    pub(crate) fn write(&mut self, frame: &[u8]) {
         self.serial.write(frame);
+        // Longer runs than 2³² bytes are not made.
+        SENT.store(SENT.load(Ordering::Relaxed).wrapping_add(frame.len() as u32), Ordering::Relaxed);
     }
 }
 
 /// Opens the channels.
-pub fn set_up(
+pub(crate) fn set_up(
     device: Peripherals,
     (producer, consumer): (Producer<'static, u8>, Consumer<'static, u8>),
 ) -> (Hardware, Receiver, Line, Reset) {
@@ -110,8 +116,9 @@ impl Board<SENSORS> for Hardware {
 }
 
 fn send(pins: &mut Channel, output: &Output) {
+    let message = PinsOut { output: *output, sent: SENT.load(Ordering::Relaxed) };
     let (mut scratch, mut out) = ([0; MAX_PINS_OUT], [0; MAX_PINS_OUT]);
-    if let Ok(frame) = frame::encode(output, &mut scratch, &mut out) {
+    if let Ok(frame) = frame::encode(&message, &mut scratch, &mut out) {
         pins.write(frame);
     }
 }
@@ -138,7 +145,7 @@ fn dig(depth: u32) -> u32 {
 }
 
 /// Motor off, and the end of the run with a status that is not 0.
-pub fn stop() -> ! {
+pub(crate) fn stop() -> ! {
     exit(Err(()))
 }
 
