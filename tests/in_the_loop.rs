@@ -56,7 +56,7 @@ fn the_image_in_qemu_gives_the_bits_of_the_host() {
         let begin = std::time::Instant::now();
         let place = Where::Qemu { image: Path::new(&image), link: Link::Files };
         let qemu = run(&rig, &table, &scenario, place).unwrap();
-        println!("{:?}", begin.elapsed());
+        println!("{:?} {}", begin.elapsed(), qemu.worst_cycles);
         let host = run(&rig, &table, &scenario, Where::Host).unwrap();
         assert_eq!(qemu.ticks, host.ticks);
         assert!(qemu.summary.stands(), "{:?}", qemu.fault);

@@ -82,6 +82,8 @@ pub struct Recording {
     pub ticks: Vec<Tick>,
     /// The fault that has ended the balancing, if one has.
     pub fault: Option<Fault>,
+    /// Longest execution of a tick: instructions of the image in QEMU; 0 on the host.
+    pub worst_cycles: u32,
 }
 
 /// Runs `scenario` with the firmware of `table` against the plant of `rig`. The rig is homed while it hangs, held by hand
@@ -182,7 +184,13 @@ impl Run<'_> {
         session.tick(&inputs(bench.counters()))?;
         record.take(&mut session)?;
         let summary = Summary::of(rig, scenario, &record.trace, record.fall);
-        Ok(Recording { trace: record.trace, summary, ticks: record.ticks, fault: record.fault })
+        Ok(Recording {
+            trace: record.trace,
+            summary,
+            ticks: record.ticks,
+            fault: record.fault,
+            worst_cycles: record.worst_cycles,
+        })
     }
 }
 
@@ -205,6 +213,7 @@ struct Record {
     next_tick: Option<u32>,
     fall: Option<Fall>,
     fault: Option<Fault>,
+    worst_cycles: u32,
 }
 
 impl Record {
@@ -216,6 +225,7 @@ impl Record {
             next_tick: None,
             fall: None,
             fault: None,
+            worst_cycles: 0,
         }
     }
 
@@ -236,6 +246,7 @@ impl Record {
                 return Ok(());
             };
             self.next_tick = Some(expected.wrapping_add(1));
+            self.worst_cycles = self.worst_cycles.max(telemetry.cycles);
             self.fault = self.fault.or(telemetry.fault);
             let estimate: Vec<f64> = telemetry.estimate.iter().map(|&value| f64::from(value)).collect();
             self.trace.push(&Sample {

@@ -13,7 +13,7 @@ use core::sync::atomic::{AtomicU32, Ordering};
 
 use cortex_m_rt::{ExceptionFrame, exception};
 use heapless::spsc::{Consumer, Producer};
-use stm32f4xx_hal::pac::Peripherals;
+use stm32f4xx_hal::pac::{Peripherals, TIM5};
 use upright::encoder::CounterWidth;
 use upright::frame::{self, Receiver as Frames};
 use upright::gains::SENSORS;
@@ -37,6 +37,9 @@ pub(crate) struct Hardware {
     pins: Channel,
     frames: Frames<MAX_PINS_IN>,
     received: Producer<'static, u8>,
+    clock: TIM5,
+    /// Instructions spent on the pins, which a board does not have.
+    spent: u32,
 }
 
 /// The serial line's interrupt never comes: its bytes come with the pins.
@@ -72,8 +75,12 @@ pub(crate) fn set_up(
     device: Peripherals,
     (producer, consumer): (Producer<'static, u8>, Consumer<'static, u8>),
 ) -> (Hardware, Receiver, Line, Reset) {
-    let (pins, serial) = open(device);
-    let hardware = Hardware { pins, frames: Frames::new(), received: producer };
+    let clock = device.TIM5;
+    // 32 bits, one count per instruction.
+    clock.arr().write(|w| w.arr().set(u32::MAX));
+    clock.cr1().write(|w| w.cen().enabled());
+    let (pins, serial) = open(device.USART1, device.USART2);
+    let hardware = Hardware { pins, frames: Frames::new(), received: producer, clock, spent: 0 };
     (hardware, Receiver, Line { received: consumer, serial }, Reset::Power)
 }
 
@@ -85,6 +92,32 @@ impl Board<SENSORS> for Hardware {
     };
 
     fn inputs(&mut self) -> Inputs<SENSORS> {
+        let begin = self.instructions();
+        let inputs = self.next_inputs();
+        self.spent = self.spent.wrapping_add(self.instructions().wrapping_sub(begin));
+        inputs
+    }
+
+    fn drive(&mut self, output: &Output) {
+        let begin = self.instructions();
+        send(&mut self.pins, output);
+        self.spent = self.spent.wrapping_add(self.instructions().wrapping_sub(begin));
+    }
+
+    fn feed_watchdog(&mut self) {}
+
+    /// Instructions, not cycles: the emulator counts a nanosecond for each, and knows no cycles.
+    fn cycles(&self) -> u32 {
+        self.instructions().wrapping_sub(self.spent)
+    }
+}
+
+impl Hardware {
+    fn instructions(&self) -> u32 {
+        self.clock.cnt().read().bits()
+    }
+
+    fn next_inputs(&mut self) -> Inputs<SENSORS> {
         loop {
             let byte = self.pins.read();
             let Some(Ok(pins)) = self.frames.push::<PinsIn<SENSORS>>(byte) else {
@@ -101,17 +134,6 @@ impl Board<SENSORS> for Hardware {
                 return inputs;
             }
         }
-    }
-
-    fn drive(&mut self, output: &Output) {
-        send(&mut self.pins, output);
-    }
-
-    fn feed_watchdog(&mut self) {}
-
-    fn cycles(&self) -> u32 {
-        // The emulator has no cycle counter.
-        0
     }
 }
 
@@ -146,6 +168,8 @@ fn dig(depth: u32) -> u32 {
 
 /// Motor off, and the end of the run with a status that is not 0.
 pub(crate) fn stop() -> ! {
+    // SAFETY: nothing else runs any more.
+    send(&mut unsafe { Channel::steal() }, &Output::OFF);
     exit(Err(()))
 }
 

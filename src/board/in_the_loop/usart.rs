@@ -1,6 +1,6 @@
 //! Channels to the host as serial lines: USART1 for the pins, USART2 for the serial line. Slow, but what boards have.
 
-use stm32f4xx_hal::pac::{Peripherals, USART1, USART2};
+use stm32f4xx_hal::pac::{USART1, USART2};
 
 /// The pins.
 pub(super) struct Channel {
@@ -13,8 +13,7 @@ pub(super) struct Serial {
 }
 
 /// Turns both lines on. The emulator has no baud rate.
-pub(super) fn open(device: Peripherals) -> (Channel, Serial) {
-    let (pins, serial) = (device.USART1, device.USART2);
+pub(super) fn open(pins: USART1, serial: USART2) -> (Channel, Serial) {
     pins.cr1().write(|w| w.ue().enabled().te().enabled().re().enabled());
     serial.cr1().write(|w| w.ue().enabled().te().enabled());
     let mut pins = Channel { usart: pins };
@@ -24,6 +23,15 @@ pub(super) fn open(device: Peripherals) -> (Channel, Serial) {
 }
 
 impl Channel {
+    /// The channel once more, to write to.
+    ///
+    /// # Safety
+    /// Its owner must no longer run.
+    pub(super) unsafe fn steal() -> Self {
+        // SAFETY: as above.
+        Channel { usart: unsafe { stm32f4xx_hal::pac::Peripherals::steal() }.USART1 }
+    }
+
     /// The next byte; waits for it.
     pub(super) fn read(&mut self) -> u8 {
         while self.usart.sr().read().rxne().bit_is_clear() {}
