@@ -7,6 +7,7 @@
 #![forbid(unsafe_code)]
 
 pub mod design;
+pub mod image;
 pub mod in_the_loop;
 pub mod numerics;
 pub mod plant;

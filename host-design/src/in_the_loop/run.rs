@@ -13,7 +13,7 @@ use super::qemu::{Emulator, Link};
 use super::session::{Session, SessionError};
 use crate::rig::Rig;
 use crate::simulate::{Bench, Fall, Sample, Scenario, Sensing, SimulationError, Summary, Trace, ticks};
-use crate::table::{TableValues, WithSize, with_size};
+use crate::table::{TableValues, WithSize, with_firmware_size};
 
 /// Where the firmware runs.
 #[derive(Debug, Clone, Copy)]
@@ -105,7 +105,7 @@ pub fn run(
         return Err(RunError::StepAt { at_s: scenario.step_at_s, least_s });
     }
     let (states, sensors) = (table.states, table.sensors);
-    with_size(states, sensors, Run { rig, table, scenario, place })
+    with_firmware_size(states, sensors, Run { rig, table, scenario, place })
         .ok_or(SimulationError::Size { states, sensors })?
 }
 
