@@ -47,7 +47,13 @@ pub struct Firmware<'t, const NX: usize, const NY: usize> {
     cycles: u32,
     statistics: Statistics,
     reset: Reset,
+    /// Telemetry of every so many ticks.
+    every: u16,
+    until_telemetry: u16,
 }
+
+/// Telemetry of every so many ticks, until the host asks for something else.
+const EVERY: u16 = 10;
 
 impl<'t, const NX: usize, const NY: usize> Firmware<'t, NX, NY> {
     /// The firmware after a `reset`, motor off.
@@ -83,6 +89,8 @@ impl<'t, const NX: usize, const NY: usize> Firmware<'t, NX, NY> {
             cycles: 0,
             statistics: Statistics::default(),
             reset,
+            every: EVERY,
+            until_telemetry: 0,
         })
     }
 
@@ -221,11 +229,11 @@ impl<'t, const NX: usize, const NY: usize> Firmware<'t, NX, NY> {
         &mut self,
         command: Option<&Command>,
         cycles: u32,
-    ) -> (Telemetry<NX, NY>, Option<Message<NX, NY>>) {
+    ) -> (Option<Telemetry<NX, NY>>, Option<Message<NX, NY>>) {
         self.cycles = cycles;
         self.statistics.ticks = self.statistics.ticks.wrapping_add(1);
         self.statistics.worst_cycles = self.statistics.worst_cycles.max(cycles);
-        let telemetry = self.telemetry();
+        let telemetry = self.telemetry_is_due().then(|| self.telemetry());
         if self.supervisor.state() == State::Balancing {
             self.end();
             if let Some(fault) = self.watch.link(&self.table.limits, command.is_some(), self.commanded) {
@@ -238,6 +246,20 @@ impl<'t, const NX: usize, const NY: usize> Firmware<'t, NX, NY> {
         let reply = command.map(|command| Message::Reply { id: command.id, answer: self.answer(command) });
         self.tick = self.tick.wrapping_add(1);
         (telemetry, reply)
+    }
+
+    /// A message found its queue full.
+    pub fn message_dropped(&mut self) {
+        self.statistics.dropped = self.statistics.dropped.saturating_add(1);
+    }
+
+    fn telemetry_is_due(&mut self) -> bool {
+        if self.until_telemetry > 0 {
+            self.until_telemetry -= 1;
+            return false;
+        }
+        self.until_telemetry = self.every.saturating_sub(1);
+        self.every > 0
     }
 
     /// Prepares the next tick of balancing.
@@ -376,6 +398,10 @@ impl<'t, const NX: usize, const NY: usize> Firmware<'t, NX, NY> {
             Request::ResetStatistics => {
                 self.statistics = Statistics::default();
                 self.detection.forget_rejected();
+                Answer::Done
+            }
+            Request::Telemetry(every) => {
+                (self.every, self.until_telemetry) = (every, 0);
                 Answer::Done
             }
         }

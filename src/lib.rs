@@ -27,12 +27,14 @@
 //! positive, 0 upright; force positive along +x. SI units throughout.
 
 #![no_std]
+#![forbid(unsafe_code)]
 
 #[cfg(test)]
 extern crate std;
 
 pub mod actuator;
 pub mod calibration;
+pub mod control_task;
 pub mod controller;
 pub mod detection;
 pub mod encoder;
@@ -40,13 +42,20 @@ pub mod envelope;
 pub mod fault;
 pub mod firmware;
 pub mod frame;
+#[cfg(not(feature = "gains-from-env"))]
 pub mod gains;
+#[cfg(feature = "gains-from-env")]
+/// Gains of another rig than the committed one, for an image that the host tool builds to try them.
+pub mod gains {
+    include!(env!("UPRIGHT_GAINS"));
+}
 pub mod homing;
 pub mod io;
 pub mod limits;
 pub mod link;
 pub mod message;
 pub mod observer;
+pub mod pins;
 pub mod reasons;
 pub mod sign_check;
 pub mod state_feedback;

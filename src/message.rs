@@ -53,6 +53,8 @@ pub enum Request {
     Statistics,
     /// Set these counters to 0.
     ResetStatistics,
+    /// Send telemetry of every so many ticks; 0: of none.
+    Telemetry(u16),
 }
 
 /// Firmware to host.

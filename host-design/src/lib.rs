@@ -4,7 +4,11 @@
 //! [`numerics`]. The control law itself is not here: a simulation runs the firmware's own controller from the crate
 //! `upright`.
 
+#![forbid(unsafe_code)]
+
 pub mod design;
+pub mod image;
+pub mod in_the_loop;
 pub mod numerics;
 pub mod plant;
 pub mod rig;

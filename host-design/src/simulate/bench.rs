@@ -80,9 +80,13 @@ impl Bench {
         self.state.copy_from_slice(state);
     }
 
-    /// Widths of the hardware counters, as on the board: 32 bits for the cart, 16 for the links.
-    pub fn widths<const NY: usize>() -> [CounterWidth; NY] {
-        core::array::from_fn(|sensor| if sensor == 0 { CounterWidth::Bits32 } else { CounterWidth::Bits16 })
+    /// Widths of the hardware counters: 32 bits for the cart, 16 for the links.
+    pub const fn widths<const NY: usize>() -> [CounterWidth; NY] {
+        let mut widths = [CounterWidth::Bits16; NY];
+        if let [cart, ..] = widths.as_mut_slice() {
+            *cart = CounterWidth::Bits32;
+        }
+        widths
     }
 
     /// What the hardware counters show, as many as the firmware reads.

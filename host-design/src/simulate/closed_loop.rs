@@ -87,7 +87,7 @@ pub fn run(
 }
 
 /// Number of the run's last tick.
-fn ticks(rig: &Rig, scenario: &Scenario) -> Result<usize, SimulationError> {
+pub(crate) fn ticks(rig: &Rig, scenario: &Scenario) -> Result<usize, SimulationError> {
     let (duration_s, period_s) = (scenario.duration_s, rig.tick.period_s);
     let ticks = (duration_s / period_s).round();
     if ticks > f64::from(MAX_TICKS) {
@@ -154,7 +154,7 @@ impl WithSize for Run<'_> {
 impl Fall {
     /// Whether `state` is beyond rescue: a link below the horizontal, the cart off its rail, a model's state out of
     /// all proportion, or anything that is not a number.
-    fn of(rig: &Rig, at_s: f64, state: &[f64]) -> Option<Self> {
+    pub(crate) fn of(rig: &Rig, at_s: f64, state: &[f64]) -> Option<Self> {
         let kind = match &rig.plant {
             _ if !state.iter().all(|value| value.is_finite()) => FallKind::NotFinite,
             PlantDescription::Chain(chain) => {

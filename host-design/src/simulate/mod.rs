@@ -10,6 +10,7 @@ mod summary;
 mod trace;
 
 pub use bench::Bench;
+pub(crate) use closed_loop::ticks;
 pub use closed_loop::{SimulationError, run, simulate};
 pub use hand::{Act, Hand, Seen};
 pub use plot::{PlotError, svg};

@@ -42,8 +42,8 @@ pub struct Session<'t, const NX: usize, const NY: usize> {
 /// What a tick came to.
 #[derive(Debug, Clone)]
 pub struct Tick<const NX: usize, const NY: usize> {
-    /// What the firmware told.
-    pub telemetry: Telemetry<NX, NY>,
+    /// What the firmware told, if telemetry was due.
+    pub telemetry: Option<Telemetry<NX, NY>>,
     /// What it answered, if it was asked.
     pub reply: Option<Message<NX, NY>>,
     /// What went to the motor.

@@ -68,7 +68,7 @@ pub struct Summary {
 }
 
 impl Summary {
-    pub(super) fn of(rig: &Rig, scenario: &Scenario, trace: &Trace, fall: Option<Fall>) -> Self {
+    pub(crate) fn of(rig: &Rig, scenario: &Scenario, trace: &Trace, fall: Option<Fall>) -> Self {
         let output = rig.output();
         let step = scenario.step_m;
         let band = (0.02 * step.abs()).max(1e-3);

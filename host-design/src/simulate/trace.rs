@@ -36,7 +36,7 @@ const LEADING: usize = 5;
 
 impl Trace {
     /// An empty record for `rig` with room for `ticks` ticks.
-    pub(super) fn new(rig: &Rig, ticks: usize) -> Self {
+    pub(crate) fn new(rig: &Rig, ticks: usize) -> Self {
         let states: Vec<String> = match &rig.plant {
             PlantDescription::Chain(chain) => {
                 let links = (1..=chain.links.len())
@@ -59,7 +59,7 @@ impl Trace {
         &self.columns
     }
 
-    pub(super) fn push(&mut self, sample: &Sample<&[f64]>) {
+    pub(crate) fn push(&mut self, sample: &Sample<&[f64]>) {
         self.rows.extend([sample.t, sample.target, sample.setpoint, sample.requested, sample.force]);
         self.rows.extend(sample.state);
         self.rows.extend(sample.estimate);

@@ -14,20 +14,29 @@ pub trait WithSize {
     fn run<const NX: usize, const NY: usize>(self) -> Self::Output;
 }
 
+macro_rules! dispatch {
+    ($states:expr, $sensors:expr, $action:expr, $($nx:literal: $($ny:literal)*;)*) => {
+        match ($states, $sensors) {
+            $($(($nx, $ny) => Some($action.run::<$nx, $ny>()),)*)*
+            _ => None,
+        }
+    };
+}
+
 /// Runs `action` with `NX = states` and `NY = sensors`; none unless the firmware's types are made for them on the host:
 /// 1 to [`MAX_STATES`] states with 1 to [`MAX_MODEL_SENSORS`] sensors, or 2n + 2 states with n + 1 sensors.
 pub fn with_size<A: WithSize>(states: usize, sensors: usize, action: A) -> Option<A::Output> {
-    macro_rules! dispatch {
-        ($($states:literal: $($sensors:literal)*;)*) => {
-            match (states, sensors) {
-                $($(($states, $sensors) => Some(action.run::<$states, $sensors>()),)*)*
-                _ => None,
-            }
-        };
-    }
-    dispatch! {
+    dispatch! { states, sensors, action,
         1: 1; 2: 1 2; 3: 1 2; 4: 1 2; 5: 1 2; 6: 1 2 3; 7: 1 2; 8: 1 2 4; 9: 1 2; 10: 1 2 5; 11: 1 2; 12: 1 2 6; 13: 1 2;
         14: 1 2 7; 15: 1 2; 16: 1 2 8; 17: 1 2; 18: 1 2 9; 19: 1 2; 20: 1 2 10; 21: 1 2; 22: 1 2 11; 23: 1 2; 24: 1 2 12;
         25: 1 2; 26: 1 2 13; 27: 1 2; 28: 1 2 14; 29: 1 2; 30: 1 2 15;
+    }
+}
+
+/// As [`with_size`], but only for sizes in which the whole firmware runs in the loop: chains of 1 to 6 links, and models
+/// of up to 6 states with one sensor. More would only take longer to compile.
+pub fn with_firmware_size<A: WithSize>(states: usize, sensors: usize, action: A) -> Option<A::Output> {
+    dispatch! { states, sensors, action,
+        1: 1; 2: 1; 3: 1; 4: 1 2; 5: 1; 6: 1 3; 8: 4; 10: 5; 12: 6; 14: 7;
     }
 }

@@ -3,6 +3,8 @@
 use std::process::ExitCode;
 
 use host_design::design::DesignError;
+use host_design::image::ImageError;
+use host_design::in_the_loop::{RunError, SessionError, TargetError};
 use host_design::rig::RigError;
 use host_design::simulate::{PlotError, SimulationError};
 use host_design::table::{NoTable, WriteError};
@@ -26,6 +28,10 @@ pub(crate) enum Failure {
     #[error(transparent)]
     Unverifiable(#[from] Unverifiable),
     #[error(transparent)]
+    Image(#[from] ImageError),
+    #[error(transparent)]
+    InTheLoop(#[from] RunError),
+    #[error(transparent)]
     Plot(#[from] PlotError),
     #[error(transparent)]
     Write(#[from] WriteError),
@@ -43,7 +49,12 @@ impl Failure {
             Failure::CheckFailed(_) => 1,
             Failure::Rig(error) => error.exit_code(),
             Failure::Design { .. } | Failure::NoTable { .. } | Failure::NoSolution(_) => 3,
-            Failure::Simulation(_)
+            Failure::Image(ImageError::NoCompiler)
+            | Failure::InTheLoop(RunError::Session(SessionError::Target(TargetError::NoEmulator))) => 4,
+            Failure::InTheLoop(RunError::Session(_)) => 1,
+            Failure::Image(_)
+            | Failure::InTheLoop(_)
+            | Failure::Simulation(_)
             | Failure::Verify(_)
             | Failure::Unverifiable(_)
             | Failure::Plot(_)

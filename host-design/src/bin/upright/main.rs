@@ -3,6 +3,7 @@
 mod check;
 mod design;
 mod failure;
+mod firmware;
 mod progress;
 mod simulate;
 mod variation;
@@ -36,6 +37,7 @@ struct Arguments {
 enum Command {
     Check(check::Check),
     Design(design::Design),
+    Firmware(firmware::Firmware),
     Simulate(simulate::Simulate),
     Verify(verify::Verify),
 }
@@ -44,6 +46,7 @@ fn main() -> ExitCode {
     let result = match Arguments::parse().command {
         Command::Check(command) => command.run(),
         Command::Design(command) => command.run(),
+        Command::Firmware(command) => command.run(),
         Command::Simulate(command) => command.run(),
         Command::Verify(command) => command.run(),
     };

@@ -6,7 +6,7 @@ use std::path::PathBuf;
 use clap::{Args, ValueEnum};
 use host_design::rig::{PlantDescription, Rig};
 use host_design::simulate::{Scenario, Sensing, Summary, Trace, simulate, svg};
-use host_design::table::write_atomically;
+use host_design::table::{TableValues, write_atomically};
 use serde_json::json;
 
 use crate::failure::Failure;
@@ -94,10 +94,20 @@ enum Disturbances {
 
 impl Simulate {
     pub(crate) fn run(self) -> Result<(), Failure> {
+        self.run_with(|rig, table, scenario| {
+            Ok(with_spinner("simulating", || simulate(rig, table, scenario))?)
+        })
+    }
+
+    /// Runs the scenario in a way of the caller's, and reports it as usual.
+    pub(crate) fn run_with(
+        self,
+        run: impl FnOnce(&Rig, &TableValues, &Scenario) -> Result<(Trace, Summary), Failure>,
+    ) -> Result<(), Failure> {
         let (rig, _, table) = self.variation.designed()?;
         let scenario = self.scenario(&rig)?;
         let table = if self.raw_step { table.without_governor() } else { table };
-        let (trace, summary) = with_spinner("simulating", || simulate(&rig, &table, &scenario))?;
+        let (trace, summary) = run(&rig, &table, &scenario)?;
         self.write(&rig, &trace, &summary)?;
         match &summary.fall {
             Some(fall) => Err(Failure::CheckFailed(format!("{}: {fall}", rig.name))),

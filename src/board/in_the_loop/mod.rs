@@ -1,0 +1,184 @@
+//! The board in the loop: a simulated rig on the host takes the place of timers and pins, in lock step.
+//!
+//! Every tick waits for the host's [`PinsIn`] and answers with a [`PinsOut`]; telemetry and replies leave on a channel
+//! of their own. When the host closes the pins, the image ends.
+
+#[cfg(feature = "in-the-loop")]
+mod semihosting;
+#[cfg(feature = "in-the-loop-usart")]
+mod usart;
+
+use core::panic::PanicInfo;
+use core::sync::atomic::{AtomicU32, Ordering};
+
+use cortex_m_rt::{ExceptionFrame, exception};
+use heapless::spsc::{Consumer, Producer};
+use stm32f4xx_hal::pac::{Peripherals, TIM5};
+use upright::encoder::CounterWidth;
+use upright::frame::{self, Receiver as Frames};
+use upright::gains::SENSORS;
+use upright::io::{Board, Inputs, Output};
+use upright::message::Reset;
+use upright::pins::{MAX_PINS_IN, MAX_PINS_OUT, PinsIn, PinsOut, Sabotage};
+
+#[cfg(feature = "in-the-loop")]
+use semihosting::{Channel, Serial, exit, open};
+#[cfg(feature = "in-the-loop-usart")]
+use usart::{Channel, Serial, exit, open};
+
+/// The emulator's core clock (Hz); no real time depends on it.
+pub(crate) const CLOCK_HZ: u32 = 168_000_000;
+
+/// Bytes sent over the serial line.
+static SENT: AtomicU32 = AtomicU32::new(0);
+
+/// The simulated pins.
+pub(crate) struct Hardware {
+    pins: Channel,
+    frames: Frames<MAX_PINS_IN>,
+    received: Producer<'static, u8>,
+    clock: TIM5,
+    /// Instructions spent on the pins, which a board does not have.
+    spent: u32,
+}
+
+/// The serial line's interrupt never comes: its bytes come with the pins.
+pub(crate) struct Receiver;
+
+impl Receiver {
+    /// Nothing to do.
+    pub(crate) fn interrupt(&mut self) {}
+}
+
+/// The serial line to the host.
+pub(crate) struct Line {
+    received: Consumer<'static, u8>,
+    serial: Serial,
+}
+
+impl Line {
+    /// The next byte from the host.
+    pub(crate) fn read(&mut self) -> Option<u8> {
+        self.received.dequeue()
+    }
+
+    /// Sends a frame to the host.
+    pub(crate) fn write(&mut self, frame: &[u8]) {
+        self.serial.write(frame);
+        // Longer runs than 2³² bytes are not made.
+        SENT.store(SENT.load(Ordering::Relaxed).wrapping_add(frame.len() as u32), Ordering::Relaxed);
+    }
+}
+
+/// Opens the channels.
+pub(crate) fn set_up(
+    device: Peripherals,
+    (producer, consumer): (Producer<'static, u8>, Consumer<'static, u8>),
+) -> (Hardware, Receiver, Line, Reset) {
+    let clock = device.TIM5;
+    // 32 bits, one count per instruction.
+    clock.arr().write(|w| w.arr().set(u32::MAX));
+    clock.cr1().write(|w| w.cen().enabled());
+    let (pins, serial) = open(device.USART1, device.USART2);
+    let hardware = Hardware { pins, frames: Frames::new(), received: producer, clock, spent: 0 };
+    (hardware, Receiver, Line { received: consumer, serial }, Reset::Power)
+}
+
+impl Board<SENSORS> for Hardware {
+    const WIDTHS: [CounterWidth; SENSORS] = {
+        let mut widths = [CounterWidth::Bits16; SENSORS];
+        widths[0] = CounterWidth::Bits32;
+        widths
+    };
+
+    fn inputs(&mut self) -> Inputs<SENSORS> {
+        let begin = self.instructions();
+        let inputs = self.next_inputs();
+        self.spent = self.spent.wrapping_add(self.instructions().wrapping_sub(begin));
+        inputs
+    }
+
+    fn drive(&mut self, output: &Output) {
+        let begin = self.instructions();
+        send(&mut self.pins, output);
+        self.spent = self.spent.wrapping_add(self.instructions().wrapping_sub(begin));
+    }
+
+    fn feed_watchdog(&mut self) {}
+
+    /// Instructions, not cycles: the emulator counts a nanosecond for each, and knows no cycles.
+    fn cycles(&self) -> u32 {
+        self.instructions().wrapping_sub(self.spent)
+    }
+}
+
+impl Hardware {
+    fn instructions(&self) -> u32 {
+        self.clock.cnt().read().bits()
+    }
+
+    fn next_inputs(&mut self) -> Inputs<SENSORS> {
+        loop {
+            let byte = self.pins.read();
+            let Some(Ok(pins)) = self.frames.push::<PinsIn<SENSORS>>(byte) else {
+                continue;
+            };
+            for &byte in &pins.received {
+                // As on a board: what does not fit is lost.
+                let _ = self.received.enqueue(byte);
+            }
+            if let Some(sabotage) = pins.sabotage {
+                suffer(sabotage);
+            }
+            if let Some(inputs) = pins.inputs() {
+                return inputs;
+            }
+        }
+    }
+}
+
+fn send(pins: &mut Channel, output: &Output) {
+    let message = PinsOut { output: *output, sent: SENT.load(Ordering::Relaxed) };
+    let (mut scratch, mut out) = ([0; MAX_PINS_OUT], [0; MAX_PINS_OUT]);
+    if let Ok(frame) = frame::encode(&message, &mut scratch, &mut out) {
+        pins.write(frame);
+    }
+}
+
+fn suffer(sabotage: Sabotage) {
+    match sabotage {
+        Sabotage::Panic => panic!(),
+        // SAFETY: none: nothing is there. That is the point.
+        Sabotage::HardFault => unsafe { core::ptr::write_volatile(0x4fff_fffc as *mut u32, 0) },
+        Sabotage::StackOverflow => {
+            dig(1);
+        }
+        Sabotage::Stall => loop {
+            cortex_m::asm::nop();
+        },
+    }
+}
+
+#[inline(never)]
+fn dig(depth: u32) -> u32 {
+    let shaft = core::hint::black_box([depth; 32]);
+    // The compiler cannot know that this is always true.
+    if core::hint::black_box(true) { dig(depth.wrapping_add(shaft[0])).wrapping_add(shaft[1]) } else { depth }
+}
+
+/// Motor off, and the end of the run with a status that is not 0.
+pub(crate) fn stop() -> ! {
+    // SAFETY: nothing else runs any more.
+    send(&mut unsafe { Channel::steal() }, &Output::OFF);
+    exit(Err(()))
+}
+
+#[panic_handler]
+fn panicked(_: &PanicInfo) -> ! {
+    stop()
+}
+
+#[exception]
+unsafe fn HardFault(_: &ExceptionFrame) -> ! {
+    stop()
+}

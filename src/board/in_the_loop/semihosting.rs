@@ -1,0 +1,99 @@
+//! Channels to the host as files of the emulator (semihosting): fast, and the same in every run.
+
+use core::sync::atomic::{AtomicUsize, Ordering};
+
+use cortex_m_semihosting::{debug, syscall};
+use stm32f4xx_hal::pac::{USART1, USART2};
+
+const READ_BINARY: usize = 1;
+const WRITE_BINARY: usize = 5;
+
+/// The pins.
+pub(super) struct Channel {
+    input: usize,
+    output: usize,
+    buffer: [u8; 256],
+    next: usize,
+    filled: usize,
+}
+
+/// The serial line.
+pub(super) struct Serial {
+    output: usize,
+}
+
+/// Opens the files `pins.in`, `pins.out` and `serial.out` in the emulator's directory, in this order.
+pub(super) fn open(_: USART1, _: USART2) -> (Channel, Serial) {
+    let input = open_file("pins.in\0", READ_BINARY);
+    let output = open_file("pins.out\0", WRITE_BINARY);
+    PINS_OUT.store(output, Ordering::Relaxed);
+    let serial = open_file("serial.out\0", WRITE_BINARY);
+    (Channel { input, output, buffer: [0; 256], next: 0, filled: 0 }, Serial { output: serial })
+}
+
+/// Handle of the open `pins.out`.
+static PINS_OUT: AtomicUsize = AtomicUsize::new(usize::MAX);
+
+impl Channel {
+    /// The channel once more, to write to.
+    ///
+    /// # Safety
+    /// Its owner must no longer run.
+    pub(super) unsafe fn steal() -> Self {
+        let output = PINS_OUT.load(Ordering::Relaxed);
+        Channel { input: usize::MAX, output, buffer: [0; 256], next: 0, filled: 0 }
+    }
+
+    /// The next byte; waits for it. Ends the run when the host has closed the file.
+    pub(super) fn read(&mut self) -> u8 {
+        loop {
+            if let Some(&byte) = self.buffer.get(self.next).filter(|_| self.next < self.filled) {
+                self.next += 1;
+                return byte;
+            }
+            let room = self.buffer.len();
+            // SAFETY: the buffer is as long as it is said to be.
+            let left = unsafe { syscall!(READ, self.input, self.buffer.as_mut_ptr(), room) };
+            if left >= room {
+                exit(Ok(()));
+            }
+            (self.next, self.filled) = (0, room - left);
+        }
+    }
+
+    /// Sends bytes.
+    pub(super) fn write(&mut self, bytes: &[u8]) {
+        write(self.output, bytes);
+    }
+}
+
+impl Serial {
+    /// Sends bytes.
+    pub(super) fn write(&mut self, bytes: &[u8]) {
+        write(self.output, bytes);
+    }
+}
+
+/// Ends the emulator, with status 0 or 1.
+pub(super) fn exit(status: debug::ExitStatus) -> ! {
+    loop {
+        debug::exit(status);
+    }
+}
+
+fn open_file(name: &str, mode: usize) -> usize {
+    // SAFETY: the name is terminated by a zero byte that its length does not count.
+    let handle = unsafe { syscall!(OPEN, name.as_ptr(), mode, name.len() - 1) };
+    if handle == usize::MAX {
+        exit(Err(()));
+    }
+    handle
+}
+
+fn write(handle: usize, bytes: &[u8]) {
+    // SAFETY: the slice is as long as it is said to be.
+    let left = unsafe { syscall!(WRITE, handle, bytes.as_ptr(), bytes.len()) };
+    if left != 0 {
+        exit(Err(()));
+    }
+}

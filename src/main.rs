@@ -1,0 +1,100 @@
+//! The firmware image: tasks and their priorities.
+//!
+//! | task | started by | priority | does |
+//! |---|---|---|---|
+//! | `tick` | the SysTick timer, at the table's period | highest | inputs → supervisor → controller → motor, then the prediction |
+//! | `received` | the serial line | below | puts a byte into a queue |
+//! | `idle` | | lowest | bytes → commands, telemetry → bytes |
+//!
+//! The tasks share no locked resource, only single-producer, single-consumer queues: nothing below `tick` can delay it by
+//! more than the entry of an interrupt.
+
+#![no_std]
+#![no_main]
+
+mod board;
+
+use upright::gains;
+
+/// The gains are for this many cycles of the processor's clock per tick.
+const CYCLES_PER_TICK: u32 = {
+    let cycles = gains::TICK_S as f64 * board::CLOCK_HZ as f64 + 0.5;
+    assert!(
+        cycles >= 20_000.0 && cycles < 16_777_216.0,
+        "tick.period_s: the board's timer cannot make this tick"
+    );
+    cycles as u32
+};
+
+#[rtic::app(device = stm32f4xx_hal::pac, peripherals = true)]
+mod app {
+    use cortex_m::peripheral::syst::SystClkSource;
+    use heapless::spsc::Queue;
+    use upright::control_task::{COMMANDS, ControlTask, MESSAGES};
+    use upright::firmware::Firmware;
+    use upright::gains::{RIG_HASH, SENSORS, STATES, TABLE, TICK_S};
+    use upright::io::Board;
+    use upright::link::Link;
+    use upright::message::{Command, Message};
+    use upright::table::Build;
+
+    use crate::board::{BYTES, Hardware, Line, Receiver, set_up};
+
+    #[shared]
+    struct Shared {}
+
+    #[local]
+    struct Local {
+        control: ControlTask<'static, 'static, Hardware, STATES, SENSORS>,
+        receiver: Receiver,
+        link: Link<'static, STATES, SENSORS>,
+        line: Line,
+    }
+
+    #[init(local = [
+        commands: Queue<Command, COMMANDS> = Queue::new(),
+        messages: Queue<Message<STATES, SENSORS>, MESSAGES> = Queue::new(),
+        bytes: Queue<u8, BYTES> = Queue::new(),
+    ])]
+    fn init(cx: init::Context) -> (Shared, Local) {
+        let (hardware, receiver, line, reset) = set_up(cx.device, cx.local.bytes.split());
+        let build = Build { rig_hash: RIG_HASH, tick_s: TICK_S };
+        let Ok(firmware) = Firmware::new(&TABLE, &build, Hardware::WIDTHS, reset) else {
+            // A damaged table: there is nothing that this image could do, and the motor is off.
+            crate::board::stop()
+        };
+        let (to_control, commands) = cx.local.commands.split();
+        let (messages, to_link) = cx.local.messages.split();
+        let mut systick = cx.core.SYST;
+        systick.set_clock_source(SystClkSource::Core);
+        systick.set_reload(crate::CYCLES_PER_TICK - 1);
+        systick.clear_current();
+        systick.enable_interrupt();
+        systick.enable_counter();
+        let control = ControlTask::new(firmware, hardware, commands, messages);
+        (Shared {}, Local { control, receiver, link: Link::new(to_control, to_link), line })
+    }
+
+    #[task(binds = SysTick, priority = 3, local = [control])]
+    fn tick(cx: tick::Context) {
+        cx.local.control.tick();
+    }
+
+    #[task(binds = USART2, priority = 1, local = [receiver])]
+    fn received(cx: received::Context) {
+        cx.local.receiver.interrupt();
+    }
+
+    #[idle(local = [link, line])]
+    fn idle(cx: idle::Context) -> ! {
+        loop {
+            while let Some(byte) = cx.local.line.read() {
+                cx.local.link.receive(byte);
+            }
+            match cx.local.link.transmit() {
+                Some(frame) => cx.local.line.write(frame),
+                None => cortex_m::asm::wfi(),
+            }
+        }
+    }
+}
