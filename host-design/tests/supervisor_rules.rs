@@ -104,15 +104,15 @@ fn reasons(answer: Answer) -> Reasons {
 
 #[test]
 fn each_input_turns_the_motor_off_in_its_tick() {
-    let cases: [(&dyn Fn(&mut Given), u32, Fault); 7] = [
-        (&|given| given.contacts.limit_low = true, 1, Fault::LimitSwitch),
-        (&|given| given.contacts.limit_high = true, 1, Fault::LimitSwitch),
-        (&|given| given.contacts.emergency_stop = true, 1, Fault::EmergencyStop),
-        (&|given| given.contacts.driver_fault = true, 1, Fault::Driver),
-        (&|given| given.contacts.overrun = true, 3, Fault::Overrun),
-        (&|given| given.supply_v = Some(f32::NAN), 1, Fault::NotFinite),
+    let cases: [(fn(&mut Given), u32, Fault); 7] = [
+        (|given| given.contacts.limit_low = true, 1, Fault::LimitSwitch),
+        (|given| given.contacts.limit_high = true, 1, Fault::LimitSwitch),
+        (|given| given.contacts.emergency_stop = true, 1, Fault::EmergencyStop),
+        (|given| given.contacts.driver_fault = true, 1, Fault::Driver),
+        (|given| given.contacts.overrun = true, 3, Fault::Overrun),
+        (|given| given.supply_v = Some(f32::NAN), 1, Fault::NotFinite),
         // 5 ms of 2 ms ticks, rounded to 3, and one.
-        (&|given| given.supply_v = Some(7.9), 4, Fault::Supply),
+        (|given| given.supply_v = Some(7.9), 4, Fault::Supply),
     ];
     for (change, ticks, fault) in cases {
         balancing(|rig| {

@@ -49,8 +49,9 @@ impl Supervised for Bits {
 
     fn balancing<const NX: usize, const NY: usize>(self, mut session: Session<'_, NX, NY>) -> Self::Output {
         let tick = |session: &mut Session<'_, NX, NY>| {
-            let telemetry = session.step(None, &mut ()).telemetry;
-            (telemetry.state, telemetry.drive.to_bits(), telemetry.estimate[2].to_bits())
+            session.step(None, &mut ());
+            let controller = session.firmware().controller();
+            (session.firmware().state(), controller.acting().to_bits(), controller.estimate()[2].to_bits())
         };
         (0..self.ticks).map(|_| tick(&mut session)).collect()
     }
