@@ -104,7 +104,8 @@ fn reasons(answer: Answer) -> Reasons {
 
 #[test]
 fn each_input_turns_the_motor_off_in_its_tick() {
-    let cases: [(fn(&mut Given), u32, Fault); 7] = [
+    type Case = (fn(&mut Given), u32, Fault);
+    let cases: [Case; 7] = [
         (|given| given.contacts.limit_low = true, 1, Fault::LimitSwitch),
         (|given| given.contacts.limit_high = true, 1, Fault::LimitSwitch),
         (|given| given.contacts.emergency_stop = true, 1, Fault::EmergencyStop),
