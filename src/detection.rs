@@ -17,7 +17,7 @@ use crate::fault::Fault;
 pub const MEMORY: f32 = 16.0;
 const KEEP: f32 = 1.0 - 1.0 / MEMORY;
 /// So many implausible measurements in a row are a fault.
-pub const IN_A_ROW: u8 = 3;
+pub const IN_A_ROW: u32 = 3;
 
 /// Thresholds of the tests for `NY` sensors; `f32::MAX` where there is nothing to test.
 #[derive(Debug, Clone, PartialEq)]
@@ -83,23 +83,29 @@ pub struct Finding {
 /// The memory of the tests.
 #[derive(Debug, Clone)]
 pub struct Detection<const NY: usize> {
-    implausible: [u8; NY],
-    counts: [i32; NY],
-    corrected: [f32; NY],
-    moved: [f32; NY],
+    sensors: [SensorMemory; NY],
     missing: [f32; 2],
     likeness: f32,
     energy: f32,
     rejected: u32,
 }
 
+/// What is remembered of a sensor.
+#[derive(Debug, Clone, Copy, Default)]
+struct SensorMemory {
+    counts: i32,
+    /// Corrected estimate of its position in the tick before (m or rad).
+    corrected: f32,
+    /// Predicted motion while the counter stands still (m or rad).
+    moved: f32,
+    /// Implausible measurements in a row.
+    implausible: u32,
+}
+
 impl<const NY: usize> Default for Detection<NY> {
     fn default() -> Self {
         Self {
-            implausible: [0; NY],
-            counts: [0; NY],
-            corrected: [0.0; NY],
-            moved: [0.0; NY],
+            sensors: [SensorMemory::default(); NY],
             missing: [0.0; 2],
             likeness: 0.0,
             energy: 0.0,
@@ -111,7 +117,10 @@ impl<const NY: usize> Default for Detection<NY> {
 impl<const NY: usize> Detection<NY> {
     /// Begins at positions `y` (m or rad).
     pub fn start(&mut self, counts: &[i32; NY], y: &[f32; NY]) {
-        *self = Self { counts: *counts, corrected: *y, rejected: self.rejected, ..Self::default() };
+        *self = Self { rejected: self.rejected, ..Self::default() };
+        for ((sensor, &counts), &corrected) in self.sensors.iter_mut().zip(counts).zip(y) {
+            (sensor.counts, sensor.corrected) = (counts, corrected);
+        }
     }
 
     /// Tests the innovation `e = y - C x̂⁻` of a tick; measurements that are not plausible get the innovation 0.
@@ -123,56 +132,41 @@ impl<const NY: usize> Detection<NY> {
         y: &[f32; NY],
         e: &mut [f32; NY],
     ) -> Option<Finding> {
-        let frozen = self.frozen(&thresholds.frozen, counts, y, e);
-        let implausible = self.implausible(&thresholds.innovation, e);
+        let (mut in_trouble, mut contradicts, mut frozen) = (0, None, None);
+        let limits = thresholds.innovation.iter().zip(&thresholds.frozen);
+        let measured = counts.iter().zip(y).zip(e.iter_mut());
+        // One pass over the sensors for both tests: every value is loaded once.
+        for (((memory, ((&counts, y), e)), (&plausible, &still)), sensor) in
+            self.sensors.iter_mut().zip(measured).zip(limits).zip(0..)
+        {
+            if counts == memory.counts {
+                // y - e is the predicted position.
+                memory.moved = KEEP * memory.moved + (y - *e - memory.corrected);
+                if memory.moved.abs() > still {
+                    frozen = Some(sensor);
+                }
+            } else {
+                (memory.moved, memory.counts) = (0.0, counts);
+            }
+            if e.abs() <= plausible {
+                memory.implausible = 0;
+            } else {
+                *e = 0.0;
+                memory.implausible = memory.implausible.saturating_add(1);
+                self.rejected = self.rejected.saturating_add(1);
+                in_trouble += 1;
+                if memory.implausible >= IN_A_ROW && contradicts.is_none() {
+                    contradicts = Some(sensor);
+                }
+            }
+        }
         // A measurement that was rejected says nothing about the motor.
         let motor = self.motor(&thresholds.motor, e.first().copied().unwrap_or_default());
-        implausible.or(frozen).or(motor)
-    }
-
-    fn implausible(&mut self, thresholds: &[f32; NY], e: &mut [f32; NY]) -> Option<Finding> {
-        let (mut in_trouble, mut found) = (0, None);
-        for (((e, &threshold), streak), sensor) in
-            e.iter_mut().zip(thresholds).zip(&mut self.implausible).zip(0..)
-        {
-            if e.abs() <= threshold {
-                *streak = 0;
-                continue;
-            }
-            *e = 0.0;
-            *streak = streak.saturating_add(1);
-            self.rejected = self.rejected.saturating_add(1);
-            in_trouble += 1;
-            if *streak >= IN_A_ROW && found.is_none() {
-                found = Some(sensor);
-            }
-        }
-        found.map(|sensor| Finding {
+        let contradicts = contradicts.map(|sensor| Finding {
             fault: if in_trouble > 1 { Fault::Motor } else { Fault::Encoder },
             sensor,
-        })
-    }
-
-    #[inline]
-    fn frozen(
-        &mut self,
-        thresholds: &[f32; NY],
-        counts: &[i32; NY],
-        y: &[f32; NY],
-        e: &[f32; NY],
-    ) -> Option<Finding> {
-        let mut found = None;
-        let before = self.counts.iter_mut().zip(&self.corrected).zip(&mut self.moved);
-        let now = counts.iter().zip(y).zip(e).zip(thresholds).zip(0..);
-        for (((last, corrected), moved), ((((&count, y), e), &threshold), sensor)) in before.zip(now) {
-            // y - e is the predicted position.
-            *moved = if count == *last { KEEP * *moved + (y - e - corrected) } else { 0.0 };
-            *last = count;
-            if moved.abs() > threshold {
-                found = Some(Finding { fault: Fault::Frozen, sensor });
-            }
-        }
-        found
+        });
+        contradicts.or(frozen.map(|sensor| Finding { fault: Fault::Frozen, sensor })).or(motor)
     }
 
     #[inline]
@@ -187,7 +181,9 @@ impl<const NY: usize> Detection<NY> {
     /// Ends a tick in which the force `u` (N) acts, with the corrected estimate of the sensors' positions.
     #[inline]
     pub fn end(&mut self, test: &MotorTest, corrected: [f32; NY], u: f32) {
-        self.corrected = corrected;
+        for (sensor, corrected) in self.sensors.iter_mut().zip(corrected) {
+            sensor.corrected = corrected;
+        }
         let ([p, v], [pp, pv, vp, vv], [b_p, b_v]) = (self.missing, test.a, test.b);
         self.missing = [pp * p + pv * v - b_p * u, vp * p + vv * v - b_v * u];
     }

@@ -9,8 +9,8 @@ use crate::limits::Limits;
 /// at, so that a single bad measurement, which was rejected, does not count.
 #[inline]
 pub fn left<const NY: usize>(limits: &Limits<NY>, x: &[f32], requested: f32) -> Option<Fault> {
-    let sum: f32 = x.iter().sum();
-    if !(sum + requested).is_finite() {
+    // The request is a sum over all states: if one of them is not finite, it is not either.
+    if !requested.is_finite() {
         return Some(Fault::NotFinite);
     }
     let mut states = x.iter();
@@ -33,6 +33,22 @@ pub fn left<const NY: usize>(limits: &Limits<NY>, x: &[f32], requested: f32) -> 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::state_feedback::state_feedback;
+    use nalgebra::SVector;
+
+    #[test]
+    fn whichever_state_is_not_finite_the_request_is_not_either() {
+        // A gain of 0 as well: 0 times infinity is not a number.
+        let k = SVector::from([1.0, -2.0, 0.0, 3.0]);
+        for state in 0..4 {
+            for bad in [f32::NAN, f32::INFINITY, f32::NEG_INFINITY] {
+                let mut x = SVector::from([0.5; 4]);
+                x[state] = bad;
+                assert!(!state_feedback(1.0, 0.0, &k, &x).is_finite());
+            }
+        }
+        assert!(state_feedback(1.0, 0.0, &k, &SVector::from([0.5; 4])).is_finite());
+    }
 
     #[test]
     fn every_limit_is_watched_on_both_sides() {
@@ -46,7 +62,8 @@ mod tests {
         assert_eq!(found([0.0, 0.0, -0.31, 0.0, 0.0, 0.0]), Some(Fault::Angle));
         // Each joint within the limit, the second link not.
         assert_eq!(found([0.0, 0.0, 0.2, 0.0, 0.2, 0.0]), Some(Fault::Angle));
-        assert_eq!(found([0.0, 0.0, 0.0, f32::NAN, 0.0, 0.0]), Some(Fault::NotFinite));
-        assert_eq!(left(&limits, &[0.0; 6], f32::INFINITY), Some(Fault::NotFinite));
+        for requested in [f32::INFINITY, f32::NAN] {
+            assert_eq!(left(&limits, &[0.0; 6], requested), Some(Fault::NotFinite));
+        }
     }
 }
