@@ -4,6 +4,7 @@ use nalgebra::SVector;
 
 use crate::actuator::Drive;
 use crate::encoder::{CounterWidth, Encoders};
+use crate::observer::Observer;
 use crate::state_feedback::{LawGains, LawState, saturate};
 use crate::table::{Build, GainTable, Law, TableError};
 
@@ -16,6 +17,7 @@ pub struct Controller<'t, const NX: usize, const NY: usize> {
     table: &'t GainTable<NX, NY>,
     law: Law,
     gains: &'t LawGains<NX>,
+    observer: Option<Observer<'t, NX, NY>>,
     running: bool,
     target: f32,
     encoders: Encoders<NY>,
@@ -89,6 +91,7 @@ impl<'t, const NX: usize, const NY: usize> Controller<'t, NX, NY> {
             table,
             law,
             gains,
+            observer: table.observer.as_ref().map(Observer::new),
             running: false,
             target: 0.0,
             encoders: Encoders::new(widths),
@@ -210,11 +213,11 @@ impl<'t, const NX: usize, const NY: usize> Controller<'t, NX, NY> {
     /// ```
     pub fn control(&mut self, raw: &[u32; NY]) -> Command {
         self.encoders.update(raw);
-        if let Some(observer) = &self.table.observer {
-            let y = self.encoders.positions(&observer.step);
-            self.innovation = observer.innovation(&y, &self.estimate);
-            self.estimate = observer.correct(&self.estimate, &self.innovation);
-        }
+        let (true, Some(observer)) = (self.running, &self.observer) else {
+            return OFF;
+        };
+        let y = self.encoders.positions(&observer.gains.step);
+        self.innovation.data.0[0] = observer.correct(y.data.0[0], &mut self.estimate.data.0[0]);
         self.act()
     }
 
@@ -254,8 +257,8 @@ impl<'t, const NX: usize, const NY: usize> Controller<'t, NX, NY> {
         let during_this_tick = if self.table.delay_ticks == 1 { self.state.pending } else { applied };
         let position = self.output();
         self.state.advance(self.gains.k_integral, position, self.table.tick_s, requested, applied);
-        if let Some(observer) = &self.table.observer {
-            self.estimate = observer.predict(&self.estimate, during_this_tick);
+        if let Some(observer) = &self.observer {
+            observer.predict(&mut self.estimate.data.0[0], during_this_tick);
         }
     }
 

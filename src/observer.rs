@@ -18,48 +18,76 @@ pub struct ObserverGains<const NX: usize, const NY: usize> {
 }
 
 impl<const NX: usize, const NY: usize> ObserverGains<NX, NY> {
-    /// Innovation `e = y - C x̂⁻`, formed explicitly: a merged `Ad - L C` would cost most of the digits of u in f32.
-    #[inline]
-    pub fn innovation(&self, y: &SVector<f32, NY>, predicted: &SVector<f32, NX>) -> SVector<f32, NY> {
-        let mut e = *y;
-        for (e, &state) in e.iter_mut().zip(&self.measured) {
-            // A checked table only names states that exist.
-            *e -= predicted.get(state as usize).copied().unwrap_or_default();
+    pub(crate) fn values(&self) -> impl Iterator<Item = f32> {
+        let matrices = self.ad.iter().chain(self.bd.iter()).chain(self.l.iter());
+        matrices.chain(self.step.iter()).copied()
+    }
+}
+
+/// The observer of a table, with what the zeros of this table save in every tick.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Observer<'t, const NX: usize, const NY: usize> {
+    pub(crate) gains: &'t ObserverGains<NX, NY>,
+    /// Sensor i measures state 2i, as in every chain: its entry of x̂⁻ needs no look-up.
+    sensors_in_order: bool,
+    /// The first column of Ad is 1, 0, 0 …, as in every chain: where the cart is moves nothing.
+    first_state_moves_nothing: bool,
+}
+
+impl<'t, const NX: usize, const NY: usize> Observer<'t, NX, NY> {
+    pub(crate) fn new(gains: &'t ObserverGains<NX, NY>) -> Self {
+        let first = gains.ad.column(0);
+        Self {
+            gains,
+            sensors_in_order: gains.measured.iter().zip(0..).all(|(&state, sensor)| state == 2 * sensor),
+            first_state_moves_nothing: first.iter().zip(0..).all(|(&a, row)| a == if row == 0 { 1.0 } else { 0.0 }),
         }
-        e
     }
 
-    /// Current estimate `x̂ = x̂⁻ + L e`.
+    /// Turns the prediction x̂⁻ into the current estimate `x̂ = x̂⁻ + L e`, and gives the innovation `e = y - C x̂⁻`.
     #[inline]
-    pub fn correct(&self, predicted: &SVector<f32, NX>, e: &SVector<f32, NY>) -> SVector<f32, NX> {
-        let mut x = *predicted;
-        for (column, e) in self.l.column_iter().zip(e.iter()) {
-            for (x, l) in x.iter_mut().zip(column.iter()) {
-                *x += l * e;
+    pub(crate) fn correct(&self, y: [f32; NY], estimate: &mut [f32; NX]) -> [f32; NY] {
+        let mut x = *estimate;
+        let mut e = y;
+        if self.sensors_in_order {
+            for (e, x) in e.iter_mut().zip(x.iter().step_by(2)) {
+                *e -= x;
+            }
+        } else {
+            for (e, &state) in e.iter_mut().zip(&self.gains.measured) {
+                // A checked table only names states that exist.
+                *e -= estimate.get(state as usize).copied().unwrap_or_default();
             }
         }
-        x
+        for (column, &e) in self.gains.l.data.0.iter().zip(&e) {
+            add_scaled(&mut x, column, e);
+        }
+        *estimate = x;
+        e
     }
 
     /// Prediction for the next tick `x̂⁻ = Ad x̂ + Bd u`, with the force `u` (N) that is really applied.
     #[inline]
-    pub fn predict(&self, x: &SVector<f32, NX>, u: f32) -> SVector<f32, NX> {
+    pub(crate) fn predict(&self, estimate: &mut [f32; NX], u: f32) {
         // Column by column, in a fixed order: the same bits on every machine.
-        let mut next = self.bd;
-        for next in next.iter_mut() {
-            *next *= u;
-        }
-        for (column, x) in self.ad.column_iter().zip(x.iter()) {
-            for (next, a) in next.iter_mut().zip(column.iter()) {
-                *next += a * x;
+        let mut next = self.gains.bd.data.0[0].map(|b| b * u);
+        for (state, (column, &x)) in self.gains.ad.data.0.iter().zip(estimate.iter()).enumerate() {
+            if state == 0 && self.first_state_moves_nothing {
+                if let Some(next) = next.first_mut() {
+                    *next += x;
+                }
+            } else {
+                add_scaled(&mut next, column, x);
             }
         }
-        next
+        *estimate = next;
     }
+}
 
-    pub(crate) fn values(&self) -> impl Iterator<Item = f32> {
-        let matrices = self.ad.iter().chain(self.bd.iter()).chain(self.l.iter());
-        matrices.chain(self.step.iter()).copied()
+#[inline]
+fn add_scaled<const N: usize>(sum: &mut [f32; N], column: &[f32; N], factor: f32) {
+    for (sum, entry) in sum.iter_mut().zip(column) {
+        *sum += entry * factor;
     }
 }
 
@@ -70,13 +98,14 @@ mod tests {
 
     #[test]
     fn the_estimate_follows_the_equations() {
-        let observer = ObserverGains {
+        let gains = ObserverGains {
             ad: matrix![1.0, 0.5; 0.0, 1.0],
             bd: vector![0.125, 0.5],
             l: matrix![0.5; 2.0],
             measured: [0],
             step: vector![1.0],
         };
+        let observer = Observer::new(&gains);
         let e = observer.innovation(&vector![3.0], &vector![1.0, -1.0]);
         assert_eq!(e, vector![2.0]);
         let x = observer.correct(&vector![1.0, -1.0], &e);
