@@ -5,7 +5,7 @@ use nalgebra::SVector;
 use crate::actuator::Drive;
 use crate::encoder::{CounterWidth, Encoders};
 use crate::observer::Observer;
-use crate::state_feedback::{LawGains, LawState, saturate};
+use crate::state_feedback::{LawGains, LawState, saturate, state_feedback};
 use crate::table::{Build, GainTable, Law, TableError};
 
 /// Observer, control law and actuator map of one gain table.
@@ -17,8 +17,9 @@ pub struct Controller<'t, const NX: usize, const NY: usize> {
     table: &'t GainTable<NX, NY>,
     law: Law,
     gains: &'t LawGains<NX>,
-    observer: Option<Observer<'t, NX, NY>>,
-    running: bool,
+    /// Whether the law depends on earlier ticks, by a force on its way or an integral.
+    remembers: bool,
+    mode: Mode<'t, NX, NY>,
     target: f32,
     encoders: Encoders<NY>,
     /// Current estimate x̂ within a tick, predicted estimate x̂⁻ between ticks.
@@ -26,7 +27,16 @@ pub struct Controller<'t, const NX: usize, const NY: usize> {
     innovation: SVector<f32, NY>,
     state: LawState,
     last_volts: f32,
-    command: Command,
+    requested: f32,
+    applied: f32,
+}
+
+#[derive(Debug, Clone, Copy)]
+enum Mode<'t, const NX: usize, const NY: usize> {
+    Stopped,
+    /// Running, and the table holds no observer.
+    WithoutObserver,
+    WithObserver(Observer<'t, NX, NY>),
 }
 
 /// The outcome of a tick.
@@ -91,15 +101,16 @@ impl<'t, const NX: usize, const NY: usize> Controller<'t, NX, NY> {
             table,
             law,
             gains,
-            observer: table.observer.as_ref().map(Observer::new),
-            running: false,
+            remembers: table.remembers(gains),
+            mode: Mode::Stopped,
             target: 0.0,
             encoders: Encoders::new(widths),
             estimate: SVector::zeros(),
             innovation: SVector::zeros(),
             state: LawState::default(),
             last_volts: 0.0,
-            command: OFF,
+            requested: 0.0,
+            applied: 0.0,
         })
     }
 
@@ -114,10 +125,11 @@ impl<'t, const NX: usize, const NY: usize> Controller<'t, NX, NY> {
     /// [`Rejected::Running`] between [`start`](Self::start) and [`stop`](Self::stop): a change of gains in mid-balance is
     /// a jump of the force. [`Rejected::NoSuchLaw`] if the table does not hold it.
     pub fn select(&mut self, law: Law) -> Result<(), Rejected> {
-        if self.running {
+        if !matches!(self.mode, Mode::Stopped) {
             return Err(Rejected::Running);
         }
         self.gains = self.table.law(law).ok_or(Rejected::NoSuchLaw)?;
+        self.remembers = self.table.remembers(self.gains);
         self.law = law;
         Ok(())
     }
@@ -193,14 +205,17 @@ impl<'t, const NX: usize, const NY: usize> Controller<'t, NX, NY> {
         self.innovation = SVector::zeros();
         self.state = LawState { setpoint: self.output(), ..LawState::default() };
         self.last_volts = 0.0;
-        self.command = OFF;
-        self.running = true;
+        (self.requested, self.applied) = (0.0, 0.0);
+        self.mode = self
+            .table
+            .observer
+            .as_ref()
+            .map_or(Mode::WithoutObserver, |gains| Mode::WithObserver(Observer::new(gains)));
     }
 
     /// Stops: the next tick needs a new start.
     pub fn stop(&mut self) {
-        self.running = false;
-        self.command = OFF;
+        self.mode = Mode::Stopped;
     }
 
     /// First half of a tick: from raw encoder counts to the command for the motor.
@@ -213,26 +228,31 @@ impl<'t, const NX: usize, const NY: usize> Controller<'t, NX, NY> {
     /// ```
     pub fn control(&mut self, raw: &[u32; NY]) -> Command {
         self.encoders.update(raw);
-        let (true, Some(observer)) = (self.running, &self.observer) else {
+        let Mode::WithObserver(observer) = &self.mode else {
             return OFF;
         };
-        let y = self.encoders.positions(&observer.gains.step);
-        self.innovation.data.0[0] = observer.correct(y.data.0[0], &mut self.estimate.data.0[0]);
+        let (estimate, innovation) = (&mut self.estimate.data.0[0], &mut self.innovation.data.0[0]);
+        observer.correct(&self.encoders, estimate, innovation);
         self.act()
     }
 
     /// First half of a tick with the whole state measured: what the paper simulates.
     pub fn control_from_state(&mut self, x: &SVector<f32, NX>) -> Command {
         self.estimate = *x;
+        if let Mode::Stopped = self.mode {
+            return OFF;
+        }
         self.act()
     }
 
+    #[inline]
     fn act(&mut self) -> Command {
-        if !self.running {
-            return OFF;
-        }
         self.state.govern(self.target, self.gains.setpoint_step);
-        let requested = self.state.force(self.gains, &self.estimate);
+        let requested = if self.remembers {
+            self.state.force(self.gains, &self.estimate)
+        } else {
+            state_feedback(self.gains.n, self.state.setpoint, &self.gains.k, &self.estimate)
+        };
         let limited = saturate(requested, self.table.force_limit_n);
         let (applied, drive) = match &self.table.motor {
             None => (limited, Drive::Force(limited)),
@@ -244,20 +264,22 @@ impl<'t, const NX: usize, const NY: usize> Controller<'t, NX, NY> {
                 (force, Drive::Duty(motor.duty(volts)))
             }
         };
-        self.command = Command { requested, applied, drive };
-        self.command
+        (self.requested, self.applied) = (requested, applied);
+        Command { requested, applied, drive }
     }
 
     /// Second half of a tick: `x̂⁻ = Ad x̂ + Bd u` with the force really applied, and the integral.
     pub fn predict(&mut self) {
-        if !self.running {
-            return;
+        let (requested, applied) = (self.requested, self.applied);
+        let mut during_this_tick = applied;
+        if self.remembers {
+            if self.table.delay_ticks == 1 {
+                during_this_tick = self.state.pending;
+            }
+            let position = self.output();
+            self.state.advance(self.gains.k_integral, position, self.table.tick_s, requested, applied);
         }
-        let Command { requested, applied, .. } = self.command;
-        let during_this_tick = if self.table.delay_ticks == 1 { self.state.pending } else { applied };
-        let position = self.output();
-        self.state.advance(self.gains.k_integral, position, self.table.tick_s, requested, applied);
-        if let Some(observer) = &self.observer {
+        if let Mode::WithObserver(observer) = &self.mode {
             observer.predict(&mut self.estimate.data.0[0], during_this_tick);
         }
     }

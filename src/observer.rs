@@ -2,6 +2,8 @@
 
 use nalgebra::{SMatrix, SVector};
 
+use crate::encoder::Encoders;
+
 /// Model and gain of the observer for `NX` states and `NY` sensors.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ObserverGains<const NX: usize, const NY: usize> {
@@ -44,26 +46,43 @@ impl<'t, const NX: usize, const NY: usize> Observer<'t, NX, NY> {
         }
     }
 
-    /// Turns the prediction x̂⁻ into the current estimate `x̂ = x̂⁻ + L e`, and gives the innovation `e = y - C x̂⁻`.
+    /// Takes the encoders' positions y: innovation `e = y - C x̂⁻`, formed explicitly because a merged `Ad - L C` would
+    /// cost most of the digits of u in f32, and current estimate `x̂ = x̂⁻ + L e` in place of the prediction x̂⁻.
     #[inline]
-    pub(crate) fn correct(&self, y: [f32; NY], estimate: &mut [f32; NX]) -> [f32; NY] {
-        let mut x = *estimate;
-        let mut e = y;
+    pub(crate) fn correct(&self, y: &Encoders<NY>, estimate: &mut [f32; NX], innovation: &mut [f32; NY]) {
         if self.sensors_in_order {
-            for (e, x) in e.iter_mut().zip(x.iter().step_by(2)) {
-                *e -= x;
-            }
+            self.correct_with(|sensor| 2 * sensor, y, estimate, innovation);
         } else {
-            for (e, &state) in e.iter_mut().zip(&self.gains.measured) {
-                // A checked table only names states that exist.
-                *e -= estimate.get(state as usize).copied().unwrap_or_default();
-            }
+            self.correct_looking_up(y, estimate, innovation);
+        }
+    }
+
+    // Out of line, so that it costs the way without look-up no register.
+    #[cold]
+    #[inline(never)]
+    fn correct_looking_up(&self, y: &Encoders<NY>, estimate: &mut [f32; NX], innovation: &mut [f32; NY]) {
+        let measured = |sensor| self.gains.measured.get(sensor).map_or(NX, |&state| state as usize);
+        self.correct_with(measured, y, estimate, innovation);
+    }
+
+    #[inline(always)]
+    fn correct_with(
+        &self,
+        measured: impl Fn(usize) -> usize,
+        encoders: &Encoders<NY>,
+        estimate: &mut [f32; NX],
+        innovation: &mut [f32; NY],
+    ) {
+        let mut x = *estimate;
+        let mut e = encoders.positions(&self.gains.step).data.0[0];
+        for (sensor, e) in e.iter_mut().enumerate() {
+            // A checked table only names states that exist.
+            *e -= estimate.get(measured(sensor)).copied().unwrap_or_default();
         }
         for (column, &e) in self.gains.l.data.0.iter().zip(&e) {
             add_scaled(&mut x, column, e);
         }
-        *estimate = x;
-        e
+        (*estimate, *innovation) = (x, e);
     }
 
     /// Prediction for the next tick `x̂⁻ = Ad x̂ + Bd u`, with the force `u` (N) that is really applied.

@@ -44,14 +44,14 @@ pub fn state_feedback<const NX: usize>(n: f32, r: f32, k: &SVector<f32, NX>, x: 
 /// `u` limited to ±`limit`; 0 if `u` is not a number, because a motor must never be driven by one.
 #[inline]
 pub fn saturate(u: f32, limit: f32) -> f32 {
-    if u > limit {
-        limit
-    } else if u < -limit {
-        -limit
-    } else if u.is_nan() {
-        0.0
-    } else {
+    if u.abs() <= limit {
         u
+    } else if u > 0.0 {
+        limit
+    } else if u < 0.0 {
+        -limit
+    } else {
+        0.0
     }
 }
 
@@ -92,11 +92,13 @@ impl LawState {
     /// the request back (Åström & Hägglund, *Advanced PID Control*, section 3.5).
     #[inline]
     pub fn advance(&mut self, k_integral: f32, x: f32, tick_s: f32, requested: f32, applied: f32) {
-        let moved = tick_s * (x - self.setpoint);
-        let excess = requested - applied;
-        // The next request changes by -k_integral·moved; hold z if that has the sign of the excess.
-        if excess * (-k_integral * moved) <= 0.0 {
-            self.integral += moved;
+        if k_integral != 0.0 {
+            let moved = tick_s * (x - self.setpoint);
+            let excess = requested - applied;
+            // The next request changes by -k_integral·moved; hold z if that has the sign of the excess.
+            if excess * (-k_integral * moved) <= 0.0 {
+                self.integral += moved;
+            }
         }
         self.pending = applied;
     }
