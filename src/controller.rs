@@ -228,12 +228,14 @@ impl<'t, const NX: usize, const NY: usize> Controller<'t, NX, NY> {
     /// ```
     pub fn control(&mut self, raw: &[u32; NY]) -> Command {
         self.encoders.update(raw);
-        let Mode::WithObserver(observer) = &self.mode else {
-            return OFF;
+        let requested = match self.mode {
+            Mode::WithObserver(observer) if observer.sensors_in_order => {
+                self.observe(&observer, |sensor| 2 * sensor)
+            }
+            Mode::WithObserver(observer) => self.observe_looking_up(&observer),
+            Mode::WithoutObserver | Mode::Stopped => return OFF,
         };
-        let (estimate, innovation) = (&mut self.estimate.data.0[0], &mut self.innovation.data.0[0]);
-        observer.correct(&self.encoders, estimate, innovation);
-        self.act()
+        self.drive(requested)
     }
 
     /// First half of a tick with the whole state measured: what the paper simulates.
@@ -242,17 +244,40 @@ impl<'t, const NX: usize, const NY: usize> Controller<'t, NX, NY> {
         if let Mode::Stopped = self.mode {
             return OFF;
         }
-        self.act()
+        let requested = self.request();
+        self.drive(requested)
     }
 
-    #[inline]
-    fn act(&mut self) -> Command {
+    // Out of line, so that it costs the way without look-up no register.
+    #[cold]
+    #[inline(never)]
+    fn observe_looking_up(&mut self, observer: &Observer<'t, NX, NY>) -> f32 {
+        let measured = &observer.gains.measured;
+        self.observe(observer, |sensor| measured.get(sensor).map_or(NX, |&state| state as usize))
+    }
+
+    #[inline(always)]
+    fn observe(&mut self, observer: &Observer<'t, NX, NY>, measured: impl Fn(usize) -> usize) -> f32 {
+        let y = self.encoders.positions(&observer.gains.step).data.0[0];
+        observer.correct(measured, &y, &mut self.estimate.data.0[0], &mut self.innovation.data.0[0]);
+        self.request()
+    }
+
+    /// The force that the law asks for with the estimate.
+    #[inline(always)]
+    fn request(&mut self) -> f32 {
         self.state.govern(self.target, self.gains.setpoint_step);
-        let requested = if self.remembers {
-            self.state.force(self.gains, &self.estimate)
-        } else {
-            state_feedback(self.gains.n, self.state.setpoint, &self.gains.k, &self.estimate)
-        };
+        let mut requested = state_feedback(self.gains.n, self.state.setpoint, &self.gains.k, &self.estimate);
+        if self.remembers {
+            requested -= self.gains.k_pending * self.state.pending;
+            requested -= self.gains.k_integral * self.state.integral;
+        }
+        requested
+    }
+
+    /// Limits the force and turns it into what the power stage needs.
+    #[inline]
+    fn drive(&mut self, requested: f32) -> Command {
         let limited = saturate(requested, self.table.force_limit_n);
         let (applied, drive) = match &self.table.motor {
             None => (limited, Drive::Force(limited)),

@@ -1,9 +1,6 @@
 //! The state estimate: a steady-state Kalman filter in current (filter) form.
 
 use nalgebra::{SMatrix, SVector};
-
-use crate::encoder::Encoders;
-
 /// Model and gain of the observer for `NX` states and `NY` sensors.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ObserverGains<const NX: usize, const NY: usize> {
@@ -31,7 +28,7 @@ impl<const NX: usize, const NY: usize> ObserverGains<NX, NY> {
 pub(crate) struct Observer<'t, const NX: usize, const NY: usize> {
     pub(crate) gains: &'t ObserverGains<NX, NY>,
     /// Sensor i measures state 2i, as in every chain: its entry of x̂⁻ needs no look-up.
-    sensors_in_order: bool,
+    pub(crate) sensors_in_order: bool,
     /// The first column of Ad is 1, 0, 0 …, as in every chain: where the cart is moves nothing.
     first_state_moves_nothing: bool,
 }
@@ -48,33 +45,18 @@ impl<'t, const NX: usize, const NY: usize> Observer<'t, NX, NY> {
 
     /// Takes the encoders' positions y: innovation `e = y - C x̂⁻`, formed explicitly because a merged `Ad - L C` would
     /// cost most of the digits of u in f32, and current estimate `x̂ = x̂⁻ + L e` in place of the prediction x̂⁻.
-    #[inline]
-    pub(crate) fn correct(&self, y: &Encoders<NY>, estimate: &mut [f32; NX], innovation: &mut [f32; NY]) {
-        if self.sensors_in_order {
-            self.correct_with(|sensor| 2 * sensor, y, estimate, innovation);
-        } else {
-            self.correct_looking_up(y, estimate, innovation);
-        }
-    }
-
-    // Out of line, so that it costs the way without look-up no register.
-    #[cold]
-    #[inline(never)]
-    fn correct_looking_up(&self, y: &Encoders<NY>, estimate: &mut [f32; NX], innovation: &mut [f32; NY]) {
-        let measured = |sensor| self.gains.measured.get(sensor).map_or(NX, |&state| state as usize);
-        self.correct_with(measured, y, estimate, innovation);
-    }
-
+    ///
+    /// `measured` says which state a sensor measures.
     #[inline(always)]
-    fn correct_with(
+    pub(crate) fn correct(
         &self,
         measured: impl Fn(usize) -> usize,
-        encoders: &Encoders<NY>,
+        y: &[f32; NY],
         estimate: &mut [f32; NX],
         innovation: &mut [f32; NY],
     ) {
         let mut x = *estimate;
-        let mut e = encoders.positions(&self.gains.step).data.0[0];
+        let mut e = *y;
         for (sensor, e) in e.iter_mut().enumerate() {
             // A checked table only names states that exist.
             *e -= estimate.get(measured(sensor)).copied().unwrap_or_default();
@@ -86,7 +68,7 @@ impl<'t, const NX: usize, const NY: usize> Observer<'t, NX, NY> {
     }
 
     /// Prediction for the next tick `x̂⁻ = Ad x̂ + Bd u`, with the force `u` (N) that is really applied.
-    #[inline]
+    #[inline(always)]
     pub(crate) fn predict(&self, estimate: &mut [f32; NX], u: f32) {
         // Column by column, in a fixed order: the same bits on every machine.
         let mut next = self.gains.bd.data.0[0].map(|b| b * u);
@@ -103,7 +85,7 @@ impl<'t, const NX: usize, const NY: usize> Observer<'t, NX, NY> {
     }
 }
 
-#[inline]
+#[inline(always)]
 fn add_scaled<const N: usize>(sum: &mut [f32; N], column: &[f32; N], factor: f32) {
     for (sum, entry) in sum.iter_mut().zip(column) {
         *sum += entry * factor;
