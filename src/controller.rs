@@ -228,12 +228,14 @@ impl<'t, const NX: usize, const NY: usize> Controller<'t, NX, NY> {
     /// ```
     pub fn control(&mut self, raw: &[u32; NY]) -> Command {
         self.encoders.update(raw);
-        let requested = match self.mode {
-            Mode::WithObserver(observer) if observer.sensors_in_order => {
-                self.observe(&observer, |sensor| 2 * sensor)
-            }
-            Mode::WithObserver(observer) => self.observe_looking_up(&observer),
-            Mode::WithoutObserver | Mode::Stopped => return OFF,
+        let Mode::WithObserver(observer) = self.mode else {
+            return OFF;
+        };
+        self.state.govern(self.target, self.gains.setpoint_step);
+        let requested = if observer.sensors_in_order {
+            self.observe(&observer, |sensor| 2 * sensor)
+        } else {
+            self.observe_looking_up(&observer)
         };
         self.drive(requested)
     }
@@ -244,6 +246,7 @@ impl<'t, const NX: usize, const NY: usize> Controller<'t, NX, NY> {
         if let Mode::Stopped = self.mode {
             return OFF;
         }
+        self.state.govern(self.target, self.gains.setpoint_step);
         let requested = self.request();
         self.drive(requested)
     }
@@ -266,7 +269,6 @@ impl<'t, const NX: usize, const NY: usize> Controller<'t, NX, NY> {
     /// The force that the law asks for with the estimate.
     #[inline(always)]
     fn request(&mut self) -> f32 {
-        self.state.govern(self.target, self.gains.setpoint_step);
         let mut requested = state_feedback(self.gains.n, self.state.setpoint, &self.gains.k, &self.estimate);
         if self.remembers {
             requested -= self.gains.k_pending * self.state.pending;

@@ -61,8 +61,10 @@ impl<'t, const NX: usize, const NY: usize> Observer<'t, NX, NY> {
             // A checked table only names states that exist.
             *e -= estimate.get(measured(sensor)).copied().unwrap_or_default();
         }
-        for (column, &e) in self.gains.l.data.0.iter().zip(&e) {
-            add_scaled(&mut x, column, e);
+        for (state, x) in x.iter_mut().enumerate() {
+            for (column, &e) in self.gains.l.data.0.iter().zip(&e) {
+                *x += column[state] * e;
+            }
         }
         (*estimate, *innovation) = (x, e);
     }
