@@ -227,15 +227,15 @@ impl<'t, const NX: usize, const NY: usize> Controller<'t, NX, NY> {
     /// e = y - C x̂⁻,   x̂ = x̂⁻ + L e,   u = sat(N r - K x̂ - k_pending u_pending - k_integral z)
     /// ```
     pub fn control(&mut self, raw: &[u32; NY]) -> Command {
-        self.encoders.update(raw);
         let Mode::WithObserver(observer) = self.mode else {
+            self.encoders.update(raw);
             return OFF;
         };
         self.state.govern(self.target, self.gains.setpoint_step);
         let requested = if observer.sensors_in_order {
-            self.observe(&observer, |sensor| 2 * sensor)
+            self.observe(&observer, raw, |sensor| 2 * sensor)
         } else {
-            self.observe_looking_up(&observer)
+            self.observe_looking_up(&observer, raw)
         };
         self.drive(requested)
     }
@@ -254,14 +254,14 @@ impl<'t, const NX: usize, const NY: usize> Controller<'t, NX, NY> {
     // Out of line, so that it costs the way without look-up no register.
     #[cold]
     #[inline(never)]
-    fn observe_looking_up(&mut self, observer: &Observer<'t, NX, NY>) -> f32 {
+    fn observe_looking_up(&mut self, observer: &Observer<'t, NX, NY>, raw: &[u32; NY]) -> f32 {
         let measured = &observer.gains.measured;
-        self.observe(observer, |sensor| measured.get(sensor).map_or(NX, |&state| state as usize))
+        self.observe(observer, raw, |sensor| measured.get(sensor).map_or(NX, |&state| state as usize))
     }
 
     #[inline(always)]
-    fn observe(&mut self, observer: &Observer<'t, NX, NY>, measured: impl Fn(usize) -> usize) -> f32 {
-        let y = self.encoders.positions(&observer.gains.step).data.0[0];
+    fn observe(&mut self, observer: &Observer<'t, NX, NY>, raw: &[u32; NY], measured: impl Fn(usize) -> usize) -> f32 {
+        let y = self.encoders.measure(raw, &observer.gains.step).data.0[0];
         observer.correct(measured, &y, &mut self.estimate.data.0[0], &mut self.innovation.data.0[0]);
         self.request()
     }

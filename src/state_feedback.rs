@@ -29,7 +29,7 @@ impl<const NX: usize> LawGains<NX> {
 /// gets the same bits.
 #[inline]
 pub fn state_feedback<const NX: usize>(n: f32, r: f32, k: &SVector<f32, NX>, x: &SVector<f32, NX>) -> f32 {
-    let (mut positions, mut rates) = (n * r, 0.0);
+    let (mut positions, mut rates) = (n * r, -0.0);
     for (k, x) in k.as_slice().chunks(2).zip(x.as_slice().chunks(2)) {
         if let ([k, ..], [x, ..]) = (k, x) {
             positions -= k * x;
