@@ -29,17 +29,15 @@ pub(crate) struct Observer<'t, const NX: usize, const NY: usize> {
     pub(crate) gains: &'t ObserverGains<NX, NY>,
     /// Sensor i measures state 2i, as in every chain: its entry of x̂⁻ needs no look-up.
     pub(crate) sensors_in_order: bool,
-    /// The first column of Ad is 1, 0, 0 …, as in every chain: where the cart is moves nothing.
-    first_state_moves_nothing: bool,
+    without_friction: bool,
 }
 
 impl<'t, const NX: usize, const NY: usize> Observer<'t, NX, NY> {
     pub(crate) fn new(gains: &'t ObserverGains<NX, NY>) -> Self {
-        let first = gains.ad.column(0);
         Self {
             gains,
             sensors_in_order: gains.measured.iter().zip(0..).all(|(&state, sensor)| state == 2 * sensor),
-            first_state_moves_nothing: first.iter().zip(0..).all(|(&a, row)| a == if row == 0 { 1.0 } else { 0.0 }),
+            without_friction: is_without_friction(&gains.ad),
         }
     }
 
@@ -70,21 +68,46 @@ impl<'t, const NX: usize, const NY: usize> Observer<'t, NX, NY> {
     }
 
     /// Prediction for the next tick `x̂⁻ = Ad x̂ + Bd u`, with the force `u` (N) that is really applied.
+    ///
+    /// The terms of an entry are added in a fixed order, that of the columns: every machine gets the same bits.
     #[inline(always)]
     pub(crate) fn predict(&self, estimate: &mut [f32; NX], u: f32) {
-        // Column by column, in a fixed order: the same bits on every machine.
         let mut next = self.gains.bd.data.0[0].map(|b| b * u);
-        for (state, (column, &x)) in self.gains.ad.data.0.iter().zip(estimate.iter()).enumerate() {
-            if state == 0 && self.first_state_moves_nothing {
-                if let Some(next) = next.first_mut() {
-                    *next += x;
-                }
-            } else {
+        if self.without_friction {
+            self.add_without_friction(&mut next, estimate);
+        } else {
+            for (column, &x) in self.gains.ad.data.0.iter().zip(estimate.iter()) {
                 add_scaled(&mut next, column, x);
             }
         }
         *estimate = next;
     }
+
+    #[inline(always)]
+    fn add_without_friction(&self, next: &mut [f32; NX], estimate: &[f32; NX]) {
+        let joints = self.gains.ad.data.0.chunks(2).zip(estimate.chunks(2));
+        for (joint, from) in joints.enumerate() {
+            let ([from_position, from_rate], [position, rate]) = from else { continue };
+            let rows = if joint == 0 { 2 } else { NX };
+            let entries = from_position.chunks(2).zip(from_rate.chunks(2));
+            for (next, entries) in next.chunks_mut(2).zip(entries).take(rows/2) {
+                if let ([next_position, next_rate], ([both, to_rate], [to_position, _])) = (next, entries) {
+                    let (a, b) = (both * position, to_rate * position);
+                    let (c, d) = (to_position * rate, both * rate);
+                    let (p, v) = (*next_position + a, *next_rate + b);
+                    (*next_position, *next_rate) = (p + c, v + d);
+                }
+            }
+        }
+    }
+}
+
+fn is_without_friction<const NX: usize>(ad: &SMatrix<f32, NX, NX>) -> bool {
+    let same = (0..NX).step_by(2).all(|i| (0..NX).step_by(2).all(|j| match (ad.get((i, j)), ad.get((i + 1, j + 1))) {
+        (Some(a), Some(b)) => a == b,
+        _ => false,
+    }));
+    same && (2..NX).all(|i| (0..2).all(|j| ad.get((i, j)) == Some(&0.0)))
 }
 
 #[inline(always)]
