@@ -5,7 +5,7 @@ use nalgebra::SVector;
 use crate::actuator::Drive;
 use crate::encoder::{CounterWidth, Encoders};
 use crate::observer::Observer;
-use crate::state_feedback::{LawGains, LawState, saturate, state_feedback};
+use crate::state_feedback::{FeedbackSum, LawGains, LawState, saturate};
 use crate::table::{Build, GainTable, Law, TableError};
 
 /// Observer, control law and actuator map of one gain table.
@@ -247,7 +247,11 @@ impl<'t, const NX: usize, const NY: usize> Controller<'t, NX, NY> {
             return OFF;
         }
         self.state.govern(self.target, self.gains.setpoint_step);
-        let requested = self.request();
+        let mut sum = FeedbackSum::new(self.gains.n, self.state.setpoint);
+        for (k, x) in self.gains.k.as_slice().chunks(2).zip(x.as_slice().chunks(2)) {
+            sum.feed_back(k, x);
+        }
+        let requested = self.request(sum);
         self.drive(requested)
     }
 
@@ -262,14 +266,20 @@ impl<'t, const NX: usize, const NY: usize> Controller<'t, NX, NY> {
     #[inline(always)]
     fn observe(&mut self, observer: &Observer<'t, NX, NY>, raw: &[u32; NY], measured: impl Fn(usize) -> usize) -> f32 {
         let y = self.encoders.measure(raw, &observer.gains.step).data.0[0];
-        observer.correct(measured, &y, &mut self.estimate.data.0[0], &mut self.innovation.data.0[0]);
-        self.request()
+        let (estimate, innovation) = (&mut self.estimate.data.0[0], &mut self.innovation.data.0[0]);
+        let mut sum = FeedbackSum::new(self.gains.n, self.state.setpoint);
+        observer.correct(measured, &y, estimate, innovation, |joint, x| {
+            if let Some(k) = self.gains.k.as_slice().chunks(2).nth(joint) {
+                sum.feed_back(k, x);
+            }
+        });
+        self.request(sum)
     }
 
-    /// The force that the law asks for with the estimate.
+    /// The force that the law asks for.
     #[inline(always)]
-    fn request(&mut self) -> f32 {
-        let mut requested = state_feedback(self.gains.n, self.state.setpoint, &self.gains.k, &self.estimate);
+    fn request(&mut self, sum: FeedbackSum) -> f32 {
+        let mut requested = sum.force();
         if self.remembers {
             requested -= self.gains.k_pending * self.state.pending;
             requested -= self.gains.k_integral * self.state.integral;

@@ -23,13 +23,46 @@ impl<const NX: usize, const NY: usize> ObserverGains<NX, NY> {
     }
 }
 
-/// The observer of a table, with what the zeros of this table save in every tick.
+/// The observer of a table, with what the pattern of its matrices saves in every tick.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Observer<'t, const NX: usize, const NY: usize> {
     pub(crate) gains: &'t ObserverGains<NX, NY>,
     /// Sensor i measures state 2i, as in every chain: its entry of x̂⁻ needs no look-up.
     pub(crate) sensors_in_order: bool,
-    without_friction: bool,
+    motion: Motion,
+}
+
+/// What an Ad has beyond being a matrix; the results are the same bits, whichever way they are computed.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Motion {
+    Any,
+    /// The first column is 1, 0, 0 …, as in every chain: where the cart is moves nothing.
+    SameEverywhere,
+    /// A chain without friction. Its motion is the same at every speed of the cart: the first two columns are 0 below their
+    /// first two entries. And it is the same backwards in time: in each block of a joint's position and rate, both entries
+    /// on the diagonal are equal, so that one load serves both.
+    Frictionless,
+}
+
+impl Motion {
+    fn of<const NX: usize>(ad: &[[f32; NX]; NX]) -> Self {
+        let is = |row: usize, column: usize, value: f32| ad.get(column).and_then(|entries| entries.get(row)) == Some(&value);
+        let diagonals_agree = ad.chunks(2).all(|joint| match joint {
+            [from_position, from_rate] => {
+                let blocks = from_position.chunks(2).zip(from_rate.chunks(2));
+                blocks.into_iter().all(|(a, b)| matches!((a, b), ([a, _], [_, b]) if a == b))
+            }
+            _ => false,
+        });
+        let same_everywhere = is(0, 0, 1.0) && (1..NX).all(|row| is(row, 0, 0.0));
+        if same_everywhere && diagonals_agree && (2..NX).all(|row| is(row, 1, 0.0)) {
+            Motion::Frictionless
+        } else if same_everywhere {
+            Motion::SameEverywhere
+        } else {
+            Motion::Any
+        }
+    }
 }
 
 impl<'t, const NX: usize, const NY: usize> Observer<'t, NX, NY> {
@@ -37,14 +70,16 @@ impl<'t, const NX: usize, const NY: usize> Observer<'t, NX, NY> {
         Self {
             gains,
             sensors_in_order: gains.measured.iter().zip(0..).all(|(&state, sensor)| state == 2 * sensor),
-            without_friction: is_without_friction(&gains.ad),
+            motion: Motion::of(&gains.ad.data.0),
         }
     }
 
-    /// Takes the encoders' positions y: innovation `e = y - C x̂⁻`, formed explicitly because a merged `Ad - L C` would
-    /// cost most of the digits of u in f32, and current estimate `x̂ = x̂⁻ + L e` in place of the prediction x̂⁻.
+    /// Takes the positions y that the sensors show: innovation `e = y - C x̂⁻`, formed explicitly because a merged
+    /// `Ad - L C` would cost most of the digits of u in f32, and current estimate `x̂ = x̂⁻ + L e` in place of the
+    /// prediction x̂⁻.
     ///
-    /// `measured` says which state a sensor measures.
+    /// `measured` says which state a sensor measures. `corrected` gets the estimate joint by joint, with the number of the
+    /// joint, while it still is in registers.
     #[inline(always)]
     pub(crate) fn correct(
         &self,
@@ -52,19 +87,34 @@ impl<'t, const NX: usize, const NY: usize> Observer<'t, NX, NY> {
         y: &[f32; NY],
         estimate: &mut [f32; NX],
         innovation: &mut [f32; NY],
+        mut corrected: impl FnMut(usize, &[f32]),
     ) {
-        let mut x = *estimate;
         let mut e = *y;
         for (sensor, e) in e.iter_mut().enumerate() {
             // A checked table only names states that exist.
             *e -= estimate.get(measured(sensor)).copied().unwrap_or_default();
         }
-        for (state, x) in x.iter_mut().enumerate() {
-            for (column, &e) in self.gains.l.data.0.iter().zip(&e) {
-                *x += column[state] * e;
+        *innovation = e;
+        let (joints, last) = estimate.as_chunks_mut::<2>();
+        for (joint, estimate) in joints.iter_mut().enumerate() {
+            let [mut position, mut rate] = *estimate;
+            for (column, e) in self.gains.l.data.0.iter().zip(&e) {
+                if let Some([to_position, to_rate]) = column.as_chunks::<2>().0.get(joint) {
+                    // Both products before both sums: no instruction waits for the one before it.
+                    let (a, b) = (to_position * e, to_rate * e);
+                    position += a;
+                    rate += b;
+                }
+            }
+            *estimate = [position, rate];
+            corrected(joint, estimate);
+        }
+        for x in last.iter_mut() {
+            for (column, e) in self.gains.l.data.0.iter().zip(&e) {
+                *x += column.last().copied().unwrap_or_default() * e;
             }
         }
-        (*estimate, *innovation) = (x, e);
+        corrected(NX / 2, last);
     }
 
     /// Prediction for the next tick `x̂⁻ = Ad x̂ + Bd u`, with the force `u` (N) that is really applied.
@@ -73,47 +123,38 @@ impl<'t, const NX: usize, const NY: usize> Observer<'t, NX, NY> {
     #[inline(always)]
     pub(crate) fn predict(&self, estimate: &mut [f32; NX], u: f32) {
         let mut next = self.gains.bd.data.0[0].map(|b| b * u);
-        if self.without_friction {
-            self.add_without_friction(&mut next, estimate);
+        if self.motion == Motion::Frictionless {
+            self.add_frictionless(&mut next, estimate);
         } else {
-            for (column, &x) in self.gains.ad.data.0.iter().zip(estimate.iter()) {
-                add_scaled(&mut next, column, x);
+            for (state, (column, x)) in self.gains.ad.data.0.iter().zip(estimate.iter()).enumerate() {
+                if state == 0 && self.motion == Motion::SameEverywhere {
+                    next[0] += x;
+                } else {
+                    for (next, a) in next.iter_mut().zip(column) {
+                        *next += a * x;
+                    }
+                }
             }
         }
         *estimate = next;
     }
 
     #[inline(always)]
-    fn add_without_friction(&self, next: &mut [f32; NX], estimate: &[f32; NX]) {
-        let joints = self.gains.ad.data.0.chunks(2).zip(estimate.chunks(2));
-        for (joint, from) in joints.enumerate() {
-            let ([from_position, from_rate], [position, rate]) = from else { continue };
-            let rows = if joint == 0 { 2 } else { NX };
-            let entries = from_position.chunks(2).zip(from_rate.chunks(2));
-            for (next, entries) in next.chunks_mut(2).zip(entries).take(rows/2) {
-                if let ([next_position, next_rate], ([both, to_rate], [to_position, _])) = (next, entries) {
-                    let (a, b) = (both * position, to_rate * position);
-                    let (c, d) = (to_position * rate, both * rate);
-                    let (p, v) = (*next_position + a, *next_rate + b);
-                    (*next_position, *next_rate) = (p + c, v + d);
-                }
+    fn add_frictionless(&self, next: &mut [f32; NX], estimate: &[f32; NX]) {
+        let from = self.gains.ad.data.0.as_chunks::<2>().0.iter().zip(estimate.as_chunks::<2>().0);
+        for (joint, ([from_position, from_rate], [position, rate])) in from.enumerate() {
+            let blocks = from_position.as_chunks::<2>().0.iter().zip(from_rate.as_chunks::<2>().0);
+            // What the cart does reaches the cart alone.
+            let reach = if joint == 0 { 1 } else { NX / 2 };
+            for (next, (of_position, of_rate)) in next.as_chunks_mut::<2>().0.iter_mut().zip(blocks).take(reach) {
+                let ([diagonal, to_rate], [to_position, _]) = (of_position, of_rate);
+                // All products before the sums: no instruction waits for the one before it.
+                let (a, b) = (diagonal * position, to_rate * position);
+                let (c, d) = (to_position * rate, diagonal * rate);
+                let [p, v] = [next[0] + a, next[1] + b];
+                *next = [p + c, v + d];
             }
         }
-    }
-}
-
-fn is_without_friction<const NX: usize>(ad: &SMatrix<f32, NX, NX>) -> bool {
-    let same = (0..NX).step_by(2).all(|i| (0..NX).step_by(2).all(|j| match (ad.get((i, j)), ad.get((i + 1, j + 1))) {
-        (Some(a), Some(b)) => a == b,
-        _ => false,
-    }));
-    same && (2..NX).all(|i| (0..2).all(|j| ad.get((i, j)) == Some(&0.0)))
-}
-
-#[inline(always)]
-fn add_scaled<const N: usize>(sum: &mut [f32; N], column: &[f32; N], factor: f32) {
-    for (sum, entry) in sum.iter_mut().zip(column) {
-        *sum += entry * factor;
     }
 }
 

@@ -24,21 +24,46 @@ impl<const NX: usize> LawGains<NX> {
 }
 
 /// State feedback with precompensation, `u = N r - K x` (the paper's control law).
-///
-/// The terms are added in a fixed order (even and odd states apart, so that a processor can overlap them): every machine
-/// gets the same bits.
 #[inline]
 pub fn state_feedback<const NX: usize>(n: f32, r: f32, k: &SVector<f32, NX>, x: &SVector<f32, NX>) -> f32 {
-    let (mut positions, mut rates) = (n * r, -0.0);
+    let mut sum = FeedbackSum::new(n, r);
     for (k, x) in k.as_slice().chunks(2).zip(x.as_slice().chunks(2)) {
+        sum.feed_back(k, x);
+    }
+    sum.force()
+}
+
+/// The sum `N r - K x`, joint by joint.
+///
+/// The terms are added in a fixed order (positions and rates apart, so that a processor can overlap them): every machine
+/// gets the same bits.
+pub(crate) struct FeedbackSum {
+    positions: f32,
+    rates: f32,
+}
+
+impl FeedbackSum {
+    #[inline(always)]
+    pub(crate) fn new(n: f32, r: f32) -> Self {
+        // -0 is what changes nothing when something is added to it; with +0, the first addition would be a real one.
+        Self { positions: n * r, rates: -0.0 }
+    }
+
+    /// Takes the gains and states of a joint: position and rate, or a position alone at the end.
+    #[inline(always)]
+    pub(crate) fn feed_back(&mut self, k: &[f32], x: &[f32]) {
         if let ([k, ..], [x, ..]) = (k, x) {
-            positions -= k * x;
+            self.positions -= k * x;
         }
         if let ([_, k], [_, x]) = (k, x) {
-            rates -= k * x;
+            self.rates -= k * x;
         }
     }
-    positions + rates
+
+    #[inline(always)]
+    pub(crate) fn force(self) -> f32 {
+        self.positions + self.rates
+    }
 }
 
 /// `u` limited to ±`limit`; 0 if `u` is not a number, because a motor must never be driven by one.
