@@ -283,6 +283,7 @@ impl<'t, const NX: usize, const NY: usize> Controller<'t, NX, NY> {
         if self.remembers {
             requested -= self.gains.k_pending * self.state.pending;
             requested -= self.gains.k_integral * self.state.integral;
+            self.requested = requested;
         }
         requested
     }
@@ -301,7 +302,7 @@ impl<'t, const NX: usize, const NY: usize> Controller<'t, NX, NY> {
                 (force, Drive::Duty(motor.duty(volts)))
             }
         };
-        (self.requested, self.applied) = (requested, applied);
+        self.applied = applied;
         Command { requested, applied, drive }
     }
 

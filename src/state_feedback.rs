@@ -52,11 +52,15 @@ impl FeedbackSum {
     /// Takes the gains and states of a joint: position and rate, or a position alone at the end.
     #[inline(always)]
     pub(crate) fn feed_back(&mut self, k: &[f32], x: &[f32]) {
-        if let ([k, ..], [x, ..]) = (k, x) {
-            self.positions -= k * x;
-        }
-        if let ([_, k], [_, x]) = (k, x) {
-            self.rates -= k * x;
+        match (k, x) {
+            ([k_position, k_rate], [position, rate]) => {
+                // Both products before both sums: no instruction waits for the one before it.
+                let (a, b) = (k_position * position, k_rate * rate);
+                self.positions -= a;
+                self.rates -= b;
+            }
+            ([k], [x]) => self.positions -= k * x,
+            _ => (),
         }
     }
 
