@@ -73,11 +73,11 @@ impl FeedbackSum {
 /// `u` limited to ±`limit`; 0 if `u` is not a number, because a motor must never be driven by one.
 #[inline]
 pub fn saturate(u: f32, limit: f32) -> f32 {
-    if u.abs() <= limit {
-        u
-    } else if u > 0.0 {
+    if u > limit {
         limit
-    } else if u < 0.0 {
+    } else if u >= -limit {
+        u
+    } else if u < -limit {
         -limit
     } else {
         0.0
@@ -103,7 +103,9 @@ impl LawState {
     /// `|θ| <= step · Σ |step response of θ|`.
     #[inline]
     pub fn govern(&mut self, target: f32, step: f32) {
-        self.setpoint += saturate(target - self.setpoint, step);
+        let rising = target - self.setpoint;
+        let rising = if rising > step { step } else { rising };
+        self.setpoint += if rising < -step { -step } else { rising };
     }
 
     /// The force (N) that the law asks for in state `x`.
