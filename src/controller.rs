@@ -264,7 +264,12 @@ impl<'t, const NX: usize, const NY: usize> Controller<'t, NX, NY> {
     }
 
     #[inline(always)]
-    fn observe(&mut self, observer: &Observer<'t, NX, NY>, raw: &[u32; NY], measured: impl Fn(usize) -> usize) -> f32 {
+    fn observe(
+        &mut self,
+        observer: &Observer<'t, NX, NY>,
+        raw: &[u32; NY],
+        measured: impl Fn(usize) -> usize,
+    ) -> f32 {
         let y = self.encoders.measure(raw, &observer.gains.step).data.0[0];
         let (estimate, innovation) = (&mut self.estimate.data.0[0], &mut self.innovation.data.0[0]);
         let mut sum = FeedbackSum::new(self.gains.n, self.state.setpoint);

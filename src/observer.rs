@@ -32,35 +32,33 @@ pub(crate) struct Observer<'t, const NX: usize, const NY: usize> {
     motion: Motion,
 }
 
-/// What an Ad has beyond being a matrix; the results are the same bits, whichever way they are computed.
+/// What an Ad is beyond being a matrix. It decides how a prediction is computed, not what comes out.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Motion {
     Any,
     /// The first column is 1, 0, 0 …, as in every chain: where the cart is moves nothing.
     SameEverywhere,
-    /// A chain without friction. Its motion is the same at every speed of the cart: the first two columns are 0 below their
-    /// first two entries. And it is the same backwards in time: in each block of a joint's position and rate, both entries
-    /// on the diagonal are equal, so that one load serves both.
+    /// A chain without friction. It moves in the same way at every speed of the cart, so the second column, too, is 0 below
+    /// its first two entries. And it moves in the same way backwards in time, so in each block of position and rate both
+    /// entries on the diagonal are equal: one load serves both.
     Frictionless,
 }
 
 impl Motion {
     fn of<const NX: usize>(ad: &[[f32; NX]; NX]) -> Self {
-        let is = |row: usize, column: usize, value: f32| ad.get(column).and_then(|entries| entries.get(row)) == Some(&value);
-        let diagonals_agree = ad.chunks(2).all(|joint| match joint {
-            [from_position, from_rate] => {
-                let blocks = from_position.chunks(2).zip(from_rate.chunks(2));
-                blocks.into_iter().all(|(a, b)| matches!((a, b), ([a, _], [_, b]) if a == b))
-            }
-            _ => false,
+        let zero_from = |first: usize, column: usize| {
+            ad.get(column).is_some_and(|entries| entries.iter().skip(first).all(|&entry| entry == 0.0))
+        };
+        let (joints, alone) = ad.as_chunks::<2>();
+        let diagonals_agree = joints.iter().all(|[from_position, from_rate]| {
+            let mut blocks = from_position.as_chunks::<2>().0.iter().zip(from_rate.as_chunks::<2>().0);
+            blocks.all(|([of_position, _], [_, of_rate])| of_position == of_rate)
         });
-        let same_everywhere = is(0, 0, 1.0) && (1..NX).all(|row| is(row, 0, 0.0));
-        if same_everywhere && diagonals_agree && (2..NX).all(|row| is(row, 1, 0.0)) {
-            Motion::Frictionless
-        } else if same_everywhere {
-            Motion::SameEverywhere
-        } else {
-            Motion::Any
+        let starts_with_one = ad.as_flattened().first() == Some(&1.0);
+        match starts_with_one && zero_from(1, 0) {
+            true if alone.is_empty() && diagonals_agree && zero_from(2, 1) => Motion::Frictionless,
+            true => Motion::SameEverywhere,
+            false => Motion::Any,
         }
     }
 }
@@ -109,12 +107,12 @@ impl<'t, const NX: usize, const NY: usize> Observer<'t, NX, NY> {
             *estimate = [position, rate];
             corrected(joint, estimate);
         }
-        for x in last.iter_mut() {
+        if let [x] = last {
             for (column, e) in self.gains.l.data.0.iter().zip(&e) {
                 *x += column.last().copied().unwrap_or_default() * e;
             }
+            corrected(NX / 2, last);
         }
-        corrected(NX / 2, last);
     }
 
     /// Prediction for the next tick `x̂⁻ = Ad x̂ + Bd u`, with the force `u` (N) that is really applied.
@@ -146,7 +144,9 @@ impl<'t, const NX: usize, const NY: usize> Observer<'t, NX, NY> {
             let blocks = from_position.as_chunks::<2>().0.iter().zip(from_rate.as_chunks::<2>().0);
             // What the cart does reaches the cart alone.
             let reach = if joint == 0 { 1 } else { NX / 2 };
-            for (next, (of_position, of_rate)) in next.as_chunks_mut::<2>().0.iter_mut().zip(blocks).take(reach) {
+            for (next, (of_position, of_rate)) in
+                next.as_chunks_mut::<2>().0.iter_mut().zip(blocks).take(reach)
+            {
                 let ([diagonal, to_rate], [to_position, _]) = (of_position, of_rate);
                 // All products before the sums: no instruction waits for the one before it.
                 let (a, b) = (diagonal * position, to_rate * position);
@@ -173,10 +173,43 @@ mod tests {
             step: vector![1.0],
         };
         let observer = Observer::new(&gains);
-        let e = observer.innovation(&vector![3.0], &vector![1.0, -1.0]);
-        assert_eq!(e, vector![2.0]);
-        let x = observer.correct(&vector![1.0, -1.0], &e);
-        assert_eq!(x, vector![2.0, 3.0]);
-        assert_eq!(observer.predict(&x, 8.0), vector![4.5, 7.0]);
+        let (mut x, mut e) = ([1.0, -1.0], [0.0]);
+        observer.correct(
+            |sensor| 2 * sensor,
+            &[3.0],
+            &mut x,
+            &mut e,
+            |joint, x| {
+                assert_eq!((joint, x), (0, &[2.0, 3.0][..]));
+            },
+        );
+        assert_eq!((x, e), ([2.0, 3.0], [2.0]));
+        observer.predict(&mut x, 8.0);
+        assert_eq!(x, [4.5, 7.0]);
+    }
+
+    #[test]
+    fn a_shortcut_is_taken_only_where_every_entry_allows_it() {
+        let motion = |ad: SMatrix<f32, 4, 4>| Motion::of(&ad.data.0);
+        let frictionless = matrix![
+            1.0, 0.1, 0.2, 0.3;
+            0.0, 1.0, 0.4, 0.2;
+            0.0, 0.0, 1.5, 0.7;
+            0.0, 0.0, 0.8, 1.5
+        ];
+        assert_eq!(motion(frictionless), Motion::Frictionless);
+        for (row, column) in (0..4).flat_map(|row| (0..4).map(move |column| (row, column))) {
+            let mut other = frictionless;
+            other[(row, column)] += 0.01;
+            let expected = match (row, column) {
+                (_, 0) => Motion::Any,
+                // Only the diagonals of the blocks are repeated, and only the links must not feel the cart.
+                (2 | 3, 1) | (0, 2) | (1, 3) | (2, 2) | (3, 3) | (1, 1) => Motion::SameEverywhere,
+                _ => Motion::Frictionless,
+            };
+            assert_eq!(motion(other), expected, "{row} {column}");
+        }
+        assert_eq!(Motion::of(&[[1.0]]), Motion::SameEverywhere);
+        assert_eq!(Motion::of(&SMatrix::<f32, 3, 3>::identity().data.0), Motion::SameEverywhere);
     }
 }
