@@ -142,12 +142,15 @@ impl<'t, const NX: usize, const NY: usize> Observer<'t, NX, NY> {
         let from = self.gains.ad.data.0.as_chunks::<2>().0.iter().zip(estimate.as_chunks::<2>().0);
         for (joint, ([from_position, from_rate], [position, rate])) in from.enumerate() {
             let blocks = from_position.as_chunks::<2>().0.iter().zip(from_rate.as_chunks::<2>().0);
-            // What the cart does reaches the cart alone.
-            let reach = if joint == 0 { 1 } else { NX / 2 };
-            for (next, (of_position, of_rate)) in
-                next.as_chunks_mut::<2>().0.iter_mut().zip(blocks).take(reach)
-            {
-                let ([diagonal, to_rate], [to_position, _]) = (of_position, of_rate);
+            let mut rows = next.as_chunks_mut::<2>().0.iter_mut().zip(blocks);
+            if joint == 0 {
+                // The cart moves itself alone, by a block of 1, T; 0, 1.
+                if let Some((next, (_, [to_position, _]))) = rows.next() {
+                    *next = [next[0] + position + to_position * rate, next[1] + rate];
+                }
+                continue;
+            }
+            for (next, ([diagonal, to_rate], [to_position, _])) in rows {
                 // All products before the sums: no instruction waits for the one before it.
                 let (a, b) = (diagonal * position, to_rate * position);
                 let (c, d) = (to_position * rate, diagonal * rate);
