@@ -5,7 +5,7 @@ use nalgebra::SVector;
 use crate::actuator::Drive;
 use crate::encoder::{CounterWidth, Encoders};
 use crate::observer::Observer;
-use crate::state_feedback::{FeedbackSum, LawGains, LawState, saturate};
+use crate::state_feedback::{FeedbackSum, LawGains, LawState, saturate, state_feedback};
 use crate::table::{Build, GainTable, Law, TableError};
 
 /// Observer, control law and actuator map of one gain table.
@@ -36,7 +36,10 @@ enum Mode<'t, const NX: usize, const NY: usize> {
     Stopped,
     /// Running, and the table holds no observer.
     WithoutObserver,
-    WithObserver(Observer<'t, NX, NY>),
+    /// Running, and sensor i measures state 2i, as in every chain.
+    InOrder(Observer<'t, NX, NY>),
+    /// Running, and the table says which state a sensor measures.
+    LookingUp(Observer<'t, NX, NY>),
 }
 
 /// The outcome of a tick.
@@ -206,11 +209,11 @@ impl<'t, const NX: usize, const NY: usize> Controller<'t, NX, NY> {
         self.state = LawState { setpoint: self.output(), ..LawState::default() };
         self.last_volts = 0.0;
         (self.requested, self.applied) = (0.0, 0.0);
-        self.mode = self
-            .table
-            .observer
-            .as_ref()
-            .map_or(Mode::WithoutObserver, |gains| Mode::WithObserver(Observer::new(gains)));
+        self.mode = match &self.table.observer {
+            None => Mode::WithoutObserver,
+            Some(gains) if gains.sensors_are_in_order() => Mode::InOrder(Observer::new(gains)),
+            Some(gains) => Mode::LookingUp(Observer::new(gains)),
+        };
     }
 
     /// Stops: the next tick needs a new start.
@@ -227,15 +230,13 @@ impl<'t, const NX: usize, const NY: usize> Controller<'t, NX, NY> {
     /// e = y - C x̂⁻,   x̂ = x̂⁻ + L e,   u = sat(N r - K x̂ - k_pending u_pending - k_integral z)
     /// ```
     pub fn control(&mut self, raw: &[u32; NY]) -> Command {
-        let Mode::WithObserver(observer) = self.mode else {
-            self.encoders.update(raw);
-            return OFF;
-        };
-        self.state.govern(self.target, self.gains.setpoint_step);
-        let requested = if observer.sensors_in_order {
-            self.observe(&observer, raw, |sensor| 2 * sensor)
-        } else {
-            self.observe_looking_up(&observer, raw)
+        let requested = match self.mode {
+            Mode::InOrder(observer) => self.observe(&observer, raw, |sensor| 2 * sensor),
+            Mode::LookingUp(observer) => self.observe_looking_up(&observer, raw),
+            Mode::WithoutObserver | Mode::Stopped => {
+                self.encoders.update(raw);
+                return OFF;
+            }
         };
         self.drive(requested)
     }
@@ -247,11 +248,7 @@ impl<'t, const NX: usize, const NY: usize> Controller<'t, NX, NY> {
             return OFF;
         }
         self.state.govern(self.target, self.gains.setpoint_step);
-        let mut sum = FeedbackSum::new(self.gains.n, self.state.setpoint);
-        for (k, x) in self.gains.k.as_slice().chunks(2).zip(x.as_slice().chunks(2)) {
-            sum.feed_back(k, x);
-        }
-        let requested = self.request(sum);
+        let requested = self.request(state_feedback(self.gains.n, self.state.setpoint, &self.gains.k, x));
         self.drive(requested)
     }
 
@@ -270,6 +267,7 @@ impl<'t, const NX: usize, const NY: usize> Controller<'t, NX, NY> {
         raw: &[u32; NY],
         measured: impl Fn(usize) -> usize,
     ) -> f32 {
+        self.state.govern(self.target, self.gains.setpoint_step);
         let y = self.encoders.measure(raw, &observer.gains.step).data.0[0];
         let (estimate, innovation) = (&mut self.estimate.data.0[0], &mut self.innovation.data.0[0]);
         let mut sum = FeedbackSum::new(self.gains.n, self.state.setpoint);
@@ -278,13 +276,13 @@ impl<'t, const NX: usize, const NY: usize> Controller<'t, NX, NY> {
                 sum.feed_back(k, x);
             }
         });
-        self.request(sum)
+        self.request(sum.force())
     }
 
-    /// The force that the law asks for.
+    /// The force that the law asks for, from its state feedback.
     #[inline(always)]
-    fn request(&mut self, sum: FeedbackSum) -> f32 {
-        let mut requested = sum.force();
+    fn request(&mut self, feedback: f32) -> f32 {
+        let mut requested = feedback;
         if self.remembers {
             requested -= self.gains.k_pending * self.state.pending;
             requested -= self.gains.k_integral * self.state.integral;
@@ -322,7 +320,7 @@ impl<'t, const NX: usize, const NY: usize> Controller<'t, NX, NY> {
             let position = self.output();
             self.state.advance(self.gains.k_integral, position, self.table.tick_s, requested, applied);
         }
-        if let Mode::WithObserver(observer) = &self.mode {
+        if let Mode::InOrder(observer) | Mode::LookingUp(observer) = &self.mode {
             observer.predict(&mut self.estimate.data.0[0], during_this_tick);
         }
     }

@@ -17,6 +17,11 @@ pub struct ObserverGains<const NX: usize, const NY: usize> {
 }
 
 impl<const NX: usize, const NY: usize> ObserverGains<NX, NY> {
+    /// Whether sensor i measures state 2i, as in every chain, so that nothing has to be looked up.
+    pub(crate) fn sensors_are_in_order(&self) -> bool {
+        self.measured.iter().zip(0..).all(|(&state, sensor)| state == 2 * sensor)
+    }
+
     pub(crate) fn values(&self) -> impl Iterator<Item = f32> {
         let matrices = self.ad.iter().chain(self.bd.iter()).chain(self.l.iter());
         matrices.chain(self.step.iter()).copied()
@@ -27,8 +32,6 @@ impl<const NX: usize, const NY: usize> ObserverGains<NX, NY> {
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Observer<'t, const NX: usize, const NY: usize> {
     pub(crate) gains: &'t ObserverGains<NX, NY>,
-    /// Sensor i measures state 2i, as in every chain: its entry of x̂⁻ needs no look-up.
-    pub(crate) sensors_in_order: bool,
     motion: Motion,
 }
 
@@ -65,11 +68,7 @@ impl Motion {
 
 impl<'t, const NX: usize, const NY: usize> Observer<'t, NX, NY> {
     pub(crate) fn new(gains: &'t ObserverGains<NX, NY>) -> Self {
-        Self {
-            gains,
-            sensors_in_order: gains.measured.iter().zip(0..).all(|(&state, sensor)| state == 2 * sensor),
-            motion: Motion::of(&gains.ad.data.0),
-        }
+        Self { gains, motion: Motion::of(&gains.ad.data.0) }
     }
 
     /// Takes the positions y that the sensors show: innovation `e = y - C x̂⁻`, formed explicitly because a merged
