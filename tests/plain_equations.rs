@@ -136,7 +136,10 @@ fn difference<const NX: usize, const NY: usize>(
         found.extend([command.requested, command.applied].iter().chain(controller.estimate()));
         let wanted = plain.tick(*target, counts);
         let differs = found.len() != wanted.len()
-            || found.iter().zip(&wanted).any(|(found, wanted)| found.to_bits() != wanted.to_bits());
+            // A term of 0 that is passed over may change the sign of a sum that is 0.
+            || found.iter().zip(&wanted).any(|(found, wanted)| {
+                found.to_bits() != wanted.to_bits() && (*found, *wanted) != (0.0, 0.0)
+            });
         differs.then(|| format!("tick {tick}: {found:?} instead of {wanted:?}"))
     })
 }
