@@ -1,6 +1,7 @@
 //! What can go wrong, and what has to come of it.
 
 use upright::fault::Fault;
+use upright::pins::Sabotage;
 use upright::reasons::Reasons;
 
 /// A kind of defect.
@@ -85,18 +86,43 @@ impl Kind {
         use Expected::*;
         use Ticks::*;
         [
-            (Kind::SupplyNotANumber, "supply-not-a-number", "the supply's measurement is not a number", Fault(F::NotFinite, Exactly(1))),
-            (Kind::SupplySag, "supply-sag", "the supply falls below its least voltage, for good", Fault(F::Supply, Supply)),
+            (
+                Kind::SupplyNotANumber,
+                "supply-not-a-number",
+                "the supply's measurement is not a number",
+                Fault(F::NotFinite, Exactly(1)),
+            ),
+            (
+                Kind::SupplySag,
+                "supply-sag",
+                "the supply falls below its least voltage, for good",
+                Fault(F::Supply, Supply),
+            ),
             (Kind::SupplyDip, "supply-dip", "the same, for a shorter time than is a fault", Ignored),
-            (Kind::EmergencyStop, "emergency-stop", "pressed for one tick", Fault(F::EmergencyStop, Exactly(1))),
+            (
+                Kind::EmergencyStop,
+                "emergency-stop",
+                "pressed for one tick",
+                Fault(F::EmergencyStop, Exactly(1)),
+            ),
             (Kind::DriverFault, "driver-fault", "reported for one tick", Fault(F::Driver, Exactly(1))),
-            (Kind::LimitSwitch, "limit-switch", "one of them pressed, or its wire open, for one tick", Fault(F::LimitSwitch, Exactly(1))),
+            (
+                Kind::LimitSwitch,
+                "limit-switch",
+                "one of them pressed, or its wire open, for one tick",
+                Fault(F::LimitSwitch, Exactly(1)),
+            ),
             (Kind::OneOverrun, "one-overrun", "one or two ticks late", Ignored),
             (Kind::Overruns, "overruns", "three ticks in a row late", Fault(F::Overrun, Exactly(3))),
             (Kind::LinkEncoderFrozen, "link-encoder-frozen", "a link's counter stands still", Off(10)),
             (Kind::CartEncoderFrozen, "cart-encoder-frozen", "the cart's counter stands still", Off(10)),
             (Kind::BadSample, "bad-sample", "one measurement off by 2 to 20 thresholds", Counted),
-            (Kind::EncoderJump, "encoder-jump", "all measurements of an encoder off by 2 to 20 thresholds", Off(3)),
+            (
+                Kind::EncoderJump,
+                "encoder-jump",
+                "all measurements of an encoder off by 2 to 20 thresholds",
+                Off(3),
+            ),
             (Kind::EncoderReversed, "encoder-reversed", "an encoder counts backwards", Off(5)),
             (Kind::EncodersSwapped, "encoders-swapped", "two neighbours' counters are swapped", Off(5)),
             (Kind::CountsLost, "counts-lost", "an encoder loses a count every 5 to 50 ticks", Bounded),
@@ -106,8 +132,18 @@ impl Kind {
             (Kind::MotorReversed, "motor-reversed", "the motor pushes the other way", Off(5)),
             (Kind::MotorStuck, "motor-stuck", "the motor pushes with all it has, to one side", Off(5)),
             (Kind::MotorWeak, "motor-weak", "half to nine tenths of the force are missing", Bounded),
-            (Kind::Push, "push", "somebody pushes the cart for 50 ms, with up to the whole force limit", Bounded),
-            (Kind::HostSilent, "host-silent", "no command any more, from a host that commands the set-point", Fault(F::LinkLost, Link)),
+            (
+                Kind::Push,
+                "push",
+                "somebody pushes the cart for 50 ms, with up to the whole force limit",
+                Bounded,
+            ),
+            (
+                Kind::HostSilent,
+                "host-silent",
+                "no command any more, from a host that commands the set-point",
+                Fault(F::LinkLost, Link),
+            ),
             (Kind::HostDeaf, "host-deaf", "nobody takes bytes from the serial line any more", Ignored),
             (Kind::FrameDamaged, "frame-damaged", "a disarm command with a wrong bit", Ignored),
             (Kind::FrameTruncated, "frame-truncated", "a disarm command without its last bytes", Ignored),
@@ -117,8 +153,18 @@ impl Kind {
             (Kind::SetpointOutOfRange, "setpoint-out-of-range", "a set-point beyond the rail", Ignored),
             (Kind::ArmUnhomed, "arm-unhomed", "arming before homing", Refused(Reasons::NOT_HOMED)),
             (Kind::ArmHanging, "arm-hanging", "arming while the links hang", Refused(Reasons::TILTED)),
-            (Kind::ArmStopped, "arm-stopped", "arming with the emergency stop pressed", Refused(Reasons::FAULT.and(Reasons::EMERGENCY_STOP))),
-            (Kind::ArmHeld, "arm-held", "an arm command that is held while a fault is cleared", Refused(Reasons::HELD)),
+            (
+                Kind::ArmStopped,
+                "arm-stopped",
+                "arming with the emergency stop pressed",
+                Refused(Reasons::FAULT.and(Reasons::EMERGENCY_STOP)),
+            ),
+            (
+                Kind::ArmHeld,
+                "arm-held",
+                "an arm command that is held while a fault is cleared",
+                Refused(Reasons::HELD),
+            ),
             (Kind::Panic, "panic", "the firmware panics", Dead),
             (Kind::HardFault, "hard-fault", "the firmware touches memory that is not there", Dead),
             (Kind::StackOverflow, "stack-overflow", "the firmware's stack overflows", Dead),
@@ -145,9 +191,19 @@ impl Kind {
         self.row().3
     }
 
+    /// What goes wrong inside the microcontroller.
+    pub(super) fn sabotage(self) -> Option<Sabotage> {
+        match self {
+            Kind::Panic => Some(Sabotage::Panic),
+            Kind::HardFault => Some(Sabotage::HardFault),
+            Kind::StackOverflow => Some(Sabotage::StackOverflow),
+            _ => None,
+        }
+    }
+
     /// Whether only an image can suffer it.
     pub fn needs_image(self) -> bool {
-        matches!(self, Kind::Panic | Kind::HardFault | Kind::StackOverflow)
+        self.sabotage().is_some()
     }
 
     /// Whether only the firmware in this process can suffer it.

@@ -2,6 +2,7 @@
 
 use std::process::ExitCode;
 
+use host_design::campaign::CampaignError;
 use host_design::design::DesignError;
 use host_design::image::ImageError;
 use host_design::in_the_loop::{RunError, SessionError, TargetError};
@@ -32,6 +33,8 @@ pub(crate) enum Failure {
     #[error(transparent)]
     InTheLoop(#[from] RunError),
     #[error(transparent)]
+    Campaign(#[from] CampaignError),
+    #[error(transparent)]
     Plot(#[from] PlotError),
     #[error(transparent)]
     Write(#[from] WriteError),
@@ -52,6 +55,7 @@ impl Failure {
             Failure::Image(ImageError::NoCompiler)
             | Failure::InTheLoop(RunError::Session(SessionError::Target(TargetError::NoEmulator))) => 4,
             Failure::InTheLoop(RunError::Session(_)) => 1,
+            Failure::Campaign(_) => 1,
             Failure::Image(_)
             | Failure::InTheLoop(_)
             | Failure::Simulation(_)
