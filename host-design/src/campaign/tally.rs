@@ -31,7 +31,7 @@ pub struct Row {
     pub kind: Kind,
     /// What it is.
     pub meaning: &'static str,
-    /// Ticks in which the motor has to be off, if it has to be.
+    /// Ticks in which the motor has to be off, or is, at its best, if it has to be.
     pub allowed: Option<u32>,
     /// Trials.
     pub runs: usize,
@@ -143,7 +143,7 @@ impl Row {
     fn of(kind: Kind, table: &TableValues, outcomes: &[Outcome]) -> Self {
         let of_kind = || outcomes.iter().filter(move |outcome| outcome.kind == kind);
         let count = |class: Class| of_kind().filter(|outcome| outcome.class == class).count();
-        let is_wrong = |class: Class| matches!(class, Class::Late | Class::Missed | Class::FalseAlarm);
+        let is_wrong = |class: Class| matches!(class, Class::Missed | Class::FalseAlarm);
         let mut faults: Vec<u8> = of_kind().filter_map(|outcome| outcome.fault).collect();
         faults.sort_unstable();
         faults.dedup();
