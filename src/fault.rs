@@ -140,23 +140,25 @@ impl Fault {
         Entry {
             fault: Fault::Encoder,
             name: "encoder",
-            condition: "three measurements in a row of one encoder contradict the model; single ones are rejected and \
-                        counted",
+            condition: "three measurements in a row of one encoder contradict the model: it jumps, is reversed, swapped or \
+                        late; single ones are rejected and counted",
             reaction: Reaction::Ticks(3),
-            remedy: "check plug, wire and coupling of this encoder; home, and check the signs again",
+            remedy: "check plug, wire and coupling of this encoder; if it is the cart's, the motor too; home, and check the signs \
+                     again",
         },
         Entry {
             fault: Fault::Frozen,
             name: "frozen encoder",
-            condition: "an encoder stands still while the model moves by several of its counts",
+            condition: "an encoder stands still while the model moves it by a seventh of its threshold per tick or more; slower \
+                        motion is found later, long before a limit",
             reaction: Reaction::Ticks(10),
             remedy: "check plug, wire and coupling of this encoder; home, and check the signs again",
         },
         Entry {
             fault: Fault::Motor,
             name: "motor",
-            condition: "the cart does not move as the motor's force should move it: motor dead or weak (20 ticks), stuck \
-                        or reversed (5), or a collision",
+            condition: "the rig does not move as the motor's force should move it: motor dead, weak, stuck or reversed, or \
+                        a collision; ticks count from when the missing motion is more than the encoders' steps hide",
             reaction: Reaction::Ticks(20),
             remedy: "check motor, coupling and belt, and the masses in the rig file; keep hands off the cart",
         },

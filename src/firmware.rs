@@ -1,18 +1,19 @@
 //! One tick of the firmware: inputs → supervisor → controller → output, then commands and telemetry.
 
+mod commands;
+mod posture;
+
 use heapless::Vec;
 
 use crate::actuator::Drive;
-use crate::calibration::{Calibration, hang};
-use crate::controller::{Controller, Rejected};
+use crate::calibration::Calibration;
+use crate::controller::Controller;
 use crate::detection::Detection;
 use crate::encoder::CounterWidth;
 use crate::envelope;
 use crate::fault::{Cause, Fault};
 use crate::io::{Contacts, Inputs, Output};
-use crate::message::{Answer, Command, Info, Message, PROTOCOL, Request, Reset, Statistics, Telemetry};
-use crate::reasons::Reasons;
-use crate::sign_check::Signs;
+use crate::message::{Command, Message, Reset, Statistics, Telemetry};
 use crate::supervisor::{State, Supervisor};
 use crate::table::{Build, GainTable, Reading, TableError};
 use crate::watch::Watch;
@@ -297,57 +298,6 @@ impl<'t, const NX: usize, const NY: usize> Firmware<'t, NX, NY> {
         }
     }
 
-    /// Largest angle of a link from the vertical at these counts (rad); 0 where there are no turns.
-    fn largest_lean(&self, counts: &[i32; NY]) -> f32 {
-        let Some(observer) = &self.table.observer else { return 0.0 };
-        let (mut angle, mut largest) = (0.0, 0.0f32);
-        let joints = counts.iter().zip(observer.step.iter()).zip(&self.table.limits.turn_counts);
-        for ((&count, step), _) in joints.filter(|(_, turn)| **turn > 0) {
-            angle += step * count as f32;
-            largest = largest.max(f32::abs(angle));
-        }
-        largest
-    }
-
-    fn off_centre(&self, counts: &[i32; NY]) -> Reasons {
-        let [low, high] = self.table.limits.rail_m;
-        let step = self
-            .table
-            .observer
-            .as_ref()
-            .map_or(0.0, |observer| observer.step.iter().next().copied().unwrap_or_default());
-        let position = step * counts.first().copied().unwrap_or_default() as f32;
-        Reasons::OFF_CENTRE.when(position < low || position > high)
-    }
-
-    fn against_by_inputs(&self) -> Reasons {
-        let Contacts { limit_low, limit_high, emergency_stop, driver_fault, .. } = self.contacts;
-        let supply_is_good = self.supply_v >= self.table.limits.supply_min_v && self.supply_v.is_finite();
-        Reasons::LIMIT_SWITCH
-            .when(limit_low || limit_high)
-            .and(Reasons::EMERGENCY_STOP.when(emergency_stop))
-            .and(Reasons::DRIVER.when(driver_fault))
-            .and(Reasons::SUPPLY.when(!supply_is_good))
-    }
-
-    /// Everything that stands against arming now, but for the table, which is only read when it is tried.
-    pub fn against_arming(&mut self) -> Reasons {
-        let state = self.supervisor.against_arming();
-        if self.supervisor.state() == State::Balancing {
-            return state;
-        }
-        let limits = &self.table.limits;
-        let counts = *self.controller.encoders_mut().counts();
-        let lean = self.largest_lean(&limits.within_half_a_turn(&counts));
-        state
-            .and(Reasons::SIGNS.when(self.calibration.signs() != Signs::Checked))
-            .and(Reasons::TILTED.when(lean > limits.arm_angle_rad))
-            .and(Reasons::MOVING.when(self.calibration.slow_ticks() < limits.arm_ticks / 4))
-            .and(self.off_centre(&counts))
-            .and(self.against_by_inputs())
-            .and(Reasons::NO_OBSERVER.when(self.table.observer.is_none()))
-    }
-
     fn telemetry(&mut self) -> Telemetry<NX, NY> {
         let (Drive::Force(drive) | Drive::Duty(drive)) = self.output.drive;
         Telemetry {
@@ -368,109 +318,7 @@ impl<'t, const NX: usize, const NY: usize> Firmware<'t, NX, NY> {
             cycles: self.cycles,
         }
     }
-
-    fn answer(&mut self, command: &Command) -> Answer {
-        let done = |result: Result<(), _>| result.map_or_else(Answer::NotNow, |()| Answer::Done);
-        let taken = |result: Result<(), _>| result.map_or_else(Answer::Rejected, |()| Answer::Done);
-        match command.request {
-            Request::Beat => Answer::Done,
-            Request::Home => done(self.home_here()),
-            Request::HomeRail => done(self.home_rail()),
-            Request::CheckSigns => done(self.check_signs()),
-            Request::Arm => done(self.arm(command.id)),
-            Request::Disarm => {
-                self.supervisor.disarm();
-                self.calibration.give_up();
-                self.commanded = false;
-                self.controller.stop();
-                Answer::Done
-            }
-            Request::Clear => {
-                let result = self.supervisor.clear(self.against_clearing());
-                self.cleared_by = command.id;
-                done(result)
-            }
-            Request::Setpoint(position) => taken(self.setpoint(position)),
-            Request::Select(law) => taken(self.controller.select(law)),
-            Request::Info => Answer::Info(self.info()),
-            Request::Cause => Answer::Cause(self.supervisor.cause()),
-            Request::Statistics => Answer::Statistics(self.statistics()),
-            Request::ResetStatistics => {
-                self.statistics = Statistics::default();
-                self.detection.forget_rejected();
-                Answer::Done
-            }
-            Request::Telemetry(every) => {
-                (self.every, self.until_telemetry) = (every, 0);
-                Answer::Done
-            }
-        }
-    }
-
-    /// Cart at 0, links hanging, as they are.
-    fn home_here(&mut self) -> Result<(), Reasons> {
-        Reasons::MOVING.when(!self.calibration.is_still(&self.table.limits)).none()?;
-        self.supervisor.homed()?;
-        self.home(&self.table.limits.rest_counts);
-        Ok(())
-    }
-
-    fn home_rail(&mut self) -> Result<(), Reasons> {
-        let [travel, _] = self.table.limits.travel_counts;
-        Reasons::NO_SWITCHES.when(travel == 0).none()?;
-        self.supervisor.begin_homing()?;
-        self.calibration.begin_rail();
-        Ok(())
-    }
-
-    fn check_signs(&mut self) -> Result<(), Reasons> {
-        let limits = &self.table.limits;
-        let hanging = hang(self.controller.encoders_mut().counts(), limits);
-        let not_homed = Reasons::NOT_HOMED.when(self.supervisor.state() != State::Calibrated);
-        Reasons::NOT_HANGING.when(!hanging).and(self.supervisor.against_arming()).and(not_homed).none()?;
-        self.calibration.begin_signs(limits);
-        Ok(())
-    }
-
-    fn arm(&mut self, id: u64) -> Result<(), Reasons> {
-        // A key that is held since the fault sends one command after the other: none of them is a new act.
-        if self.supervisor.state() == State::Fault || self.held > 0 {
-            self.held = self.table.limits.still_ticks;
-        }
-        let held = self.supervisor.state() != State::Fault && (self.held > 0 || id <= self.cleared_by);
-        let further = self.against_arming().and(Reasons::HELD.when(held));
-        let table = Reasons::TABLE.when(self.table.check(&self.build).is_err());
-        self.supervisor.arm(further.and(table))?;
-        let counts = *self.controller.encoders_mut().counts();
-        self.calibration.restart_slow(&counts);
-        Ok(())
-    }
-
-    /// What would raise the fault again at once.
-    fn against_clearing(&self) -> Reasons {
-        let Contacts { emergency_stop, driver_fault, .. } = self.contacts;
-        Reasons::EMERGENCY_STOP.when(emergency_stop).and(Reasons::DRIVER.when(driver_fault))
-    }
-
-    fn setpoint(&mut self, position: f32) -> Result<(), Rejected> {
-        let [low, high] = self.table.limits.rail_m;
-        if !(low..=high).contains(&position) {
-            return Err(Rejected::Setpoint);
-        }
-        self.controller.set_setpoint(position)?;
-        self.commanded = true;
-        Ok(())
-    }
-
-    fn info(&self) -> Info {
-        Info {
-            protocol: PROTOCOL,
-            version: [0, 1, 0],
-            rig_hash: self.table.rig_hash,
-            tick_s: self.table.tick_s,
-            states: NX as u8,
-            sensors: NY as u8,
-            reset: self.reset,
-        }
-    }
 }
+
+#[cfg(test)]
+mod tests;

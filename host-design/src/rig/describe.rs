@@ -6,8 +6,8 @@ use std::f64::consts::TAU;
 use std::fmt::Display;
 
 use super::{
-    Actuator, Chain, Kalman, LinearPlant, Link, LinkEncoder, Lqr, Motor, PlantDescription, PolePlacement,
-    Rig, defaults,
+    Actuator, Chain, Kalman, Limits, LinearPlant, Link, LinkEncoder, Lqr, Motor, PlantDescription,
+    PolePlacement, Rig, defaults,
 };
 
 const DEFAULT: &str = "(default)";
@@ -30,9 +30,7 @@ impl Rig {
         let delay = f64::from(self.tick.delay_ticks);
         page.value("delay", delay, "ticks", mark(self.tick.delay_ticks == defaults::DELAY_TICKS));
         page.design(self);
-        page.heading("limits");
-        page.value_or_none("angle", self.limits.angle_rad, "rad");
-        page.value_or_none("cart speed", self.limits.speed_m_per_s, "m/s");
+        page.limits(&self.limits);
         page.text
     }
 }
@@ -129,6 +127,31 @@ impl Page {
             self.heading(format!("link {}", index + 1));
             self.link(link);
         }
+    }
+
+    fn limits(&mut self, limits: &Limits) {
+        self.heading("limits");
+        self.value_or_none("angle", limits.angle_rad, "rad");
+        self.value_or_none("cart speed", limits.speed_m_per_s, "m/s");
+        let mut value_or = |name: &str, x: Option<f64>, unit: &str, otherwise: &str| match x {
+            Some(x) => self.value(name, x, unit, ""),
+            None => self.list(name, [otherwise.to_owned()], DEFAULT),
+        };
+        value_or("rail margin", limits.rail_margin_m, "m", "2.5 % of the rail");
+        value_or("travel tolerance", limits.travel_tolerance_m, "m", "1 % of the rail");
+        value_or("least supply", limits.supply_min_v, "V", "80 % of supply_v");
+        value_or("begins within", limits.arm_angle_rad, "rad", "a tenth of the angle");
+        let usual = Limits::default();
+        let mut value =
+            |name: &str, x: f64, unit: &str, usual: f64| self.value(name, x, unit, mark(x == usual));
+        value("begins below", limits.arm_rate_rad_per_s, "rad/s", usual.arm_rate_rad_per_s);
+        value("begins below", limits.arm_speed_m_per_s, "m/s", usual.arm_speed_m_per_s);
+        value("begins after", limits.arm_time_s, "s", usual.arm_time_s);
+        value("still for homing", limits.still_time_s, "s", usual.still_time_s);
+        value("supply too low for", limits.supply_time_s, "s", usual.supply_time_s);
+        value("saturated for", limits.saturation_time_s, "s", usual.saturation_time_s);
+        value("host silent for", limits.link_timeout_s, "s", usual.link_timeout_s);
+        value("false alarm every", limits.false_alarm_h, "h", usual.false_alarm_h);
     }
 
     fn link(&mut self, link: &Link) {

@@ -1,5 +1,8 @@
 //! The rigs of `rigs/`, each with the firmware's types of its size, brought to balance.
 
+// Each test program uses some of these.
+#![allow(dead_code)]
+
 use host_design::design::design;
 use host_design::rig::Rig;
 use host_design::simulate::{Scenario, Session, SimulationError};
