@@ -37,7 +37,6 @@ impl<'q, 't, B: Board<NY>, const NX: usize, const NY: usize> ControlTask<'q, 't,
         let inputs = self.board.inputs();
         let output = self.firmware.control(&inputs);
         self.board.drive(&output);
-        self.board.feed_watchdog();
         let command = self.commands.dequeue();
         let (telemetry, reply) = self.firmware.finish(command.as_ref(), self.cycles);
         // A reply goes first: telemetry comes again, it does not.
@@ -46,6 +45,7 @@ impl<'q, 't, B: Board<NY>, const NX: usize, const NY: usize> ControlTask<'q, 't,
                 self.firmware.message_dropped();
             }
         }
+        self.board.feed_watchdog();
         self.cycles = self.board.cycles().wrapping_sub(begin);
     }
 

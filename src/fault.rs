@@ -18,4 +18,6 @@ pub enum Fault {
     EmergencyStop = 5,
     /// The power stage reports a fault.
     Driver = 6,
+    /// The clock has failed to start: crystal or PLL.
+    Clock = 18,
 }

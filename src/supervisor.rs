@@ -129,6 +129,8 @@ impl Supervisor {
             self.trip(Fault::EmergencyStop);
         } else if contacts.driver_fault {
             self.trip(Fault::Driver);
+        } else if contacts.clock_fault {
+            self.trip(Fault::Clock);
         } else if self.state == State::Balancing && (contacts.limit_low || contacts.limit_high) {
             self.trip(Fault::LimitSwitch);
         }
