@@ -33,6 +33,7 @@
 extern crate std;
 
 pub mod actuator;
+pub mod checksum;
 pub mod control_task;
 pub mod controller;
 pub mod encoder;
@@ -51,6 +52,7 @@ pub mod link;
 pub mod message;
 pub mod observer;
 pub mod pins;
+pub mod queue;
 pub mod state_feedback;
 pub mod supervisor;
 pub mod table;

@@ -1,18 +1,15 @@
 //! The gain table: everything the controller knows about the rig, and how it is checked.
 
-use crc::{CRC_32_ISO_HDLC, Crc, Digest, NoTable};
 use nalgebra::{ArrayStorage, SMatrix};
 use serde::{Deserialize, Serialize};
 
 use crate::actuator::MotorMap;
+use crate::checksum::crc32;
 use crate::observer::ObserverGains;
 use crate::state_feedback::LawGains;
 
 /// Layout of [`GainTable`]; a table written for another layout is refused.
 pub const TABLE_FORMAT: u32 = 2;
-
-/// Without a lookup table: a few cycles per byte slower, a kilobyte of flash smaller.
-const CRC: Crc<u32, NoTable> = Crc::<u32, NoTable>::new(&CRC_32_ISO_HDLC);
 
 /// The constants of a controller with `NX` states and `NY` sensors, as written by `upright design` into `src/gains.rs`.
 #[derive(Debug, Clone, PartialEq)]
@@ -114,7 +111,7 @@ impl<const NX: usize, const NY: usize> GainTable<NX, NY> {
     /// CRC-32 (ISO-HDLC) of every field but `crc`, in order, as little-endian bytes; a missing part is one zero byte, a
     /// part that is there is preceded by a one.
     pub fn checksum(&self) -> u32 {
-        let mut digest = CRC.digest();
+        let mut digest = Digest(0);
         for word in [self.format, self.states, self.sensors, self.output] {
             digest.update(&word.to_le_bytes());
         }
@@ -134,7 +131,7 @@ impl<const NX: usize, const NY: usize> GainTable<NX, NY> {
         }
         digest.update(&[u8::from(self.motor.is_some())]);
         update(&mut digest, self.motor.iter().flat_map(MotorMap::values));
-        digest.finalize()
+        digest.0
     }
 
     /// The gains of a law, if the table holds them.
@@ -196,7 +193,16 @@ impl<const NX: usize, const NY: usize> GainTable<NX, NY> {
     }
 }
 
-fn update(digest: &mut Digest<'_, u32, NoTable>, values: impl IntoIterator<Item = f32>) {
+/// The checksum so far.
+struct Digest(u32);
+
+impl Digest {
+    fn update(&mut self, bytes: &[u8]) {
+        self.0 = crc32(self.0, bytes);
+    }
+}
+
+fn update(digest: &mut Digest, values: impl IntoIterator<Item = f32>) {
     for value in values {
         digest.update(&value.to_le_bytes());
     }

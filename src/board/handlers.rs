@@ -28,5 +28,8 @@ global_asm!(
     "mov sp, r0",
     "b {crashed}",
     ".size HardFault, . - HardFault",
+    // All other exceptions that nobody expects.
+    ".global DefaultHandler",
+    ".thumb_set DefaultHandler, HardFault",
     crashed = sym crashed,
 );

@@ -2,6 +2,7 @@
 
 use heapless::spsc::{Consumer, Producer};
 use stm32f4xx_hal::pac::{RCC, USART2};
+use upright::queue;
 
 /// Telemetry of a quadruple rig at every tenth tick needs a third of it.
 const BAUD: u32 = 460_800;
@@ -41,14 +42,14 @@ impl Receiver {
         // SAFETY: reading status and data, in this order, is this half's alone; it also clears an overrun (30.6.1).
         let usart = unsafe { &*USART2::PTR };
         let _ = usart.sr().read();
-        let _ = self.received.enqueue(usart.dr().read().bits() as u8);
+        let _ = queue::put(&mut self.received, usart.dr().read().bits() as u8);
     }
 }
 
 impl Line {
     /// The next byte from the host.
     pub(crate) fn read(&mut self) -> Option<u8> {
-        self.received.dequeue()
+        queue::take(&mut self.received)
     }
 
     /// Sends a frame to the host, or gives up: a transmitter that is never ready loses the frame.
