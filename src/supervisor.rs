@@ -125,12 +125,12 @@ impl Supervisor {
 
     /// Looks at the contacts of a tick.
     pub fn watch(&mut self, contacts: &Contacts) {
-        if contacts.emergency_stop {
+        if contacts.clock_fault {
+            self.trip(Fault::Clock);
+        } else if contacts.emergency_stop {
             self.trip(Fault::EmergencyStop);
         } else if contacts.driver_fault {
             self.trip(Fault::Driver);
-        } else if contacts.clock_fault {
-            self.trip(Fault::Clock);
         } else if self.state == State::Balancing && (contacts.limit_low || contacts.limit_high) {
             self.trip(Fault::LimitSwitch);
         }
