@@ -49,7 +49,11 @@ fn try_set_up(rcc: &RCC, flash: &FLASH) -> Option<()> {
     wait(|| rcc.cr().read().pllrdy().bit_is_set())?;
     // SAFETY: 2 is the PLL.
     rcc.cfgr().modify(|_, w| unsafe { w.sw().bits(2) });
-    wait(|| rcc.cfgr().read().sws().bits() == 2)
+    wait(|| rcc.cfgr().read().sws().bits() == 2)?;
+    // A crystal that stops later breaks the motor's timer off, and ends in the handler of the non-maskable interrupt
+    // (RM0090, 7.2.7).
+    rcc.cr().modify(|_, w| w.csson().set_bit());
+    Some(())
 }
 
 /// Waits for a flag, not for ever.

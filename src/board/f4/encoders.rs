@@ -34,7 +34,8 @@ const ARR: usize = 0x2c;
 
 /// Starts the counters in use at 0.
 pub(super) fn set_up(rcc: &RCC) {
-    rcc.apb1enr().modify(|_, w| w.tim2en().set_bit().tim3en().set_bit().tim4en().set_bit().tim5en().set_bit());
+    rcc.apb1enr()
+        .modify(|_, w| w.tim2en().set_bit().tim3en().set_bit().tim4en().set_bit().tim5en().set_bit());
     rcc.apb2enr().modify(|_, w| w.tim8en().set_bit());
     for &(timer, _) in TIMERS.iter().take(SENSORS) {
         let write = |offset, value: u32| {

@@ -13,7 +13,7 @@ use core::mem::MaybeUninit;
 
 use cortex_m::peripheral::{DWT, SYST};
 use heapless::spsc::{Consumer, Producer};
-use stm32f4xx_hal::pac::{EXTI, IWDG, Peripherals};
+use stm32f4xx_hal::pac::{EXTI, Peripherals};
 use upright::encoder::CounterWidth;
 use upright::gains::SENSORS;
 use upright::io::{Board, Contacts, Inputs, Output};
@@ -23,13 +23,14 @@ pub(crate) use clock::CLOCK_HZ;
 use motor::Motor;
 pub(crate) use serial::{Line, Receiver};
 use supply::Supply;
+use watchdog::Watchdog;
 
 /// The pins and peripherals of the control task.
 pub(crate) struct Hardware {
     motor: Motor,
     supply: Supply,
     exti: EXTI,
-    watchdog: IWDG,
+    watchdog: Watchdog,
     clock_fault: bool,
     overrun: bool,
 }
@@ -52,19 +53,17 @@ pub(crate) fn set_up(
     let mut core = unsafe { cortex_m::Peripherals::steal() };
     core.DCB.enable_trace();
     core.DWT.enable_cycle_counter();
+    pins::light(clock.is_ok());
+    // What was noticed while the pull-ups rose does not count.
+    let _ = (motor.was_stopped(), pins::driver_fault_was_reported(&device.EXTI));
     let hardware = Hardware {
         motor,
         supply,
         exti: device.EXTI,
-        watchdog: device.IWDG,
+        watchdog: Watchdog::new(device.IWDG),
         clock_fault: clock.is_err(),
         overrun: false,
     };
-    // From here on, ticks have to come; on the slow oscillator they come too late for it.
-    if clock.is_ok() {
-        watchdog::start(&hardware.watchdog);
-        pins::light(true);
-    }
     (hardware, receiver, line, reset)
 }
 
@@ -94,11 +93,12 @@ impl Board<SENSORS> for Hardware {
         self.motor.drive(output);
     }
 
-    /// Only a tick that ends before the next one is due is healthy.
+    /// Only a tick that ends before the next one is due is healthy. On the slow oscillator, ticks come too late for the
+    /// watchdog; the motor stays off there anyway.
     fn feed_watchdog(&mut self) {
         self.overrun = tick_is_due();
-        if !self.overrun {
-            watchdog::feed(&self.watchdog);
+        if !self.overrun && !self.clock_fault {
+            self.watchdog.feed();
         }
     }
 

@@ -27,8 +27,7 @@ struct Port {
 }
 
 const SET_UP: [Port; PORTS] = {
-    let mut ports =
-        [Port { mode: 0, pull: 0, two_bits: 0, alternate: [0; 2], four_bits: [0; 2] }; PORTS];
+    let mut ports = [Port { mode: 0, pull: 0, two_bits: 0, alternate: [0; 2], four_bits: [0; 2] }; PORTS];
     let mut i = 0;
     while i <= WIRING.len() {
         let wire = if i < WIRING.len() { WIRING[i] } else { LIGHT };
@@ -54,9 +53,8 @@ const SET_UP: [Port; PORTS] = {
 
 /// Sets up all pins. The outputs are low from their first moment: that is what the output registers hold after a reset.
 pub(super) fn set_up(rcc: &RCC, syscfg: &SYSCFG, exti: &EXTI) {
-    rcc.ahb1enr().modify(|_, w| {
-        w.gpioaen().set_bit().gpioben().set_bit().gpiocen().set_bit().gpioden().set_bit()
-    });
+    rcc.ahb1enr()
+        .modify(|_, w| w.gpioaen().set_bit().gpioben().set_bit().gpiocen().set_bit().gpioden().set_bit());
     rcc.apb2enr().modify(|_, w| w.syscfgen().set_bit());
     let bases = [GPIOA::PTR as usize, GPIOB::PTR as usize, GPIOC::PTR as usize, GPIOD::PTR as usize];
     for (base, port) in bases.into_iter().zip(&SET_UP) {

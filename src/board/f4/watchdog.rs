@@ -11,20 +11,31 @@ const COUNTS: u16 = {
     counts as u16
 };
 
-/// Starts the watchdog. Nothing can stop it (RM0090, 21.3).
-pub(super) fn start(watchdog: &IWDG) {
-    // SAFETY: keys, prescaler and reload value of RM0090, 21.4.
-    unsafe {
-        watchdog.kr().write(|w| w.bits(0xcccc));
-        watchdog.kr().write(|w| w.bits(0x5555));
-        watchdog.pr().write(|w| w.bits(0));
-        watchdog.rlr().write(|w| w.bits(COUNTS.into()));
-    }
-    feed(watchdog);
+/// The watchdog. It starts with the first healthy tick; before that, nothing has ever turned the motor on.
+pub(super) struct Watchdog {
+    registers: IWDG,
+    running: bool,
 }
 
-/// Starts its count anew.
-pub(super) fn feed(watchdog: &IWDG) {
-    // SAFETY: the key for it.
-    watchdog.kr().write(|w| unsafe { w.bits(0xaaaa) });
+impl Watchdog {
+    /// Not yet running.
+    pub(super) fn new(registers: IWDG) -> Self {
+        Self { registers, running: false }
+    }
+
+    /// Starts its count anew. Nothing can stop it (RM0090, 21.3).
+    pub(super) fn feed(&mut self) {
+        let watchdog = &self.registers;
+        // SAFETY: keys, prescaler and reload value of RM0090, 21.4.
+        unsafe {
+            if !self.running {
+                watchdog.kr().write(|w| w.bits(0xcccc));
+                watchdog.kr().write(|w| w.bits(0x5555));
+                watchdog.pr().write(|w| w.bits(0));
+                watchdog.rlr().write(|w| w.bits(COUNTS.into()));
+                self.running = true;
+            }
+            watchdog.kr().write(|w| w.bits(0xaaaa));
+        }
+    }
 }

@@ -52,15 +52,15 @@ pub(crate) const WIRING: [Wire; 20] = [
     wire(b'B', DIRECTION, Mode::Output, false, "output", "power stage, direction: high pushes along +x"),
     wire(b'B', ENABLE, Mode::Output, false, "output", "power stage, enable: high; 10 kΩ to ground"),
     wire(b'B', DRIVER_FAULT, Mode::Input, true, "input", "power stage, fault: low; open drain"),
-    wire(b'B', EMERGENCY_STOP, Mode::Alternate(1), true, "TIM1_BKIN", "emergency stop, normally closed, to ground"),
-    wire(b'C', LIMIT_LOW, Mode::Input, true, "input", "limit switch at the low end, normally closed, to ground"),
-    wire(b'C', LIMIT_HIGH, Mode::Input, true, "input", "limit switch at the high end, normally closed, to ground"),
+    wire(b'B', EMERGENCY_STOP, Mode::Alternate(1), true, "TIM1_BKIN", "emergency stop: opens when pressed"),
+    wire(b'C', LIMIT_LOW, Mode::Input, true, "input", "limit switch, low end: opens when pressed"),
+    wire(b'C', LIMIT_HIGH, Mode::Input, true, "input", "limit switch, high end: opens when pressed"),
     wire(b'C', 2, Mode::Analog, false, "ADC1_IN12", "supply voltage through 10 kΩ; 1 kΩ to ground"),
     wire(b'A', 2, Mode::Alternate(7), false, "USART2_TX", "serial line to the host"),
     wire(b'A', 3, Mode::Alternate(7), true, "USART2_RX", "serial line from the host"),
 ];
 
-/// The lights, one per board: on while the firmware ticks without a fault of the clock.
+/// The lights, one per board: on after a good start, off after a crash.
 pub(crate) const LIGHTS: [Wire; 3] = [
     wire(b'C', 13, Mode::Output, false, "output", "light (STM32F405)"),
     wire(b'D', 12, Mode::Output, false, "output", "light (STM32F407 Discovery: green)"),
