@@ -46,7 +46,7 @@ pub enum Rejected {
     NoSuchLaw,
     /// The law can only be changed while the controller is stopped.
     Running,
-    /// The set-point is not a finite number.
+    /// The set-point is not a finite number, or not within the soft limits of the rail.
     Setpoint,
     /// The table holds no observer, so the controller cannot run from encoders.
     NoObserver,
@@ -57,7 +57,7 @@ impl core::fmt::Display for Rejected {
         f.write_str(match self {
             Rejected::NoSuchLaw => "the gain table does not hold this control law",
             Rejected::Running => "the control law can only be changed while disarmed",
-            Rejected::Setpoint => "the set-point is not a finite number",
+            Rejected::Setpoint => "the set-point is not a finite number within the soft limits of the rail",
             Rejected::NoObserver => {
                 "the gain table holds no observer: give the rig its encoders and [kalman]"
             }
@@ -210,12 +210,25 @@ impl<'t, const NX: usize, const NY: usize> Controller<'t, NX, NY> {
     /// e = y - C x̂⁻,   x̂ = x̂⁻ + L e,   u = sat(N r - K x̂ - k_pending u_pending - k_integral z)
     /// ```
     pub fn control(&mut self, raw: &[u32; NY]) -> Command {
+        self.control_with(raw, |_, _, _| ())
+    }
+
+    /// As [`control`](Self::control), with a look at counts, positions and innovation before the innovation is used:
+    /// `judge` sets that of a measurement it rejects to 0, and the prediction takes its place.
+    #[inline]
+    pub fn control_with(
+        &mut self,
+        raw: &[u32; NY],
+        judge: impl FnOnce(&[i32; NY], &[f32; NY], &mut [f32; NY]),
+    ) -> Command {
         self.encoders.update(raw);
-        if let Some(observer) = &self.table.observer {
-            let y = self.encoders.positions(&observer.step);
-            self.innovation = observer.innovation(&y, &self.estimate);
-            self.estimate = observer.correct(&self.estimate, &self.innovation);
-        }
+        let (true, Some(observer)) = (self.running, &self.table.observer) else {
+            return OFF;
+        };
+        let y = self.encoders.positions(&observer.step);
+        self.innovation = observer.innovation(&y, &self.estimate);
+        judge(self.encoders.counts(), &y.data.0[0], &mut self.innovation.data.0[0]);
+        self.estimate = observer.correct(&self.estimate, &self.innovation);
         self.act()
     }
 
@@ -252,12 +265,17 @@ impl<'t, const NX: usize, const NY: usize> Controller<'t, NX, NY> {
             return;
         }
         let Command { requested, applied, .. } = self.command;
-        let during_this_tick = if self.table.delay_ticks == 1 { self.state.pending } else { applied };
+        let during_this_tick = self.acting();
         let position = self.output();
         self.state.advance(self.gains.k_integral, position, self.table.tick_s, requested, applied);
         if let Some(observer) = &self.table.observer {
             self.estimate = observer.predict(&self.estimate, during_this_tick);
         }
+    }
+
+    /// Force on the cart during this tick (N), between [`control`](Self::control) and [`predict`](Self::predict).
+    pub fn acting(&self) -> f32 {
+        if self.table.delay_ticks == 1 { self.state.pending } else { self.command.applied }
     }
 
     fn output(&self) -> f32 {
@@ -268,6 +286,8 @@ impl<'t, const NX: usize, const NY: usize> Controller<'t, NX, NY> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::detection::Thresholds;
+    use crate::limits::Limits;
     use crate::observer::ObserverGains;
     use crate::table::{TABLE_FORMAT, columns};
     use nalgebra::{matrix, vector};
@@ -302,6 +322,8 @@ mod tests {
                 step: vector![0.25],
             }),
             motor: None,
+            limits: Limits::none(),
+            thresholds: Thresholds::none(),
             crc: 0,
         };
         table.crc = table.checksum();

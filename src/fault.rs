@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 /// Why the motor was turned off. Latched: the first cause stays until it is cleared.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[repr(u8)]
 pub enum Fault {
     /// A measurement, the estimate or the force is not a finite number.
@@ -12,10 +12,245 @@ pub enum Fault {
     Angle = 2,
     /// The cart is beyond its soft limits.
     Rail = 3,
-    /// A limit switch is pressed.
-    LimitSwitch = 4,
-    /// The emergency stop is pressed.
-    EmergencyStop = 5,
-    /// The power stage reports a fault.
-    Driver = 6,
+    /// The cart is faster than the limit.
+    Speed = 4,
+    /// A limit switch is pressed, or its wire is open.
+    LimitSwitch = 5,
+    /// The emergency stop is pressed, or its wire is open.
+    EmergencyStop = 6,
+    /// The power stage has reported a fault.
+    Driver = 7,
+    /// The supply of the power stage is too low.
+    Supply = 8,
+    /// Measurements of one encoder contradict the model.
+    Encoder = 9,
+    /// An encoder stands still while the model moves.
+    Frozen = 10,
+    /// The rig does not move as the motor's force should move it.
+    Motor = 11,
+    /// The law has asked for more force than there is for too long.
+    Saturated = 12,
+    /// Ticks were not finished in time.
+    Overrun = 13,
+    /// The host that commands the set-point is silent.
+    LinkLost = 14,
+    /// The gain table has changed in memory.
+    Table = 15,
+    /// Ticks stopped: the independent watchdog has reset the microcontroller.
+    Watchdog = 16,
+    /// The program has failed: panic, processor fault or stack overflow.
+    Crash = 17,
+}
+
+/// The most ticks from a fault's first effect on what the firmware sees to motor off.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Reaction {
+    /// So many ticks: 1 means in the tick that sees it.
+    Ticks(u32),
+    /// So many ticks after a time that the rig file gives under this key of `[limits]`.
+    After(&'static str, u32),
+    /// By other means than the control task: see the condition.
+    Hardware(&'static str),
+}
+
+impl core::fmt::Display for Reaction {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        match self {
+            Reaction::Ticks(ticks) => write!(f, "{ticks}"),
+            Reaction::After(key, ticks) => write!(f, "`{key}` + {ticks}"),
+            Reaction::Hardware(what) => f.write_str(what),
+        }
+    }
+}
+
+/// What there is to know about a fault.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Entry {
+    /// The fault; its code is its number.
+    pub fault: Fault,
+    /// Short name.
+    pub name: &'static str,
+    /// When it is raised.
+    pub condition: &'static str,
+    /// How soon the motor is off.
+    pub reaction: Reaction,
+    /// What to do about it.
+    pub remedy: &'static str,
+}
+
+impl Fault {
+    /// Every fault, by code.
+    pub const ALL: [Entry; 17] = [
+        Entry {
+            fault: Fault::NotFinite,
+            name: "not finite",
+            condition: "a measurement, the estimate or the force is not a finite number",
+            reaction: Reaction::Ticks(1),
+            remedy: "check the supply's measurement; if it comes again, report it with the telemetry before it",
+        },
+        Entry {
+            fault: Fault::Angle,
+            name: "angle",
+            condition: "a link leans further than `angle_rad` from the vertical",
+            reaction: Reaction::Ticks(1),
+            remedy: "let the links hang, then raise them again; smaller disturbances, or a design with more force",
+        },
+        Entry {
+            fault: Fault::Rail,
+            name: "rail",
+            condition: "the cart is closer than `rail_margin_m` to an end of the rail",
+            reaction: Reaction::Ticks(1),
+            remedy: "push the cart to the middle; if it drifted there, an encoder loses counts, or the rail is not level",
+        },
+        Entry {
+            fault: Fault::Speed,
+            name: "speed",
+            condition: "the cart is faster than `speed_m_per_s`",
+            reaction: Reaction::Ticks(1),
+            remedy: "smaller disturbances, or a higher limit if the rig can take it",
+        },
+        Entry {
+            fault: Fault::LimitSwitch,
+            name: "limit switch",
+            condition: "a limit switch is pressed, or its wire is open, while balancing",
+            reaction: Reaction::Ticks(1),
+            remedy: "push the cart off the switch; if it was not there, check the wire, and home again",
+        },
+        Entry {
+            fault: Fault::EmergencyStop,
+            name: "emergency stop",
+            condition: "the emergency stop is pressed, or its wire is open; it also cuts the power stage by hardware",
+            reaction: Reaction::Ticks(1),
+            remedy: "release the emergency stop, then clear",
+        },
+        Entry {
+            fault: Fault::Driver,
+            name: "driver",
+            condition: "the power stage has reported a fault since the last tick, however briefly",
+            reaction: Reaction::Ticks(1),
+            remedy: "check motor wiring, short circuits and temperature of the power stage",
+        },
+        Entry {
+            fault: Fault::Supply,
+            name: "supply",
+            condition: "the supply is below `supply_min_v` for `supply_time_s`",
+            reaction: Reaction::After("supply_time_s", 1),
+            remedy: "check the supply and its current limit",
+        },
+        Entry {
+            fault: Fault::Encoder,
+            name: "encoder",
+            condition: "three measurements in a row of one encoder contradict the model; single ones are rejected and \
+                        counted",
+            reaction: Reaction::Ticks(3),
+            remedy: "check plug, wire and coupling of this encoder; home, and check the signs again",
+        },
+        Entry {
+            fault: Fault::Frozen,
+            name: "frozen encoder",
+            condition: "an encoder stands still while the model moves by several of its counts",
+            reaction: Reaction::Ticks(10),
+            remedy: "check plug, wire and coupling of this encoder; home, and check the signs again",
+        },
+        Entry {
+            fault: Fault::Motor,
+            name: "motor",
+            condition: "the cart does not move as the motor's force should move it: motor dead or weak (20 ticks), stuck \
+                        or reversed (5), or a collision",
+            reaction: Reaction::Ticks(20),
+            remedy: "check motor, coupling and belt, and the masses in the rig file; keep hands off the cart",
+        },
+        Entry {
+            fault: Fault::Saturated,
+            name: "saturated",
+            condition: "the law asks for more than the largest force in every tick of `saturation_time_s`",
+            reaction: Reaction::After("saturation_time_s", 1),
+            remedy: "find out what holds the cart; smaller disturbances, or a stronger motor",
+        },
+        Entry {
+            fault: Fault::Overrun,
+            name: "overrun",
+            condition: "three ticks in a row were not finished in time; single ones are counted",
+            reaction: Reaction::Ticks(3),
+            remedy: "give the rig a longer `period_s`, or build the firmware with optimisation",
+        },
+        Entry {
+            fault: Fault::LinkLost,
+            name: "link lost",
+            condition: "no command for `link_timeout_s` although the host has commanded a set-point while balancing",
+            reaction: Reaction::After("link_timeout_s", 1),
+            remedy: "check the cable; the host must send beats while it commands the set-point",
+        },
+        Entry {
+            fault: Fault::Table,
+            name: "table",
+            condition: "the gain table no longer fits its checksum; it is read all the time, and before arming",
+            reaction: Reaction::Hardware("one pass over the table"),
+            remedy: "flash the firmware again; if it comes again, the memory is damaged",
+        },
+        Entry {
+            fault: Fault::Watchdog,
+            name: "watchdog",
+            condition: "ticks stopped: the independent watchdog resets the microcontroller, which starts disarmed and \
+                        keeps this as the reason",
+            reaction: Reaction::Hardware("3 periods, by the watchdog"),
+            remedy: "report it with the firmware's version; home and check the signs again",
+        },
+        Entry {
+            fault: Fault::Crash,
+            name: "crash",
+            condition: "panic, processor fault or stack overflow: the handler turns the motor off and resets; the \
+                        firmware starts disarmed and keeps this as the reason",
+            reaction: Reaction::Hardware("at once, in the handler"),
+            remedy: "report it with the firmware's version; home and check the signs again",
+        },
+    ];
+
+    /// The number by which it is known in telemetry and documentation.
+    pub fn code(self) -> u8 {
+        self as u8
+    }
+
+    /// Name, condition, reaction and remedy.
+    pub fn entry(self) -> &'static Entry {
+        const ALL: &[Entry] = &Fault::ALL;
+        // A test holds that the entry of every code is at its place.
+        ALL.get(self as usize - 1).unwrap_or(&ALL[0])
+    }
+
+    /// Whether positions can no longer be trusted after it: home, and check the signs, again.
+    pub fn loses_positions(self) -> bool {
+        matches!(self, Fault::Encoder | Fault::Frozen | Fault::Watchdog | Fault::Crash)
+    }
+}
+
+impl core::fmt::Display for Fault {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        f.write_str(self.entry().name)
+    }
+}
+
+/// The first cause, as it was latched.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Cause {
+    /// The fault.
+    pub fault: Fault,
+    /// Number of its tick since the start of the firmware.
+    pub tick: u32,
+    /// The sensor it was found at (0: cart, 1: first link …).
+    pub sensor: Option<u8>,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_fault_is_at_the_place_of_its_code() {
+        for (entry, code) in Fault::ALL.iter().zip(1..) {
+            assert_eq!(entry.fault.code(), code);
+            assert_eq!(entry.fault.entry(), entry);
+            assert!(!entry.name.is_empty() && !entry.condition.is_empty() && !entry.remedy.is_empty());
+        }
+    }
 }

@@ -3,12 +3,19 @@
 use heapless::Vec;
 
 use crate::actuator::Drive;
-use crate::controller::Controller;
+use crate::calibration::{Calibration, hang};
+use crate::controller::{Controller, Rejected};
+use crate::detection::Detection;
 use crate::encoder::CounterWidth;
-use crate::io::{Inputs, Output};
+use crate::envelope;
+use crate::fault::{Cause, Fault};
+use crate::io::{Contacts, Inputs, Output};
 use crate::message::{Answer, Command, Info, Message, PROTOCOL, Request, Reset, Statistics, Telemetry};
+use crate::reasons::Reasons;
+use crate::sign_check::Signs;
 use crate::supervisor::{State, Supervisor};
-use crate::table::{Build, GainTable, TableError};
+use crate::table::{Build, GainTable, Reading, TableError};
+use crate::watch::Watch;
 
 /// Controller and supervisor, tick by tick. It knows neither registers nor frames.
 ///
@@ -18,8 +25,21 @@ use crate::table::{Build, GainTable, TableError};
 pub struct Firmware<'t, const NX: usize, const NY: usize> {
     controller: Controller<'t, NX, NY>,
     supervisor: Supervisor,
+    calibration: Calibration<NY>,
+    detection: Detection<NY>,
+    watch: Watch,
+    reading: Reading,
     table: &'t GainTable<NX, NY>,
+    build: Build,
     raw: [u32; NY],
+    contacts: Contacts,
+    supply_v: f32,
+    /// Whether the host has given a set-point since the motor was last turned off.
+    commanded: bool,
+    /// Ticks for which another arm command is the one that was refused because of a fault.
+    held: u32,
+    /// Number of the last command that cleared a fault.
+    cleared_by: u64,
     tick: u32,
     output: Output,
     requested: f32,
@@ -46,11 +66,22 @@ impl<'t, const NX: usize, const NY: usize> Firmware<'t, NX, NY> {
         widths: [CounterWidth; NY],
         reset: Reset,
     ) -> Result<Self, TableError> {
+        let cause = reset.fault().map(|fault| Cause { fault, tick: 0, sensor: None });
         Ok(Self {
             controller: Controller::new(table, build, widths)?,
-            supervisor: Supervisor::default(),
+            supervisor: Supervisor::new(cause),
+            calibration: Calibration::new(&table.limits),
+            detection: Detection::default(),
+            watch: Watch::default(),
+            reading: Reading::default(),
             table,
+            build: *build,
             raw: [0; NY],
+            contacts: Contacts::default(),
+            supply_v: 0.0,
+            commanded: false,
+            held: 0,
+            cleared_by: 0,
             tick: 0,
             output: Output::OFF,
             requested: 0.0,
@@ -73,23 +104,123 @@ impl<'t, const NX: usize, const NY: usize> Firmware<'t, NX, NY> {
         self.supervisor.state()
     }
 
+    /// The first cause of the latched fault, or of the reset before the start.
+    pub fn cause(&self) -> Option<Cause> {
+        self.supervisor.cause()
+    }
+
+    /// Homing and the check of the signs.
+    pub fn calibration(&self) -> &Calibration<NY> {
+        &self.calibration
+    }
+
+    /// What has happened since the start.
+    pub fn statistics(&self) -> Statistics {
+        Statistics { rejected_samples: self.detection.rejected(), ..self.statistics }
+    }
+
     /// First half of a tick, from inputs to output.
     pub fn control(&mut self, inputs: &Inputs<NY>) -> Output {
-        self.raw = inputs.counts;
-        self.supervisor.watch(&inputs.contacts);
-        if self.supervisor.upright() {
-            // A controller without observer stays stopped.
-            let _ = self.controller.start(&inputs.counts);
+        (self.raw, self.contacts, self.supply_v) = (inputs.counts, inputs.contacts, inputs.supply_v);
+        self.statistics.overruns =
+            self.statistics.overruns.saturating_add(u32::from(inputs.contacts.overrun));
+        if inputs.contacts.emergency_stop {
+            self.trip(Fault::EmergencyStop, None);
+        } else if inputs.contacts.driver_fault {
+            self.trip(Fault::Driver, None);
         }
-        let command = self.controller.control(&inputs.counts);
+        if self.supervisor.state() != State::Balancing {
+            self.prepare();
+        }
+        self.output = match self.supervisor.state() {
+            State::Balancing => self.balance(inputs),
+            _ => Output::OFF,
+        };
+        if !self.output.enable {
+            (self.requested, self.applied) = (0.0, 0.0);
+            self.controller.stop();
+        }
+        self.output
+    }
+
+    /// A tick with the motor on.
+    fn balance(&mut self, inputs: &Inputs<NY>) -> Output {
+        let table = self.table;
+        let (detection, thresholds) = (&mut self.detection, &table.thresholds);
+        let mut finding = None;
+        let command = self.controller.control_with(&inputs.counts, |counts, y, e| {
+            finding = detection.test(thresholds, counts, y, e);
+        });
         (self.requested, self.applied) = (command.requested, command.applied);
-        self.output = if self.supervisor.state() == State::Balancing {
+        if let Some(fault) = self.watch.inputs(&table.limits, inputs) {
+            self.trip(fault, None);
+        }
+        if let Some(fault) =
+            envelope::left(&table.limits, self.controller.estimate().as_slice(), command.requested)
+        {
+            self.trip(fault, None);
+        }
+        if let Some(finding) = finding {
+            self.trip(finding.fault, Some(finding.sensor));
+        }
+        if let Some(fault) = self.watch.force(&table.limits, command.requested != command.applied) {
+            self.trip(fault, None);
+        }
+        if self.supervisor.state() == State::Balancing {
             Output { enable: true, drive: command.drive }
         } else {
-            self.controller.stop();
             Output::OFF
-        };
-        self.output
+        }
+    }
+
+    /// A tick with the motor off: what is done by hand.
+    fn prepare(&mut self) {
+        // Stopped: the encoders are followed, no more.
+        self.controller.control(&self.raw);
+        let limits = &self.table.limits;
+        let counts = *self.controller.encoders_mut().counts();
+        self.calibration.update(&counts, limits);
+        self.held = self.held.saturating_sub(1);
+        match self.supervisor.state() {
+            State::Homing => match self.calibration.find_rail(&counts, &self.contacts, limits) {
+                Ok(Some(position)) => self.home(&position),
+                Ok(None) => {}
+                Err(_) => self.supervisor.disarm(),
+            },
+            State::Calibrated => self.calibration.check_signs(&counts, limits),
+            State::Armed => self.wait(&counts),
+            State::Disarmed | State::Balancing | State::Fault => {}
+        }
+    }
+
+    /// Armed: begins when everything has been upright and slow for long enough.
+    fn wait(&mut self, counts: &[i32; NY]) {
+        let limits = &self.table.limits;
+        let upright = limits.within_half_a_turn(counts);
+        let lean = self.largest_lean(&upright);
+        if lean > limits.angle_rad || !self.against_by_inputs().and(self.off_centre(counts)).is_empty() {
+            self.supervisor.lost();
+        } else if lean > limits.arm_angle_rad {
+            self.calibration.restart_slow(counts);
+        } else if self.calibration.slow_ticks() >= limits.arm_ticks {
+            self.begin(&upright);
+        }
+    }
+
+    /// Balancing begins at these counts, which are within half a turn.
+    fn begin(&mut self, counts: &[i32; NY]) {
+        self.controller.encoders_mut().home(&self.raw, counts);
+        if self.controller.start(&self.raw).is_err() {
+            return;
+        }
+        if !self.commanded {
+            let here = self.controller.law_state().setpoint;
+            // A position from the encoders is finite.
+            let _ = self.controller.set_setpoint(here);
+        }
+        self.detection.start(counts, &self.controller.positions().data.0[0]);
+        self.watch.start();
+        self.supervisor.upright();
     }
 
     /// Second half of a tick: telemetry, then the prediction for the next tick and the command that has arrived, if any.
@@ -103,7 +234,15 @@ impl<'t, const NX: usize, const NY: usize> Firmware<'t, NX, NY> {
         self.statistics.ticks = self.statistics.ticks.wrapping_add(1);
         self.statistics.worst_cycles = self.statistics.worst_cycles.max(cycles);
         let telemetry = self.telemetry_is_due().then(|| self.telemetry());
-        self.controller.predict();
+        if self.supervisor.state() == State::Balancing {
+            self.end();
+            if let Some(fault) = self.watch.link(&self.table.limits, command.is_some(), self.commanded) {
+                self.trip(fault, None);
+            }
+        }
+        if self.reading.next(self.table).is_some_and(|crc| crc != self.table.crc) {
+            self.trip(Fault::Table, None);
+        }
         let reply = command.map(|command| Message::Reply { id: command.id, answer: self.answer(command) });
         self.tick = self.tick.wrapping_add(1);
         (telemetry, reply)
@@ -123,12 +262,102 @@ impl<'t, const NX: usize, const NY: usize> Firmware<'t, NX, NY> {
         self.every > 0
     }
 
+    /// Prepares the next tick of balancing.
+    fn end(&mut self) {
+        let corrected = self.measured_estimate();
+        self.detection.end(&self.table.thresholds.motor, corrected, self.controller.acting());
+        self.controller.predict();
+    }
+
+    /// The estimate of what each sensor measures.
+    fn measured_estimate(&self) -> [f32; NY] {
+        let mut positions = [0.0; NY];
+        if let Some(observer) = &self.table.observer {
+            let estimate = self.controller.estimate();
+            for (position, &state) in positions.iter_mut().zip(&observer.measured) {
+                *position = estimate.get(state as usize).copied().unwrap_or_default();
+            }
+        }
+        positions
+    }
+
+    fn trip(&mut self, fault: Fault, sensor: Option<u8>) {
+        if self.supervisor.state() != State::Fault && fault.loses_positions() {
+            self.calibration.lose(&self.table.limits);
+        }
+        self.calibration.give_up();
+        self.commanded = false;
+        self.supervisor.trip(Cause { fault, tick: self.tick, sensor });
+    }
+
+    fn home(&mut self, position: &[i32; NY]) {
+        if self.supervisor.homed().is_ok() {
+            self.controller.encoders_mut().home(&self.raw, position);
+            self.calibration.homed();
+        }
+    }
+
+    /// Largest angle of a link from the vertical at these counts (rad); 0 where there are no turns.
+    fn largest_lean(&self, counts: &[i32; NY]) -> f32 {
+        let Some(observer) = &self.table.observer else { return 0.0 };
+        let (mut angle, mut largest) = (0.0, 0.0f32);
+        let joints = counts.iter().zip(observer.step.iter()).zip(&self.table.limits.turn_counts);
+        for ((&count, step), _) in joints.filter(|(_, turn)| **turn > 0) {
+            angle += step * count as f32;
+            largest = largest.max(f32::abs(angle));
+        }
+        largest
+    }
+
+    fn off_centre(&self, counts: &[i32; NY]) -> Reasons {
+        let [low, high] = self.table.limits.rail_m;
+        let step = self
+            .table
+            .observer
+            .as_ref()
+            .map_or(0.0, |observer| observer.step.iter().next().copied().unwrap_or_default());
+        let position = step * counts.first().copied().unwrap_or_default() as f32;
+        Reasons::OFF_CENTRE.when(position < low || position > high)
+    }
+
+    fn against_by_inputs(&self) -> Reasons {
+        let Contacts { limit_low, limit_high, emergency_stop, driver_fault, .. } = self.contacts;
+        let supply_is_good = self.supply_v >= self.table.limits.supply_min_v && self.supply_v.is_finite();
+        Reasons::LIMIT_SWITCH
+            .when(limit_low || limit_high)
+            .and(Reasons::EMERGENCY_STOP.when(emergency_stop))
+            .and(Reasons::DRIVER.when(driver_fault))
+            .and(Reasons::SUPPLY.when(!supply_is_good))
+    }
+
+    /// Everything that stands against arming now, but for the table, which is only read when it is tried.
+    pub fn against_arming(&mut self) -> Reasons {
+        let state = self.supervisor.against_arming();
+        if self.supervisor.state() == State::Balancing {
+            return state;
+        }
+        let limits = &self.table.limits;
+        let counts = *self.controller.encoders_mut().counts();
+        let lean = self.largest_lean(&limits.within_half_a_turn(&counts));
+        state
+            .and(Reasons::SIGNS.when(self.calibration.signs() != Signs::Checked))
+            .and(Reasons::TILTED.when(lean > limits.arm_angle_rad))
+            .and(Reasons::MOVING.when(self.calibration.slow_ticks() < limits.arm_ticks / 4))
+            .and(self.off_centre(&counts))
+            .and(self.against_by_inputs())
+            .and(Reasons::NO_OBSERVER.when(self.table.observer.is_none()))
+    }
+
     fn telemetry(&mut self) -> Telemetry<NX, NY> {
         let (Drive::Force(drive) | Drive::Duty(drive)) = self.output.drive;
         Telemetry {
             tick: self.tick,
             state: self.supervisor.state(),
             fault: self.supervisor.fault(),
+            cause_tick: self.supervisor.cause().map_or(0, |cause| cause.tick),
+            homing: self.calibration.homing(),
+            signs: self.calibration.signs(),
+            against: self.against_arming(),
             counts: Vec::from_slice(self.controller.encoders_mut().counts()).unwrap_or_default(),
             estimate: Vec::from_slice(self.controller.estimate().as_slice()).unwrap_or_default(),
             innovation: Vec::from_slice(self.controller.innovation().as_slice()).unwrap_or_default(),
@@ -145,29 +374,30 @@ impl<'t, const NX: usize, const NY: usize> Firmware<'t, NX, NY> {
         let taken = |result: Result<(), _>| result.map_or_else(Answer::Rejected, |()| Answer::Done);
         match command.request {
             Request::Beat => Answer::Done,
-            Request::Home => {
-                let result = self.supervisor.home();
-                if result.is_ok() {
-                    self.controller.encoders_mut().home(&self.raw, &[0; NY]);
-                }
-                done(result)
-            }
-            Request::Arm => done(self.supervisor.arm()),
+            Request::Home => done(self.home_here()),
+            Request::HomeRail => done(self.home_rail()),
+            Request::CheckSigns => done(self.check_signs()),
+            Request::Arm => done(self.arm(command.id)),
             Request::Disarm => {
                 self.supervisor.disarm();
+                self.calibration.give_up();
+                self.commanded = false;
                 self.controller.stop();
                 Answer::Done
             }
             Request::Clear => {
-                self.supervisor.clear();
-                Answer::Done
+                let result = self.supervisor.clear(self.against_clearing());
+                self.cleared_by = command.id;
+                done(result)
             }
-            Request::Setpoint(position) => taken(self.controller.set_setpoint(position)),
+            Request::Setpoint(position) => taken(self.setpoint(position)),
             Request::Select(law) => taken(self.controller.select(law)),
             Request::Info => Answer::Info(self.info()),
-            Request::Statistics => Answer::Statistics(self.statistics),
+            Request::Cause => Answer::Cause(self.supervisor.cause()),
+            Request::Statistics => Answer::Statistics(self.statistics()),
             Request::ResetStatistics => {
                 self.statistics = Statistics::default();
+                self.detection.forget_rejected();
                 Answer::Done
             }
             Request::Telemetry(every) => {
@@ -175,6 +405,61 @@ impl<'t, const NX: usize, const NY: usize> Firmware<'t, NX, NY> {
                 Answer::Done
             }
         }
+    }
+
+    /// Cart at 0, links hanging, as they are.
+    fn home_here(&mut self) -> Result<(), Reasons> {
+        Reasons::MOVING.when(!self.calibration.is_still(&self.table.limits)).none()?;
+        self.supervisor.homed()?;
+        self.home(&self.table.limits.rest_counts);
+        Ok(())
+    }
+
+    fn home_rail(&mut self) -> Result<(), Reasons> {
+        let [travel, _] = self.table.limits.travel_counts;
+        Reasons::NO_SWITCHES.when(travel == 0).none()?;
+        self.supervisor.begin_homing()?;
+        self.calibration.begin_rail();
+        Ok(())
+    }
+
+    fn check_signs(&mut self) -> Result<(), Reasons> {
+        let limits = &self.table.limits;
+        let hanging = hang(self.controller.encoders_mut().counts(), limits);
+        let not_homed = Reasons::NOT_HOMED.when(self.supervisor.state() != State::Calibrated);
+        Reasons::NOT_HANGING.when(!hanging).and(self.supervisor.against_arming()).and(not_homed).none()?;
+        self.calibration.begin_signs(limits);
+        Ok(())
+    }
+
+    fn arm(&mut self, id: u64) -> Result<(), Reasons> {
+        // A key that is held since the fault sends one command after the other: none of them is a new act.
+        if self.supervisor.state() == State::Fault || self.held > 0 {
+            self.held = self.table.limits.still_ticks;
+        }
+        let held = self.supervisor.state() != State::Fault && (self.held > 0 || id <= self.cleared_by);
+        let further = self.against_arming().and(Reasons::HELD.when(held));
+        let table = Reasons::TABLE.when(self.table.check(&self.build).is_err());
+        self.supervisor.arm(further.and(table))?;
+        let counts = *self.controller.encoders_mut().counts();
+        self.calibration.restart_slow(&counts);
+        Ok(())
+    }
+
+    /// What would raise the fault again at once.
+    fn against_clearing(&self) -> Reasons {
+        let Contacts { emergency_stop, driver_fault, .. } = self.contacts;
+        Reasons::EMERGENCY_STOP.when(emergency_stop).and(Reasons::DRIVER.when(driver_fault))
+    }
+
+    fn setpoint(&mut self, position: f32) -> Result<(), Rejected> {
+        let [low, high] = self.table.limits.rail_m;
+        if !(low..=high).contains(&position) {
+            return Err(Rejected::Setpoint);
+        }
+        self.controller.set_setpoint(position)?;
+        self.commanded = true;
+        Ok(())
     }
 
     fn info(&self) -> Info {

@@ -2,6 +2,8 @@
 //!
 //! Every gain is the exact answer of its design problem, rounded once to f32.
 
+use crate::detection::{MotorTest, Thresholds};
+use crate::limits::Limits;
 use crate::observer::ObserverGains;
 use crate::state_feedback::LawGains;
 use crate::table::{GainTable, TABLE_FORMAT, columns};
@@ -13,7 +15,7 @@ pub const RIG: &str = "quadruple-paper";
 pub const TOOL_VERSION: &str = "0.1.0";
 
 /// Hash of the rig file's values.
-pub const RIG_HASH: u64 = 0x4abd_0ba4_0358_14a6;
+pub const RIG_HASH: u64 = 0x7bac_5da7_a6fc_58e1;
 
 /// Control period (s).
 pub const TICK_S: f32 = 0.001;
@@ -498,6 +500,138 @@ pub static TABLE: GainTable<STATES, SENSORS> = GainTable {
     }),
     // motor, gear and pulley
     motor: None,
+    // what the supervisor enforces
+    limits: Limits {
+        // m: soft limits of the rail
+        rail_m: [-1.9, 1.9],
+        // rad: largest angle of a link from the vertical
+        angle_rad: 0.35,
+        // m/s: largest speed of the cart
+        speed_m_per_s: 2.0,
+        // V: least supply
+        supply_min_v: 0.0,
+        // ticks: the supply may be too low for so long
+        supply_ticks: 5,
+        // ticks: the force may be at its limit for so long
+        saturated_ticks: 500,
+        // ticks: the host may be silent for so long
+        link_ticks: 100,
+        // rad: largest angle to begin at
+        arm_angle_rad: 0.035,
+        // ticks: upright and slow before it begins
+        arm_ticks: 300,
+        // ticks: still before homing
+        still_ticks: 500,
+        // counts: between the limit switches, and its tolerance
+        travel_counts: [200000, 2000],
+        // counts: middle of the rail
+        middle_counts: 0,
+        // counts: most motion that is slow
+        slow_counts: [
+            // cart position
+            750,
+            // angle of link 1
+            20,
+            // angle of link 2
+            20,
+            // angle of link 3
+            20,
+            // angle of link 4
+            20,
+        ],
+        // counts: links hanging at rest
+        rest_counts: [
+            // cart position
+            0,
+            // angle of link 1
+            2048,
+            // angle of link 2
+            0,
+            // angle of link 3
+            0,
+            // angle of link 4
+            0,
+        ],
+        // counts: a whole turn
+        turn_counts: [
+            // cart position
+            0,
+            // angle of link 1
+            4096,
+            // angle of link 2
+            4096,
+            // angle of link 3
+            4096,
+            // angle of link 4
+            4096,
+        ],
+        // counts: motion that shows the sign
+        sign_counts: [
+            // cart position
+            10000,
+            // angle of link 1
+            130,
+            // angle of link 2
+            130,
+            // angle of link 3
+            130,
+            // angle of link 4
+            130,
+        ],
+    },
+    // when encoders and motor are at fault
+    thresholds: Thresholds {
+        // m or rad: largest innovation
+        innovation: [
+            // cart position
+            5.810177e-5,
+            // angle of link 1
+            0.003990035,
+            // angle of link 2
+            0.0042185974,
+            // angle of link 3
+            0.004008325,
+            // angle of link 4
+            0.0039284667,
+        ],
+        // m or rad: most predicted motion while the counter stands still
+        frozen: [
+            // cart position
+            0.00010278882,
+            // angle of link 1
+            0.0052355444,
+            // angle of link 2
+            0.0066623194,
+            // angle of link 3
+            0.0053651608,
+            // angle of link 4
+            0.0047674673,
+        ],
+        motor: MotorTest {
+            // error of the prediction, a tick later
+            a: [
+                // position from position
+                0.58488953,
+                // position from speed
+                0.001,
+                // speed from position
+                -83.491486,
+                // speed from speed
+                1.0,
+            ],
+            // of a missing newton
+            b: [
+                // m/N: position
+                3.88048e-6,
+                // m/(s N): speed
+                0.0077619203,
+            ],
+            // 1: share of the force that may be missing
+            ratio: 0.5,
+            // m²: least for a verdict
+            energy: 9.255121e-9,
+        },
+    },
     // CRC-32 of all values above
-    crc: 0x22d2_6415,
+    crc: 0xdde3_c537,
 };

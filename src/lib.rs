@@ -33,9 +33,12 @@
 extern crate std;
 
 pub mod actuator;
+pub mod calibration;
 pub mod control_task;
 pub mod controller;
+pub mod detection;
 pub mod encoder;
+pub mod envelope;
 pub mod fault;
 pub mod firmware;
 pub mod frame;
@@ -46,11 +49,17 @@ pub mod gains;
 pub mod gains {
     include!(env!("UPRIGHT_GAINS"));
 }
+pub mod homing;
 pub mod io;
+pub mod limits;
 pub mod link;
 pub mod message;
 pub mod observer;
 pub mod pins;
+pub mod reasons;
+pub mod sign_check;
 pub mod state_feedback;
+pub mod stillness;
 pub mod supervisor;
 pub mod table;
+pub mod watch;

@@ -4,8 +4,11 @@ use heapless::Vec;
 use serde::{Deserialize, Serialize};
 
 use crate::controller::Rejected;
-use crate::fault::Fault;
-use crate::supervisor::{Reasons, State};
+use crate::fault::{Cause, Fault};
+use crate::homing::Homing;
+use crate::reasons::Reasons;
+use crate::sign_check::Signs;
+use crate::supervisor::State;
 use crate::table::Law;
 
 /// Version of these messages; a host that speaks another one must not send commands.
@@ -28,7 +31,11 @@ pub enum Request {
     Beat,
     /// Take positions from here: cart at its zero, links hanging still.
     Home,
-    /// Balance as soon as all links are upright and slow.
+    /// Take the cart's position from the limit switches, to which it is pushed by hand, then as for [`Request::Home`].
+    HomeRail,
+    /// Check the encoders' signs: see [`crate::sign_check`].
+    CheckSigns,
+    /// Balance as soon as all links have been upright and slow for the time set in the rig file.
     Arm,
     /// Motor off.
     Disarm,
@@ -40,6 +47,8 @@ pub enum Request {
     Select(Law),
     /// Tell what this firmware is.
     Info,
+    /// Tell the first cause of the fault, or of the last reset.
+    Cause,
     /// Tell the counters of [`Statistics`].
     Statistics,
     /// Set these counters to 0.
@@ -75,6 +84,8 @@ pub enum Answer {
     Rejected(Rejected),
     /// [`Request::Info`]
     Info(Info),
+    /// [`Request::Cause`]
+    Cause(Option<Cause>),
     /// [`Request::Statistics`]
     Statistics(Statistics),
 }
@@ -110,6 +121,17 @@ pub enum Reset {
     Software,
 }
 
+impl Reset {
+    /// The fault behind it, if it was one.
+    pub fn fault(self) -> Option<Fault> {
+        match self {
+            Reset::Power => None,
+            Reset::Watchdog => Some(Fault::Watchdog),
+            Reset::Software => Some(Fault::Crash),
+        }
+    }
+}
+
 /// What has happened since the start, or since [`Request::ResetStatistics`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub struct Statistics {
@@ -138,6 +160,14 @@ pub struct Telemetry<const NX: usize, const NY: usize> {
     pub state: State,
     /// The latched fault.
     pub fault: Option<Fault>,
+    /// Tick of its first cause; 0 without.
+    pub cause_tick: u32,
+    /// How far homing is.
+    pub homing: Homing,
+    /// How far the check of the encoders' signs is.
+    pub signs: Signs,
+    /// What stands against arming now.
+    pub against: Reasons,
     /// Encoder counts from position 0.
     pub counts: Vec<i32, NY>,
     /// Current estimate x̂.

@@ -21,6 +21,15 @@ impl<const NX: usize> LawGains<NX> {
     pub(crate) fn values(&self) -> impl Iterator<Item = f32> {
         self.k.iter().copied().chain([self.k_pending, self.k_integral, self.n, self.setpoint_step])
     }
+
+    /// The values in order, as bits.
+    pub(crate) fn word(&self, index: usize) -> Option<u32> {
+        let further = || {
+            let values = [self.k_pending, self.k_integral, self.n, self.setpoint_step];
+            values.get(index.wrapping_sub(NX)).copied()
+        };
+        self.k.as_slice().get(index).copied().or_else(further).map(f32::to_bits)
+    }
 }
 
 /// State feedback with precompensation, `u = N r - K x` (the paper's control law).

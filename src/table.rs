@@ -1,18 +1,20 @@
 //! The gain table: everything the controller knows about the rig, and how it is checked.
 
-use crc::{CRC_32_ISO_HDLC, Crc, Digest, NoTable};
+use crc::{CRC_32_ISO_HDLC, Crc};
 use nalgebra::{ArrayStorage, SMatrix};
 use serde::{Deserialize, Serialize};
 
 use crate::actuator::MotorMap;
+use crate::detection::Thresholds;
+use crate::limits::Limits;
 use crate::observer::ObserverGains;
 use crate::state_feedback::LawGains;
 
 /// Layout of [`GainTable`]; a table written for another layout is refused.
-pub const TABLE_FORMAT: u32 = 2;
+pub const TABLE_FORMAT: u32 = 3;
 
-/// Without a lookup table: a few cycles per byte slower, a kilobyte of flash smaller.
-const CRC: Crc<u32, NoTable> = Crc::<u32, NoTable>::new(&CRC_32_ISO_HDLC);
+/// With a lookup table of a kilobyte: it is read all the time while balancing.
+static CRC: Crc<u32> = Crc::<u32>::new(&CRC_32_ISO_HDLC);
 
 /// The constants of a controller with `NX` states and `NY` sensors, as written by `upright design` into `src/gains.rs`.
 #[derive(Debug, Clone, PartialEq)]
@@ -41,6 +43,10 @@ pub struct GainTable<const NX: usize, const NY: usize> {
     pub observer: Option<ObserverGains<NX, NY>>,
     /// The motor, if described: without it the controller gives a force.
     pub motor: Option<MotorMap>,
+    /// What the supervisor enforces.
+    pub limits: Limits<NY>,
+    /// When encoders and motor are at fault.
+    pub thresholds: Thresholds<NY>,
     /// CRC-32 (ISO-HDLC) of all fields above, see [`GainTable::checksum`].
     pub crc: u32,
 }
@@ -111,30 +117,60 @@ impl core::fmt::Display for TableError {
 impl core::error::Error for TableError {}
 
 impl<const NX: usize, const NY: usize> GainTable<NX, NY> {
-    /// CRC-32 (ISO-HDLC) of every field but `crc`, in order, as little-endian bytes; a missing part is one zero byte, a
-    /// part that is there is preceded by a one.
+    /// CRC-32 (ISO-HDLC) of every field but `crc`, as little-endian words, see [`Reading`].
     pub fn checksum(&self) -> u32 {
-        let mut digest = CRC.digest();
-        for word in [self.format, self.states, self.sensors, self.output] {
-            digest.update(&word.to_le_bytes());
-        }
-        digest.update(&self.rig_hash.to_le_bytes());
-        update(&mut digest, [self.tick_s, self.force_limit_n]);
-        digest.update(&self.delay_ticks.to_le_bytes());
-        for law in [&self.lqr, &self.pole_placement] {
-            digest.update(&[u8::from(law.is_some())]);
-            update(&mut digest, law.iter().flat_map(LawGains::values));
-        }
-        digest.update(&[u8::from(self.observer.is_some())]);
-        if let Some(observer) = &self.observer {
-            update(&mut digest, observer.values());
-            for state in observer.measured {
-                digest.update(&state.to_le_bytes());
+        let mut reading = Reading::default();
+        loop {
+            if let Some(crc) = reading.next(self) {
+                return crc;
             }
         }
-        digest.update(&[u8::from(self.motor.is_some())]);
-        update(&mut digest, self.motor.iter().flat_map(MotorMap::values));
-        digest.finalize()
+    }
+
+    /// A word of the table: which part, and where in it. Parts that are missing are empty.
+    fn word(&self, part: u8, index: usize) -> Option<u32> {
+        let number = |values: &[f32]| values.get(index).map(|value| value.to_bits());
+        let integer = |values: &[i32]| values.get(index).map(|&value| value as u32);
+        let law = |law: &Option<LawGains<NX>>| law.as_ref().and_then(|law| law.word(index));
+        let observer = self.observer.as_ref();
+        match part {
+            0 => self.header().get(index).copied(),
+            1 => law(&self.lqr),
+            2 => law(&self.pole_placement),
+            3 => observer.and_then(|observer| number(observer.ad.as_slice())),
+            4 => observer.and_then(|observer| number(observer.bd.as_slice())),
+            5 => observer.and_then(|observer| number(observer.l.as_slice())),
+            6 => observer.and_then(|observer| number(observer.step.as_slice())),
+            7 => observer.and_then(|observer| observer.measured.get(index).copied()),
+            8 => self.motor.as_ref().and_then(|motor| number(&motor.values())),
+            9 => self.limits.scalars().get(index).copied(),
+            10 => integer(&self.limits.slow_counts),
+            11 => integer(&self.limits.rest_counts),
+            12 => integer(&self.limits.turn_counts),
+            13 => integer(&self.limits.sign_counts),
+            14 => number(&self.thresholds.innovation),
+            15 => number(&self.thresholds.frozen),
+            16 => number(&self.thresholds.motor.values()),
+            _ => None,
+        }
+    }
+
+    fn header(&self) -> [u32; 13] {
+        [
+            self.format,
+            self.states,
+            self.sensors,
+            self.output,
+            self.rig_hash as u32,
+            (self.rig_hash >> 32) as u32,
+            self.tick_s.to_bits(),
+            self.delay_ticks,
+            self.force_limit_n.to_bits(),
+            u32::from(self.lqr.is_some()),
+            u32::from(self.pole_placement.is_some()),
+            u32::from(self.observer.is_some()),
+            u32::from(self.motor.is_some()),
+        ]
     }
 
     /// The gains of a law, if the table holds them.
@@ -183,6 +219,8 @@ impl<const NX: usize, const NY: usize> GainTable<NX, NY> {
         let limit_is_sound = self.force_limit_n > 0.0 && self.force_limit_n.is_finite();
         if !(limit_is_sound
             && laws.all(|law| law.setpoint_step > 0.0 && finite(&mut law.values()))
+            && self.limits.is_sound()
+            && self.thresholds.is_sound()
             && self.observer.iter().all(|observer| finite(&mut observer.values()))
             && self.motor.iter().all(|motor| {
                 motor.volts_per_newton > 0.0
@@ -196,8 +234,47 @@ impl<const NX: usize, const NY: usize> GainTable<NX, NY> {
     }
 }
 
-fn update(digest: &mut Digest<'_, u32, NoTable>, values: impl IntoIterator<Item = f32>) {
-    for value in values {
-        digest.update(&value.to_le_bytes());
+/// A pass over a table that takes one word at a time, to be spread over many ticks.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Reading {
+    part: u8,
+    index: usize,
+    /// CRC of what was read.
+    crc: u32,
+}
+
+impl Reading {
+    const PARTS: u8 = 17;
+
+    /// Reads the next word of `table`; at its end gives the CRC of all, and begins anew.
+    pub fn next<const NX: usize, const NY: usize>(&mut self, table: &GainTable<NX, NY>) -> Option<u32> {
+        if let Some(word) = table.word(self.part, self.index) {
+            // The CRC goes on where it was: the initial value is what the final one was, turned back.
+            let mut digest = CRC.digest_with_initial((self.crc ^ CRC_32_ISO_HDLC.xorout).reverse_bits());
+            digest.update(&word.to_le_bytes());
+            (self.crc, self.index) = (digest.finalize(), self.index + 1);
+            return None;
+        }
+        (self.part, self.index) = (self.part + 1, 0);
+        if self.part < Self::PARTS {
+            return None;
+        }
+        Some(core::mem::take(self).crc)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_crc_in_pieces_is_the_crc_of_the_whole() {
+        let mut reading = 0u32;
+        for word in [1u32, 0xdead_beef, 0] {
+            let mut digest = CRC.digest_with_initial((reading ^ CRC_32_ISO_HDLC.xorout).reverse_bits());
+            digest.update(&word.to_le_bytes());
+            reading = digest.finalize();
+        }
+        assert_eq!(reading, CRC.checksum(&[1, 0, 0, 0, 0xef, 0xbe, 0xad, 0xde, 0, 0, 0, 0]));
     }
 }

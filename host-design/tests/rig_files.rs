@@ -82,7 +82,7 @@ fn what_is_left_out_gets_its_documented_default() {
         pole_placement: None,
         kalman: None,
         integral: None,
-        limits: Limits { angle_rad: None, speed_m_per_s: None },
+        limits: Limits::default(),
     };
     assert_eq!(parse(MINIMAL), expected);
 }

@@ -16,6 +16,8 @@ pub struct Kalman<T> {
     pub l_predictor: Matrix<T>,
     /// Travel per count of each sensor (m or rad), p×1.
     pub steps: Matrix<T>,
+    /// Variance of each sensor's innovation, the diagonal of `S = C P⁻ Cᵀ + R` (m² or rad²), p×1.
+    pub innovation_variances: Matrix<T>,
 }
 
 /// Kalman gains, and the relative residual of their Riccati equation, for process noise of the intensities in `noise`, entering through the columns of `inputs` and
@@ -52,9 +54,14 @@ pub(super) fn kalman<R: Real>(
     let (a_t, c_t) = (ad.transpose(), c.transpose());
     let solution = dare(&a_t, &c_t, &Cost::new(q, r.clone())).map_err(|_| why_no_kalman(&a_t, &c_t))?;
     let p_c = &solution.x * &c_t;
-    let l_filter =
-        solve_right(&p_c, &(&(&c * &p_c) + &r)).map_err(|_| DesignError::NoKalman { bits: R::BITS })?;
-    let gains = Kalman { l_predictor: ad * &l_filter, l_filter, steps: Matrix::column(&steps) };
+    let s = &(&c * &p_c) + &r;
+    let l_filter = solve_right(&p_c, &s).map_err(|_| DesignError::NoKalman { bits: R::BITS })?;
+    let gains = Kalman {
+        l_predictor: ad * &l_filter,
+        l_filter,
+        steps: Matrix::column(&steps),
+        innovation_variances: Matrix::from_fn(s.rows(), 1, |i, _| s[(i, i)].clone()),
+    };
     Ok((gains, solution.residual))
 }
 

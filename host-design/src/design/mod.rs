@@ -12,6 +12,7 @@ mod loops;
 mod place;
 mod riccati;
 mod synthesis;
+mod thresholds;
 mod zero_order_hold;
 
 pub use assessment::Assessment;
@@ -25,4 +26,5 @@ pub use place::{Pole, dominant_pair, place};
 pub use riccati::{Cost, NoStabilisingSolution, Regulator, care, dare, is_stable, is_stable_sampled};
 pub use synthesis::{Design, Feedback, Laws};
 pub(crate) use synthesis::{OBSERVER, continuous_plant, noise_columns, wanted_poles};
+pub use thresholds::{DetectionDesign, MotorDesign, detection_thresholds};
 pub use zero_order_hold::{integrated_quadratic, sampled_cost, zero_order_hold};

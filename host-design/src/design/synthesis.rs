@@ -166,6 +166,7 @@ impl<const BITS: usize> Design<Wide<BITS>> {
                 l_filter: kalman.l_filter.rounded(round),
                 l_predictor: kalman.l_predictor.rounded(round),
                 steps: kalman.steps.map(round),
+                innovation_variances: kalman.innovation_variances.map(round),
             }),
         }
     }

@@ -12,7 +12,7 @@ use super::in_process::{InProcess, Queues};
 use super::qemu::{Emulator, Link};
 use super::session::{Session, SessionError};
 use crate::rig::Rig;
-use crate::simulate::{Bench, Fall, Sample, Scenario, Sensing, SimulationError, Summary, Trace, ticks};
+use crate::simulate::{Bench, Fall, Hand, Sample, Scenario, Sensing, SimulationError, Summary, Trace, ticks};
 use crate::table::{TableValues, WithSize, with_firmware_size};
 
 /// Where the firmware runs.
@@ -86,8 +86,9 @@ pub struct Recording {
     pub worst_cycles: u32,
 }
 
-/// Runs `scenario` with the firmware of `table` against the plant of `rig`. The rig is homed while it hangs, held by hand
-/// at the scenario's start until the firmware begins to balance, and released in that tick: time 0.
+/// Runs `scenario` with the firmware of `table` against the plant of `rig`. A hand homes the rig while it hangs, checks the
+/// signs, raises the links and holds them at the scenario's start until the firmware begins to balance; it lets go in
+/// that tick: time 0.
 ///
 /// # Errors
 /// [`RunError`] if the firmware does not run, or refuses to begin.
@@ -143,31 +144,53 @@ impl Run<'_> {
         let supply_v = table.motor.map_or(0.0, |motor| motor.supply_v);
         let inputs = |counts| Inputs { counts, supply_v, contacts: Contacts::default() };
         let mut bench = Bench::new(rig, scenario)?;
-        let at_rest = inputs(bench.counters_at_zero());
-        session.meet(table.rig_hash, &at_rest)?;
-        session.ask(Request::Select(scenario.law), &at_rest)?;
-        session.ask(Request::Telemetry(1), &at_rest)?;
-        session.ask(Request::Home, &at_rest)?;
-        let held = inputs(bench.counters());
+        let mut hand = Hand::new(rig, &scenario.start);
+        bench.hold(hand.held());
+        let hanging = inputs(bench.counters());
+        session.meet(table.rig_hash, &hanging)?;
+        session.ask(Request::Select(scenario.law), &hanging)?;
+        session.ask(Request::Telemetry(1), &hanging)?;
         let target_at = |tick: usize| {
             let t = tick as f64 * rig.tick.period_s;
             if t >= scenario.step_at_s { scenario.step_m } else { 0.0 }
         };
-        session.ask(Request::Setpoint(target_at(0) as f32), &held)?;
-        let mut output = session.arm(&held, rig.tick.period_s)?;
+        let mut asked = None;
+        let mut waited = 0;
+        let mut output = loop {
+            if let Some(act) = hand.act(waited, &session.seen()) {
+                bench.hold(&act.held);
+                if let Some(request) = act.request {
+                    session.send(request);
+                }
+            }
+            if session.seen().state == State::Armed && asked.is_none() {
+                asked = Some(target_at(0));
+                session.send(Request::Setpoint(target_at(0) as f32));
+            }
+            let output = session.tick(&inputs(bench.counters()))?;
+            if output.enable {
+                break output;
+            }
+            waited += 1;
+            if f64::from(waited) * rig.tick.period_s > LONGEST_WAIT_S {
+                return Err(SessionError::NotBalancing(session.seen().state).into());
+            }
+        };
 
         let last = ticks(rig, scenario)?;
         let mut record = Record::new(rig, last);
-        let mut asked = target_at(0);
+        let beat = (BEAT_S / rig.tick.period_s).max(1.0) as usize;
         for tick in 0..=last {
             if tick > 0 {
                 output = session.tick(&inputs(bench.counters()))?;
             }
             // What is sent from now on comes with the next tick and counts in the one after the next.
             let ahead = target_at(tick + TICKS_TO_OBEY);
-            if ahead != asked {
+            if asked != Some(ahead) {
                 session.send(Request::Setpoint(ahead as f32));
-                asked = ahead;
+                asked = Some(ahead);
+            } else if tick.is_multiple_of(beat) {
+                session.send(Request::Beat);
             }
             let t = tick as f64 * rig.tick.period_s;
             let fall = Fall::of(rig, t, bench.state());
@@ -194,6 +217,10 @@ impl Run<'_> {
     }
 }
 
+/// Longest time from power-up to balancing (s).
+const LONGEST_WAIT_S: f64 = 60.0;
+/// Between two signs of life for a firmware whose set-point the host commands (s).
+const BEAT_S: f64 = 0.025;
 /// A command is taken in the tick after the one it came with, and obeyed from the next on.
 const TICKS_TO_OBEY: usize = 3;
 

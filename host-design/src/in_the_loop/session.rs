@@ -7,9 +7,11 @@ use upright::io::{Inputs, Output};
 use upright::link::{MAX_COMMAND, MAX_MESSAGE};
 use upright::message::{Answer, Command, Info, Message, PROTOCOL, Request, Telemetry};
 use upright::pins::{PinsIn, Sabotage};
+use upright::sign_check::Signs;
 use upright::supervisor::State;
 
 use super::target::{Target, TargetError};
+use crate::simulate::Seen;
 
 /// A firmware that does not do what it is asked for.
 #[derive(Debug, thiserror::Error)]
@@ -29,7 +31,7 @@ pub enum SessionError {
         answer: Answer,
     },
     /// It never began to balance.
-    #[error("the firmware was armed but does not begin to balance; its state is {0:?}")]
+    #[error("the firmware does not begin to balance; its state is {0:?}")]
     NotBalancing(State),
     /// It speaks another language.
     #[error("the firmware speaks version {0} of the messages, this tool version {PROTOCOL}: build it again")]
@@ -50,9 +52,6 @@ pub enum SessionError {
 /// and the answer is heard with the one after.
 const TICKS_TO_ANSWER: usize = 4;
 
-/// Longest time between arming and balancing of a rig that is held upright (s).
-const LONGEST_WAIT_S: f64 = 10.0;
-
 /// A firmware in lock step, and what it said.
 pub struct Session<'a, const NX: usize, const NY: usize> {
     target: &'a mut dyn Target<NY>,
@@ -63,7 +62,7 @@ pub struct Session<'a, const NX: usize, const NY: usize> {
     sabotage: Option<Sabotage>,
     telemetry: VecDeque<Telemetry<NX, NY>>,
     replies: VecDeque<(u64, Answer)>,
-    last_state: State,
+    seen: Seen,
     /// Frames from the firmware that could not be read.
     pub damaged: usize,
 }
@@ -80,7 +79,7 @@ impl<'a, const NX: usize, const NY: usize> Session<'a, NX, NY> {
             sabotage: None,
             telemetry: VecDeque::new(),
             replies: VecDeque::new(),
-            last_state: State::default(),
+            seen: Seen { state: State::Disarmed, signs: Signs::Unchecked },
             damaged: 0,
         }
     }
@@ -123,7 +122,7 @@ impl<'a, const NX: usize, const NY: usize> Session<'a, NX, NY> {
         for byte in self.serial.drain(..) {
             match self.receiver.push::<Message<NX, NY>>(byte) {
                 Some(Ok(Message::Telemetry(telemetry))) => {
-                    self.last_state = telemetry.state;
+                    self.seen = Seen { state: telemetry.state, signs: telemetry.signs };
                     self.telemetry.push_back(telemetry);
                 }
                 Some(Ok(Message::Reply { id, answer })) => self.replies.push_back((id, answer)),
@@ -134,9 +133,9 @@ impl<'a, const NX: usize, const NY: usize> Session<'a, NX, NY> {
         Ok(output)
     }
 
-    /// State of the supervisor, as last heard.
-    pub fn last_state(&self) -> State {
-        self.last_state
+    /// What a person at the rig has last seen of the firmware.
+    pub fn seen(&self) -> Seen {
+        self.seen
     }
 
     /// The oldest telemetry that was not yet looked at.
@@ -162,25 +161,6 @@ impl<'a, const NX: usize, const NY: usize> Session<'a, NX, NY> {
             }
         }
         Err(SessionError::NoAnswer(request))
-    }
-
-    /// Arms, and lets ticks of `period_s` (s) with these inputs pass until the motor is enabled; gives the output of that
-    /// tick.
-    ///
-    /// # Errors
-    /// [`SessionError`] if it is refused, or does not happen.
-    pub fn arm(&mut self, inputs: &Inputs<NY>, period_s: f64) -> Result<Output, SessionError> {
-        let id = self.send(Request::Arm);
-        let mut waited_s = 0.0;
-        while waited_s < LONGEST_WAIT_S {
-            let output = self.tick(inputs)?;
-            if output.enable {
-                return Ok(output);
-            }
-            self.answer_to(id, Request::Arm)?;
-            waited_s += period_s;
-        }
-        Err(SessionError::NotBalancing(self.last_state))
     }
 
     fn answer_to(&mut self, id: u64, request: Request) -> Result<Option<Answer>, SessionError> {

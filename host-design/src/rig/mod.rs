@@ -7,6 +7,7 @@
 pub mod defaults;
 mod describe;
 mod error;
+mod limits;
 mod load;
 mod node;
 mod parse;
@@ -15,6 +16,7 @@ mod rule;
 mod sensors;
 
 pub use error::{Place, RigError, RigErrorKind};
+pub use limits::Limits;
 pub use load::MAX_BYTES;
 pub use requirements::Requirements;
 pub use sensors::Sensor;
@@ -200,15 +202,6 @@ pub struct Kalman {
 pub struct Integral {
     /// Weight of the integrated position error in the cost.
     pub position_weight: f64,
-}
-
-/// `[limits]`
-#[derive(Debug, Clone, PartialEq, Serialize, Default)]
-pub struct Limits {
-    /// Largest absolute angle of any link from upright (rad).
-    pub angle_rad: Option<f64>,
-    /// Largest cart speed (m/s).
-    pub speed_m_per_s: Option<f64>,
 }
 
 impl Default for Tick {

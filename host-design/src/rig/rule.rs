@@ -33,6 +33,12 @@ impl Rule {
     /// An angle up to half a turn (rad).
     pub(super) const ANGLE: Rule =
         Rule { accepts: "a number > 0 and <= pi (rad)", admits: |x| x > 0.0 && x <= PI };
+    /// A time that the supervisor counts in ticks (s).
+    pub(super) const DURATION: Rule =
+        Rule { accepts: "a number > 0 and <= 60 (s)", admits: |x| x > 0.0 && x <= 60.0 };
+    /// A mean time between false alarms (h).
+    pub(super) const FALSE_ALARM: Rule =
+        Rule { accepts: "a number from 1 to 1e9 (h)", admits: |x| (1.0..=1e9).contains(&x) };
     /// Encoder counts per revolution.
     pub(super) const COUNTS: Rule = Rule { accepts: "a number >= 2", admits: |x| x >= 2.0 };
 

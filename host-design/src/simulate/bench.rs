@@ -69,6 +69,17 @@ impl Bench {
         &self.state
     }
 
+    /// Control period (s).
+    pub fn period_s(&self) -> f64 {
+        self.period_s
+    }
+
+    /// Puts the rig into `state` (m, m/s, rad, rad/s …), as a hand that holds it.
+    pub fn hold(&mut self, state: &[f64]) {
+        self.plant.set_state(state);
+        self.state.copy_from_slice(state);
+    }
+
     /// Widths of the hardware counters: 32 bits for the cart, 16 for the links.
     pub const fn widths<const NY: usize>() -> [CounterWidth; NY] {
         let mut widths = [CounterWidth::Bits16; NY];

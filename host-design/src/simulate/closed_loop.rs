@@ -30,6 +30,9 @@ pub enum SimulationError {
     /// A standard deviation that is negative or not finite.
     #[error("a noise level of {0} is not possible: give a number of at least 0")]
     Noise(f64),
+    /// The supervisor never let the motor be turned on.
+    #[error("the firmware does not begin to balance: {0:?}")]
+    NotBalancing(Option<upright::fault::Cause>),
     /// A disturbing force that is not finite.
     #[error("a constant force of {0} N is not possible: give a finite number")]
     Offset(f64),

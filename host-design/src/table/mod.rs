@@ -2,6 +2,8 @@
 
 mod any_size;
 mod source;
+mod supervision;
+mod supervision_source;
 mod write;
 
 use nalgebra::{SMatrix, SVector};
@@ -11,12 +13,13 @@ use upright::observer::ObserverGains;
 use upright::state_feedback::LawGains;
 use upright::table::{Build, GainTable, TABLE_FORMAT};
 
-use crate::design::{Certified, Feedback, setpoint_step};
+use crate::design::{Certified, Feedback, detection_thresholds, setpoint_step};
 use crate::numerics::Matrix;
 use crate::rig::{Motor, PlantDescription, Rig};
 
 pub use any_size::{MAX_MODEL_SENSORS, MAX_STATES, WithSize, with_firmware_size, with_size};
 pub use source::gains_source;
+pub use supervision::{LimitValues, ThresholdValues};
 pub use write::{WriteError, write_atomically};
 
 /// Which gains go into a table.
@@ -57,6 +60,10 @@ pub struct TableValues {
     pub observer: Option<ObserverValues>,
     /// The motor.
     pub motor: Option<MotorValues>,
+    /// What the supervisor enforces.
+    pub limits: LimitValues,
+    /// When encoders and motor are at fault.
+    pub thresholds: ThresholdValues,
 }
 
 /// Gains of one law.
@@ -166,6 +173,8 @@ impl TableValues {
             (None, PlantDescription::Chain(chain)) => chain.links.len() + 1,
             (None, PlantDescription::Model(_)) => 1,
         };
+        let steps = design.double.kalman.as_ref().map_or(&[][..], |kalman| kalman.steps.entries());
+        let detection = detection_thresholds(rig, &design.double);
         let values = Self {
             rig: rig.name.clone(),
             rig_hash: rig.hash(),
@@ -186,6 +195,8 @@ impl TableValues {
                 .as_ref()
                 .map(|motor| MotorValues::of(motor, rig.tick.period_s))
                 .transpose()?,
+            limits: LimitValues::of(rig, sensors, steps)?,
+            thresholds: ThresholdValues::of(sensors, detection.as_ref()),
         };
         if let PlantDescription::Chain(chain) = &rig.plant
             && sensors != chain.links.len() + 1
@@ -244,6 +255,8 @@ impl TableValues {
                 slew_v_per_tick: motor.slew_v_per_tick,
                 supply_v: motor.supply_v,
             }),
+            limits: self.limits.limits(),
+            thresholds: self.thresholds.thresholds(),
             crc: 0,
         };
         table.crc = table.checksum();

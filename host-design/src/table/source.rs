@@ -2,6 +2,7 @@
 
 use core::fmt::Write;
 
+use super::supervision_source::write_supervision;
 use super::{LawValues, MotorValues, ObserverValues, TableValues};
 use crate::rig::{PlantDescription, Rig};
 
@@ -22,6 +23,8 @@ fn write_source(out: &mut String, rig: &Rig, table: &TableValues) -> core::fmt::
     if table.motor.is_some() {
         writeln!(out, "use crate::actuator::MotorMap;")?;
     }
+    writeln!(out, "use crate::detection::{{MotorTest, Thresholds}};")?;
+    writeln!(out, "use crate::limits::Limits;")?;
     if table.observer.is_some() {
         writeln!(out, "use crate::observer::ObserverGains;")?;
     }
@@ -61,6 +64,8 @@ fn write_source(out: &mut String, rig: &Rig, table: &TableValues) -> core::fmt::
     write_law(out, "pole_placement", &table.pole_placement, &states)?;
     write_observer(out, &table.observer, &states)?;
     write_motor(out, &table.motor)?;
+    let measured = measured_names(table, &states);
+    write_supervision(out, &table.limits, &table.thresholds, &measured)?;
     let (high, low) = (crc >> 16, crc & 0xffff);
     writeln!(out, "    // CRC-32 of all values above\n    crc: 0x{high:04x}_{low:04x},\n}};")
 }
@@ -182,8 +187,17 @@ fn state_meanings(rig: &Rig) -> Vec<Meaning> {
     }
 }
 
+/// What each sensor measures.
+fn measured_names<'a>(table: &TableValues, states: &'a [Meaning]) -> Vec<&'a str> {
+    let of_chain = (0..table.sensors).map(|sensor| 2 * sensor).collect::<Vec<_>>();
+    let measured = table.observer.as_ref();
+    let measured =
+        measured.map_or(of_chain, |observer| observer.measured.iter().map(|&state| state as usize).collect());
+    measured.iter().map(|&state| states.get(state).map_or("", |state| state.name.as_str())).collect()
+}
+
 /// The shortest decimal that reads back as the same `f32`.
-fn literal(value: f32) -> String {
+pub(super) fn literal(value: f32) -> String {
     format!("{value:?}")
 }
 

@@ -1,6 +1,7 @@
 //! From the tables of a rig file to a checked [`Rig`].
 
 mod design;
+mod limits;
 mod plant;
 
 use super::error::RigError;
@@ -42,7 +43,7 @@ pub(super) fn rig(source: &Source<'_>) -> Result<Rig, RigError> {
             .transpose()?,
         kalman: root.get("kalman").map(|node| design::kalman(&node, &plant)).transpose()?,
         integral: root.get("integral").map(|node| design::integral(&node)).transpose()?,
-        limits: root.get("limits").map_or(Ok(Limits::default()), |node| limits(&node))?,
+        limits: root.get("limits").map_or(Ok(Limits::default()), |node| limits::limits(&node, &plant))?,
         verify: root.get("verify").map_or(Ok(Requirements::default()), |node| requirements(&node))?,
         plant,
     };
@@ -129,22 +130,6 @@ fn tick(node: &Node<'_>) -> Result<Tick, RigError> {
             Some(node) => u8::from(node.index(1, "0 or 1", delay)? == 1),
             None => defaults::DELAY_TICKS,
         },
-    })
-}
-
-fn limits(node: &Node<'_>) -> Result<Limits, RigError> {
-    let table = node.section(&["angle_rad", "speed_m_per_s"])?;
-    Ok(Limits {
-        angle_rad: table.number_if_given(
-            "angle_rad",
-            Rule::ANGLE,
-            "the largest angle from upright in rad, or leave it out",
-        )?,
-        speed_m_per_s: table.number_if_given(
-            "speed_m_per_s",
-            Rule::POSITIVE,
-            "the largest speed of the cart in m/s, or leave it out",
-        )?,
     })
 }
 
