@@ -181,6 +181,11 @@ impl<const NX: usize, const NY: usize> GainTable<NX, NY> {
         }
     }
 
+    /// Whether a tick with these gains depends on earlier ones beyond the estimate: by a force on its way or an integral.
+    pub(crate) fn remembers(&self, gains: &LawGains<NX>) -> bool {
+        self.delay_ticks == 1 || gains.k_pending != 0.0 || gains.k_integral != 0.0
+    }
+
     /// Whether the table is sound and meant for this build.
     ///
     /// # Errors

@@ -19,6 +19,8 @@ pub struct InProcess<'q, 't, const NX: usize, const NY: usize> {
     link: Link<'q, NX, NY>,
     /// On the serial line: the host hears of a tick with the next one, as from an image.
     sent: Vec<u8>,
+    /// Whether nobody takes bytes from the serial line any more: its buffers fill up.
+    pub stuck: bool,
 }
 
 /// The board: inputs and output in memory.
@@ -77,6 +79,7 @@ impl<'q, 't, const NX: usize, const NY: usize> InProcess<'q, 't, NX, NY> {
             control: ControlTask::new(firmware, wires, commands, messages),
             link: Link::new(to_control, to_link),
             sent: Vec::new(),
+            stuck: false,
         })
     }
 }
@@ -91,7 +94,9 @@ impl<const NX: usize, const NY: usize> Target<NY> for InProcess<'_, '_, NX, NY> 
         for &byte in &pins.received {
             self.link.receive(byte);
         }
-        while let Some(frame) = self.link.transmit() {
+        while !self.stuck
+            && let Some(frame) = self.link.transmit()
+        {
             self.sent.extend_from_slice(frame);
         }
         Ok(self.control.board().output)

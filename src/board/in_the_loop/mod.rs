@@ -153,9 +153,6 @@ fn suffer(sabotage: Sabotage) {
         Sabotage::StackOverflow => {
             dig(1);
         }
-        Sabotage::Stall => loop {
-            cortex_m::asm::nop();
-        },
     }
 }
 
