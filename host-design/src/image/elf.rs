@@ -72,7 +72,8 @@ pub struct Image {
     text: (u32, Vec<u8>),
     /// Handlers by their number in the vector table, from 1 (reset).
     pub(crate) vectors: Vec<(usize, u32)>,
-    /// Bytes that memory.x gives to the stack.
+    /// Where the stack begins, and how many bytes below memory.x gives to it.
+    pub(crate) stack_start: u32,
     pub(crate) stack_reserved: u32,
 }
 
@@ -82,8 +83,7 @@ impl Image {
     /// # Errors
     /// [`ElfError`] if it cannot be read or is no image of this firmware.
     pub fn read(path: &Path) -> Result<Self, ElfError> {
-        let bytes =
-            std::fs::read(path).map_err(|source| ElfError::Read { path: path.to_owned(), source })?;
+        let bytes = std::fs::read(path).map_err(|source| ElfError::Read { path: path.to_owned(), source })?;
         let format = |source| ElfError::Format { path: path.to_owned(), source };
         let missing = |what| ElfError::Missing { path: path.to_owned(), what };
         let elf: ElfFile32 = ElfFile32::parse(&bytes[..]).map_err(format)?;
@@ -132,14 +132,14 @@ impl Image {
                 _ => {}
             }
         }
-        let stack_reserved = match (stack_start, stack_end) {
-            (Some(start), Some(end)) if start > end => start - end,
+        let (stack_start, stack_reserved) = match (stack_start, stack_end) {
+            (Some(start), Some(end)) if start > end => (start, start - end),
             _ => return Err(missing("symbols _stack_start above _stack_end")),
         };
         mapping.sort_unstable();
         let end = text.0 + text.1.len() as u32;
         let functions = without_aliases(functions, end);
-        Ok(Self { sections, functions, data, mapping, text, vectors, stack_reserved, bytes })
+        Ok(Self { sections, functions, data, mapping, text, vectors, stack_start, stack_reserved, bytes })
     }
 
     /// The machine code of a function.
@@ -161,6 +161,13 @@ impl Image {
             address = end;
         }
         pieces
+    }
+
+    /// A constant between instructions.
+    pub(crate) fn word_in_code(&self, address: u32) -> Option<u32> {
+        let at = address.checked_sub(self.text.0)? as usize;
+        let bytes = self.text.1.get(at..at + 4)?;
+        bytes.try_into().ok().map(u32::from_le_bytes)
     }
 
     /// The function that contains an address.

@@ -26,9 +26,9 @@ pub fn forbidden_functions(image: &Image) -> Vec<&str> {
 fn is_forbidden(name: &str) -> bool {
     FORBIDDEN.iter().any(|part| match part.strip_suffix("::") {
         // A path begins with it, or holds it as a type: `<alloc::vec::Vec<u8>>::push`.
-        Some(_) => name
-            .match_indices(part)
-            .any(|(at, _)| !name[..at].ends_with(|before: char| before.is_alphanumeric() || "_:".contains(before))),
+        Some(_) => name.match_indices(part).any(|(at, _)| {
+            !name[..at].ends_with(|before: char| before.is_alphanumeric() || "_:".contains(before))
+        }),
         None => name.contains(part),
     })
 }

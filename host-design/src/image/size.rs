@@ -113,7 +113,8 @@ fn crate_of_file(path: &str) -> String {
     };
     if let Some([_, package, ..]) = after("registry").and_then(|rest| rest.strip_prefix(&["src"])) {
         let version = package.match_indices('-').find(|(at, _)| {
-            package[at + 1..].starts_with(|first: char| first.is_ascii_digit()) && package[*at..].contains('.')
+            package[at + 1..].starts_with(|first: char| first.is_ascii_digit())
+                && package[*at..].contains('.')
         });
         return version.map_or(*package, |(at, _)| &package[..at]).to_owned();
     }
@@ -148,7 +149,10 @@ mod tests {
     #[test]
     fn a_source_file_belongs_to_its_package() {
         for (path, name) in [
-            ("/home/me/.cargo/registry/src/index.crates.io-1949cf8c6b5b557f/nalgebra-0.35.0/src/base/ops.rs", "nalgebra"),
+            (
+                "/home/me/.cargo/registry/src/index.crates.io-1949cf8c6b5b557f/nalgebra-0.35.0/src/base/ops.rs",
+                "nalgebra",
+            ),
             ("/x/registry/src/index.crates.io-1/cortex-m-rt-0.7.5/src/lib.rs", "cortex-m-rt"),
             ("/x/registry/src/index.crates.io-1/stm32f4xx-hal-0.23.0/src/lib.rs", "stm32f4xx-hal"),
             ("/rustc/59807616e1fa/library/core/src/slice/mod.rs", "core"),

@@ -135,7 +135,7 @@ fn node(image: &Image, index: usize) -> Result<Node, StackError> {
     let name = image.functions[index].name.clone();
     let mut node = Node { name: name.clone(), ..Node::default() };
     let effects = effects(image, index);
-    for &(address, effect) in &effects {
+    for (place, &(address, effect)) in effects.iter().enumerate() {
         match effect {
             Effect::Grow(bytes) => node.frame += bytes,
             Effect::Call(target) => node.calls.push(index_of(image, &name, target)?),
@@ -145,28 +145,50 @@ fn node(image: &Image, index: usize) -> Result<Node, StackError> {
                     node.calls.push(other);
                 }
             }
-            Effect::Indirect => return Err(StackError::Indirect { function: name, address }),
-            Effect::Unknown => return Err(StackError::Variable { function: name, address }),
-            Effect::FromRegister(register) => {
-                let from = effects.iter().find_map(|(_, effect)| match effect {
-                    Effect::Aligned(aligned, bytes) if *aligned == register => Some(*bytes),
-                    _ => None,
-                });
-                // The frame pointer and what is reckoned from it give back what was taken.
-                let restored =
-                    register == 7 || effects.iter().any(|(_, effect)| *effect == Effect::FromFrame(register));
-                match from {
-                    Some(bytes) => node.frame += bytes,
-                    None if restored => {}
-                    None => return Err(StackError::Variable { function: name, address }),
-                }
+            // A table of branches, each of which is looked at as well.
+            Effect::JumpTo(register) if before(&effects, place).contains(&Effect::Near(register)) => {}
+            Effect::Indirect | Effect::JumpTo(_) => {
+                return Err(StackError::Indirect { function: name, address });
             }
-            Effect::Aligned(..) | Effect::FromFrame(_) | Effect::None => {}
+            Effect::FromRegister(register) => {
+                let growth = growth(image, &effects, place, register);
+                node.frame += growth.ok_or(StackError::Variable { function: name.clone(), address })?;
+            }
+            Effect::Unknown => return Err(StackError::Variable { function: name, address }),
+            Effect::Aligned(..)
+            | Effect::FromFrame(_)
+            | Effect::Near(_)
+            | Effect::Literal(..)
+            | Effect::None => {}
         }
     }
     node.calls.sort_unstable();
     node.calls.dedup();
     Ok(node)
+}
+
+/// The few instructions before one.
+fn before(effects: &[(u32, Effect)], place: usize) -> Vec<Effect> {
+    effects[place.saturating_sub(5)..place].iter().map(|(_, effect)| *effect).collect()
+}
+
+/// How much the stack grows, at most, when its pointer becomes this register's value; nothing if that cannot be told.
+fn growth(image: &Image, effects: &[(u32, Effect)], place: usize, register: u8) -> Option<u32> {
+    // r7 is the frame pointer: it gives back what was taken.
+    if register == 7 {
+        return Some(0);
+    }
+    before(effects, place).into_iter().rev().find_map(|effect| match effect {
+        Effect::Aligned(aligned, bytes) if aligned == register => Some(bytes),
+        Effect::FromFrame(from) if from == register => Some(0),
+        // A fault's handler begins the stack anew.
+        Effect::Literal(loaded, at)
+            if loaded == register && image.word_in_code(at) == Some(image.stack_start) =>
+        {
+            Some(0)
+        }
+        _ => None,
+    })
 }
 
 /// The deepest chain of calls from a function: bytes and names.

@@ -13,6 +13,12 @@ pub(crate) enum Effect {
     Jump(u32),
     /// A call or branch to an address in a register or in memory.
     Indirect,
+    /// A branch to the address in this register.
+    JumpTo(u8),
+    /// This register becomes the address of something near, as that of a table of branches.
+    Near(u8),
+    /// This register becomes the word at this address.
+    Literal(u8, u32),
     /// The stack pointer becomes this register's value.
     FromRegister(u8),
     /// This register is rounded down to a multiple of so many bytes.
@@ -37,8 +43,14 @@ pub(crate) fn decode(address: u32, first: u16, second: u16) -> Effect {
             0xB400..=0xB5FF => Effect::Grow(4 * (first & 0x1FF).count_ones()), // PUSH
             0xB080..=0xB0FF => Effect::Grow(4 * u32::from(first & 0x7F)),      // SUB SP
             _ if first & 0xFFF8 == 0x4770 => Effect::None,                     // BX LR
-            // BX, BLX; MOV and ADD to PC
-            _ if first & 0xFF00 == 0x4700 || matches!(first & 0xFF87, 0x4687 | 0x4487) => Effect::Indirect,
+            _ if first & 0xFF87 == 0x4687 => Effect::JumpTo(register(first >> 3)), // MOV PC
+            // BX, BLX; ADD to PC
+            _ if first & 0xFF00 == 0x4700 || first & 0xFF87 == 0x4487 => Effect::Indirect,
+            0xA000..=0xA7FF => Effect::Near((first >> 8 & 7) as u8), // ADR
+            0x4800..=0x4FFF => {
+                let at = (address.wrapping_add(4) & !3) + 4 * u32::from(first & 0xFF);
+                Effect::Literal((first >> 8 & 7) as u8, at) // LDR
+            }
             _ if first & 0xFF87 == 0x4685 => Effect::FromRegister(register(first >> 3)), // MOV SP
             _ if first & 0xFE38 == 0x1E38 => Effect::FromFrame((first & 7) as u8),       // SUBS Rd, R7
             0xD000..=0xDDFF => to(sign_extended(u32::from(first & 0xFF) << 1, 9)),
@@ -46,7 +58,8 @@ pub(crate) fn decode(address: u32, first: u16, second: u16) -> Effect {
             _ => Effect::None,
         };
     }
-    let constant = u32::from(first >> 10 & 1) << 11 | u32::from(second >> 12 & 7) << 8 | u32::from(second & 0xFF);
+    let constant =
+        u32::from(first >> 10 & 1) << 11 | u32::from(second >> 12 & 7) << 8 | u32::from(second & 0xFF);
     match first {
         0xE92D => Effect::Grow(4 * second.count_ones()), // PUSH, of registers
         0xF84D if second & 0x0F00 == 0x0D00 => Effect::Grow(u32::from(second & 0xFF)), // STR, pre-indexed
@@ -61,6 +74,7 @@ pub(crate) fn decode(address: u32, first: u16, second: u16) -> Effect {
         _ if matches!(first & 0xFBFF, 0xF1A7 | 0xF2A7) && second & 0x8000 == 0 => {
             Effect::FromFrame(register(second >> 8)) // SUB Rd, R7
         }
+        0xF20F | 0xF60F | 0xF2AF | 0xF6AF => Effect::Near(register(second >> 8)), // ADR
         // BFC from bit 0
         0xF36F if second & 0x70C0 == 0 => Effect::Aligned(register(second >> 8), 2 << (second & 31)),
         // LDR to PC; from the stack, it is a return
@@ -143,7 +157,10 @@ mod tests {
         ("bx lr", 0x4770, 0x0000, Effect::None),
         ("bx r3", 0x4718, 0x0000, Effect::Indirect),
         ("blx r3", 0x4798, 0x0000, Effect::Indirect),
-        ("mov pc, r3", 0x469F, 0x0000, Effect::Indirect),
+        ("mov pc, r3", 0x469F, 0x0000, Effect::JumpTo(3)),
+        ("adr.w r6, #8", 0xF20F, 0x0608, Effect::Near(6)),
+        ("adr r3, #8", 0xA302, 0x0000, Effect::Near(3)),
+        ("ldr r0, [pc, #4]", 0x4801, 0x0000, Effect::Literal(0, 0x0800_1008)),
         ("ldr.w pc, [r3]", 0xF8D3, 0xF000, Effect::Indirect),
         ("ldr pc, [sp], #4", 0xF85D, 0xFB04, Effect::None),
         ("msr msp, r0", 0xF380, 0x8808, Effect::None),
