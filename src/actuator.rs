@@ -31,6 +31,15 @@ pub enum Drive {
 impl Drive {
     /// No force, motor off.
     pub const OFF: Self = Drive::Force(0.0);
+
+    /// The command as a duty cycle from -1 to 1. A force becomes a share of `force_limit` (N), for a power stage that
+    /// controls the motor's current and is set to reach the limit at its full scale.
+    pub fn duty(self, force_limit: f32) -> f32 {
+        match self {
+            Drive::Force(force) => saturate(force / force_limit, 1.0),
+            Drive::Duty(duty) => saturate(duty, 1.0),
+        }
+    }
 }
 
 impl MotorMap {
@@ -101,6 +110,15 @@ mod tests {
         assert_eq!(MOTOR.duty(0.0625), 0.6875 / 12.0);
         assert_eq!(MOTOR.duty(0.5), 1.5 / 12.0);
         assert_eq!(MOTOR.duty(2.0), 3.0 / 12.0);
+    }
+
+    #[test]
+    fn a_force_is_a_share_of_the_limit() {
+        assert_eq!(Drive::Force(-5.0).duty(20.0), -0.25);
+        assert_eq!(Drive::Force(30.0).duty(20.0), 1.0);
+        assert_eq!(Drive::Duty(-0.5).duty(20.0), -0.5);
+        assert_eq!(Drive::OFF.duty(20.0), 0.0);
+        assert_eq!(Drive::Force(f32::NAN).duty(20.0), 0.0);
     }
 
     #[test]

@@ -5,6 +5,7 @@ use heapless::spsc::{Consumer, Producer};
 use crate::firmware::Firmware;
 use crate::io::Board;
 use crate::message::{Command, Message};
+use crate::queue;
 
 /// Commands that may wait for the next ticks; one is taken per tick. (A queue of 4 holds 3.)
 pub const COMMANDS: usize = 4;
@@ -37,15 +38,15 @@ impl<'q, 't, B: Board<NY>, const NX: usize, const NY: usize> ControlTask<'q, 't,
         let inputs = self.board.inputs();
         let output = self.firmware.control(&inputs);
         self.board.drive(&output);
-        self.board.feed_watchdog();
-        let command = self.commands.dequeue();
+        let command = queue::take(&mut self.commands);
         let (telemetry, reply) = self.firmware.finish(command.as_ref(), self.cycles);
         // A reply goes first: telemetry comes again, it does not.
         for message in [reply, telemetry.map(Message::Telemetry)].into_iter().flatten() {
-            if self.messages.enqueue(message).is_err() {
+            if queue::put(&mut self.messages, message).is_err() {
                 self.firmware.message_dropped();
             }
         }
+        self.board.feed_watchdog();
         self.cycles = self.board.cycles().wrapping_sub(begin);
     }
 

@@ -5,7 +5,8 @@ use serde::{Deserialize, Serialize};
 
 use crate::actuator::Drive;
 use crate::encoder::{CounterWidth, Encoders};
-use crate::state_feedback::{LawGains, LawState, saturate};
+use crate::observer::Observer;
+use crate::state_feedback::{FeedbackSum, LawGains, LawState, saturate, state_feedback};
 use crate::table::{Build, GainTable, Law, TableError};
 
 /// Observer, control law and actuator map of one gain table.
@@ -17,7 +18,9 @@ pub struct Controller<'t, const NX: usize, const NY: usize> {
     table: &'t GainTable<NX, NY>,
     law: Law,
     gains: &'t LawGains<NX>,
-    running: bool,
+    /// Whether the law depends on earlier ticks, by a force on its way or an integral.
+    remembers: bool,
+    mode: Mode<'t, NX, NY>,
     target: f32,
     encoders: Encoders<NY>,
     /// Current estimate x̂ within a tick, predicted estimate x̂⁻ between ticks.
@@ -25,7 +28,19 @@ pub struct Controller<'t, const NX: usize, const NY: usize> {
     innovation: SVector<f32, NY>,
     state: LawState,
     last_volts: f32,
-    command: Command,
+    requested: f32,
+    applied: f32,
+}
+
+#[derive(Debug, Clone, Copy)]
+enum Mode<'t, const NX: usize, const NY: usize> {
+    Stopped,
+    /// Running, and the table holds no observer.
+    WithoutObserver,
+    /// Running, and sensor i measures state 2i, as in every chain.
+    InOrder(Observer<'t, NX, NY>),
+    /// Running, and the table says which state a sensor measures.
+    LookingUp(Observer<'t, NX, NY>),
 }
 
 /// The outcome of a tick.
@@ -90,14 +105,16 @@ impl<'t, const NX: usize, const NY: usize> Controller<'t, NX, NY> {
             table,
             law,
             gains,
-            running: false,
+            remembers: table.remembers(gains),
+            mode: Mode::Stopped,
             target: 0.0,
             encoders: Encoders::new(widths),
             estimate: SVector::zeros(),
             innovation: SVector::zeros(),
             state: LawState::default(),
             last_volts: 0.0,
-            command: OFF,
+            requested: 0.0,
+            applied: 0.0,
         })
     }
 
@@ -112,10 +129,11 @@ impl<'t, const NX: usize, const NY: usize> Controller<'t, NX, NY> {
     /// [`Rejected::Running`] between [`start`](Self::start) and [`stop`](Self::stop): a change of gains in mid-balance is
     /// a jump of the force. [`Rejected::NoSuchLaw`] if the table does not hold it.
     pub fn select(&mut self, law: Law) -> Result<(), Rejected> {
-        if self.running {
+        if !matches!(self.mode, Mode::Stopped) {
             return Err(Rejected::Running);
         }
         self.gains = self.table.law(law).ok_or(Rejected::NoSuchLaw)?;
+        self.remembers = self.table.remembers(self.gains);
         self.law = law;
         Ok(())
     }
@@ -191,14 +209,17 @@ impl<'t, const NX: usize, const NY: usize> Controller<'t, NX, NY> {
         self.innovation = SVector::zeros();
         self.state = LawState { setpoint: self.output(), ..LawState::default() };
         self.last_volts = 0.0;
-        self.command = OFF;
-        self.running = true;
+        (self.requested, self.applied) = (0.0, 0.0);
+        self.mode = match &self.table.observer {
+            None => Mode::WithoutObserver,
+            Some(gains) if gains.sensors_are_in_order() => Mode::InOrder(Observer::new(gains)),
+            Some(gains) => Mode::LookingUp(Observer::new(gains)),
+        };
     }
 
     /// Stops: the next tick needs a new start.
     pub fn stop(&mut self) {
-        self.running = false;
-        self.command = OFF;
+        self.mode = Mode::Stopped;
     }
 
     /// First half of a tick: from raw encoder counts to the command for the motor.
@@ -221,29 +242,79 @@ impl<'t, const NX: usize, const NY: usize> Controller<'t, NX, NY> {
         raw: &[u32; NY],
         judge: impl FnOnce(&[i32; NY], &[f32; NY], &mut [f32; NY]),
     ) -> Command {
-        self.encoders.update(raw);
-        let (true, Some(observer)) = (self.running, &self.table.observer) else {
-            return OFF;
+        let requested = match self.mode {
+            Mode::InOrder(observer) => self.observe(&observer, raw, |sensor| 2 * sensor, judge),
+            Mode::LookingUp(observer) => self.observe_looking_up(&observer, raw, judge),
+            Mode::WithoutObserver | Mode::Stopped => {
+                self.encoders.update(raw);
+                return OFF;
+            }
         };
-        let y = self.encoders.positions(&observer.step);
-        self.innovation = observer.innovation(&y, &self.estimate);
-        judge(self.encoders.counts(), &y.data.0[0], &mut self.innovation.data.0[0]);
-        self.estimate = observer.correct(&self.estimate, &self.innovation);
-        self.act()
+        self.drive(requested)
     }
 
     /// First half of a tick with the whole state measured: what the paper simulates.
     pub fn control_from_state(&mut self, x: &SVector<f32, NX>) -> Command {
         self.estimate = *x;
-        self.act()
-    }
-
-    fn act(&mut self) -> Command {
-        if !self.running {
+        if let Mode::Stopped = self.mode {
             return OFF;
         }
         self.state.govern(self.target, self.gains.setpoint_step);
-        let requested = self.state.force(self.gains, &self.estimate);
+        let requested = self.request(state_feedback(self.gains.n, self.state.setpoint, &self.gains.k, x));
+        self.drive(requested)
+    }
+
+    // Out of line, so that it costs the way without look-up no register.
+    #[cold]
+    #[inline(never)]
+    fn observe_looking_up(
+        &mut self,
+        observer: &Observer<'t, NX, NY>,
+        raw: &[u32; NY],
+        judge: impl FnOnce(&[i32; NY], &[f32; NY], &mut [f32; NY]),
+    ) -> f32 {
+        let measured = &observer.gains.measured;
+        self.observe(observer, raw, |sensor| measured.get(sensor).map_or(NX, |&state| state as usize), judge)
+    }
+
+    #[inline(always)]
+    fn observe(
+        &mut self,
+        observer: &Observer<'t, NX, NY>,
+        raw: &[u32; NY],
+        measured: impl Fn(usize) -> usize,
+        judge: impl FnOnce(&[i32; NY], &[f32; NY], &mut [f32; NY]),
+    ) -> f32 {
+        self.state.govern(self.target, self.gains.setpoint_step);
+        let y = self.encoders.measure(raw, &observer.gains.step).data.0[0];
+        let (estimate, innovation) = (&mut self.estimate.data.0[0], &mut self.innovation.data.0[0]);
+        let mut sum = FeedbackSum::new(self.gains.n, self.state.setpoint);
+        let counts = self.encoders.counts();
+        observer.innovation(measured, &y, estimate, innovation);
+        judge(counts, &y, innovation);
+        observer.correct(innovation, estimate, |joint, x| {
+            if let Some(k) = self.gains.k.as_slice().chunks(2).nth(joint) {
+                sum.feed_back(k, x);
+            }
+        });
+        self.request(sum.force())
+    }
+
+    /// The force that the law asks for, from its state feedback.
+    #[inline(always)]
+    fn request(&mut self, feedback: f32) -> f32 {
+        let mut requested = feedback;
+        if self.remembers {
+            requested -= self.gains.k_pending * self.state.pending;
+            requested -= self.gains.k_integral * self.state.integral;
+            self.requested = requested;
+        }
+        requested
+    }
+
+    /// Limits the force and turns it into what the power stage needs.
+    #[inline]
+    fn drive(&mut self, requested: f32) -> Command {
         let limited = saturate(requested, self.table.force_limit_n);
         let (applied, drive) = match &self.table.motor {
             None => (limited, Drive::Force(limited)),
@@ -255,27 +326,26 @@ impl<'t, const NX: usize, const NY: usize> Controller<'t, NX, NY> {
                 (force, Drive::Duty(motor.duty(volts)))
             }
         };
-        self.command = Command { requested, applied, drive };
-        self.command
+        self.applied = applied;
+        Command { requested, applied, drive }
     }
 
     /// Second half of a tick: `x̂⁻ = Ad x̂ + Bd u` with the force really applied, and the integral.
     pub fn predict(&mut self) {
-        if !self.running {
-            return;
-        }
-        let Command { requested, applied, .. } = self.command;
+        let (requested, applied) = (self.requested, self.applied);
         let during_this_tick = self.acting();
-        let position = self.output();
-        self.state.advance(self.gains.k_integral, position, self.table.tick_s, requested, applied);
-        if let Some(observer) = &self.table.observer {
-            self.estimate = observer.predict(&self.estimate, during_this_tick);
+        if self.remembers {
+            let position = self.output();
+            self.state.advance(self.gains.k_integral, position, self.table.tick_s, requested, applied);
+        }
+        if let Mode::InOrder(observer) | Mode::LookingUp(observer) = &self.mode {
+            observer.predict(&mut self.estimate.data.0[0], during_this_tick);
         }
     }
 
     /// Force on the cart during this tick (N), between [`control`](Self::control) and [`predict`](Self::predict).
     pub fn acting(&self) -> f32 {
-        if self.table.delay_ticks == 1 { self.state.pending } else { self.command.applied }
+        if self.table.delay_ticks == 1 { self.state.pending } else { self.applied }
     }
 
     fn output(&self) -> f32 {

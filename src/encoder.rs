@@ -14,7 +14,8 @@ pub enum CounterWidth {
 /// Follows hardware counters across their wrap-around and knows which count is position 0.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Encoders<const NY: usize> {
-    widths: [CounterWidth; NY],
+    /// Bit i is set if counter i has 16 bits: one word for all of them.
+    of_16_bits: u32,
     last: [u32; NY],
     /// Counts from position 0; wraps silently after 2³¹ counts, a hundred kilometres of any rail.
     position: [i32; NY],
@@ -22,8 +23,20 @@ pub struct Encoders<const NY: usize> {
 
 impl<const NY: usize> Encoders<NY> {
     /// Encoders at position 0 with their counters at 0.
+    ///
+    /// # Panics
+    /// When compiled, for more than 32 counters.
     pub const fn new(widths: [CounterWidth; NY]) -> Self {
-        Self { widths, last: [0; NY], position: [0; NY] }
+        const { assert!(NY <= 32, "at most 32 counters") };
+        let mut of_16_bits = 0;
+        let mut counter = 0;
+        while counter < NY {
+            if let CounterWidth::Bits16 = widths[counter] {
+                of_16_bits |= 1 << counter;
+            }
+            counter += 1;
+        }
+        Self { of_16_bits, last: [0; NY], position: [0; NY] }
     }
 
     /// Declares that the counters stand at `raw` while the rig is at `position` (counts), as found by homing.
@@ -34,17 +47,23 @@ impl<const NY: usize> Encoders<NY> {
 
     /// Takes new counter readings. Between two readings a counter may move by less than half its range.
     pub fn update(&mut self, raw: &[u32; NY]) {
-        let follow = self.widths.iter().zip(&mut self.last).zip(&mut self.position).zip(raw);
-        for (((width, last), position), &raw) in follow {
-            let moved = raw.wrapping_sub(*last);
-            let moved = match width {
-                // The cast keeps the low 16 bits: the distance modulo the counter's range, with its sign.
-                CounterWidth::Bits16 => i32::from(moved as i16),
-                CounterWidth::Bits32 => moved as i32,
-            };
+        self.measure(raw, &SVector::zeros());
+    }
+
+    /// Takes new counter readings, and gives the positions like [`positions`](Self::positions).
+    #[inline(always)]
+    pub(crate) fn measure(&mut self, raw: &[u32; NY], step: &SVector<f32, NY>) -> SVector<f32, NY> {
+        let mut y = *step;
+        let counters = self.last.iter_mut().zip(&mut self.position).zip(raw).zip(y.iter_mut());
+        for (counter, (((last, position), &raw), y)) in counters.enumerate() {
+            let moved = raw.wrapping_sub(*last) as i32;
+            // The inner cast keeps the low 16 bits: the distance modulo the counter's range, with its sign.
+            let moved = if self.of_16_bits & (1 << counter) != 0 { i32::from(moved as i16) } else { moved };
             *last = raw;
             *position = position.wrapping_add(moved);
+            *y *= *position as f32;
         }
+        y
     }
 
     /// Positions in counts.
@@ -53,6 +72,7 @@ impl<const NY: usize> Encoders<NY> {
     }
 
     /// Positions in SI units; `step` holds the travel per count (m or rad).
+    #[inline]
     pub fn positions(&self, step: &SVector<f32, NY>) -> SVector<f32, NY> {
         let mut y = *step;
         for (y, &counts) in y.iter_mut().zip(&self.position) {

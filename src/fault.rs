@@ -40,6 +40,8 @@ pub enum Fault {
     Watchdog = 16,
     /// The program has failed: panic, processor fault or stack overflow.
     Crash = 17,
+    /// The clock has failed to start: crystal or PLL.
+    Clock = 18,
 }
 
 /// The most ticks from a fault's first effect on what the firmware sees to motor off.
@@ -80,7 +82,7 @@ pub struct Entry {
 
 impl Fault {
     /// Every fault, by code.
-    pub const ALL: [Entry; 17] = [
+    pub const ALL: [Entry; 18] = [
         Entry {
             fault: Fault::NotFinite,
             name: "not finite",
@@ -205,6 +207,14 @@ impl Fault {
                         firmware starts disarmed and keeps this as the reason",
             reaction: Reaction::Hardware("at once, in the handler"),
             remedy: "report it with the firmware's version; home and check the signs again",
+        },
+        Entry {
+            fault: Fault::Clock,
+            name: "clock",
+            condition: "crystal or PLL have not started, or the crystal has stopped: the firmware runs from the internal \
+                        clock, at another tick, and never arms",
+            reaction: Reaction::Ticks(1),
+            remedy: "check the crystal (8 MHz) and the board's feature; then reset",
         },
     ];
 

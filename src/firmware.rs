@@ -125,7 +125,9 @@ impl<'t, const NX: usize, const NY: usize> Firmware<'t, NX, NY> {
         (self.raw, self.contacts, self.supply_v) = (inputs.counts, inputs.contacts, inputs.supply_v);
         self.statistics.overruns =
             self.statistics.overruns.saturating_add(u32::from(inputs.contacts.overrun));
-        if inputs.contacts.emergency_stop {
+        if inputs.contacts.clock_fault {
+            self.trip(Fault::Clock, None);
+        } else if inputs.contacts.emergency_stop {
             self.trip(Fault::EmergencyStop, None);
         } else if inputs.contacts.driver_fault {
             self.trip(Fault::Driver, None);

@@ -3,11 +3,11 @@
 //! One definition for both ends and every kind of message. A receiver that has lost its place finds it again at the next
 //! zero byte.
 
-use crc::{CRC_32_ISO_HDLC, Crc, NoTable};
+use cobs::{DecodeResult, DecoderState};
 use serde::{Deserialize, Serialize};
 
-/// As for the gain table: without a lookup table.
-const CRC: Crc<u32, NoTable> = Crc::<u32, NoTable>::new(&CRC_32_ISO_HDLC);
+use crate::checksum::crc32;
+
 const CRC_BYTES: usize = 4;
 /// What follows every frame, and is in none.
 pub const END: u8 = 0;
@@ -50,7 +50,7 @@ pub fn encode<'a, T: Serialize>(
 ) -> Result<&'a [u8], FrameError> {
     let length = postcard::to_slice(message, scratch).map_err(|_| FrameError::Long)?.len();
     let (body, rest) = scratch.split_at_mut_checked(length).ok_or(FrameError::Long)?;
-    let crc = CRC.checksum(body).to_le_bytes();
+    let crc = crc32(0, body).to_le_bytes();
     rest.get_mut(..CRC_BYTES).ok_or(FrameError::Long)?.copy_from_slice(&crc);
     let checked = scratch.get(..length + CRC_BYTES).ok_or(FrameError::Long)?;
     let length = cobs::try_encode(checked, out).map_err(|_| FrameError::Long)?;
@@ -63,16 +63,32 @@ pub fn encode<'a, T: Serialize>(
 /// # Errors
 /// [`FrameError`]; nothing of a damaged frame is used.
 pub fn decode<T: for<'de> Deserialize<'de>>(frame: &mut [u8]) -> Result<T, FrameError> {
-    let length = cobs::decode_in_place(frame).map_err(|_| FrameError::Coding)?;
+    let length = unstuff(frame).ok_or(FrameError::Coding)?;
     let checked = frame.get(..length).ok_or(FrameError::Coding)?;
     let (body, crc) = checked.split_last_chunk::<CRC_BYTES>().ok_or(FrameError::Coding)?;
-    if CRC.checksum(body) != u32::from_le_bytes(*crc) {
+    if crc32(0, body) != u32::from_le_bytes(*crc) {
         return Err(FrameError::Crc);
     }
     match postcard::take_from_bytes(body) {
         Ok((message, [])) => Ok(message),
         _ => Err(FrameError::Message),
     }
+}
+
+/// Decodes COBS in place; the length of what comes out.
+fn unstuff(frame: &mut [u8]) -> Option<usize> {
+    let (mut decoder, mut length) = (DecoderState::Idle, 0);
+    for i in 0..frame.len() {
+        match decoder.feed(*frame.get(i)?).ok()? {
+            DecodeResult::NoData => {}
+            DecodeResult::DataContinue(byte) => {
+                *frame.get_mut(length)? = byte;
+                length += 1;
+            }
+            DecodeResult::DataComplete => return None,
+        }
+    }
+    matches!(decoder.feed(END), Ok(DecodeResult::DataComplete)).then_some(length)
 }
 
 /// Cuts a stream of bytes into frames of up to `N` bytes.

@@ -29,6 +29,8 @@ pub struct Contacts {
     pub driver_fault: bool,
     /// The tick before was not finished when this one was due.
     pub overrun: bool,
+    /// The processor's clock is not the one that the tick is counted in: it has failed to start.
+    pub clock_fault: bool,
 }
 
 /// What goes to the power stage at the end of a tick.
@@ -57,7 +59,8 @@ pub trait Board<const NY: usize> {
     /// Drives the motor until the next call.
     fn drive(&mut self, output: &Output);
 
-    /// Restarts the independent watchdog, which resets the microcontroller, motor off, when this is not called in time.
+    /// The tick has ended. If it has done so before the next one is due, restarts the independent watchdog, which resets
+    /// the microcontroller, motor off, when that does not happen in time.
     fn feed_watchdog(&mut self);
 
     /// A free-running counter of processor cycles.

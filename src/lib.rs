@@ -34,6 +34,7 @@ extern crate std;
 
 pub mod actuator;
 pub mod calibration;
+pub mod checksum;
 pub mod control_task;
 pub mod controller;
 pub mod detection;
@@ -58,6 +59,7 @@ pub mod observer;
 pub mod pins;
 pub mod reasons;
 pub mod sign_check;
+pub mod queue;
 pub mod state_feedback;
 pub mod stillness;
 pub mod supervisor;

@@ -8,6 +8,7 @@ use serde::Serialize;
 
 use crate::frame::{self, Receiver};
 use crate::message::{Answer, Command, Message};
+use crate::queue;
 
 /// Longest frame from the host (bytes).
 pub const MAX_COMMAND: usize = 32;
@@ -51,7 +52,7 @@ impl<'q, const NX: usize, const NY: usize> Link<'q, NX, NY> {
             Ok(command) if command.id <= self.last_id => self.replayed = self.replayed.saturating_add(1),
             Ok(command) => {
                 // A host that sends faster than one command per tick gets no answer to what is too much.
-                if self.commands.enqueue(command).is_ok() {
+                if queue::put(&mut self.commands, command).is_ok() {
                     self.last_id = command.id;
                 }
             }
@@ -60,7 +61,7 @@ impl<'q, const NX: usize, const NY: usize> Link<'q, NX, NY> {
 
     /// The next frame for the line, if there is one.
     pub fn transmit(&mut self) -> Option<&[u8]> {
-        let mut message = self.messages.dequeue()?;
+        let mut message = queue::take(&mut self.messages)?;
         if let Message::Reply { answer: Answer::Statistics(statistics), .. } = &mut message {
             (statistics.malformed, statistics.replayed) = (self.malformed, self.replayed);
         }

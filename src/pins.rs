@@ -36,8 +36,6 @@ pub enum Sabotage {
     HardFault,
     /// A recursion without end.
     StackOverflow,
-    /// A tick that does not return.
-    Stall,
 }
 
 /// Image to host: the output of one tick.

@@ -33,21 +33,50 @@ impl<const NX: usize> LawGains<NX> {
 }
 
 /// State feedback with precompensation, `u = N r - K x` (the paper's control law).
-///
-/// The terms are added in a fixed order (even and odd states apart, so that a processor can overlap them): every machine
-/// gets the same bits.
 #[inline]
 pub fn state_feedback<const NX: usize>(n: f32, r: f32, k: &SVector<f32, NX>, x: &SVector<f32, NX>) -> f32 {
-    let (mut positions, mut rates) = (n * r, 0.0);
+    let mut sum = FeedbackSum::new(n, r);
     for (k, x) in k.as_slice().chunks(2).zip(x.as_slice().chunks(2)) {
-        if let ([k, ..], [x, ..]) = (k, x) {
-            positions -= k * x;
-        }
-        if let ([_, k], [_, x]) = (k, x) {
-            rates -= k * x;
+        sum.feed_back(k, x);
+    }
+    sum.force()
+}
+
+/// The sum `N r - K x`, joint by joint.
+///
+/// The terms are added in a fixed order (positions and rates apart, so that a processor can overlap them): every machine
+/// gets the same bits.
+pub(crate) struct FeedbackSum {
+    positions: f32,
+    rates: f32,
+}
+
+impl FeedbackSum {
+    #[inline(always)]
+    pub(crate) fn new(n: f32, r: f32) -> Self {
+        // -0 is what changes nothing when something is added to it; with +0, the first addition would be a real one.
+        Self { positions: n * r, rates: -0.0 }
+    }
+
+    /// Takes the gains and states of a joint: position and rate, or a position alone at the end.
+    #[inline(always)]
+    pub(crate) fn feed_back(&mut self, k: &[f32], x: &[f32]) {
+        match (k, x) {
+            ([k_position, k_rate], [position, rate]) => {
+                // Both products before both sums: no instruction waits for the one before it.
+                let (a, b) = (k_position * position, k_rate * rate);
+                self.positions -= a;
+                self.rates -= b;
+            }
+            ([k], [x]) => self.positions -= k * x,
+            _ => (),
         }
     }
-    positions + rates
+
+    #[inline(always)]
+    pub(crate) fn force(self) -> f32 {
+        self.positions + self.rates
+    }
 }
 
 /// `u` limited to ±`limit`; 0 if `u` is not a number, because a motor must never be driven by one.
@@ -55,12 +84,12 @@ pub fn state_feedback<const NX: usize>(n: f32, r: f32, k: &SVector<f32, NX>, x: 
 pub fn saturate(u: f32, limit: f32) -> f32 {
     if u > limit {
         limit
+    } else if u >= -limit {
+        u
     } else if u < -limit {
         -limit
-    } else if u.is_nan() {
-        0.0
     } else {
-        u
+        0.0
     }
 }
 
@@ -83,7 +112,9 @@ impl LawState {
     /// `|θ| <= step · Σ |step response of θ|`.
     #[inline]
     pub fn govern(&mut self, target: f32, step: f32) {
-        self.setpoint += saturate(target - self.setpoint, step);
+        let rising = target - self.setpoint;
+        let rising = if rising > step { step } else { rising };
+        self.setpoint += if rising < -step { -step } else { rising };
     }
 
     /// The force (N) that the law asks for in state `x`.
@@ -101,11 +132,13 @@ impl LawState {
     /// the request back (Åström & Hägglund, *Advanced PID Control*, section 3.5).
     #[inline]
     pub fn advance(&mut self, k_integral: f32, x: f32, tick_s: f32, requested: f32, applied: f32) {
-        let moved = tick_s * (x - self.setpoint);
-        let excess = requested - applied;
-        // The next request changes by -k_integral·moved; hold z if that has the sign of the excess.
-        if excess * (-k_integral * moved) <= 0.0 {
-            self.integral += moved;
+        if k_integral != 0.0 {
+            let moved = tick_s * (x - self.setpoint);
+            let excess = requested - applied;
+            // The next request changes by -k_integral·moved; hold z if that has the sign of the excess.
+            if excess * (-k_integral * moved) <= 0.0 {
+                self.integral += moved;
+            }
         }
         self.pending = applied;
     }

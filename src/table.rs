@@ -1,10 +1,10 @@
 //! The gain table: everything the controller knows about the rig, and how it is checked.
 
-use crc::{CRC_32_ISO_HDLC, Crc};
 use nalgebra::{ArrayStorage, SMatrix};
 use serde::{Deserialize, Serialize};
 
 use crate::actuator::MotorMap;
+use crate::checksum::crc32;
 use crate::detection::Thresholds;
 use crate::limits::Limits;
 use crate::observer::ObserverGains;
@@ -12,9 +12,6 @@ use crate::state_feedback::LawGains;
 
 /// Layout of [`GainTable`]; a table written for another layout is refused.
 pub const TABLE_FORMAT: u32 = 3;
-
-/// With a lookup table of a kilobyte: it is read all the time while balancing.
-static CRC: Crc<u32> = Crc::<u32>::new(&CRC_32_ISO_HDLC);
 
 /// The constants of a controller with `NX` states and `NY` sensors, as written by `upright design` into `src/gains.rs`.
 #[derive(Debug, Clone, PartialEq)]
@@ -181,6 +178,11 @@ impl<const NX: usize, const NY: usize> GainTable<NX, NY> {
         }
     }
 
+    /// Whether a tick with these gains depends on earlier ones beyond the estimate: by a force on its way or an integral.
+    pub(crate) fn remembers(&self, gains: &LawGains<NX>) -> bool {
+        self.delay_ticks == 1 || gains.k_pending != 0.0 || gains.k_integral != 0.0
+    }
+
     /// Whether the table is sound and meant for this build.
     ///
     /// # Errors
@@ -249,10 +251,7 @@ impl Reading {
     /// Reads the next word of `table`; at its end gives the CRC of all, and begins anew.
     pub fn next<const NX: usize, const NY: usize>(&mut self, table: &GainTable<NX, NY>) -> Option<u32> {
         if let Some(word) = table.word(self.part, self.index) {
-            // The CRC goes on where it was: the initial value is what the final one was, turned back.
-            let mut digest = CRC.digest_with_initial((self.crc ^ CRC_32_ISO_HDLC.xorout).reverse_bits());
-            digest.update(&word.to_le_bytes());
-            (self.crc, self.index) = (digest.finalize(), self.index + 1);
+            (self.crc, self.index) = (crc32(self.crc, &word.to_le_bytes()), self.index + 1);
             return None;
         }
         (self.part, self.index) = (self.part + 1, 0);

@@ -6,6 +6,7 @@
 
 #![forbid(unsafe_code)]
 
+pub mod campaign;
 pub mod design;
 pub mod image;
 pub mod in_the_loop;

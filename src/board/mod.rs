@@ -5,9 +5,14 @@
 
 #![allow(unsafe_code)]
 
+#[cfg(not(any(feature = "in-the-loop", feature = "in-the-loop-usart")))]
+mod f4;
+mod handlers;
 #[cfg(any(feature = "in-the-loop", feature = "in-the-loop-usart"))]
 mod in_the_loop;
 
+#[cfg(not(any(feature = "in-the-loop", feature = "in-the-loop-usart")))]
+pub(crate) use f4::{CLOCK_HZ, Hardware, Line, Receiver, set_up, stop};
 #[cfg(any(feature = "in-the-loop", feature = "in-the-loop-usart"))]
 pub(crate) use in_the_loop::{CLOCK_HZ, Hardware, Line, Receiver, set_up, stop};
 

@@ -1,5 +1,14 @@
 //! Images for the microcontroller: built with whatever compiler is there, and looked into.
 
 mod build;
+mod elf;
+mod forbidden;
+mod size;
+mod stack;
+mod thumb;
 
 pub use build::{ImageError, Kind, build, build_for};
+pub use elf::{ElfError, Image};
+pub use forbidden::forbidden_functions;
+pub use size::{FLASH_LIMIT, Part, RAM_LIMIT, Size, SizeError, size};
+pub use stack::{StackBound, StackError, StackLevel, stack_bound};

@@ -19,6 +19,9 @@ pub struct InProcess<'q, 't, const NX: usize, const NY: usize> {
     link: Link<'q, NX, NY>,
     /// On the serial line: the host hears of a tick with the next one, as from an image.
     sent: Vec<u8>,
+    /// Nobody takes bytes from the serial line from so many ticks after the first with the motor on: its buffers fill up.
+    pub stuck_from: Option<usize>,
+    ticks_on: usize,
 }
 
 /// The board: inputs and output in memory.
@@ -77,6 +80,8 @@ impl<'q, 't, const NX: usize, const NY: usize> InProcess<'q, 't, NX, NY> {
             control: ControlTask::new(firmware, wires, commands, messages),
             link: Link::new(to_control, to_link),
             sent: Vec::new(),
+            stuck_from: None,
+            ticks_on: 0,
         })
     }
 }
@@ -91,7 +96,9 @@ impl<const NX: usize, const NY: usize> Target<NY> for InProcess<'_, '_, NX, NY> 
         for &byte in &pins.received {
             self.link.receive(byte);
         }
-        while let Some(frame) = self.link.transmit() {
+        self.ticks_on += usize::from(self.control.board().output.enable || self.ticks_on > 0);
+        let stuck = self.stuck_from.is_some_and(|from| self.ticks_on > from);
+        while !stuck && let Some(frame) = self.link.transmit() {
             self.sent.extend_from_slice(frame);
         }
         Ok(self.control.board().output)

@@ -8,10 +8,12 @@ mod in_process;
 mod qemu;
 mod run;
 mod session;
+mod stage;
 mod target;
 
-pub use in_process::InProcess;
+pub use in_process::{InProcess, Queues};
 pub use qemu::{Emulator, Link};
 pub use run::{Recording, RunError, Tick, Where, run};
 pub use session::{Session, SessionError};
+pub use stage::Stage;
 pub use target::{Target, TargetError};

@@ -4,15 +4,16 @@ use std::collections::VecDeque;
 use std::path::Path;
 
 use upright::fault::Fault;
-use upright::io::{Contacts, Inputs, Output};
+use upright::io::Output;
 use upright::message::{Request, Telemetry};
 use upright::supervisor::State;
 
 use super::in_process::{InProcess, Queues};
 use super::qemu::{Emulator, Link};
 use super::session::{Session, SessionError};
+use super::stage::Stage;
 use crate::rig::Rig;
-use crate::simulate::{Bench, Fall, Hand, Sample, Scenario, Sensing, SimulationError, Summary, Trace, ticks};
+use crate::simulate::{Fall, Sample, Scenario, Sensing, SimulationError, Summary, Trace, ticks};
 use crate::table::{TableValues, WithSize, with_firmware_size};
 
 /// Where the firmware runs.
@@ -138,74 +139,45 @@ impl WithSize for Run<'_> {
 impl Run<'_> {
     fn with<const NX: usize, const NY: usize>(
         self,
-        mut session: Session<'_, NX, NY>,
+        session: Session<'_, NX, NY>,
     ) -> Result<Recording, RunError> {
         let Self { rig, table, scenario, .. } = self;
-        let supply_v = table.motor.map_or(0.0, |motor| motor.supply_v);
-        let inputs = |counts| Inputs { counts, supply_v, contacts: Contacts::default() };
-        let mut bench = Bench::new(rig, scenario)?;
-        let mut hand = Hand::new(rig, &scenario.start);
-        bench.hold(hand.held());
-        let hanging = inputs(bench.counters());
-        session.meet(table.rig_hash, &hanging)?;
-        session.ask(Request::Select(scenario.law), &hanging)?;
-        session.ask(Request::Telemetry(1), &hanging)?;
+        let mut stage = Stage::new(rig, table, scenario, session)?;
         let target_at = |tick: usize| {
             let t = tick as f64 * rig.tick.period_s;
             if t >= scenario.step_at_s { scenario.step_m } else { 0.0 }
         };
-        let mut asked = None;
-        let mut waited = 0;
-        let mut output = loop {
-            if let Some(act) = hand.act(waited, &session.seen()) {
-                bench.hold(&act.held);
-                if let Some(request) = act.request {
-                    session.send(request);
-                }
-            }
-            if session.seen().state == State::Armed && asked.is_none() {
-                asked = Some(target_at(0));
-                session.send(Request::Setpoint(target_at(0) as f32));
-            }
-            let output = session.tick(&inputs(bench.counters()))?;
-            if output.enable {
-                break output;
-            }
-            waited += 1;
-            if f64::from(waited) * rig.tick.period_s > LONGEST_WAIT_S {
-                return Err(SessionError::NotBalancing(session.seen().state).into());
-            }
-        };
-
+        let mut output = stage.raise(target_at(0) as f32)?;
+        let mut asked = target_at(0);
         let last = ticks(rig, scenario)?;
         let mut record = Record::new(rig, last);
         let beat = (BEAT_S / rig.tick.period_s).max(1.0) as usize;
         for tick in 0..=last {
             if tick > 0 {
-                output = session.tick(&inputs(bench.counters()))?;
+                output = stage.session.tick(&stage.inputs())?;
             }
             // What is sent from now on comes with the next tick and counts in the one after the next.
             let ahead = target_at(tick + TICKS_TO_OBEY);
-            if asked != Some(ahead) {
-                session.send(Request::Setpoint(ahead as f32));
-                asked = Some(ahead);
+            if asked != ahead {
+                stage.session.send(Request::Setpoint(ahead as f32));
+                asked = ahead;
             } else if tick.is_multiple_of(beat) {
-                session.send(Request::Beat);
+                stage.session.send(Request::Beat);
             }
             let t = tick as f64 * rig.tick.period_s;
-            let fall = Fall::of(rig, t, bench.state());
-            let state = bench.state().to_vec();
-            let force = bench.tick(output.drive);
+            let fall = Fall::of(rig, t, stage.bench.state());
+            let state = stage.bench.state().to_vec();
+            let force = stage.bench.tick(output.drive);
             record.waiting.push_back(Pending { t, target: target_at(tick), state, force, output });
-            record.take(&mut session)?;
+            record.take(&mut stage.session)?;
             if fall.is_some() {
                 record.fall = fall;
                 break;
             }
         }
         // What the firmware said of the last tick may come with the next one.
-        session.tick(&inputs(bench.counters()))?;
-        record.take(&mut session)?;
+        stage.session.tick(&stage.inputs())?;
+        record.take(&mut stage.session)?;
         let summary = Summary::of(rig, scenario, &record.trace, record.fall);
         Ok(Recording {
             trace: record.trace,
@@ -217,8 +189,6 @@ impl Run<'_> {
     }
 }
 
-/// Longest time from power-up to balancing (s).
-const LONGEST_WAIT_S: f64 = 60.0;
 /// Between two signs of life for a firmware whose set-point the host commands (s).
 const BEAT_S: f64 = 0.025;
 /// A command is taken in the tick after the one it came with, and obeyed from the next on.

@@ -2,6 +2,7 @@
 
 use std::collections::VecDeque;
 
+use upright::fault::Fault;
 use upright::frame::{self, Receiver};
 use upright::io::{Inputs, Output};
 use upright::link::{MAX_COMMAND, MAX_MESSAGE};
@@ -63,6 +64,7 @@ pub struct Session<'a, const NX: usize, const NY: usize> {
     telemetry: VecDeque<Telemetry<NX, NY>>,
     replies: VecDeque<(u64, Answer)>,
     seen: Seen,
+    fault: Option<Fault>,
     /// Frames from the firmware that could not be read.
     pub damaged: usize,
 }
@@ -80,6 +82,7 @@ impl<'a, const NX: usize, const NY: usize> Session<'a, NX, NY> {
             telemetry: VecDeque::new(),
             replies: VecDeque::new(),
             seen: Seen { state: State::Disarmed, signs: Signs::Unchecked },
+            fault: None,
             damaged: 0,
         }
     }
@@ -93,6 +96,11 @@ impl<'a, const NX: usize, const NY: usize> Session<'a, NX, NY> {
         if let Ok(frame) = frame::encode(&command, &mut scratch, &mut out) {
             self.to_send.extend(frame);
         }
+        self.last_id
+    }
+
+    /// Number of the last command.
+    pub fn last_id(&self) -> u64 {
         self.last_id
     }
 
@@ -122,6 +130,7 @@ impl<'a, const NX: usize, const NY: usize> Session<'a, NX, NY> {
         for byte in self.serial.drain(..) {
             match self.receiver.push::<Message<NX, NY>>(byte) {
                 Some(Ok(Message::Telemetry(telemetry))) => {
+                    self.fault = telemetry.fault;
                     self.seen = Seen { state: telemetry.state, signs: telemetry.signs };
                     self.telemetry.push_back(telemetry);
                 }
@@ -131,6 +140,11 @@ impl<'a, const NX: usize, const NY: usize> Session<'a, NX, NY> {
             }
         }
         Ok(output)
+    }
+
+    /// The latched fault, as last heard.
+    pub fn fault(&self) -> Option<Fault> {
+        self.fault
     }
 
     /// What a person at the rig has last seen of the firmware.

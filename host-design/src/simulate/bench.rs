@@ -21,6 +21,7 @@ pub struct Bench {
     force_noise: Normal<f64>,
     torque_noise: Normal<f64>,
     force_offset: f64,
+    push_n: f64,
     torques: Vec<f64>,
     state: Vec<f64>,
     period_s: f64,
@@ -56,6 +57,7 @@ impl Bench {
             force_noise: noise(scenario.force_noise_n)?,
             torque_noise: noise(scenario.torque_noise_n_m)?,
             force_offset: finite(scenario.force_offset_n)?,
+            push_n: 0.0,
             state: scenario.start.clone(),
             period_s: rig.tick.period_s,
             substeps: scenario.substeps.max(1),
@@ -105,11 +107,17 @@ impl Bench {
         Self::widths::<NY>().map(|width| shown_by(width, self.counter_start))
     }
 
+    /// Adds a force on the cart for the next tick (N).
+    pub fn push(&mut self, force_n: f64) {
+        self.push_n = force_n;
+    }
+
     /// Lets one tick pass with the command `drive` of its start; gives the force on the cart at the start of the tick,
     /// without the disturbance (N).
     pub fn tick(&mut self, drive: Drive) -> f64 {
         let now = if self.delay { std::mem::replace(&mut self.on_its_way, drive) } else { drive };
-        let disturbance = self.force_offset + self.force_noise.sample(&mut self.random);
+        let push = std::mem::take(&mut self.push_n);
+        let disturbance = self.force_offset + push + self.force_noise.sample(&mut self.random);
         let (torque_noise, random) = (&self.torque_noise, &mut self.random);
         self.torques.fill_with(|| torque_noise.sample(random));
         let at_start = self.force(now);

@@ -215,6 +215,17 @@ impl TableValues {
         self
     }
 
+    /// The same table with nothing that the supervisor could find anything by: no thresholds, no limits. What happens to a
+    /// rig without it.
+    pub fn without_detection(mut self) -> Self {
+        let sensors = self.sensors;
+        self.thresholds = ThresholdValues::of(sensors, None);
+        let limits = &mut self.limits;
+        (limits.rail_m, limits.angle_rad, limits.speed_m_per_s) = ([-f32::MAX, f32::MAX], f32::MAX, f32::MAX);
+        limits.saturated_ticks = u32::MAX;
+        self
+    }
+
     /// The firmware's table, sealed with its checksum.
     ///
     /// # Panics

@@ -8,10 +8,8 @@ mod semihosting;
 #[cfg(feature = "in-the-loop-usart")]
 mod usart;
 
-use core::panic::PanicInfo;
 use core::sync::atomic::{AtomicU32, Ordering};
 
-use cortex_m_rt::{ExceptionFrame, exception};
 use heapless::spsc::{Consumer, Producer};
 use stm32f4xx_hal::pac::{Peripherals, TIM5};
 use upright::encoder::CounterWidth;
@@ -153,9 +151,6 @@ fn suffer(sabotage: Sabotage) {
         Sabotage::StackOverflow => {
             dig(1);
         }
-        Sabotage::Stall => loop {
-            cortex_m::asm::nop();
-        },
     }
 }
 
@@ -171,14 +166,4 @@ pub(crate) fn stop() -> ! {
     // SAFETY: nothing else runs any more.
     send(&mut unsafe { Channel::steal() }, &Output::OFF);
     exit(Err(()))
-}
-
-#[panic_handler]
-fn panicked(_: &PanicInfo) -> ! {
-    stop()
-}
-
-#[exception]
-unsafe fn HardFault(_: &ExceptionFrame) -> ! {
-    stop()
 }

@@ -2,8 +2,9 @@
 
 use std::process::ExitCode;
 
+use host_design::campaign::CampaignError;
 use host_design::design::DesignError;
-use host_design::image::ImageError;
+use host_design::image::{ElfError, ImageError, SizeError};
 use host_design::in_the_loop::{RunError, SessionError, TargetError};
 use host_design::rig::RigError;
 use host_design::simulate::{PlotError, SimulationError};
@@ -30,7 +31,15 @@ pub(crate) enum Failure {
     #[error(transparent)]
     Image(#[from] ImageError),
     #[error(transparent)]
+    Elf(#[from] ElfError),
+    #[error(transparent)]
+    Size(#[from] SizeError),
+    #[error("{0}")]
+    NoProgram(&'static str),
+    #[error(transparent)]
     InTheLoop(#[from] RunError),
+    #[error(transparent)]
+    Campaign(#[from] CampaignError),
     #[error(transparent)]
     Plot(#[from] PlotError),
     #[error(transparent)]
@@ -49,10 +58,14 @@ impl Failure {
             Failure::CheckFailed(_) => 1,
             Failure::Rig(error) => error.exit_code(),
             Failure::Design { .. } | Failure::NoTable { .. } | Failure::NoSolution(_) => 3,
-            Failure::Image(ImageError::NoCompiler)
+            Failure::NoProgram(_)
+            | Failure::Image(ImageError::NoCompiler)
             | Failure::InTheLoop(RunError::Session(SessionError::Target(TargetError::NoEmulator))) => 4,
             Failure::InTheLoop(RunError::Session(_)) => 1,
+            Failure::Campaign(_) => 1,
             Failure::Image(_)
+            | Failure::Elf(_)
+            | Failure::Size(_)
             | Failure::InTheLoop(_)
             | Failure::Simulation(_)
             | Failure::Verify(_)

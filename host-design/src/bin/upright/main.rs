@@ -3,6 +3,7 @@
 mod check;
 mod design;
 mod failure;
+mod faults;
 mod firmware;
 mod progress;
 mod simulate;
@@ -37,6 +38,7 @@ struct Arguments {
 enum Command {
     Check(check::Check),
     Design(design::Design),
+    Faults(faults::Faults),
     Firmware(firmware::Firmware),
     Simulate(simulate::Simulate),
     Verify(verify::Verify),
@@ -46,6 +48,7 @@ fn main() -> ExitCode {
     let result = match Arguments::parse().command {
         Command::Check(command) => command.run(),
         Command::Design(command) => command.run(),
+        Command::Faults(command) => command.run(),
         Command::Firmware(command) => command.run(),
         Command::Simulate(command) => command.run(),
         Command::Verify(command) => command.run(),

@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use indicatif::ProgressBar;
+use indicatif::{ProgressBar, ProgressStyle};
 
 /// Runs `work` with a spinner on stderr, if that is a terminal.
 pub(crate) fn with_spinner<T>(message: &'static str, work: impl FnOnce() -> T) -> T {
@@ -10,5 +10,20 @@ pub(crate) fn with_spinner<T>(message: &'static str, work: impl FnOnce() -> T) -
     spinner.enable_steady_tick(Duration::from_millis(120));
     let result = work();
     spinner.finish_and_clear();
+    result
+}
+
+/// Runs `work` with a bar of `steps` on stderr, if that is a terminal; it calls what it is given after each step.
+pub(crate) fn with_bar<T>(
+    message: &'static str,
+    steps: u64,
+    work: impl FnOnce(&(dyn Fn() + Sync)) -> T,
+) -> T {
+    let bar = ProgressBar::new(steps).with_message(message);
+    if let Ok(style) = ProgressStyle::with_template("{msg} {bar:40} {pos}/{len}, {eta} left") {
+        bar.set_style(style);
+    }
+    let result = work(&|| bar.inc(1));
+    bar.finish_and_clear();
     result
 }

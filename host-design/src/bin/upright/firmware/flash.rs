@@ -1,0 +1,54 @@
+//! `upright firmware flash`
+
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+use clap::Args;
+
+use super::{Board, built};
+use crate::failure::Failure;
+
+const PROBE_RS: &str = "probe-rs";
+
+/// Builds the image of a board, writes it to the board with probe-rs, compares what has arrived, and starts it.
+///
+/// The firmware starts disarmed: the motor stays off.
+#[derive(Args)]
+#[command(before_help = "\
+Examples:
+  upright firmware flash                                      with src/gains.rs as it is
+  upright firmware flash rigs/single-quanser-ip02.toml --board stm32f446")]
+pub(crate) struct Flash {
+    /// Rig file (TOML), designed anew [default: the table in src/gains.rs]
+    rig: Option<PathBuf>,
+    /// Microcontroller of the board
+    #[arg(long, value_enum, default_value_t = Board::Stm32f405)]
+    board: Board,
+}
+
+impl Flash {
+    pub(crate) fn run(self) -> Result<(), Failure> {
+        // Before the image is built, which takes longer.
+        if Command::new(PROBE_RS).arg("--version").output().is_err() {
+            return Err(Failure::NoProgram(
+                "probe-rs is missing: install it (https://probe.rs, or `cargo install probe-rs-tools --locked`)",
+            ));
+        }
+        let image = built(self.board.kind(), self.rig.as_deref())?;
+        probe_rs(&["download", "--verify", "--chip", self.board.chip()], Some(&image))?;
+        probe_rs(&["reset", "--chip", self.board.chip()], None)
+    }
+}
+
+/// Its messages and its progress go where they always go.
+fn probe_rs(arguments: &[&str], image: Option<&Path>) -> Result<(), Failure> {
+    let status = Command::new(PROBE_RS).args(arguments).args(image).status()?;
+    if status.success() {
+        Ok(())
+    } else {
+        Err(Failure::CheckFailed(format!(
+            "probe-rs {} ended with {status}; is the probe connected and the board powered?",
+            arguments[0]
+        )))
+    }
+}

@@ -1,0 +1,17 @@
+//! Faults on purpose: the whole firmware in the loop, one defect per run, and what came of it.
+//!
+//! A [`Kind`] of defect has an [`Expected`] outcome; a [`Trial`] is a run with one defect, drawn from the campaign's seed
+//! and its number, so that any of them can be run again alone; [`campaign`] runs many and sums up.
+
+mod attempt;
+mod defect;
+mod injection;
+mod judge;
+mod tally;
+mod trial;
+
+pub use attempt::Place;
+pub use defect::{Expected, Kind, Ticks};
+pub use judge::{Class, Outcome};
+pub use tally::{Campaign, CampaignError, Row, campaign, kinds, one};
+pub use trial::Trial;

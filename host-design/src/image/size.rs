@@ -1,0 +1,165 @@
+//! How large an image is, by section and by the crate whose source a byte comes from.
+
+use std::collections::BTreeMap;
+
+use addr2line::Context;
+use addr2line::gimli::{Dwarf, EndianSlice, LittleEndian, SectionId};
+use object::read::elf::ElfFile32;
+use object::{Object, ObjectSection};
+
+use super::elf::{Image, Item};
+
+/// Most flash that the image of a board may take, in bytes.
+pub const FLASH_LIMIT: u32 = 16 * 1024;
+/// Most static RAM (variables, without the stack) that the image of a board may take, in bytes.
+pub const RAM_LIMIT: u32 = 4 * 1024;
+
+/// Bytes of an image.
+#[derive(Debug, Clone, PartialEq, Eq, serde::Serialize)]
+pub struct Size {
+    /// All in flash, with the initial values of variables.
+    pub flash: u32,
+    /// All variables, without the stack.
+    pub ram: u32,
+    /// By section, in the order of addresses.
+    pub sections: Vec<Part>,
+    /// By crate, the largest first. Code belongs to the crate of its source line, also where it is inlined.
+    pub crates: Vec<Part>,
+}
+
+/// A part of an image, in bytes.
+#[derive(Debug, Clone, Default, PartialEq, Eq, serde::Serialize)]
+pub struct Part {
+    /// A section, a crate, or what belongs to none in parentheses.
+    pub name: String,
+    /// Its bytes in flash.
+    pub flash: u32,
+    /// Its bytes of static RAM.
+    pub ram: u32,
+}
+
+/// Information for debuggers that cannot be read.
+#[derive(Debug, thiserror::Error)]
+#[error("the image's information for debuggers cannot be read: {0}")]
+pub struct SizeError(#[from] addr2line::gimli::Error);
+
+/// Measures an image.
+///
+/// # Errors
+/// [`SizeError`] if the information for debuggers, which says where code comes from, is damaged.
+pub fn size(image: &Image) -> Result<Size, SizeError> {
+    let mut sections: Vec<Part> = Vec::new();
+    for section in &image.sections {
+        let bytes = |counts: bool| if counts { section.bytes } else { 0 };
+        let (flash, ram) = (bytes(section.in_flash), bytes(section.in_ram));
+        sections.push(Part { name: section.name.clone(), flash, ram });
+    }
+    let flash: u32 = sections.iter().map(|part| part.flash).sum();
+    let ram: u32 = sections.iter().map(|part| part.ram).sum();
+
+    let mut shares: BTreeMap<String, Part> = BTreeMap::new();
+    for (name, bytes) in code_by_crate(image)? {
+        shares.entry(name).or_default().flash += bytes;
+    }
+    for item in &image.data {
+        let share = shares.entry(crate_of_symbol(item)).or_default();
+        // Values that variables begin with are few: they count where the variables are.
+        let place = if item.address >= 0x1000_0000 { &mut share.ram } else { &mut share.flash };
+        *place += item.size;
+    }
+    let (counted_flash, counted_ram) =
+        shares.values().fold((0, 0), |(flash, ram), part| (flash + part.flash, ram + part.ram));
+    let rest = shares.entry("(alignment, constants without a name)".to_owned()).or_default();
+    rest.flash += flash.saturating_sub(counted_flash);
+    rest.ram += ram.saturating_sub(counted_ram);
+    let mut crates: Vec<Part> = shares.into_iter().map(|(name, part)| Part { name, ..part }).collect();
+    crates.sort_by_key(|part| std::cmp::Reverse((part.flash, part.ram)));
+    Ok(Size { flash, ram, sections, crates })
+}
+
+/// Bytes of machine code by the crate of their source line.
+fn code_by_crate(image: &Image) -> Result<BTreeMap<String, u32>, SizeError> {
+    // It was read before: it can be parsed.
+    let elf = ElfFile32::<object::Endianness>::parse(&image.bytes[..]).ok();
+    let section = |id: SectionId| {
+        let found = elf.as_ref().and_then(|elf| elf.section_by_name(id.name()));
+        let data = found.and_then(|section| section.data().ok()).unwrap_or_default();
+        Ok::<_, addr2line::gimli::Error>(EndianSlice::new(data, LittleEndian))
+    };
+    let context = Context::from_dwarf(Dwarf::load(section)?)?;
+    let mut crates = BTreeMap::new();
+    for function in &image.functions {
+        let (begin, end) = (u64::from(function.address), u64::from(function.address + function.size));
+        let mut located = 0;
+        for (address, length, location) in context.find_location_range(begin, end)? {
+            let (from, to) = (address.max(begin), (address + length).min(end));
+            let bytes = to.saturating_sub(from) as u32;
+            located += bytes;
+            *crates.entry(crate_of_file(location.file.unwrap_or_default())).or_default() += bytes;
+        }
+        // Assembly, which has no lines.
+        *crates.entry(crate_of_symbol(function)).or_default() += function.size.saturating_sub(located);
+    }
+    crates.retain(|_, bytes| *bytes > 0);
+    Ok(crates)
+}
+
+/// The crate of a source file: a folder of cargo's registry, of Rust's library, or this project.
+fn crate_of_file(path: &str) -> String {
+    let folders: Vec<&str> = path.split(['/', '\\']).collect();
+    let after = |name: &str| {
+        let at = folders.iter().rposition(|folder| *folder == name)?;
+        Some(&folders[at + 1..])
+    };
+    if let Some([_, package, ..]) = after("registry").and_then(|rest| rest.strip_prefix(&["src"])) {
+        let version = package.match_indices('-').find(|(at, _)| {
+            package[at + 1..].starts_with(|first: char| first.is_ascii_digit())
+                && package[*at..].contains('.')
+        });
+        return version.map_or(*package, |(at, _)| &package[..at]).to_owned();
+    }
+    match after("library") {
+        Some([name, ..]) => name.replace('-', "_"),
+        _ if path.is_empty() => "(assembly)".to_owned(),
+        _ => "upright".to_owned(),
+    }
+}
+
+/// The crate of a function or variable by its path.
+fn crate_of_symbol(item: &Item) -> String {
+    let path = item.name.trim_start_matches(['<', '&', '(']);
+    match path.split_once("::") {
+        Some(("upright_image", _)) => "upright".to_owned(),
+        Some((name, _)) => name.to_owned(),
+        None if item.name.starts_with("__INTERRUPTS")
+            || item.name.starts_with("__EXCEPTIONS")
+            || item.name.starts_with("__RESET_VECTOR") =>
+        {
+            "(vector table)".to_owned()
+        }
+        None if item.name.starts_with(".L") => "(alignment, constants without a name)".to_owned(),
+        None => "(assembly and names of C)".to_owned(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::crate_of_file;
+
+    #[test]
+    fn a_source_file_belongs_to_its_package() {
+        for (path, name) in [
+            (
+                "/home/me/.cargo/registry/src/index.crates.io-1949cf8c6b5b557f/nalgebra-0.35.0/src/base/ops.rs",
+                "nalgebra",
+            ),
+            ("/x/registry/src/index.crates.io-1/cortex-m-rt-0.7.5/src/lib.rs", "cortex-m-rt"),
+            ("/x/registry/src/index.crates.io-1/stm32f4xx-hal-0.23.0/src/lib.rs", "stm32f4xx-hal"),
+            ("/rustc/59807616e1fa/library/core/src/slice/mod.rs", "core"),
+            ("/usr/lib/rustlib/src/rust/library/compiler-builtins/src/mem.rs", "compiler_builtins"),
+            ("/home/me/upright/src/controller.rs", "upright"),
+        ] {
+            assert_eq!(crate_of_file(path), name);
+        }
+    }
+}

@@ -1,0 +1,251 @@
+//! A bound on the stack, from the machine code: what functions push, whom they call, and which handlers interrupt.
+//!
+//! It holds for every compiler and every input, because it takes every branch: a function costs the sum of everything it
+//! ever pushes, and every handler of the vector table is taken to interrupt in the deepest place of all others.
+
+use super::elf::Image;
+use super::thumb::{Effect, decode, is_wide};
+
+/// What the processor pushes when it takes an exception (Armv7-M Architecture Reference Manual, B1.5.7): 8 words, 18 of
+/// the floating-point unit, and one to align; bytes.
+const EXCEPTION_FRAME: u32 = 108;
+
+/// The stack that an image can need at most.
+#[derive(Debug, Clone, PartialEq, Eq, serde::Serialize)]
+pub struct StackBound {
+    /// All levels on top of each other, in bytes.
+    pub bytes: u32,
+    /// What memory.x reserves, in bytes.
+    pub reserved: u32,
+    /// The program and each handler.
+    pub levels: Vec<StackLevel>,
+}
+
+/// The program from its start, or a handler.
+#[derive(Debug, Clone, PartialEq, Eq, serde::Serialize)]
+pub struct StackLevel {
+    /// The deepest chain of calls, from the first function.
+    pub chain: Vec<String>,
+    /// Its stack with the frame that the processor pushes, in bytes.
+    pub bytes: u32,
+}
+
+/// Code whose stack has no bound that could be found.
+#[derive(Debug, thiserror::Error, PartialEq, Eq)]
+pub enum StackError {
+    /// A function that calls itself, perhaps through others.
+    #[error("no bound on the stack: {0} calls itself")]
+    Recursion(String),
+    /// A call through a pointer.
+    #[error("no bound on the stack: {function} calls what a pointer says, at {address:#010x}")]
+    Indirect {
+        /// Who.
+        function: String,
+        /// Where.
+        address: u32,
+    },
+    /// An array of a size that is not constant.
+    #[error("no bound on the stack: {function} moves the stack pointer by a variable, at {address:#010x}")]
+    Variable {
+        /// Who.
+        function: String,
+        /// Where.
+        address: u32,
+    },
+    /// A call of something that is no function.
+    #[error("{function} calls {target:#010x}, where no function is")]
+    Nowhere {
+        /// Who.
+        function: String,
+        /// What.
+        target: u32,
+    },
+}
+
+/// What one function does.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+struct Node {
+    name: String,
+    /// Bytes that it pushes itself.
+    frame: u32,
+    /// Indices of those that it calls.
+    calls: Vec<usize>,
+}
+
+/// Bounds the stack of an image.
+///
+/// # Errors
+/// [`StackError`] if functions call each other in a circle or through pointers.
+pub fn stack_bound(image: &Image) -> Result<StackBound, StackError> {
+    let nodes = reachable(image)?;
+    let mut levels: Vec<StackLevel> = Vec::new();
+    let mut entries: Vec<(usize, u32)> = Vec::new();
+    for (number, address) in &image.vectors {
+        let frame = if *number == 1 { 0 } else { EXCEPTION_FRAME };
+        let function = index_of(image, "the vector table", *address)?;
+        if !entries.contains(&(function, frame)) {
+            entries.push((function, frame));
+        }
+    }
+    for (function, frame) in entries {
+        let (bytes, chain) = deepest(&nodes, function)?;
+        levels.push(StackLevel { chain, bytes: bytes + frame });
+    }
+    let bytes = levels.iter().map(|level| level.bytes).sum();
+    Ok(StackBound { bytes, reserved: image.stack_reserved, levels })
+}
+
+fn index_of(image: &Image, caller: &str, target: u32) -> Result<usize, StackError> {
+    image.function_at(target).ok_or_else(|| StackError::Nowhere { function: caller.to_owned(), target })
+}
+
+/// All functions of the image; those that no handler reaches are empty.
+fn reachable(image: &Image) -> Result<Vec<Node>, StackError> {
+    let mut nodes = vec![None; image.functions.len()];
+    let mut waiting = Vec::new();
+    for (_, address) in &image.vectors {
+        waiting.push(index_of(image, "the vector table", *address)?);
+    }
+    while let Some(index) = waiting.pop() {
+        if nodes[index].is_none() {
+            let node = node(image, index)?;
+            waiting.extend(&node.calls);
+            nodes[index] = Some(node);
+        }
+    }
+    Ok(nodes.into_iter().map(Option::unwrap_or_default).collect())
+}
+
+/// Each instruction of a piece of code with its address.
+fn effects(image: &Image, index: usize) -> Vec<(u32, Effect)> {
+    let mut effects = Vec::new();
+    for code in image.code(&image.functions[index]) {
+        let mut place = 0;
+        while let Some(&first) = code.halfwords.get(place) {
+            let address = code.address + 2 * place as u32;
+            let second = code.halfwords.get(place + 1).copied().unwrap_or_default();
+            effects.push((address, decode(address, first, second)));
+            place += 1 + usize::from(is_wide(first));
+        }
+    }
+    effects
+}
+
+fn node(image: &Image, index: usize) -> Result<Node, StackError> {
+    let name = image.functions[index].name.clone();
+    let mut node = Node { name: name.clone(), ..Node::default() };
+    let effects = effects(image, index);
+    for (place, &(address, effect)) in effects.iter().enumerate() {
+        match effect {
+            Effect::Grow(bytes) => node.frame += bytes,
+            Effect::Call(target) => node.calls.push(index_of(image, &name, target)?),
+            Effect::Jump(target) => {
+                let other = index_of(image, &name, target)?;
+                if other != index {
+                    node.calls.push(other);
+                }
+            }
+            // A table of branches, each of which is looked at as well.
+            Effect::JumpTo(register) if before(&effects, place).contains(&Effect::Near(register)) => {}
+            Effect::Indirect | Effect::JumpTo(_) => {
+                return Err(StackError::Indirect { function: name, address });
+            }
+            Effect::FromRegister(register) => {
+                let growth = growth(image, &effects, place, register);
+                node.frame += growth.ok_or(StackError::Variable { function: name.clone(), address })?;
+            }
+            Effect::Unknown => return Err(StackError::Variable { function: name, address }),
+            Effect::Aligned(..)
+            | Effect::FromFrame(_)
+            | Effect::Near(_)
+            | Effect::Literal(..)
+            | Effect::None => {}
+        }
+    }
+    node.calls.sort_unstable();
+    node.calls.dedup();
+    Ok(node)
+}
+
+/// The few instructions before one.
+fn before(effects: &[(u32, Effect)], place: usize) -> Vec<Effect> {
+    effects[place.saturating_sub(5)..place].iter().map(|(_, effect)| *effect).collect()
+}
+
+/// How much the stack grows, at most, when its pointer becomes this register's value; nothing if that cannot be told.
+fn growth(image: &Image, effects: &[(u32, Effect)], place: usize, register: u8) -> Option<u32> {
+    // r7 is the frame pointer: it gives back what was taken.
+    if register == 7 {
+        return Some(0);
+    }
+    before(effects, place).into_iter().rev().find_map(|effect| match effect {
+        Effect::Aligned(aligned, bytes) if aligned == register => Some(bytes),
+        Effect::FromFrame(from) if from == register => Some(0),
+        // A fault's handler begins the stack anew.
+        Effect::Literal(loaded, at)
+            if loaded == register && image.word_in_code(at) == Some(image.stack_start) =>
+        {
+            Some(0)
+        }
+        _ => None,
+    })
+}
+
+/// The deepest chain of calls from a function: bytes and names.
+fn deepest(nodes: &[Node], from: usize) -> Result<(u32, Vec<String>), StackError> {
+    fn walk(
+        nodes: &[Node],
+        index: usize,
+        path: &mut Vec<usize>,
+        known: &mut [Option<(u32, Option<usize>)>],
+    ) -> Result<u32, StackError> {
+        if let Some((bytes, _)) = known[index] {
+            return Ok(bytes);
+        }
+        if path.contains(&index) {
+            return Err(StackError::Recursion(nodes[index].name.clone()));
+        }
+        path.push(index);
+        let (mut below, mut next) = (0, None);
+        for &called in &nodes[index].calls {
+            let bytes = walk(nodes, called, path, known)?;
+            if next.is_none() || bytes > below {
+                (below, next) = (bytes, Some(called));
+            }
+        }
+        path.pop();
+        let bytes = nodes[index].frame + below;
+        known[index] = Some((bytes, next));
+        Ok(bytes)
+    }
+    let mut known = vec![None; nodes.len()];
+    let bytes = walk(nodes, from, &mut Vec::new(), &mut known)?;
+    let mut chain = vec![nodes[from].name.clone()];
+    let mut index = from;
+    while let Some((_, Some(next))) = known[index] {
+        chain.push(nodes[next].name.clone());
+        index = next;
+    }
+    Ok((bytes, chain))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{Node, StackError, deepest};
+
+    fn node(name: &str, frame: u32, calls: &[usize]) -> Node {
+        Node { name: name.to_owned(), frame, calls: calls.to_vec() }
+    }
+
+    #[test]
+    fn the_deepest_chain_counts_and_not_the_longest() {
+        let nodes = [node("a", 8, &[1, 3]), node("b", 4, &[2]), node("c", 4, &[]), node("d", 100, &[])];
+        assert_eq!(deepest(&nodes, 0).unwrap(), (108, vec!["a".to_owned(), "d".to_owned()]));
+    }
+
+    #[test]
+    fn functions_that_call_each_other_have_no_bound() {
+        let nodes = [node("a", 8, &[1]), node("b", 4, &[2]), node("c", 4, &[1])];
+        assert_eq!(deepest(&nodes, 0), Err(StackError::Recursion("b".to_owned())));
+    }
+}

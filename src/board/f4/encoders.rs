@@ -1,0 +1,64 @@
+//! Incremental encoders, counted by timers.
+
+use stm32f4xx_hal::pac::{RCC, TIM2, TIM3, TIM4, TIM5, TIM8};
+use upright::encoder::CounterWidth::{self, Bits16, Bits32};
+use upright::gains::SENSORS;
+
+/// Cart first, then the links from the lowest; a rig with fewer sensors uses the first ones.
+const TIMERS: [(*const u32, CounterWidth); 5] = [
+    (TIM2::PTR.cast(), Bits32),
+    (TIM5::PTR.cast(), Bits32),
+    (TIM3::PTR.cast(), Bits16),
+    (TIM4::PTR.cast(), Bits16),
+    (TIM8::PTR.cast(), Bits16),
+];
+
+/// Widths of the counters in use.
+pub(super) const WIDTHS: [CounterWidth; SENSORS] = {
+    assert!(SENSORS <= TIMERS.len(), "this board counts at most five encoders");
+    let mut widths = [Bits16; SENSORS];
+    let mut i = 0;
+    while i < SENSORS {
+        widths[i] = TIMERS[i].1;
+        i += 1;
+    }
+    widths
+};
+
+// Offsets of registers, the same in all these timers (RM0090, 17.4 and 18.4).
+const CR1: usize = 0x00;
+const SMCR: usize = 0x08;
+const CCMR1: usize = 0x18;
+const CNT: usize = 0x24;
+const ARR: usize = 0x2c;
+
+/// Starts the counters in use at 0.
+pub(super) fn set_up(rcc: &RCC) {
+    rcc.apb1enr()
+        .modify(|_, w| w.tim2en().set_bit().tim3en().set_bit().tim4en().set_bit().tim5en().set_bit());
+    rcc.apb2enr().modify(|_, w| w.tim8en().set_bit());
+    for &(timer, _) in TIMERS.iter().take(SENSORS) {
+        let write = |offset, value: u32| {
+            // SAFETY: a register of this timer, which nothing else uses.
+            unsafe { timer.byte_add(offset).cast_mut().write_volatile(value) };
+        };
+        // Both inputs straight to their channels, each level confirmed by eight samples of the timer's clock (48 ns or
+        // 95 ns): shorter is noise (RM0090, 18.4.7: CCxS = 01, ICxF = 0011).
+        write(CCMR1, 0x3131);
+        // Encoder mode 3: every edge of both inputs counts (RM0090, 18.3.12).
+        write(SMCR, 3);
+        // The upper half of it does not exist in a counter of 16 bits.
+        write(ARR, u32::MAX);
+        write(CR1, 1);
+    }
+}
+
+/// The counters.
+pub(super) fn counts() -> [u32; SENSORS] {
+    let mut counts = [0; SENSORS];
+    for (count, &(timer, _)) in counts.iter_mut().zip(&TIMERS) {
+        // SAFETY: reading a counter has no effect.
+        *count = unsafe { timer.byte_add(CNT).read_volatile() };
+    }
+    counts
+}

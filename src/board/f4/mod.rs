@@ -1,0 +1,143 @@
+//! Boards with an STM32F405, STM32F407 or STM32F446.
+
+mod clock;
+mod encoders;
+mod motor;
+mod pins;
+mod serial;
+mod supply;
+mod watchdog;
+mod wiring;
+
+use core::mem::MaybeUninit;
+
+use cortex_m::peripheral::{DWT, SYST};
+use heapless::spsc::{Consumer, Producer};
+use stm32f4xx_hal::pac::{EXTI, Peripherals};
+use upright::encoder::CounterWidth;
+use upright::gains::SENSORS;
+use upright::io::{Board, Contacts, Inputs, Output};
+use upright::message::Reset;
+
+pub(crate) use clock::CLOCK_HZ;
+use motor::Motor;
+pub(crate) use serial::{Line, Receiver};
+use supply::Supply;
+use watchdog::Watchdog;
+
+/// The pins and peripherals of the control task.
+pub(crate) struct Hardware {
+    motor: Motor,
+    supply: Supply,
+    exti: EXTI,
+    watchdog: Watchdog,
+    clock_fault: bool,
+    overrun: bool,
+}
+
+/// Turns everything on, motor off. Takes 150 ms at most, whatever does not answer.
+pub(crate) fn set_up(
+    device: Peripherals,
+    bytes: (Producer<'static, u8>, Consumer<'static, u8>),
+) -> (Hardware, Receiver, Line, Reset) {
+    let rcc = &device.RCC;
+    pins::set_up(rcc, &device.SYSCFG, &device.EXTI);
+    let motor = Motor::set_up(rcc, device.TIM1);
+    let reset = clock::reset_reason(rcc, take_crash());
+    let clock = clock::set_up(rcc, &device.FLASH);
+    encoders::set_up(rcc);
+    let supply = Supply::set_up(rcc, device.ADC1, &device.ADC_COMMON);
+    let (Ok(bus_hz) | Err(bus_hz)) = clock;
+    let (receiver, line) = serial::set_up(rcc, device.USART2, bus_hz, bytes);
+    // SAFETY: the tick's timer is RTIC's, and stays untouched; nobody else wants these two.
+    let mut core = unsafe { cortex_m::Peripherals::steal() };
+    core.DCB.enable_trace();
+    core.DWT.enable_cycle_counter();
+    pins::light(clock.is_ok());
+    // What was noticed while the pull-ups rose does not count.
+    let _ = (motor.was_stopped(), pins::driver_fault_was_reported(&device.EXTI));
+    let hardware = Hardware {
+        motor,
+        supply,
+        exti: device.EXTI,
+        watchdog: Watchdog::new(device.IWDG),
+        clock_fault: clock.is_err(),
+        overrun: false,
+    };
+    (hardware, receiver, line, reset)
+}
+
+impl Board<SENSORS> for Hardware {
+    const WIDTHS: [CounterWidth; SENSORS] = encoders::WIDTHS;
+
+    fn inputs(&mut self) -> Inputs<SENSORS> {
+        let counts = encoders::counts();
+        // Forgets that this tick was due.
+        let _ = tick_is_due();
+        let levels = pins::Levels::read();
+        Inputs {
+            counts,
+            supply_v: self.supply.volts(),
+            contacts: Contacts {
+                limit_low: levels.limit_low(),
+                limit_high: levels.limit_high(),
+                emergency_stop: self.motor.was_stopped() | levels.emergency_stop(),
+                driver_fault: pins::driver_fault_was_reported(&self.exti) | levels.driver_fault(),
+                overrun: self.overrun,
+                clock_fault: self.clock_fault,
+            },
+        }
+    }
+
+    fn drive(&mut self, output: &Output) {
+        self.motor.drive(output);
+    }
+
+    /// Only a tick that ends before the next one is due is healthy. On the slow oscillator, ticks come too late for the
+    /// watchdog; the motor stays off there anyway.
+    fn feed_watchdog(&mut self) {
+        self.overrun = tick_is_due();
+        if !self.overrun && !self.clock_fault {
+            self.watchdog.feed();
+        }
+    }
+
+    fn cycles(&self) -> u32 {
+        DWT::cycle_count()
+    }
+}
+
+/// Whether the tick's timer has come to its end since the last call.
+fn tick_is_due() -> bool {
+    // SAFETY: after the start, the control task is the only one that reads this register, which clears the flag.
+    unsafe { (*SYST::PTR).csr.read() & 1 << 16 != 0 }
+}
+
+/// Says after the watchdog's reset that it was a panic or a processor fault: not initialised, and so it survives.
+#[unsafe(link_section = ".uninit.CRASH")]
+static mut CRASH: MaybeUninit<u32> = MaybeUninit::uninit();
+const CRASHED: u32 = 0x5afe_0ff5;
+
+/// Whether the firmware has crashed; forgets it.
+fn take_crash() -> bool {
+    let cell = (&raw mut CRASH).cast::<u32>();
+    // SAFETY: nothing else runs yet; what the memory holds after power-on is read as it is, and means nothing else.
+    unsafe {
+        let crashed = cell.read_volatile() == CRASHED;
+        cell.write_volatile(0);
+        crashed
+    }
+}
+
+/// Motor off, for good: the watchdog, if it runs already, resets the microcontroller.
+pub(crate) fn stop() -> ! {
+    // SAFETY: nothing else runs any more.
+    unsafe {
+        motor::off(&Peripherals::steal().TIM1);
+        (&raw mut CRASH).cast::<u32>().write_volatile(CRASHED);
+    }
+    pins::light(false);
+    loop {
+        cortex_m::asm::nop();
+    }
+}

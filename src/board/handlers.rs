@@ -1,0 +1,35 @@
+//! The ends: panics and processor faults. Both turn the motor off.
+
+use core::arch::global_asm;
+use core::panic::PanicInfo;
+
+use super::stop;
+
+#[panic_handler]
+fn panicked(_: &PanicInfo) -> ! {
+    crashed()
+}
+
+/// With interrupts off, so that the tick cannot turn the motor on again.
+extern "C" fn crashed() -> ! {
+    cortex_m::interrupt::disable();
+    stop()
+}
+
+// After a stack overflow, the stack pointer is below the memory, and whatever pushes a register faults again, which locks
+// the core up. So the stack begins anew before the first push.
+global_asm!(
+    ".section .HardFault.entry, \"ax\"",
+    ".global HardFault",
+    ".type HardFault, %function",
+    ".thumb_func",
+    "HardFault:",
+    "ldr r0, =_stack_start",
+    "mov sp, r0",
+    "b {crashed}",
+    ".size HardFault, . - HardFault",
+    // All other exceptions that nobody expects.
+    ".global DefaultHandler",
+    ".thumb_set DefaultHandler, HardFault",
+    crashed = sym crashed,
+);
