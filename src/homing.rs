@@ -90,6 +90,7 @@ mod tests {
         emergency_stop: false,
         driver_fault: false,
         overrun: false,
+        clock_fault: false,
     };
 
     /// The cart pushed along these counts, with the switches closing at `low` and below, `high` and above.

@@ -81,6 +81,7 @@ mod tests {
             emergency_stop: false,
             driver_fault: false,
             overrun: false,
+            clock_fault: false,
         },
     };
 

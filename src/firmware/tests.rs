@@ -23,6 +23,7 @@ const INPUTS: Inputs<SENSORS> = Inputs {
         emergency_stop: false,
         driver_fault: false,
         overrun: false,
+        clock_fault: false,
     },
 };
 
