@@ -3,8 +3,9 @@
 use std::process::ExitCode;
 
 use host_design::design::DesignError;
+use host_design::figure::FigureError;
 use host_design::rig::RigError;
-use host_design::simulate::{PlotError, SimulationError};
+use host_design::simulate::SimulationError;
 use host_design::table::{NoTable, WriteError};
 use host_design::verify::{Unverifiable, VerifyError};
 
@@ -26,7 +27,7 @@ pub(crate) enum Failure {
     #[error(transparent)]
     Unverifiable(#[from] Unverifiable),
     #[error(transparent)]
-    Plot(#[from] PlotError),
+    Figure(#[from] FigureError),
     #[error(transparent)]
     Write(#[from] WriteError),
     #[error("the output cannot be written: {0}")]
@@ -46,7 +47,7 @@ impl Failure {
             Failure::Simulation(_)
             | Failure::Verify(_)
             | Failure::Unverifiable(_)
-            | Failure::Plot(_)
+            | Failure::Figure(_)
             | Failure::Write(_)
             | Failure::Output(_)
             | Failure::BadArgument(_) => 2,
