@@ -12,6 +12,8 @@ mod png;
 mod scale;
 mod theme;
 
+pub(crate) use png::pixels;
+
 pub use draw::{Drawing, PlotArea};
 pub use heat::HeatMap;
 

@@ -4,6 +4,7 @@ use std::process::ExitCode;
 
 use host_design::design::DesignError;
 use host_design::figure::FigureError;
+use host_design::report::ReportError;
 use host_design::rig::RigError;
 use host_design::simulate::SimulationError;
 use host_design::table::{NoTable, WriteError};
@@ -29,6 +30,8 @@ pub(crate) enum Failure {
     #[error(transparent)]
     Figure(#[from] FigureError),
     #[error(transparent)]
+    Report(#[from] ReportError),
+    #[error(transparent)]
     Write(#[from] WriteError),
     #[error("the output cannot be written: {0}")]
     Output(#[from] std::io::Error),
@@ -48,6 +51,7 @@ impl Failure {
             | Failure::Verify(_)
             | Failure::Unverifiable(_)
             | Failure::Figure(_)
+            | Failure::Report(_)
             | Failure::Write(_)
             | Failure::Output(_)
             | Failure::BadArgument(_) => 2,

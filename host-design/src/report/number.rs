@@ -1,0 +1,47 @@
+//! Numbers for reading.
+
+/// `digits` significant digits, with a power of ten for what is very large or very small.
+pub(super) fn significant(x: f64, digits: usize) -> String {
+    if x == 0.0 {
+        return "0".to_owned();
+    }
+    let rounded: f64 = format!("{x:.*e}", digits - 1).parse().unwrap_or(x);
+    if (1e-4..1e6).contains(&rounded.abs()) {
+        return minus(rounded.to_string());
+    }
+    let text = format!("{rounded:e}");
+    minus(text.replace('e', "·10^"))
+}
+
+/// Three significant digits.
+pub(super) fn number(x: f64) -> String {
+    significant(x, 3)
+}
+
+/// A complex number.
+pub(super) fn complex([re, im]: [f64; 2], digits: usize) -> String {
+    if im == 0.0 {
+        return significant(re, digits);
+    }
+    format!("{} ± {}i", significant(re, digits), significant(im.abs(), digits))
+}
+
+/// With a typographic minus sign.
+fn minus(text: String) -> String {
+    text.replace('-', "−")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_are_rounded_to_significant_digits() {
+        assert_eq!(number(1234.5), "1230");
+        assert_eq!(number(-0.012345), "−0.0123");
+        assert_eq!(number(1.5e-9), "1.5·10^−9");
+        assert_eq!(number(1e-75), "1·10^−75");
+        assert_eq!(number(0.0), "0");
+        assert_eq!(complex([0.5, -0.25], 3), "0.5 ± 0.25i");
+    }
+}
