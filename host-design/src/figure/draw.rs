@@ -7,7 +7,7 @@ use plotters::style::text_anchor::{HPos, Pos, VPos};
 use super::legend::{Entry, Key, SAMPLE, entries};
 use super::path::Map;
 use super::scale::Scale;
-use super::theme::{COLOURS, FINE, HEAT, LIMIT, LINE, MARKER, REFERENCE, THIN, WIDE, dashed};
+use super::theme::{COLOURS, FINE, HEAT, LIMIT, LINE, MARKER, REFERENCE, THIN, WIDE, finished};
 use super::{Figure, FigureError, Panel, Style};
 
 type Area<'a> = DrawingArea<SVGBackend<'a>, Shift>;
@@ -90,7 +90,7 @@ impl Figure {
             format!("width=\"{}\" height=\"{}\"", view[0], view[1]),
             format!("width=\"{}\" height=\"{}\"", size[0], size[1]),
         );
-        Ok(Drawing { svg: dashed(&svg.replacen(&fine_size, &real_size, 1)), size: view, panels })
+        Ok(Drawing { svg: finished(&svg.replacen(&fine_size, &real_size, 1)), size: view, panels })
     }
 
     fn layout(&self, panel: &Panel, top: f64, describes_x: bool) -> Result<Layout, FigureError> {
@@ -118,8 +118,8 @@ impl Figure {
             below,
             entries,
             describes_x,
-            x: Scale::of(&panel.x, x, ticks(width, 4.6))?,
-            y: Scale::of(&panel.y, y, ticks(height, 2.0))?,
+            x: Scale::of(&panel.x, x, ticks(width, 3.4))?,
+            y: Scale::of(&panel.y, y, ticks(height, 1.7))?,
         })
     }
 

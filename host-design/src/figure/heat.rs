@@ -30,7 +30,8 @@ impl HeatMap {
     /// Upper end of each colour.
     pub(super) fn classes(&self) -> [f64; HEAT.len()] {
         let largest = self.values.iter().flatten().flatten().copied().fold(0.0, f64::max);
-        core::array::from_fn(|class| largest * (class + 1) as f64 / HEAT.len() as f64)
+        let step = round_up(largest / HEAT.len() as f64);
+        core::array::from_fn(|class| step * (class + 1) as f64)
     }
 
     /// Rectangles of one colour: class, `[left, right]`, `[bottom, top]`. Neighbours in a row are joined.
@@ -52,6 +53,16 @@ impl HeatMap {
         }
         rectangles
     }
+}
+
+/// The next number of one digit, or 1.5 or 2.5, times a power of ten.
+fn round_up(x: f64) -> f64 {
+    if x <= 0.0 {
+        return 1.0;
+    }
+    let power = 10f64.powf(x.log10().floor());
+    let digits = [1.0, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0, 9.0];
+    digits.into_iter().map(|digit| digit * power).find(|round| *round >= x).unwrap_or(10.0 * power)
 }
 
 fn spacing(centres: &[f64]) -> f64 {

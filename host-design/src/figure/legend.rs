@@ -24,17 +24,29 @@ pub(super) enum Key {
 pub(super) const SAMPLE: f64 = 26.0;
 
 /// All entries of a panel, and the height they take (px).
+///
+/// A limit beyond the panel is named all the same.
 pub(super) fn entries(figure: &Figure, panel: &Panel, from: f64) -> (Vec<Entry>, f64) {
     let mut keys: Vec<(Key, String)> = Vec::new();
     if let Some(heat) = &panel.heat {
         keys.push((Key::Nothing, heat.name.clone()));
         for (end, colour) in heat.classes().into_iter().zip(HEAT) {
-            keys.push((Key::Fill(colour.into()), format!("{end:.2} {}", heat.unit)));
+            // Without the digits that a sum of decimals leaves behind.
+            let end: f64 = format!("{end:.3e}").parse().unwrap_or(end);
+            keys.push((Key::Fill(colour.into()), format!("{end} {}", heat.unit)));
         }
         keys.push((Key::Nothing, "blank: not at all".to_owned()));
     }
     let named = panel.curves.iter().filter(|curve| !curve.name.is_empty());
-    keys.extend(named.map(|curve| (Key::Curve(curve.style), curve.name.clone())));
+    let [low, high] = panel.y_range();
+    keys.extend(named.map(|curve| {
+        let seen = curve.points.iter().any(|point| (low..=high).contains(&point[1]));
+        if curve.style == Style::Limit && !seen {
+            (Key::Nothing, format!("{}: beyond", curve.name))
+        } else {
+            (Key::Curve(curve.style), curve.name.clone())
+        }
+    }));
 
     let line = 1.45 * figure.text;
     let (mut left, mut middle) = (from, 0.5 * line + 2.0);

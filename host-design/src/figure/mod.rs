@@ -120,14 +120,17 @@ impl Figure {
         self
     }
 
-    /// Gives the panels of the same number in all `figures` the same vertical range, so that their curves can be compared.
+    /// Gives the panels of the same number in all `figures` the same ranges, so that their curves can be compared.
     pub fn same_scale(figures: &mut [Figure]) {
         let panels = figures.iter().map(|figure| figure.panels.len()).max().unwrap_or(0);
         for index in 0..panels {
-            let ranges = figures.iter().filter_map(|figure| figure.panels.get(index)).map(Panel::y_range);
-            let common = ranges.reduce(|a, b| [a[0].min(b[0]), a[1].max(b[1])]);
+            let common = |range: fn(&Panel) -> [f64; 2]| {
+                let ranges = figures.iter().filter_map(|figure| figure.panels.get(index)).map(range);
+                ranges.reduce(|a, b| [a[0].min(b[0]), a[1].max(b[1])])
+            };
+            let (x, y) = (common(Panel::x_range), common(Panel::y_range));
             for panel in figures.iter_mut().filter_map(|figure| figure.panels.get_mut(index)) {
-                panel.y.range = common;
+                (panel.x.range, panel.y.range) = (x, y);
             }
         }
     }

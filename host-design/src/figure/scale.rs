@@ -23,7 +23,9 @@ impl Panel {
     /// The range of the axis to the right.
     pub(super) fn x_range(&self) -> [f64; 2] {
         let heat = self.heat.as_ref().map(|heat| heat.x_range());
-        self.x.range.or(heat).unwrap_or_else(|| around(&self.x, &self.curves, 0, 0.01))
+        let has_markers = self.curves.iter().any(|curve| matches!(curve.style, Style::Markers(_)));
+        let margin = if has_markers { 0.06 } else { 0.01 };
+        self.x.range.or(heat).unwrap_or_else(|| around(&self.x, &self.curves, 0, margin))
     }
 
     /// The range of the axis upwards.
@@ -93,7 +95,9 @@ impl Ranged for Scale {
         let decades = high.log10() - low.log10();
         let factors: &[f64] = if decades < 2.5 { &[1.0, 2.0, 5.0] } else { &[1.0] };
         let every = (decades / self.ticks as f64).ceil().max(1.0) as usize;
-        let powers = (low.log10().floor() as i32..=high.log10().ceil() as i32).step_by(every);
+        // 1 is a tick wherever it is on the axis.
+        let first = (low.log10().floor() as i32).div_euclid(every as i32) * every as i32;
+        let powers = (first..=high.log10().ceil() as i32).step_by(every);
         let points = powers.flat_map(|power| factors.iter().map(move |factor| factor * 10f64.powi(power)));
         points.filter(|point| (low..=high).contains(point)).collect()
     }

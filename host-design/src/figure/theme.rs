@@ -36,8 +36,9 @@ pub(super) const THIN: u32 = FINE + 1;
 /// Width of a cross; of no other line.
 pub(super) const MARKER: u32 = 2 * FINE - 1;
 
-/// Puts the dashes into a document: the drawing library has no dashed line in one piece, but every colour has one dash.
-pub(super) fn dashed(svg: &str) -> String {
+/// Puts into a document what the drawing library has no word for: dashed lines in one piece (every colour has one dash),
+/// and cells of a map that join without a seam.
+pub(super) fn finished(svg: &str) -> String {
     let mut svg = svg.to_owned();
     let lines = COLOURS.iter().zip(DASHES).map(|(colour, dash)| (colour, LINE, dash));
     for (colour, width, dash) in lines.chain([(&LIMIT, THIN, LIMIT_DASH)]) {
@@ -47,6 +48,10 @@ pub(super) fn dashed(svg: &str) -> String {
         let stroke = format!("stroke=\"{}\" stroke-width=\"{width}\"", hex(*colour));
         let dash: Vec<String> = dash.iter().map(|length| (length * FINE).to_string()).collect();
         svg = svg.replace(&stroke, &format!("{stroke} stroke-dasharray=\"{}\"", dash.join(" ")));
+    }
+    for colour in &HEAT {
+        let fill = format!("fill=\"{}\"", hex(*colour));
+        svg = svg.replace(&fill, &format!("{fill} shape-rendering=\"crispEdges\""));
     }
     svg
 }

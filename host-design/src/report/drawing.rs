@@ -12,7 +12,7 @@ const CHAIN: f64 = 300.0;
 /// Height of the ground line (px from the top).
 const GROUND: f64 = 400.0;
 /// Where the chain stands (px from the left).
-const MIDDLE: f64 = 130.0;
+const MIDDLE: f64 = 170.0;
 /// Height of the cart (px).
 const CART: f64 = 34.0;
 
@@ -59,13 +59,8 @@ fn draw(out: &mut String, chain: &Chain) -> core::fmt::Result {
         )?;
         dot(out, [MIDDLE, at], 2.0, "#000000")?;
         line(out, [MIDDLE + 12.0, 0.5 * (from + to)], [MIDDLE + 60.0, label - 4.0], "#5A5A5A", 1.0)?;
-        let name = format!(
-            "link {}: {} mm, {} kg, centre of mass at {} mm",
-            index + 1,
-            number(1e3 * link.length_m),
-            number(link.mass_kg),
-            number(1e3 * centre)
-        );
+        let name =
+            format!("link {}: {} mm, {} kg", index + 1, number(1e3 * link.length_m), number(link.mass_kg));
         text(out, [MIDDLE + 66.0, label], &name)?;
         bottom += link.length_m;
         free = to;

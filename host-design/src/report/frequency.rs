@@ -28,22 +28,26 @@ impl Point {
     }
 }
 
-/// Bode and Nyquist plot of a stable loop with its margins marked; none for an unstable one.
+/// Bode plots and Nyquist plots of all stable loops, with their margins marked.
 pub(super) fn figures(
     rig: &Rig,
     certified: &Certified,
     table: &TableValues,
-    law: Law,
-    report: &LinearReport,
-) -> Option<[Figure; 2]> {
-    let margins = report.margins.as_ref()?;
-    let model = LoopModel::<f64>::as_it_runs(certified, table, law)?;
-    let points = sweep(&model, report, rig.tick.period_s);
-    let title = |what: &str| format!("{}: {what}, {}", rig.name, law_name(law));
-    Some([bode(&points, margins, title("Bode plot")), nyquist(&points, margins, title("Nyquist plot"))])
+    laws: &[(Law, &LinearReport)],
+) -> [Vec<Figure>; 2] {
+    let (mut bodes, mut nyquists) = (Vec::new(), Vec::new());
+    for &(law, report) in laws {
+        let model = LoopModel::<f64>::as_it_runs(certified, table, law);
+        let (Some(margins), Some(model)) = (&report.margins, model) else { continue };
+        let points = sweep(&model, report, rig.tick.period_s);
+        let title = |what: &str| format!("{}: {what}, {}", rig.name, law_name(law));
+        bodes.push(bode(&points, margins, title("Bode plot")));
+        nyquists.push(nyquist(&points, margins, title("Nyquist plot")));
+    }
+    [bodes, nyquists]
 }
 
-/// L(e^jωT) from a hundredth of the slowest pole to half the sampling rate.
+/// L(e^jωT) from a hundredth of the slowest pole to all but half the sampling rate, where |L| of many loops is 0.
 fn sweep(model: &LoopModel<f64>, report: &LinearReport, tick: f64) -> Vec<Point> {
     const POINTS: usize = 3000;
     let distance = |pole: &[f64; 2]| (pole[0].hypot(pole[1]).ln()).hypot(pole[1].atan2(pole[0]));
@@ -51,8 +55,8 @@ fn sweep(model: &LoopModel<f64>, report: &LinearReport, tick: f64) -> Vec<Point>
     let low = (1e-2 * slowest).max(1e-9);
     let mut points: Vec<Point> = Vec::new();
     for index in 0..=POINTS {
-        let omega = low * (PI / low).powf(index as f64 / POINTS as f64);
-        let Some(response) = model.response(omega.min(PI)) else { continue };
+        let omega = low * (0.99 * PI / low).powf(index as f64 / POINTS as f64);
+        let Some(response) = model.response(omega) else { continue };
         let l = response.l();
         let wrapped = l.im.atan2(l.re).to_degrees();
         let phase = match points.last() {
@@ -136,8 +140,8 @@ fn nyquist(points: &[Point], margins: &Margins, title: String) -> Figure {
         .equal()
         .unit_circle()
         .with(around_critical(margins))
-        .with(Curve::line("L, frequency above 0", 0, line(1.0)))
-        .with(Curve::line("below 0", 1, line(-1.0)))
+        .with(Curve::line("L, ω > 0", 0, line(1.0)))
+        .with(Curve::line("ω < 0", 1, line(-1.0)))
         .with(Curve::markers("−1", 0, vec![[-1.0, 0.0]]));
     for (number, (name, factor)) in gain_margins(margins).into_iter().enumerate() {
         panel = panel.with(Curve::markers(name, number + 1, vec![[-1.0 / factor, 0.0]]));

@@ -107,22 +107,28 @@ pub fn report(source: &Source<'_>, stage: &dyn Fn(&str)) -> Result<Report, Repor
         }
     }
     stage("poles and frequency");
-    for (&law, part) in laws.iter().zip(&trust.laws) {
-        let figure = poles::figure(rig, certified, law, &part.linear);
-        keep("poles", law, &figure)?;
-        page.poles.push(Plot::of(&figure, law_name(law).to_owned())?);
-        if let Some([bode, nyquist]) = frequency::figures(rig, certified, table, law, &part.linear) {
-            keep("bode", law, &bode)?;
-            page.bode.push(Plot::of(&bode, format!("Bode plot, {}", law_name(law)))?);
-            keep("nyquist", law, &nyquist)?;
-            page.nyquist.push(Plot::of(&nyquist, format!("Nyquist plot, {}", law_name(law)))?);
-        }
+    let parts: Vec<_> = laws.iter().copied().zip(trust.laws.iter().map(|part| &part.linear)).collect();
+    let mut poles: Vec<Figure> =
+        parts.iter().map(|(law, part)| poles::figure(rig, certified, *law, part)).collect();
+    Figure::same_scale(&mut poles);
+    for (figure, &(law, _)) in poles.iter().zip(&parts) {
+        keep("poles", law, figure)?;
+        page.poles.push(Plot::of(figure, law_name(law).to_owned())?);
     }
-    let stable: Vec<Law> =
-        laws.iter().zip(&trust.laws).filter(|(_, part)| part.linear.stable).map(|(law, _)| *law).collect();
+    let stable: Vec<Law> = parts.iter().filter(|(_, part)| part.stable).map(|(law, _)| *law).collect();
+    let [mut bode, mut nyquist] = frequency::figures(rig, certified, table, &parts);
+    Figure::same_scale(&mut bode);
+    Figure::same_scale(&mut nyquist);
+    for (&law, (bode, nyquist)) in stable.iter().zip(bode.iter().zip(&nyquist)) {
+        keep("bode", law, bode)?;
+        page.bode.push(Plot::of(bode, format!("Bode plot, {}", law_name(law)))?);
+        keep("nyquist", law, nyquist)?;
+        page.nyquist.push(Plot::of(nyquist, format!("Nyquist plot, {}", law_name(law)))?);
+    }
     if page.drawing.is_some() && !stable.is_empty() {
         stage("region of attraction");
-        for (&law, figure) in stable.iter().zip(region::figures(rig, table, &stable)?) {
+        for law in stable {
+            let figure = region::figure(rig, table, law)?;
             keep("region", law, &figure)?;
             page.regions.push(Plot::of(&figure, law_name(law).to_owned())?);
         }

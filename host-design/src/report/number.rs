@@ -10,8 +10,15 @@ pub(super) fn significant(x: f64, digits: usize) -> String {
         return minus(rounded.to_string());
     }
     let text = format!("{rounded:e}");
-    minus(text.replace('e', "·10^"))
+    let (digits, power) = text.split_once('e').unwrap_or((&text, "0"));
+    let raised = |sign: char| match sign {
+        '-' => '⁻',
+        digit => RAISED[digit.to_digit(10).unwrap_or(0) as usize],
+    };
+    format!("{}·10{}", minus(digits.to_owned()), power.chars().map(raised).collect::<String>())
 }
+
+const RAISED: [char; 10] = ['⁰', '¹', '²', '³', '⁴', '⁵', '⁶', '⁷', '⁸', '⁹'];
 
 /// Three significant digits.
 pub(super) fn number(x: f64) -> String {
@@ -39,8 +46,8 @@ mod tests {
     fn numbers_are_rounded_to_significant_digits() {
         assert_eq!(number(1234.5), "1230");
         assert_eq!(number(-0.012345), "−0.0123");
-        assert_eq!(number(1.5e-9), "1.5·10^−9");
-        assert_eq!(number(1e-75), "1·10^−75");
+        assert_eq!(number(1.5e-9), "1.5·10⁻⁹");
+        assert_eq!(number(1e-75), "1·10⁻⁷⁵");
         assert_eq!(number(0.0), "0");
         assert_eq!(complex([0.5, -0.25], 3), "0.5 ± 0.25i");
     }

@@ -49,7 +49,7 @@
     const all = runs.flatMap((run) => [...run.x, ...run.target]);
     const [low, high] = [Math.min(...all), Math.max(...all)];
     const needed = high - low + 1.6 * total;
-    const width = Math.max(2.6 * total, Math.min(needed, 4.6 * total));
+    const width = Math.max(2.6 * total, Math.min(needed, 3.2 * total));
     const follows = needed > width;
     // As high as the links get, with some ground below.
     const view = { width, height: 1.62 * total, top: 1.3 * total };
@@ -60,14 +60,14 @@
       const canvas = svg("svg", { class: "stage", role: "img", "aria-label": `The machine under ${run.law}` });
       figure.append(caption, canvas);
       stages.append(figure);
-      const step = [1, 2, 5, 10, 20, 50, 100].map((s) => s * 10 ** (Math.floor(Math.log10(total)) - 1)).find((s) => s > 0.24 * width);
+      const step = [1, 2, 5, 10, 20, 50].map((s) => s * 10 ** (Math.floor(Math.log10(total)) - 1)).find((s) => s > 0.24 * width);
       const ground = svg("g", {}, canvas);
       place(line(ground, "#000000", 0.012), data.rail[0], 0, data.rail[1], 0);
       for (const end of data.rail) place(line(ground, "#000000", 0.03), end, 0, end, 0.12 * total);
       for (let i = Math.ceil(data.rail[0] / step); i * step <= data.rail[1]; i += 1) {
         place(line(ground, "#000000", 0.008), i * step, 0, i * step, -0.04 * total);
         const label = svg("text", { x: i * step, y: 0.17 * total, "text-anchor": "middle", fill: "#000000",
-          "font-size": 0.032 * width, "font-family": "sans-serif" }, ground);
+          "font-size": 0.1 * total, "font-family": "sans-serif" }, ground);
         label.textContent = `${Number((i * step).toPrecision(6))} m`.replace("-", "−");
       }
       const target = svg("path", { d: `M0 0 l${0.045 * total} ${0.08 * total} h${-0.09 * total} z`, fill: "#D55E00" }, ground);

@@ -12,24 +12,34 @@ use crate::verify::{Axis, Horizon, Map, Unverifiable, attraction_map};
 const POINTS: usize = 31;
 const ANGLE: usize = 2;
 const RATE: usize = 3;
+/// Largest angle (rad) and rate (rad/s) that is looked at, roughly.
+const LARGEST: [f64; 2] = [0.8, 8.0];
 
-/// Maps over angle and rate of the first joint, all on the same axes.
-pub(super) fn figures(rig: &Rig, table: &TableValues, laws: &[Law]) -> Result<Vec<Figure>, Unverifiable> {
-    let mut ranges = [0.0f64; 2];
-    for &law in laws {
-        for (range, (state, largest)) in ranges.iter_mut().zip([(ANGLE, 0.8), (RATE, 8.0)]) {
-            *range = range.max(2.2 * extent(rig, table, law, state, largest)?);
+/// Map over angle and rate of the first joint, wide enough to show the whole region.
+pub(super) fn figure(rig: &Rig, table: &TableValues, law: Law) -> Result<Figure, Unverifiable> {
+    const WIDER: f64 = 1.6;
+    let axis = |state: usize, largest: f64| -> Result<Axis, Unverifiable> {
+        let end = 1.4 * extent(rig, table, law, state, largest)?;
+        Ok(Axis { state, range: [-end, end], points: POINTS })
+    };
+    let mut axes = [axis(ANGLE, LARGEST[0])?, axis(RATE, LARGEST[1])?];
+    let map = loop {
+        let map = attraction_map(rig, table, law, axes, &Horizon::default(), &|| {})?;
+        if !reaches_edge(&map) || axes[0].range[1] > LARGEST[0] || axes[1].range[1] > LARGEST[1] {
+            break map;
         }
-    }
-    let axis = |state: usize, end: f64| Axis { state, range: [-end, end], points: POINTS };
-    let axes = [axis(ANGLE, ranges[0]), axis(RATE, ranges[1])];
-    laws.iter()
-        .map(|&law| {
-            let map = attraction_map(rig, table, law, axes, &Horizon::default(), &|| {})?;
-            let title = format!("{}: region of attraction, {}", rig.name, law_name(law));
-            Ok(figure(title, &map))
-        })
-        .collect()
+        axes = axes.map(|axis| Axis { range: axis.range.map(|end| WIDER * end), ..axis });
+    };
+    let title = format!("{}: region of attraction, {}", rig.name, law_name(law));
+    Ok(drawn(title, &map))
+}
+
+/// Whether some start on the rim of the map is recovered from: the region may go on beyond.
+fn reaches_edge(map: &Map) -> bool {
+    let rows = &map.settled_s;
+    let sides = rows.iter().flat_map(|row| row.first().into_iter().chain(row.last()));
+    let ends = rows.first().into_iter().chain(rows.last()).flatten();
+    sides.chain(ends).any(Option::is_some)
 }
 
 /// How far the start may be off in one state alone, roughly: at least a hundredth of `largest`.
@@ -48,7 +58,7 @@ fn extent(rig: &Rig, table: &TableValues, law: Law, state: usize, largest: f64) 
     }
 }
 
-fn figure(title: String, map: &Map) -> Figure {
+fn drawn(title: String, map: &Map) -> Figure {
     let centres = |axis: &Axis| -> Vec<f64> {
         let [low, high] = axis.range.map(f64::to_degrees);
         (0..axis.points).map(|i| low + (high - low) * i as f64 / (axis.points - 1) as f64).collect()

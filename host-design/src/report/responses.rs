@@ -1,5 +1,6 @@
 //! Runs over time.
 
+use super::number::number;
 use super::runs::{LawRun, Scene, law_name};
 use crate::figure::{Axis, Curve, Figure, Panel};
 use crate::rig::{PlantDescription, Rig};
@@ -40,18 +41,24 @@ fn figure(rig: &Rig, scene: &Scene, run: &LawRun) -> Figure {
         let input = panel("input").with(Curve::line("u", 0, curve(&|s| s.force)));
         return Figure::narrow(title).with(position).with(others).with(input);
     };
-    let position = panel("position (m)")
-        .with(Curve::reference("set-point", curve(&|s| s.target)))
-        .with(Curve::line("governed", 1, curve(&|s| s.setpoint)))
+    let rail = chain.cart.travel_m;
+    let mut position = panel("position (m)").with(Curve::reference("set-point", curve(&|s| s.target)));
+    if run.trace.samples().any(|sample| sample.setpoint != sample.target) {
+        position = position.with(Curve::line("governed", 1, curve(&|s| s.setpoint)));
+    }
+    let position = position
         .with(Curve::line("x", 0, curve(&|s| s.state[0])))
-        .with(limits("ends of rail", chain.cart.travel_m));
+        .with(limits(&format!("rail {} to {} m", number(rail[0]), number(rail[1])), rail));
     let joints = 0..chain.links.len();
     let angles = joints.clone().fold(panel("angles (°)"), |panel, joint| {
         let points = curve(&|s| s.state[2 + 2 * joint].to_degrees());
         panel.with(Curve::line(format!("θ{}", joint + 1), joint, points))
     });
     let angles = match rig.limits.angle_rad {
-        Some(limit) => angles.with(limits("limit", [-limit, limit].map(f64::to_degrees))),
+        Some(limit) => {
+            let limit = limit.to_degrees();
+            angles.with(limits(&format!("limit ±{}°", number(limit)), [-limit, limit]))
+        }
         None => angles,
     };
     let rates = joints.fold(panel("rates (°/s)"), |panel, joint| {
@@ -64,9 +71,7 @@ fn figure(rig: &Rig, scene: &Scene, run: &LawRun) -> Figure {
         .with(Curve::reference("asked for", curve(&|s| s.requested.clamp(-most, most))))
         .with(Curve::line("u", 0, curve(&|s| s.force)));
     let force = match rig.force_limit_n() {
-        Some(limit) => {
-            force.with(limits(&format!("limit ±{} N", super::number::number(limit)), [-limit, limit]))
-        }
+        Some(limit) => force.with(limits(&format!("limit ±{} N", number(limit)), [-limit, limit])),
         None => force,
     };
     Figure::narrow(title).with(position).with(angles).with(rates).with(force)

@@ -84,10 +84,14 @@ pub(super) fn scenes(
     let mut tilted = base.clone();
     let text = if is_chain {
         let angle = tilt(trust);
+        // The other links stand upright: the second one bends back.
         tilted.start[2] = angle;
+        if let Some(second) = tilted.start.get_mut(4) {
+            *second = -angle;
+        }
         format!(
-            "The whole chain leans by {} rad ({}°) at the start: half of what the weaker law recovers from when the first \
-             link alone leans; the whole state is measured.",
+            "Link 1 leans by {} rad ({}°) at the start, all others are vertical: half of what the weaker law recovers from; \
+             the whole state is measured.",
             number(angle),
             number(angle.to_degrees())
         )
