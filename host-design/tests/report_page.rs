@@ -63,7 +63,7 @@ fn a_linear_model_has_no_drawing_and_the_page_says_so() {
 }
 
 #[test]
-fn one_to_six_links_without_encoders_have_a_page() {
+fn a_chain_of_one_or_six_links_without_encoders_has_a_page() {
     for links in [1, 6] {
         let report = quick_report(&chain(links, "links"));
         assert!(report.html.len() < LARGEST, "{links} links: {}", report.html.len());

@@ -42,7 +42,7 @@ pub(super) fn entries(figure: &Figure, panel: &Panel, from: f64) -> (Vec<Entry>,
     keys.extend(named.map(|curve| {
         let seen = curve.points.iter().any(|point| (low..=high).contains(&point[1]));
         if curve.style == Style::Limit && !seen {
-            (Key::Nothing, format!("{}: beyond", curve.name))
+            (Key::Nothing, format!("{} (not in view)", curve.name))
         } else {
             (Key::Curve(curve.style), curve.name.clone())
         }

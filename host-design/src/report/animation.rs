@@ -63,7 +63,9 @@ impl Animation {
                 .runs
                 .iter()
                 .map(|run| {
-                    let samples: Vec<_> = run.trace.samples().step_by(stride).collect();
+                    let is_finite = |state: &[f64]| state.iter().all(|value| value.is_finite());
+                    let samples = run.trace.samples().step_by(stride).filter(|s| is_finite(s.state));
+                    let samples: Vec<_> = samples.collect();
                     let angle =
                         |state: &[f64], link: usize| (0..=link).map(|i| state[2 + 2 * i]).sum::<f64>();
                     let shown = if links > 0 { samples.as_slice() } else { &[] };
