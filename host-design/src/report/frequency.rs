@@ -77,7 +77,7 @@ fn gain_margins(margins: &Margins) -> Vec<(String, f64)> {
     lower.into_iter().chain(upper).map(named).collect()
 }
 
-fn nearest<'a>(points: &'a [Point], distance: impl Fn(&Point) -> f64) -> Option<&'a Point> {
+fn nearest(points: &[Point], distance: impl Fn(&Point) -> f64) -> Option<&Point> {
     points.iter().min_by(|a, b| distance(a).total_cmp(&distance(b)))
 }
 

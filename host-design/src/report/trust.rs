@@ -30,13 +30,12 @@ pub(super) fn checks(report: &TrustReport) -> Vec<CheckRow> {
     report.checks.iter().map(row).collect()
 }
 
-/// A line of the table and how a law's part of it is found.
-type Line<'a> = (String, Box<dyn Fn(&LawTrust) -> Option<String> + 'a>);
+/// How a value is found, if a law has it.
+type Value = Box<dyn Fn(&LawTrust) -> Option<String>>;
 
 pub(super) fn rows(rig: &Rig, report: &TrustReport) -> Vec<Row> {
-    let mut lines: Vec<Line<'_>> = Vec::new();
-    let mut line =
-        |name: &str, value: Box<dyn Fn(&LawTrust) -> Option<String>>| lines.push((name.to_owned(), value));
+    let mut lines: Vec<(String, Value)> = Vec::new();
+    let mut line = |name: &str, value: Value| lines.push((name.to_owned(), value));
     line("spectral radius", Box::new(|law| Some(format!("{:.6}", law.linear.spectral_radius))));
     line(
         "gain margin",
@@ -182,7 +181,7 @@ pub(super) fn rows(rig: &Rig, report: &TrustReport) -> Vec<Row> {
             ))
         }),
     );
-    let row = |(name, value): &Line<'_>| {
+    let row = |(name, value): &(String, Value)| {
         let found: Vec<Option<String>> = report.laws.iter().map(value).collect();
         let values = found.iter().map(|value| value.clone().unwrap_or_else(|| "—".to_owned())).collect();
         found.iter().any(Option::is_some).then(|| Row { name: name.clone(), values })

@@ -4,7 +4,7 @@ use std::io::Write;
 use std::path::{Path, PathBuf};
 
 use clap::Args;
-use host_design::report::{Picture, Report as Page, Source, report};
+use host_design::report::{Report as Page, Source, report};
 use host_design::table::write_atomically;
 use host_design::verify::{Effort, trust};
 use indicatif::{ProgressBar, ProgressStyle};
@@ -49,6 +49,7 @@ pub(crate) struct Report {
 
 impl Report {
     pub(crate) fn run(self) -> Result<(), Failure> {
+        self.prepare()?;
         let (rig, certified, table) = self.variation.designed()?;
         let laws = usize::from(table.lqr.is_some()) + usize::from(table.pole_placement.is_some());
         let bar = ProgressBar::new((laws * self.runs as usize) as u64);
@@ -96,32 +97,38 @@ impl Report {
         Ok(())
     }
 
+    /// Makes the folders, so that a place that cannot be written to is known before the work is done.
+    fn prepare(&self) -> Result<(), Failure> {
+        for folder in [&self.svg, &self.png, &self.csv].into_iter().flatten() {
+            std::fs::create_dir_all(folder).map_err(|error| {
+                Failure::BadArgument(format!("{}: the folder cannot be made: {error}", folder.display()))
+            })?;
+        }
+        let parent =
+            self.out.as_deref().and_then(Path::parent).filter(|parent| !parent.as_os_str().is_empty());
+        match parent {
+            Some(parent) if !parent.is_dir() => Err(Failure::BadArgument(format!(
+                "{}: there is no such folder to write the page into: make it, or give another --out",
+                parent.display()
+            ))),
+            _ => Ok(()),
+        }
+    }
+
     /// Pictures first: a page that exists is complete.
     fn write(&self, page: &Page) -> Result<Vec<PathBuf>, Failure> {
         let mut files = Vec::new();
         for picture in &page.pictures {
-            let mut write =
-                |folder: &Option<PathBuf>,
-                 ending: &str,
-                 contents: &dyn Fn(&Picture) -> Result<Option<Vec<u8>>, Failure>| {
-                    let (Some(folder), Some(contents)) = (folder, contents(picture)?) else { return Ok(()) };
-                    std::fs::create_dir_all(folder).map_err(|error| {
-                        Failure::BadArgument(format!(
-                            "{}: the folder cannot be made: {error}",
-                            folder.display()
-                        ))
-                    })?;
-                    let path = folder.join(format!("{}.{ending}", picture.name));
-                    write_atomically(&path, &contents)?;
-                    files.push(path);
-                    Ok::<(), Failure>(())
-                };
-            write(&self.svg, "svg", &|picture| Ok(Some(picture.svg.clone().into_bytes())))?;
-            // Pixels cost time: only if they are wanted.
-            write(&self.png, "png", &|picture| {
-                self.png.as_ref().map(|_| picture.png()).transpose().map_err(Failure::from)
-            })?;
-            write(&self.csv, "csv", &|picture| Ok(picture.csv.clone().map(String::into_bytes)))?;
+            let name = &picture.name;
+            if let Some(folder) = &self.svg {
+                files.push(write_into(folder, &format!("{name}.svg"), picture.svg.as_bytes())?);
+            }
+            if let Some(folder) = &self.png {
+                files.push(write_into(folder, &format!("{name}.png"), &picture.png()?)?);
+            }
+            if let (Some(folder), Some(csv)) = (&self.csv, &picture.csv) {
+                files.push(write_into(folder, &format!("{name}.csv"), csv.as_bytes())?);
+            }
         }
         let path = self.out.clone().unwrap_or_else(|| default_page(&self.variation.rig));
         write_atomically(&path, page.html.as_bytes())?;
@@ -140,6 +147,12 @@ impl Report {
         }
         typed
     }
+}
+
+fn write_into(folder: &Path, name: &str, contents: &[u8]) -> Result<PathBuf, Failure> {
+    let path = folder.join(name);
+    write_atomically(&path, contents)?;
+    Ok(path)
 }
 
 fn default_page(rig: &Path) -> PathBuf {
