@@ -109,7 +109,7 @@ impl Figure {
             }
         }
         let ticks =
-            |size: f64, spacing: f64| (size / (spacing * self.text)).round().clamp(2.0, 10.0) as usize;
+            |size: f64, spacing: f64| (size / (spacing * self.text)).round().clamp(4.0, 10.0) as usize;
         Ok(Layout {
             top,
             left,
@@ -119,7 +119,7 @@ impl Figure {
             entries,
             describes_x,
             x: Scale::of(&panel.x, x, ticks(width, 3.4))?,
-            y: Scale::of(&panel.y, y, ticks(height, 1.7))?,
+            y: Scale::of(&panel.y, y, ticks(height, 1.35))?,
         })
     }
 

@@ -51,23 +51,27 @@
     const needed = high - low + 1.6 * total;
     const width = Math.max(2.6 * total, Math.min(needed, 3.2 * total));
     const follows = needed > width;
-    // As high as the links get, with some ground below.
-    const view = { width, height: 1.62 * total, top: 1.3 * total };
     stages.replaceChildren();
+    // Labels stay legible on a telephone.
+    const room = (stages.clientWidth - 20 * (runs.length - 1)) / runs.length;
+    const letter = Math.max(0.09 * total, 10 * Math.max(width / room, 1.6 * total / (0.24 * window.innerHeight)));
+    // As high as the links get, with the labels below.
+    const view = { width, height: 1.4 * total + 1.3 * letter, top: 1.3 * total };
+    const steps = [1, 2, 5, 10, 20, 50].map((s) => s * 10 ** (Math.floor(Math.log10(total)) - 1));
+    const step = steps.find((s) => s > 4.2 * letter) ?? steps.at(-1);
     drawn = runs.map((run) => {
       const figure = document.createElement("figure");
       const caption = document.createElement("figcaption");
       const canvas = svg("svg", { class: "stage", role: "img", "aria-label": `The machine under ${run.law}` });
       figure.append(caption, canvas);
       stages.append(figure);
-      const step = [1, 2, 5, 10, 20, 50].map((s) => s * 10 ** (Math.floor(Math.log10(total)) - 1)).find((s) => s > 0.24 * width);
       const ground = svg("g", {}, canvas);
       place(line(ground, "#000000", 0.012), data.rail[0], 0, data.rail[1], 0);
       for (const end of data.rail) place(line(ground, "#000000", 0.03), end, 0, end, 0.12 * total);
       for (let i = Math.ceil(data.rail[0] / step); i * step <= data.rail[1]; i += 1) {
         place(line(ground, "#000000", 0.008), i * step, 0, i * step, -0.04 * total);
-        const label = svg("text", { x: i * step, y: 0.17 * total, "text-anchor": "middle", fill: "#000000",
-          "font-size": 0.1 * total, "font-family": "sans-serif" }, ground);
+        const label = svg("text", { x: i * step, y: 0.08 * total + letter, "text-anchor": "middle", fill: "#000000",
+          "font-size": letter, "font-family": "sans-serif" }, ground);
         label.textContent = `${Number((i * step).toPrecision(6))} m`.replace("-", "−");
       }
       const target = svg("path", { d: `M0 0 l${0.045 * total} ${0.08 * total} h${-0.09 * total} z`, fill: "#D55E00" }, ground);
@@ -164,7 +168,7 @@
     drawing.addEventListener("pointerdown", point);
     drawing.addEventListener("pointermove", (event) => { if (event.buttons === 1) point(event); });
   }
-  setStage();
   player.hidden = false;
+  setStage();
   show();
 })();

@@ -164,7 +164,8 @@ impl Outcome {
         if !summary.peak_angles_rad.is_empty() {
             parts.push(format!("largest angle {}°", number(degrees)));
         }
-        parts.push(format!("largest force {} N", number(summary.peak_force_n)));
+        let (what, unit) = if summary.peak_angles_rad.is_empty() { ("input", "") } else { ("force", " N") };
+        parts.push(format!("largest {what} {}{unit}", number(summary.peak_force_n)));
         Self { law: law_name(run.law), stands: summary.stands(), text: parts.join(", ") }
     }
 }

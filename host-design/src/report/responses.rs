@@ -22,7 +22,7 @@ fn figure(rig: &Rig, scene: &Scene, run: &LawRun) -> Figure {
     let ends = scene.runs.iter().filter_map(|run| run.trace.samples().last().map(|sample| sample.t));
     let end = ends.fold(1e-9, f64::max);
     let panel =
-        |label: &str| Panel::new(Axis::linear("time (s)").range(0.0, end), Axis::linear(label)).high(165);
+        |label: &str| Panel::new(Axis::linear("time (s)").range(0.0, end), Axis::linear(label)).high(178);
     let limits = |name: &str, limits: [f64; 2]| {
         let ends = limits.map(|limit| [[0.0, limit], [end, limit]]);
         let points = [ends[0].as_slice(), &[[f64::NAN; 2]], &ends[1]].concat();

@@ -76,8 +76,9 @@ pub(super) fn scenes(
     let stepped = Scenario { step_m, ..base.clone() };
     if steps {
         let text = format!(
-            "Set-point moved by {}{unit} at 0 s, made into a ramp by the governor; the whole state is measured{of_model}.",
-            number(step_m)
+            "Set-point moved by {}{unit} at 0 s{}; the whole state is measured{of_model}.",
+            number(step_m),
+            if is_chain { ", made into a ramp by the governor" } else { "" }
         );
         add("step", "Step", text, &stepped)?;
     }
