@@ -18,8 +18,6 @@ type Failure = Box<dyn std::error::Error>;
 pub struct Drawing {
     /// The document.
     pub svg: String,
-    /// Width and height of its view box.
-    pub size: [u32; 2],
     /// Where the panels are, from top to bottom.
     pub panels: Vec<PlotArea>,
 }
@@ -90,7 +88,7 @@ impl Figure {
             format!("width=\"{}\" height=\"{}\"", view[0], view[1]),
             format!("width=\"{}\" height=\"{}\"", size[0], size[1]),
         );
-        Ok(Drawing { svg: finished(&svg.replacen(&fine_size, &real_size, 1)), size: view, panels })
+        Ok(Drawing { svg: finished(&svg.replacen(&fine_size, &real_size, 1)), panels })
     }
 
     fn layout(&self, panel: &Panel, top: f64, describes_x: bool) -> Result<Layout, FigureError> {

@@ -16,11 +16,11 @@ mod trust;
 
 pub use error::ReportError;
 
-use page::Page;
-use plot::Plot;
-use runs::law_name;
 use upright::table::Law;
 
+use self::page::Page;
+use self::plot::Plot;
+use self::runs::law_name;
 use crate::design::Certified;
 use crate::figure::{Figure, FigureError, pixels};
 use crate::rig::{PlantDescription, Rig};

@@ -48,18 +48,18 @@ pub(super) fn rows(rig: &Rig, report: &TrustReport) -> Vec<Row> {
     line(
         "phase margin",
         Box::new(|law| {
-            Some(format!("{}°", number(law.linear.margins.as_ref()?.phase_margin_rad?.to_degrees())))
+            let margin = law.linear.margins.as_ref()?.phase_margin_rad;
+            Some(margin.map_or("no limit".to_owned(), |phase| format!("{}°", number(phase.to_degrees()))))
         }),
     );
     line(
         "delay margin",
         Box::new(|law| {
             let margins = law.linear.margins.as_ref()?;
-            Some(format!(
-                "{} ms = {} ticks",
-                number(1e3 * margins.delay_margin_s?),
-                number(margins.delay_margin_ticks?)
-            ))
+            Some(match (margins.delay_margin_s, margins.delay_margin_ticks) {
+                (Some(s), Some(ticks)) => format!("{} ms = {} ticks", number(1e3 * s), number(ticks)),
+                _ => "no limit".to_owned(),
+            })
         }),
     );
     line(
