@@ -25,8 +25,11 @@ pub(super) fn number(x: f64) -> String {
     significant(x, 3)
 }
 
-/// A complex number.
-pub(super) fn complex([re, im]: [f64; 2], digits: usize) -> String {
+/// A pole, and its conjugate if there is one. A rounding residue of a pole at the origin is shown as zero.
+pub(super) fn pole([re, im]: [f64; 2], digits: usize) -> String {
+    if re.hypot(im) < 1e-60 {
+        return "0".to_owned();
+    }
     if im == 0.0 {
         return significant(re, digits);
     }
@@ -49,6 +52,7 @@ mod tests {
         assert_eq!(number(1.5e-9), "1.5·10⁻⁹");
         assert_eq!(number(1e-75), "1·10⁻⁷⁵");
         assert_eq!(number(0.0), "0");
-        assert_eq!(complex([0.5, -0.25], 3), "0.5 ± 0.25i");
+        assert_eq!(pole([0.5, -0.25], 3), "0.5 ± 0.25i");
+        assert_eq!(pole([-5e-154, 0.0], 3), "0");
     }
 }

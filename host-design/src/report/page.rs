@@ -5,7 +5,7 @@ use upright::table::{Law, TABLE_FORMAT};
 
 use super::animation::Animation;
 use super::cost::Cost;
-use super::number::{complex, number, significant};
+use super::number::{number, pole, significant};
 use super::plot::Plot;
 use super::runs::{LawRun, Scene, law_name, laws};
 use super::trust::{CheckRow, Row, checks, rows};
@@ -197,7 +197,7 @@ impl LawEntry {
         gains.push(GainRow { name: "N".to_owned(), continuous: n(continuous), sampled: n(sampled) });
         let listed = |poles: Option<&Vec<[f64; 2]>>| {
             let upper = poles.into_iter().flatten().filter(|pole| pole[1] >= 0.0);
-            upper.map(|pole| complex(*pole, DIGITS)).collect::<Vec<_>>().join(",  ")
+            upper.map(|&upper| pole(upper, DIGITS)).collect::<Vec<_>>().join(",  ")
         };
         let name = if index == 0 { "lqr" } else { "pole_placement" };
         let part = trust.laws.iter().find(|part| part.linear.law == name)?;
