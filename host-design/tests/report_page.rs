@@ -90,3 +90,29 @@ fn a_name_from_a_rig_file_cannot_become_a_script() {
     let unescaped = report.html.replace("&#60;", "<").replace("&#62;", ">");
     assert!(unescaped.contains(name));
 }
+
+#[test]
+fn the_margins_in_the_bode_plot_are_on_the_curve() {
+    let report = quick_report(&report_rigs::rig("single-quanser-ip02"));
+    let mut marked = 0;
+    for picture in report.pictures.iter().filter(|picture| picture.name.starts_with("bode-")) {
+        for line in picture.csv.as_ref().unwrap().lines() {
+            let fields: Vec<&str> = line.split(',').collect();
+            let [_, _, curve, _, y, ..] = fields[..] else { continue };
+            let y = || y.parse::<f64>().unwrap();
+            if let Some(factor) = curve.strip_prefix("gain margin × ") {
+                // The force times this factor makes |L| = 1 there; three digits of it are named.
+                let product = y() * factor.parse::<f64>().unwrap();
+                assert!((product - 1.0).abs() < 0.01, "{}: {line}: {product}", picture.name);
+                marked += 1;
+            } else if let Some(margin) = curve.strip_prefix("phase margin ") {
+                let margin: f64 = margin.trim_end_matches('°').parse().unwrap();
+                let beyond = (y() - 180.0).rem_euclid(360.0);
+                let spare = beyond.min(360.0 - beyond);
+                assert!((spare - margin).abs() < 0.5, "{}: {line}: {spare}", picture.name);
+                marked += 1;
+            }
+        }
+    }
+    assert!(marked >= 4, "{marked}");
+}
