@@ -1,17 +1,19 @@
 //! From a rig file to a model, gains, the const table and a verdict on the closed loop.
 //!
-//! The way of data is the order of the modules: [`rig`] → [`plant`] → [`design`] → [`table`] → [`simulate`] → [`verify`], on top of
-//! [`numerics`]. The control law itself is not here: a simulation runs the firmware's own controller from the crate
-//! `upright`.
+//! The way of data is the order of the modules: [`rig`] → [`plant`] → [`design`] → [`table`] → [`simulate`] → [`verify`] →
+//! [`report`], on top of [`numerics`]; [`figure`] draws. The control law itself is not here: a simulation runs the firmware's
+//! own controller from the crate `upright`.
 
 #![forbid(unsafe_code)]
 
 pub mod campaign;
 pub mod design;
+pub mod figure;
 pub mod image;
 pub mod in_the_loop;
 pub mod numerics;
 pub mod plant;
+pub mod report;
 pub mod rig;
 pub mod simulate;
 pub mod table;

@@ -13,6 +13,7 @@ pub use bench::Bench;
 pub(crate) use closed_loop::ticks;
 pub use closed_loop::{SimulationError, run, simulate};
 pub use hand::{Act, Hand, Seen};
+pub use plot::svg;
 pub use plot::{PlotError, svg};
 pub use scenario::{Scenario, Sensing};
 pub use session::{Interference, Session, Tick};

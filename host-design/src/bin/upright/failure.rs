@@ -4,10 +4,12 @@ use std::process::ExitCode;
 
 use host_design::campaign::CampaignError;
 use host_design::design::DesignError;
+use host_design::figure::FigureError;
 use host_design::image::{ElfError, ImageError, SizeError};
 use host_design::in_the_loop::{RunError, SessionError, TargetError};
+use host_design::report::ReportError;
 use host_design::rig::RigError;
-use host_design::simulate::{PlotError, SimulationError};
+use host_design::simulate::SimulationError;
 use host_design::table::{NoTable, WriteError};
 use host_design::verify::{Unverifiable, VerifyError};
 
@@ -17,9 +19,15 @@ pub(crate) enum Failure {
     #[error(transparent)]
     Rig(#[from] RigError),
     #[error("{rig}: {source}")]
-    Design { rig: String, source: DesignError },
+    Design {
+        rig: String,
+        source: DesignError,
+    },
     #[error("{rig}: {source}")]
-    NoTable { rig: String, source: NoTable },
+    NoTable {
+        rig: String,
+        source: NoTable,
+    },
     #[error("{0}")]
     NoSolution(String),
     #[error(transparent)]
@@ -40,8 +48,9 @@ pub(crate) enum Failure {
     InTheLoop(#[from] RunError),
     #[error(transparent)]
     Campaign(#[from] CampaignError),
+    Figure(#[from] FigureError),
     #[error(transparent)]
-    Plot(#[from] PlotError),
+    Report(#[from] ReportError),
     #[error(transparent)]
     Write(#[from] WriteError),
     #[error("the output cannot be written: {0}")]
@@ -70,7 +79,8 @@ impl Failure {
             | Failure::Simulation(_)
             | Failure::Verify(_)
             | Failure::Unverifiable(_)
-            | Failure::Plot(_)
+            | Failure::Figure(_)
+            | Failure::Report(_)
             | Failure::Write(_)
             | Failure::Output(_)
             | Failure::BadArgument(_) => 2,

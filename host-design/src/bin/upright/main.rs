@@ -6,6 +6,7 @@ mod failure;
 mod faults;
 mod firmware;
 mod progress;
+mod report;
 mod simulate;
 mod variation;
 mod verify;
@@ -21,6 +22,7 @@ Examples:
   upright design my.toml --json --no-write      the same as data, leaving all files alone
   upright simulate rigs/quadruple-paper.toml --step 1 --svg step.svg
   upright verify rigs/quadruple-paper.toml      how far the loop can be trusted, in numbers
+  upright report rigs/quadruple-paper.toml      all of it on one page, with an animation
 
 Exit status:
   0  done        1  a check failed: the pendulum falls, a requirement is not met, a file differs
@@ -40,6 +42,7 @@ enum Command {
     Design(design::Design),
     Faults(faults::Faults),
     Firmware(firmware::Firmware),
+    Report(report::Report),
     Simulate(simulate::Simulate),
     Verify(verify::Verify),
 }
@@ -50,6 +53,7 @@ fn main() -> ExitCode {
         Command::Design(command) => command.run(),
         Command::Faults(command) => command.run(),
         Command::Firmware(command) => command.run(),
+        Command::Report(command) => command.run(),
         Command::Simulate(command) => command.run(),
         Command::Verify(command) => command.run(),
     };
