@@ -7,6 +7,7 @@
 pub mod design;
 pub mod numerics;
 pub mod plant;
+pub mod reproduce;
 pub mod rig;
 pub mod simulate;
 pub mod table;

@@ -3,6 +3,7 @@
 use std::process::ExitCode;
 
 use host_design::design::DesignError;
+use host_design::reproduce::ReproduceError;
 use host_design::rig::RigError;
 use host_design::simulate::{PlotError, SimulationError};
 use host_design::table::{NoTable, WriteError};
@@ -26,6 +27,8 @@ pub(crate) enum Failure {
     #[error(transparent)]
     Unverifiable(#[from] Unverifiable),
     #[error(transparent)]
+    Reproduce(#[from] ReproduceError),
+    #[error(transparent)]
     Plot(#[from] PlotError),
     #[error(transparent)]
     Write(#[from] WriteError),
@@ -46,6 +49,7 @@ impl Failure {
             Failure::Simulation(_)
             | Failure::Verify(_)
             | Failure::Unverifiable(_)
+            | Failure::Reproduce(_)
             | Failure::Plot(_)
             | Failure::Write(_)
             | Failure::Output(_)

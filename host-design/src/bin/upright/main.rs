@@ -4,6 +4,7 @@ mod check;
 mod design;
 mod failure;
 mod progress;
+mod reproduce;
 mod simulate;
 mod variation;
 mod verify;
@@ -19,6 +20,7 @@ Examples:
   upright design my.toml --json --no-write      the same as data, leaving all files alone
   upright simulate rigs/quadruple-paper.toml --step 1 --svg step.svg
   upright verify rigs/quadruple-paper.toml      how far the loop can be trusted, in numbers
+  upright reproduce                             the results of the paper beside ours
 
 Exit status:
   0  done        1  a check failed: the pendulum falls, a requirement is not met, a file differs
@@ -36,6 +38,7 @@ struct Arguments {
 enum Command {
     Check(check::Check),
     Design(design::Design),
+    Reproduce(reproduce::Reproduce),
     Simulate(simulate::Simulate),
     Verify(verify::Verify),
 }
@@ -44,6 +47,7 @@ fn main() -> ExitCode {
     let result = match Arguments::parse().command {
         Command::Check(command) => command.run(),
         Command::Design(command) => command.run(),
+        Command::Reproduce(command) => command.run(),
         Command::Simulate(command) => command.run(),
         Command::Verify(command) => command.run(),
     };

@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use indicatif::ProgressBar;
+use indicatif::{ProgressBar, ProgressStyle};
 
 /// Runs `work` with a spinner on stderr, if that is a terminal.
 pub(crate) fn with_spinner<T>(message: &'static str, work: impl FnOnce() -> T) -> T {
@@ -10,5 +10,21 @@ pub(crate) fn with_spinner<T>(message: &'static str, work: impl FnOnce() -> T) -
     spinner.enable_steady_tick(Duration::from_millis(120));
     let result = work();
     spinner.finish_and_clear();
+    result
+}
+
+/// Runs `work` with a bar of `stages` on stderr, if that is a terminal; `work` names each stage before it starts it.
+pub(crate) fn with_stages<T>(stages: u64, work: impl FnOnce(&dyn Fn(&'static str)) -> T) -> T {
+    let bar = ProgressBar::new(stages);
+    bar.set_style(
+        ProgressStyle::with_template("{spinner} {bar:20} {pos}/{len} {msg} {elapsed}")
+            .unwrap_or_else(|_| ProgressStyle::default_bar()),
+    );
+    bar.enable_steady_tick(Duration::from_millis(120));
+    let result = work(&|stage| {
+        bar.inc(1);
+        bar.set_message(stage);
+    });
+    bar.finish_and_clear();
     result
 }
