@@ -5,6 +5,7 @@
 //! `upright`.
 
 pub mod design;
+pub mod figure;
 pub mod numerics;
 pub mod plant;
 pub mod reproduce;

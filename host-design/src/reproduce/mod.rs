@@ -12,6 +12,7 @@ mod continuous_margins;
 mod course;
 mod designs;
 mod errata;
+mod figures;
 mod markdown;
 pub mod published;
 mod responses;

@@ -67,6 +67,20 @@ impl Spectrum {
         self.density.iter().sum::<f64>() * self.spacing_hz
     }
 
+    /// Frequency (Hz) and root of the density (unit per √Hz), averaged over twelfths of an octave: for drawing.
+    pub fn amplitudes(&self) -> Vec<[f64; 2]> {
+        let band = |i: usize| (12.0 * (i as f64).log2()).floor();
+        let indices: Vec<usize> = (1..self.density.len()).collect();
+        let bands = indices.chunk_by(|&a, &b| band(a) == band(b));
+        bands
+            .map(|band| {
+                let sum: f64 = band.iter().map(|&i| self.density[i]).sum();
+                let middle = band.iter().sum::<usize>() as f64 / band.len() as f64;
+                [middle * self.spacing_hz, (sum / band.len() as f64).sqrt()]
+            })
+            .collect()
+    }
+
     /// Where the power lies.
     pub fn bandwidth(&self) -> Bandwidth {
         let total: f64 = self.density.iter().sum();

@@ -9,7 +9,7 @@ mod trace;
 
 pub use bench::Bench;
 pub use closed_loop::{SimulationError, run, simulate};
-pub use plot::{PlotError, svg};
+pub use plot::svg;
 pub use scenario::{Scenario, Sensing};
 pub use summary::{Fall, FallKind, Summary};
 pub use trace::{Sample, Trace};

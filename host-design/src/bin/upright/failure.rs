@@ -3,9 +3,10 @@
 use std::process::ExitCode;
 
 use host_design::design::DesignError;
+use host_design::figure::FigureError;
 use host_design::reproduce::ReproduceError;
 use host_design::rig::RigError;
-use host_design::simulate::{PlotError, SimulationError};
+use host_design::simulate::SimulationError;
 use host_design::table::{NoTable, WriteError};
 use host_design::verify::{Unverifiable, VerifyError};
 
@@ -29,7 +30,7 @@ pub(crate) enum Failure {
     #[error(transparent)]
     Reproduce(#[from] ReproduceError),
     #[error(transparent)]
-    Plot(#[from] PlotError),
+    Figure(#[from] FigureError),
     #[error(transparent)]
     Write(#[from] WriteError),
     #[error("the output cannot be written: {0}")]
@@ -50,7 +51,7 @@ impl Failure {
             | Failure::Verify(_)
             | Failure::Unverifiable(_)
             | Failure::Reproduce(_)
-            | Failure::Plot(_)
+            | Failure::Figure(_)
             | Failure::Write(_)
             | Failure::Output(_)
             | Failure::BadArgument(_) => 2,

@@ -5,6 +5,7 @@ use std::path::PathBuf;
 
 use clap::Args;
 use host_design::reproduce::{STAGES, reproduce};
+use host_design::table::write_atomically;
 
 use crate::failure::Failure;
 use crate::progress::with_stages;
@@ -32,13 +33,22 @@ pub(crate) struct Reproduce {
 impl Reproduce {
     pub(crate) fn run(self) -> Result<(), Failure> {
         let found = with_stages(STAGES, reproduce)?;
-        let summary = found.summary();
+        if !self.no_write {
+            let files = found.files()?;
+            std::fs::create_dir_all(&self.out).map_err(|error| {
+                Failure::BadArgument(format!("--out {}: cannot be made: {error}", self.out.display()))
+            })?;
+            for (name, contents) in &files {
+                write_atomically(&self.out.join(name), contents)?;
+            }
+            eprintln!("wrote summary.md, figures and data ({} files) to {}", files.len(), self.out.display());
+        }
         let mut out = std::io::stdout().lock();
         if self.json {
             serde_json::to_writer(&mut out, &found).map_err(std::io::Error::from)?;
             writeln!(out)?;
         } else {
-            write!(out, "{summary}")?;
+            write!(out, "{}", found.summary())?;
         }
         Ok(())
     }

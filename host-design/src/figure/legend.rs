@@ -1,0 +1,57 @@
+//! The names of the curves, above the panel, where they hide none of them.
+
+use plotters::style::ShapeStyle;
+
+use super::theme::HEAT;
+use super::{Figure, Panel, Style};
+
+/// One entry of a legend (px from the top left corner of the panel).
+pub(super) struct Entry {
+    pub(super) key: Key,
+    pub(super) text: String,
+    pub(super) left: f64,
+    pub(super) middle: f64,
+}
+
+/// What stands before the text.
+pub(super) enum Key {
+    Curve(Style),
+    Fill(ShapeStyle),
+    Nothing,
+}
+
+/// Length of the piece of line before a name (px).
+pub(super) const SAMPLE: f64 = 26.0;
+
+/// All entries of a panel, and the height they take (px).
+pub(super) fn entries(figure: &Figure, panel: &Panel, from: f64) -> (Vec<Entry>, f64) {
+    let mut keys: Vec<(Key, String)> = Vec::new();
+    if let Some(heat) = &panel.heat {
+        keys.push((Key::Nothing, heat.name.clone()));
+        for (end, colour) in heat.classes().into_iter().zip(HEAT) {
+            keys.push((Key::Fill(colour.into()), format!("{end:.2} {}", heat.unit)));
+        }
+        keys.push((Key::Nothing, "blank: not at all".to_owned()));
+    }
+    let named = panel.curves.iter().filter(|curve| !curve.name.is_empty());
+    keys.extend(named.map(|curve| (Key::Curve(curve.style), curve.name.clone())));
+
+    let line = 1.45 * figure.text;
+    let (mut left, mut middle) = (from, 0.5 * line + 2.0);
+    let mut entries = Vec::new();
+    for (key, text) in keys {
+        let before = match key {
+            Key::Nothing => 0.0,
+            Key::Fill(_) => figure.text + 5.0,
+            Key::Curve(_) => SAMPLE + 7.0,
+        };
+        let width = before + 0.56 * figure.text * text.chars().count() as f64 + 14.0;
+        if left > from && left + width > f64::from(figure.width) {
+            (left, middle) = (from, middle + line);
+        }
+        entries.push(Entry { key, text, left, middle });
+        left += width;
+    }
+    let height = if entries.is_empty() { 6.0 } else { middle + 0.5 * line + 2.0 };
+    (entries, height)
+}

@@ -1,0 +1,56 @@
+//! Colours, dashes and widths.
+
+use plotters::style::RGBColor;
+
+/// Okabe and Ito, the order changed so that neighbours differ in lightness, too.
+pub(super) const COLOURS: [RGBColor; 7] = [
+    RGBColor(0, 114, 178),
+    RGBColor(213, 94, 0),
+    RGBColor(0, 158, 115),
+    RGBColor(204, 121, 167),
+    RGBColor(230, 159, 0),
+    RGBColor(86, 180, 233),
+    RGBColor(0, 0, 0),
+];
+
+/// The dash of each colour (px); empty: solid.
+pub(super) const DASHES: [&[u32]; 7] =
+    [&[], &[9, 3], &[2, 2], &[9, 3, 2, 3], &[5, 3], &[12, 3, 2, 3, 2, 3], &[3, 5]];
+
+pub(super) const REFERENCE: RGBColor = RGBColor(190, 190, 190);
+pub(super) const LIMIT: RGBColor = RGBColor(90, 90, 90);
+pub(super) const LIMIT_DASH: &[u32] = &[4, 4];
+
+/// Settling times from short to long: lightness falls, so that it reads in grey (ColorBrewer YlGnBu).
+pub(super) const HEAT: [RGBColor; 4] =
+    [RGBColor(199, 233, 180), RGBColor(127, 205, 187), RGBColor(65, 182, 196), RGBColor(34, 94, 168)];
+
+/// Units of the drawing in one pixel: coordinates are whole numbers, and steps of a pixel would be seen in a curve.
+pub(super) const FINE: u32 = 4;
+/// Width of a curve (units of the drawing).
+pub(super) const LINE: u32 = 2 * FINE;
+/// Width of a reference.
+pub(super) const WIDE: u32 = 5 * FINE;
+/// Width of a limit; of no other line, so that its dash can be told.
+pub(super) const THIN: u32 = FINE + 1;
+/// Width of a cross; of no other line.
+pub(super) const MARKER: u32 = 2 * FINE - 1;
+
+/// Puts the dashes into a document: the drawing library has no dashed line in one piece, but every colour has one dash.
+pub(super) fn dashed(svg: &str) -> String {
+    let mut svg = svg.to_owned();
+    let lines = COLOURS.iter().zip(DASHES).map(|(colour, dash)| (colour, LINE, dash));
+    for (colour, width, dash) in lines.chain([(&LIMIT, THIN, LIMIT_DASH)]) {
+        if dash.is_empty() {
+            continue;
+        }
+        let stroke = format!("stroke=\"{}\" stroke-width=\"{width}\"", hex(*colour));
+        let dash: Vec<String> = dash.iter().map(|length| (length * FINE).to_string()).collect();
+        svg = svg.replace(&stroke, &format!("{stroke} stroke-dasharray=\"{}\"", dash.join(" ")));
+    }
+    svg
+}
+
+fn hex(RGBColor(r, g, b): RGBColor) -> String {
+    format!("#{r:02X}{g:02X}{b:02X}")
+}
