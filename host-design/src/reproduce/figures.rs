@@ -91,7 +91,7 @@ impl Settling {
         for (number, row) in self.rows.iter().enumerate() {
             let course = &row.course;
             let name = match &row.fall {
-                Some(_) => format!("{} s (falls)", row.settling_time_s),
+                Some(_) => format!("ts = {} s, falls", row.settling_time_s),
                 None => format!("ts = {} s", row.settling_time_s),
             };
             let points = over_time(course, |index| 100.0 * (course.states[index][0] - 1.0).abs());
@@ -106,18 +106,21 @@ impl Settling {
                 |(row, printed): (&super::SettlingRow, bool)| row.course.stabilised(1.0, horizon) == printed;
             [horizon, self.rows.iter().zip(printed()).map(same).filter(|&same| same).count() as f64]
         });
-        let mut count = Panel::new(time(), Axis::linear("verdicts as printed").range(0.0, 7.5))
+        let mut count = Panel::new(time(), Axis::linear("verdicts as printed, of 7").range(0.0, 7.5))
             .high(190)
-            .with(Curve::line("of 7", 0, agreeing.collect()));
+            .with(Curve::line("", 0, agreeing.collect()));
         if let Some([first, last]) = self.horizons_s {
             let edge = |at: f64| vec![[at, 0.0], [at, 7.5]];
             count = count
                 .with(Curve::limit(format!("all 7: {first:.2} to {last:.2} s"), edge(first)))
                 .with(Curve::limit("", edge(last)));
         }
-        Figure::new("Table 2 of the paper: a matter of how long the runs are").with(distance).with(count)
+        Figure::new("Table 2 of the paper: verdicts by the length of the runs").with(distance).with(count)
     }
 }
+
+/// Beyond lies hardly any motion (Hz).
+const HIGHEST_HZ: f64 = 200.0;
 
 /// Spectra of cart, first joint and force under the paper's disturbances.
 fn spectra(all: &[Robustness]) -> Figure {
@@ -125,11 +128,13 @@ fn spectra(all: &[Robustness]) -> Figure {
     for (signal, label, scale) in
         [("x", "cart (mm/√Hz)", 1e3), ("theta1", "θ1 (mrad/√Hz)", 1e3), ("u", "force (N/√Hz)", 1.0)]
     {
-        let mut panel = Panel::new(Axis::log("frequency (Hz)").range(0.1, 500.0), Axis::log(label)).high(250);
+        let mut panel =
+            Panel::new(Axis::log("frequency (Hz)").range(0.1, HIGHEST_HZ), Axis::log(label)).high(250);
         let shown = all.iter().filter(|one| one.kind != Loop::FullState);
         for (number, one) in shown.enumerate() {
             let Some(ripple) = one.ripples.iter().find(|ripple| ripple.signal == signal) else { continue };
-            let points = ripple.spectrum.amplitudes().into_iter().map(|[f, density]| [f, scale * density]);
+            let points = ripple.spectrum.amplitudes().into_iter().filter(|point| point[0] <= HIGHEST_HZ);
+            let points = points.map(|[frequency, amplitude]| [frequency, scale * amplitude]);
             panel = panel.with(Curve::line(
                 format!("{}, {}", one.law, one.kind.name()),
                 number,

@@ -162,7 +162,7 @@ fn settling(settling: &Settling) -> String {
                 format!("{}", row.settling_time_s),
                 yes(row.printed).to_owned(),
                 match (&row.fall, row.settled_after_s) {
-                    (Some(fall), _) => format!("{fall}"),
+                    (Some(fall), _) => format!("has fallen by {:.2} s", fall.at_s),
                     (None, Some(time)) => format!("stands, within 2 % from {time:.2} s on"),
                     (None, None) => "stands, not settled".to_owned(),
                 },
@@ -271,7 +271,7 @@ fn claims(all: &[Robustness]) -> String {
         "mean u² (N²)",
     ];
     text += &markdown_table(&header, 2, &rows);
-    text.push('\n');
+    text += "\nBetter is: lower frequency, rms, force and effort; larger margins.\n\n";
     for kind in Loop::ALL {
         let of = |law: &str| all.iter().find(|one| one.law == law && one.kind == kind);
         if let (Some(lqr), Some(placement)) = (of("LQR"), of("pole placement")) {
@@ -301,33 +301,49 @@ fn margin_row(one: &Robustness) -> Vec<String> {
     ]
 }
 
-/// One sentence: in what the LQR is better than pole placement in this loop, and in what it is not.
+/// Quantities that differ by less than this factor count as equal: a run of another seed gives as much.
+const ALIKE: f64 = 1.1;
+
+/// In what the LQR is better than pole placement in this loop, in what it is not, and in what they are alike.
 fn comparison(lqr: &Robustness, placement: &Robustness) -> String {
-    let mut better = Vec::new();
-    let mut worse = Vec::new();
-    let mut weigh =
-        |what: String, is_better: bool| if is_better { better.push(what) } else { worse.push(what) };
+    let mut groups: [Vec<String>; 3] = Default::default();
+    // `gain`: how many times better the LQR is.
+    let mut weigh = |what: &str, gain: f64| {
+        let group = if gain > ALIKE {
+            0
+        } else if gain * ALIKE < 1.0 {
+            1
+        } else {
+            2
+        };
+        groups[group].push(what.to_owned());
+    };
     for (ours, theirs) in lqr.ripples.iter().zip(&placement.ripples) {
-        weigh(format!("frequency of {}", ours.signal), ours.bandwidth.mean_hz < theirs.bandwidth.mean_hz);
+        let what = format!("mean frequency of {}", ours.signal);
+        weigh(&what, theirs.bandwidth.mean_hz / ours.bandwidth.mean_hz);
     }
     for (ours, theirs) in lqr.ripples.iter().zip(&placement.ripples) {
-        weigh(format!("rms of {}", ours.signal), ours.rms < theirs.rms);
+        weigh(&format!("rms of {}", ours.signal), theirs.rms / ours.rms);
     }
     if let (Some(ours), Some(theirs)) = (&lqr.margins, &placement.margins) {
-        weigh("gain may fall".to_owned(), ours.lowest_gain < theirs.lowest_gain);
-        if let (Some(ours), Some(theirs)) = (ours.highest_gain, theirs.highest_gain) {
-            weigh("gain may grow".to_owned(), ours > theirs);
+        weigh("how far the gain may fall", theirs.lowest_gain / ours.lowest_gain);
+        let each = |of: fn(&Margins) -> Option<f64>| Some(of(ours)? / of(theirs)?);
+        for (what, gain) in [
+            ("how far the gain may grow", each(|margins| margins.highest_gain)),
+            ("phase margin", each(|margins| margins.phase_margin_rad)),
+            ("delay margin", each(|margins| margins.delay_margin_s)),
+            ("disk margin", each(|margins| Some(margins.disk_margin))),
+        ] {
+            if let Some(gain) = gain {
+                weigh(what, gain);
+            }
         }
-        weigh("phase margin".to_owned(), ours.phase_margin_rad > theirs.phase_margin_rad);
-        weigh("delay margin".to_owned(), ours.delay_margin_s > theirs.delay_margin_s);
-        weigh("disk margin".to_owned(), ours.disk_margin > theirs.disk_margin);
     }
-    weigh("peak force".to_owned(), lqr.peak_force_n < placement.peak_force_n);
-    weigh("mean u²".to_owned(), lqr.effort_n2 < placement.effort_n2);
+    weigh("peak force", placement.peak_force_n / lqr.peak_force_n);
+    weigh("mean u²", placement.effort_n2 / lqr.effort_n2);
+    let [better, worse, alike] = groups.map(|group| group.join(", "));
     format!(
-        "- {}: the LQR is lower, or more tolerant, in: {}. It is not in: {}.\n",
-        lqr.kind.name(),
-        better.join(", "),
-        worse.join(", ")
+        "- {}\n  - the LQR does better, by 10 % or more, in: {better}\n  - pole placement does in: {worse}\n  - alike: {alike}\n",
+        lqr.kind.name()
     )
 }
