@@ -4,6 +4,7 @@
 //! [`numerics`]. The control law itself is not here: a simulation runs the firmware's own controller from the crate
 //! `upright`.
 
+pub mod compare;
 pub mod design;
 pub mod figure;
 pub mod numerics;

@@ -1,6 +1,7 @@
 //! The command-line tool: from a rig file to gains, to the table, to a closed loop.
 
 mod check;
+mod compare;
 mod design;
 mod failure;
 mod progress;
@@ -20,6 +21,7 @@ Examples:
   upright design my.toml --json --no-write      the same as data, leaving all files alone
   upright simulate rigs/quadruple-paper.toml --step 1 --svg step.svg
   upright verify rigs/quadruple-paper.toml      how far the loop can be trusted, in numbers
+  upright compare rigs/quadruple-paper.toml --sweep tick.period_s=0.0005..0.01
   upright reproduce                             the results of the paper beside ours
 
 Exit status:
@@ -38,6 +40,7 @@ struct Arguments {
 enum Command {
     Check(check::Check),
     Design(design::Design),
+    Compare(compare::Compare),
     Reproduce(reproduce::Reproduce),
     Simulate(simulate::Simulate),
     Verify(verify::Verify),
@@ -47,6 +50,7 @@ fn main() -> ExitCode {
     let result = match Arguments::parse().command {
         Command::Check(command) => command.run(),
         Command::Design(command) => command.run(),
+        Command::Compare(command) => command.run(),
         Command::Reproduce(command) => command.run(),
         Command::Simulate(command) => command.run(),
         Command::Verify(command) => command.run(),
