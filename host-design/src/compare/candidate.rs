@@ -14,6 +14,8 @@ use crate::verify::{AttractionSettings, Margins, attraction, linear};
 /// A rig to compare, and the value of the swept key in it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Candidate {
+    /// What it is called in the table: different for each rig file.
+    pub label: String,
     /// The rig.
     pub rig: Rig,
     /// The value.
@@ -106,7 +108,7 @@ fn row(candidate: &Candidate, law: Law, conditions: &Conditions) -> Result<Row, 
         rig.kalman = None;
     }
     let mut row = Row {
-        rig: rig.name.clone(),
+        rig: candidate.label.clone(),
         value: candidate.value,
         law: name,
         fate: Fate::Standing,

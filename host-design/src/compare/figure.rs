@@ -4,7 +4,7 @@ use super::candidate::Candidate;
 use super::row::{Fate, Figures, Row};
 use super::sweep::Sweep;
 use crate::figure::{Axis, Curve, Figure, Panel};
-use crate::rig::PlantDescription;
+use crate::rig::{PlantDescription, Rig};
 
 /// One figure of a row.
 type Value = fn(&Figures) -> Option<f64>;
@@ -58,6 +58,7 @@ fn over_key(rows: &[Row], sweep: &Sweep) -> Figure {
         let of_run = index < 4;
         let mut panel = Panel::new(x_axis(), Axis::linear(label)).high(165);
         let mut lost: Vec<[f64; 2]> = Vec::new();
+        // Number 0 is that of the cross.
         for (number, (name, group)) in groups.iter().enumerate() {
             let points: Vec<[f64; 2]> = group
                 .iter()
@@ -88,18 +89,23 @@ fn over_key(rows: &[Row], sweep: &Sweep) -> Figure {
 
 fn over_time(rows: &[Row], candidates: &[Candidate]) -> Figure {
     let time = || Axis::linear("time (s)");
-    let mut position = Panel::new(time(), Axis::linear("position (m)"));
+    let is_chain = |rig: &Rig| matches!(rig.plant, PlantDescription::Chain(_));
+    let all_chains = candidates.iter().all(|candidate| is_chain(&candidate.rig));
+    let label = if all_chains { "position (m)" } else { "position (m), or output" };
+    let mut position = Panel::new(time(), Axis::linear(label));
     let mut angle = Panel::new(time(), Axis::linear("largest angle (°)"));
     let mut force = Panel::new(time(), Axis::linear("force (N)"));
     for (number, (name, group)) in groups(rows).into_iter().enumerate() {
         let Some(trace) = group.first().and_then(|row| row.trace.as_ref()) else { continue };
-        let rig = candidates.iter().map(|candidate| &candidate.rig).find(|rig| rig.name == group[0].rig);
-        let output = rig.map_or(0, |rig| rig.output());
+        let Some(candidate) = candidates.iter().find(|candidate| candidate.label == group[0].rig) else {
+            continue;
+        };
+        let output = candidate.rig.output();
         let course = |value: &dyn Fn(&[f64], f64) -> f64| -> Vec<[f64; 2]> {
             trace.samples().map(|sample| [sample.t, value(sample.state, sample.force)]).collect()
         };
         position = position.with(Curve::line(name, number, course(&|state, _| state[output])));
-        if rig.is_some_and(|rig| matches!(rig.plant, PlantDescription::Chain(_))) {
+        if is_chain(&candidate.rig) {
             let largest = |state: &[f64]| {
                 state[2..].iter().step_by(2).fold(0.0, |largest: f64, angle| largest.max(angle.abs()))
             };

@@ -7,7 +7,7 @@ use crate::simulate::{Fall, Trace};
 /// What was found for one law of one candidate.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Row {
-    /// Name of the rig.
+    /// Label of the rig.
     pub rig: String,
     /// Value of the swept key.
     pub value: Option<f64>,

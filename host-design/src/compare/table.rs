@@ -3,11 +3,13 @@
 use super::row::{Fate, Figures, Row};
 use crate::reproduce::markdown_table;
 
-/// All rows as a table with aligned columns, which is Markdown as well; `key` is the swept one.
+/// All rows as a table with aligned columns, which is Markdown as well; `key` is the swept one. A column of the same rig
+/// throughout is left out.
 pub fn table(rows: &[Row], key: Option<&str>) -> String {
-    let mut header = vec!["rig", "law", "run"];
+    let several = rows.iter().any(|row| row.rig != rows[0].rig);
+    let mut header = if several { vec!["rig", "law", "run"] } else { vec!["law", "run"] };
+    let left = header.len();
     header.extend(key);
-    let left = header.len() - usize::from(key.is_some());
     header.extend([
         "settled (s)",
         "overshoot (%)",
@@ -22,7 +24,8 @@ pub fn table(rows: &[Row], key: Option<&str>) -> String {
     let cells: Vec<Vec<String>> = rows
         .iter()
         .map(|row| {
-            let mut cells = vec![row.rig.clone(), law(row.law).to_owned(), fate(&row.fate)];
+            let mut cells = if several { vec![row.rig.clone()] } else { Vec::new() };
+            cells.extend([law(row.law).to_owned(), fate(&row.fate)]);
             cells.extend(key.map(|_| row.value.map_or(String::new(), |value| value.to_string())));
             cells.extend(figures(row));
             cells

@@ -65,9 +65,12 @@ pub(crate) struct Compare {
 
 impl Compare {
     pub(crate) fn run(self) -> Result<(), Failure> {
+        let rigs: Vec<Rig> = self.rigs.iter().map(|path| Rig::from_path(path)).collect::<Result<_, _>>()?;
         let mut candidates = Vec::new();
-        for path in &self.rigs {
-            candidates.extend(self.candidates(path)?);
+        for (path, rig) in self.rigs.iter().zip(&rigs) {
+            let is_copy = rigs.iter().filter(|other| other.name == rig.name).count() > 1;
+            let label = if is_copy { path.display().to_string() } else { rig.name.clone() };
+            candidates.extend(self.candidates(path, rig, &label)?);
         }
         let conditions = Conditions {
             step_m: self.step,
@@ -121,12 +124,13 @@ impl Compare {
     }
 
     /// The rig of a file, or one for each value of the sweep.
-    fn candidates(&self, path: &Path) -> Result<Vec<Candidate>, Failure> {
-        let rig = Rig::from_path(path)?;
-        let Some(sweep) = &self.sweep else { return Ok(vec![Candidate { rig, value: None }]) };
-        let text = std::fs::read_to_string(path)?;
-        let candidate =
-            |&value: &f64| sweep.rig(&text, path, value).map(|rig| Candidate { rig, value: Some(value) });
+    fn candidates(&self, path: &Path, rig: &Rig, label: &str) -> Result<Vec<Candidate>, Failure> {
+        let named = |rig, value| Candidate { label: label.to_owned(), rig, value };
+        let Some(sweep) = &self.sweep else { return Ok(vec![named(rig.clone(), None)]) };
+        let text = std::fs::read_to_string(path).map_err(|error| {
+            Failure::BadArgument(format!("{}: cannot be read again for --sweep: {error}", path.display()))
+        })?;
+        let candidate = |&value: &f64| sweep.rig(&text, path, value).map(|rig| named(rig, Some(value)));
         Ok(sweep.values.iter().map(candidate).collect::<Result<_, _>>()?)
     }
 }

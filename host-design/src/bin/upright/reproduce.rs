@@ -32,12 +32,14 @@ pub(crate) struct Reproduce {
 
 impl Reproduce {
     pub(crate) fn run(self) -> Result<(), Failure> {
-        let found = with_stages(STAGES, reproduce)?;
         if !self.no_write {
-            let files = found.files()?;
             std::fs::create_dir_all(&self.out).map_err(|error| {
                 Failure::BadArgument(format!("--out {}: cannot be made: {error}", self.out.display()))
             })?;
+        }
+        let found = with_stages(STAGES, reproduce)?;
+        if !self.no_write {
+            let files = found.files()?;
             for (name, contents) in &files {
                 write_atomically(&self.out.join(name), contents)?;
             }
