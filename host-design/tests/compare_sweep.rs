@@ -124,7 +124,7 @@ fn table_2_of_the_paper_is_a_sweep() {
 
 #[test]
 fn continuous_gains_end_where_the_tick_gets_long_and_sampled_ones_do_not() {
-    let (candidates, _) = sweep_of(PAPER, "tick.period_s=0.001..0.003:3");
+    let (candidates, _) = sweep_of(PAPER, "tick.period_s=0.001..0.005:3");
     let run = |continuous_gains: bool| {
         let conditions = Conditions {
             full_state: true,
@@ -135,10 +135,11 @@ fn continuous_gains_end_where_the_tick_gets_long_and_sampled_ones_do_not() {
         };
         compare(&candidates, &conditions, &|| ()).unwrap()
     };
+    // At 3 ms the loop is unstable, but the force limit keeps it swinging.
     let (held, redesigned) = (run(true), run(false));
-    assert_eq!((fates(&held).as_str(), fates(&redesigned).as_str()), ("yyf", "yyy"));
+    assert_eq!((fates(&held).as_str(), fates(&redesigned).as_str()), ("ynf", "yyy"));
     let phase = |row: &Row| row.figures.as_ref().unwrap().phase_margin_rad;
-    assert!(phase(&held[2]).is_none() && phase(&held[0]) > phase(&held[1]));
+    assert!(phase(&held[0]).is_some() && phase(&held[1]).is_none() && phase(&held[2]).is_none());
     assert!(redesigned.iter().all(|row| phase(row).is_some()));
     assert!(table(&held, Some("tick.period_s")).lines().last().unwrap().contains("unstable"));
 }
