@@ -1,8 +1,8 @@
 //! From a rig file to a model, gains, the const table and a verdict on the closed loop.
 //!
 //! The way of data is the order of the modules: [`rig`] → [`plant`] → [`design`] → [`table`] → [`simulate`] → [`verify`], on top of
-//! [`numerics`]. The control law itself is not here: a simulation runs the firmware's own controller from the crate
-//! `upright`.
+//! [`numerics`]. [`compare`] puts designs side by side, [`reproduce`] the results of the paper beside ours. The control
+//! law itself is not here: a simulation runs the firmware's own controller from the crate `upright`.
 
 pub mod compare;
 pub mod design;

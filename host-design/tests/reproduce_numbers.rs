@@ -392,6 +392,17 @@ fn a_rig_with_one_law_or_without_links_is_refused_with_a_remedy() {
     assert!(message.contains("[cart]"), "{message}");
 }
 
+/// Every number that is printed.
+#[test]
+fn the_committed_summary_is_what_comes_out() {
+    let file = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../docs/reproduction.md");
+    let (committed, found) = (std::fs::read_to_string(file).unwrap(), ALL.summary());
+    for (line, (committed, found)) in committed.lines().zip(found.lines()).enumerate() {
+        assert_eq!(committed, found, "docs/reproduction.md:{}: made anew by `upright reproduce`?", line + 1);
+    }
+    assert_eq!(committed.lines().count(), found.lines().count());
+}
+
 #[test]
 fn the_summary_and_the_files_hold_every_part() {
     let summary = ALL.summary();

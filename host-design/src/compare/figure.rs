@@ -44,7 +44,11 @@ fn over_key(rows: &[Row], sweep: &Sweep) -> Figure {
         axis.range(ends[0] - pad, ends[1] + pad)
     };
     let groups = groups(rows);
-    let title = if rows.iter().all(|row| row.rig == rows[0].rig) { rows[0].rig.as_str() } else { "" };
+    let title = if rows.iter().all(|row| row.rig == rows[0].rig) {
+        rows.first().map_or("", |row| row.rig.as_str())
+    } else {
+        ""
+    };
     let mut figure = Figure::new(title);
     let panels: [(&str, Value); 6] = [
         ("settled (s)", |figures| figures.settling_time_s),

@@ -57,7 +57,6 @@ impl core::str::FromStr for Sweep {
         for part in parts {
             match part {
                 "log" if !log => log = true,
-                "lin" => {}
                 _ if points.is_none() && !log => {
                     points = Some(part.parse().map_err(|_| SweepError::Syntax)?);
                 }

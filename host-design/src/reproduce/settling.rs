@@ -83,13 +83,17 @@ pub fn printed() -> [bool; 7] {
 /// # Errors
 /// [`ReproduceError`] if a design or a run fails.
 pub fn settling() -> Result<Settling, ReproduceError> {
+    let exact: Vec<Feedback<f64>> = published::TABLE_2
+        .par_iter()
+        .map(|&(settling_time_s, _)| placement(&asking_for(paper_rig()?, settling_time_s)))
+        .collect::<Result<_, _>>()?;
     let changes = Change::all();
-    let jobs: Vec<(usize, f64)> = (0..changes.len())
-        .flat_map(|change| published::TABLE_2.map(|(settling_time_s, _)| (change, settling_time_s)))
+    let jobs: Vec<(usize, f64, &Feedback<f64>)> = (0..changes.len())
+        .flat_map(|change| published::TABLE_2.iter().zip(&exact).map(move |(row, law)| (change, row.0, law)))
         .collect();
     let courses: Vec<Course> = jobs
         .par_iter()
-        .map(|&(change, settling_time_s)| changes[change].1.course(settling_time_s))
+        .map(|&(change, settling_time_s, exact)| changes[change].1.course(settling_time_s, exact))
         .collect::<Result<_, _>>()?;
     let mut groups = courses.chunks_exact(published::TABLE_2.len()).zip(&changes);
     let sensitivity = groups
@@ -196,10 +200,13 @@ impl Change {
         }
     }
 
-    fn course(&self, settling_time_s: f64) -> Result<Course, ReproduceError> {
+    /// `exact` are the gains of the exact model.
+    fn course(&self, settling_time_s: f64, exact: &Feedback<f64>) -> Result<Course, ReproduceError> {
         let mut rig = asking_for(paper_rig()?, settling_time_s);
         match self {
-            Change::Continuous { gains, run } => run.course(chain(&rig)?, &gains.law(&rig, settling_time_s)?),
+            Change::Continuous { gains, run } => {
+                run.course(chain(&rig)?, &gains.law(&rig, settling_time_s, exact)?)
+            }
             Change::Firmware { tick, gains, force_limit_n } => {
                 rig.tick = tick.clone();
                 rig.actuator.force_limit_n = *force_limit_n;
@@ -231,26 +238,38 @@ fn asking_for(mut rig: Rig, wanted_s: f64) -> Rig {
 }
 
 impl GainsFrom {
-    fn law(&self, rig: &Rig, settling_time_s: f64) -> Result<Feedback<f64>, ReproduceError> {
-        let mut rig = match self {
-            GainsFrom::PrintedMatrices => asking_for(printed_rig()?, settling_time_s),
-            _ => rig.clone(),
-        };
-        if let Some(PolePlacement::Response { far_poles, .. }) = &mut rig.pole_placement {
-            for pole in far_poles {
-                match self {
-                    GainsFrom::FarPolesMoved => *pole *= published::SETTLING_TIME_S / settling_time_s,
-                    GainsFrom::TenTimesDominant => *pole = -40.0 / settling_time_s,
-                    GainsFrom::Exact | GainsFrom::Rounded | GainsFrom::PrintedMatrices => {}
+    /// The gains for `rig`, whose exact ones are `exact`.
+    fn law(
+        &self,
+        rig: &Rig,
+        settling_time_s: f64,
+        exact: &Feedback<f64>,
+    ) -> Result<Feedback<f64>, ReproduceError> {
+        let moved = |to: &dyn Fn(f64) -> f64| {
+            let mut rig = rig.clone();
+            if let Some(PolePlacement::Response { far_poles, .. }) = &mut rig.pole_placement {
+                for pole in far_poles {
+                    *pole = to(*pole);
                 }
             }
+            placement(&rig)
+        };
+        match self {
+            GainsFrom::Exact => Ok(exact.clone()),
+            GainsFrom::Rounded => Ok(Feedback {
+                k: exact.k.map(|gain| (gain * 1e2).round() / 1e2),
+                n: exact.n.map(|n| (n * 1e4).round() / 1e4),
+                integral: false,
+            }),
+            GainsFrom::PrintedMatrices => placement(&asking_for(printed_rig()?, settling_time_s)),
+            GainsFrom::FarPolesMoved => moved(&|pole| pole * published::SETTLING_TIME_S / settling_time_s),
+            GainsFrom::TenTimesDominant => moved(&|_| -40.0 / settling_time_s),
         }
-        let law = design(&rig)?.double.continuous.pole_placement;
-        let mut law = law.ok_or_else(|| ReproduceError::OneLaw(rig.name.clone()))?;
-        if let GainsFrom::Rounded = self {
-            law.k = law.k.map(|gain| (gain * 1e2).round() / 1e2);
-            law.n = law.n.map(|n| (n * 1e4).round() / 1e4);
-        }
-        Ok(law)
     }
+}
+
+/// Continuous gains of the pole placement that `rig` asks for.
+fn placement(rig: &Rig) -> Result<Feedback<f64>, ReproduceError> {
+    let law = design(rig)?.double.continuous.pole_placement;
+    law.ok_or_else(|| ReproduceError::OneLaw(rig.name.clone()))
 }
