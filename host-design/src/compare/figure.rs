@@ -62,7 +62,6 @@ fn over_key(rows: &[Row], sweep: &Sweep) -> Figure {
         let of_run = index < 4;
         let mut panel = Panel::new(x_axis(), Axis::linear(label)).high(165);
         let mut lost: Vec<[f64; 2]> = Vec::new();
-        // Number 0 is that of the cross.
         for (number, (name, group)) in groups.iter().enumerate() {
             let points: Vec<[f64; 2]> = group
                 .iter()
@@ -73,11 +72,9 @@ fn over_key(rows: &[Row], sweep: &Sweep) -> Figure {
                 })
                 .collect();
             let name = if index == 0 { name.as_str() } else { "" };
-            panel = panel.with(Curve::line(name, number, points.clone())).with(Curve::markers(
-                "",
-                1 + number,
-                points,
-            ));
+            // Number 0 is that of the crosses.
+            panel = panel.with(Curve::line(name, 1 + number, points.clone()));
+            panel = panel.with(Curve::markers("", 1 + number, points));
             let is_lost = |row: &&&Row| matches!(row.fate, Fate::Fallen(_) | Fate::NoDesign(_));
             lost.extend(group.iter().filter(is_lost).map(|row| [row.value.unwrap_or(f64::NAN), 0.0]));
         }
