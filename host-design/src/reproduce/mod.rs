@@ -6,6 +6,7 @@
 //! it says about the two laws without numbers. [`ContinuousRun`] is the loop that the paper simulates; where a tick is
 //! involved, the firmware's own controller runs.
 
+mod claims;
 mod comparison;
 mod continuous_loop;
 mod continuous_margins;

@@ -19,9 +19,9 @@ use crate::variation::{LawName, finite, positive};
 #[command(before_help = "\
 Examples:
   upright compare rigs/single-quanser-ip02.toml rigs/double-quanser-dbpen.toml
-  upright compare rigs/quadruple-paper.toml --sweep tick.period_s=0.0005..0.01:8:log      how slow may my tick be
-  upright compare rigs/quadruple-paper.toml --sweep pole_placement.settling_time_s=3..9 --law pole-placement \\
-      --full-state --step 1 --raw-step --duration 6.5                                   Table 2 of the paper
+  upright compare rigs/quadruple-paper.toml --sweep tick.period_s=0.0005..0.02:9:log
+  upright compare rigs/quadruple-paper.toml --sweep pole_placement.settling_time_s=3..9 \\
+      --law pole-placement --full-state --step 1 --raw-step --duration 6.5     (Table 2 of the paper)
   upright compare my.toml --sweep lqr.force_weight=0.01..10:13:log --svg weight.svg --csv weight.csv
   upright compare my.toml --sweep 'link[1].mass_kg=0.1..0.3' --json")]
 pub(crate) struct Compare {
