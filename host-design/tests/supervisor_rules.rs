@@ -280,6 +280,7 @@ fn event() -> impl Strategy<Value = Event> {
         emergency_stop: a & c & e,
         driver_fault: b & d & e,
         overrun: a,
+        clock_fault: a & b & c & d & e,
     });
     prop_oneof![
         4 => request.prop_map(Event::Ask),

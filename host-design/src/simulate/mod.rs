@@ -14,7 +14,6 @@ pub(crate) use closed_loop::ticks;
 pub use closed_loop::{SimulationError, run, simulate};
 pub use hand::{Act, Hand, Seen};
 pub use plot::svg;
-pub use plot::{PlotError, svg};
 pub use scenario::{Scenario, Sensing};
 pub use session::{Interference, Session, Tick};
 pub use summary::{Fall, FallKind, Summary};

@@ -8,6 +8,7 @@ use host_design::figure::FigureError;
 use host_design::image::{ElfError, ImageError, SizeError};
 use host_design::in_the_loop::{RunError, SessionError, TargetError};
 use host_design::report::ReportError;
+use host_design::reproduce::ReproduceError;
 use host_design::rig::RigError;
 use host_design::simulate::SimulationError;
 use host_design::table::{NoTable, WriteError};
@@ -48,6 +49,9 @@ pub(crate) enum Failure {
     InTheLoop(#[from] RunError),
     #[error(transparent)]
     Campaign(#[from] CampaignError),
+    #[error(transparent)]
+    Reproduce(#[from] ReproduceError),
+    #[error(transparent)]
     Figure(#[from] FigureError),
     #[error(transparent)]
     Report(#[from] ReportError),
@@ -79,6 +83,7 @@ impl Failure {
             | Failure::Simulation(_)
             | Failure::Verify(_)
             | Failure::Unverifiable(_)
+            | Failure::Reproduce(_)
             | Failure::Figure(_)
             | Failure::Report(_)
             | Failure::Write(_)

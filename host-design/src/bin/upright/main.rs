@@ -1,12 +1,14 @@
 //! The command-line tool: from a rig file to gains, to the table, to a closed loop.
 
 mod check;
+mod compare;
 mod design;
 mod failure;
 mod faults;
 mod firmware;
 mod progress;
 mod report;
+mod reproduce;
 mod simulate;
 mod variation;
 mod verify;
@@ -23,6 +25,8 @@ Examples:
   upright simulate rigs/quadruple-paper.toml --step 1 --svg step.svg
   upright verify rigs/quadruple-paper.toml      how far the loop can be trusted, in numbers
   upright report rigs/quadruple-paper.toml      all of it on one page, with an animation
+  upright compare rigs/quadruple-paper.toml --sweep tick.period_s=0.0005..0.01
+  upright reproduce                             the results of the paper beside ours
 
 Exit status:
   0  done        1  a check failed: the pendulum falls, a requirement is not met, a file differs
@@ -43,6 +47,8 @@ enum Command {
     Faults(faults::Faults),
     Firmware(firmware::Firmware),
     Report(report::Report),
+    Compare(compare::Compare),
+    Reproduce(reproduce::Reproduce),
     Simulate(simulate::Simulate),
     Verify(verify::Verify),
 }
@@ -54,6 +60,8 @@ fn main() -> ExitCode {
         Command::Faults(command) => command.run(),
         Command::Firmware(command) => command.run(),
         Command::Report(command) => command.run(),
+        Command::Compare(command) => command.run(),
+        Command::Reproduce(command) => command.run(),
         Command::Simulate(command) => command.run(),
         Command::Verify(command) => command.run(),
     };

@@ -27,3 +27,19 @@ pub(crate) fn with_bar<T>(
     bar.finish_and_clear();
     result
 }
+
+/// Runs `work` with a bar of `stages` on stderr, if that is a terminal; `work` names each stage before it starts it.
+pub(crate) fn with_stages<T>(stages: u64, work: impl FnOnce(&dyn Fn(&'static str)) -> T) -> T {
+    let bar = ProgressBar::new(stages);
+    bar.set_style(
+        ProgressStyle::with_template("{spinner} {bar:20} {pos}/{len} {msg} {elapsed}")
+            .unwrap_or_else(|_| ProgressStyle::default_bar()),
+    );
+    bar.enable_steady_tick(Duration::from_millis(120));
+    let result = work(&|stage| {
+        bar.inc(1);
+        bar.set_message(stage);
+    });
+    bar.finish_and_clear();
+    result
+}

@@ -1,0 +1,141 @@
+//! A comparison as text and as CSV.
+
+use super::row::{Fate, Figures, Row};
+use crate::reproduce::markdown_table;
+
+/// All rows as a table with aligned columns, which is Markdown as well; `key` is the swept one. A column of the same rig
+/// throughout is left out.
+pub fn table(rows: &[Row], key: Option<&str>) -> String {
+    let several = rows.iter().any(|row| row.rig != rows[0].rig);
+    let mut header = if several { vec!["rig", "law", "run"] } else { vec!["law", "run"] };
+    let left = header.len();
+    header.extend(key);
+    header.extend([
+        "settled (s)",
+        "overshoot (%)",
+        "peak angle (°)",
+        "peak force (N)",
+        "gain margin",
+        "phase (°)",
+        "delay (ms)",
+        "tilt (°)",
+        "fastest pole (1/s)",
+    ]);
+    let cells: Vec<Vec<String>> = rows
+        .iter()
+        .map(|row| {
+            let mut cells = if several { vec![row.rig.clone()] } else { Vec::new() };
+            cells.extend([law(row.law).to_owned(), fate(&row.fate)]);
+            cells.extend(key.map(|_| row.value.map_or(String::new(), |value| value.to_string())));
+            cells.extend(figures(row));
+            cells
+        })
+        .collect();
+    markdown_table(&header, left, &cells)
+}
+
+fn law(name: &str) -> &str {
+    if name == "lqr" { "LQR" } else { "pole placement" }
+}
+
+fn fate(fate: &Fate) -> String {
+    match fate {
+        Fate::Settled => "settles".to_owned(),
+        Fate::Standing => "stands".to_owned(),
+        Fate::Fallen(fall) => format!("{fall}"),
+        Fate::NoDesign(_) => "no design".to_owned(),
+    }
+}
+
+fn figures(row: &Row) -> [String; 9] {
+    let Some(figures) = &row.figures else { return core::array::from_fn(|_| "-".to_owned()) };
+    let fallen = matches!(row.fate, Fate::Fallen(_));
+    let number = |value: Option<f64>, decimals: usize| {
+        value.map_or("-".to_owned(), |value| format!("{value:.decimals$}"))
+    };
+    // What a falling pendulum does to force and angle says nothing.
+    let of_run = |value: Option<f64>, decimals: usize| number(value.filter(|_| !fallen), decimals);
+    [
+        number(figures.settling_time_s, 3),
+        of_run(figures.overshoot_percent, 2),
+        of_run(figures.peak_angle_rad.map(f64::to_degrees), 2),
+        of_run(Some(figures.peak_force_n), 2),
+        gain_margin(figures),
+        number(figures.phase_margin_rad.map(f64::to_degrees), 1),
+        number(figures.delay_margin_s.map(|delay| 1e3 * delay), 2),
+        number(figures.tilt_rad.map(f64::to_degrees), 2),
+        number(Some(figures.fastest_pole_per_s), 1),
+    ]
+}
+
+fn gain_margin(figures: &Figures) -> String {
+    match (figures.lowest_gain, figures.highest_gain) {
+        (None, _) => "unstable".to_owned(),
+        (Some(lowest), None) => format!("{lowest:.2} to ∞"),
+        (Some(lowest), Some(highest)) => format!("{lowest:.2} to {highest:.2}"),
+    }
+}
+
+/// Why some rows have no design, one line each.
+pub fn notes(rows: &[Row], key: Option<&str>) -> Vec<String> {
+    let note = |row: &Row| match &row.fate {
+        Fate::NoDesign(reason) => {
+            let value =
+                row.value.map_or(String::new(), |value| format!(", {} = {value}", key.unwrap_or("value")));
+            Some(format!("{}{value}: {reason}", row.rig))
+        }
+        Fate::Settled | Fate::Standing | Fate::Fallen(_) => None,
+    };
+    rows.iter().filter_map(note).collect()
+}
+
+/// All rows as CSV, in SI units; what does not exist is left empty.
+///
+/// # Errors
+/// Those of the writer, which are none in memory.
+pub fn csv(rows: &[Row], key: Option<&str>) -> std::io::Result<Vec<u8>> {
+    let mut csv = csv::Writer::from_writer(Vec::new());
+    csv.write_record([
+        "rig",
+        "law",
+        key.unwrap_or("value"),
+        "run",
+        "settling_time_s",
+        "overshoot_percent",
+        "peak_angle_rad",
+        "peak_force_n",
+        "lowest_gain",
+        "highest_gain",
+        "phase_margin_rad",
+        "delay_margin_s",
+        "tilt_rad",
+        "fastest_pole_per_s",
+        "reason",
+    ])?;
+    let number = |value: Option<f64>| value.map_or(String::new(), |value| value.to_string());
+    for row in rows {
+        let reason = match &row.fate {
+            Fate::NoDesign(reason) => reason.as_str(),
+            Fate::Settled | Fate::Standing | Fate::Fallen(_) => "",
+        };
+        let of = |value: fn(&Figures) -> Option<f64>| number(row.figures.as_ref().and_then(value));
+        csv.write_record([
+            row.rig.as_str(),
+            row.law,
+            &number(row.value),
+            &fate(&row.fate),
+            &of(|figures| figures.settling_time_s),
+            &of(|figures| figures.overshoot_percent),
+            &of(|figures| figures.peak_angle_rad),
+            &of(|figures| Some(figures.peak_force_n)),
+            &of(|figures| figures.lowest_gain),
+            &of(|figures| figures.highest_gain),
+            &of(|figures| figures.phase_margin_rad),
+            &of(|figures| figures.delay_margin_s),
+            &of(|figures| figures.tilt_rad),
+            &of(|figures| Some(figures.fastest_pole_per_s)),
+            reason,
+        ])?;
+    }
+    csv.into_inner().map_err(|error| std::io::Error::other(error.to_string()))
+}

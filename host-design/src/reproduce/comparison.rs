@@ -1,0 +1,119 @@
+//! A printed number beside ours.
+
+use serde::Serialize;
+
+/// To how many digits the paper prints a number.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Digits {
+    /// So many digits behind the point.
+    Decimals(usize),
+    /// So many digits from the first that is not 0.
+    Significant(usize),
+}
+
+/// How ours compares with what is printed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Verdict {
+    /// Rounded to as many digits as printed, it is the same number.
+    EveryDigit,
+    /// Rounded so, it is this many units of the last printed digit away.
+    UnitsOfLastDigit(u64),
+    /// The paper does not print it.
+    NotPrinted,
+}
+
+/// One line of the comparison.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Row {
+    /// What it is, as in `A[2,3]` (counted from 1) or `K[9] of the LQR`, with its unit if it has a simple one.
+    pub quantity: String,
+    /// What ours was computed from.
+    pub from: &'static str,
+    /// As the paper prints it, without the zeros that say nothing.
+    pub printed: Option<&'static str>,
+    /// Ours, in SI units.
+    pub ours: f64,
+    /// Ours less the printed number.
+    pub deviation: Option<f64>,
+    /// How they compare.
+    pub verdict: Verdict,
+}
+
+impl Row {
+    /// Compares `ours` with a number that the paper prints to so many `digits`.
+    pub fn printed(
+        quantity: impl Into<String>,
+        from: &'static str,
+        printed: &'static str,
+        digits: Digits,
+        ours: f64,
+    ) -> Self {
+        let value = value_of(printed);
+        let unit = digits.unit(value);
+        let units = ((digits.round(ours) - value) / unit).abs().round();
+        let verdict =
+            if units == 0.0 { Verdict::EveryDigit } else { Verdict::UnitsOfLastDigit(units as u64) };
+        Self {
+            quantity: quantity.into(),
+            from,
+            printed: Some(printed),
+            ours,
+            deviation: Some(ours - value),
+            verdict,
+        }
+    }
+
+    /// A number that follows from the paper's formulas but is not printed in it.
+    pub fn not_printed(quantity: impl Into<String>, from: &'static str, ours: f64) -> Self {
+        let quantity = quantity.into();
+        Self { quantity, from, printed: None, ours, deviation: None, verdict: Verdict::NotPrinted }
+    }
+
+    /// Whether every printed digit came out.
+    pub fn is_exact(&self) -> bool {
+        self.verdict == Verdict::EveryDigit
+    }
+}
+
+/// The number that a text of this crate stands for: not a number if it is none.
+pub(super) fn value_of(text: &str) -> f64 {
+    text.parse().unwrap_or(f64::NAN)
+}
+
+impl Digits {
+    /// `value` with as many digits as printed.
+    fn round(self, value: f64) -> f64 {
+        value_of(&match self {
+            Digits::Decimals(decimals) => format!("{value:.decimals$}"),
+            Digits::Significant(digits) => format!("{value:.*e}", digits.saturating_sub(1)),
+        })
+    }
+
+    /// The weight of the last printed digit of `value`.
+    fn unit(self, value: f64) -> f64 {
+        match self {
+            Digits::Decimals(decimals) => 0.1f64.powi(decimals as i32),
+            Digits::Significant(digits) => {
+                let leading = if value == 0.0 { 0.0 } else { value.abs().log10().floor() };
+                10f64.powf(leading - digits as f64 + 1.0)
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_number_agrees_up_to_half_a_unit_of_its_last_printed_digit() {
+        let verdict = |ours| Row::printed("K", "", "-578.51", Digits::Decimals(2), ours).verdict;
+        assert_eq!(verdict(-578.5051), Verdict::EveryDigit);
+        assert_eq!(verdict(-578.5049), Verdict::UnitsOfLastDigit(1));
+        assert_eq!(verdict(578.51), Verdict::UnitsOfLastDigit(115_702));
+        let verdict = |ours| Row::printed("A", "", "-1659.85", Digits::Significant(6), ours).verdict;
+        assert_eq!(verdict(-1659.852), Verdict::EveryDigit);
+        assert_eq!(verdict(-1659.862), Verdict::UnitsOfLastDigit(1));
+    }
+}
