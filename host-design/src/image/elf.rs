@@ -139,6 +139,7 @@ impl Image {
         mapping.sort_unstable();
         let end = text.0 + text.1.len() as u32;
         let functions = without_aliases(functions, end);
+        let data = without_overlap(data);
         Ok(Self { sections, functions, data, mapping, text, vectors, stack_start, stack_reserved, bytes })
     }
 
@@ -177,6 +178,20 @@ impl Image {
         let function = &self.functions[index];
         (address < function.address + function.size).then_some(index)
     }
+}
+
+/// Each byte once: the compiler merges small variables into one, and leaves their names.
+fn without_overlap(mut data: Vec<Item>) -> Vec<Item> {
+    data.sort_by_key(|item| (item.address, std::cmp::Reverse(item.size)));
+    let mut counted = 0;
+    for item in &mut data {
+        let end = item.address + item.size;
+        item.address = item.address.max(counted);
+        item.size = end.saturating_sub(item.address);
+        counted = counted.max(end);
+    }
+    data.retain(|item| item.size > 0);
+    data
 }
 
 /// One name for each address, the one that has a size; what assembly gives no size extends to the next function.
