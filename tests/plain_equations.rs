@@ -4,7 +4,9 @@ use nalgebra::{SMatrix, SVector};
 use proptest::prelude::*;
 use proptest::test_runner::{TestCaseError, TestRunner};
 use upright::controller::Controller;
+use upright::detection::Thresholds;
 use upright::encoder::CounterWidth;
+use upright::limits::Limits;
 use upright::observer::ObserverGains;
 use upright::state_feedback::{LawGains, saturate};
 use upright::table::{Build, GainTable, TABLE_FORMAT};
@@ -68,6 +70,8 @@ fn table<const NX: usize, const NY: usize>(
             step: SVector::from_fn(|_, _| number().abs()),
         }),
         motor: None,
+        limits: Limits::none(),
+        thresholds: Thresholds::none(),
         crc: 0,
     };
     table.crc = table.checksum();

@@ -20,15 +20,9 @@ pub(crate) enum Failure {
     #[error(transparent)]
     Rig(#[from] RigError),
     #[error("{rig}: {source}")]
-    Design {
-        rig: String,
-        source: DesignError,
-    },
+    Design { rig: String, source: DesignError },
     #[error("{rig}: {source}")]
-    NoTable {
-        rig: String,
-        source: NoTable,
-    },
+    NoTable { rig: String, source: NoTable },
     #[error("{0}")]
     NoSolution(String),
     #[error(transparent)]
