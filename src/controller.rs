@@ -222,6 +222,11 @@ impl<'t, const NX: usize, const NY: usize> Controller<'t, NX, NY> {
         self.mode = Mode::Stopped;
     }
 
+    /// Follows the encoders, and no more: a tick of a stopped controller.
+    pub fn follow(&mut self, raw: &[u32; NY]) {
+        self.encoders.update(raw);
+    }
+
     /// First half of a tick: from raw encoder counts to the command for the motor.
     ///
     /// With `delay_ticks = 0` the command is carried out at once and held for one tick. With 1 it is carried out, and

@@ -178,8 +178,7 @@ impl<'t, const NX: usize, const NY: usize> Firmware<'t, NX, NY> {
 
     /// A tick with the motor off: what is done by hand.
     fn prepare(&mut self) {
-        // Stopped: the encoders are followed, no more.
-        self.controller.control(&self.raw);
+        self.controller.follow(&self.raw);
         let limits = &self.table.limits;
         let counts = *self.controller.encoders_mut().counts();
         self.calibration.update(&counts, limits);

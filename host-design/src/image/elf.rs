@@ -94,7 +94,7 @@ impl Image {
             if address == 0 || section.size() == 0 {
                 continue; // debugging information
             }
-            let in_ram = address < 0x0800_0000 || address >= 0x1000_0000;
+            let in_ram = !(0x0800_0000..0x1000_0000).contains(&address);
             let in_flash = section.kind() != SectionKind::UninitializedData
                 && section.file_range().is_some_and(|(_, size)| size > 0);
             sections.push(Section { name: name.to_owned(), bytes: section.size() as u32, in_flash, in_ram });

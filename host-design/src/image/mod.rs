@@ -7,7 +7,7 @@ mod size;
 mod stack;
 mod thumb;
 
-pub use build::{ImageError, Kind, build, build_for};
+pub use build::{ImageError, Kind, build, build_for, build_if_possible};
 pub use elf::{ElfError, Image};
 pub use forbidden::forbidden_functions;
 pub use size::{FLASH_LIMIT, Part, RAM_LIMIT, Size, SizeError, size};
