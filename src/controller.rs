@@ -241,7 +241,7 @@ impl<'t, const NX: usize, const NY: usize> Controller<'t, NX, NY> {
 
     /// As [`control`](Self::control), with a look at counts, positions and innovation before the innovation is used:
     /// `judge` sets that of a measurement it rejects to 0, and the prediction takes its place.
-    #[inline]
+    #[inline(always)]
     pub fn control_with(
         &mut self,
         raw: &[u32; NY],
@@ -292,12 +292,13 @@ impl<'t, const NX: usize, const NY: usize> Controller<'t, NX, NY> {
     ) -> f32 {
         self.state.govern(self.target, self.gains.setpoint_step);
         let y = self.encoders.measure(raw, &observer.gains.step).data.0[0];
-        let (estimate, innovation) = (&mut self.estimate.data.0[0], &mut self.innovation.data.0[0]);
+        let estimate = &mut self.estimate.data.0[0];
         let mut sum = FeedbackSum::new(self.gains.n, self.state.setpoint);
         let counts = self.encoders.counts();
-        observer.innovation(measured, &y, estimate, innovation);
-        judge(counts, &y, innovation);
-        observer.correct(innovation, estimate, |joint, x| {
+        let mut e = observer.innovation(measured, &y, estimate);
+        judge(counts, &y, &mut e);
+        self.innovation.data.0[0] = e;
+        observer.correct(&e, estimate, |joint, x| {
             if let Some(k) = self.gains.k.as_slice().chunks(2).nth(joint) {
                 sum.feed_back(k, x);
             }
@@ -350,7 +351,7 @@ impl<'t, const NX: usize, const NY: usize> Controller<'t, NX, NY> {
 
     /// Force on the cart during this tick (N), between [`control`](Self::control) and [`predict`](Self::predict).
     pub fn acting(&self) -> f32 {
-        if self.table.delay_ticks == 1 { self.state.pending } else { self.applied }
+        if self.remembers && self.table.delay_ticks == 1 { self.state.pending } else { self.applied }
     }
 
     fn output(&self) -> f32 {

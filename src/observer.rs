@@ -80,13 +80,13 @@ impl<'t, const NX: usize, const NY: usize> Observer<'t, NX, NY> {
         measured: impl Fn(usize) -> usize,
         y: &[f32; NY],
         estimate: &[f32; NX],
-        innovation: &mut [f32; NY],
-    ) {
-        *innovation = *y;
+    ) -> [f32; NY] {
+        let mut innovation = *y;
         for (sensor, e) in innovation.iter_mut().enumerate() {
             // A checked table only names states that exist.
             *e -= estimate.get(measured(sensor)).copied().unwrap_or_default();
         }
+        innovation
     }
 
     /// Current estimate `x̂ = x̂⁻ + L e` in place of the prediction x̂⁻. `corrected` gets it joint by joint, with the number
@@ -98,11 +98,10 @@ impl<'t, const NX: usize, const NY: usize> Observer<'t, NX, NY> {
         estimate: &mut [f32; NX],
         mut corrected: impl FnMut(usize, &[f32]),
     ) {
-        let e = *innovation;
         let (joints, last) = estimate.as_chunks_mut::<2>();
         for (joint, estimate) in joints.iter_mut().enumerate() {
             let [mut position, mut rate] = *estimate;
-            for (column, e) in self.gains.l.data.0.iter().zip(&e) {
+            for (column, e) in self.gains.l.data.0.iter().zip(innovation) {
                 if let Some([to_position, to_rate]) = column.as_chunks::<2>().0.get(joint) {
                     // Both products before both sums: no instruction waits for the one before it.
                     let (a, b) = (to_position * e, to_rate * e);
@@ -114,7 +113,7 @@ impl<'t, const NX: usize, const NY: usize> Observer<'t, NX, NY> {
             corrected(joint, estimate);
         }
         if let [x] = last {
-            for (column, e) in self.gains.l.data.0.iter().zip(&e) {
+            for (column, e) in self.gains.l.data.0.iter().zip(innovation) {
                 *x += column.last().copied().unwrap_or_default() * e;
             }
             corrected(NX / 2, last);
@@ -182,8 +181,8 @@ mod tests {
             step: vector![1.0],
         };
         let observer = Observer::new(&gains);
-        let (mut x, mut e) = ([1.0, -1.0], [0.0]);
-        observer.innovation(|sensor| 2 * sensor, &[3.0], &x, &mut e);
+        let mut x = [1.0, -1.0];
+        let e = observer.innovation(|sensor| 2 * sensor, &[3.0], &x);
         observer.correct(&e, &mut x, |joint, x| assert_eq!((joint, x), (0, &[2.0, 3.0][..])));
         assert_eq!((x, e), ([2.0, 3.0], [2.0]));
         observer.predict(&mut x, 8.0);
