@@ -10,7 +10,7 @@ use object::{Object, ObjectSection};
 use super::elf::{Image, Item};
 
 /// Most flash that the image of a board may take, in bytes.
-pub const FLASH_LIMIT: u32 = 16 * 1024;
+pub const FLASH_LIMIT: u32 = 32 * 1024;
 /// Most static RAM (variables, without the stack) that the image of a board may take, in bytes.
 pub const RAM_LIMIT: u32 = 4 * 1024;
 
