@@ -30,7 +30,7 @@ reasons! {
     9 DRIVER "the power stage reports a fault";
     10 SUPPLY "the supply is too low";
     11 HELD "the arm command was held since the fault: let go, then arm again";
-    12 NO_OBSERVER "the gain table holds no observer: give the rig its encoders and [kalman]";
+    12 NO_OBSERVER "the gain table holds no observer: give the rig its encoders and `[kalman]`";
     13 TABLE "the gain table does not fit its checksum or this build";
     14 NOT_HANGING "the links do not hang at rest";
     15 NO_SWITCHES "this rig has no rail with switches at its ends";

@@ -35,7 +35,7 @@ impl Supervised for Nominal {
         let mut closest = 0.0f32;
         for tick in 0..self.ticks {
             // Beats every 50 ticks: the host commands the set-point.
-            let side = if tick / self.minute % 2 == 0 { 1.0 } else { -1.0 };
+            let side = if (tick / self.minute).is_multiple_of(2) { 1.0 } else { -1.0 };
             let request = match tick {
                 _ if tick % self.minute == 0 => Some(Request::Setpoint(side * self.setpoint_m)),
                 _ if tick % 50 == 0 => Some(Request::Beat),
