@@ -8,7 +8,7 @@ use upright::message::{Answer, Request};
 use upright::reasons::Reasons;
 use upright::sign_check::Signs;
 
-use super::defect::Kind;
+use super::defect::{Expected, Kind};
 use super::injection::Injection;
 use super::trial::Trial;
 use crate::in_the_loop::{
@@ -22,6 +22,8 @@ use crate::table::{TableValues, WithSize, with_firmware_size};
 pub enum Place<'a> {
     /// In this process.
     Host,
+    /// In this process, with nothing that it could find a defect by.
+    Blind,
     /// As this image in QEMU, a new one for each trial.
     Qemu(&'a Path),
 }
@@ -51,6 +53,8 @@ pub(super) struct Seen {
 
 /// Between two signs of life of the host (s).
 const BEAT_S: f64 = 0.025;
+/// Longest time from a defect to its verdict (s).
+const LONGEST_S: f64 = 6.0;
 /// A true angle or position beyond its limit by more than this share is too late, whatever follows.
 const BEYOND: f64 = 0.25;
 
@@ -81,9 +85,13 @@ impl WithSize for Attempt<'_> {
 
     fn run<const NX: usize, const NY: usize>(self) -> Self::Output {
         match self.place {
-            Place::Host => {
-                let (table, mut queues) = (self.table.table::<NX, NY>(), Queues::default());
-                let mut target = InProcess::<NX, NY>::new(&mut queues, &table, &self.table.build())?;
+            Place::Host | Place::Blind => {
+                let mut values = self.table.clone();
+                if let Place::Blind = self.place {
+                    values = values.without_detection();
+                }
+                let (table, mut queues) = (values.table::<NX, NY>(), Queues::default());
+                let mut target = InProcess::<NX, NY>::new(&mut queues, &table, &values.build())?;
                 if self.with_defect && self.trial.kind == Kind::HostDeaf {
                     // From the first tick of the run on: see below.
                     target.stuck_from = Some(self.trial.onset);
@@ -113,8 +121,18 @@ impl Attempt<'_> {
         let mut seen = Seen::default();
         let mut injection = Injection::<NY>::new(self.rig, self.table, trial);
         let mut output = stage.raise(0.0)?;
-        let beat = (BEAT_S / self.rig.tick.period_s).max(1.0) as usize;
-        for tick in 0..trial.onset + trial.watched {
+        let ticks = |seconds: f64| (seconds / self.rig.tick.period_s).max(1.0) as usize;
+        let beat = ticks(BEAT_S);
+        let (last, longest) = (trial.onset + trial.watched, trial.onset + ticks(LONGEST_S));
+        for tick in 0.. {
+            // What can be seen has to be decided, one way or the other: a slow rig takes its time to fall.
+            let undecided = matches!(trial.kind.expected(), Expected::Off(_))
+                && seen.visible.is_some()
+                && seen.off.is_none()
+                && !seen.outside;
+            if tick >= last && !(undecided && tick < longest) {
+                break;
+            }
             let since = tick.checked_sub(trial.onset).filter(|_| self.with_defect);
             let mut told = false;
             if tick > 0 {

@@ -88,7 +88,7 @@ pub fn kinds(table: &TableValues, place: Place<'_>) -> Vec<Kind> {
             _ => true,
         })
         .filter(|kind| match place {
-            Place::Host => !kind.needs_image(),
+            Place::Host | Place::Blind => !kind.needs_image(),
             Place::Qemu(_) => !kind.needs_process(),
         })
         .collect()

@@ -105,10 +105,9 @@ impl Faults {
         if chosen.is_empty() {
             return Ok(None);
         }
-        let blind = table.clone().without_detection();
         let runs = CONTROL_RUNS * chosen.len() as u64;
         let result = with_bar("without detection", runs, |tick| {
-            campaign(rig, &blind, &chosen, self.seed, runs, Place::Host, tick)
+            campaign(rig, table, &chosen, self.seed, runs, Place::Blind, tick)
         })?;
         Ok(Some(result))
     }
