@@ -2,7 +2,7 @@
 //!
 //! The way of data is the order of the modules: [`rig`] → [`plant`] → [`design`] → [`table`] → [`simulate`] → [`verify`] →
 //! [`report`], on top of [`numerics`]; [`figure`] draws. [`image`] builds the firmware, [`in_the_loop`] runs it whole, on
-//! the host or in QEMU, and [`campaign`] breaks the rig meanwhile. [`compare`] puts designs side by side, [`reproduce`]
+//! the host or in QEMU, [`campaign`] breaks the rig meanwhile, and [`monitor`] shows what a firmware says. [`compare`] puts designs side by side, [`reproduce`]
 //! the results of the paper beside ours. The control law itself is not here: a simulation runs the firmware's own
 //! controller from the crate `upright`.
 
@@ -14,6 +14,7 @@ pub mod design;
 pub mod figure;
 pub mod image;
 pub mod in_the_loop;
+pub mod monitor;
 pub mod numerics;
 pub mod plant;
 pub mod report;

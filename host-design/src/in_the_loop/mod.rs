@@ -6,6 +6,7 @@
 
 mod in_process;
 mod qemu;
+mod relay;
 mod run;
 mod session;
 mod stage;
@@ -13,6 +14,7 @@ mod target;
 
 pub use in_process::{InProcess, Queues};
 pub use qemu::{Emulator, Link};
+pub use relay::{RelayError, serve};
 pub use run::{Recording, RunError, Tick, Where, run};
 pub use session::{Session, SessionError};
 pub use stage::Stage;

@@ -6,7 +6,8 @@ use host_design::campaign::CampaignError;
 use host_design::design::DesignError;
 use host_design::figure::FigureError;
 use host_design::image::{ElfError, ImageError, SizeError};
-use host_design::in_the_loop::{RunError, SessionError, TargetError};
+use host_design::in_the_loop::{RelayError, RunError, SessionError, TargetError};
+use host_design::monitor::OpenError;
 use host_design::report::ReportError;
 use host_design::reproduce::ReproduceError;
 use host_design::rig::RigError;
@@ -41,6 +42,10 @@ pub(crate) enum Failure {
     NoProgram(&'static str),
     #[error(transparent)]
     InTheLoop(#[from] RunError),
+    #[error("nobody can connect: {0}")]
+    Relay(std::io::Error),
+    #[error(transparent)]
+    Monitor(#[from] OpenError),
     #[error(transparent)]
     Campaign(#[from] CampaignError),
     #[error(transparent)]
@@ -59,6 +64,15 @@ pub(crate) enum Failure {
     CheckFailed(String),
 }
 
+impl From<RelayError> for Failure {
+    fn from(error: RelayError) -> Self {
+        match error {
+            RelayError::Run(error) => Failure::InTheLoop(error),
+            RelayError::Socket(error) => Failure::Relay(error),
+        }
+    }
+}
+
 impl Failure {
     fn exit_status(&self) -> u8 {
         match self {
@@ -74,6 +88,8 @@ impl Failure {
             | Failure::Elf(_)
             | Failure::Size(_)
             | Failure::InTheLoop(_)
+            | Failure::Relay(_)
+            | Failure::Monitor(_)
             | Failure::Simulation(_)
             | Failure::Verify(_)
             | Failure::Unverifiable(_)

@@ -2,6 +2,7 @@
 
 mod build;
 mod flash;
+mod monitor;
 mod run;
 mod size;
 
@@ -16,7 +17,7 @@ use host_design::table::{Gains, TableValues};
 use crate::failure::Failure;
 use crate::progress::with_spinner;
 
-/// Builds, measures, runs and flashes the firmware image.
+/// Builds, measures, runs, flashes and watches the firmware image.
 #[derive(Args)]
 pub(crate) struct Firmware {
     #[command(subcommand)]
@@ -29,6 +30,7 @@ enum Command {
     Size(size::Size),
     Flash(flash::Flash),
     Run(run::Run),
+    Monitor(monitor::Monitor),
 }
 
 impl Firmware {
@@ -38,6 +40,7 @@ impl Firmware {
             Command::Size(command) => command.run(),
             Command::Flash(command) => command.run(),
             Command::Run(command) => command.run(),
+            Command::Monitor(command) => command.run(),
         }
     }
 }

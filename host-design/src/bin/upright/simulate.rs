@@ -104,15 +104,21 @@ impl Simulate {
         self,
         run: impl FnOnce(&Rig, &TableValues, &Scenario) -> Result<(Trace, Summary), Failure>,
     ) -> Result<(), Failure> {
-        let (rig, _, table) = self.variation.designed()?;
-        let scenario = self.scenario(&rig)?;
-        let table = if self.raw_step { table.without_governor() } else { table };
+        let (rig, table, scenario) = self.prepared()?;
         let (trace, summary) = run(&rig, &table, &scenario)?;
         self.write(&rig, &trace, &summary)?;
         match &summary.fall {
             Some(fall) => Err(Failure::CheckFailed(format!("{}: {fall}", rig.name))),
             None => Ok(()),
         }
+    }
+
+    /// The rig, its table and the scenario that the options ask for.
+    pub(crate) fn prepared(&self) -> Result<(Rig, TableValues, Scenario), Failure> {
+        let (rig, _, table) = self.variation.designed()?;
+        let scenario = self.scenario(&rig)?;
+        let table = if self.raw_step { table.without_governor() } else { table };
+        Ok((rig, table, scenario))
     }
 
     fn scenario(&self, rig: &Rig) -> Result<Scenario, Failure> {

@@ -1,8 +1,10 @@
 //! `upright firmware run`
 
+use std::net::TcpListener;
+
 use clap::{Args, ValueEnum};
 use host_design::image::{self, Kind};
-use host_design::in_the_loop::{Link, Recording, Where, run};
+use host_design::in_the_loop::{Link, Recording, Where, run, serve};
 use host_design::rig::Rig;
 use host_design::simulate::Scenario;
 use host_design::table::TableValues;
@@ -21,13 +23,17 @@ use crate::simulate::Simulate;
 Examples:
   upright firmware run rigs/quadruple-paper.toml --step 1 --svg qemu.svg
   upright firmware run rigs/quadruple-paper.toml --law pole-placement --tilt 0.004 --csv run.csv
-  upright firmware run rigs/single-quanser-ip02.toml --link usart --duration 2")]
+  upright firmware run rigs/single-quanser-ip02.toml --link usart --duration 2
+  upright firmware run rigs/single-quanser-ip02.toml --serve 127.0.0.1:7777 --duration 600")]
 pub(crate) struct Run {
     #[command(flatten)]
     simulate: Simulate,
     /// What the pins of the image are: files of the emulator (fast), or a serial line (as boards have)
     #[arg(long, value_enum, default_value_t = LinkName::Files)]
     link: LinkName,
+    /// Let `upright firmware monitor tcp:HOST:PORT` connect: in real time, for --duration, with nothing compared
+    #[arg(long, value_name = "HOST:PORT", conflicts_with_all = ["csv", "svg", "json"])]
+    serve: Option<String>,
 }
 
 #[derive(Clone, Copy, ValueEnum)]
@@ -42,6 +48,16 @@ impl Run {
             LinkName::Files => (Link::Files, Kind::InTheLoop),
             LinkName::Usart => (Link::Usart, Kind::InTheLoopUsart),
         };
+        if let Some(address) = &self.serve {
+            let listener = TcpListener::bind(address).map_err(|error| {
+                Failure::BadArgument(format!("--serve {address}: {error}; give HOST:PORT"))
+            })?;
+            let (rig, table, scenario) = self.simulate.prepared()?;
+            let image = with_spinner("building the image", || image::build_for(kind, &rig, &table))?;
+            eprintln!("connect with: upright firmware monitor tcp:{}", listener.local_addr()?);
+            let place = Where::Qemu { image: &image, link };
+            return Ok(with_spinner("serving", || serve(&rig, &table, &scenario, place, &listener))?);
+        }
         self.simulate.run_with(|rig, table, scenario| {
             let image = with_spinner("building the image", || image::build_for(kind, rig, table))?;
             let place = Where::Qemu { image: &image, link };

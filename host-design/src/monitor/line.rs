@@ -1,0 +1,101 @@
+//! The line to a firmware.
+
+use std::io::{ErrorKind, Read, Write};
+use std::net::TcpStream;
+use std::time::Duration;
+
+use serialport::SerialPort;
+
+/// Speed of the firmware's serial line (Bd).
+const BAUD: u32 = 460_800;
+/// Longest wait for bytes.
+const PATIENCE: Duration = Duration::from_millis(5);
+/// Longest wait for a line that takes no bytes.
+const STUCK: Duration = Duration::from_secs(1);
+
+/// A port that cannot be opened.
+#[derive(Debug, thiserror::Error)]
+pub enum OpenError {
+    /// A serial device.
+    #[error("{port}: {source}; is the board connected, and may you use it (group dialout)?")]
+    Serial {
+        /// What was asked for.
+        port: String,
+        /// Why it fails.
+        source: serialport::Error,
+    },
+    /// A TCP address.
+    #[error("tcp:{address}: {source}; start `upright firmware run RIG --serve {address}` first")]
+    Tcp {
+        /// What was asked for.
+        address: String,
+        /// Why it fails.
+        source: std::io::Error,
+    },
+}
+
+/// A serial device or a TCP connection.
+pub enum Line {
+    /// A serial device.
+    Serial(Box<dyn SerialPort>),
+    /// A relay.
+    Tcp(TcpStream),
+}
+
+impl Line {
+    /// Opens a serial device (`/dev/ttyACM0`, 460,800 Bd) or a relay (`tcp:HOST:PORT`).
+    ///
+    /// # Errors
+    /// [`OpenError`] with the port and what to do.
+    pub fn open(port: &str) -> Result<Self, OpenError> {
+        let Some(address) = port.strip_prefix("tcp:") else {
+            let serial = serialport::new(port, BAUD).timeout(PATIENCE).open();
+            return serial
+                .map(Line::Serial)
+                .map_err(|source| OpenError::Serial { port: port.to_owned(), source });
+        };
+        let connect = || {
+            let stream = TcpStream::connect(address)?;
+            stream.set_nodelay(true)?;
+            stream.set_read_timeout(Some(PATIENCE))?;
+            stream.set_write_timeout(Some(STUCK))?;
+            Ok(stream)
+        };
+        connect().map(Line::Tcp).map_err(|source| OpenError::Tcp { address: address.to_owned(), source })
+    }
+
+    /// Bytes that have come within 5 ms; none of them is no error.
+    ///
+    /// # Errors
+    /// If the line is closed.
+    pub fn receive<'a>(&mut self, buffer: &'a mut [u8]) -> std::io::Result<&'a [u8]> {
+        let (read, serial) = match self {
+            Line::Serial(port) => (port.read(buffer), true),
+            Line::Tcp(stream) => (stream.read(buffer), false),
+        };
+        match read {
+            Ok(0) if !serial => Err(ErrorKind::UnexpectedEof.into()),
+            Ok(length) => Ok(&buffer[..length]),
+            Err(error)
+                if matches!(
+                    error.kind(),
+                    ErrorKind::TimedOut | ErrorKind::WouldBlock | ErrorKind::Interrupted
+                ) =>
+            {
+                Ok(&[])
+            }
+            Err(error) => Err(error),
+        }
+    }
+
+    /// Sends all of these.
+    ///
+    /// # Errors
+    /// If the line is closed, or takes nothing.
+    pub fn send(&mut self, bytes: &[u8]) -> std::io::Result<()> {
+        match self {
+            Line::Serial(port) => port.write_all(bytes),
+            Line::Tcp(stream) => stream.write_all(bytes),
+        }
+    }
+}

@@ -1,0 +1,14 @@
+//! What a running firmware says, and what a person at the keyboard says to it.
+//!
+//! [`Monitor`] knows neither terminal nor line: bytes and keys go in, bytes come out. [`view`] draws it, [`Line`] is a
+//! serial device or a TCP connection, [`record`] writes telemetry.
+
+mod command;
+mod line;
+mod model;
+pub mod record;
+pub mod view;
+
+pub use command::{Action, BadCommand, action, request};
+pub use line::{Line, OpenError};
+pub use model::{Ended, Monitor, TelemetryOfAny};

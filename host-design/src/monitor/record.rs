@@ -1,0 +1,71 @@
+//! Telemetry as data.
+
+use std::io::Write;
+
+use serde_json::{Value, json};
+
+use super::model::TelemetryOfAny;
+
+/// One object with SI units; fault and reasons against arming in words.
+pub fn json(telemetry: &TelemetryOfAny) -> Value {
+    json!({
+        "tick": telemetry.tick,
+        "state": telemetry.state,
+        "fault": telemetry.fault.map(|fault| fault.to_string()),
+        "against_arming": telemetry.against.texts().collect::<Vec<_>>(),
+        "counts": telemetry.counts,
+        "estimate": telemetry.estimate,
+        "innovation": telemetry.innovation,
+        "setpoint_m": telemetry.setpoint,
+        "requested_n": telemetry.requested,
+        "applied_n": telemetry.applied,
+        "drive": telemetry.drive,
+        "cycles": telemetry.cycles,
+    })
+}
+
+/// A CSV file that grows with every telemetry. What was written stays readable whenever it ends.
+pub struct Recorder<W: Write> {
+    csv: csv::Writer<W>,
+    begun: bool,
+}
+
+impl<W: Write> Recorder<W> {
+    /// An empty recording.
+    pub fn new(out: W) -> Self {
+        Self { csv: csv::Writer::from_writer(out), begun: false }
+    }
+
+    /// Adds a row, the first with a head before it.
+    ///
+    /// # Errors
+    /// If it cannot be written.
+    pub fn push(&mut self, telemetry: &TelemetryOfAny) -> std::io::Result<()> {
+        if !self.begun {
+            let fixed =
+                ["tick", "state", "fault", "setpoint_m", "requested_n", "applied_n", "drive", "cycles"];
+            let head = fixed.iter().map(|name| (*name).to_owned());
+            let numbered = |name: &'static str, length| (0..length).map(move |i| format!("{name}{i}"));
+            let head = head
+                .chain(numbered("count", telemetry.counts.len()))
+                .chain(numbered("estimate", telemetry.estimate.len()))
+                .chain(numbered("innovation", telemetry.innovation.len()));
+            self.csv.write_record(head)?;
+            self.begun = true;
+        }
+        let fixed = [
+            telemetry.tick.to_string(),
+            format!("{:?}", telemetry.state),
+            telemetry.fault.map(|fault| fault.to_string()).unwrap_or_default(),
+            telemetry.setpoint.to_string(),
+            telemetry.requested.to_string(),
+            telemetry.applied.to_string(),
+            telemetry.drive.to_string(),
+            telemetry.cycles.to_string(),
+        ];
+        let counts = telemetry.counts.iter().map(ToString::to_string);
+        let values = telemetry.estimate.iter().chain(&telemetry.innovation).map(ToString::to_string);
+        self.csv.write_record(fixed.into_iter().chain(counts).chain(values))?;
+        self.csv.flush()
+    }
+}
