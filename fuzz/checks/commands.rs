@@ -21,7 +21,7 @@ const BYTES_PER_TICK: usize = 16;
 ///
 /// # Panics
 /// If the firmware arms or balances, or the motor is turned on.
-pub fn check(bytes: &[u8]) {
+pub(crate) fn check(bytes: &[u8]) {
     on_a_hanging_rig(|link, tick| {
         for piece in bytes.chunks(BYTES_PER_TICK) {
             piece.iter().for_each(|&byte| link(byte));
