@@ -39,7 +39,7 @@ const LONGEST_WAIT_S: f64 = 60.0;
 /// holds the rig at the scenario's start, so that it can be armed again.
 ///
 /// # Errors
-/// [`RelayError`] if the firmware does not run, or the socket fails.
+/// [`RelayError`] if the firmware does not run, the socket fails, or nobody connects for as long as the run would last.
 pub fn serve(
     rig: &Rig,
     table: &TableValues,
@@ -85,11 +85,8 @@ impl Relay<'_> {
         let mut tap = Tap { target, said: &said };
         let mut stage = Stage::<NX, NY>::new(self.rig, self.table, self.scenario, Session::new(&mut tap))?;
         let mut output = raise(&mut stage, self.rig.tick.period_s)?;
-        let (mut client, _) = self.listener.accept().map(|(stream, from)| (Some(stream), from))?;
         self.listener.set_nonblocking(true)?;
-        if let Some(stream) = &client {
-            stream.set_nonblocking(true)?;
-        }
+        let mut client = Some(self.first_client()?);
         said.borrow_mut().clear();
         let begin = Instant::now();
         let mut tick = 0u32;
@@ -116,6 +113,20 @@ impl Relay<'_> {
             std::thread::sleep(due.saturating_duration_since(Instant::now()));
         }
         Ok(())
+    }
+
+    /// Waits for somebody to connect, as long as the run would last.
+    fn first_client(&self) -> std::io::Result<TcpStream> {
+        let begin = Instant::now();
+        loop {
+            if let Some(client) = accepted(self.listener)? {
+                return Ok(client);
+            }
+            if begin.elapsed().as_secs_f64() > self.scenario.duration_s {
+                return Err(ErrorKind::TimedOut.into());
+            }
+            std::thread::sleep(Duration::from_millis(5));
+        }
     }
 }
 
