@@ -20,8 +20,8 @@ pub enum Class {
     Rejected,
     /// The motor went off in time.
     Detected,
-    /// The motor went off before links or cart had left their limits, but later than a defect of its kind is found at its
-    /// best: the observer follows an encoder whose error grows slowly.
+    /// The motor went off before a link was more than a quarter beyond its limit or the cart off its rail, but later than a
+    /// defect of its kind is found at its best: the observer follows an encoder whose error grows slowly.
     Late,
     /// What had to come did not come.
     Missed,
