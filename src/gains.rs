@@ -2,10 +2,10 @@
 //!
 //! Every gain is the exact answer of its design problem, rounded once to f32.
 
-use crate::detection::{MotorTest, Thresholds};
-use crate::limits::Limits;
-use crate::observer::ObserverGains;
-use crate::state_feedback::LawGains;
+use crate::control::observer::ObserverGains;
+use crate::control::state_feedback::LawGains;
+use crate::supervision::detection::{MotorTest, Thresholds};
+use crate::table::limits::Limits;
 use crate::table::{GainTable, TABLE_FORMAT, columns};
 
 /// Name of the rig.

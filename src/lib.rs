@@ -6,8 +6,8 @@
 //! hand here. The same code runs on the target, in simulations and in tests.
 //!
 //! ```
-//! use upright::controller::Controller;
-//! use upright::encoder::CounterWidth;
+//! use upright::control::controller::Controller;
+//! use upright::control::encoder::CounterWidth;
 //! use upright::gains::{RIG_HASH, SENSORS, TABLE, TICK_S};
 //! use upright::table::Build;
 //!
@@ -32,17 +32,9 @@
 #[cfg(test)]
 extern crate std;
 
-pub mod actuator;
-pub mod calibration;
-pub mod checksum;
-pub mod control_task;
-pub mod controller;
-pub mod detection;
-pub mod encoder;
-pub mod envelope;
-pub mod fault;
+pub mod board;
+pub mod control;
 pub mod firmware;
-pub mod frame;
 #[cfg(not(feature = "gains-from-env"))]
 pub mod gains;
 #[cfg(feature = "gains-from-env")]
@@ -50,18 +42,6 @@ pub mod gains;
 pub mod gains {
     include!(env!("UPRIGHT_GAINS"));
 }
-pub mod homing;
-pub mod io;
-pub mod limits;
-pub mod link;
-pub mod message;
-pub mod observer;
-pub mod pins;
-pub mod queue;
-pub mod reasons;
-pub mod sign_check;
-pub mod state_feedback;
-pub mod stillness;
-pub mod supervisor;
+pub mod protocol;
+pub mod supervision;
 pub mod table;
-pub mod watch;

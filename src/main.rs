@@ -12,6 +12,7 @@
 #![no_std]
 #![no_main]
 
+#[path = "board/hardware.rs"]
 mod board;
 
 use upright::gains;
@@ -30,12 +31,12 @@ const CYCLES_PER_TICK: u32 = {
 mod app {
     use cortex_m::peripheral::syst::SystClkSource;
     use heapless::spsc::Queue;
-    use upright::control_task::{COMMANDS, ControlTask, MESSAGES};
+    use upright::board::Board;
     use upright::firmware::Firmware;
+    use upright::firmware::control_task::{COMMANDS, ControlTask, MESSAGES};
     use upright::gains::{RIG_HASH, SENSORS, STATES, TABLE, TICK_S};
-    use upright::io::Board;
-    use upright::link::Link;
-    use upright::message::{Command, Message};
+    use upright::protocol::link::Link;
+    use upright::protocol::message::{Command, Message};
     use upright::table::Build;
 
     use crate::board::{BYTES, Hardware, Line, Receiver, set_up};

@@ -1,16 +1,16 @@
 //! Bytes and commands to a firmware whose rig hangs still: it never arms, and the motor stays off.
 
 use heapless::spsc::Queue;
-use upright::actuator::Drive;
-use upright::control_task::{COMMANDS, ControlTask, MESSAGES};
-use upright::encoder::CounterWidth;
+use upright::board::{Board, Contacts, Inputs, Output};
+use upright::control::actuator::Drive;
+use upright::control::encoder::CounterWidth;
 use upright::firmware::Firmware;
-use upright::frame::encode;
+use upright::firmware::control_task::{COMMANDS, ControlTask, MESSAGES};
 use upright::gains::{RIG_HASH, SENSORS, STATES, TABLE, TICK_S};
-use upright::io::{Board, Contacts, Inputs, Output};
-use upright::link::{Link, MAX_COMMAND};
-use upright::message::{Command, Message, Request, Reset};
-use upright::supervisor::State;
+use upright::protocol::frame::encode;
+use upright::protocol::link::{Link, MAX_COMMAND};
+use upright::protocol::message::{Command, Message, Request, Reset};
+use upright::supervision::supervisor::State;
 use upright::table::Build;
 
 /// The bytes of one tick, at most; what a line carries in it.

@@ -2,10 +2,10 @@
 
 use serde::Serialize;
 use serde::de::DeserializeOwned;
-use upright::frame::{Receiver, encode};
 use upright::gains::{SENSORS, STATES};
-use upright::link::{MAX_COMMAND, MAX_MESSAGE};
-use upright::message::{Command, Message};
+use upright::protocol::frame::{Receiver, encode};
+use upright::protocol::link::{MAX_COMMAND, MAX_MESSAGE};
+use upright::protocol::message::{Command, Message};
 
 /// Reads `bytes` as a stream of frames, and as a message without a frame, which gets past the checksum.
 ///

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use host_design::rig::Rig;
+use upright_design::rig::Rig;
 
 /// Reads `bytes` as a rig file.
 ///

@@ -1,12 +1,12 @@
 //! What the host asks for.
 
 use super::Firmware;
-use crate::calibration::hang;
-use crate::controller::Rejected;
-use crate::io::Contacts;
-use crate::message::{Answer, Command, Info, PROTOCOL, Request, Statistics};
-use crate::reasons::Reasons;
-use crate::supervisor::State;
+use crate::board::Contacts;
+use crate::control::controller::Rejected;
+use crate::protocol::message::{Answer, Command, Info, PROTOCOL, Request, Statistics};
+use crate::supervision::calibration::hang;
+use crate::supervision::inhibits::Reasons;
+use crate::supervision::supervisor::State;
 
 impl<const NX: usize, const NY: usize> Firmware<'_, NX, NY> {
     pub(super) fn answer(&mut self, command: &Command) -> Answer {

@@ -1,10 +1,10 @@
 //! Whether the rig stands so that balancing may begin.
 
 use super::Firmware;
-use crate::io::Contacts;
-use crate::reasons::Reasons;
-use crate::sign_check::Signs;
-use crate::supervisor::State;
+use crate::board::Contacts;
+use crate::supervision::inhibits::Reasons;
+use crate::supervision::sign_check::Signs;
+use crate::supervision::supervisor::State;
 
 impl<const NX: usize, const NY: usize> Firmware<'_, NX, NY> {
     /// Largest angle of a link from the vertical at these counts (rad); 0 where there are no turns.

@@ -2,8 +2,8 @@
 
 use super::*;
 use crate::gains::{RIG_HASH, SENSORS, STATES, TABLE, TICK_S};
-use crate::message::{Answer, Request};
-use crate::reasons::Reasons;
+use crate::protocol::message::{Answer, Request};
+use crate::supervision::inhibits::Reasons;
 
 const BUILD: Build = Build { rig_hash: RIG_HASH, tick_s: TICK_S };
 
@@ -108,6 +108,6 @@ fn a_rail_of_another_length_is_not_homed() {
     }
     assert_eq!(
         (firmware.state(), firmware.calibration.homing()),
-        (State::Disarmed, crate::homing::Homing::WrongTravel)
+        (State::Disarmed, crate::supervision::homing::Homing::WrongTravel)
     );
 }

@@ -10,7 +10,7 @@
 //! voltage scaling for 168 MHz is the one after a reset (RM0090, 5.4.1; RM0390, 5.4.1).
 
 use stm32f4xx_hal::pac::{FLASH, RCC};
-use upright::message::Reset;
+use upright::protocol::message::Reset;
 
 /// Core clock (Hz).
 pub(crate) const CLOCK_HZ: u32 = 168_000_000;

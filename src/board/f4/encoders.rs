@@ -1,7 +1,7 @@
 //! Incremental encoders, counted by timers.
 
 use stm32f4xx_hal::pac::{RCC, TIM2, TIM3, TIM4, TIM5, TIM8};
-use upright::encoder::CounterWidth::{self, Bits16, Bits32};
+use upright::control::encoder::CounterWidth::{self, Bits16, Bits32};
 use upright::gains::SENSORS;
 
 /// Cart first, then the links from the lowest; a rig with fewer sensors uses the first ones.

@@ -14,10 +14,10 @@ use core::mem::MaybeUninit;
 use cortex_m::peripheral::{DWT, SYST};
 use heapless::spsc::{Consumer, Producer};
 use stm32f4xx_hal::pac::{EXTI, Peripherals};
-use upright::encoder::CounterWidth;
+use upright::board::{Board, Contacts, Inputs, Output};
+use upright::control::encoder::CounterWidth;
 use upright::gains::SENSORS;
-use upright::io::{Board, Contacts, Inputs, Output};
-use upright::message::Reset;
+use upright::protocol::message::Reset;
 
 pub(crate) use clock::CLOCK_HZ;
 use motor::Motor;

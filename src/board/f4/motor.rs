@@ -10,8 +10,8 @@
 //! back, once the contact is closed again.
 
 use stm32f4xx_hal::pac::{RCC, TIM1};
+use upright::board::Output;
 use upright::gains::TABLE;
-use upright::io::Output;
 
 use super::pins;
 use crate::CYCLES_PER_TICK;

@@ -2,7 +2,7 @@
 
 use heapless::spsc::{Consumer, Producer};
 use stm32f4xx_hal::pac::{RCC, USART2};
-use upright::queue;
+use upright::protocol::queue;
 
 /// Telemetry of a quadruple rig at every tenth tick needs a third of it.
 const BAUD: u32 = 460_800;

@@ -12,12 +12,12 @@ use core::sync::atomic::{AtomicU32, Ordering};
 
 use heapless::spsc::{Consumer, Producer};
 use stm32f4xx_hal::pac::{Peripherals, TIM5};
-use upright::encoder::CounterWidth;
-use upright::frame::{self, Receiver as Frames};
+use upright::board::{Board, Inputs, Output};
+use upright::control::encoder::CounterWidth;
 use upright::gains::SENSORS;
-use upright::io::{Board, Inputs, Output};
-use upright::message::Reset;
-use upright::pins::{MAX_PINS_IN, MAX_PINS_OUT, PinsIn, PinsOut, Sabotage};
+use upright::protocol::frame::{self, Receiver as Frames};
+use upright::protocol::message::Reset;
+use upright::protocol::pins::{MAX_PINS_IN, MAX_PINS_OUT, PinsIn, PinsOut, Sabotage};
 
 #[cfg(feature = "in-the-loop")]
 use semihosting::{Channel, Serial, exit, open};

@@ -1,0 +1,31 @@
+//! Control design: from a linear model to gains, each the correctly rounded exact answer.
+
+mod assessment;
+mod certified;
+mod controllability;
+mod diagnosis;
+mod doubling;
+mod error;
+mod governor;
+mod kalman;
+mod loops;
+mod place;
+mod riccati;
+mod synthesis;
+mod thresholds;
+mod zero_order_hold;
+
+pub use assessment::Assessment;
+pub use certified::{Certified, design};
+pub use controllability::Reach;
+pub use error::{DesignError, Task};
+pub use governor::setpoint_step;
+pub use kalman::Kalman;
+pub use loops::{DesignPoles, Poles};
+pub use place::{Pole, dominant_pair, place};
+pub use riccati::{Cost, NoStabilisingSolution, Regulator, care, dare, is_stable, is_stable_sampled};
+pub use synthesis::continuous_plant;
+pub use synthesis::{Design, Feedback, Laws};
+pub(crate) use synthesis::{OBSERVER, noise_columns, wanted_poles};
+pub use thresholds::{DetectionDesign, MotorDesign, detection_thresholds};
+pub use zero_order_hold::{integrated_quadratic, sampled_cost, zero_order_hold};

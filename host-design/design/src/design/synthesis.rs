@@ -1,0 +1,336 @@
+//! A whole design at one working precision: plant, sampled plant, and every gain the rig file asks for.
+
+use super::diagnosis::{why_no_lqr, why_no_placement};
+use super::error::{DesignError, Task};
+use super::kalman::{Kalman, kalman};
+use super::place::{Pole, dominant_pair, place};
+use super::riccati::{Cost, care, dare};
+use super::zero_order_hold::{sampled_cost, zero_order_hold};
+use crate::numerics::{Complex, Matrix, Real, Wide, eigenvalues, solve};
+use crate::plant::{ChainParameters, Equilibrium, LinearModel, linearise};
+use crate::rig::{LinearPlant, Lqr, PlantDescription, PolePlacement, Rig};
+
+/// Plant and gains with entries of type `T`: a working precision, or what it was rounded to.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Design<T> {
+    /// `ẋ = A x + B u`, s×s.
+    pub a: Matrix<T>,
+    /// B, s×1.
+    pub b: Matrix<T>,
+    /// `x⁺ = Ad x + Bd u` for a force held over one tick, s×s.
+    pub ad: Matrix<T>,
+    /// Bd, s×1.
+    pub bd: Matrix<T>,
+    /// Gains for continuous time.
+    pub continuous: Laws<T>,
+    /// Gains for the tick. With one tick of delay K has one more entry, for the force still on its way.
+    pub sampled: Laws<T>,
+    /// The observer, if the rig file asks for one.
+    pub kalman: Option<Kalman<T>>,
+}
+
+/// Both of the paper's control laws, where the rig file asks for them.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Laws<T> {
+    /// Linear quadratic regulator.
+    pub lqr: Option<Feedback<T>>,
+    /// Pole placement.
+    pub pole_placement: Option<Feedback<T>>,
+    /// Linear quadratic regulator with integral action on the output: K over [x; z], or [x; z; force on its way].
+    pub integral: Option<Feedback<T>>,
+}
+
+/// `u = N r - K x`.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Feedback<T> {
+    /// K, 1×s (or 1×(s+1) with a delay).
+    pub k: Matrix<T>,
+    /// N; none if no constant force can hold the output away from 0.
+    pub n: Option<T>,
+    /// Whether K is over [x; z] with the integral z of the output.
+    pub integral: bool,
+}
+
+impl<T> Laws<T> {
+    /// [LQR, pole placement].
+    pub fn each(&self) -> [Option<&Feedback<T>>; 2] {
+        [self.lqr.as_ref(), self.pole_placement.as_ref()]
+    }
+
+    /// [LQR, pole placement] as they go into the table: LQR with integral action, if there is such a design.
+    pub fn in_table(&self) -> [Option<&Feedback<T>>; 2] {
+        [self.integral.as_ref().or(self.lqr.as_ref()), self.pole_placement.as_ref()]
+    }
+
+    fn none() -> Self {
+        Self { lqr: None, pole_placement: None, integral: None }
+    }
+}
+
+impl<R: Real> Design<R> {
+    /// Designs everything that `rig` asks for.
+    ///
+    /// # Errors
+    /// [`DesignError`] with the reason if some law has no solution.
+    pub fn of(rig: &Rig) -> Result<Self, DesignError> {
+        Self::of_plant(rig, continuous_plant::<R>(rig)?, &mut Vec::new())
+    }
+
+    /// As [`of`](Self::of), for another linear plant than that of the rig; notes the relative residual of each Riccati
+    /// equation under the name of its gain.
+    pub(crate) fn of_plant(
+        rig: &Rig,
+        plant: LinearModel<R>,
+        residuals: &mut Vec<(String, f64)>,
+    ) -> Result<Self, DesignError> {
+        let LinearModel { a, b, torque_inputs } = plant;
+        let period = R::from_f64(rig.tick.period_s);
+        refuse_unbridgeable_tick(&a, rig)?;
+        let (ad, bd) = zero_order_hold(&a, &b, &period);
+        let output = rig.output();
+        let late = rig.tick.delay_ticks == 1;
+
+        let mut continuous = Laws::none();
+        let mut sampled = Laws::none();
+        if let Some(weights) = &rig.lqr {
+            let cost = lqr_cost(weights);
+            let k = lqr(Task::ContinuousLqr, &a, &b, &cost, residuals)?;
+            continuous.lqr = Some(feedback(k, &a, &b, output));
+            let tick_cost = sampled_cost(&a, &b, &cost, &period);
+            let k = lqr(Task::SampledLqr, &ad, &bd, &tick_cost, residuals)?;
+            sampled.lqr = Some(sampled_feedback(k, &ad, &bd, output, late));
+            if let Some(integral) = &rig.integral {
+                let weight = R::from_f64(integral.position_weight);
+                let (a_z, b_z) = with_integral(&a, &b, output, &R::one(), &R::zero());
+                let k = lqr(
+                    Task::ContinuousIntegral,
+                    &a_z,
+                    &b_z,
+                    &with_integral_weight(&cost, &weight),
+                    residuals,
+                )?;
+                continuous.integral = Some(feedback(k, &a, &b, output));
+                let (a_z, b_z) = with_integral(&ad, &bd, output, &period, &R::one());
+                // z is constant during a tick: its cost over the tick is T w z².
+                let tick_cost = with_integral_weight(&tick_cost, &(weight * &period));
+                let k = lqr(Task::SampledIntegral, &a_z, &b_z, &tick_cost, residuals)?;
+                sampled.integral = Some(sampled_feedback_over(k, &ad, &bd, &a_z, &b_z, output, late));
+            }
+        }
+        if let Some(placement) = &rig.pole_placement {
+            let poles = wanted_poles(placement, rig)?;
+            let place = |task, a, b, poles: &[Pole<R>]| {
+                place(a, b, poles).map_err(|_| why_no_placement::<R>(task, a, b))
+            };
+            let k = place(Task::ContinuousPlacement, &a, &b, &poles)?;
+            continuous.pole_placement = Some(feedback(k, &a, &b, output));
+            let poles: Vec<Pole<R>> = poles.iter().map(|pole| pole.sampled(&period)).collect();
+            let k = place(Task::SampledPlacement, &ad, &bd, &poles)?;
+            sampled.pole_placement = Some(sampled_feedback(k, &ad, &bd, output, late));
+        }
+        let kalman = rig.kalman.as_ref().map(|noise| {
+            let inputs = noise_inputs(rig, &b, &torque_inputs);
+            let (gains, residual) = kalman(&a, &ad, &inputs, noise, &rig.sensors(), &period)?;
+            residuals.push((OBSERVER.to_owned(), residual.to_f64()));
+            Ok(gains)
+        });
+        Ok(Self { continuous, sampled, kalman: kalman.transpose()?, a, b, ad, bd })
+    }
+}
+
+impl<const BITS: usize> Design<Wide<BITS>> {
+    /// Every entry passed through `round`, after [`Matrix::rounded`] has set pure rounding errors to zero.
+    pub fn rounded<S>(&self, round: fn(&Wide<BITS>) -> S) -> Design<S> {
+        let laws = |laws: &Laws<Wide<BITS>>| {
+            let feedback = |law: &Option<Feedback<Wide<BITS>>>| {
+                law.as_ref().map(|law| Feedback {
+                    k: law.k.rounded(round),
+                    n: law.n.as_ref().map(round),
+                    integral: law.integral,
+                })
+            };
+            Laws {
+                lqr: feedback(&laws.lqr),
+                pole_placement: feedback(&laws.pole_placement),
+                integral: feedback(&laws.integral),
+            }
+        };
+        Design {
+            a: self.a.rounded(round),
+            b: self.b.rounded(round),
+            ad: self.ad.rounded(round),
+            bd: self.bd.rounded(round),
+            continuous: laws(&self.continuous),
+            sampled: laws(&self.sampled),
+            kalman: self.kalman.as_ref().map(|kalman| Kalman {
+                l_filter: kalman.l_filter.rounded(round),
+                l_predictor: kalman.l_predictor.rounded(round),
+                steps: kalman.steps.map(round),
+                innovation_variances: kalman.innovation_variances.map(round),
+            }),
+        }
+    }
+}
+
+/// Name of the observer's gain among the residuals.
+pub(crate) const OBSERVER: &str = "Kalman filter";
+
+/// The columns through which the noise of `[kalman]` enters, one per intensity.
+///
+/// # Errors
+/// [`DesignError::MassMatrix`] if the plant has no linear model.
+pub(crate) fn noise_columns(rig: &Rig) -> Result<Matrix<f64>, DesignError> {
+    let LinearModel { b, torque_inputs, .. } = continuous_plant::<Wide<256>>(rig)?;
+    Ok(noise_inputs(rig, &b, &torque_inputs).rounded(Wide::round_to_f64))
+}
+
+/// The linear plant of the rig: the chain about upright, or the given model.
+pub fn continuous_plant<R: Real>(rig: &Rig) -> Result<LinearModel<R>, DesignError> {
+    match &rig.plant {
+        PlantDescription::Chain(chain) => {
+            linearise(&ChainParameters::of(chain), Equilibrium::Upright).map_err(|_| DesignError::MassMatrix)
+        }
+        PlantDescription::Model(model) => Ok(LinearModel {
+            a: Matrix::from_f64_rows(&model.a),
+            b: Matrix::from_fn(model.b.len(), 1, |i, _| R::from_f64(model.b[i])),
+            torque_inputs: Matrix::zeros(model.b.len(), 0),
+        }),
+    }
+}
+
+/// Columns through which the noise of `[kalman]` enters: force and joint torques, or those of the model.
+fn noise_inputs<R: Real>(rig: &Rig, b: &Matrix<R>, torque_inputs: &Matrix<R>) -> Matrix<R> {
+    match &rig.plant {
+        PlantDescription::Model(LinearPlant { noise_input: Some(columns), .. }) => {
+            Matrix::from_fn(b.rows(), columns.len(), |i, j| R::from_f64(columns[j][i]))
+        }
+        _ => b.beside(torque_inputs),
+    }
+}
+
+/// Between two ticks an unstable mode grows by `e^(pT)`. Beyond 2²⁴ the last bit of a measurement has grown to the
+/// size of the measurement: no controller in single precision can hold the plant, whatever its gains.
+fn refuse_unbridgeable_tick<R: Real>(a: &Matrix<R>, rig: &Rig) -> Result<(), DesignError> {
+    let poles = eigenvalues(a).map_err(|_| DesignError::Poles)?;
+    let fastest = poles.iter().map(|pole| pole.re.to_f64()).fold(0.0, f64::max);
+    let growth = (fastest * rig.tick.period_s).exp();
+    if growth > f64::from(1 << 24) {
+        return Err(DesignError::TickTooLong { tick_s: rig.tick.period_s, pole: fastest, growth });
+    }
+    Ok(())
+}
+
+/// Gain K of the linear quadratic regulator of (a, b).
+fn lqr<R: Real>(
+    task: Task,
+    a: &Matrix<R>,
+    b: &Matrix<R>,
+    cost: &Cost<R>,
+    residuals: &mut Vec<(String, f64)>,
+) -> Result<Matrix<R>, DesignError> {
+    let solution = if task.is_sampled() { dare(a, b, cost) } else { care(a, b, cost) };
+    let regulator = solution.map_err(|_| why_no_lqr(task, a, b, cost))?;
+    residuals.push((task.to_string(), regulator.residual.to_f64()));
+    Ok(regulator.k)
+}
+
+/// Continuous feedback with N = -1 / (C (A - B K)⁻¹ B): the paper's equation for the precompensation gain. K is over x, or
+/// over [x; z]; N is that of the part over x, because with the right N the integral has nothing to do.
+fn feedback<R: Real>(k: Matrix<R>, a: &Matrix<R>, b: &Matrix<R>, output: usize) -> Feedback<R> {
+    let k_x = k.block(0, 0, 1, a.cols());
+    let n = precompensation(&-&(a - &(b * &k_x)), b, output);
+    Feedback { integral: k.cols() > a.cols(), k, n }
+}
+
+/// Sampled feedback K, made for the delay: one tick late, `u⁺ = N r - K (Ad x + Bd u)` acts on the state it will meet.
+fn sampled_feedback<R: Real>(
+    k: Matrix<R>,
+    ad: &Matrix<R>,
+    bd: &Matrix<R>,
+    output: usize,
+    late: bool,
+) -> Feedback<R> {
+    sampled_feedback_over(k, ad, bd, ad, bd, output, late)
+}
+
+/// As [`sampled_feedback`], with K over the states of a larger plant (`a_z`, `b_z`) that contains (`ad`, `bd`).
+fn sampled_feedback_over<R: Real>(
+    k: Matrix<R>,
+    ad: &Matrix<R>,
+    bd: &Matrix<R>,
+    a_z: &Matrix<R>,
+    b_z: &Matrix<R>,
+    output: usize,
+    late: bool,
+) -> Feedback<R> {
+    // The steady state of x = Ad x + Bd u.
+    let k_x = k.block(0, 0, 1, ad.cols());
+    let n = precompensation(&(&Matrix::identity(ad.rows()) - &(ad - &(bd * &k_x))), bd, output);
+    let k = if late { &k * &a_z.beside(b_z) } else { k };
+    Feedback { k, n, integral: a_z.rows() > ad.rows() }
+}
+
+/// The plant with the integral of its output as a further state: `ż = y` (`gain` 1, `kept` 0) or `z⁺ = z + T y`
+/// (`gain` T, `kept` 1).
+pub(super) fn with_integral<R: Real>(
+    a: &Matrix<R>,
+    b: &Matrix<R>,
+    output: usize,
+    gain: &R,
+    kept: &R,
+) -> (Matrix<R>, Matrix<R>) {
+    let s = a.rows();
+    let mut a_z = Matrix::zeros(s + 1, s + 1).with_block(0, 0, a);
+    a_z[(s, output)] = gain.clone();
+    a_z[(s, s)] = kept.clone();
+    (a_z, b.above(&Matrix::zeros(1, 1)))
+}
+
+fn with_integral_weight<R: Real>(cost: &Cost<R>, weight: &R) -> Cost<R> {
+    let s = cost.q.rows();
+    let mut q = Matrix::zeros(s + 1, s + 1).with_block(0, 0, &cost.q);
+    q[(s, s)] = weight.clone();
+    Cost { q, r: cost.r.clone(), s: cost.s.above(&Matrix::zeros(1, 1)) }
+}
+
+/// `1 / (C M⁻¹ B)` with `C` picking the state `output`; none if `C M⁻¹ B` is zero, or nothing but rounding error.
+fn precompensation<R: Real>(m: &Matrix<R>, b: &Matrix<R>, output: usize) -> Option<R> {
+    let steady = solve(m, b).ok()?;
+    let noise = steady.largest_entry().scale_by_power_of_two(-(R::BITS as i32) / 2);
+    let gain = &steady[(output, 0)];
+    (gain.abs() > noise).then(|| R::one() / gain)
+}
+
+fn lqr_cost<R: Real>(weights: &Lqr) -> Cost<R> {
+    let q: Vec<R> = weights.state_weights.iter().map(|&w| R::from_f64(w)).collect();
+    Cost::new(Matrix::from_diagonal(&q), Matrix::from_diagonal(&[R::from_f64(weights.force_weight)]))
+}
+
+/// The poles the rig file asks for.
+pub(crate) fn wanted_poles<R: Real>(
+    placement: &PolePlacement,
+    rig: &Rig,
+) -> Result<Vec<Pole<R>>, DesignError> {
+    let poles = match placement {
+        PolePlacement::Response { overshoot_percent, settling_time_s, far_poles } => {
+            let mut poles = vec![Pole::Pair(dominant_pair(*overshoot_percent, *settling_time_s))];
+            poles.extend(far_poles.iter().map(|&pole| Pole::Real(R::from_f64(pole))));
+            poles
+        }
+        PolePlacement::Poles(poles) => {
+            // The rig file was checked: complex poles come in conjugate pairs.
+            let upper = poles.iter().filter(|pole| pole[1] >= 0.0);
+            upper
+                .map(|&[re, im]| match im {
+                    0.0 => Pole::Real(R::from_f64(re)),
+                    _ => Pole::Pair(Complex { re: R::from_f64(re), im: R::from_f64(im) }),
+                })
+                .collect()
+        }
+    };
+    let given = poles.iter().map(Pole::order).sum();
+    if given != rig.states() {
+        return Err(DesignError::PoleCount { given, wanted: rig.states() });
+    }
+    Ok(poles)
+}

@@ -1,0 +1,99 @@
+//! When an innovation says that an encoder or the motor is at fault, from the Kalman filter's own covariance.
+
+use super::Design;
+use crate::rig::{PlantDescription, Rig};
+
+/// Share of the motor's force that may be missing.
+const MISSING_SHARE: f64 = 0.5;
+
+/// Thresholds of the firmware's tests (`upright::supervision::detection`), in f64.
+#[derive(Debug, Clone, PartialEq)]
+pub struct DetectionDesign {
+    /// Standard deviations between a healthy rig and an alarm.
+    pub deviations: f64,
+    /// Largest plausible innovation of each sensor (m or rad).
+    pub innovation: Vec<f64>,
+    /// Largest predicted motion of each sensor while its counter stands still (m or rad).
+    pub frozen: Vec<f64>,
+    /// The motor's test; none for a model, whose sensors need not see the speed that a force makes.
+    pub motor: Option<MotorDesign>,
+}
+
+/// Constants of the motor's test.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct MotorDesign {
+    /// Dynamics of the error of predicted position and speed, [a_pp, a_pv, a_vp, a_vv].
+    pub a: [f64; 4],
+    /// What a force does to position and speed in a tick (m/N, m/s/N).
+    pub b: [f64; 2],
+    /// Share of the force that may be missing.
+    pub ratio: f64,
+    /// Least energy for a verdict (m²).
+    pub energy: f64,
+}
+
+/// Thresholds for a rig with an observer; none without.
+///
+/// With a healthy rig the innovation `e` is white with covariance `S = C P⁻ Cᵀ + R`. `g` standard deviations are exceeded
+/// once in `false_alarm_h` by all tests together; that three in a row are needed for a fault is not made use of, so that
+/// the rate holds for disturbances that last, too.
+///
+/// - Plausible: `|e_i| <= g √S_ii + step_i / 2`. The half step is the largest error of a counter: its rounding is no
+///   Gaussian noise.
+/// - Frozen: over a memory of M ticks (each keeping `κ = 1 - 1/M`), the predicted motion of a counter that stands still is
+///   its true motion, less than a step, and what the observer corrected, `Σ κ^k (L e)_i`. The corrections are white with
+///   at most the variance `S_ii - R_ii`, so that the sum is within `step_i + g √((S_ii - R_ii) / (1 - κ²))`.
+/// - Motor: the share ρ of the force that is missing is estimated by least squares over the same memory,
+///   `ρ̂ = Σ e p / Σ p²`, with the innovation p that a wholly missing force makes. With a healthy motor its standard
+///   deviation is `√(S_00 / Σ p²)`; a verdict waits until that is a g-th of the share that may be missing.
+pub fn detection_thresholds(rig: &Rig, design: &Design<f64>) -> Option<DetectionDesign> {
+    let kalman = design.kalman.as_ref()?;
+    let variances = kalman.innovation_variances.entries();
+    let steps = kalman.steps.entries();
+    // One test for plausibility and one for freezing per sensor, and one for the motor.
+    let tests = (2 * steps.len() + 1) as f64 * rig.limits.false_alarm_h * 3600.0 / rig.tick.period_s;
+    let g = deviations(1.0 / tests);
+    let keep = f64::from(1.0 - 1.0 / upright::supervision::detection::MEMORY);
+    let innovation = variances.iter().zip(steps).map(|(s, step)| g * s.sqrt() + 0.5 * step).collect();
+    let frozen = variances.iter().zip(steps).map(|(s, step)| {
+        let corrected = (s - step * step / 12.0).max(0.0) / (1.0 - keep * keep);
+        step + g * corrected.sqrt()
+    });
+    let motor = matches!(rig.plant, PlantDescription::Chain(_)).then(|| {
+        let (ad, bd, l) = (&design.ad, &design.bd, &kalman.l_filter);
+        let corrected = |row: usize| ad[(row, 0)] * (1.0 - l[(0, 0)]) - ad[(row, 1)] * l[(1, 0)];
+        MotorDesign {
+            a: [corrected(0), ad[(0, 1)], corrected(1), ad[(1, 1)]],
+            b: [bd[(0, 0)], bd[(1, 0)]],
+            ratio: MISSING_SHARE,
+            energy: (g / MISSING_SHARE).powi(2) * variances[0],
+        }
+    });
+    Some(DetectionDesign { deviations: g, innovation, frozen: frozen.collect(), motor })
+}
+
+/// The number of standard deviations that a Gaussian exceeds, on either side, with this probability.
+fn deviations(probability: f64) -> f64 {
+    let (mut low, mut high) = (0.0, 40.0);
+    for _ in 0..100 {
+        let middle = 0.5 * (low + high);
+        let exceeded = libm::erfc(middle / core::f64::consts::SQRT_2);
+        if exceeded > probability { low = middle } else { high = middle }
+    }
+    high
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_deviations_are_those_of_the_normal_distribution() {
+        // Tables of the normal distribution.
+        for (probability, wanted) in
+            [(0.317_310_507_9, 1.0), (0.002_699_796_063, 3.0), (5.733_031_44e-7, 5.0)]
+        {
+            assert!((deviations(probability) - wanted).abs() < 1e-8);
+        }
+    }
+}

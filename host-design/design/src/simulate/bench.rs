@@ -1,0 +1,159 @@
+//! The rig on the simulated bench: plant, motor, encoders and disturbances, one tick at a time.
+
+use rand::SeedableRng;
+use rand_distr::{Distribution, Normal};
+use rand_pcg::Pcg64;
+use upright::control::actuator::Drive;
+use upright::control::encoder::CounterWidth;
+
+use super::closed_loop::SimulationError;
+use super::scenario::Scenario;
+use crate::plant::{LinearSimulation, MotorPlant, Plant, chain_plant};
+use crate::rig::{PlantDescription, Rig};
+
+/// Everything that is not the controller.
+pub struct Bench {
+    plant: Box<dyn Plant>,
+    motor: Option<MotorPlant>,
+    sensors: Vec<(usize, f64)>,
+    counter_start: u32,
+    random: Pcg64,
+    force_noise: Normal<f64>,
+    torque_noise: Normal<f64>,
+    force_offset: f64,
+    push_n: f64,
+    torques: Vec<f64>,
+    state: Vec<f64>,
+    period_s: f64,
+    substeps: usize,
+    delay: bool,
+    on_its_way: Drive,
+}
+
+impl Bench {
+    /// The bench of `rig` at the start of `scenario`.
+    ///
+    /// # Errors
+    /// [`SimulationError`] if the plant cannot be built or a noise level is impossible.
+    pub fn new(rig: &Rig, scenario: &Scenario) -> Result<Self, SimulationError> {
+        let mut plant: Box<dyn Plant> = match &rig.plant {
+            PlantDescription::Chain(chain) => chain_plant(chain)?,
+            PlantDescription::Model(model) => Box::new(LinearSimulation::of(model)),
+        };
+        plant.set_state(&scenario.start);
+        let noise = |level: f64| {
+            let possible = level.is_finite() && level >= 0.0;
+            Normal::new(0.0, level).ok().filter(|_| possible).ok_or(SimulationError::Noise(level))
+        };
+        let finite =
+            |offset: f64| if offset.is_finite() { Ok(offset) } else { Err(SimulationError::Offset(offset)) };
+        Ok(Self {
+            torques: vec![0.0; plant.disturbances()],
+            plant,
+            motor: rig.actuator.motor.as_ref().map(MotorPlant::of),
+            sensors: rig.sensors().iter().map(|sensor| (sensor.state, sensor.step())).collect(),
+            counter_start: scenario.counter_start,
+            random: Pcg64::seed_from_u64(scenario.seed),
+            force_noise: noise(scenario.force_noise_n)?,
+            torque_noise: noise(scenario.torque_noise_n_m)?,
+            force_offset: finite(scenario.force_offset_n)?,
+            push_n: 0.0,
+            state: scenario.start.clone(),
+            period_s: rig.tick.period_s,
+            substeps: scenario.substeps.max(1),
+            delay: rig.tick.delay_ticks == 1,
+            on_its_way: Drive::OFF,
+        })
+    }
+
+    /// The true state.
+    pub fn state(&self) -> &[f64] {
+        &self.state
+    }
+
+    /// Control period (s).
+    pub fn period_s(&self) -> f64 {
+        self.period_s
+    }
+
+    /// Puts the rig into `state` (m, m/s, rad, rad/s …), as a hand that holds it.
+    pub fn hold(&mut self, state: &[f64]) {
+        self.plant.set_state(state);
+        self.state.copy_from_slice(state);
+    }
+
+    /// Widths of the hardware counters: 32 bits for the cart, 16 for the links.
+    pub const fn widths<const NY: usize>() -> [CounterWidth; NY] {
+        let mut widths = [CounterWidth::Bits16; NY];
+        if let [cart, ..] = widths.as_mut_slice() {
+            *cart = CounterWidth::Bits32;
+        }
+        widths
+    }
+
+    /// What the hardware counters show, as many as the firmware reads.
+    pub fn counters<const NY: usize>(&self) -> [u32; NY] {
+        let mut counters = [0; NY];
+        let shown = counters.iter_mut().zip(Self::widths::<NY>()).zip(&self.sensors);
+        for ((counter, width), &(state, step)) in shown {
+            let counts = libm::round(self.state[state] / step) as i64;
+            *counter = shown_by(width, self.counter_start.wrapping_add(counts as u32));
+        }
+        counters
+    }
+
+    /// What they show at position 0: where homing found them.
+    pub fn counters_at_zero<const NY: usize>(&self) -> [u32; NY] {
+        Self::widths::<NY>().map(|width| shown_by(width, self.counter_start))
+    }
+
+    /// Adds a force on the cart for the next tick (N).
+    pub fn push(&mut self, force_n: f64) {
+        self.push_n = force_n;
+    }
+
+    /// Lets one tick pass with the command `drive` of its start; gives the force on the cart at the start of the tick,
+    /// without the disturbance (N).
+    pub fn tick(&mut self, drive: Drive) -> f64 {
+        let now = if self.delay { std::mem::replace(&mut self.on_its_way, drive) } else { drive };
+        let push = std::mem::take(&mut self.push_n);
+        let disturbance = self.force_offset + push + self.force_noise.sample(&mut self.random);
+        let (torque_noise, random) = (&self.torque_noise, &mut self.random);
+        self.torques.fill_with(|| torque_noise.sample(random));
+        let at_start = self.force(now);
+        match (&self.motor, now) {
+            // The back-EMF follows the speed within the tick.
+            (Some(_), Drive::Duty(_)) => {
+                let step = self.period_s / self.substeps as f64;
+                for _ in 0..self.substeps {
+                    let force = self.force(now);
+                    self.plant.advance(force + disturbance, &self.torques, step, 1);
+                    self.plant.write_state(&mut self.state);
+                }
+            }
+            _ => {
+                self.plant.advance(at_start + disturbance, &self.torques, self.period_s, self.substeps);
+                self.plant.write_state(&mut self.state);
+            }
+        }
+        at_start
+    }
+
+    fn force(&self, drive: Drive) -> f64 {
+        match (drive, &self.motor) {
+            (Drive::Force(force), _) => f64::from(force),
+            (Drive::Duty(duty), Some(motor)) => {
+                motor.force(f64::from(duty), self.state.get(1).copied().unwrap_or_default())
+            }
+            (Drive::Duty(_), None) => 0.0,
+        }
+    }
+}
+
+/// The low bits that a counter of this width has.
+fn shown_by(width: CounterWidth, counts: u32) -> u32 {
+    match width {
+        CounterWidth::Bits16 => counts & 0xffff,
+        CounterWidth::Bits32 => counts,
+    }
+}

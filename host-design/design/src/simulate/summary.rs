@@ -1,0 +1,150 @@
+//! What a run amounts to.
+
+use core::fmt;
+
+use serde::Serialize;
+
+use super::scenario::Scenario;
+use super::trace::Trace;
+use crate::rig::{PlantDescription, Rig};
+
+/// The end of a run that was lost.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Fall {
+    /// When (s).
+    pub at_s: f64,
+    /// How.
+    pub kind: FallKind,
+}
+
+/// How a run was lost.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum FallKind {
+    /// This link (from 1) leans further than the horizontal.
+    Link(usize),
+    /// The cart left its rail.
+    EndOfRail,
+    /// A state of a linear model grew beyond a million.
+    Diverged,
+    /// A state is no longer a number.
+    NotFinite,
+}
+
+impl fmt::Display for Fall {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self.kind {
+            FallKind::Link(link) => write!(f, "link {link} fell")?,
+            FallKind::EndOfRail => f.write_str("the cart left its rail")?,
+            FallKind::Diverged => f.write_str("the state diverged")?,
+            FallKind::NotFinite => f.write_str("the state is no longer finite")?,
+        }
+        write!(f, " at {:.3} s", self.at_s)
+    }
+}
+
+/// Figures of one run. The settling band is 2 % of the step around the set-point, and at least 1 mm (of the output, for
+/// a model).
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Summary {
+    /// How the run was lost, if it was.
+    pub fall: Option<Fall>,
+    /// Within the settling band when the run ends.
+    pub settled: bool,
+    /// Time after the step from which the run stays settled (s).
+    pub settling_time_s: Option<f64>,
+    /// Largest excursion beyond the step (% of the step).
+    pub overshoot_percent: Option<f64>,
+    /// Largest excursion against the step (% of the step).
+    pub undershoot_percent: Option<f64>,
+    /// Largest absolute relative angle of each link (rad).
+    pub peak_angles_rad: Vec<f64>,
+    /// Largest absolute force on the cart (N).
+    pub peak_force_n: f64,
+    /// Largest absolute force asked for (N).
+    pub peak_requested_force_n: f64,
+    /// Set-point minus output at the end (m).
+    pub final_error_m: f64,
+}
+
+impl Summary {
+    /// The figures of a run of `rig` through `scenario`, recorded in `trace`, that ended with `fall`.
+    pub fn of(rig: &Rig, scenario: &Scenario, trace: &Trace, fall: Option<Fall>) -> Self {
+        let output = rig.output();
+        let step = scenario.step_m;
+        let band = (0.02 * step.abs()).max(1e-3);
+        let is_chain = matches!(rig.plant, PlantDescription::Chain(_));
+        let angles = |state: &[f64]| -> Vec<f64> {
+            if is_chain {
+                state.iter().skip(2).step_by(2).map(|angle| angle.abs()).collect()
+            } else {
+                Vec::new()
+            }
+        };
+        let mut peak_angles_rad = angles(&scenario.start);
+        let (mut peak_force_n, mut peak_requested_force_n) = (0.0f64, 0.0f64);
+        let (mut beyond, mut against) = (0.0f64, 0.0f64);
+        let (mut last_outside, mut final_error_m) = (None, 0.0);
+        for sample in trace.samples() {
+            let lean = angles(sample.state);
+            for (peak, angle) in peak_angles_rad.iter_mut().zip(&lean) {
+                *peak = peak.max(*angle);
+            }
+            peak_force_n = peak_force_n.max(sample.force.abs());
+            peak_requested_force_n = peak_requested_force_n.max(sample.requested.abs());
+            let y = sample.state[output];
+            final_error_m = sample.target - y;
+            if sample.t >= scenario.step_at_s {
+                beyond = beyond.max((y - step) * step.signum());
+                against = against.max(-y * step.signum());
+            }
+            // A number that is not one is outside, too.
+            if (y - step).abs().partial_cmp(&band) != Some(core::cmp::Ordering::Less) {
+                last_outside = Some(sample.t);
+            }
+        }
+        let end = trace.samples().last().map_or(0.0, |sample| sample.t);
+        let settled = fall.is_none() && last_outside != Some(end);
+        let settling_time_s = settled
+            .then(|| last_outside.map_or(0.0, |t| (t + rig.tick.period_s - scenario.step_at_s).max(0.0)));
+        let percent = |excursion: f64| (step != 0.0).then(|| 100.0 * excursion / step.abs());
+        Self {
+            fall,
+            settled,
+            settling_time_s,
+            overshoot_percent: percent(beyond),
+            undershoot_percent: percent(against),
+            peak_angles_rad,
+            peak_force_n,
+            peak_requested_force_n,
+            final_error_m,
+        }
+    }
+
+    /// Still standing at the end of the run.
+    pub fn stands(&self) -> bool {
+        self.fall.is_none()
+    }
+}
+
+impl fmt::Display for Summary {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match (&self.fall, self.settling_time_s) {
+            (Some(fall), _) => writeln!(f, "FALLS: {fall}")?,
+            (None, Some(time)) => writeln!(f, "stands, settled after {time:.3} s")?,
+            (None, None) => writeln!(f, "stands, not settled when the run ends")?,
+        }
+        if let (Some(over), Some(under)) = (self.overshoot_percent, self.undershoot_percent) {
+            writeln!(f, "  overshoot      {over:.2} %   (first the other way: {under:.2} %)")?;
+        }
+        for (index, angle) in self.peak_angles_rad.iter().enumerate() {
+            writeln!(f, "  peak theta{}    {:.4} rad ({:.2} deg)", index + 1, angle, angle.to_degrees())?;
+        }
+        writeln!(
+            f,
+            "  peak force     {:.3} N (asked for: {:.3} N)",
+            self.peak_force_n, self.peak_requested_force_n
+        )?;
+        write!(f, "  final error    {:.2e} m", self.final_error_m)
+    }
+}

@@ -1,0 +1,95 @@
+//! The record of a run.
+
+use std::io::Write;
+
+use crate::rig::{PlantDescription, Rig};
+
+/// Everything that happened, tick by tick.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Trace {
+    columns: Vec<String>,
+    rows: Vec<f64>,
+    states: usize,
+}
+
+/// One tick.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Sample<S> {
+    /// Time at the start of the tick (s).
+    pub t: f64,
+    /// Set-point asked for (m).
+    pub target: f64,
+    /// Set-point that the law follows (m).
+    pub setpoint: f64,
+    /// Force that the law asks for in this tick (N).
+    pub requested: f64,
+    /// Force on the cart at the start of this tick, without the disturbance (N).
+    pub force: f64,
+    /// True state at the start of the tick.
+    pub state: S,
+    /// The controller's estimate of it.
+    pub estimate: S,
+}
+
+/// Columns before the states.
+const LEADING: usize = 5;
+
+impl Trace {
+    /// An empty record for `rig` with room for `ticks` ticks.
+    pub fn new(rig: &Rig, ticks: usize) -> Self {
+        let states: Vec<String> = match &rig.plant {
+            PlantDescription::Chain(chain) => {
+                let links = (1..=chain.links.len())
+                    .flat_map(|link| [format!("theta{link}_rad"), format!("theta{link}dot_rad_per_s")]);
+                ["x_m".to_owned(), "xdot_m_per_s".to_owned()].into_iter().chain(links).collect()
+            }
+            PlantDescription::Model(model) => (0..model.b.len()).map(|i| format!("state{i}")).collect(),
+        };
+        let leading: [&str; LEADING] = ["t_s", "target_m", "setpoint_m", "force_requested_n", "force_n"];
+        let estimates = states.iter().map(|name| format!("{name}_estimated"));
+        let columns: Vec<String> =
+            leading.map(str::to_owned).into_iter().chain(states.clone()).chain(estimates).collect();
+        // A record of a very long run grows as it goes.
+        let rows = Vec::with_capacity((ticks + 1).min(200_000) * columns.len());
+        Self { columns, rows, states: states.len() }
+    }
+
+    /// Names of the columns, with units.
+    pub fn columns(&self) -> &[String] {
+        &self.columns
+    }
+
+    /// Appends a tick.
+    pub fn push(&mut self, sample: &Sample<&[f64]>) {
+        self.rows.extend([sample.t, sample.target, sample.setpoint, sample.requested, sample.force]);
+        self.rows.extend(sample.state);
+        self.rows.extend(sample.estimate);
+    }
+
+    /// All ticks in order.
+    pub fn samples(&self) -> impl ExactSizeIterator<Item = Sample<&[f64]>> {
+        let states = self.states;
+        self.rows.chunks_exact(self.columns.len()).map(move |row| Sample {
+            t: row[0],
+            target: row[1],
+            setpoint: row[2],
+            requested: row[3],
+            force: row[4],
+            state: &row[LEADING..LEADING + states],
+            estimate: &row[LEADING + states..],
+        })
+    }
+
+    /// Writes the record as CSV: one header line with units, then one line per tick, numbers as shortest decimals.
+    ///
+    /// # Errors
+    /// Those of `out`.
+    pub fn write_csv(&self, out: impl Write) -> std::io::Result<()> {
+        let mut csv = csv::Writer::from_writer(out);
+        csv.write_record(&self.columns)?;
+        for row in self.rows.chunks_exact(self.columns.len()) {
+            csv.write_record(row.iter().map(f64::to_string))?;
+        }
+        csv.flush()
+    }
+}

@@ -1,0 +1,19 @@
+//! Tests of rig files, plant, design, simulation and verification. One program, so that it is linked once.
+
+mod design_properties;
+mod plant_equations;
+mod plant_linear_model;
+mod plant_linearisation;
+mod plant_motion;
+mod plant_rigs;
+mod published;
+mod rig_errors;
+mod rig_files;
+mod rig_fuzz;
+mod supervised;
+mod supervisor_false_alarms;
+mod supervisor_faults;
+mod supervisor_rules;
+mod supervisor_session;
+mod verify_linear;
+mod verify_nonlinear;

@@ -1,0 +1,212 @@
+//! Good rig files: the ones in `rigs/`, the defaults, the hash and the description.
+
+use std::path::{Path, PathBuf};
+
+use upright_design::rig::{
+    Actuator, Cart, Chain, Limits, Link, LinkEncoder, PlantDescription, PolePlacement, Rig, Tick,
+};
+
+const MINIMAL: &str = r#"
+name = "minimal"
+[cart]
+mass_kg = 1
+[[link]]
+mass_kg = 0.5
+length_m = 0.4
+"#;
+
+fn parse(text: &str) -> Rig {
+    Rig::from_toml(text, Path::new("test.toml")).unwrap_or_else(|error| panic!("{error}"))
+}
+
+fn rig_files() -> Vec<PathBuf> {
+    let directory = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../rigs");
+    let mut files: Vec<_> = std::fs::read_dir(directory)
+        .unwrap()
+        .map(|entry| entry.unwrap().path())
+        .filter(|path| path.extension().is_some_and(|extension| extension == "toml"))
+        .collect();
+    files.sort();
+    files
+}
+
+#[test]
+fn every_rig_file_is_good_and_named_after_its_rig() {
+    let files = rig_files();
+    assert!(files.len() >= 4, "{files:?}");
+    for file in files {
+        let rig = Rig::from_path(&file).unwrap_or_else(|error| panic!("{error}"));
+        assert_eq!(file.file_stem().unwrap().to_str().unwrap(), rig.name);
+        assert!(rig.lqr.is_some() && rig.pole_placement.is_some());
+        assert!(rig.kalman.is_some() || matches!(rig.plant, PlantDescription::Model(_)));
+    }
+}
+
+#[test]
+fn the_paper_rig_has_the_papers_values() {
+    let rig = Rig::from_path(&Path::new(env!("CARGO_MANIFEST_DIR")).join("../../rigs/quadruple-paper.toml"))
+        .unwrap();
+    let PlantDescription::Chain(chain) = &rig.plant else { panic!("not a chain") };
+    assert_eq!(chain.cart.mass_kg, 0.1);
+    assert_eq!(chain.links.iter().map(|link| link.length_m).collect::<Vec<_>>(), [0.03, 0.04, 0.07, 0.10]);
+    assert!(chain.links.iter().all(|link| link.mass_kg == 0.1 && link.inertia_kg_m2.is_none()));
+    assert_eq!(rig.states(), 10);
+    assert_eq!(
+        rig.pole_placement,
+        Some(PolePlacement::Response {
+            overshoot_percent: 1.0,
+            settling_time_s: 6.0,
+            far_poles: vec![-40.0, -41.0, -42.0, -43.0, -44.0, -45.0, -46.0, -47.0],
+        })
+    );
+}
+
+#[test]
+fn what_is_left_out_gets_its_documented_default() {
+    let link = Link {
+        mass_kg: 0.5,
+        length_m: 0.4,
+        centre_of_mass_m: None,
+        inertia_kg_m2: None,
+        friction_n_m_s_per_rad: 0.0,
+        encoder: None,
+    };
+    let cart = Cart { mass_kg: 1.0, friction_n_s_per_m: 0.0, travel_m: [-2.0, 2.0], encoder_step_m: None };
+    let expected = Rig {
+        verify: Default::default(),
+        name: "minimal".to_owned(),
+        plant: PlantDescription::Chain(Chain { cart, links: vec![link], gravity_m_per_s2: 9.81 }),
+        actuator: Actuator { force_limit_n: None, motor: None },
+        tick: Tick { period_s: 0.001, delay_ticks: 0 },
+        lqr: None,
+        pole_placement: None,
+        kalman: None,
+        integral: None,
+        limits: Limits::default(),
+    };
+    assert_eq!(parse(MINIMAL), expected);
+}
+
+#[test]
+fn defaults_of_the_motor() {
+    let motor = "[actuator]\ntorque_constant_n_m_per_a = 0.01\nresistance_ohm = 1\npulley_radius_m = 0.01\nsupply_v = 12\n";
+    let motor = parse(&format!("{MINIMAL}{motor}")).actuator.motor.unwrap();
+    assert_eq!((motor.gear_ratio, motor.dead_zone_v, motor.slew_v_per_s), (1.0, 0.0, None));
+}
+
+#[test]
+fn defaults_of_a_model() {
+    let PlantDescription::Model(model) = parse("name = \"m\"\nmodel = { a = [[1]], b = [2] }\n").plant else {
+        panic!("not a model")
+    };
+    assert_eq!((model.a, model.b), (vec![vec![1.0]], vec![2.0]));
+    assert_eq!((model.output, model.measured, model.measured_steps), (0, vec![0], vec![]));
+    assert_eq!(model.noise_input, None);
+}
+
+#[test]
+fn encoders_by_step_or_by_counts() {
+    let of = |line: &str| match parse(&format!("{MINIMAL}{line}\n")).plant {
+        PlantDescription::Chain(chain) => chain.links[0].encoder,
+        PlantDescription::Model(_) => None,
+    };
+    assert_eq!(of("encoder_step_rad = 0.001"), Some(LinkEncoder::StepRad(0.001)));
+    assert_eq!(of("encoder_counts_per_rev = 4096"), Some(LinkEncoder::CountsPerRev(4096.0)));
+}
+
+#[test]
+fn complex_poles_come_in_any_order() {
+    let poles = "[pole_placement]\npoles = [[-1, 2], [-3, 0], [-1, 2], [-1, -2]]\n";
+    let error = Rig::from_toml(&format!("{MINIMAL}{poles}"), Path::new("x")).unwrap_err();
+    assert_eq!(error.key.as_deref(), Some("pole_placement.poles[3]"), "{error}");
+    parse(&format!("{MINIMAL}{}", poles.replace("[-3, 0]", "[-1, -2]")));
+}
+
+#[test]
+fn the_hash_sees_values_only() {
+    let hash = parse(MINIMAL).hash();
+    for same in [
+        "# a comment\nname = 'minimal'\nlink = [{ length_m = 0.4, mass_kg = 5e-1 }]\n\n\n[cart]\nmass_kg = 1.0",
+        "cart.mass_kg = 1.00\r\nname = \"minimal\"\r\n[[link]]\r\nlength_m = 0.40 # m\r\nmass_kg = 0.5\r\n",
+        &format!("{MINIMAL}[tick]\nperiod_s = 0.001\ndelay_ticks = 0\n"),
+        &format!("{MINIMAL}friction_n_m_s_per_rad = -0.0\n"),
+    ] {
+        assert_eq!(parse(same).hash(), hash, "{same}");
+    }
+}
+
+/// Every number of every rig file, changed in its last digit, changes the hash.
+#[test]
+fn the_hash_sees_every_value() {
+    for file in rig_files() {
+        let text = std::fs::read_to_string(&file).unwrap();
+        let rig = parse(&text);
+        if matches!(rig.plant, PlantDescription::Model(_)) {
+            continue; // its matrix spans several lines
+        }
+        let hash = rig.hash();
+        let mut changed = 0;
+        // Thresholds of `upright verify` change no gain and are not part of the hash.
+        let counted = text.split("[verify]").next().unwrap_or_default();
+        for (index, line) in
+            counted.lines().enumerate().filter(|(_, line)| !line.trim_start().starts_with('#'))
+        {
+            let Some((key, value)) = line.split('#').next().unwrap_or_default().split_once('=') else {
+                continue;
+            };
+            let value = if key.trim() == "name" {
+                value.replacen('"', "\"x", 1)
+            } else if key.trim() == "delay_ticks" {
+                "1".to_owned()
+            } else {
+                let last = value.rfind(|c: char| c.is_ascii_digit()).unwrap();
+                let exponent =
+                    value[..last].rfind(['e', ' ', '[']).is_some_and(|at| value[at..].starts_with('e'));
+                // One more digit, where it is part of the number and not of its exponent.
+                let (at, digit) = if exponent { (value.rfind('e').unwrap(), "") } else { (last + 1, "") };
+                let point = value[..at].rfind([' ', '[']).is_some_and(|start| value[start..at].contains('.'));
+                format!("{}{}{digit}{}", &value[..at], if point { "1" } else { ".01" }, &value[at..])
+            };
+            let mut lines: Vec<String> = text.lines().map(str::to_owned).collect();
+            lines[index] = format!("{key}={value}");
+            assert_ne!(parse(&lines.join("\n")).hash(), hash, "{}: {}", file.display(), lines[index]);
+            changed += 1;
+        }
+        assert!(changed > 20);
+    }
+}
+
+/// The hash is stored in gain tables: it must not change from one build to the next. (It does change, rightly, when the
+/// rig gains a field.)
+#[test]
+fn the_hash_of_the_minimal_rig_is_fixed() {
+    assert_eq!(format!("{:016x}", parse(MINIMAL).hash()), "38c880ab2d7c81d4");
+}
+
+#[test]
+fn the_description_fits_the_screen_and_marks_defaults() {
+    for file in rig_files() {
+        let text = Rig::from_path(&file).unwrap().describe();
+        for line in text.lines() {
+            assert!(line.chars().count() < 80, "{line}");
+        }
+    }
+    let text = parse(MINIMAL).describe();
+    let line = |start: &str| text.lines().find(|line| line.trim_start().starts_with(start)).unwrap();
+    assert!(
+        line("centre of mass").contains("0.2 m") && line("centre of mass").contains("(default)"),
+        "{text}"
+    );
+    assert!(line("inertia").contains("0.00666667 kg·m²") && line("inertia").contains("(default)"), "{text}");
+    assert!(line("total mass").contains("1.5 kg") && !line("total mass").contains("default"), "{text}");
+}
+
+#[test]
+fn the_description_of_a_motor_has_its_largest_force() {
+    let rig =
+        Rig::from_path(&Path::new(env!("CARGO_MANIFEST_DIR")).join("../../rigs/single-quanser-ip02.toml"))
+            .unwrap();
+    let text = rig.describe();
+    // 3.71 * 0.00767 N·m/A * 10 V / (2.6 ohm * 0.00635 m)
+    assert!(text.contains("17.2354 N"), "{text}");
+}

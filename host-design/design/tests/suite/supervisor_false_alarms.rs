@@ -1,0 +1,103 @@
+//! A healthy rig is never switched off.
+
+use rayon::prelude::*;
+use upright_design::rig::Rig;
+use upright_design::simulate::{Scenario, Session};
+use upright_design::verify::Disturbance;
+
+use crate::supervised::{ALL_RIGS, Supervised, rig, run, table};
+use upright::protocol::message::Request;
+use upright::supervision::fault::Cause;
+use upright::table::Law;
+
+/// Balances for some hours; at the ends of every minute the set-point goes to the other side.
+struct Nominal {
+    ticks: u64,
+    minute: u64,
+    setpoint_m: f32,
+}
+
+#[derive(Debug, PartialEq)]
+struct Found {
+    cause: Option<Cause>,
+    rejected: u32,
+    /// Largest innovation as a share of its threshold.
+    closest: f32,
+}
+
+impl Supervised for Nominal {
+    type Output = Found;
+
+    fn balancing<const NX: usize, const NY: usize>(self, mut session: Session<'_, NX, NY>) -> Found {
+        let thresholds = session.thresholds().innovation;
+        let mut closest = 0.0f32;
+        for tick in 0..self.ticks {
+            // Beats every 50 ticks: the host commands the set-point.
+            let side = if (tick / self.minute).is_multiple_of(2) { 1.0 } else { -1.0 };
+            let request = match tick {
+                _ if tick % self.minute == 0 => Some(Request::Setpoint(side * self.setpoint_m)),
+                _ if tick % 50 == 0 => Some(Request::Beat),
+                _ => None,
+            };
+            session.step(request, &mut ());
+            for (e, threshold) in session.firmware().controller().innovation().iter().zip(thresholds) {
+                closest = closest.max(e.abs() / threshold);
+            }
+            if session.fault().is_some() {
+                break;
+            }
+        }
+        Found { cause: session.fault(), rejected: session.firmware().statistics().rejected_samples, closest }
+    }
+}
+
+fn nominal(rig: &Rig, law: Law, seed: u64, hours: f64) -> Found {
+    let disturbance = Disturbance::of(rig);
+    let scenario = Scenario {
+        force_noise_n: disturbance.force_n,
+        torque_noise_n_m: disturbance.torque_n_m,
+        seed,
+        substeps: 2,
+        ..Scenario::at_rest(rig, law)
+    };
+    let ticks = |seconds: f64| (seconds / rig.tick.period_s) as u64;
+    let what = Nominal { ticks: ticks(3600.0 * hours), minute: ticks(60.0), setpoint_m: 0.1 };
+    run(rig, &table(rig), &scenario, what).unwrap()
+}
+
+/// `hours` for each rig and law, in `parts` of which each has its own disturbances.
+fn no_alarm(hours: f64, parts: u64) {
+    let of_rig = |name: &'static str| [Law::Lqr, Law::PolePlacement].map(|law| (name, law));
+    let runs: Vec<_> = ALL_RIGS.into_iter().flat_map(of_rig).collect();
+    let runs = runs.into_iter().flat_map(|(name, law)| (1..=parts).map(move |seed| (name, law, seed)));
+    let found: Vec<_> = runs
+        .collect::<Vec<_>>()
+        .into_par_iter()
+        .map(|(name, law, seed)| (name, law, seed, nominal(&rig(name), law, seed, hours / parts as f64)))
+        .collect();
+    for (name, law, seed, found) in &found {
+        println!("{name} {law:?} seed {seed}: {found:?}");
+    }
+    for (name, law, seed, found) in found {
+        assert_eq!(found.cause, None, "{name} {law:?} seed {seed}: {found:?}");
+    }
+}
+
+#[test]
+fn half_a_minute_of_nominal_balancing_of_every_rig_raises_no_alarm() {
+    no_alarm(30.0 / 3600.0, 1);
+}
+
+#[test]
+#[ignore = "some minutes on two cores: cargo test -p host-design --test supervisor_false_alarms -- --ignored --nocapture"]
+fn ten_hours_of_nominal_balancing_of_every_rig_raise_no_alarm() {
+    no_alarm(10.0, 2);
+}
+
+#[test]
+fn twenty_times_the_disturbance_is_an_alarm() {
+    // The tests can fail.
+    let mut rough = rig("quadruple-paper");
+    rough.verify.force_rms_n = Some(20.0 * 0.1);
+    assert!(nominal(&rough, Law::Lqr, 1, 30.0 / 3600.0).cause.is_some());
+}

@@ -1,0 +1,286 @@
+//! Every fault of encoders and motor turns the motor off before a link leaves its limit; what is no fault does not.
+
+use crate::supervised::{ALL_RIGS, Supervised, rig, run, table};
+use upright::board::{Inputs, Output};
+use upright::control::actuator::Drive;
+use upright::control::encoder::CounterWidth;
+use upright::supervision::fault::Fault;
+use upright::table::Law;
+use upright_design::rig::Rig;
+use upright_design::simulate::{Interference, Scenario, Session};
+use upright_design::table::TableValues;
+use upright_design::verify::Disturbance;
+
+/// What is wrong, with the number of the sensor.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Defect {
+    Nothing,
+    Frozen(usize),
+    /// One measurement is off by so many counts.
+    OneBad(usize, i32),
+    /// Two are, then one is not, and so on.
+    TwoOfThreeBad(usize, i32),
+    /// All from now on are.
+    Jump(usize, i32),
+    /// A count is lost every so many ticks.
+    LosesCounts(usize, u32),
+    Reversed(usize),
+    /// This one and the next.
+    Swapped(usize),
+    /// The measurement is from so many ticks before.
+    Late(usize, usize),
+    MotorDead,
+    MotorReversed,
+    /// Full force to one side.
+    MotorStuck,
+}
+
+struct Interfering {
+    defect: Defect,
+    from: u32,
+    frozen: Option<u32>,
+    past: Vec<u32>,
+    full: f32,
+}
+
+impl<const NY: usize> Interference<NY> for Interfering {
+    fn inputs(&mut self, tick: u32, inputs: &mut Inputs<NY>) {
+        let Some(since) = tick.checked_sub(self.from) else { return };
+        let mut add = |sensor: usize, counts: i32| {
+            inputs.counts[sensor] = shown(sensor, inputs.counts[sensor].wrapping_add(counts as u32));
+        };
+        match self.defect {
+            Defect::OneBad(sensor, counts) if since == 0 => add(sensor, counts),
+            Defect::TwoOfThreeBad(sensor, counts) if since % 3 < 2 => add(sensor, counts),
+            Defect::Jump(sensor, counts) => add(sensor, counts),
+            Defect::LosesCounts(sensor, every) => add(sensor, (since / every) as i32),
+            Defect::Frozen(sensor) => {
+                inputs.counts[sensor] = *self.frozen.get_or_insert(inputs.counts[sensor]);
+            }
+            Defect::Reversed(sensor) => {
+                inputs.counts[sensor] = shown(sensor, inputs.counts[sensor].wrapping_neg());
+            }
+            Defect::Swapped(sensor) => inputs.counts.swap(sensor, sensor + 1),
+            Defect::Late(sensor, ticks) => {
+                self.past.push(inputs.counts[sensor]);
+                inputs.counts[sensor] = self.past[self.past.len().saturating_sub(ticks + 1)];
+            }
+            _ => {}
+        }
+    }
+
+    fn output(&mut self, tick: u32, output: &mut Output) {
+        if tick < self.from {
+            return;
+        }
+        let (Drive::Force(command) | Drive::Duty(command)) = &mut output.drive;
+        *command = match self.defect {
+            Defect::MotorDead => 0.0,
+            Defect::MotorReversed => -*command,
+            Defect::MotorStuck => self.full,
+            _ => *command,
+        };
+    }
+}
+
+/// What a counter of the bench's width shows.
+fn shown(sensor: usize, counts: u32) -> u32 {
+    let [cart, link]: [CounterWidth; 2] = upright_design::simulate::Bench::widths();
+    if (if sensor == 0 { cart } else { link }) == CounterWidth::Bits16 { counts & 0xffff } else { counts }
+}
+
+/// What came of it.
+#[derive(Debug, Clone, PartialEq)]
+struct Outcome {
+    /// The fault, and the ticks from the defect to motor off.
+    fault: Option<(Fault, u32)>,
+    sensor: Option<u8>,
+    /// Largest true angle of a link from the vertical until then (rad).
+    lean_rad: f64,
+    rejected: u32,
+}
+
+struct Watched {
+    fault: Interfering,
+    ticks: u32,
+}
+
+impl Supervised for Watched {
+    type Output = Outcome;
+
+    fn balancing<const NX: usize, const NY: usize>(mut self, mut session: Session<'_, NX, NY>) -> Outcome {
+        self.fault.from += session.number();
+        let (mut lean_rad, mut off) = (0.0f64, None);
+        for _ in 0..self.ticks {
+            let tick = session.number();
+            let output = session.step(None, &mut self.fault).output;
+            let mut angle = 0.0;
+            for joint in session.bench().state()[2..].iter().step_by(2) {
+                angle += joint;
+                lean_rad = lean_rad.max(f64::abs(angle));
+            }
+            if !output.enable {
+                off = Some(tick);
+                break;
+            }
+        }
+        let cause = session.fault();
+        Outcome {
+            fault: cause.zip(off).map(|(cause, off)| (cause.fault, off + 1 - self.fault.from)),
+            sensor: cause.and_then(|cause| cause.sensor),
+            lean_rad,
+            rejected: session.firmware().statistics().rejected_samples,
+        }
+    }
+}
+
+fn watch(rig: &Rig, values: &TableValues, law: Law, defect: Defect, seed: u64, ticks: u32) -> Outcome {
+    let disturbance = Disturbance::of(rig);
+    let scenario = Scenario {
+        force_noise_n: disturbance.force_n,
+        torque_noise_n_m: disturbance.torque_n_m,
+        seed,
+        substeps: 2,
+        ..Scenario::at_rest(rig, law)
+    };
+    let full = if rig.actuator.motor.is_some() { 1.0 } else { rig.force_limit_n().unwrap() as f32 };
+    let fault = Interfering { defect, from: 1000 + 17 * seed as u32, frozen: None, past: Vec::new(), full };
+    run(rig, values, &scenario, Watched { fault, ticks }).unwrap()
+}
+
+const LAWS: [Law; 2] = [Law::Lqr, Law::PolePlacement];
+const SEEDS: u64 = 4;
+
+/// Every rig, law and some seeds with these defects.
+fn of_all(
+    defects: impl Fn(usize) -> Vec<Defect>,
+    ticks: u32,
+    verdict: impl Fn(&str, &Rig, Defect, &Outcome),
+) {
+    for name in ALL_RIGS {
+        let rig = rig(name);
+        let values = table(&rig);
+        for defect in defects(rig.sensors().len()) {
+            for law in LAWS {
+                for seed in 0..SEEDS {
+                    let outcome = watch(&rig, &values, law, defect, seed, ticks);
+                    verdict(
+                        &format!("{name} {law:?} seed {seed} {defect:?}: {outcome:?}"),
+                        &rig,
+                        defect,
+                        &outcome,
+                    );
+                }
+            }
+        }
+    }
+}
+
+/// The motor went off in time, and by these tests, not because a link had left its limit.
+fn found_in_time(what: &str, rig: &Rig, _: Defect, outcome: &Outcome) {
+    let (fault, _) = outcome.fault.unwrap_or_else(|| panic!("not found: {what}"));
+    assert!(matches!(fault, Fault::Encoder | Fault::Frozen | Fault::Motor), "{what}");
+    assert!(outcome.lean_rad < 0.5 * rig.limits.angle_rad.unwrap(), "{what}");
+}
+
+#[test]
+fn a_frozen_encoder_is_found_long_before_a_link_leaves_its_limit() {
+    // The lightest motion may stay within a count for a while: then there is nothing to lose yet.
+    of_all(
+        |sensors| (0..sensors).map(Defect::Frozen).collect(),
+        3000,
+        |what, rig, defect, outcome| {
+            let (fault, _) = outcome.fault.unwrap_or_else(|| panic!("not found: {what}"));
+            assert!(matches!(fault, Fault::Encoder | Fault::Frozen | Fault::Motor), "{what}");
+            assert!(outcome.lean_rad < 0.8 * rig.limits.angle_rad.unwrap(), "{what} {defect:?}");
+        },
+    );
+}
+
+#[test]
+fn a_jump_is_found_in_the_third_tick_and_named_with_its_sensor() {
+    for counts in [5, -400] {
+        of_all(
+            |sensors| (0..sensors).map(|sensor| Defect::Jump(sensor, counts)).collect(),
+            1100,
+            |what, _, defect, outcome| {
+                let Defect::Jump(sensor, _) = defect else { panic!("{what}") };
+                assert_eq!(outcome.fault, Some((Fault::Encoder, 3)), "{what}");
+                assert_eq!(outcome.sensor, Some(sensor as u8), "{what}");
+            },
+        );
+    }
+}
+
+#[test]
+fn a_single_bad_measurement_is_rejected_and_counted_and_nothing_else() {
+    let bad = |sensors| (0..sensors).map(|sensor| Defect::OneBad(sensor, 1000)).collect();
+    of_all(bad, 4000, |what, _, _, outcome| {
+        assert_eq!((outcome.fault, outcome.rejected), (None, 1), "{what}");
+    });
+}
+
+#[test]
+fn an_intermittent_encoder_is_survived_or_found() {
+    let bad = |sensors| (0..sensors).map(|sensor| Defect::TwoOfThreeBad(sensor, 1000)).collect();
+    of_all(bad, 4000, |what, rig, _, outcome| {
+        assert!(outcome.rejected >= 2, "{what}");
+        assert!(outcome.lean_rad < rig.limits.angle_rad.unwrap(), "{what}");
+    });
+}
+
+#[test]
+fn a_late_encoder_is_survived_or_found() {
+    let late = |ticks| move |sensors| (0..sensors).map(|sensor| Defect::Late(sensor, ticks)).collect();
+    for ticks in [1, 5] {
+        of_all(late(ticks), 4000, |what, rig, _, outcome| {
+            assert!(outcome.lean_rad < rig.limits.angle_rad.unwrap(), "{what}");
+        });
+    }
+    // So late that the limit itself is seen late: the true angle may be beyond it when the motor is turned off.
+    of_all(late(20), 4000, |what, rig, _, outcome| {
+        assert!(outcome.fault.is_some() || outcome.lean_rad < rig.limits.angle_rad.unwrap(), "{what}");
+    });
+}
+
+#[test]
+fn reversed_and_swapped_encoders_are_found() {
+    of_all(|sensors| (0..sensors).map(Defect::Reversed).collect(), 3000, found_in_time);
+    of_all(|sensors| (0..sensors - 1).map(Defect::Swapped).collect(), 3000, found_in_time);
+}
+
+#[test]
+fn a_dead_and_a_reversed_motor_are_found() {
+    of_all(|_| vec![Defect::MotorDead, Defect::MotorReversed], 3000, found_in_time);
+}
+
+#[test]
+fn a_motor_stuck_at_full_force_is_off_within_six_ticks() {
+    of_all(
+        |_| vec![Defect::MotorStuck],
+        1100,
+        |what, rig, defect, outcome| {
+            found_in_time(what, rig, defect, outcome);
+            assert!(outcome.fault.is_some_and(|(_, ticks)| ticks <= 6), "{what}");
+        },
+    );
+}
+
+#[test]
+fn an_encoder_of_a_link_that_loses_counts_is_found_before_the_limits_are_left() {
+    let lost = |sensors| (1..sensors).map(|sensor| Defect::LosesCounts(sensor, 100)).collect();
+    of_all(lost, 5000, |what, rig, _, outcome| {
+        assert!(outcome.fault.is_some(), "{what}");
+        // The limit is on the measured angle, which is wrong by the lost counts.
+        assert!(outcome.lean_rad <= 1.05 * rig.limits.angle_rad.unwrap(), "{what}");
+    });
+}
+
+#[test]
+fn nothing_wrong_is_no_fault() {
+    of_all(
+        |_| vec![Defect::Nothing],
+        4000,
+        |what, _, _, outcome| assert_eq!((outcome.fault, outcome.rejected), (None, 0), "{what}"),
+    );
+}

@@ -1,0 +1,339 @@
+//! The rules of arming, clearing and commanding, on the whole firmware.
+
+use crate::supervised::{Supervised, rig, run, table};
+use proptest::prelude::*;
+use upright::board::{Contacts, Inputs, Output};
+use upright::control::controller::Rejected;
+use upright::protocol::message::{Answer, Message, Request};
+use upright::supervision::fault::Fault;
+use upright::supervision::inhibits::Reasons;
+use upright::supervision::supervisor::State;
+use upright::table::Law;
+use upright_design::simulate::{Interference, Scenario, Session};
+
+/// What a test does with the single pendulum, balancing and undisturbed.
+fn balancing<F: FnOnce(&mut dyn Rigged) -> T, T>(test: F) -> T {
+    struct Test<F>(F);
+    impl<F: FnOnce(&mut dyn Rigged) -> T, T> Supervised for Test<F> {
+        type Output = T;
+
+        fn balancing<const NX: usize, const NY: usize>(self, session: Session<'_, NX, NY>) -> T {
+            (self.0)(&mut Bare { session, inputs: Given::default() })
+        }
+    }
+    let rig = rig("single-quanser-ip02");
+    run(&rig, &table(&rig), &Scenario::at_rest(&rig, Law::Lqr), Test(test)).unwrap()
+}
+
+/// Inputs that a test gives.
+#[derive(Clone, Copy, Default)]
+struct Given {
+    contacts: Contacts,
+    supply_v: Option<f32>,
+    /// Added to the counts of the link.
+    counts: i32,
+}
+
+impl<const NY: usize> Interference<NY> for Given {
+    fn inputs(&mut self, _: u32, inputs: &mut Inputs<NY>) {
+        inputs.contacts = self.contacts;
+        inputs.supply_v = self.supply_v.unwrap_or(inputs.supply_v);
+        inputs.counts[1] = inputs.counts[1].wrapping_add(self.counts as u32) & 0xffff;
+    }
+}
+
+struct Bare<'t, const NX: usize, const NY: usize> {
+    session: Session<'t, NX, NY>,
+    inputs: Given,
+}
+
+/// A session without its sizes.
+trait Rigged {
+    fn tick(&mut self, request: Option<Request>) -> (Output, Option<Answer>);
+    fn inputs(&mut self) -> &mut Given;
+    fn state(&self) -> State;
+    fn fault(&self) -> Option<Fault>;
+
+    fn ask(&mut self, request: Request) -> Answer {
+        self.tick(Some(request)).1.unwrap()
+    }
+
+    fn wait(&mut self, ticks: u32) {
+        for _ in 0..ticks {
+            self.tick(None);
+        }
+    }
+
+    /// Ticks until the motor is off; none if it stays on.
+    fn ticks_to_off(&mut self, most: u32) -> Option<u32> {
+        (1..=most).find(|_| !self.tick(None).0.enable)
+    }
+}
+
+impl<const NX: usize, const NY: usize> Rigged for Bare<'_, NX, NY> {
+    fn tick(&mut self, request: Option<Request>) -> (Output, Option<Answer>) {
+        let tick = self.session.step(request, &mut self.inputs);
+        let answer = tick.reply.map(|reply| match reply {
+            Message::Reply { answer, .. } => answer,
+            Message::Telemetry(_) => panic!("telemetry is no reply"),
+        });
+        (tick.output, answer)
+    }
+
+    fn inputs(&mut self) -> &mut Given {
+        &mut self.inputs
+    }
+
+    fn state(&self) -> State {
+        self.session.firmware().state()
+    }
+
+    fn fault(&self) -> Option<Fault> {
+        self.session.fault().map(|cause| cause.fault)
+    }
+}
+
+fn reasons(answer: Answer) -> Reasons {
+    match answer {
+        Answer::NotNow(reasons) => reasons,
+        other => panic!("{other:?}"),
+    }
+}
+
+#[test]
+fn each_input_turns_the_motor_off_in_its_tick() {
+    type Case = (fn(&mut Given), u32, Fault);
+    let cases: [Case; 7] = [
+        (|given| given.contacts.limit_low = true, 1, Fault::LimitSwitch),
+        (|given| given.contacts.limit_high = true, 1, Fault::LimitSwitch),
+        (|given| given.contacts.emergency_stop = true, 1, Fault::EmergencyStop),
+        (|given| given.contacts.driver_fault = true, 1, Fault::Driver),
+        (|given| given.contacts.overrun = true, 3, Fault::Overrun),
+        (|given| given.supply_v = Some(f32::NAN), 1, Fault::NotFinite),
+        // 5 ms of 2 ms ticks, rounded to 3, and one.
+        (|given| given.supply_v = Some(7.9), 4, Fault::Supply),
+    ];
+    for (change, ticks, fault) in cases {
+        balancing(|rig| {
+            assert_eq!(rig.ticks_to_off(100), None, "nothing is wrong yet");
+            change(rig.inputs());
+            assert_eq!(rig.ticks_to_off(100), Some(ticks), "{fault:?}");
+            assert_eq!((rig.state(), rig.fault()), (State::Fault, Some(fault)));
+        });
+    }
+}
+
+#[test]
+fn a_brief_overrun_and_a_brief_sag_are_no_fault() {
+    balancing(|rig| {
+        for _ in 0..20 {
+            (rig.inputs().contacts.overrun, rig.inputs().supply_v) = (true, Some(5.0));
+            rig.wait(2);
+            (rig.inputs().contacts.overrun, rig.inputs().supply_v) = (false, None);
+            rig.wait(1);
+        }
+        assert_eq!(rig.state(), State::Balancing);
+        let Answer::Statistics(statistics) = rig.ask(Request::Statistics) else { panic!() };
+        assert_eq!(statistics.overruns, 40);
+    });
+}
+
+#[test]
+fn a_set_point_without_sense_is_rejected_and_the_old_one_stays() {
+    balancing(|rig| {
+        assert_eq!(rig.ask(Request::Setpoint(0.1)), Answer::Done);
+        for position in [f32::NAN, f32::INFINITY, 0.39, -0.39, -1e9] {
+            assert_eq!(rig.ask(Request::Setpoint(position)), Answer::Rejected(Rejected::Setpoint));
+        }
+        assert_eq!(rig.ask(Request::Setpoint(-0.37)), Answer::Done);
+    });
+}
+
+#[test]
+fn a_host_that_commands_the_set_point_must_not_fall_silent_and_one_that_does_not_may() {
+    balancing(|rig| {
+        assert_eq!(rig.ticks_to_off(2000), None);
+        rig.ask(Request::Setpoint(0.0));
+        for _ in 0..10 {
+            rig.wait(49);
+            rig.ask(Request::Beat);
+        }
+        assert_eq!(rig.state(), State::Balancing);
+        // 100 ms of 2 ms ticks, and the tick after.
+        assert_eq!(rig.ticks_to_off(100), Some(51));
+        assert_eq!(rig.fault(), Some(Fault::LinkLost));
+    });
+}
+
+#[test]
+fn clear_and_arm_are_two_acts_and_a_held_arm_is_none() {
+    balancing(|rig| {
+        rig.inputs().contacts.driver_fault = true;
+        rig.wait(1);
+        assert!(reasons(rig.ask(Request::Arm)).contains(Reasons::FAULT));
+        assert_eq!(reasons(rig.ask(Request::Clear)), Reasons::DRIVER);
+        rig.inputs().contacts.driver_fault = false;
+        rig.wait(1);
+        assert_eq!(rig.ask(Request::Clear), Answer::Done);
+        assert_eq!((rig.state(), rig.fault()), (State::Calibrated, None));
+        // The key is still down: for as long as it is, nothing happens.
+        for _ in 0..50 {
+            assert!(reasons(rig.ask(Request::Arm)).contains(Reasons::HELD));
+            rig.wait(100);
+        }
+        assert_eq!(rig.state(), State::Calibrated);
+        // Let go for half a second. (Undisturbed, the link has stayed upright.)
+        rig.wait(260);
+        assert_eq!(rig.ask(Request::Arm), Answer::Done);
+        rig.wait(200);
+        assert_eq!(rig.state(), State::Balancing);
+    });
+}
+
+#[test]
+fn a_tilted_a_moving_and_a_displaced_rig_are_not_armed_and_all_reasons_are_told() {
+    balancing(|rig| {
+        rig.ask(Request::Disarm);
+        rig.inputs().counts = 40; // 0.06 rad
+        rig.inputs().contacts.limit_low = true;
+        rig.wait(1);
+        let found = reasons(rig.ask(Request::Arm));
+        assert_eq!(found, Reasons::TILTED.and(Reasons::MOVING).and(Reasons::LIMIT_SWITCH), "{found}");
+        rig.wait(200);
+        let found = reasons(rig.ask(Request::Arm));
+        assert_eq!(found, Reasons::TILTED.and(Reasons::LIMIT_SWITCH), "{found}");
+        rig.inputs().contacts.limit_low = false;
+        rig.inputs().counts = 0;
+        rig.wait(200);
+        assert_eq!(rig.ask(Request::Arm), Answer::Done);
+        // Tilted while armed: the wait starts anew. Fallen: no longer armed.
+        rig.wait(100);
+        rig.inputs().counts = 40;
+        rig.wait(1000);
+        assert_eq!(rig.state(), State::Armed);
+        rig.inputs().counts = 300;
+        rig.wait(1);
+        assert_eq!(rig.state(), State::Calibrated);
+    });
+}
+
+#[test]
+fn after_an_encoder_fault_home_and_check_again() {
+    balancing(|rig| {
+        rig.inputs().counts = 100;
+        assert_eq!(rig.ticks_to_off(100), Some(3));
+        assert_eq!(rig.ask(Request::Clear), Answer::Done);
+        assert_eq!(rig.state(), State::Disarmed);
+        let reasons = reasons(rig.ask(Request::Arm));
+        assert!(reasons.contains(Reasons::NOT_HOMED.and(Reasons::SIGNS)), "{reasons}");
+    });
+}
+
+#[test]
+fn disarming_turns_the_motor_off_and_keeps_the_positions() {
+    balancing(|rig| {
+        assert_eq!(rig.ask(Request::Disarm), Answer::Done);
+        assert_eq!(rig.ticks_to_off(1), Some(1));
+        assert_eq!((rig.state(), rig.fault()), (State::Calibrated, None));
+        assert!(reasons(rig.ask(Request::Home)).contains(Reasons::MOVING), "still for a tick only");
+    });
+}
+
+#[test]
+fn what_runs_is_neither_homed_nor_checked_nor_given_another_law() {
+    balancing(|rig| {
+        for request in [Request::Home, Request::HomeRail, Request::CheckSigns, Request::Arm] {
+            assert!(!reasons(rig.ask(request)).is_empty(), "{request:?}");
+        }
+        assert_eq!(rig.ask(Request::Select(Law::PolePlacement)), Answer::Rejected(Rejected::Running));
+        assert_eq!(rig.state(), State::Balancing);
+    });
+}
+
+/// What may happen: requests, inputs, and time.
+#[derive(Debug, Clone)]
+enum Event {
+    Ask(Request),
+    Contacts(Contacts),
+    Supply(Option<f32>),
+    Counts(i32),
+    Wait(u32),
+}
+
+fn event() -> impl Strategy<Value = Event> {
+    let request = prop_oneof![
+        Just(Request::Arm),
+        Just(Request::Arm),
+        Just(Request::Clear),
+        Just(Request::Disarm),
+        Just(Request::Home),
+        Just(Request::HomeRail),
+        Just(Request::CheckSigns),
+        Just(Request::Beat),
+        any::<f32>().prop_map(Request::Setpoint),
+    ];
+    let contacts = any::<[bool; 5]>().prop_map(|[a, b, c, d, e]| Contacts {
+        limit_low: a & b & c,
+        limit_high: b & c & d,
+        emergency_stop: a & c & e,
+        driver_fault: b & d & e,
+        overrun: a,
+        clock_fault: a & b & c & d & e,
+    });
+    prop_oneof![
+        4 => request.prop_map(Event::Ask),
+        1 => contacts.prop_map(Event::Contacts),
+        1 => prop_oneof![Just(None), Just(Some(5.0)), Just(Some(f32::NAN))].prop_map(Event::Supply),
+        1 => prop_oneof![Just(0), -3000..3000].prop_map(Event::Counts),
+        3 => (1u32..400).prop_map(Event::Wait),
+    ]
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(64))]
+
+    #[test]
+    fn the_motor_is_on_in_balancing_alone_and_balancing_comes_from_a_deliberate_arm_alone(
+        events in prop::collection::vec(event(), 1..60),
+        balancing_first: bool,
+    ) {
+        balancing(|rig| {
+            if !balancing_first {
+                rig.ask(Request::Disarm);
+            }
+            let mut before = rig.state();
+            let mut armed = false;
+            for event in &events {
+                let (mut request, ticks) = match event {
+                    Event::Ask(request) => (Some(*request), 1),
+                    Event::Contacts(contacts) => { rig.inputs().contacts = *contacts; (None, 1) }
+                    Event::Supply(supply) => { rig.inputs().supply_v = *supply; (None, 1) }
+                    Event::Counts(counts) => { rig.inputs().counts = *counts; (None, 1) }
+                    Event::Wait(ticks) => (None, *ticks),
+                };
+                for _ in 0..ticks {
+                    let asked = request.take();
+                    let (output, answer) = rig.tick(asked);
+                    let after = rig.state();
+                    // What the tick ended in tells whether its output may have been on.
+                    assert!(output == Output::OFF || before == State::Balancing || armed);
+                    assert!(!output.enable || after != State::Fault || asked.is_some() || answer.is_none());
+                    if asked == Some(Request::Arm) && answer == Some(Answer::Done) {
+                        assert!(before == State::Calibrated, "armed in {before:?}");
+                        armed = true;
+                    }
+                    if after == State::Armed || (after == State::Balancing && before != State::Balancing) {
+                        assert!(armed, "{after:?} without an arm");
+                        let contacts = rig.inputs().contacts;
+                        assert!(after == State::Armed || !(contacts.emergency_stop || contacts.driver_fault
+                            || contacts.limit_low || contacts.limit_high));
+                    }
+                    if !matches!(after, State::Armed | State::Balancing) {
+                        armed = false;
+                    }
+                    before = after;
+                }
+            }
+        });
+    }
+}

@@ -1,0 +1,220 @@
+//! The nonlinear half of the trust report, with rigs that must pass and rigs that must not.
+
+use std::path::Path;
+use std::sync::LazyLock;
+use std::sync::atomic::{AtomicUsize, Ordering};
+
+use upright::table::Law;
+use upright_design::design::design;
+use upright_design::rig::{PlantDescription, Rig};
+use upright_design::simulate::run;
+use upright_design::table::{Gains, TableValues};
+use upright_design::verify::{
+    AttractionSettings, Axis, CornerSettings, Disturbance, EncoderSettings, Horizon, Mass, Spread,
+    attraction, attraction_map, coarser, coarsest_encoder, corners, endurance, largest_percent,
+    mass_tolerances, monte_carlo, noise_run, sample, trial,
+};
+
+const LAWS: [Law; 2] = [Law::Lqr, Law::PolePlacement];
+/// The disturbances of the paper: 0.1 N and 3.16e-5 N·m rms.
+const PAPERS: Disturbance = Disturbance { force_n: 0.1, torque_n_m: 3.16e-5 };
+
+fn rig(name: &str) -> Rig {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../rigs");
+    Rig::from_path(&folder.join(name)).unwrap()
+}
+
+fn table(rig: &Rig) -> TableValues {
+    TableValues::of(rig, &design(rig).unwrap(), Gains::Sampled).unwrap()
+}
+
+fn with_force_limit(mut rig: Rig, limit_n: f64) -> Rig {
+    rig.actuator.force_limit_n = Some(limit_n);
+    rig
+}
+
+/// The paper's rig, limited to 5 N.
+static PAPER: LazyLock<(Rig, TableValues)> = LazyLock::new(|| {
+    let rig = with_force_limit(rig("quadruple-paper.toml"), 5.0);
+    let table = table(&rig);
+    (rig, table)
+});
+static SINGLE: LazyLock<(Rig, TableValues)> = LazyLock::new(|| {
+    let rig = rig("single-quanser-ip02.toml");
+    let table = table(&rig);
+    (rig, table)
+});
+
+#[test]
+fn the_edges_of_attraction_are_edges() {
+    let (rig, table) = &*SINGLE;
+    let settings = AttractionSettings::default();
+    let found = attraction(rig, table, Law::Lqr, &settings).unwrap();
+    let tilt = &found.tilts[0].edge;
+    assert!(tilt.size > 0.05 && tilt.size < 1.0 && !tilt.at_largest_tried, "{found:?}");
+    assert!(tilt.peak_force_n > 1.0);
+    assert_eq!(found.worst.as_ref().unwrap().edge.size, tilt.size);
+    assert!(found.raw_step.as_ref().unwrap().size > 0.05, "{found:?}");
+
+    // The map agrees with the edge on both sides of it.
+    let axis = |state, range| Axis { state, range, points: 2 };
+    let axes = [axis(2, [0.9 * tilt.size, 1.1 * tilt.size]), axis(3, [0.0, 0.01])];
+    let map = attraction_map(rig, table, Law::Lqr, axes, &settings.horizon, &|| ()).unwrap();
+    assert!(map.settled_s[0][0].is_some() && map.settled_s[0][1].is_none(), "{map:?}");
+    let outside = axis(4, [0.0, 1.0]);
+    assert!(attraction_map(rig, table, Law::Lqr, [outside, axes[1]], &settings.horizon, &|| ()).is_err());
+}
+
+#[test]
+fn links_that_lean_to_different_sides_are_worse() {
+    let (rig, table) = &*PAPER;
+    let settings = AttractionSettings { relative: 0.1, ..AttractionSettings::default() };
+    let found = attraction(rig, table, Law::Lqr, &settings).unwrap();
+    let worst = found.worst.unwrap();
+    assert_eq!((found.tilts.len(), worst.tried), (4, 8));
+    assert!(worst.edge.size > 0.0);
+    assert!(found.tilts.iter().all(|tilt| tilt.edge.size >= worst.edge.size), "{:?} {worst:?}", found.tilts);
+    assert!(worst.signs.windows(2).any(|pair| pair[0] != pair[1]), "{worst:?}");
+}
+
+#[test]
+fn too_weak_a_motor_holds_less_and_finally_nothing() {
+    let settings = AttractionSettings { relative: 0.1, ..AttractionSettings::default() };
+    let (strong, strong_table) = &*SINGLE;
+    let edge = |rig: &Rig, table: &TableValues| {
+        attraction(rig, table, Law::Lqr, &settings).unwrap().tilts[0].edge.size
+    };
+    // The table is for the motor it has; the plant's is weaker than that.
+    let mut weak = strong.clone();
+    weak.actuator.motor.as_mut().unwrap().supply_v /= 4.0;
+    assert!(edge(&weak, &table(&weak)) < 0.7 * edge(strong, strong_table));
+
+    let (paper, _) = &*PAPER;
+    let feeble = with_force_limit(paper.clone(), 0.05);
+    let stood = endurance(&feeble, &table(&feeble), Law::Lqr, &PAPERS, 2, 5.0, &|| ()).unwrap();
+    assert_eq!(stood.stood, 0, "0.05 N against noise of 0.1 N");
+}
+
+#[test]
+fn the_papers_rig_stands_for_long_in_noise() {
+    let (rig, table) = &*PAPER;
+    for law in LAWS {
+        let found = endurance(rig, table, law, &PAPERS, 4, 20.0, &|| ()).unwrap();
+        assert_eq!((found.stood, found.fallen.len()), (4, 0), "{law:?}");
+        let noise = noise_run(rig, table, law, &PAPERS, 4, 5.0).unwrap();
+        assert_eq!(noise.stood, 4);
+        // Whatever disturbs the cart has to be made up for.
+        assert!(noise.force_rms_n > 0.1 && noise.force_peak_n <= 5.0, "{noise:?}");
+        assert!(noise.angle_rms_rad.iter().all(|&rms| rms > 1e-5 && rms < 0.05), "{noise:?}");
+    }
+}
+
+#[test]
+fn every_corner_of_two_percent_wrong_masses_stands() {
+    let (rig, table) = &*PAPER;
+    for law in LAWS {
+        let settings = CornerSettings { disturbance: PAPERS, ..CornerSettings::of(rig) };
+        let found = corners(rig, table, law, 2.0, &settings).unwrap();
+        assert_eq!((found.stand, found.corners), (32, 32), "{law:?}: {:?}", found.lost);
+    }
+}
+
+#[test]
+fn masses_wrong_by_a_third_do_not_stand_and_the_weakest_is_named() {
+    let (rig, table) = &*PAPER;
+    let settings = CornerSettings { disturbance: PAPERS, ..CornerSettings::of(rig) };
+    let found = corners(rig, table, Law::Lqr, 30.0, &settings).unwrap();
+    assert!(found.stand < 24, "{}", found.stand);
+    let first = |fall: &Option<upright_design::simulate::Fall>| fall.as_ref().unwrap().at_s;
+    let at_s = first(&found.weakest.outcome.fall);
+    let fallen = found.lost.iter().filter(|corner| corner.outcome.fall.is_some());
+    assert!(fallen.map(|corner| first(&corner.outcome.fall)).all(|other| at_s <= other));
+
+    let percent = largest_percent(rig, table, Law::Lqr, &settings, 1.0, 30.0).unwrap();
+    assert!((2.0..30.0).contains(&percent), "{percent}");
+    let tolerances = mass_tolerances(rig, table, Law::Lqr, &settings).unwrap();
+    assert_eq!(tolerances.len(), 5);
+    assert!(tolerances.windows(2).all(|pair| pair[0].percent() <= pair[1].percent()));
+    assert!(tolerances[0].percent() >= percent, "all at once is worse than one alone: {tolerances:?}");
+    assert!(tolerances.iter().any(|tolerance| tolerance.mass == Mass::Cart));
+}
+
+#[test]
+fn monte_carlo_does_not_depend_on_the_threads_and_its_worst_case_can_be_replayed() {
+    let (rig, table) = &*PAPER;
+    let mut spread = Spread { disturbance: PAPERS, ..Spread::of(rig) };
+    spread.duration_s = 3.0;
+    // Wrong enough that some fall.
+    (spread.mass, spread.length, spread.inertia) = (0.15, 0.1, 0.15);
+    let with_threads = |threads: usize| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        let done = AtomicUsize::new(0);
+        let count = || {
+            done.fetch_add(1, Ordering::Relaxed);
+        };
+        let found = pool.install(|| monte_carlo(rig, table, Law::Lqr, &spread, 7, 60, &count).unwrap());
+        assert_eq!(done.into_inner(), 60);
+        found
+    };
+    let found = with_threads(1);
+    assert_eq!(found, with_threads(3));
+    assert!(found.stood > 0 && found.stood < 60, "{found:?}");
+    let [low, high] = found.interval;
+    assert!(0.0 < low && low < found.success_rate && found.success_rate < high && high < 1.0);
+
+    let worst = found.worst.unwrap();
+    let (plant, scenario) = sample(rig, Law::Lqr, &spread, worst.seed);
+    assert_eq!(run(&plant, table, &scenario, &mut |_| ()).unwrap(), worst.outcome.fall);
+    assert_eq!(trial(&plant, table, &scenario, &Horizon::default()).unwrap(), worst.outcome);
+}
+
+#[test]
+fn a_drawn_plant_is_within_its_spread() {
+    let (rig, _) = &*PAPER;
+    let spread = Spread { other_delay: 0.5, ..Spread::of(rig) };
+    let masses = |rig: &Rig| match &rig.plant {
+        PlantDescription::Chain(chain) => chain.links.iter().map(|link| link.mass_kg).collect::<Vec<_>>(),
+        PlantDescription::Model(_) => Vec::new(),
+    };
+    let mut late = 0;
+    for seed in 0..200 {
+        let (plant, scenario) = sample(rig, Law::Lqr, &spread, seed);
+        assert!(
+            masses(&plant).iter().zip(masses(rig)).all(|(drawn, given)| (drawn / given - 1.0).abs() <= 0.02)
+        );
+        assert!(scenario.start[2].abs() <= spread.tilt_rad && scenario.seed == seed);
+        late += plant.tick.delay_ticks;
+    }
+    assert!((60..140).contains(&late), "{late} of 200 late");
+    let spread = Spread { mass: 1.5, ..spread };
+    assert!(monte_carlo(rig, &PAPER.1, Law::Lqr, &spread, 0, 1, &|| ()).is_err());
+}
+
+#[test]
+fn too_coarse_an_encoder_falls_and_the_coarsest_is_found() {
+    let (rig, _) = &*PAPER;
+    let settings = EncoderSettings {
+        duration_s: 5.0,
+        disturbance: PAPERS,
+        seeds: 2,
+        largest_factor: 64.0,
+        relative: 0.5,
+    };
+    let found = coarsest_encoder(rig, Law::Lqr, &settings).unwrap();
+    let factor = found.factor.unwrap();
+    assert!((1.0..64.0).contains(&factor) && !found.at_largest_tried, "{found:?}");
+    let coarse = coarser(rig, 64.0);
+    let stood = endurance(&coarse, &table(&coarse), Law::Lqr, &PAPERS, 2, 5.0, &|| ()).unwrap();
+    assert_eq!(stood.stood, 0, "64 counts per revolution");
+}
+
+#[test]
+fn a_model_has_no_masses() {
+    let rig = rig("quadruple-paper-printed.toml");
+    let table = table(&rig);
+    let error = corners(&rig, &table, Law::Lqr, 2.0, &CornerSettings::of(&rig)).unwrap_err();
+    assert!(error.to_string().contains("no masses"), "{error}");
+    assert!(coarsest_encoder(&rig, Law::Lqr, &EncoderSettings::of(&rig)).is_err());
+    let found = attraction(&rig, &table, Law::Lqr, &AttractionSettings::default()).unwrap();
+    assert!(found.tilts.is_empty() && found.worst.is_none() && found.raw_step.unwrap().at_largest_tried);
+}

@@ -1,0 +1,136 @@
+//! `upright compare`
+
+use std::io::Write;
+use std::path::{Path, PathBuf};
+
+use clap::Args;
+use indicatif::{ProgressBar, ProgressStyle};
+use serde_json::json;
+use upright_design::rig::Rig;
+use upright_design::table::write_atomically;
+use upright_tool::compare::{Candidate, Conditions, Sweep, compare, csv, figure, jobs, notes, table};
+
+use crate::failure::Failure;
+use crate::variation::{LawName, finite, positive};
+
+/// Puts designs side by side: several rigs, or one key of a rig file swept over a range. What falls or has no design is a
+/// row, too.
+#[derive(Args)]
+#[command(before_help = "\
+Examples:
+  upright compare rigs/single-quanser-ip02.toml rigs/double-quanser-dbpen.toml
+  upright compare rigs/quadruple-paper.toml --sweep tick.period_s=0.0005..0.02:9:log
+  upright compare rigs/quadruple-paper.toml --sweep pole_placement.settling_time_s=3..9 \\
+      --law pole-placement --full-state --step 1 --raw-step --duration 6.5     (Table 2 of the paper)
+  upright compare my.toml --sweep lqr.force_weight=0.01..10:13:log --svg weight.svg --csv weight.csv
+  upright compare my.toml --sweep 'link[1].mass_kg=0.1..0.3' --json")]
+pub(crate) struct Compare {
+    /// Rig files (TOML)
+    #[arg(required = true, value_name = "RIG")]
+    rigs: Vec<PathBuf>,
+    /// Key of the rig files and its values; 7 of them if POINTS is left out
+    #[arg(long, value_name = "KEY=FROM..TO[:POINTS][:log]")]
+    sweep: Option<Sweep>,
+    /// Only this law
+    #[arg(long, value_enum)]
+    law: Option<LawName>,
+    /// Step of the set-point (m)
+    #[arg(long, default_value_t = 0.1, value_name = "M", allow_negative_numbers = true, value_parser = finite)]
+    step: f64,
+    /// Length of each run (s)
+    #[arg(long, default_value_t = 10.0, value_name = "S", allow_negative_numbers = true, value_parser = positive)]
+    duration: f64,
+    /// Give the controller the whole state instead of encoder counts
+    #[arg(long)]
+    full_state: bool,
+    /// Let the set-point jump, without the governor
+    #[arg(long)]
+    raw_step: bool,
+    /// Use the gains for continuous time instead of those for the tick
+    #[arg(long)]
+    continuous_gains: bool,
+    /// Print everything as one JSON object
+    #[arg(long)]
+    json: bool,
+    /// Write the table as CSV
+    #[arg(long, value_name = "FILE")]
+    csv: Option<PathBuf>,
+    /// Write the figure as SVG: figures over the swept key, or the runs without one
+    #[arg(long, value_name = "FILE")]
+    svg: Option<PathBuf>,
+    /// Write the figure as PNG
+    #[arg(long, value_name = "FILE")]
+    png: Option<PathBuf>,
+}
+
+impl Compare {
+    pub(crate) fn run(self) -> Result<(), Failure> {
+        let rigs: Vec<Rig> = self.rigs.iter().map(|path| Rig::from_path(path)).collect::<Result<_, _>>()?;
+        let mut candidates = Vec::new();
+        for (path, rig) in self.rigs.iter().zip(&rigs) {
+            let is_copy = rigs.iter().filter(|other| other.name == rig.name).count() > 1;
+            let label = if is_copy { path.display().to_string() } else { rig.name.clone() };
+            candidates.extend(self.candidates(path, rig, &label)?);
+        }
+        let conditions = Conditions {
+            step_m: self.step,
+            duration_s: self.duration,
+            full_state: self.full_state,
+            raw_step: self.raw_step,
+            continuous_gains: self.continuous_gains,
+            law: self.law.map(LawName::law),
+        };
+        let rows = jobs(&candidates, &conditions).len();
+        if rows == 0 {
+            return Err(Failure::BadArgument(
+                "no rig asks for such a control law: add [lqr] or [pole_placement], or leave out --law"
+                    .to_owned(),
+            ));
+        }
+        let bar = ProgressBar::new(rows as u64);
+        bar.set_style(
+            ProgressStyle::with_template("{spinner} {wide_bar} {pos}/{len} designs {elapsed}")
+                .unwrap_or_else(|_| ProgressStyle::default_bar()),
+        );
+        bar.enable_steady_tick(std::time::Duration::from_millis(120));
+        let rows = compare(&candidates, &conditions, &|| bar.inc(1));
+        bar.finish_and_clear();
+        let rows = rows?;
+
+        let key = self.sweep.as_ref().map(|sweep| sweep.key.as_str());
+        if let Some(path) = &self.csv {
+            write_atomically(path, &csv(&rows, key)?)?;
+        }
+        if self.svg.is_some() || self.png.is_some() {
+            let figure = figure(&rows, &candidates, self.sweep.as_ref());
+            if let Some(path) = &self.svg {
+                write_atomically(path, figure.svg()?.as_bytes())?;
+            }
+            if let Some(path) = &self.png {
+                write_atomically(path, &figure.png(2.0)?)?;
+            }
+        }
+        let mut out = std::io::stdout().lock();
+        if self.json {
+            let all = json!({ "key": key, "conditions": conditions, "rows": rows });
+            writeln!(out, "{all}")?;
+        } else {
+            write!(out, "{}", table(&rows, key))?;
+            for note in notes(&rows, key) {
+                writeln!(out, "{note}")?;
+            }
+        }
+        Ok(())
+    }
+
+    /// The rig of a file, or one for each value of the sweep.
+    fn candidates(&self, path: &Path, rig: &Rig, label: &str) -> Result<Vec<Candidate>, Failure> {
+        let named = |rig, value| Candidate { label: label.to_owned(), rig, value };
+        let Some(sweep) = &self.sweep else { return Ok(vec![named(rig.clone(), None)]) };
+        let text = std::fs::read_to_string(path).map_err(|error| {
+            Failure::BadArgument(format!("{}: cannot be read again for --sweep: {error}", path.display()))
+        })?;
+        let candidate = |&value: &f64| sweep.rig(&text, path, value).map(|rig| named(rig, Some(value)));
+        Ok(sweep.values.iter().map(candidate).collect::<Result<_, _>>()?)
+    }
+}

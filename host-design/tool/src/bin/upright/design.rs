@@ -1,0 +1,166 @@
+//! `upright design`
+
+use std::io::Write;
+use std::path::{Path, PathBuf};
+
+use clap::Args;
+use upright::table::Law;
+use upright_design::design::{Assessment, Certified, design};
+use upright_design::rig::Rig;
+use upright_design::simulate::{Scenario, Summary, simulate};
+use upright_design::table::{Gains, TableValues, gains_source, write_atomically};
+
+use crate::failure::Failure;
+use crate::progress::with_spinner;
+
+mod data;
+mod text;
+
+/// Designs the gains of a rig, proves them, and writes the const table of the firmware.
+#[derive(Args)]
+#[command(before_help = "\
+Examples:
+  upright design rigs/quadruple-paper.toml
+  upright design my.toml --out /tmp/gains.rs
+  upright design rigs/quadruple-paper.toml --check        exit status 1 if src/gains.rs differs
+  upright design my.toml --json --no-write | jq .sampled.lqr.K")]
+pub(crate) struct Design {
+    /// Rig file (TOML)
+    rig: PathBuf,
+    /// Write the table here [default: src/gains.rs of this checkout]
+    #[arg(long, value_name = "FILE")]
+    out: Option<PathBuf>,
+    /// Write nothing; fail if the table file differs from what would be written
+    #[arg(long, conflicts_with = "no_write")]
+    check: bool,
+    /// Write nothing
+    #[arg(long)]
+    no_write: bool,
+    /// Print the whole design as one JSON object
+    #[arg(long)]
+    json: bool,
+}
+
+/// A control law of a design, with what has been found out about it.
+struct LawReport {
+    name: &'static str,
+    /// Index into [`Certified::poles`] and assessments.
+    index: usize,
+    assessment: Assessment,
+    /// The acceptance run, if there is a table.
+    run: Option<Summary>,
+}
+
+impl Design {
+    pub(crate) fn run(self) -> Result<(), Failure> {
+        let rig = Rig::from_path(&self.rig)?;
+        let name = || self.rig.display().to_string();
+        let (certified, reports, table) = with_spinner("designing", || -> Result<_, Failure> {
+            let failed = |source| Failure::Design { rig: name(), source };
+            let certified = design(&rig).map_err(failed)?;
+            let assessments = certified.assess(&rig).map_err(failed)?;
+            let table = TableValues::of(&rig, &certified, Gains::Sampled);
+            let reports = report(&rig, &certified, assessments, table.as_ref().ok())?;
+            Ok((certified, reports, table))
+        })?;
+
+        let mut out = std::io::stdout().lock();
+        if self.json {
+            serde_json::to_writer(&mut out, &data::DesignData::of(&rig, &certified, table.as_ref().ok()))
+                .map_err(std::io::Error::from)?;
+            writeln!(out)?;
+        } else {
+            write!(out, "{}", text::design(&rig, &certified, &reports))?;
+        }
+        for warning in text::warnings(&rig, &certified, &reports, table.as_ref().ok()) {
+            eprintln!("warning: {warning}");
+        }
+        if self.no_write {
+            return Ok(());
+        }
+        let table = table.map_err(|source| Failure::NoTable { rig: name(), source })?;
+        refuse_failing_table(&rig, &reports)?;
+        let source = gains_source(&rig, &table);
+        let path = self.out.unwrap_or_else(default_table);
+        if self.check {
+            return check(&path, &source);
+        }
+        if std::fs::read_to_string(&path).is_ok_and(|found| found == source) {
+            // A new time stamp alone would have the firmware compiled again.
+            eprintln!("{} is up to date", path.display());
+            return Ok(());
+        }
+        write_atomically(&path, source.as_bytes())?;
+        eprintln!("wrote {}", path.display());
+        Ok(())
+    }
+}
+
+fn report(
+    rig: &Rig,
+    certified: &Certified,
+    assessments: [Option<Assessment>; 2],
+    table: Option<&TableValues>,
+) -> Result<Vec<LawReport>, Failure> {
+    let laws = [("LQR", Law::Lqr), ("pole placement", Law::PolePlacement)];
+    let mut reports = Vec::new();
+    for (index, ((name, law), assessment)) in laws.into_iter().zip(assessments).enumerate() {
+        let Some(assessment) = assessment else { continue };
+        let run = match table {
+            Some(table) => {
+                let scenario = Scenario::acceptance(rig, law, slowest_time_constant(rig, certified, index));
+                Some(simulate(rig, table, &scenario)?.1)
+            }
+            None => None,
+        };
+        reports.push(LawReport { name, index, assessment, run });
+    }
+    Ok(reports)
+}
+
+/// Of the continuous loop (s).
+fn slowest_time_constant(rig: &Rig, certified: &Certified, law: usize) -> f64 {
+    let poles = certified.poles.in_table(law)[0].map(Vec::as_slice).unwrap_or_default();
+    let slowest = poles.iter().map(|pole| -pole[0]).fold(f64::INFINITY, f64::min);
+    if slowest > 0.0 && slowest.is_finite() { 1.0 / slowest } else { rig.tick.period_s }
+}
+
+/// A table that cannot hold its own plant is not written.
+fn refuse_failing_table(rig: &Rig, reports: &[LawReport]) -> Result<(), Failure> {
+    for LawReport { name, assessment, run, .. } in reports {
+        if assessment.rounded >= 1.0 {
+            return Err(Failure::NoSolution(format!(
+                "{}: {name}: rounded to f32 the gains no longer hold the plant (spectral radius {:.6}): tick.period_s = {} s \
+                 is too long for single precision; shorten it. Nothing was written",
+                rig.name, assessment.rounded, rig.tick.period_s
+            )));
+        }
+        if let Some(fall) = run.as_ref().and_then(|run| run.fall.as_ref()) {
+            return Err(Failure::CheckFailed(format!(
+                "{}: {name}: {fall} in the closed loop with the new table. Nothing was written",
+                rig.name
+            )));
+        }
+    }
+    Ok(())
+}
+
+/// `src/gains.rs` of the checkout this tool was built from.
+fn default_table() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("../../src/gains.rs")
+}
+
+fn check(path: &Path, source: &str) -> Result<(), Failure> {
+    let found = std::fs::read_to_string(path)
+        .map_err(|error| Failure::CheckFailed(format!("{}: cannot be read: {error}", path.display())))?;
+    if found == source {
+        eprintln!("{} is up to date", path.display());
+        return Ok(());
+    }
+    let differing = found.lines().zip(source.lines()).position(|(found, wanted)| found != wanted);
+    let line = differing.unwrap_or_else(|| found.lines().count().min(source.lines().count())) + 1;
+    Err(Failure::CheckFailed(format!(
+        "{}:{line}: differs from what `upright design` would write; run it without --check",
+        path.display()
+    )))
+}

@@ -1,0 +1,144 @@
+//! A design for reading.
+
+use core::fmt::Write;
+
+use upright_design::design::{Certified, Feedback};
+use upright_design::rig::{PlantDescription, Rig};
+use upright_design::table::{LawValues, TableValues};
+
+use super::LawReport;
+
+pub(super) fn design(rig: &Rig, certified: &Certified, reports: &[LawReport]) -> String {
+    let mut out = String::new();
+    // Writing into a String cannot fail.
+    let _ = write_design(&mut out, rig, certified, reports);
+    out
+}
+
+fn write_design(
+    out: &mut String,
+    rig: &Rig,
+    certified: &Certified,
+    reports: &[LawReport],
+) -> core::fmt::Result {
+    let [low, high] = certified.bits;
+    writeln!(out, "{} (hash {:016x})", rig.name, rig.hash())?;
+    writeln!(
+        out,
+        "{} states, tick {} ms, delay {} ticks; every gain the same at {low} and {high} bits",
+        rig.states(),
+        short(rig.tick.period_s * 1e3),
+        rig.tick.delay_ticks
+    )?;
+    for report in reports {
+        let index = report.index;
+        writeln!(out, "\n{}", report.name)?;
+        let [poles, sampled_poles] = certified.poles.in_table(index);
+        if let Some(law) = certified.double.continuous.in_table()[index] {
+            write_law(out, "continuous", "s", law, poles)?;
+        }
+        if let Some(law) = certified.double.sampled.in_table()[index] {
+            write_law(out, "sampled", "z", law, sampled_poles)?;
+        }
+        let assessment = &report.assessment;
+        writeln!(
+            out,
+            "  spectral radius at the tick: {:.6} exact, {:.6} rounded to f32, {:.6} with the continuous gains\n  \
+             rounding to f32 moves no gain by more than {:.1e} of itself",
+            assessment.exact, assessment.rounded, assessment.continuous_at_tick, assessment.largest_rounding
+        )?;
+        match &report.run {
+            Some(run) => writeln!(out, "  closed loop, firmware against nonlinear plant: {run}")?,
+            None => writeln!(out, "  no closed loop: this design makes no table")?,
+        }
+    }
+    Ok(())
+}
+
+fn write_law(
+    out: &mut String,
+    name: &str,
+    plane: &str,
+    law: &Feedback<f64>,
+    poles: Option<&Vec<[f64; 2]>>,
+) -> core::fmt::Result {
+    let k: Vec<String> = law.k.entries().iter().map(|&gain| short(gain)).collect();
+    writeln!(out, "  {name}")?;
+    writeln!(out, "    K       {}", wrapped(&k))?;
+    writeln!(
+        out,
+        "    N       {}",
+        law.n.map_or("none: no constant input holds the output away from 0".to_owned(), short)
+    )?;
+    // A conjugate pair is named once.
+    let poles: Vec<String> = poles
+        .map(Vec::as_slice)
+        .unwrap_or_default()
+        .iter()
+        .filter(|pole| pole[1] >= 0.0)
+        .map(|&[re, im]| if im == 0.0 { short(re) } else { format!("{}±{}i", short(re), short(im)) })
+        .collect();
+    writeln!(out, "    poles {plane} {}", wrapped(&poles))
+}
+
+/// Six significant digits; a rounding residue of a pole at the origin is shown as zero.
+fn short(x: f64) -> String {
+    if x.abs() < 1e-60 {
+        return "0".to_owned();
+    }
+    let rounded: f64 = format!("{x:.5e}").parse().unwrap_or(x);
+    if (1e-4..1e7).contains(&rounded.abs()) { rounded.to_string() } else { format!("{rounded:e}") }
+}
+
+fn wrapped(items: &[String]) -> String {
+    let lines: Vec<String> = items.chunks(6).map(|line| line.join("  ")).collect();
+    lines.join("\n            ")
+}
+
+/// What a user should know before flashing.
+pub(super) fn warnings(
+    rig: &Rig,
+    certified: &Certified,
+    reports: &[LawReport],
+    table: Option<&TableValues>,
+) -> Vec<String> {
+    let mut warnings = Vec::new();
+    for LawReport { name, assessment, .. } in reports {
+        if assessment.continuous_at_tick >= 1.0 {
+            warnings.push(format!(
+                "{name}: the continuous gains would not survive the tick of {} ms (spectral radius {:.2}); the table holds the sampled ones",
+                short(rig.tick.period_s * 1e3),
+                assessment.continuous_at_tick
+            ));
+        }
+        if assessment.rounded >= 1.0 {
+            warnings.push(format!(
+                "{name}: rounded to f32 the gains do not hold the plant (spectral radius {:.6})",
+                assessment.rounded
+            ));
+        }
+    }
+    let sampled = &certified.double.sampled;
+    if sampled.each().into_iter().flatten().any(|law| law.n.is_none()) {
+        warnings.push(
+            "no constant input holds the output away from 0: N is 0 in the table, set-points have no effect"
+                .to_owned(),
+        );
+    }
+    let ungoverned = |law: &LawValues| law.setpoint_step == f32::MAX && law.n != 0.0;
+    if let Some(table) = table.filter(|_| matches!(rig.plant, PlantDescription::Chain(_)))
+        && [&table.lqr, &table.pole_placement].into_iter().flatten().any(ungoverned)
+    {
+        warnings.push(
+            "the loop is too slow for a bound on its step response: the set-point is not governed".to_owned(),
+        );
+    }
+    if rig.force_limit_n().is_none() {
+        warnings
+            .push("no force limit: give actuator.force_limit_n or a motor before connecting one".to_owned());
+    }
+    if reports.is_empty() {
+        warnings.push("the rig file asks for no control law: add [lqr] or [pole_placement]".to_owned());
+    }
+    warnings
+}

@@ -1,0 +1,116 @@
+//! Failures of the tool and their exit status.
+
+use std::process::ExitCode;
+
+use upright_design::design::DesignError;
+use upright_design::rig::RigError;
+use upright_design::simulate::SimulationError;
+use upright_design::table::{NoTable, WriteError};
+use upright_design::verify::{Unverifiable, VerifyError};
+use upright_tool::campaign::CampaignError;
+use upright_tool::figure::FigureError;
+use upright_tool::image::{ElfError, ImageError, SizeError};
+use upright_tool::in_the_loop::{RelayError, RunError, SessionError, TargetError};
+use upright_tool::monitor::OpenError;
+use upright_tool::report::ReportError;
+use upright_tool::reproduce::ReproduceError;
+
+/// Why a command ends without success.
+#[derive(Debug, thiserror::Error)]
+pub(crate) enum Failure {
+    #[error(transparent)]
+    Rig(#[from] RigError),
+    #[error("{rig}: {source}")]
+    Design { rig: String, source: DesignError },
+    #[error("{rig}: {source}")]
+    NoTable { rig: String, source: NoTable },
+    #[error("{0}")]
+    NoSolution(String),
+    #[error(transparent)]
+    Simulation(#[from] SimulationError),
+    #[error(transparent)]
+    Verify(#[from] VerifyError),
+    #[error(transparent)]
+    Unverifiable(#[from] Unverifiable),
+    #[error(transparent)]
+    Image(#[from] ImageError),
+    #[error(transparent)]
+    Elf(#[from] ElfError),
+    #[error(transparent)]
+    Size(#[from] SizeError),
+    #[error("{0}")]
+    NoProgram(&'static str),
+    #[error(transparent)]
+    InTheLoop(#[from] RunError),
+    #[error("nobody can connect: {0}")]
+    Relay(std::io::Error),
+    #[error(transparent)]
+    Monitor(#[from] OpenError),
+    #[error(transparent)]
+    Campaign(#[from] CampaignError),
+    #[error(transparent)]
+    Reproduce(#[from] ReproduceError),
+    #[error(transparent)]
+    Figure(#[from] FigureError),
+    #[error(transparent)]
+    Report(#[from] ReportError),
+    #[error(transparent)]
+    Write(#[from] WriteError),
+    #[error("the output cannot be written: {0}")]
+    Output(#[from] std::io::Error),
+    #[error("{0}")]
+    BadArgument(String),
+    #[error("{0}")]
+    CheckFailed(String),
+}
+
+impl From<RelayError> for Failure {
+    fn from(error: RelayError) -> Self {
+        match error {
+            RelayError::Run(error) => Failure::InTheLoop(error),
+            RelayError::Socket(error) => Failure::Relay(error),
+        }
+    }
+}
+
+impl Failure {
+    fn exit_status(&self) -> u8 {
+        match self {
+            Failure::CheckFailed(_) => 1,
+            Failure::Rig(error) => error.exit_code(),
+            Failure::Design { .. } | Failure::NoTable { .. } | Failure::NoSolution(_) => 3,
+            Failure::NoProgram(_)
+            | Failure::Image(ImageError::NoCompiler)
+            | Failure::InTheLoop(RunError::Session(SessionError::Target(TargetError::NoEmulator))) => 4,
+            Failure::InTheLoop(RunError::Session(_)) => 1,
+            Failure::Campaign(_) => 1,
+            Failure::Image(_)
+            | Failure::Elf(_)
+            | Failure::Size(_)
+            | Failure::InTheLoop(_)
+            | Failure::Relay(_)
+            | Failure::Monitor(_)
+            | Failure::Simulation(_)
+            | Failure::Verify(_)
+            | Failure::Unverifiable(_)
+            | Failure::Reproduce(_)
+            | Failure::Figure(_)
+            | Failure::Report(_)
+            | Failure::Write(_)
+            | Failure::Output(_)
+            | Failure::BadArgument(_) => 2,
+        }
+    }
+
+    /// Tells the user and gives the exit status.
+    pub(crate) fn report(&self) -> ExitCode {
+        match self {
+            // The reader of a pipe has seen enough.
+            Failure::Output(error) if error.kind() == std::io::ErrorKind::BrokenPipe => {
+                return ExitCode::SUCCESS;
+            }
+            _ => eprintln!("upright: {self}"),
+        }
+        ExitCode::from(self.exit_status())
+    }
+}

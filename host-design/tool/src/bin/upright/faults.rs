@@ -1,0 +1,206 @@
+//! `upright faults`
+
+use std::io::Write;
+
+use clap::{Args, ValueEnum};
+use serde_json::json;
+use upright_design::rig::Rig;
+use upright_design::table::TableValues;
+use upright_tool::campaign::{Campaign, Kind, Place, Row, campaign, kinds, one};
+use upright_tool::image::{Kind as ImageKind, build_for};
+
+use crate::failure::Failure;
+use crate::progress::{with_bar, with_spinner};
+use crate::variation::Variation;
+
+/// Breaks the rig on purpose, again and again, and looks whether the firmware turns the motor off in time; exit status 1
+/// when it once does not, or turns it off for nothing.
+///
+/// A part of the campaign is run once more with a firmware that has no thresholds and no limits: there the faults have to
+/// be missed, or the campaign proves nothing.
+#[derive(Args)]
+#[command(before_help = "\
+Examples:
+  upright faults rigs/quadruple-paper.toml
+  upright faults rigs/single-quanser-ip02.toml --runs 10000 --seed 7
+  upright faults rigs/quadruple-paper.toml --target qemu --runs 300
+  upright faults rigs/quadruple-paper.toml --only 1234               one run again, byte for byte
+  upright faults rigs/quadruple-paper.toml --kind motor-dead --json")]
+pub(crate) struct Faults {
+    #[command(flatten)]
+    variation: Variation,
+    /// Where the firmware runs
+    #[arg(long, value_enum, default_value_t = Target::Host)]
+    target: Target,
+    /// Seed of the campaign
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
+    /// Number of runs
+    #[arg(long, default_value_t = 1000, value_parser = clap::value_parser!(u64).range(1..=10_000_000))]
+    runs: u64,
+    /// Only defects of this kind
+    #[arg(long, value_parser = kind)]
+    kind: Option<Kind>,
+    /// Only the run with this number
+    #[arg(long, value_name = "NUMBER")]
+    only: Option<u64>,
+    /// Print the result as one JSON object
+    #[arg(long)]
+    json: bool,
+}
+
+#[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum Target {
+    Host,
+    Qemu,
+}
+
+/// Runs of each kind without detection.
+const CONTROL_RUNS: u64 = 12;
+
+fn kind(name: &str) -> Result<Kind, String> {
+    let known = || Kind::ALL.map(|(_, name, ..)| name).join(", ");
+    Kind::ALL
+        .iter()
+        .find(|(_, known, ..)| *known == name)
+        .map(|(kind, ..)| *kind)
+        .ok_or_else(|| format!("known kinds: {}", known()))
+}
+
+impl Faults {
+    pub(crate) fn run(self) -> Result<(), Failure> {
+        let (rig, _, table) = self.variation.designed()?;
+        let image = match self.target {
+            Target::Host => None,
+            Target::Qemu => {
+                Some(with_spinner("building the image", || build_for(ImageKind::InTheLoop, &rig, &table))?)
+            }
+        };
+        let place = image.as_ref().map_or(Place::Host, |image| Place::Qemu(image));
+        let possible = kinds(&table, place);
+        let chosen: Vec<Kind> = match self.kind {
+            Some(kind) if possible.contains(&kind) => vec![kind],
+            Some(kind) => {
+                return Err(Failure::BadArgument(format!(
+                    "--kind {}: this rig cannot have it there",
+                    kind.name()
+                )));
+            }
+            None => possible,
+        };
+        if let Some(number) = self.only {
+            return self.replay(&rig, &table, &chosen, number, place);
+        }
+        let result = with_bar("faults", self.runs, |tick| {
+            campaign(&rig, &table, &chosen, self.seed, self.runs, place, tick)
+        })?;
+        let control = self.control(&rig, &table, &chosen)?;
+        self.print(&rig, &result, control.as_ref())?;
+        self.verdict(&result, control.as_ref())
+    }
+
+    /// The same with nothing that faults could be found by, on the host.
+    fn control(&self, rig: &Rig, table: &TableValues, chosen: &[Kind]) -> Result<Option<Campaign>, Failure> {
+        let chosen: Vec<Kind> = chosen.iter().copied().filter(|kind| kind.needs_detection()).collect();
+        if chosen.is_empty() {
+            return Ok(None);
+        }
+        let runs = CONTROL_RUNS * chosen.len() as u64;
+        let result = with_bar("without detection", runs, |tick| {
+            campaign(rig, table, &chosen, self.seed, runs, Place::Blind, tick)
+        })?;
+        Ok(Some(result))
+    }
+
+    fn replay(
+        &self,
+        rig: &Rig,
+        table: &TableValues,
+        kinds: &[Kind],
+        number: u64,
+        place: Place<'_>,
+    ) -> Result<(), Failure> {
+        let outcome = one(rig, table, kinds, self.seed, number, place)?;
+        writeln!(std::io::stdout(), "{}", serde_json::to_string(&outcome).map_err(std::io::Error::from)?)?;
+        Ok(())
+    }
+
+    fn print(&self, rig: &Rig, result: &Campaign, control: Option<&Campaign>) -> Result<(), Failure> {
+        let mut out = std::io::stdout().lock();
+        if self.json {
+            let target = if self.target == Target::Host { "host" } else { "qemu" };
+            let all = json!({
+                "rig": rig.name, "hash": format!("{:016x}", rig.hash()), "target": target,
+                "campaign": result, "without_detection": control,
+            });
+            writeln!(out, "{all}")?;
+            return Ok(());
+        }
+        writeln!(
+            out,
+            "{:22}{:>6}{:>8}{:>9}{:>9}{:>6}{:>7}{:>7}{:>9}{:>8}{:>8}  faults",
+            "defect",
+            "runs",
+            "masked",
+            "rejected",
+            "detected",
+            "late",
+            "missed",
+            "false",
+            "allowed",
+            "worst",
+            "onset"
+        )?;
+        for row in &result.rows {
+            let ticks = |ticks: Option<u32>| ticks.map_or("-".to_owned(), |ticks| ticks.to_string());
+            writeln!(
+                out,
+                "{:22}{:>6}{:>8}{:>9}{:>9}{:>6}{:>7}{:>7}{:>9}{:>8}{:>8}  {}",
+                row.kind.name(),
+                row.runs,
+                row.masked,
+                row.rejected,
+                row.detected,
+                row.late,
+                row.missed,
+                row.false_alarms,
+                ticks(row.allowed),
+                ticks(row.worst),
+                ticks(row.worst_from_onset),
+                row.faults.join(", ")
+            )?;
+        }
+        if let Some(control) = control {
+            let missed: usize = control.rows.iter().map(|row| row.missed).sum();
+            let runs: usize = control.rows.iter().map(|row| row.runs).sum();
+            writeln!(out, "without detection {missed} of {runs} runs are missed, as they have to be")?;
+        }
+        Ok(())
+    }
+
+    fn verdict(&self, result: &Campaign, control: Option<&Campaign>) -> Result<(), Failure> {
+        let seen = |row: &&Row| row.missed == 0;
+        if let Some(row) = control.and_then(|control| control.rows.iter().find(seen)) {
+            return Err(Failure::CheckFailed(format!(
+                "without detection, `{}` is not missed once: the campaign proves nothing",
+                row.kind.name()
+            )));
+        }
+        let Some((row, number)) =
+            result.rows.iter().find_map(|row| row.wrong.first().map(|number| (row, number)))
+        else {
+            return Ok(());
+        };
+        let wrong: usize = result.rows.iter().map(|row| row.wrong.len()).sum();
+        let target = if self.target == Target::Host { "" } else { " --target qemu" };
+        // A campaign of one kind numbers its runs in its own way.
+        let kind = self.kind.map_or(String::new(), |kind| format!(" --kind {}", kind.name()));
+        Err(Failure::CheckFailed(format!(
+            "{wrong} of {} runs came out wrong; the first of `{}` again: upright faults {} --seed {}{target}{kind} --only {number}",
+            result.runs,
+            row.kind.name(),
+            self.variation.as_typed(),
+            self.seed
+        )))
+    }
+}

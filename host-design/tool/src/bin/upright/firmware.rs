@@ -1,0 +1,87 @@
+//! `upright firmware`: the image, on its way from the source to the board.
+
+mod build;
+mod flash;
+mod monitor;
+mod run;
+mod size;
+
+use std::path::{Path, PathBuf};
+
+use clap::{Args, Subcommand, ValueEnum};
+use upright_design::design::design;
+use upright_design::rig::Rig;
+use upright_design::table::{Gains, TableValues};
+use upright_tool::image::{self, Kind};
+
+use crate::failure::Failure;
+use crate::progress::with_spinner;
+
+/// Builds, measures, runs, flashes and watches the firmware image.
+#[derive(Args)]
+pub(crate) struct Firmware {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Subcommand)]
+enum Command {
+    Build(build::Build),
+    Size(size::Size),
+    Flash(flash::Flash),
+    Run(run::Run),
+    Monitor(monitor::Monitor),
+}
+
+impl Firmware {
+    pub(crate) fn run(self) -> Result<(), Failure> {
+        match self.command {
+            Command::Build(command) => command.run(),
+            Command::Size(command) => command.run(),
+            Command::Flash(command) => command.run(),
+            Command::Run(command) => command.run(),
+            Command::Monitor(command) => command.run(),
+        }
+    }
+}
+
+/// A board by the name of its microcontroller.
+#[derive(Clone, Copy, ValueEnum)]
+enum Board {
+    Stm32f405,
+    Stm32f407,
+    Stm32f446,
+}
+
+impl Board {
+    fn kind(self) -> Kind {
+        match self {
+            Board::Stm32f405 => Kind::F405,
+            Board::Stm32f407 => Kind::F407,
+            Board::Stm32f446 => Kind::F446,
+        }
+    }
+
+    /// As probe-rs calls it.
+    fn chip(self) -> &'static str {
+        match self {
+            Board::Stm32f405 => "STM32F405RGTx",
+            Board::Stm32f407 => "STM32F407VGTx",
+            Board::Stm32f446 => "STM32F446RETx",
+        }
+    }
+}
+
+/// The image with the table of the rig, or with src/gains.rs as it is.
+fn built(kind: Kind, rig: Option<&Path>) -> Result<PathBuf, Failure> {
+    let Some(path) = rig else {
+        return Ok(with_spinner("building the image", || image::build(kind))?);
+    };
+    let rig = Rig::from_path(path)?;
+    let name = || path.display().to_string();
+    let certified = with_spinner("designing", || design(&rig))
+        .map_err(|source| Failure::Design { rig: name(), source })?;
+    let table = TableValues::of(&rig, &certified, Gains::Sampled)
+        .map_err(|source| Failure::NoTable { rig: name(), source })?;
+    Ok(with_spinner("building the image", || image::build_for(kind, &rig, &table))?)
+}

@@ -1,0 +1,215 @@
+//! `upright firmware monitor`
+
+use std::fs::File;
+use std::io::{BufRead, IsTerminal, Write};
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::mpsc::{Receiver, channel};
+use std::time::{Duration, Instant, SystemTime};
+
+use clap::Args;
+use ratatui::DefaultTerminal;
+use ratatui::crossterm::event::{self, Event, KeyEventKind};
+use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
+use upright_tool::monitor::record::{Recorder, json};
+use upright_tool::monitor::{Action, Line, action, request, view};
+
+use crate::failure::Failure;
+use crate::variation::positive;
+
+/// Shows what a firmware says, live, and sends it commands; exit status 1 when the connection is lost or the firmware
+/// speaks another version of the messages.
+///
+/// When it ends while the cart's set-point is commanded, the firmware turns the motor off: link lost. Without a terminal,
+/// or with --json, it prints one JSON object per telemetry, answers on stderr, and takes commands as lines of stdin:
+/// home, home-rail, check-signs, arm, disarm, clear, set-point METRES, law lqr, law pole-placement.
+#[derive(Args)]
+#[command(before_help = "\
+Examples:
+  upright firmware monitor /dev/ttyACM0                       a board
+  upright firmware monitor tcp:127.0.0.1:7777                 after: upright firmware run RIG --serve 127.0.0.1:7777
+  upright firmware monitor /dev/ttyACM0 --csv run.csv
+  echo set-point 0.05 | upright firmware monitor tcp:127.0.0.1:7777 --json --duration 5")]
+pub(crate) struct Monitor {
+    /// Serial device, or tcp:HOST:PORT
+    port: String,
+    /// Record telemetry into this file from the start
+    #[arg(long, value_name = "FILE")]
+    csv: Option<PathBuf>,
+    /// Print one JSON object per telemetry
+    #[arg(long)]
+    json: bool,
+    /// End after so long (s)
+    #[arg(long, value_name = "S", value_parser = positive)]
+    duration: Option<f64>,
+}
+
+/// Between two pictures.
+const PICTURE: Duration = Duration::from_millis(50);
+
+impl Monitor {
+    pub(crate) fn run(self) -> Result<(), Failure> {
+        let line = Line::open(&self.port)?;
+        let stop = Arc::new(AtomicBool::new(false));
+        for signal in [SIGTERM, SIGHUP, SIGINT] {
+            signal_hook::flag::register(signal, Arc::clone(&stop))?;
+        }
+        let mut conversation = Conversation {
+            model: upright_tool::monitor::Monitor::new(&self.port),
+            line,
+            recorder: None,
+            stop,
+            until: self.duration.map(|duration| Instant::now() + Duration::from_secs_f64(duration)),
+        };
+        if let Some(path) = &self.csv {
+            conversation.record(path)?;
+        }
+        if self.json || !std::io::stdout().is_terminal() || !std::io::stdin().is_terminal() {
+            conversation.as_lines()?;
+        } else {
+            conversation.on_screen(&mut Screen::new()?)?;
+        }
+        match &conversation.model.ended {
+            Some(ended) => Err(Failure::CheckFailed(format!("{}: {ended}", self.port))),
+            None => Ok(()),
+        }
+    }
+}
+
+/// A terminal that is as before when this is dropped; a panic restores it, too.
+struct Screen(DefaultTerminal);
+
+impl Screen {
+    fn new() -> std::io::Result<Self> {
+        ratatui::try_init().map(Self).inspect_err(|_| ratatui::restore())
+    }
+}
+
+impl Drop for Screen {
+    fn drop(&mut self) {
+        ratatui::restore();
+    }
+}
+
+struct Conversation {
+    model: upright_tool::monitor::Monitor,
+    line: Line,
+    recorder: Option<Recorder<File>>,
+    stop: Arc<AtomicBool>,
+    until: Option<Instant>,
+}
+
+impl Conversation {
+    fn goes_on(&self) -> bool {
+        !self.stop.load(Ordering::Relaxed) && self.until.is_none_or(|until| Instant::now() < until)
+    }
+
+    fn record(&mut self, path: &Path) -> Result<(), Failure> {
+        let file = File::create_new(path).map_err(|error| {
+            Failure::BadArgument(format!("{}: {error}; give the name of a new file", path.display()))
+        })?;
+        self.recorder = Some(Recorder::new(file));
+        self.model.recording = Some(path.display().to_string());
+        Ok(())
+    }
+
+    /// Hears and says what there is to hear and say; takes 5 ms at most when the line is silent.
+    fn exchange(
+        &mut self,
+        mut each: impl FnMut(&serde_json::Value) -> std::io::Result<()>,
+    ) -> Result<(), Failure> {
+        if self.model.ended.is_some() {
+            std::thread::sleep(PICTURE);
+            return Ok(());
+        }
+        let mut buffer = [0; 4096];
+        match self.line.receive(&mut buffer) {
+            Ok(bytes) => {
+                for telemetry in self.model.receive(bytes, now()) {
+                    each(&json(&telemetry))?;
+                    if let Some(recorder) = &mut self.recorder {
+                        recorder.push(&telemetry)?;
+                    }
+                }
+            }
+            Err(error) => self.model.close(&error),
+        }
+        self.model.poll(now());
+        let bytes = self.model.take_outgoing();
+        if let Err(error) = self.line.send(&bytes) {
+            self.model.close(&error);
+        }
+        Ok(())
+    }
+
+    fn as_lines(&mut self) -> Result<(), Failure> {
+        let said = lines_of_stdin();
+        let mut out = std::io::stdout().lock();
+        while self.goes_on() && self.model.ended.is_none() {
+            // The firmware has to have said which messages it speaks before it is told anything.
+            while self.model.telemetry.is_some()
+                && let Ok(line) = said.try_recv()
+            {
+                match request(&line) {
+                    Ok(request) => self.model.act(Action::Send(request), now()),
+                    Err(bad) => eprintln!("{bad}"),
+                }
+            }
+            self.exchange(|object| writeln!(out, "{object}"))?;
+            out.flush()?;
+            self.model.log.drain(..).for_each(|line| eprintln!("{line}"));
+        }
+        Ok(())
+    }
+
+    fn on_screen(&mut self, screen: &mut Screen) -> Result<(), Failure> {
+        let mut next = Instant::now();
+        while self.goes_on() {
+            self.exchange(|_| Ok(()))?;
+            while event::poll(Duration::ZERO)? {
+                let Event::Key(key) = event::read()? else { continue };
+                match action(&key).filter(|_| key.kind != KeyEventKind::Release) {
+                    Some(Action::Quit) => return Ok(()),
+                    Some(Action::Record) => self.switch_recording(),
+                    Some(action) => self.model.act(action, now()),
+                    None => (),
+                }
+            }
+            if Instant::now() >= next {
+                screen.0.draw(|frame| view::draw(&self.model, frame))?;
+                next = Instant::now() + PICTURE;
+            }
+        }
+        Ok(())
+    }
+
+    fn switch_recording(&mut self) {
+        if self.recorder.take().is_some() {
+            let file = self.model.recording.take().unwrap_or_default();
+            return self.model.note(format!("recorded {file}"));
+        }
+        let path = PathBuf::from(format!("monitor-{}.csv", now().as_secs()));
+        if let Err(error) = self.record(&path) {
+            self.model.note(error.to_string());
+        }
+    }
+}
+
+/// Since 1970.
+fn now() -> Duration {
+    SystemTime::UNIX_EPOCH.elapsed().unwrap_or_default()
+}
+
+/// Lines of stdin as they come; it may stay open for ever.
+fn lines_of_stdin() -> Receiver<String> {
+    let (sender, lines) = channel();
+    std::thread::spawn(move || {
+        for line in std::io::stdin().lock().lines().map_while(Result::ok) {
+            if sender.send(line).is_err() {
+                break;
+            }
+        }
+    });
+    lines
+}

@@ -1,0 +1,126 @@
+//! `upright firmware size`
+
+use std::fmt::Write as _;
+use std::io::Write;
+use std::path::PathBuf;
+
+use clap::Args;
+use serde_json::json;
+use upright_tool::image::{
+    FLASH_LIMIT, Image, Part, RAM_LIMIT, StackBound, StackError, forbidden_functions, size, stack_bound,
+};
+
+use super::{Board, built};
+use crate::failure::Failure;
+
+/// Measures the image of a board: flash and RAM by section and by crate, a bound on its stack, and whether it can panic;
+/// exit status 1 when it takes more than 32 KiB of flash, 4 KiB of static RAM or the stack reserved in memory.x, or can
+/// panic or allocate.
+#[derive(Args)]
+#[command(before_help = "\
+Examples:
+  upright firmware size                                       builds it with src/gains.rs as it is
+  upright firmware size rigs/single-quanser-ip02.toml --board stm32f446
+  upright firmware size --elf target/image.elf --json | jq .stack.bytes")]
+pub(crate) struct Size {
+    /// Rig file (TOML), designed anew [default: the table in src/gains.rs]
+    rig: Option<PathBuf>,
+    /// Microcontroller of the board
+    #[arg(long, value_enum, default_value_t = Board::Stm32f405)]
+    board: Board,
+    /// Measure this image, building none
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["rig", "board"])]
+    elf: Option<PathBuf>,
+    /// Print the figures as one JSON object
+    #[arg(long)]
+    json: bool,
+}
+
+impl Size {
+    pub(crate) fn run(self) -> Result<(), Failure> {
+        let path = match self.elf {
+            Some(path) => path,
+            None => built(self.board.kind(), self.rig.as_deref())?,
+        };
+        let image = Image::read(&path)?;
+        let (size, stack, forbidden) = (size(&image)?, stack_bound(&image), forbidden_functions(&image));
+        let wrong = wrong(&size, &stack, &forbidden);
+        let text = if self.json {
+            json!({
+                "image": path,
+                "flash": size.flash,
+                "ram": size.ram,
+                "limits": { "flash": FLASH_LIMIT, "ram": RAM_LIMIT },
+                "sections": size.sections,
+                "crates": size.crates,
+                "stack": stack.as_ref().ok(),
+                "forbidden_functions": forbidden,
+                "wrong": wrong,
+            })
+            .to_string()
+        } else {
+            table(&size, &stack)
+        };
+        writeln!(std::io::stdout(), "{}", text.trim_end())?;
+        if wrong.is_empty() { Ok(()) } else { Err(Failure::CheckFailed(wrong.join("; "))) }
+    }
+}
+
+/// What must not be, in words.
+fn wrong(
+    size: &upright_tool::image::Size,
+    stack: &Result<StackBound, StackError>,
+    forbidden: &[&str],
+) -> Vec<String> {
+    let mut wrong = Vec::new();
+    let mut limit = |what: &str, bytes: u32, limit: u32| {
+        if bytes > limit {
+            wrong.push(format!("{what}: {bytes} bytes, {} above the limit of {limit}", bytes - limit));
+        }
+    };
+    limit("flash", size.flash, FLASH_LIMIT);
+    limit("static RAM", size.ram, RAM_LIMIT);
+    match stack {
+        Ok(stack) => limit("stack", stack.bytes, stack.reserved),
+        Err(error) => wrong.push(error.to_string()),
+    }
+    if !forbidden.is_empty() {
+        wrong.push(format!("it can panic or allocate: it contains {}", forbidden.join(", ")));
+    }
+    wrong
+}
+
+fn table(size: &upright_tool::image::Size, stack: &Result<StackBound, StackError>) -> String {
+    let mut text = String::new();
+    let mut rows = |head: &str, parts: &[Part]| {
+        // Writing to a string cannot fail.
+        _ = writeln!(text, "{head:<40} {:>8} {:>8}", "flash", "RAM");
+        for part in parts {
+            _ = writeln!(text, "  {:<38} {:>8} {:>8}", part.name, part.flash, part.ram);
+        }
+        _ = writeln!(text);
+    };
+    rows("section (bytes)", &size.sections);
+    rows("crate (bytes)", &size.crates);
+    let all = [
+        Part { name: "sum".to_owned(), flash: size.flash, ram: size.ram },
+        Part { name: "limit".to_owned(), flash: FLASH_LIMIT, ram: RAM_LIMIT },
+    ];
+    rows("image (bytes)", &all);
+    if let Ok(stack) = stack {
+        _ = writeln!(text, "{:<40} {:>8}", "stack, at most (bytes)", "");
+        for level in &stack.levels {
+            let deepest: Vec<&str> = level.chain.iter().map(|name| short(name)).collect();
+            _ = writeln!(text, "  {:<47} {:>8}", deepest.join(" → "), level.bytes);
+        }
+        _ = writeln!(text, "  {:<47} {:>8}", "sum, each interrupting the one above", stack.bytes);
+        _ = writeln!(text, "  {:<47} {:>8}", "reserved", stack.reserved);
+    }
+    text
+}
+
+/// The last part of a path, without what is generic.
+fn short(name: &str) -> &str {
+    let plain = name.split("::<").next().unwrap_or(name);
+    plain.rsplit("::").next().unwrap_or(plain).trim_end_matches('>')
+}

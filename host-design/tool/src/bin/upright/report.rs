@@ -1,0 +1,160 @@
+//! `upright report`
+
+use std::io::Write;
+use std::path::{Path, PathBuf};
+
+use clap::Args;
+use indicatif::{ProgressBar, ProgressStyle};
+use serde_json::json;
+use upright_design::table::write_atomically;
+use upright_design::verify::{Effort, trust};
+use upright_tool::report::{Report as Page, Source, report};
+
+use crate::failure::Failure;
+use crate::variation::Variation;
+
+/// Writes everything about a rig and its loop into one HTML file: runs with animation, model, gains, margins, trust report.
+#[derive(Args)]
+#[command(before_help = "\
+Examples:
+  upright report rigs/quadruple-paper.toml                      writes quadruple-paper.html
+  upright report rigs/quadruple-paper.toml --out report.html --svg figures --csv data
+  upright report rigs/single-quanser-ip02.toml --runs 1000 --png figures
+  upright report rigs/quadruple-paper.toml --gains continuous --tick 0.005     what a wrong tick does")]
+pub(crate) struct Report {
+    #[command(flatten)]
+    variation: Variation,
+    /// Write the page here [default: the rig file's name with .html, in the current folder]
+    #[arg(long, value_name = "FILE")]
+    out: Option<PathBuf>,
+    /// Write each figure as SVG into this folder
+    #[arg(long, value_name = "DIR")]
+    svg: Option<PathBuf>,
+    /// Write each figure as PNG into this folder
+    #[arg(long, value_name = "DIR")]
+    png: Option<PathBuf>,
+    /// Write every curve of each figure as CSV into this folder
+    #[arg(long, value_name = "DIR")]
+    csv: Option<PathBuf>,
+    /// Random plants for each law in the trust report
+    #[arg(long, default_value_t = 200, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
+    runs: u32,
+    /// Seed of the disturbances and of the first random plant
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
+    /// Print the names of the files and the trust report as one JSON object
+    #[arg(long)]
+    json: bool,
+}
+
+impl Report {
+    pub(crate) fn run(self) -> Result<(), Failure> {
+        self.prepare()?;
+        let (rig, certified, table) = self.variation.designed()?;
+        let laws = usize::from(table.lqr.is_some()) + usize::from(table.pole_placement.is_some());
+        let bar = ProgressBar::new((laws * self.runs as usize) as u64);
+        bar.set_style(
+            ProgressStyle::with_template("{spinner} {msg} {wide_bar} {pos}/{len} random plants {elapsed}")
+                .unwrap_or_else(|_| ProgressStyle::default_bar()),
+        );
+        bar.enable_steady_tick(std::time::Duration::from_millis(120));
+        let stage = |stage: &str| bar.set_message(stage.to_owned());
+        let effort = Effort { runs: self.runs as usize, seed: self.seed, late: 0.0 };
+        let made = || -> Result<_, Failure> {
+            let trust = trust(&rig, &certified, &table, effort, &stage, &|| bar.inc(1))?;
+            let command = self.as_typed();
+            let source = Source {
+                rig: &rig,
+                certified: &certified,
+                table: &table,
+                trust: &trust,
+                seed: self.seed,
+                command: &command,
+            };
+            let page = report(&source, &stage)?;
+            stage("writing");
+            let files = self.write(&page)?;
+            Ok((trust, files))
+        }();
+        bar.finish_and_clear();
+        let (trust, files) = made?;
+        let mut out = std::io::stdout().lock();
+        if self.json {
+            let object = json!({ "rig": rig.name, "hash": format!("{:016x}", rig.hash()), "files": files, "trust": trust });
+            writeln!(out, "{object}")?;
+        } else {
+            for file in &files {
+                writeln!(out, "{}", file.display())?;
+            }
+        }
+        let failed = trust.checks.iter().filter(|check| !check.holds).count();
+        if failed > 0 {
+            eprintln!(
+                "{failed} of {} requirements are not met: see the page, or upright verify",
+                trust.checks.len()
+            );
+        }
+        Ok(())
+    }
+
+    /// Makes the folders, so that a place that cannot be written to is known before the work is done.
+    fn prepare(&self) -> Result<(), Failure> {
+        for folder in [&self.svg, &self.png, &self.csv].into_iter().flatten() {
+            std::fs::create_dir_all(folder).map_err(|error| {
+                Failure::BadArgument(format!("{}: the folder cannot be made: {error}", folder.display()))
+            })?;
+        }
+        let parent =
+            self.out.as_deref().and_then(Path::parent).filter(|parent| !parent.as_os_str().is_empty());
+        match parent {
+            Some(parent) if !parent.is_dir() => Err(Failure::BadArgument(format!(
+                "{}: there is no such folder to write the page into: make it, or give another --out",
+                parent.display()
+            ))),
+            _ => Ok(()),
+        }
+    }
+
+    /// Pictures first: a page that exists is complete.
+    fn write(&self, page: &Page) -> Result<Vec<PathBuf>, Failure> {
+        let mut files = Vec::new();
+        for picture in &page.pictures {
+            let name = &picture.name;
+            if let Some(folder) = &self.svg {
+                files.push(write_into(folder, &format!("{name}.svg"), picture.svg.as_bytes())?);
+            }
+            if let Some(folder) = &self.png {
+                files.push(write_into(folder, &format!("{name}.png"), &picture.png()?)?);
+            }
+            if let (Some(folder), Some(csv)) = (&self.csv, &picture.csv) {
+                files.push(write_into(folder, &format!("{name}.csv"), csv.as_bytes())?);
+            }
+        }
+        let path = self.out.clone().unwrap_or_else(|| default_page(&self.variation.rig));
+        write_atomically(&path, page.html.as_bytes())?;
+        files.push(path);
+        Ok(files)
+    }
+
+    /// The command as it would be typed again. Where the files go is no part of what they say.
+    fn as_typed(&self) -> String {
+        let mut typed = format!("upright report {}", self.variation.as_typed());
+        if self.runs != 200 {
+            typed.push_str(&format!(" --runs {}", self.runs));
+        }
+        if self.seed != 1 {
+            typed.push_str(&format!(" --seed {}", self.seed));
+        }
+        typed
+    }
+}
+
+fn write_into(folder: &Path, name: &str, contents: &[u8]) -> Result<PathBuf, Failure> {
+    let path = folder.join(name);
+    write_atomically(&path, contents)?;
+    Ok(path)
+}
+
+fn default_page(rig: &Path) -> PathBuf {
+    PathBuf::from(rig.file_name().unwrap_or(rig.as_os_str())).with_extension("html")
+}

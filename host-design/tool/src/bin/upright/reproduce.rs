@@ -1,0 +1,57 @@
+//! `upright reproduce`
+
+use std::io::Write;
+use std::path::PathBuf;
+
+use clap::Args;
+use upright_design::table::write_atomically;
+use upright_tool::reproduce::{STAGES, reproduce};
+
+use crate::failure::Failure;
+use crate::progress::with_stages;
+
+/// Prints the results of the paper beside ours, number by number, and writes figures and data of its figures 5 to 8 and
+/// Table 2.
+#[derive(Args)]
+#[command(before_help = "\
+Examples:
+  upright reproduce                          prints the comparison; figures, data and summary go to reproduced/
+  upright reproduce --out /tmp/paper
+  upright reproduce --no-write --json | jq '.designs.rows[] | select(.verdict != \"every_digit\")'")]
+pub(crate) struct Reproduce {
+    /// Folder for summary.md and all figures (SVG) and their data (CSV)
+    #[arg(long, value_name = "DIR", default_value = "reproduced")]
+    out: PathBuf,
+    /// Write nothing
+    #[arg(long, conflicts_with = "out")]
+    no_write: bool,
+    /// Print everything as one JSON object
+    #[arg(long)]
+    json: bool,
+}
+
+impl Reproduce {
+    pub(crate) fn run(self) -> Result<(), Failure> {
+        if !self.no_write {
+            std::fs::create_dir_all(&self.out).map_err(|error| {
+                Failure::BadArgument(format!("--out {}: cannot be made: {error}", self.out.display()))
+            })?;
+        }
+        let found = with_stages(STAGES, reproduce)?;
+        if !self.no_write {
+            let files = found.files()?;
+            for (name, contents) in &files {
+                write_atomically(&self.out.join(name), contents)?;
+            }
+            eprintln!("wrote summary.md, figures and data ({} files) to {}", files.len(), self.out.display());
+        }
+        let mut out = std::io::stdout().lock();
+        if self.json {
+            serde_json::to_writer(&mut out, &found).map_err(std::io::Error::from)?;
+            writeln!(out)?;
+        } else {
+            write!(out, "{}", found.summary())?;
+        }
+        Ok(())
+    }
+}

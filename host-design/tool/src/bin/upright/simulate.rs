@@ -1,0 +1,230 @@
+//! `upright simulate`
+
+use std::io::Write;
+use std::path::PathBuf;
+
+use clap::{Args, ValueEnum};
+use serde_json::json;
+use upright_design::rig::{PlantDescription, Rig};
+use upright_design::simulate::{Scenario, Sensing, Summary, Trace, simulate};
+use upright_design::table::{TableValues, write_atomically};
+use upright_tool::figure::run_svg;
+
+use crate::failure::Failure;
+use crate::progress::with_spinner;
+use crate::variation::{LawName, Variation, finite, not_negative, positive};
+
+/// Runs the firmware's own controller against the nonlinear plant; exit status 1 when it falls.
+#[derive(Args)]
+#[command(before_help = "\
+Examples:
+  upright simulate rigs/quadruple-paper.toml --step 1 --svg step.svg
+  upright simulate rigs/quadruple-paper.toml --law pole-placement --tilt 0.01,-0.01
+  upright simulate rigs/quadruple-paper.toml --disturbances paper --seed 7 --csv run.csv
+  upright simulate rigs/quadruple-paper.toml --tick 0.005 --gains continuous --tilt 0.001   falls
+  upright simulate rigs/quadruple-paper.toml --csv - | head")]
+pub(crate) struct Simulate {
+    #[command(flatten)]
+    variation: Variation,
+
+    /// Control law
+    #[arg(long, value_enum, default_value_t = LawName::Lqr)]
+    law: LawName,
+    /// Length of the run (s)
+    #[arg(long, default_value_t = 10.0, value_name = "S", allow_negative_numbers = true, value_parser = positive)]
+    duration: f64,
+    /// Step of the set-point (m)
+    #[arg(long, default_value_t = 0.0, value_name = "M", allow_negative_numbers = true, value_parser = finite)]
+    step: f64,
+    /// When the set-point steps (s)
+    #[arg(long, default_value_t = 0.0, value_name = "S", value_parser = not_negative)]
+    step_at: f64,
+    /// Let the set-point jump, without the governor
+    #[arg(long)]
+    raw_step: bool,
+    /// What the controller sees [default: encoders if the rig file has [kalman]]
+    #[arg(long, value_enum)]
+    sensing: Option<SensingName>,
+    /// Angles of the links at the start, from the cart outwards (rad); missing ones are 0
+    #[arg(long, value_delimiter = ',', value_name = "RAD,…", allow_negative_numbers = true, value_parser = finite)]
+    tilt: Vec<f64>,
+    /// The whole state at the start: x, xdot, theta1, theta1dot … (SI), instead of --tilt
+    #[arg(long, value_delimiter = ',', value_name = "X,…", allow_negative_numbers = true, value_parser = finite, conflicts_with = "tilt")]
+    start: Vec<f64>,
+    /// Disturbances: none, or the paper's force of 0.1 N rms and joint torques of 3.16e-5 N·m rms
+    #[arg(long, value_enum, default_value_t = Disturbances::None)]
+    disturbances: Disturbances,
+    /// Disturbing force, drawn anew each tick (N rms)
+    #[arg(long, value_name = "N", value_parser = not_negative)]
+    force_noise: Option<f64>,
+    /// Disturbing torque at each joint, drawn anew each tick (N·m rms)
+    #[arg(long, value_name = "NM", value_parser = not_negative)]
+    torque_noise: Option<f64>,
+    /// Constant disturbing force on the cart, as from a tilted rail (N)
+    #[arg(long, default_value_t = 0.0, value_name = "N", allow_negative_numbers = true, value_parser = finite)]
+    force_offset: f64,
+    /// Seed of the disturbances
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
+    /// Integration steps per tick
+    #[arg(long, default_value_t = 4, value_parser = clap::value_parser!(u16).range(1..=1000))]
+    substeps: u16,
+
+    /// Write every tick as CSV to a file, or to stdout with `-`
+    #[arg(long, value_name = "FILE")]
+    csv: Option<PathBuf>,
+    /// Draw position, angles and force into an SVG file
+    #[arg(long, value_name = "FILE")]
+    svg: Option<PathBuf>,
+    /// Print the summary as one JSON object
+    #[arg(long)]
+    json: bool,
+}
+
+#[derive(Clone, Copy, ValueEnum)]
+enum SensingName {
+    FullState,
+    Encoders,
+}
+
+#[derive(Clone, Copy, ValueEnum)]
+enum Disturbances {
+    None,
+    Paper,
+}
+
+impl Simulate {
+    pub(crate) fn run(self) -> Result<(), Failure> {
+        self.run_with(|rig, table, scenario| {
+            Ok(with_spinner("simulating", || simulate(rig, table, scenario))?)
+        })
+    }
+
+    /// Runs the scenario in a way of the caller's, and reports it as usual.
+    pub(crate) fn run_with(
+        self,
+        run: impl FnOnce(&Rig, &TableValues, &Scenario) -> Result<(Trace, Summary), Failure>,
+    ) -> Result<(), Failure> {
+        let (rig, table, scenario) = self.prepared()?;
+        let (trace, summary) = run(&rig, &table, &scenario)?;
+        self.write(&rig, &trace, &summary)?;
+        match &summary.fall {
+            Some(fall) => Err(Failure::CheckFailed(format!("{}: {fall}", rig.name))),
+            None => Ok(()),
+        }
+    }
+
+    /// The rig, its table and the scenario that the options ask for.
+    pub(crate) fn prepared(&self) -> Result<(Rig, TableValues, Scenario), Failure> {
+        let (rig, _, table) = self.variation.designed()?;
+        let scenario = self.scenario(&rig)?;
+        let table = if self.raw_step { table.without_governor() } else { table };
+        Ok((rig, table, scenario))
+    }
+
+    fn scenario(&self, rig: &Rig) -> Result<Scenario, Failure> {
+        let law = self.law.law();
+        let mut scenario = Scenario::at_rest(rig, law);
+        if let Some(sensing) = self.sensing {
+            scenario.sensing = match sensing {
+                SensingName::FullState => Sensing::FullState,
+                SensingName::Encoders => Sensing::Encoders,
+            };
+        }
+        let states = rig.states();
+        if !self.start.is_empty() {
+            if self.start.len() != states {
+                return Err(Failure::BadArgument(format!(
+                    "--start: {} values for {states} states; give {states}",
+                    self.start.len()
+                )));
+            }
+            scenario.start.clone_from(&self.start);
+        }
+        let links = match &rig.plant {
+            PlantDescription::Chain(chain) => chain.links.len(),
+            PlantDescription::Model(_) => 0,
+        };
+        if self.tilt.len() > links {
+            return Err(Failure::BadArgument(format!(
+                "--tilt: {} angles for {links} links; give at most {links}",
+                self.tilt.len()
+            )));
+        }
+        let pushed = self.step != 0.0
+            || !self.start.is_empty()
+            || !self.tilt.is_empty()
+            || !matches!(self.disturbances, Disturbances::None)
+            || self.force_noise.is_some()
+            || self.torque_noise.is_some()
+            || self.force_offset != 0.0;
+        if !pushed {
+            // At exact rest even a hopeless loop stands.
+            let acceptance = Scenario::acceptance(rig, law, 1.0);
+            scenario.start = acceptance.start;
+            eprintln!("no step, tilt or disturbance given: starting a little off balance");
+        }
+        for (link, &angle) in self.tilt.iter().enumerate() {
+            scenario.start[2 + 2 * link] = angle;
+        }
+        // The paper's disturbances: F_d ~ N(0, 0.01), joint torques ~ N(0, 1e-9), given there as variances.
+        let (force, torque) = match self.disturbances {
+            Disturbances::None => (0.0, 0.0),
+            Disturbances::Paper => (0.01f64.sqrt(), 1e-9f64.sqrt()),
+        };
+        Ok(Scenario {
+            duration_s: self.duration,
+            step_m: self.step,
+            step_at_s: self.step_at,
+            force_noise_n: self.force_noise.unwrap_or(force),
+            torque_noise_n_m: self.torque_noise.unwrap_or(torque),
+            force_offset_n: self.force_offset,
+            seed: self.seed,
+            substeps: self.substeps.into(),
+            ..scenario
+        })
+    }
+
+    fn write(&self, rig: &Rig, trace: &Trace, summary: &Summary) -> Result<(), Failure> {
+        let csv_on_stdout = self.csv.as_ref().is_some_and(|path| path.as_os_str() == "-");
+        let mut out = std::io::stdout().lock();
+        if let Some(path) = &self.csv {
+            let mut bytes = Vec::new();
+            trace.write_csv(&mut bytes)?;
+            if csv_on_stdout {
+                out.write_all(&bytes)?;
+            } else {
+                write_atomically(path, &bytes)?;
+            }
+        }
+        if let Some(path) = &self.svg {
+            let law = match self.law {
+                LawName::Lqr => "LQR",
+                LawName::PolePlacement => "pole placement",
+            };
+            let title = format!(
+                "{}, {law}, tick {} ms",
+                rig.name,
+                format!("{:.4}", rig.tick.period_s * 1e3).trim_end_matches('0').trim_end_matches('.')
+            );
+            write_atomically(path, run_svg(rig, trace, &title)?.as_bytes())?;
+        }
+        let text = if self.json {
+            let mut object = json!({ "rig": rig.name, "hash": format!("{:016x}", rig.hash()), "stands": summary.stands() });
+            if let (Some(object), Ok(serde_json::Value::Object(figures))) =
+                (object.as_object_mut(), serde_json::to_value(summary))
+            {
+                object.extend(figures);
+            }
+            object.to_string()
+        } else {
+            summary.to_string()
+        };
+        if csv_on_stdout {
+            eprintln!("{text}");
+        } else {
+            writeln!(out, "{text}")?;
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,117 @@
+//! A rig file with some of its values changed on the command line, designed anew.
+
+use std::path::PathBuf;
+
+use clap::{Args, ValueEnum};
+use upright::table::Law;
+use upright_design::design::{Certified, design};
+use upright_design::rig::Rig;
+use upright_design::table::{Gains, TableValues};
+
+use crate::failure::Failure;
+use crate::progress::with_spinner;
+
+#[derive(Args)]
+pub(crate) struct Variation {
+    /// Rig file (TOML)
+    pub(crate) rig: PathBuf,
+    /// Which gains: those designed for the tick, or those for continuous time
+    #[arg(long, value_enum, default_value_t = GainsName::Sampled)]
+    gains: GainsName,
+    /// Control period instead of the rig's (s); the gains are designed anew
+    #[arg(long, value_name = "S", allow_negative_numbers = true, value_parser = period)]
+    tick: Option<f64>,
+    /// Delay instead of the rig's (ticks); the gains are designed anew
+    #[arg(long, value_name = "TICKS", value_parser = clap::value_parser!(u8).range(0..=1))]
+    delay: Option<u8>,
+    /// Force limit instead of the rig's (N)
+    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = positive)]
+    force_limit: Option<f64>,
+}
+
+#[derive(Clone, Copy, ValueEnum)]
+enum GainsName {
+    Sampled,
+    Continuous,
+}
+
+/// A control law by its name on the command line.
+#[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(crate) enum LawName {
+    Lqr,
+    PolePlacement,
+}
+
+impl LawName {
+    pub(crate) fn law(self) -> Law {
+        match self {
+            LawName::Lqr => Law::Lqr,
+            LawName::PolePlacement => Law::PolePlacement,
+        }
+    }
+}
+
+impl Variation {
+    /// The rig file and all changes as they would be typed again.
+    pub(crate) fn as_typed(&self) -> String {
+        let mut typed = self.rig.display().to_string();
+        if let GainsName::Continuous = self.gains {
+            typed.push_str(" --gains continuous");
+        }
+        let mut option = |name: &str, value: Option<String>| {
+            if let Some(value) = value {
+                typed.push_str(&format!(" --{name} {value}"));
+            }
+        };
+        option("tick", self.tick.map(|tick| tick.to_string()));
+        option("delay", self.delay.map(|delay| delay.to_string()));
+        option("force-limit", self.force_limit.map(|limit| limit.to_string()));
+        typed
+    }
+
+    /// The rig with its changes, its design, and the table with the gains asked for.
+    pub(crate) fn designed(&self) -> Result<(Rig, Certified, TableValues), Failure> {
+        let mut rig = Rig::from_path(&self.rig)?;
+        rig.tick.period_s = self.tick.unwrap_or(rig.tick.period_s);
+        rig.tick.delay_ticks = self.delay.unwrap_or(rig.tick.delay_ticks);
+        rig.actuator.force_limit_n = self.force_limit.or(rig.actuator.force_limit_n);
+        let name = || self.rig.display().to_string();
+        let certified = with_spinner("designing", || design(&rig))
+            .map_err(|source| Failure::Design { rig: name(), source })?;
+        let gains = match self.gains {
+            GainsName::Sampled => Gains::Sampled,
+            GainsName::Continuous => Gains::Continuous,
+        };
+        let table = TableValues::of(&rig, &certified, gains)
+            .map_err(|source| Failure::NoTable { rig: name(), source })?;
+        Ok((rig, certified, table))
+    }
+}
+
+pub(crate) fn finite(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(value) if value.is_finite() => Ok(value),
+        _ => Err("give a finite number".to_owned()),
+    }
+}
+
+pub(crate) fn positive(text: &str) -> Result<f64, String> {
+    finite(text)
+        .and_then(|value| if value > 0.0 { Ok(value) } else { Err("give a number above 0".to_owned()) })
+}
+
+pub(crate) fn not_negative(text: &str) -> Result<f64, String> {
+    finite(text).and_then(|value| {
+        if value >= 0.0 { Ok(value) } else { Err("give a number of at least 0".to_owned()) }
+    })
+}
+
+fn period(text: &str) -> Result<f64, String> {
+    finite(text).and_then(|value| {
+        if (1e-6..=10.0).contains(&value) {
+            Ok(value)
+        } else {
+            Err("give a period from 1e-6 to 10 s".to_owned())
+        }
+    })
+}

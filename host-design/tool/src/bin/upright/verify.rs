@@ -1,0 +1,200 @@
+//! `upright verify`
+
+use std::io::Write;
+use std::path::PathBuf;
+
+use clap::Args;
+use indicatif::{ProgressBar, ProgressStyle};
+use upright::table::Law;
+use upright_design::rig::Rig;
+use upright_design::simulate::simulate;
+use upright_design::table::{TableValues, write_atomically};
+use upright_design::verify::{Axis, Effort, Horizon, TrustReport, attraction_map, sample, spread, trust};
+
+use crate::failure::Failure;
+use crate::progress::with_spinner;
+use crate::variation::{LawName, Variation};
+
+mod text;
+
+/// How far the loop can be trusted before a motor is connected: exit status 1 when a requirement of the rig file's
+/// [verify] is not met.
+#[derive(Args)]
+#[command(before_help = "\
+Examples:
+  upright verify rigs/single-quanser-ip02.toml
+  upright verify rigs/quadruple-paper.toml --runs 1000 --seed 1 --json
+  upright verify rigs/quadruple-paper.toml --replay 17 --law lqr --csv worst.csv   the random plant of seed 17 again
+  upright verify rigs/single-quanser-ip02.toml --map tilt.csv       from which angle and rate of link 1 it recovers
+  upright verify rigs/quadruple-paper.toml --gains continuous --tick 0.003         fails: not even stable")]
+pub(crate) struct Verify {
+    #[command(flatten)]
+    variation: Variation,
+    /// Monte Carlo runs for each law; fewer than 73 cannot show 95 % even if all stand
+    #[arg(long, default_value_t = 200, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
+    runs: u32,
+    /// Seed of the first run; each following run has the next one
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
+    /// Only this law
+    #[arg(long, value_enum)]
+    law: Option<LawName>,
+    /// Make no report, but the single Monte Carlo run of this seed again
+    #[arg(long, value_name = "SEED", requires = "law")]
+    replay: Option<u64>,
+    /// With --replay: write every tick as CSV
+    #[arg(long, value_name = "FILE", requires = "replay")]
+    csv: Option<PathBuf>,
+    /// Make no report, but a map of the starts from which the loop recovers, as CSV
+    #[arg(long, value_name = "FILE", conflicts_with = "replay")]
+    map: Option<PathBuf>,
+    /// With --map: its two states, as index:from:to (SI; state order x, xdot, theta1, theta1dot …)
+    #[arg(long, value_name = "S:A:B", num_args = 2, value_delimiter = ',', requires = "map", allow_negative_numbers = true,
+          value_parser = axis, default_values = ["2:-0.5:0.5", "3:-4:4"])]
+    axes: Vec<Axis>,
+    /// Share of the random plants in which the force comes one tick later than designed for (0 to 1)
+    #[arg(long, value_name = "SHARE", default_value_t = 0.0, value_parser = share)]
+    late: f64,
+    /// Print the report as one JSON object
+    #[arg(long)]
+    json: bool,
+}
+
+/// Starts along each axis of a map.
+const POINTS: usize = 41;
+
+fn axis(text: &str) -> Result<Axis, String> {
+    let accepted = || "give index:from:to, such as 2:-0.5:0.5".to_owned();
+    let mut parts = text.split(':');
+    let mut next = || parts.next().ok_or_else(accepted);
+    let state = next()?.parse().map_err(|_| accepted())?;
+    let from: f64 = next()?.parse().map_err(|_| accepted())?;
+    let to: f64 = next()?.parse().map_err(|_| accepted())?;
+    if !(from.is_finite() && to.is_finite() && from < to) {
+        return Err("give a range from a smaller to a larger finite number".to_owned());
+    }
+    Ok(Axis { state, range: [from, to], points: POINTS })
+}
+
+fn share(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(share) if (0.0..=1.0).contains(&share) => Ok(share),
+        _ => Err("give a number from 0 to 1".to_owned()),
+    }
+}
+
+impl Verify {
+    pub(crate) fn run(self) -> Result<(), Failure> {
+        let (rig, certified, mut table) = self.variation.designed()?;
+        match self.law {
+            Some(LawName::Lqr) => table.pole_placement = None,
+            Some(LawName::PolePlacement) => table.lqr = None,
+            None => {}
+        }
+        if table.lqr.is_none() && table.pole_placement.is_none() {
+            return Err(Failure::BadArgument(
+                "--law: the rig file does not ask for this control law".to_owned(),
+            ));
+        }
+        if let (Some(seed), Some(law)) = (self.replay, self.law) {
+            return self.replay(&rig, &table, law.law(), seed);
+        }
+        if let Some(path) = &self.map {
+            return self.map(&rig, &table, path);
+        }
+        let laws = usize::from(table.lqr.is_some()) + usize::from(table.pole_placement.is_some());
+        let bar = ProgressBar::new((laws * self.runs as usize) as u64);
+        bar.set_style(
+            ProgressStyle::with_template("{spinner} {msg} {wide_bar} {pos}/{len} random plants {elapsed}")
+                .unwrap_or_else(|_| ProgressStyle::default_bar()),
+        );
+        bar.enable_steady_tick(std::time::Duration::from_millis(120));
+        let effort = Effort { runs: self.runs as usize, seed: self.seed, late: self.late };
+        let report =
+            trust(&rig, &certified, &table, effort, &|stage| bar.set_message(stage.to_owned()), &|| {
+                bar.inc(1)
+            });
+        bar.finish_and_clear();
+        self.print(&rig, &report?)
+    }
+
+    /// What a replay has to repeat.
+    fn as_typed(&self) -> String {
+        let late = if self.late == 0.0 { String::new() } else { format!(" --late {}", self.late) };
+        self.variation.as_typed() + &late
+    }
+
+    fn print(&self, rig: &Rig, report: &TrustReport) -> Result<(), Failure> {
+        let mut out = std::io::stdout().lock();
+        if self.json {
+            serde_json::to_writer(&mut out, report).map_err(std::io::Error::from)?;
+            writeln!(out)?;
+        } else {
+            write!(out, "{}", text::report(rig, report, &self.as_typed()))?;
+        }
+        let failed: Vec<String> = report
+            .checks
+            .iter()
+            .filter(|check| !check.holds)
+            .map(|check| format!("{}: {}", check.law, check.requirement))
+            .collect();
+        if failed.is_empty() {
+            return Ok(());
+        }
+        Err(Failure::CheckFailed(format!("{}: not met: {}", rig.name, failed.join("; "))))
+    }
+
+    fn replay(&self, rig: &Rig, table: &TableValues, law: Law, seed: u64) -> Result<(), Failure> {
+        let (plant, scenario) = sample(rig, law, &spread(rig, self.late), seed);
+        let (trace, summary) = with_spinner("simulating", || simulate(&plant, table, &scenario))?;
+        if let Some(path) = &self.csv {
+            let mut bytes = Vec::new();
+            trace.write_csv(&mut bytes)?;
+            write_atomically(path, &bytes)?;
+        }
+        let mut out = std::io::stdout().lock();
+        if self.json {
+            serde_json::to_writer(&mut out, &summary).map_err(std::io::Error::from)?;
+            writeln!(out)?;
+        } else {
+            writeln!(out, "{}\n{summary}", plant.describe())?;
+        }
+        match &summary.fall {
+            Some(fall) => Err(Failure::CheckFailed(format!("{}, seed {seed}: {fall}", rig.name))),
+            None => Ok(()),
+        }
+    }
+
+    /// A line for each start: both states and the time to come near rest, or nothing.
+    fn map(&self, rig: &Rig, table: &TableValues, path: &std::path::Path) -> Result<(), Failure> {
+        let law = if table.lqr.is_some() { Law::Lqr } else { Law::PolePlacement };
+        let &[across, down] = self.axes.as_slice() else {
+            return Err(Failure::BadArgument("--axes: give two".to_owned()));
+        };
+        let axes = [across, down];
+        if axes.iter().any(|axis| axis.state >= rig.states()) || across.state == down.state {
+            return Err(Failure::BadArgument(format!(
+                "--axes: give two different states from 0 to {}",
+                rig.states() - 1
+            )));
+        }
+        let bar = ProgressBar::new((POINTS * POINTS) as u64).with_message("starts");
+        let map = attraction_map(rig, table, law, axes, &Horizon::default(), &|| bar.inc(1))?;
+        bar.finish_and_clear();
+        let [columns, rows] = axes.map(|axis| {
+            let step = (axis.range[1] - axis.range[0]) / (axis.points - 1) as f64;
+            (0..axis.points).map(|i| axis.range[0] + step * i as f64).collect::<Vec<f64>>()
+        });
+        let mut csv = format!("state{},state{},settled_s\n", across.state, down.state);
+        for (second, row) in rows.iter().zip(&map.settled_s) {
+            for (first, settled) in columns.iter().zip(row) {
+                let settled = settled.map_or(String::new(), |time| time.to_string());
+                csv.push_str(&format!("{first:.6},{second:.6},{settled}\n"));
+            }
+        }
+        write_atomically(path, csv.as_bytes())?;
+        let recovered = map.settled_s.iter().flatten().flatten().count();
+        println!("recovers from {recovered} of {} starts; written to {}", POINTS * POINTS, path.display());
+        Ok(())
+    }
+}

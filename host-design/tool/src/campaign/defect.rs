@@ -1,0 +1,243 @@
+//! What can go wrong, and what has to come of it.
+
+use upright::protocol::pins::Sabotage;
+use upright::supervision::fault::Fault;
+use upright::supervision::inhibits::Reasons;
+
+/// A kind of defect.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, serde::Serialize)]
+#[serde(rename_all = "kebab-case")]
+#[allow(missing_docs)] // the table below says what each is
+pub enum Kind {
+    SupplyNotANumber,
+    SupplySag,
+    SupplyDip,
+    EmergencyStop,
+    DriverFault,
+    LimitSwitch,
+    OneOverrun,
+    Overruns,
+    LinkEncoderFrozen,
+    CartEncoderFrozen,
+    BadSample,
+    EncoderJump,
+    EncoderReversed,
+    EncodersSwapped,
+    CountsLost,
+    SensorLate,
+    SensorIntermittent,
+    MotorDead,
+    MotorReversed,
+    MotorStuck,
+    MotorWeak,
+    Push,
+    HostSilent,
+    HostDeaf,
+    FrameDamaged,
+    FrameTruncated,
+    FrameReplayed,
+    Rubbish,
+    SetpointNotANumber,
+    SetpointOutOfRange,
+    ArmUnhomed,
+    ArmHanging,
+    ArmStopped,
+    ArmHeld,
+    Panic,
+    HardFault,
+    StackOverflow,
+}
+
+/// What has to come of a defect.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Expected {
+    /// Motor off for this fault, exactly so many ticks after it began; the rig's limits give those that the list of faults
+    /// leaves open.
+    Fault(Fault, Ticks),
+    /// Motor off, for whatever fault, at most so many ticks after the defect could first be told from a healthy rig, or
+    /// before a link leans further than its limit.
+    Off(u32),
+    /// Balancing goes on as if nothing had been, and it is counted.
+    Counted,
+    /// Balancing goes on, every output bit for bit as without it.
+    Ignored,
+    /// Whatever the firmware does, links and cart stay within their limits until the motor is off.
+    Bounded,
+    /// The firmware refuses to arm, for these reasons at least.
+    Refused(Reasons),
+    /// The motor is off in the same tick, and the firmware does not run on.
+    Dead,
+}
+
+/// A number of ticks.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Ticks {
+    /// So many.
+    Exactly(u32),
+    /// `supply_time_s` and one more.
+    Supply,
+    /// `link_timeout_s`, from the last command on.
+    Link,
+}
+
+impl Kind {
+    /// Every kind, its name, what it is, and what has to come of it.
+    pub const ALL: [(Kind, &str, &str, Expected); 37] = {
+        use Expected::*;
+        use Ticks::*;
+        [
+            (
+                Kind::SupplyNotANumber,
+                "supply-not-a-number",
+                "the supply's measurement is not a number",
+                Fault(F::NotFinite, Exactly(1)),
+            ),
+            (
+                Kind::SupplySag,
+                "supply-sag",
+                "the supply falls below its least voltage, for good",
+                Fault(F::Supply, Supply),
+            ),
+            (Kind::SupplyDip, "supply-dip", "the same, for a shorter time than is a fault", Ignored),
+            (
+                Kind::EmergencyStop,
+                "emergency-stop",
+                "pressed for one tick",
+                Fault(F::EmergencyStop, Exactly(1)),
+            ),
+            (Kind::DriverFault, "driver-fault", "reported for one tick", Fault(F::Driver, Exactly(1))),
+            (
+                Kind::LimitSwitch,
+                "limit-switch",
+                "one of them pressed, or its wire open, for one tick",
+                Fault(F::LimitSwitch, Exactly(1)),
+            ),
+            (Kind::OneOverrun, "one-overrun", "one or two ticks late", Ignored),
+            (Kind::Overruns, "overruns", "three ticks in a row late", Fault(F::Overrun, Exactly(3))),
+            (Kind::LinkEncoderFrozen, "link-encoder-frozen", "a link's counter stands still", Off(10)),
+            (Kind::CartEncoderFrozen, "cart-encoder-frozen", "the cart's counter stands still", Off(10)),
+            (Kind::BadSample, "bad-sample", "one measurement off by 2 to 20 thresholds", Counted),
+            (
+                Kind::EncoderJump,
+                "encoder-jump",
+                "all measurements of an encoder off by 2 to 20 thresholds",
+                Off(3),
+            ),
+            (Kind::EncoderReversed, "encoder-reversed", "an encoder counts backwards", Off(5)),
+            (Kind::EncodersSwapped, "encoders-swapped", "two neighbours' counters are swapped", Off(5)),
+            (Kind::CountsLost, "counts-lost", "an encoder loses a count every 5 to 50 ticks", Bounded),
+            (Kind::SensorLate, "sensor-late", "an encoder's measurements come 1 to 20 ticks late", Bounded),
+            (Kind::SensorIntermittent, "sensor-intermittent", "two of three measurements are off", Bounded),
+            (Kind::MotorDead, "motor-dead", "the motor does nothing", Off(20)),
+            (Kind::MotorReversed, "motor-reversed", "the motor pushes the other way", Off(5)),
+            (Kind::MotorStuck, "motor-stuck", "the motor pushes with all it has, to one side", Off(5)),
+            (Kind::MotorWeak, "motor-weak", "half to nine tenths of the force are missing", Bounded),
+            (
+                Kind::Push,
+                "push",
+                "somebody pushes the cart for 50 ms, with up to the whole force limit",
+                Bounded,
+            ),
+            (
+                Kind::HostSilent,
+                "host-silent",
+                "no command any more, from a host that commands the set-point",
+                Fault(F::LinkLost, Link),
+            ),
+            (Kind::HostDeaf, "host-deaf", "nobody takes bytes from the serial line any more", Ignored),
+            (Kind::FrameDamaged, "frame-damaged", "a disarm command with a wrong bit", Ignored),
+            (Kind::FrameTruncated, "frame-truncated", "a disarm command without its last bytes", Ignored),
+            (Kind::FrameReplayed, "frame-replayed", "a disarm command with an old number", Ignored),
+            (Kind::Rubbish, "rubbish", "random bytes on the serial line", Ignored),
+            (Kind::SetpointNotANumber, "setpoint-not-a-number", "a set-point that is not finite", Ignored),
+            (Kind::SetpointOutOfRange, "setpoint-out-of-range", "a set-point beyond the rail", Ignored),
+            (Kind::ArmUnhomed, "arm-unhomed", "arming before homing", Refused(Reasons::NOT_HOMED)),
+            (Kind::ArmHanging, "arm-hanging", "arming while the links hang", Refused(Reasons::TILTED)),
+            (
+                Kind::ArmStopped,
+                "arm-stopped",
+                "arming with the emergency stop pressed",
+                Refused(Reasons::FAULT.and(Reasons::EMERGENCY_STOP)),
+            ),
+            (
+                Kind::ArmHeld,
+                "arm-held",
+                "an arm command that is held while a fault is cleared",
+                Refused(Reasons::HELD),
+            ),
+            (Kind::Panic, "panic", "the firmware panics", Dead),
+            (Kind::HardFault, "hard-fault", "the firmware touches memory that is not there", Dead),
+            (Kind::StackOverflow, "stack-overflow", "the firmware's stack overflows", Dead),
+        ]
+    };
+
+    fn row(self) -> &'static (Kind, &'static str, &'static str, Expected) {
+        // A test holds that every kind is in the table, in its order.
+        &Self::ALL[self as usize]
+    }
+
+    /// Its name on the command line.
+    pub fn name(self) -> &'static str {
+        self.row().1
+    }
+
+    /// What it is.
+    pub fn meaning(self) -> &'static str {
+        self.row().2
+    }
+
+    /// What has to come of it.
+    pub fn expected(self) -> Expected {
+        self.row().3
+    }
+
+    /// What goes wrong inside the microcontroller.
+    pub(super) fn sabotage(self) -> Option<Sabotage> {
+        match self {
+            Kind::Panic => Some(Sabotage::Panic),
+            Kind::HardFault => Some(Sabotage::HardFault),
+            Kind::StackOverflow => Some(Sabotage::StackOverflow),
+            _ => None,
+        }
+    }
+
+    /// Whether only an image can suffer it.
+    pub fn needs_image(self) -> bool {
+        self.sabotage().is_some()
+    }
+
+    /// Whether only the firmware in this process can suffer it.
+    pub fn needs_process(self) -> bool {
+        self == Kind::HostDeaf
+    }
+
+    /// Whether it is found by a test that the gain table has thresholds for: without them it has to be missed.
+    pub fn needs_detection(self) -> bool {
+        matches!(
+            self,
+            Kind::LinkEncoderFrozen
+                | Kind::CartEncoderFrozen
+                | Kind::EncoderJump
+                | Kind::EncoderReversed
+                | Kind::EncodersSwapped
+                | Kind::MotorDead
+                | Kind::MotorReversed
+                | Kind::MotorStuck
+        )
+    }
+}
+
+use Fault as F;
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_table_has_every_kind_in_order() {
+        for (index, (kind, name, meaning, _)) in Kind::ALL.iter().enumerate() {
+            assert_eq!(*kind as usize, index);
+            assert!(!name.is_empty() && !meaning.is_empty());
+        }
+    }
+}

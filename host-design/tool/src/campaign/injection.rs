@@ -1,0 +1,217 @@
+//! A defect at work: between rig and firmware, tick by tick.
+
+use rand::RngExt;
+use rand_pcg::Pcg64;
+use upright::board::{Inputs, Output};
+use upright::control::actuator::Drive;
+use upright::control::encoder::CounterWidth;
+use upright::protocol::frame;
+use upright::protocol::link::MAX_COMMAND;
+use upright::protocol::message::{Command, Request};
+
+use super::defect::Kind;
+use super::trial::Trial;
+use crate::in_the_loop::Session;
+use upright_design::rig::Rig;
+use upright_design::simulate::Bench;
+use upright_design::table::TableValues;
+
+/// A push on the cart lasts so long (s).
+const PUSH_S: f64 = 0.05;
+
+/// The defect of a trial.
+pub(super) struct Injection<'a, const NY: usize> {
+    trial: &'a Trial,
+    table: &'a TableValues,
+    random: Pcg64,
+    /// Counters when it began.
+    at_onset: Option<[u32; NY]>,
+    past: Vec<[u32; NY]>,
+    /// How wrong each sensor may be before the firmware's tests can see it (counts).
+    visible_counts: [i64; NY],
+    /// Position and speed that the missing force would have given the cart (m, m/s).
+    missing: [f64; 2],
+    full_force_n: f64,
+    push_ticks: usize,
+    supply_ticks: usize,
+}
+
+impl<'a, const NY: usize> Injection<'a, NY> {
+    pub(super) fn new(rig: &Rig, table: &'a TableValues, trial: &'a Trial) -> Self {
+        let ticks = |seconds: f64| (seconds / rig.tick.period_s).ceil() as usize;
+        let visible_counts = core::array::from_fn(|sensor| match &table.observer {
+            Some(observer) => {
+                let threshold = table.thresholds.innovation[sensor];
+                (threshold / observer.step[sensor]).ceil().min(1e9) as i64
+            }
+            None => i64::MAX,
+        });
+        Self {
+            trial,
+            table,
+            random: trial.random(),
+            at_onset: None,
+            past: Vec::new(),
+            visible_counts,
+            missing: [0.0; 2],
+            full_force_n: f64::from(table.force_limit_n),
+            push_ticks: ticks(PUSH_S),
+            supply_ticks: table.limits.supply_ticks as usize,
+        }
+    }
+
+    /// Whether the host still speaks, `since` ticks after the onset.
+    pub(super) fn host_speaks(&self, since: Option<usize>) -> bool {
+        self.trial.kind != Kind::HostSilent || since.is_none()
+    }
+
+    /// Changes what the firmware reads, `since` ticks after the onset; whether it could be told from a healthy rig.
+    pub(super) fn inputs(&mut self, since: usize, inputs: &mut Inputs<NY>) -> bool {
+        let Trial { kind, sensor, sign, size, .. } = *self.trial;
+        let truth = inputs.counts;
+        let began = *self.at_onset.get_or_insert(truth);
+        self.past.push(truth);
+        let contacts = &mut inputs.contacts;
+        let moved = |sensor: usize| signed(sensor, truth[sensor].wrapping_sub(began[sensor]));
+        let off = (self.visible_counts[sensor] as f64 * (2.0 + 18.0 * size) * sign) as i64;
+        let shows = |sensor: usize, counts: i64| (sensor, began[sensor].wrapping_add(counts as u32));
+        let mut shown = Vec::new();
+        match kind {
+            Kind::SupplyNotANumber if since == 0 => inputs.supply_v = f32::NAN,
+            Kind::SupplySag => inputs.supply_v = self.table.limits.supply_min_v * (0.2 + 0.7 * size as f32),
+            Kind::SupplyDip if since < self.supply_ticks => {
+                inputs.supply_v = self.table.limits.supply_min_v * (0.2 + 0.7 * size as f32);
+            }
+            Kind::EmergencyStop if since == 0 => contacts.emergency_stop = true,
+            Kind::DriverFault if since == 0 => contacts.driver_fault = true,
+            Kind::LimitSwitch if since == 0 && sign > 0.0 => contacts.limit_high = true,
+            Kind::LimitSwitch if since == 0 => contacts.limit_low = true,
+            Kind::OneOverrun => contacts.overrun = since < 1 + usize::from(size > 0.5),
+            Kind::Overruns => contacts.overrun = since < 3,
+            Kind::LinkEncoderFrozen | Kind::CartEncoderFrozen => shown.push(shows(sensor, 0)),
+            Kind::BadSample if since == 0 => shown.push(shows(sensor, moved(sensor) + off)),
+            Kind::EncoderJump => shown.push(shows(sensor, moved(sensor) + off)),
+            Kind::SensorIntermittent if since % 3 < 2 => shown.push(shows(sensor, moved(sensor) + off)),
+            Kind::EncoderReversed => shown.push(shows(sensor, -moved(sensor))),
+            Kind::EncodersSwapped if NY > 1 => {
+                shown.push(shows(sensor, moved(sensor + 1)));
+                shown.push(shows(sensor + 1, moved(sensor)));
+            }
+            Kind::CountsLost => {
+                let every = 5 + (45.0 * size) as usize;
+                shown.push(shows(sensor, moved(sensor) - (sign * (since / every) as f64) as i64));
+            }
+            Kind::SensorLate => {
+                let late = 1 + (19.0 * size) as usize;
+                let then = self.past[self.past.len().saturating_sub(1 + late)][sensor];
+                inputs.counts[sensor] = then;
+                return (signed(sensor, truth[sensor].wrapping_sub(then))).abs()
+                    > self.visible_counts[sensor];
+            }
+            _ => {}
+        }
+        let mut visible = false;
+        for (sensor, counter) in shown {
+            let counter = in_width(sensor, counter);
+            let wrong = signed(sensor, counter.wrapping_sub(truth[sensor]));
+            visible |= wrong.abs() > self.visible_counts[sensor];
+            inputs.counts[sensor] = counter;
+        }
+        visible
+    }
+
+    /// Changes what the motor gets; whether it could be told from a healthy rig by now.
+    pub(super) fn output(&mut self, output: &mut Output) -> bool {
+        let (Drive::Force(command) | Drive::Duty(command)) = &mut output.drive;
+        let asked = *command;
+        let full = if self.table.motor.is_some() { 1.0 } else { self.full_force_n as f32 };
+        *command = match self.trial.kind {
+            Kind::MotorDead => 0.0,
+            Kind::MotorReversed => -asked,
+            Kind::MotorStuck => full * self.trial.sign as f32,
+            Kind::MotorWeak => asked * (0.1 + 0.4 * self.trial.size as f32),
+            _ => return false,
+        };
+        let force_per_command = match &self.table.motor {
+            Some(motor) => f64::from(motor.supply_v / motor.volts_per_newton),
+            None => 1.0,
+        };
+        let missing_n = f64::from(asked - *command) * force_per_command;
+        let Some(observer) = &self.table.observer else { return false };
+        let [b_p, b_v] = [0, 1].map(|state| f64::from(observer.bd[state]));
+        let [p, v] = self.missing;
+        self.missing = [p + v * f64::from(self.table.tick_s) + b_p * missing_n, v + b_v * missing_n];
+        self.missing[0].abs() > f64::from(self.table.thresholds.innovation[0])
+    }
+
+    /// A force on the cart that somebody adds (N).
+    pub(super) fn push_n(&self, since: usize) -> f64 {
+        let pushes = self.trial.kind == Kind::Push && since < self.push_ticks;
+        if pushes { self.trial.sign * self.trial.size * self.full_force_n } else { 0.0 }
+    }
+
+    /// What happens on the serial line at the onset.
+    pub(super) fn serial<const NX: usize>(&mut self, session: &mut Session<'_, NX, NY>) {
+        let Trial { kind, sign, size, .. } = *self.trial;
+        let disarm = |id: u64| {
+            let (mut scratch, mut out) = ([0; MAX_COMMAND], [0; MAX_COMMAND]);
+            let command = Command { id, request: Request::Disarm };
+            frame::encode(&command, &mut scratch, &mut out).unwrap_or_default().to_vec()
+        };
+        let mut next = disarm(session.last_id() + 1);
+        match kind {
+            Kind::FrameDamaged => {
+                let bit = self.random.random_range(0..8 * (next.len() - 1));
+                next[bit / 8] ^= 1 << (bit % 8);
+                session.send_bytes(&next);
+            }
+            Kind::FrameTruncated => {
+                let left = self.random.random_range(1..next.len() - 1);
+                next.truncate(left);
+                next.push(frame::END);
+                session.send_bytes(&next);
+            }
+            Kind::FrameReplayed => {
+                session.send_bytes(&disarm(1 + self.trial.seed % session.last_id().max(1)))
+            }
+            Kind::Rubbish => {
+                let mut rubbish: Vec<u8> =
+                    (0..self.random.random_range(1..60)).map(|_| self.random.random()).collect();
+                // What follows has to be read again.
+                rubbish.push(frame::END);
+                session.send_bytes(&rubbish);
+            }
+            Kind::SetpointNotANumber => {
+                let values = [f32::NAN, f32::INFINITY, f32::NEG_INFINITY];
+                let _ = session.send(Request::Setpoint(values[(size * 2.99) as usize]));
+            }
+            Kind::SetpointOutOfRange => {
+                let [low, high] = self.table.limits.rail_m;
+                let beyond = if sign > 0.0 { high } else { low } * (1.01 + 100.0 * size as f32);
+                let _ = session.send(Request::Setpoint(beyond));
+            }
+            _ => {}
+        }
+    }
+}
+
+fn widths(sensor: usize) -> CounterWidth {
+    let [cart, link]: [CounterWidth; 2] = Bench::widths();
+    if sensor == 0 { cart } else { link }
+}
+
+/// The low bits that the sensor's counter has.
+fn in_width(sensor: usize, counter: u32) -> u32 {
+    match widths(sensor) {
+        CounterWidth::Bits16 => counter & 0xffff,
+        CounterWidth::Bits32 => counter,
+    }
+}
+
+/// A difference of two readings, with its sign.
+fn signed(sensor: usize, difference: u32) -> i64 {
+    match widths(sensor) {
+        CounterWidth::Bits16 => i64::from(difference as i16),
+        CounterWidth::Bits32 => i64::from(difference as i32),
+    }
+}

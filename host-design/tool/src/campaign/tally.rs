@@ -1,0 +1,177 @@
+//! Many trials, in parallel, summed up by kind.
+
+use rayon::prelude::*;
+use serde::Serialize;
+use upright::supervision::fault::Fault;
+
+use super::attempt::Place;
+use super::defect::{Expected, Kind};
+use super::judge::{Class, Outcome, allowed, judge};
+use super::trial::Trial;
+use crate::in_the_loop::RunError;
+use upright_design::rig::Rig;
+use upright_design::table::TableValues;
+
+/// A trial that could not be run.
+#[derive(Debug, thiserror::Error)]
+#[error("trial {number} ({kind}): {source}")]
+pub struct CampaignError {
+    /// Its number.
+    pub number: u64,
+    /// Its kind.
+    pub kind: &'static str,
+    /// Why.
+    pub source: RunError,
+}
+
+/// All trials of one kind.
+#[derive(Debug, Clone, Serialize)]
+pub struct Row {
+    /// The kind.
+    pub kind: Kind,
+    /// What it is.
+    pub meaning: &'static str,
+    /// Ticks in which the motor has to be off, or is, at its best, if it has to be.
+    pub allowed: Option<u32>,
+    /// Trials.
+    pub runs: usize,
+    /// Trials of each class.
+    pub masked: usize,
+    /// See [`Class::Rejected`].
+    pub rejected: usize,
+    /// See [`Class::Detected`].
+    pub detected: usize,
+    /// See [`Class::Late`].
+    pub late: usize,
+    /// See [`Class::Missed`].
+    pub missed: usize,
+    /// See [`Class::FalseAlarm`].
+    pub false_alarms: usize,
+    /// Largest number of ticks to motor off.
+    pub worst: Option<u32>,
+    /// The same, from the first tick of the defect.
+    pub worst_from_onset: Option<u32>,
+    /// Names of the faults that were latched.
+    pub faults: Vec<&'static str>,
+    /// Trials that came out wrong, by number.
+    pub wrong: Vec<u64>,
+}
+
+/// A campaign.
+#[derive(Debug, Clone, Serialize)]
+pub struct Campaign {
+    /// Its seed.
+    pub seed: u64,
+    /// Trials.
+    pub runs: u64,
+    /// One row per kind.
+    pub rows: Vec<Row>,
+}
+
+impl Campaign {
+    /// Whether all came out as expected.
+    pub fn is_clean(&self) -> bool {
+        self.rows.iter().all(|row| row.wrong.is_empty())
+    }
+}
+
+/// The kinds of defects that this rig can have at this place.
+pub fn kinds(table: &TableValues, place: Place<'_>) -> Vec<Kind> {
+    let has_supply = table.limits.supply_min_v > 0.0;
+    let has_links = table.sensors > 1;
+    Kind::ALL
+        .iter()
+        .map(|(kind, ..)| *kind)
+        .filter(|kind| match kind {
+            Kind::SupplySag | Kind::SupplyDip => has_supply,
+            Kind::LinkEncoderFrozen | Kind::EncodersSwapped => has_links,
+            _ => true,
+        })
+        .filter(|kind| match place {
+            Place::Host | Place::Blind => !kind.needs_image(),
+            Place::Qemu(_) => !kind.needs_process(),
+        })
+        .collect()
+}
+
+/// One trial of a campaign.
+///
+/// # Errors
+/// [`CampaignError`] if it cannot be run.
+pub fn one(
+    rig: &Rig,
+    table: &TableValues,
+    kinds: &[Kind],
+    seed: u64,
+    number: u64,
+    place: Place<'_>,
+) -> Result<Outcome, CampaignError> {
+    let trial = Trial::draw(rig, table, kinds, seed, number);
+    judge(rig, table, &trial, place).map_err(|source| CampaignError {
+        number,
+        kind: trial.kind.name(),
+        source,
+    })
+}
+
+/// Runs `runs` trials of `kinds`, in turn; `done` hears of each.
+///
+/// # Errors
+/// The first [`CampaignError`].
+pub fn campaign(
+    rig: &Rig,
+    table: &TableValues,
+    kinds: &[Kind],
+    seed: u64,
+    runs: u64,
+    place: Place<'_>,
+    done: &(dyn Fn() + Sync),
+) -> Result<Campaign, CampaignError> {
+    let outcomes: Vec<Outcome> = (0..runs)
+        .into_par_iter()
+        .map(|number| {
+            let outcome = one(rig, table, kinds, seed, number, place);
+            done();
+            outcome
+        })
+        .collect::<Result<_, _>>()?;
+    let rows = kinds.iter().map(|&kind| Row::of(kind, table, &outcomes)).collect();
+    Ok(Campaign { seed, runs, rows })
+}
+
+impl Row {
+    fn of(kind: Kind, table: &TableValues, outcomes: &[Outcome]) -> Self {
+        let of_kind = || outcomes.iter().filter(move |outcome| outcome.kind == kind);
+        let count = |class: Class| of_kind().filter(|outcome| outcome.class == class).count();
+        let is_wrong = |class: Class| matches!(class, Class::Missed | Class::FalseAlarm);
+        let mut faults: Vec<u8> = of_kind().filter_map(|outcome| outcome.fault).collect();
+        faults.sort_unstable();
+        faults.dedup();
+        let name =
+            |code: u8| Fault::ALL.iter().find(|entry| entry.fault.code() == code).map(|entry| entry.name);
+        Self {
+            kind,
+            meaning: kind.meaning(),
+            allowed: match kind.expected() {
+                Expected::Fault(_, within) => Some(allowed(table, within)),
+                Expected::Off(ticks) => Some(ticks),
+                Expected::Dead => Some(1),
+                _ => None,
+            },
+            runs: of_kind().count(),
+            masked: count(Class::Masked),
+            rejected: count(Class::Rejected),
+            detected: count(Class::Detected),
+            late: count(Class::Late),
+            missed: count(Class::Missed),
+            false_alarms: count(Class::FalseAlarm),
+            worst: of_kind().filter_map(|outcome| outcome.ticks).max(),
+            worst_from_onset: of_kind().filter_map(|outcome| outcome.from_onset).max(),
+            faults: faults.into_iter().filter_map(name).collect(),
+            wrong: of_kind()
+                .filter(|outcome| is_wrong(outcome.class))
+                .map(|outcome| outcome.number)
+                .collect(),
+        }
+    }
+}

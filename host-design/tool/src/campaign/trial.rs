@@ -1,0 +1,92 @@
+//! One run with one defect: drawn from a number, the same every time.
+
+use rand::{RngExt, SeedableRng};
+use rand_pcg::Pcg64;
+use upright::table::Law;
+
+use super::defect::Kind;
+use upright_design::rig::Rig;
+use upright_design::simulate::{Scenario, Sensing};
+use upright_design::table::TableValues;
+use upright_design::verify::Disturbance;
+
+/// A defect, and the run it happens in.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Trial {
+    /// Number of the trial in its campaign.
+    pub number: u64,
+    /// What goes wrong.
+    pub kind: Kind,
+    /// What the rig does meanwhile.
+    pub scenario: Scenario,
+    /// In which tick after the release it goes wrong.
+    pub onset: usize,
+    /// Ticks of the run after that.
+    pub watched: usize,
+    /// The sensor (0: cart).
+    pub sensor: usize,
+    /// -1 or 1.
+    pub sign: f64,
+    /// From 0 to 1: how much.
+    pub size: f64,
+    /// For what is random tick by tick.
+    pub seed: u64,
+}
+
+impl Trial {
+    /// The trial `number` of a campaign: its kind is one of `kinds`, in turn.
+    pub fn draw(rig: &Rig, table: &TableValues, kinds: &[Kind], seed: u64, number: u64) -> Self {
+        let kind = kinds[(number % kinds.len() as u64) as usize];
+        // A generator for each trial: it does not depend on the others.
+        let mut random = Pcg64::new(u128::from(seed) << 64 | u128::from(number), 0xcafe_f00d);
+        let laws: Vec<Law> =
+            [(Law::Lqr, table.lqr.is_some()), (Law::PolePlacement, table.pole_placement.is_some())]
+                .into_iter()
+                .filter_map(|(law, there)| there.then_some(law))
+                .collect();
+        let law = laws[random.random_range(0..laws.len())];
+        let disturbance = Disturbance::of(rig);
+        let sign = |random: &mut Pcg64| if random.random() { 1.0 } else { -1.0 };
+        // At rest, after a step, or disturbed more than usual.
+        let (step_m, disturbed) = match random.random_range(0..3) {
+            0 => (0.0, 1.0),
+            1 => (sign(&mut random) * random.random_range(0.02..0.1), 1.0),
+            _ => (0.0, 1.5),
+        };
+        let per_second = 1.0 / rig.tick.period_s;
+        let scenario = Scenario {
+            sensing: Sensing::Encoders,
+            step_m,
+            force_noise_n: disturbed * disturbance.force_n,
+            torque_noise_n_m: disturbed * disturbance.torque_n_m,
+            seed: random.random(),
+            substeps: 2,
+            // Anywhere, so that counters wrap around in some runs.
+            counter_start: random.random(),
+            ..Scenario::at_rest(rig, law)
+        };
+        let sensors = table.sensors;
+        let sensor = match kind {
+            Kind::CartEncoderFrozen => 0,
+            Kind::LinkEncoderFrozen => random.random_range(1..sensors.max(2)),
+            Kind::EncodersSwapped => random.random_range(0..sensors.saturating_sub(1).max(1)),
+            _ => random.random_range(0..sensors),
+        };
+        Self {
+            number,
+            kind,
+            scenario,
+            onset: random.random_range((0.2 * per_second) as usize..(0.7 * per_second) as usize),
+            watched: (0.8 * per_second) as usize,
+            sensor,
+            sign: sign(&mut random),
+            size: random.random(),
+            seed: random.random(),
+        }
+    }
+
+    /// What is random tick by tick.
+    pub fn random(&self) -> Pcg64 {
+        Pcg64::seed_from_u64(self.seed)
+    }
+}

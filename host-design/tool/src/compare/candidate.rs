@@ -1,0 +1,162 @@
+//! From a rig to its row.
+
+use rayon::prelude::*;
+use serde::Serialize;
+use upright::table::Law;
+
+use super::row::{Fate, Figures, Row};
+use upright_design::design::design;
+use upright_design::rig::Rig;
+use upright_design::simulate::{Scenario, SimulationError, simulate};
+use upright_design::table::{Gains, TableValues};
+use upright_design::verify::{AttractionSettings, Margins, attraction, linear};
+
+/// A rig to compare, and the value of the swept key in it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Candidate {
+    /// What it is called in the table: different for each rig file.
+    pub label: String,
+    /// The rig.
+    pub rig: Rig,
+    /// The value.
+    pub value: Option<f64>,
+}
+
+/// What every candidate has to go through.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Conditions {
+    /// Step of the set-point (m, or the unit of a model's output).
+    pub step_m: f64,
+    /// Length of the run (s).
+    pub duration_s: f64,
+    /// Give the controller the whole state, whether or not the rig asks for an observer.
+    pub full_state: bool,
+    /// Let the set-point jump, without the governor.
+    pub raw_step: bool,
+    /// Use gains for continuous time instead of those for the tick.
+    pub continuous_gains: bool,
+    /// Only this law.
+    #[serde(skip)]
+    pub law: Option<Law>,
+}
+
+impl Default for Conditions {
+    /// A step of 0.1 m in 10 s, as the rig file has it.
+    fn default() -> Self {
+        Self {
+            step_m: 0.1,
+            duration_s: 10.0,
+            full_state: false,
+            raw_step: false,
+            continuous_gains: false,
+            law: None,
+        }
+    }
+}
+
+/// Width to which the edge of the tilt is found: enough for a table.
+const TILT_PRECISION: f64 = 0.02;
+
+/// Each law that a candidate asks for, in the order of the rows of [`compare`].
+pub fn jobs<'a>(candidates: &'a [Candidate], conditions: &Conditions) -> Vec<(&'a Candidate, Law)> {
+    let asked = |candidate: &Candidate, law: Law| match law {
+        Law::Lqr => candidate.rig.lqr.is_some(),
+        Law::PolePlacement => candidate.rig.pole_placement.is_some(),
+    };
+    let wanted = |law: &Law| conditions.law.is_none_or(|only| only == *law);
+    [Law::Lqr, Law::PolePlacement]
+        .into_iter()
+        .filter(wanted)
+        .flat_map(|law| candidates.iter().filter(move |one| asked(one, law)).map(move |one| (one, law)))
+        .collect()
+}
+
+/// Makes all rows, in parallel, ordered by law; `done` hears of each that is finished.
+///
+/// # Errors
+/// [`SimulationError`] if a run is impossible for every candidate alike: too long, say.
+pub fn compare(
+    candidates: &[Candidate],
+    conditions: &Conditions,
+    done: &(dyn Fn() + Sync),
+) -> Result<Vec<Row>, SimulationError> {
+    jobs(candidates, conditions)
+        .into_par_iter()
+        .map(|(candidate, law)| {
+            let row = row(candidate, law, conditions);
+            done();
+            row
+        })
+        .collect()
+}
+
+fn row(candidate: &Candidate, law: Law, conditions: &Conditions) -> Result<Row, SimulationError> {
+    let mut rig = candidate.rig.clone();
+    // One law alone: whether the other has a design does not matter here.
+    let name = match law {
+        Law::Lqr => {
+            rig.pole_placement = None;
+            "lqr"
+        }
+        Law::PolePlacement => {
+            rig.lqr = None;
+            rig.integral = None;
+            "pole_placement"
+        }
+    };
+    if conditions.full_state {
+        rig.kalman = None;
+    }
+    let mut row = Row {
+        rig: candidate.label.clone(),
+        value: candidate.value,
+        law: name,
+        fate: Fate::Standing,
+        figures: None,
+        trace: None,
+    };
+    let gains = if conditions.continuous_gains { Gains::Continuous } else { Gains::Sampled };
+    let certified = match design(&rig) {
+        Ok(certified) => certified,
+        Err(reason) => return Ok(Row { fate: Fate::NoDesign(reason.to_string()), ..row }),
+    };
+    let table = match TableValues::of(&rig, &certified, gains) {
+        Ok(table) if conditions.raw_step => table.without_governor(),
+        Ok(table) => table,
+        Err(reason) => return Ok(Row { fate: Fate::NoDesign(reason.to_string()), ..row }),
+    };
+    let scenario = Scenario {
+        step_m: conditions.step_m,
+        duration_s: conditions.duration_s,
+        ..Scenario::at_rest(&rig, law)
+    };
+    let (trace, summary) = simulate(&rig, &table, &scenario)?;
+    // What has no margins, being unstable, and what has none that can be computed show the same: none.
+    let report = linear(&rig, &certified, &table).ok().and_then(|mut reports| reports.pop());
+    let stable = report.as_ref().is_some_and(|report| report.stable);
+    let margins = report.and_then(|report| report.margins);
+    let settings = AttractionSettings { relative: TILT_PRECISION, ..AttractionSettings::default() };
+    let attraction = stable.then(|| attraction(&rig, &table, law, &settings).ok()).flatten();
+    let tilts = attraction.iter().flat_map(|attraction| &attraction.tilts).map(|tilt| tilt.edge.size);
+    let poles = certified.poles.in_table(usize::from(law == Law::PolePlacement))[0];
+    let margin = |of: fn(&Margins) -> Option<f64>| margins.as_ref().and_then(of);
+    row.figures = Some(Figures {
+        settling_time_s: summary.settling_time_s,
+        overshoot_percent: summary.overshoot_percent,
+        peak_angle_rad: summary.peak_angles_rad.iter().copied().max_by(f64::total_cmp),
+        peak_force_n: summary.peak_force_n,
+        lowest_gain: margin(|margins| Some(margins.lowest_gain)),
+        highest_gain: margin(|margins| margins.highest_gain),
+        phase_margin_rad: margin(|margins| margins.phase_margin_rad),
+        delay_margin_s: margin(|margins| margins.delay_margin_s),
+        tilt_rad: tilts.min_by(f64::total_cmp),
+        fastest_pole_per_s: poles.into_iter().flatten().map(|pole| pole[0]).fold(0.0, f64::min),
+    });
+    row.fate = match summary.fall {
+        Some(fall) => Fate::Fallen(fall),
+        None if summary.settled => Fate::Settled,
+        None => Fate::Standing,
+    };
+    row.trace = Some(trace);
+    Ok(row)
+}

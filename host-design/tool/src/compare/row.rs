@@ -1,0 +1,62 @@
+//! One line of a comparison.
+
+use serde::Serialize;
+
+use upright_design::simulate::{Fall, Trace};
+
+/// What was found for one law of one candidate.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Row {
+    /// Label of the rig.
+    pub rig: String,
+    /// Value of the swept key.
+    pub value: Option<f64>,
+    /// `lqr` or `pole_placement`.
+    pub law: &'static str,
+    /// How the run ended.
+    pub fate: Fate,
+    /// All figures; none without a design.
+    pub figures: Option<Figures>,
+    /// The run; none without a design.
+    #[serde(skip)]
+    pub trace: Option<Trace>,
+}
+
+/// How a run ended, or why there was none.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Fate {
+    /// It stands, and is within the settling band when the run ends.
+    Settled,
+    /// It stands, but is not within the band.
+    Standing,
+    /// It falls.
+    Fallen(Fall),
+    /// There is no such design, for this reason.
+    NoDesign(String),
+}
+
+/// Figures of one law of one candidate.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Figures {
+    /// Time from which the output stays within 2 % of the step, at least 1 mm (s).
+    pub settling_time_s: Option<f64>,
+    /// Largest excursion beyond the set-point (% of the step).
+    pub overshoot_percent: Option<f64>,
+    /// Largest angle of any joint (rad); none for a model.
+    pub peak_angle_rad: Option<f64>,
+    /// Largest force on the cart (N).
+    pub peak_force_n: f64,
+    /// Smallest factor on the force at which the loop is still stable; none if it is not.
+    pub lowest_gain: Option<f64>,
+    /// Largest such factor; none: no limit, or not stable.
+    pub highest_gain: Option<f64>,
+    /// Phase margin (rad); none if the loop is not stable.
+    pub phase_margin_rad: Option<f64>,
+    /// Delay margin (s); likewise.
+    pub delay_margin_s: Option<f64>,
+    /// Largest tilt of the worst single link from which it recovers (rad); none for a model or an unstable loop.
+    pub tilt_rad: Option<f64>,
+    /// Fastest pole of the continuous design (1/s): negative.
+    pub fastest_pole_per_s: f64,
+}

@@ -1,0 +1,216 @@
+//! Figures: panels of curves with axes and units, as SVG, PNG and CSV.
+//!
+//! Drawn by `plotters`. Colours are those of Okabe and Ito (*Color Universal Design*, 2008), which stay apart for
+//! colour-blind readers; every curve has a dash or a marker of its own besides, so that nothing depends on colour.
+
+mod csv;
+mod draw;
+mod heat;
+mod legend;
+mod path;
+mod png;
+mod run;
+mod scale;
+mod theme;
+
+pub(crate) use png::pixels;
+
+pub use draw::{Drawing, PlotArea};
+pub use heat::HeatMap;
+pub use run::run_svg;
+
+/// A figure that could not be made.
+#[derive(Debug, thiserror::Error)]
+pub enum FigureError {
+    /// The drawing library failed.
+    #[error("the figure cannot be drawn: {0}")]
+    Draw(String),
+    /// The figure as SVG could not be made into pixels.
+    #[error("the figure cannot be made into a PNG: {0}")]
+    Png(String),
+    /// A range without extent, or one that a logarithmic axis does not have.
+    #[error("the axis \"{label}\" cannot go from {from} to {to}")]
+    Range {
+        /// The axis.
+        label: String,
+        /// Its lower end.
+        from: f64,
+        /// Its upper end.
+        to: f64,
+    },
+}
+
+/// Panels one below the other under a title.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Figure {
+    /// Above the panels; may be empty.
+    pub title: String,
+    /// From top to bottom.
+    pub panels: Vec<Panel>,
+    /// Width of the figure (px).
+    pub width: u32,
+    /// Size of all text but the title (px).
+    pub text: f64,
+}
+
+/// One system of axes with its curves.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Panel {
+    /// To the right.
+    pub x: Axis,
+    /// Upwards.
+    pub y: Axis,
+    /// Height with labels and legend (px).
+    pub height: u32,
+    /// One unit is as long to the right as upwards.
+    pub equal: bool,
+    /// Drawn below the curves.
+    pub heat: Option<HeatMap>,
+    /// In the order in which they are drawn.
+    pub curves: Vec<Curve>,
+}
+
+/// An axis.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Axis {
+    /// Quantity and unit.
+    pub label: String,
+    /// Logarithmic instead of linear.
+    pub log: bool,
+    /// Both ends; none: what the curves need.
+    pub range: Option<[f64; 2]>,
+}
+
+/// A curve, or points that belong together.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Curve {
+    /// Name in the legend; empty: not there.
+    pub name: String,
+    /// `[x, y]` each. A point that is not finite interrupts the line.
+    pub points: Vec<[f64; 2]>,
+    /// How it looks.
+    pub style: Style,
+}
+
+/// How a curve looks.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Style {
+    /// A line with colour and dash of this number; 0 is solid.
+    Line(usize),
+    /// Single points with colour and shape of this number; 0 is a cross.
+    Markers(usize),
+    /// A wide grey line, visible below the curve that should lie on it.
+    Reference,
+    /// A thin line at a limit. It widens an automatic range only where the curves come near it.
+    Limit,
+}
+
+impl Figure {
+    /// A figure for a page of text: 900 px wide.
+    pub fn new(title: impl Into<String>) -> Self {
+        Self { title: title.into(), panels: Vec::new(), width: 900, text: 14.0 }
+    }
+
+    /// A figure that stays legible on a telephone: 480 px wide, with larger text.
+    pub fn narrow(title: impl Into<String>) -> Self {
+        Self { width: 480, text: 15.0, ..Self::new(title) }
+    }
+
+    /// With one more panel at the bottom.
+    pub fn with(mut self, panel: Panel) -> Self {
+        self.panels.push(panel);
+        self
+    }
+
+    /// Gives the panels of the same number in all `figures` the same ranges, so that their curves can be compared.
+    pub fn same_scale(figures: &mut [Figure]) {
+        let panels = figures.iter().map(|figure| figure.panels.len()).max().unwrap_or(0);
+        for index in 0..panels {
+            let common = |range: fn(&Panel) -> [f64; 2]| {
+                let ranges = figures.iter().filter_map(|figure| figure.panels.get(index)).map(range);
+                ranges.reduce(|a, b| [a[0].min(b[0]), a[1].max(b[1])])
+            };
+            let (x, y) = (common(Panel::x_range), common(Panel::y_range));
+            for panel in figures.iter_mut().filter_map(|figure| figure.panels.get_mut(index)) {
+                (panel.x.range, panel.y.range) = (x, y);
+            }
+        }
+    }
+
+    /// The figure as an SVG document.
+    ///
+    /// # Errors
+    /// [`FigureError`] for an impossible range, or from the drawing library.
+    pub fn svg(&self) -> Result<String, FigureError> {
+        self.draw().map(|drawing| drawing.svg)
+    }
+}
+
+impl Panel {
+    /// A panel without curves, 230 px high.
+    pub fn new(x: Axis, y: Axis) -> Self {
+        Self { x, y, height: 230, equal: false, heat: None, curves: Vec::new() }
+    }
+
+    /// With one more curve.
+    pub fn with(mut self, curve: Curve) -> Self {
+        self.curves.push(curve);
+        self
+    }
+
+    /// With this height (px).
+    pub fn high(self, height: u32) -> Self {
+        Self { height, ..self }
+    }
+
+    /// With one unit as long to the right as upwards.
+    pub fn equal(self) -> Self {
+        Self { equal: true, ..self }
+    }
+
+    /// With the unit circle as a thin line.
+    pub fn unit_circle(self) -> Self {
+        let circle = (0..=360).map(|degree| f64::from(degree).to_radians()).map(|t| [t.cos(), t.sin()]);
+        let points = circle.collect();
+        self.with(Curve { name: "unit circle".to_owned(), points, style: Style::Limit })
+    }
+}
+
+impl Axis {
+    /// A linear axis.
+    pub fn linear(label: impl Into<String>) -> Self {
+        Self { label: label.into(), log: false, range: None }
+    }
+
+    /// A logarithmic axis.
+    pub fn log(label: impl Into<String>) -> Self {
+        Self { log: true, ..Self::linear(label) }
+    }
+
+    /// From `low` to `high`.
+    pub fn range(self, low: f64, high: f64) -> Self {
+        Self { range: Some([low, high]), ..self }
+    }
+}
+
+impl Curve {
+    /// A line; `number` chooses colour and dash.
+    pub fn line(name: impl Into<String>, number: usize, points: Vec<[f64; 2]>) -> Self {
+        Self { name: name.into(), points, style: Style::Line(number) }
+    }
+
+    /// Single points; `number` chooses colour and shape.
+    pub fn markers(name: impl Into<String>, number: usize, points: Vec<[f64; 2]>) -> Self {
+        Self { name: name.into(), points, style: Style::Markers(number) }
+    }
+
+    /// What another curve is to be compared with.
+    pub fn reference(name: impl Into<String>, points: Vec<[f64; 2]>) -> Self {
+        Self { name: name.into(), points, style: Style::Reference }
+    }
+
+    /// A limit.
+    pub fn limit(name: impl Into<String>, points: Vec<[f64; 2]>) -> Self {
+        Self { name: name.into(), points, style: Style::Limit }
+    }
+}

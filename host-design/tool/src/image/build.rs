@@ -1,0 +1,208 @@
+//! Building an image: with the target of rustup if it is installed, otherwise with the compiler and the library source of
+//! Debian.
+
+use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
+use std::sync::{Mutex, PoisonError};
+
+use upright_design::rig::Rig;
+use upright_design::table::{TableValues, WriteError, gains_source, write_atomically};
+
+const TARGET: &str = "thumbv7em-none-eabihf";
+const PROFILE: &str = "firmware";
+/// Debian's compiler, which can build Rust's core library from `rust-web-src`.
+const DEBIAN_RUSTC: &str = "/usr/bin/rustc";
+const DEBIAN_CARGO: &str = "/usr/bin/cargo";
+
+/// Which image.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Kind {
+    /// For a board with an STM32F405.
+    F405,
+    /// For a board with an STM32F407.
+    F407,
+    /// For a board with an STM32F446.
+    F446,
+    /// For QEMU, pins as files.
+    InTheLoop,
+    /// For QEMU, pins as a serial line.
+    InTheLoopUsart,
+}
+
+impl Kind {
+    /// The cargo feature that makes it.
+    pub fn feature(self) -> &'static str {
+        match self {
+            Kind::F405 => "stm32f405",
+            Kind::F407 => "stm32f407",
+            Kind::F446 => "stm32f446",
+            Kind::InTheLoop => "in-the-loop",
+            Kind::InTheLoopUsart => "in-the-loop-usart",
+        }
+    }
+}
+
+/// An image that could not be built.
+#[derive(Debug, thiserror::Error)]
+pub enum ImageError {
+    /// No compiler for the target.
+    #[error(
+        "no compiler for {TARGET}: run `rustup target add {TARGET}`, or on Debian \
+         `apt-get install lld rustc-web cargo-web rust-web-src`"
+    )]
+    NoCompiler,
+    /// The tool is used without its source.
+    #[error("{0} is not there: images are built from the source of this project")]
+    NoSource(PathBuf),
+    /// The compiler cannot be started.
+    #[error("{0} cannot be started: {1}")]
+    Start(&'static str, std::io::Error),
+    /// The compiler says no.
+    #[error("the image cannot be built; the compiler says:\n{0}")]
+    Compiler(String),
+    /// The gain table for it cannot be written.
+    #[error(transparent)]
+    Write(#[from] WriteError),
+    /// A file of the image cannot be copied.
+    #[error("{}: {source}", path.display())]
+    File {
+        /// Which.
+        path: PathBuf,
+        /// Why.
+        source: std::io::Error,
+    },
+}
+
+/// Builds the image with the committed gain table, `src/gains.rs`; gives the ELF file.
+///
+/// # Errors
+/// [`ImageError`] if there is no compiler, or it fails.
+pub fn build(kind: Kind) -> Result<PathBuf, ImageError> {
+    compile(kind, None, kind.feature())
+}
+
+/// As [`build`], for tests: none where there is no compiler, which is said on stderr; an error there, too, if the
+/// environment variable `UPRIGHT_REQUIRE_IMAGE` is set.
+///
+/// # Errors
+/// As for [`build`].
+pub fn build_if_possible(kind: Kind) -> Result<Option<PathBuf>, ImageError> {
+    match build(kind) {
+        Err(error @ ImageError::NoCompiler) if std::env::var_os("UPRIGHT_REQUIRE_IMAGE").is_none() => {
+            eprintln!("not exercised: the image {}: {error}", kind.feature());
+            Ok(None)
+        }
+        built => built.map(Some),
+    }
+}
+
+/// Builds the image with the table of `rig` in place of `src/gains.rs`; gives the ELF file.
+///
+/// # Errors
+/// As for [`build`].
+pub fn build_for(kind: Kind, rig: &Rig, table: &TableValues) -> Result<PathBuf, ImageError> {
+    let source = gains_source(rig, table);
+    // Documentation of a module cannot be included into one.
+    let included = source.lines().filter(|line| !line.starts_with("//!")).collect::<Vec<_>>().join("../..");
+    let name = format!("{}-{:016x}-{:08x}", kind.feature(), rig.hash(), table.crc());
+    let gains = images()?.join(format!("{name}.rs"));
+    // An unchanged file stays as it is, so that nothing is compiled anew.
+    if std::fs::read_to_string(&gains).ok().as_deref() != Some(&included) {
+        write_atomically(&gains, included.as_bytes())?;
+    }
+    compile(kind, Some(&gains), &name)
+}
+
+fn project() -> Result<PathBuf, ImageError> {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
+    match root.canonicalize() {
+        Ok(root) if root.join("memory.x").is_file() => Ok(root),
+        _ => Err(ImageError::NoSource(root)),
+    }
+}
+
+/// One of its own: the caller may be run by cargo, which holds its lock on the usual one.
+fn target_directory() -> Result<PathBuf, ImageError> {
+    let base = match std::env::var_os("CARGO_TARGET_DIR") {
+        Some(directory) => std::path::absolute(directory).unwrap_or_default(),
+        None => project()?.join("target"),
+    };
+    Ok(base.join("firmware"))
+}
+
+/// The compiler writes all images to the same place; each is copied from there before the next.
+static COMPILING: Mutex<()> = Mutex::new(());
+
+fn compile(kind: Kind, gains: Option<&Path>, name: &str) -> Result<PathBuf, ImageError> {
+    let _one_at_a_time = COMPILING.lock().unwrap_or_else(PoisonError::into_inner);
+    let root = project()?;
+    let target_directory = target_directory()?;
+    let (program, mut command, target_directory) = if rustup_has_the_target() {
+        ("cargo", Command::new("cargo"), target_directory)
+    } else if debian_has_a_compiler() {
+        let mut command = Command::new(DEBIAN_CARGO);
+        command.env("RUSTC_BOOTSTRAP", "1").env("RUSTC", DEBIAN_RUSTC).arg("-Zbuild-std=core");
+        command.env("CARGO_TARGET_THUMBV7EM_NONE_EABIHF_LINKER", "ld.lld");
+        // Two compilers cannot share a directory.
+        (DEBIAN_CARGO, command, target_directory.join("debian"))
+    } else {
+        return Err(ImageError::NoCompiler);
+    };
+    // What an outer cargo has set is for the host.
+    for (name, _) in std::env::vars_os() {
+        let name_is_cargos =
+            name.to_str().is_some_and(|name| name.starts_with("CARGO_PKG_") || name == "CARGO");
+        if name_is_cargos || name == "RUSTFLAGS" || name == "CARGO_ENCODED_RUSTFLAGS" {
+            command.env_remove(name);
+        }
+    }
+    let features = match gains {
+        Some(gains) => {
+            command.env("UPRIGHT_GAINS", gains);
+            format!("{},gains-from-env", kind.feature())
+        }
+        None => kind.feature().to_owned(),
+    };
+    let output = command
+        .current_dir(&root)
+        .env("CARGO_TARGET_DIR", &target_directory)
+        .args(["build", "--quiet", "--package", "upright", "--bin", "upright-image"])
+        .args(["--profile", PROFILE, "--target", TARGET, "--features", &features])
+        .stdin(Stdio::null())
+        .output()
+        .map_err(|source| ImageError::Start(program, source))?;
+    if !output.status.success() {
+        return Err(ImageError::Compiler(String::from_utf8_lossy(&output.stderr).into_owned()));
+    }
+    let built = target_directory.join(TARGET).join(PROFILE).join("upright-image");
+    let directory = images()?;
+    let image = directory.join(format!("{name}.elf"));
+    std::fs::copy(&built, &image).map_err(|source| ImageError::File { path: image.clone(), source })?;
+    Ok(image)
+}
+
+/// Where images are kept.
+fn images() -> Result<PathBuf, ImageError> {
+    let directory = target_directory()?.join("images");
+    match std::fs::create_dir_all(&directory) {
+        Ok(()) => Ok(directory),
+        Err(source) => Err(ImageError::File { path: directory, source }),
+    }
+}
+
+fn rustup_has_the_target() -> bool {
+    let output = Command::new("rustc").args(["--print", "target-libdir", "--target", TARGET]).output();
+    output.is_ok_and(|output| {
+        output.status.success() && Path::new(String::from_utf8_lossy(&output.stdout).trim()).is_dir()
+    })
+}
+
+fn debian_has_a_compiler() -> bool {
+    let sysroot = Command::new(DEBIAN_RUSTC).args(["--print", "sysroot"]).output();
+    let linker = Command::new("ld.lld").arg("--version").output();
+    let has_source = sysroot.is_ok_and(|output| {
+        let sysroot = String::from_utf8_lossy(&output.stdout).trim().to_owned();
+        Path::new(&sysroot).join("lib/rustlib/src/rust/library/core").is_dir()
+    });
+    has_source && Path::new(DEBIAN_CARGO).exists() && linker.is_ok()
+}

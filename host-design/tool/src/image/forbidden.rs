@@ -1,0 +1,57 @@
+//! What an image for a board must not contain: a way to panic, and an allocator.
+
+use super::elf::Image;
+
+/// Parts of the names of functions that only a panic, its message or an allocation brings into an image.
+const FORBIDDEN: [&str; 9] = [
+    "core::panicking::",
+    "core::panic::",
+    "core::fmt::",
+    "rust_begin_unwind",
+    "unwrap_failed",
+    "expect_failed",
+    "slice_index_fail",
+    "__rust_alloc",
+    "alloc::",
+];
+
+/// Names of functions in the image that panic, format a panic's message, or allocate; none in a good image.
+///
+/// An optimised build drops whatever is never called, so that a function that is there is one that may be reached.
+pub fn forbidden_functions(image: &Image) -> Vec<&str> {
+    let names = image.functions.iter().map(|function| function.name.as_str());
+    names.filter(|name| is_forbidden(name)).collect()
+}
+
+fn is_forbidden(name: &str) -> bool {
+    FORBIDDEN.iter().any(|part| match part.strip_suffix("::") {
+        // A path begins with it, or holds it as a type: `<alloc::vec::Vec<u8>>::push`.
+        Some(_) => name.match_indices(part).any(|(at, _)| {
+            !name[..at].ends_with(|before: char| before.is_alphanumeric() || "_:".contains(before))
+        }),
+        None => name.contains(part),
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::is_forbidden;
+
+    #[test]
+    fn only_panics_and_allocations_are_forbidden() {
+        for name in [
+            "core::panicking::panic_fmt",
+            "core::option::unwrap_failed",
+            "<core::fmt::Formatter>::pad",
+            "<alloc::vec::Vec<u8>>::push",
+            "__rust_alloc",
+        ] {
+            assert!(is_forbidden(name), "{name}");
+        }
+        for name in
+            ["upright::control::controller::tick", "upright_image::app::idle", "heapless::pool::alloc::take"]
+        {
+            assert!(!is_forbidden(name), "{name}");
+        }
+    }
+}

@@ -1,0 +1,73 @@
+//! What keys and lines of text mean.
+
+use ratatui::crossterm::event::{KeyCode, KeyEvent, KeyModifiers};
+use upright::protocol::message::Request;
+use upright::table::Law;
+
+/// What a key asks for.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Action {
+    /// This of the firmware.
+    Send(Request),
+    /// The set-point further by this (m).
+    Shift(f32),
+    /// The other control law.
+    OtherLaw,
+    /// Begin or end a recording.
+    Record,
+    /// End.
+    Quit,
+}
+
+/// One press of an arrow key (m).
+const SHIFT_M: f32 = 0.01;
+
+/// The meaning of a key; none for one without.
+pub fn action(key: &KeyEvent) -> Option<Action> {
+    if key.modifiers.contains(KeyModifiers::CONTROL) {
+        return (key.code == KeyCode::Char('c')).then_some(Action::Quit);
+    }
+    Some(match key.code {
+        KeyCode::Char('h') => Action::Send(Request::Home),
+        KeyCode::Char('H') => Action::Send(Request::HomeRail),
+        KeyCode::Char('g') => Action::Send(Request::CheckSigns),
+        KeyCode::Char('a') => Action::Send(Request::Arm),
+        KeyCode::Char('d' | ' ') => Action::Send(Request::Disarm),
+        KeyCode::Char('c') => Action::Send(Request::Clear),
+        KeyCode::Char('0') => Action::Send(Request::Setpoint(0.0)),
+        KeyCode::Left => Action::Shift(-SHIFT_M),
+        KeyCode::Right => Action::Shift(SHIFT_M),
+        KeyCode::Char('l') => Action::OtherLaw,
+        KeyCode::Char('r') => Action::Record,
+        KeyCode::Char('q') => Action::Quit,
+        _ => return None,
+    })
+}
+
+/// A line that is no command.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error(
+    "`{0}` is no command; give home, home-rail, check-signs, arm, disarm, clear, set-point METRES, or law lqr|pole-placement"
+)]
+pub struct BadCommand(String);
+
+/// The meaning of a line of text, such as `arm` or `set-point 0.05` (m).
+///
+/// # Errors
+/// [`BadCommand`], with what can be said instead.
+pub fn request(line: &str) -> Result<Request, BadCommand> {
+    let bad = || BadCommand(line.trim().to_owned());
+    let words: Vec<&str> = line.split_whitespace().collect();
+    Ok(match words.as_slice() {
+        ["home"] => Request::Home,
+        ["home-rail"] => Request::HomeRail,
+        ["check-signs"] => Request::CheckSigns,
+        ["arm"] => Request::Arm,
+        ["disarm"] => Request::Disarm,
+        ["clear"] => Request::Clear,
+        ["set-point", metres] => Request::Setpoint(metres.parse().map_err(|_| bad())?),
+        ["law", "lqr"] => Request::Select(Law::Lqr),
+        ["law", "pole-placement"] => Request::Select(Law::PolePlacement),
+        _ => return Err(bad()),
+    })
+}

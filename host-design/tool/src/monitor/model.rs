@@ -1,0 +1,275 @@
+//! The state of a conversation with a firmware of any size.
+
+use std::collections::VecDeque;
+use std::time::Duration;
+
+use upright::protocol::frame::{self, Receiver};
+use upright::protocol::link::{MAX_COMMAND, MAX_MESSAGE};
+use upright::protocol::message::{Answer, Command, Info, Message, PROTOCOL, Request, Statistics, Telemetry};
+use upright::supervision::fault::Cause;
+use upright::table::Law;
+
+use super::command::Action;
+
+/// Telemetry of a firmware of any size: on the line, a list is its length and its items.
+pub type TelemetryOfAny = Telemetry<30, 15>;
+
+/// What is shown of the past (s).
+const HISTORY_S: f32 = 10.0;
+/// Between two pieces of telemetry (s).
+const TELEMETRY_S: f32 = 0.02;
+const BEAT: Duration = Duration::from_millis(25);
+const ASK: Duration = Duration::from_millis(500);
+const STATISTICS: Duration = Duration::from_secs(1);
+const LOG_LINES: usize = 100;
+
+/// Why a conversation is over.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum Ended {
+    /// The firmware speaks another language; nothing but the question was sent to it.
+    #[error(
+        "the firmware speaks version {0} of the messages, this tool version {PROTOCOL}: flash the firmware again, \
+         or use its own tool"
+    )]
+    Protocol(u8),
+    /// The line is closed.
+    #[error("the connection is closed: {0}; start `upright firmware monitor` again")]
+    Closed(String),
+}
+
+/// A conversation: bytes and actions in, bytes out. Times are since 1970.
+pub struct Monitor {
+    /// The port, as it was asked for.
+    pub connection: String,
+    /// What the firmware is, once it has said so.
+    pub info: Option<Info>,
+    /// The latest telemetry.
+    pub telemetry: Option<TelemetryOfAny>,
+    /// The counters, as last heard.
+    pub statistics: Option<Statistics>,
+    /// The first cause of the fault or of the last reset.
+    pub cause: Option<Cause>,
+    /// What was asked and answered, oldest first.
+    pub log: VecDeque<String>,
+    /// Telemetry of the last 10 s.
+    pub history: VecDeque<TelemetryOfAny>,
+    /// The law that was selected here; none if none was.
+    pub law: Option<Law>,
+    /// The set-point commanded here (m); none if none is.
+    pub wanted: Option<f32>,
+    /// The file of the recording, if one is written.
+    pub recording: Option<String>,
+    /// Frames that could not be read.
+    pub unreadable: u32,
+    /// Why it is over.
+    pub ended: Option<Ended>,
+    receiver: Receiver<MAX_MESSAGE>,
+    to_send: Vec<u8>,
+    last_id: u64,
+    asked: VecDeque<(u64, Request)>,
+    beating: bool,
+    next_beat: Duration,
+    next_ask: Duration,
+}
+
+impl Monitor {
+    /// A conversation over `connection` that has not begun.
+    pub fn new(connection: &str) -> Self {
+        Self {
+            connection: connection.to_owned(),
+            info: None,
+            telemetry: None,
+            statistics: None,
+            cause: None,
+            log: VecDeque::new(),
+            history: VecDeque::new(),
+            law: None,
+            wanted: None,
+            recording: None,
+            unreadable: 0,
+            ended: None,
+            receiver: Receiver::new(),
+            to_send: Vec::new(),
+            last_id: 0,
+            asked: VecDeque::new(),
+            beating: false,
+            next_beat: Duration::ZERO,
+            next_ask: Duration::ZERO,
+        }
+    }
+
+    /// Takes bytes of the line; gives the telemetry in them.
+    pub fn receive(&mut self, bytes: &[u8], now: Duration) -> Vec<TelemetryOfAny> {
+        let mut all = Vec::new();
+        for &byte in bytes {
+            match self.receiver.push::<Message<30, 15>>(byte) {
+                Some(Ok(Message::Telemetry(telemetry))) if self.info.is_some() => {
+                    self.take(telemetry.clone(), now);
+                    all.push(telemetry);
+                }
+                Some(Ok(Message::Reply { id, answer })) => self.answered(id, answer, now),
+                Some(Err(_)) => self.unreadable = self.unreadable.saturating_add(1),
+                // Telemetry before the firmware has said which messages it speaks may mean anything.
+                Some(Ok(Message::Telemetry(_))) | None => (),
+            }
+        }
+        all
+    }
+
+    fn take(&mut self, telemetry: TelemetryOfAny, now: Duration) {
+        let fault = self.telemetry.as_ref().and_then(|before| before.fault);
+        if telemetry.fault != fault {
+            if let Some(fault) = telemetry.fault {
+                self.note(format!("fault: {fault}"));
+            }
+            self.send(Request::Cause, now);
+        }
+        // The firmware has started anew: its past is another one's.
+        if self.history.back().is_some_and(|last| last.tick > telemetry.tick) {
+            self.history.clear();
+            self.note("the firmware has started anew".to_owned());
+        }
+        let tick_s = self.info.map_or(0.0, |info| info.tick_s);
+        while let Some(first) = self.history.front()
+            && telemetry.tick.wrapping_sub(first.tick) as f32 * tick_s > HISTORY_S
+        {
+            self.history.pop_front();
+        }
+        self.history.push_back(telemetry.clone());
+        self.telemetry = Some(telemetry);
+    }
+
+    fn answered(&mut self, id: u64, answer: Answer, now: Duration) {
+        let Some(place) = self.asked.iter().position(|(asked, _)| *asked == id) else { return };
+        let Some((_, request)) = self.asked.remove(place) else { return };
+        match answer {
+            Answer::Info(info) if info.protocol != PROTOCOL => {
+                self.to_send.clear();
+                self.ended = Some(Ended::Protocol(info.protocol));
+            }
+            Answer::Info(info) => {
+                self.info = Some(info);
+                let ticks = (TELEMETRY_S / info.tick_s).round().clamp(1.0, f32::from(u16::MAX));
+                self.send(Request::Telemetry(ticks as u16), now);
+                self.send(Request::Cause, now);
+            }
+            Answer::Cause(cause) => self.cause = cause,
+            Answer::Statistics(statistics) => self.statistics = Some(statistics),
+            Answer::Done => match request {
+                Request::Beat | Request::Telemetry(_) => (),
+                Request::Select(law) => {
+                    self.law = Some(law);
+                    self.note(format!("{}: done", name(request)));
+                }
+                _ => self.note(format!("{}: done", name(request))),
+            },
+            Answer::NotNow(_) if request == Request::Beat => (),
+            Answer::NotNow(reasons) => {
+                self.note(format!("{}: refused", name(request)));
+                reasons.texts().for_each(|text| self.note(format!("  because {text}")));
+                self.forget(request);
+            }
+            Answer::Rejected(rejected) => {
+                self.note(format!("{}: {rejected}", name(request)));
+                self.forget(request);
+            }
+        }
+    }
+
+    /// A refused set-point is not what the cart goes to.
+    fn forget(&mut self, request: Request) {
+        if matches!(request, Request::Setpoint(_)) {
+            self.wanted = None;
+        }
+    }
+
+    /// Does what an action asks of the firmware. Recording and quitting are the caller's.
+    pub fn act(&mut self, action: Action, now: Duration) {
+        if self.info.is_none() {
+            return self.note("the firmware has not answered yet".to_owned());
+        }
+        let request = match action {
+            Action::Send(request) => request,
+            Action::Shift(by) => {
+                let governed = self.telemetry.as_ref().map_or(0.0, |telemetry| telemetry.setpoint);
+                Request::Setpoint(self.wanted.unwrap_or(governed) + by)
+            }
+            Action::OtherLaw => Request::Select(match self.law {
+                None | Some(Law::Lqr) => Law::PolePlacement,
+                Some(Law::PolePlacement) => Law::Lqr,
+            }),
+            Action::Record | Action::Quit => return,
+        };
+        if let Request::Setpoint(wanted) = request {
+            (self.wanted, self.beating) = (Some(wanted), true);
+        }
+        self.send(request, now);
+    }
+
+    /// What has to be said by now without being asked: who are you, I am here, how are you.
+    pub fn poll(&mut self, now: Duration) {
+        if now >= self.next_ask {
+            let (request, pause) = match self.info {
+                None => (Request::Info, ASK),
+                Some(_) => (Request::Statistics, STATISTICS),
+            };
+            self.send(request, now);
+            self.next_ask = now + pause;
+        }
+        if self.beating && now >= self.next_beat {
+            self.send(Request::Beat, now);
+            self.next_beat = now + BEAT;
+        }
+    }
+
+    /// Ends the conversation because the line has failed.
+    pub fn close(&mut self, error: &std::io::Error) {
+        self.ended.get_or_insert(Ended::Closed(error.to_string()));
+    }
+
+    /// Bytes for the line.
+    pub fn take_outgoing(&mut self) -> Vec<u8> {
+        std::mem::take(&mut self.to_send)
+    }
+
+    /// Adds a line to the log.
+    pub fn note(&mut self, line: String) {
+        self.log.push_back(line);
+        if self.log.len() > LOG_LINES {
+            self.log.pop_front();
+        }
+    }
+
+    fn send(&mut self, request: Request, now: Duration) {
+        if self.ended.is_some() {
+            return;
+        }
+        self.last_id = (now.as_micros() as u64).max(self.last_id + 1);
+        let command = Command { id: self.last_id, request };
+        let (mut scratch, mut out) = ([0; MAX_COMMAND], [0; MAX_COMMAND]);
+        // Every command fits: a test of the messages says so.
+        if let Ok(frame) = frame::encode(&command, &mut scratch, &mut out) {
+            self.to_send.extend_from_slice(frame);
+        }
+        self.asked.push_back((self.last_id, request));
+        if self.asked.len() > LOG_LINES {
+            self.asked.pop_front();
+        }
+    }
+}
+
+/// A request in words.
+fn name(request: Request) -> String {
+    match request {
+        Request::Home => "home".to_owned(),
+        Request::HomeRail => "home on the rail's switches".to_owned(),
+        Request::CheckSigns => "check signs".to_owned(),
+        Request::Arm => "arm".to_owned(),
+        Request::Disarm => "disarm".to_owned(),
+        Request::Clear => "clear".to_owned(),
+        Request::Setpoint(metres) => format!("set-point {metres:.3} m"),
+        Request::Select(Law::Lqr) => "law LQR".to_owned(),
+        Request::Select(Law::PolePlacement) => "law pole placement".to_owned(),
+        other => format!("{other:?}"),
+    }
+}

@@ -1,0 +1,246 @@
+//! Draws a [`Monitor`] on a terminal of 80 × 24 characters or more.
+
+use ratatui::Frame;
+use ratatui::layout::{Constraint, Layout, Rect};
+use ratatui::style::{Color, Style, Stylize};
+use ratatui::symbols::Marker;
+use ratatui::text::Line;
+use ratatui::widgets::{Axis, Block, Chart, Dataset, GraphType, Paragraph, Wrap};
+use upright::supervision::homing::Homing;
+use upright::supervision::sign_check::Signs;
+use upright::supervision::supervisor::State;
+use upright::table::Law;
+
+use super::model::{Monitor, TelemetryOfAny};
+
+const KEYS: &str = "h/H home (rail)  g check signs  a arm  d/space disarm  c clear  ←→ 1 cm  0 zero  l law  r record  q quit";
+const COLOURS: [Color; 6] =
+    [Color::Cyan, Color::Yellow, Color::Magenta, Color::Green, Color::Blue, Color::Red];
+
+/// Draws all of it.
+pub fn draw(monitor: &Monitor, frame: &mut Frame<'_>) {
+    let head = header(monitor);
+    let rows = monitor.telemetry.as_ref().map_or(0, |telemetry| telemetry.counts.len());
+    let keys = Paragraph::new(KEYS.dim()).wrap(Wrap { trim: true });
+    let width = frame.area().width.max(1);
+    let keys_height = if (KEYS.chars().count() as u16) < width { 1 } else { 2 };
+    let head_height = head
+        .iter()
+        .map(|line| (line.width() as u16).div_ceil(width.saturating_sub(2).max(1)).max(1))
+        .sum::<u16>()
+        + 2;
+    let [top, middle, charts, log, bottom] = Layout::vertical([
+        Constraint::Length(head_height),
+        Constraint::Length(rows.max(3) as u16 + 3),
+        Constraint::Min(0),
+        Constraint::Length(6),
+        Constraint::Length(keys_height),
+    ])
+    .areas(frame.area());
+    let title = format!(" upright monitor {} ", monitor.connection);
+    frame.render_widget(
+        Paragraph::new(head).wrap(Wrap { trim: true }).block(Block::bordered().title(title)),
+        top,
+    );
+    let [states, timing] = Layout::horizontal([Constraint::Fill(1), Constraint::Length(34)]).areas(middle);
+    frame.render_widget(
+        Paragraph::new(state_table(monitor)).block(Block::bordered().title(" states ")),
+        states,
+    );
+    frame.render_widget(
+        Paragraph::new(force_and_timing(monitor)).block(Block::bordered().title(" force, timing ")),
+        timing,
+    );
+    draw_charts(monitor, frame, charts);
+    let shown = usize::from(log.height.saturating_sub(2));
+    let last = monitor.log.iter().skip(monitor.log.len().saturating_sub(shown));
+    let lines: Vec<Line<'_>> = last.map(|line| Line::from(line.as_str())).collect();
+    frame.render_widget(Paragraph::new(lines).block(Block::bordered().title(" answers ")), log);
+    frame.render_widget(keys, bottom);
+}
+
+fn header(monitor: &Monitor) -> Vec<Line<'_>> {
+    let mut lines = Vec::new();
+    if let Some(ended) = &monitor.ended {
+        lines.push(Line::from(ended.to_string()).red().bold());
+    }
+    let Some(info) = monitor.info else {
+        if monitor.ended.is_none() {
+            lines.push(Line::from("waiting for the firmware's answer"));
+        }
+        return lines;
+    };
+    let [major, minor, patch] = info.version;
+    let law = match monitor.law {
+        None => "as started",
+        Some(Law::Lqr) => "LQR",
+        Some(Law::PolePlacement) => "pole placement",
+    };
+    let recording = monitor.recording.as_ref().map_or(String::new(), |file| format!("  recording {file}"));
+    lines.push(Line::from(format!(
+        "firmware {major}.{minor}.{patch}  rig {:016x}  tick {} ms  law {law}{recording}",
+        info.rig_hash,
+        info.tick_s * 1e3,
+    )));
+    let Some(telemetry) = &monitor.telemetry else { return lines };
+    let (state, colour) = match telemetry.state {
+        State::Disarmed => ("disarmed: positions are not known", Color::White),
+        State::Homing => ("homing", Color::Yellow),
+        State::Calibrated => ("calibrated: motor off", Color::White),
+        State::Armed => ("armed: waits until all links are upright and still", Color::Yellow),
+        State::Balancing => ("balancing: the motor is on", Color::Green),
+        State::Fault => ("fault: motor off", Color::Red),
+    };
+    lines.push(Line::from(state).style(Style::new().fg(colour).bold()));
+    if let Some(fault) = telemetry.fault {
+        let entry = fault.entry();
+        let sensor = monitor.cause.filter(|cause| cause.fault == fault).and_then(|cause| cause.sensor);
+        let at = sensor.map_or(String::new(), |sensor| format!(" at the {}", joint(sensor)));
+        lines.push(Line::from(format!(
+            "{} {}{at}, tick {}: {}",
+            fault.code(),
+            entry.name,
+            telemetry.cause_tick,
+            entry.condition
+        )));
+        lines.push(Line::from(format!("remedy: {}", entry.remedy)).yellow());
+    } else if let Some(cause) = monitor.cause.filter(|_| telemetry.state == State::Disarmed) {
+        lines.push(Line::from(format!("before: {}; {}", cause.fault, cause.fault.entry().remedy)));
+    }
+    lines.extend(by_hand(telemetry).map(|what| Line::from(format!("now: {what}")).yellow()));
+    if telemetry.state != State::Balancing && !telemetry.against.is_empty() {
+        lines.push(Line::from(format!("against arming: {}", telemetry.against)));
+    }
+    lines
+}
+
+fn joint(sensor: u8) -> String {
+    if sensor == 0 { "cart".to_owned() } else { format!("link {sensor}") }
+}
+
+/// What to do next by hand.
+fn by_hand(telemetry: &TelemetryOfAny) -> Option<String> {
+    let move_it = |sensor: u8| match sensor {
+        0 => "push the cart along +x".to_owned(),
+        link => format!("turn link {link} counter-clockwise"),
+    };
+    match (telemetry.homing, telemetry.signs) {
+        (Homing::Touch { low: false, .. }, _) => {
+            Some("push the cart to the switch at the low end".to_owned())
+        }
+        (Homing::Touch { .. }, _) => Some("push the cart to the switch at the high end".to_owned()),
+        (Homing::HoldStill, _) => Some("let the links hang still, away from the switches".to_owned()),
+        (Homing::WrongTravel, _) => {
+            Some("the switches are not as far apart as the rig file says; check them, home again".to_owned())
+        }
+        (_, Signs::Rest(sensor)) => Some(format!("let the links hang at rest; then {}", move_it(sensor))),
+        (_, Signs::Move(sensor)) => Some(move_it(sensor)),
+        (_, Signs::Reversed(sensor)) => {
+            Some(format!("the encoder of the {} counts the wrong way: swap its channels", joint(sensor)))
+        }
+        (_, Signs::Swapped { asked, moved }) => Some(format!(
+            "the {} has answered for the {}: swap the encoders' plugs",
+            joint(moved),
+            joint(asked)
+        )),
+        _ => None,
+    }
+}
+
+fn state_table(monitor: &Monitor) -> Vec<Line<'_>> {
+    let Some(telemetry) = &monitor.telemetry else { return vec![Line::from("no telemetry yet")] };
+    let mut lines =
+        vec![Line::from(format!("{:<7}{:>11}{:>11}{:>8}{:>9}", "", "estimate", "per s", "counts", "innov."))];
+    // Without a joint per sensor (a model), there are positions and rates for as many as there are.
+    for (i, &counts) in telemetry.counts.iter().enumerate() {
+        let (position, rate) = (telemetry.estimate.get(2 * i), telemetry.estimate.get(2 * i + 1));
+        let unit = if i == 0 { "m" } else { "rad" };
+        let number = |value: Option<&f32>| value.map_or("-".to_owned(), |value| format!("{value:.4}"));
+        lines.push(Line::from(format!(
+            "{:<7}{:>11}{:>11}{:>8}{:>9}",
+            joint(i as u8),
+            format!("{} {unit}", number(position)),
+            number(rate),
+            counts,
+            telemetry.innovation.get(i).map_or(String::new(), |value| format!("{value:.5}")),
+        )));
+    }
+    lines
+}
+
+fn force_and_timing(monitor: &Monitor) -> Vec<Line<'_>> {
+    let mut lines = Vec::new();
+    if let Some(telemetry) = &monitor.telemetry {
+        let wanted = monitor.wanted.map_or("-".to_owned(), |wanted| format!("{wanted:.3}"));
+        lines.push(Line::from(format!("set-point {:.3} m, wanted {wanted}", telemetry.setpoint)));
+        lines.push(Line::from(format!(
+            "force {:.2} N, applied {:.2} N",
+            telemetry.requested, telemetry.applied
+        )));
+        lines.push(Line::from(format!("drive {:>7.3} {}", telemetry.drive, bar(telemetry.drive))));
+        let worst = monitor.statistics.map_or("-".to_owned(), |all| all.worst_cycles.to_string());
+        lines.push(Line::from(format!("cycles {}, worst {worst}", telemetry.cycles)));
+    }
+    if let Some(all) = monitor.statistics {
+        lines.push(Line::from(format!("overruns {}, dropped {}", all.overruns, all.dropped)));
+        lines.push(Line::from(format!("malformed {}, replayed {}", all.malformed, all.replayed)));
+    }
+    lines
+}
+
+/// From −1 to 1, with 0 in the middle.
+fn bar(value: f32) -> String {
+    const HALF: i32 = 6;
+    let end = (value.clamp(-1.0, 1.0) * HALF as f32).round() as i32;
+    let cell = |i: i32| match i {
+        0 => '│',
+        i if i.signum() == end.signum() && i.abs() <= end.abs() => '█',
+        _ => '·',
+    };
+    (-HALF..=HALF).map(cell).collect()
+}
+
+fn draw_charts(monitor: &Monitor, frame: &mut Frame<'_>, area: Rect) {
+    let (Some(info), Some(last)) = (monitor.info, monitor.history.back()) else { return };
+    let series = |value: &dyn Fn(&TelemetryOfAny) -> Option<f32>| -> Vec<(f64, f64)> {
+        let age = |telemetry: &TelemetryOfAny| {
+            -f64::from(last.tick.wrapping_sub(telemetry.tick)) * f64::from(info.tick_s)
+        };
+        let finite = |value: &f32| value.is_finite();
+        let points = monitor.history.iter().filter_map(|t| Some((age(t), value(t).filter(finite)?.into())));
+        points.collect()
+    };
+    let angles = (1..last.counts.len().min(last.estimate.len() / 2))
+        .map(|i| series(&|telemetry| telemetry.estimate.get(2 * i).copied()))
+        .collect();
+    let cart = vec![series(&|telemetry| telemetry.estimate.first().copied()), series(&|t| Some(t.setpoint))];
+    let force = vec![series(&|telemetry| Some(telemetry.applied))];
+    let areas: [Rect; 3] = Layout::horizontal([Constraint::Fill(1); 3]).areas(area);
+    let charts = [(" cart, set-point (m) ", cart), (" angles (rad) ", angles), (" force (N) ", force)];
+    for (area, (title, lines)) in areas.into_iter().zip(charts) {
+        draw_chart(frame, area, title, &lines);
+    }
+}
+
+fn draw_chart(frame: &mut Frame<'_>, area: Rect, title: &str, lines: &[Vec<(f64, f64)>]) {
+    let values = lines.iter().flatten().map(|(_, value)| *value);
+    let (low, high) = values
+        .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), value| (low.min(value), high.max(value)));
+    if low > high {
+        return;
+    }
+    let room = ((high - low) * 0.05).max(1e-4);
+    let (low, high) = (low - room, high + room);
+    let datasets = lines.iter().zip(COLOURS.iter().cycle()).map(|(points, colour)| {
+        Dataset::default()
+            .data(points)
+            .graph_type(GraphType::Line)
+            .marker(Marker::Braille)
+            .style(Style::new().fg(*colour))
+    });
+    let chart = Chart::new(datasets.collect())
+        .block(Block::bordered().title(title))
+        .x_axis(Axis::default().bounds([-10.0, 0.0]).labels(["-10 s", "now"]))
+        .y_axis(Axis::default().bounds([low, high]).labels([format!("{low:.3}"), format!("{high:.3}")]));
+    frame.render_widget(chart, area);
+}

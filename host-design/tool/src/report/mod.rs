@@ -1,0 +1,137 @@
+//! A rig, its design and its runs as one page: HTML that needs nothing but a browser.
+
+mod animation;
+mod cost;
+mod drawing;
+mod error;
+mod frequency;
+mod number;
+mod page;
+mod plot;
+mod poles;
+mod region;
+mod responses;
+mod runs;
+mod trust;
+
+pub use error::ReportError;
+
+use upright::table::Law;
+
+use self::page::Page;
+use self::plot::Plot;
+use self::runs::law_name;
+use crate::figure::{Figure, FigureError, pixels};
+use upright_design::design::Certified;
+use upright_design::rig::{PlantDescription, Rig};
+use upright_design::table::TableValues;
+use upright_design::verify::TrustReport;
+
+/// What a report is made of.
+#[derive(Debug, Clone, Copy)]
+pub struct Source<'a> {
+    /// The rig.
+    pub rig: &'a Rig,
+    /// Its design.
+    pub certified: &'a Certified,
+    /// The table that is simulated.
+    pub table: &'a TableValues,
+    /// The trust report of this table.
+    pub trust: &'a TrustReport,
+    /// Seed of the disturbances in the runs.
+    pub seed: u64,
+    /// The command that made the report, to make it again.
+    pub command: &'a str,
+}
+
+/// A report.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Report {
+    /// The page, a whole file.
+    pub html: String,
+    /// Its pictures, in its order.
+    pub pictures: Vec<Picture>,
+}
+
+/// A picture of a report for use elsewhere.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Picture {
+    /// Name for a file, without its ending.
+    pub name: String,
+    /// As an SVG document.
+    pub svg: String,
+    /// Every point of every curve; none for the drawing of the rig.
+    pub csv: Option<String>,
+}
+
+impl Picture {
+    /// As a PNG file, twice as large as the SVG says.
+    ///
+    /// # Errors
+    /// [`FigureError::Png`] if it is too large.
+    pub fn png(&self) -> Result<Vec<u8>, FigureError> {
+        pixels(&self.svg, 2.0)
+    }
+
+    fn of(name: String, figure: &Figure) -> Result<Self, FigureError> {
+        Ok(Self { name, svg: figure.svg()?, csv: Some(figure.csv()?) })
+    }
+}
+
+/// Makes the report; calls `stage` before each part.
+///
+/// # Errors
+/// [`ReportError`] if a run cannot be started or a figure cannot be drawn; a rig that falls is no error.
+pub fn report(source: &Source<'_>, stage: &dyn Fn(&str)) -> Result<Report, ReportError> {
+    let Source { rig, certified, table, trust, .. } = *source;
+    stage("runs");
+    let scenes = runs::scenes(rig, certified, table, trust, source.seed)?;
+    let laws = runs::laws(table);
+    let mut pictures = Vec::new();
+    let mut page = Page::new(source, &scenes)?;
+    if let PlantDescription::Chain(chain) = &rig.plant {
+        let svg = drawing::svg(chain);
+        page.drawing = Some(svg.clone());
+        pictures.push(Picture { name: "rig".to_owned(), svg, csv: None });
+    }
+    let mut keep = |id: &str, law: Law, figure: &Figure| -> Result<(), ReportError> {
+        let law = if law == Law::Lqr { "lqr" } else { "pole-placement" };
+        pictures.push(Picture::of(format!("{id}-{law}"), figure)?);
+        Ok(())
+    };
+    stage("figures of the runs");
+    for (scene, entry) in scenes.iter().zip(&mut page.scenes) {
+        for (run, figure) in scene.runs.iter().zip(responses::figures(rig, scene)) {
+            keep(scene.id, run.law, &figure)?;
+            entry.plots.push(Plot::over_time(&figure, format!("{}, {}", scene.name, law_name(run.law)))?);
+        }
+    }
+    stage("poles and frequency");
+    let parts: Vec<_> = laws.iter().copied().zip(trust.laws.iter().map(|part| &part.linear)).collect();
+    let mut poles: Vec<Figure> =
+        parts.iter().map(|(law, part)| poles::figure(rig, certified, *law, part)).collect();
+    Figure::same_scale(&mut poles);
+    for (figure, &(law, _)) in poles.iter().zip(&parts) {
+        keep("poles", law, figure)?;
+        page.poles.push(Plot::of(figure, law_name(law).to_owned())?);
+    }
+    let stable: Vec<Law> = parts.iter().filter(|(_, part)| part.stable).map(|(law, _)| *law).collect();
+    let [mut bode, mut nyquist] = frequency::figures(rig, certified, table, &parts);
+    Figure::same_scale(&mut bode);
+    Figure::same_scale(&mut nyquist);
+    for (&law, (bode, nyquist)) in stable.iter().zip(bode.iter().zip(&nyquist)) {
+        keep("bode", law, bode)?;
+        page.bode.push(Plot::of(bode, format!("Bode plot, {}", law_name(law)))?);
+        keep("nyquist", law, nyquist)?;
+        page.nyquist.push(Plot::of(nyquist, format!("Nyquist plot, {}", law_name(law)))?);
+    }
+    if page.drawing.is_some() && !stable.is_empty() {
+        stage("region of attraction");
+        for law in stable {
+            let figure = region::figure(rig, table, law)?;
+            keep("region", law, &figure)?;
+            page.regions.push(Plot::of(&figure, law_name(law).to_owned())?);
+        }
+    }
+    Ok(Report { html: page.html()?, pictures })
+}

@@ -1,0 +1,235 @@
+//! What the page shows, filled into its template.
+
+use askama::Template;
+use upright::table::{Law, TABLE_FORMAT};
+
+use super::animation::Animation;
+use super::cost::Cost;
+use super::number::{number, pole, significant};
+use super::plot::Plot;
+use super::runs::{LawRun, Scene, law_name, laws};
+use super::trust::{CheckRow, Row, checks, rows};
+use super::{ReportError, Source};
+use upright_design::design::Feedback;
+use upright_design::rig::{PlantDescription, Rig};
+use upright_design::verify::{Certificate, Disturbance};
+
+/// Digits of A and B.
+const DIGITS: usize = 6;
+
+#[derive(Template)]
+#[template(path = "page.html")]
+pub(super) struct Page<'a> {
+    name: &'a str,
+    hash: String,
+    states: usize,
+    tick_ms: String,
+    delay_ticks: u8,
+    is_chain: bool,
+    is_disturbed: bool,
+    failed: usize,
+    checks: Vec<CheckRow>,
+    description: String,
+    pub(super) drawing: Option<String>,
+    pub(super) scenes: Vec<SceneEntry>,
+    state_names: Vec<String>,
+    a: Vec<Vec<String>>,
+    b: Vec<String>,
+    pub(super) poles: Vec<Plot>,
+    laws: Vec<LawEntry>,
+    observer: Option<Vec<Vec<String>>>,
+    sensor_names: Vec<String>,
+    bits: [usize; 2],
+    pub(super) bode: Vec<Plot>,
+    pub(super) nyquist: Vec<Plot>,
+    pub(super) regions: Vec<Plot>,
+    trust: Vec<Row>,
+    seed: u64,
+    table_format: u32,
+    table_crc: String,
+    version: &'static str,
+    command: &'a str,
+    animation: String,
+    style: &'static str,
+    script: &'static str,
+}
+
+/// A scenario with its plots.
+pub(super) struct SceneEntry {
+    id: &'static str,
+    name: &'static str,
+    text: String,
+    outcomes: Vec<Outcome>,
+    pub(super) plots: Vec<Plot>,
+}
+
+struct Outcome {
+    law: &'static str,
+    stands: bool,
+    text: String,
+}
+
+/// A law with its gains.
+struct LawEntry {
+    name: &'static str,
+    gains: Vec<GainRow>,
+    poles: [String; 2],
+    certificates: Vec<CertificateRow>,
+    cost: Cost,
+}
+
+struct GainRow {
+    name: String,
+    continuous: String,
+    sampled: String,
+}
+
+struct CertificateRow {
+    gain: String,
+    bits: [usize; 2],
+    residual: String,
+    condition: String,
+}
+
+impl<'a> Page<'a> {
+    /// All but the pictures.
+    pub(super) fn new(source: &Source<'a>, scenes: &[Scene]) -> Result<Self, ReportError> {
+        let Source { rig, certified, table, trust, .. } = *source;
+        let design = &certified.double;
+        let short = |entry: &f64| significant(*entry, DIGITS);
+        let names = state_names(rig);
+        let observer = design.kalman.as_ref().filter(|_| table.observer.is_some());
+        let checks = checks(trust);
+        Ok(Self {
+            name: &rig.name,
+            hash: format!("{:016x}", rig.hash()),
+            states: rig.states(),
+            tick_ms: significant(1e3 * rig.tick.period_s, DIGITS),
+            delay_ticks: rig.tick.delay_ticks,
+            is_chain: matches!(rig.plant, PlantDescription::Chain(_)),
+            is_disturbed: Disturbance::of(rig) != Disturbance::NONE,
+            failed: checks.iter().filter(|check| !check.holds).count(),
+            checks,
+            description: rig.describe(),
+            drawing: None,
+            scenes: scenes.iter().map(SceneEntry::of).collect(),
+            a: design.a.row_slices().map(|row| row.iter().map(short).collect()).collect(),
+            b: design.b.entries().iter().map(short).collect(),
+            poles: Vec::new(),
+            laws: laws(table).into_iter().filter_map(|law| LawEntry::of(source, &names, law)).collect(),
+            observer: observer.map(|kalman| {
+                kalman.l_filter.row_slices().map(|row| row.iter().map(short).collect()).collect()
+            }),
+            sensor_names: rig.sensors().iter().map(|sensor| names[sensor.state].clone()).collect(),
+            state_names: names,
+            bits: certified.bits,
+            bode: Vec::new(),
+            nyquist: Vec::new(),
+            regions: Vec::new(),
+            trust: rows(rig, trust),
+            seed: source.seed,
+            table_format: TABLE_FORMAT,
+            table_crc: format!("{:08x}", table.crc()),
+            version: env!("CARGO_PKG_VERSION"),
+            command: source.command,
+            animation: Animation::of(rig, scenes).json()?,
+            style: include_str!("page.css"),
+            script: include_str!("page.js"),
+        })
+    }
+
+    /// The page as a file.
+    pub(super) fn html(&self) -> Result<String, ReportError> {
+        Ok(self.render()?)
+    }
+}
+
+impl SceneEntry {
+    fn of(scene: &Scene) -> Self {
+        let outcomes = scene.runs.iter().map(Outcome::of).collect();
+        Self { id: scene.id, name: scene.name, text: scene.text.clone(), outcomes, plots: Vec::new() }
+    }
+}
+
+impl Outcome {
+    fn of(run: &LawRun) -> Self {
+        let summary = &run.summary;
+        let mut parts = vec![match (&summary.fall, summary.settling_time_s) {
+            (Some(fall), _) => format!("falls: {fall}"),
+            (None, Some(time)) => format!("stands, settled after {} s", number(time)),
+            (None, None) => "stands, not settled to within 2 % (at least 1 mm) at the end".to_owned(),
+        }];
+        parts.extend(summary.overshoot_percent.map(|over| format!("overshoot {} %", number(over))));
+        let degrees = summary.peak_angles_rad.iter().copied().fold(0.0, f64::max).to_degrees();
+        if !summary.peak_angles_rad.is_empty() {
+            parts.push(format!("largest angle {}°", number(degrees)));
+        }
+        let (what, unit) = if summary.peak_angles_rad.is_empty() { ("input", "") } else { ("force", " N") };
+        parts.push(format!("largest {what} {}{unit}", number(summary.peak_force_n)));
+        Self { law: law_name(run.law), stands: summary.stands(), text: parts.join(", ") }
+    }
+}
+
+impl LawEntry {
+    fn of(source: &Source<'_>, names: &[String], law: Law) -> Option<Self> {
+        let Source { rig, certified, table, trust, .. } = *source;
+        let index = usize::from(law == Law::PolePlacement);
+        let design = &certified.double;
+        let (continuous, sampled) = (design.continuous.in_table()[index]?, design.sampled.in_table()[index]?);
+        let values = if index == 0 { table.lqr.as_ref()? } else { table.pole_placement.as_ref()? };
+        let mut names: Vec<String> = names.iter().map(|name| format!("K, {name}")).collect();
+        if sampled.integral {
+            names.push("K, integral".to_owned());
+        }
+        if rig.tick.delay_ticks == 1 {
+            names.push("K, force on its way".to_owned());
+        }
+        let entry = |law: &Feedback<f64>, index: usize| {
+            law.k.entries().get(index).map_or("—".to_owned(), |gain| significant(*gain, 9))
+        };
+        let row = |(index, name): (usize, String)| GainRow {
+            name,
+            continuous: entry(continuous, index),
+            sampled: entry(sampled, index),
+        };
+        let n = |law: &Feedback<f64>| law.n.map_or("none".to_owned(), |n| significant(n, 9));
+        let mut gains: Vec<GainRow> = names.into_iter().enumerate().map(row).collect();
+        gains.push(GainRow { name: "N".to_owned(), continuous: n(continuous), sampled: n(sampled) });
+        let listed = |poles: Option<&Vec<[f64; 2]>>| {
+            let upper = poles.into_iter().flatten().filter(|pole| pole[1] >= 0.0);
+            upper.map(|&upper| pole(upper, DIGITS)).collect::<Vec<_>>().join(",  ")
+        };
+        let name = if index == 0 { "lqr" } else { "pole_placement" };
+        let part = trust.laws.iter().find(|part| part.linear.law == name)?;
+        Some(Self {
+            name: law_name(law),
+            gains,
+            poles: certified.poles.in_table(index).map(listed),
+            certificates: part.linear.certificates.iter().map(CertificateRow::of).collect(),
+            cost: Cost::of(table, values),
+        })
+    }
+}
+
+impl CertificateRow {
+    fn of(certificate: &Certificate) -> Self {
+        Self {
+            gain: certificate.gain.clone(),
+            bits: certificate.bits,
+            residual: number(certificate.residual),
+            condition: number(certificate.condition),
+        }
+    }
+}
+
+/// x, x', θ1, θ1' …; the states of a model have numbers.
+fn state_names(rig: &Rig) -> Vec<String> {
+    match &rig.plant {
+        PlantDescription::Chain(chain) => {
+            let joints =
+                (1..=chain.links.len()).flat_map(|joint| [format!("θ{joint}"), format!("θ{joint}'")]);
+            ["x".to_owned(), "x'".to_owned()].into_iter().chain(joints).collect()
+        }
+        PlantDescription::Model(model) => (0..model.b.len()).map(|state| format!("state {state}")).collect(),
+    }
+}

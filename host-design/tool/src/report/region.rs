@@ -1,0 +1,76 @@
+//! From which starts the loop recovers.
+
+use upright::table::Law;
+
+use super::runs::law_name;
+use crate::figure::{Axis as FigureAxis, Figure, HeatMap, Panel};
+use upright_design::rig::Rig;
+use upright_design::table::TableValues;
+use upright_design::verify::{Axis, Horizon, Map, Unverifiable, attraction_map};
+
+/// Starts along each axis of the map.
+const POINTS: usize = 31;
+const ANGLE: usize = 2;
+const RATE: usize = 3;
+/// Largest angle (rad) and rate (rad/s) that is looked at, roughly.
+const LARGEST: [f64; 2] = [0.8, 8.0];
+
+/// Map over angle and rate of the first joint, wide enough to show the whole region.
+pub(super) fn figure(rig: &Rig, table: &TableValues, law: Law) -> Result<Figure, Unverifiable> {
+    const WIDER: f64 = 1.6;
+    let axis = |state: usize, largest: f64| -> Result<Axis, Unverifiable> {
+        let end = 1.4 * extent(rig, table, law, state, largest)?;
+        Ok(Axis { state, range: [-end, end], points: POINTS })
+    };
+    let mut axes = [axis(ANGLE, LARGEST[0])?, axis(RATE, LARGEST[1])?];
+    let map = loop {
+        let map = attraction_map(rig, table, law, axes, &Horizon::default(), &|| {})?;
+        if !reaches_edge(&map) || axes[0].range[1] > LARGEST[0] || axes[1].range[1] > LARGEST[1] {
+            break map;
+        }
+        axes = axes.map(|axis| Axis { range: axis.range.map(|end| WIDER * end), ..axis });
+    };
+    let title = format!("{}: region of attraction, {}", rig.name, law_name(law));
+    Ok(drawn(title, &map))
+}
+
+/// Whether some start on the rim of the map is recovered from: the region may go on beyond.
+fn reaches_edge(map: &Map) -> bool {
+    let rows = &map.settled_s;
+    let sides = rows.iter().flat_map(|row| row.first().into_iter().chain(row.last()));
+    let ends = rows.first().into_iter().chain(rows.last()).flatten();
+    sides.chain(ends).any(Option::is_some)
+}
+
+/// How far the start may be off in one state alone, roughly: at least a hundredth of `largest`.
+fn extent(rig: &Rig, table: &TableValues, law: Law, state: usize, largest: f64) -> Result<f64, Unverifiable> {
+    const TRIED: usize = 13;
+    let still = Axis { state: if state == ANGLE { RATE } else { ANGLE }, range: [0.0, 0.0], points: 1 };
+    let mut end = largest;
+    loop {
+        let moved = Axis { state, range: [0.0, end], points: TRIED };
+        let map = attraction_map(rig, table, law, [moved, still], &Horizon::default(), &|| {})?;
+        let recovered = map.settled_s.concat().iter().take_while(|settled| settled.is_some()).count();
+        if recovered >= 4 || end < 1e-2 * largest {
+            return Ok(end * recovered.max(1) as f64 / (TRIED - 1) as f64);
+        }
+        end *= recovered.max(1) as f64 / 4.0;
+    }
+}
+
+fn drawn(title: String, map: &Map) -> Figure {
+    let centres = |axis: &Axis| -> Vec<f64> {
+        let [low, high] = axis.range.map(f64::to_degrees);
+        (0..axis.points).map(|i| low + (high - low) * i as f64 / (axis.points - 1) as f64).collect()
+    };
+    let heat = HeatMap {
+        name: "at rest within".to_owned(),
+        unit: "s".to_owned(),
+        columns: centres(&map.across),
+        rows: centres(&map.down),
+        values: map.settled_s.clone(),
+    };
+    let axes =
+        Panel::new(FigureAxis::linear("θ1 at the start (°)"), FigureAxis::linear("θ1' at the start (°/s)"));
+    Figure::narrow(title).with(Panel { heat: Some(heat), ..axes.high(400) })
+}

@@ -1,0 +1,104 @@
+//! The loop that the paper simulates: the nonlinear chain under `u = N r - K x` in continuous time, the whole state known,
+//! no tick, no force limit, no end of the rail.
+//!
+//! The firmware's controller has no such mode: this law is the paper's object of study, not something that runs here.
+
+use rand::SeedableRng;
+use rand_distr::{Distribution, Normal};
+use rand_pcg::Pcg64;
+
+use super::ReproduceError;
+use super::course::{Course, fall_of};
+use super::published;
+use upright_design::design::Feedback;
+use upright_design::plant::chain_plant;
+use upright_design::plant::reference::{Tolerance, integrate};
+use upright_design::rig::Chain;
+
+/// A run of the continuous loop.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ContinuousRun {
+    /// Set-point from 0 s on (m).
+    pub step_m: f64,
+    /// Length (s).
+    pub duration_s: f64,
+    /// Time between samples (s).
+    pub sample_s: f64,
+    /// With the paper's disturbances, drawn from this seed at each sample and held until the next: the very numbers that
+    /// a simulation of the firmware with this tick and seed draws.
+    pub disturbances: Option<u64>,
+    /// Local error allowed.
+    pub tolerance: Tolerance,
+}
+
+impl ContinuousRun {
+    /// The paper's step of 1 m, every millisecond of 10 s, to 1e-10.
+    pub const STEP: Self = Self {
+        step_m: 1.0,
+        duration_s: 10.0,
+        sample_s: 1e-3,
+        disturbances: None,
+        tolerance: Tolerance { relative: 1e-10, absolute: 1e-12 },
+    };
+
+    /// The course from rest at 0.
+    ///
+    /// # Errors
+    /// [`ReproduceError`] if the integrator gives up or the plant cannot be built.
+    pub fn course(&self, chain: &Chain, law: &Feedback<f64>) -> Result<Course, ReproduceError> {
+        let plant = chain_plant(chain)?;
+        let (k, n) = (law.k.entries(), law.n.unwrap_or(0.0));
+        let force = |_: f64, state: &[f64]| {
+            n * self.step_m - k.iter().zip(state).map(|(gain, entry)| gain * entry).sum::<f64>()
+        };
+        let mut disturbances = Disturbances::of(self.disturbances, plant.disturbances())?;
+        let samples = (self.duration_s / self.sample_s).round() as usize;
+        let mut state = vec![0.0; plant.states()];
+        let mut course = Course {
+            sample_s: self.sample_s,
+            states: Vec::with_capacity(samples + 1),
+            forces_n: Vec::with_capacity(samples + 1),
+            fall: None,
+        };
+        for sample in 0..=samples {
+            course.states.push(state.clone());
+            course.forces_n.push(force(0.0, &state));
+            course.fall = fall_of(&state, sample as f64 * self.sample_s);
+            if course.fall.is_some() {
+                break;
+            }
+            let push = disturbances.next_force();
+            let pushed = |t: f64, state: &[f64]| force(t, state) + push;
+            let torques = &disturbances.torques;
+            state = integrate(&*plant, &state, pushed, torques, self.sample_s, self.tolerance)?;
+        }
+        Ok(course)
+    }
+}
+
+/// Held disturbances, in the order in which the simulated bench draws them.
+struct Disturbances {
+    source: Option<(Pcg64, Normal<f64>, Normal<f64>)>,
+    torques: Vec<f64>,
+}
+
+impl Disturbances {
+    fn of(seed: Option<u64>, joints: usize) -> Result<Self, ReproduceError> {
+        let normal =
+            |variance: f64| Normal::new(0.0, variance.sqrt()).map_err(|_| ReproduceError::Variance(variance));
+        let force = normal(published::FORCE_VARIANCE_N2)?;
+        let torque = normal(published::TORQUE_VARIANCE_N2_M2)?;
+        Ok(Self {
+            source: seed.map(|seed| (Pcg64::seed_from_u64(seed), force, torque)),
+            torques: vec![0.0; joints],
+        })
+    }
+
+    /// Draws the next ones and gives the force (N).
+    fn next_force(&mut self) -> f64 {
+        let Some((random, force, torque)) = &mut self.source else { return 0.0 };
+        let push = force.sample(random);
+        self.torques.fill_with(|| torque.sample(random));
+        push
+    }
+}

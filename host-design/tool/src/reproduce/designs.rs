@@ -1,0 +1,125 @@
+//! A, B, K, N and poles, beside what is printed.
+
+use serde::Serialize;
+
+use super::comparison::{Digits, Row};
+use super::{LAWS, ReproduceError, paper_rig, printed_rig, published};
+use upright_design::design::{Feedback, continuous_plant, design, dominant_pair};
+use upright_design::numerics::{Complex, Matrix, Wide, eigenvalues};
+use upright_design::rig::Rig;
+
+/// Comparison of the linear models and designs.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Designs {
+    /// Every number that the paper prints (entries of A that are 0 or 1 by definition are left out), and those that its
+    /// formulas for the dominant poles give.
+    pub rows: Vec<Row>,
+    /// Poles. The paper prints none.
+    pub poles: Vec<PoleSet>,
+}
+
+/// Poles of one loop.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct PoleSet {
+    /// Which loop.
+    pub of: String,
+    /// [re, im] (1/s), by real part.
+    pub poles: Vec<[f64; 2]>,
+}
+
+const EXACT: &str = "exact model";
+const PRINTED: &str = "printed A and B";
+
+/// Designs both laws from the exact model and from the printed matrices and compares.
+///
+/// # Errors
+/// [`ReproduceError`] if a design fails.
+pub fn designs() -> Result<Designs, ReproduceError> {
+    let (exact_rig, printed_rig) = (paper_rig()?, printed_rig()?);
+    let (exact, printed) = (design(&exact_rig)?, design(&printed_rig)?);
+    let mut rows = plant_rows(&exact.double.a, &exact.double.b);
+    rows.extend(dominant_rows());
+    for (from, certified) in [(PRINTED, &printed), (EXACT, &exact)] {
+        for (law, name, k, n) in [
+            (&certified.double.continuous.lqr, "LQR", &published::LQR_K, published::LQR_N),
+            (
+                &certified.double.continuous.pole_placement,
+                "pole placement",
+                &published::PLACEMENT_K,
+                published::PLACEMENT_N,
+            ),
+        ] {
+            let Some(law) = law else { continue };
+            rows.extend(gain_rows(name, from, law, k, n));
+        }
+    }
+
+    let mut poles = vec![PoleSet { of: "open loop".to_owned(), poles: open_loop_poles(&exact_rig)? }];
+    for ((_, name), closed) in LAWS.into_iter().zip(exact.poles.continuous) {
+        poles.extend(closed.map(|poles| PoleSet { of: format!("{name}, exact gains"), poles }));
+    }
+    for (name, k) in [("LQR", &published::LQR_K), ("pole placement", &published::PLACEMENT_K)] {
+        let k = Matrix::from_fn(1, 10, |_, j| super::comparison::value_of(k[j]));
+        let closed = &exact.double.a - &(&exact.double.b * &k);
+        let found = eigenvalues(&closed).map_err(|_| upright_design::design::DesignError::Poles)?;
+        let poles_found = found.iter().map(Complex::to_f64).collect();
+        poles.push(PoleSet { of: format!("{name}, gains as printed (two decimals)"), poles: poles_found });
+    }
+    Ok(Designs { rows, poles })
+}
+
+/// Poles of the plant alone [re, im] (1/s), by real part; its two integrators exactly 0.
+pub(super) fn open_loop_poles(rig: &Rig) -> Result<Vec<[f64; 2]>, ReproduceError> {
+    let a = continuous_plant::<Wide<256>>(rig)?.a;
+    let poles = eigenvalues(&a).map_err(|_| upright_design::design::DesignError::Poles)?;
+    // A double pole comes out with half of the bits.
+    let clean = |part: f64| if part.abs() < 1e-30 { 0.0 } else { part };
+    Ok(poles.iter().map(|pole| pole.to_f64().map(clean)).collect())
+}
+
+pub(super) fn plant_rows(a: &Matrix<f64>, b: &Matrix<f64>) -> Vec<Row> {
+    let six = Digits::Significant(6);
+    let mut rows = Vec::new();
+    for (i, entries) in published::A.iter().enumerate() {
+        for (j, printed) in entries.iter().enumerate() {
+            // Positions are integrals of rates: 0 and 1 by the order of the states.
+            if i % 2 == 1 && (*printed != "0" || a[(i, j)] != 0.0) {
+                let name = format!("A[{},{}]", i + 1, j + 1);
+                rows.push(Row::printed(name, EXACT, printed, six, a[(i, j)]));
+            }
+        }
+    }
+    for (i, printed) in published::B.iter().enumerate().filter(|(i, _)| i % 2 == 1) {
+        rows.push(Row::printed(format!("B[{}]", i + 1), EXACT, printed, six, b[(i, 0)]));
+    }
+    rows
+}
+
+pub(super) fn gain_rows(
+    law: &str,
+    from: &'static str,
+    ours: &Feedback<f64>,
+    k: &[&'static str; 10],
+    n: &'static str,
+) -> Vec<Row> {
+    let gains = k.iter().zip(ours.k.entries()).enumerate().map(|(i, (printed, &ours))| {
+        Row::printed(format!("{law} K[{}]", i + 1), from, printed, Digits::Decimals(2), ours)
+    });
+    let mut rows: Vec<Row> = gains.collect();
+    let ours = ours.n.unwrap_or(f64::NAN);
+    rows.push(Row::printed(format!("{law} N"), from, n, Digits::Decimals(4), ours));
+    rows
+}
+
+/// The paper's formulas for the dominant pair, with its 1 % and 6 s: it prints no result.
+fn dominant_rows() -> Vec<Row> {
+    let pair = dominant_pair::<Wide<256>>(published::OVERSHOOT_PERCENT, published::SETTLING_TIME_S);
+    let [natural, re, im] = [pair.modulus(), pair.re, pair.im].map(|part| part.round_to_f64());
+    let from = "formulas";
+    vec![
+        Row::not_printed("damping ε of the dominant pair", from, -re / natural),
+        Row::not_printed("natural frequency ωn (rad/s)", from, natural),
+        Row::not_printed("real part of s1 and s2 (1/s)", from, re),
+        Row::not_printed("imaginary part of s1, minus that of s2 (1/s)", from, im),
+    ]
+}

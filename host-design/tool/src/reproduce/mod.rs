@@ -1,0 +1,152 @@
+//! The results of the paper beside ours: F. J. Ticona Coaquira, "Design and comparison of two linear controllers with
+//! precompensation gain for the Quadruple inverted pendulum".
+//!
+//! [`published`] holds what is printed, [`designs`] compares matrices, gains and poles digit by digit, [`errata`] says what
+//! the paper leaves open or misprints, [`responses`] are its figures 5 to 8, [`settling`] its Table 2, [`robustness`] what
+//! it says about the two laws without numbers. [`ContinuousRun`] is the loop that the paper simulates; where a tick is
+//! involved, the firmware's own controller runs.
+
+mod claims;
+mod comparison;
+mod continuous_loop;
+mod continuous_margins;
+mod course;
+mod designs;
+mod errata;
+mod figures;
+mod markdown;
+pub mod published;
+mod responses;
+mod robustness;
+mod settling;
+mod spectrum;
+mod summary;
+
+use std::path::Path;
+
+use serde::Serialize;
+use upright::table::Law;
+
+pub use comparison::{Digits, Row, Verdict};
+pub use continuous_loop::ContinuousRun;
+pub use continuous_margins::continuous_margins;
+pub use course::{BAND, Course, StepFigures};
+pub use designs::{Designs, PoleSet, designs};
+pub use errata::{Erratum, Evidence, errata};
+pub use markdown::markdown_table;
+pub use responses::{Loop, Loops, Response, responses};
+pub use robustness::{Ripple, Robustness, SEED, robustness};
+pub use settling::{HORIZON_S, LONGEST_S, Sensitivity, Settling, SettlingRow, printed, settling};
+pub use spectrum::{Bandwidth, SEGMENT, Spectrum};
+
+use upright_design::design::DesignError;
+use upright_design::plant::PlantError;
+use upright_design::plant::reference::ReferenceError;
+use upright_design::rig::{Chain, PlantDescription, Rig, RigError};
+use upright_design::simulate::SimulationError;
+use upright_design::table::NoTable;
+use upright_design::verify::VerifyError;
+
+/// A result that could not be computed.
+#[derive(Debug, thiserror::Error)]
+pub enum ReproduceError {
+    /// A rig that comes with this program cannot be read.
+    #[error(transparent)]
+    Rig(#[from] RigError),
+    /// The rig is not a chain of links.
+    #[error(
+        "the paper's plant is a chain of links, but {0} is given by [model]: use a rig with [cart] and [[link]]"
+    )]
+    NotAChain(String),
+    /// The rig asks for one control law only.
+    #[error("{0} asks for one control law, and two are compared: add [lqr] or [pole_placement]")]
+    OneLaw(String),
+    /// A design has no solution.
+    #[error(transparent)]
+    Design(#[from] DesignError),
+    /// A design makes no table.
+    #[error(transparent)]
+    NoTable(#[from] NoTable),
+    /// The plant cannot be simulated.
+    #[error(transparent)]
+    Plant(#[from] PlantError),
+    /// The continuous loop could not be followed.
+    #[error(transparent)]
+    Reference(#[from] ReferenceError),
+    /// The firmware's loop could not be run.
+    #[error(transparent)]
+    Simulation(#[from] SimulationError),
+    /// The margins could not be computed.
+    #[error(transparent)]
+    Verify(#[from] VerifyError),
+    /// A variance of the paper that is none.
+    #[error("a variance of {0} is not possible: it has to be at least 0")]
+    Variance(f64),
+}
+
+/// Everything that is compared.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Reproduction {
+    /// Matrices, gains, poles.
+    pub designs: Designs,
+    /// What the paper leaves open or misprints.
+    pub errata: Vec<Erratum>,
+    /// Figures 5 to 8.
+    pub responses: Vec<Response>,
+    /// Table 2.
+    pub settling: Settling,
+    /// The paper's claims about the two laws.
+    pub robustness: Vec<Robustness>,
+}
+
+/// Number of stages that [`reproduce`] names.
+pub const STAGES: u64 = 5;
+
+/// Computes everything; `stage` hears the name of each of the [`STAGES`] before it starts.
+///
+/// # Errors
+/// [`ReproduceError`] if a result cannot be computed.
+pub fn reproduce(stage: &dyn Fn(&'static str)) -> Result<Reproduction, ReproduceError> {
+    stage("matrices, gains and poles");
+    let designs = designs()?;
+    stage("errata");
+    let errata = errata()?;
+    stage("step responses");
+    let loops = Loops::of(&paper_rig()?)?;
+    let responses = responses(&loops)?;
+    stage("Table 2");
+    let settling = settling()?;
+    stage("spectra and margins");
+    let robustness = robustness(&loops)?;
+    Ok(Reproduction { designs, errata, responses, settling, robustness })
+}
+
+/// The paper's machine, with our tick, limit, encoders and noise: `rigs/quadruple-paper.toml`.
+///
+/// # Errors
+/// [`RigError`], if the file was bad when this program was compiled.
+pub fn paper_rig() -> Result<Rig, RigError> {
+    Rig::from_toml(
+        include_str!("../../../../rigs/quadruple-paper.toml"),
+        Path::new("rigs/quadruple-paper.toml"),
+    )
+}
+
+/// The paper's A and B as printed: `rigs/quadruple-paper-printed.toml`.
+///
+/// # Errors
+/// As for [`paper_rig`].
+pub fn printed_rig() -> Result<Rig, RigError> {
+    let file = Path::new("rigs/quadruple-paper-printed.toml");
+    Rig::from_toml(include_str!("../../../../rigs/quadruple-paper-printed.toml"), file)
+}
+
+/// The two laws in the order of the paper.
+const LAWS: [(Law, &str); 2] = [(Law::Lqr, "LQR"), (Law::PolePlacement, "pole placement")];
+
+fn chain(rig: &Rig) -> Result<&Chain, ReproduceError> {
+    match &rig.plant {
+        PlantDescription::Chain(chain) => Ok(chain),
+        PlantDescription::Model(_) => Err(ReproduceError::NotAChain(rig.name.clone())),
+    }
+}

@@ -1,0 +1,123 @@
+//! What the paper says about the two laws without numbers, measured: that the response under LQR "has less frequency" and
+//! that it is "more robust".
+
+use rayon::prelude::*;
+use serde::Serialize;
+use upright::table::Law;
+
+use super::continuous_loop::ContinuousRun;
+use super::continuous_margins::continuous_margins;
+use super::course::Course;
+use super::designs::open_loop_poles;
+use super::responses::{Loop, Loops};
+use super::spectrum::{Bandwidth, SEGMENT, Spectrum};
+use super::{LAWS, ReproduceError};
+use upright_design::plant::reference::Tolerance;
+use upright_design::rig::Rig;
+use upright_design::table::{Gains, TableValues};
+use upright_design::verify::{Margins, linear};
+
+/// Seed of all disturbances.
+pub const SEED: u64 = 1;
+
+/// The beginning of each run that is left out: the loop forgets where it started (s).
+const FORGOTTEN_S: f64 = 10.0;
+
+/// 30 segments that overlap by half, after what is forgotten.
+const RUN: ContinuousRun = ContinuousRun {
+    step_m: 0.0,
+    duration_s: FORGOTTEN_S + 15.5 * SEGMENT as f64 * 1e-3,
+    sample_s: 1e-3,
+    disturbances: Some(SEED),
+    tolerance: Tolerance { relative: 1e-8, absolute: 1e-10 },
+};
+
+/// One law in one loop.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Robustness {
+    /// LQR or pole placement.
+    pub law: &'static str,
+    /// Which loop.
+    pub kind: Loop,
+    /// Margins of the linear loop, broken at the force.
+    pub margins: Option<Margins>,
+    /// Cart, joints and force at rest under the paper's disturbances, the same for every law and loop.
+    pub ripples: Vec<Ripple>,
+    /// Largest force in this run (N).
+    pub peak_force_n: f64,
+    /// Squared force, on average (N²): control energy per second.
+    pub effort_n2: f64,
+}
+
+/// One signal of a run at rest under disturbances.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Ripple {
+    /// `x`, `theta1` … or `u`.
+    pub signal: String,
+    /// Root mean square (m, rad or N).
+    pub rms: f64,
+    /// Where its power lies.
+    pub bandwidth: Bandwidth,
+    /// Its spectrum.
+    #[serde(skip)]
+    pub spectrum: Spectrum,
+}
+
+/// Measures both laws in every loop.
+///
+/// # Errors
+/// [`ReproduceError`] if a run or the margins fail.
+pub fn robustness(loops: &Loops) -> Result<Vec<Robustness>, ReproduceError> {
+    let open = open_loop_poles(&loops.rig)?;
+    let full_state = {
+        let rig = Rig { kalman: None, ..loops.rig.clone() };
+        let certified = upright_design::design::design(&rig)?;
+        linear(&rig, &certified, &TableValues::of(&rig, &certified, Gains::Sampled)?)?
+    };
+    let encoders = linear(&loops.rig, &loops.certified, &loops.table)?;
+    let margins = |index: usize, kind: Loop| match kind {
+        Loop::Continuous => {
+            loops.certified.poles.continuous[index].as_ref().map(|closed| continuous_margins(&open, closed))
+        }
+        Loop::FullState => full_state.get(index).and_then(|report| report.margins.clone()),
+        Loop::Encoders => encoders.get(index).and_then(|report| report.margins.clone()),
+    };
+    let jobs: Vec<(usize, (Law, &str), Loop)> = LAWS
+        .into_iter()
+        .enumerate()
+        .flat_map(|(index, law)| Loop::ALL.map(|kind| (index, law, kind)))
+        .collect();
+    jobs.into_par_iter()
+        .map(|(index, (law, name), kind)| {
+            let course = loops.course(law, kind, &RUN)?;
+            let forces = &course.forces_n[after(&course)..];
+            Ok(Robustness {
+                law: name,
+                kind,
+                margins: margins(index, kind),
+                ripples: ripples(&course),
+                peak_force_n: forces.iter().map(|force| force.abs()).fold(0.0, f64::max),
+                effort_n2: forces.iter().map(|force| force * force).sum::<f64>() / forces.len() as f64,
+            })
+        })
+        .collect()
+}
+
+/// Number of the first sample that counts.
+fn after(course: &Course) -> usize {
+    ((FORGOTTEN_S / course.sample_s).round() as usize).min(course.forces_n.len())
+}
+
+fn ripples(course: &Course) -> Vec<Ripple> {
+    let joints = course.states.first().map_or(0, |state| state.len() / 2 - 1);
+    let angles = (1..=joints).map(|joint| (format!("theta{joint}"), course.state(2 * joint)));
+    let signals = [("x".to_owned(), course.state(0))].into_iter().chain(angles);
+    let force = ("u".to_owned(), course.forces_n.clone());
+    let ripple = |(signal, values): (String, Vec<f64>)| {
+        let values = &values[after(course)..];
+        let spectrum = Spectrum::welch(values, course.sample_s)?;
+        let rms = (values.iter().map(|value| value * value).sum::<f64>() / values.len() as f64).sqrt();
+        Some(Ripple { signal, rms, bandwidth: spectrum.bandwidth(), spectrum })
+    };
+    signals.chain([force]).filter_map(ripple).collect()
+}

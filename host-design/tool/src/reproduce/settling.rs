@@ -1,0 +1,275 @@
+//! The paper's Table 2: for which settling times asked of the pole placement the response is stabilised.
+//!
+//! The paper says neither how long its runs are nor what counts as stabilised. Here it means: no link is beyond the
+//! horizontal and the cart is within 2 % of the set-point when the run ends. Everything about the horizon is a fit.
+
+use rayon::prelude::*;
+use serde::Serialize;
+use upright::table::Law;
+
+use super::continuous_loop::ContinuousRun;
+use super::course::Course;
+use super::{ReproduceError, SEED, chain, paper_rig, printed_rig, published};
+use upright_design::design::{Feedback, design};
+use upright_design::plant::reference::Tolerance;
+use upright_design::rig::{PolePlacement, Rig, Tick};
+use upright_design::simulate::{Fall, Scenario, Sensing, simulate};
+use upright_design::table::{Gains, TableValues};
+
+/// Table 2, what decides it, and what does not.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Settling {
+    /// One per settling time, with the far poles at -40 … -47.
+    pub rows: Vec<SettlingRow>,
+    /// Horizons (s) and our verdicts there.
+    pub by_horizon: Vec<(f64, [bool; 7])>,
+    /// First and last horizon (s) at which all seven verdicts are the paper's, in steps of 10 ms, and nowhere else.
+    pub horizons_s: Option<[f64; 2]>,
+    /// What else was tried.
+    pub sensitivity: Vec<Sensitivity>,
+}
+
+/// One row of Table 2.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct SettlingRow {
+    /// Settling time asked for (s).
+    pub settling_time_s: f64,
+    /// The paper's verdict.
+    pub printed: bool,
+    /// How it falls, if it does within [`LONGEST_S`].
+    pub fall: Option<Fall>,
+    /// Time after which it stays within 2 % (s).
+    pub settled_after_s: Option<f64>,
+    /// Largest angle of any joint (°); of a run that falls, up to then.
+    pub peak_angle_deg: f64,
+    /// Largest force (N).
+    pub peak_force_n: f64,
+    /// The course.
+    #[serde(skip)]
+    pub course: Course,
+}
+
+/// One change of the runs and what it does to the verdicts.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Sensitivity {
+    /// What is different.
+    pub changed: &'static str,
+    /// Verdicts at [`HORIZON_S`].
+    pub at_horizon: [bool; 7],
+    /// Verdicts at [`LONGEST_S`]. What is `false` there falls or never comes near.
+    pub in_the_end: [bool; 7],
+    /// Which fall.
+    pub falls: [bool; 7],
+    /// Horizons with all seven verdicts of the paper (s), as in [`Settling::horizons_s`].
+    pub horizons_s: Option<[f64; 2]>,
+}
+
+/// Length of the runs (s).
+pub const LONGEST_S: f64 = 20.0;
+/// A horizon within those that give the paper's verdicts (s).
+pub const HORIZON_S: f64 = 6.5;
+/// Resolution of the horizon (s).
+const STEP_S: f64 = 0.01;
+
+const RUN: ContinuousRun = ContinuousRun { duration_s: LONGEST_S, sample_s: STEP_S, ..ContinuousRun::STEP };
+
+/// The paper's verdicts.
+pub fn printed() -> [bool; 7] {
+    published::TABLE_2.map(|(_, verdict)| verdict)
+}
+
+/// Runs Table 2 and all that was tried besides.
+///
+/// # Errors
+/// [`ReproduceError`] if a design or a run fails.
+pub fn settling() -> Result<Settling, ReproduceError> {
+    let exact: Vec<Feedback<f64>> = published::TABLE_2
+        .par_iter()
+        .map(|&(settling_time_s, _)| placement(&asking_for(paper_rig()?, settling_time_s)))
+        .collect::<Result<_, _>>()?;
+    let changes = Change::all();
+    let jobs: Vec<(usize, f64, &Feedback<f64>)> = (0..changes.len())
+        .flat_map(|change| published::TABLE_2.iter().zip(&exact).map(move |(row, law)| (change, row.0, law)))
+        .collect();
+    let courses: Vec<Course> = jobs
+        .par_iter()
+        .map(|&(change, settling_time_s, exact)| changes[change].1.course(settling_time_s, exact))
+        .collect::<Result<_, _>>()?;
+    let mut groups = courses.chunks_exact(published::TABLE_2.len()).zip(&changes);
+    let sensitivity = groups
+        .clone()
+        .skip(1)
+        .map(|(courses, (changed, change))| Sensitivity {
+            changed,
+            at_horizon: verdicts(courses, change.step_m(), HORIZON_S),
+            in_the_end: verdicts(courses, change.step_m(), LONGEST_S),
+            falls: core::array::from_fn(|i| courses[i].fall.is_some()),
+            horizons_s: agreeing(courses, change.step_m()),
+        })
+        .collect();
+    let as_stated = groups.next().map_or(&[][..], |(courses, _)| courses);
+    let rows = published::TABLE_2.iter().zip(as_stated).map(|(&(settling_time_s, printed), course)| {
+        let figures = course.step_figures(RUN.step_m);
+        SettlingRow {
+            settling_time_s,
+            printed,
+            fall: figures.fall,
+            settled_after_s: figures.settling_time_s,
+            peak_angle_deg: figures.peak_angles_deg.iter().copied().fold(0.0, f64::max),
+            peak_force_n: figures.peak_force_n,
+            course: course.clone(),
+        }
+    });
+    let horizons = [4.0, 5.0, 5.5, 6.0, HORIZON_S, 7.0, 7.5, 8.0, 10.0, LONGEST_S];
+    Ok(Settling {
+        rows: rows.collect(),
+        by_horizon: horizons.map(|horizon| (horizon, verdicts(as_stated, RUN.step_m, horizon))).to_vec(),
+        horizons_s: agreeing(as_stated, RUN.step_m),
+        sensitivity,
+    })
+}
+
+fn verdicts(courses: &[Course], step_m: f64, horizon_s: f64) -> [bool; 7] {
+    core::array::from_fn(|i| courses.get(i).is_some_and(|course| course.stabilised(step_m, horizon_s)))
+}
+
+/// First and last horizon with the paper's verdicts, if there are any and all between have them, too.
+fn agreeing(courses: &[Course], step_m: f64) -> Option<[f64; 2]> {
+    let steps = (LONGEST_S / STEP_S).round() as usize;
+    let agrees = |step: &usize| verdicts(courses, step_m, *step as f64 * STEP_S) == printed();
+    let first = (0..=steps).find(agrees)?;
+    let last = (first..=steps).rev().find(agrees)?;
+    (first..=last).all(|step| agrees(&step)).then_some([first as f64 * STEP_S, last as f64 * STEP_S])
+}
+
+/// What is done differently.
+enum Change {
+    /// Gains and run of the continuous loop.
+    Continuous { gains: GainsFrom, run: ContinuousRun },
+    /// The firmware's controller, the whole state known.
+    Firmware { tick: Tick, gains: Gains, force_limit_n: Option<f64> },
+}
+
+/// Where the gains come from.
+enum GainsFrom {
+    /// The exact model, far poles from -40 to -47.
+    Exact,
+    /// As printed: two decimals of K, four of N.
+    Rounded,
+    /// The printed matrices.
+    PrintedMatrices,
+    /// The exact model, each far pole times `6 / ts`.
+    FarPolesMoved,
+    /// The exact model, all far poles ten times as far left as the dominant pair.
+    TenTimesDominant,
+}
+
+impl Change {
+    /// The stated criterion first, then everything that was tried.
+    fn all() -> Vec<(&'static str, Self)> {
+        let gains = |gains| Change::Continuous { gains, run: RUN };
+        let run = |run| Change::Continuous { gains: GainsFrom::Exact, run };
+        let tick = |period_s, delay_ticks| Tick { period_s, delay_ticks };
+        let held = |tick, gains, force_limit_n| Change::Firmware { tick, gains, force_limit_n };
+        let loose = Tolerance { relative: 1e-3, absolute: 1e-6 };
+        vec![
+            ("nothing", gains(GainsFrom::Exact)),
+            ("gains rounded as printed", gains(GainsFrom::Rounded)),
+            ("gains from the printed A and B", gains(GainsFrom::PrintedMatrices)),
+            ("far poles moved with ts (times 6/ts)", gains(GainsFrom::FarPolesMoved)),
+            ("far poles ten times the dominant real part", gains(GainsFrom::TenTimesDominant)),
+            ("solver tolerance 1e-3", run(ContinuousRun { tolerance: loose, ..RUN })),
+            (
+                "the paper's disturbances",
+                run(ContinuousRun { disturbances: Some(SEED), sample_s: 1e-3, ..RUN }),
+            ),
+            ("step of 0.5 m", run(ContinuousRun { step_m: 0.5, ..RUN })),
+            ("step of 2 m", run(ContinuousRun { step_m: 2.0, ..RUN })),
+            ("held for a tick of 1 ms", held(tick(0.001, 0), Gains::Continuous, None)),
+            ("1 ms, a tick late", held(tick(0.001, 1), Gains::Continuous, None)),
+            ("gains for a tick of 5 ms", held(tick(0.005, 0), Gains::Sampled, None)),
+            ("1 ms, force limited to 20 N", held(tick(0.001, 0), Gains::Continuous, Some(20.0))),
+            ("1 ms, force limited to 10 N", held(tick(0.001, 0), Gains::Continuous, Some(10.0))),
+        ]
+    }
+
+    fn step_m(&self) -> f64 {
+        match self {
+            Change::Continuous { run, .. } => run.step_m,
+            Change::Firmware { .. } => RUN.step_m,
+        }
+    }
+
+    /// `exact` are the gains of the exact model.
+    fn course(&self, settling_time_s: f64, exact: &Feedback<f64>) -> Result<Course, ReproduceError> {
+        let mut rig = asking_for(paper_rig()?, settling_time_s);
+        match self {
+            Change::Continuous { gains, run } => {
+                run.course(chain(&rig)?, &gains.law(&rig, settling_time_s, exact)?)
+            }
+            Change::Firmware { tick, gains, force_limit_n } => {
+                rig.tick = tick.clone();
+                rig.actuator.force_limit_n = *force_limit_n;
+                if let upright_design::rig::PlantDescription::Chain(chain) = &mut rig.plant {
+                    chain.cart.travel_m = [-1e3, 1e3]; // the paper has no rail
+                }
+                let table = TableValues::of(&rig, &design(&rig)?, *gains)?.without_governor();
+                let scenario = Scenario {
+                    sensing: Sensing::FullState,
+                    step_m: RUN.step_m,
+                    duration_s: RUN.duration_s,
+                    ..Scenario::at_rest(&rig, Law::PolePlacement)
+                };
+                let (trace, summary) = simulate(&rig, &table, &scenario)?;
+                Ok(Course::of_trace(&trace, rig.tick.period_s, summary.fall))
+            }
+        }
+    }
+}
+
+/// `rig` with nothing but a pole placement for this settling time.
+fn asking_for(mut rig: Rig, wanted_s: f64) -> Rig {
+    rig.lqr = None;
+    rig.kalman = None;
+    if let Some(PolePlacement::Response { settling_time_s, .. }) = &mut rig.pole_placement {
+        *settling_time_s = wanted_s;
+    }
+    rig
+}
+
+impl GainsFrom {
+    /// The gains for `rig`, whose exact ones are `exact`.
+    fn law(
+        &self,
+        rig: &Rig,
+        settling_time_s: f64,
+        exact: &Feedback<f64>,
+    ) -> Result<Feedback<f64>, ReproduceError> {
+        let moved = |to: &dyn Fn(f64) -> f64| {
+            let mut rig = rig.clone();
+            if let Some(PolePlacement::Response { far_poles, .. }) = &mut rig.pole_placement {
+                for pole in far_poles {
+                    *pole = to(*pole);
+                }
+            }
+            placement(&rig)
+        };
+        match self {
+            GainsFrom::Exact => Ok(exact.clone()),
+            GainsFrom::Rounded => Ok(Feedback {
+                k: exact.k.map(|gain| (gain * 1e2).round() / 1e2),
+                n: exact.n.map(|n| (n * 1e4).round() / 1e4),
+                integral: false,
+            }),
+            GainsFrom::PrintedMatrices => placement(&asking_for(printed_rig()?, settling_time_s)),
+            GainsFrom::FarPolesMoved => moved(&|pole| pole * published::SETTLING_TIME_S / settling_time_s),
+            GainsFrom::TenTimesDominant => moved(&|_| -40.0 / settling_time_s),
+        }
+    }
+}
+
+/// Continuous gains of the pole placement that `rig` asks for.
+fn placement(rig: &Rig) -> Result<Feedback<f64>, ReproduceError> {
+    let law = design(rig)?.double.continuous.pole_placement;
+    law.ok_or_else(|| ReproduceError::OneLaw(rig.name.clone()))
+}

@@ -1,0 +1,94 @@
+//! Looking into images: what is wrong with one is found. The image for the emulator is a wrong one for a board: it can
+//! be told to panic and to overflow its stack.
+
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
+use std::sync::OnceLock;
+
+use serde_json::Value;
+use upright_tool::image::{
+    Image, Kind, StackError, build_if_possible, forbidden_functions, size, stack_bound,
+};
+
+/// None where there is no compiler for it.
+fn path_in_the_loop() -> Option<&'static Path> {
+    static PATH: OnceLock<Option<PathBuf>> = OnceLock::new();
+    PATH.get_or_init(|| build_if_possible(Kind::InTheLoop).unwrap()).as_deref()
+}
+
+fn upright(arguments: &[&str]) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_upright")).args(arguments).output().unwrap()
+}
+
+/// Without anything but the tool itself.
+fn upright_alone(arguments: &[&str]) -> Output {
+    let nowhere = tempfile::tempdir().unwrap();
+    Command::new(env!("CARGO_BIN_EXE_upright")).args(arguments).env("PATH", nowhere.path()).output().unwrap()
+}
+
+#[test]
+fn a_panic_is_found() {
+    let Some(path) = path_in_the_loop() else { return };
+    let image = Image::read(path).unwrap();
+    let found = forbidden_functions(&image);
+    assert!(found.contains(&"core::panicking::panic_fmt"), "{found:?}");
+}
+
+#[test]
+fn a_recursion_has_no_bound_on_the_stack() {
+    let Some(path) = path_in_the_loop() else { return };
+    let image = Image::read(path).unwrap();
+    match stack_bound(&image) {
+        Err(StackError::Recursion(name)) => assert!(name.ends_with("::dig"), "{name}"),
+        other => panic!("{other:?}"),
+    }
+}
+
+#[test]
+fn each_byte_is_counted_once() {
+    let Some(path) = path_in_the_loop() else { return };
+    let image = Image::read(path).unwrap();
+    let size = size(&image).unwrap();
+    let sum = |parts: &[upright_tool::image::Part]| {
+        parts.iter().fold((0, 0), |(flash, ram), part| (flash + part.flash, ram + part.ram))
+    };
+    assert_eq!(sum(&size.sections), (size.flash, size.ram));
+    assert_eq!(sum(&size.crates), (size.flash, size.ram));
+    let upright = size.crates.iter().find(|part| part.name == "upright").unwrap();
+    assert!(upright.flash > 1000, "{upright:?}");
+}
+
+#[test]
+fn an_image_that_must_not_ship_ends_with_status_1_after_its_figures() {
+    let Some(path) = path_in_the_loop() else { return };
+    let output = upright(&["firmware", "size", "--json", "--elf", path.to_str().unwrap()]);
+    assert_eq!(output.status.code(), Some(1));
+    let figures: Value = serde_json::from_slice(&output.stdout).unwrap();
+    let wrong = figures["wrong"].to_string();
+    assert!(wrong.contains("calls itself") && wrong.contains("can panic"), "{wrong}");
+}
+
+#[test]
+fn a_file_that_is_no_image_is_bad_input() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("image.elf");
+    let Some(whole) = path_in_the_loop() else { return };
+    let whole = std::fs::read(whole).unwrap();
+    for bytes in [&b""[..], b"not an image", &whole[..60], &whole[..whole.len() / 2]] {
+        std::fs::write(&path, bytes).unwrap();
+        let output = upright(&["firmware", "size", "--elf", path.to_str().unwrap()]);
+        let said = String::from_utf8(output.stderr).unwrap();
+        assert_eq!(output.status.code(), Some(2), "{said}");
+        assert!(said.contains("image.elf") && said.lines().count() == 1, "{said}");
+    }
+}
+
+#[test]
+fn what_is_missing_is_named_in_one_line() {
+    for (command, missing) in [("build", "rustup target add"), ("flash", "probe-rs is missing")] {
+        let output = upright_alone(&["firmware", command]);
+        let said = String::from_utf8(output.stderr).unwrap();
+        assert_eq!(output.status.code(), Some(4), "{said}");
+        assert!(said.contains(missing) && said.lines().count() == 1, "{said}");
+    }
+}

@@ -1,0 +1,20 @@
+//! Tests of the command line and what it is made of. One program, so that it is linked once.
+
+mod campaign;
+mod command_line;
+mod compare_command;
+mod compare_sweep;
+mod fault_table;
+mod image;
+mod monitor;
+mod observer_design;
+mod paper;
+mod published;
+mod report_browser;
+mod report_command;
+mod report_devtools;
+mod report_figures;
+mod report_page;
+mod report_rigs;
+mod reproduce_numbers;
+mod verify_command;

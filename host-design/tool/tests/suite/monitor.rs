@@ -1,0 +1,251 @@
+//! The monitor: what it shows, what its keys say, and the whole way to a firmware and back.
+
+use std::io::Write;
+use std::net::TcpListener;
+use std::path::Path;
+use std::process::{Command, Stdio};
+use std::time::Duration;
+
+use heapless::Vec as List;
+use ratatui::Terminal;
+use ratatui::backend::TestBackend;
+use ratatui::crossterm::event::{KeyCode, KeyEvent, KeyModifiers};
+use serde::Serialize;
+use serde_json::Value;
+use upright::protocol::frame::{self, Receiver};
+use upright::protocol::link::MAX_COMMAND;
+use upright::protocol::message::{
+    Answer, Command as Asked, Info, Message, PROTOCOL, Request, Reset, Telemetry,
+};
+use upright::supervision::fault::Fault;
+use upright::supervision::homing::Homing;
+use upright::supervision::inhibits::Reasons;
+use upright::supervision::sign_check::Signs;
+use upright::supervision::supervisor::State;
+use upright::table::Law;
+use upright_design::design::design;
+use upright_design::rig::Rig;
+use upright_design::simulate::Scenario;
+use upright_design::table::{Gains, TableValues};
+use upright_tool::in_the_loop::{Where, serve};
+use upright_tool::monitor::{Ended, Monitor, action, view};
+
+const NOW: Duration = Duration::from_secs(1_800_000_000);
+
+fn framed(message: &impl Serialize) -> Vec<u8> {
+    frame::encode(message, &mut [0; 320], &mut [0; 320]).unwrap().to_vec()
+}
+
+fn telemetry(tick: u32, state: State, fault: Option<Fault>) -> Telemetry<10, 5> {
+    Telemetry {
+        tick,
+        state,
+        fault,
+        cause_tick: 7,
+        homing: Homing::Homed,
+        signs: Signs::Checked,
+        against: if fault.is_some() { Reasons::FAULT } else { Reasons::NONE },
+        counts: List::from_slice(&[1, -2, 3, -4, 5]).unwrap(),
+        estimate: List::from_slice(&[0.125, 0.0, 0.01, 0.0, 0.02, 0.0, -0.01, 0.0, 0.005, -0.5]).unwrap(),
+        innovation: List::from_slice(&[0.0; 5]).unwrap(),
+        setpoint: 0.05,
+        requested: 3.5,
+        applied: 3.25,
+        drive: 0.5,
+        cycles: 1234,
+    }
+}
+
+fn told(monitor: &mut Monitor, telemetry: Telemetry<10, 5>) -> usize {
+    monitor.receive(&framed(&Message::Telemetry(telemetry)), NOW).len()
+}
+
+/// What the monitor has to say.
+fn asked(monitor: &mut Monitor) -> Vec<Asked> {
+    let mut receiver = Receiver::<MAX_COMMAND>::new();
+    let bytes = monitor.take_outgoing();
+    bytes.into_iter().filter_map(|byte| receiver.push(byte)).map(Result::unwrap).collect()
+}
+
+fn answer(monitor: &mut Monitor, id: u64, answer: Answer) {
+    monitor.receive(&framed(&Message::<10, 5>::Reply { id, answer }), NOW);
+}
+
+fn met(protocol: u8) -> Monitor {
+    let mut monitor = Monitor::new("tcp:here");
+    monitor.poll(NOW);
+    let first = asked(&mut monitor);
+    assert!(matches!(first[..], [Asked { request: Request::Info, .. }]));
+    let info = Info {
+        protocol,
+        version: [1, 2, 3],
+        rig_hash: 0xabcd,
+        tick_s: 0.001,
+        states: 10,
+        sensors: 5,
+        reset: Reset::Power,
+    };
+    answer(&mut monitor, first[0].id, Answer::Info(info));
+    monitor
+}
+
+fn screen(monitor: &Monitor) -> String {
+    let mut terminal = Terminal::new(TestBackend::new(110, 36)).unwrap();
+    terminal.draw(|frame| view::draw(monitor, frame)).unwrap();
+    let buffer = terminal.backend().buffer();
+    let rows = buffer.content().chunks(110);
+    rows.map(|row| row.iter().map(|cell| cell.symbol()).collect::<String>() + "\n").collect()
+}
+
+fn press(monitor: &mut Monitor, code: KeyCode) -> Vec<Request> {
+    asked(monitor);
+    monitor.act(action(&KeyEvent::new(code, KeyModifiers::NONE)).unwrap(), NOW);
+    asked(monitor).into_iter().map(|command| command.request).collect()
+}
+
+#[test]
+fn the_screen_shows_state_fault_and_remedy() {
+    let mut monitor = met(PROTOCOL);
+    for tick in 0..200 {
+        assert_eq!(told(&mut monitor, telemetry(20 * tick, State::Balancing, None)), 1);
+    }
+    let healthy = screen(&monitor);
+    println!("{healthy}");
+    for words in
+        ["balancing", "1.2.3", "000000000000abcd", "0.1250 m", "link 4", "applied 3.25 N", "cycles 1234"]
+    {
+        assert!(healthy.contains(words), "{words}\n{healthy}");
+    }
+    assert!(!healthy.contains("remedy"));
+    told(&mut monitor, telemetry(4000, State::Fault, Some(Fault::EmergencyStop)));
+    let faulty = screen(&monitor);
+    println!("{faulty}");
+    for words in ["fault: motor off", "emergency stop", "remedy: release", "clear it first"] {
+        assert!(faulty.contains(words), "{words}\n{faulty}");
+    }
+    assert!(!faulty.contains("balancing: the motor is on"));
+}
+
+#[test]
+fn every_key_gives_its_command() {
+    let mut monitor = met(PROTOCOL);
+    told(&mut monitor, telemetry(1, State::Calibrated, None));
+    for (key, request) in [
+        (KeyCode::Char('h'), Request::Home),
+        (KeyCode::Char('H'), Request::HomeRail),
+        (KeyCode::Char('g'), Request::CheckSigns),
+        (KeyCode::Char('a'), Request::Arm),
+        (KeyCode::Char('d'), Request::Disarm),
+        (KeyCode::Char(' '), Request::Disarm),
+        (KeyCode::Char('c'), Request::Clear),
+        (KeyCode::Right, Request::Setpoint(0.05 + 0.01)),
+        (KeyCode::Char('0'), Request::Setpoint(0.0)),
+        (KeyCode::Left, Request::Setpoint(-0.01)),
+        (KeyCode::Char('l'), Request::Select(Law::PolePlacement)),
+    ] {
+        assert_eq!(press(&mut monitor, key), [request], "{key:?}");
+    }
+    assert!(press(&mut monitor, KeyCode::Char('q')).is_empty());
+    assert_eq!(action(&KeyEvent::new(KeyCode::Char('x'), KeyModifiers::NONE)), None);
+}
+
+#[test]
+fn beats_begin_with_the_first_setpoint_and_numbers_always_grow() {
+    let beats = |monitor: &mut Monitor| -> usize {
+        let said: Vec<_> = (1..=100)
+            .flat_map(|ms| {
+                monitor.poll(NOW + Duration::from_millis(ms));
+                asked(monitor)
+            })
+            .collect();
+        assert!(said.windows(2).all(|pair| pair[0].id < pair[1].id));
+        said.iter().filter(|command| command.request == Request::Beat).count()
+    };
+    let mut monitor = met(PROTOCOL);
+    assert_eq!(beats(&mut monitor), 0);
+    press(&mut monitor, KeyCode::Right);
+    assert_eq!(beats(&mut monitor), 4);
+}
+
+#[test]
+fn a_refusal_is_shown_with_all_reasons() {
+    let mut monitor = met(PROTOCOL);
+    asked(&mut monitor);
+    monitor.act(action(&KeyEvent::new(KeyCode::Char('a'), KeyModifiers::NONE)).unwrap(), NOW);
+    let id = asked(&mut monitor)[0].id;
+    answer(&mut monitor, id + 1, Answer::NotNow(Reasons::TILTED));
+    assert!(!screen(&monitor).contains("refused"), "that answers another command");
+    answer(&mut monitor, id, Answer::NotNow(Reasons::TILTED.and(Reasons::NOT_HOMED)));
+    let shown = screen(&monitor);
+    assert!(shown.contains("arm: refused") && shown.contains("not upright") && shown.contains("home first"));
+}
+
+#[test]
+fn another_version_of_the_messages_is_refused_and_nothing_more_is_sent() {
+    let mut monitor = met(PROTOCOL + 1);
+    assert_eq!(monitor.ended, Some(Ended::Protocol(PROTOCOL + 1)));
+    assert_eq!(told(&mut monitor, telemetry(1, State::Balancing, None)), 0);
+    assert!(press(&mut monitor, KeyCode::Char('a')).is_empty());
+    assert!(screen(&monitor).contains("speaks version"));
+}
+
+#[test]
+fn garbage_is_counted_and_what_follows_is_read() {
+    let mut monitor = met(PROTOCOL);
+    let mut damaged = framed(&Message::Telemetry(telemetry(1, State::Armed, None)));
+    damaged[9] ^= 0x10;
+    let noise: Vec<u8> = (0..5000u32).map(|i| (i.wrapping_mul(2_654_435_761) >> 24) as u8).collect();
+    assert!(monitor.receive(&damaged, NOW).is_empty() && monitor.unreadable == 1);
+    assert!(monitor.receive(&noise, NOW).is_empty() && monitor.unreadable > 1);
+    monitor.receive(&[0], NOW);
+    assert_eq!(told(&mut monitor, telemetry(2, State::Armed, None)), 1);
+}
+
+#[test]
+fn a_closed_connection_is_shown() {
+    let mut monitor = met(PROTOCOL);
+    assert!(!screen(&monitor).contains("closed"));
+    monitor.close(&std::io::ErrorKind::UnexpectedEof.into());
+    assert!(screen(&monitor).contains("connection is closed"));
+}
+
+/// Telemetry of the command against the firmware in this process, told `said` on stdin.
+fn monitored(said: &str) -> Vec<Value> {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../rigs/single-quanser-ip02.toml");
+    let rig = Rig::from_path(&path).unwrap();
+    let table = TableValues::of(&rig, &design(&rig).unwrap(), Gains::Sampled).unwrap();
+    let listener = TcpListener::bind("127.0.0.1:0").unwrap();
+    let port = format!("tcp:{}", listener.local_addr().unwrap());
+    let server = std::thread::spawn(move || {
+        let scenario = Scenario { duration_s: 4.0, ..Scenario::at_rest(&rig, Law::Lqr) };
+        serve(&rig, &table, &scenario, Where::Host, &listener)
+    });
+    let mut monitor = Command::new(env!("CARGO_BIN_EXE_upright"))
+        .args(["firmware", "monitor", &port, "--json", "--duration", "3"])
+        .stdin(Stdio::piped())
+        .stdout(Stdio::piped())
+        .spawn()
+        .unwrap();
+    monitor.stdin.take().unwrap().write_all(said.as_bytes()).unwrap();
+    let output = monitor.wait_with_output().unwrap();
+    server.join().unwrap().unwrap();
+    assert!(output.status.success());
+    output
+        .stdout
+        .split(|&byte| byte == b'\n')
+        .filter(|line| !line.is_empty())
+        .map(|line| serde_json::from_slice(line).unwrap())
+        .collect()
+}
+
+#[test]
+fn a_set_point_from_the_monitor_moves_the_firmware_and_holds_it() {
+    let moved = monitored("set-point 0.05\n");
+    let last = moved.last().unwrap();
+    assert!(moved.len() > 50, "{}", moved.len());
+    assert!(moved.iter().all(|telemetry| telemetry["state"] == "Balancing"), "{last}");
+    assert!((last["setpoint_m"].as_f64().unwrap() - 0.05).abs() < 1e-6, "{last}");
+    // Negative control: nobody moves it unasked.
+    let still = monitored("");
+    assert_eq!(still.last().unwrap()["setpoint_m"], 0.0);
+}

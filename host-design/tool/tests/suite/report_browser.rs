@@ -1,0 +1,146 @@
+//! The page in a real browser.
+//!
+//! Needs Chromium or Chrome. Without one the test says so and passes, unless `UPRIGHT_REQUIRE_BROWSER=1` is set.
+
+use std::path::Path;
+
+use crate::report_devtools::Browser;
+
+/// Width of a telephone (CSS pixels).
+const TELEPHONE: u32 = 390;
+
+const GEOMETRY: &str =
+    "[...document.querySelectorAll('.stage line, .stage circle')].map((e) => e.outerHTML).join()";
+const CURSORS: &str = "[...document.querySelectorAll('.cursor')].map((line) => line.getAttribute('x1'))";
+const WAIT: &str = "new Promise((done) => setTimeout(done, 500))";
+
+/// Everything that is wrong with a page.
+fn faults(browser: &mut Browser, page: &Path, is_drawn: bool) -> Vec<String> {
+    let mut faults = Vec::new();
+    let mut check = |holds: bool, fault: &str| {
+        if !holds {
+            faults.push(fault.to_owned());
+        }
+    };
+    browser.open(page, 1200, "light", "screen");
+    check(browser.value("!document.getElementById('player').hidden") == true, "no player");
+    if is_drawn {
+        let still = browser.value(GEOMETRY);
+        check(still.as_str().is_some_and(|geometry| !geometry.is_empty()), "nothing is drawn");
+        browser.value(WAIT);
+        check(browser.value(GEOMETRY) == still, "the animation moves before it is played");
+        browser.value("document.getElementById('play').click()");
+        browser.value(WAIT);
+        check(browser.value(GEOMETRY) != still, "the animation does not move");
+        browser.value("document.getElementById('play').click()");
+        let paused = browser.value(GEOMETRY);
+        browser.value(WAIT);
+        check(browser.value(GEOMETRY) == paused, "the animation cannot be paused");
+    }
+    let panels = "[...document.querySelectorAll('figure[data-areas]')].flatMap((f) => f.dataset.areas.split(';')).length";
+    let panels = browser.value(panels).as_u64().unwrap_or(0) as usize;
+    let scrub =
+        "{ const s = document.getElementById('scrub'); s.value = 700; s.dispatchEvent(new Event('input')); }";
+    let before = browser.value(CURSORS);
+    browser.value(scrub);
+    let after = browser.value(CURSORS);
+    let moved =
+        |before: &serde_json::Value, after: &serde_json::Value| match (before.as_array(), after.as_array()) {
+            (Some(before), Some(after)) => {
+                panels > 0
+                    && before.len() == panels
+                    && before.iter().zip(after).all(|(before, after)| before != after)
+            }
+            _ => false,
+        };
+    check(moved(&before, &after), "scrubbing does not move every cursor");
+    let press = "{ const p = document.querySelector('figure[data-areas] svg'); const b = p.getBoundingClientRect(); \
+                 p.dispatchEvent(new PointerEvent('pointerdown', { clientX: b.left + 0.5 * b.width })); }";
+    browser.value(press);
+    check(moved(&after, &browser.value(CURSORS)), "a plot does not set the time");
+    let every_scene = "{ const c = document.getElementById('scene'); for (let i = 0; i < c.length; i += 1) { \
+                       c.value = String(i); c.dispatchEvent(new Event('change')); } }";
+    browser.value(every_scene);
+    let light = browser.value("getComputedStyle(document.body).backgroundColor");
+    for error in browser.errors() {
+        check(false, &format!("error: {error}"));
+    }
+    browser.open(page, TELEPHONE, "dark", "screen");
+    let width = browser.value("document.documentElement.scrollWidth").as_u64();
+    check(width.is_some_and(|width| width <= u64::from(TELEPHONE)), "it scrolls sideways on a telephone");
+    let smallest = "Math.min(...[...document.querySelectorAll('svg.plot text')].map((t) => t.getBoundingClientRect().height))";
+    check(
+        browser.value(smallest).as_f64().is_some_and(|size| size >= 10.0),
+        "text too small for a telephone",
+    );
+    let dark = browser.value("getComputedStyle(document.body).backgroundColor");
+    check(light != dark, "the page does not follow the dark scheme");
+    let ink = browser.value("getComputedStyle(document.querySelector('svg.plot text')).fill");
+    check(ink != "rgb(0, 0, 0)", "the plots do not follow the dark scheme");
+    browser.open(page, 800, "dark", "print");
+    check(
+        browser.value("getComputedStyle(document.body).backgroundColor") == light,
+        "it prints on dark paper",
+    );
+    let controls = browser.value("getComputedStyle(document.querySelector('.controls')).display");
+    check(controls == "none", "it prints its buttons");
+    faults
+}
+
+#[test]
+fn the_page_works_in_a_browser_and_each_of_its_faults_is_found() {
+    let Some(mut browser) = Browser::start() else {
+        let required = std::env::var("UPRIGHT_REQUIRE_BROWSER").is_ok_and(|value| value == "1");
+        assert!(
+            !required,
+            "UPRIGHT_REQUIRE_BROWSER=1, but there is no chromium or google-chrome in the PATH"
+        );
+        eprintln!(
+            "not exercised, for want of a chromium or google-chrome in the PATH: the report in a browser"
+        );
+        return;
+    };
+    let folder = tempfile::tempdir().unwrap();
+    let page = folder.path().join("report.html");
+    let html = crate::report_rigs::quick_report(&crate::report_rigs::rig("single-quanser-ip02")).html;
+    std::fs::write(&page, &html).unwrap();
+    assert_eq!(faults(&mut browser, &page, true), Vec::<String>::new());
+
+    let broken = [
+        ("</body>", "<script>throw new Error('on purpose')</script></body>", "on purpose"),
+        (
+            "</body>",
+            "<script src=\"https://upright.invalid/x.js\"></script></body>",
+            "request for https://upright.invalid",
+        ),
+        ("<main>", "<main><div style=\"width: 600px\">too wide</div>", "it scrolls sideways on a telephone"),
+        ("drawMachine();", "", "the animation does not move"),
+        ("requestAnimationFrame(tick);", "", "the animation does not move"),
+        ("moveCursors();", "", "scrubbing does not move every cursor"),
+        (
+            "prefers-color-scheme: dark",
+            "prefers-color-scheme: none",
+            "the page does not follow the dark scheme",
+        ),
+        ("@media screen and (prefers", "@media (prefers", "it prints on dark paper"),
+        ("nav, .controls, noscript", "nav, noscript", "it prints its buttons"),
+        (
+            "<svg class=\"plot\"",
+            "<svg style=\"width: 150px\" class=\"plot\"",
+            "text too small for a telephone",
+        ),
+    ];
+    for (part, instead, fault) in broken {
+        assert!(html.contains(part), "{part}");
+        std::fs::write(&page, html.replace(part, instead)).unwrap();
+        let found = faults(&mut browser, &page, true);
+        assert!(found.iter().any(|found| found.contains(fault)), "{fault}: {found:?}");
+    }
+
+    std::fs::write(
+        &page,
+        crate::report_rigs::quick_report(&crate::report_rigs::rig("quadruple-paper-printed")).html,
+    )
+    .unwrap();
+    assert_eq!(faults(&mut browser, &page, false), Vec::<String>::new());
+}

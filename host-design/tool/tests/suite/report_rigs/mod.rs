@@ -1,0 +1,40 @@
+//! Reports for tests: without the slow half of the trust report.
+
+use std::path::Path;
+
+use upright_design::design::design;
+use upright_design::rig::Rig;
+use upright_design::table::{Gains, TableValues};
+use upright_design::verify::{LawTrust, TrustReport, linear};
+use upright_tool::report::{Report, Source, report};
+
+/// A rig of this checkout.
+pub(crate) fn rig(name: &str) -> Rig {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../rigs").join(name).with_extension("toml");
+    Rig::from_path(&path).unwrap()
+}
+
+/// Its report.
+pub(crate) fn quick_report(rig: &Rig) -> Report {
+    let certified = design(rig).unwrap();
+    let table = TableValues::of(rig, &certified, Gains::Sampled).unwrap();
+    let laws = linear(rig, &certified, &table).unwrap().into_iter().map(|linear| LawTrust {
+        linear,
+        attraction: None,
+        noise_run: None,
+        coarsest_encoder: None,
+        corners: None,
+        mass_tolerances: Vec::new(),
+        monte_carlo: None,
+    });
+    let trust = TrustReport { laws: laws.collect(), checks: Vec::new() };
+    let source = Source {
+        rig,
+        certified: &certified,
+        table: &table,
+        trust: &trust,
+        seed: 1,
+        command: "upright report test",
+    };
+    report(&source, &|_| {}).unwrap()
+}

@@ -1,0 +1,129 @@
+//! From force to motor duty, and back to the force that is really applied.
+
+use serde::{Deserialize, Serialize};
+
+use crate::control::state_feedback::saturate;
+
+/// A DC motor behind gear and pulley, as seen by the cart.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct MotorMap {
+    /// Voltage per force at standstill, `R r / (gear Kt)` (V/N).
+    pub volts_per_newton: f32,
+    /// Back-EMF per cart speed, `gear Kt / r` (V·s/m).
+    pub volts_per_speed: f32,
+    /// Voltage below which the motor does not move (V).
+    pub dead_zone_v: f32,
+    /// Largest change of the voltage in one tick (V).
+    pub slew_v_per_tick: f32,
+    /// Supply voltage the table was designed for (V).
+    pub supply_v: f32,
+}
+
+/// What goes to the power stage.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub enum Drive {
+    /// A force (N), for rigs without motor data.
+    Force(f32),
+    /// A duty cycle from -1 to 1, positive along +x.
+    Duty(f32),
+}
+
+impl Drive {
+    /// No force, motor off.
+    pub const OFF: Self = Drive::Force(0.0);
+
+    /// The command as a duty cycle from -1 to 1. A force becomes a share of `force_limit` (N), for a power stage that
+    /// controls the motor's current and is set to reach the limit at its full scale.
+    pub fn duty(self, force_limit: f32) -> f32 {
+        match self {
+            Drive::Force(force) => saturate(force / force_limit, 1.0),
+            Drive::Duty(duty) => saturate(duty, 1.0),
+        }
+    }
+}
+
+impl MotorMap {
+    /// Voltage that makes the motor push with `force` (N) at cart speed `speed` (m/s), within the supply and the slew
+    /// limit from `last_v`; and the force that this voltage makes.
+    ///
+    /// ```text
+    /// V = (R r / (gear Kt)) F + (gear Kt / r) ẋ
+    /// ```
+    pub fn drive(&self, force: f32, speed: f32, last_v: f32) -> (f32, f32) {
+        let back_emf = self.volts_per_speed * speed;
+        let wanted = self.volts_per_newton * force + back_emf;
+        // What is left of the supply when the dead zone has taken its share.
+        let within_supply = saturate(wanted, self.supply_v - self.dead_zone_v);
+        let volts = last_v + saturate(within_supply - last_v, self.slew_v_per_tick);
+        if volts == wanted { (volts, force) } else { (volts, (volts - back_emf) / self.volts_per_newton) }
+    }
+
+    /// Duty cycle for `volts`, lifted over the dead zone.
+    ///
+    /// The lift grows with the voltage, ten times as fast, up to the whole dead zone: the duty does not jump at rest, and
+    /// less than a tenth of the dead zone is left of it.
+    pub fn duty(&self, volts: f32) -> f32 {
+        let lift = saturate(10.0 * volts, self.dead_zone_v);
+        saturate((volts + lift) / self.supply_v, 1.0)
+    }
+
+    pub(crate) fn values(&self) -> [f32; 5] {
+        [self.volts_per_newton, self.volts_per_speed, self.dead_zone_v, self.slew_v_per_tick, self.supply_v]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const MOTOR: MotorMap = MotorMap {
+        volts_per_newton: 2.0,
+        volts_per_speed: 4.0,
+        dead_zone_v: 1.0,
+        slew_v_per_tick: 100.0,
+        supply_v: 12.0,
+    };
+
+    #[test]
+    fn back_emf_is_made_up_for() {
+        assert_eq!(MOTOR.drive(1.5, 0.5, 0.0), (5.0, 1.5));
+    }
+
+    #[test]
+    fn the_force_that_is_left_at_the_supply_limit_is_reported() {
+        // 11 V of 12 V are left above the dead zone; 4 V go into back-EMF.
+        assert_eq!(MOTOR.drive(10.0, 1.0, 0.0), (11.0, 3.5));
+        assert_eq!(MOTOR.duty(11.0), 1.0);
+        assert_eq!(MOTOR.duty(-11.0), -1.0);
+    }
+
+    #[test]
+    fn the_voltage_changes_no_faster_than_the_slew_limit() {
+        let slow = MotorMap { slew_v_per_tick: 0.5, ..MOTOR };
+        assert_eq!(slow.drive(2.0, 0.0, 1.0), (1.5, 0.75));
+        assert_eq!(slow.drive(-2.0, 0.0, 1.0), (0.5, 0.25));
+    }
+
+    #[test]
+    fn the_dead_zone_is_jumped_without_a_jump_at_rest() {
+        assert_eq!(MOTOR.duty(0.0), 0.0);
+        assert_eq!(MOTOR.duty(0.0625), 0.6875 / 12.0);
+        assert_eq!(MOTOR.duty(0.5), 1.5 / 12.0);
+        assert_eq!(MOTOR.duty(2.0), 3.0 / 12.0);
+    }
+
+    #[test]
+    fn a_force_is_a_share_of_the_limit() {
+        assert_eq!(Drive::Force(-5.0).duty(20.0), -0.25);
+        assert_eq!(Drive::Force(30.0).duty(20.0), 1.0);
+        assert_eq!(Drive::Duty(-0.5).duty(20.0), -0.5);
+        assert_eq!(Drive::OFF.duty(20.0), 0.0);
+        assert_eq!(Drive::Force(f32::NAN).duty(20.0), 0.0);
+    }
+
+    #[test]
+    fn not_a_number_turns_the_motor_off() {
+        assert_eq!(MOTOR.duty(f32::NAN), 0.0);
+        assert_eq!(MOTOR.drive(f32::NAN, 0.0, 0.0).0, 0.0);
+    }
+}

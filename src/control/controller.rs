@@ -1,0 +1,504 @@
+//! The controller: one tick from encoder counts to motor duty.
+
+use nalgebra::SVector;
+use serde::{Deserialize, Serialize};
+
+use crate::control::actuator::Drive;
+use crate::control::encoder::{CounterWidth, Encoders};
+use crate::control::observer::Observer;
+use crate::control::state_feedback::{FeedbackSum, LawGains, LawState, saturate, state_feedback};
+use crate::table::{Build, GainTable, Law, TableError};
+
+/// Observer, control law and actuator map of one gain table.
+///
+/// A tick has two halves. [`control`](Self::control) goes from counts to duty and is all that has to happen between
+/// reading the encoders and driving the motor; [`predict`](Self::predict) prepares the next tick and may follow after.
+#[derive(Debug, Clone)]
+pub struct Controller<'t, const NX: usize, const NY: usize> {
+    table: &'t GainTable<NX, NY>,
+    law: Law,
+    gains: &'t LawGains<NX>,
+    /// Whether the law depends on earlier ticks, by a force on its way or an integral.
+    remembers: bool,
+    mode: Mode<'t, NX, NY>,
+    target: f32,
+    encoders: Encoders<NY>,
+    /// Current estimate x̂ within a tick, predicted estimate x̂⁻ between ticks.
+    estimate: SVector<f32, NX>,
+    innovation: SVector<f32, NY>,
+    state: LawState,
+    last_volts: f32,
+    requested: f32,
+    applied: f32,
+}
+
+#[derive(Debug, Clone, Copy)]
+enum Mode<'t, const NX: usize, const NY: usize> {
+    Stopped,
+    /// Running, and the table holds no observer.
+    WithoutObserver,
+    /// Running, and sensor i measures state 2i, as in every chain.
+    InOrder(Observer<'t, NX, NY>),
+    /// Running, and the table says which state a sensor measures.
+    LookingUp(Observer<'t, NX, NY>),
+}
+
+/// The outcome of a tick.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Command {
+    /// Force that the control law asks for (N).
+    pub requested: f32,
+    /// Force that will be applied, within all limits (N); 0 if the request is not a number.
+    pub applied: f32,
+    /// What goes to the power stage.
+    pub drive: Drive,
+}
+
+/// A request the controller does not follow; what was set before stays.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+pub enum Rejected {
+    /// The table holds no gains for this law.
+    NoSuchLaw,
+    /// The law can only be changed while the controller is stopped.
+    Running,
+    /// The set-point is not a finite number, or not within the soft limits of the rail.
+    Setpoint,
+    /// The table holds no observer, so the controller cannot run from encoders.
+    NoObserver,
+}
+
+impl core::fmt::Display for Rejected {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        f.write_str(match self {
+            Rejected::NoSuchLaw => "the gain table does not hold this control law",
+            Rejected::Running => "the control law can only be changed while disarmed",
+            Rejected::Setpoint => "the set-point is not a finite number within the soft limits of the rail",
+            Rejected::NoObserver => {
+                "the gain table holds no observer: give the rig its encoders and [kalman]"
+            }
+        })
+    }
+}
+
+impl core::error::Error for Rejected {}
+
+const OFF: Command = Command { requested: 0.0, applied: 0.0, drive: Drive::OFF };
+
+impl<'t, const NX: usize, const NY: usize> Controller<'t, NX, NY> {
+    /// A stopped controller at set-point 0 with the first law the table holds (LQR before pole placement), for encoder
+    /// counters of these widths.
+    ///
+    /// # Errors
+    /// [`TableError`] if the table is damaged or was made for another build.
+    pub fn new(
+        table: &'t GainTable<NX, NY>,
+        build: &Build,
+        widths: [CounterWidth; NY],
+    ) -> Result<Self, TableError> {
+        table.check(build)?;
+        let (law, gains) = match (&table.lqr, &table.pole_placement) {
+            (Some(gains), _) => (Law::Lqr, gains),
+            (None, Some(gains)) => (Law::PolePlacement, gains),
+            (None, None) => return Err(TableError::NoLaw),
+        };
+        Ok(Self {
+            table,
+            law,
+            gains,
+            remembers: table.remembers(gains),
+            mode: Mode::Stopped,
+            target: 0.0,
+            encoders: Encoders::new(widths),
+            estimate: SVector::zeros(),
+            innovation: SVector::zeros(),
+            state: LawState::default(),
+            last_volts: 0.0,
+            requested: 0.0,
+            applied: 0.0,
+        })
+    }
+
+    /// The law in use.
+    pub fn law(&self) -> Law {
+        self.law
+    }
+
+    /// Uses another law of the table.
+    ///
+    /// # Errors
+    /// [`Rejected::Running`] between [`start`](Self::start) and [`stop`](Self::stop): a change of gains in mid-balance is
+    /// a jump of the force. [`Rejected::NoSuchLaw`] if the table does not hold it.
+    pub fn select(&mut self, law: Law) -> Result<(), Rejected> {
+        if !matches!(self.mode, Mode::Stopped) {
+            return Err(Rejected::Running);
+        }
+        self.gains = self.table.law(law).ok_or(Rejected::NoSuchLaw)?;
+        self.remembers = self.table.remembers(self.gains);
+        self.law = law;
+        Ok(())
+    }
+
+    /// Wanted cart position (m), as asked for; the governed one that the law follows is in
+    /// [`law_state`](Self::law_state).
+    pub fn setpoint(&self) -> f32 {
+        self.target
+    }
+
+    /// Asks for a cart position (m). The governor takes the law there no faster than the limits allow.
+    ///
+    /// # Errors
+    /// [`Rejected::Setpoint`] if it is not finite.
+    pub fn set_setpoint(&mut self, position: f32) -> Result<(), Rejected> {
+        if !position.is_finite() {
+            return Err(Rejected::Setpoint);
+        }
+        self.target = position;
+        Ok(())
+    }
+
+    /// Governed set-point, integral and force on its way.
+    pub fn law_state(&self) -> &LawState {
+        &self.state
+    }
+
+    /// The estimate: current x̂ after [`control`](Self::control), predicted x̂⁻ after [`predict`](Self::predict).
+    pub fn estimate(&self) -> &SVector<f32, NX> {
+        &self.estimate
+    }
+
+    /// What the sensors said in the last tick beyond the prediction (m or rad).
+    pub fn innovation(&self) -> &SVector<f32, NY> {
+        &self.innovation
+    }
+
+    /// The encoders, for homing.
+    pub fn encoders_mut(&mut self) -> &mut Encoders<NY> {
+        &mut self.encoders
+    }
+
+    /// Positions according to the encoders (m, rad); all 0 without observer.
+    pub fn positions(&self) -> SVector<f32, NY> {
+        self.table
+            .observer
+            .as_ref()
+            .map_or_else(SVector::zeros, |observer| self.encoders.positions(&observer.step))
+    }
+
+    /// Starts from rest where the encoders stand at `raw` counts: rates 0, governed set-point at the output, nothing on
+    /// its way.
+    ///
+    /// # Errors
+    /// [`Rejected::NoObserver`] if the table holds none.
+    pub fn start(&mut self, raw: &[u32; NY]) -> Result<(), Rejected> {
+        let observer = self.table.observer.as_ref().ok_or(Rejected::NoObserver)?;
+        self.encoders.update(raw);
+        let y = self.encoders.positions(&observer.step);
+        let mut x = SVector::<f32, NX>::zeros();
+        for (&state, &position) in observer.measured.iter().zip(y.iter()) {
+            if let Some(entry) = x.get_mut(state as usize) {
+                *entry = position;
+            }
+        }
+        self.start_in_state(&x);
+        Ok(())
+    }
+
+    /// Starts from the state `x` (m, m/s, rad, rad/s …).
+    pub fn start_in_state(&mut self, x: &SVector<f32, NX>) {
+        self.estimate = *x;
+        self.innovation = SVector::zeros();
+        self.state = LawState { setpoint: self.output(), ..LawState::default() };
+        self.last_volts = 0.0;
+        (self.requested, self.applied) = (0.0, 0.0);
+        self.mode = match &self.table.observer {
+            None => Mode::WithoutObserver,
+            Some(gains) if gains.sensors_are_in_order() => Mode::InOrder(Observer::new(gains)),
+            Some(gains) => Mode::LookingUp(Observer::new(gains)),
+        };
+    }
+
+    /// Stops: the next tick needs a new start.
+    pub fn stop(&mut self) {
+        self.mode = Mode::Stopped;
+    }
+
+    /// Follows the encoders, and no more: a tick of a stopped controller.
+    pub fn follow(&mut self, raw: &[u32; NY]) {
+        self.encoders.update(raw);
+    }
+
+    /// First half of a tick: from raw encoder counts to the command for the motor.
+    ///
+    /// With `delay_ticks = 0` the command is carried out at once and held for one tick. With 1 it is carried out, and
+    /// held, from the start of the next tick; the law then also feeds back the force that is still on its way.
+    ///
+    /// ```text
+    /// e = y - C x̂⁻,   x̂ = x̂⁻ + L e,   u = sat(N r - K x̂ - k_pending u_pending - k_integral z)
+    /// ```
+    pub fn control(&mut self, raw: &[u32; NY]) -> Command {
+        self.control_with(raw, |_, _, _| ())
+    }
+
+    /// As [`control`](Self::control), with a look at counts, positions and innovation before the innovation is used:
+    /// `judge` sets that of a measurement it rejects to 0, and the prediction takes its place.
+    #[inline(always)]
+    pub fn control_with(
+        &mut self,
+        raw: &[u32; NY],
+        judge: impl FnOnce(&[i32; NY], &[f32; NY], &mut [f32; NY]),
+    ) -> Command {
+        let requested = match self.mode {
+            Mode::InOrder(observer) => self.observe(&observer, raw, |sensor| 2 * sensor, judge),
+            Mode::LookingUp(observer) => self.observe_looking_up(&observer, raw, judge),
+            Mode::WithoutObserver | Mode::Stopped => {
+                self.encoders.update(raw);
+                return OFF;
+            }
+        };
+        self.drive(requested)
+    }
+
+    /// First half of a tick with the whole state measured: what the paper simulates.
+    pub fn control_from_state(&mut self, x: &SVector<f32, NX>) -> Command {
+        self.estimate = *x;
+        if let Mode::Stopped = self.mode {
+            return OFF;
+        }
+        self.state.govern(self.target, self.gains.setpoint_step);
+        let requested = self.request(state_feedback(self.gains.n, self.state.setpoint, &self.gains.k, x));
+        self.drive(requested)
+    }
+
+    // Out of line, so that it costs the way without look-up no register.
+    #[cold]
+    #[inline(never)]
+    fn observe_looking_up(
+        &mut self,
+        observer: &Observer<'t, NX, NY>,
+        raw: &[u32; NY],
+        judge: impl FnOnce(&[i32; NY], &[f32; NY], &mut [f32; NY]),
+    ) -> f32 {
+        let measured = &observer.gains.measured;
+        self.observe(observer, raw, |sensor| measured.get(sensor).map_or(NX, |&state| state as usize), judge)
+    }
+
+    #[inline(always)]
+    fn observe(
+        &mut self,
+        observer: &Observer<'t, NX, NY>,
+        raw: &[u32; NY],
+        measured: impl Fn(usize) -> usize,
+        judge: impl FnOnce(&[i32; NY], &[f32; NY], &mut [f32; NY]),
+    ) -> f32 {
+        self.state.govern(self.target, self.gains.setpoint_step);
+        let y = self.encoders.measure(raw, &observer.gains.step).data.0[0];
+        let estimate = &mut self.estimate.data.0[0];
+        let mut sum = FeedbackSum::new(self.gains.n, self.state.setpoint);
+        let counts = self.encoders.counts();
+        let mut e = observer.innovation(measured, &y, estimate);
+        judge(counts, &y, &mut e);
+        self.innovation.data.0[0] = e;
+        observer.correct(&e, estimate, |joint, x| {
+            if let Some(k) = self.gains.k.as_slice().chunks(2).nth(joint) {
+                sum.feed_back(k, x);
+            }
+        });
+        self.request(sum.force())
+    }
+
+    /// The force that the law asks for, from its state feedback.
+    #[inline(always)]
+    fn request(&mut self, feedback: f32) -> f32 {
+        let mut requested = feedback;
+        if self.remembers {
+            requested -= self.gains.k_pending * self.state.pending;
+            requested -= self.gains.k_integral * self.state.integral;
+            self.requested = requested;
+        }
+        requested
+    }
+
+    /// Limits the force and turns it into what the power stage needs.
+    #[inline]
+    fn drive(&mut self, requested: f32) -> Command {
+        let limited = saturate(requested, self.table.force_limit_n);
+        let (applied, drive) = match &self.table.motor {
+            None => (limited, Drive::Force(limited)),
+            Some(motor) => {
+                // The speed of the cart is the state after its position.
+                let speed = self.estimate.get(1).copied().unwrap_or_default();
+                let (volts, force) = motor.drive(limited, speed, self.last_volts);
+                self.last_volts = volts;
+                (force, Drive::Duty(motor.duty(volts)))
+            }
+        };
+        self.applied = applied;
+        Command { requested, applied, drive }
+    }
+
+    /// Second half of a tick: `x̂⁻ = Ad x̂ + Bd u` with the force really applied, and the integral.
+    pub fn predict(&mut self) {
+        let (requested, applied) = (self.requested, self.applied);
+        let during_this_tick = self.acting();
+        if self.remembers {
+            let position = self.output();
+            self.state.advance(self.gains.k_integral, position, self.table.tick_s, requested, applied);
+        }
+        if let Mode::InOrder(observer) | Mode::LookingUp(observer) = &self.mode {
+            observer.predict(&mut self.estimate.data.0[0], during_this_tick);
+        }
+    }
+
+    /// Force on the cart during this tick (N), between [`control`](Self::control) and [`predict`](Self::predict).
+    pub fn acting(&self) -> f32 {
+        if self.remembers && self.table.delay_ticks == 1 { self.state.pending } else { self.applied }
+    }
+
+    fn output(&self) -> f32 {
+        self.estimate.get(self.table.output as usize).copied().unwrap_or_default()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::control::observer::ObserverGains;
+    use crate::supervision::detection::Thresholds;
+    use crate::table::limits::Limits;
+    use crate::table::{TABLE_FORMAT, columns};
+    use nalgebra::{matrix, vector};
+
+    const BUILD: Build = Build { rig_hash: 7, tick_s: 0.5 };
+
+    /// A cart of 2 kg without friction, held for half a second.
+    fn table() -> GainTable<2, 1> {
+        let law = LawGains {
+            k: columns([[1.0, 2.0]]),
+            k_pending: 0.5,
+            k_integral: 0.0,
+            n: 1.0,
+            setpoint_step: 10.0,
+        };
+        let mut table = GainTable {
+            format: TABLE_FORMAT,
+            states: 2,
+            sensors: 1,
+            output: 0,
+            rig_hash: 7,
+            tick_s: 0.5,
+            delay_ticks: 1,
+            force_limit_n: 5.0,
+            lqr: Some(law),
+            pole_placement: None,
+            observer: Some(ObserverGains {
+                ad: matrix![1.0, 0.5; 0.0, 1.0],
+                bd: vector![0.0625, 0.25],
+                l: matrix![0.5; 1.0],
+                measured: [0],
+                step: vector![0.25],
+            }),
+            motor: None,
+            limits: Limits::none(),
+            thresholds: Thresholds::none(),
+            crc: 0,
+        };
+        table.crc = table.checksum();
+        table
+    }
+
+    fn controller(table: &GainTable<2, 1>) -> Controller<'_, 2, 1> {
+        let mut controller = Controller::new(table, &BUILD, [CounterWidth::Bits16]).unwrap();
+        controller.start_in_state(&vector![0.0, 0.0]);
+        controller
+    }
+
+    #[test]
+    fn the_force_on_its_way_is_fed_back() {
+        let table = table();
+        let mut controller = controller(&table);
+        let x = vector![-1.0, -1.0];
+        assert_eq!(controller.control_from_state(&x).applied, 3.0);
+        controller.predict();
+        assert_eq!(controller.control_from_state(&x).applied, 1.5);
+    }
+
+    #[test]
+    fn a_limited_force_is_what_counts_as_on_its_way() {
+        let table = table();
+        let mut controller = controller(&table);
+        let command = controller.control_from_state(&vector![-100.0, 0.0]);
+        assert_eq!((command.requested, command.applied), (100.0, 5.0));
+        controller.predict();
+        assert_eq!(controller.control_from_state(&vector![0.0, 0.0]).requested, -2.5);
+    }
+
+    #[test]
+    fn the_estimate_uses_the_force_that_is_applied_in_the_tick() {
+        let table = table();
+        let mut controller = controller(&table);
+        // 4 counts of 0.25 m: innovation 1, estimate (0.5, 1), request -(0.5 + 2).
+        let command = controller.control(&[4]);
+        assert_eq!(command.applied, -2.5);
+        controller.predict();
+        // With a tick of delay that force is still on its way: Ad x̂ alone.
+        assert_eq!(controller.estimate(), &vector![1.0, 1.0]);
+        controller.control(&[4]);
+        controller.predict();
+        assert_eq!(controller.estimate(), &vector![1.5 - 0.0625 * 2.5, 1.0 - 0.25 * 2.5]);
+    }
+
+    #[test]
+    fn a_stopped_controller_gives_no_force() {
+        let table = table();
+        let mut controller = controller(&table);
+        controller.stop();
+        assert_eq!(controller.control(&[400]), OFF);
+        assert_eq!(controller.control_from_state(&vector![9.0, 9.0]).drive, Drive::OFF);
+    }
+
+    #[test]
+    fn a_request_that_makes_no_sense_leaves_everything_as_it_was() {
+        let table = table();
+        let mut controller = controller(&table);
+        controller.set_setpoint(0.25).unwrap();
+        assert_eq!(controller.set_setpoint(f32::NAN), Err(Rejected::Setpoint));
+        assert_eq!(controller.select(Law::Lqr), Err(Rejected::Running));
+        controller.stop();
+        assert_eq!(controller.select(Law::PolePlacement), Err(Rejected::NoSuchLaw));
+        assert_eq!((controller.setpoint(), controller.law()), (0.25, Law::Lqr));
+    }
+
+    #[test]
+    fn a_table_that_does_not_fit_is_refused() {
+        let refused = |change: &dyn Fn(&mut GainTable<2, 1>), sealed: bool| {
+            let mut table = table();
+            change(&mut table);
+            if sealed {
+                table.crc = table.checksum();
+            }
+            Controller::new(&table, &BUILD, [CounterWidth::Bits16]).err()
+        };
+        assert_eq!(refused(&|_| (), true), None);
+        assert_eq!(refused(&|t| t.format += 1, true), Some(TableError::Format));
+        assert_eq!(refused(&|t| t.states = 3, true), Some(TableError::Dimensions));
+        assert_eq!(refused(&|t| t.sensors = 2, true), Some(TableError::Dimensions));
+        assert_eq!(refused(&|t| t.output = 2, true), Some(TableError::Dimensions));
+        assert_eq!(refused(&|t| t.rig_hash ^= 1, true), Some(TableError::RigHash));
+        assert_eq!(refused(&|t| t.tick_s = 0.002, true), Some(TableError::Tick));
+        assert_eq!(refused(&|t| t.delay_ticks = 2, true), Some(TableError::Delay));
+        assert_eq!(refused(&|t| t.force_limit_n = f32::NAN, true), Some(TableError::Value));
+        assert_eq!(refused(&|t| t.lqr = None, true), Some(TableError::NoLaw));
+        assert_eq!(refused(&|t| t.force_limit_n = 6.0, false), Some(TableError::Crc));
+    }
+
+    #[test]
+    fn every_single_bit_of_a_gain_is_guarded_by_the_checksum() {
+        for bit in 0..32 {
+            let mut table = table();
+            if let Some(observer) = &mut table.observer {
+                observer.ad[(1, 0)] = f32::from_bits(observer.ad[(1, 0)].to_bits() ^ 1 << bit);
+            }
+            assert_eq!(table.check(&BUILD), Err(TableError::Crc));
+        }
+    }
+}

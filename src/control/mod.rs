@@ -1,0 +1,7 @@
+//! From encoder counts to the motor's duty, once per tick.
+
+pub mod actuator;
+pub mod controller;
+pub mod encoder;
+pub mod observer;
+pub mod state_feedback;

@@ -1,0 +1,186 @@
+//! Frames on a serial line: postcard, then a CRC-32, then COBS, then a zero byte.
+//!
+//! One definition for both ends and every kind of message. A receiver that has lost its place finds it again at the next
+//! zero byte.
+
+use cobs::{DecodeResult, DecoderState};
+use serde::{Deserialize, Serialize};
+
+use crate::table::checksum::crc32;
+
+const CRC_BYTES: usize = 4;
+/// What follows every frame, and is in none.
+pub const END: u8 = 0;
+
+/// Why bytes are not a frame, or a message does not fit into one.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum FrameError {
+    /// Longer than the buffer.
+    Long,
+    /// Not COBS, or too short for a checksum.
+    Coding,
+    /// The checksum is wrong.
+    Crc,
+    /// The contents are not the message that was expected.
+    Message,
+}
+
+impl core::fmt::Display for FrameError {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        f.write_str(match self {
+            FrameError::Long => "the frame is too long",
+            FrameError::Coding => "the frame is not coded with COBS, or too short",
+            FrameError::Crc => "the frame's checksum is wrong",
+            FrameError::Message => "the frame holds something else than the expected message",
+        })
+    }
+}
+
+impl core::error::Error for FrameError {}
+
+/// Writes `message` as a frame, its end included, into `out` and gives that part of it. `scratch` is room for the
+/// message before COBS.
+///
+/// # Errors
+/// [`FrameError::Long`] if either buffer is too small.
+pub fn encode<'a, T: Serialize>(
+    message: &T,
+    scratch: &mut [u8],
+    out: &'a mut [u8],
+) -> Result<&'a [u8], FrameError> {
+    let length = postcard::to_slice(message, scratch).map_err(|_| FrameError::Long)?.len();
+    let (body, rest) = scratch.split_at_mut_checked(length).ok_or(FrameError::Long)?;
+    let crc = crc32(0, body).to_le_bytes();
+    rest.get_mut(..CRC_BYTES).ok_or(FrameError::Long)?.copy_from_slice(&crc);
+    let checked = scratch.get(..length + CRC_BYTES).ok_or(FrameError::Long)?;
+    let length = cobs::try_encode(checked, out).map_err(|_| FrameError::Long)?;
+    *out.get_mut(length).ok_or(FrameError::Long)? = END;
+    out.get(..=length).ok_or(FrameError::Long)
+}
+
+/// Reads a frame, without the zero byte at its end. `frame` is overwritten.
+///
+/// # Errors
+/// [`FrameError`]; nothing of a damaged frame is used.
+pub fn decode<T: for<'de> Deserialize<'de>>(frame: &mut [u8]) -> Result<T, FrameError> {
+    let length = unstuff(frame).ok_or(FrameError::Coding)?;
+    let checked = frame.get(..length).ok_or(FrameError::Coding)?;
+    let (body, crc) = checked.split_last_chunk::<CRC_BYTES>().ok_or(FrameError::Coding)?;
+    if crc32(0, body) != u32::from_le_bytes(*crc) {
+        return Err(FrameError::Crc);
+    }
+    match postcard::take_from_bytes(body) {
+        Ok((message, [])) => Ok(message),
+        _ => Err(FrameError::Message),
+    }
+}
+
+/// Decodes COBS in place; the length of what comes out.
+fn unstuff(frame: &mut [u8]) -> Option<usize> {
+    let (mut decoder, mut length) = (DecoderState::Idle, 0);
+    for i in 0..frame.len() {
+        match decoder.feed(*frame.get(i)?).ok()? {
+            DecodeResult::NoData => {}
+            DecodeResult::DataContinue(byte) => {
+                *frame.get_mut(length)? = byte;
+                length += 1;
+            }
+            DecodeResult::DataComplete => return None,
+        }
+    }
+    matches!(decoder.feed(END), Ok(DecodeResult::DataComplete)).then_some(length)
+}
+
+/// Cuts a stream of bytes into frames of up to `N` bytes.
+#[derive(Debug, Clone)]
+pub struct Receiver<const N: usize> {
+    buffer: [u8; N],
+    length: usize,
+}
+
+impl<const N: usize> Default for Receiver<N> {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+impl<const N: usize> Receiver<N> {
+    /// Nothing received yet.
+    pub const fn new() -> Self {
+        Self { buffer: [0; N], length: 0 }
+    }
+
+    /// Takes the next byte; the message of the frame that it completes, or why there is none. Empty frames say nothing.
+    pub fn push<T: for<'de> Deserialize<'de>>(&mut self, byte: u8) -> Option<Result<T, FrameError>> {
+        if byte != END {
+            // A longer frame is dropped as a whole: its length stays beyond the buffer.
+            if let Some(place) = self.buffer.get_mut(self.length) {
+                *place = byte;
+            }
+            self.length = self.length.saturating_add(1);
+            return None;
+        }
+        let length = core::mem::take(&mut self.length);
+        if length == 0 {
+            return None;
+        }
+        Some(self.buffer.get_mut(..length).ok_or(FrameError::Long).and_then(|frame| decode(frame)))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    fn frame<T: Serialize>(message: &T) -> heapless::Vec<u8, 64> {
+        let (mut scratch, mut out) = ([0; 64], [0; 64]);
+        heapless::Vec::from_slice(encode(message, &mut scratch, &mut out).unwrap()).unwrap()
+    }
+
+    fn receive(receiver: &mut Receiver<64>, bytes: &[u8]) -> heapless::Vec<Result<(u8, u32), FrameError>, 8> {
+        bytes.iter().filter_map(|&byte| receiver.push(byte)).collect()
+    }
+
+    proptest! {
+        #[test]
+        fn a_message_comes_back_as_it_was(message: (u8, u32)) {
+            let received = receive(&mut Receiver::new(), &frame(&message));
+            prop_assert_eq!(received.as_slice(), &[Ok(message)]);
+        }
+
+        #[test]
+        fn one_wrong_bit_never_gives_a_message(message: (u8, u32), bit in 0usize..64) {
+            let mut bytes = frame(&message);
+            let bit = bit % (8 * (bytes.len() - 1));
+            bytes[bit / 8] ^= 1 << (bit % 8);
+            prop_assert!(receive(&mut Receiver::new(), &bytes).iter().all(Result::is_err));
+        }
+
+        #[test]
+        fn after_any_rubbish_the_next_frame_is_read(rubbish: std::vec::Vec<u8>, message: (u8, u32)) {
+            let mut receiver = Receiver::<64>::new();
+            receive(&mut receiver, &rubbish.into_iter().take(7).collect::<std::vec::Vec<_>>());
+            receive(&mut receiver, &[END]);
+            let received = receive(&mut receiver, &frame(&message));
+            prop_assert_eq!(received.as_slice(), &[Ok(message)]);
+        }
+    }
+
+    #[test]
+    fn a_frame_that_is_too_long_is_dropped_as_a_whole() {
+        let mut receiver = Receiver::<8>::new();
+        for _ in 0..100 {
+            assert_eq!(receiver.push::<u8>(1), None);
+        }
+        assert_eq!(receiver.push::<u8>(END), Some(Err(FrameError::Long)));
+        let last = frame(&7u8).iter().filter_map(|&byte| receiver.push::<u8>(byte)).last();
+        assert_eq!(last, Some(Ok(7)));
+    }
+
+    #[test]
+    fn a_message_that_does_not_fit_is_not_sent() {
+        let (mut scratch, mut out) = ([0; 64], [0; 5]);
+        assert_eq!(encode(&(1u8, 2u32), &mut scratch, &mut out), Err(FrameError::Long));
+    }
+}

@@ -1,0 +1,309 @@
+//! Tests of the innovation: do encoders and motor do what the model says?
+//!
+//! Three tests run in every tick of balancing. All thresholds are worked out by `upright design` from the covariance of the
+//! Kalman filter and a stated rate of false alarms.
+//!
+//! - *Plausible*: `|e_i|` within its threshold. A measurement beyond it is rejected (the prediction takes its place) and
+//!   counted; the third in a row is a fault. It is the encoder's if no other sensor is in trouble, else the motor's:
+//!   a wrong force moves all of them.
+//! - *Not frozen*: while a counter stands still, the motion that the model predicts for it stays small. The predicted
+//!   motion is summed with a memory of [`MEMORY`] ticks, so that a small steady error of the model is no alarm.
+//! - *Motor*: the innovation of the cart is compared with what a missing force `-u` would make of it. The ratio of the two,
+//!   by least squares over a memory of [`MEMORY`] ticks, is 0 for a healthy motor, 1 for a dead and 2 for a reversed one.
+
+use crate::supervision::fault::Fault;
+
+/// Memory of the sums (ticks): each tick keeps `1 - 1/MEMORY` of them.
+pub const MEMORY: f32 = 16.0;
+const KEEP: f32 = 1.0 - 1.0 / MEMORY;
+/// So many implausible measurements in a row are a fault.
+pub const IN_A_ROW: u32 = 3;
+
+/// Thresholds of the tests for `NY` sensors; `f32::MAX` where there is nothing to test.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Thresholds<const NY: usize> {
+    /// Largest plausible innovation of each sensor (m or rad).
+    pub innovation: [f32; NY],
+    /// Largest predicted motion of each sensor while its counter stands still (m or rad).
+    pub frozen: [f32; NY],
+    /// The test of the motor.
+    pub motor: MotorTest,
+}
+
+/// What a missing force does to the innovation of the first sensor, and when that is a fault.
+///
+/// The error `(p, v)` of predicted position and speed follows
+/// `p⁺ = a_pp p' + a_pv v' - b_p u, v⁺ = a_vp p' + a_vv v' - b_v u` with `p' = p - l_p p, v' = v - l_v p`; p is the
+/// innovation that a missing `u` makes.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct MotorTest {
+    /// a_pp, a_pv, a_vp, a_vv over one tick, with the correction by the observer in them.
+    pub a: [f32; 4],
+    /// b_p (m/N), b_v (m/s/N).
+    pub b: [f32; 2],
+    /// Share of the force that may be missing.
+    pub ratio: f32,
+    /// Least sum of p² (m²) for a verdict.
+    pub energy: f32,
+}
+
+impl MotorTest {
+    /// No test.
+    pub const NONE: Self = Self { a: [0.0; 4], b: [0.0; 2], ratio: 1.0, energy: f32::MAX };
+
+    pub(crate) fn values(&self) -> [f32; 8] {
+        let ([pp, pv, vp, vv], [p, v]) = (self.a, self.b);
+        [pp, pv, vp, vv, p, v, self.ratio, self.energy]
+    }
+}
+
+impl<const NY: usize> Thresholds<NY> {
+    /// Thresholds that nothing exceeds.
+    pub const fn none() -> Self {
+        Self { innovation: [f32::MAX; NY], frozen: [f32::MAX; NY], motor: MotorTest::NONE }
+    }
+
+    pub(crate) fn is_sound(&self) -> bool {
+        let positive =
+            self.innovation.iter().chain(&self.frozen).chain([&self.motor.ratio, &self.motor.energy]);
+        positive.into_iter().all(|threshold| *threshold > 0.0 && threshold.is_finite())
+            && self.motor.values().iter().all(|value| value.is_finite())
+    }
+}
+
+/// What the tests have found in a tick.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Finding {
+    /// Encoder, frozen encoder or motor.
+    pub fault: Fault,
+    /// The sensor (0: cart, 1: first link …).
+    pub sensor: u8,
+}
+
+/// The memory of the tests.
+#[derive(Debug, Clone)]
+pub struct Detection<const NY: usize> {
+    sensors: [SensorMemory; NY],
+    missing: [f32; 2],
+    likeness: f32,
+    energy: f32,
+    rejected: u32,
+}
+
+/// What is remembered of a sensor.
+#[derive(Debug, Clone, Copy, Default)]
+struct SensorMemory {
+    counts: i32,
+    /// Corrected estimate of its position in the tick before (m or rad).
+    corrected: f32,
+    /// Predicted motion while the counter stands still (m or rad).
+    moved: f32,
+    /// Implausible measurements in a row.
+    implausible: u32,
+}
+
+impl<const NY: usize> Default for Detection<NY> {
+    fn default() -> Self {
+        Self {
+            sensors: [SensorMemory::default(); NY],
+            missing: [0.0; 2],
+            likeness: 0.0,
+            energy: 0.0,
+            rejected: 0,
+        }
+    }
+}
+
+impl<const NY: usize> Detection<NY> {
+    /// Begins at positions `y` (m or rad).
+    pub fn start(&mut self, counts: &[i32; NY], y: &[f32; NY]) {
+        *self = Self { rejected: self.rejected, ..Self::default() };
+        for ((sensor, &counts), &corrected) in self.sensors.iter_mut().zip(counts).zip(y) {
+            (sensor.counts, sensor.corrected) = (counts, corrected);
+        }
+    }
+
+    /// Tests the innovation `e = y - C x̂⁻` of a tick; measurements that are not plausible get the innovation 0.
+    #[inline]
+    pub fn test(
+        &mut self,
+        thresholds: &Thresholds<NY>,
+        counts: &[i32; NY],
+        y: &[f32; NY],
+        e: &mut [f32; NY],
+    ) -> Option<Finding> {
+        let (mut in_trouble, mut contradicts, mut frozen) = (0, None, None);
+        let limits = thresholds.innovation.iter().zip(&thresholds.frozen);
+        let measured = counts.iter().zip(y).zip(e.iter_mut());
+        // One pass over the sensors for both tests: every value is loaded once.
+        for (((memory, ((&counts, y), e)), (&plausible, &still)), sensor) in
+            self.sensors.iter_mut().zip(measured).zip(limits).zip(0..)
+        {
+            if counts == memory.counts {
+                // y - e is the predicted position.
+                memory.moved = KEEP * memory.moved + (y - *e - memory.corrected);
+                if memory.moved.abs() > still {
+                    frozen = Some(sensor);
+                }
+            } else {
+                (memory.moved, memory.counts) = (0.0, counts);
+            }
+            if e.abs() <= plausible {
+                memory.implausible = 0;
+            } else {
+                *e = 0.0;
+                memory.implausible = memory.implausible.saturating_add(1);
+                self.rejected = self.rejected.saturating_add(1);
+                in_trouble += 1;
+                if memory.implausible >= IN_A_ROW && contradicts.is_none() {
+                    contradicts = Some(sensor);
+                }
+            }
+        }
+        // A measurement that was rejected says nothing about the motor.
+        let motor = self.motor(&thresholds.motor, e.first().copied().unwrap_or_default());
+        let contradicts = contradicts.map(|sensor| Finding {
+            fault: if in_trouble > 1 { Fault::Motor } else { Fault::Encoder },
+            sensor,
+        });
+        contradicts.or(frozen.map(|sensor| Finding { fault: Fault::Frozen, sensor })).or(motor)
+    }
+
+    #[inline]
+    fn motor(&mut self, test: &MotorTest, e: f32) -> Option<Finding> {
+        let [missing, _] = self.missing;
+        self.likeness = KEEP * self.likeness + e * missing;
+        self.energy = KEEP * self.energy + missing * missing;
+        let found = self.energy > test.energy && self.likeness > test.ratio * self.energy;
+        found.then_some(Finding { fault: Fault::Motor, sensor: 0 })
+    }
+
+    /// Ends a tick in which the force `u` (N) acts, with the corrected estimate of the sensors' positions.
+    #[inline]
+    pub fn end(&mut self, test: &MotorTest, corrected: [f32; NY], u: f32) {
+        for (sensor, corrected) in self.sensors.iter_mut().zip(corrected) {
+            sensor.corrected = corrected;
+        }
+        let ([p, v], [pp, pv, vp, vv], [b_p, b_v]) = (self.missing, test.a, test.b);
+        self.missing = [pp * p + pv * v - b_p * u, vp * p + vv * v - b_v * u];
+    }
+
+    /// Measurements rejected since the start, or since they were last forgotten.
+    pub fn rejected(&self) -> u32 {
+        self.rejected
+    }
+
+    /// Counts rejected measurements from 0 again.
+    pub fn forget_rejected(&mut self) {
+        self.rejected = 0;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const THRESHOLDS: Thresholds<2> = Thresholds {
+        innovation: [1.0, 1.0],
+        frozen: [3.0, 3.0],
+        // A filter that follows the measurement at once, and a unit of way per newton and tick.
+        motor: MotorTest { a: [0.0; 4], b: [1.0, 0.0], ratio: 0.5, energy: 4.0 },
+    };
+
+    /// Innovations tick by tick, with counters that move; the tick of the first finding.
+    fn first(of: impl Fn(i32) -> [f32; 2]) -> Option<(i32, Finding)> {
+        let mut detection = Detection::default();
+        detection.start(&[0; 2], &[0.0; 2]);
+        (1..100).find_map(|tick| {
+            let found = detection.test(&THRESHOLDS, &[tick; 2], &[tick as f32; 2], &mut of(tick));
+            detection.end(&THRESHOLDS.motor, [tick as f32; 2], 0.0);
+            found.map(|finding| (tick, finding))
+        })
+    }
+
+    fn finding(fault: Fault, sensor: u8) -> Finding {
+        Finding { fault, sensor }
+    }
+
+    #[test]
+    fn the_third_implausible_measurement_in_a_row_is_a_fault_and_two_are_not() {
+        assert_eq!(first(|_| [0.9, -0.9]), None);
+        assert_eq!(first(|tick| [0.0, if tick % 3 == 0 { 0.0 } else { 5.0 }]), None);
+        let from_20 = |tick: i32| if tick >= 20 { -1.1 } else { 0.0 };
+        assert_eq!(first(|tick| [0.0, from_20(tick)]), Some((22, finding(Fault::Encoder, 1))));
+        assert_eq!(first(|tick| [from_20(tick), 0.0]), Some((22, finding(Fault::Encoder, 0))));
+        assert_eq!(first(|tick| [from_20(tick), from_20(tick)]), Some((22, finding(Fault::Motor, 0))));
+        assert_eq!(
+            first(|tick| [f32::NAN, f32::from(tick as i16) * 0.0]),
+            Some((3, finding(Fault::Encoder, 0)))
+        );
+    }
+
+    #[test]
+    fn a_rejected_measurement_has_no_innovation_and_is_counted() {
+        let mut detection = Detection::<2>::default();
+        let mut e = [7.0, 0.5];
+        assert_eq!(detection.test(&THRESHOLDS, &[7, 1], &[7.0, 1.0], &mut e), None);
+        assert_eq!((e, detection.rejected()), ([0.0, 0.5], 1));
+        detection.start(&[0; 2], &[0.0; 2]);
+        assert_eq!(detection.rejected(), 1, "a new start does not forget it");
+        detection.forget_rejected();
+        assert_eq!(detection.rejected(), 0);
+    }
+
+    /// The second counter stands still while the model moves it by `per_tick`; the tick of the finding.
+    fn frozen(per_tick: f32) -> Option<(i32, Finding)> {
+        let mut detection = Detection::<2>::default();
+        detection.start(&[0; 2], &[0.0; 2]);
+        (1..1000).find_map(|tick| {
+            // The observer holds on to the measurement: every tick it predicts the same motion again.
+            let mut e = [0.0, -per_tick];
+            let found = detection.test(&THRESHOLDS, &[tick, 0], &[tick as f32, 0.0], &mut e);
+            detection.end(&THRESHOLDS.motor, [tick as f32, 0.0], 0.0);
+            found.map(|finding| (tick, finding))
+        })
+    }
+
+    #[test]
+    fn a_counter_that_stands_still_while_the_model_moves_is_found() {
+        assert_eq!(frozen(0.4), Some((10, finding(Fault::Frozen, 1))));
+        assert_eq!(frozen(-0.4), Some((10, finding(Fault::Frozen, 1))));
+        // A small steady error of the model is no alarm, however long it lasts.
+        assert_eq!(frozen(0.18), None);
+    }
+
+    /// A motor of which a share is missing, pushed to and fro; the tick of the finding.
+    fn motor(missing: f32) -> Option<(i32, Finding)> {
+        let mut detection = Detection::<2>::default();
+        detection.start(&[0; 2], &[0.0; 2]);
+        let mut force = 0.0;
+        (1..1000).find_map(|tick| {
+            let mut e = [-missing * force, 0.0];
+            let found = detection.test(&THRESHOLDS, &[tick; 2], &[tick as f32; 2], &mut e);
+            force = if tick % 4 < 2 { 0.4 } else { -0.4 };
+            detection.end(&THRESHOLDS.motor, [tick as f32; 2], force);
+            found.map(|finding| (tick, finding))
+        })
+    }
+
+    #[test]
+    fn a_motor_of_which_more_than_half_is_missing_is_found() {
+        assert_eq!(motor(0.0), None);
+        assert_eq!(motor(0.45), None);
+        // Not enough has been moved for a verdict: 0.16 a tick gives at most 16 · 0.16 = 2.56.
+        assert_eq!(motor(1.0), None);
+        let found = |missing: f32| {
+            let mut detection = Detection::<2>::default();
+            (1..100).find_map(|tick| {
+                let mut e = [-missing * 0.6, 0.0];
+                let found = detection.test(&THRESHOLDS, &[tick; 2], &[tick as f32; 2], &mut e);
+                detection.end(&THRESHOLDS.motor, [tick as f32; 2], 0.6);
+                found.map(|finding| finding.fault)
+            })
+        };
+        assert_eq!(found(0.45), None);
+        assert_eq!(found(0.55), Some(Fault::Motor));
+        assert_eq!(found(1.0), Some(Fault::Motor));
+        assert_eq!(found(-1.0), None, "more force than asked for is not a missing one");
+    }
+}

@@ -1,0 +1,124 @@
+//! Where the cart is on its rail, by pushing it to both limit switches by hand.
+
+use serde::{Deserialize, Serialize};
+
+use crate::board::Contacts;
+
+/// How far homing is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+pub enum Homing {
+    /// Not homed since power-up or since positions were lost.
+    #[default]
+    NotHomed,
+    /// Push the cart to both limit switches; these have been touched.
+    Touch {
+        /// The one at the low end.
+        low: bool,
+        /// The one at the high end.
+        high: bool,
+    },
+    /// Both were touched; let the links hang still, away from the switches.
+    HoldStill,
+    /// Positions are known.
+    Homed,
+    /// The distance between the switches is not that of the rig file, or one of them does not open: nothing was homed.
+    WrongTravel,
+}
+
+/// The way to both limit switches and what it has found.
+#[derive(Debug, Clone, Default)]
+pub struct Rail {
+    low: Option<i32>,
+    high: Option<i32>,
+}
+
+impl Rail {
+    /// Takes the cart's counts and the contacts of a tick.
+    ///
+    /// `travel` is the distance between the switches and by how much it may differ (counts), `middle` the count of the
+    /// rail's middle. The first press of each switch counts. Once both were touched, gives the cart's position (counts).
+    ///
+    /// # Errors
+    /// [`WrongTravel`] if both are pressed at once, or the distance differs.
+    pub fn update(
+        &mut self,
+        cart: i32,
+        contacts: &Contacts,
+        travel: [i32; 2],
+        middle: i32,
+    ) -> Result<Option<i32>, WrongTravel> {
+        if contacts.limit_low && contacts.limit_high {
+            return Err(WrongTravel);
+        }
+        if contacts.limit_low {
+            self.low.get_or_insert(cart);
+        }
+        if contacts.limit_high {
+            self.high.get_or_insert(cart);
+        }
+        let (Some(low), Some(high)) = (self.low, self.high) else { return Ok(None) };
+        let [wanted, tolerance] = travel;
+        let found = high.wrapping_sub(low);
+        if found.wrapping_sub(wanted).unsigned_abs() > tolerance.unsigned_abs() {
+            return Err(WrongTravel);
+        }
+        let middle_found = low.wrapping_add(found / 2);
+        Ok(Some(cart.wrapping_sub(middle_found).wrapping_add(middle)))
+    }
+
+    /// How far it is.
+    pub fn progress(&self) -> Homing {
+        match (self.low, self.high) {
+            (Some(_), Some(_)) => Homing::HoldStill,
+            (low, high) => Homing::Touch { low: low.is_some(), high: high.is_some() },
+        }
+    }
+}
+
+/// The rail is not as long as the rig file says, or a switch is stuck.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct WrongTravel;
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const TRAVEL: [i32; 2] = [2000, 20];
+    const OPEN: Contacts = Contacts {
+        limit_low: false,
+        limit_high: false,
+        emergency_stop: false,
+        driver_fault: false,
+        overrun: false,
+        clock_fault: false,
+    };
+
+    /// The cart pushed along these counts, with the switches closing at `low` and below, `high` and above.
+    fn push(path: &[i32], low: i32, high: i32, middle: i32) -> Result<Option<i32>, WrongTravel> {
+        let mut rail = Rail::default();
+        path.iter().try_fold(None, |_, &cart| {
+            let contacts = Contacts { limit_low: cart <= low, limit_high: cart >= high, ..OPEN };
+            rail.update(cart, &contacts, TRAVEL, middle)
+        })
+    }
+
+    #[test]
+    fn both_switches_give_the_position_whichever_comes_first() {
+        assert_eq!(push(&[0, -700, -300, 1295, 100], -700, 1295, 0), Ok(Some(-197)));
+        assert_eq!(push(&[0, 1295, 0, -700, -702, 100], -700, 1295, 50), Ok(Some(-147)));
+    }
+
+    #[test]
+    fn one_switch_is_not_enough() {
+        assert_eq!(push(&[0, -700, -300], -700, 1295, 0), Ok(None));
+    }
+
+    #[test]
+    fn a_rail_of_another_length_a_reversed_encoder_and_a_stuck_switch_are_refused() {
+        assert_eq!(push(&[0, -700, 1200], -700, 1200, 0), Err(WrongTravel));
+        assert_eq!(push(&[0, 700, -1300], 700, -1300, 0), Err(WrongTravel));
+        let mut rail = Rail::default();
+        let both = Contacts { limit_low: true, limit_high: true, ..OPEN };
+        assert_eq!(rail.update(0, &both, TRAVEL, 0), Err(WrongTravel));
+    }
+}

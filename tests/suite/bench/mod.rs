@@ -1,0 +1,82 @@
+//! Rigs, tables and runs that the closed-loop tests share.
+
+// Each test program uses some of these.
+#![allow(dead_code)]
+
+use std::path::{Path, PathBuf};
+
+use upright::table::Law;
+use upright_design::design::{Certified, design};
+use upright_design::rig::{Rig, Tick};
+use upright_design::simulate::{Scenario, Sensing, Summary, simulate};
+use upright_design::table::{Gains, TableValues};
+
+pub(crate) const LAWS: [Law; 2] = [Law::Lqr, Law::PolePlacement];
+
+fn rigs() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("rigs")
+}
+
+/// The rig in file `name`.
+pub(crate) fn rig(name: &str) -> Rig {
+    Rig::from_path(&rigs().join(name).with_extension("toml")).unwrap_or_else(|error| panic!("{error}"))
+}
+
+/// The rig whose gains `src/gains.rs` holds: the one of that name in `rigs/`, whatever its file is called.
+pub(crate) fn rig_of_the_firmware() -> Rig {
+    let wanted = upright::gains::RIG;
+    std::fs::read_dir(rigs())
+        .unwrap()
+        .map(|entry| entry.unwrap().path())
+        .filter(|path| path.extension().is_some_and(|extension| extension == "toml"))
+        .filter_map(|path| Rig::from_path(&path).ok())
+        .find(|rig| rig.name == wanted)
+        .unwrap_or_else(|| panic!("src/gains.rs is for the rig {wanted:?}: put its rig file into rigs/"))
+}
+
+/// The paper's rig with another tick.
+pub(crate) fn paper_at(period_s: f64, delay_ticks: u8) -> Rig {
+    let mut rig = rig("quadruple-paper");
+    rig.tick = Tick { period_s, delay_ticks };
+    rig
+}
+
+pub(crate) fn designed(rig: &Rig) -> Certified {
+    design(rig).unwrap_or_else(|error| panic!("{}: {error}", rig.name))
+}
+
+/// The table that `upright design` would write.
+pub(crate) fn table(rig: &Rig) -> TableValues {
+    TableValues::of(rig, &designed(rig), Gains::Sampled).unwrap()
+}
+
+/// As [`table`], but steps of the set-point go through unshaped: the law alone, as the paper simulates it.
+pub(crate) fn raw_table(rig: &Rig) -> TableValues {
+    table(rig).without_governor()
+}
+
+/// The gains for continuous time in a table, as the paper has them.
+pub(crate) fn continuous_table(rig: &Rig) -> TableValues {
+    TableValues::of(rig, &designed(rig), Gains::Continuous).unwrap().without_governor()
+}
+
+/// Ten seconds at rest with the whole state measured, as the paper simulates it.
+pub(crate) fn at_rest(rig: &Rig, law: Law) -> Scenario {
+    Scenario { sensing: Sensing::FullState, ..Scenario::at_rest(rig, law) }
+}
+
+pub(crate) fn run(rig: &Rig, table: &TableValues, scenario: &Scenario) -> Summary {
+    simulate(rig, table, scenario).unwrap_or_else(|error| panic!("{}: {error}", rig.name)).1
+}
+
+/// A step of 1 m from rest.
+pub(crate) fn metre_step(rig: &Rig, law: Law, duration_s: f64) -> Scenario {
+    Scenario { step_m: 1.0, duration_s, ..at_rest(rig, law) }
+}
+
+/// A first link that leans by `angle` (rad), left alone.
+pub(crate) fn lean(rig: &Rig, law: Law, angle: f64) -> Scenario {
+    let mut scenario = at_rest(rig, law);
+    scenario.start[2] = angle;
+    scenario
+}

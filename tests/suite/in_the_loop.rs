@@ -1,0 +1,183 @@
+//! The whole firmware in closed loop: the same bits in a simulation of the controller alone, with all tasks on the host,
+//! and as an image in QEMU.
+//!
+//! Without a compiler for the image, or without QEMU, the tests that need them say so and pass; with the environment
+//! variable `UPRIGHT_REQUIRE_IMAGE` set, they fail.
+
+use std::fmt::Write;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
+
+use upright::gains::{SENSORS, STATES};
+use upright::protocol::frame::Receiver;
+use upright::protocol::link::MAX_MESSAGE;
+use upright::protocol::message::Message;
+use upright::supervision::fault::Fault;
+use upright::supervision::supervisor::State;
+use upright::table::Law;
+use upright::table::checksum::crc32;
+use upright_design::design::design;
+use upright_design::rig::Rig;
+use upright_design::simulate::{Scenario, simulate};
+use upright_design::table::{Gains, TableValues};
+use upright_tool::image::{Kind, build_if_possible};
+use upright_tool::in_the_loop::{Link, Recording, Where, run};
+
+/// Most instructions of a tick of the image, telemetry of every tick included; a tenth more than counted with Rust 1.96.
+const MOST_INSTRUCTIONS: u32 = 3325;
+
+fn quadruple() -> (Rig, TableValues) {
+    let rig = Rig::from_path(Path::new("rigs/quadruple-paper.toml")).unwrap();
+    let table = TableValues::of(&rig, &design(&rig).unwrap(), Gains::Sampled).unwrap();
+    (rig, table)
+}
+
+/// Step and tilt with each law; with disturbances, too, or without.
+fn scenarios(rig: &Rig, disturbed: bool) -> Vec<(String, Scenario)> {
+    let mut scenarios = Vec::new();
+    for (name, law) in [("lqr", Law::Lqr), ("pole-placement", Law::PolePlacement)] {
+        let mut rest = Scenario { duration_s: 1.0, counter_start: 65_000, ..Scenario::at_rest(rig, law) };
+        if disturbed {
+            rest = Scenario { force_noise_n: 0.1, torque_noise_n_m: 3e-5, seed: 7, ..rest };
+        }
+        let step = Scenario { step_m: 0.3, step_at_s: 0.1, ..rest.clone() };
+        let mut tilt = rest;
+        tilt.start[2] = 0.004;
+        scenarios.extend([(format!("{name}-step"), step), (format!("{name}-tilt"), tilt)]);
+    }
+    scenarios
+}
+
+/// The image, and QEMU to run it, if both are there.
+fn image(kind: Kind) -> Option<PathBuf> {
+    let image = build_if_possible(kind).unwrap()?;
+    match Command::new("qemu-system-arm").arg("--version").stdout(Stdio::null()).status() {
+        Ok(_) => Some(image),
+        Err(error) if std::env::var_os("UPRIGHT_REQUIRE_IMAGE").is_some() => panic!("no QEMU: {error}"),
+        Err(_) => {
+            eprintln!("not exercised: the image in QEMU: install qemu-system-arm");
+            None
+        }
+    }
+}
+
+fn forces_and_estimates(recording: &Recording) -> Vec<(f64, f64, Vec<f64>)> {
+    recording.trace.samples().map(|s| (s.requested, s.force, s.estimate.to_vec())).collect()
+}
+
+#[test]
+fn all_tasks_together_give_the_bits_of_the_controller_alone() {
+    let (rig, table) = quadruple();
+    for (name, scenario) in scenarios(&rig, true) {
+        let (alone, summary) = simulate(&rig, &table, &scenario).unwrap();
+        let together = run(&rig, &table, &scenario, Where::Host).unwrap();
+        assert_eq!((together.fault, &together.summary), (None, &summary), "{name}");
+        let alone = alone.samples().map(|s| (s.requested, s.force, s.estimate.to_vec()));
+        assert!(alone.eq(forces_and_estimates(&together)), "{name}");
+    }
+}
+
+#[test]
+fn the_image_in_qemu_gives_the_bits_of_the_host_and_of_its_last_run() {
+    let Some(image) = image(Kind::InTheLoop) else { return };
+    let (rig, table) = quadruple();
+    let place = Where::Qemu { image: &image, link: Link::Files };
+    for (name, scenario) in scenarios(&rig, true) {
+        let qemu = run(&rig, &table, &scenario, place).unwrap();
+        let host = run(&rig, &table, &scenario, Where::Host).unwrap();
+        assert!(qemu.ticks == host.ticks, "{name}");
+        assert!(qemu.summary.stands(), "{name}: {:?}", qemu.fault);
+        let again = run(&rig, &table, &scenario, place).unwrap();
+        assert_eq!((&qemu.ticks, qemu.worst_cycles), (&again.ticks, again.worst_cycles), "{name}");
+        // The comparison sees a single bit.
+        let other = Scenario { seed: 8, ..scenario };
+        assert!(run(&rig, &table, &other, Where::Host).unwrap().ticks != host.ticks, "{name}");
+    }
+}
+
+#[test]
+fn the_image_runs_with_serial_lines_too() {
+    let Some(image) = image(Kind::InTheLoopUsart) else { return };
+    let (rig, table) = quadruple();
+    let (_, scenario) = scenarios(&rig, true).remove(0);
+    let scenario = Scenario { duration_s: 0.3, ..scenario };
+    let qemu = run(&rig, &table, &scenario, Where::Qemu { image: &image, link: Link::Usart }).unwrap();
+    assert!(qemu.ticks == run(&rig, &table, &scenario, Where::Host).unwrap().ticks);
+}
+
+#[test]
+fn a_tick_of_the_image_takes_no_more_instructions_than_it_used_to() {
+    let Some(image) = image(Kind::InTheLoop) else { return };
+    let (rig, table) = quadruple();
+    let place = Where::Qemu { image: &image, link: Link::Files };
+    let (_, scenario) = scenarios(&rig, true).remove(0);
+    let worst = run(&rig, &table, &scenario, place).unwrap().worst_cycles;
+    println!("{worst} instructions in the longest tick");
+    assert!((500..=MOST_INSTRUCTIONS).contains(&worst), "{worst}");
+}
+
+/// Per tick: number, force applied (f32 bits), checksum of all bits that the firmware tells.
+fn golden(recording: &Recording) -> String {
+    let mut text = String::from("tick,force_bits,checksum\n");
+    for (number, tick) in recording.ticks.iter().enumerate() {
+        let checksum = tick.bits.iter().fold(0, |crc, bits| crc32(crc, &bits.to_le_bytes()));
+        let force = tick.bits.last().unwrap();
+        writeln!(text, "{number},{force:08x},{checksum:08x}").unwrap();
+    }
+    text
+}
+
+/// The committed traces. `UPRIGHT_BLESS=1 cargo test --test in_the_loop` writes them anew.
+#[test]
+fn the_runs_are_those_of_the_committed_traces() {
+    let (rig, table) = quadruple();
+    let image = image(Kind::InTheLoop);
+    for (name, scenario) in scenarios(&rig, false) {
+        let scenario = Scenario { duration_s: 0.5, ..scenario };
+        let path = PathBuf::from(format!("tests/golden/{name}.csv"));
+        let host = golden(&run(&rig, &table, &scenario, Where::Host).unwrap());
+        if std::env::var_os("UPRIGHT_BLESS").is_some() {
+            std::fs::write(&path, &host).unwrap();
+        }
+        let committed = std::fs::read_to_string(&path).unwrap();
+        assert!(host == committed, "{} differs on the host", path.display());
+        if let Some(image) = &image {
+            let place = Where::Qemu { image, link: Link::Files };
+            assert!(golden(&run(&rig, &table, &scenario, place).unwrap()) == committed, "{name} in QEMU");
+        }
+    }
+}
+
+/// The emulator has no clock tree: the board's image finds no crystal there, says so and stays off.
+#[test]
+fn the_image_for_the_board_ends_a_wait_for_the_clock_with_its_fault() {
+    let Some(image) = image(Kind::F405) else { return };
+    let folder = tempfile::tempdir().unwrap();
+    let line = folder.path().join("usart2");
+    let mut qemu = Command::new("qemu-system-arm")
+        .args(["-machine", "netduinoplus2", "-nographic", "-monitor", "none", "-icount", "shift=0,sleep=off"])
+        .args(["-serial", "null", "-serial", &format!("file:{}", line.display()), "-kernel"])
+        .arg(&image)
+        .stdin(Stdio::null())
+        .stdout(Stdio::null())
+        .spawn()
+        .unwrap();
+    let mut heard = Vec::new();
+    for _ in 0..100 {
+        std::thread::sleep(std::time::Duration::from_millis(100));
+        heard = std::fs::read(&line).unwrap_or_default();
+        if heard.len() > 2000 {
+            break;
+        }
+    }
+    qemu.kill().unwrap();
+    qemu.wait().unwrap();
+    let mut receiver = Receiver::<MAX_MESSAGE>::new();
+    let told: Vec<_> = heard.iter().filter_map(|&byte| receiver.push(byte)).collect();
+    assert!(told.len() > 5, "{} bytes", heard.len());
+    for message in told {
+        let Ok(Message::<STATES, SENSORS>::Telemetry(telemetry)) = message else { panic!("{message:?}") };
+        assert_eq!((telemetry.state, telemetry.fault), (State::Fault, Some(Fault::Clock)));
+        assert_eq!(telemetry.drive, 0.0);
+    }
+}

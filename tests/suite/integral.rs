@@ -1,0 +1,133 @@
+//! Integral action on the cart position: removes what the precompensation cannot, and does not wind up.
+
+use crate::bench::*;
+use std::path::Path;
+
+use nalgebra::SVector;
+use upright::control::actuator::Drive;
+use upright::control::state_feedback::{LawState, saturate};
+use upright::table::Law;
+use upright_design::rig::{Integral, PlantDescription, Rig};
+use upright_design::simulate::{Bench, Scenario, Sensing, simulate};
+
+fn with_integral(name: &str, position_weight: f64) -> Rig {
+    Rig { integral: Some(Integral { position_weight }), ..rig(name) }
+}
+
+/// Mean distance from the set-point over the second half of the run (m): encoder steps keep a cart moving to and fro.
+fn offset(rig: &Rig, scenario: &Scenario) -> f64 {
+    let (trace, summary) = simulate(rig, &table(rig), scenario).unwrap();
+    assert!(summary.stands(), "{}: {summary}", rig.name);
+    let last: Vec<f64> = trace
+        .samples()
+        .filter(|sample| sample.t >= 0.5 * scenario.duration_s)
+        .map(|sample| sample.state[0] - sample.target)
+        .collect();
+    last.iter().sum::<f64>() / last.len() as f64
+}
+
+fn pulled(rig: &Rig, sensing: Sensing, force_n: f64) -> Scenario {
+    Scenario {
+        sensing,
+        force_offset_n: force_n,
+        step_m: 0.1,
+        duration_s: 40.0,
+        substeps: 2,
+        ..Scenario::at_rest(rig, Law::Lqr)
+    }
+}
+
+#[test]
+fn a_constant_force_moves_the_cart_without_integral_action_and_not_with_it() {
+    for (name, weight, force_n) in [("single-quanser-ip02", 100.0, 0.5), ("quadruple-paper", 10.0, 0.1)] {
+        for sensing in [Sensing::FullState, Sensing::Encoders] {
+            for delay_ticks in [0, 1] {
+                let mut with = with_integral(name, weight);
+                with.tick.delay_ticks = delay_ticks;
+                let without = Rig { integral: None, ..with.clone() };
+                let scenario = pulled(&with, sensing, force_n);
+                let (moved, held) = (offset(&without, &scenario), offset(&with, &scenario));
+                assert!(moved.abs() > 5e-3, "{name} {sensing:?} {delay_ticks}: {moved}");
+                assert!(held.abs() < 1e-3, "{name} {sensing:?} {delay_ticks}: {held} where {moved} was");
+            }
+        }
+    }
+}
+
+#[test]
+fn a_rig_that_is_not_as_described_arrives_all_the_same() {
+    let with = with_integral("single-quanser-ip02", 100.0);
+    let table = table(&with);
+    let mut heavier = with.clone();
+    let PlantDescription::Chain(chain) = &mut heavier.plant else { panic!() };
+    chain.cart.mass_kg *= 1.3;
+    chain.cart.friction_n_s_per_m *= 1.5;
+    chain.links[0].mass_kg *= 0.8;
+    let scenario = pulled(&with, Sensing::Encoders, 0.5);
+    let summary = run(&heavier, &table, &scenario);
+    // Half of the dead zone that is left lets the cart move by a millimetre or two.
+    assert!(summary.stands() && summary.final_error_m.abs() < 3e-3, "{summary}");
+}
+
+/// A cart of 1 kg without pendulum, so that nothing can fall while the force is at its limit for long.
+fn cart(force_limit_n: f64) -> Rig {
+    let text = format!(
+        "name = \"cart\"\n[model]\na = [[0, 1], [0, 0]]\nb = [0, 1]\n[actuator]\nforce_limit_n = {force_limit_n:e}\n\
+         [lqr]\nstate_weights = [1, 1]\nforce_weight = 1\n[integral]\nposition_weight = 0.1\n"
+    );
+    Rig::from_toml(&text, Path::new("cart.toml")).unwrap_or_else(|error| panic!("{error}"))
+}
+
+const FAR_M: f64 = 10.0;
+
+/// A raw step with the law alone, either as the firmware integrates or always integrating: the cart's positions (m).
+fn law_alone(rig: &Rig, conditional: bool) -> Vec<f64> {
+    let values = raw_table(rig);
+    let table = values.table::<2, 1>();
+    let gains = table.lqr.as_ref().unwrap();
+    let mut bench = Bench::new(rig, &at_rest(rig, Law::Lqr)).unwrap();
+    let mut state = LawState::default();
+    let mut positions = Vec::new();
+    for _ in 0..=40_000 {
+        let x = SVector::from_fn(|i, _| bench.state()[i] as f32);
+        positions.push(bench.state()[0]);
+        state.govern(FAR_M as f32, gains.setpoint_step);
+        let requested = state.force(gains, &x);
+        let applied = saturate(requested, table.force_limit_n);
+        bench.tick(Drive::Force(applied));
+        // An integral that does not hear of the limit.
+        let heard = if conditional { applied } else { requested };
+        state.advance(gains.k_integral, x[0], table.tick_s, requested, heard);
+    }
+    positions
+}
+
+#[test]
+fn the_integral_does_not_wind_up_while_the_force_is_limited() {
+    let rig = cart(1.0);
+    let scenario = Scenario { step_m: FAR_M, duration_s: 40.0, ..at_rest(&rig, Law::Lqr) };
+    let (trace, summary) = simulate(&rig, &raw_table(&rig), &scenario).unwrap();
+    let limited = trace.samples().filter(|sample| sample.requested.abs() > 1.0).count();
+    assert!(limited > 2000, "the force is limited for {limited} ticks only");
+    assert!(summary.settled && summary.final_error_m.abs() < 1e-3, "{summary}");
+    let held = law_alone(&rig, true);
+    // The loop above is the firmware's.
+    assert_eq!(held.len(), trace.samples().len());
+    assert!(held.iter().zip(trace.samples()).all(|(x, sample)| x.to_bits() == sample.state[0].to_bits()));
+
+    let overshoot = |positions: &[f64]| positions.iter().copied().fold(0.0, f64::max) / FAR_M - 1.0;
+    let (held, wound) = (overshoot(&held), overshoot(&law_alone(&rig, false)));
+    // What the law does without any limit, where both integrate alike.
+    let strong = cart(1e6);
+    let free = overshoot(&law_alone(&strong, true));
+    assert_eq!(free, overshoot(&law_alone(&strong, false)));
+    assert!(held < free, "no more than without a limit: {held} {free}");
+    assert!(wound > 5.0 * held && wound > 1.0, "the step itself again: {wound} {held}");
+}
+
+#[test]
+fn a_constant_force_beyond_all_sense_is_refused() {
+    let rig = rig("quadruple-paper");
+    let scenario = Scenario { force_offset_n: f64::NAN, ..at_rest(&rig, Law::Lqr) };
+    assert!(simulate(&rig, &table(&rig), &scenario).unwrap_err().to_string().contains("constant force"));
+}

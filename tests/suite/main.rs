@@ -1,0 +1,13 @@
+//! The control core in closed loop with the nonlinear plant, and the image in QEMU. One program, so that it is linked once.
+
+mod bench;
+mod closed_loop;
+mod encoders_only;
+mod fuzz_corpus;
+mod gains_table;
+mod governor;
+mod in_the_loop;
+mod integral;
+mod lost_loops;
+mod plain_equations;
+mod wiring;

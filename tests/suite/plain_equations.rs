@@ -1,0 +1,201 @@
+//! The tick gives the same bits as its equations written out plainly, whatever shortcuts it takes for a table.
+
+use nalgebra::{SMatrix, SVector};
+use proptest::prelude::*;
+use proptest::test_runner::{TestCaseError, TestRunner};
+use upright::control::controller::Controller;
+use upright::control::encoder::CounterWidth;
+use upright::control::observer::ObserverGains;
+use upright::control::state_feedback::{LawGains, saturate};
+use upright::supervision::detection::Thresholds;
+use upright::table::limits::Limits;
+use upright::table::{Build, GainTable, TABLE_FORMAT};
+
+const BUILD: Build = Build { rig_hash: 1, tick_s: 0.01 };
+
+/// What is special about an Ad, and with that the way a prediction takes.
+#[derive(Debug, Clone, Copy)]
+enum Pattern {
+    Any,
+    ChainWithFriction,
+    ChainWithoutFriction,
+}
+
+/// A table from a stream of numbers; no entry is 0 but those that the pattern wants.
+fn table<const NX: usize, const NY: usize>(
+    pattern: Pattern,
+    in_order: bool,
+    delay_ticks: u32,
+    integral: bool,
+    numbers: &[f32],
+) -> GainTable<NX, NY> {
+    let mut numbers = numbers.iter().copied().cycle();
+    let mut number = || numbers.next().unwrap();
+    let mut ad = SMatrix::<f32, NX, NX>::from_fn(|_, _| 0.3 * number());
+    if !matches!(pattern, Pattern::Any) {
+        ad.set_column(0, &SVector::from_fn(|row, _| if row == 0 { 1.0 } else { 0.0 }));
+    }
+    if let Pattern::ChainWithoutFriction = pattern {
+        ad.set_column(1, &SVector::zeros());
+        (ad[(0, 1)], ad[(1, 1)]) = (0.5, 1.0);
+        for (row, column) in (0..NX / 2).flat_map(|row| (0..NX / 2).map(move |column| (2 * row, 2 * column)))
+        {
+            ad[(row + 1, column + 1)] = ad[(row, column)];
+        }
+    }
+    let mut table = GainTable {
+        format: TABLE_FORMAT,
+        states: NX as u32,
+        sensors: NY as u32,
+        output: 0,
+        rig_hash: BUILD.rig_hash,
+        tick_s: BUILD.tick_s,
+        delay_ticks,
+        force_limit_n: 3.0,
+        lqr: Some(LawGains {
+            k: SVector::from_fn(|_, _| number()),
+            k_pending: if delay_ticks == 1 { number() } else { 0.0 },
+            k_integral: if integral { number() } else { 0.0 },
+            n: number(),
+            setpoint_step: 0.125,
+        }),
+        pole_placement: None,
+        observer: Some(ObserverGains {
+            ad,
+            bd: SVector::from_fn(|_, _| number()),
+            l: SMatrix::from_fn(|_, _| 0.3 * number()),
+            measured: core::array::from_fn(|sensor| {
+                2 * if in_order { sensor } else { NY - 1 - sensor } as u32
+            }),
+            step: SVector::from_fn(|_, _| number().abs()),
+        }),
+        motor: None,
+        limits: Limits::none(),
+        thresholds: Thresholds::none(),
+        crc: 0,
+    };
+    table.crc = table.checksum();
+    table
+}
+
+/// The equations as the documentation has them, entry by entry.
+struct Plain<'t, const NX: usize, const NY: usize> {
+    table: &'t GainTable<NX, NY>,
+    x: [f32; NX],
+    setpoint: f32,
+    integral: f32,
+    pending: f32,
+}
+
+impl<'t, const NX: usize, const NY: usize> Plain<'t, NX, NY> {
+    fn started(table: &'t GainTable<NX, NY>) -> Self {
+        Self { table, x: [0.0; NX], setpoint: 0.0, integral: 0.0, pending: 0.0 }
+    }
+
+    /// Innovation, estimate and requested force; then prepares the next tick.
+    fn tick(&mut self, target: f32, counts: &[u32; NY]) -> Vec<f32> {
+        let (law, observer) = (self.table.lqr.as_ref().unwrap(), self.table.observer.as_ref().unwrap());
+        let e: [f32; NY] = core::array::from_fn(|i| {
+            observer.step[i] * counts[i] as i32 as f32 - self.x[observer.measured[i] as usize]
+        });
+        let x: [f32; NX] =
+            core::array::from_fn(|i| (0..NY).fold(self.x[i], |sum, j| sum + observer.l[(i, j)] * e[j]));
+        self.setpoint += saturate(target - self.setpoint, law.setpoint_step);
+        let over =
+            |start: f32, first: usize| (first..NX).step_by(2).fold(start, |sum, i| sum - law.k[i] * x[i]);
+        let requested = over(law.n * self.setpoint, 0) + over(-0.0, 1)
+            - law.k_pending * self.pending
+            - law.k_integral * self.integral;
+        let applied = saturate(requested, self.table.force_limit_n);
+        let now = if self.table.delay_ticks == 1 { self.pending } else { applied };
+        let moved = self.table.tick_s * (x[0] - self.setpoint);
+        if law.k_integral != 0.0 && (requested - applied) * (-law.k_integral * moved) <= 0.0 {
+            self.integral += moved;
+        }
+        self.pending = applied;
+        self.x = core::array::from_fn(|i| {
+            (0..NX).fold(observer.bd[i] * now, |sum, j| sum + observer.ad[(i, j)] * x[j])
+        });
+        e.into_iter().chain(x).chain([requested, applied]).chain(self.x).collect()
+    }
+}
+
+type Ticks<const NY: usize> = Vec<(f32, [u32; NY])>;
+
+/// The first difference between the firmware with `table` and the equations with `plain`.
+fn difference<const NX: usize, const NY: usize>(
+    table: &GainTable<NX, NY>,
+    plain: &GainTable<NX, NY>,
+    ticks: &Ticks<NY>,
+) -> Option<String> {
+    let mut controller = Controller::new(table, &BUILD, [CounterWidth::Bits32; NY]).unwrap();
+    controller.start(&[0; NY]).unwrap();
+    let mut plain = Plain::started(plain);
+    ticks.iter().enumerate().find_map(|(tick, (target, counts))| {
+        controller.set_setpoint(*target).unwrap();
+        let command = controller.control(counts);
+        let mut found: Vec<f32> =
+            controller.innovation().iter().chain(controller.estimate()).copied().collect();
+        controller.predict();
+        found.extend([command.requested, command.applied].iter().chain(controller.estimate()));
+        let wanted = plain.tick(*target, counts);
+        let differs = found.len() != wanted.len()
+            // A term of 0 that is passed over may change the sign of a sum that is 0.
+            || found.iter().zip(&wanted).any(|(found, wanted)| {
+                found.to_bits() != wanted.to_bits() && (*found, *wanted) != (0.0, 0.0)
+            });
+        differs.then(|| format!("tick {tick}: {found:?} instead of {wanted:?}"))
+    })
+}
+
+fn ticks<const NY: usize>() -> impl Strategy<Value = Ticks<NY>> {
+    let counts = prop::array::uniform::<_, NY>(-9i32..=9).prop_map(|counts| counts.map(|count| count as u32));
+    prop::collection::vec((-2.0f32..2.0, counts), 1..8)
+}
+
+fn numbers() -> impl Strategy<Value = Vec<f32>> {
+    let number =
+        (0.1f32..1.0, any::<bool>()).prop_map(|(size, negative)| if negative { -size } else { size });
+    prop::collection::vec(number, 251)
+}
+
+fn patterns() -> impl Strategy<Value = Pattern> {
+    prop::sample::select(vec![Pattern::Any, Pattern::ChainWithFriction, Pattern::ChainWithoutFriction])
+}
+
+fn same_bits<const NX: usize, const NY: usize>(patterns: impl Strategy<Value = Pattern>) {
+    let inputs = (patterns, any::<bool>(), 0..2u32, any::<bool>(), numbers(), ticks::<NY>());
+    let same = |(pattern, in_order, delay, integral, numbers, ticks): (_, _, _, _, Vec<f32>, _)| {
+        let table = table::<NX, NY>(pattern, in_order, delay, integral, &numbers);
+        difference(&table, &table, &ticks).map_or(Ok(()), |difference| Err(TestCaseError::fail(difference)))
+    };
+    TestRunner::default().run(&inputs, same).unwrap();
+}
+
+#[test]
+fn a_tick_gives_the_bits_of_the_plain_equations() {
+    same_bits::<10, 5>(patterns());
+    same_bits::<4, 2>(patterns());
+    same_bits::<2, 1>(patterns());
+    // An odd number of states is no chain of links.
+    same_bits::<5, 2>(Just(Pattern::Any));
+    same_bits::<1, 1>(Just(Pattern::Any));
+}
+
+proptest! {
+    /// Every single entry counts: the comparison above would notice a shortcut that passes over one of them.
+    #[test]
+    fn one_entry_off_by_one_bit_is_noticed(numbers in numbers(), pattern in patterns(), row in 0..10usize, column in 0..10usize) {
+        let table = table::<10, 5>(pattern, true, 0, false, &numbers);
+        let mut other = table.clone();
+        let entry = &mut other.observer.as_mut().unwrap().ad[(row, column)];
+        // An entry that is 0 becomes large enough to be seen in a sum.
+        *entry = if *entry == 0.0 { 0.25 } else { f32::from_bits(entry.to_bits() ^ 1 << 20) };
+        other.crc = other.checksum();
+        let ticks = vec![(0.5, [3, 5, 7, 2, 1]); 3];
+        prop_assert_eq!(difference(&table, &table, &ticks), None);
+        prop_assert_eq!(difference(&other, &other, &ticks), None);
+        prop_assert!(difference(&table, &other, &ticks).is_some());
+        prop_assert!(difference(&other, &table, &ticks).is_some());
+    }
+}
