@@ -7,6 +7,7 @@
 #![forbid(unsafe_code)]
 
 pub mod design;
+pub mod number;
 pub mod numerics;
 pub mod plant;
 pub mod rig;

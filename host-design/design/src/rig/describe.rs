@@ -5,6 +5,8 @@
 use std::f64::consts::TAU;
 use std::fmt::Display;
 
+use crate::number::significant;
+
 use super::{
     Actuator, Chain, Kalman, Limits, LinearPlant, Link, LinkEncoder, Lqr, Motor, PlantDescription,
     PolePlacement, Rig, defaults,
@@ -39,12 +41,9 @@ fn mark(is_default: bool) -> &'static str {
     if is_default { DEFAULT } else { "" }
 }
 
-/// The digits of a number, rounded to six significant ones where there are many.
+/// Six significant digits.
 fn digits(x: f64) -> String {
-    const MANY: usize = 9;
-    let rounded = if format!("{x:e}").len() <= MANY { x } else { format!("{x:.5e}").parse().unwrap_or(x) };
-    let large_or_small = rounded != 0.0 && !(1e-3..1e7).contains(&rounded.abs());
-    if large_or_small { format!("{rounded:e}") } else { format!("{rounded}") }
+    significant(x, 6)
 }
 
 #[derive(Default)]

@@ -16,6 +16,7 @@ mod noise_runs;
 mod report;
 mod response;
 mod rounding;
+mod rows;
 mod tick;
 mod trial;
 
@@ -39,5 +40,6 @@ pub use noise_runs::{Endurance, NoiseRun, endurance, noise_run};
 pub use report::{Check, Effort, LawTrust, TrustReport, spread, trust};
 pub use response::Response;
 pub use rounding::Rounding;
+pub use rows::{Quantity, Row, quantities, rows};
 pub use tick::TickLimits;
 pub use trial::{Disturbance, Horizon, Outcome, Unverifiable, trial};

@@ -6,11 +6,12 @@ use upright::table::Law;
 use super::corners::MOST_LINKS;
 use super::{
     Attraction, AttractionSettings, CoarsestEncoder, CornerSettings, Corners, Disturbance, EncoderSettings,
-    LinearReport, MassTolerance, MonteCarlo, NoiseRun, Spread, Unverifiable, VerifyError, attraction,
-    coarsest_encoder, corners, linear, mass_tolerances, monte_carlo, noise_run,
+    LinearReport, Margins, MassTolerance, MonteCarlo, NoiseRun, Spread, Unverifiable, VerifyError,
+    attraction, coarsest_encoder, corners, linear, mass_tolerances, monte_carlo, noise_run,
 };
 use crate::design::Certified;
-use crate::rig::{PlantDescription, Rig};
+use crate::number::significant;
+use crate::rig::{PlantDescription, Requirements, Rig};
 use crate::table::TableValues;
 
 /// The trust report of a rig.
@@ -34,9 +35,9 @@ pub struct LawTrust {
     pub noise_run: Option<NoiseRun>,
     /// The coarsest encoder.
     pub coarsest_encoder: Option<CoarsestEncoder>,
-    /// Wrong masses, every corner.
+    /// Mass errors, every combination.
     pub corners: Option<Corners>,
-    /// How wrong each single mass may be, the most critical first.
+    /// Tolerated error of each single mass, the most critical first.
     pub mass_tolerances: Vec<MassTolerance>,
     /// Random plants.
     pub monte_carlo: Option<MonteCarlo>,
@@ -117,7 +118,7 @@ fn law_trust(
     if !trust.linear.stable {
         return Ok(trust);
     }
-    stage("largest tilts and step");
+    stage("region of attraction");
     trust.attraction = known(attraction(rig, table, law, &AttractionSettings::default()))?;
     stage("noise");
     trust.noise_run = known(noise_run(rig, table, law, &Disturbance::of(rig), 4, 20.0))?;
@@ -127,7 +128,7 @@ fn law_trust(
     }
     // Beyond that there are too many corners to try them all.
     if is_chain && rig.states() / 2 - 1 <= MOST_LINKS {
-        stage("wrong masses");
+        stage("mass errors");
         let settings = CornerSettings::of(rig);
         trust.corners = known(corners(rig, table, law, rig.verify.corner_percent, &settings))?;
         let mut tolerances = known(mass_tolerances(rig, table, law, &settings))?.unwrap_or_default();
@@ -151,82 +152,100 @@ fn known<T>(part: Result<T, Unverifiable>) -> Result<Option<T>, VerifyError> {
     }
 }
 
+impl Check {
+    /// What was found, for reading.
+    pub fn found_text(&self) -> String {
+        let without_number = if self.holds { "no limit" } else { "none" };
+        self.found.map_or(without_number.to_owned(), |found| significant(found, 3))
+    }
+
+    /// The threshold, for reading.
+    pub fn required_text(&self) -> String {
+        significant(self.required, 3)
+    }
+
+    /// A requirement that what was found is at least `required`; without a bound `unbounded` decides.
+    fn at_least(
+        law: &'static str,
+        requirement: &'static str,
+        required: f64,
+        found: Option<f64>,
+        unbounded: bool,
+    ) -> Self {
+        let holds = found.map_or(unbounded, |found| found >= required);
+        Check { law, requirement, required, found, holds }
+    }
+
+    /// A requirement that all of a number of runs stand.
+    fn all_stand(law: &'static str, requirement: &'static str, runs: f64, stood: f64) -> Self {
+        Check { law, requirement, required: runs, found: Some(stood), holds: stood >= runs }
+    }
+}
+
+/// Every requirement of one law.
 fn checks(rig: &Rig, trust: &LawTrust) -> Vec<Check> {
-    let required = &rig.verify;
-    let law = trust.linear.law;
-    let mut checks = Vec::new();
-    let mut check = |requirement, required, found: Option<f64>, holds| {
-        checks.push(Check { law, requirement, required, found, holds });
-    };
-    let mut at_least = |requirement, required: f64, found: Option<f64>, when_unbounded: bool| {
-        check(requirement, required, found, found.map_or(when_unbounded, |found| found >= required));
-    };
-    let margins = trust.linear.margins.as_ref();
-    let stable = trust.linear.stable;
-    if let Some(margins) = margins {
-        // Without a crossing of the critical value the margin is unlimited.
-        at_least("gain may grow by a factor (gain_margin)", required.gain_margin, margins.highest_gain, true);
-        at_least(
-            "gain may fall by a factor (gain_margin)",
-            required.gain_margin,
-            Some(1.0 / margins.lowest_gain),
-            true,
-        );
-        let phase = margins.phase_margin_rad.map(f64::to_degrees);
-        at_least("phase margin in degrees (phase_margin_deg)", required.phase_margin_deg, phase, true);
-        let delay = margins.delay_margin_ticks;
-        at_least("further delay in ticks (delay_margin_ticks)", required.delay_margin_ticks, delay, true);
-    }
-    if let Some(attraction) = &trust.attraction {
-        let smallest = attraction.tilts.iter().map(|tilt| tilt.edge.size).min_by(f64::total_cmp);
-        if smallest.is_some() {
-            at_least("tilt of any link in rad (tilt_rad)", required.tilt_rad, smallest, false);
-        }
-    }
-    if let Some(encoder) = &trust.coarsest_encoder {
-        at_least(
-            "encoders coarser by a factor (encoder_factor)",
-            required.encoder_factor,
-            encoder.factor,
-            false,
-        );
-    }
-    if let Some(runs) = &trust.monte_carlo {
-        let lowest = 100.0 * runs.interval[0];
-        at_least(
-            "random plants that stand in %, lower bound (success_percent)",
-            required.success_percent,
-            Some(lowest),
-            false,
-        );
-    }
-    if let Some(margins) = margins {
-        let peak = margins.peak_sensitivity;
-        check(
-            "peak sensitivity at most (peak_sensitivity)",
-            required.peak_sensitivity,
-            Some(peak),
-            peak <= required.peak_sensitivity,
-        );
-    }
-    if let Some(corners) = &trust.corners {
-        let all = corners.corners as f64;
-        check(
-            "corners of wrong masses that stand (corner_percent)",
-            all,
-            Some(corners.stand as f64),
-            corners.stand == corners.corners,
-        );
-    }
-    if let Some(noise) = &trust.noise_run {
-        check(
-            "nominal runs that stand",
-            noise.seeds as f64,
-            Some(noise.stood as f64),
-            noise.stood == noise.seeds,
-        );
-    }
-    check("spectral radius below", 1.0, Some(trust.linear.spectral_radius), stable);
-    checks.rotate_right(1);
+    let (law, margins) = (trust.linear.law, trust.linear.margins.as_ref());
+    let mut checks = vec![Check {
+        law,
+        requirement: "spectral radius below",
+        required: 1.0,
+        found: Some(trust.linear.spectral_radius),
+        holds: trust.linear.stable,
+    }];
+    checks.extend(margins.into_iter().flat_map(|margins| margin_checks(&rig.verify, law, margins)));
+    checks.extend(run_checks(&rig.verify, trust));
+    checks.extend(margins.map(|margins| {
+        let (required, peak) = (rig.verify.peak_sensitivity, margins.peak_sensitivity);
+        let requirement = "peak sensitivity at most (peak_sensitivity)";
+        Check { law, requirement, required, found: Some(peak), holds: peak <= required }
+    }));
+    checks.extend(counted_checks(trust));
     checks
+}
+
+fn margin_checks(required: &Requirements, law: &'static str, margins: &Margins) -> [Check; 4] {
+    // Without a crossing of the critical value the margin is unlimited.
+    let at_least =
+        |requirement, required, found: Option<f64>| Check::at_least(law, requirement, required, found, true);
+    let (lowest, highest) = (Some(1.0 / margins.lowest_gain), margins.highest_gain);
+    let phase_deg = margins.phase_margin_rad.map(f64::to_degrees);
+    let delay_ticks = margins.delay_margin_ticks;
+    [
+        at_least("gain may grow by a factor (gain_margin)", required.gain_margin, highest),
+        at_least("gain may fall by a factor (gain_margin)", required.gain_margin, lowest),
+        at_least("phase margin in degrees (phase_margin_deg)", required.phase_margin_deg, phase_deg),
+        at_least("additional delay in ticks (delay_margin_ticks)", required.delay_margin_ticks, delay_ticks),
+    ]
+}
+
+fn run_checks(required: &Requirements, trust: &LawTrust) -> Vec<Check> {
+    let at_least = |requirement, required, found: Option<f64>| {
+        Check::at_least(trust.linear.law, requirement, required, found, false)
+    };
+    let tilts = trust.attraction.iter().flat_map(|attraction| &attraction.tilts);
+    let smallest = tilts.map(|tilt| tilt.edge.size).min_by(f64::total_cmp);
+    let tilt =
+        smallest.map(|rad| at_least("tilt of any link in rad (tilt_rad)", required.tilt_rad, Some(rad)));
+    let encoder = trust.coarsest_encoder.as_ref().map(|encoder| {
+        at_least("encoders coarser by a factor (encoder_factor)", required.encoder_factor, encoder.factor)
+    });
+    let random = trust.monte_carlo.as_ref().map(|runs| {
+        let lowest = Some(100.0 * runs.interval[0]);
+        let requirement = "random plants that stand in %, lower bound (success_percent)";
+        at_least(requirement, required.success_percent, lowest)
+    });
+    [tilt, encoder, random].into_iter().flatten().collect()
+}
+
+/// Runs that all have to stand.
+fn counted_checks(trust: &LawTrust) -> Vec<Check> {
+    let law = trust.linear.law;
+    let corners = trust.corners.as_ref().map(|corners| {
+        let (all, stand) = (corners.corners as f64, corners.stand as f64);
+        Check::all_stand(law, "combinations of mass errors that stand (corner_percent)", all, stand)
+    });
+    let nominal = trust.noise_run.as_ref().map(|noise| {
+        Check::all_stand(law, "nominal runs that stand", noise.seeds as f64, noise.stood as f64)
+    });
+    [corners, nominal].into_iter().flatten().collect()
 }

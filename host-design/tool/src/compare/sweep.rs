@@ -4,6 +4,7 @@ use std::path::Path;
 
 use toml_edit::{Document, Item, TableLike};
 
+use upright_design::number::rounded;
 use upright_design::rig::{Rig, RigError, RigErrorKind};
 
 /// Values for one key of a rig file.
@@ -78,17 +79,13 @@ impl core::str::FromStr for Sweep {
             match index {
                 0 => from,
                 _ if index + 1 == points => to,
-                _ if log => digits(from * (to / from).powf(share), 6),
-                _ => digits(from + (to - from) * share, 12),
+                // Rounded: nobody wants 0.30000000000000004 in a table.
+                _ if log => rounded(from * (to / from).powf(share), 6),
+                _ => rounded(from + (to - from) * share, 12),
             }
         };
         Ok(Self { key: key.trim().to_owned(), values: (0..points).map(value).collect(), log })
     }
-}
-
-/// `value` with so many digits: nobody wants 0.30000000000000004 in a table.
-fn digits(value: f64, digits: usize) -> f64 {
-    format!("{value:.*e}", digits - 1).parse().unwrap_or(value)
 }
 
 impl Sweep {

@@ -1,6 +1,7 @@
 //! The names of the curves, above the panel, where they hide none of them.
 
 use plotters::style::ShapeStyle;
+use upright_design::number::rounded;
 
 use super::theme::HEAT;
 use super::{Figure, Panel, Style};
@@ -32,7 +33,7 @@ pub(super) fn entries(figure: &Figure, panel: &Panel, from: f64) -> (Vec<Entry>,
         keys.push((Key::Nothing, heat.name.clone()));
         for (end, colour) in heat.classes().into_iter().zip(HEAT) {
             // Without the digits that a sum of decimals leaves behind.
-            let end: f64 = format!("{end:.3e}").parse().unwrap_or(end);
+            let end = rounded(end, 4);
             keys.push((Key::Fill(colour.into()), format!("{end} {}", heat.unit)));
         }
         keys.push((Key::Nothing, "blank: not at all".to_owned()));

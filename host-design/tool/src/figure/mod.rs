@@ -14,6 +14,7 @@ mod scale;
 mod theme;
 
 pub(crate) use png::pixels;
+pub(crate) use theme::{CHROMATIC, curve_colour, reference_colour, style_sheet};
 
 pub use draw::{Drawing, PlotArea};
 pub use heat::HeatMap;

@@ -56,6 +56,35 @@ pub(super) fn finished(svg: &str) -> String {
     svg
 }
 
+/// The colour of curve `number`, as in a document.
+pub(crate) fn curve_colour(number: usize) -> String {
+    hex(COLOURS[number % COLOURS.len()])
+}
+
+/// The colour of references, and of the cart in drawings.
+pub(crate) fn reference_colour() -> String {
+    hex(REFERENCE)
+}
+
+/// Style rules by which a page can exchange the colours of the figures: each is drawn in a custom property, `--c0` …,
+/// `--reference` or `--limit`, whose value here is that colour.
+pub(crate) fn style_sheet() -> String {
+    let named =
+        COLOURS.iter().take(CHROMATIC).enumerate().map(|(i, &colour)| (format!("--c{i}"), hex(colour)));
+    let named = named.chain([("--reference".to_owned(), hex(REFERENCE)), ("--limit".to_owned(), hex(LIMIT))]);
+    let (mut properties, mut rules) = (String::new(), String::new());
+    for (name, colour) in named {
+        properties += &format!(" {name}: {colour};");
+        for place in ["stroke", "fill"] {
+            rules += &format!("svg [{place}=\"{colour}\"] {{ {place}: var({name}); }}\n");
+        }
+    }
+    format!(":root {{{properties} }}\n{rules}")
+}
+
+/// How many of the colours are not black; a page draws black in the colour of its text.
+pub(crate) const CHROMATIC: usize = 6;
+
 fn hex(RGBColor(r, g, b): RGBColor) -> String {
     format!("#{r:02X}{g:02X}{b:02X}")
 }

@@ -3,6 +3,7 @@
 use serde::Serialize;
 
 use super::runs::{Scene, law_name};
+use crate::figure::{CHROMATIC, curve_colour, reference_colour};
 use upright_design::rig::{PlantDescription, Rig};
 
 /// Everything the script of the page needs.
@@ -12,6 +13,9 @@ pub(super) struct Animation {
     lengths: Vec<f64>,
     /// Ends of the rail (m).
     rail: [f64; 2],
+    /// Of the links, from the first; then again from the first.
+    colours: Vec<String>,
+    cart_colour: String,
     scenes: Vec<SceneFrames>,
 }
 
@@ -83,7 +87,13 @@ impl Animation {
                 })
                 .collect(),
         };
-        Self { lengths, rail, scenes: scenes.iter().map(frames).collect() }
+        Self {
+            lengths,
+            rail,
+            colours: (0..CHROMATIC).map(curve_colour).collect(),
+            cart_colour: reference_colour(),
+            scenes: scenes.iter().map(frames).collect(),
+        }
     }
 
     /// As JSON that may stand in a `<script>`.

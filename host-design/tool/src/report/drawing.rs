@@ -3,6 +3,7 @@
 use core::fmt::Write;
 
 use super::number::number;
+use crate::figure::{CHROMATIC, curve_colour, reference_colour};
 use upright_design::rig::Chain;
 
 /// Width of the drawing (px).
@@ -36,9 +37,10 @@ fn draw(out: &mut String, chain: &Chain) -> core::fmt::Result {
     line(out, [20.0, GROUND], [WIDTH - 20.0, GROUND], "#000000", 2.0)?;
     writeln!(
         out,
-        "<rect x=\"{}\" y=\"{}\" width=\"90\" height=\"{CART}\" rx=\"4\" fill=\"#BEBEBE\" stroke=\"#000000\" stroke-width=\"1.5\"/>",
+        "<rect x=\"{}\" y=\"{}\" width=\"90\" height=\"{CART}\" rx=\"4\" fill=\"{}\" stroke=\"#000000\" stroke-width=\"1.5\"/>",
         MIDDLE - 45.0,
-        GROUND - CART - 12.0
+        GROUND - CART - 12.0,
+        reference_colour()
     )?;
     for wheel in [-28.0, 28.0] {
         dot(out, [MIDDLE + wheel, GROUND - 6.0], 6.0, "#000000")?;
@@ -48,8 +50,7 @@ fn draw(out: &mut String, chain: &Chain) -> core::fmt::Result {
     let labels = label_heights(chain, pivot - 6.0, scale);
     for (index, (link, label)) in chain.links.iter().zip(labels).enumerate() {
         let (from, to) = (pivot - scale * bottom, pivot - scale * (bottom + link.length_m));
-        let colour = ["#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9"][index % 6];
-        line(out, [MIDDLE, from], [MIDDLE, to], colour, 8.0)?;
+        line(out, [MIDDLE, from], [MIDDLE, to], &curve_colour(index % CHROMATIC), 8.0)?;
         dot(out, [MIDDLE, from], 5.0, "#000000")?;
         let centre = link.centre_of_mass_m.unwrap_or(0.5 * link.length_m);
         let at = pivot - scale * (bottom + centre);

@@ -1,58 +1,56 @@
-//! Numbers for reading.
+//! Numbers as the page shows them.
+
+use upright_design::number;
 
 /// `digits` significant digits, with a power of ten for what is very large or very small.
 pub(super) fn significant(x: f64, digits: usize) -> String {
-    if x == 0.0 {
-        return "0".to_owned();
-    }
-    let rounded: f64 = format!("{x:.*e}", digits - 1).parse().unwrap_or(x);
-    if (1e-4..1e6).contains(&rounded.abs()) {
-        return minus(rounded.to_string());
-    }
-    let text = format!("{rounded:e}");
-    let (digits, power) = text.split_once('e').unwrap_or((&text, "0"));
-    let raised = |sign: char| match sign {
-        '-' => '⁻',
-        digit => RAISED[digit.to_digit(10).unwrap_or(0) as usize],
-    };
-    format!("{}·10{}", minus(digits.to_owned()), power.chars().map(raised).collect::<String>())
+    typeset(&number::significant(x, digits))
 }
-
-const RAISED: [char; 10] = ['⁰', '¹', '²', '³', '⁴', '⁵', '⁶', '⁷', '⁸', '⁹'];
 
 /// Three significant digits.
 pub(super) fn number(x: f64) -> String {
     significant(x, 3)
 }
 
-/// A pole, and its conjugate if there is one. A rounding residue of a pole at the origin is shown as zero.
-pub(super) fn pole([re, im]: [f64; 2], digits: usize) -> String {
-    if re.hypot(im) < 1e-60 {
-        return "0".to_owned();
-    }
-    if im == 0.0 {
-        return significant(re, digits);
-    }
-    format!("{} ± {}i", significant(re, digits), significant(im.abs(), digits))
+/// Poles, each conjugate pair once.
+pub(super) fn poles(poles: &[[f64; 2]], digits: usize) -> Vec<String> {
+    number::poles(poles, digits).iter().map(|pole| typeset(pole)).collect()
 }
 
-/// With a typographic minus sign.
-fn minus(text: String) -> String {
-    text.replace('-', "−")
+/// With minus signs and powers of ten as they are printed.
+fn typeset(plain: &str) -> String {
+    let (mut text, mut raised) = (String::new(), false);
+    for symbol in plain.chars() {
+        let digit = symbol.to_digit(10).and_then(|digit| RAISED.get(digit as usize));
+        raised &= symbol == '-' || digit.is_some();
+        match (symbol, digit) {
+            ('e', _) => {
+                text.push_str("·10");
+                raised = true;
+            }
+            ('-', _) => text.push(if raised { '⁻' } else { '−' }),
+            ('±', _) => text.push_str(" ± "),
+            (_, Some(&digit)) if raised => text.push(digit),
+            _ => text.push(symbol),
+        }
+    }
+    text
 }
+
+const RAISED: [char; 10] = ['⁰', '¹', '²', '³', '⁴', '⁵', '⁶', '⁷', '⁸', '⁹'];
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
     #[test]
-    fn numbers_are_rounded_to_significant_digits() {
+    fn numbers_are_typeset() {
         assert_eq!(number(1234.5), "1230");
         assert_eq!(number(-0.012345), "−0.0123");
         assert_eq!(number(1.5e-9), "1.5·10⁻⁹");
         assert_eq!(number(1e-75), "1·10⁻⁷⁵");
         assert_eq!(number(0.0), "0");
-        assert_eq!(pole([0.5, -0.25], 3), "0.5 ± 0.25i");
-        assert_eq!(pole([-5e-154, 0.0], 3), "0");
+        let pair = [[0.5, -0.25], [0.5, 0.25], [-5e-154, 0.0], [-2e-5, 1e7]];
+        assert_eq!(poles(&pair, 3), ["0.5 ± 0.25i", "0", "−2·10⁻⁵ ± 1·10⁷i"]);
     }
 }

@@ -36,7 +36,7 @@
   // The machine, to scale: metres, y upwards.
   const total = data.lengths.reduce((sum, length) => sum + length, 0);
   const cart = { width: 0.36 * total, height: 0.13 * total };
-  const colours = ["#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9"];
+  const colours = data.colours;
   const line = (parent, stroke, width) =>
     svg("line", { stroke, "stroke-width": width * total, "stroke-linecap": "round" }, parent);
   const place = (element, x1, y1, x2, y2) => {
@@ -74,10 +74,10 @@
           "font-size": letter, "font-family": "sans-serif" }, ground);
         label.textContent = `${Number((i * step).toPrecision(6))} m`.replace("-", "−");
       }
-      const target = svg("path", { d: `M0 0 l${0.045 * total} ${0.08 * total} h${-0.09 * total} z`, fill: "#D55E00" }, ground);
+      const target = svg("path", { d: `M0 0 l${0.045 * total} ${0.08 * total} h${-0.09 * total} z`, fill: colours[1] }, ground);
       const body = svg("g", {}, canvas);
       svg("rect", { x: -0.5 * cart.width, y: -cart.height - 0.03 * total, width: cart.width, height: cart.height, rx: 0.02 * total,
-        fill: "#BEBEBE", stroke: "#000000", "stroke-width": 0.008 * total }, body);
+        fill: data.cart_colour, stroke: "#000000", "stroke-width": 0.008 * total }, body);
       for (const side of [-0.3, 0.3]) svg("circle", { cx: side * cart.width, cy: -0.03 * total, r: 0.03 * total, fill: "#000000" }, body);
       const links = data.lengths.map((_, index) => line(canvas, colours[index % colours.length], 0.035));
       const joints = data.lengths.map(() => svg("circle", { r: 0.022 * total, fill: "#000000" }, canvas));

@@ -5,11 +5,12 @@ use upright::table::{Law, TABLE_FORMAT};
 
 use super::animation::Animation;
 use super::cost::Cost;
-use super::number::{number, pole, significant};
+use super::number::{number, poles, significant};
 use super::plot::Plot;
 use super::runs::{LawRun, Scene, law_name, laws};
-use super::trust::{CheckRow, Row, checks, rows};
+use super::trust::{CheckRow, TrustRow, check_rows, trust_rows};
 use super::{ReportError, Source};
+use crate::figure::style_sheet;
 use upright_design::design::Feedback;
 use upright_design::rig::{PlantDescription, Rig};
 use upright_design::verify::{Certificate, Disturbance};
@@ -43,14 +44,14 @@ pub(super) struct Page<'a> {
     pub(super) bode: Vec<Plot>,
     pub(super) nyquist: Vec<Plot>,
     pub(super) regions: Vec<Plot>,
-    trust: Vec<Row>,
+    trust: Vec<TrustRow>,
     seed: u64,
     table_format: u32,
     table_crc: String,
     version: &'static str,
     command: &'a str,
     animation: String,
-    style: &'static str,
+    style: String,
     script: &'static str,
 }
 
@@ -99,7 +100,7 @@ impl<'a> Page<'a> {
         let short = |entry: &f64| significant(*entry, DIGITS);
         let names = state_names(rig);
         let observer = design.kalman.as_ref().filter(|_| table.observer.is_some());
-        let checks = checks(trust);
+        let checks = check_rows(trust);
         Ok(Self {
             name: &rig.name,
             hash: format!("{:016x}", rig.hash()),
@@ -126,14 +127,14 @@ impl<'a> Page<'a> {
             bode: Vec::new(),
             nyquist: Vec::new(),
             regions: Vec::new(),
-            trust: rows(rig, trust),
+            trust: trust_rows(rig, trust),
             seed: source.seed,
             table_format: TABLE_FORMAT,
             table_crc: format!("{:08x}", table.crc()),
             version: env!("CARGO_PKG_VERSION"),
             command: source.command,
             animation: Animation::of(rig, scenes).json()?,
-            style: include_str!("page.css"),
+            style: format!("{}{}", style_sheet(), include_str!("page.css")),
             script: include_str!("page.js"),
         })
     }
@@ -182,7 +183,7 @@ impl LawEntry {
             names.push("K, integral".to_owned());
         }
         if rig.tick.delay_ticks == 1 {
-            names.push("K, force on its way".to_owned());
+            names.push("K, pending force".to_owned());
         }
         let entry = |law: &Feedback<f64>, index: usize| {
             law.k.entries().get(index).map_or("—".to_owned(), |gain| significant(*gain, 9))
@@ -195,9 +196,8 @@ impl LawEntry {
         let n = |law: &Feedback<f64>| law.n.map_or("none".to_owned(), |n| significant(n, 9));
         let mut gains: Vec<GainRow> = names.into_iter().enumerate().map(row).collect();
         gains.push(GainRow { name: "N".to_owned(), continuous: n(continuous), sampled: n(sampled) });
-        let listed = |poles: Option<&Vec<[f64; 2]>>| {
-            let upper = poles.into_iter().flatten().filter(|pole| pole[1] >= 0.0);
-            upper.map(|&upper| pole(upper, DIGITS)).collect::<Vec<_>>().join(",  ")
+        let listed = |found: Option<&Vec<[f64; 2]>>| {
+            found.map_or(String::new(), |found| poles(found, DIGITS).join(",  "))
         };
         let name = if index == 0 { "lqr" } else { "pole_placement" };
         let part = trust.laws.iter().find(|part| part.linear.law == name)?;

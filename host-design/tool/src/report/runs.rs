@@ -4,6 +4,7 @@ use upright::table::Law;
 
 use super::number::number;
 use upright_design::design::Certified;
+use upright_design::number::rounded;
 use upright_design::rig::{PlantDescription, Rig};
 use upright_design::simulate::{Scenario, Sensing, SimulationError, Summary, Trace, simulate};
 use upright_design::table::TableValues;
@@ -156,7 +157,7 @@ fn tilt(trust: &TrustReport) -> f64 {
     let weakest = edges.map(|tilt| tilt.edge.size).filter(|size| *size > 0.0).fold(f64::INFINITY, f64::min);
     let half = if weakest.is_finite() { 0.5 * weakest } else { 0.002 };
     // Two digits are enough to be repeated by hand.
-    format!("{half:.1e}").parse().unwrap_or(half)
+    rounded(half, 2)
 }
 
 fn gain(table: &TableValues, law: Law) -> f32 {

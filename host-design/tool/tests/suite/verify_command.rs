@@ -74,7 +74,7 @@ fn the_report_for_reading_has_a_line_for_every_requirement() {
     let output = verify(&rig_path(SINGLE), &["--runs", "100", "--law", "lqr"], None);
     assert_eq!(status(&output), 0, "{}", stderr(&output));
     let text = String::from_utf8(output.stdout).unwrap();
-    for line in ["spectral radius", "phase margin", "wrong masses", "random plants", "requirements"] {
+    for line in ["spectral radius", "phase margin", "mass errors", "random plants", "requirements"] {
         assert!(text.contains(line), "{line}: {text}");
     }
     assert!(!text.contains("FAILS") && !text.contains("pole_placement"), "{text}");

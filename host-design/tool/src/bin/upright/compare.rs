@@ -4,13 +4,13 @@ use std::io::Write;
 use std::path::{Path, PathBuf};
 
 use clap::Args;
-use indicatif::{ProgressBar, ProgressStyle};
 use serde_json::json;
 use upright_design::rig::Rig;
 use upright_design::table::write_atomically;
 use upright_tool::compare::{Candidate, Conditions, Sweep, compare, csv, figure, jobs, notes, table};
 
 use crate::failure::Failure;
+use crate::progress::with_bar;
 use crate::variation::{LawName, finite, positive};
 
 /// Puts designs side by side: several rigs, or one key of a rig file swept over a range. What falls or has no design is a
@@ -87,15 +87,7 @@ impl Compare {
                     .to_owned(),
             ));
         }
-        let bar = ProgressBar::new(rows as u64);
-        bar.set_style(
-            ProgressStyle::with_template("{spinner} {wide_bar} {pos}/{len} designs {elapsed}")
-                .unwrap_or_else(|_| ProgressStyle::default_bar()),
-        );
-        bar.enable_steady_tick(std::time::Duration::from_millis(120));
-        let rows = compare(&candidates, &conditions, &|| bar.inc(1));
-        bar.finish_and_clear();
-        let rows = rows?;
+        let rows = with_bar("designs", rows as u64, |done| compare(&candidates, &conditions, done))?;
 
         let key = self.sweep.as_ref().map(|sweep| sweep.key.as_str());
         if let Some(path) = &self.csv {

@@ -4,13 +4,13 @@ use std::io::Write;
 use std::path::{Path, PathBuf};
 
 use clap::Args;
-use indicatif::{ProgressBar, ProgressStyle};
 use serde_json::json;
 use upright_design::table::write_atomically;
 use upright_design::verify::{Effort, trust};
 use upright_tool::report::{Report as Page, Source, report};
 
 use crate::failure::Failure;
+use crate::progress::with_random_plants;
 use crate::variation::Variation;
 
 /// Writes everything about a rig and its loop into one HTML file: runs with animation, model, gains, margins, trust report.
@@ -51,33 +51,24 @@ impl Report {
     pub(crate) fn run(self) -> Result<(), Failure> {
         self.prepare()?;
         let (rig, certified, table) = self.variation.designed()?;
-        let laws = usize::from(table.lqr.is_some()) + usize::from(table.pole_placement.is_some());
-        let bar = ProgressBar::new((laws * self.runs as usize) as u64);
-        bar.set_style(
-            ProgressStyle::with_template("{spinner} {msg} {wide_bar} {pos}/{len} random plants {elapsed}")
-                .unwrap_or_else(|_| ProgressStyle::default_bar()),
-        );
-        bar.enable_steady_tick(std::time::Duration::from_millis(120));
-        let stage = |stage: &str| bar.set_message(stage.to_owned());
+        let laws = u64::from(table.lqr.is_some()) + u64::from(table.pole_placement.is_some());
         let effort = Effort { runs: self.runs as usize, seed: self.seed, late: 0.0 };
-        let made = || -> Result<_, Failure> {
-            let trust = trust(&rig, &certified, &table, effort, &stage, &|| bar.inc(1))?;
-            let command = self.as_typed();
-            let source = Source {
-                rig: &rig,
-                certified: &certified,
-                table: &table,
-                trust: &trust,
-                seed: self.seed,
-                command: &command,
-            };
-            let page = report(&source, &stage)?;
-            stage("writing");
-            let files = self.write(&page)?;
-            Ok((trust, files))
-        }();
-        bar.finish_and_clear();
-        let (trust, files) = made?;
+        let (trust, files) =
+            with_random_plants(laws * u64::from(self.runs), |stage, done| -> Result<_, Failure> {
+                let trust = trust(&rig, &certified, &table, effort, stage, done)?;
+                let source = Source {
+                    rig: &rig,
+                    certified: &certified,
+                    table: &table,
+                    trust: &trust,
+                    seed: self.seed,
+                    command: &self.as_typed(),
+                };
+                let page = report(&source, stage)?;
+                stage("writing");
+                let files = self.write(&page)?;
+                Ok((trust, files))
+            })?;
         let mut out = std::io::stdout().lock();
         if self.json {
             let object = json!({ "rig": rig.name, "hash": format!("{:016x}", rig.hash()), "files": files, "trust": trust });

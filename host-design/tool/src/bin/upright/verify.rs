@@ -4,7 +4,6 @@ use std::io::Write;
 use std::path::PathBuf;
 
 use clap::Args;
-use indicatif::{ProgressBar, ProgressStyle};
 use upright::table::Law;
 use upright_design::rig::Rig;
 use upright_design::simulate::simulate;
@@ -12,7 +11,7 @@ use upright_design::table::{TableValues, write_atomically};
 use upright_design::verify::{Axis, Effort, Horizon, TrustReport, attraction_map, sample, spread, trust};
 
 use crate::failure::Failure;
-use crate::progress::with_spinner;
+use crate::progress::{with_bar, with_random_plants, with_spinner};
 use crate::variation::{LawName, Variation};
 
 mod text;
@@ -102,19 +101,11 @@ impl Verify {
         if let Some(path) = &self.map {
             return self.map(&rig, &table, path);
         }
-        let laws = usize::from(table.lqr.is_some()) + usize::from(table.pole_placement.is_some());
-        let bar = ProgressBar::new((laws * self.runs as usize) as u64);
-        bar.set_style(
-            ProgressStyle::with_template("{spinner} {msg} {wide_bar} {pos}/{len} random plants {elapsed}")
-                .unwrap_or_else(|_| ProgressStyle::default_bar()),
-        );
-        bar.enable_steady_tick(std::time::Duration::from_millis(120));
+        let laws = u64::from(table.lqr.is_some()) + u64::from(table.pole_placement.is_some());
         let effort = Effort { runs: self.runs as usize, seed: self.seed, late: self.late };
-        let report =
-            trust(&rig, &certified, &table, effort, &|stage| bar.set_message(stage.to_owned()), &|| {
-                bar.inc(1)
-            });
-        bar.finish_and_clear();
+        let report = with_random_plants(laws * u64::from(self.runs), |stage, done| {
+            trust(&rig, &certified, &table, effort, stage, done)
+        });
         self.print(&rig, &report?)
     }
 
@@ -178,9 +169,9 @@ impl Verify {
                 rig.states() - 1
             )));
         }
-        let bar = ProgressBar::new((POINTS * POINTS) as u64).with_message("starts");
-        let map = attraction_map(rig, table, law, axes, &Horizon::default(), &|| bar.inc(1))?;
-        bar.finish_and_clear();
+        let map = with_bar("initial states", (POINTS * POINTS) as u64, |done| {
+            attraction_map(rig, table, law, axes, &Horizon::default(), done)
+        })?;
         let [columns, rows] = axes.map(|axis| {
             let step = (axis.range[1] - axis.range[0]) / (axis.points - 1) as f64;
             (0..axis.points).map(|i| axis.range[0] + step * i as f64).collect::<Vec<f64>>()

@@ -3,6 +3,7 @@
 use core::fmt::Write;
 
 use upright_design::design::{Certified, Feedback};
+use upright_design::number::{self, significant};
 use upright_design::rig::{PlantDescription, Rig};
 use upright_design::table::{LawValues, TableValues};
 
@@ -70,24 +71,13 @@ fn write_law(
         "    N       {}",
         law.n.map_or("none: no constant input holds the output away from 0".to_owned(), short)
     )?;
-    // A conjugate pair is named once.
-    let poles: Vec<String> = poles
-        .map(Vec::as_slice)
-        .unwrap_or_default()
-        .iter()
-        .filter(|pole| pole[1] >= 0.0)
-        .map(|&[re, im]| if im == 0.0 { short(re) } else { format!("{}±{}i", short(re), short(im)) })
-        .collect();
+    let poles = poles.map_or(Vec::new(), |found| number::poles(found, 6));
     writeln!(out, "    poles {plane} {}", wrapped(&poles))
 }
 
-/// Six significant digits; a rounding residue of a pole at the origin is shown as zero.
+/// Six significant digits.
 fn short(x: f64) -> String {
-    if x.abs() < 1e-60 {
-        return "0".to_owned();
-    }
-    let rounded: f64 = format!("{x:.5e}").parse().unwrap_or(x);
-    if (1e-4..1e7).contains(&rounded.abs()) { rounded.to_string() } else { format!("{rounded:e}") }
+    significant(x, 6)
 }
 
 fn wrapped(items: &[String]) -> String {

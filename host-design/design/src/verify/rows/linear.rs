@@ -1,0 +1,125 @@
+//! Rows from the linear model of the loop.
+
+use super::Values::{Each, One};
+use super::{Quantity, number};
+use crate::rig::{PlantDescription, Rig};
+use crate::verify::{LawTrust, Margins, NoiseShare};
+
+pub(super) const QUANTITIES: &[Quantity] = &[
+    Quantity {
+        name: "spectral radius",
+        meaning: "largest absolute value of a pole of the sampled loop: stable below 1",
+        values: One(|_, law| {
+            let suffix = if law.linear.stable { "" } else { ", NOT STABLE" };
+            Some(format!("{:.6}{suffix}", law.linear.spectral_radius))
+        }),
+    },
+    Quantity {
+        name: "gain margin",
+        meaning: "factors by which the real force may constantly differ from the commanded force before the loop is \
+                  unstable",
+        values: One(|_, law| {
+            let margins = margins(law)?;
+            let highest = margins.highest_gain.map_or("any".to_owned(), number);
+            Some(format!("factor {} to {highest}", number(margins.lowest_gain)))
+        }),
+    },
+    Quantity {
+        name: "phase margin",
+        meaning: "phase that the loop may lose or gain",
+        values: One(|_, law| {
+            let phase = margins(law)?.phase_margin_rad;
+            Some(phase.map_or("no limit".to_owned(), |phase| format!("{:.1}°", phase.to_degrees())))
+        }),
+    },
+    Quantity {
+        name: "delay margin",
+        meaning: "additional delay of the force, including fractions of a tick, at which the loop becomes unstable",
+        values: One(|_, law| {
+            let margins = margins(law)?;
+            Some(match (margins.delay_margin_s, margins.delay_margin_ticks) {
+                (Some(s), Some(ticks)) => format!("{} ms = {} ticks", number(1e3 * s), number(ticks)),
+                _ => "no limit".to_owned(),
+            })
+        }),
+    },
+    Quantity {
+        name: "peak sensitivity",
+        meaning: "largest amplification of a disturbance over all frequencies (Ms), and where it occurs",
+        values: One(|_, law| {
+            let margins = margins(law)?;
+            let frequency = number(margins.peak_sensitivity_rad_per_s);
+            Some(format!("{} at {frequency} rad/s", number(margins.peak_sensitivity)))
+        }),
+    },
+    Quantity {
+        name: "disk margin",
+        meaning: "size of the disk in which gain and phase may change together; 0: no margin",
+        values: One(|_, law| Some(number(margins(law)?.disk_margin))),
+    },
+    Quantity {
+        name: "longest stable tick",
+        meaning: "longest period at which the same table still gives a stable loop",
+        values: One(|_, law| {
+            let longest = law.linear.tick.as_ref()?.longest_stable_s;
+            Some(longest.map_or("30 ticks or more".to_owned(), |s| format!("{} ms", number(1e3 * s))))
+        }),
+    },
+    Quantity {
+        name: "jitter margin",
+        meaning: "each force may be late by any time up to this, differently in every tick (C.-Y. Kao and B. Lincoln, \
+                  Automatica 40, 2004); sufficient, not necessary",
+        values: One(|_, law| Some(format!("{} ms", number(1e3 * law.linear.tick.as_ref()?.jitter_s)))),
+    },
+    Quantity {
+        name: "f32 gains",
+        meaning: "largest rounding error of a gain in units in the last place (at most 0.5: all are correctly rounded), and \
+                  the change of the spectral radius",
+        values: One(|_, law| {
+            let rounding = law.linear.rounding.as_ref()?;
+            let change = rounding.spectral_radius_change;
+            Some(format!("{} ULP, spectral radius {change:+.1e}", number(rounding.gain_ulp)))
+        }),
+    },
+    Quantity {
+        name: "f32 against f64",
+        meaning: "largest difference of the force, tick by tick, from the same controller in f64 with exact gains, and \
+                  relative to the peak force of that run",
+        values: One(|_, law| {
+            let rounding = law.linear.rounding.as_ref()?;
+            let (force_n, relative) = (rounding.force_difference_n?, rounding.force_difference_relative?);
+            Some(format!("{} N, {relative:.1e} of the peak", number(force_n)))
+        }),
+    },
+    Quantity {
+        name: "RMS, ",
+        meaning: "ripple at rest from this source, and from all, as the linear model predicts it; encoder resolution \
+                  counts as white noise",
+        values: Each(|rig, law| {
+            let is_chain = matches!(rig.plant, PlantDescription::Chain(_));
+            let shares = law.linear.noise.iter().flatten().filter(|_| is_chain);
+            let row = |share: &NoiseShare| ripple(rig, share.force_n, &share.states);
+            shares.map(|share| (share.source.clone(), row(share))).collect()
+        }),
+    },
+    Quantity {
+        name: "simulated RMS",
+        meaning: "the same in four runs of 20 s against the nonlinear plant, with real encoder steps and the dead zone of \
+                  the motor: trust this row more",
+        values: One(|rig, law| {
+            let run = law.noise_run.as_ref()?;
+            Some(ripple(rig, run.force_rms_n, &run.state_rms))
+        }),
+    },
+];
+
+fn margins(law: &LawTrust) -> Option<&Margins> {
+    law.linear.margins.as_ref()
+}
+
+/// Root mean squares of force, cart and joint angles.
+fn ripple(rig: &Rig, force_n: f64, states: &[f64]) -> String {
+    let angles: Vec<String> = states.iter().skip(2).step_by(2).map(|&angle| number(1e3 * angle)).collect();
+    let cart_mm = number(1e3 * states[rig.output()]);
+    format!("force {} N, cart {cart_mm} mm, angles {} mrad", number(force_n), angles.join(" "))
+}

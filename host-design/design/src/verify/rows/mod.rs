@@ -1,0 +1,71 @@
+//! The trust report of one law as rows for reading. Text and page both show these, and the documentation is held against
+//! their names and meanings.
+
+mod linear;
+mod runs;
+
+use super::LawTrust;
+use crate::number::significant;
+use crate::rig::Rig;
+
+/// One quantity of the trust report.
+#[derive(Debug, Clone, Copy)]
+pub struct Quantity {
+    /// What a row is called, or how the names of its rows begin.
+    pub name: &'static str,
+    /// What the value means.
+    pub meaning: &'static str,
+    values: Values,
+}
+
+/// How the text of a value is made.
+#[derive(Debug, Clone, Copy)]
+enum Values {
+    /// One row; none where the report does not have it.
+    One(fn(&Rig, &LawTrust) -> Option<String>),
+    /// A row for each link or source, whose name follows that of the quantity.
+    Each(fn(&Rig, &LawTrust) -> Vec<(String, String)>),
+}
+
+/// One row of the trust report.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Row {
+    /// Which quantity, with its link or source.
+    pub name: String,
+    /// What was found, with its unit.
+    pub value: String,
+    /// What the value means.
+    pub meaning: &'static str,
+}
+
+/// Every quantity, in the order in which they are shown.
+pub fn quantities() -> impl Iterator<Item = &'static Quantity> {
+    linear::QUANTITIES.iter().chain(runs::QUANTITIES)
+}
+
+/// The rows of one law. Those that the report does not have, because the rig has no such part or the loop is unstable,
+/// are left out.
+pub fn rows(rig: &Rig, law: &LawTrust) -> Vec<Row> {
+    let rows_of = |quantity: &'static Quantity| {
+        let values = match quantity.values {
+            Values::One(value) => value(rig, law).map(|value| (String::new(), value)).into_iter().collect(),
+            Values::Each(values) => values(rig, law),
+        };
+        values.into_iter().map(|(part, value)| Row {
+            name: format!("{}{part}", quantity.name),
+            value,
+            meaning: quantity.meaning,
+        })
+    };
+    quantities().flat_map(rows_of).collect()
+}
+
+/// Three significant digits.
+fn number(x: f64) -> String {
+    significant(x, 3)
+}
+
+/// Signs of a combination, such as `+-+-`.
+fn signs(signs: &[i8]) -> String {
+    signs.iter().map(|&sign| if sign > 0 { '+' } else { '-' }).collect()
+}

@@ -1,0 +1,95 @@
+//! Rows from runs against the nonlinear plant.
+
+use super::Values::{Each, One};
+use super::{Quantity, number, signs};
+use crate::verify::LawTrust;
+
+pub(super) const QUANTITIES: &[Quantity] = &[
+    Quantity {
+        name: "largest tilt, ",
+        meaning: "largest initial angle from the vertical of this link alone, all others vertical, from which the loop \
+                  recovers",
+        values: Each(|_, law| tilts(law)),
+    },
+    Quantity {
+        name: "largest tilt, all links",
+        meaning: "the same for all links at once, in the combination of sides with the smallest angle",
+        values: One(|_, law| {
+            let worst = law.attraction.as_ref()?.worst.as_ref()?;
+            let (size, sides) = (number(worst.edge.size), signs(&worst.signs));
+            Some(format!("{size} rad, sides {sides}, of {} combinations", worst.tried))
+        }),
+    },
+    Quantity {
+        name: "largest ungoverned step",
+        meaning: "largest step of the set-point without the governor; 2 m is the largest tried",
+        values: One(|_, law| {
+            let step = law.attraction.as_ref()?.raw_step.as_ref()?;
+            let largest = if step.at_largest_tried { " (largest tried)" } else { "" };
+            Some(format!("{} m{largest}, peak force {} N", number(step.size), number(step.peak_force_n)))
+        }),
+    },
+    Quantity {
+        name: "coarsest encoders",
+        meaning: "how many times coarser all encoders may be, with gains redesigned for them",
+        values: One(|_, law| {
+            let encoder = law.coarsest_encoder.as_ref()?;
+            let factor = encoder.factor.map_or("not even the rig's own".to_owned(), |factor| {
+                format!("{} times coarser", number(factor))
+            });
+            let counts: Vec<String> = encoder.counts_per_rev.iter().map(|&counts| number(counts)).collect();
+            Some(format!("{factor} (links: {} counts per turn)", counts.join(" ")))
+        }),
+    },
+    Quantity {
+        name: "mass errors",
+        meaning: "every combination of too heavy and too light cart and links, 10 s with disturbances, the table unchanged",
+        values: One(|_, law| {
+            let corners = law.corners.as_ref()?;
+            let percent = number(corners.percent);
+            Some(format!("±{percent} %: {} of {} combinations stand", corners.stand, corners.corners))
+        }),
+    },
+    Quantity {
+        name: "worst mass errors",
+        meaning: "the combination that falls first or, if none falls, has the largest angle",
+        values: One(|_, law| {
+            let weakest = signs(&law.corners.as_ref()?.weakest.signs);
+            Some(format!("{weakest} (cart, then links: + heavier, - lighter)"))
+        }),
+    },
+    Quantity {
+        name: "most critical mass",
+        meaning: "the mass with the smallest tolerance when it alone is wrong",
+        values: One(|_, law| {
+            let critical = law.mass_tolerances.first()?;
+            let (lighter, heavier) = (number(critical.lighter_percent), number(critical.heavier_percent));
+            Some(format!("{}: alone -{lighter} % to +{heavier} %", critical.mass))
+        }),
+    },
+    Quantity {
+        name: "random plants",
+        meaning: "Monte Carlo: masses, lengths and inertias (by spread_percent) and friction (±20 %) drawn at random, with \
+                  the 95 % interval of the share that stands (Wilson): 200 of 200 is not 100 %",
+        values: One(|rig, law| {
+            let runs = law.monte_carlo.as_ref()?;
+            let [low, high] = runs.interval.map(|share| 100.0 * share);
+            let spread = number(rig.verify.spread_percent);
+            let share = 100.0 * runs.success_rate;
+            let (stood, made) = (runs.stood, runs.runs);
+            Some(format!(
+                "±{spread} %: {stood} of {made} stand ({share:.1} %, 95 % interval {low:.1} to {high:.1} %)"
+            ))
+        }),
+    },
+];
+
+fn tilts(law: &LawTrust) -> Vec<(String, String)> {
+    let tilts = law.attraction.iter().flat_map(|attraction| &attraction.tilts);
+    let row = |tilt: &crate::verify::Tilt| {
+        let (size, degrees) = (number(tilt.edge.size), tilt.edge.size.to_degrees());
+        let value = format!("{size} rad ({degrees:.2}°), peak force {} N", number(tilt.edge.peak_force_n));
+        (format!("link {}", tilt.link), value)
+    };
+    tilts.map(row).collect()
+}
