@@ -1,7 +1,7 @@
 //! Solves a collection of Riccati problems with known answers and counts the correctly rounded gains.
 //!
 //! ```sh
-//! cargo run --release -p host-design --example riccati_collection -- COLLECTION.json …
+//! cargo run --release -p upright-design --example riccati_collection -- COLLECTION.json …
 //! ```
 //!
 //! A collection is a JSON array of objects with `id`, matrices `A`, `B`, `Q`, `R` as row arrays, an optional `S`
@@ -13,9 +13,7 @@ use std::time::Instant;
 
 use serde::Deserialize;
 use upright_design::design::{Cost, NoStabilisingSolution, care, dare};
-use upright_design::numerics::{Matrix, Wide};
-
-type Attempt = fn(&Problem) -> Result<Vec<Vec<f64>>, NoStabilisingSolution>;
+use upright_design::numerics::{Matrix, Wide, with_precision};
 
 #[derive(Deserialize)]
 #[serde(rename_all = "UPPERCASE")]
@@ -33,8 +31,8 @@ struct Problem {
 }
 
 impl Problem {
-    fn gain<const BITS: usize>(&self) -> Result<Vec<Vec<f64>>, NoStabilisingSolution> {
-        let matrix = |rows: &Vec<Vec<f64>>| Matrix::<Wide<BITS>>::from_f64_rows(rows);
+    fn gain(&self) -> Result<Vec<Vec<f64>>, NoStabilisingSolution> {
+        let matrix = |rows: &Vec<Vec<f64>>| Matrix::<Wide>::from_f64_rows(rows);
         let (a, b) = (matrix(&self.a), matrix(&self.b));
         let mut cost = Cost::new(matrix(&self.q), matrix(&self.r));
         let regulator = match &self.s {
@@ -60,15 +58,9 @@ impl Problem {
 
     /// Doubles the precision until two in a row round to the same gain; with it, the bits of the first of them.
     fn certified_gain(&self) -> Result<(Vec<Vec<f64>>, usize), NoStabilisingSolution> {
-        let attempts: [(usize, Attempt); 4] = [
-            (256, Self::gain::<256>),
-            (512, Self::gain::<512>),
-            (1024, Self::gain::<1024>),
-            (2048, Self::gain::<2048>),
-        ];
         let mut before = Err(NoStabilisingSolution);
-        for (bits, solve) in attempts {
-            let gain = solve(self);
+        for bits in [256, 512, 1024, 2048] {
+            let gain = with_precision(bits, || self.gain());
             if gain.is_ok() && gain == before {
                 return gain.map(|gain| (gain, bits / 2));
             }

@@ -3,7 +3,7 @@
 use super::error::DesignError;
 use super::loops::DesignPoles;
 use super::synthesis::Design;
-use crate::numerics::Wide;
+use crate::numerics::{Wide, with_precision};
 use crate::rig::Rig;
 
 /// A design whose every number came out the same at two precisions.
@@ -24,13 +24,15 @@ pub struct Certified {
 
 type Attempt = Result<Certified, DesignError>;
 
-fn attempt<const BITS: usize>(rig: &Rig) -> Attempt {
-    let design = Design::<Wide<BITS>>::of(rig)?;
-    Ok(Certified {
-        double: design.rounded(Wide::round_to_f64),
-        single: design.rounded(Wide::round_to_f32),
-        poles: design.poles(rig)?,
-        bits: [BITS / 2, BITS],
+fn attempt(rig: &Rig, bits: usize) -> Attempt {
+    with_precision(bits, || {
+        let design = Design::<Wide>::of(rig)?;
+        Ok(Certified {
+            double: design.rounded(Wide::round_to_f64),
+            single: design.rounded(Wide::round_to_f32),
+            poles: design.poles(rig)?,
+            bits: [bits / 2, bits],
+        })
     })
 }
 
@@ -41,8 +43,8 @@ fn attempt<const BITS: usize>(rig: &Rig) -> Attempt {
 /// highest ones give different gains.
 pub fn design(rig: &Rig) -> Result<Certified, DesignError> {
     let (first, second) = std::thread::scope(|scope| {
-        let first = scope.spawn(|| attempt::<256>(rig));
-        let second = attempt::<512>(rig);
+        let first = scope.spawn(|| attempt(rig, 256));
+        let second = attempt(rig, 512);
         (first.join(), second)
     });
     let first = first.unwrap_or_else(|panic| std::panic::resume_unwind(panic));
@@ -50,8 +52,8 @@ pub fn design(rig: &Rig) -> Result<Certified, DesignError> {
         return second;
     }
     let mut before = second;
-    for next in [attempt::<1024>, attempt::<2048>, attempt::<4096>] {
-        let after = next(rig);
+    for bits in [1024, 2048, 4096] {
+        let after = attempt(rig, bits);
         if agree(&before, &after) {
             return after;
         }

@@ -15,11 +15,11 @@ impl<R: Real> Reach<R> {
     /// The controllable subspace of (A, B), grown by one orthogonalised direction at a time from the columns of B
     /// (the staircase algorithm of Rosenbrock, in its Krylov form).
     ///
-    /// A direction counts as new when orthogonalisation leaves more than `2^(-BITS/2)` of it; unlike the rank of
+    /// A direction counts as new when orthogonalisation leaves more than `2^(-bits/2)` of it; unlike the rank of
     /// `[B AB A²B …]` this does not decay with the number of states.
     pub fn of(a: &Matrix<R>, b: &Matrix<R>) -> Self {
         let states = a.rows();
-        let threshold = R::one().scale_by_power_of_two(-(R::BITS as i32) / 2);
+        let threshold = R::one().scale_by_power_of_two(-(R::bits() as i32) / 2);
         let mut basis: Vec<Matrix<R>> = Vec::new();
         let input_floor = b.norm() * &threshold;
         for j in 0..b.cols() {
@@ -73,7 +73,7 @@ mod tests {
     use super::*;
     use crate::numerics::Wide;
 
-    type W = Wide<256>;
+    type W = Wide;
 
     #[test]
     fn a_chain_of_integrators_is_reached_from_its_end_only() {

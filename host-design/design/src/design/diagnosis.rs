@@ -12,14 +12,14 @@ pub(super) fn why_no_placement<R: Real>(task: Task, a: &Matrix<R>, b: &Matrix<R>
         Ok(modes) if !modes.is_empty() => {
             DesignError::Uncontrollable { task, modes: modes.iter().map(Complex::to_f64).collect() }
         }
-        _ => DesignError::Unresolved { task, bits: R::BITS },
+        _ => DesignError::Unresolved { task, bits: R::bits() },
     }
 }
 
 /// Why a regulator does not exist.
 pub(super) fn why_no_lqr<R: Real>(task: Task, a: &Matrix<R>, b: &Matrix<R>, cost: &Cost<R>) -> DesignError {
     // A quarter of the bits: a repeated mode is only known to that many.
-    let fuzz = R::one().scale_by_power_of_two(-(R::BITS as i32) / 8);
+    let fuzz = R::one().scale_by_power_of_two(-(R::bits() as i32) / 8);
     // How far outside the stability region a mode lies, relative to the size of the plant.
     let excess = |mode: &Complex<R>| {
         if task.is_sampled() {
@@ -41,5 +41,5 @@ pub(super) fn why_no_lqr<R: Real>(task: Task, a: &Matrix<R>, b: &Matrix<R>, cost
             return DesignError::Unweighted { task, modes: marginal };
         }
     }
-    DesignError::Unresolved { task, bits: R::BITS }
+    DesignError::Unresolved { task, bits: R::bits() }
 }

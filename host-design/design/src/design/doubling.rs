@@ -45,7 +45,7 @@ pub(super) fn doubling<R: Real>(a: &Matrix<R>, g: &Matrix<R>, h: &Matrix<R>) -> 
 /// Whether every eigenvalue of `a` lies strictly inside the unit circle: some power `2^k` has norm below 1/2.
 pub(super) fn powers_vanish<R: Real>(a: &Matrix<R>) -> bool {
     let half = R::from_f64(0.5);
-    let hopeless = R::one().scale_by_power_of_two(R::BITS as i32);
+    let hopeless = R::one().scale_by_power_of_two(R::bits() as i32);
     let mut power = a.clone();
     for _ in 0..90 {
         let norm = power.norm();

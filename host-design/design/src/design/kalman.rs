@@ -55,7 +55,7 @@ pub(super) fn kalman<R: Real>(
     let solution = dare(&a_t, &c_t, &Cost::new(q, r.clone())).map_err(|_| why_no_kalman(&a_t, &c_t))?;
     let p_c = &solution.x * &c_t;
     let s = &(&c * &p_c) + &r;
-    let l_filter = solve_right(&p_c, &s).map_err(|_| DesignError::NoKalman { bits: R::BITS })?;
+    let l_filter = solve_right(&p_c, &s).map_err(|_| DesignError::NoKalman { bits: R::bits() })?;
     let gains = Kalman {
         l_predictor: ad * &l_filter,
         l_filter,
@@ -66,12 +66,12 @@ pub(super) fn kalman<R: Real>(
 }
 
 fn why_no_kalman<R: Real>(a_t: &Matrix<R>, c_t: &Matrix<R>) -> DesignError {
-    let fuzz = R::one().scale_by_power_of_two(-(R::BITS as i32) / 8);
+    let fuzz = R::one().scale_by_power_of_two(-(R::bits() as i32) / 8);
     let hidden = Reach::of(a_t, c_t).unreachable_modes().unwrap_or_default();
     let hidden: Vec<[f64; 2]> =
         hidden.iter().filter(|mode| mode.modulus() > R::one() - &fuzz).map(Complex::to_f64).collect();
     if hidden.is_empty() {
-        DesignError::NoKalman { bits: R::BITS }
+        DesignError::NoKalman { bits: R::bits() }
     } else {
         DesignError::Undetectable { modes: hidden }
     }

@@ -88,7 +88,7 @@ mod tests {
     use crate::numerics::{Wide, eigenvalues};
     use proptest::prelude::*;
 
-    type W = Wide<256>;
+    type W = Wide;
 
     #[test]
     fn the_papers_dominant_pair() {

@@ -172,7 +172,7 @@ fn relative<R: Real>(left: &Matrix<R>, terms: &[&Matrix<R>]) -> R {
 /// Half the working bits are right: enough to tell a solution from a failed iteration. Whether a gain is good to
 /// the last bit of an f64 is decided by repeating the design at twice the precision.
 fn accurate<R: Real>(residual: &R) -> bool {
-    *residual <= R::one().scale_by_power_of_two(-(R::BITS as i32) / 2)
+    *residual <= R::one().scale_by_power_of_two(-(R::bits() as i32) / 2)
 }
 
 /// Whether every eigenvalue of `a` has a negative real part: its Cayley transform
@@ -194,7 +194,7 @@ mod tests {
     use super::*;
     use crate::numerics::Wide;
 
-    type W = Wide<256>;
+    type W = Wide;
 
     fn matrix(rows: &[&[f64]]) -> Matrix<W> {
         Matrix::from_f64_rows(&rows.iter().map(|row| row.to_vec()).collect::<Vec<_>>())

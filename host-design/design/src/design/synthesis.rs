@@ -138,11 +138,11 @@ impl<R: Real> Design<R> {
     }
 }
 
-impl<const BITS: usize> Design<Wide<BITS>> {
+impl Design<Wide> {
     /// Every entry passed through `round`, after [`Matrix::rounded`] has set pure rounding errors to zero.
-    pub fn rounded<S>(&self, round: fn(&Wide<BITS>) -> S) -> Design<S> {
-        let laws = |laws: &Laws<Wide<BITS>>| {
-            let feedback = |law: &Option<Feedback<Wide<BITS>>>| {
+    pub fn rounded<S>(&self, round: fn(&Wide) -> S) -> Design<S> {
+        let laws = |laws: &Laws<Wide>| {
+            let feedback = |law: &Option<Feedback<Wide>>| {
                 law.as_ref().map(|law| Feedback {
                     k: law.k.rounded(round),
                     n: law.n.as_ref().map(round),
@@ -180,7 +180,7 @@ pub(crate) const OBSERVER: &str = "Kalman filter";
 /// # Errors
 /// [`DesignError::MassMatrix`] if the plant has no linear model.
 pub(crate) fn noise_columns(rig: &Rig) -> Result<Matrix<f64>, DesignError> {
-    let LinearModel { b, torque_inputs, .. } = continuous_plant::<Wide<256>>(rig)?;
+    let LinearModel { b, torque_inputs, .. } = continuous_plant::<Wide>(rig)?;
     Ok(noise_inputs(rig, &b, &torque_inputs).rounded(Wide::round_to_f64))
 }
 
@@ -296,7 +296,7 @@ fn with_integral_weight<R: Real>(cost: &Cost<R>, weight: &R) -> Cost<R> {
 /// `1 / (C M⁻¹ B)` with `C` picking the state `output`; none if `C M⁻¹ B` is zero, or nothing but rounding error.
 fn precompensation<R: Real>(m: &Matrix<R>, b: &Matrix<R>, output: usize) -> Option<R> {
     let steady = solve(m, b).ok()?;
-    let noise = steady.largest_entry().scale_by_power_of_two(-(R::BITS as i32) / 2);
+    let noise = steady.largest_entry().scale_by_power_of_two(-(R::bits() as i32) / 2);
     let gain = &steady[(output, 0)];
     (gain.abs() > noise).then(|| R::one() / gain)
 }

@@ -47,7 +47,7 @@ mod tests {
     use super::*;
     use crate::numerics::Wide;
 
-    type W = Wide<256>;
+    type W = Wide;
 
     #[test]
     fn a_double_integrator_is_held_and_integrated_in_closed_form() {

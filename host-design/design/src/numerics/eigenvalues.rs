@@ -32,10 +32,10 @@ pub struct NoConvergence;
 /// Eigenvalues of a square matrix, by balancing, reduction to Hessenberg form and Francis' double-shift QR steps
 /// (Golub & Van Loan, *Matrix Computations*, section 7.5; `hqr` of EISPACK), ordered by real part.
 ///
-/// A k-fold eigenvalue comes out with about `BITS / k` good bits: ask in a precision that leaves enough.
+/// A k-fold eigenvalue comes out with about `bits / k` good bits: ask in a precision that leaves enough.
 ///
 /// # Errors
-/// [`NoConvergence`] after `30 + 2 BITS` steps without a deflation (repeated eigenvalues converge one bit at a time).
+/// [`NoConvergence`] after `30 + 2 bits` steps without a deflation (repeated eigenvalues converge one bit at a time).
 pub fn eigenvalues<R: Real>(a: &Matrix<R>) -> Result<Vec<Complex<R>>, NoConvergence> {
     if !a.is_finite() {
         return Err(NoConvergence);
@@ -57,7 +57,7 @@ pub fn eigenvalues<R: Real>(a: &Matrix<R>) -> Result<Vec<Complex<R>>, NoConverge
             end -= 2;
             steps = 0;
         } else {
-            if steps == 30 + 2 * R::BITS {
+            if steps == 30 + 2 * R::bits() {
                 return Err(NoConvergence);
             }
             steps += 1;
@@ -290,7 +290,7 @@ mod tests {
     #[test]
     fn roots_of_wilkinsons_polynomial_come_back() {
         let roots: Vec<f64> = (1..=20).map(f64::from).collect();
-        let found = eigenvalues(&companion::<Wide<256>>(&roots)).unwrap();
+        let found = eigenvalues(&companion::<Wide>(&roots)).unwrap();
         for (eigenvalue, root) in found.iter().zip(&roots) {
             assert_eq!(eigenvalue.re.round_to_f64(), *root);
             assert!(eigenvalue.im.to_f64() == 0.0);
@@ -299,7 +299,7 @@ mod tests {
 
     #[test]
     fn a_fourfold_root_keeps_a_quarter_of_the_bits() {
-        for eigenvalue in eigenvalues(&companion::<Wide<256>>(&[-40.0; 4])).unwrap() {
+        for eigenvalue in eigenvalues(&companion::<Wide>(&[-40.0; 4])).unwrap() {
             assert!((eigenvalue.re.to_f64() + 40.0).abs() < 1e-16 && eigenvalue.im.to_f64().abs() < 1e-16);
         }
     }
@@ -316,7 +316,7 @@ mod tests {
     proptest! {
         #[test]
         fn sum_and_product_of_eigenvalues_are_trace_and_determinant(entries in prop::collection::vec(-10.0..10.0f64, 36)) {
-            type W = Wide<256>;
+            type W = Wide;
             let a = Matrix::<W>::from_fn(6, 6, |i, j| W::from_f64(entries[6 * i + j]));
             let found = eigenvalues(&a).unwrap();
             let trace = (0..6).fold(W::zero(), |sum, i| sum + &a[(i, i)]);

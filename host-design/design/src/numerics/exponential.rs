@@ -7,13 +7,13 @@ use super::{Matrix, Real};
 /// In extended precision there are digits to spare, so the plainest method is also the most trustworthy one
 /// (Moler & Van Loan, *Nineteen dubious ways*, SIAM Review 2003, method 3).
 pub fn exponential<R: Real>(a: &Matrix<R>) -> Matrix<R> {
-    // ‖A‖ / 2^s <= 2^-8 makes about BITS / 8 terms enough.
+    // ‖A‖ / 2^s <= 2^-8 makes about bits / 8 terms enough.
     let norm = a.norm().to_f64();
     let squarings = if norm > 0.0 { (norm.log2().ceil() as i32 + 8).max(0) } else { 0 };
     let scaled = a.map(|entry| entry.scale_by_power_of_two(-squarings));
     let mut sum = Matrix::identity(a.rows());
     let mut term = sum.clone();
-    for order in 1..=R::BITS {
+    for order in 1..=R::bits() {
         term = (&term * &scaled).map(|entry| entry.clone() / &R::from_f64(order as f64));
         sum = &sum + &term;
         if term.largest_entry() <= R::epsilon().scale_by_power_of_two(-8) {
@@ -31,7 +31,7 @@ mod tests {
     use super::super::Wide;
     use super::*;
 
-    type W = Wide<256>;
+    type W = Wide;
 
     #[test]
     fn a_rotation_and_a_nilpotent_block_have_their_closed_forms() {

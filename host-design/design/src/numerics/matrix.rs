@@ -143,11 +143,11 @@ impl<R: Real> Matrix<R> {
     }
 }
 
-impl<const BITS: usize> Matrix<Wide<BITS>> {
+impl Matrix<Wide> {
     /// The matrix that calculation meant, with every entry passed through `round`: entries that are nothing but
-    /// rounding error, `2^(-BITS/2)` times smaller than the largest, become zero first.
-    pub fn rounded<S>(&self, mut round: impl FnMut(&Wide<BITS>) -> S) -> Matrix<S> {
-        let noise = self.largest_entry().scale_by_power_of_two(-(BITS as i32) / 2);
+    /// rounding error, `2^(-bits/2)` times smaller than the largest, become zero first.
+    pub fn rounded<S>(&self, mut round: impl FnMut(&Wide) -> S) -> Matrix<S> {
+        let noise = self.largest_entry().scale_by_power_of_two(-(Wide::bits() as i32) / 2);
         let zero = Wide::zero();
         self.map(|entry| round(if entry.abs() < noise { &zero } else { entry }))
     }

@@ -12,4 +12,4 @@ pub use exponential::exponential;
 pub use matrix::Matrix;
 pub use real::Real;
 pub use solve::{Lu, Singular, solve, solve_right};
-pub use wide::Wide;
+pub use wide::{Wide, with_precision};

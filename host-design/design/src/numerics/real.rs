@@ -3,7 +3,7 @@
 use core::fmt::Debug;
 use core::ops::{Add, Div, Mul, Neg, Sub};
 
-/// A real number of some working precision: `f64`, or [`Wide`](super::Wide) with a chosen number of bits.
+/// A real number of some working precision: `f64`, or [`Wide`](super::Wide) at the thread's working precision.
 ///
 /// Operands on the right are taken by reference, so that a formula reads `a.clone() * b + c` for big
 /// floats and costs nothing for `f64`.
@@ -18,7 +18,7 @@ pub trait Real:
     + for<'a> Div<&'a Self, Output = Self>
 {
     /// Bits in the significand.
-    const BITS: usize;
+    fn bits() -> usize;
 
     /// The exact value of `x`.
     fn from_f64(x: f64) -> Self;
@@ -49,9 +49,9 @@ pub trait Real:
     fn one() -> Self {
         Self::from_f64(1.0)
     }
-    /// `2^(1 - BITS)`, the distance from 1 to the next larger number.
+    /// `2^(1 - bits)`, the distance from 1 to the next larger number.
     fn epsilon() -> Self {
-        Self::one().scale_by_power_of_two(1 - Self::BITS as i32)
+        Self::one().scale_by_power_of_two(1 - Self::bits() as i32)
     }
     /// Absolute value.
     fn abs(&self) -> Self {
@@ -68,7 +68,9 @@ pub trait Real:
 }
 
 impl Real for f64 {
-    const BITS: usize = 53;
+    fn bits() -> usize {
+        53
+    }
 
     fn from_f64(x: f64) -> Self {
         x

@@ -1,8 +1,8 @@
-//! Extended precision: a pure-Rust big float with its number of bits in the type.
+//! Extended precision: a pure-Rust big float whose number of bits is set for a stretch of a thread's work.
 
 use core::cmp::Ordering;
 use core::ops::{Add, Div, Mul, Neg, Sub};
-use std::cell::RefCell;
+use std::cell::{Cell, RefCell};
 
 use astro_float::{BigFloat, Consts, RoundingMode, Sign};
 
@@ -13,19 +13,37 @@ const ROUNDING: RoundingMode = RoundingMode::ToEven;
 thread_local! {
     /// Digits of π, ln 2 … computed once per thread.
     static CONSTANTS: RefCell<Option<Consts>> = const { RefCell::new(None) };
+    /// What [`with_precision`] set.
+    static PRECISION_BITS: Cell<usize> = const { Cell::new(256) };
 }
 
-/// A real number with a significand of `BITS` bits (a multiple of 64), rounded to nearest even.
-#[derive(Clone, Debug)]
-pub struct Wide<const BITS: usize>(BigFloat);
+/// Runs `calculate` on this thread with significands of `bits` bits (a multiple of 64) instead of 256. Threads that it
+/// starts begin at 256 again.
+pub fn with_precision<T>(bits: usize, calculate: impl FnOnce() -> T) -> T {
+    struct Restore(usize);
+    impl Drop for Restore {
+        fn drop(&mut self) {
+            PRECISION_BITS.set(self.0);
+        }
+    }
+    let _restore = Restore(PRECISION_BITS.replace(bits));
+    calculate()
+}
 
-impl<const BITS: usize> Wide<BITS> {
+/// A real number: each operation rounds its result to the thread's working precision ([`with_precision`]), to nearest
+/// even.
+///
+/// The precision is no type parameter, because the whole design would be compiled again for each.
+#[derive(Clone, Debug)]
+pub struct Wide(BigFloat);
+
+impl Wide {
     /// Rounds away the last quarter of the significand, where a long calculation leaves its rounding errors,
     /// so that a result which is exactly a short number comes out as that number.
     fn without_noise(&self) -> BigFloat {
         let mut short = self.0.clone();
         // The only error is a precision out of range; a shorter precision is in range.
-        let _ = short.set_precision(BITS - BITS / 4, ROUNDING);
+        let _ = short.set_precision(Self::bits() - Self::bits() / 4, ROUNDING);
         short
     }
 
@@ -54,19 +72,19 @@ impl<const BITS: usize> Wide<BITS> {
     }
 }
 
-impl<const BITS: usize> PartialEq for Wide<BITS> {
+impl PartialEq for Wide {
     fn eq(&self, other: &Self) -> bool {
         self.partial_cmp(other) == Some(Ordering::Equal)
     }
 }
 
-impl<const BITS: usize> PartialOrd for Wide<BITS> {
+impl PartialOrd for Wide {
     fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
         self.0.cmp(&other.0).map(|sign| sign.cmp(&0))
     }
 }
 
-impl<const BITS: usize> Neg for Wide<BITS> {
+impl Neg for Wide {
     type Output = Self;
     fn neg(mut self) -> Self {
         self.0.inv_sign();
@@ -74,65 +92,67 @@ impl<const BITS: usize> Neg for Wide<BITS> {
     }
 }
 
-impl<const BITS: usize> Add<&Self> for Wide<BITS> {
+impl Add<&Self> for Wide {
     type Output = Self;
     fn add(self, other: &Self) -> Self {
-        Self(self.0.add(&other.0, BITS, ROUNDING))
+        Self(self.0.add(&other.0, Self::bits(), ROUNDING))
     }
 }
 
-impl<const BITS: usize> Sub<&Self> for Wide<BITS> {
+impl Sub<&Self> for Wide {
     type Output = Self;
     fn sub(self, other: &Self) -> Self {
-        Self(self.0.sub(&other.0, BITS, ROUNDING))
+        Self(self.0.sub(&other.0, Self::bits(), ROUNDING))
     }
 }
 
-impl<const BITS: usize> Mul<&Self> for Wide<BITS> {
+impl Mul<&Self> for Wide {
     type Output = Self;
     fn mul(self, other: &Self) -> Self {
-        Self(self.0.mul(&other.0, BITS, ROUNDING))
+        Self(self.0.mul(&other.0, Self::bits(), ROUNDING))
     }
 }
 
-impl<const BITS: usize> Div<&Self> for Wide<BITS> {
+impl Div<&Self> for Wide {
     type Output = Self;
     fn div(self, other: &Self) -> Self {
-        Self(self.0.div(&other.0, BITS, ROUNDING))
+        Self(self.0.div(&other.0, Self::bits(), ROUNDING))
     }
 }
 
-impl<const BITS: usize> Real for Wide<BITS> {
-    const BITS: usize = BITS;
+impl Real for Wide {
+    fn bits() -> usize {
+        PRECISION_BITS.get()
+    }
 
     fn from_f64(x: f64) -> Self {
         if x.is_subnormal() {
             // astro-float 0.9.6 reads subnormal numbers as half their value.
             let normal = x * f64::from_bits((1023 + 64) << 52);
-            return Self(BigFloat::from_f64(normal, BITS)).scale_by_power_of_two(-64);
+            return Self(BigFloat::from_f64(normal, Self::bits())).scale_by_power_of_two(-64);
         }
-        Self(BigFloat::from_f64(x, BITS))
+        Self(BigFloat::from_f64(x, Self::bits()))
     }
     fn to_f64(&self) -> f64 {
         f64::from_bits(nearest(&self.0, &DOUBLE))
     }
     fn sqrt(&self) -> Self {
-        Self(self.0.sqrt(BITS, ROUNDING))
+        Self(self.0.sqrt(Self::bits(), ROUNDING))
     }
     fn exp(&self) -> Self {
-        self.with_constants(|x, constants| x.exp(BITS, ROUNDING, constants))
+        self.with_constants(|x, constants| x.exp(Self::bits(), ROUNDING, constants))
     }
     fn ln(&self) -> Self {
-        self.with_constants(|x, constants| x.ln(BITS, ROUNDING, constants))
+        self.with_constants(|x, constants| x.ln(Self::bits(), ROUNDING, constants))
     }
     fn sin(&self) -> Self {
-        self.with_constants(|x, constants| x.sin(BITS, ROUNDING, constants))
+        self.with_constants(|x, constants| x.sin(Self::bits(), ROUNDING, constants))
     }
     fn cos(&self) -> Self {
-        self.with_constants(|x, constants| x.cos(BITS, ROUNDING, constants))
+        self.with_constants(|x, constants| x.cos(Self::bits(), ROUNDING, constants))
     }
     fn pi() -> Self {
-        Self::zero().with_constants(|_, constants| constants.pi(BITS, ROUNDING))
+        Self::zero().with_constants(|_, constants| constants.pi(Self::bits(), ROUNDING))
     }
     fn is_finite(&self) -> bool {
         !(self.0.is_nan() || self.0.is_inf())
@@ -209,7 +229,7 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
 
-    type W = Wide<256>;
+    type W = Wide;
 
     proptest! {
         #[test]
@@ -260,5 +280,22 @@ mod tests {
         let noisy = exact_tie.clone() + &W::one().scale_by_power_of_two(-250);
         assert_eq!(noisy.round_to_f32(), 1.0);
         assert_eq!(noisy.to_f64(), 1.0 + f64::from(f32::EPSILON) / 2.0);
+    }
+
+    #[test]
+    fn the_precision_holds_for_its_stretch_of_this_thread_alone() {
+        let third = || W::one() / &W::from_f64(3.0);
+        let error = |x: W| (x * &W::from_f64(3.0) - &W::one()).abs();
+        let (coarse, elsewhere) =
+            with_precision(128, || (third(), std::thread::scope(|scope| scope.spawn(third).join().unwrap())));
+        with_precision(512, || {
+            assert!(error(coarse) > W::one().scale_by_power_of_two(-130));
+            assert!(error(elsewhere) < W::one().scale_by_power_of_two(-254));
+            assert!(error(third()) < W::one().scale_by_power_of_two(-510));
+        });
+        assert_eq!(W::bits(), 256);
+        let panicked = std::panic::catch_unwind(|| with_precision(64, || panic!("on purpose")));
+        assert!(panicked.is_err());
+        assert_eq!(W::bits(), 256);
     }
 }

@@ -124,7 +124,7 @@ mod tests {
         let mut rounded_wrongly = 0;
         for i in -2000..2000 {
             let x = f64::from(i) * 0.37 + 1e-3;
-            let exact = Wide::<256>::from_f64(x);
+            let exact = Wide::from_f64(x);
             let ([s], [c]) = sin_cos(&[x]);
             let errors = [ulps(s, exact.sin().to_f64()), ulps(c, exact.cos().to_f64())];
             assert!(errors.iter().all(|&error| error <= 1), "at {x}");

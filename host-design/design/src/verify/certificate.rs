@@ -7,7 +7,7 @@ use upright::table::Law;
 
 use super::VerifyError;
 use crate::design::{Certified, Design, Laws, OBSERVER, Pole, Task, continuous_plant, wanted_poles};
-use crate::numerics::{Matrix, Real, Wide, eigenvalues};
+use crate::numerics::{Matrix, Real, Wide, eigenvalues, with_precision};
 use crate::plant::LinearModel;
 use crate::rig::Rig;
 
@@ -29,7 +29,7 @@ pub struct Certificate {
 }
 
 /// A design and the residual of each of its Riccati equations.
-type Solved<const BITS: usize> = (Design<Wide<BITS>>, Vec<(String, f64)>);
+type Solved = (Design<Wide>, Vec<(String, f64)>);
 const DRAWS: u64 = 3;
 const CHANGE: f64 = 1e-20;
 
@@ -43,17 +43,12 @@ pub(super) struct Certificates {
 impl Certificates {
     /// Solves again at the lower of the two precisions that agreed.
     pub(super) fn of(rig: &Rig, certified: &Certified) -> Result<Self, VerifyError> {
-        match certified.bits[0] {
-            256 => Self::at_precision::<256>(rig, certified),
-            512 => Self::at_precision::<512>(rig, certified),
-            1024 => Self::at_precision::<1024>(rig, certified),
-            _ => Self::at_precision::<2048>(rig, certified),
-        }
+        with_precision(certified.bits[0], || Self::at_working_precision(rig, certified))
     }
 
-    fn at_precision<const BITS: usize>(rig: &Rig, certified: &Certified) -> Result<Self, VerifyError> {
-        let solve = |draw: Option<u64>| -> Result<Solved<BITS>, VerifyError> {
-            let mut plant = continuous_plant::<Wide<BITS>>(rig)?;
+    fn at_working_precision(rig: &Rig, certified: &Certified) -> Result<Self, VerifyError> {
+        let solve = |draw: Option<u64>| -> Result<Solved, VerifyError> {
+            let mut plant = continuous_plant::<Wide>(rig)?;
             if let Some(seed) = draw {
                 disturb(&mut plant, seed);
             }
@@ -62,27 +57,31 @@ impl Certificates {
         };
         let (mut solved, mut disturbed) = (None, Vec::new());
         std::thread::scope(|scope| {
-            let draws: Vec<_> = (0..DRAWS).map(|seed| scope.spawn(move || solve(Some(seed)))).collect();
+            let draws: Vec<_> = (0..DRAWS)
+                .map(|seed| {
+                    // A new thread starts at the usual precision.
+                    scope.spawn(move || with_precision(certified.bits[0], || solve(Some(seed))))
+                })
+                .collect();
             solved = Some(solve(None));
             disturbed
                 .extend(draws.into_iter().map(|d| d.join().unwrap_or_else(|p| std::panic::resume_unwind(p))));
         });
         let Some(solved) = solved else { return Err(VerifyError::Poles) };
         let (nominal, residuals) = solved?;
-        let disturbed: Vec<Design<Wide<BITS>>> =
+        let disturbed: Vec<Design<Wide>> =
             disturbed.into_iter().map(|d| d.map(|(design, _)| design)).collect::<Result<_, _>>()?;
-        let certificate =
-            |gain: String, residual: f64, k: &dyn Fn(&Design<Wide<BITS>>) -> Option<Matrix<Wide<BITS>>>| {
-                let base = k(&nominal)?;
-                let changes = disturbed.iter().filter_map(k).map(|changed| {
-                    (&changed - &base).largest_entry().to_f64() / base.largest_entry().to_f64() / CHANGE
-                });
-                let condition = changes.fold(0.0, f64::max);
-                Some(Certificate { gain, bits: certified.bits, residual, condition })
-            };
+        let certificate = |gain: String, residual: f64, k: &dyn Fn(&Design<Wide>) -> Option<Matrix<Wide>>| {
+            let base = k(&nominal)?;
+            let changes = disturbed.iter().filter_map(k).map(|changed| {
+                (&changed - &base).largest_entry().to_f64() / base.largest_entry().to_f64() / CHANGE
+            });
+            let condition = changes.fold(0.0, f64::max);
+            Some(Certificate { gain, bits: certified.bits, residual, condition })
+        };
         let residual = |name: &str| residuals.iter().find(|(n, _)| n == name).map_or(f64::NAN, |(_, r)| *r);
         let in_table =
-            |index: usize| move |d: &Design<Wide<BITS>>| d.sampled.in_table()[index].map(|law| law.k.clone());
+            |index: usize| move |d: &Design<Wide>| d.sampled.in_table()[index].map(|law| law.k.clone());
         let task = if nominal.sampled.integral.is_some() { Task::SampledIntegral } else { Task::SampledLqr };
         Ok(Self {
             lqr: certificate(task.to_string(), residual(&task.to_string()), &in_table(0)),

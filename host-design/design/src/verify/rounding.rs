@@ -7,7 +7,7 @@ use upright::table::Law;
 use super::loop_model::{LoopModel, Numbers};
 use super::{VerifyError, radius};
 use crate::design::Certified;
-use crate::numerics::{Matrix, Wide};
+use crate::numerics::{Matrix, Wide, with_precision};
 use crate::rig::Rig;
 use crate::simulate::{Sample, Scenario, run};
 use crate::table::TableValues;
@@ -50,14 +50,14 @@ pub(super) fn rounding(
     }
     let observers = exact.observer.as_ref().zip(single.observer.as_ref());
     // In f64 the eigenvalues of a loop this stiff are not good enough to see the change.
-    let wide = |numbers: Option<Numbers<Wide<128>>>| {
-        numbers.map(|numbers| radius(&LoopModel::with_numbers(certified, &numbers))).transpose()
-    };
-    let change =
-        match (wide(Numbers::of_table(table, law))?, wide(Numbers::exact(rig, certified, table, law))?) {
-            (Some(single), Some(exact)) => single - exact,
-            _ => 0.0,
+    let (single_radius, exact_radius) = with_precision(128, || {
+        let radius = |numbers: Option<Numbers<Wide>>| {
+            numbers.map(|numbers| radius(&LoopModel::with_numbers(certified, &numbers))).transpose()
         };
+        let of_table = radius(Numbers::of_table(table, law))?;
+        Ok::<_, VerifyError>((of_table, radius(Numbers::exact(rig, certified, table, law))?))
+    })?;
+    let change = single_radius.zip(exact_radius).map_or(0.0, |(single, exact)| single - exact);
     let difference = if spectral_radius < 1.0 {
         force_difference(rig, table, law, &exact, spectral_radius)?
     } else {

@@ -7,7 +7,7 @@ use upright_design::design::{Certified, DesignError, Task, design};
 use upright_design::numerics::{Real, Wide};
 use upright_design::rig::{Actuator, Chain, Limits, Lqr, PlantDescription, PolePlacement, Rig, Tick};
 
-type W = Wide<256>;
+type W = Wide;
 
 /// A chain with both laws: weights and pole distances within a factor of some thousand, as in practice.
 fn any_rig(links: core::ops::RangeInclusive<usize>) -> impl Strategy<Value = Rig> {

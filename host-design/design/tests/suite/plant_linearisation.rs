@@ -6,7 +6,7 @@ use upright_design::numerics::{Matrix, Wide, solve};
 use upright_design::plant::{ChainParameters, Equilibrium, LinearModel, chain_plant, linearise};
 use upright_design::rig::Chain;
 
-type W = Wide<256>;
+type W = Wide;
 
 fn model(chain: &Chain, about: Equilibrium) -> LinearModel<f64> {
     linearise(&ChainParameters::of(chain), about).expect("a mass matrix with an inverse")

@@ -128,7 +128,7 @@ fn determinant<R: Real>(mut m: Matrix<R>) -> R {
 /// (the discrete hanging chain; D. Bernoulli 1733). Two monic polynomials of degree n that agree at n + 1 points
 /// are the same, so their roots need not be found.
 fn differs_from_laguerre(links: &[Link]) -> f64 {
-    type W = Wide<256>;
+    type W = Wide;
     let n = links.len();
     let rig = chain(1e60, links.to_vec()); // a cart that does not move
     let model = linearise(&ChainParameters::<W>::of(&rig), Equilibrium::Hanging).unwrap();

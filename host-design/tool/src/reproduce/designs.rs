@@ -70,7 +70,7 @@ pub fn designs() -> Result<Designs, ReproduceError> {
 
 /// Poles of the plant alone [re, im] (1/s), by real part; its two integrators exactly 0.
 pub(super) fn open_loop_poles(rig: &Rig) -> Result<Vec<[f64; 2]>, ReproduceError> {
-    let a = continuous_plant::<Wide<256>>(rig)?.a;
+    let a = continuous_plant::<Wide>(rig)?.a;
     let poles = eigenvalues(&a).map_err(|_| upright_design::design::DesignError::Poles)?;
     // A double pole comes out with half of the bits.
     let clean = |part: f64| if part.abs() < 1e-30 { 0.0 } else { part };
@@ -113,7 +113,7 @@ pub(super) fn gain_rows(
 
 /// The paper's formulas for the dominant pair, with its 1 % and 6 s: it prints no result.
 fn dominant_rows() -> Vec<Row> {
-    let pair = dominant_pair::<Wide<256>>(published::OVERSHOOT_PERCENT, published::SETTLING_TIME_S);
+    let pair = dominant_pair::<Wide>(published::OVERSHOOT_PERCENT, published::SETTLING_TIME_S);
     let [natural, re, im] = [pair.modulus(), pair.re, pair.im].map(|part| part.round_to_f64());
     let from = "formulas";
     vec![

@@ -85,7 +85,7 @@ fn cart_mass() -> Result<Erratum, ReproduceError> {
                 link.inertia_kg_m2 = if rods { None } else { Some(0.0) };
             }
         }
-        let plant = continuous_plant::<Wide<256>>(&rig)?;
+        let plant = continuous_plant::<Wide>(&rig)?;
         let rows = plant_rows(&plant.a.rounded(Wide::round_to_f64), &plant.b.rounded(Wide::round_to_f64));
         evidence.push(counted(reading, &rows, "A and B"));
     }

@@ -2,10 +2,8 @@
 
 use crate::published::{rig, rig_of};
 use upright_design::design::{Certified, DesignError, Feedback, design, is_stable_sampled};
-use upright_design::numerics::{Matrix, Real, Wide, spectral_radius};
+use upright_design::numerics::{Matrix, Real, Wide, spectral_radius, with_precision};
 use upright_design::rig::{Integral, Rig};
-
-type W = Wide<512>;
 
 const WITH_ENCODERS: [&str; 4] =
     ["single-quanser-ip02", "double-quanser-dbpen", "triple-glueck-eder-kugi", "quadruple-paper"];
@@ -59,14 +57,17 @@ fn integrator(step: f64, q: f64, period: f64) -> Rig {
     ))
 }
 
-/// `P² - Q P - Q R = 0` and `L = P / (P + R)` with `Q = q T`, `R = step²/12`, in 512 bits.
-fn scalar_gain(step: f64, q: f64, period: f64) -> W {
-    let w = W::from_f64;
-    let q = w(q) * &w(period);
-    let r = w(step) * &w(step) / &w(12.0);
-    let root = (q.clone() * &q + &(w(4.0) * &q * &r)).sqrt();
-    let p = (q + &root) / &w(2.0);
-    p.clone() / &(p + &r)
+/// `P² - Q P - Q R = 0` and `L = P / (P + R)` with `Q = q T`, `R = step²/12`, in 512 bits, rounded.
+fn scalar_gain(step: f64, q: f64, period: f64) -> (f64, f32) {
+    with_precision(512, || {
+        let w = Wide::from_f64;
+        let q = w(q) * &w(period);
+        let r = w(step) * &w(step) / &w(12.0);
+        let root = (q.clone() * &q + &(w(4.0) * &q * &r)).sqrt();
+        let p = (q + &root) / &w(2.0);
+        let l = p.clone() / &(p + &r);
+        (l.round_to_f64(), l.round_to_f32())
+    })
 }
 
 #[test]
@@ -75,15 +76,15 @@ fn the_gain_of_a_scalar_plant_is_the_closed_form_correctly_rounded() {
         [(1e-3, 1e-4, 1e-3), (2.275e-5, 2e-4, 2e-3), (0.7, 3.3, 0.01), (1e-6, 0.25, 5e-4), (0.1, 1e-9, 1e-3)]
     {
         let certified = design(&integrator(step, q, period)).unwrap();
-        let wanted = scalar_gain(step, q, period);
+        let (wanted_double, wanted_single) = scalar_gain(step, q, period);
         let (double, single) =
             (certified.double.kalman.as_ref().unwrap(), certified.single.kalman.as_ref().unwrap());
-        assert_eq!(double.l_filter[(0, 0)], wanted.round_to_f64(), "{step} {q} {period}");
-        assert_eq!(single.l_filter[(0, 0)], wanted.round_to_f32(), "{step} {q} {period}");
+        assert_eq!(double.l_filter[(0, 0)], wanted_double, "{step} {q} {period}");
+        assert_eq!(single.l_filter[(0, 0)], wanted_single, "{step} {q} {period}");
         // Ad = 1.
         assert_eq!(double.l_predictor, double.l_filter);
         // Negative control: another noise has another gain.
-        assert_ne!(double.l_filter[(0, 0)], scalar_gain(step, 1.0001 * q, period).round_to_f64());
+        assert_ne!(double.l_filter[(0, 0)], scalar_gain(step, 1.0001 * q, period).0);
     }
 }
 
@@ -161,10 +162,13 @@ fn integral_action_of_a_scalar_plant_is_the_closed_form_correctly_rounded() {
     assert_eq!(exact.continuous.integral.unwrap().k.entries(), [3.0, 2.0]);
     for (q, weight) in [(1.0, 2.0), (0.3, 7.0), (100.0, 0.01)] {
         let certified = design(&integrator_with_integral(q, weight)).unwrap();
-        let k_z = W::from_f64(weight).sqrt();
-        let k_x = (W::from_f64(q) + &(W::from_f64(2.0) * &k_z)).sqrt();
+        let wanted = with_precision(512, || {
+            let k_z = Wide::from_f64(weight).sqrt();
+            let k_x = (Wide::from_f64(q) + &(Wide::from_f64(2.0) * &k_z)).sqrt();
+            [k_x, k_z].map(|gain| gain.round_to_f64())
+        });
         let found = certified.double.continuous.integral.unwrap();
-        assert_eq!(found.k.entries(), [k_x.round_to_f64(), k_z.round_to_f64()], "{q} {weight}");
+        assert_eq!(found.k.entries(), wanted, "{q} {weight}");
         // At a tick of 1 ms the sampled gains are within some tenths of a percent of it.
         let sampled = certified.double.sampled.integral.unwrap();
         for (sampled, continuous) in sampled.k.entries().iter().zip(found.k.entries()) {
