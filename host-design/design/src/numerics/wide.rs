@@ -4,7 +4,7 @@ use core::cmp::Ordering;
 use core::ops::{Add, Div, Mul, Neg, Sub};
 use std::cell::{Cell, RefCell};
 
-use astro_float::{BigFloat, Consts, RoundingMode, Sign};
+use astro_float_num::{BigFloat, Consts, RoundingMode, Sign};
 
 use super::Real;
 
@@ -127,7 +127,7 @@ impl Real for Wide {
 
     fn from_f64(x: f64) -> Self {
         if x.is_subnormal() {
-            // astro-float 0.9.6 reads subnormal numbers as half their value.
+            // astro-float-num 0.3.7 reads subnormal numbers as half their value.
             let normal = x * f64::from_bits((1023 + 64) << 52);
             return Self(BigFloat::from_f64(normal, Self::bits())).scale_by_power_of_two(-64);
         }
