@@ -35,8 +35,8 @@ mod app {
     use upright::firmware::Firmware;
     use upright::firmware::control_task::{COMMANDS, ControlTask, MESSAGES};
     use upright::gains::{RIG_HASH, SENSORS, STATES, TABLE, TICK_S};
-    use upright::protocol::link::Link;
     use upright::protocol::message::{Command, Message};
+    use upright::protocol::serial_link::SerialLink;
     use upright::table::Build;
 
     use crate::board::{BYTES, Hardware, Line, Receiver, set_up};
@@ -48,7 +48,7 @@ mod app {
     struct Local {
         control: ControlTask<'static, 'static, Hardware, STATES, SENSORS>,
         receiver: Receiver,
-        link: Link<'static, STATES, SENSORS>,
+        link: SerialLink<'static, STATES, SENSORS>,
         line: Line,
     }
 
@@ -73,7 +73,7 @@ mod app {
         systick.enable_interrupt();
         systick.enable_counter();
         let control = ControlTask::new(firmware, hardware, commands, messages);
-        (Shared {}, Local { control, receiver, link: Link::new(to_control, to_link), line })
+        (Shared {}, Local { control, receiver, link: SerialLink::new(to_control, to_link), line })
     }
 
     #[task(binds = SysTick, priority = 3, local = [control])]

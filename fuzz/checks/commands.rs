@@ -8,8 +8,8 @@ use upright::firmware::Firmware;
 use upright::firmware::control_task::{COMMANDS, ControlTask, MESSAGES};
 use upright::gains::{RIG_HASH, SENSORS, STATES, TABLE, TICK_S};
 use upright::protocol::frame::encode;
-use upright::protocol::link::{Link, MAX_COMMAND};
 use upright::protocol::message::{Command, Message, Request, Reset};
+use upright::protocol::serial_link::{MAX_COMMAND, SerialLink};
 use upright::supervision::supervisor::State;
 use upright::table::Build;
 
@@ -56,7 +56,7 @@ fn on_a_hanging_rig(what: impl FnOnce(&mut dyn FnMut(u8), &mut dyn FnMut(u32))) 
     let build = Build { rig_hash: RIG_HASH, tick_s: TICK_S };
     let firmware = Firmware::new(&TABLE, &build, Hanging::WIDTHS, Reset::Power).expect("the table is sound");
     let mut control = ControlTask::new(firmware, Hanging, from_link, from_control);
-    let link = core::cell::RefCell::new(Link::new(to_control, to_link));
+    let link = core::cell::RefCell::new(SerialLink::new(to_control, to_link));
     what(&mut |byte| link.borrow_mut().receive(byte), &mut |ticks| {
         for _ in 0..ticks {
             control.tick();
@@ -74,7 +74,7 @@ impl Board<SENSORS> for Hanging {
     const WIDTHS: [CounterWidth; SENSORS] = [CounterWidth::Bits32; SENSORS];
 
     fn inputs(&mut self) -> Inputs<SENSORS> {
-        Inputs { counts: [0; SENSORS], supply_v: 24.0, contacts: Contacts::default() }
+        Inputs { raw_counts: [0; SENSORS], supply_v: 24.0, contacts: Contacts::default() }
     }
 
     fn drive(&mut self, output: &Output) {

@@ -4,8 +4,8 @@ use serde::Serialize;
 use serde::de::DeserializeOwned;
 use upright::gains::{SENSORS, STATES};
 use upright::protocol::frame::{Receiver, encode};
-use upright::protocol::link::{MAX_COMMAND, MAX_MESSAGE};
 use upright::protocol::message::{Command, Message};
+use upright::protocol::serial_link::{MAX_COMMAND, MAX_MESSAGE};
 
 /// Reads `bytes` as a stream of frames, and as a message without a frame, which gets past the checksum.
 ///

@@ -9,7 +9,7 @@ use crate::control::encoder::CounterWidth;
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Inputs<const NY: usize> {
     /// Raw encoder counters.
-    pub counts: [u32; NY],
+    pub raw_counts: [u32; NY],
     /// Supply voltage of the motor's power stage (V).
     pub supply_v: f32,
     /// Contacts and flags.

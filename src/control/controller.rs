@@ -45,11 +45,11 @@ enum Mode<'t, const NX: usize, const NY: usize> {
 
 /// The outcome of a tick.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Command {
+pub struct MotorCommand {
     /// Force that the control law asks for (N).
-    pub requested: f32,
+    pub requested_n: f32,
     /// Force that will be applied, within all limits (N); 0 if the request is not a number.
-    pub applied: f32,
+    pub applied_n: f32,
     /// What goes to the power stage.
     pub drive: Drive,
 }
@@ -82,7 +82,7 @@ impl core::fmt::Display for Rejected {
 
 impl core::error::Error for Rejected {}
 
-const OFF: Command = Command { requested: 0.0, applied: 0.0, drive: Drive::OFF };
+const OFF: MotorCommand = MotorCommand { requested_n: 0.0, applied_n: 0.0, drive: Drive::OFF };
 
 impl<'t, const NX: usize, const NY: usize> Controller<'t, NX, NY> {
     /// A stopped controller at set-point 0 with the first law the table holds (LQR before pole placement), for encoder
@@ -171,7 +171,12 @@ impl<'t, const NX: usize, const NY: usize> Controller<'t, NX, NY> {
         &self.innovation
     }
 
-    /// The encoders, for homing.
+    /// The encoders, to read their counts.
+    pub fn encoders(&self) -> &Encoders<NY> {
+        &self.encoders
+    }
+
+    /// The encoders, to home them.
     pub fn encoders_mut(&mut self) -> &mut Encoders<NY> {
         &mut self.encoders
     }
@@ -235,7 +240,7 @@ impl<'t, const NX: usize, const NY: usize> Controller<'t, NX, NY> {
     /// ```text
     /// e = y - C x̂⁻,   x̂ = x̂⁻ + L e,   u = sat(N r - K x̂ - k_pending u_pending - k_integral z)
     /// ```
-    pub fn control(&mut self, raw: &[u32; NY]) -> Command {
+    pub fn control(&mut self, raw: &[u32; NY]) -> MotorCommand {
         self.control_with(raw, |_, _, _| ())
     }
 
@@ -246,7 +251,7 @@ impl<'t, const NX: usize, const NY: usize> Controller<'t, NX, NY> {
         &mut self,
         raw: &[u32; NY],
         judge: impl FnOnce(&[i32; NY], &[f32; NY], &mut [f32; NY]),
-    ) -> Command {
+    ) -> MotorCommand {
         let requested = match self.mode {
             Mode::InOrder(observer) => self.observe(&observer, raw, |sensor| 2 * sensor, judge),
             Mode::LookingUp(observer) => self.observe_looking_up(&observer, raw, judge),
@@ -259,7 +264,7 @@ impl<'t, const NX: usize, const NY: usize> Controller<'t, NX, NY> {
     }
 
     /// First half of a tick with the whole state measured: what the paper simulates.
-    pub fn control_from_state(&mut self, x: &SVector<f32, NX>) -> Command {
+    pub fn control_from_state(&mut self, x: &SVector<f32, NX>) -> MotorCommand {
         self.estimate = *x;
         if let Mode::Stopped = self.mode {
             return OFF;
@@ -320,7 +325,7 @@ impl<'t, const NX: usize, const NY: usize> Controller<'t, NX, NY> {
 
     /// Limits the force and turns it into what the power stage needs.
     #[inline]
-    fn drive(&mut self, requested: f32) -> Command {
+    fn drive(&mut self, requested: f32) -> MotorCommand {
         let limited = saturate(requested, self.table.force_limit_n);
         let (applied, drive) = match &self.table.motor {
             None => (limited, Drive::Force(limited)),
@@ -333,7 +338,7 @@ impl<'t, const NX: usize, const NY: usize> Controller<'t, NX, NY> {
             }
         };
         self.applied = applied;
-        Command { requested, applied, drive }
+        MotorCommand { requested_n: requested, applied_n: applied, drive }
     }
 
     /// Second half of a tick: `x̂⁻ = Ad x̂ + Bd u` with the force really applied, and the integral.
@@ -417,9 +422,9 @@ mod tests {
         let table = table();
         let mut controller = controller(&table);
         let x = vector![-1.0, -1.0];
-        assert_eq!(controller.control_from_state(&x).applied, 3.0);
+        assert_eq!(controller.control_from_state(&x).applied_n, 3.0);
         controller.predict();
-        assert_eq!(controller.control_from_state(&x).applied, 1.5);
+        assert_eq!(controller.control_from_state(&x).applied_n, 1.5);
     }
 
     #[test]
@@ -427,9 +432,9 @@ mod tests {
         let table = table();
         let mut controller = controller(&table);
         let command = controller.control_from_state(&vector![-100.0, 0.0]);
-        assert_eq!((command.requested, command.applied), (100.0, 5.0));
+        assert_eq!((command.requested_n, command.applied_n), (100.0, 5.0));
         controller.predict();
-        assert_eq!(controller.control_from_state(&vector![0.0, 0.0]).requested, -2.5);
+        assert_eq!(controller.control_from_state(&vector![0.0, 0.0]).requested_n, -2.5);
     }
 
     #[test]
@@ -438,7 +443,7 @@ mod tests {
         let mut controller = controller(&table);
         // 4 counts of 0.25 m: innovation 1, estimate (0.5, 1), request -(0.5 + 2).
         let command = controller.control(&[4]);
-        assert_eq!(command.applied, -2.5);
+        assert_eq!(command.applied_n, -2.5);
         controller.predict();
         // With a tick of delay that force is still on its way: Ad x̂ alone.
         assert_eq!(controller.estimate(), &vector![1.0, 1.0]);

@@ -1,14 +1,30 @@
-//! What the host asks for.
+//! Answers to the host's requests.
 
 use super::Firmware;
 use crate::board::Contacts;
 use crate::control::controller::Rejected;
 use crate::protocol::message::{Answer, Command, Info, PROTOCOL, Request, Statistics};
-use crate::supervision::calibration::hang;
-use crate::supervision::inhibits::Reasons;
+use crate::supervision::calibration::links_hang;
+use crate::supervision::inhibits::Inhibits;
 use crate::supervision::supervisor::State;
 
+/// Version of this crate: major, minor, patch.
+const VERSION: [u8; 3] = [
+    number(env!("CARGO_PKG_VERSION_MAJOR")),
+    number(env!("CARGO_PKG_VERSION_MINOR")),
+    number(env!("CARGO_PKG_VERSION_PATCH")),
+];
+
+/// Reads a decimal number when the crate is compiled; too large a number does not compile.
+const fn number(digits: &str) -> u8 {
+    match u8::from_str_radix(digits, 10) {
+        Ok(number) => number,
+        Err(_) => panic!("a number of the version does not fit into a byte"),
+    }
+}
+
 impl<const NX: usize, const NY: usize> Firmware<'_, NX, NY> {
+    /// Carries out a command and gives the answer.
     pub(super) fn answer(&mut self, command: &Command) -> Answer {
         let done = |result: Result<(), _>| result.map_or_else(Answer::NotNow, |()| Answer::Done);
         let taken = |result: Result<(), _>| result.map_or_else(Answer::Rejected, |()| Answer::Done);
@@ -20,92 +36,104 @@ impl<const NX: usize, const NY: usize> Firmware<'_, NX, NY> {
             Request::Arm => done(self.arm(command.id)),
             Request::Disarm => {
                 self.supervisor.disarm();
-                self.calibration.give_up();
-                self.commanded = false;
+                self.calibration.cancel();
+                self.setpoint_commanded = false;
                 self.controller.stop();
                 Answer::Done
             }
             Request::Clear => {
-                let result = self.supervisor.clear(self.against_clearing());
-                self.cleared_by = command.id;
+                let result = self.supervisor.clear(self.clearing_inhibits());
+                self.last_clear_id = command.id;
                 done(result)
             }
-            Request::Setpoint(position) => taken(self.setpoint(position)),
+            Request::Setpoint(position_m) => taken(self.take_setpoint(position_m)),
             Request::Select(law) => taken(self.controller.select(law)),
             Request::Info => Answer::Info(self.info()),
             Request::Cause => Answer::Cause(self.supervisor.cause()),
             Request::Statistics => Answer::Statistics(self.statistics()),
             Request::ResetStatistics => {
                 self.statistics = Statistics::default();
-                self.detection.forget_rejected();
+                self.detection.reset_rejected();
                 Answer::Done
             }
-            Request::Telemetry(every) => {
-                (self.every, self.until_telemetry) = (every, 0);
+            Request::Telemetry(period_ticks) => {
+                (self.telemetry_period_ticks, self.ticks_to_telemetry) = (period_ticks, 0);
                 Answer::Done
             }
         }
     }
 
-    /// Cart at 0, links hanging, as they are.
-    fn home_here(&mut self) -> Result<(), Reasons> {
-        Reasons::MOVING.when(!self.calibration.is_still(&self.table.limits)).none()?;
-        self.supervisor.homed()?;
+    /// Takes the present position as cart at 0, links hanging.
+    fn home_here(&mut self) -> Result<(), Inhibits> {
+        Inhibits::MOVING.when(!self.calibration.is_still(&self.table.limits)).err_if_any()?;
+        self.supervisor.complete_homing()?;
         self.home(&self.table.limits.rest_counts);
         Ok(())
     }
 
-    fn home_rail(&mut self) -> Result<(), Reasons> {
+    /// Starts homing by the limit switches.
+    fn home_rail(&mut self) -> Result<(), Inhibits> {
         let [travel, _] = self.table.limits.travel_counts;
-        Reasons::NO_SWITCHES.when(travel == 0).none()?;
-        self.supervisor.begin_homing()?;
-        self.calibration.begin_rail();
+        Inhibits::NO_SWITCHES.when(travel == 0).err_if_any()?;
+        self.supervisor.start_homing()?;
+        self.calibration.start_rail_homing();
         Ok(())
     }
 
-    fn check_signs(&mut self) -> Result<(), Reasons> {
+    /// Starts the sign check.
+    fn check_signs(&mut self) -> Result<(), Inhibits> {
         let limits = &self.table.limits;
-        let hanging = hang(self.controller.encoders_mut().counts(), limits);
-        let not_homed = Reasons::NOT_HOMED.when(self.supervisor.state() != State::Calibrated);
-        Reasons::NOT_HANGING.when(!hanging).and(self.supervisor.against_arming()).and(not_homed).none()?;
-        self.calibration.begin_signs(limits);
+        let hanging = links_hang(self.controller.encoders().counts(), limits);
+        let not_homed = Inhibits::NOT_HOMED.when(self.supervisor.state() != State::Calibrated);
+        Inhibits::NOT_HANGING
+            .when(!hanging)
+            .union(self.supervisor.arming_inhibits())
+            .union(not_homed)
+            .err_if_any()?;
+        self.calibration.start_sign_check(limits);
         Ok(())
     }
 
-    fn arm(&mut self, id: u64) -> Result<(), Reasons> {
-        // A key that is held since the fault sends one command after the other: none of them is a new act.
-        if self.supervisor.state() == State::Fault || self.held > 0 {
-            self.held = self.table.limits.still_ticks;
+    /// Arms. `id` is that of the command.
+    fn arm(&mut self, id: u64) -> Result<(), Inhibits> {
+        // A key held down since the fault sends one arm command after the other. None of them may arm: each one restarts
+        // the lockout, which ends only when the key has been released for `still_ticks`. The time that counts as standing
+        // still for homing also counts as letting go; nothing speaks for a key of its own in the rig file.
+        if self.supervisor.state() == State::Fault || self.rearm_lockout_ticks > 0 {
+            self.rearm_lockout_ticks = self.table.limits.still_ticks;
         }
-        let held = self.supervisor.state() != State::Fault && (self.held > 0 || id <= self.cleared_by);
-        let further = self.against_arming().and(Reasons::HELD.when(held));
-        let table = Reasons::TABLE.when(self.table.check(&self.build).is_err());
-        self.supervisor.arm(further.and(table))?;
-        let counts = *self.controller.encoders_mut().counts();
+        let held = self.supervisor.state() != State::Fault
+            && (self.rearm_lockout_ticks > 0 || id <= self.last_clear_id);
+        let inhibits = self.arming_inhibits().union(Inhibits::HELD.when(held));
+        let table = Inhibits::TABLE.when(self.table.check(&self.build).is_err());
+        self.supervisor.arm(inhibits.union(table))?;
+        let counts = *self.controller.encoders().counts();
         self.calibration.restart_slow(&counts);
         Ok(())
     }
 
-    /// What would raise the fault again at once.
-    fn against_clearing(&self) -> Reasons {
+    /// Inhibits of clearing: contacts that would raise the fault again at once.
+    fn clearing_inhibits(&self) -> Inhibits {
         let Contacts { emergency_stop, driver_fault, .. } = self.contacts;
-        Reasons::EMERGENCY_STOP.when(emergency_stop).and(Reasons::DRIVER.when(driver_fault))
+        Inhibits::EMERGENCY_STOP.when(emergency_stop).union(Inhibits::DRIVER.when(driver_fault))
     }
 
-    fn setpoint(&mut self, position: f32) -> Result<(), Rejected> {
+    /// Takes the wanted cart position (m), which has to be within the soft limits of the rail.
+    fn take_setpoint(&mut self, position_m: f32) -> Result<(), Rejected> {
         let [low, high] = self.table.limits.rail_m;
-        if !(low..=high).contains(&position) {
+        if !(low..=high).contains(&position_m) {
             return Err(Rejected::Setpoint);
         }
-        self.controller.set_setpoint(position)?;
-        self.commanded = true;
+        self.controller.set_setpoint(position_m)?;
+        self.setpoint_commanded = true;
         Ok(())
     }
 
+    /// Identity of this firmware.
     fn info(&self) -> Info {
         Info {
             protocol: PROTOCOL,
-            version: [0, 1, 0],
+            version: VERSION,
             rig_hash: self.table.rig_hash,
             tick_s: self.table.tick_s,
             states: NX as u8,

@@ -1,4 +1,4 @@
-//! The task that a hardware timer starts at every tick, above everything else.
+//! The control task: a hardware timer starts it every tick, at the highest priority.
 
 use heapless::spsc::{Consumer, Producer};
 
@@ -7,12 +7,13 @@ use crate::firmware::Firmware;
 use crate::protocol::message::{Command, Message};
 use crate::protocol::queue;
 
-/// Commands that may wait for the next ticks; one is taken per tick. (A queue of 4 holds 3.)
+/// Length of the queue of commands; it holds one less. One command is taken per tick.
 pub const COMMANDS: usize = 4;
-/// Telemetry and replies that may wait for the line.
+/// Length of the queue of telemetry and replies for the serial link; it holds one less.
 pub const MESSAGES: usize = 8;
 
-/// Firmware, board, and this task's ends of the queues to the [`Link`](crate::protocol::link::Link). It waits for nobody.
+/// Firmware, board, and this task's ends of the queues to the
+/// [`SerialLink`](crate::protocol::serial_link::SerialLink). It never waits.
 pub struct ControlTask<'q, 't, B, const NX: usize, const NY: usize> {
     firmware: Firmware<'t, NX, NY>,
     board: B,
@@ -22,7 +23,7 @@ pub struct ControlTask<'q, 't, B, const NX: usize, const NY: usize> {
 }
 
 impl<'q, 't, B: Board<NY>, const NX: usize, const NY: usize> ControlTask<'q, 't, B, NX, NY> {
-    /// The task before its first tick.
+    /// The task before its first tick; `commands` and `messages` lead from and to the serial link.
     pub fn new(
         firmware: Firmware<'t, NX, NY>,
         board: B,
@@ -40,8 +41,8 @@ impl<'q, 't, B: Board<NY>, const NX: usize, const NY: usize> ControlTask<'q, 't,
         self.board.drive(&output);
         let command = queue::take(&mut self.commands);
         let (telemetry, reply) = self.firmware.finish(command.as_ref(), self.cycles);
-        // A reply goes first: telemetry comes again, it does not.
-        for message in [reply, telemetry.map(Message::Telemetry)].into_iter().flatten() {
+        // The reply goes first: it is sent once, telemetry again and again.
+        for message in [reply.map(Message::Reply), telemetry.map(Message::Telemetry)].into_iter().flatten() {
             if queue::put(&mut self.messages, message).is_err() {
                 self.firmware.message_dropped();
             }
@@ -50,12 +51,12 @@ impl<'q, 't, B: Board<NY>, const NX: usize, const NY: usize> ControlTask<'q, 't,
         self.cycles = self.board.cycles().wrapping_sub(begin);
     }
 
-    /// The firmware, to look at.
+    /// The firmware, read-only.
     pub fn firmware(&self) -> &Firmware<'t, NX, NY> {
         &self.firmware
     }
 
-    /// The board, to look at.
+    /// The board.
     pub fn board(&mut self) -> &mut B {
         &mut self.board
     }

@@ -1,13 +1,20 @@
-//! Whether the rig stands so that balancing may begin.
+//! Inhibits of arming: does the rig stand so that balancing may start?
 
 use super::Firmware;
 use crate::board::Contacts;
-use crate::supervision::inhibits::Reasons;
+use crate::supervision::inhibits::Inhibits;
 use crate::supervision::sign_check::Signs;
 use crate::supervision::supervisor::State;
 
+/// Arming requires that the rig has been slow for this part of [`Limits::arm_ticks`]: long enough to refuse it while a link
+/// swings through the vertical, short enough that a steady hand is never told to wait. The whole of `arm_ticks` has to pass
+/// after arming before the motor is on.
+///
+/// [`Limits::arm_ticks`]: crate::table::limits::Limits::arm_ticks
+const MOVING_PART_OF_ARM_TICKS: u32 = 4;
+
 impl<const NX: usize, const NY: usize> Firmware<'_, NX, NY> {
-    /// Largest angle of a link from the vertical at these counts (rad); 0 where there are no turns.
+    /// Largest angle of a link from the vertical at these counts (rad); 0 for a rig without joints (a `[model]`).
     pub(super) fn largest_lean(&self, counts: &[i32; NY]) -> f32 {
         let Some(observer) = &self.table.observer else { return 0.0 };
         let (mut angle, mut largest) = (0.0, 0.0f32);
@@ -19,7 +26,8 @@ impl<const NX: usize, const NY: usize> Firmware<'_, NX, NY> {
         largest
     }
 
-    pub(super) fn off_centre(&self, counts: &[i32; NY]) -> Reasons {
+    /// [`Inhibits::OFF_CENTRE`] if the cart is outside the soft limits of the rail at these counts.
+    pub(super) fn off_centre_inhibit(&self, counts: &[i32; NY]) -> Inhibits {
         let [low, high] = self.table.limits.rail_m;
         let step = self
             .table
@@ -27,34 +35,39 @@ impl<const NX: usize, const NY: usize> Firmware<'_, NX, NY> {
             .as_ref()
             .map_or(0.0, |observer| observer.step.iter().next().copied().unwrap_or_default());
         let position = step * counts.first().copied().unwrap_or_default() as f32;
-        Reasons::OFF_CENTRE.when(position < low || position > high)
+        Inhibits::OFF_CENTRE.when(position < low || position > high)
     }
 
-    pub(super) fn against_by_inputs(&self) -> Reasons {
+    /// Inhibits by the contacts and the supply.
+    pub(super) fn input_inhibits(&self) -> Inhibits {
         let Contacts { limit_low, limit_high, emergency_stop, driver_fault, .. } = self.contacts;
         let supply_is_good = self.supply_v >= self.table.limits.supply_min_v && self.supply_v.is_finite();
-        Reasons::LIMIT_SWITCH
+        Inhibits::LIMIT_SWITCH
             .when(limit_low || limit_high)
-            .and(Reasons::EMERGENCY_STOP.when(emergency_stop))
-            .and(Reasons::DRIVER.when(driver_fault))
-            .and(Reasons::SUPPLY.when(!supply_is_good))
+            .union(Inhibits::EMERGENCY_STOP.when(emergency_stop))
+            .union(Inhibits::DRIVER.when(driver_fault))
+            .union(Inhibits::SUPPLY.when(!supply_is_good))
     }
 
-    /// Everything that stands against arming now, but for the table, which is only read when it is tried.
-    pub fn against_arming(&mut self) -> Reasons {
-        let state = self.supervisor.against_arming();
+    /// All inhibits of arming that hold now, except those that are only known when it is tried: [`Inhibits::HELD`] and
+    /// [`Inhibits::TABLE`].
+    pub fn arming_inhibits(&self) -> Inhibits {
+        let state = self.supervisor.arming_inhibits();
         if self.supervisor.state() == State::Balancing {
             return state;
         }
         let limits = &self.table.limits;
-        let counts = *self.controller.encoders_mut().counts();
+        let counts = *self.controller.encoders().counts();
         let lean = self.largest_lean(&limits.within_half_a_turn(&counts));
         state
-            .and(Reasons::SIGNS.when(self.calibration.signs() != Signs::Checked))
-            .and(Reasons::TILTED.when(lean > limits.arm_angle_rad))
-            .and(Reasons::MOVING.when(self.calibration.slow_ticks() < limits.arm_ticks / 4))
-            .and(self.off_centre(&counts))
-            .and(self.against_by_inputs())
-            .and(Reasons::NO_OBSERVER.when(self.table.observer.is_none()))
+            .union(Inhibits::SIGNS.when(self.calibration.signs() != Signs::Checked))
+            .union(Inhibits::TILTED.when(lean > limits.arm_angle_rad))
+            .union(
+                Inhibits::MOVING
+                    .when(self.calibration.slow_ticks() < limits.arm_ticks / MOVING_PART_OF_ARM_TICKS),
+            )
+            .union(self.off_centre_inhibit(&counts))
+            .union(self.input_inhibits())
+            .union(Inhibits::NO_OBSERVER.when(self.table.observer.is_none()))
     }
 }

@@ -1,9 +1,9 @@
-//! Ticks of the whole firmware.
+//! Tests of whole ticks of the firmware.
 
 use super::*;
 use crate::gains::{RIG_HASH, SENSORS, STATES, TABLE, TICK_S};
 use crate::protocol::message::{Answer, Request};
-use crate::supervision::inhibits::Reasons;
+use crate::supervision::inhibits::Inhibits;
 
 const BUILD: Build = Build { rig_hash: RIG_HASH, tick_s: TICK_S };
 
@@ -15,7 +15,7 @@ fn firmware<'t>(
 }
 
 const INPUTS: Inputs<SENSORS> = Inputs {
-    counts: [0; SENSORS],
+    raw_counts: [0; SENSORS],
     supply_v: 12.0,
     contacts: Contacts {
         limit_low: false,
@@ -63,8 +63,8 @@ fn a_reset_by_the_watchdog_starts_disarmed_and_tells_why() {
         let request = Command { id: 1, request: Request::Arm };
         let (_, reply) = firmware.finish(Some(&request), 0);
         assert_eq!((firmware.state(), firmware.supervisor.fault()), (State::Disarmed, None));
-        let Some(Message::Reply { answer: Answer::NotNow(reasons), .. }) = reply else { panic!("{reply:?}") };
-        assert!(reasons.contains(Reasons::NOT_HOMED.and(Reasons::SIGNS)));
+        let Some(Reply { answer: Answer::NotNow(inhibits), .. }) = reply else { panic!("{reply:?}") };
+        assert!(inhibits.contains(Inhibits::NOT_HOMED.union(Inhibits::SIGNS)));
     }
 }
 
@@ -74,12 +74,12 @@ fn the_cart_is_homed_between_its_switches() {
     let mut step = |cart: i32, request: Option<Request>| {
         let contacts =
             Contacts { limit_low: cart <= -90_000, limit_high: cart >= 110_000, ..INPUTS.contacts };
-        let mut counts = INPUTS.counts;
-        counts[0] = cart as u32;
-        firmware.control(&Inputs { counts, contacts, ..INPUTS });
+        let mut raw_counts = INPUTS.raw_counts;
+        raw_counts[0] = cart as u32;
+        firmware.control(&Inputs { raw_counts, contacts, ..INPUTS });
         let command = request.map(|request| Command { id: 1, request });
         firmware.finish(command.as_ref(), 0);
-        (firmware.state(), *firmware.controller.encoders_mut().counts())
+        (firmware.state(), *firmware.controller.encoders().counts())
     };
     step(0, Some(Request::HomeRail));
     for cart in [0, -90_000, 0] {
@@ -101,9 +101,9 @@ fn a_rail_of_another_length_is_not_homed() {
     firmware.finish(Some(&command), 0);
     for (cart, limit_low, limit_high) in [(0, true, false), (150_000, false, true), (100_000, false, false)] {
         let contacts = Contacts { limit_low, limit_high, ..INPUTS.contacts };
-        let mut counts = INPUTS.counts;
-        counts[0] = cart;
-        firmware.control(&Inputs { counts, contacts, ..INPUTS });
+        let mut raw_counts = INPUTS.raw_counts;
+        raw_counts[0] = cart;
+        firmware.control(&Inputs { raw_counts, contacts, ..INPUTS });
         firmware.finish(None, 0);
     }
     assert_eq!(

@@ -1,7 +1,7 @@
 //! Frames on a serial line: postcard, then a CRC-32, then COBS, then a zero byte.
 //!
-//! One definition for both ends and every kind of message. A receiver that has lost its place finds it again at the next
-//! zero byte.
+//! One definition for host and firmware and for every type of message. A receiver that has lost synchronisation finds the
+//! start of the next frame after the next zero byte.
 
 use cobs::{DecodeResult, DecoderState};
 use serde::{Deserialize, Serialize};
@@ -9,19 +9,19 @@ use serde::{Deserialize, Serialize};
 use crate::table::checksum::crc32;
 
 const CRC_BYTES: usize = 4;
-/// What follows every frame, and is in none.
-pub const END: u8 = 0;
+/// Frame delimiter: follows every frame and occurs in none.
+pub const DELIMITER: u8 = 0;
 
-/// Why bytes are not a frame, or a message does not fit into one.
+/// Why bytes cannot be decoded, or a message cannot be encoded.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum FrameError {
-    /// Longer than the buffer.
+    /// The frame is longer than the buffer.
     Long,
-    /// Not COBS, or too short for a checksum.
+    /// The bytes are not COBS, or too short to hold a checksum.
     Coding,
     /// The checksum is wrong.
     Crc,
-    /// The contents are not the message that was expected.
+    /// The contents are not a message of the expected type.
     Message,
 }
 
@@ -31,15 +31,15 @@ impl core::fmt::Display for FrameError {
             FrameError::Long => "the frame is too long",
             FrameError::Coding => "the frame is not coded with COBS, or too short",
             FrameError::Crc => "the frame's checksum is wrong",
-            FrameError::Message => "the frame holds something else than the expected message",
+            FrameError::Message => "the frame does not hold a message of the expected type",
         })
     }
 }
 
 impl core::error::Error for FrameError {}
 
-/// Writes `message` as a frame, its end included, into `out` and gives that part of it. `scratch` is room for the
-/// message before COBS.
+/// Encodes `message` as a frame, delimiter included, into `out`, and gives the part of `out` that it fills. `scratch`
+/// holds the message before COBS.
 ///
 /// # Errors
 /// [`FrameError::Long`] if either buffer is too small.
@@ -54,11 +54,11 @@ pub fn encode<'a, T: Serialize>(
     rest.get_mut(..CRC_BYTES).ok_or(FrameError::Long)?.copy_from_slice(&crc);
     let checked = scratch.get(..length + CRC_BYTES).ok_or(FrameError::Long)?;
     let length = cobs::try_encode(checked, out).map_err(|_| FrameError::Long)?;
-    *out.get_mut(length).ok_or(FrameError::Long)? = END;
+    *out.get_mut(length).ok_or(FrameError::Long)? = DELIMITER;
     out.get(..=length).ok_or(FrameError::Long)
 }
 
-/// Reads a frame, without the zero byte at its end. `frame` is overwritten.
+/// Decodes a frame, given without its delimiter. `frame` is overwritten.
 ///
 /// # Errors
 /// [`FrameError`]; nothing of a damaged frame is used.
@@ -75,7 +75,7 @@ pub fn decode<T: for<'de> Deserialize<'de>>(frame: &mut [u8]) -> Result<T, Frame
     }
 }
 
-/// Decodes COBS in place; the length of what comes out.
+/// Decodes COBS in place; gives the length of the result.
 fn unstuff(frame: &mut [u8]) -> Option<usize> {
     let (mut decoder, mut length) = (DecoderState::Idle, 0);
     for i in 0..frame.len() {
@@ -88,10 +88,10 @@ fn unstuff(frame: &mut [u8]) -> Option<usize> {
             DecodeResult::DataComplete => return None,
         }
     }
-    matches!(decoder.feed(END), Ok(DecodeResult::DataComplete)).then_some(length)
+    matches!(decoder.feed(DELIMITER), Ok(DecodeResult::DataComplete)).then_some(length)
 }
 
-/// Cuts a stream of bytes into frames of up to `N` bytes.
+/// Splits a stream of bytes into frames of up to `N` bytes and decodes them.
 #[derive(Debug, Clone)]
 pub struct Receiver<const N: usize> {
     buffer: [u8; N],
@@ -105,15 +105,16 @@ impl<const N: usize> Default for Receiver<N> {
 }
 
 impl<const N: usize> Receiver<N> {
-    /// Nothing received yet.
+    /// A receiver at the start of a frame.
     pub const fn new() -> Self {
         Self { buffer: [0; N], length: 0 }
     }
 
-    /// Takes the next byte; the message of the frame that it completes, or why there is none. Empty frames say nothing.
+    /// Takes the next byte. If it completes a frame, gives its message, or why it cannot be decoded. Empty frames are
+    /// ignored.
     pub fn push<T: for<'de> Deserialize<'de>>(&mut self, byte: u8) -> Option<Result<T, FrameError>> {
-        if byte != END {
-            // A longer frame is dropped as a whole: its length stays beyond the buffer.
+        if byte != DELIMITER {
+            // Too long a frame is dropped as a whole: its length is larger than the buffer.
             if let Some(place) = self.buffer.get_mut(self.length) {
                 *place = byte;
             }
@@ -144,7 +145,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn a_message_comes_back_as_it_was(message: (u8, u32)) {
+        fn a_message_is_decoded_as_it_was_encoded(message: (u8, u32)) {
             let received = receive(&mut Receiver::new(), &frame(&message));
             prop_assert_eq!(received.as_slice(), &[Ok(message)]);
         }
@@ -158,10 +159,10 @@ mod tests {
         }
 
         #[test]
-        fn after_any_rubbish_the_next_frame_is_read(rubbish: std::vec::Vec<u8>, message: (u8, u32)) {
+        fn after_any_garbage_the_next_frame_is_read(garbage: std::vec::Vec<u8>, message: (u8, u32)) {
             let mut receiver = Receiver::<64>::new();
-            receive(&mut receiver, &rubbish.into_iter().take(7).collect::<std::vec::Vec<_>>());
-            receive(&mut receiver, &[END]);
+            receive(&mut receiver, &garbage.into_iter().take(7).collect::<std::vec::Vec<_>>());
+            receive(&mut receiver, &[DELIMITER]);
             let received = receive(&mut receiver, &frame(&message));
             prop_assert_eq!(received.as_slice(), &[Ok(message)]);
         }
@@ -173,7 +174,7 @@ mod tests {
         for _ in 0..100 {
             assert_eq!(receiver.push::<u8>(1), None);
         }
-        assert_eq!(receiver.push::<u8>(END), Some(Err(FrameError::Long)));
+        assert_eq!(receiver.push::<u8>(DELIMITER), Some(Err(FrameError::Long)));
         let last = frame(&7u8).iter().filter_map(|&byte| receiver.push::<u8>(byte)).last();
         assert_eq!(last, Some(Ok(7)));
     }

@@ -1,4 +1,7 @@
-//! What the firmware and the host say to each other. [`crate::protocol::frame`] puts it into frames.
+//! The messages between host and firmware. [`frame`](crate::protocol::frame) puts them into frames.
+//!
+//! A new request is a variant of [`Request`], with an answer in `firmware/commands.rs`; a new value to report is a field of
+//! [`Telemetry`] or [`Statistics`]. Any change of these types raises [`PROTOCOL`].
 
 use heapless::Vec;
 use serde::{Deserialize, Serialize};
@@ -6,71 +9,75 @@ use serde::{Deserialize, Serialize};
 use crate::control::controller::Rejected;
 use crate::supervision::fault::{Cause, Fault};
 use crate::supervision::homing::Homing;
-use crate::supervision::inhibits::Reasons;
+use crate::supervision::inhibits::Inhibits;
 use crate::supervision::sign_check::Signs;
 use crate::supervision::supervisor::State;
 use crate::table::Law;
 
-/// Version of these messages; a host that speaks another one must not send commands.
-pub const PROTOCOL: u8 = 1;
+/// Version of these messages; a host with another version must not send commands.
+pub const PROTOCOL: u8 = 2;
 
 /// A command, host to firmware.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Command {
-    /// Larger than that of every command before, over restarts of the host too (microseconds since 1970 are): a command
-    /// that is not is a replay and ignored.
+    /// Larger than the id of every command before, even after a restart of the host (microseconds since 1970 are). A
+    /// command with another id is taken for a replay and ignored.
     pub id: u64,
-    /// What to do.
+    /// The request.
     pub request: Request,
 }
 
-/// What the host may ask for.
+/// The host's requests.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub enum Request {
-    /// Nothing; tells that the host is there.
+    /// Heartbeat: the host is alive. Nothing else.
     Beat,
-    /// Take positions from here: cart at its zero, links hanging still.
+    /// Home here: the cart is at its zero, and the links hang still.
     Home,
-    /// Take the cart's position from the limit switches, to which it is pushed by hand, then as for [`Request::Home`].
+    /// Home by the limit switches: a person pushes the cart to both and then lets the links hang still.
     HomeRail,
-    /// Check the encoders' signs: see [`crate::supervision::sign_check`].
+    /// Start the [sign check](crate::supervision::sign_check).
     CheckSigns,
-    /// Balance as soon as all links have been upright and slow for the time set in the rig file.
+    /// Start balancing as soon as all links have been upright and slow for `arm_time_s` of the rig file.
     Arm,
     /// Motor off.
     Disarm,
-    /// Forget a latched fault.
+    /// Clear a latched fault.
     Clear,
     /// Move the cart to this position (m).
     Setpoint(f32),
-    /// Use this control law.
+    /// Use this control law; only with the motor off.
     Select(Law),
-    /// Tell what this firmware is.
+    /// Report [`Info`].
     Info,
-    /// Tell the first cause of the fault, or of the last reset.
+    /// Report the first cause of the fault, or of the last reset.
     Cause,
-    /// Tell the counters of [`Statistics`].
+    /// Report [`Statistics`].
     Statistics,
-    /// Set these counters to 0.
+    /// Set the counters of [`Statistics`] to 0, except those of the serial link.
     ResetStatistics,
-    /// Send telemetry of every so many ticks; 0: of none.
+    /// Send telemetry every n ticks; 0: never.
     Telemetry(u16),
 }
 
 /// Firmware to host.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-// The larger one is the frequent one.
+// The larger variant is the frequent one.
 #[allow(clippy::large_enum_variant)]
 pub enum Message<const NX: usize, const NY: usize> {
-    /// One tick.
+    /// The state of one tick.
     Telemetry(Telemetry<NX, NY>),
-    /// The answer to the command with this id.
-    Reply {
-        /// [`Command::id`].
-        id: u64,
-        /// The answer.
-        answer: Answer,
-    },
+    /// The answer to a command.
+    Reply(Reply),
+}
+
+/// The answer to one command.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Reply {
+    /// [`Command::id`] of the command.
+    pub id: u64,
+    /// What became of it.
+    pub answer: Answer,
 }
 
 /// The answer to a command.
@@ -78,22 +85,22 @@ pub enum Message<const NX: usize, const NY: usize> {
 pub enum Answer {
     /// Done.
     Done,
-    /// Not done, because of all of these.
-    NotNow(Reasons),
-    /// Not done: a request that makes no sense.
+    /// Refused for now, because of these inhibits.
+    NotNow(Inhibits),
+    /// Refused: the request is invalid.
     Rejected(Rejected),
-    /// [`Request::Info`]
+    /// Answer to [`Request::Info`].
     Info(Info),
-    /// [`Request::Cause`]
+    /// Answer to [`Request::Cause`].
     Cause(Option<Cause>),
-    /// [`Request::Statistics`]
+    /// Answer to [`Request::Statistics`].
     Statistics(Statistics),
 }
 
-/// What a firmware is.
+/// Identity of a firmware.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Info {
-    /// [`PROTOCOL`].
+    /// Its [`PROTOCOL`].
     pub protocol: u8,
     /// Version of this crate: major, minor, patch.
     pub version: [u8; 3],
@@ -122,7 +129,7 @@ pub enum Reset {
 }
 
 impl Reset {
-    /// The fault behind it, if it was one.
+    /// The fault that caused the reset, if one did.
     pub fn fault(self) -> Option<Fault> {
         match self {
             Reset::Power => None,
@@ -132,10 +139,10 @@ impl Reset {
     }
 }
 
-/// What has happened since the start, or since [`Request::ResetStatistics`].
+/// Counters since the start of the firmware, or since [`Request::ResetStatistics`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub struct Statistics {
-    /// Ticks.
+    /// Number of ticks.
     pub ticks: u32,
     /// Longest execution of a tick (processor cycles).
     pub worst_cycles: u32,
@@ -143,44 +150,46 @@ pub struct Statistics {
     pub overruns: u32,
     /// Single measurements that were rejected as implausible.
     pub rejected_samples: u32,
-    /// Telemetry that found the buffer full.
+    /// Messages dropped because their queue was full.
     pub dropped: u32,
     /// Frames that could not be read.
     pub malformed: u32,
-    /// Commands that came again, or late.
+    /// Commands ignored because their id was not larger than the last one.
     pub replayed: u32,
 }
 
-/// One tick, in the firmware's own units and bits; conversion is the host's work.
+/// State of the firmware in one tick, with the very values that it computes with.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Telemetry<const NX: usize, const NY: usize> {
     /// Number of the tick since the start of the firmware.
     pub tick: u32,
     /// State of the supervisor.
     pub state: State,
+    /// The control law in use.
+    pub law: Law,
     /// The latched fault.
     pub fault: Option<Fault>,
     /// Tick of its first cause; 0 without.
     pub cause_tick: u32,
-    /// How far homing is.
+    /// Progress of homing.
     pub homing: Homing,
-    /// How far the check of the encoders' signs is.
+    /// Progress of the sign check.
     pub signs: Signs,
-    /// What stands against arming now.
-    pub against: Reasons,
-    /// Encoder counts from position 0.
+    /// Inhibits of arming that hold now.
+    pub arming_inhibits: Inhibits,
+    /// Encoder counts, from position 0.
     pub counts: Vec<i32, NY>,
-    /// Current estimate x̂.
+    /// Corrected estimate x̂ (m, m/s, rad, rad/s …).
     pub estimate: Vec<f32, NX>,
-    /// Innovation e (m or rad).
+    /// Innovation e: measurement minus prediction (m or rad).
     pub innovation: Vec<f32, NY>,
     /// Governed set-point (m).
-    pub setpoint: f32,
-    /// Force the law asked for (N).
-    pub requested: f32,
+    pub setpoint_m: f32,
+    /// Force that the law asks for (N).
+    pub requested_n: f32,
     /// Force within all limits (N).
-    pub applied: f32,
-    /// Command to the power stage: duty (1), or force (N) for a rig without motor data.
+    pub applied_n: f32,
+    /// Command to the power stage: a duty cycle from -1 to 1, or a force (N) for a rig without motor data.
     pub drive: f32,
     /// Execution time of the tick before (processor cycles).
     pub cycles: u32,

@@ -1,7 +1,11 @@
-//! What the firmware and the host say to each other over the serial line, and how it is framed.
+//! Protocol: the messages between firmware and host, and how they travel over the serial line.
+//!
+//! [`message`] defines the requests, answers and telemetry: a new message belongs there. [`frame`] defines the frames for
+//! all of them, [`serial_link`] sends and receives them beside the control task, [`queue`] connects the two, and
+//! [`simulated_pins`] replaces the wires when an image runs in the loop with a simulation.
 
 pub mod frame;
-pub mod link;
 pub mod message;
-pub mod pins;
 pub mod queue;
+pub mod serial_link;
+pub mod simulated_pins;

@@ -1,12 +1,12 @@
-//! What has to be done by hand before arming: homing and the check of the signs.
+//! What a person does before arming: homing and the sign check. Both work on encoder counts with the motor off.
 
 use crate::board::Contacts;
-use crate::supervision::homing::{Homing, Rail};
+use crate::supervision::homing::{Homing, Rail, WrongTravel};
 use crate::supervision::sign_check::{SignCheck, Signs};
 use crate::supervision::stillness::Stillness;
 use crate::table::limits::Limits;
 
-/// Homing, sign check, and what is still.
+/// Progress of homing and sign check, and how long the rig has been still or slow.
 #[derive(Debug, Clone)]
 pub struct Calibration<const NY: usize> {
     homing: Homing,
@@ -17,7 +17,7 @@ pub struct Calibration<const NY: usize> {
 }
 
 impl<const NY: usize> Calibration<NY> {
-    /// Nothing is known yet.
+    /// Not homed, signs unchecked.
     pub fn new(limits: &Limits<NY>) -> Self {
         Self {
             homing: Homing::default(),
@@ -28,18 +28,18 @@ impl<const NY: usize> Calibration<NY> {
         }
     }
 
-    /// How far homing is.
+    /// Progress of homing.
     pub fn homing(&self) -> Homing {
         self.homing
     }
 
-    /// How far the check of the signs is.
+    /// Progress of the sign check.
     pub fn signs(&self) -> Signs {
         self.signs.signs()
     }
 
-    /// Forgets everything: positions can no longer be trusted.
-    pub fn lose(&mut self, limits: &Limits<NY>) {
+    /// Back to not homed and unchecked: positions can no longer be trusted.
+    pub fn invalidate(&mut self, limits: &Limits<NY>) {
         *self = Self::new(limits);
     }
 
@@ -49,42 +49,43 @@ impl<const NY: usize> Calibration<NY> {
         self.slow.update(counts, &limits.slow_counts);
     }
 
-    /// Whether nothing has moved by more than a count for long enough to be homed.
+    /// Whether nothing has moved by more than a count for [`Limits::still_ticks`], as homing requires.
     pub fn is_still(&self, limits: &Limits<NY>) -> bool {
         self.still.ticks() >= limits.still_ticks
     }
 
-    /// Ticks for which everything has been slow.
+    /// Number of ticks for which no sensor has moved by more than [`Limits::slow_counts`].
     pub fn slow_ticks(&self) -> u32 {
         self.slow.ticks()
     }
 
-    /// The time of being slow starts anew.
+    /// Restarts the count of slow ticks at these counts.
     pub fn restart_slow(&mut self, counts: &[i32; NY]) {
         self.slow.restart(counts);
     }
 
-    /// Positions are known.
-    pub fn homed(&mut self) {
+    /// Records that positions are known.
+    pub fn set_homed(&mut self) {
         self.homing = Homing::Homed;
     }
 
-    /// Begins to look for the switches.
-    pub fn begin_rail(&mut self) {
+    /// Starts homing by the limit switches.
+    pub fn start_rail_homing(&mut self) {
         self.rail = Rail::default();
         self.homing = self.rail.progress();
     }
 
-    /// Looks for the switches: gives the counts of all sensors once they are known and nothing moves; an error ends it.
+    /// One tick of homing by the limit switches. Gives the counts of all sensors once both switches were found, the cart
+    /// is off them, and everything is still.
     ///
     /// # Errors
-    /// The rail is not the one of the rig file.
-    pub fn find_rail(
+    /// [`WrongTravel`]: the rail is not the one in the rig file; homing ends.
+    pub fn update_rail_homing(
         &mut self,
         counts: &[i32; NY],
         contacts: &Contacts,
         limits: &Limits<NY>,
-    ) -> Result<Option<[i32; NY]>, crate::supervision::homing::WrongTravel> {
+    ) -> Result<Option<[i32; NY]>, WrongTravel> {
         let cart = counts.first().copied().unwrap_or_default();
         let found = self.rail.update(cart, contacts, limits.travel_counts, limits.middle_counts);
         self.homing = if found.is_err() { Homing::WrongTravel } else { self.rail.progress() };
@@ -98,28 +99,28 @@ impl<const NY: usize> Calibration<NY> {
         }))
     }
 
-    /// Homing was given up, and a check that is not done.
-    pub fn give_up(&mut self) {
+    /// Cancels homing and a sign check that are in progress; what is finished stays.
+    pub fn cancel(&mut self) {
         if matches!(self.homing, Homing::Touch { .. } | Homing::HoldStill) {
             self.homing = Homing::NotHomed;
         }
-        self.signs.give_up();
+        self.signs.cancel();
     }
 
-    /// Begins to check the signs.
-    pub fn begin_signs(&mut self, limits: &Limits<NY>) {
-        self.signs.begin(&limits.sign_counts);
+    /// Starts the sign check.
+    pub fn start_sign_check(&mut self, limits: &Limits<NY>) {
+        self.signs.start(&limits.sign_counts);
     }
 
-    /// Checks the signs.
-    pub fn check_signs(&mut self, counts: &[i32; NY], limits: &Limits<NY>) {
-        let at_rest = self.is_still(limits) && hang(counts, limits);
+    /// One tick of the sign check.
+    pub fn update_sign_check(&mut self, counts: &[i32; NY], limits: &Limits<NY>) {
+        let at_rest = self.is_still(limits) && links_hang(counts, limits);
         self.signs.update(counts, at_rest, &limits.sign_counts);
     }
 }
 
-/// Whether the links hang, to half of what counts as a turn by hand.
-pub fn hang<const NY: usize>(counts: &[i32; NY], limits: &Limits<NY>) -> bool {
+/// Whether all links hang at rest, to within half of [`Limits::sign_counts`].
+pub fn links_hang<const NY: usize>(counts: &[i32; NY], limits: &Limits<NY>) -> bool {
     let mut from_rest = *counts;
     for (count, &rest) in from_rest.iter_mut().zip(&limits.rest_counts) {
         *count = count.wrapping_sub(rest);

@@ -1,22 +1,22 @@
-//! Tests of the innovation: do encoders and motor do what the model says?
+//! Fault detection by the innovation: do encoders and motor behave as the model says?
 //!
-//! Three tests run in every tick of balancing. All thresholds are worked out by `upright design` from the covariance of the
-//! Kalman filter and a stated rate of false alarms.
+//! Three tests run in every tick of balancing. `upright design` computes all thresholds from the covariance of the Kalman
+//! filter and a stated rate of false alarms.
 //!
 //! - *Plausible*: `|e_i|` within its threshold. A measurement beyond it is rejected (the prediction takes its place) and
-//!   counted; the third in a row is a fault. It is the encoder's if no other sensor is in trouble, else the motor's:
-//!   a wrong force moves all of them.
+//!   counted; the third in a row is a fault: of the encoder if no other measurement of the tick is rejected, else of the
+//!   motor, because a wrong force moves all of them.
 //! - *Not frozen*: while a counter stands still, the motion that the model predicts for it stays small. The predicted
-//!   motion is summed with a memory of [`MEMORY`] ticks, so that a small steady error of the model is no alarm.
-//! - *Motor*: the innovation of the cart is compared with what a missing force `-u` would make of it. The ratio of the two,
-//!   by least squares over a memory of [`MEMORY`] ticks, is 0 for a healthy motor, 1 for a dead and 2 for a reversed one.
+//!   motion is summed with a memory of [`MEMORY`] ticks, so that a small constant model error raises no alarm.
+//! - *Motor*: the innovation of the cart is compared with the one that a missing force `-u` would cause. Their ratio, by
+//!   least squares with the same memory, is 0 for a healthy motor, 1 for a dead one and 2 for a reversed one.
 
 use crate::supervision::fault::Fault;
 
 /// Memory of the sums (ticks): each tick keeps `1 - 1/MEMORY` of them.
 pub const MEMORY: f32 = 16.0;
 const KEEP: f32 = 1.0 - 1.0 / MEMORY;
-/// So many implausible measurements in a row are a fault.
+/// This many implausible measurements in a row are a fault.
 pub const IN_A_ROW: u32 = 3;
 
 /// Thresholds of the tests for `NY` sensors; `f32::MAX` where there is nothing to test.
@@ -26,18 +26,18 @@ pub struct Thresholds<const NY: usize> {
     pub innovation: [f32; NY],
     /// Largest predicted motion of each sensor while its counter stands still (m or rad).
     pub frozen: [f32; NY],
-    /// The test of the motor.
+    /// Model and thresholds of the motor test.
     pub motor: MotorTest,
 }
 
-/// What a missing force does to the innovation of the first sensor, and when that is a fault.
+/// Effect of a missing force on the innovation of the first sensor, and when that is a fault.
 ///
 /// The error `(p, v)` of predicted position and speed follows
 /// `p⁺ = a_pp p' + a_pv v' - b_p u, v⁺ = a_vp p' + a_vv v' - b_v u` with `p' = p - l_p p, v' = v - l_v p`; p is the
-/// innovation that a missing `u` makes.
+/// innovation that a missing `u` causes.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct MotorTest {
-    /// a_pp, a_pv, a_vp, a_vv over one tick, with the correction by the observer in them.
+    /// a_pp, a_pv, a_vp, a_vv over one tick, the observer's correction included.
     pub a: [f32; 4],
     /// b_p (m/N), b_v (m/s/N).
     pub b: [f32; 2],
@@ -48,7 +48,7 @@ pub struct MotorTest {
 }
 
 impl MotorTest {
-    /// No test.
+    /// A test that never finds anything.
     pub const NONE: Self = Self { a: [0.0; 4], b: [0.0; 2], ratio: 1.0, energy: f32::MAX };
 
     pub(crate) fn values(&self) -> [f32; 8] {
@@ -71,26 +71,29 @@ impl<const NY: usize> Thresholds<NY> {
     }
 }
 
-/// What the tests have found in a tick.
+/// Result of the tests in a tick.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Finding {
-    /// Encoder, frozen encoder or motor.
+    /// [`Fault::Encoder`], [`Fault::Frozen`] or [`Fault::Motor`].
     pub fault: Fault,
     /// The sensor (0: cart, 1: first link …).
     pub sensor: u8,
 }
 
-/// The memory of the tests.
+/// State of the tests.
 #[derive(Debug, Clone)]
 pub struct Detection<const NY: usize> {
     sensors: [SensorMemory; NY],
+    /// Error `(p, v)` of predicted position (m) and speed (m/s) that a missing force would have caused by now.
     missing: [f32; 2],
-    likeness: f32,
+    /// Sum of `e p` (m²).
+    correlation: f32,
+    /// Sum of `p²` (m²).
     energy: f32,
     rejected: u32,
 }
 
-/// What is remembered of a sensor.
+/// State of the tests of one sensor.
 #[derive(Debug, Clone, Copy, Default)]
 struct SensorMemory {
     counts: i32,
@@ -107,7 +110,7 @@ impl<const NY: usize> Default for Detection<NY> {
         Self {
             sensors: [SensorMemory::default(); NY],
             missing: [0.0; 2],
-            likeness: 0.0,
+            correlation: 0.0,
             energy: 0.0,
             rejected: 0,
         }
@@ -115,7 +118,7 @@ impl<const NY: usize> Default for Detection<NY> {
 }
 
 impl<const NY: usize> Detection<NY> {
-    /// Begins at positions `y` (m or rad).
+    /// Restarts the tests at positions `y` (m or rad); the number of rejected measurements stays.
     pub fn start(&mut self, counts: &[i32; NY], y: &[f32; NY]) {
         *self = Self { rejected: self.rejected, ..Self::default() };
         for ((sensor, &counts), &corrected) in self.sensors.iter_mut().zip(counts).zip(y) {
@@ -123,7 +126,9 @@ impl<const NY: usize> Detection<NY> {
         }
     }
 
-    /// Tests the innovation `e = y - C x̂⁻` of a tick; measurements that are not plausible get the innovation 0.
+    /// Tests the innovation `e = y - C x̂⁻` of a tick (m or rad); sets that of an implausible measurement to 0.
+    ///
+    /// If several tests fail in one tick, the result is the first of: implausible, frozen, motor.
     #[inline]
     pub fn test(
         &mut self,
@@ -132,7 +137,7 @@ impl<const NY: usize> Detection<NY> {
         y: &[f32; NY],
         e: &mut [f32; NY],
     ) -> Option<Finding> {
-        let (mut in_trouble, mut contradicts, mut frozen) = (0, None, None);
+        let (mut rejected_now, mut implausible, mut frozen) = (0, None, None);
         let limits = thresholds.innovation.iter().zip(&thresholds.frozen);
         let measured = counts.iter().zip(y).zip(e.iter_mut());
         // One pass over the sensors for both tests: every value is loaded once.
@@ -154,33 +159,34 @@ impl<const NY: usize> Detection<NY> {
                 *e = 0.0;
                 memory.implausible = memory.implausible.saturating_add(1);
                 self.rejected = self.rejected.saturating_add(1);
-                in_trouble += 1;
-                if memory.implausible >= IN_A_ROW && contradicts.is_none() {
-                    contradicts = Some(sensor);
+                rejected_now += 1;
+                if memory.implausible >= IN_A_ROW && implausible.is_none() {
+                    implausible = Some(sensor);
                 }
             }
         }
-        // A measurement that was rejected says nothing about the motor.
-        let motor = self.motor(&thresholds.motor, e.first().copied().unwrap_or_default());
-        let contradicts = contradicts.map(|sensor| Finding {
-            fault: if in_trouble > 1 { Fault::Motor } else { Fault::Encoder },
+        // The innovation of a rejected measurement is 0: it says nothing about the motor.
+        let motor = self.test_motor(&thresholds.motor, e.first().copied().unwrap_or_default());
+        let implausible = implausible.map(|sensor| Finding {
+            fault: if rejected_now > 1 { Fault::Motor } else { Fault::Encoder },
             sensor,
         });
-        contradicts.or(frozen.map(|sensor| Finding { fault: Fault::Frozen, sensor })).or(motor)
+        implausible.or(frozen.map(|sensor| Finding { fault: Fault::Frozen, sensor })).or(motor)
     }
 
     #[inline]
-    fn motor(&mut self, test: &MotorTest, e: f32) -> Option<Finding> {
+    fn test_motor(&mut self, test: &MotorTest, e: f32) -> Option<Finding> {
         let [missing, _] = self.missing;
-        self.likeness = KEEP * self.likeness + e * missing;
+        self.correlation = KEEP * self.correlation + e * missing;
         self.energy = KEEP * self.energy + missing * missing;
-        let found = self.energy > test.energy && self.likeness > test.ratio * self.energy;
+        let found = self.energy > test.energy && self.correlation > test.ratio * self.energy;
         found.then_some(Finding { fault: Fault::Motor, sensor: 0 })
     }
 
-    /// Ends a tick in which the force `u` (N) acts, with the corrected estimate of the sensors' positions.
+    /// Second half of a tick: stores the corrected estimate of the sensors' positions (m or rad) and the force `u` (N) that
+    /// acts during this tick.
     #[inline]
-    pub fn end(&mut self, test: &MotorTest, corrected: [f32; NY], u: f32) {
+    pub fn finish_tick(&mut self, test: &MotorTest, corrected: [f32; NY], u: f32) {
         for (sensor, corrected) in self.sensors.iter_mut().zip(corrected) {
             sensor.corrected = corrected;
         }
@@ -188,13 +194,13 @@ impl<const NY: usize> Detection<NY> {
         self.missing = [pp * p + pv * v - b_p * u, vp * p + vv * v - b_v * u];
     }
 
-    /// Measurements rejected since the start, or since they were last forgotten.
+    /// Number of measurements rejected since power-up or the last [`reset_rejected`](Self::reset_rejected).
     pub fn rejected(&self) -> u32 {
         self.rejected
     }
 
-    /// Counts rejected measurements from 0 again.
-    pub fn forget_rejected(&mut self) {
+    /// Sets the number of rejected measurements to 0.
+    pub fn reset_rejected(&mut self) {
         self.rejected = 0;
     }
 }
@@ -206,7 +212,7 @@ mod tests {
     const THRESHOLDS: Thresholds<2> = Thresholds {
         innovation: [1.0, 1.0],
         frozen: [3.0, 3.0],
-        // A filter that follows the measurement at once, and a unit of way per newton and tick.
+        // A filter that follows the measurement at once, and 1 m per newton and tick.
         motor: MotorTest { a: [0.0; 4], b: [1.0, 0.0], ratio: 0.5, energy: 4.0 },
     };
 
@@ -216,7 +222,7 @@ mod tests {
         detection.start(&[0; 2], &[0.0; 2]);
         (1..100).find_map(|tick| {
             let found = detection.test(&THRESHOLDS, &[tick; 2], &[tick as f32; 2], &mut of(tick));
-            detection.end(&THRESHOLDS.motor, [tick as f32; 2], 0.0);
+            detection.finish_tick(&THRESHOLDS.motor, [tick as f32; 2], 0.0);
             found.map(|finding| (tick, finding))
         })
     }
@@ -247,7 +253,7 @@ mod tests {
         assert_eq!((e, detection.rejected()), ([0.0, 0.5], 1));
         detection.start(&[0; 2], &[0.0; 2]);
         assert_eq!(detection.rejected(), 1, "a new start does not forget it");
-        detection.forget_rejected();
+        detection.reset_rejected();
         assert_eq!(detection.rejected(), 0);
     }
 
@@ -259,7 +265,7 @@ mod tests {
             // The observer holds on to the measurement: every tick it predicts the same motion again.
             let mut e = [0.0, -per_tick];
             let found = detection.test(&THRESHOLDS, &[tick, 0], &[tick as f32, 0.0], &mut e);
-            detection.end(&THRESHOLDS.motor, [tick as f32, 0.0], 0.0);
+            detection.finish_tick(&THRESHOLDS.motor, [tick as f32, 0.0], 0.0);
             found.map(|finding| (tick, finding))
         })
     }
@@ -281,7 +287,7 @@ mod tests {
             let mut e = [-missing * force, 0.0];
             let found = detection.test(&THRESHOLDS, &[tick; 2], &[tick as f32; 2], &mut e);
             force = if tick % 4 < 2 { 0.4 } else { -0.4 };
-            detection.end(&THRESHOLDS.motor, [tick as f32; 2], force);
+            detection.finish_tick(&THRESHOLDS.motor, [tick as f32; 2], force);
             found.map(|finding| (tick, finding))
         })
     }
@@ -297,7 +303,7 @@ mod tests {
             (1..100).find_map(|tick| {
                 let mut e = [-missing * 0.6, 0.0];
                 let found = detection.test(&THRESHOLDS, &[tick; 2], &[tick as f32; 2], &mut e);
-                detection.end(&THRESHOLDS.motor, [tick as f32; 2], 0.6);
+                detection.finish_tick(&THRESHOLDS.motor, [tick as f32; 2], 0.6);
                 found.map(|finding| finding.fault)
             })
         };

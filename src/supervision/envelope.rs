@@ -1,16 +1,19 @@
-//! Where the rig may be while the motor is on.
+//! Limits on position, speed and angles while the motor is on.
+//!
+//! A new limit on the state belongs here; its value belongs to [`Limits`].
 
 use crate::supervision::fault::Fault;
 use crate::table::limits::Limits;
 
-/// The limit that the state `x` (m, m/s, rad, rad/s …) with the requested force (N) is beyond, if any.
+/// The fault of the first limit that the state `x` (m, m/s, rad, rad/s …) or the requested force (N) exceeds.
 ///
-/// Angles are summed from joint to joint: the limit is on the angle from the vertical. The corrected estimate is looked
-/// at, so that a single bad measurement, which was rejected, does not count.
+/// In this order: request not finite, rail, angle, speed. Joint angles are added up, because the limit is on each link's
+/// angle from the vertical. `x` is the corrected estimate: a single bad measurement was rejected before and does not
+/// count.
 #[inline]
-pub fn left<const NY: usize>(limits: &Limits<NY>, x: &[f32], requested: f32) -> Option<Fault> {
-    // The request is a sum over all states: if one of them is not finite, it is not either.
-    if !requested.is_finite() {
+pub fn exceeded<const NY: usize>(limits: &Limits<NY>, x: &[f32], requested_n: f32) -> Option<Fault> {
+    // The request is a sum over all states: if one of them is not finite, neither is the sum.
+    if !requested_n.is_finite() {
         return Some(Fault::NotFinite);
     }
     let mut states = x.iter();
@@ -37,8 +40,8 @@ mod tests {
     use nalgebra::SVector;
 
     #[test]
-    fn whichever_state_is_not_finite_the_request_is_not_either() {
-        // A gain of 0 as well: 0 times infinity is not a number.
+    fn a_state_that_is_not_finite_makes_the_request_not_finite() {
+        // With a gain of 0, too: 0 times infinity is NaN.
         let k = SVector::from([1.0, -2.0, 0.0, 3.0]);
         for state in 0..4 {
             for bad in [f32::NAN, f32::INFINITY, f32::NEG_INFINITY] {
@@ -54,7 +57,7 @@ mod tests {
     fn every_limit_is_watched_on_both_sides() {
         let limits =
             Limits::<3> { rail_m: [-1.0, 2.0], angle_rad: 0.3, speed_m_per_s: 1.5, ..Limits::none() };
-        let found = |x: [f32; 6]| left(&limits, &x, 0.0);
+        let found = |x: [f32; 6]| exceeded(&limits, &x, 0.0);
         assert_eq!(found([1.9, -1.4, 0.2, 9.0, -0.45, -9.0]), None);
         assert_eq!(found([2.1, 0.0, 0.0, 0.0, 0.0, 0.0]), Some(Fault::Rail));
         assert_eq!(found([-1.1, 0.0, 0.0, 0.0, 0.0, 0.0]), Some(Fault::Rail));
@@ -62,8 +65,8 @@ mod tests {
         assert_eq!(found([0.0, 0.0, -0.31, 0.0, 0.0, 0.0]), Some(Fault::Angle));
         // Each joint within the limit, the second link not.
         assert_eq!(found([0.0, 0.0, 0.2, 0.0, 0.2, 0.0]), Some(Fault::Angle));
-        for requested in [f32::INFINITY, f32::NAN] {
-            assert_eq!(left(&limits, &[0.0; 6], requested), Some(Fault::NotFinite));
+        for requested_n in [f32::INFINITY, f32::NAN] {
+            assert_eq!(exceeded(&limits, &[0.0; 6], requested_n), Some(Fault::NotFinite));
         }
     }
 }

@@ -1,4 +1,7 @@
 //! The faults: one list for code, documentation and tests.
+//!
+//! A new fault gets a variant with the next code, an [`Entry`] in [`Fault::ALL`] and a place in [`Fault::PRECEDENCE`]; the
+//! test that the documentation lists it then fails until `docs/faults.md` has it, too.
 
 use serde::{Deserialize, Serialize};
 
@@ -44,14 +47,14 @@ pub enum Fault {
     Clock = 18,
 }
 
-/// The most ticks from a fault's first effect on what the firmware sees to motor off.
+/// Longest time from a fault's first effect on the firmware's inputs to motor off.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Reaction {
-    /// So many ticks: 1 means in the tick that sees it.
+    /// This many ticks; 1: in the same tick.
     Ticks(u32),
-    /// So many ticks after a time that the rig file gives under this key of `[limits]`.
+    /// This many ticks after the time that the rig file gives under this key of `[limits]`.
     After(&'static str, u32),
-    /// By other means than the control task: see the condition.
+    /// Not by the control task: see the condition.
     Hardware(&'static str),
 }
 
@@ -65,16 +68,16 @@ impl core::fmt::Display for Reaction {
     }
 }
 
-/// What there is to know about a fault.
+/// A fault's row in the table of faults.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Entry {
-    /// The fault; its code is its number.
+    /// The fault, which gives the code.
     pub fault: Fault,
     /// Short name.
     pub name: &'static str,
     /// When it is raised.
     pub condition: &'static str,
-    /// How soon the motor is off.
+    /// Longest time to motor off.
     pub reaction: Reaction,
     /// What to do about it.
     pub remedy: &'static str,
@@ -218,19 +221,44 @@ impl Fault {
         },
     ];
 
-    /// The number by which it is known in telemetry and documentation.
+    /// Which fault is latched when several occur in one tick: the first of these. Inputs come first, then the limits on
+    /// the estimate, then the tests of the innovation, and last what is checked after the motor was driven.
+    ///
+    /// [`Fault::NotFinite`] stands once for the supply voltage and the requested force: the supply comes after the limit
+    /// switches, the force after the overrun. A [`Fault::Motor`] found by rejected measurements of several sensors has the
+    /// place of [`Fault::Encoder`]. [`Fault::Watchdog`] and [`Fault::Crash`] reset the microcontroller.
+    pub const PRECEDENCE: [Fault; 16] = [
+        Fault::Clock,
+        Fault::EmergencyStop,
+        Fault::Driver,
+        Fault::LimitSwitch,
+        Fault::NotFinite,
+        Fault::Supply,
+        Fault::Overrun,
+        Fault::Rail,
+        Fault::Angle,
+        Fault::Speed,
+        Fault::Encoder,
+        Fault::Frozen,
+        Fault::Motor,
+        Fault::Saturated,
+        Fault::LinkLost,
+        Fault::Table,
+    ];
+
+    /// The fault's number in telemetry and documentation.
     pub fn code(self) -> u8 {
         self as u8
     }
 
-    /// Name, condition, reaction and remedy.
+    /// The fault's row in [`Fault::ALL`].
     pub fn entry(self) -> &'static Entry {
         const ALL: &[Entry] = &Fault::ALL;
-        // A test holds that the entry of every code is at its place.
+        // A test checks that every entry is at the index given by its code.
         ALL.get(self as usize - 1).unwrap_or(&ALL[0])
     }
 
-    /// Whether positions can no longer be trusted after it: home, and check the signs, again.
+    /// Whether positions can no longer be trusted after this fault, so that homing and sign check are due again.
     pub fn loses_positions(self) -> bool {
         matches!(self, Fault::Encoder | Fault::Frozen | Fault::Watchdog | Fault::Crash)
     }
@@ -242,14 +270,14 @@ impl core::fmt::Display for Fault {
     }
 }
 
-/// The first cause, as it was latched.
+/// A latched fault: what, when, and at which sensor.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Cause {
     /// The fault.
     pub fault: Fault,
-    /// Number of its tick since the start of the firmware.
+    /// Number of the tick since the start of the firmware.
     pub tick: u32,
-    /// The sensor it was found at (0: cart, 1: first link …).
+    /// The sensor at which it was found (0: cart, 1: first link …), if at one.
     pub sensor: Option<u8>,
 }
 
@@ -258,7 +286,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn every_fault_is_at_the_place_of_its_code() {
+    fn every_entry_is_at_the_index_of_its_code() {
         for (entry, code) in Fault::ALL.iter().zip(1..) {
             assert_eq!(entry.fault.code(), code);
             assert_eq!(entry.fault.entry(), entry);

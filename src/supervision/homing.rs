@@ -1,31 +1,31 @@
-//! Where the cart is on its rail, by pushing it to both limit switches by hand.
+//! Homing by the limit switches: a person pushes the cart to both, and their middle gives its position on the rail.
 
 use serde::{Deserialize, Serialize};
 
 use crate::board::Contacts;
 
-/// How far homing is.
+/// Progress of homing.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub enum Homing {
-    /// Not homed since power-up or since positions were lost.
+    /// Not homed since power-up, or since a fault made the positions unknown.
     #[default]
     NotHomed,
-    /// Push the cart to both limit switches; these have been touched.
+    /// Push the cart to both limit switches; tells which have been pressed so far.
     Touch {
-        /// The one at the low end.
+        /// Low end of the rail.
         low: bool,
-        /// The one at the high end.
+        /// High end of the rail.
         high: bool,
     },
-    /// Both were touched; let the links hang still, away from the switches.
+    /// Both were pressed; move the cart off the switches and let the links hang still.
     HoldStill,
     /// Positions are known.
     Homed,
-    /// The distance between the switches is not that of the rig file, or one of them does not open: nothing was homed.
+    /// Not homed: the distance between the switches differs from the rig file's, or a switch does not open.
     WrongTravel,
 }
 
-/// The way to both limit switches and what it has found.
+/// Cart counts at which the limit switches were pressed.
 #[derive(Debug, Clone, Default)]
 pub struct Rail {
     low: Option<i32>,
@@ -33,13 +33,14 @@ pub struct Rail {
 }
 
 impl Rail {
-    /// Takes the cart's counts and the contacts of a tick.
+    /// Takes the cart's counts and the contacts of a tick. Once both switches were pressed, gives the cart's position
+    /// (counts). Of each switch, the first press is used.
     ///
-    /// `travel` is the distance between the switches and by how much it may differ (counts), `middle` the count of the
-    /// rail's middle. The first press of each switch counts. Once both were touched, gives the cart's position (counts).
+    /// `travel` holds the distance between the switches and its tolerance (counts); `middle` is the position of their
+    /// middle (counts).
     ///
     /// # Errors
-    /// [`WrongTravel`] if both are pressed at once, or the distance differs.
+    /// [`WrongTravel`] if both are pressed at once, or the distance is out of tolerance.
     pub fn update(
         &mut self,
         cart: i32,
@@ -66,7 +67,7 @@ impl Rail {
         Ok(Some(cart.wrapping_sub(middle_found).wrapping_add(middle)))
     }
 
-    /// How far it is.
+    /// Which switches are still to be pressed.
     pub fn progress(&self) -> Homing {
         match (self.low, self.high) {
             (Some(_), Some(_)) => Homing::HoldStill,
@@ -75,7 +76,7 @@ impl Rail {
     }
 }
 
-/// The rail is not as long as the rig file says, or a switch is stuck.
+/// The distance between the switches is not that of the rig file, or a switch is stuck.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct WrongTravel;
 

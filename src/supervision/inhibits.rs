@@ -1,23 +1,26 @@
-//! Why a command is not followed now.
+//! The inhibits: conditions that keep the firmware from following a command now.
+//!
+//! A new one is a line in the list below. The functions that check for it are in `firmware/posture.rs` and
+//! `firmware/commands.rs`.
 
 use serde::{Deserialize, Serialize};
 
-/// A set of reasons; every one that holds is in it.
+/// A set of inhibits: all that hold at the same time.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
-pub struct Reasons(u32);
+pub struct Inhibits(u32);
 
-macro_rules! reasons {
+macro_rules! inhibits {
     ($($bit:literal $name:ident $text:literal;)*) => {
-        impl Reasons {
-            $(#[doc = concat!("Because ", $text, ".")] pub const $name: Self = Self(1 << $bit);)*
+        impl Inhibits {
+            $(#[doc = concat!("Refused: ", $text, ".")] pub const $name: Self = Self(1 << $bit);)*
 
-            /// Every reason and its text.
+            /// Every inhibit with its text.
             pub const ALL: &[(Self, &str)] = &[$((Self::$name, $text)),*];
         }
     };
 }
 
-reasons! {
+inhibits! {
     0 NOT_HOMED "positions are not known: home first";
     1 FAULT "a fault is latched: clear it first";
     2 RUNNING "the motor is not off: disarm first";
@@ -36,45 +39,45 @@ reasons! {
     15 NO_SWITCHES "this rig has no rail with switches at its ends";
 }
 
-impl Reasons {
-    /// No reason.
+impl Inhibits {
+    /// The empty set.
     pub const NONE: Self = Self(0);
 
-    /// Both sets of reasons.
-    pub const fn and(self, other: Self) -> Self {
+    /// All inhibits of both sets.
+    pub const fn union(self, other: Self) -> Self {
         Self(self.0 | other.0)
     }
 
-    /// These reasons if `holds`, else none.
+    /// These inhibits if `holds`, else the empty set.
     pub const fn when(self, holds: bool) -> Self {
         if holds { self } else { Self::NONE }
     }
 
-    /// Whether there is none.
+    /// Whether no inhibit holds.
     pub const fn is_empty(self) -> bool {
         self.0 == 0
     }
 
-    /// Whether all of `other` are among these.
+    /// Whether this set includes all of `other`.
     pub const fn contains(self, other: Self) -> bool {
         self.0 & other.0 == other.0
     }
 
-    /// `Ok` if there is none.
+    /// `Ok` if no inhibit holds, for use with `?`.
     ///
     /// # Errors
-    /// All of them.
-    pub const fn none(self) -> Result<(), Self> {
+    /// The set itself, if it is not empty.
+    pub const fn err_if_any(self) -> Result<(), Self> {
         if self.is_empty() { Ok(()) } else { Err(self) }
     }
 
-    /// The text of each.
+    /// Texts of all inhibits in the set.
     pub fn texts(self) -> impl Iterator<Item = &'static str> {
-        Self::ALL.iter().filter(move |(reason, _)| self.contains(*reason)).map(|(_, text)| *text)
+        Self::ALL.iter().filter(move |(inhibit, _)| self.contains(*inhibit)).map(|(_, text)| *text)
     }
 }
 
-impl core::fmt::Display for Reasons {
+impl core::fmt::Display for Inhibits {
     fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
         for (index, text) in self.texts().enumerate() {
             f.write_str(if index == 0 { "" } else { "; " })?;
@@ -90,15 +93,19 @@ mod tests {
     use std::string::ToString;
 
     #[test]
-    fn all_reasons_are_listed() {
-        let both = Reasons::TILTED.and(Reasons::NOT_HOMED);
+    fn all_inhibits_are_listed() {
+        let both = Inhibits::TILTED.union(Inhibits::NOT_HOMED);
         assert_eq!(both.texts().count(), 2);
         assert!(both.to_string().contains("home first") && both.to_string().contains("upright"));
         assert_eq!(
-            Reasons::ALL.iter().fold(Reasons::NONE, |all, (reason, _)| all.and(*reason)).texts().count(),
+            Inhibits::ALL
+                .iter()
+                .fold(Inhibits::NONE, |all, (inhibit, _)| all.union(*inhibit))
+                .texts()
+                .count(),
             16
         );
-        assert_eq!(Reasons::NONE.none(), Ok(()));
-        assert_eq!(both.none(), Err(both));
+        assert_eq!(Inhibits::NONE.err_if_any(), Ok(()));
+        assert_eq!(both.err_if_any(), Err(both));
     }
 }

@@ -1,63 +1,63 @@
-//! Whether every encoder counts the right way and is plugged in at its own place.
+//! The sign check: does every encoder count in the right direction, and is it plugged in at its own place?
 //!
-//! A person turns the links one by one, from the outermost inwards, counter-clockwise, and then pushes the cart along +x,
-//! each until the sensor has moved by its [`sign_counts`](crate::table::limits::Limits::sign_counts); before each, the links hang
-//! at rest. Of the sensor that is asked for and those further inwards, the one asked for has to be the first to get so
-//! far, and on the positive side. (Links further out hang on, and turn the other way against the one that is turned; they
-//! have been checked before.) An encoder that is reversed gets there on the negative side; of two that are swapped, the
-//! inner one answers for the outer.
+//! A person turns the links counter-clockwise one by one, from the outermost inwards, and then pushes the cart along +x.
+//! Each step starts with the links hanging at rest and lasts until a sensor has moved by its
+//! [`sign_counts`](crate::table::limits::Limits::sign_counts). The requested sensor has to be the first to do so, among
+//! itself and all sensors further inwards, and in the positive direction. (Links further out keep hanging and so turn
+//! backwards against the one being turned; they were checked before.) A reversed encoder moves in the negative direction;
+//! of two swapped encoders, the inner one moves instead of the outer one.
 
 use serde::{Deserialize, Serialize};
 
-/// How far the check is, with numbers of sensors (0: cart, 1: first link …).
+/// Progress of the sign check; sensors are numbered (0: cart, 1: first link …).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub enum Signs {
-    /// Not begun since power-up.
+    /// Not started since power-up.
     #[default]
     Unchecked,
-    /// Let the links hang at rest; this one comes next.
+    /// Let the links hang at rest; this sensor is next.
     Rest(u8),
-    /// Move this one: turn the link counter-clockwise, push the cart along +x.
+    /// Move this sensor: turn the link counter-clockwise, or push the cart along +x.
     Move(u8),
-    /// All are as they should be.
+    /// All signs are right.
     Checked,
-    /// This one has moved the wrong way.
+    /// This sensor has moved in the wrong direction.
     Reversed(u8),
-    /// Another one has moved than was asked for.
+    /// Another sensor has moved than the requested one.
     Swapped {
-        /// The one that was asked for.
+        /// Requested sensor.
         asked: u8,
-        /// The one that has moved.
+        /// Sensor that has moved.
         moved: u8,
     },
 }
 
-/// The check and where it began.
+/// Progress of the check, and the counts at which the current step started.
 #[derive(Debug, Clone)]
 pub struct SignCheck<const NY: usize> {
     signs: Signs,
-    from: [i32; NY],
+    start_counts: [i32; NY],
 }
 
 impl<const NY: usize> SignCheck<NY> {
-    /// Before any check; done if `sign_counts` leave nothing to check.
+    /// Unchecked, or already checked if `sign_counts` leave nothing to check.
     pub fn new(sign_counts: &[i32; NY]) -> Self {
-        let signs = last(sign_counts, NY).map_or(Signs::Checked, |_| Signs::Unchecked);
-        Self { signs, from: [0; NY] }
+        let signs = last_to_check(sign_counts, NY).map_or(Signs::Checked, |_| Signs::Unchecked);
+        Self { signs, start_counts: [0; NY] }
     }
 
-    /// How far it is.
+    /// Progress of the check.
     pub fn signs(&self) -> Signs {
         self.signs
     }
 
-    /// Begins.
-    pub fn begin(&mut self, sign_counts: &[i32; NY]) {
-        self.signs = last(sign_counts, NY).map_or(Signs::Checked, Signs::Rest);
+    /// Starts with the outermost link.
+    pub fn start(&mut self, sign_counts: &[i32; NY]) {
+        self.signs = last_to_check(sign_counts, NY).map_or(Signs::Checked, Signs::Rest);
     }
 
-    /// Gives up a check that is not done.
-    pub fn give_up(&mut self) {
+    /// Cancels a check in progress; a finished one stays.
+    pub fn cancel(&mut self) {
         if matches!(self.signs, Signs::Rest(_) | Signs::Move(_)) {
             self.signs = Signs::Unchecked;
         }
@@ -66,14 +66,14 @@ impl<const NY: usize> SignCheck<NY> {
     /// Takes the counts of a tick, and whether the links hang at rest.
     pub fn update(&mut self, counts: &[i32; NY], at_rest: bool, sign_counts: &[i32; NY]) {
         match self.signs {
-            Signs::Rest(next) if at_rest => (self.signs, self.from) = (Signs::Move(next), *counts),
-            Signs::Move(asked) => self.moving(asked, counts, sign_counts),
+            Signs::Rest(next) if at_rest => (self.signs, self.start_counts) = (Signs::Move(next), *counts),
+            Signs::Move(asked) => self.update_move(asked, counts, sign_counts),
             _ => {}
         }
     }
 
-    fn moving(&mut self, asked: u8, counts: &[i32; NY], sign_counts: &[i32; NY]) {
-        let sensors = counts.iter().zip(&self.from).zip(sign_counts).zip(0..=asked);
+    fn update_move(&mut self, asked: u8, counts: &[i32; NY], sign_counts: &[i32; NY]) {
+        let sensors = counts.iter().zip(&self.start_counts).zip(sign_counts).zip(0..=asked);
         let far =
             sensors.map(|(((count, from), &enough), sensor)| (count.wrapping_sub(*from), enough, sensor));
         let mut far =
@@ -84,13 +84,13 @@ impl<const NY: usize> SignCheck<NY> {
         } else if moved < 0 {
             Signs::Reversed(asked)
         } else {
-            last(sign_counts, usize::from(asked)).map_or(Signs::Checked, Signs::Rest)
+            last_to_check(sign_counts, usize::from(asked)).map_or(Signs::Checked, Signs::Rest)
         };
     }
 }
 
 /// The last sensor before `end` that has a sign to check.
-fn last<const NY: usize>(sign_counts: &[i32; NY], end: usize) -> Option<u8> {
+fn last_to_check<const NY: usize>(sign_counts: &[i32; NY], end: usize) -> Option<u8> {
     let sensors = sign_counts.iter().take(end).zip(0u8..);
     sensors.filter(|(counts, _)| **counts > 0).map(|(_, sensor)| sensor).last()
 }
@@ -101,16 +101,16 @@ mod tests {
 
     const ENOUGH: [i32; 3] = [50, 130, 130];
 
-    /// A person moves what is asked for; `wire` is what the wiring makes of the true counts.
+    /// Result when a person moves each requested sensor; `wire` turns true counts into those that the firmware reads.
     fn check(wire: impl Fn([i32; 3]) -> [i32; 3]) -> Signs {
         let mut check = SignCheck::new(&ENOUGH);
-        check.begin(&ENOUGH);
+        check.start(&ENOUGH);
         for tick in 0.. {
             let moved = 1 + tick % 200;
             let counts = match check.signs() {
                 Signs::Rest(_) => [0, 0, 0],
                 Signs::Move(2) => [0, 0, moved],
-                // The outer link hangs on.
+                // The outer link keeps hanging.
                 Signs::Move(1) => [0, moved, -moved],
                 // The links swing back while the cart is pushed.
                 Signs::Move(0) => [moved, 2 * moved, -2 * moved],
@@ -123,7 +123,7 @@ mod tests {
     }
 
     #[test]
-    fn right_wiring_is_found_right() {
+    fn right_wiring_passes() {
         assert_eq!(check(|counts| counts), Signs::Checked);
         assert_eq!(check(|[x, a, b]| [x + 7, a + 2048, b]), Signs::Checked);
     }
@@ -144,7 +144,7 @@ mod tests {
     }
 
     #[test]
-    fn where_there_is_nothing_to_check_nothing_is_asked_for() {
+    fn a_rig_with_nothing_to_check_is_checked() {
         assert_eq!(SignCheck::new(&[0, 0]).signs(), Signs::Checked);
         assert_eq!(SignCheck::new(&ENOUGH).signs(), Signs::Unchecked);
     }

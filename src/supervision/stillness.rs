@@ -1,6 +1,6 @@
-//! Whether cart and links have been still.
+//! How long cart and links have been still.
 
-/// For how long the counters have stayed near where they were.
+/// Number of ticks for which all counts have stayed near a reference.
 #[derive(Debug, Clone)]
 pub struct Stillness<const NY: usize> {
     reference: [i32; NY],
@@ -14,7 +14,8 @@ impl<const NY: usize> Default for Stillness<NY> {
 }
 
 impl<const NY: usize> Stillness<NY> {
-    /// Takes the counts of a tick. When one is further than `allowed` from where it was, the time starts anew.
+    /// Takes the counts of a tick. If one is further than `allowed` from its reference, these counts become the
+    /// reference and the number of ticks restarts at 0.
     pub fn update(&mut self, counts: &[i32; NY], allowed: &[i32; NY]) {
         let near = |((&count, &reference), &allowed): ((&i32, &i32), &i32)| {
             count.wrapping_sub(reference).unsigned_abs() <= allowed.unsigned_abs()
@@ -26,12 +27,12 @@ impl<const NY: usize> Stillness<NY> {
         }
     }
 
-    /// The time starts anew, here.
+    /// Makes these counts the reference and restarts the number of ticks at 0.
     pub fn restart(&mut self, counts: &[i32; NY]) {
         (self.reference, self.ticks) = (*counts, 0);
     }
 
-    /// Ticks since something moved.
+    /// Number of ticks since something moved.
     pub fn ticks(&self) -> u32 {
         self.ticks
     }

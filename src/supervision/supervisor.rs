@@ -1,9 +1,9 @@
-//! Who decides whether the motor may move: states, and what leads from one to another.
+//! The state machine that decides whether the motor may run.
 
 use serde::{Deserialize, Serialize};
 
 use crate::supervision::fault::{Cause, Fault};
-use crate::supervision::inhibits::Reasons;
+use crate::supervision::inhibits::Inhibits;
 
 /// State of the supervisor. The motor is off in all of them but [`State::Balancing`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default, Serialize, Deserialize)]
@@ -15,7 +15,7 @@ pub enum State {
     Homing,
     /// Positions are known.
     Calibrated,
-    /// Waiting until all links have been upright and slow for a set time.
+    /// Waiting until all links have been upright and slow for `arm_time_s`.
     Armed,
     /// The controller drives the motor.
     Balancing,
@@ -23,11 +23,13 @@ pub enum State {
     Fault,
 }
 
-/// The state machine, with the first cause of a fault.
+/// The state machine, with the first cause of a fault. Each method is an event.
 ///
 /// ```text
-/// Disarmed ─ begin_homing ─► Homing ─ homed ─► Calibrated ─ arm ─► Armed ─ upright ─► Balancing
-///     └───────────────────── homed ───────────────►│◄── disarm, lost ─┘◄───── disarm ─────┘
+/// Disarmed ─ start_homing ─► Homing ─ complete_homing ─► Calibrated ─ arm ─► Armed ─ start_balancing ─► Balancing
+///     └───────────────────── complete_homing ────────────────►│◄─────────────────┘                          │
+///                                                             │     disarm, cancel_arming                   │
+///                                                             └◄───────────────── disarm ───────────────────┘
 /// any state ─ trip ─► Fault ─ clear ─► Calibrated, or Disarmed if positions are not known
 /// ```
 #[derive(Debug, Clone, Default)]
@@ -38,17 +40,17 @@ pub struct Supervisor {
 }
 
 impl Supervisor {
-    /// The state after a reset: disarmed, with what the reset was caused by.
+    /// The state after a reset: disarmed, with the cause of the reset, if it was a fault.
     pub fn new(cause: Option<Cause>) -> Self {
         Self { cause, ..Self::default() }
     }
 
-    /// The state.
+    /// The current state.
     pub fn state(&self) -> State {
         self.state
     }
 
-    /// The latched fault.
+    /// The latched fault; none in any state but [`State::Fault`].
     pub fn fault(&self) -> Option<Fault> {
         self.cause.filter(|_| self.state == State::Fault).map(|cause| cause.fault)
     }
@@ -58,7 +60,8 @@ impl Supervisor {
         self.cause
     }
 
-    /// Latches `cause` unless there is an earlier fault.
+    /// Latches `cause` unless a fault is latched already: the first cause stays. Faults of the same tick are tripped in
+    /// the order of [`Fault::PRECEDENCE`].
     pub fn trip(&mut self, cause: Cause) {
         if self.state == State::Fault {
             return;
@@ -68,7 +71,7 @@ impl Supervisor {
         self.state = State::Fault;
     }
 
-    /// Turns the motor off, and ends homing.
+    /// Turns the motor off; ends homing.
     pub fn disarm(&mut self) {
         match self.state {
             State::Armed | State::Balancing => self.state = State::Calibrated,
@@ -77,77 +80,77 @@ impl Supervisor {
         }
     }
 
-    /// Begins to look for positions; those known before are forgotten.
+    /// Starts homing by the limit switches; positions known before are forgotten.
     ///
     /// # Errors
-    /// The reasons against it.
-    pub fn begin_homing(&mut self) -> Result<(), Reasons> {
-        self.may_home()?;
+    /// The inhibits that hold.
+    pub fn start_homing(&mut self) -> Result<(), Inhibits> {
+        self.check_homing_allowed()?;
         self.positions_known = false;
         self.state = State::Homing;
         Ok(())
     }
 
-    /// Positions are known from now on.
+    /// Ends homing: positions are known from now on.
     ///
     /// # Errors
-    /// The reasons against it.
-    pub fn homed(&mut self) -> Result<(), Reasons> {
-        self.may_home()?;
+    /// The inhibits that hold.
+    pub fn complete_homing(&mut self) -> Result<(), Inhibits> {
+        self.check_homing_allowed()?;
         self.positions_known = true;
         self.state = State::Calibrated;
         Ok(())
     }
 
-    fn may_home(&self) -> Result<(), Reasons> {
+    fn check_homing_allowed(&self) -> Result<(), Inhibits> {
         match self.state {
             State::Disarmed | State::Homing | State::Calibrated => Ok(()),
-            State::Armed | State::Balancing => Err(Reasons::RUNNING),
-            State::Fault => Err(Reasons::FAULT),
+            State::Armed | State::Balancing => Err(Inhibits::RUNNING),
+            State::Fault => Err(Inhibits::FAULT),
         }
     }
 
-    /// Balance when upright, if nothing of `further` is against it.
+    /// Arms, unless the state or one of `other` inhibits it.
     ///
     /// # Errors
-    /// All reasons against it.
-    pub fn arm(&mut self, further: Reasons) -> Result<(), Reasons> {
-        self.against_arming().and(further).none()?;
+    /// All inhibits that hold.
+    pub fn arm(&mut self, other: Inhibits) -> Result<(), Inhibits> {
+        self.arming_inhibits().union(other).err_if_any()?;
         self.state = State::Armed;
         Ok(())
     }
 
-    /// The reasons against arming that the state gives.
-    pub fn against_arming(&self) -> Reasons {
-        let unknown = Reasons::NOT_HOMED.when(!self.positions_known);
-        unknown.and(match self.state {
-            State::Disarmed | State::Homing | State::Calibrated => Reasons::NONE,
-            State::Armed | State::Balancing => Reasons::RUNNING,
-            State::Fault => Reasons::FAULT,
+    /// Inhibits of arming that follow from the state.
+    pub fn arming_inhibits(&self) -> Inhibits {
+        let unknown = Inhibits::NOT_HOMED.when(!self.positions_known);
+        unknown.union(match self.state {
+            State::Disarmed | State::Homing | State::Calibrated => Inhibits::NONE,
+            State::Armed | State::Balancing => Inhibits::RUNNING,
+            State::Fault => Inhibits::FAULT,
         })
     }
 
-    /// The links have been upright and slow for long enough: balancing begins if armed.
-    pub fn upright(&mut self) {
+    /// Turns the motor on if armed: the links have been upright and slow for long enough.
+    pub fn start_balancing(&mut self) {
         if self.state == State::Armed {
             self.state = State::Balancing;
         }
     }
 
-    /// What arming waits for has become impossible: no longer armed.
-    pub fn lost(&mut self) {
+    /// Ends arming, because the rig no longer stands as it has to: a link has fallen, a limit switch is pressed …
+    pub fn cancel_arming(&mut self) {
         if self.state == State::Armed {
             self.state = State::Calibrated;
         }
     }
 
-    /// Forgets the cause, unless one of `still` holds on.
+    /// Clears a latched fault and its cause, unless one of `inhibits` holds.
     ///
     /// # Errors
-    /// `still`.
-    pub fn clear(&mut self, still: Reasons) -> Result<(), Reasons> {
+    /// `inhibits`.
+    pub fn clear(&mut self, inhibits: Inhibits) -> Result<(), Inhibits> {
         if self.state == State::Fault {
-            still.none()?;
+            inhibits.err_if_any()?;
             self.state = if self.positions_known { State::Calibrated } else { State::Disarmed };
         }
         self.cause = None;
@@ -168,14 +171,14 @@ mod tests {
         Trip,
         TripEncoder,
         Disarm,
-        BeginHoming,
-        Homed,
+        StartHoming,
+        CompleteHoming,
         Arm,
-        ArmAgainst,
-        Upright,
-        Lost,
+        ArmInhibited,
+        StartBalancing,
+        CancelArming,
         Clear,
-        ClearAgainst,
+        ClearInhibited,
     }
 
     fn cause(fault: super::Fault) -> Cause {
@@ -187,20 +190,20 @@ mod tests {
         Supervisor { state, positions_known, cause }
     }
 
-    /// Does it, and whether it was accepted.
-    fn apply(supervisor: &mut Supervisor, event: Event) -> Result<(), Reasons> {
+    /// Applies the event; an error if it is refused.
+    fn apply(supervisor: &mut Supervisor, event: Event) -> Result<(), Inhibits> {
         match event {
             Event::Trip => supervisor.trip(cause(super::Fault::Rail)),
             Event::TripEncoder => supervisor.trip(cause(super::Fault::Encoder)),
             Event::Disarm => supervisor.disarm(),
-            Event::BeginHoming => return supervisor.begin_homing(),
-            Event::Homed => return supervisor.homed(),
-            Event::Arm => return supervisor.arm(Reasons::NONE),
-            Event::ArmAgainst => return supervisor.arm(Reasons::TILTED),
-            Event::Upright => supervisor.upright(),
-            Event::Lost => supervisor.lost(),
-            Event::Clear => return supervisor.clear(Reasons::NONE),
-            Event::ClearAgainst => return supervisor.clear(Reasons::EMERGENCY_STOP),
+            Event::StartHoming => return supervisor.start_homing(),
+            Event::CompleteHoming => return supervisor.complete_homing(),
+            Event::Arm => return supervisor.arm(Inhibits::NONE),
+            Event::ArmInhibited => return supervisor.arm(Inhibits::TILTED),
+            Event::StartBalancing => supervisor.start_balancing(),
+            Event::CancelArming => supervisor.cancel_arming(),
+            Event::Clear => return supervisor.clear(Inhibits::NONE),
+            Event::ClearInhibited => return supervisor.clear(Inhibits::EMERGENCY_STOP),
         }
         Ok(())
     }
@@ -214,9 +217,9 @@ mod tests {
             (Trip, [Fault; 6], &[]),
             (TripEncoder, [Fault; 6], &[]),
             (Disarm, [Disarmed, Disarmed, Calibrated, Calibrated, Calibrated, Fault], &[]),
-            (BeginHoming, [Homing, Homing, Homing, Armed, Balancing, Fault], &[Armed, Balancing, Fault]),
+            (StartHoming, [Homing, Homing, Homing, Armed, Balancing, Fault], &[Armed, Balancing, Fault]),
             (
-                Homed,
+                CompleteHoming,
                 [Calibrated, Calibrated, Calibrated, Armed, Balancing, Fault],
                 &[Armed, Balancing, Fault],
             ),
@@ -225,11 +228,11 @@ mod tests {
                 [Disarmed, Homing, Armed, Armed, Balancing, Fault],
                 &[Disarmed, Homing, Armed, Balancing, Fault],
             ),
-            (ArmAgainst, STATES, &STATES),
-            (Upright, [Disarmed, Homing, Calibrated, Balancing, Balancing, Fault], &[]),
-            (Lost, [Disarmed, Homing, Calibrated, Calibrated, Balancing, Fault], &[]),
+            (ArmInhibited, STATES, &STATES),
+            (StartBalancing, [Disarmed, Homing, Calibrated, Balancing, Balancing, Fault], &[]),
+            (CancelArming, [Disarmed, Homing, Calibrated, Calibrated, Balancing, Fault], &[]),
             (Clear, [Disarmed, Homing, Calibrated, Armed, Balancing, Disarmed], &[]),
-            (ClearAgainst, STATES, &[Fault]),
+            (ClearInhibited, STATES, &[Fault]),
         ];
         for (event, leads_to, refused_in) in table {
             for (from, to) in STATES.into_iter().zip(leads_to) {
@@ -251,9 +254,9 @@ mod tests {
         supervisor.trip(Cause { fault: super::Fault::Angle, tick: 3, sensor: None });
         supervisor.trip(Cause { fault: super::Fault::Rail, tick: 4, sensor: None });
         assert_eq!(supervisor.cause().map(|cause| (cause.fault, cause.tick)), Some((super::Fault::Angle, 3)));
-        assert_eq!(supervisor.clear(Reasons::EMERGENCY_STOP), Err(Reasons::EMERGENCY_STOP));
+        assert_eq!(supervisor.clear(Inhibits::EMERGENCY_STOP), Err(Inhibits::EMERGENCY_STOP));
         assert_eq!(supervisor.fault(), Some(super::Fault::Angle));
-        supervisor.clear(Reasons::NONE).unwrap();
+        supervisor.clear(Inhibits::NONE).unwrap();
         assert_eq!((supervisor.state(), supervisor.cause()), (Calibrated, None));
     }
 
@@ -267,27 +270,27 @@ mod tests {
         ] {
             let mut supervisor = supervisor(state, true);
             supervisor.trip(cause(fault));
-            supervisor.clear(Reasons::NONE).unwrap();
+            supervisor.clear(Inhibits::NONE).unwrap();
             assert_eq!(supervisor.state(), left, "{fault:?} in {state:?}");
         }
     }
 
     #[test]
-    fn all_reasons_against_arming_are_given_at_once() {
+    fn all_inhibits_of_arming_are_given_at_once() {
         let mut supervisor = supervisor(Fault, false);
-        let reasons = supervisor.arm(Reasons::TILTED.and(Reasons::SIGNS)).unwrap_err();
-        let wanted = [Reasons::FAULT, Reasons::NOT_HOMED, Reasons::TILTED, Reasons::SIGNS];
-        assert_eq!(reasons, wanted.into_iter().fold(Reasons::NONE, Reasons::and));
+        let inhibits = supervisor.arm(Inhibits::TILTED.union(Inhibits::SIGNS)).unwrap_err();
+        let wanted = [Inhibits::FAULT, Inhibits::NOT_HOMED, Inhibits::TILTED, Inhibits::SIGNS];
+        assert_eq!(inhibits, wanted.into_iter().fold(Inhibits::NONE, Inhibits::union));
     }
 
     #[test]
-    fn a_reset_by_the_watchdog_starts_disarmed_and_keeps_the_reason() {
+    fn a_reset_by_the_watchdog_starts_disarmed_and_keeps_the_cause() {
         let mut supervisor = Supervisor::new(Some(cause(super::Fault::Watchdog)));
         assert_eq!(supervisor.state(), Disarmed);
         assert_eq!(supervisor.cause().map(|cause| cause.fault), Some(super::Fault::Watchdog));
-        supervisor.homed().unwrap();
+        supervisor.complete_homing().unwrap();
         assert!(supervisor.cause().is_some(), "homing does not forget it");
-        let events: Vec<_> = [Event::Upright, Event::Lost, Event::Disarm].to_vec();
+        let events: Vec<_> = [Event::StartBalancing, Event::CancelArming, Event::Disarm].to_vec();
         for event in events {
             apply(&mut supervisor, event).unwrap();
             assert_eq!(supervisor.state(), Calibrated);

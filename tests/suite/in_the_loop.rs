@@ -10,8 +10,8 @@ use std::process::{Command, Stdio};
 
 use upright::gains::{SENSORS, STATES};
 use upright::protocol::frame::Receiver;
-use upright::protocol::link::MAX_MESSAGE;
 use upright::protocol::message::Message;
+use upright::protocol::serial_link::MAX_MESSAGE;
 use upright::supervision::fault::Fault;
 use upright::supervision::supervisor::State;
 use upright::table::Law;

@@ -137,7 +137,7 @@ fn difference<const NX: usize, const NY: usize>(
         let mut found: Vec<f32> =
             controller.innovation().iter().chain(controller.estimate()).copied().collect();
         controller.predict();
-        found.extend([command.requested, command.applied].iter().chain(controller.estimate()));
+        found.extend([command.requested_n, command.applied_n].iter().chain(controller.estimate()));
         let wanted = plain.tick(*target, counts);
         let differs = found.len() != wanted.len()
             // A term of 0 that is passed over may change the sign of a sum that is 0.

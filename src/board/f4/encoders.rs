@@ -54,7 +54,7 @@ pub(super) fn set_up(rcc: &RCC) {
 }
 
 /// The counters.
-pub(super) fn counts() -> [u32; SENSORS] {
+pub(super) fn raw_counts() -> [u32; SENSORS] {
     let mut counts = [0; SENSORS];
     for (count, &(timer, _)) in counts.iter_mut().zip(&TIMERS) {
         // SAFETY: reading a counter has no effect.

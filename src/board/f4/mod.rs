@@ -71,12 +71,12 @@ impl Board<SENSORS> for Hardware {
     const WIDTHS: [CounterWidth; SENSORS] = encoders::WIDTHS;
 
     fn inputs(&mut self) -> Inputs<SENSORS> {
-        let counts = encoders::counts();
+        let raw_counts = encoders::raw_counts();
         // Forgets that this tick was due.
         let _ = tick_is_due();
         let levels = pins::Levels::read();
         Inputs {
-            counts,
+            raw_counts,
             supply_v: self.supply.volts(),
             contacts: Contacts {
                 limit_low: levels.limit_low(),

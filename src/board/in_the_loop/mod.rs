@@ -17,7 +17,7 @@ use upright::control::encoder::CounterWidth;
 use upright::gains::SENSORS;
 use upright::protocol::frame::{self, Receiver as Frames};
 use upright::protocol::message::Reset;
-use upright::protocol::pins::{MAX_PINS_IN, MAX_PINS_OUT, PinsIn, PinsOut, Sabotage};
+use upright::protocol::simulated_pins::{MAX_PINS_IN, MAX_PINS_OUT, PinsIn, PinsOut, Sabotage};
 
 #[cfg(feature = "in-the-loop")]
 use semihosting::{Channel, Serial, exit, open};

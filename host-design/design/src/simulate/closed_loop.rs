@@ -137,7 +137,7 @@ impl WithSize for Run<'_> {
                 t,
                 target,
                 setpoint: f64::from(controller.law_state().setpoint),
-                requested: f64::from(command.requested),
+                requested: f64::from(command.requested_n),
                 force,
                 state: &before,
                 estimate: &estimate,

@@ -2,7 +2,7 @@
 
 use upright::board::{Inputs, Output};
 use upright::firmware::Firmware;
-use upright::protocol::message::{Answer, Command, Message, Request, Reset, Telemetry};
+use upright::protocol::message::{Answer, Command, Reply, Request, Reset, Telemetry};
 use upright::supervision::detection::Thresholds;
 use upright::supervision::fault::Cause;
 use upright::supervision::supervisor::State;
@@ -45,7 +45,7 @@ pub struct Tick<const NX: usize, const NY: usize> {
     /// What the firmware told, if telemetry was due.
     pub telemetry: Option<Telemetry<NX, NY>>,
     /// What it answered, if it was asked.
-    pub reply: Option<Message<NX, NY>>,
+    pub reply: Option<Reply>,
     /// What went to the motor.
     pub output: Output,
 }
@@ -77,7 +77,7 @@ impl<'t, const NX: usize, const NY: usize> Session<'t, NX, NY> {
             tick: 0,
             commands: 0,
         };
-        if let Some(Message::Reply { answer: Answer::Rejected(rejected), .. }) =
+        if let Some(Reply { answer: Answer::Rejected(rejected), .. }) =
             session.step(Some(Request::Select(scenario.law)), &mut ()).reply
         {
             return Err(rejected.into());
@@ -139,8 +139,11 @@ impl<'t, const NX: usize, const NY: usize> Session<'t, NX, NY> {
         request: Option<Request>,
         interference: &mut impl Interference<NY>,
     ) -> Tick<NX, NY> {
-        let mut inputs =
-            Inputs { counts: self.bench.counters(), supply_v: self.supply_v, contacts: Default::default() };
+        let mut inputs = Inputs {
+            raw_counts: self.bench.counters(),
+            supply_v: self.supply_v,
+            contacts: Default::default(),
+        };
         interference.inputs(self.tick, &mut inputs);
         let mut output = self.firmware.control(&inputs);
         interference.output(self.tick, &mut output);

@@ -47,7 +47,7 @@ impl<const NY: usize> Interference<NY> for Interfering {
     fn inputs(&mut self, tick: u32, inputs: &mut Inputs<NY>) {
         let Some(since) = tick.checked_sub(self.from) else { return };
         let mut add = |sensor: usize, counts: i32| {
-            inputs.counts[sensor] = shown(sensor, inputs.counts[sensor].wrapping_add(counts as u32));
+            inputs.raw_counts[sensor] = shown(sensor, inputs.raw_counts[sensor].wrapping_add(counts as u32));
         };
         match self.defect {
             Defect::OneBad(sensor, counts) if since == 0 => add(sensor, counts),
@@ -55,15 +55,15 @@ impl<const NY: usize> Interference<NY> for Interfering {
             Defect::Jump(sensor, counts) => add(sensor, counts),
             Defect::LosesCounts(sensor, every) => add(sensor, (since / every) as i32),
             Defect::Frozen(sensor) => {
-                inputs.counts[sensor] = *self.frozen.get_or_insert(inputs.counts[sensor]);
+                inputs.raw_counts[sensor] = *self.frozen.get_or_insert(inputs.raw_counts[sensor]);
             }
             Defect::Reversed(sensor) => {
-                inputs.counts[sensor] = shown(sensor, inputs.counts[sensor].wrapping_neg());
+                inputs.raw_counts[sensor] = shown(sensor, inputs.raw_counts[sensor].wrapping_neg());
             }
-            Defect::Swapped(sensor) => inputs.counts.swap(sensor, sensor + 1),
+            Defect::Swapped(sensor) => inputs.raw_counts.swap(sensor, sensor + 1),
             Defect::Late(sensor, ticks) => {
-                self.past.push(inputs.counts[sensor]);
-                inputs.counts[sensor] = self.past[self.past.len().saturating_sub(ticks + 1)];
+                self.past.push(inputs.raw_counts[sensor]);
+                inputs.raw_counts[sensor] = self.past[self.past.len().saturating_sub(ticks + 1)];
             }
             _ => {}
         }

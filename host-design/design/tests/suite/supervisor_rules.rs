@@ -4,9 +4,9 @@ use crate::supervised::{Supervised, rig, run, table};
 use proptest::prelude::*;
 use upright::board::{Contacts, Inputs, Output};
 use upright::control::controller::Rejected;
-use upright::protocol::message::{Answer, Message, Request};
+use upright::protocol::message::{Answer, Request};
 use upright::supervision::fault::Fault;
-use upright::supervision::inhibits::Reasons;
+use upright::supervision::inhibits::Inhibits;
 use upright::supervision::supervisor::State;
 use upright::table::Law;
 use upright_design::simulate::{Interference, Scenario, Session};
@@ -38,7 +38,7 @@ impl<const NY: usize> Interference<NY> for Given {
     fn inputs(&mut self, _: u32, inputs: &mut Inputs<NY>) {
         inputs.contacts = self.contacts;
         inputs.supply_v = self.supply_v.unwrap_or(inputs.supply_v);
-        inputs.counts[1] = inputs.counts[1].wrapping_add(self.counts as u32) & 0xffff;
+        inputs.raw_counts[1] = inputs.raw_counts[1].wrapping_add(self.counts as u32) & 0xffff;
     }
 }
 
@@ -73,11 +73,7 @@ trait Rigged {
 impl<const NX: usize, const NY: usize> Rigged for Bare<'_, NX, NY> {
     fn tick(&mut self, request: Option<Request>) -> (Output, Option<Answer>) {
         let tick = self.session.step(request, &mut self.inputs);
-        let answer = tick.reply.map(|reply| match reply {
-            Message::Reply { answer, .. } => answer,
-            Message::Telemetry(_) => panic!("telemetry is no reply"),
-        });
-        (tick.output, answer)
+        (tick.output, tick.reply.map(|reply| reply.answer))
     }
 
     fn inputs(&mut self) -> &mut Given {
@@ -93,7 +89,7 @@ impl<const NX: usize, const NY: usize> Rigged for Bare<'_, NX, NY> {
     }
 }
 
-fn reasons(answer: Answer) -> Reasons {
+fn reasons(answer: Answer) -> Inhibits {
     match answer {
         Answer::NotNow(reasons) => reasons,
         other => panic!("{other:?}"),
@@ -170,15 +166,15 @@ fn clear_and_arm_are_two_acts_and_a_held_arm_is_none() {
     balancing(|rig| {
         rig.inputs().contacts.driver_fault = true;
         rig.wait(1);
-        assert!(reasons(rig.ask(Request::Arm)).contains(Reasons::FAULT));
-        assert_eq!(reasons(rig.ask(Request::Clear)), Reasons::DRIVER);
+        assert!(reasons(rig.ask(Request::Arm)).contains(Inhibits::FAULT));
+        assert_eq!(reasons(rig.ask(Request::Clear)), Inhibits::DRIVER);
         rig.inputs().contacts.driver_fault = false;
         rig.wait(1);
         assert_eq!(rig.ask(Request::Clear), Answer::Done);
         assert_eq!((rig.state(), rig.fault()), (State::Calibrated, None));
         // The key is still down: for as long as it is, nothing happens.
         for _ in 0..50 {
-            assert!(reasons(rig.ask(Request::Arm)).contains(Reasons::HELD));
+            assert!(reasons(rig.ask(Request::Arm)).contains(Inhibits::HELD));
             rig.wait(100);
         }
         assert_eq!(rig.state(), State::Calibrated);
@@ -198,10 +194,10 @@ fn a_tilted_a_moving_and_a_displaced_rig_are_not_armed_and_all_reasons_are_told(
         rig.inputs().contacts.limit_low = true;
         rig.wait(1);
         let found = reasons(rig.ask(Request::Arm));
-        assert_eq!(found, Reasons::TILTED.and(Reasons::MOVING).and(Reasons::LIMIT_SWITCH), "{found}");
+        assert_eq!(found, Inhibits::TILTED.union(Inhibits::MOVING).union(Inhibits::LIMIT_SWITCH), "{found}");
         rig.wait(200);
         let found = reasons(rig.ask(Request::Arm));
-        assert_eq!(found, Reasons::TILTED.and(Reasons::LIMIT_SWITCH), "{found}");
+        assert_eq!(found, Inhibits::TILTED.union(Inhibits::LIMIT_SWITCH), "{found}");
         rig.inputs().contacts.limit_low = false;
         rig.inputs().counts = 0;
         rig.wait(200);
@@ -225,7 +221,7 @@ fn after_an_encoder_fault_home_and_check_again() {
         assert_eq!(rig.ask(Request::Clear), Answer::Done);
         assert_eq!(rig.state(), State::Disarmed);
         let reasons = reasons(rig.ask(Request::Arm));
-        assert!(reasons.contains(Reasons::NOT_HOMED.and(Reasons::SIGNS)), "{reasons}");
+        assert!(reasons.contains(Inhibits::NOT_HOMED.union(Inhibits::SIGNS)), "{reasons}");
     });
 }
 
@@ -235,7 +231,7 @@ fn disarming_turns_the_motor_off_and_keeps_the_positions() {
         assert_eq!(rig.ask(Request::Disarm), Answer::Done);
         assert_eq!(rig.ticks_to_off(1), Some(1));
         assert_eq!((rig.state(), rig.fault()), (State::Calibrated, None));
-        assert!(reasons(rig.ask(Request::Home)).contains(Reasons::MOVING), "still for a tick only");
+        assert!(reasons(rig.ask(Request::Home)).contains(Inhibits::MOVING), "still for a tick only");
     });
 }
 

@@ -5,7 +5,7 @@ use std::path::Path;
 use upright::board::Output;
 use upright::protocol::message::{Answer, Request};
 use upright::supervision::fault::Fault;
-use upright::supervision::inhibits::Reasons;
+use upright::supervision::inhibits::Inhibits;
 use upright::supervision::sign_check::Signs;
 
 use super::defect::{Expected, Kind};
@@ -45,8 +45,8 @@ pub(super) struct Seen {
     pub(super) fault: Option<Fault>,
     /// Measurements that were rejected.
     pub(super) rejected: u32,
-    /// Reasons against arming.
-    pub(super) refused: Option<Reasons>,
+    /// Inhibits against arming.
+    pub(super) refused: Option<Inhibits>,
     /// Whether the firmware has stopped running.
     pub(super) dead: bool,
 }

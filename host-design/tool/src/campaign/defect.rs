@@ -1,8 +1,8 @@
 //! What can go wrong, and what has to come of it.
 
-use upright::protocol::pins::Sabotage;
+use upright::protocol::simulated_pins::Sabotage;
 use upright::supervision::fault::Fault;
-use upright::supervision::inhibits::Reasons;
+use upright::supervision::inhibits::Inhibits;
 
 /// A kind of defect.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, serde::Serialize)]
@@ -64,7 +64,7 @@ pub enum Expected {
     /// Whatever the firmware does, links and cart stay within their limits until the motor is off.
     Bounded,
     /// The firmware refuses to arm, for these reasons at least.
-    Refused(Reasons),
+    Refused(Inhibits),
     /// The motor is off in the same tick, and the firmware does not run on.
     Dead,
 }
@@ -151,19 +151,19 @@ impl Kind {
             (Kind::Rubbish, "rubbish", "random bytes on the serial line", Ignored),
             (Kind::SetpointNotANumber, "setpoint-not-a-number", "a set-point that is not finite", Ignored),
             (Kind::SetpointOutOfRange, "setpoint-out-of-range", "a set-point beyond the rail", Ignored),
-            (Kind::ArmUnhomed, "arm-unhomed", "arming before homing", Refused(Reasons::NOT_HOMED)),
-            (Kind::ArmHanging, "arm-hanging", "arming while the links hang", Refused(Reasons::TILTED)),
+            (Kind::ArmUnhomed, "arm-unhomed", "arming before homing", Refused(Inhibits::NOT_HOMED)),
+            (Kind::ArmHanging, "arm-hanging", "arming while the links hang", Refused(Inhibits::TILTED)),
             (
                 Kind::ArmStopped,
                 "arm-stopped",
                 "arming with the emergency stop pressed",
-                Refused(Reasons::FAULT.and(Reasons::EMERGENCY_STOP)),
+                Refused(Inhibits::FAULT.union(Inhibits::EMERGENCY_STOP)),
             ),
             (
                 Kind::ArmHeld,
                 "arm-held",
                 "an arm command that is held while a fault is cleared",
-                Refused(Reasons::HELD),
+                Refused(Inhibits::HELD),
             ),
             (Kind::Panic, "panic", "the firmware panics", Dead),
             (Kind::HardFault, "hard-fault", "the firmware touches memory that is not there", Dead),

@@ -6,8 +6,8 @@ use upright::board::{Inputs, Output};
 use upright::control::actuator::Drive;
 use upright::control::encoder::CounterWidth;
 use upright::protocol::frame;
-use upright::protocol::link::MAX_COMMAND;
 use upright::protocol::message::{Command, Request};
+use upright::protocol::serial_link::MAX_COMMAND;
 
 use super::defect::Kind;
 use super::trial::Trial;
@@ -68,7 +68,7 @@ impl<'a, const NY: usize> Injection<'a, NY> {
     /// Changes what the firmware reads, `since` ticks after the onset; whether it could be told from a healthy rig.
     pub(super) fn inputs(&mut self, since: usize, inputs: &mut Inputs<NY>) -> bool {
         let Trial { kind, sensor, sign, size, .. } = *self.trial;
-        let truth = inputs.counts;
+        let truth = inputs.raw_counts;
         let began = *self.at_onset.get_or_insert(truth);
         self.past.push(truth);
         let contacts = &mut inputs.contacts;
@@ -104,7 +104,7 @@ impl<'a, const NY: usize> Injection<'a, NY> {
             Kind::SensorLate => {
                 let late = 1 + (19.0 * size) as usize;
                 let then = self.past[self.past.len().saturating_sub(1 + late)][sensor];
-                inputs.counts[sensor] = then;
+                inputs.raw_counts[sensor] = then;
                 return (signed(sensor, truth[sensor].wrapping_sub(then))).abs()
                     > self.visible_counts[sensor];
             }
@@ -115,7 +115,7 @@ impl<'a, const NY: usize> Injection<'a, NY> {
             let counter = in_width(sensor, counter);
             let wrong = signed(sensor, counter.wrapping_sub(truth[sensor]));
             visible |= wrong.abs() > self.visible_counts[sensor];
-            inputs.counts[sensor] = counter;
+            inputs.raw_counts[sensor] = counter;
         }
         visible
     }
@@ -168,7 +168,7 @@ impl<'a, const NY: usize> Injection<'a, NY> {
             Kind::FrameTruncated => {
                 let left = self.random.random_range(1..next.len() - 1);
                 next.truncate(left);
-                next.push(frame::END);
+                next.push(frame::DELIMITER);
                 session.send_bytes(&next);
             }
             Kind::FrameReplayed => {
@@ -178,7 +178,7 @@ impl<'a, const NY: usize> Injection<'a, NY> {
                 let mut rubbish: Vec<u8> =
                     (0..self.random.random_range(1..60)).map(|_| self.random.random()).collect();
                 // What follows has to be read again.
-                rubbish.push(frame::END);
+                rubbish.push(frame::DELIMITER);
                 session.send_bytes(&rubbish);
             }
             Kind::SetpointNotANumber => {

@@ -5,9 +5,9 @@ use upright::board::{Board, Inputs, Output};
 use upright::control::encoder::CounterWidth;
 use upright::firmware::Firmware;
 use upright::firmware::control_task::{COMMANDS, ControlTask, MESSAGES};
-use upright::protocol::link::Link;
 use upright::protocol::message::{Command, Message, Reset};
-use upright::protocol::pins::PinsIn;
+use upright::protocol::serial_link::SerialLink;
+use upright::protocol::simulated_pins::PinsIn;
 use upright::table::{Build, GainTable};
 
 use super::target::{Target, TargetError};
@@ -16,7 +16,7 @@ use upright_design::simulate::Bench;
 /// The image's tasks without an image.
 pub struct InProcess<'q, 't, const NX: usize, const NY: usize> {
     control: ControlTask<'q, 't, Wires<NY>, NX, NY>,
-    link: Link<'q, NX, NY>,
+    link: SerialLink<'q, NX, NY>,
     /// On the serial line: the host hears of a tick with the next one, as from an image.
     sent: Vec<u8>,
     /// Nobody takes bytes from the serial line from so many ticks after the first with the motor on: its buffers fill up.
@@ -75,10 +75,10 @@ impl<'q, 't, const NX: usize, const NY: usize> InProcess<'q, 't, NX, NY> {
         let (messages, to_link) = queues.messages.split();
         let contacts = Default::default();
         let wires =
-            Wires { inputs: Inputs { counts: [0; NY], supply_v: 0.0, contacts }, output: Output::OFF };
+            Wires { inputs: Inputs { raw_counts: [0; NY], supply_v: 0.0, contacts }, output: Output::OFF };
         Ok(Self {
             control: ControlTask::new(firmware, wires, commands, messages),
-            link: Link::new(to_control, to_link),
+            link: SerialLink::new(to_control, to_link),
             sent: Vec::new(),
             stuck_from: None,
             ticks_on: 0,

@@ -11,7 +11,7 @@ use rustix::fs::{Mode, OFlags};
 use tempfile::TempDir;
 use upright::board::Output;
 use upright::protocol::frame::{self, Receiver};
-use upright::protocol::pins::{MAX_PINS_IN, MAX_PINS_OUT, PinsIn, PinsOut};
+use upright::protocol::simulated_pins::{MAX_PINS_IN, MAX_PINS_OUT, PinsIn, PinsOut};
 
 use super::target::{Target, TargetError};
 

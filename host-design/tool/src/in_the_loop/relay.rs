@@ -6,7 +6,7 @@ use std::net::{TcpListener, TcpStream};
 use std::time::{Duration, Instant};
 
 use upright::board::Output;
-use upright::protocol::pins::PinsIn;
+use upright::protocol::simulated_pins::PinsIn;
 
 use super::in_process::{InProcess, Queues};
 use super::qemu::Emulator;

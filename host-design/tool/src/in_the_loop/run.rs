@@ -249,8 +249,8 @@ impl Record {
             self.trace.push(&Sample {
                 t,
                 target,
-                setpoint: f64::from(telemetry.setpoint),
-                requested: f64::from(telemetry.requested),
+                setpoint: f64::from(telemetry.setpoint_m),
+                requested: f64::from(telemetry.requested_n),
                 force,
                 state: &state,
                 estimate: &estimate,
@@ -264,7 +264,7 @@ impl Record {
 impl Tick {
     fn of<const NX: usize, const NY: usize>(telemetry: &Telemetry<NX, NY>, output: &Output) -> Self {
         let values = telemetry.estimate.iter().chain(&telemetry.innovation);
-        let bits = values.chain([&telemetry.setpoint, &telemetry.requested, &telemetry.applied]);
+        let bits = values.chain([&telemetry.setpoint_m, &telemetry.requested_n, &telemetry.applied_n]);
         Self { output: *output, state: telemetry.state, bits: bits.map(|value| value.to_bits()).collect() }
     }
 }

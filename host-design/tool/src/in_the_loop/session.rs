@@ -4,9 +4,9 @@ use std::collections::VecDeque;
 
 use upright::board::{Inputs, Output};
 use upright::protocol::frame::{self, Receiver};
-use upright::protocol::link::{MAX_COMMAND, MAX_MESSAGE};
-use upright::protocol::message::{Answer, Command, Info, Message, PROTOCOL, Request, Telemetry};
-use upright::protocol::pins::{PinsIn, Sabotage};
+use upright::protocol::message::{Answer, Command, Info, Message, PROTOCOL, Reply, Request, Telemetry};
+use upright::protocol::serial_link::{MAX_COMMAND, MAX_MESSAGE};
+use upright::protocol::simulated_pins::{PinsIn, Sabotage};
 use upright::supervision::fault::Fault;
 use upright::supervision::sign_check::Signs;
 use upright::supervision::supervisor::State;
@@ -134,7 +134,7 @@ impl<'a, const NX: usize, const NY: usize> Session<'a, NX, NY> {
                     self.seen = Seen { state: telemetry.state, signs: telemetry.signs };
                     self.telemetry.push_back(telemetry);
                 }
-                Some(Ok(Message::Reply { id, answer })) => self.replies.push_back((id, answer)),
+                Some(Ok(Message::Reply(Reply { id, answer }))) => self.replies.push_back((id, answer)),
                 Some(Err(_)) => self.damaged += 1,
                 None => (),
             }

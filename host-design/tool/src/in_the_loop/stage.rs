@@ -50,7 +50,7 @@ impl<'a, const NX: usize, const NY: usize> Stage<'a, NX, NY> {
 
     /// What a healthy board reads now.
     pub fn inputs(&self) -> Inputs<NY> {
-        Inputs { counts: self.bench.counters(), supply_v: self.supply_v, contacts: Contacts::default() }
+        Inputs { raw_counts: self.bench.counters(), supply_v: self.supply_v, contacts: Contacts::default() }
     }
 
     /// One tick in which the hand does what comes next; the output of the firmware.

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use upright::board::Output;
 use upright::protocol::frame::FrameError;
-use upright::protocol::pins::PinsIn;
+use upright::protocol::simulated_pins::PinsIn;
 use upright::table::TableError;
 
 /// The firmware with `NY` encoders, wherever it runs.

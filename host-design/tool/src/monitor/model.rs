@@ -4,8 +4,10 @@ use std::collections::VecDeque;
 use std::time::Duration;
 
 use upright::protocol::frame::{self, Receiver};
-use upright::protocol::link::{MAX_COMMAND, MAX_MESSAGE};
-use upright::protocol::message::{Answer, Command, Info, Message, PROTOCOL, Request, Statistics, Telemetry};
+use upright::protocol::message::{
+    Answer, Command, Info, Message, PROTOCOL, Reply, Request, Statistics, Telemetry,
+};
+use upright::protocol::serial_link::{MAX_COMMAND, MAX_MESSAGE};
 use upright::supervision::fault::Cause;
 use upright::table::Law;
 
@@ -53,8 +55,6 @@ pub struct Monitor {
     pub log: VecDeque<String>,
     /// Telemetry of the last 10 s.
     pub history: VecDeque<TelemetryOfAny>,
-    /// The law that was selected here; none if none was.
-    pub law: Option<Law>,
     /// The set-point commanded here (m); none if none is.
     pub wanted: Option<f32>,
     /// The file of the recording, if one is written.
@@ -83,7 +83,6 @@ impl Monitor {
             cause: None,
             log: VecDeque::new(),
             history: VecDeque::new(),
-            law: None,
             wanted: None,
             recording: None,
             unreadable: 0,
@@ -107,7 +106,7 @@ impl Monitor {
                     self.take(telemetry.clone(), now);
                     all.push(telemetry);
                 }
-                Some(Ok(Message::Reply { id, answer })) => self.answered(id, answer, now),
+                Some(Ok(Message::Reply(Reply { id, answer }))) => self.answered(id, answer, now),
                 Some(Err(_)) => self.unreadable = self.unreadable.saturating_add(1),
                 // Telemetry before the firmware has said which messages it speaks may mean anything.
                 Some(Ok(Message::Telemetry(_))) | None => (),
@@ -157,10 +156,6 @@ impl Monitor {
             Answer::Statistics(statistics) => self.statistics = Some(statistics),
             Answer::Done => match request {
                 Request::Beat | Request::Telemetry(_) => (),
-                Request::Select(law) => {
-                    self.law = Some(law);
-                    self.note(format!("{}: done", name(request)));
-                }
                 _ => self.note(format!("{}: done", name(request))),
             },
             Answer::NotNow(_) if request == Request::Beat => (),
@@ -191,13 +186,15 @@ impl Monitor {
         let request = match action {
             Action::Send(request) => request,
             Action::Shift(by) => {
-                let governed = self.telemetry.as_ref().map_or(0.0, |telemetry| telemetry.setpoint);
+                let governed = self.telemetry.as_ref().map_or(0.0, |telemetry| telemetry.setpoint_m);
                 Request::Setpoint(self.wanted.unwrap_or(governed) + by)
             }
-            Action::OtherLaw => Request::Select(match self.law {
-                None | Some(Law::Lqr) => Law::PolePlacement,
-                Some(Law::PolePlacement) => Law::Lqr,
-            }),
+            Action::OtherLaw => {
+                Request::Select(match self.telemetry.as_ref().map(|telemetry| telemetry.law) {
+                    None | Some(Law::Lqr) => Law::PolePlacement,
+                    Some(Law::PolePlacement) => Law::Lqr,
+                })
+            }
             Action::Record | Action::Quit => return,
         };
         if let Request::Setpoint(wanted) = request {

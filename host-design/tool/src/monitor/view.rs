@@ -71,8 +71,8 @@ fn header(monitor: &Monitor) -> Vec<Line<'_>> {
         return lines;
     };
     let [major, minor, patch] = info.version;
-    let law = match monitor.law {
-        None => "as started",
+    let law = match monitor.telemetry.as_ref().map(|telemetry| telemetry.law) {
+        None => "not known yet",
         Some(Law::Lqr) => "LQR",
         Some(Law::PolePlacement) => "pole placement",
     };
@@ -108,8 +108,8 @@ fn header(monitor: &Monitor) -> Vec<Line<'_>> {
         lines.push(Line::from(format!("before: {}; {}", cause.fault, cause.fault.entry().remedy)));
     }
     lines.extend(by_hand(telemetry).map(|what| Line::from(format!("now: {what}")).yellow()));
-    if telemetry.state != State::Balancing && !telemetry.against.is_empty() {
-        lines.push(Line::from(format!("against arming: {}", telemetry.against)));
+    if telemetry.state != State::Balancing && !telemetry.arming_inhibits.is_empty() {
+        lines.push(Line::from(format!("against arming: {}", telemetry.arming_inhibits)));
     }
     lines
 }
@@ -172,10 +172,10 @@ fn force_and_timing(monitor: &Monitor) -> Vec<Line<'_>> {
     let mut lines = Vec::new();
     if let Some(telemetry) = &monitor.telemetry {
         let wanted = monitor.wanted.map_or("-".to_owned(), |wanted| format!("{wanted:.3}"));
-        lines.push(Line::from(format!("set-point {:.3} m, wanted {wanted}", telemetry.setpoint)));
+        lines.push(Line::from(format!("set-point {:.3} m, wanted {wanted}", telemetry.setpoint_m)));
         lines.push(Line::from(format!(
             "force {:.2} N, applied {:.2} N",
-            telemetry.requested, telemetry.applied
+            telemetry.requested_n, telemetry.applied_n
         )));
         lines.push(Line::from(format!("drive {:>7.3} {}", telemetry.drive, bar(telemetry.drive))));
         let worst = monitor.statistics.map_or("-".to_owned(), |all| all.worst_cycles.to_string());
@@ -213,8 +213,9 @@ fn draw_charts(monitor: &Monitor, frame: &mut Frame<'_>, area: Rect) {
     let angles = (1..last.counts.len().min(last.estimate.len() / 2))
         .map(|i| series(&|telemetry| telemetry.estimate.get(2 * i).copied()))
         .collect();
-    let cart = vec![series(&|telemetry| telemetry.estimate.first().copied()), series(&|t| Some(t.setpoint))];
-    let force = vec![series(&|telemetry| Some(telemetry.applied))];
+    let cart =
+        vec![series(&|telemetry| telemetry.estimate.first().copied()), series(&|t| Some(t.setpoint_m))];
+    let force = vec![series(&|telemetry| Some(telemetry.applied_n))];
     let areas: [Rect; 3] = Layout::horizontal([Constraint::Fill(1); 3]).areas(area);
     let charts = [(" cart, set-point (m) ", cart), (" angles (rad) ", angles), (" force (N) ", force)];
     for (area, (title, lines)) in areas.into_iter().zip(charts) {

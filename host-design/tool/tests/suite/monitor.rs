@@ -13,13 +13,13 @@ use ratatui::crossterm::event::{KeyCode, KeyEvent, KeyModifiers};
 use serde::Serialize;
 use serde_json::Value;
 use upright::protocol::frame::{self, Receiver};
-use upright::protocol::link::MAX_COMMAND;
 use upright::protocol::message::{
-    Answer, Command as Asked, Info, Message, PROTOCOL, Request, Reset, Telemetry,
+    Answer, Command as Asked, Info, Message, PROTOCOL, Reply, Request, Reset, Telemetry,
 };
+use upright::protocol::serial_link::MAX_COMMAND;
 use upright::supervision::fault::Fault;
 use upright::supervision::homing::Homing;
-use upright::supervision::inhibits::Reasons;
+use upright::supervision::inhibits::Inhibits;
 use upright::supervision::sign_check::Signs;
 use upright::supervision::supervisor::State;
 use upright::table::Law;
@@ -40,17 +40,18 @@ fn telemetry(tick: u32, state: State, fault: Option<Fault>) -> Telemetry<10, 5> 
     Telemetry {
         tick,
         state,
+        law: Law::Lqr,
         fault,
         cause_tick: 7,
         homing: Homing::Homed,
         signs: Signs::Checked,
-        against: if fault.is_some() { Reasons::FAULT } else { Reasons::NONE },
+        arming_inhibits: if fault.is_some() { Inhibits::FAULT } else { Inhibits::NONE },
         counts: List::from_slice(&[1, -2, 3, -4, 5]).unwrap(),
         estimate: List::from_slice(&[0.125, 0.0, 0.01, 0.0, 0.02, 0.0, -0.01, 0.0, 0.005, -0.5]).unwrap(),
         innovation: List::from_slice(&[0.0; 5]).unwrap(),
-        setpoint: 0.05,
-        requested: 3.5,
-        applied: 3.25,
+        setpoint_m: 0.05,
+        requested_n: 3.5,
+        applied_n: 3.25,
         drive: 0.5,
         cycles: 1234,
     }
@@ -68,7 +69,7 @@ fn asked(monitor: &mut Monitor) -> Vec<Asked> {
 }
 
 fn answer(monitor: &mut Monitor, id: u64, answer: Answer) {
-    monitor.receive(&framed(&Message::<10, 5>::Reply { id, answer }), NOW);
+    monitor.receive(&framed(&Message::<10, 5>::Reply(Reply { id, answer })), NOW);
 }
 
 fn met(protocol: u8) -> Monitor {
@@ -111,12 +112,21 @@ fn the_screen_shows_state_fault_and_remedy() {
     }
     let healthy = screen(&monitor);
     println!("{healthy}");
-    for words in
-        ["balancing", "1.2.3", "000000000000abcd", "0.1250 m", "link 4", "applied 3.25 N", "cycles 1234"]
-    {
+    for words in [
+        "balancing",
+        "1.2.3",
+        "000000000000abcd",
+        "0.1250 m",
+        "link 4",
+        "applied 3.25 N",
+        "cycles 1234",
+        "law LQR",
+    ] {
         assert!(healthy.contains(words), "{words}\n{healthy}");
     }
     assert!(!healthy.contains("remedy"));
+    told(&mut monitor, Telemetry { law: Law::PolePlacement, ..telemetry(3990, State::Calibrated, None) });
+    assert!(screen(&monitor).contains("law pole placement"));
     told(&mut monitor, telemetry(4000, State::Fault, Some(Fault::EmergencyStop)));
     let faulty = screen(&monitor);
     println!("{faulty}");
@@ -173,9 +183,9 @@ fn a_refusal_is_shown_with_all_reasons() {
     asked(&mut monitor);
     monitor.act(action(&KeyEvent::new(KeyCode::Char('a'), KeyModifiers::NONE)).unwrap(), NOW);
     let id = asked(&mut monitor)[0].id;
-    answer(&mut monitor, id + 1, Answer::NotNow(Reasons::TILTED));
+    answer(&mut monitor, id + 1, Answer::NotNow(Inhibits::TILTED));
     assert!(!screen(&monitor).contains("refused"), "that answers another command");
-    answer(&mut monitor, id, Answer::NotNow(Reasons::TILTED.and(Reasons::NOT_HOMED)));
+    answer(&mut monitor, id, Answer::NotNow(Inhibits::TILTED.union(Inhibits::NOT_HOMED)));
     let shown = screen(&monitor);
     assert!(shown.contains("arm: refused") && shown.contains("not upright") && shown.contains("home first"));
 }

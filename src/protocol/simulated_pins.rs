@@ -1,4 +1,4 @@
-//! The pins of a simulated rig: what takes the place of the wires when an image runs in the loop.
+//! Simulated pins: the messages that replace the wires to the rig when an image runs in the loop with a simulation.
 
 use heapless::Vec;
 use serde::{Deserialize, Serialize};
@@ -16,43 +16,43 @@ pub const MAX_PINS_OUT: usize = 32;
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct PinsIn<const NY: usize> {
     /// Raw encoder counters.
-    pub counts: Vec<u32, NY>,
+    pub raw_counts: Vec<u32, NY>,
     /// Supply voltage (V).
     pub supply_v: f32,
     /// Contacts and flags.
     pub contacts: Contacts,
-    /// What arrives on the serial line during this tick.
+    /// Bytes that arrive on the serial line during this tick.
     pub received: Vec<u8, BYTES_PER_TICK>,
-    /// What goes wrong in this tick.
+    /// Fault injected in this tick.
     pub sabotage: Option<Sabotage>,
 }
 
-/// What can only go wrong inside the microcontroller.
+/// Fault injection inside the microcontroller, which no input could cause.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Sabotage {
     /// A panic.
     Panic,
-    /// An access to an address that does not exist.
+    /// A processor fault: access to an address that does not exist.
     HardFault,
-    /// A recursion without end.
+    /// Endless recursion.
     StackOverflow,
 }
 
 /// Image to host: the output of one tick.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct PinsOut {
-    /// The output.
+    /// What the motor is driven with.
     pub output: Output,
-    /// Bytes that were sent over the serial line before this tick. A host that reads just these hears the same in every
-    /// run, however fast it is.
+    /// Number of bytes sent over the serial line before this tick. A host that reads just these gets the same data at the
+    /// same tick in every run, however fast it is.
     pub sent: u32,
 }
 
 impl<const NY: usize> PinsIn<NY> {
-    /// The inputs of a tick without commands and without sabotage.
+    /// These inputs, with nothing on the serial line and no injected fault.
     pub fn of(inputs: &Inputs<NY>) -> Self {
         Self {
-            counts: Vec::from_array(inputs.counts),
+            raw_counts: Vec::from_array(inputs.raw_counts),
             supply_v: inputs.supply_v,
             contacts: inputs.contacts,
             received: Vec::new(),
@@ -60,9 +60,9 @@ impl<const NY: usize> PinsIn<NY> {
         }
     }
 
-    /// What the firmware reads; none if the number of counters is another one.
+    /// The inputs that the firmware reads; none if the number of counters is not `NY`.
     pub fn inputs(&self) -> Option<Inputs<NY>> {
-        let counts = self.counts.as_slice().try_into().ok()?;
-        Some(Inputs { counts, supply_v: self.supply_v, contacts: self.contacts })
+        let raw_counts = self.raw_counts.as_slice().try_into().ok()?;
+        Some(Inputs { raw_counts, supply_v: self.supply_v, contacts: self.contacts })
     }
 }

@@ -1,30 +1,36 @@
-//! Conditions that may last a while before they are faults: counted, tick by tick.
+//! Conditions that become a fault only after they have held for a number of ticks in a row.
+//!
+//! A new fault with a time limit gets a counter here; its time belongs to [`Limits`].
 
 use crate::board::Inputs;
 use crate::supervision::fault::Fault;
 use crate::table::limits::Limits;
 
-/// So many overruns in a row are a fault.
+/// This many overruns in a row are a fault.
 const OVERRUNS: u32 = 3;
 
-/// For how many ticks in a row each condition has held.
+/// Number of ticks in a row for which each condition has held.
 #[derive(Debug, Clone, Copy, Default)]
-pub struct Watch {
+pub struct Debounce {
     supply: u32,
     overruns: u32,
     saturated: u32,
-    silent: u32,
+    link_silent: u32,
 }
 
-impl Watch {
-    /// Balancing begins: nothing counts from before.
+impl Debounce {
+    /// Clears all counters: balancing starts.
     pub fn start(&mut self) {
         *self = Self::default();
     }
 
-    /// Looks at the inputs of a tick while balancing.
+    /// Checks the inputs of a tick while balancing: limit switches, then the supply, then overruns.
     #[inline]
-    pub fn inputs<const NY: usize>(&mut self, limits: &Limits<NY>, inputs: &Inputs<NY>) -> Option<Fault> {
+    pub fn check_inputs<const NY: usize>(
+        &mut self,
+        limits: &Limits<NY>,
+        inputs: &Inputs<NY>,
+    ) -> Option<Fault> {
         let contacts = &inputs.contacts;
         count(&mut self.overruns, contacts.overrun);
         count(&mut self.supply, inputs.supply_v < limits.supply_min_v);
@@ -41,23 +47,23 @@ impl Watch {
         }
     }
 
-    /// Looks at the force of a tick: whether the law asked for more than there is.
+    /// Checks the force of a tick; `limited` says that the law asked for more than there is.
     #[inline]
-    pub fn force<const NY: usize>(&mut self, limits: &Limits<NY>, limited: bool) -> Option<Fault> {
+    pub fn check_force<const NY: usize>(&mut self, limits: &Limits<NY>, limited: bool) -> Option<Fault> {
         count(&mut self.saturated, limited);
         (self.saturated > limits.saturated_ticks).then_some(Fault::Saturated)
     }
 
-    /// Ends a tick: whether a command has come, and whether the host commands the set-point.
+    /// Checks the link at the end of a tick: whether a command was received, and whether the host commands the set-point.
     #[inline]
-    pub fn link<const NY: usize>(
+    pub fn check_link<const NY: usize>(
         &mut self,
         limits: &Limits<NY>,
-        heard: bool,
-        commanded: bool,
+        received: bool,
+        setpoint_commanded: bool,
     ) -> Option<Fault> {
-        count(&mut self.silent, !heard);
-        (commanded && self.silent >= limits.link_ticks).then_some(Fault::LinkLost)
+        count(&mut self.link_silent, !received);
+        (setpoint_commanded && self.link_silent >= limits.link_ticks).then_some(Fault::LinkLost)
     }
 }
 
@@ -73,7 +79,7 @@ mod tests {
     const LIMITS: Limits<1> =
         Limits { supply_min_v: 9.0, supply_ticks: 4, saturated_ticks: 5, link_ticks: 6, ..Limits::none() };
     const GOOD: Inputs<1> = Inputs {
-        counts: [0],
+        raw_counts: [0],
         supply_v: 12.0,
         contacts: Contacts {
             limit_low: false,
@@ -87,8 +93,8 @@ mod tests {
 
     /// The tick in which it becomes a fault.
     fn tick_of(inputs: Inputs<1>) -> Option<(usize, Fault)> {
-        let mut watch = Watch::default();
-        (1..100).find_map(|tick| watch.inputs(&LIMITS, &inputs).map(|fault| (tick, fault)))
+        let mut debounce = Debounce::default();
+        (1..100).find_map(|tick| debounce.check_inputs(&LIMITS, &inputs).map(|fault| (tick, fault)))
     }
 
     #[test]
@@ -107,27 +113,27 @@ mod tests {
     }
 
     #[test]
-    fn what_is_interrupted_starts_anew() {
-        let mut watch = Watch::default();
+    fn an_interrupted_condition_counts_from_0_again() {
+        let mut debounce = Debounce::default();
         for tick in 0..100 {
             let mut inputs = GOOD;
             inputs.contacts.overrun = tick % 3 != 0;
             inputs.supply_v = if tick % 5 == 0 { 12.0 } else { 5.0 };
-            assert_eq!(watch.inputs(&LIMITS, &inputs), None);
-            assert_eq!(watch.force(&LIMITS, tick % 6 != 0), None);
-            assert_eq!(watch.link(&LIMITS, tick % 6 == 0, true), None);
+            assert_eq!(debounce.check_inputs(&LIMITS, &inputs), None);
+            assert_eq!(debounce.check_force(&LIMITS, tick % 6 != 0), None);
+            assert_eq!(debounce.check_link(&LIMITS, tick % 6 == 0, true), None);
         }
     }
 
     #[test]
     fn saturation_and_silence_have_their_times() {
-        let mut watch = Watch::default();
+        let mut debounce = Debounce::default();
         let first = |found: &mut dyn FnMut() -> Option<Fault>| {
             (1..100).find_map(|tick| found().map(|fault| (tick, fault)))
         };
-        assert_eq!(first(&mut || watch.force(&LIMITS, true)), Some((6, Fault::Saturated)));
-        assert_eq!(first(&mut || watch.link(&LIMITS, false, true)), Some((6, Fault::LinkLost)));
-        let mut watch = Watch::default();
-        assert_eq!(first(&mut || watch.link(&LIMITS, false, false)), None);
+        assert_eq!(first(&mut || debounce.check_force(&LIMITS, true)), Some((6, Fault::Saturated)));
+        assert_eq!(first(&mut || debounce.check_link(&LIMITS, false, true)), Some((6, Fault::LinkLost)));
+        let mut debounce = Debounce::default();
+        assert_eq!(first(&mut || debounce.check_link(&LIMITS, false, false)), None);
     }
 }

@@ -1,0 +1,47 @@
+//! Telemetry: when it is sent, and what is in it.
+
+use heapless::Vec;
+
+use super::Firmware;
+use crate::control::actuator::Drive;
+use crate::protocol::message::Telemetry;
+
+impl<const NX: usize, const NY: usize> Firmware<'_, NX, NY> {
+    /// Counts a message that found its queue full.
+    pub fn message_dropped(&mut self) {
+        self.statistics.dropped = self.statistics.dropped.saturating_add(1);
+    }
+
+    /// Whether telemetry is sent in this tick; counts the ticks.
+    pub(super) fn telemetry_is_due(&mut self) -> bool {
+        if self.ticks_to_telemetry > 0 {
+            self.ticks_to_telemetry -= 1;
+            return false;
+        }
+        self.ticks_to_telemetry = self.telemetry_period_ticks.saturating_sub(1);
+        self.telemetry_period_ticks > 0
+    }
+
+    /// The telemetry of this tick.
+    pub(super) fn telemetry(&self) -> Telemetry<NX, NY> {
+        let (Drive::Force(drive) | Drive::Duty(drive)) = self.output.drive;
+        Telemetry {
+            tick: self.tick,
+            state: self.supervisor.state(),
+            law: self.controller.law(),
+            fault: self.supervisor.fault(),
+            cause_tick: self.supervisor.cause().map_or(0, |cause| cause.tick),
+            homing: self.calibration.homing(),
+            signs: self.calibration.signs(),
+            arming_inhibits: self.arming_inhibits(),
+            counts: Vec::from_slice(self.controller.encoders().counts()).unwrap_or_default(),
+            estimate: Vec::from_slice(self.controller.estimate().as_slice()).unwrap_or_default(),
+            innovation: Vec::from_slice(self.controller.innovation().as_slice()).unwrap_or_default(),
+            setpoint_m: self.controller.law_state().setpoint,
+            requested_n: self.requested_n,
+            applied_n: self.applied_n,
+            drive,
+            cycles: self.cycles,
+        }
+    }
+}

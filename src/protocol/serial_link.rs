@@ -1,0 +1,114 @@
+//! The serial link, below the control task: bytes to commands, telemetry and replies to bytes.
+//!
+//! Control task and serial link share only two single-producer, single-consumer queues, so neither ever waits for the
+//! other: there is no lock, and what finds its queue full is dropped.
+
+use heapless::spsc::{Consumer, Producer};
+use serde::Serialize;
+
+use crate::protocol::frame::{self, Receiver};
+use crate::protocol::message::{Answer, Command, Message, Reply};
+use crate::protocol::queue;
+
+/// Longest frame from the host (bytes).
+pub const MAX_COMMAND: usize = 32;
+/// Longest frame to the host (bytes): enough for 30 states and 15 sensors.
+pub const MAX_MESSAGE: usize = 320;
+
+/// Receiver and transmitter of frames, with this side's ends of the queues to the control task.
+pub struct SerialLink<'q, const NX: usize, const NY: usize> {
+    commands: Producer<'q, Command>,
+    messages: Consumer<'q, Message<NX, NY>>,
+    receiver: Receiver<MAX_COMMAND>,
+    last_id: u64,
+    malformed: u32,
+    replayed: u32,
+    scratch: [u8; MAX_MESSAGE],
+    out: [u8; MAX_MESSAGE],
+}
+
+impl<'q, const NX: usize, const NY: usize> SerialLink<'q, NX, NY> {
+    /// A link that puts commands into one queue and takes messages from the other.
+    pub fn new(commands: Producer<'q, Command>, messages: Consumer<'q, Message<NX, NY>>) -> Self {
+        Self {
+            commands,
+            messages,
+            receiver: Receiver::new(),
+            last_id: 0,
+            malformed: 0,
+            replayed: 0,
+            scratch: [0; MAX_MESSAGE],
+            out: [0; MAX_MESSAGE],
+        }
+    }
+
+    /// Takes a byte from the serial line; a complete command goes to the control task.
+    pub fn receive(&mut self, byte: u8) {
+        let Some(command) = self.receiver.push::<Command>(byte) else {
+            return;
+        };
+        match command {
+            Err(_) => self.malformed = self.malformed.saturating_add(1),
+            Ok(command) if command.id <= self.last_id => self.replayed = self.replayed.saturating_add(1),
+            Ok(command) => {
+                // A host that sends more than one command per tick gets no answer to those that find the queue full.
+                if queue::put(&mut self.commands, command).is_ok() {
+                    self.last_id = command.id;
+                }
+            }
+        }
+    }
+
+    /// The next frame for the line, if there is one.
+    pub fn transmit(&mut self) -> Option<&[u8]> {
+        let mut message = queue::take(&mut self.messages)?;
+        if let Message::Reply(Reply { answer: Answer::Statistics(statistics), .. }) = &mut message {
+            (statistics.malformed, statistics.replayed) = (self.malformed, self.replayed);
+        }
+        send(&message, &mut self.scratch, &mut self.out)
+    }
+}
+
+fn send<'a, T: Serialize>(message: &T, scratch: &mut [u8], out: &'a mut [u8]) -> Option<&'a [u8]> {
+    frame::encode(message, scratch, out).ok()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::protocol::message::Telemetry;
+    use crate::supervision::fault::Fault;
+    use crate::supervision::homing::Homing;
+    use crate::supervision::inhibits::Inhibits;
+    use crate::supervision::sign_check::Signs;
+    use crate::supervision::supervisor::State;
+    use crate::table::Law;
+    use heapless::Vec;
+
+    #[test]
+    fn the_longest_telemetry_fits_into_a_frame() {
+        let all = Inhibits::ALL.iter().fold(Inhibits::NONE, |all, (inhibit, _)| all.union(*inhibit));
+        let telemetry = Message::Telemetry(Telemetry::<30, 15> {
+            tick: u32::MAX,
+            state: State::Fault,
+            law: Law::PolePlacement,
+            fault: Some(Fault::Clock),
+            cause_tick: u32::MAX,
+            homing: Homing::Touch { low: true, high: true },
+            signs: Signs::Swapped { asked: u8::MAX, moved: u8::MAX },
+            arming_inhibits: all,
+            counts: Vec::from_array([i32::MIN; 15]),
+            estimate: Vec::from_array([f32::MAX; 30]),
+            innovation: Vec::from_array([f32::MAX; 15]),
+            setpoint_m: f32::MAX,
+            requested_n: f32::MAX,
+            applied_n: f32::MAX,
+            drive: f32::MAX,
+            cycles: u32::MAX,
+        });
+        let (mut scratch, mut out) = ([0; MAX_MESSAGE], [0; MAX_MESSAGE]);
+        assert!(send(&telemetry, &mut scratch, &mut out).is_some());
+        let (mut scratch, mut out) = ([0; MAX_MESSAGE], [0; MAX_MESSAGE - 20]);
+        assert!(send(&telemetry, &mut scratch, &mut out).is_none(), "not even without 20 bytes");
+    }
+}
