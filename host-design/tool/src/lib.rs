@@ -9,5 +9,6 @@ pub mod figure;
 pub mod image;
 pub mod in_the_loop;
 pub mod monitor;
+pub mod project;
 pub mod report;
 pub mod reproduce;

@@ -2,10 +2,7 @@
 
 use heapless::spsc::{Consumer, Producer};
 use stm32f4xx_hal::pac::{RCC, USART2};
-use upright::protocol::queue;
-
-/// Telemetry of a quadruple rig at every tenth tick needs a third of it.
-const BAUD: u32 = 460_800;
+use upright::protocol::{BAUD, queue};
 
 /// Turns of the loop that waits for the transmitter: 60 µs or more, three bytes.
 const PATIENCE: u32 = 2_500;

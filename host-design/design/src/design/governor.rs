@@ -2,12 +2,10 @@
 
 use super::synthesis::Feedback;
 use crate::numerics::Matrix;
-use crate::rig::{PlantDescription, Rig};
+use crate::rig::{PlantDescription, Rig, defaults};
 
 /// Share of the angle and force limits that a motion of the set-point may use; the rest is for disturbances.
 const SHARE: f64 = 0.5;
-/// Largest angle of a link from the vertical (rad) where the rig file gives no limit: sin θ is within 2 % of θ.
-const LINEAR_ZONE_RAD: f64 = 0.35;
 
 /// The largest change of the set-point per tick (m) with which, in the linear model, no motion of the set-point takes a
 /// link or the force beyond half of its limit; none for a model that is not a chain, or without such a bound.
@@ -58,7 +56,7 @@ pub fn setpoint_step(rig: &Rig, ad: &Matrix<f64>, bd: &Matrix<f64>, law: &Feedba
 
 fn bound(rig: &Rig, sums: &[f64]) -> Option<f64> {
     let (force, angles) = sums.split_last()?;
-    let angle_limit = rig.limits.angle_rad.unwrap_or(LINEAR_ZONE_RAD).min(LINEAR_ZONE_RAD);
+    let angle_limit = rig.limits.angle_rad.unwrap_or(defaults::ANGLE_RAD).min(defaults::ANGLE_RAD);
     let by_angle = angles.iter().map(|sum| SHARE * angle_limit / sum);
     let by_force = rig.force_limit_n().map(|limit| SHARE * limit / force);
     by_angle.chain(by_force).filter(|step| step.is_finite()).min_by(f64::total_cmp)

@@ -32,7 +32,7 @@ pub use linear::{Equilibrium, LinearModel, linearise};
 pub use linear_simulation::LinearSimulation;
 pub use motor::MotorPlant;
 pub use parameters::ChainParameters;
-pub use simulation::{ChainSimulation, MAX_LINKS, Plant, chain_plant};
+pub use simulation::{ChainSimulation, Plant, chain_plant};
 pub use sincos::sin_cos;
 
 /// The plant cannot be built for this number of links.
@@ -47,7 +47,7 @@ pub enum PlantError {
         compiled: usize,
     },
     /// No compiled plant has this many links.
-    #[error("a chain of {links} links cannot be simulated: give 1 to {MAX_LINKS} links")]
+    #[error("a chain of {links} links cannot be simulated: give 1 to {} links", crate::rig::MAX_LINKS)]
     UnsupportedLinks {
         /// Links of the chain.
         links: usize,

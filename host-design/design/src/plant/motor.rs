@@ -14,7 +14,7 @@ pub struct MotorPlant {
 impl MotorPlant {
     /// The motor of a rig file.
     pub fn of(motor: &rig::Motor) -> Self {
-        let volts_per_speed = motor.gear_ratio * motor.torque_constant_n_m_per_a / motor.pulley_radius_m;
+        let volts_per_speed = motor.volts_per_speed();
         Self {
             newtons_per_volt: volts_per_speed / motor.resistance_ohm,
             volts_per_speed,

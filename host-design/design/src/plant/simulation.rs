@@ -3,9 +3,6 @@
 use super::{ChainParameters, ChainPlant, ChainState, Energy, PlantError};
 use crate::rig;
 
-/// The largest number of links that [`chain_plant`] can simulate.
-pub const MAX_LINKS: usize = 14;
-
 /// A plant that can be moved forward in time.
 ///
 /// States of a chain are in the order of this module: `x, ẋ, θ_1, θ̇_1, …` with relative angles; those of a linear
@@ -98,7 +95,7 @@ impl<const N: usize> Plant for ChainSimulation<N> {
 /// A simulation of `chain`, at rest with every link upright.
 ///
 /// # Errors
-/// [`PlantError::UnsupportedLinks`] unless the chain has 1 to [`MAX_LINKS`] links.
+/// [`PlantError::UnsupportedLinks`] unless the chain has 1 to [`MAX_LINKS`](rig::MAX_LINKS) links.
 pub fn chain_plant(chain: &rig::Chain) -> Result<Box<dyn Plant>, PlantError> {
     fn boxed<const N: usize>(chain: &rig::Chain) -> Result<Box<dyn Plant>, PlantError> {
         let plant = ChainPlant::<N>::new(&ChainParameters::of(chain))?;

@@ -205,9 +205,7 @@ impl Page {
     }
 
     fn motor(&mut self, motor: &Motor) {
-        let ratio = motor.gear_ratio / motor.pulley_radius_m;
-        let force_per_volt = ratio * motor.torque_constant_n_m_per_a / motor.resistance_ohm;
-        let speed_per_volt = 1.0 / (ratio * motor.torque_constant_n_m_per_a);
+        let volts_per_speed = motor.volts_per_speed();
         self.value("torque constant", motor.torque_constant_n_m_per_a, "N·m/A", "");
         self.value("winding resistance", motor.resistance_ohm, "Ω", "");
         self.value("gear ratio", motor.gear_ratio, "", mark(motor.gear_ratio == defaults::GEAR_RATIO));
@@ -216,9 +214,10 @@ impl Page {
         self.value("dead zone", motor.dead_zone_v, "V", mark(motor.dead_zone_v == defaults::DEAD_ZONE_V));
         self.value_or_none("slew", motor.slew_v_per_s, "V/s");
         self.value("force at standstill", motor.stall_force_n(), "N", "(largest)");
-        self.value("speed without load", speed_per_volt * motor.supply_v, "m/s", "(largest)");
-        // Fb = (Kt N / r)^2 / R: what back-EMF takes away, seen by the cart as viscous friction.
-        self.value("braking by back-EMF", force_per_volt / speed_per_volt, "N·s/m", "");
+        self.value("speed without load", motor.supply_v / volts_per_speed, "m/s", "(largest)");
+        // (gear Kt / r)² / R: back-EMF acts on the cart as viscous friction.
+        let braking = volts_per_speed * volts_per_speed / motor.resistance_ohm;
+        self.value("braking by back-EMF", braking, "N·s/m", "");
     }
 
     fn design(&mut self, rig: &Rig) {

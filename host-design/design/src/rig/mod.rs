@@ -24,6 +24,9 @@ pub use sensors::Sensor;
 use serde::Serialize;
 use sha2::{Digest, Sha256};
 
+/// Most links of a chain: plants of more are not compiled.
+pub const MAX_LINKS: usize = 14;
+
 /// A rig file, read and checked.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Rig {
@@ -221,6 +224,11 @@ impl PlantDescription {
 }
 
 impl Motor {
+    /// Back-EMF per cart speed, `gear Kt / r` (V·s/m), which is also the force per current (N/A).
+    pub fn volts_per_speed(&self) -> f64 {
+        self.gear_ratio * self.torque_constant_n_m_per_a / self.pulley_radius_m
+    }
+
     /// Force on the cart at standstill and full supply, `gear Kt V / (R r)` (N).
     pub fn stall_force_n(&self) -> f64 {
         self.gear_ratio * self.torque_constant_n_m_per_a * self.supply_v

@@ -320,7 +320,7 @@ impl LawValues {
 
 impl MotorValues {
     fn of(motor: &Motor, period_s: f64) -> Result<Self, NoTable> {
-        let speed = motor.gear_ratio * motor.torque_constant_n_m_per_a / motor.pulley_radius_m;
+        let speed = motor.volts_per_speed();
         Ok(Self {
             volts_per_newton: finite("the motor's voltage per force", (motor.resistance_ohm / speed) as f32)?,
             volts_per_speed: finite("the motor's voltage per speed", speed as f32)?,

@@ -4,10 +4,9 @@ use crate::plant_rigs::{chain, paper, rod, unequal_rods, with_friction};
 use upright_design::numerics::{Matrix, Real, Wide};
 use upright_design::plant::reference::{ReferenceError, Tolerance, integrate};
 use upright_design::plant::{
-    ChainParameters, ChainPlant, ChainState, Equilibrium, MAX_LINKS, Plant, PlantError, chain_plant,
-    linearise,
+    ChainParameters, ChainPlant, ChainState, Equilibrium, Plant, PlantError, chain_plant, linearise,
 };
-use upright_design::rig::{Chain, Link};
+use upright_design::rig::{Chain, Link, MAX_LINKS};
 
 const TIGHT: Tolerance = Tolerance { relative: 1e-13, absolute: 1e-13 };
 

@@ -18,6 +18,7 @@ pub(crate) use theme::{CHROMATIC, curve_colour, reference_colour, style_sheet};
 
 pub use draw::{Drawing, PlotArea};
 pub use heat::HeatMap;
+pub(crate) use run::run_figure;
 pub use run::run_svg;
 
 /// A figure that could not be made.

@@ -1,47 +1,123 @@
-//! A run as a picture.
+//! A simulated run over time as a figure.
 
-use upright_design::rig::{PlantDescription, Rig};
+use upright_design::number::significant;
+use upright_design::rig::{Chain, PlantDescription, Rig};
 use upright_design::simulate::{Sample, Trace};
 
 use super::{Axis, Curve, Figure, FigureError, Panel};
 
-/// Position, angles and force of a run over time, one below the other, as an SVG document.
+/// Position, angles, rates and force of a run over time, one below the other, as an SVG document.
 ///
 /// # Errors
 /// [`FigureError`] from the drawing library.
 pub fn run_svg(rig: &Rig, trace: &Trace, title: &str) -> Result<String, FigureError> {
-    let curve = |value: &dyn Fn(&Sample<&[f64]>) -> f64| -> Vec<[f64; 2]> {
-        trace.samples().map(|sample| [sample.t, value(&sample)]).collect()
+    let end_s = trace.samples().last().map_or(1.0, |sample| sample.t).max(1e-9);
+    run_figure(Figure::new(title), rig, trace, end_s).svg()
+}
+
+/// Adds the panels of a run to `figure`: position, angles, rates and force with their limits, or the states and the input
+/// of a `[model]`. The time axis ends at `end_s`.
+pub(crate) fn run_figure(figure: Figure, rig: &Rig, trace: &Trace, end_s: f64) -> Figure {
+    let run = Run { rig, trace, end_s };
+    let panels = match &rig.plant {
+        PlantDescription::Chain(chain) => {
+            vec![run.position(chain), run.angles(chain), run.rates(chain), run.force()]
+        }
+        PlantDescription::Model(_) => vec![run.output(), run.other_states(), run.input()],
     };
-    let end = trace.samples().last().map_or(1.0, |sample| sample.t).max(1e-9);
-    let panel =
-        |label: &str| Panel::new(Axis::linear("time (s)").range(-0.01 * end, end), Axis::linear(label));
-    let output = rig.output();
-    let is_chain = matches!(rig.plant, PlantDescription::Chain(_));
-    let (label, name) =
-        if is_chain { ("position (m)", "cart".to_owned()) } else { ("output", format!("state {output}")) };
-    let mut figure = Figure::new(title).with(
-        panel(label)
-            .with(Curve::reference("set-point", curve(&|s| s.target)))
-            .with(Curve::line("governed", 1, curve(&|s| s.setpoint)))
-            .with(Curve::line(name, 0, curve(&|s| s.state[output]))),
-    );
-    if let PlantDescription::Chain(chain) = &rig.plant {
-        let angle = |link: usize| {
-            let points = curve(&|s| s.state[2 + 2 * link].to_degrees());
-            Curve::line(format!("θ{}", link + 1), link, points)
-        };
-        figure = figure.with((0..chain.links.len()).map(angle).fold(panel("angles (°)"), Panel::with));
+    panels.into_iter().fold(figure, Figure::with)
+}
+
+struct Run<'a> {
+    rig: &'a Rig,
+    trace: &'a Trace,
+    end_s: f64,
+}
+
+impl Run<'_> {
+    fn panel(&self, label: &str) -> Panel {
+        Panel::new(Axis::linear("time (s)").range(0.0, self.end_s), Axis::linear(label)).high(178)
     }
-    // A falling pendulum asks for a hundred times what there is: the rest should stay legible.
-    let most = 2.0 * trace.samples().fold(0.0f64, |most, s| most.max(s.force.abs()));
-    let is_cut_off = trace.samples().any(|s| s.requested.abs() > most);
-    let name = if is_cut_off { "asked for (cut off)" } else { "asked for" };
-    figure
-        .with(
-            panel(if is_chain { "force (N)" } else { "input" })
-                .with(Curve::reference(name, curve(&|s| s.requested.clamp(-most, most))))
-                .with(Curve::line("applied", 0, curve(&|s| s.force))),
-        )
-        .svg()
+
+    fn curve(&self, value: impl Fn(&Sample<&[f64]>) -> f64) -> Vec<[f64; 2]> {
+        self.trace.samples().map(|sample| [sample.t, value(&sample)]).collect()
+    }
+
+    /// Two lines across the panel.
+    fn limits(&self, name: &str, limits: [f64; 2]) -> Curve {
+        let [low, high] = limits.map(|limit| [[0.0, limit], [self.end_s, limit]]);
+        Curve::limit(name, [low.as_slice(), &[[f64::NAN; 2]], &high].concat())
+    }
+
+    fn position(&self, chain: &Chain) -> Panel {
+        let rail = chain.cart.travel_m;
+        let name = format!("rail {} to {} m", number(rail[0]), number(rail[1]));
+        let mut panel = self
+            .panel("position (m)")
+            .with(Curve::reference("set-point", self.curve(|sample| sample.target)));
+        if self.trace.samples().any(|sample| sample.setpoint != sample.target) {
+            let governed = self.curve(|sample| sample.setpoint);
+            panel = panel.with(Curve::line("governed set-point", 1, governed));
+        }
+        let position = self.curve(|sample| sample.state[0]);
+        panel.with(Curve::line("x", 0, position)).with(self.limits(&name, rail))
+    }
+
+    fn angles(&self, chain: &Chain) -> Panel {
+        let panel = (0..chain.links.len()).fold(self.panel("angles (°)"), |panel, joint| {
+            let points = self.curve(|sample| sample.state[2 + 2 * joint].to_degrees());
+            panel.with(Curve::line(format!("θ{}", joint + 1), joint, points))
+        });
+        match self.rig.limits.angle_rad.map(f64::to_degrees) {
+            Some(limit) => panel.with(self.limits(&format!("limit ±{}°", number(limit)), [-limit, limit])),
+            None => panel,
+        }
+    }
+
+    fn rates(&self, chain: &Chain) -> Panel {
+        (0..chain.links.len()).fold(self.panel("rates (°/s)"), |panel, joint| {
+            let points = self.curve(|sample| sample.state[3 + 2 * joint].to_degrees());
+            panel.with(Curve::line(format!("θ{}'", joint + 1), joint, points))
+        })
+    }
+
+    fn force(&self) -> Panel {
+        // The request of a falling pendulum can be a hundred times the limit and would flatten everything else.
+        let largest = 2.0 * self.trace.samples().fold(0.0f64, |most, sample| most.max(sample.force.abs()));
+        let is_cut_off = self.trace.samples().any(|sample| sample.requested.abs() > largest);
+        let name = if is_cut_off { "requested (cut off)" } else { "requested" };
+        let requested = self.curve(|sample| sample.requested.clamp(-largest, largest));
+        let panel = self.panel("force (N)").with(Curve::reference(name, requested)).with(Curve::line(
+            "u",
+            0,
+            self.curve(|sample| sample.force),
+        ));
+        match self.rig.force_limit_n() {
+            Some(limit) => panel.with(self.limits(&format!("limit ±{} N", number(limit)), [-limit, limit])),
+            None => panel,
+        }
+    }
+
+    fn output(&self) -> Panel {
+        let output = self.rig.output();
+        self.panel("output")
+            .with(Curve::reference("set-point", self.curve(|sample| sample.target)))
+            .with(Curve::line(format!("state {output}"), 0, self.curve(|sample| sample.state[output])))
+    }
+
+    fn other_states(&self) -> Panel {
+        let others = (0..self.rig.states()).filter(|&state| state != self.rig.output());
+        others.enumerate().fold(self.panel("other states"), |panel, (number, state)| {
+            panel.with(Curve::line(state.to_string(), number, self.curve(|sample| sample.state[state])))
+        })
+    }
+
+    fn input(&self) -> Panel {
+        self.panel("input").with(Curve::line("u", 0, self.curve(|sample| sample.force)))
+    }
+}
+
+/// Three significant digits, with a printed minus sign.
+fn number(x: f64) -> String {
+    significant(x, 3).replace('-', "−")
 }

@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 use std::sync::{Mutex, PoisonError};
 
+use crate::project::{NoCheckout, checkout};
 use upright_design::rig::Rig;
 use upright_design::table::{TableValues, WriteError, gains_source, write_atomically};
 
@@ -51,9 +52,9 @@ pub enum ImageError {
          `apt-get install lld rustc-web cargo-web rust-web-src`"
     )]
     NoCompiler,
-    /// The tool is used without its source.
-    #[error("{0} is not there: images are built from the source of this project")]
-    NoSource(PathBuf),
+    /// Images are built from the source of this project.
+    #[error(transparent)]
+    NoCheckout(#[from] NoCheckout),
     /// The compiler cannot be started.
     #[error("{0} cannot be started: {1}")]
     Start(&'static str, std::io::Error),
@@ -103,7 +104,7 @@ pub fn build_if_possible(kind: Kind) -> Result<Option<PathBuf>, ImageError> {
 pub fn build_for(kind: Kind, rig: &Rig, table: &TableValues) -> Result<PathBuf, ImageError> {
     let source = gains_source(rig, table);
     // Documentation of a module cannot be included into one.
-    let included = source.lines().filter(|line| !line.starts_with("//!")).collect::<Vec<_>>().join("../..");
+    let included = source.lines().filter(|line| !line.starts_with("//!")).collect::<Vec<_>>().join("\n");
     let name = format!("{}-{:016x}-{:08x}", kind.feature(), rig.hash(), table.crc());
     let gains = images()?.join(format!("{name}.rs"));
     // An unchanged file stays as it is, so that nothing is compiled anew.
@@ -113,19 +114,11 @@ pub fn build_for(kind: Kind, rig: &Rig, table: &TableValues) -> Result<PathBuf, 
     compile(kind, Some(&gains), &name)
 }
 
-fn project() -> Result<PathBuf, ImageError> {
-    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
-    match root.canonicalize() {
-        Ok(root) if root.join("memory.x").is_file() => Ok(root),
-        _ => Err(ImageError::NoSource(root)),
-    }
-}
-
 /// One of its own: the caller may be run by cargo, which holds its lock on the usual one.
 fn target_directory() -> Result<PathBuf, ImageError> {
     let base = match std::env::var_os("CARGO_TARGET_DIR") {
         Some(directory) => std::path::absolute(directory).unwrap_or_default(),
-        None => project()?.join("target"),
+        None => checkout()?.join("target"),
     };
     Ok(base.join("firmware"))
 }
@@ -135,7 +128,7 @@ static COMPILING: Mutex<()> = Mutex::new(());
 
 fn compile(kind: Kind, gains: Option<&Path>, name: &str) -> Result<PathBuf, ImageError> {
     let _one_at_a_time = COMPILING.lock().unwrap_or_else(PoisonError::into_inner);
-    let root = project()?;
+    let root = checkout()?;
     let target_directory = target_directory()?;
     let (program, mut command, target_directory) = if rustup_has_the_target() {
         ("cargo", Command::new("cargo"), target_directory)

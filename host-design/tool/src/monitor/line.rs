@@ -5,9 +5,8 @@ use std::net::TcpStream;
 use std::time::Duration;
 
 use serialport::SerialPort;
+use upright::protocol::BAUD;
 
-/// Speed of the firmware's serial line (Bd).
-const BAUD: u32 = 460_800;
 /// Longest wait for bytes.
 const PATIENCE: Duration = Duration::from_millis(5);
 /// Longest wait for a line that takes no bytes.

@@ -3,7 +3,7 @@
 use serde::Serialize;
 
 use super::comparison::{Digits, Row};
-use super::{LAWS, ReproduceError, paper_rig, printed_rig, published};
+use super::{LAWS, PaperRigs, ReproduceError, published};
 use upright_design::design::{Feedback, continuous_plant, design, dominant_pair};
 use upright_design::numerics::{Complex, Matrix, Wide, eigenvalues};
 use upright_design::rig::Rig;
@@ -34,9 +34,8 @@ const PRINTED: &str = "printed A and B";
 ///
 /// # Errors
 /// [`ReproduceError`] if a design fails.
-pub fn designs() -> Result<Designs, ReproduceError> {
-    let (exact_rig, printed_rig) = (paper_rig()?, printed_rig()?);
-    let (exact, printed) = (design(&exact_rig)?, design(&printed_rig)?);
+pub fn designs(rigs: &PaperRigs) -> Result<Designs, ReproduceError> {
+    let (exact, printed) = (design(&rigs.exact)?, design(&rigs.printed)?);
     let mut rows = plant_rows(&exact.double.a, &exact.double.b);
     rows.extend(dominant_rows());
     for (from, certified) in [(PRINTED, &printed), (EXACT, &exact)] {
@@ -54,7 +53,7 @@ pub fn designs() -> Result<Designs, ReproduceError> {
         }
     }
 
-    let mut poles = vec![PoleSet { of: "open loop".to_owned(), poles: open_loop_poles(&exact_rig)? }];
+    let mut poles = vec![PoleSet { of: "open loop".to_owned(), poles: open_loop_poles(&rigs.exact)? }];
     for ((_, name), closed) in LAWS.into_iter().zip(exact.poles.continuous) {
         poles.extend(closed.map(|poles| PoleSet { of: format!("{name}, exact gains"), poles }));
     }

@@ -3,7 +3,7 @@
 use serde::Serialize;
 
 use super::designs::{gain_rows, plant_rows};
-use super::{ReproduceError, Row, chain, paper_rig, printed_rig, published};
+use super::{PaperRigs, ReproduceError, Row, chain, published};
 use upright_design::design::{Feedback, continuous_plant, design};
 use upright_design::numerics::Wide;
 use upright_design::plant::chain_plant;
@@ -36,8 +36,14 @@ pub struct Evidence {
 ///
 /// # Errors
 /// [`ReproduceError`] if a design fails that should exist.
-pub fn errata() -> Result<Vec<Erratum>, ReproduceError> {
-    Ok(vec![weights()?, cart_mass()?, far_poles()?, rate_for_position()?, rounded_matrices()?])
+pub fn errata(rigs: &PaperRigs) -> Result<Vec<Erratum>, ReproduceError> {
+    Ok(vec![
+        weights(&rigs.printed)?,
+        cart_mass(&rigs.exact)?,
+        far_poles(&rigs.printed)?,
+        rate_for_position(&rigs.exact)?,
+        rounded_matrices(rigs)?,
+    ])
 }
 
 fn counted(reading: impl Into<String>, rows: &[Row], of: &str) -> Evidence {
@@ -46,7 +52,7 @@ fn counted(reading: impl Into<String>, rows: &[Row], of: &str) -> Evidence {
     Evidence { reading: reading.into(), outcome, agree: Some(agree) }
 }
 
-fn weights() -> Result<Erratum, ReproduceError> {
+fn weights(printed: &Rig) -> Result<Erratum, ReproduceError> {
     let mut evidence = Vec::new();
     let pattern: Vec<f64> = [10.0, 1.0].repeat(5);
     let q = published::Q_DIAGONAL;
@@ -55,7 +61,7 @@ fn weights() -> Result<Erratum, ReproduceError> {
         ("the first ten entries as printed", q[..10].to_vec()),
         ("the last ten entries as printed", q[5..].to_vec()),
     ] {
-        let mut rig = printed_rig()?;
+        let mut rig = printed.clone();
         if let Some(lqr) = &mut rig.lqr {
             lqr.state_weights = weights;
         }
@@ -70,7 +76,7 @@ fn weights() -> Result<Erratum, ReproduceError> {
     })
 }
 
-fn cart_mass() -> Result<Erratum, ReproduceError> {
+fn cart_mass(exact: &Rig) -> Result<Erratum, ReproduceError> {
     let mut evidence = Vec::new();
     for (reading, mass_kg, rods) in [
         ("cart of 0.1 kg, uniform rods", 0.1, true),
@@ -78,7 +84,7 @@ fn cart_mass() -> Result<Erratum, ReproduceError> {
         ("cart of 0.1001 kg, uniform rods", 0.1001, true),
         ("cart of 0.1 kg, each mass in the middle of its rod", 0.1, false),
     ] {
-        let mut rig = paper_rig()?;
+        let mut rig = exact.clone();
         if let PlantDescription::Chain(chain) = &mut rig.plant {
             chain.cart.mass_kg = mass_kg;
             for link in &mut chain.links {
@@ -96,7 +102,7 @@ fn cart_mass() -> Result<Erratum, ReproduceError> {
     })
 }
 
-fn far_poles() -> Result<Erratum, ReproduceError> {
+fn far_poles(printed: &Rig) -> Result<Erratum, ReproduceError> {
     let mut evidence = Vec::new();
     let real = -4.0 / published::SETTLING_TIME_S;
     let imaginary = upright_design::design::dominant_pair::<f64>(
@@ -120,7 +126,7 @@ fn far_poles() -> Result<Erratum, ReproduceError> {
         ("eight times ten times the real part, -6.67", far(vec![10.0 * real; 8])),
         ("four times the pair of ten times s1 and s2", PolePlacement::Poles(literal)),
     ] {
-        let mut rig = printed_rig()?;
+        let mut rig = printed.clone();
         rig.pole_placement = Some(placement);
         let law = placement_of(&rig)?;
         let rows = gain_rows("", "", &law, &published::PLACEMENT_K, published::PLACEMENT_N);
@@ -137,9 +143,8 @@ fn far_poles() -> Result<Erratum, ReproduceError> {
     })
 }
 
-fn rate_for_position() -> Result<Erratum, ReproduceError> {
-    let rig = paper_rig()?;
-    let chain = chain(&rig)?;
+fn rate_for_position(exact: &Rig) -> Result<Erratum, ReproduceError> {
+    let chain = chain(exact)?;
     let mut plant = chain_plant(chain)?;
     let mut state = vec![0.0; plant.states()];
     for (joint, angle) in [(1, 2.0), (2, -0.5), (3, 0.7), (4, 0.3)] {
@@ -179,13 +184,12 @@ fn rate_for_position() -> Result<Erratum, ReproduceError> {
     })
 }
 
-fn rounded_matrices() -> Result<Erratum, ReproduceError> {
+fn rounded_matrices(rigs: &PaperRigs) -> Result<Erratum, ReproduceError> {
     let mut evidence = Vec::new();
-    for (reading, rig) in
-        [("the printed, rounded matrices", printed_rig()?), ("the exact model", paper_rig()?)]
+    for (reading, rig) in [("the printed, rounded matrices", &rigs.printed), ("the exact model", &rigs.exact)]
     {
-        let mut rows = gain_rows("LQR", "", &lqr_of(&rig)?, &published::LQR_K, published::LQR_N);
-        let placement = placement_of(&rig)?;
+        let mut rows = gain_rows("LQR", "", &lqr_of(rig)?, &published::LQR_K, published::LQR_N);
+        let placement = placement_of(rig)?;
         rows.extend(gain_rows("", "", &placement, &published::PLACEMENT_K, published::PLACEMENT_N));
         evidence.push(counted(reading, &rows, "both K and N"));
     }

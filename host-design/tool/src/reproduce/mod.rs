@@ -22,7 +22,7 @@ mod settling;
 mod spectrum;
 mod summary;
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use serde::Serialize;
 use upright::table::Law;
@@ -50,7 +50,13 @@ use upright_design::verify::VerifyError;
 /// A result that could not be computed.
 #[derive(Debug, thiserror::Error)]
 pub enum ReproduceError {
-    /// A rig that comes with this program cannot be read.
+    /// A rig file of the paper is not there.
+    #[error(
+        "{}: there is no such file: run this in a checkout of Upright, or name the folder of its rig files with --rigs",
+        .0.display()
+    )]
+    NoRigs(PathBuf),
+    /// A rig file of the paper cannot be used.
     #[error(transparent)]
     Rig(#[from] RigError),
     /// The rig is not a chain of links.
@@ -79,7 +85,7 @@ pub enum ReproduceError {
     /// The margins could not be computed.
     #[error(transparent)]
     Verify(#[from] VerifyError),
-    /// A variance of the paper that is none.
+    /// A negative variance.
     #[error("a variance of {0} is not possible: it has to be at least 0")]
     Variance(f64),
 }
@@ -102,43 +108,46 @@ pub struct Reproduction {
 /// Number of stages that [`reproduce`] names.
 pub const STAGES: u64 = 5;
 
-/// Computes everything; `stage` hears the name of each of the [`STAGES`] before it starts.
+/// Computes everything; `stage` is called with the name of each of the [`STAGES`] before it starts.
 ///
 /// # Errors
 /// [`ReproduceError`] if a result cannot be computed.
-pub fn reproduce(stage: &dyn Fn(&'static str)) -> Result<Reproduction, ReproduceError> {
+pub fn reproduce(rigs: &PaperRigs, stage: &dyn Fn(&'static str)) -> Result<Reproduction, ReproduceError> {
     stage("matrices, gains and poles");
-    let designs = designs()?;
+    let designs = designs(rigs)?;
     stage("errata");
-    let errata = errata()?;
+    let errata = errata(rigs)?;
     stage("step responses");
-    let loops = Loops::of(&paper_rig()?)?;
+    let loops = Loops::of(&rigs.exact)?;
     let responses = responses(&loops)?;
     stage("Table 2");
-    let settling = settling()?;
+    let settling = settling(rigs)?;
     stage("spectra and margins");
     let robustness = robustness(&loops)?;
     Ok(Reproduction { designs, errata, responses, settling, robustness })
 }
 
-/// The paper's machine, with our tick, limit, encoders and noise: `rigs/quadruple-paper.toml`.
-///
-/// # Errors
-/// [`RigError`], if the file was bad when this program was compiled.
-pub fn paper_rig() -> Result<Rig, RigError> {
-    Rig::from_toml(
-        include_str!("../../../../rigs/quadruple-paper.toml"),
-        Path::new("rigs/quadruple-paper.toml"),
-    )
+/// The two rig files of the paper's machine.
+#[derive(Debug, Clone, PartialEq)]
+pub struct PaperRigs {
+    /// The machine itself, with our tick, limit, encoders and noise: `quadruple-paper.toml`.
+    pub exact: Rig,
+    /// A and B as printed in the paper: `quadruple-paper-printed.toml`.
+    pub printed: Rig,
 }
 
-/// The paper's A and B as printed: `rigs/quadruple-paper-printed.toml`.
-///
-/// # Errors
-/// As for [`paper_rig`].
-pub fn printed_rig() -> Result<Rig, RigError> {
-    let file = Path::new("rigs/quadruple-paper-printed.toml");
-    Rig::from_toml(include_str!("../../../../rigs/quadruple-paper-printed.toml"), file)
+impl PaperRigs {
+    /// Reads both files from `folder`.
+    ///
+    /// # Errors
+    /// [`ReproduceError::NoRigs`] if they are not there, [`ReproduceError::Rig`] if one cannot be used.
+    pub fn from_folder(folder: &Path) -> Result<Self, ReproduceError> {
+        let read = |name: &str| {
+            let file = folder.join(name);
+            if file.is_file() { Ok(Rig::from_path(&file)?) } else { Err(ReproduceError::NoRigs(file)) }
+        };
+        Ok(Self { exact: read("quadruple-paper.toml")?, printed: read("quadruple-paper-printed.toml")? })
+    }
 }
 
 /// The two laws in the order of the paper.

@@ -9,7 +9,7 @@ use upright::table::Law;
 
 use super::continuous_loop::ContinuousRun;
 use super::course::Course;
-use super::{ReproduceError, SEED, chain, paper_rig, printed_rig, published};
+use super::{PaperRigs, ReproduceError, SEED, chain, published};
 use upright_design::design::{Feedback, design};
 use upright_design::plant::reference::Tolerance;
 use upright_design::rig::{PolePlacement, Rig, Tick};
@@ -82,10 +82,10 @@ pub fn printed() -> [bool; 7] {
 ///
 /// # Errors
 /// [`ReproduceError`] if a design or a run fails.
-pub fn settling() -> Result<Settling, ReproduceError> {
+pub fn settling(rigs: &PaperRigs) -> Result<Settling, ReproduceError> {
     let exact: Vec<Feedback<f64>> = published::TABLE_2
         .par_iter()
-        .map(|&(settling_time_s, _)| placement(&asking_for(paper_rig()?, settling_time_s)))
+        .map(|&(settling_time_s, _)| placement(&asking_for(&rigs.exact, settling_time_s)))
         .collect::<Result<_, _>>()?;
     let changes = Change::all();
     let jobs: Vec<(usize, f64, &Feedback<f64>)> = (0..changes.len())
@@ -93,7 +93,7 @@ pub fn settling() -> Result<Settling, ReproduceError> {
         .collect();
     let courses: Vec<Course> = jobs
         .par_iter()
-        .map(|&(change, settling_time_s, exact)| changes[change].1.course(settling_time_s, exact))
+        .map(|&(change, settling_time_s, exact)| changes[change].1.course(rigs, settling_time_s, exact))
         .collect::<Result<_, _>>()?;
     let mut groups = courses.chunks_exact(published::TABLE_2.len()).zip(&changes);
     let sensitivity = groups
@@ -201,11 +201,16 @@ impl Change {
     }
 
     /// `exact` are the gains of the exact model.
-    fn course(&self, settling_time_s: f64, exact: &Feedback<f64>) -> Result<Course, ReproduceError> {
-        let mut rig = asking_for(paper_rig()?, settling_time_s);
+    fn course(
+        &self,
+        rigs: &PaperRigs,
+        settling_time_s: f64,
+        exact: &Feedback<f64>,
+    ) -> Result<Course, ReproduceError> {
+        let mut rig = asking_for(&rigs.exact, settling_time_s);
         match self {
             Change::Continuous { gains, run } => {
-                run.course(chain(&rig)?, &gains.law(&rig, settling_time_s, exact)?)
+                run.course(chain(&rig)?, &gains.law(rigs, settling_time_s, exact)?)
             }
             Change::Firmware { tick, gains, force_limit_n } => {
                 rig.tick = tick.clone();
@@ -228,9 +233,8 @@ impl Change {
 }
 
 /// `rig` with nothing but a pole placement for this settling time.
-fn asking_for(mut rig: Rig, wanted_s: f64) -> Rig {
-    rig.lqr = None;
-    rig.kalman = None;
+fn asking_for(rig: &Rig, wanted_s: f64) -> Rig {
+    let mut rig = Rig { lqr: None, kalman: None, ..rig.clone() };
     if let Some(PolePlacement::Response { settling_time_s, .. }) = &mut rig.pole_placement {
         *settling_time_s = wanted_s;
     }
@@ -238,15 +242,15 @@ fn asking_for(mut rig: Rig, wanted_s: f64) -> Rig {
 }
 
 impl GainsFrom {
-    /// The gains for `rig`, whose exact ones are `exact`.
+    /// The gains for this settling time; `exact` are those of the exact model.
     fn law(
         &self,
-        rig: &Rig,
+        rigs: &PaperRigs,
         settling_time_s: f64,
         exact: &Feedback<f64>,
     ) -> Result<Feedback<f64>, ReproduceError> {
         let moved = |to: &dyn Fn(f64) -> f64| {
-            let mut rig = rig.clone();
+            let mut rig = asking_for(&rigs.exact, settling_time_s);
             if let Some(PolePlacement::Response { far_poles, .. }) = &mut rig.pole_placement {
                 for pole in far_poles {
                     *pole = to(*pole);
@@ -261,7 +265,7 @@ impl GainsFrom {
                 n: exact.n.map(|n| (n * 1e4).round() / 1e4),
                 integral: false,
             }),
-            GainsFrom::PrintedMatrices => placement(&asking_for(printed_rig()?, settling_time_s)),
+            GainsFrom::PrintedMatrices => placement(&asking_for(&rigs.printed, settling_time_s)),
             GainsFrom::FarPolesMoved => moved(&|pole| pole * published::SETTLING_TIME_S / settling_time_s),
             GainsFrom::TenTimesDominant => moved(&|_| -40.0 / settling_time_s),
         }

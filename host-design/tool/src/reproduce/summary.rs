@@ -5,8 +5,8 @@ use std::fmt::Write as _;
 use super::claims::claims;
 use super::markdown::markdown_table;
 use super::{
-    Designs, Erratum, HORIZON_S, LONGEST_S, PoleSet, Reproduction, Response, Row, Settling, Verdict, printed,
-    published,
+    Designs, Erratum, HORIZON_S, LONGEST_S, PoleSet, Reproduction, Response, Row, Sensitivity, Settling,
+    SettlingRow, Verdict, printed, published,
 };
 
 const HEAD: &str = "\
@@ -148,32 +148,34 @@ fn responses(responses: &[Response]) -> String {
 }
 
 fn settling(settling: &Settling) -> String {
-    let mut text = format!(
+    let text = format!(
         "## Table 2: pole placement for 1 % and ts = 3 to 9 s\n\n\
          The paper gives neither criterion nor length of its runs. Here \"stabilised\" means: no link is beyond the horizontal,\n\
          and the cart is within 2 % of the set-point when the run ends. Step of 1 m, far poles at -40 to -47, the paper's\n\
          continuous loop, runs of {LONGEST_S} s.\n\n"
     );
-    let rows: Vec<Vec<String>> = settling
-        .rows
-        .iter()
-        .map(|row| {
-            vec![
-                format!("{}", row.settling_time_s),
-                yes(row.printed).to_owned(),
-                match (&row.fall, row.settled_after_s) {
-                    (Some(fall), _) => format!("has fallen by {:.2} s", fall.at_s),
-                    (None, Some(time)) => format!("stands, within 2 % from {time:.2} s on"),
-                    (None, None) => "stands, not settled".to_owned(),
-                },
-                if row.fall.is_some() { "-".to_owned() } else { format!("{:.2}", row.peak_angle_deg) },
-                if row.fall.is_some() { "-".to_owned() } else { format!("{:.2}", row.peak_force_n) },
-            ]
-        })
-        .collect();
-    text += &markdown_table(&["ts (s)", "paper", "ours", "peak angle (°)", "peak force (N)"], 3, &rows);
+    let row = |row: &SettlingRow| {
+        let unless_fallen = |value: f64| {
+            if row.fall.is_some() { "-".to_owned() } else { format!("{value:.2}") }
+        };
+        vec![
+            format!("{}", row.settling_time_s),
+            yes(row.printed).to_owned(),
+            match (&row.fall, row.settled_after_s) {
+                (Some(fall), _) => format!("has fallen by {:.2} s", fall.at_s),
+                (None, Some(time)) => format!("stands, within 2 % from {time:.2} s on"),
+                (None, None) => "stands, not settled".to_owned(),
+            },
+            unless_fallen(row.peak_angle_deg),
+            unless_fallen(row.peak_force_n),
+        ]
+    };
+    let rows: Vec<Vec<String>> = settling.rows.iter().map(row).collect();
+    let header = ["ts (s)", "paper", "ours", "peak angle (°)", "peak force (N)"];
+    text + &markdown_table(&header, 3, &rows) + &verdicts_by_horizon(settling) + &sensitivity(settling)
+}
 
-    text += "\nVerdicts by the length of the run (y: stabilised):\n\n";
+fn verdicts_by_horizon(settling: &Settling) -> String {
     let mut header = vec!["run of (s)".to_owned()];
     header.extend(published::TABLE_2.map(|(time, _)| format!("{time} s")));
     header.push("as in the paper".to_owned());
@@ -182,42 +184,41 @@ fn settling(settling: &Settling) -> String {
     rows.extend(
         settling.by_horizon.iter().map(|(horizon, verdicts)| verdict_row(&format!("{horizon:.1}"), verdicts)),
     );
-    text += &markdown_table(&header, 1, &rows);
-    text += &match settling.horizons_s {
+    let conclusion = match settling.horizons_s {
         Some([first, last]) => format!(
             "\nRuns of {first:.2} to {last:.2} s give all seven verdicts of the paper, others do not. So its 3 s and 4 s fall, and its\n\
              8 s and 9 s have merely not settled yet. This is a fit to what the paper does not state, not a proof.\n"
         ),
         None => "\nNo length of the runs gives all seven verdicts of the paper.\n".to_owned(),
     };
+    let table = markdown_table(&header, 1, &rows);
+    format!("\nVerdicts by the length of the run (y: stabilised):\n\n{table}{conclusion}")
+}
 
-    let _ = writeln!(
-        text,
-        "\nWhat else was tried, one change at a time (f: falls, n: stands, not within 2 % at {HORIZON_S} s, y: stabilised):\n"
-    );
-    let rows: Vec<Vec<String>> = settling
-        .sensitivity
-        .iter()
-        .map(|tried| {
-            let letters = (0..7).map(|i| match (tried.falls[i], tried.at_horizon[i]) {
-                (true, _) => "f",
-                (false, true) => "y",
-                (false, false) => "n",
-            });
-            let settle = tried.in_the_end.iter().filter(|&&settles| settles).count();
-            vec![
-                tried.changed.to_owned(),
-                letters.collect::<Vec<_>>().join(" "),
-                format!("{settle} of 7"),
-                tried
-                    .horizons_s
-                    .map_or("none".to_owned(), |[first, last]| format!("{first:.2} to {last:.2} s")),
-            ]
-        })
-        .collect();
+fn sensitivity(settling: &Settling) -> String {
+    let row = |tried: &Sensitivity| {
+        let letters = (0..7).map(|i| match (tried.falls[i], tried.at_horizon[i]) {
+            (true, _) => "f",
+            (false, true) => "y",
+            (false, false) => "n",
+        });
+        let settle = tried.in_the_end.iter().filter(|&&settles| settles).count();
+        let horizons =
+            tried.horizons_s.map_or("none".to_owned(), |[first, last]| format!("{first:.2} to {last:.2} s"));
+        vec![
+            tried.changed.to_owned(),
+            letters.collect::<Vec<_>>().join(" "),
+            format!("{settle} of 7"),
+            horizons,
+        ]
+    };
+    let rows: Vec<Vec<String>> = settling.sensitivity.iter().map(row).collect();
     let settled = format!("settled at {LONGEST_S} s");
     let header = ["changed", "ts = 3 … 9 s", settled.as_str(), "runs that give the paper's verdicts"];
-    text + &markdown_table(&header, 4, &rows)
+    format!(
+        "\nWhat else was tried, one change at a time (f: falls, n: stands, not within 2 % at {HORIZON_S} s, y: stabilised):\n\n{}",
+        markdown_table(&header, 4, &rows)
+    )
 }
 
 fn yes(verdict: bool) -> &'static str {

@@ -9,13 +9,18 @@ use upright_design::plant::reference::Tolerance;
 use upright_design::rig::{Chain, PlantDescription, PolePlacement, Rig};
 use upright_design::simulate::FallKind;
 use upright_tool::reproduce::{
-    ContinuousRun, Course, Loop, Loops, Reproduction, Robustness, STAGES, Verdict, continuous_margins,
-    paper_rig, printed, published, reproduce,
+    ContinuousRun, Course, Loop, Loops, PaperRigs, Reproduction, Robustness, STAGES, Verdict,
+    continuous_margins, printed, published, reproduce,
 };
+
+static RIGS: LazyLock<PaperRigs> = LazyLock::new(|| {
+    let folder = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../../rigs");
+    PaperRigs::from_folder(&folder).unwrap()
+});
 
 static ALL: LazyLock<Reproduction> = LazyLock::new(|| {
     let stages = Cell::new(0);
-    let all = reproduce(&|_| stages.set(stages.get() + 1)).unwrap();
+    let all = reproduce(&RIGS, &|_| stages.set(stages.get() + 1)).unwrap();
     assert_eq!(stages.get(), STAGES);
     all
 });
@@ -124,7 +129,7 @@ fn printed_law(k: [&str; 10]) -> Feedback<f64> {
 /// on which these three agree.
 #[test]
 fn a_step_of_one_metre_with_the_printed_gains_is_the_one_other_programs_find() {
-    let rig = paper_rig().unwrap();
+    let rig = RIGS.exact.clone();
     for (law, wanted) in [
         (printed_law(published::LQR_K), (1.68, 1.76, 2.11, [12.31, 1.49, 1.34, 1.03], 3.16)),
         (printed_law(published::PLACEMENT_K), (1.02, 1.05, 5.09, [8.48, 6.71, 2.30, 0.87], 11.01)),
@@ -276,7 +281,7 @@ fn what_else_was_tried_on_table_2_is_pinned() {
 
 #[test]
 fn a_run_that_falls_falls_at_any_tolerance() {
-    let mut rig = paper_rig().unwrap();
+    let mut rig = RIGS.exact.clone();
     if let Some(PolePlacement::Response { settling_time_s, .. }) = &mut rig.pole_placement {
         *settling_time_s = 4.0;
     }
@@ -385,11 +390,17 @@ fn every_joint_swings_slower_under_the_lqr_and_the_force_does_not() {
 
 #[test]
 fn a_rig_with_one_law_or_without_links_is_refused_with_a_remedy() {
-    let one_law = Rig { lqr: None, ..paper_rig().unwrap() };
+    let one_law = Rig { lqr: None, ..RIGS.exact.clone() };
     let message = Loops::of(&one_law).unwrap_err().to_string();
     assert!(message.contains("add [lqr]"), "{message}");
-    let message = Loops::of(&upright_tool::reproduce::printed_rig().unwrap()).unwrap_err().to_string();
+    let message = Loops::of(&RIGS.printed).unwrap_err().to_string();
     assert!(message.contains("[cart]"), "{message}");
+}
+
+#[test]
+fn a_folder_without_the_rig_files_is_refused_with_a_remedy() {
+    let message = PaperRigs::from_folder(std::path::Path::new("no-such-folder")).unwrap_err().to_string();
+    assert!(message.contains("quadruple-paper.toml") && message.contains("--rigs"), "{message}");
 }
 
 /// Every number that is printed.

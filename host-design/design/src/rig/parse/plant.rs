@@ -3,10 +3,8 @@
 use crate::rig::error::RigError;
 use crate::rig::node::{Node, Section};
 use crate::rig::rule::Rule;
-use crate::rig::{Cart, Chain, LinearPlant, Link, LinkEncoder, PlantDescription, defaults};
+use crate::rig::{Cart, Chain, LinearPlant, Link, LinkEncoder, MAX_LINKS, PlantDescription, defaults};
 
-/// Most links of a chain.
-const MOST_LINKS: usize = 14;
 /// Highest order of a linear model.
 const MOST_STATES: usize = 60;
 
@@ -42,8 +40,8 @@ fn chain(root: &Section<'_>) -> Result<Chain, RigError> {
     let cart = self::cart(&cart)?;
     let links = root.need("link", LINKS)?;
     let entries = links.list("a list of tables", LINKS)?;
-    if !(1..=MOST_LINKS).contains(&entries.len()) {
-        return Err(links.wrong_length(entries.len(), &format!("1 to {MOST_LINKS}"), LINKS));
+    if !(1..=MAX_LINKS).contains(&entries.len()) {
+        return Err(links.wrong_length(entries.len(), &format!("1 to {MAX_LINKS}"), LINKS));
     }
     Ok(Chain {
         cart,

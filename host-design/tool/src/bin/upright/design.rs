@@ -9,6 +9,7 @@ use upright_design::design::{Assessment, Certified, design};
 use upright_design::rig::Rig;
 use upright_design::simulate::{Scenario, Summary, simulate};
 use upright_design::table::{Gains, TableValues, gains_source, write_atomically};
+use upright_tool::project::checkout;
 
 use crate::failure::Failure;
 use crate::progress::with_spinner;
@@ -81,11 +82,11 @@ impl Design {
         let table = table.map_err(|source| Failure::NoTable { rig: name(), source })?;
         refuse_failing_table(&rig, &reports)?;
         let source = gains_source(&rig, &table);
-        let path = self.out.unwrap_or_else(default_table);
+        let path = self.out.map_or_else(default_table, Ok)?;
         if self.check {
             return check(&path, &source);
         }
-        if std::fs::read_to_string(&path).is_ok_and(|found| found == source) {
+        if std::fs::read_to_string(&path).is_ok_and(|found| first_difference(&found, &source).is_none()) {
             // A new time stamp alone would have the firmware compiled again.
             eprintln!("{} is up to date", path.display());
             return Ok(());
@@ -145,22 +146,47 @@ fn refuse_failing_table(rig: &Rig, reports: &[LawReport]) -> Result<(), Failure>
     Ok(())
 }
 
-/// `src/gains.rs` of the checkout this tool was built from.
-fn default_table() -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("../../src/gains.rs")
+/// `src/gains.rs` of the checkout.
+fn default_table() -> Result<PathBuf, Failure> {
+    let checkout = checkout().map_err(|error| {
+        Failure::BadArgument(format!("{error}; or give the file for the gain table with --out FILE"))
+    })?;
+    Ok(checkout.join("src").join("gains.rs"))
 }
 
+/// Whatever ends the lines of the file, as a checkout on Windows may have changed that.
 fn check(path: &Path, source: &str) -> Result<(), Failure> {
     let found = std::fs::read_to_string(path)
         .map_err(|error| Failure::CheckFailed(format!("{}: cannot be read: {error}", path.display())))?;
-    if found == source {
+    let Some(line) = first_difference(&found, source) else {
         eprintln!("{} is up to date", path.display());
         return Ok(());
-    }
-    let differing = found.lines().zip(source.lines()).position(|(found, wanted)| found != wanted);
-    let line = differing.unwrap_or_else(|| found.lines().count().min(source.lines().count())) + 1;
+    };
     Err(Failure::CheckFailed(format!(
         "{}:{line}: differs from what `upright design` would write; run it without --check",
         path.display()
     )))
+}
+
+/// The first line, counted from 1, in which two texts differ.
+fn first_difference(found: &str, wanted: &str) -> Option<usize> {
+    let (mut found, mut wanted) = (found.lines(), wanted.lines());
+    (1..).map(|line| (line, found.next(), wanted.next())).find_map(|lines| match lines {
+        (_, None, None) => Some(None),
+        (line, found, wanted) if found != wanted => Some(Some(line)),
+        _ => None,
+    })?
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn line_ends_are_no_difference_and_everything_else_is() {
+        assert_eq!(first_difference("a\r\nb\r\n", "a\nb\n"), None);
+        assert_eq!(first_difference("a\nc\n", "a\nb\n"), Some(2));
+        assert_eq!(first_difference("a\n", "a\nb\n"), Some(2));
+        assert_eq!(first_difference("a\nb\n\n", "a\nb\n"), Some(3));
+    }
 }

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 
 use clap::Args;
 use upright_design::table::write_atomically;
-use upright_tool::reproduce::{STAGES, reproduce};
+use upright_tool::reproduce::{PaperRigs, STAGES, reproduce};
 
 use crate::failure::Failure;
 use crate::progress::with_stages;
@@ -16,9 +16,12 @@ use crate::progress::with_stages;
 #[command(before_help = "\
 Examples:
   upright reproduce                          prints the comparison; figures, data and summary go to reproduced/
-  upright reproduce --out /tmp/paper
+  upright reproduce --rigs ../upright/rigs --out paper      from another folder
   upright reproduce --no-write --json | jq '.designs.rows[] | select(.verdict != \"every_digit\")'")]
 pub(crate) struct Reproduce {
+    /// Folder of the rig files quadruple-paper.toml and quadruple-paper-printed.toml
+    #[arg(long, value_name = "DIR", default_value = "rigs")]
+    rigs: PathBuf,
     /// Folder for summary.md and all figures (SVG) and their data (CSV)
     #[arg(long, value_name = "DIR", default_value = "reproduced")]
     out: PathBuf,
@@ -32,12 +35,13 @@ pub(crate) struct Reproduce {
 
 impl Reproduce {
     pub(crate) fn run(self) -> Result<(), Failure> {
+        let rigs = PaperRigs::from_folder(&self.rigs)?;
         if !self.no_write {
             std::fs::create_dir_all(&self.out).map_err(|error| {
                 Failure::BadArgument(format!("--out {}: cannot be made: {error}", self.out.display()))
             })?;
         }
-        let found = with_stages(STAGES, reproduce)?;
+        let found = with_stages(STAGES, |stage| reproduce(&rigs, stage))?;
         if !self.no_write {
             let files = found.files()?;
             for (name, contents) in &files {
