@@ -127,7 +127,7 @@ fn golden(recording: &Recording) -> String {
     text
 }
 
-/// The committed traces. `UPRIGHT_BLESS=1 cargo test --test in_the_loop` writes them anew.
+/// The committed traces. With UPRIGHT_BLESS=1 in the environment this writes them again.
 #[test]
 fn the_runs_are_those_of_the_committed_traces() {
     let (rig, table) = quadruple();

@@ -1,4 +1,4 @@
-//! The wiring in the README is the one that the image sets up.
+//! The wiring in docs/board.md is the one that the image sets up.
 
 #[path = "../../src/board/f4/wiring.rs"]
 #[allow(dead_code, unreachable_pub)]
@@ -6,7 +6,7 @@ mod wiring;
 
 use wiring::{LIGHTS, WIRING, Wire};
 
-const README: &str = include_str!("../../README.md");
+const PAGE: &str = include_str!("../../docs/board.md");
 
 fn row(wire: &Wire) -> String {
     let pull_up = if wire.pull_up { "pull-up" } else { "" };
@@ -16,7 +16,7 @@ fn row(wire: &Wire) -> String {
 /// The rows of the table between the markers, without its two lines of heading.
 fn documented(text: &str) -> Vec<&str> {
     let table = text.split_once("<!-- wiring -->").and_then(|(_, rest)| rest.split_once("<!-- /wiring -->"));
-    table.expect("README.md has no wiring table").0.trim().lines().skip(2).collect()
+    table.expect("docs/board.md has no wiring table").0.trim().lines().skip(2).collect()
 }
 
 fn defined() -> Vec<String> {
@@ -24,11 +24,11 @@ fn defined() -> Vec<String> {
 }
 
 #[test]
-fn the_readme_shows_the_wiring_of_the_image() {
-    assert_eq!(documented(README), defined(), "write src/board/f4/wiring.rs's table into README.md");
+fn the_page_shows_the_wiring_of_the_image() {
+    assert_eq!(documented(PAGE), defined(), "write src/board/f4/wiring.rs's table into docs/board.md");
 }
 
 #[test]
-fn a_wrong_pin_in_the_readme_is_noticed() {
-    assert_ne!(documented(&README.replace("| PB12 |", "| PB11 |")), defined());
+fn a_wrong_pin_on_the_page_is_noticed() {
+    assert_ne!(documented(&PAGE.replace("| PB12 |", "| PB11 |")), defined());
 }

@@ -1,8 +1,19 @@
-//! From a rig file to a model, certified gains, the gain table and a verdict on the closed loop.
+#![doc = include_str!("../README.md")]
 //!
-//! Data flows in the order of the modules: [`rig`] → [`plant`] → [`design`] → [`table`] → [`simulate`] → [`verify`], on top of
-//! [`numerics`]. The control law itself is not here: a simulation runs the firmware's own controller from the crate
-//! `upright`.
+//! # Modules
+//!
+//! Data flows in this order, on top of [`numerics`]:
+//!
+//! | module | from | to |
+//! |---|---|---|
+//! | [`rig`] | a file in TOML | checked values in SI units |
+//! | [`plant`] | masses, lengths, friction | equations of motion, linear model |
+//! | [`design`] | linear model, weights, poles, noise | certified gains and observer |
+//! | [`table`] | gains and limits | the gain table of the firmware, as values and as Rust source |
+//! | [`simulate`] | table and scenario | a run of the firmware's controller against the nonlinear plant |
+//! | [`verify`] | table and requirements | the trust report |
+//!
+//! The control law itself is not here: a simulation runs the firmware's own controller from the crate `upright`.
 
 #![forbid(unsafe_code)]
 

@@ -29,8 +29,11 @@ Examples:
   upright reproduce                             the results of the paper beside ours
 
 Exit status:
-  0  done        1  a check failed: the pendulum falls, a requirement is not met, a file differs
-  2  bad input   3  the design problem has no solution        4  a needed program is missing";
+  0  done
+  1  a check failed: the pendulum falls, a requirement is not met, a fault is missed, a file differs
+  2  bad input: a rig file, an argument, a file that cannot be written
+  3  the design problem has no solution
+  4  a needed program is missing";
 
 /// Designs, emits and proves the gains that balance an n-link inverted pendulum on a cart.
 #[derive(Parser)]

@@ -1,0 +1,231 @@
+//! Tables in the documents are those of the source. With UPRIGHT_BLESS=1 in the environment, they are written there.
+
+use std::collections::BTreeSet;
+use std::process::Command;
+
+use ratatui::crossterm::event::{KeyCode, KeyEvent, KeyModifiers};
+use upright::supervision::fault::Fault;
+use upright::supervision::inhibits::Reasons;
+use upright_tool::campaign::Kind;
+use upright_tool::image::{FLASH_LIMIT, RAM_LIMIT};
+use upright_tool::monitor::{Action, action, request};
+
+use crate::documents::{read, root};
+use crate::published::rig_path;
+
+fn upright(arguments: &[&str]) -> String {
+    let output = Command::new(env!("CARGO_BIN_EXE_upright")).args(arguments).output().unwrap();
+    String::from_utf8(output.stdout).unwrap()
+}
+
+/// What stands between the markers called `name`.
+fn between<'a>(page: &'a str, name: &str) -> Option<&'a str> {
+    let (_, rest) = page.split_once(&format!("<!-- {name} -->"))?;
+    Some(rest.split_once(&format!("<!-- /{name} -->"))?.0.trim())
+}
+
+/// Asserts that the table called `name` in `file` is `wanted`, or writes it there.
+fn hold(file: &str, name: &str, wanted: &str) {
+    let page = read(file);
+    let found = between(&page, name).unwrap_or_else(|| panic!("{file} has no <!-- {name} -->"));
+    if std::env::var_os("UPRIGHT_BLESS").is_some() && found != wanted.trim() {
+        let (before, rest) = page.split_once(&format!("<!-- {name} -->")).unwrap();
+        let (_, after) = rest.split_once(&format!("<!-- /{name} -->")).unwrap();
+        let page = format!("{before}<!-- {name} -->\n{}\n<!-- /{name} -->{after}", wanted.trim());
+        return std::fs::write(root().join(file), page).unwrap();
+    }
+    assert_eq!(found, wanted.trim(), "put this between the markers in {file}:\n{wanted}");
+}
+
+/// The first cell of each row of a table, and the others.
+fn rows(table: &str) -> Vec<Vec<&str>> {
+    let cells = |line| -> Vec<&str> { str::trim_matches(line, '|').split('|').map(str::trim).collect() };
+    table.lines().skip(2).map(cells).collect()
+}
+
+fn faults() -> String {
+    let mut table = String::from(
+        "| code | fault | condition | ticks to motor off | what to do |\n|---|---|---|---|---|\n",
+    );
+    for entry in Fault::ALL {
+        table += &format!(
+            "| {} | {} | {} | {} | {} |\n",
+            entry.fault.code(),
+            entry.name,
+            entry.condition,
+            entry.reaction,
+            entry.remedy
+        );
+    }
+    table
+}
+
+fn inhibits() -> String {
+    let rows = Reasons::ALL.iter().map(|(_, text)| match text.split_once(": ") {
+        Some((reason, remedy)) => format!("| {reason} | {remedy} |\n"),
+        None => format!("| {text} | |\n"),
+    });
+    "| reason | what to do |\n|---|---|\n".to_owned() + &rows.collect::<String>()
+}
+
+fn defects() -> String {
+    let rows = Kind::ALL.iter().map(|(_, name, what, _)| format!("| `{name}` | {what} |\n"));
+    "| kind | defect |\n|---|---|\n".to_owned() + &rows.collect::<String>()
+}
+
+/// The statuses that `upright --help` lists.
+fn exit_statuses(help: &str) -> String {
+    let list = help.split_once("Exit status:\n").unwrap().1.split_once("\n\n").unwrap().0;
+    let row = |line: &str| {
+        let (status, meaning) = line.trim().split_once("  ").unwrap();
+        format!("| {status} | {meaning} |\n")
+    };
+    "| status | meaning |\n|---|---|\n".to_owned() + &list.lines().map(row).collect::<String>()
+}
+
+/// Names of the commands that a help text lists.
+fn commands(help: &str) -> BTreeSet<&str> {
+    let list = help.split_once("Commands:\n").unwrap().1.split_once("\n\n").unwrap().0;
+    let names = list.lines().filter_map(|line| line.strip_prefix("  ")?.split_once(' '));
+    names.map(|(name, _)| name).filter(|name| !name.is_empty() && *name != "help").collect()
+}
+
+#[test]
+fn the_page_about_faults_holds_the_table_of_the_source() {
+    hold("docs/faults.md", "faults", &faults());
+}
+
+#[test]
+fn the_page_about_faults_holds_the_reasons_against_a_command() {
+    hold("docs/faults.md", "inhibits", &inhibits());
+}
+
+#[test]
+fn the_page_about_faults_holds_the_kinds_of_defects() {
+    hold("docs/faults.md", "defects", &defects());
+}
+
+#[test]
+fn the_page_about_commands_holds_the_exit_statuses_of_the_help() {
+    hold("docs/commands.md", "exit statuses", &exit_statuses(&upright(&["--help"])));
+}
+
+#[test]
+fn a_changed_word_of_a_table_would_be_noticed() {
+    for table in [faults(), inhibits(), defects(), exit_statuses(&upright(&["--help"]))] {
+        let page = format!("before\n<!-- x -->\n{table}\n<!-- /x -->\nafter");
+        assert_eq!(between(&page, "x"), Some(table.trim()));
+        let word = table.trim().rsplit(' ').nth(1).unwrap();
+        assert_ne!(between(&page.replacen(word, "leant", 1), "x"), Some(table.trim()));
+    }
+    assert_eq!(between("no table", "x"), None);
+}
+
+#[test]
+fn every_command_is_listed_with_its_guide() {
+    let all = upright(&["--help"]);
+    let firmware = upright(&["firmware", "--help"]);
+    let mut wanted: BTreeSet<String> = commands(&all).iter().map(|&name| name.to_owned()).collect();
+    assert!(wanted.remove("firmware"));
+    wanted.extend(commands(&firmware).iter().map(|name| format!("firmware {name}")));
+    let page = read("docs/commands.md");
+    let rows = rows(between(&page, "commands").unwrap());
+    let listed: BTreeSet<String> = rows.iter().map(|row| row[0].trim_matches('`').to_owned()).collect();
+    assert_eq!(listed, wanted);
+    // Negative control: a help text with one more.
+    let more = all.replacen("Commands:\n", "Commands:\n  dance  Dances\n", 1);
+    assert!(commands(&more).contains("dance") && !listed.contains("dance"));
+}
+
+/// The key codes of a cell such as `d` or space.
+fn keys(cell: &str) -> Vec<KeyCode> {
+    let key = |word: &str| match word {
+        "←" => KeyCode::Left,
+        "→" => KeyCode::Right,
+        "space" => KeyCode::Char(' '),
+        _ => KeyCode::Char(word.trim_matches('`').chars().next().unwrap()),
+    };
+    cell.split(" or ").map(key).collect()
+}
+
+fn meaning(code: KeyCode) -> Option<Action> {
+    action(&KeyEvent::new(code, KeyModifiers::NONE))
+}
+
+#[test]
+fn every_key_of_the_monitor_is_listed_with_the_line_that_does_the_same() {
+    let page = read("docs/in-the-loop.md");
+    let mut listed = Vec::new();
+    for row in rows(between(&page, "keys of the monitor").unwrap()) {
+        for code in keys(row[0]) {
+            let meaning = meaning(code).unwrap_or_else(|| panic!("{row:?}: this key does nothing"));
+            let line = row[2].trim_matches('`');
+            if !line.is_empty() && !line.contains(' ') || line == "set-point 0" {
+                assert_eq!(meaning, Action::Send(request(line).unwrap()), "{row:?}");
+            }
+            listed.push(code);
+        }
+    }
+    let printable = (' '..='~').map(KeyCode::Char);
+    for code in printable.chain([KeyCode::Left, KeyCode::Right, KeyCode::Up, KeyCode::Down, KeyCode::Enter]) {
+        assert_eq!(meaning(code).is_some(), listed.contains(&code), "{code:?}");
+    }
+    // Negative control: a key that means something else than a line.
+    assert_ne!(meaning(KeyCode::Char('a')), Some(Action::Send(request("disarm").unwrap())));
+}
+
+/// Whether a row's name is explained: by itself, or by one that ends in `…`.
+fn explains(listed: &str, name: &str) -> bool {
+    match listed.trim_matches('`').strip_suffix('…') {
+        Some(beginning) => name.starts_with(beginning),
+        None => listed.trim_matches('`') == name,
+    }
+}
+
+#[test]
+fn every_row_of_verify_is_explained() {
+    let rig = rig_path("single-quanser-ip02");
+    let report = upright(&["verify", rig.to_str().unwrap(), "--law", "lqr", "--runs", "1"]);
+    let (figures, _) = report.split_once("\nrequirements").unwrap();
+    // Two spaces, then the name in 24 columns; a line without a name continues the one above.
+    let names: Vec<&str> = figures
+        .lines()
+        .filter_map(|line| line.strip_prefix("  ")?.get(..24).map(str::trim))
+        .filter(|name| !name.is_empty())
+        .collect();
+    let page = read("docs/trust.md");
+    let table = rows(between(&page, "rows of verify").unwrap());
+    let explained = |name: &str| table.iter().any(|row| explains(row[0], name));
+    for name in &names {
+        assert!(explained(name), "docs/trust.md does not explain `{name}`");
+    }
+    for row in &table {
+        assert!(names.iter().any(|name| explains(row[0], name)), "verify prints no {}", row[0]);
+    }
+    assert!(names.len() > 20 && !explained("luck margin") && !explained("RMS"));
+}
+
+#[test]
+fn the_readme_shows_what_design_prints() {
+    let rig = rig_path("quadruple-paper");
+    let printed = upright(&["design", rig.to_str().unwrap(), "--no-write"]);
+    let shown_by = |line: &str| printed.lines().any(|printed| printed.trim() == line.trim());
+    let page = read("README.md");
+    let block: Vec<&str> =
+        page.lines().filter(|line| line.starts_with("    ") && line.trim() != "…").collect();
+    assert!(block.len() > 8, "{block:?}");
+    for line in block {
+        assert!(shown_by(line), "README.md: `design` does not print\n{line}");
+    }
+    assert!(!shown_by("K       3.16228  3.68443"));
+}
+
+#[test]
+fn the_page_about_the_board_names_the_limits_of_the_image() {
+    let limits = |flash: u32, ram: u32| {
+        format!("more than {} KiB of flash or {} KiB of static RAM", flash / 1024, ram / 1024)
+    };
+    let page = read("docs/board.md");
+    assert!(page.contains(&limits(FLASH_LIMIT, RAM_LIMIT)));
+    assert!(!page.contains(&limits(2 * FLASH_LIMIT, RAM_LIMIT)));
+}
