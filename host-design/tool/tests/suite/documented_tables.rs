@@ -112,7 +112,7 @@ fn the_page_about_commands_holds_the_exit_statuses_of_the_help() {
 
 #[test]
 fn a_changed_word_of_a_table_would_be_noticed() {
-    for table in [faults(), inhibits(), defects(), exit_statuses(&upright(&["--help"]))] {
+    for table in [faults(), inhibits(), defects(), quantities(), exit_statuses(&upright(&["--help"]))] {
         let page = format!("before\n<!-- x -->\n{table}\n<!-- /x -->\nafter");
         assert_eq!(between(&page, "x"), Some(table.trim()));
         let word = table.trim().rsplit(' ').nth(1).unwrap();
@@ -174,6 +174,20 @@ fn every_key_of_the_monitor_is_listed_with_the_line_that_does_the_same() {
     assert_ne!(meaning(KeyCode::Char('a')), Some(Action::Send(request("disarm").unwrap())));
 }
 
+/// Names and meanings of the trust report; a name that ends in a space is followed by a link or a source.
+fn quantities() -> String {
+    let rows = upright_design::verify::quantities().map(|quantity| {
+        let more = if quantity.name.ends_with(' ') { "…" } else { "" };
+        format!("| `{}{more}` | {} |\n", quantity.name, quantity.meaning)
+    });
+    "| row | meaning |\n|---|---|\n".to_owned() + &rows.collect::<String>()
+}
+
+#[test]
+fn the_page_about_trust_holds_the_meanings_of_the_source() {
+    hold("docs/trust.md", "rows of verify", &quantities());
+}
+
 /// Whether a row's name is explained: by itself, or by one that ends in `…`.
 fn explains(listed: &str, name: &str) -> bool {
     match listed.trim_matches('`').strip_suffix('…') {
@@ -187,19 +201,19 @@ fn every_row_of_verify_is_explained() {
     let rig = rig_path("single-quanser-ip02");
     let report = upright(&["verify", rig.to_str().unwrap(), "--law", "lqr", "--runs", "1"]);
     let (figures, _) = report.split_once("\nrequirements").unwrap();
-    // Two spaces, then the name in 24 columns; a line without a name continues the one above.
+    // Two spaces, then the name in 26 columns; a line without a name continues the one above.
     let names: Vec<&str> = figures
         .lines()
-        .filter_map(|line| line.strip_prefix("  ")?.get(..24).map(str::trim))
+        .filter_map(|line| line.strip_prefix("  ")?.get(..26).map(str::trim))
         .filter(|name| !name.is_empty())
         .collect();
     let page = read("docs/trust.md");
-    let table = rows(between(&page, "rows of verify").unwrap());
-    let explained = |name: &str| table.iter().any(|row| explains(row[0], name));
+    let tables = ["rows of verify", "further rows of verify"].map(|name| rows(between(&page, name).unwrap()));
+    let explained = |name: &str| tables.iter().flatten().any(|row| explains(row[0], name));
     for name in &names {
         assert!(explained(name), "docs/trust.md does not explain `{name}`");
     }
-    for row in &table {
+    for row in tables.iter().flatten() {
         assert!(names.iter().any(|name| explains(row[0], name)), "verify prints no {}", row[0]);
     }
     assert!(names.len() > 20 && !explained("luck margin") && !explained("RMS"));
