@@ -5,7 +5,7 @@ use std::process::Command;
 
 use ratatui::crossterm::event::{KeyCode, KeyEvent, KeyModifiers};
 use upright::supervision::fault::Fault;
-use upright::supervision::inhibits::Reasons;
+use upright::supervision::inhibits::Inhibits;
 use upright_tool::campaign::Kind;
 use upright_tool::image::{FLASH_LIMIT, RAM_LIMIT};
 use upright_tool::monitor::{Action, action, request};
@@ -61,7 +61,7 @@ fn faults() -> String {
 }
 
 fn inhibits() -> String {
-    let rows = Reasons::ALL.iter().map(|(_, text)| match text.split_once(": ") {
+    let rows = Inhibits::ALL.iter().map(|(_, text)| match text.split_once(": ") {
         Some((reason, remedy)) => format!("| {reason} | {remedy} |\n"),
         None => format!("| {text} | |\n"),
     });
