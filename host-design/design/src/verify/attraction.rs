@@ -1,4 +1,4 @@
-//! How far the rig may lean or jump at the start and still come back, on the nonlinear plant.
+//! Region of attraction on the nonlinear plant: the largest initial tilts and the largest step from which the loop recovers.
 
 use rayon::prelude::*;
 use serde::Serialize;
@@ -9,15 +9,15 @@ use crate::rig::Rig;
 use crate::simulate::{Scenario, SimulationError};
 use crate::table::TableValues;
 
-/// How the edges are looked for.
+/// Settings of the search for the edges of the region.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct AttractionSettings {
-    /// Length of each run and what counts as back near rest, before it is [widened](Horizon::widened) for the law's own
-    /// unrest; the position's band is also at least a tenth of a step.
+    /// Length of each run and what counts as back near rest, before it is [widened](Horizon::widened) for the law's
+    /// limit cycle; the position's band is also at least a tenth of a step.
     pub horizon: Horizon,
-    /// Width to which an edge is found, relative to it.
+    /// Relative precision of an edge.
     pub relative: f64,
-    /// Largest angle tried (rad).
+    /// Largest initial angle tried (rad).
     pub largest_angle_rad: f64,
     /// Largest step tried (m).
     pub largest_step_m: f64,
@@ -29,7 +29,7 @@ impl Default for AttractionSettings {
     }
 }
 
-/// The largest start from which a run still stands.
+/// The largest initial deviation from which a run still recovers.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Edge {
     /// Its size (rad or m); 0 if not even the smallest one tried (1/10000 of the largest) stands.
@@ -40,7 +40,7 @@ pub struct Edge {
     pub at_largest_tried: bool,
 }
 
-/// Edge for one link leaning alone, all others upright (those above it stand beside their place, but vertical).
+/// Edge for one link leaning alone, all others upright (those above it are displaced, but vertical).
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Tilt {
     /// The link, from 1.
@@ -60,7 +60,7 @@ pub struct WorstTilt {
     pub tried: usize,
 }
 
-/// How far the rig may be away from rest at the start.
+/// Largest initial deviations from rest.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Attraction {
     /// The law's name, as in the table.
@@ -82,10 +82,10 @@ const LINKS_FOR_ALL_SIDES: usize = 7;
 /// Finds the edges for `law` by doubling and bisection (see [`AttractionSettings`]): no fall within the horizon, and
 /// near rest at its end. Runs are without noise, from encoders if the table has an observer.
 ///
-/// Of two mirror images only one is tried if the rail is symmetric: then so is the loop.
+/// Of two mirror images only one is tried if the rail is symmetric, because then the loop is, too.
 ///
 /// # Errors
-/// [`Unverifiable`] if the runs cannot be started or a setting makes no sense.
+/// [`Unverifiable`] if the runs cannot be started or a setting is invalid.
 pub fn attraction(
     rig: &Rig,
     table: &TableValues,
@@ -236,7 +236,8 @@ pub struct Map {
     pub settled_s: Vec<Vec<Option<f64>>>,
 }
 
-/// Runs every start of the plane, with `horizon` [widened](Horizon::widened) for the law's own unrest. `done` hears of each run that ends, from any thread.
+/// Runs every start of the plane, with `horizon` [widened](Horizon::widened) for the law's limit cycle. `done` is called
+/// after each run, from any thread.
 ///
 /// # Errors
 /// [`Unverifiable`] if the runs cannot be started or an axis names no state.

@@ -1,4 +1,4 @@
-//! Why each gain can be believed: residual, agreeing precisions, condition.
+//! Evidence for each gain: residual, agreeing precisions, condition.
 
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
@@ -18,8 +18,8 @@ pub struct Certificate {
     pub gain: String,
     /// The two precisions (bits) that gave the same `f32` and `f64`.
     pub bits: [usize; 2],
-    /// Of an LQR or Kalman gain: what is left when the solution is put into its Riccati equation, relative to
-    /// the sum of the norms of the terms. Of a pole placement: the largest distance of a requested pole from the
+    /// Of an LQR or Kalman gain: residual of the solution in its Riccati equation, relative to the
+    /// sum of the norms of the terms. Of a pole placement: the largest distance of a requested pole from the
     /// nearest pole of the loop.
     pub residual: f64,
     /// Largest relative change of the gain per relative change of the plant: `max |ΔK| / max |K| / 1e-20` for
@@ -96,7 +96,7 @@ impl Certificates {
         })
     }
 
-    /// Those of the gains that run with `law`.
+    /// Those of the gains used with `law`.
     pub(super) fn of_law(&self, law: Law) -> Vec<Certificate> {
         let law = if law == Law::Lqr { &self.lqr } else { &self.placement };
         law.iter().chain(&self.observer).cloned().collect()

@@ -1,4 +1,4 @@
-//! Wrong masses: every combination of too light and too heavy, and each mass alone.
+//! Mass errors: every combination of too light and too heavy, and each mass alone.
 
 use rayon::prelude::*;
 use serde::Serialize;
@@ -12,14 +12,14 @@ use crate::rig::{PlantDescription, Rig};
 use crate::simulate::{Scenario, SimulationError};
 use crate::table::TableValues;
 
-/// The run that every wrong plant has to stand.
+/// The run in which every plant with mass errors has to stand.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct CornerSettings {
     /// Length of the run (s).
     pub duration_s: f64,
-    /// What disturbs it.
+    /// Its disturbances.
     pub disturbance: Disturbance,
-    /// Angle from the vertical of every link at the start (rad): the whole chain leans.
+    /// Initial angle of every link from the vertical (rad): the whole chain leans.
     pub tilt_rad: f64,
     /// Seed of the disturbances, the same in every run.
     pub seed: u64,
@@ -36,9 +36,9 @@ impl CornerSettings {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Mass {
-    /// The cart's.
+    /// The cart.
     Cart,
-    /// That of this link, from 1.
+    /// This link, counted from 1.
     Link(usize),
 }
 
@@ -51,19 +51,19 @@ impl core::fmt::Display for Mass {
     }
 }
 
-/// One combination of wrong masses.
+/// One combination of mass errors.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Corner {
     /// For the cart and each link: +1 if the real mass is larger than in the rig file, -1 if smaller.
     pub signs: Vec<i8>,
-    /// What became of the run.
+    /// The outcome of the run.
     pub outcome: Outcome,
 }
 
 /// All combinations of masses that are wrong by the same percentage.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Corners {
-    /// How wrong each mass is (%).
+    /// Error of each mass (%).
     pub percent: f64,
     /// 2^(n+1).
     pub corners: usize,
@@ -78,8 +78,8 @@ pub struct Corners {
 /// With more links than this there are too many corners to try.
 pub(super) const MOST_LINKS: usize = 9;
 
-/// The rig with its masses, cart first, changed by `percent` times `factors`. An inertia that the rig file gives stays; one that
-/// it leaves to the default follows the mass.
+/// The rig with its masses, cart first, changed by `percent` times `factors`. An inertia given in the rig file stays; a
+/// default one follows the mass.
 pub fn wrong_masses(rig: &Rig, percent: f64, factors: &[f64]) -> Rig {
     let mut wrong = rig.clone();
     if let PlantDescription::Chain(chain) = &mut wrong.plant {
@@ -102,7 +102,7 @@ fn run_of(rig: &Rig, law: Law, settings: &CornerSettings) -> Scenario {
     }
 }
 
-/// Runs every corner of ±`percent` wrong cart and link masses; the controller stays the one of `table`.
+/// Runs every combination of cart and link masses wrong by ±`percent`; the controller stays that of `table`.
 ///
 /// # Errors
 /// [`Unverifiable`] for a model, a chain of more than 9 links, or runs that cannot be started.
@@ -159,7 +159,7 @@ pub fn largest_percent(
     Ok(step * held as f64)
 }
 
-/// How wrong one mass alone may be.
+/// Tolerance of one mass when it alone is wrong.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct MassTolerance {
     /// Which mass.
@@ -177,8 +177,8 @@ impl MassTolerance {
     }
 }
 
-/// For each mass how wrong it alone may be, by doubling from 0.1 % and bisection to a twentieth; the one to weigh best comes
-/// first.
+/// The tolerance of each mass when it alone is wrong, by doubling from 0.1 % and bisection to a twentieth; the most
+/// critical mass comes first.
 ///
 /// # Errors
 /// [`Unverifiable`] for a model, or runs that cannot be started.

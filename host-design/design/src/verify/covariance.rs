@@ -1,4 +1,4 @@
-//! What noise does to the loop at rest, predicted: encoder resolution, and the rig file's force and joint noise.
+//! Predicted ripple of the loop at rest from encoder resolution and the rig file's force and joint noise.
 
 use serde::Serialize;
 
@@ -13,7 +13,7 @@ use crate::rig::Rig;
 pub struct NoiseShare {
     /// Which: `encoder 1`, …, `force`, `joint 1`, …, or `total`.
     pub source: String,
-    /// RMS of the force that the law asks for (N).
+    /// RMS of the requested force (N).
     pub force_n: f64,
     /// RMS of every state (m, m/s, rad, rad/s …): cart and relative angles are every other one, from the first.
     pub states: Vec<f64>,
@@ -50,7 +50,7 @@ pub(super) fn covariance(
         }
     }
     let inputs = noise_columns(rig)?;
-    // The disturbances that the runs of this report use, too; an rms per tick is an intensity over the tick.
+    // The same disturbances as in the runs of this report. An intensity is variance times tick.
     let real = |rms: Option<f64>, expected: f64| rms.map_or(expected, |rms| rms * rms * rig.tick.period_s);
     let force = real(rig.verify.force_rms_n, noise.force_noise_n2_s);
     let joints = noise.joint_noise.iter().map(|&expected| real(rig.verify.torque_rms_n_m, expected));

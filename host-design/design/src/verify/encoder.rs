@@ -1,4 +1,4 @@
-//! How coarse the encoders may be.
+//! The coarsest encoders with which a law still stands.
 
 use rayon::prelude::*;
 use serde::Serialize;
@@ -11,18 +11,18 @@ use crate::rig::{LinkEncoder, PlantDescription, Rig};
 use crate::simulate::{Scenario, SimulationError};
 use crate::table::{Gains, TableValues};
 
-/// How the coarsest encoder is looked for.
+/// Settings of the search for the coarsest encoders.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct EncoderSettings {
     /// Length of each run (s).
     pub duration_s: f64,
-    /// What disturbs the runs.
+    /// Disturbances of the runs.
     pub disturbance: Disturbance,
     /// Runs that must all stand, with the seeds from 1.
     pub seeds: u64,
     /// Largest factor tried, at least 1.
     pub largest_factor: f64,
-    /// Width to which the factor is found, relative to it.
+    /// Relative precision of the factor.
     pub relative: f64,
 }
 
@@ -44,7 +44,8 @@ impl EncoderSettings {
 pub struct CoarsestEncoder {
     /// The law's name, as in the table.
     pub law: &'static str,
-    /// How many times coarser than in the rig file, cart and links alike; none if the rig's own do not do.
+    /// How many times coarser than in the rig file, cart and links alike; none if not even
+    /// the rig's own suffice.
     pub factor: Option<f64>,
     /// Whether the factor is the largest that was tried.
     pub at_largest_tried: bool,
@@ -76,8 +77,8 @@ pub fn coarser(rig: &Rig, factor: f64) -> Rig {
     coarse
 }
 
-/// Looks for the coarsest encoders by doubling and bisection of a common factor. For every factor the gains are designed
-/// anew, as a user with such encoders would: the observer knows how coarse they are.
+/// Finds the coarsest encoders by doubling and bisection of a common factor. The gains are redesigned for every factor, as
+/// a user with such encoders would do: the observer knows their resolution.
 ///
 /// # Errors
 /// [`Unverifiable`] for a model or a rig without observer, and if a design or run fails.

@@ -1,4 +1,4 @@
-//! What the linear model of the loop, as it will run, can tell.
+//! Results from the linear model of the loop as it will run.
 
 use serde::Serialize;
 use upright::table::Law;
@@ -12,7 +12,7 @@ use crate::table::TableValues;
 use super::{Certificate, LoopModel, Margins, NoiseShare, Rounding, TickLimits, Unverifiable};
 use super::{certificate, covariance, loop_model, margins, rounding, tick};
 
-/// Everything the linear model of the loop can tell about one law: sampled, delayed, with observer, with the table's
+/// Results from the linear model of the loop for one law: sampled, delayed, with observer, with the table's
 /// `f32` values.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct LinearReport {
@@ -26,11 +26,11 @@ pub struct LinearReport {
     pub stable: bool,
     /// Margins at the plant's input.
     pub margins: Option<Margins>,
-    /// Longer, shorter and uneven ticks.
+    /// Limits on longer, shorter and uneven ticks.
     pub tick: Option<TickLimits>,
     /// RMS by source of noise, the total last; none without `[kalman]`.
     pub noise: Option<Vec<NoiseShare>>,
-    /// What `f32` does; none if the table's gains are not those of the design.
+    /// Effect of `f32`; none if the table's gains are not those of the design.
     pub rounding: Option<Rounding>,
     /// Evidence for each gain; empty if the table's gains are not those designed for the tick.
     pub certificates: Vec<Certificate>,

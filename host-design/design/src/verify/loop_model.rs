@@ -8,7 +8,7 @@ use crate::numerics::{Matrix, Real};
 use crate::rig::Rig;
 use crate::table::{LawValues, TableValues};
 
-/// The plant from force to measurement, `x⁺ = A x + B u`, `y = C x`, with forces on their way as further states.
+/// The plant from force to measurement, `x⁺ = A x + B u`, `y = C x`, with pending forces as further states.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PlantModel<R> {
     a: Matrix<R>,
@@ -36,9 +36,9 @@ pub struct LoopModel<R> {
     pub force_input: Matrix<R>,
     /// F: where the error of each sensor enters.
     pub sensor_input: Matrix<R>,
-    /// C: the force that the law asks for.
+    /// C: the requested force.
     pub force_output: Matrix<R>,
-    /// D: what a sensor's error does to the force in the same tick.
+    /// D: effect of a sensor's error on the force in the same tick.
     pub sensor_to_force: Matrix<R>,
     /// Number of states of the plant.
     pub states: usize,
@@ -133,7 +133,7 @@ impl<R: Real> Numbers<R> {
     }
 }
 
-/// The states that reach the controller: those of its encoders, or all.
+/// The states that the controller measures: those of its encoders, or all.
 fn measured(table: &TableValues) -> Vec<usize> {
     match &table.observer {
         Some(observer) => observer.measured.iter().map(|&state| state as usize).collect(),

@@ -1,4 +1,4 @@
-//! Many runs with everything a little wrong at once.
+//! Monte Carlo: many runs with random errors in all parameters at once.
 
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
@@ -11,16 +11,16 @@ use crate::rig::{Chain, Link, PlantDescription, Rig};
 use crate::simulate::{Scenario, SimulationError};
 use crate::table::TableValues;
 
-/// From what range each run's plant and start are drawn, uniformly. A share of 0.02 means from -2 % to +2 %.
+/// The ranges from which each run's plant and start are drawn, uniformly. A share of 0.02 means from -2 % to +2 %.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Spread {
-    /// Of the cart's and each link's mass.
+    /// Range of the cart's and each link's mass.
     pub mass: f64,
-    /// Of each link's length; its centre of mass moves along.
+    /// Range of each link's length; its centre of mass moves along.
     pub length: f64,
-    /// Of each link's inertia, beyond what follows from mass and length (m l²).
+    /// Range of each link's inertia, beyond what follows from mass and length (m l²).
     pub inertia: f64,
-    /// Of the cart's and each joint's friction.
+    /// Range of the cart's and each joint's friction.
     pub friction: f64,
     /// Share of runs in which the force acts one tick later than the table was designed for (0 to 1); a rig designed
     /// for one tick of delay then has none.
@@ -34,7 +34,7 @@ pub struct Spread {
 }
 
 impl Spread {
-    /// ±2 % of masses, lengths and inertia, ±20 % of friction, what disturbances the rig file expects, and a start within
+    /// ±2 % of masses, lengths and inertia, ±20 % of friction, the disturbances that the rig file expects, and a start within
     /// ±0.5 mrad.
     pub fn of(rig: &Rig) -> Self {
         Self {
@@ -50,12 +50,12 @@ impl Spread {
     }
 }
 
-/// The run that went worst: the first to fall, or, if none falls, that with the largest angle.
+/// The worst run: the first to fall, or, if none falls, that with the largest angle.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct WorstCase {
-    /// Give it to [`sample`] to get plant and scenario again.
+    /// Seed with which [`sample`] returns its plant and scenario.
     pub seed: u64,
-    /// What became of it.
+    /// Its outcome.
     pub outcome: Outcome,
 }
 
@@ -72,7 +72,7 @@ pub struct MonteCarlo {
     pub success_rate: f64,
     /// 95 % confidence interval of the success rate (Wilson).
     pub interval: [f64; 2],
-    /// The run that went worst; none if there was none.
+    /// The worst run; none if there was no run.
     pub worst: Option<WorstCase>,
 }
 
@@ -120,10 +120,10 @@ fn draw_chain(chain: &mut Chain, spread: &Spread, between: &mut impl FnMut(f64) 
 }
 
 /// Makes `runs` runs with the seeds from `base_seed` on, on all threads; the outcome does not depend on their number. `done`
-/// hears of each run that ends, from any thread.
+/// is called after each run, from any thread.
 ///
 /// # Errors
-/// [`Unverifiable`] if a run cannot be started or a setting makes no sense.
+/// [`Unverifiable`] if a run cannot be started or a setting is invalid.
 pub fn monte_carlo(
     rig: &Rig,
     table: &TableValues,
@@ -164,7 +164,7 @@ pub fn monte_carlo(
     })
 }
 
-/// Whether `a` went worse than `b`: fell earlier, or fell where `b` stood, or, both standing, leaned further.
+/// Whether `a` is worse than `b`: fell earlier, or fell where `b` stood, or, both standing, leaned further.
 pub(super) fn is_worse(a: &Outcome, b: &Outcome) -> bool {
     match (&a.fall, &b.fall) {
         (Some(a), Some(b)) => a.at_s < b.at_s,

@@ -1,4 +1,4 @@
-//! What encoder steps and disturbances do over a long run.
+//! Ripple and endurance under encoder resolution and disturbances, in long runs.
 
 use rayon::prelude::*;
 use serde::Serialize;
@@ -125,7 +125,7 @@ pub struct Endurance {
     pub peak_force_n: f64,
 }
 
-/// Runs the nominal plant from rest for `duration_s` with each of the seeds 1 to `seeds`. `done` hears of each run that ends,
+/// Runs the nominal plant from rest for `duration_s` with each of the seeds 1 to `seeds`. `done` is called after each run,
 /// from any thread.
 ///
 /// # Errors

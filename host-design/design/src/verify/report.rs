@@ -1,4 +1,4 @@
-//! All of it for one rig, and the verdict against the rig file's `[verify]`.
+//! The whole trust report of a rig, and its verdict against the rig file's `[verify]`.
 
 use serde::Serialize;
 use upright::table::Law;
@@ -19,12 +19,12 @@ use crate::table::TableValues;
 pub struct TrustReport {
     /// One part for each law in the table.
     pub laws: Vec<LawTrust>,
-    /// Every requirement with what was found.
+    /// Every requirement and the value found.
     pub checks: Vec<Check>,
 }
 
-/// What was found for one law. Parts that a rig has no data for (masses of a `[model]`, encoders) are none, and so are
-/// the runs of a loop that is not even stable.
+/// What was found for one law. Parts for which a rig has no data (masses of a `[model]`, encoders) are none, and so are
+/// the runs of an unstable loop.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct LawTrust {
     /// Margins, tick, noise, rounding, certificates.
@@ -58,14 +58,14 @@ pub struct Check {
     pub holds: bool,
 }
 
-/// How much effort goes into the report.
+/// Size of the Monte Carlo part.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Effort {
     /// Monte Carlo runs for each law.
     pub runs: usize,
     /// Seed of the first of them.
     pub seed: u64,
-    /// Share of them in which the force comes one tick later than designed for.
+    /// Share of the runs with one tick more delay than designed for.
     pub late: f64,
 }
 
@@ -78,7 +78,7 @@ pub fn spread(rig: &Rig, late: f64) -> Spread {
 /// Makes the report. `done` is called after each Monte Carlo run, `stage` before each part.
 ///
 /// # Errors
-/// [`VerifyError`] if a figure cannot be computed.
+/// [`VerifyError`] if a value cannot be computed.
 pub fn trust(
     rig: &Rig,
     certified: &Certified,
@@ -126,7 +126,7 @@ fn law_trust(
         stage("coarsest encoder");
         trust.coarsest_encoder = known(coarsest_encoder(rig, law, &EncoderSettings::of(rig)))?;
     }
-    // Beyond that there are too many corners to try them all.
+    // With more links there are too many combinations to try.
     if is_chain && rig.states() / 2 - 1 <= MOST_LINKS {
         stage("mass errors");
         let settings = CornerSettings::of(rig);
@@ -143,7 +143,7 @@ fn law_trust(
     Ok(trust)
 }
 
-/// A part for which the rig file has no data is left out; any other failure is one.
+/// A part for which the rig file has no data is left out; any other failure is an error.
 fn known<T>(part: Result<T, Unverifiable>) -> Result<Option<T>, VerifyError> {
     match part {
         Ok(part) => Ok(Some(part)),

@@ -11,7 +11,7 @@ pub struct Response {
     pub s: Complex<f64>,
     /// T = L / (1 + L).
     pub t: Complex<f64>,
-    /// From a kick to each of the plant's states to the law's force.
+    /// From an impulse on each of the plant's states to the law's force.
     pub kick_to_force: Vec<Complex<f64>>,
 }
 

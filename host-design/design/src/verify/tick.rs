@@ -1,4 +1,4 @@
-//! What the loop makes of a tick that is not the one it was designed for: longer, shorter, or uneven.
+//! Stability with a tick other than the designed one: longer, shorter, or with jitter.
 
 use serde::Serialize;
 
@@ -12,7 +12,7 @@ use crate::numerics::Matrix;
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct TickLimits {
     /// Longest period (s) up to which the loop stays stable when the same table runs slower than it was designed for, the
-    /// plant sampled anew; none: stable up to 30 times the tick.
+    /// plant sampled at that period; none: stable up to 30 times the tick.
     pub longest_stable_s: Option<f64>,
     /// The unstable period just above it (s): the bisection ends there.
     pub shortest_unstable_s: Option<f64>,
@@ -39,7 +39,7 @@ pub(super) fn loop_at(certified: &Certified, numbers: &Numbers<f64>, period: f64
 ///
 /// Jitter (C.-Y. Kao, B. Lincoln, *Automatica* 40, 2004, theorem for continuous plants and sampled controllers): a
 /// force late by δ < J ticks differs from the one in time by `u(k) - u(k-1)` for at most J h seconds, so
-/// `‖w‖₂ <= √(J h) ‖u(k) - u(k-1)‖₂`. With h(z) from kicks of the states to u and `W = ∫₀ʰ e^(Aτ) B Bᵀ e^(Aᵀτ) dτ`
+/// `‖w‖₂ <= √(J h) ‖u(k) - u(k-1)‖₂`. With h(z) from impulses on the states to u and `W = ∫₀ʰ e^(Aτ) B Bᵀ e^(Aᵀτ) dτ`
 /// (their sum over aliases, in closed form) the loop from w to u(k) - u(k-1) has the gain
 /// `|z - 1| √(h(z) W h(z)*)`, and small gain asks for
 ///

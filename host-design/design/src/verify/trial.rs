@@ -1,4 +1,4 @@
-//! One run of the loop as it will run, boiled down to what a verdict needs.
+//! One run of the loop as it will run, reduced to what a verdict needs.
 
 use serde::Serialize;
 use upright::table::Law;
@@ -8,13 +8,13 @@ use crate::rig::{Chain, PlantDescription, Rig};
 use crate::simulate::{Fall, Scenario, SimulationError, run};
 use crate::table::{NoTable, TableValues};
 
-/// A question that cannot be put to this rig.
+/// A quantity that cannot be computed for this rig.
 #[derive(Debug, thiserror::Error)]
 pub enum Unverifiable {
     /// The runs cannot be started.
     #[error(transparent)]
     Simulation(#[from] SimulationError),
-    /// A changed rig, for which gains would have to be made anew, has no design.
+    /// A changed rig, for which the gains have to be redesigned, has no design.
     #[error(transparent)]
     Design(#[from] DesignError),
     /// A changed rig makes no table.
@@ -26,19 +26,19 @@ pub enum Unverifiable {
     /// The controller does not run from encoders.
     #[error("the rig has no observer: give it its encoders and [kalman]")]
     NoObserver,
-    /// A setting without sense.
+    /// An invalid setting.
     #[error("{what} = {value}: give {accepts}")]
     Setting {
         /// Which one.
         what: &'static str,
         /// Its value.
         value: f64,
-        /// What would do.
+        /// The accepted values.
         accepts: &'static str,
     },
 }
 
-/// What disturbs the rig in every tick, drawn anew and held for the tick.
+/// Disturbances, drawn again in every tick and held for the tick.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Disturbance {
     /// Force on the cart (N rms).
@@ -48,7 +48,7 @@ pub struct Disturbance {
 }
 
 impl Disturbance {
-    /// None at all.
+    /// No disturbances.
     pub const NONE: Self = Self { force_n: 0.0, torque_n_m: 0.0 };
 
     /// What the rig file gives in `[verify]`, or else what its `[kalman]` expects: an intensity is variance times tick.
@@ -78,20 +78,20 @@ pub struct Horizon {
 }
 
 impl Default for Horizon {
-    /// 10 s; 2° and 5 cm, far inside of any fall.
+    /// 10 s; 2° and 5 cm, far from any fall.
     fn default() -> Self {
         Self { duration_s: 10.0, angle_rad: 0.035, position_m: 0.05 }
     }
 }
 
 impl Horizon {
-    /// Wide enough for `law`'s own unrest: encoder steps keep some loops moving by far more than the steps, so that near
-    /// rest is at least twice what a run from (all but) rest without disturbances reaches.
+    /// Wide enough for `law`'s limit cycle: encoder resolution keeps some loops moving by far more than one count, so that near
+    /// rest is at least twice the largest deviation of a run without disturbances that starts (all but) at rest.
     ///
     /// # Errors
     /// Those of [`run`].
     pub fn widened(self, rig: &Rig, table: &TableValues, law: Law) -> Result<Self, SimulationError> {
-        // A start that no encoder sees, but off the equilibrium: there nothing would ever move.
+        // Less than an encoder count, but not the equilibrium, where nothing would ever move.
         let mut nudged = scenario(rig, law, 2.0 * self.duration_s);
         let first = if matches!(rig.plant, PlantDescription::Chain(_)) { 2 } else { rig.output() };
         nudged.start[first] = 1e-6;
@@ -107,12 +107,12 @@ impl Horizon {
     }
 }
 
-/// What became of a run.
+/// Outcome of a run.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Outcome {
-    /// How it was lost, if it was.
+    /// How it fell, if it did.
     pub fall: Option<Fall>,
-    /// Time from which on it stayed near rest (s); none if it was not there when the run ended.
+    /// Time from which it stayed near rest (s); none if it was not near rest when the run ended.
     pub at_rest_after_s: Option<f64>,
     /// Largest angle of any link from the vertical (rad); 0 for a model.
     pub peak_angle_rad: f64,
@@ -123,7 +123,7 @@ pub struct Outcome {
 }
 
 impl Outcome {
-    /// No fall: the question where disturbances never let the rig come to rest.
+    /// No fall. For runs whose disturbances never let the rig come to rest.
     pub fn stands(&self) -> bool {
         self.fall.is_none()
     }
@@ -153,7 +153,7 @@ pub fn trial(
         peak_angle_rad = peak_angle_rad.max(angle);
         peak_error_m = peak_error_m.max(error);
         peak_force_n = peak_force_n.max(sample.force.abs());
-        // Not written as "beyond": what is not a number is not near rest either.
+        // Compared this way round so that NaN does not count as near rest.
         let quiet = angle <= horizon.angle_rad && error <= horizon.position_m;
         quiet_since = if quiet { quiet_since.or(Some(sample.t)) } else { None };
     })?;
@@ -200,7 +200,7 @@ pub(super) fn chain<'a>(rig: &'a Rig, what: &'static str) -> Result<&'a Chain, U
     }
 }
 
-/// Refuses a setting that is not within its range.
+/// An error for a setting outside its range.
 pub(super) fn within(
     what: &'static str,
     value: f64,
@@ -210,10 +210,10 @@ pub(super) fn within(
     if range.contains(&value) { Ok(()) } else { Err(Unverifiable::Setting { what, value, accepts }) }
 }
 
-/// The last size that stands before the first that was found not to: from `smallest` up by doubling to at most
+/// The largest size that stands below the first one found to fall: from `smallest` up by doubling to at most
 /// `largest`, then by bisection to within `relative` of the edge.
 ///
-/// An island of standing sizes beyond the first that falls is not looked for: nobody should rely on one.
+/// Sizes that stand beyond the first that falls are not searched for: nobody should rely on them.
 pub(super) fn edge<T, E>(
     [smallest, largest]: [f64; 2],
     relative: f64,

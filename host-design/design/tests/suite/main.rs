@@ -1,6 +1,10 @@
 //! Tests of rig files, plant, design, simulation and verification. One program, so that it is linked once.
 
 mod design_properties;
+// What the paper prints has one home, in the tool.
+#[allow(dead_code)]
+#[path = "../../../tool/src/reproduce/published.rs"]
+mod paper_numbers;
 mod plant_equations;
 mod plant_linear_model;
 mod plant_linearisation;

@@ -5,9 +5,9 @@ use serde::Serialize;
 use upright::table::Law;
 
 use super::row::{Fate, Figures, Row};
-use upright_design::design::design;
+use upright_design::design::{Certified, design};
 use upright_design::rig::Rig;
-use upright_design::simulate::{Scenario, SimulationError, simulate};
+use upright_design::simulate::{Scenario, SimulationError, Summary, simulate};
 use upright_design::table::{Gains, TableValues};
 use upright_design::verify::{AttractionSettings, Margins, attraction, linear};
 
@@ -71,7 +71,7 @@ pub fn jobs<'a>(candidates: &'a [Candidate], conditions: &Conditions) -> Vec<(&'
         .collect()
 }
 
-/// Makes all rows, in parallel, ordered by law; `done` hears of each that is finished.
+/// Makes all rows, in parallel, ordered by law; `done` is called after each.
 ///
 /// # Errors
 /// [`SimulationError`] if a run is impossible for every candidate alike: too long, say.
@@ -91,23 +91,9 @@ pub fn compare(
 }
 
 fn row(candidate: &Candidate, law: Law, conditions: &Conditions) -> Result<Row, SimulationError> {
-    let mut rig = candidate.rig.clone();
-    // One law alone: whether the other has a design does not matter here.
-    let name = match law {
-        Law::Lqr => {
-            rig.pole_placement = None;
-            "lqr"
-        }
-        Law::PolePlacement => {
-            rig.lqr = None;
-            rig.integral = None;
-            "pole_placement"
-        }
-    };
-    if conditions.full_state {
-        rig.kalman = None;
-    }
-    let mut row = Row {
+    let rig = with_one_law(candidate, law, conditions);
+    let name = if law == Law::Lqr { "lqr" } else { "pole_placement" };
+    let row = Row {
         rig: candidate.label.clone(),
         value: candidate.value,
         law: name,
@@ -115,15 +101,9 @@ fn row(candidate: &Candidate, law: Law, conditions: &Conditions) -> Result<Row, 
         figures: None,
         trace: None,
     };
-    let gains = if conditions.continuous_gains { Gains::Continuous } else { Gains::Sampled };
-    let certified = match design(&rig) {
-        Ok(certified) => certified,
-        Err(reason) => return Ok(Row { fate: Fate::NoDesign(reason.to_string()), ..row }),
-    };
-    let table = match TableValues::of(&rig, &certified, gains) {
-        Ok(table) if conditions.raw_step => table.without_governor(),
-        Ok(table) => table,
-        Err(reason) => return Ok(Row { fate: Fate::NoDesign(reason.to_string()), ..row }),
+    let (certified, table) = match designed(&rig, conditions) {
+        Ok(designed) => designed,
+        Err(reason) => return Ok(Row { fate: Fate::NoDesign(reason), ..row }),
     };
     let scenario = Scenario {
         step_m: conditions.step_m,
@@ -131,16 +111,50 @@ fn row(candidate: &Candidate, law: Law, conditions: &Conditions) -> Result<Row, 
         ..Scenario::at_rest(&rig, law)
     };
     let (trace, summary) = simulate(&rig, &table, &scenario)?;
-    // What has no margins, being unstable, and what has none that can be computed show the same: none.
-    let report = linear(&rig, &certified, &table).ok().and_then(|mut reports| reports.pop());
+    let figures = figures(&rig, law, &certified, &table, &summary);
+    let fate = match summary.fall {
+        Some(fall) => Fate::Fallen(fall),
+        None if summary.settled => Fate::Settled,
+        None => Fate::Standing,
+    };
+    Ok(Row { fate, figures: Some(figures), trace: Some(trace), ..row })
+}
+
+/// The rig with this law alone: whether the other has a design does not matter here.
+fn with_one_law(candidate: &Candidate, law: Law, conditions: &Conditions) -> Rig {
+    let mut rig = candidate.rig.clone();
+    match law {
+        Law::Lqr => rig.pole_placement = None,
+        Law::PolePlacement => {
+            rig.lqr = None;
+            rig.integral = None;
+        }
+    }
+    if conditions.full_state {
+        rig.kalman = None;
+    }
+    rig
+}
+
+/// Design and table, or the reason why there is none.
+fn designed(rig: &Rig, conditions: &Conditions) -> Result<(Certified, TableValues), String> {
+    let gains = if conditions.continuous_gains { Gains::Continuous } else { Gains::Sampled };
+    let certified = design(rig).map_err(|reason| reason.to_string())?;
+    let table = TableValues::of(rig, &certified, gains).map_err(|reason| reason.to_string())?;
+    Ok((certified, if conditions.raw_step { table.without_governor() } else { table }))
+}
+
+fn figures(rig: &Rig, law: Law, certified: &Certified, table: &TableValues, summary: &Summary) -> Figures {
+    // An unstable loop and one whose margins cannot be computed both have none.
+    let report = linear(rig, certified, table).ok().and_then(|mut reports| reports.pop());
     let stable = report.as_ref().is_some_and(|report| report.stable);
     let margins = report.and_then(|report| report.margins);
     let settings = AttractionSettings { relative: TILT_PRECISION, ..AttractionSettings::default() };
-    let attraction = stable.then(|| attraction(&rig, &table, law, &settings).ok()).flatten();
+    let attraction = stable.then(|| attraction(rig, table, law, &settings).ok()).flatten();
     let tilts = attraction.iter().flat_map(|attraction| &attraction.tilts).map(|tilt| tilt.edge.size);
     let poles = certified.poles.in_table(usize::from(law == Law::PolePlacement))[0];
     let margin = |of: fn(&Margins) -> Option<f64>| margins.as_ref().and_then(of);
-    row.figures = Some(Figures {
+    Figures {
         settling_time_s: summary.settling_time_s,
         overshoot_percent: summary.overshoot_percent,
         peak_angle_rad: summary.peak_angles_rad.iter().copied().max_by(f64::total_cmp),
@@ -151,12 +165,5 @@ fn row(candidate: &Candidate, law: Law, conditions: &Conditions) -> Result<Row, 
         delay_margin_s: margin(|margins| margins.delay_margin_s),
         tilt_rad: tilts.min_by(f64::total_cmp),
         fastest_pole_per_s: poles.into_iter().flatten().map(|pole| pole[0]).fold(0.0, f64::min),
-    });
-    row.fate = match summary.fall {
-        Some(fall) => Fate::Fallen(fall),
-        None if summary.settled => Fate::Settled,
-        None => Fate::Standing,
-    };
-    row.trace = Some(trace);
-    Ok(row)
+    }
 }

@@ -18,10 +18,10 @@ pub struct Sweep {
     pub log: bool,
 }
 
-/// A sweep that makes no sense.
+/// An invalid sweep.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum SweepError {
-    /// The text is no sweep.
+    /// The text does not describe a sweep.
     #[error(
         "give KEY=FROM..TO, KEY=FROM..TO:POINTS or KEY=FROM..TO:POINTS:log, such as tick.period_s=0.001..0.01:10"
     )]
@@ -39,9 +39,9 @@ pub enum SweepError {
     },
 }
 
-/// Most values of a sweep.
+/// Largest number of values.
 const MOST_POINTS: usize = 1000;
-/// Values where none are asked for.
+/// Number of values if none is given.
 const POINTS: usize = 7;
 
 impl core::str::FromStr for Sweep {
@@ -165,7 +165,7 @@ enum Place {
     At(core::ops::Range<usize>),
     /// Not there; it would go here, after this.
     New { at: usize, prefix: String },
-    /// Nowhere that one could tell.
+    /// Not known.
     Nowhere,
 }
 

@@ -3,7 +3,7 @@
 use super::{Figure, FigureError};
 
 impl Figure {
-    /// Every point of every curve as CSV, all of them, also those that the drawing leaves out: panel (its vertical axis),
+    /// Every point of every curve as CSV, including those that the drawing leaves out: panel (its vertical axis),
     /// curve, x, y, value, with one line for each point or cell of a map. Numbers are shortest decimals.
     ///
     /// # Errors

@@ -1,4 +1,4 @@
-//! The names of the curves, above the panel, where they hide none of them.
+//! The legend: names of the curves above the panel, where they hide nothing.
 
 use plotters::style::ShapeStyle;
 use upright_design::number::rounded;
@@ -26,7 +26,7 @@ pub(super) const SAMPLE: f64 = 26.0;
 
 /// All entries of a panel, and the height they take (px).
 ///
-/// A limit beyond the panel is named all the same.
+/// A limit outside the panel has an entry, too.
 pub(super) fn entries(figure: &Figure, panel: &Panel, from: f64) -> (Vec<Entry>, f64) {
     let mut keys: Vec<(Key, String)> = Vec::new();
     if let Some(heat) = &panel.heat {

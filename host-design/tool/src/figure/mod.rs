@@ -1,7 +1,7 @@
 //! Figures: panels of curves with axes and units, as SVG, PNG and CSV.
 //!
-//! Drawn by `plotters`. Colours are those of Okabe and Ito (*Color Universal Design*, 2008), which stay apart for
-//! colour-blind readers; every curve has a dash or a marker of its own besides, so that nothing depends on colour.
+//! Drawn by `plotters`. Colours are those of Okabe and Ito (*Color Universal Design*, 2008), which colour-blind readers can
+//! distinguish; every curve also has its own dash or marker, so that nothing depends on colour.
 
 mod csv;
 mod draw;
@@ -27,10 +27,10 @@ pub enum FigureError {
     /// The drawing library failed.
     #[error("the figure cannot be drawn: {0}")]
     Draw(String),
-    /// The figure as SVG could not be made into pixels.
-    #[error("the figure cannot be made into a PNG: {0}")]
+    /// The SVG could not be rendered as pixels.
+    #[error("the figure cannot be rendered as PNG: {0}")]
     Png(String),
-    /// A range without extent, or one that a logarithmic axis does not have.
+    /// An empty range, or one that is impossible on a logarithmic axis.
     #[error("the axis \"{label}\" cannot go from {from} to {to}")]
     Range {
         /// The axis.
@@ -64,7 +64,7 @@ pub struct Panel {
     pub y: Axis,
     /// Height with labels and legend (px).
     pub height: u32,
-    /// One unit is as long to the right as upwards.
+    /// Both axes have the same scale.
     pub equal: bool,
     /// Drawn below the curves.
     pub heat: Option<HeatMap>,
@@ -79,14 +79,14 @@ pub struct Axis {
     pub label: String,
     /// Logarithmic instead of linear.
     pub log: bool,
-    /// Both ends; none: what the curves need.
+    /// Both ends; none: fitted to the curves.
     pub range: Option<[f64; 2]>,
 }
 
 /// A curve, or points that belong together.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Curve {
-    /// Name in the legend; empty: not there.
+    /// Name in the legend; empty: no entry.
     pub name: String,
     /// `[x, y]` each. A point that is not finite interrupts the line.
     pub points: Vec<[f64; 2]>,
@@ -165,7 +165,7 @@ impl Panel {
         Self { height, ..self }
     }
 
-    /// With one unit as long to the right as upwards.
+    /// With the same scale on both axes.
     pub fn equal(self) -> Self {
         Self { equal: true, ..self }
     }
@@ -206,7 +206,7 @@ impl Curve {
         Self { name: name.into(), points, style: Style::Markers(number) }
     }
 
-    /// What another curve is to be compared with.
+    /// A reference for another curve.
     pub fn reference(name: impl Into<String>, points: Vec<[f64; 2]>) -> Self {
         Self { name: name.into(), points, style: Style::Reference }
     }

@@ -1,5 +1,4 @@
-//! Building an image: with the target of rustup if it is installed, otherwise with the compiler and the library source of
-//! Debian.
+//! Building an image, with rustup's target if it is installed, otherwise with Debian's compiler and library source.
 
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
@@ -52,13 +51,13 @@ pub enum ImageError {
          `apt-get install lld rustc-web cargo-web rust-web-src`"
     )]
     NoCompiler,
-    /// Images are built from the source of this project.
+    /// There is no source to build from.
     #[error(transparent)]
     NoCheckout(#[from] NoCheckout),
     /// The compiler cannot be started.
     #[error("{0} cannot be started: {1}")]
     Start(&'static str, std::io::Error),
-    /// The compiler says no.
+    /// The compiler reports errors.
     #[error("the image cannot be built; the compiler says:\n{0}")]
     Compiler(String),
     /// The gain table for it cannot be written.
@@ -82,8 +81,8 @@ pub fn build(kind: Kind) -> Result<PathBuf, ImageError> {
     compile(kind, None, kind.feature())
 }
 
-/// As [`build`], for tests: none where there is no compiler, which is said on stderr; an error there, too, if the
-/// environment variable `UPRIGHT_REQUIRE_IMAGE` is set.
+/// As [`build`], for tests: without a compiler it returns none and says so on stderr, or fails if the environment variable
+/// `UPRIGHT_REQUIRE_IMAGE` is set.
 ///
 /// # Errors
 /// As for [`build`].
@@ -103,18 +102,18 @@ pub fn build_if_possible(kind: Kind) -> Result<Option<PathBuf>, ImageError> {
 /// As for [`build`].
 pub fn build_for(kind: Kind, rig: &Rig, table: &TableValues) -> Result<PathBuf, ImageError> {
     let source = gains_source(rig, table);
-    // Documentation of a module cannot be included into one.
+    // An included file cannot have module documentation.
     let included = source.lines().filter(|line| !line.starts_with("//!")).collect::<Vec<_>>().join("\n");
     let name = format!("{}-{:016x}-{:08x}", kind.feature(), rig.hash(), table.crc());
     let gains = images()?.join(format!("{name}.rs"));
-    // An unchanged file stays as it is, so that nothing is compiled anew.
+    // An unchanged file stays as it is, so that nothing is compiled again.
     if std::fs::read_to_string(&gains).ok().as_deref() != Some(&included) {
         write_atomically(&gains, included.as_bytes())?;
     }
     compile(kind, Some(&gains), &name)
 }
 
-/// One of its own: the caller may be run by cargo, which holds its lock on the usual one.
+/// A separate one: the caller may run under cargo, which holds a lock on the usual one.
 fn target_directory() -> Result<PathBuf, ImageError> {
     let base = match std::env::var_os("CARGO_TARGET_DIR") {
         Some(directory) => std::path::absolute(directory).unwrap_or_default(),
@@ -141,7 +140,7 @@ fn compile(kind: Kind, gains: Option<&Path>, name: &str) -> Result<PathBuf, Imag
     } else {
         return Err(ImageError::NoCompiler);
     };
-    // What an outer cargo has set is for the host.
+    // Variables set by an outer cargo are for the host.
     for (name, _) in std::env::vars_os() {
         let name_is_cargos =
             name.to_str().is_some_and(|name| name.starts_with("CARGO_PKG_") || name == "CARGO");

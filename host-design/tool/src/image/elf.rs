@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use object::read::elf::ElfFile32;
 use object::{Object, ObjectSection, ObjectSymbol, SectionKind, SymbolKind};
 
-/// A file that is no image of this firmware.
+/// A file that is not an image of this firmware.
 #[derive(Debug, thiserror::Error)]
 pub enum ElfError {
     /// The file cannot be read.
@@ -24,12 +24,12 @@ pub enum ElfError {
         /// Why.
         source: object::Error,
     },
-    /// A section or symbol that every image has.
+    /// A section or symbol that every image has is missing.
     #[error("{}: no {what}; `upright firmware build` makes an image that has it", path.display())]
     Missing {
         /// Which file.
         path: PathBuf,
-        /// What is not there.
+        /// What is missing.
         what: &'static str,
     },
 }
@@ -52,7 +52,7 @@ pub(crate) struct Item {
     pub(crate) size: u32,
 }
 
-/// A stretch of machine code without the constants between instructions.
+/// Machine code without the constants between instructions.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) struct Code {
     pub(crate) address: u32,
@@ -72,7 +72,7 @@ pub struct Image {
     text: (u32, Vec<u8>),
     /// Handlers by their number in the vector table, from 1 (reset).
     pub(crate) vectors: Vec<(usize, u32)>,
-    /// Where the stack begins, and how many bytes below memory.x gives to it.
+    /// Where the stack begins, and how many bytes memory.x reserves for it.
     pub(crate) stack_start: u32,
     pub(crate) stack_reserved: u32,
 }
@@ -81,7 +81,7 @@ impl Image {
     /// Reads an ELF file.
     ///
     /// # Errors
-    /// [`ElfError`] if it cannot be read or is no image of this firmware.
+    /// [`ElfError`] if it cannot be read or is not an image of this firmware.
     pub fn read(path: &Path) -> Result<Self, ElfError> {
         let bytes = std::fs::read(path).map_err(|source| ElfError::Read { path: path.to_owned(), source })?;
         let format = |source| ElfError::Format { path: path.to_owned(), source };

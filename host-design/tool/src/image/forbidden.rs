@@ -17,7 +17,7 @@ const FORBIDDEN: [&str; 9] = [
 
 /// Names of functions in the image that panic, format a panic's message, or allocate; none in a good image.
 ///
-/// An optimised build drops whatever is never called, so that a function that is there is one that may be reached.
+/// An optimised build drops functions that are never called, so a function in the image may be reached.
 pub fn forbidden_functions(image: &Image) -> Vec<&str> {
     let names = image.functions.iter().map(|function| function.name.as_str());
     names.filter(|name| is_forbidden(name)).collect()

@@ -1,4 +1,4 @@
-//! Images for the microcontroller: built with whatever compiler is there, and looked into.
+//! Images for the microcontroller: built with the compiler that is installed, and examined for size, stack and panics.
 
 mod build;
 mod elf;

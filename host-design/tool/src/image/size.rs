@@ -9,9 +9,9 @@ use object::{Object, ObjectSection};
 
 use super::elf::{Image, Item};
 
-/// Most flash that the image of a board may take, in bytes.
+/// Limit of the flash of an image for a board (bytes).
 pub const FLASH_LIMIT: u32 = 32 * 1024;
-/// Most static RAM (variables, without the stack) that the image of a board may take, in bytes.
+/// Limit of the static RAM of an image for a board: variables, without the stack (bytes).
 pub const RAM_LIMIT: u32 = 4 * 1024;
 
 /// Bytes of an image.
@@ -38,15 +38,15 @@ pub struct Part {
     pub ram: u32,
 }
 
-/// Information for debuggers that cannot be read.
+/// Debug information that cannot be read.
 #[derive(Debug, thiserror::Error)]
-#[error("the image's information for debuggers cannot be read: {0}")]
+#[error("the image's debug information cannot be read: {0}")]
 pub struct SizeError(#[from] addr2line::gimli::Error);
 
 /// Measures an image.
 ///
 /// # Errors
-/// [`SizeError`] if the information for debuggers, which says where code comes from, is damaged.
+/// [`SizeError`] if the debug information, which gives the source of code, is damaged.
 pub fn size(image: &Image) -> Result<Size, SizeError> {
     let mut sections: Vec<Part> = Vec::new();
     for section in &image.sections {
@@ -63,7 +63,7 @@ pub fn size(image: &Image) -> Result<Size, SizeError> {
     }
     for item in &image.data {
         let share = shares.entry(crate_of_symbol(item)).or_default();
-        // Values that variables begin with are few: they count where the variables are.
+        // Initial values of variables are few: they count as part of their section.
         let place = if item.address >= 0x1000_0000 { &mut share.ram } else { &mut share.flash };
         *place += item.size;
     }

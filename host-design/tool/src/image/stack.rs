@@ -1,7 +1,7 @@
-//! A bound on the stack, from the machine code: what functions push, whom they call, and which handlers interrupt.
+//! A bound on the stack from the machine code: what functions push, what they call, and which handlers interrupt.
 //!
 //! It holds for every compiler and every input, because it takes every branch: a function costs the sum of everything it
-//! ever pushes, and every handler of the vector table is taken to interrupt in the deepest place of all others.
+//! ever pushes, and every handler of the vector table is assumed to interrupt all others at their deepest point.
 
 use super::elf::Image;
 use super::thumb::{Effect, decode, is_wide};
@@ -10,7 +10,7 @@ use super::thumb::{Effect, decode, is_wide};
 /// the floating-point unit, and one to align; bytes.
 const EXCEPTION_FRAME: u32 = 108;
 
-/// The stack that an image can need at most.
+/// The most stack that an image can need.
 #[derive(Debug, Clone, PartialEq, Eq, serde::Serialize)]
 pub struct StackBound {
     /// All levels on top of each other, in bytes.
@@ -30,34 +30,34 @@ pub struct StackLevel {
     pub bytes: u32,
 }
 
-/// Code whose stack has no bound that could be found.
+/// Code for whose stack no bound was found.
 #[derive(Debug, thiserror::Error, PartialEq, Eq)]
 pub enum StackError {
     /// A function that calls itself, perhaps through others.
     #[error("no bound on the stack: {0} calls itself")]
     Recursion(String),
     /// A call through a pointer.
-    #[error("no bound on the stack: {function} calls what a pointer says, at {address:#010x}")]
+    #[error("no bound on the stack: {function} calls through a pointer, at {address:#010x}")]
     Indirect {
-        /// Who.
+        /// The function.
         function: String,
-        /// Where.
+        /// Its address.
         address: u32,
     },
     /// An array of a size that is not constant.
     #[error("no bound on the stack: {function} moves the stack pointer by a variable, at {address:#010x}")]
     Variable {
-        /// Who.
+        /// The function.
         function: String,
-        /// Where.
+        /// Its address.
         address: u32,
     },
-    /// A call of something that is no function.
-    #[error("{function} calls {target:#010x}, where no function is")]
+    /// A call of an address that is not a function.
+    #[error("{function} calls {target:#010x}, which is not a function")]
     Nowhere {
-        /// Who.
+        /// The function.
         function: String,
-        /// What.
+        /// The address called.
         target: u32,
     },
 }
@@ -172,7 +172,7 @@ fn before(effects: &[(u32, Effect)], place: usize) -> Vec<Effect> {
     effects[place.saturating_sub(5)..place].iter().map(|(_, effect)| *effect).collect()
 }
 
-/// How much the stack grows, at most, when its pointer becomes this register's value; nothing if that cannot be told.
+/// Largest growth of the stack when its pointer becomes this register's value; none if unknown.
 fn growth(image: &Image, effects: &[(u32, Effect)], place: usize, register: u8) -> Option<u32> {
     // r7 is the frame pointer: it gives back what was taken.
     if register == 7 {
@@ -181,7 +181,7 @@ fn growth(image: &Image, effects: &[(u32, Effect)], place: usize, register: u8) 
     before(effects, place).into_iter().rev().find_map(|effect| match effect {
         Effect::Aligned(aligned, bytes) if aligned == register => Some(bytes),
         Effect::FromFrame(from) if from == register => Some(0),
-        // A fault's handler begins the stack anew.
+        // The handler of a fault resets the stack.
         Effect::Literal(loaded, at)
             if loaded == register && image.word_in_code(at) == Some(image.stack_start) =>
         {

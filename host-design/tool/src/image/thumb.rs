@@ -1,6 +1,6 @@
 //! The Thumb-2 instructions that matter for the stack and for calls (Armv7-M Architecture Reference Manual, A5 and A7.7).
 
-/// What an instruction does to the stack pointer or the flow of control.
+/// Effect of an instruction on the stack pointer or the control flow.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Effect {
     /// Nothing that matters here.
@@ -25,7 +25,7 @@ pub(crate) enum Effect {
     Aligned(u8, u32),
     /// This register becomes the frame pointer (r7) less a constant.
     FromFrame(u8),
-    /// The stack grows by what only the run can tell.
+    /// The stack grows by an amount known only at run time.
     Unknown,
 }
 

@@ -1,28 +1,28 @@
-//! What keys and lines of text mean.
+//! Keys and lines of text as actions.
 
 use ratatui::crossterm::event::{KeyCode, KeyEvent, KeyModifiers};
 use upright::protocol::message::Request;
 use upright::table::Law;
 
-/// What a key asks for.
+/// The action of a key.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Action {
-    /// This of the firmware.
+    /// Send this command to the firmware.
     Send(Request),
-    /// The set-point further by this (m).
+    /// Move the set-point by this (m).
     Shift(f32),
-    /// The other control law.
+    /// Switch to the other control law.
     OtherLaw,
-    /// Begin or end a recording.
+    /// Start or stop a recording.
     Record,
-    /// End.
+    /// Quit.
     Quit,
 }
 
-/// One press of an arrow key (m).
+/// Change of the set-point per press of an arrow key (m).
 const SHIFT_M: f32 = 0.01;
 
-/// The meaning of a key; none for one without.
+/// The action of a key; none if it has none.
 pub fn action(key: &KeyEvent) -> Option<Action> {
     if key.modifiers.contains(KeyModifiers::CONTROL) {
         return (key.code == KeyCode::Char('c')).then_some(Action::Quit);
@@ -44,7 +44,7 @@ pub fn action(key: &KeyEvent) -> Option<Action> {
     })
 }
 
-/// A line that is no command.
+/// A line that is not a command.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error(
     "`{0}` is no command; give home, home-rail, check-signs, arm, disarm, clear, set-point METRES, or law lqr|pole-placement"
@@ -54,7 +54,7 @@ pub struct BadCommand(String);
 /// The meaning of a line of text, such as `arm` or `set-point 0.05` (m).
 ///
 /// # Errors
-/// [`BadCommand`], with what can be said instead.
+/// [`BadCommand`], which lists the commands.
 pub fn request(line: &str) -> Result<Request, BadCommand> {
     let bad = || BadCommand(line.trim().to_owned());
     let words: Vec<&str> = line.split_whitespace().collect();

@@ -1,4 +1,4 @@
-//! The line to a firmware.
+//! The connection to a firmware: a serial port or a relay.
 
 use std::io::{ErrorKind, Read, Write};
 use std::net::TcpStream;
@@ -7,18 +7,27 @@ use std::time::Duration;
 use serialport::SerialPort;
 use upright::protocol::BAUD;
 
+/// Names of serial ports on this system, for an error message.
+const PORTS: &str = if cfg!(windows) {
+    "COM3, COM4 … in the device manager"
+} else if cfg!(target_os = "macos") {
+    "/dev/cu.usbmodem…"
+} else {
+    "/dev/ttyACM0 …; your user has to be in the group dialout"
+};
+
 /// Longest wait for bytes.
 const PATIENCE: Duration = Duration::from_millis(5);
-/// Longest wait for a line that takes no bytes.
+/// Longest wait for a line that accepts no bytes.
 const STUCK: Duration = Duration::from_secs(1);
 
 /// A port that cannot be opened.
 #[derive(Debug, thiserror::Error)]
 pub enum OpenError {
     /// A serial device.
-    #[error("{port}: {source}; is the board connected, and may you use it (group dialout)?")]
+    #[error("{port}: {source}; is the board connected? Ports: {PORTS}")]
     Serial {
-        /// What was asked for.
+        /// As given on the command line.
         port: String,
         /// Why it fails.
         source: serialport::Error,
@@ -26,7 +35,7 @@ pub enum OpenError {
     /// A TCP address.
     #[error("tcp:{address}: {source}; start `upright firmware run RIG --serve {address}` first")]
     Tcp {
-        /// What was asked for.
+        /// As given on the command line.
         address: String,
         /// Why it fails.
         source: std::io::Error,
@@ -42,7 +51,8 @@ pub enum Line {
 }
 
 impl Line {
-    /// Opens a serial device (`/dev/ttyACM0`, 460,800 Bd) or a relay (`tcp:HOST:PORT`).
+    /// Opens a serial port at [`BAUD`], such as `/dev/ttyACM0` (Linux), `/dev/cu.usbmodem1101` (macOS) or `COM3` (Windows), or
+    /// a relay (`tcp:HOST:PORT`).
     ///
     /// # Errors
     /// [`OpenError`] with the port and what to do.
@@ -63,7 +73,7 @@ impl Line {
         connect().map(Line::Tcp).map_err(|source| OpenError::Tcp { address: address.to_owned(), source })
     }
 
-    /// Bytes that have come within 5 ms; none of them is no error.
+    /// Bytes received within 5 ms. To receive none is not an error.
     ///
     /// # Errors
     /// If the line is closed.
@@ -90,7 +100,7 @@ impl Line {
     /// Sends all of these.
     ///
     /// # Errors
-    /// If the line is closed, or takes nothing.
+    /// If the line is closed, or accepts no bytes.
     pub fn send(&mut self, bytes: &[u8]) -> std::io::Result<()> {
         match self {
             Line::Serial(port) => port.write_all(bytes),

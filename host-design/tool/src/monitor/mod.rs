@@ -1,6 +1,6 @@
-//! What a running firmware says, and what a person at the keyboard says to it.
+//! The conversation of a person at the keyboard with a running firmware.
 //!
-//! [`Monitor`] knows neither terminal nor line: bytes and keys go in, bytes come out. [`view`] draws it, [`Line`] is a
+//! [`Monitor`] holds the state and knows neither terminal nor line: bytes and keys go in, bytes come out. [`view`] draws it, [`Line`] is a
 //! serial device or a TCP connection, [`record`] writes telemetry.
 
 mod command;

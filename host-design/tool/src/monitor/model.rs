@@ -13,22 +13,22 @@ use upright::table::Law;
 
 use super::command::Action;
 
-/// Telemetry of a firmware of any size: on the line, a list is its length and its items.
+/// Telemetry of a firmware of any size: a list is sent as its length and its items.
 pub type TelemetryOfAny = Telemetry<30, 15>;
 
-/// What is shown of the past (s).
+/// Time span of the plots (s).
 const HISTORY_S: f32 = 10.0;
-/// Between two pieces of telemetry (s).
+/// Time between two telemetry messages (s).
 const TELEMETRY_S: f32 = 0.02;
 const BEAT: Duration = Duration::from_millis(25);
 const ASK: Duration = Duration::from_millis(500);
 const STATISTICS: Duration = Duration::from_secs(1);
 const LOG_LINES: usize = 100;
 
-/// Why a conversation is over.
+/// Why a conversation has ended.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum Ended {
-    /// The firmware speaks another language; nothing but the question was sent to it.
+    /// The firmware uses another version of the messages; only the request for its identity was sent.
     #[error(
         "the firmware speaks version {0} of the messages, this tool version {PROTOCOL}: flash the firmware again, \
          or use its own tool"
@@ -39,29 +39,29 @@ pub enum Ended {
     Closed(String),
 }
 
-/// A conversation: bytes and actions in, bytes out. Times are since 1970.
+/// A conversation: bytes and actions in, bytes out. Times are seconds since 1970.
 pub struct Monitor {
-    /// The port, as it was asked for.
+    /// The port, as given on the command line.
     pub connection: String,
-    /// What the firmware is, once it has said so.
+    /// Identity of the firmware, once received.
     pub info: Option<Info>,
     /// The latest telemetry.
     pub telemetry: Option<TelemetryOfAny>,
-    /// The counters, as last heard.
+    /// The counters, as last received.
     pub statistics: Option<Statistics>,
     /// The first cause of the fault or of the last reset.
     pub cause: Option<Cause>,
-    /// What was asked and answered, oldest first.
+    /// Requests and replies, oldest first.
     pub log: VecDeque<String>,
     /// Telemetry of the last 10 s.
     pub history: VecDeque<TelemetryOfAny>,
-    /// The set-point commanded here (m); none if none is.
+    /// The set-point commanded here (m), if any.
     pub wanted: Option<f32>,
     /// The file of the recording, if one is written.
     pub recording: Option<String>,
     /// Frames that could not be read.
     pub unreadable: u32,
-    /// Why it is over.
+    /// Why it has ended.
     pub ended: Option<Ended>,
     receiver: Receiver<MAX_MESSAGE>,
     to_send: Vec<u8>,
@@ -73,7 +73,7 @@ pub struct Monitor {
 }
 
 impl Monitor {
-    /// A conversation over `connection` that has not begun.
+    /// A new conversation over `connection`.
     pub fn new(connection: &str) -> Self {
         Self {
             connection: connection.to_owned(),
@@ -97,7 +97,7 @@ impl Monitor {
         }
     }
 
-    /// Takes bytes of the line; gives the telemetry in them.
+    /// Takes received bytes; returns the telemetry in them.
     pub fn receive(&mut self, bytes: &[u8], now: Duration) -> Vec<TelemetryOfAny> {
         let mut all = Vec::new();
         for &byte in bytes {
@@ -108,7 +108,7 @@ impl Monitor {
                 }
                 Some(Ok(Message::Reply(Reply { id, answer }))) => self.answered(id, answer, now),
                 Some(Err(_)) => self.unreadable = self.unreadable.saturating_add(1),
-                // Telemetry before the firmware has said which messages it speaks may mean anything.
+                // Until the firmware has named its version of the messages, telemetry may mean anything.
                 Some(Ok(Message::Telemetry(_))) | None => (),
             }
         }
@@ -123,7 +123,7 @@ impl Monitor {
             }
             self.send(Request::Cause, now);
         }
-        // The firmware has started anew: its past is another one's.
+        // The firmware has restarted: what was shown belongs to the run before.
         if self.history.back().is_some_and(|last| last.tick > telemetry.tick) {
             self.history.clear();
             self.note("the firmware has started anew".to_owned());
@@ -171,14 +171,14 @@ impl Monitor {
         }
     }
 
-    /// A refused set-point is not what the cart goes to.
+    /// A refused set-point is not shown as the target.
     fn forget(&mut self, request: Request) {
         if matches!(request, Request::Setpoint(_)) {
             self.wanted = None;
         }
     }
 
-    /// Does what an action asks of the firmware. Recording and quitting are the caller's.
+    /// Sends the request of an action. Recording and quitting are up to the caller.
     pub fn act(&mut self, action: Action, now: Duration) {
         if self.info.is_none() {
             return self.note("the firmware has not answered yet".to_owned());
@@ -203,7 +203,7 @@ impl Monitor {
         self.send(request, now);
     }
 
-    /// What has to be said by now without being asked: who are you, I am here, how are you.
+    /// Sends what is due: the request for the identity, the keep-alive of the dead-man timer, the request for the counters.
     pub fn poll(&mut self, now: Duration) {
         if now >= self.next_ask {
             let (request, pause) = match self.info {
@@ -255,7 +255,7 @@ impl Monitor {
     }
 }
 
-/// A request in words.
+/// A request, for the log.
 fn name(request: Request) -> String {
     match request {
         Request::Home => "home".to_owned(),

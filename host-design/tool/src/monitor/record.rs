@@ -6,7 +6,7 @@ use serde_json::{Value, json};
 
 use super::model::TelemetryOfAny;
 
-/// One object with SI units; fault and reasons against arming in words.
+/// One object with SI units; fault and arming inhibits by name.
 pub fn json(telemetry: &TelemetryOfAny) -> Value {
     json!({
         "tick": telemetry.tick,
@@ -24,7 +24,7 @@ pub fn json(telemetry: &TelemetryOfAny) -> Value {
     })
 }
 
-/// A CSV file that grows with every telemetry. What was written stays readable whenever it ends.
+/// A CSV file with one row per telemetry message. It is readable whenever the recording ends.
 pub struct Recorder<W: Write> {
     csv: csv::Writer<W>,
     begun: bool,
@@ -36,7 +36,7 @@ impl<W: Write> Recorder<W> {
         Self { csv: csv::Writer::from_writer(out), begun: false }
     }
 
-    /// Adds a row, the first with a head before it.
+    /// Adds a row, before the first one a header.
     ///
     /// # Errors
     /// If it cannot be written.

@@ -118,7 +118,7 @@ fn joint(sensor: u8) -> String {
     if sensor == 0 { "cart".to_owned() } else { format!("link {sensor}") }
 }
 
-/// What to do next by hand.
+/// The next thing to do by hand.
 fn by_hand(telemetry: &TelemetryOfAny) -> Option<String> {
     let move_it = |sensor: u8| match sensor {
         0 => "push the cart along +x".to_owned(),

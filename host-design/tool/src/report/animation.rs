@@ -13,7 +13,7 @@ pub(super) struct Animation {
     lengths: Vec<f64>,
     /// Ends of the rail (m).
     rail: [f64; 2],
-    /// Of the links, from the first; then again from the first.
+    /// Colours of the links, repeated if there are more links.
     colours: Vec<String>,
     cart_colour: String,
     scenes: Vec<SceneFrames>,
@@ -34,11 +34,11 @@ struct Frames {
     every: f64,
     /// Cart (m).
     x: Vec<f64>,
-    /// Set-point asked for (m).
+    /// Requested set-point (m).
     target: Vec<f64>,
     /// Angle of each link from the vertical, frame by frame (rad).
     angles: Vec<Vec<f64>>,
-    /// How the run was lost, if it was.
+    /// How it falls, if it does.
     fall: Option<String>,
 }
 

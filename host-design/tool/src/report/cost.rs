@@ -1,4 +1,4 @@
-//! What the controller costs per tick, counted.
+//! Operations and memory of the controller, counted.
 
 use upright::table::GainTable;
 
@@ -20,7 +20,7 @@ pub(super) struct Cost {
 }
 
 impl Cost {
-    /// Of one law of the table.
+    /// Cost of one law of the table.
     pub(super) fn of(table: &TableValues, law: &LawValues) -> Self {
         let (states, sensors) = (table.states, table.sensors);
         let further = [law.k_pending, law.k_integral].iter().filter(|gain| **gain != 0.0).count();

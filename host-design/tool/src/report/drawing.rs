@@ -18,7 +18,7 @@ const MIDDLE: f64 = 170.0;
 const CART: f64 = 34.0;
 
 /// Cart and links upright, with lengths, masses and centres of mass, as an SVG document. Lengths of links and places
-/// of centres of mass are to scale; the size of the cart is in no rig file.
+/// of centres of mass are to scale; the rig file gives no size of the cart.
 pub(super) fn svg(chain: &Chain) -> String {
     let mut out = format!(
         "<svg width=\"{WIDTH}\" height=\"450\" viewBox=\"0 0 {WIDTH} 450\" xmlns=\"http://www.w3.org/2000/svg\" \

@@ -1,25 +1,25 @@
-//! Reports that cannot be made.
+//! Errors of a report.
 
 use crate::figure::FigureError;
 use upright_design::simulate::SimulationError;
 use upright_design::verify::{Unverifiable, VerifyError};
 
-/// A report that cannot be made.
+/// Why a report cannot be made.
 #[derive(Debug, thiserror::Error)]
 pub enum ReportError {
-    /// A figure.
+    /// A figure cannot be drawn.
     #[error(transparent)]
     Figure(#[from] FigureError),
-    /// A run.
+    /// A run cannot be started.
     #[error(transparent)]
     Simulation(#[from] SimulationError),
-    /// The trust report.
+    /// The trust report cannot be computed.
     #[error(transparent)]
     Verify(#[from] VerifyError),
-    /// The region of attraction.
+    /// The region of attraction cannot be computed.
     #[error(transparent)]
     Runs(#[from] Unverifiable),
-    /// The page.
+    /// The page cannot be rendered.
     #[error("the page cannot be made: {0}")]
     Page(String),
 }

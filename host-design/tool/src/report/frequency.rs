@@ -1,4 +1,4 @@
-//! The sampled loop over frequency, broken at the force.
+//! Bode and Nyquist plots of the sampled loop, broken at the force.
 
 use core::f64::consts::PI;
 
@@ -68,7 +68,7 @@ fn sweep(model: &LoopModel<f64>, report: &LinearReport, tick: f64) -> Vec<Point>
     points
 }
 
-/// L = -1/g: the points at which another factor on the force makes the loop unstable.
+/// L = -1/g: the points at which a factor g on the force makes the loop unstable.
 fn gain_margins(margins: &Margins) -> Vec<(String, f64)> {
     let lower = (margins.lowest_gain > 0.0)
         .then(|| ("× ".to_owned() + &number(margins.lowest_gain), margins.lowest_gain));
@@ -81,7 +81,7 @@ fn nearest(points: &[Point], distance: impl Fn(&Point) -> f64) -> Option<&Point>
     points.iter().min_by(|a, b| distance(a).total_cmp(&distance(b)))
 }
 
-/// Where |L| = 1 with the least phase to spare.
+/// The crossover |L| = 1 with the smallest phase margin.
 fn critical_crossover<'a>(points: &'a [Point], margins: &Margins) -> Option<&'a Point> {
     let at = |omega: &f64| nearest(points, |point| (point.omega / omega).ln().abs());
     let spare = |point: &&Point| {
@@ -107,7 +107,7 @@ fn bode(points: &[Point], margins: &Margins, title: String) -> Figure {
         .high(230)
         .with(level("|L| = 1", 1.0))
         .with(Curve::line("|L|", 0, curve(&Point::gain)));
-    // The phase is told modulo 360°; that of the critical point nearest to the middle of the curve is marked.
+    // Phase is known modulo 360°; the critical one nearest to the middle of the curve is marked.
     let (low, high) = points
         .iter()
         .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), p| (low.min(p.phase), high.max(p.phase)));

@@ -1,4 +1,4 @@
-//! A rig, its design and its runs as one page: HTML that needs nothing but a browser.
+//! A rig, its design and its runs as one self-contained HTML page.
 
 mod animation;
 mod cost;
@@ -27,7 +27,7 @@ use upright_design::rig::{PlantDescription, Rig};
 use upright_design::table::TableValues;
 use upright_design::verify::TrustReport;
 
-/// What a report is made of.
+/// Input of a report.
 #[derive(Debug, Clone, Copy)]
 pub struct Source<'a> {
     /// The rig.
@@ -81,7 +81,7 @@ impl Picture {
 /// Makes the report; calls `stage` before each part.
 ///
 /// # Errors
-/// [`ReportError`] if a run cannot be started or a figure cannot be drawn; a rig that falls is no error.
+/// [`ReportError`] if a run cannot be started or a figure cannot be drawn; a rig that falls is not an error.
 pub fn report(source: &Source<'_>, stage: &dyn Fn(&str)) -> Result<Report, ReportError> {
     let Source { rig, certified, table, trust, .. } = *source;
     stage("runs");

@@ -1,4 +1,4 @@
-//! Where the poles are.
+//! Pole plots.
 
 use upright::table::Law;
 

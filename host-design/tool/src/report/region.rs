@@ -1,4 +1,4 @@
-//! From which starts the loop recovers.
+//! Map of the region of attraction.
 
 use upright::table::Law;
 
@@ -12,7 +12,7 @@ use upright_design::verify::{Axis, Horizon, Map, Unverifiable, attraction_map};
 const POINTS: usize = 31;
 const ANGLE: usize = 2;
 const RATE: usize = 3;
-/// Largest angle (rad) and rate (rad/s) that is looked at, roughly.
+/// Approximate largest angle (rad) and rate (rad/s) of the map.
 const LARGEST: [f64; 2] = [0.8, 8.0];
 
 /// Map over angle and rate of the first joint, wide enough to show the whole region.
@@ -34,7 +34,7 @@ pub(super) fn figure(rig: &Rig, table: &TableValues, law: Law) -> Result<Figure,
     Ok(drawn(title, &map))
 }
 
-/// Whether some start on the rim of the map is recovered from: the region may go on beyond.
+/// Whether the loop recovers from some start on the edge of the map, so that the region may extend beyond.
 fn reaches_edge(map: &Map) -> bool {
     let rows = &map.settled_s;
     let sides = rows.iter().flat_map(|row| row.first().into_iter().chain(row.last()));
@@ -42,7 +42,7 @@ fn reaches_edge(map: &Map) -> bool {
     sides.chain(ends).any(Option::is_some)
 }
 
-/// How far the start may be off in one state alone, roughly: at least a hundredth of `largest`.
+/// Approximate largest deviation in one state alone: at least a hundredth of `largest`.
 fn extent(rig: &Rig, table: &TableValues, law: Law, state: usize, largest: f64) -> Result<f64, Unverifiable> {
     const TRIED: usize = 13;
     let still = Axis { state: if state == ANGLE { RATE } else { ANGLE }, range: [0.0, 0.0], points: 1 };

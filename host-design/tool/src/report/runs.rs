@@ -42,7 +42,8 @@ pub(super) fn law_name(law: Law) -> &'static str {
 /// Longest run (ticks).
 const MOST_TICKS: f64 = 200_000.0;
 
-/// Runs everything: a step, a tilt, disturbances with the whole state measured, and all but the tilt from encoders alone.
+/// Runs every scene: a step, a tilt and disturbances with the whole state measured, and a step with disturbances from encoders
+/// alone.
 pub(super) fn scenes(
     rig: &Rig,
     certified: &Certified,
@@ -50,84 +51,126 @@ pub(super) fn scenes(
     trust: &TrustReport,
     seed: u64,
 ) -> Result<Vec<Scene>, SimulationError> {
-    let duration_s = duration(rig, certified);
     let base = Scenario {
         sensing: Sensing::FullState,
-        duration_s,
+        duration_s: duration(rig, certified),
         seed,
         substeps: 4,
         ..Scenario::at_rest(rig, Law::Lqr)
     };
-    let step_m = step(rig);
-    let steps = laws(table).iter().all(|law| gain(table, *law) != 0.0);
-    let disturbance = Disturbance::of(rig);
-    let is_chain = matches!(rig.plant, PlantDescription::Chain(_));
-    let of_model = if is_chain { "" } else { ", on the linear model" };
-    let mut scenes = Vec::new();
-    let mut add = |id, name, text: String, scenario: &Scenario| -> Result<(), SimulationError> {
-        let mut runs = Vec::new();
-        for law in laws(table) {
-            let (trace, summary) = simulate(rig, table, &Scenario { law, ..scenario.clone() })?;
-            runs.push(LawRun { law, trace, summary });
-        }
-        scenes.push(Scene { id, name, text, runs });
-        Ok(())
-    };
-    let unit = if is_chain { " m" } else { "" };
-    let stepped = Scenario { step_m, ..base.clone() };
-    if steps {
-        let text = format!(
-            "Set-point moved by {}{unit} at 0 s{}; the whole state is measured{of_model}.",
-            number(step_m),
-            if is_chain { ", made into a ramp by the governor" } else { "" }
-        );
-        add("step", "Step", text, &stepped)?;
+    let can_step = laws(table).iter().all(|law| gain(table, *law) != 0.0);
+    let stepped = can_step.then(|| Scenario { step_m: step(rig), ..base.clone() });
+    let mut plans = Vec::new();
+    plans.extend(stepped.clone().map(|stepped| step_plan(rig, stepped)));
+    plans.push(tilt_plan(rig, trust, base.clone()));
+    if Disturbance::of(rig) != Disturbance::NONE {
+        plans.push(disturbed_plan(rig, &base));
     }
-    let mut tilted = base.clone();
-    let text = if is_chain {
-        let angle = tilt(trust);
-        // The other links stand upright: the second one bends back.
-        tilted.start[2] = angle;
-        if let Some(second) = tilted.start.get_mut(4) {
-            *second = -angle;
-        }
-        format!(
-            "Link 1 leans by {} rad ({}°) at the start, all others are vertical: half of what the weaker law recovers from; \
-             the whole state is measured.",
-            number(angle),
-            number(angle.to_degrees())
-        )
-    } else {
-        tilted.start[rig.output()] = 0.05;
-        format!(
-            "State {} is 0.05 at the start, all others 0; the whole state is measured{of_model}.",
-            rig.output()
-        )
-    };
-    add("tilt", if is_chain { "Tilt" } else { "Offset" }, text, &tilted)?;
-    let noisy = |scenario: &Scenario| Scenario {
+    if table.observer.is_some() {
+        plans.push(encoder_plan(rig, &stepped.unwrap_or(base)));
+    }
+    plans.into_iter().map(|plan| plan.run(rig, table)).collect()
+}
+
+/// A scene before it has run.
+struct Plan {
+    id: &'static str,
+    name: &'static str,
+    text: String,
+    scenario: Scenario,
+}
+
+impl Plan {
+    fn run(self, rig: &Rig, table: &TableValues) -> Result<Scene, SimulationError> {
+        let run = |law| {
+            let (trace, summary) = simulate(rig, table, &Scenario { law, ..self.scenario.clone() })?;
+            Ok(LawRun { law, trace, summary })
+        };
+        let runs = laws(table).into_iter().map(run).collect::<Result<_, SimulationError>>()?;
+        Ok(Scene { id: self.id, name: self.name, text: self.text, runs })
+    }
+}
+
+fn is_chain(rig: &Rig) -> bool {
+    matches!(rig.plant, PlantDescription::Chain(_))
+}
+
+/// How a description ends where the plant is a linear model.
+fn of_model(rig: &Rig) -> &'static str {
+    if is_chain(rig) { "" } else { ", on the linear model" }
+}
+
+/// Unit of the set-point with its space.
+fn unit(rig: &Rig) -> &'static str {
+    if is_chain(rig) { " m" } else { "" }
+}
+
+fn step_plan(rig: &Rig, scenario: Scenario) -> Plan {
+    let text = format!(
+        "Set-point moved by {}{} at 0 s{}; the whole state is measured{}.",
+        number(scenario.step_m),
+        unit(rig),
+        if is_chain(rig) { ", made into a ramp by the governor" } else { "" },
+        of_model(rig)
+    );
+    Plan { id: "step", name: "Step", text, scenario }
+}
+
+fn tilt_plan(rig: &Rig, trust: &TrustReport, mut scenario: Scenario) -> Plan {
+    if !is_chain(rig) {
+        scenario.start[rig.output()] = 0.05;
+        let (state, model) = (rig.output(), of_model(rig));
+        let text =
+            format!("State {state} starts at 0.05, all others at 0; the whole state is measured{model}.");
+        return Plan { id: "tilt", name: "Offset", text, scenario };
+    }
+    let angle = tilt(trust);
+    // Angles are relative: with the opposite one at the second joint all other links are vertical.
+    scenario.start[2] = angle;
+    if let Some(second) = scenario.start.get_mut(4) {
+        *second = -angle;
+    }
+    let text = format!(
+        "Link 1 starts at {} rad ({}°) from the vertical, half of what the weaker law recovers from, all others vertical; \
+         the whole state is measured.",
+        number(angle),
+        number(angle.to_degrees())
+    );
+    Plan { id: "tilt", name: "Tilt", text, scenario }
+}
+
+fn disturbed_plan(rig: &Rig, scenario: &Scenario) -> Plan {
+    let (noise, model) = (noise_text(rig, scenario.seed), of_model(rig));
+    let text = format!("At rest, disturbed by {noise}; the whole state is measured{model}.");
+    Plan { id: "disturbances", name: "Disturbances", text, scenario: disturbed(rig, scenario) }
+}
+
+fn encoder_plan(rig: &Rig, scenario: &Scenario) -> Plan {
+    let (step, unit, noise) = (number(scenario.step_m), unit(rig), noise_text(rig, scenario.seed));
+    let text = format!(
+        "As on the bench: the controller measures encoder counts only and estimates the state. Set-point moved by {step}{unit}; \
+         {noise}."
+    );
+    let scenario = Scenario { sensing: Sensing::Encoders, ..disturbed(rig, scenario) };
+    Plan { id: "encoders", name: "Encoders only", text, scenario }
+}
+
+fn disturbed(rig: &Rig, scenario: &Scenario) -> Scenario {
+    let disturbance = Disturbance::of(rig);
+    Scenario {
         force_noise_n: disturbance.force_n,
         torque_noise_n_m: disturbance.torque_n_m,
         ..scenario.clone()
-    };
-    let what = format!(
-        "a force of {} N rms on the cart and torques of {} N·m rms at every joint, drawn anew each tick (seed {seed})",
+    }
+}
+
+fn noise_text(rig: &Rig, seed: u64) -> String {
+    let disturbance = Disturbance::of(rig);
+    format!(
+        "a force of {} N rms on the cart and torques of {} N·m rms at every joint, drawn again in each tick (seed {seed})",
         number(disturbance.force_n),
         number(disturbance.torque_n_m)
-    );
-    if disturbance != Disturbance::NONE {
-        let text = format!("At rest, disturbed by {what}; the whole state is measured{of_model}.");
-        add("disturbances", "Disturbances", text, &noisy(&base))?;
-    }
-    if table.observer.is_some() {
-        let moved = if steps { stepped } else { base };
-        let text = format!(
-            "As on the bench: the controller sees encoder counts only and estimates the rest. Set-point moved by {}{unit}; {what}.",
-            number(moved.step_m)
-        );
-        add("encoders", "Encoders only", text, &noisy(&Scenario { sensing: Sensing::Encoders, ..moved }))?;
-    }
-    Ok(scenes)
+    )
 }
 
 /// Ten seconds for links on a cart; ten of the slowest time constants for a model, whose clock may be any.

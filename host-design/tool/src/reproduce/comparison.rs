@@ -1,13 +1,13 @@
-//! A printed number beside ours.
+//! A printed number compared with ours.
 
 use serde::Serialize;
 
-/// To how many digits the paper prints a number.
+/// Number of digits that the paper prints.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Digits {
-    /// So many digits behind the point.
+    /// Digits after the decimal point.
     Decimals(usize),
-    /// So many digits from the first that is not 0.
+    /// Significant digits.
     Significant(usize),
 }
 
@@ -30,7 +30,7 @@ pub struct Row {
     pub quantity: String,
     /// What ours was computed from.
     pub from: &'static str,
-    /// As the paper prints it, without the zeros that say nothing.
+    /// As the paper prints it, without insignificant zeros.
     pub printed: Option<&'static str>,
     /// Ours, in SI units.
     pub ours: f64,
@@ -76,7 +76,7 @@ impl Row {
     }
 }
 
-/// The number that a text of this crate stands for: not a number if it is none.
+/// The number in a text of this crate; NaN if there is none.
 pub(super) fn value_of(text: &str) -> f64 {
     text.parse().unwrap_or(f64::NAN)
 }

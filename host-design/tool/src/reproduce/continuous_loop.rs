@@ -1,5 +1,5 @@
 //! The loop that the paper simulates: the nonlinear chain under `u = N r - K x` in continuous time, the whole state known,
-//! no tick, no force limit, no end of the rail.
+//! without tick, force limit or ends of the rail.
 //!
 //! The firmware's controller has no such mode: this law is the paper's object of study, not something that runs here.
 
@@ -24,8 +24,8 @@ pub struct ContinuousRun {
     pub duration_s: f64,
     /// Time between samples (s).
     pub sample_s: f64,
-    /// With the paper's disturbances, drawn from this seed at each sample and held until the next: the very numbers that
-    /// a simulation of the firmware with this tick and seed draws.
+    /// With the paper's disturbances, drawn from this seed at each sample and held until the next: the same numbers
+    /// that a simulation of the firmware with this tick and seed draws.
     pub disturbances: Option<u64>,
     /// Local error allowed.
     pub tolerance: Tolerance,

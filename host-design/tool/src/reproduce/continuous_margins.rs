@@ -9,7 +9,7 @@ use upright_design::verify::Margins;
 /// Frequencies looked at: this many per factor of ten from 1e-3 to 1e5 rad/s.
 const PER_DECADE: i32 = 5000;
 
-/// Margins of the loop broken at the force, from nothing but poles: with one input
+/// Margins of the loop broken at the force, from the poles alone: with one input
 ///
 /// ```text
 /// S(s) = det(s I - A) / det(s I - A + B K) = Π (s - open) / Π (s - closed),   L = 1/S - 1

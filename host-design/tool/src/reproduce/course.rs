@@ -1,4 +1,4 @@
-//! The course of a run, whichever loop made it, and the figures of a step response.
+//! The course of a run of any loop, and the figures of a step response.
 
 use serde::Serialize;
 
@@ -13,14 +13,14 @@ pub struct Course {
     pub states: Vec<Vec<f64>>,
     /// Force of the control law on the cart, without disturbance, from each sample on (N).
     pub forces_n: Vec<f64>,
-    /// How it was lost, if it was: the course ends there.
+    /// How it falls, if it does: the course ends there.
     pub fall: Option<Fall>,
 }
 
 /// Figures of a response to a step of the set-point at 0 s.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct StepFigures {
-    /// How it was lost, if it was.
+    /// How it falls, if it does.
     pub fall: Option<Fall>,
     /// Time after which the cart stays within 2 % of the step until the run ends (s).
     pub settling_time_s: Option<f64>,
@@ -84,7 +84,7 @@ impl Course {
     }
 }
 
-/// The first link beyond the horizontal, as a fall at `at_s`; a state that is not a number is one, too.
+/// The first link beyond the horizontal, as a fall at `at_s`; a NaN counts as a fall, too.
 pub(super) fn fall_of(state: &[f64], at_s: f64) -> Option<Fall> {
     if !state.iter().all(|entry| entry.is_finite()) {
         return Some(Fall { at_s, kind: FallKind::NotFinite });

@@ -1,4 +1,4 @@
-//! A, B, K, N and poles, beside what is printed.
+//! A, B, K, N and poles, compared with the printed ones.
 
 use serde::Serialize;
 
@@ -71,7 +71,7 @@ pub fn designs(rigs: &PaperRigs) -> Result<Designs, ReproduceError> {
 pub(super) fn open_loop_poles(rig: &Rig) -> Result<Vec<[f64; 2]>, ReproduceError> {
     let a = continuous_plant::<Wide>(rig)?.a;
     let poles = eigenvalues(&a).map_err(|_| upright_design::design::DesignError::Poles)?;
-    // A double pole comes out with half of the bits.
+    // A double pole is found with half of the bits.
     let clean = |part: f64| if part.abs() < 1e-30 { 0.0 } else { part };
     Ok(poles.iter().map(|pole| pole.to_f64().map(clean)).collect())
 }

@@ -1,4 +1,4 @@
-//! What the paper leaves open or misprints, each with what was tried and how much of what it prints then comes out.
+//! Gaps and misprints of the paper, each with the readings tried and how many printed numbers each of them gives.
 
 use serde::Serialize;
 
@@ -15,18 +15,18 @@ use upright_design::rig::{PlantDescription, PolePlacement, Rig};
 pub struct Erratum {
     /// What is wrong or missing.
     pub what: &'static str,
-    /// What has to stand there.
+    /// The correction.
     pub instead: &'static str,
-    /// What shows it.
+    /// The evidence.
     pub evidence: Vec<Evidence>,
 }
 
-/// One reading of the paper and what comes out of it.
+/// One reading of the paper and its result.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Evidence {
     /// The reading.
     pub reading: String,
-    /// How much of what is printed comes out, or what else was found.
+    /// How many printed numbers it gives, or another finding.
     pub outcome: String,
     /// Printed numbers that come out to the last digit, and how many there are; none where it is not about numbers.
     pub agree: Option<[usize; 2]>,

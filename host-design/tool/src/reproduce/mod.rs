@@ -1,4 +1,4 @@
-//! The results of the paper beside ours: F. J. Ticona Coaquira, "Design and comparison of two linear controllers with
+//! The results of the paper compared with ours: F. J. Ticona Coaquira, "Design and comparison of two linear controllers with
 //! precompensation gain for the Quadruple inverted pendulum".
 //!
 //! [`published`] holds what is printed, [`designs`] compares matrices, gains and poles digit by digit, [`errata`] says what
@@ -47,7 +47,7 @@ use upright_design::simulate::SimulationError;
 use upright_design::table::NoTable;
 use upright_design::verify::VerifyError;
 
-/// A result that could not be computed.
+/// Why a result cannot be computed.
 #[derive(Debug, thiserror::Error)]
 pub enum ReproduceError {
     /// A rig file of the paper is not there.

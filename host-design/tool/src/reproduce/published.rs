@@ -1,7 +1,7 @@
 //! What the paper prints: F. J. Ticona Coaquira, "Design and comparison of two linear controllers with precompensation
-//! gain for the Quadruple inverted pendulum". The only home of these numbers.
+//! gain for the Quadruple inverted pendulum". These numbers stand nowhere else.
 
-/// A of the paper, by rows: six significant digits (its further zeros say nothing).
+/// A of the paper, by rows: six significant digits (without insignificant zeros).
 pub const A: [[&str; 10]; 10] = [
     ["0", "1", "0", "0", "0", "0", "0", "0", "0", "0"],
     ["0", "0", "28.2528", "0", "-5.53284", "0", "0.94176", "0", "-0.11772", "0"],

@@ -19,7 +19,7 @@ pub enum Loop {
     Continuous,
     /// The firmware's controller with gains for the tick and the force limit of the rig file, the whole state known.
     FullState,
-    /// The same from encoder counts, by way of the observer.
+    /// The same from encoder counts, with the observer.
     Encoders,
 }
 

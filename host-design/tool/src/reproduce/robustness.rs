@@ -20,10 +20,10 @@ use upright_design::verify::{Margins, linear};
 /// Seed of all disturbances.
 pub const SEED: u64 = 1;
 
-/// The beginning of each run that is left out: the loop forgets where it started (s).
+/// Start of each run that is left out, until the initial state no longer matters (s).
 const FORGOTTEN_S: f64 = 10.0;
 
-/// 30 segments that overlap by half, after what is forgotten.
+/// 30 segments that overlap by half, after the part left out.
 const RUN: ContinuousRun = ContinuousRun {
     step_m: 0.0,
     duration_s: FORGOTTEN_S + 15.5 * SEGMENT as f64 * 1e-3,
@@ -56,7 +56,7 @@ pub struct Ripple {
     pub signal: String,
     /// Root mean square (m, rad or N).
     pub rms: f64,
-    /// Where its power lies.
+    /// Its bandwidth.
     pub bandwidth: Bandwidth,
     /// Its spectrum.
     #[serde(skip)]

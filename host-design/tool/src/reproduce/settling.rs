@@ -56,7 +56,7 @@ pub struct Sensitivity {
     pub changed: &'static str,
     /// Verdicts at [`HORIZON_S`].
     pub at_horizon: [bool; 7],
-    /// Verdicts at [`LONGEST_S`]. What is `false` there falls or never comes near.
+    /// Verdicts at [`LONGEST_S`]. `false`: it falls or never settles.
     pub in_the_end: [bool; 7],
     /// Which fall.
     pub falls: [bool; 7],
@@ -78,7 +78,7 @@ pub fn printed() -> [bool; 7] {
     published::TABLE_2.map(|(_, verdict)| verdict)
 }
 
-/// Runs Table 2 and all that was tried besides.
+/// Runs Table 2 and all variations that were tried.
 ///
 /// # Errors
 /// [`ReproduceError`] if a design or a run fails.
@@ -142,7 +142,7 @@ fn agreeing(courses: &[Course], step_m: f64) -> Option<[f64; 2]> {
     (first..=last).all(|step| agrees(&step)).then_some([first as f64 * STEP_S, last as f64 * STEP_S])
 }
 
-/// What is done differently.
+/// What is changed.
 enum Change {
     /// Gains and run of the continuous loop.
     Continuous { gains: GainsFrom, run: ContinuousRun },

@@ -8,7 +8,9 @@ use upright_design::rig::Rig;
 
 use crate::failure::Failure;
 
-/// Reads a rig file and prints it as understood, with defaults filled in.
+/// Reads a rig file and prints all its values, with defaults filled in.
+///
+/// Exit status 2 if the file cannot be used; the message names line, key and remedy.
 #[derive(Args)]
 #[command(before_help = "\
 Examples:

@@ -13,8 +13,9 @@ use crate::failure::Failure;
 use crate::progress::with_bar;
 use crate::variation::{LawName, finite, positive};
 
-/// Puts designs side by side: several rigs, or one key of a rig file swept over a range. What falls or has no design is a
-/// row, too.
+/// Compares designs: several rigs, or one key of a rig file swept over a range.
+///
+/// A design that falls, or does not exist, has a row, too; the exit status is 0.
 #[derive(Args)]
 #[command(before_help = "\
 Examples:
@@ -55,7 +56,7 @@ pub(crate) struct Compare {
     /// Write the table as CSV
     #[arg(long, value_name = "FILE")]
     csv: Option<PathBuf>,
-    /// Write the figure as SVG: figures over the swept key, or the runs without one
+    /// Write the figure as SVG: results over the swept key, or the runs without a sweep
     #[arg(long, value_name = "FILE")]
     svg: Option<PathBuf>,
     /// Write the figure as PNG

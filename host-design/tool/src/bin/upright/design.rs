@@ -17,18 +17,20 @@ use crate::progress::with_spinner;
 mod data;
 mod text;
 
-/// Designs the gains of a rig, proves them, and writes the const table of the firmware.
+/// Designs and certifies the gains of a rig and writes the gain table of the firmware.
+///
+/// Exit status 1 if the closed loop falls or --check finds a difference, 2 for a bad rig file, 3 if there is no design.
 #[derive(Args)]
 #[command(before_help = "\
 Examples:
   upright design rigs/quadruple-paper.toml
-  upright design my.toml --out /tmp/gains.rs
+  upright design my.toml --out gains.rs
   upright design rigs/quadruple-paper.toml --check        exit status 1 if src/gains.rs differs
   upright design my.toml --json --no-write | jq .sampled.lqr.K")]
 pub(crate) struct Design {
     /// Rig file (TOML)
     rig: PathBuf,
-    /// Write the table here [default: src/gains.rs of this checkout]
+    /// Write the table here [default: src/gains.rs of the checkout]
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
     /// Write nothing; fail if the table file differs from what would be written
@@ -42,7 +44,7 @@ pub(crate) struct Design {
     json: bool,
 }
 
-/// A control law of a design, with what has been found out about it.
+/// A control law of a design with its assessment.
 struct LawReport {
     name: &'static str,
     /// Index into [`Certified::poles`] and assessments.
@@ -87,7 +89,7 @@ impl Design {
             return check(&path, &source);
         }
         if std::fs::read_to_string(&path).is_ok_and(|found| first_difference(&found, &source).is_none()) {
-            // A new time stamp alone would have the firmware compiled again.
+            // A new time stamp alone would make cargo compile the firmware again.
             eprintln!("{} is up to date", path.display());
             return Ok(());
         }
@@ -131,7 +133,7 @@ fn refuse_failing_table(rig: &Rig, reports: &[LawReport]) -> Result<(), Failure>
     for LawReport { name, assessment, run, .. } in reports {
         if assessment.rounded >= 1.0 {
             return Err(Failure::NoSolution(format!(
-                "{}: {name}: rounded to f32 the gains no longer hold the plant (spectral radius {:.6}): tick.period_s = {} s \
+                "{}: {name}: rounded to f32 the gains no longer stabilise the plant (spectral radius {:.6}): tick.period_s = {} s \
                  is too long for single precision; shorten it. Nothing was written",
                 rig.name, assessment.rounded, rig.tick.period_s
             )));

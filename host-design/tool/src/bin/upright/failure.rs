@@ -1,4 +1,4 @@
-//! Failures of the tool and their exit status.
+//! Errors of the tool and their exit status.
 
 use std::process::ExitCode;
 
@@ -42,7 +42,7 @@ pub(crate) enum Failure {
     NoProgram(&'static str),
     #[error(transparent)]
     InTheLoop(#[from] RunError),
-    #[error("nobody can connect: {0}")]
+    #[error("no client can connect: {0}")]
     Relay(std::io::Error),
     #[error(transparent)]
     Monitor(#[from] OpenError),
@@ -102,10 +102,10 @@ impl Failure {
         }
     }
 
-    /// Tells the user and gives the exit status.
+    /// Prints the error and returns the exit status.
     pub(crate) fn report(&self) -> ExitCode {
         match self {
-            // The reader of a pipe has seen enough.
+            // The reader of a pipe has closed it: not an error.
             Failure::Output(error) if error.kind() == std::io::ErrorKind::BrokenPipe => {
                 return ExitCode::SUCCESS;
             }

@@ -1,4 +1,4 @@
-//! The command-line tool: from a rig file to gains, to the table, to a closed loop.
+//! The command-line tool: from a rig file to gains, gain table and closed loop.
 
 mod check;
 mod compare;
@@ -19,14 +19,14 @@ use clap::{Parser, Subcommand};
 
 const EXAMPLES: &str = "\
 Examples:
-  upright check rigs/quadruple-paper.toml       read a rig file and say how it was understood
+  upright check rigs/quadruple-paper.toml       read a rig file and print its values with defaults filled in
   upright design rigs/quadruple-paper.toml      design the gains, prove them, write src/gains.rs
-  upright design my.toml --json --no-write      the same as data, leaving all files alone
+  upright design my.toml --json --no-write      the same as JSON, without writing files
   upright simulate rigs/quadruple-paper.toml --step 1 --svg step.svg
-  upright verify rigs/quadruple-paper.toml      how far the loop can be trusted, in numbers
+  upright verify rigs/quadruple-paper.toml      margins, region of attraction, noise, model errors
   upright report rigs/quadruple-paper.toml      all of it on one page, with an animation
   upright compare rigs/quadruple-paper.toml --sweep tick.period_s=0.0005..0.01
-  upright reproduce                             the results of the paper beside ours
+  upright reproduce                             the results of the paper compared with ours
 
 Exit status:
   0  done
@@ -35,7 +35,7 @@ Exit status:
   3  the design problem has no solution
   4  a needed program is missing";
 
-/// Designs, emits and proves the gains that balance an n-link inverted pendulum on a cart.
+/// Designs and verifies the gains that balance an n-link inverted pendulum on a cart, and writes them as a table.
 #[derive(Parser)]
 #[command(name = "upright", version, before_help = EXAMPLES, arg_required_else_help = true)]
 struct Arguments {

@@ -6,7 +6,7 @@ use indicatif::{ProgressBar, ProgressStyle};
 
 const SPINNER_STEP: Duration = Duration::from_millis(120);
 
-/// Runs `work` with a spinner on stderr, if that is a terminal.
+/// Runs `work` with a spinner on stderr, if stderr is a terminal.
 pub(crate) fn with_spinner<T>(message: &'static str, work: impl FnOnce() -> T) -> T {
     let spinner = ProgressBar::new_spinner().with_message(message);
     spinner.enable_steady_tick(SPINNER_STEP);
@@ -15,7 +15,7 @@ pub(crate) fn with_spinner<T>(message: &'static str, work: impl FnOnce() -> T) -
     result
 }
 
-/// Runs `work` with a bar of `steps` on stderr, if that is a terminal; it calls its argument after each step.
+/// Runs `work` with a bar of `steps` on stderr, if stderr is a terminal; it calls its argument after each step.
 pub(crate) fn with_bar<T>(
     message: &'static str,
     steps: u64,
@@ -28,7 +28,7 @@ pub(crate) fn with_bar<T>(
     result
 }
 
-/// Runs `work` with a bar of `runs` random plants on stderr, if that is a terminal. `work` names each stage before it starts
+/// Runs `work` with a bar of `runs` random plants on stderr, if stderr is a terminal. `work` names each stage before it starts
 /// it, and calls its second argument after each run.
 pub(crate) fn with_random_plants<T>(
     runs: u64,
@@ -41,7 +41,7 @@ pub(crate) fn with_random_plants<T>(
     result
 }
 
-/// Runs `work` with a bar of `stages` on stderr, if that is a terminal; `work` names each stage before it starts it.
+/// Runs `work` with a bar of `stages` on stderr, if stderr is a terminal; `work` names each stage before it starts it.
 pub(crate) fn with_stages<T>(stages: u64, work: impl FnOnce(&dyn Fn(&'static str)) -> T) -> T {
     let bar = ProgressBar::new(stages);
     style(&bar, "{spinner} {bar:20} {pos}/{len} {msg} {elapsed}");

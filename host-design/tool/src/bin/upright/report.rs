@@ -13,14 +13,16 @@ use crate::failure::Failure;
 use crate::progress::with_random_plants;
 use crate::variation::Variation;
 
-/// Writes everything about a rig and its loop into one HTML file: runs with animation, model, gains, margins, trust report.
+/// Writes one HTML page about a rig and its loop: animated runs, model, gains, margins, trust report.
+///
+/// Exit status 0 also if requirements are not met: the page lists them.
 #[derive(Args)]
 #[command(before_help = "\
 Examples:
   upright report rigs/quadruple-paper.toml                      writes quadruple-paper.html
   upright report rigs/quadruple-paper.toml --out report.html --svg figures --csv data
   upright report rigs/single-quanser-ip02.toml --runs 1000 --png figures
-  upright report rigs/quadruple-paper.toml --gains continuous --tick 0.005     what a wrong tick does")]
+  upright report rigs/quadruple-paper.toml --gains continuous --tick 0.005     effect of a wrong tick")]
 pub(crate) struct Report {
     #[command(flatten)]
     variation: Variation,
@@ -88,25 +90,25 @@ impl Report {
         Ok(())
     }
 
-    /// Makes the folders, so that a place that cannot be written to is known before the work is done.
+    /// Creates the folders, so that an unwritable place is found before the work is done.
     fn prepare(&self) -> Result<(), Failure> {
         for folder in [&self.svg, &self.png, &self.csv].into_iter().flatten() {
             std::fs::create_dir_all(folder).map_err(|error| {
-                Failure::BadArgument(format!("{}: the folder cannot be made: {error}", folder.display()))
+                Failure::BadArgument(format!("{}: the folder cannot be created: {error}", folder.display()))
             })?;
         }
         let parent =
             self.out.as_deref().and_then(Path::parent).filter(|parent| !parent.as_os_str().is_empty());
         match parent {
             Some(parent) if !parent.is_dir() => Err(Failure::BadArgument(format!(
-                "{}: there is no such folder to write the page into: make it, or give another --out",
+                "{}: there is no such folder: create it, or give another --out",
                 parent.display()
             ))),
             _ => Ok(()),
         }
     }
 
-    /// Pictures first: a page that exists is complete.
+    /// Pictures first, so that a page that exists is complete.
     fn write(&self, page: &Page) -> Result<Vec<PathBuf>, Failure> {
         let mut files = Vec::new();
         for picture in &page.pictures {
@@ -127,7 +129,7 @@ impl Report {
         Ok(files)
     }
 
-    /// The command as it would be typed again. Where the files go is no part of what they say.
+    /// The command that makes the same page; its output paths do not matter.
     fn as_typed(&self) -> String {
         let mut typed = format!("upright report {}", self.variation.as_typed());
         if self.runs != 200 {

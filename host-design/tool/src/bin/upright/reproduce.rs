@@ -10,8 +10,8 @@ use upright_tool::reproduce::{PaperRigs, STAGES, reproduce};
 use crate::failure::Failure;
 use crate::progress::with_stages;
 
-/// Prints the results of the paper beside ours, number by number, and writes figures and data of its figures 5 to 8 and
-/// Table 2.
+/// Compares the results of the paper with ours, number by number, and writes its figures 5 to 8 and Table 2 as figures and
+/// data.
 #[derive(Args)]
 #[command(before_help = "\
 Examples:
@@ -38,7 +38,7 @@ impl Reproduce {
         let rigs = PaperRigs::from_folder(&self.rigs)?;
         if !self.no_write {
             std::fs::create_dir_all(&self.out).map_err(|error| {
-                Failure::BadArgument(format!("--out {}: cannot be made: {error}", self.out.display()))
+                Failure::BadArgument(format!("--out {}: cannot be created: {error}", self.out.display()))
             })?;
         }
         let found = with_stages(STAGES, |stage| reproduce(&rigs, stage))?;

@@ -5,6 +5,7 @@ use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
 use serde_json::json;
+use upright::table::Law;
 use upright_design::rig::{PlantDescription, Rig};
 use upright_design::simulate::{Scenario, Sensing, Summary, Trace, simulate};
 use upright_design::table::{TableValues, write_atomically};
@@ -14,7 +15,9 @@ use crate::failure::Failure;
 use crate::progress::with_spinner;
 use crate::variation::{LawName, Variation, finite, not_negative, positive};
 
-/// Runs the firmware's own controller against the nonlinear plant; exit status 1 when it falls.
+/// Runs the firmware's own controller against the nonlinear plant.
+///
+/// Exit status 1 if the pendulum falls.
 #[derive(Args)]
 #[command(before_help = "\
 Examples:
@@ -42,22 +45,22 @@ pub(crate) struct Simulate {
     /// Let the set-point jump, without the governor
     #[arg(long)]
     raw_step: bool,
-    /// What the controller sees [default: encoders if the rig file has [kalman]]
+    /// What the controller measures [default: encoders if the rig file has [kalman]]
     #[arg(long, value_enum)]
     sensing: Option<SensingName>,
-    /// Angles of the links at the start, from the cart outwards (rad); missing ones are 0
+    /// Initial angles of the links, from the cart outwards (rad); missing ones are 0
     #[arg(long, value_delimiter = ',', value_name = "RAD,…", allow_negative_numbers = true, value_parser = finite)]
     tilt: Vec<f64>,
-    /// The whole state at the start: x, xdot, theta1, theta1dot … (SI), instead of --tilt
+    /// The whole initial state: x, xdot, theta1, theta1dot … (SI), instead of --tilt
     #[arg(long, value_delimiter = ',', value_name = "X,…", allow_negative_numbers = true, value_parser = finite, conflicts_with = "tilt")]
     start: Vec<f64>,
     /// Disturbances: none, or the paper's force of 0.1 N rms and joint torques of 3.16e-5 N·m rms
     #[arg(long, value_enum, default_value_t = Disturbances::None)]
     disturbances: Disturbances,
-    /// Disturbing force, drawn anew each tick (N rms)
+    /// Disturbing force, drawn again in each tick (N rms)
     #[arg(long, value_name = "N", value_parser = not_negative)]
     force_noise: Option<f64>,
-    /// Disturbing torque at each joint, drawn anew each tick (N·m rms)
+    /// Disturbing torque at each joint, drawn again in each tick (N·m rms)
     #[arg(long, value_name = "NM", value_parser = not_negative)]
     torque_noise: Option<f64>,
     /// Constant disturbing force on the cart, as from a tilted rail (N)
@@ -73,7 +76,7 @@ pub(crate) struct Simulate {
     /// Write every tick as CSV to a file, or to stdout with `-`
     #[arg(long, value_name = "FILE")]
     csv: Option<PathBuf>,
-    /// Draw position, angles and force into an SVG file
+    /// Draw position, angles, rates and force into an SVG file
     #[arg(long, value_name = "FILE")]
     svg: Option<PathBuf>,
     /// Print the summary as one JSON object
@@ -100,7 +103,7 @@ impl Simulate {
         })
     }
 
-    /// Runs the scenario in a way of the caller's, and reports it as usual.
+    /// Runs the scenario with `run`, and writes and prints the result.
     pub(crate) fn run_with(
         self,
         run: impl FnOnce(&Rig, &TableValues, &Scenario) -> Result<(Trace, Summary), Failure>,
@@ -131,42 +134,7 @@ impl Simulate {
                 SensingName::Encoders => Sensing::Encoders,
             };
         }
-        let states = rig.states();
-        if !self.start.is_empty() {
-            if self.start.len() != states {
-                return Err(Failure::BadArgument(format!(
-                    "--start: {} values for {states} states; give {states}",
-                    self.start.len()
-                )));
-            }
-            scenario.start.clone_from(&self.start);
-        }
-        let links = match &rig.plant {
-            PlantDescription::Chain(chain) => chain.links.len(),
-            PlantDescription::Model(_) => 0,
-        };
-        if self.tilt.len() > links {
-            return Err(Failure::BadArgument(format!(
-                "--tilt: {} angles for {links} links; give at most {links}",
-                self.tilt.len()
-            )));
-        }
-        let pushed = self.step != 0.0
-            || !self.start.is_empty()
-            || !self.tilt.is_empty()
-            || !matches!(self.disturbances, Disturbances::None)
-            || self.force_noise.is_some()
-            || self.torque_noise.is_some()
-            || self.force_offset != 0.0;
-        if !pushed {
-            // At exact rest even a hopeless loop stands.
-            let acceptance = Scenario::acceptance(rig, law, 1.0);
-            scenario.start = acceptance.start;
-            eprintln!("no step, tilt or disturbance given: starting a little off balance");
-        }
-        for (link, &angle) in self.tilt.iter().enumerate() {
-            scenario.start[2 + 2 * link] = angle;
-        }
+        scenario.start = self.initial_state(rig, law)?;
         // The paper's disturbances: F_d ~ N(0, 0.01), joint torques ~ N(0, 1e-9), given there as variances.
         let (force, torque) = match self.disturbances {
             Disturbances::None => (0.0, 0.0),
@@ -183,6 +151,45 @@ impl Simulate {
             substeps: self.substeps.into(),
             ..scenario
         })
+    }
+
+    /// The initial state that the options give. Without any motion to start with it is a small tilt.
+    fn initial_state(&self, rig: &Rig, law: Law) -> Result<Vec<f64>, Failure> {
+        let states = rig.states();
+        let links = match &rig.plant {
+            PlantDescription::Chain(chain) => chain.links.len(),
+            PlantDescription::Model(_) => 0,
+        };
+        let [values, angles] = [self.start.len(), self.tilt.len()];
+        if values != 0 && values != states {
+            return Err(Failure::BadArgument(format!(
+                "--start: {values} values for {states} states; give {states}"
+            )));
+        }
+        if angles > links {
+            return Err(Failure::BadArgument(format!(
+                "--tilt: {angles} angles for {links} links; give at most {links}"
+            )));
+        }
+        if values != 0 {
+            return Ok(self.start.clone());
+        }
+        let moves = self.step != 0.0
+            || angles != 0
+            || !matches!(self.disturbances, Disturbances::None)
+            || self.force_noise.is_some()
+            || self.torque_noise.is_some()
+            || self.force_offset != 0.0;
+        if !moves {
+            // At exact rest even an unstable loop stands.
+            eprintln!("no step, tilt or disturbance given: starting with a small tilt");
+            return Ok(Scenario::acceptance(rig, law, 1.0).start);
+        }
+        let mut start = Scenario::at_rest(rig, law).start;
+        for (link, &angle) in self.tilt.iter().enumerate() {
+            start[2 + 2 * link] = angle;
+        }
+        Ok(start)
     }
 
     fn write(&self, rig: &Rig, trace: &Trace, summary: &Summary) -> Result<(), Failure> {

@@ -1,4 +1,4 @@
-//! A rig file with some of its values changed on the command line, designed anew.
+//! A rig file with some of its values changed on the command line.
 
 use std::path::PathBuf;
 
@@ -18,10 +18,10 @@ pub(crate) struct Variation {
     /// Which gains: those designed for the tick, or those for continuous time
     #[arg(long, value_enum, default_value_t = GainsName::Sampled)]
     gains: GainsName,
-    /// Control period instead of the rig's (s); the gains are designed anew
+    /// Control period instead of the rig's (s); the gains are redesigned
     #[arg(long, value_name = "S", allow_negative_numbers = true, value_parser = period)]
     tick: Option<f64>,
-    /// Delay instead of the rig's (ticks); the gains are designed anew
+    /// Delay instead of the rig's (ticks); the gains are redesigned
     #[arg(long, value_name = "TICKS", value_parser = clap::value_parser!(u8).range(0..=1))]
     delay: Option<u8>,
     /// Force limit instead of the rig's (N)
@@ -52,7 +52,7 @@ impl LawName {
 }
 
 impl Variation {
-    /// The rig file and all changes as they would be typed again.
+    /// The rig file and all changes as command-line arguments.
     pub(crate) fn as_typed(&self) -> String {
         let mut typed = self.rig.display().to_string();
         if let GainsName::Continuous = self.gains {

@@ -16,16 +16,17 @@ use crate::variation::{LawName, Variation};
 
 mod text;
 
-/// How far the loop can be trusted before a motor is connected: exit status 1 when a requirement of the rig file's
-/// [verify] is not met.
+/// Verifies the loop before a motor is connected: margins, region of attraction, noise, mass errors, random plants.
+///
+/// Exit status 1 if a requirement of the rig file's [verify] is not met.
 #[derive(Args)]
 #[command(before_help = "\
 Examples:
   upright verify rigs/single-quanser-ip02.toml
   upright verify rigs/quadruple-paper.toml --runs 1000 --seed 1 --json
-  upright verify rigs/quadruple-paper.toml --replay 17 --law lqr --csv worst.csv   the random plant of seed 17 again
+  upright verify rigs/quadruple-paper.toml --replay 17 --law lqr --csv worst.csv   the random plant of seed 17
   upright verify rigs/single-quanser-ip02.toml --map tilt.csv       from which angle and rate of link 1 it recovers
-  upright verify rigs/quadruple-paper.toml --gains continuous --tick 0.003         fails: not even stable")]
+  upright verify rigs/quadruple-paper.toml --gains continuous --tick 0.003         unstable: exit status 1")]
 pub(crate) struct Verify {
     #[command(flatten)]
     variation: Variation,
@@ -38,20 +39,20 @@ pub(crate) struct Verify {
     /// Only this law
     #[arg(long, value_enum)]
     law: Option<LawName>,
-    /// Make no report, but the single Monte Carlo run of this seed again
+    /// Instead of the report, repeat the Monte Carlo run of this seed
     #[arg(long, value_name = "SEED", requires = "law")]
     replay: Option<u64>,
     /// With --replay: write every tick as CSV
     #[arg(long, value_name = "FILE", requires = "replay")]
     csv: Option<PathBuf>,
-    /// Make no report, but a map of the starts from which the loop recovers, as CSV
+    /// Instead of the report, write a map of the initial states from which the loop recovers, as CSV
     #[arg(long, value_name = "FILE", conflicts_with = "replay")]
     map: Option<PathBuf>,
-    /// With --map: its two states, as index:from:to (SI; state order x, xdot, theta1, theta1dot …)
+    /// With --map: two states and their ranges, as index:from:to (SI; state order x, xdot, theta1, theta1dot …)
     #[arg(long, value_name = "S:A:B", num_args = 2, value_delimiter = ',', requires = "map", allow_negative_numbers = true,
           value_parser = axis, default_values = ["2:-0.5:0.5", "3:-4:4"])]
     axes: Vec<Axis>,
-    /// Share of the random plants in which the force comes one tick later than designed for (0 to 1)
+    /// Share of the random plants with one more tick of delay than designed for (0 to 1)
     #[arg(long, value_name = "SHARE", default_value_t = 0.0, value_parser = share)]
     late: f64,
     /// Print the report as one JSON object
@@ -59,7 +60,7 @@ pub(crate) struct Verify {
     json: bool,
 }
 
-/// Starts along each axis of a map.
+/// Initial values along each axis of a map.
 const POINTS: usize = 41;
 
 fn axis(text: &str) -> Result<Axis, String> {
@@ -109,7 +110,7 @@ impl Verify {
         self.print(&rig, &report?)
     }
 
-    /// What a replay has to repeat.
+    /// The arguments that a replay has to repeat.
     fn as_typed(&self) -> String {
         let late = if self.late == 0.0 { String::new() } else { format!(" --late {}", self.late) };
         self.variation.as_typed() + &late
@@ -156,7 +157,7 @@ impl Verify {
         }
     }
 
-    /// A line for each start: both states and the time to come near rest, or nothing.
+    /// One CSV row per initial state: both states and the settling time, empty if it does not recover.
     fn map(&self, rig: &Rig, table: &TableValues, path: &std::path::Path) -> Result<(), Failure> {
         let law = if table.lqr.is_some() { Law::Lqr } else { Law::PolePlacement };
         let &[across, down] = self.axes.as_slice() else {
@@ -185,7 +186,11 @@ impl Verify {
         }
         write_atomically(path, csv.as_bytes())?;
         let recovered = map.settled_s.iter().flatten().flatten().count();
-        println!("recovers from {recovered} of {} starts; written to {}", POINTS * POINTS, path.display());
+        println!(
+            "recovers from {recovered} of {} initial states; written to {}",
+            POINTS * POINTS,
+            path.display()
+        );
         Ok(())
     }
 }

@@ -58,7 +58,7 @@ struct LawData<'a> {
 
 #[derive(Serialize)]
 struct IntegralData<'a> {
-    /// Over [x; z], and the force on its way if there is a delay.
+    /// For [x; z], and for the pending force if there is a delay.
     #[serde(rename = "K")]
     k: Rows<'a>,
     /// The entry of K on z.

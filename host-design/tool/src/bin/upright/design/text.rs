@@ -1,4 +1,4 @@
-//! A design for reading.
+//! A design as text.
 
 use core::fmt::Write;
 
@@ -26,7 +26,7 @@ fn write_design(
     writeln!(out, "{} (hash {:016x})", rig.name, rig.hash())?;
     writeln!(
         out,
-        "{} states, tick {} ms, delay {} ticks; every gain the same at {low} and {high} bits",
+        "{} states, tick {} ms, delay {} ticks; every gain equal at {low} and {high} bits",
         rig.states(),
         short(rig.tick.period_s * 1e3),
         rig.tick.delay_ticks
@@ -45,7 +45,7 @@ fn write_design(
         writeln!(
             out,
             "  spectral radius at the tick: {:.6} exact, {:.6} rounded to f32, {:.6} with the continuous gains\n  \
-             rounding to f32 moves no gain by more than {:.1e} of itself",
+             rounding to f32 changes no gain by more than {:.1e}, relative",
             assessment.exact, assessment.rounded, assessment.continuous_at_tick, assessment.largest_rounding
         )?;
         match &report.run {
@@ -85,7 +85,7 @@ fn wrapped(items: &[String]) -> String {
     lines.join("\n            ")
 }
 
-/// What a user should know before flashing.
+/// Warnings before flashing.
 pub(super) fn warnings(
     rig: &Rig,
     certified: &Certified,
@@ -96,14 +96,14 @@ pub(super) fn warnings(
     for LawReport { name, assessment, .. } in reports {
         if assessment.continuous_at_tick >= 1.0 {
             warnings.push(format!(
-                "{name}: the continuous gains would not survive the tick of {} ms (spectral radius {:.2}); the table holds the sampled ones",
+                "{name}: the continuous gains are unstable at the tick of {} ms (spectral radius {:.2}); the table holds the sampled ones",
                 short(rig.tick.period_s * 1e3),
                 assessment.continuous_at_tick
             ));
         }
         if assessment.rounded >= 1.0 {
             warnings.push(format!(
-                "{name}: rounded to f32 the gains do not hold the plant (spectral radius {:.6})",
+                "{name}: rounded to f32 the gains do not stabilise the plant (spectral radius {:.6})",
                 assessment.rounded
             ));
         }
