@@ -17,7 +17,8 @@ pub fn significant(x: f64, digits: usize) -> String {
     }
 }
 
-/// Poles `[re, im]`, each conjugate pair once, as `re±imi`. What rounding leaves of a pole at the origin is shown as 0.
+/// Poles `[re, im]`, each conjugate pair once, as `re±imi`. What rounding leaves of a pole at the origin is shown as
+/// 0.
 pub fn poles(poles: &[[f64; 2]], digits: usize) -> Vec<String> {
     let upper = poles.iter().filter(|pole| pole[1] >= 0.0);
     upper

@@ -1,4 +1,5 @@
-//! Region of attraction on the nonlinear plant: the largest initial tilts and the largest step from which the loop recovers.
+//! Region of attraction on the nonlinear plant: the largest initial tilts and the largest step from which the loop
+//! recovers.
 
 use rayon::prelude::*;
 use serde::Serialize;
@@ -236,8 +237,8 @@ pub struct Map {
     pub settled_s: Vec<Vec<Option<f64>>>,
 }
 
-/// Runs every start of the plane, with `horizon` [widened](Horizon::widened) for the law's limit cycle. `done` is called
-/// after each run, from any thread.
+/// Runs every start of the plane, with `horizon` [widened](Horizon::widened) for the law's limit cycle. `done` is
+/// called after each run, from any thread.
 ///
 /// # Errors
 /// [`Unverifiable`] if the runs cannot be started or an axis names no state.

@@ -78,8 +78,8 @@ pub struct Corners {
 /// With more links than this there are too many corners to try.
 pub(super) const MOST_LINKS: usize = 9;
 
-/// The rig with its masses, cart first, changed by `percent` times `factors`. An inertia given in the rig file stays; a
-/// default one follows the mass.
+/// The rig with its masses, cart first, changed by `percent` times `factors`. An inertia given in the rig file stays;
+/// a default one follows the mass.
 pub fn wrong_masses(rig: &Rig, percent: f64, factors: &[f64]) -> Rig {
     let mut wrong = rig.clone();
     if let PlantDescription::Chain(chain) = &mut wrong.plant {
@@ -135,8 +135,8 @@ pub fn corners(
     Ok(Corners { percent, corners: all.len(), stand: all.len() - lost.len(), weakest: weakest.clone(), lost })
 }
 
-/// The largest percentage, a multiple of `step` up to `largest` (%), at which all corners stand, by bisection over those
-/// multiples; 0 if not even the first does.
+/// The largest percentage, a multiple of `step` up to `largest` (%), at which all corners stand, by bisection over
+/// those multiples; 0 if not even the first does.
 ///
 /// # Errors
 /// As [`corners`].

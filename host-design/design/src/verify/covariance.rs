@@ -22,8 +22,8 @@ pub struct NoiseShare {
 /// Shares of all sources, the total last; none without `[kalman]`.
 ///
 /// The covariance P of the loop driven by white noise of covariance Q per tick solves `P = M P Mᵀ + Q`; summed by
-/// doubling, `P ← P + M P Mᵀ, M ← M²`. An encoder's rounding error is taken as white, of variance step²/12; intensities
-/// are integrated over the tick (Van Loan).
+/// doubling, `P ← P + M P Mᵀ, M ← M²`. An encoder's rounding error is taken as white, of variance step²/12;
+/// intensities are integrated over the tick (Van Loan).
 pub(super) fn covariance(
     rig: &Rig,
     certified: &Certified,

@@ -77,8 +77,8 @@ pub fn coarser(rig: &Rig, factor: f64) -> Rig {
     coarse
 }
 
-/// Finds the coarsest encoders by doubling and bisection of a common factor. The gains are redesigned for every factor, as
-/// a user with such encoders would do: the observer knows their resolution.
+/// Finds the coarsest encoders by doubling and bisection of a common factor. The gains are redesigned for every
+/// factor, as a user with such encoders would do: the observer knows their resolution.
 ///
 /// # Errors
 /// [`Unverifiable`] for a model or a rig without observer, and if a design or run fails.

@@ -166,9 +166,9 @@ impl<R: Real> PlantModel<R> {
         Self::with_taps(ad, &taps, measured)
     }
 
-    /// `ẋ = a x + b u` sampled every `period` seconds, with a force that arrives `delay_ticks` (any real number) later:
-    /// a fraction f of a tick splits the tick into the old force for f and the new one for 1 - f (Åström & Wittenmark,
-    /// *Computer-Controlled Systems*, section 2.3).
+    /// `ẋ = a x + b u` sampled every `period` seconds, with a force that arrives `delay_ticks` (any real number)
+    /// later: a fraction f of a tick splits the tick into the old force for f and the new one for 1 - f (Åström &
+    /// Wittenmark, *Computer-Controlled Systems*, section 2.3).
     pub(super) fn delayed(
         a: &Matrix<R>,
         b: &Matrix<R>,

@@ -19,8 +19,8 @@ pub struct Margins {
     pub highest_gain: Option<f64>,
     /// Phase margin (rad), to either side; none if |L| is never 1.
     pub phase_margin_rad: Option<f64>,
-    /// Delay margin (s): the smallest further delay of the force that makes the loop unstable, of the sampled loop with
-    /// the delay as it is, fractions of a tick included; none if none was found.
+    /// Delay margin (s): the smallest further delay of the force that makes the loop unstable, of the sampled loop
+    /// with the delay as it is, fractions of a tick included; none if none was found.
     pub delay_margin_s: Option<f64>,
     /// The same in ticks.
     pub delay_margin_ticks: Option<f64>,

@@ -34,8 +34,8 @@ pub struct Spread {
 }
 
 impl Spread {
-    /// ±2 % of masses, lengths and inertia, ±20 % of friction, the disturbances that the rig file expects, and a start within
-    /// ±0.5 mrad.
+    /// ±2 % of masses, lengths and inertia, ±20 % of friction, the disturbances that the rig file expects, and a start
+    /// within ±0.5 mrad.
     pub fn of(rig: &Rig) -> Self {
         Self {
             mass: 0.02,
@@ -78,8 +78,8 @@ pub struct MonteCarlo {
 
 /// Plant and scenario of the run with this seed.
 ///
-/// Masses and lengths are drawn first; a given centre of mass keeps its share of the length and a given inertia follows m l²,
-/// then gets its own factor.
+/// Masses and lengths are drawn first; a given centre of mass keeps its share of the length and a given inertia
+/// follows m l², then gets its own factor.
 pub fn sample(rig: &Rig, law: Law, spread: &Spread, seed: u64) -> (Rig, Scenario) {
     let mut random = Pcg64::seed_from_u64(seed);
     let mut between = |share: f64| share * random.random_range(-1.0..=1.0);
@@ -119,8 +119,8 @@ fn draw_chain(chain: &mut Chain, spread: &Spread, between: &mut impl FnMut(f64) 
     }
 }
 
-/// Makes `runs` runs with the seeds from `base_seed` on, on all threads; the outcome does not depend on their number. `done`
-/// is called after each run, from any thread.
+/// Makes `runs` runs with the seeds from `base_seed` on, on all threads; the outcome does not depend on their number.
+/// `done` is called after each run, from any thread.
 ///
 /// # Errors
 /// [`Unverifiable`] if a run cannot be started or a setting is invalid.
@@ -174,9 +174,9 @@ pub(super) fn is_worse(a: &Outcome, b: &Outcome) -> bool {
     }
 }
 
-/// The 95 % confidence interval of a share of which `successes` of `runs` were seen, after E. B. Wilson, "Probable inference,
-/// the law of succession, and statistical inference", J. Am. Stat. Assoc. 22 (1927) 209-212. It does not shrink to a point
-/// when every run succeeds.
+/// The 95 % confidence interval of a share of which `successes` of `runs` were seen, after E. B. Wilson, "Probable
+/// inference, the law of succession, and statistical inference", J. Am. Stat. Assoc. 22 (1927) 209-212. It does not
+/// shrink to a point when every run succeeds.
 pub fn wilson(successes: usize, runs: usize) -> [f64; 2] {
     if runs == 0 {
         return [0.0, 1.0];

@@ -125,8 +125,8 @@ pub struct Endurance {
     pub peak_force_n: f64,
 }
 
-/// Runs the nominal plant from rest for `duration_s` with each of the seeds 1 to `seeds`. `done` is called after each run,
-/// from any thread.
+/// Runs the nominal plant from rest for `duration_s` with each of the seeds 1 to `seeds`. `done` is called after each
+/// run, from any thread.
 ///
 /// # Errors
 /// [`Unverifiable`] if the runs cannot be started.

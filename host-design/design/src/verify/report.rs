@@ -23,8 +23,8 @@ pub struct TrustReport {
     pub checks: Vec<Check>,
 }
 
-/// What was found for one law. Parts for which a rig has no data (masses of a `[model]`, encoders) are none, and so are
-/// the runs of an unstable loop.
+/// What was found for one law. Parts for which a rig has no data (masses of a `[model]`, encoders) are none, and so
+/// are the runs of an unstable loop.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct LawTrust {
     /// Margins, tick, noise, rounding, certificates.

@@ -11,15 +11,15 @@ use crate::numerics::Matrix;
 /// Limits on the tick for an unchanged table.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct TickLimits {
-    /// Longest period (s) up to which the loop stays stable when the same table runs slower than it was designed for, the
-    /// plant sampled at that period; none: stable up to 30 times the tick.
+    /// Longest period (s) up to which the loop stays stable when the same table runs slower than it was designed for,
+    /// the plant sampled at that period; none: stable up to 30 times the tick.
     pub longest_stable_s: Option<f64>,
     /// The unstable period just above it (s): the bisection ends there.
     pub shortest_unstable_s: Option<f64>,
     /// Shortest period (s) down to which it stays stable when the table runs faster; none: down to a thirtieth.
     pub shortest_stable_s: Option<f64>,
-    /// Jitter (ticks) that is tolerated: each force may come late by any time up to this, differently in every tick. By
-    /// the small-gain criterion of Kao and Lincoln: sufficient only.
+    /// Jitter (ticks) that is tolerated: each force may come late by any time up to this, differently in every tick.
+    /// By the small-gain criterion of Kao and Lincoln: sufficient only.
     pub jitter_ticks: f64,
     /// The same (s).
     pub jitter_s: f64,

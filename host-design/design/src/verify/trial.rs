@@ -51,8 +51,8 @@ impl Disturbance {
     /// No disturbances.
     pub const NONE: Self = Self { force_n: 0.0, torque_n_m: 0.0 };
 
-    /// What the rig file gives in `[verify]`, or else what its `[kalman]` expects: an intensity is variance times tick.
-    /// The joint with the most noise stands for all.
+    /// What the rig file gives in `[verify]`, or else what its `[kalman]` expects: an intensity is variance times
+    /// tick. The joint with the most noise stands for all.
     pub fn of(rig: &Rig) -> Self {
         let rms = |intensity: f64| (intensity / rig.tick.period_s).sqrt();
         let expected = rig.kalman.as_ref().map_or(Self::NONE, |kalman| Self {
@@ -85,8 +85,9 @@ impl Default for Horizon {
 }
 
 impl Horizon {
-    /// Wide enough for `law`'s limit cycle: encoder resolution keeps some loops moving by far more than one count, so that near
-    /// rest is at least twice the largest deviation of a run without disturbances that starts (all but) at rest.
+    /// Wide enough for `law`'s limit cycle: encoder resolution keeps some loops moving by far more than one count, so
+    /// that near rest is at least twice the largest deviation of a run without disturbances that starts (all but) at
+    /// rest.
     ///
     /// # Errors
     /// Those of [`run`].

@@ -2,7 +2,7 @@
 
 mod design_properties;
 // What the paper prints has one home, in the tool.
-#[allow(dead_code)]
+#[allow(dead_code, unreachable_pub)]
 #[path = "../../../tool/src/reproduce/published.rs"]
 mod paper_numbers;
 mod plant_equations;

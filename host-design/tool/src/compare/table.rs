@@ -3,8 +3,8 @@
 use super::row::{Fate, Figures, Row};
 use crate::reproduce::markdown_table;
 
-/// All rows as a table with aligned columns, which is Markdown as well; `key` is the swept one. A column of the same rig
-/// throughout is left out.
+/// All rows as a table with aligned columns, which is Markdown as well; `key` is the swept one. A column of the same
+/// rig throughout is left out.
 pub fn table(rows: &[Row], key: Option<&str>) -> String {
     let several = rows.iter().any(|row| row.rig != rows[0].rig);
     let mut header = if several { vec!["rig", "law", "run"] } else { vec!["law", "run"] };

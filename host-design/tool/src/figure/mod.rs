@@ -1,7 +1,7 @@
 //! Figures: panels of curves with axes and units, as SVG, PNG and CSV.
 //!
-//! Drawn by `plotters`. Colours are those of Okabe and Ito (*Color Universal Design*, 2008), which colour-blind readers can
-//! distinguish; every curve also has its own dash or marker, so that nothing depends on colour.
+//! Drawn by `plotters`. Colours are those of Okabe and Ito (*Color Universal Design*, 2008), which colour-blind
+//! readers can distinguish; every curve also has its own dash or marker, so that nothing depends on colour.
 
 mod csv;
 mod draw;

@@ -15,8 +15,8 @@ pub fn run_svg(rig: &Rig, trace: &Trace, title: &str) -> Result<String, FigureEr
     run_figure(Figure::new(title), rig, trace, end_s).svg()
 }
 
-/// Adds the panels of a run to `figure`: position, angles, rates and force with their limits, or the states and the input
-/// of a `[model]`. The time axis ends at `end_s`.
+/// Adds the panels of a run to `figure`: position, angles, rates and force with their limits, or the states and the
+/// input of a `[model]`. The time axis ends at `end_s`.
 pub(crate) fn run_figure(figure: Figure, rig: &Rig, trace: &Trace, end_s: f64) -> Figure {
     let run = Run { rig, trace, end_s };
     let panels = match &rig.plant {

@@ -36,8 +36,8 @@ pub(super) const THIN: u32 = FINE + 1;
 /// Width of a cross; of no other line.
 pub(super) const MARKER: u32 = 2 * FINE - 1;
 
-/// Adds to a document what the drawing library cannot express: dashed lines in one piece (every colour has its dash), and
-/// cells of a map without seams.
+/// Adds to a document what the drawing library cannot express: dashed lines in one piece (every colour has its dash),
+/// and cells of a map without seams.
 pub(super) fn finished(svg: &str) -> String {
     let mut svg = svg.to_owned();
     let lines = COLOURS.iter().zip(DASHES).map(|(colour, dash)| (colour, LINE, dash));

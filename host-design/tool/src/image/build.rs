@@ -81,8 +81,8 @@ pub fn build(kind: Kind) -> Result<PathBuf, ImageError> {
     compile(kind, None, kind.feature())
 }
 
-/// As [`build`], for tests: without a compiler it returns none and says so on stderr, or fails if the environment variable
-/// `UPRIGHT_REQUIRE_IMAGE` is set.
+/// As [`build`], for tests: without a compiler it returns none and says so on stderr, or fails if the environment
+/// variable `UPRIGHT_REQUIRE_IMAGE` is set.
 ///
 /// # Errors
 /// As for [`build`].

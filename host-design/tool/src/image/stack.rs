@@ -1,13 +1,13 @@
 //! A bound on the stack from the machine code: what functions push, what they call, and which handlers interrupt.
 //!
-//! It holds for every compiler and every input, because it takes every branch: a function costs the sum of everything it
-//! ever pushes, and every handler of the vector table is assumed to interrupt all others at their deepest point.
+//! It holds for every compiler and every input, because it takes every branch: a function costs the sum of everything
+//! it ever pushes, and every handler of the vector table is assumed to interrupt all others at their deepest point.
 
 use super::elf::Image;
 use super::thumb::{Effect, decode, is_wide};
 
-/// What the processor pushes when it takes an exception (Armv7-M Architecture Reference Manual, B1.5.7): 8 words, 18 of
-/// the floating-point unit, and one to align; bytes.
+/// What the processor pushes when it takes an exception (Armv7-M Architecture Reference Manual, B1.5.7): 8 words, 18
+/// of the floating-point unit, and one to align; bytes.
 const EXCEPTION_FRAME: u32 = 108;
 
 /// The most stack that an image can need.

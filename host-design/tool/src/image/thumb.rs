@@ -1,4 +1,5 @@
-//! The Thumb-2 instructions that matter for the stack and for calls (Armv7-M Architecture Reference Manual, A5 and A7.7).
+//! The Thumb-2 instructions that matter for the stack and for calls (Armv7-M Architecture Reference Manual, A5 and
+//! A7.7).
 
 /// Effect of an instruction on the stack pointer or the control flow.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

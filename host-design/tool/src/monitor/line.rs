@@ -51,8 +51,8 @@ pub enum Line {
 }
 
 impl Line {
-    /// Opens a serial port at [`BAUD`], such as `/dev/ttyACM0` (Linux), `/dev/cu.usbmodem1101` (macOS) or `COM3` (Windows), or
-    /// a relay (`tcp:HOST:PORT`).
+    /// Opens a serial port at [`BAUD`], such as `/dev/ttyACM0` (Linux), `/dev/cu.usbmodem1101` (macOS) or `COM3`
+    /// (Windows), or a relay (`tcp:HOST:PORT`).
     ///
     /// # Errors
     /// [`OpenError`] with the port and what to do.

@@ -1,7 +1,7 @@
 //! The conversation of a person at the keyboard with a running firmware.
 //!
-//! [`Monitor`] holds the state and knows neither terminal nor line: bytes and keys go in, bytes come out. [`view`] draws it, [`Line`] is a
-//! serial device or a TCP connection, [`record`] writes telemetry.
+//! [`Monitor`] holds the state and knows neither terminal nor line: bytes and keys go in, bytes come out. [`view`]
+//! draws it, [`Line`] is a serial device or a TCP connection, [`record`] writes telemetry.
 
 mod command;
 mod line;

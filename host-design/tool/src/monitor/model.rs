@@ -203,7 +203,8 @@ impl Monitor {
         self.send(request, now);
     }
 
-    /// Sends what is due: the request for the identity, the keep-alive of the dead-man timer, the request for the counters.
+    /// Sends what is due: the request for the identity, the keep-alive of the dead-man timer, the request for the
+    /// counters.
     pub fn poll(&mut self, now: Duration) {
         if now >= self.next_ask {
             let (request, pause) = match self.info {

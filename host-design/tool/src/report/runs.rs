@@ -42,8 +42,8 @@ pub(super) fn law_name(law: Law) -> &'static str {
 /// Longest run (ticks).
 const MOST_TICKS: f64 = 200_000.0;
 
-/// Runs every scene: a step, a tilt and disturbances with the whole state measured, and a step with disturbances from encoders
-/// alone.
+/// Runs every scene: a step, a tilt and disturbances with the whole state measured, and a step with disturbances from
+/// encoders alone.
 pub(super) fn scenes(
     rig: &Rig,
     certified: &Certified,

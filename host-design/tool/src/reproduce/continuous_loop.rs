@@ -1,5 +1,5 @@
-//! The loop that the paper simulates: the nonlinear chain under `u = N r - K x` in continuous time, the whole state known,
-//! without tick, force limit or ends of the rail.
+//! The loop that the paper simulates: the nonlinear chain under `u = N r - K x` in continuous time, the whole state
+//! known, without tick, force limit or ends of the rail.
 //!
 //! The firmware's controller has no such mode: this law is the paper's object of study, not something that runs here.
 

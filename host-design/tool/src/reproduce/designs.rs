@@ -11,8 +11,8 @@ use upright_design::rig::Rig;
 /// Comparison of the linear models and designs.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Designs {
-    /// Every number that the paper prints (entries of A that are 0 or 1 by definition are left out), and those that its
-    /// formulas for the dominant poles give.
+    /// Every number that the paper prints (entries of A that are 0 or 1 by definition are left out), and those that
+    /// its formulas for the dominant poles give.
     pub rows: Vec<Row>,
     /// Poles. The paper prints none.
     pub poles: Vec<PoleSet>,

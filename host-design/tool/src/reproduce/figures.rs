@@ -82,8 +82,8 @@ fn response(responses: &[&Response]) -> Figure {
 }
 
 impl Settling {
-    /// Distance of the cart from the set-point over time for each row, and how many verdicts a run of that length shares
-    /// with the paper.
+    /// Distance of the cart from the set-point over time for each row, and how many verdicts a run of that length
+    /// shares with the paper.
     fn figure(&self) -> Figure {
         let time = || Axis::linear("length of the run (s)").range(0.0, 12.0);
         let mut distance =

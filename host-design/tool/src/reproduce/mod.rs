@@ -1,10 +1,10 @@
-//! The results of the paper compared with ours: F. J. Ticona Coaquira, "Design and comparison of two linear controllers with
-//! precompensation gain for the Quadruple inverted pendulum".
+//! The results of the paper compared with ours: F. J. Ticona Coaquira, "Design and comparison of two linear
+//! controllers with precompensation gain for the Quadruple inverted pendulum".
 //!
-//! [`published`] holds what is printed, [`designs`] compares matrices, gains and poles digit by digit, [`errata`] says what
-//! the paper leaves open or misprints, [`responses`] are its figures 5 to 8, [`settling`] its Table 2, [`robustness`] what
-//! it says about the two laws without numbers. [`ContinuousRun`] is the loop that the paper simulates; where a tick is
-//! involved, the firmware's own controller runs.
+//! [`published`] holds what is printed, [`designs`] compares matrices, gains and poles digit by digit, [`errata`] says
+//! what the paper leaves open or misprints, [`responses`] are its figures 5 to 8, [`settling`] its Table 2,
+//! [`robustness`] what it says about the two laws without numbers. [`ContinuousRun`] is the loop that the paper
+//! simulates; where a tick is involved, the firmware's own controller runs.
 
 mod claims;
 mod comparison;

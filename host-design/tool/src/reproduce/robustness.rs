@@ -1,5 +1,5 @@
-//! What the paper says about the two laws without numbers, measured: that the response under LQR "has less frequency" and
-//! that it is "more robust".
+//! What the paper says about the two laws without numbers, measured: that the response under LQR "has less frequency"
+//! and that it is "more robust".
 
 use rayon::prelude::*;
 use serde::Serialize;

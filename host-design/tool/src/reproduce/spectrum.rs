@@ -27,9 +27,9 @@ pub struct Bandwidth {
 }
 
 impl Spectrum {
-    /// Welch's estimate (P. D. Welch, *IEEE Trans. Audio Electroacoust.* 15, 1967): [`SEGMENT`] samples at a time, each
-    /// segment less its mean and under a Hann window, overlapping by half; the mean of their periodograms. None if the
-    /// signal is shorter than a segment.
+    /// Welch's estimate (P. D. Welch, *IEEE Trans. Audio Electroacoust.* 15, 1967): [`SEGMENT`] samples at a time,
+    /// each segment less its mean and under a Hann window, overlapping by half; the mean of their periodograms. None
+    /// if the signal is shorter than a segment.
     pub fn welch(signal: &[f64], sample_s: f64) -> Option<Self> {
         let window: Vec<f64> =
             (0..SEGMENT).map(|i| (core::f64::consts::PI * i as f64 / SEGMENT as f64).sin().powi(2)).collect();

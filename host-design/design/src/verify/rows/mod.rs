@@ -1,5 +1,5 @@
-//! The trust report of one law as rows for reading. Text and page both show these, and the documentation is held against
-//! their names and meanings.
+//! The trust report of one law as rows for reading. Text and page both show these, and the documentation is held
+//! against their names and meanings.
 
 mod linear;
 mod runs;

@@ -19,7 +19,8 @@ mod text;
 
 /// Designs and certifies the gains of a rig and writes the gain table of the firmware.
 ///
-/// Exit status 1 if the closed loop falls or --check finds a difference, 2 for a bad rig file, 3 if there is no design.
+/// Exit status 1 if the closed loop falls or --check finds a difference, 2 for a bad rig file, 3 if there is no
+/// design.
 #[derive(Args)]
 #[command(before_help = "\
 Examples:

@@ -28,8 +28,8 @@ pub(crate) fn with_bar<T>(
     result
 }
 
-/// Runs `work` with a bar of `runs` random plants on stderr, if stderr is a terminal. `work` names each stage before it starts
-/// it, and calls its second argument after each run.
+/// Runs `work` with a bar of `runs` random plants on stderr, if stderr is a terminal. `work` names each stage before
+/// it starts it, and calls its second argument after each run.
 pub(crate) fn with_random_plants<T>(
     runs: u64,
     work: impl FnOnce(&dyn Fn(&str), &(dyn Fn() + Sync)) -> T,

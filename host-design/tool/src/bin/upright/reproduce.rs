@@ -10,8 +10,8 @@ use upright_tool::reproduce::{PaperRigs, STAGES, reproduce};
 use crate::failure::Failure;
 use crate::progress::with_stages;
 
-/// Compares the results of the paper with ours, number by number, and writes its figures 5 to 8 and Table 2 as figures and
-/// data.
+/// Compares the results of the paper with ours, number by number, and writes its figures 5 to 8 and Table 2 as figures
+/// and data.
 #[derive(Args)]
 #[command(before_help = "\
 Examples:
