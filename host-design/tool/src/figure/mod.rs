@@ -7,6 +7,7 @@ mod csv;
 mod draw;
 mod heat;
 mod legend;
+mod outlines;
 mod path;
 mod png;
 mod run;

@@ -1,9 +1,8 @@
 //! A figure as pixels.
 
-use std::sync::Arc;
-
 use resvg::{tiny_skia, usvg};
 
+use super::outlines::outlined;
 use super::{Figure, FigureError};
 
 impl Figure {
@@ -20,15 +19,9 @@ impl Figure {
 /// An SVG document as a PNG file.
 pub(crate) fn pixels(svg: &str, scale: f32) -> Result<Vec<u8>, FigureError> {
     let failed = |error: String| FigureError::Png(error);
-    let mut fonts = usvg::fontdb::Database::new();
-    fonts.load_font_data(epaint_default_fonts::UBUNTU_LIGHT.to_vec());
-    let Some(family) = fonts.faces().next().and_then(|face| face.families.first()).map(|name| name.0.clone())
-    else {
-        return Err(failed("the typeface that comes with the program cannot be read".to_owned()));
-    };
-    fonts.set_sans_serif_family(family);
-    let options = usvg::Options { fontdb: Arc::new(fonts), ..usvg::Options::default() };
-    let tree = usvg::Tree::from_str(svg, &options).map_err(|error| failed(error.to_string()))?;
+    let svg = outlined(svg).map_err(failed)?;
+    let tree =
+        usvg::Tree::from_str(&svg, &usvg::Options::default()).map_err(|error| failed(error.to_string()))?;
     let [width, height] =
         [tree.size().width(), tree.size().height()].map(|size| (size * scale).ceil() as u32);
     let mut pixmap = tiny_skia::Pixmap::new(width, height)
