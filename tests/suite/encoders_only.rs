@@ -163,7 +163,9 @@ fn with_widths<const NX: usize, const NY: usize>(
     let mut scenario = Scenario { counter_start, force_noise_n: 0.1, ..Scenario::at_rest(&rig, law) };
     scenario.start[2] = 0.005;
     let mut bench = Bench::new(&rig, &scenario).unwrap();
-    controller.encoders_mut().home(&bench.counters_at_zero(), &[0; NY]);
+    let mut at_zero = [0; NY];
+    bench.read_counters_at_zero(&mut at_zero);
+    controller.encoders_mut().home(&at_zero, &[0; NY]);
     controller.start(&bench.counters()).unwrap();
     controller.set_setpoint(0.2).unwrap();
     let mut states = Vec::new();

@@ -17,11 +17,12 @@ use upright::supervision::supervisor::State;
 use upright::table::Law;
 use upright::table::checksum::crc32;
 use upright_design::design::design;
+use upright_design::harness::Recording;
 use upright_design::rig::Rig;
 use upright_design::simulate::{Scenario, simulate};
 use upright_design::table::{Gains, TableValues};
 use upright_tool::image::{Kind, build_if_possible};
-use upright_tool::in_the_loop::{Link, Recording, Where, run};
+use upright_tool::in_the_loop::{Link, Place, run};
 
 /// Most instructions of a tick of the image, telemetry of every tick included; a tenth more than counted with Rust 1.96.
 const MOST_INSTRUCTIONS: u32 = 3325;
@@ -70,7 +71,7 @@ fn all_tasks_together_give_the_bits_of_the_controller_alone() {
     let (rig, table) = quadruple();
     for (name, scenario) in scenarios(&rig, true) {
         let (alone, summary) = simulate(&rig, &table, &scenario).unwrap();
-        let together = run(&rig, &table, &scenario, Where::Host).unwrap();
+        let together = run(&rig, &table, &scenario, Place::Host).unwrap();
         assert_eq!((together.fault, &together.summary), (None, &summary), "{name}");
         let alone = alone.samples().map(|s| (s.requested, s.force, s.estimate.to_vec()));
         assert!(alone.eq(forces_and_estimates(&together)), "{name}");
@@ -81,17 +82,17 @@ fn all_tasks_together_give_the_bits_of_the_controller_alone() {
 fn the_image_in_qemu_gives_the_bits_of_the_host_and_of_its_last_run() {
     let Some(image) = image(Kind::InTheLoop) else { return };
     let (rig, table) = quadruple();
-    let place = Where::Qemu { image: &image, link: Link::Files };
+    let place = Place::Qemu { image: &image, link: Link::Files };
     for (name, scenario) in scenarios(&rig, true) {
         let qemu = run(&rig, &table, &scenario, place).unwrap();
-        let host = run(&rig, &table, &scenario, Where::Host).unwrap();
+        let host = run(&rig, &table, &scenario, Place::Host).unwrap();
         assert!(qemu.ticks == host.ticks, "{name}");
         assert!(qemu.summary.stands(), "{name}: {:?}", qemu.fault);
         let again = run(&rig, &table, &scenario, place).unwrap();
         assert_eq!((&qemu.ticks, qemu.worst_cycles), (&again.ticks, again.worst_cycles), "{name}");
         // The comparison sees a single bit.
         let other = Scenario { seed: 8, ..scenario };
-        assert!(run(&rig, &table, &other, Where::Host).unwrap().ticks != host.ticks, "{name}");
+        assert!(run(&rig, &table, &other, Place::Host).unwrap().ticks != host.ticks, "{name}");
     }
 }
 
@@ -101,15 +102,15 @@ fn the_image_runs_with_serial_lines_too() {
     let (rig, table) = quadruple();
     let (_, scenario) = scenarios(&rig, true).remove(0);
     let scenario = Scenario { duration_s: 0.3, ..scenario };
-    let qemu = run(&rig, &table, &scenario, Where::Qemu { image: &image, link: Link::Usart }).unwrap();
-    assert!(qemu.ticks == run(&rig, &table, &scenario, Where::Host).unwrap().ticks);
+    let qemu = run(&rig, &table, &scenario, Place::Qemu { image: &image, link: Link::Usart }).unwrap();
+    assert!(qemu.ticks == run(&rig, &table, &scenario, Place::Host).unwrap().ticks);
 }
 
 #[test]
 fn a_tick_of_the_image_takes_no_more_instructions_than_it_used_to() {
     let Some(image) = image(Kind::InTheLoop) else { return };
     let (rig, table) = quadruple();
-    let place = Where::Qemu { image: &image, link: Link::Files };
+    let place = Place::Qemu { image: &image, link: Link::Files };
     let (_, scenario) = scenarios(&rig, true).remove(0);
     let worst = run(&rig, &table, &scenario, place).unwrap().worst_cycles;
     println!("{worst} instructions in the longest tick");
@@ -135,14 +136,14 @@ fn the_runs_are_those_of_the_committed_traces() {
     for (name, scenario) in scenarios(&rig, false) {
         let scenario = Scenario { duration_s: 0.5, ..scenario };
         let path = PathBuf::from(format!("tests/golden/{name}.csv"));
-        let host = golden(&run(&rig, &table, &scenario, Where::Host).unwrap());
+        let host = golden(&run(&rig, &table, &scenario, Place::Host).unwrap());
         if std::env::var_os("UPRIGHT_BLESS").is_some() {
             std::fs::write(&path, &host).unwrap();
         }
         let committed = std::fs::read_to_string(&path).unwrap();
         assert!(host == committed, "{} differs on the host", path.display());
         if let Some(image) = &image {
-            let place = Where::Qemu { image, link: Link::Files };
+            let place = Place::Qemu { image, link: Link::Files };
             assert!(golden(&run(&rig, &table, &scenario, place).unwrap()) == committed, "{name} in QEMU");
         }
     }

@@ -18,6 +18,7 @@
 #![forbid(unsafe_code)]
 
 pub mod design;
+pub mod harness;
 pub mod number;
 pub mod numerics;
 pub mod plant;

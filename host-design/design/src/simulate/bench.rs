@@ -6,7 +6,7 @@ use rand_pcg::Pcg64;
 use upright::control::actuator::Drive;
 use upright::control::encoder::CounterWidth;
 
-use super::closed_loop::SimulationError;
+use super::error::SimulationError;
 use super::scenario::Scenario;
 use crate::plant::{LinearSimulation, MotorPlant, Plant, chain_plant};
 use crate::rig::{PlantDescription, Rig};
@@ -27,7 +27,7 @@ pub struct Bench {
     period_s: f64,
     substeps: usize,
     delay: bool,
-    on_its_way: Drive,
+    pending_drive: Drive,
 }
 
 impl Bench {
@@ -62,7 +62,7 @@ impl Bench {
             period_s: rig.tick.period_s,
             substeps: scenario.substeps.max(1),
             delay: rig.tick.delay_ticks == 1,
-            on_its_way: Drive::OFF,
+            pending_drive: Drive::OFF,
         })
     }
 
@@ -86,25 +86,44 @@ impl Bench {
     pub const fn widths<const NY: usize>() -> [CounterWidth; NY] {
         let mut widths = [CounterWidth::Bits16; NY];
         if let [cart, ..] = widths.as_mut_slice() {
-            *cart = CounterWidth::Bits32;
+            *cart = Self::width(0);
         }
         widths
     }
 
-    /// What the hardware counters show, as many as the firmware reads.
+    /// Width of the hardware counter of sensor number `sensor` (0: cart).
+    pub const fn width(sensor: usize) -> CounterWidth {
+        if sensor == 0 { CounterWidth::Bits32 } else { CounterWidth::Bits16 }
+    }
+
+    /// Writes what the hardware counters show into `counters`; those without a sensor keep their value.
+    pub fn read_counters(&self, counters: &mut [u32]) {
+        for (index, (counter, &(state, step))) in counters.iter_mut().zip(&self.sensors).enumerate() {
+            let counts = libm::round(self.state[state] / step) as i64;
+            *counter = Self::reading(index, self.counter_start.wrapping_add(counts as u32));
+        }
+    }
+
+    /// As [`Bench::read_counters`], for as many sensors as the firmware has.
     pub fn counters<const NY: usize>(&self) -> [u32; NY] {
         let mut counters = [0; NY];
-        let shown = counters.iter_mut().zip(Self::widths::<NY>()).zip(&self.sensors);
-        for ((counter, width), &(state, step)) in shown {
-            let counts = libm::round(self.state[state] / step) as i64;
-            *counter = shown_by(width, self.counter_start.wrapping_add(counts as u32));
-        }
+        self.read_counters(&mut counters);
         counters
     }
 
-    /// What they show at position 0: where homing found them.
-    pub fn counters_at_zero<const NY: usize>(&self) -> [u32; NY] {
-        Self::widths::<NY>().map(|width| shown_by(width, self.counter_start))
+    /// Writes what the counters show at position 0.
+    pub fn read_counters_at_zero(&self, counters: &mut [u32]) {
+        for (index, counter) in counters.iter_mut().enumerate() {
+            *counter = Self::reading(index, self.counter_start);
+        }
+    }
+
+    /// What the counter of sensor number `sensor` shows after `counts`: their low bits.
+    pub const fn reading(sensor: usize, counts: u32) -> u32 {
+        match Self::width(sensor) {
+            CounterWidth::Bits16 => counts & 0xffff,
+            CounterWidth::Bits32 => counts,
+        }
     }
 
     /// Adds a force on the cart for the next tick (N).
@@ -115,7 +134,7 @@ impl Bench {
     /// Lets one tick pass with the command `drive` of its start; gives the force on the cart at the start of the tick,
     /// without the disturbance (N).
     pub fn tick(&mut self, drive: Drive) -> f64 {
-        let now = if self.delay { std::mem::replace(&mut self.on_its_way, drive) } else { drive };
+        let now = if self.delay { std::mem::replace(&mut self.pending_drive, drive) } else { drive };
         let push = std::mem::take(&mut self.push_n);
         let disturbance = self.force_offset + push + self.force_noise.sample(&mut self.random);
         let (torque_noise, random) = (&self.torque_noise, &mut self.random);
@@ -147,13 +166,5 @@ impl Bench {
             }
             (Drive::Duty(_), None) => 0.0,
         }
-    }
-}
-
-/// The low bits that a counter of this width has.
-fn shown_by(width: CounterWidth, counts: u32) -> u32 {
-    match width {
-        CounterWidth::Bits16 => counts & 0xffff,
-        CounterWidth::Bits32 => counts,
     }
 }

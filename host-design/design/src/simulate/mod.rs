@@ -1,18 +1,16 @@
 //! The closed loop on the host: the firmware's own controller against the nonlinear plant.
 
+mod any_controller;
 mod bench;
 mod closed_loop;
-mod hand;
+mod error;
 mod scenario;
-mod session;
 mod summary;
 mod trace;
 
 pub use bench::Bench;
-pub use closed_loop::ticks;
-pub use closed_loop::{SimulationError, run, simulate};
-pub use hand::{Act, Hand, Seen};
+pub use closed_loop::{run, simulate, ticks};
+pub use error::SimulationError;
 pub use scenario::{Scenario, Sensing};
-pub use session::{Interference, Session, Tick};
 pub use summary::{Fall, FallKind, Summary};
 pub use trace::{Sample, Trace};

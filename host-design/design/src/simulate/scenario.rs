@@ -19,9 +19,9 @@ pub struct Scenario {
     pub step_m: f64,
     /// When the set-point steps (s).
     pub step_at_s: f64,
-    /// Standard deviation of the disturbing force, drawn anew each tick (N).
+    /// Standard deviation of the disturbing force, drawn again in every tick (N).
     pub force_noise_n: f64,
-    /// Standard deviation of the disturbing torque at each joint, drawn anew each tick (N·m).
+    /// Standard deviation of the disturbing torque at each joint, drawn again in every tick (N·m).
     pub torque_noise_n_m: f64,
     /// Constant disturbing force on the cart (N): a tilted rail, a cable that pulls.
     pub force_offset_n: f64,

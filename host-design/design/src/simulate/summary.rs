@@ -31,6 +31,32 @@ pub enum FallKind {
     NotFinite,
 }
 
+impl Fall {
+    /// Whether `state` is beyond rescue: a link below the horizontal, the cart off its rail, a model's state out of
+    /// all proportion, or a value that is not finite.
+    pub fn of(rig: &Rig, at_s: f64, state: &[f64]) -> Option<Self> {
+        let kind = match &rig.plant {
+            _ if !state.iter().all(|value| value.is_finite()) => FallKind::NotFinite,
+            PlantDescription::Chain(chain) => {
+                let mut absolute = 0.0;
+                let fallen = state[2..].chunks_exact(2).position(|joint| {
+                    absolute += joint[0];
+                    absolute.abs() > core::f64::consts::FRAC_PI_2
+                });
+                let [left, right] = chain.cart.travel_m;
+                match fallen {
+                    Some(index) => FallKind::Link(index + 1),
+                    None if state[0] < left || state[0] > right => FallKind::EndOfRail,
+                    None => return None,
+                }
+            }
+            PlantDescription::Model(_) if state.iter().any(|value| value.abs() > 1e6) => FallKind::Diverged,
+            PlantDescription::Model(_) => return None,
+        };
+        Some(Self { at_s, kind })
+    }
+}
+
 impl fmt::Display for Fall {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self.kind {

@@ -17,7 +17,7 @@ use crate::design::{Certified, Feedback, detection_thresholds, setpoint_step};
 use crate::numerics::Matrix;
 use crate::rig::{Motor, PlantDescription, Rig};
 
-pub use any_size::{MAX_MODEL_SENSORS, MAX_STATES, WithSize, with_firmware_size, with_size};
+pub use any_size::{MAX_MODEL_SENSORS, MAX_SENSORS, MAX_STATES, WithSize, with_firmware_size, with_size};
 pub use source::gains_source;
 pub use supervision::{LimitValues, ThresholdValues};
 pub use write::{WriteError, write_atomically};

@@ -1,20 +1,23 @@
 //! A healthy rig is never switched off.
 
 use rayon::prelude::*;
+use upright_design::harness::Harness;
 use upright_design::rig::Rig;
-use upright_design::simulate::{Scenario, Session};
+use upright_design::simulate::Scenario;
 use upright_design::verify::Disturbance;
 
-use crate::supervised::{ALL_RIGS, Supervised, rig, run, table};
+use crate::supervised::{ALL_RIGS, balancing, cause, rejected, rig, table, tick};
 use upright::protocol::message::Request;
 use upright::supervision::fault::Cause;
 use upright::table::Law;
 
-/// Balances for some hours; at the ends of every minute the set-point goes to the other side.
+/// Balances for some hours; every minute the set-point goes to the other side.
 struct Nominal {
     ticks: u64,
     minute: u64,
     setpoint_m: f32,
+    /// Thresholds of the innovation.
+    thresholds: Vec<f32>,
 }
 
 #[derive(Debug, PartialEq)]
@@ -25,29 +28,30 @@ struct Found {
     closest: f32,
 }
 
-impl Supervised for Nominal {
-    type Output = Found;
-
-    fn balancing<const NX: usize, const NY: usize>(self, mut session: Session<'_, NX, NY>) -> Found {
-        let thresholds = session.thresholds().innovation;
+impl Nominal {
+    fn run(&self, harness: &mut Harness<'_>) -> Found {
         let mut closest = 0.0f32;
-        for tick in 0..self.ticks {
-            // Beats every 50 ticks: the host commands the set-point.
-            let side = if (tick / self.minute).is_multiple_of(2) { 1.0 } else { -1.0 };
-            let request = match tick {
-                _ if tick % self.minute == 0 => Some(Request::Setpoint(side * self.setpoint_m)),
-                _ if tick % 50 == 0 => Some(Request::Beat),
-                _ => None,
-            };
-            session.step(request, &mut ());
-            for (e, threshold) in session.firmware().controller().innovation().iter().zip(thresholds) {
-                closest = closest.max(e.abs() / threshold);
+        for number in 0..self.ticks {
+            // A heartbeat every 50 ticks: the host commands the set-point.
+            let side = if (number / self.minute).is_multiple_of(2) { 1.0 } else { -1.0 };
+            if number % self.minute == 0 {
+                harness.session.send(Request::Setpoint(side * self.setpoint_m));
+            } else if number % 50 == 0 {
+                harness.session.send(Request::Beat);
             }
-            if session.fault().is_some() {
+            tick(harness);
+            while harness.session.next_reply().is_some() {}
+            while let Some(telemetry) = harness.session.next_telemetry() {
+                for (e, threshold) in telemetry.innovation.iter().zip(&self.thresholds) {
+                    closest = closest.max(e.abs() / threshold);
+                }
+            }
+            if harness.session.fault().is_some() {
                 break;
             }
         }
-        Found { cause: session.fault(), rejected: session.firmware().statistics().rejected_samples, closest }
+        let fault = harness.session.fault();
+        Found { cause: cause(harness).filter(|_| fault.is_some()), rejected: rejected(harness), closest }
     }
 }
 
@@ -61,8 +65,14 @@ fn nominal(rig: &Rig, law: Law, seed: u64, hours: f64) -> Found {
         ..Scenario::at_rest(rig, law)
     };
     let ticks = |seconds: f64| (seconds / rig.tick.period_s) as u64;
-    let what = Nominal { ticks: ticks(3600.0 * hours), minute: ticks(60.0), setpoint_m: 0.1 };
-    run(rig, &table(rig), &scenario, what).unwrap()
+    let values = table(rig);
+    let nominal = Nominal {
+        ticks: ticks(3600.0 * hours),
+        minute: ticks(60.0),
+        setpoint_m: 0.1,
+        thresholds: values.thresholds.innovation.clone(),
+    };
+    balancing(rig, &values, &scenario, |harness| nominal.run(harness)).unwrap()
 }
 
 /// `hours` for each rig and law, in `parts` of which each has its own disturbances.
@@ -89,7 +99,7 @@ fn half_a_minute_of_nominal_balancing_of_every_rig_raises_no_alarm() {
 }
 
 #[test]
-#[ignore = "some minutes on two cores: cargo test -p host-design --test supervisor_false_alarms -- --ignored --nocapture"]
+#[ignore = "some minutes on two cores: cargo test -p upright-design --test suite supervisor_false_alarms -- --ignored --nocapture"]
 fn ten_hours_of_nominal_balancing_of_every_rig_raise_no_alarm() {
     no_alarm(10.0, 2);
 }

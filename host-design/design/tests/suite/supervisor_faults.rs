@@ -1,13 +1,14 @@
 //! Every fault of encoders and motor turns the motor off before a link leaves its limit; what is no fault does not.
 
-use crate::supervised::{ALL_RIGS, Supervised, rig, run, table};
-use upright::board::{Inputs, Output};
+use crate::supervised::{ALL_RIGS, balancing, cause, rejected, rig, table};
+use upright::board::Output;
 use upright::control::actuator::Drive;
-use upright::control::encoder::CounterWidth;
+use upright::protocol::message::Request;
 use upright::supervision::fault::Fault;
 use upright::table::Law;
+use upright_design::harness::{Harness, Pins};
 use upright_design::rig::Rig;
-use upright_design::simulate::{Interference, Scenario, Session};
+use upright_design::simulate::{Bench, Scenario};
 use upright_design::table::TableValues;
 use upright_design::verify::Disturbance;
 
@@ -16,18 +17,18 @@ use upright_design::verify::Disturbance;
 enum Defect {
     Nothing,
     Frozen(usize),
-    /// One measurement is off by so many counts.
+    /// One measurement is off by n counts.
     OneBad(usize, i32),
     /// Two are, then one is not, and so on.
     TwoOfThreeBad(usize, i32),
     /// All from now on are.
     Jump(usize, i32),
-    /// A count is lost every so many ticks.
+    /// A count is lost every n ticks.
     LosesCounts(usize, u32),
     Reversed(usize),
     /// This one and the next.
     Swapped(usize),
-    /// The measurement is from so many ticks before.
+    /// The measurement is n ticks old.
     Late(usize, usize),
     MotorDead,
     MotorReversed,
@@ -35,19 +36,21 @@ enum Defect {
     MotorStuck,
 }
 
-struct Interfering {
+/// A defect between rig and firmware.
+struct Injection {
     defect: Defect,
+    /// Its first tick, counted from the release.
     from: u32,
     frozen: Option<u32>,
     past: Vec<u32>,
     full: f32,
 }
 
-impl<const NY: usize> Interference<NY> for Interfering {
-    fn inputs(&mut self, tick: u32, inputs: &mut Inputs<NY>) {
+impl Injection {
+    fn inputs(&mut self, tick: u32, inputs: &mut Pins) {
         let Some(since) = tick.checked_sub(self.from) else { return };
         let mut add = |sensor: usize, counts: i32| {
-            inputs.raw_counts[sensor] = shown(sensor, inputs.raw_counts[sensor].wrapping_add(counts as u32));
+            inputs.raw_counts[sensor] = Bench::reading(sensor, inputs.raw_counts[sensor].wrapping_add(counts as u32));
         };
         match self.defect {
             Defect::OneBad(sensor, counts) if since == 0 => add(sensor, counts),
@@ -58,7 +61,7 @@ impl<const NY: usize> Interference<NY> for Interfering {
                 inputs.raw_counts[sensor] = *self.frozen.get_or_insert(inputs.raw_counts[sensor]);
             }
             Defect::Reversed(sensor) => {
-                inputs.raw_counts[sensor] = shown(sensor, inputs.raw_counts[sensor].wrapping_neg());
+                inputs.raw_counts[sensor] = Bench::reading(sensor, inputs.raw_counts[sensor].wrapping_neg());
             }
             Defect::Swapped(sensor) => inputs.raw_counts.swap(sensor, sensor + 1),
             Defect::Late(sensor, ticks) => {
@@ -83,12 +86,6 @@ impl<const NY: usize> Interference<NY> for Interfering {
     }
 }
 
-/// What a counter of the bench's width shows.
-fn shown(sensor: usize, counts: u32) -> u32 {
-    let [cart, link]: [CounterWidth; 2] = upright_design::simulate::Bench::widths();
-    if (if sensor == 0 { cart } else { link }) == CounterWidth::Bits16 { counts & 0xffff } else { counts }
-}
-
 /// What came of it.
 #[derive(Debug, Clone, PartialEq)]
 struct Outcome {
@@ -100,37 +97,33 @@ struct Outcome {
     rejected: u32,
 }
 
-struct Watched {
-    fault: Interfering,
-    ticks: u32,
-}
-
-impl Supervised for Watched {
-    type Output = Outcome;
-
-    fn balancing<const NX: usize, const NY: usize>(mut self, mut session: Session<'_, NX, NY>) -> Outcome {
-        self.fault.from += session.number();
-        let (mut lean_rad, mut off) = (0.0f64, None);
-        for _ in 0..self.ticks {
-            let tick = session.number();
-            let output = session.step(None, &mut self.fault).output;
-            let mut angle = 0.0;
-            for joint in session.bench().state()[2..].iter().step_by(2) {
-                angle += joint;
-                lean_rad = lean_rad.max(f64::abs(angle));
-            }
-            if !output.enable {
-                off = Some(tick);
-                break;
-            }
+/// Lets the rig balance with the defect, until the motor is off.
+fn observe(harness: &mut Harness<'_>, mut injection: Injection, ticks: u32) -> Outcome {
+    // The telemetry is of no use here.
+    harness.session.send(Request::Telemetry(0));
+    let (mut lean_rad, mut off) = (0.0f64, None);
+    for tick in 0..ticks {
+        let mut inputs = harness.inputs();
+        injection.inputs(tick, &mut inputs);
+        let mut output = harness.session.tick(&inputs).unwrap();
+        injection.output(tick, &mut output);
+        harness.bench.tick(output.drive);
+        let mut angle = 0.0;
+        for joint in harness.bench.state()[2..].iter().step_by(2) {
+            angle += joint;
+            lean_rad = lean_rad.max(f64::abs(angle));
         }
-        let cause = session.fault();
-        Outcome {
-            fault: cause.zip(off).map(|(cause, off)| (cause.fault, off + 1 - self.fault.from)),
-            sensor: cause.and_then(|cause| cause.sensor),
-            lean_rad,
-            rejected: session.firmware().statistics().rejected_samples,
+        if !output.enable {
+            off = Some(tick);
+            break;
         }
+    }
+    let cause = cause(harness);
+    Outcome {
+        fault: cause.zip(off).map(|(cause, off)| (cause.fault, off + 1 - injection.from)),
+        sensor: cause.zip(off).and_then(|(cause, _)| cause.sensor),
+        lean_rad,
+        rejected: rejected(harness),
     }
 }
 
@@ -144,8 +137,8 @@ fn watch(rig: &Rig, values: &TableValues, law: Law, defect: Defect, seed: u64, t
         ..Scenario::at_rest(rig, law)
     };
     let full = if rig.actuator.motor.is_some() { 1.0 } else { rig.force_limit_n().unwrap() as f32 };
-    let fault = Interfering { defect, from: 1000 + 17 * seed as u32, frozen: None, past: Vec::new(), full };
-    run(rig, values, &scenario, Watched { fault, ticks }).unwrap()
+    let injection = Injection { defect, from: 1000 + 17 * seed as u32, frozen: None, past: Vec::new(), full };
+    balancing(rig, values, &scenario, |harness| observe(harness, injection, ticks)).unwrap()
 }
 
 const LAWS: [Law; 2] = [Law::Lqr, Law::PolePlacement];

@@ -1,28 +1,25 @@
 //! The rules of arming, clearing and commanding, on the whole firmware.
 
-use crate::supervised::{Supervised, rig, run, table};
+use crate::supervised::{balancing as balance, rig, table};
 use proptest::prelude::*;
-use upright::board::{Contacts, Inputs, Output};
+use upright::board::{Contacts, Output};
 use upright::control::controller::Rejected;
 use upright::protocol::message::{Answer, Request};
 use upright::supervision::fault::Fault;
 use upright::supervision::inhibits::Inhibits;
 use upright::supervision::supervisor::State;
 use upright::table::Law;
-use upright_design::simulate::{Interference, Scenario, Session};
+use upright_design::harness::Harness;
+use upright_design::simulate::Scenario;
 
 /// What a test does with the single pendulum, balancing and undisturbed.
-fn balancing<F: FnOnce(&mut dyn Rigged) -> T, T>(test: F) -> T {
-    struct Test<F>(F);
-    impl<F: FnOnce(&mut dyn Rigged) -> T, T> Supervised for Test<F> {
-        type Output = T;
-
-        fn balancing<const NX: usize, const NY: usize>(self, session: Session<'_, NX, NY>) -> T {
-            (self.0)(&mut Bare { session, inputs: Given::default() })
-        }
-    }
+fn balancing<T>(test: impl FnOnce(&mut Rigged<'_, '_>) -> T) -> T {
     let rig = rig("single-quanser-ip02");
-    run(&rig, &table(&rig), &Scenario::at_rest(&rig, Law::Lqr), Test(test)).unwrap()
+    balance(&rig, &table(&rig), &Scenario::at_rest(&rig, Law::Lqr), |harness| {
+        while harness.session.next_reply().is_some() || harness.session.next_telemetry().is_some() {}
+        test(&mut Rigged { harness, inputs: Given::default(), output: Output::OFF })
+    })
+    .unwrap()
 }
 
 /// Inputs that a test gives.
@@ -34,58 +31,56 @@ struct Given {
     counts: i32,
 }
 
-impl<const NY: usize> Interference<NY> for Given {
-    fn inputs(&mut self, _: u32, inputs: &mut Inputs<NY>) {
-        inputs.contacts = self.contacts;
-        inputs.supply_v = self.supply_v.unwrap_or(inputs.supply_v);
-        inputs.raw_counts[1] = inputs.raw_counts[1].wrapping_add(self.counts as u32) & 0xffff;
-    }
-}
-
-struct Bare<'t, const NX: usize, const NY: usize> {
-    session: Session<'t, NX, NY>,
+/// The rig and its firmware, with given inputs.
+struct Rigged<'h, 't> {
+    harness: &'h mut Harness<'t>,
     inputs: Given,
+    /// Output of the last tick.
+    output: Output,
 }
 
-/// A session without its sizes.
-trait Rigged {
-    fn tick(&mut self, request: Option<Request>) -> (Output, Option<Answer>);
-    fn inputs(&mut self) -> &mut Given;
-    fn state(&self) -> State;
-    fn fault(&self) -> Option<Fault>;
-
-    fn ask(&mut self, request: Request) -> Answer {
-        self.tick(Some(request)).1.unwrap()
-    }
-
-    fn wait(&mut self, ticks: u32) {
-        for _ in 0..ticks {
-            self.tick(None);
-        }
-    }
-
-    /// Ticks until the motor is off; none if it stays on.
-    fn ticks_to_off(&mut self, most: u32) -> Option<u32> {
-        (1..=most).find(|_| !self.tick(None).0.enable)
-    }
-}
-
-impl<const NX: usize, const NY: usize> Rigged for Bare<'_, NX, NY> {
-    fn tick(&mut self, request: Option<Request>) -> (Output, Option<Answer>) {
-        let tick = self.session.step(request, &mut self.inputs);
-        (tick.output, tick.reply.map(|reply| reply.answer))
+impl Rigged<'_, '_> {
+    fn tick(&mut self) -> Output {
+        let mut inputs = self.harness.inputs();
+        inputs.contacts = self.inputs.contacts;
+        inputs.supply_v = self.inputs.supply_v.unwrap_or(inputs.supply_v);
+        inputs.raw_counts[1] = inputs.raw_counts[1].wrapping_add(self.inputs.counts as u32) & 0xffff;
+        self.output = self.harness.session.tick(&inputs).unwrap();
+        self.harness.bench.tick(self.output.drive);
+        self.output
     }
 
     fn inputs(&mut self) -> &mut Given {
         &mut self.inputs
     }
 
+    /// State and fault according to the last telemetry, which is that of the tick before the last.
     fn state(&self) -> State {
-        self.session.firmware().state()
+        self.harness.session.status().state
     }
 
     fn fault(&self) -> Option<Fault> {
-        self.session.fault().map(|cause| cause.fault)
+        self.harness.session.fault()
+    }
+
+    /// Takes three ticks: the command comes with the first, is executed in the second, and answered with the third.
+    fn ask(&mut self, request: Request) -> Answer {
+        let id = self.harness.session.send(request);
+        self.wait(3);
+        let (answered, answer) = self.harness.session.next_reply().unwrap();
+        assert_eq!((answered, self.harness.session.next_reply()), (id, None));
+        answer
+    }
+
+    fn wait(&mut self, ticks: u32) {
+        for _ in 0..ticks {
+            self.tick();
+        }
+    }
+
+    /// Ticks until the motor is off; none if it stays on.
+    fn ticks_to_off(&mut self, most: u32) -> Option<u32> {
+        (1..=most).find(|_| !self.tick().enable)
     }
 }
 
@@ -114,6 +109,7 @@ fn each_input_turns_the_motor_off_in_its_tick() {
             assert_eq!(rig.ticks_to_off(100), None, "nothing is wrong yet");
             change(rig.inputs());
             assert_eq!(rig.ticks_to_off(100), Some(ticks), "{fault:?}");
+            rig.wait(1);
             assert_eq!((rig.state(), rig.fault()), (State::Fault, Some(fault)));
         });
     }
@@ -151,12 +147,13 @@ fn a_host_that_commands_the_set_point_must_not_fall_silent_and_one_that_does_not
         assert_eq!(rig.ticks_to_off(2000), None);
         rig.ask(Request::Setpoint(0.0));
         for _ in 0..10 {
-            rig.wait(49);
+            rig.wait(47);
             rig.ask(Request::Beat);
         }
         assert_eq!(rig.state(), State::Balancing);
-        // 100 ms of 2 ms ticks, and the tick after.
-        assert_eq!(rig.ticks_to_off(100), Some(51));
+        // 100 ms of 2 ms ticks, and the tick after; one of them has brought the answer.
+        assert_eq!(rig.ticks_to_off(100), Some(51 - 1));
+        rig.wait(1);
         assert_eq!(rig.fault(), Some(Fault::LinkLost));
     });
 }
@@ -171,6 +168,7 @@ fn clear_and_arm_are_two_acts_and_a_held_arm_is_none() {
         rig.inputs().contacts.driver_fault = false;
         rig.wait(1);
         assert_eq!(rig.ask(Request::Clear), Answer::Done);
+        rig.wait(1);
         assert_eq!((rig.state(), rig.fault()), (State::Calibrated, None));
         // The key is still down: for as long as it is, nothing happens.
         for _ in 0..50 {
@@ -202,13 +200,13 @@ fn a_tilted_a_moving_and_a_displaced_rig_are_not_armed_and_all_reasons_are_told(
         rig.inputs().counts = 0;
         rig.wait(200);
         assert_eq!(rig.ask(Request::Arm), Answer::Done);
-        // Tilted while armed: the wait starts anew. Fallen: no longer armed.
+        // Tilted while armed: the wait starts again. Fallen: no longer armed.
         rig.wait(100);
         rig.inputs().counts = 40;
         rig.wait(1000);
         assert_eq!(rig.state(), State::Armed);
         rig.inputs().counts = 300;
-        rig.wait(1);
+        rig.wait(2);
         assert_eq!(rig.state(), State::Calibrated);
     });
 }
@@ -219,6 +217,7 @@ fn after_an_encoder_fault_home_and_check_again() {
         rig.inputs().counts = 100;
         assert_eq!(rig.ticks_to_off(100), Some(3));
         assert_eq!(rig.ask(Request::Clear), Answer::Done);
+        rig.wait(1);
         assert_eq!(rig.state(), State::Disarmed);
         let reasons = reasons(rig.ask(Request::Arm));
         assert!(reasons.contains(Inhibits::NOT_HOMED.union(Inhibits::SIGNS)), "{reasons}");
@@ -229,9 +228,11 @@ fn after_an_encoder_fault_home_and_check_again() {
 fn disarming_turns_the_motor_off_and_keeps_the_positions() {
     balancing(|rig| {
         assert_eq!(rig.ask(Request::Disarm), Answer::Done);
-        assert_eq!(rig.ticks_to_off(1), Some(1));
+        // Off in the tick after the one that executed the command.
+        assert_eq!(rig.output, Output::OFF);
+        rig.wait(1);
         assert_eq!((rig.state(), rig.fault()), (State::Calibrated, None));
-        assert!(reasons(rig.ask(Request::Home)).contains(Inhibits::MOVING), "still for a tick only");
+        assert!(reasons(rig.ask(Request::Home)).contains(Inhibits::MOVING), "still for a few ticks only");
     });
 }
 
@@ -297,39 +298,83 @@ proptest! {
             if !balancing_first {
                 rig.ask(Request::Disarm);
             }
-            let mut before = rig.state();
-            let mut armed = false;
+            let mut rules = Rules::new(rig);
             for event in &events {
-                let (mut request, ticks) = match event {
-                    Event::Ask(request) => (Some(*request), 1),
-                    Event::Contacts(contacts) => { rig.inputs().contacts = *contacts; (None, 1) }
-                    Event::Supply(supply) => { rig.inputs().supply_v = *supply; (None, 1) }
-                    Event::Counts(counts) => { rig.inputs().counts = *counts; (None, 1) }
-                    Event::Wait(ticks) => (None, *ticks),
+                let ticks = match event {
+                    Event::Ask(request) => { rules.request(rig, *request); 1 }
+                    Event::Contacts(contacts) => { rig.inputs().contacts = *contacts; 1 }
+                    Event::Supply(supply) => { rig.inputs().supply_v = *supply; 1 }
+                    Event::Counts(counts) => { rig.inputs().counts = *counts; 1 }
+                    Event::Wait(ticks) => *ticks,
                 };
                 for _ in 0..ticks {
-                    let asked = request.take();
-                    let (output, answer) = rig.tick(asked);
-                    let after = rig.state();
-                    // What the tick ended in tells whether its output may have been on.
-                    assert!(output == Output::OFF || before == State::Balancing || armed);
-                    assert!(!output.enable || after != State::Fault || asked.is_some() || answer.is_none());
-                    if asked == Some(Request::Arm) && answer == Some(Answer::Done) {
-                        assert!(before == State::Calibrated, "armed in {before:?}");
-                        armed = true;
-                    }
-                    if after == State::Armed || (after == State::Balancing && before != State::Balancing) {
-                        assert!(armed, "{after:?} without an arm");
-                        let contacts = rig.inputs().contacts;
-                        assert!(after == State::Armed || !(contacts.emergency_stop || contacts.driver_fault
-                            || contacts.limit_low || contacts.limit_high));
-                    }
-                    if !matches!(after, State::Armed | State::Balancing) {
-                        armed = false;
-                    }
-                    before = after;
+                    rules.tick(rig);
                 }
             }
         });
+    }
+}
+
+/// The rules, checked in every tick.
+struct Rules {
+    /// Contacts and output of the last tick, whose telemetry comes with the next one.
+    last: (Contacts, Output),
+    /// State in the tick before it.
+    before: State,
+    /// Whether an arm command was accepted, and the firmware has been armed or balancing since.
+    armed: bool,
+    /// Commands that arm.
+    arms: Vec<u64>,
+}
+
+impl Rules {
+    fn new(rig: &mut Rigged<'_, '_>) -> Self {
+        rig.tick();
+        let before = rig.state();
+        while rig.harness.session.next_telemetry().is_some() {}
+        // A firmware that balances already was armed by hand.
+        Self {
+            last: (rig.inputs.contacts, rig.output),
+            before,
+            armed: before == State::Balancing,
+            arms: Vec::new(),
+        }
+    }
+
+    fn request(&mut self, rig: &mut Rigged<'_, '_>, request: Request) {
+        let id = rig.harness.session.send(request);
+        if request == Request::Arm {
+            self.arms.push(id);
+        }
+    }
+
+    fn tick(&mut self, rig: &mut Rigged<'_, '_>) {
+        let output = rig.tick();
+        let (contacts, last_output) = std::mem::replace(&mut self.last, (rig.inputs.contacts, output));
+        let telemetry = rig.harness.session.next_telemetry().expect("telemetry of every tick");
+        assert_eq!(rig.harness.session.next_telemetry(), None);
+        let (before, state) = (self.before, telemetry.state);
+        assert!(last_output == Output::OFF || state == State::Balancing, "on in {state:?}");
+        if state == State::Armed || (state == State::Balancing && before != State::Balancing) {
+            assert!(self.armed, "{state:?} without an arm command");
+            assert!(
+                state == State::Armed
+                    || !(contacts.emergency_stop
+                        || contacts.driver_fault
+                        || contacts.limit_low
+                        || contacts.limit_high)
+            );
+        }
+        if !matches!(state, State::Armed | State::Balancing) {
+            self.armed = false;
+        }
+        // A command is executed at the end of the tick, after its telemetry.
+        while let Some((id, answer)) = rig.harness.session.next_reply() {
+            if self.arms.contains(&id) && answer == Answer::Done {
+                assert!(state == State::Calibrated, "armed in {state:?}");
+                self.armed = true;
+            }
+        }
+        self.before = state;
     }
 }

@@ -1,27 +1,10 @@
 //! The whole firmware, from power-up to balancing.
 
-use crate::supervised::{ALL_RIGS, Supervised, rig, run, table};
-use upright::supervision::fault::Cause;
+use crate::supervised::{ALL_RIGS, balancing, cause, rejected, rig, table, tick};
 use upright::supervision::supervisor::State;
 use upright::table::Law;
-use upright_design::simulate::{Scenario, Session, SimulationError};
-
-struct Stands {
-    ticks: u32,
-}
-
-impl Supervised for Stands {
-    type Output = (u32, State, Option<Cause>, u32);
-
-    fn balancing<const NX: usize, const NY: usize>(self, mut session: Session<'_, NX, NY>) -> Self::Output {
-        let begun = session.number();
-        for _ in 0..self.ticks {
-            session.step(None, &mut ());
-        }
-        let firmware = session.firmware();
-        (begun, firmware.state(), firmware.cause(), firmware.statistics().rejected_samples)
-    }
-}
+use upright_design::harness::{Tick, record, with_firmware};
+use upright_design::simulate::Scenario;
 
 #[test]
 fn every_rig_is_homed_checked_raised_and_balanced_by_hand() {
@@ -30,28 +13,14 @@ fn every_rig_is_homed_checked_raised_and_balanced_by_hand() {
         let values = table(&rig);
         for law in [Law::Lqr, Law::PolePlacement] {
             let scenario = Scenario::at_rest(&rig, law);
-            let outcome: Result<_, SimulationError> = run(&rig, &values, &scenario, Stands { ticks: 10_000 });
-            let (_, state, cause, rejected) = outcome.unwrap();
-            assert_eq!((state, cause, rejected), (State::Balancing, None, 0), "{name} {law:?}");
+            let outcome = balancing(&rig, &values, &scenario, |harness| {
+                for _ in 0..10_000 {
+                    tick(harness);
+                }
+                (cause(harness), rejected(harness), harness.session.status().state)
+            });
+            assert_eq!(outcome.unwrap(), (None, 0, State::Balancing), "{name} {law:?}");
         }
-    }
-}
-
-/// What the firmware decided in every tick from the first of balancing on, as bits.
-struct Bits {
-    ticks: u32,
-}
-
-impl Supervised for Bits {
-    type Output = Vec<(State, u32, u32)>;
-
-    fn balancing<const NX: usize, const NY: usize>(self, mut session: Session<'_, NX, NY>) -> Self::Output {
-        let tick = |session: &mut Session<'_, NX, NY>| {
-            session.step(None, &mut ());
-            let controller = session.firmware().controller();
-            (session.firmware().state(), controller.acting().to_bits(), controller.estimate()[2].to_bits())
-        };
-        (0..self.ticks).map(|_| tick(&mut session)).collect()
     }
 }
 
@@ -59,14 +28,17 @@ impl Supervised for Bits {
 fn counters_that_wrap_on_the_way_change_no_bit() {
     let rig = rig("double-quanser-dbpen");
     let values = table(&rig);
-    let bits = |counter_start: u32, tilt: f64| {
+    // What the firmware decided in every tick from the first of balancing on, as bits.
+    let bits = |counter_start: u32, tilt: f64| -> Vec<Tick> {
         let mut scenario =
             Scenario { counter_start, force_noise_n: 0.3, ..Scenario::at_rest(&rig, Law::Lqr) };
         scenario.start[2] = tilt;
-        run(&rig, &values, &scenario, Bits { ticks: 3000 }).unwrap()
+        scenario.duration_s = 3000.0 * rig.tick.period_s;
+        let recording = with_firmware(&values, |target| record(&rig, &values, &scenario, target));
+        recording.unwrap().unwrap().ticks
     };
     let plain = bits(0, 0.01);
-    assert!(plain.iter().all(|(state, ..)| *state == State::Balancing));
+    assert!(plain.len() > 3000 && plain.iter().all(|tick| tick.state == State::Balancing));
     for counter_start in [u32::MAX, u32::MAX - 60_000, 0x7fff_ffff, 0x7ff0, 1] {
         assert!(bits(counter_start, 0.01) == plain, "counters from {counter_start:#x}");
     }

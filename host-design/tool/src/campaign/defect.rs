@@ -192,7 +192,7 @@ impl Kind {
     }
 
     /// What goes wrong inside the microcontroller.
-    pub(super) fn sabotage(self) -> Option<Sabotage> {
+    pub(super) fn inside_the_microcontroller(self) -> Option<Sabotage> {
         match self {
             Kind::Panic => Some(Sabotage::Panic),
             Kind::HardFault => Some(Sabotage::HardFault),
@@ -203,7 +203,7 @@ impl Kind {
 
     /// Whether only an image can suffer it.
     pub fn needs_image(self) -> bool {
-        self.sabotage().is_some()
+        self.inside_the_microcontroller().is_some()
     }
 
     /// Whether only the firmware in this process can suffer it.

@@ -1,8 +1,8 @@
-//! A defect at work: between rig and firmware, tick by tick.
+//! Fault injection: a defect between rig and firmware, tick by tick.
 
 use rand::RngExt;
 use rand_pcg::Pcg64;
-use upright::board::{Inputs, Output};
+use upright::board::Output;
 use upright::control::actuator::Drive;
 use upright::control::encoder::CounterWidth;
 use upright::protocol::frame;
@@ -11,24 +11,27 @@ use upright::protocol::serial_link::MAX_COMMAND;
 
 use super::defect::Kind;
 use super::trial::Trial;
-use crate::in_the_loop::Session;
+use upright_design::harness::{Pins, Session};
 use upright_design::rig::Rig;
 use upright_design::simulate::Bench;
-use upright_design::table::TableValues;
+use upright_design::table::{MAX_SENSORS, TableValues};
 
-/// A push on the cart lasts so long (s).
+/// Duration of a push on the cart (s).
 const PUSH_S: f64 = 0.05;
 
+/// The raw counters of one tick.
+type Counters = heapless::Vec<u32, MAX_SENSORS>;
+
 /// The defect of a trial.
-pub(super) struct Injection<'a, const NY: usize> {
+pub(super) struct Injection<'a> {
     trial: &'a Trial,
     table: &'a TableValues,
     random: Pcg64,
-    /// Counters when it began.
-    at_onset: Option<[u32; NY]>,
-    past: Vec<[u32; NY]>,
-    /// How wrong each sensor may be before the firmware's tests can see it (counts).
-    visible_counts: [i64; NY],
+    /// Counters at the onset.
+    at_onset: Option<Counters>,
+    past: Vec<Counters>,
+    /// Error of each sensor above which the firmware's tests can see it (counts).
+    visible_counts: Vec<i64>,
     /// Position and speed that the missing force would have given the cart (m, m/s).
     missing: [f64; 2],
     full_force_n: f64,
@@ -36,23 +39,23 @@ pub(super) struct Injection<'a, const NY: usize> {
     supply_ticks: usize,
 }
 
-impl<'a, const NY: usize> Injection<'a, NY> {
+impl<'a> Injection<'a> {
     pub(super) fn new(rig: &Rig, table: &'a TableValues, trial: &'a Trial) -> Self {
         let ticks = |seconds: f64| (seconds / rig.tick.period_s).ceil() as usize;
-        let visible_counts = core::array::from_fn(|sensor| match &table.observer {
+        let visible = |sensor: usize| match &table.observer {
             Some(observer) => {
                 let threshold = table.thresholds.innovation[sensor];
                 (threshold / observer.step[sensor]).ceil().min(1e9) as i64
             }
             None => i64::MAX,
-        });
+        };
         Self {
             trial,
             table,
             random: trial.random(),
             at_onset: None,
             past: Vec::new(),
-            visible_counts,
+            visible_counts: (0..table.sensors).map(visible).collect(),
             missing: [0.0; 2],
             full_force_n: f64::from(table.force_limit_n),
             push_ticks: ticks(PUSH_S),
@@ -60,17 +63,17 @@ impl<'a, const NY: usize> Injection<'a, NY> {
         }
     }
 
-    /// Whether the host still speaks, `since` ticks after the onset.
-    pub(super) fn host_speaks(&self, since: Option<usize>) -> bool {
+    /// Whether the host still sends heartbeats, `since` ticks after the onset.
+    pub(super) fn host_is_alive(&self, since: Option<usize>) -> bool {
         self.trial.kind != Kind::HostSilent || since.is_none()
     }
 
-    /// Changes what the firmware reads, `since` ticks after the onset; whether it could be told from a healthy rig.
-    pub(super) fn inputs(&mut self, since: usize, inputs: &mut Inputs<NY>) -> bool {
+    /// Changes what the firmware reads, `since` ticks after the onset; gives whether it differs visibly from a healthy rig.
+    pub(super) fn inputs(&mut self, since: usize, inputs: &mut Pins) -> bool {
         let Trial { kind, sensor, sign, size, .. } = *self.trial;
-        let truth = inputs.raw_counts;
-        let began = *self.at_onset.get_or_insert(truth);
-        self.past.push(truth);
+        let truth = inputs.raw_counts.clone();
+        let began = self.at_onset.get_or_insert_with(|| truth.clone()).clone();
+        self.past.push(truth.clone());
         let contacts = &mut inputs.contacts;
         let moved = |sensor: usize| signed(sensor, truth[sensor].wrapping_sub(began[sensor]));
         let off = (self.visible_counts[sensor] as f64 * (2.0 + 18.0 * size) * sign) as i64;
@@ -93,7 +96,7 @@ impl<'a, const NY: usize> Injection<'a, NY> {
             Kind::EncoderJump => shown.push(shows(sensor, moved(sensor) + off)),
             Kind::SensorIntermittent if since % 3 < 2 => shown.push(shows(sensor, moved(sensor) + off)),
             Kind::EncoderReversed => shown.push(shows(sensor, -moved(sensor))),
-            Kind::EncodersSwapped if NY > 1 => {
+            Kind::EncodersSwapped if truth.len() > 1 => {
                 shown.push(shows(sensor, moved(sensor + 1)));
                 shown.push(shows(sensor + 1, moved(sensor)));
             }
@@ -112,7 +115,7 @@ impl<'a, const NY: usize> Injection<'a, NY> {
         }
         let mut visible = false;
         for (sensor, counter) in shown {
-            let counter = in_width(sensor, counter);
+            let counter = Bench::reading(sensor, counter);
             let wrong = signed(sensor, counter.wrapping_sub(truth[sensor]));
             visible |= wrong.abs() > self.visible_counts[sensor];
             inputs.raw_counts[sensor] = counter;
@@ -120,7 +123,7 @@ impl<'a, const NY: usize> Injection<'a, NY> {
         visible
     }
 
-    /// Changes what the motor gets; whether it could be told from a healthy rig by now.
+    /// Changes the output to the motor; gives whether the effect differs visibly from a healthy rig by now.
     pub(super) fn output(&mut self, output: &mut Output) -> bool {
         let (Drive::Force(command) | Drive::Duty(command)) = &mut output.drive;
         let asked = *command;
@@ -144,14 +147,14 @@ impl<'a, const NY: usize> Injection<'a, NY> {
         self.missing[0].abs() > f64::from(self.table.thresholds.innovation[0])
     }
 
-    /// A force on the cart that somebody adds (N).
+    /// External force on the cart (N).
     pub(super) fn push_n(&self, since: usize) -> f64 {
         let pushes = self.trial.kind == Kind::Push && since < self.push_ticks;
         if pushes { self.trial.sign * self.trial.size * self.full_force_n } else { 0.0 }
     }
 
-    /// What happens on the serial line at the onset.
-    pub(super) fn serial<const NX: usize>(&mut self, session: &mut Session<'_, NX, NY>) {
+    /// What is sent over the serial line at the onset.
+    pub(super) fn serial(&mut self, session: &mut Session<'_>) {
         let Trial { kind, sign, size, .. } = *self.trial;
         let disarm = |id: u64| {
             let (mut scratch, mut out) = ([0; MAX_COMMAND], [0; MAX_COMMAND]);
@@ -177,7 +180,7 @@ impl<'a, const NY: usize> Injection<'a, NY> {
             Kind::Rubbish => {
                 let mut rubbish: Vec<u8> =
                     (0..self.random.random_range(1..60)).map(|_| self.random.random()).collect();
-                // What follows has to be read again.
+                // The frames after it have to be readable again.
                 rubbish.push(frame::DELIMITER);
                 session.send_bytes(&rubbish);
             }
@@ -195,22 +198,9 @@ impl<'a, const NY: usize> Injection<'a, NY> {
     }
 }
 
-fn widths(sensor: usize) -> CounterWidth {
-    let [cart, link]: [CounterWidth; 2] = Bench::widths();
-    if sensor == 0 { cart } else { link }
-}
-
-/// The low bits that the sensor's counter has.
-fn in_width(sensor: usize, counter: u32) -> u32 {
-    match widths(sensor) {
-        CounterWidth::Bits16 => counter & 0xffff,
-        CounterWidth::Bits32 => counter,
-    }
-}
-
 /// A difference of two readings, with its sign.
 fn signed(sensor: usize, difference: u32) -> i64 {
-    match widths(sensor) {
+    match Bench::width(sensor) {
         CounterWidth::Bits16 => i64::from(difference as i16),
         CounterWidth::Bits32 => i64::from(difference as i32),
     }

@@ -3,11 +3,11 @@
 use serde::Serialize;
 use upright::supervision::fault::Fault;
 
-use super::attempt::{Place, Seen, attempt};
+use super::attempt::{Setup, attempt};
 use super::defect::{Expected, Kind, Ticks};
+use super::observed::Observed;
 use super::trial::Trial;
 use crate::in_the_loop::RunError;
-use upright_design::rig::Rig;
 use upright_design::table::TableValues;
 
 /// Class of an outcome.
@@ -47,60 +47,61 @@ pub struct Outcome {
 }
 
 /// Runs and judges a trial.
-pub(super) fn judge(
-    rig: &Rig,
-    table: &TableValues,
-    trial: &Trial,
-    place: Place<'_>,
-) -> Result<Outcome, RunError> {
-    let seen = attempt(rig, table, trial, true, place)?;
-    let before = seen.off.is_some_and(|off| off < trial.onset);
-    let from = |tick: usize| seen.off.map(|off| off.saturating_sub(tick) as u32 + 1);
-    let (from_onset, ticks) = match seen.visible {
+pub(super) fn judge(setup: &Setup<'_>, trial: &Trial) -> Result<Outcome, RunError> {
+    let observed = attempt(setup, trial, true)?;
+    let before = observed.off.is_some_and(|off| off < trial.onset);
+    let from = |tick: usize| observed.off.map(|off| off.saturating_sub(tick) as u32 + 1);
+    let (from_onset, ticks) = match observed.visible {
         _ if before => (None, None),
         Some(visible) => (from(trial.onset), from(visible)),
         // Off before it could be seen by one sensor alone: at once.
-        None => (from(trial.onset), seen.off.map(|_| 1)),
+        None => (from(trial.onset), observed.off.map(|_| 1)),
     };
     let expected = trial.kind.expected();
     let ticks = if let Expected::Fault(..) | Expected::Dead = expected { from_onset } else { ticks };
     let class = match expected {
         _ if before => Class::FalseAlarm,
-        _ if seen.on_again => Class::Missed,
-        Expected::Fault(fault, within) => of_fault(table, &seen, fault, within, ticks),
+        _ if observed.on_again => Class::Missed,
+        Expected::Fault(fault, within) => of_fault(setup.table, &observed, fault, within, ticks),
         Expected::Off(within) => match ticks {
-            _ if seen.outside => Class::Missed,
+            _ if observed.outside => Class::Missed,
             Some(ticks) if ticks <= within => Class::Detected,
             Some(_) => Class::Late,
-            None if seen.visible.is_none() => Class::Masked,
+            None if observed.visible.is_none() => Class::Masked,
             None => Class::Missed,
         },
-        Expected::Counted if seen.off.is_some() => Class::FalseAlarm,
-        Expected::Counted if seen.rejected > 0 => Class::Rejected,
+        Expected::Counted if observed.off.is_some() => Class::FalseAlarm,
+        Expected::Counted if observed.rejected > 0 => Class::Rejected,
         Expected::Counted => Class::Missed,
-        Expected::Ignored if seen.off.is_some() => Class::FalseAlarm,
+        Expected::Ignored if observed.off.is_some() => Class::FalseAlarm,
         Expected::Ignored => {
-            let without = attempt(rig, table, trial, false, place)?;
-            if without.outputs == seen.outputs { Class::Rejected } else { Class::Missed }
+            let without = attempt(setup, trial, false)?;
+            if without.outputs == observed.outputs { Class::Rejected } else { Class::Missed }
         }
-        Expected::Bounded if seen.outside => Class::Missed,
-        Expected::Bounded if seen.off.is_some() => Class::Detected,
+        Expected::Bounded if observed.outside => Class::Missed,
+        Expected::Bounded if observed.off.is_some() => Class::Detected,
         Expected::Bounded => Class::Masked,
-        Expected::Refused(reasons) => match seen.refused {
+        Expected::Refused(reasons) => match observed.refused {
             Some(refused) if refused.contains(reasons) => Class::Rejected,
             _ => Class::Missed,
         },
-        Expected::Dead if seen.dead && ticks == Some(1) => Class::Detected,
+        Expected::Dead if observed.dead && ticks == Some(1) => Class::Detected,
         Expected::Dead => Class::Missed,
     };
-    let fault = seen.fault.map(Fault::code);
+    let fault = observed.fault.map(Fault::code);
     Ok(Outcome { number: trial.number, kind: trial.kind, class, ticks, from_onset, fault })
 }
 
-fn of_fault(table: &TableValues, seen: &Seen, fault: Fault, within: Ticks, ticks: Option<u32>) -> Class {
+fn of_fault(
+    table: &TableValues,
+    observed: &Observed,
+    fault: Fault,
+    within: Ticks,
+    ticks: Option<u32>,
+) -> Class {
     let limit = allowed(table, within);
-    match (ticks, seen.fault) {
-        _ if seen.outside => Class::Missed,
+    match (ticks, observed.fault) {
+        _ if observed.outside => Class::Missed,
         (Some(ticks), Some(found)) if found == fault && ticks <= limit => Class::Detected,
         _ => Class::Missed,
     }

@@ -1,16 +1,17 @@
-//! Faults on purpose: the whole firmware in the loop, one defect per run, and what came of it.
+//! Fault injection: the whole firmware in the loop, one defect per run, and the outcome.
 //!
-//! A [`Kind`] of defect has an [`Expected`] outcome; a [`Trial`] is a run with one defect, drawn from the campaign's seed
-//! and its number, so that any of them can be run again alone; [`campaign`] runs many and sums up.
+//! A [`Kind`] of defect has an [`Expected`] outcome. A [`Trial`] is a run with one defect, drawn from the campaign's seed
+//! and its number, so that any of them can be run again alone. [`campaign`] runs many and counts the outcomes.
 
 mod attempt;
 mod defect;
 mod injection;
 mod judge;
+mod observed;
 mod tally;
 mod trial;
 
-pub use attempt::Place;
+pub use attempt::Setup;
 pub use defect::{Expected, Kind, Ticks};
 pub use judge::{Class, Outcome};
 pub use tally::{Campaign, CampaignError, Row, campaign, kinds, one};

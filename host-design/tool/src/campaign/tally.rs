@@ -4,12 +4,11 @@ use rayon::prelude::*;
 use serde::Serialize;
 use upright::supervision::fault::Fault;
 
-use super::attempt::Place;
+use super::attempt::Setup;
 use super::defect::{Expected, Kind};
 use super::judge::{Class, Outcome, allowed, judge};
 use super::trial::Trial;
-use crate::in_the_loop::RunError;
-use upright_design::rig::Rig;
+use crate::in_the_loop::{Place, RunError};
 use upright_design::table::TableValues;
 
 /// A trial that could not be run.
@@ -68,14 +67,7 @@ pub struct Campaign {
     pub rows: Vec<Row>,
 }
 
-impl Campaign {
-    /// Whether all came out as expected.
-    pub fn is_clean(&self) -> bool {
-        self.rows.iter().all(|row| row.wrong.is_empty())
-    }
-}
-
-/// The kinds of defects that this rig can have at this place.
+/// The kinds of defects that are possible with this rig and this place.
 pub fn kinds(table: &TableValues, place: Place<'_>) -> Vec<Kind> {
     let has_supply = table.limits.supply_min_v > 0.0;
     let has_links = table.sensors > 1;
@@ -88,8 +80,8 @@ pub fn kinds(table: &TableValues, place: Place<'_>) -> Vec<Kind> {
             _ => true,
         })
         .filter(|kind| match place {
-            Place::Host | Place::Blind => !kind.needs_image(),
-            Place::Qemu(_) => !kind.needs_process(),
+            Place::Host => !kind.needs_image(),
+            Place::Qemu { .. } => !kind.needs_process(),
         })
         .collect()
 }
@@ -98,44 +90,31 @@ pub fn kinds(table: &TableValues, place: Place<'_>) -> Vec<Kind> {
 ///
 /// # Errors
 /// [`CampaignError`] if it cannot be run.
-pub fn one(
-    rig: &Rig,
-    table: &TableValues,
-    kinds: &[Kind],
-    seed: u64,
-    number: u64,
-    place: Place<'_>,
-) -> Result<Outcome, CampaignError> {
-    let trial = Trial::draw(rig, table, kinds, seed, number);
-    judge(rig, table, &trial, place).map_err(|source| CampaignError {
-        number,
-        kind: trial.kind.name(),
-        source,
-    })
+pub fn one(setup: &Setup<'_>, kinds: &[Kind], seed: u64, number: u64) -> Result<Outcome, CampaignError> {
+    let trial = Trial::draw(setup.rig, setup.table, kinds, seed, number);
+    judge(setup, &trial).map_err(|source| CampaignError { number, kind: trial.kind.name(), source })
 }
 
-/// Runs `runs` trials of `kinds`, in turn; `done` hears of each.
+/// Runs `runs` trials of `kinds`, in turn; `done` is called after each.
 ///
 /// # Errors
 /// The first [`CampaignError`].
 pub fn campaign(
-    rig: &Rig,
-    table: &TableValues,
+    setup: &Setup<'_>,
     kinds: &[Kind],
     seed: u64,
     runs: u64,
-    place: Place<'_>,
     done: &(dyn Fn() + Sync),
 ) -> Result<Campaign, CampaignError> {
     let outcomes: Vec<Outcome> = (0..runs)
         .into_par_iter()
         .map(|number| {
-            let outcome = one(rig, table, kinds, seed, number, place);
+            let outcome = one(setup, kinds, seed, number);
             done();
             outcome
         })
         .collect::<Result<_, _>>()?;
-    let rows = kinds.iter().map(|&kind| Row::of(kind, table, &outcomes)).collect();
+    let rows = kinds.iter().map(|&kind| Row::of(kind, setup.table, &outcomes)).collect();
     Ok(Campaign { seed, runs, rows })
 }
 

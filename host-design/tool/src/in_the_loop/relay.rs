@@ -1,24 +1,18 @@
 //! The firmware's serial line over TCP, in real time: for a monitor without a board.
 
-use std::cell::RefCell;
 use std::io::{ErrorKind, Read, Write};
 use std::net::{TcpListener, TcpStream};
 use std::time::{Duration, Instant};
 
-use upright::board::Output;
-use upright::protocol::simulated_pins::PinsIn;
-
-use super::in_process::{InProcess, Queues};
-use super::qemu::Emulator;
-use super::run::{RunError, Where};
-use super::session::{Session, SessionError};
-use super::stage::Stage;
-use super::target::{Target, TargetError};
+use upright_design::harness::{Harness, HarnessError, Target};
 use upright_design::rig::Rig;
-use upright_design::simulate::{Scenario, SimulationError};
-use upright_design::table::{TableValues, WithSize, with_firmware_size};
+use upright_design::simulate::Scenario;
+use upright_design::table::TableValues;
 
-/// A relay that has ended before its time.
+use super::place::{Place, RunError};
+use super::qemu::EmulatorError;
+
+/// A relay that has ended early.
 #[derive(Debug, thiserror::Error)]
 pub enum RelayError {
     /// The firmware or the rig.
@@ -29,8 +23,17 @@ pub enum RelayError {
     Socket(#[from] std::io::Error),
 }
 
-/// Longest time in which a hand homes, checks and raises the rig (s).
-const LONGEST_WAIT_S: f64 = 60.0;
+impl From<HarnessError> for RelayError {
+    fn from(error: HarnessError) -> Self {
+        RelayError::Run(error.into())
+    }
+}
+
+impl From<EmulatorError> for RelayError {
+    fn from(error: EmulatorError) -> Self {
+        RelayError::Run(error.into())
+    }
+}
 
 /// Runs the firmware of `table` with the plant of `rig` for the duration of `scenario`, in real time from the first
 /// client on, and passes the bytes of its serial line to and from whoever is connected to `listener`, one at a time.
@@ -44,78 +47,56 @@ pub fn serve(
     rig: &Rig,
     table: &TableValues,
     scenario: &Scenario,
-    place: Where<'_>,
+    place: Place<'_>,
     listener: &TcpListener,
 ) -> Result<(), RelayError> {
-    let (states, sensors) = (table.states, table.sensors);
-    with_firmware_size(states, sensors, Relay { rig, table, scenario, place, listener })
-        .ok_or_else(|| RunError::from(SimulationError::Size { states, sensors }))?
+    place.with_target(table, |target| Relay { rig, table, scenario, listener }.run(target))
 }
 
 struct Relay<'a> {
     rig: &'a Rig,
     table: &'a TableValues,
     scenario: &'a Scenario,
-    place: Where<'a>,
     listener: &'a TcpListener,
 }
 
-impl WithSize for Relay<'_> {
-    type Output = Result<(), RelayError>;
-
-    fn run<const NX: usize, const NY: usize>(self) -> Self::Output {
-        match self.place {
-            Where::Host => {
-                let (table, mut queues) = (self.table.table::<NX, NY>(), Queues::default());
-                let mut target = InProcess::<NX, NY>::new(&mut queues, &table, &self.table.build())
-                    .map_err(RunError::from)?;
-                self.with::<NX, NY>(&mut target)
-            }
-            Where::Qemu { image, link } => {
-                let mut target = Emulator::start(image, link).map_err(RunError::from)?;
-                self.with::<NX, NY>(&mut target)
-            }
-        }
-    }
-}
-
 impl Relay<'_> {
-    fn with<const NX: usize, const NY: usize>(self, target: &mut dyn Target<NY>) -> Result<(), RelayError> {
-        let said = RefCell::new(Vec::new());
-        let mut tap = Tap { target, said: &said };
-        let mut stage = Stage::<NX, NY>::new(self.rig, self.table, self.scenario, Session::new(&mut tap))?;
-        let mut output = raise(&mut stage, self.rig.tick.period_s)?;
+    fn run(self, target: &mut dyn Target) -> Result<(), RelayError> {
+        let period_s = self.rig.tick.period_s;
+        let mut harness = Harness::new(self.rig, self.table, self.scenario, target)?;
+        // No set-point is commanded, so the firmware needs no heartbeats.
+        let mut output = harness.raise(None)?;
         self.listener.set_nonblocking(true)?;
         let mut client = Some(self.first_client()?);
-        said.borrow_mut().clear();
         let begin = Instant::now();
         let mut tick = 0u32;
-        while f64::from(tick) * self.rig.tick.period_s < self.scenario.duration_s {
+        while f64::from(tick) * period_s < self.scenario.duration_s {
             if output.enable {
-                stage.bench.tick(output.drive);
+                harness.bench.tick(output.drive);
             } else {
-                stage.bench.hold(&self.scenario.start);
+                harness.bench.hold(&self.scenario.start);
             }
             if client.is_none() {
                 client = accepted(self.listener)?;
             }
-            let heard = client.as_mut().map_or(Some(Vec::new()), heard);
-            stage.session.send_bytes(heard.as_deref().unwrap_or(&[]));
-            output = stage.session.tick(&stage.inputs()).map_err(RunError::from)?;
-            while stage.session.next_telemetry().is_some() || stage.session.next_reply().is_some() {}
-            let told = client.as_mut().is_none_or(|stream| told(stream, &said.borrow()));
-            said.borrow_mut().clear();
-            if heard.is_none() || !told {
+            let received = client.as_mut().map_or(Some(Vec::new()), receive);
+            harness.session.send_bytes(received.as_deref().unwrap_or(&[]));
+            let inputs = harness.inputs();
+            output = harness.session.tick(&inputs)?;
+            while harness.session.next_telemetry().is_some() || harness.session.next_reply().is_some() {}
+            let is_connected =
+                client.as_mut().is_none_or(|stream| send(stream, harness.session.last_bytes()));
+            if received.is_none() || !is_connected {
                 client = None;
             }
             tick += 1;
-            let due = begin + Duration::from_secs_f64(f64::from(tick) * self.rig.tick.period_s);
+            let due = begin + Duration::from_secs_f64(f64::from(tick) * period_s);
             std::thread::sleep(due.saturating_duration_since(Instant::now()));
         }
         Ok(())
     }
 
-    /// Waits for somebody to connect, as long as the run would last.
+    /// Waits for the first client, as long as the run would last.
     fn first_client(&self) -> std::io::Result<TcpStream> {
         let begin = Instant::now();
         loop {
@@ -130,21 +111,7 @@ impl Relay<'_> {
     }
 }
 
-/// Until the motor is on; commands no set-point, so that the firmware needs no beats.
-fn raise<const NX: usize, const NY: usize>(
-    stage: &mut Stage<'_, NX, NY>,
-    period_s: f64,
-) -> Result<Output, RunError> {
-    for tick in 0..(LONGEST_WAIT_S / period_s) as u32 {
-        let output = stage.by_hand(tick)?;
-        if output.enable {
-            return Ok(output);
-        }
-    }
-    Err(SessionError::NotBalancing(stage.session.seen().state).into())
-}
-
-/// Whoever waits to be connected.
+/// A client that waits to be connected, if there is one.
 fn accepted(listener: &TcpListener) -> std::io::Result<Option<TcpStream>> {
     match listener.accept() {
         Ok((stream, _)) => {
@@ -156,8 +123,8 @@ fn accepted(listener: &TcpListener) -> std::io::Result<Option<TcpStream>> {
     }
 }
 
-/// What has come from the client; none if it has gone.
-fn heard(stream: &mut TcpStream) -> Option<Vec<u8>> {
+/// What has come from the client; `None` if it has disconnected.
+fn receive(stream: &mut TcpStream) -> Option<Vec<u8>> {
     let mut buffer = [0; 256];
     match stream.read(&mut buffer) {
         Ok(0) => None,
@@ -169,8 +136,8 @@ fn heard(stream: &mut TcpStream) -> Option<Vec<u8>> {
     }
 }
 
-/// Whether the client is still there. As on a serial line, what it does not take in time is lost.
-fn told(stream: &mut TcpStream, mut bytes: &[u8]) -> bool {
+/// Sends to the client; gives whether it is still connected. As on a serial line, what it does not take in time is lost.
+fn send(stream: &mut TcpStream, mut bytes: &[u8]) -> bool {
     while !bytes.is_empty() {
         match stream.write(bytes) {
             Ok(0) => return false,
@@ -181,19 +148,4 @@ fn told(stream: &mut TcpStream, mut bytes: &[u8]) -> bool {
         }
     }
     true
-}
-
-/// A target whose serial line is listened to.
-struct Tap<'a, const NY: usize> {
-    target: &'a mut dyn Target<NY>,
-    said: &'a RefCell<Vec<u8>>,
-}
-
-impl<const NY: usize> Target<NY> for Tap<'_, NY> {
-    fn tick(&mut self, pins: &PinsIn<NY>, serial: &mut Vec<u8>) -> Result<Output, TargetError> {
-        let begin = serial.len();
-        let output = self.target.tick(pins, serial)?;
-        self.said.borrow_mut().extend_from_slice(&serial[begin..]);
-        Ok(output)
-    }
 }

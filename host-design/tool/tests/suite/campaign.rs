@@ -5,7 +5,8 @@ use std::path::Path;
 use upright_design::design::design;
 use upright_design::rig::Rig;
 use upright_design::table::{Gains, TableValues};
-use upright_tool::campaign::{Campaign, Kind, Place, campaign, kinds, one};
+use upright_tool::campaign::{Campaign, Kind, Setup, Trial, campaign, kinds, one};
+use upright_tool::in_the_loop::Place;
 
 fn rig(name: &str) -> (Rig, TableValues) {
     let rig = Rig::from_path(&Path::new("../rigs").join(name)).unwrap();
@@ -13,8 +14,12 @@ fn rig(name: &str) -> (Rig, TableValues) {
     (rig, table)
 }
 
-fn run(rig: &Rig, table: &TableValues, kinds: &[Kind], runs: u64, place: Place<'_>) -> Campaign {
-    campaign(rig, table, kinds, 3, runs, place, &|| ()).unwrap()
+fn on_host<'a>(rig: &'a Rig, table: &'a TableValues) -> Setup<'a> {
+    Setup { rig, table, place: Place::Host, detection: true }
+}
+
+fn run(setup: &Setup<'_>, kinds: &[Kind], runs: u64) -> Campaign {
+    campaign(setup, kinds, 3, runs, &|| ()).unwrap()
 }
 
 #[test]
@@ -22,7 +27,7 @@ fn every_defect_is_found_and_nothing_else() {
     for name in ["quadruple-paper.toml", "single-quanser-ip02.toml"] {
         let (rig, table) = rig(name);
         let kinds = kinds(&table, Place::Host);
-        let result = run(&rig, &table, &kinds, 5 * kinds.len() as u64, Place::Host);
+        let result = run(&on_host(&rig, &table), &kinds, 5 * kinds.len() as u64);
         for row in &result.rows {
             assert!(row.wrong.is_empty() && row.runs == 5, "{name}: {row:?}");
         }
@@ -34,17 +39,33 @@ fn without_detection_every_defect_that_needs_it_is_missed() {
     let (rig, table) = rig("quadruple-paper.toml");
     let kinds: Vec<Kind> =
         kinds(&table, Place::Host).into_iter().filter(|kind| kind.needs_detection()).collect();
-    let result = run(&rig, &table, &kinds, 4 * kinds.len() as u64, Place::Blind);
+    let blind = Setup { detection: false, ..on_host(&rig, &table) };
+    let result = run(&blind, &kinds, 4 * kinds.len() as u64);
     for row in &result.rows {
         assert!(row.missed > 0, "{row:?}");
     }
 }
 
 #[test]
-fn a_run_is_the_same_every_time_and_does_not_depend_on_the_others() {
+fn a_trial_is_the_same_every_time_and_does_not_depend_on_the_others() {
     let (rig, table) = rig("quadruple-paper.toml");
-    let kinds = kinds(&table, Place::Host);
-    let again = |number| one(&rig, &table, &kinds, 5, number, Place::Host).unwrap();
-    assert_eq!(again(8), again(8));
-    assert_ne!(again(8).number, again(8 + kinds.len() as u64).number);
+    let setup = on_host(&rig, &table);
+    let kinds = [Kind::Overruns, Kind::MotorReversed, Kind::EncoderJump];
+    let alone = |number| one(&setup, &kinds, 5, number).unwrap();
+    // Alone, in any order, and as part of a campaign, whose rows sum up its trials.
+    let backwards: Vec<_> = (0..6).rev().map(alone).collect();
+    let forwards: Vec<_> = (0..6).map(alone).collect();
+    assert!(forwards.iter().eq(backwards.iter().rev()));
+    let together = campaign(&setup, &kinds, 5, 6, &|| ()).unwrap();
+    for row in &together.rows {
+        let of_kind = || forwards.iter().filter(|outcome| outcome.kind == row.kind);
+        assert_eq!(of_kind().count(), row.runs);
+        assert_eq!(of_kind().filter_map(|outcome| outcome.ticks).max(), row.worst, "{row:?}");
+        assert_eq!(of_kind().filter_map(|outcome| outcome.from_onset).max(), row.worst_from_onset, "{row:?}");
+    }
+    // Another seed or another number is another trial.
+    let trial = |seed, number| Trial { number: 0, ..Trial::draw(&rig, &table, &kinds, seed, number) };
+    assert_eq!(trial(5, 1), trial(5, 1));
+    assert_ne!(trial(5, 1), trial(6, 1));
+    assert_ne!(trial(5, 1), trial(5, 4));
 }

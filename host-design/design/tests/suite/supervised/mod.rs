@@ -1,11 +1,12 @@
-//! The rigs of `rigs/`, each with the firmware's types of its size, brought to balance.
+//! The rigs of `rigs/` with the whole firmware, brought to balance.
 
-// Each test program uses some of these.
-#![allow(dead_code)]
-
+use upright::board::Output;
+use upright::protocol::message::{Answer, Request};
+use upright::supervision::fault::Cause;
 use upright_design::design::design;
+use upright_design::harness::{Harness, HarnessError, with_firmware};
 use upright_design::rig::Rig;
-use upright_design::simulate::{Scenario, Session, SimulationError};
+use upright_design::simulate::Scenario;
 use upright_design::table::{Gains, TableValues};
 
 pub(crate) const ALL_RIGS: [&str; 4] =
@@ -19,35 +20,56 @@ pub(crate) fn table(rig: &Rig) -> TableValues {
     TableValues::of(rig, &design(rig).unwrap(), Gains::Sampled).unwrap()
 }
 
-/// What is done with a rig that balances.
-pub(crate) trait Supervised {
-    type Output;
-
-    fn balancing<const NX: usize, const NY: usize>(self, session: Session<'_, NX, NY>) -> Self::Output;
-}
-
-/// Brings the rig from hanging to balance at the start of `scenario`, then goes on with `what`.
-pub(crate) fn run<S: Supervised>(
+/// Brings the rig from hanging to balance at the start of `scenario`, lets go, and goes on with `test` after the first
+/// tick of balancing.
+pub(crate) fn balancing<R>(
     rig: &Rig,
     values: &TableValues,
     scenario: &Scenario,
-    what: S,
-) -> Result<S::Output, SimulationError> {
-    fn sized<S: Supervised, const NX: usize, const NY: usize>(
-        rig: &Rig,
-        values: &TableValues,
-        scenario: &Scenario,
-        what: S,
-    ) -> Result<S::Output, SimulationError> {
-        let table = values.table::<NX, NY>();
-        let mut session = Session::new(rig, values, &table, scenario)?;
-        session.start(&mut ())?;
-        Ok(what.balancing(session))
+    test: impl FnOnce(&mut Harness<'_>) -> R,
+) -> Result<R, HarnessError> {
+    with_firmware(values, |target| {
+        let mut harness = Harness::new(rig, values, scenario, target)?;
+        let output = harness.raise(None)?;
+        harness.bench.tick(output.drive);
+        Ok(test(&mut harness))
+    })?
+}
+
+/// One tick of firmware and rig.
+pub(crate) fn tick(harness: &mut Harness<'_>) -> Output {
+    let inputs = harness.inputs();
+    let output = harness.session.tick(&inputs).unwrap();
+    harness.bench.tick(output.drive);
+    output
+}
+
+/// The answer to a request, while firmware and rig go on.
+pub(crate) fn ask(harness: &mut Harness<'_>, request: Request) -> Answer {
+    let id = harness.session.send(request);
+    for _ in 0..3 {
+        tick(harness);
+        while let Some((answered, answer)) = harness.session.next_reply() {
+            if answered == id {
+                return answer;
+            }
+        }
     }
-    match values.sensors {
-        2 => sized::<S, 4, 2>(rig, values, scenario, what),
-        3 => sized::<S, 6, 3>(rig, values, scenario, what),
-        4 => sized::<S, 8, 4>(rig, values, scenario, what),
-        _ => sized::<S, 10, 5>(rig, values, scenario, what),
+    panic!("no answer to {request:?}")
+}
+
+/// The first cause of the fault.
+pub(crate) fn cause(harness: &mut Harness<'_>) -> Option<Cause> {
+    match ask(harness, Request::Cause) {
+        Answer::Cause(cause) => cause,
+        other => panic!("{other:?}"),
+    }
+}
+
+/// Measurements that the firmware has rejected so far.
+pub(crate) fn rejected(harness: &mut Harness<'_>) -> u32 {
+    match ask(harness, Request::Statistics) {
+        Answer::Statistics(statistics) => statistics.rejected_samples,
+        other => panic!("{other:?}"),
     }
 }

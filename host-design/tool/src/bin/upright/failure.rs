@@ -3,6 +3,7 @@
 use std::process::ExitCode;
 
 use upright_design::design::DesignError;
+use upright_design::harness::HarnessError;
 use upright_design::rig::RigError;
 use upright_design::simulate::SimulationError;
 use upright_design::table::{NoTable, WriteError};
@@ -10,7 +11,7 @@ use upright_design::verify::{Unverifiable, VerifyError};
 use upright_tool::campaign::CampaignError;
 use upright_tool::figure::FigureError;
 use upright_tool::image::{ElfError, ImageError, SizeError};
-use upright_tool::in_the_loop::{RelayError, RunError, SessionError, TargetError};
+use upright_tool::in_the_loop::{EmulatorError, RelayError, RunError};
 use upright_tool::monitor::OpenError;
 use upright_tool::report::ReportError;
 use upright_tool::reproduce::ReproduceError;
@@ -81,13 +82,17 @@ impl Failure {
             Failure::Design { .. } | Failure::NoTable { .. } | Failure::NoSolution(_) => 3,
             Failure::NoProgram(_)
             | Failure::Image(ImageError::NoCompiler)
-            | Failure::InTheLoop(RunError::Session(SessionError::Target(TargetError::NoEmulator))) => 4,
-            Failure::InTheLoop(RunError::Session(_)) => 1,
+            | Failure::InTheLoop(RunError::Emulator(EmulatorError::Missing | EmulatorError::NeedsUnix)) => 4,
+            Failure::InTheLoop(RunError::Harness(error)) if is_bad_scenario(error) => 2,
+            Failure::InTheLoop(_) => 1,
+            Failure::Campaign(CampaignError {
+                source: RunError::Emulator(EmulatorError::Missing | EmulatorError::NeedsUnix),
+                ..
+            }) => 4,
             Failure::Campaign(_) => 1,
             Failure::Image(_)
             | Failure::Elf(_)
             | Failure::Size(_)
-            | Failure::InTheLoop(_)
             | Failure::Relay(_)
             | Failure::Monitor(_)
             | Failure::Simulation(_)
@@ -113,4 +118,15 @@ impl Failure {
         }
         ExitCode::from(self.exit_status())
     }
+}
+
+/// Whether the firmware would run, but not this scenario.
+fn is_bad_scenario(error: &HarnessError) -> bool {
+    matches!(
+        error,
+        HarnessError::Simulation(_)
+            | HarnessError::FullState
+            | HarnessError::StepAt { .. }
+            | HarnessError::Lost(_)
+    )
 }

@@ -5,9 +5,9 @@ use std::io::Write;
 use clap::{Args, ValueEnum};
 use serde_json::json;
 use upright_design::rig::Rig;
-use upright_design::table::TableValues;
-use upright_tool::campaign::{Campaign, Kind, Place, Row, campaign, kinds, one};
+use upright_tool::campaign::{Campaign, Kind, Row, Setup, campaign, kinds, one};
 use upright_tool::image::{Kind as ImageKind, build_for};
+use upright_tool::in_the_loop::{Link, Place};
 
 use crate::failure::Failure;
 use crate::progress::{with_bar, with_spinner};
@@ -76,7 +76,10 @@ impl Faults {
                 Some(with_spinner("building the image", || build_for(ImageKind::InTheLoop, &rig, &table))?)
             }
         };
-        let place = image.as_ref().map_or(Place::Host, |image| Place::Qemu(image));
+        let place = match &image {
+            Some(image) => Place::Qemu { image, link: Link::Files },
+            None => Place::Host,
+        };
         let possible = kinds(&table, place);
         let chosen: Vec<Kind> = match self.kind {
             Some(kind) if possible.contains(&kind) => vec![kind],
@@ -88,39 +91,32 @@ impl Faults {
             }
             None => possible,
         };
+        let setup = Setup { rig: &rig, table: &table, place, detection: true };
         if let Some(number) = self.only {
-            return self.replay(&rig, &table, &chosen, number, place);
+            return self.replay(&setup, &chosen, number);
         }
-        let result = with_bar("faults", self.runs, |tick| {
-            campaign(&rig, &table, &chosen, self.seed, self.runs, place, tick)
-        })?;
-        let control = self.control(&rig, &table, &chosen)?;
+        let result =
+            with_bar("faults", self.runs, |tick| campaign(&setup, &chosen, self.seed, self.runs, tick))?;
+        let control = self.control(&setup, &chosen)?;
         self.print(&rig, &result, control.as_ref())?;
         self.verdict(&result, control.as_ref())
     }
 
-    /// The same with nothing that faults could be found by, on the host.
-    fn control(&self, rig: &Rig, table: &TableValues, chosen: &[Kind]) -> Result<Option<Campaign>, Failure> {
+    /// The negative control: the same on the host, without thresholds and limits.
+    fn control(&self, setup: &Setup<'_>, chosen: &[Kind]) -> Result<Option<Campaign>, Failure> {
         let chosen: Vec<Kind> = chosen.iter().copied().filter(|kind| kind.needs_detection()).collect();
         if chosen.is_empty() {
             return Ok(None);
         }
+        let setup = Setup { place: Place::Host, detection: false, ..*setup };
         let runs = CONTROL_RUNS * chosen.len() as u64;
-        let result = with_bar("without detection", runs, |tick| {
-            campaign(rig, table, &chosen, self.seed, runs, Place::Blind, tick)
-        })?;
+        let result =
+            with_bar("without detection", runs, |tick| campaign(&setup, &chosen, self.seed, runs, tick))?;
         Ok(Some(result))
     }
 
-    fn replay(
-        &self,
-        rig: &Rig,
-        table: &TableValues,
-        kinds: &[Kind],
-        number: u64,
-        place: Place<'_>,
-    ) -> Result<(), Failure> {
-        let outcome = one(rig, table, kinds, self.seed, number, place)?;
+    fn replay(&self, setup: &Setup<'_>, kinds: &[Kind], number: u64) -> Result<(), Failure> {
+        let outcome = one(setup, kinds, self.seed, number)?;
         writeln!(std::io::stdout(), "{}", serde_json::to_string(&outcome).map_err(std::io::Error::from)?)?;
         Ok(())
     }

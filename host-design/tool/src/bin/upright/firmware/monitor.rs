@@ -11,7 +11,9 @@ use std::time::{Duration, Instant, SystemTime};
 use clap::Args;
 use ratatui::DefaultTerminal;
 use ratatui::crossterm::event::{self, Event, KeyEventKind};
-use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
+#[cfg(unix)]
+use signal_hook::consts::SIGHUP;
+use signal_hook::consts::{SIGINT, SIGTERM};
 use upright_tool::monitor::record::{Recorder, json};
 use upright_tool::monitor::{Action, Line, action, request, view};
 
@@ -52,7 +54,12 @@ impl Monitor {
     pub(crate) fn run(self) -> Result<(), Failure> {
         let line = Line::open(&self.port)?;
         let stop = Arc::new(AtomicBool::new(false));
-        for signal in [SIGTERM, SIGHUP, SIGINT] {
+        for signal in [
+            SIGTERM,
+            SIGINT,
+            #[cfg(unix)]
+            SIGHUP,
+        ] {
             signal_hook::flag::register(signal, Arc::clone(&stop))?;
         }
         let mut conversation = Conversation {

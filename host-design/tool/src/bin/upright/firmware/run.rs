@@ -3,11 +3,12 @@
 use std::net::TcpListener;
 
 use clap::{Args, ValueEnum};
+use upright_design::harness::Recording;
 use upright_design::rig::Rig;
 use upright_design::simulate::Scenario;
 use upright_design::table::TableValues;
 use upright_tool::image::{self, Kind};
-use upright_tool::in_the_loop::{Link, Recording, Where, run, serve};
+use upright_tool::in_the_loop::{Link, Place, run, serve};
 
 use crate::failure::Failure;
 use crate::progress::with_spinner;
@@ -55,12 +56,12 @@ impl Run {
             let (rig, table, scenario) = self.simulate.prepared()?;
             let image = with_spinner("building the image", || image::build_for(kind, &rig, &table))?;
             eprintln!("connect with: upright firmware monitor tcp:{}", listener.local_addr()?);
-            let place = Where::Qemu { image: &image, link };
+            let place = Place::Qemu { image: &image, link };
             return Ok(with_spinner("serving", || serve(&rig, &table, &scenario, place, &listener))?);
         }
         self.simulate.run_with(|rig, table, scenario| {
             let image = with_spinner("building the image", || image::build_for(kind, rig, table))?;
-            let place = Where::Qemu { image: &image, link };
+            let place = Place::Qemu { image: &image, link };
             let recording = with_spinner("running it in QEMU", || run(rig, table, scenario, place))?;
             compare(rig, table, scenario, &recording)?;
             Ok((recording.trace, recording.summary))
@@ -70,7 +71,7 @@ impl Run {
 
 /// The same run on the host, bit by bit.
 fn compare(rig: &Rig, table: &TableValues, scenario: &Scenario, qemu: &Recording) -> Result<(), Failure> {
-    let host = run(rig, table, scenario, Where::Host)?;
+    let host = run(rig, table, scenario, Place::Host)?;
     let difference = host.ticks.iter().zip(&qemu.ticks).position(|(host, qemu)| host != qemu);
     match difference {
         Some(tick) => {

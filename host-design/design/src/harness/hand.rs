@@ -6,35 +6,35 @@ use upright::supervision::supervisor::State;
 
 use crate::rig::{PlantDescription, Rig};
 
-/// Where the hand leads the rig, and what it asks the firmware for, in a tick.
+/// What the hand does in one tick.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Act {
+pub struct HandTick {
     /// The state in which the rig is held (m, m/s, rad, rad/s …).
     pub held: Vec<f64>,
     /// The request sent at the end of the tick.
     pub request: Option<Request>,
 }
 
-/// What the hand sees of the firmware: its telemetry tells.
+/// What the hand knows of the firmware, from its telemetry.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Seen {
+pub struct Status {
     /// State of the supervisor.
     pub state: State,
-    /// How far the check of the signs is.
+    /// Progress of the sign check.
     pub signs: Signs,
 }
 
-/// The hand, tick by tick. It goes the way that the firmware asks for, as a person would; there is no other.
+/// The hand, tick by tick. It follows the firmware's instructions, as a person would.
 #[derive(Debug, Clone)]
 pub struct Hand {
     doing: Doing,
     hanging: Vec<f64>,
     start: Vec<f64>,
     held: Vec<f64>,
-    /// Way of a tick for a link (rad) and the cart (m).
-    pace: [f64; 2],
-    /// Ticks to wait before a refused request is tried again.
-    patience: u32,
+    /// Largest movement per tick of a joint (rad) and of the cart (m).
+    step: [f64; 2],
+    /// Ticks between two tries of the same request.
+    retry_ticks: u32,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -47,13 +47,13 @@ enum Doing {
     Hold,
 }
 
-/// Pace of the hand: joints (rad/s), cart (m/s).
+/// Speed of the hand: joints (rad/s), cart (m/s).
 const RATE: [f64; 2] = [2.0, 0.5];
-/// Between two tries of the same request (s).
+/// Time between two tries of the same request (s).
 const RETRY_S: f64 = 0.05;
 
 impl Hand {
-    /// A hand that leads `rig` from hanging to the state `start`, and lets go there.
+    /// A hand that moves `rig` from hanging to the state `start`, and lets go there.
     pub fn new(rig: &Rig, start: &[f64]) -> Self {
         let mut hanging = vec![0.0; rig.states()];
         if let (PlantDescription::Chain(_), Some(first)) = (&rig.plant, hanging.get_mut(2)) {
@@ -64,8 +64,8 @@ impl Hand {
             held: hanging.clone(),
             hanging,
             start: start.to_vec(),
-            pace: RATE.map(|rate| rate * rig.tick.period_s),
-            patience: (RETRY_S / rig.tick.period_s).ceil() as u32,
+            step: RATE.map(|rate| rate * rig.tick.period_s),
+            retry_ticks: (RETRY_S / rig.tick.period_s).ceil() as u32,
         }
     }
 
@@ -74,61 +74,61 @@ impl Hand {
         &self.held
     }
 
-    /// The next tick; none once the firmware balances and the hand has let go.
-    pub fn act(&mut self, tick: u32, seen: &Seen) -> Option<Act> {
-        if seen.state == State::Balancing {
+    /// What the hand does in tick number `tick`; `None` once the firmware balances and the hand has let go.
+    pub fn act(&mut self, tick: u32, status: &Status) -> Option<HandTick> {
+        if status.state == State::Balancing {
             return None;
         }
         let request = match self.doing {
             Doing::Home => {
-                self.until(seen.state == State::Calibrated, Doing::CheckSigns, tick, Request::Home)
+                self.until(status.state == State::Calibrated, Doing::CheckSigns, tick, Request::Home)
             }
             Doing::CheckSigns => {
-                let begun = seen.signs != Signs::Unchecked;
+                let begun = status.signs != Signs::Unchecked;
                 self.until(begun, Doing::Follow, tick, Request::CheckSigns)
             }
             Doing::Follow => {
-                self.follow(seen.signs);
+                self.follow(status.signs);
                 None
             }
             Doing::Raise => {
                 let start = self.start.clone();
-                if self.lead_to(&start) {
+                if self.move_to(&start) {
                     self.doing = Doing::Arm;
                 }
                 None
             }
-            Doing::Arm => self.until(seen.state == State::Armed, Doing::Hold, tick, Request::Arm),
+            Doing::Arm => self.until(status.state == State::Armed, Doing::Hold, tick, Request::Arm),
             Doing::Hold => None,
         };
-        Some(Act { held: self.held.clone(), request })
+        Some(HandTick { held: self.held.clone(), request })
     }
 
-    /// Asks again and again, until it is `done`.
+    /// Repeats a request until it is `done`, then goes on with `then`.
     fn until(&mut self, done: bool, then: Doing, tick: u32, request: Request) -> Option<Request> {
         if done {
             self.doing = then;
             return None;
         }
-        tick.is_multiple_of(self.patience).then_some(request)
+        tick.is_multiple_of(self.retry_ticks).then_some(request)
     }
 
-    /// Moves what the check of the signs asks for.
+    /// Moves what the sign check asks for.
     fn follow(&mut self, signs: Signs) {
         match signs {
             Signs::Rest(_) => {
                 // The cart stays where it is.
                 let mut rest = self.hanging.clone();
                 rest[0] = self.held[0];
-                self.lead_to(&rest);
+                self.move_to(&rest);
             }
-            Signs::Move(0) => self.held[0] += self.pace[1],
+            Signs::Move(0) => self.held[0] += self.step[1],
             Signs::Move(sensor) => {
                 let joint = 2 * usize::from(sensor);
-                self.held[joint] += self.pace[0];
-                // The next link hangs on.
+                self.held[joint] += self.step[0];
+                // The next link keeps hanging.
                 if let Some(outer) = self.held.get_mut(joint + 2) {
-                    *outer -= self.pace[0];
+                    *outer -= self.step[0];
                 }
             }
             Signs::Checked => self.doing = Doing::Raise,
@@ -136,12 +136,12 @@ impl Hand {
         }
     }
 
-    /// Leads every position towards `to`; whether it is there.
-    fn lead_to(&mut self, to: &[f64]) -> bool {
+    /// Moves every position towards `to`; gives whether all are there.
+    fn move_to(&mut self, to: &[f64]) -> bool {
         let mut there = true;
         for (index, (held, &to)) in self.held.iter_mut().zip(to).enumerate().step_by(2) {
-            let pace = self.pace[usize::from(index == 0)];
-            *held += (to - *held).clamp(-pace, pace);
+            let step = self.step[usize::from(index == 0)];
+            *held += (to - *held).clamp(-step, step);
             there &= *held == to;
         }
         there

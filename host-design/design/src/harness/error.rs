@@ -1,0 +1,76 @@
+//! Why a firmware does not run, or does not do what it is asked for.
+
+use upright::protocol::frame::FrameError;
+use upright::protocol::message::{Answer, PROTOCOL, Request};
+use upright::supervision::supervisor::State;
+use upright::table::TableError;
+
+use crate::simulate::SimulationError;
+
+/// A run with the whole firmware that could not be started or finished.
+#[derive(Debug, thiserror::Error)]
+pub enum HarnessError {
+    /// The firmware refuses its table.
+    #[error("the firmware refuses the table: {0}")]
+    Table(#[from] TableError),
+    /// The simulated rig.
+    #[error(transparent)]
+    Simulation(#[from] SimulationError),
+    /// The image has ended in mid-run.
+    #[error("the image has stopped in mid-run (exit status {status}){message}")]
+    Stopped {
+        /// The emulator's exit status; −1 if it was killed.
+        status: i32,
+        /// What the emulator printed, after ": ".
+        message: String,
+    },
+    /// A frame that cannot be read.
+    #[error("the firmware's answer cannot be read: {0}")]
+    Frame(#[from] FrameError),
+    /// The target cannot do this.
+    #[error("this is not possible where the firmware runs: {0}")]
+    Unsupported(&'static str),
+    /// No answer within the ticks in which every command is answered.
+    #[error("the firmware does not answer {0:?}")]
+    NoAnswer(Request),
+    /// A command that the firmware refuses.
+    #[error("the firmware refuses {request:?}: {answer:?}")]
+    Refused {
+        /// The command's request.
+        request: Request,
+        /// The firmware's answer.
+        answer: Answer,
+    },
+    /// The firmware never began to balance.
+    #[error("the firmware does not begin to balance; its state is {0:?}")]
+    NotBalancing(State),
+    /// The firmware uses another version of the messages.
+    #[error("the firmware speaks version {0} of the messages, this tool version {PROTOCOL}: build it again")]
+    Protocol(u8),
+    /// The firmware was built for another rig.
+    #[error(
+        "the firmware was built for a rig with hash {found:016x}, this one has {wanted:016x}: build it again"
+    )]
+    Rig {
+        /// Hash in the firmware.
+        found: u64,
+        /// Hash of the rig file.
+        wanted: u64,
+    },
+    /// The scenario measures the whole state; the firmware has encoders only.
+    #[error("the firmware runs from encoders: give the rig file its encoders and [kalman]")]
+    FullState,
+    /// The set-point steps before a command can reach the control law.
+    #[error(
+        "a step at {at_s} s: the command needs {least_s} s to reach the control law; give 0, or at least that"
+    )]
+    StepAt {
+        /// Time of the step (s).
+        at_s: f64,
+        /// Earliest possible time other than 0 (s).
+        least_s: f64,
+    },
+    /// Telemetry of a tick is missing.
+    #[error("the telemetry of tick {0} is missing")]
+    Lost(u32),
+}

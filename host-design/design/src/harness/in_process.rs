@@ -1,0 +1,117 @@
+//! The firmware in this process: the tasks of the image, one after the other.
+//!
+//! The numbers of states and sensors are parameters of the firmware's type, so each pair is compiled separately. Only
+//! what is in this file is; everything around a [`Target`] is compiled once.
+
+use heapless::spsc::Queue;
+use upright::board::{Board, Inputs, Output};
+use upright::control::encoder::CounterWidth;
+use upright::firmware::Firmware;
+use upright::firmware::control_task::{COMMANDS, ControlTask, MESSAGES};
+use upright::protocol::frame::FrameError;
+use upright::protocol::serial_link::SerialLink;
+use upright::protocol::message::{Command, Reset};
+
+use super::error::HarnessError;
+use super::target::{Pins, Target};
+use crate::simulate::{Bench, SimulationError};
+use crate::table::{TableValues, WithSize, with_firmware_size};
+
+/// Starts the firmware of `table` in this process, after a power-on reset, and does `action` with it.
+///
+/// # Errors
+/// [`HarnessError`] if the firmware refuses the table, or is not compiled for its size.
+pub fn with_firmware<R>(
+    table: &TableValues,
+    action: impl FnOnce(&mut dyn Target) -> R,
+) -> Result<R, HarnessError> {
+    let (states, sensors) = (table.states, table.sensors);
+    let (mut action, mut result) = (Some(action), None);
+    // Without R in its type, so that the firmware is compiled once per size and not once per size and caller.
+    let mut run = |target: &mut dyn Target| result = action.take().map(|action| action(target));
+    let outcome = with_firmware_size(states, sensors, WithFirmware { table, run: &mut run });
+    outcome.transpose()?.and(result).ok_or_else(|| SimulationError::Size { states, sensors }.into())
+}
+
+struct WithFirmware<'a> {
+    table: &'a TableValues,
+    run: &'a mut dyn FnMut(&mut dyn Target),
+}
+
+impl WithSize for WithFirmware<'_> {
+    type Output = Result<(), HarnessError>;
+
+    fn run<const NX: usize, const NY: usize>(self) -> Self::Output {
+        let table = self.table.table::<NX, NY>();
+        let firmware = Firmware::new(&table, &self.table.build(), Wires::<NY>::WIDTHS, Reset::Power)?;
+        let (mut commands, mut messages) = (Queue::<Command, COMMANDS>::new(), Queue::<_, MESSAGES>::new());
+        let (to_control, commands) = commands.split();
+        let (messages, to_link) = messages.split();
+        let inputs = Inputs { raw_counts: [0; NY], supply_v: 0.0, contacts: Default::default() };
+        let wires = Wires { inputs, output: Output::OFF };
+        (self.run)(&mut InProcess {
+            control: ControlTask::<_, NX, NY>::new(firmware, wires, commands, messages),
+            link: SerialLink::new(to_control, to_link),
+            sent: Vec::new(),
+            is_read: true,
+        });
+        Ok(())
+    }
+}
+
+/// The image's tasks without an image.
+struct InProcess<'q, 't, const NX: usize, const NY: usize> {
+    control: ControlTask<'q, 't, Wires<NY>, NX, NY>,
+    link: SerialLink<'q, NX, NY>,
+    /// On the serial line: the host receives what is sent about a tick with the next one, as from an image.
+    sent: Vec<u8>,
+    /// Whether the serial line takes bytes.
+    is_read: bool,
+}
+
+/// The board: inputs and output in memory.
+struct Wires<const NY: usize> {
+    inputs: Inputs<NY>,
+    output: Output,
+}
+
+impl<const NY: usize> Board<NY> for Wires<NY> {
+    const WIDTHS: [CounterWidth; NY] = Bench::widths();
+
+    fn inputs(&mut self) -> Inputs<NY> {
+        self.inputs
+    }
+
+    fn drive(&mut self, output: &Output) {
+        self.output = *output;
+    }
+
+    fn feed_watchdog(&mut self) {}
+
+    fn cycles(&self) -> u32 {
+        0
+    }
+}
+
+impl<const NX: usize, const NY: usize> Target for InProcess<'_, '_, NX, NY> {
+    fn tick(&mut self, pins: &Pins, serial: &mut Vec<u8>) -> Result<Output, HarnessError> {
+        let raw_counts = pins.raw_counts.as_slice().try_into().map_err(|_| FrameError::Message)?;
+        self.control.board().inputs = Inputs { raw_counts, supply_v: pins.supply_v, contacts: pins.contacts };
+        self.control.tick();
+        serial.append(&mut self.sent);
+        for &byte in &pins.received {
+            self.link.receive(byte);
+        }
+        while self.is_read
+            && let Some(frame) = self.link.transmit()
+        {
+            self.sent.extend_from_slice(frame);
+        }
+        Ok(self.control.board().output)
+    }
+
+    fn stop_reading(&mut self) -> Result<(), HarnessError> {
+        self.is_read = false;
+        Ok(())
+    }
+}

@@ -1,0 +1,25 @@
+//! The whole firmware in closed loop with the simulated rig, from power-up to whatever happens.
+//!
+//! A firmware is a [`Target`]: it takes the pins of one tick and gives the output of that tick, and what it has sent over
+//! its serial line. [`with_firmware`] runs the firmware's tasks in this process; an image in an emulator is another
+//! target. Everything else is the same code for all of them, so that two runs of a scenario can be compared bit by bit:
+//! a [`Session`] sends commands and collects telemetry, a [`Harness`] adds the rig and the person who raises it, and
+//! [`record`] runs a scenario.
+//!
+//! Nothing here has the numbers of states and sensors in its type, except the firmware itself.
+
+mod error;
+mod hand;
+mod in_process;
+mod record;
+mod session;
+mod start_up;
+mod target;
+
+pub use error::HarnessError;
+pub use hand::{Hand, HandTick, Status};
+pub use in_process::with_firmware;
+pub use record::{Recording, Tick, record};
+pub use session::{AnyTelemetry, HEARTBEAT_S, Session};
+pub use start_up::Harness;
+pub use target::{Pins, Target};

@@ -1,0 +1,195 @@
+//! A scenario with the whole firmware: homed, raised, armed, released, recorded.
+
+use std::collections::VecDeque;
+
+use upright::board::Output;
+use upright::protocol::message::Request;
+use upright::supervision::fault::Fault;
+use upright::supervision::supervisor::State;
+
+use super::error::HarnessError;
+use super::session::{AnyTelemetry, HEARTBEAT_S, Session};
+use super::start_up::Harness;
+use super::target::Target;
+use crate::rig::Rig;
+use crate::simulate::{Fall, Sample, Scenario, Sensing, Summary, Trace, ticks};
+use crate::table::TableValues;
+
+/// One tick of a run, bit by bit: two runs are equal if all of their ticks are.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Tick {
+    /// Output to the power stage.
+    pub output: Output,
+    /// State of the supervisor.
+    pub state: State,
+    /// Raw bits of estimate, innovation, governed set-point, force asked for and force applied, in this order.
+    pub bits: Vec<u32>,
+}
+
+/// A run with the whole firmware.
+#[derive(Debug, Clone)]
+pub struct Recording {
+    /// The record, as of a simulation.
+    pub trace: Trace,
+    /// Figures of the run, as of a simulation.
+    pub summary: Summary,
+    /// The firmware's own bits, tick by tick.
+    pub ticks: Vec<Tick>,
+    /// The fault that turned the motor off, if there was one.
+    pub fault: Option<Fault>,
+    /// Longest execution of a tick: instructions of the image in QEMU; 0 on the host.
+    pub worst_cycles: u32,
+}
+
+/// Runs `scenario` with the firmware `target`, which has the table `table`, against the plant of `rig`. A hand homes the
+/// rig while it hangs, checks the signs, raises the links and holds them at the scenario's start until the firmware begins
+/// to balance. It lets go in that tick, which is time 0.
+///
+/// # Errors
+/// [`HarnessError`] if the firmware cannot run this scenario, or does not begin to balance.
+pub fn record(
+    rig: &Rig,
+    table: &TableValues,
+    scenario: &Scenario,
+    target: &mut dyn Target,
+) -> Result<Recording, HarnessError> {
+    let period_s = rig.tick.period_s;
+    check(scenario, period_s)?;
+    let mut harness = Harness::new(rig, table, scenario, target)?;
+    let target_at = |tick: usize| {
+        let t = tick as f64 * period_s;
+        if t >= scenario.step_at_s { scenario.step_m } else { 0.0 }
+    };
+    let mut output = harness.raise(Some(target_at(0) as f32))?;
+    let mut commanded = target_at(0);
+    let last = ticks(rig, scenario)?;
+    let mut record = Record::new(rig, last);
+    let heartbeat = (HEARTBEAT_S / period_s).max(1.0) as usize;
+    for tick in 0..=last {
+        if tick > 0 {
+            let inputs = harness.inputs();
+            output = harness.session.tick(&inputs)?;
+        }
+        // What is sent now comes with the next tick and counts in the one after the next.
+        let ahead = target_at(tick + COMMAND_TICKS);
+        if commanded != ahead {
+            harness.session.send(Request::Setpoint(ahead as f32));
+            commanded = ahead;
+        } else if tick.is_multiple_of(heartbeat) {
+            harness.session.send(Request::Beat);
+        }
+        let t = tick as f64 * period_s;
+        let fall = Fall::of(rig, t, harness.bench.state());
+        let state = harness.bench.state().to_vec();
+        let force = harness.bench.tick(output.drive);
+        record.pending.push_back(Pending { t, target: target_at(tick), state, force, output });
+        record.take(&mut harness.session)?;
+        if fall.is_some() {
+            record.fall = fall;
+            break;
+        }
+    }
+    // The last tick's telemetry may come with the next one.
+    let inputs = harness.inputs();
+    harness.session.tick(&inputs)?;
+    record.take(&mut harness.session)?;
+    Ok(record.finish(rig, scenario))
+}
+
+/// Whether the firmware can run this scenario.
+fn check(scenario: &Scenario, period_s: f64) -> Result<(), HarnessError> {
+    if scenario.sensing != Sensing::Encoders {
+        return Err(HarnessError::FullState);
+    }
+    let least_s = COMMAND_TICKS as f64 * period_s;
+    if scenario.step_at_s > 0.0 && scenario.step_at_s < least_s {
+        return Err(HarnessError::StepAt { at_s: scenario.step_at_s, least_s });
+    }
+    Ok(())
+}
+
+/// Ticks from sending a command to the first tick that follows it: it is executed at the end of the tick after the one it
+/// came with.
+const COMMAND_TICKS: usize = 3;
+
+/// A tick whose telemetry has not come yet.
+struct Pending {
+    t: f64,
+    target: f64,
+    state: Vec<f64>,
+    force: f64,
+    output: Output,
+}
+
+struct Record {
+    trace: Trace,
+    ticks: Vec<Tick>,
+    pending: VecDeque<Pending>,
+    next_tick: Option<u32>,
+    fall: Option<Fall>,
+    fault: Option<Fault>,
+    worst_cycles: u32,
+}
+
+impl Record {
+    fn new(rig: &Rig, ticks: usize) -> Self {
+        Self {
+            trace: Trace::new(rig, ticks),
+            ticks: Vec::with_capacity(ticks + 1),
+            pending: VecDeque::new(),
+            next_tick: None,
+            fall: None,
+            fault: None,
+            worst_cycles: 0,
+        }
+    }
+
+    /// Joins the telemetry of each tick with the true state of the bench in that tick.
+    fn take(&mut self, session: &mut Session<'_>) -> Result<(), HarnessError> {
+        while let Some(telemetry) = session.next_telemetry() {
+            if self.next_tick.is_none() && telemetry.state != State::Balancing {
+                continue;
+            }
+            let expected = self.next_tick.unwrap_or(telemetry.tick);
+            if telemetry.tick != expected {
+                return Err(HarnessError::Lost(expected));
+            }
+            let Some(Pending { t, target, state, force, output }) = self.pending.pop_front() else {
+                return Ok(());
+            };
+            self.next_tick = Some(expected.wrapping_add(1));
+            self.worst_cycles = self.worst_cycles.max(telemetry.cycles);
+            self.fault = self.fault.or(telemetry.fault);
+            let estimate: Vec<f64> = telemetry.estimate.iter().map(|&value| f64::from(value)).collect();
+            self.trace.push(&Sample {
+                t,
+                target,
+                setpoint: f64::from(telemetry.setpoint_m),
+                requested: f64::from(telemetry.requested_n),
+                force,
+                state: &state,
+                estimate: &estimate,
+            });
+            self.ticks.push(Tick::of(&telemetry, &output));
+        }
+        Ok(())
+    }
+
+    fn finish(self, rig: &Rig, scenario: &Scenario) -> Recording {
+        Recording {
+            summary: Summary::of(rig, scenario, &self.trace, self.fall),
+            trace: self.trace,
+            ticks: self.ticks,
+            fault: self.fault,
+            worst_cycles: self.worst_cycles,
+        }
+    }
+}
+
+impl Tick {
+    fn of(telemetry: &AnyTelemetry, output: &Output) -> Self {
+        let values = telemetry.estimate.iter().chain(&telemetry.innovation);
+        let bits = values.chain([&telemetry.setpoint_m, &telemetry.requested_n, &telemetry.applied_n]);
+        Self { output: *output, state: telemetry.state, bits: bits.map(|value| value.to_bits()).collect() }
+    }
+}

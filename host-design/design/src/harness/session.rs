@@ -1,0 +1,194 @@
+//! A conversation with the firmware: commands with their answers, telemetry.
+
+use std::collections::VecDeque;
+
+use upright::board::Output;
+use upright::protocol::frame::{self, Receiver};
+use upright::protocol::serial_link::{MAX_COMMAND, MAX_MESSAGE};
+use upright::protocol::message::{Answer, Command, Info, Message, PROTOCOL, Reply, Request, Telemetry};
+use upright::protocol::simulated_pins::Sabotage;
+use upright::supervision::fault::Fault;
+use upright::supervision::sign_check::Signs;
+use upright::supervision::supervisor::State;
+
+use super::error::HarnessError;
+use super::hand::Status;
+use super::target::{Pins, Target};
+use crate::table::{MAX_SENSORS, MAX_STATES};
+
+/// Telemetry of a firmware of any size: its frames are the same bytes whatever the capacity of the lists.
+pub type AnyTelemetry = Telemetry<MAX_STATES, MAX_SENSORS>;
+
+/// Time between two heartbeats of a host that commands the set-point (s).
+pub const HEARTBEAT_S: f64 = 0.025;
+
+/// Ticks in which every command is answered: its bytes are read after the tick they came with, it is executed in the
+/// next, and the answer comes with the one after.
+const TICKS_TO_ANSWER: usize = 4;
+
+/// A firmware in lock step, and what it has sent.
+pub struct Session<'a> {
+    target: &'a mut dyn Target,
+    receiver: Receiver<MAX_MESSAGE>,
+    serial: Vec<u8>,
+    to_send: VecDeque<u8>,
+    last_id: u64,
+    sabotage: Option<Sabotage>,
+    telemetry: VecDeque<AnyTelemetry>,
+    replies: VecDeque<(u64, Answer)>,
+    status: Status,
+    fault: Option<Fault>,
+    /// Frames from the firmware that could not be read.
+    pub damaged: usize,
+}
+
+impl<'a> Session<'a> {
+    /// A conversation with `target`, just started: its commands are numbered from 1.
+    pub fn new(target: &'a mut dyn Target) -> Self {
+        Self {
+            target,
+            receiver: Receiver::new(),
+            serial: Vec::new(),
+            to_send: VecDeque::new(),
+            last_id: 0,
+            sabotage: None,
+            telemetry: VecDeque::new(),
+            replies: VecDeque::new(),
+            status: Status { state: State::Disarmed, signs: Signs::Unchecked },
+            fault: None,
+            damaged: 0,
+        }
+    }
+
+    /// Sends a command with the next tick and gives its number.
+    pub fn send(&mut self, request: Request) -> u64 {
+        self.last_id += 1;
+        let command = Command { id: self.last_id, request };
+        let (mut scratch, mut out) = ([0; MAX_COMMAND], [0; MAX_COMMAND]);
+        // Every command fits: a test of the messages says so.
+        if let Ok(frame) = frame::encode(&command, &mut scratch, &mut out) {
+            self.to_send.extend(frame);
+        }
+        self.last_id
+    }
+
+    /// Number of the last command.
+    pub fn last_id(&self) -> u64 {
+        self.last_id
+    }
+
+    /// Sends bytes, which need not be a command, with the next tick.
+    pub fn send_bytes(&mut self, bytes: &[u8]) {
+        self.to_send.extend(bytes);
+    }
+
+    /// Injects a fault inside the microcontroller in the next tick.
+    pub fn sabotage(&mut self, sabotage: Sabotage) {
+        self.sabotage = Some(sabotage);
+    }
+
+    /// One tick with these inputs.
+    ///
+    /// # Errors
+    /// [`HarnessError`] if the firmware does not answer.
+    pub fn tick(&mut self, inputs: &Pins) -> Result<Output, HarnessError> {
+        let mut pins = inputs.clone();
+        while !pins.received.is_full() {
+            let Some(byte) = self.to_send.pop_front() else { break };
+            // Not full.
+            let _ = pins.received.push(byte);
+        }
+        pins.sabotage = self.sabotage.take();
+        self.serial.clear();
+        let output = self.target.tick(&pins, &mut self.serial)?;
+        for &byte in &self.serial {
+            match self.receiver.push::<Message<MAX_STATES, MAX_SENSORS>>(byte) {
+                Some(Ok(Message::Telemetry(telemetry))) => {
+                    self.fault = telemetry.fault;
+                    self.status = Status { state: telemetry.state, signs: telemetry.signs };
+                    self.telemetry.push_back(telemetry);
+                }
+                Some(Ok(Message::Reply(Reply { id, answer }))) => self.replies.push_back((id, answer)),
+                Some(Err(_)) => self.damaged += 1,
+                None => (),
+            }
+        }
+        Ok(output)
+    }
+
+    /// Bytes on the serial line that came with the last tick.
+    pub fn last_bytes(&self) -> &[u8] {
+        &self.serial
+    }
+
+    /// From now on nobody reads the firmware's serial line.
+    ///
+    /// # Errors
+    /// [`HarnessError::Unsupported`] unless the firmware runs in this process.
+    pub fn stop_reading(&mut self) -> Result<(), HarnessError> {
+        self.target.stop_reading()
+    }
+
+    /// The latched fault according to the last telemetry.
+    pub fn fault(&self) -> Option<Fault> {
+        self.fault
+    }
+
+    /// What the last telemetry says about the firmware.
+    pub fn status(&self) -> Status {
+        self.status
+    }
+
+    /// Takes the oldest telemetry that was not yet taken.
+    pub fn next_telemetry(&mut self) -> Option<AnyTelemetry> {
+        self.telemetry.pop_front()
+    }
+
+    /// Takes the oldest answer that was not yet taken, with the number of its command.
+    pub fn next_reply(&mut self) -> Option<(u64, Answer)> {
+        self.replies.pop_front()
+    }
+
+    /// Sends a command and runs ticks with these inputs until it is answered.
+    ///
+    /// # Errors
+    /// [`HarnessError`] if it is refused or not answered.
+    pub fn ask(&mut self, request: Request, inputs: &Pins) -> Result<Answer, HarnessError> {
+        let id = self.send(request);
+        for _ in 0..TICKS_TO_ANSWER {
+            self.tick(inputs)?;
+            if let Some(answer) = self.answer_to(id, request)? {
+                return Ok(answer);
+            }
+        }
+        Err(HarnessError::NoAnswer(request))
+    }
+
+    fn answer_to(&mut self, id: u64, request: Request) -> Result<Option<Answer>, HarnessError> {
+        while let Some((answered, answer)) = self.next_reply() {
+            match answer {
+                _ if answered != id => (),
+                Answer::NotNow(_) | Answer::Rejected(_) => {
+                    return Err(HarnessError::Refused { request, answer });
+                }
+                answer => return Ok(Some(answer)),
+            }
+        }
+        Ok(None)
+    }
+
+    /// Asks for the firmware's identity, and checks that it is made for the rig with this hash.
+    ///
+    /// # Errors
+    /// [`HarnessError`] if it is for another rig, or does not answer.
+    pub fn check_info(&mut self, rig_hash: u64, inputs: &Pins) -> Result<Info, HarnessError> {
+        match self.ask(Request::Info, inputs)? {
+            Answer::Info(info) if info.protocol != PROTOCOL => Err(HarnessError::Protocol(info.protocol)),
+            Answer::Info(info) if info.rig_hash != rig_hash => {
+                Err(HarnessError::Rig { found: info.rig_hash, wanted: rig_hash })
+            }
+            Answer::Info(info) => Ok(info),
+            answer => Err(HarnessError::Refused { request: Request::Info, answer }),
+        }
+    }
+}

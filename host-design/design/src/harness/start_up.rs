@@ -1,0 +1,104 @@
+//! The simulated rig with the firmware on its wires, from power-up to the tick in which the hand lets go.
+
+use upright::board::Output;
+use upright::protocol::message::Request;
+use upright::supervision::supervisor::State;
+
+use super::error::HarnessError;
+use super::hand::{Hand, HandTick};
+use super::session::Session;
+use super::target::{Pins, Target, healthy};
+use crate::rig::Rig;
+use crate::simulate::{Bench, Scenario};
+use crate::table::TableValues;
+
+/// Longest time from power-up to balancing (s).
+const LONGEST_WAIT_S: f64 = 60.0;
+
+/// Firmware, simulated rig, and the hand that raises it.
+pub struct Harness<'t> {
+    /// The conversation with the firmware.
+    pub session: Session<'t>,
+    /// The rig.
+    pub bench: Bench,
+    hand: Hand,
+    counters: Vec<u32>,
+    supply_v: f32,
+    period_s: f64,
+}
+
+impl<'t> Harness<'t> {
+    /// The rig hanging at rest, held by hand, and `target`, which has just started and has the table `table`. It is told
+    /// to use the law of `scenario` and to send telemetry in every tick.
+    ///
+    /// # Errors
+    /// [`HarnessError`] if the firmware is for another rig, or refuses the law.
+    pub fn new(
+        rig: &Rig,
+        table: &TableValues,
+        scenario: &Scenario,
+        target: &'t mut dyn Target,
+    ) -> Result<Self, HarnessError> {
+        let hand = Hand::new(rig, &scenario.start);
+        let mut bench = Bench::new(rig, scenario)?;
+        bench.hold(hand.held());
+        let mut harness = Self {
+            session: Session::new(target),
+            bench,
+            hand,
+            counters: vec![0; table.sensors],
+            supply_v: table.motor.map_or(0.0, |motor| motor.supply_v),
+            period_s: rig.tick.period_s,
+        };
+        let hanging = harness.inputs();
+        harness.session.check_info(table.rig_hash, &hanging)?;
+        harness.session.ask(Request::Select(scenario.law), &hanging)?;
+        harness.session.ask(Request::Telemetry(1), &hanging)?;
+        Ok(harness)
+    }
+
+    /// What a healthy board reads now.
+    pub fn inputs(&mut self) -> Pins {
+        self.bench.read_counters(&mut self.counters);
+        healthy(&self.counters, self.supply_v)
+    }
+
+    /// One tick in which the hand does what comes next; gives the firmware's output.
+    ///
+    /// # Errors
+    /// [`HarnessError`] if the firmware does not answer.
+    pub fn by_hand(&mut self, tick: u32) -> Result<Output, HarnessError> {
+        if let Some(HandTick { held, request }) = self.hand.act(tick, &self.session.status()) {
+            self.bench.hold(&held);
+            if let Some(request) = request {
+                self.session.send(request);
+            }
+        }
+        let inputs = self.inputs();
+        self.session.tick(&inputs)
+    }
+
+    /// Homes, checks the signs, raises the links and arms. Ends with the first tick in which the motor is on, and gives
+    /// that tick's output.
+    ///
+    /// `setpoint_m` is commanded as soon as the firmware is armed; from then on it needs a command every
+    /// [`HEARTBEAT_S`](super::HEARTBEAT_S). Without a set-point it holds the position in which it begins.
+    ///
+    /// # Errors
+    /// [`HarnessError::NotBalancing`] if that takes longer than a minute.
+    pub fn raise(&mut self, setpoint_m: Option<f32>) -> Result<Output, HarnessError> {
+        let mut setpoint_m = setpoint_m;
+        for tick in 0..=(LONGEST_WAIT_S / self.period_s) as u32 {
+            if self.session.status().state == State::Armed
+                && let Some(position_m) = setpoint_m.take()
+            {
+                self.session.send(Request::Setpoint(position_m));
+            }
+            let output = self.by_hand(tick)?;
+            if output.enable {
+                return Ok(output);
+            }
+        }
+        Err(HarnessError::NotBalancing(self.session.status().state))
+    }
+}

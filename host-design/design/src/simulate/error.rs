@@ -1,0 +1,45 @@
+//! Why a simulation cannot be run.
+
+use upright::control::controller::Rejected;
+use upright::table::TableError;
+
+use crate::plant::PlantError;
+
+/// Most ticks of a run: an hour at 1 ms, and a record of some 450 MB for a quadruple pendulum.
+pub(super) const MAX_TICKS: u32 = 4_000_000;
+
+/// A run that cannot be started.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum SimulationError {
+    /// There is no compiled plant with this number of links.
+    #[error(transparent)]
+    Plant(#[from] PlantError),
+    /// The firmware refuses the table.
+    #[error("the firmware refuses the table: {0}")]
+    Table(#[from] TableError),
+    /// The firmware refuses a command of the scenario.
+    #[error("the firmware rejects the scenario: {0}")]
+    Rejected(#[from] Rejected),
+    /// A standard deviation that is negative or not finite.
+    #[error("a noise level of {0} is not possible: give a number of at least 0")]
+    Noise(f64),
+    /// A disturbing force that is not finite.
+    #[error("a constant force of {0} N is not possible: give a finite number")]
+    Offset(f64),
+    /// A run whose record would not fit into memory.
+    #[error("a run of {duration_s} s has more than {MAX_TICKS} ticks of {period_s} s: shorten it")]
+    TooLong {
+        /// Length of the run (s).
+        duration_s: f64,
+        /// Control period (s).
+        period_s: f64,
+    },
+    /// The firmware is not compiled for these dimensions on the host.
+    #[error("no firmware for {states} states and {sensors} sensors")]
+    Size {
+        /// States of the table.
+        states: usize,
+        /// Sensors of the table.
+        sensors: usize,
+    },
+}

@@ -1,0 +1,44 @@
+//! What is observed in a trial.
+
+use upright::board::Output;
+use upright::supervision::fault::Fault;
+use upright::supervision::inhibits::Inhibits;
+
+/// What was observed in a trial. Ticks count from the release of the rig.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub(super) struct Observed {
+    /// Outputs from the release on.
+    pub(super) outputs: Vec<Output>,
+    /// First tick in which the motor was off.
+    pub(super) off: Option<usize>,
+    /// Whether it came on again.
+    pub(super) on_again: bool,
+    /// First tick in which the defect was visible: the rig differed from a healthy one by more than a threshold.
+    pub(super) visible: Option<usize>,
+    /// Whether a link or the cart was far beyond its limit while the motor was on.
+    pub(super) outside: bool,
+    /// The latched fault.
+    pub(super) fault: Option<Fault>,
+    /// Measurements that were rejected.
+    pub(super) rejected: u32,
+    /// Reasons against arming.
+    pub(super) refused: Option<Inhibits>,
+    /// Whether the firmware has stopped running.
+    pub(super) dead: bool,
+}
+
+impl Observed {
+    /// Takes the firmware's output in `tick`.
+    pub(super) fn output(&mut self, tick: usize, output: Output) {
+        self.outputs.push(output);
+        self.on_again |= output.enable && self.off.is_some();
+        if !output.enable {
+            self.off.get_or_insert(tick);
+        }
+    }
+
+    /// Whether the defect is visible and the motor is neither off nor too late: a slow rig takes its time to fall.
+    pub(super) fn is_undecided(&self) -> bool {
+        self.visible.is_some() && self.off.is_none() && !self.outside
+    }
+}

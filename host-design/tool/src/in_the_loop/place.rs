@@ -1,0 +1,68 @@
+//! Where the firmware runs, and how it is started there.
+
+use std::path::Path;
+
+use upright_design::harness::{HarnessError, Recording, Target, record, with_firmware};
+use upright_design::rig::Rig;
+use upright_design::simulate::Scenario;
+use upright_design::table::TableValues;
+
+use super::qemu::{Emulator, EmulatorError, Link};
+
+/// Where the firmware runs.
+#[derive(Debug, Clone, Copy)]
+pub enum Place<'a> {
+    /// In this process.
+    Host,
+    /// As an image in QEMU.
+    Qemu {
+        /// The ELF file.
+        image: &'a Path,
+        /// How its pins are connected.
+        link: Link,
+    },
+}
+
+/// A run that could not be started or finished.
+#[derive(Debug, thiserror::Error)]
+pub enum RunError {
+    /// The firmware does not do what it should.
+    #[error(transparent)]
+    Harness(#[from] HarnessError),
+    /// QEMU does not run it.
+    #[error(transparent)]
+    Emulator(#[from] EmulatorError),
+}
+
+impl Place<'_> {
+    /// Starts the firmware of `table` and does `action` with it. The firmware ends with the action.
+    ///
+    /// # Errors
+    /// Those of the start, and of `action`.
+    pub fn with_target<R, E>(
+        self,
+        table: &TableValues,
+        action: impl FnOnce(&mut dyn Target) -> Result<R, E>,
+    ) -> Result<R, E>
+    where
+        E: From<HarnessError> + From<EmulatorError>,
+    {
+        match self {
+            Place::Host => with_firmware(table, action)?,
+            Place::Qemu { image, link } => action(&mut Emulator::start(image, link)?),
+        }
+    }
+}
+
+/// Runs `scenario` with the firmware of `table` against the plant of `rig`: see [`record`].
+///
+/// # Errors
+/// [`RunError`] if the firmware does not run, or does not begin to balance.
+pub fn run(
+    rig: &Rig,
+    table: &TableValues,
+    scenario: &Scenario,
+    place: Place<'_>,
+) -> Result<Recording, RunError> {
+    place.with_target(table, |target| Ok(record(rig, table, scenario, target)?))
+}
