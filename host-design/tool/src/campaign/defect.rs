@@ -1,4 +1,4 @@
-//! What can go wrong, and what has to come of it.
+//! The kinds of defects, and the outcome that each must have.
 
 use upright::protocol::simulated_pins::Sabotage;
 use upright::supervision::fault::Fault;
@@ -48,20 +48,20 @@ pub enum Kind {
     StackOverflow,
 }
 
-/// What has to come of a defect.
+/// The outcome that a defect must have.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Expected {
-    /// Motor off for this fault, exactly so many ticks after it began; the rig's limits give those that the list of faults
-    /// leaves open.
+    /// Motor off with this fault, at most this number of ticks after the onset. Where the list of faults gives no number, the
+    /// rig's limits do.
     Fault(Fault, Ticks),
-    /// Motor off, for whatever fault, at most so many ticks after the defect could first be told from a healthy rig, or
-    /// before a link leans further than its limit.
+    /// Motor off, with any fault. At its best that takes this number of ticks from the first visible difference to a healthy
+    /// rig; in any case it comes before a link is far beyond its limit.
     Off(u32),
-    /// Balancing goes on as if nothing had been, and it is counted.
+    /// Balancing goes on, and the rejected measurement is counted.
     Counted,
-    /// Balancing goes on, every output bit for bit as without it.
+    /// Balancing goes on, with every output bit for bit as without the defect.
     Ignored,
-    /// Whatever the firmware does, links and cart stay within their limits until the motor is off.
+    /// Links and cart stay within their limits until the motor is off, if it is turned off at all.
     Bounded,
     /// The firmware refuses to arm, for these reasons at least.
     Refused(Inhibits),
@@ -72,16 +72,16 @@ pub enum Expected {
 /// A number of ticks.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Ticks {
-    /// So many.
+    /// This number.
     Exactly(u32),
-    /// `supply_time_s` and one more.
+    /// Those of `supply_time_s`, and one.
     Supply,
     /// `link_timeout_s`, from the last command on.
     Link,
 }
 
 impl Kind {
-    /// Every kind, its name, what it is, and what has to come of it.
+    /// Every kind with its name, a description, and the outcome that it must have.
     pub const ALL: [(Kind, &str, &str, Expected); 37] = {
         use Expected::*;
         use Ticks::*;
@@ -89,16 +89,16 @@ impl Kind {
             (
                 Kind::SupplyNotANumber,
                 "supply-not-a-number",
-                "the supply's measurement is not a number",
+                "the measured supply voltage is NaN",
                 Fault(F::NotFinite, Exactly(1)),
             ),
             (
                 Kind::SupplySag,
                 "supply-sag",
-                "the supply falls below its least voltage, for good",
+                "the supply stays below its lowest permitted voltage",
                 Fault(F::Supply, Supply),
             ),
-            (Kind::SupplyDip, "supply-dip", "the same, for a shorter time than is a fault", Ignored),
+            (Kind::SupplyDip, "supply-dip", "the supply is too low for less than the time that makes it a fault", Ignored),
             (
                 Kind::EmergencyStop,
                 "emergency-stop",
@@ -116,40 +116,40 @@ impl Kind {
             (Kind::Overruns, "overruns", "three ticks in a row late", Fault(F::Overrun, Exactly(3))),
             (Kind::LinkEncoderFrozen, "link-encoder-frozen", "a link's counter stands still", Off(10)),
             (Kind::CartEncoderFrozen, "cart-encoder-frozen", "the cart's counter stands still", Off(10)),
-            (Kind::BadSample, "bad-sample", "one measurement off by 2 to 20 thresholds", Counted),
+            (Kind::BadSample, "bad-sample", "one measurement wrong by 2 to 20 thresholds", Counted),
             (
                 Kind::EncoderJump,
                 "encoder-jump",
-                "all measurements of an encoder off by 2 to 20 thresholds",
+                "all measurements of an encoder wrong by 2 to 20 thresholds",
                 Off(3),
             ),
             (Kind::EncoderReversed, "encoder-reversed", "an encoder counts backwards", Off(5)),
             (Kind::EncodersSwapped, "encoders-swapped", "two neighbours' counters are swapped", Off(5)),
             (Kind::CountsLost, "counts-lost", "an encoder loses a count every 5 to 50 ticks", Bounded),
-            (Kind::SensorLate, "sensor-late", "an encoder's measurements come 1 to 20 ticks late", Bounded),
-            (Kind::SensorIntermittent, "sensor-intermittent", "two of three measurements are off", Bounded),
-            (Kind::MotorDead, "motor-dead", "the motor does nothing", Off(20)),
-            (Kind::MotorReversed, "motor-reversed", "the motor pushes the other way", Off(5)),
-            (Kind::MotorStuck, "motor-stuck", "the motor pushes with all it has, to one side", Off(5)),
-            (Kind::MotorWeak, "motor-weak", "half to nine tenths of the force are missing", Bounded),
+            (Kind::SensorLate, "sensor-late", "an encoder's measurements are 1 to 20 ticks late", Bounded),
+            (Kind::SensorIntermittent, "sensor-intermittent", "two of three measurements are wrong", Bounded),
+            (Kind::MotorDead, "motor-dead", "the motor gives no force", Off(20)),
+            (Kind::MotorReversed, "motor-reversed", "the motor's force has the wrong sign", Off(5)),
+            (Kind::MotorStuck, "motor-stuck", "the motor gives full force to one side", Off(5)),
+            (Kind::MotorWeak, "motor-weak", "the motor gives 10 to 50 % of the force", Bounded),
             (
                 Kind::Push,
                 "push",
-                "somebody pushes the cart for 50 ms, with up to the whole force limit",
+                "a push on the cart for 50 ms, with up to the force limit",
                 Bounded,
             ),
             (
                 Kind::HostSilent,
                 "host-silent",
-                "no command any more, from a host that commands the set-point",
+                "a host that commands the set-point sends nothing more",
                 Fault(F::LinkLost, Link),
             ),
-            (Kind::HostDeaf, "host-deaf", "nobody takes bytes from the serial line any more", Ignored),
+            (Kind::HostDeaf, "host-deaf", "nobody reads the serial line any more", Ignored),
             (Kind::FrameDamaged, "frame-damaged", "a disarm command with a wrong bit", Ignored),
             (Kind::FrameTruncated, "frame-truncated", "a disarm command without its last bytes", Ignored),
             (Kind::FrameReplayed, "frame-replayed", "a disarm command with an old number", Ignored),
             (Kind::Rubbish, "rubbish", "random bytes on the serial line", Ignored),
-            (Kind::SetpointNotANumber, "setpoint-not-a-number", "a set-point that is not finite", Ignored),
+            (Kind::SetpointNotANumber, "setpoint-not-a-number", "a set-point of NaN or infinity", Ignored),
             (Kind::SetpointOutOfRange, "setpoint-out-of-range", "a set-point beyond the rail", Ignored),
             (Kind::ArmUnhomed, "arm-unhomed", "arming before homing", Refused(Inhibits::NOT_HOMED)),
             (Kind::ArmHanging, "arm-hanging", "arming while the links hang", Refused(Inhibits::TILTED)),
@@ -162,11 +162,11 @@ impl Kind {
             (
                 Kind::ArmHeld,
                 "arm-held",
-                "an arm command that is held while a fault is cleared",
+                "an arm command that is repeated while a fault is cleared",
                 Refused(Inhibits::HELD),
             ),
             (Kind::Panic, "panic", "the firmware panics", Dead),
-            (Kind::HardFault, "hard-fault", "the firmware touches memory that is not there", Dead),
+            (Kind::HardFault, "hard-fault", "the firmware accesses memory that does not exist", Dead),
             (Kind::StackOverflow, "stack-overflow", "the firmware's stack overflows", Dead),
         ]
     };
@@ -176,22 +176,22 @@ impl Kind {
         &Self::ALL[self as usize]
     }
 
-    /// Its name on the command line.
+    /// Name on the command line.
     pub fn name(self) -> &'static str {
         self.row().1
     }
 
-    /// What it is.
+    /// One-line description.
     pub fn meaning(self) -> &'static str {
         self.row().2
     }
 
-    /// What has to come of it.
+    /// The outcome that it must have.
     pub fn expected(self) -> Expected {
         self.row().3
     }
 
-    /// What goes wrong inside the microcontroller.
+    /// The fault inside the microcontroller, if it is one.
     pub(super) fn inside_the_microcontroller(self) -> Option<Sabotage> {
         match self {
             Kind::Panic => Some(Sabotage::Panic),
@@ -201,17 +201,17 @@ impl Kind {
         }
     }
 
-    /// Whether only an image can suffer it.
+    /// Whether it is possible only with an image.
     pub fn needs_image(self) -> bool {
         self.inside_the_microcontroller().is_some()
     }
 
-    /// Whether only the firmware in this process can suffer it.
+    /// Whether it is possible only with the firmware in this process.
     pub fn needs_process(self) -> bool {
         self == Kind::HostDeaf
     }
 
-    /// Whether it is found by a test that the gain table has thresholds for: without them it has to be missed.
+    /// Whether it is found by a threshold of the gain table: without thresholds it must be missed.
     pub fn needs_detection(self) -> bool {
         matches!(
             self,

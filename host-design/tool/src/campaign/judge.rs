@@ -1,4 +1,4 @@
-//! What a trial came to, by what had to come of it.
+//! The verdict on a trial: its outcome compared with the one that its kind must have.
 
 use serde::Serialize;
 use upright::supervision::fault::Fault;
@@ -14,22 +14,22 @@ use upright_design::table::TableValues;
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Class {
-    /// The defect had no effect that could be seen, and nothing happened.
+    /// The defect had no visible effect, and the motor stayed on.
     Masked,
-    /// The firmware did not take it: balancing went on as it should, or arming was refused.
+    /// The firmware rejected it: balancing went on as it should, or arming was refused.
     Rejected,
     /// The motor went off in time.
     Detected,
-    /// The motor went off before a link was more than a quarter beyond its limit or the cart off its rail, but later than a
-    /// defect of its kind is found at its best: the observer follows an encoder whose error grows slowly.
+    /// The motor went off before a link was more than a quarter beyond its limit or the cart off its rail, but later than
+    /// the best time of its kind: the observer follows an encoder whose error grows slowly.
     Late,
-    /// What had to come did not come.
+    /// The required outcome did not happen.
     Missed,
-    /// The motor went off although it should not.
+    /// The motor went off although it should have stayed on.
     FalseAlarm,
 }
 
-/// What a trial came to.
+/// The outcome of a trial.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Outcome {
     /// Number of the trial.
@@ -38,9 +38,9 @@ pub struct Outcome {
     pub kind: Kind,
     /// Class.
     pub class: Class,
-    /// Ticks to motor off, the one with the defect counted; from the tick on in which it could be told from a healthy rig.
+    /// Ticks to motor off, counted from the first visible difference to a healthy rig, that tick included.
     pub ticks: Option<u32>,
-    /// The same from its first tick on.
+    /// The same, counted from the first tick of the defect.
     pub from_onset: Option<u32>,
     /// Code of the latched fault.
     pub fault: Option<u8>,
@@ -54,7 +54,7 @@ pub(super) fn judge(setup: &Setup<'_>, trial: &Trial) -> Result<Outcome, RunErro
     let (from_onset, ticks) = match observed.visible {
         _ if before => (None, None),
         Some(visible) => (from(trial.onset), from(visible)),
-        // Off before it could be seen by one sensor alone: at once.
+        // Off before one sensor alone could show it: at once.
         None => (from(trial.onset), observed.off.map(|_| 1)),
     };
     let expected = trial.kind.expected();
@@ -107,7 +107,7 @@ fn of_fault(
     }
 }
 
-/// The number of ticks on this rig.
+/// The number of ticks for this table.
 pub(super) fn allowed(table: &TableValues, within: Ticks) -> u32 {
     match within {
         Ticks::Exactly(ticks) => ticks,

@@ -1,4 +1,4 @@
-//! Many trials, in parallel, summed up by kind.
+//! Many trials in parallel, and their counts by kind.
 
 use rayon::prelude::*;
 use serde::Serialize;
@@ -15,11 +15,11 @@ use upright_design::table::TableValues;
 #[derive(Debug, thiserror::Error)]
 #[error("trial {number} ({kind}): {source}")]
 pub struct CampaignError {
-    /// Its number.
+    /// Number of the trial.
     pub number: u64,
-    /// Its kind.
+    /// Name of its kind.
     pub kind: &'static str,
-    /// Why.
+    /// The cause.
     pub source: RunError,
 }
 
@@ -28,13 +28,13 @@ pub struct CampaignError {
 pub struct Row {
     /// The kind.
     pub kind: Kind,
-    /// What it is.
+    /// See [`Kind::meaning`].
     pub meaning: &'static str,
-    /// Ticks in which the motor has to be off, or is, at its best, if it has to be.
+    /// Ticks within which the motor must be off; for [`Expected::Off`], the ticks that this takes at its best.
     pub allowed: Option<u32>,
-    /// Trials.
+    /// Number of trials.
     pub runs: usize,
-    /// Trials of each class.
+    /// Trials of [`Class::Masked`].
     pub masked: usize,
     /// See [`Class::Rejected`].
     pub rejected: usize,
@@ -48,20 +48,20 @@ pub struct Row {
     pub false_alarms: usize,
     /// Largest number of ticks to motor off.
     pub worst: Option<u32>,
-    /// The same, from the first tick of the defect.
+    /// The same, counted from the first tick of the defect.
     pub worst_from_onset: Option<u32>,
     /// Names of the faults that were latched.
     pub faults: Vec<&'static str>,
-    /// Trials that came out wrong, by number.
+    /// Numbers of the trials with a wrong outcome.
     pub wrong: Vec<u64>,
 }
 
-/// A campaign.
+/// The result of a campaign.
 #[derive(Debug, Clone, Serialize)]
 pub struct Campaign {
-    /// Its seed.
+    /// Seed of the campaign.
     pub seed: u64,
-    /// Trials.
+    /// Number of trials.
     pub runs: u64,
     /// One row per kind.
     pub rows: Vec<Row>,

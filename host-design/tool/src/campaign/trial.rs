@@ -1,4 +1,4 @@
-//! One run with one defect: drawn from a number, the same every time.
+//! One run with one defect, drawn from the campaign's seed and its number: the same every time.
 
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
@@ -10,26 +10,26 @@ use upright_design::simulate::{Scenario, Sensing};
 use upright_design::table::TableValues;
 use upright_design::verify::Disturbance;
 
-/// A defect, and the run it happens in.
+/// A defect, and the run that it happens in.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Trial {
     /// Number of the trial in its campaign.
     pub number: u64,
-    /// What goes wrong.
+    /// Kind of the defect.
     pub kind: Kind,
-    /// What the rig does meanwhile.
+    /// Set-point and disturbances of the run.
     pub scenario: Scenario,
-    /// In which tick after the release it goes wrong.
+    /// First tick of the defect, counted from the release.
     pub onset: usize,
-    /// Ticks of the run after that.
+    /// Ticks of the run from the onset on.
     pub watched: usize,
-    /// The sensor (0: cart).
+    /// Number of the sensor (0: cart).
     pub sensor: usize,
-    /// -1 or 1.
+    /// Direction: −1 or 1.
     pub sign: f64,
-    /// From 0 to 1: how much.
+    /// Severity, from 0 to 1.
     pub size: f64,
-    /// For what is random tick by tick.
+    /// Seed of whatever is random after the onset.
     pub seed: u64,
 }
 
@@ -37,7 +37,7 @@ impl Trial {
     /// The trial `number` of a campaign: its kind is one of `kinds`, in turn.
     pub fn draw(rig: &Rig, table: &TableValues, kinds: &[Kind], seed: u64, number: u64) -> Self {
         let kind = kinds[(number % kinds.len() as u64) as usize];
-        // A generator for each trial: it does not depend on the others.
+        // A generator for each trial, so that it does not depend on the others.
         let mut random = Pcg64::new(u128::from(seed) << 64 | u128::from(number), 0xcafe_f00d);
         let laws: Vec<Law> =
             [(Law::Lqr, table.lqr.is_some()), (Law::PolePlacement, table.pole_placement.is_some())]
@@ -85,7 +85,7 @@ impl Trial {
         }
     }
 
-    /// What is random tick by tick.
+    /// Generator of whatever is random after the onset.
     pub fn random(&self) -> Pcg64 {
         Pcg64::seed_from_u64(self.seed)
     }

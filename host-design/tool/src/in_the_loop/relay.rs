@@ -19,7 +19,7 @@ pub enum RelayError {
     #[error(transparent)]
     Run(#[from] RunError),
     /// The listening socket.
-    #[error("nobody can connect: {0}")]
+    #[error("no client can connect: {0}")]
     Socket(#[from] std::io::Error),
 }
 
@@ -38,11 +38,11 @@ impl From<EmulatorError> for RelayError {
 /// Runs the firmware of `table` with the plant of `rig` for the duration of `scenario`, in real time from the first
 /// client on, and passes the bytes of its serial line to and from whoever is connected to `listener`, one at a time.
 ///
-/// A hand has homed, checked and raised the rig before, and balancing has begun. Whenever the motor is off, the hand
+/// Before that, the hand has homed, checked and raised the rig, and balancing has begun. While the motor is off, the hand
 /// holds the rig at the scenario's start, so that it can be armed again.
 ///
 /// # Errors
-/// [`RelayError`] if the firmware does not run, the socket fails, or nobody connects for as long as the run would last.
+/// [`RelayError`] if the firmware does not run, the socket fails, or no client connects within the duration of the run.
 pub fn serve(
     rig: &Rig,
     table: &TableValues,

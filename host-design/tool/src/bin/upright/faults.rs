@@ -13,18 +13,18 @@ use crate::failure::Failure;
 use crate::progress::{with_bar, with_spinner};
 use crate::variation::Variation;
 
-/// Breaks the rig on purpose, again and again, and looks whether the firmware turns the motor off in time; exit status 1
-/// when it once does not, or turns it off for nothing.
+/// Fault injection: runs the firmware with one defect at a time and checks that the motor is off in time; exit status 1
+/// if it ever is not, or is turned off without a reason.
 ///
-/// A part of the campaign is run once more with a firmware that has no thresholds and no limits: there the faults have to
-/// be missed, or the campaign proves nothing.
+/// Part of the campaign is run again with a firmware without thresholds and limits: there the defects must be missed,
+/// or the campaign proves nothing.
 #[derive(Args)]
 #[command(before_help = "\
 Examples:
   upright faults rigs/quadruple-paper.toml
   upright faults rigs/single-quanser-ip02.toml --runs 10000 --seed 7
   upright faults rigs/quadruple-paper.toml --target qemu --runs 300
-  upright faults rigs/quadruple-paper.toml --only 1234               one run again, byte for byte
+  upright faults rigs/quadruple-paper.toml --only 1234               one run again, bit for bit
   upright faults rigs/quadruple-paper.toml --kind motor-dead --json")]
 pub(crate) struct Faults {
     #[command(flatten)]
@@ -85,7 +85,7 @@ impl Faults {
             Some(kind) if possible.contains(&kind) => vec![kind],
             Some(kind) => {
                 return Err(Failure::BadArgument(format!(
-                    "--kind {}: this rig cannot have it there",
+                    "--kind {}: not possible with this rig and --target",
                     kind.name()
                 )));
             }
@@ -169,7 +169,7 @@ impl Faults {
         if let Some(control) = control {
             let missed: usize = control.rows.iter().map(|row| row.missed).sum();
             let runs: usize = control.rows.iter().map(|row| row.runs).sum();
-            writeln!(out, "without detection {missed} of {runs} runs are missed, as they have to be")?;
+            writeln!(out, "without detection {missed} of {runs} runs are missed, as they must be")?;
         }
         Ok(())
     }
@@ -178,7 +178,7 @@ impl Faults {
         let seen = |row: &&Row| row.missed == 0;
         if let Some(row) = control.and_then(|control| control.rows.iter().find(seen)) {
             return Err(Failure::CheckFailed(format!(
-                "without detection, `{}` is not missed once: the campaign proves nothing",
+                "without detection, `{}` is never missed: the campaign proves nothing",
                 row.kind.name()
             )));
         }
@@ -189,10 +189,10 @@ impl Faults {
         };
         let wrong: usize = result.rows.iter().map(|row| row.wrong.len()).sum();
         let target = if self.target == Target::Host { "" } else { " --target qemu" };
-        // A campaign of one kind numbers its runs in its own way.
+        // A campaign of one kind numbers its runs differently.
         let kind = self.kind.map_or(String::new(), |kind| format!(" --kind {}", kind.name()));
         Err(Failure::CheckFailed(format!(
-            "{wrong} of {} runs came out wrong; the first of `{}` again: upright faults {} --seed {}{target}{kind} --only {number}",
+            "{wrong} of {} runs have a wrong outcome; to repeat the first of `{}`: upright faults {} --seed {}{target}{kind} --only {number}",
             result.runs,
             row.kind.name(),
             self.variation.as_typed(),

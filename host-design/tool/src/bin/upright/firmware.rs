@@ -1,4 +1,4 @@
-//! `upright firmware`: the image, on its way from the source to the board.
+//! `upright firmware`: everything about the image, from building to monitoring.
 
 mod build;
 mod flash;
@@ -17,7 +17,7 @@ use upright_tool::image::{self, Kind};
 use crate::failure::Failure;
 use crate::progress::with_spinner;
 
-/// Builds, measures, runs, flashes and watches the firmware image.
+/// Builds, measures, runs, flashes and monitors the firmware image.
 #[derive(Args)]
 pub(crate) struct Firmware {
     #[command(subcommand)]
@@ -62,7 +62,7 @@ impl Board {
         }
     }
 
-    /// As probe-rs calls it.
+    /// Its name in probe-rs.
     fn chip(self) -> &'static str {
         match self {
             Board::Stm32f405 => "STM32F405RGTx",
@@ -72,7 +72,7 @@ impl Board {
     }
 }
 
-/// The image with the table of the rig, or with src/gains.rs as it is.
+/// Builds the image with the table of the rig, or with src/gains.rs as it is.
 fn built(kind: Kind, rig: Option<&Path>) -> Result<PathBuf, Failure> {
     let Some(path) = rig else {
         return Ok(with_spinner("building the image", || image::build(kind))?);

@@ -19,7 +19,7 @@ Examples:
   upright firmware build rigs/single-quanser-ip02.toml        with the gains of another rig
   upright firmware build --board stm32f446")]
 pub(crate) struct Build {
-    /// Rig file (TOML), designed anew [default: the table in src/gains.rs]
+    /// Rig file (TOML), to be designed [default: the table in src/gains.rs]
     rig: Option<PathBuf>,
     /// Microcontroller of the board
     #[arg(long, value_enum, default_value_t = Board::Stm32f405)]

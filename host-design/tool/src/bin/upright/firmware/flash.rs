@@ -10,7 +10,7 @@ use crate::failure::Failure;
 
 const PROBE_RS: &str = "probe-rs";
 
-/// Builds the image of a board, writes it to the board with probe-rs, compares what has arrived, and starts it.
+/// Builds the image of a board, writes it to the board with probe-rs, verifies it, and starts it.
 ///
 /// The firmware starts disarmed: the motor stays off.
 #[derive(Args)]
@@ -19,7 +19,7 @@ Examples:
   upright firmware flash                                      with src/gains.rs as it is
   upright firmware flash rigs/single-quanser-ip02.toml --board stm32f446")]
 pub(crate) struct Flash {
-    /// Rig file (TOML), designed anew [default: the table in src/gains.rs]
+    /// Rig file (TOML), to be designed [default: the table in src/gains.rs]
     rig: Option<PathBuf>,
     /// Microcontroller of the board
     #[arg(long, value_enum, default_value_t = Board::Stm32f405)]
@@ -28,7 +28,7 @@ pub(crate) struct Flash {
 
 impl Flash {
     pub(crate) fn run(self) -> Result<(), Failure> {
-        // Before the image is built, which takes longer.
+        // First, because building the image takes longer.
         if Command::new(PROBE_RS).arg("--version").output().is_err() {
             return Err(Failure::NoProgram(
                 "probe-rs is missing: install it (https://probe.rs, or `cargo install probe-rs-tools --locked`)",
@@ -40,7 +40,7 @@ impl Flash {
     }
 }
 
-/// Its messages and its progress go where they always go.
+/// Runs probe-rs, which prints its own messages and progress.
 fn probe_rs(arguments: &[&str], image: Option<&Path>) -> Result<(), Failure> {
     let status = Command::new(PROBE_RS).args(arguments).args(image).status()?;
     if status.success() {

@@ -20,10 +20,10 @@ use upright_tool::monitor::{Action, Line, action, request, view};
 use crate::failure::Failure;
 use crate::variation::positive;
 
-/// Shows what a firmware says, live, and sends it commands; exit status 1 when the connection is lost or the firmware
-/// speaks another version of the messages.
+/// Shows a firmware's telemetry, live, and sends commands to it; exit status 1 if the connection is lost or the firmware
+/// uses another version of the messages.
 ///
-/// When it ends while the cart's set-point is commanded, the firmware turns the motor off: link lost. Without a terminal,
+/// If it ends while the cart's set-point is commanded, the firmware turns the motor off: link lost. Without a terminal,
 /// or with --json, it prints one JSON object per telemetry, answers on stderr, and takes commands as lines of stdin:
 /// home, home-rail, check-signs, arm, disarm, clear, set-point METRES, law lqr, law pole-placement.
 #[derive(Args)]
@@ -34,7 +34,7 @@ Examples:
   upright firmware monitor /dev/ttyACM0 --csv run.csv
   echo set-point 0.05 | upright firmware monitor tcp:127.0.0.1:7777 --json --duration 5")]
 pub(crate) struct Monitor {
-    /// Serial device, or tcp:HOST:PORT
+    /// Serial port (/dev/ttyACM0, COM3 …), or tcp:HOST:PORT
     port: String,
     /// Record telemetry into this file from the start
     #[arg(long, value_name = "FILE")]
@@ -42,12 +42,12 @@ pub(crate) struct Monitor {
     /// Print one JSON object per telemetry
     #[arg(long)]
     json: bool,
-    /// End after so long (s)
+    /// End after this time (s)
     #[arg(long, value_name = "S", value_parser = positive)]
     duration: Option<f64>,
 }
 
-/// Between two pictures.
+/// Time between two frames on the screen.
 const PICTURE: Duration = Duration::from_millis(50);
 
 impl Monitor {
@@ -84,7 +84,7 @@ impl Monitor {
     }
 }
 
-/// A terminal that is as before when this is dropped; a panic restores it, too.
+/// The terminal in full-screen mode. Dropping this restores it, and so does a panic.
 struct Screen(DefaultTerminal);
 
 impl Screen {
@@ -121,7 +121,7 @@ impl Conversation {
         Ok(())
     }
 
-    /// Hears and says what there is to hear and say; takes 5 ms at most when the line is silent.
+    /// Receives and sends whatever is due; takes at most 5 ms if the line is silent.
     fn exchange(
         &mut self,
         mut each: impl FnMut(&serde_json::Value) -> std::io::Result<()>,
@@ -154,7 +154,7 @@ impl Conversation {
         let said = lines_of_stdin();
         let mut out = std::io::stdout().lock();
         while self.goes_on() && self.model.ended.is_none() {
-            // The firmware has to have said which messages it speaks before it is told anything.
+            // No command before the firmware has told its version of the messages.
             while self.model.telemetry.is_some()
                 && let Ok(line) = said.try_recv()
             {
@@ -203,12 +203,12 @@ impl Conversation {
     }
 }
 
-/// Since 1970.
+/// Time since 1970.
 fn now() -> Duration {
     SystemTime::UNIX_EPOCH.elapsed().unwrap_or_default()
 }
 
-/// Lines of stdin as they come; it may stay open for ever.
+/// Lines of stdin as they come. A thread of its own, because stdin may stay open for ever.
 fn lines_of_stdin() -> Receiver<String> {
     let (sender, lines) = channel();
     std::thread::spawn(move || {

@@ -14,11 +14,11 @@ use crate::failure::Failure;
 use crate::progress::with_spinner;
 use crate::simulate::Simulate;
 
-/// Builds the image for the rig, runs it in QEMU against the nonlinear plant, in lock step, and compares every bit with
-/// the same run on the host; exit status 1 when the pendulum falls or a bit differs.
+/// Builds the image for the rig, runs it in QEMU in lock step with the nonlinear plant, and compares every bit with the
+/// same run on the host; exit status 1 if the pendulum falls or a bit differs.
 ///
 /// The rig is homed while it hangs, held by hand at the start of the scenario until the firmware begins to balance, and
-/// released: time 0. Options are those of `upright simulate`.
+/// released at time 0. Options are those of `upright simulate`.
 #[derive(Args)]
 #[command(before_help = "\
 Examples:
@@ -29,10 +29,10 @@ Examples:
 pub(crate) struct Run {
     #[command(flatten)]
     simulate: Simulate,
-    /// What the pins of the image are: files of the emulator (fast), or a serial line (as boards have)
+    /// How the pins of the image are connected: files of the emulator (fast; Unix only), or serial lines
     #[arg(long, value_enum, default_value_t = LinkName::Files)]
     link: LinkName,
-    /// Let `upright firmware monitor tcp:HOST:PORT` connect: in real time, for --duration, with nothing compared
+    /// Serve `upright firmware monitor tcp:HOST:PORT`: in real time, for --duration, without the comparison
     #[arg(long, value_name = "HOST:PORT", conflicts_with_all = ["csv", "svg", "json"])]
     serve: Option<String>,
 }

@@ -14,7 +14,7 @@ use super::{Board, built};
 use crate::failure::Failure;
 
 /// Measures the image of a board: flash and RAM by section and by crate, a bound on its stack, and whether it can panic;
-/// exit status 1 when it takes more than 32 KiB of flash, 4 KiB of static RAM or the stack reserved in memory.x, or can
+/// exit status 1 if it takes more than 32 KiB of flash, 4 KiB of static RAM or the stack reserved in memory.x, or can
 /// panic or allocate.
 #[derive(Args)]
 #[command(before_help = "\
@@ -23,12 +23,12 @@ Examples:
   upright firmware size rigs/single-quanser-ip02.toml --board stm32f446
   upright firmware size --elf target/image.elf --json | jq .stack.bytes")]
 pub(crate) struct Size {
-    /// Rig file (TOML), designed anew [default: the table in src/gains.rs]
+    /// Rig file (TOML), to be designed [default: the table in src/gains.rs]
     rig: Option<PathBuf>,
     /// Microcontroller of the board
     #[arg(long, value_enum, default_value_t = Board::Stm32f405)]
     board: Board,
-    /// Measure this image, building none
+    /// Measure this image instead of building one
     #[arg(long, value_name = "FILE", conflicts_with_all = ["rig", "board"])]
     elf: Option<PathBuf>,
     /// Print the figures as one JSON object
@@ -66,7 +66,7 @@ impl Size {
     }
 }
 
-/// What must not be, in words.
+/// Violated limits, as text.
 fn wrong(
     size: &upright_tool::image::Size,
     stack: &Result<StackBound, StackError>,
@@ -119,7 +119,7 @@ fn table(size: &upright_tool::image::Size, stack: &Result<StackBound, StackError
     text
 }
 
-/// The last part of a path, without what is generic.
+/// The last part of a path, without generic parameters.
 fn short(name: &str) -> &str {
     let plain = name.split("::<").next().unwrap_or(name);
     plain.rsplit("::").next().unwrap_or(plain).trim_end_matches('>')
