@@ -9,8 +9,8 @@ use upright::control::encoder::CounterWidth;
 use upright::firmware::Firmware;
 use upright::firmware::control_task::{COMMANDS, ControlTask, MESSAGES};
 use upright::protocol::frame::FrameError;
-use upright::protocol::serial_link::SerialLink;
 use upright::protocol::message::{Command, Reset};
+use upright::protocol::serial_link::SerialLink;
 
 use super::error::HarnessError;
 use super::target::{Pins, Target};

@@ -1,4 +1,4 @@
-//! The whole firmware in closed loop with the simulated rig, from power-up to whatever happens.
+//! The whole firmware in closed loop with the simulated rig, from power-up on.
 //!
 //! A firmware is a [`Target`]: it takes the pins of one tick and gives the output of that tick, and what it has sent over
 //! its serial line. [`with_firmware`] runs the firmware's tasks in this process; an image in an emulator is another

@@ -70,7 +70,7 @@ pub fn record(
             let inputs = harness.inputs();
             output = harness.session.tick(&inputs)?;
         }
-        // What is sent now comes with the next tick and counts in the one after the next.
+        // A command that is sent now takes effect after COMMAND_TICKS.
         let ahead = target_at(tick + COMMAND_TICKS);
         if commanded != ahead {
             harness.session.send(Request::Setpoint(ahead as f32));

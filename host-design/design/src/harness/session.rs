@@ -4,8 +4,8 @@ use std::collections::VecDeque;
 
 use upright::board::Output;
 use upright::protocol::frame::{self, Receiver};
-use upright::protocol::serial_link::{MAX_COMMAND, MAX_MESSAGE};
 use upright::protocol::message::{Answer, Command, Info, Message, PROTOCOL, Reply, Request, Telemetry};
+use upright::protocol::serial_link::{MAX_COMMAND, MAX_MESSAGE};
 use upright::protocol::simulated_pins::Sabotage;
 use upright::supervision::fault::Fault;
 use upright::supervision::sign_check::Signs;
@@ -65,7 +65,7 @@ impl<'a> Session<'a> {
         self.last_id += 1;
         let command = Command { id: self.last_id, request };
         let (mut scratch, mut out) = ([0; MAX_COMMAND], [0; MAX_COMMAND]);
-        // Every command fits: a test of the messages says so.
+        // Every command fits, as a test of the messages checks.
         if let Ok(frame) = frame::encode(&command, &mut scratch, &mut out) {
             self.to_send.extend(frame);
         }

@@ -1,4 +1,4 @@
-//! The rig on the simulated bench: plant, motor, encoders and disturbances, one tick at a time.
+//! The simulated rig: plant, motor, encoders and disturbances, one tick at a time.
 
 use rand::SeedableRng;
 use rand_distr::{Distribution, Normal};
@@ -11,7 +11,7 @@ use super::scenario::Scenario;
 use crate::plant::{LinearSimulation, MotorPlant, Plant, chain_plant};
 use crate::rig::{PlantDescription, Rig};
 
-/// Everything that is not the controller.
+/// The simulated rig: everything outside the controller.
 pub struct Bench {
     plant: Box<dyn Plant>,
     motor: Option<MotorPlant>,
@@ -31,7 +31,7 @@ pub struct Bench {
 }
 
 impl Bench {
-    /// The bench of `rig` at the start of `scenario`.
+    /// The simulation of `rig` at the start of `scenario`.
     ///
     /// # Errors
     /// [`SimulationError`] if the plant cannot be built or a noise level is impossible.
@@ -76,7 +76,7 @@ impl Bench {
         self.period_s
     }
 
-    /// Puts the rig into `state` (m, m/s, rad, rad/s …), as a hand that holds it.
+    /// Sets the state (m, m/s, rad, rad/s …), as a hand does that holds the rig.
     pub fn hold(&mut self, state: &[f64]) {
         self.plant.set_state(state);
         self.state.copy_from_slice(state);
@@ -126,13 +126,13 @@ impl Bench {
         }
     }
 
-    /// Adds a force on the cart for the next tick (N).
+    /// Adds an external force on the cart in the next tick (N).
     pub fn push(&mut self, force_n: f64) {
         self.push_n = force_n;
     }
 
-    /// Lets one tick pass with the command `drive` of its start; gives the force on the cart at the start of the tick,
-    /// without the disturbance (N).
+    /// Simulates one tick with the command `drive` from its start; gives the motor's force on the cart at the start of the
+    /// tick (N), without the disturbance.
     pub fn tick(&mut self, drive: Drive) -> f64 {
         let now = if self.delay { std::mem::replace(&mut self.pending_drive, drive) } else { drive };
         let push = std::mem::take(&mut self.push_n);

@@ -1,4 +1,4 @@
-//! What happens to the rig during a run.
+//! Scenario of a run: start, set-point, disturbances, sensors.
 
 use upright::table::Law;
 
@@ -9,7 +9,7 @@ use crate::rig::{PlantDescription, Rig};
 pub struct Scenario {
     /// Control law.
     pub law: Law,
-    /// What the controller gets to see.
+    /// What the controller measures.
     pub sensing: Sensing,
     /// Length of the run (s).
     pub duration_s: f64,
@@ -29,16 +29,16 @@ pub struct Scenario {
     pub seed: u64,
     /// Integration steps per tick.
     pub substeps: usize,
-    /// What the encoder counters show at position 0.
+    /// Reading of the encoder counters at position 0.
     pub counter_start: u32,
 }
 
-/// What the controller gets to see.
+/// What the controller measures.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Sensing {
-    /// The whole state, exactly: what the paper simulates.
+    /// The whole state, exactly, as in the paper's simulations.
     FullState,
-    /// Encoder counts; the observer estimates the rest.
+    /// Encoder counts; the observer estimates the state.
     Encoders,
 }
 
@@ -61,7 +61,7 @@ impl Scenario {
         }
     }
 
-    /// The run that every freshly designed table has to pass: a small lean of the first link (or a small offset of a
+    /// The run that every new table must pass: a small lean of the first link (or a small offset of a
     /// model's output) together with a small step, for ten time constants of the slowest pole.
     pub fn acceptance(rig: &Rig, law: Law, slowest_time_constant_s: f64) -> Self {
         let mut scenario = Self::at_rest(rig, law);

@@ -1,4 +1,4 @@
-//! What a run amounts to.
+//! Figures of a run.
 
 use core::fmt;
 
@@ -8,7 +8,7 @@ use super::scenario::Scenario;
 use super::trace::Trace;
 use crate::rig::{PlantDescription, Rig};
 
-/// The end of a run that was lost.
+/// Loss of balance, which ends a run.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Fall {
     /// When (s).
@@ -17,7 +17,7 @@ pub struct Fall {
     pub kind: FallKind,
 }
 
-/// How a run was lost.
+/// Kind of a loss of balance.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum FallKind {
@@ -27,7 +27,7 @@ pub enum FallKind {
     EndOfRail,
     /// A state of a linear model grew beyond a million.
     Diverged,
-    /// A state is no longer a number.
+    /// A state is NaN or infinite.
     NotFinite,
 }
 
@@ -73,7 +73,7 @@ impl fmt::Display for Fall {
 /// a model).
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Summary {
-    /// How the run was lost, if it was.
+    /// The loss of balance, if there was one.
     pub fall: Option<Fall>,
     /// Within the settling band when the run ends.
     pub settled: bool,
@@ -87,7 +87,7 @@ pub struct Summary {
     pub peak_angles_rad: Vec<f64>,
     /// Largest absolute force on the cart (N).
     pub peak_force_n: f64,
-    /// Largest absolute force asked for (N).
+    /// Largest absolute force that the law requested (N).
     pub peak_requested_force_n: f64,
     /// Set-point minus output at the end (m).
     pub final_error_m: f64,
@@ -124,7 +124,7 @@ impl Summary {
                 beyond = beyond.max((y - step) * step.signum());
                 against = against.max(-y * step.signum());
             }
-            // A number that is not one is outside, too.
+            // NaN is outside, too.
             if (y - step).abs().partial_cmp(&band) != Some(core::cmp::Ordering::Less) {
                 last_outside = Some(sample.t);
             }

@@ -4,7 +4,7 @@ use std::io::Write;
 
 use crate::rig::{PlantDescription, Rig};
 
-/// Everything that happened, tick by tick.
+/// The record of a run, tick by tick.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Trace {
     columns: Vec<String>,
@@ -17,11 +17,11 @@ pub struct Trace {
 pub struct Sample<S> {
     /// Time at the start of the tick (s).
     pub t: f64,
-    /// Set-point asked for (m).
+    /// Commanded set-point (m).
     pub target: f64,
-    /// Set-point that the law follows (m).
+    /// Governed set-point, which the law follows (m).
     pub setpoint: f64,
-    /// Force that the law asks for in this tick (N).
+    /// Force that the law requests in this tick (N).
     pub requested: f64,
     /// Force on the cart at the start of this tick, without the disturbance (N).
     pub force: f64,

@@ -50,7 +50,8 @@ impl Injection {
     fn inputs(&mut self, tick: u32, inputs: &mut Pins) {
         let Some(since) = tick.checked_sub(self.from) else { return };
         let mut add = |sensor: usize, counts: i32| {
-            inputs.raw_counts[sensor] = Bench::reading(sensor, inputs.raw_counts[sensor].wrapping_add(counts as u32));
+            inputs.raw_counts[sensor] =
+                Bench::reading(sensor, inputs.raw_counts[sensor].wrapping_add(counts as u32));
         };
         match self.defect {
             Defect::OneBad(sensor, counts) if since == 0 => add(sensor, counts),

@@ -98,7 +98,12 @@ impl Kind {
                 "the supply stays below its lowest permitted voltage",
                 Fault(F::Supply, Supply),
             ),
-            (Kind::SupplyDip, "supply-dip", "the supply is too low for less than the time that makes it a fault", Ignored),
+            (
+                Kind::SupplyDip,
+                "supply-dip",
+                "the supply is too low for less than the time that makes it a fault",
+                Ignored,
+            ),
             (
                 Kind::EmergencyStop,
                 "emergency-stop",
@@ -132,12 +137,7 @@ impl Kind {
             (Kind::MotorReversed, "motor-reversed", "the motor's force has the wrong sign", Off(5)),
             (Kind::MotorStuck, "motor-stuck", "the motor gives full force to one side", Off(5)),
             (Kind::MotorWeak, "motor-weak", "the motor gives 10 to 50 % of the force", Bounded),
-            (
-                Kind::Push,
-                "push",
-                "a push on the cart for 50 ms, with up to the force limit",
-                Bounded,
-            ),
+            (Kind::Push, "push", "a push on the cart for 50 ms, with up to the force limit", Bounded),
             (
                 Kind::HostSilent,
                 "host-silent",
