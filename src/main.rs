@@ -17,7 +17,7 @@ mod board;
 
 use upright::gains;
 
-/// The gains are for this many cycles of the processor's clock per tick.
+/// Processor cycles per tick, for which the gains were designed.
 const CYCLES_PER_TICK: u32 = {
     let cycles = gains::TICK_S as f64 * board::CLOCK_HZ as f64 + 0.5;
     assert!(
@@ -39,7 +39,7 @@ mod app {
     use upright::protocol::serial_link::SerialLink;
     use upright::table::Build;
 
-    use crate::board::{BYTES, Hardware, Line, Receiver, set_up};
+    use crate::board::{BYTES, Hardware, Receiver, SerialLine, set_up};
 
     #[shared]
     struct Shared {}
@@ -49,7 +49,7 @@ mod app {
         control: ControlTask<'static, 'static, Hardware, STATES, SENSORS>,
         receiver: Receiver,
         link: SerialLink<'static, STATES, SENSORS>,
-        line: Line,
+        line: SerialLine,
     }
 
     #[init(local = [
@@ -61,7 +61,7 @@ mod app {
         let (hardware, receiver, line, reset) = set_up(cx.device, cx.local.bytes.split());
         let build = Build { rig_hash: RIG_HASH, tick_s: TICK_S };
         let Ok(firmware) = Firmware::new(&TABLE, &build, Hardware::WIDTHS, reset) else {
-            // A damaged table: there is nothing that this image could do, and the motor is off.
+            // The table is damaged: the image cannot do anything, and the motor is off.
             crate::board::stop()
         };
         let (to_control, commands) = cx.local.commands.split();

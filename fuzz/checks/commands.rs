@@ -1,89 +1,179 @@
-//! Bytes and commands to a firmware whose rig hangs still: it never arms, and the motor stays off.
+//! Commands to the whole firmware: a run starts from a clone of one that balances, is armed, is raised, or hangs.
+//!
+//! The bytes of a run spell what happens to it: requests in good frames, which get past the checksum, damaged and repeated
+//! frames, bytes that are no frame, contacts, the supply, a push by hand, and time.
+
+use std::sync::OnceLock;
 
 use heapless::spsc::Queue;
-use upright::board::{Board, Contacts, Inputs, Output};
-use upright::control::actuator::Drive;
-use upright::control::encoder::CounterWidth;
-use upright::firmware::Firmware;
+use upright::board::Contacts;
 use upright::firmware::control_task::{COMMANDS, ControlTask, MESSAGES};
-use upright::gains::{RIG_HASH, SENSORS, STATES, TABLE, TICK_S};
-use upright::protocol::frame::encode;
-use upright::protocol::message::{Command, Message, Request, Reset};
-use upright::protocol::serial_link::{MAX_COMMAND, SerialLink};
-use upright::supervision::supervisor::State;
-use upright::table::Build;
+use upright::gains::{SENSORS, STATES, TABLE};
+use upright::protocol::frame::{Receiver, encode};
+use upright::protocol::message::{Command, Message, Reply, Request};
+use upright::protocol::serial_link::{MAX_COMMAND, MAX_MESSAGE, SerialLink};
+use upright::table::Law;
 
-/// The bytes of one tick, at most; what a line carries in it.
-const BYTES_PER_TICK: usize = 16;
+use invariants::Invariants;
+use simulated_rig::{SimulatedRig, Start, starts};
 
-/// Sends `bytes` as they are; then the requests that they spell, in good frames, which gets past the checksum: before
-/// each request, one byte says how many times 16 ticks pass.
+mod invariants;
+mod simulated_rig;
+
+/// A run ends after this many ticks at the latest.
+const MOST_TICKS: u32 = 120;
+
+/// Runs what `bytes` spell.
 ///
 /// # Panics
-/// If the firmware arms or balances, or the motor is turned on.
+/// If the firmware panics or an [invariant](invariants) does not hold.
 pub(crate) fn check(bytes: &[u8]) {
-    on_a_hanging_rig(|link, tick| {
-        for piece in bytes.chunks(BYTES_PER_TICK) {
-            piece.iter().for_each(|&byte| link(byte));
-            tick(1);
-        }
-        tick(2);
-    });
-    on_a_hanging_rig(|link, tick| {
-        let (mut rest, mut id) = (bytes, 0);
-        while let Some((&ticks, after)) = rest.split_first() {
-            let Ok((request, after)) = postcard::take_from_bytes::<Request>(after) else {
-                rest = after;
-                continue;
-            };
-            rest = after;
-            id += 1;
-            let (mut scratch, mut out) = ([0; MAX_COMMAND], [0; MAX_COMMAND]);
-            let frame = encode(&Command { id, request }, &mut scratch, &mut out).expect("a command fits");
-            tick(16 * u32::from(ticks % 64));
-            frame.iter().for_each(|&byte| link(byte));
-            tick(1);
-        }
-        tick(2);
-    });
-}
-
-/// Runs `what` with a way to send a byte and a way to let ticks pass.
-fn on_a_hanging_rig(what: impl FnOnce(&mut dyn FnMut(u8), &mut dyn FnMut(u32))) {
+    static STARTS: OnceLock<[Start; 4]> = OnceLock::new();
+    let Some((&first, bytes)) = bytes.split_first() else { return };
+    let [hanging, raised, armed, balancing] = STARTS.get_or_init(starts);
+    let start = match first % 8 {
+        0 => hanging,
+        1 => armed,
+        2 | 3 => raised,
+        _ => balancing,
+    };
     let (mut commands, mut messages) =
         (Queue::<Command, COMMANDS>::new(), Queue::<Message<STATES, SENSORS>, MESSAGES>::new());
     let ((to_control, from_link), (from_control, to_link)) = (commands.split(), messages.split());
-    let build = Build { rig_hash: RIG_HASH, tick_s: TICK_S };
-    let firmware = Firmware::new(&TABLE, &build, Hanging::WIDTHS, Reset::Power).expect("the table is sound");
-    let mut control = ControlTask::new(firmware, Hanging, from_link, from_control);
-    let link = core::cell::RefCell::new(SerialLink::new(to_control, to_link));
-    what(&mut |byte| link.borrow_mut().receive(byte), &mut |ticks| {
-        for _ in 0..ticks {
-            control.tick();
-            let state = control.firmware().state();
-            assert!(!matches!(state, State::Armed | State::Balancing), "{state:?}");
-            while link.borrow_mut().transmit().is_some() {}
-        }
-    });
+    let mut run = Run {
+        control: ControlTask::new(start.firmware.clone(), start.rig.clone(), from_link, from_control),
+        link: SerialLink::new(to_control, to_link),
+        invariants: Invariants::new(&start.firmware),
+        sent: Vec::new(),
+        last_frame: Vec::new(),
+        id: start.id,
+        ticks: 0,
+    };
+    let mut bytes = bytes.iter().copied();
+    while run.ticks < MOST_TICKS
+        && let Some(what) = bytes.next()
+    {
+        run.step(what, &mut bytes);
+    }
+    run.tick();
+    run.tick();
 }
 
-/// A healthy board whose rig hangs still; it refuses to drive the motor.
-struct Hanging;
+/// Firmware and rig in a run, and what was sent to it.
+struct Run<'q> {
+    control: ControlTask<'q, 'static, SimulatedRig, STATES, SENSORS>,
+    link: SerialLink<'q, STATES, SENSORS>,
+    invariants: Invariants,
+    sent: Vec<Command>,
+    last_frame: Vec<u8>,
+    id: u64,
+    ticks: u32,
+}
 
-impl Board<SENSORS> for Hanging {
-    const WIDTHS: [CounterWidth; SENSORS] = [CounterWidth::Bits32; SENSORS];
-
-    fn inputs(&mut self) -> Inputs<SENSORS> {
-        Inputs { raw_counts: [0; SENSORS], supply_v: 24.0, contacts: Contacts::default() }
+impl Run<'_> {
+    /// One step: three bits of `what` say how many ticks follow it, five bits what happens, with the next bytes as operand.
+    fn step(&mut self, what: u8, bytes: &mut impl Iterator<Item = u8>) {
+        let mut next = || bytes.next().unwrap_or_default();
+        match what >> 3 {
+            0 => self.send(Request::Beat),
+            1 => self.send(Request::Home),
+            2 => self.send(Request::HomeRail),
+            3 => self.send(Request::CheckSigns),
+            4 | 5 => self.send(Request::Arm),
+            6 => self.send(Request::Disarm),
+            7 => self.send(Request::Clear),
+            8 => self.send(Request::Setpoint(f32::from_le_bytes([next(), next(), next(), next()]))),
+            9 => self.send(Request::Setpoint(setpoint(next()))),
+            10 => self.send(Request::Select(if next() % 2 == 0 { Law::Lqr } else { Law::PolePlacement })),
+            11 => self.send(Request::Info),
+            12 => self.send(Request::Cause),
+            13 => self.send(Request::Statistics),
+            14 => self.send(Request::ResetStatistics),
+            15 => self.send(Request::Telemetry(u16::from_le_bytes([next(), next()]))),
+            16 => {
+                let length = next() % 32;
+                (0..length).for_each(|_| self.link.receive(next()));
+            }
+            17 => self.last_frame.iter().for_each(|&byte| self.link.receive(byte)),
+            18 => {
+                let (place, bits) = (usize::from(next()), next());
+                for (index, &byte) in self.last_frame.iter().enumerate() {
+                    self.link.receive(if index == place { byte ^ bits } else { byte });
+                }
+            }
+            19 | 20 => self.control.board().contacts = contacts(next()),
+            21 => self.control.board().supply_v = supply(next()),
+            22 | 23 => {
+                let sensor = usize::from(next()) % SENSORS;
+                let moved = i16::from_le_bytes([next(), next()]);
+                let offset = &mut self.control.board().offset[sensor];
+                *offset = offset.wrapping_add(moved.into());
+            }
+            24 => (0..next()).for_each(|_| self.tick()),
+            _ => {}
+        }
+        const TICKS: [u8; 8] = [1, 0, 1, 2, 1, 3, 0, 4];
+        (0..TICKS[usize::from(what % 8)]).for_each(|_| self.tick());
     }
 
-    fn drive(&mut self, output: &Output) {
-        assert!(!output.enable && output.drive == Drive::OFF, "{output:?}");
+    fn send(&mut self, request: Request) {
+        self.id += 1;
+        let command = Command { id: self.id, request };
+        let (mut scratch, mut out) = ([0; MAX_COMMAND], [0; MAX_COMMAND]);
+        let frame = encode(&command, &mut scratch, &mut out).expect("a command fits into its frame");
+        frame.iter().for_each(|&byte| self.link.receive(byte));
+        self.sent.push(command);
+        frame.clone_into(&mut self.last_frame);
     }
 
-    fn feed_watchdog(&mut self) {}
+    /// One tick, with all that has to hold after it.
+    fn tick(&mut self) {
+        if self.ticks >= MOST_TICKS + 2 {
+            return;
+        }
+        self.ticks += 1;
+        self.control.tick();
+        let mut receiver = Receiver::<MAX_MESSAGE>::new();
+        let mut answered = None;
+        while let Some(frame) = self.link.transmit() {
+            for message in frame.iter().filter_map(|&byte| receiver.push::<Message<STATES, SENSORS>>(byte)) {
+                match message.expect("a frame that the firmware sends can be read") {
+                    Message::Telemetry(telemetry) => invariants::telemetry(&telemetry),
+                    Message::Reply(Reply { id, answer }) => {
+                        // A damaged frame has its own id only by a collision of the checksum.
+                        let command = self.sent.iter().find(|command| command.id == id);
+                        let command = command.expect("a reply belongs to a command that was sent");
+                        assert!(answered.replace((command.request, answer)).is_none(), "one reply per tick");
+                    }
+                }
+            }
+        }
+        let rig = self.control.board().clone();
+        self.invariants.check(self.control.firmware(), &rig, answered.as_ref());
+    }
+}
 
-    fn cycles(&self) -> u32 {
-        0
+/// Set-points at the edges.
+fn setpoint(which: u8) -> f32 {
+    let [low, high] = TABLE.limits.rail_m;
+    let edges = [0.0, -0.0, low, high, low.next_down(), high.next_up(), f32::INFINITY, f32::NEG_INFINITY];
+    let edges = edges.into_iter().chain([f32::NAN, f32::MAX, f32::MIN_POSITIVE, 0.1, -0.1, 1.0, -1.0]);
+    edges.into_iter().nth(usize::from(which % 15)).unwrap_or_default()
+}
+
+/// Voltages of the supply; most are good.
+fn supply(which: u8) -> f32 {
+    [24.0, 12.0, 0.0, -1.0, f32::NAN, f32::INFINITY][usize::from(which % 6)]
+}
+
+fn contacts(bits: u8) -> Contacts {
+    let bit = |number: u8| bits & 1 << number != 0;
+    Contacts {
+        limit_low: bit(0),
+        limit_high: bit(1),
+        emergency_stop: bit(2),
+        driver_fault: bit(3),
+        overrun: bit(4),
+        clock_fault: bit(5),
     }
 }

@@ -1,4 +1,4 @@
-//! The ends: panics and processor faults. Both turn the motor off.
+//! Panic and exception handlers. They turn the motor off.
 
 use core::arch::global_asm;
 use core::panic::PanicInfo;
@@ -16,8 +16,8 @@ extern "C" fn crashed() -> ! {
     stop()
 }
 
-// After a stack overflow, the stack pointer is below the memory, and whatever pushes a register faults again, which locks
-// the core up. So the stack begins anew before the first push.
+// After a stack overflow, the stack pointer is below the memory, and pushing a register would fault again and lock up the
+// core. So the stack pointer is reset before the first push.
 global_asm!(
     ".section .HardFault.entry, \"ax\"",
     ".global HardFault",
@@ -28,7 +28,7 @@ global_asm!(
     "mov sp, r0",
     "b {crashed}",
     ".size HardFault, . - HardFault",
-    // All other exceptions that nobody expects.
+    // All exceptions without a handler of their own.
     ".global DefaultHandler",
     ".thumb_set DefaultHandler, HardFault",
     crashed = sym crashed,

@@ -1,9 +1,44 @@
-//! The board: the only place that touches registers, and the only one with `unsafe`.
+//! The board of this image: the only place that touches registers, and the only one with `unsafe`.
 //!
-//! A cargo feature chooses which. Each gives the same few names: `set_up` makes a [`Hardware`] for the control task, a
-//! `Receiver` for the serial line's interrupt and a `Line` for the background; `stop` is where everything ends.
+//! A cargo feature chooses it. A new board is a folder beside `f4` that gives the same few names: `set_up` makes a
+//! [`Hardware`] for the control task, a [`Receiver`] for the serial line's interrupt and a [`SerialLine`] for the background;
+//! `stop` turns the motor off for good; `CLOCK_HZ` is the core clock.
 
 #![allow(unsafe_code)]
+
+#[cfg(not(any(
+    feature = "stm32f405",
+    feature = "stm32f407",
+    feature = "stm32f446",
+    feature = "in-the-loop",
+    feature = "in-the-loop-usart",
+)))]
+compile_error!(
+    "the image has no board: choose one with `cargo upright firmware build --board BOARD`, or with one of the features \
+     stm32f405, stm32f407, stm32f446, in-the-loop, in-the-loop-usart"
+);
+
+#[cfg(any(
+    all(
+        feature = "stm32f405",
+        any(
+            feature = "stm32f407",
+            feature = "stm32f446",
+            feature = "in-the-loop",
+            feature = "in-the-loop-usart",
+        )
+    ),
+    all(
+        feature = "stm32f407",
+        any(feature = "stm32f446", feature = "in-the-loop", feature = "in-the-loop-usart")
+    ),
+    all(feature = "stm32f446", any(feature = "in-the-loop", feature = "in-the-loop-usart")),
+    all(feature = "in-the-loop", feature = "in-the-loop-usart"),
+))]
+compile_error!(
+    "the image has two boards: choose only one of the features stm32f405, stm32f407, stm32f446, in-the-loop, \
+     in-the-loop-usart"
+);
 
 #[cfg(not(any(feature = "in-the-loop", feature = "in-the-loop-usart")))]
 mod f4;
@@ -12,9 +47,9 @@ mod handlers;
 mod in_the_loop;
 
 #[cfg(not(any(feature = "in-the-loop", feature = "in-the-loop-usart")))]
-pub(crate) use f4::{CLOCK_HZ, Hardware, Line, Receiver, set_up, stop};
+pub(crate) use f4::{CLOCK_HZ, Hardware, Receiver, SerialLine, set_up, stop};
 #[cfg(any(feature = "in-the-loop", feature = "in-the-loop-usart"))]
-pub(crate) use in_the_loop::{CLOCK_HZ, Hardware, Line, Receiver, set_up, stop};
+pub(crate) use in_the_loop::{CLOCK_HZ, Hardware, Receiver, SerialLine, set_up, stop};
 
-/// Bytes from the host that may wait.
+/// Length of the queue of bytes from the host; it holds one less.
 pub(crate) const BYTES: usize = 128;

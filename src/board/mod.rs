@@ -1,11 +1,14 @@
-//! What the firmware reads from the board and gives to it: the one boundary between control code and hardware.
+//! The board as the firmware sees it: inputs, output and the trait [`Board`], the boundary between firmware and hardware.
+//!
+//! A board of one's own implements [`Board`] in one's own crate. The boards of this project's image are not in this library
+//! but in the image: `hardware.rs` beside this file chooses one of the folders `f4` and `in_the_loop`.
 
 use serde::{Deserialize, Serialize};
 
 use crate::control::actuator::Drive;
 use crate::control::encoder::CounterWidth;
 
-/// Everything that is read at the start of a tick.
+/// All inputs, read at the start of a tick.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Inputs<const NY: usize> {
     /// Raw encoder counters.
@@ -27,18 +30,18 @@ pub struct Contacts {
     pub emergency_stop: bool,
     /// The power stage has reported a fault since the last tick, however briefly.
     pub driver_fault: bool,
-    /// The tick before was not finished when this one was due.
+    /// The previous tick had not ended when this one was due.
     pub overrun: bool,
-    /// The processor's clock is not the one that the tick is counted in: it has failed to start.
+    /// The processor's clock has failed to start or has stopped: ticks have the wrong length.
     pub clock_fault: bool,
 }
 
-/// What goes to the power stage at the end of a tick.
+/// The output to the power stage.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Output {
-    /// Whether the power stage may switch at all; false lets the motor coast.
+    /// Whether the power stage is enabled; false lets the motor coast.
     pub enable: bool,
-    /// The command; [`Drive::OFF`] whenever `enable` is false.
+    /// Force or duty cycle; [`Drive::OFF`] whenever `enable` is false.
     pub drive: Drive,
 }
 
@@ -47,20 +50,20 @@ impl Output {
     pub const OFF: Self = Self { enable: false, drive: Drive::OFF };
 }
 
-/// The hardware, as the firmware sees it. One implementation per board, one for the image that runs in the loop with a
-/// simulated rig, one in the simulations on the host.
+/// The hardware. There is one implementation per board, one for the image in the loop with a simulated rig, and one in
+/// the simulations on the host.
 pub trait Board<const NY: usize> {
     /// Widths of the encoders' counters.
     const WIDTHS: [CounterWidth; NY];
 
-    /// Reads all inputs at once. Never waits.
+    /// Reads all inputs, without waiting.
     fn inputs(&mut self) -> Inputs<NY>;
 
     /// Drives the motor until the next call.
     fn drive(&mut self, output: &Output);
 
-    /// The tick has ended. If it has done so before the next one is due, restarts the independent watchdog, which resets
-    /// the microcontroller, motor off, when that does not happen in time.
+    /// Called at the end of a tick. Restarts the independent watchdog if the next tick is not due yet; a watchdog that is
+    /// not restarted in time resets the microcontroller, which turns the motor off.
     fn feed_watchdog(&mut self);
 
     /// A free-running counter of processor cycles.

@@ -111,3 +111,86 @@ fn a_rail_of_another_length_is_not_homed() {
         (State::Disarmed, crate::supervision::homing::Homing::WrongTravel)
     );
 }
+
+/// Ticks of [`cause_of`]; those of a pass of the table's checksum are before it.
+const TICKS: u32 = 3;
+
+/// The cause that is latched when all of `faults` are due in the same tick of balancing, the last of [`TICKS`].
+fn cause_of(faults: &[Fault], ticks_of_a_pass: u32) -> Option<Cause> {
+    let due = |fault| faults.contains(&fault);
+    // The first table finds nothing but a bad encoder, of which the third measurement in a row counts. The second one
+    // finds whatever is due.
+    let mut calm = TABLE.clone();
+    calm.limits.angle_rad = f32::MAX;
+    calm.thresholds.innovation = [f32::MAX; SENSORS];
+    calm.thresholds.frozen = [f32::MAX; SENSORS];
+    calm.thresholds.motor.energy = f32::MAX;
+    if due(Fault::Encoder) {
+        calm.thresholds.innovation[1] = -1.0;
+    }
+    let mut strict = calm.clone();
+    let (limits, thresholds) = (&mut strict.limits, &mut strict.thresholds);
+    (limits.supply_ticks, limits.link_ticks, limits.saturated_ticks) = (TICKS - 1, TICKS, 0);
+    limits.rail_m = if due(Fault::Rail) { [5.0, 6.0] } else { limits.rail_m };
+    limits.angle_rad = if due(Fault::Angle) { -1.0 } else { limits.angle_rad };
+    limits.speed_m_per_s = if due(Fault::Speed) { -1.0 } else { limits.speed_m_per_s };
+    thresholds.frozen = if due(Fault::Frozen) { [-1.0; SENSORS] } else { thresholds.frozen };
+    if due(Fault::Motor) {
+        (thresholds.motor.ratio, thresholds.motor.energy) = (-1.0, -1.0);
+        calm.thresholds.motor.b = [1.0; 2];
+    }
+    strict.crc ^= u32::from(due(Fault::Table));
+
+    let mut firmware = firmware(&TABLE, Reset::Power).unwrap();
+    // The pass ends in the last tick if the table is due, else later: it would find that the tables differ.
+    let sooner = if due(Fault::Table) { 0 } else { 10 };
+    for _ in 0..ticks_of_a_pass - TICKS - sooner {
+        firmware.control(&INPUTS);
+        firmware.finish(None, 0);
+    }
+    firmware.supervisor.complete_homing().unwrap();
+    firmware.supervisor.arm(Inhibits::NONE).unwrap();
+    firmware.start_balancing(&[0; SENSORS]);
+    // For a force that the test of the motor can miss.
+    firmware.controller.set_setpoint(0.5).unwrap();
+    firmware.table = &calm;
+    let mut inputs = INPUTS;
+    inputs.contacts.overrun = due(Fault::Overrun);
+    inputs.supply_v = if due(Fault::Supply) { -1.0 } else { inputs.supply_v };
+    for _ in 1..TICKS {
+        firmware.control(&inputs);
+        firmware.finish(None, 0);
+        assert_eq!(firmware.state(), State::Balancing, "{:?}", firmware.cause());
+    }
+    inputs.contacts.clock_fault = due(Fault::Clock);
+    inputs.contacts.emergency_stop = due(Fault::EmergencyStop);
+    inputs.contacts.driver_fault = due(Fault::Driver);
+    inputs.contacts.limit_high = due(Fault::LimitSwitch);
+    inputs.supply_v = if due(Fault::NotFinite) { f32::NAN } else { inputs.supply_v };
+    firmware.setpoint_commanded = due(Fault::LinkLost);
+    if due(Fault::Saturated) {
+        let mut leaning = nalgebra::SVector::zeros();
+        leaning[2] = 0.3;
+        firmware.controller.start_in_state(&leaning);
+    }
+    firmware.table = &strict;
+    firmware.control(&inputs);
+    firmware.finish(None, 0);
+    firmware.cause()
+}
+
+#[test]
+fn of_several_faults_in_one_tick_the_first_of_the_precedence_is_latched() {
+    let mut damaged = TABLE.clone();
+    damaged.crc ^= 1;
+    let mut other = firmware(&TABLE, Reset::Power).unwrap();
+    other.table = &damaged;
+    let (ticks_of_a_pass, _) = ticks_to_fault(&mut other).unwrap();
+    for (index, first) in Fault::PRECEDENCE.into_iter().enumerate() {
+        let cause = cause_of(&Fault::PRECEDENCE[index..], ticks_of_a_pass);
+        assert_eq!(cause.map(|cause| (cause.fault, cause.tick)), Some((first, ticks_of_a_pass - 1)));
+        let alone = cause_of(&[first], ticks_of_a_pass);
+        assert_eq!(alone.map(|cause| cause.fault), Some(first), "alone");
+    }
+    assert_eq!(cause_of(&[], ticks_of_a_pass), None, "nothing is due, nothing is found");
+}

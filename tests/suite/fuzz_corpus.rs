@@ -21,6 +21,6 @@ fn messages_of_the_corpus_come_back_from_their_frames() {
 }
 
 #[test]
-fn no_input_of_the_corpus_arms_or_moves_a_hanging_rig() {
+fn no_input_of_the_corpus_breaks_an_invariant() {
     replay("commands", commands::check);
 }

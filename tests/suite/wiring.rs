@@ -4,7 +4,7 @@
 #[allow(dead_code, unreachable_pub)]
 mod wiring;
 
-use wiring::{LIGHTS, WIRING, Wire};
+use wiring::{STATUS_LEDS, WIRING, Wire};
 
 const PAGE: &str = include_str!("../../docs/board.md");
 
@@ -20,7 +20,7 @@ fn documented(text: &str) -> Vec<&str> {
 }
 
 fn defined() -> Vec<String> {
-    WIRING.iter().chain(&LIGHTS).map(row).collect()
+    WIRING.iter().chain(&STATUS_LEDS).map(row).collect()
 }
 
 #[test]

@@ -6,7 +6,7 @@
 //! | PCLK1 | 42 MHz | USART2; timers 2 to 5 at 84 MHz |
 //! | PCLK2 | 84 MHz | ADC at 21 MHz; timers 1 and 8 at 168 MHz |
 //!
-//! A wait that does not end leaves the core on its 16 MHz oscillator, where it started: slow, but able to say so. The
+//! If a wait times out, the core stays on the internal 16 MHz oscillator: slow, but able to report the fault. The
 //! voltage scaling for 168 MHz is the one after a reset (RM0090, 5.4.1; RM0390, 5.4.1).
 
 use stm32f4xx_hal::pac::{FLASH, RCC};
@@ -18,14 +18,30 @@ pub(crate) const CLOCK_HZ: u32 = 168_000_000;
 /// Turns of a waiting loop: at 16 MHz and at least 4 cycles each, 50 ms or more; a crystal starts within 10 ms.
 const PATIENCE: u32 = 200_000;
 
-/// Frequency of the bus of USART2 (Hz), or that frequency when the set-up has failed.
-pub(super) type Result = core::result::Result<u32, u32>;
+/// The clock that the core runs from after the set-up.
+#[derive(Clone, Copy, PartialEq, Eq)]
+pub(super) enum Clock {
+    /// PLL and crystal: [`CLOCK_HZ`].
+    Full,
+    /// The internal oscillator of 16 MHz: crystal or PLL have not started.
+    Fallback,
+}
 
-/// Starts crystal and PLL and goes over to them.
-pub(super) fn set_up(rcc: &RCC, flash: &FLASH) -> Result {
+impl Clock {
+    /// Frequency of the bus of USART2 (Hz).
+    pub(super) fn usart2_bus_hz(self) -> u32 {
+        match self {
+            Clock::Full => CLOCK_HZ / 4,
+            Clock::Fallback => 16_000_000,
+        }
+    }
+}
+
+/// Starts crystal and PLL and switches the core to them, if they start.
+pub(super) fn set_up(rcc: &RCC, flash: &FLASH) -> Clock {
     match try_set_up(rcc, flash) {
-        Some(()) => Ok(CLOCK_HZ / 4),
-        None => Err(16_000_000),
+        Some(()) => Clock::Full,
+        None => Clock::Fallback,
     }
 }
 
@@ -56,12 +72,12 @@ fn try_set_up(rcc: &RCC, flash: &FLASH) -> Option<()> {
     Some(())
 }
 
-/// Waits for a flag, not for ever.
+/// Waits for a flag, for [`PATIENCE`] turns at most.
 fn wait(ready: impl Fn() -> bool) -> Option<()> {
     (0..PATIENCE).any(|_| ready()).then_some(())
 }
 
-/// Why the microcontroller started (RM0090, 7.3.21); forgets it.
+/// Why the microcontroller started (RM0090, 7.3.21); clears the flags.
 pub(super) fn reset_reason(rcc: &RCC, crashed: bool) -> Reset {
     let flags = rcc.csr().read();
     rcc.csr().modify(|_, w| w.rmvf().set_bit());

@@ -20,8 +20,9 @@ use upright::gains::SENSORS;
 use upright::protocol::message::Reset;
 
 pub(crate) use clock::CLOCK_HZ;
+use clock::Clock;
 use motor::Motor;
-pub(crate) use serial::{Line, Receiver};
+pub(crate) use serial::{Receiver, SerialLine};
 use supply::Supply;
 use watchdog::Watchdog;
 
@@ -35,11 +36,11 @@ pub(crate) struct Hardware {
     overrun: bool,
 }
 
-/// Turns everything on, motor off. Takes 150 ms at most, whatever does not answer.
+/// Sets up all peripherals, with the motor off. Takes 150 ms at most, even if something does not answer.
 pub(crate) fn set_up(
     device: Peripherals,
     bytes: (Producer<'static, u8>, Consumer<'static, u8>),
-) -> (Hardware, Receiver, Line, Reset) {
+) -> (Hardware, Receiver, SerialLine, Reset) {
     let rcc = &device.RCC;
     pins::set_up(rcc, &device.SYSCFG, &device.EXTI);
     let motor = Motor::set_up(rcc, device.TIM1);
@@ -47,21 +48,20 @@ pub(crate) fn set_up(
     let clock = clock::set_up(rcc, &device.FLASH);
     encoders::set_up(rcc);
     let supply = Supply::set_up(rcc, device.ADC1, &device.ADC_COMMON);
-    let (Ok(bus_hz) | Err(bus_hz)) = clock;
-    let (receiver, line) = serial::set_up(rcc, device.USART2, bus_hz, bytes);
+    let (receiver, line) = serial::set_up(rcc, device.USART2, clock.usart2_bus_hz(), bytes);
     // SAFETY: the tick's timer is RTIC's, and stays untouched; nobody else wants these two.
     let mut core = unsafe { cortex_m::Peripherals::steal() };
     core.DCB.enable_trace();
     core.DWT.enable_cycle_counter();
-    pins::light(clock.is_ok());
-    // What was noticed while the pull-ups rose does not count.
+    pins::set_status_led(clock == Clock::Full);
+    // Clears the flags that were set while the pull-ups charged the inputs.
     let _ = (motor.was_stopped(), pins::driver_fault_was_reported(&device.EXTI));
     let hardware = Hardware {
         motor,
         supply,
         exti: device.EXTI,
         watchdog: Watchdog::new(device.IWDG),
-        clock_fault: clock.is_err(),
+        clock_fault: clock == Clock::Fallback,
         overrun: false,
     };
     (hardware, receiver, line, reset)
@@ -72,7 +72,7 @@ impl Board<SENSORS> for Hardware {
 
     fn inputs(&mut self) -> Inputs<SENSORS> {
         let raw_counts = encoders::raw_counts();
-        // Forgets that this tick was due.
+        // Clears the flag of this tick.
         let _ = tick_is_due();
         let levels = pins::Levels::read();
         Inputs {
@@ -107,18 +107,19 @@ impl Board<SENSORS> for Hardware {
     }
 }
 
-/// Whether the tick's timer has come to its end since the last call.
+/// Whether the tick's timer has wrapped since the last call.
 fn tick_is_due() -> bool {
     // SAFETY: after the start, the control task is the only one that reads this register, which clears the flag.
     unsafe { (*SYST::PTR).csr.read() & 1 << 16 != 0 }
 }
 
-/// Says after the watchdog's reset that it was a panic or a processor fault: not initialised, and so it survives.
+/// Tells after a reset by the watchdog that the reason was a panic or a processor fault. It is not initialised at start,
+/// so it survives the reset.
 #[unsafe(link_section = ".uninit.CRASH")]
 static mut CRASH: MaybeUninit<u32> = MaybeUninit::uninit();
 const CRASHED: u32 = 0x5afe_0ff5;
 
-/// Whether the firmware has crashed; forgets it.
+/// Whether the firmware has crashed before this reset; clears the record.
 fn take_crash() -> bool {
     let cell = (&raw mut CRASH).cast::<u32>();
     // SAFETY: nothing else runs yet; what the memory holds after power-on is read as it is, and means nothing else.
@@ -129,14 +130,14 @@ fn take_crash() -> bool {
     }
 }
 
-/// Motor off, for good: the watchdog, if it runs already, resets the microcontroller.
+/// Motor off for good: the watchdog, if it runs already, resets the microcontroller.
 pub(crate) fn stop() -> ! {
     // SAFETY: nothing else runs any more.
     unsafe {
         motor::off(&Peripherals::steal().TIM1);
         (&raw mut CRASH).cast::<u32>().write_volatile(CRASHED);
     }
-    pins::light(false);
+    pins::set_status_led(false);
     loop {
         cortex_m::asm::nop();
     }

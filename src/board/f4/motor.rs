@@ -1,7 +1,7 @@
-//! The motor: PWM with a dead-man's handle, direction and enable.
+//! The motor: PWM with a dead-man timer, direction and enable.
 //!
 //! Timer 1 does not run by itself. Every tick with the motor on starts it for a fixed number of PWM periods, three ticks
-//! long at most, and the next tick starts it anew: one-pulse mode with the repetition counter (RM0090, 17.3.10, 17.3.3).
+//! long at most, and the next tick restarts it: one-pulse mode with the repetition counter (RM0090, 17.3.10, 17.3.3).
 //! When ticks stop, for whatever reason, the timer stops too, at the end of a period with its counter at 0. In PWM mode 2
 //! the output is inactive while the counter is below the compare value (17.3.9), which is never 0 here: it stops inactive.
 //! No code takes part in that, and no other clock.
@@ -19,7 +19,7 @@ use crate::CYCLES_PER_TICK;
 /// Frequency that the PWM comes near to (Hz): above hearing.
 const PWM_HZ: u32 = 20_000;
 
-/// PWM periods per tick: a whole number, so that starting anew cuts no period short. Three ticks of them fit into the
+/// PWM periods per tick: a whole number, so that a restart cuts no period short. Three ticks of them fit into the
 /// repetition counter of 8 bits.
 const PERIODS_PER_TICK: u32 = {
     let wanted = CYCLES_PER_TICK / (super::CLOCK_HZ / PWM_HZ);

@@ -3,10 +3,10 @@
 use stm32f4xx_hal::pac::{EXTI, GPIOA, GPIOB, GPIOC, GPIOD, RCC, SYSCFG};
 
 use super::wiring::{
-    DIRECTION, DRIVER_FAULT, EMERGENCY_STOP, ENABLE, LIGHTS, LIMIT_HIGH, LIMIT_LOW, Mode, WIRING, Wire,
+    DIRECTION, DRIVER_FAULT, EMERGENCY_STOP, ENABLE, LIMIT_HIGH, LIMIT_LOW, Mode, STATUS_LEDS, WIRING, Wire,
 };
 
-const LIGHT: Wire = LIGHTS[if cfg!(feature = "stm32f405") {
+const STATUS_LED: Wire = STATUS_LEDS[if cfg!(feature = "stm32f405") {
     0
 } else if cfg!(feature = "stm32f407") {
     1
@@ -30,7 +30,7 @@ const SET_UP: [Port; PORTS] = {
     let mut ports = [Port { mode: 0, pull: 0, two_bits: 0, alternate: [0; 2], four_bits: [0; 2] }; PORTS];
     let mut i = 0;
     while i <= WIRING.len() {
-        let wire = if i < WIRING.len() { WIRING[i] } else { LIGHT };
+        let wire = if i < WIRING.len() { WIRING[i] } else { STATUS_LED };
         let port = &mut ports[(wire.port - b'A') as usize];
         let (at, half) = (2 * wire.pin, (wire.pin / 8) as usize);
         assert!(port.two_bits & (3 << at) == 0, "a pin is used twice");
@@ -136,11 +136,11 @@ fn set(pin: u8, high: bool) {
     unsafe { (*GPIOB::PTR).bsrr().write(|w| w.bits(1 << pin)) };
 }
 
-/// The light.
-pub(super) fn light(on: bool) {
+/// Switches the status LED.
+pub(super) fn set_status_led(on: bool) {
     let port = [GPIOA::PTR as usize, GPIOB::PTR as usize, GPIOC::PTR as usize, GPIOD::PTR as usize]
-        [(LIGHT.port - b'A') as usize];
-    let pin = LIGHT.pin + if on { 0 } else { 16 };
-    // SAFETY: the bit set and reset register of the light's port changes nothing but the light.
+        [(STATUS_LED.port - b'A') as usize];
+    let pin = STATUS_LED.pin + if on { 0 } else { 16 };
+    // SAFETY: the bit set and reset register of the LED's port changes nothing but the LED.
     unsafe { ((port + 0x18) as *mut u32).write_volatile(1 << pin) };
 }

@@ -13,7 +13,7 @@ pub(crate) struct Receiver {
 }
 
 /// The sending half, and what was received.
-pub(crate) struct Line {
+pub(crate) struct SerialLine {
     received: Consumer<'static, u8>,
     usart: USART2,
 }
@@ -24,13 +24,13 @@ pub(super) fn set_up(
     usart: USART2,
     clock: u32,
     (producer, consumer): (Producer<'static, u8>, Consumer<'static, u8>),
-) -> (Receiver, Line) {
+) -> (Receiver, SerialLine) {
     rcc.apb1enr().modify(|_, w| w.usart2en().set_bit());
     // Sixteen samples per bit (RM0090, 30.3.4): the divisor has four fractional bits.
     // SAFETY: 35 to 91 for the clocks of this board.
     usart.brr().write(|w| unsafe { w.bits(((clock + BAUD / 2) / BAUD) as u16) });
     usart.cr1().write(|w| w.ue().set_bit().te().set_bit().re().set_bit().rxneie().set_bit());
-    (Receiver { received: producer }, Line { received: consumer, usart })
+    (Receiver { received: producer }, SerialLine { received: consumer, usart })
 }
 
 impl Receiver {
@@ -43,7 +43,7 @@ impl Receiver {
     }
 }
 
-impl Line {
+impl SerialLine {
     /// The next byte from the host.
     pub(crate) fn read(&mut self) -> Option<u8> {
         queue::take(&mut self.received)

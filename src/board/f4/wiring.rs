@@ -36,7 +36,7 @@ pub(crate) enum Mode {
     Analog,
 }
 
-/// All pins but the light's.
+/// All pins but that of the status LED.
 pub(crate) const WIRING: [Wire; 20] = [
     encoder(b'A', 15, 1, "TIM2_CH1", "cart encoder, A"),
     encoder(b'B', 3, 1, "TIM2_CH2", "cart encoder, B"),
@@ -60,11 +60,11 @@ pub(crate) const WIRING: [Wire; 20] = [
     wire(b'A', 3, Mode::Alternate(7), true, "USART2_RX", "serial line from the host"),
 ];
 
-/// The lights, one per board: on after a good start, off after a crash.
-pub(crate) const LIGHTS: [Wire; 3] = [
-    wire(b'C', 13, Mode::Output, false, "output", "light (STM32F405)"),
-    wire(b'D', 12, Mode::Output, false, "output", "light (STM32F407 Discovery: green)"),
-    wire(b'A', 5, Mode::Output, false, "output", "light (STM32F446 Nucleo: LD2)"),
+/// The status LED of each board: on after a good start, off after a crash.
+pub(crate) const STATUS_LEDS: [Wire; 3] = [
+    wire(b'C', 13, Mode::Output, false, "output", "status LED (STM32F405)"),
+    wire(b'D', 12, Mode::Output, false, "output", "status LED (STM32F407 Discovery: green)"),
+    wire(b'A', 5, Mode::Output, false, "output", "status LED (STM32F446 Nucleo: LD2)"),
 ];
 
 /// Pin of port B: direction.

@@ -1,4 +1,4 @@
-//! The board in the loop: a simulated rig on the host takes the place of timers and pins, in lock step.
+//! The board in the loop: a simulated rig on the host replaces timers and pins, in lock step.
 //!
 //! Every tick waits for the host's [`PinsIn`] and answers with a [`PinsOut`]; telemetry and replies leave on a channel
 //! of their own. When the host closes the pins, the image ends.
@@ -49,12 +49,12 @@ impl Receiver {
 }
 
 /// The serial line to the host.
-pub(crate) struct Line {
+pub(crate) struct SerialLine {
     received: Consumer<'static, u8>,
     serial: Serial,
 }
 
-impl Line {
+impl SerialLine {
     /// The next byte from the host.
     pub(crate) fn read(&mut self) -> Option<u8> {
         self.received.dequeue()
@@ -72,14 +72,14 @@ impl Line {
 pub(crate) fn set_up(
     device: Peripherals,
     (producer, consumer): (Producer<'static, u8>, Consumer<'static, u8>),
-) -> (Hardware, Receiver, Line, Reset) {
+) -> (Hardware, Receiver, SerialLine, Reset) {
     let clock = device.TIM5;
     // 32 bits, one count per instruction.
     clock.arr().write(|w| w.arr().set(u32::MAX));
     clock.cr1().write(|w| w.cen().enabled());
     let (pins, serial) = open(device.USART1, device.USART2);
     let hardware = Hardware { pins, frames: Frames::new(), received: producer, clock, spent: 0 };
-    (hardware, Receiver, Line { received: consumer, serial }, Reset::Power)
+    (hardware, Receiver, SerialLine { received: consumer, serial }, Reset::Power)
 }
 
 impl Board<SENSORS> for Hardware {
@@ -126,7 +126,7 @@ impl Hardware {
                 let _ = self.received.enqueue(byte);
             }
             if let Some(sabotage) = pins.sabotage {
-                suffer(sabotage);
+                inject(sabotage);
             }
             if let Some(inputs) = pins.inputs() {
                 return inputs;
@@ -143,7 +143,7 @@ fn send(pins: &mut Channel, output: &Output) {
     }
 }
 
-fn suffer(sabotage: Sabotage) {
+fn inject(sabotage: Sabotage) {
     match sabotage {
         Sabotage::Panic => panic!(),
         // SAFETY: none: nothing is there. That is the point.

@@ -2,8 +2,13 @@
 
 use std::path::Path;
 
+use check::check;
 use proptest::prelude::*;
 use upright_design::rig::Rig;
+
+/// The check that the fuzzer runs, too.
+#[path = "../../../../fuzz/checks/rig.rs"]
+mod check;
 
 const SEEDS: [&str; 4] = [
     include_str!("../../../../rigs/quadruple-paper.toml"),
@@ -61,20 +66,6 @@ const PIECES: &[&str] = &[
     "a.b.c = 1\n",
 ];
 
-fn survives(bytes: &[u8]) {
-    let Ok(text) = std::str::from_utf8(bytes) else { return };
-    match Rig::from_toml(text, Path::new("fuzz.toml")) {
-        Ok(rig) => {
-            let _ = (rig.hash(), rig.describe());
-        }
-        Err(error) => {
-            let message = error.to_string();
-            assert!(message.starts_with("fuzz.toml:") && !message.contains('\n'), "{message:?}");
-            assert!(matches!(error.exit_code(), 2 | 3));
-        }
-    }
-}
-
 proptest! {
     #![proptest_config(ProptestConfig { cases: 2000, ..ProptestConfig::default() })]
 
@@ -87,17 +78,17 @@ proptest! {
         if let Err(error) = result {
             prop_assert!(matches!(error.exit_code(), 2 | 3));
         }
-        survives(&bytes);
+        check(&bytes);
     }
 
     #[test]
     fn any_text(text in "\\PC{0,100}") {
-        survives(text.as_bytes());
+        check(text.as_bytes());
     }
 
     #[test]
     fn toml_like_pieces(pieces in prop::collection::vec(prop::sample::select(PIECES), 0..40)) {
-        survives(pieces.concat().as_bytes());
+        check(pieces.concat().as_bytes());
     }
 
     #[test]
@@ -110,7 +101,7 @@ proptest! {
             let at = at.index(bytes.len());
             bytes[at] = byte;
         }
-        survives(&bytes);
+        check(&bytes);
     }
 
     #[test]
@@ -128,7 +119,7 @@ proptest! {
                 break;
             }
         }
-        survives(text.into_iter().collect::<String>().as_bytes());
+        check(text.into_iter().collect::<String>().as_bytes());
     }
 }
 
@@ -137,8 +128,8 @@ proptest! {
 fn deep_nesting() {
     for (open, close) in [("[", "]"), ("{a=", "}"), ("a.", "b")] {
         let deep = format!("name = {}1{}\n", open.repeat(100_000), close.repeat(100_000));
-        survives(deep.as_bytes());
-        survives(format!("{}b = 1\n", "a.".repeat(100_000)).as_bytes());
-        survives(format!("[{}b]\n", "a.".repeat(100_000)).as_bytes());
+        check(deep.as_bytes());
+        check(format!("{}b = 1\n", "a.".repeat(100_000)).as_bytes());
+        check(format!("[{}b]\n", "a.".repeat(100_000)).as_bytes());
     }
 }

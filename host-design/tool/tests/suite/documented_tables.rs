@@ -96,6 +96,11 @@ fn the_page_about_faults_holds_the_table_of_the_source() {
 }
 
 #[test]
+fn the_page_about_faults_holds_the_order_within_a_tick() {
+    hold("docs/faults.md", "precedence", &Fault::PRECEDENCE.map(|fault| fault.to_string()).join(", "));
+}
+
+#[test]
 fn the_page_about_faults_holds_the_reasons_against_a_command() {
     hold("docs/faults.md", "inhibits", &inhibits());
 }

@@ -1,0 +1,161 @@
+//! What holds after every tick, whatever was sent. Worked out from the inputs and the replies alone, not by the firmware's
+//! own functions: a condition that the firmware forgets is still known here.
+
+use std::collections::VecDeque;
+
+use upright::board::Output;
+use upright::control::actuator::Drive;
+use upright::gains::{SENSORS, STATES, TABLE};
+use upright::protocol::message::{Answer, Request, Telemetry};
+use upright::supervision::fault::{Cause, Fault};
+use upright::supervision::sign_check::Signs;
+use upright::supervision::supervisor::State;
+
+use super::simulated_rig::{SimulatedRig, Tested};
+
+/// What was known before a tick.
+pub(crate) struct Invariants {
+    state: State,
+    cause: Option<Cause>,
+    tick: u32,
+    /// Counts of the last ticks with the motor off.
+    counts: VecDeque<[i32; SENSORS]>,
+    /// When arming was last refused because of a latched fault, or soon after that.
+    arm_held_at: Option<u32>,
+}
+
+/// Arming needs this many slow ticks.
+const SLOW_TICKS: usize = TABLE.limits.arm_ticks as usize / 4;
+
+impl Invariants {
+    pub(crate) fn new(firmware: &Tested) -> Self {
+        let (state, cause) = (firmware.state(), firmware.cause());
+        Self { state, cause, tick: 0, counts: VecDeque::new(), arm_held_at: None }
+    }
+
+    /// Checks a tick; `answered` is the request whose reply it gave.
+    pub(crate) fn check(
+        &mut self,
+        firmware: &Tested,
+        rig: &SimulatedRig,
+        answered: Option<&(Request, Answer)>,
+    ) {
+        self.tick += 1;
+        if self.state == State::Balancing {
+            self.counts.clear();
+        }
+        self.counts.push_back(*firmware.controller().encoders().counts());
+        if self.counts.len() > SLOW_TICKS {
+            self.counts.pop_front();
+        }
+        self.motor(firmware, rig, answered);
+        setpoint(firmware, answered);
+        self.first_cause(firmware, answered);
+        self.arming(firmware, rig, answered);
+        (self.state, self.cause) = (firmware.state(), firmware.cause());
+    }
+
+    /// The motor is on only while balancing, within its limits, and off in the tick of a fault or after a disarm.
+    fn motor(&self, firmware: &Tested, rig: &SimulatedRig, answered: Option<&(Request, Answer)>) {
+        let (before, after) = (self.state, firmware.state());
+        let Output { enable, drive } = rig.output;
+        match drive {
+            Drive::Force(force) => {
+                assert!(force.is_finite() && force.abs() <= TABLE.force_limit_n, "{force}")
+            }
+            Drive::Duty(duty) => assert!(duty.is_finite() && duty.abs() <= 1.0, "{duty}"),
+        }
+        let disarmed = matches!(answered, Some((Request::Disarm, Answer::Done)));
+        if enable {
+            assert!(matches!(before, State::Armed | State::Balancing), "motor on after {before:?}");
+            // Found in the second half of the tick; the motor is off from the next one.
+            let late =
+                firmware.cause().is_some_and(|cause| matches!(cause.fault, Fault::LinkLost | Fault::Table));
+            assert!(after == State::Balancing || disarmed || late, "motor on in {after:?}");
+            let contacts = rig.contacts;
+            assert!(!contacts.emergency_stop && !contacts.driver_fault && !contacts.clock_fault);
+            assert!(!contacts.limit_low && !contacts.limit_high && rig.supply_v.is_finite());
+        } else {
+            assert_eq!(drive, Drive::OFF);
+            assert_ne!(after, State::Balancing, "balancing with the motor off");
+        }
+        assert!(!disarmed || !matches!(after, State::Armed | State::Balancing | State::Homing), "{after:?}");
+    }
+
+    /// The first cause of a fault stays until it is cleared.
+    fn first_cause(&self, firmware: &Tested, answered: Option<&(Request, Answer)>) {
+        let cleared = matches!(answered, Some((Request::Clear, Answer::Done)));
+        if self.state == State::Fault && !cleared {
+            assert_eq!((firmware.state(), firmware.cause()), (State::Fault, self.cause));
+        }
+        assert!(firmware.state() != State::Fault || firmware.cause().is_some());
+    }
+
+    /// Nothing but a command arms, and only when no inhibit holds.
+    fn arming(&mut self, firmware: &Tested, rig: &SimulatedRig, answered: Option<&(Request, Answer)>) {
+        match answered {
+            Some((Request::Arm, Answer::Done)) => self.no_inhibit(firmware, rig),
+            Some((Request::Arm, _)) => {
+                let locked = self.arm_held_at.is_some_and(|at| self.tick - at < TABLE.limits.still_ticks);
+                if locked || firmware.state() == State::Fault {
+                    self.arm_held_at = Some(self.tick);
+                }
+            }
+            _ => assert!(firmware.state() != State::Armed || self.state == State::Armed, "armed unasked"),
+        }
+        assert!(
+            firmware.state() != State::Balancing || matches!(self.state, State::Armed | State::Balancing),
+            "balancing without having been armed"
+        );
+    }
+
+    fn no_inhibit(&self, firmware: &Tested, rig: &SimulatedRig) {
+        let limits = &TABLE.limits;
+        assert!(matches!(self.state, State::Calibrated | State::Homing), "armed in {:?}", self.state);
+        assert_eq!(firmware.calibration().signs(), Signs::Checked);
+        let contacts = rig.contacts;
+        assert!(!contacts.limit_low && !contacts.limit_high, "armed on a limit switch");
+        assert!(!contacts.emergency_stop && !contacts.driver_fault && !contacts.clock_fault);
+        assert!(rig.supply_v >= limits.supply_min_v && rig.supply_v.is_finite(), "armed without supply");
+        let Some(counts) = self.counts.back() else { panic!("a tick has counts") };
+        let step = |sensor: usize| TABLE.observer.as_ref().map_or(0.0, |observer| observer.step[sensor]);
+        let position_m = step(0) * counts[0] as f32;
+        let [low, high] = limits.rail_m;
+        assert!((low..=high).contains(&position_m), "armed off centre");
+        let mut angle = 0.0;
+        for sensor in 1..SENSORS {
+            let turn = limits.turn_counts[sensor];
+            let nearest = (f64::from(counts[sensor]) / f64::from(turn)).round() * f64::from(turn);
+            angle += step(sensor) * (f64::from(counts[sensor]) - nearest) as f32;
+            assert!(angle.abs() <= limits.arm_angle_rad * 1.0001, "armed while tilted");
+        }
+        for sensor in 0..SENSORS {
+            let all = || self.counts.iter().map(|counts| counts[sensor]);
+            let (least, most) = (all().min().unwrap_or_default(), all().max().unwrap_or_default());
+            assert!(most.wrapping_sub(least) <= 2 * limits.slow_counts[sensor], "armed while moving");
+        }
+        let held = self.arm_held_at.is_some_and(|at| self.tick - at < limits.still_ticks);
+        assert!(!held, "armed by a command that was held since the fault");
+    }
+}
+
+/// A set-point that is taken is finite and on the rail, and so is the one that the law follows.
+fn setpoint(firmware: &Tested, answered: Option<&(Request, Answer)>) {
+    let [low, high] = TABLE.limits.rail_m;
+    if let Some((Request::Setpoint(wanted), answer)) = answered {
+        let good = (low..=high).contains(wanted);
+        assert_eq!(*answer == Answer::Done, good, "set-point {wanted}: {answer:?}");
+    }
+    let controller = firmware.controller();
+    for setpoint in [controller.setpoint(), controller.law_state().setpoint] {
+        assert!((low..=high).contains(&setpoint), "set-point {setpoint}");
+    }
+}
+
+/// All numbers of a telemetry are finite, and the force is within its limit.
+pub(crate) fn telemetry(telemetry: &Telemetry<STATES, SENSORS>) {
+    let vectors = telemetry.estimate.iter().chain(&telemetry.innovation);
+    let numbers = [telemetry.setpoint_m, telemetry.requested_n, telemetry.applied_n, telemetry.drive];
+    assert!(vectors.chain(&numbers).all(|number| number.is_finite()), "{telemetry:?}");
+    assert!(telemetry.applied_n.abs() <= TABLE.force_limit_n, "{telemetry:?}");
+}

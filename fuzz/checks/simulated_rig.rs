@@ -1,0 +1,145 @@
+//! A board with a rig behind it that is cheap to simulate: the observer's own model while the motor is on, a hand that
+//! holds the rig while it is off.
+
+use upright::board::{Board, Contacts, Inputs, Output};
+use upright::control::actuator::Drive;
+use upright::control::encoder::CounterWidth;
+use upright::firmware::Firmware;
+use upright::gains::{RIG_HASH, SENSORS, STATES, TABLE, TICK_S};
+use upright::protocol::message::{Answer, Command, Request, Reset};
+use upright::supervision::sign_check::Signs;
+use upright::supervision::supervisor::State;
+use upright::table::Build;
+
+/// The whole firmware with the committed gains.
+pub(crate) type Tested = Firmware<'static, STATES, SENSORS>;
+
+/// Rig, contacts and supply, and the last output to the motor.
+#[derive(Clone)]
+pub(crate) struct SimulatedRig {
+    state: [f32; STATES],
+    /// Counts that are added to those of the simulated state: the hand moves something.
+    pub(crate) offset: [i32; SENSORS],
+    pub(crate) contacts: Contacts,
+    pub(crate) supply_v: f32,
+    pub(crate) output: Output,
+}
+
+impl SimulatedRig {
+    fn new() -> Self {
+        let offset = TABLE.limits.rest_counts;
+        let contacts = Contacts::default();
+        Self { state: [0.0; STATES], offset, contacts, supply_v: 24.0, output: Output::OFF }
+    }
+
+    /// One tick under the output's force; the hand stops the rig when the motor is off.
+    fn advance(&mut self) {
+        let observer = TABLE.observer.as_ref().expect("the committed table has an observer");
+        if !self.output.enable {
+            self.state.iter_mut().skip(1).step_by(2).for_each(|rate| *rate = 0.0);
+            return;
+        }
+        let force = match self.output.drive {
+            Drive::Force(force) => force,
+            Drive::Duty(duty) => duty * TABLE.force_limit_n,
+        };
+        let mut next = [0.0; STATES];
+        for (row, next) in next.iter_mut().enumerate() {
+            let products = self.state.iter().enumerate().map(|(column, x)| observer.ad[(row, column)] * x);
+            *next = products.sum::<f32>() + observer.bd[row] * force;
+        }
+        self.state = next;
+    }
+}
+
+impl Board<SENSORS> for SimulatedRig {
+    const WIDTHS: [CounterWidth; SENSORS] = [CounterWidth::Bits32; SENSORS];
+
+    fn inputs(&mut self) -> Inputs<SENSORS> {
+        let mut raw_counts = [0; SENSORS];
+        for (sensor, raw) in raw_counts.iter_mut().enumerate() {
+            let counts = self.state[2 * sensor] / TABLE.observer.as_ref().map_or(1.0, |o| o.step[sensor]);
+            *raw = (counts.round() as i32).wrapping_add(self.offset[sensor]) as u32;
+        }
+        Inputs { raw_counts, supply_v: self.supply_v, contacts: self.contacts }
+    }
+
+    fn drive(&mut self, output: &Output) {
+        self.output = *output;
+        self.advance();
+    }
+
+    fn feed_watchdog(&mut self) {}
+
+    fn cycles(&self) -> u32 {
+        0
+    }
+}
+
+/// Firmware and rig in a state to start from.
+#[derive(Clone)]
+pub(crate) struct Start {
+    pub(crate) firmware: Tested,
+    pub(crate) rig: SimulatedRig,
+    /// Id of the last command.
+    pub(crate) id: u64,
+}
+
+impl Start {
+    fn tick(&mut self, request: Option<Request>) -> Option<Answer> {
+        let inputs = self.rig.inputs();
+        let output = self.firmware.control(&inputs);
+        self.rig.drive(&output);
+        let command = request.map(|request| {
+            self.id += 1;
+            Command { id: self.id, request }
+        });
+        self.firmware.finish(command.as_ref(), 0).1.map(|reply| reply.answer)
+    }
+
+    fn wait(&mut self, ticks: u32) {
+        for _ in 0..ticks {
+            self.tick(None);
+        }
+    }
+
+    fn ask(&mut self, request: Request) {
+        assert_eq!(self.tick(Some(request)), Some(Answer::Done), "{request:?}");
+    }
+}
+
+/// The way from power-up to balancing as a person goes it, with the states on it: `[hanging, raised, armed, balancing]`.
+///
+/// Hanging is just powered up; raised is homed, checked, upright and still; armed is two ticks before balancing.
+pub(crate) fn starts() -> [Start; 4] {
+    let limits = &TABLE.limits;
+    let build = Build { rig_hash: RIG_HASH, tick_s: TICK_S };
+    let firmware = Firmware::new(&TABLE, &build, SimulatedRig::WIDTHS, Reset::Power).expect("a sound table");
+    let mut start = Start { firmware, rig: SimulatedRig::new(), id: 0 };
+    start.wait(limits.still_ticks + 1);
+    let hanging = start.clone();
+    start.ask(Request::Home);
+    start.ask(Request::CheckSigns);
+    while start.firmware.calibration().signs() != Signs::Checked {
+        start.rig.offset = limits.rest_counts;
+        match start.firmware.calibration().signs() {
+            Signs::Rest(_) => start.wait(limits.still_ticks + 1),
+            Signs::Move(sensor) => {
+                start.rig.offset[usize::from(sensor)] += limits.sign_counts[usize::from(sensor)];
+                start.wait(1);
+            }
+            signs => panic!("{signs:?}"),
+        }
+    }
+    start.rig.offset = [0; SENSORS];
+    start.wait(limits.arm_ticks + 1);
+    let raised = start.clone();
+    start.ask(Request::Arm);
+    start.wait(limits.arm_ticks - 2);
+    let armed = start.clone();
+    assert_eq!(armed.firmware.state(), State::Armed);
+    start.wait(3);
+    assert_eq!(start.firmware.state(), State::Balancing);
+    start.wait(50);
+    [hanging, raised, armed, start]
+}
