@@ -52,7 +52,7 @@ use upright_design::verify::VerifyError;
 pub enum ReproduceError {
     /// A rig file of the paper is not there.
     #[error(
-        "{}: there is no such file: run this in a checkout of Upright, or name the folder of its rig files with --rigs",
+        "{}: there is no such file: name the folder of the rig files of a checkout of Upright with --rigs",
         .0.display()
     )]
     NoRigs(PathBuf),

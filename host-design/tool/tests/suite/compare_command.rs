@@ -135,6 +135,14 @@ fn the_paper_is_reproduced_from_any_folder() {
 }
 
 #[test]
+fn a_folder_without_the_papers_rig_files_is_an_error_of_the_user() {
+    let folder = tempfile::tempdir().unwrap();
+    let output = upright(&["reproduce", "--no-write", "--rigs", folder.path().to_str().unwrap()]);
+    assert_eq!(status(&output), 2);
+    assert!(stderr(&output).contains("quadruple-paper.toml"), "{}", stderr(&output));
+}
+
+#[test]
 fn a_folder_that_cannot_be_made_is_said_before_anything_is_written() {
     let folder = tempfile::tempdir().unwrap();
     let file = folder.path().join("file");
@@ -142,7 +150,7 @@ fn a_folder_that_cannot_be_made_is_said_before_anything_is_written() {
     let output = upright(&["reproduce", "--out", file.join("below").to_str().unwrap()]);
     assert_eq!(status(&output), 2);
     assert!(
-        stderr(&output).contains("--out") && stderr(&output).contains("cannot be made"),
+        stderr(&output).contains("--out") && stderr(&output).contains("cannot be created"),
         "{}",
         stderr(&output)
     );

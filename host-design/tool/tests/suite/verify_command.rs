@@ -185,3 +185,16 @@ fn a_rig_that_is_not_there_or_an_argument_without_sense_is_not_a_failed_requirem
     assert_eq!(status(&verify(&rig_path(SINGLE), &["--runs", "0"], None)), 2);
     assert_eq!(status(&verify(&rig_path(SINGLE), &["--replay", "1"], None)), 2);
 }
+
+#[test]
+fn the_documentation_lists_every_row_with_its_meaning() {
+    let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs/trust.md");
+    let page = std::fs::read_to_string(file).unwrap();
+    let has = |name: &str, meaning: &str| page.contains(&format!("| `{name}` | {meaning} |"));
+    for quantity in upright_design::verify::quantities() {
+        let several = quantity.name.strip_suffix(' ').map(|name| format!("{name} …"));
+        let name = several.as_deref().unwrap_or(quantity.name);
+        assert!(has(name, quantity.meaning), "docs/trust.md: | `{name}` | {} |", quantity.meaning);
+        assert!(!has(name, "something else"));
+    }
+}

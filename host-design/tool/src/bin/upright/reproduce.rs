@@ -5,6 +5,7 @@ use std::path::PathBuf;
 
 use clap::Args;
 use upright_design::table::write_atomically;
+use upright_tool::project::checkout;
 use upright_tool::reproduce::{PaperRigs, STAGES, reproduce};
 
 use crate::failure::Failure;
@@ -19,9 +20,9 @@ Examples:
   upright reproduce --rigs ../upright/rigs --out paper      from another folder
   upright reproduce --no-write --json | jq '.designs.rows[] | select(.verdict != \"every_digit\")'")]
 pub(crate) struct Reproduce {
-    /// Folder of the rig files quadruple-paper.toml and quadruple-paper-printed.toml
-    #[arg(long, value_name = "DIR", default_value = "rigs")]
-    rigs: PathBuf,
+    /// Folder of quadruple-paper.toml and quadruple-paper-printed.toml [default: rigs of the checkout]
+    #[arg(long, value_name = "DIR")]
+    rigs: Option<PathBuf>,
     /// Folder for summary.md and all figures (SVG) and their data (CSV)
     #[arg(long, value_name = "DIR", default_value = "reproduced")]
     out: PathBuf,
@@ -35,7 +36,7 @@ pub(crate) struct Reproduce {
 
 impl Reproduce {
     pub(crate) fn run(self) -> Result<(), Failure> {
-        let rigs = PaperRigs::from_folder(&self.rigs)?;
+        let rigs = PaperRigs::from_folder(&self.rigs.map_or_else(default_rigs, Ok)?)?;
         if !self.no_write {
             std::fs::create_dir_all(&self.out).map_err(|error| {
                 Failure::BadArgument(format!("--out {}: cannot be created: {error}", self.out.display()))
@@ -58,4 +59,11 @@ impl Reproduce {
         }
         Ok(())
     }
+}
+
+fn default_rigs() -> Result<PathBuf, Failure> {
+    let checkout = checkout().map_err(|error| {
+        Failure::BadArgument(format!("{error}; or name the folder of the paper's rig files with --rigs"))
+    })?;
+    Ok(checkout.join("rigs"))
 }
