@@ -12,11 +12,13 @@
 //! are written in `x, φ`, where the mass matrix is simple (see [`ChainParameters`]).
 //!
 //! - [`ChainParameters`]: the constants of the equations, in any precision.
+//! - [`absolute_angles`]: the angles `φ` of a state.
 //! - [`linearise`]: the exact linear model about an equilibrium, in any precision.
 //! - [`ChainPlant`]: the nonlinear equations in `f64`, fast, with n in the type.
 //! - [`Plant`]: what a simulation of any size needs; [`chain_plant`] and [`LinearSimulation`] provide it.
 //! - [`reference::integrate`]: an adaptive integrator of high order, to judge the fast one by.
 
+mod angles;
 mod chain;
 mod linear;
 mod linear_simulation;
@@ -27,6 +29,7 @@ mod rk4;
 mod simulation;
 mod sincos;
 
+pub use angles::absolute_angles;
 pub use chain::{ChainPlant, ChainState, Energy};
 pub use linear::{Equilibrium, LinearModel, linearise};
 pub use linear_simulation::LinearSimulation;

@@ -7,9 +7,15 @@ use std::fmt::Display;
 
 use crate::number::significant;
 
+use super::key::{Absent, Key, Keys, Section};
+use super::sections::actuator::ACTUATOR;
+use super::sections::chain::{CART, GRAVITY, LINK};
+use super::sections::integral::INTEGRAL;
+use super::sections::limits::LIMITS;
+use super::sections::tick::TICK;
+use super::sections::verify::VERIFY;
 use super::{
-    Actuator, Chain, Kalman, Limits, LinearPlant, Link, LinkEncoder, Lqr, Motor, PlantDescription,
-    PolePlacement, Rig, defaults,
+    Actuator, Chain, Kalman, LinearPlant, Link, LinkEncoder, Lqr, Motor, PlantDescription, PolePlacement, Rig,
 };
 
 const DEFAULT: &str = "(default)";
@@ -26,13 +32,11 @@ impl Rig {
             PlantDescription::Model(model) => page.model(model),
         }
         page.actuator(&self.actuator);
-        page.heading("tick");
-        page.value("period", self.tick.period_s, "s", mark(self.tick.period_s == defaults::PERIOD_S));
+        page.section(&TICK, &self.tick);
         page.value("rate", 1.0 / self.tick.period_s, "Hz", "");
-        let delay = f64::from(self.tick.delay_ticks);
-        page.value("delay", delay, "ticks", mark(self.tick.delay_ticks == defaults::DELAY_TICKS));
         page.design(self);
-        page.limits(&self.limits);
+        page.section(&LIMITS, &self.limits);
+        page.section(&VERIFY, &self.verify);
         page.text
     }
 }
@@ -60,16 +64,50 @@ impl Page {
     }
 
     fn value(&mut self, name: &str, x: f64, unit: &str, remark: &str) {
-        let line = format!("  {name:<26}{:>12} {unit:<12}{remark}", digits(x));
-        self.text.push_str(line.trim_end());
-        self.text.push('\n');
+        self.line(name, &digits(x), unit, remark);
     }
 
-    fn value_or_none(&mut self, name: &str, x: Option<f64>, unit: &str) {
-        match x {
-            Some(x) => self.value(name, x, unit, ""),
-            None => self.note(name, "none"),
+    /// A section of scalars under its heading.
+    fn section<T: Keys>(&mut self, section: &Section, values: &T) {
+        self.heading(section.name.replace('_', " "));
+        self.rows(section, values);
+    }
+
+    fn rows<T: Keys>(&mut self, section: &Section, values: &T) {
+        for (key, numbers) in T::KEYS.iter().zip(values.values()) {
+            self.row(section, key, &numbers);
         }
+    }
+
+    /// A key with its numbers; without any, with what holds instead.
+    fn row(&mut self, section: &Section, key: &Key, numbers: &[f64]) {
+        let label = match key.label() {
+            label if label.is_empty() => section.name.to_owned(),
+            label => label,
+        };
+        let (numbers, remark) = match key.absent {
+            Absent::Numbers(usual) if numbers.is_empty() || numbers == usual => (usual, DEFAULT),
+            _ => (numbers, ""),
+        };
+        match numbers {
+            [] => {
+                let text = key.absent.to_string();
+                // What follows the semicolon is for other rigs.
+                self.list(&label, text.split(';').take(1).map(str::to_owned), DEFAULT);
+            }
+            [number] => self.value(&label, *number, key.unit, remark),
+            _ => {
+                let all: Vec<_> = numbers.iter().map(|&x| digits(x)).collect();
+                let text = format!("[{}]", all.join(", "));
+                self.line(&label, &text, key.unit, remark);
+            }
+        }
+    }
+
+    fn line(&mut self, name: &str, text: &str, unit: &str, remark: &str) {
+        let line = format!("  {name:<26}{text:>12} {unit:<12}{remark}");
+        self.text.push_str(line.trim_end());
+        self.text.push('\n');
     }
 
     fn note(&mut self, name: &str, note: &str) {
@@ -105,64 +143,28 @@ impl Page {
         let n = chain.links.len();
         let length: f64 = chain.links.iter().map(|link| link.length_m).sum();
         let mass: f64 = chain.cart.mass_kg + chain.links.iter().map(|link| link.mass_kg).sum::<f64>();
-        let gravity = chain.gravity_m_per_s2;
         self.value("links on a cart", n as f64, "", "");
         self.value("states", (2 * n + 2) as f64, "", "");
         self.value("total mass", mass, "kg", "");
         self.value("total length", length, "m", "");
-        self.value("gravity", gravity, "m/s²", mark(gravity == defaults::GRAVITY_M_PER_S2));
-
-        let cart = &chain.cart;
-        self.heading("cart");
-        self.value("mass", cart.mass_kg, "kg", "");
-        let friction = cart.friction_n_s_per_m;
-        self.value("viscous friction", friction, "N·s/m", mark(friction == defaults::FRICTION));
-        let [low, high] = cart.travel_m;
-        let travel = mark(cart.travel_m == defaults::TRAVEL_M);
-        self.value("rail from", low, "m", travel);
-        self.value("rail to", high, "m", travel);
-        self.value_or_none("encoder step", cart.encoder_step_m, "m");
+        self.row(&GRAVITY, GRAVITY.key("m_per_s2"), &[chain.gravity_m_per_s2]);
+        self.section(&CART, &chain.cart);
         for (index, link) in chain.links.iter().enumerate() {
             self.heading(format!("link {}", index + 1));
             self.link(link);
         }
     }
 
-    fn limits(&mut self, limits: &Limits) {
-        self.heading("limits");
-        self.value_or_none("angle", limits.angle_rad, "rad");
-        self.value_or_none("cart speed", limits.speed_m_per_s, "m/s");
-        let mut value_or = |name: &str, x: Option<f64>, unit: &str, otherwise: &str| match x {
-            Some(x) => self.value(name, x, unit, ""),
-            None => self.list(name, [otherwise.to_owned()], DEFAULT),
-        };
-        value_or("rail margin", limits.rail_margin_m, "m", "2.5 % of the rail");
-        value_or("travel tolerance", limits.travel_tolerance_m, "m", "1 % of the rail");
-        value_or("least supply", limits.supply_min_v, "V", "80 % of supply_v");
-        value_or("begins within", limits.arm_angle_rad, "rad", "a tenth of the angle");
-        let usual = Limits::default();
-        let mut value =
-            |name: &str, x: f64, unit: &str, usual: f64| self.value(name, x, unit, mark(x == usual));
-        value("begins below", limits.arm_rate_rad_per_s, "rad/s", usual.arm_rate_rad_per_s);
-        value("begins below", limits.arm_speed_m_per_s, "m/s", usual.arm_speed_m_per_s);
-        value("begins after", limits.arm_time_s, "s", usual.arm_time_s);
-        value("still for homing", limits.still_time_s, "s", usual.still_time_s);
-        value("supply too low for", limits.supply_time_s, "s", usual.supply_time_s);
-        value("saturated for", limits.saturation_time_s, "s", usual.saturation_time_s);
-        value("host silent for", limits.link_timeout_s, "s", usual.link_timeout_s);
-        value("false alarm every", limits.false_alarm_h, "h", usual.false_alarm_h);
-    }
-
     fn link(&mut self, link: &Link) {
         let &Link { mass_kg, length_m, .. } = link;
-        self.value("mass", mass_kg, "kg", "");
-        self.value("length", length_m, "m", "");
         let centre = link.centre_of_mass_m.unwrap_or(length_m / 2.0);
-        self.value("centre of mass from joint", centre, "m", mark(link.centre_of_mass_m.is_none()));
         let inertia = link.inertia_kg_m2.unwrap_or(mass_kg * length_m * length_m / 12.0);
+        let given = |name| LINK.key(name);
+        self.row(&LINK, given("mass_kg"), &[mass_kg]);
+        self.row(&LINK, given("length_m"), &[length_m]);
+        self.value("centre of mass from joint", centre, "m", mark(link.centre_of_mass_m.is_none()));
         self.value("inertia about it", inertia, "kg·m²", mark(link.inertia_kg_m2.is_none()));
-        let friction = link.friction_n_m_s_per_rad;
-        self.value("viscous joint friction", friction, "N·m·s/rad", mark(friction == defaults::FRICTION));
+        self.row(&LINK, given("friction_n_m_s_per_rad"), &[link.friction_n_m_s_per_rad]);
         match link.encoder {
             Some(LinkEncoder::StepRad(step)) => self.value("encoder step", step, "rad", ""),
             Some(LinkEncoder::CountsPerRev(counts)) => {
@@ -174,7 +176,7 @@ impl Page {
 
     fn model(&mut self, model: &LinearPlant) {
         self.value("states of a linear model", model.b.len() as f64, "", "");
-        self.value("controlled state", model.output as f64, "", mark(model.output == defaults::OUTPUT));
+        self.value("controlled state", model.output as f64, "", mark(model.output == 0));
         let indices = model.measured.iter().map(usize::to_string);
         self.list("measured states", indices, mark(model.measured == [model.output]));
         match &model.measured_steps[..] {
@@ -197,7 +199,8 @@ impl Page {
 
     fn actuator(&mut self, actuator: &Actuator) {
         self.heading("actuator");
-        self.value_or_none("force limit", actuator.force_limit_n, "N");
+        let limit = ACTUATOR.key("force_limit_n");
+        self.row(&ACTUATOR, limit, actuator.force_limit_n.as_slice());
         match &actuator.motor {
             None => self.note("motor", "none"),
             Some(motor) => self.motor(motor),
@@ -206,13 +209,7 @@ impl Page {
 
     fn motor(&mut self, motor: &Motor) {
         let volts_per_speed = motor.volts_per_speed();
-        self.value("torque constant", motor.torque_constant_n_m_per_a, "N·m/A", "");
-        self.value("winding resistance", motor.resistance_ohm, "Ω", "");
-        self.value("gear ratio", motor.gear_ratio, "", mark(motor.gear_ratio == defaults::GEAR_RATIO));
-        self.value("pulley radius", motor.pulley_radius_m, "m", "");
-        self.value("supply", motor.supply_v, "V", "");
-        self.value("dead zone", motor.dead_zone_v, "V", mark(motor.dead_zone_v == defaults::DEAD_ZONE_V));
-        self.value_or_none("slew", motor.slew_v_per_s, "V/s");
+        self.rows(&ACTUATOR, motor);
         self.value("force at standstill", motor.stall_force_n(), "N", "(largest)");
         self.value("speed without load", motor.supply_v / volts_per_speed, "m/s", "(largest)");
         // (gear Kt / r)² / R: back-EMF acts on the cart as viscous friction.
@@ -250,8 +247,7 @@ impl Page {
             self.numbers("joint noise intensities", joint_noise, "(N·m)²·s");
         }
         if let Some(integral) = &rig.integral {
-            self.heading("integral");
-            self.value("position weight", integral.position_weight, "", "");
+            self.section(&INTEGRAL, integral);
         }
     }
 }

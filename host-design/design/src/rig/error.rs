@@ -5,7 +5,8 @@ use std::path::{Path, PathBuf};
 
 use thiserror::Error;
 
-use super::load::MAX_BYTES;
+/// Largest rig file accepted (bytes): a hundred times what the longest sensible one needs.
+pub const MAX_BYTES: u64 = 1 << 20;
 
 /// A rig file that cannot be used.
 ///

@@ -4,17 +4,14 @@ use std::fs::File;
 use std::io::{self, Read};
 use std::path::Path;
 
-use super::error::{RigError, RigErrorKind};
+use super::error::{MAX_BYTES, RigError, RigErrorKind};
 use super::node::Source;
-use super::{Rig, parse};
-
-/// Largest rig file accepted (bytes): a hundred times what the longest sensible one needs.
-pub const MAX_BYTES: u64 = 1 << 20;
+use super::{Rig, read};
 
 impl Rig {
     /// Reads and checks the rig file at `file`.
     pub fn from_path(file: &Path) -> Result<Rig, RigError> {
-        let bytes = read(file).map_err(|kind| RigError::of_file(file, kind))?;
+        let bytes = bytes(file).map_err(|kind| RigError::of_file(file, kind))?;
         match std::str::from_utf8(&bytes) {
             Ok(text) => Rig::from_toml(text, file),
             Err(error) => {
@@ -31,12 +28,12 @@ impl Rig {
         if text.len() as u64 > MAX_BYTES {
             return Err(RigError::of_file(file, RigErrorKind::TooLarge));
         }
-        parse::rig(&Source { file, text })
+        read::rig(&Source { file, text })
     }
 }
 
 /// The bytes of a file that is small enough.
-fn read(file: &Path) -> Result<Vec<u8>, RigErrorKind> {
+fn bytes(file: &Path) -> Result<Vec<u8>, RigErrorKind> {
     let about = std::fs::metadata(file).map_err(refusal)?;
     if about.is_dir() {
         return Err(RigErrorKind::Directory);

@@ -6,6 +6,7 @@ use std::path::Path;
 use toml_edit::{ArrayOfTables, Document, Item, TableLike, Value};
 
 use super::error::{Place, RigError, RigErrorKind};
+use super::key::{self, Section};
 use super::rule::Rule;
 
 /// A rig file's text and name.
@@ -125,10 +126,10 @@ impl<'a> Node<'a> {
             let found = self.source.text.get(self.span.clone()).map(excerpt).unwrap_or_default();
             return Err(self.error(RigErrorKind::NotFinite { found, remedy }));
         }
-        if !Rule::SANE.admits(value) {
+        if !Rule::SANE.admits(&[value]) {
             return Err(self.out_of_range(Rule::SANE.accepts, &remedy));
         }
-        if !rule.admits(value) {
+        if !rule.admits(&[value]) {
             return Err(self.out_of_range(rule.accepts, &remedy));
         }
         // Adding zero turns -0.0 into 0.0, which are one value and must hash as one.
@@ -196,15 +197,16 @@ impl<'a> Node<'a> {
         })
     }
 
-    /// A table.
-    pub(super) fn section(&self, known: &[&str]) -> Result<Section<'a>, RigError> {
+    /// A table that holds keys of `section` only.
+    pub(super) fn table(&self, section: &'static Section) -> Result<Table<'a>, RigError> {
         let Found::Table(table) = self.found else {
             let remedy = format!("write it as [{0}] with its keys below", self.key);
             return Err(self.wrong_type("a table", &remedy));
         };
-        let section = Section { source: self.source, key: self.key.clone(), start: self.span.start, table };
-        section.only(known)?;
-        Ok(section)
+        let table =
+            Table { source: self.source, section, key: self.key.clone(), start: self.span.start, table };
+        table.only(&section.keys().map(|key| key.name).collect::<Vec<_>>())?;
+        Ok(table)
     }
 }
 
@@ -215,23 +217,26 @@ fn of_value(value: &Value) -> Found<'_> {
     }
 }
 
-/// A table with its key and place.
-pub(super) struct Section<'a> {
+/// A table of the file with its key and place.
+pub(super) struct Table<'a> {
     source: &'a Source<'a>,
+    section: &'static Section,
     key: String,
     start: usize,
     table: &'a dyn TableLike,
 }
 
-impl<'a> Section<'a> {
-    /// The document itself; `known` are the keys and tables it may hold.
+impl<'a> Table<'a> {
+    /// The document itself: the keys of `section`, and the sections of these names.
     pub(super) fn root(
         source: &'a Source<'a>,
         document: &'a Document<&'a str>,
-        known: &[&str],
+        section: &'static Section,
+        sections: &[&str],
     ) -> Result<Self, RigError> {
-        let root = Section { source, key: String::new(), start: 0, table: document.as_table() };
-        root.only(known)?;
+        let root = Table { source, section, key: String::new(), start: 0, table: document.as_table() };
+        let keys: Vec<_> = section.keys().map(|key| key.name).chain(sections.iter().copied()).collect();
+        root.only(&keys)?;
         Ok(root)
     }
 
@@ -269,30 +274,39 @@ impl<'a> Section<'a> {
         Some(Node { source: self.source, key: self.full_key(name), span, found })
     }
 
-    /// An error saying that a key is absent. `meaning` completes "add".
-    pub(super) fn missing(&self, name: &str, meaning: &str) -> RigError {
-        let remedy = meaning.to_owned();
+    /// An error saying that a key is absent. `remedy` completes "add".
+    pub(super) fn missing(&self, name: &str, remedy: &str) -> RigError {
+        let remedy = remedy.to_owned();
         self.source.error(self.start, Some(self.full_key(name)), RigErrorKind::MissingKey { remedy })
     }
 
-    /// The value of a key that must be given.
-    pub(super) fn need(&self, name: &str, meaning: &str) -> Result<Node<'a>, RigError> {
-        self.get(name).ok_or_else(|| self.missing(name, meaning))
+    /// What a key is to be given as: completes "give" and "add".
+    pub(super) fn asks_for(&self, name: &str) -> String {
+        self.section.asks_for(self.section.key(name))
     }
 
-    /// A number that must be given.
-    pub(super) fn number(&self, name: &str, rule: Rule, meaning: &str) -> Result<f64, RigError> {
-        self.need(name, meaning)?.number(rule, meaning)
+    /// The value of a key or section that must be given. `remedy` completes "add".
+    pub(super) fn need(&self, name: &str, remedy: &str) -> Result<Node<'a>, RigError> {
+        self.get(name).ok_or_else(|| self.missing(name, remedy))
     }
 
-    /// A number that may be given.
-    pub(super) fn number_if_given(
-        &self,
-        name: &str,
-        rule: Rule,
-        meaning: &str,
-    ) -> Result<Option<f64>, RigError> {
-        self.get(name).map(|node| node.number(rule, meaning)).transpose()
+    /// The value of a key that must be given, whatever it is.
+    pub(super) fn required(&self, name: &str) -> Result<Node<'a>, RigError> {
+        self.need(name, &self.asks_for(name))
+    }
+
+    /// A list of exactly `length` numbers that must be given.
+    pub(super) fn numbers(&self, name: &str, length: usize, entries: Rule) -> Result<Vec<f64>, RigError> {
+        self.required(name)?.numbers(length, entries, &self.asks_for(name))
+    }
+
+    /// The value of a key as its row says.
+    pub(super) fn value<V: key::Value>(&self, name: &str) -> Result<V, RigError> {
+        let key = self.section.key(name);
+        match self.get(name) {
+            Some(node) => V::read(&node, key.rule, &self.section.asks_for(key)),
+            None => V::when_absent(key.absent).ok_or_else(|| self.missing(name, &self.section.asks_for(key))),
+        }
     }
 
     /// Rejects two keys that exclude each other; the error stands at the second.

@@ -2,48 +2,74 @@
 
 use std::f64::consts::PI;
 
-/// A condition on a number, and its wording.
-#[derive(Clone, Copy)]
-pub(super) struct Rule {
-    /// What is accepted, for messages.
-    pub(super) accepts: &'static str,
-    admits: fn(f64) -> bool,
+/// A condition on a number or on a pair of numbers, and its wording in messages and in the documentation.
+#[derive(Debug, Clone, Copy)]
+pub struct Rule {
+    /// What is accepted: `a number > 0`.
+    pub accepts: &'static str,
+    admits: fn(&[f64]) -> bool,
 }
 
 impl Rule {
     /// Every number of a rig file: squares and products of these stay far from overflow and underflow.
     pub(super) const SANE: Rule = Rule {
         accepts: "0, or a number of magnitude 1e-30 to 1e15",
-        admits: |x| x == 0.0 || (1e-30..=1e15).contains(&x.abs()),
+        admits: |x| x.iter().all(|&x| x == 0.0 || (1e-30..=1e15).contains(&x.abs())),
     };
     /// No further condition.
-    pub(super) const ANY: Rule = Rule { accepts: "a number", admits: |_| true };
+    pub(super) const ANY: Rule = Rule::checked_by_its_section("a number");
     /// Above zero.
-    pub(super) const POSITIVE: Rule = Rule { accepts: "a number > 0", admits: |x| x > 0.0 };
+    pub(super) const POSITIVE: Rule =
+        Rule { accepts: "a number > 0", admits: |x| x.iter().all(|&x| x > 0.0) };
     /// Zero or above.
-    pub(super) const NOT_NEGATIVE: Rule = Rule { accepts: "a number >= 0", admits: |x| x >= 0.0 };
+    pub(super) const NOT_NEGATIVE: Rule =
+        Rule { accepts: "a number >= 0", admits: |x| x.iter().all(|&x| x >= 0.0) };
     /// Below zero.
-    pub(super) const NEGATIVE: Rule = Rule { accepts: "a number < 0", admits: |x| x < 0.0 };
+    pub(super) const NEGATIVE: Rule =
+        Rule { accepts: "a number < 0", admits: |x| x.iter().all(|&x| x < 0.0) };
     /// A control period (s).
-    pub(super) const PERIOD: Rule =
-        Rule { accepts: "a number from 1e-6 to 10 (s)", admits: |x| (1e-6..=10.0).contains(&x) };
-    /// An overshoot in percent.
+    pub(super) const PERIOD: Rule = Rule {
+        accepts: "a number from 1e-6 to 10 (s)",
+        admits: |x| x.iter().all(|&x| (1e-6..=10.0).contains(&x)),
+    };
+    /// A share (%).
     pub(super) const PERCENT: Rule =
-        Rule { accepts: "a number > 0 and < 100 (%)", admits: |x| x > 0.0 && x < 100.0 };
+        Rule { accepts: "a number > 0 and < 100 (%)", admits: |x| x.iter().all(|&x| x > 0.0 && x < 100.0) };
     /// An angle up to half a turn (rad).
     pub(super) const ANGLE: Rule =
-        Rule { accepts: "a number > 0 and <= pi (rad)", admits: |x| x > 0.0 && x <= PI };
+        Rule { accepts: "a number > 0 and <= pi (rad)", admits: |x| x.iter().all(|&x| x > 0.0 && x <= PI) };
     /// A time that the supervisor counts in ticks (s).
     pub(super) const DURATION: Rule =
-        Rule { accepts: "a number > 0 and <= 60 (s)", admits: |x| x > 0.0 && x <= 60.0 };
+        Rule { accepts: "a number > 0 and <= 60 (s)", admits: |x| x.iter().all(|&x| x > 0.0 && x <= 60.0) };
     /// A mean time between false alarms (h).
-    pub(super) const FALSE_ALARM: Rule =
-        Rule { accepts: "a number from 1 to 1e9 (h)", admits: |x| (1.0..=1e9).contains(&x) };
+    pub(super) const FALSE_ALARM: Rule = Rule {
+        accepts: "a number from 1 to 1e9 (h)",
+        admits: |x| x.iter().all(|&x| (1.0..=1e9).contains(&x)),
+    };
     /// Encoder counts per revolution.
-    pub(super) const COUNTS: Rule = Rule { accepts: "a number >= 2", admits: |x| x >= 2.0 };
+    pub(super) const COUNTS: Rule =
+        Rule { accepts: "a number >= 2", admits: |x| x.iter().all(|&x| x >= 2.0) };
+    /// No tick of delay or one.
+    pub(super) const ZERO_OR_ONE: Rule =
+        Rule { accepts: "0 or 1", admits: |x| x.iter().all(|&x| x == 0.0 || x == 1.0) };
+    /// Two ends with the origin between them.
+    pub(super) const AROUND_ZERO: Rule = Rule {
+        accepts: "[a number < 0, a number > 0]",
+        admits: |x| matches!(*x, [low, high] if low < 0.0 && high > 0.0),
+    };
 
-    /// Whether a number is accepted.
-    pub(super) fn admits(self, x: f64) -> bool {
+    /// The wording of a condition on a list, a text, or several keys, which the section's own code checks.
+    pub(super) const fn checked_by_its_section(accepts: &'static str) -> Rule {
+        Rule { accepts, admits: |_| true }
+    }
+
+    /// The same condition in other words, for a key whose section checks more.
+    pub(super) const fn worded(self, accepts: &'static str) -> Rule {
+        Rule { accepts, ..self }
+    }
+
+    /// Whether a number, or a pair, is accepted.
+    pub(super) fn admits(self, x: &[f64]) -> bool {
         (self.admits)(x)
     }
 }

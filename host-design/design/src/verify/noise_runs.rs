@@ -5,6 +5,7 @@ use serde::Serialize;
 use upright::table::Law;
 
 use super::trial::{Disturbance, Horizon, Unverifiable, chain, scenario, trial};
+use crate::plant::absolute_angles;
 use crate::rig::Rig;
 use crate::simulate::{Scenario, SimulationError, run};
 use crate::table::TableValues;
@@ -75,10 +76,8 @@ pub fn noise_run(
             for (sum, (x, estimate)) in sums.error.iter_mut().zip(sample.state.iter().zip(sample.estimate)) {
                 *sum += (estimate - x) * (estimate - x);
             }
-            let mut phi = 0.0;
-            for (link, sum) in sums.angle.iter_mut().enumerate() {
-                phi += sample.state[2 + 2 * link];
-                *sum += phi * phi;
+            for (sum, angle) in sums.angle.iter_mut().zip(absolute_angles(sample.state)) {
+                *sum += angle * angle;
             }
         })?;
         Ok(Sums { stands: fall.is_none(), ..sums })

@@ -4,6 +4,7 @@ use serde::Serialize;
 use upright::table::Law;
 
 use crate::design::DesignError;
+use crate::plant::absolute_angles;
 use crate::rig::{Chain, PlantDescription, Rig};
 use crate::simulate::{Fall, Scenario, SimulationError, run};
 use crate::table::{NoTable, TableValues};
@@ -166,11 +167,7 @@ fn largest_angle(rig: &Rig, state: &[f64]) -> f64 {
     if !matches!(rig.plant, PlantDescription::Chain(_)) {
         return 0.0;
     }
-    let mut phi = 0.0;
-    state[2..].chunks_exact(2).fold(0.0, |largest, joint| {
-        phi += joint[0];
-        f64::max(largest, phi.abs())
-    })
+    absolute_angles(state).fold(0.0, |largest, angle| f64::max(largest, angle.abs()))
 }
 
 /// The rig's run at rest for `horizon`, with integration steps of at most 1 ms: on the fastest rig a run then differs

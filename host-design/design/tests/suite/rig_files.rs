@@ -3,7 +3,8 @@
 use std::path::{Path, PathBuf};
 
 use upright_design::rig::{
-    Actuator, Cart, Chain, Limits, Link, LinkEncoder, PlantDescription, PolePlacement, Rig, Tick,
+    Absent, Actuator, Cart, Chain, Limits, Link, LinkEncoder, PlantDescription, PolePlacement, Rig, SECTIONS,
+    TOP, Tick, defaults, key_table, unit_in_names,
 };
 
 const MINIMAL: &str = r#"
@@ -209,4 +210,86 @@ fn the_description_of_a_motor_has_its_largest_force() {
     let text = rig.describe();
     // 3.71 * 0.00767 N·m/A * 10 V / (2.6 ohm * 0.00635 m)
     assert!(text.contains("17.2354 N"), "{text}");
+}
+
+/// The part of `docs/rig-file.md` between its markers.
+fn documented_keys(page: &str) -> &str {
+    let (_, rest) = page.split_once("<!-- keys -->\n").expect("no marker <!-- keys -->");
+    rest.split_once("<!-- /keys -->").expect("no marker <!-- /keys -->").0.trim()
+}
+
+#[test]
+fn the_documented_keys_are_those_of_the_code() {
+    let page = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs/rig-file.md");
+    let page = std::fs::read_to_string(page).unwrap().replace("\r\n", "\n");
+    let remedy = "paste what `upright check --keys` prints between the markers of docs/rig-file.md";
+    assert_eq!(documented_keys(&page), key_table().trim(), "{remedy}");
+    let changed = page.replacen("| `arm_rate_rad_per_s` |", "| `arm_rate` |", 1);
+    assert_ne!(documented_keys(&changed), key_table().trim());
+}
+
+/// Units are part of the names: the unit of a row and the end of its name are one.
+#[test]
+fn names_of_keys_end_in_their_unit() {
+    let ends_in_unit = |name: &str, unit: &str| name.ends_with(&unit_in_names(unit));
+    for key in SECTIONS.iter().flat_map(|section| section.keys()) {
+        // Lists of poles and encoder counts have their unit in words.
+        if !["1/s", "counts/rev"].contains(&key.unit) {
+            assert!(ends_in_unit(key.name, key.unit), "{} is not in {}", key.name, key.unit);
+        }
+    }
+    assert!(ends_in_unit("arm_rate_rad_per_s", "rad/s") && !ends_in_unit("arm_rate_rad_per_s", "m/s"));
+    assert!(ends_in_unit("inertia_kg_m2", "kg·m²") && !ends_in_unit("inertia_kg_m2", "kg·m"));
+}
+
+/// Every key of a good file is in the table, and a key that is not is refused.
+#[test]
+fn the_table_has_every_key_of_every_rig_file() {
+    for file in rig_files() {
+        let text = std::fs::read_to_string(&file).unwrap();
+        let mut section = &TOP;
+        for line in text.lines().map(str::trim) {
+            if line.starts_with('[') && !line.contains(',') {
+                let title = line.split('#').next().unwrap_or_default().trim();
+                section = SECTIONS.iter().find(|section| section.title == title).unwrap();
+            } else if let Some((name, _)) = line.split_once(" = ").filter(|_| !line.starts_with('#')) {
+                let known = section.keys().any(|key| key.name == name);
+                assert!(known, "{}: {name} in {}", file.display(), section.title);
+            }
+        }
+    }
+    assert!(TOP.keys().all(|key| key.name != "mass_kg"));
+}
+
+/// The shares that the table's words give are those the gain table is made with.
+#[test]
+fn shares_in_words_are_those_in_use() {
+    let limits = SECTIONS.iter().find(|section| section.name == "limits").unwrap();
+    let says = |name: &str, share: f64| {
+        let key = limits.keys().find(|key| key.name == name).unwrap();
+        let Absent::Follows(words) = key.absent else { panic!("{name} has no default in words") };
+        words.starts_with(&format!("{} %", 100.0 * share))
+    };
+    assert!(says("rail_margin_m", defaults::RAIL_MARGIN_SHARE) && !says("rail_margin_m", 0.1));
+    assert!(says("travel_tolerance_m", defaults::TRAVEL_TOLERANCE_SHARE));
+    assert!(says("supply_min_v", defaults::SUPPLY_SHARE));
+    assert!(says("arm_angle_rad", defaults::ARM_ANGLE_SHARE));
+}
+
+#[test]
+fn rows_of_the_description_have_names_of_their_own() {
+    for file in rig_files() {
+        let text = Rig::from_path(&file).unwrap().describe();
+        for block in text.split("\n\n") {
+            // A name takes the first 26 columns; a list goes on below an empty one.
+            let names: Vec<String> = block
+                .lines()
+                .map(|line| line.chars().skip(2).take(26).collect::<String>().trim().to_owned())
+                .filter(|name| !name.is_empty())
+                .collect();
+            for (index, name) in names.iter().enumerate() {
+                assert!(!names[..index].contains(name), "{}: {name} twice", file.display());
+            }
+        }
+    }
 }

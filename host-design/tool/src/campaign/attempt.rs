@@ -10,6 +10,7 @@ use super::observed::Observed;
 use super::trial::Trial;
 use crate::in_the_loop::{Place, RunError};
 use upright_design::harness::{HEARTBEAT_S, Harness, HarnessError};
+use upright_design::plant::absolute_angles;
 use upright_design::rig::{PlantDescription, Rig};
 use upright_design::table::TableValues;
 
@@ -154,11 +155,7 @@ impl Attempt<'_> {
         let PlantDescription::Chain(chain) = &self.rig.plant else { return false };
         let angle =
             f64::from(self.rig.limits.angle_rad.unwrap_or(f64::from(self.table.limits.angle_rad)) as f32);
-        let mut lean = 0.0;
-        let leans = state[2..].chunks_exact(2).any(|joint| {
-            lean += joint[0];
-            f64::abs(lean) > angle * (1.0 + BEYOND)
-        });
+        let leans = absolute_angles(state).any(|lean| lean.abs() > angle * (1.0 + BEYOND));
         let [low, high] = chain.cart.travel_m;
         leans || !(low..=high).contains(&state[0])
     }

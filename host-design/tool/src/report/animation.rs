@@ -4,6 +4,7 @@ use serde::Serialize;
 
 use super::runs::{Scene, law_name};
 use crate::figure::{CHROMATIC, curve_colour, reference_colour};
+use upright_design::plant::absolute_angles;
 use upright_design::rig::{PlantDescription, Rig};
 
 /// Everything the script of the page needs.
@@ -70,8 +71,6 @@ impl Animation {
                     let is_finite = |state: &[f64]| state.iter().all(|value| value.is_finite());
                     let samples = run.trace.samples().step_by(stride).filter(|s| is_finite(s.state));
                     let samples: Vec<_> = samples.collect();
-                    let angle =
-                        |state: &[f64], link: usize| (0..=link).map(|i| state[2 + 2 * i]).sum::<f64>();
                     let shown = if links > 0 { samples.as_slice() } else { &[] };
                     Frames {
                         law: law_name(run.law),
@@ -80,7 +79,7 @@ impl Animation {
                         target: shown.iter().map(|s| rounded(s.target)).collect(),
                         angles: shown
                             .iter()
-                            .map(|s| (0..links).map(|link| rounded(angle(s.state, link))).collect())
+                            .map(|s| absolute_angles(s.state).map(rounded).collect())
                             .collect(),
                         fall: run.summary.fall.as_ref().map(ToString::to_string),
                     }

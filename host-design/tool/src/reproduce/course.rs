@@ -2,6 +2,7 @@
 
 use serde::Serialize;
 
+use upright_design::plant::absolute_angles;
 use upright_design::simulate::{Fall, FallKind, Trace};
 
 /// States and force at equally spaced times.
@@ -89,11 +90,7 @@ pub(super) fn fall_of(state: &[f64], at_s: f64) -> Option<Fall> {
     if !state.iter().all(|entry| entry.is_finite()) {
         return Some(Fall { at_s, kind: FallKind::NotFinite });
     }
-    let mut absolute = 0.0f64;
-    let fallen = state[2..].chunks_exact(2).position(|joint| {
-        absolute += joint[0];
-        absolute.abs() > core::f64::consts::FRAC_PI_2
-    })?;
+    let fallen = absolute_angles(state).position(|angle| angle.abs() > core::f64::consts::FRAC_PI_2)?;
     Some(Fall { at_s, kind: FallKind::Link(fallen + 1) })
 }
 

@@ -4,7 +4,7 @@ use std::io::Write;
 use std::path::PathBuf;
 
 use clap::Args;
-use upright_design::rig::Rig;
+use upright_design::rig::{Rig, key_table};
 
 use crate::failure::Failure;
 
@@ -15,19 +15,28 @@ use crate::failure::Failure;
 #[command(before_help = "\
 Examples:
   upright check rigs/quadruple-paper.toml
-  upright check my.toml --json | jq .plant")]
+  upright check my.toml --json | jq .plant
+  upright check --keys")]
 pub(crate) struct Check {
     /// Rig file (TOML)
-    rig: PathBuf,
+    #[arg(required_unless_present = "keys")]
+    rig: Option<PathBuf>,
     /// Print the values as one JSON object
     #[arg(long)]
     json: bool,
+    /// Print all keys of a rig file as a Markdown table: meaning, what is accepted, default
+    #[arg(long, conflicts_with_all = ["rig", "json"])]
+    keys: bool,
 }
 
 impl Check {
     pub(crate) fn run(self) -> Result<(), Failure> {
-        let rig = Rig::from_path(&self.rig)?;
         let mut out = std::io::stdout().lock();
+        let Some(file) = self.rig else {
+            write!(out, "{}", key_table())?;
+            return Ok(());
+        };
+        let rig = Rig::from_path(&file)?;
         if self.json {
             serde_json::to_writer(&mut out, &rig).map_err(std::io::Error::from)?;
             writeln!(out)?;

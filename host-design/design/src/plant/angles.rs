@@ -1,0 +1,22 @@
+//! Angles from the vertical.
+
+/// The angles of a chain's links from the vertical, `φ_i = θ_1 + … + θ_i` (rad), from the state `x, ẋ, θ_1, θ̇_1, …`
+/// (2n + 2 entries) with angles relative to the link below.
+pub fn absolute_angles(state: &[f64]) -> impl Iterator<Item = f64> + '_ {
+    state.iter().skip(2).step_by(2).scan(0.0, |angle, relative| {
+        *angle += relative;
+        Some(*angle)
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::absolute_angles;
+
+    #[test]
+    fn each_angle_is_the_sum_of_those_up_to_its_link() {
+        let angles: Vec<f64> = absolute_angles(&[9.0, 9.0, 0.25, 9.0, -0.5, 9.0, 1.0, 9.0]).collect();
+        assert_eq!(angles, [0.25, -0.25, 0.75]);
+        assert_eq!(absolute_angles(&[1.0, 2.0]).count(), 0);
+    }
+}

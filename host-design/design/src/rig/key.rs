@@ -1,0 +1,258 @@
+//! What a key of a rig file is: one row each, which reading, `upright check`, the documentation and its test all use.
+
+use std::fmt;
+
+use super::error::RigError;
+use super::node::{Node, Table};
+use super::rule::Rule;
+
+/// One key of a rig file.
+#[derive(Debug, Clone, Copy)]
+pub struct Key {
+    /// The name in the file, which ends in the unit: `arm_rate_rad_per_s`.
+    pub name: &'static str,
+    /// The unit as people write it, `rad/s`; empty if there is none.
+    pub unit: &'static str,
+    /// What is accepted.
+    pub rule: Rule,
+    /// What the key means: completes "give the …" and opens a row of the documentation.
+    pub meaning: &'static str,
+    /// What holds if the file leaves the key out.
+    pub absent: Absent,
+}
+
+/// What holds if the file leaves out a key or a section.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Absent {
+    /// It has to be given.
+    Required,
+    /// It has to be given under a condition, such as "unless poles are given".
+    RequiredIf(&'static str),
+    /// These numbers hold: one, or both of a pair.
+    Numbers(&'static [f64]),
+    /// A value that follows from others, in words.
+    Follows(&'static str),
+}
+
+/// A section of a rig file: `[limits]`, `[[link]]`.
+#[derive(Debug)]
+pub struct Section {
+    /// The name without brackets; empty for the top of the file.
+    pub name: &'static str,
+    /// The section as it stands in the file, with brackets.
+    pub title: &'static str,
+    /// What the section is about.
+    pub meaning: &'static str,
+    /// What holds without the section.
+    pub absent: Absent,
+    /// Its keys, in groups: each `keys!` structure is one.
+    pub keys: &'static [&'static [Key]],
+}
+
+impl Key {
+    /// The words of the name without its unit: `arm rate`. Empty if the name is nothing but a unit.
+    pub(super) fn label(&self) -> String {
+        let words = self.name.strip_suffix(&unit_in_names(self.unit)).unwrap_or(self.name);
+        words.trim_end_matches('_').replace('_', " ")
+    }
+}
+
+/// A unit as key names write it: `rad_per_s` for `rad/s`.
+pub fn unit_in_names(unit: &str) -> String {
+    let words = [
+        ("(", ""),
+        (")", ""),
+        ("·", "_"),
+        ("/", "_per_"),
+        ("²", "2"),
+        ("Ω", "ohm"),
+        ("%", "percent"),
+        ("°", "deg"),
+    ];
+    words.iter().fold(unit.to_lowercase(), |name, (symbol, word)| name.replace(&symbol.to_lowercase(), word))
+}
+
+impl Section {
+    /// All keys, in the order of the documentation.
+    pub fn keys(&self) -> impl Iterator<Item = &'static Key> + use<> {
+        self.keys.iter().copied().flatten()
+    }
+
+    /// The row of a key.
+    ///
+    /// # Panics
+    ///
+    /// If the section has no such key: the code that asks for it is wrong.
+    pub(super) fn key(&self, name: &str) -> &'static Key {
+        let key = self.keys().find(|key| key.name == name);
+        key.unwrap_or_else(|| panic!("{} has no row for the key {name}", self.title))
+    }
+
+    /// What a key is to be given as, and the alternative: completes "give" and "add".
+    pub(super) fn asks_for(&self, key: &Key) -> String {
+        let unit = if key.unit.is_empty() { String::new() } else { format!(", in {}", key.unit) };
+        let otherwise = match (key.absent, self.absent) {
+            (Absent::Required, Absent::Numbers(_) | Absent::Follows(_)) => {
+                format!(", or leave {} out", self.title)
+            }
+            (Absent::Required, _) => String::new(),
+            (Absent::RequiredIf(_), _) => format!(" ({})", key.absent),
+            (Absent::Numbers(_) | Absent::Follows(_), _) => format!(", or leave it out for {}", key.absent),
+        };
+        format!("the {}{unit}{otherwise}", key.meaning)
+    }
+}
+
+impl fmt::Display for Absent {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Absent::Required => f.write_str("required"),
+            Absent::RequiredIf(condition) => write!(f, "required {condition}"),
+            Absent::Numbers([number]) => write!(f, "{number}"),
+            Absent::Numbers(numbers) => write!(f, "{numbers:?}"),
+            Absent::Follows(words) => f.write_str(words),
+        }
+    }
+}
+
+/// A type that one key of a rig file fills: `f64`, `Option<f64>`, `u8`, or a pair.
+pub(super) trait Value: Sized {
+    /// Reads the value, or says why it is not accepted. `asks_for` completes "give".
+    fn read(node: &Node<'_>, rule: Rule, asks_for: &str) -> Result<Self, RigError>;
+
+    /// The value of a key that the file leaves out; none if it is required.
+    fn when_absent(absent: Absent) -> Option<Self>;
+
+    /// The numbers of the value: none for one that was left out.
+    fn numbers(&self) -> Vec<f64>;
+}
+
+impl Value for f64 {
+    fn read(node: &Node<'_>, rule: Rule, asks_for: &str) -> Result<Self, RigError> {
+        node.number(rule, asks_for)
+    }
+
+    fn when_absent(absent: Absent) -> Option<Self> {
+        match absent {
+            Absent::Numbers(&[number]) => Some(number),
+            _ => None,
+        }
+    }
+
+    fn numbers(&self) -> Vec<f64> {
+        vec![*self]
+    }
+}
+
+impl Value for Option<f64> {
+    fn read(node: &Node<'_>, rule: Rule, asks_for: &str) -> Result<Self, RigError> {
+        node.number(rule, asks_for).map(Some)
+    }
+
+    fn when_absent(_: Absent) -> Option<Self> {
+        Some(None)
+    }
+
+    fn numbers(&self) -> Vec<f64> {
+        self.iter().copied().collect()
+    }
+}
+
+impl Value for u8 {
+    fn read(node: &Node<'_>, rule: Rule, asks_for: &str) -> Result<Self, RigError> {
+        let whole = node.index(usize::from(u8::MAX), rule.accepts, asks_for)?;
+        let admitted = u8::try_from(whole).ok().filter(|&whole| rule.admits(&[f64::from(whole)]));
+        admitted.ok_or_else(|| node.out_of_range(rule.accepts, &format!("give {asks_for}")))
+    }
+
+    fn when_absent(absent: Absent) -> Option<Self> {
+        f64::when_absent(absent).map(|number| number as u8)
+    }
+
+    fn numbers(&self) -> Vec<f64> {
+        vec![f64::from(*self)]
+    }
+}
+
+impl Value for [f64; 2] {
+    fn read(node: &Node<'_>, rule: Rule, asks_for: &str) -> Result<Self, RigError> {
+        match node.numbers(2, Rule::ANY, asks_for)?[..] {
+            [first, second] if rule.admits(&[first, second]) => Ok([first, second]),
+            _ => Err(node.out_of_range(rule.accepts, &format!("give {asks_for}"))),
+        }
+    }
+
+    fn when_absent(absent: Absent) -> Option<Self> {
+        match absent {
+            Absent::Numbers(&[first, second]) => Some([first, second]),
+            _ => None,
+        }
+    }
+
+    fn numbers(&self) -> Vec<f64> {
+        self.to_vec()
+    }
+}
+
+/// A structure whose fields are the keys of a section, made by `keys!`.
+pub(super) trait Keys: Sized {
+    /// A row per field.
+    const KEYS: &'static [Key];
+
+    /// Reads all fields from a table of the file.
+    fn read(table: &Table<'_>) -> Result<Self, RigError>;
+
+    /// The values without the section; none if one of them is required.
+    fn when_absent() -> Option<Self>;
+
+    /// The numbers of each field, in the order of [`Keys::KEYS`].
+    fn values(&self) -> Vec<Vec<f64>>;
+}
+
+/// Declares a structure of scalar keys: a row gives field, type, unit, rule, meaning, and what holds without the key.
+///
+/// The row is all that reading, `upright check` and the documentation need. Fields serialise in the order of the rows,
+/// and the rig's hash depends on it.
+macro_rules! keys {
+    (
+        $(#[$attribute:meta])*
+        pub struct $name:ident {
+            $( $field:ident: $type:ty, $unit:literal, $rule:expr, $meaning:literal, $absent:expr; )+
+        }
+    ) => {
+        $(#[$attribute])*
+        #[derive(Debug, Clone, PartialEq, serde::Serialize)]
+        pub struct $name {
+            $(
+                #[doc = concat!("The ", $meaning, ".")]
+                pub $field: $type,
+            )+
+        }
+
+        impl $crate::rig::key::Keys for $name {
+            const KEYS: &'static [$crate::rig::key::Key] = &[$(
+                $crate::rig::key::Key {
+                    name: stringify!($field),
+                    unit: $unit,
+                    rule: $rule,
+                    meaning: $meaning,
+                    absent: $absent,
+                },
+            )+];
+
+            fn read(table: &$crate::rig::node::Table<'_>) -> Result<Self, $crate::rig::RigError> {
+                Ok(Self { $( $field: table.value(stringify!($field))?, )+ })
+            }
+
+            fn when_absent() -> Option<Self> {
+                Some(Self { $( $field: $crate::rig::key::Value::when_absent($absent)?, )+ })
+            }
+
+            fn values(&self) -> Vec<Vec<f64>> {
+                vec![$( $crate::rig::key::Value::numbers(&self.$field), )+]
+            }
+        }
+    };
+}
+
+pub(super) use keys;

@@ -1,0 +1,75 @@
+//! From the text of a rig file to a checked [`Rig`].
+
+use super::error::RigError;
+use super::key::{Keys, Section};
+use super::node::{Source, Table};
+use super::sections::{
+    SECTIONS, TOP, actuator, chain, integral, kalman, limits, lqr, model, pole_placement, tick, verify,
+};
+use super::{Actuator, Integral, Limits, PlantDescription, Requirements, Rig, Tick};
+
+/// Checks a whole rig file.
+pub(super) fn rig(source: &Source<'_>) -> Result<Rig, RigError> {
+    let document = source.document()?;
+    let root = Table::root(source, &document, &TOP, &SECTIONS.map(|section| section.name))?;
+    let name = name(&root)?;
+    let plant = chain::plant(&root)?;
+    let states = plant.states();
+    let given = |section: &Section| root.get(section.name);
+    let rig = Rig {
+        name,
+        actuator: given(&actuator::ACTUATOR)
+            .map_or(Ok(Actuator::default()), |node| actuator::actuator(&node))?,
+        tick: scalars(&root, &tick::TICK)?.unwrap_or_else(Tick::default),
+        lqr: given(&lqr::LQR).map(|node| lqr::lqr(&node, states)).transpose()?,
+        pole_placement: given(&pole_placement::POLE_PLACEMENT)
+            .map(|node| pole_placement::pole_placement(&node, states))
+            .transpose()?,
+        kalman: given(&kalman::KALMAN).map(|node| kalman::kalman(&node, &plant)).transpose()?,
+        integral: scalars::<Integral>(&root, &integral::INTEGRAL)?,
+        limits: given(&limits::LIMITS).map_or(Ok(Limits::default()), |node| limits::limits(&node, &plant))?,
+        verify: scalars(&root, &verify::VERIFY)?.unwrap_or_else(Requirements::default),
+        plant,
+    };
+    if rig.kalman.is_some() {
+        position_is_measured(&root, &rig.plant)?;
+    }
+    Ok(rig)
+}
+
+/// A section of scalars, if given.
+fn scalars<T: Keys>(root: &Table<'_>, section: &'static Section) -> Result<Option<T>, RigError> {
+    root.get(section.name).map(|node| T::read(&node.table(section)?)).transpose()
+}
+
+/// The name goes into the gain table and onto terminals: short, and nothing that moves a cursor.
+fn name(root: &Table<'_>) -> Result<String, RigError> {
+    const LONGEST: usize = 64;
+    const MEANING: &str = "`name = \"...\"`, the name of the rig, at the top of the file";
+    let accepts = TOP.key("name").rule.accepts;
+    let node = root.need("name", MEANING)?;
+    let name = node.text(accepts, "the name in quotes")?;
+    let plain = name.replace(['"', '\'', '\\'], "_");
+    let printable = plain.escape_debug().eq(plain.chars());
+    if name.trim().is_empty() || name.len() > LONGEST || !printable {
+        return Err(
+            node.out_of_range(accepts, "shorten it, and leave out line breaks and control characters")
+        );
+    }
+    Ok(name.to_owned())
+}
+
+/// An observer needs the resolution of its sensors; and no observer finds the cart's position from the angles alone.
+fn position_is_measured(root: &Table<'_>, plant: &PlantDescription) -> Result<(), RigError> {
+    match plant {
+        PlantDescription::Chain(chain) if chain.cart.encoder_step_m.is_none() => Err(root
+            .need("cart", "[cart]")?
+            .table(&chain::CART)?
+            .missing("encoder_step_m", "the travel per encoder count in m: [kalman] needs it")),
+        PlantDescription::Model(model) if model.measured_steps.is_empty() => Err(root
+            .need("model", "[model]")?
+            .table(&model::MODEL)?
+            .missing("measured_steps", "the step of each sensor: [kalman] needs them")),
+        _ => Ok(()),
+    }
+}

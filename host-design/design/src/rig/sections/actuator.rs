@@ -1,0 +1,86 @@
+//! `[actuator]`: force limit and motor.
+
+use serde::Serialize;
+
+use super::super::error::RigError;
+use super::super::key::{Absent, Key, Keys, Section, keys};
+use super::super::node::{Node, Table};
+use super::super::rule::Rule;
+
+/// `[actuator]`
+pub(in crate::rig) static ACTUATOR: Section = Section {
+    name: "actuator",
+    title: "[actuator]",
+    meaning: "force limit and DC motor; one key of the motor describes it, and then it needs all the required ones",
+    absent: Absent::Follows("no limit, no motor"),
+    keys: &[FORCE_LIMIT, Motor::KEYS],
+};
+
+const FORCE_LIMIT: &[Key] = &[Key {
+    name: "force_limit_n",
+    unit: "N",
+    rule: Rule::POSITIVE,
+    meaning: "largest force on the cart",
+    absent: Absent::Follows("no limit"),
+}];
+
+/// Accepted voltages of the dead zone; the section's own code compares it with the supply.
+const DEAD_ZONE: Rule = Rule::NOT_NEGATIVE.worded("a number >= 0 and < supply_v (V)");
+const WITH_A_MOTOR: Absent = Absent::RequiredIf("with a motor");
+
+/// `[actuator]`
+#[derive(Debug, Clone, PartialEq, Serialize, Default)]
+pub struct Actuator {
+    /// Largest force on the cart (N); none given: no limit.
+    pub force_limit_n: Option<f64>,
+    /// The DC motor, if described.
+    pub motor: Option<Motor>,
+}
+
+keys! {
+    /// A DC motor with gear and pulley.
+    pub struct Motor {
+        torque_constant_n_m_per_a: f64, "N·m/A", Rule::POSITIVE,
+            "torque constant of the motor, equal to its back-EMF constant in V·s/rad", WITH_A_MOTOR;
+        resistance_ohm: f64, "Ω", Rule::POSITIVE, "winding resistance of the motor", WITH_A_MOTOR;
+        gear_ratio: f64, "", Rule::POSITIVE, "number of motor turns per pulley turn", Absent::Numbers(&[1.0]);
+        pulley_radius_m: f64, "m", Rule::POSITIVE, "radius of the pulley or pinion", WITH_A_MOTOR;
+        supply_v: f64, "V", Rule::POSITIVE, "supply voltage of the motor driver", WITH_A_MOTOR;
+        dead_zone_v: f64, "V", DEAD_ZONE,
+            "voltage below which the motor does not move", Absent::Numbers(&[0.0]);
+        slew_v_per_s: Option<f64>, "V/s", Rule::POSITIVE,
+            "largest rate of change of the motor's voltage", Absent::Follows("no limit");
+    }
+}
+
+impl Motor {
+    /// Back-EMF per cart speed, `gear Kt / r` (V·s/m), which is also the force per current (N/A).
+    pub fn volts_per_speed(&self) -> f64 {
+        self.gear_ratio * self.torque_constant_n_m_per_a / self.pulley_radius_m
+    }
+
+    /// Force on the cart at standstill and full supply, `gear Kt V / (R r)` (N).
+    pub fn stall_force_n(&self) -> f64 {
+        self.gear_ratio * self.torque_constant_n_m_per_a * self.supply_v
+            / (self.resistance_ohm * self.pulley_radius_m)
+    }
+}
+
+/// Reads `[actuator]`; a motor is described as soon as one of its keys is given.
+pub(in crate::rig) fn actuator(node: &Node<'_>) -> Result<Actuator, RigError> {
+    let table = node.table(&ACTUATOR)?;
+    let force_limit_n = table.value("force_limit_n")?;
+    let described = Motor::KEYS.iter().any(|key| table.get(key.name).is_some());
+    Ok(Actuator { force_limit_n, motor: described.then(|| motor(&table)).transpose()? })
+}
+
+fn motor(table: &Table<'_>) -> Result<Motor, RigError> {
+    let motor = Motor::read(table)?;
+    match table.get("dead_zone_v") {
+        Some(node) if motor.dead_zone_v >= motor.supply_v => Err(node.out_of_range(
+            DEAD_ZONE.accepts,
+            &format!("give {}, less than supply_v", table.asks_for("dead_zone_v")),
+        )),
+        _ => Ok(motor),
+    }
+}

@@ -1,0 +1,21 @@
+//! `[integral]`: integral action on the controlled output, for the LQR.
+
+use super::super::key::{Absent, Keys, Section, keys};
+use super::super::rule::Rule;
+
+/// `[integral]`
+pub(in crate::rig) static INTEGRAL: Section = Section {
+    name: "integral",
+    title: "[integral]",
+    meaning: "integral action on the cart position, for the LQR",
+    absent: Absent::Follows("no integral action"),
+    keys: &[Integral::KEYS],
+};
+
+keys! {
+    /// `[integral]`
+    pub struct Integral {
+        position_weight: f64, "", Rule::POSITIVE,
+            "weight of the integrated position error in the cost", Absent::Required;
+    }
+}
