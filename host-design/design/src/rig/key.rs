@@ -109,7 +109,10 @@ impl fmt::Display for Absent {
             Absent::Required => f.write_str("required"),
             Absent::RequiredIf(condition) => write!(f, "required {condition}"),
             Absent::Numbers([number]) => write!(f, "{number}"),
-            Absent::Numbers(numbers) => write!(f, "{numbers:?}"),
+            Absent::Numbers(numbers) => {
+                let all: Vec<_> = numbers.iter().map(f64::to_string).collect();
+                write!(f, "[{}]", all.join(", "))
+            }
             Absent::Follows(words) => f.write_str(words),
         }
     }
