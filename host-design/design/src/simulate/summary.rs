@@ -6,6 +6,7 @@ use serde::Serialize;
 
 use super::scenario::Scenario;
 use super::trace::Trace;
+use crate::plant::absolute_angles;
 use crate::rig::{PlantDescription, Rig};
 
 /// Loss of balance, which ends a run.
@@ -38,11 +39,8 @@ impl Fall {
         let kind = match &rig.plant {
             _ if !state.iter().all(|value| value.is_finite()) => FallKind::NotFinite,
             PlantDescription::Chain(chain) => {
-                let mut absolute = 0.0;
-                let fallen = state[2..].chunks_exact(2).position(|joint| {
-                    absolute += joint[0];
-                    absolute.abs() > core::f64::consts::FRAC_PI_2
-                });
+                let fallen =
+                    absolute_angles(state).position(|angle| angle.abs() > core::f64::consts::FRAC_PI_2);
                 let [left, right] = chain.cart.travel_m;
                 match fallen {
                     Some(index) => FallKind::Link(index + 1),
