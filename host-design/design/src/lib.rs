@@ -11,6 +11,7 @@
 //! | [`design`] | linear model, weights, poles, noise | certified gains and observer |
 //! | [`table`] | gains and limits | the gain table of the firmware, as values and as Rust source |
 //! | [`simulate`] | table and scenario | a run of the firmware's controller against the nonlinear plant |
+//! | [`harness`] | a target and a scenario | a run of the whole firmware, from power-up on |
 //! | [`verify`] | table and requirements | the trust report |
 //!
 //! The control law itself is not here: a simulation runs the firmware's own controller from the crate `upright`.
