@@ -2,11 +2,9 @@
 //!
 //! Every gain is the exact answer of its design problem, rounded once to f32.
 
-use crate::control::observer::ObserverGains;
-use crate::control::state_feedback::LawGains;
-use crate::supervision::detection::{MotorTest, Thresholds};
-use crate::table::limits::Limits;
-use crate::table::{GainTable, TABLE_FORMAT, columns};
+use upright::table::{
+    GainTable, LawGains, Limits, MotorTest, ObserverGains, PerLaw, TABLE_FORMAT, Thresholds, columns,
+};
 
 /// Name of the rig.
 pub const RIG: &str = "quadruple-paper";
@@ -28,87 +26,96 @@ pub const SENSORS: usize = 5;
 
 /// The gain table.
 pub static TABLE: GainTable<STATES, SENSORS> = GainTable {
+    // [`TABLE_FORMAT`] of the writer.
     format: TABLE_FORMAT,
+    // Number of states; equal to `NX` in a sound table.
     states: 10,
+    // Number of sensors; equal to `NY` in a sound table.
     sensors: 5,
-    // index of the state that follows the set-point
+    // Index of the state that follows the set-point.
     output: 0,
+    // Hash of the rig file's values.
     rig_hash: RIG_HASH,
-    // s: control period
+    // Control period (s).
     tick_s: TICK_S,
-    // ticks between a measurement and the force computed from it
+    // Delay between a measurement and the force computed from it: 0 or 1 (ticks).
     delay_ticks: 0,
-    // N: largest force on the cart
+    // Largest force on the cart (N).
     force_limit_n: 20.0,
-    // linear quadratic regulator
-    lqr: Some(LawGains {
-        k: columns([[
-            // N/m: cart position
-            2.2781084,
-            // N s/m: cart speed
-            2.6554902,
-            // N/rad: angle of link 1
-            -9.160463,
-            // N s/rad: angular rate of link 1
-            -4.1506615,
-            // N/rad: angle of link 2
-            -126.060455,
-            // N s/rad: angular rate of link 2
-            -3.9034085,
-            // N/rad: angle of link 3
-            393.3646,
-            // N s/rad: angular rate of link 3
-            1.4876164,
-            // N/rad: angle of link 4
-            -423.12985,
-            // N s/rad: angular rate of link 4
-            -18.388689,
-        ]]),
-        // 1: gain on the force still on its way (0 without delay)
-        k_pending: 0.0,
-        // N/(m s): gain on the integrated position error (0 without integral action)
-        k_integral: 0.0,
-        // N/m: precompensation gain on the set-point
-        n: 2.2781084,
-        // m: largest change of the governed set-point in one tick
-        setpoint_step: 0.00089194486,
-    }),
-    // pole placement
-    pole_placement: Some(LawGains {
-        k: columns([[
-            // N/m: cart position
-            9.243705,
-            // N s/m: cart speed
-            20.633793,
-            // N/rad: angle of link 1
-            -171.82307,
-            // N s/rad: angular rate of link 1
-            -32.6107,
-            // N/rad: angle of link 2
-            -225.30045,
-            // N s/rad: angular rate of link 2
-            -31.775797,
-            // N/rad: angle of link 3
-            135.11073,
-            // N s/rad: angular rate of link 3
-            -29.605173,
-            // N/rad: angle of link 4
-            -898.03656,
-            // N s/rad: angular rate of link 4
-            -46.97237,
-        ]]),
-        // 1: gain on the force still on its way (0 without delay)
-        k_pending: 0.0,
-        // N/(m s): gain on the integrated position error (0 without integral action)
-        k_integral: 0.0,
-        // N/m: precompensation gain on the set-point
-        n: 9.243705,
-        // m: largest change of the governed set-point in one tick
-        setpoint_step: 0.002020263,
-    }),
-    // steady-state Kalman filter
+    // Gains of the control laws that are designed, at least one.
+    laws: PerLaw {
+        // Gains of the linear quadratic regulator, if designed.
+        lqr: Some(LawGains {
+            // K, one gain per state (N/m, N s/m, N/rad, N s/rad …).
+            k: columns([[
+                // N/m: cart position
+                2.2781084,
+                // N s/m: cart speed
+                2.6554902,
+                // N/rad: angle of link 1
+                -9.160463,
+                // N s/rad: angular rate of link 1
+                -4.1506615,
+                // N/rad: angle of link 2
+                -126.060455,
+                // N s/rad: angular rate of link 2
+                -3.9034085,
+                // N/rad: angle of link 3
+                393.3646,
+                // N s/rad: angular rate of link 3
+                1.4876164,
+                // N/rad: angle of link 4
+                -423.12985,
+                // N s/rad: angular rate of link 4
+                -18.388689,
+            ]]),
+            // Gain on the pending force (1); 0 without delay.
+            k_pending: 0.0,
+            // Gain on the integrated position error (N/(m s)); 0 without integral action.
+            k_integral: 0.0,
+            // N, the precompensation gain on the set-point (N/m).
+            n: 2.2781084,
+            // Largest change of the governed set-point in one tick (m).
+            setpoint_step: 0.00089194486,
+        }),
+        // Gains of the pole placement, if designed.
+        pole_placement: Some(LawGains {
+            // K, one gain per state (N/m, N s/m, N/rad, N s/rad …).
+            k: columns([[
+                // N/m: cart position
+                9.243705,
+                // N s/m: cart speed
+                20.633793,
+                // N/rad: angle of link 1
+                -171.82307,
+                // N s/rad: angular rate of link 1
+                -32.6107,
+                // N/rad: angle of link 2
+                -225.30045,
+                // N s/rad: angular rate of link 2
+                -31.775797,
+                // N/rad: angle of link 3
+                135.11073,
+                // N s/rad: angular rate of link 3
+                -29.605173,
+                // N/rad: angle of link 4
+                -898.03656,
+                // N s/rad: angular rate of link 4
+                -46.97237,
+            ]]),
+            // Gain on the pending force (1); 0 without delay.
+            k_pending: 0.0,
+            // Gain on the integrated position error (N/(m s)); 0 without integral action.
+            k_integral: 0.0,
+            // N, the precompensation gain on the set-point (N/m).
+            n: 9.243705,
+            // Largest change of the governed set-point in one tick (m).
+            setpoint_step: 0.002020263,
+        }),
+    },
+    // The observer, if designed: without it the controller needs the whole state.
     observer: Some(ObserverGains {
-        // one column per state now, one entry per state a tick later
+        // Ad of `x⁺ = Ad x + Bd u` over one tick: a column for each state now, a row for each state a tick later.
         ad: columns([
             // from cart position
             [
@@ -341,7 +348,7 @@ pub static TABLE: GainTable<STATES, SENSORS> = GainTable {
                 1.0002996,
             ],
         ]),
-        // per newton held for one tick
+        // Bd, what one newton held for one tick adds to each state.
         bd: columns([[
             // to cart position
             3.88048e-6,
@@ -364,7 +371,7 @@ pub static TABLE: GainTable<STATES, SENSORS> = GainTable {
             // to angular rate of link 4
             -0.012723288,
         ]]),
-        // one column per sensor: what an innovation adds to each state
+        // L of `x̂ = x̂⁻ + L e`: a column for each sensor, a row for each state.
         l: columns([
             // from the sensor of cart position
             [
@@ -482,9 +489,9 @@ pub static TABLE: GainTable<STATES, SENSORS> = GainTable {
                 10.166408,
             ],
         ]),
-        // index of the state that each sensor measures
+        // Index of the state that each sensor measures.
         measured: [0, 2, 4, 6, 8],
-        // m or rad per count
+        // Travel per count of each sensor (m or rad).
         step: columns([[
             // sensor of cart position
             2e-5,
@@ -498,35 +505,35 @@ pub static TABLE: GainTable<STATES, SENSORS> = GainTable {
             0.0015339808,
         ]]),
     }),
-    // motor, gear and pulley
+    // The motor, if described: without it the controller gives a force.
     motor: None,
-    // what the supervisor enforces
+    // Limits that the supervisor enforces.
     limits: Limits {
-        // m: soft limits of the rail
+        // Soft limits of the rail, low and high (m).
         rail_m: [-1.9, 1.9],
-        // rad: largest angle of a link from the vertical
+        // Largest angle of any link from the vertical (rad).
         angle_rad: 0.35,
-        // m/s: largest speed of the cart
+        // Largest speed of the cart (m/s).
         speed_m_per_s: 2.0,
-        // V: least supply
+        // Least supply voltage of the power stage (V).
         supply_min_v: 0.0,
-        // ticks: the supply may be too low for so long
+        // Longest time for which the supply may be too low (ticks).
         supply_ticks: 5,
-        // ticks: the force may be at its limit for so long
+        // Longest time for which the law may ask for more than the largest force (ticks).
         saturated_ticks: 500,
-        // ticks: the host may be silent for so long
+        // Longest silence of a host that commands the set-point (ticks).
         link_ticks: 100,
-        // rad: largest angle to begin at
+        // Largest angle of any link from the vertical at which balancing begins (rad).
         arm_angle_rad: 0.035,
-        // ticks: upright and slow before it begins
+        // Time for which all links have to be upright and slow before balancing begins (ticks).
         arm_ticks: 300,
-        // ticks: still before homing
+        // Time for which cart and links have to be still before they are homed (ticks).
         still_ticks: 500,
-        // counts: between the limit switches, and its tolerance
+        // Distance between the limit switches, and its tolerance when homing finds it (counts).
         travel_counts: [200000, 2000],
-        // counts: middle of the rail
+        // The middle between the limit switches, from position 0 (counts).
         middle_counts: 0,
-        // counts: most motion that is slow
+        // Largest motion of each sensor within `arm_ticks` that is still slow (counts).
         slow_counts: [
             // cart position
             750,
@@ -539,7 +546,7 @@ pub static TABLE: GainTable<STATES, SENSORS> = GainTable {
             // angle of link 4
             20,
         ],
-        // counts: links hanging at rest
+        // Reading of each sensor while the links hang at rest: half a turn for the first link, else 0 (counts).
         rest_counts: [
             // cart position
             0,
@@ -552,7 +559,7 @@ pub static TABLE: GainTable<STATES, SENSORS> = GainTable {
             // angle of link 4
             0,
         ],
-        // counts: a whole turn
+        // A whole turn of each joint; 0 for the cart (counts).
         turn_counts: [
             // cart position
             0,
@@ -565,7 +572,7 @@ pub static TABLE: GainTable<STATES, SENSORS> = GainTable {
             // angle of link 4
             4096,
         ],
-        // counts: motion that shows the sign
+        // Distance that each sensor has to be moved when its sign is checked (counts).
         sign_counts: [
             // cart position
             10000,
@@ -579,9 +586,9 @@ pub static TABLE: GainTable<STATES, SENSORS> = GainTable {
             130,
         ],
     },
-    // when encoders and motor are at fault
+    // Thresholds at which the supervisor takes encoders and motor to be at fault.
     thresholds: Thresholds {
-        // m or rad: largest innovation
+        // Largest plausible innovation of each sensor (m or rad).
         innovation: [
             // cart position
             5.810177e-5,
@@ -594,7 +601,7 @@ pub static TABLE: GainTable<STATES, SENSORS> = GainTable {
             // angle of link 4
             0.0039284667,
         ],
-        // m or rad: most predicted motion while the counter stands still
+        // Largest predicted motion of each sensor while its counter stands still (m or rad).
         frozen: [
             // cart position
             0.00010278882,
@@ -607,8 +614,9 @@ pub static TABLE: GainTable<STATES, SENSORS> = GainTable {
             // angle of link 4
             0.0047674673,
         ],
+        // Model and thresholds of the motor test.
         motor: MotorTest {
-            // error of the prediction, a tick later
+            // a_pp, a_pv, a_vp, a_vv over one tick, the observer's correction included.
             a: [
                 // position from position
                 0.58488953,
@@ -619,19 +627,14 @@ pub static TABLE: GainTable<STATES, SENSORS> = GainTable {
                 // speed from speed
                 1.0,
             ],
-            // of a missing newton
-            b: [
-                // m/N: position
-                3.88048e-6,
-                // m/(s N): speed
-                0.0077619203,
-            ],
-            // 1: share of the force that may be missing
+            // b_p (m/N), b_v (m/(s N)).
+            b: [3.88048e-6, 0.0077619203],
+            // Share of the force that may be missing.
             ratio: 0.5,
-            // m²: least for a verdict
+            // Least sum of p² for a verdict (m²).
             energy: 9.255121e-9,
         },
     },
-    // CRC-32 of all values above
-    crc: 0xdde3_c537,
+    // CRC-32 of all values above.
+    crc: 0x6aa6_3b4f,
 };

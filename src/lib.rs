@@ -29,6 +29,8 @@
 #![no_std]
 #![forbid(unsafe_code)]
 
+// A generated table names this crate as another one would: the same file serves inside and outside.
+extern crate self as upright;
 #[cfg(test)]
 extern crate std;
 

@@ -3,21 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use crate::control::state_feedback::saturate;
-
-/// A DC motor behind gear and pulley, as seen by the cart.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct MotorMap {
-    /// Voltage per force at standstill, `R r / (gear Kt)` (V/N).
-    pub volts_per_newton: f32,
-    /// Back-EMF per cart speed, `gear Kt / r` (V·s/m).
-    pub volts_per_speed: f32,
-    /// Voltage below which the motor does not move (V).
-    pub dead_zone_v: f32,
-    /// Largest change of the voltage in one tick (V).
-    pub slew_v_per_tick: f32,
-    /// Supply voltage the table was designed for (V).
-    pub supply_v: f32,
-}
+use crate::table::{MotorMap, Scalar};
 
 /// What goes to the power stage.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -42,17 +28,17 @@ impl Drive {
     }
 }
 
-impl MotorMap {
+impl<T: Scalar> MotorMap<T> {
     /// Voltage that makes the motor push with `force` (N) at cart speed `speed` (m/s), within the supply and the slew
     /// limit from `last_v`; and the force that this voltage makes.
     ///
     /// ```text
     /// V = (R r / (gear Kt)) F + (gear Kt / r) ẋ
     /// ```
-    pub fn drive(&self, force: f32, speed: f32, last_v: f32) -> (f32, f32) {
+    pub fn drive(&self, force: T, speed: T, last_v: T) -> (T, T) {
         let back_emf = self.volts_per_speed * speed;
         let wanted = self.volts_per_newton * force + back_emf;
-        // What is left of the supply when the dead zone has taken its share.
+        // The duty adds the dead zone again, so the voltage leaves room for it.
         let within_supply = saturate(wanted, self.supply_v - self.dead_zone_v);
         let volts = last_v + saturate(within_supply - last_v, self.slew_v_per_tick);
         if volts == wanted { (volts, force) } else { (volts, (volts - back_emf) / self.volts_per_newton) }
@@ -62,13 +48,9 @@ impl MotorMap {
     ///
     /// The lift grows with the voltage, ten times as fast, up to the whole dead zone: the duty does not jump at rest, and
     /// less than a tenth of the dead zone is left of it.
-    pub fn duty(&self, volts: f32) -> f32 {
-        let lift = saturate(10.0 * volts, self.dead_zone_v);
-        saturate((volts + lift) / self.supply_v, 1.0)
-    }
-
-    pub(crate) fn values(&self) -> [f32; 5] {
-        [self.volts_per_newton, self.volts_per_speed, self.dead_zone_v, self.slew_v_per_tick, self.supply_v]
+    pub fn duty(&self, volts: T) -> T {
+        let lift = saturate(T::from_f32(10.0) * volts, self.dead_zone_v);
+        saturate((volts + lift) / self.supply_v, T::from_f32(1.0))
     }
 }
 
@@ -122,7 +104,7 @@ mod tests {
     }
 
     #[test]
-    fn not_a_number_turns_the_motor_off() {
+    fn nan_turns_the_motor_off() {
         assert_eq!(MOTOR.duty(f32::NAN), 0.0);
         assert_eq!(MOTOR.drive(f32::NAN, 0.0, 0.0).0, 0.0);
     }

@@ -2,6 +2,8 @@
 
 use nalgebra::SVector;
 
+use crate::table::Scalar;
+
 /// Width of a hardware counter.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum CounterWidth {
@@ -47,12 +49,12 @@ impl<const NY: usize> Encoders<NY> {
 
     /// Takes new counter readings. Between two readings a counter may move by less than half its range.
     pub fn update(&mut self, raw: &[u32; NY]) {
-        self.measure(raw, &SVector::zeros());
+        self.measure(raw, &SVector::<f32, NY>::zeros());
     }
 
     /// Takes new counter readings, and gives the positions like [`positions`](Self::positions).
     #[inline(always)]
-    pub(crate) fn measure(&mut self, raw: &[u32; NY], step: &SVector<f32, NY>) -> SVector<f32, NY> {
+    pub(crate) fn measure<T: Scalar>(&mut self, raw: &[u32; NY], step: &SVector<T, NY>) -> SVector<T, NY> {
         let mut y = *step;
         let counters = self.last.iter_mut().zip(&mut self.position).zip(raw).zip(y.iter_mut());
         for (counter, (((last, position), &raw), y)) in counters.enumerate() {
@@ -61,7 +63,7 @@ impl<const NY: usize> Encoders<NY> {
             let moved = if self.of_16_bits & (1 << counter) != 0 { i32::from(moved as i16) } else { moved };
             *last = raw;
             *position = position.wrapping_add(moved);
-            *y *= *position as f32;
+            *y *= T::from_counts(*position);
         }
         y
     }
@@ -73,10 +75,10 @@ impl<const NY: usize> Encoders<NY> {
 
     /// Positions in SI units; `step` holds the travel per count (m or rad).
     #[inline]
-    pub fn positions(&self, step: &SVector<f32, NY>) -> SVector<f32, NY> {
+    pub fn positions<T: Scalar>(&self, step: &SVector<T, NY>) -> SVector<T, NY> {
         let mut y = *step;
         for (y, &counts) in y.iter_mut().zip(&self.position) {
-            *y *= counts as f32;
+            *y *= T::from_counts(counts);
         }
         y
     }
@@ -107,6 +109,6 @@ mod tests {
         let mut encoders = Encoders::new([CounterWidth::Bits32; 2]);
         encoders.home(&[100, 7], &[0, 50]);
         encoders.update(&[98, 8]);
-        assert_eq!(encoders.positions(&SVector::from([0.5, 0.25])), SVector::from([-1.0, 12.75]));
+        assert_eq!(encoders.positions(&SVector::from([0.5f32, 0.25])), SVector::from([-1.0, 12.75]));
     }
 }

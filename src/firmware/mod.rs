@@ -19,7 +19,7 @@ use crate::supervision::detection::Detection;
 use crate::supervision::envelope;
 use crate::supervision::fault::{Cause, Fault};
 use crate::supervision::supervisor::{State, Supervisor};
-use crate::table::{Build, GainTable, Reading, TableError};
+use crate::table::{Build, ChecksumScan, GainTable, TableError};
 
 /// Controller and supervisor of one rig.
 ///
@@ -32,7 +32,7 @@ pub struct Firmware<'t, const NX: usize, const NY: usize> {
     calibration: Calibration<NY>,
     detection: Detection<NY>,
     debounce: Debounce,
-    reading: Reading,
+    checksum_scan: ChecksumScan,
     table: &'t GainTable<NX, NY>,
     build: Build,
     raw_counts: [u32; NY],
@@ -79,7 +79,7 @@ impl<'t, const NX: usize, const NY: usize> Firmware<'t, NX, NY> {
             calibration: Calibration::new(&table.limits),
             detection: Detection::default(),
             debounce: Debounce::default(),
-            reading: Reading::default(),
+            checksum_scan: ChecksumScan::default(),
             table,
             build: *build,
             raw_counts: [0; NY],
@@ -253,7 +253,7 @@ impl<'t, const NX: usize, const NY: usize> Firmware<'t, NX, NY> {
                 self.trip(fault, None);
             }
         }
-        if self.reading.next(self.table).is_some_and(|crc| crc != self.table.crc) {
+        if self.checksum_scan.next(self.table).is_some_and(|crc| crc != self.table.crc) {
             self.trip(Fault::Table, None);
         }
         let reply = command.map(|command| Reply { id: command.id, answer: self.answer(command) });

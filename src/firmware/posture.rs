@@ -10,7 +10,7 @@ use crate::supervision::supervisor::State;
 /// swings through the vertical, short enough that a steady hand is never told to wait. The whole of `arm_ticks` has to pass
 /// after arming before the motor is on.
 ///
-/// [`Limits::arm_ticks`]: crate::table::limits::Limits::arm_ticks
+/// [`Limits::arm_ticks`]: crate::table::Limits::arm_ticks
 const MOVING_PART_OF_ARM_TICKS: u32 = 4;
 
 impl<const NX: usize, const NY: usize> Firmware<'_, NX, NY> {

@@ -4,7 +4,7 @@ use crate::board::Contacts;
 use crate::supervision::homing::{Homing, Rail, WrongTravel};
 use crate::supervision::sign_check::{SignCheck, Signs};
 use crate::supervision::stillness::Stillness;
-use crate::table::limits::Limits;
+use crate::table::Limits;
 
 /// Progress of homing and sign check, and how long the rig has been still or slow.
 #[derive(Debug, Clone)]

@@ -4,7 +4,7 @@
 
 use crate::board::Inputs;
 use crate::supervision::fault::Fault;
-use crate::table::limits::Limits;
+use crate::table::Limits;
 
 /// This many overruns in a row are a fault.
 const OVERRUNS: u32 = 3;

@@ -12,64 +12,13 @@
 //!   least squares with the same memory, is 0 for a healthy motor, 1 for a dead one and 2 for a reversed one.
 
 use crate::supervision::fault::Fault;
+use crate::table::{MotorTest, Thresholds};
 
 /// Memory of the sums (ticks): each tick keeps `1 - 1/MEMORY` of them.
 pub const MEMORY: f32 = 16.0;
 const KEEP: f32 = 1.0 - 1.0 / MEMORY;
 /// This many implausible measurements in a row are a fault.
 pub const IN_A_ROW: u32 = 3;
-
-/// Thresholds of the tests for `NY` sensors; `f32::MAX` where there is nothing to test.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Thresholds<const NY: usize> {
-    /// Largest plausible innovation of each sensor (m or rad).
-    pub innovation: [f32; NY],
-    /// Largest predicted motion of each sensor while its counter stands still (m or rad).
-    pub frozen: [f32; NY],
-    /// Model and thresholds of the motor test.
-    pub motor: MotorTest,
-}
-
-/// Effect of a missing force on the innovation of the first sensor, and when that is a fault.
-///
-/// The error `(p, v)` of predicted position and speed follows
-/// `p⁺ = a_pp p' + a_pv v' - b_p u, v⁺ = a_vp p' + a_vv v' - b_v u` with `p' = p - l_p p, v' = v - l_v p`; p is the
-/// innovation that a missing `u` causes.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct MotorTest {
-    /// a_pp, a_pv, a_vp, a_vv over one tick, the observer's correction included.
-    pub a: [f32; 4],
-    /// b_p (m/N), b_v (m/s/N).
-    pub b: [f32; 2],
-    /// Share of the force that may be missing.
-    pub ratio: f32,
-    /// Least sum of p² (m²) for a verdict.
-    pub energy: f32,
-}
-
-impl MotorTest {
-    /// A test that never finds anything.
-    pub const NONE: Self = Self { a: [0.0; 4], b: [0.0; 2], ratio: 1.0, energy: f32::MAX };
-
-    pub(crate) fn values(&self) -> [f32; 8] {
-        let ([pp, pv, vp, vv], [p, v]) = (self.a, self.b);
-        [pp, pv, vp, vv, p, v, self.ratio, self.energy]
-    }
-}
-
-impl<const NY: usize> Thresholds<NY> {
-    /// Thresholds that nothing exceeds.
-    pub const fn none() -> Self {
-        Self { innovation: [f32::MAX; NY], frozen: [f32::MAX; NY], motor: MotorTest::NONE }
-    }
-
-    pub(crate) fn is_sound(&self) -> bool {
-        let positive =
-            self.innovation.iter().chain(&self.frozen).chain([&self.motor.ratio, &self.motor.energy]);
-        positive.into_iter().all(|threshold| *threshold > 0.0 && threshold.is_finite())
-            && self.motor.values().iter().all(|value| value.is_finite())
-    }
-}
 
 /// Result of the tests in a tick.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

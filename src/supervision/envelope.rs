@@ -3,7 +3,7 @@
 //! A new limit on the state belongs here; its value belongs to [`Limits`].
 
 use crate::supervision::fault::Fault;
-use crate::table::limits::Limits;
+use crate::table::Limits;
 
 /// The fault of the first limit that the state `x` (m, m/s, rad, rad/s …) or the requested force (N) exceeds.
 ///

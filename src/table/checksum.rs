@@ -1,6 +1,8 @@
 //! The checksum of frames and gain tables.
 
-/// CRC-32 (ISO-HDLC) of what `crc` is the checksum of, 0 of nothing, and `bytes` after it.
+use crate::table::part::Part;
+
+/// CRC-32 (ISO-HDLC) of earlier bytes, whose checksum is `crc` (0 for none), and `bytes` after them.
 ///
 /// Four bits at a time: a table of 64 bytes instead of the usual kilobyte.
 #[inline(never)]
@@ -12,7 +14,7 @@ pub fn crc32(crc: u32, bytes: &[u8]) -> u32 {
     })
 }
 
-/// What four bits that leave the register do to it.
+/// Change of the register for each value of the four bits that leave it.
 const NIBBLES: [u32; 16] = {
     let mut nibbles = [0; 16];
     let mut nibble = 0;
@@ -28,6 +30,39 @@ const NIBBLES: [u32; 16] = {
     }
     nibbles
 };
+
+/// Checksum of all words of `table` at once, as little-endian bytes in the order of declaration.
+pub(crate) fn checksum(table: &impl Part) -> u32 {
+    let leaves = (0..).map_while(|leaf| table.part(&mut { leaf }));
+    leaves.fold(0, |crc, leaf| {
+        (0..).map_while(|word| leaf.get(word)).fold(crc, |crc, word| crc32(crc, &word.to_le_bytes()))
+    })
+}
+
+/// The same checksum word by word, to be spread over many ticks.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct ChecksumScan {
+    /// Leaf of the table, see [`Part::part`].
+    leaf: u16,
+    /// Word of the leaf.
+    word: u16,
+    /// Checksum of the words before.
+    crc: u32,
+}
+
+impl ChecksumScan {
+    /// Takes the next word of `table`. At the end gives the checksum of all words, and starts again.
+    pub fn next(&mut self, table: &impl Part) -> Option<u32> {
+        let Some(words) = table.part(&mut usize::from(self.leaf)) else {
+            return Some(core::mem::take(self).crc);
+        };
+        match words.get(usize::from(self.word)) {
+            Some(word) => (self.crc, self.word) = (crc32(self.crc, &word.to_le_bytes()), self.word + 1),
+            None => (self.leaf, self.word) = (self.leaf + 1, 0),
+        }
+        None
+    }
+}
 
 #[cfg(test)]
 mod tests {

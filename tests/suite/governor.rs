@@ -112,8 +112,7 @@ fn the_governed_set_point_is_monotone_and_arrives_exactly() {
             assert!(path.windows(2).all(|pair| (pair[1] - pair[0]) * step_m >= 0.0), "{law:?} {step_m}");
             assert_eq!(path.last(), Some(&f64::from(step_m as f32)), "{law:?}");
             // It takes its time: not there at once, and no tick moves it further than the table's step.
-            let gains = if law == Law::Lqr { &table.lqr } else { &table.pole_placement };
-            let largest = f64::from(gains.as_ref().unwrap().setpoint_step);
+            let largest = f64::from(table.law(law).unwrap().setpoint_step);
             assert!(largest < 0.1, "{largest}");
             assert!(
                 path.windows(2).all(|pair| (pair[1] - pair[0]).abs() < largest * 1.001 + 1e-6),
@@ -190,7 +189,7 @@ fn integral_action_is_governed_too() {
     rig.integral = Some(upright_design::rig::Integral { position_weight: 10.0 });
     let table = table(&rig);
     let (trace, summary) = simulate(&rig, &table, &step(&rig, Law::Lqr, 1.0, 40.0)).unwrap();
-    assert!(table.lqr.as_ref().unwrap().setpoint_step < 0.1);
+    assert!(table.laws.lqr.as_ref().unwrap().setpoint_step < 0.1);
     let mut peaks = Peaks::default();
     trace.samples().for_each(|sample| peaks.see(sample.state, sample.force));
     assert!(summary.settled && peaks.within_limits(&rig), "{summary} {peaks:?}");

@@ -36,7 +36,7 @@ fn quadruple() -> (Rig, TableValues) {
 /// Step and tilt with each law; with disturbances, too, or without.
 fn scenarios(rig: &Rig, disturbed: bool) -> Vec<(String, Scenario)> {
     let mut scenarios = Vec::new();
-    for (name, law) in [("lqr", Law::Lqr), ("pole-placement", Law::PolePlacement)] {
+    for (name, law) in Law::ALL.map(|law| (law.option(), law)) {
         let mut rest = Scenario { duration_s: 1.0, counter_start: 65_000, ..Scenario::at_rest(rig, law) };
         if disturbed {
             rest = Scenario { force_noise_n: 0.1, torque_noise_n_m: 3e-5, seed: 7, ..rest };

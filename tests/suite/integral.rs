@@ -4,8 +4,8 @@ use crate::bench::*;
 use std::path::Path;
 
 use nalgebra::SVector;
-use upright::control::actuator::Drive;
-use upright::control::state_feedback::{LawState, saturate};
+use upright::control::controller::Controller;
+use upright::control::encoder::CounterWidth;
 use upright::table::Law;
 use upright_design::rig::{Integral, PlantDescription, Rig};
 use upright_design::simulate::{Bench, Scenario, Sensing, simulate};
@@ -84,20 +84,21 @@ const FAR_M: f64 = 10.0;
 fn law_alone(rig: &Rig, conditional: bool) -> Vec<f64> {
     let values = raw_table(rig);
     let table = values.table::<2, 1>();
-    let gains = table.lqr.as_ref().unwrap();
     let mut bench = Bench::new(rig, &at_rest(rig, Law::Lqr)).unwrap();
-    let mut state = LawState::default();
+    let mut controller = Controller::new(&table, &values.build(), [CounterWidth::Bits32]).unwrap();
+    controller.start_in_state(&SVector::zeros());
+    controller.set_setpoint(FAR_M as f32).unwrap();
     let mut positions = Vec::new();
     for _ in 0..=40_000 {
         let x = SVector::from_fn(|i, _| bench.state()[i] as f32);
         positions.push(bench.state()[0]);
-        state.govern(FAR_M as f32, gains.setpoint_step);
-        let requested = state.force(gains, &x);
-        let applied = saturate(requested, table.force_limit_n);
-        bench.tick(Drive::Force(applied));
-        // An integral that does not hear of the limit.
-        let heard = if conditional { applied } else { requested };
-        state.advance(gains.k_integral, x[0], table.tick_s, requested, heard);
+        let command = controller.control_from_state(&x);
+        bench.tick(command.drive);
+        if !conditional {
+            // An integral that does not know of the limit.
+            controller.take_force(command.requested_n, command.requested_n);
+        }
+        controller.predict();
     }
     positions
 }

@@ -3,7 +3,7 @@
 use crate::bench::*;
 use upright::table::{Law, TableError};
 use upright_design::simulate::{FallKind, Scenario, SimulationError, simulate};
-use upright_design::table::{LawValues, TableValues};
+use upright_design::table::TableValues;
 
 const LEAN: f64 = 0.001;
 
@@ -46,12 +46,7 @@ fn a_delay_that_was_designed_for_stands_and_one_that_was_ignored_falls() {
 
 fn with_gain(table: &TableValues, law: Law, entry: usize, factor: f32) -> TableValues {
     let mut broken = table.clone();
-    let gains: &mut LawValues = match law {
-        Law::Lqr => broken.lqr.as_mut(),
-        Law::PolePlacement => broken.pole_placement.as_mut(),
-    }
-    .unwrap();
-    gains.k[entry] *= factor;
+    broken.laws[law].as_mut().unwrap().k[entry] *= factor;
     broken
 }
 

@@ -1,15 +1,14 @@
 //! The tick gives the same bits as its equations written out plainly, whatever shortcuts it takes for a table.
+//!
+//! The law is written here a second time on purpose: this is what the firmware's code is held against.
 
 use nalgebra::{SMatrix, SVector};
 use proptest::prelude::*;
 use proptest::test_runner::{TestCaseError, TestRunner};
 use upright::control::controller::Controller;
 use upright::control::encoder::CounterWidth;
-use upright::control::observer::ObserverGains;
-use upright::control::state_feedback::{LawGains, saturate};
-use upright::supervision::detection::Thresholds;
-use upright::table::limits::Limits;
-use upright::table::{Build, GainTable, TABLE_FORMAT};
+use upright::control::state_feedback::saturate;
+use upright::table::{Build, GainTable, LawGains, Limits, ObserverGains, PerLaw, TABLE_FORMAT, Thresholds};
 
 const BUILD: Build = Build { rig_hash: 1, tick_s: 0.01 };
 
@@ -52,14 +51,16 @@ fn table<const NX: usize, const NY: usize>(
         tick_s: BUILD.tick_s,
         delay_ticks,
         force_limit_n: 3.0,
-        lqr: Some(LawGains {
-            k: SVector::from_fn(|_, _| number()),
-            k_pending: if delay_ticks == 1 { number() } else { 0.0 },
-            k_integral: if integral { number() } else { 0.0 },
-            n: number(),
-            setpoint_step: 0.125,
-        }),
-        pole_placement: None,
+        laws: PerLaw {
+            lqr: Some(LawGains {
+                k: SVector::from_fn(|_, _| number()),
+                k_pending: if delay_ticks == 1 { number() } else { 0.0 },
+                k_integral: if integral { number() } else { 0.0 },
+                n: number(),
+                setpoint_step: 0.125,
+            }),
+            pole_placement: None,
+        },
         observer: Some(ObserverGains {
             ad,
             bd: SVector::from_fn(|_, _| number()),
@@ -94,7 +95,7 @@ impl<'t, const NX: usize, const NY: usize> Plain<'t, NX, NY> {
 
     /// Innovation, estimate and requested force; then prepares the next tick.
     fn tick(&mut self, target: f32, counts: &[u32; NY]) -> Vec<f32> {
-        let (law, observer) = (self.table.lqr.as_ref().unwrap(), self.table.observer.as_ref().unwrap());
+        let (law, observer) = (self.table.laws.lqr.as_ref().unwrap(), self.table.observer.as_ref().unwrap());
         let e: [f32; NY] = core::array::from_fn(|i| {
             observer.step[i] * counts[i] as i32 as f32 - self.x[observer.measured[i] as usize]
         });

@@ -11,7 +11,7 @@ use upright_design::rig::{Rig, Tick};
 use upright_design::simulate::{Scenario, Sensing, Summary, simulate};
 use upright_design::table::{Gains, TableValues};
 
-pub(crate) const LAWS: [Law; 2] = [Law::Lqr, Law::PolePlacement];
+pub(crate) const LAWS: [Law; 2] = Law::ALL;
 
 fn rigs() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("rigs")

@@ -3,6 +3,7 @@
 use super::{Certified, DesignError, Feedback};
 use crate::numerics::{Matrix, spectral_radius};
 use crate::rig::Rig;
+use upright::table::PerLaw;
 
 /// Spectral radii of one law's loop at the tick (below 1: stable).
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -18,37 +19,36 @@ pub struct Assessment {
 }
 
 impl Certified {
-    /// Assesses [LQR, pole placement] as they go into the table (LQR with its integral action, if it has one), where
-    /// designed.
+    /// Assesses the laws as they go into the table (LQR with its integral action, if it has one), where designed.
     ///
     /// # Errors
     /// [`DesignError::Poles`] if the eigenvalue iteration fails.
-    pub fn assess(&self, rig: &Rig) -> Result<[Option<Assessment>; 2], DesignError> {
+    pub fn assess(&self, rig: &Rig) -> Result<PerLaw<Option<Assessment>>, DesignError> {
         let design = &self.double;
         let radius = |law: &Feedback<f64>| {
             spectral_radius(&design.sampled_loop(rig, law)).map_err(|_| DesignError::Poles)
         };
-        let mut assessments = [None, None];
-        for (law, assessment) in assessments.iter_mut().enumerate() {
+        let assess = |law| {
             let (exact, single) = (design.sampled.in_table()[law], self.single.sampled.in_table()[law]);
-            if let (Some(continuous), Some(exact), Some(single)) =
+            let (Some(continuous), Some(exact), Some(single)) =
                 (design.continuous.in_table()[law], exact, single)
-            {
-                let rounded = Feedback { k: single.k.map(|&gain| f64::from(gain)), ..exact.clone() };
-                // A continuous gain knows nothing of a force on its way.
-                let mut held = Matrix::zeros(1, continuous.k.cols() + usize::from(rig.tick.delay_ticks));
-                for j in 0..continuous.k.cols() {
-                    held[(0, j)] = continuous.k[(0, j)];
-                }
-                *assessment = Some(Assessment {
-                    exact: radius(exact)?,
-                    rounded: radius(&rounded)?,
-                    largest_rounding: largest_relative_difference(&exact.k, &rounded.k),
-                    continuous_at_tick: radius(&Feedback { k: held, ..continuous.clone() })?,
-                });
+            else {
+                return Ok(None);
+            };
+            let rounded = Feedback { k: single.k.map(|&gain| f64::from(gain)), ..exact.clone() };
+            // A continuous gain feeds back no pending force.
+            let mut held = Matrix::zeros(1, continuous.k.cols() + usize::from(rig.tick.delay_ticks));
+            for j in 0..continuous.k.cols() {
+                held[(0, j)] = continuous.k[(0, j)];
             }
-        }
-        Ok(assessments)
+            Ok(Some(Assessment {
+                exact: radius(exact)?,
+                rounded: radius(&rounded)?,
+                largest_rounding: largest_relative_difference(&exact.k, &rounded.k),
+                continuous_at_tick: radius(&Feedback { k: held, ..continuous.clone() })?,
+            }))
+        };
+        PerLaw::from_fn(assess).transpose()
     }
 }
 

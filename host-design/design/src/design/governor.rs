@@ -1,6 +1,6 @@
 //! How fast the set-point may move.
 
-use super::synthesis::Feedback;
+use super::synthesis::{Design, Feedback};
 use crate::numerics::Matrix;
 use crate::rig::{PlantDescription, Rig, defaults};
 
@@ -11,45 +11,31 @@ const SHARE: f64 = 0.5;
 /// link or the force beyond half of its limit; none for a model that is not a chain, or without such a bound.
 ///
 /// The set-point's path is a sum of small steps, one per tick, so the response is the same sum of step responses:
-/// `|θ(k)| <= step · Σ_j |s(j)|` with the unit step response s. This is the criterion the paper says is missing for
+/// `|θ(k)| <= step · Σ_j |s(j)|` with the unit step response s of the design's own sampled loop. This is the criterion the paper says is missing for
 /// keeping the states in their linear zone; it holds for every path, and needs one number in the table.
-pub fn setpoint_step(rig: &Rig, ad: &Matrix<f64>, bd: &Matrix<f64>, law: &Feedback<f64>) -> Option<f64> {
-    let PlantDescription::Chain(_) = &rig.plant else { return None };
-    let n = law.n?;
-    let (s, late) = (ad.rows(), rig.tick.delay_ticks == 1);
-    let links = s / 2 - 1;
+pub fn setpoint_step(rig: &Rig, design: &Design<f64>, law: &Feedback<f64>) -> Option<f64> {
+    let PlantDescription::Chain(chain) = &rig.plant else { return None };
+    let (matrix, input) = (design.sampled_loop(rig, law), design.setpoint_input(rig, law)?);
+    let (links, n) = (chain.links.len(), law.n?);
 
-    let mut x = vec![0.0; s];
-    let (mut pending, mut z) = (0.0, 0.0);
+    let mut state = Matrix::zeros(matrix.rows(), 1);
     let mut sums = vec![0.0; links + 1];
     let most_ticks = (300.0 / rig.tick.period_s).clamp(1e4, 1e6) as usize;
     for tick in 0..most_ticks {
-        let mut u = n;
-        for (j, x) in x.iter().enumerate() {
-            u -= law.k[(0, j)] * x;
-        }
-        if law.integral {
-            u -= law.k[(0, s)] * z;
-        }
-        if late {
-            u -= law.k[(0, law.k.cols() - 1)] * pending;
-        }
+        let force = n - (&law.k * &state)[(0, 0)];
         let mut angle = 0.0;
-        let mut largest = u.abs();
+        let mut largest = force.abs();
         for (link, sum) in sums.iter_mut().take(links).enumerate() {
-            angle += x[2 + 2 * link];
+            angle += state[(2 + 2 * link, 0)];
             *sum += f64::abs(angle);
             largest = largest.max(f64::abs(angle));
         }
-        sums[links] += u.abs();
-        let settled = largest < 1e-9 && (x[0] - 1.0).abs() < 1e-6;
+        sums[links] += force.abs();
+        let settled = largest < 1e-9 && (state[(0, 0)] - 1.0).abs() < 1e-6;
         if settled && tick > 10 {
             return bound(rig, &sums);
         }
-        let applied = if late { pending } else { u };
-        z += rig.tick.period_s * (x[0] - 1.0);
-        x = (0..s).map(|i| bd[(i, 0)] * applied + (0..s).map(|j| ad[(i, j)] * x[j]).sum::<f64>()).collect();
-        pending = u;
+        state = &(&matrix * &state) + &input;
     }
     None
 }

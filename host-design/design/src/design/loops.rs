@@ -4,6 +4,7 @@ use super::error::DesignError;
 use super::synthesis::{Design, Feedback, with_integral};
 use crate::numerics::{Complex, Matrix, Real, eigenvalues};
 use crate::rig::Rig;
+use upright::table::{Law, PerLaw};
 
 impl<R: Real> Design<R> {
     /// Poles of every closed loop.
@@ -14,15 +15,16 @@ impl<R: Real> Design<R> {
         let of = |a: Matrix<R>| -> Result<Poles, DesignError> {
             Ok(eigenvalues(&a).map_err(|_| DesignError::Poles)?.iter().map(Complex::to_f64).collect())
         };
-        let continuous = |law: &Option<Feedback<R>>| {
-            law.as_ref().map(|law| of(self.continuous_loop(rig, law))).transpose()
-        };
-        let sampled =
-            |law: &Option<Feedback<R>>| law.as_ref().map(|law| of(self.sampled_loop(rig, law))).transpose();
+        let continuous =
+            |law: Option<&Feedback<R>>| law.map(|law| of(self.continuous_loop(rig, law))).transpose();
+        let sampled = |law: Option<&Feedback<R>>| law.map(|law| of(self.sampled_loop(rig, law))).transpose();
         Ok(DesignPoles {
-            continuous: [continuous(&self.continuous.lqr)?, continuous(&self.continuous.pole_placement)?],
-            sampled: [sampled(&self.sampled.lqr)?, sampled(&self.sampled.pole_placement)?],
-            integral: [continuous(&self.continuous.integral)?, sampled(&self.sampled.integral)?],
+            continuous: self.continuous.each().map(continuous).transpose()?,
+            sampled: self.sampled.each().map(sampled).transpose()?,
+            integral: [
+                continuous(self.continuous.integral.as_ref())?,
+                sampled(self.sampled.integral.as_ref())?,
+            ],
         })
     }
 
@@ -36,8 +38,8 @@ impl<R: Real> Design<R> {
         &a - &(&b * &law.k)
     }
 
-    /// The closed loop of the sampled plant with `law`: of x, and z with integral action, and the force on its way with
-    /// one tick of delay.
+    /// The closed loop of the sampled plant with `law`, `ζ⁺ = M ζ` for set-point 0. ζ holds x, then z with integral action,
+    /// then the pending force with one tick of delay; `u = -K ζ`.
     pub fn sampled_loop(&self, rig: &Rig, law: &Feedback<R>) -> Matrix<R> {
         let period = R::from_f64(rig.tick.period_s);
         let (a, b) = if law.integral {
@@ -51,30 +53,44 @@ impl<R: Real> Design<R> {
         // u⁺ = -K [x; u]
         a.beside(&b).above(&-&law.k)
     }
+
+    /// The input of the set-point r to [`sampled_loop`](Self::sampled_loop), `ζ⁺ = M ζ + E r`; none for a law without N.
+    pub fn setpoint_input(&self, rig: &Rig, law: &Feedback<R>) -> Option<Matrix<R>> {
+        let n = law.n.as_ref()?;
+        let states = self.ad.rows();
+        let mut input = Matrix::zeros(law.k.cols(), 1);
+        if rig.tick.delay_ticks == 1 {
+            input[(law.k.cols() - 1, 0)] = n.clone();
+        } else {
+            input = input.with_block(0, 0, &self.bd.scaled(n));
+        }
+        if law.integral {
+            // z⁺ = z + T (x - r)
+            input[(states, 0)] = -R::from_f64(rig.tick.period_s);
+        }
+        Some(input)
+    }
 }
 
-/// Poles of each closed loop: [LQR, pole placement], where designed; with the delayed force as a further state, if there
-/// is a delay.
+/// Poles of each closed loop, where designed; with the pending force as a further state, if there is a delay.
 #[derive(Debug, Clone, PartialEq)]
 pub struct DesignPoles {
     /// Continuous loops (1/s).
-    pub continuous: [Option<Poles>; 2],
+    pub continuous: PerLaw<Option<Poles>>,
     /// Sampled loops.
-    pub sampled: [Option<Poles>; 2],
+    pub sampled: PerLaw<Option<Poles>>,
     /// [continuous, sampled] loop of the LQR with integral action.
     pub integral: [Option<Poles>; 2],
 }
 
 impl DesignPoles {
-    /// [continuous, sampled] poles of the law that is number `law` in the table (LQR with integral action, if there is
-    /// such a design).
-    pub fn in_table(&self, law: usize) -> [Option<&Poles>; 2] {
-        let with_integral = |integral: &'_ Option<Poles>| law == 0 && integral.is_some();
-        let [continuous, sampled] = &self.integral;
-        [
-            if with_integral(continuous) { continuous.as_ref() } else { self.continuous[law].as_ref() },
-            if with_integral(sampled) { sampled.as_ref() } else { self.sampled[law].as_ref() },
-        ]
+    /// [continuous, sampled] poles of `law` as it goes into the table: LQR with integral action, if there is such a design.
+    pub fn in_table(&self, law: Law) -> [Option<&Poles>; 2] {
+        let [continuous, sampled] = self.integral.each_ref().map(|poles| match law {
+            Law::Lqr => poles.as_ref(),
+            Law::PolePlacement => None,
+        });
+        [continuous.or(self.continuous[law].as_ref()), sampled.or(self.sampled[law].as_ref())]
     }
 }
 

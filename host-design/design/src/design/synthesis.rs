@@ -9,6 +9,7 @@ use super::zero_order_hold::{sampled_cost, zero_order_hold};
 use crate::numerics::{Complex, Matrix, Real, Wide, eigenvalues, solve};
 use crate::plant::{ChainParameters, Equilibrium, LinearModel, linearise};
 use crate::rig::{LinearPlant, Lqr, PlantDescription, PolePlacement, Rig};
+use upright::table::PerLaw;
 
 /// Plant and gains with entries of type `T`: a working precision, or what it was rounded to.
 #[derive(Debug, Clone, PartialEq)]
@@ -52,14 +53,14 @@ pub struct Feedback<T> {
 }
 
 impl<T> Laws<T> {
-    /// [LQR, pole placement].
-    pub fn each(&self) -> [Option<&Feedback<T>>; 2] {
-        [self.lqr.as_ref(), self.pole_placement.as_ref()]
+    /// The laws without integral action.
+    pub fn each(&self) -> PerLaw<Option<&Feedback<T>>> {
+        PerLaw { lqr: self.lqr.as_ref(), pole_placement: self.pole_placement.as_ref() }
     }
 
-    /// [LQR, pole placement] as they go into the table: LQR with integral action, if there is such a design.
-    pub fn in_table(&self) -> [Option<&Feedback<T>>; 2] {
-        [self.integral.as_ref().or(self.lqr.as_ref()), self.pole_placement.as_ref()]
+    /// The laws as they go into the table: LQR with integral action, if there is such a design.
+    pub fn in_table(&self) -> PerLaw<Option<&Feedback<T>>> {
+        PerLaw { lqr: self.integral.as_ref().or(self.lqr.as_ref()), ..self.each() }
     }
 
     fn none() -> Self {

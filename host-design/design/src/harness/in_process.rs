@@ -25,7 +25,7 @@ pub fn with_firmware<R>(
     table: &TableValues,
     action: impl FnOnce(&mut dyn Target) -> R,
 ) -> Result<R, HarnessError> {
-    let (states, sensors) = (table.states, table.sensors);
+    let (states, sensors) = (table.states(), table.sensors());
     let (mut action, mut result) = (Some(action), None);
     // Without R in its type, so that the firmware is compiled once per size and not once per size and caller.
     let mut run = |target: &mut dyn Target| result = action.take().map(|action| action(target));

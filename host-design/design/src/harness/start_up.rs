@@ -46,7 +46,7 @@ impl<'t> Harness<'t> {
             session: Session::new(target),
             bench,
             hand,
-            counters: vec![0; table.sensors],
+            counters: vec![0; table.sensors()],
             supply_v: table.motor.map_or(0.0, |motor| motor.supply_v),
             period_s: rig.tick.period_s,
         };

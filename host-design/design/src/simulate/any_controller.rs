@@ -90,7 +90,7 @@ pub(super) fn with_controller(
     table: &TableValues,
     action: Action<'_>,
 ) -> Result<Option<Fall>, SimulationError> {
-    let (states, sensors) = (table.states, table.sensors);
+    let (states, sensors) = (table.states(), table.sensors());
     with_size(states, sensors, WithController { table, action })
         .ok_or(SimulationError::Size { states, sensors })?
 }

@@ -36,7 +36,7 @@ pub fn run(
     scenario: &Scenario,
     observe: &mut dyn FnMut(&Sample<&[f64]>),
 ) -> Result<Option<Fall>, SimulationError> {
-    with_controller(table, &mut |controller| closed_loop(rig, controller, table.sensors, scenario, observe))
+    with_controller(table, &mut |controller| closed_loop(rig, controller, table.sensors(), scenario, observe))
 }
 
 /// Number of the run's last tick.

@@ -4,6 +4,8 @@
 
 /// The largest number of states a gain table can hold.
 pub const MAX_STATES: usize = 30;
+/// The largest number of sensors a gain table can hold: cart and links of the longest chain.
+pub const MAX_SENSORS: usize = 15;
 /// The largest number of sensors for a `[model]` rig; a chain has one for the cart and one for each link.
 pub const MAX_MODEL_SENSORS: usize = 2;
 /// The largest number of sensors of any rig: a chain of 14 links.

@@ -1,17 +1,16 @@
 //! The gain table on the host: its values for any number of states, as a firmware table and as Rust source.
 
 mod any_size;
+mod contents;
 mod source;
 mod supervision;
-mod supervision_source;
 mod write;
 
+use core::ops::{Deref, DerefMut};
+
 use nalgebra::{SMatrix, SVector};
-use serde::Serialize;
-use upright::control::actuator::MotorMap;
-use upright::control::observer::ObserverGains;
-use upright::control::state_feedback::LawGains;
-use upright::table::{Build, GainTable, TABLE_FORMAT};
+use serde::{Serialize, Serializer};
+use upright::table::{Build, GainTable, LawGains, MotorMap, ObserverGains, PerLaw, Resize, TABLE_FORMAT};
 
 use crate::design::{Certified, Feedback, detection_thresholds, setpoint_step};
 use crate::numerics::Matrix;
@@ -19,7 +18,6 @@ use crate::rig::{Motor, PlantDescription, Rig};
 
 pub use any_size::{MAX_MODEL_SENSORS, MAX_SENSORS, MAX_STATES, WithSize, with_firmware_size, with_size};
 pub use source::gains_source;
-pub use supervision::{LimitValues, ThresholdValues};
 pub use write::{WriteError, write_atomically};
 
 /// Which gains go into a table.
@@ -31,84 +29,41 @@ pub enum Gains {
     Continuous,
 }
 
-/// What goes into the table, with the numbers of states and sensors not yet in the type.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+/// The firmware's table in the largest size, with the numbers of states and sensors that are used; all entries beyond
+/// them are 0 or, of limits and thresholds, those of [`Limits::none`](upright::table::Limits::none) and
+/// [`Thresholds::none`](upright::table::Thresholds::none). The checksum is only made with the [`table`](Self::table).
+#[derive(Debug, Clone, PartialEq)]
 pub struct TableValues {
     /// Name of the rig.
-    #[serde(skip)]
     pub rig: String,
-    /// Hash of the rig file's values.
-    #[serde(skip)]
-    pub rig_hash: u64,
-    /// Number of states.
-    pub states: usize,
-    /// Number of sensors.
-    pub sensors: usize,
-    /// Index of the state that follows the set-point.
-    pub output: usize,
-    /// Control period (s).
-    pub tick_s: f32,
-    /// 0 or 1.
-    pub delay_ticks: u32,
-    /// Largest force (N).
-    pub force_limit_n: f32,
-    /// LQR gains, with integral action if the rig file asks for it.
-    pub lqr: Option<LawValues>,
-    /// Pole placement gains.
-    pub pole_placement: Option<LawValues>,
-    /// The observer.
-    pub observer: Option<ObserverValues>,
-    /// The motor.
-    pub motor: Option<MotorValues>,
-    /// What the supervisor enforces.
-    pub limits: LimitValues,
-    /// When encoders and motor are at fault.
-    pub thresholds: ThresholdValues,
+    widest: GainTable<MAX_STATES, MAX_SENSORS>,
 }
 
-/// Gains of one law.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct LawValues {
-    /// K, one per state.
-    pub k: Vec<f32>,
-    /// Gain on the force on its way.
-    pub k_pending: f32,
-    /// Gain on the integral.
-    pub k_integral: f32,
-    /// N; 0 if no constant force can hold the output away from 0.
-    pub n: f32,
-    /// Largest change of the governed set-point per tick (m).
-    pub setpoint_step: f32,
+/// Gains of one law in the largest size.
+pub type LawValues = LawGains<MAX_STATES>;
+
+/// All fields of the table can be read and changed.
+impl Deref for TableValues {
+    type Target = GainTable<MAX_STATES, MAX_SENSORS>;
+
+    fn deref(&self) -> &Self::Target {
+        &self.widest
+    }
 }
 
-/// Model and gain of the observer.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct ObserverValues {
-    /// Ad by rows.
-    pub ad: Vec<Vec<f32>>,
-    /// Bd.
-    pub bd: Vec<f32>,
-    /// L (filter form) by rows.
-    pub l: Vec<Vec<f32>>,
-    /// Which state each sensor measures.
-    pub measured: Vec<u32>,
-    /// Travel per count of each sensor.
-    pub step: Vec<f32>,
+impl DerefMut for TableValues {
+    fn deref_mut(&mut self) -> &mut Self::Target {
+        &mut self.widest
+    }
 }
 
-/// The motor as the cart sees it.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct MotorValues {
-    /// V/N at standstill.
-    pub volts_per_newton: f32,
-    /// V·s/m of back-EMF.
-    pub volts_per_speed: f32,
-    /// V.
-    pub dead_zone_v: f32,
-    /// V per tick.
-    pub slew_v_per_tick: f32,
-    /// V.
-    pub supply_v: f32,
+/// All fields but those that identify the table.
+impl Serialize for TableValues {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        let fields = self.fields();
+        let shown = fields.iter().filter(|field| !["format", "rig_hash"].contains(&field.name));
+        contents::object(shown, serializer)
+    }
 }
 
 /// A design that does not make a table.
@@ -151,53 +106,58 @@ impl TableValues {
             Gains::Continuous => single.continuous.in_table(),
         };
         // The governor's step comes from the loop the law was designed for.
-        let steps = design
-            .double
-            .sampled
-            .in_table()
-            .map(|law| law.and_then(|law| setpoint_step(rig, &design.double.ad, &design.double.bd, law)));
-        let law = |index: usize| laws[index].map(|law| LawValues::of(law, states, steps[index])).transpose();
-        let (lqr, pole_placement) = (law(0)?, law(1)?);
-        if lqr.is_none() && pole_placement.is_none() {
+        let double = &design.double;
+        let steps = double.sampled.in_table().map(|law| setpoint_step(rig, double, law?));
+        let laws =
+            PerLaw::from_fn(|law| laws[law].map(|gains| law_gains(gains, states, steps[law])).transpose())
+                .transpose()?;
+        if laws.present().next().is_none() {
             return Err(NoTable::NoLaw);
         }
-        let observer = single.kalman.as_ref().map(|kalman| ObserverValues {
-            ad: rows(&single.ad),
-            bd: single.bd.entries().to_vec(),
-            l: rows(&kalman.l_filter),
-            measured: rig.sensors().iter().map(|sensor| sensor.state as u32).collect(),
-            step: kalman.steps.entries().to_vec(),
+        let observer = single.kalman.as_ref().map(|kalman| {
+            let mut measured = [MAX_STATES as u32; MAX_SENSORS];
+            for (state, sensor) in measured.iter_mut().zip(rig.sensors()) {
+                *state = sensor.state as u32;
+            }
+            ObserverGains {
+                ad: widest(&single.ad),
+                bd: widest(&single.bd),
+                l: widest(&kalman.l_filter),
+                measured,
+                step: widest(&kalman.steps),
+            }
         });
-        let sensors = match (&observer, &rig.plant) {
-            (Some(observer), _) => observer.step.len(),
+        let sensors = match (&single.kalman, &rig.plant) {
+            (Some(kalman), _) => kalman.steps.entries().len(),
             (None, PlantDescription::Chain(chain)) => chain.links.len() + 1,
             (None, PlantDescription::Model(_)) => 1,
         };
         let steps = design.double.kalman.as_ref().map_or(&[][..], |kalman| kalman.steps.entries());
         let detection = detection_thresholds(rig, &design.double);
-        let values = Self {
-            rig: rig.name.clone(),
+        let widest = GainTable {
+            format: TABLE_FORMAT,
+            states: states as u32,
+            sensors: sensors as u32,
+            output: rig.output() as u32,
             rig_hash: rig.hash(),
-            states,
-            sensors,
-            output: rig.output(),
             tick_s: finite("tick.period_s", rig.tick.period_s as f32)?,
             delay_ticks: u32::from(rig.tick.delay_ticks),
             force_limit_n: rig
                 .force_limit_n()
                 .map_or(Ok(f32::MAX), |limit| finite("actuator.force_limit_n", limit as f32))?,
-            lqr,
-            pole_placement,
+            laws,
             observer,
             motor: rig
                 .actuator
                 .motor
                 .as_ref()
-                .map(|motor| MotorValues::of(motor, rig.tick.period_s))
+                .map(|motor| motor_map(motor, rig.tick.period_s))
                 .transpose()?,
-            limits: LimitValues::of(rig, sensors, steps)?,
-            thresholds: ThresholdValues::of(sensors, detection.as_ref()),
+            limits: supervision::limits(rig, steps)?,
+            thresholds: supervision::thresholds(detection.as_ref()),
+            crc: 0,
         };
+        let values = Self { rig: rig.name.clone(), widest };
         if let PlantDescription::Chain(chain) = &rig.plant
             && sensors != chain.links.len() + 1
         {
@@ -209,21 +169,39 @@ impl TableValues {
 
     /// The same table with a governor that lets every step of the set-point through, as the paper simulates.
     pub fn without_governor(mut self) -> Self {
-        for law in [&mut self.lqr, &mut self.pole_placement].into_iter().flatten() {
+        for law in self.laws.present_mut() {
             law.setpoint_step = f32::MAX;
         }
         self
     }
 
-    /// The same table with nothing that the supervisor could find anything by: no thresholds, no limits. What happens to a
-    /// rig without it.
+    /// The same table with no thresholds and no limits, so that the supervisor finds nothing: what happens to a rig
+    /// without it.
     pub fn without_detection(mut self) -> Self {
-        let sensors = self.sensors;
-        self.thresholds = ThresholdValues::of(sensors, None);
+        self.thresholds = supervision::thresholds(None);
         let limits = &mut self.limits;
         (limits.rail_m, limits.angle_rad, limits.speed_m_per_s) = ([-f32::MAX, f32::MAX], f32::MAX, f32::MAX);
         limits.saturated_ticks = u32::MAX;
         self
+    }
+
+    /// Number of states.
+    pub fn states(&self) -> usize {
+        self.widest.states as usize
+    }
+
+    /// Number of sensors.
+    pub fn sensors(&self) -> usize {
+        self.widest.sensors as usize
+    }
+
+    /// The states that the sensors measure; those of a chain are the positions, with or without observer.
+    pub fn measured(&self) -> Vec<usize> {
+        let sensors = 0..self.sensors();
+        match &self.observer {
+            Some(observer) => sensors.map(|sensor| observer.measured[sensor] as usize).collect(),
+            None => sensors.map(|sensor| 2 * sensor).collect(),
+        }
     }
 
     /// The firmware's table, sealed with its checksum.
@@ -231,53 +209,22 @@ impl TableValues {
     /// # Panics
     /// If `NX` and `NY` are not the table's numbers of states and sensors.
     pub fn table<const NX: usize, const NY: usize>(&self) -> GainTable<NX, NY> {
-        assert_eq!((self.states, self.sensors), (NX, NY), "states and sensors of the table");
-        let law = |law: &Option<LawValues>| {
-            law.as_ref().map(|law| LawGains {
-                k: SVector::from_fn(|i, _| law.k[i]),
-                k_pending: law.k_pending,
-                k_integral: law.k_integral,
-                n: law.n,
-                setpoint_step: law.setpoint_step,
-            })
-        };
-        let mut table = GainTable {
-            format: TABLE_FORMAT,
-            states: NX as u32,
-            sensors: NY as u32,
-            output: self.output as u32,
-            rig_hash: self.rig_hash,
-            tick_s: self.tick_s,
-            delay_ticks: self.delay_ticks,
-            force_limit_n: self.force_limit_n,
-            lqr: law(&self.lqr),
-            pole_placement: law(&self.pole_placement),
-            observer: self.observer.as_ref().map(|observer| ObserverGains {
-                ad: SMatrix::from_fn(|i, j| observer.ad[i][j]),
-                bd: SVector::from_fn(|i, _| observer.bd[i]),
-                l: SMatrix::from_fn(|i, j| observer.l[i][j]),
-                measured: core::array::from_fn(|i| observer.measured[i]),
-                step: SVector::from_fn(|i, _| observer.step[i]),
-            }),
-            motor: self.motor.map(|motor| MotorMap {
-                volts_per_newton: motor.volts_per_newton,
-                volts_per_speed: motor.volts_per_speed,
-                dead_zone_v: motor.dead_zone_v,
-                slew_v_per_tick: motor.slew_v_per_tick,
-                supply_v: motor.supply_v,
-            }),
-            limits: self.limits.limits(),
-            thresholds: self.thresholds.thresholds(),
-            crc: 0,
-        };
+        assert_eq!((self.states(), self.sensors()), (NX, NY), "states and sensors of the table");
+        let mut table: GainTable<NX, NY> = self.widest.resized();
         table.crc = table.checksum();
         table
+    }
+
+    /// Names, documentation and values of all fields.
+    fn fields(&self) -> Vec<contents::Field> {
+        // Values are only made for sizes that exist.
+        with_size(self.states(), self.sensors(), Fields(self)).unwrap_or_default()
     }
 
     /// The checksum the firmware expects.
     pub fn crc(&self) -> u32 {
         // Values are only made for sizes that exist.
-        with_size(self.states, self.sensors, Checksum(self)).unwrap_or(0)
+        with_size(self.states(), self.sensors(), Checksum(self)).unwrap_or(0)
     }
 
     /// What a firmware image for this table is built for.
@@ -296,45 +243,56 @@ impl WithSize for Checksum<'_> {
     }
 }
 
-impl LawValues {
-    /// K holds the gains on the states, then on the integral and on the force on its way, where there are such.
-    fn of(law: &Feedback<f32>, states: usize, setpoint_step: Option<f64>) -> Result<Self, NoTable> {
-        let entries: Vec<f32> =
-            law.k.entries().iter().map(|&gain| finite("a gain", gain)).collect::<Result<_, _>>()?;
-        let (k, further) = entries.split_at(states);
-        let (k_integral, k_pending) = match (further, law.integral) {
-            ([integral, pending], _) => (*integral, *pending),
-            ([integral], true) => (*integral, 0.0),
-            ([pending], false) => (0.0, *pending),
-            _ => (0.0, 0.0),
-        };
-        Ok(Self {
-            k: k.to_vec(),
-            k_pending,
-            k_integral,
-            n: finite("the precompensation gain", law.n.unwrap_or(0.0))?,
-            setpoint_step: setpoint_step.map_or(f32::MAX, |step| step as f32),
-        })
+struct Fields<'a>(&'a TableValues);
+
+impl WithSize for Fields<'_> {
+    type Output = Vec<contents::Field>;
+
+    fn run<const NX: usize, const NY: usize>(self) -> Self::Output {
+        contents::fields(&self.0.table::<NX, NY>())
     }
 }
 
-impl MotorValues {
-    fn of(motor: &Motor, period_s: f64) -> Result<Self, NoTable> {
-        let speed = motor.volts_per_speed();
-        Ok(Self {
-            volts_per_newton: finite("the motor's voltage per force", (motor.resistance_ohm / speed) as f32)?,
-            volts_per_speed: finite("the motor's voltage per speed", speed as f32)?,
-            dead_zone_v: finite("actuator.dead_zone_v", motor.dead_zone_v as f32)?,
-            slew_v_per_tick: motor
-                .slew_v_per_s
-                .map_or(Ok(f32::MAX), |slew| finite("actuator.slew_v_per_s", (slew * period_s) as f32))?,
-            supply_v: finite("actuator.supply_v", motor.supply_v as f32)?,
-        })
-    }
+/// K of a design holds the gains on the states, then on the integral and on the pending force, where there are such.
+fn law_gains(law: &Feedback<f32>, states: usize, setpoint_step: Option<f64>) -> Result<LawValues, NoTable> {
+    let entries: Vec<f32> =
+        law.k.entries().iter().map(|&gain| finite("a gain", gain)).collect::<Result<_, _>>()?;
+    let (k, further) = entries.split_at(states);
+    let (k_integral, k_pending) = match (further, law.integral) {
+        ([integral, pending], _) => (*integral, *pending),
+        ([integral], true) => (*integral, 0.0),
+        ([pending], false) => (0.0, *pending),
+        _ => (0.0, 0.0),
+    };
+    Ok(LawGains {
+        k: SVector::from_fn(|state, _| k.get(state).copied().unwrap_or_default()),
+        k_pending,
+        k_integral,
+        n: finite("the precompensation gain", law.n.unwrap_or(0.0))?,
+        setpoint_step: setpoint_step.map_or(f32::MAX, |step| step as f32),
+    })
 }
 
-fn rows(matrix: &Matrix<f32>) -> Vec<Vec<f32>> {
-    matrix.row_slices().map(<[f32]>::to_vec).collect()
+fn motor_map(motor: &Motor, period_s: f64) -> Result<MotorMap, NoTable> {
+    let speed = motor.volts_per_speed();
+    Ok(MotorMap {
+        volts_per_newton: finite("the motor's voltage per force", (motor.resistance_ohm / speed) as f32)?,
+        volts_per_speed: finite("the motor's voltage per speed", speed as f32)?,
+        dead_zone_v: finite("actuator.dead_zone_v", motor.dead_zone_v as f32)?,
+        slew_v_per_tick: motor
+            .slew_v_per_s
+            .map_or(Ok(f32::MAX), |slew| finite("actuator.slew_v_per_s", (slew * period_s) as f32))?,
+        supply_v: finite("actuator.supply_v", motor.supply_v as f32)?,
+    })
+}
+
+/// `matrix` with zeros around it.
+pub(crate) fn widest<T: upright::table::Scalar, const R: usize, const C: usize>(
+    matrix: &Matrix<T>,
+) -> SMatrix<T, R, C> {
+    SMatrix::from_fn(|row, column| {
+        if row < matrix.rows() && column < matrix.cols() { matrix[(row, column)] } else { T::default() }
+    })
 }
 
 fn finite(what: &'static str, value: f32) -> Result<f32, NoTable> {

@@ -1,12 +1,14 @@
 //! `src/gains.rs`: the table as Rust source, in rustfmt's format, the same bytes for the same rig.
+//!
+//! Names, order and comments are those of the declaration in the firmware's `table`.
 
 use core::fmt::Write;
 
-use super::supervision_source::write_supervision;
-use super::{LawValues, MotorValues, ObserverValues, TableValues};
+use super::TableValues;
+use super::contents::{Field, Node, Number};
 use crate::rig::{PlantDescription, Rig};
 
-/// The source of a `gains.rs` for `table`, designed from `rig`.
+/// The source of a `gains.rs` for `table`, designed from `rig`. It compiles in any crate that depends on `upright`.
 pub fn gains_source(rig: &Rig, table: &TableValues) -> String {
     let mut out = String::new();
     // Writing into a String cannot fail.
@@ -15,21 +17,10 @@ pub fn gains_source(rig: &Rig, table: &TableValues) -> String {
 }
 
 fn write_source(out: &mut String, rig: &Rig, table: &TableValues) -> core::fmt::Result {
-    let crc = table.crc();
-    let states = state_meanings(rig);
     writeln!(out, "//! Gains of the rig `{}`, written by `upright design`; do not edit.", table.rig)?;
     writeln!(out, "//!")?;
     writeln!(out, "//! Every gain is the exact answer of its design problem, rounded once to f32.\n")?;
-    if table.motor.is_some() {
-        writeln!(out, "use crate::control::actuator::MotorMap;")?;
-    }
-    writeln!(out, "use crate::supervision::detection::{{MotorTest, Thresholds}};")?;
-    writeln!(out, "use crate::table::limits::Limits;")?;
-    if table.observer.is_some() {
-        writeln!(out, "use crate::control::observer::ObserverGains;")?;
-    }
-    writeln!(out, "use crate::control::state_feedback::LawGains;")?;
-    writeln!(out, "use crate::table::{{GainTable, TABLE_FORMAT, columns}};\n")?;
+    write_imports(out, table)?;
     let mut constant = |doc: &str, name: &str, kind: &str, value: &str| {
         writeln!(out, "/// {doc}\npub const {name}: {kind} = {value};\n")
     };
@@ -40,168 +31,208 @@ fn write_source(out: &mut String, rig: &Rig, table: &TableValues) -> core::fmt::
         "&str",
         &format!("{:?}", env!("CARGO_PKG_VERSION")),
     )?;
-    constant("Hash of the rig file's values.", "RIG_HASH", "u64", &hexadecimal(table.rig_hash))?;
-    constant("Control period (s).", "TICK_S", "f32", &literal(table.tick_s))?;
-    constant("Number of states.", "STATES", "usize", &table.states.to_string())?;
-    constant("Number of sensors.", "SENSORS", "usize", &table.sensors.to_string())?;
+    constant("Hash of the rig file's values.", "RIG_HASH", "u64", &hexadecimal(table.rig_hash, 4))?;
+    constant("Control period (s).", "TICK_S", "f32", &literal(Number::Float(table.tick_s)))?;
+    constant("Number of states.", "STATES", "usize", &table.states().to_string())?;
+    constant("Number of sensors.", "SENSORS", "usize", &table.sensors().to_string())?;
     writeln!(out, "/// The gain table.\npub static TABLE: GainTable<STATES, SENSORS> = GainTable {{")?;
-    writeln!(out, "    format: TABLE_FORMAT,")?;
-    writeln!(out, "    states: {},", table.states)?;
-    writeln!(out, "    sensors: {},", table.sensors)?;
-    writeln!(out, "    // index of the state that follows the set-point\n    output: {},", table.output)?;
-    writeln!(out, "    rig_hash: RIG_HASH,")?;
-    writeln!(out, "    // s: control period\n    tick_s: TICK_S,")?;
-    writeln!(out, "    // ticks between a measurement and the force computed from it")?;
-    writeln!(out, "    delay_ticks: {},", table.delay_ticks)?;
-    writeln!(
-        out,
-        "    // N: largest force on the cart\n    force_limit_n: {},",
-        literal(table.force_limit_n)
-    )?;
-    writeln!(out, "    // linear quadratic regulator")?;
-    write_law(out, "lqr", &table.lqr, &states)?;
-    writeln!(out, "    // pole placement")?;
-    write_law(out, "pole_placement", &table.pole_placement, &states)?;
-    write_observer(out, &table.observer, &states)?;
-    write_motor(out, &table.motor)?;
-    let measured = measured_names(table, &states);
-    write_supervision(out, &table.limits, &table.thresholds, &measured)?;
-    let (high, low) = (crc >> 16, crc & 0xffff);
-    writeln!(out, "    // CRC-32 of all values above\n    crc: 0x{high:04x}_{low:04x},\n}};")
-}
-
-fn write_law(out: &mut String, name: &str, law: &Option<LawValues>, states: &[Meaning]) -> core::fmt::Result {
-    let Some(law) = law else {
-        return writeln!(out, "    {name}: None,");
-    };
-    writeln!(out, "    {name}: Some(LawGains {{\n        k: columns([[")?;
-    for (gain, state) in law.k.iter().zip(states) {
-        entry(out, 12, &format!("{}: {}", state.gain_unit, state.name), *gain)?;
+    let mut writer = Writer { out, meanings: Meanings::of(rig, table), indent: 4 };
+    for field in table.fields() {
+        writer.field(&field)?;
     }
-    writeln!(out, "        ]]),")?;
-    let mut field = |name: &str, meaning: &str, value: f32| {
-        writeln!(out, "        // {meaning}\n        {name}: {},", literal(value))
-    };
-    field("k_pending", "1: gain on the force still on its way (0 without delay)", law.k_pending)?;
-    field(
-        "k_integral",
-        "N/(m s): gain on the integrated position error (0 without integral action)",
-        law.k_integral,
-    )?;
-    field("n", "N/m: precompensation gain on the set-point", law.n)?;
-    field("setpoint_step", "m: largest change of the governed set-point in one tick", law.setpoint_step)?;
-    writeln!(out, "    }}),")
+    let crc = hexadecimal(table.crc().into(), 2);
+    writeln!(out, "    // CRC-32 of all values above.\n    crc: {crc},\n}};")
 }
 
-fn write_observer(
-    out: &mut String,
-    observer: &Option<ObserverValues>,
-    states: &[Meaning],
-) -> core::fmt::Result {
-    writeln!(out, "    // steady-state Kalman filter")?;
-    let Some(observer) = observer else {
-        return writeln!(out, "    observer: None,");
-    };
-    let name = |index: usize| states.get(index).map_or("", |state| state.name.as_str());
-    writeln!(out, "    observer: Some(ObserverGains {{")?;
-    writeln!(
-        out,
-        "        // one column per state now, one entry per state a tick later\n        ad: columns(["
-    )?;
-    for from in 0..states.len() {
-        writeln!(out, "            // from {}\n            [", name(from))?;
-        for (to, row) in observer.ad.iter().enumerate() {
-            entry(out, 16, &format!("to {}", name(to)), row[from])?;
+/// All that the table needs, in rustfmt's order and line breaks.
+fn write_imports(out: &mut String, table: &TableValues) -> core::fmt::Result {
+    let names = [
+        ("GainTable", true),
+        ("LawGains", true),
+        ("Limits", true),
+        ("MotorMap", table.motor.is_some()),
+        ("MotorTest", true),
+        ("ObserverGains", table.observer.is_some()),
+        ("PerLaw", true),
+        ("TABLE_FORMAT", true),
+        ("Thresholds", true),
+        ("columns", table.observer.is_some() || table.laws.present().next().is_some()),
+    ];
+    let used: Vec<&str> = names.into_iter().filter(|(_, used)| *used).map(|(name, _)| name).collect();
+    let names = used.join(", ");
+    let line = format!("use upright::table::{{{names}}};");
+    if line.len() <= WIDTH {
+        writeln!(out, "{line}\n")
+    } else {
+        writeln!(out, "use upright::table::{{\n    {names},\n}};\n")
+    }
+}
+
+/// rustfmt's longest line.
+const WIDTH: usize = 110;
+
+struct Writer<'a> {
+    out: &'a mut String,
+    meanings: Meanings,
+    indent: usize,
+}
+
+impl Writer<'_> {
+    fn line(&mut self, text: &str) -> core::fmt::Result {
+        writeln!(self.out, "{:1$}{text}", "", self.indent)
+    }
+
+    /// `lines` further in.
+    fn inside(&mut self, lines: impl FnOnce(&mut Self) -> core::fmt::Result) -> core::fmt::Result {
+        self.indent += 4;
+        lines(self)?;
+        self.indent -= 4;
+        Ok(())
+    }
+
+    fn field(&mut self, field: &Field) -> core::fmt::Result {
+        let Field { name, documentation, value } = field;
+        for line in documentation {
+            self.line(&format!("// {}", line.trim()))?;
         }
-        writeln!(out, "            ],")?;
-    }
-    writeln!(out, "        ]),\n        // per newton held for one tick\n        bd: columns([[")?;
-    for (to, gain) in observer.bd.iter().enumerate() {
-        entry(out, 12, &format!("to {}", name(to)), *gain)?;
-    }
-    writeln!(
-        out,
-        "        ]]),\n        // one column per sensor: what an innovation adds to each state\n        l: columns(["
-    )?;
-    for (sensor, &measured) in observer.measured.iter().enumerate() {
-        writeln!(out, "            // from the sensor of {}\n            [", name(measured as usize))?;
-        for (to, row) in observer.l.iter().enumerate() {
-            entry(out, 16, &format!("to {}", name(to)), row[sensor])?;
+        match value {
+            Node::Value(number) => match *name {
+                "format" => self.line("format: TABLE_FORMAT,"),
+                "rig_hash" => self.line("rig_hash: RIG_HASH,"),
+                "tick_s" => self.line("tick_s: TICK_S,"),
+                name => self.line(&format!("{name}: {},", literal(*number))),
+            },
+            Node::List(numbers) if self.meanings.entry(name, 0).is_none() => {
+                let numbers: Vec<String> = numbers.iter().map(|&number| literal(number)).collect();
+                self.line(&format!("{name}: [{}],", numbers.join(", ")))
+            }
+            Node::List(numbers) => {
+                self.line(&format!("{name}: ["))?;
+                self.inside(|writer| writer.entries(name, numbers))?;
+                self.line("],")
+            }
+            Node::Columns(columns) => self.columns(name, columns),
+            Node::Struct(kind, fields) => self.body(name, &format!("{kind} {{"), fields, "},"),
+            Node::Optional(None) => self.line(&format!("{name}: None,")),
+            Node::Optional(Some(node)) => match &**node {
+                Node::Struct(kind, fields) => self.body(name, &format!("Some({kind} {{"), fields, "}),"),
+                _ => Err(core::fmt::Error),
+            },
         }
-        writeln!(out, "            ],")?;
     }
-    writeln!(out, "        ]),\n        // index of the state that each sensor measures")?;
-    let measured: Vec<String> = observer.measured.iter().map(u32::to_string).collect();
-    writeln!(out, "        measured: [{}],", measured.join(", "))?;
-    writeln!(out, "        // m or rad per count\n        step: columns([[")?;
-    for (&measured, &step) in observer.measured.iter().zip(&observer.step) {
-        entry(out, 12, &format!("sensor of {}", name(measured as usize)), step)?;
+
+    fn body(&mut self, name: &str, opening: &str, fields: &[Field], closing: &str) -> core::fmt::Result {
+        self.line(&format!("{name}: {opening}"))?;
+        self.inside(|writer| fields.iter().try_for_each(|field| writer.field(field)))?;
+        self.line(closing)
     }
-    writeln!(out, "        ]]),\n    }}),")
-}
 
-fn write_motor(out: &mut String, motor: &Option<MotorValues>) -> core::fmt::Result {
-    writeln!(out, "    // motor, gear and pulley")?;
-    let Some(motor) = motor else {
-        return writeln!(out, "    motor: None,");
-    };
-    writeln!(out, "    motor: Some(MotorMap {{")?;
-    let mut field = |name: &str, meaning: &str, value: f32| {
-        writeln!(out, "        // {meaning}\n        {name}: {},", literal(value))
-    };
-    field("volts_per_newton", "V/N: voltage for a force at standstill", motor.volts_per_newton)?;
-    field("volts_per_speed", "V s/m: back-EMF", motor.volts_per_speed)?;
-    field("dead_zone_v", "V: below this the motor does not move", motor.dead_zone_v)?;
-    field("slew_v_per_tick", "V: largest change in one tick", motor.slew_v_per_tick)?;
-    field("supply_v", "V: supply", motor.supply_v)?;
-    writeln!(out, "    }}),")
-}
-
-/// One value of an array under a comment that says what it is.
-fn entry(out: &mut String, indent: usize, meaning: &str, value: f32) -> core::fmt::Result {
-    writeln!(out, "{0:indent$}// {meaning}\n{0:indent$}{1},", "", literal(value))
-}
-
-/// What a state is, and the unit of a gain on it.
-struct Meaning {
-    name: String,
-    gain_unit: &'static str,
-}
-
-fn state_meanings(rig: &Rig) -> Vec<Meaning> {
-    match &rig.plant {
-        PlantDescription::Chain(chain) => {
-            let cart = [("cart position", "N/m"), ("cart speed", "N s/m")];
-            let cart = cart.map(|(name, gain_unit)| Meaning { name: name.into(), gain_unit });
-            let links = (1..=chain.links.len()).flat_map(|link| {
-                [
-                    Meaning { name: format!("angle of link {link}"), gain_unit: "N/rad" },
-                    Meaning { name: format!("angular rate of link {link}"), gain_unit: "N s/rad" },
-                ]
-            });
-            cart.into_iter().chain(links).collect()
+    fn columns(&mut self, name: &str, columns: &[Vec<Number>]) -> core::fmt::Result {
+        if !self.meanings.has_columns(name) {
+            self.line(&format!("{name}: columns([["))?;
+            self.inside(|writer| columns.iter().try_for_each(|column| writer.entries(name, column)))?;
+            return self.line("]]),");
         }
-        PlantDescription::Model(model) => (0..model.b.len())
-            .map(|i| Meaning { name: format!("state {i}"), gain_unit: "input/state" })
-            .collect(),
+        self.line(&format!("{name}: columns(["))?;
+        self.inside(|writer| {
+            for (index, column) in columns.iter().enumerate() {
+                let meaning = writer.meanings.column(name, index);
+                writer.line(&format!("// {meaning}"))?;
+                writer.line("[")?;
+                writer.inside(|writer| writer.entries(name, column))?;
+                writer.line("],")?;
+            }
+            Ok(())
+        })?;
+        self.line("]),")
+    }
+
+    /// One value of an array a line, under a comment that says what it is.
+    fn entries(&mut self, name: &str, numbers: &[Number]) -> core::fmt::Result {
+        for (index, &number) in numbers.iter().enumerate() {
+            let meaning = self.meanings.entry(name, index).unwrap_or_default();
+            self.line(&format!("// {meaning}"))?;
+            self.line(&format!("{},", literal(number)))?;
+        }
+        Ok(())
     }
 }
 
-/// What each sensor measures.
-fn measured_names<'a>(table: &TableValues, states: &'a [Meaning]) -> Vec<&'a str> {
-    let of_chain = (0..table.sensors).map(|sensor| 2 * sensor).collect::<Vec<_>>();
-    let measured = table.observer.as_ref();
-    let measured =
-        measured.map_or(of_chain, |observer| observer.measured.iter().map(|&state| state as usize).collect());
-    measured.iter().map(|&state| states.get(state).map_or("", |state| state.name.as_str())).collect()
+/// What the entries of vectors and matrices belong to.
+struct Meanings {
+    /// Each state, and the unit of a gain on it.
+    states: Vec<(String, &'static str)>,
+    /// Which state each sensor measures.
+    measured: Vec<usize>,
 }
 
-/// The shortest decimal that reads back as the same `f32`.
-pub(super) fn literal(value: f32) -> String {
-    format!("{value:?}")
+impl Meanings {
+    fn of(rig: &Rig, table: &TableValues) -> Self {
+        let states = match &rig.plant {
+            PlantDescription::Chain(chain) => {
+                let cart = [("cart position".to_owned(), "N/m"), ("cart speed".to_owned(), "N s/m")];
+                let links = (1..=chain.links.len()).flat_map(|link| {
+                    [
+                        (format!("angle of link {link}"), "N/rad"),
+                        (format!("angular rate of link {link}"), "N s/rad"),
+                    ]
+                });
+                cart.into_iter().chain(links).collect()
+            }
+            PlantDescription::Model(model) => {
+                (0..model.b.len()).map(|state| (format!("state {state}"), "input/state")).collect()
+            }
+        };
+        Self { states, measured: table.measured() }
+    }
+
+    fn state(&self, index: usize) -> &str {
+        self.states.get(index).map_or("", |(name, _)| name)
+    }
+
+    fn sensor(&self, index: usize) -> &str {
+        self.measured.get(index).map_or("", |&state| self.state(state))
+    }
+
+    /// What an entry of the field is; none for a field whose documentation says it.
+    fn entry(&self, field: &str, index: usize) -> Option<String> {
+        const ERROR: [&str; 4] =
+            ["position from position", "position from speed", "speed from position", "speed from speed"];
+        Some(match field {
+            "rail_m" | "travel_counts" | "measured" | "b" => return None,
+            "k" => self.states.get(index).map_or(String::new(), |(name, unit)| format!("{unit}: {name}")),
+            "ad" | "bd" | "l" => format!("to {}", self.state(index)),
+            "a" => ERROR.get(index).copied().unwrap_or_default().to_owned(),
+            "step" => format!("sensor of {}", self.sensor(index)),
+            _ => self.sensor(index).to_owned(),
+        })
+    }
+
+    /// Whether the field is a matrix.
+    fn has_columns(&self, field: &str) -> bool {
+        matches!(field, "ad" | "l")
+    }
+
+    fn column(&self, field: &str, index: usize) -> String {
+        match field {
+            "l" => format!("from the sensor of {}", self.sensor(index)),
+            _ => format!("from {}", self.state(index)),
+        }
+    }
 }
 
-fn hexadecimal(value: u64) -> String {
-    let groups: Vec<String> = (0..4).rev().map(|i| format!("{:04x}", value >> (16 * i) & 0xffff)).collect();
+/// The shortest decimal that reads back as the same number.
+fn literal(number: Number) -> String {
+    match number {
+        Number::Float(value) => format!("{value:?}"),
+        Number::Integer(value) => value.to_string(),
+        Number::Hash(value) => hexadecimal(value, 4),
+    }
+}
+
+/// In groups of four digits.
+fn hexadecimal(value: u64, groups: usize) -> String {
+    let groups: Vec<String> =
+        (0..groups).rev().map(|i| format!("{:04x}", value >> (16 * i) & 0xffff)).collect();
     format!("0x{}", groups.join("_"))
 }

@@ -64,8 +64,8 @@ pub struct WorstTilt {
 /// Largest initial deviations from rest.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Attraction {
-    /// The law's name, as in the table.
-    pub law: &'static str,
+    /// The law.
+    pub law: Law,
     /// What counted as back near rest.
     pub horizon: Horizon,
     /// For each link alone.
@@ -106,13 +106,7 @@ pub fn attraction(
         }
         Err(_) => (Vec::new(), None),
     };
-    Ok(Attraction {
-        law: law_name(law),
-        horizon,
-        tilts,
-        worst,
-        raw_step: raw_step(rig, table, law, settings)?,
-    })
+    Ok(Attraction { law, horizon, tilts, worst, raw_step: raw_step(rig, table, law, settings)? })
 }
 
 fn tilts(
@@ -156,11 +150,7 @@ fn raw_step(
     law: Law,
     settings: &AttractionSettings,
 ) -> Result<Option<Edge>, SimulationError> {
-    let gains = match law {
-        Law::Lqr => &table.lqr,
-        Law::PolePlacement => &table.pole_placement,
-    };
-    if gains.as_ref().is_none_or(|gains| gains.n == 0.0) {
+    if table.law(law).is_none_or(|gains| gains.n == 0.0) {
         return Ok(None);
     }
     let raw = table.clone().without_governor();
@@ -267,14 +257,6 @@ pub fn attraction_map(
     let cells: Vec<Option<f64>> =
         (0..across.points * down.points).into_par_iter().map(cell).collect::<Result<_, SimulationError>>()?;
     Ok(Map { across, down, settled_s: cells.chunks(across.points).map(<[_]>::to_vec).collect() })
-}
-
-/// The law's name, as in the table.
-pub(super) fn law_name(law: Law) -> &'static str {
-    match law {
-        Law::Lqr => "lqr",
-        Law::PolePlacement => "pole_placement",
-    }
 }
 
 #[cfg(test)]

@@ -3,7 +3,7 @@
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
 use serde::Serialize;
-use upright::table::Law;
+use upright::table::{Law, PerLaw};
 
 use super::VerifyError;
 use crate::design::{Certified, Design, Laws, OBSERVER, Pole, Task, continuous_plant, wanted_poles};
@@ -35,8 +35,7 @@ const CHANGE: f64 = 1e-20;
 
 /// Certificates of all gains that the rig asks for, by law: those of LQR, of pole placement, and of the observer.
 pub(super) struct Certificates {
-    lqr: Option<Certificate>,
-    placement: Option<Certificate>,
+    laws: PerLaw<Option<Certificate>>,
     observer: Option<Certificate>,
 }
 
@@ -80,16 +79,17 @@ impl Certificates {
             Some(Certificate { gain, bits: certified.bits, residual, condition })
         };
         let residual = |name: &str| residuals.iter().find(|(n, _)| n == name).map_or(f64::NAN, |(_, r)| *r);
-        let in_table =
-            |index: usize| move |d: &Design<Wide>| d.sampled.in_table()[index].map(|law| law.k.clone());
+        let in_table = |law: Law| move |d: &Design<Wide>| d.sampled.in_table()[law].map(|law| law.k.clone());
         let task = if nominal.sampled.integral.is_some() { Task::SampledIntegral } else { Task::SampledLqr };
         Ok(Self {
-            lqr: certificate(task.to_string(), residual(&task.to_string()), &in_table(0)),
-            placement: certificate(
-                Task::SampledPlacement.to_string(),
-                pole_error(rig, &nominal)?,
-                &in_table(1),
-            ),
+            laws: PerLaw {
+                lqr: certificate(task.to_string(), residual(&task.to_string()), &in_table(Law::Lqr)),
+                pole_placement: certificate(
+                    Task::SampledPlacement.to_string(),
+                    pole_error(rig, &nominal)?,
+                    &in_table(Law::PolePlacement),
+                ),
+            },
             observer: certificate(OBSERVER.to_owned(), residual(OBSERVER), &|d| {
                 d.kalman.as_ref().map(|kalman| kalman.l_filter.clone())
             }),
@@ -98,8 +98,7 @@ impl Certificates {
 
     /// Those of the gains used with `law`.
     pub(super) fn of_law(&self, law: Law) -> Vec<Certificate> {
-        let law = if law == Law::Lqr { &self.lqr } else { &self.placement };
-        law.iter().chain(&self.observer).cloned().collect()
+        self.laws[law].iter().chain(&self.observer).cloned().collect()
     }
 }
 

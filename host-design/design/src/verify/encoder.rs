@@ -4,7 +4,6 @@ use rayon::prelude::*;
 use serde::Serialize;
 use upright::table::Law;
 
-use super::attraction::law_name;
 use super::trial::{Disturbance, Horizon, Unverifiable, chain, edge, scenario, trial, within};
 use crate::design::design;
 use crate::rig::{LinkEncoder, PlantDescription, Rig};
@@ -42,8 +41,8 @@ impl EncoderSettings {
 /// The coarsest encoders with which a law still stands.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct CoarsestEncoder {
-    /// The law's name, as in the table.
-    pub law: &'static str,
+    /// The law.
+    pub law: Law,
     /// How many times coarser than in the rig file, cart and links alike; none if not even
     /// the rig's own suffice.
     pub factor: Option<f64>,
@@ -113,7 +112,7 @@ pub fn coarsest_encoder(
     let at_edge = coarser(rig, factor.unwrap_or(1.0));
     let at_edge = chain(&at_edge, "encoders")?;
     Ok(CoarsestEncoder {
-        law: law_name(law),
+        law,
         factor,
         at_largest_tried: factor.is_some_and(|factor| factor >= settings.largest_factor),
         cart_step_m: at_edge.cart.encoder_step_m,

@@ -16,8 +16,8 @@ use super::{certificate, covariance, loop_model, margins, rounding, tick};
 /// `f32` values.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct LinearReport {
-    /// `lqr` or `pole_placement`.
-    pub law: &'static str,
+    /// The law.
+    pub law: Law,
     /// Poles of the whole loop as [re, im], by real part.
     pub poles: Vec<[f64; 2]>,
     /// Largest absolute value of a pole: stable below 1.
@@ -66,9 +66,8 @@ pub fn linear(
     table: &TableValues,
 ) -> Result<Vec<LinearReport>, VerifyError> {
     let certificates = certificate::Certificates::of(rig, certified)?;
-    let laws = [(Law::Lqr, "lqr"), (Law::PolePlacement, "pole_placement")];
     let mut reports = Vec::new();
-    for (law, name) in laws {
+    for law in Law::ALL {
         let Some(numbers) = loop_model::Numbers::<f64>::of_table(table, law) else { continue };
         let model = LoopModel::with_numbers(certified, &numbers);
         let poles = eigenvalues(&model.matrix).map_err(|_| VerifyError::Poles)?;
@@ -84,9 +83,9 @@ pub fn linear(
             noise = covariance::covariance(rig, certified, &model, table.observer.is_some())?;
         }
         let as_designed = loop_model::exact_law(certified, table, law)
-            .is_some_and(|exact| certified.double.sampled.in_table().contains(&Some(exact)));
+            .is_some_and(|exact| certified.double.sampled.in_table()[law] == Some(exact));
         reports.push(LinearReport {
-            law: name,
+            law,
             poles,
             spectral_radius,
             stable,

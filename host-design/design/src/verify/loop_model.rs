@@ -1,12 +1,14 @@
-//! The loop as it will run, as matrices: sampled plant, delay, observer, control law. Only for analysis; a simulation
-//! runs the firmware's own controller, and a test holds this model against it.
+//! The loop as it will run, as matrices: sampled plant, delay, observer, control law.
+//!
+//! Poles, margins and covariances need the law as a matrix; here alone it is written a second time. A simulation runs the
+//! firmware's own controller, and a test compares this model with it.
 
 use upright::table::Law;
 
 use crate::design::{Certified, Feedback, zero_order_hold};
 use crate::numerics::{Matrix, Real};
 use crate::rig::Rig;
-use crate::table::{LawValues, TableValues};
+use crate::table::{MAX_STATES, TableValues};
 
 /// The plant from force to measurement, `x⁺ = A x + B u`, `y = C x`, with pending forces as further states.
 #[derive(Debug, Clone, PartialEq)]
@@ -66,35 +68,28 @@ pub(super) struct ObserverNumbers<R> {
     pub(super) step: Vec<R>,
 }
 
-/// The gains of `law` in the table.
-pub(super) fn law_values(table: &TableValues, law: Law) -> Option<&LawValues> {
-    match law {
-        Law::Lqr => table.lqr.as_ref(),
-        Law::PolePlacement => table.pole_placement.as_ref(),
-    }
-}
+type LawVector = nalgebra::SVector<f32, MAX_STATES>;
 
 impl<R: Real> Numbers<R> {
     /// What the table holds.
     pub(super) fn of_table(table: &TableValues, law: Law) -> Option<Self> {
-        let values = law_values(table, law)?;
+        let values = table.law(law)?;
+        let (states, sensors) = (table.states(), table.sensors());
         let exact = |x: f32| R::from_f64(f64::from(x));
-        let column = |x: &[f32]| Matrix::from_fn(x.len(), 1, |i, _| exact(x[i]));
-        let rows =
-            |x: &[Vec<f32>]| Matrix::from_fn(x.len(), x.first().map_or(0, Vec::len), |i, j| exact(x[i][j]));
+        let column = |x: &LawVector| Matrix::from_fn(states, 1, |i, _| exact(x[i]));
         Some(Self {
             k: column(&values.k).transpose(),
             k_pending: exact(values.k_pending),
             k_integral: exact(values.k_integral),
             n: exact(values.n),
             observer: table.observer.as_ref().map(|observer| ObserverNumbers {
-                ad: rows(&observer.ad),
+                ad: Matrix::from_fn(states, states, |i, j| exact(observer.ad[(i, j)])),
                 bd: column(&observer.bd),
-                l: rows(&observer.l),
-                step: observer.step.iter().map(|&step| exact(step)).collect(),
+                l: Matrix::from_fn(states, sensors, |i, j| exact(observer.l[(i, j)])),
+                step: observer.step.iter().take(sensors).map(|&step| exact(step)).collect(),
             }),
             measured: measured(table),
-            output: table.output,
+            output: table.output as usize,
             tick_s: exact(table.tick_s),
             delay_ticks: table.delay_ticks as usize,
         })
@@ -103,7 +98,7 @@ impl<R: Real> Numbers<R> {
     /// What the table's numbers were rounded from (to `f64`), or none if the design does not know the table's gains.
     pub(super) fn exact(rig: &Rig, certified: &Certified, table: &TableValues, law: Law) -> Option<Self> {
         let feedback = exact_law(certified, table, law)?;
-        let (double, states) = (&certified.double, table.states);
+        let (double, states) = (&certified.double, table.states());
         let entries: Vec<R> = feedback.k.entries().iter().map(|&gain| R::from_f64(gain)).collect();
         let (k, further) = entries.split_at_checked(states)?;
         let (k_integral, k_pending) = match (further, feedback.integral) {
@@ -126,7 +121,7 @@ impl<R: Real> Numbers<R> {
                 step: rig.sensors().iter().map(crate::rig::Sensor::step).collect(),
             }),
             measured: measured(table),
-            output: table.output,
+            output: table.output as usize,
             tick_s: R::from_f64(rig.tick.period_s),
             delay_ticks: table.delay_ticks as usize,
         })
@@ -135,10 +130,7 @@ impl<R: Real> Numbers<R> {
 
 /// The states that the controller measures: those of its encoders, or all.
 fn measured(table: &TableValues) -> Vec<usize> {
-    match &table.observer {
-        Some(observer) => observer.measured.iter().map(|&state| state as usize).collect(),
-        None => (0..table.states).collect(),
-    }
+    if table.observer.is_some() { table.measured() } else { (0..table.states()).collect() }
 }
 
 /// The certified feedback that rounds to the table's K: that for the tick or that for continuous time.
@@ -147,14 +139,13 @@ pub(super) fn exact_law<'c>(
     table: &TableValues,
     law: Law,
 ) -> Option<&'c Feedback<f64>> {
-    let index = usize::from(law == Law::PolePlacement);
-    let k = &law_values(table, law)?.k;
+    let k = &table.law(law)?.k.as_slice()[..table.states()];
     let pairs = [
         (certified.single.sampled.in_table(), certified.double.sampled.in_table()),
         (certified.single.continuous.in_table(), certified.double.continuous.in_table()),
     ];
     pairs.into_iter().find_map(|(single, double)| {
-        single[index].filter(|single| single.k.entries().starts_with(k)).and(double[index])
+        single[law].filter(|single| single.k.entries().starts_with(k)).and(double[law])
     })
 }
 

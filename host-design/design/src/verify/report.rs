@@ -47,7 +47,7 @@ pub struct LawTrust {
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Check {
     /// The law it is about.
-    pub law: &'static str,
+    pub law: Law,
     /// What is required, with its key in `[verify]`.
     pub requirement: &'static str,
     /// The threshold.
@@ -104,7 +104,7 @@ fn law_trust(
     stage: &dyn Fn(&str),
     done: &(dyn Fn() + Sync),
 ) -> Result<LawTrust, VerifyError> {
-    let law = if linear.law == "lqr" { Law::Lqr } else { Law::PolePlacement };
+    let law = linear.law;
     let is_chain = matches!(rig.plant, PlantDescription::Chain(_));
     let mut trust = LawTrust {
         linear,
@@ -166,7 +166,7 @@ impl Check {
 
     /// A requirement that what was found is at least `required`; without a bound `unbounded` decides.
     fn at_least(
-        law: &'static str,
+        law: Law,
         requirement: &'static str,
         required: f64,
         found: Option<f64>,
@@ -177,7 +177,7 @@ impl Check {
     }
 
     /// A requirement that all of a number of runs stand.
-    fn all_stand(law: &'static str, requirement: &'static str, runs: f64, stood: f64) -> Self {
+    fn all_stand(law: Law, requirement: &'static str, runs: f64, stood: f64) -> Self {
         Check { law, requirement, required: runs, found: Some(stood), holds: stood >= runs }
     }
 }
@@ -203,7 +203,7 @@ fn checks(rig: &Rig, trust: &LawTrust) -> Vec<Check> {
     checks
 }
 
-fn margin_checks(required: &Requirements, law: &'static str, margins: &Margins) -> [Check; 4] {
+fn margin_checks(required: &Requirements, law: Law, margins: &Margins) -> [Check; 4] {
     // Without a crossing of the critical value the margin is unlimited.
     let at_least =
         |requirement, required, found: Option<f64>| Check::at_least(law, requirement, required, found, true);

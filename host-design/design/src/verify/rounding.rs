@@ -1,21 +1,24 @@
 //! What single precision does: to the gains, to the poles, and to the force tick by tick.
 
+use nalgebra::SVector;
 use serde::Serialize;
-use upright::control::actuator::MotorMap;
-use upright::table::Law;
+use upright::control::controller::Controller;
+use upright::control::encoder::CounterWidth;
+use upright::control::state_feedback::saturate;
+use upright::table::{GainTable, Law, LawGains, Limits, ObserverGains, PerLaw, Thresholds};
 
 use super::loop_model::{LoopModel, Numbers};
 use super::{VerifyError, radius};
 use crate::design::Certified;
 use crate::numerics::{Matrix, Wide, with_precision};
 use crate::rig::Rig;
-use crate::simulate::{Sample, Scenario, run};
-use crate::table::TableValues;
+use crate::simulate::{Sample, Scenario, SimulationError, run};
+use crate::table::{MAX_SENSORS, MAX_STATES, TableValues, widest};
 
 /// The table's `f32` against exact numbers.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Rounding {
-    /// Largest error of a gain on a state, the force on its way, the integral or the set-point, in units of the last place
+    /// Largest error of a gain on a state, the pending force, the integral or the set-point, in units of the last place
     /// of its `f32`; at most 0.5 if all are correctly rounded.
     pub gain_ulp: f64,
     /// The same for the observer's gain L; none without observer.
@@ -105,92 +108,111 @@ fn force_difference(
     if exact.observer.is_none() {
         scenario.sensing = crate::simulate::Sensing::FullState;
     }
-    let mut shadow = Shadow::new(exact, table);
-    let (mut largest, mut peak) = (0.0f64, 0.0f64);
+    let double = in_double_precision(exact, table, law);
+    let mut shadow = Shadow::new(&double, table)?;
+    let (mut largest, mut peak, mut refused) = (0.0f64, 0.0f64, None);
     let fall = run(rig, table, &scenario, &mut |sample| {
-        let force = shadow.tick(sample);
-        largest = largest.max((force - sample.requested).abs());
+        match shadow.tick(sample) {
+            Ok(force) => largest = largest.max((force - sample.requested).abs()),
+            Err(error) => refused = Some(error),
+        }
         peak = peak.max(sample.requested.abs());
     })?;
+    if let Some(error) = refused {
+        return Err(error.into());
+    }
     Ok((fall.is_none() && peak > 0.0).then_some((largest, peak)))
 }
 
-/// The law in `f64`, beside the firmware: sees its encoder readings, set-point and applied forces.
-struct Shadow<'a> {
-    numbers: &'a Numbers<f64>,
-    motor: Option<MotorMap>,
-    force_limit: f32,
-    last_volts: f32,
-    predicted: Option<Matrix<f64>>,
-    integral: f64,
-    pending: f64,
+/// The widest table, so that the firmware's code in `f64` is compiled for one size only.
+type Double = GainTable<MAX_STATES, MAX_SENSORS, f64>;
+
+/// The table with exact gains. Force and set-point come from the firmware beside it, which has limited them already.
+fn in_double_precision(exact: &Numbers<f64>, table: &TableValues, law: Law) -> Double {
+    let mut laws = PerLaw::default();
+    laws[law] = Some(LawGains {
+        k: widest(&exact.k.transpose()),
+        k_pending: exact.k_pending,
+        k_integral: exact.k_integral,
+        n: exact.n,
+        setpoint_step: f64::MAX,
+    });
+    let observer = table.observer.as_ref().zip(exact.observer.as_ref());
+    GainTable {
+        format: table.format,
+        states: table.states,
+        sensors: table.sensors,
+        output: table.output,
+        rig_hash: table.rig_hash,
+        tick_s: exact.tick_s,
+        delay_ticks: table.delay_ticks,
+        force_limit_n: f64::MAX,
+        laws,
+        observer: observer.map(|(single, exact)| ObserverGains {
+            ad: widest(&exact.ad),
+            bd: widest(&exact.bd),
+            l: widest(&exact.l),
+            measured: single.measured,
+            step: widest(&Matrix::column(&exact.step)),
+        }),
+        motor: None,
+        limits: Limits::none(),
+        thresholds: Thresholds::none(),
+        crc: 0,
+    }
 }
 
-impl<'a> Shadow<'a> {
-    fn new(numbers: &'a Numbers<f64>, table: &TableValues) -> Self {
-        let motor = table.motor.map(|motor| MotorMap {
-            volts_per_newton: motor.volts_per_newton,
-            volts_per_speed: motor.volts_per_speed,
-            dead_zone_v: motor.dead_zone_v,
-            slew_v_per_tick: motor.slew_v_per_tick,
-            supply_v: motor.supply_v,
-        });
-        Self {
-            numbers,
-            motor,
-            force_limit: table.force_limit_n,
-            last_volts: 0.0,
-            predicted: None,
-            integral: 0.0,
-            pending: 0.0,
-        }
+/// The firmware's controller in `f64`, beside the one in `f32`: sees its encoder readings, set-point and forces.
+struct Shadow<'t> {
+    controller: Controller<'t, MAX_STATES, MAX_SENSORS, f64>,
+    double: &'t Double,
+    table: &'t TableValues,
+    last_volts: f32,
+    is_started: bool,
+}
+
+impl<'t> Shadow<'t> {
+    fn new(double: &'t Double, table: &'t TableValues) -> Result<Self, SimulationError> {
+        let controller = Controller::with_checked(double, [CounterWidth::Bits32; MAX_SENSORS])?;
+        Ok(Self { controller, double, table, last_volts: 0.0, is_started: false })
     }
 
-    /// The force asked for; then prepares the next tick.
-    fn tick(&mut self, sample: &Sample<&[f64]>) -> f64 {
-        let numbers = self.numbers;
-        let states = numbers.k.cols();
-        let x = match &numbers.observer {
-            // What the firmware converts to f32.
-            None => Matrix::from_fn(states, 1, |i, _| f64::from(sample.state[i] as f32)),
+    /// The force asked for (N); then prepares the next tick.
+    fn tick(&mut self, sample: &Sample<&[f64]>) -> Result<f64, SimulationError> {
+        let command = match &self.double.observer {
+            None => {
+                // What the firmware converts to f32.
+                let state = |i| sample.state.get(i).map_or(0.0, |&value| f64::from(value as f32));
+                let x = SVector::from_fn(|i, _| state(i));
+                if !self.is_started {
+                    self.controller.start_in_state(&x);
+                }
+                self.controller.set_setpoint(sample.setpoint)?;
+                self.controller.control_from_state(&x)
+            }
             Some(observer) => {
-                let counts = numbers.measured.iter().zip(&observer.step);
-                let y: Vec<f64> =
-                    counts.map(|(&state, step)| libm::round(sample.state[state] / step) * step).collect();
-                let predicted = self.predicted.take().unwrap_or_else(|| {
-                    // At the start: positions as read, rates 0.
-                    let mut x = Matrix::zeros(states, 1);
-                    for (&state, &y) in numbers.measured.iter().zip(&y) {
-                        x[(state, 0)] = y;
-                    }
-                    x
-                });
-                let e = Matrix::from_fn(y.len(), 1, |i, _| y[i] - predicted[(numbers.measured[i], 0)]);
-                &predicted + &(&observer.l * &e)
+                let mut counts = [0; MAX_SENSORS];
+                for (sensor, state) in self.table.measured().into_iter().enumerate() {
+                    counts[sensor] = libm::round(sample.state[state] / observer.step[sensor]) as i32 as u32;
+                }
+                if !self.is_started {
+                    self.controller.start(&counts)?;
+                }
+                self.controller.set_setpoint(sample.setpoint)?;
+                self.controller.control(&counts)
             }
         };
-        let force = numbers.n * sample.setpoint
-            - (&numbers.k * &x)[(0, 0)]
-            - numbers.k_pending * self.pending
-            - numbers.k_integral * self.integral;
+        self.is_started = true;
         let applied = self.applied(sample);
-        let during_this_tick = if numbers.delay_ticks == 1 { self.pending } else { applied };
-        let moved = numbers.tick_s * (x[(numbers.output, 0)] - sample.setpoint);
-        if (sample.requested - applied) * (-numbers.k_integral * moved) <= 0.0 {
-            self.integral += moved;
-        }
-        self.pending = applied;
-        self.predicted = numbers
-            .observer
-            .as_ref()
-            .map(|observer| &(&observer.ad * &x) + &observer.bd.scaled(&during_this_tick));
-        force
+        self.controller.take_force(sample.requested, applied);
+        self.controller.predict();
+        Ok(command.requested_n)
     }
 
-    /// The force that the firmware takes for applied: its own actuator map on its own request.
+    /// The force that the firmware takes for applied (N): its own actuator map on its own request.
     fn applied(&mut self, sample: &Sample<&[f64]>) -> f64 {
-        let limited = upright::control::state_feedback::saturate(sample.requested as f32, self.force_limit);
-        let Some(motor) = &self.motor else { return f64::from(limited) };
+        let limited = saturate(sample.requested as f32, self.table.force_limit_n);
+        let Some(motor) = &self.table.motor else { return f64::from(limited) };
         let speed = sample.estimate.get(1).copied().unwrap_or_default() as f32;
         let (volts, force) = motor.drive(limited, speed, self.last_volts);
         self.last_volts = volts;

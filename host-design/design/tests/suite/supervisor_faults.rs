@@ -142,7 +142,7 @@ fn watch(rig: &Rig, values: &TableValues, law: Law, defect: Defect, seed: u64, t
     balancing(rig, values, &scenario, |harness| observe(harness, injection, ticks)).unwrap()
 }
 
-const LAWS: [Law; 2] = [Law::Lqr, Law::PolePlacement];
+const LAWS: [Law; 2] = Law::ALL;
 const SEEDS: u64 = 4;
 
 /// Every rig, law and some seeds with these defects.

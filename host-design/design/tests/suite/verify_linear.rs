@@ -55,7 +55,7 @@ fn report(rig: &Rig) -> Vec<LinearReport> {
 }
 
 fn law(report: &LinearReport) -> Law {
-    if report.law == "lqr" { Law::Lqr } else { Law::PolePlacement }
+    report.law
 }
 
 /// Spectral radius with the force on the plant multiplied by `re + j im`: `M + (factor - 1) E C`, as a real matrix of
@@ -219,7 +219,7 @@ fn every_gain_is_correctly_rounded_and_a_changed_one_is_noticed() {
         assert!(rounding.force_difference_relative.unwrap() < 1e-3, "{rounding:?}");
     }
     let observer = table.observer.as_mut().unwrap();
-    observer.l[1][0] = observer.l[1][0].next_up();
+    observer.l[(1, 0)] = observer.l[(1, 0)].next_up();
     let ulp = linear(&rig, &certified, &table).unwrap()[0].rounding.clone().unwrap().observer_ulp.unwrap();
     assert!(ulp > 0.5 && ulp < 1.6, "{ulp}");
 }

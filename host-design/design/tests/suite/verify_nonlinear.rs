@@ -15,7 +15,7 @@ use upright_design::verify::{
     mass_tolerances, monte_carlo, noise_run, sample, trial,
 };
 
-const LAWS: [Law; 2] = [Law::Lqr, Law::PolePlacement];
+const LAWS: [Law; 2] = Law::ALL;
 /// The disturbances of the paper: 0.1 N and 3.16e-5 N·m rms.
 const PAPERS: Disturbance = Disturbance { force_n: 0.1, torque_n_m: 3.16e-5 };
 

@@ -55,7 +55,7 @@ impl<'a> Injection<'a> {
             random: trial.random(),
             at_onset: None,
             past: Vec::new(),
-            visible_counts: (0..table.sensors).map(visible).collect(),
+            visible_counts: (0..table.sensors()).map(visible).collect(),
             missing: [0.0; 2],
             full_force_n: f64::from(table.force_limit_n),
             push_ticks: ticks(PUSH_S),

@@ -70,7 +70,7 @@ pub struct Campaign {
 /// The kinds of defects that are possible with this rig and this place.
 pub fn kinds(table: &TableValues, place: Place<'_>) -> Vec<Kind> {
     let has_supply = table.limits.supply_min_v > 0.0;
-    let has_links = table.sensors > 1;
+    let has_links = table.sensors() > 1;
     Kind::ALL
         .iter()
         .map(|(kind, ..)| *kind)

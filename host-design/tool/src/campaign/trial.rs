@@ -39,11 +39,7 @@ impl Trial {
         let kind = kinds[(number % kinds.len() as u64) as usize];
         // A generator for each trial, so that it does not depend on the others.
         let mut random = Pcg64::new(u128::from(seed) << 64 | u128::from(number), 0xcafe_f00d);
-        let laws: Vec<Law> =
-            [(Law::Lqr, table.lqr.is_some()), (Law::PolePlacement, table.pole_placement.is_some())]
-                .into_iter()
-                .filter_map(|(law, there)| there.then_some(law))
-                .collect();
+        let laws: Vec<Law> = table.laws.present().map(|(law, _)| law).collect();
         let law = laws[random.random_range(0..laws.len())];
         let disturbance = Disturbance::of(rig);
         let sign = |random: &mut Pcg64| if random.random() { 1.0 } else { -1.0 };
@@ -65,7 +61,7 @@ impl Trial {
             counter_start: random.random(),
             ..Scenario::at_rest(rig, law)
         };
-        let sensors = table.sensors;
+        let sensors = table.sensors();
         let sensor = match kind {
             Kind::CartEncoderFrozen => 0,
             Kind::LinkEncoderFrozen => random.random_range(1..sensors.max(2)),

@@ -64,7 +64,7 @@ pub fn jobs<'a>(candidates: &'a [Candidate], conditions: &Conditions) -> Vec<(&'
         Law::PolePlacement => candidate.rig.pole_placement.is_some(),
     };
     let wanted = |law: &Law| conditions.law.is_none_or(|only| only == *law);
-    [Law::Lqr, Law::PolePlacement]
+    Law::ALL
         .into_iter()
         .filter(wanted)
         .flat_map(|law| candidates.iter().filter(move |one| asked(one, law)).map(move |one| (one, law)))
@@ -92,11 +92,10 @@ pub fn compare(
 
 fn row(candidate: &Candidate, law: Law, conditions: &Conditions) -> Result<Row, SimulationError> {
     let rig = with_one_law(candidate, law, conditions);
-    let name = if law == Law::Lqr { "lqr" } else { "pole_placement" };
     let row = Row {
         rig: candidate.label.clone(),
         value: candidate.value,
-        law: name,
+        law,
         fate: Fate::Standing,
         figures: None,
         trace: None,
@@ -152,7 +151,7 @@ fn figures(rig: &Rig, law: Law, certified: &Certified, table: &TableValues, summ
     let settings = AttractionSettings { relative: TILT_PRECISION, ..AttractionSettings::default() };
     let attraction = stable.then(|| attraction(rig, table, law, &settings).ok()).flatten();
     let tilts = attraction.iter().flat_map(|attraction| &attraction.tilts).map(|tilt| tilt.edge.size);
-    let poles = certified.poles.in_table(usize::from(law == Law::PolePlacement))[0];
+    let poles = certified.poles.in_table(law)[0];
     let margin = |of: fn(&Margins) -> Option<f64>| margins.as_ref().and_then(of);
     Figures {
         settling_time_s: summary.settling_time_s,

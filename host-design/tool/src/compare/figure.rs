@@ -22,8 +22,8 @@ fn groups(rows: &[Row]) -> Vec<(String, Vec<&Row>)> {
     let several = rows.iter().any(|row| row.rig != rows[0].rig);
     let mut groups: Vec<(String, Vec<&Row>)> = Vec::new();
     for row in rows {
-        let law = if row.law == "lqr" { "LQR" } else { "pole placement" };
-        let name = if several { format!("{}, {law}", row.rig) } else { law.to_owned() };
+        let law = row.law;
+        let name = if several { format!("{}, {law}", row.rig) } else { law.to_string() };
         match groups.iter_mut().find(|(found, _)| *found == name) {
             Some((_, group)) => group.push(row),
             None => groups.push((name, vec![row])),

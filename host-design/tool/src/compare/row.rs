@@ -1,6 +1,7 @@
 //! One line of a comparison.
 
 use serde::Serialize;
+use upright::table::Law;
 
 use upright_design::simulate::{Fall, Trace};
 
@@ -11,8 +12,8 @@ pub struct Row {
     pub rig: String,
     /// Value of the swept key.
     pub value: Option<f64>,
-    /// `lqr` or `pole_placement`.
-    pub law: &'static str,
+    /// The law.
+    pub law: Law,
     /// How the run ended.
     pub fate: Fate,
     /// All figures; none without a design.

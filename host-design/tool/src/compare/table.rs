@@ -25,17 +25,13 @@ pub fn table(rows: &[Row], key: Option<&str>) -> String {
         .iter()
         .map(|row| {
             let mut cells = if several { vec![row.rig.clone()] } else { Vec::new() };
-            cells.extend([law(row.law).to_owned(), fate(&row.fate)]);
+            cells.extend([row.law.to_string(), fate(&row.fate)]);
             cells.extend(key.map(|_| row.value.map_or(String::new(), |value| value.to_string())));
             cells.extend(figures(row));
             cells
         })
         .collect();
     markdown_table(&header, left, &cells)
-}
-
-fn law(name: &str) -> &str {
-    if name == "lqr" { "LQR" } else { "pole placement" }
 }
 
 fn fate(fate: &Fate) -> String {
@@ -121,7 +117,7 @@ pub fn csv(rows: &[Row], key: Option<&str>) -> std::io::Result<Vec<u8>> {
         let of = |value: fn(&Figures) -> Option<f64>| number(row.figures.as_ref().and_then(value));
         csv.write_record([
             row.rig.as_str(),
-            row.law,
+            row.law.key(),
             &number(row.value),
             &fate(&row.fate),
             &of(|figures| figures.settling_time_s),

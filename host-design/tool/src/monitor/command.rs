@@ -66,8 +66,7 @@ pub fn request(line: &str) -> Result<Request, BadCommand> {
         ["disarm"] => Request::Disarm,
         ["clear"] => Request::Clear,
         ["set-point", metres] => Request::Setpoint(metres.parse().map_err(|_| bad())?),
-        ["law", "lqr"] => Request::Select(Law::Lqr),
-        ["law", "pole-placement"] => Request::Select(Law::PolePlacement),
+        ["law", name] => Request::Select(Law::from_option(name).ok_or_else(bad)?),
         _ => return Err(bad()),
     })
 }

@@ -266,8 +266,7 @@ fn name(request: Request) -> String {
         Request::Disarm => "disarm".to_owned(),
         Request::Clear => "clear".to_owned(),
         Request::Setpoint(metres) => format!("set-point {metres:.3} m"),
-        Request::Select(Law::Lqr) => "law LQR".to_owned(),
-        Request::Select(Law::PolePlacement) => "law pole placement".to_owned(),
+        Request::Select(law) => format!("law {law}"),
         other => format!("{other:?}"),
     }
 }

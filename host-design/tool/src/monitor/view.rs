@@ -9,7 +9,6 @@ use ratatui::widgets::{Axis, Block, Chart, Dataset, GraphType, Paragraph, Wrap};
 use upright::supervision::homing::Homing;
 use upright::supervision::sign_check::Signs;
 use upright::supervision::supervisor::State;
-use upright::table::Law;
 
 use super::model::{Monitor, TelemetryOfAny};
 
@@ -72,9 +71,8 @@ fn header(monitor: &Monitor) -> Vec<Line<'_>> {
     };
     let [major, minor, patch] = info.version;
     let law = match monitor.telemetry.as_ref().map(|telemetry| telemetry.law) {
-        None => "not known yet",
-        Some(Law::Lqr) => "LQR",
-        Some(Law::PolePlacement) => "pole placement",
+        None => "not known yet".to_owned(),
+        Some(law) => law.to_string(),
     };
     let recording = monitor.recording.as_ref().map_or(String::new(), |file| format!("  recording {file}"));
     lines.push(Line::from(format!(

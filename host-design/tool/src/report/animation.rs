@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 
-use super::runs::{Scene, law_name};
+use super::runs::Scene;
 use crate::figure::{CHROMATIC, curve_colour, reference_colour};
 use upright_design::plant::absolute_angles;
 use upright_design::rig::{PlantDescription, Rig};
@@ -73,7 +73,7 @@ impl Animation {
                     let samples: Vec<_> = samples.collect();
                     let shown = if links > 0 { samples.as_slice() } else { &[] };
                     Frames {
-                        law: law_name(run.law),
+                        law: run.law.title(),
                         every,
                         x: shown.iter().map(|s| rounded(s.state[0])).collect(),
                         target: shown.iter().map(|s| rounded(s.target)).collect(),

@@ -22,7 +22,7 @@ pub(super) struct Cost {
 impl Cost {
     /// Cost of one law of the table.
     pub(super) fn of(table: &TableValues, law: &LawValues) -> Self {
-        let (states, sensors) = (table.states, table.sensors);
+        let (states, sensors) = (table.states(), table.sensors());
         let further = [law.k_pending, law.k_integral].iter().filter(|gain| **gain != 0.0).count();
         let has_integral = usize::from(law.k_integral != 0.0);
         // u = N r - K x - …, in two halves; z + T (x - r).

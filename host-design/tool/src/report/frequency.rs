@@ -5,7 +5,6 @@ use core::f64::consts::PI;
 use upright::table::Law;
 
 use super::number::number;
-use super::runs::law_name;
 use crate::figure::{Axis, Curve, Figure, Panel};
 use upright_design::design::Certified;
 use upright_design::rig::Rig;
@@ -40,7 +39,7 @@ pub(super) fn figures(
         let model = LoopModel::<f64>::as_it_runs(certified, table, law);
         let (Some(margins), Some(model)) = (&report.margins, model) else { continue };
         let points = sweep(&model, report, rig.tick.period_s);
-        let title = |what: &str| format!("{}: {what}, {}", rig.name, law_name(law));
+        let title = |what: &str| format!("{}: {what}, {}", rig.name, law.title());
         bodes.push(bode(&points, margins, title("Bode plot")));
         nyquists.push(nyquist(&points, margins, title("Nyquist plot")));
     }

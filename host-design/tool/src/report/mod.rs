@@ -20,7 +20,6 @@ use upright::table::Law;
 
 use self::page::Page;
 use self::plot::Plot;
-use self::runs::law_name;
 use crate::figure::{Figure, FigureError, pixels};
 use upright_design::design::Certified;
 use upright_design::rig::{PlantDescription, Rig};
@@ -95,7 +94,7 @@ pub fn report(source: &Source<'_>, stage: &dyn Fn(&str)) -> Result<Report, Repor
         pictures.push(Picture { name: "rig".to_owned(), svg, csv: None });
     }
     let mut keep = |id: &str, law: Law, figure: &Figure| -> Result<(), ReportError> {
-        let law = if law == Law::Lqr { "lqr" } else { "pole-placement" };
+        let law = law.option();
         pictures.push(Picture::of(format!("{id}-{law}"), figure)?);
         Ok(())
     };
@@ -103,7 +102,7 @@ pub fn report(source: &Source<'_>, stage: &dyn Fn(&str)) -> Result<Report, Repor
     for (scene, entry) in scenes.iter().zip(&mut page.scenes) {
         for (run, figure) in scene.runs.iter().zip(responses::figures(rig, scene)) {
             keep(scene.id, run.law, &figure)?;
-            entry.plots.push(Plot::over_time(&figure, format!("{}, {}", scene.name, law_name(run.law)))?);
+            entry.plots.push(Plot::over_time(&figure, format!("{}, {}", scene.name, run.law.title()))?);
         }
     }
     stage("poles and frequency");
@@ -113,7 +112,7 @@ pub fn report(source: &Source<'_>, stage: &dyn Fn(&str)) -> Result<Report, Repor
     Figure::same_scale(&mut poles);
     for (figure, &(law, _)) in poles.iter().zip(&parts) {
         keep("poles", law, figure)?;
-        page.poles.push(Plot::of(figure, law_name(law).to_owned())?);
+        page.poles.push(Plot::of(figure, law.title().to_owned())?);
     }
     let stable: Vec<Law> = parts.iter().filter(|(_, part)| part.stable).map(|(law, _)| *law).collect();
     let [mut bode, mut nyquist] = frequency::figures(rig, certified, table, &parts);
@@ -121,16 +120,16 @@ pub fn report(source: &Source<'_>, stage: &dyn Fn(&str)) -> Result<Report, Repor
     Figure::same_scale(&mut nyquist);
     for (&law, (bode, nyquist)) in stable.iter().zip(bode.iter().zip(&nyquist)) {
         keep("bode", law, bode)?;
-        page.bode.push(Plot::of(bode, format!("Bode plot, {}", law_name(law)))?);
+        page.bode.push(Plot::of(bode, format!("Bode plot, {}", law.title()))?);
         keep("nyquist", law, nyquist)?;
-        page.nyquist.push(Plot::of(nyquist, format!("Nyquist plot, {}", law_name(law)))?);
+        page.nyquist.push(Plot::of(nyquist, format!("Nyquist plot, {}", law.title()))?);
     }
     if page.drawing.is_some() && !stable.is_empty() {
         stage("region of attraction");
         for law in stable {
             let figure = region::figure(rig, table, law)?;
             keep("region", law, &figure)?;
-            page.regions.push(Plot::of(&figure, law_name(law).to_owned())?);
+            page.regions.push(Plot::of(&figure, law.title().to_owned())?);
         }
     }
     Ok(Report { html: page.html()?, pictures })

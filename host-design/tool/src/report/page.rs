@@ -7,7 +7,7 @@ use super::animation::Animation;
 use super::cost::Cost;
 use super::number::{number, poles, significant};
 use super::plot::Plot;
-use super::runs::{LawRun, Scene, law_name, laws};
+use super::runs::{LawRun, Scene, laws};
 use super::trust::{CheckRow, TrustRow, check_rows, trust_rows};
 use super::{ReportError, Source};
 use crate::figure::style_sheet;
@@ -167,17 +167,16 @@ impl Outcome {
         }
         let (what, unit) = if summary.peak_angles_rad.is_empty() { ("input", "") } else { ("force", " N") };
         parts.push(format!("largest {what} {}{unit}", number(summary.peak_force_n)));
-        Self { law: law_name(run.law), stands: summary.stands(), text: parts.join(", ") }
+        Self { law: run.law.title(), stands: summary.stands(), text: parts.join(", ") }
     }
 }
 
 impl LawEntry {
     fn of(source: &Source<'_>, names: &[String], law: Law) -> Option<Self> {
         let Source { rig, certified, table, trust, .. } = *source;
-        let index = usize::from(law == Law::PolePlacement);
         let design = &certified.double;
-        let (continuous, sampled) = (design.continuous.in_table()[index]?, design.sampled.in_table()[index]?);
-        let values = if index == 0 { table.lqr.as_ref()? } else { table.pole_placement.as_ref()? };
+        let (continuous, sampled) = (design.continuous.in_table()[law]?, design.sampled.in_table()[law]?);
+        let values = table.law(law)?;
         let mut names: Vec<String> = names.iter().map(|name| format!("K, {name}")).collect();
         if sampled.integral {
             names.push("K, integral".to_owned());
@@ -199,12 +198,11 @@ impl LawEntry {
         let listed = |found: Option<&Vec<[f64; 2]>>| {
             found.map_or(String::new(), |found| poles(found, DIGITS).join(",  "))
         };
-        let name = if index == 0 { "lqr" } else { "pole_placement" };
-        let part = trust.laws.iter().find(|part| part.linear.law == name)?;
+        let part = trust.laws.iter().find(|part| part.linear.law == law)?;
         Some(Self {
-            name: law_name(law),
+            name: law.title(),
             gains,
-            poles: certified.poles.in_table(index).map(listed),
+            poles: certified.poles.in_table(law).map(listed),
             certificates: part.linear.certificates.iter().map(CertificateRow::of).collect(),
             cost: Cost::of(table, values),
         })

@@ -2,7 +2,6 @@
 
 use upright::table::Law;
 
-use super::runs::law_name;
 use crate::figure::{Axis, Curve, Figure, Panel};
 use upright_design::design::Certified;
 use upright_design::rig::Rig;
@@ -10,7 +9,7 @@ use upright_design::verify::LinearReport;
 
 /// The poles in the z-plane with the unit circle, and in the s-plane.
 pub(super) fn figure(rig: &Rig, certified: &Certified, law: Law, report: &LinearReport) -> Figure {
-    let [continuous, sampled] = certified.poles.in_table(usize::from(law == Law::PolePlacement));
+    let [continuous, sampled] = certified.poles.in_table(law);
     let points = |poles: Option<&Vec<[f64; 2]>>| poles.cloned().unwrap_or_default();
     let tick = rig.tick.period_s;
     // s = ln z / T; a pole at z = 0 has no place in the s-plane.
@@ -26,5 +25,5 @@ pub(super) fn figure(rig: &Rig, certified: &Certified, law: Law, report: &Linear
         .with(Curve::limit("", vec![[0.0, -1e9], [0.0, 1e9]]))
         .with(Curve::markers("designed for continuous time", 0, points(continuous)))
         .with(Curve::markers("whole loop, ln z / T", 1, report.poles.iter().map(to_s).collect()));
-    Figure::narrow(format!("{}: poles, {}", rig.name, law_name(law))).with(z).with(s)
+    Figure::narrow(format!("{}: poles, {}", rig.name, law.title())).with(z).with(s)
 }

@@ -2,7 +2,6 @@
 
 use upright::table::Law;
 
-use super::runs::law_name;
 use crate::figure::{Axis as FigureAxis, Figure, HeatMap, Panel};
 use upright_design::rig::Rig;
 use upright_design::table::TableValues;
@@ -30,7 +29,7 @@ pub(super) fn figure(rig: &Rig, table: &TableValues, law: Law) -> Result<Figure,
         }
         axes = axes.map(|axis| Axis { range: axis.range.map(|end| WIDER * end), ..axis });
     };
-    let title = format!("{}: region of attraction, {}", rig.name, law_name(law));
+    let title = format!("{}: region of attraction, {}", rig.name, law.title());
     Ok(drawn(title, &map))
 }
 

@@ -1,6 +1,6 @@
 //! The runs of a scenario over time.
 
-use super::runs::{LawRun, Scene, law_name};
+use super::runs::{LawRun, Scene};
 use crate::figure::{Figure, run_figure};
 use upright_design::rig::Rig;
 
@@ -10,7 +10,7 @@ pub(super) fn figures(rig: &Rig, scene: &Scene) -> Vec<Figure> {
     let ends = scene.runs.iter().filter_map(|run| run.trace.samples().last().map(|sample| sample.t));
     let end_s = ends.fold(1e-9, f64::max);
     let figure = |run: &LawRun| {
-        let title = format!("{}: {}, {}", rig.name, scene.name.to_lowercase(), law_name(run.law));
+        let title = format!("{}: {}, {}", rig.name, scene.name.to_lowercase(), run.law.title());
         run_figure(Figure::narrow(title), rig, &run.trace, end_s)
     };
     let mut figures: Vec<Figure> = scene.runs.iter().map(figure).collect();

@@ -28,15 +28,7 @@ pub(super) struct LawRun {
 
 /// The laws of a table.
 pub(super) fn laws(table: &TableValues) -> Vec<Law> {
-    let all = [(Law::Lqr, table.lqr.is_some()), (Law::PolePlacement, table.pole_placement.is_some())];
-    all.into_iter().filter(|(_, there)| *there).map(|(law, _)| law).collect()
-}
-
-pub(super) fn law_name(law: Law) -> &'static str {
-    match law {
-        Law::Lqr => "LQR",
-        Law::PolePlacement => "Pole placement",
-    }
+    table.laws.present().map(|(law, _)| law).collect()
 }
 
 /// Longest run (ticks).
@@ -175,7 +167,11 @@ fn noise_text(rig: &Rig, seed: u64) -> String {
 
 /// Ten seconds for links on a cart; ten of the slowest time constants for a model, whose clock may be any.
 fn duration(rig: &Rig, certified: &Certified) -> f64 {
-    let slowest = (0..2).filter_map(|law| certified.poles.in_table(law)[0]).flatten().map(|pole| -pole[0]);
+    let slowest = Law::ALL
+        .into_iter()
+        .filter_map(|law| certified.poles.in_table(law)[0])
+        .flatten()
+        .map(|pole| -pole[0]);
     let slowest = slowest.filter(|rate| *rate > 0.0).fold(f64::INFINITY, f64::min);
     let wanted = match &rig.plant {
         PlantDescription::Model(_) if slowest.is_finite() => 10.0 / slowest,
@@ -204,9 +200,5 @@ fn tilt(trust: &TrustReport) -> f64 {
 }
 
 fn gain(table: &TableValues, law: Law) -> f32 {
-    let values = match law {
-        Law::Lqr => &table.lqr,
-        Law::PolePlacement => &table.pole_placement,
-    };
-    values.as_ref().map_or(0.0, |values| values.n)
+    table.law(law).map_or(0.0, |values| values.n)
 }

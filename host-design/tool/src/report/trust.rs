@@ -22,7 +22,7 @@ pub(super) struct CheckRow {
 pub(super) fn check_rows(report: &TrustReport) -> Vec<CheckRow> {
     let row = |check: &upright_design::verify::Check| CheckRow {
         holds: check.holds,
-        law: if check.law == "lqr" { "LQR" } else { "Pole placement" },
+        law: check.law.title(),
         requirement: check.requirement,
         found: check.found_text(),
         required: check.required_text(),

@@ -1,5 +1,7 @@
 //! The paper's claims about the two laws, in the words of what was measured.
 
+use upright::table::Law;
+
 use super::markdown::markdown_table;
 use super::{Loop, Robustness};
 use upright_design::verify::Margins;
@@ -21,7 +23,7 @@ pub(super) fn claims(all: &[Robustness]) -> String {
                 _ => (1e3, "mrad"),
             };
             rows.push(vec![
-                one.law.to_owned(),
+                one.law.to_string(),
                 one.kind.name().to_owned(),
                 ripple.signal.clone(),
                 format!("{:.3} {unit}", scale * ripple.rms),
@@ -48,8 +50,8 @@ pub(super) fn claims(all: &[Robustness]) -> String {
     text += &markdown_table(&header, 2, &rows);
     text += "\nBetter is: lower frequency, rms, force and effort; larger margins.\n\n";
     for kind in Loop::ALL {
-        let of = |law: &str| all.iter().find(|one| one.law == law && one.kind == kind);
-        if let (Some(lqr), Some(placement)) = (of("LQR"), of("pole placement")) {
+        let of = |law: Law| all.iter().find(|one| one.law == law && one.kind == kind);
+        if let (Some(lqr), Some(placement)) = (of(Law::Lqr), of(Law::PolePlacement)) {
             text += &comparison(lqr, placement);
         }
     }
@@ -64,7 +66,7 @@ fn margin_row(one: &Robustness) -> Vec<String> {
     let highest =
         |margins: &Margins| margins.highest_gain.map_or("∞".to_owned(), |gain| format!("{gain:.2}"));
     vec![
-        one.law.to_owned(),
+        one.law.to_string(),
         one.kind.name().to_owned(),
         of(&|margins| format!("{:.2} to {}", margins.lowest_gain, highest(margins))),
         of(&|margins| number(margins.phase_margin_rad.map(f64::to_degrees), 1)),

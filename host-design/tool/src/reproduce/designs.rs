@@ -2,8 +2,10 @@
 
 use serde::Serialize;
 
+use upright::table::Law;
+
 use super::comparison::{Digits, Row};
-use super::{LAWS, PaperRigs, ReproduceError, published};
+use super::{PaperRigs, ReproduceError, published};
 use upright_design::design::{Feedback, continuous_plant, design, dominant_pair};
 use upright_design::numerics::{Complex, Matrix, Wide, eigenvalues};
 use upright_design::rig::Rig;
@@ -39,30 +41,24 @@ pub fn designs(rigs: &PaperRigs) -> Result<Designs, ReproduceError> {
     let mut rows = plant_rows(&exact.double.a, &exact.double.b);
     rows.extend(dominant_rows());
     for (from, certified) in [(PRINTED, &printed), (EXACT, &exact)] {
-        for (law, name, k, n) in [
-            (&certified.double.continuous.lqr, "LQR", &published::LQR_K, published::LQR_N),
-            (
-                &certified.double.continuous.pole_placement,
-                "pole placement",
-                &published::PLACEMENT_K,
-                published::PLACEMENT_N,
-            ),
-        ] {
-            let Some(law) = law else { continue };
-            rows.extend(gain_rows(name, from, law, k, n));
+        let designed = certified.double.continuous.each();
+        for (law, gains) in designed.present() {
+            let (k, n) = published::gains(law);
+            rows.extend(gain_rows(&law.to_string(), from, gains, k, n));
         }
     }
 
     let mut poles = vec![PoleSet { of: "open loop".to_owned(), poles: open_loop_poles(&rigs.exact)? }];
-    for ((_, name), closed) in LAWS.into_iter().zip(exact.poles.continuous) {
-        poles.extend(closed.map(|poles| PoleSet { of: format!("{name}, exact gains"), poles }));
+    for (law, found) in exact.poles.continuous.present() {
+        poles.push(PoleSet { of: format!("{law}, exact gains"), poles: found.clone() });
     }
-    for (name, k) in [("LQR", &published::LQR_K), ("pole placement", &published::PLACEMENT_K)] {
+    for law in Law::ALL {
+        let (k, _) = published::gains(law);
         let k = Matrix::from_fn(1, 10, |_, j| super::comparison::value_of(k[j]));
         let closed = &exact.double.a - &(&exact.double.b * &k);
         let found = eigenvalues(&closed).map_err(|_| upright_design::design::DesignError::Poles)?;
         let poles_found = found.iter().map(Complex::to_f64).collect();
-        poles.push(PoleSet { of: format!("{name}, gains as printed (two decimals)"), poles: poles_found });
+        poles.push(PoleSet { of: format!("{law}, gains as printed (two decimals)"), poles: poles_found });
     }
     Ok(Designs { rows, poles })
 }

@@ -25,7 +25,6 @@ mod summary;
 use std::path::{Path, PathBuf};
 
 use serde::Serialize;
-use upright::table::Law;
 
 pub use comparison::{Digits, Row, Verdict};
 pub use continuous_loop::ContinuousRun;
@@ -149,9 +148,6 @@ impl PaperRigs {
         Ok(Self { exact: read("quadruple-paper.toml")?, printed: read("quadruple-paper-printed.toml")? })
     }
 }
-
-/// The two laws in the order of the paper.
-const LAWS: [(Law, &str); 2] = [(Law::Lqr, "LQR"), (Law::PolePlacement, "pole placement")];
 
 fn chain(rig: &Rig) -> Result<&Chain, ReproduceError> {
     match &rig.plant {

@@ -1,6 +1,8 @@
 //! What the paper prints: F. J. Ticona Coaquira, "Design and comparison of two linear controllers with precompensation
 //! gain for the Quadruple inverted pendulum". These numbers stand nowhere else.
 
+use upright::table::Law;
+
 /// A of the paper, by rows: six significant digits (without insignificant zeros).
 pub const A: [[&str; 10]; 10] = [
     ["0", "1", "0", "0", "0", "0", "0", "0", "0", "0"],
@@ -17,6 +19,14 @@ pub const A: [[&str; 10]; 10] = [
 
 /// B of the paper: six significant digits.
 pub const B: [&str; 10] = ["0", "7.76", "0", "328", "0", "-394", "0", "76.2857", "0", "-12.6857"];
+
+/// K (two decimals) and N (four decimals) of a law.
+pub fn gains(law: Law) -> (&'static [&'static str; 10], &'static str) {
+    match law {
+        Law::Lqr => (&LQR_K, LQR_N),
+        Law::PolePlacement => (&PLACEMENT_K, PLACEMENT_N),
+    }
+}
 
 /// K of the LQR, two decimals.
 pub const LQR_K: [&str; 10] =

@@ -5,7 +5,7 @@ use upright::table::Law;
 
 use super::continuous_loop::ContinuousRun;
 use super::course::{Course, StepFigures};
-use super::{LAWS, ReproduceError, SEED, chain, published};
+use super::{ReproduceError, SEED, chain, published};
 use upright_design::design::{Certified, Feedback, design};
 use upright_design::rig::Rig;
 use upright_design::simulate::{Scenario, Sensing, simulate};
@@ -56,7 +56,7 @@ impl Loops {
     pub fn of(rig: &Rig) -> Result<Self, ReproduceError> {
         chain(rig)?;
         let certified = design(rig)?;
-        if certified.double.continuous.each().contains(&None) {
+        if certified.double.continuous.each().into_array().contains(&None) {
             return Err(ReproduceError::OneLaw(rig.name.clone()));
         }
         let table = TableValues::of(rig, &certified, Gains::Sampled)?.without_governor();
@@ -66,11 +66,7 @@ impl Loops {
     /// Continuous gains of `law`.
     pub(super) fn continuous(&self, law: Law) -> Result<&Feedback<f64>, ReproduceError> {
         let laws = &self.certified.double.continuous;
-        let law = match law {
-            Law::Lqr => &laws.lqr,
-            Law::PolePlacement => &laws.pole_placement,
-        };
-        law.as_ref().ok_or_else(|| ReproduceError::OneLaw(self.rig.name.clone()))
+        laws.each()[law].ok_or_else(|| ReproduceError::OneLaw(self.rig.name.clone()))
     }
 
     /// The course of `law` in `kind` of loop, from rest; sampled loops at the tick, whatever `run` says.
@@ -101,7 +97,7 @@ pub struct Response {
     /// Number of the paper's figure.
     pub figure: u8,
     /// LQR or pole placement.
-    pub law: &'static str,
+    pub law: Law,
     /// Which loop.
     pub kind: Loop,
     /// Its figures.
@@ -118,12 +114,12 @@ pub struct Response {
 pub fn responses(loops: &Loops) -> Result<Vec<Response>, ReproduceError> {
     let mut responses = Vec::new();
     for (offset, disturbances) in [(5, None), (7, Some(SEED))] {
-        for (figure, (law, name)) in (offset..).zip(LAWS) {
+        for (figure, law) in (offset..).zip(Law::ALL) {
             for kind in Loop::ALL {
                 let course =
                     loops.course(law, kind, &ContinuousRun { disturbances, ..ContinuousRun::STEP })?;
                 let figures = course.step_figures(ContinuousRun::STEP.step_m);
-                responses.push(Response { figure, law: name, kind, figures, course });
+                responses.push(Response { figure, law, kind, figures, course });
             }
         }
     }

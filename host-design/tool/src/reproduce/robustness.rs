@@ -5,17 +5,17 @@ use rayon::prelude::*;
 use serde::Serialize;
 use upright::table::Law;
 
+use super::ReproduceError;
 use super::continuous_loop::ContinuousRun;
 use super::continuous_margins::continuous_margins;
 use super::course::Course;
 use super::designs::open_loop_poles;
 use super::responses::{Loop, Loops};
 use super::spectrum::{Bandwidth, SEGMENT, Spectrum};
-use super::{LAWS, ReproduceError};
 use upright_design::plant::reference::Tolerance;
 use upright_design::rig::Rig;
 use upright_design::table::{Gains, TableValues};
-use upright_design::verify::{Margins, linear};
+use upright_design::verify::{LinearReport, Margins, linear};
 
 /// Seed of all disturbances.
 pub const SEED: u64 = 1;
@@ -35,8 +35,8 @@ const RUN: ContinuousRun = ContinuousRun {
 /// One law in one loop.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Robustness {
-    /// LQR or pole placement.
-    pub law: &'static str,
+    /// The law.
+    pub law: Law,
     /// Which loop.
     pub kind: Loop,
     /// Margins of the linear loop, broken at the force.
@@ -75,26 +75,26 @@ pub fn robustness(loops: &Loops) -> Result<Vec<Robustness>, ReproduceError> {
         linear(&rig, &certified, &TableValues::of(&rig, &certified, Gains::Sampled)?)?
     };
     let encoders = linear(&loops.rig, &loops.certified, &loops.table)?;
-    let margins = |index: usize, kind: Loop| match kind {
-        Loop::Continuous => {
-            loops.certified.poles.continuous[index].as_ref().map(|closed| continuous_margins(&open, closed))
-        }
-        Loop::FullState => full_state.get(index).and_then(|report| report.margins.clone()),
-        Loop::Encoders => encoders.get(index).and_then(|report| report.margins.clone()),
+    let of_law = |reports: &[LinearReport], law: Law| {
+        reports.iter().find(|report| report.law == law).and_then(|report| report.margins.clone())
     };
-    let jobs: Vec<(usize, (Law, &str), Loop)> = LAWS
-        .into_iter()
-        .enumerate()
-        .flat_map(|(index, law)| Loop::ALL.map(|kind| (index, law, kind)))
-        .collect();
+    let margins = |law: Law, kind: Loop| match kind {
+        Loop::Continuous => {
+            loops.certified.poles.continuous[law].as_ref().map(|closed| continuous_margins(&open, closed))
+        }
+        Loop::FullState => of_law(&full_state, law),
+        Loop::Encoders => of_law(&encoders, law),
+    };
+    let jobs: Vec<(Law, Loop)> =
+        Law::ALL.into_iter().flat_map(|law| Loop::ALL.map(|kind| (law, kind))).collect();
     jobs.into_par_iter()
-        .map(|(index, (law, name), kind)| {
+        .map(|(law, kind)| {
             let course = loops.course(law, kind, &RUN)?;
             let forces = &course.forces_n[after(&course)..];
             Ok(Robustness {
-                law: name,
+                law,
                 kind,
-                margins: margins(index, kind),
+                margins: margins(law, kind),
                 ripples: ripples(&course),
                 peak_force_n: forces.iter().map(|force| force.abs()).fold(0.0, f64::max),
                 effort_n2: forces.iter().map(|force| force * force).sum::<f64>() / forces.len() as f64,

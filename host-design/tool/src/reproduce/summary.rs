@@ -121,7 +121,7 @@ fn responses(responses: &[Response]) -> String {
                 figures.peak_angles_deg.iter().map(|angle| format!("{angle:.2}")).collect();
             vec![
                 response.figure.to_string(),
-                response.law.to_owned(),
+                response.law.to_string(),
                 response.kind.name().to_owned(),
                 figures.settling_time_s.map_or("-".to_owned(), |time| format!("{time:.3}")),
                 format!("{:.2}", figures.overshoot_percent),

@@ -20,7 +20,7 @@ fn printed_n(law: &Feedback<f64>) -> String {
 
 /// Continuous [LQR, pole placement].
 fn laws(certified: &Certified) -> [&Feedback<f64>; 2] {
-    certified.double.continuous.each().map(Option::unwrap)
+    certified.double.continuous.each().into_array().map(Option::unwrap)
 }
 
 #[test]
@@ -113,9 +113,11 @@ fn open_loop_poles_are_two_integrators_and_four_pairs() {
 #[test]
 fn closed_loop_poles_are_those_of_the_paper() {
     let poles = design(&rig("quadruple-paper")).unwrap().poles;
-    let fastest = poles.continuous[0].as_ref().unwrap().iter().map(|pole| pole[0]).fold(0.0, f64::min);
+    let fastest = poles.continuous.lqr.as_ref().unwrap().iter().map(|pole| pole[0]).fold(0.0, f64::min);
     assert_eq!(format!("{fastest:.1}"), "-527.6");
-    let placed: Vec<[String; 2]> = poles.continuous[1]
+    let placed: Vec<[String; 2]> = poles
+        .continuous
+        .pole_placement
         .as_ref()
         .unwrap()
         .iter()
@@ -135,7 +137,7 @@ fn the_papers_gains_survive_ticks_of_one_and_two_milliseconds_only() {
         [(0.001, 0, None), (0.002, 0, None), (0.003, 0, Some("1.08")), (0.002, 1, Some("1.29"))]
     {
         rig.tick = upright_design::rig::Tick { period_s, delay_ticks };
-        let lqr = design(&rig).unwrap().assess(&rig).unwrap()[0].unwrap();
+        let lqr = design(&rig).unwrap().assess(&rig).unwrap().lqr.unwrap();
         assert!(lqr.exact < 1.0 && lqr.rounded < 1.0, "redesigned for the tick it always holds");
         match wanted {
             None => assert!(lqr.continuous_at_tick < 1.0, "{period_s}: {lqr:?}"),
@@ -143,6 +145,6 @@ fn the_papers_gains_survive_ticks_of_one_and_two_milliseconds_only() {
         }
     }
     rig.tick = upright_design::rig::Tick { period_s: 0.005, delay_ticks: 0 };
-    let lqr = design(&rig).unwrap().assess(&rig).unwrap()[0].unwrap();
+    let lqr = design(&rig).unwrap().assess(&rig).unwrap().lqr.unwrap();
     assert_eq!(format!("{:.1}", lqr.continuous_at_tick), "3.1");
 }

@@ -4,6 +4,7 @@
 use std::cell::Cell;
 use std::sync::LazyLock;
 
+use upright::table::Law;
 use upright_design::design::{Feedback, design};
 use upright_design::plant::reference::Tolerance;
 use upright_design::rig::{Chain, PlantDescription, PolePlacement, Rig};
@@ -295,7 +296,7 @@ fn a_run_that_falls_falls_at_any_tolerance() {
     }
 }
 
-fn robustness(law: &str, kind: Loop) -> &'static Robustness {
+fn robustness(law: Law, kind: Loop) -> &'static Robustness {
     ALL.robustness.iter().find(|one| one.law == law && one.kind == kind).unwrap()
 }
 
@@ -303,12 +304,12 @@ fn robustness(law: &str, kind: Loop) -> &'static Robustness {
 fn margins_of_every_loop_are_pinned() {
     // lowest gain, highest gain, phase (°), delay (ms), peak sensitivity, disk margin
     for (law, kind, wanted) in [
-        ("LQR", Loop::Continuous, [0.331, f64::INFINITY, 77.2, 1.955, 1.0, 0.991]),
-        ("LQR", Loop::FullState, [0.407, 3.682, 59.0, 1.912, 1.373, 0.826]),
-        ("LQR", Loop::Encoders, [0.549, 2.864, 27.5, 1.532, 2.240, 0.490]),
-        ("pole placement", Loop::Continuous, [0.482, f64::INFINITY, 60.3, 3.164, 1.0, 0.697]),
-        ("pole placement", Loop::FullState, [0.525, 6.243, 49.9, 2.870, 1.191, 0.619]),
-        ("pole placement", Loop::Encoders, [0.518, 2.490, 22.7, 1.450, 2.601, 0.399]),
+        (Law::Lqr, Loop::Continuous, [0.331, f64::INFINITY, 77.2, 1.955, 1.0, 0.991]),
+        (Law::Lqr, Loop::FullState, [0.407, 3.682, 59.0, 1.912, 1.373, 0.826]),
+        (Law::Lqr, Loop::Encoders, [0.549, 2.864, 27.5, 1.532, 2.240, 0.490]),
+        (Law::PolePlacement, Loop::Continuous, [0.482, f64::INFINITY, 60.3, 3.164, 1.0, 0.697]),
+        (Law::PolePlacement, Loop::FullState, [0.525, 6.243, 49.9, 2.870, 1.191, 0.619]),
+        (Law::PolePlacement, Loop::Encoders, [0.518, 2.490, 22.7, 1.450, 2.601, 0.399]),
     ] {
         let margins = robustness(law, kind).margins.as_ref().unwrap();
         let found = [
@@ -333,7 +334,7 @@ fn margins_of_every_loop_are_pinned() {
 /// R. E. Kalman: `|1 + L| >= 1` for every LQR with R = 1; no other law has to keep it.
 #[test]
 fn the_continuous_lqr_has_the_margins_that_theory_promises() {
-    let margins = robustness("LQR", Loop::Continuous).margins.as_ref().unwrap();
+    let margins = robustness(Law::Lqr, Loop::Continuous).margins.as_ref().unwrap();
     assert!(margins.peak_sensitivity <= 1.0 + 1e-9 && margins.lowest_gain <= 0.5);
     assert!(margins.highest_gain.is_none() && margins.phase_margin_rad.unwrap().to_degrees() >= 60.0);
     // Faster far poles break it, so the figure can be otherwise.
@@ -349,12 +350,12 @@ fn the_continuous_lqr_has_the_margins_that_theory_promises() {
 fn spectra_and_ripple_are_pinned() {
     // rms of x (mm), θ1 (mrad), u (N), their mean frequencies (Hz), mean u² (N²)
     for (law, kind, wanted) in [
-        ("LQR", Loop::Continuous, [7.07, 6.33, 0.0888, 0.298, 1.61, 103.0, 0.00789]),
-        ("LQR", Loop::FullState, [7.30, 6.53, 0.0946, 0.298, 1.62, 106.0, 0.00894]),
-        ("LQR", Loop::Encoders, [16.4, 15.9, 0.444, 0.316, 3.23, 82.4, 0.197]),
-        ("pole placement", Loop::Continuous, [1.53, 3.57, 0.111, 0.324, 8.07, 51.8, 0.0124]),
-        ("pole placement", Loop::FullState, [1.56, 3.66, 0.116, 0.325, 8.12, 52.6, 0.0135]),
-        ("pole placement", Loop::Encoders, [4.80, 24.6, 0.991, 0.779, 11.1, 40.5, 0.982]),
+        (Law::Lqr, Loop::Continuous, [7.07, 6.33, 0.0888, 0.298, 1.61, 103.0, 0.00789]),
+        (Law::Lqr, Loop::FullState, [7.30, 6.53, 0.0946, 0.298, 1.62, 106.0, 0.00894]),
+        (Law::Lqr, Loop::Encoders, [16.4, 15.9, 0.444, 0.316, 3.23, 82.4, 0.197]),
+        (Law::PolePlacement, Loop::Continuous, [1.53, 3.57, 0.111, 0.324, 8.07, 51.8, 0.0124]),
+        (Law::PolePlacement, Loop::FullState, [1.56, 3.66, 0.116, 0.325, 8.12, 52.6, 0.0135]),
+        (Law::PolePlacement, Loop::Encoders, [4.80, 24.6, 0.991, 0.779, 11.1, 40.5, 0.982]),
     ] {
         let one = robustness(law, kind);
         let signal = |name: &str| one.ripples.iter().find(|ripple| ripple.signal == name).unwrap();
@@ -379,12 +380,12 @@ fn spectra_and_ripple_are_pinned() {
 #[test]
 fn every_joint_swings_slower_under_the_lqr_and_the_force_does_not() {
     for kind in Loop::ALL {
-        let frequency = |law: &str, index: usize| robustness(law, kind).ripples[index].bandwidth.mean_hz;
+        let frequency = |law: Law, index: usize| robustness(law, kind).ripples[index].bandwidth.mean_hz;
         for joint in 1..=4 {
-            let slower = frequency("LQR", joint) < frequency("pole placement", joint);
+            let slower = frequency(Law::Lqr, joint) < frequency(Law::PolePlacement, joint);
             assert!(slower, "{kind:?}, joint {joint}");
         }
-        assert!(frequency("LQR", 5) > frequency("pole placement", 5), "{kind:?}, force");
+        assert!(frequency(Law::Lqr, 5) > frequency(Law::PolePlacement, 5), "{kind:?}, force");
     }
 }
 

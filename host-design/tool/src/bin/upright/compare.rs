@@ -5,13 +5,14 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 use serde_json::json;
+use upright::table::Law;
 use upright_design::rig::Rig;
 use upright_design::table::write_atomically;
 use upright_tool::compare::{Candidate, Conditions, Sweep, compare, csv, figure, jobs, notes, table};
 
 use crate::failure::Failure;
 use crate::progress::with_bar;
-use crate::variation::{LawName, finite, positive};
+use crate::variation::{finite, law_option, positive};
 
 /// Compares designs: several rigs, or one key of a rig file swept over a range.
 ///
@@ -33,8 +34,8 @@ pub(crate) struct Compare {
     #[arg(long, value_name = "KEY=FROM..TO[:POINTS][:log]")]
     sweep: Option<Sweep>,
     /// Only this law
-    #[arg(long, value_enum)]
-    law: Option<LawName>,
+    #[arg(long, value_parser = law_option())]
+    law: Option<Law>,
     /// Step of the set-point (m)
     #[arg(long, default_value_t = 0.1, value_name = "M", allow_negative_numbers = true, value_parser = finite)]
     step: f64,
@@ -79,7 +80,7 @@ impl Compare {
             full_state: self.full_state,
             raw_step: self.raw_step,
             continuous_gains: self.continuous_gains,
-            law: self.law.map(LawName::law),
+            law: self.law,
         };
         let rows = jobs(&candidates, &conditions).len();
         if rows == 0 {

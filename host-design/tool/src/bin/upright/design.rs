@@ -4,7 +4,7 @@ use std::io::Write;
 use std::path::{Path, PathBuf};
 
 use clap::Args;
-use upright::table::Law;
+use upright::table::{Law, PerLaw};
 use upright_design::design::{Assessment, Certified, design};
 use upright_design::rig::Rig;
 use upright_design::simulate::{Scenario, Summary, simulate};
@@ -47,9 +47,7 @@ pub(crate) struct Design {
 
 /// A control law of a design with its assessment.
 struct LawReport {
-    name: &'static str,
-    /// Index into [`Certified::poles`] and assessments.
-    index: usize,
+    law: Law,
     assessment: Assessment,
     /// The acceptance run, if there is a table.
     run: Option<Summary>,
@@ -103,27 +101,25 @@ impl Design {
 fn report(
     rig: &Rig,
     certified: &Certified,
-    assessments: [Option<Assessment>; 2],
+    assessments: PerLaw<Option<Assessment>>,
     table: Option<&TableValues>,
 ) -> Result<Vec<LawReport>, Failure> {
-    let laws = [("LQR", Law::Lqr), ("pole placement", Law::PolePlacement)];
     let mut reports = Vec::new();
-    for (index, ((name, law), assessment)) in laws.into_iter().zip(assessments).enumerate() {
-        let Some(assessment) = assessment else { continue };
+    for (law, &assessment) in assessments.present() {
         let run = match table {
             Some(table) => {
-                let scenario = Scenario::acceptance(rig, law, slowest_time_constant(rig, certified, index));
+                let scenario = Scenario::acceptance(rig, law, slowest_time_constant(rig, certified, law));
                 Some(simulate(rig, table, &scenario)?.1)
             }
             None => None,
         };
-        reports.push(LawReport { name, index, assessment, run });
+        reports.push(LawReport { law, assessment, run });
     }
     Ok(reports)
 }
 
 /// Of the continuous loop (s).
-fn slowest_time_constant(rig: &Rig, certified: &Certified, law: usize) -> f64 {
+fn slowest_time_constant(rig: &Rig, certified: &Certified, law: Law) -> f64 {
     let poles = certified.poles.in_table(law)[0].map(Vec::as_slice).unwrap_or_default();
     let slowest = poles.iter().map(|pole| -pole[0]).fold(f64::INFINITY, f64::min);
     if slowest > 0.0 && slowest.is_finite() { 1.0 / slowest } else { rig.tick.period_s }
@@ -131,17 +127,17 @@ fn slowest_time_constant(rig: &Rig, certified: &Certified, law: usize) -> f64 {
 
 /// A table that cannot hold its own plant is not written.
 fn refuse_failing_table(rig: &Rig, reports: &[LawReport]) -> Result<(), Failure> {
-    for LawReport { name, assessment, run, .. } in reports {
+    for LawReport { law, assessment, run } in reports {
         if assessment.rounded >= 1.0 {
             return Err(Failure::NoSolution(format!(
-                "{}: {name}: rounded to f32 the gains no longer stabilise the plant (spectral radius {:.6}): tick.period_s = {} s \
+                "{}: {law}: rounded to f32 the gains no longer stabilise the plant (spectral radius {:.6}): tick.period_s = {} s \
                  is too long for single precision; shorten it. Nothing was written",
                 rig.name, assessment.rounded, rig.tick.period_s
             )));
         }
         if let Some(fall) = run.as_ref().and_then(|run| run.fall.as_ref()) {
             return Err(Failure::CheckFailed(format!(
-                "{}: {name}: {fall} in the closed loop with the new table. Nothing was written",
+                "{}: {law}: {fall} in the closed loop with the new table. Nothing was written",
                 rig.name
             )));
         }

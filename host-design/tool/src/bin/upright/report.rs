@@ -53,7 +53,7 @@ impl Report {
     pub(crate) fn run(self) -> Result<(), Failure> {
         self.prepare()?;
         let (rig, certified, table) = self.variation.designed()?;
-        let laws = u64::from(table.lqr.is_some()) + u64::from(table.pole_placement.is_some());
+        let laws = table.laws.present().count() as u64;
         let effort = Effort { runs: self.runs as usize, seed: self.seed, late: 0.0 };
         let (trust, files) =
             with_random_plants(laws * u64::from(self.runs), |stage, done| -> Result<_, Failure> {

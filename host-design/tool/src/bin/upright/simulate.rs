@@ -13,7 +13,7 @@ use upright_tool::figure::run_svg;
 
 use crate::failure::Failure;
 use crate::progress::with_spinner;
-use crate::variation::{LawName, Variation, finite, not_negative, positive};
+use crate::variation::{Variation, finite, law_option, not_negative, positive};
 
 /// Runs the firmware's own controller against the nonlinear plant.
 ///
@@ -31,8 +31,8 @@ pub(crate) struct Simulate {
     variation: Variation,
 
     /// Control law
-    #[arg(long, value_enum, default_value_t = LawName::Lqr)]
-    law: LawName,
+    #[arg(long, value_parser = law_option(), default_value = Law::Lqr.option())]
+    law: Law,
     /// Length of the run (s)
     #[arg(long, default_value_t = 10.0, value_name = "S", allow_negative_numbers = true, value_parser = positive)]
     duration: f64,
@@ -126,7 +126,7 @@ impl Simulate {
     }
 
     fn scenario(&self, rig: &Rig) -> Result<Scenario, Failure> {
-        let law = self.law.law();
+        let law = self.law;
         let mut scenario = Scenario::at_rest(rig, law);
         if let Some(sensing) = self.sensing {
             scenario.sensing = match sensing {
@@ -205,10 +205,7 @@ impl Simulate {
             }
         }
         if let Some(path) = &self.svg {
-            let law = match self.law {
-                LawName::Lqr => "LQR",
-                LawName::PolePlacement => "pole placement",
-            };
+            let law = self.law;
             let title = format!(
                 "{}, {law}, tick {} ms",
                 rig.name,

@@ -2,6 +2,7 @@
 
 use std::path::PathBuf;
 
+use clap::builder::{PossibleValuesParser, TypedValueParser};
 use clap::{Args, ValueEnum};
 use upright::table::Law;
 use upright_design::design::{Certified, design};
@@ -36,19 +37,10 @@ enum GainsName {
 }
 
 /// A control law by its name on the command line.
-#[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
-pub(crate) enum LawName {
-    Lqr,
-    PolePlacement,
-}
-
-impl LawName {
-    pub(crate) fn law(self) -> Law {
-        match self {
-            LawName::Lqr => Law::Lqr,
-            LawName::PolePlacement => Law::PolePlacement,
-        }
-    }
+pub(crate) fn law_option() -> impl TypedValueParser<Value = Law> {
+    // Only these names reach the second step.
+    PossibleValuesParser::new(Law::ALL.map(Law::option))
+        .map(|name| Law::from_option(&name).unwrap_or(Law::Lqr))
 }
 
 impl Variation {

@@ -12,7 +12,7 @@ use upright_design::verify::{Axis, Effort, Horizon, TrustReport, attraction_map,
 
 use crate::failure::Failure;
 use crate::progress::{with_bar, with_random_plants, with_spinner};
-use crate::variation::{LawName, Variation};
+use crate::variation::{Variation, law_option};
 
 mod text;
 
@@ -37,8 +37,8 @@ pub(crate) struct Verify {
     #[arg(long, default_value_t = 1)]
     seed: u64,
     /// Only this law
-    #[arg(long, value_enum)]
-    law: Option<LawName>,
+    #[arg(long, value_parser = law_option())]
+    law: Option<Law>,
     /// Instead of the report, repeat the Monte Carlo run of this seed
     #[arg(long, value_name = "SEED", requires = "law")]
     replay: Option<u64>,
@@ -86,23 +86,21 @@ fn share(text: &str) -> Result<f64, String> {
 impl Verify {
     pub(crate) fn run(self) -> Result<(), Failure> {
         let (rig, certified, mut table) = self.variation.designed()?;
-        match self.law {
-            Some(LawName::Lqr) => table.pole_placement = None,
-            Some(LawName::PolePlacement) => table.lqr = None,
-            None => {}
+        for other in Law::ALL.into_iter().filter(|law| self.law.is_some_and(|only| only != *law)) {
+            table.laws[other] = None;
         }
-        if table.lqr.is_none() && table.pole_placement.is_none() {
+        if table.laws.present().next().is_none() {
             return Err(Failure::BadArgument(
                 "--law: the rig file does not ask for this control law".to_owned(),
             ));
         }
         if let (Some(seed), Some(law)) = (self.replay, self.law) {
-            return self.replay(&rig, &table, law.law(), seed);
+            return self.replay(&rig, &table, law, seed);
         }
         if let Some(path) = &self.map {
             return self.map(&rig, &table, path);
         }
-        let laws = u64::from(table.lqr.is_some()) + u64::from(table.pole_placement.is_some());
+        let laws = table.laws.present().count() as u64;
         let effort = Effort { runs: self.runs as usize, seed: self.seed, late: self.late };
         let report = with_random_plants(laws * u64::from(self.runs), |stage, done| {
             trust(&rig, &certified, &table, effort, stage, done)
@@ -128,7 +126,7 @@ impl Verify {
             .checks
             .iter()
             .filter(|check| !check.holds)
-            .map(|check| format!("{}: {}", check.law, check.requirement))
+            .map(|check| format!("{}: {}", check.law.key(), check.requirement))
             .collect();
         if failed.is_empty() {
             return Ok(());
@@ -159,7 +157,7 @@ impl Verify {
 
     /// One CSV row per initial state: both states and the settling time, empty if it does not recover.
     fn map(&self, rig: &Rig, table: &TableValues, path: &std::path::Path) -> Result<(), Failure> {
-        let law = if table.lqr.is_some() { Law::Lqr } else { Law::PolePlacement };
+        let law = table.laws.present().next().map_or(Law::Lqr, |(law, _)| law);
         let &[across, down] = self.axes.as_slice() else {
             return Err(Failure::BadArgument("--axes: give two".to_owned()));
         };

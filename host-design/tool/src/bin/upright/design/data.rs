@@ -1,7 +1,8 @@
 //! A design as one JSON object.
 
 use serde::Serialize;
-use upright_design::design::{Certified, Feedback, Laws, Poles};
+use upright::table::{Law, PerLaw};
+use upright_design::design::{Certified, Laws, Poles};
 use upright_design::numerics::Matrix;
 use upright_design::rig::Rig;
 use upright_design::table::TableValues;
@@ -104,14 +105,13 @@ impl<'a> DesignData<'a> {
     }
 }
 
-fn laws<'a>(laws: &'a Laws<f64>, poles: &'a [Option<Poles>; 2], states: usize) -> LawsData<'a> {
-    let law = |law: &'a Option<Feedback<f64>>, poles: &'a Option<Poles>| {
-        law.as_ref().map(|law| LawData { k: rows(&law.k), n: law.n, poles: poles.as_ref() })
+fn laws<'a>(laws: &'a Laws<f64>, poles: &'a PerLaw<Option<Poles>>, states: usize) -> LawsData<'a> {
+    let of = |law: Law| {
+        laws.each()[law].map(|gains| LawData { k: rows(&gains.k), n: gains.n, poles: poles[law].as_ref() })
     };
-    let [lqr, pole_placement] = poles;
     LawsData {
-        lqr: law(&laws.lqr, lqr),
-        pole_placement: law(&laws.pole_placement, pole_placement),
+        lqr: of(Law::Lqr),
+        pole_placement: of(Law::PolePlacement),
         integral: laws.integral.as_ref().map(|law| IntegralData {
             k: rows(&law.k),
             ki: law.k[(0, states)],

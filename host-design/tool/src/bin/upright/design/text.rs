@@ -32,14 +32,14 @@ fn write_design(
         rig.tick.delay_ticks
     )?;
     for report in reports {
-        let index = report.index;
-        writeln!(out, "\n{}", report.name)?;
-        let [poles, sampled_poles] = certified.poles.in_table(index);
-        if let Some(law) = certified.double.continuous.in_table()[index] {
-            write_law(out, "continuous", "s", law, poles)?;
+        let law = report.law;
+        writeln!(out, "\n{law}")?;
+        let [poles, sampled_poles] = certified.poles.in_table(law);
+        if let Some(gains) = certified.double.continuous.in_table()[law] {
+            write_law(out, "continuous", "s", gains, poles)?;
         }
-        if let Some(law) = certified.double.sampled.in_table()[index] {
-            write_law(out, "sampled", "z", law, sampled_poles)?;
+        if let Some(gains) = certified.double.sampled.in_table()[law] {
+            write_law(out, "sampled", "z", gains, sampled_poles)?;
         }
         let assessment = &report.assessment;
         writeln!(
@@ -93,23 +93,23 @@ pub(super) fn warnings(
     table: Option<&TableValues>,
 ) -> Vec<String> {
     let mut warnings = Vec::new();
-    for LawReport { name, assessment, .. } in reports {
+    for LawReport { law, assessment, .. } in reports {
         if assessment.continuous_at_tick >= 1.0 {
             warnings.push(format!(
-                "{name}: the continuous gains are unstable at the tick of {} ms (spectral radius {:.2}); the table holds the sampled ones",
+                "{law}: the continuous gains are unstable at the tick of {} ms (spectral radius {:.2}); the table holds the sampled ones",
                 short(rig.tick.period_s * 1e3),
                 assessment.continuous_at_tick
             ));
         }
         if assessment.rounded >= 1.0 {
             warnings.push(format!(
-                "{name}: rounded to f32 the gains do not stabilise the plant (spectral radius {:.6})",
+                "{law}: rounded to f32 the gains do not stabilise the plant (spectral radius {:.6})",
                 assessment.rounded
             ));
         }
     }
     let sampled = &certified.double.sampled;
-    if sampled.each().into_iter().flatten().any(|law| law.n.is_none()) {
+    if sampled.each().present().any(|(_, law)| law.n.is_none()) {
         warnings.push(
             "no constant input holds the output away from 0: N is 0 in the table, set-points have no effect"
                 .to_owned(),
@@ -117,7 +117,7 @@ pub(super) fn warnings(
     }
     let ungoverned = |law: &LawValues| law.setpoint_step == f32::MAX && law.n != 0.0;
     if let Some(table) = table.filter(|_| matches!(rig.plant, PlantDescription::Chain(_)))
-        && [&table.lqr, &table.pole_placement].into_iter().flatten().any(ungoverned)
+        && table.laws.present().any(|(_, law)| ungoverned(law))
     {
         warnings.push(
             "the loop is too slow for a bound on its step response: the set-point is not governed".to_owned(),

@@ -24,7 +24,7 @@ fn write_report(out: &mut String, rig: &Rig, report: &TrustReport, arguments: &s
         rig.tick.delay_ticks
     )?;
     for law in &report.laws {
-        writeln!(out, "\n{}", law.linear.law)?;
+        writeln!(out, "\n{}", law.linear.law.key())?;
         for row in rows(rig, law) {
             line(out, &row.name, &row.value)?;
         }
@@ -37,7 +37,7 @@ fn write_report(out: &mut String, rig: &Rig, report: &TrustReport, arguments: &s
 
 fn worst_random_plant(out: &mut String, law: &LawTrust, arguments: &str) -> core::fmt::Result {
     let Some(worst) = law.monte_carlo.as_ref().and_then(|runs| runs.worst.as_ref()) else { return Ok(()) };
-    let name = law.linear.law.replace('_', "-");
+    let name = law.linear.law.option();
     let command = format!("upright verify {arguments} --law {name} --replay {}", worst.seed);
     line(out, "worst random plant", &command)
 }
@@ -60,7 +60,12 @@ fn poles_and_certificates(out: &mut String, law: &LawTrust) -> core::fmt::Result
 fn requirement(out: &mut String, check: &Check) -> core::fmt::Result {
     let verdict = if check.holds { "ok" } else { "FAILS" };
     let (found, required) = (check.found_text(), check.required_text());
-    writeln!(out, "  {verdict:<6}{:<15}{:<60}{found:>10}  required {required}", check.law, check.requirement)
+    writeln!(
+        out,
+        "  {verdict:<6}{:<15}{:<60}{found:>10}  required {required}",
+        check.law.key(),
+        check.requirement
+    )
 }
 
 fn line(out: &mut String, name: &str, text: &str) -> core::fmt::Result {

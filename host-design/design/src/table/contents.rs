@@ -1,0 +1,156 @@
+//! A table's names and values as a tree, for everything that writes a table out.
+
+use serde::ser::{Serialize, SerializeMap, Serializer};
+use upright::table::{Part, Reader, Shape, Words};
+
+/// A value of the tree.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) enum Node {
+    /// A number.
+    Value(Number),
+    /// An array.
+    List(Vec<Number>),
+    /// A matrix, column by column.
+    Columns(Vec<Vec<Number>>),
+    /// A struct.
+    Struct(&'static str, Vec<Field>),
+    /// A struct that may be missing.
+    Optional(Option<Box<Node>>),
+}
+
+/// A field of a struct.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Field {
+    pub(super) name: &'static str,
+    pub(super) documentation: Vec<&'static str>,
+    pub(super) value: Node,
+}
+
+/// A number of a table.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) enum Number {
+    Float(f32),
+    Integer(i64),
+    Hash(u64),
+}
+
+/// The fields of a table, in the order of their declaration.
+pub(super) fn fields(table: &impl Part) -> Vec<Field> {
+    let mut builder = Builder::default();
+    table.read(&mut builder);
+    match builder.done {
+        Some(Node::Struct(_, fields)) => fields,
+        _ => Vec::new(),
+    }
+}
+
+#[derive(Default)]
+struct Builder {
+    /// Structs that have begun, the innermost last.
+    open: Vec<(&'static str, Vec<Field>)>,
+    /// Fields that wait for their value, and whether it is optional; the innermost last.
+    waiting: Vec<(&'static str, Vec<&'static str>, bool)>,
+    done: Option<Node>,
+}
+
+impl Builder {
+    fn value(&mut self, node: Node) {
+        let (Some((_, fields)), Some((name, documentation, is_optional))) =
+            (self.open.last_mut(), self.waiting.pop())
+        else {
+            self.done = Some(node);
+            return;
+        };
+        let value = if is_optional { Node::Optional(Some(Box::new(node))) } else { node };
+        fields.push(Field { name, documentation, value });
+    }
+}
+
+impl Reader for Builder {
+    fn begin(&mut self, name: &'static str) {
+        self.open.push((name, Vec::new()));
+    }
+
+    fn field(&mut self, name: &'static str, documentation: &[&'static str]) {
+        self.waiting.push((name, documentation.to_vec(), false));
+    }
+
+    fn words(&mut self, words: Words<'_>, shape: Shape) {
+        let numbers: Vec<Number> = match words {
+            Words::F32(values) => values.iter().map(|&value| Number::Float(value)).collect(),
+            Words::U32(values) => values.iter().map(|&value| Number::Integer(value.into())).collect(),
+            Words::I32(values) => values.iter().map(|&value| Number::Integer(value.into())).collect(),
+            Words::U64(value) => vec![Number::Hash(value)],
+        };
+        self.value(match shape {
+            Shape::Value => Node::Value(numbers[0]),
+            Shape::List => Node::List(numbers),
+            Shape::Columns { rows } => Node::Columns(numbers.chunks(rows).map(<[_]>::to_vec).collect()),
+        });
+    }
+
+    fn option(&mut self, is_there: bool) {
+        if is_there {
+            if let Some((_, _, is_optional)) = self.waiting.last_mut() {
+                *is_optional = true;
+            }
+        } else {
+            self.value(Node::Optional(None));
+        }
+    }
+
+    fn end(&mut self) {
+        if let Some((name, fields)) = self.open.pop() {
+            self.value(Node::Struct(name, fields));
+        }
+    }
+}
+
+/// As JSON has it: a vector is an array, a matrix an array of its rows, what is missing is null.
+impl Serialize for Node {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        match self {
+            Node::Value(number) => number.serialize(serializer),
+            Node::List(numbers) => serializer.collect_seq(numbers),
+            Node::Columns(columns) => match columns.as_slice() {
+                [column] => serializer.collect_seq(column),
+                columns => {
+                    let rows = columns.first().map_or(0, Vec::len);
+                    let row = |row: usize| columns.iter().map(|column| column[row]).collect::<Vec<_>>();
+                    serializer.collect_seq((0..rows).map(row))
+                }
+            },
+            Node::Struct(_, fields) => object(fields.iter(), serializer),
+            Node::Optional(node) => node.serialize(serializer),
+        }
+    }
+}
+
+impl Serialize for Number {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        match *self {
+            Number::Float(value) => serializer.serialize_f32(value),
+            Number::Integer(value) => serializer.serialize_i64(value),
+            Number::Hash(value) => serializer.collect_str(&format_args!("{value:016x}")),
+        }
+    }
+}
+
+/// The fields as a JSON object; the laws stand beside the others.
+pub(super) fn object<'a, S: Serializer>(
+    fields: impl Iterator<Item = &'a Field>,
+    serializer: S,
+) -> Result<S::Ok, S::Error> {
+    let mut object = serializer.serialize_map(None)?;
+    for field in fields {
+        match &field.value {
+            Node::Struct("PerLaw", laws) => {
+                for law in laws {
+                    object.serialize_entry(law.name, &law.value)?;
+                }
+            }
+            value => object.serialize_entry(field.name, value)?,
+        }
+    }
+    object.end()
+}

@@ -1,0 +1,217 @@
+//! The control laws a table can hold, and their gains.
+
+use core::fmt;
+use core::ops::{Index, IndexMut};
+
+use nalgebra::SVector;
+use serde::{Deserialize, Serialize};
+
+use crate::table::part::{Part, Reader, Resize, Words, WordsMut, part};
+use crate::table::scalar::Scalar;
+
+/// A control law of the table.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Law {
+    /// Linear quadratic regulator.
+    Lqr,
+    /// Pole placement.
+    PolePlacement,
+}
+
+impl Law {
+    /// All laws; a controller starts with the first that its table holds.
+    pub const ALL: [Self; 2] = [Self::Lqr, Self::PolePlacement];
+
+    /// Name in rig files, in JSON and as a field of [`PerLaw`].
+    pub const fn key(self) -> &'static str {
+        match self {
+            Law::Lqr => "lqr",
+            Law::PolePlacement => "pole_placement",
+        }
+    }
+
+    /// Name in commands and file names: the key with a hyphen.
+    pub const fn option(self) -> &'static str {
+        match self {
+            Law::Lqr => "lqr",
+            Law::PolePlacement => "pole-placement",
+        }
+    }
+
+    /// Name in headings: "LQR", "Pole placement".
+    pub const fn title(self) -> &'static str {
+        match self {
+            Law::Lqr => "LQR",
+            Law::PolePlacement => "Pole placement",
+        }
+    }
+
+    /// The law with this [`option`](Self::option) name.
+    pub fn from_option(name: &str) -> Option<Self> {
+        Self::ALL.into_iter().find(|law| law.option() == name)
+    }
+}
+
+/// Name within a sentence: "LQR", "pole placement".
+impl fmt::Display for Law {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.pad(match self {
+            Law::Lqr => "LQR",
+            Law::PolePlacement => "pole placement",
+        })
+    }
+}
+
+/// One `T` for each law.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct PerLaw<T> {
+    /// That of [`Law::Lqr`].
+    pub lqr: T,
+    /// That of [`Law::PolePlacement`].
+    pub pole_placement: T,
+}
+
+impl<T> PerLaw<T> {
+    /// What `make` gives for each law.
+    pub fn from_fn(mut make: impl FnMut(Law) -> T) -> Self {
+        Self { lqr: make(Law::Lqr), pole_placement: make(Law::PolePlacement) }
+    }
+
+    /// A reference for each law.
+    pub fn as_ref(&self) -> PerLaw<&T> {
+        PerLaw::from_fn(|law| &self[law])
+    }
+
+    /// The values in the order of [`Law::ALL`].
+    pub fn into_array(self) -> [T; 2] {
+        [self.lqr, self.pole_placement]
+    }
+
+    /// The values changed one by one.
+    pub fn map<U>(self, mut change: impl FnMut(T) -> U) -> PerLaw<U> {
+        PerLaw { lqr: change(self.lqr), pole_placement: change(self.pole_placement) }
+    }
+
+    /// The values in the order of [`Law::ALL`], each with its law.
+    pub fn iter(&self) -> impl Iterator<Item = (Law, &T)> {
+        Law::ALL.into_iter().map(|law| (law, &self[law]))
+    }
+}
+
+impl<T> PerLaw<Option<T>> {
+    /// What there is, each with its law.
+    pub fn present(&self) -> impl Iterator<Item = (Law, &T)> {
+        self.iter().filter_map(|(law, value)| Some((law, value.as_ref()?)))
+    }
+
+    /// What there is, to be changed.
+    pub fn present_mut(&mut self) -> impl Iterator<Item = &mut T> {
+        [&mut self.lqr, &mut self.pole_placement].into_iter().flatten()
+    }
+}
+
+impl<T, E> PerLaw<Result<T, E>> {
+    /// All values, or the first error.
+    ///
+    /// # Errors
+    /// The first of the errors in the order of [`Law::ALL`].
+    pub fn transpose(self) -> Result<PerLaw<T>, E> {
+        Ok(PerLaw { lqr: self.lqr?, pole_placement: self.pole_placement? })
+    }
+}
+
+impl<T> Index<Law> for PerLaw<T> {
+    type Output = T;
+
+    fn index(&self, law: Law) -> &T {
+        match law {
+            Law::Lqr => &self.lqr,
+            Law::PolePlacement => &self.pole_placement,
+        }
+    }
+}
+
+impl<T> IndexMut<Law> for PerLaw<T> {
+    fn index_mut(&mut self, law: Law) -> &mut T {
+        match law {
+            Law::Lqr => &mut self.lqr,
+            Law::PolePlacement => &mut self.pole_placement,
+        }
+    }
+}
+
+impl<P: Part> Part for PerLaw<P> {
+    #[inline]
+    fn part(&self, at: &mut usize) -> Option<Words<'_>> {
+        self.lqr.part(at).or_else(|| self.pole_placement.part(at))
+    }
+
+    fn part_mut(&mut self, at: &mut usize) -> Option<WordsMut<'_>> {
+        match self.lqr.part_mut(at) {
+            Some(words) => Some(words),
+            None => self.pole_placement.part_mut(at),
+        }
+    }
+
+    fn read(&self, reader: &mut dyn Reader) {
+        reader.begin("PerLaw");
+        for law in Law::ALL {
+            reader.field(
+                law.key(),
+                &[match law {
+                    Law::Lqr => "Gains of the linear quadratic regulator, if designed.",
+                    Law::PolePlacement => "Gains of the pole placement, if designed.",
+                }],
+            );
+            self[law].read(reader);
+        }
+        reader.end();
+    }
+}
+
+impl<P: Resize<Q>, Q> Resize<PerLaw<Q>> for PerLaw<P> {
+    fn resized(&self) -> PerLaw<Q> {
+        self.as_ref().map(Resize::resized)
+    }
+}
+
+part! {
+    /// Gains of one control law `u = N r - K x - k_pending u_pending - k_integral z`.
+    pub struct LawGains<NX to MX; T> {
+        /// K, one gain per state (N/m, N s/m, N/rad, N s/rad …).
+        pub k: SVector<T, NX>,
+        /// Gain on the pending force (1); 0 without delay.
+        pub k_pending: T,
+        /// Gain on the integrated position error (N/(m s)); 0 without integral action.
+        pub k_integral: T,
+        /// N, the precompensation gain on the set-point (N/m).
+        pub n: T,
+        /// Largest change of the governed set-point in one tick (m).
+        pub setpoint_step: T,
+    }
+}
+
+impl<const NX: usize> LawGains<NX> {
+    /// Whether the governor can move the set-point.
+    pub(crate) fn is_sound(&self) -> bool {
+        self.setpoint_step > 0.0
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn each_law_has_its_own_value_and_its_own_names() {
+        let mut per_law = PerLaw::from_fn(Law::key);
+        for law in Law::ALL {
+            assert_eq!(per_law[law], law.key());
+            assert_eq!(Law::from_option(law.option()), Some(law));
+        }
+        per_law[Law::PolePlacement] = "changed";
+        assert_eq!((per_law.lqr, per_law.pole_placement), ("lqr", "changed"));
+        assert_eq!(Law::from_option("pole placement"), None);
+    }
+}

@@ -1,0 +1,28 @@
+//! The motor as the cart sees it.
+
+use crate::table::part::part;
+use crate::table::scalar::Scalar;
+
+part! {
+    /// A DC motor behind gear and pulley, as seen by the cart.
+    #[derive(Copy)]
+    pub struct MotorMap<; T> {
+        /// Voltage per force at standstill, `R r / (gear Kt)` (V/N).
+        pub volts_per_newton: T,
+        /// Back-EMF per cart speed, `gear Kt / r` (V s/m).
+        pub volts_per_speed: T,
+        /// Voltage below which the motor does not move (V).
+        pub dead_zone_v: T,
+        /// Largest change of the voltage in one tick (V).
+        pub slew_v_per_tick: T,
+        /// Supply voltage the table was designed for (V).
+        pub supply_v: T,
+    }
+}
+
+impl MotorMap {
+    /// Whether a force has a voltage, and a voltage a duty cycle.
+    pub(crate) fn is_sound(&self) -> bool {
+        self.volts_per_newton > 0.0 && self.supply_v > 0.0
+    }
+}

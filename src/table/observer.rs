@@ -1,0 +1,22 @@
+//! Model and gain of the observer.
+
+use nalgebra::{SMatrix, SVector};
+
+use crate::table::part::part;
+use crate::table::scalar::Scalar;
+
+part! {
+    /// Model and gain of the observer for `NX` states and `NY` sensors, a steady-state Kalman filter in filter form.
+    pub struct ObserverGains<NX to MX, NY to MY; T> {
+        /// Ad of `x⁺ = Ad x + Bd u` over one tick: a column for each state now, a row for each state a tick later.
+        pub ad: SMatrix<T, NX, NX>,
+        /// Bd, what one newton held for one tick adds to each state.
+        pub bd: SVector<T, NX>,
+        /// L of `x̂ = x̂⁻ + L e`: a column for each sensor, a row for each state.
+        pub l: SMatrix<T, NX, NY>,
+        /// Index of the state that each sensor measures.
+        pub measured: [u32; NY],
+        /// Travel per count of each sensor (m or rad).
+        pub step: SVector<T, NY>,
+    }
+}

@@ -1,0 +1,298 @@
+//! What a gain table consists of: structs of words, each declared once by [`part!`].
+//!
+//! The declaration makes the struct and everything that has to go through all of its fields: the checksum, the check for
+//! values that are not finite, the writer of the source and the change of size. The fields are taken from the struct by
+//! exhaustive destructuring, so that none can be forgotten.
+
+use nalgebra::SMatrix;
+
+/// Consecutive words of a table.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Words<'a> {
+    /// Floating-point numbers.
+    F32(&'a [f32]),
+    /// Unsigned integers.
+    U32(&'a [u32]),
+    /// Signed integers.
+    I32(&'a [i32]),
+    /// Two words, the low one first.
+    U64(u64),
+}
+
+impl Words<'_> {
+    /// Word number `index` as bits; none beyond the last.
+    #[inline]
+    pub fn get(&self, index: usize) -> Option<u32> {
+        match self {
+            Words::F32(values) => values.get(index).map(|value| value.to_bits()),
+            Words::U32(values) => values.get(index).copied(),
+            Words::I32(values) => values.get(index).map(|&value| value as u32),
+            Words::U64(value) => match index {
+                0 => Some(*value as u32),
+                1 => Some((value >> 32) as u32),
+                _ => None,
+            },
+        }
+    }
+}
+
+/// As [`Words`], to be changed.
+#[derive(Debug, PartialEq)]
+pub enum WordsMut<'a> {
+    /// Floating-point numbers.
+    F32(&'a mut [f32]),
+    /// Unsigned integers.
+    U32(&'a mut [u32]),
+    /// Signed integers.
+    I32(&'a mut [i32]),
+    /// Two words, the low one first.
+    U64(&'a mut u64),
+    /// Whether an optional part is there.
+    Presence,
+}
+
+/// How the words of a field are arranged.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Shape {
+    /// A single value.
+    Value,
+    /// An array.
+    List,
+    /// A matrix, column by column; a vector is one column.
+    Columns {
+        /// Entries of each column.
+        rows: usize,
+    },
+}
+
+/// A table or a part of one.
+pub trait Part {
+    /// The words of leaf number `at`, in the order of declaration. A part that has fewer leaves takes their number off `at`
+    /// and gives none. An optional part is one word (1 or 0) and, if it is there, its contents.
+    fn part(&self, at: &mut usize) -> Option<Words<'_>>;
+
+    /// As [`part`](Self::part), to change the words.
+    fn part_mut(&mut self, at: &mut usize) -> Option<WordsMut<'_>>;
+
+    /// Tells `reader` all names, documentation and values, in the order of declaration.
+    fn read(&self, reader: &mut dyn Reader);
+}
+
+/// Who wants the names of a table's fields along with their values.
+pub trait Reader {
+    /// A struct of this name begins.
+    fn begin(&mut self, name: &'static str);
+
+    /// A field of it, with its documentation line by line; its value follows.
+    fn field(&mut self, name: &'static str, documentation: &[&'static str]);
+
+    /// The value of a field.
+    fn words(&mut self, words: Words<'_>, shape: Shape);
+
+    /// The value of an optional field: if it is there, it follows.
+    fn option(&mut self, is_there: bool);
+
+    /// The struct ends.
+    fn end(&mut self);
+}
+
+/// The same part for other numbers of states and sensors: entries beyond the smaller size are dropped, those beyond the
+/// larger are 0.
+pub trait Resize<To> {
+    /// The part in the other size.
+    fn resized(&self) -> To;
+}
+
+macro_rules! words {
+    ($kind:ident, $type:ty) => {
+        impl Part for $type {
+            #[inline]
+            fn part(&self, at: &mut usize) -> Option<Words<'_>> {
+                leaf(at, Words::$kind(core::slice::from_ref(self)))
+            }
+
+            fn part_mut(&mut self, at: &mut usize) -> Option<WordsMut<'_>> {
+                leaf(at, WordsMut::$kind(core::slice::from_mut(self)))
+            }
+
+            fn read(&self, reader: &mut dyn Reader) {
+                reader.words(Words::$kind(core::slice::from_ref(self)), Shape::Value);
+            }
+        }
+
+        impl Resize<$type> for $type {
+            fn resized(&self) -> Self {
+                *self
+            }
+        }
+
+        impl<const N: usize> Part for [$type; N] {
+            #[inline]
+            fn part(&self, at: &mut usize) -> Option<Words<'_>> {
+                leaf(at, Words::$kind(self))
+            }
+
+            fn part_mut(&mut self, at: &mut usize) -> Option<WordsMut<'_>> {
+                leaf(at, WordsMut::$kind(self))
+            }
+
+            fn read(&self, reader: &mut dyn Reader) {
+                reader.words(Words::$kind(self), Shape::List);
+            }
+        }
+
+        impl<const N: usize, const M: usize> Resize<[$type; M]> for [$type; N] {
+            fn resized(&self) -> [$type; M] {
+                core::array::from_fn(|index| self.get(index).copied().unwrap_or_default())
+            }
+        }
+    };
+}
+
+words!(F32, f32);
+words!(U32, u32);
+words!(I32, i32);
+
+impl Part for u64 {
+    #[inline]
+    fn part(&self, at: &mut usize) -> Option<Words<'_>> {
+        leaf(at, Words::U64(*self))
+    }
+
+    fn part_mut(&mut self, at: &mut usize) -> Option<WordsMut<'_>> {
+        leaf(at, WordsMut::U64(self))
+    }
+
+    fn read(&self, reader: &mut dyn Reader) {
+        reader.words(Words::U64(*self), Shape::Value);
+    }
+}
+
+impl Resize<u64> for u64 {
+    fn resized(&self) -> Self {
+        *self
+    }
+}
+
+impl<const R: usize, const C: usize> Part for SMatrix<f32, R, C> {
+    #[inline]
+    fn part(&self, at: &mut usize) -> Option<Words<'_>> {
+        leaf(at, Words::F32(self.as_slice()))
+    }
+
+    fn part_mut(&mut self, at: &mut usize) -> Option<WordsMut<'_>> {
+        leaf(at, WordsMut::F32(self.as_mut_slice()))
+    }
+
+    fn read(&self, reader: &mut dyn Reader) {
+        reader.words(Words::F32(self.as_slice()), Shape::Columns { rows: R });
+    }
+}
+
+impl<const R: usize, const C: usize, const S: usize, const D: usize> Resize<SMatrix<f32, S, D>>
+    for SMatrix<f32, R, C>
+{
+    fn resized(&self) -> SMatrix<f32, S, D> {
+        SMatrix::from_fn(|row, column| self.get((row, column)).copied().unwrap_or_default())
+    }
+}
+
+impl<P: Part> Part for Option<P> {
+    #[inline]
+    fn part(&self, at: &mut usize) -> Option<Words<'_>> {
+        let presence: &[u32] = if self.is_some() { &[1] } else { &[0] };
+        leaf(at, Words::U32(presence)).or_else(|| self.as_ref()?.part(at))
+    }
+
+    fn part_mut(&mut self, at: &mut usize) -> Option<WordsMut<'_>> {
+        leaf(at, WordsMut::Presence).or_else(|| self.as_mut()?.part_mut(at))
+    }
+
+    fn read(&self, reader: &mut dyn Reader) {
+        reader.option(self.is_some());
+        if let Some(part) = self {
+            part.read(reader);
+        }
+    }
+}
+
+impl<P: Resize<Q>, Q> Resize<Option<Q>> for Option<P> {
+    fn resized(&self) -> Option<Q> {
+        self.as_ref().map(Resize::resized)
+    }
+}
+
+/// `words` if they are those that are looked for.
+#[inline(always)]
+fn leaf<W>(at: &mut usize, words: W) -> Option<W> {
+    match at.checked_sub(1) {
+        None => Some(words),
+        Some(further) => {
+            *at = further;
+            None
+        }
+    }
+}
+
+/// Declares a struct of a gain table, `pub struct Name<SIZE to OTHER, …; SCALAR> { … }`, each field with its
+/// documentation: the numbers of states and sensors with a second name for [`Resize`], and the scalar if a host wants the
+/// struct in another precision as well. A last field `sealed by NAME` is the checksum of the others.
+macro_rules! part {
+    (
+        $(#[$attribute:meta])*
+        pub struct $name:ident<$($size:ident to $other:ident),*; $($scalar:ident)?> {
+            $($(#[doc = $doc:literal])+ pub $field:ident: $type:ty,)+
+            $(sealed by $(#[$seal_attribute:meta])+ pub $seal:ident,)?
+        }
+    ) => {
+        $(#[$attribute])*
+        #[derive(Debug, Clone, PartialEq)]
+        pub struct $name<$(const $size: usize,)* $($scalar: Scalar = f32)?> {
+            $($(#[doc = $doc])+ pub $field: $type,)+
+            $($(#[$seal_attribute])+ pub $seal: u32,)?
+        }
+
+        impl<$(const $size: usize),*> $crate::table::part::Part for $name<$($size),*> {
+            #[inline]
+            fn part(&self, at: &mut usize) -> Option<$crate::table::part::Words<'_>> {
+                let Self { $($field,)+ $($seal: _)? } = self;
+                $(if let Some(words) = $crate::table::part::Part::part($field, at) {
+                    return Some(words);
+                })+
+                None
+            }
+
+            fn part_mut(&mut self, at: &mut usize) -> Option<$crate::table::part::WordsMut<'_>> {
+                let Self { $($field,)+ $($seal: _)? } = self;
+                $(if let Some(words) = $crate::table::part::Part::part_mut($field, at) {
+                    return Some(words);
+                })+
+                None
+            }
+
+            fn read(&self, reader: &mut dyn $crate::table::part::Reader) {
+                let Self { $($field,)+ $($seal: _)? } = self;
+                reader.begin(stringify!($name));
+                $(
+                    reader.field(stringify!($field), &[$($doc),+]);
+                    $crate::table::part::Part::read($field, reader);
+                )+
+                reader.end();
+            }
+        }
+
+        impl<$(const $size: usize, const $other: usize),*> $crate::table::part::Resize<$name<$($other),*>>
+            for $name<$($size),*>
+        {
+            fn resized(&self) -> $name<$($other),*> {
+                let Self { $($field,)+ $($seal)? } = self;
+                $name {
+                    $($field: $crate::table::part::Resize::resized($field),)+
+                    $($seal: *$seal)?
+                }
+            }
+        }
+    };
+}
+
+pub(crate) use part;

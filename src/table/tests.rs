@@ -1,0 +1,251 @@
+//! The checksum guards every bit of a table, whichever field it is in.
+
+use std::format;
+use std::string::String;
+use std::vec::Vec;
+
+use nalgebra::{SMatrix, SVector};
+
+use super::*;
+
+const BUILD: Build = Build { rig_hash: 0x0123_4567_89ab_cdef, tick_s: 0.01 };
+
+/// A table with everything in it, all numbers different.
+fn full() -> GainTable<4, 2> {
+    let mut number = 0.5;
+    let mut next = || {
+        number += 0.25;
+        number
+    };
+    let laws = PerLaw::from_fn(|_| {
+        Some(LawGains {
+            k: SVector::from_fn(|_, _| next()),
+            k_pending: next(),
+            k_integral: next(),
+            n: next(),
+            setpoint_step: next(),
+        })
+    });
+    let mut table = GainTable {
+        format: TABLE_FORMAT,
+        states: 4,
+        sensors: 2,
+        output: 0,
+        rig_hash: BUILD.rig_hash,
+        tick_s: BUILD.tick_s,
+        delay_ticks: 1,
+        force_limit_n: next(),
+        laws,
+        observer: Some(ObserverGains {
+            ad: SMatrix::from_fn(|_, _| next()),
+            bd: SVector::from_fn(|_, _| next()),
+            l: SMatrix::from_fn(|_, _| next()),
+            measured: [0, 2],
+            step: SVector::from_fn(|_, _| next()),
+        }),
+        motor: Some(MotorMap {
+            volts_per_newton: next(),
+            volts_per_speed: next(),
+            dead_zone_v: next(),
+            slew_v_per_tick: next(),
+            supply_v: next(),
+        }),
+        limits: Limits {
+            rail_m: [-1.0, 1.0],
+            angle_rad: 0.35,
+            speed_m_per_s: 2.0,
+            supply_min_v: 9.0,
+            supply_ticks: 2,
+            saturated_ticks: 3,
+            link_ticks: 4,
+            arm_angle_rad: 0.05,
+            arm_ticks: 5,
+            still_ticks: 6,
+            travel_counts: [2000, 20],
+            middle_counts: 7,
+            slow_counts: [8, 9],
+            rest_counts: [0, 2048],
+            turn_counts: [0, 4096],
+            sign_counts: [50, 130],
+        },
+        thresholds: Thresholds {
+            innovation: [0.1, 0.2],
+            frozen: [0.3, 0.4],
+            motor: MotorTest { a: [1.0, 2.0, 3.0, 4.0], b: [5.0, 6.0], ratio: 0.5, energy: 7.0 },
+        },
+        crc: 0,
+    };
+    table.crc = table.checksum();
+    table
+}
+
+/// Numbers of words in the leaves of a part; none for the presence of an optional one.
+fn sizes(part: &mut impl Part) -> Vec<Option<usize>> {
+    let size = |leaf: usize| match part.part_mut(&mut { leaf })? {
+        WordsMut::F32(values) => Some(Some(values.len())),
+        WordsMut::U32(values) => Some(Some(values.len())),
+        WordsMut::I32(values) => Some(Some(values.len())),
+        WordsMut::U64(_) => Some(Some(2)),
+        WordsMut::Presence => Some(None),
+    };
+    (0..).map_while(size).collect()
+}
+
+/// Flips one bit of a word.
+fn flip(part: &mut impl Part, leaf: usize, word: usize, bit: u32) {
+    match part.part_mut(&mut { leaf }) {
+        Some(WordsMut::F32(values)) => values[word] = f32::from_bits(values[word].to_bits() ^ 1 << bit),
+        Some(WordsMut::U32(values)) => values[word] ^= 1 << bit,
+        Some(WordsMut::I32(values)) => values[word] ^= 1 << bit,
+        Some(WordsMut::U64(value)) => *value ^= 1 << (32 * word as u32 + bit),
+        Some(WordsMut::Presence) | None => panic!("leaf {leaf} has no word {word}"),
+    }
+}
+
+/// How many numbers the text of `{:?}` holds: it goes through the fields without [`Part`].
+fn numbers_in(debug: &str) -> usize {
+    let starts_number =
+        |word: &&str| word.trim_start_matches('-').starts_with(|first: char| first.is_ascii_digit());
+    debug.split(|c: char| !(c.is_ascii_alphanumeric() || "-._".contains(c))).filter(starts_number).count()
+}
+
+#[test]
+fn every_flipped_bit_of_a_full_table_is_refused() {
+    let good = full();
+    assert_eq!(good.check(&BUILD), Ok(()));
+    let mut flipped = 0;
+    for (leaf, size) in sizes(&mut good.clone()).into_iter().enumerate() {
+        for (word, bit) in (0..size.unwrap_or(0)).flat_map(|word| (0..32).map(move |bit| (word, bit))) {
+            let mut damaged = good.clone();
+            flip(&mut damaged, leaf, word, bit);
+            let expected = match leaf {
+                0 => TableError::Format,
+                1 | 2 => TableError::Dimensions,
+                _ => TableError::Crc,
+            };
+            assert_eq!(damaged.check(&BUILD), Err(expected), "leaf {leaf}, word {word}, bit {bit}");
+            flipped += 1;
+        }
+    }
+    for bit in 0..32 {
+        let damaged = GainTable { crc: good.crc ^ 1 << bit, ..good.clone() };
+        assert_eq!(damaged.check(&BUILD), Err(TableError::Crc));
+    }
+    // All words but the checksum itself; the hash of 64 bits is two.
+    assert_eq!(flipped, 32 * (numbers_in(&format!("{good:?}")) - 1 + 1));
+}
+
+#[test]
+fn a_part_that_is_missing_or_moved_to_the_other_law_is_refused() {
+    let refused = |change: &dyn Fn(&mut GainTable<4, 2>)| {
+        let mut damaged = full();
+        change(&mut damaged);
+        damaged.check(&BUILD)
+    };
+    let crc = Err(TableError::Crc);
+    assert_eq!(refused(&|t| t.laws.lqr = None), crc);
+    assert_eq!(refused(&|t| t.laws.pole_placement = None), crc);
+    assert_eq!(refused(&|t| t.observer = None), crc);
+    assert_eq!(refused(&|t| t.motor = None), crc);
+    assert_eq!(refused(&|t| core::mem::swap(&mut t.laws.lqr, &mut t.laws.pole_placement)), crc);
+    let mut one = full();
+    one.laws.lqr = None;
+    one.crc = one.checksum();
+    core::mem::swap(&mut one.laws.lqr, &mut one.laws.pole_placement);
+    assert_eq!(one.check(&BUILD), crc);
+}
+
+/// Declared by hand, and so as not to be declared: a field is forgotten.
+#[derive(Debug)]
+struct Forgetful {
+    guarded: [f32; 2],
+    forgotten: f32,
+}
+
+impl Part for Forgetful {
+    fn part(&self, at: &mut usize) -> Option<Words<'_>> {
+        self.guarded.part(at)
+    }
+
+    fn part_mut(&mut self, at: &mut usize) -> Option<WordsMut<'_>> {
+        self.guarded.part_mut(at)
+    }
+
+    fn read(&self, reader: &mut dyn Reader) {
+        self.guarded.read(reader);
+    }
+}
+
+#[test]
+fn a_forgotten_field_is_found_by_counting() {
+    let mut forgetful = Forgetful { guarded: [1.0, 2.0], forgotten: 3.0 };
+    let words: usize = sizes(&mut forgetful).into_iter().flatten().sum();
+    assert_eq!((words, numbers_in(&format!("{forgetful:?}"))), (2, 3));
+    let before = checksum::checksum(&forgetful);
+    forgetful.forgotten = 4.0;
+    assert_eq!(checksum::checksum(&forgetful), before);
+}
+
+#[test]
+fn every_number_that_is_not_finite_is_refused_even_with_the_right_checksum() {
+    let good = full();
+    for (leaf, size) in sizes(&mut good.clone()).into_iter().enumerate() {
+        for word in 0..size.unwrap_or(0) {
+            let mut damaged = good.clone();
+            let Some(WordsMut::F32(values)) = damaged.part_mut(&mut { leaf }) else { continue };
+            values[word] = f32::INFINITY;
+            damaged.crc = damaged.checksum();
+            assert!(damaged.check(&BUILD).is_err(), "leaf {leaf}, word {word}");
+        }
+    }
+}
+
+#[test]
+fn a_table_in_another_size_and_back_is_the_same() {
+    let good = full();
+    let wide: GainTable<7, 5> = good.resized();
+    assert_eq!(wide.limits.turn_counts, [0, 4096, 0, 0, 0]);
+    let back: GainTable<4, 2> = wide.resized();
+    assert_eq!(back, good);
+}
+
+#[test]
+fn a_scan_gives_the_same_checksum_again_and_again() {
+    let good = full();
+    let mut scan = ChecksumScan::default();
+    for _ in 0..3 {
+        assert_eq!((0..1000).find_map(|_| scan.next(&good)), Some(good.crc));
+    }
+}
+
+/// Notes the names of all fields.
+struct Names(Vec<String>);
+
+impl Reader for Names {
+    fn begin(&mut self, _: &'static str) {}
+
+    fn field(&mut self, name: &'static str, documentation: &[&'static str]) {
+        assert!(documentation.iter().all(|line| !line.trim().is_empty()));
+        self.0.push(name.into());
+    }
+
+    fn words(&mut self, _: Words<'_>, _: Shape) {}
+
+    fn option(&mut self, _: bool) {}
+
+    fn end(&mut self) {}
+}
+
+#[test]
+fn a_reader_hears_every_name_in_the_order_of_declaration() {
+    let mut names = Names(Vec::new());
+    full().read(&mut names);
+    let debug = format!("{:?}", full());
+    let mut rest = debug.as_str();
+    for name in &names.0 {
+        let found = rest.find(&format!("{name}: "));
+        assert!(found.is_some(), "{name}");
+        rest = &rest[found.unwrap() + name.len()..];
+    }
+    assert_eq!(names.0.last().map(String::as_str), Some("energy"));
+}

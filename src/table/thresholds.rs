@@ -1,0 +1,54 @@
+//! When the supervisor takes encoders and motor to be at fault; the tests are in
+//! [`detection`](crate::supervision::detection).
+
+use crate::table::part::part;
+
+part! {
+    /// Thresholds of the tests for `NY` sensors; `f32::MAX` where there is nothing to test.
+    pub struct Thresholds<NY to MY;> {
+        /// Largest plausible innovation of each sensor (m or rad).
+        pub innovation: [f32; NY],
+        /// Largest predicted motion of each sensor while its counter stands still (m or rad).
+        pub frozen: [f32; NY],
+        /// Model and thresholds of the motor test.
+        pub motor: MotorTest,
+    }
+}
+
+part! {
+    /// Effect of a missing force on the innovation of the first sensor, and when that is a fault.
+    ///
+    /// The error `(p, v)` of predicted position and speed follows
+    /// `p⁺ = a_pp p' + a_pv v' - b_p u, v⁺ = a_vp p' + a_vv v' - b_v u` with `p' = p - l_p p, v' = v - l_v p`; p is the
+    /// innovation that a missing `u` causes.
+    #[derive(Copy)]
+    pub struct MotorTest<;> {
+        /// a_pp, a_pv, a_vp, a_vv over one tick, the observer's correction included.
+        pub a: [f32; 4],
+        /// b_p (m/N), b_v (m/(s N)).
+        pub b: [f32; 2],
+        /// Share of the force that may be missing.
+        pub ratio: f32,
+        /// Least sum of p² for a verdict (m²).
+        pub energy: f32,
+    }
+}
+
+impl MotorTest {
+    /// A test that never finds anything.
+    pub const NONE: Self = Self { a: [0.0; 4], b: [0.0; 2], ratio: 1.0, energy: f32::MAX };
+}
+
+impl<const NY: usize> Thresholds<NY> {
+    /// Thresholds that nothing exceeds.
+    pub const fn none() -> Self {
+        Self { innovation: [f32::MAX; NY], frozen: [f32::MAX; NY], motor: MotorTest::NONE }
+    }
+
+    /// Whether every threshold is above 0.
+    pub(crate) fn is_sound(&self) -> bool {
+        let thresholds =
+            self.innovation.iter().chain(&self.frozen).chain([&self.motor.ratio, &self.motor.energy]);
+        thresholds.into_iter().all(|threshold| *threshold > 0.0)
+    }
+}
