@@ -9,5 +9,6 @@ mod governor;
 mod in_the_loop;
 mod integral;
 mod lost_loops;
+mod own_board;
 mod plain_equations;
 mod wiring;

@@ -11,6 +11,7 @@ use upright::firmware::control_task::{COMMANDS, ControlTask, MESSAGES};
 use upright::protocol::frame::FrameError;
 use upright::protocol::message::{Command, Reset};
 use upright::protocol::serial_link::SerialLink;
+use upright::table::{Build, GainTable};
 
 use super::error::HarnessError;
 use super::target::{Pins, Target};
@@ -33,6 +34,29 @@ pub fn with_firmware<R>(
     outcome.transpose()?.and(result).ok_or_else(|| SimulationError::Size { states, sensors }.into())
 }
 
+/// As [`with_firmware`], with a table of any size that is known when this is compiled: that of a firmware crate.
+///
+/// # Errors
+/// [`HarnessError`] if the firmware refuses the table.
+pub fn with_table<R, const NX: usize, const NY: usize>(
+    table: &GainTable<NX, NY>,
+    build: &Build,
+    action: impl FnOnce(&mut dyn Target) -> R,
+) -> Result<R, HarnessError> {
+    let firmware = Firmware::new(table, build, Wires::<NY>::WIDTHS, Reset::Power)?;
+    let (mut commands, mut messages) = (Queue::<Command, COMMANDS>::new(), Queue::<_, MESSAGES>::new());
+    let (to_control, commands) = commands.split();
+    let (messages, to_link) = messages.split();
+    let inputs = Inputs { raw_counts: [0; NY], supply_v: 0.0, contacts: Default::default() };
+    let wires = Wires { inputs, output: Output::OFF };
+    Ok(action(&mut InProcess {
+        control: ControlTask::<_, NX, NY>::new(firmware, wires, commands, messages),
+        link: SerialLink::new(to_control, to_link),
+        sent: Vec::new(),
+        is_read: true,
+    }))
+}
+
 struct WithFirmware<'a> {
     table: &'a TableValues,
     run: &'a mut dyn FnMut(&mut dyn Target),
@@ -43,19 +67,7 @@ impl WithSize for WithFirmware<'_> {
 
     fn run<const NX: usize, const NY: usize>(self) -> Self::Output {
         let table = self.table.table::<NX, NY>();
-        let firmware = Firmware::new(&table, &self.table.build(), Wires::<NY>::WIDTHS, Reset::Power)?;
-        let (mut commands, mut messages) = (Queue::<Command, COMMANDS>::new(), Queue::<_, MESSAGES>::new());
-        let (to_control, commands) = commands.split();
-        let (messages, to_link) = messages.split();
-        let inputs = Inputs { raw_counts: [0; NY], supply_v: 0.0, contacts: Default::default() };
-        let wires = Wires { inputs, output: Output::OFF };
-        (self.run)(&mut InProcess {
-            control: ControlTask::<_, NX, NY>::new(firmware, wires, commands, messages),
-            link: SerialLink::new(to_control, to_link),
-            sent: Vec::new(),
-            is_read: true,
-        });
-        Ok(())
+        with_table(&table, &self.table.build(), self.run)
     }
 }
 

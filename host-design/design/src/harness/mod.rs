@@ -18,7 +18,7 @@ mod target;
 
 pub use error::HarnessError;
 pub use hand::{Hand, HandTick, Status};
-pub use in_process::with_firmware;
+pub use in_process::{with_firmware, with_table};
 pub use record::{Recording, Tick, record};
 pub use session::{AnyTelemetry, HEARTBEAT_S, Session};
 pub use start_up::Harness;

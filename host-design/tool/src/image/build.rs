@@ -1,18 +1,17 @@
-//! Building an image, with rustup's target if it is installed, otherwise with Debian's compiler and library source.
+//! Building an image.
 
 use std::path::{Path, PathBuf};
-use std::process::{Command, Stdio};
 use std::sync::{Mutex, PoisonError};
 
+use super::compiler::{Compiler, compiler, target_directory};
 use crate::project::{NoCheckout, checkout};
 use upright_design::rig::Rig;
 use upright_design::table::{TableValues, WriteError, gains_source, write_atomically};
 
-const TARGET: &str = "thumbv7em-none-eabihf";
-const PROFILE: &str = "firmware";
-/// Debian's compiler, which can build Rust's core library from `rust-web-src`.
-const DEBIAN_RUSTC: &str = "/usr/bin/rustc";
-const DEBIAN_CARGO: &str = "/usr/bin/cargo";
+/// The target that images are compiled for: Cortex-M4 with single-precision floating point.
+pub const TARGET: &str = "thumbv7em-none-eabihf";
+/// The cargo profile that images are compiled with.
+pub const PROFILE: &str = "firmware";
 
 /// Which image.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -113,54 +112,24 @@ pub fn build_for(kind: Kind, rig: &Rig, table: &TableValues) -> Result<PathBuf, 
     compile(kind, Some(&gains), &name)
 }
 
-/// A separate one: the caller may run under cargo, which holds a lock on the usual one.
-fn target_directory() -> Result<PathBuf, ImageError> {
-    let base = match std::env::var_os("CARGO_TARGET_DIR") {
-        Some(directory) => std::path::absolute(directory).unwrap_or_default(),
-        None => checkout()?.join("target"),
-    };
-    Ok(base.join("firmware"))
-}
-
 /// The compiler writes all images to the same place; each is copied from there before the next.
 static COMPILING: Mutex<()> = Mutex::new(());
 
 fn compile(kind: Kind, gains: Option<&Path>, name: &str) -> Result<PathBuf, ImageError> {
     let _one_at_a_time = COMPILING.lock().unwrap_or_else(PoisonError::into_inner);
     let root = checkout()?;
-    let target_directory = target_directory()?;
-    let (program, mut command, target_directory) = if rustup_has_the_target() {
-        ("cargo", Command::new("cargo"), target_directory)
-    } else if debian_has_a_compiler() {
-        let mut command = Command::new(DEBIAN_CARGO);
-        command.env("RUSTC_BOOTSTRAP", "1").env("RUSTC", DEBIAN_RUSTC).arg("-Zbuild-std=core");
-        command.env("CARGO_TARGET_THUMBV7EM_NONE_EABIHF_LINKER", "ld.lld");
-        // Two compilers cannot share a directory.
-        (DEBIAN_CARGO, command, target_directory.join("debian"))
-    } else {
-        return Err(ImageError::NoCompiler);
-    };
-    // Variables set by an outer cargo are for the host.
-    for (name, _) in std::env::vars_os() {
-        let name_is_cargos =
-            name.to_str().is_some_and(|name| name.starts_with("CARGO_PKG_") || name == "CARGO");
-        if name_is_cargos || name == "RUSTFLAGS" || name == "CARGO_ENCODED_RUSTFLAGS" {
-            command.env_remove(name);
-        }
-    }
+    let Compiler { program, mut cargo, target_directory } = compiler()?;
     let features = match gains {
         Some(gains) => {
-            command.env("UPRIGHT_GAINS", gains);
+            cargo.env("UPRIGHT_GAINS", gains);
             format!("{},gains-from-env", kind.feature())
         }
         None => kind.feature().to_owned(),
     };
-    let output = command
+    let output = cargo
         .current_dir(&root)
-        .env("CARGO_TARGET_DIR", &target_directory)
         .args(["build", "--quiet", "--package", "upright", "--bin", "upright-image"])
         .args(["--profile", PROFILE, "--target", TARGET, "--features", &features])
-        .stdin(Stdio::null())
         .output()
         .map_err(|source| ImageError::Start(program, source))?;
     if !output.status.success() {
@@ -180,21 +149,4 @@ fn images() -> Result<PathBuf, ImageError> {
         Ok(()) => Ok(directory),
         Err(source) => Err(ImageError::File { path: directory, source }),
     }
-}
-
-fn rustup_has_the_target() -> bool {
-    let output = Command::new("rustc").args(["--print", "target-libdir", "--target", TARGET]).output();
-    output.is_ok_and(|output| {
-        output.status.success() && Path::new(String::from_utf8_lossy(&output.stdout).trim()).is_dir()
-    })
-}
-
-fn debian_has_a_compiler() -> bool {
-    let sysroot = Command::new(DEBIAN_RUSTC).args(["--print", "sysroot"]).output();
-    let linker = Command::new("ld.lld").arg("--version").output();
-    let has_source = sysroot.is_ok_and(|output| {
-        let sysroot = String::from_utf8_lossy(&output.stdout).trim().to_owned();
-        Path::new(&sysroot).join("lib/rustlib/src/rust/library/core").is_dir()
-    });
-    has_source && Path::new(DEBIAN_CARGO).exists() && linker.is_ok()
 }

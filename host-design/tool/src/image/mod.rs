@@ -1,13 +1,15 @@
 //! Images for the microcontroller: built with the compiler that is installed, and examined for size, stack and panics.
 
 mod build;
+mod compiler;
 mod elf;
 mod forbidden;
 mod size;
 mod stack;
 mod thumb;
 
-pub use build::{ImageError, Kind, build, build_for, build_if_possible};
+pub use build::{ImageError, Kind, PROFILE, TARGET, build, build_for, build_if_possible};
+pub use compiler::{Compiler, compiler};
 pub use elf::{ElfError, Image};
 pub use forbidden::forbidden_functions;
 pub use size::{FLASH_LIMIT, Part, RAM_LIMIT, Size, SizeError, size};

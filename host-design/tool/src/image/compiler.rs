@@ -1,0 +1,78 @@
+//! The compiler for the microcontroller: that of rustup if it has the target, otherwise Debian's.
+
+use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
+
+use super::build::{ImageError, TARGET};
+use crate::project::checkout;
+
+/// Debian's compiler, which can build Rust's core library from `rust-web-src`.
+const DEBIAN_CARGO: &str = "/usr/bin/cargo";
+const DEBIAN_RUSTC: &str = "/usr/bin/rustc";
+
+/// A `cargo` that compiles for [`TARGET`].
+#[derive(Debug)]
+pub struct Compiler {
+    /// Name of the program, for messages.
+    pub program: &'static str,
+    /// The call so far: its arguments begin with the command, such as `build`. Nothing of an outer cargo's environment
+    /// is left in it.
+    pub cargo: Command,
+    /// Where it puts what it builds; it is told so.
+    pub target_directory: PathBuf,
+}
+
+/// The compiler that is installed.
+///
+/// # Errors
+/// [`ImageError::NoCompiler`] if there is none.
+pub fn compiler() -> Result<Compiler, ImageError> {
+    let target_directory = target_directory()?;
+    let mut compiler = if rustup_has_the_target() {
+        Compiler { program: "cargo", cargo: Command::new("cargo"), target_directory }
+    } else if debian_has_a_compiler() {
+        let mut cargo = Command::new(DEBIAN_CARGO);
+        cargo.env("RUSTC_BOOTSTRAP", "1").env("RUSTC", DEBIAN_RUSTC).arg("-Zbuild-std=core");
+        cargo.env("CARGO_TARGET_THUMBV7EM_NONE_EABIHF_LINKER", "ld.lld");
+        // Two compilers cannot share a directory.
+        Compiler { program: DEBIAN_CARGO, cargo, target_directory: target_directory.join("debian") }
+    } else {
+        return Err(ImageError::NoCompiler);
+    };
+    // Variables set by an outer cargo are for the host.
+    for (name, _) in std::env::vars_os() {
+        let name_is_cargos =
+            name.to_str().is_some_and(|name| name.starts_with("CARGO_PKG_") || name == "CARGO");
+        if name_is_cargos || name == "RUSTFLAGS" || name == "CARGO_ENCODED_RUSTFLAGS" {
+            compiler.cargo.env_remove(name);
+        }
+    }
+    compiler.cargo.env("CARGO_TARGET_DIR", &compiler.target_directory).stdin(Stdio::null());
+    Ok(compiler)
+}
+
+/// A separate one: the caller may run under cargo, which holds a lock on the usual one.
+pub(super) fn target_directory() -> Result<PathBuf, ImageError> {
+    let base = match std::env::var_os("CARGO_TARGET_DIR") {
+        Some(directory) => std::path::absolute(directory).unwrap_or_default(),
+        None => checkout()?.join("target"),
+    };
+    Ok(base.join("firmware"))
+}
+
+fn rustup_has_the_target() -> bool {
+    let output = Command::new("rustc").args(["--print", "target-libdir", "--target", TARGET]).output();
+    output.is_ok_and(|output| {
+        output.status.success() && Path::new(String::from_utf8_lossy(&output.stdout).trim()).is_dir()
+    })
+}
+
+fn debian_has_a_compiler() -> bool {
+    let sysroot = Command::new(DEBIAN_RUSTC).args(["--print", "sysroot"]).output();
+    let linker = Command::new("ld.lld").arg("--version").output();
+    let has_source = sysroot.is_ok_and(|output| {
+        let sysroot = String::from_utf8_lossy(&output.stdout).trim().to_owned();
+        Path::new(&sysroot).join("lib/rustlib/src/rust/library/core").is_dir()
+    });
+    has_source && Path::new(DEBIAN_CARGO).exists() && linker.is_ok()
+}
