@@ -60,7 +60,11 @@ fn the_document_shows_the_files_of_the_example() {
         "src/main.rs",
     ];
     assert_eq!(names, wanted);
-    assert!(differing(DOCUMENT).is_empty(), "{:?}: copy examples/own-board/ into the page", differing(DOCUMENT));
+    assert!(
+        differing(DOCUMENT).is_empty(),
+        "{:?}: copy examples/own-board/ into the page",
+        differing(DOCUMENT)
+    );
 }
 
 #[test]

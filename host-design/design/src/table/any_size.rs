@@ -8,8 +8,6 @@ pub const MAX_STATES: usize = 30;
 pub const MAX_SENSORS: usize = 15;
 /// The largest number of sensors for a `[model]` rig; a chain has one for the cart and one for each link.
 pub const MAX_MODEL_SENSORS: usize = 2;
-/// The largest number of sensors of any rig: a chain of 14 links.
-pub const MAX_SENSORS: usize = 15;
 
 /// Something that needs the numbers of states (NX) and sensors (NY) as parameters of a type.
 pub trait WithSize {
