@@ -34,13 +34,13 @@ impl<T: Scalar> FeedbackSum<T> {
     #[inline(always)]
     pub(crate) fn feed_back(&mut self, k: &[T], x: &[T]) {
         match (k, x) {
-            (&[k_position, k_rate], &[position, rate]) => {
+            ([k_position, k_rate], [position, rate]) => {
                 // Both products before both sums: no instruction waits for the one before it.
-                let (a, b) = (k_position * position, k_rate * rate);
+                let (a, b) = (*k_position * *position, *k_rate * *rate);
                 self.positions -= a;
                 self.rates -= b;
             }
-            (&[k], &[x]) => self.positions -= k * x,
+            ([k], [x]) => self.positions -= *k * *x,
             _ => (),
         }
     }

@@ -70,7 +70,7 @@ fn nominal(rig: &Rig, law: Law, seed: u64, hours: f64) -> Found {
         ticks: ticks(3600.0 * hours),
         minute: ticks(60.0),
         setpoint_m: 0.1,
-        thresholds: values.thresholds.innovation[..values.sensors as usize].to_vec(),
+        thresholds: values.thresholds.innovation[..values.sensors()].to_vec(),
     };
     balancing(rig, &values, &scenario, |harness| nominal.run(harness)).unwrap()
 }
