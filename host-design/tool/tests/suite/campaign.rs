@@ -9,7 +9,8 @@ use upright_tool::campaign::{Campaign, Kind, Setup, Trial, campaign, kinds, one}
 use upright_tool::in_the_loop::Place;
 
 fn rig(name: &str) -> (Rig, TableValues) {
-    let rig = Rig::from_path(&Path::new("../rigs").join(name)).unwrap();
+    let rig =
+        Rig::from_path(&Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../../rigs")).join(name)).unwrap();
     let table = TableValues::of(&rig, &design(&rig).unwrap(), Gains::Sampled).unwrap();
     (rig, table)
 }
