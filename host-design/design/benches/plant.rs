@@ -1,5 +1,7 @@
-//! What one derivative of the nonlinear plant costs, for chains of 1 to 8 links, and one second of
-//! simulation: `cargo bench -p host-design --bench plant`.
+//! Time of one derivative of the nonlinear plant, for chains of 1 to 8 links, and of one second of simulation:
+//! `cargo bench -p upright-design --bench plant`.
+
+#![allow(missing_docs)] // of a function that criterion's macro makes
 
 use std::hint::black_box;
 use std::time::Duration;
