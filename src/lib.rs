@@ -1,9 +1,42 @@
-//! The control core of Upright: it balances an n-link inverted pendulum on a cart from a microcontroller.
+//! Balances an n-link inverted pendulum on a cart from a microcontroller: controller, supervisor and serial protocol.
 //!
-//! The way of data is `encoder counts → estimate → force → motor duty`, once per tick, in the order of the modules
-//! [`encoder`], [`observer`], [`state_feedback`] and [`actuator`]; [`controller`] puts them together. All constants come
-//! from a gain table ([`gains`]) that the host tool `upright design RIG` writes from one rig file; nothing is tuned by
-//! hand here. The same code runs on the target, in simulations and in tests.
+//! Once per tick, data flows `encoder counts → estimate → force → motor duty`. All constants come from a gain table that the
+//! host tool `upright design RIG` writes from one rig file. The same code runs on the target, in simulations and in tests.
+//!
+//! | module | what is in it |
+//! |---|---|
+//! | [`table`] | the gain table: its fields, its checksum, limits and thresholds |
+//! | [`gains`] | the generated gain table of one rig |
+//! | [`control`] | encoders, observer, state feedback, actuator, and the controller that joins them |
+//! | [`supervision`] | states, faults, what prevents arming, homing, sign check, limits, fault detection |
+//! | [`protocol`] | messages, frames, the serial link |
+//! | [`board`] | the trait that a board implements: inputs of a tick, output to the motor |
+//! | [`firmware`] | one tick of all of it, and the control task that a timer starts |
+//!
+//! The whole firmware, as a control task runs it: the motor stays off until everything that prevents arming is gone.
+//!
+//! ```
+//! use upright::board::{Contacts, Inputs};
+//! use upright::control::encoder::CounterWidth;
+//! use upright::firmware::Firmware;
+//! use upright::gains::{RIG_HASH, SENSORS, TABLE, TICK_S};
+//! use upright::protocol::message::{Answer, Command, Request, Reset};
+//! use upright::supervision::inhibits::Inhibits;
+//! use upright::table::Build;
+//!
+//! let build = Build { rig_hash: RIG_HASH, tick_s: TICK_S };
+//! let mut firmware = Firmware::new(&TABLE, &build, [CounterWidth::Bits32; SENSORS], Reset::Power)?;
+//! let inputs = Inputs { raw_counts: [0; SENSORS], supply_v: 24.0, contacts: Contacts::default() };
+//! let output = firmware.control(&inputs); // at the start of a tick; then drive the motor with it
+//! assert!(!output.enable);
+//! let arm = Command { id: 1, request: Request::Arm };
+//! let (_telemetry, reply) = firmware.finish(Some(&arm), 0); // any time before the next tick
+//! let Some(Answer::NotNow(inhibits)) = reply.map(|reply| reply.answer) else { panic!() };
+//! assert!(inhibits.contains(Inhibits::NOT_HOMED));
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+//!
+//! The controller alone:
 //!
 //! ```
 //! use upright::control::controller::Controller;

@@ -6,6 +6,7 @@ use crate::table::Scalar;
 
 /// State feedback with precompensation, `u = N r - K x` (the paper's control law).
 #[inline]
+#[doc(alias = "full_state_feedback")]
 pub fn state_feedback<T: Scalar, const NX: usize>(n: T, r: T, k: &SVector<T, NX>, x: &SVector<T, NX>) -> T {
     let mut sum = FeedbackSum::new(n, r);
     for (k, x) in k.as_slice().chunks(2).zip(x.as_slice().chunks(2)) {

@@ -1,5 +1,27 @@
-//! What the command line is made of: figures, the report, the firmware image and where it runs, fault campaigns, the
-//! monitor, comparisons and the paper's results.
+//! The command line `upright`, as a library: figures, the report, firmware images and where they run, fault campaigns, the
+//! monitor, comparisons and the paper's results. Models, design and simulation are those of `upright-design`.
+//!
+//! | module | what is in it |
+//! |---|---|
+//! | [`figure`] | figures as SVG, PNG and CSV |
+//! | [`report`] | the HTML page |
+//! | [`image`] | builds firmware images, measures flash, stack and panics |
+//! | [`in_the_loop`] | runs the whole firmware, on the host or as an image in QEMU |
+//! | [`campaign`] | fault injection |
+//! | [`monitor`] | telemetry and commands in a terminal |
+//! | [`compare`] | rigs and sweeps side by side |
+//! | [`reproduce`] | the paper's results beside ours |
+//! | [`project`] | finds the checkout that images are built from |
+//!
+//! ```
+//! use upright_tool::figure::{Axis, Curve, Figure, Panel};
+//!
+//! let points = (0..100).map(|i| 0.1 * f64::from(i)).map(|t| [t, (-t).exp()]).collect();
+//! let panel = Panel::new(Axis::linear("time (s)"), Axis::linear("angle (°)"));
+//! let svg = Figure::new("decay").with(panel.with(Curve::line("θ1", 0, points))).svg()?;
+//! assert!(svg.contains("time (s)"));
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
 
 #![forbid(unsafe_code)]
 

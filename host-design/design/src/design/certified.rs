@@ -41,6 +41,10 @@ fn attempt(rig: &Rig, bits: usize) -> Attempt {
 /// # Errors
 /// [`DesignError`]: the reason, on which two precisions agreed as well; [`DesignError::Disagreement`] if even the
 /// highest ones give different gains.
+#[doc(alias = "lqr")]
+#[doc(alias = "dlqr")]
+#[doc(alias = "acker")]
+#[doc(alias = "kalman")]
 pub fn design(rig: &Rig) -> Result<Certified, DesignError> {
     let (first, second) = std::thread::scope(|scope| {
         let first = scope.spawn(|| attempt(rig, 256));

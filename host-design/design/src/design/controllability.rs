@@ -4,6 +4,10 @@ use crate::numerics::{Complex, Matrix, NoConvergence, Real, eigenvalues};
 
 /// The state space split by what the inputs reach.
 #[derive(Debug, Clone)]
+#[doc(alias = "ctrb")]
+#[doc(alias = "obsv")]
+#[doc(alias = "controllability")]
+#[doc(alias = "staircase")]
 pub struct Reach<R> {
     /// Dimension of the controllable subspace.
     pub dimension: usize,

@@ -13,6 +13,8 @@ const SHARE: f64 = 0.5;
 /// The set-point's path is a sum of small steps, one per tick, so the response is the same sum of step responses:
 /// `|θ(k)| <= step · Σ_j |s(j)|` with the unit step response s of the design's own sampled loop. This is the criterion the paper says is missing for
 /// keeping the states in their linear zone; it holds for every path, and needs one number in the table.
+#[doc(alias = "reference_governor")]
+#[doc(alias = "command_governor")]
 pub fn setpoint_step(rig: &Rig, design: &Design<f64>, law: &Feedback<f64>) -> Option<f64> {
     let PlantDescription::Chain(chain) = &rig.plant else { return None };
     let (matrix, input) = (design.sampled_loop(rig, law), design.setpoint_input(rig, law)?);

@@ -8,6 +8,9 @@ use crate::numerics::{Complex, Matrix, Real, solve_right};
 use crate::rig::{self, Sensor};
 
 /// Steady-state gains of the observer.
+#[doc(alias = "lqe")]
+#[doc(alias = "dlqe")]
+#[doc(alias = "estimator")]
 #[derive(Debug, Clone, PartialEq)]
 pub struct Kalman<T> {
     /// Filter (current) form `x̂ = x̂⁻ + L (y - C x̂⁻)`, s×p: what the table holds.

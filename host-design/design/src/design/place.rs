@@ -43,6 +43,9 @@ impl<R: Real> Pole<R> {
 ///
 /// # Panics
 /// If the orders of `poles` do not add up to the number of states.
+#[doc(alias = "acker")]
+#[doc(alias = "ackermann")]
+#[doc(alias = "pole_placement")]
 pub fn place<R: Real>(a: &Matrix<R>, b: &Matrix<R>, poles: &[Pole<R>]) -> Result<Matrix<R>, Singular> {
     let states = a.rows();
     assert_eq!(poles.iter().map(Pole::order).sum::<usize>(), states, "one pole for each state");

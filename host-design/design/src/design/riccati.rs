@@ -47,6 +47,9 @@ pub struct NoStabilisingSolution;
 /// # Errors
 /// [`NoStabilisingSolution`]: the pair is not stabilisable, the loop lies on the imaginary axis, R is singular, or
 /// this precision does not suffice.
+#[doc(alias = "lqr")]
+#[doc(alias = "are")]
+#[doc(alias = "continuous_are")]
 pub fn care<R: Real>(
     a: &Matrix<R>,
     b: &Matrix<R>,
@@ -123,6 +126,8 @@ fn care_residual<R: Real>(a: &Matrix<R>, g: &Matrix<R>, q: &Matrix<R>, x: &Matri
 ///
 /// # Errors
 /// [`NoStabilisingSolution`] as for [`care`], with the unit circle for the imaginary axis.
+#[doc(alias = "dlqr")]
+#[doc(alias = "discrete_are")]
 pub fn dare<R: Real>(
     a: &Matrix<R>,
     b: &Matrix<R>,

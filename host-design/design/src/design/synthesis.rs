@@ -13,6 +13,9 @@ use upright::table::PerLaw;
 
 /// Plant and gains with entries of type `T`: a working precision, or what it was rounded to.
 #[derive(Debug, Clone, PartialEq)]
+#[doc(alias = "lqr")]
+#[doc(alias = "lqi")]
+#[doc(alias = "lqrd")]
 pub struct Design<T> {
     /// `ẋ = A x + B u`, s×s.
     pub a: Matrix<T>,

@@ -5,6 +5,9 @@ use crate::numerics::{Matrix, Real, exponential};
 
 /// `x⁺ = Ad x + Bd u` for an input held over one period `t` (s):
 /// `e^([A B; 0 0] t) = [Ad Bd; 0 I]` (Van Loan, *IEEE Trans. Automatic Control* 23, 1978).
+#[doc(alias = "c2d")]
+#[doc(alias = "cont2discrete")]
+#[doc(alias = "zoh")]
 pub fn zero_order_hold<R: Real>(a: &Matrix<R>, b: &Matrix<R>, t: &R) -> (Matrix<R>, Matrix<R>) {
     let (states, inputs) = (a.rows(), b.cols());
     let transition = exponential(&held(a, b).scaled(t));
@@ -31,6 +34,8 @@ pub fn integrated_quadratic<R: Real>(a: &Matrix<R>, q: &Matrix<R>, t: &R) -> Mat
 
 /// The cost of one tick in terms of its first state and its held input, so that the sampled sum equals the
 /// continuous integral: this is where the cross term comes from.
+#[doc(alias = "lqrd")]
+#[doc(alias = "van_loan")]
 pub fn sampled_cost<R: Real>(a: &Matrix<R>, b: &Matrix<R>, cost: &Cost<R>, t: &R) -> Cost<R> {
     let (states, inputs) = (a.rows(), b.cols());
     let weights = cost.q.beside(&cost.s).above(&cost.s.transpose().beside(&cost.r));

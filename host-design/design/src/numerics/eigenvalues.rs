@@ -36,6 +36,7 @@ pub struct NoConvergence;
 ///
 /// # Errors
 /// [`NoConvergence`] after `30 + 2 bits` steps without a deflation (repeated eigenvalues converge one bit at a time).
+#[doc(alias = "eig")]
 pub fn eigenvalues<R: Real>(a: &Matrix<R>) -> Result<Vec<Complex<R>>, NoConvergence> {
     if !a.is_finite() {
         return Err(NoConvergence);

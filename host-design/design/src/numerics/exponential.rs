@@ -6,6 +6,7 @@ use super::{Matrix, Real};
 ///
 /// In extended precision there are digits to spare, so the plainest method is also the most trustworthy one
 /// (Moler & Van Loan, *Nineteen dubious ways*, SIAM Review 2003, method 3).
+#[doc(alias = "expm")]
 pub fn exponential<R: Real>(a: &Matrix<R>) -> Matrix<R> {
     // ‖A‖ / 2^s <= 2^-8 makes about bits / 8 terms enough.
     let norm = a.norm().to_f64();

@@ -34,6 +34,7 @@ pub struct LinearModel<R> {
 ///
 /// # Errors
 /// [`Singular`] if the mass matrix has no inverse: some motion of the chain moves no mass.
+#[doc(alias = "linearize")]
 pub fn linearise<R: Real>(
     parameters: &ChainParameters<R>,
     about: Equilibrium,

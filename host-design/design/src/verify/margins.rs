@@ -12,6 +12,10 @@ use crate::numerics::eigenvalues;
 
 /// Margins of a stable loop, broken at the plant's input.
 #[derive(Debug, Clone, PartialEq, Serialize)]
+#[doc(alias = "margin")]
+#[doc(alias = "gain_margin")]
+#[doc(alias = "phase_margin")]
+#[doc(alias = "allmargin")]
 pub struct Margins {
     /// Smallest factor on the force below 1 at which the loop is still stable: 0 if it is for any.
     pub lowest_gain: f64,
