@@ -1,4 +1,4 @@
-//! What rounding to `f32` and holding a continuous gain over the tick do to the loop.
+//! Effect on the loop of rounding the gains to `f32`, and of using a continuous gain at the tick.
 
 use super::{Certified, DesignError, Feedback};
 use crate::numerics::{Matrix, spectral_radius};
@@ -12,14 +12,14 @@ pub struct Assessment {
     pub exact: f64,
     /// With the sampled gains as the table holds them, rounded to `f32`.
     pub rounded: f64,
-    /// Largest relative change of a gain by rounding to `f32`.
+    /// Largest relative change of a gain caused by rounding to `f32`.
     pub largest_rounding: f64,
-    /// With the gains for continuous time, used at the tick (and late by the delay) without redesign.
+    /// With the gains for continuous time, used at the tick (and with the delay) without redesign.
     pub continuous_at_tick: f64,
 }
 
 impl Certified {
-    /// Assesses the laws as they go into the table (LQR with its integral action, if it has one), where designed.
+    /// Assesses each designed law as it goes into the table (LQR with integral action, if there is such a design).
     ///
     /// # Errors
     /// [`DesignError::Poles`] if the eigenvalue iteration fails.

@@ -1,4 +1,4 @@
-//! The guard that makes every gain the correctly rounded exact answer.
+//! Certification that every gain is the correctly rounded exact answer.
 
 use super::error::DesignError;
 use super::loops::DesignPoles;
@@ -6,10 +6,10 @@ use super::synthesis::Design;
 use crate::numerics::{Wide, with_precision};
 use crate::rig::Rig;
 
-/// A design whose every number came out the same at two precisions.
+/// A design whose numbers all round to the same values at two precisions.
 ///
-/// The problem is stated by the `f64` values of the rig file and solved with at least 256 bits; it is then solved again
-/// with twice as many. If any entry rounds to another `f64` or another `f32`, the precision is doubled, and so on.
+/// The `f64` values of the rig file state the problem. It is solved with at least 256 bits, then again with twice as
+/// many. If any entry rounds to a different `f64` or `f32`, the precision is doubled, and so on.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Certified {
     /// Every value rounded once to `f64`.
@@ -39,8 +39,8 @@ fn attempt(rig: &Rig, bits: usize) -> Attempt {
 /// Designs what `rig` asks for and certifies it.
 ///
 /// # Errors
-/// [`DesignError`]: the reason, on which two precisions agreed as well; [`DesignError::Disagreement`] if even the
-/// highest ones give different gains.
+/// [`DesignError`] with a reason on which two precisions agree; [`DesignError::Disagreement`] if even the two highest
+/// precisions give different gains.
 #[doc(alias = "lqr")]
 #[doc(alias = "dlqr")]
 #[doc(alias = "acker")]
@@ -69,7 +69,7 @@ pub fn design(rig: &Rig) -> Result<Certified, DesignError> {
 fn agree(low: &Attempt, high: &Attempt) -> bool {
     match (low, high) {
         (Ok(low), Ok(high)) => low.double == high.double && low.single == high.single,
-        // Not resolved yet is no answer.
+        // A failure to resolve the problem is no agreement: more bits may help.
         (_, Err(DesignError::Unresolved { .. } | DesignError::NoKalman { .. })) => false,
         (Err(low), Err(high)) => core::mem::discriminant(low) == core::mem::discriminant(high),
         _ => false,

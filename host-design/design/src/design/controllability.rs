@@ -2,7 +2,7 @@
 
 use crate::numerics::{Complex, Matrix, NoConvergence, Real, eigenvalues};
 
-/// The state space split by what the inputs reach.
+/// The state space, split into what the inputs reach and the rest.
 #[derive(Debug, Clone)]
 #[doc(alias = "ctrb")]
 #[doc(alias = "obsv")]
@@ -16,8 +16,8 @@ pub struct Reach<R> {
 }
 
 impl<R: Real> Reach<R> {
-    /// The controllable subspace of (A, B), grown by one orthogonalised direction at a time from the columns of B
-    /// (the staircase algorithm of Rosenbrock, in its Krylov form).
+    /// The controllable subspace of (A, B), grown one orthogonalised direction at a time from the columns of B (the
+    /// staircase algorithm of Rosenbrock, in its Krylov form).
     ///
     /// A direction counts as new when orthogonalisation leaves more than `2^(-bits/2)` of it; unlike the rank of
     /// `[B AB A²B …]` this does not decay with the number of states.

@@ -1,4 +1,4 @@
-//! What is wrong with a design problem that has no solution.
+//! Diagnosis of a design problem that has no solution.
 
 use super::controllability::Reach;
 use super::error::{DesignError, Task};
@@ -18,7 +18,7 @@ pub(super) fn why_no_placement<R: Real>(task: Task, a: &Matrix<R>, b: &Matrix<R>
 
 /// Why a regulator does not exist.
 pub(super) fn why_no_lqr<R: Real>(task: Task, a: &Matrix<R>, b: &Matrix<R>, cost: &Cost<R>) -> DesignError {
-    // A quarter of the bits: a repeated mode is only known to that many.
+    // A quarter of the bits: a repeated mode is known only to that many.
     let fuzz = R::one().scale_by_power_of_two(-(R::bits() as i32) / 8);
     // How far outside the stability region a mode lies, relative to the size of the plant.
     let excess = |mode: &Complex<R>| {

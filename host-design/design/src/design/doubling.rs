@@ -2,7 +2,7 @@
 
 use crate::numerics::{Lu, Matrix, Real};
 
-/// Why an attempt failed; the caller tries another shift.
+/// The iteration broke down; the caller tries another shift.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Breakdown;
 
@@ -60,7 +60,7 @@ pub(super) fn powers_vanish<R: Real>(a: &Matrix<R>) -> bool {
     false
 }
 
-/// Symmetric shifts `c I` of the unknown to try, starting with none: a shift makes a singular control weight or a
+/// Symmetric shifts `c I` of the unknown to try, starting with zero: a shift makes a singular control weight or a
 /// weightless unstable mode harmless without changing the solution.
 pub(super) fn solution_shifts<R: Real>(size: usize) -> impl Iterator<Item = Matrix<R>> {
     [0.0, 0.37, 23.0, 0.0047].into_iter().map(move |c| Matrix::identity(size).scaled(&R::from_f64(c)))

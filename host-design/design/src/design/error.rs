@@ -41,25 +41,25 @@ impl fmt::Display for Task {
 /// A design problem without a solution.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum DesignError {
-    /// Some motion moves no mass.
+    /// The mass matrix is singular: some motion moves no mass.
     #[error(
         "the mass matrix has no inverse: some motion of the chain moves no mass; give every link a mass and a centre of mass or an inertia"
     )]
     MassMatrix,
-    /// Poles cannot be placed because some modes do not feel the force.
+    /// Poles cannot be placed because the force does not reach some modes.
     #[error("{task}: the force does not reach {}: these poles cannot be moved; choose another input b, or use [lqr] alone if they are stable", mode_list(.modes))]
     Uncontrollable {
         /// Which design.
         task: Task,
-        /// The modes out of reach, [re, im].
+        /// The modes that the force does not reach, [re, im].
         modes: Vec<[f64; 2]>,
     },
-    /// An unstable mode does not feel the force.
+    /// The force does not reach an unstable mode.
     #[error("{task}: no stabilising gain exists: the force does not reach {}, and it does not decay by itself; choose another input b", mode_list(.modes))]
     NotStabilisable {
         /// Which design.
         task: Task,
-        /// The modes out of reach, [re, im].
+        /// The modes that the force does not reach, [re, im].
         modes: Vec<[f64; 2]>,
     },
     /// A mode on the stability boundary carries no weight.
@@ -73,7 +73,7 @@ pub enum DesignError {
     /// The sensors do not show a mode that does not decay by itself.
     #[error("observer: no stable observer exists: the sensors do not show {}; measure another state", mode_list(.modes))]
     Undetectable {
-        /// The modes out of sight, [re, im].
+        /// The modes that the sensors do not show, [re, im].
         modes: Vec<[f64; 2]>,
     },
     /// The steady-state Kalman filter does not exist.
@@ -81,7 +81,7 @@ pub enum DesignError {
         "observer: no steady-state Kalman filter could be resolved with {bits} bits: a mode on the stability boundary feels no noise; give [kalman] noise that reaches every joint"
     )]
     NoKalman {
-        /// Working precision.
+        /// Working precision (bits).
         bits: usize,
     },
     /// The number of poles is not the number of states.
@@ -101,20 +101,20 @@ pub enum DesignError {
         tick_s: f64,
         /// Fastest unstable pole (1/s).
         pole: f64,
-        /// `e^(pT)`.
+        /// Growth `e^(pT)` within one tick.
         growth: f64,
     },
-    /// No solution was found and no reason is known.
+    /// No solution was found, for an unknown reason.
     #[error(
         "{task}: no stabilising solution could be resolved with {bits} bits: the problem is degenerate (a closed-loop pole on the stability boundary) or extremely badly scaled; check weights and units"
     )]
     Unresolved {
         /// Which design.
         task: Task,
-        /// Working precision.
+        /// Working precision (bits).
         bits: usize,
     },
-    /// Two precisions gave different answers up to the highest one.
+    /// Even the two highest precisions gave different answers.
     #[error(
         "the gains still changed between {0} and {1} bits: the problem is extremely badly conditioned; check units and the tick"
     )]

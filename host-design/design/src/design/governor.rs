@@ -1,4 +1,4 @@
-//! How fast the set-point may move.
+//! The governor's bound on the speed of the set-point.
 
 use super::synthesis::{Design, Feedback};
 use crate::numerics::Matrix;
@@ -7,12 +7,13 @@ use crate::rig::{PlantDescription, Rig, defaults};
 /// Share of the angle and force limits that a motion of the set-point may use; the rest is for disturbances.
 const SHARE: f64 = 0.5;
 
-/// The largest change of the set-point per tick (m) with which, in the linear model, no motion of the set-point takes a
-/// link or the force beyond half of its limit; none for a model that is not a chain, or without such a bound.
+/// Largest change of the set-point per tick (m). In the linear model it keeps every link and the force within half of
+/// their limits, however the set-point moves. None if the plant is not a chain, or if no such bound is found.
 ///
-/// The set-point's path is a sum of small steps, one per tick, so the response is the same sum of step responses:
-/// `|θ(k)| <= step · Σ_j |s(j)|` with the unit step response s of the design's own sampled loop. This is the criterion the paper says is missing for
-/// keeping the states in their linear zone; it holds for every path, and needs one number in the table.
+/// The set-point's path is a sum of small steps, one per tick, and the response is the same sum of step responses:
+/// `|θ(k)| <= step · Σ_j |s(j)|` with the unit step response s of the design's own sampled loop. The paper says that a
+/// criterion for keeping the states in their linear zone is missing; this is one. It holds for every path and needs
+/// one number in the table.
 #[doc(alias = "reference_governor")]
 #[doc(alias = "command_governor")]
 pub fn setpoint_step(rig: &Rig, design: &Design<f64>, law: &Feedback<f64>) -> Option<f64> {

@@ -1,4 +1,4 @@
-//! The steady-state Kalman filter, by the dual of the sampled Riccati equation.
+//! The steady-state Kalman filter, from the sampled Riccati equation of the dual system.
 
 use super::controllability::Reach;
 use super::error::DesignError;
@@ -23,8 +23,9 @@ pub struct Kalman<T> {
     pub innovation_variances: Matrix<T>,
 }
 
-/// Kalman gains, and the relative residual of their Riccati equation, for process noise of the intensities in `noise`, entering through the columns of `inputs` and
-/// integrated over one tick (Van Loan), and a rounding error of variance step²/12 on each sensor.
+/// Kalman gains and the relative residual of their Riccati equation. Process noise has the intensities in `noise`,
+/// enters through the columns of `inputs` and is integrated over one tick (Van Loan). Each sensor has a rounding error
+/// of variance step²/12.
 ///
 /// The error covariance P of the prediction solves the sampled Riccati equation of (Adᵀ, Cᵀ);
 /// `L = P Cᵀ (C P Cᵀ + R)⁻¹` (Anderson & Moore, *Optimal Filtering*, chapter 4).

@@ -28,7 +28,8 @@ impl<R: Real> Design<R> {
         })
     }
 
-    /// The closed loop of the continuous plant with `law`: of x, and z with integral action.
+    /// The closed loop of the continuous plant with `law`, `ζ̇ = M ζ` for set-point 0. ζ holds x, then z with integral
+    /// action.
     fn continuous_loop(&self, rig: &Rig, law: &Feedback<R>) -> Matrix<R> {
         let (a, b) = if law.integral {
             with_integral(&self.a, &self.b, rig.output(), &R::one(), &R::zero())
@@ -38,8 +39,8 @@ impl<R: Real> Design<R> {
         &a - &(&b * &law.k)
     }
 
-    /// The closed loop of the sampled plant with `law`, `ζ⁺ = M ζ` for set-point 0. ζ holds x, then z with integral action,
-    /// then the pending force with one tick of delay; `u = -K ζ`.
+    /// The closed loop of the sampled plant with `law`, `ζ⁺ = M ζ` for set-point 0. ζ holds x, then z if there is
+    /// integral action, then the pending force if there is a delay; `u = -K ζ`.
     pub fn sampled_loop(&self, rig: &Rig, law: &Feedback<R>) -> Matrix<R> {
         let period = R::from_f64(rig.tick.period_s);
         let (a, b) = if law.integral {
@@ -54,7 +55,8 @@ impl<R: Real> Design<R> {
         a.beside(&b).above(&-&law.k)
     }
 
-    /// The input of the set-point r to [`sampled_loop`](Self::sampled_loop), `ζ⁺ = M ζ + E r`; none for a law without N.
+    /// Input vector of the set-point r in [`sampled_loop`](Self::sampled_loop), `ζ⁺ = M ζ + E r`; none for a law
+    /// without N.
     pub fn setpoint_input(&self, rig: &Rig, law: &Feedback<R>) -> Option<Matrix<R>> {
         let n = law.n.as_ref()?;
         let states = self.ad.rows();
@@ -72,19 +74,19 @@ impl<R: Real> Design<R> {
     }
 }
 
-/// Poles of each closed loop, where designed; with the pending force as a further state, if there is a delay.
+/// Poles of each closed loop, where designed. If there is a delay, the pending force is a further state.
 #[derive(Debug, Clone, PartialEq)]
 pub struct DesignPoles {
-    /// Continuous loops (1/s).
+    /// Poles of the continuous loops (1/s).
     pub continuous: PerLaw<Option<Poles>>,
-    /// Sampled loops.
+    /// Poles of the sampled loops (stable inside the unit circle).
     pub sampled: PerLaw<Option<Poles>>,
-    /// [continuous, sampled] loop of the LQR with integral action.
+    /// [continuous, sampled] poles of the LQR with integral action.
     pub integral: [Option<Poles>; 2],
 }
 
 impl DesignPoles {
-    /// [continuous, sampled] poles of `law` as it goes into the table: LQR with integral action, if there is such a design.
+    /// [continuous, sampled] poles of `law` as it goes into the table: LQR with integral action, if it is designed.
     pub fn in_table(&self, law: Law) -> [Option<&Poles>; 2] {
         let [continuous, sampled] = self.integral.each_ref().map(|poles| match law {
             Law::Lqr => poles.as_ref(),

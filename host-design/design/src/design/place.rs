@@ -12,7 +12,7 @@ pub enum Pole<R> {
 }
 
 impl<R: Real> Pole<R> {
-    /// How many states it takes: 1 or 2.
+    /// Number of states it takes: 1 or 2.
     pub fn order(&self) -> usize {
         match self {
             Pole::Real(_) => 1,
@@ -32,11 +32,11 @@ impl<R: Real> Pole<R> {
     }
 }
 
-/// The gain K, 1×s, with which `A - B K` has exactly these poles; repeated poles are allowed.
+/// The gain K, 1×s, with which `A - B K` has exactly these poles, for A s×s and B s×1. Repeated poles are allowed.
 ///
-/// Ackermann's formula `K = [0 … 0 1] [B AB … Aˢ⁻¹B]⁻¹ p(A)` (J. Ackermann, *Regelungstechnik* 20, 1972): garbage
-/// in double precision beyond a few states, exact when there are bits to spare. The polynomial is applied factor by
-/// factor to the row, never expanded.
+/// Ackermann's formula `K = [0 … 0 1] [B AB … Aˢ⁻¹B]⁻¹ p(A)` (J. Ackermann, *Regelungstechnik* 20, 1972): useless in
+/// double precision beyond a few states, exact with bits to spare. The polynomial is applied to the row factor by
+/// factor, never expanded.
 ///
 /// # Errors
 /// [`Singular`]: the pair (A, B) is not controllable, or working precision cannot tell.

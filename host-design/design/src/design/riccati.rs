@@ -3,7 +3,7 @@
 use super::doubling::{Breakdown, doubling, powers_vanish, solution_shifts};
 use crate::numerics::{Matrix, Real, solve, solve_right};
 
-/// The quadratic cost of states x and inputs u: `xᵀ Q x + 2 xᵀ S u + uᵀ R u`.
+/// The quadratic cost of s states x and m inputs u: `xᵀ Q x + 2 xᵀ S u + uᵀ R u`.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Cost<R> {
     /// Symmetric, s×s.
@@ -29,7 +29,7 @@ pub struct Regulator<R> {
     pub x: Matrix<R>,
     /// Feedback gain, m×s.
     pub k: Matrix<R>,
-    /// What is left when X is put into the equation, relative to the size of its terms.
+    /// Residual of the equation at X, relative to the size of its terms.
     pub residual: R,
 }
 
@@ -80,8 +80,8 @@ pub fn care<R: Real>(
     Err(NoStabilisingSolution)
 }
 
-/// Shifts γ > 0 around the size of the Hamiltonian's eigenvalues. Fixed fractions of 1 would meet an eigenvalue of
-/// some plant exactly (a shift of 1 does, on textbook examples): these odd factors do not.
+/// Shifts γ > 0 around the size of the Hamiltonian's eigenvalues. Fixed fractions of 1 would hit an eigenvalue of some
+/// plant exactly (a shift of 1 does, on textbook examples): these odd factors do not.
 fn cayley_shifts<R: Real>(a: &Matrix<R>, g: &Matrix<R>, q: &Matrix<R>) -> Vec<R> {
     let product = (g.norm() * &q.norm()).sqrt();
     let size = a.norm().max(product);
@@ -125,7 +125,7 @@ fn care_residual<R: Real>(a: &Matrix<R>, g: &Matrix<R>, q: &Matrix<R>, x: &Matri
 /// A is s×s, B is s×m. R may be singular (even zero) as long as `R + Bᵀ X B` is not.
 ///
 /// # Errors
-/// [`NoStabilisingSolution`] as for [`care`], with the unit circle for the imaginary axis.
+/// [`NoStabilisingSolution`] as for [`care`], with the unit circle in place of the imaginary axis.
 #[doc(alias = "dlqr")]
 #[doc(alias = "discrete_are")]
 pub fn dare<R: Real>(
@@ -174,8 +174,8 @@ fn relative<R: Real>(left: &Matrix<R>, terms: &[&Matrix<R>]) -> R {
     if size.is_zero() { left.norm() } else { left.norm() / &size }
 }
 
-/// Half the working bits are right: enough to tell a solution from a failed iteration. Whether a gain is good to
-/// the last bit of an f64 is decided by repeating the design at twice the precision.
+/// At least half of the working bits are correct: enough to tell a solution from a failed iteration. Whether a gain is
+/// correct to the last bit of an `f64` is decided by repeating the design at twice the precision.
 fn accurate<R: Real>(residual: &R) -> bool {
     *residual <= R::one().scale_by_power_of_two(-(R::bits() as i32) / 2)
 }

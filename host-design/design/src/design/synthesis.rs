@@ -11,7 +11,7 @@ use crate::plant::{ChainParameters, Equilibrium, LinearModel, linearise};
 use crate::rig::{LinearPlant, Lqr, PlantDescription, PolePlacement, Rig};
 use upright::table::PerLaw;
 
-/// Plant and gains with entries of type `T`: a working precision, or what it was rounded to.
+/// Plant and gains with entries of type `T`: a working precision, or the type they were rounded to.
 #[derive(Debug, Clone, PartialEq)]
 #[doc(alias = "lqr")]
 #[doc(alias = "lqi")]
@@ -27,7 +27,7 @@ pub struct Design<T> {
     pub bd: Matrix<T>,
     /// Gains for continuous time.
     pub continuous: Laws<T>,
-    /// Gains for the tick. With one tick of delay K has one more entry, for the force still on its way.
+    /// Gains for the tick. With one tick of delay K has one more entry, for the pending force.
     pub sampled: Laws<T>,
     /// The observer, if the rig file asks for one.
     pub kalman: Option<Kalman<T>>,
@@ -40,7 +40,7 @@ pub struct Laws<T> {
     pub lqr: Option<Feedback<T>>,
     /// Pole placement.
     pub pole_placement: Option<Feedback<T>>,
-    /// Linear quadratic regulator with integral action on the output: K over [x; z], or [x; z; force on its way].
+    /// Linear quadratic regulator with integral action on the output: K over [x; z], or [x; z; pending force].
     pub integral: Option<Feedback<T>>,
 }
 
@@ -80,7 +80,7 @@ impl<R: Real> Design<R> {
         Self::of_plant(rig, continuous_plant::<R>(rig)?, &mut Vec::new())
     }
 
-    /// As [`of`](Self::of), for another linear plant than that of the rig; notes the relative residual of each Riccati
+    /// As [`of`](Self::of), for a linear plant other than the rig's; records the relative residual of each Riccati
     /// equation under the name of its gain.
     pub(crate) fn of_plant(
         rig: &Rig,
@@ -143,7 +143,7 @@ impl<R: Real> Design<R> {
 }
 
 impl Design<Wide> {
-    /// Every entry passed through `round`, after [`Matrix::rounded`] has set pure rounding errors to zero.
+    /// Applies `round` to every entry, after [`Matrix::rounded`] has set pure rounding errors to zero.
     pub fn rounded<S>(&self, round: fn(&Wide) -> S) -> Design<S> {
         let laws = |laws: &Laws<Wide>| {
             let feedback = |law: &Option<Feedback<Wide>>| {
@@ -238,15 +238,16 @@ fn lqr<R: Real>(
     Ok(regulator.k)
 }
 
-/// Continuous feedback with N = -1 / (C (A - B K)⁻¹ B): the paper's equation for the precompensation gain. K is over x, or
-/// over [x; z]; N is that of the part over x, because with the right N the integral has nothing to do.
+/// Continuous feedback with N = -1 / (C (A - B K)⁻¹ B): the paper's equation for the precompensation gain. K is over
+/// x, or over [x; z]; N belongs to the part over x: with the right N the integral has nothing to do.
 fn feedback<R: Real>(k: Matrix<R>, a: &Matrix<R>, b: &Matrix<R>, output: usize) -> Feedback<R> {
     let k_x = k.block(0, 0, 1, a.cols());
     let n = precompensation(&-&(a - &(b * &k_x)), b, output);
     Feedback { integral: k.cols() > a.cols(), k, n }
 }
 
-/// Sampled feedback K, made for the delay: one tick late, `u⁺ = N r - K (Ad x + Bd u)` acts on the state it will meet.
+/// Sampled feedback K, adapted to the delay: with one tick of delay, `u⁺ = N r - K (Ad x + Bd u)` acts on the
+/// predicted state.
 fn sampled_feedback<R: Real>(
     k: Matrix<R>,
     ad: &Matrix<R>,
@@ -297,7 +298,7 @@ fn with_integral_weight<R: Real>(cost: &Cost<R>, weight: &R) -> Cost<R> {
     Cost { q, r: cost.r.clone(), s: cost.s.above(&Matrix::zeros(1, 1)) }
 }
 
-/// `1 / (C M⁻¹ B)` with `C` picking the state `output`; none if `C M⁻¹ B` is zero, or nothing but rounding error.
+/// `1 / (C M⁻¹ B)` with `C` picking the state `output`; none if `C M⁻¹ B` is zero or only rounding error.
 fn precompensation<R: Real>(m: &Matrix<R>, b: &Matrix<R>, output: usize) -> Option<R> {
     let steady = solve(m, b).ok()?;
     let noise = steady.largest_entry().scale_by_power_of_two(-(R::bits() as i32) / 2);
@@ -310,7 +311,7 @@ fn lqr_cost<R: Real>(weights: &Lqr) -> Cost<R> {
     Cost::new(Matrix::from_diagonal(&q), Matrix::from_diagonal(&[R::from_f64(weights.force_weight)]))
 }
 
-/// The poles the rig file asks for.
+/// The continuous-time poles that the rig file asks for (1/s).
 pub(crate) fn wanted_poles<R: Real>(
     placement: &PolePlacement,
     rig: &Rig,

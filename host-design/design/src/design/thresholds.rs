@@ -1,4 +1,4 @@
-//! When an innovation says that an encoder or the motor is at fault, from the Kalman filter's own covariance.
+//! Thresholds of the innovation that indicate a faulty encoder or motor, from the Kalman filter's covariance.
 
 use super::Design;
 use crate::rig::{PlantDescription, Rig};
@@ -9,13 +9,13 @@ const MISSING_SHARE: f64 = 0.5;
 /// Thresholds of the firmware's tests (`upright::supervision::detection`), in f64.
 #[derive(Debug, Clone, PartialEq)]
 pub struct DetectionDesign {
-    /// Standard deviations between a healthy rig and an alarm.
+    /// Alarm threshold, in standard deviations of a healthy rig.
     pub deviations: f64,
     /// Largest plausible innovation of each sensor (m or rad).
     pub innovation: Vec<f64>,
     /// Largest predicted motion of each sensor while its counter stands still (m or rad).
     pub frozen: Vec<f64>,
-    /// The motor's test; none for a model, whose sensors need not see the speed that a force makes.
+    /// The motor's test; none for a model, whose sensors need not show the speed that a force causes.
     pub motor: Option<MotorDesign>,
 }
 
@@ -24,28 +24,29 @@ pub struct DetectionDesign {
 pub struct MotorDesign {
     /// Dynamics of the error of predicted position and speed, [a_pp, a_pv, a_vp, a_vv].
     pub a: [f64; 4],
-    /// What a force does to position and speed in a tick (m/N, m/s/N).
+    /// Change of position and speed per force in one tick (m/N, m/s/N).
     pub b: [f64; 2],
-    /// Share of the force that may be missing.
+    /// Share of the force that may be missing without a fault.
     pub ratio: f64,
-    /// Least energy for a verdict (m²).
+    /// Least energy `Σ p²` for a verdict (m²).
     pub energy: f64,
 }
 
 /// Thresholds for a rig with an observer; none without.
 ///
-/// With a healthy rig the innovation `e` is white with covariance `S = C P⁻ Cᵀ + R`. `g` standard deviations are exceeded
-/// once in `false_alarm_h` by all tests together; that three in a row are needed for a fault is not made use of, so that
-/// the rate holds for disturbances that last, too.
+/// On a healthy rig the innovation `e` is white with covariance `S = C P⁻ Cᵀ + R`. All tests together exceed `g`
+/// standard deviations once in `false_alarm_h`. A fault needs three in a row, but this is not used here, so the rate
+/// also holds for lasting disturbances.
 ///
-/// - Plausible: `|e_i| <= g √S_ii + step_i / 2`. The half step is the largest error of a counter: its rounding is no
-///   Gaussian noise.
-/// - Frozen: over a memory of M ticks (each keeping `κ = 1 - 1/M`), the predicted motion of a counter that stands still is
-///   its true motion, less than a step, and what the observer corrected, `Σ κ^k (L e)_i`. The corrections are white with
-///   at most the variance `S_ii - R_ii`, so that the sum is within `step_i + g √((S_ii - R_ii) / (1 - κ²))`.
-/// - Motor: the share ρ of the force that is missing is estimated by least squares over the same memory,
-///   `ρ̂ = Σ e p / Σ p²`, with the innovation p that a wholly missing force makes. With a healthy motor its standard
-///   deviation is `√(S_00 / Σ p²)`; a verdict waits until that is a g-th of the share that may be missing.
+/// - Plausible: `|e_i| <= g √S_ii + step_i / 2`. The half step is a counter's largest rounding error, which is not
+///   Gaussian.
+/// - Frozen: over a memory of M ticks (each keeping `κ = 1 - 1/M`), the predicted motion of a counter that stands
+///   still is its true motion, less than a step, plus the observer's corrections, `Σ κ^k (L e)_i`. The corrections are
+///   white with at most the variance `S_ii - R_ii`, so the sum is within `step_i + g √((S_ii - R_ii) / (1 - κ²))`.
+/// - Motor: least squares over the same memory estimates the share ρ of the force that is missing,
+///   `ρ̂ = Σ e p / Σ p²`, where p is the innovation caused by a completely missing force. With a healthy motor its
+///   standard deviation is `√(S_00 / Σ p²)`; there is no verdict until that is at most 1/g of the share that may be
+///   missing.
 pub fn detection_thresholds(rig: &Rig, design: &Design<f64>) -> Option<DetectionDesign> {
     let kalman = design.kalman.as_ref()?;
     let variances = kalman.innovation_variances.entries();
@@ -72,7 +73,7 @@ pub fn detection_thresholds(rig: &Rig, design: &Design<f64>) -> Option<Detection
     Some(DetectionDesign { deviations: g, innovation, frozen: frozen.collect(), motor })
 }
 
-/// The number of standard deviations that a Gaussian exceeds, on either side, with this probability.
+/// Number of standard deviations that a Gaussian exceeds, on either side, with this probability.
 fn deviations(probability: f64) -> f64 {
     let (mut low, mut high) = (0.0, 40.0);
     for _ in 0..100 {

@@ -1,4 +1,4 @@
-//! From continuous time to the tick: the plant, its cost and its noise, all exact.
+//! Exact conversion from continuous time to the tick: plant, cost and noise.
 
 use super::riccati::Cost;
 use crate::numerics::{Matrix, Real, exponential};
@@ -32,8 +32,8 @@ pub fn integrated_quadratic<R: Real>(a: &Matrix<R>, q: &Matrix<R>, t: &R) -> Mat
     (&transition.block(n, n, n, n).transpose() * &transition.block(0, n, n, n)).symmetric_part()
 }
 
-/// The cost of one tick in terms of its first state and its held input, so that the sampled sum equals the
-/// continuous integral: this is where the cross term comes from.
+/// The cost of one tick in terms of the state at its start and the held input. The sampled sum then equals the
+/// continuous integral. This is where the cross term comes from.
 #[doc(alias = "lqrd")]
 #[doc(alias = "van_loan")]
 pub fn sampled_cost<R: Real>(a: &Matrix<R>, b: &Matrix<R>, cost: &Cost<R>, t: &R) -> Cost<R> {

@@ -12,7 +12,7 @@ pub struct Complex<R> {
 }
 
 impl<R: Real> Complex<R> {
-    /// Absolute value, `√(re² + im²)`.
+    /// Absolute value `√(re² + im²)`.
     pub fn modulus(&self) -> R {
         let squared = self.re.clone() * &self.re + &(self.im.clone() * &self.im);
         squared.sqrt()
@@ -24,7 +24,7 @@ impl<R: Real> Complex<R> {
     }
 }
 
-/// The QR iteration did not settle; in extended precision only seen on matrices that are not finite.
+/// The QR iteration did not converge. In extended precision this was seen only with entries that are not finite.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[error("the eigenvalue iteration did not converge")]
 pub struct NoConvergence;
@@ -32,7 +32,7 @@ pub struct NoConvergence;
 /// Eigenvalues of a square matrix, by balancing, reduction to Hessenberg form and Francis' double-shift QR steps
 /// (Golub & Van Loan, *Matrix Computations*, section 7.5; `hqr` of EISPACK), ordered by real part.
 ///
-/// A k-fold eigenvalue comes out with about `bits / k` good bits: ask in a precision that leaves enough.
+/// A k-fold eigenvalue has only about `bits / k` correct bits: choose the precision accordingly.
 ///
 /// # Errors
 /// [`NoConvergence`] after `30 + 2 bits` steps without a deflation (repeated eigenvalues converge one bit at a time).
@@ -69,7 +69,7 @@ pub fn eigenvalues<R: Real>(a: &Matrix<R>) -> Result<Vec<Complex<R>>, NoConverge
     Ok(found)
 }
 
-/// The largest absolute value of an eigenvalue.
+/// Spectral radius: the largest absolute value of an eigenvalue of a square matrix.
 ///
 /// # Errors
 /// As for [`eigenvalues`].
@@ -77,7 +77,8 @@ pub fn spectral_radius<R: Real>(a: &Matrix<R>) -> Result<R, NoConvergence> {
     Ok(eigenvalues(a)?.iter().map(Complex::modulus).fold(R::zero(), R::max))
 }
 
-/// Scales rows and columns by powers of two until they are of similar size; exact, so the eigenvalues stay.
+/// Scales rows and columns by powers of two until they are of similar size. The scaling is exact, so the eigenvalues
+/// do not change.
 fn balanced<R: Real>(mut a: Matrix<R>) -> Matrix<R> {
     let n = a.rows();
     for _ in 0..20 {
@@ -154,7 +155,7 @@ fn swap<R: Clone>(a: &mut Matrix<R>, first: (usize, usize), second: (usize, usiz
     a[second] = kept;
 }
 
-/// Sets negligible subdiagonal entries to zero; returns where the lowest unreduced block, ending at `last`, starts.
+/// Sets negligible subdiagonal entries to zero; returns the start of the unreduced block that ends at `last`.
 fn deflate<R: Real>(h: &mut Matrix<R>, last: usize, size: &R) -> usize {
     for i in (1..=last).rev() {
         let mut neighbours = h[(i - 1, i - 1)].abs() + &h[(i, i)].abs();
@@ -179,7 +180,8 @@ fn eigenvalues_of_block<R: Real>(h: &Matrix<R>, i: usize) -> [Complex<R>; 2] {
     if discriminant < R::zero() {
         [Complex { re: mean.clone(), im: -root.clone() }, Complex { re: mean, im: root }]
     } else {
-        // The root with the larger sum first; the other follows from the determinant without cancellation.
+        // The two terms of this sum have the same sign, so nothing cancels; the other root follows from the
+        // determinant.
         let sum = if half_difference < R::zero() {
             half_difference.clone() - &root
         } else {
@@ -200,7 +202,7 @@ fn francis_step<R: Real>(h: &mut Matrix<R>, start: usize, last: usize, exception
         (a.clone() + d, a.clone() * d - &(b.clone() * c))
     };
     if exceptional {
-        // A cycle: shift by something of the right size that is no eigenvalue of the corner.
+        // The iteration cycles: shift by values of the right size that are not eigenvalues of the corner block.
         let size = h[(last, last - 1)].abs() + &h[(last - 1, last - 2)].abs();
         sum = size.clone() * &R::from_f64(1.5);
         product = size.clone() * &size;

@@ -1,11 +1,11 @@
-//! The exponential of a matrix.
+//! The matrix exponential.
 
 use super::{Matrix, Real};
 
-/// `e^A` by the Taylor series of `A / 2^s`, squared `s` times.
+/// `e^A` of a square matrix by the Taylor series of `A / 2^s`, squared `s` times.
 ///
-/// In extended precision there are digits to spare, so the plainest method is also the most trustworthy one
-/// (Moler & Van Loan, *Nineteen dubious ways*, SIAM Review 2003, method 3).
+/// Extended precision has digits to spare, so the simplest method is also the most trustworthy one (Moler & Van Loan,
+/// *Nineteen dubious ways*, SIAM Review 2003, method 3).
 #[doc(alias = "expm")]
 pub fn exponential<R: Real>(a: &Matrix<R>) -> Matrix<R> {
     // ‖A‖ / 2^s <= 2^-8 makes about bits / 8 terms enough.

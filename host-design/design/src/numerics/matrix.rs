@@ -4,7 +4,7 @@ use core::ops::{Add, Index, IndexMut, Mul, Neg, Sub};
 
 use super::{Real, Wide};
 
-/// A dense matrix, stored by rows.
+/// A dense matrix, stored row by row.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Matrix<R> {
     rows: usize,
@@ -51,7 +51,7 @@ impl<R: Real> Matrix<R> {
         Self { rows, cols, data }
     }
 
-    /// All zeros.
+    /// A `rows`×`cols` matrix of zeros.
     pub fn zeros(rows: usize, cols: usize) -> Self {
         Self::from_fn(rows, cols, |_, _| R::zero())
     }
@@ -67,12 +67,12 @@ impl<R: Real> Matrix<R> {
         Self::from_fn(size, size, |i, j| if i == j { diagonal[i].clone() } else { R::zero() })
     }
 
-    /// A single column.
+    /// A column vector.
     pub fn column(entries: &[R]) -> Self {
         Self { rows: entries.len(), cols: 1, data: entries.to_vec() }
     }
 
-    /// The exact values of rows of `f64`, all of the length of the first.
+    /// Converts rows of `f64` exactly; all rows have the length of the first.
     pub fn from_f64_rows(rows: &[Vec<f64>]) -> Self {
         let cols = rows.first().map_or(0, Vec::len);
         Self::from_fn(rows.len(), cols, |i, j| R::from_f64(rows[i][j]))
@@ -98,7 +98,7 @@ impl<R: Real> Matrix<R> {
         self.map(|entry| entry.clone() * factor)
     }
 
-    /// `(X + Xᵀ) / 2`: removes the rounding errors that make a symmetric result unsymmetric.
+    /// `(X + Xᵀ) / 2`: removes rounding errors that spoil the symmetry of a result.
     pub fn symmetric_part(&self) -> Self {
         Self::from_fn(self.rows, self.cols, |i, j| {
             (self[(i, j)].clone() + &self[(j, i)]).scale_by_power_of_two(-1)
@@ -130,7 +130,7 @@ impl<R: Real> Matrix<R> {
         Self::zeros(self.rows + below.rows, self.cols).with_block(0, 0, self).with_block(self.rows, 0, below)
     }
 
-    /// The largest column sum of absolute values, ‖·‖₁.
+    /// 1-norm ‖·‖₁: the largest column sum of absolute values.
     pub fn norm(&self) -> R {
         (0..self.cols)
             .map(|j| (0..self.rows).fold(R::zero(), |sum, i| sum + &self[(i, j)].abs()))
@@ -144,15 +144,15 @@ impl<R: Real> Matrix<R> {
 }
 
 impl Matrix<Wide> {
-    /// The matrix that calculation meant, with every entry passed through `round`: entries that are nothing but
-    /// rounding error, `2^(-bits/2)` times smaller than the largest, become zero first.
+    /// Applies `round` to every entry. Entries that are only rounding error, below `2^(-bits/2)` times the largest,
+    /// become zero first.
     pub fn rounded<S>(&self, mut round: impl FnMut(&Wide) -> S) -> Matrix<S> {
         let noise = self.largest_entry().scale_by_power_of_two(-(Wide::bits() as i32) / 2);
         let zero = Wide::zero();
         self.map(|entry| round(if entry.abs() < noise { &zero } else { entry }))
     }
 
-    /// Rows of the nearest `f64` values.
+    /// Rows of the nearest `f64` values, with entries that are only rounding error set to zero.
     pub fn round_to_f64_rows(&self) -> Vec<Vec<f64>> {
         self.rounded(Wide::round_to_f64).to_f64_rows()
     }
@@ -180,7 +180,7 @@ impl<R: Real> Mul for &Matrix<R> {
             for k in 0..self.cols {
                 let factor = &self[(i, k)];
                 if factor.is_zero() {
-                    continue; // models are sparse, and a wide product is not cheap
+                    continue; // models are sparse, and products of wide numbers are slow
                 }
                 for j in 0..right.cols {
                     let term = right[(k, j)].clone() * factor;

@@ -1,4 +1,4 @@
-//! The dense numeric kernel: one set of routines over any [`Real`], run in `f64` and in extended precision.
+//! Dense linear algebra over any [`Real`]: the same routines run in `f64` and in extended precision.
 
 mod eigenvalues;
 mod exponential;

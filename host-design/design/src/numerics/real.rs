@@ -1,9 +1,9 @@
-//! The scalar that every numeric kernel is written over.
+//! The scalar type of the numeric routines.
 
 use core::fmt::Debug;
 use core::ops::{Add, Div, Mul, Neg, Sub};
 
-/// A real number of some working precision: `f64`, or [`Wide`](super::Wide) at the thread's working precision.
+/// A real number at some working precision: `f64`, or [`Wide`](super::Wide) at the thread's working precision.
 ///
 /// Operands on the right are taken by reference, so that a formula reads `a.clone() * b + c` for big
 /// floats and costs nothing for `f64`.
@@ -26,7 +26,7 @@ pub trait Real:
     fn to_f64(&self) -> f64;
     /// Square root.
     fn sqrt(&self) -> Self;
-    /// Exponential.
+    /// `e^self`.
     fn exp(&self) -> Self;
     /// Natural logarithm.
     fn ln(&self) -> Self;
@@ -34,9 +34,9 @@ pub trait Real:
     fn sin(&self) -> Self;
     /// Cosine of an angle in radians.
     fn cos(&self) -> Self;
-    /// The circle constant at working precision.
+    /// π at working precision.
     fn pi() -> Self;
-    /// Neither infinite nor not-a-number.
+    /// Whether the number is neither infinite nor NaN.
     fn is_finite(&self) -> bool;
     /// `self · 2^power`, exact unless it overflows or underflows.
     fn scale_by_power_of_two(&self, power: i32) -> Self;
@@ -57,7 +57,7 @@ pub trait Real:
     fn abs(&self) -> Self {
         if *self < Self::zero() { -self.clone() } else { self.clone() }
     }
-    /// Exactly zero.
+    /// Whether the number is exactly zero.
     fn is_zero(&self) -> bool {
         *self == Self::zero()
     }

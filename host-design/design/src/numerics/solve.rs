@@ -8,13 +8,13 @@ pub struct Lu<R> {
     row_order: Vec<usize>,
 }
 
-/// The matrix has no inverse at working precision.
+/// The matrix is singular at working precision.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[error("the matrix is singular at working precision")]
 pub struct Singular;
 
 impl<R: Real> Lu<R> {
-    /// Factors a square matrix.
+    /// Factorises a square matrix.
     ///
     /// # Errors
     /// [`Singular`] if a column has no usable pivot: zero, not finite, or `2^(8 - bits)` times smaller than its
@@ -25,7 +25,7 @@ impl<R: Real> Lu<R> {
         let mut lu = a.clone();
         let mut row_order: Vec<usize> = (0..n).collect();
         let noise = R::epsilon().scale_by_power_of_two(7);
-        // Scaled pivoting: rows of very different size (stiff plants, bad units) stay comparable.
+        // Scaled pivoting keeps rows of very different size (stiff plants, badly chosen units) comparable.
         let mut row_size: Vec<R> =
             (0..n).map(|i| (0..n).map(|j| lu[(i, j)].abs()).fold(R::zero(), R::max)).collect();
         for k in 0..n {
@@ -70,7 +70,7 @@ impl<R: Real> Lu<R> {
         Ok(Self { factors: lu, row_order })
     }
 
-    /// Solves `A X = B`.
+    /// Solves `A X = B` for B with as many rows as A.
     pub fn solve(&self, b: &Matrix<R>) -> Matrix<R> {
         let n = self.factors.rows();
         let mut x = Matrix::from_fn(n, b.cols(), |i, j| b[(self.row_order[i], j)].clone());

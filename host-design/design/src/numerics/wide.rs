@@ -1,4 +1,4 @@
-//! Extended precision: a pure-Rust big float whose number of bits is set for a stretch of a thread's work.
+//! Extended precision: a pure-Rust big float whose number of bits is set per thread, for the length of a call.
 
 use core::cmp::Ordering;
 use core::ops::{Add, Div, Mul, Neg, Sub};
@@ -13,12 +13,12 @@ const ROUNDING: RoundingMode = RoundingMode::ToEven;
 thread_local! {
     /// Digits of π, ln 2 … computed once per thread.
     static CONSTANTS: RefCell<Option<Consts>> = const { RefCell::new(None) };
-    /// What [`with_precision`] set.
+    /// Bits that [`with_precision`] set.
     static PRECISION_BITS: Cell<usize> = const { Cell::new(256) };
 }
 
 /// Runs `calculate` on this thread with significands of `bits` bits (a multiple of 64) instead of 256. Threads that it
-/// starts begin at 256 again.
+/// starts use 256 again.
 pub fn with_precision<T>(bits: usize, calculate: impl FnOnce() -> T) -> T {
     struct Restore(usize);
     impl Drop for Restore {
@@ -33,13 +33,13 @@ pub fn with_precision<T>(bits: usize, calculate: impl FnOnce() -> T) -> T {
 /// A real number: each operation rounds its result to the thread's working precision ([`with_precision`]), to nearest
 /// even.
 ///
-/// The precision is no type parameter, because the whole design would be compiled again for each.
+/// The precision is not a type parameter, because the whole design would then be compiled once per precision.
 #[derive(Clone, Debug)]
 pub struct Wide(BigFloat);
 
 impl Wide {
-    /// Rounds away the last quarter of the significand, where a long calculation leaves its rounding errors,
-    /// so that a result which is exactly a short number comes out as that number.
+    /// Rounds away the last quarter of the significand, where a long calculation leaves its rounding errors. A result
+    /// that is exactly a short number then comes out as that number.
     fn without_noise(&self) -> BigFloat {
         let mut short = self.0.clone();
         // The only error is a precision out of range; a shorter precision is in range.
@@ -47,13 +47,12 @@ impl Wide {
         short
     }
 
-    /// The nearest `f64` of the value that is left when rounding errors are dropped.
+    /// The nearest `f64`, after the calculation's rounding errors are dropped.
     pub fn round_to_f64(&self) -> f64 {
         f64::from_bits(nearest(&self.without_noise(), &DOUBLE))
     }
 
-    /// The nearest `f32` of the value that is left when rounding errors are dropped: rounded once, never
-    /// through `f64`.
+    /// The nearest `f32`, after the calculation's rounding errors are dropped: rounded once, never through `f64`.
     pub fn round_to_f32(&self) -> f32 {
         f32::from_bits(nearest(&self.without_noise(), &SINGLE) as u32)
     }
@@ -188,7 +187,7 @@ fn nearest(x: &BigFloat, format: &Format) -> u64 {
         return sign | infinity;
     }
     let Some((words, _, _, exponent, _)) = x.as_raw_parts() else {
-        return infinity | 1 << (fraction_bits - 1); // not a number
+        return infinity | 1 << (fraction_bits - 1); // NaN
     };
     if x.is_zero() {
         return sign;
@@ -200,7 +199,7 @@ fn nearest(x: &BigFloat, format: &Format) -> u64 {
     let sticky = rest.iter().any(|&word| word != 0);
     let exponent = i64::from(exponent) - 1;
     let min_exponent = 1 - format.max_exponent;
-    // Numbers below the smallest normal one keep fewer bits.
+    // Subnormal numbers keep fewer bits.
     let kept = format.significand_bits - (min_exponent - exponent).max(0);
     if kept < 0 {
         return sign;
@@ -215,7 +214,7 @@ fn nearest(x: &BigFloat, format: &Format) -> u64 {
     let round_up = remainder > half || (remainder == half && (sticky || significand & 1 == 1));
     significand += u64::from(round_up);
     if exponent < min_exponent {
-        // A carry into the hidden bit makes the smallest normal number: the encoding does the right thing.
+        // A carry into the hidden bit gives the smallest normal number, with the right encoding.
         return sign | significand;
     }
     // Adding (not or-ing) lets a carry out of the significand raise the exponent.

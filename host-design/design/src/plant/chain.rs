@@ -6,16 +6,16 @@
 use super::{ChainParameters, PlantError, sin_cos};
 use crate::rig;
 
-/// Where the chain is and how it moves, in absolute angles; also the rate of change of such a state.
+/// State of the chain in absolute angles. A state's rate of change has the same type.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ChainState<const N: usize> {
     /// Position of the cart (m).
     pub x: f64,
-    /// Its velocity (m/s).
+    /// Velocity of the cart (m/s).
     pub xdot: f64,
     /// Absolute angles `φ` of the links (rad).
     pub phi: [f64; N],
-    /// Their rates (rad/s).
+    /// Rates `φ̇` of the absolute angles (rad/s).
     pub phidot: [f64; N],
 }
 
@@ -23,10 +23,10 @@ impl<const N: usize> ChainState<N> {
     /// At rest with every link upright.
     pub const UPRIGHT: Self = Self { x: 0.0, xdot: 0.0, phi: [0.0; N], phidot: [0.0; N] };
 
-    /// From `x, ẋ, θ_1, θ̇_1, …` with relative angles (2N + 2 entries).
+    /// Converts from `x, ẋ, θ_1, θ̇_1, …` with relative angles (2N + 2 entries).
     ///
     /// # Panics
-    /// If the slice has another length.
+    /// If the slice has any other length.
     pub fn from_relative(state: &[f64]) -> Self {
         assert_eq!(state.len(), 2 * N + 2, "a chain of {N} links has 2n + 2 states");
         let mut absolute = Self { x: state[0], xdot: state[1], ..Self::UPRIGHT };
@@ -43,7 +43,7 @@ impl<const N: usize> ChainState<N> {
     /// Writes `x, ẋ, θ_1, θ̇_1, …` with relative angles (2N + 2 entries).
     ///
     /// # Panics
-    /// If the slice has another length.
+    /// If the slice has any other length.
     pub fn write_relative(&self, state: &mut [f64]) {
         assert_eq!(state.len(), 2 * N + 2, "a chain of {N} links has 2n + 2 states");
         state[0] = self.x;
@@ -56,7 +56,7 @@ impl<const N: usize> ChainState<N> {
         }
     }
 
-    /// `self + factor · rate`.
+    /// `self + factor · rate`, entry by entry.
     #[inline]
     pub fn plus(&self, factor: f64, rate: &Self) -> Self {
         let mut sum = *self;
@@ -73,20 +73,20 @@ impl<const N: usize> ChainState<N> {
 /// Mechanical energy (J); the potential energy is zero where every centre of mass is level with the first joint.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Energy {
-    /// Energy of motion.
+    /// Kinetic energy T (J).
     pub kinetic: f64,
-    /// Energy of height.
+    /// Potential energy V (J).
     pub potential: f64,
 }
 
 impl Energy {
-    /// Kinetic and potential energy together.
+    /// Kinetic plus potential energy (J).
     pub fn total(&self) -> f64 {
         self.kinetic + self.potential
     }
 }
 
-/// The equations of motion of N links on a cart: the equations and letters of [`ChainParameters`], arranged for speed.
+/// Equations of motion of N links on a cart: those of [`ChainParameters`] with the same symbols, arranged for speed.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ChainPlant<const N: usize> {
     total_mass: f64,
@@ -100,10 +100,10 @@ pub struct ChainPlant<const N: usize> {
 }
 
 impl<const N: usize> ChainPlant<N> {
-    /// The plant with these constants.
+    /// Creates the plant from the constants of its equations.
     ///
     /// # Errors
-    /// [`PlantError::WrongLinks`] if they are not those of N links.
+    /// [`PlantError::WrongLinks`] if the constants are not those of N links.
     pub fn new(parameters: &ChainParameters<f64>) -> Result<Self, PlantError> {
         let (a, b, mt) = (&parameters.a, &parameters.b, parameters.total_mass);
         if a.len() != N {
@@ -127,7 +127,7 @@ impl<const N: usize> ChainPlant<N> {
     /// The plant of a rig file's chain.
     ///
     /// # Errors
-    /// [`PlantError::WrongLinks`] if the chain has not N links.
+    /// [`PlantError::WrongLinks`] if the chain does not have N links.
     pub fn of(chain: &rig::Chain) -> Result<Self, PlantError> {
         Self::new(&ChainParameters::of(chain))
     }
@@ -135,11 +135,13 @@ impl<const N: usize> ChainPlant<N> {
     /// Rate of change of `state` under a force on the cart (N, along +x) and torques at the joints (N·m).
     ///
     /// The first equation gives `ẍ = (f + Σ_k a_k cos φ_k φ̈_k) / M_t` with `f = u - d_0 ẋ - Σ_k a_k sin φ_k φ̇_k²`.
-    /// With it and `cos(φ_j - φ_k) = cos φ_j cos φ_k + sin φ_j sin φ_k` (and likewise the sine) the others are `S φ̈ = r`,
+    /// Substituted into the others, with `cos(φ_j - φ_k) = cos φ_j cos φ_k + sin φ_j sin φ_k` (and the sine likewise),
+    /// it gives `S φ̈ = r`:
     ///
     /// ```text
     /// S_jk = (b_jk - a_j a_k / M_t) cos φ_j cos φ_k + b_jk sin φ_j sin φ_k
-    /// r_j  = Q_j + g a_j sin φ_j - sin φ_j Σ_k b_jk cos φ_k φ̇_k² + cos φ_j Σ_k b_jk sin φ_k φ̇_k² + a_j cos φ_j f / M_t
+    /// r_j  = Q_j + g a_j sin φ_j - sin φ_j Σ_k b_jk cos φ_k φ̇_k² + cos φ_j Σ_k b_jk sin φ_k φ̇_k²
+    ///        + a_j cos φ_j f / M_t
     /// ```
     #[inline]
     pub fn derivative(&self, state: &ChainState<N>, force: f64, torques: &[f64; N]) -> ChainState<N> {
@@ -172,7 +174,7 @@ impl<const N: usize> ChainPlant<N> {
                 s[j][k] = self.b_reduced[j][k] * (cos[j] * cos[k]) + self.b[j][k] * (sin[j] * sin[k]);
             }
         }
-        // Q_j = τ_j - τ_{j+1}: each joint torque turns its own link and, the other way, the one below.
+        // Q_j = τ_j - τ_{j+1}: each joint torque acts on its own link and, with opposite sign, on the link below.
         let mut rate_below = 0.0;
         for j in 0..N {
             let tau = torques[j] - self.joint_frictions[j] * (state.phidot[j] - rate_below);
@@ -213,8 +215,8 @@ impl<const N: usize> ChainPlant<N> {
     }
 }
 
-/// Solves `S x = r` for a symmetric positive definite S, given by its lower triangle, by `S = L D Lᵀ` without
-/// exchanges (Golub & Van Loan, *Matrix Computations*, §4.1).
+/// Solves `S x = r` for a symmetric positive definite S, given by its lower triangle, by `S = L D Lᵀ` without pivoting
+/// (Golub & Van Loan, *Matrix Computations*, §4.1).
 #[inline]
 fn solve_symmetric<const N: usize>(mut s: [[f64; N]; N], mut r: [f64; N]) -> [f64; N] {
     let mut inverse_d = [0.0; N];
@@ -229,7 +231,7 @@ fn solve_symmetric<const N: usize>(mut s: [[f64; N]; N], mut r: [f64; N]) -> [f6
             r[i] -= l * r[k];
         }
     }
-    // Below the diagonal s now holds L D.
+    // Below its diagonal, s now holds L D.
     for k in (0..N).rev() {
         let mut known = r[k];
         for i in k + 1..N {

@@ -3,7 +3,7 @@
 use super::ChainParameters;
 use crate::numerics::{Matrix, Real, Singular, solve};
 
-/// A point at which the chain can rest without force.
+/// A configuration in which the chain rests without force.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Equilibrium {
     /// Every link upright: all `θ_i = 0`.
@@ -12,7 +12,8 @@ pub enum Equilibrium {
     Hanging,
 }
 
-/// `ẋ = A x + B u + G τ` for s = 2n + 2 states in the order of this module, as deviations from an equilibrium.
+/// Linear model `ẋ = A x + B u + G τ` in deviations from an equilibrium. A chain has s = 2n + 2 states, in the order
+/// that the module `plant` defines.
 #[derive(Debug, Clone, PartialEq)]
 pub struct LinearModel<R> {
     /// `A`, s×s.
@@ -25,7 +26,8 @@ pub struct LinearModel<R> {
 
 /// Linearises the equations of motion of [`ChainParameters`], frictions included, about an equilibrium.
 ///
-/// With `σ = 1` upright and `-1` hanging, and `φ` from here on a deviation, terms of first order are left:
+/// With `σ = 1` upright and `-1` hanging, and `φ` now a deviation from the equilibrium, the equations to first order
+/// are:
 ///
 /// ```text
 /// M [ẍ; φ̈] = [u - d_0 ẋ;  σ g a_j φ_j + τ_j - τ_{j+1} - d_j θ̇_j + d_{j+1} θ̇_{j+1}],
@@ -54,7 +56,7 @@ pub fn linearise<R: Real>(
         for i in 1..=j {
             causes[(j, i - 1)] = gravity_torque.clone();
         }
-        // A torque at joint i turns link i and turns the link below the other way: Q_i = τ_i, Q_{i-1} = -τ_i.
+        // A torque at joint i acts on link i and, with opposite sign, on the link below: Q_i = τ_i, Q_{i-1} = -τ_i.
         let friction = parameters.joint_frictions[j - 1].clone();
         causes[(j, inputs + j)] = R::one();
         causes[(j, rates + j)] = -friction.clone();
@@ -73,7 +75,7 @@ pub fn linearise<R: Real>(
     let s = 2 * n + 2;
     let a = Matrix::from_fn(s, s, |row, column| match (row % 2, column) {
         (0, _) => R::from_f64(if column == row + 1 { 1.0 } else { 0.0 }),
-        (_, 0) => R::zero(), // nothing depends on where the cart is
+        (_, 0) => R::zero(), // nothing depends on the cart's position
         _ if column % 2 == 0 => acceleration(row / 2, column / 2 - 1),
         _ => acceleration(row / 2, rates + column / 2),
     });

@@ -4,7 +4,7 @@ use super::{Energy, Plant};
 use crate::numerics::Matrix;
 use crate::rig;
 
-/// `ẋ = A x + B u + G w` with its present state; G holds the noise columns of the rig file, if it gives any.
+/// `ẋ = A x + B u + G w` with its current state. G holds the noise columns of the rig file, if there are any.
 #[derive(Debug, Clone, PartialEq)]
 pub struct LinearSimulation {
     a: Matrix<f64>,
@@ -12,11 +12,12 @@ pub struct LinearSimulation {
     state: Vec<f64>,
 }
 
-/// Terms of the series after which even the slowest convergence (`‖A‖ h = 1`) is far below rounding: 1/25! = 6e-26.
+/// Number of terms of the series: even at the slowest convergence (`‖A‖ h = 1`) the last term, 1/25! = 6e-26, is far
+/// below rounding.
 const TERMS: u32 = 25;
 
 impl LinearSimulation {
-    /// A simulation of `model`, at its origin.
+    /// Creates a simulation of `model` that starts at the origin.
     ///
     /// # Panics
     /// If rows or columns of the model differ in length from its number of states.
@@ -35,7 +36,7 @@ impl LinearSimulation {
         }
     }
 
-    /// `B u + G w`.
+    /// `B u + G w`, s×1.
     fn drive(&self, force: f64, disturbances: &[f64]) -> Matrix<f64> {
         assert_eq!(disturbances.len(), self.disturbances(), "one disturbance per noise column");
         &self.inputs

@@ -8,15 +8,15 @@
 //! ( x - Σ_{j<i} l_j sin φ_j - c_i sin φ_i,   Σ_{j<i} l_j cos φ_j + c_i cos φ_i )
 //! ```
 //!
-//! Every state vector of this module is `x, ẋ, θ_1, θ̇_1, …, θ_n, θ̇_n` (m, m/s, rad, rad/s). Inside, the equations
-//! are written in `x, φ`, where the mass matrix is simple (see [`ChainParameters`]).
+//! Every state vector of this module is `x, ẋ, θ_1, θ̇_1, …, θ_n, θ̇_n` (m, m/s, rad, rad/s). Internally the equations
+//! are in `x, φ`, where the mass matrix is simple (see [`ChainParameters`]).
 //!
 //! - [`ChainParameters`]: the constants of the equations, in any precision.
 //! - [`absolute_angles`]: the angles `φ` of a state.
 //! - [`linearise`]: the exact linear model about an equilibrium, in any precision.
 //! - [`ChainPlant`]: the nonlinear equations in `f64`, fast, with n in the type.
-//! - [`Plant`]: what a simulation of any size needs; [`chain_plant`] and [`LinearSimulation`] provide it.
-//! - [`reference::integrate`]: an adaptive integrator of high order, to judge the fast one by.
+//! - [`Plant`]: the interface of a simulation of any size; [`chain_plant`] and [`LinearSimulation`] provide it.
+//! - [`reference::integrate`]: an adaptive integrator of high order, the reference for the fast one.
 
 mod angles;
 mod chain;
@@ -49,7 +49,7 @@ pub enum PlantError {
         /// Links in the type.
         compiled: usize,
     },
-    /// No compiled plant has this many links.
+    /// No plant is compiled for this many links.
     #[error("a chain of {links} links cannot be simulated: give 1 to {} links", crate::rig::MAX_LINKS)]
     UnsupportedLinks {
         /// Links of the chain.

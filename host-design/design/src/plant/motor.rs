@@ -1,8 +1,8 @@
-//! The DC motor that pushes the cart, as it really behaves: supply, back-EMF, dead zone.
+//! The DC motor that drives the cart, with supply limit, back-EMF and dead zone.
 
 use crate::rig;
 
-/// Voltage to force through gear and pulley.
+/// Force on the cart from the motor's voltage, through gear and pulley.
 #[derive(Debug, Clone, PartialEq)]
 pub struct MotorPlant {
     newtons_per_volt: f64,
@@ -12,7 +12,7 @@ pub struct MotorPlant {
 }
 
 impl MotorPlant {
-    /// The motor of a rig file.
+    /// Creates the motor that a rig file describes.
     pub fn of(motor: &rig::Motor) -> Self {
         let volts_per_speed = motor.volts_per_speed();
         Self {
@@ -23,8 +23,8 @@ impl MotorPlant {
         }
     }
 
-    /// Force on the cart (N) at `duty` (-1 to 1) and cart speed `speed` (m/s). The dead zone takes its share of the
-    /// voltage whichever way it points, and all of a smaller one.
+    /// Force on the cart (N) at `duty` (clamped to -1 … 1) and cart speed `speed` (m/s). The dead zone reduces the
+    /// magnitude of the voltage; a voltage inside the dead zone counts as zero.
     pub fn force(&self, duty: f64, speed: f64) -> f64 {
         let volts = duty.clamp(-1.0, 1.0) * self.supply_v;
         let effective = volts.signum() * (volts.abs() - self.dead_zone_v).max(0.0);

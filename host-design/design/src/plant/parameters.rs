@@ -37,8 +37,8 @@ pub struct ChainParameters<R> {
 }
 
 impl<R: Real> ChainParameters<R> {
-    /// Works out the constants from the exact values in a rig file. A centre of mass that is not given is `l/2`, an
-    /// inertia that is not given is that of a uniform rod, `m l²/12`, both rounded only in `R`.
+    /// Computes the constants from the exact values in a rig file. The default centre of mass is `l/2`, the default
+    /// inertia that of a uniform rod, `m l²/12`; both are rounded only in `R`.
     pub fn of(chain: &rig::Chain) -> Self {
         let n = chain.links.len();
         let mass: Vec<R> = chain.links.iter().map(|link| R::from_f64(link.mass_kg)).collect();

@@ -1,4 +1,4 @@
-//! An adaptive integrator of order 8, slow and accurate, to judge the fixed-step one by.
+//! Adaptive integrator of order 8: slow and accurate, the reference for the fixed-step one.
 
 use differential_equations::error::Error;
 use differential_equations::methods::ExplicitRungeKutta;
@@ -27,10 +27,10 @@ pub enum ReferenceError {
     Stopped {
         /// Time reached (s).
         time_s: f64,
-        /// What the integrator says.
+        /// The integrator's reason.
         cause: &'static str,
     },
-    /// The state grew beyond all numbers.
+    /// The state is no longer finite: it overflowed or became NaN.
     #[error("the integration left the range of finite numbers")]
     NotFinite,
 }
@@ -39,15 +39,15 @@ const MOST_STEPS: usize = 20_000_000;
 
 /// The state of `plant` after `duration` (s) from `start` under `force(t, state)` (N) and held `disturbances` (joint
 /// torques in N·m), by DOP853 (Hairer, Nørsett & Wanner, *Solving Ordinary Differential Equations I*, §II.10). The
-/// plant's own state plays no part.
+/// plant's own state is not used.
 ///
-/// A force that jumps belongs at the ends of runs, not inside one.
+/// If the force jumps, end the run at the jump and start the next run there.
 ///
 /// # Errors
-/// [`ReferenceError`] if the request makes no sense or the integrator cannot meet it.
+/// [`ReferenceError`] if an argument is invalid or the integrator cannot meet the tolerance.
 ///
 /// # Panics
-/// If a slice has not the length that [`Plant`] asks for.
+/// If a slice does not have the length that [`Plant`] requires.
 pub fn integrate(
     plant: &dyn Plant,
     start: &[f64],
@@ -65,8 +65,8 @@ pub fn integrate(
     let mut method =
         ExplicitRungeKutta::dop853().rtol(tolerance.relative).atol(tolerance.absolute).max_steps(MOST_STEPS);
     method.init(&problem, 0.0, duration, &start.to_vec()).map_err(|error| cause(0.0, &error))?;
-    // Stepped by hand: the run must end with a step of the integrator, not with an interpolated value, and must give
-    // up soon if a force or state that is not a number makes every step be rejected.
+    // Stepped by hand, for two reasons. The run must end on a step of the integrator, not on an interpolated value. It
+    // must stop early if a NaN in force or state makes the integrator reject every step.
     loop {
         let remaining = duration - method.t();
         if remaining <= 2.0 * f64::EPSILON * duration {

@@ -4,7 +4,7 @@ use super::{ChainPlant, ChainState};
 
 impl<const N: usize> ChainPlant<N> {
     /// One step of length `dt` (s) of the classical fourth-order Runge–Kutta method (Hairer, Nørsett & Wanner,
-    /// *Solving Ordinary Differential Equations I*, table II.1.2) with `force` (N) and `torques` (N·m) held.
+    /// *Solving Ordinary Differential Equations I*, table II.1.2) with `force` (N) and `torques` (N·m) held constant.
     #[inline]
     pub fn rk4(&self, state: &ChainState<N>, force: f64, torques: &[f64; N], dt: f64) -> ChainState<N> {
         let k1 = self.derivative(state, force, torques);

@@ -3,11 +3,10 @@
 use super::{ChainParameters, ChainPlant, ChainState, Energy, PlantError};
 use crate::rig;
 
-/// A plant that can be moved forward in time.
+/// A plant that can be simulated.
 ///
-/// States of a chain are in the order of this module: `x, ẋ, θ_1, θ̇_1, …` with relative angles; those of a linear
-/// model in the order of its matrices. A slice of another length than asked for is a mistake in the program: every
-/// method that takes a slice panics on it.
+/// A chain's states are `x, ẋ, θ_1, θ̇_1, …` with relative angles; a linear model's states are in the order of its
+/// matrices. A slice of the wrong length is a bug in the caller: every method that takes a slice panics on it.
 pub trait Plant: Send {
     /// Number of links; 0 for a linear model.
     fn links(&self) -> usize;
@@ -18,30 +17,30 @@ pub trait Plant: Send {
     /// Number of disturbance inputs: the n joint torques of a chain, the noise columns of a linear model.
     fn disturbances(&self) -> usize;
 
-    /// Copies the state out ([`states`](Self::states) entries).
+    /// Copies the state into `state` ([`states`](Self::states) entries).
     fn write_state(&self, state: &mut [f64]);
 
-    /// Puts the plant into a state ([`states`](Self::states) entries).
+    /// Sets the state ([`states`](Self::states) entries).
     fn set_state(&mut self, state: &[f64]);
 
     /// Writes the rate of change of `state` under `force` (N) and `disturbances` (joint torques in N·m) into `rate`.
-    /// Uses and changes nothing of the plant's own state.
+    /// Neither uses nor changes the plant's own state.
     fn rate(&self, state: &[f64], force: f64, disturbances: &[f64], rate: &mut [f64]);
 
-    /// Moves the plant forward by `dt` (s) in `substeps` equal steps (0 counts as 1) with `force` (N) and
-    /// `disturbances` (joint torques in N·m) held.
+    /// Advances the plant by `dt` (s) in `substeps` equal steps (0 counts as 1) with `force` (N) and `disturbances`
+    /// (joint torques in N·m) held constant.
     fn advance(&mut self, force: f64, disturbances: &[f64], dt: f64, substeps: usize);
 
-    /// Mechanical energy; none for a linear model.
+    /// Mechanical energy (J); none for a linear model.
     fn energy(&self) -> Option<Energy>;
 }
 
-/// N links on a cart with their present state.
+/// N links on a cart with their current state.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ChainSimulation<const N: usize> {
     /// The equations of motion.
     pub plant: ChainPlant<N>,
-    /// The present state.
+    /// The current state, in absolute angles.
     pub state: ChainState<N>,
 }
 
@@ -72,7 +71,7 @@ impl<const N: usize> Plant for ChainSimulation<N> {
     }
 
     fn rate(&self, state: &[f64], force: f64, disturbances: &[f64], rate: &mut [f64]) {
-        // The way from absolute to relative angles is linear, so rates go the same way as states.
+        // The conversion from absolute to relative angles is linear, so it converts rates as well as states.
         self.plant
             .derivative(&ChainState::from_relative(state), force, &joint_torques(disturbances))
             .write_relative(rate);
@@ -92,7 +91,7 @@ impl<const N: usize> Plant for ChainSimulation<N> {
     }
 }
 
-/// A simulation of `chain`, at rest with every link upright.
+/// Creates a simulation of `chain`, at rest with every link upright.
 ///
 /// # Errors
 /// [`PlantError::UnsupportedLinks`] unless the chain has 1 to [`MAX_LINKS`](rig::MAX_LINKS) links.

@@ -1,8 +1,8 @@
-//! Sine and cosine of several angles at once, without branches, so that the compiler can use its vector unit.
+//! Sine and cosine of several angles at once, without branches, so that the compiler can vectorise it.
 
-// 2/π, and π/2 as a sum of three parts. The first two have 33 bits, so that a whole number below 2^20 times such a
-// part is exact (W. J. Cody and W. Waite, Software Manual for the Elementary Functions, 1980). The values and the
-// minimax coefficients on [-π/4, π/4] below are those of fdlibm (Sun Microsystems, 1993).
+// 2/π, and π/2 as a sum of three parts. The first two have 33 bits, so an integer below 2^20 times such a part is
+// exact (W. J. Cody and W. Waite, Software Manual for the Elementary Functions, 1980). The values and the minimax
+// coefficients on [-π/4, π/4] below are those of fdlibm (Sun Microsystems, 1993).
 const TWO_OVER_PI: f64 = core::f64::consts::FRAC_2_PI;
 const HALF_PI_1: f64 = 1.5707963267341256;
 const HALF_PI_2: f64 = 6.077100506303966e-11;
@@ -25,23 +25,23 @@ const C: [f64; 6] = [
     -1.1359647557788195e-11,
 ];
 
-/// Adding and subtracting this rounds to a whole number, to nearest and ties to even, hence equally for both signs;
-/// while it is added, the lowest bits of the sum are that number's (in two's complement).
+/// Adding and then subtracting this rounds to the nearest integer, ties to even, so both signs round alike. The lowest
+/// bits of the sum are those of that integer (in two's complement).
 const ROUND: f64 = 1.5 * (1u64 << 52) as f64;
 
-/// Up to here the multiple of π/2 is below 2^20 (rad).
+/// Up to this angle (rad) the multiple of π/2 is below 2^20.
 const LARGEST: f64 = 1e6;
 
 /// Sines and cosines of `angles` (rad), as (sines, cosines), within 1 ulp.
 ///
-/// Mirrored angles give exactly mirrored results. Angles beyond ±1e6 rad take a slower way.
+/// Mirrored angles give exactly mirrored results. Angles beyond ±1e6 rad take a slower path.
 #[inline]
 pub fn sin_cos<const N: usize>(angles: &[f64; N]) -> ([f64; N], [f64; N]) {
     let (mut sines, mut cosines) = ([0.0; N], [0.0; N]);
     for ((x, sine), cosine) in angles.iter().zip(&mut sines).zip(&mut cosines) {
         (*sine, *cosine) = within_range(*x);
     }
-    // Not-a-number must take this way too.
+    // NaN must take this path, too.
     if !angles.iter().all(|x| x.abs() <= LARGEST) {
         for ((x, sine), cosine) in angles.iter().zip(&mut sines).zip(&mut cosines) {
             (*sine, *cosine) = libm::sincos(*x);
@@ -52,7 +52,7 @@ pub fn sin_cos<const N: usize>(angles: &[f64; N]) -> ([f64; N], [f64; N]) {
 
 #[inline(always)]
 fn within_range(x: f64) -> (f64, f64) {
-    // x = k π/2 + y + e with |y| <= π/4 and e what does not fit into y.
+    // x = k π/2 + y + e with |y| <= π/4 and e the part that does not fit into y.
     let shifted = x * TWO_OVER_PI + ROUND;
     let k = shifted - ROUND;
     let quadrant = shifted.to_bits();
@@ -86,7 +86,7 @@ mod tests {
     use crate::numerics::{Real, Wide};
     use proptest::prelude::*;
 
-    /// Units in the last place between two results of like sign.
+    /// Units in the last place between two results of the same sign.
     fn ulps(a: f64, b: f64) -> u64 {
         if a == b { 0 } else { (a.to_bits() as i64).abs_diff(b.to_bits() as i64) }
     }
@@ -130,7 +130,7 @@ mod tests {
             assert!(errors.iter().all(|&error| error <= 1), "at {x}");
             rounded_wrongly += errors.iter().sum::<u64>();
         }
-        // Of 8000, 247; without the correction e in the cosine it is 432.
+        // 247 of 8000; without the correction e in the cosine, 432.
         assert!(rounded_wrongly < 300, "{rounded_wrongly}");
     }
 

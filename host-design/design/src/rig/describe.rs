@@ -1,6 +1,6 @@
-//! The rig as understood, for reading: every value with its unit, defaults filled in.
+//! Readable text of a rig as the program understands it: every value with its unit, defaults filled in.
 //!
-//! The derived numbers here are for the eye and computed in f64; no gain depends on them.
+//! Derived numbers here are for the reader and computed in `f64`; no gain depends on them.
 
 use std::f64::consts::TAU;
 use std::fmt::Display;
@@ -21,8 +21,8 @@ use super::{
 const DEFAULT: &str = "(default)";
 
 impl Rig {
-    /// What the rig file says, in plain text of less than 80 columns: values that equal their default or that were left
-    /// out are marked `(default)`.
+    /// The rig's values as plain text of less than 80 columns. Values that equal their default or were left out are
+    /// marked `(default)`.
     pub fn describe(&self) -> String {
         let mut page = Page::default();
         page.heading(&self.name);
@@ -79,7 +79,7 @@ impl Page {
         }
     }
 
-    /// A key with its numbers; without any, with what holds instead.
+    /// A key with its numbers or, if it has none, with what applies instead.
     fn row(&mut self, section: &Section, key: &Key, numbers: &[f64]) {
         let label = match key.label() {
             label if label.is_empty() => section.name.to_owned(),
@@ -92,7 +92,7 @@ impl Page {
         match numbers {
             [] => {
                 let text = key.absent.to_string();
-                // What follows the semicolon is for other rigs.
+                // The text after the semicolon is for other rigs.
                 self.list(&label, text.split(';').take(1).map(str::to_owned), DEFAULT);
             }
             [number] => self.value(&label, *number, key.unit, remark),

@@ -1,9 +1,9 @@
-//! The table of keys, as the documentation has it.
+//! The table of keys for the documentation.
 
 use super::key::Key;
 use super::sections::{SECTIONS, TOP};
 
-/// All sections and keys as a table in Markdown, with a line for the head: key, meaning, accepted, without the key.
+/// All sections and keys as a Markdown table with the columns key, meaning, accepted and default.
 pub fn key_table() -> String {
     let mut table = "| key | meaning | accepted | default |\n|---|---|---|---|\n".to_owned();
     table.extend(TOP.keys().map(row));

@@ -1,11 +1,11 @@
-//! What can be wrong with a rig file, each error with the place, the key, what was found and what to do about it.
+//! Errors of a rig file. Each gives the place, the key, what was found and what to do about it.
 
 use std::fmt;
 use std::path::{Path, PathBuf};
 
 use thiserror::Error;
 
-/// Largest rig file accepted (bytes): a hundred times what the longest sensible one needs.
+/// Largest rig file accepted (bytes): a hundred times the size of the longest realistic one.
 pub const MAX_BYTES: u64 = 1 << 20;
 
 /// A rig file that cannot be used.
@@ -33,7 +33,7 @@ pub struct Place {
     pub column: usize,
 }
 
-/// The kinds of faults of a rig file.
+/// What is wrong with a rig file.
 #[derive(Debug, Clone, PartialEq, Error)]
 pub enum RigErrorKind {
     /// There is no such file.
@@ -42,10 +42,10 @@ pub enum RigErrorKind {
     /// The path names a directory.
     #[error("this is a directory; name a rig file (*.toml) in it")]
     Directory,
-    /// The system refuses to hand the file out.
+    /// The operating system refuses to read the file.
     #[error("cannot be read ({reason}); check its permissions")]
     Unreadable {
-        /// The system's reason.
+        /// The operating system's reason.
         reason: String,
     },
     /// The file is too large to be a rig file.
@@ -62,7 +62,7 @@ pub enum RigErrorKind {
     /// The text is not TOML.
     #[error("not TOML: {message}; a line is `[table]`, `key = value` or `# comment`")]
     NotToml {
-        /// The parser's complaint.
+        /// The parser's message.
         message: String,
     },
     /// A key or table is given twice.
@@ -76,7 +76,7 @@ pub enum RigErrorKind {
         /// All keys accepted at this place.
         accepts: String,
     },
-    /// A needed key or table is absent.
+    /// A required key or table is missing.
     #[error("missing; add {remedy}")]
     MissingKey {
         /// What to add.
@@ -85,9 +85,9 @@ pub enum RigErrorKind {
     /// The value is of another type.
     #[error("found {found}, accepted: {accepts}; {remedy}")]
     WrongType {
-        /// The value, as it stands in the file.
+        /// The value as written in the file.
         found: String,
-        /// What would be right.
+        /// What is accepted.
         accepts: String,
         /// What to do.
         remedy: String,
@@ -97,7 +97,7 @@ pub enum RigErrorKind {
     WrongLength {
         /// Number of entries in the file.
         found: usize,
-        /// The number that would be right.
+        /// The accepted number.
         accepts: String,
         /// What to do.
         remedy: String,
@@ -105,17 +105,17 @@ pub enum RigErrorKind {
     /// The value is not a finite number.
     #[error("found {found}, accepted: a finite number; {remedy}")]
     NotFinite {
-        /// The value, as it stands in the file.
+        /// The value as written in the file.
         found: String,
         /// What to do.
         remedy: String,
     },
-    /// The value has no physical sense, or is outside what the design handles.
+    /// The value is physically impossible or outside the range that the design handles.
     #[error("found {found}, accepted: {accepts}; {remedy}")]
     OutOfRange {
-        /// The value, as it stands in the file.
+        /// The value as written in the file.
         found: String,
-        /// What would be right.
+        /// What is accepted.
         accepts: String,
         /// What to do.
         remedy: String,
@@ -133,7 +133,7 @@ pub enum RigErrorKind {
     PoleCount {
         /// Number of poles in the file.
         found: usize,
-        /// The number that would be right.
+        /// The accepted number.
         accepts: String,
         /// What to do.
         remedy: String,
@@ -149,7 +149,7 @@ pub enum RigErrorKind {
 }
 
 impl RigError {
-    /// An error of the file as a whole.
+    /// An error about the file as a whole.
     pub(super) fn of_file(file: &Path, kind: RigErrorKind) -> Self {
         RigError { file: file.to_owned(), place: None, key: None, kind: Box::new(kind) }
     }

@@ -1,4 +1,4 @@
-//! What a key of a rig file is: one row each, which reading, `upright check`, the documentation and its test all use.
+//! The keys of a rig file, one row each. Reading, `upright check`, the documentation and its test all use these rows.
 
 use std::fmt;
 
@@ -11,26 +11,26 @@ use super::rule::Rule;
 pub struct Key {
     /// The name in the file, which ends in the unit: `arm_rate_rad_per_s`.
     pub name: &'static str,
-    /// The unit as people write it, `rad/s`; empty if there is none.
+    /// The unit as usually written, `rad/s`; empty if there is none.
     pub unit: &'static str,
     /// What is accepted.
     pub rule: Rule,
     /// What the key means: completes "give the …" and opens a row of the documentation.
     pub meaning: &'static str,
-    /// What holds if the file leaves the key out.
+    /// What applies if the file leaves the key out.
     pub absent: Absent,
 }
 
-/// What holds if the file leaves out a key or a section.
+/// What applies if the file leaves out a key or a section.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Absent {
-    /// It has to be given.
+    /// It is required.
     Required,
-    /// It has to be given under a condition, such as "unless poles are given".
+    /// It is required under a condition, such as "unless poles are given".
     RequiredIf(&'static str),
-    /// These numbers hold: one, or both of a pair.
+    /// The default numbers: one, or both of a pair.
     Numbers(&'static [f64]),
-    /// A value that follows from others, in words.
+    /// A default that follows from other values, in words.
     Follows(&'static str),
 }
 
@@ -39,18 +39,18 @@ pub enum Absent {
 pub struct Section {
     /// The name without brackets; empty for the top of the file.
     pub name: &'static str,
-    /// The section as it stands in the file, with brackets.
+    /// The section as written in the file, with brackets.
     pub title: &'static str,
     /// What the section is about.
     pub meaning: &'static str,
-    /// What holds without the section.
+    /// What applies without the section.
     pub absent: Absent,
-    /// Its keys, in groups: each `keys!` structure is one.
+    /// Its keys in groups, one per `keys!` structure.
     pub keys: &'static [&'static [Key]],
 }
 
 impl Key {
-    /// The words of the name without its unit: `arm rate`. Empty if the name is nothing but a unit.
+    /// The words of the name without its unit: `arm rate`. Empty if the name is only a unit.
     pub(super) fn label(&self) -> String {
         let words = self.name.strip_suffix(&unit_in_names(self.unit)).unwrap_or(self.name);
         words.trim_end_matches('_').replace('_', " ")
@@ -78,17 +78,17 @@ impl Section {
         self.keys.iter().copied().flatten()
     }
 
-    /// The row of a key.
+    /// The row of the key `name`.
     ///
     /// # Panics
     ///
-    /// If the section has no such key: the code that asks for it is wrong.
+    /// If the section has no such key, which is a bug in the calling code.
     pub(super) fn key(&self, name: &str) -> &'static Key {
         let key = self.keys().find(|key| key.name == name);
         key.unwrap_or_else(|| panic!("{} has no row for the key {name}", self.title))
     }
 
-    /// What a key is to be given as, and the alternative: completes "give" and "add".
+    /// What to give for a key, and the alternative: completes "give" and "add".
     pub(super) fn asks_for(&self, key: &Key) -> String {
         let unit = if key.unit.is_empty() { String::new() } else { format!(", in {}", key.unit) };
         let otherwise = match (key.absent, self.absent) {
@@ -205,7 +205,7 @@ pub(super) trait Keys: Sized {
     /// Reads all fields from a table of the file.
     fn read(table: &Table<'_>) -> Result<Self, RigError>;
 
-    /// The values without the section; none if one of them is required.
+    /// The values if the section is left out; none if one of them is required.
     fn when_absent() -> Option<Self>;
 
     /// The numbers of each field, in the order of [`Keys::KEYS`].

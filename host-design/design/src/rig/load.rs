@@ -1,4 +1,4 @@
-//! From a path to a checked [`Rig`].
+//! Loading of a rig file into a checked [`Rig`].
 
 use std::fs::File;
 use std::io::{self, Read};
@@ -10,6 +10,9 @@ use super::{Rig, read};
 
 impl Rig {
     /// Reads and checks the rig file at `file`.
+    ///
+    /// # Errors
+    /// [`RigError`] with the place, the key and what to do about it.
     pub fn from_path(file: &Path) -> Result<Rig, RigError> {
         let bytes = bytes(file).map_err(|kind| RigError::of_file(file, kind))?;
         match std::str::from_utf8(&bytes) {
@@ -23,7 +26,10 @@ impl Rig {
         }
     }
 
-    /// Checks the text of a rig file; `file` is the name its errors carry.
+    /// Checks the text of a rig file; `file` is the name that its errors show.
+    ///
+    /// # Errors
+    /// As for [`from_path`](Self::from_path), without those of the file system.
     pub fn from_toml(text: &str, file: &Path) -> Result<Rig, RigError> {
         if text.len() as u64 > MAX_BYTES {
             return Err(RigError::of_file(file, RigErrorKind::TooLarge));
@@ -32,7 +38,7 @@ impl Rig {
     }
 }
 
-/// The bytes of a file that is small enough.
+/// Reads a file of at most `MAX_BYTES` bytes.
 fn bytes(file: &Path) -> Result<Vec<u8>, RigErrorKind> {
     let about = std::fs::metadata(file).map_err(refusal)?;
     if about.is_dir() {
@@ -41,7 +47,7 @@ fn bytes(file: &Path) -> Result<Vec<u8>, RigErrorKind> {
     if about.len() > MAX_BYTES {
         return Err(RigErrorKind::TooLarge);
     }
-    // Pipes and devices have no size to look at beforehand: stop reading one byte past the limit.
+    // Pipes and devices report no size beforehand: stop reading one byte past the limit.
     let mut bytes = Vec::new();
     File::open(file).and_then(|open| open.take(MAX_BYTES + 1).read_to_end(&mut bytes)).map_err(refusal)?;
     if bytes.len() as u64 > MAX_BYTES { Err(RigErrorKind::TooLarge) } else { Ok(bytes) }

@@ -1,8 +1,8 @@
 //! The rig file: what the user knows about the machine on the bench, in SI units.
 //!
 //! [`Rig`] holds the values as the file gives them; defaults that follow from other values (the centre of mass of a
-//! uniform rod, its inertia, an encoder's step from its counts) stay `None` here and are worked out where they are
-//! used, in that place's precision.
+//! uniform rod, its inertia, an encoder's step from its counts) stay `None` here and are computed where they are used,
+//! in the precision used there.
 
 pub mod defaults;
 mod describe;
@@ -68,8 +68,8 @@ impl Rig {
         self.plant.states()
     }
 
-    /// The largest force on the cart (N): the limit the file gives, and what the motor can push at standstill, if there
-    /// is one; the smaller of the two. None: no limit.
+    /// Largest force on the cart (N): the smaller of the file's limit and the motor's stall force, as far as they
+    /// exist. None: no limit.
     pub fn force_limit_n(&self) -> Option<f64> {
         let stall = self.actuator.motor.as_ref().map(Motor::stall_force_n);
         match (self.actuator.force_limit_n, stall) {
@@ -88,8 +88,8 @@ impl Rig {
 
     /// The first eight bytes of the SHA-256 of the checked values, as a big-endian number.
     ///
-    /// Comments, layout and the order of keys in the file do not change it; any value does. A gain table carries it, so
-    /// that a controller and a host can tell whether they speak of the same rig.
+    /// Comments, layout and the order of keys in the file do not change it; any value does. A gain table carries it,
+    /// so that controller and host can check that they use the same rig.
     pub fn hash(&self) -> u64 {
         // Serialising plain structs of numbers and strings into memory cannot fail.
         let values = serde_json::to_vec(self).expect("a rig is representable as JSON");

@@ -30,7 +30,7 @@ impl<'a> Source<'a> {
         RigError { file: self.file.to_owned(), place: Some(place), key, kind: Box::new(kind) }
     }
 
-    /// The document, or where it stops being TOML.
+    /// Parses the document; an error says where it stops being TOML.
     pub(super) fn document(&self) -> Result<Document<&'a str>, RigError> {
         Document::parse(self.text).map_err(|error| {
             let span = error.span().unwrap_or(0..0);
@@ -62,7 +62,7 @@ pub(super) fn excerpt(text: &str) -> String {
     }
 }
 
-/// What stands behind a key.
+/// What a key holds.
 #[derive(Clone, Copy)]
 enum Found<'a> {
     Table(&'a dyn TableLike),
@@ -86,7 +86,7 @@ impl<'a> Node<'a> {
         self.source.error(self.span.start, Some(self.key.clone()), kind)
     }
 
-    /// The value as the file has it.
+    /// The value as written in the file.
     pub(super) fn as_written(&self) -> String {
         match self.found {
             Found::Table(_) => "a table".to_owned(),
@@ -132,7 +132,7 @@ impl<'a> Node<'a> {
         if !rule.admits(&[value]) {
             return Err(self.out_of_range(rule.accepts, &remedy));
         }
-        // Adding zero turns -0.0 into 0.0, which are one value and must hash as one.
+        // Adding zero turns -0.0 into 0.0: the two are equal and must have the same hash.
         Ok(value + 0.0)
     }
 
@@ -280,7 +280,7 @@ impl<'a> Table<'a> {
         self.source.error(self.start, Some(self.full_key(name)), RigErrorKind::MissingKey { remedy })
     }
 
-    /// What a key is to be given as: completes "give" and "add".
+    /// What to give for a key: completes "give" and "add".
     pub(super) fn asks_for(&self, name: &str) -> String {
         self.section.asks_for(self.section.key(name))
     }
@@ -290,7 +290,7 @@ impl<'a> Table<'a> {
         self.get(name).ok_or_else(|| self.missing(name, remedy))
     }
 
-    /// The value of a key that must be given, whatever it is.
+    /// The value of a required key, of any type.
     pub(super) fn required(&self, name: &str) -> Result<Node<'a>, RigError> {
         self.need(name, &self.asks_for(name))
     }
@@ -300,7 +300,7 @@ impl<'a> Table<'a> {
         self.required(name)?.numbers(length, entries, &self.asks_for(name))
     }
 
-    /// The value of a key as its row says.
+    /// The value of a key, read according to its row.
     pub(super) fn value<V: key::Value>(&self, name: &str) -> Result<V, RigError> {
         let key = self.section.key(name);
         match self.get(name) {
@@ -309,7 +309,7 @@ impl<'a> Table<'a> {
         }
     }
 
-    /// Rejects two keys that exclude each other; the error stands at the second.
+    /// Rejects two keys that exclude each other; the error points to the second.
     pub(super) fn not_both(&self, first: &str, second: &str, remedy: &str) -> Result<(), RigError> {
         match (self.get(first), self.get(second)) {
             (Some(first), Some(second)) => {

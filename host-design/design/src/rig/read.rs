@@ -1,4 +1,4 @@
-//! From the text of a rig file to a checked [`Rig`].
+//! Checks the text of a rig file and makes a [`Rig`] of it.
 
 use super::error::RigError;
 use super::key::{Keys, Section};
@@ -42,7 +42,7 @@ fn scalars<T: Keys>(root: &Table<'_>, section: &'static Section) -> Result<Optio
     root.get(section.name).map(|node| T::read(&node.table(section)?)).transpose()
 }
 
-/// The name goes into the gain table and onto terminals: short, and nothing that moves a cursor.
+/// The name is stored in the gain table and printed on terminals, so it must be short and printable.
 fn name(root: &Table<'_>) -> Result<String, RigError> {
     const LONGEST: usize = 64;
     const MEANING: &str = "`name = \"...\"`, the name of the rig, at the top of the file";
@@ -59,7 +59,8 @@ fn name(root: &Table<'_>) -> Result<String, RigError> {
     Ok(name.to_owned())
 }
 
-/// An observer needs the resolution of its sensors; and no observer finds the cart's position from the angles alone.
+/// An observer needs the resolution of its sensors, and no observer can find the cart's position from the angles
+/// alone.
 fn position_is_measured(root: &Table<'_>, plant: &PlantDescription) -> Result<(), RigError> {
     match plant {
         PlantDescription::Chain(chain) if chain.cart.encoder_step_m.is_none() => Err(root

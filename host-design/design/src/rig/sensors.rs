@@ -3,7 +3,7 @@
 use super::{LinkEncoder, PlantDescription, Rig};
 use crate::numerics::Real;
 
-/// A sensor that measures one state in steps.
+/// A sensor that measures one state in discrete steps.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Sensor {
     /// Index of the state.
@@ -18,8 +18,8 @@ enum Resolution {
 }
 
 impl Sensor {
-    /// Travel per count (m, rad, or the unit of the state), in the precision asked for: 2π over the counts is not a
-    /// number of f64.
+    /// Travel per count (m, rad, or the unit of the state), in the precision asked for: 2π over the counts is not
+    /// exact in `f64`.
     pub fn step<R: Real>(&self) -> R {
         match self.resolution {
             Resolution::Step(step) => R::from_f64(step),
@@ -29,7 +29,7 @@ impl Sensor {
 }
 
 impl Rig {
-    /// The sensors whose resolution the rig file gives, in the order of the states: the cart's and the links' encoders,
+    /// The sensors with a resolution in the rig file, in the order of the states: the cart's and the links' encoders,
     /// or the measured states of a model.
     pub fn sensors(&self) -> Vec<Sensor> {
         match &self.plant {

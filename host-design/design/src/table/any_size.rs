@@ -1,6 +1,7 @@
-//! From numbers of states and sensors that are known at run time to the firmware's types, whose parameters they are.
+//! From numbers of states and sensors known at run time to the firmware's types, which take them as parameters.
 //!
-//! Everything inside a [`WithSize`] is compiled once per size: only what needs the numbers in its type belongs there.
+//! Everything inside a [`WithSize`] is compiled once per size: only code that needs the numbers in a type belongs
+//! there.
 
 /// The largest number of states a gain table can hold.
 pub const MAX_STATES: usize = 30;
@@ -9,12 +10,12 @@ pub const MAX_SENSORS: usize = 15;
 /// The largest number of sensors for a `[model]` rig; a chain has one for the cart and one for each link.
 pub const MAX_MODEL_SENSORS: usize = 2;
 
-/// Something that needs the numbers of states (NX) and sensors (NY) as parameters of a type.
+/// An action that needs the numbers of states (NX) and sensors (NY) as parameters of a type.
 pub trait WithSize {
-    /// Its result.
+    /// Result of the action.
     type Output;
 
-    /// Runs it for one size.
+    /// Runs the action for one size.
     fn run<const NX: usize, const NY: usize>(self) -> Self::Output;
 }
 
@@ -27,7 +28,9 @@ macro_rules! dispatch {
     };
 }
 
-/// Runs `action` with `NX = states` and `NY = sensors`; `None` for sizes that are not compiled on the host. These are: 1 to [`MAX_STATES`] states with 1 to [`MAX_MODEL_SENSORS`] sensors, or 2n + 2 states with n + 1 sensors.
+/// Runs `action` with `NX = states` and `NY = sensors`; `None` for sizes that are not compiled on the host. The
+/// compiled sizes are 1 to [`MAX_STATES`] states with 1 to [`MAX_MODEL_SENSORS`] sensors, or 2n + 2 states with n + 1
+/// sensors.
 pub fn with_size<A: WithSize>(states: usize, sensors: usize, action: A) -> Option<A::Output> {
     dispatch! { states, sensors, action,
         1: 1; 2: 1 2; 3: 1 2; 4: 1 2; 5: 1 2; 6: 1 2 3; 7: 1 2; 8: 1 2 4; 9: 1 2; 10: 1 2 5; 11: 1 2; 12: 1 2 6; 13: 1 2;
@@ -36,8 +39,8 @@ pub fn with_size<A: WithSize>(states: usize, sensors: usize, action: A) -> Optio
     }
 }
 
-/// As [`with_size`], for the sizes in which the whole firmware runs on the host: chains of 1 to 6 links, and models of up
-/// to 6 states with one sensor. More sizes would only take longer to compile.
+/// As [`with_size`], for the sizes with which the whole firmware runs on the host: chains of 1 to 6 links, and models
+/// of up to 6 states with one sensor. More sizes would only take longer to compile.
 pub fn with_firmware_size<A: WithSize>(states: usize, sensors: usize, action: A) -> Option<A::Output> {
     dispatch! { states, sensors, action,
         1: 1; 2: 1; 3: 1; 4: 1 2; 5: 1; 6: 1 3; 8: 4; 10: 5; 12: 6; 14: 7;

@@ -1,4 +1,4 @@
-//! A table's names and values as a tree, for everything that writes a table out.
+//! A table's names and values as a tree, for all code that writes a table.
 
 use serde::ser::{Serialize, SerializeMap, Serializer};
 use upright::table::{Part, Reader, Shape, Words};
@@ -46,9 +46,9 @@ pub(super) fn fields(table: &impl Part) -> Vec<Field> {
 
 #[derive(Default)]
 struct Builder {
-    /// Structs that have begun, the innermost last.
+    /// Open structs, innermost last.
     open: Vec<(&'static str, Vec<Field>)>,
-    /// Fields that wait for their value, and whether it is optional; the innermost last.
+    /// Fields still without a value, each with whether it is optional; innermost last.
     waiting: Vec<(&'static str, Vec<&'static str>, bool)>,
     done: Option<Node>,
 }
@@ -106,7 +106,7 @@ impl Reader for Builder {
     }
 }
 
-/// As JSON has it: a vector is an array, a matrix an array of its rows, what is missing is null.
+/// As JSON: a vector is an array, a matrix is an array of its rows, a missing struct is null.
 impl Serialize for Node {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         match self {
@@ -136,7 +136,7 @@ impl Serialize for Number {
     }
 }
 
-/// The fields as a JSON object; the laws stand beside the others.
+/// The fields as a JSON object; the laws are entries beside the other fields.
 pub(super) fn object<'a, S: Serializer>(
     fields: impl Iterator<Item = &'a Field>,
     serializer: S,

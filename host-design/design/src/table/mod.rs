@@ -29,9 +29,9 @@ pub enum Gains {
     Continuous,
 }
 
-/// The firmware's table in the largest size, with the numbers of states and sensors that are used; all entries beyond
-/// them are 0 or, of limits and thresholds, those of [`Limits::none`](upright::table::Limits::none) and
-/// [`Thresholds::none`](upright::table::Thresholds::none). The checksum is only made with the [`table`](Self::table).
+/// The firmware's table in the largest size, with the numbers of states and sensors in use. Entries beyond these are
+/// 0; in limits and thresholds they are those of [`Limits::none`](upright::table::Limits::none) and
+/// [`Thresholds::none`](upright::table::Thresholds::none). Only [`table`](Self::table) computes the checksum.
 #[derive(Debug, Clone, PartialEq)]
 pub struct TableValues {
     /// Name of the rig.
@@ -57,7 +57,7 @@ impl DerefMut for TableValues {
     }
 }
 
-/// All fields but those that identify the table.
+/// All fields except those that identify the table.
 impl Serialize for TableValues {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         let fields = self.fields();
@@ -66,7 +66,7 @@ impl Serialize for TableValues {
     }
 }
 
-/// A design that does not make a table.
+/// Why a design gives no table.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum NoTable {
     /// The rig file asks for no control law.
@@ -77,10 +77,10 @@ pub enum NoTable {
     Range {
         /// Which value.
         what: &'static str,
-        /// Its `f32`.
+        /// The value as `f32`.
         value: f32,
     },
-    /// Dimensions the firmware's types are not made for.
+    /// The firmware's types are not compiled for these dimensions.
     #[error(
         "no gain table for {states} states and {sensors} sensors: a table holds up to {MAX_STATES} states; the controller of \
          a chain needs encoders on the cart and on every link, that of a model 1 to {MAX_MODEL_SENSORS} sensors"
@@ -167,7 +167,7 @@ impl TableValues {
         Ok(values)
     }
 
-    /// The same table with a governor that lets every step of the set-point through, as the paper simulates.
+    /// The same table with a governor that lets every step of the set-point pass, as in the paper's simulations.
     pub fn without_governor(mut self) -> Self {
         for law in self.laws.present_mut() {
             law.setpoint_step = f32::MAX;
@@ -175,8 +175,8 @@ impl TableValues {
         self
     }
 
-    /// The same table with no thresholds and no limits, so that the supervisor finds nothing: what happens to a rig
-    /// without it.
+    /// The same table with no thresholds and no limits, so that the supervisor detects nothing. It shows what happens
+    /// to a rig without a supervisor.
     pub fn without_detection(mut self) -> Self {
         self.thresholds = supervision::thresholds(None);
         let limits = &mut self.limits;
@@ -204,7 +204,7 @@ impl TableValues {
         }
     }
 
-    /// The firmware's table, sealed with its checksum.
+    /// The firmware's table, complete with its checksum.
     ///
     /// # Panics
     /// If `NX` and `NY` are not the table's numbers of states and sensors.
@@ -217,17 +217,17 @@ impl TableValues {
 
     /// Names, documentation and values of all fields.
     fn fields(&self) -> Vec<contents::Field> {
-        // Values are only made for sizes that exist.
+        // `of` makes table values only for compiled sizes.
         with_size(self.states(), self.sensors(), Fields(self)).unwrap_or_default()
     }
 
     /// The checksum the firmware expects.
     pub fn crc(&self) -> u32 {
-        // Values are only made for sizes that exist.
+        // `of` makes table values only for compiled sizes.
         with_size(self.states(), self.sensors(), Checksum(self)).unwrap_or(0)
     }
 
-    /// What a firmware image for this table is built for.
+    /// Rig and tick that a firmware image for this table is built for.
     pub fn build(&self) -> Build {
         Build { rig_hash: self.rig_hash, tick_s: self.tick_s }
     }
@@ -253,7 +253,7 @@ impl WithSize for Fields<'_> {
     }
 }
 
-/// K of a design holds the gains on the states, then on the integral and on the pending force, where there are such.
+/// K of a design holds the gains on the states, then on the integral, then on the pending force, if there are any.
 fn law_gains(law: &Feedback<f32>, states: usize, setpoint_step: Option<f64>) -> Result<LawValues, NoTable> {
     let entries: Vec<f32> =
         law.k.entries().iter().map(|&gain| finite("a gain", gain)).collect::<Result<_, _>>()?;
@@ -286,7 +286,7 @@ fn motor_map(motor: &Motor, period_s: f64) -> Result<MotorMap, NoTable> {
     })
 }
 
-/// `matrix` with zeros around it.
+/// `matrix`, padded with zeros to R×C.
 pub(crate) fn widest<T: upright::table::Scalar, const R: usize, const C: usize>(
     matrix: &Matrix<T>,
 ) -> SMatrix<T, R, C> {

@@ -44,7 +44,7 @@ fn write_source(out: &mut String, rig: &Rig, table: &TableValues) -> core::fmt::
     writeln!(out, "    // CRC-32 of all values above.\n    crc: {crc},\n}};")
 }
 
-/// All that the table needs, in rustfmt's order and line breaks.
+/// Writes the imports of the table, with rustfmt's order and line breaks.
 fn write_imports(out: &mut String, table: &TableValues) -> core::fmt::Result {
     let names = [
         ("GainTable", true),
@@ -82,7 +82,7 @@ impl Writer<'_> {
         writeln!(self.out, "{:1$}{text}", "", self.indent)
     }
 
-    /// `lines` further in.
+    /// Writes `lines` one level deeper.
     fn inside(&mut self, lines: impl FnOnce(&mut Self) -> core::fmt::Result) -> core::fmt::Result {
         self.indent += 4;
         lines(self)?;
@@ -147,7 +147,7 @@ impl Writer<'_> {
         self.line("]),")
     }
 
-    /// One value of an array a line, under a comment that says what it is.
+    /// Writes an array with one value per line, under a comment that says what it is.
     fn entries(&mut self, name: &str, numbers: &[Number]) -> core::fmt::Result {
         for (index, &number) in numbers.iter().enumerate() {
             let meaning = self.meanings.entry(name, index).unwrap_or_default();
@@ -158,7 +158,7 @@ impl Writer<'_> {
     }
 }
 
-/// What the entries of vectors and matrices belong to.
+/// Meanings of the entries of vectors and matrices.
 struct Meanings {
     /// Each state, and the unit of a gain on it.
     states: Vec<(String, &'static str)>,
@@ -230,7 +230,7 @@ fn literal(number: Number) -> String {
     }
 }
 
-/// In groups of four digits.
+/// Hexadecimal, in groups of four digits.
 fn hexadecimal(value: u64, groups: usize) -> String {
     let groups: Vec<String> =
         (0..groups).rev().map(|i| format!("{:04x}", value >> (16 * i) & 0xffff)).collect();

@@ -6,12 +6,12 @@ use super::{MAX_SENSORS, NoTable, finite};
 use crate::design::DetectionDesign;
 use crate::rig::{Chain, PlantDescription, Rig, defaults};
 
-/// What a hand has to move when an encoder's sign is checked: a link by this angle (rad) …
+/// Motion by hand that the check of an encoder's sign requires of a link (rad) …
 const SIGN_RAD: f64 = 0.2;
-/// … and the cart by this share of the rail.
+/// … and of the cart (share of the rail).
 const SIGN_SHARE: f64 = 0.05;
 
-/// Limits of `rig` with these steps of its sensors (m or rad); without steps no counts are known.
+/// Limits of `rig`, whose sensors have these steps (m or rad). Without steps there are no limits in counts.
 pub(super) fn limits(rig: &Rig, steps: &[f64]) -> Result<Limits<MAX_SENSORS>, NoTable> {
     let wanted = &rig.limits;
     let ticks = |seconds: f64| (seconds / rig.tick.period_s).round().clamp(1.0, f64::from(u32::MAX)) as u32;
@@ -42,7 +42,7 @@ fn set_limits_of_chain(
     let [low, high] = chain.cart.travel_m;
     let length = high - low;
     let margin = wanted.rail_margin_m.unwrap_or_else(|| {
-        // Position 0 stays within, however unequal the ends are.
+        // Position 0 stays inside the limits, however unequal the two ends are.
         (defaults::RAIL_MARGIN_SHARE * length).min(0.5 * high.min(-low))
     });
     limits.rail_m =
@@ -94,13 +94,13 @@ fn supply_min_v(rig: &Rig) -> Option<f64> {
     rig.limits.supply_min_v.or(motor.map(|motor| defaults::SUPPLY_SHARE * motor.supply_v))
 }
 
-/// Whole counts of a distance.
+/// A distance in whole counts.
 fn counts(distance: f64, step: f64) -> i32 {
     // Saturates far beyond any rail or turn.
     (distance / step).round() as i32
 }
 
-/// A threshold as f32: between the smallest and the largest that can be one.
+/// A threshold as `f32`, clamped to the positive normal numbers.
 fn threshold(value: f64) -> f32 {
     (value as f32).clamp(f32::MIN_POSITIVE, f32::MAX)
 }

@@ -1,11 +1,11 @@
-//! Writing a file whole or not at all.
+//! Atomic writing of a file: whole or not at all.
 
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
 use atomic_write_file::AtomicWriteFile;
 
-/// The file could not be written; what was there before is still there.
+/// The file could not be written; its old contents, if any, are unchanged.
 #[derive(Debug, thiserror::Error)]
 #[error("{}: cannot be written ({source}); the old file, if any, is unchanged: check that the folder exists and is writable", path.display())]
 pub struct WriteError {
@@ -13,9 +13,10 @@ pub struct WriteError {
     source: std::io::Error,
 }
 
-/// Replaces the contents of `path` in one step: a reader sees the old file or the new one, never a half.
+/// Replaces the contents of `path` in one step: a reader sees the old file or the new one, never half of one.
 ///
-/// A link is followed and stays a link. What is no file but, say, a device or a pipe is written to, not replaced.
+/// A link is followed and stays a link. Anything other than a regular file, such as a device or a pipe, is written to,
+/// not replaced.
 ///
 /// # Errors
 /// [`WriteError`] with the reason of the file system.
@@ -61,7 +62,7 @@ mod tests {
         assert_eq!(std::fs::read_to_string(&file).unwrap(), "new");
     }
 
-    /// By way of a link, so that a mistake here costs no device of the machine that runs the test.
+    /// Through a link, so that a mistake here cannot destroy a device of the machine that runs the test.
     #[cfg(target_os = "linux")]
     #[test]
     fn a_device_is_written_to_and_not_replaced() {

@@ -1,7 +1,7 @@
 //! The loop as it will run, as matrices: sampled plant, delay, observer, control law.
 //!
-//! Poles, margins and covariances need the law as a matrix; here alone it is written a second time. A simulation runs the
-//! firmware's own controller, and a test compares this model with it.
+//! Poles, margins and covariances need the law as a matrix; this is the only place where it is written a second time.
+//! A simulation runs the firmware's own controller, and a test compares this model with it.
 
 use upright::table::Law;
 
@@ -71,7 +71,7 @@ pub(super) struct ObserverNumbers<R> {
 type LawVector = nalgebra::SVector<f32, MAX_STATES>;
 
 impl<R: Real> Numbers<R> {
-    /// What the table holds.
+    /// The table's numbers, converted exactly; none if the table does not hold `law`.
     pub(super) fn of_table(table: &TableValues, law: Law) -> Option<Self> {
         let values = table.law(law)?;
         let (states, sensors) = (table.states(), table.sensors());
@@ -95,7 +95,7 @@ impl<R: Real> Numbers<R> {
         })
     }
 
-    /// What the table's numbers were rounded from (to `f64`), or none if the design does not know the table's gains.
+    /// The `f64` numbers from which the table's were rounded; none if the table's gains are not those of the design.
     pub(super) fn exact(rig: &Rig, certified: &Certified, table: &TableValues, law: Law) -> Option<Self> {
         let feedback = exact_law(certified, table, law)?;
         let (double, states) = (&certified.double, table.states());
@@ -158,7 +158,7 @@ impl<R: Real> PlantModel<R> {
     }
 
     /// `ẋ = a x + b u` sampled every `period` seconds, with a force that arrives `delay_ticks` (any real number)
-    /// later: a fraction f of a tick splits the tick into the old force for f and the new one for 1 - f (Åström &
+    /// later. A fraction f splits the tick: the old force acts for f of it, the new one for 1 - f (Åström &
     /// Wittenmark, *Computer-Controlled Systems*, section 2.3).
     pub(super) fn delayed(
         a: &Matrix<R>,
@@ -195,7 +195,7 @@ impl<R: Real> PlantModel<R> {
 }
 
 impl<R: Real> ControllerModel<R> {
-    /// The firmware's tick with nothing limited and set-point 0:
+    /// The firmware's tick without limits and with set-point 0:
     ///
     /// ```text
     /// x̂ = x̂⁻ + L (y - C x̂⁻),   u = -K x̂ - k_pending u_pending - k_integral z,
@@ -252,7 +252,7 @@ impl<R: Real> ControllerModel<R> {
 }
 
 impl<R: Real> LoopModel<R> {
-    /// Plant and controller in one loop.
+    /// Closes the loop of plant and controller.
     pub fn of(plant: &PlantModel<R>, controller: &ControllerModel<R>) -> Self {
         let (n, m) = (plant.a.rows(), controller.a.rows());
         let force_output = (&controller.d * &plant.c).beside(&controller.c);
@@ -268,7 +268,7 @@ impl<R: Real> LoopModel<R> {
         }
     }
 
-    /// The loop of the rig as it will run with `law` of the table; none if the table does not hold it.
+    /// The loop of the rig as it will run with the table's `law`; none if the table does not hold it.
     pub fn as_it_runs(certified: &Certified, table: &TableValues, law: Law) -> Option<Self> {
         Some(Self::with_numbers(certified, &Numbers::of_table(table, law)?))
     }

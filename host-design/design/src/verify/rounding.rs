@@ -1,4 +1,4 @@
-//! What single precision does: to the gains, to the poles, and to the force tick by tick.
+//! Effect of single precision on the gains, on the poles, and on the force tick by tick.
 
 use nalgebra::SVector;
 use serde::Serialize;
@@ -15,15 +15,15 @@ use crate::rig::Rig;
 use crate::simulate::{Sample, Scenario, SimulationError, run};
 use crate::table::{MAX_SENSORS, MAX_STATES, TableValues, widest};
 
-/// The table's `f32` against exact numbers.
+/// The table's `f32` numbers compared with the exact ones.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Rounding {
-    /// Largest error of a gain on a state, the pending force, the integral or the set-point, in units of the last place
-    /// of its `f32`; at most 0.5 if all are correctly rounded.
+    /// Largest error of a gain on a state, pending force, integral or set-point, in units of the last place of its
+    /// `f32`; at most 0.5 if all are correctly rounded.
     pub gain_ulp: f64,
     /// The same for the observer's gain L; none without observer.
     pub observer_ulp: Option<f64>,
-    /// Spectral radius with the table's numbers less that with the exact ones.
+    /// Spectral radius with the table's numbers minus that with the exact ones.
     pub spectral_radius_change: f64,
     /// Largest difference between the firmware's force and the same law in `f64` with exact gains, fed with the same
     /// encoder readings and applied forces, along the acceptance run (N); none if that run cannot be made.
@@ -52,7 +52,7 @@ pub(super) fn rounding(
         gain_ulp = gain_ulp.max(ulp(exact, single));
     }
     let observers = exact.observer.as_ref().zip(single.observer.as_ref());
-    // In f64 the eigenvalues of a loop this stiff are not good enough to see the change.
+    // In `f64` the eigenvalues of a loop this stiff are not accurate enough to show the change.
     let (single_radius, exact_radius) = with_precision(128, || {
         let radius = |numbers: Option<Numbers<Wide>>| {
             numbers.map(|numbers| radius(&LoopModel::with_numbers(certified, &numbers))).transpose()
@@ -85,7 +85,7 @@ fn largest_ulp(exact: &Matrix<f64>, single: &Matrix<f64>) -> f64 {
 }
 
 /// `|single - exact|` in units of the last place of an `f32` in the binade of `exact`. `exact` is itself rounded to
-/// `f64`, which is good to 2⁻³⁰ of such a unit: that much is taken off.
+/// `f64`, which is accurate to 2⁻³⁰ of such a unit: that much is subtracted.
 fn ulp(exact: f64, single: f64) -> f64 {
     const SLACK: f64 = 1.0 / (1u64 << 30) as f64;
     if exact == single {
@@ -127,7 +127,8 @@ fn force_difference(
 /// The widest table, so that the firmware's code in `f64` is compiled for one size only.
 type Double = GainTable<MAX_STATES, MAX_SENSORS, f64>;
 
-/// The table with exact gains. Force and set-point come from the firmware beside it, which has limited them already.
+/// The table with exact gains. Force and set-point come from the firmware that runs beside it, which has already
+/// limited them.
 fn in_double_precision(exact: &Numbers<f64>, table: &TableValues, law: Law) -> Double {
     let mut laws = PerLaw::default();
     laws[law] = Some(LawGains {
@@ -162,7 +163,8 @@ fn in_double_precision(exact: &Numbers<f64>, table: &TableValues, law: Law) -> D
     }
 }
 
-/// The firmware's controller in `f64`, beside the one in `f32`: sees its encoder readings, set-point and forces.
+/// The firmware's controller in `f64`, run beside the one in `f32` with the same encoder readings, set-point and
+/// forces.
 struct Shadow<'t> {
     controller: Controller<'t, MAX_STATES, MAX_SENSORS, f64>,
     double: &'t Double,
@@ -177,11 +179,11 @@ impl<'t> Shadow<'t> {
         Ok(Self { controller, double, table, last_volts: 0.0, is_started: false })
     }
 
-    /// The force asked for (N); then prepares the next tick.
+    /// The requested force (N); then prepares the next tick.
     fn tick(&mut self, sample: &Sample<&[f64]>) -> Result<f64, SimulationError> {
         let command = match &self.double.observer {
             None => {
-                // What the firmware converts to f32.
+                // The firmware gets the state in `f32`.
                 let state = |i| sample.state.get(i).map_or(0.0, |&value| f64::from(value as f32));
                 let x = SVector::from_fn(|i, _| state(i));
                 if !self.is_started {
@@ -209,7 +211,7 @@ impl<'t> Shadow<'t> {
         Ok(command.requested_n)
     }
 
-    /// The force that the firmware takes for applied (N): its own actuator map on its own request.
+    /// The force that the firmware assumes to be applied (N): its own actuator map of its own requested force.
     fn applied(&mut self, sample: &Sample<&[f64]>) -> f64 {
         let limited = saturate(sample.requested as f32, self.table.force_limit_n);
         let Some(motor) = &self.table.motor else { return f64::from(limited) };

@@ -28,10 +28,10 @@ const FORCE_LIMIT: &[Key] = &[Key {
 const DEAD_ZONE: Rule = Rule::NOT_NEGATIVE.worded("a number >= 0 and < supply_v (V)");
 const WITH_A_MOTOR: Absent = Absent::RequiredIf("with a motor");
 
-/// `[actuator]`
+/// The actuator, `[actuator]`: force limit and motor.
 #[derive(Debug, Clone, PartialEq, Serialize, Default)]
 pub struct Actuator {
-    /// Largest force on the cart (N); none given: no limit.
+    /// Largest force on the cart (N); none: no limit.
     pub force_limit_n: Option<f64>,
     /// The DC motor, if described.
     pub motor: Option<Motor>,

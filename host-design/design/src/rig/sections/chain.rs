@@ -8,7 +8,7 @@ use super::super::node::{Node, Table};
 use super::super::rule::Rule;
 use super::model::{self, LinearPlant};
 
-/// Most links of a chain: plants of more are not compiled.
+/// Largest number of links of a chain; plants with more are not compiled.
 pub const MAX_LINKS: usize = 14;
 
 /// `[cart]`
@@ -113,7 +113,7 @@ keys! {
     }
 }
 
-/// What is to be balanced.
+/// The plant to balance.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub enum PlantDescription {
     /// Links on a cart.
@@ -122,7 +122,7 @@ pub enum PlantDescription {
     Model(LinearPlant),
 }
 
-/// `n >= 1` links on a cart.
+/// A cart with n >= 1 links.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Chain {
     /// The cart.
@@ -133,7 +133,7 @@ pub struct Chain {
     pub gravity_m_per_s2: f64,
 }
 
-/// `[[link]]`
+/// One link of a chain, `[[link]]`.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Link {
     /// Mass (kg).
@@ -150,12 +150,12 @@ pub struct Link {
     pub encoder: Option<LinkEncoder>,
 }
 
-/// Resolution of a joint encoder, in whichever way the file gives it.
+/// Resolution of a joint encoder, in the form that the file gives.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub enum LinkEncoder {
     /// `encoder_step_rad`: angle per count (rad).
     StepRad(f64),
-    /// `encoder_counts_per_rev`: counts per revolution; the step is 2π over it.
+    /// `encoder_counts_per_rev`: counts per revolution; the step is 2π / counts (rad).
     CountsPerRev(f64),
 }
 
@@ -169,7 +169,7 @@ impl PlantDescription {
     }
 }
 
-/// The plant, described in one of the two ways.
+/// Reads the plant, which the file gives either as a chain or as a linear model.
 pub(in crate::rig) fn plant(root: &Table<'_>) -> Result<PlantDescription, RigError> {
     const ONE: &str = "keep [model], or [cart] with its [[link]]s and [gravity], not both";
     for part in ["cart", "link", "gravity"] {

@@ -36,7 +36,7 @@ pub(in crate::rig) static LQR: Section = Section {
 pub struct Lqr {
     /// Diagonal of Q, one weight per state.
     pub state_weights: Vec<f64>,
-    /// R > 0.
+    /// Weight r > 0 of the squared force.
     pub force_weight: f64,
 }
 

@@ -1,8 +1,9 @@
-//! The sections of a rig file, one file each: its structure, the rows of its keys, and what spans several keys.
+//! The sections of a rig file, one file each: its structure, the rows of its keys, and the checks that involve several
+//! keys.
 //!
-//! A section of scalars is a structure declared with `keys!`; a further scalar key is one row there. A section with
-//! lists has its rows and its structure apart. A new section needs its file, an entry in [`SECTIONS`], and a field of
-//! [`Rig`](super::Rig).
+//! A section of scalars is a structure declared with `keys!`; a new scalar key is one more row there. A section with
+//! lists keeps its rows and its structure separate. A new section needs its file, an entry in [`SECTIONS`], and a
+//! field of [`Rig`](super::Rig).
 
 pub(super) mod actuator;
 pub(super) mod chain;
@@ -18,7 +19,7 @@ pub(super) mod verify;
 use super::key::{Absent, Key, Section};
 use super::rule::Rule;
 
-/// What stands above the sections.
+/// The keys above the first section.
 pub static TOP: Section = Section {
     name: "",
     title: "the file",

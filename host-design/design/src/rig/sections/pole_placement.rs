@@ -48,7 +48,7 @@ pub(in crate::rig) static POLE_PLACEMENT: Section = Section {
     ]],
 };
 
-/// `[pole_placement]`
+/// The poles to place, `[pole_placement]`, in one of two forms.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub enum PolePlacement {
     /// A dominant pair from a second-order response, and real far poles.
@@ -126,7 +126,7 @@ fn pole_count(node: &Node<'_>, found: usize, accepts: String, asks_for: &str) ->
     node.error(RigErrorKind::PoleCount { found, accepts, remedy: format!("give {asks_for}") })
 }
 
-/// Index of the first complex pole that no other pole is the conjugate of, each pole serving once.
+/// Index of the first complex pole without a conjugate; each pole is the conjugate of one other pole only.
 fn unpaired(poles: &[[f64; 2]]) -> Option<usize> {
     let mut paired: Vec<bool> = poles.iter().map(|[_, im]| *im == 0.0).collect();
     for (index, [re, im]) in poles.iter().enumerate() {
