@@ -6,8 +6,8 @@
 //! | `received` | the serial line | below | puts a byte into a queue |
 //! | `idle` | | lowest | bytes → commands, telemetry → bytes |
 //!
-//! The tasks share no locked resource, only single-producer, single-consumer queues: nothing below `tick` can delay it by
-//! more than the entry of an interrupt.
+//! The tasks share no locked resource, only single-producer, single-consumer queues. So no task below `tick` can delay
+//! it by more than an interrupt entry.
 
 #![no_std]
 #![no_main]
@@ -17,7 +17,7 @@ mod board;
 
 use upright::gains;
 
-/// Processor cycles per tick, for which the gains were designed.
+/// Processor cycles per tick, at the period for which the gains were designed.
 const CYCLES_PER_TICK: u32 = {
     let cycles = gains::TICK_S as f64 * board::CLOCK_HZ as f64 + 0.5;
     assert!(
@@ -61,7 +61,7 @@ mod app {
         let (hardware, receiver, line, reset) = set_up(cx.device, cx.local.bytes.split());
         let build = Build { rig_hash: RIG_HASH, tick_s: TICK_S };
         let Ok(firmware) = Firmware::new(&TABLE, &build, Hardware::WIDTHS, reset) else {
-            // The table is damaged: the image cannot do anything, and the motor is off.
+            // The table is damaged: the image cannot do anything, so the motor stays off.
             crate::board::stop()
         };
         let (to_control, commands) = cx.local.commands.split();

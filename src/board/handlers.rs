@@ -10,14 +10,14 @@ fn panicked(_: &PanicInfo) -> ! {
     crashed()
 }
 
-/// With interrupts off, so that the tick cannot turn the motor on again.
+/// Turns the motor off for good. Disables interrupts first, so that the tick cannot turn it on again.
 extern "C" fn crashed() -> ! {
     cortex_m::interrupt::disable();
     stop()
 }
 
-// After a stack overflow, the stack pointer is below the memory, and pushing a register would fault again and lock up the
-// core. So the stack pointer is reset before the first push.
+// After a stack overflow the stack pointer is below the memory. Pushing a register would fault again and lock up the
+// core, so the stack pointer is reset before the first push.
 global_asm!(
     ".section .HardFault.entry, \"ax\"",
     ".global HardFault",
@@ -28,7 +28,7 @@ global_asm!(
     "mov sp, r0",
     "b {crashed}",
     ".size HardFault, . - HardFault",
-    // All exceptions without a handler of their own.
+    // All exceptions that have no handler of their own.
     ".global DefaultHandler",
     ".thumb_set DefaultHandler, HardFault",
     crashed = sym crashed,

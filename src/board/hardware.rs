@@ -1,8 +1,8 @@
-//! The board of this image: the only place that touches registers, and the only one with `unsafe`.
+//! The board of this image: the only code that accesses registers, and the only code with `unsafe`.
 //!
-//! A cargo feature chooses it. A new board is a folder beside `f4` that gives the same few names: `set_up` makes a
-//! [`Hardware`] for the control task, a [`Receiver`] for the serial line's interrupt and a [`SerialLine`] for the background;
-//! `stop` turns the motor off for good; `CLOCK_HZ` is the core clock.
+//! A cargo feature selects the board. A new board is a folder beside `f4` that provides the same names: `set_up` makes
+//! a [`Hardware`] for the control task, a [`Receiver`] for the interrupt of the serial line and a [`SerialLine`] for
+//! the background task; `stop` turns the motor off for good; `CLOCK_HZ` is the core clock.
 
 #![allow(unsafe_code)]
 
@@ -51,5 +51,5 @@ pub(crate) use f4::{CLOCK_HZ, Hardware, Receiver, SerialLine, set_up, stop};
 #[cfg(any(feature = "in-the-loop", feature = "in-the-loop-usart"))]
 pub(crate) use in_the_loop::{CLOCK_HZ, Hardware, Receiver, SerialLine, set_up, stop};
 
-/// Length of the queue of bytes from the host; it holds one less.
+/// Length of the queue of bytes from the host; it holds one byte less.
 pub(crate) const BYTES: usize = 128;

@@ -1,7 +1,8 @@
-//! The board as the firmware sees it: inputs, output and the trait [`Board`], the boundary between firmware and hardware.
+//! The board, as the firmware sees it: inputs, output and the trait [`Board`], the boundary between firmware and
+//! hardware.
 //!
-//! A board of one's own implements [`Board`] in one's own crate. The boards of this project's image are not in this library
-//! but in the image: `hardware.rs` beside this file chooses one of the folders `f4` and `in_the_loop`.
+//! To use your own board, implement [`Board`] in your own crate. The boards of this project are not in this library
+//! but in the image: `hardware.rs` beside this file selects one of the folders `f4` and `in_the_loop`.
 
 use serde::{Deserialize, Serialize};
 
@@ -11,7 +12,7 @@ use crate::control::encoder::CounterWidth;
 /// All inputs, read at the start of a tick.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Inputs<const NY: usize> {
-    /// Raw encoder counters.
+    /// Raw readings of the encoder counters.
     pub raw_counts: [u32; NY],
     /// Supply voltage of the motor's power stage (V).
     pub supply_v: f32,
@@ -19,7 +20,7 @@ pub struct Inputs<const NY: usize> {
     pub contacts: Contacts,
 }
 
-/// Contacts and flags of a tick; all false is the healthy state.
+/// Contacts and flags of a tick; all are false in the healthy state.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub struct Contacts {
     /// The limit switch at the low end of the rail is pressed, or its wire is open.
@@ -28,11 +29,11 @@ pub struct Contacts {
     pub limit_high: bool,
     /// The emergency stop is pressed, or its wire is open.
     pub emergency_stop: bool,
-    /// The power stage has reported a fault since the last tick, however briefly.
+    /// The power stage has reported a fault since the last tick, even a short one.
     pub driver_fault: bool,
-    /// The previous tick had not ended when this one was due.
+    /// The previous tick was still running when this one was due.
     pub overrun: bool,
-    /// The processor's clock has failed to start or has stopped: ticks have the wrong length.
+    /// The processor's clock did not start or has stopped: ticks have the wrong length.
     pub clock_fault: bool,
 }
 
@@ -50,20 +51,20 @@ impl Output {
     pub const OFF: Self = Self { enable: false, drive: Drive::OFF };
 }
 
-/// The hardware. There is one implementation per board, one for the image in the loop with a simulated rig, and one in
-/// the simulations on the host.
+/// The hardware. Each board implements this trait; so do the image in the loop with a simulated rig and the
+/// simulations on the host.
 pub trait Board<const NY: usize> {
-    /// Widths of the encoders' counters.
+    /// Widths of the encoder counters.
     const WIDTHS: [CounterWidth; NY];
 
-    /// Reads all inputs, without waiting.
+    /// Reads all inputs without waiting.
     fn inputs(&mut self) -> Inputs<NY>;
 
     /// Drives the motor until the next call.
     fn drive(&mut self, output: &Output);
 
-    /// Called at the end of a tick. Restarts the independent watchdog if the next tick is not due yet; a watchdog that is
-    /// not restarted in time resets the microcontroller, which turns the motor off.
+    /// Called at the end of a tick. Restarts the independent watchdog if the next tick is not due yet. If the watchdog
+    /// is not restarted in time, it resets the microcontroller, which turns the motor off.
     fn feed_watchdog(&mut self);
 
     /// A free-running counter of processor cycles.

@@ -1,11 +1,11 @@
-//! From force to motor duty, and back to the force that is really applied.
+//! From force to motor duty cycle, and back to the force really applied.
 
 use serde::{Deserialize, Serialize};
 
 use crate::control::state_feedback::saturate;
 use crate::table::{MotorMap, Scalar};
 
-/// What goes to the power stage.
+/// Command to the power stage.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub enum Drive {
     /// A force (N), for rigs without motor data.
@@ -18,8 +18,8 @@ impl Drive {
     /// No force, motor off.
     pub const OFF: Self = Drive::Force(0.0);
 
-    /// The command as a duty cycle from -1 to 1. A force becomes a share of `force_limit` (N), for a power stage that
-    /// controls the motor's current and is set to reach the limit at its full scale.
+    /// The command as a duty cycle from -1 to 1. A force becomes a fraction of `force_limit` (N): for a power stage
+    /// that controls the motor current and reaches the limit at full scale.
     pub fn duty(self, force_limit: f32) -> f32 {
         match self {
             Drive::Force(force) => saturate(force / force_limit, 1.0),
@@ -29,8 +29,8 @@ impl Drive {
 }
 
 impl<T: Scalar> MotorMap<T> {
-    /// Voltage that makes the motor push with `force` (N) at cart speed `speed` (m/s), within the supply and the slew
-    /// limit from `last_v`; and the force that this voltage makes.
+    /// Voltage for the force `force` (N) at the cart speed `speed` (m/s), limited by the supply and by the slew rate
+    /// from `last_v`; and the force that this voltage produces.
     ///
     /// ```text
     /// V = (R r / (gear Kt)) F + (gear Kt / r) ẋ
@@ -38,16 +38,16 @@ impl<T: Scalar> MotorMap<T> {
     pub fn drive(&self, force: T, speed: T, last_v: T) -> (T, T) {
         let back_emf = self.volts_per_speed * speed;
         let wanted = self.volts_per_newton * force + back_emf;
-        // The duty adds the dead zone again, so the voltage leaves room for it.
+        // The duty cycle adds the dead zone again, so the voltage leaves room for it.
         let within_supply = saturate(wanted, self.supply_v - self.dead_zone_v);
         let volts = last_v + saturate(within_supply - last_v, self.slew_v_per_tick);
         if volts == wanted { (volts, force) } else { (volts, (volts - back_emf) / self.volts_per_newton) }
     }
 
-    /// Duty cycle for `volts`, lifted over the dead zone.
+    /// Duty cycle for `volts`, with the dead zone compensated.
     ///
-    /// The lift grows with the voltage, ten times as fast, up to the whole dead zone: the duty does not jump at rest, and
-    /// less than a tenth of the dead zone is left of it.
+    /// The compensation rises ten times as fast as the voltage, up to the whole dead zone. So the duty cycle does not
+    /// jump around 0, and less than a tenth of the dead zone remains.
     pub fn duty(&self, volts: T) -> T {
         let lift = saturate(T::from_f32(10.0) * volts, self.dead_zone_v);
         saturate((volts + lift) / self.supply_v, T::from_f32(1.0))
@@ -73,7 +73,7 @@ mod tests {
 
     #[test]
     fn the_force_that_is_left_at_the_supply_limit_is_reported() {
-        // 11 V of 12 V are left above the dead zone; 4 V go into back-EMF.
+        // The dead zone leaves 11 V of 12 V; 4 V of them are back-EMF.
         assert_eq!(MOTOR.drive(10.0, 1.0, 0.0), (11.0, 3.5));
         assert_eq!(MOTOR.duty(11.0), 1.0);
         assert_eq!(MOTOR.duty(-11.0), -1.0);

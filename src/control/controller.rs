@@ -1,4 +1,4 @@
-//! The controller: one tick from encoder counts to motor duty.
+//! The controller: one tick from encoder counts to motor duty cycle.
 
 use nalgebra::SVector;
 use serde::{Deserialize, Serialize};
@@ -11,14 +11,15 @@ use crate::table::{Build, GainTable, Law, LawGains, Scalar, TableError};
 
 /// Observer, control law and actuator map of one gain table.
 ///
-/// A tick has two halves. [`control`](Self::control) goes from counts to duty and is all that has to happen between
-/// reading the encoders and driving the motor; [`predict`](Self::predict) prepares the next tick and may follow after.
+/// A tick has two halves. [`control`](Self::control) computes the duty cycle from the counts; only this has to happen
+/// between reading the encoders and driving the motor. [`predict`](Self::predict) prepares the next tick and may run
+/// later.
 #[derive(Debug, Clone)]
 pub struct Controller<'t, const NX: usize, const NY: usize, T: Scalar = f32> {
     table: &'t GainTable<NX, NY, T>,
     law: Law,
     gains: &'t LawGains<NX, T>,
-    /// Whether the force depends on earlier ticks, by a pending force or an integral.
+    /// Whether the force depends on earlier ticks, through a pending force or an integral.
     has_memory: bool,
     mode: Mode<'t, NX, NY, T>,
     target: T,
@@ -35,33 +36,33 @@ pub struct Controller<'t, const NX: usize, const NY: usize, T: Scalar = f32> {
 #[derive(Debug, Clone, Copy)]
 enum Mode<'t, const NX: usize, const NY: usize, T: Scalar> {
     Stopped,
-    /// Running, and the table holds no observer.
+    /// Running without an observer: the table holds none.
     WithoutObserver,
-    /// Running, and sensor i measures state 2i, as in every chain.
+    /// Running; sensor i measures state 2i, as in every chain.
     InOrder(Observer<'t, NX, NY, T>),
-    /// Running, and the table says which state a sensor measures.
+    /// Running; the table says which state each sensor measures.
     LookingUp(Observer<'t, NX, NY, T>),
 }
 
-/// The outcome of a tick.
+/// Result of the first half of a tick.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct MotorCommand<T = f32> {
-    /// Force that the control law asks for (N).
+    /// Force requested by the control law (N).
     pub requested_n: T,
-    /// Force that will be applied, within all limits (N); 0 if the request is NaN.
+    /// Force applied after all limits (N); 0 if the request is NaN.
     pub applied_n: T,
-    /// What goes to the power stage.
+    /// Command to the power stage.
     pub drive: Drive,
 }
 
-/// A request the controller does not follow; what was set before stays.
+/// Reason for rejecting a request; the earlier setting stays.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Rejected {
     /// The table holds no gains for this law.
     NoSuchLaw,
     /// The law can only be changed while the controller is stopped.
     Running,
-    /// The set-point is not a finite number, or not within the soft limits of the rail.
+    /// The set-point is not finite, or not within the soft limits of the rail.
     Setpoint,
     /// The table holds no observer, so the controller cannot run from encoders.
     NoObserver,
@@ -83,8 +84,8 @@ impl core::fmt::Display for Rejected {
 impl core::error::Error for Rejected {}
 
 impl<'t, const NX: usize, const NY: usize> Controller<'t, NX, NY> {
-    /// A stopped controller at set-point 0 with the first law the table holds (LQR before pole placement), for encoder
-    /// counters of these widths.
+    /// A stopped controller at set-point 0, for encoder counters of these widths. It uses the first law that the table
+    /// holds (LQR before pole placement).
     ///
     /// # Errors
     /// [`TableError`] if the table is damaged or was made for another build.
@@ -99,11 +100,11 @@ impl<'t, const NX: usize, const NY: usize> Controller<'t, NX, NY> {
 }
 
 impl<'t, const NX: usize, const NY: usize, T: Scalar> Controller<'t, NX, NY, T> {
-    /// As [`new`](Controller::new), for a table that needs no check: one in another precision, which a host compares with
-    /// that of the firmware.
+    /// The same as [`new`](Controller::new), but without checking the table: for a table in another precision, which a
+    /// host compares with that of the firmware.
     ///
     /// # Errors
-    /// [`TableError::NoLaw`] for a table without law.
+    /// [`TableError::NoLaw`] if the table holds no law.
     pub fn with_checked(
         table: &'t GainTable<NX, NY, T>,
         widths: [CounterWidth; NY],
@@ -137,11 +138,11 @@ impl<'t, const NX: usize, const NY: usize, T: Scalar> Controller<'t, NX, NY, T> 
         self.law
     }
 
-    /// Uses another law of the table.
+    /// Selects another law of the table.
     ///
     /// # Errors
-    /// [`Rejected::Running`] between [`start`](Self::start) and [`stop`](Self::stop): a change of gains in mid-balance is
-    /// a jump of the force. [`Rejected::NoSuchLaw`] if the table does not hold it.
+    /// [`Rejected::Running`] between [`start`](Self::start) and [`stop`](Self::stop), because changing gains while
+    /// balancing makes the force jump. [`Rejected::NoSuchLaw`] if the table does not hold the law.
     pub fn select(&mut self, law: Law) -> Result<(), Rejected> {
         if !matches!(self.mode, Mode::Stopped) {
             return Err(Rejected::Running);
@@ -152,16 +153,15 @@ impl<'t, const NX: usize, const NY: usize, T: Scalar> Controller<'t, NX, NY, T> 
         Ok(())
     }
 
-    /// Wanted cart position (m), as asked for; the governed one that the law follows is in
-    /// [`law_state`](Self::law_state).
+    /// Requested cart position (m). The governed set-point that the law follows is in [`law_state`](Self::law_state).
     pub fn setpoint(&self) -> T {
         self.target
     }
 
-    /// Asks for a cart position (m). The governor takes the law there no faster than the limits allow.
+    /// Requests a cart position (m). The governor moves the law's set-point there no faster than the limits allow.
     ///
     /// # Errors
-    /// [`Rejected::Setpoint`] if it is not finite.
+    /// [`Rejected::Setpoint`] if the position is not finite.
     pub fn set_setpoint(&mut self, position: T) -> Result<(), Rejected> {
         if !position.is_finite() {
             return Err(Rejected::Setpoint);
@@ -195,7 +195,7 @@ impl<'t, const NX: usize, const NY: usize, T: Scalar> Controller<'t, NX, NY, T> 
         &mut self.encoders
     }
 
-    /// Positions according to the encoders (m, rad); all 0 without observer.
+    /// Positions from the encoders (m, rad); all 0 without observer.
     pub fn positions(&self) -> SVector<T, NY> {
         self.table
             .observer
@@ -203,11 +203,11 @@ impl<'t, const NX: usize, const NY: usize, T: Scalar> Controller<'t, NX, NY, T> 
             .map_or_else(|| SVector::repeat(T::default()), |observer| self.encoders.positions(&observer.step))
     }
 
-    /// Starts from rest where the encoders stand at `raw` counts: rates 0, governed set-point at the output, no
-    /// pending force.
+    /// Starts from rest at the counter readings `raw`: rates 0, governed set-point at the present output, no pending
+    /// force.
     ///
     /// # Errors
-    /// [`Rejected::NoObserver`] if the table holds none.
+    /// [`Rejected::NoObserver`] if the table holds no observer.
     pub fn start(&mut self, raw: &[u32; NY]) -> Result<(), Rejected> {
         let observer = self.table.observer.as_ref().ok_or(Rejected::NoObserver)?;
         self.encoders.update(raw);
@@ -236,20 +236,20 @@ impl<'t, const NX: usize, const NY: usize, T: Scalar> Controller<'t, NX, NY, T> 
         };
     }
 
-    /// Stops: the next tick needs a new start.
+    /// Stops. The controller must be started again before it drives the motor.
     pub fn stop(&mut self) {
         self.mode = Mode::Stopped;
     }
 
-    /// Only follows the encoders: a tick of a stopped controller.
+    /// A tick of a stopped controller: only tracks the encoders.
     pub fn follow(&mut self, raw: &[u32; NY]) {
         self.encoders.update(raw);
     }
 
-    /// First half of a tick: from raw encoder counts to the command for the motor.
+    /// First half of a tick: from raw encoder counts to the motor command.
     ///
-    /// With `delay_ticks = 0` the command is carried out at once and held for one tick. With 1 it is carried out, and
-    /// held, from the start of the next tick; the law then also feeds back the pending force.
+    /// With `delay_ticks = 0` the command takes effect at once and is held for one tick. With 1 it takes effect at the
+    /// start of the next tick and is held for that tick; the law then also feeds back the pending force.
     ///
     /// ```text
     /// e = y - C x̂⁻,   x̂ = x̂⁻ + L e,   u = sat(N r - K x̂ - k_pending u_pending - k_integral z)
@@ -258,8 +258,9 @@ impl<'t, const NX: usize, const NY: usize, T: Scalar> Controller<'t, NX, NY, T> 
         self.control_with(raw, |_, _, _| ())
     }
 
-    /// As [`control`](Self::control), with a look at counts, positions and innovation before the innovation is used:
-    /// `judge` sets that of a measurement it rejects to 0, and the prediction takes its place.
+    /// The same as [`control`](Self::control), but calls `judge` with counts, positions and innovation before the
+    /// innovation is used. `judge` sets the innovation of a rejected measurement to 0, so that the prediction replaces
+    /// the measurement.
     #[inline(always)]
     pub fn control_with(
         &mut self,
@@ -277,7 +278,7 @@ impl<'t, const NX: usize, const NY: usize, T: Scalar> Controller<'t, NX, NY, T> 
         self.drive(requested)
     }
 
-    /// First half of a tick with the whole state measured: what the paper simulates.
+    /// First half of a tick with the whole state measured, as the paper simulates it.
     pub fn control_from_state(&mut self, x: &SVector<T, NX>) -> MotorCommand<T> {
         self.estimate = *x;
         if let Mode::Stopped = self.mode {
@@ -288,7 +289,7 @@ impl<'t, const NX: usize, const NY: usize, T: Scalar> Controller<'t, NX, NY, T> 
         self.drive(requested)
     }
 
-    // Out of line, so that it takes no register from the path without look-up.
+    // Not inlined, so that it takes no registers from the path without look-up.
     #[cold]
     #[inline(never)]
     fn observe_looking_up(
@@ -325,7 +326,7 @@ impl<'t, const NX: usize, const NY: usize, T: Scalar> Controller<'t, NX, NY, T> 
         self.request(sum.force())
     }
 
-    /// The force that the law asks for, from its state feedback.
+    /// The force requested by the law, from its state feedback.
     #[inline(always)]
     fn request(&mut self, feedback: T) -> T {
         let mut requested = feedback;
@@ -337,14 +338,14 @@ impl<'t, const NX: usize, const NY: usize, T: Scalar> Controller<'t, NX, NY, T> 
         requested
     }
 
-    /// Limits the force and turns it into what the power stage needs.
+    /// Limits the force and converts it for the power stage.
     #[inline]
     fn drive(&mut self, requested: T) -> MotorCommand<T> {
         let limited = saturate(requested, self.table.force_limit_n);
         let (applied, drive) = match &self.table.motor {
             None => (limited, Drive::Force(limited.to_f32())),
             Some(motor) => {
-                // The speed of the cart is the state after its position.
+                // The cart's speed is the state after its position.
                 let speed = self.estimate.get(1).copied().unwrap_or_default();
                 let (volts, force) = motor.drive(limited, speed, self.last_volts);
                 self.last_volts = volts;
@@ -355,9 +356,9 @@ impl<'t, const NX: usize, const NY: usize, T: Scalar> Controller<'t, NX, NY, T> 
         MotorCommand { requested_n: requested, applied_n: applied, drive }
     }
 
-    /// Takes the force of another controller on the same rig in place of its own, between [`control`](Self::control) and
-    /// [`predict`](Self::predict): what the other requested and what was applied (N). So a host lets the law in `f64` run
-    /// beside the firmware.
+    /// Replaces the force of this tick by that of another controller on the same rig: requested and applied (N). Call
+    /// it between [`control`](Self::control) and [`predict`](Self::predict). A host uses it to run the law in `f64`
+    /// alongside the firmware.
     pub fn take_force(&mut self, requested: T, applied: T) {
         (self.requested, self.applied) = (requested, applied);
     }

@@ -1,4 +1,4 @@
-//! Incremental encoders: raw counters of any width to positions in SI units.
+//! Incremental encoders: from raw counters of 16 or 32 bits to positions in SI units.
 
 use nalgebra::SVector;
 
@@ -13,13 +13,13 @@ pub enum CounterWidth {
     Bits32,
 }
 
-/// Follows hardware counters across their wrap-around and knows which count is position 0.
+/// Tracks hardware counters across wrap-around and knows which count is position 0.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Encoders<const NY: usize> {
-    /// Bit i is set if counter i has 16 bits: one word for all of them.
+    /// Bit i is set if counter i has 16 bits; one word holds all of them.
     of_16_bits: u32,
     last: [u32; NY],
-    /// Counts from position 0; wraps silently after 2³¹ counts, a hundred kilometres of any rail.
+    /// Counts from position 0. Wraps silently after 2³¹ counts, which is a hundred kilometres on any rail.
     position: [i32; NY],
 }
 
@@ -41,25 +41,25 @@ impl<const NY: usize> Encoders<NY> {
         Self { of_16_bits, last: [0; NY], position: [0; NY] }
     }
 
-    /// Declares that the counters stand at `raw` while the rig is at `position` (counts), as found by homing.
+    /// Sets the position (counts) at the counter readings `raw`, as found by homing.
     pub fn home(&mut self, raw: &[u32; NY], position: &[i32; NY]) {
         self.last = *raw;
         self.position = *position;
     }
 
-    /// Takes new counter readings. Between two readings a counter may move by less than half its range.
+    /// Takes new counter readings. A counter must move by less than half its range between two readings.
     pub fn update(&mut self, raw: &[u32; NY]) {
         self.measure(raw, &SVector::<f32, NY>::zeros());
     }
 
-    /// Takes new counter readings, and gives the positions like [`positions`](Self::positions).
+    /// Takes new counter readings and returns the positions, like [`positions`](Self::positions).
     #[inline(always)]
     pub(crate) fn measure<T: Scalar>(&mut self, raw: &[u32; NY], step: &SVector<T, NY>) -> SVector<T, NY> {
         let mut y = *step;
         let counters = self.last.iter_mut().zip(&mut self.position).zip(raw).zip(y.iter_mut());
         for (counter, (((last, position), &raw), y)) in counters.enumerate() {
             let moved = raw.wrapping_sub(*last) as i32;
-            // The inner cast keeps the low 16 bits: the distance modulo the counter's range, with its sign.
+            // The inner cast keeps the low 16 bits: the signed distance modulo the counter's range.
             let moved = if self.of_16_bits & (1 << counter) != 0 { i32::from(moved as i16) } else { moved };
             *last = raw;
             *position = position.wrapping_add(moved);

@@ -1,4 +1,4 @@
-//! From encoder counts to the motor's duty, once per tick.
+//! From encoder counts to motor duty cycle, once per tick.
 
 pub mod actuator;
 pub mod controller;

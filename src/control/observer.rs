@@ -1,4 +1,4 @@
-//! The state estimate: a steady-state Kalman filter in current (filter) form.
+//! The state estimate: a steady-state Kalman filter in filter form.
 //!
 //! ```text
 //! e = y - C x̂⁻,   x̂ = x̂⁻ + L e,   x̂⁻(next tick) = Ad x̂ + Bd u
@@ -7,7 +7,7 @@
 use crate::table::{ObserverGains, Scalar};
 
 impl<const NX: usize, const NY: usize, T: Scalar> ObserverGains<NX, NY, T> {
-    /// Whether sensor i measures state 2i, as in every chain, so that no index has to be looked up.
+    /// Whether sensor i measures state 2i, as in every chain. Then no index has to be looked up.
     pub(crate) fn sensors_are_in_order(&self) -> bool {
         self.measured.iter().zip(0..).all(|(&state, sensor)| state == 2 * sensor)
     }
@@ -20,16 +20,16 @@ pub(crate) struct Observer<'t, const NX: usize, const NY: usize, T: Scalar = f32
     pattern: Pattern,
 }
 
-/// Entries of Ad that are known beforehand. They make a prediction faster; the result is the same, bit by bit.
+/// Entries of Ad that are known in advance. They make the prediction faster; the result is the same, bit for bit.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Pattern {
-    /// None.
+    /// No entry is known.
     Any,
-    /// The first column is 1, 0, 0 …, as in every chain: its motion does not depend on the position of the cart.
+    /// The first column is 1, 0, 0 …, as in every chain: the motion does not depend on the position of the cart.
     SameEverywhere,
-    /// A chain without friction. Its motion does not depend on the speed of the cart either, so the second column is 0 below
-    /// its first two entries. And it is the same backwards in time, so in each block of position and rate both entries on
-    /// the diagonal are equal: one load serves both.
+    /// A chain without friction. The motion does not depend on the speed of the cart either, so the second column is 0
+    /// below its first two entries. And the motion is reversible in time, so both diagonal entries of each block of
+    /// position and rate are equal: one load serves both.
     Frictionless,
 }
 
@@ -58,8 +58,9 @@ impl<'t, const NX: usize, const NY: usize, T: Scalar> Observer<'t, NX, NY, T> {
         Self { gains, pattern: Pattern::of(&gains.ad.data.0) }
     }
 
-    /// Innovation `e = y - C x̂⁻` (m or rad), measurement minus prediction, for measured positions y. It is formed explicitly: a
-    /// merged `Ad - L C` would cost most of the digits of u in f32. `measured` says which state a sensor measures.
+    /// Innovation `e = y - C x̂⁻` (m or rad): measurement minus prediction, for the measured positions y. It is
+    /// computed explicitly: a merged `Ad - L C` would cost most of the digits of u in f32. `measured` maps a sensor to
+    /// its state.
     #[inline(always)]
     pub(crate) fn innovation(
         &self,
@@ -69,14 +70,14 @@ impl<'t, const NX: usize, const NY: usize, T: Scalar> Observer<'t, NX, NY, T> {
     ) -> [T; NY] {
         let mut innovation = *y;
         for (sensor, e) in innovation.iter_mut().enumerate() {
-            // A checked table only names states that exist.
+            // A checked table names only states that exist.
             *e -= estimate.get(measured(sensor)).copied().unwrap_or_default();
         }
         innovation
     }
 
-    /// Current estimate `x̂ = x̂⁻ + L e` in place of the prediction x̂⁻. `corrected` gets it joint by joint, with the number
-    /// of the joint, while it still is in registers.
+    /// Replaces the prediction x̂⁻ by the current estimate `x̂ = x̂⁻ + L e`. Calls `corrected` for each joint, with
+    /// its number, while the joint's states are still in registers.
     #[inline(always)]
     pub(crate) fn correct(
         &self,
@@ -89,7 +90,7 @@ impl<'t, const NX: usize, const NY: usize, T: Scalar> Observer<'t, NX, NY, T> {
             let [mut position, mut rate] = *estimate;
             for (column, e) in self.gains.l.data.0.iter().zip(innovation) {
                 if let Some([to_position, to_rate]) = column.as_chunks::<2>().0.get(joint) {
-                    // Both products before both sums: no instruction waits for the one before it.
+                    // Both products before both sums, so that no instruction waits for the one before it.
                     let (a, b) = (*to_position * *e, *to_rate * *e);
                     position += a;
                     rate += b;
@@ -106,11 +107,11 @@ impl<'t, const NX: usize, const NY: usize, T: Scalar> Observer<'t, NX, NY, T> {
         }
     }
 
-    /// Prediction for the next tick `x̂⁻ = Ad x̂ + Bd u`, with the force `u` (N) that is really applied.
+    /// Prediction for the next tick, `x̂⁻ = Ad x̂ + Bd u`, with the force `u` (N) really applied.
     ///
-    /// The terms of an entry are added in a fixed order, that of the columns: every machine gets the same bits.
-    // Factors stay references up to their product, so that each is loaded where it is used: 13 cycles less in a tick of five
-    // sensors.
+    /// The terms of an entry are added in a fixed order, column by column, so every machine computes the same bits.
+    // Factors stay references until they are multiplied, so that each is loaded where it is used: this saves 13 cycles
+    // in a tick with five sensors.
     #[inline(always)]
     pub(crate) fn predict(&self, estimate: &mut [T; NX], u: T) {
         let mut next = self.gains.bd.data.0[0].map(|b| b * u);
@@ -137,14 +138,14 @@ impl<'t, const NX: usize, const NY: usize, T: Scalar> Observer<'t, NX, NY, T> {
             let blocks = from_position.as_chunks::<2>().0.iter().zip(from_rate.as_chunks::<2>().0);
             let mut rows = next.as_chunks_mut::<2>().0.iter_mut().zip(blocks);
             if joint == 0 {
-                // The cart moves only itself, by the block 1, T; 0, 1.
+                // The cart's position and speed affect only the cart, through the block 1, T; 0, 1.
                 if let Some((next, (_, [to_position, _]))) = rows.next() {
                     *next = [next[0] + *position + *to_position * *rate, next[1] + *rate];
                 }
                 continue;
             }
             for (next, ([diagonal, to_rate], [to_position, _])) in rows {
-                // All products before the sums: no instruction waits for the one before it.
+                // All products before the sums, so that no instruction waits for the one before it.
                 let (a, b) = (*diagonal * *position, *to_rate * *position);
                 let (c, d) = (*to_position * *rate, *diagonal * *rate);
                 let [p, v] = [next[0] + a, next[1] + b];

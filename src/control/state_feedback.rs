@@ -15,10 +15,10 @@ pub fn state_feedback<T: Scalar, const NX: usize>(n: T, r: T, k: &SVector<T, NX>
     sum.force()
 }
 
-/// The sum `N r - K x`, joint by joint.
+/// The sum `N r - K x`, built up joint by joint.
 ///
-/// The terms are added in a fixed order (positions and rates apart, so that a processor can overlap them): every machine
-/// gets the same bits.
+/// The terms are added in a fixed order, so every machine computes the same bits. Positions and rates are summed
+/// separately, so that a processor can overlap them.
 pub(crate) struct FeedbackSum<T> {
     positions: T,
     rates: T,
@@ -27,16 +27,16 @@ pub(crate) struct FeedbackSum<T> {
 impl<T: Scalar> FeedbackSum<T> {
     #[inline(always)]
     pub(crate) fn new(n: T, r: T) -> Self {
-        // Adding to -0 changes nothing, so the compiler leaves the first addition out; with +0 it could not.
+        // Adding to -0 changes nothing, so the compiler can drop the first addition; with +0 it could not.
         Self { positions: n * r, rates: T::from_f32(-0.0) }
     }
 
-    /// Takes the gains and states of a joint: position and rate, or a position alone at the end.
+    /// Adds the gains times the states of a joint: position and rate, or only a position at the end.
     #[inline(always)]
     pub(crate) fn feed_back(&mut self, k: &[T], x: &[T]) {
         match (k, x) {
             ([k_position, k_rate], [position, rate]) => {
-                // Both products before both sums: no instruction waits for the one before it.
+                // Both products before both sums, so that no instruction waits for the one before it.
                 let (a, b) = (*k_position * *position, *k_rate * *rate);
                 self.positions -= a;
                 self.rates -= b;
@@ -52,7 +52,7 @@ impl<T: Scalar> FeedbackSum<T> {
     }
 }
 
-/// `u` limited to ±`limit`; 0 if `u` is NaN, which must never reach a motor.
+/// Limits `u` to ±`limit`; 0 if `u` is NaN, which must never reach a motor.
 #[inline]
 pub fn saturate<T: Scalar>(u: T, limit: T) -> T {
     if u > limit {
@@ -69,7 +69,7 @@ pub fn saturate<T: Scalar>(u: T, limit: T) -> T {
 /// The memory of a control law.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct LawState<T = f32> {
-    /// Governed set-point (m): what the law follows.
+    /// Governed set-point (m), which the law follows.
     pub setpoint: T,
     /// Integrated position error z (m·s).
     pub integral: T,
@@ -78,10 +78,10 @@ pub struct LawState<T = f32> {
 }
 
 impl<T: Scalar> LawState<T> {
-    /// Moves the governed set-point towards `target` (m) by at most one step of the gains' governor.
+    /// Moves the governed set-point towards `target` (m) by at most `step` (m), which comes from the gains.
     ///
-    /// In the linear model any such motion keeps every angle and the force within the share of their limits that the
-    /// step was designed for: a response is a sum of step responses, one per tick, so that
+    /// In the linear model, any such motion keeps every angle and the force within the share of their limits for which
+    /// the step was designed. The reason: a response is a sum of step responses, one per tick, so
     /// `|θ| <= step · Σ |step response of θ|`.
     #[inline]
     pub fn govern(&mut self, target: T, step: T) {
@@ -90,11 +90,11 @@ impl<T: Scalar> LawState<T> {
         self.setpoint += if rising < -step { -step } else { rising };
     }
 
-    /// Ends a tick of `tick_s` (s) at position `x` (m), in which `requested` was asked for and `applied` was possible:
+    /// Ends a tick of `tick_s` (s) at position `x` (m), with the force `requested` by the law and the force `applied`:
     /// `z⁺ = z + T (x - r)`.
     ///
-    /// Anti-windup by conditional integration: while the force is limited, z only moves in the direction that brings
-    /// the request back (Åström & Hägglund, *Advanced PID Control*, section 3.5).
+    /// Anti-windup by conditional integration: while the force is limited, z moves only in the direction that reduces
+    /// the excess (Åström & Hägglund, *Advanced PID Control*, section 3.5).
     #[inline]
     pub fn advance(&mut self, k_integral: T, x: T, tick_s: T, requested: T, applied: T) {
         let zero = T::default();
@@ -146,10 +146,10 @@ mod tests {
     #[test]
     fn the_integral_holds_while_the_force_is_limited_and_returns_at_once() {
         let mut state = LawState::<f32>::default();
-        // Position below the set-point asks for more force than there is: no winding up.
+        // Below the set-point, the law requests more force than is available: z must not wind up.
         state.advance(2.0, -1.0, 0.1, 9.0, 5.0);
         assert_eq!(state.integral, 0.0);
-        // The other way it may move although the force is limited.
+        // In the other direction z may move although the force is limited.
         state.advance(2.0, 1.0, 0.1, 9.0, 5.0);
         assert_eq!(state.integral, 0.1);
         state.advance(2.0, -1.0, 0.1, 5.0, 5.0);

@@ -2,9 +2,9 @@
 
 use crate::table::part::Part;
 
-/// CRC-32 (ISO-HDLC) of earlier bytes, whose checksum is `crc` (0 for none), and `bytes` after them.
+/// Continues the CRC-32 (ISO-HDLC) `crc` of earlier bytes (0 if there are none) with `bytes`.
 ///
-/// Four bits at a time: a table of 64 bytes instead of the usual kilobyte.
+/// Takes four bits at a time: the lookup table needs 64 bytes instead of the usual 1024.
 #[inline(never)]
 pub fn crc32(crc: u32, bytes: &[u8]) -> u32 {
     !bytes.iter().fold(!crc, |crc, &byte| {
@@ -14,7 +14,7 @@ pub fn crc32(crc: u32, bytes: &[u8]) -> u32 {
     })
 }
 
-/// Change of the register for each value of the four bits that leave it.
+/// Change of the register for each value of the four bits shifted out.
 const NIBBLES: [u32; 16] = {
     let mut nibbles = [0; 16];
     let mut nibble = 0;
@@ -31,7 +31,7 @@ const NIBBLES: [u32; 16] = {
     nibbles
 };
 
-/// Checksum of all words of `table` at once, as little-endian bytes in the order of declaration.
+/// Checksum of all words of `table`, as little-endian bytes in the order of declaration.
 pub(crate) fn checksum(table: &impl Part) -> u32 {
     let leaves = (0..).map_while(|leaf| table.part(&mut { leaf }));
     leaves.fold(0, |crc, leaf| {
@@ -39,19 +39,19 @@ pub(crate) fn checksum(table: &impl Part) -> u32 {
     })
 }
 
-/// The same checksum word by word, to be spread over many ticks.
+/// The same checksum, one word per call, so that the work is spread over many ticks.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct ChecksumScan {
-    /// Leaf of the table, see [`Part::part`].
+    /// Current leaf of the table, see [`Part::part`].
     leaf: u16,
-    /// Word of the leaf.
+    /// Next word within the leaf.
     word: u16,
-    /// Checksum of the words before.
+    /// Checksum of the words so far.
     crc: u32,
 }
 
 impl ChecksumScan {
-    /// Takes the next word of `table`. At the end gives the checksum of all words, and starts again.
+    /// Adds the next word of `table`. After the last word, returns the checksum of all words and starts again.
     pub fn next(&mut self, table: &impl Part) -> Option<u32> {
         let Some(words) = table.part(&mut usize::from(self.leaf)) else {
             return Some(core::mem::take(self).crc);

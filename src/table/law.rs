@@ -1,4 +1,4 @@
-//! The control laws a table can hold, and their gains.
+//! The control laws that a table can hold, and their gains.
 
 use core::fmt;
 use core::ops::{Index, IndexMut};
@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 use crate::table::part::{Part, Reader, Resize, Words, WordsMut, part};
 use crate::table::scalar::Scalar;
 
-/// A control law of the table.
+/// A control law.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Law {
@@ -20,10 +20,10 @@ pub enum Law {
 }
 
 impl Law {
-    /// All laws; a controller starts with the first that its table holds.
+    /// All laws. A controller starts with the first one that its table holds.
     pub const ALL: [Self; 2] = [Self::Lqr, Self::PolePlacement];
 
-    /// Name in rig files, in JSON and as a field of [`PerLaw`].
+    /// Name in rig files and JSON, and as a field of [`PerLaw`].
     pub const fn key(self) -> &'static str {
         match self {
             Law::Lqr => "lqr",
@@ -31,7 +31,7 @@ impl Law {
         }
     }
 
-    /// Name in commands and file names: the key with a hyphen.
+    /// Name in commands and file names: the key with hyphens.
     pub const fn option(self) -> &'static str {
         match self {
             Law::Lqr => "lqr",
@@ -47,7 +47,7 @@ impl Law {
         }
     }
 
-    /// The law with this [`option`](Self::option) name.
+    /// The law with this [`option`](Self::option) name, if any.
     pub fn from_option(name: &str) -> Option<Self> {
         Self::ALL.into_iter().find(|law| law.option() == name)
     }
@@ -63,22 +63,22 @@ impl fmt::Display for Law {
     }
 }
 
-/// One `T` for each law.
+/// One value of `T` for each law.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct PerLaw<T> {
-    /// That of [`Law::Lqr`].
+    /// Value for [`Law::Lqr`].
     pub lqr: T,
-    /// That of [`Law::PolePlacement`].
+    /// Value for [`Law::PolePlacement`].
     pub pole_placement: T,
 }
 
 impl<T> PerLaw<T> {
-    /// What `make` gives for each law.
+    /// Calls `make` for each law.
     pub fn from_fn(mut make: impl FnMut(Law) -> T) -> Self {
         Self { lqr: make(Law::Lqr), pole_placement: make(Law::PolePlacement) }
     }
 
-    /// A reference for each law.
+    /// A reference to each value.
     pub fn as_ref(&self) -> PerLaw<&T> {
         PerLaw::from_fn(|law| &self[law])
     }
@@ -88,34 +88,34 @@ impl<T> PerLaw<T> {
         [self.lqr, self.pole_placement]
     }
 
-    /// The values changed one by one.
+    /// Applies `change` to each value.
     pub fn map<U>(self, mut change: impl FnMut(T) -> U) -> PerLaw<U> {
         PerLaw { lqr: change(self.lqr), pole_placement: change(self.pole_placement) }
     }
 
-    /// The values in the order of [`Law::ALL`], each with its law.
+    /// Iterates over the values with their laws, in the order of [`Law::ALL`].
     pub fn iter(&self) -> impl Iterator<Item = (Law, &T)> {
         Law::ALL.into_iter().map(|law| (law, &self[law]))
     }
 }
 
 impl<T> PerLaw<Option<T>> {
-    /// What there is, each with its law.
+    /// Iterates over the values that are present, with their laws.
     pub fn present(&self) -> impl Iterator<Item = (Law, &T)> {
         self.iter().filter_map(|(law, value)| Some((law, value.as_ref()?)))
     }
 
-    /// What there is, to be changed.
+    /// Iterates over the values that are present, mutably.
     pub fn present_mut(&mut self) -> impl Iterator<Item = &mut T> {
         [&mut self.lqr, &mut self.pole_placement].into_iter().flatten()
     }
 }
 
 impl<T, E> PerLaw<Result<T, E>> {
-    /// All values, or the first error.
+    /// All values, or an error.
     ///
     /// # Errors
-    /// The first of the errors in the order of [`Law::ALL`].
+    /// The first error in the order of [`Law::ALL`].
     pub fn transpose(self) -> Result<PerLaw<T>, E> {
         Ok(PerLaw { lqr: self.lqr?, pole_placement: self.pole_placement? })
     }
@@ -193,7 +193,7 @@ part! {
 }
 
 impl<const NX: usize> LawGains<NX> {
-    /// Whether the governor can move the set-point.
+    /// Whether the largest step lets the governor move the set-point.
     pub(crate) fn is_sound(&self) -> bool {
         self.setpoint_step > 0.0
     }

@@ -1,11 +1,11 @@
-//! What the supervisor enforces, as part of the gain table.
+//! The limits that the supervisor enforces, as part of the gain table.
 
 use crate::table::part::part;
 
 part! {
-    /// Limits for `NY` sensors, worked out by `upright design` from `[limits]` of the rig file. Times are in ticks. A limit
-    /// that a rig does not have is `f32::MAX`, a least value 0; a sensor without turns, rest or sign to check (any of a
-    /// `[model]`) has 0 there.
+    /// Limits for `NY` sensors. `upright design` computes them from `[limits]` of the rig file. Times are in ticks. If
+    /// the rig has no such limit, a maximum is `f32::MAX` and a minimum 0. If a sensor has no turns, rest position or
+    /// sign to check (any sensor of a `[model]`), the value is 0.
     pub struct Limits<NY to MY;> {
         /// Soft limits of the rail, low and high (m).
         pub rail_m: [f32; 2],
@@ -43,7 +43,7 @@ part! {
 }
 
 impl<const NY: usize> Limits<NY> {
-    /// Limits that nothing exceeds: for a controller without supervisor.
+    /// Limits that are never exceeded: for a controller without a supervisor.
     pub const fn none() -> Self {
         Self {
             rail_m: [-f32::MAX, f32::MAX],
@@ -65,7 +65,7 @@ impl<const NY: usize> Limits<NY> {
         }
     }
 
-    /// Whether every limit can be one.
+    /// Whether every limit has a valid value.
     pub(crate) fn is_sound(&self) -> bool {
         let [low, high] = self.rail_m;
         let ticks =
@@ -78,7 +78,7 @@ impl<const NY: usize> Limits<NY> {
             && counts.into_iter().flatten().chain(&self.travel_counts).all(|&counts| counts >= 0)
     }
 
-    /// `counts` with each joint turned by whole turns to the half turn on either side of 0.
+    /// `counts` with whole turns removed from each joint, so that it is within half a turn of 0.
     pub fn within_half_a_turn(&self, counts: &[i32; NY]) -> [i32; NY] {
         let mut wrapped = *counts;
         for (count, &turn) in wrapped.iter_mut().zip(&self.turn_counts) {

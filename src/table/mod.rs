@@ -1,7 +1,7 @@
-//! The gain table: everything the controller knows about the rig, and how it is checked.
+//! The gain table: everything the controller knows about the rig, and the check of the table.
 //!
-//! The data are here, each field declared once; what is done with them is in [`control`](crate::control) and
-//! [`supervision`](crate::supervision). A table in another crate needs no other module than this one.
+//! Only the data are here, each field declared once; [`control`](crate::control) and
+//! [`supervision`](crate::supervision) use them. A gain table in another crate imports only this module.
 
 pub mod checksum;
 mod law;
@@ -25,11 +25,12 @@ pub use part::{Part, Reader, Resize, Shape, Words, WordsMut};
 pub use scalar::Scalar;
 pub use thresholds::{MotorTest, Thresholds};
 
-/// Layout of [`GainTable`]; a table written for another layout is refused.
+/// Version of the layout of [`GainTable`]; a table with another version is refused.
 pub const TABLE_FORMAT: u32 = 4;
 
 part! {
-    /// The constants of a controller with `NX` states and `NY` sensors, as written by `upright design` into `src/gains.rs`.
+    /// The constants of a controller with `NX` states and `NY` sensors. `upright design` writes them to
+    /// `src/gains.rs`.
     pub struct GainTable<NX to MX, NY to MY; T> {
         /// [`TABLE_FORMAT`] of the writer.
         pub format: u32,
@@ -63,28 +64,28 @@ part! {
     }
 }
 
-/// A matrix of constants, given column by column, usable in a `const`.
+/// A constant matrix, given column by column; usable in a `const`.
 pub const fn columns<const R: usize, const C: usize>(entries: [[f32; R]; C]) -> SMatrix<f32, R, C> {
     SMatrix::from_array_storage(ArrayStorage(entries))
 }
 
-/// What the firmware was built for; a table must agree with it.
+/// The rig and tick for which the firmware was built; a table must match both.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Build {
-    /// Hash of the rig file's values.
+    /// Hash of the values in the rig file.
     pub rig_hash: u64,
     /// Control period of the hardware timer (s).
     pub tick_s: f32,
 }
 
-/// Why a table is refused.
+/// Reason for refusing a table.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum TableError {
-    /// Written for another layout of the table.
+    /// Written for another version of the layout.
     Format,
-    /// The stored number of states or sensors is not that of the type, or a state is named that does not exist.
+    /// The stored number of states or sensors differs from that of the type, or a state index is out of range.
     Dimensions,
-    /// The checksum does not fit the contents.
+    /// The checksum does not match the contents.
     Crc,
     /// Designed for another rig.
     RigHash,
@@ -92,9 +93,9 @@ pub enum TableError {
     Tick,
     /// A delay other than 0 or 1 tick.
     Delay,
-    /// A value that is not finite, or a limit, supply or step that is not positive.
+    /// A value is not finite, or a limit, supply or step is not positive.
     Value,
-    /// No control law in the table.
+    /// The table holds no control law.
     NoLaw,
 }
 
@@ -120,12 +121,12 @@ impl core::fmt::Display for TableError {
 impl core::error::Error for TableError {}
 
 impl<const NX: usize, const NY: usize> GainTable<NX, NY> {
-    /// CRC-32 (ISO-HDLC) of every field but `crc`, as little-endian words in the order of declaration.
+    /// CRC-32 (ISO-HDLC) of every field except `crc`, as little-endian words in the order of declaration.
     pub fn checksum(&self) -> u32 {
         checksum::checksum(self)
     }
 
-    /// Whether the table is sound and meant for this build.
+    /// Checks that the table is intact, plausible and made for this build.
     ///
     /// # Errors
     /// The first [`TableError`] found.
@@ -163,7 +164,7 @@ impl<const NX: usize, const NY: usize> GainTable<NX, NY> {
         if is_sound && self.is_finite() { Ok(()) } else { Err(TableError::Value) }
     }
 
-    /// Whether no number of the table is infinite or NaN.
+    /// Whether the table is free of infinities and NaN.
     fn is_finite(&self) -> bool {
         let leaves = (0..).map_while(|leaf| self.part(&mut { leaf }));
         leaves.into_iter().all(|words| match words {
@@ -174,12 +175,12 @@ impl<const NX: usize, const NY: usize> GainTable<NX, NY> {
 }
 
 impl<const NX: usize, const NY: usize, T: Scalar> GainTable<NX, NY, T> {
-    /// The gains of a law, if the table holds them.
+    /// The gains of a law, if they are in the table.
     pub fn law(&self, law: Law) -> Option<&LawGains<NX, T>> {
         self.laws[law].as_ref()
     }
 
-    /// Whether the force depends on earlier ticks other than through the estimate: by a pending force or an integral.
+    /// Whether the force depends on earlier ticks by more than the estimate: through a pending force or an integral.
     pub(crate) fn has_memory(&self, gains: &LawGains<NX, T>) -> bool {
         let zero = T::default();
         self.delay_ticks == 1 || gains.k_pending != zero || gains.k_integral != zero

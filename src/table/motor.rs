@@ -1,10 +1,10 @@
-//! The motor as the cart sees it.
+//! The motor, as seen by the cart.
 
 use crate::table::part::part;
 use crate::table::scalar::Scalar;
 
 part! {
-    /// A DC motor behind gear and pulley, as seen by the cart.
+    /// A DC motor that drives the cart through a gear and a pulley.
     #[derive(Copy)]
     pub struct MotorMap<; T> {
         /// Voltage per force at standstill, `R r / (gear Kt)` (V/N).
@@ -21,7 +21,7 @@ part! {
 }
 
 impl MotorMap {
-    /// Whether a force has a voltage, and a voltage a duty cycle.
+    /// Whether every force maps to a voltage, and every voltage to a duty cycle.
     pub(crate) fn is_sound(&self) -> bool {
         self.volts_per_newton > 0.0 && self.supply_v > 0.0
     }

@@ -1,12 +1,12 @@
-//! What a gain table consists of: structs of words, each declared once by [`part!`].
+//! The structs of words that make up a gain table, each declared once by [`part!`].
 //!
-//! The declaration makes the struct and everything that has to go through all of its fields: the checksum, the check for
-//! values that are not finite, the writer of the source and the change of size. The fields are taken from the struct by
-//! exhaustive destructuring, so that none can be forgotten.
+//! The declaration generates the struct and everything that visits all of its fields: the checksum, the check for
+//! infinities and NaN, the writer of the source and the change of size. Exhaustive destructuring makes the compiler
+//! reject a forgotten field.
 
 use nalgebra::SMatrix;
 
-/// Consecutive words of a table.
+/// Consecutive words of a table, all of one type.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Words<'a> {
     /// Floating-point numbers.
@@ -20,7 +20,7 @@ pub enum Words<'a> {
 }
 
 impl Words<'_> {
-    /// Word number `index` as bits; none beyond the last.
+    /// The bits of word `index`; `None` past the end.
     #[inline]
     pub fn get(&self, index: usize) -> Option<u32> {
         match self {
@@ -36,7 +36,7 @@ impl Words<'_> {
     }
 }
 
-/// As [`Words`], to be changed.
+/// The same words as [`Words`], mutable.
 #[derive(Debug, PartialEq)]
 pub enum WordsMut<'a> {
     /// Floating-point numbers.
@@ -47,7 +47,7 @@ pub enum WordsMut<'a> {
     I32(&'a mut [i32]),
     /// Two words, the low one first.
     U64(&'a mut u64),
-    /// Whether an optional part is there.
+    /// Whether an optional part is present.
     Presence,
 }
 
@@ -60,46 +60,45 @@ pub enum Shape {
     List,
     /// A matrix, column by column; a vector is one column.
     Columns {
-        /// Entries of each column.
+        /// Number of entries in each column.
         rows: usize,
     },
 }
 
 /// A table or a part of one.
 pub trait Part {
-    /// The words of leaf number `at`, in the order of declaration. A part that has fewer leaves takes their number off `at`
-    /// and gives none. An optional part is one word (1 or 0) and, if it is there, its contents.
+    /// The words of leaf `at`, counted in the order of declaration. A part with fewer leaves subtracts their number
+    /// from `at` and returns `None`. An optional part is one word (1 or 0), followed by its contents if it is present.
     fn part(&self, at: &mut usize) -> Option<Words<'_>>;
 
-    /// As [`part`](Self::part), to change the words.
+    /// The same as [`part`](Self::part), mutable.
     fn part_mut(&mut self, at: &mut usize) -> Option<WordsMut<'_>>;
 
-    /// Tells `reader` all names, documentation and values, in the order of declaration.
+    /// Passes all names, documentation and values to `reader`, in the order of declaration.
     fn read(&self, reader: &mut dyn Reader);
 }
 
-/// Who wants the names of a table's fields along with their values.
+/// Receives the fields of a table with names, documentation and values.
 pub trait Reader {
-    /// A struct of this name begins.
+    /// Start of a struct with this name.
     fn begin(&mut self, name: &'static str);
 
-    /// A field of it, with its documentation line by line; its value follows.
+    /// A field of the struct, with its documentation line by line; its value follows.
     fn field(&mut self, name: &'static str, documentation: &[&'static str]);
 
     /// The value of a field.
     fn words(&mut self, words: Words<'_>, shape: Shape);
 
-    /// The value of an optional field: if it is there, it follows.
+    /// The value of an optional field. If `is_there`, the value itself follows.
     fn option(&mut self, is_there: bool);
 
-    /// The struct ends.
+    /// End of the struct.
     fn end(&mut self);
 }
 
-/// The same part for other numbers of states and sensors: entries beyond the smaller size are dropped, those beyond the
-/// larger are 0.
+/// Converts a part to another number of states and sensors: surplus entries are dropped, new ones are 0.
 pub trait Resize<To> {
-    /// The part in the other size.
+    /// The part in the new size.
     fn resized(&self) -> To;
 }
 
@@ -222,7 +221,7 @@ impl<P: Resize<Q>, Q> Resize<Option<Q>> for Option<P> {
     }
 }
 
-/// `words` if they are those that are looked for.
+/// `words` if `at` is 0; otherwise counts `at` down by this leaf.
 #[inline(always)]
 fn leaf<W>(at: &mut usize, words: W) -> Option<W> {
     match at.checked_sub(1) {
@@ -234,9 +233,9 @@ fn leaf<W>(at: &mut usize, words: W) -> Option<W> {
     }
 }
 
-/// Declares a struct of a gain table, `pub struct Name<SIZE to OTHER, …; SCALAR> { … }`, each field with its
-/// documentation: the numbers of states and sensors with a second name for [`Resize`], and the scalar if a host wants the
-/// struct in another precision as well. A last field `sealed by NAME` is the checksum of the others.
+/// Declares a struct of a gain table: `pub struct Name<SIZE to OTHER, …; SCALAR> { … }`. `SIZE` is a number of states
+/// or sensors and `OTHER` its name in the result of [`Resize`]. `SCALAR` is given if the host also uses the struct in
+/// another precision. Every field needs documentation. A last field `sealed by NAME` is the checksum of the others.
 macro_rules! part {
     (
         $(#[$attribute:meta])*

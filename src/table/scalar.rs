@@ -2,8 +2,8 @@
 
 use core::ops::{Add, AddAssign, Div, Mul, MulAssign, Neg, Sub, SubAssign};
 
-/// A floating-point type that the control law can be computed in: `f32` in the firmware, `f64` where the host compares
-/// the firmware with the same law in double precision.
+/// A floating-point type for the control law: `f32` in the firmware, `f64` on the host, which compares the firmware
+/// with the same law in double precision.
 pub trait Scalar:
     nalgebra::Scalar
     + Copy
@@ -18,16 +18,16 @@ pub trait Scalar:
     + SubAssign
     + MulAssign
 {
-    /// The same value; exact.
+    /// Converts from `f32`, exactly.
     fn from_f32(value: f32) -> Self;
 
-    /// A number of encoder counts, rounded to this type.
+    /// Converts encoder counts, rounded to this type.
     fn from_counts(counts: i32) -> Self;
 
-    /// The value as it goes to the power stage, rounded to `f32`.
+    /// Converts to `f32` for the power stage, rounded.
     fn to_f32(self) -> f32;
 
-    /// Whether it is neither infinite nor NaN.
+    /// Whether the value is neither infinite nor NaN.
     fn is_finite(self) -> bool;
 }
 

@@ -1,4 +1,4 @@
-//! The checksum guards every bit of a table, whichever field it is in.
+//! The checksum guards every bit of a table, in every field.
 
 use std::format;
 use std::string::String;
@@ -10,7 +10,7 @@ use super::*;
 
 const BUILD: Build = Build { rig_hash: 0x0123_4567_89ab_cdef, tick_s: 0.01 };
 
-/// A table with everything in it, all numbers different.
+/// A table with every optional part, all numbers different.
 fn full() -> GainTable<4, 2> {
     let mut number = 0.5;
     let mut next = || {
@@ -79,7 +79,7 @@ fn full() -> GainTable<4, 2> {
     table
 }
 
-/// Numbers of words in the leaves of a part; none for the presence of an optional one.
+/// Number of words in each leaf of a part; `None` for the presence word of an optional part.
 fn sizes(part: &mut impl Part) -> Vec<Option<usize>> {
     let size = |leaf: usize| match part.part_mut(&mut { leaf })? {
         WordsMut::F32(values) => Some(Some(values.len())),
@@ -102,7 +102,7 @@ fn flip(part: &mut impl Part, leaf: usize, word: usize, bit: u32) {
     }
 }
 
-/// How many numbers the text of `{:?}` holds: it goes through the fields without [`Part`].
+/// Count of the numbers in the text of `{:?}`, which visits the fields without [`Part`].
 fn numbers_in(debug: &str) -> usize {
     let starts_number =
         |word: &&str| word.trim_start_matches('-').starts_with(|first: char| first.is_ascii_digit());
@@ -131,7 +131,7 @@ fn every_flipped_bit_of_a_full_table_is_refused() {
         let damaged = GainTable { crc: good.crc ^ 1 << bit, ..good.clone() };
         assert_eq!(damaged.check(&BUILD), Err(TableError::Crc));
     }
-    // All words but the checksum itself; the hash of 64 bits is two.
+    // All words except the checksum itself; the 64-bit hash counts as two.
     assert_eq!(flipped, 32 * (numbers_in(&format!("{good:?}")) - 1 + 1));
 }
 
@@ -155,7 +155,7 @@ fn a_part_that_is_missing_or_moved_to_the_other_law_is_refused() {
     assert_eq!(one.check(&BUILD), crc);
 }
 
-/// Declared by hand, and so as not to be declared: a field is forgotten.
+/// Negative control: a part written by hand, as nobody should, that forgets a field.
 #[derive(Debug)]
 struct Forgetful {
     guarded: [f32; 2],
@@ -218,7 +218,7 @@ fn a_scan_gives_the_same_checksum_again_and_again() {
     }
 }
 
-/// Notes the names of all fields.
+/// Collects the names of all fields.
 struct Names(Vec<String>);
 
 impl Reader for Names {

@@ -1,10 +1,10 @@
-//! When the supervisor takes encoders and motor to be at fault; the tests are in
+//! Thresholds above which the supervisor reports a fault of an encoder or the motor; the tests are in
 //! [`detection`](crate::supervision::detection).
 
 use crate::table::part::part;
 
 part! {
-    /// Thresholds of the tests for `NY` sensors; `f32::MAX` where there is nothing to test.
+    /// Thresholds of the fault tests for `NY` sensors; `f32::MAX` where there is nothing to test.
     pub struct Thresholds<NY to MY;> {
         /// Largest plausible innovation of each sensor (m or rad).
         pub innovation: [f32; NY],
@@ -16,11 +16,11 @@ part! {
 }
 
 part! {
-    /// Effect of a missing force on the innovation of the first sensor, and when that is a fault.
+    /// Effect of a missing force on the innovation of the first sensor, and when it counts as a fault.
     ///
-    /// The error `(p, v)` of predicted position and speed follows
-    /// `p⁺ = a_pp p' + a_pv v' - b_p u, v⁺ = a_vp p' + a_vv v' - b_v u` with `p' = p - l_p p, v' = v - l_v p`; p is the
-    /// innovation that a missing `u` causes.
+    /// The error `(p, v)` of the predicted position and speed follows
+    /// `p⁺ = a_pp p' + a_pv v' - b_p u, v⁺ = a_vp p' + a_vv v' - b_v u` with `p' = p - l_p p, v' = v - l_v p`. p is
+    /// the innovation that a missing `u` causes.
     #[derive(Copy)]
     pub struct MotorTest<;> {
         /// a_pp, a_pv, a_vp, a_vv over one tick, the observer's correction included.
@@ -40,12 +40,12 @@ impl MotorTest {
 }
 
 impl<const NY: usize> Thresholds<NY> {
-    /// Thresholds that nothing exceeds.
+    /// Thresholds that are never exceeded.
     pub const fn none() -> Self {
         Self { innovation: [f32::MAX; NY], frozen: [f32::MAX; NY], motor: MotorTest::NONE }
     }
 
-    /// Whether every threshold is above 0.
+    /// Whether every threshold is positive.
     pub(crate) fn is_sound(&self) -> bool {
         let thresholds =
             self.innovation.iter().chain(&self.frozen).chain([&self.motor.ratio, &self.motor.energy]);

@@ -6,7 +6,7 @@ use upright::gains::{RIG_HASH, STATES, TABLE, TICK_S};
 use upright::table::{Build, Law};
 use upright_design::simulate::{Bench, Scenario, Summary, simulate};
 
-/// `gains::TABLE` in the firmware's own controller, in the plainest loop there is; every state at every tick.
+/// `gains::TABLE` in the firmware's own controller, in the simplest possible loop; every state at every tick.
 fn firmware_alone(scenario: &Scenario) -> Vec<[f64; STATES]> {
     let rig = rig_of_the_firmware();
     let build = Build { rig_hash: RIG_HASH, tick_s: TICK_S };
@@ -26,7 +26,7 @@ fn firmware_alone(scenario: &Scenario) -> Vec<[f64; STATES]> {
         .collect()
 }
 
-/// Whatever rig the table is for: it stands, and the tool's simulation is this very run.
+/// Whatever rig the table is for, it balances, and the tool's simulation is exactly this run.
 #[test]
 fn the_firmwares_table_holds_its_rig_bit_for_bit_as_simulated() {
     let rig = rig_of_the_firmware();
@@ -53,7 +53,7 @@ fn the_papers_rig_follows_a_metre_step_without_steady_state_error() {
         let summary = run(&rig, &table, &metre_step(&rig, law, duration_s));
         assert!(summary.settled && summary.final_error_m.abs() < 1e-4, "{law:?}: {summary}");
         assert!(summary.peak_force_n < 20.0, "the limit takes no part in this");
-        // Negative control: half way to the set-point is an error.
+        // Negative control: half way to the set-point, the error is large.
         let early = run(&rig, &table, &metre_step(&rig, law, 1.0));
         assert!(!early.settled && early.final_error_m.abs() > 1e-2, "{law:?}: {early}");
     }
@@ -73,11 +73,11 @@ fn figures(summary: &Summary) -> Vec<f64> {
     .collect()
 }
 
-/// Drake, MuJoCo and a hand-derived model agree on these figures for the gains as printed; two decimals of a gain
-/// are up to 0.3 % of it, which moves a figure by up to 3 %.
+/// Drake, MuJoCo and a hand-derived model agree on these figures for the gains as printed. Two decimals of a gain are
+/// up to 0.3 % of it, which changes a figure by up to 3 %.
 #[test]
 fn the_papers_continuous_gains_give_the_published_responses() {
-    // A tick of 0.1 ms is continuous time for a loop whose fastest pole is at -528 1/s.
+    // A tick of 0.1 ms is as good as continuous time for a loop whose fastest pole is at -528 1/s.
     let rig = paper_at(1e-4, 0);
     let table = continuous_table(&rig);
     for (law, wanted) in [
@@ -91,7 +91,7 @@ fn the_papers_continuous_gains_give_the_published_responses() {
     }
 }
 
-/// Gains for the tick ask for less force at once, and leave the response as it was meant.
+/// Gains for the tick request less force at first, and keep the response as intended.
 #[test]
 fn sampled_gains_keep_the_response_of_the_continuous_design() {
     let (continuous, sampled) = (paper_at(1e-4, 0), paper_at(1e-3, 0));
@@ -101,7 +101,7 @@ fn sampled_gains_keep_the_response_of_the_continuous_design() {
         let found = run(&sampled, &sampled_table, &metre_step(&sampled, law, 8.0));
         assert!(found.peak_force_n < meant.peak_force_n);
         let time = |summary: &Summary| summary.settling_time_s.unwrap();
-        // A few ticks: the sampled optimum is another one, if by little.
+        // A few ticks: the sampled optimum differs slightly.
         assert!((time(&found) - time(&meant)).abs() < 5e-3, "{law:?}\n{found}\n{meant}");
         for (found, meant) in found.peak_angles_rad.iter().zip(&meant.peak_angles_rad) {
             assert!((found / meant - 1.0).abs() < 0.01, "{law:?}: {found} {meant}");
@@ -120,7 +120,7 @@ fn single_double_and_triple_rigs_stand_under_both_laws_with_and_without_delay() 
                 let scenario = Scenario { step_m: 0.1, duration_s: 12.0, ..lean(&rig, law, 0.01) };
                 let summary = run(&rig, &table, &scenario);
                 assert!(
-                    // What is left of the dead zone lets the cart rest, or creep, a little beside its place.
+                    // The rest of the dead zone lets the cart stop, or creep, a little beside the set-point.
                     summary.settled && summary.final_error_m.abs() < 2e-3,
                     "{name} {law:?} delay {delay_ticks}: {summary}"
                 );
@@ -149,7 +149,7 @@ fn it_stands_under_the_papers_disturbances() {
     let rig = rig("quadruple-paper");
     let table = raw_table(&rig);
     for law in LAWS {
-        // F_d ~ N(0, 0.01) and joint torques ~ N(0, 1e-9), variances as the paper gives them.
+        // F_d ~ N(0, 0.01) and joint torques ~ N(0, 1e-9), with the variances given in the paper.
         let disturbed = Scenario {
             force_noise_n: 0.1,
             torque_noise_n_m: 1e-9f64.sqrt(),

@@ -1,4 +1,4 @@
-//! Nothing but encoder counts: every rig stands, and what must not matter does not.
+//! With only encoder counts, every rig balances, and counter widths and starting counts make no difference.
 
 use crate::bench::*;
 use upright::control::controller::Controller;
@@ -9,10 +9,10 @@ use upright_design::simulate::{Bench, Sample, Scenario, Sensing, simulate};
 use upright_design::table::TableValues;
 use upright_design::verify::{CornerSettings, Corners, Disturbance, coarser, corners, endurance};
 
-/// 0.1 N rms on the cart, nothing at the joints.
+/// Force noise of 0.1 N rms on the cart, none at the joints.
 const FORCE_NOISE: Disturbance = Disturbance { force_n: 0.1, torque_n_m: 0.0 };
 
-/// The paper's rig (4096 counts per revolution, 1 kHz) with at most `limit_n` of force.
+/// The paper's rig (4096 counts per revolution, 1 kHz) with a force limit of `limit_n`.
 fn paper_with_limit(limit_n: f64) -> Rig {
     let mut rig = rig("quadruple-paper");
     rig.actuator.force_limit_n = Some(limit_n);
@@ -40,7 +40,7 @@ fn too_coarse_an_encoder_and_too_small_a_force_fall() {
         assert_eq!(stood(&fine, law, 3, 5.0), 3);
         // 64 counts per revolution.
         assert_eq!(stood(&coarser(&fine, 64.0), law, 3, 5.0), 0, "{law:?}: coarse");
-        // Half of the noise is not enough to make up for it.
+        // A force limit of half the noise (rms) is too small to compensate it.
         assert_eq!(stood(&paper_with_limit(0.05), law, 3, 5.0), 0, "{law:?}: weak");
     }
 }
@@ -53,7 +53,7 @@ fn the_quadruple_takes_half_a_metre_through_the_governor_in_noise() {
             Scenario { step_m: 0.5, duration_s: 20.0, force_noise_n: 0.1, ..Scenario::at_rest(&rig, law) };
         assert_eq!(scenario.sensing, Sensing::Encoders);
         let summary = run(&rig, &table(&rig), &scenario);
-        // Force noise moves the cart by some millimetres all the time.
+        // The force noise keeps moving the cart by some millimetres.
         assert!(summary.stands() && summary.final_error_m.abs() < 0.05, "{law:?}: {summary}");
         assert!(summary.peak_force_n < 5.0, "{law:?}: {summary}");
     }
@@ -70,9 +70,9 @@ fn single_double_and_triple_with_motor_dead_zone_and_friction_take_a_step_throug
             let step = Scenario { step_m: 0.1, duration_s: 20.0, ..Scenario::at_rest(&rig, law) };
             assert_eq!(step.sensing, Sensing::Encoders);
             let summary = run(&rig, &table, &step);
-            // What is left of the dead zone and the encoder's steps let the cart creep beside its place.
+            // The rest of the dead zone and the encoder's steps let the cart creep beside the set-point.
             assert!(summary.stands() && summary.final_error_m.abs() < 5e-3, "{name} {law:?}: {summary}");
-            // Negative control: a hundredth of the supply cannot hold a lean that the whole of it holds.
+            // Negative control: a hundredth of the supply cannot hold a lean that the full supply holds.
             let mut tired = rig.clone();
             tired.actuator.motor.as_mut().unwrap().supply_v /= 100.0;
             let mut push = step.clone();
@@ -95,14 +95,14 @@ fn bits(rig: &Rig, table: &TableValues, scenario: &Scenario, counter_start: u32)
     trace.samples().map(row).collect()
 }
 
-/// How often each counter goes over its end in that run.
+/// How often each counter wraps in that run.
 fn wraps(rig: &Rig, table: &TableValues, scenario: &Scenario, counter_start: u32) -> Vec<usize> {
     let (trace, _) = simulate(rig, table, scenario).unwrap();
     rig.sensors()
         .iter()
         .enumerate()
         .map(|(index, sensor)| {
-            // The cart's counter has 32 bits, those of the links 16.
+            // The cart's counter has 32 bits, those of the links have 16.
             let bits = if index == 0 { 32 } else { 16 };
             let shown: Vec<u64> = trace
                 .samples()
@@ -130,7 +130,7 @@ fn a_wrap_of_every_counter_in_mid_run_changes_nothing() {
                 let wraps = wraps(&rig, &table, &scenario, counter_start);
                 assert!(wraps.iter().all(|&wraps| wraps > 0), "{name} {law:?} {counter_start}: {wraps:?}");
             }
-            // The 16 bits of the links end where the 32 of the cart do not, and the sign bits turn over.
+            // The links' 16 bits wrap where the cart's 32 do not, and the sign bits change.
             for counter_start in [65_535, 2 * 65_536 - 1, 7 * 65_535, (1 << 31) - 1, 1 << 15] {
                 assert!(
                     bits(&rig, &table, &scenario, counter_start) == plain,
@@ -147,8 +147,8 @@ fn a_wrap_of_every_counter_in_mid_run_changes_nothing() {
     }
 }
 
-/// A run in the plainest loop there is, the controller taking the counters for ones of these widths; every state, as bits.
-/// None if a link fell.
+/// A run in the simplest possible loop, with the controller told that the counters have these widths; every state, as
+/// bits. `None` if a link fell.
 fn with_widths<const NX: usize, const NY: usize>(
     name: &str,
     assumed: [CounterWidth; NY],
@@ -186,7 +186,7 @@ fn registers_of_sixteen_bits_wrap_unnoticed_and_not_if_their_width_is_mistaken()
     for law in LAWS {
         let paper = |widths, start| with_widths::<10, 5>("quadruple-paper", widths, law, start);
         let plain = paper(Bench::widths(), 1 << 14).unwrap();
-        // At 65 535 and at u32::MAX every register of 16 bits stands right before its end, at 0 right after it.
+        // At 65 535 and at u32::MAX, every 16-bit register is just before its wrap; at 0, just after it.
         for start in [0, 65_535, u32::MAX] {
             assert!(paper(Bench::widths(), start).as_ref() == Some(&plain), "{law:?} {start}");
             assert!(paper([Bits32; 5], start).is_none(), "{law:?} {start}");
@@ -220,6 +220,6 @@ fn an_observer_that_trusts_the_papers_joint_noise_loses_corners_at_five_percent(
     let found = wrong_by(&rig, Law::PolePlacement, 5.0);
     assert!((1..32).contains(&(found.corners - found.stand)), "{} of {} stand", found.stand, found.corners);
     assert_eq!(found.lost.len(), found.corners - found.stand);
-    // It is the wrong masses that it does not stand.
+    // Negative control: the wrong masses are what makes it fall.
     assert_eq!(wrong_by(&rig, Law::PolePlacement, 2.0).stand, 32);
 }

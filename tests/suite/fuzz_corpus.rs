@@ -1,4 +1,4 @@
-//! What fuzzing has found worth keeping, again, without the fuzzer: see `.ci/fuzz`.
+//! Inputs that fuzzing found worth keeping, run without the fuzzer: see `.ci/fuzz`.
 
 #[path = "../../fuzz/checks/commands.rs"]
 mod commands;

@@ -10,7 +10,7 @@ use upright_design::table::gains_source;
 
 const WIDTHS: [CounterWidth; SENSORS] = [CounterWidth::Bits32; SENSORS];
 
-/// Line and contents of the first difference.
+/// The first difference: line number and contents.
 fn difference(found: &str, wanted: &str) -> Option<String> {
     if found == wanted {
         return None;
@@ -49,7 +49,7 @@ fn any_changed_value_of_the_rig_changes_the_table() {
     assert_eq!(other(&|_| ()), None);
     assert!(other(&|rig| rig.tick.period_s *= 1.001).is_some());
     assert!(other(&|rig| rig.name.push('2')).is_some());
-    // Limits feed no gain, but a controller and a host must not disagree about them either: the hash changes.
+    // Limits affect no gain, but a controller and a host must agree about them too: the hash changes.
     let hash = other(&|rig| rig.limits.angle_rad = Some(0.123)).unwrap();
     assert!(hash.contains("RIG_HASH"), "{hash}");
 }

@@ -1,7 +1,7 @@
-//! The set-point governor: any position may be asked for, at any time, and nothing leaves its limits on the way.
+//! The set-point governor: any position may be requested at any time, and nothing leaves its limits on the way.
 //!
-//! The criterion: in the linear model no path of the governed set-point takes a link's angle from the vertical or the
-//! force beyond half of its limit.
+//! The criterion: in the linear model, no path of the governed set-point takes the force, or a link's angle from the
+//! vertical, beyond half of its limit.
 
 use crate::bench::*;
 use nalgebra::SVector;
@@ -14,7 +14,8 @@ use upright_design::rig::{PolePlacement, Rig};
 use upright_design::simulate::{Bench, Scenario, Sensing, simulate};
 use upright_design::table::TableValues;
 
-/// The criterion is about the linear model: at half of the limit, 0.175 rad, sin θ and cos θ differ from it by up to 1.5 %.
+/// The criterion holds for the linear model: at half of the limit, 0.175 rad, sin θ and cos θ differ from it by up to
+/// 1.5 %.
 const NONLINEAR: f64 = 1.03;
 
 /// The paper's rig with the settling time at which its pole placement falls on a step of 1 m.
@@ -45,7 +46,7 @@ impl Peaks {
         self.force = self.force.max(force.abs());
     }
 
-    /// Both as shares of what the criterion allows.
+    /// Both peaks as shares of what the criterion allows.
     fn shares(self, rig: &Rig) -> [f64; 2] {
         [
             self.angle / (0.5 * rig.limits.angle_rad.unwrap()),
@@ -76,7 +77,7 @@ fn the_metre_step_that_falls_without_governor_is_reached_through_it_within_half_
             assert!(summary.settled && summary.final_error_m.abs() < 1e-4, "{law:?} {step_m}: {summary}");
             assert!(peaks.within_limits(rig), "{law:?} {step_m}: {peaks:?} {:?}", peaks.shares(rig));
         }
-        // Negative control: this check does find a step that goes too far.
+        // Negative control: this check finds a step that goes too far.
         let (trace, _) = simulate(rig, &raw, &step(rig, law, 1.9, 10.0)).unwrap();
         let mut peaks = Peaks::default();
         trace.samples().for_each(|sample| peaks.see(sample.state, sample.force));
@@ -111,7 +112,7 @@ fn the_governed_set_point_is_monotone_and_arrives_exactly() {
             let path: Vec<f64> = trace.samples().map(|sample| sample.setpoint).collect();
             assert!(path.windows(2).all(|pair| (pair[1] - pair[0]) * step_m >= 0.0), "{law:?} {step_m}");
             assert_eq!(path.last(), Some(&f64::from(step_m as f32)), "{law:?}");
-            // It takes its time: not there at once, and no tick moves it further than the table's step.
+            // The set-point moves gradually: no tick moves it further than the step in the table.
             let largest = f64::from(table.law(law).unwrap().setpoint_step);
             assert!(largest < 0.1, "{largest}");
             assert!(
@@ -122,7 +123,7 @@ fn the_governed_set_point_is_monotone_and_arrives_exactly() {
     }
 }
 
-/// Runs a list of requests, each held for its number of ticks; none if something fell.
+/// Runs a list of requests, each held for its number of ticks; `None` if a link fell.
 fn requests(rig: &Rig, values: &TableValues, law: Law, requests: &[(f32, u32)]) -> Option<Peaks> {
     let table = values.table::<10, 5>();
     let mut controller = Controller::new(&table, &values.build(), [CounterWidth::Bits32; 5]).unwrap();
@@ -178,7 +179,7 @@ fn to_and_fro_at_any_pace_stays_within_the_limits_and_does_not_without_governor(
             unshaped_leaves |= !unshaped.is_some_and(|peaks| peaks.within_limits(rig));
         }
         assert!(unshaped_leaves, "{law:?}");
-        // The bound is not so wide that it says nothing: half of what is allowed is really used.
+        // The bound is not too wide to be useful: the runs use more than half of what it allows.
         assert!(largest > 0.5, "{law:?}: {largest}");
     }
 }

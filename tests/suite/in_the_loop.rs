@@ -1,8 +1,8 @@
-//! The whole firmware in closed loop: the same bits in a simulation of the controller alone, with all tasks on the host,
-//! and as an image in QEMU.
+//! The whole firmware in closed loop gives the same bits three times: in a simulation of the controller alone, with
+//! all tasks on the host, and as an image in QEMU.
 //!
-//! Without a compiler for the image, or without QEMU, the tests that need them say so and pass; with the environment
-//! variable `UPRIGHT_REQUIRE_IMAGE` set, they fail.
+//! Without a compiler for the image, or without QEMU, the tests that need them say so and pass. If the environment
+//! variable `UPRIGHT_REQUIRE_IMAGE` is set, they fail.
 
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
@@ -24,7 +24,8 @@ use upright_design::table::{Gains, TableValues};
 use upright_tool::image::{Kind, build_if_possible};
 use upright_tool::in_the_loop::{Link, Place, run};
 
-/// Most instructions of a tick of the image, telemetry of every tick included; a tenth more than counted with Rust 1.96.
+/// Upper bound on the instructions in a tick of the image, with telemetry in every tick: 10 % above the count with
+/// Rust 1.96.
 const MOST_INSTRUCTIONS: u32 = 3325;
 
 fn quadruple() -> (Rig, TableValues) {
@@ -33,7 +34,7 @@ fn quadruple() -> (Rig, TableValues) {
     (rig, table)
 }
 
-/// Step and tilt with each law; with disturbances, too, or without.
+/// Step and tilt with each law, with or without disturbances.
 fn scenarios(rig: &Rig, disturbed: bool) -> Vec<(String, Scenario)> {
     let mut scenarios = Vec::new();
     for (name, law) in Law::ALL.map(|law| (law.option(), law)) {
@@ -49,7 +50,7 @@ fn scenarios(rig: &Rig, disturbed: bool) -> Vec<(String, Scenario)> {
     scenarios
 }
 
-/// The image, and QEMU to run it, if both are there.
+/// The image, if its compiler and QEMU are both there.
 fn image(kind: Kind) -> Option<PathBuf> {
     let image = build_if_possible(kind).unwrap()?;
     match Command::new("qemu-system-arm").arg("--version").stdout(Stdio::null()).status() {
@@ -90,7 +91,7 @@ fn the_image_in_qemu_gives_the_bits_of_the_host_and_of_its_last_run() {
         assert!(qemu.summary.stands(), "{name}: {:?}", qemu.fault);
         let again = run(&rig, &table, &scenario, place).unwrap();
         assert_eq!((&qemu.ticks, qemu.worst_cycles), (&again.ticks, again.worst_cycles), "{name}");
-        // The comparison sees a single bit.
+        // Negative control: the comparison sees another seed.
         let other = Scenario { seed: 8, ..scenario };
         assert!(run(&rig, &table, &other, Place::Host).unwrap().ticks != host.ticks, "{name}");
     }
@@ -117,7 +118,7 @@ fn a_tick_of_the_image_takes_no_more_instructions_than_it_used_to() {
     assert!((500..=MOST_INSTRUCTIONS).contains(&worst), "{worst}");
 }
 
-/// Per tick: number, force applied (f32 bits), checksum of all bits that the firmware tells.
+/// Per tick: number, applied force (f32 bits), checksum of all bits that the firmware reports.
 fn golden(recording: &Recording) -> String {
     let mut text = String::from("tick,force_bits,checksum\n");
     for (number, tick) in recording.ticks.iter().enumerate() {
@@ -128,7 +129,7 @@ fn golden(recording: &Recording) -> String {
     text
 }
 
-/// The committed traces. With UPRIGHT_BLESS=1 in the environment this writes them again.
+/// The committed traces. With UPRIGHT_BLESS=1 in the environment, this writes them again.
 #[test]
 fn the_runs_are_those_of_the_committed_traces() {
     let (rig, table) = quadruple();
@@ -149,7 +150,7 @@ fn the_runs_are_those_of_the_committed_traces() {
     }
 }
 
-/// The emulator has no clock tree: the board's image finds no crystal there, says so and stays off.
+/// The emulator has no clock tree, so the board's image finds no crystal, reports it and stays off.
 #[test]
 fn the_image_for_the_board_ends_a_wait_for_the_clock_with_its_fault() {
     let Some(image) = image(Kind::F405) else { return };

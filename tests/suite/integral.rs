@@ -1,4 +1,4 @@
-//! Integral action on the cart position: removes what the precompensation cannot, and does not wind up.
+//! Integral action on the cart position: removes the offset that the precompensation leaves, and does not wind up.
 
 use crate::bench::*;
 use std::path::Path;
@@ -14,7 +14,8 @@ fn with_integral(name: &str, position_weight: f64) -> Rig {
     Rig { integral: Some(Integral { position_weight }), ..rig(name) }
 }
 
-/// Mean distance from the set-point over the second half of the run (m): encoder steps keep a cart moving to and fro.
+/// Mean distance from the set-point over the second half of the run (m): encoder steps keep the cart moving back and
+/// forth.
 fn offset(rig: &Rig, scenario: &Scenario) -> f64 {
     let (trace, summary) = simulate(rig, &table(rig), scenario).unwrap();
     assert!(summary.stands(), "{}: {summary}", rig.name);
@@ -65,11 +66,11 @@ fn a_rig_that_is_not_as_described_arrives_all_the_same() {
     chain.links[0].mass_kg *= 0.8;
     let scenario = pulled(&with, Sensing::Encoders, 0.5);
     let summary = run(&heavier, &table, &scenario);
-    // Half of the dead zone that is left lets the cart move by a millimetre or two.
+    // The rest of the dead zone lets the cart move by a millimetre or two.
     assert!(summary.stands() && summary.final_error_m.abs() < 3e-3, "{summary}");
 }
 
-/// A cart of 1 kg without pendulum, so that nothing can fall while the force is at its limit for long.
+/// A cart of 1 kg without pendulum, so that nothing falls while the force stays at its limit.
 fn cart(force_limit_n: f64) -> Rig {
     let text = format!(
         "name = \"cart\"\n[model]\na = [[0, 1], [0, 0]]\nb = [0, 1]\n[actuator]\nforce_limit_n = {force_limit_n:e}\n\
@@ -80,7 +81,7 @@ fn cart(force_limit_n: f64) -> Rig {
 
 const FAR_M: f64 = 10.0;
 
-/// A raw step with the law alone, either as the firmware integrates or always integrating: the cart's positions (m).
+/// A raw step with the law alone, integrating as the firmware does or always: the cart's positions (m).
 fn law_alone(rig: &Rig, conditional: bool) -> Vec<f64> {
     let values = raw_table(rig);
     let table = values.table::<2, 1>();
@@ -95,7 +96,7 @@ fn law_alone(rig: &Rig, conditional: bool) -> Vec<f64> {
         let command = controller.control_from_state(&x);
         bench.tick(command.drive);
         if !conditional {
-            // An integral that does not know of the limit.
+            // Negative control: an integral that ignores the limit.
             controller.take_force(command.requested_n, command.requested_n);
         }
         controller.predict();
@@ -112,13 +113,13 @@ fn the_integral_does_not_wind_up_while_the_force_is_limited() {
     assert!(limited > 2000, "the force is limited for {limited} ticks only");
     assert!(summary.settled && summary.final_error_m.abs() < 1e-3, "{summary}");
     let held = law_alone(&rig, true);
-    // The loop above is the firmware's.
+    // The loop above is that of the firmware.
     assert_eq!(held.len(), trace.samples().len());
     assert!(held.iter().zip(trace.samples()).all(|(x, sample)| x.to_bits() == sample.state[0].to_bits()));
 
     let overshoot = |positions: &[f64]| positions.iter().copied().fold(0.0, f64::max) / FAR_M - 1.0;
     let (held, wound) = (overshoot(&held), overshoot(&law_alone(&rig, false)));
-    // What the law does without any limit, where both integrate alike.
+    // Without any limit, both integrate alike.
     let strong = cart(1e6);
     let free = overshoot(&law_alone(&strong, true));
     assert_eq!(free, overshoot(&law_alone(&strong, false)));

@@ -1,4 +1,4 @@
-//! What must fall, falls: the closed-loop tests can fail. And what a run is made of: limits, seeds.
+//! What must fall, falls: the closed-loop tests can fail. Also the limits and seeds of a run.
 
 use crate::bench::*;
 use upright::table::{Law, TableError};
@@ -12,7 +12,7 @@ fn continuous_gains_fall_at_five_milliseconds_where_sampled_ones_stand() {
     let rig = paper_at(0.005, 0);
     let scenario = Scenario { step_m: 0.05, ..lean(&rig, Law::Lqr, LEAN) };
     let held = run(&rig, &continuous_table(&rig), &scenario);
-    // Spectral radius 3.1: from a milliradian to the horizontal in some seven ticks, and the force limit.
+    // Spectral radius 3.1: from a milliradian to the horizontal in about seven ticks, and the force limit.
     assert!(held.fall.as_ref().is_some_and(|fall| fall.at_s < 0.5), "{held}");
     let redesigned = run(&rig, &table(&rig), &scenario);
     assert!(redesigned.settled && redesigned.final_error_m.abs() < 1e-4, "{redesigned}");
@@ -39,7 +39,7 @@ fn a_delay_that_was_designed_for_stands_and_one_that_was_ignored_falls() {
         let summary = run(&rig, &designed, &lean(&rig, law, LEAN));
         assert!(summary.settled, "{law:?}: {summary}");
     }
-    // The same continuous gains stand without the delay.
+    // The same continuous gains balance without the delay.
     let prompt = paper_at(0.002, 0);
     assert!(run(&prompt, &continuous_table(&prompt), &scenario).stands());
 }
@@ -55,14 +55,14 @@ fn a_gain_that_is_wrong_by_a_fifth_or_in_sign_falls() {
     let rig = rig("quadruple-paper");
     let table = raw_table(&rig);
     for (law, entry, factor) in [
-        // The third link's angle is what the LQR watches most closely. (20 % less of it and the loop only oscillates.)
+        // The LQR depends most on the third link's angle. (With 20 % less of it, the loop only oscillates.)
         (Law::Lqr, 6, 1.2),
         (Law::PolePlacement, 5, 0.8),
         (Law::PolePlacement, 3, 1.2),
         (Law::Lqr, 4, -1.0),
         (Law::PolePlacement, 2, -1.0),
     ] {
-        // A loop that is lost by 0.1 % per tick needs its time.
+        // A loop that diverges by 0.1 % per tick needs time to fall.
         let scenario = Scenario { duration_s: 30.0, ..lean(&rig, law, LEAN) };
         let broken = run(&rig, &with_gain(&table, law, entry, factor), &scenario);
         assert!(!broken.stands(), "{law:?} K[{entry}] times {factor}: {broken}");
@@ -73,7 +73,7 @@ fn a_gain_that_is_wrong_by_a_fifth_or_in_sign_falls() {
 #[test]
 fn no_run_exceeds_the_force_limit() {
     let mut rig = rig("quadruple-paper");
-    // A limit below what the pole placement asks for at a step of 1 m (9.2 N).
+    // A limit below the 9.2 N that the pole placement requests at a step of 1 m.
     rig.actuator.force_limit_n = Some(5.0);
     let table = raw_table(&rig);
     let (trace, summary) = simulate(&rig, &table, &metre_step(&rig, Law::PolePlacement, 2.0)).unwrap();
@@ -120,7 +120,7 @@ fn the_same_seed_gives_the_same_run_bit_for_bit_and_another_seed_another_run() {
     assert_ne!(record(7), record(8));
 }
 
-/// A run at rest shows nothing: even a loop that is lost does not fall without a push.
+/// A run at rest proves nothing: even an unstable loop does not fall without a push.
 #[test]
 fn balance_is_only_proved_by_a_push() {
     let rig = paper_at(0.005, 0);

@@ -1,4 +1,5 @@
-//! The control core in closed loop with the nonlinear plant, and the image in QEMU. One program, so that it is linked once.
+//! The control core in closed loop with the nonlinear plant, and the image in QEMU. One program, so that linking
+//! happens once.
 
 mod bench;
 mod closed_loop;

@@ -1,5 +1,5 @@
-//! A firmware crate made from docs/own-board.md alone, outside the workspace: it builds for the target, and on the host it
-//! balances with its own table.
+//! A firmware crate made only from docs/own-board.md, outside the workspace: it builds for the target, and on the host
+//! it balances with its own table.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -12,7 +12,7 @@ use upright_tool::image::{Compiler, ImageError, PROFILE, TARGET, compiler};
 
 const DOCUMENT: &str = include_str!("../../docs/own-board.md");
 
-/// The files of the document: a line with the name and a colon, an empty line, and a block.
+/// The files in the document: a line with the name and a colon, an empty line, and a block.
 fn files(document: &str) -> BTreeMap<&str, String> {
     let mut files = BTreeMap::new();
     let mut lines = document.lines().peekable();
@@ -36,7 +36,7 @@ fn root() -> &'static Path {
     Path::new(env!("CARGO_MANIFEST_DIR"))
 }
 
-/// Names of the files in which document and example differ.
+/// Names of the files that differ between document and example.
 fn differing(document: &str) -> Vec<String> {
     let example = |name: &str| std::fs::read_to_string(root().join("examples/own-board").join(name));
     let of_the_example = files(document).into_iter().filter(|(name, _)| *name != ".cargo/config.toml");
@@ -72,20 +72,20 @@ fn a_changed_line_in_the_document_is_noticed() {
     assert_eq!(differing(&DOCUMENT.replace("Bits16", "Bits32")), ["src/board.rs"]);
 }
 
-/// The crate of the document in a folder outside the repository, with the table of its rig.
+/// Writes the document's crate to a folder outside the repository, with the table of its rig.
 fn foreign_crate(folder: &Path) {
     for (name, text) in files(DOCUMENT) {
         let path = folder.join(name);
         std::fs::create_dir_all(path.parent().unwrap()).unwrap();
         let root = root().to_str().unwrap().replace('\\', "/");
-        // The published crates are named by version; these are not published yet.
+        // Published crates would be found by version. These are not published yet, so their paths become absolute.
         let text = text.replace("\"../../host-design", &format!("\"{root}/host-design"));
         std::fs::write(path, text.replace("\"../..\"", &format!("\"{root}\""))).unwrap();
     }
     let rig = Rig::from_path(&folder.join("rig.toml")).unwrap();
     let table = TableValues::of(&rig, &design(&rig).unwrap(), Gains::Sampled).unwrap();
     std::fs::write(folder.join("src/gains.rs"), gains_source(&rig, &table)).unwrap();
-    // The same versions as here, where both need a package.
+    // The same versions as in this repository, for packages that both need.
     std::fs::copy(root().join("Cargo.lock"), folder.join("Cargo.lock")).unwrap();
 }
 
@@ -111,7 +111,7 @@ fn a_crate_made_from_the_document_builds_for_the_target() {
     let build = ["build", "--quiet", "--bin", "image", "--features", "image"];
     run(cargo.current_dir(&folder).args(build).args(["--profile", PROFILE, "--target", TARGET]));
     let image = std::fs::read(target_directory.join(TARGET).join(PROFILE).join("image")).unwrap();
-    // The control task and the link of the library are in it.
+    // The image contains the control task and the serial link of the library.
     for function in [&b"ControlTask"[..], b"SerialLink"] {
         assert!(image.windows(function.len()).any(|window| window == function));
     }
@@ -129,7 +129,7 @@ fn a_crate_made_from_the_document_balances_on_the_host() {
     };
     let said = run(&mut host(folder.path()));
     assert!(said.starts_with("5001 ticks, fault: None\n"), "{said}");
-    // Negative control: a table of another rig.
+    // Negative control: a table for another rig.
     let rig = folder.path().join("rig.toml");
     let other = std::fs::read_to_string(&rig).unwrap().replace("mass_kg = 0.2", "mass_kg = 0.3");
     std::fs::write(&rig, other).unwrap();

@@ -1,6 +1,6 @@
-//! The tick gives the same bits as its equations written out plainly, whatever shortcuts it takes for a table.
+//! The tick gives the same bits as its equations written out plainly, whichever shortcuts it takes for a table.
 //!
-//! The law is written here a second time on purpose: this is what the firmware's code is held against.
+//! The law is written a second time here on purpose: the firmware's code is checked against it.
 
 use nalgebra::{SMatrix, SVector};
 use proptest::prelude::*;
@@ -12,7 +12,7 @@ use upright::table::{Build, GainTable, LawGains, Limits, ObserverGains, PerLaw, 
 
 const BUILD: Build = Build { rig_hash: 1, tick_s: 0.01 };
 
-/// What is special about an Ad, and with that the way a prediction takes.
+/// Structure of Ad, which decides the code path of the prediction.
 #[derive(Debug, Clone, Copy)]
 enum Pattern {
     Any,
@@ -20,7 +20,7 @@ enum Pattern {
     ChainWithoutFriction,
 }
 
-/// A table from a stream of numbers; no entry is 0 but those that the pattern wants.
+/// A table from a stream of numbers; only the entries that the pattern requires are 0.
 fn table<const NX: usize, const NY: usize>(
     pattern: Pattern,
     in_order: bool,
@@ -79,7 +79,7 @@ fn table<const NX: usize, const NY: usize>(
     table
 }
 
-/// The equations as the documentation has them, entry by entry.
+/// The equations as documented, entry by entry.
 struct Plain<'t, const NX: usize, const NY: usize> {
     table: &'t GainTable<NX, NY>,
     x: [f32; NX],
@@ -93,7 +93,7 @@ impl<'t, const NX: usize, const NY: usize> Plain<'t, NX, NY> {
         Self { table, x: [0.0; NX], setpoint: 0.0, integral: 0.0, pending: 0.0 }
     }
 
-    /// Innovation, estimate and requested force; then prepares the next tick.
+    /// Computes innovation, estimate and requested force, then prepares the next tick.
     fn tick(&mut self, target: f32, counts: &[u32; NY]) -> Vec<f32> {
         let (law, observer) = (self.table.laws.lqr.as_ref().unwrap(), self.table.observer.as_ref().unwrap());
         let e: [f32; NY] = core::array::from_fn(|i| {
@@ -141,7 +141,7 @@ fn difference<const NX: usize, const NY: usize>(
         found.extend([command.requested_n, command.applied_n].iter().chain(controller.estimate()));
         let wanted = plain.tick(*target, counts);
         let differs = found.len() != wanted.len()
-            // A term of 0 that is passed over may change the sign of a sum that is 0.
+            // Skipping a term of 0 may change the sign of a sum that is 0.
             || found.iter().zip(&wanted).any(|(found, wanted)| {
                 found.to_bits() != wanted.to_bits() && (*found, *wanted) != (0.0, 0.0)
             });
@@ -178,19 +178,19 @@ fn a_tick_gives_the_bits_of_the_plain_equations() {
     same_bits::<10, 5>(patterns());
     same_bits::<4, 2>(patterns());
     same_bits::<2, 1>(patterns());
-    // An odd number of states is no chain of links.
+    // An odd number of states: not a chain of links.
     same_bits::<5, 2>(Just(Pattern::Any));
     same_bits::<1, 1>(Just(Pattern::Any));
 }
 
 proptest! {
-    /// Every single entry counts: the comparison above would notice a shortcut that passes over one of them.
+    /// Every single entry matters: the comparison above would notice a shortcut that skips one.
     #[test]
     fn one_entry_off_by_one_bit_is_noticed(numbers in numbers(), pattern in patterns(), row in 0..10usize, column in 0..10usize) {
         let table = table::<10, 5>(pattern, true, 0, false, &numbers);
         let mut other = table.clone();
         let entry = &mut other.observer.as_mut().unwrap().ad[(row, column)];
-        // An entry that is 0 becomes large enough to be seen in a sum.
+        // Makes an entry of 0 large enough to be visible in a sum.
         *entry = if *entry == 0.0 { 0.25 } else { f32::from_bits(entry.to_bits() ^ 1 << 20) };
         other.crc = other.checksum();
         let ticks = vec![(0.5, [3, 5, 7, 2, 1]); 3];

@@ -13,7 +13,7 @@ fn row(wire: &Wire) -> String {
     format!("| P{}{} | {} | {} | {pull_up} |", char::from(wire.port), wire.pin, wire.function, wire.signal)
 }
 
-/// The rows of the table between the markers, without its two lines of heading.
+/// The rows of the table between the markers, without its two header lines.
 fn documented(text: &str) -> Vec<&str> {
     let table = text.split_once("<!-- wiring -->").and_then(|(_, rest)| rest.split_once("<!-- /wiring -->"));
     table.expect("docs/board.md has no wiring table").0.trim().lines().skip(2).collect()

@@ -1,4 +1,4 @@
-//! The clock tree: 168 MHz from the crystal, by bounded waits.
+//! The clock tree: 168 MHz from the crystal. Every wait is bounded.
 //!
 //! | clock | frequency | for |
 //! |---|---|---|
@@ -15,15 +15,15 @@ use upright::protocol::message::Reset;
 /// Core clock (Hz).
 pub(crate) const CLOCK_HZ: u32 = 168_000_000;
 
-/// Turns of a waiting loop: at 16 MHz and at least 4 cycles each, 50 ms or more; a crystal starts within 10 ms.
+/// Iterations of a waiting loop: at 16 MHz and at least 4 cycles each, 50 ms or more. A crystal starts within 10 ms.
 const PATIENCE: u32 = 200_000;
 
-/// The clock that the core runs from after the set-up.
+/// The clock that the core uses after the set-up.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub(super) enum Clock {
     /// PLL and crystal: [`CLOCK_HZ`].
     Full,
-    /// The internal oscillator of 16 MHz: crystal or PLL have not started.
+    /// The internal 16 MHz oscillator: the crystal or the PLL did not start.
     Fallback,
 }
 
@@ -37,7 +37,7 @@ impl Clock {
     }
 }
 
-/// Starts crystal and PLL and switches the core to them, if they start.
+/// Starts the crystal and the PLL. If both start, switches the core to them.
 pub(super) fn set_up(rcc: &RCC, flash: &FLASH) -> Clock {
     match try_set_up(rcc, flash) {
         Some(()) => Clock::Full,
@@ -46,10 +46,10 @@ pub(super) fn set_up(rcc: &RCC, flash: &FLASH) -> Clock {
 }
 
 fn try_set_up(rcc: &RCC, flash: &FLASH) -> Option<()> {
-    // A Nucleo's debugger feeds 8 MHz in; the other boards have a crystal of 8 MHz.
+    // A Nucleo's debugger supplies 8 MHz; the other boards have an 8 MHz crystal.
     rcc.cr().modify(|_, w| w.hsebyp().bit(cfg!(feature = "stm32f446")).hseon().set_bit());
     wait(|| rcc.cr().read().hserdy().bit_is_set())?;
-    // 8 MHz / 4 × 168 / 2 = 168 MHz (RM0090, 7.3.2); the PLL's input is at 2 MHz, where it jitters least.
+    // 8 MHz / 4 × 168 / 2 = 168 MHz (RM0090, 7.3.2); the PLL's input is at 2 MHz, where its jitter is lowest.
     // SAFETY: factors within the limits given there: 2 to 63, 50 to 432, 0 for a division by 2, 2 to 15.
     rcc.pllcfgr().modify(|_, w| unsafe {
         w.pllsrc().set_bit().pllm().bits(4).plln().bits(168).pllp().bits(0).pllq().bits(7)
@@ -59,29 +59,30 @@ fn try_set_up(rcc: &RCC, flash: &FLASH) -> Option<()> {
     // SAFETY: a value of this table.
     flash.acr().write(|w| unsafe { w.bits(5 | 1 << 8 | 1 << 9 | 1 << 10) });
     wait(|| flash.acr().read().bits() & 15 == 5)?;
-    // Buses before the core, so that they are never too fast: HCLK / 4 and / 2 (RM0090, 7.3.3).
+    // Buses before the core, so that they never run too fast: HCLK / 4 and / 2 (RM0090, 7.3.3).
     // SAFETY: divisors of this register.
     rcc.cfgr().modify(|_, w| unsafe { w.hpre().bits(0).ppre1().bits(0b101).ppre2().bits(0b100) });
     wait(|| rcc.cr().read().pllrdy().bit_is_set())?;
     // SAFETY: 2 is the PLL.
     rcc.cfgr().modify(|_, w| unsafe { w.sw().bits(2) });
     wait(|| rcc.cfgr().read().sws().bits() == 2)?;
-    // A crystal that stops later breaks the motor's timer off, and ends in the handler of the non-maskable interrupt
-    // (RM0090, 7.2.7).
+    // If the crystal stops later, the hardware switches the motor timer's output off and raises the non-maskable
+    // interrupt (RM0090, 7.2.7).
     rcc.cr().modify(|_, w| w.csson().set_bit());
     Some(())
 }
 
-/// Waits for a flag, for [`PATIENCE`] turns at most.
+/// Waits for a flag, for at most [`PATIENCE`] iterations.
 fn wait(ready: impl Fn() -> bool) -> Option<()> {
     (0..PATIENCE).any(|_| ready()).then_some(())
 }
 
-/// Why the microcontroller started (RM0090, 7.3.21); clears the flags.
+/// Reason for the last reset (RM0090, 7.3.21); clears the flags.
 pub(super) fn reset_reason(rcc: &RCC, crashed: bool) -> Reset {
     let flags = rcc.csr().read();
     rcc.csr().modify(|_, w| w.rmvf().set_bit());
-    // The reset pin's flag accompanies every reset, and power-on the flag of the brown-out detector: the rarer first.
+    // Every reset also sets the reset pin's flag, and power-on sets that of the brown-out detector, so the rarer flags
+    // come first.
     if flags.porrstf().bit_is_set() {
         Reset::Power
     } else if crashed || flags.sftrstf().bit_is_set() {

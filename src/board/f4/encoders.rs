@@ -4,7 +4,7 @@ use stm32f4xx_hal::pac::{RCC, TIM2, TIM3, TIM4, TIM5, TIM8};
 use upright::control::encoder::CounterWidth::{self, Bits16, Bits32};
 use upright::gains::SENSORS;
 
-/// Cart first, then the links from the lowest; a rig with fewer sensors uses the first ones.
+/// Cart first, then the links from the lowest up; a rig with fewer sensors uses the first timers.
 const TIMERS: [(*const u32, CounterWidth); 5] = [
     (TIM2::PTR.cast(), Bits32),
     (TIM5::PTR.cast(), Bits32),
@@ -25,14 +25,14 @@ pub(super) const WIDTHS: [CounterWidth; SENSORS] = {
     widths
 };
 
-// Offsets of registers, the same in all these timers (RM0090, 17.4 and 18.4).
+// Register offsets, the same in all these timers (RM0090, 17.4 and 18.4).
 const CR1: usize = 0x00;
 const SMCR: usize = 0x08;
 const CCMR1: usize = 0x18;
 const CNT: usize = 0x24;
 const ARR: usize = 0x2c;
 
-/// Starts the counters in use at 0.
+/// Starts the counters in use, at 0.
 pub(super) fn set_up(rcc: &RCC) {
     rcc.apb1enr()
         .modify(|_, w| w.tim2en().set_bit().tim3en().set_bit().tim4en().set_bit().tim5en().set_bit());
@@ -42,22 +42,22 @@ pub(super) fn set_up(rcc: &RCC) {
             // SAFETY: a register of this timer, which nothing else uses.
             unsafe { timer.byte_add(offset).cast_mut().write_volatile(value) };
         };
-        // Both inputs straight to their channels, each level confirmed by eight samples of the timer's clock (48 ns or
-        // 95 ns): shorter is noise (RM0090, 18.4.7: CCxS = 01, ICxF = 0011).
+        // Both inputs directly to their channels. A level counts only after eight equal samples of the timer's clock
+        // (48 ns or 95 ns); anything shorter is noise (RM0090, 18.4.7: CCxS = 01, ICxF = 0011).
         write(CCMR1, 0x3131);
         // Encoder mode 3: every edge of both inputs counts (RM0090, 18.3.12).
         write(SMCR, 3);
-        // The upper half of it does not exist in a counter of 16 bits.
+        // A 16-bit counter ignores the upper half.
         write(ARR, u32::MAX);
         write(CR1, 1);
     }
 }
 
-/// The counters.
+/// Current readings of the counters in use.
 pub(super) fn raw_counts() -> [u32; SENSORS] {
     let mut counts = [0; SENSORS];
     for (count, &(timer, _)) in counts.iter_mut().zip(&TIMERS) {
-        // SAFETY: reading a counter has no effect.
+        // SAFETY: reading a counter has no side effect.
         *count = unsafe { timer.byte_add(CNT).read_volatile() };
     }
     counts

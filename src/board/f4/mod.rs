@@ -36,7 +36,7 @@ pub(crate) struct Hardware {
     overrun: bool,
 }
 
-/// Sets up all peripherals, with the motor off. Takes 150 ms at most, even if something does not answer.
+/// Sets up all peripherals, with the motor off. Takes at most 150 ms, even if a peripheral does not respond.
 pub(crate) fn set_up(
     device: Peripherals,
     bytes: (Producer<'static, u8>, Consumer<'static, u8>),
@@ -49,12 +49,12 @@ pub(crate) fn set_up(
     encoders::set_up(rcc);
     let supply = Supply::set_up(rcc, device.ADC1, &device.ADC_COMMON);
     let (receiver, line) = serial::set_up(rcc, device.USART2, clock.usart2_bus_hz(), bytes);
-    // SAFETY: the tick's timer is RTIC's, and stays untouched; nobody else wants these two.
+    // SAFETY: the tick's timer belongs to RTIC and stays untouched; nothing else uses the other two.
     let mut core = unsafe { cortex_m::Peripherals::steal() };
     core.DCB.enable_trace();
     core.DWT.enable_cycle_counter();
     pins::set_status_led(clock == Clock::Full);
-    // Clears the flags that were set while the pull-ups charged the inputs.
+    // Clears flags that were set while the pull-ups charged the inputs.
     let _ = (motor.was_stopped(), pins::driver_fault_was_reported(&device.EXTI));
     let hardware = Hardware {
         motor,
@@ -72,7 +72,7 @@ impl Board<SENSORS> for Hardware {
 
     fn inputs(&mut self) -> Inputs<SENSORS> {
         let raw_counts = encoders::raw_counts();
-        // Clears the flag of this tick.
+        // Clears the flag of the current tick.
         let _ = tick_is_due();
         let levels = pins::Levels::read();
         Inputs {
@@ -93,8 +93,8 @@ impl Board<SENSORS> for Hardware {
         self.motor.drive(output);
     }
 
-    /// Only a tick that ends before the next one is due is healthy. On the slow oscillator, ticks come too late for the
-    /// watchdog; the motor stays off there anyway.
+    /// Only a tick that ends before the next one is due is healthy. On the slow oscillator, ticks come too late for
+    /// the watchdog, but the motor is off then anyway.
     fn feed_watchdog(&mut self) {
         self.overrun = tick_is_due();
         if !self.overrun && !self.clock_fault {
@@ -107,22 +107,22 @@ impl Board<SENSORS> for Hardware {
     }
 }
 
-/// Whether the tick's timer has wrapped since the last call.
+/// Whether the tick timer has wrapped since the last call.
 fn tick_is_due() -> bool {
-    // SAFETY: after the start, the control task is the only one that reads this register, which clears the flag.
+    // SAFETY: after start-up, only the control task reads this register; reading it clears the flag.
     unsafe { (*SYST::PTR).csr.read() & 1 << 16 != 0 }
 }
 
-/// Tells after a reset by the watchdog that the reason was a panic or a processor fault. It is not initialised at start,
-/// so it survives the reset.
+/// Records a panic or processor fault, so that the firmware knows the reason after the watchdog's reset. It is not
+/// initialised at start-up, so it survives the reset.
 #[unsafe(link_section = ".uninit.CRASH")]
 static mut CRASH: MaybeUninit<u32> = MaybeUninit::uninit();
 const CRASHED: u32 = 0x5afe_0ff5;
 
-/// Whether the firmware has crashed before this reset; clears the record.
+/// Whether the firmware crashed before this reset; clears the record.
 fn take_crash() -> bool {
     let cell = (&raw mut CRASH).cast::<u32>();
-    // SAFETY: nothing else runs yet; what the memory holds after power-on is read as it is, and means nothing else.
+    // SAFETY: nothing else runs yet. After power-on the memory holds arbitrary bits, which are valid for this type.
     unsafe {
         let crashed = cell.read_volatile() == CRASHED;
         cell.write_volatile(0);
@@ -130,7 +130,7 @@ fn take_crash() -> bool {
     }
 }
 
-/// Motor off for good: the watchdog, if it runs already, resets the microcontroller.
+/// Turns the motor off for good. If the watchdog is running, it resets the microcontroller.
 pub(crate) fn stop() -> ! {
     // SAFETY: nothing else runs any more.
     unsafe {

@@ -1,4 +1,4 @@
-//! The pins, set up from the wiring and read and written as contacts.
+//! The pins: set up from the wiring, read and written by name.
 
 use stm32f4xx_hal::pac::{EXTI, GPIOA, GPIOB, GPIOC, GPIOD, RCC, SYSCFG};
 
@@ -16,7 +16,7 @@ const STATUS_LED: Wire = STATUS_LEDS[if cfg!(feature = "stm32f405") {
 
 const PORTS: usize = 4;
 
-/// Registers of a port, as values and the bits that they cover (RM0090, 8.4).
+/// Values for the registers of a port, and the bits that they cover (RM0090, 8.4).
 #[derive(Clone, Copy)]
 struct Port {
     mode: u32,
@@ -51,7 +51,7 @@ const SET_UP: [Port; PORTS] = {
     ports
 };
 
-/// Sets up all pins. The outputs are low from their first moment: that is what the output registers hold after a reset.
+/// Sets up all pins. The outputs are low from the start, because the output registers hold 0 after a reset.
 pub(super) fn set_up(rcc: &RCC, syscfg: &SYSCFG, exti: &EXTI) {
     rcc.ahb1enr()
         .modify(|_, w| w.gpioaen().set_bit().gpioben().set_bit().gpiocen().set_bit().gpioden().set_bit());
@@ -60,24 +60,24 @@ pub(super) fn set_up(rcc: &RCC, syscfg: &SYSCFG, exti: &EXTI) {
     for (base, port) in bases.into_iter().zip(&SET_UP) {
         let change = |offset: usize, covered: u32, value: u32| {
             let register = (base + offset) as *mut u32;
-            // SAFETY: a register of this port; nothing else runs before the set-up is done.
+            // SAFETY: a register of this port; nothing else runs before the set-up is complete.
             unsafe { register.write_volatile(register.read_volatile() & !covered | value) };
         };
-        // Functions first, so that no pin has a wrong one for a moment.
+        // Alternate functions first, so that no pin has the wrong one even for a moment.
         change(0x20, port.four_bits[0], port.alternate[0]);
         change(0x24, port.four_bits[1], port.alternate[1]);
         change(0x0c, port.two_bits, port.pull);
         change(0x00, port.two_bits, port.mode);
     }
-    // A falling edge of the power stage's fault stays in the pending register until the next tick has seen it, however
-    // short it was (RM0090, 12.2.4). Its interrupt is not enabled in the NVIC.
+    // A falling edge of the power stage's fault signal, however short, stays in the pending register until the next
+    // tick reads it (RM0090, 12.2.4). Its interrupt is not enabled in the NVIC.
     // SAFETY: 1 is port B (RM0090, 9.2.6).
     syscfg.exticr4().modify(|_, w| unsafe { w.exti13().bits(1) });
     exti.ftsr().modify(|_, w| w.tr13().set_bit());
     exti.imr().modify(|_, w| w.mr13().set_bit());
 }
 
-/// Levels of the ports B and C at one moment; true is high.
+/// Levels of ports B and C at one moment; true is high.
 #[derive(Clone, Copy)]
 pub(super) struct Levels {
     b: u32,
@@ -85,13 +85,13 @@ pub(super) struct Levels {
 }
 
 impl Levels {
-    /// Reads them.
+    /// Reads the levels of both ports.
     pub(super) fn read() -> Self {
-        // SAFETY: reading levels has no effect.
+        // SAFETY: reading levels has no side effect.
         unsafe { Self { b: (*GPIOB::PTR).idr().read().bits(), c: (*GPIOC::PTR).idr().read().bits() } }
     }
 
-    /// An open contact lets the pull-up win.
+    /// An open contact reads high, because of the pull-up.
     pub(super) fn emergency_stop(self) -> bool {
         self.b & (1 << EMERGENCY_STOP) != 0
     }
@@ -109,23 +109,23 @@ impl Levels {
     }
 }
 
-/// Whether the power stage has reported a fault since the last call, even if it is over.
+/// Whether the power stage has reported a fault since the last call, even if the fault is over.
 pub(super) fn driver_fault_was_reported(exti: &EXTI) -> bool {
     let reported = exti.pr().read().pr13().bit_is_set();
     if reported {
         // Writing a one clears this bit and no other.
-        // SAFETY: any combination is allowed.
+        // SAFETY: any combination of bits is allowed.
         exti.pr().write(|w| unsafe { w.bits(1 << DRIVER_FAULT) });
     }
     reported
 }
 
-/// The power stage may switch, or not.
+/// Enables or disables the power stage.
 pub(super) fn enable(enable: bool) {
     set(ENABLE, enable);
 }
 
-/// Direction of the motor.
+/// Sets the direction of the motor.
 pub(super) fn push_along_x(along: bool) {
     set(DIRECTION, along);
 }

@@ -1,5 +1,5 @@
-//! The wiring: what is connected to which pin. The only definition; the pins are set up from it, and the README's table is
-//! checked against it.
+//! The wiring: what is connected to which pin. This is the only definition. The pins are set up from it, and a test
+//! checks the table in docs/board.md against it.
 //!
 //! All pins exist on the 64-pin packages of STM32F405, STM32F407 and STM32F446, with the same functions. Alternate
 //! functions: datasheets DS8626 (F405, F407) and DS10693 (F446), table "Alternate function mapping".
@@ -11,24 +11,24 @@ pub(crate) struct Wire {
     pub(crate) port: u8,
     /// Number within the port.
     pub(crate) pin: u8,
-    /// How the pin works.
+    /// Electrical mode of the pin.
     pub(crate) mode: Mode,
     /// Whether the pin is pulled to 3.3 V inside the microcontroller (about 40 kΩ).
     pub(crate) pull_up: bool,
     /// The peripheral behind the pin.
     #[cfg_attr(target_os = "none", allow(dead_code, reason = "for the table of the documentation"))]
     pub(crate) function: &'static str,
-    /// What is connected.
+    /// Signal that is connected to the pin.
     #[cfg_attr(target_os = "none", allow(dead_code, reason = "for the table of the documentation"))]
     pub(crate) signal: &'static str,
 }
 
-/// How a pin works; the numbers are those of the register GPIOx_MODER (RM0090, 8.4.1).
+/// Mode of a pin; the numbers are those of the register GPIOx_MODER (RM0090, 8.4.1).
 #[derive(Clone, Copy, PartialEq)]
 pub(crate) enum Mode {
     /// Digital input.
     Input,
-    /// Push-pull output, low at first.
+    /// Push-pull output, initially low.
     Output,
     /// Alternate function of this number.
     Alternate(u8),
@@ -36,7 +36,7 @@ pub(crate) enum Mode {
     Analog,
 }
 
-/// All pins but that of the status LED.
+/// All pins except that of the status LED.
 pub(crate) const WIRING: [Wire; 20] = [
     encoder(b'A', 15, 1, "TIM2_CH1", "cart encoder, A"),
     encoder(b'B', 3, 1, "TIM2_CH2", "cart encoder, B"),
@@ -60,16 +60,16 @@ pub(crate) const WIRING: [Wire; 20] = [
     wire(b'A', 3, Mode::Alternate(7), true, "USART2_RX", "serial line from the host"),
 ];
 
-/// The status LED of each board: on after a good start, off after a crash.
+/// The status LED of each board: on after a normal start, off after a crash.
 pub(crate) const STATUS_LEDS: [Wire; 3] = [
     wire(b'C', 13, Mode::Output, false, "output", "status LED (STM32F405)"),
     wire(b'D', 12, Mode::Output, false, "output", "status LED (STM32F407 Discovery: green)"),
     wire(b'A', 5, Mode::Output, false, "output", "status LED (STM32F446 Nucleo: LD2)"),
 ];
 
-/// Pin of port B: direction.
+/// Pin of port B: motor direction.
 pub(crate) const DIRECTION: u8 = 14;
-/// Pin of port B: enable.
+/// Pin of port B: enable of the power stage.
 pub(crate) const ENABLE: u8 = 15;
 /// Pin of port B: fault of the power stage.
 pub(crate) const DRIVER_FAULT: u8 = 13;
@@ -91,7 +91,7 @@ const fn wire(
     Wire { port, pin, mode, pull_up, function, signal }
 }
 
-/// With the pull-up that open-collector encoders need.
+/// An input with the pull-up that open-collector encoders need.
 const fn encoder(port: u8, pin: u8, alternate: u8, function: &'static str, signal: &'static str) -> Wire {
     wire(port, pin, Mode::Alternate(alternate), true, function, signal)
 }

@@ -1,7 +1,7 @@
 //! The board in the loop: a simulated rig on the host replaces timers and pins, in lock step.
 //!
-//! Every tick waits for the host's [`PinsIn`] and answers with a [`PinsOut`]; telemetry and replies leave on a channel
-//! of their own. When the host closes the pins, the image ends.
+//! Every tick waits for a [`PinsIn`] from the host and answers with a [`PinsOut`]; telemetry and replies use a channel
+//! of their own. When the host closes the channel of the pins, the image ends.
 
 #[cfg(feature = "in-the-loop")]
 mod semihosting;
@@ -24,23 +24,23 @@ use semihosting::{Channel, Serial, exit, open};
 #[cfg(feature = "in-the-loop-usart")]
 use usart::{Channel, Serial, exit, open};
 
-/// The emulator's core clock (Hz); no real time depends on it.
+/// The emulator's core clock (Hz); nothing depends on real time.
 pub(crate) const CLOCK_HZ: u32 = 168_000_000;
 
-/// Bytes sent over the serial line.
+/// Number of bytes sent over the serial line.
 static SENT: AtomicU32 = AtomicU32::new(0);
 
-/// The simulated pins.
+/// The simulated pins and the counter of instructions.
 pub(crate) struct Hardware {
     pins: Channel,
     frames: Frames<MAX_PINS_IN>,
     received: Producer<'static, u8>,
     clock: TIM5,
-    /// Instructions spent on the pins, which a board does not have.
+    /// Instructions spent on the simulated pins; a real board does not have them.
     spent: u32,
 }
 
-/// The serial line's interrupt never comes: its bytes come with the pins.
+/// The interrupt of the serial line never occurs: its bytes arrive with the pins.
 pub(crate) struct Receiver;
 
 impl Receiver {
@@ -55,7 +55,7 @@ pub(crate) struct SerialLine {
 }
 
 impl SerialLine {
-    /// The next byte from the host.
+    /// The next byte from the host, if any.
     pub(crate) fn read(&mut self) -> Option<u8> {
         self.received.dequeue()
     }
@@ -63,12 +63,12 @@ impl SerialLine {
     /// Sends a frame to the host.
     pub(crate) fn write(&mut self, frame: &[u8]) {
         self.serial.write(frame);
-        // Longer runs than 2³² bytes are not made.
+        // No run sends 2³² bytes.
         SENT.store(SENT.load(Ordering::Relaxed).wrapping_add(frame.len() as u32), Ordering::Relaxed);
     }
 }
 
-/// Opens the channels.
+/// Opens the channels and starts the counter of instructions.
 pub(crate) fn set_up(
     device: Peripherals,
     (producer, consumer): (Producer<'static, u8>, Consumer<'static, u8>),
@@ -104,7 +104,7 @@ impl Board<SENSORS> for Hardware {
 
     fn feed_watchdog(&mut self) {}
 
-    /// Instructions, not cycles: the emulator counts a nanosecond for each, and knows no cycles.
+    /// Instructions, not cycles: the emulator counts a nanosecond per instruction and does not model cycles.
     fn cycles(&self) -> u32 {
         self.instructions().wrapping_sub(self.spent)
     }
@@ -122,7 +122,7 @@ impl Hardware {
                 continue;
             };
             for &byte in &pins.received {
-                // As on a board: what does not fit is lost.
+                // As on a board, a byte that does not fit is lost.
                 let _ = self.received.enqueue(byte);
             }
             if let Some(sabotage) = pins.sabotage {
@@ -146,7 +146,7 @@ fn send(pins: &mut Channel, output: &Output) {
 fn inject(sabotage: Sabotage) {
     match sabotage {
         Sabotage::Panic => panic!(),
-        // SAFETY: none: nothing is there. That is the point.
+        // SAFETY: unsound on purpose: nothing is mapped there, so the access faults.
         Sabotage::HardFault => unsafe { core::ptr::write_volatile(0x4fff_fffc as *mut u32, 0) },
         Sabotage::StackOverflow => {
             dig(1);
@@ -161,7 +161,7 @@ fn dig(depth: u32) -> u32 {
     if core::hint::black_box(true) { dig(depth.wrapping_add(shaft[0])).wrapping_add(shaft[1]) } else { depth }
 }
 
-/// Motor off, and the end of the run with a status that is not 0.
+/// Turns the motor off and ends the run with exit status 1.
 pub(crate) fn stop() -> ! {
     // SAFETY: nothing else runs any more.
     send(&mut unsafe { Channel::steal() }, &Output::OFF);

@@ -1,4 +1,4 @@
-//! Channels to the host as files of the emulator (semihosting): fast, and the same in every run.
+//! Channels to the host as files of the emulator (semihosting): fast, and identical in every run.
 
 use core::sync::atomic::{AtomicUsize, Ordering};
 
@@ -8,7 +8,7 @@ use stm32f4xx_hal::pac::{USART1, USART2};
 const READ_BINARY: usize = 1;
 const WRITE_BINARY: usize = 5;
 
-/// The pins.
+/// The channel that carries the simulated pins.
 pub(super) struct Channel {
     input: usize,
     output: usize,
@@ -17,7 +17,7 @@ pub(super) struct Channel {
     filled: usize,
 }
 
-/// The serial line.
+/// The channel that carries the serial line's output.
 pub(super) struct Serial {
     output: usize,
 }
@@ -35,16 +35,16 @@ pub(super) fn open(_: USART1, _: USART2) -> (Channel, Serial) {
 static PINS_OUT: AtomicUsize = AtomicUsize::new(usize::MAX);
 
 impl Channel {
-    /// The channel once more, to write to.
+    /// A second handle on the channel, for writing.
     ///
     /// # Safety
-    /// Its owner must no longer run.
+    /// The owner of the channel must no longer run.
     pub(super) unsafe fn steal() -> Self {
         let output = PINS_OUT.load(Ordering::Relaxed);
         Channel { input: usize::MAX, output, buffer: [0; 256], next: 0, filled: 0 }
     }
 
-    /// The next byte; waits for it. Ends the run when the host has closed the file.
+    /// Waits for the next byte. Ends the run if the host has closed the file.
     pub(super) fn read(&mut self) -> u8 {
         loop {
             if let Some(&byte) = self.buffer.get(self.next).filter(|_| self.next < self.filled) {
@@ -52,7 +52,7 @@ impl Channel {
                 return byte;
             }
             let room = self.buffer.len();
-            // SAFETY: the buffer is as long as it is said to be.
+            // SAFETY: the buffer is at least `room` bytes long.
             let left = unsafe { syscall!(READ, self.input, self.buffer.as_mut_ptr(), room) };
             if left >= room {
                 exit(Ok(()));
@@ -61,20 +61,20 @@ impl Channel {
         }
     }
 
-    /// Sends bytes.
+    /// Sends bytes to the host.
     pub(super) fn write(&mut self, bytes: &[u8]) {
         write(self.output, bytes);
     }
 }
 
 impl Serial {
-    /// Sends bytes.
+    /// Sends bytes to the host.
     pub(super) fn write(&mut self, bytes: &[u8]) {
         write(self.output, bytes);
     }
 }
 
-/// Ends the emulator, with status 0 or 1.
+/// Ends the emulator with exit status 0 or 1.
 pub(super) fn exit(status: debug::ExitStatus) -> ! {
     loop {
         debug::exit(status);
@@ -82,7 +82,7 @@ pub(super) fn exit(status: debug::ExitStatus) -> ! {
 }
 
 fn open_file(name: &str, mode: usize) -> usize {
-    // SAFETY: the name is terminated by a zero byte that its length does not count.
+    // SAFETY: the name ends with a zero byte, which its length does not include.
     let handle = unsafe { syscall!(OPEN, name.as_ptr(), mode, name.len() - 1) };
     if handle == usize::MAX {
         exit(Err(()));
@@ -91,7 +91,7 @@ fn open_file(name: &str, mode: usize) -> usize {
 }
 
 fn write(handle: usize, bytes: &[u8]) {
-    // SAFETY: the slice is as long as it is said to be.
+    // SAFETY: pointer and length are those of the slice.
     let left = unsafe { syscall!(WRITE, handle, bytes.as_ptr(), bytes.len()) };
     if left != 0 {
         exit(Err(()));

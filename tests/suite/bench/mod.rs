@@ -1,6 +1,6 @@
-//! Rigs, tables and runs that the closed-loop tests share.
+//! Rigs, tables and runs shared by the closed-loop tests.
 
-// Each test program uses some of these.
+// Each test program uses only some of these.
 #![allow(dead_code)]
 
 use std::path::{Path, PathBuf};
@@ -22,7 +22,7 @@ pub(crate) fn rig(name: &str) -> Rig {
     Rig::from_path(&rigs().join(name).with_extension("toml")).unwrap_or_else(|error| panic!("{error}"))
 }
 
-/// The rig whose gains `src/gains.rs` holds: the one of that name in `rigs/`, whatever its file is called.
+/// The rig whose gains are in `src/gains.rs`: the one with that name in `rigs/`, whatever its file is called.
 pub(crate) fn rig_of_the_firmware() -> Rig {
     let wanted = upright::gains::RIG;
     std::fs::read_dir(rigs())
@@ -50,12 +50,12 @@ pub(crate) fn table(rig: &Rig) -> TableValues {
     TableValues::of(rig, &designed(rig), Gains::Sampled).unwrap()
 }
 
-/// As [`table`], but steps of the set-point go through unshaped: the law alone, as the paper simulates it.
+/// The same as [`table`], but steps of the set-point pass unshaped: the law alone, as the paper simulates it.
 pub(crate) fn raw_table(rig: &Rig) -> TableValues {
     table(rig).without_governor()
 }
 
-/// The gains for continuous time in a table, as the paper has them.
+/// A table with the gains for continuous time, as in the paper.
 pub(crate) fn continuous_table(rig: &Rig) -> TableValues {
     TableValues::of(rig, &designed(rig), Gains::Continuous).unwrap().without_governor()
 }
@@ -74,7 +74,7 @@ pub(crate) fn metre_step(rig: &Rig, law: Law, duration_s: f64) -> Scenario {
     Scenario { step_m: 1.0, duration_s, ..at_rest(rig, law) }
 }
 
-/// A first link that leans by `angle` (rad), left alone.
+/// A run that starts with the first link tilted by `angle` (rad) and no further disturbance.
 pub(crate) fn lean(rig: &Rig, law: Law, angle: f64) -> Scenario {
     let mut scenario = at_rest(rig, law);
     scenario.start[2] = angle;

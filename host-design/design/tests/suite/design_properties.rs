@@ -1,4 +1,4 @@
-//! What every design must satisfy, on random chains, on closed forms, and where there is no solution.
+//! Properties of every design: on random chains, against closed forms, and where there is no solution.
 
 use crate::plant_rigs::any_chain;
 use crate::published::{rig, rig_of};
@@ -9,7 +9,7 @@ use upright_design::rig::{Actuator, Chain, Limits, Lqr, PlantDescription, PolePl
 
 type W = Wide;
 
-/// A chain with both laws: weights and pole distances within a factor of some thousand, as in practice.
+/// A chain with both laws: weights and pole distances span a factor of about a thousand, as in practice.
 fn any_rig(links: core::ops::RangeInclusive<usize>) -> impl Strategy<Value = Rig> {
     let weights = prop::collection::vec(0.1..100.0f64, 16);
     let gaps = prop::collection::vec(1.0..5.0f64, 16);
@@ -54,7 +54,7 @@ fn bare(chain: Chain) -> Rig {
     }
 }
 
-/// The poles a rig asks for, by the paper's equations in double precision.
+/// The poles that a rig requests, by the paper's equations in double precision.
 fn wanted_poles(rig: &Rig) -> Vec<[f64; 2]> {
     let Some(PolePlacement::Response { overshoot_percent, settling_time_s, far_poles }) = &rig.pole_placement
     else {
@@ -67,7 +67,7 @@ fn wanted_poles(rig: &Rig) -> Vec<[f64; 2]> {
     far_poles.iter().map(|&pole| [pole, 0.0]).chain([[re, im], [re, -im]]).collect()
 }
 
-/// Whether the poles agree one to one; both are correctly computed simple poles, so f64 rounding is all there is.
+/// Whether the poles agree one to one. Both are correctly computed simple poles, so they differ only by f64 rounding.
 fn same_poles(found: &[[f64; 2]], wanted: &[[f64; 2]]) -> bool {
     let close =
         |a: &[f64; 2], b: &[f64; 2]| (a[0] - b[0]).hypot(a[1] - b[1]) < 1e-13 * (1.0 + a[0].hypot(a[1]));
@@ -104,7 +104,7 @@ proptest! {
         prop_assert!(open.iter().any(|pole| pole.re > 0.0), "upright is unstable without control");
     }
 
-    /// A cart at rest anywhere needs no force: the set-point and the position must weigh the same.
+    /// A cart at rest needs no force at any position: the gains on set-point and position must be equal.
     #[test]
     fn the_precompensation_gain_of_a_chain_is_the_gain_on_the_position(mut rig in any_rig(1..=3), delay in 0..=1u8) {
         rig.tick.delay_ticks = delay;
@@ -139,7 +139,7 @@ proptest! {
         prop_assert_eq!(gains(&prompt, false), gains(&delayed, false), "continuous gains know no delay");
     }
 
-    /// First order in the tick: ten times shorter, ten times nearer.
+    /// The error is of first order in the tick: a tick ten times shorter gives an error ten times smaller.
     #[test]
     fn sampled_gains_tend_to_the_continuous_ones(mut rig in any_rig(1..=2)) {
         let mut distances = [[0.0; 2]; 2];
@@ -152,7 +152,7 @@ proptest! {
             }
         }
         for (long, short) in distances[0].into_iter().zip(distances[1]) {
-            // The second order leaves a few per cent of the factor 10 open on the fastest of these rigs.
+            // On the fastest of these rigs, the second order makes the factor 10 wrong by a few per cent.
             prop_assert!((long / short - 10.0).abs() < 1.0 && short < 1e-2, "{long} {short}");
         }
     }
@@ -168,7 +168,7 @@ fn scalar(a: f64, q: f64, r: f64, period: f64) -> Rig {
 fn the_optimal_gain_of_a_first_order_plant_is_its_closed_form() {
     let k = design(&scalar(2.0, 5.0, 1.0, 0.5)).unwrap();
     assert_eq!(gains_of_lqr(&k, false), [5.0], "a + sqrt(a² + q / r)");
-    // An unstable pole without weight is mirrored: at -2, and at e^-1 = e^(-2 · 0.5) for the tick.
+    // An unstable pole without weight is mirrored: to -2, and with the tick to e^-1 = e^(-2 · 0.5).
     let mirrored = design(&scalar(2.0, 0.0, 1.0, 0.5)).unwrap();
     assert_eq!(gains_of_lqr(&mirrored, false), [4.0]);
     let at_tick = W::from_f64(2.0) * &(W::one() + &W::from_f64(-1.0).exp());
@@ -231,7 +231,7 @@ fn a_plant_that_the_force_does_not_reach_is_named_with_its_modes() {
         error,
         DesignError::Uncontrollable { task: Task::ContinuousPlacement, modes: vec![[-2.0, 0.0]] }
     );
-    // The regulator can leave a mode alone that decays by itself, and only that.
+    // The regulator may leave a mode alone only if that mode decays by itself.
     assert!(design(&model("[[-1, 0], [0, -2]]", "[1, 0]", LQR)).is_ok());
     let error = design(&model("[[-1, 0], [0, 2]]", "[1, 0]", LQR)).unwrap_err();
     assert_eq!(error, DesignError::NotStabilisable { task: Task::ContinuousLqr, modes: vec![[2.0, 0.0]] });

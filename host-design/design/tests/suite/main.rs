@@ -1,7 +1,7 @@
-//! Tests of rig files, plant, design, simulation and verification. One program, so that it is linked once.
+//! Tests of rig files, plant, design, simulation and verification. One program, so that linking happens once.
 
 mod design_properties;
-// What the paper prints has one home, in the tool.
+// The paper's printed values are defined once, in the tool.
 #[allow(dead_code, unreachable_pub)]
 #[path = "../../../tool/src/reproduce/published.rs"]
 mod paper_numbers;

@@ -1,4 +1,5 @@
-//! The equations of motion at one instant: against their definition, against energy and power, and in their signs.
+//! The equations of motion at one instant: compared with their definition, with energy and power, and checked for
+//! signs.
 
 use crate::plant_rigs::{any_chain_in_motion, paper, unequal_rods};
 use proptest::prelude::*;
@@ -25,7 +26,7 @@ fn absolute(state: &[f64]) -> (Vec<f64>, Vec<f64>) {
     (sums(0), sums(1))
 }
 
-/// Mechanical energy from the motion of each centre of mass, straight from the picture of the rig.
+/// Mechanical energy from the motion of each centre of mass, directly from the geometry of the rig.
 fn energy_of_masses(chain: &Chain, state: &[f64]) -> f64 {
     let (phi, rate) = absolute(state);
     let mut energy = 0.5 * chain.cart.mass_kg * state[1] * state[1];
@@ -74,7 +75,7 @@ proptest! {
         let mut m = parameters.mass_matrix(&absolute(&state).0);
         prop_assert_eq!(&m.transpose(), &m);
         prop_assert!(is_positive_definite(&m));
-        // Less than the weight of the links on the rail is impossible.
+        // Negative control: the total mass on the rail cannot be 0.
         m[(0, 0)] = 0.0;
         prop_assert!(!is_positive_definite(&m));
     }
@@ -92,7 +93,8 @@ proptest! {
         prop_assert!((energy_of_masses(&longer, &state) - expected).abs() > 1e-12 * size);
     }
 
-    /// The force and torques put in what the frictions do not take: `Ė = u ẋ + Σ τ_i θ̇_i - d_0 ẋ² - Σ d_i θ̇_i²`.
+    /// The energy changes by the power of force and torques minus the power lost to friction:
+    /// `Ė = u ẋ + Σ τ_i θ̇_i - d_0 ẋ² - Σ d_i θ̇_i²`.
     #[test]
     fn energy_changes_by_the_power_of_forces_and_frictions((chain, state) in any_chain_in_motion(1..=8), force in -20.0..20.0f64) {
         let mut plant = chain_plant(&chain).unwrap();
@@ -103,7 +105,7 @@ proptest! {
             let w = state[2 * i + 3];
             power += torques[i] * w - link.friction_n_m_s_per_rad * w * w;
         }
-        // Energy along the direction of motion, by a central difference scaled to the speed of that motion.
+        // Energy along the direction of motion, by a central difference scaled to the speed of the motion.
         let speed = rate.iter().fold(1.0, |most: f64, r| most.max(r.abs()));
         let h = 1e-4 / speed;
         let mut energy_after = |t: f64| {
@@ -117,7 +119,7 @@ proptest! {
         prop_assert!((measured - power).abs() < 1e-9 * size, "{measured} {power} {size}");
     }
 
-    /// The fast arrangement against the equations as they stand: `M [ẍ; φ̈] = right-hand side`.
+    /// The fast algorithm agrees with the equations as written: `M [ẍ; φ̈] = right-hand side`.
     #[test]
     fn accelerations_satisfy_lagranges_equations((chain, state) in any_chain_in_motion(1..=14), force in -20.0..20.0f64) {
         let p = ChainParameters::<f64>::of(&chain);
@@ -143,7 +145,7 @@ proptest! {
                 }
             }
             let (residual, size) = terms.iter().fold((0.0, 0.0), |(sum, size), t| (sum + t, size + t.abs()));
-            // Elimination is backward stable; in the cart's row the errors of every link come together.
+            // Elimination is backward stable; in the cart's row the errors of all links add up.
             prop_assert!(f64::abs(residual) < 1e-11 * (size + 1.0), "row {row}: {residual} of {size}");
         }
     }
@@ -169,7 +171,7 @@ fn a_push_along_x_moves_the_cart_along_x_and_leaves_the_links_behind() {
     for n in 1..=8 {
         let plant = chain_plant(&unequal_rods(n)).unwrap();
         let rate = rate_of(&*plant, &vec![0.0; plant.states()], 1.0, &vec![0.0; n]);
-        // Left behind means tilted to -x, which is counter-clockwise.
+        // A link left behind tilts to -x, which is counter-clockwise.
         assert!(rate[1] > 0.0 && rate[3] > 0.0);
     }
 }

@@ -1,4 +1,4 @@
-//! Simulation of a plant given as a linear model.
+//! Simulation of a plant that is given as a linear model.
 
 use crate::plant_rigs::paper;
 use upright_design::plant::reference::{Tolerance, integrate};
@@ -58,7 +58,7 @@ fn near_upright_the_chain_moves_as_its_linear_model() {
     let chain = linearise(&ChainParameters::<f64>::of(&paper()), Equilibrium::Upright).unwrap();
     let mut linear = LinearSimulation::of(&model(chain.a.to_f64_rows(), chain.b.entries().to_vec(), None));
     let mut nonlinear = chain_plant(&paper()).unwrap();
-    // The difference is of third order in the size of the motion.
+    // The difference is of third order in the amplitude of the motion.
     let mut difference = |size: f64| {
         let start: Vec<f64> = (0..10).map(|i| size * (1.0 - 0.2 * f64::from(i))).collect();
         linear.set_state(&start);

@@ -1,4 +1,4 @@
-//! The linear model against the paper's printed matrices, closed forms and the nonlinear plant.
+//! The linear model, compared with the paper's printed matrices, closed forms and the nonlinear plant.
 
 use crate::paper_numbers::{A, B};
 use crate::plant_rigs::{any_chain, any_link, chain, paper};
@@ -13,7 +13,8 @@ fn model(chain: &Chain, about: Equilibrium) -> LinearModel<f64> {
     linearise(&ChainParameters::of(chain), about).expect("a mass matrix with an inverse")
 }
 
-/// Odd rows (ẋ, θ̇_1, …) of A in columns θ_1 … θ_4, and of B, that differ from the printed ones in six significant digits.
+/// Number of odd rows (ẋ, θ̇_1, …) of A in columns θ_1 … θ_4, and of B, that differ from the printed ones in six
+/// significant digits.
 fn misprints(model: &LinearModel<f64>) -> usize {
     let digits = |value: f64| format!("{value:.5e}");
     let differs = |printed: &str, computed: f64| digits(printed.parse().unwrap()) != digits(computed);
@@ -29,9 +30,10 @@ fn misprints(model: &LinearModel<f64>) -> usize {
 fn the_papers_matrices_come_out_to_every_printed_digit() {
     let ours = model(&paper(), Equilibrium::Upright);
     assert_eq!(misprints(&ours), 0, "{ours:?}");
-    // Of this entry the paper prints seven digits.
+    // The paper prints seven digits of this entry.
     assert_eq!(format!("{:.5}", ours.a[(1, 2)]), "28.25280");
-    // What is not printed is structure: positions follow velocities, and nothing else has an effect.
+    // The entries that are not printed follow from the structure: positions follow velocities, and nothing else has an
+    // effect.
     for row in 0..10 {
         for column in 0..10 {
             let printed = row % 2 == 1 && column % 2 == 0 && column > 0;
@@ -63,8 +65,8 @@ fn slightly_wrong_rigs_do_not_give_the_papers_matrices() {
     }
 }
 
-/// Largest difference of two matrices, relative to the largest entry of its column in the first. A column is the
-/// solution of the equations of motion for one cause, and errors of a solution are relative to its size.
+/// Largest difference of two matrices, relative to the largest entry of the same column in the first one. A column is
+/// the solution of the equations of motion for one cause, and the error of a solution scales with its size.
 fn difference(a: &Matrix<f64>, b: &Matrix<f64>) -> f64 {
     (0..a.cols())
         .map(|j| {
@@ -82,7 +84,7 @@ fn differences(chain: &Chain, about: Equilibrium) -> LinearModel<f64> {
     if about == Equilibrium::Hanging {
         rest[2] = core::f64::consts::PI;
     }
-    // One column of s + 1 + n: a step in a state, in the force or in a torque.
+    // One column out of s + 1 + n: a step in a state, in the force or in a torque.
     let column = |index: usize| {
         let h = 1e-5;
         let rate = |step: f64| {
@@ -107,7 +109,7 @@ fn differences(chain: &Chain, about: Equilibrium) -> LinearModel<f64> {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(150))]
 
-    // Central differences at 1e-5 are good to about 1e-9; a wrong term would show at order 1.
+    // Central differences at 1e-5 are accurate to about 1e-9; a wrong term would be of order 1.
     #[test]
     fn the_linear_model_is_the_derivative_of_the_nonlinear_plant(chain in any_chain(1..=8), hanging: bool) {
         let about = if hanging { Equilibrium::Hanging } else { Equilibrium::Upright };
@@ -116,7 +118,7 @@ proptest! {
         prop_assert!(difference(&exact.b, &measured.b) < 1e-7);
         prop_assert!(difference(&exact.torque_inputs, &measured.torque_inputs) < 1e-7);
 
-        // The same comparison sees one joint whose friction is 1 % off.
+        // Negative control: the comparison sees one joint whose friction is 1 % off.
         let mut wrong = chain.clone();
         wrong.links[0].friction_n_m_s_per_rad = 1.01 * chain.links[0].friction_n_m_s_per_rad + 1e-3;
         prop_assert!(difference(&model(&wrong, about).a, &measured.a) > 1e-7);
@@ -140,7 +142,7 @@ proptest! {
         for (i, expected) in [(1, cart), (3, joint)] {
             let found = [ours.a[(i, 1)], ours.a[(i, 2)], ours.a[(i, 3)], ours.b[(i, 0)], ours.torque_inputs[(i, 0)]];
             for (expected, found) in expected.into_iter().zip(found) {
-                // det loses a few digits where cart and inertia are small.
+                // The determinant loses a few digits if the cart's mass and the inertia are small.
                 prop_assert!((expected - found).abs() <= 1e-12 * expected.abs(), "{expected} {found}");
             }
         }
@@ -151,7 +153,7 @@ proptest! {
         let about = if hanging { Equilibrium::Hanging } else { Equilibrium::Upright };
         let wide = linearise(&ChainParameters::<W>::of(&chain), about).unwrap();
         let double = model(&chain, about);
-        // A few rounding errors, times the condition of the equations that were solved.
+        // A few rounding errors, times the condition number of the solved equations.
         let upright = ChainParameters::<f64>::of(&chain).mass_matrix(&vec![0.0; chain.links.len()]);
         let inverse = solve(&upright, &Matrix::identity(upright.rows())).unwrap();
         let tolerance = 4.0 * f64::EPSILON * upright.norm() * inverse.norm();

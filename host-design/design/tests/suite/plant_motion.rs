@@ -1,4 +1,4 @@
-//! Motion over time: energy, natural frequencies and the agreement of both integrators.
+//! Motion over time: energy, natural frequencies and the agreement of the two integrators.
 
 use crate::plant_rigs::{chain, paper, rod, unequal_rods, with_friction};
 use upright_design::numerics::{Matrix, Real, Wide};
@@ -10,7 +10,7 @@ use upright_design::rig::{Chain, Link, MAX_LINKS};
 
 const TIGHT: Tolerance = Tolerance { relative: 1e-13, absolute: 1e-13 };
 
-/// Every link at another angle and in motion.
+/// A state with every link at another angle and in motion.
 fn tangled(n: usize) -> Vec<f64> {
     let mut state = vec![0.1, -0.4];
     for i in 0..n {
@@ -25,7 +25,7 @@ fn total_energy(chain: &Chain, state: &[f64]) -> f64 {
     plant.energy().unwrap().total()
 }
 
-/// Energy between all links hanging and all upright (J).
+/// Energy difference between all links upright and all hanging (J).
 fn energy_range(chain: &Chain) -> f64 {
     2.0 * total_energy(chain, &vec![0.0; 2 * chain.links.len() + 2])
 }
@@ -53,7 +53,7 @@ fn energy_is_conserved_without_friction() {
     }
 }
 
-/// Largest energy gained in one step of 0.1 ms during 2 s, as a share of the energy range.
+/// Largest energy gain in one step of 0.1 ms during 2 s, as a share of the energy range.
 fn largest_gain(rig: &Chain) -> f64 {
     let n = rig.links.len();
     let mut plant = chain_plant(rig).unwrap();
@@ -73,7 +73,7 @@ fn largest_gain(rig: &Chain) -> f64 {
 fn energy_never_increases_with_friction() {
     for n in 1..=6 {
         let braked = with_friction(unequal_rods(n), 1.0);
-        // Room for rounding only: at a turning point nothing is dissipated.
+        // Margin for rounding only: at a turning point nothing is dissipated.
         assert!(largest_gain(&braked) < 1e-14, "{n} links: {:e}", largest_gain(&braked));
         assert!(largest_gain(&with_friction(unequal_rods(n), -1e-3)) > 1e-14, "driving is noticed");
     }
@@ -89,8 +89,8 @@ fn a_hanging_link_on_a_cart_swings_with_the_textbook_period() {
     let model = linearise(&ChainParameters::<f64>::of(&rig), Equilibrium::Hanging).unwrap();
     assert!((model.a[(3, 2)] + omega * omega).abs() < 1e-13 * omega * omega);
 
-    // A small swing of the nonlinear plant returns after that period, cart and all; the true period is longer
-    // by an order of the amplitude squared.
+    // A small swing of the nonlinear plant, cart included, returns after that period. The true period is longer by an
+    // amount of the order of the amplitude squared.
     let amplitude = 1e-4;
     let start = [0.2, 0.0, core::f64::consts::PI + amplitude, 0.0];
     let plant = chain_plant(&rig).unwrap();
@@ -101,7 +101,7 @@ fn a_hanging_link_on_a_cart_swings_with_the_textbook_period() {
     assert!(missed(after(1.001 * period)) > 1e-6 * amplitude, "a period 0.1 % off is noticed");
 }
 
-/// Determinant by elimination with exchanges.
+/// Determinant by elimination with row exchanges.
 fn determinant<R: Real>(mut m: Matrix<R>) -> R {
     let mut det = R::one();
     for k in 0..m.rows() {
@@ -124,8 +124,8 @@ fn determinant<R: Real>(mut m: Matrix<R>) -> R {
 }
 
 /// n equal point masses on equal strings swing with `ω² = (g/l) r` at the roots r of the Laguerre polynomial `L_n`
-/// (the discrete hanging chain; D. Bernoulli 1733). Two monic polynomials of degree n that agree at n + 1 points
-/// are the same, so their roots need not be found.
+/// (the discrete hanging chain; D. Bernoulli 1733). Two monic polynomials of degree n that agree at n + 1 points are
+/// equal, so the roots need not be computed.
 fn differs_from_laguerre(links: &[Link]) -> f64 {
     type W = Wide;
     let n = links.len();
@@ -134,7 +134,7 @@ fn differs_from_laguerre(links: &[Link]) -> f64 {
     let l_over_g = W::from_f64(0.25) / &W::from_f64(rig.gravity_m_per_s2);
     let mut worst = 0.0f64;
     for point in 0..=n {
-        // At negative arguments all terms have one sign, so nothing cancels.
+        // At negative arguments all terms have the same sign, so nothing cancels.
         let r = W::from_f64(-0.5 - 3.0 * point as f64);
         let characteristic = determinant(Matrix::from_fn(n, n, |i, j| {
             let stiffness = -model.a[(2 * i + 3, 2 * j + 2)].clone() * &l_over_g;
@@ -167,10 +167,10 @@ fn point_masses_on_a_fixed_point_swing_at_the_roots_of_laguerre_polynomials() {
     }
 }
 
-/// Distance from the reference of 0.1 s of a push on the nearly upright paper rig, in steps of `dt`.
+/// Distance from the reference after 0.1 s of a push on the nearly upright paper rig, in `steps` steps.
 fn rk4_error(steps: u32) -> f64 {
     let plant = chain_plant(&paper()).unwrap();
-    let duration = 0.1; // the fastest instability grows 1300-fold meanwhile: long, but not yet chaotic
+    let duration = 0.1; // the fastest instability grows 1300-fold in this time: long, but not yet chaotic
     let start = [0.0, 0.1, 0.02, 0.1, -0.03, 0.0, 0.01, -0.2, 0.02, 0.0];
     let torques = [1e-4, 0.0, -1e-4, 0.0];
     let exact = integrate(&*plant, &start, |_, _| 0.05, &torques, duration, TIGHT).unwrap();

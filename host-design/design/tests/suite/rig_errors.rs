@@ -1,10 +1,10 @@
-//! Bad rig files, each with the place and key its message must name and the exit code it must have.
+//! Bad rig files: for each, the place and key that the message must name, and its exit code.
 
 use std::path::{Path, PathBuf};
 
 use upright_design::rig::{MAX_BYTES, Rig, RigError, RigErrorKind};
 
-/// A rig with every table, one key a line, so that a case changes one line.
+/// A rig with every table, one key per line, so that a case changes one line.
 const GOOD: &str = r#"name = "bench"
 [cart]
 mass_kg = 1.0
@@ -53,7 +53,7 @@ angle_rad = 0.3
 speed_m_per_s = 2
 "#;
 
-/// A plant by its matrices, one key a line.
+/// A plant given by its matrices, one key per line.
 const MODEL: &str = r#"name = "model"
 [model]
 a = [[0, 1], [2, 0]]
@@ -69,7 +69,7 @@ force_noise_n2_s = 1
 joint_noise = [1]
 "#;
 
-/// (file, the line in it to replace, its replacement, place, key, words of the message, exit code)
+/// (file, line to replace, replacement, place, key, words of the message, exit code)
 type Case =
     (&'static str, &'static str, &'static str, &'static str, &'static str, &'static [&'static str], u8);
 
@@ -111,7 +111,7 @@ const CASES: &[Case] = &[
     (GOOD, "name = \"bench\"", "name = \"a\\u001b[2Jb\"", "1:8", "name", &["printable"], 2),
     (GOOD, "name = \"bench\"", "name = \"0123456789012345678901234567890123456789012345678901234567890123456789\"",
         "1:8", "name", &["1 to 64 bytes"], 2),
-    // Numbers that are none
+    // Numbers that are not finite or out of range
     (GOOD, "mass_kg = 1.0", "mass_kg = nan", "3:11", "cart.mass_kg", &["found nan", "a finite number"], 2),
     (GOOD, "friction_n_s_per_m = 2", "friction_n_s_per_m = -inf", "4:22", "cart.friction_n_s_per_m", &["-inf", "finite"], 2),
     (GOOD, "mass_kg = 1.0", "mass_kg = 1e400", "3:11", "mass_kg", &["not TOML", "overflow"], 2),
@@ -247,7 +247,7 @@ fn too_many_links_or_states() {
     check(&error, "3:5", "model.a", &["found a list of 61", "1 to 60"], 2);
 }
 
-/// A file of these bytes in a directory of this test's own.
+/// Writes a file with these bytes to a directory of this test's own.
 fn file(name: &str, bytes: &[u8]) -> PathBuf {
     let directory = Path::new(env!("CARGO_TARGET_TMPDIR")).join("rig_errors");
     std::fs::create_dir_all(&directory).unwrap();

@@ -136,7 +136,7 @@ fn the_hash_sees_values_only() {
     }
 }
 
-/// Every number of every rig file, changed in its last digit, changes the hash.
+/// Changing the last digit of any number in any rig file changes the hash.
 #[test]
 fn the_hash_sees_every_value() {
     for file in rig_files() {
@@ -147,7 +147,7 @@ fn the_hash_sees_every_value() {
         }
         let hash = rig.hash();
         let mut changed = 0;
-        // Thresholds of `upright verify` change no gain and are not part of the hash.
+        // Thresholds of `upright verify` affect no gain and are not part of the hash.
         let counted = text.split("[verify]").next().unwrap_or_default();
         for (index, line) in
             counted.lines().enumerate().filter(|(_, line)| !line.trim_start().starts_with('#'))
@@ -163,7 +163,7 @@ fn the_hash_sees_every_value() {
                 let last = value.rfind(|c: char| c.is_ascii_digit()).unwrap();
                 let exponent =
                     value[..last].rfind(['e', ' ', '[']).is_some_and(|at| value[at..].starts_with('e'));
-                // One more digit, where it is part of the number and not of its exponent.
+                // Adds a digit to the number, not to its exponent.
                 let (at, digit) = if exponent { (value.rfind('e').unwrap(), "") } else { (last + 1, "") };
                 let point = value[..at].rfind([' ', '[']).is_some_and(|start| value[start..at].contains('.'));
                 format!("{}{}{digit}{}", &value[..at], if point { "1" } else { ".01" }, &value[at..])
@@ -177,8 +177,8 @@ fn the_hash_sees_every_value() {
     }
 }
 
-/// The hash is stored in gain tables: it must not change from one build to the next. (It does change, rightly, when the
-/// rig gains a field.)
+/// The hash is stored in gain tables, so it must not change from one build to the next. (It does change, rightly, when
+/// the rig gets a new field.)
 #[test]
 fn the_hash_of_the_minimal_rig_is_fixed() {
     assert_eq!(format!("{:016x}", parse(MINIMAL).hash()), "38c880ab2d7c81d4");
@@ -212,7 +212,7 @@ fn the_description_of_a_motor_has_its_largest_force() {
     assert!(text.contains("17.2354 N"), "{text}");
 }
 
-/// The part of `docs/rig-file.md` between its markers.
+/// The part of `docs/rig-file.md` between the markers.
 fn documented_keys(page: &str) -> &str {
     let (_, rest) = page.split_once("<!-- keys -->\n").expect("no marker <!-- keys -->");
     rest.split_once("<!-- /keys -->").expect("no marker <!-- /keys -->").0.trim()
@@ -228,12 +228,12 @@ fn the_documented_keys_are_those_of_the_code() {
     assert_ne!(documented_keys(&changed), key_table().trim());
 }
 
-/// Units are part of the names: the unit of a row and the end of its name are one.
+/// Units are part of the names: the unit of a row matches the end of its name.
 #[test]
 fn names_of_keys_end_in_their_unit() {
     let ends_in_unit = |name: &str, unit: &str| name.ends_with(&unit_in_names(unit));
     for key in SECTIONS.iter().flat_map(|section| section.keys()) {
-        // Lists of poles and encoder counts have their unit in words.
+        // Lists of poles and encoder counts give their unit in words.
         if !["1/s", "counts/rev"].contains(&key.unit) {
             assert!(ends_in_unit(key.name, key.unit), "{} is not in {}", key.name, key.unit);
         }
@@ -242,7 +242,7 @@ fn names_of_keys_end_in_their_unit() {
     assert!(ends_in_unit("inertia_kg_m2", "kg·m²") && !ends_in_unit("inertia_kg_m2", "kg·m"));
 }
 
-/// Every key of a good file is in the table, and a key that is not is refused.
+/// Every key of a good file is in the table, and an unknown key is refused.
 #[test]
 fn the_table_has_every_key_of_every_rig_file() {
     for file in rig_files() {
@@ -261,7 +261,7 @@ fn the_table_has_every_key_of_every_rig_file() {
     assert!(TOP.keys().all(|key| key.name != "mass_kg"));
 }
 
-/// The shares that the table's words give are those the gain table is made with.
+/// The shares stated in the table are those that the gain table is made with.
 #[test]
 fn shares_in_words_are_those_in_use() {
     let limits = SECTIONS.iter().find(|section| section.name == "limits").unwrap();
@@ -281,7 +281,7 @@ fn rows_of_the_description_have_names_of_their_own() {
     for file in rig_files() {
         let text = Rig::from_path(&file).unwrap().describe();
         for block in text.split("\n\n") {
-            // A name takes the first 26 columns; a list goes on below an empty one.
+            // A name takes the first 26 columns; a list continues below an empty one.
             let names: Vec<String> = block
                 .lines()
                 .map(|line| line.chars().skip(2).take(26).collect::<String>().trim().to_owned())

@@ -1,4 +1,4 @@
-//! No file, however mangled, makes the reader panic, and every error is one plain line with a sensible exit code.
+//! No file, however mangled, makes the reader panic, and every error is one plain line with a valid exit code.
 
 use std::path::Path;
 
@@ -6,7 +6,7 @@ use check::check;
 use proptest::prelude::*;
 use upright_design::rig::Rig;
 
-/// The check that the fuzzer runs, too.
+/// The same check that the fuzzer runs.
 #[path = "../../../../fuzz/checks/rig.rs"]
 mod check;
 
@@ -18,7 +18,7 @@ const SEEDS: [&str; 4] = [
      [pole_placement]\npoles = [[-1, 2], [-1, -2]]\n[kalman]\nforce_noise_n2_s = 1\n",
 ];
 
-/// Pieces that a TOML parser treats specially, and numbers at the edges.
+/// Pieces that a TOML parser treats specially, and numbers at the limits.
 const PIECES: &[&str] = &[
     "[",
     "]",
@@ -123,7 +123,7 @@ proptest! {
     }
 }
 
-/// Nesting as deep as a file can hold is refused, not followed until the stack is gone.
+/// Nesting as deep as a file can hold is refused; the parser does not follow it until the stack overflows.
 #[test]
 fn deep_nesting() {
     for (open, close) in [("[", "]"), ("{a=", "}"), ("a.", "b")] {

@@ -11,7 +11,7 @@ use upright::protocol::message::Request;
 use upright::supervision::fault::Cause;
 use upright::table::Law;
 
-/// Balances for some hours; every minute the set-point goes to the other side.
+/// Balances for some hours. The set-point changes sides every minute.
 struct Nominal {
     ticks: u64,
     minute: u64,
@@ -24,7 +24,7 @@ struct Nominal {
 struct Found {
     cause: Option<Cause>,
     rejected: u32,
-    /// Largest innovation as a share of its threshold.
+    /// Largest innovation so far, as a share of its threshold.
     closest: f32,
 }
 
@@ -75,7 +75,7 @@ fn nominal(rig: &Rig, law: Law, seed: u64, hours: f64) -> Found {
     balancing(rig, &values, &scenario, |harness| nominal.run(harness)).unwrap()
 }
 
-/// `hours` for each rig and law, in `parts` of which each has its own disturbances.
+/// Balances for `hours` in total with each rig and law, in `parts` runs with different disturbances.
 fn no_alarm(hours: f64, parts: u64) {
     let of_rig = |name: &'static str| [Law::Lqr, Law::PolePlacement].map(|law| (name, law));
     let runs: Vec<_> = ALL_RIGS.into_iter().flat_map(of_rig).collect();
@@ -106,7 +106,7 @@ fn ten_hours_of_nominal_balancing_of_every_rig_raise_no_alarm() {
 
 #[test]
 fn twenty_times_the_disturbance_is_an_alarm() {
-    // The tests can fail.
+    // Negative control: larger disturbances do raise an alarm.
     let mut rough = rig("quadruple-paper");
     rough.verify.force_rms_n = Some(20.0 * 0.1);
     assert!(nominal(&rough, Law::Lqr, 1, 30.0 / 3600.0).cause.is_some());

@@ -1,4 +1,4 @@
-//! Every fault of encoders and motor turns the motor off before a link leaves its limit; what is no fault does not.
+//! Every fault of encoders and motor turns the motor off before a link leaves its limit. Anything else does not.
 
 use crate::supervised::{ALL_RIGS, balancing, cause, rejected, rig, table};
 use upright::board::Output;
@@ -12,21 +12,21 @@ use upright_design::simulate::{Bench, Scenario};
 use upright_design::table::TableValues;
 use upright_design::verify::Disturbance;
 
-/// What is wrong, with the number of the sensor.
+/// A defect, with the number of the sensor.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Defect {
     Nothing,
     Frozen(usize),
     /// One measurement is off by n counts.
     OneBad(usize, i32),
-    /// Two are, then one is not, and so on.
+    /// Of every three measurements, two are off by n counts.
     TwoOfThreeBad(usize, i32),
-    /// All from now on are.
+    /// From now on, all measurements are off by n counts.
     Jump(usize, i32),
     /// A count is lost every n ticks.
     LosesCounts(usize, u32),
     Reversed(usize),
-    /// This one and the next.
+    /// The readings of this sensor and the next are swapped.
     Swapped(usize),
     /// The measurement is n ticks old.
     Late(usize, usize),
@@ -36,10 +36,10 @@ enum Defect {
     MotorStuck,
 }
 
-/// A defect between rig and firmware.
+/// A defect inserted between rig and firmware.
 struct Injection {
     defect: Defect,
-    /// Its first tick, counted from the release.
+    /// First tick of the defect, counted from the release.
     from: u32,
     frozen: Option<u32>,
     past: Vec<u32>,
@@ -87,20 +87,20 @@ impl Injection {
     }
 }
 
-/// What came of it.
+/// Result of a run with a defect.
 #[derive(Debug, Clone, PartialEq)]
 struct Outcome {
-    /// The fault, and the ticks from the defect to motor off.
+    /// The fault, and the number of ticks from the start of the defect until the motor is off.
     fault: Option<(Fault, u32)>,
     sensor: Option<u8>,
-    /// Largest true angle of a link from the vertical until then (rad).
+    /// Largest true angle of a link from the vertical up to then (rad).
     lean_rad: f64,
     rejected: u32,
 }
 
-/// Lets the rig balance with the defect, until the motor is off.
+/// Lets the rig balance with the defect until the motor is off, for at most `ticks`.
 fn observe(harness: &mut Harness<'_>, mut injection: Injection, ticks: u32) -> Outcome {
-    // The telemetry is of no use here.
+    // The telemetry is not needed here.
     harness.session.send(Request::Telemetry(0));
     let (mut lean_rad, mut off) = (0.0f64, None);
     for tick in 0..ticks {
@@ -145,7 +145,7 @@ fn watch(rig: &Rig, values: &TableValues, law: Law, defect: Defect, seed: u64, t
 const LAWS: [Law; 2] = Law::ALL;
 const SEEDS: u64 = 4;
 
-/// Every rig, law and some seeds with these defects.
+/// Runs these defects on every rig, with every law and some seeds.
 fn of_all(
     defects: impl Fn(usize) -> Vec<Defect>,
     ticks: u32,
@@ -170,7 +170,7 @@ fn of_all(
     }
 }
 
-/// The motor went off in time, and by these tests, not because a link had left its limit.
+/// The motor went off in time, because of these tests and not because a link had left its limit.
 fn found_in_time(what: &str, rig: &Rig, _: Defect, outcome: &Outcome) {
     let (fault, _) = outcome.fault.unwrap_or_else(|| panic!("not found: {what}"));
     assert!(matches!(fault, Fault::Encoder | Fault::Frozen | Fault::Motor), "{what}");
@@ -179,7 +179,7 @@ fn found_in_time(what: &str, rig: &Rig, _: Defect, outcome: &Outcome) {
 
 #[test]
 fn a_frozen_encoder_is_found_long_before_a_link_leaves_its_limit() {
-    // The lightest motion may stay within a count for a while: then there is nothing to lose yet.
+    // The slightest motion may stay within a count for a while: then a frozen counter loses nothing yet.
     of_all(
         |sensors| (0..sensors).map(Defect::Frozen).collect(),
         3000,
@@ -231,7 +231,8 @@ fn a_late_encoder_is_survived_or_found() {
             assert!(outcome.lean_rad < rig.limits.angle_rad.unwrap(), "{what}");
         });
     }
-    // So late that the limit itself is seen late: the true angle may be beyond it when the motor is turned off.
+    // The delay is so long that the limit itself is noticed late: the true angle may exceed it when the motor goes
+    // off.
     of_all(late(20), 4000, |what, rig, _, outcome| {
         assert!(outcome.fault.is_some() || outcome.lean_rad < rig.limits.angle_rad.unwrap(), "{what}");
     });
@@ -265,7 +266,7 @@ fn an_encoder_of_a_link_that_loses_counts_is_found_before_the_limits_are_left() 
     let lost = |sensors| (1..sensors).map(|sensor| Defect::LosesCounts(sensor, 100)).collect();
     of_all(lost, 5000, |what, rig, _, outcome| {
         assert!(outcome.fault.is_some(), "{what}");
-        // The limit is on the measured angle, which is wrong by the lost counts.
+        // The limit applies to the measured angle, which is off by the lost counts.
         assert!(outcome.lean_rad <= 1.05 * rig.limits.angle_rad.unwrap(), "{what}");
     });
 }

@@ -1,4 +1,4 @@
-//! The rules of arming, clearing and commanding, on the whole firmware.
+//! The rules of arming, clearing faults and commanding, tested on the whole firmware.
 
 use crate::supervised::{balancing as balance, rig, table};
 use proptest::prelude::*;
@@ -12,7 +12,7 @@ use upright::table::Law;
 use upright_design::harness::Harness;
 use upright_design::simulate::Scenario;
 
-/// What a test does with the single pendulum, balancing and undisturbed.
+/// Runs a test with the single pendulum, balancing and undisturbed.
 fn balancing<T>(test: impl FnOnce(&mut Rigged<'_, '_>) -> T) -> T {
     let rig = rig("single-quanser-ip02");
     balance(&rig, &table(&rig), &Scenario::at_rest(&rig, Law::Lqr), |harness| {
@@ -22,7 +22,7 @@ fn balancing<T>(test: impl FnOnce(&mut Rigged<'_, '_>) -> T) -> T {
     .unwrap()
 }
 
-/// Inputs that a test gives.
+/// Inputs that a test sets.
 #[derive(Clone, Copy, Default)]
 struct Given {
     contacts: Contacts,
@@ -31,7 +31,7 @@ struct Given {
     counts: i32,
 }
 
-/// The rig and its firmware, with given inputs.
+/// The rig and its firmware, with inputs set by the test.
 struct Rigged<'h, 't> {
     harness: &'h mut Harness<'t>,
     inputs: Given,
@@ -54,7 +54,7 @@ impl Rigged<'_, '_> {
         &mut self.inputs
     }
 
-    /// State and fault according to the last telemetry, which is that of the tick before the last.
+    /// State according to the last telemetry, which describes the tick before the last one.
     fn state(&self) -> State {
         self.harness.session.status().state
     }
@@ -63,7 +63,7 @@ impl Rigged<'_, '_> {
         self.harness.session.fault()
     }
 
-    /// Takes three ticks: the command comes with the first, is executed in the second, and answered with the third.
+    /// Takes three ticks: the command arrives in the first, is executed in the second and answered in the third.
     fn ask(&mut self, request: Request) -> Answer {
         let id = self.harness.session.send(request);
         self.wait(3);
@@ -78,7 +78,7 @@ impl Rigged<'_, '_> {
         }
     }
 
-    /// Ticks until the motor is off; none if it stays on.
+    /// Number of ticks until the motor is off; `None` if it stays on.
     fn ticks_to_off(&mut self, most: u32) -> Option<u32> {
         (1..=most).find(|_| !self.tick().enable)
     }
@@ -101,7 +101,7 @@ fn each_input_turns_the_motor_off_in_its_tick() {
         (|given| given.contacts.driver_fault = true, 1, Fault::Driver),
         (|given| given.contacts.overrun = true, 3, Fault::Overrun),
         (|given| given.supply_v = Some(f32::NAN), 1, Fault::NotFinite),
-        // 5 ms of 2 ms ticks, rounded to 3, and one.
+        // 5 ms at ticks of 2 ms, rounded up to 3 ticks, plus one.
         (|given| given.supply_v = Some(7.9), 4, Fault::Supply),
     ];
     for (change, ticks, fault) in cases {
@@ -151,7 +151,7 @@ fn a_host_that_commands_the_set_point_must_not_fall_silent_and_one_that_does_not
             rig.ask(Request::Beat);
         }
         assert_eq!(rig.state(), State::Balancing);
-        // 100 ms of 2 ms ticks, and the tick after; one of them has brought the answer.
+        // 100 ms at ticks of 2 ms, plus one tick; the answer has taken one of them.
         assert_eq!(rig.ticks_to_off(100), Some(51 - 1));
         rig.wait(1);
         assert_eq!(rig.fault(), Some(Fault::LinkLost));
@@ -170,13 +170,13 @@ fn clear_and_arm_are_two_acts_and_a_held_arm_is_none() {
         assert_eq!(rig.ask(Request::Clear), Answer::Done);
         rig.wait(1);
         assert_eq!((rig.state(), rig.fault()), (State::Calibrated, None));
-        // The key is still down: for as long as it is, nothing happens.
+        // The key is still pressed: nothing happens for as long as it is.
         for _ in 0..50 {
             assert!(reasons(rig.ask(Request::Arm)).contains(Inhibits::HELD));
             rig.wait(100);
         }
         assert_eq!(rig.state(), State::Calibrated);
-        // Let go for half a second. (Undisturbed, the link has stayed upright.)
+        // Released for half a second. (Undisturbed, the link has stayed upright.)
         rig.wait(260);
         assert_eq!(rig.ask(Request::Arm), Answer::Done);
         rig.wait(200);
@@ -247,7 +247,7 @@ fn what_runs_is_neither_homed_nor_checked_nor_given_another_law() {
     });
 }
 
-/// What may happen: requests, inputs, and time.
+/// Events of a random test: requests, inputs and time.
 #[derive(Debug, Clone)]
 enum Event {
     Ask(Request),
@@ -317,13 +317,13 @@ proptest! {
 
 /// The rules, checked in every tick.
 struct Rules {
-    /// Contacts and output of the last tick, whose telemetry comes with the next one.
+    /// Contacts and output of the last tick, whose telemetry comes with the next tick.
     last: (Contacts, Output),
     /// State in the tick before it.
     before: State,
     /// Whether an arm command was accepted, and the firmware has been armed or balancing since.
     armed: bool,
-    /// Commands that arm.
+    /// Ids of the commands that arm.
     arms: Vec<u64>,
 }
 
@@ -332,7 +332,7 @@ impl Rules {
         rig.tick();
         let before = rig.state();
         while rig.harness.session.next_telemetry().is_some() {}
-        // A firmware that balances already was armed by hand.
+        // A firmware that is already balancing was armed by hand.
         Self {
             last: (rig.inputs.contacts, rig.output),
             before,

@@ -28,7 +28,7 @@ fn every_rig_is_homed_checked_raised_and_balanced_by_hand() {
 fn counters_that_wrap_on_the_way_change_no_bit() {
     let rig = rig("double-quanser-dbpen");
     let values = table(&rig);
-    // What the firmware decided in every tick from the first of balancing on, as bits.
+    // What the firmware decided in every tick from the first tick of balancing on, as bits.
     let bits = |counter_start: u32, tilt: f64| -> Vec<Tick> {
         let mut scenario =
             Scenario { counter_start, force_noise_n: 0.3, ..Scenario::at_rest(&rig, Law::Lqr) };

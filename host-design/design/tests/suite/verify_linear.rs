@@ -1,4 +1,4 @@
-//! The linear half of the trust report, against the firmware and against what it claims.
+//! The linear half of the trust report, compared with the firmware and with its own claims.
 
 use std::path::Path;
 
@@ -11,7 +11,7 @@ use upright_design::simulate::{Scenario, simulate};
 use upright_design::table::{Gains, TableValues};
 use upright_design::verify::{LinearReport, LoopModel, linear};
 
-/// A pendulum of 0.3 m on a cart as a given model: steps so fine that nothing but the law is seen.
+/// A pendulum of 0.3 m on a cart, as a `[model]`. Its encoder steps are so fine that only the law has an effect.
 const MODEL: &str = r#"
 name = "pendulum-model"
 [model]
@@ -67,7 +67,7 @@ fn radius_with_factor(model: &LoopModel<f64>, re: f64, im: f64) -> f64 {
     spectral_radius(&real.beside(&-&imaginary).above(&imaginary.beside(&real))).unwrap()
 }
 
-/// Spectral radius with the force `ticks` whole ticks later.
+/// Spectral radius with the force delayed by `ticks` whole ticks.
 fn radius_with_delay(model: &LoopModel<f64>, ticks: usize) -> f64 {
     let (n, e, c) = (model.matrix.rows(), &model.force_input, &model.force_output);
     if ticks == 0 {
@@ -100,7 +100,7 @@ fn the_model_of_the_loop_moves_as_the_firmware_does() {
         for law in [Law::Lqr, Law::PolePlacement] {
             let model = LoopModel::<f64>::as_it_runs(&certified, &table, law).unwrap();
             let mut scenario = Scenario::at_rest(&rig, law);
-            // The links' counters have 16 bits: a start with a lean would wrap them at once.
+            // The links' counters have 16 bits: with a lean at the start, they would wrap at once.
             scenario.start = vec![0.004, 0.0, 0.0, 0.0];
             scenario.duration_s = 3.0;
             let (trace, _) = simulate(&rig, &table, &scenario).unwrap();
@@ -114,8 +114,8 @@ fn the_model_of_the_loop_moves_as_the_firmware_does() {
                 peak = peak.max(force.abs());
                 state = &model.matrix * &state;
             }
-            // All that is left is the encoders' rounding, with the RMS that the noise model predicts for it (f32 is finer).
-            // A wrong tick of delay or a lost term is a hundred times more.
+            // Only the rounding of the encoders is left, with the RMS that the noise model predicts (f32 is finer).
+            // A wrong tick of delay or a lost term would be a hundred times larger.
             let rounding = encoder_force_n(&rig, &certified, &table, law);
             assert!(
                 worst < 8.0 * rounding,
@@ -145,7 +145,7 @@ fn the_loop_is_on_the_edge_at_its_margins_and_nowhere_before() {
             edge("gain", &gain, margins.lowest_gain, 0.999);
             let phase = |phi: f64| radius_with_factor(&model, phi.cos(), phi.sin());
             edge("phase", &phase, margins.phase_margin_rad.unwrap(), 1.001);
-            // Between the margins nothing fails.
+            // Between the margins the loop is stable.
             let (low, high) = (margins.lowest_gain, margins.highest_gain.unwrap());
             for i in 1..40 {
                 assert!(gain(low * (high / low).powf(f64::from(i) / 40.0)) < 1.0);
@@ -153,7 +153,7 @@ fn the_loop_is_on_the_edge_at_its_margins_and_nowhere_before() {
             let delay = margins.delay_margin_ticks.unwrap();
             assert!(radius_with_delay(&model, delay.floor() as usize) < 1.0, "{delay}");
             assert!(radius_with_delay(&model, delay.ceil() as usize) > 1.0, "{delay}");
-            // Every corner of the disk's gain and phase ranges is inside the exact ones.
+            // Every corner of the disk's gain and phase ranges lies inside the exact ones.
             let alpha = margins.disk_margin;
             assert!((2.0 + alpha) / (2.0 - alpha) <= high && (2.0 - alpha) / (2.0 + alpha) >= low);
             assert!(2.0 * (alpha / 2.0).atan() <= margins.phase_margin_rad.unwrap());
@@ -186,7 +186,7 @@ fn the_paper_rig_is_reported_stable_with_finite_margins() {
         assert!(margins.peak_sensitivity.is_finite() && margins.disk_margin > 0.0);
         assert!(tick.longest_stable_s.unwrap() > 0.001);
         assert!(tick.shortest_unstable_s.unwrap() >= tick.longest_stable_s.unwrap());
-        // The sufficient criterion never promises more than the exact constant delay allows.
+        // The sufficient criterion never promises more than the exact margin for constant delay.
         assert!(tick.jitter_ticks > 0.0 && tick.jitter_ticks <= margins.delay_margin_ticks.unwrap());
         assert!(tick.varying_delay_ticks <= margins.delay_margin_ticks.unwrap().ceil());
     }
@@ -203,7 +203,7 @@ fn continuous_gains_held_for_three_milliseconds_are_reported_unstable() {
     let report = &linear(&rig, &certified, &held).unwrap()[0];
     assert!(!report.stable && (report.spectral_radius - 1.08).abs() < 0.005, "{}", report.spectral_radius);
     assert!(report.margins.is_none() && report.tick.is_none() && report.certificates.is_empty());
-    // The gains designed for that tick hold.
+    // With the gains designed for that tick, the loop is stable.
     let sampled = TableValues::of(&rig, &certified, Gains::Sampled).unwrap();
     assert!(linear(&rig, &certified, &sampled).unwrap()[0].stable);
 }
@@ -245,7 +245,7 @@ fn the_predicted_rms_is_that_of_a_long_run() {
     let of_encoders = |value: &dyn Fn(&upright_design::verify::NoiseShare) -> f64| {
         shares.iter().filter(|s| s.source.starts_with("encoder")).map(|s| value(s).powi(2)).sum::<f64>()
     };
-    // Variances of u, cart position and angle, predicted; then batches of a run with uniform rounding errors.
+    // Predicted variances of u, cart position and angle; then batches of a run with uniform rounding errors.
     let predicted =
         [of_encoders(&|s| s.force_n), of_encoders(&|s| s.states[0]), of_encoders(&|s| s.states[2])];
     let steps = certified.double.kalman.as_ref().unwrap().steps.entries().to_vec();
@@ -257,7 +257,7 @@ fn the_predicted_rms_is_that_of_a_long_run() {
         for _ in 0..length {
             let v = Matrix::from_fn(steps.len(), 1, |i, _| steps[i] * random.random_range(-0.5..0.5));
             let u = (&(&model.force_output * &state) + &(&model.sensor_to_force * &v))[(0, 0)];
-            // The first batch is for settling.
+            // The first batch lets the run settle.
             if let Some(mean) = batch.checked_sub(1).map(|b| &mut means[b]) {
                 for (mean, value) in mean.iter_mut().zip([u, state[(0, 0)], state[(2, 0)]]) {
                     *mean += value * value / f64::from(length);

@@ -1,4 +1,4 @@
-//! The nonlinear half of the trust report, with rigs that must pass and rigs that must not.
+//! The nonlinear half of the trust report, with rigs that must pass and rigs that must fail.
 
 use std::path::Path;
 use std::sync::LazyLock;
@@ -16,7 +16,7 @@ use upright_design::verify::{
 };
 
 const LAWS: [Law; 2] = Law::ALL;
-/// The disturbances of the paper: 0.1 N and 3.16e-5 N·m rms.
+/// The disturbances in the paper: 0.1 N and 3.16e-5 N·m rms.
 const PAPERS: Disturbance = Disturbance { force_n: 0.1, torque_n_m: 3.16e-5 };
 
 fn rig(name: &str) -> Rig {
@@ -33,7 +33,7 @@ fn with_force_limit(mut rig: Rig, limit_n: f64) -> Rig {
     rig
 }
 
-/// The paper's rig, limited to 5 N.
+/// The paper's rig with a force limit of 5 N.
 static PAPER: LazyLock<(Rig, TableValues)> = LazyLock::new(|| {
     let rig = with_force_limit(rig("quadruple-paper.toml"), 5.0);
     let table = table(&rig);
@@ -56,7 +56,7 @@ fn the_edges_of_attraction_are_edges() {
     assert_eq!(found.worst.as_ref().unwrap().edge.size, tilt.size);
     assert!(found.raw_step.as_ref().unwrap().size > 0.05, "{found:?}");
 
-    // The map agrees with the edge on both sides of it.
+    // The map agrees with the edge on both of its sides.
     let axis = |state, range| Axis { state, range, points: 2 };
     let axes = [axis(2, [0.9 * tilt.size, 1.1 * tilt.size]), axis(3, [0.0, 0.01])];
     let map = attraction_map(rig, table, Law::Lqr, axes, &settings.horizon, &|| ()).unwrap();
@@ -84,7 +84,7 @@ fn too_weak_a_motor_holds_less_and_finally_nothing() {
     let edge = |rig: &Rig, table: &TableValues| {
         attraction(rig, table, Law::Lqr, &settings).unwrap().tilts[0].edge.size
     };
-    // The table is for the motor it has; the plant's is weaker than that.
+    // A quarter of the supply, and a table for it: the edge is lower.
     let mut weak = strong.clone();
     weak.actuator.motor.as_mut().unwrap().supply_v /= 4.0;
     assert!(edge(&weak, &table(&weak)) < 0.7 * edge(strong, strong_table));
@@ -103,7 +103,7 @@ fn the_papers_rig_stands_for_long_in_noise() {
         assert_eq!((found.stood, found.fallen.len()), (4, 0), "{law:?}");
         let noise = noise_run(rig, table, law, &PAPERS, 4, 5.0).unwrap();
         assert_eq!(noise.stood, 4);
-        // Whatever disturbs the cart has to be made up for.
+        // The force has to compensate the disturbances of the cart.
         assert!(noise.force_rms_n > 0.1 && noise.force_peak_n <= 5.0, "{noise:?}");
         assert!(noise.angle_rms_rad.iter().all(|&rms| rms > 1e-5 && rms < 0.05), "{noise:?}");
     }
@@ -144,7 +144,7 @@ fn monte_carlo_does_not_depend_on_the_threads_and_its_worst_case_can_be_replayed
     let (rig, table) = &*PAPER;
     let mut spread = Spread { disturbance: PAPERS, ..Spread::of(rig) };
     spread.duration_s = 3.0;
-    // Wrong enough that some fall.
+    // Errors large enough that some runs fall.
     (spread.mass, spread.length, spread.inertia) = (0.15, 0.1, 0.15);
     let with_threads = |threads: usize| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();

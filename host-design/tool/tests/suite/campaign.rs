@@ -1,4 +1,5 @@
-//! A short campaign: every defect is found in time, nothing else is, and without detection they are missed.
+//! A short campaign: every defect is found in time, there are no false alarms, and without detection the defects are
+//! missed.
 
 use std::path::Path;
 
@@ -53,7 +54,7 @@ fn a_trial_is_the_same_every_time_and_does_not_depend_on_the_others() {
     let setup = on_host(&rig, &table);
     let kinds = [Kind::Overruns, Kind::MotorReversed, Kind::EncoderJump];
     let alone = |number| one(&setup, &kinds, 5, number).unwrap();
-    // Alone, in any order, and as part of a campaign, whose rows sum up its trials.
+    // Alone, in any order, and as part of a campaign, whose rows summarise its trials.
     let backwards: Vec<_> = (0..6).rev().map(alone).collect();
     let forwards: Vec<_> = (0..6).map(alone).collect();
     assert!(forwards.iter().eq(backwards.iter().rev()));
@@ -64,7 +65,7 @@ fn a_trial_is_the_same_every_time_and_does_not_depend_on_the_others() {
         assert_eq!(of_kind().filter_map(|outcome| outcome.ticks).max(), row.worst, "{row:?}");
         assert_eq!(of_kind().filter_map(|outcome| outcome.from_onset).max(), row.worst_from_onset, "{row:?}");
     }
-    // Another seed or another number is another trial.
+    // Negative control: another seed or another number is another trial.
     let trial = |seed, number| Trial { number: 0, ..Trial::draw(&rig, &table, &kinds, seed, number) };
     assert_eq!(trial(5, 1), trial(5, 1));
     assert_ne!(trial(5, 1), trial(6, 1));

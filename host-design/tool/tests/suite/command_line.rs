@@ -1,4 +1,4 @@
-//! The tool as a user or a script meets it: exit statuses, what is on stdout, what is written and what is not.
+//! The tool as a user or a script sees it: exit statuses, stdout, and which files are written.
 
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
@@ -37,7 +37,7 @@ fn object(output: &Output) -> Value {
     value
 }
 
-/// A folder with a table that must stay as it is, and a rig file.
+/// A folder with a table that must not change, and a rig file.
 struct Bench(tempfile::TempDir);
 
 impl Bench {
@@ -57,7 +57,7 @@ impl Bench {
         upright(&[&["design", rig.to_str().unwrap(), "--out", out.to_str().unwrap()], more].concat())
     }
 
-    /// Neither a new file nor a changed one.
+    /// Whether no file in the folder is new or changed.
     fn is_untouched(&self) -> bool {
         std::fs::read_to_string(self.path("gains.rs")).unwrap() == "precious"
             && std::fs::read_dir(self.0.path()).unwrap().count() == 2
@@ -102,7 +102,7 @@ fn a_problem_without_solution_ends_with_status_3_says_why_and_writes_nothing() {
             assert!(bench.is_untouched(), "{rig}");
         }
     }
-    // Negative control: with a solution it is written.
+    // Negative control: with a solution, the table is written.
     let bench = Bench::new(&model("[[0, 1], [0, 0]]", "[0, 1]", LQR));
     assert_eq!((status(&bench.design(&[])), bench.is_untouched()), (0, false));
 }
@@ -175,7 +175,7 @@ fn the_same_rig_gives_the_same_table_to_the_byte_and_check_tells_any_other() {
     assert_eq!(check(&folder.path().join("none.rs")).0, 1);
 }
 
-/// Matrix dimensions of a member.
+/// Dimensions of a matrix in the JSON.
 fn shape(value: &Value) -> (usize, usize) {
     let rows = value.as_array().unwrap();
     let width = |row: &Value| row.as_array().unwrap().iter().filter(|entry| entry.is_f64()).count();
@@ -223,7 +223,7 @@ fn numbers_are_shortest_decimals_and_an_absent_design_is_null() {
         assert!(design[plane]["pole_placement"].is_null() && design[plane]["lqr"].is_object());
     }
     assert!(design["table"]["pole_placement"].is_null());
-    // √3, as the language prints the nearest double.
+    // √3, as Rust prints the nearest double.
     assert!(stdout(&output).contains(&format!("\"K\":[[1.0,{}]]", 3f64.sqrt())), "{}", stdout(&output));
 }
 
@@ -258,7 +258,7 @@ fn a_fall_ends_with_status_1_and_says_what_fell() {
     assert_eq!((status(&output), &summary["stands"]), (1, &false.into()));
     let link = summary["fall"]["kind"]["link"].as_u64().unwrap();
     assert!(stderr(&output).contains(&format!("link {link} fell")));
-    // The same with gains for the tick stands.
+    // With gains designed for the tick, the same run balances.
     let output = upright(&[&arguments[..4], &arguments[6..]].concat());
     assert_eq!((status(&output), &object(&output)["settled"]), (0, &true.into()));
 }

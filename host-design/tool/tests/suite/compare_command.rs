@@ -1,4 +1,4 @@
-//! `upright compare` and `upright reproduce` as a user or a script meets them.
+//! `upright compare` and `upright reproduce` as a user or a script sees them.
 
 use std::process::{Command, Output};
 

@@ -1,4 +1,4 @@
-//! Sweeps over a rig file, and comparisons of the designs that come out.
+//! Sweeps over a rig file, and comparisons of the resulting designs.
 
 use std::path::Path;
 
@@ -44,7 +44,7 @@ fn a_key_that_the_file_leaves_out_is_added_where_it_belongs() {
     let upright_design::rig::PlantDescription::Chain(chain) = &with_friction.plant else { panic!("a chain") };
     let frictions: Vec<f64> = chain.links.iter().map(|link| link.friction_n_m_s_per_rad).collect();
     assert_eq!(frictions, [0.0, 1e-7, 0.0, 0.0]);
-    // A table that is not there at all, and integers.
+    // A table that does not exist in the file, and integers.
     assert_eq!(
         changed(&text, "integral.position_weight", 3.0).unwrap().integral.unwrap().position_weight,
         3.0
@@ -115,7 +115,7 @@ fn table_2_of_the_paper_is_a_sweep() {
         .filter_map(|row| row.figures.as_ref()?.settling_time_s.map(|time| format!("{time:.2}")))
         .collect();
     assert_eq!(settled, ["4.27", "5.09", "5.91"]);
-    // The far poles stay, so the fastest one does.
+    // The far poles stay, so the fastest pole stays too.
     assert!(rows.iter().all(|row| row.figures.as_ref().unwrap().fastest_pole_per_s == -47.0));
     assert!(figure(&rows, &candidates, Some(&sweep)).svg().unwrap().contains("settling_time_s"));
 }
@@ -145,7 +145,7 @@ fn continuous_gains_end_where_the_tick_gets_long_and_sampled_ones_do_not() {
 #[test]
 fn what_has_no_design_is_a_row_with_its_reason() {
     let mut hopeless = rig("single-quanser-ip02");
-    hopeless.tick.period_s = 9.0; // nothing holds it from one tick to the next
+    hopeless.tick.period_s = 9.0; // no law can balance at this tick
     let bad_weight = {
         let mut rig = rig("single-quanser-ip02");
         rig.lqr.as_mut().unwrap().state_weights = vec![0.0; 4];
@@ -154,7 +154,7 @@ fn what_has_no_design_is_a_row_with_its_reason() {
     let candidates = [("good", rig("single-quanser-ip02")), ("slow", hopeless), ("weightless", bad_weight)]
         .map(|(label, rig)| Candidate { label: label.to_owned(), rig, value: None });
     let rows = compare(&candidates, &Conditions::default(), &|| ()).unwrap();
-    // The placement of the third is not touched by its weights.
+    // The pole placement of the third candidate does not depend on its weights.
     assert_eq!(fates(&rows), "y--y-y");
     let notes = notes(&rows, None);
     assert_eq!(notes.len(), 3);
@@ -181,7 +181,7 @@ fn every_row_says_when_it_is_done() {
     let rows = compare(&candidates, &conditions, &count).unwrap();
     assert_eq!((rows.len(), done.into_inner()), (6, 6));
     assert_eq!(jobs(&candidates, &conditions).len(), 6);
-    // Dearer force: less of it.
+    // A higher weight on the force reduces the force.
     let force: Vec<f64> = rows[..3].iter().map(|row| row.figures.as_ref().unwrap().peak_force_n).collect();
     assert!(force[0] > force[1] && force[1] > force[2], "{force:?}");
 }

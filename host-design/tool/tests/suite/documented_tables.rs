@@ -1,4 +1,4 @@
-//! Tables in the documents are those of the source. With UPRIGHT_BLESS=1 in the environment, they are written there.
+//! The tables in the documents match the source. With UPRIGHT_BLESS=1 in the environment, the tests write them.
 
 use std::collections::BTreeSet;
 use std::process::Command;
@@ -18,13 +18,13 @@ fn upright(arguments: &[&str]) -> String {
     String::from_utf8(output.stdout).unwrap()
 }
 
-/// What stands between the markers called `name`.
+/// The text between the markers called `name`.
 fn between<'a>(page: &'a str, name: &str) -> Option<&'a str> {
     let (_, rest) = page.split_once(&format!("<!-- {name} -->"))?;
     Some(rest.split_once(&format!("<!-- /{name} -->"))?.0.trim())
 }
 
-/// Asserts that the table called `name` in `file` is `wanted`, or writes it there.
+/// Asserts that the table called `name` in `file` equals `wanted`, or writes it there.
 fn hold(file: &str, name: &str, wanted: &str) {
     let page = read(file);
     let found = between(&page, name).unwrap_or_else(|| panic!("{file} has no <!-- {name} -->"));
@@ -37,7 +37,7 @@ fn hold(file: &str, name: &str, wanted: &str) {
     assert_eq!(found, wanted.trim(), "put this between the markers in {file}:\n{wanted}");
 }
 
-/// The first cell of each row of a table, and the others.
+/// The cells of each row of a table.
 fn rows(table: &str) -> Vec<Vec<&str>> {
     let cells = |line| -> Vec<&str> { str::trim_matches(line, '|').split('|').map(str::trim).collect() };
     table.lines().skip(2).map(cells).collect()
@@ -137,12 +137,12 @@ fn every_command_is_listed_with_its_guide() {
     let rows = rows(between(&page, "commands").unwrap());
     let listed: BTreeSet<String> = rows.iter().map(|row| row[0].trim_matches('`').to_owned()).collect();
     assert_eq!(listed, wanted);
-    // Negative control: a help text with one more.
+    // Negative control: a help text with one more command.
     let more = all.replacen("Commands:\n", "Commands:\n  dance  Dances\n", 1);
     assert!(commands(&more).contains("dance") && !listed.contains("dance"));
 }
 
-/// The key codes of a cell such as `d` or space.
+/// The key codes in a cell such as `d` or space.
 fn keys(cell: &str) -> Vec<KeyCode> {
     let key = |word: &str| match word {
         "←" => KeyCode::Left,
@@ -175,11 +175,11 @@ fn every_key_of_the_monitor_is_listed_with_the_line_that_does_the_same() {
     for code in printable.chain([KeyCode::Left, KeyCode::Right, KeyCode::Up, KeyCode::Down, KeyCode::Enter]) {
         assert_eq!(meaning(code).is_some(), listed.contains(&code), "{code:?}");
     }
-    // Negative control: a key that means something else than a line.
+    // Negative control: a key whose meaning differs from that of a line.
     assert_ne!(meaning(KeyCode::Char('a')), Some(Action::Send(request("disarm").unwrap())));
 }
 
-/// Names and meanings of the trust report; a name that ends in a space is followed by a link or a source.
+/// Names and meanings in the trust report; a name that ends in a space is followed by a link or a source.
 fn quantities() -> String {
     let rows = upright_design::verify::quantities().map(|quantity| {
         let more = if quantity.name.ends_with(' ') { "…" } else { "" };
@@ -193,7 +193,7 @@ fn the_page_about_trust_holds_the_meanings_of_the_source() {
     hold("docs/trust.md", "rows of verify", &quantities());
 }
 
-/// Whether a row's name is explained: by itself, or by one that ends in `…`.
+/// Whether a row's name is explained: exactly, or by a name that ends in `…`.
 fn explains(listed: &str, name: &str) -> bool {
     match listed.trim_matches('`').strip_suffix('…') {
         Some(beginning) => name.starts_with(beginning),

@@ -1,9 +1,9 @@
-//! The documents: links that lead somewhere, folders that exist, commands that work in every shell.
+//! The documents: links work, folders exist, commands run in every shell.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-/// Most lines of README.md.
+/// Maximum number of lines in README.md.
 const README_LINES: usize = 180;
 
 pub(crate) fn root() -> PathBuf {
@@ -14,7 +14,7 @@ pub(crate) fn read(file: &str) -> String {
     std::fs::read_to_string(root().join(file)).unwrap_or_else(|error| panic!("{file}: {error}"))
 }
 
-/// Name and text of each document, from the root of the repository.
+/// Path and text of each document; paths start at the root of the repository.
 fn documents() -> Vec<(String, String)> {
     let mut names = vec!["README.md".to_owned(), "ARCHITECTURE.md".to_owned(), "CONTRIBUTING.md".to_owned()];
     names.extend(["host-design/design/README.md".to_owned(), "host-design/tool/README.md".to_owned()]);
@@ -27,7 +27,7 @@ fn documents() -> Vec<(String, String)> {
     names.into_iter().map(|name| (name.clone(), read(&name))).collect()
 }
 
-/// Lines of the blocks whose opening line is ``` and `mark`.
+/// Lines of the blocks that open with ``` and `mark`.
 fn block_lines<'a>(text: &'a str, mark: &str) -> Vec<&'a str> {
     let (mut lines, mut inside) = (Vec::new(), false);
     for line in text.lines() {
@@ -40,7 +40,7 @@ fn block_lines<'a>(text: &'a str, mark: &str) -> Vec<&'a str> {
     lines
 }
 
-/// What a heading is called in a link, as GitHub does it.
+/// The anchor that GitHub generates for a heading.
 fn anchor(heading: &str) -> String {
     let kept = heading.to_lowercase().replace(' ', "-");
     kept.chars().filter(|c| c.is_alphanumeric() || matches!(c, '-' | '_')).collect()
@@ -50,7 +50,7 @@ fn has_anchor(text: &str, wanted: &str) -> bool {
     text.lines().any(|line| line.starts_with('#') && anchor(line.trim_start_matches('#').trim()) == wanted)
 }
 
-/// The links of `text`, which stands in the folder `folder`, that lead nowhere.
+/// The broken links in `text`, which is in the folder `folder`.
 fn broken_links(folder: &Path, text: &str) -> Vec<String> {
     let targets = text.split("](").skip(1).filter_map(|rest| rest.split_once(')')).map(|(target, _)| target);
     let broken = |target: &&str| {
@@ -68,7 +68,7 @@ fn broken_links(folder: &Path, text: &str) -> Vec<String> {
     targets.filter(broken).map(str::to_owned).collect()
 }
 
-/// Why a command line does not work both in a POSIX shell and in PowerShell, if it does not.
+/// Reason why a command line does not work in both a POSIX shell and PowerShell, if there is one.
 fn not_portable(line: &str) -> Option<&'static str> {
     let command = line.split(" # ").next().unwrap_or(line);
     let first = command.split_whitespace().next().unwrap_or_default();
@@ -112,7 +112,7 @@ fn every_command_works_in_powershell_too() {
     for (name, text) in documents() {
         for mark in ["sh", "sh (not run by CI)"] {
             for line in block_lines(&text, mark) {
-                // Programs of CI itself need Linux, and their page says so.
+                // CI's own programs need Linux, and their page says so.
                 let found = not_portable(line).filter(|_| !line.starts_with(".ci/"));
                 assert_eq!(found, None, "{name}: {line}");
             }

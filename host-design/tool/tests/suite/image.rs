@@ -1,5 +1,5 @@
-//! Looking into images: what is wrong with one is found. The image for the emulator is a wrong one for a board: it can
-//! be told to panic and to overflow its stack.
+//! Inspection of images: defects of an image are found. The image for the emulator is not fit for a board: it can be
+//! told to panic and to overflow its stack.
 
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
@@ -10,7 +10,7 @@ use upright_tool::image::{
     Image, Kind, StackError, build_if_possible, forbidden_functions, size, stack_bound,
 };
 
-/// None where there is no compiler for it.
+/// Path of the image for the emulator; `None` without a compiler for it.
 fn path_in_the_loop() -> Option<&'static Path> {
     static PATH: OnceLock<Option<PathBuf>> = OnceLock::new();
     PATH.get_or_init(|| build_if_possible(Kind::InTheLoop).unwrap()).as_deref()
@@ -20,7 +20,7 @@ fn upright(arguments: &[&str]) -> Output {
     Command::new(env!("CARGO_BIN_EXE_upright")).args(arguments).output().unwrap()
 }
 
-/// Without anything but the tool itself.
+/// Runs the tool with an empty PATH.
 fn upright_alone(arguments: &[&str]) -> Output {
     let nowhere = tempfile::tempdir().unwrap();
     Command::new(env!("CARGO_BIN_EXE_upright")).args(arguments).env("PATH", nowhere.path()).output().unwrap()

@@ -1,4 +1,4 @@
-//! Tests of the command line and what it is made of. One program, so that it is linked once.
+//! Tests of the command line and of the modules behind it. One program, so that linking happens once.
 
 mod campaign;
 mod command_line;

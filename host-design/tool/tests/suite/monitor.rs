@@ -1,4 +1,4 @@
-//! The monitor: what it shows, what its keys say, and the whole way to a firmware and back.
+//! The monitor: what it shows, what its keys do, and the whole path to a firmware and back.
 
 use std::io::Write;
 use std::net::TcpListener;
@@ -61,7 +61,7 @@ fn told(monitor: &mut Monitor, telemetry: Telemetry<10, 5>) -> usize {
     monitor.receive(&framed(&Message::Telemetry(telemetry)), NOW).len()
 }
 
-/// What the monitor has to say.
+/// The commands that the monitor wants to send.
 fn asked(monitor: &mut Monitor) -> Vec<Asked> {
     let mut receiver = Receiver::<MAX_COMMAND>::new();
     let bytes = monitor.take_outgoing();
@@ -219,7 +219,7 @@ fn a_closed_connection_is_shown() {
     assert!(screen(&monitor).contains("connection is closed"));
 }
 
-/// Telemetry of the command against the firmware in this process, told `said` on stdin.
+/// Telemetry from the command, with the firmware in this process and `said` on stdin.
 fn monitored(said: &str) -> Vec<Value> {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../rigs/single-quanser-ip02.toml");
     let rig = Rig::from_path(&path).unwrap();
@@ -255,7 +255,7 @@ fn a_set_point_from_the_monitor_moves_the_firmware_and_holds_it() {
     assert!(moved.len() > 50, "{}", moved.len());
     assert!(moved.iter().all(|telemetry| telemetry["state"] == "Balancing"), "{last}");
     assert!((last["setpoint_m"].as_f64().unwrap() - 0.05).abs() < 1e-6, "{last}");
-    // Negative control: nobody moves it unasked.
+    // Negative control: without a request, nobody moves it.
     let still = monitored("");
     assert_eq!(still.last().unwrap()["setpoint_m"], 0.0);
 }

@@ -1,4 +1,4 @@
-//! Kalman gain and integral action against closed forms, and what every design of them must satisfy.
+//! Kalman gain and integral action: compared with closed forms, and properties of every design.
 
 use crate::published::{rig, rig_of};
 use upright_design::design::{Certified, DesignError, Feedback, design, is_stable_sampled};
@@ -48,7 +48,7 @@ fn the_observer_of_every_rig_is_stable() {
     }
 }
 
-/// `ẋ = u`, measured in steps of `step`, with force noise of intensity `q`, at a tick of `period` (s).
+/// `ẋ = u`, measured in steps of `step`, with force noise of intensity `q`, and a tick of `period` (s).
 fn integrator(step: f64, q: f64, period: f64) -> Rig {
     rig_of(&format!(
         "name = \"integrator\"\n[model]\na = [[0]]\nb = [1]\nmeasured = [0]\nmeasured_steps = [{step:e}]\n\
@@ -83,7 +83,7 @@ fn the_gain_of_a_scalar_plant_is_the_closed_form_correctly_rounded() {
         assert_eq!(single.l_filter[(0, 0)], wanted_single, "{step} {q} {period}");
         // Ad = 1.
         assert_eq!(double.l_predictor, double.l_filter);
-        // Negative control: another noise has another gain.
+        // Negative control: different noise gives a different gain.
         assert_ne!(double.l_filter[(0, 0)], scalar_gain(step, 1.0001 * q, period).0);
     }
 }
@@ -118,7 +118,7 @@ fn double_integrator(measured: usize) -> Rig {
 fn a_mode_that_no_sensor_shows_is_named() {
     let error = design(&double_integrator(1)).unwrap_err();
     let DesignError::Undetectable { modes } = &error else { panic!("{error}") };
-    // The position, a mode of the sampled plant at 1, whatever unit it is given in.
+    // The position: a mode of the sampled plant at 1, in whatever unit it is given.
     assert_eq!(modes.len(), 1);
     assert!(error.to_string().contains("the sensors do not show the mode at"), "{error}");
     assert!(design(&double_integrator(0)).is_ok(), "the position shows everything");
@@ -169,7 +169,7 @@ fn integral_action_of_a_scalar_plant_is_the_closed_form_correctly_rounded() {
         });
         let found = certified.double.continuous.integral.unwrap();
         assert_eq!(found.k.entries(), wanted, "{q} {weight}");
-        // At a tick of 1 ms the sampled gains are within some tenths of a percent of it.
+        // At a tick of 1 ms the sampled gains agree with it to a few tenths of a percent.
         let sampled = certified.double.sampled.integral.unwrap();
         for (sampled, continuous) in sampled.k.entries().iter().zip(found.k.entries()) {
             assert!((sampled / continuous - 1.0).abs() < 0.02 && sampled != continuous, "{q} {weight}");
@@ -193,7 +193,7 @@ fn the_loop_with_integral_action_is_stable_and_not_without_its_integral_gain() {
             let states = rig.states();
             assert_eq!(law.k.cols(), states + 1 + usize::from(delay_ticks), "{name}");
             assert!(law.integral && is_stable_sampled(&certified.double.sampled_loop(&rig, law)), "{name}");
-            // The wrong sign of Ki drives z away.
+            // Negative control: with the wrong sign of Ki, z diverges.
             let mut k = law.k.clone();
             k[(0, states)] = -k[(0, states)];
             let wrong = Feedback { k, ..law.clone() };
@@ -216,7 +216,7 @@ fn the_integral_gain_vanishes_with_its_weight_and_the_rest_becomes_the_plain_law
         };
         let found = [1.0, 1e-4, 1e-8, 1e-12].map(of);
         for pair in found.windows(2) {
-            // Ki goes with the square root of the weight.
+            // Ki is proportional to the square root of the weight.
             let ratio = pair[0].0 / pair[1].0;
             assert!((80.0..120.0).contains(&ratio), "{name}: {found:?}");
             assert!(pair[1].1 < pair[0].1, "{name}: {found:?}");

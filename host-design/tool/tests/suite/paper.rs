@@ -1,9 +1,9 @@
 //! F. J. Ticona Coaquira, "Design and comparison of two linear controllers with precompensation gain for the Quadruple
 //! inverted pendulum": every digit it prints.
 //!
-//! Its gains were computed from A and B as printed, rounded to six digits (`rigs/quadruple-paper-printed.toml`). From the
-//! exact equations of motion (`rigs/quadruple-paper.toml`) they come out up to 5.3e-5 off, relative: five of the twenty
-//! printed gains then end in another digit, and the pole placement's N is 11.0075.
+//! Its gains were computed from A and B as printed, rounded to six digits (`rigs/quadruple-paper-printed.toml`). From
+//! the exact equations of motion (`rigs/quadruple-paper.toml`) they differ by up to 5.3e-5, relative: five of the
+//! twenty printed gains then end in another digit, and the pole placement's N is 11.0075.
 
 use crate::published::rig;
 use upright_design::design::{Certified, Feedback, design};
@@ -18,7 +18,7 @@ fn printed_n(law: &Feedback<f64>) -> String {
     format!("{:.4}", law.n.unwrap())
 }
 
-/// Continuous [LQR, pole placement].
+/// The continuous laws: [LQR, pole placement].
 fn laws(certified: &Certified) -> [&Feedback<f64>; 2] {
     certified.double.continuous.each().into_array().map(Option::unwrap)
 }
@@ -53,8 +53,8 @@ fn another_weight_or_another_far_pole_prints_other_digits() {
 fn the_exact_model_gives_the_printed_gains_to_the_accuracy_of_the_printed_matrices() {
     let (exact, printed) =
         (design(&rig("quadruple-paper")).unwrap(), design(&rig("quadruple-paper-printed")).unwrap());
-    // A and B are printed with six digits: half a unit in the last of them is up to 5e-6 of an entry, and the worst
-    // gain magnifies that elevenfold.
+    // A and B are printed with six digits: half a unit in the last digit is up to 5e-6 of an entry, and the most
+    // sensitive gain magnifies it elevenfold.
     for (exact, printed) in laws(&exact).into_iter().zip(laws(&printed)) {
         for (exact, printed) in exact.k.entries().iter().zip(printed.k.entries()) {
             assert!((exact / printed - 1.0).abs() < 6e-5, "{exact} {printed}");
@@ -88,7 +88,7 @@ fn open_loop_poles_are_two_integrators_and_four_pairs() {
     let mut real: Vec<String> = poles
         .iter()
         .map(|pole| {
-            // A double eigenvalue of a matrix rounded to f64 is good to about half the digits.
+            // A double eigenvalue of a matrix rounded to f64 is accurate to about half the digits.
             assert!(pole.im.abs() < 1e-5, "{pole:?}");
             format!("{:.3}", if pole.re.abs() < 1e-5 { 0.0 } else { pole.re })
         })
@@ -131,7 +131,7 @@ fn closed_loop_poles_are_those_of_the_paper() {
 
 #[test]
 fn the_papers_gains_survive_ticks_of_one_and_two_milliseconds_only() {
-    // (tick, delay, spectral radius of the LQR's continuous gains held over it)
+    // (tick, delay, spectral radius with the LQR's continuous gains held over the tick)
     let mut rig = rig("quadruple-paper");
     for (period_s, delay_ticks, wanted) in
         [(0.001, 0, None), (0.002, 0, None), (0.003, 0, Some("1.08")), (0.002, 1, Some("1.29"))]

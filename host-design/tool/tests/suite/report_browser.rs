@@ -6,7 +6,7 @@ use std::path::Path;
 
 use crate::report_devtools::Browser;
 
-/// Width of a telephone (CSS pixels).
+/// Width of a phone (CSS pixels).
 const TELEPHONE: u32 = 390;
 
 const GEOMETRY: &str =

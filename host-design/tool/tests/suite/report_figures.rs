@@ -1,4 +1,4 @@
-//! Figures: what they show, and that it stays legible without colour.
+//! Figures: their contents, and that they are legible without colour.
 
 use upright_tool::figure::{Axis, Curve, Figure, FigureError, HeatMap, Panel};
 

@@ -1,4 +1,4 @@
-//! The page for all kinds of rigs: complete, self-contained, harmless.
+//! The page for all kinds of rigs: complete, self-contained and safe.
 
 use std::path::Path;
 
@@ -7,7 +7,7 @@ use upright_design::rig::Rig;
 
 const LARGEST: usize = 5_000_000;
 
-/// `n` links of 0.3 m without encoders, for the LQR alone.
+/// `links` links of 0.3 m without encoders, for the LQR alone.
 fn chain(links: usize, name: &str) -> Rig {
     let link = "[[link]]\nmass_kg = 0.2\nlength_m = 0.3\n".repeat(links);
     let weights: Vec<String> = (0..=links).map(|_| "10, 1".to_owned()).collect();
@@ -30,7 +30,7 @@ fn a_rig_gets_a_whole_page_that_needs_nothing_else() {
     let sections =
         ["runs", "rig", "model", "poles", "gains", "frequency", "region", "cost", "trust", "provenance"];
     assert_eq!(ids(html), sections);
-    // An address in a namespace is a name, not a place.
+    // The address of a namespace is only a name; no browser opens it.
     let addresses = html.replace("http://www.w3.org/2000/svg", "");
     for outside in ["http:", "https:", "src=", "@import", "url("] {
         assert!(!addresses.contains(outside), "{outside}");
@@ -84,7 +84,7 @@ fn a_name_from_a_rig_file_cannot_become_a_script() {
     for picture in &report.pictures {
         assert!(!picture.svg.contains("<script"), "{}", picture.name);
     }
-    // The page does name the rig: the checks above would see it.
+    // Negative control: the page does show the rig's name, so the checks above would see it.
     let unescaped = report.html.replace("&#60;", "<").replace("&#62;", ">");
     assert!(unescaped.contains(name));
 }
@@ -99,7 +99,7 @@ fn the_margins_in_the_bode_plot_are_on_the_curve() {
             let [_, _, curve, _, y, ..] = fields[..] else { continue };
             let y = || y.parse::<f64>().unwrap();
             if let Some(factor) = curve.strip_prefix("gain margin × ") {
-                // The force times this factor makes |L| = 1 there; three digits of it are named.
+                // The force times this factor makes |L| = 1 at that point; the page shows three digits.
                 let product = y() * factor.parse::<f64>().unwrap();
                 assert!((product - 1.0).abs() < 0.01, "{}: {line}: {product}", picture.name);
                 marked += 1;

@@ -1,5 +1,5 @@
-//! Every number of `upright reproduce`, pinned: what the paper prints, what was found about it, and figures of the runs
-//! that were computed with other programs before.
+//! Pins every number of `upright reproduce`: what the paper prints, what was found about it, and figures of the runs
+//! that other programs computed before.
 
 use std::cell::Cell;
 use std::sync::LazyLock;
@@ -119,15 +119,15 @@ fn each_erratum_has_one_reading_that_agrees_and_others_that_do_not() {
     assert_eq!(counts, wanted);
 }
 
-/// K as printed, and N = K[1], so that the cart ends at the set-point: with the printed N, two digits longer, it ends
-/// 0.07 % beyond.
+/// K as printed, and N = K[1], so that the cart ends at the set-point. The printed N has two digits more, and with it
+/// the cart ends 0.07 % beyond.
 fn printed_law(k: [&str; 10]) -> Feedback<f64> {
     let k = upright_design::numerics::Matrix::from_fn(1, 10, |_, j| k[j].parse::<f64>().unwrap());
     Feedback { n: Some(k[(0, 0)]), k, integral: false }
 }
 
-/// The same two runs, looked at every 10 ms, were made in Drake, in MuJoCo and with equations derived by hand: the digits
-/// on which these three agree.
+/// The same two runs, sampled every 10 ms, were made in Drake, in MuJoCo and with equations derived by hand. These are
+/// the digits on which all three agree.
 #[test]
 fn a_step_of_one_metre_with_the_printed_gains_is_the_one_other_programs_find() {
     let rig = RIGS.exact.clone();
@@ -199,7 +199,7 @@ fn the_same_seed_disturbs_the_continuous_loop_and_the_firmware_alike() {
         let found = ALL.responses.iter().find(|one| one.figure == figure && one.kind == kind);
         &found.unwrap().course
     };
-    // The tick of 1 ms moves the cart by less than a millimetre, the disturbances by many.
+    // The tick of 1 ms moves the cart by less than a millimetre, the disturbances by many millimetres.
     let alike = difference(of(7, Loop::Continuous), of(7, Loop::FullState));
     let disturbed = difference(of(7, Loop::Continuous), of(5, Loop::Continuous));
     assert!(alike < 2e-3 && disturbed > 5.0 * alike, "{alike} {disturbed}");
@@ -291,7 +291,7 @@ fn a_run_that_falls_falls_at_any_tolerance() {
         let tolerance = Tolerance { relative, absolute: 1e-2 * relative };
         let run = ContinuousRun { tolerance, duration_s: 1.0, ..ContinuousRun::STEP };
         let fall = run.course(chain(&rig), &law).unwrap().fall.unwrap();
-        // Which link is the first one below the horizontal is a matter of the sampling.
+        // Which link is the first one below the horizontal depends on the sampling.
         assert!(matches!(fall.kind, FallKind::Link(_)) && (0.06..=0.07).contains(&fall.at_s), "{fall:?}");
     }
 }
@@ -331,13 +331,13 @@ fn margins_of_every_loop_are_pinned() {
     }
 }
 
-/// R. E. Kalman: `|1 + L| >= 1` for every LQR with R = 1; no other law has to keep it.
+/// R. E. Kalman: `|1 + L| >= 1` for every LQR with R = 1. Other laws need not satisfy it.
 #[test]
 fn the_continuous_lqr_has_the_margins_that_theory_promises() {
     let margins = robustness(Law::Lqr, Loop::Continuous).margins.as_ref().unwrap();
     assert!(margins.peak_sensitivity <= 1.0 + 1e-9 && margins.lowest_gain <= 0.5);
     assert!(margins.highest_gain.is_none() && margins.phase_margin_rad.unwrap().to_degrees() >= 60.0);
-    // Faster far poles break it, so the figure can be otherwise.
+    // Negative control: far poles at half the distance violate it.
     let open = &ALL.designs.poles[0].poles;
     let mut closed = ALL.designs.poles[2].poles.clone();
     for pole in closed.iter_mut().filter(|pole| pole[0] < -1.0) {
@@ -370,7 +370,7 @@ fn spectra_and_ripple_are_pinned() {
             one.effort_n2,
         ];
         for (found, wanted) in found.into_iter().zip(wanted) {
-            // Encoder steps make the run chaotic: another rounding anywhere gives another run.
+            // Encoder steps make the run chaotic: a different rounding anywhere changes the run.
             let tolerance = if kind == Loop::Encoders { 0.1 } else { 6e-3 };
             close(found / wanted, 1.0, tolerance);
         }
@@ -404,7 +404,7 @@ fn a_folder_without_the_rig_files_is_refused_with_a_remedy() {
     assert!(message.contains("quadruple-paper.toml") && message.contains("--rigs"), "{message}");
 }
 
-/// Every number that is printed.
+/// Every number that the command prints.
 #[test]
 fn the_committed_summary_is_what_comes_out() {
     let file = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs/reproduction.md");

@@ -1,4 +1,4 @@
-//! `upright verify` as a user meets it: its verdict, the line it names, and that it says the same twice.
+//! `upright verify` as a user sees it: its verdict, the line that it names, and that it repeats exactly.
 
 use std::path::Path;
 use std::process::{Command, Output};
@@ -29,14 +29,14 @@ fn object(output: &Output) -> Value {
     serde_json::from_slice(&output.stdout).unwrap_or_else(|error| panic!("{error}: {output:?}"))
 }
 
-/// The requirements that the report says do not hold.
+/// The requirements that the report marks as failed.
 fn failed(report: &Value) -> Vec<String> {
     let checks = report["checks"].as_array().unwrap();
     let failed = checks.iter().filter(|check| check["holds"] == false);
     failed.map(|check| check["requirement"].as_str().unwrap().to_owned()).collect()
 }
 
-/// The rig file in a folder of its own, with parts of its text replaced.
+/// A copy of the rig file in its own folder, with parts of the text replaced.
 fn changed(name: &str, changes: &[(&str, &str)]) -> (tempfile::TempDir, std::path::PathBuf) {
     let mut text = std::fs::read_to_string(rig_path(name)).unwrap();
     for (from, to) in changes {
@@ -104,7 +104,7 @@ fn too_coarse_an_encoder_fails_where_it_is_about_encoders_or_runs() {
         "{failed:?}"
     );
     assert!(failed.iter().all(|line| stderr(&output).contains(line)), "{failed:?}: {}", stderr(&output));
-    // Nothing is wrong with the linear loop.
+    // The linear loop has no fault.
     assert!(failed.iter().all(|line| !line.contains("spectral radius")), "{failed:?}");
 }
 

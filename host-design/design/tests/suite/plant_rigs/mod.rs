@@ -1,6 +1,6 @@
-//! Chains that the plant's tests share.
+//! Chains shared by the tests of the plant.
 
-// Each test program uses some of these.
+// Each test program uses only some of these.
 #![allow(dead_code)]
 
 use proptest::prelude::*;
@@ -37,12 +37,12 @@ pub(crate) fn paper() -> Chain {
     chain(0.1, [0.03, 0.04, 0.07, 0.10].map(|length| rod(0.1, length)).to_vec())
 }
 
-/// A chain of `n` unequal rods, the size of a classroom rig, without friction.
+/// A chain of `n` unequal rods without friction, the size of a classroom rig.
 pub(crate) fn unequal_rods(n: usize) -> Chain {
     chain(0.8, (0..n).map(|i| rod(0.3 - 0.03 * i as f64, 0.2 + 0.05 * ((7 * i) % 3) as f64)).collect())
 }
 
-/// The same chain with friction in every bearing; a negative factor drives instead of braking.
+/// The same chain with friction in every bearing; a negative factor accelerates instead of braking.
 pub(crate) fn with_friction(mut chain: Chain, factor: f64) -> Chain {
     chain.cart.friction_n_s_per_m = 0.5 * factor;
     for link in &mut chain.links {
@@ -51,7 +51,7 @@ pub(crate) fn with_friction(mut chain: Chain, factor: f64) -> Chain {
     chain
 }
 
-/// Any link a workshop would make: 10 g to 1 kg, 5 cm to 1 m, its mass anywhere along it.
+/// Any link that a workshop would make: 10 g to 1 kg, 5 cm to 1 m, its mass anywhere along it.
 pub(crate) fn any_link() -> impl Strategy<Value = Link> {
     let given = prop::option::of((0.1..1.0f64, 0.01..0.3f64));
     (0.01..1.0f64, 0.05..1.0f64, given, 0.0..0.01f64).prop_map(|(mass, length, given, friction)| Link {
@@ -74,7 +74,7 @@ pub(crate) fn any_chain(links: core::ops::RangeInclusive<usize>) -> impl Strateg
     )
 }
 
-/// A chain and any state of it in motion: `x, ẋ, θ_1, θ̇_1, …`.
+/// A chain and a random state in motion: `x, ẋ, θ_1, θ̇_1, …`.
 pub(crate) fn any_chain_in_motion(
     links: core::ops::RangeInclusive<usize>,
 ) -> impl Strategy<Value = (Chain, Vec<f64>)> {

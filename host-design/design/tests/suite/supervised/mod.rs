@@ -1,4 +1,4 @@
-//! The rigs of `rigs/` with the whole firmware, brought to balance.
+//! Brings the rigs of `rigs/` to balance with the whole firmware.
 
 use upright::board::Output;
 use upright::protocol::message::{Answer, Request};
@@ -20,8 +20,8 @@ pub(crate) fn table(rig: &Rig) -> TableValues {
     TableValues::of(rig, &design(rig).unwrap(), Gains::Sampled).unwrap()
 }
 
-/// Brings the rig from hanging to balance at the start of `scenario`, lets go, and goes on with `test` after the first
-/// tick of balancing.
+/// Brings the rig from hanging to balance at the start of `scenario`, releases it, and continues with `test` after the
+/// first tick of balancing.
 pub(crate) fn balancing<R>(
     rig: &Rig,
     values: &TableValues,
@@ -44,7 +44,7 @@ pub(crate) fn tick(harness: &mut Harness<'_>) -> Output {
     output
 }
 
-/// The answer to a request, while firmware and rig go on.
+/// Sends a request and runs firmware and rig until the answer arrives.
 pub(crate) fn ask(harness: &mut Harness<'_>, request: Request) -> Answer {
     let id = harness.session.send(request);
     for _ in 0..3 {
@@ -66,7 +66,7 @@ pub(crate) fn cause(harness: &mut Harness<'_>) -> Option<Cause> {
     }
 }
 
-/// Measurements that the firmware has rejected so far.
+/// Number of measurements that the firmware has rejected so far.
 pub(crate) fn rejected(harness: &mut Harness<'_>) -> u32 {
     match ask(harness, Request::Statistics) {
         Answer::Statistics(statistics) => statistics.rejected_samples,

@@ -1,13 +1,13 @@
 //! The rig files of the repository.
 
-// Each test program uses some of these.
+// Each test program uses only some of these.
 #![allow(dead_code)]
 
 use std::path::{Path, PathBuf};
 
 use upright_design::rig::Rig;
 
-/// Where the rig file `name` is.
+/// Path of the rig file `name`.
 pub(crate) fn rig_path(name: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../../rigs").join(name).with_extension("toml")
 }

@@ -1,4 +1,4 @@
-//! A browser without a window, by the Chrome DevTools protocol over a pipe.
+//! A headless browser, controlled with the Chrome DevTools protocol over a pipe.
 
 use std::io::{BufRead, BufReader, Write};
 use std::path::Path;
@@ -21,7 +21,7 @@ pub(crate) struct Browser {
 }
 
 impl Browser {
-    /// None if there is no Chromium or Chrome on this machine.
+    /// Starts the browser; `None` if there is no Chromium or Chrome on this machine.
     pub(crate) fn start() -> Option<Self> {
         let names = ["chromium", "chromium-browser", "google-chrome", "google-chrome-stable"];
         let folders = std::env::var_os("PATH")?;
@@ -83,7 +83,8 @@ impl Browser {
         }
     }
 
-    /// Opens a file in a window of this width (CSS pixels), in the scheme `light` or `dark`, for `screen` or `print`.
+    /// Opens a file in a window of this width (CSS pixels), with the colour scheme `scheme` (`light` or `dark`) and
+    /// the medium `medium` (`screen` or `print`).
     pub(crate) fn open(&mut self, page: &Path, width: u32, scheme: &str, medium: &str) {
         let metrics = json!({ "width": width, "height": 844, "deviceScaleFactor": 1, "mobile": false });
         self.call("Emulation.setDeviceMetricsOverride", metrics);
@@ -97,7 +98,7 @@ impl Browser {
         }
     }
 
-    /// The value of an expression; a promise is waited for.
+    /// The value of an expression; waits for promises.
     pub(crate) fn value(&mut self, expression: &str) -> Value {
         let parameters = json!({ "expression": expression, "returnByValue": true, "awaitPromise": true });
         let answer = self.call("Runtime.evaluate", parameters);
@@ -105,9 +106,9 @@ impl Browser {
         answer["result"]["value"].clone()
     }
 
-    /// Errors that the page has made since it was opened, and what it wanted from a network.
+    /// Errors of the page since it was opened, and its requests to a network.
     pub(crate) fn errors(&mut self) -> Vec<String> {
-        // Whatever happened before this answer has been told by then.
+        // By the time of this answer, the browser has reported everything that happened before.
         self.value("0");
         let told = |event: &Value| match event["method"].as_str()? {
             "Runtime.exceptionThrown" => Some(event["params"]["exceptionDetails"].to_string()),

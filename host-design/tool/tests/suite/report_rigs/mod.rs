@@ -1,4 +1,4 @@
-//! Reports for tests: without the slow half of the trust report.
+//! Reports for the tests, without the slow half of the trust report.
 
 use std::path::Path;
 
@@ -8,13 +8,13 @@ use upright_design::table::{Gains, TableValues};
 use upright_design::verify::{LawTrust, TrustReport, linear};
 use upright_tool::report::{Report, Source, report};
 
-/// A rig of this checkout.
+/// A rig from this repository.
 pub(crate) fn rig(name: &str) -> Rig {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../rigs").join(name).with_extension("toml");
     Rig::from_path(&path).unwrap()
 }
 
-/// Its report.
+/// The report on a rig, without the slow half of the trust report.
 pub(crate) fn quick_report(rig: &Rig) -> Report {
     let certified = design(rig).unwrap();
     let table = TableValues::of(rig, &certified, Gains::Sampled).unwrap();
