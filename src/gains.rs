@@ -26,7 +26,7 @@ pub const SENSORS: usize = 5;
 
 /// The gain table.
 pub static TABLE: GainTable<STATES, SENSORS> = GainTable {
-    // [`TABLE_FORMAT`] of the writer.
+    // Layout of the table: `TABLE_FORMAT` of the writer.
     format: TABLE_FORMAT,
     // Number of states; equal to `NX` in a sound table.
     states: 10,

@@ -123,10 +123,9 @@ impl Invariants {
         let [low, high] = limits.rail_m;
         assert!((low..=high).contains(&position_m), "armed off centre");
         let mut angle = 0.0;
-        for sensor in 1..SENSORS {
-            let turn = limits.turn_counts[sensor];
-            let nearest = (f64::from(counts[sensor]) / f64::from(turn)).round() * f64::from(turn);
-            angle += step(sensor) * (f64::from(counts[sensor]) - nearest) as f32;
+        for (sensor, (&count, &turn)) in counts.iter().zip(&limits.turn_counts).enumerate().skip(1) {
+            let nearest = (f64::from(count) / f64::from(turn)).round() * f64::from(turn);
+            angle += step(sensor) * (f64::from(count) - nearest) as f32;
             assert!(angle.abs() <= limits.arm_angle_rad * 1.0001, "armed while tilted");
         }
         for sensor in 0..SENSORS {

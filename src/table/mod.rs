@@ -32,7 +32,7 @@ part! {
     /// The constants of a controller with `NX` states and `NY` sensors. `upright design` writes them to
     /// `src/gains.rs`.
     pub struct GainTable<NX to MX, NY to MY; T> {
-        /// [`TABLE_FORMAT`] of the writer.
+        /// Layout of the table: `TABLE_FORMAT` of the writer.
         pub format: u32,
         /// Number of states; equal to `NX` in a sound table.
         pub states: u32,

@@ -2,9 +2,9 @@
 
 #[path = "../../src/board/f4/wiring.rs"]
 #[allow(dead_code, unreachable_pub)]
-mod wiring;
+mod image;
 
-use wiring::{STATUS_LEDS, WIRING, Wire};
+use image::{STATUS_LEDS, WIRING, Wire};
 
 const PAGE: &str = include_str!("../../docs/board.md");
 
