@@ -1,0 +1,44 @@
+//! Runs an image with fixed encoder counts and closed contacts: `run_image FILE SECONDS [strict|noted|lost]`.
+
+use std::time::Instant;
+
+use upright_board::{Board, Conditions, Image, Input, Rules, Wire, Wiring, pin, seconds};
+
+fn main() -> Result<(), Box<dyn std::error::Error>> {
+    let arguments: Vec<String> = std::env::args().collect();
+    let image = Image::from_elf(&std::fs::read(&arguments[1])?)?;
+    let rules = match arguments.get(3).map(String::as_str) {
+        Some("strict") => Rules::STRICT,
+        Some("lost") => Rules { early_is_lost: true, ..Rules::NOTED },
+        _ => Rules::NOTED,
+    };
+    let begin = Instant::now();
+    let mut board = Board::power_on(&image, &Conditions::f405(1), Wiring::upright(), rules)?;
+    for contact in [pin('B', 12), pin('C', 0), pin('C', 1)] {
+        board.apply(Input::Level(contact, Wire::Low));
+    }
+    board.apply(Input::Level(pin('B', 13), Wire::High));
+    board.apply(Input::Supply(24.0));
+    let ended = board.run_until(seconds(arguments[2].parse()?));
+    let wall = begin.elapsed().as_secs_f64();
+    let (executed, skipped) = board.instructions();
+    println!("{ended:?}");
+    println!(
+        "{:.6} s at {} Hz: {executed} instructions, {skipped} of them skipped, in {wall:.3} s: {:.1} MIPS executed",
+        board.now() as f64 / 25.2e9,
+        board.core_hz(),
+        (executed - skipped) as f64 / wall / 1e6,
+    );
+    println!("{} bytes sent, {} resets, pc {:#x}", board.sent().len(), board.resets(), board.program_counter());
+    println!("{:?}\n{:?}", board.power_stage(), board.driven());
+    for note in board.notes() {
+        println!(
+            "{:#010x} x{} at {:.6} s: {}",
+            note.stopped.program_counter,
+            note.count,
+            note.stopped.time as f64 / 25.2e9,
+            note.stopped.violation
+        );
+    }
+    Ok(())
+}

@@ -1,0 +1,288 @@
+//! Everything that the core reaches by addresses, and the time that passes there.
+
+mod memory;
+mod registers;
+mod signals;
+
+use crate::chip::Chip;
+use crate::clock::{NEVER, Time};
+use crate::error::{Note, Rule, Rules, Stopped, Trap, Violation};
+use crate::peripherals::adc::Adc;
+use crate::peripherals::capture_timer::CaptureTimer;
+use crate::peripherals::dma::Dma;
+use crate::peripherals::encoder_timer::{EncoderTimer, Shaft};
+use crate::peripherals::exti::Exti;
+use crate::peripherals::gpio::Port;
+use crate::peripherals::iwdg::Iwdg;
+use crate::peripherals::power::Power;
+use crate::peripherals::pwm_timer::PwmTimer;
+use crate::peripherals::rcc::{Crystal, Rcc};
+use crate::peripherals::usart::Usart;
+use crate::processor::flash_cache::FlashCache;
+use crate::processor::system::System;
+use crate::wiring::Wiring;
+
+/// Ports A to I.
+pub(crate) const PORTS: usize = 9;
+
+/// What the motor's pins have done since power-on.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Driven {
+    /// Time with PWM high, enable high and direction high.
+    pub along: Time,
+    /// Time with PWM high, enable high and direction low.
+    pub against: Time,
+    /// Time with PWM high, whatever enable says.
+    pub pwm_high: Time,
+    /// Time with enable high.
+    pub enabled: Time,
+}
+
+/// What differs from board to board and from power-on to power-on.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Conditions {
+    /// The chip.
+    pub chip: Chip,
+    /// The clock at HSE.
+    pub crystal: Crystal,
+    /// What the internal oscillator of nominally 16 MHz has (Hz).
+    pub hsi_hz: u32,
+    /// What the watchdog's oscillator has (Hz): 17 000 to 47 000.
+    pub lsi_hz: u32,
+    /// What memory, registers and floating pins hold at power-on follows from it.
+    pub seed: u64,
+    /// Supply of the chip (V).
+    pub chip_v: f32,
+}
+
+/// Memory, peripherals and time.
+#[derive(Debug, Clone)]
+pub(crate) struct Bus {
+    pub(crate) now: Time,
+    /// Period of the core's clock.
+    pub(crate) hclk: Time,
+    /// When the next thing happens by itself.
+    pub(crate) deadline: Time,
+    /// A read that gives something else at any time, such as of a counter.
+    pub(crate) unstable: bool,
+    /// Something was written to a register.
+    pub(crate) touched: bool,
+    pub(crate) pc: u32,
+    pub(crate) rules: Rules,
+    pub(crate) notes: Vec<Note>,
+    pub(crate) chip: Chip,
+    pub(crate) wiring: Wiring,
+    pub(crate) noise: u64,
+    pub(crate) flash: Vec<u8>,
+    pub(crate) sram: Vec<u8>,
+    core_coupled: Vec<u8>,
+    pub(crate) cache: FlashCache,
+    pub(crate) system: System,
+    pub(crate) rcc: Rcc,
+    flash_control: u32,
+    debug_freeze: [u32; 3],
+    pub(crate) ports: Vec<Port>,
+    pub(crate) exti: Exti,
+    pub(crate) pwm: PwmTimer,
+    pub(crate) encoders: [EncoderTimer; 5],
+    pub(crate) shafts: Vec<Shaft>,
+    capture: CaptureTimer,
+    pub(crate) adc: Adc,
+    pub(crate) usart: Usart,
+    dma: Dma,
+    pub(crate) iwdg: Iwdg,
+    pub(crate) power: Power,
+    pub(crate) driven: Driven,
+    driven_until: Time,
+    /// The watchdog has asked for a reset.
+    pub(crate) watchdog_reset: bool,
+    /// A register whose next write is lost.
+    pub(crate) lost_write: Option<u32>,
+}
+
+impl Bus {
+    pub(crate) fn new(conditions: &Conditions, wiring: Wiring, rules: Rules, image: &[(u32, Vec<u8>)]) -> Self {
+        let chip = conditions.chip;
+        let mut noise = conditions.seed | 1;
+        let mut random = |bytes: usize| (0..bytes).map(|_| next_noise(&mut noise) as u8).collect::<Vec<_>>();
+        let (sram, core_coupled) = (random(128 << 10), random(chip.core_coupled_bytes()));
+        let mut flash = vec![0xff; chip.flash_bytes()];
+        for (address, bytes) in image {
+            let begin = (address & 0x07ff_ffff) as usize;
+            if let Some(place) = flash.get_mut(begin..begin + bytes.len()) {
+                place.copy_from_slice(bytes);
+            }
+        }
+        let rcc = Rcc::new(chip, conditions.crystal, conditions.hsi_hz);
+        let shafts = vec![Shaft::default(); wiring.encoders.len()];
+        Self {
+            now: 0,
+            hclk: rcc.hclk(),
+            deadline: 0,
+            unstable: false,
+            touched: true,
+            pc: 0,
+            rules,
+            notes: Vec::new(),
+            chip,
+            wiring,
+            noise,
+            flash,
+            sram,
+            core_coupled,
+            cache: FlashCache::new(),
+            system: System::new(),
+            rcc,
+            flash_control: 0,
+            debug_freeze: [0; 3],
+            ports: (0..PORTS as u8).map(|i| Port::new(b'A' + i)).collect(),
+            exti: Exti::default(),
+            pwm: PwmTimer::new(),
+            encoders: [true, false, false, true, false].map(EncoderTimer::new),
+            shafts,
+            capture: CaptureTimer::new(),
+            adc: Adc::default(),
+            usart: Usart::new(),
+            dma: Dma::default(),
+            iwdg: Iwdg::new(conditions.lsi_hz),
+            power: Power::new(conditions.chip_v),
+            driven: Driven::default(),
+            driven_until: 0,
+            watchdog_reset: false,
+            lost_write: None,
+        }
+    }
+
+    /// A system reset: registers begin again, memory stays; `flags` say why.
+    pub(crate) fn reset(&mut self, flags: u32) {
+        self.settle_output();
+        self.system = System::new();
+        self.rcc.reset(flags | crate::peripherals::rcc::PIN_FLAG);
+        self.cache = FlashCache::new();
+        self.flash_control = 0;
+        for (i, port) in self.ports.iter_mut().enumerate() {
+            port.reset(b'A' + i as u8);
+        }
+        self.exti = Exti::default();
+        self.pwm.reset(self.now);
+        self.encoders = [true, false, false, true, false].map(EncoderTimer::new);
+        self.capture = CaptureTimer::new();
+        self.adc.reset();
+        self.usart.reset();
+        self.dma = Dma::default();
+        self.iwdg.reset();
+        self.power = Power::new(self.power.volts);
+        self.watchdog_reset = false;
+        self.hclk = self.rcc.hclk();
+        self.levels_changed();
+        self.refresh();
+    }
+
+    /// Cycles that the flash keeps a jump waiting.
+    #[inline]
+    pub(crate) fn instruction_wait(&mut self, target: u32) -> u32 {
+        if target >> 24 == 8 { self.cache.jump(target) } else { 0 }
+    }
+
+    /// A DSB: what was written to the clock enables has arrived.
+    pub(crate) fn writes_are_through(&mut self) {
+        self.rcc.writes_are_through(self.now);
+    }
+
+    /// A violation that hardware lets pass.
+    pub(crate) fn tolerate(&mut self, rule: Rule, violation: Violation) -> Result<(), Trap> {
+        if rule == Rule::Stop {
+            return Err(violation.into());
+        }
+        let stopped = Stopped { violation, program_counter: self.pc, time: self.now };
+        let known = self.notes.iter_mut().find(|note| {
+            note.stopped.program_counter == stopped.program_counter && note.stopped.violation == violation
+        });
+        match known {
+            Some(note) => note.count += 1,
+            None => self.notes.push(Note { stopped, count: 1 }),
+        }
+        Ok(())
+    }
+
+    /// Address of an exception's handler.
+    pub(crate) fn vector(&mut self, exception: usize) -> Result<u32, Violation> {
+        let address = self.system.vtor + 4 * exception as u32;
+        self.peek(address).ok_or(Violation::Unmapped(address))
+    }
+
+    /// Lets happen what is due.
+    pub(crate) fn advance(&mut self) {
+        let now = self.now;
+        self.system.advance(now, self.hclk);
+        self.rcc.advance(now);
+        let apb1 = self.rcc.pclk(crate::peripherals::rcc::Domain::Apb1);
+        let connected = self.serial_connected();
+        self.usart.advance(now, apb1, connected);
+        let ports = &self.ports;
+        let channels = |channel: usize| match crate::wiring::analog_pin(channel) {
+            Some(pin) => ports[pin.port].mode_of(pin.number) == 3,
+            None => true,
+        };
+        self.adc.advance(now, channels);
+        let tick = self.rcc.timer_clock(crate::peripherals::rcc::Domain::Apb2);
+        self.capture.advance(now, tick, self.rcc.hse_for_rtc());
+        if self.iwdg.advance(now) {
+            self.watchdog_reset = true;
+        }
+        self.move_by_dma();
+        self.refresh();
+    }
+
+    /// Interrupt lines and the next deadline, after anything has changed.
+    pub(crate) fn refresh(&mut self) {
+        self.system.nvic.line(38, self.usart.interrupt());
+        self.system.nvic.line(16, self.dma.interrupt(crate::peripherals::dma::RECEIVE));
+        self.system.nvic.line(17, self.dma.interrupt(crate::peripherals::dma::TRANSMIT));
+        for (interrupt, high) in self.exti.interrupts() {
+            self.system.nvic.line(interrupt, high);
+        }
+        if self.rcc.security_pending() {
+            self.system.nvic.pend(crate::processor::nvic::NMI);
+        }
+        self.deadline = self
+            .system
+            .deadline()
+            .min(self.rcc.deadline())
+            .min(self.usart.deadline())
+            .min(self.adc.deadline())
+            .min(self.capture.deadline(self.now, self.rcc.hse_for_rtc()))
+            .min(if self.watchdog_reset { NEVER } else { self.iwdg.deadline() });
+    }
+
+    fn move_by_dma(&mut self) {
+        use crate::peripherals::dma::{RECEIVE, TRANSMIT};
+        if self.usart.wants_fetch() {
+            if let Some(address) = self.dma.next(RECEIVE) {
+                let byte = self.usart.fetch();
+                self.poke(address, byte);
+                self.dma.moved(RECEIVE);
+            }
+        }
+        while self.usart.wants_byte() {
+            let Some(address) = self.dma.next(TRANSMIT) else { break };
+            let byte = self.peek(address & !3).unwrap_or(0).to_le_bytes()[address as usize & 3];
+            let apb1 = self.rcc.pclk(crate::peripherals::rcc::Domain::Apb1);
+            self.usart.transmit(byte, self.now, apb1);
+            self.dma.moved(TRANSMIT);
+        }
+    }
+
+    /// Something without pattern, different for every call.
+    pub(crate) fn random(&mut self) -> u64 {
+        next_noise(&mut self.noise)
+    }
+}
+
+/// Xorshift: enough for memory that nobody should rely on.
+fn next_noise(state: &mut u64) -> u64 {
+    *state ^= *state << 13;
+    *state ^= *state >> 7;
+    *state ^= *state << 17;
+    state.wrapping_mul(0x2545_f491_4f6c_dd1d) >> 32
+}

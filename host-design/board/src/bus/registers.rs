@@ -1,0 +1,360 @@
+//! Accesses to registers: address map (RM0090, 2.3), clocks, widths and reserved bits.
+
+use super::Bus;
+use crate::error::{Trap, Violation};
+use crate::peripherals::adc::Adc;
+use crate::peripherals::capture_timer::CaptureTimer;
+use crate::peripherals::dma::Dma;
+use crate::peripherals::exti::Exti;
+use crate::peripherals::iwdg::Iwdg;
+use crate::peripherals::power::Power;
+use crate::peripherals::rcc::Domain;
+use crate::peripherals::usart::Usart;
+use crate::peripherals::Bits;
+
+/// A peripheral that is modelled.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Place {
+    Encoder(usize),
+    Iwdg,
+    Usart,
+    Power,
+    Pwm,
+    Adc,
+    Syscfg,
+    Exti,
+    Capture,
+    Port(usize),
+    Rcc,
+    Flash,
+    Dma,
+    Debug,
+}
+
+/// The peripheral and its base.
+fn place(address: u32) -> Option<(Place, u32)> {
+    let block = address & !0x3ff;
+    let found = match block {
+        0x4000_0000..=0x4000_0c00 => (Place::Encoder((block as usize >> 10) & 3), block),
+        0x4000_3000 => (Place::Iwdg, block),
+        0x4000_4400 => (Place::Usart, block),
+        0x4000_7000 => (Place::Power, block),
+        0x4001_0000 => (Place::Pwm, block),
+        0x4001_0400 => (Place::Encoder(4), block),
+        0x4001_2000 => (Place::Adc, block),
+        0x4001_3800 => (Place::Syscfg, block),
+        0x4001_3c00 => (Place::Exti, block),
+        0x4001_4800 => (Place::Capture, block),
+        0x4002_0000..=0x4002_2000 => (Place::Port((block as usize >> 10) & 15), block),
+        0x4002_3800 => (Place::Rcc, block),
+        0x4002_3c00 => (Place::Flash, block),
+        0x4002_6000 => (Place::Dma, block),
+        0xe004_2000 => (Place::Debug, block),
+        _ => return None,
+    };
+    Some(found)
+}
+
+/// The bit that gives a peripheral its clock (7.3.10 to 7.3.14).
+fn clock(place: Place) -> Option<(Domain, u32)> {
+    Some(match place {
+        Place::Encoder(4) => (Domain::Apb2, 1),
+        Place::Encoder(i) => (Domain::Apb1, i as u32),
+        Place::Usart => (Domain::Apb1, 17),
+        Place::Power => (Domain::Apb1, 28),
+        Place::Pwm => (Domain::Apb2, 0),
+        Place::Adc => (Domain::Apb2, 8),
+        Place::Syscfg => (Domain::Apb2, 14),
+        Place::Capture => (Domain::Apb2, 18),
+        Place::Port(i) => (Domain::Ahb1, i as u32),
+        Place::Dma => (Domain::Ahb1, 21),
+        Place::Iwdg | Place::Exti | Place::Rcc | Place::Flash | Place::Debug => return None,
+    })
+}
+
+/// Whether an access of this width is allowed (2.3, and each chapter's opening).
+fn width_allowed(place: Place, bytes: u32) -> bool {
+    match place {
+        Place::Port(_) | Place::Rcc => true,
+        Place::Encoder(_) | Place::Pwm | Place::Capture | Place::Usart | Place::Iwdg | Place::Power => bytes >= 2,
+        _ => bytes == 4,
+    }
+}
+
+impl Bus {
+    /// Reads a register of the chip or of the core.
+    pub(crate) fn read_register(&mut self, address: u32, bytes: u32) -> Result<u32, Trap> {
+        if address >> 20 == 0xe00 && address & !0x3ff != 0xe004_2000 {
+            return self.read_system(address, bytes);
+        }
+        let Some((place, base)) = place(address) else {
+            return Err(self.nothing_at(address, Violation::Unmapped(address)));
+        };
+        if self.now >= self.deadline {
+            self.advance();
+        }
+        let (word, shift) = (address & !3, 8 * (address & 3));
+        let offset = word - base;
+        if !width_allowed(place, bytes) {
+            return Err(Violation::Width { address, bytes }.into());
+        }
+        let _ = self.bits(place, offset).ok_or(Violation::UnknownRegister(address))?;
+        if !self.has_clock(place, address)? {
+            return Ok(0);
+        }
+        let value = self.read_place(place, offset) >> shift;
+        Ok(if bytes == 4 { value } else { value & ((1 << (8 * bytes)) - 1) })
+    }
+
+    /// Writes a register of the chip or of the core.
+    pub(crate) fn write_register(&mut self, address: u32, bytes: u32, value: u32) -> Result<(), Trap> {
+        self.touched = true;
+        if address >> 20 == 0xe00 && address & !0x3ff != 0xe004_2000 {
+            return self.write_system(address, bytes, value);
+        }
+        let Some((place, base)) = place(address) else {
+            return Err(self.nothing_at(address, Violation::Unmapped(address)));
+        };
+        if self.now >= self.deadline {
+            self.advance();
+        }
+        if !width_allowed(place, bytes) || (bytes < 4 && !matches!(place, Place::Port(_)) && address & 3 != 0) {
+            return Err(Violation::Width { address, bytes }.into());
+        }
+        let (word, shift) = (address & !3, 8 * (address & 3));
+        let offset = word - base;
+        let bits = self.bits(place, offset).ok_or(Violation::UnknownRegister(address))?;
+        let value = if bytes == 4 {
+            value
+        } else if let Place::Port(i) = place {
+            // The other bytes keep what they have; those of BSRR are not kept, but zero.
+            let mask = ((1u32 << (8 * bytes)) - 1) << shift;
+            let old = if offset == 0x18 { 0 } else { self.ports[i].read(offset, 0, 0) };
+            old & !mask | value << shift & mask
+        } else {
+            value & ((1 << (8 * bytes)) - 1)
+        };
+        if self.lost_write == Some(address) {
+            self.lost_write = None;
+            return Ok(());
+        }
+        if !self.has_clock(place, address)? && self.rules.early_is_lost {
+            return Ok(());
+        }
+        self.check_bits(address, bits, value)?;
+        self.write_place(place, offset, value & bits.writable)?;
+        self.hclk_may_have_changed();
+        self.refresh();
+        Ok(())
+    }
+
+    fn check_bits(&mut self, address: u32, bits: Bits, value: u32) -> Result<(), Trap> {
+        let reserved = !(bits.writable | bits.read_only);
+        let wrong = (value ^ bits.reserved_ones) & reserved;
+        if wrong != 0 {
+            self.tolerate(self.rules.reserved_bits, Violation::ReservedBits { address, bits: wrong })?;
+        }
+        let ones = value & bits.read_only;
+        if ones != 0 {
+            self.tolerate(self.rules.read_only_bits, Violation::ReadOnlyBits { address, bits: ones })?;
+        }
+        Ok(())
+    }
+
+    /// Whether the peripheral's clock runs long enough; without clock the run ends.
+    fn has_clock(&mut self, place: Place, address: u32) -> Result<bool, Trap> {
+        let Some((domain, bit)) = clock(place) else { return Ok(true) };
+        let Some(at) = self.rcc.usable_at(domain, bit) else {
+            return Err(Violation::NoClock(address).into());
+        };
+        if self.now >= at {
+            return Ok(true);
+        }
+        let cycles = (at - self.now).div_ceil(self.hclk) as u32;
+        self.tolerate(self.rules.early, Violation::Early { address, cycles })?;
+        Ok(false)
+    }
+
+    fn bits(&self, place: Place, offset: u32) -> Option<Bits> {
+        match place {
+            Place::Encoder(i) => self.encoders[i].bits(offset),
+            Place::Iwdg => Iwdg::bits(offset),
+            Place::Usart => Usart::bits(offset),
+            Place::Power => Power::bits(offset),
+            Place::Pwm => self.pwm.bits(offset),
+            Place::Adc => Adc::bits(offset),
+            Place::Syscfg => Exti::configuration_bits(offset),
+            Place::Exti => Exti::bits(offset),
+            Place::Capture => CaptureTimer::bits(offset),
+            Place::Port(i) => self.ports.get(i)?.bits(offset),
+            Place::Rcc => self.rcc.bits(offset),
+            // FLASH_ACR (3.9.1), FLASH_OPTCR (3.9.10).
+            Place::Flash => match offset {
+                0x00 => Some(Bits::writable(0x1f07)),
+                0x14 => Some(Bits::writable(0).with_read_only(u32::MAX)),
+                _ => None,
+            },
+            Place::Dma => Dma::bits(offset),
+            // DBGMCU (38.16).
+            Place::Debug => match offset {
+                0x00 => Some(Bits::writable(0).with_read_only(u32::MAX)),
+                0x04 => Some(Bits::writable(0xe7)),
+                0x08 => Some(Bits::writable(0x06e0_1dff)),
+                0x0c => Some(Bits::writable(0x0007_0003)),
+                _ => None,
+            },
+        }
+    }
+
+    fn read_place(&mut self, place: Place, offset: u32) -> u32 {
+        let now = self.now;
+        match place {
+            Place::Encoder(i) => {
+                self.unstable |= offset == 0x24;
+                let (shaft, tick) = self.encoder_route(i);
+                self.encoders[i].read(offset, shaft.as_ref(), now, tick)
+            }
+            Place::Iwdg => self.iwdg.read(offset),
+            Place::Usart => {
+                let value = self.usart.read(offset);
+                if offset == 4 {
+                    self.touched = true;
+                    self.refresh();
+                }
+                value
+            }
+            Place::Power => self.power.read(offset),
+            Place::Pwm => {
+                self.unstable = true;
+                self.settle_output();
+                self.pwm.read(offset)
+            }
+            Place::Adc => {
+                self.touched |= offset == 0x4c;
+                self.adc.read(offset)
+            }
+            Place::Syscfg => self.exti.read_configuration(offset),
+            Place::Exti => self.exti.read(offset),
+            Place::Capture => {
+                self.unstable |= offset == 0x24;
+                self.touched |= offset == 0x34;
+                let tick = self.rcc.timer_clock(Domain::Apb2);
+                self.capture.read(offset, now, tick)
+            }
+            Place::Port(i) => {
+                self.unstable |= offset == 0x10;
+                let noise = self.random() as u32;
+                let levels = self.alternate_levels(i);
+                self.ports[i].read(offset, levels, noise)
+            }
+            Place::Rcc => self.rcc.read(offset),
+            Place::Flash if offset == 0 => self.flash_control,
+            // As delivered: no protection, no brown-out reset.
+            Place::Flash => 0x0fff_aaed,
+            Place::Dma => self.dma.read(offset),
+            Place::Debug if offset == 0 => self.chip.identity(),
+            Place::Debug => self.debug_freeze[offset as usize / 4 - 1],
+        }
+    }
+
+    fn write_place(&mut self, place: Place, offset: u32, value: u32) -> Result<(), Violation> {
+        let now = self.now;
+        match place {
+            Place::Encoder(i) => {
+                let (shaft, tick) = self.encoder_route(i);
+                self.encoders[i].write(offset, value, shaft.as_ref(), now, tick)
+            }
+            Place::Iwdg => self.iwdg.write(offset, value, now),
+            Place::Usart => {
+                let apb1 = self.rcc.pclk(Domain::Apb1);
+                self.usart.write(offset, value, now, apb1)?;
+                self.move_by_dma();
+                Ok(())
+            }
+            Place::Power => {
+                self.power.write(offset, value);
+                self.supply_changed();
+                Ok(())
+            }
+            Place::Pwm => {
+                self.settle_output();
+                self.pwm.write(offset, value, now)
+            }
+            Place::Adc => {
+                let apb2 = self.rcc.pclk(Domain::Apb2);
+                self.adc.write(offset, value, now, apb2)
+            }
+            Place::Syscfg => {
+                self.exti.write_configuration(offset, value);
+                Ok(())
+            }
+            Place::Exti => {
+                self.exti.write(offset, value);
+                Ok(())
+            }
+            Place::Capture => self.capture.write(offset, value, now),
+            Place::Port(i) => {
+                self.settle_output();
+                self.ports[i].write(offset, value)?;
+                self.levels_changed();
+                Ok(())
+            }
+            Place::Rcc => {
+                self.settle_output();
+                self.rcc.write(offset, value, now)
+            }
+            Place::Flash => {
+                self.flash_control = value;
+                self.cache.configure(value);
+                self.check_wait_states()
+            }
+            Place::Dma => {
+                self.dma.write(offset, value)?;
+                self.move_by_dma();
+                Ok(())
+            }
+            Place::Debug => {
+                self.debug_freeze[offset as usize / 4 - 1] = value;
+                Ok(())
+            }
+        }
+    }
+
+    fn hclk_may_have_changed(&mut self) {
+        let hclk = self.rcc.hclk();
+        if hclk != self.hclk {
+            self.system.change_clock(self.now, self.hclk, hclk);
+            self.hclk = hclk;
+        }
+    }
+
+    /// One wait state for each 30 MHz at 2.7 V and more (3.5.1).
+    pub(crate) fn check_wait_states(&self) -> Result<(), Violation> {
+        let hz = crate::clock::frequency(self.rcc.hclk());
+        let needed = hz.saturating_sub(1) / 30_000_000;
+        let set = self.flash_control & 7;
+        if set < needed { Err(Violation::WaitStates(set)) } else { Ok(()) }
+    }
+
+    fn read_system(&mut self, address: u32, bytes: u32) -> Result<u32, Trap> {
+        self.unstable |= matches!(address, 0xe000_1004 | 0xe000_e018);
+        match bytes {
+            4 => self.system.read(address, self.now, self.hclk),
+            1 => {
+                let byte = self.system.read_byte(address);
+                byte.map(u32::from).ok_or(Violation::Width { address, bytes }.into())
+            }
+            _ => Err(Violation::Width { address, bytes }.into()),
+        }
+    }
+
+    fn write_system(&mut self, address: u32, bytes: u32, value: u32) -> Result<(), Trap> {
+        match bytes {
+            4 => self.system.write(address, value, self.now, self.hclk)?,
+            1 if self.system.write_byte(address, value as u8) => {}
+            _ => return Err(Violation::Width { address, bytes }.into()),
+        }
+        self.refresh();
+        Ok(())
+    }
+}

@@ -1,0 +1,117 @@
+//! Signals between pins and peripherals.
+
+use super::{Bus, Driven};
+use crate::clock::Time;
+use crate::peripherals::encoder_timer::Shaft;
+use crate::peripherals::gpio::Wire;
+use crate::peripherals::rcc::Domain;
+use crate::wiring::{BREAK_PINS, ENCODER_ROUTES, PWM_PINS, Pin, SERIAL_PINS};
+
+impl Bus {
+    /// The shaft whose signals reach a timer, and the period of that timer.
+    pub(super) fn encoder_route(&self, timer: usize) -> (Option<Shaft>, Time) {
+        let tick = self.rcc.timer_clock(if timer == 4 { Domain::Apb2 } else { Domain::Apb1 });
+        let shaft = ENCODER_ROUTES.iter().filter(|route| route.0 == timer).find_map(|&(_, a, b, function)| {
+            if !self.is_alternate(a, function) || !self.is_alternate(b, function) {
+                return None;
+            }
+            let index = self.wiring.encoders.iter().position(|&encoder| encoder == (a, b))?;
+            self.shafts.get(index).copied()
+        });
+        (shaft, tick)
+    }
+
+    fn is_alternate(&self, pin: Pin, function: u32) -> bool {
+        self.ports[pin.port].is_alternate(pin.number, function)
+    }
+
+    /// Whether TX and RX are at pins.
+    pub(super) fn serial_connected(&self) -> (bool, bool) {
+        let any = |choose: fn(&(Pin, Pin)) -> Pin| {
+            SERIAL_PINS.iter().any(|pins| self.is_alternate(choose(pins), 7))
+        };
+        (any(|pins| pins.0), any(|pins| pins.1))
+    }
+
+    /// Levels that the timer gives to the pins of a port.
+    pub(super) fn alternate_levels(&self, port: usize) -> u32 {
+        PWM_PINS
+            .iter()
+            .filter(|pin| pin.port == port && self.is_alternate(**pin, 1) && self.pwm.level())
+            .fold(0, |levels, pin| levels | 1 << pin.number)
+    }
+
+    /// Level of an output pin as the power stage sees it; its resistor pulls it low while nothing drives it.
+    pub(crate) fn output_level(&self, pin: Pin) -> bool {
+        let port = &self.ports[pin.port];
+        port.mode_of(pin.number) == 1 && port.output >> pin.number & 1 != 0
+    }
+
+    /// Counts what the motor's pins have done until now.
+    pub(crate) fn settle_output(&mut self) {
+        let before = self.pwm.high;
+        let tick = self.rcc.timer_clock(Domain::Apb2);
+        self.pwm.advance(self.now, tick);
+        let high = self.pwm.high - before;
+        let span = self.now - self.driven_until;
+        self.driven_until = self.now;
+        let (pwm, along) = (self.wiring.pwm, self.output_level(self.wiring.direction));
+        let high = if self.is_alternate(pwm, 1) {
+            high
+        } else if self.output_level(pwm) {
+            span
+        } else {
+            0
+        };
+        let enabled = self.output_level(self.wiring.enable);
+        let Driven { along: plus, against: minus, pwm_high, enabled: enabled_time } = &mut self.driven;
+        *pwm_high += high;
+        if enabled {
+            *enabled_time += span;
+            *(if along { plus } else { minus }) += high;
+        }
+    }
+
+    /// Connects a pin to something else.
+    pub(crate) fn connect(&mut self, pin: Pin, wire: Wire) {
+        self.settle_output();
+        let before = self.ports[pin.port].input(pin.number);
+        self.ports[pin.port].wires[usize::from(pin.number)] = wire;
+        let after = self.ports[pin.port].input(pin.number);
+        if let (true, Some(high)) = (before != after, after) {
+            self.exti.pin(pin.port, pin.number, high);
+        }
+        self.levels_changed();
+        self.refresh();
+    }
+
+    /// What follows levels without a clock: the break input.
+    pub(crate) fn levels_changed(&mut self) {
+        for pin in BREAK_PINS {
+            if self.is_alternate(pin, 1) {
+                // A floating input is taken for a break.
+                let high = self.ports[pin.port].input(pin.number).unwrap_or(true);
+                self.pwm.break_input(high);
+            }
+        }
+    }
+
+    /// The chip's supply has changed: the voltage detector is line 16 of EXTI.
+    pub(crate) fn supply_changed(&mut self) {
+        let below = self.power.below();
+        self.exti.line(16, below);
+    }
+
+    /// The crystal stops.
+    pub(crate) fn stop_crystal(&mut self) {
+        self.settle_output();
+        self.rcc.stop_crystal();
+        if std::mem::take(&mut self.rcc.security_event) {
+            self.pwm.clock_failure();
+        }
+        let hclk = self.rcc.hclk();
+        self.system.change_clock(self.now, self.hclk, hclk);
+        self.hclk = hclk;
+        self.refresh();
+    }
+}

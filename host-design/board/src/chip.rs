@@ -1,0 +1,53 @@
+//! The chips, as data: where they differ.
+
+/// A microcontroller.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Chip {
+    /// STM32F405
+    F405,
+    /// STM32F407
+    F407,
+    /// STM32F446
+    F446,
+}
+
+impl Chip {
+    /// DBGMCU_IDCODE (RM0090, 38.6.1; RM0390, 33.6.1).
+    pub fn identity(self) -> u32 {
+        match self {
+            Chip::F405 | Chip::F407 => 0x1007_6413,
+            Chip::F446 => 0x1000_6421,
+        }
+    }
+
+    /// Bytes of flash memory.
+    pub fn flash_bytes(self) -> usize {
+        match self {
+            Chip::F405 | Chip::F407 => 1 << 20,
+            Chip::F446 => 512 << 10,
+        }
+    }
+
+    /// Bytes of core-coupled memory at 0x1000_0000.
+    pub fn core_coupled_bytes(self) -> usize {
+        match self {
+            Chip::F405 | Chip::F407 => 64 << 10,
+            Chip::F446 => 0,
+        }
+    }
+
+    /// Fastest core clock (Hz), without over-drive for F446 (which is not modelled).
+    pub fn fastest_hz(self) -> u32 {
+        168_000_000
+    }
+
+    /// Range of the PLL's input (Hz), with the margin of the datasheets.
+    pub(crate) fn pll_input_hz(self) -> std::ops::RangeInclusive<u32> {
+        950_000..=2_100_000
+    }
+
+    /// Range of the PLL's oscillator (Hz).
+    pub(crate) fn vco_hz(self) -> std::ops::RangeInclusive<u32> {
+        100_000_000..=432_000_000
+    }
+}

@@ -1,0 +1,78 @@
+//! Images: what an ELF file puts into flash.
+
+use object::{Object, ObjectSegment, ObjectSymbol};
+
+/// What is flashed.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Image {
+    pub(crate) segments: Vec<(u32, Vec<u8>)>,
+    symbols: Vec<(String, u32)>,
+}
+
+/// A file that is no image.
+#[derive(Debug, thiserror::Error)]
+pub enum ImageError {
+    /// Not an ELF file.
+    #[error("not an ELF file: {0}")]
+    Elf(#[from] object::read::Error),
+    /// Nothing of it goes to flash.
+    #[error("the file puts nothing into flash at 0x0800_0000")]
+    Empty,
+    /// Something of it goes elsewhere.
+    #[error("the file puts {bytes} bytes to {address:#010x}, where no flash is")]
+    Outside {
+        /// Where.
+        address: u64,
+        /// How many.
+        bytes: u64,
+    },
+}
+
+impl Image {
+    /// Reads an ELF file.
+    ///
+    /// # Errors
+    /// [`ImageError`]
+    pub fn from_elf(bytes: &[u8]) -> Result<Self, ImageError> {
+        let file = object::read::elf::ElfFile32::<object::Endianness>::parse(bytes)?;
+        let mut segments = Vec::new();
+        for segment in file.elf_program_headers() {
+            use object::read::elf::ProgramHeader;
+            let endian = file.endian();
+            if segment.p_type(endian) != object::elf::PT_LOAD || segment.p_filesz(endian) == 0 {
+                continue;
+            }
+            let address = segment.p_paddr(endian);
+            let data = segment.data(endian, bytes).map_err(|()| ImageError::Empty)?;
+            if !(0x0800_0000..0x0810_0000).contains(&address) {
+                return Err(ImageError::Outside { address: address.into(), bytes: data.len() as u64 });
+            }
+            segments.push((address, data.to_vec()));
+        }
+        if segments.is_empty() {
+            return Err(ImageError::Empty);
+        }
+        let symbols = file
+            .symbols()
+            .filter_map(|symbol| Some((symbol.name().ok()?.to_owned(), symbol.address() as u32)))
+            .collect();
+        let _ = file.segments().map(|segment| segment.address());
+        Ok(Self { segments, symbols })
+    }
+
+    /// Code at the beginning of flash, as directed programs have it: two vectors, then instructions.
+    pub fn from_flash(bytes: Vec<u8>) -> Self {
+        Self { segments: vec![(0x0800_0000, bytes)], symbols: Vec::new() }
+    }
+
+    /// Address of a symbol.
+    pub fn symbol(&self, name: &str) -> Option<u32> {
+        self.symbols.iter().find(|(known, _)| known == name).map(|&(_, address)| address)
+    }
+
+    /// Bytes of flash up to the end of the image.
+    pub(crate) fn end(&self) -> usize {
+        let end = |(address, bytes): &(u32, Vec<u8>)| (address & 0x00ff_ffff) as usize + bytes.len();
+        self.segments.iter().map(end).max().unwrap_or(0)
+    }
+}

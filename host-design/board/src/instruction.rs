@@ -1,0 +1,359 @@
+//! Instructions as the decoder gives them and the processor executes them.
+//!
+//! Names and operands follow the ARMv7-M Architecture Reference Manual (DDI 0403), chapter A7. Addresses that depend on
+//! the program counter alone are computed by the decoder.
+
+/// Whether an instruction sets the flags.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Sets {
+    /// It does not.
+    Never,
+    /// It does.
+    Always,
+    /// It does, but not in an IT block (most 16-bit forms).
+    OutsideIt,
+}
+
+/// Data processing with a result.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Alu {
+    And,
+    Bic,
+    Orr,
+    Orn,
+    Eor,
+    Add,
+    Adc,
+    Sub,
+    Sbc,
+    Rsb,
+    Mov,
+    Mvn,
+}
+
+/// Data processing with flags alone.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Compare {
+    Tst,
+    Teq,
+    Cmp,
+    Cmn,
+}
+
+/// Kind of a shift.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Shift {
+    Lsl,
+    Lsr,
+    Asr,
+    Ror,
+    Rrx,
+}
+
+/// Second operand of data processing.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Operand {
+    /// A constant, which leaves the carry alone.
+    Constant(u32),
+    /// A constant whose expansion sets the carry to its top bit.
+    Rotated(u32),
+    /// A register as it is.
+    Register(u8),
+    /// A register, shifted by a constant.
+    Shifted { register: u8, shift: Shift, amount: u8 },
+}
+
+/// Size and extension of a memory access.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Unit {
+    Word,
+    Half,
+    Byte,
+    SignedHalf,
+    SignedByte,
+}
+
+/// Where a single access goes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Place {
+    /// Base and offset.
+    Offset(i32),
+    /// Base and offset; the base becomes the address.
+    PreIndexed(i16),
+    /// Base; the offset is added to it afterwards.
+    PostIndexed(i16),
+    /// Base and another register, shifted to the left.
+    Indexed { register: u8, shift: u8 },
+}
+
+/// Extension of a byte or half-word.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Extend {
+    SignedByte,
+    SignedHalf,
+    Byte,
+    Half,
+    SignedBytes,
+    Bytes,
+}
+
+/// Operations of one register on another.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Unary {
+    Rev,
+    Rev16,
+    Revsh,
+    Rbit,
+    Clz,
+}
+
+/// What a parallel addition or subtraction does with the halves or bytes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Lanes {
+    Add16,
+    AddSubExchanged,
+    SubAddExchanged,
+    Sub16,
+    Add8,
+    Sub8,
+}
+
+/// How a parallel addition or subtraction treats what does not fit.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Prefix {
+    Signed,
+    SignedSaturating,
+    SignedHalving,
+    Unsigned,
+    UnsignedSaturating,
+    UnsignedHalving,
+}
+
+/// Multiplications with a result of 32 bits.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Multiply {
+    /// MUL, MLA
+    Low,
+    /// MLS
+    Subtract,
+    /// SMULxy, SMLAxy: top halves of the first and second factor.
+    Halves { first_top: bool, second_top: bool },
+    /// SMULWy, SMLAWy
+    WordByHalf { top: bool },
+    /// SMUAD, SMLAD
+    DualAdd { exchange: bool },
+    /// SMUSD, SMLSD
+    DualSubtract { exchange: bool },
+    /// SMMUL, SMMLA
+    High { round: bool },
+    /// SMMLS
+    HighSubtract { round: bool },
+}
+
+/// Multiplications with a result of 64 bits.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum LongMultiply {
+    /// SMULL
+    Signed,
+    /// UMULL
+    Unsigned,
+    /// SMLAL
+    SignedAdd,
+    /// UMLAL
+    UnsignedAdd,
+    /// UMAAL
+    UnsignedAddTwo,
+    /// SMLALxy
+    Halves { first_top: bool, second_top: bool },
+    /// SMLALD
+    DualAdd { exchange: bool },
+    /// SMLSLD
+    DualSubtract { exchange: bool },
+}
+
+/// Floating point: two operands, one result.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Float2 {
+    Add,
+    Sub,
+    Mul,
+    NegMul,
+    Div,
+    /// d + n·m, rounded twice.
+    Mla,
+    /// d − n·m
+    Mls,
+    /// −d − n·m
+    NegMla,
+    /// −d + n·m
+    NegMls,
+    /// d + n·m, rounded once.
+    Fma,
+    /// d − n·m
+    Fms,
+    /// −d − n·m
+    NegFma,
+    /// −d + n·m
+    NegFms,
+}
+
+/// Floating point: one operand, one result.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Float1 {
+    Move,
+    Abs,
+    Neg,
+    Sqrt,
+    /// From an integer.
+    FromSigned,
+    FromUnsigned,
+    /// To an integer, rounded towards zero or as FPSCR says.
+    ToSigned { to_zero: bool },
+    ToUnsigned { to_zero: bool },
+    /// From a fixed-point number in the same register.
+    FromFixed { signed: bool, half: bool, fraction: u8 },
+    /// To a fixed-point number in the same register.
+    ToFixed { signed: bool, half: bool, fraction: u8 },
+    /// From the lower or upper half, a number of 16 bits.
+    FromHalf { top: bool },
+    /// To the lower or upper half.
+    ToHalf { top: bool },
+}
+
+/// Special registers for MRS and MSR (B5.2.2).
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Special {
+    /// APSR, IPSR, EPSR and combinations; the number's lower bits say which.
+    Psr(u8),
+    Msp,
+    Psp,
+    Primask,
+    Basepri,
+    BasepriMax,
+    Faultmask,
+    Control,
+}
+
+/// One instruction.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Op {
+    /// Not yet looked at (of the cache).
+    Undecoded,
+    Nop,
+    /// WFI
+    WaitForInterrupt,
+    /// WFE
+    WaitForEvent,
+    /// SEV
+    SendEvent,
+    /// DSB
+    SyncData,
+    /// DMB, ISB
+    Barrier,
+    ClearExclusive,
+    It(u8),
+    /// CPSIE or CPSID, of PRIMASK and FAULTMASK.
+    ChangeMasks { disable: bool, primask: bool, faultmask: bool },
+    Svc,
+    Breakpoint,
+    Undefined,
+    Alu { alu: Alu, sets: Sets, rd: u8, rn: u8, operand: Operand },
+    Compare { compare: Compare, rn: u8, operand: Operand },
+    ShiftBy { shift: Shift, sets: Sets, rd: u8, rn: u8, rm: u8 },
+    /// MOVT
+    MoveTop { rd: u8, value: u16 },
+    Branch { target: u32 },
+    BranchIf { condition: u8, target: u32 },
+    Call { target: u32 },
+    BranchTo { rm: u8 },
+    CallTo { rm: u8 },
+    /// CBZ, CBNZ
+    BranchZero { rn: u8, if_zero: bool, target: u32 },
+    /// TBB, TBH
+    TableBranch { rn: u8, rm: u8, half: bool },
+    Load { unit: Unit, rt: u8, rn: u8, place: Place },
+    Store { unit: Unit, rt: u8, rn: u8, place: Place },
+    LoadLiteral { unit: Unit, rt: u8, address: u32 },
+    LoadDual { rt: u8, rt2: u8, rn: u8, offset: i16, index: bool, write_back: bool },
+    StoreDual { rt: u8, rt2: u8, rn: u8, offset: i16, index: bool, write_back: bool },
+    LoadMultiple { rn: u8, list: u16, down: bool, write_back: bool },
+    StoreMultiple { rn: u8, list: u16, down: bool, write_back: bool },
+    LoadExclusive { unit: Unit, rt: u8, rn: u8, offset: u16 },
+    StoreExclusive { unit: Unit, rd: u8, rt: u8, rn: u8, offset: u16 },
+    /// `ra` 15: without a summand.
+    Multiply { multiply: Multiply, sets: Sets, rd: u8, rn: u8, rm: u8, ra: u8 },
+    LongMultiply { multiply: LongMultiply, low: u8, high: u8, rn: u8, rm: u8 },
+    Divide { signed: bool, rd: u8, rn: u8, rm: u8 },
+    /// BFI; BFC with `rn` 15.
+    InsertField { rd: u8, rn: u8, lsb: u8, width: u8 },
+    ExtractField { signed: bool, rd: u8, rn: u8, lsb: u8, width: u8 },
+    /// SSAT, USAT
+    Saturate { signed: bool, rd: u8, rn: u8, bits: u8, shift: Shift, amount: u8 },
+    /// SSAT16, USAT16
+    SaturateHalves { signed: bool, rd: u8, rn: u8, bits: u8 },
+    /// `rn` 15: without a summand.
+    Extend { extend: Extend, rd: u8, rn: u8, rm: u8, rotate: u8 },
+    Unary { unary: Unary, rd: u8, rm: u8 },
+    Parallel { prefix: Prefix, lanes: Lanes, rd: u8, rn: u8, rm: u8 },
+    /// QADD, QSUB, QDADD, QDSUB
+    SaturatingSum { double: bool, subtract: bool, rd: u8, rn: u8, rm: u8 },
+    Select { rd: u8, rn: u8, rm: u8 },
+    /// USAD8, USADA8 (`ra` 15: without a summand)
+    AbsoluteDifferences { rd: u8, rn: u8, rm: u8, ra: u8 },
+    /// PKHBT, PKHTB
+    PackHalves { rd: u8, rn: u8, rm: u8, top_first: bool, amount: u8 },
+    ReadSpecial { rd: u8, special: Special },
+    WriteSpecial { rn: u8, special: Special, mask: u8 },
+    Float2 { op: Float2, d: u8, n: u8, m: u8 },
+    Float1 { op: Float1, d: u8, m: u8 },
+    FloatConstant { d: u8, bits: u32 },
+    /// VCMP, VCMPE; without `m` against zero.
+    FloatCompare { d: u8, m: Option<u8>, signal: bool },
+    /// VMOV between a core register and a single.
+    FloatToCore { rt: u8, n: u8 },
+    CoreToFloat { n: u8, rt: u8 },
+    /// VMOV between two core registers and two singles in sequence.
+    FloatPairToCore { rt: u8, rt2: u8, m: u8 },
+    CorePairToFloat { rt: u8, rt2: u8, m: u8 },
+    /// VMRS; register 15 stands for the flags.
+    ReadFloatStatus { rt: u8 },
+    /// VMSR
+    WriteFloatStatus { rt: u8 },
+    /// VLDR, VSTR: `count` words (1 or 2) from `d` on.
+    FloatLoad { d: u8, rn: u8, offset: i16, count: u8 },
+    FloatStore { d: u8, rn: u8, offset: i16, count: u8 },
+    /// VLDM, VPOP
+    FloatLoadMultiple { d: u8, rn: u8, count: u8, down: bool, write_back: bool },
+    /// VSTM, VPUSH
+    FloatStoreMultiple { d: u8, rn: u8, count: u8, down: bool, write_back: bool },
+}
+
+/// An instruction and its length in bytes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct Instruction {
+    pub(crate) op: Op,
+    pub(crate) length: u8,
+}
+
+impl Op {
+    /// Whether it needs the floating-point unit.
+    pub(crate) fn is_float(self) -> bool {
+        matches!(
+            self,
+            Op::Float2 { .. }
+                | Op::Float1 { .. }
+                | Op::FloatConstant { .. }
+                | Op::FloatCompare { .. }
+                | Op::FloatToCore { .. }
+                | Op::CoreToFloat { .. }
+                | Op::FloatPairToCore { .. }
+                | Op::CorePairToFloat { .. }
+                | Op::ReadFloatStatus { .. }
+                | Op::WriteFloatStatus { .. }
+                | Op::FloatLoad { .. }
+                | Op::FloatStore { .. }
+                | Op::FloatLoadMultiple { .. }
+                | Op::FloatStoreMultiple { .. }
+        )
+    }
+}

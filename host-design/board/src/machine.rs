@@ -1,0 +1,329 @@
+//! The processor at work: fetching, executing, taking exceptions.
+
+use crate::bus::Bus;
+use crate::clock::{NEVER, Time};
+use crate::decode::{Undecodable, decode, is_wide};
+use crate::error::{Fault, Rule, Stopped, Trap, Violation};
+use crate::execute::memory::size;
+use crate::instruction::{Instruction, Op, Unit};
+use crate::peripherals::rcc::{SOFTWARE_FLAG, WATCHDOG_FLAG};
+use crate::processor::mpu::Purpose;
+use crate::processor::registers::Registers;
+use crate::processor::waiting::Watch;
+
+const FLASH: u32 = 0x0800_0000;
+
+/// Core and everything it reaches.
+#[derive(Debug, Clone)]
+pub(crate) struct Machine {
+    pub(crate) registers: Registers,
+    pub(crate) bus: Bus,
+    /// Decoded flash, by half-words.
+    decoded: Vec<Instruction>,
+    pub(crate) next: u32,
+    pub(crate) cycles: u32,
+    pub(crate) in_it: bool,
+    /// The instruction before was a load.
+    pub(crate) loaded: bool,
+    pub(crate) asleep: bool,
+    pub(crate) locked_up: bool,
+    /// Held in reset, or without power.
+    pub(crate) held: bool,
+    pub(crate) event: bool,
+    pub(crate) exclusive: bool,
+    /// Instructions executed, those skipped in waiting loops included.
+    pub(crate) executed: u64,
+    pub(crate) skipped: u64,
+    pub(crate) resets: u64,
+    pub(crate) watch: Watch,
+}
+
+impl Machine {
+    /// Power on; `code_bytes` of flash are worth remembering decoded.
+    pub(crate) fn new(mut bus: Bus, code_bytes: usize) -> Self {
+        let registers = Registers::after_reset(|| bus.random() as u32);
+        let undecoded = Instruction { op: Op::Undecoded, length: 2 };
+        Self {
+            registers,
+            bus,
+            decoded: vec![undecoded; code_bytes / 2 + 1],
+            next: 0,
+            cycles: 0,
+            in_it: false,
+            loaded: false,
+            asleep: false,
+            locked_up: false,
+            held: false,
+            event: false,
+            exclusive: false,
+            executed: 0,
+            skipped: 0,
+            resets: 0,
+            watch: Watch::default(),
+        }
+    }
+
+    /// A reset of the core: stack pointer and program counter from the vectors.
+    pub(crate) fn reset(&mut self) -> Result<(), Violation> {
+        let bus = &mut self.bus;
+        self.registers = Registers::after_reset(|| bus.random() as u32);
+        let stack = self.bus.vector(0)?;
+        let start = self.bus.vector(1)?;
+        self.registers.r[13] = stack & !3;
+        self.registers.r[14] = u32::MAX;
+        self.registers.pc = start & !1;
+        self.asleep = false;
+        self.locked_up = false;
+        self.exclusive = false;
+        self.resets += 1;
+        if start & 1 == 0 { Err(Violation::Forbidden("a reset vector without its lowest bit")) } else { Ok(()) }
+    }
+
+    /// Forgets the decoded instructions around an address of flash.
+    pub(crate) fn forget(&mut self, address: u32) {
+        let index = (address & 0x00ff_ffff) as usize / 2;
+        for i in index.saturating_sub(1)..=index {
+            if let Some(instruction) = self.decoded.get_mut(i) {
+                instruction.op = Op::Undecoded;
+            }
+        }
+    }
+
+    /// Runs until a time.
+    pub(crate) fn run_until(&mut self, end: Time) -> Result<(), Stopped> {
+        self.run(end).map_err(|violation| Stopped {
+            violation,
+            program_counter: self.registers.pc,
+            time: self.bus.now,
+        })
+    }
+
+    fn run(&mut self, end: Time) -> Result<(), Violation> {
+        while self.bus.now < end {
+            if self.bus.now >= self.bus.deadline {
+                self.bus.advance();
+            }
+            if self.bus.watchdog_reset || self.bus.system.reset_requested {
+                let flag = if self.bus.watchdog_reset { WATCHDOG_FLAG } else { SOFTWARE_FLAG };
+                self.bus.reset(flag);
+                self.reset()?;
+            }
+            if self.held || self.locked_up || self.bus.rcc.stopped {
+                self.bus.now = self.idle_until(end);
+                continue;
+            }
+            if self.bus.system.nvic.changed && self.take_pending()? {
+                self.bus.now += Time::from(self.cycles) * self.bus.hclk;
+                self.watch.forget();
+                continue;
+            }
+            if self.asleep {
+                self.sleep(end);
+                continue;
+            }
+            self.run_steps(end)?;
+        }
+        Ok(())
+    }
+
+    /// Until something may happen beside the instructions.
+    fn run_steps(&mut self, end: Time) -> Result<(), Violation> {
+        loop {
+            self.step()?;
+            let bus = &self.bus;
+            if bus.system.nvic.changed || self.asleep || bus.now >= bus.deadline.min(end) || self.locked_up {
+                return Ok(());
+            }
+            if bus.system.reset_requested {
+                return Ok(());
+            }
+            if self.next < self.bus.pc {
+                self.skip_waiting(end);
+            }
+        }
+    }
+
+    /// The next deadline, but not beyond the end of the run.
+    fn idle_until(&self, end: Time) -> Time {
+        let deadline = if self.held { NEVER } else { self.bus.deadline };
+        deadline.clamp(self.bus.now + 1, end.max(self.bus.now + 1))
+    }
+
+    /// WFI: whole clocks until something pends.
+    fn sleep(&mut self, end: Time) {
+        if self.wakes() || std::mem::take(&mut self.event) {
+            self.asleep = false;
+            self.bus.system.nvic.changed = true;
+            return;
+        }
+        let until = self.idle_until(end);
+        let clocks = (until - self.bus.now).div_ceil(self.bus.hclk);
+        self.bus.now += clocks * self.bus.hclk;
+    }
+
+    /// Executes one instruction.
+    #[inline]
+    fn step(&mut self) -> Result<(), Violation> {
+        let pc = self.registers.pc;
+        self.bus.pc = pc;
+        self.executed += 1;
+        self.cycles = 1;
+        let it = self.registers.it;
+        let done = match self.instruction(pc) {
+            Ok(instruction) => {
+                self.next = pc.wrapping_add(instruction.length.into());
+                self.registers.r[15] = pc.wrapping_add(4);
+                if it == 0 {
+                    self.in_it = false;
+                    self.execute(instruction.op)
+                } else {
+                    self.conditional(instruction.op, it)
+                }
+            }
+            Err(trap) => Err(trap),
+        };
+        match done {
+            Ok(()) => self.registers.pc = self.next,
+            Err(Trap::Stop(violation)) => return Err(violation),
+            Err(Trap::Fault(fault)) => {
+                self.registers.it = it;
+                self.fault(fault)?;
+            }
+        }
+        self.bus.now += Time::from(self.cycles) * self.bus.hclk;
+        Ok(())
+    }
+
+    /// An instruction of an IT block.
+    fn conditional(&mut self, op: Op, it: u8) -> Result<(), Trap> {
+        let last = it & 15 == 8;
+        let never = matches!(
+            op,
+            Op::It(_) | Op::BranchIf { .. } | Op::BranchZero { .. } | Op::ChangeMasks { .. }
+        );
+        if never {
+            return Err(Violation::Unpredictable(self.code_at(self.registers.pc)).into());
+        }
+        self.registers.advance_it();
+        if !self.registers.holds(it >> 4) {
+            return Ok(());
+        }
+        self.in_it = true;
+        let straight = self.next;
+        self.execute(op)?;
+        if self.next != straight && !last {
+            return Err(Violation::Unpredictable(self.code_at(self.registers.pc)).into());
+        }
+        Ok(())
+    }
+
+    fn code_at(&self, address: u32) -> u32 {
+        let first = self.bus.fetch(address).unwrap_or(0);
+        if is_wide(first) {
+            u32::from(first) << 16 | u32::from(self.bus.fetch(address.wrapping_add(2)).unwrap_or(0))
+        } else {
+            first.into()
+        }
+    }
+
+    /// The instruction at an address, from the cache if it is in flash.
+    #[inline]
+    pub(crate) fn instruction(&mut self, pc: u32) -> Result<Instruction, Trap> {
+        if self.bus.system.mpu.enabled() && !self.allowed(pc, Purpose::Execute) {
+            return Err(Fault::MemoryInstruction.into());
+        }
+        let index = (pc.wrapping_sub(FLASH) >> 1) as usize;
+        match self.decoded.get(index) {
+            Some(instruction) if instruction.op != Op::Undecoded => Ok(*instruction),
+            _ => self.decode_at(pc, index),
+        }
+    }
+
+    #[cold]
+    fn decode_at(&mut self, pc: u32, index: usize) -> Result<Instruction, Trap> {
+        let nothing = |bus: &Bus, address| bus.nothing_at(address, Violation::Unmapped(address));
+        let first = self.bus.fetch(pc).ok_or_else(|| nothing(&self.bus, pc))?;
+        let second = if is_wide(first) {
+            self.bus.fetch(pc.wrapping_add(2)).ok_or_else(|| nothing(&self.bus, pc))?
+        } else {
+            0
+        };
+        let instruction = decode(first, second, pc).map_err(|undecodable| {
+            if self.bus.rules.faults_are_taken {
+                return Fault::UndefinedInstruction.into();
+            }
+            let code = self.code_at(pc);
+            Trap::Stop(match undecodable {
+                Undecodable::Unknown => Violation::UnknownInstruction(code),
+                Undecodable::Unpredictable => Violation::Unpredictable(code),
+            })
+        })?;
+        if let Some(place) = self.decoded.get_mut(index) {
+            *place = instruction;
+        }
+        Ok(instruction)
+    }
+
+    fn allowed(&self, address: u32, purpose: Purpose) -> bool {
+        let registers = &self.registers;
+        let suspended = registers.faultmask || matches!(registers.ipsr, 2 | 3);
+        self.bus.system.mpu.allows(address, purpose, registers.privileged(), suspended)
+    }
+
+    /// Loads from memory or a register, extended to 32 bits.
+    #[inline]
+    pub(crate) fn load(&mut self, address: u32, unit: Unit) -> Result<u32, Trap> {
+        let bytes = size(unit);
+        if self.bus.system.mpu.enabled() && !self.allowed(address, Purpose::Read) {
+            return Err(Fault::MemoryData(address).into());
+        }
+        if address & (bytes - 1) != 0 {
+            self.unaligned(address)?;
+        }
+        let value = match self.bus.read_memory(address, unit) {
+            Some(value) => {
+                if address >> 24 == 8 {
+                    self.cycles += self.bus.cache.load(address);
+                }
+                value
+            }
+            None if address == 0xe000_ed04 => self.bus.system.interrupt_state(self.registers.ipsr),
+            None => self.bus.read_register(address, bytes)?,
+        };
+        Ok(match unit {
+            Unit::SignedHalf => value as i16 as u32,
+            Unit::SignedByte => value as i8 as u32,
+            _ => value,
+        })
+    }
+
+    /// Stores to memory or a register.
+    #[inline]
+    pub(crate) fn store(&mut self, address: u32, unit: Unit, value: u32) -> Result<(), Trap> {
+        let bytes = size(unit);
+        if self.bus.system.mpu.enabled() && !self.allowed(address, Purpose::Write) {
+            return Err(Fault::MemoryData(address).into());
+        }
+        if address & (bytes - 1) != 0 {
+            self.unaligned(address)?;
+        }
+        self.watch.stored();
+        if self.bus.write_memory(address, unit, value) {
+            return Ok(());
+        }
+        if matches!(address >> 24, 0x00 | 0x08 | 0x1f) {
+            return Err(self.bus.nothing_at(address, Violation::ReadOnly(address)));
+        }
+        self.bus.write_register(address, bytes, value)
+    }
+
+    /// The core splits unaligned accesses to memory; to registers they fault.
+    fn unaligned(&mut self, address: u32) -> Result<(), Trap> {
+        let memory = matches!(address >> 24, 0x00 | 0x08 | 0x10 | 0x20);
+        if !memory || self.bus.rules.unaligned == Rule::Stop {
+            return Err(Violation::Unaligned(address).into());
+        }
+        self.cycles += 1;
+        self.bus.tolerate(Rule::Note, Violation::Unaligned(address))
+    }
+}

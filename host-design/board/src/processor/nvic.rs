@@ -1,0 +1,168 @@
+//! Exceptions: enabled, pending, active, and their priorities (B1.5, B3.4).
+
+/// External interrupts of the largest chip here.
+pub(crate) const INTERRUPTS: usize = 97;
+/// All exception numbers.
+const EXCEPTIONS: usize = 16 + INTERRUPTS;
+
+pub(crate) const NMI: usize = 2;
+pub(crate) const HARD_FAULT: usize = 3;
+pub(crate) const MEM_MANAGE: usize = 4;
+pub(crate) const BUS_FAULT: usize = 5;
+pub(crate) const USAGE_FAULT: usize = 6;
+pub(crate) const SV_CALL: usize = 11;
+pub(crate) const PEND_SV: usize = 14;
+pub(crate) const SYS_TICK: usize = 15;
+
+/// A set of exceptions.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub(crate) struct Set(u128);
+
+impl Set {
+    pub(crate) fn has(self, exception: usize) -> bool {
+        self.0 >> exception & 1 != 0
+    }
+
+    pub(crate) fn put(&mut self, exception: usize, member: bool) {
+        self.0 = self.0 & !(1 << exception) | u128::from(member) << exception;
+    }
+
+    pub(crate) fn is_empty(self) -> bool {
+        self.0 == 0
+    }
+
+    fn members(self) -> impl Iterator<Item = usize> {
+        let mut bits = self.0;
+        std::iter::from_fn(move || {
+            let next = bits.trailing_zeros() as usize;
+            (bits != 0).then(|| {
+                bits &= bits - 1;
+                next
+            })
+        })
+    }
+
+    /// 32 external interrupts.
+    pub(crate) fn word(self, word: usize) -> u32 {
+        (self.0 >> (16 + 32 * word)) as u32
+    }
+
+    fn external(word: usize, bits: u32) -> u128 {
+        let all = (1u128 << EXCEPTIONS) - 1;
+        if word > 3 { 0 } else { (u128::from(bits) << (16 + 32 * word)) & all }
+    }
+
+    pub(crate) fn put_word(&mut self, word: usize, bits: u32, member: bool) {
+        let bits = Self::external(word, bits);
+        self.0 = if member { self.0 | bits } else { self.0 & !bits };
+    }
+}
+
+/// The controller.
+#[derive(Debug, Clone)]
+pub(crate) struct Nvic {
+    pub(crate) enabled: Set,
+    pub(crate) pending: Set,
+    pub(crate) active: Set,
+    /// Interrupt lines that are high now.
+    pub(crate) lines: Set,
+    /// Four bits each, the upper ones of the byte.
+    pub(crate) priority: [u8; EXCEPTIONS],
+    /// AIRCR.PRIGROUP
+    pub(crate) group: u8,
+    /// Something has changed that may let an exception come.
+    pub(crate) changed: bool,
+}
+
+impl Nvic {
+    pub(crate) fn new() -> Self {
+        let mut enabled = Set::default();
+        for always in [NMI, HARD_FAULT, SV_CALL, PEND_SV, SYS_TICK] {
+            enabled.put(always, true);
+        }
+        Self {
+            enabled,
+            pending: Set::default(),
+            active: Set::default(),
+            lines: Set::default(),
+            priority: [0; EXCEPTIONS],
+            group: 0,
+            changed: true,
+        }
+    }
+
+    pub(crate) fn pend(&mut self, exception: usize) {
+        self.pending.put(exception, true);
+        self.changed = true;
+    }
+
+    /// The line of an external interrupt: pending while it is high (B3.4.1).
+    pub(crate) fn line(&mut self, interrupt: usize, high: bool) {
+        let exception = 16 + interrupt;
+        if high && !self.lines.has(exception) {
+            self.pend(exception);
+        }
+        self.lines.put(exception, high);
+    }
+
+    /// Full priority; smaller is more urgent.
+    fn of(&self, exception: usize) -> i32 {
+        match exception {
+            NMI => -2,
+            HARD_FAULT => -1,
+            _ => i32::from(self.priority[exception]),
+        }
+    }
+
+    /// Priority that decides about preemption.
+    fn grouped(&self, priority: i32) -> i32 {
+        if priority < 0 { priority } else { priority & !((2 << self.group) - 1) }
+    }
+
+    /// Priority at which the processor executes (B1.5.4).
+    pub(crate) fn executing(&self, primask: bool, faultmask: bool, basepri: u8) -> i32 {
+        let mut lowest = 256;
+        for exception in self.active.members() {
+            lowest = lowest.min(self.grouped(self.of(exception)));
+        }
+        if basepri != 0 {
+            lowest = lowest.min(self.grouped(basepri.into()));
+        }
+        if primask {
+            lowest = lowest.min(0);
+        }
+        if faultmask {
+            lowest = lowest.min(-1);
+        }
+        lowest
+    }
+
+    /// The most urgent pending and enabled exception, and its preemption priority.
+    pub(crate) fn most_urgent(&self) -> Option<(usize, i32)> {
+        if self.pending.is_empty() {
+            return None;
+        }
+        let ready = Set(self.pending.0 & self.enabled.0);
+        let first = ready.members().min_by_key(|&exception| (self.of(exception), exception))?;
+        Some((first, self.grouped(self.of(first))))
+    }
+
+    /// Preemption priority of an exception.
+    pub(crate) fn preemption(&self, exception: usize) -> i32 {
+        self.grouped(self.of(exception))
+    }
+
+    pub(crate) fn activate(&mut self, exception: usize) {
+        self.pending.put(exception, false);
+        self.active.put(exception, true);
+    }
+
+    /// Ends a handler; an interrupt whose line is still high pends again.
+    pub(crate) fn deactivate(&mut self, exception: usize) {
+        self.active.put(exception, false);
+        if self.lines.has(exception) {
+            self.pending.put(exception, true);
+        }
+        self.changed = true;
+    }
+}

@@ -1,0 +1,148 @@
+//! Waiting loops, skipped ahead without changing what happens.
+//!
+//! A loop that stores nothing, reads nothing that changes by itself before the next deadline, and comes round with the
+//! same registers does the same thing until that deadline. One register may count down by one per turn, if the loop uses
+//! it for nothing else than `subs` with a constant 1: then the flags stay the same until it comes near zero.
+
+use crate::clock::Time;
+use crate::instruction::{Alu, Op, Operand};
+use crate::machine::Machine;
+use crate::processor::registers::Registers;
+
+/// Longest loop that is looked at (instructions).
+const LONGEST: u64 = 16;
+
+/// The last turn of a loop.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct Watch {
+    head: u32,
+    since: Option<(Box<Registers>, Time, u64)>,
+    turn: Option<(Time, u64)>,
+    stored: bool,
+}
+
+impl Watch {
+    pub(crate) fn forget(&mut self) {
+        self.head = 0;
+    }
+
+    #[inline]
+    pub(crate) fn stored(&mut self) {
+        self.stored = true;
+    }
+}
+
+impl Machine {
+    /// Called after a jump backwards, with the program counter at the loop's head.
+    pub(crate) fn skip_waiting(&mut self, end: Time) {
+        let head = self.registers.pc;
+        let (now, executed) = (self.bus.now, self.executed);
+        let quiet = !std::mem::take(&mut self.watch.stored)
+            & !std::mem::take(&mut self.bus.unstable)
+            & !std::mem::take(&mut self.bus.touched);
+        let same_loop = self.watch.head == head && quiet;
+        self.watch.head = head;
+        let turn = match &self.watch.since {
+            Some((_, since, count)) if same_loop && executed - count <= LONGEST => {
+                Some((now - since, executed - count))
+            }
+            _ => None,
+        };
+        let repeats = turn.is_some() && turn == self.watch.turn;
+        self.watch.turn = turn;
+        if repeats {
+            let limit = self.turns_without_change(self.bus.pc);
+            if let (Some(limit), Some((span, count))) = (limit, turn) {
+                self.skip(end, span, count, limit);
+            }
+        }
+        if turn.is_some() || !same_loop {
+            let (now, executed) = (self.bus.now, self.executed);
+            match &mut self.watch.since {
+                Some((registers, since, count)) => {
+                    (**registers).clone_from(&self.registers);
+                    (*since, *count) = (now, executed);
+                }
+                None => self.watch.since = Some((Box::new(self.registers.clone()), now, executed)),
+            }
+        }
+    }
+
+    /// How many turns may be skipped, and which register counts them; none if this is no waiting loop.
+    fn turns_without_change(&mut self, last: u32) -> Option<(u64, Option<usize>)> {
+        let before = &self.watch.since.as_ref()?.0;
+        let mut counter = None;
+        for i in 0..15 {
+            if before.r[i] != self.registers.r[i] {
+                let counts = before.r[i].wrapping_sub(1) == self.registers.r[i] && counter.is_none();
+                if !counts {
+                    return None;
+                }
+                counter = Some(i);
+            }
+        }
+        let mut without = Registers::clone(before);
+        (without.r, without.pc) = (self.registers.r, self.registers.pc);
+        if without != self.registers {
+            return None;
+        }
+        let Some(counter) = counter else { return Some((u64::MAX, None)) };
+        let head = self.registers.pc;
+        if !self.only_counts(head, last, counter as u8) {
+            return None;
+        }
+        let left = self.registers.r[counter];
+        (left > 4 && left < 1 << 31).then_some((u64::from(left) - 3, Some(counter)))
+    }
+
+    /// Whether a stretch of code uses a register for `subs r, r, #1` alone.
+    fn only_counts(&mut self, head: u32, last: u32, counter: u8) -> bool {
+        let mut pc = head;
+        let mut seen = 0;
+        while pc <= last {
+            let Ok(instruction) = self.instruction(pc) else { return false };
+            pc += u32::from(instruction.length);
+            let plain = match instruction.op {
+                Op::Alu { alu: Alu::Sub, rd, rn, operand: Operand::Constant(1), .. }
+                    if rd == counter && rn == counter =>
+                {
+                    seen += 1;
+                    true
+                }
+                Op::Load { rt, rn, place: crate::instruction::Place::Offset(_), .. } => {
+                    rt != counter && rn != counter
+                }
+                Op::Alu { rd, rn, operand, .. } => {
+                    rd != counter && rn != counter && !uses(operand, counter)
+                }
+                Op::Compare { rn, operand, .. } => rn != counter && !uses(operand, counter),
+                Op::Branch { .. } | Op::BranchIf { .. } | Op::Nop | Op::It(_) => true,
+                Op::BranchZero { rn, .. } => rn != counter,
+                _ => false,
+            };
+            if !plain {
+                return false;
+            }
+        }
+        seen == 1
+    }
+
+    fn skip(&mut self, end: Time, span: Time, count: u64, (limit, counter): (u64, Option<usize>)) {
+        let until = self.bus.deadline.min(end);
+        // The turn in which the deadline falls is executed.
+        let turns = ((until - self.bus.now) / span).saturating_sub(1).min(limit);
+        self.bus.now += turns * span;
+        self.executed += turns * count;
+        self.skipped += turns * count;
+        if let Some(counter) = counter {
+            self.registers.r[counter] -= turns as u32;
+        }
+    }
+}
+
+fn uses(operand: Operand, register: u8) -> bool {
+    match operand {
+        Operand::Constant(_) | Operand::Rotated(_) => false,
+        Operand::Register(r) | Operand::Shifted { register: r, .. } => r == register,
+    }
+}

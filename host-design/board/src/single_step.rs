@@ -1,0 +1,82 @@
+//! Single instructions on given states: for the comparison with another emulator.
+
+use crate::bus::{Bus, Conditions};
+use crate::error::{Rules, Stopped};
+use crate::machine::Machine;
+use crate::wiring::Wiring;
+
+/// Registers as the comparison has them.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct State {
+    /// R0 to R14 and the program counter.
+    pub r: [u32; 16],
+    /// Flags N, Z, C, V, Q (bits 31 to 27) and GE (19 to 16).
+    pub apsr: u32,
+    /// The singles.
+    pub s: [u32; 32],
+    /// FPSCR.
+    pub fpscr: u32,
+}
+
+/// A processor in the middle of SRAM.
+#[derive(Debug)]
+pub struct Stepper {
+    machine: Machine,
+}
+
+impl Default for Stepper {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+impl Stepper {
+    /// With the floating-point unit on, and unaligned accesses allowed.
+    pub fn new() -> Self {
+        let mut bus = Bus::new(&Conditions::f405(1), Wiring::upright(), Rules::NOTED, &[]);
+        // CPACR, FPCCR without lazy stacking.
+        let _ = bus.system.write(0xe000_ed88, 0x00f0_0000, 0, 1);
+        bus.rules = Rules::NOTED;
+        Self { machine: Machine::new(bus, 0) }
+    }
+
+    /// Fills memory.
+    pub fn write(&mut self, address: u32, bytes: &[u8]) {
+        for (i, &byte) in (0..).zip(bytes) {
+            self.machine.bus.write_memory(address + i, crate::instruction::Unit::Byte, byte.into());
+        }
+    }
+
+    /// A part of memory.
+    pub fn read(&self, address: u32, length: u32) -> Vec<u8> {
+        (0..length)
+            .map(|i| self.machine.bus.read_memory(address + i, crate::instruction::Unit::Byte).unwrap_or(0) as u8)
+            .collect()
+    }
+
+    /// Executes `count` instructions from a state.
+    ///
+    /// # Errors
+    /// [`Stopped`] as a board would.
+    pub fn run(&mut self, state: &State, count: u32) -> Result<State, Stopped> {
+        let machine = &mut self.machine;
+        machine.bus.notes.clear();
+        machine.asleep = false;
+        let registers = &mut machine.registers;
+        registers.r = state.r;
+        registers.pc = state.r[15] & !1;
+        registers.set_xpsr(state.apsr | 1 << 24);
+        registers.s = state.s;
+        registers.fpscr = state.fpscr;
+        registers.float_active = true;
+        machine.bus.system.nvic = crate::processor::nvic::Nvic::new();
+        machine.bus.system.nvic.changed = false;
+        for _ in 0..count {
+            machine.run_until(machine.bus.now + 1)?;
+        }
+        let registers = &machine.registers;
+        let mut r = registers.r;
+        r[15] = registers.pc;
+        Ok(State { r, apsr: registers.apsr(), s: registers.s, fpscr: registers.fpscr })
+    }
+}
