@@ -327,6 +327,11 @@ impl Board {
         (bus.usart.overruns, bus.encoders.iter().map(|encoder| encoder.lost).sum())
     }
 
+    /// Whether waiting loops are skipped ahead (they are, unless told otherwise): it must make no difference but speed.
+    pub fn skip_waiting(&mut self, skip: bool) {
+        self.machine.skips = skip;
+    }
+
     /// Whether anything is still scheduled.
     pub fn next_input(&self) -> Option<Time> {
         self.scheduled.first_key_value().map(|(&(time, _), _)| time).filter(|&time| time != NEVER)

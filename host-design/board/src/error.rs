@@ -77,7 +77,7 @@ pub enum Violation {
 
 /// Where a run ended.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
-#[error("at program counter {program_counter:#010x}: {violation}")]
+#[error("at program counter {program_counter:#010x}, {:.6} s after power-on: {violation}", *time as f64 / 25.2e9)]
 pub struct Stopped {
     /// Why.
     pub violation: Violation,
@@ -103,6 +103,8 @@ pub enum Rule {
     Stop,
     /// It is noted, and what the hardware most likely does happens.
     Note,
+    /// It is allowed.
+    Allow,
 }
 
 /// Rules for the violations that hardware lets pass.
@@ -116,7 +118,8 @@ pub struct Rules {
     pub early: Rule,
     /// With `early` noted: whether a write that comes too early is lost.
     pub early_is_lost: bool,
-    /// Unaligned accesses to memory, which the processor splits.
+    /// Unaligned accesses of one register to memory: the processor splits them, and compilers make use of that. All others
+    /// (to registers, of several words) end the run or fault.
     pub unaligned: Rule,
     /// Whether unmapped accesses, unknown instructions and UDF raise the processor's faults instead of ending the run.
     pub faults_are_taken: bool,
@@ -129,7 +132,7 @@ impl Rules {
         read_only_bits: Rule::Stop,
         early: Rule::Stop,
         early_is_lost: false,
-        unaligned: Rule::Stop,
+        unaligned: Rule::Allow,
         faults_are_taken: false,
     };
 
@@ -139,7 +142,7 @@ impl Rules {
         read_only_bits: Rule::Note,
         early: Rule::Note,
         early_is_lost: false,
-        unaligned: Rule::Note,
+        unaligned: Rule::Allow,
         faults_are_taken: false,
     };
 }

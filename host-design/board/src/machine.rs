@@ -3,7 +3,7 @@
 use crate::bus::Bus;
 use crate::clock::{NEVER, Time};
 use crate::decode::{Undecodable, decode, is_wide};
-use crate::error::{Fault, Rule, Stopped, Trap, Violation};
+use crate::error::{Fault, Stopped, Trap, Violation};
 use crate::execute::memory::size;
 use crate::instruction::{Instruction, Op, Unit};
 use crate::peripherals::rcc::{SOFTWARE_FLAG, WATCHDOG_FLAG};
@@ -36,6 +36,8 @@ pub(crate) struct Machine {
     pub(crate) skipped: u64,
     pub(crate) resets: u64,
     pub(crate) watch: Watch,
+    /// Whether waiting loops are skipped.
+    pub(crate) skips: bool,
 }
 
 impl Machine {
@@ -60,6 +62,7 @@ impl Machine {
             skipped: 0,
             resets: 0,
             watch: Watch::default(),
+            skips: true,
         }
     }
 
@@ -137,7 +140,7 @@ impl Machine {
             if bus.system.reset_requested {
                 return Ok(());
             }
-            if self.next < self.bus.pc {
+            if self.next < self.bus.pc && self.skips {
                 self.skip_waiting(end);
             }
         }
@@ -320,10 +323,10 @@ impl Machine {
     /// The core splits unaligned accesses to memory; to registers they fault.
     fn unaligned(&mut self, address: u32) -> Result<(), Trap> {
         let memory = matches!(address >> 24, 0x00 | 0x08 | 0x10 | 0x20);
-        if !memory || self.bus.rules.unaligned == Rule::Stop {
+        if !memory {
             return Err(Violation::Unaligned(address).into());
         }
         self.cycles += 1;
-        self.bus.tolerate(Rule::Note, Violation::Unaligned(address))
+        self.bus.tolerate(self.bus.rules.unaligned, Violation::Unaligned(address))
     }
 }

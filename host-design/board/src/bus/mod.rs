@@ -65,7 +65,7 @@ pub(crate) struct Bus {
     pub(crate) deadline: Time,
     /// A read that gives something else at any time, such as of a counter.
     pub(crate) unstable: bool,
-    /// Something was written to a register.
+    /// Something was written to a register, or has happened by itself.
     pub(crate) touched: bool,
     pub(crate) pc: u32,
     pub(crate) rules: Rules,
@@ -191,8 +191,10 @@ impl Bus {
 
     /// A violation that hardware lets pass.
     pub(crate) fn tolerate(&mut self, rule: Rule, violation: Violation) -> Result<(), Trap> {
-        if rule == Rule::Stop {
-            return Err(violation.into());
+        match rule {
+            Rule::Stop => return Err(violation.into()),
+            Rule::Allow => return Ok(()),
+            Rule::Note => {}
         }
         let stopped = Stopped { violation, program_counter: self.pc, time: self.now };
         let known = self.notes.iter_mut().find(|note| {
@@ -214,6 +216,7 @@ impl Bus {
     /// Lets happen what is due.
     pub(crate) fn advance(&mut self) {
         let now = self.now;
+        self.touched = true;
         self.system.advance(now, self.hclk);
         self.rcc.advance(now);
         let apb1 = self.rcc.pclk(crate::peripherals::rcc::Domain::Apb1);

@@ -1,16 +1,19 @@
 //! Waiting loops, skipped ahead without changing what happens.
 //!
 //! A loop that stores nothing, reads nothing that changes by itself before the next deadline, and comes round with the
-//! same registers does the same thing until that deadline. One register may count down by one per turn, if the loop uses
-//! it for nothing else than `subs` with a constant 1: then the flags stay the same until it comes near zero.
+//! same registers does the same thing until that deadline. One register may count down by a constant per turn, if the loop
+//! uses it for nothing else than one subtraction of that constant: then the flags stay the same until it comes near zero.
 
 use crate::clock::Time;
 use crate::instruction::{Alu, Op, Operand};
 use crate::machine::Machine;
 use crate::processor::registers::Registers;
 
+/// Turns that may be skipped, and the register that counts them with its step.
+type Skip = (u64, Option<(usize, u32)>);
+
 /// Longest loop that is looked at (instructions).
-const LONGEST: u64 = 16;
+const LONGEST: u64 = 32;
 
 /// The last turn of a loop.
 #[derive(Debug, Clone, Default)]
@@ -56,7 +59,7 @@ impl Machine {
                 self.skip(end, span, count, limit);
             }
         }
-        if turn.is_some() || !same_loop {
+        {
             let (now, executed) = (self.bus.now, self.executed);
             match &mut self.watch.since {
                 Some((registers, since, count)) => {
@@ -69,16 +72,15 @@ impl Machine {
     }
 
     /// How many turns may be skipped, and which register counts them; none if this is no waiting loop.
-    fn turns_without_change(&mut self, last: u32) -> Option<(u64, Option<usize>)> {
+    fn turns_without_change(&mut self, last: u32) -> Option<Skip> {
         let before = &self.watch.since.as_ref()?.0;
         let mut counter = None;
         for i in 0..15 {
             if before.r[i] != self.registers.r[i] {
-                let counts = before.r[i].wrapping_sub(1) == self.registers.r[i] && counter.is_none();
-                if !counts {
+                if counter.is_some() {
                     return None;
                 }
-                counter = Some(i);
+                counter = Some((i, before.r[i].wrapping_sub(self.registers.r[i])));
             }
         }
         let mut without = Registers::clone(before);
@@ -86,25 +88,25 @@ impl Machine {
         if without != self.registers {
             return None;
         }
-        let Some(counter) = counter else { return Some((u64::MAX, None)) };
-        let head = self.registers.pc;
-        if !self.only_counts(head, last, counter as u8) {
+        let Some((counter, step)) = counter else { return Some((u64::MAX, None)) };
+        let (head, left) = (self.registers.pc, self.registers.r[counter]);
+        if !self.only_counts(head, last, counter as u8, step) || left >= 1 << 31 {
             return None;
         }
-        let left = self.registers.r[counter];
-        (left > 4 && left < 1 << 31).then_some((u64::from(left) - 3, Some(counter)))
+        let turns = u64::from(left / step).saturating_sub(3);
+        Some((turns, Some((counter, step))))
     }
 
-    /// Whether a stretch of code uses a register for `subs r, r, #1` alone.
-    fn only_counts(&mut self, head: u32, last: u32, counter: u8) -> bool {
+    /// Whether a stretch of code uses a register for `subs r, r, #step` alone.
+    fn only_counts(&mut self, head: u32, last: u32, counter: u8, step: u32) -> bool {
         let mut pc = head;
         let mut seen = 0;
         while pc <= last {
             let Ok(instruction) = self.instruction(pc) else { return false };
             pc += u32::from(instruction.length);
             let plain = match instruction.op {
-                Op::Alu { alu: Alu::Sub, rd, rn, operand: Operand::Constant(1), .. }
-                    if rd == counter && rn == counter =>
+                Op::Alu { alu: Alu::Sub, rd, rn, operand: Operand::Constant(constant), .. }
+                    if rd == counter && rn == counter && constant == step =>
                 {
                     seen += 1;
                     true
@@ -118,6 +120,7 @@ impl Machine {
                 Op::Compare { rn, operand, .. } => rn != counter && !uses(operand, counter),
                 Op::Branch { .. } | Op::BranchIf { .. } | Op::Nop | Op::It(_) => true,
                 Op::BranchZero { rn, .. } => rn != counter,
+                Op::MoveTop { rd, .. } => rd != counter,
                 _ => false,
             };
             if !plain {
@@ -127,15 +130,15 @@ impl Machine {
         seen == 1
     }
 
-    fn skip(&mut self, end: Time, span: Time, count: u64, (limit, counter): (u64, Option<usize>)) {
+    fn skip(&mut self, end: Time, span: Time, count: u64, (limit, counter): Skip) {
         let until = self.bus.deadline.min(end);
         // The turn in which the deadline falls is executed.
         let turns = ((until - self.bus.now) / span).saturating_sub(1).min(limit);
         self.bus.now += turns * span;
         self.executed += turns * count;
         self.skipped += turns * count;
-        if let Some(counter) = counter {
-            self.registers.r[counter] -= turns as u32;
+        if let Some((counter, step)) = counter {
+            self.registers.r[counter] -= turns as u32 * step;
         }
     }
 }
