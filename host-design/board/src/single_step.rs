@@ -69,6 +69,7 @@ impl Stepper {
         registers.s = state.s;
         registers.fpscr = state.fpscr;
         registers.float_active = true;
+        machine.bus.system.fpccr = 0;
         machine.bus.system.nvic = crate::processor::nvic::Nvic::new();
         machine.bus.system.nvic.changed = false;
         for _ in 0..count {

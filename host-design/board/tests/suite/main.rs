@@ -1,1 +1,3 @@
-mod boots;
+//! Tests of the virtual board: one program.
+
+mod independent_answers;
