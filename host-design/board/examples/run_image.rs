@@ -29,7 +29,12 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         board.core_hz(),
         (executed - skipped) as f64 / wall / 1e6,
     );
-    println!("{} bytes sent, {} resets, pc {:#x}", board.sent().len(), board.resets(), board.program_counter());
+    println!(
+        "{} bytes sent, {} resets, pc {:#x}",
+        board.sent().len(),
+        board.resets(),
+        board.program_counter()
+    );
     println!("{:?}\n{:?}", board.power_stage(), board.driven());
     for note in board.notes() {
         println!(

@@ -54,7 +54,9 @@ pub enum Violation {
     #[error("the peripheral at {0:#010x} has no clock")]
     NoClock(u32),
     /// A peripheral accessed too soon after its clock was enabled (ES0182, 2.1.13).
-    #[error("the peripheral at {address:#010x} is accessed {cycles} cycles too early after its clock was enabled")]
+    #[error(
+        "the peripheral at {address:#010x} is accessed {cycles} cycles too early after its clock was enabled"
+    )]
     Early {
         /// Of the access.
         address: u32,

@@ -208,16 +208,32 @@ pub(crate) enum Float1 {
     FromSigned,
     FromUnsigned,
     /// To an integer, rounded towards zero or as FPSCR says.
-    ToSigned { to_zero: bool },
-    ToUnsigned { to_zero: bool },
+    ToSigned {
+        to_zero: bool,
+    },
+    ToUnsigned {
+        to_zero: bool,
+    },
     /// From a fixed-point number in the same register.
-    FromFixed { signed: bool, half: bool, fraction: u8 },
+    FromFixed {
+        signed: bool,
+        half: bool,
+        fraction: u8,
+    },
     /// To a fixed-point number in the same register.
-    ToFixed { signed: bool, half: bool, fraction: u8 },
+    ToFixed {
+        signed: bool,
+        half: bool,
+        fraction: u8,
+    },
     /// From the lower or upper half, a number of 16 bits.
-    FromHalf { top: bool },
+    FromHalf {
+        top: bool,
+    },
     /// To the lower or upper half.
-    ToHalf { top: bool },
+    ToHalf {
+        top: bool,
+    },
 }
 
 /// Special registers for MRS and MSR (B5.2.2).
@@ -253,79 +269,311 @@ pub(crate) enum Op {
     ClearExclusive,
     It(u8),
     /// CPSIE or CPSID, of PRIMASK and FAULTMASK.
-    ChangeMasks { disable: bool, primask: bool, faultmask: bool },
+    ChangeMasks {
+        disable: bool,
+        primask: bool,
+        faultmask: bool,
+    },
     Svc,
     Breakpoint,
     Undefined,
-    Alu { alu: Alu, sets: Sets, rd: u8, rn: u8, operand: Operand },
-    Compare { compare: Compare, rn: u8, operand: Operand },
-    ShiftBy { shift: Shift, sets: Sets, rd: u8, rn: u8, rm: u8 },
+    Alu {
+        alu: Alu,
+        sets: Sets,
+        rd: u8,
+        rn: u8,
+        operand: Operand,
+    },
+    Compare {
+        compare: Compare,
+        rn: u8,
+        operand: Operand,
+    },
+    ShiftBy {
+        shift: Shift,
+        sets: Sets,
+        rd: u8,
+        rn: u8,
+        rm: u8,
+    },
     /// MOVT
-    MoveTop { rd: u8, value: u16 },
-    Branch { target: u32 },
-    BranchIf { condition: u8, target: u32 },
-    Call { target: u32 },
-    BranchTo { rm: u8 },
-    CallTo { rm: u8 },
+    MoveTop {
+        rd: u8,
+        value: u16,
+    },
+    Branch {
+        target: u32,
+    },
+    BranchIf {
+        condition: u8,
+        target: u32,
+    },
+    Call {
+        target: u32,
+    },
+    BranchTo {
+        rm: u8,
+    },
+    CallTo {
+        rm: u8,
+    },
     /// CBZ, CBNZ
-    BranchZero { rn: u8, if_zero: bool, target: u32 },
+    BranchZero {
+        rn: u8,
+        if_zero: bool,
+        target: u32,
+    },
     /// TBB, TBH
-    TableBranch { rn: u8, rm: u8, half: bool },
-    Load { unit: Unit, rt: u8, rn: u8, place: Place },
-    Store { unit: Unit, rt: u8, rn: u8, place: Place },
-    LoadLiteral { unit: Unit, rt: u8, address: u32 },
-    LoadDual { rt: u8, rt2: u8, rn: u8, offset: i16, index: bool, write_back: bool },
-    StoreDual { rt: u8, rt2: u8, rn: u8, offset: i16, index: bool, write_back: bool },
-    LoadMultiple { rn: u8, list: u16, down: bool, write_back: bool },
-    StoreMultiple { rn: u8, list: u16, down: bool, write_back: bool },
-    LoadExclusive { unit: Unit, rt: u8, rn: u8, offset: u16 },
-    StoreExclusive { unit: Unit, rd: u8, rt: u8, rn: u8, offset: u16 },
+    TableBranch {
+        rn: u8,
+        rm: u8,
+        half: bool,
+    },
+    Load {
+        unit: Unit,
+        rt: u8,
+        rn: u8,
+        place: Place,
+    },
+    Store {
+        unit: Unit,
+        rt: u8,
+        rn: u8,
+        place: Place,
+    },
+    LoadLiteral {
+        unit: Unit,
+        rt: u8,
+        address: u32,
+    },
+    LoadDual {
+        rt: u8,
+        rt2: u8,
+        rn: u8,
+        offset: i16,
+        index: bool,
+        write_back: bool,
+    },
+    StoreDual {
+        rt: u8,
+        rt2: u8,
+        rn: u8,
+        offset: i16,
+        index: bool,
+        write_back: bool,
+    },
+    LoadMultiple {
+        rn: u8,
+        list: u16,
+        down: bool,
+        write_back: bool,
+    },
+    StoreMultiple {
+        rn: u8,
+        list: u16,
+        down: bool,
+        write_back: bool,
+    },
+    LoadExclusive {
+        unit: Unit,
+        rt: u8,
+        rn: u8,
+        offset: u16,
+    },
+    StoreExclusive {
+        unit: Unit,
+        rd: u8,
+        rt: u8,
+        rn: u8,
+        offset: u16,
+    },
     /// `ra` 15: without a summand.
-    Multiply { multiply: Multiply, sets: Sets, rd: u8, rn: u8, rm: u8, ra: u8 },
-    LongMultiply { multiply: LongMultiply, low: u8, high: u8, rn: u8, rm: u8 },
-    Divide { signed: bool, rd: u8, rn: u8, rm: u8 },
+    Multiply {
+        multiply: Multiply,
+        sets: Sets,
+        rd: u8,
+        rn: u8,
+        rm: u8,
+        ra: u8,
+    },
+    LongMultiply {
+        multiply: LongMultiply,
+        low: u8,
+        high: u8,
+        rn: u8,
+        rm: u8,
+    },
+    Divide {
+        signed: bool,
+        rd: u8,
+        rn: u8,
+        rm: u8,
+    },
     /// BFI; BFC with `rn` 15.
-    InsertField { rd: u8, rn: u8, lsb: u8, width: u8 },
-    ExtractField { signed: bool, rd: u8, rn: u8, lsb: u8, width: u8 },
+    InsertField {
+        rd: u8,
+        rn: u8,
+        lsb: u8,
+        width: u8,
+    },
+    ExtractField {
+        signed: bool,
+        rd: u8,
+        rn: u8,
+        lsb: u8,
+        width: u8,
+    },
     /// SSAT, USAT
-    Saturate { signed: bool, rd: u8, rn: u8, bits: u8, shift: Shift, amount: u8 },
+    Saturate {
+        signed: bool,
+        rd: u8,
+        rn: u8,
+        bits: u8,
+        shift: Shift,
+        amount: u8,
+    },
     /// SSAT16, USAT16
-    SaturateHalves { signed: bool, rd: u8, rn: u8, bits: u8 },
+    SaturateHalves {
+        signed: bool,
+        rd: u8,
+        rn: u8,
+        bits: u8,
+    },
     /// `rn` 15: without a summand.
-    Extend { extend: Extend, rd: u8, rn: u8, rm: u8, rotate: u8 },
-    Unary { unary: Unary, rd: u8, rm: u8 },
-    Parallel { prefix: Prefix, lanes: Lanes, rd: u8, rn: u8, rm: u8 },
+    Extend {
+        extend: Extend,
+        rd: u8,
+        rn: u8,
+        rm: u8,
+        rotate: u8,
+    },
+    Unary {
+        unary: Unary,
+        rd: u8,
+        rm: u8,
+    },
+    Parallel {
+        prefix: Prefix,
+        lanes: Lanes,
+        rd: u8,
+        rn: u8,
+        rm: u8,
+    },
     /// QADD, QSUB, QDADD, QDSUB
-    SaturatingSum { double: bool, subtract: bool, rd: u8, rn: u8, rm: u8 },
-    Select { rd: u8, rn: u8, rm: u8 },
+    SaturatingSum {
+        double: bool,
+        subtract: bool,
+        rd: u8,
+        rn: u8,
+        rm: u8,
+    },
+    Select {
+        rd: u8,
+        rn: u8,
+        rm: u8,
+    },
     /// USAD8, USADA8 (`ra` 15: without a summand)
-    AbsoluteDifferences { rd: u8, rn: u8, rm: u8, ra: u8 },
+    AbsoluteDifferences {
+        rd: u8,
+        rn: u8,
+        rm: u8,
+        ra: u8,
+    },
     /// PKHBT, PKHTB
-    PackHalves { rd: u8, rn: u8, rm: u8, top_first: bool, amount: u8 },
-    ReadSpecial { rd: u8, special: Special },
-    WriteSpecial { rn: u8, special: Special, mask: u8 },
-    Float2 { op: Float2, d: u8, n: u8, m: u8 },
-    Float1 { op: Float1, d: u8, m: u8 },
-    FloatConstant { d: u8, bits: u32 },
+    PackHalves {
+        rd: u8,
+        rn: u8,
+        rm: u8,
+        top_first: bool,
+        amount: u8,
+    },
+    ReadSpecial {
+        rd: u8,
+        special: Special,
+    },
+    WriteSpecial {
+        rn: u8,
+        special: Special,
+        mask: u8,
+    },
+    Float2 {
+        op: Float2,
+        d: u8,
+        n: u8,
+        m: u8,
+    },
+    Float1 {
+        op: Float1,
+        d: u8,
+        m: u8,
+    },
+    FloatConstant {
+        d: u8,
+        bits: u32,
+    },
     /// VCMP, VCMPE; without `m` against zero.
-    FloatCompare { d: u8, m: Option<u8>, signal: bool },
+    FloatCompare {
+        d: u8,
+        m: Option<u8>,
+        signal: bool,
+    },
     /// VMOV between a core register and a single.
-    FloatToCore { rt: u8, n: u8 },
-    CoreToFloat { n: u8, rt: u8 },
+    FloatToCore {
+        rt: u8,
+        n: u8,
+    },
+    CoreToFloat {
+        n: u8,
+        rt: u8,
+    },
     /// VMOV between two core registers and two singles in sequence.
-    FloatPairToCore { rt: u8, rt2: u8, m: u8 },
-    CorePairToFloat { rt: u8, rt2: u8, m: u8 },
+    FloatPairToCore {
+        rt: u8,
+        rt2: u8,
+        m: u8,
+    },
+    CorePairToFloat {
+        rt: u8,
+        rt2: u8,
+        m: u8,
+    },
     /// VMRS; register 15 stands for the flags.
-    ReadFloatStatus { rt: u8 },
+    ReadFloatStatus {
+        rt: u8,
+    },
     /// VMSR
-    WriteFloatStatus { rt: u8 },
+    WriteFloatStatus {
+        rt: u8,
+    },
     /// VLDR, VSTR: `count` words (1 or 2) from `d` on.
-    FloatLoad { d: u8, rn: u8, offset: i16, count: u8 },
-    FloatStore { d: u8, rn: u8, offset: i16, count: u8 },
+    FloatLoad {
+        d: u8,
+        rn: u8,
+        offset: i16,
+        count: u8,
+    },
+    FloatStore {
+        d: u8,
+        rn: u8,
+        offset: i16,
+        count: u8,
+    },
     /// VLDM, VPOP
-    FloatLoadMultiple { d: u8, rn: u8, count: u8, down: bool, write_back: bool },
+    FloatLoadMultiple {
+        d: u8,
+        rn: u8,
+        count: u8,
+        down: bool,
+        write_back: bool,
+    },
     /// VSTM, VPUSH
-    FloatStoreMultiple { d: u8, rn: u8, count: u8, down: bool, write_back: bool },
+    FloatStoreMultiple {
+        d: u8,
+        rn: u8,
+        count: u8,
+        down: bool,
+        write_back: bool,
+    },
 }
 
 /// An instruction and its length in bytes.

@@ -79,7 +79,11 @@ impl Machine {
         self.locked_up = false;
         self.exclusive = false;
         self.resets += 1;
-        if start & 1 == 0 { Err(Violation::Forbidden("a reset vector without its lowest bit")) } else { Ok(()) }
+        if start & 1 == 0 {
+            Err(Violation::Forbidden("a reset vector without its lowest bit"))
+        } else {
+            Ok(())
+        }
     }
 
     /// Forgets the decoded instructions around an address of flash.
@@ -200,10 +204,8 @@ impl Machine {
     /// An instruction of an IT block.
     fn conditional(&mut self, op: Op, it: u8) -> Result<(), Trap> {
         let last = it & 15 == 8;
-        let never = matches!(
-            op,
-            Op::It(_) | Op::BranchIf { .. } | Op::BranchZero { .. } | Op::ChangeMasks { .. }
-        );
+        let never =
+            matches!(op, Op::It(_) | Op::BranchIf { .. } | Op::BranchZero { .. } | Op::ChangeMasks { .. });
         if never {
             return Err(Violation::Unpredictable(self.code_at(self.registers.pc)).into());
         }

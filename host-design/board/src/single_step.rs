@@ -50,7 +50,9 @@ impl Stepper {
     /// A part of memory.
     pub fn read(&self, address: u32, length: u32) -> Vec<u8> {
         (0..length)
-            .map(|i| self.machine.bus.read_memory(address + i, crate::instruction::Unit::Byte).unwrap_or(0) as u8)
+            .map(|i| {
+                self.machine.bus.read_memory(address + i, crate::instruction::Unit::Byte).unwrap_or(0) as u8
+            })
             .collect()
     }
 

@@ -101,7 +101,12 @@ pub(crate) struct Bus {
 }
 
 impl Bus {
-    pub(crate) fn new(conditions: &Conditions, wiring: Wiring, rules: Rules, image: &[(u32, Vec<u8>)]) -> Self {
+    pub(crate) fn new(
+        conditions: &Conditions,
+        wiring: Wiring,
+        rules: Rules,
+        image: &[(u32, Vec<u8>)],
+    ) -> Self {
         let chip = conditions.chip;
         let mut noise = conditions.seed | 1;
         let mut random = |bytes: usize| (0..bytes).map(|_| next_noise(&mut noise) as u8).collect::<Vec<_>>();
@@ -260,12 +265,10 @@ impl Bus {
 
     fn move_by_dma(&mut self) {
         use crate::peripherals::dma::{RECEIVE, TRANSMIT};
-        if self.usart.wants_fetch() {
-            if let Some(address) = self.dma.next(RECEIVE) {
-                let byte = self.usart.fetch();
-                self.poke(address, byte);
-                self.dma.moved(RECEIVE);
-            }
+        if let Some(address) = self.dma.next(RECEIVE).filter(|_| self.usart.wants_fetch()) {
+            let byte = self.usart.fetch();
+            self.poke(address, byte);
+            self.dma.moved(RECEIVE);
         }
         while self.usart.wants_byte() {
             let Some(address) = self.dma.next(TRANSMIT) else { break };

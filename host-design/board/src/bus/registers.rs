@@ -2,6 +2,7 @@
 
 use super::Bus;
 use crate::error::{Trap, Violation};
+use crate::peripherals::Bits;
 use crate::peripherals::adc::Adc;
 use crate::peripherals::capture_timer::CaptureTimer;
 use crate::peripherals::dma::Dma;
@@ -10,7 +11,6 @@ use crate::peripherals::iwdg::Iwdg;
 use crate::peripherals::power::Power;
 use crate::peripherals::rcc::Domain;
 use crate::peripherals::usart::Usart;
-use crate::peripherals::Bits;
 
 /// A peripheral that is modelled.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -76,7 +76,9 @@ fn clock(place: Place) -> Option<(Domain, u32)> {
 fn width_allowed(place: Place, bytes: u32) -> bool {
     match place {
         Place::Port(_) | Place::Rcc => true,
-        Place::Encoder(_) | Place::Pwm | Place::Capture | Place::Usart | Place::Iwdg | Place::Power => bytes >= 2,
+        Place::Encoder(_) | Place::Pwm | Place::Capture | Place::Usart | Place::Iwdg | Place::Power => {
+            bytes >= 2
+        }
         _ => bytes == 4,
     }
 }
@@ -118,7 +120,8 @@ impl Bus {
         if self.now >= self.deadline {
             self.advance();
         }
-        if !width_allowed(place, bytes) || (bytes < 4 && !matches!(place, Place::Port(_)) && address & 3 != 0) {
+        if !width_allowed(place, bytes) || (bytes < 4 && !matches!(place, Place::Port(_)) && address & 3 != 0)
+        {
             return Err(Violation::Width { address, bytes }.into());
         }
         let (word, shift) = (address & !3, 8 * (address & 3));
@@ -143,7 +146,10 @@ impl Bus {
         }
         self.check_bits(address, bits, value)?;
         self.write_place(place, offset, value & bits.writable)?;
-        self.hclk_may_have_changed();
+        if place == Place::Rcc {
+            self.hclk_may_have_changed();
+            self.check_wait_states()?;
+        }
         self.refresh();
         Ok(())
     }

@@ -11,13 +11,14 @@ impl Bus {
     /// The shaft whose signals reach a timer, and the period of that timer.
     pub(super) fn encoder_route(&self, timer: usize) -> (Option<Shaft>, Time) {
         let tick = self.rcc.timer_clock(if timer == 4 { Domain::Apb2 } else { Domain::Apb1 });
-        let shaft = ENCODER_ROUTES.iter().filter(|route| route.0 == timer).find_map(|&(_, a, b, function)| {
-            if !self.is_alternate(a, function) || !self.is_alternate(b, function) {
-                return None;
-            }
-            let index = self.wiring.encoders.iter().position(|&encoder| encoder == (a, b))?;
-            self.shafts.get(index).copied()
-        });
+        let shaft =
+            ENCODER_ROUTES.iter().filter(|route| route.0 == timer).find_map(|&(_, a, b, function)| {
+                if !self.is_alternate(a, function) || !self.is_alternate(b, function) {
+                    return None;
+                }
+                let index = self.wiring.encoders.iter().position(|&encoder| encoder == (a, b))?;
+                self.shafts.get(index).copied()
+            });
         (shaft, tick)
     }
 
@@ -51,7 +52,11 @@ impl Bus {
     pub(crate) fn settle_output(&mut self) {
         let before = self.pwm.high;
         let tick = self.rcc.timer_clock(Domain::Apb2);
-        self.pwm.advance(self.now, tick);
+        if self.rcc.stopped {
+            self.pwm.stand_still(self.now);
+        } else {
+            self.pwm.advance(self.now, tick);
+        }
         let high = self.pwm.high - before;
         let span = self.now - self.driven_until;
         self.driven_until = self.now;

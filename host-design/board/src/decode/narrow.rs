@@ -22,9 +22,7 @@ pub(super) fn decode(code: u32, address: u32) -> Decoded {
             let value = (address.wrapping_add(4) & !3).wrapping_add((code & 0xff) * 4);
             Ok(alu(Alu::Mov, Sets::Never, low(code, 8), 15, Operand::Constant(value)))
         }
-        0x2a | 0x2b => {
-            Ok(alu(Alu::Add, Sets::Never, low(code, 8), 13, Operand::Constant((code & 0xff) * 4)))
-        }
+        0x2a | 0x2b => Ok(alu(Alu::Add, Sets::Never, low(code, 8), 13, Operand::Constant((code & 0xff) * 4))),
         0x2c..=0x2f => miscellaneous(code, address),
         0x30..=0x33 => multiple(code),
         0x34..=0x37 => conditional(code, address),

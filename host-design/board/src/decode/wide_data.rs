@@ -19,7 +19,8 @@ pub(super) fn shift(kind: u32, amount: u32) -> (Shift, u8) {
 /// The constant that twelve bits stand for (A5.3.2).
 fn expanded(bits: u32) -> Result<Operand, Undecodable> {
     let byte = bits & 0xff;
-    let repeated = |value| if byte == 0 { Err(Undecodable::Unpredictable) } else { Ok(Operand::Constant(value)) };
+    let repeated =
+        |value| if byte == 0 { Err(Undecodable::Unpredictable) } else { Ok(Operand::Constant(value)) };
     match bits >> 8 {
         0 => Ok(Operand::Constant(byte)),
         1 => repeated(byte << 16 | byte),
@@ -72,9 +73,7 @@ fn processing(first: u32, rd: u8, rn: u8, operand: Operand, rm: Option<u8>) -> D
         let allowed = rn != 15 && (rn != 13 || rn_may_be_sp) && !rm_bad;
         fixed(allowed, Op::Compare { compare, rn, operand })
     };
-    let alu = |alu| {
-        fixed(!bad(rd) && !bad(rn) && !rm_bad, Op::Alu { alu, sets, rd, rn, operand })
-    };
+    let alu = |alu| fixed(!bad(rd) && !bad(rn) && !rm_bad, Op::Alu { alu, sets, rd, rn, operand });
     let without_first = |alu| fixed(!bad(rd) && !rm_bad, Op::Alu { alu, sets, rd, rn: 15, operand });
     let sum = |alu| {
         let small = match operand {

@@ -77,7 +77,8 @@ fn miscellaneous(op: u32, top: u32, rd: u8, rn: u8, rm: u8) -> Decoded {
 }
 
 pub(super) fn multiply(first: u32, second: u32) -> Decoded {
-    let (rd, rn, rm, ra) = (register(second, 8), register(first, 0), register(second, 0), register(second, 12));
+    let (rd, rn, rm, ra) =
+        (register(second, 8), register(first, 0), register(second, 0), register(second, 12));
     let (upper, lower) = (second & 0x20 != 0, second & 0x10 != 0);
     if second & 0xc0 != 0 {
         return Err(Undecodable::Unknown);
@@ -104,7 +105,8 @@ pub(super) fn multiply(first: u32, second: u32) -> Decoded {
 }
 
 pub(super) fn long_multiply(first: u32, second: u32) -> Decoded {
-    let (high, rn, rm, low) = (register(second, 8), register(first, 0), register(second, 0), register(second, 12));
+    let (high, rn, rm, low) =
+        (register(second, 8), register(first, 0), register(second, 0), register(second, 12));
     let (upper, lower) = (second & 0x20 != 0, second & 0x10 != 0);
     let multiply = match (first >> 4 & 7, second >> 4 & 15) {
         (0, 0) => LongMultiply::Signed,

@@ -138,9 +138,8 @@ impl Machine {
 }
 
 fn extended(extend: Extend, base: u32, x: u32) -> u32 {
-    let halves = |low: u32, high: u32| {
-        base.wrapping_add(low) & 0xffff | (base >> 16).wrapping_add(high) << 16
-    };
+    let halves =
+        |low: u32, high: u32| base.wrapping_add(low) & 0xffff | (base >> 16).wrapping_add(high) << 16;
     match extend {
         Extend::SignedByte => base.wrapping_add(x as i8 as u32),
         Extend::SignedHalf => base.wrapping_add(x as i16 as u32),

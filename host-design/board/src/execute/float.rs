@@ -70,7 +70,9 @@ impl Machine {
 
     fn only_default_modes(&self) -> Done {
         if self.registers.fpscr & MODES != 0 {
-            return Err(Violation::NotModelled("floating point with other modes than the default ones").into());
+            return Err(
+                Violation::NotModelled("floating point with other modes than the default ones").into()
+            );
         }
         Ok(())
     }

@@ -125,8 +125,8 @@ pub(super) fn sqrt(x: u32, flags: &mut u32) -> u32 {
 /// a + x·y, rounded once.
 pub(super) fn fused(a: u32, x: u32, y: u32, flags: &mut u32) -> u32 {
     let result = value(x).mul_add(value(y), value(a));
-    let zero_times_infinity = (value(x) == 0.0 && value(y).is_infinite())
-        || (value(y) == 0.0 && value(x).is_infinite());
+    let zero_times_infinity =
+        (value(x) == 0.0 && value(y).is_infinite()) || (value(y) == 0.0 && value(x).is_infinite());
     if zero_times_infinity && is_nan(a) && !is_signalling(a) {
         *flags |= INVALID;
         return DEFAULT_NAN;
@@ -173,11 +173,8 @@ pub(super) fn to_fixed(x: u32, fraction: u8, signed: bool, bits: u32, to_zero: b
     }
     let scaled = wide(x) * (1u64 << fraction) as f64;
     let whole = if to_zero { scaled.trunc() } else { scaled.round_ties_even() };
-    let (low, high) = if signed {
-        (-(1i64 << (bits - 1)), (1i64 << (bits - 1)) - 1)
-    } else {
-        (0, (1i64 << bits) - 1)
-    };
+    let (low, high) =
+        if signed { (-(1i64 << (bits - 1)), (1i64 << (bits - 1)) - 1) } else { (0, (1i64 << bits) - 1) };
     // The conversion of the host saturates.
     let cut = (whole as i64).clamp(low, high);
     if whole < low as f64 || whole > high as f64 {
@@ -237,4 +234,3 @@ pub(super) fn to_half(x: u32, flags: &mut u32) -> u16 {
     let coded = if steps < 1024.0 { steps as u16 } else { ((exponent + 14) as u16) * 1024 + steps as u16 };
     sign | coded
 }
-

@@ -62,7 +62,7 @@ impl Machine {
             Multiply::Halves { first_top, second_top } => {
                 (half(x, first_top) * half(y, second_top) + signed_a, true)
             }
-            Multiply::WordByHalf { top } => ((i64::from(x as i32) * half(y, top) >> 16) + signed_a, true),
+            Multiply::WordByHalf { top } => (((i64::from(x as i32) * half(y, top)) >> 16) + signed_a, true),
             Multiply::DualAdd { exchange } => {
                 let (low, top) = products(x, y, exchange);
                 (low + top + signed_a, true)

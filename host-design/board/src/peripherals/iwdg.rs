@@ -88,14 +88,18 @@ impl Iwdg {
                 return Err(Violation::Forbidden("the watchdog's registers are locked (21.3.2)"));
             }
             (0x04, _) if self.prescaler_at != NEVER => {
-                return Err(Violation::Forbidden("the watchdog's prescaler is written while PVU is set (21.4.4)"));
+                return Err(Violation::Forbidden(
+                    "the watchdog's prescaler is written while PVU is set (21.4.4)",
+                ));
             }
             (0x04, value) => {
                 self.prescaler = value;
                 self.prescaler_at = now + UPDATE_PERIODS * self.lsi;
             }
             (_, _) if self.reload_at != NEVER => {
-                return Err(Violation::Forbidden("the watchdog's reload is written while RVU is set (21.4.4)"));
+                return Err(Violation::Forbidden(
+                    "the watchdog's reload is written while RVU is set (21.4.4)",
+                ));
             }
             (_, value) => {
                 self.reload = value;

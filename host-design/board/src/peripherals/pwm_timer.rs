@@ -265,13 +265,17 @@ impl PwmTimer {
         self.period_active + 1
     }
 
+    /// Lets time pass without a clock: the pin stays as it is.
+    pub(crate) fn stand_still(&mut self, now: Time) {
+        self.high += if self.level() { now - self.synced } else { 0 };
+        self.synced = now;
+    }
+
     /// Lets time pass; `tick` is the period of the timer's clock.
     pub(crate) fn advance(&mut self, now: Time, tick: Time) {
         while self.synced < now {
             if self.control & ENABLED == 0 {
-                self.high += if self.level() { now - self.synced } else { 0 };
-                self.synced = now;
-                return;
+                return self.stand_still(now);
             }
             let tick = tick * (Time::from(self.prescaler_active) + 1);
             let due = (now - self.synced) / tick;

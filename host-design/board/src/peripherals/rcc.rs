@@ -297,9 +297,8 @@ impl Rcc {
         self.control = self.control & 0xff02_ff02 | value & 0x150d_00f9 | self.control & 0x0a00_0000;
         if changed & HSE_ON != 0 {
             let bypassed = value & HSE_BYPASS != 0;
-            let swings = self.crystal.hz != 0
-                && !self.crystal_stopped
-                && bypassed == self.crystal.is_clock_input;
+            let swings =
+                self.crystal.hz != 0 && !self.crystal_stopped && bypassed == self.crystal.is_clock_input;
             let starts = value & HSE_ON != 0 && swings;
             self.hse_ready_at = if starts { now + self.crystal.start } else { NEVER };
         }

@@ -205,7 +205,9 @@ impl Usart {
             || asked(1 << 7, EMPTY)
             || asked(1 << 6, COMPLETE)
             || asked(1 << 4, IDLE)
-            || (self.control[2] & 1 != 0 && self.control[2] & 1 << 6 != 0 && self.status & (OVERRUN | FRAMING) != 0)
+            || (self.control[2] & 1 != 0
+                && self.control[2] & 1 << 6 != 0
+                && self.status & (OVERRUN | FRAMING) != 0)
     }
 
     /// Whether it asks the DMA to fetch a byte.

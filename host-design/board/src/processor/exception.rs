@@ -123,8 +123,7 @@ impl Machine {
                 let thread = !self.registers.handler_mode();
                 let user = !self.registers.privileged();
                 let keep = self.bus.system.fpccr & (AUTOMATIC | LAZY);
-                self.bus.system.fpccr =
-                    keep | LAZY_ACTIVE | u32::from(user) << 1 | u32::from(thread) << 3;
+                self.bus.system.fpccr = keep | LAZY_ACTIVE | u32::from(user) << 1 | u32::from(thread) << 3;
                 self.bus.system.fpcar = frame.wrapping_add(0x20);
             }
         }
@@ -177,13 +176,12 @@ impl Machine {
         }
         self.cycles += RETURN_CYCLES - 1;
         // Tail-chaining: the next handler takes the frame over.
-        if let Some((next, priority)) = self.bus.system.nvic.most_urgent() {
-            if priority < self.executing_priority() {
-                self.cycles = TAIL_CHAIN_CYCLES;
-                self.start_handler(next, code)?;
-                self.next = self.registers.pc;
-                return Ok(());
-            }
+        let next = self.bus.system.nvic.most_urgent();
+        if let Some((next, _)) = next.filter(|&(_, priority)| priority < self.executing_priority()) {
+            self.cycles = TAIL_CHAIN_CYCLES;
+            self.start_handler(next, code)?;
+            self.next = self.registers.pc;
+            return Ok(());
         }
         self.pop_frame(code, to_process)
     }
@@ -278,16 +276,16 @@ impl Machine {
     /// A fault while a frame is stacked.
     fn derived(&mut self, fault: Fault, bit: u32) -> Result<(), Violation> {
         self.bus.system.cfsr |= bit;
+        // HardFault and NMI begin without a frame: nothing could come before them, and it is no lock-up.
+        if matches!(usize::from(self.registers.ipsr), nvic::NMI | nvic::HARD_FAULT) {
+            return Ok(());
+        }
         let exception = match fault {
             Fault::MemoryData(_) => nvic::MEM_MANAGE,
             _ => nvic::BUS_FAULT,
         };
         let executing = self.executing_priority();
         let system = &mut self.bus.system;
-        if executing <= -1 {
-            self.locked_up = true;
-            return Ok(());
-        }
         let comes = system.nvic.enabled.has(exception) && system.nvic.preemption(exception) < executing;
         let exception = if comes {
             exception

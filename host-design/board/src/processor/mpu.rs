@@ -58,8 +58,8 @@ impl Mpu {
             return privileged && self.control & 4 != 0 && (purpose != Purpose::Execute || executable);
         };
         let (read, write) = match (region.attributes >> 24 & 7, privileged) {
-            (1 | 2 | 3, true) | (3, false) => (true, true),
-            (5 | 6 | 7, true) | (2 | 6 | 7, false) => (true, false),
+            (1..=3, true) | (3, false) => (true, true),
+            (5..=7, true) | (2 | 6 | 7, false) => (true, false),
             _ => (false, false),
         };
         match purpose {

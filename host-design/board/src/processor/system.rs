@@ -104,11 +104,6 @@ impl System {
         }
     }
 
-    /// SCR.SLEEPONEXIT or SLEEPDEEP, which are not modelled.
-    pub(crate) fn deep_sleep(&self) -> bool {
-        self.scr & 4 != 0
-    }
-
     /// When something happens here by itself.
     pub(crate) fn deadline(&self) -> Time {
         if self.systick.control & 1 != 0 && self.systick.reload != 0 { self.systick.zero_at } else { NEVER }
@@ -192,7 +187,11 @@ impl System {
         match address {
             0xe000_1000 | 0xe000_edfc => {
                 let base = self.cycle_count(now, hclk);
-                if address == 0xe000_1000 { self.dwt_control = 0x4000_0000 | value & 1 } else { self.demcr = value }
+                if address == 0xe000_1000 {
+                    self.dwt_control = 0x4000_0000 | value & 1
+                } else {
+                    self.demcr = value
+                }
                 self.cycles = Cycles { base, since: now };
             }
             0xe000_1004 => self.cycles = Cycles { base: value, since: now },
@@ -215,7 +214,8 @@ impl System {
             0xe000_e200..0xe000_e210 => self.nvic.pending.put_word(word(address), value, true),
             0xe000_e280..0xe000_e290 => {
                 self.nvic.pending.put_word(word(address), value, false);
-                let high = self.nvic.lines.word(word(address)) & value & !self.nvic.active.word(word(address));
+                let high =
+                    self.nvic.lines.word(word(address)) & value & !self.nvic.active.word(word(address));
                 self.nvic.pending.put_word(word(address), high, true);
             }
             0xe000_e400..0xe000_e464 => self.set_priorities(16 + (address - 0xe000_e400) as usize, value),
@@ -235,7 +235,9 @@ impl System {
             0xe000_ed20 => self.set_priorities(12, value),
             0xe000_ed24 => {
                 self.shcsr = value & 7 << 16;
-                for (bit, exception) in [(16, nvic::MEM_MANAGE), (17, nvic::BUS_FAULT), (18, nvic::USAGE_FAULT)] {
+                for (bit, exception) in
+                    [(16, nvic::MEM_MANAGE), (17, nvic::BUS_FAULT), (18, nvic::USAGE_FAULT)]
+                {
                     self.nvic.enabled.put(exception, value >> bit & 1 != 0);
                 }
             }

@@ -114,9 +114,7 @@ impl Machine {
                 Op::Load { rt, rn, place: crate::instruction::Place::Offset(_), .. } => {
                     rt != counter && rn != counter
                 }
-                Op::Alu { rd, rn, operand, .. } => {
-                    rd != counter && rn != counter && !uses(operand, counter)
-                }
+                Op::Alu { rd, rn, operand, .. } => rd != counter && rn != counter && !uses(operand, counter),
                 Op::Compare { rn, operand, .. } => rn != counter && !uses(operand, counter),
                 Op::Branch { .. } | Op::BranchIf { .. } | Op::Nop | Op::It(_) => true,
                 Op::BranchZero { rn, .. } => rn != counter,

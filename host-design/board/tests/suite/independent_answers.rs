@@ -120,7 +120,16 @@ impl Iterator for Cases<'_> {
         let seed = u32::from_le_bytes(self.bytes());
         let changes = (0..self.byte()).map(|_| (self.byte(), u32::from_le_bytes(self.bytes()))).collect();
         let writes = (0..self.byte()).map(|_| (u16::from_le_bytes(self.bytes()), self.byte())).collect();
-        Some(Case { code, count, kind: kind & 0x7f, index, seed, changes, writes, in_image: kind & 0x80 != 0 })
+        Some(Case {
+            code,
+            count,
+            kind: kind & 0x7f,
+            index,
+            seed,
+            changes,
+            writes,
+            in_image: kind & 0x80 != 0,
+        })
     }
 }
 
@@ -160,7 +169,9 @@ fn disagreement(stepper: &mut Stepper, memory: &[u8], case: &Case) -> Option<Str
     stepper.write(CODE, &memory[place..place + case.code.len()]);
     let wanted: BTreeMap<u16, u8> = case.writes.iter().copied().collect();
     let left = stepper.read(SRAM, SIZE);
-    let wrong = (0u16..).zip(left.iter().zip(memory)).any(|(at, (&now, &old))| now != *wanted.get(&at).unwrap_or(&old));
+    let wrong = (0u16..)
+        .zip(left.iter().zip(memory))
+        .any(|(at, (&now, &old))| now != *wanted.get(&at).unwrap_or(&old));
     if wrong || !case.writes.is_empty() {
         stepper.write(SRAM, memory);
     }

@@ -19,3 +19,4 @@ mod report_page;
 mod report_rigs;
 mod reproduce_numbers;
 mod verify_command;
+mod virtual_board;
