@@ -1,4 +1,7 @@
-//! Runs an image with fixed encoder counts and closed contacts: `run_image FILE SECONDS [strict|noted|lost]`.
+//! Runs an image with fixed encoder counts and closed contacts: `run_image FILE SECONDS [NAME[=VALUE]]…`.
+//!
+//! Names: `strict` or `lost` (early writes are lost); `crystal=HZ` (0: none); `lsi=HZ`; `stop-crystal=SECONDS`;
+//! `open=SECONDS` (emergency stop); `no-skip` (execute waiting loops).
 
 use std::time::Instant;
 
@@ -7,13 +10,28 @@ use upright_board::{Board, Conditions, Image, Input, Rules, Wire, Wiring, pin, s
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let arguments: Vec<String> = std::env::args().collect();
     let image = Image::from_elf(&std::fs::read(&arguments[1])?)?;
-    let rules = match arguments.get(3).map(String::as_str) {
-        Some("strict") => Rules::STRICT,
-        Some("lost") => Rules { early_is_lost: true, ..Rules::NOTED },
+    let value = |name: &str| {
+        let options = arguments.iter().skip(3).filter_map(|option| option.split_once('='));
+        options.clone().find(|(known, _)| *known == name).and_then(|(_, value)| value.parse::<f64>().ok())
+    };
+    let has = |name: &str| arguments.iter().any(|option| option == name);
+    let rules = match (has("strict"), has("lost")) {
+        (true, _) => Rules::STRICT,
+        (_, true) => Rules { early_is_lost: true, ..Rules::NOTED },
         _ => Rules::NOTED,
     };
+    let mut conditions = Conditions::f405(1);
+    conditions.crystal.hz = value("crystal").map_or(8_000_000, |hz| hz as u32);
+    conditions.lsi_hz = value("lsi").map_or(32_000, |hz| hz as u32);
     let begin = Instant::now();
-    let mut board = Board::power_on(&image, &Conditions::f405(1), Wiring::upright(), rules)?;
+    let mut board = Board::power_on(&image, &conditions, Wiring::upright(), rules)?;
+    board.skip_waiting(!has("no-skip"));
+    if let Some(at) = value("stop-crystal") {
+        board.at(seconds(at), Input::StopCrystal);
+    }
+    if let Some(at) = value("open") {
+        board.at(seconds(at), Input::Level(pin('B', 12), Wire::Open));
+    }
     for contact in [pin('B', 12), pin('C', 0), pin('C', 1)] {
         board.apply(Input::Level(contact, Wire::Low));
     }

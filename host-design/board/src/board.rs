@@ -160,12 +160,7 @@ impl Board {
                 }
             }
             Input::ChipSupply(volts) => self.set_chip_supply(volts),
-            Input::Encoder { encoder, position, end } => {
-                let now = bus.now;
-                if let Some(shaft) = bus.shafts.get_mut(encoder) {
-                    shaft.turn(position, now, end.max(now));
-                }
-            }
+            Input::Encoder { encoder, position, end } => bus.turn_encoder(encoder, position, end),
             Input::StopCrystal => bus.stop_crystal(),
             Input::Reset(low) => self.hold(low, 0),
             Input::LoseWrite(register) => bus.lost_write = Some(register),
@@ -327,7 +322,7 @@ impl Board {
         (bus.usart.overruns, bus.encoders.iter().map(|encoder| encoder.lost).sum())
     }
 
-    /// Whether waiting loops are skipped ahead (they are, unless told otherwise): it must make no difference but speed.
+    /// Whether waiting loops are skipped ahead (they are, unless told otherwise); it makes no difference but speed.
     pub fn skip_waiting(&mut self, skip: bool) {
         self.machine.skips = skip;
     }

@@ -120,8 +120,8 @@ pub struct Rules {
     pub early: Rule,
     /// With `early` noted: whether a write that comes too early is lost.
     pub early_is_lost: bool,
-    /// Unaligned accesses of one register to memory: the processor splits them, and compilers make use of that. All others
-    /// (to registers, of several words) end the run or fault.
+    /// Unaligned accesses of one register to memory: the processor splits them, and compilers make use of that. All
+    /// others (to peripherals, of several words) end the run or fault.
     pub unaligned: Rule,
     /// Whether unmapped accesses, unknown instructions and UDF raise the processor's faults instead of ending the run.
     pub faults_are_taken: bool,

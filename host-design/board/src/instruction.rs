@@ -1,7 +1,7 @@
 //! Instructions as the decoder gives them and the processor executes them.
 //!
-//! Names and operands follow the ARMv7-M Architecture Reference Manual (DDI 0403), chapter A7. Addresses that depend on
-//! the program counter alone are computed by the decoder.
+//! Names and operands follow the ARMv7-M Architecture Reference Manual (DDI 0403), chapter A7. The decoder computes
+//! addresses that depend on the program counter alone.
 
 /// Whether an instruction sets the flags.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -1,7 +1,8 @@
 //! A virtual board with an STM32F405, STM32F407 or STM32F446: it runs the very ELF file that is flashed.
 //!
-//! A [`Board`] interprets the image's instructions against models of the registers that the firmware uses. It is strict:
-//! what the manuals do not allow, or what is not modelled, ends the run with a [`Stopped`] that says where and why.
+//! A [`Board`] interprets the image's instructions against models of the registers that the firmware uses. It is
+//! strict: what the manuals do not allow, or what is not modelled, ends the run with a [`Stopped`] that says where and
+//! why.
 //! Inputs are edges, levels, volts and bytes at their baud rate; the output is what the pins do.
 //!
 //! ```no_run
@@ -16,9 +17,25 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!
+//! # What is modelled
+//! | what | section (RM0090) |
+//! |---|---|
+//! | ARMv7E-M with FPv4-SP, exceptions, lazy stacking, MPU, SysTick, NVIC, DWT cycle counter | ARM DDI 0403 |
+//! | clock tree, clock security, reset flags, delays after enabling | 7.3; ES0182 2.1.13 |
+//! | flash wait states, approximate accelerator; option bytes are read as delivered | 3.5, 3.9 |
+//! | ports, external interrupts 0 to 15 and 16 (voltage detector) | 8.4, 12.3 |
+//! | TIM1 channel 1: one pulse, repetition, preload, PWM, break, lock | 17.4 |
+//! | TIM2 to 5, TIM8: encoder mode 3 with filter | 18.4 |
+//! | TIM11: HSE against HSI | 19.5 |
+//! | ADC1, single conversions; USART2; DMA1 between USART2 and SRAM; IWDG; PWR | 13.13, 30.6, 10.5, 21.4, 5.4 |
+//!
+//! Not modelled, and an error if used: every other peripheral, other modes of these, rounding modes other than to
+//! nearest, sleep deeper than WFI, bit-banding, writing flash. Brown-out levels above the power-down threshold, the
+//! rise time of pull-ups and the over-drive of the F446 are not modelled either.
+//!
 //! # What is approximate
-//! Cycles (see `execute`): ARM's table with the flash accelerator looked up by address. DWT_CYCCNT counts during WFI,
-//! too. What is exact: every value, every flag, every exception, for given inputs and given times.
+//! Cycles: ARM's table, with the flash accelerator looked up by address. DWT_CYCCNT counts during WFI, too. What is
+//! exact: every value, every flag, every exception, for given inputs at given times.
 
 #![forbid(unsafe_code)]
 

@@ -22,6 +22,17 @@ impl Bus {
         (shaft, tick)
     }
 
+    /// An encoder turns to `position` until `end`, after all counters have seen where it was.
+    pub(crate) fn turn_encoder(&mut self, encoder: usize, position: i64, end: Time) {
+        for timer in 0..self.encoders.len() {
+            let (shaft, tick) = self.encoder_route(timer);
+            self.encoders[timer].read(0x24, shaft.as_ref(), self.now, tick);
+        }
+        if let Some(shaft) = self.shafts.get_mut(encoder) {
+            shaft.turn(position, self.now, end.max(self.now));
+        }
+    }
+
     fn is_alternate(&self, pin: Pin, function: u32) -> bool {
         self.ports[pin.port].is_alternate(pin.number, function)
     }

@@ -1,8 +1,8 @@
 //! What instructions do (ARMv7-M Architecture Reference Manual, A7.7), and their cycles.
 //!
-//! Cycles follow the table of the Cortex-M4 Technical Reference Manual (DDI 0439, 3.3) with single-cycle stores (the
-//! write buffer), two cycles for refilling the pipeline, and the flash accelerator of [`crate::processor::flash_cache`].
-//! They are approximate: overlaps between neighbours are modelled for loads alone.
+//! Cycles follow the table of the Cortex-M4 Technical Reference Manual (DDI 0439, 3.3), with single-cycle stores (the
+//! write buffer), two cycles for refilling the pipeline, and the flash accelerator of
+//! [`crate::processor::flash_cache`]. They are approximate: overlaps are modelled for loads alone.
 
 mod arithmetic;
 mod data;

@@ -28,9 +28,9 @@ impl Shaft {
         self.from + (i128::from(self.to - self.from) * elapsed / span) as i64
     }
 
-    /// Time between two edges; `None` at rest.
+    /// Time between two edges; `None` at rest, and for a shaft that is put somewhere at once.
     fn spacing(&self) -> Option<Time> {
-        let edges = (self.to - self.from).unsigned_abs();
+        let edges = if self.end > self.begin { (self.to - self.from).unsigned_abs() } else { 0 };
         (self.end - self.begin).checked_div(edges)
     }
 }
@@ -129,7 +129,7 @@ impl EncoderTimer {
         if self.control & 1 == 0 || self.slave != 3 || self.inputs == 0 || moved == 0 {
             return;
         }
-        if shaft.spacing().is_some_and(|spacing| now < shaft.end && 2 * spacing < delay) {
+        if shaft.spacing().is_some_and(|spacing| 2 * spacing < delay) {
             self.lost += moved.unsigned_abs();
             return;
         }

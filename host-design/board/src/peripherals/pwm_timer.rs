@@ -1,4 +1,4 @@
-//! Timer 1, channel 1 (RM0090, 17.4): PWM in one-pulse mode with repetition counter, break input, and what its pin does.
+//! Timer 1, channel 1 (RM0090, 17.4): PWM in one-pulse mode with repetition counter, break input, and its pin.
 
 use super::Bits;
 use crate::clock::Time;

@@ -1,7 +1,7 @@
 //! The flash accelerator (RM0090, 3.4.2), approximately: 64 instruction lines and 8 data lines of 128 bits.
 //!
-//! Lines that are fetched in sequence come from the prefetch unit and cost nothing; a jump to a line that is in no cache
-//! costs the wait states. Both caches are looked up by the line's address, not by age.
+//! Lines that are fetched in sequence come from the prefetch unit and cost nothing; a jump to a line that is in no
+//! cache costs the wait states. Both caches are looked up by the line's address, not by age.
 
 /// Lines by their number.
 #[derive(Debug, Clone)]

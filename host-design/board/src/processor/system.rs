@@ -1,4 +1,4 @@
-//! The system control space: SysTick, NVIC, SCB, MPU, FPU control, DWT (ARMv7-M Architecture Reference Manual, B3, C1).
+//! The system control space: SysTick, NVIC, SCB, MPU, FPU control, DWT (ARMv7-M reference manual, B3 and C1).
 
 use super::mpu::Mpu;
 use super::nvic::{self, Nvic};

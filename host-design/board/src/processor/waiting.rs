@@ -1,8 +1,8 @@
 //! Waiting loops, skipped ahead without changing what happens.
 //!
 //! A loop that stores nothing, reads nothing that changes by itself before the next deadline, and comes round with the
-//! same registers does the same thing until that deadline. One register may count down by a constant per turn, if the loop
-//! uses it for nothing else than one subtraction of that constant: then the flags stay the same until it comes near zero.
+//! same registers does the same thing until that deadline. One register may count down by a constant per turn, if the
+//! loop uses it for one subtraction of that constant alone: then the flags stay the same until it comes near zero.
 
 use crate::clock::Time;
 use crate::instruction::{Alu, Op, Operand};

@@ -207,6 +207,8 @@ fn encoders_count_and_the_filter_swallows_what_is_too_fast() {
     };
     assert_eq!(turned(5, 100 * US, 200 * US), (5, 0));
     assert_eq!(turned(-5, 100 * US, 200 * US), (0xfffb, 0));
+    // An edge every 100 ns: a level stays for 200 ns, and the filter wants eight samples, 500 ns.
+    assert_eq!(turned(1_000, 100 * US, 200 * US), (0, 1_000));
 }
 
 #[test]

@@ -32,8 +32,8 @@ struct OnTheBoard {
 
 impl OnTheBoard {
     fn power_on(image: &Image, rig: &Rig) -> Self {
-        let mut board =
-            Board::power_on(image, &Conditions::f405(1), Wiring::upright(), Rules::NOTED).expect("good vectors");
+        let mut board = Board::power_on(image, &Conditions::f405(1), Wiring::upright(), Rules::NOTED)
+            .expect("good vectors");
         for contact in [pin('B', 12), pin('C', 0), pin('C', 1)] {
             board.apply(Input::Level(contact, Wire::Low));
         }
