@@ -24,7 +24,10 @@ impl Shaft {
         if now >= self.end {
             return self.to;
         }
-        let (elapsed, span) = (now.saturating_sub(self.begin) as i128, (self.end - self.begin) as i128);
+        if now <= self.begin {
+            return self.from;
+        }
+        let (elapsed, span) = ((now - self.begin) as i128, (self.end - self.begin) as i128);
         self.from + (i128::from(self.to - self.from) * elapsed / span) as i64
     }
 

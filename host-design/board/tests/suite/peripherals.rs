@@ -157,6 +157,35 @@ fn bytes_take_their_time_both_ways_and_overruns_lose() {
 }
 
 #[test]
+fn skipped_waiting_loops_make_no_difference() {
+    // r3 = 2500; loop: r3 -= 1, r2 = SR << 24 (TXE to N), again while TXE is clear; then a byte, and all again.
+    let main = serial().set(0, USART2).raw(&[
+        0x2455,
+        0xf640,
+        0x13c4,
+        0x3b01,
+        0x8802,
+        0x0612,
+        0xd5fb,
+        0x6044,
+        0xe7f7,
+    ]);
+    let mut skipping = board(&main, &[], Rules::STRICT);
+    let mut executing = board(&main, &[], Rules::STRICT);
+    executing.skip_waiting(false);
+    for i in 1..400 {
+        skipping.run_until(i * 13 * US + i % 7).unwrap();
+        executing.run_until(i * 13 * US + i % 7).unwrap();
+        assert_eq!(skipping.registers(), executing.registers(), "{i}");
+        assert_eq!(skipping.instructions().0, executing.instructions().0, "{i}");
+        assert_eq!(skipping.now(), executing.now(), "{i}");
+        assert_eq!(skipping.sent(), executing.sent(), "{i}");
+    }
+    assert!(skipping.instructions().1 > skipping.instructions().0 / 2, "{:?}", skipping.instructions());
+    assert_eq!(executing.instructions().1, 0);
+}
+
+#[test]
 fn received_bytes_interrupt() {
     let handler =
         Code::new().read(USART2).read(USART2 + 4).set(0, LOG + 16).raw(&[0x6803, 0x18d2, 0x6002, RETURN]);
@@ -207,6 +236,8 @@ fn encoders_count_and_the_filter_swallows_what_is_too_fast() {
     };
     assert_eq!(turned(5, 100 * US, 200 * US), (5, 0));
     assert_eq!(turned(-5, 100 * US, 200 * US), (0xfffb, 0));
+    // At once, as a test may put it.
+    assert_eq!(turned(7, 100 * US, 100 * US), (7, 0));
     // An edge every 100 ns: a level stays for 200 ns, and the filter wants eight samples, 500 ns.
     assert_eq!(turned(1_000, 100 * US, 200 * US), (0, 1_000));
 }
