@@ -8,8 +8,9 @@ use upright::supervision::sign_check::Signs;
 use upright::supervision::supervisor::State;
 use upright::table::Law;
 use upright_board::{Board, Conditions, Image, Input, Rules, Time, Wire, Wiring, pin, seconds};
+use upright_design::harness::{Hand, Status};
 use upright_design::rig::Rig;
-use upright_design::simulate::{Bench, Hand, Scenario, Seen};
+use upright_design::simulate::{Bench, Scenario};
 use upright_tool::image::{Kind, build_if_possible};
 
 const BAUD: u32 = 460_800;
@@ -103,11 +104,11 @@ impl OnTheBoard {
     /// A tick with the hand, until the motor is on.
     fn by_hand(&mut self) {
         let _ = self.step();
-        let seen = self.telemetry.as_ref().map_or(
-            Seen { state: State::Disarmed, signs: Signs::Unchecked },
-            |telemetry| Seen { state: telemetry.state, signs: telemetry.signs },
+        let status = self.telemetry.as_ref().map_or(
+            Status { state: State::Disarmed, signs: Signs::Unchecked },
+            |telemetry| Status { state: telemetry.state, signs: telemetry.signs },
         );
-        if let Some(act) = self.hand.act(self.number, &seen) {
+        if let Some(act) = self.hand.act(self.number, &status) {
             self.bench.hold(&act.held);
             if let Some(request) = act.request {
                 self.ask(request);
