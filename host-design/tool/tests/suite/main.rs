@@ -10,6 +10,7 @@ mod image;
 mod monitor;
 mod observer_design;
 mod paper;
+#[path = "../../../design/tests/suite/published/mod.rs"]
 mod published;
 mod report_browser;
 mod report_command;
