@@ -12,6 +12,7 @@
 //! | [`table`] | gains and limits | the gain table of the firmware, as values and as Rust source |
 //! | [`simulate`] | table and scenario | a run of the firmware's controller against the nonlinear plant |
 //! | [`harness`] | a target and a scenario | a run of the whole firmware, from power-up on |
+//! | [`swing_up`] | rig file | motions from hanging to upright and back, with their gains |
 //! | [`verify`] | table and requirements | the trust report |
 //!
 //! The control law itself is not here: a simulation runs the firmware's own controller from the crate `upright`.
@@ -25,5 +26,6 @@ pub mod numerics;
 pub mod plant;
 pub mod rig;
 pub mod simulate;
+pub mod swing_up;
 pub mod table;
 pub mod verify;
