@@ -10,13 +10,10 @@ use crate::image::Image;
 use crate::instruction::Unit;
 use crate::machine::Machine;
 use crate::peripherals::gpio::Wire;
+use crate::peripherals::power::{BrownOut, POWER_DOWN_V};
 use crate::peripherals::rcc::{BROWN_OUT_FLAG, Crystal, PIN_FLAG, POWER_FLAG};
 use crate::peripherals::usart::LineByte;
 use crate::wiring::{Pin, Wiring};
-
-/// Below it the chip is in reset, and above the other it leaves it (V; datasheet, VPDR and VPOR).
-const POWER_DOWN_V: f32 = 1.68;
-const POWER_UP_V: f32 = 1.72;
 
 /// What can happen to a board.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -40,6 +37,8 @@ pub enum Input {
     StopCrystal,
     /// The reset pin is held low, or let go.
     Reset(bool),
+    /// A debugger halts the core, or lets it go on.
+    Halt(bool),
     /// The next write to this register is lost.
     LoseWrite(u32),
     /// A bit of memory (flash, SRAM) changes.
@@ -80,18 +79,26 @@ pub struct Board {
     scheduled: BTreeMap<(Time, u64), Input>,
     order: u64,
     line_free_at: Time,
+    /// The chip's supply was below the power-down threshold.
+    power_lost: bool,
 }
 
 impl Conditions {
     /// An STM32F405 with a crystal of 8 MHz, everything as it typically is.
     pub fn f405(seed: u64) -> Self {
+        Self::typical(Chip::F405, seed)
+    }
+
+    /// A chip with a crystal of 8 MHz, everything as it typically is.
+    pub fn typical(chip: Chip, seed: u64) -> Self {
         Self {
-            chip: Chip::F405,
+            chip,
             crystal: Crystal { hz: 8_000_000, start: 2_000 * UNITS_PER_MICROSECOND, is_clock_input: false },
             hsi_hz: 16_000_000,
             lsi_hz: 32_000,
             seed,
             chip_v: 3.3,
+            brown_out: BrownOut::Off,
         }
     }
 }
@@ -116,7 +123,7 @@ impl Board {
         machine.resets = 0;
         let stopped = |violation| Stopped { violation, program_counter: 0, time: 0 };
         started.map_err(stopped)?;
-        Ok(Self { machine, scheduled: BTreeMap::new(), order: 0, line_free_at: 0 })
+        Ok(Self { machine, scheduled: BTreeMap::new(), order: 0, line_free_at: 0, power_lost: false })
     }
 
     /// Time since power-on.
@@ -163,6 +170,7 @@ impl Board {
             Input::Encoder { encoder, position, end } => bus.turn_encoder(encoder, position, end),
             Input::StopCrystal => bus.stop_crystal(),
             Input::Reset(low) => self.hold(low, 0),
+            Input::Halt(halted) => bus.halt(halted),
             Input::LoseWrite(register) => bus.lost_write = Some(register),
             Input::FlipBit { address, bit } => self.flip(address, bit),
             Input::IgnoreWatchdog => bus.iwdg.ignored = true,
@@ -172,15 +180,18 @@ impl Board {
     }
 
     fn set_chip_supply(&mut self, volts: f32) {
+        self.power_lost |= volts < POWER_DOWN_V;
         let bus = &mut self.machine.bus;
         bus.power.volts = volts;
         bus.adc.inputs[17] = 1.21 / volts.max(0.1);
         bus.supply_changed();
         bus.refresh();
-        if volts < POWER_DOWN_V && !self.machine.held {
+        let (down_v, up_v) = bus.power.brown_out.thresholds_v();
+        if volts < down_v && !self.machine.held {
             self.hold(true, 0);
-        } else if volts > POWER_UP_V && self.machine.held {
-            self.hold(false, POWER_FLAG | BROWN_OUT_FLAG);
+        } else if volts > up_v && self.machine.held {
+            let power = if std::mem::take(&mut self.power_lost) { POWER_FLAG } else { 0 };
+            self.hold(false, power | BROWN_OUT_FLAG);
         }
     }
 

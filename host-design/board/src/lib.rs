@@ -22,16 +22,18 @@
 //! |---|---|
 //! | ARMv7E-M with FPv4-SP, exceptions, lazy stacking, MPU, SysTick, NVIC, DWT cycle counter | ARM DDI 0403 |
 //! | clock tree, clock security, reset flags, delays after enabling | 7.3; ES0182 2.1.13 |
-//! | flash wait states, approximate accelerator; option bytes are read as delivered | 3.5, 3.9 |
+//! | flash wait states by supply, approximate accelerator; option bytes are read | 3.5, 3.9 |
 //! | ports, external interrupts 0 to 15 and 16 (voltage detector) | 8.4, 12.3 |
 //! | TIM1 channel 1: one pulse, repetition, preload, PWM, break, lock | 17.4 |
 //! | TIM2 to 5, TIM8: encoder mode 3 with filter | 18.4 |
 //! | TIM11: HSE against HSI | 19.5 |
-//! | ADC1, single conversions; USART2; DMA1 between USART2 and SRAM; IWDG; PWR | 13.13, 30.6, 10.5, 21.4, 5.4 |
+//! | ADC1, single conversions; USART2; DMA1 between USART2 and SRAM; IWDG | 13.13, 30.6, 10.5, 21.4 |
+//! | PWR with the voltage detector; brown-out reset at the level of the option bytes | 5.2.2, 5.4 |
+//! | DBGMCU: identity, and the watchdog while a debugger halts the core | 38.6, 38.16 |
 //!
 //! Not modelled, and an error if used: every other peripheral, other modes of these, rounding modes other than to
-//! nearest, sleep deeper than WFI, bit-banding, writing flash. Brown-out levels above the power-down threshold, the
-//! rise time of pull-ups and the over-drive of the F446 are not modelled either.
+//! nearest, sleep deeper than WFI, bit-banding, writing flash. The rise time of pull-ups, the over-drive of the F446, and
+//! what a supply that is too low for the clock does to the core are not modelled either.
 //!
 //! # What is approximate
 //! Cycles: ARM's table, with the flash accelerator looked up by address. DWT_CYCCNT counts during WFI, too. What is
@@ -61,6 +63,7 @@ pub use clock::{Time, UNITS_PER_MICROSECOND, UNITS_PER_SECOND, seconds};
 pub use error::{Note, Rule, Rules, Stopped, Violation};
 pub use image::{Image, ImageError};
 pub use peripherals::gpio::Wire;
+pub use peripherals::power::BrownOut;
 pub use peripherals::rcc::Crystal;
 pub use peripherals::usart::LineByte;
 pub use wiring::{Pin, Wiring, pin};

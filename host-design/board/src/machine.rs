@@ -115,7 +115,7 @@ impl Machine {
                 self.bus.reset(flag);
                 self.reset()?;
             }
-            if self.held || self.locked_up || self.bus.rcc.stopped {
+            if self.held || self.locked_up || self.bus.rcc.stopped || self.bus.debug_freeze.halted {
                 self.bus.now = self.idle_until(end);
                 continue;
             }

@@ -57,17 +57,26 @@ impl Wiring {
     }
 }
 
-/// Timers in encoder mode: base address, channels 1 and 2, alternate function (datasheet, alternate function mapping).
-pub(crate) const ENCODER_ROUTES: [(usize, Pin, Pin, u32); 9] = [
-    (0, pin('A', 15), pin('B', 3), 1),
-    (0, pin('A', 5), pin('A', 1), 1),
-    (1, pin('B', 4), pin('B', 5), 2),
-    (1, pin('A', 6), pin('A', 7), 2),
-    (1, pin('C', 6), pin('C', 7), 2),
-    (2, pin('B', 6), pin('B', 7), 2),
-    (2, pin('D', 12), pin('D', 13), 2),
-    (3, pin('A', 0), pin('A', 1), 2),
-    (4, pin('C', 6), pin('C', 7), 3),
+/// Inputs of the timers in encoder mode: timer, channel (0 or 1), pin, alternate function (datasheet, alternate function
+/// mapping).
+pub(crate) const ENCODER_INPUTS: [(usize, usize, Pin, u32); 17] = [
+    (0, 0, pin('A', 15), 1),
+    (0, 0, pin('A', 0), 1),
+    (0, 0, pin('A', 5), 1),
+    (0, 1, pin('B', 3), 1),
+    (0, 1, pin('A', 1), 1),
+    (1, 0, pin('B', 4), 2),
+    (1, 0, pin('A', 6), 2),
+    (1, 0, pin('C', 6), 2),
+    (1, 1, pin('B', 5), 2),
+    (1, 1, pin('A', 7), 2),
+    (1, 1, pin('C', 7), 2),
+    (2, 0, pin('B', 6), 2),
+    (2, 1, pin('B', 7), 2),
+    (3, 0, pin('A', 0), 2),
+    (3, 1, pin('A', 1), 2),
+    (4, 0, pin('C', 6), 3),
+    (4, 1, pin('C', 7), 3),
 ];
 
 /// Break inputs of TIM1, all with alternate function 1.

@@ -70,7 +70,7 @@ impl Bus {
     /// The unique number, the flash size and VREFIN_CAL (RM0090, 39; datasheet, internal reference voltage).
     fn identity(&self, address: u32, unit: Unit) -> Option<u32> {
         let mut data = [0u8; 0x40];
-        data[0x10..0x1c].copy_from_slice(b"\x2a\0\x31\0\x0c51337138");
+        data[0x10..0x1c].copy_from_slice(b"\x2a\0\x31\0\x0c5133713");
         data[0x22..0x24].copy_from_slice(&((self.chip.flash_bytes() >> 10) as u16).to_le_bytes());
         // 1.21 V of 3.3 V in 12 bits.
         data[0x2a..0x2c].copy_from_slice(&1502u16.to_le_bytes());

@@ -14,7 +14,7 @@ use crate::peripherals::encoder_timer::{EncoderTimer, Shaft};
 use crate::peripherals::exti::Exti;
 use crate::peripherals::gpio::Port;
 use crate::peripherals::iwdg::Iwdg;
-use crate::peripherals::power::Power;
+use crate::peripherals::power::{BrownOut, Power};
 use crate::peripherals::pwm_timer::PwmTimer;
 use crate::peripherals::rcc::{Crystal, Rcc};
 use crate::peripherals::usart::Usart;
@@ -53,7 +53,21 @@ pub struct Conditions {
     pub seed: u64,
     /// Supply of the chip (V).
     pub chip_v: f32,
+    /// The brown-out level in the option bytes.
+    pub brown_out: BrownOut,
 }
+
+/// What the debugger freezes with the core (DBGMCU; RM0090, 38.16).
+#[derive(Debug, Clone, Copy, Default)]
+pub(crate) struct DebugFreeze {
+    /// CR, APB1_FZ and APB2_FZ.
+    registers: [u32; 3],
+    /// The debugger has halted the core.
+    pub(crate) halted: bool,
+}
+
+/// DBG_IWDG_STOP
+const FREEZES_WATCHDOG: u32 = 1 << 12;
 
 /// Memory, peripherals and time.
 #[derive(Debug, Clone)]
@@ -80,7 +94,7 @@ pub(crate) struct Bus {
     pub(crate) system: System,
     pub(crate) rcc: Rcc,
     flash_control: u32,
-    debug_freeze: [u32; 3],
+    pub(crate) debug_freeze: DebugFreeze,
     pub(crate) ports: Vec<Port>,
     pub(crate) exti: Exti,
     pub(crate) pwm: PwmTimer,
@@ -139,7 +153,7 @@ impl Bus {
             system: System::new(),
             rcc,
             flash_control: 0,
-            debug_freeze: [0; 3],
+            debug_freeze: DebugFreeze::default(),
             ports: (0..PORTS as u8).map(|i| Port::new(b'A' + i)).collect(),
             exti: Exti::default(),
             pwm: PwmTimer::new(),
@@ -150,7 +164,7 @@ impl Bus {
             usart: Usart::new(),
             dma: Dma::default(),
             iwdg: Iwdg::new(conditions.lsi_hz),
-            power: Power::new(conditions.chip_v),
+            power: Power::new(chip, conditions.chip_v, conditions.brown_out),
             driven: Driven::default(),
             driven_until: 0,
             watchdog_reset: false,
@@ -176,7 +190,8 @@ impl Bus {
         self.usart.reset();
         self.dma = Dma::default();
         self.iwdg.reset();
-        self.power = Power::new(self.power.volts);
+        self.power.reset();
+        self.debug_freeze = DebugFreeze { halted: self.debug_freeze.halted, ..DebugFreeze::default() };
         self.watchdog_reset = false;
         self.hclk = self.rcc.hclk();
         self.levels_changed();
@@ -210,6 +225,14 @@ impl Bus {
             None => self.notes.push(Note { stopped, count: 1 }),
         }
         Ok(())
+    }
+
+    /// The debugger halts the core, or lets it go on: its tick's timer stands still, the watchdog if it is told to.
+    pub(crate) fn halt(&mut self, halted: bool) {
+        self.debug_freeze.halted = halted;
+        self.system.freeze(halted, self.now);
+        self.iwdg.freeze(halted && self.debug_freeze.registers[1] & FREEZES_WATCHDOG != 0, self.now);
+        self.refresh();
     }
 
     /// Address of an exception's handler.

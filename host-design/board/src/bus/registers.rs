@@ -8,7 +8,6 @@ use crate::peripherals::capture_timer::CaptureTimer;
 use crate::peripherals::dma::Dma;
 use crate::peripherals::exti::Exti;
 use crate::peripherals::iwdg::Iwdg;
-use crate::peripherals::power::Power;
 use crate::peripherals::rcc::Domain;
 use crate::peripherals::usart::Usart;
 
@@ -186,7 +185,7 @@ impl Bus {
             Place::Encoder(i) => self.encoders[i].bits(offset),
             Place::Iwdg => Iwdg::bits(offset),
             Place::Usart => Usart::bits(offset),
-            Place::Power => Power::bits(offset),
+            Place::Power => self.power.bits(offset),
             Place::Pwm => self.pwm.bits(offset),
             Place::Adc => Adc::bits(offset),
             Place::Syscfg => Exti::configuration_bits(offset),
@@ -255,11 +254,10 @@ impl Bus {
             }
             Place::Rcc => self.rcc.read(offset),
             Place::Flash if offset == 0 => self.flash_control,
-            // As delivered: no protection, no brown-out reset.
-            Place::Flash => 0x0fff_aaed,
+            Place::Flash => self.power.brown_out.option_control(),
             Place::Dma => self.dma.read(offset),
             Place::Debug if offset == 0 => self.chip.identity(),
-            Place::Debug => self.debug_freeze[offset as usize / 4 - 1],
+            Place::Debug => self.debug_freeze.registers[offset as usize / 4 - 1],
         }
     }
 
@@ -320,7 +318,10 @@ impl Bus {
                 Ok(())
             }
             Place::Debug => {
-                self.debug_freeze[offset as usize / 4 - 1] = value;
+                if offset >= 8 && value & !super::FREEZES_WATCHDOG != 0 {
+                    return Err(Violation::NotModelled("freezing another timer than the watchdog"));
+                }
+                self.debug_freeze.registers[offset as usize / 4 - 1] = value;
                 Ok(())
             }
         }
@@ -334,10 +335,10 @@ impl Bus {
         }
     }
 
-    /// One wait state for each 30 MHz at 2.7 V and more (3.5.1).
+    /// One wait state for each 30 MHz at 2.7 V and more, for less below (3.5.1).
     pub(crate) fn check_wait_states(&self) -> Result<(), Violation> {
         let hz = crate::clock::frequency(self.rcc.hclk());
-        let needed = hz.saturating_sub(1) / 30_000_000;
+        let needed = hz.saturating_sub(1) / self.power.hz_per_wait_state();
         let set = self.flash_control & 7;
         if set < needed { Err(Violation::WaitStates(set)) } else { Ok(()) }
     }

@@ -5,20 +5,23 @@ use crate::clock::Time;
 use crate::peripherals::encoder_timer::Shaft;
 use crate::peripherals::gpio::Wire;
 use crate::peripherals::rcc::Domain;
-use crate::wiring::{BREAK_PINS, ENCODER_ROUTES, PWM_PINS, Pin, SERIAL_PINS};
+use crate::wiring::{BREAK_PINS, ENCODER_INPUTS, PWM_PINS, Pin, SERIAL_PINS};
 
 impl Bus {
     /// The shaft whose signals reach a timer, and the period of that timer.
     pub(super) fn encoder_route(&self, timer: usize) -> (Option<Shaft>, Time) {
         let tick = self.rcc.timer_clock(if timer == 4 { Domain::Apb2 } else { Domain::Apb1 });
-        let shaft =
-            ENCODER_ROUTES.iter().filter(|route| route.0 == timer).find_map(|&(_, a, b, function)| {
-                if !self.is_alternate(a, function) || !self.is_alternate(b, function) {
-                    return None;
-                }
-                let index = self.wiring.encoders.iter().position(|&encoder| encoder == (a, b))?;
-                self.shafts.get(index).copied()
-            });
+        let input = |channel: usize| {
+            ENCODER_INPUTS
+                .iter()
+                .filter(|input| input.0 == timer && input.1 == channel)
+                .find(|(.., pin, function)| self.is_alternate(*pin, *function))
+                .map(|&(.., pin, _)| pin)
+        };
+        let shaft = input(0).zip(input(1)).and_then(|pins| {
+            let index = self.wiring.encoders.iter().position(|&encoder| encoder == pins)?;
+            self.shafts.get(index).copied()
+        });
         (shaft, tick)
     }
 
@@ -114,8 +117,9 @@ impl Bus {
 
     /// The chip's supply has changed: the voltage detector is line 16 of EXTI.
     pub(crate) fn supply_changed(&mut self) {
-        let below = self.power.below();
-        self.exti.line(16, below);
+        if let (is_below, true) = self.power.compare() {
+            self.exti.line(16, is_below);
+        }
     }
 
     /// The crystal stops.

@@ -9,6 +9,11 @@ const SETTLE: Time = 3 * UNITS_PER_MICROSECOND;
 /// Highest clock of the converter (Hz).
 const FASTEST_HZ: Time = 36_000_000;
 const END_OF_CONVERSION: u32 = 1 << 1;
+/// TSVREFE: temperature sensor and internal reference on.
+const REFERENCE_ON: u32 = 1 << 23;
+/// Start-up and shortest sampling of the internal reference (datasheet, embedded reference voltage).
+const REFERENCE_START: Time = 10 * UNITS_PER_MICROSECOND;
+const REFERENCE_SAMPLING: Time = 10 * UNITS_PER_MICROSECOND;
 
 /// The converter.
 #[derive(Debug, Clone, Default)]
@@ -19,6 +24,7 @@ pub(crate) struct Adc {
     sequence: [u32; 3],
     data: u32,
     common: u32,
+    reference_on_at: Time,
     on_at: Time,
     done_at: Option<Time>,
     /// Voltages of the inputs as fractions of the reference, by their numbers.
@@ -74,7 +80,12 @@ impl Adc {
             0x2c if value == 0 => {}
             0x30 => self.sequence[1] = value,
             0x34 => self.sequence[2] = value,
-            0x304 if value & 0xef1f == 0 => self.common = value,
+            0x304 if value & 0xef1f == 0 => {
+                if value & !self.common & REFERENCE_ON != 0 {
+                    self.reference_on_at = now;
+                }
+                self.common = value;
+            }
             _ => return Err(Violation::NotModelled("this function of the converter")),
         }
         Ok(())
@@ -106,6 +117,19 @@ impl Adc {
         if UNITS_PER_SECOND > FASTEST_HZ * clock {
             return Err(Violation::ClockTooFast((UNITS_PER_SECOND / clock) as u32));
         }
+        if self.channel() > 16
+            && self.common & REFERENCE_ON != 0
+            && now < self.reference_on_at + REFERENCE_START
+        {
+            return Err(Violation::Forbidden(
+                "the internal reference is converted before it has started (tSTART)",
+            ));
+        }
+        if self.channel() > 16 && self.sampling_clocks() * clock < REFERENCE_SAMPLING {
+            return Err(Violation::Forbidden(
+                "the internal reference is sampled for less than 10 µs (TS_vrefint)",
+            ));
+        }
         if self.done_at.is_none() {
             self.done_at = Some(now + (self.sampling_clocks() + 12) * clock);
         }
@@ -135,7 +159,7 @@ impl Adc {
         if self.done_at.is_some_and(|at| at <= now) {
             self.done_at = None;
             let channel = self.channel();
-            let internal = channel < 16 || self.common & 1 << 23 != 0;
+            let internal = channel < 16 || self.common & REFERENCE_ON != 0;
             let fraction = self.inputs.get(channel).copied().filter(|_| connected(channel) && internal);
             self.data = (fraction.unwrap_or(0.0) * 4096.0).clamp(0.0, 4095.0) as u32;
             self.status |= END_OF_CONVERSION | 1 << 4;

@@ -21,6 +21,8 @@ pub(crate) struct Iwdg {
     prescaler_at: Time,
     reload_at: Time,
     expires_at: Time,
+    /// The debugger lets it stand still since then.
+    frozen_at: Option<Time>,
     /// It is started, but not wired: for the negative controls.
     pub(crate) ignored: bool,
 }
@@ -38,6 +40,7 @@ impl Iwdg {
             prescaler_at: NEVER,
             reload_at: NEVER,
             expires_at: NEVER,
+            frozen_at: None,
             ignored: false,
         }
     }
@@ -118,12 +121,27 @@ impl Iwdg {
         self.expires_at = now + (Time::from(self.reload_seen) + 1) * self.count();
     }
 
+    /// The debugger halts the core with DBG_IWDG_STOP set, or lets it go on.
+    pub(crate) fn freeze(&mut self, frozen: bool, now: Time) {
+        if frozen {
+            self.frozen_at = Some(now);
+        } else if let Some(since) = self.frozen_at.take().filter(|_| self.expires_at != NEVER) {
+            self.expires_at += now - since;
+        }
+    }
+
     pub(crate) fn deadline(&self) -> Time {
+        if self.frozen_at.is_some() {
+            return NEVER;
+        }
         self.prescaler_at.min(self.reload_at).min(self.expires_at)
     }
 
     /// Gives whether the microcontroller is reset now.
     pub(crate) fn advance(&mut self, now: Time) -> bool {
+        if self.frozen_at.is_some() {
+            return false;
+        }
         if self.prescaler_at <= now {
             let left = self.expires_at.saturating_sub(self.prescaler_at) / self.count();
             self.prescaler_seen = self.prescaler;

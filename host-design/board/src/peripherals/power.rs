@@ -1,33 +1,87 @@
-//! Power control (RM0090, 5.4): the voltage detector.
+//! Power control (RM0090, 5.4; RM0390, 5.4), the voltage detector, and the brown-out reset (RM0090, 5.2.2).
 
 use super::Bits;
+use crate::chip::Chip;
 
 /// Thresholds of the detector (V), falling (datasheet, embedded reset and power control block).
 const THRESHOLDS: [f32; 8] = [2.04, 2.20, 2.33, 2.45, 2.62, 2.76, 2.87, 3.0];
 
+/// By how much the supply must rise above a threshold again (V; datasheet, hysteresis).
+const HYSTERESIS_V: f32 = 0.1;
+
+/// Below it the chip is in reset, whatever the option bytes say (V; datasheet, VPDR).
+pub(crate) const POWER_DOWN_V: f32 = 1.68;
+
+/// Below which supply the chip is in reset, as its option bytes say (BOR_LEV in FLASH_OPTCR).
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum BrownOut {
+    /// As delivered: the power-down threshold alone.
+    #[default]
+    Off,
+    /// Level 1.
+    Level1,
+    /// Level 2.
+    Level2,
+    /// Level 3.
+    Level3,
+}
+
+impl BrownOut {
+    /// The supply that resets the chip as it falls, and the one that lets it go as it rises (V; datasheet, VBOR, VPDR).
+    pub(crate) fn thresholds_v(self) -> (f32, f32) {
+        match self {
+            BrownOut::Off => (POWER_DOWN_V, 1.72),
+            BrownOut::Level1 => (2.19, 2.29),
+            BrownOut::Level2 => (2.50, 2.59),
+            BrownOut::Level3 => (2.83, 2.92),
+        }
+    }
+
+    /// FLASH_OPTCR: no protection (3.9.10).
+    pub(crate) fn option_control(self) -> u32 {
+        let level = match self {
+            BrownOut::Off => 3,
+            BrownOut::Level1 => 2,
+            BrownOut::Level2 => 1,
+            BrownOut::Level3 => 0,
+        };
+        0x0fff_aae1 | level << 2
+    }
+}
+
 /// The registers.
 #[derive(Debug, Clone)]
 pub(crate) struct Power {
+    chip: Chip,
     control: u32,
+    is_below: bool,
     /// Supply of the chip (V).
     pub(crate) volts: f32,
+    pub(crate) brown_out: BrownOut,
 }
 
 impl Power {
-    pub(crate) fn new(volts: f32) -> Self {
-        Self { control: 1 << 14, volts }
+    pub(crate) fn new(chip: Chip, volts: f32, brown_out: BrownOut) -> Self {
+        let control = if chip == Chip::F446 { 3 << 14 } else { 1 << 14 };
+        Self { chip, control, is_below: false, volts, brown_out }
     }
 
-    pub(crate) fn bits(offset: u32) -> Option<Bits> {
-        Some(match offset {
-            0x00 => Bits::writable(0x43ff),
-            0x04 => Bits::writable(0x300).with_read_only(0x400f),
+    pub(crate) fn reset(&mut self) {
+        *self = Self::new(self.chip, self.volts, self.brown_out);
+    }
+
+    pub(crate) fn bits(&self, offset: u32) -> Option<Bits> {
+        Some(match (offset, self.chip) {
+            (0x00, Chip::F446) => Bits::writable(0x003f_eff3 | 0xc),
+            (0x00, _) => Bits::writable(0x43ff),
+            (0x04, Chip::F446) => Bits::writable(0x000c_0300).with_read_only(0x0003_400f),
+            (0x04, _) => Bits::writable(0x300).with_read_only(0x400f),
             _ => return None,
         })
     }
 
     pub(crate) fn read(&self, offset: u32) -> u32 {
-        if offset == 0 { self.control } else { 1 << 14 | u32::from(self.below()) << 2 }
+        if offset == 0 { self.control } else { 1 << 14 | u32::from(self.is_below) << 2 }
     }
 
     pub(crate) fn write(&mut self, offset: u32, value: u32) {
@@ -36,8 +90,23 @@ impl Power {
         }
     }
 
-    /// Whether the supply is below the threshold; line 16 of EXTI.
-    pub(crate) fn below(&self) -> bool {
-        self.control & 1 << 4 != 0 && self.volts < THRESHOLDS[(self.control >> 5 & 7) as usize]
+    /// Compares the supply with the threshold; gives whether it is below (line 16 of EXTI), and whether that is new.
+    pub(crate) fn compare(&mut self) -> (bool, bool) {
+        let threshold_v = THRESHOLDS[(self.control >> 5 & 7) as usize];
+        let release_v = if self.is_below { threshold_v + HYSTERESIS_V } else { threshold_v };
+        let is_below = self.control & 1 << 4 != 0 && self.volts < release_v;
+        let changed = is_below != self.is_below;
+        self.is_below = is_below;
+        (is_below, changed)
+    }
+
+    /// Core clock per flash wait state at this supply (Hz; RM0090, 3.5.1, table 10).
+    pub(crate) fn hz_per_wait_state(&self) -> u32 {
+        match self.volts {
+            volts if volts >= 2.7 => 30_000_000,
+            volts if volts >= 2.4 => 24_000_000,
+            volts if volts >= 2.1 => 22_000_000,
+            _ => 20_000_000,
+        }
     }
 }

@@ -49,6 +49,8 @@ struct SysTick {
     /// Its value while it stands still.
     stopped_at: u32,
     counted: bool,
+    /// The debugger has halted the core since then.
+    frozen_at: Option<Time>,
 }
 
 impl SysTick {
@@ -75,7 +77,14 @@ impl System {
         Self {
             nvic: Nvic::new(),
             mpu: Mpu::default(),
-            systick: SysTick { control: 4, reload: 0, zero_at: NEVER, stopped_at: 0, counted: false },
+            systick: SysTick {
+                control: 4,
+                reload: 0,
+                zero_at: NEVER,
+                stopped_at: 0,
+                counted: false,
+                frozen_at: None,
+            },
             vtor: 0,
             scr: 0,
             shcsr: 0,
@@ -106,7 +115,17 @@ impl System {
 
     /// When something happens here by itself.
     pub(crate) fn deadline(&self) -> Time {
-        if self.systick.control & 1 != 0 && self.systick.reload != 0 { self.systick.zero_at } else { NEVER }
+        let counts = self.systick.control & 1 != 0 && self.systick.reload != 0;
+        if counts && self.systick.frozen_at.is_none() { self.systick.zero_at } else { NEVER }
+    }
+
+    /// The debugger halts the core, or lets it go on.
+    pub(crate) fn freeze(&mut self, halted: bool, now: Time) {
+        if halted {
+            self.systick.frozen_at = Some(now);
+        } else if let Some(since) = self.systick.frozen_at.take().filter(|_| self.systick.zero_at != NEVER) {
+            self.systick.zero_at += now - since;
+        }
     }
 
     /// Lets happen what is due.

@@ -5,3 +5,4 @@ mod independent_answers;
 mod peripherals;
 mod program;
 mod strictness;
+mod supply_and_chip;
