@@ -7,6 +7,7 @@
 //! |---|---|
 //! | [`table`] | the gain table: its fields, its checksum, limits and thresholds |
 //! | [`gains`] | the generated gain table of one rig |
+//! | [`plant`] | nonlinear equations of motion, shared with the host |
 //! | [`control`] | encoders, observer, state feedback, actuator, and the controller that joins them |
 //! | [`supervision`] | states, faults, what prevents arming, homing, sign check, limits, fault detection |
 //! | [`protocol`] | messages, frames, the serial link |
@@ -77,6 +78,7 @@ pub mod gains;
 pub mod gains {
     include!(env!("UPRIGHT_GAINS"));
 }
+pub mod plant;
 pub mod protocol;
 pub mod supervision;
 pub mod table;

@@ -3,6 +3,7 @@
 //! Only the data are here, each field declared once; [`control`](crate::control) and
 //! [`supervision`](crate::supervision) use them. A gain table in another crate imports only this module.
 
+mod chain_model;
 pub mod checksum;
 mod law;
 mod limits;
@@ -16,6 +17,7 @@ use nalgebra::{ArrayStorage, SMatrix};
 
 use crate::table::part::part;
 
+pub use chain_model::ChainModel;
 pub use checksum::ChecksumScan;
 pub use law::{Law, LawGains, PerLaw};
 pub use limits::Limits;

@@ -2,8 +2,8 @@
 
 use core::ops::{Add, AddAssign, Div, Mul, MulAssign, Neg, Sub, SubAssign};
 
-/// A floating-point type for the control law: `f32` in the firmware, `f64` on the host, which compares the firmware
-/// with the same law in double precision.
+/// A number for control law and equations of motion: `f32` in the firmware; on the host also `f64`, to compare the
+/// firmware with the same law in double precision and to simulate, or a type that carries derivatives.
 pub trait Scalar:
     nalgebra::Scalar
     + Copy
@@ -29,10 +29,14 @@ pub trait Scalar:
 
     /// Whether the value is neither infinite nor NaN.
     fn is_finite(self) -> bool;
+
+    /// Sines and cosines of `angles` (rad), with the same bits on every machine; mirrored angles give exactly mirrored
+    /// results.
+    fn sines_and_cosines<const N: usize>(angles: &[Self; N]) -> ([Self; N], [Self; N]);
 }
 
 macro_rules! scalar {
-    ($type:ty) => {
+    ($type:ty, $sines_and_cosines:path) => {
         impl Scalar for $type {
             #[inline(always)]
             fn from_f32(value: f32) -> Self {
@@ -53,9 +57,14 @@ macro_rules! scalar {
             fn is_finite(self) -> bool {
                 self.is_finite()
             }
+
+            #[inline(always)]
+            fn sines_and_cosines<const N: usize>(angles: &[Self; N]) -> ([Self; N], [Self; N]) {
+                $sines_and_cosines(angles)
+            }
         }
     };
 }
 
-scalar!(f32);
-scalar!(f64);
+scalar!(f32, crate::plant::single::sines_and_cosines);
+scalar!(f64, crate::plant::double::sines_and_cosines);

@@ -14,7 +14,7 @@
 //! - [`ChainParameters`]: the constants of the equations, in any precision.
 //! - [`absolute_angles`]: the angles `φ` of a state.
 //! - [`linearise`]: the exact linear model about an equilibrium, in any precision.
-//! - [`ChainPlant`]: the nonlinear equations in `f64`, fast, with n in the type.
+//! - [`ChainPlant`]: the nonlinear equations in `f64`, fast, with n in the type; their source is [`upright::plant`].
 //! - [`Plant`]: the interface of a simulation of any size; [`chain_plant`] and [`LinearSimulation`] provide it.
 //! - [`reference::integrate`]: an adaptive integrator of high order, the reference for the fast one.
 
@@ -27,7 +27,6 @@ mod parameters;
 pub mod reference;
 mod rk4;
 mod simulation;
-mod sincos;
 
 pub use angles::absolute_angles;
 pub use chain::{ChainPlant, ChainState, Energy};
@@ -36,7 +35,6 @@ pub use linear_simulation::LinearSimulation;
 pub use motor::MotorPlant;
 pub use parameters::ChainParameters;
 pub use simulation::{ChainSimulation, Plant, chain_plant};
-pub use sincos::sin_cos;
 
 /// The plant cannot be built for this number of links.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]

@@ -44,6 +44,12 @@ pub struct ChainSimulation<const N: usize> {
     pub state: ChainState<N>,
 }
 
+impl<const N: usize> ChainSimulation<N> {
+    fn check_length(&self, state: &[f64]) {
+        assert_eq!(state.len(), self.states(), "a chain of {N} links has 2n + 2 states");
+    }
+}
+
 fn joint_torques<const N: usize>(disturbances: &[f64]) -> [f64; N] {
     assert_eq!(disturbances.len(), N, "a chain of {N} links has {N} joint torques");
     core::array::from_fn(|i| disturbances[i])
@@ -63,14 +69,18 @@ impl<const N: usize> Plant for ChainSimulation<N> {
     }
 
     fn write_state(&self, state: &mut [f64]) {
+        self.check_length(state);
         self.state.write_relative(state);
     }
 
     fn set_state(&mut self, state: &[f64]) {
+        self.check_length(state);
         self.state = ChainState::from_relative(state);
     }
 
     fn rate(&self, state: &[f64], force: f64, disturbances: &[f64], rate: &mut [f64]) {
+        self.check_length(state);
+        self.check_length(rate);
         // The conversion from absolute to relative angles is linear, so it converts rates as well as states.
         self.plant
             .derivative(&ChainState::from_relative(state), force, &joint_torques(disturbances))
@@ -98,7 +108,7 @@ impl<const N: usize> Plant for ChainSimulation<N> {
 pub fn chain_plant(chain: &rig::Chain) -> Result<Box<dyn Plant>, PlantError> {
     fn boxed<const N: usize>(chain: &rig::Chain) -> Result<Box<dyn Plant>, PlantError> {
         let plant = ChainPlant::<N>::new(&ChainParameters::of(chain))?;
-        Ok(Box::new(ChainSimulation { plant, state: ChainState::UPRIGHT }))
+        Ok(Box::new(ChainSimulation { plant, state: ChainState::upright() }))
     }
     match chain.links.len() {
         1 => boxed::<1>(chain),

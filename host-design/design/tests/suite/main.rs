@@ -10,6 +10,7 @@ mod plant_linear_model;
 mod plant_linearisation;
 mod plant_motion;
 mod plant_rigs;
+mod plant_sines;
 mod published;
 mod rig_errors;
 mod rig_files;

@@ -1,0 +1,78 @@
+//! The nonlinear equations of motion of links on a cart: one source for the firmware, which predicts with them in `f32`,
+//! and for the host, which simulates with them in `f64`.
+//!
+//! The state is in relative angles outside, `x, ẋ, θ_1, θ̇_1, …`, and in absolute angles `φ_i = θ_1 + … + θ_i` inside,
+//! where the mass matrix is simple.
+
+pub(crate) mod double;
+mod equations;
+pub(crate) mod single;
+
+use crate::table::Scalar;
+
+/// State of a chain in absolute angles. A state's rate of change has the same type.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ChainState<const N: usize, T = f32> {
+    /// Position of the cart (m).
+    pub x: T,
+    /// Velocity of the cart (m/s).
+    pub xdot: T,
+    /// Absolute angles `φ` of the links (rad).
+    pub phi: [T; N],
+    /// Rates `φ̇` of the absolute angles (rad/s).
+    pub phidot: [T; N],
+}
+
+impl<const N: usize, T: Scalar> ChainState<N, T> {
+    /// At rest with every link upright.
+    pub fn upright() -> Self {
+        let zero = T::default();
+        Self { x: zero, xdot: zero, phi: [zero; N], phidot: [zero; N] }
+    }
+
+    /// Converts from `x, ẋ, θ_1, θ̇_1, …` with relative angles. Entries beyond 2N + 2 are ignored, missing ones are 0.
+    #[inline]
+    pub fn from_relative(state: &[T]) -> Self {
+        let mut absolute = Self::upright();
+        let mut joints = state.as_chunks::<2>().0.iter();
+        if let Some(&[x, xdot]) = joints.next() {
+            (absolute.x, absolute.xdot) = (x, xdot);
+        }
+        let (mut angle, mut rate) = (T::default(), T::default());
+        for ((phi, phidot), joint) in absolute.phi.iter_mut().zip(&mut absolute.phidot).zip(joints) {
+            angle += joint[0];
+            rate += joint[1];
+            (*phi, *phidot) = (angle, rate);
+        }
+        absolute
+    }
+
+    /// Writes `x, ẋ, θ_1, θ̇_1, …` with relative angles (2N + 2 entries).
+    #[inline]
+    pub fn write_relative(&self, state: &mut [T]) {
+        let mut joints = state.as_chunks_mut::<2>().0.iter_mut();
+        if let Some(cart) = joints.next() {
+            *cart = [self.x, self.xdot];
+        }
+        let (mut angle, mut rate) = (T::default(), T::default());
+        for ((&phi, &phidot), joint) in self.phi.iter().zip(&self.phidot).zip(joints) {
+            *joint = [phi - angle, phidot - rate];
+            (angle, rate) = (phi, phidot);
+        }
+    }
+
+    /// `self + factor · rate`, entry by entry.
+    #[inline]
+    pub fn plus(&self, factor: T, rate: &Self) -> Self {
+        let mut sum = *self;
+        sum.x += factor * rate.x;
+        sum.xdot += factor * rate.xdot;
+        for (sum, &rate) in sum.phi.iter_mut().zip(&rate.phi) {
+            *sum += factor * rate;
+        }
+        for (sum, &rate) in sum.phidot.iter_mut().zip(&rate.phidot) {
+            *sum += factor * rate;
+        }
+        sum
+    }
+}
