@@ -3,8 +3,7 @@
 //! | task | started by | priority | does |
 //! |---|---|---|---|
 //! | `tick` | the SysTick timer, at the table's period | highest | inputs → supervisor → controller → motor, then the prediction |
-//! | `received` | the serial line | below | puts a byte into a queue |
-//! | `idle` | | lowest | bytes → commands, telemetry → bytes |
+//! | `idle` | every interrupt | lowest | bytes → commands, telemetry → bytes |
 //!
 //! The tasks share no locked resource, only single-producer, single-consumer queues. So no task below `tick` can delay
 //! it by more than an interrupt entry.
@@ -39,7 +38,7 @@ mod app {
     use upright::protocol::serial_link::SerialLink;
     use upright::table::Build;
 
-    use crate::board::{BYTES, Hardware, Receiver, SerialLine, set_up};
+    use crate::board::{Buffer, Hardware, SerialLine, set_up};
 
     #[shared]
     struct Shared {}
@@ -47,7 +46,6 @@ mod app {
     #[local]
     struct Local {
         control: ControlTask<'static, 'static, Hardware, STATES, SENSORS>,
-        receiver: Receiver,
         link: SerialLink<'static, STATES, SENSORS>,
         line: SerialLine,
     }
@@ -55,15 +53,14 @@ mod app {
     #[init(local = [
         commands: Queue<Command, COMMANDS> = Queue::new(),
         messages: Queue<Message<STATES, SENSORS>, MESSAGES> = Queue::new(),
-        bytes: Queue<u8, BYTES> = Queue::new(),
+        buffer: Buffer = Buffer::new(),
     ])]
     fn init(cx: init::Context) -> (Shared, Local) {
-        let (hardware, receiver, line, reset) = set_up(cx.device, cx.local.bytes.split());
         let build = Build { rig_hash: RIG_HASH, tick_s: TICK_S };
-        let Ok(firmware) = Firmware::new(&TABLE, &build, Hardware::WIDTHS, reset) else {
-            // The table is damaged: the image cannot do anything, so the motor stays off.
-            crate::board::stop()
-        };
+        let (hardware, line, firmware) = set_up(cx.device, cx.local.buffer, |reset| {
+            Firmware::new(&TABLE, &build, Hardware::WIDTHS, reset)
+                .unwrap_or_else(|_| Firmware::unusable(&TABLE, Hardware::WIDTHS, reset))
+        });
         let (to_control, commands) = cx.local.commands.split();
         let (messages, to_link) = cx.local.messages.split();
         let mut systick = cx.core.SYST;
@@ -73,17 +70,12 @@ mod app {
         systick.enable_interrupt();
         systick.enable_counter();
         let control = ControlTask::new(firmware, hardware, commands, messages);
-        (Shared {}, Local { control, receiver, link: SerialLink::new(to_control, to_link), line })
+        (Shared {}, Local { control, link: SerialLink::new(to_control, to_link), line })
     }
 
     #[task(binds = SysTick, priority = 3, local = [control])]
     fn tick(cx: tick::Context) {
         cx.local.control.tick();
-    }
-
-    #[task(binds = USART2, priority = 1, local = [receiver])]
-    fn received(cx: received::Context) {
-        cx.local.receiver.interrupt();
     }
 
     #[idle(local = [link, line])]
@@ -92,10 +84,12 @@ mod app {
             while let Some(byte) = cx.local.line.read() {
                 cx.local.link.receive(byte);
             }
-            match cx.local.link.transmit() {
-                Some(frame) => cx.local.line.write(frame),
-                None => cortex_m::asm::wfi(),
+            while cx.local.line.is_free()
+                && let Some(frame) = cx.local.link.transmit()
+            {
+                cx.local.line.write(frame);
             }
+            cortex_m::asm::wfi();
         }
     }
 }

@@ -192,5 +192,6 @@ fn contacts(bits: u8) -> Contacts {
         driver_fault: bit(3),
         overrun: bit(4),
         clock_fault: bit(5),
+        board_fault: bit(6),
     }
 }

@@ -73,7 +73,8 @@ impl Invariants {
                 firmware.cause().is_some_and(|cause| matches!(cause.fault, Fault::LinkLost | Fault::Table));
             assert!(after == State::Balancing || disarmed || late, "motor on in {after:?}");
             let contacts = rig.contacts;
-            assert!(!contacts.emergency_stop && !contacts.driver_fault && !contacts.clock_fault);
+            assert!(!contacts.emergency_stop && !contacts.driver_fault);
+            assert!(!contacts.clock_fault && !contacts.board_fault);
             assert!(!contacts.limit_low && !contacts.limit_high && rig.supply_v.is_finite());
         } else {
             assert_eq!(drive, Drive::OFF);
@@ -115,7 +116,8 @@ impl Invariants {
         assert_eq!(firmware.calibration().signs(), Signs::Checked);
         let contacts = rig.contacts;
         assert!(!contacts.limit_low && !contacts.limit_high, "armed on a limit switch");
-        assert!(!contacts.emergency_stop && !contacts.driver_fault && !contacts.clock_fault);
+        assert!(!contacts.emergency_stop && !contacts.driver_fault);
+        assert!(!contacts.clock_fault && !contacts.board_fault);
         assert!(rig.supply_v >= limits.supply_min_v && rig.supply_v.is_finite(), "armed without supply");
         let Some(counts) = self.counts.back() else { panic!("a tick has counts") };
         let step = |sensor: usize| TABLE.observer.as_ref().map_or(0.0, |observer| observer.step[sensor]);

@@ -1,8 +1,8 @@
 //! The board of this image: the only code that accesses registers, and the only code with `unsafe`.
 //!
 //! A cargo feature selects the board. A new board is a folder beside `f4` that provides the same names: `set_up` makes
-//! a [`Hardware`] for the control task, a [`Receiver`] for the interrupt of the serial line and a [`SerialLine`] for
-//! the background task; `stop` turns the motor off for good; `CLOCK_HZ` is the core clock.
+//! a [`Hardware`] for the control task and a [`SerialLine`] for the background task, with a [`Buffer`] for its bytes;
+//! `stop` turns the motor off for good; `CLOCK_HZ` is the core clock.
 
 #![allow(unsafe_code)]
 
@@ -47,9 +47,6 @@ mod handlers;
 mod in_the_loop;
 
 #[cfg(not(any(feature = "in-the-loop", feature = "in-the-loop-usart")))]
-pub(crate) use f4::{CLOCK_HZ, Hardware, Receiver, SerialLine, set_up, stop};
+pub(crate) use f4::{Buffer, CLOCK_HZ, Hardware, SerialLine, set_up, stop};
 #[cfg(any(feature = "in-the-loop", feature = "in-the-loop-usart"))]
-pub(crate) use in_the_loop::{CLOCK_HZ, Hardware, Receiver, SerialLine, set_up, stop};
-
-/// Length of the queue of bytes from the host; it holds one byte less.
-pub(crate) const BYTES: usize = 128;
+pub(crate) use in_the_loop::{Buffer, CLOCK_HZ, Hardware, SerialLine, set_up, stop};

@@ -35,6 +35,9 @@ pub struct Contacts {
     pub overrun: bool,
     /// The processor's clock did not start or has stopped: ticks have the wrong length.
     pub clock_fault: bool,
+    /// The chip is not the one that the image is for, a register lost what was written to it, or the chip's own supply
+    /// was low.
+    pub board_fault: bool,
 }
 
 /// The output to the power stage.

@@ -97,6 +97,11 @@ impl<'t, const NX: usize, const NY: usize> Controller<'t, NX, NY> {
         table.check(build)?;
         Self::with_checked(table, widths)
     }
+
+    /// A controller that must never be started, for a table that cannot be used.
+    pub fn unusable(table: &'t GainTable<NX, NY>, widths: [CounterWidth; NY]) -> Self {
+        Self::stopped(table, Law::Lqr, const { &LawGains::NONE }, widths)
+    }
 }
 
 impl<'t, const NX: usize, const NY: usize, T: Scalar> Controller<'t, NX, NY, T> {
@@ -110,8 +115,17 @@ impl<'t, const NX: usize, const NY: usize, T: Scalar> Controller<'t, NX, NY, T> 
         widths: [CounterWidth; NY],
     ) -> Result<Self, TableError> {
         let (law, gains) = table.laws.present().next().ok_or(TableError::NoLaw)?;
+        Ok(Self::stopped(table, law, gains, widths))
+    }
+
+    fn stopped(
+        table: &'t GainTable<NX, NY, T>,
+        law: Law,
+        gains: &'t LawGains<NX, T>,
+        widths: [CounterWidth; NY],
+    ) -> Self {
         let zero = T::default();
-        Ok(Self {
+        Self {
             table,
             law,
             gains,
@@ -125,7 +139,7 @@ impl<'t, const NX: usize, const NY: usize, T: Scalar> Controller<'t, NX, NY, T> 
             last_volts: zero,
             requested: zero,
             applied: zero,
-        })
+        }
     }
 
     /// No force, motor off.

@@ -7,6 +7,7 @@ use crate::protocol::message::{Answer, Command, Info, PROTOCOL, Request, Statist
 use crate::supervision::calibration::links_hang;
 use crate::supervision::inhibits::Inhibits;
 use crate::supervision::supervisor::State;
+use crate::table::ChecksumScan;
 
 /// Version of this crate: major, minor, patch.
 const VERSION: [u8; 3] = [
@@ -104,18 +105,20 @@ impl<const NX: usize, const NY: usize> Firmware<'_, NX, NY> {
         }
         let held = self.supervisor.state() != State::Fault
             && (self.rearm_lockout_ticks > 0 || id <= self.last_clear_id);
-        let inhibits = self.arming_inhibits().union(Inhibits::HELD.when(held));
-        let table = Inhibits::TABLE.when(self.table.check(&self.build).is_err());
-        self.supervisor.arm(inhibits.union(table))?;
+        self.supervisor.arm(self.arming_inhibits().union(Inhibits::HELD.when(held)))?;
+        (self.checksum_scan, self.is_checked) = (ChecksumScan::default(), false);
         let counts = *self.controller.encoders().counts();
         self.calibration.restart_slow(&counts);
         Ok(())
     }
 
-    /// Inhibits of clearing: contacts that would raise the fault again at once.
+    /// Inhibits of clearing: what would raise the fault again at once.
     fn clearing_inhibits(&self) -> Inhibits {
         let Contacts { emergency_stop, driver_fault, .. } = self.contacts;
-        Inhibits::EMERGENCY_STOP.when(emergency_stop).union(Inhibits::DRIVER.when(driver_fault))
+        Inhibits::EMERGENCY_STOP
+            .when(emergency_stop)
+            .union(Inhibits::DRIVER.when(driver_fault))
+            .union(Inhibits::TABLE.when(!self.is_usable))
     }
 
     /// Takes the wanted cart position (m), which has to be within the soft limits of the rail.

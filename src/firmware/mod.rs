@@ -33,8 +33,11 @@ pub struct Firmware<'t, const NX: usize, const NY: usize> {
     detection: Detection<NY>,
     debounce: Debounce,
     checksum_scan: ChecksumScan,
+    /// Whether the table was sound at the start.
+    is_usable: bool,
+    /// Whether the whole table was found intact since arming.
+    is_checked: bool,
     table: &'t GainTable<NX, NY>,
-    build: Build,
     raw_counts: [u32; NY],
     contacts: Contacts,
     supply_v: f32,
@@ -58,6 +61,10 @@ pub struct Firmware<'t, const NX: usize, const NY: usize> {
     ticks_to_telemetry: u16,
 }
 
+/// Words of the table that are checked in a tick while armed, when the whole table has to be read before the motor is
+/// on. Otherwise it is one.
+const WORDS_PER_ARMED_TICK: u32 = 8;
+
 /// [`Firmware::telemetry_period_ticks`] until the host sets it.
 const DEFAULT_TELEMETRY_PERIOD_TICKS: u16 = 10;
 
@@ -72,16 +79,33 @@ impl<'t, const NX: usize, const NY: usize> Firmware<'t, NX, NY> {
         widths: [CounterWidth; NY],
         reset: Reset,
     ) -> Result<Self, TableError> {
+        Ok(Self::with_controller(table, Controller::new(table, build, widths)?, reset))
+    }
+
+    /// The firmware with a table that cannot be used: it has latched [`Fault::Table`] for good, and reports it.
+    pub fn unusable(table: &'t GainTable<NX, NY>, widths: [CounterWidth; NY], reset: Reset) -> Self {
+        let mut firmware = Self::with_controller(table, Controller::unusable(table, widths), reset);
+        firmware.is_usable = false;
+        firmware.trip(Fault::Table, None);
+        firmware
+    }
+
+    fn with_controller(
+        table: &'t GainTable<NX, NY>,
+        controller: Controller<'t, NX, NY>,
+        reset: Reset,
+    ) -> Self {
         let cause = reset.fault().map(|fault| Cause { fault, tick: 0, sensor: None });
-        Ok(Self {
-            controller: Controller::new(table, build, widths)?,
+        Self {
+            controller,
             supervisor: Supervisor::new(cause),
             calibration: Calibration::new(&table.limits),
             detection: Detection::default(),
             debounce: Debounce::default(),
             checksum_scan: ChecksumScan::default(),
+            is_usable: true,
+            is_checked: false,
             table,
-            build: *build,
             raw_counts: [0; NY],
             contacts: Contacts::default(),
             supply_v: 0.0,
@@ -97,7 +121,7 @@ impl<'t, const NX: usize, const NY: usize> Firmware<'t, NX, NY> {
             reset,
             telemetry_period_ticks: DEFAULT_TELEMETRY_PERIOD_TICKS,
             ticks_to_telemetry: 0,
-        })
+        }
     }
 
     /// The controller, read-only.
@@ -133,6 +157,8 @@ impl<'t, const NX: usize, const NY: usize> Firmware<'t, NX, NY> {
             self.statistics.overruns.saturating_add(u32::from(inputs.contacts.overrun));
         if inputs.contacts.clock_fault {
             self.trip(Fault::Clock, None);
+        } else if inputs.contacts.board_fault {
+            self.trip(Fault::Board, None);
         } else if inputs.contacts.emergency_stop {
             self.trip(Fault::EmergencyStop, None);
         } else if inputs.contacts.driver_fault {
@@ -213,7 +239,7 @@ impl<'t, const NX: usize, const NY: usize> Firmware<'t, NX, NY> {
             self.supervisor.cancel_arming();
         } else if lean > limits.arm_angle_rad {
             self.calibration.restart_slow(counts);
-        } else if self.calibration.slow_ticks() >= limits.arm_ticks {
+        } else if self.calibration.slow_ticks() >= limits.arm_ticks && self.is_checked {
             self.start_balancing(&upright);
         }
     }
@@ -253,8 +279,13 @@ impl<'t, const NX: usize, const NY: usize> Firmware<'t, NX, NY> {
                 self.trip(fault, None);
             }
         }
-        if self.checksum_scan.next(self.table).is_some_and(|crc| crc != self.table.crc) {
-            self.trip(Fault::Table, None);
+        let words = if self.supervisor.state() == State::Armed { WORDS_PER_ARMED_TICK } else { 1 };
+        for _ in 0..words {
+            match self.checksum_scan.next(self.table) {
+                Some(crc) if crc != self.table.crc => self.trip(Fault::Table, None),
+                Some(_) => self.is_checked = true,
+                None => {}
+            }
         }
         let reply = command.map(|command| Reply { id: command.id, answer: self.answer(command) });
         self.tick = self.tick.wrapping_add(1);

@@ -49,8 +49,7 @@ impl<const NX: usize, const NY: usize> Firmware<'_, NX, NY> {
             .union(Inhibits::SUPPLY.when(!supply_is_good))
     }
 
-    /// All inhibits of arming that hold now, except those that are only known when it is tried: [`Inhibits::HELD`] and
-    /// [`Inhibits::TABLE`].
+    /// All inhibits of arming that hold now, except [`Inhibits::HELD`], which is only known when it is tried.
     pub fn arming_inhibits(&self) -> Inhibits {
         let state = self.supervisor.arming_inhibits();
         if self.supervisor.state() == State::Balancing {

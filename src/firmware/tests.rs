@@ -24,6 +24,7 @@ const INPUTS: Inputs<SENSORS> = Inputs {
         driver_fault: false,
         overrun: false,
         clock_fault: false,
+        board_fault: false,
     },
 };
 
@@ -163,6 +164,7 @@ fn cause_of(faults: &[Fault], ticks_of_a_pass: u32) -> Option<Cause> {
         assert_eq!(firmware.state(), State::Balancing, "{:?}", firmware.cause());
     }
     inputs.contacts.clock_fault = due(Fault::Clock);
+    inputs.contacts.board_fault = due(Fault::Board);
     inputs.contacts.emergency_stop = due(Fault::EmergencyStop);
     inputs.contacts.driver_fault = due(Fault::Driver);
     inputs.contacts.limit_high = due(Fault::LimitSwitch);

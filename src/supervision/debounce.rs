@@ -88,6 +88,7 @@ mod tests {
             driver_fault: false,
             overrun: false,
             clock_fault: false,
+            board_fault: false,
         },
     };
 

@@ -43,8 +43,10 @@ pub enum Fault {
     Watchdog = 16,
     /// The program has failed: panic, processor fault or stack overflow.
     Crash = 17,
-    /// The clock has failed to start: crystal or PLL.
+    /// The clock has failed to start: crystal or PLL. Or the crystal is another one.
     Clock = 18,
+    /// The chip, the registers of the motor's timer or the chip's supply are not as they have to be.
+    Board = 19,
 }
 
 /// Longest time from a fault's first effect on the firmware's inputs to motor off.
@@ -85,7 +87,7 @@ pub struct Entry {
 
 impl Fault {
     /// Every fault, by code.
-    pub const ALL: [Entry; 18] = [
+    pub const ALL: [Entry; 19] = [
         Entry {
             fault: Fault::NotFinite,
             name: "not finite",
@@ -214,10 +216,18 @@ impl Fault {
         Entry {
             fault: Fault::Clock,
             name: "clock",
-            condition: "crystal or PLL have not started, or the crystal has stopped: the firmware runs from the internal \
-                        clock, at another tick, and never arms",
+            condition: "crystal or PLL have not started, or the crystal has another frequency than the board's: the \
+                        firmware runs from the internal clock, at another tick, and never arms",
             reaction: Reaction::Ticks(1),
-            remedy: "check the crystal (8 MHz) and the board's feature; then reset",
+            remedy: "flash the image for this board, or check its crystal; then reset",
+        },
+        Entry {
+            fault: Fault::Board,
+            name: "board",
+            condition: "the chip is not the one that the image is for, a register of the motor's timer has lost what was \
+                        written to it, or the chip's own supply was below 2.8 V",
+            reaction: Reaction::Ticks(1),
+            remedy: "flash the image for this board, check its 3.3 V; then reset",
         },
     ];
 
@@ -227,8 +237,9 @@ impl Fault {
     /// [`Fault::NotFinite`] stands once for the supply voltage and the requested force: the supply comes after the limit
     /// switches, the force after the overrun. A [`Fault::Motor`] found by rejected measurements of several sensors has the
     /// place of [`Fault::Encoder`]. [`Fault::Watchdog`] and [`Fault::Crash`] reset the microcontroller.
-    pub const PRECEDENCE: [Fault; 16] = [
+    pub const PRECEDENCE: [Fault; 17] = [
         Fault::Clock,
+        Fault::Board,
         Fault::EmergencyStop,
         Fault::Driver,
         Fault::LimitSwitch,

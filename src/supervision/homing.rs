@@ -92,6 +92,7 @@ mod tests {
         driver_fault: false,
         overrun: false,
         clock_fault: false,
+        board_fault: false,
     };
 
     /// The cart pushed along these counts, with the switches closing at `low` and below, `high` and above.

@@ -6,6 +6,7 @@ use core::ops::{Index, IndexMut};
 use nalgebra::SVector;
 use serde::{Deserialize, Serialize};
 
+use crate::table::columns;
 use crate::table::part::{Part, Reader, Resize, Words, WordsMut, part};
 use crate::table::scalar::Scalar;
 
@@ -193,6 +194,10 @@ part! {
 }
 
 impl<const NX: usize> LawGains<NX> {
+    /// No gains, no force.
+    pub(crate) const NONE: Self =
+        Self { k: columns([[0.0; NX]]), k_pending: 0.0, k_integral: 0.0, n: 0.0, setpoint_step: 0.0 };
+
     /// Whether the largest step lets the governor move the set-point.
     pub(crate) fn is_sound(&self) -> bool {
         self.setpoint_step > 0.0

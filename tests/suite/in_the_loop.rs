@@ -8,12 +8,6 @@ use std::fmt::Write;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
-use upright::gains::{SENSORS, STATES};
-use upright::protocol::frame::Receiver;
-use upright::protocol::message::Message;
-use upright::protocol::serial_link::MAX_MESSAGE;
-use upright::supervision::fault::Fault;
-use upright::supervision::supervisor::State;
 use upright::table::Law;
 use upright::table::checksum::crc32;
 use upright_design::design::design;
@@ -147,39 +141,5 @@ fn the_runs_are_those_of_the_committed_traces() {
             let place = Place::Qemu { image, link: Link::Files };
             assert!(golden(&run(&rig, &table, &scenario, place).unwrap()) == committed, "{name} in QEMU");
         }
-    }
-}
-
-/// The emulator has no clock tree, so the board's image finds no crystal, reports it and stays off.
-#[test]
-fn the_image_for_the_board_ends_a_wait_for_the_clock_with_its_fault() {
-    let Some(image) = image(Kind::F405) else { return };
-    let folder = tempfile::tempdir().unwrap();
-    let line = folder.path().join("usart2");
-    let mut qemu = Command::new("qemu-system-arm")
-        .args(["-machine", "netduinoplus2", "-nographic", "-monitor", "none", "-icount", "shift=0,sleep=off"])
-        .args(["-serial", "null", "-serial", &format!("file:{}", line.display()), "-kernel"])
-        .arg(&image)
-        .stdin(Stdio::null())
-        .stdout(Stdio::null())
-        .spawn()
-        .unwrap();
-    let mut heard = Vec::new();
-    for _ in 0..100 {
-        std::thread::sleep(std::time::Duration::from_millis(100));
-        heard = std::fs::read(&line).unwrap_or_default();
-        if heard.len() > 2000 {
-            break;
-        }
-    }
-    qemu.kill().unwrap();
-    qemu.wait().unwrap();
-    let mut receiver = Receiver::<MAX_MESSAGE>::new();
-    let told: Vec<_> = heard.iter().filter_map(|&byte| receiver.push(byte)).collect();
-    assert!(told.len() > 5, "{} bytes", heard.len());
-    for message in told {
-        let Ok(Message::<STATES, SENSORS>::Telemetry(telemetry)) = message else { panic!("{message:?}") };
-        assert_eq!((telemetry.state, telemetry.fault), (State::Fault, Some(Fault::Clock)));
-        assert_eq!(telemetry.drive, 0.0);
     }
 }

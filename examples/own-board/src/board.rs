@@ -49,6 +49,7 @@ impl Board<SENSORS> for OwnBoard {
                 driver_fault: self.driver_fault.is_low(),
                 overrun: core::mem::take(&mut self.overrun),
                 clock_fault: false,
+                board_fault: false,
             },
         }
     }

@@ -6,24 +6,34 @@
 //! | PCLK1 | 42 MHz | USART2; timers 2 to 5 at 84 MHz |
 //! | PCLK2 | 84 MHz | ADC at 21 MHz; timers 1 and 8 at 168 MHz |
 //!
-//! If a wait times out, the core stays on the internal 16 MHz oscillator: slow, but able to report the fault. The
-//! voltage scaling for 168 MHz is the one after a reset (RM0090, 5.4.1; RM0390, 5.4.1).
+//! The crystal is measured against the internal oscillator before it is used. If it has another frequency, or if
+//! anything does not start, the core stays on the internal 16 MHz oscillator with all buses undivided: slow, but able
+//! to report the fault. The voltage scaling for 168 MHz is the one after a reset (RM0090, 5.4.1; RM0390, 5.4.1).
 
-use stm32f4xx_hal::pac::{FLASH, RCC};
+use stm32f4xx_hal::pac::{FLASH, RCC, TIM11};
 use upright::protocol::message::Reset;
 
 /// Core clock (Hz).
 pub(crate) const CLOCK_HZ: u32 = 168_000_000;
 
+/// The internal oscillator (Hz), within 1 % at room temperature.
+const INTERNAL_HZ: u32 = 16_000_000;
+
+/// The crystal, or the clock that comes in its place (Hz).
+const CRYSTAL_HZ: u32 = 8_000_000;
+
 /// Iterations of a waiting loop: at 16 MHz and at least 4 cycles each, 50 ms or more. A crystal starts within 10 ms.
 const PATIENCE: u32 = 200_000;
+
+/// Bits of RCC_CR that code may write; the others belong to the hardware or are reserved (RM0090, 7.3.1).
+const CONTROL_BITS: u32 = 0x050d_00f9;
 
 /// The clock that the core uses after the set-up.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub(super) enum Clock {
     /// PLL and crystal: [`CLOCK_HZ`].
     Full,
-    /// The internal 16 MHz oscillator: the crystal or the PLL did not start.
+    /// The internal oscillator: the crystal or the PLL did not start, or the crystal has another frequency.
     Fallback,
 }
 
@@ -32,43 +42,118 @@ impl Clock {
     pub(super) fn usart2_bus_hz(self) -> u32 {
         match self {
             Clock::Full => CLOCK_HZ / 4,
-            Clock::Fallback => 16_000_000,
+            Clock::Fallback => INTERNAL_HZ,
         }
     }
 }
 
-/// Starts the crystal and the PLL. If both start, switches the core to them.
-pub(super) fn set_up(rcc: &RCC, flash: &FLASH) -> Clock {
-    match try_set_up(rcc, flash) {
+/// Gives all peripherals in use their clocks.
+pub(super) fn enable_peripherals(rcc: &RCC) {
+    rcc.ahb1enr().modify(|_, w| {
+        w.gpioaen().set_bit().gpioben().set_bit().gpiocen().set_bit().gpioden().set_bit().dma1en().set_bit()
+    });
+    rcc.apb1enr().modify(|_, w| {
+        w.tim2en().set_bit().tim3en().set_bit().tim4en().set_bit().tim5en().set_bit();
+        w.usart2en().set_bit().pwren().set_bit()
+    });
+    rcc.apb2enr().modify(|_, w| {
+        w.tim1en().set_bit().tim8en().set_bit().tim11en().set_bit().adc1en().set_bit().syscfgen().set_bit()
+    });
+    // A write to a peripheral may be lost until two cycles of its bus after its clock was enabled (ES0182 2.1.13,
+    // ES0298 2.1.6). The barrier waits for the write to the enable register, the delay for those cycles.
+    cortex_m::asm::dsb();
+    cortex_m::asm::delay(16);
+}
+
+/// Starts the crystal and the PLL. If both start, and the crystal has its frequency, switches the core to them.
+pub(super) fn set_up(rcc: &RCC, flash: &FLASH, timer: &TIM11) -> Clock {
+    match start_crystal(rcc).and_then(|()| measure_crystal(rcc, timer)).and_then(|()| start_pll(rcc, flash)) {
         Some(()) => Clock::Full,
-        None => Clock::Fallback,
+        None => {
+            // The internal oscillator, nothing divided.
+            rcc.cfgr().reset();
+            Clock::Fallback
+        }
     }
 }
 
-fn try_set_up(rcc: &RCC, flash: &FLASH) -> Option<()> {
-    // A Nucleo's debugger supplies 8 MHz; the other boards have an 8 MHz crystal.
-    rcc.cr().modify(|_, w| w.hsebyp().bit(cfg!(feature = "stm32f446")).hseon().set_bit());
-    wait(|| rcc.cr().read().hserdy().bit_is_set())?;
+/// Sets bits of RCC_CR.
+fn set(rcc: &RCC, bits: u32) {
+    // SAFETY: only bits that code may write.
+    rcc.cr().modify(|r, w| unsafe { w.bits((r.bits() | bits) & CONTROL_BITS) });
+}
+
+const HSEON: u32 = 1 << 16;
+const HSEBYP: u32 = 1 << 18;
+const CSSON: u32 = 1 << 19;
+const PLLON: u32 = 1 << 24;
+
+fn start_crystal(rcc: &RCC) -> Option<()> {
+    // A Nucleo's debugger supplies a clock; the other boards have a crystal. The bypass changes only while HSE is off.
+    set(rcc, if cfg!(feature = "stm32f446") { HSEBYP } else { 0 });
+    set(rcc, HSEON);
+    wait(|| rcc.cr().read().hserdy().bit_is_set())
+}
+
+/// The crystal's clock is divided by this for the measurement …
+const DIVISOR: u32 = 25;
+/// … and the timer captures every eighth edge of that, so often.
+const CAPTURES: u32 = 16;
+/// Largest deviation of the crystal from its frequency: the internal oscillator's, with a margin (%).
+const DEVIATION_PERCENT: u32 = 3;
+
+/// Measures the crystal: timer 11 counts the internal oscillator between edges of the crystal (RM0090, 19.5.11:
+/// TI1_RMP = 10). Nothing if the frequency is not [`CRYSTAL_HZ`].
+fn measure_crystal(rcc: &RCC, timer: &TIM11) -> Option<()> {
+    // SAFETY, here and below: values of the fields described there.
+    rcc.cfgr().write(|w| unsafe { w.rtcpre().bits(DIVISOR as u8) });
+    timer.or().write(|w| unsafe { w.bits(0b10) });
+    timer.ccmr1_input().write(|w| unsafe { w.bits(0b11 << 2 | 0b01) });
+    timer.ccer().write(|w| w.cc1e().set_bit());
+    timer.cr1().write(|w| w.cen().set_bit());
+    let capture = || {
+        wait(|| timer.sr().read().cc1if().bit_is_set())?;
+        Some(timer.ccr1().read().bits() as u16)
+    };
+    let first = capture()?;
+    let last = (0..CAPTURES).try_fold(first, |_, _| capture())?;
+    timer.cr1().write(|w| w.cen().clear_bit());
+    // The counter wraps at 16 bits; between the first edge and the last, it does not come round at 1 MHz or more.
+    let counted = u32::from(last.wrapping_sub(first));
+    const EXPECTED: u32 = (INTERNAL_HZ as u64 * (8 * DIVISOR * CAPTURES) as u64 / CRYSTAL_HZ as u64) as u32;
+    const { assert!(EXPECTED < 32_768, "the crystal is too slow for this measurement") };
+    (counted.abs_diff(EXPECTED) <= EXPECTED * DEVIATION_PERCENT / 100).then_some(())
+}
+
+fn start_pll(rcc: &RCC, flash: &FLASH) -> Option<()> {
     // 8 MHz / 4 × 168 / 2 = 168 MHz (RM0090, 7.3.2); the PLL's input is at 2 MHz, where its jitter is lowest.
     // SAFETY: factors within the limits given there: 2 to 63, 50 to 432, 0 for a division by 2, 2 to 15.
     rcc.pllcfgr().modify(|_, w| unsafe {
-        w.pllsrc().set_bit().pllm().bits(4).plln().bits(168).pllp().bits(0).pllq().bits(7)
+        w.pllsrc()
+            .set_bit()
+            .pllm()
+            .bits((CRYSTAL_HZ / 2_000_000) as u8)
+            .plln()
+            .bits(168)
+            .pllp()
+            .bits(0)
+            .pllq()
+            .bits(7)
     });
-    rcc.cr().modify(|_, w| w.pllon().set_bit());
+    set(rcc, PLLON);
     // Five wait states above 150 MHz at 3.3 V (RM0090, 3.5.1; the same for F446: RM0390, 3.4.1).
     // SAFETY: a value of this table.
     flash.acr().write(|w| unsafe { w.bits(5 | 1 << 8 | 1 << 9 | 1 << 10) });
     wait(|| flash.acr().read().bits() & 15 == 5)?;
-    // Buses before the core, so that they never run too fast: HCLK / 4 and / 2 (RM0090, 7.3.3).
-    // SAFETY: divisors of this register.
-    rcc.cfgr().modify(|_, w| unsafe { w.hpre().bits(0).ppre1().bits(0b101).ppre2().bits(0b100) });
     wait(|| rcc.cr().read().pllrdy().bit_is_set())?;
-    // SAFETY: 2 is the PLL.
-    rcc.cfgr().modify(|_, w| unsafe { w.sw().bits(2) });
+    // Buses before the core, so that they never run too fast: HCLK / 4 and / 2 (RM0090, 7.3.3).
+    // SAFETY: divisors of this register; 2 is the PLL.
+    rcc.cfgr().write(|w| unsafe { w.ppre1().bits(0b101).ppre2().bits(0b100) });
+    rcc.cfgr().write(|w| unsafe { w.ppre1().bits(0b101).ppre2().bits(0b100).sw().bits(2) });
     wait(|| rcc.cfgr().read().sws().bits() == 2)?;
     // If the crystal stops later, the hardware switches the motor timer's output off and raises the non-maskable
     // interrupt (RM0090, 7.2.7).
-    rcc.cr().modify(|_, w| w.csson().set_bit());
+    set(rcc, CSSON);
     Some(())
 }
 
@@ -80,12 +165,13 @@ fn wait(ready: impl Fn() -> bool) -> Option<()> {
 /// Reason for the last reset (RM0090, 7.3.21); clears the flags.
 pub(super) fn reset_reason(rcc: &RCC, crashed: bool) -> Reset {
     let flags = rcc.csr().read();
-    rcc.csr().modify(|_, w| w.rmvf().set_bit());
+    // SAFETY: RMVF; the other bits are the hardware's.
+    rcc.csr().write(|w| unsafe { w.bits(1 << 24) });
     // Every reset also sets the reset pin's flag, and power-on sets that of the brown-out detector, so the rarer flags
-    // come first.
+    // come first. The flag of a reset by software comes from a debugger: this firmware never asks for one.
     if flags.porrstf().bit_is_set() {
         Reset::Power
-    } else if crashed || flags.sftrstf().bit_is_set() {
+    } else if crashed {
         Reset::Software
     } else if flags.wdgrstf().bit_is_set() {
         Reset::Watchdog

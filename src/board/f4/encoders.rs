@@ -1,6 +1,6 @@
 //! Incremental encoders, counted by timers.
 
-use stm32f4xx_hal::pac::{RCC, TIM2, TIM3, TIM4, TIM5, TIM8};
+use stm32f4xx_hal::pac::{TIM2, TIM3, TIM4, TIM5, TIM8};
 use upright::control::encoder::CounterWidth::{self, Bits16, Bits32};
 use upright::gains::SENSORS;
 
@@ -33,11 +33,8 @@ const CNT: usize = 0x24;
 const ARR: usize = 0x2c;
 
 /// Starts the counters in use, at 0.
-pub(super) fn set_up(rcc: &RCC) {
-    rcc.apb1enr()
-        .modify(|_, w| w.tim2en().set_bit().tim3en().set_bit().tim4en().set_bit().tim5en().set_bit());
-    rcc.apb2enr().modify(|_, w| w.tim8en().set_bit());
-    for &(timer, _) in TIMERS.iter().take(SENSORS) {
+pub(super) fn set_up() {
+    for &(timer, width) in TIMERS.iter().take(SENSORS) {
         let write = |offset, value: u32| {
             // SAFETY: a register of this timer, which nothing else uses.
             unsafe { timer.byte_add(offset).cast_mut().write_volatile(value) };
@@ -47,8 +44,7 @@ pub(super) fn set_up(rcc: &RCC) {
         write(CCMR1, 0x3131);
         // Encoder mode 3: every edge of both inputs counts (RM0090, 18.3.12).
         write(SMCR, 3);
-        // A 16-bit counter ignores the upper half.
-        write(ARR, u32::MAX);
+        write(ARR, if width == Bits32 { u32::MAX } else { 0xffff });
         write(CR1, 1);
     }
 }

@@ -2,6 +2,7 @@
 
 mod clock;
 mod encoders;
+mod guard;
 mod motor;
 mod pins;
 mod serial;
@@ -12,8 +13,7 @@ mod wiring;
 use core::mem::MaybeUninit;
 
 use cortex_m::peripheral::{DWT, SYST};
-use heapless::spsc::{Consumer, Producer};
-use stm32f4xx_hal::pac::{EXTI, Peripherals};
+use stm32f4xx_hal::pac::{EXTI, PWR, Peripherals};
 use upright::board::{Board, Contacts, Inputs, Output};
 use upright::control::encoder::CounterWidth;
 use upright::gains::SENSORS;
@@ -22,7 +22,7 @@ use upright::protocol::message::Reset;
 pub(crate) use clock::CLOCK_HZ;
 use clock::Clock;
 use motor::Motor;
-pub(crate) use serial::{Receiver, SerialLine};
+pub(crate) use serial::{Buffer, SerialLine};
 use supply::Supply;
 use watchdog::Watchdog;
 
@@ -31,40 +31,51 @@ pub(crate) struct Hardware {
     motor: Motor,
     supply: Supply,
     exti: EXTI,
+    power: PWR,
     watchdog: Watchdog,
     clock_fault: bool,
+    wrong_chip: bool,
     overrun: bool,
 }
 
-/// Sets up all peripherals, with the motor off. Takes at most 150 ms, even if a peripheral does not respond.
-pub(crate) fn set_up(
+/// Sets up all peripherals, with the motor off. Takes at most 150 ms, even if a peripheral does not respond. `start`
+/// takes the reason for the reset and makes what has to be ready before the watchdog runs.
+pub(crate) fn set_up<T>(
     device: Peripherals,
-    bytes: (Producer<'static, u8>, Consumer<'static, u8>),
-) -> (Hardware, Receiver, SerialLine, Reset) {
+    buffer: &'static mut Buffer,
+    start: impl FnOnce(Reset) -> T,
+) -> (Hardware, SerialLine, T) {
     let rcc = &device.RCC;
-    pins::set_up(rcc, &device.SYSCFG, &device.EXTI);
-    let motor = Motor::set_up(rcc, device.TIM1);
+    clock::enable_peripherals(rcc);
+    pins::set_up(&device.SYSCFG, &device.EXTI);
+    let motor = Motor::set_up(device.TIM1);
     let reset = clock::reset_reason(rcc, take_crash());
-    let clock = clock::set_up(rcc, &device.FLASH);
-    encoders::set_up(rcc);
-    let supply = Supply::set_up(rcc, device.ADC1, &device.ADC_COMMON);
-    let (receiver, line) = serial::set_up(rcc, device.USART2, clock.usart2_bus_hz(), bytes);
-    // SAFETY: the tick's timer belongs to RTIC and stays untouched; nothing else uses the other two.
+    let clock = clock::set_up(rcc, &device.FLASH, &device.TIM11);
+    encoders::set_up();
+    let supply = Supply::set_up(device.ADC1, &device.ADC_COMMON);
+    let line = serial::set_up(&device.USART2, device.DMA1, clock.usart2_bus_hz(), buffer);
+    guard::watch_supply(&device.PWR, &device.EXTI);
+    // SAFETY: the tick's timer belongs to RTIC and stays untouched; nothing else uses the others.
     let mut core = unsafe { cortex_m::Peripherals::steal() };
+    guard::protect_stack(&core.MPU);
     core.DCB.enable_trace();
     core.DWT.enable_cycle_counter();
-    pins::set_status_led(clock == Clock::Full);
+    let wrong_chip = !guard::chip_is_right(&device.DBGMCU);
+    pins::set_status_led(clock == Clock::Full && !wrong_chip && !motor.has_failed());
     // Clears flags that were set while the pull-ups charged the inputs.
     let _ = (motor.was_stopped(), pins::driver_fault_was_reported(&device.EXTI));
+    let started = start(reset);
     let hardware = Hardware {
         motor,
         supply,
         exti: device.EXTI,
-        watchdog: Watchdog::new(device.IWDG),
+        power: device.PWR,
+        watchdog: Watchdog::start(device.IWDG, clock),
         clock_fault: clock == Clock::Fallback,
+        wrong_chip,
         overrun: false,
     };
-    (hardware, receiver, line, reset)
+    (hardware, line, started)
 }
 
 impl Board<SENSORS> for Hardware {
@@ -85,6 +96,9 @@ impl Board<SENSORS> for Hardware {
                 driver_fault: pins::driver_fault_was_reported(&self.exti) | levels.driver_fault(),
                 overrun: self.overrun,
                 clock_fault: self.clock_fault,
+                board_fault: self.wrong_chip
+                    | self.motor.has_failed()
+                    | guard::supply_was_low(&self.power, &self.exti),
             },
         }
     }
@@ -93,11 +107,10 @@ impl Board<SENSORS> for Hardware {
         self.motor.drive(output);
     }
 
-    /// Only a tick that ends before the next one is due is healthy. On the slow oscillator, ticks come too late for
-    /// the watchdog, but the motor is off then anyway.
+    /// Only a tick that ends before the next one is due is healthy.
     fn feed_watchdog(&mut self) {
         self.overrun = tick_is_due();
-        if !self.overrun && !self.clock_fault {
+        if !self.overrun {
             self.watchdog.feed();
         }
     }

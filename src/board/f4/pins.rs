@@ -1,6 +1,6 @@
 //! The pins: set up from the wiring, read and written by name.
 
-use stm32f4xx_hal::pac::{EXTI, GPIOA, GPIOB, GPIOC, GPIOD, RCC, SYSCFG};
+use stm32f4xx_hal::pac::{EXTI, GPIOA, GPIOB, GPIOC, GPIOD, SYSCFG};
 
 use super::wiring::{
     DIRECTION, DRIVER_FAULT, EMERGENCY_STOP, ENABLE, LIMIT_HIGH, LIMIT_LOW, Mode, STATUS_LEDS, WIRING, Wire,
@@ -52,10 +52,7 @@ const SET_UP: [Port; PORTS] = {
 };
 
 /// Sets up all pins. The outputs are low from the start, because the output registers hold 0 after a reset.
-pub(super) fn set_up(rcc: &RCC, syscfg: &SYSCFG, exti: &EXTI) {
-    rcc.ahb1enr()
-        .modify(|_, w| w.gpioaen().set_bit().gpioben().set_bit().gpiocen().set_bit().gpioden().set_bit());
-    rcc.apb2enr().modify(|_, w| w.syscfgen().set_bit());
+pub(super) fn set_up(syscfg: &SYSCFG, exti: &EXTI) {
     let bases = [GPIOA::PTR as usize, GPIOB::PTR as usize, GPIOC::PTR as usize, GPIOD::PTR as usize];
     for (base, port) in bases.into_iter().zip(&SET_UP) {
         let change = |offset: usize, covered: u32, value: u32| {

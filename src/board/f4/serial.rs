@@ -1,61 +1,102 @@
-//! The serial line: USART2, 460 800 baud, 8 data bits, no parity.
+//! The serial line: USART2, 460 800 baud, 8 data bits, no parity. Both directions go to and from memory without code, so
+//! no tick can be too long for a byte.
 
-use heapless::spsc::{Consumer, Producer};
-use stm32f4xx_hal::pac::{RCC, USART2};
-use upright::protocol::{BAUD, queue};
+use core::cell::UnsafeCell;
 
-/// Iterations of the loop that waits for the transmitter: at least 60 µs, three bytes.
-const PATIENCE: u32 = 2_500;
+use stm32f4xx_hal::pac::{DMA1, USART2};
+use upright::protocol::BAUD;
+use upright::protocol::serial_link::MAX_MESSAGE;
 
-/// The receiving half, used by the interrupt.
-pub(crate) struct Receiver {
-    received: Producer<'static, u8>,
+/// Received bytes that wait for the background task: more than arrive while it is not run.
+const RECEIVED: usize = 512;
+
+/// Memory for both directions, which the DMA controller shares with the code.
+pub(crate) struct Buffer {
+    /// Received bytes, round and round.
+    received: UnsafeCell<[u8; RECEIVED]>,
+    /// The frame that is being sent.
+    sent: UnsafeCell<[u8; MAX_MESSAGE]>,
 }
 
-/// The sending half, and the queue of received bytes.
+impl Buffer {
+    /// Nothing received, nothing to send.
+    pub(crate) const fn new() -> Self {
+        Self { received: UnsafeCell::new([0; RECEIVED]), sent: UnsafeCell::new([0; MAX_MESSAGE]) }
+    }
+}
+
+// Streams of DMA1 (RM0090, 10.3.3: channel 4 of both).
+const RECEIVE: usize = 5;
+const SEND: usize = 6;
+/// Channel 4, and memory addresses that count up.
+const BYTES_OF_USART2: u32 = 4 << 25 | 1 << 10;
+/// The flags of stream 6 in HIFCR.
+const SEND_FLAGS: u32 = 0x3d << 16;
+
+/// Both directions of the line.
 pub(crate) struct SerialLine {
-    received: Consumer<'static, u8>,
-    usart: USART2,
+    dma: DMA1,
+    buffer: &'static mut Buffer,
+    /// The next received byte to read.
+    next: usize,
 }
 
-/// Enables both halves; `clock` is the frequency of the bus (Hz).
-pub(super) fn set_up(
-    rcc: &RCC,
-    usart: USART2,
-    clock: u32,
-    (producer, consumer): (Producer<'static, u8>, Consumer<'static, u8>),
-) -> (Receiver, SerialLine) {
-    rcc.apb1enr().modify(|_, w| w.usart2en().set_bit());
-    // Sixteen samples per bit (RM0090, 30.3.4): the divisor has four fractional bits.
+/// Enables both directions; `clock` is the frequency of the bus (Hz).
+pub(super) fn set_up(usart: &USART2, dma: DMA1, clock: u32, buffer: &'static mut Buffer) -> SerialLine {
+    let data = USART2::PTR as u32 + 4;
+    let receive = dma.st(RECEIVE);
+    // SAFETY, here and below: values of the fields of RM0090, 10.5, and addresses of memory that is only the DMA
+    // controller's and this module's.
+    receive.par().write(|w| unsafe { w.bits(data) });
+    receive.m0ar().write(|w| unsafe { w.bits(buffer.received.get() as u32) });
+    receive.ndtr().write(|w| unsafe { w.bits(RECEIVED as u32) });
+    // Circular, from the peripheral.
+    receive.cr().write(|w| unsafe { w.bits(BYTES_OF_USART2 | 1 << 8 | 1) });
+    let send = dma.st(SEND);
+    send.par().write(|w| unsafe { w.bits(data) });
+    send.m0ar().write(|w| unsafe { w.bits(buffer.sent.get() as u32) });
+    // Sixteen samples per bit (30.3.4): the divisor has four fractional bits.
     // SAFETY: 35 to 91 at the clocks of this board.
     usart.brr().write(|w| unsafe { w.bits(((clock + BAUD / 2) / BAUD) as u16) });
-    usart.cr1().write(|w| w.ue().set_bit().te().set_bit().re().set_bit().rxneie().set_bit());
-    (Receiver { received: producer }, SerialLine { received: consumer, usart })
-}
-
-impl Receiver {
-    /// Queues a received byte. If the queue is full, the byte is lost, and the frame's checksum shows it.
-    pub(crate) fn interrupt(&mut self) {
-        // SAFETY: only this half reads status and data, in this order, which also clears an overrun (30.6.1).
-        let usart = unsafe { &*USART2::PTR };
-        let _ = usart.sr().read();
-        let _ = queue::put(&mut self.received, usart.dr().read().bits() as u8);
-    }
+    usart.cr3().write(|w| w.dmar().set_bit().dmat().set_bit());
+    usart.cr1().write(|w| w.ue().set_bit().te().set_bit().re().set_bit());
+    SerialLine { dma, buffer, next: 0 }
 }
 
 impl SerialLine {
     /// The next byte from the host, if any.
     pub(crate) fn read(&mut self) -> Option<u8> {
-        queue::take(&mut self.received)
+        let left = self.dma.st(RECEIVE).ndtr().read().bits() as usize;
+        if self.next == RECEIVED.wrapping_sub(left) % RECEIVED {
+            return None;
+        }
+        // SAFETY: within the buffer; the DMA controller writes whole bytes.
+        let byte = unsafe { self.buffer.received.get().cast::<u8>().add(self.next).read_volatile() };
+        self.next = (self.next + 1) % RECEIVED;
+        Some(byte)
     }
 
-    /// Sends a frame to the host. If the transmitter is not ready in time, drops the frame.
+    /// Whether the last frame is on its way, so that there is room for another one.
+    pub(crate) fn is_free(&self) -> bool {
+        self.dma.st(SEND).cr().read().bits() & 1 == 0
+    }
+
+    /// Sends a frame to the host; the line has to be free.
     pub(crate) fn write(&mut self, frame: &[u8]) {
-        for &byte in frame {
-            if !(0..PATIENCE).any(|_| self.usart.sr().read().txe().bit_is_set()) {
-                return;
-            }
-            self.usart.dr().write(|w| w.dr().set(byte.into()));
+        let sent = self.buffer.sent.get_mut();
+        let length = frame.len().min(sent.len());
+        for (byte, &from) in sent.iter_mut().zip(frame) {
+            *byte = from;
+        }
+        // The controller must not read before the bytes are there.
+        cortex_m::asm::dmb();
+        let send = self.dma.st(SEND);
+        // SAFETY: values of the fields of RM0090, 10.5; the stream is off.
+        unsafe {
+            self.dma.hifcr().write(|w| w.bits(SEND_FLAGS));
+            send.ndtr().write(|w| w.bits(length as u32));
+            // To the peripheral.
+            send.cr().write(|w| w.bits(BYTES_OF_USART2 | 1 << 6 | 1));
         }
     }
 }

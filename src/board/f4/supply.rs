@@ -1,40 +1,74 @@
 //! The supply voltage of the power stage.
 
-use stm32f4xx_hal::pac::{ADC_COMMON, ADC1, RCC};
+use stm32f4xx_hal::pac::{ADC_COMMON, ADC1};
 
-/// Volts per step of the converter: 12 bits for 3.3 V, behind a divider of 10 kΩ and 1 kΩ.
-const VOLTS_PER_STEP: f32 = 3.3 / 4096.0 * 11.0;
+/// Supply voltage over the voltage at the input: a divider of 10 kΩ and 1 kΩ.
+const DIVIDER: f32 = 11.0;
+
+/// The microcontroller's own supply (V), which the converter measures against, if it cannot be measured.
+const USUAL_REFERENCE_V: f32 = 3.3;
+
+/// Input 12 is the supply, input 17 the internal reference (RM0090, 13.10).
+const SUPPLY: u8 = 12;
+const REFERENCE: u8 = 17;
+
+/// The reference's reading at 3.3 V, measured at the factory (datasheet, internal reference voltage).
+const CALIBRATION: *const u16 = 0x1fff_7a2a as *const u16;
+
+/// Iterations of the loop that waits for a conversion: at least 100 µs.
+const PATIENCE: u32 = 5_000;
 
 /// The A/D converter; it makes one conversion per tick.
 pub(super) struct Supply {
     converter: ADC1,
+    volts_per_step: f32,
 }
 
 impl Supply {
-    /// Turns the converter on. The first tick starts the first conversion, long after the 3 µs that the converter
-    /// needs.
-    pub(super) fn set_up(rcc: &RCC, converter: ADC1, common: &ADC_COMMON) -> Self {
-        rcc.apb2enr().modify(|_, w| w.adc1en().set_bit());
-        // PCLK2 / 4 = 21 MHz; the maximum is 30 MHz (RM0090, 13.13.16).
+    /// Turns the converter on and measures the microcontroller's own supply, which is 3.0 V on some boards.
+    pub(super) fn set_up(converter: ADC1, common: &ADC_COMMON) -> Self {
+        // PCLK2 / 4 = 21 MHz; the maximum is 30 MHz (RM0090, 13.13.16). TSVREFE: the internal reference.
         // SAFETY, here and below: values of the fields described there.
-        common.ccr().write(|w| unsafe { w.adcpre().bits(0b01) });
-        // Input 12, sampled for 84 cycles: enough for 1 kΩ.
-        converter.smpr1().write(|w| unsafe { w.bits(0b100 << 6) });
-        converter.sqr3().write(|w| unsafe { w.bits(12) });
+        common.ccr().write(|w| unsafe { w.adcpre().bits(0b01).tsvrefe().set_bit() });
+        // Input 12 is sampled for 84 cycles, enough for 1 kΩ; input 17 for 480 cycles, 23 µs, of the 10 µs it needs.
+        converter.smpr1().write(|w| unsafe { w.bits(0b100 << 6 | 0b111 << 21) });
+        converter.sqr3().write(|w| unsafe { w.bits(REFERENCE.into()) });
         converter.cr2().write(|w| w.adon().set_bit());
-        Self { converter }
+        // Converter and reference need 3 µs and 10 µs to start (datasheet, tSTAB and tSTART).
+        cortex_m::asm::delay(super::CLOCK_HZ / 1_000_000 * 12);
+        let mut supply = Self { converter, volts_per_step: 0.0 };
+        supply.start_conversion();
+        let measured = (0..PATIENCE).find_map(|_| supply.result());
+        supply.converter.sqr3().write(|w| unsafe { w.bits(SUPPLY.into()) });
+        // SAFETY: the chip's own data; reading them has no side effect.
+        let calibration = unsafe { CALIBRATION.read_volatile() };
+        supply.volts_per_step =
+            reference_v(calibration.into(), measured.unwrap_or_default()) * DIVIDER / 4096.0;
+        supply
+    }
+
+    fn start_conversion(&self) {
+        self.converter.cr2().write(|w| w.adon().set_bit().swstart().set_bit());
+    }
+
+    /// The result of a conversion, once it has ended; reading it clears the flag (13.13.1).
+    fn result(&self) -> Option<f32> {
+        let ended = self.converter.sr().read().eoc().bit_is_set();
+        ended.then(|| self.converter.dr().read().bits() as f32)
     }
 
     /// The voltage measured in the previous tick (V); starts the next conversion, which takes 5 µs. If the converter
     /// has not finished, the voltage is 0 V.
     pub(super) fn volts(&mut self) -> f32 {
-        let volts = if self.converter.sr().read().eoc().bit_is_set() {
-            // Reading the result clears the flag (RM0090, 13.13.1).
-            self.converter.dr().read().bits() as f32 * VOLTS_PER_STEP
-        } else {
-            0.0
-        };
-        self.converter.cr2().write(|w| w.adon().set_bit().swstart().set_bit());
+        let volts = self.result().unwrap_or_default() * self.volts_per_step;
+        self.start_conversion();
         volts
     }
+}
+
+/// The microcontroller's own supply (V), from the factory's reading of the reference and from ours. What cannot be, such
+/// as memory without a calibration, gives the usual one.
+fn reference_v(calibration: f32, measured: f32) -> f32 {
+    let volts = 3.3 * calibration / measured;
+    if (2.5..3.7).contains(&volts) { volts } else { USUAL_REFERENCE_V }
 }

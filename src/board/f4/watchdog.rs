@@ -3,6 +3,8 @@
 use stm32f4xx_hal::pac::IWDG;
 use upright::gains::TICK_S;
 
+use super::clock::Clock;
+
 /// Watchdog counts in three ticks, at 32 kHz / 4. Its oscillator runs at 17 to 47 kHz, so the real time is two to six
 /// ticks. (The motor's timer does not depend on it.)
 const COUNTS: u16 = {
@@ -11,31 +13,38 @@ const COUNTS: u16 = {
     counts as u16
 };
 
-/// The watchdog. It starts with the first healthy tick; until then, the motor has never been on.
+/// Iterations of the loop that waits for the new values: at least 2 ms at 168 MHz. They arrive within five periods of
+/// the watchdog's oscillator, 0.3 ms, once it has started.
+const PATIENCE: u32 = 100_000;
+
+/// The watchdog, running. Nothing can stop it (RM0090, 21.3).
 pub(super) struct Watchdog {
     registers: IWDG,
-    running: bool,
 }
 
 impl Watchdog {
-    /// A watchdog that is not yet running.
-    pub(super) fn new(registers: IWDG) -> Self {
-        Self { registers, running: false }
-    }
-
-    /// Restarts the watchdog's count; starts the watchdog if necessary. Nothing can stop it afterwards (RM0090, 21.3).
-    pub(super) fn feed(&mut self) {
-        let watchdog = &self.registers;
+    /// Starts the watchdog and waits until the values have arrived: until then, a restart would begin at the value after
+    /// a reset, 512 ms (21.4.4). On the internal oscillator, ticks are 10.5 times as long; the watchdog then counts
+    /// 16 times as slowly.
+    pub(super) fn start(registers: IWDG, clock: Clock) -> Self {
+        let prescaler = if clock == Clock::Full { 0 } else { 4 };
         // SAFETY: keys, prescaler and reload value of RM0090, 21.4.
         unsafe {
-            if !self.running {
-                watchdog.kr().write(|w| w.bits(0xcccc));
-                watchdog.kr().write(|w| w.bits(0x5555));
-                watchdog.pr().write(|w| w.bits(0));
-                watchdog.rlr().write(|w| w.bits(COUNTS.into()));
-                self.running = true;
-            }
-            watchdog.kr().write(|w| w.bits(0xaaaa));
+            registers.kr().write(|w| w.bits(0xcccc));
+            registers.kr().write(|w| w.bits(0x5555));
+            registers.pr().write(|w| w.bits(prescaler));
+            registers.rlr().write(|w| w.bits(COUNTS.into()));
         }
+        // If it waits in vain, the watchdog starts at 512 ms; the motor's timer does not need it.
+        let _ = (0..PATIENCE).any(|_| registers.sr().read().bits() == 0);
+        let watchdog = Self { registers };
+        watchdog.feed();
+        watchdog
+    }
+
+    /// Restarts the watchdog's count.
+    pub(super) fn feed(&self) {
+        // SAFETY: a key of RM0090, 21.4.
+        self.registers.kr().write(|w| unsafe { w.bits(0xaaaa) });
     }
 }

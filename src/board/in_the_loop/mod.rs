@@ -10,7 +10,7 @@ mod usart;
 
 use core::sync::atomic::{AtomicU32, Ordering};
 
-use heapless::spsc::{Consumer, Producer};
+use heapless::spsc::{Consumer, Producer, Queue};
 use stm32f4xx_hal::pac::{Peripherals, TIM5};
 use upright::board::{Board, Inputs, Output};
 use upright::control::encoder::CounterWidth;
@@ -40,12 +40,14 @@ pub(crate) struct Hardware {
     spent: u32,
 }
 
-/// The interrupt of the serial line never occurs: its bytes arrive with the pins.
-pub(crate) struct Receiver;
+/// The bytes that have arrived with the pins.
+pub(crate) struct Buffer(Queue<u8, 128>);
 
-impl Receiver {
-    /// Nothing to do.
-    pub(crate) fn interrupt(&mut self) {}
+impl Buffer {
+    /// Empty.
+    pub(crate) const fn new() -> Self {
+        Self(Queue::new())
+    }
 }
 
 /// The serial line to the host.
@@ -60,6 +62,11 @@ impl SerialLine {
         self.received.dequeue()
     }
 
+    /// There is always room for a frame.
+    pub(crate) fn is_free(&self) -> bool {
+        true
+    }
+
     /// Sends a frame to the host.
     pub(crate) fn write(&mut self, frame: &[u8]) {
         self.serial.write(frame);
@@ -69,17 +76,19 @@ impl SerialLine {
 }
 
 /// Opens the channels and starts the counter of instructions.
-pub(crate) fn set_up(
+pub(crate) fn set_up<T>(
     device: Peripherals,
-    (producer, consumer): (Producer<'static, u8>, Consumer<'static, u8>),
-) -> (Hardware, Receiver, SerialLine, Reset) {
+    buffer: &'static mut Buffer,
+    start: impl FnOnce(Reset) -> T,
+) -> (Hardware, SerialLine, T) {
     let clock = device.TIM5;
     // 32 bits, one count per instruction.
     clock.arr().write(|w| w.arr().set(u32::MAX));
     clock.cr1().write(|w| w.cen().enabled());
     let (pins, serial) = open(device.USART1, device.USART2);
+    let (producer, consumer) = buffer.0.split();
     let hardware = Hardware { pins, frames: Frames::new(), received: producer, clock, spent: 0 };
-    (hardware, Receiver, SerialLine { received: consumer, serial }, Reset::Power)
+    (hardware, SerialLine { received: consumer, serial }, start(Reset::Power))
 }
 
 impl Board<SENSORS> for Hardware {

@@ -108,7 +108,8 @@ impl Dma {
     /// Where the next byte goes to or comes from, if the stream runs.
     pub(crate) fn next(&self, number: usize) -> Option<u32> {
         let stream = &self.streams[number];
-        let position = if stream.control & 1 << 10 != 0 { stream.length - stream.left } else { 0 };
+        let position =
+            if stream.control & 1 << 10 != 0 { stream.length.wrapping_sub(stream.left) } else { 0 };
         (stream.control & ENABLED != 0 && stream.left > 0).then(|| stream.memory.wrapping_add(position))
     }
 

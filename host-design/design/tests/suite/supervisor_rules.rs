@@ -276,6 +276,7 @@ fn event() -> impl Strategy<Value = Event> {
         driver_fault: b & d & e,
         overrun: a,
         clock_fault: a & b & c & d & e,
+        board_fault: a & b & !c & d & e,
     });
     prop_oneof![
         4 => request.prop_map(Event::Ask),

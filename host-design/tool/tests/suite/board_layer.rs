@@ -1,0 +1,212 @@
+//! What the flashed image does with hardware that is not as it has to be, on the virtual board.
+
+use upright::gains::{SENSORS, STATES, TABLE, TICK_S};
+use upright::protocol::frame::{self, Receiver};
+use upright::protocol::message::{Answer, Command, Message, Reply, Request, Telemetry};
+use upright::supervision::fault::Fault;
+use upright::supervision::inhibits::Inhibits;
+use upright::supervision::supervisor::State;
+use upright_board::{Board, Chip, Conditions, Image, Input, Rules, Wire, Wiring, pin, seconds};
+use upright_tool::image::{Kind, build_if_possible};
+
+const BAUD: u32 = 460_800;
+const TIM1: u32 = 0x4001_0000;
+const RCC_CR: u32 = 0x4002_3800;
+
+/// The image; none without a compiler.
+fn image() -> Option<Image> {
+    let elf = build_if_possible(Kind::F405).unwrap()?;
+    Some(Image::from_elf(&std::fs::read(elf).unwrap()).unwrap())
+}
+
+/// A board with all contacts closed and the motor's supply on.
+struct Powered {
+    board: Board,
+    frames: Receiver<512>,
+    telemetry: Vec<Telemetry<STATES, SENSORS>>,
+    replies: Vec<Reply>,
+}
+
+impl Powered {
+    fn with(image: &Image, conditions: &Conditions, rules: Rules) -> Self {
+        let mut board = Board::power_on(image, conditions, Wiring::upright(), rules).unwrap();
+        for contact in [pin('B', 12), pin('C', 0), pin('C', 1)] {
+            board.apply(Input::Level(contact, Wire::Low));
+        }
+        board.apply(Input::Supply(24.0));
+        Self { board, frames: Receiver::new(), telemetry: Vec::new(), replies: Vec::new() }
+    }
+
+    fn strict(image: &Image, conditions: &Conditions) -> Self {
+        Self::with(image, conditions, Rules::STRICT)
+    }
+
+    /// Runs to this time after power-on, and reads what the board sends at its baud rate: a byte with another length of
+    /// its bits cannot be read.
+    fn run(&mut self, time_s: f64) {
+        self.board.run_until(seconds(time_s)).unwrap();
+        for byte in self.board.sent() {
+            let baud = seconds(1.0) as f64 / byte.bit as f64;
+            assert!((baud / f64::from(BAUD) - 1.0).abs() < 0.03, "{baud} baud");
+            match self.frames.push::<Message<STATES, SENSORS>>(byte.value) {
+                Some(Ok(Message::Telemetry(telemetry))) => self.telemetry.push(telemetry),
+                Some(Ok(Message::Reply(reply))) => self.replies.push(reply),
+                Some(Err(error)) => panic!("{error:?}"),
+                None => {}
+            }
+        }
+    }
+
+    fn ask(&mut self, id: u64, request: Request) {
+        let (mut scratch, mut out) = ([0; 64], [0; 64]);
+        let frame = frame::encode(&Command { id, request }, &mut scratch, &mut out).unwrap();
+        self.board.send(frame, BAUD);
+    }
+
+    fn last(&self) -> (State, Option<Fault>) {
+        self.telemetry.last().map(|telemetry| (telemetry.state, telemetry.fault)).expect("telemetry")
+    }
+}
+
+fn with_crystal(hz: u32, hsi_hz: u32) -> Conditions {
+    let mut conditions = Conditions { hsi_hz, ..Conditions::f405(3) };
+    conditions.crystal.hz = hz;
+    conditions
+}
+
+#[test]
+fn nothing_in_the_image_breaks_a_rule_of_the_manuals() {
+    let Some(image) = image() else { return };
+    for seed in 1..4 {
+        let mut run = Powered::strict(&image, &Conditions::f405(seed));
+        run.run(0.1);
+        assert_eq!(run.last(), (State::Disarmed, None));
+        assert!(run.telemetry.len() >= 8 && run.board.notes().is_empty());
+    }
+}
+
+/// A write that comes too early after the clock is lost; here every single one of the motor's timer.
+#[test]
+fn a_lost_write_to_the_motors_timer_keeps_the_motor_off() {
+    let Some(image) = image() else { return };
+    for (offset, name) in [(0x2c, "ARR"), (0x30, "RCR"), (0x18, "CCMR1"), (0x20, "CCER"), (0x44, "BDTR")] {
+        let mut run = Powered::strict(&image, &Conditions::f405(1));
+        run.board.apply(Input::LoseWrite(TIM1 + offset));
+        run.run(0.05);
+        assert_eq!(run.last(), (State::Fault, Some(Fault::Board)), "{name}");
+        assert!(!run.board.power_stage().main_output, "{name}");
+    }
+    // Another register's write may be lost: the compare value is written again in every tick.
+    let mut run = Powered::strict(&image, &Conditions::f405(1));
+    run.board.apply(Input::LoseWrite(TIM1 + 0x34));
+    run.run(0.05);
+    assert_eq!(run.last(), (State::Disarmed, None));
+}
+
+#[test]
+fn the_image_for_the_board_ends_a_wait_for_the_clock_with_its_fault() {
+    let Some(image) = image() else { return };
+    let mut run = Powered::strict(&image, &with_crystal(0, 16_000_000));
+    run.run(1.0);
+    assert!(run.telemetry.len() > 5, "{}", run.telemetry.len());
+    for telemetry in run.telemetry {
+        assert_eq!((telemetry.state, telemetry.fault), (State::Fault, Some(Fault::Clock)));
+        assert_eq!(telemetry.drive, 0.0);
+    }
+}
+
+#[test]
+fn another_crystal_is_noticed_and_told_at_the_right_baud_rate() {
+    let Some(image) = image() else { return };
+    let fault = (State::Fault, Some(Fault::Clock));
+    for (hz, hsi_hz, expected) in [
+        (8_000_000, 16_160_000, (State::Disarmed, None)),
+        (8_000_000, 15_840_000, (State::Disarmed, None)),
+        (12_000_000, 16_000_000, fault),
+        (25_000_000, 16_000_000, fault),
+        (16_000_000, 16_000_000, fault),
+        (4_000_000, 16_000_000, fault),
+        (8_400_000, 16_000_000, fault),
+        (7_600_000, 16_000_000, fault),
+        (0, 16_000_000, fault),
+    ] {
+        let mut run = Powered::strict(&image, &with_crystal(hz, hsi_hz));
+        run.run(0.5);
+        assert_eq!(run.last(), expected, "{hz} Hz against {hsi_hz} Hz");
+        assert_eq!(run.board.resets(), 0, "the watchdog is fed on the slow clock, too");
+    }
+}
+
+/// The write that switches the PLL on is lost: the next one to this register after the crystal has been measured.
+#[test]
+fn a_pll_that_does_not_start_is_told_at_the_right_baud_rate() {
+    let Some(image) = image() else { return };
+    let mut run = Powered::strict(&image, &Conditions::f405(1));
+    run.board.at(seconds(0.002_2), Input::LoseWrite(RCC_CR));
+    run.run(0.5);
+    assert_eq!(run.last(), (State::Fault, Some(Fault::Clock)));
+    assert_eq!(run.board.core_hz(), 16_000_000);
+}
+
+#[test]
+fn another_chip_is_noticed() {
+    let Some(image) = image() else { return };
+    let conditions = Conditions { chip: Chip::F446, ..Conditions::f405(1) };
+    let mut run = Powered::strict(&image, &conditions);
+    run.run(0.05);
+    assert_eq!(run.last(), (State::Fault, Some(Fault::Board)));
+}
+
+/// A bit of the first gain flips in flash before power comes.
+#[test]
+fn a_damaged_table_is_told_and_cannot_be_cleared() {
+    let Some(image) = image() else { return };
+    let gains: Vec<u32> =
+        TABLE.laws.lqr.as_ref().unwrap().k.iter().take(3).map(|gain| gain.to_bits()).collect();
+    let mut run = Powered::strict(&image, &Conditions::f405(1));
+    let words = (0x0800_0000..0x0801_0000).step_by(4);
+    let here = |at: &u32| (0..3).all(|i| run.board.word(at + 4 * i) == Some(gains[i as usize]));
+    let address = words.into_iter().find(here).expect("the table is in flash");
+    run.board.apply(Input::FlipBit { address, bit: 5 });
+    run.run(0.05);
+    assert_eq!(run.last(), (State::Fault, Some(Fault::Table)));
+    run.ask(1, Request::Clear);
+    run.run(0.1);
+    assert_eq!(run.last(), (State::Fault, Some(Fault::Table)));
+    assert_eq!(run.replies, [Reply { id: 1, answer: Answer::NotNow(Inhibits::TABLE) }]);
+    stop_the_crystal(&mut run);
+}
+
+/// The crystal stops: the handler stops the program, and the watchdog resets within six ticks.
+fn stop_the_crystal(run: &mut Powered) {
+    run.board.apply(Input::StopCrystal);
+    let end = run.board.now() + 6 * seconds(f64::from(TICK_S));
+    run.board.run_until(end).unwrap();
+    assert_eq!(run.board.resets(), 1);
+}
+
+/// At the earliest moment: the values of the watchdog must have arrived before its first tick.
+#[test]
+fn the_watchdog_resets_in_time_from_the_first_tick_on() {
+    let Some(image) = image() else { return };
+    for lsi_hz in [17_000, 32_000, 47_000] {
+        let mut run = Powered::strict(&image, &Conditions { lsi_hz, ..Conditions::f405(1) });
+        while run.board.exception() != 15 {
+            run.board.run_until(run.board.now() + 1).unwrap();
+        }
+        stop_the_crystal(&mut run);
+    }
+}
+
+#[test]
+fn a_low_supply_of_the_chip_is_noticed_however_short_it_is() {
+    let Some(image) = image() else { return };
+    let mut run = Powered::strict(&image, &Conditions::f405(1));
+    run.run(0.05);
+    assert_eq!(run.last(), (State::Disarmed, None));
+    run.board.apply(Input::ChipSupply(2.6));
+    run.run(0.050_01);
+    run.board.apply(Input::ChipSupply(3.3));
+    run.run(0.1);
+    assert_eq!(run.last(), (State::Fault, Some(Fault::Board)));
+}

@@ -1,0 +1,50 @@
+//! What guards the program: memory below the stack, the microcontroller's own supply, the chip itself.
+
+use cortex_m::peripheral::MPU;
+use stm32f4xx_hal::pac::{DBGMCU, EXTI, PWR};
+
+/// Device identifier of the chip that the image is for (RM0090, 38.6.1; RM0390, 33.6.1).
+const CHIP: u32 = if cfg!(feature = "stm32f446") { 0x421 } else { 0x413 };
+
+/// Line of EXTI that the voltage detector is connected to (RM0090, 12.2.5).
+const DETECTOR: u32 = 1 << 16;
+
+/// Whether this is the chip that the image is for. While a debugger holds the processor, the watchdog waits.
+pub(super) fn chip_is_right(debug: &DBGMCU) -> bool {
+    debug.apb1_fz().modify(|_, w| w.dbg_iwdg_stop().set_bit());
+    debug.idcode().read().bits() & 0xfff == CHIP
+}
+
+/// Makes every access to the 64 KiB below the stack a fault: the stack is at the start of the memory, and writes to the
+/// reserved space before it may be ignored. (The factory's data are there, too: read them before.)
+pub(super) fn protect_stack(mpu: &MPU) {
+    // SAFETY: nothing uses this space; all other memory stays as it is (PRIVDEFENA).
+    unsafe {
+        mpu.rbar.write(0x1fff_0000 | 1 << 4);
+        // No access, not executable, 2^16 bytes.
+        mpu.rasr.write(1 << 28 | 15 << 1 | 1);
+        mpu.ctrl.write(1 << 2 | 1);
+    }
+    cortex_m::asm::dsb();
+    cortex_m::asm::isb();
+}
+
+/// Starts the detector of a low supply: below 2.76 V or so; 168 MHz needs 2.7 V (RM0090, 5.4.1).
+pub(super) fn watch_supply(power: &PWR, exti: &EXTI) {
+    // Full voltage scaling, as after a reset; level 5; on.
+    // SAFETY: values of the fields described there.
+    power.cr().modify(|_, w| unsafe { w.pls().bits(5).pvde().set_bit() });
+    exti.rtsr().modify(|_, w| w.tr16().set_bit());
+    exti.imr().modify(|_, w| w.mr16().set_bit());
+}
+
+/// Whether the supply has been low since the last call.
+pub(super) fn supply_was_low(power: &PWR, exti: &EXTI) -> bool {
+    let was_low = exti.pr().read().bits() & DETECTOR != 0;
+    if was_low {
+        // Writing a one clears this bit and no other.
+        // SAFETY: any combination of bits is allowed.
+        exti.pr().write(|w| unsafe { w.bits(DETECTOR) });
+    }
+    was_low || power.csr().read().pvdo().bit_is_set()
+}
