@@ -136,11 +136,11 @@ fn hessenberg<R: Real>(mut a: Matrix<R>) -> Matrix<R> {
             }
             let factor = a[(i, column)].clone() / &a[(m, column)];
             for j in column..n {
-                let step = factor.clone() * &a[(m, j)];
-                a[(i, j)] = a[(i, j)].clone() - &step;
+                let step = factor.times(&a[(m, j)]);
+                a[(i, j)] = a[(i, j)].minus(&step);
             }
             for k in 0..n {
-                let step = factor.clone() * &a[(k, i)];
+                let step = factor.times(&a[(k, i)]);
                 a[(k, m)] = a[(k, m)].clone() + &step;
             }
             a[(i, column)] = R::zero();
@@ -245,21 +245,21 @@ fn francis_step<R: Real>(h: &mut Matrix<R>, start: usize, last: usize, exception
         for j in k..n {
             let mut dot = R::zero();
             for (i, component) in v.iter().enumerate().take(width) {
-                dot = dot + &(component.clone() * &h[(k + i, j)]);
+                dot = dot + &component.times(&h[(k + i, j)]);
             }
             let dot = dot * &scale;
             for (i, component) in v.iter().enumerate().take(width) {
-                h[(k + i, j)] = h[(k + i, j)].clone() - &(component.clone() * &dot);
+                h[(k + i, j)] = h[(k + i, j)].minus(&component.times(&dot));
             }
         }
         for i in 0..=(k + 3).min(last) {
             let mut dot = R::zero();
             for (j, component) in v.iter().enumerate().take(width) {
-                dot = dot + &(component.clone() * &h[(i, k + j)]);
+                dot = dot + &component.times(&h[(i, k + j)]);
             }
             let dot = dot * &scale;
             for (j, component) in v.iter().enumerate().take(width) {
-                h[(i, k + j)] = h[(i, k + j)].clone() - &(component.clone() * &dot);
+                h[(i, k + j)] = h[(i, k + j)].minus(&component.times(&dot));
             }
         }
     }

@@ -95,7 +95,7 @@ impl<R: Real> Matrix<R> {
 
     /// Every entry times `factor`.
     pub fn scaled(&self, factor: &R) -> Self {
-        self.map(|entry| entry.clone() * factor)
+        self.map(|entry| entry.times(factor))
     }
 
     /// `(X + Xᵀ) / 2`: removes rounding errors that spoil the symmetry of a result.
@@ -183,7 +183,7 @@ impl<R: Real> Mul for &Matrix<R> {
                     continue; // models are sparse, and products of wide numbers are slow
                 }
                 for j in 0..right.cols {
-                    let term = right[(k, j)].clone() * factor;
+                    let term = right[(k, j)].times(factor);
                     let entry = &mut product[(i, j)];
                     *entry = term + entry;
                 }
@@ -205,7 +205,7 @@ impl<R: Real> Sub for &Matrix<R> {
     type Output = Matrix<R>;
     fn sub(self, right: &Matrix<R>) -> Matrix<R> {
         assert_eq!((self.rows, self.cols), (right.rows, right.cols), "dimensions of a difference");
-        Matrix::from_fn(self.rows, self.cols, |i, j| self[(i, j)].clone() - &right[(i, j)])
+        Matrix::from_fn(self.rows, self.cols, |i, j| self[(i, j)].minus(&right[(i, j)]))
     }
 }
 

@@ -41,6 +41,14 @@ pub trait Real:
     /// `self · 2^power`, exact unless it overflows or underflows.
     fn scale_by_power_of_two(&self, power: i32) -> Self;
 
+    /// `self · other`, without the copy that the operator needs.
+    fn times(&self, other: &Self) -> Self {
+        self.clone() * other
+    }
+    /// `self - other`, without the copy that the operator needs.
+    fn minus(&self, other: &Self) -> Self {
+        self.clone() - other
+    }
     /// 0.
     fn zero() -> Self {
         Self::from_f64(0.0)

@@ -60,8 +60,8 @@ impl<R: Real> Lu<R> {
                 let factor = lu[(i, k)].clone() / &lu[(k, k)];
                 for j in k + 1..n {
                     if !lu[(k, j)].is_zero() {
-                        let step = factor.clone() * &lu[(k, j)];
-                        lu[(i, j)] = lu[(i, j)].clone() - &step;
+                        let step = factor.times(&lu[(k, j)]);
+                        lu[(i, j)] = lu[(i, j)].minus(&step);
                     }
                 }
                 lu[(i, k)] = factor;
@@ -93,8 +93,8 @@ impl<R: Real> Lu<R> {
     fn eliminate(&self, x: &mut Matrix<R>, i: usize, k: usize, column: usize) {
         let (factor, known) = (&self.factors[(i, k)], &x[(k, column)]);
         if !factor.is_zero() && !known.is_zero() {
-            let step = known.clone() * factor;
-            x[(i, column)] = x[(i, column)].clone() - &step;
+            let step = known.times(factor);
+            x[(i, column)] = x[(i, column)].minus(&step);
         }
     }
 }

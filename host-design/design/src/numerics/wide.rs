@@ -101,14 +101,14 @@ impl Add<&Self> for Wide {
 impl Sub<&Self> for Wide {
     type Output = Self;
     fn sub(self, other: &Self) -> Self {
-        Self(self.0.sub(&other.0, Self::bits(), ROUNDING))
+        self.minus(other)
     }
 }
 
 impl Mul<&Self> for Wide {
     type Output = Self;
     fn mul(self, other: &Self) -> Self {
-        Self(self.0.mul(&other.0, Self::bits(), ROUNDING))
+        self.times(other)
     }
 }
 
@@ -152,6 +152,18 @@ impl Real for Wide {
     }
     fn pi() -> Self {
         Self::zero().with_constants(|_, constants| constants.pi(Self::bits(), ROUNDING))
+    }
+    fn times(&self, other: &Self) -> Self {
+        Self(self.0.mul(&other.0, Self::bits(), ROUNDING))
+    }
+    fn minus(&self, other: &Self) -> Self {
+        Self(self.0.sub(&other.0, Self::bits(), ROUNDING))
+    }
+    fn abs(&self) -> Self {
+        Self(self.0.abs())
+    }
+    fn is_zero(&self) -> bool {
+        self.0.is_zero()
     }
     fn is_finite(&self) -> bool {
         !(self.0.is_nan() || self.0.is_inf())

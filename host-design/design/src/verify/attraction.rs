@@ -93,55 +93,99 @@ pub fn attraction(
     law: Law,
     settings: &AttractionSettings,
 ) -> Result<Attraction, Unverifiable> {
-    within("relative", settings.relative, 1e-6..=1.0, "a width from 1e-6 to 1")?;
-    within("largest_angle_rad", settings.largest_angle_rad, 1e-6..=1.5, "an angle from 1e-6 to 1.5 rad")?;
-    within("largest_step_m", settings.largest_step_m, 1e-6..=1e6, "a step from 1e-6 to 1e6 m")?;
-    let horizon = settings.horizon.widened(rig, table, law)?;
-    let settings = &AttractionSettings { horizon, ..*settings };
-    let (tilts, worst) = match chain(rig, "links") {
-        Ok(chain) => {
-            let mirrored = chain.cart.travel_m[0] == -chain.cart.travel_m[1];
-            let sides = sides(chain.links.len(), mirrored);
-            tilts(rig, table, law, settings, mirrored, &sides)?
-        }
-        Err(_) => (Vec::new(), None),
-    };
-    Ok(Attraction { law, horizon, tilts, worst, raw_step: raw_step(rig, table, law, settings)? })
+    let settings = &settings.widened(rig, table, law)?;
+    // All searches at once: none of them waits for the slowest of another kind.
+    let ((tilts, worst), raw_step) = rayon::join(
+        || {
+            rayon::join(
+                || single_tilts(rig, table, law, settings),
+                || worst_tilt(rig, table, law, settings),
+            )
+        },
+        || raw_step(rig, table, law, settings),
+    );
+    Ok(Attraction { law, horizon: settings.horizon, tilts: tilts?, worst: worst?, raw_step: raw_step? })
 }
 
-fn tilts(
+/// The edges of [`attraction`] for each link alone; empty for a model.
+///
+/// # Errors
+/// As for [`attraction`].
+pub fn largest_tilts(
     rig: &Rig,
     table: &TableValues,
     law: Law,
     settings: &AttractionSettings,
-    mirrored: bool,
-    sides: &[Vec<i8>],
-) -> Result<(Vec<Tilt>, Option<WorstTilt>), SimulationError> {
-    let links = rig.states() / 2 - 1;
-    let lean = |direction: &[i8]| {
-        search(rig, table, settings, settings.largest_angle_rad, |size| {
-            let angles: Vec<f64> = direction.iter().map(|&side| size * f64::from(side)).collect();
-            Scenario { start: leaning(rig, &angles), ..scenario(rig, law, settings.horizon.duration_s) }
-        })
-    };
+) -> Result<Vec<Tilt>, Unverifiable> {
+    Ok(single_tilts(rig, table, law, &settings.widened(rig, table, law)?)?)
+}
+
+impl AttractionSettings {
+    /// With the horizon [widened](Horizon::widened) for the law's limit cycle.
+    fn widened(&self, rig: &Rig, table: &TableValues, law: Law) -> Result<Self, Unverifiable> {
+        within("relative", self.relative, 1e-6..=1.0, "a width from 1e-6 to 1")?;
+        within("largest_angle_rad", self.largest_angle_rad, 1e-6..=1.5, "an angle from 1e-6 to 1.5 rad")?;
+        within("largest_step_m", self.largest_step_m, 1e-6..=1e6, "a step from 1e-6 to 1e6 m")?;
+        Ok(Self { horizon: self.horizon.widened(rig, table, law)?, ..*self })
+    }
+}
+
+/// Links of the rig, 0 for a model, and whether its rail is symmetric.
+fn links(rig: &Rig) -> (usize, bool) {
+    chain(rig, "links").map_or((0, true), |chain| {
+        let [low, high] = chain.cart.travel_m;
+        (chain.links.len(), low == -high)
+    })
+}
+
+/// The edge for links that lean to the sides in `direction`; 0: upright.
+fn lean(
+    rig: &Rig,
+    table: &TableValues,
+    law: Law,
+    settings: &AttractionSettings,
+    direction: &[i8],
+) -> Result<Edge, SimulationError> {
+    search(rig, table, settings, settings.largest_angle_rad, |size| {
+        let angles: Vec<f64> = direction.iter().map(|&side| size * f64::from(side)).collect();
+        Scenario { start: leaning(rig, &angles), ..scenario(rig, law, settings.horizon.duration_s) }
+    })
+}
+
+fn single_tilts(
+    rig: &Rig,
+    table: &TableValues,
+    law: Law,
+    settings: &AttractionSettings,
+) -> Result<Vec<Tilt>, SimulationError> {
+    let (links, mirrored) = links(rig);
     let alone = |(link, side): (usize, i8)| {
         let direction: Vec<i8> = (0..links).map(|other| if other == link { side } else { 0 }).collect();
-        Ok(Tilt { link: link + 1, edge: lean(&direction)? })
+        Ok(Tilt { link: link + 1, edge: lean(rig, table, law, settings, &direction)? })
     };
     let single: Vec<(usize, i8)> = (0..links)
         .flat_map(|link| [(link, 1), (link, -1)])
         .filter(|&(_, side)| side > 0 || !mirrored)
         .collect();
     let all: Vec<Tilt> = single.into_par_iter().map(alone).collect::<Result<_, SimulationError>>()?;
-    let tilts = all
-        .chunks(if mirrored { 1 } else { 2 })
-        .filter_map(|pair| pair.iter().min_by(|a, b| a.edge.size.total_cmp(&b.edge.size)).cloned())
-        .collect();
-    let edges: Vec<Edge> =
-        sides.par_iter().map(|signs| lean(signs)).collect::<Result<_, SimulationError>>()?;
+    let worse = |pair: &[Tilt]| pair.iter().min_by(|a, b| a.edge.size.total_cmp(&b.edge.size)).cloned();
+    Ok(all.chunks(if mirrored { 1 } else { 2 }).filter_map(worse).collect())
+}
+
+fn worst_tilt(
+    rig: &Rig,
+    table: &TableValues,
+    law: Law,
+    settings: &AttractionSettings,
+) -> Result<Option<WorstTilt>, SimulationError> {
+    let (links, mirrored) = links(rig);
+    let sides = sides(links, mirrored);
+    let edges: Vec<Edge> = sides
+        .par_iter()
+        .map(|signs| lean(rig, table, law, settings, signs))
+        .collect::<Result<_, SimulationError>>()?;
     let worst = sides.iter().zip(edges).min_by(|(_, a), (_, b)| a.size.total_cmp(&b.size));
-    let worst = worst.map(|(signs, edge)| WorstTilt { signs: signs.clone(), edge, tried: sides.len() });
-    Ok((tilts, worst))
+    Ok(worst.map(|(signs, edge)| WorstTilt { signs: signs.clone(), edge, tried: sides.len() }))
 }
 
 fn raw_step(
@@ -182,6 +226,9 @@ fn search(
 
 /// Combinations of sides for `links` links; without mirror images if `mirrored`.
 fn sides(links: usize, mirrored: bool) -> Vec<Vec<i8>> {
+    if links == 0 {
+        return Vec::new();
+    }
     let side = |negative: bool| if negative { -1 } else { 1 };
     let first: Vec<Vec<i8>> = if links <= LINKS_FOR_ALL_SIDES {
         (0..1u32 << (links - 1))

@@ -4,7 +4,7 @@ use serde::Serialize;
 use upright::table::Law;
 
 use crate::design::{Certified, DesignError};
-use crate::numerics::{Real, eigenvalues, spectral_radius};
+use crate::numerics::{Complex, Real, eigenvalues, spectral_radius};
 use crate::rig::Rig;
 use crate::simulate::SimulationError;
 use crate::table::TableValues;
@@ -70,16 +70,14 @@ pub fn linear(
     for law in Law::ALL {
         let Some(numbers) = loop_model::Numbers::<f64>::of_table(table, law) else { continue };
         let model = LoopModel::with_numbers(certified, &numbers);
-        let poles = eigenvalues(&model.matrix).map_err(|_| VerifyError::Poles)?;
-        let poles: Vec<[f64; 2]> = poles.iter().map(crate::numerics::Complex::to_f64).collect();
-        let spectral_radius = poles.iter().map(|pole| pole[0].hypot(pole[1])).fold(0.0, f64::max);
+        let (poles, spectral_radius) = poles(&model)?;
         let stable = spectral_radius < 1.0;
         let tick_s = rig.tick.period_s;
         let (mut margins, mut tick, mut noise) = (None, None, None);
         if stable {
             let grid = margins::Grid::of(&model)?;
-            margins = Some(margins::margins(certified, &numbers, &model, &grid, tick_s)?);
-            tick = Some(tick::limits(certified, &numbers, &model, &grid, tick_s)?);
+            margins = Some(margins::margins(certified, &numbers, &grid, tick_s)?);
+            tick = Some(tick::limits(certified, &numbers, &grid, tick_s)?);
             noise = covariance::covariance(rig, certified, &model, table.observer.is_some())?;
         }
         let as_designed = loop_model::exact_law(certified, table, law)
@@ -97,6 +95,35 @@ pub fn linear(
         });
     }
     Ok(reports)
+}
+
+/// The margins of [`linear`] alone; none if the table does not hold `law` or its loop is unstable.
+///
+/// # Errors
+/// [`VerifyError`] if they cannot be computed.
+pub fn margins_of(
+    rig: &Rig,
+    certified: &Certified,
+    table: &TableValues,
+    law: Law,
+) -> Result<Option<Margins>, VerifyError> {
+    let Some(numbers) = loop_model::Numbers::<f64>::of_table(table, law) else { return Ok(None) };
+    let model = LoopModel::with_numbers(certified, &numbers);
+    let (_, spectral_radius) = poles(&model)?;
+    let stable = spectral_radius < 1.0;
+    if !stable {
+        return Ok(None);
+    }
+    let grid = margins::Grid::of(&model)?;
+    margins::margins(certified, &numbers, &grid, rig.tick.period_s).map(Some)
+}
+
+/// Poles of the loop as [re, im], by real part, and the largest absolute value of one.
+fn poles(model: &LoopModel<f64>) -> Result<(Vec<[f64; 2]>, f64), VerifyError> {
+    let poles = eigenvalues(&model.matrix).map_err(|_| VerifyError::Poles)?;
+    let poles: Vec<[f64; 2]> = poles.iter().map(Complex::to_f64).collect();
+    let spectral_radius = poles.iter().map(|pole| pole[0].hypot(pole[1])).fold(0.0, f64::max);
+    Ok((poles, spectral_radius))
 }
 
 pub(super) fn radius<R: Real>(model: &LoopModel<R>) -> Result<f64, VerifyError> {

@@ -2,6 +2,7 @@
 
 use core::f64::consts::PI;
 
+use rayon::prelude::*;
 use serde::Serialize;
 
 use super::loop_model::{ControllerModel, LoopModel, Numbers, PlantModel};
@@ -43,12 +44,15 @@ pub struct Margins {
     pub disk_margin_rad_per_s: f64,
 }
 
-/// Frequencies to look at (rad per tick), dense around every pole of the loop.
-pub(super) struct Grid(Vec<f64>);
+/// The loop's response at frequencies (rad per tick) that are dense around each of its poles; none on a pole.
+pub(super) struct Grid<'m> {
+    model: &'m LoopModel<f64>,
+    points: Vec<(f64, Option<Response>)>,
+}
 
-impl Grid {
+impl<'m> Grid<'m> {
     /// From a hundredth of the slowest pole to Nyquist.
-    pub(super) fn of(model: &LoopModel<f64>) -> Result<Self, VerifyError> {
+    pub(super) fn of(model: &'m LoopModel<f64>) -> Result<Self, VerifyError> {
         const POINTS: usize = 1500;
         let poles = eigenvalues(&model.matrix).map_err(|_| VerifyError::Poles)?;
         // A pole p is at frequency arg p and as wide as its distance from the circle.
@@ -64,20 +68,27 @@ impl Grid {
         omegas.retain(|omega| (low..PI).contains(omega));
         omegas.extend([0.0, PI]);
         omegas.sort_by(f64::total_cmp);
-        Ok(Self(omegas))
+        let points = omegas.into_par_iter().map(|omega| (omega, model.response(omega))).collect();
+        Ok(Self { model, points })
+    }
+
+    /// `f` at every point; NaN on a pole.
+    fn values(&self, f: impl Fn(f64, &Response) -> f64) -> Vec<f64> {
+        let at = |(omega, response): &(f64, Option<Response>)| response.as_ref().map_or(f64::NAN, |r| f(*omega, r));
+        self.points.iter().map(at).collect()
     }
 
     /// The largest value of `f` and where it is, every local maximum near the top refined by golden section.
-    pub(super) fn maximum(&self, model: &LoopModel<f64>, f: impl Fn(f64, &Response) -> f64) -> (f64, f64) {
-        let at = |omega: f64| model.response(omega).map_or(f64::NAN, |r| f(omega, &r));
-        let values: Vec<f64> = self.0.iter().map(|&omega| at(omega)).collect();
+    pub(super) fn maximum(&self, f: impl Fn(f64, &Response) -> f64) -> (f64, f64) {
+        let at = |omega: f64| self.model.response(omega).map_or(f64::NAN, |r| f(omega, &r));
+        let values = self.values(&f);
         let top = values.iter().copied().fold(0.0, f64::max);
         let mut best = (0.0, 0.0);
         for i in 0..values.len() {
             let (before, after) = (i.saturating_sub(1), (i + 1).min(values.len() - 1));
             if values[i] >= 0.8 * top && values[i] >= values[before] && values[i] >= values[after] {
-                let refined = golden(&at, self.0[before], self.0[after]);
-                for candidate in [refined, (self.0[i], values[i])] {
+                let refined = golden(&at, self.points[before].0, self.points[after].0);
+                for candidate in [refined, (self.points[i].0, values[i])] {
                     if candidate.1 > best.1 {
                         best = candidate;
                     }
@@ -88,13 +99,13 @@ impl Grid {
     }
 
     /// Where `f` changes its sign, by bisection.
-    fn zeros(&self, model: &LoopModel<f64>, f: impl Fn(&Response) -> f64) -> Vec<f64> {
-        let at = |omega: f64| model.response(omega).map_or(f64::NAN, |r| f(&r));
-        let values: Vec<f64> = self.0.iter().map(|&omega| at(omega)).collect();
+    fn zeros(&self, f: impl Fn(&Response) -> f64) -> Vec<f64> {
+        let at = |omega: f64| self.model.response(omega).map_or(f64::NAN, |r| f(&r));
+        let values = self.values(|_, r| f(r));
         let mut zeros = Vec::new();
-        for (omega, value) in self.0.windows(2).zip(values.windows(2)) {
+        for (point, value) in self.points.windows(2).zip(values.windows(2)) {
             if value[0] * value[1] < 0.0 {
-                let (mut low, mut high) = (omega[0], omega[1]);
+                let (mut low, mut high) = (point[0].0, point[1].0);
                 while high - low > 1e-13 * high {
                     let middle = 0.5 * (low + high);
                     if middle <= low || middle >= high {
@@ -131,14 +142,14 @@ fn golden(f: &impl Fn(f64) -> f64, mut low: f64, mut high: f64) -> (f64, f64) {
 pub(super) fn margins(
     certified: &Certified,
     numbers: &Numbers<f64>,
-    model: &LoopModel<f64>,
-    grid: &Grid,
+    grid: &Grid<'_>,
     tick_s: f64,
 ) -> Result<Margins, VerifyError> {
+    let model = grid.model;
     // 1 + g L = 0 with g real where 1/L = S/T is.
     let inverse = |r: &Response| r.s / r.t;
     let mut factors = Vec::new();
-    for omega in grid.zeros(model, |r| inverse(r).im).into_iter().chain([0.0, PI]) {
+    for omega in grid.zeros(|r| inverse(r).im).into_iter().chain([0.0, PI]) {
         if let Some(response) = model.response(omega) {
             let q = inverse(&response);
             // A sign change through a pole of 1/L is none through 0.
@@ -150,7 +161,7 @@ pub(super) fn margins(
     let lowest_gain = factors.iter().copied().filter(|&g| g < 1.0).fold(0.0, f64::max);
     let highest_gain = factors.iter().copied().filter(|&g| g > 1.0).min_by(f64::total_cmp);
 
-    let crossovers = grid.zeros(model, |r| r.t.norm_sqr() - r.s.norm_sqr());
+    let crossovers = grid.zeros(|r| r.t.norm_sqr() - r.s.norm_sqr());
     let mut phase_margin_rad = None::<f64>;
     let mut delay_guess = f64::INFINITY;
     for &omega in &crossovers {
@@ -161,9 +172,9 @@ pub(super) fn margins(
         delay_guess = delay_guess.min(lag.rem_euclid(2.0 * PI) / omega);
     }
     let delay_margin_ticks = delay_margin(certified, numbers, tick_s, delay_guess)?;
-    let sensitivity = grid.maximum(model, |_, r| r.s.norm_sqr().sqrt());
-    let complementary = grid.maximum(model, |_, r| r.t.norm_sqr().sqrt());
-    let disk = grid.maximum(model, |_, r| (r.s - r.t).norm_sqr().sqrt());
+    let sensitivity = grid.maximum(|_, r| r.s.norm_sqr().sqrt());
+    let complementary = grid.maximum(|_, r| r.t.norm_sqr().sqrt());
+    let disk = grid.maximum(|_, r| (r.s - r.t).norm_sqr().sqrt());
     Ok(Margins {
         lowest_gain,
         highest_gain,

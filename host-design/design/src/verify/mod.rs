@@ -24,7 +24,7 @@ mod trial;
 use linear::radius;
 
 pub use attraction::{
-    Attraction, AttractionSettings, Axis, Edge, Map, Tilt, WorstTilt, attraction, attraction_map,
+    Attraction, AttractionSettings, Axis, Edge, Map, Tilt, WorstTilt, attraction, attraction_map, largest_tilts,
 };
 pub use certificate::Certificate;
 pub use corners::{
@@ -33,7 +33,7 @@ pub use corners::{
 };
 pub use covariance::NoiseShare;
 pub use encoder::{CoarsestEncoder, EncoderSettings, coarser, coarsest_encoder};
-pub use linear::{LinearReport, VerifyError, linear};
+pub use linear::{LinearReport, VerifyError, linear, margins_of};
 pub use loop_model::{ControllerModel, LoopModel, PlantModel};
 pub use margins::Margins;
 pub use monte_carlo::{MonteCarlo, Spread, WorstCase, monte_carlo, sample, wilson};

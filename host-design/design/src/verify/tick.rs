@@ -51,8 +51,7 @@ pub(super) fn loop_at(certified: &Certified, numbers: &Numbers<f64>, period: f64
 pub(super) fn limits(
     certified: &Certified,
     numbers: &Numbers<f64>,
-    model: &LoopModel<f64>,
-    grid: &Grid,
+    grid: &Grid<'_>,
     tick_s: f64,
 ) -> Result<TickLimits, VerifyError> {
     let unstable = |period: f64| Ok(radius(&loop_at(certified, numbers, period))? >= 1.0);
@@ -62,12 +61,12 @@ pub(super) fn limits(
     let (a, b) = (&certified.double.a, &certified.double.b);
     let spread = integrated_quadratic(&a.transpose(), &(b * &b.transpose()), &tick_s);
     let difference = |omega: f64| 2.0 * (0.5 * omega).sin();
-    let (_, gain) = grid.maximum(model, |omega, r| {
+    let (_, gain) = grid.maximum(|omega, r| {
         let (re, im): (Vec<f64>, Vec<f64>) = r.kick_to_force.iter().map(|h| (h.re, h.im)).unzip();
         let power = quadratic(&spread, &re) + quadratic(&spread, &im);
         difference(omega) * (tick_s * power.max(0.0)).sqrt()
     });
-    let (_, whole) = grid.maximum(model, |omega, r| difference(omega) * r.t.norm_sqr().sqrt());
+    let (_, whole) = grid.maximum(|omega, r| difference(omega) * r.t.norm_sqr().sqrt());
     let jitter_ticks = jitter(1.0 / (gain * gain));
     Ok(TickLimits {
         longest_stable_s: longer.map(|bracket| bracket.0),

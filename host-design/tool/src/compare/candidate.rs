@@ -9,7 +9,7 @@ use upright_design::design::{Certified, design};
 use upright_design::rig::Rig;
 use upright_design::simulate::{Scenario, SimulationError, Summary, simulate};
 use upright_design::table::{Gains, TableValues};
-use upright_design::verify::{AttractionSettings, Margins, attraction, linear};
+use upright_design::verify::{AttractionSettings, Margins, largest_tilts, margins_of};
 
 /// A rig to compare, and the value of the swept key in it.
 #[derive(Debug, Clone, PartialEq)]
@@ -145,12 +145,10 @@ fn designed(rig: &Rig, conditions: &Conditions) -> Result<(Certified, TableValue
 
 fn figures(rig: &Rig, law: Law, certified: &Certified, table: &TableValues, summary: &Summary) -> Figures {
     // An unstable loop and one whose margins cannot be computed both have none.
-    let report = linear(rig, certified, table).ok().and_then(|mut reports| reports.pop());
-    let stable = report.as_ref().is_some_and(|report| report.stable);
-    let margins = report.and_then(|report| report.margins);
+    let margins = margins_of(rig, certified, table, law).ok().flatten();
     let settings = AttractionSettings { relative: TILT_PRECISION, ..AttractionSettings::default() };
-    let attraction = stable.then(|| attraction(rig, table, law, &settings).ok()).flatten();
-    let tilts = attraction.iter().flat_map(|attraction| &attraction.tilts).map(|tilt| tilt.edge.size);
+    let tilts = margins.as_ref().and_then(|_| largest_tilts(rig, table, law, &settings).ok());
+    let tilts = tilts.into_iter().flatten().map(|tilt| tilt.edge.size);
     let poles = certified.poles.in_table(law)[0];
     let margin = |of: fn(&Margins) -> Option<f64>| margins.as_ref().and_then(of);
     Figures {
