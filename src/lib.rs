@@ -1,7 +1,8 @@
 //! Balances an n-link inverted pendulum on a cart from a microcontroller: controller, supervisor and serial protocol.
 //!
-//! Once per tick, data flows `encoder counts → estimate → force → motor duty`. All constants come from a gain table that the
-//! host tool `upright design RIG` writes from one rig file. The same code runs on the target, in simulations and in tests.
+//! Once per tick, data flows `encoder counts → estimate → force → motor duty`. All constants come from a gain table
+//! that the host tool `upright design RIG` writes from one rig file. The same code runs on the target, in simulations
+//! and in tests.
 //!
 //! | module | what is in it |
 //! |---|---|

@@ -1,7 +1,7 @@
 //! Commands to the whole firmware: a run starts from a clone of one that balances, is armed, is raised, or hangs.
 //!
-//! The bytes of a run spell what happens to it: requests in good frames, which get past the checksum, damaged and repeated
-//! frames, bytes that are no frame, contacts, the supply, a push by hand, and time.
+//! The bytes of a run spell what happens to it: requests in good frames, which get past the checksum, damaged and
+//! repeated frames, bytes that are no frame, contacts, the supply, a push by hand, and time.
 
 use std::sync::OnceLock;
 
@@ -73,7 +73,8 @@ struct Run<'q> {
 }
 
 impl Run<'_> {
-    /// One step: three bits of `what` say how many ticks follow it, five bits what happens, with the next bytes as operand.
+    /// One step: three bits of `what` say how many ticks follow it, five bits what happens, with the next bytes as
+    /// operand.
     fn step(&mut self, what: u8, bytes: &mut impl Iterator<Item = u8>) {
         let mut next = || bytes.next().unwrap_or_default();
         match what >> 3 {
@@ -113,8 +114,8 @@ impl Run<'_> {
             }
             24 => (0..next() % 32).for_each(|_| self.tick()),
             25 => {
-                // Coverage does not lead to a single value of 16 bits. So every input tries 32 values of its own, which its
-                // hash chooses: mutations alone prefer few values.
+                // Coverage does not lead to a single value of 16 bits. So every input tries 32 values of its own,
+                // which its hash chooses: mutations alone prefer few values.
                 let first = self.hash & !31;
                 for period_ticks in first..=first | 31 {
                     self.send(Request::Telemetry(period_ticks));

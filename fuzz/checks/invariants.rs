@@ -1,5 +1,5 @@
-//! What holds after every tick, whatever was sent. Worked out from the inputs and the replies alone, not by the firmware's
-//! own functions: a condition that the firmware forgets is still known here.
+//! What holds after every tick, whatever was sent. Worked out from the inputs and the replies alone, not by the
+//! firmware's own functions: a condition that the firmware forgets is still known here.
 
 use std::collections::VecDeque;
 

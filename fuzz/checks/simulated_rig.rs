@@ -108,7 +108,8 @@ impl Start {
     }
 }
 
-/// The way from power-up to balancing as a person goes it, with the states on it: `[hanging, raised, armed, balancing]`.
+/// The way from power-up to balancing as a person goes it, with the states on it:
+/// `[hanging, raised, armed, balancing]`.
 ///
 /// Hanging is just powered up; raised is homed, checked, upright and still; armed is two ticks before balancing.
 pub(crate) fn starts() -> [Start; 4] {

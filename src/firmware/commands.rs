@@ -97,9 +97,9 @@ impl<const NX: usize, const NY: usize> Firmware<'_, NX, NY> {
 
     /// Arms. `id` is that of the command.
     fn arm(&mut self, id: u64) -> Result<(), Inhibits> {
-        // A key held down since the fault sends one arm command after the other. None of them may arm: each one restarts
-        // the lockout, which ends only when the key has been released for `still_ticks`. The time that counts as standing
-        // still for homing also counts as letting go; nothing speaks for a key of its own in the rig file.
+        // A key held down since the fault sends one arm command after the other. None of them may arm: each one
+        // restarts the lockout, which ends only when the key has been released for `still_ticks`. The time that counts
+        // as standing still for homing also counts as letting go; nothing speaks for a key of its own in the rig file.
         if self.supervisor.state() == State::Fault || self.rearm_lockout_ticks > 0 {
             self.rearm_lockout_ticks = self.table.limits.still_ticks;
         }

@@ -1,8 +1,8 @@
 //! The whole firmware, tick by tick: inputs → supervisor → controller → output, then commands and telemetry.
 //!
-//! Here the other rooms are put together. [`Firmware`] knows neither registers nor frames; [`control_task`] connects it to
-//! a board and to the serial link. The answer to a new request is written in `commands.rs`; a new condition on arming in
-//! `posture.rs`; a new field of telemetry in `telemetry.rs`.
+//! Here the other rooms are put together. [`Firmware`] knows neither registers nor frames; [`control_task`] connects
+//! it to a board and to the serial link. The answer to a new request is written in `commands.rs`; a new condition on
+//! arming in `posture.rs`; a new field of telemetry in `telemetry.rs`.
 
 mod commands;
 pub mod control_task;
@@ -260,8 +260,8 @@ impl<'t, const NX: usize, const NY: usize> Firmware<'t, NX, NY> {
         self.supervisor.start_balancing();
     }
 
-    /// Second half of a tick: telemetry if it is due, the prediction for the next tick, and the reply to `command`, if one
-    /// has arrived. `cycles` is the execution time of the tick before (processor cycles).
+    /// Second half of a tick: telemetry if it is due, the prediction for the next tick, and the reply to `command`, if
+    /// one has arrived. `cycles` is the execution time of the tick before (processor cycles).
     pub fn finish(
         &mut self,
         command: Option<&Command>,

@@ -6,9 +6,9 @@ use crate::supervision::inhibits::Inhibits;
 use crate::supervision::sign_check::Signs;
 use crate::supervision::supervisor::State;
 
-/// Arming requires that the rig has been slow for this part of [`Limits::arm_ticks`]: long enough to refuse it while a link
-/// swings through the vertical, short enough that a steady hand is never told to wait. The whole of `arm_ticks` has to pass
-/// after arming before the motor is on.
+/// Arming requires that the rig has been slow for this part of [`Limits::arm_ticks`]: long enough to refuse it while a
+/// link swings through the vertical, short enough that a steady hand is never told to wait. The whole of `arm_ticks`
+/// has to pass after arming before the motor is on.
 ///
 /// [`Limits::arm_ticks`]: crate::table::Limits::arm_ticks
 const MOVING_PART_OF_ARM_TICKS: u32 = 4;

@@ -6,7 +6,8 @@
 //!
 //! A collection is a JSON array of objects with `id`, matrices `A`, `B`, `Q`, `R` as row arrays, an optional `S`
 //! (its presence makes the problem a sampled one), the known gain `K` (from 1000 bits), and `degenerate` for problems
-//! whose closed loop lies on the stability boundary. Exit status 1 if the gain of any non-degenerate problem is not correctly rounded.
+//! whose closed loop lies on the stability boundary. Exit status 1 if the gain of any non-degenerate problem is not
+//! correctly rounded.
 
 use std::process::ExitCode;
 use std::time::Instant;
@@ -45,8 +46,8 @@ impl Problem {
         Ok(regulator.k.round_to_f64_rows())
     }
 
-    /// The known gain. Entries below `2^-960` of the largest are the rounding error of a calculation with 1000 bits: the
-    /// answer there is zero.
+    /// The known gain. Entries below `2^-960` of the largest are the rounding error of a calculation with 1000 bits:
+    /// the answer there is zero.
     fn known_gain(&self) -> Vec<Vec<f64>> {
         let largest = self.k.iter().flatten().fold(0.0f64, |largest, entry| largest.max(entry.abs()));
         let noise = largest * 2f64.powi(-960);

@@ -1,5 +1,5 @@
-//! The command line `upright`, as a library: figures, the report, firmware images and where they run, fault campaigns, the
-//! monitor, comparisons and the paper's results. Models, design and simulation are those of `upright-design`.
+//! The command line `upright`, as a library: figures, the report, firmware images and where they run, fault campaigns,
+//! the monitor, comparisons and the paper's results. Models, design and simulation are those of `upright-design`.
 //!
 //! | module | what is in it |
 //! |---|---|

@@ -41,9 +41,9 @@ pub struct Recording {
     pub worst_cycles: u32,
 }
 
-/// Runs `scenario` with the firmware `target`, which has the table `table`, against the plant of `rig`. A hand homes the
-/// rig while it hangs, checks the signs, raises the links and holds them at the scenario's start until the firmware begins
-/// to balance. It lets go in that tick, which is time 0.
+/// Runs `scenario` with the firmware `target`, which has the table `table`, against the plant of `rig`. A hand homes
+/// the rig while it hangs, checks the signs, raises the links and holds them at the scenario's start until the
+/// firmware begins to balance. It lets go in that tick, which is time 0.
 ///
 /// # Errors
 /// [`HarnessError`] if the firmware cannot run this scenario, or does not begin to balance.
@@ -108,8 +108,8 @@ fn check(scenario: &Scenario, period_s: f64) -> Result<(), HarnessError> {
     Ok(())
 }
 
-/// Ticks from sending a command to the first tick that follows it: it is executed at the end of the tick after the one it
-/// came with.
+/// Ticks from sending a command to the first tick that follows it: it is executed at the end of the tick after the one
+/// it came with.
 const COMMAND_TICKS: usize = 3;
 
 /// A tick whose telemetry has not come yet.

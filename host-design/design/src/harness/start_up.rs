@@ -28,8 +28,8 @@ pub struct Harness<'t> {
 }
 
 impl<'t> Harness<'t> {
-    /// The rig hanging at rest, held by hand, and `target`, which has just started and has the table `table`. It is told
-    /// to use the law of `scenario` and to send telemetry in every tick.
+    /// The rig hanging at rest, held by hand, and `target`, which has just started and has the table `table`. It is
+    /// told to use the law of `scenario` and to send telemetry in every tick.
     ///
     /// # Errors
     /// [`HarnessError`] if the firmware is for another rig, or refuses the law.
@@ -78,8 +78,8 @@ impl<'t> Harness<'t> {
         self.session.tick(&inputs)
     }
 
-    /// Homes, checks the signs, raises the links and arms. Ends with the first tick in which the motor is on, and gives
-    /// that tick's output.
+    /// Homes, checks the signs, raises the links and arms. Ends with the first tick in which the motor is on, and
+    /// gives that tick's output.
     ///
     /// `setpoint_m` is commanded as soon as the firmware is armed; from then on it needs a command every
     /// [`HEARTBEAT_S`](super::HEARTBEAT_S). Without a set-point it holds the position in which it begins.

@@ -12,8 +12,8 @@ pub type Pins = PinsIn<MAX_SENSORS>;
 
 /// The firmware, wherever it runs.
 pub trait Target {
-    /// One tick: takes the pins, gives the output, and appends to `serial` what the firmware has sent over the serial line
-    /// since the tick before. What it sends about this tick comes with the next one.
+    /// One tick: takes the pins, gives the output, and appends to `serial` what the firmware has sent over the serial
+    /// line since the tick before. What it sends about this tick comes with the next one.
     ///
     /// # Errors
     /// [`HarnessError`] if the firmware does not answer.

@@ -35,6 +35,7 @@ pub use sensors::Sensor;
 
 use serde::Serialize;
 use sha2::{Digest, Sha256};
+use upright::table::Law;
 
 /// A rig file, read and checked.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -63,6 +64,19 @@ pub struct Rig {
 }
 
 impl Rig {
+    /// The rig with `law` alone: whether the other one has a design does not matter to it.
+    pub fn with_law_alone(&self, law: Law) -> Self {
+        let mut rig = self.clone();
+        match law {
+            Law::Lqr => rig.pole_placement = None,
+            Law::PolePlacement => {
+                rig.lqr = None;
+                rig.integral = None;
+            }
+        }
+        rig
+    }
+
     /// Number of states: 2n + 2 for n links, or the order of the model.
     pub fn states(&self) -> usize {
         self.plant.states()

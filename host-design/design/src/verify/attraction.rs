@@ -96,12 +96,7 @@ pub fn attraction(
     let settings = &settings.widened(rig, table, law)?;
     // All searches at once: none of them waits for the slowest of another kind.
     let ((tilts, worst), raw_step) = rayon::join(
-        || {
-            rayon::join(
-                || single_tilts(rig, table, law, settings),
-                || worst_tilt(rig, table, law, settings),
-            )
-        },
+        || rayon::join(|| single_tilts(rig, table, law, settings), || worst_tilt(rig, table, law, settings)),
         || raw_step(rig, table, law, settings),
     );
     Ok(Attraction { law, horizon: settings.horizon, tilts: tilts?, worst: worst?, raw_step: raw_step? })
@@ -275,7 +270,9 @@ pub struct Map {
 }
 
 /// Runs every start of the plane, with `horizon` [widened](Horizon::widened) for the law's limit cycle. `done` is
-/// called after each run, from any thread.
+/// called for each start, from any thread.
+///
+/// Of two mirror images only one is run if rail and plane are symmetric, because then the loop is, too.
 ///
 /// # Errors
 /// [`Unverifiable`] if the runs cannot be started or an axis names no state.
@@ -301,8 +298,16 @@ pub fn attraction_map(
         done();
         Ok(outcome.at_rest_after_s)
     };
-    let cells: Vec<Option<f64>> =
-        (0..across.points * down.points).into_par_iter().map(cell).collect::<Result<_, SimulationError>>()?;
+    let all = across.points * down.points;
+    let (_, is_rail_symmetric) = links(rig);
+    let mirrored = is_rail_symmetric && [across, down].iter().all(|axis| axis.range[0] == -axis.range[1]);
+    let run = if mirrored { all.div_ceil(2) } else { all };
+    let mut cells: Vec<Option<f64>> =
+        (0..run).into_par_iter().map(cell).collect::<Result<_, SimulationError>>()?;
+    for image in (0..all - run).rev() {
+        cells.push(cells[image]);
+        done();
+    }
     Ok(Map { across, down, settled_s: cells.chunks(across.points).map(<[_]>::to_vec).collect() })
 }
 

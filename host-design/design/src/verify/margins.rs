@@ -74,7 +74,9 @@ impl<'m> Grid<'m> {
 
     /// `f` at every point; NaN on a pole.
     fn values(&self, f: impl Fn(f64, &Response) -> f64) -> Vec<f64> {
-        let at = |(omega, response): &(f64, Option<Response>)| response.as_ref().map_or(f64::NAN, |r| f(*omega, r));
+        let at = |(omega, response): &(f64, Option<Response>)| {
+            response.as_ref().map_or(f64::NAN, |r| f(*omega, r))
+        };
         self.points.iter().map(at).collect()
     }
 

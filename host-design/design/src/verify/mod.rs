@@ -24,7 +24,8 @@ mod trial;
 use linear::radius;
 
 pub use attraction::{
-    Attraction, AttractionSettings, Axis, Edge, Map, Tilt, WorstTilt, attraction, attraction_map, largest_tilts,
+    Attraction, AttractionSettings, Axis, Edge, Map, Tilt, WorstTilt, attraction, attraction_map,
+    largest_tilts,
 };
 pub use certificate::Certificate;
 pub use corners::{

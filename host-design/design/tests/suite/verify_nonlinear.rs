@@ -66,6 +66,28 @@ fn the_edges_of_attraction_are_edges() {
 }
 
 #[test]
+fn a_map_of_which_half_is_run_is_the_whole_map() {
+    let (rig, table) = &*SINGLE;
+    let axis = |state, end: f64| Axis { state, range: [-end, end], points: 4 };
+    let axes = [axis(2, 0.6), axis(3, 3.0)];
+    let horizon = Horizon::default();
+    let map =
+        |axes: [Axis; 2]| attraction_map(rig, table, Law::Lqr, axes, &horizon, &|| ()).unwrap().settled_s;
+    let whole = map(axes);
+    let start = |axis: Axis, index: usize| {
+        let value = axis.range[0] + 2.0 * axis.range[1] * index as f64 / 3.0;
+        Axis { range: [value, value], points: 1, ..axis }
+    };
+    for (row, column) in [(0, 0), (1, 1), (1, 2), (2, 1), (2, 2), (2, 3), (3, 0), (3, 3)] {
+        let alone = map([start(axes[0], column), start(axes[1], row)]);
+        assert_eq!(whole[row][column], alone[0][0], "{row} {column}");
+    }
+    // Negative control: the map is not the same from right to left.
+    let reversed = whole.iter().map(|row| row.iter().rev().copied().collect::<Vec<_>>());
+    assert!(!reversed.eq(whole.iter().cloned()), "{whole:?}");
+}
+
+#[test]
 fn links_that_lean_to_different_sides_are_worse() {
     let (rig, table) = &*PAPER;
     let settings = AttractionSettings { relative: 0.1, ..AttractionSettings::default() };

@@ -51,11 +51,11 @@ pub enum Kind {
 /// The outcome that a defect must have.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Expected {
-    /// Motor off with this fault, at most this number of ticks after the onset. Where the list of faults gives no number, the
-    /// rig's limits do.
+    /// Motor off with this fault, at most this number of ticks after the onset. Where the list of faults gives no
+    /// number, the rig's limits do.
     Fault(Fault, Ticks),
-    /// Motor off, with any fault. At its best that takes this number of ticks from the first visible difference to a healthy
-    /// rig; in any case it comes before a link is far beyond its limit.
+    /// Motor off, with any fault. At its best that takes this number of ticks from the first visible difference to a
+    /// healthy rig; in any case it comes before a link is far beyond its limit.
     Off(u32),
     /// Balancing goes on, and the rejected measurement is counted.
     Counted,

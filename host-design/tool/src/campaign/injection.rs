@@ -68,7 +68,8 @@ impl<'a> Injection<'a> {
         self.trial.kind != Kind::HostSilent || since.is_none()
     }
 
-    /// Changes what the firmware reads, `since` ticks after the onset; gives whether it differs visibly from a healthy rig.
+    /// Changes what the firmware reads, `since` ticks after the onset; gives whether it differs visibly from a healthy
+    /// rig.
     pub(super) fn inputs(&mut self, since: usize, inputs: &mut Pins) -> bool {
         let Trial { kind, sensor, sign, size, .. } = *self.trial;
         let truth = inputs.raw_counts.clone();

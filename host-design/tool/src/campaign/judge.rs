@@ -20,8 +20,8 @@ pub enum Class {
     Rejected,
     /// The motor went off in time.
     Detected,
-    /// The motor went off before a link was more than a quarter beyond its limit or the cart off its rail, but later than
-    /// the best time of its kind: the observer follows an encoder whose error grows slowly.
+    /// The motor went off before a link was more than a quarter beyond its limit or the cart off its rail, but later
+    /// than the best time of its kind: the observer follows an encoder whose error grows slowly.
     Late,
     /// The required outcome did not happen.
     Missed,

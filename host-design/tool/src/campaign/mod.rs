@@ -1,7 +1,7 @@
 //! Fault injection: the whole firmware in the loop, one defect per run, and the outcome.
 //!
-//! A [`Kind`] of defect has an [`Expected`] outcome. A [`Trial`] is a run with one defect, drawn from the campaign's seed
-//! and its number, so that any of them can be run again alone. [`campaign`] runs many and counts the outcomes.
+//! A [`Kind`] of defect has an [`Expected`] outcome. A [`Trial`] is a run with one defect, drawn from the campaign's
+//! seed and its number, so that any of them can be run again alone. [`campaign`] runs many and counts the outcomes.
 
 mod attempt;
 mod defect;

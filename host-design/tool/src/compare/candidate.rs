@@ -91,7 +91,10 @@ pub fn compare(
 }
 
 fn row(candidate: &Candidate, law: Law, conditions: &Conditions) -> Result<Row, SimulationError> {
-    let rig = with_one_law(candidate, law, conditions);
+    let mut rig = candidate.rig.with_law_alone(law);
+    if conditions.full_state {
+        rig.kalman = None;
+    }
     let row = Row {
         rig: candidate.label.clone(),
         value: candidate.value,
@@ -117,22 +120,6 @@ fn row(candidate: &Candidate, law: Law, conditions: &Conditions) -> Result<Row, 
         None => Fate::Standing,
     };
     Ok(Row { fate, figures: Some(figures), trace: Some(trace), ..row })
-}
-
-/// The rig with this law alone: whether the other has a design does not matter here.
-fn with_one_law(candidate: &Candidate, law: Law, conditions: &Conditions) -> Rig {
-    let mut rig = candidate.rig.clone();
-    match law {
-        Law::Lqr => rig.pole_placement = None,
-        Law::PolePlacement => {
-            rig.lqr = None;
-            rig.integral = None;
-        }
-    }
-    if conditions.full_state {
-        rig.kalman = None;
-    }
-    rig
 }
 
 /// Design and table, or the reason why there is none.

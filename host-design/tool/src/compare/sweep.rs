@@ -92,8 +92,8 @@ impl Sweep {
     /// The rig of `text` with `value` for the key. A key that is not in the text, but could be, is added.
     ///
     /// # Errors
-    /// As for any rig file: unknown keys with a suggestion, bad values with the accepted range. An error has no line where
-    /// the key had to be added.
+    /// As for any rig file: unknown keys with a suggestion, bad values with the accepted range. An error has no line
+    /// where the key had to be added.
     pub fn rig(&self, text: &str, file: &Path, value: f64) -> Result<Rig, RigError> {
         let number = if value.abs() < 1e15 { format!("{value}") } else { format!("{value:e}") };
         match self.place(text) {

@@ -23,7 +23,8 @@ const PROGRAM: &str = "qemu-system-arm";
 /// How the pins of the image are connected.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Link {
-    /// Files of the emulator (semihosting): the image with the feature `in-the-loop`. They are FIFOs, which only Unix has.
+    /// Files of the emulator (semihosting): the image with the feature `in-the-loop`. They are FIFOs, which only Unix
+    /// has.
     Files,
     /// Serial lines: the image with the feature `in-the-loop-usart`.
     Usart,

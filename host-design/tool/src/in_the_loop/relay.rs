@@ -38,11 +38,12 @@ impl From<EmulatorError> for RelayError {
 /// Runs the firmware of `table` with the plant of `rig` for the duration of `scenario`, in real time from the first
 /// client on, and passes the bytes of its serial line to and from whoever is connected to `listener`, one at a time.
 ///
-/// Before that, the hand has homed, checked and raised the rig, and balancing has begun. While the motor is off, the hand
-/// holds the rig at the scenario's start, so that it can be armed again.
+/// Before that, the hand has homed, checked and raised the rig, and balancing has begun. While the motor is off, the
+/// hand holds the rig at the scenario's start, so that it can be armed again.
 ///
 /// # Errors
-/// [`RelayError`] if the firmware does not run, the socket fails, or no client connects within the duration of the run.
+/// [`RelayError`] if the firmware does not run, the socket fails, or no client connects within the duration of the
+/// run.
 pub fn serve(
     rig: &Rig,
     table: &TableValues,
@@ -136,7 +137,8 @@ fn receive(stream: &mut TcpStream) -> Option<Vec<u8>> {
     }
 }
 
-/// Sends to the client; gives whether it is still connected. As on a serial line, what it does not take in time is lost.
+/// Sends to the client; gives whether it is still connected. As on a serial line, what it does not take in time is
+/// lost.
 fn send(stream: &mut TcpStream, mut bytes: &[u8]) -> bool {
     while !bytes.is_empty() {
         match stream.write(bytes) {

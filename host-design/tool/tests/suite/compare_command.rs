@@ -1,31 +1,10 @@
 //! `upright compare` and `upright reproduce` as a user or a script sees them.
 
-use std::process::{Command, Output};
+use std::process::Command;
 
+use crate::command::{SINGLE, path_of, status, stderr, stdout, upright};
 use crate::published::rig_path;
 use serde_json::Value;
-
-const SINGLE: &str = "single-quanser-ip02";
-
-fn upright(arguments: &[&str]) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_upright")).args(arguments).output().unwrap()
-}
-
-fn status(output: &Output) -> i32 {
-    output.status.code().unwrap()
-}
-
-fn stdout(output: &Output) -> &str {
-    std::str::from_utf8(&output.stdout).unwrap()
-}
-
-fn stderr(output: &Output) -> &str {
-    std::str::from_utf8(&output.stderr).unwrap()
-}
-
-fn path_of(name: &str) -> String {
-    rig_path(name).to_str().unwrap().to_owned()
-}
 
 #[test]
 fn rows_and_files_agree() {

@@ -2,6 +2,7 @@
 
 mod board_layer;
 mod campaign;
+mod command;
 mod command_line;
 mod compare_command;
 mod compare_sweep;

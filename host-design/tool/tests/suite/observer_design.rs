@@ -1,6 +1,6 @@
 //! Kalman gain and integral action: compared with closed forms, and properties of every design.
 
-use crate::published::{rig, rig_of};
+use crate::published::{designed, rig, rig_of};
 use upright_design::design::{Certified, DesignError, Feedback, design, is_stable_sampled};
 use upright_design::numerics::{Matrix, Real, Wide, spectral_radius, with_precision};
 use upright_design::rig::{Integral, Rig};
@@ -19,7 +19,7 @@ fn observer_loop(rig: &Rig, certified: &Certified, l: &Matrix<f64>) -> Matrix<f6
 #[test]
 fn the_predictor_gain_is_the_filter_gain_carried_over_one_tick() {
     for name in WITH_ENCODERS {
-        let certified = design(&rig(name)).unwrap();
+        let certified = designed(name);
         let (ad, kalman) = (&certified.double.ad, certified.double.kalman.as_ref().unwrap());
         let product = ad * &kalman.l_filter;
         let sizes = &ad.map(|entry| entry.abs()) * &kalman.l_filter.map(|entry| entry.abs());
@@ -36,13 +36,13 @@ fn the_predictor_gain_is_the_filter_gain_carried_over_one_tick() {
 fn the_observer_of_every_rig_is_stable() {
     for name in WITH_ENCODERS {
         let rig = rig(name);
-        let certified = design(&rig).unwrap();
+        let certified = designed(name);
         let l = &certified.double.kalman.as_ref().unwrap().l_predictor;
-        let radius = spectral_radius(&observer_loop(&rig, &certified, l)).unwrap();
+        let radius = spectral_radius(&observer_loop(&rig, certified, l)).unwrap();
         assert!(radius < 1.0, "{name}: {radius}");
         // Negative controls: the pendulum without correction, and corrected the wrong way.
         for wrong in [l.scaled(&0.0), l.scaled(&-1.0)] {
-            let radius = spectral_radius(&observer_loop(&rig, &certified, &wrong)).unwrap();
+            let radius = spectral_radius(&observer_loop(&rig, certified, &wrong)).unwrap();
             assert!(radius > 1.0, "{name}: {radius}");
         }
     }
@@ -177,8 +177,10 @@ fn integral_action_of_a_scalar_plant_is_the_closed_form_correctly_rounded() {
     }
 }
 
+/// The LQR alone, with integral action and without observer: neither of the others depends on it.
 fn with_weight(name: &str, position_weight: f64, delay_ticks: u8) -> Rig {
-    let mut rig = Rig { integral: Some(Integral { position_weight }), ..rig(name) };
+    let integral = Some(Integral { position_weight });
+    let mut rig = Rig { integral, pole_placement: None, kalman: None, ..rig(name) };
     rig.tick.delay_ticks = delay_ticks;
     rig
 }
@@ -227,6 +229,6 @@ fn the_integral_gain_vanishes_with_its_weight_and_the_rest_becomes_the_plain_law
 
 #[test]
 fn a_rig_without_integral_has_none() {
-    let certified = design(&rig("quadruple-paper")).unwrap();
+    let certified = designed("quadruple-paper");
     assert!(certified.double.sampled.integral.is_none() && certified.double.continuous.integral.is_none());
 }

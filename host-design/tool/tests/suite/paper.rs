@@ -5,9 +5,10 @@
 //! the exact equations of motion (`rigs/quadruple-paper.toml`) they differ by up to 5.3e-5, relative: five of the
 //! twenty printed gains then end in another digit, and the pole placement's N is 11.0075.
 
-use crate::published::rig;
+use crate::published::{designed, rig};
 use upright_design::design::{Certified, Feedback, design};
 use upright_design::numerics::eigenvalues;
+use upright_design::rig::Rig;
 use upright_tool::reproduce::published::{LQR_K, LQR_N, PLACEMENT_K, PLACEMENT_N};
 
 fn printed_k(law: &Feedback<f64>) -> String {
@@ -25,8 +26,8 @@ fn laws(certified: &Certified) -> [&Feedback<f64>; 2] {
 
 #[test]
 fn every_printed_digit_of_both_designs_comes_from_the_printed_matrices() {
-    let certified = design(&rig("quadruple-paper-printed")).unwrap();
-    let [lqr, placement] = laws(&certified);
+    let certified = designed("quadruple-paper-printed");
+    let [lqr, placement] = laws(certified);
     assert_eq!((printed_k(lqr).as_str(), printed_n(lqr).as_str()), (LQR_K.join(" ").as_str(), LQR_N));
     assert_eq!(
         (printed_k(placement).as_str(), printed_n(placement).as_str()),
@@ -51,16 +52,15 @@ fn another_weight_or_another_far_pole_prints_other_digits() {
 
 #[test]
 fn the_exact_model_gives_the_printed_gains_to_the_accuracy_of_the_printed_matrices() {
-    let (exact, printed) =
-        (design(&rig("quadruple-paper")).unwrap(), design(&rig("quadruple-paper-printed")).unwrap());
+    let (exact, printed) = (designed("quadruple-paper"), designed("quadruple-paper-printed"));
     // A and B are printed with six digits: half a unit in the last digit is up to 5e-6 of an entry, and the most
     // sensitive gain magnifies it elevenfold.
-    for (exact, printed) in laws(&exact).into_iter().zip(laws(&printed)) {
+    for (exact, printed) in laws(exact).into_iter().zip(laws(printed)) {
         for (exact, printed) in exact.k.entries().iter().zip(printed.k.entries()) {
             assert!((exact / printed - 1.0).abs() < 6e-5, "{exact} {printed}");
         }
     }
-    let [lqr, placement] = laws(&exact);
+    let [lqr, placement] = laws(exact);
     let differing = |ours: String, theirs: [&str; 10]| {
         ours.split(' ').zip(theirs).filter(|(ours, theirs)| ours != theirs).count()
     };
@@ -77,14 +77,14 @@ fn the_exact_model_gives_the_printed_gains_to_the_accuracy_of_the_printed_matric
 
 #[test]
 fn the_precompensation_of_the_lqr_is_the_root_of_ten() {
-    let certified = design(&rig("quadruple-paper")).unwrap();
+    let certified = designed("quadruple-paper");
     // The correctly rounded answer, to the last bit.
-    assert_eq!(laws(&certified)[0].n.unwrap().to_bits(), 10f64.sqrt().to_bits());
+    assert_eq!(laws(certified)[0].n.unwrap().to_bits(), 10f64.sqrt().to_bits());
 }
 
 #[test]
 fn open_loop_poles_are_two_integrators_and_four_pairs() {
-    let poles = eigenvalues(&design(&rig("quadruple-paper")).unwrap().double.a).unwrap();
+    let poles = eigenvalues(&designed("quadruple-paper").double.a).unwrap();
     let mut real: Vec<String> = poles
         .iter()
         .map(|pole| {
@@ -112,7 +112,7 @@ fn open_loop_poles_are_two_integrators_and_four_pairs() {
 
 #[test]
 fn closed_loop_poles_are_those_of_the_paper() {
-    let poles = design(&rig("quadruple-paper")).unwrap().poles;
+    let poles = &designed("quadruple-paper").poles;
     let fastest = poles.continuous.lqr.as_ref().unwrap().iter().map(|pole| pole[0]).fold(0.0, f64::min);
     assert_eq!(format!("{fastest:.1}"), "-527.6");
     let placed: Vec<[String; 2]> = poles
@@ -132,7 +132,7 @@ fn closed_loop_poles_are_those_of_the_paper() {
 #[test]
 fn the_papers_gains_survive_ticks_of_one_and_two_milliseconds_only() {
     // (tick, delay, spectral radius with the LQR's continuous gains held over the tick)
-    let mut rig = rig("quadruple-paper");
+    let mut rig = Rig { pole_placement: None, kalman: None, ..rig("quadruple-paper") };
     for (period_s, delay_ticks, wanted) in
         [(0.001, 0, None), (0.002, 0, None), (0.003, 0, Some("1.08")), (0.002, 1, Some("1.29"))]
     {

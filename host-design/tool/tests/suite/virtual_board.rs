@@ -1,4 +1,5 @@
-//! The image that is flashed, on the virtual board, from power-up to balancing with no one's help but the simulated hand.
+//! The image that is flashed, on the virtual board, from power-up to balancing with no one's help but the simulated
+//! hand.
 
 use upright::control::actuator::Drive;
 use upright::gains::{RIG_HASH, SENSORS, STATES, TABLE, TICK_S};

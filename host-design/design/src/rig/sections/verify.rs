@@ -15,8 +15,8 @@ pub(in crate::rig) static VERIFY: Section = Section {
 keys! {
     /// Thresholds of the trust report. They change no gain, so they are not part of the rig's hash.
     ///
-    /// The disturbances of the simulated runs and the noise that `[kalman]` expects differ when the observer's noise is
-    /// raised on purpose, to make it robust.
+    /// The disturbances of the simulated runs and the noise that `[kalman]` expects differ when the observer's noise
+    /// is raised on purpose, to make it robust.
     pub struct Requirements {
         gain_margin: f64, "", Rule::POSITIVE,
             "least factor by which the loop's gain may be too large, and too small", Absent::Numbers(&[1.2]);

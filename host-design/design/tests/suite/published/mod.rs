@@ -3,8 +3,11 @@
 // Each test program uses only some of these.
 #![allow(dead_code)]
 
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
+use std::sync::{Mutex, OnceLock};
 
+use upright_design::design::{Certified, design};
 use upright_design::rig::Rig;
 
 /// Path of the rig file `name`.
@@ -15,6 +18,13 @@ pub(crate) fn rig_path(name: &str) -> PathBuf {
 /// The rig in file `name`.
 pub(crate) fn rig(name: &str) -> Rig {
     Rig::from_path(&rig_path(name)).unwrap()
+}
+
+/// The design of the rig in file `name`, made once for all tests.
+pub(crate) fn designed(name: &'static str) -> &'static Certified {
+    static DESIGNS: Mutex<BTreeMap<&str, &OnceLock<Certified>>> = Mutex::new(BTreeMap::new());
+    let place = *DESIGNS.lock().unwrap().entry(name).or_insert_with(|| Box::leak(Box::default()));
+    place.get_or_init(|| design(&rig(name)).unwrap())
 }
 
 /// A rig from text.

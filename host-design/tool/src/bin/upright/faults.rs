@@ -13,8 +13,8 @@ use crate::failure::Failure;
 use crate::progress::{with_bar, with_spinner};
 use crate::variation::Variation;
 
-/// Fault injection: runs the firmware with one defect at a time and checks that the motor is off in time; exit status 1
-/// if it ever is not, or is turned off without a reason.
+/// Fault injection: runs the firmware with one defect at a time and checks that the motor is off in time; exit status
+/// 1 if it ever is not, or is turned off without a reason.
 ///
 /// Part of the campaign is run again with a firmware without thresholds and limits: there the defects must be missed,
 /// or the campaign proves nothing.

@@ -20,12 +20,12 @@ use upright_tool::monitor::{Action, Line, action, request, view};
 use crate::failure::Failure;
 use crate::variation::positive;
 
-/// Shows a firmware's telemetry, live, and sends commands to it; exit status 1 if the connection is lost or the firmware
-/// uses another version of the messages.
+/// Shows a firmware's telemetry, live, and sends commands to it; exit status 1 if the connection is lost or the
+/// firmware uses another version of the messages.
 ///
-/// If it ends while the cart's set-point is commanded, the firmware turns the motor off: link lost. Without a terminal,
-/// or with --json, it prints one JSON object per telemetry, answers on stderr, and takes commands as lines of stdin:
-/// home, home-rail, check-signs, arm, disarm, clear, set-point METRES, law lqr, law pole-placement.
+/// If it ends while the cart's set-point is commanded, the firmware turns the motor off: link lost. Without a
+/// terminal, or with --json, it prints one JSON object per telemetry, answers on stderr, and takes commands as lines
+/// of stdin: home, home-rail, check-signs, arm, disarm, clear, set-point METRES, law lqr, law pole-placement.
 #[derive(Args)]
 #[command(before_help = "\
 Examples:

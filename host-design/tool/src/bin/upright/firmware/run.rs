@@ -14,11 +14,11 @@ use crate::failure::Failure;
 use crate::progress::with_spinner;
 use crate::simulate::Simulate;
 
-/// Builds the image for the rig, runs it in QEMU in lock step with the nonlinear plant, and compares every bit with the
-/// same run on the host; exit status 1 if the pendulum falls or a bit differs.
+/// Builds the image for the rig, runs it in QEMU in lock step with the nonlinear plant, and compares every bit with
+/// the same run on the host; exit status 1 if the pendulum falls or a bit differs.
 ///
-/// The rig is homed while it hangs, held by hand at the start of the scenario until the firmware begins to balance, and
-/// released at time 0. Options are those of `upright simulate`.
+/// The rig is homed while it hangs, held by hand at the start of the scenario until the firmware begins to balance,
+/// and released at time 0. Options are those of `upright simulate`.
 #[derive(Args)]
 #[command(before_help = "\
 Examples:
