@@ -8,6 +8,7 @@
 //! |---|---|---|
 //! | [`rig`] | a file in TOML | checked values in SI units |
 //! | [`plant`] | masses, lengths, friction | equations of motion, linear model |
+//! | [`reality`] | plant, `[reality]` of the rig | the plant as it really is: friction, play, errors of sensors and driver |
 //! | [`design`] | linear model, weights, poles, noise | certified gains and observer |
 //! | [`table`] | gains and limits | the gain table of the firmware, as values and as Rust source |
 //! | [`simulate`] | table and scenario | a run of the firmware's controller against the nonlinear plant |
@@ -24,6 +25,7 @@ pub mod harness;
 pub mod number;
 pub mod numerics;
 pub mod plant;
+pub mod reality;
 pub mod rig;
 pub mod simulate;
 pub mod swing_up;

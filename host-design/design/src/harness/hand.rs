@@ -4,6 +4,7 @@ use upright::protocol::message::Request;
 use upright::supervision::sign_check::Signs;
 use upright::supervision::supervisor::State;
 
+use crate::reality::hanging_by_hand;
 use crate::rig::{PlantDescription, Rig};
 
 /// What the hand does in one tick.
@@ -55,10 +56,10 @@ const RETRY_S: f64 = 0.05;
 impl Hand {
     /// A hand that moves `rig` from hanging to the state `start`, and lets go there.
     pub fn new(rig: &Rig, start: &[f64]) -> Self {
-        let mut hanging = vec![0.0; rig.states()];
-        if let (PlantDescription::Chain(_), Some(first)) = (&rig.plant, hanging.get_mut(2)) {
-            *first = core::f64::consts::PI;
-        }
+        let hanging = match &rig.plant {
+            PlantDescription::Chain(_) => hanging_by_hand(rig),
+            PlantDescription::Model(_) => vec![0.0; rig.states()],
+        };
         Self {
             doing: Doing::Home,
             held: hanging.clone(),

@@ -60,7 +60,7 @@ impl<'t> Harness<'t> {
     /// What a healthy board reads now.
     pub fn inputs(&mut self) -> Pins {
         self.bench.read_counters(&mut self.counters);
-        healthy(&self.counters, self.supply_v)
+        healthy(&self.counters, self.supply_v * self.bench.supply_share() as f32)
     }
 
     /// One tick in which the hand does what comes next; gives the firmware's output.

@@ -34,7 +34,7 @@ pub use linear::{Equilibrium, LinearModel, linearise};
 pub use linear_simulation::LinearSimulation;
 pub use motor::MotorPlant;
 pub use parameters::ChainParameters;
-pub use simulation::{ChainSimulation, Plant, chain_plant};
+pub use simulation::{ChainSimulation, Plant, WithLinks, chain_plant, with_links};
 
 /// The plant cannot be built for this number of links.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]

@@ -26,9 +26,29 @@ impl MotorPlant {
     /// Force on the cart (N) at `duty` (clamped to -1 … 1) and cart speed `speed` (m/s). The dead zone reduces the
     /// magnitude of the voltage; a voltage inside the dead zone counts as zero.
     pub fn force(&self, duty: f64, speed: f64) -> f64 {
-        let volts = duty.clamp(-1.0, 1.0) * self.supply_v;
+        self.force_at_supply(duty, speed, self.supply_v)
+    }
+
+    /// As [`MotorPlant::force`], at another supply voltage (V).
+    pub fn force_at_supply(&self, duty: f64, speed: f64, supply_v: f64) -> f64 {
+        let volts = duty.clamp(-1.0, 1.0) * supply_v;
         let effective = volts.signum() * (volts.abs() - self.dead_zone_v).max(0.0);
         self.newtons_per_volt * (effective - self.volts_per_speed * speed)
+    }
+
+    /// Winding resistance (Ω).
+    pub fn resistance_ohm(&self) -> f64 {
+        self.volts_per_speed / self.newtons_per_volt
+    }
+
+    /// Back-EMF per speed of the cart (V·s/m), which is also the force per current (N/A).
+    pub fn volts_per_speed(&self) -> f64 {
+        self.volts_per_speed
+    }
+
+    /// Supply voltage without load (V).
+    pub fn supply_v(&self) -> f64 {
+        self.supply_v
     }
 }
 

@@ -1,6 +1,6 @@
 //! Simulation of a plant of any size behind one object-safe trait.
 
-use super::{ChainParameters, ChainPlant, ChainState, Energy, PlantError};
+use super::{ChainPlant, ChainState, Energy, PlantError};
 use crate::rig;
 
 /// A plant that can be simulated.
@@ -33,6 +33,11 @@ pub trait Plant: Send {
 
     /// Mechanical energy (J); none for a linear model.
     fn energy(&self) -> Option<Energy>;
+
+    /// Speed of the motor, as speed of the cart (m/s), if a belt or backlash is between them.
+    fn motor_speed(&self) -> Option<f64> {
+        None
+    }
 }
 
 /// N links on a cart with their current state.
@@ -101,30 +106,52 @@ impl<const N: usize> Plant for ChainSimulation<N> {
     }
 }
 
+/// Something that is compiled for every number of links.
+pub trait WithLinks {
+    /// What it gives.
+    type Output;
+
+    /// Does it for chains of N links.
+    fn run<const N: usize>(self) -> Self::Output;
+}
+
+/// Does `action` for chains of `links` links.
+///
+/// # Errors
+/// [`PlantError::UnsupportedLinks`] unless there are 1 to [`MAX_LINKS`](rig::MAX_LINKS) links.
+pub fn with_links<A: WithLinks>(links: usize, action: A) -> Result<A::Output, PlantError> {
+    Ok(match links {
+        1 => action.run::<1>(),
+        2 => action.run::<2>(),
+        3 => action.run::<3>(),
+        4 => action.run::<4>(),
+        5 => action.run::<5>(),
+        6 => action.run::<6>(),
+        7 => action.run::<7>(),
+        8 => action.run::<8>(),
+        9 => action.run::<9>(),
+        10 => action.run::<10>(),
+        11 => action.run::<11>(),
+        12 => action.run::<12>(),
+        13 => action.run::<13>(),
+        14 => action.run::<14>(),
+        links => return Err(PlantError::UnsupportedLinks { links }),
+    })
+}
+
 /// Creates a simulation of `chain`, at rest with every link upright.
 ///
 /// # Errors
 /// [`PlantError::UnsupportedLinks`] unless the chain has 1 to [`MAX_LINKS`](rig::MAX_LINKS) links.
 pub fn chain_plant(chain: &rig::Chain) -> Result<Box<dyn Plant>, PlantError> {
-    fn boxed<const N: usize>(chain: &rig::Chain) -> Result<Box<dyn Plant>, PlantError> {
-        let plant = ChainPlant::<N>::new(&ChainParameters::of(chain))?;
-        Ok(Box::new(ChainSimulation { plant, state: ChainState::upright() }))
+    struct Ideal<'a>(&'a rig::Chain);
+    impl WithLinks for Ideal<'_> {
+        type Output = Result<Box<dyn Plant>, PlantError>;
+
+        fn run<const N: usize>(self) -> Self::Output {
+            let plant = ChainPlant::<N>::of(self.0)?;
+            Ok(Box::new(ChainSimulation { plant, state: ChainState::upright() }))
+        }
     }
-    match chain.links.len() {
-        1 => boxed::<1>(chain),
-        2 => boxed::<2>(chain),
-        3 => boxed::<3>(chain),
-        4 => boxed::<4>(chain),
-        5 => boxed::<5>(chain),
-        6 => boxed::<6>(chain),
-        7 => boxed::<7>(chain),
-        8 => boxed::<8>(chain),
-        9 => boxed::<9>(chain),
-        10 => boxed::<10>(chain),
-        11 => boxed::<11>(chain),
-        12 => boxed::<12>(chain),
-        13 => boxed::<13>(chain),
-        14 => boxed::<14>(chain),
-        links => Err(PlantError::UnsupportedLinks { links }),
-    }
+    with_links(chain.links.len(), Ideal(chain))?
 }

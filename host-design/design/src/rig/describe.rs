@@ -12,10 +12,12 @@ use super::sections::actuator::ACTUATOR;
 use super::sections::chain::{CART, GRAVITY, LINK};
 use super::sections::integral::INTEGRAL;
 use super::sections::limits::LIMITS;
+use super::sections::reality::REALITY;
 use super::sections::tick::TICK;
 use super::sections::verify::VERIFY;
 use super::{
-    Actuator, Chain, Kalman, LinearPlant, Link, LinkEncoder, Lqr, Motor, PlantDescription, PolePlacement, Rig,
+    Actuator, Chain, Kalman, LinearPlant, Link, LinkEncoder, Lqr, Motor, PlantDescription, PolePlacement,
+    Reality, Rig,
 };
 
 const DEFAULT: &str = "(default)";
@@ -37,6 +39,7 @@ impl Rig {
         page.design(self);
         page.section(&LIMITS, &self.limits);
         page.section(&VERIFY, &self.verify);
+        page.reality(&self.reality);
         page.text
     }
 }
@@ -215,6 +218,17 @@ impl Page {
         // (gear Kt / r)² / R: back-EMF acts on the cart as viscous friction.
         let braking = volts_per_speed * volts_per_speed / motor.resistance_ohm;
         self.value("braking by back-EMF", braking, "N·s/m", "");
+    }
+
+    fn reality(&mut self, reality: &Reality) {
+        if *reality == Reality::default() {
+            return;
+        }
+        self.section(&REALITY, &reality.friction);
+        self.rows(&REALITY, &reality.drive_train);
+        self.rows(&REALITY, &reality.driver);
+        self.rows(&REALITY, &reality.sensors);
+        self.rows(&REALITY, &reality.parameters);
     }
 
     fn design(&mut self, rig: &Rig) {

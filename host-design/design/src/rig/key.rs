@@ -177,6 +177,45 @@ impl Value for u8 {
     }
 }
 
+/// One number for every joint, or one per joint.
+#[derive(Debug, Clone, PartialEq, serde::Serialize)]
+pub struct PerJoint(Vec<f64>);
+
+impl PerJoint {
+    /// The same number for every joint.
+    pub fn all(number: f64) -> Self {
+        Self(vec![number])
+    }
+
+    /// The number of joint `joint`, counted from 0.
+    pub fn of(&self, joint: usize) -> f64 {
+        self.0.get(joint).or(self.0.first()).copied().unwrap_or_default()
+    }
+
+    /// Whether any joint has a number other than 0.
+    pub fn is_any(&self) -> bool {
+        self.0.iter().any(|&number| number != 0.0)
+    }
+}
+
+impl Value for PerJoint {
+    fn read(node: &Node<'_>, rule: Rule, asks_for: &str) -> Result<Self, RigError> {
+        if !node.is_list() {
+            return Ok(Self::all(node.number(rule, asks_for)?));
+        }
+        let entries = node.list(rule.accepts, asks_for)?;
+        entries.iter().map(|entry| entry.number(rule, asks_for)).collect::<Result<_, _>>().map(Self)
+    }
+
+    fn when_absent(absent: Absent) -> Option<Self> {
+        f64::when_absent(absent).map(Self::all)
+    }
+
+    fn numbers(&self) -> Vec<f64> {
+        self.0.clone()
+    }
+}
+
 impl Value for [f64; 2] {
     fn read(node: &Node<'_>, rule: Rule, asks_for: &str) -> Result<Self, RigError> {
         match node.numbers(2, Rule::ANY, asks_for)?[..] {

@@ -18,7 +18,7 @@ mod sensors;
 
 pub use document::key_table;
 pub use error::{MAX_BYTES, Place, RigError, RigErrorKind};
-pub use key::{Absent, Key, Section, unit_in_names};
+pub use key::{Absent, Key, PerJoint, Section, unit_in_names};
 pub use rule::Rule;
 pub use sections::actuator::{Actuator, Motor};
 pub use sections::chain::{Cart, Chain, Link, LinkEncoder, MAX_LINKS, PlantDescription};
@@ -28,6 +28,7 @@ pub use sections::limits::Limits;
 pub use sections::lqr::Lqr;
 pub use sections::model::LinearPlant;
 pub use sections::pole_placement::PolePlacement;
+pub use sections::reality::{DriveTrain, DriverFaults, DryFriction, ParameterErrors, Reality, SensorErrors};
 pub use sections::tick::Tick;
 pub use sections::verify::Requirements;
 pub use sections::{SECTIONS, TOP};
@@ -61,6 +62,9 @@ pub struct Rig {
     /// What `upright verify` requires.
     #[serde(skip)]
     pub verify: Requirements,
+    /// How the simulated machine differs from the model.
+    #[serde(skip)]
+    pub reality: Reality,
 }
 
 impl Rig {

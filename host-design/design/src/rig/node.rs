@@ -156,6 +156,11 @@ impl<'a> Node<'a> {
         }
     }
 
+    /// Whether the value is a list of values.
+    pub(super) fn is_list(&self) -> bool {
+        matches!(self.found, Found::Value(Value::Array(_)))
+    }
+
     /// The entries of a list, keyed `key[1]`, `key[2]`, ...
     pub(super) fn list(&self, accepts: &str, meaning: &str) -> Result<Vec<Node<'a>>, RigError> {
         let entry = |(index, span, found): (usize, Option<Range<usize>>, Found<'a>)| Node {

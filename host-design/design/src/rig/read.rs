@@ -2,11 +2,12 @@
 
 use super::error::RigError;
 use super::key::{Keys, Section};
-use super::node::{Source, Table};
+use super::node::{Node, Source, Table};
 use super::sections::{
-    SECTIONS, TOP, actuator, chain, integral, kalman, limits, lqr, model, pole_placement, tick, verify,
+    SECTIONS, TOP, actuator, chain, integral, kalman, limits, lqr, model, pole_placement, reality, tick,
+    verify,
 };
-use super::{Actuator, Integral, Limits, PlantDescription, Requirements, Rig, Tick};
+use super::{Actuator, Integral, Limits, PlantDescription, Reality, Requirements, Rig, Tick};
 
 /// Checks a whole rig file.
 pub(super) fn rig(source: &Source<'_>) -> Result<Rig, RigError> {
@@ -16,11 +17,13 @@ pub(super) fn rig(source: &Source<'_>) -> Result<Rig, RigError> {
     let plant = chain::plant(&root)?;
     let states = plant.states();
     let given = |section: &Section| root.get(section.name);
+    let actuator =
+        given(&actuator::ACTUATOR).map_or(Ok(Actuator::default()), |node| actuator::actuator(&node))?;
+    let tick = scalars(&root, &tick::TICK)?.unwrap_or_else(Tick::default);
+    let reality = |node: Node<'_>| reality::reality(&node, &plant, tick.period_s, actuator.motor.is_some());
     let rig = Rig {
         name,
-        actuator: given(&actuator::ACTUATOR)
-            .map_or(Ok(Actuator::default()), |node| actuator::actuator(&node))?,
-        tick: scalars(&root, &tick::TICK)?.unwrap_or_else(Tick::default),
+        reality: given(&reality::REALITY).map_or(Ok(Reality::default()), reality)?,
         lqr: given(&lqr::LQR).map(|node| lqr::lqr(&node, states)).transpose()?,
         pole_placement: given(&pole_placement::POLE_PLACEMENT)
             .map(|node| pole_placement::pole_placement(&node, states))
@@ -29,6 +32,8 @@ pub(super) fn rig(source: &Source<'_>) -> Result<Rig, RigError> {
         integral: scalars::<Integral>(&root, &integral::INTEGRAL)?,
         limits: given(&limits::LIMITS).map_or(Ok(Limits::default()), |node| limits::limits(&node, &plant))?,
         verify: scalars(&root, &verify::VERIFY)?.unwrap_or_else(Requirements::default),
+        actuator,
+        tick,
         plant,
     };
     if rig.kalman.is_some() {

@@ -38,6 +38,24 @@ impl Rule {
     /// An angle up to half a turn (rad).
     pub(super) const ANGLE: Rule =
         Rule { accepts: "a number > 0 and <= pi (rad)", admits: |x| x.iter().all(|&x| x > 0.0 && x <= PI) };
+    /// An angle of either sign (rad).
+    pub(super) const SIGNED_ANGLE: Rule = Rule {
+        accepts: "a number from -pi to pi (rad)",
+        admits: |x| x.iter().all(|&x| (-PI..=PI).contains(&x)),
+    };
+    /// How much too large or too small something is (%).
+    pub(super) const SIGNED_PERCENT: Rule = Rule {
+        accepts: "a number > -100 and <= 900 (%)",
+        admits: |x| x.iter().all(|&x| x > -100.0 && x <= 900.0),
+    };
+    /// A spread in both directions (%).
+    pub(super) const SPREAD: Rule = Rule {
+        accepts: "a number >= 0 and <= 90 (%)",
+        admits: |x| x.iter().all(|&x| (0.0..=90.0).contains(&x)),
+    };
+    /// A length or an angle that a simulation can resolve.
+    pub(super) const AT_LEAST_A_MILLIONTH: Rule =
+        Rule { accepts: "a number >= 1e-6", admits: |x| x.iter().all(|&x| x >= 1e-6) };
     /// A time that the supervisor counts in ticks (s).
     pub(super) const DURATION: Rule =
         Rule { accepts: "a number > 0 and <= 60 (s)", admits: |x| x.iter().all(|&x| x > 0.0 && x <= 60.0) };

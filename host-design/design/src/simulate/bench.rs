@@ -8,13 +8,17 @@ use upright::control::encoder::CounterWidth;
 
 use super::error::SimulationError;
 use super::scenario::Scenario;
-use crate::plant::{LinearSimulation, MotorPlant, Plant, chain_plant};
+use crate::plant::{LinearSimulation, MotorPlant, Plant};
+use crate::reality::{Driver, Encoders, Timing, real_plant};
 use crate::rig::{PlantDescription, Rig};
 
 /// The simulated rig: everything outside the controller.
 pub struct Bench {
     plant: Box<dyn Plant>,
     motor: Option<MotorPlant>,
+    driver: Option<Driver>,
+    timing: Timing,
+    encoders: Option<Encoders>,
     sensors: Vec<(usize, f64)>,
     counter_start: u32,
     random: Pcg64,
@@ -28,6 +32,8 @@ pub struct Bench {
     substeps: usize,
     delay: bool,
     pending_drive: Drive,
+    /// What acts until the latency of the next tick is over.
+    acting_drive: Drive,
 }
 
 impl Bench {
@@ -37,7 +43,7 @@ impl Bench {
     /// [`SimulationError`] if the plant cannot be built or a noise level is impossible.
     pub fn new(rig: &Rig, scenario: &Scenario) -> Result<Self, SimulationError> {
         let mut plant: Box<dyn Plant> = match &rig.plant {
-            PlantDescription::Chain(chain) => chain_plant(chain)?,
+            PlantDescription::Chain(chain) => real_plant(chain, rig)?,
             PlantDescription::Model(model) => Box::new(LinearSimulation::of(model)),
         };
         plant.set_state(&scenario.start);
@@ -51,6 +57,9 @@ impl Bench {
             torques: vec![0.0; plant.disturbances()],
             plant,
             motor: rig.actuator.motor.as_ref().map(MotorPlant::of),
+            driver: Driver::of(rig),
+            timing: Timing::of(rig, scenario.seed),
+            encoders: Encoders::of(rig),
             sensors: rig.sensors().iter().map(|sensor| (sensor.state, sensor.step())).collect(),
             counter_start: scenario.counter_start,
             random: Pcg64::seed_from_u64(scenario.seed),
@@ -63,6 +72,7 @@ impl Bench {
             substeps: scenario.substeps.max(1),
             delay: rig.tick.delay_ticks == 1,
             pending_drive: Drive::OFF,
+            acting_drive: Drive::OFF,
         })
     }
 
@@ -99,7 +109,11 @@ impl Bench {
     /// Writes what the hardware counters show into `counters`; those without a sensor keep their value.
     pub fn read_counters(&self, counters: &mut [u32]) {
         for (index, (counter, &(state, step))) in counters.iter_mut().zip(&self.sensors).enumerate() {
-            let counts = libm::round(self.state[state] / step) as i64;
+            let position = self
+                .encoders
+                .as_ref()
+                .map_or(self.state[state], |errors| errors.measured(state, self.state[state]));
+            let counts = libm::round(position / step) as i64;
             *counter = Self::reading(index, self.counter_start.wrapping_add(counts as u32));
         }
     }
@@ -139,32 +153,52 @@ impl Bench {
         let disturbance = self.force_offset + push + self.force_noise.sample(&mut self.random);
         let (torque_noise, random) = (&self.torque_noise, &mut self.random);
         self.torques.fill_with(|| torque_noise.sample(random));
-        let at_start = self.force(now);
-        match (&self.motor, now) {
-            // The back-EMF follows the speed within the tick.
-            (Some(_), Drive::Duty(_)) => {
-                let step = self.period_s / self.substeps as f64;
-                for _ in 0..self.substeps {
-                    let force = self.force(now);
-                    self.plant.advance(force + disturbance, &self.torques, step, 1);
-                    self.plant.write_state(&mut self.state);
-                }
-            }
-            _ => {
-                self.plant.advance(at_start + disturbance, &self.torques, self.period_s, self.substeps);
-                self.plant.write_state(&mut self.state);
-            }
+        let before = std::mem::replace(&mut self.acting_drive, now);
+        let [latency, rest] = self.timing.next_tick();
+        if latency > 0.0 {
+            self.advance(before, disturbance, latency);
         }
-        at_start
+        self.advance(now, disturbance, rest)
     }
 
-    fn force(&self, drive: Drive) -> f64 {
-        match (drive, &self.motor) {
-            (Drive::Force(force), _) => f64::from(force),
-            (Drive::Duty(duty), Some(motor)) => {
-                motor.force(f64::from(duty), self.state.get(1).copied().unwrap_or_default())
-            }
-            (Drive::Duty(_), None) => 0.0,
+    /// The supply voltage, as a share of that without load.
+    pub fn supply_share(&self) -> f64 {
+        self.driver.as_ref().map_or(1.0, Driver::supply_share)
+    }
+
+    /// Simulates `length_s` of a tick, in which the command does not change; gives the motor's force at its start.
+    fn advance(&mut self, drive: Drive, disturbance: f64, length_s: f64) -> f64 {
+        let substeps = self.substeps_in(length_s);
+        let step = length_s / substeps as f64;
+        // Within the tick, the back-EMF follows the speed, and the driver the command.
+        let changes = self.driver.is_some() || matches!((&self.motor, drive), (Some(_), Drive::Duty(_)));
+        let (pieces, piece, substeps) = if changes { (substeps, step, 1) } else { (1, length_s, substeps) };
+        let mut at_start = None;
+        for _ in 0..pieces {
+            let force = self.force(drive, piece);
+            at_start.get_or_insert(force);
+            self.plant.advance(force + disturbance, &self.torques, piece, substeps);
+            self.plant.write_state(&mut self.state);
+        }
+        at_start.unwrap_or_default()
+    }
+
+    /// As many substeps as the length has a share in a tick.
+    fn substeps_in(&self, length_s: f64) -> usize {
+        if length_s == self.period_s {
+            return self.substeps;
+        }
+        (self.substeps as f64 * length_s / self.period_s).ceil().max(1.0) as usize
+    }
+
+    /// Mean force of the motor on the cart in the next `dt` (s).
+    fn force(&mut self, drive: Drive, dt: f64) -> f64 {
+        let speed = self.plant.motor_speed().or(self.state.get(1).copied()).unwrap_or_default();
+        match (&mut self.driver, drive, &self.motor) {
+            (Some(driver), _, motor) => driver.force(drive, motor.as_ref(), speed, dt),
+            (None, Drive::Force(force), _) => f64::from(force),
+            (None, Drive::Duty(duty), Some(motor)) => motor.force(f64::from(duty), speed),
+            (None, Drive::Duty(_), None) => 0.0,
         }
     }
 }

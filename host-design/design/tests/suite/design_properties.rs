@@ -42,6 +42,7 @@ fn any_rig(links: core::ops::RangeInclusive<usize>) -> impl Strategy<Value = Rig
 fn bare(chain: Chain) -> Rig {
     Rig {
         verify: Default::default(),
+        reality: Default::default(),
         name: "random".into(),
         plant: PlantDescription::Chain(chain),
         actuator: Actuator::default(),

@@ -12,6 +12,8 @@ mod plant_motion;
 mod plant_rigs;
 mod plant_sines;
 mod published;
+mod reality_friction;
+mod reality_loop;
 mod rig_errors;
 mod rig_files;
 mod rig_fuzz;

@@ -75,6 +75,7 @@ fn what_is_left_out_gets_its_documented_default() {
     let cart = Cart { mass_kg: 1.0, friction_n_s_per_m: 0.0, travel_m: [-2.0, 2.0], encoder_step_m: None };
     let expected = Rig {
         verify: Default::default(),
+        reality: Default::default(),
         name: "minimal".to_owned(),
         plant: PlantDescription::Chain(Chain { cart, links: vec![link], gravity_m_per_s2: 9.81 }),
         actuator: Actuator { force_limit_n: None, motor: None },

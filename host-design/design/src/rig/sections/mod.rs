@@ -13,6 +13,7 @@ pub(super) mod limits;
 pub(super) mod lqr;
 pub(super) mod model;
 pub(super) mod pole_placement;
+pub(super) mod reality;
 pub(super) mod tick;
 pub(super) mod verify;
 
@@ -35,7 +36,7 @@ pub static TOP: Section = Section {
 };
 
 /// All sections, in the order of the documentation.
-pub static SECTIONS: [&Section; 12] = [
+pub static SECTIONS: [&Section; 13] = [
     &chain::CART,
     &chain::LINK,
     &chain::GRAVITY,
@@ -47,5 +48,6 @@ pub static SECTIONS: [&Section; 12] = [
     &integral::INTEGRAL,
     &limits::LIMITS,
     &verify::VERIFY,
+    &reality::REALITY,
     &model::MODEL,
 ];

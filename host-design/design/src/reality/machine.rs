@@ -1,0 +1,323 @@
+//! The chain with dry friction, belt and tilted rail.
+
+use upright::table::Scalar;
+
+use super::belt::{Belt, Rotor};
+use super::bristle::{Bristle, Contact};
+use super::parameters::real_chain;
+use crate::numerics::{Lu, Matrix};
+use crate::plant::{
+    ChainParameters, ChainPlant, ChainState, Energy, Plant, PlantError, WithLinks, chain_plant, with_links,
+};
+use crate::rig::{Chain, Rig};
+
+/// Largest phase (rad) by which the fastest stuck contact may advance in a step. A Runge–Kutta step then has an error of
+/// about 1e-5 of its swing; at half of it, the runs differ by less than by another seed.
+const LARGEST_PHASE: f64 = 0.25;
+
+/// A chain with dry friction, belt and tilted rail.
+///
+/// Angles of its state are from the vertical, as in a plant without tilt; inside they are from the rail's normal.
+#[derive(Debug, Clone, PartialEq)]
+pub struct RealChain<const N: usize> {
+    plant: ChainPlant<N>,
+    motion: Motion<N>,
+    joints: Option<[Bristle; N]>,
+    cart: Option<Bristle>,
+    /// Deflections of the bristles in the joints (rad), and under the cart (m).
+    bent: ([f64; N], f64),
+    belt: Option<Belt>,
+    slope: Slope<N>,
+    longest_step_s: f64,
+}
+
+/// What moves.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Motion<const N: usize> {
+    chain: ChainState<N>,
+    rotor: Rotor,
+}
+
+impl<const N: usize> Motion<N> {
+    #[inline]
+    fn plus(&self, factor: f64, rate: &Self) -> Self {
+        Self { chain: self.chain.plus(factor, &rate.chain), rotor: self.rotor.plus(factor, &rate.rotor) }
+    }
+}
+
+/// Gravity along a rail that rises by `angle` towards +x. With angles from the rail's normal, the potential energy is
+/// `g (cos(angle) Σ a_j cos φ_j + sin(angle) (M_t x - Σ a_j sin φ_j))`; the plant has the first part.
+#[derive(Debug, Clone, PartialEq)]
+struct Slope<const N: usize> {
+    angle: f64,
+    /// `g sin(angle) M_t` (N).
+    cart_n: f64,
+    /// `g sin(angle) a_j` (N·m).
+    links_n_m: [f64; N],
+}
+
+impl<const N: usize> RealChain<N> {
+    /// The chain of `rig` with the imperfections of its `[reality]`, at rest with every link upright.
+    ///
+    /// # Errors
+    /// [`PlantError::WrongLinks`] if the chain does not have N links.
+    pub fn new(chain: &Chain, rig: &Rig) -> Result<Self, PlantError> {
+        let mut real = real_chain(chain, &rig.reality.parameters);
+        let angle = rig.reality.sensors.rail_tilt_rad;
+        let gravity = real.gravity_m_per_s2;
+        real.gravity_m_per_s2 *= libm::cos(angle);
+        let belt = Belt::of(rig, real.cart.mass_kg);
+        if let Some(belt) = &belt {
+            real.cart.mass_kg -= belt.rotor_kg;
+        }
+        let parameters = ChainParameters::<f64>::of(&real);
+        let along = gravity * libm::sin(angle);
+        let total_kg = parameters.total_mass + belt.as_ref().map_or(0.0, |belt| belt.rotor_kg);
+        let slope = Slope {
+            angle,
+            cart_n: along * total_kg,
+            links_n_m: core::array::from_fn(|j| along * parameters.a[j]),
+        };
+        let mobility = mobility(&parameters);
+        let (joints, cart) = bristles(rig, &mobility);
+        let mut stiffness_per_mass = 0.0;
+        if let Some(joints) = &joints {
+            stiffness_per_mass +=
+                joints.iter().zip(&mobility[1..]).map(|(b, m)| b.stiffness * m).sum::<f64>();
+        }
+        stiffness_per_mass += cart.map_or(0.0, |bristle| bristle.stiffness * mobility[0]);
+        if let Some(belt) = &belt {
+            stiffness_per_mass += belt.stiffness * (mobility[0] + 1.0 / belt.rotor_kg);
+        }
+        let rotor = Rotor { position: 0.0, speed: 0.0 };
+        let mut machine = Self {
+            plant: ChainPlant::new(&parameters)?,
+            motion: Motion { chain: ChainState::upright(), rotor },
+            joints,
+            cart,
+            bent: ([0.0; N], 0.0),
+            belt,
+            slope,
+            longest_step_s: LARGEST_PHASE / stiffness_per_mass.sqrt(),
+        };
+        machine.set_state(&vec![0.0; 2 * N + 2]);
+        Ok(machine)
+    }
+
+    /// Longest integration step (s) that resolves the fastest contact; infinite without one. The sum of stiffness times
+    /// mobility over all contacts bounds the square of the highest natural frequency (the trace bounds the largest
+    /// eigenvalue).
+    pub fn longest_step_s(&self) -> f64 {
+        self.longest_step_s
+    }
+
+    /// The same machine with another longest step (s), to see what it changes.
+    pub fn with_longest_step_s(mut self, longest_step_s: f64) -> Self {
+        self.longest_step_s = longest_step_s;
+        self
+    }
+
+    /// Rate of change at `at`, when the bristles were bent as now at `from`.
+    #[inline]
+    fn derivative(&self, from: &Motion<N>, at: &Motion<N>, force: f64, torques: &[f64; N]) -> Motion<N> {
+        let (mut on_cart, mut torques) = (force, *torques);
+        let (here, start) = (&at.chain, &from.chain);
+        let mut rotor = Rotor { position: at.rotor.speed, speed: 0.0 };
+        if let Some(belt) = &self.belt {
+            on_cart = belt.force(&at.rotor, here.x, here.xdot);
+            rotor.speed = (force - on_cart) / belt.rotor_kg;
+        }
+        if let Some(bristle) = &self.cart {
+            on_cart -= bristle.force(self.bent.1, here.x - start.x, here.xdot);
+        }
+        if let Some(bristles) = &self.joints {
+            let (travel, rate) = (relative(&here.phi, &start.phi), relative(&here.phidot, &[0.0; N]));
+            for j in 0..N {
+                torques[j] -= bristles[j].force(self.bent.0[j], travel[j], rate[j]);
+            }
+        }
+        if self.slope.angle != 0.0 {
+            on_cart -= self.slope.cart_n;
+            let (_, cos) = f64::sines_and_cosines(&here.phi);
+            // Q_j = τ_j - τ_{j+1}.
+            let mut above = 0.0;
+            for j in (0..N).rev() {
+                above += self.slope.links_n_m[j] * cos[j];
+                torques[j] += above;
+            }
+        }
+        Motion { chain: self.plant.derivative(here, on_cart, &torques), rotor }
+    }
+
+    /// One step of the classical Runge–Kutta method. The friction at a stage is a function of the travel since the start of
+    /// the step, so that the bristles need no stages of their own.
+    fn step(&mut self, force: f64, torques: &[f64; N], dt: f64) {
+        let from = self.motion;
+        let rate = |at: &Motion<N>| self.derivative(&from, at, force, torques);
+        let k1 = rate(&from);
+        let k2 = rate(&from.plus(0.5 * dt, &k1));
+        let k3 = rate(&from.plus(0.5 * dt, &k2));
+        let k4 = rate(&from.plus(dt, &k3));
+        let sum = k1.plus(2.0, &k2).plus(2.0, &k3).plus(1.0, &k4);
+        let to = from.plus(dt / 6.0, &sum);
+        if let Some(bristle) = &self.cart {
+            self.bent.1 = bristle.deflection(self.bent.1, to.chain.x - from.chain.x, to.chain.xdot);
+        }
+        if let Some(bristles) = &self.joints {
+            let travel = relative(&to.chain.phi, &from.chain.phi);
+            let rate = relative(&to.chain.phidot, &[0.0; N]);
+            for j in 0..N {
+                self.bent.0[j] = bristles[j].deflection(self.bent.0[j], travel[j], rate[j]);
+            }
+        }
+        self.motion = to;
+    }
+}
+
+/// What each joint turns by when the links turn from `from` to `to`.
+#[inline]
+fn relative<const N: usize>(to: &[f64; N], from: &[f64; N]) -> [f64; N] {
+    core::array::from_fn(|j| {
+        let below = if j == 0 { 0.0 } else { to[j - 1] - from[j - 1] };
+        (to[j] - from[j]) - below
+    })
+}
+
+/// Acceleration of the cart per force on it, and of each joint per torque in it, with the links in line and everything
+/// else free (1/kg, 1/(kg·m²)): `eᵀ M⁻¹ e`.
+fn mobility(parameters: &ChainParameters<f64>) -> Vec<f64> {
+    let n = parameters.links();
+    let mass = parameters.mass_matrix(&vec![0.0; n]);
+    // It is positive definite, but may be so close to singular that this fails.
+    let Ok(lu) = Lu::new(&mass) else { return (0..=n).map(|i| 1.0 / mass[(i, i)]).collect() };
+    let of = |contact: usize| {
+        let along = Matrix::from_fn(n + 1, 1, |row, _| match row {
+            _ if row == contact => 1.0,
+            _ if row + 1 == contact && contact > 1 => -1.0,
+            _ => 0.0,
+        });
+        let moved = lu.solve(&along);
+        (0..=n).map(|row| along[(row, 0)] * moved[(row, 0)]).sum()
+    };
+    (0..=n).map(of).collect()
+}
+
+/// The bristles in the joints and under the cart, where there is friction.
+fn bristles<const N: usize>(rig: &Rig, mobility: &[f64]) -> (Option<[Bristle; N]>, Option<Bristle>) {
+    let friction = &rig.reality.friction;
+    let contact = |coulomb: f64, stribeck: f64, presliding: f64, mobility: f64| {
+        Bristle::new(&Contact {
+            coulomb,
+            breakaway_percent: friction.breakaway_percent,
+            stribeck,
+            presliding,
+            mobility,
+        })
+    };
+    let joint = |j: usize| {
+        let coulomb = friction.joint_friction_n_m.of(j);
+        contact(coulomb, friction.stribeck_rad_per_s, friction.presliding_rad, mobility[j + 1])
+    };
+    let joints = friction.joint_friction_n_m.is_any().then(|| core::array::from_fn(joint));
+    let cart = (friction.cart_friction_n > 0.0).then(|| {
+        contact(friction.cart_friction_n, friction.stribeck_m_per_s, friction.presliding_m, mobility[0])
+    });
+    (joints, cart)
+}
+
+impl<const N: usize> Plant for RealChain<N> {
+    fn links(&self) -> usize {
+        N
+    }
+
+    fn states(&self) -> usize {
+        2 * N + 2
+    }
+
+    fn disturbances(&self) -> usize {
+        N
+    }
+
+    fn write_state(&self, state: &mut [f64]) {
+        assert_eq!(state.len(), self.states(), "a chain of {N} links has 2n + 2 states");
+        self.motion.chain.write_relative(state);
+        state[2] += self.slope.angle;
+    }
+
+    /// The bristles relax, and the rotor is in the middle of its play.
+    fn set_state(&mut self, state: &[f64]) {
+        assert_eq!(state.len(), self.states(), "a chain of {N} links has 2n + 2 states");
+        let mut chain = ChainState::from_relative(state);
+        for phi in &mut chain.phi {
+            *phi -= self.slope.angle;
+        }
+        self.motion = Motion { chain, rotor: Rotor { position: chain.x, speed: chain.xdot } };
+        self.bent = ([0.0; N], 0.0);
+    }
+
+    /// With the bristles as they are bent now.
+    fn rate(&self, state: &[f64], force: f64, disturbances: &[f64], rate: &mut [f64]) {
+        let mut other = self.clone();
+        other.set_state(state);
+        other.bent = self.bent;
+        let torques = core::array::from_fn(|j| disturbances[j]);
+        other.derivative(&other.motion, &other.motion, force, &torques).chain.write_relative(rate);
+    }
+
+    fn advance(&mut self, force: f64, disturbances: &[f64], dt: f64, substeps: usize) {
+        assert_eq!(disturbances.len(), N, "a chain of {N} links has {N} joint torques");
+        let torques = core::array::from_fn(|j| disturbances[j]);
+        let steps = (dt / self.longest_step_s).ceil().max(substeps.max(1) as f64);
+        for _ in 0..steps as u64 {
+            self.step(force, &torques, dt / steps);
+        }
+    }
+
+    fn energy(&self) -> Option<Energy> {
+        let Motion { chain, rotor } = &self.motion;
+        let Energy { mut kinetic, mut potential } = self.plant.energy(chain);
+        if let Some(belt) = &self.belt {
+            kinetic += 0.5 * belt.rotor_kg * rotor.speed * rotor.speed;
+            potential += belt.energy(rotor, chain.x);
+        }
+        if let Some(bristles) = &self.joints {
+            potential += bristles.iter().zip(&self.bent.0).map(|(one, &bent)| one.energy(bent)).sum::<f64>();
+        }
+        potential += self.cart.map_or(0.0, |bristle| bristle.energy(self.bent.1));
+        if self.slope.angle != 0.0 {
+            let (sin, _) = f64::sines_and_cosines(&chain.phi);
+            potential += self.slope.cart_n * chain.x;
+            potential -= self.slope.links_n_m.iter().zip(&sin).map(|(torque, sin)| torque * sin).sum::<f64>();
+        }
+        Some(Energy { kinetic, potential })
+    }
+
+    fn motor_speed(&self) -> Option<f64> {
+        self.belt.as_ref().map(|_| self.motion.rotor.speed)
+    }
+}
+
+/// The plant of a rig's chain as it really is; that of [`chain_plant`] if nothing in `[reality]` changes its motion.
+///
+/// # Errors
+/// [`PlantError::UnsupportedLinks`] unless the chain has 1 to [`MAX_LINKS`](crate::rig::MAX_LINKS) links.
+pub fn real_plant(chain: &Chain, rig: &Rig) -> Result<Box<dyn Plant>, PlantError> {
+    struct Real<'a>(&'a Chain, &'a Rig);
+    impl WithLinks for Real<'_> {
+        type Output = Result<Box<dyn Plant>, PlantError>;
+
+        fn run<const N: usize>(self) -> Self::Output {
+            Ok(Box::new(RealChain::<N>::new(self.0, self.1)?))
+        }
+    }
+    let (friction, drive_train) = (&rig.reality.friction, &rig.reality.drive_train);
+    let is_ideal = !friction.joint_friction_n_m.is_any()
+        && friction.cart_friction_n == 0.0
+        && drive_train.backlash_m == 0.0
+        && drive_train.belt_compliance_m_per_n == 0.0
+        && rig.reality.sensors.rail_tilt_rad == 0.0;
+    if is_ideal {
+        return chain_plant(&real_chain(chain, &rig.reality.parameters));
+    }
+    with_links(chain.links.len(), Real(chain, rig))?
+}

@@ -1,0 +1,27 @@
+//! The machine as it really is: what `[reality]` of a rig file adds to the model when a run is simulated.
+//!
+//! - [`Bristle`]: dry friction that sticks.
+//! - [`Belt`]: backlash and a belt that gives.
+//! - [`real_plant`]: the chain with both, on a tilted rail, with its real masses and lengths.
+//! - [`Driver`]: motor driver and supply.
+//! - [`Timing`]: when the force of a tick begins and ends.
+//! - [`Encoders`]: errors of encoders and of their zeros.
+//!
+//! Equations, sources and the step size are in `docs/reality.md`. What a rig file leaves out is absent: the simulation
+//! then does the same operations as without `[reality]`, and gives the same bits.
+
+mod belt;
+mod bristle;
+mod driver;
+mod encoders;
+mod machine;
+mod parameters;
+mod timing;
+
+pub use belt::{Belt, Rotor};
+pub use bristle::{Bristle, Contact};
+pub use driver::Driver;
+pub use encoders::{Encoders, hanging_by_hand};
+pub use machine::{RealChain, real_plant};
+pub use parameters::real_chain;
+pub use timing::Timing;

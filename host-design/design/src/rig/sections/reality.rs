@@ -1,0 +1,198 @@
+//! `[reality]`: how the machine on the bench differs from the model.
+
+use super::super::error::RigError;
+use super::super::key::{Absent, Keys, PerJoint, Section, keys};
+use super::super::node::{Node, Table};
+use super::super::rule::Rule;
+use super::chain::{Chain, PlantDescription};
+
+/// `[reality]`
+pub(in crate::rig) static REALITY: Section = Section {
+    name: "reality",
+    title: "[reality]",
+    meaning: "imperfections of the simulated machine, not with [model]; they change no gain",
+    absent: Absent::Follows("the machine is as the model"),
+    keys: &[
+        DryFriction::KEYS,
+        DriveTrain::KEYS,
+        DriverFaults::KEYS,
+        SensorErrors::KEYS,
+        ParameterErrors::KEYS,
+    ],
+};
+
+const NONE: Absent = Absent::Numbers(&[0.0]);
+const EACH_NOT_NEGATIVE: Rule = Rule::NOT_NEGATIVE.worded("a number >= 0, or one per joint");
+const EACH_ANGLE: Rule = Rule::SIGNED_ANGLE.worded("a number from -pi to pi (rad), or one per joint");
+const EACH_PERCENT: Rule = Rule::SIGNED_PERCENT.worded("a number > -100 and <= 900 (%), or one per joint");
+
+keys! {
+    /// Dry friction: a bristle that gives a little and then slides.
+    pub struct DryFriction {
+        joint_friction_n_m: PerJoint, "N·m", EACH_NOT_NEGATIVE, "Coulomb friction in each joint", NONE;
+        cart_friction_n: f64, "N", Rule::NOT_NEGATIVE, "Coulomb friction of the cart on its rail", NONE;
+        breakaway_percent: f64, "%", Rule::NOT_NEGATIVE,
+            "excess of the friction at rest over the Coulomb friction", NONE;
+        stribeck_rad_per_s: f64, "rad/s", Rule::POSITIVE,
+            "rate of a joint at which half of that excess is left", Absent::Numbers(&[0.1]);
+        stribeck_m_per_s: f64, "m/s", Rule::POSITIVE,
+            "speed of the cart at which half of that excess is left", Absent::Numbers(&[0.01]);
+        presliding_rad: f64, "rad", Rule::AT_LEAST_A_MILLIONTH,
+            "angle over which the friction of a joint builds up", Absent::Numbers(&[0.001]);
+        presliding_m: f64, "m", Rule::AT_LEAST_A_MILLIONTH,
+            "travel over which the friction of the cart builds up", Absent::Numbers(&[5e-5]);
+    }
+}
+
+keys! {
+    /// Between motor and cart.
+    pub struct DriveTrain {
+        backlash_m: f64, "m", Rule::NOT_NEGATIVE, "play between motor and cart, as travel of the cart", NONE;
+        belt_compliance_m_per_n: f64, "m/N", Rule::NOT_NEGATIVE, "stretch of belt or gear per force", NONE;
+        rotor_mass_kg: Option<f64>, "kg", Rule::POSITIVE.worded("a number > 0 and < mass_kg of [cart]"),
+            "part of the cart's mass that is on the motor's side of backlash and belt",
+            Absent::Follows("10 % of the cart's mass");
+    }
+}
+
+keys! {
+    /// Motor driver, supply, and the instants at which a force begins.
+    pub struct DriverFaults {
+        driver_lag_s: f64, "s", Rule::NOT_NEGATIVE, "time constant of the motor driver", NONE;
+        current_limit_a: Option<f64>, "A", Rule::POSITIVE, "largest current of the motor driver",
+            Absent::Follows("no limit");
+        supply_resistance_ohm: f64, "Ω", Rule::NOT_NEGATIVE,
+            "internal resistance of the supply, which sags under load", NONE;
+        force_percent: f64, "%", Rule::SIGNED_PERCENT, "excess of the real force over the commanded one", NONE;
+        latency_s: f64, "s", Rule::NOT_NEGATIVE,
+            "delay of the force besides delay_ticks", NONE;
+        jitter_s: f64, "s",
+            Rule::NOT_NEGATIVE.worded("a number >= 0; 2 jitter_s + latency_s < period_s"),
+            "each tick begins early or late by up to this", NONE;
+    }
+}
+
+keys! {
+    /// Encoders, their zeros, and the rail.
+    pub struct SensorErrors {
+        homing_error_rad: PerJoint, "rad", EACH_ANGLE, "measured minus true angle of each joint", NONE;
+        eccentricity_rad: PerJoint, "rad", EACH_NOT_NEGATIVE,
+            "amplitude of the error of each joint's encoder over a turn", NONE;
+        eccentricity_phase_rad: PerJoint, "rad", EACH_ANGLE,
+            "phase of that error when the joint is straight", NONE;
+        rail_tilt_rad: f64, "rad", Rule::SIGNED_ANGLE, "slope of the rail, up towards +x", NONE;
+    }
+}
+
+keys! {
+    /// Parameters of the machine that differ from those in the file.
+    pub struct ParameterErrors {
+        cart_mass_percent: f64, "%", Rule::SIGNED_PERCENT, "excess of the real mass of the cart", NONE;
+        link_mass_percent: PerJoint, "%", EACH_PERCENT, "excess of the real mass of each link", NONE;
+        link_length_percent: PerJoint, "%", EACH_PERCENT,
+            "excess of the real length of each link; its centre of mass moves along", NONE;
+        link_inertia_percent: PerJoint, "%", EACH_PERCENT,
+            "excess of the real inertia of each link, beyond what mass and length do", NONE;
+        parameter_spread_percent: f64, "%", Rule::SPREAD,
+            "spread (±) of all masses, lengths and inertias, drawn once, besides these", NONE;
+        parameter_seed: u8, "", Rule::NOT_NEGATIVE.worded("a whole number from 0 to 255"),
+            "seed of that drawing", NONE;
+    }
+}
+
+/// How the simulated machine differs from the model, `[reality]`. It changes no gain, so it is not part of the rig's hash.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Reality {
+    /// Dry friction of joints and cart.
+    pub friction: DryFriction,
+    /// Backlash and belt.
+    pub drive_train: DriveTrain,
+    /// Motor driver, supply and timing.
+    pub driver: DriverFaults,
+    /// Encoders, zeros and rail.
+    pub sensors: SensorErrors,
+    /// Masses, lengths and inertias.
+    pub parameters: ParameterErrors,
+}
+
+impl Default for Reality {
+    /// The machine is as the model.
+    fn default() -> Self {
+        fn absent<T: Keys>() -> T {
+            T::when_absent().expect("no key of [reality] is required")
+        }
+        Self {
+            friction: absent(),
+            drive_train: absent(),
+            driver: absent(),
+            sensors: absent(),
+            parameters: absent(),
+        }
+    }
+}
+
+/// Reads `[reality]`, which needs a chain.
+pub(in crate::rig) fn reality(
+    node: &Node<'_>,
+    plant: &PlantDescription,
+    period_s: f64,
+    has_motor: bool,
+) -> Result<Reality, RigError> {
+    let PlantDescription::Chain(chain) = plant else {
+        let remedy = "describe the machine by [cart] and [[link]], or leave [reality] out";
+        return Err(node.out_of_range("only a chain of links", remedy));
+    };
+    let table = node.table(&REALITY)?;
+    let reality = Reality {
+        friction: DryFriction::read(&table)?,
+        drive_train: DriveTrain::read(&table)?,
+        driver: DriverFaults::read(&table)?,
+        sensors: SensorErrors::read(&table)?,
+        parameters: ParameterErrors::read(&table)?,
+    };
+    lists_fit(&table, chain.links.len())?;
+    within_the_rig(&table, &reality, chain, period_s, has_motor)?;
+    Ok(reality)
+}
+
+/// A list has one entry per joint.
+fn lists_fit(table: &Table<'_>, joints: usize) -> Result<(), RigError> {
+    for key in REALITY.keys() {
+        if let Some(list) = table.get(key.name).filter(Node::is_list) {
+            list.numbers(joints, Rule::ANY, &table.asks_for(key.name))?;
+        }
+    }
+    Ok(())
+}
+
+/// Conditions that involve other values of the file.
+fn within_the_rig(
+    table: &Table<'_>,
+    reality: &Reality,
+    chain: &Chain,
+    period_s: f64,
+    has_motor: bool,
+) -> Result<(), RigError> {
+    let refused = |name: &str, accepts: &str, remedy: &str| match table.get(name) {
+        Some(node) => Err(node.out_of_range(accepts, remedy)),
+        None => Ok(()),
+    };
+    if reality.drive_train.rotor_mass_kg.is_some_and(|mass| mass >= chain.cart.mass_kg) {
+        refused("rotor_mass_kg", "a number > 0 and < mass_kg of [cart]", "give the smaller part of it")?;
+    }
+    let DriverFaults { latency_s, jitter_s, .. } = reality.driver;
+    if 2.0 * jitter_s + latency_s >= period_s {
+        let name = if latency_s >= period_s { "latency_s" } else { "jitter_s" };
+        let remedy = "give less, or set delay_ticks = 1 in [tick] for a further tick of delay";
+        refused(name, &format!("2 jitter_s + latency_s < period_s = {period_s} (s)"), remedy)?;
+    }
+    for (name, given) in [
+        ("current_limit_a", reality.driver.current_limit_a.is_some()),
+        ("supply_resistance_ohm", reality.driver.supply_resistance_ohm > 0.0),
+    ] {
+        if given && !has_motor {
+            refused(name, "only with a motor", "describe the motor in [actuator], or leave the key out")?;
+        }
+    }
+    Ok(())
+}
