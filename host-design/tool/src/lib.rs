@@ -11,6 +11,7 @@
 //! | [`monitor`] | telemetry and commands in a terminal |
 //! | [`compare`] | rigs and sweeps side by side |
 //! | [`reproduce`] | the paper's results beside ours |
+//! | [`twin`] | the live twin: a page on which the rig moves |
 //! | [`project`] | finds the checkout that images are built from |
 //!
 //! ```
@@ -34,3 +35,4 @@ pub mod monitor;
 pub mod project;
 pub mod report;
 pub mod reproduce;
+pub mod twin;

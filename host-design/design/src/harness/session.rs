@@ -72,6 +72,11 @@ impl<'a> Session<'a> {
         self.last_id
     }
 
+    /// Numbers the next command from here on: somebody else has sent commands with numbers up to `id`.
+    pub fn count_from(&mut self, id: u64) {
+        self.last_id = self.last_id.max(id);
+    }
+
     /// Number of the last command.
     pub fn last_id(&self) -> u64 {
         self.last_id

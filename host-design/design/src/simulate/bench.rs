@@ -26,6 +26,7 @@ pub struct Bench {
     torque_noise: Normal<f64>,
     force_offset: f64,
     push_n: f64,
+    pull_n_m: Vec<f64>,
     torques: Vec<f64>,
     state: Vec<f64>,
     period_s: f64,
@@ -55,6 +56,7 @@ impl Bench {
             |offset: f64| if offset.is_finite() { Ok(offset) } else { Err(SimulationError::Offset(offset)) };
         Ok(Self {
             torques: vec![0.0; plant.disturbances()],
+            pull_n_m: vec![0.0; plant.disturbances()],
             plant,
             motor: rig.actuator.motor.as_ref().map(MotorPlant::of),
             driver: Driver::of(rig),
@@ -145,6 +147,13 @@ impl Bench {
         self.push_n = force_n;
     }
 
+    /// Adds an external force on the cart (N) and external torques at the joints (N·m; missing ones are 0) in the next tick:
+    /// those of a hand that pulls.
+    pub fn pull(&mut self, force_n: f64, torques_n_m: &[f64]) {
+        self.push_n = force_n;
+        self.pull_n_m.iter_mut().zip(torques_n_m).for_each(|(pull, &torque)| *pull = torque);
+    }
+
     /// Simulates one tick with the command `drive` from its start; gives the motor's force on the cart at the start of the
     /// tick (N), without the disturbance.
     pub fn tick(&mut self, drive: Drive) -> f64 {
@@ -153,6 +162,9 @@ impl Bench {
         let disturbance = self.force_offset + push + self.force_noise.sample(&mut self.random);
         let (torque_noise, random) = (&self.torque_noise, &mut self.random);
         self.torques.fill_with(|| torque_noise.sample(random));
+        for (torque, pull) in self.torques.iter_mut().zip(&mut self.pull_n_m) {
+            *torque += std::mem::take(pull);
+        }
         let before = std::mem::replace(&mut self.acting_drive, now);
         let [latency, rest] = self.timing.next_tick();
         if latency > 0.0 {

@@ -66,7 +66,7 @@ impl Attempt<'_> {
     fn balance(&self, harness: &mut Harness<'_>) -> Result<Observed, HarnessError> {
         let trial = self.trial;
         let mut observed = Observed::default();
-        let mut injection = Injection::new(self.rig, self.table, trial);
+        let mut injection = Injection::new(self.rig, self.table, trial.clone());
         let mut output = harness.raise(Some(0.0))?;
         let heartbeat = self.ticks(HEARTBEAT_S);
         for tick in 0.. {

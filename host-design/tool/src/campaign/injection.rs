@@ -19,12 +19,15 @@ use upright_design::table::{MAX_SENSORS, TableValues};
 /// Duration of a push on the cart (s).
 const PUSH_S: f64 = 0.05;
 
+/// Longest lateness of a measurement (ticks).
+const LONGEST_LATENESS: usize = 20;
+
 /// The raw counters of one tick.
 type Counters = heapless::Vec<u32, MAX_SENSORS>;
 
 /// The defect of a trial.
 pub(super) struct Injection<'a> {
-    trial: &'a Trial,
+    trial: Trial,
     table: &'a TableValues,
     random: Pcg64,
     /// Counters at the onset.
@@ -40,7 +43,7 @@ pub(super) struct Injection<'a> {
 }
 
 impl<'a> Injection<'a> {
-    pub(super) fn new(rig: &Rig, table: &'a TableValues, trial: &'a Trial) -> Self {
+    pub(super) fn new(rig: &Rig, table: &'a TableValues, trial: Trial) -> Self {
         let ticks = |seconds: f64| (seconds / rig.tick.period_s).ceil() as usize;
         let visible = |sensor: usize| match &table.observer {
             Some(observer) => {
@@ -50,9 +53,9 @@ impl<'a> Injection<'a> {
             None => i64::MAX,
         };
         Self {
+            random: trial.random(),
             trial,
             table,
-            random: trial.random(),
             at_onset: None,
             past: Vec::new(),
             visible_counts: (0..table.sensors()).map(visible).collect(),
@@ -71,10 +74,13 @@ impl<'a> Injection<'a> {
     /// Changes what the firmware reads, `since` ticks after the onset; gives whether it differs visibly from a healthy
     /// rig.
     pub(super) fn inputs(&mut self, since: usize, inputs: &mut Pins) -> bool {
-        let Trial { kind, sensor, sign, size, .. } = *self.trial;
+        let Trial { kind, sensor, sign, size, .. } = self.trial;
         let truth = inputs.raw_counts.clone();
         let began = self.at_onset.get_or_insert_with(|| truth.clone()).clone();
         self.past.push(truth.clone());
+        if self.past.len() > 2 * LONGEST_LATENESS {
+            self.past.drain(..LONGEST_LATENESS);
+        }
         let contacts = &mut inputs.contacts;
         let moved = |sensor: usize| signed(sensor, truth[sensor].wrapping_sub(began[sensor]));
         let off = (self.visible_counts[sensor] as f64 * (2.0 + 18.0 * size) * sign) as i64;
@@ -106,7 +112,7 @@ impl<'a> Injection<'a> {
                 shown.push(shows(sensor, moved(sensor) - (sign * (since / every) as f64) as i64));
             }
             Kind::SensorLate => {
-                let late = 1 + (19.0 * size) as usize;
+                let late = 1 + ((LONGEST_LATENESS - 1) as f64 * size) as usize;
                 let then = self.past[self.past.len().saturating_sub(1 + late)][sensor];
                 inputs.raw_counts[sensor] = then;
                 return (signed(sensor, truth[sensor].wrapping_sub(then))).abs()
@@ -156,7 +162,7 @@ impl<'a> Injection<'a> {
 
     /// What is sent over the serial line at the onset.
     pub(super) fn serial(&mut self, session: &mut Session<'_>) {
-        let Trial { kind, sign, size, .. } = *self.trial;
+        let Trial { kind, sign, size, .. } = self.trial;
         let disarm = |id: u64| {
             let (mut scratch, mut out) = ([0; MAX_COMMAND], [0; MAX_COMMAND]);
             let command = Command { id, request: Request::Disarm };

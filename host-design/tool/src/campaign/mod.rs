@@ -4,6 +4,7 @@
 //! seed and its number, so that any of them can be run again alone. [`campaign`] runs many and counts the outcomes.
 
 mod attempt;
+mod by_hand;
 mod defect;
 mod injection;
 mod judge;
@@ -12,6 +13,7 @@ mod tally;
 mod trial;
 
 pub use attempt::Setup;
+pub use by_hand::Defective;
 pub use defect::{Expected, Kind, Ticks};
 pub use judge::{Class, Outcome};
 pub use tally::{Campaign, CampaignError, Row, campaign, kinds, one};

@@ -15,7 +15,9 @@ mod scale;
 mod theme;
 
 pub(crate) use png::pixels;
-pub(crate) use theme::{CHROMATIC, curve_colour, reference_colour, style_sheet};
+pub(crate) use theme::{
+    CHROMATIC, COLOURS_CSS, curve_colour, curve_dash, limit_colour, reference_colour, style_sheet,
+};
 
 pub use draw::{Drawing, PlotArea};
 pub use heat::HeatMap;

@@ -61,6 +61,19 @@ pub(crate) fn curve_colour(number: usize) -> String {
     hex(COLOURS[number % COLOURS.len()])
 }
 
+/// The dash of curve `number` (px); empty: solid.
+pub(crate) fn curve_dash(number: usize) -> &'static [u32] {
+    DASHES[number % DASHES.len()]
+}
+
+/// The colour of limits.
+pub(crate) fn limit_colour() -> String {
+    hex(LIMIT)
+}
+
+/// The colours of pages in the light and the dark scheme.
+pub(crate) const COLOURS_CSS: &str = include_str!("colours.css");
+
 /// The colour of references, and of the cart in drawings.
 pub(crate) fn reference_colour() -> String {
     hex(REFERENCE)

@@ -35,6 +35,19 @@ pub enum RunError {
 }
 
 impl Place<'_> {
+    /// Its name.
+    pub fn name(self) -> &'static str {
+        match self {
+            Place::Host => "this computer",
+            Place::Qemu { .. } => "QEMU",
+        }
+    }
+
+    /// Whether it runs an image, which can crash.
+    pub fn has_image(self) -> bool {
+        !matches!(self, Place::Host)
+    }
+
     /// Starts the firmware of `table` and does `action` with it. The firmware ends with the action.
     ///
     /// # Errors

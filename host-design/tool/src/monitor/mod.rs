@@ -8,6 +8,7 @@ mod line;
 mod model;
 pub mod record;
 pub mod view;
+pub mod words;
 
 pub use command::{Action, BadCommand, action, request};
 pub use line::{Line, OpenError};

@@ -34,6 +34,17 @@ pub enum Ended {
          or use its own tool"
     )]
     Protocol(u8),
+    /// The firmware is that of another rig.
+    #[error(
+        "the firmware was built for a rig with hash {found:016x}, the rig file has {wanted:016x}: flash the firmware again, \
+         or give its own rig file"
+    )]
+    Rig {
+        /// Hash in the firmware.
+        found: u64,
+        /// Hash of the rig file.
+        wanted: u64,
+    },
     /// The line is closed.
     #[error("the connection is closed: {0}; start `upright firmware monitor` again")]
     Closed(String),
@@ -67,6 +78,7 @@ pub struct Monitor {
     to_send: Vec<u8>,
     last_id: u64,
     asked: VecDeque<(u64, Request)>,
+    telemetry_s: f32,
     beating: bool,
     next_beat: Duration,
     next_ask: Duration,
@@ -91,9 +103,25 @@ impl Monitor {
             to_send: Vec::new(),
             last_id: 0,
             asked: VecDeque::new(),
+            telemetry_s: TELEMETRY_S,
             beating: false,
             next_beat: Duration::ZERO,
             next_ask: Duration::ZERO,
+        }
+    }
+
+    /// As [`Monitor::new`], with telemetry every `seconds`, as far as the ticks allow.
+    pub fn with_telemetry_every(seconds: f32, connection: &str) -> Self {
+        Self { telemetry_s: seconds, ..Self::new(connection) }
+    }
+
+    /// Ends the conversation if the firmware is not that of the rig with this hash.
+    pub fn expect_rig(&mut self, wanted: u64) {
+        if let Some(Info { rig_hash: found, .. }) = self.info
+            && found != wanted
+        {
+            self.to_send.clear();
+            self.ended.get_or_insert(Ended::Rig { found, wanted });
         }
     }
 
@@ -148,7 +176,7 @@ impl Monitor {
             }
             Answer::Info(info) => {
                 self.info = Some(info);
-                let ticks = (TELEMETRY_S / info.tick_s).round().clamp(1.0, f32::from(u16::MAX));
+                let ticks = (self.telemetry_s / info.tick_s).round().clamp(1.0, f32::from(u16::MAX));
                 self.send(Request::Telemetry(ticks as u16), now);
                 self.send(Request::Cause, now);
             }

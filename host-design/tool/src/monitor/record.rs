@@ -11,6 +11,7 @@ pub fn json(telemetry: &TelemetryOfAny) -> Value {
     json!({
         "tick": telemetry.tick,
         "state": telemetry.state,
+        "law": telemetry.law,
         "fault": telemetry.fault.map(|fault| fault.to_string()),
         "against_arming": telemetry.arming_inhibits.texts().collect::<Vec<_>>(),
         "counts": telemetry.counts,
@@ -34,6 +35,11 @@ impl<W: Write> Recorder<W> {
     /// An empty recording.
     pub fn new(out: W) -> Self {
         Self { csv: csv::Writer::from_writer(out), begun: false }
+    }
+
+    /// What has been written.
+    pub fn get_ref(&self) -> &W {
+        self.csv.get_ref()
     }
 
     /// Adds a row, before the first one a header.
@@ -67,5 +73,13 @@ impl<W: Write> Recorder<W> {
         let values = telemetry.estimate.iter().chain(&telemetry.innovation).map(ToString::to_string);
         self.csv.write_record(fixed.into_iter().chain(counts).chain(values))?;
         self.csv.flush()
+    }
+}
+
+impl Recorder<Vec<u8>> {
+    /// Ends the recording; gives the file's bytes.
+    pub fn into_bytes(self) -> Vec<u8> {
+        // Every row has been flushed, so nothing is left to fail.
+        self.csv.into_inner().unwrap_or_default()
     }
 }

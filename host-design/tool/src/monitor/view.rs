@@ -6,11 +6,10 @@ use ratatui::style::{Color, Style, Stylize};
 use ratatui::symbols::Marker;
 use ratatui::text::Line;
 use ratatui::widgets::{Axis, Block, Chart, Dataset, GraphType, Paragraph, Wrap};
-use upright::supervision::homing::Homing;
-use upright::supervision::sign_check::Signs;
 use upright::supervision::supervisor::State;
 
 use super::model::{Monitor, TelemetryOfAny};
+use super::words;
 
 const KEYS: &str = "h/H home (rail)  g check signs  a arm  d/space disarm  c clear  ←→ 1 cm  0 zero  l law  r record  q quit";
 const COLOURS: [Color; 6] =
@@ -81,19 +80,17 @@ fn header(monitor: &Monitor) -> Vec<Line<'_>> {
         info.tick_s * 1e3,
     )));
     let Some(telemetry) = &monitor.telemetry else { return lines };
-    let (state, colour) = match telemetry.state {
-        State::Disarmed => ("disarmed: positions are not known", Color::White),
-        State::Homing => ("homing", Color::Yellow),
-        State::Calibrated => ("calibrated: motor off", Color::White),
-        State::Armed => ("armed: waits until all links are upright and still", Color::Yellow),
-        State::Balancing => ("balancing: the motor is on", Color::Green),
-        State::Fault => ("fault: motor off", Color::Red),
+    let colour = match telemetry.state {
+        State::Disarmed | State::Calibrated => Color::White,
+        State::Homing | State::Armed => Color::Yellow,
+        State::Balancing => Color::Green,
+        State::Fault => Color::Red,
     };
-    lines.push(Line::from(state).style(Style::new().fg(colour).bold()));
+    lines.push(Line::from(words::state(telemetry.state)).style(Style::new().fg(colour).bold()));
     if let Some(fault) = telemetry.fault {
         let entry = fault.entry();
         let sensor = monitor.cause.filter(|cause| cause.fault == fault).and_then(|cause| cause.sensor);
-        let at = sensor.map_or(String::new(), |sensor| format!(" at the {}", joint(sensor)));
+        let at = sensor.map_or(String::new(), |sensor| format!(" at the {}", words::joint(sensor)));
         lines.push(Line::from(format!(
             "{} {}{at}, tick {}: {}",
             fault.code(),
@@ -105,44 +102,11 @@ fn header(monitor: &Monitor) -> Vec<Line<'_>> {
     } else if let Some(cause) = monitor.cause.filter(|_| telemetry.state == State::Disarmed) {
         lines.push(Line::from(format!("before: {}; {}", cause.fault, cause.fault.entry().remedy)));
     }
-    lines.extend(by_hand(telemetry).map(|what| Line::from(format!("now: {what}")).yellow()));
+    lines.extend(words::instruction(telemetry).map(|what| Line::from(format!("now: {what}")).yellow()));
     if telemetry.state != State::Balancing && !telemetry.arming_inhibits.is_empty() {
         lines.push(Line::from(format!("against arming: {}", telemetry.arming_inhibits)));
     }
     lines
-}
-
-fn joint(sensor: u8) -> String {
-    if sensor == 0 { "cart".to_owned() } else { format!("link {sensor}") }
-}
-
-/// The next thing to do by hand.
-fn by_hand(telemetry: &TelemetryOfAny) -> Option<String> {
-    let move_it = |sensor: u8| match sensor {
-        0 => "push the cart along +x".to_owned(),
-        link => format!("turn link {link} counter-clockwise"),
-    };
-    match (telemetry.homing, telemetry.signs) {
-        (Homing::Touch { low: false, .. }, _) => {
-            Some("push the cart to the switch at the low end".to_owned())
-        }
-        (Homing::Touch { .. }, _) => Some("push the cart to the switch at the high end".to_owned()),
-        (Homing::HoldStill, _) => Some("let the links hang still, away from the switches".to_owned()),
-        (Homing::WrongTravel, _) => {
-            Some("the switches are not as far apart as the rig file says; check them, home again".to_owned())
-        }
-        (_, Signs::Rest(sensor)) => Some(format!("let the links hang at rest; then {}", move_it(sensor))),
-        (_, Signs::Move(sensor)) => Some(move_it(sensor)),
-        (_, Signs::Reversed(sensor)) => {
-            Some(format!("the encoder of the {} counts the wrong way: swap its channels", joint(sensor)))
-        }
-        (_, Signs::Swapped { asked, moved }) => Some(format!(
-            "the {} has answered for the {}: swap the encoders' plugs",
-            joint(moved),
-            joint(asked)
-        )),
-        _ => None,
-    }
 }
 
 fn state_table(monitor: &Monitor) -> Vec<Line<'_>> {
@@ -156,7 +120,7 @@ fn state_table(monitor: &Monitor) -> Vec<Line<'_>> {
         let number = |value: Option<&f32>| value.map_or("-".to_owned(), |value| format!("{value:.4}"));
         lines.push(Line::from(format!(
             "{:<7}{:>11}{:>11}{:>8}{:>9}",
-            joint(i as u8),
+            words::joint(i as u8),
             format!("{} {unit}", number(position)),
             number(rate),
             counts,

@@ -10,7 +10,7 @@ use super::plot::Plot;
 use super::runs::{LawRun, Scene, laws};
 use super::trust::{CheckRow, TrustRow, check_rows, trust_rows};
 use super::{ReportError, Source};
-use crate::figure::style_sheet;
+use crate::figure::{COLOURS_CSS, style_sheet};
 use upright_design::design::Feedback;
 use upright_design::rig::{PlantDescription, Rig};
 use upright_design::verify::{Certificate, Disturbance};
@@ -134,7 +134,7 @@ impl<'a> Page<'a> {
             version: env!("CARGO_PKG_VERSION"),
             command: source.command,
             animation: Animation::of(rig, scenes).json()?,
-            style: format!("{}{}", style_sheet(), include_str!("page.css")),
+            style: format!("{}{COLOURS_CSS}{}", style_sheet(), include_str!("page.css")),
             script: include_str!("page.js"),
         })
     }

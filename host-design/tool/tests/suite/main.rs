@@ -21,5 +21,7 @@ mod report_figures;
 mod report_page;
 mod report_rigs;
 mod reproduce_numbers;
+mod twin_door;
+mod twin_page;
 mod verify_command;
 mod virtual_board;

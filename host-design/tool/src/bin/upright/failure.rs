@@ -15,6 +15,7 @@ use upright_tool::in_the_loop::{EmulatorError, RelayError, RunError};
 use upright_tool::monitor::OpenError;
 use upright_tool::report::ReportError;
 use upright_tool::reproduce::ReproduceError;
+use upright_tool::twin::TwinError;
 
 /// Why a command ends without success.
 #[derive(Debug, thiserror::Error)]
@@ -70,6 +71,15 @@ impl From<RelayError> for Failure {
         match error {
             RelayError::Run(error) => Failure::InTheLoop(error),
             RelayError::Socket(error) => Failure::Relay(error),
+        }
+    }
+}
+
+impl From<TwinError> for Failure {
+    fn from(error: TwinError) -> Self {
+        match error {
+            TwinError::Run(error) => Failure::InTheLoop(error),
+            TwinError::Socket(error) => Failure::Relay(error),
         }
     }
 }

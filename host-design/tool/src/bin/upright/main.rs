@@ -10,6 +10,7 @@ mod progress;
 mod report;
 mod reproduce;
 mod simulate;
+mod twin;
 mod variation;
 mod verify;
 
@@ -23,6 +24,7 @@ Examples:
   upright design rigs/quadruple-paper.toml      design the gains, prove them, write src/gains.rs
   upright design my.toml --json --no-write      the same as JSON, without writing files
   upright simulate rigs/quadruple-paper.toml --step 1 --svg step.svg
+  upright twin rigs/quadruple-paper.toml        a page on which the rig moves: pull it, break it, watch it
   upright verify rigs/quadruple-paper.toml      margins, region of attraction, noise, model errors
   upright report rigs/quadruple-paper.toml      all of it on one page, with an animation
   upright compare rigs/quadruple-paper.toml --sweep tick.period_s=0.0005..0.01
@@ -53,6 +55,7 @@ enum Command {
     Compare(compare::Compare),
     Reproduce(reproduce::Reproduce),
     Simulate(simulate::Simulate),
+    Twin(twin::Twin),
     Verify(verify::Verify),
 }
 
@@ -66,6 +69,7 @@ fn main() -> ExitCode {
         Command::Compare(command) => command.run(),
         Command::Reproduce(command) => command.run(),
         Command::Simulate(command) => command.run(),
+        Command::Twin(command) => command.run(),
         Command::Verify(command) => command.run(),
     };
     match result {

@@ -86,15 +86,40 @@ impl Browser {
     /// Opens a file in a window of this width (CSS pixels), with the colour scheme `scheme` (`light` or `dark`) and
     /// the medium `medium` (`screen` or `print`).
     pub(crate) fn open(&mut self, page: &Path, width: u32, scheme: &str, medium: &str) {
+        self.open_address(&format!("file://{}", page.display()), width, scheme, medium);
+    }
+
+    /// As [`Browser::open`], with an address.
+    pub(crate) fn open_address(&mut self, address: &str, width: u32, scheme: &str, medium: &str) {
         let metrics = json!({ "width": width, "height": 844, "deviceScaleFactor": 1, "mobile": false });
         self.call("Emulation.setDeviceMetricsOverride", metrics);
         let feature = json!({ "name": "prefers-color-scheme", "value": scheme });
         self.call("Emulation.setEmulatedMedia", json!({ "media": medium, "features": [feature] }));
         self.events.clear();
-        self.call("Page.navigate", json!({ "url": format!("file://{}", page.display()) }));
+        self.call("Page.navigate", json!({ "url": address }));
         while !self.events.iter().any(|event| event["method"] == "Page.loadEventFired") {
             let event = self.messages.recv_timeout(PATIENCE).expect("the page loads");
             self.events.push(event);
+        }
+    }
+
+    /// Frees what the page no longer uses.
+    pub(crate) fn collect_garbage(&mut self) {
+        self.call("HeapProfiler.collectGarbage", json!({}));
+    }
+
+    /// Moves, presses or releases the mouse at a point of the window (CSS pixels), as the system would.
+    pub(crate) fn mouse(&mut self, kind: &str, [x, y]: [f64; 2]) {
+        let buttons = i32::from(kind != "mouseReleased");
+        let event =
+            json!({ "type": kind, "x": x, "y": y, "button": "left", "buttons": buttons, "clickCount": 1 });
+        self.call("Input.dispatchMouseEvent", event);
+    }
+
+    /// Presses and releases a key.
+    pub(crate) fn key(&mut self, key: &str) {
+        for kind in ["keyDown", "keyUp"] {
+            self.call("Input.dispatchKeyEvent", json!({ "type": kind, "key": key }));
         }
     }
 
@@ -116,7 +141,9 @@ impl Browser {
             "Runtime.consoleAPICalled" => Some(event["params"]["args"].to_string()),
             "Network.requestWillBeSent" => {
                 let url = event["params"]["request"]["url"].as_str()?;
-                (!url.starts_with("file:") && !url.starts_with("data:")).then(|| format!("request for {url}"))
+                let is_own =
+                    ["file:", "data:", "blob:", "http://127.0.0.1:"].iter().any(|own| url.starts_with(own));
+                (!is_own).then(|| format!("request for {url}"))
             }
             _ => None,
         };

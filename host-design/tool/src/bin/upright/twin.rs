@@ -1,0 +1,95 @@
+//! `upright twin`
+
+use std::net::SocketAddr;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::{Duration, Instant};
+
+use clap::{Args, ValueEnum};
+use signal_hook::consts::{SIGINT, SIGTERM};
+use upright::table::Law;
+use upright_design::simulate::{Scenario, Sensing};
+use upright_tool::image::{self, Kind};
+use upright_tool::in_the_loop::{Link, Place};
+use upright_tool::monitor::Line;
+use upright_tool::twin::Server;
+
+use crate::failure::Failure;
+use crate::progress::with_spinner;
+use crate::variation::{Variation, law_option, positive};
+
+/// Serves a page on which the rig moves, run by the firmware itself: pull it, change it, break it, watch it.
+///
+/// Open the address that is printed; it holds a secret, so nobody else can move the motor. The page needs no network.
+/// It ends with Ctrl-C. If the page in command is closed or falls silent for two seconds, the motor is turned off.
+#[derive(Args)]
+#[command(before_help = "\
+Examples:
+  upright twin rigs/quadruple-paper.toml                      the firmware on this computer, the rig simulated
+  upright twin rigs/quadruple-paper.toml --target qemu        the image in QEMU
+  upright twin rigs/single-quanser-ip02.toml --hanging        from power-up on, with everything to do by hand
+  upright twin rigs/quadruple-paper.toml --port /dev/ttyACM0  a real board, without what only a simulation has
+  upright twin rigs/quadruple-paper.toml --listen 0.0.0.0:8080   for a phone in the same network: mind who hears")]
+pub(crate) struct Twin {
+    #[command(flatten)]
+    variation: Variation,
+    /// Where the firmware runs
+    #[arg(long, value_enum, default_value_t = Target::Host)]
+    target: Target,
+    /// A board instead of a simulation: its serial port (/dev/ttyACM0, COM3 …), or tcp:HOST:PORT
+    #[arg(long, conflicts_with_all = ["target", "hanging"])]
+    port: Option<String>,
+    /// Begin with the links hanging, not homed
+    #[arg(long)]
+    hanging: bool,
+    /// Control law at the start
+    #[arg(long, value_parser = law_option(), default_value = Law::Lqr.option())]
+    law: Law,
+    /// Address of the page; port 0 takes a free one
+    #[arg(long, value_name = "ADDRESS:PORT", default_value = "127.0.0.1:0")]
+    listen: SocketAddr,
+    /// End after this time (s)
+    #[arg(long, value_name = "S", value_parser = positive)]
+    duration: Option<f64>,
+}
+
+#[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum Target {
+    /// In this process
+    Host,
+    /// As an image in QEMU
+    Qemu,
+}
+
+impl Twin {
+    pub(crate) fn run(self) -> Result<(), Failure> {
+        let (rig, _, table) = self.variation.designed()?;
+        let image = match self.target {
+            Target::Qemu if self.port.is_none() => {
+                Some(with_spinner("building the image", || image::build_for(Kind::InTheLoop, &rig, &table))?)
+            }
+            _ => None,
+        };
+        let stop = Arc::new(AtomicBool::new(false));
+        for signal in [SIGINT, SIGTERM] {
+            signal_hook::flag::register(signal, Arc::clone(&stop))?;
+        }
+        let until = self.duration.map(|duration| Instant::now() + Duration::from_secs_f64(duration));
+        let goes_on = || !stop.load(Ordering::Relaxed) && until.is_none_or(|until| Instant::now() < until);
+        let server = Server::listen(self.listen).map_err(|error| {
+            Failure::BadArgument(format!("--listen {}: {error}; give another port, or 0", self.listen))
+        })?;
+        let line = self.port.as_deref().map(Line::open).transpose()?;
+        println!("{}", server.address()?);
+        eprintln!("open this address in a browser; Ctrl-C ends");
+        if let Some((line, port)) = line.zip(self.port.as_deref()) {
+            return Ok(server.connect(&rig, &table, line, port, &goes_on)?);
+        }
+        let place = match &image {
+            Some(image) => Place::Qemu { image, link: Link::Files },
+            None => Place::Host,
+        };
+        let scenario = Scenario { sensing: Sensing::Encoders, ..Scenario::at_rest(&rig, self.law) };
+        Ok(server.simulate(&rig, &table, &scenario, place, !self.hanging, &goes_on)?)
+    }
+}

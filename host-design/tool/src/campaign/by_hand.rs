@@ -1,0 +1,107 @@
+//! A defect that a person begins, in a rig that runs.
+
+use upright::board::Output;
+use upright_design::harness::{Pins, Session};
+use upright_design::rig::Rig;
+use upright_design::simulate::Scenario;
+use upright_design::table::TableValues;
+
+use super::defect::{Expected, Kind};
+use super::injection::Injection;
+use super::trial::Trial;
+
+/// A rig with a defect, tick by tick.
+pub struct Defective<'a> {
+    injection: Injection<'a>,
+    kind: Kind,
+    since: usize,
+}
+
+impl Kind {
+    /// Whether it can begin while the rig balances, with a firmware in this process or, if there is one, in an image.
+    pub fn can_begin_while_balancing(self, has_image: bool) -> bool {
+        let is_before_balancing = matches!(self.expected(), Expected::Refused(_));
+        !is_before_balancing && !self.needs_process() && (has_image || !self.needs_image())
+    }
+
+    /// Whether it is in one of the sensors.
+    pub fn has_sensor(self) -> bool {
+        matches!(
+            self,
+            Kind::LinkEncoderFrozen
+                | Kind::BadSample
+                | Kind::EncoderJump
+                | Kind::EncoderReversed
+                | Kind::EncodersSwapped
+                | Kind::CountsLost
+                | Kind::SensorLate
+                | Kind::SensorIntermittent
+        )
+    }
+}
+
+impl Trial {
+    /// A defect of medium severity that begins now.
+    pub fn by_hand(kind: Kind, scenario: &Scenario, sensors: usize, sensor: usize, seed: u64) -> Self {
+        let sensor = match kind {
+            Kind::CartEncoderFrozen => 0,
+            Kind::LinkEncoderFrozen => sensor.clamp(1, sensors.max(2) - 1),
+            Kind::EncodersSwapped => sensor.min(sensors.saturating_sub(2)),
+            _ => sensor.min(sensors.saturating_sub(1)),
+        };
+        let sign = if seed.is_multiple_of(2) { 1.0 } else { -1.0 };
+        Self {
+            number: 0,
+            kind,
+            scenario: scenario.clone(),
+            onset: 0,
+            watched: 0,
+            sensor,
+            sign,
+            size: 0.5,
+            seed,
+        }
+    }
+}
+
+impl<'a> Defective<'a> {
+    /// The defect of `trial`, which begins with the next tick.
+    pub fn new(rig: &Rig, table: &'a TableValues, trial: Trial) -> Self {
+        let kind = trial.kind;
+        Self { injection: Injection::new(rig, table, trial), kind, since: 0 }
+    }
+
+    /// The kind of the defect.
+    pub fn kind(&self) -> Kind {
+        self.kind
+    }
+
+    /// Does what happens once: bytes on the serial line, or a fault inside the microcontroller.
+    pub fn begin(&mut self, session: &mut Session<'_>) {
+        self.injection.serial(session);
+        if let Some(sabotage) = self.kind.inside_the_microcontroller() {
+            session.sabotage(sabotage);
+        }
+    }
+
+    /// Whether the host is still heard.
+    pub fn host_is_alive(&self) -> bool {
+        self.injection.host_is_alive(Some(self.since))
+    }
+
+    /// Changes what the firmware reads in the next tick.
+    pub fn inputs(&mut self, inputs: &mut Pins) {
+        self.injection.inputs(self.since, inputs);
+        self.since += 1;
+    }
+
+    /// Changes the output to the motor.
+    pub fn output(&mut self, output: &mut Output) {
+        self.injection.output(output);
+    }
+
+    /// External force on the cart (N).
+    pub fn push_n(&self) -> f64 {
+        self.injection.push_n(self.since)
+    }
+}

@@ -1,0 +1,53 @@
+//! States, sensors and instructions in words.
+
+use upright::supervision::homing::Homing;
+use upright::supervision::sign_check::Signs;
+use upright::supervision::supervisor::State;
+
+use super::model::TelemetryOfAny;
+
+/// A state of the supervisor.
+pub fn state(state: State) -> &'static str {
+    match state {
+        State::Disarmed => "disarmed: positions are not known",
+        State::Homing => "homing",
+        State::Calibrated => "calibrated: motor off",
+        State::Armed => "armed: waits until all links are upright and still",
+        State::Balancing => "balancing: the motor is on",
+        State::Fault => "fault: motor off",
+    }
+}
+
+/// A sensor by its number.
+pub fn joint(sensor: u8) -> String {
+    if sensor == 0 { "cart".to_owned() } else { format!("link {sensor}") }
+}
+
+/// The next thing to do by hand.
+pub fn instruction(telemetry: &TelemetryOfAny) -> Option<String> {
+    let move_it = |sensor: u8| match sensor {
+        0 => "push the cart along +x".to_owned(),
+        link => format!("turn link {link} counter-clockwise"),
+    };
+    match (telemetry.homing, telemetry.signs) {
+        (Homing::Touch { low: false, .. }, _) => {
+            Some("push the cart to the switch at the low end".to_owned())
+        }
+        (Homing::Touch { .. }, _) => Some("push the cart to the switch at the high end".to_owned()),
+        (Homing::HoldStill, _) => Some("let the links hang still, away from the switches".to_owned()),
+        (Homing::WrongTravel, _) => {
+            Some("the switches are not as far apart as the rig file says; check them, home again".to_owned())
+        }
+        (_, Signs::Rest(sensor)) => Some(format!("let the links hang at rest; then {}", move_it(sensor))),
+        (_, Signs::Move(sensor)) => Some(move_it(sensor)),
+        (_, Signs::Reversed(sensor)) => {
+            Some(format!("the encoder of the {} counts the wrong way: swap its channels", joint(sensor)))
+        }
+        (_, Signs::Swapped { asked, moved }) => Some(format!(
+            "the {} has answered for the {}: swap the encoders' plugs",
+            joint(moved),
+            joint(asked)
+        )),
+        _ => None,
+    }
+}

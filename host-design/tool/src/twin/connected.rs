@@ -1,0 +1,46 @@
+//! A machine behind a serial line: telemetry comes in, commands go out.
+
+use std::time::{Duration, Instant, SystemTime};
+
+use serde_json::Value;
+
+use super::desk::Desk;
+use super::pace::PICTURE;
+use crate::monitor::Line;
+
+/// Passes bytes between the line and the viewers until `goes_on` says no. The firmware has to be that of the rig with this
+/// hash; commands to another one are not sent.
+pub(super) fn run(mut line: Line, desk: &mut Desk, rig_hash: u64, goes_on: &dyn Fn() -> bool) {
+    let mut buffer = [0; 4096];
+    let mut next = Instant::now();
+    while goes_on() {
+        // What only a simulation can do is not asked of a machine.
+        let _ = desk.requests(now());
+        if desk.monitor.ended.is_none() {
+            match line.receive(&mut buffer) {
+                Ok(bytes) => desk.receive(bytes, now()),
+                Err(error) => desk.monitor.close(&error),
+            }
+            desk.monitor.expect_rig(rig_hash);
+            desk.monitor.poll(now());
+            let bytes = desk.monitor.take_outgoing();
+            if let Err(error) = line.send(&bytes) {
+                desk.monitor.close(&error);
+            }
+        } else {
+            std::thread::sleep(PICTURE);
+        }
+        if Instant::now() >= next {
+            desk.show(&Value::Null);
+            next = Instant::now() + PICTURE;
+        }
+    }
+    // Whoever was in command is no longer heard.
+    desk.turn_off(now());
+    let _ = line.send(&desk.monitor.take_outgoing());
+}
+
+/// Time since 1970.
+fn now() -> Duration {
+    SystemTime::UNIX_EPOCH.elapsed().unwrap_or_default()
+}

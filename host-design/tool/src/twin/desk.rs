@@ -1,0 +1,234 @@
+//! The desk between viewers and firmware: the conversation with the firmware, who is in command, and the recording.
+//!
+//! It is the same for a simulated rig and for a real one.
+
+use std::sync::{Arc, Mutex, PoisonError};
+use std::time::{Duration, Instant};
+
+use serde_json::{Value, json};
+use upright::protocol::message;
+use upright::supervision::supervisor::State;
+
+use super::pace::PICTURE;
+use super::request::{MachineRequest, Request};
+use super::viewers::{Event, Id, Inbox, Viewers};
+use crate::monitor::record::{Recorder, json as telemetry_json};
+use crate::monitor::{Action, Monitor, request as command, words};
+
+/// Longest silence of the viewer in command while the motor may move. A page answers every few pictures, in a background
+/// tab as well; a sleeping computer does not.
+const SILENCE: Duration = Duration::from_secs(2);
+/// Longest recording (bytes).
+const MAX_RECORDING: usize = 256 << 20;
+/// Telemetry kept for a picture; older ones are dropped while nobody looks.
+const MAX_FRESH: usize = 2000;
+
+/// A recording that is shared with the door.
+pub(super) type Recording = Arc<Mutex<Vec<u8>>>;
+
+/// The desk.
+pub(super) struct Desk {
+    /// The conversation with the firmware.
+    pub(super) monitor: Monitor,
+    viewers: Viewers,
+    inbox: Inbox,
+    greeting: Value,
+    commander: Option<Id>,
+    last_heard: Instant,
+    /// Whether anyone has ever looked.
+    pub(super) was_seen: bool,
+    fresh: Vec<Value>,
+    recorder: Option<Recorder<Vec<u8>>>,
+    recording: Recording,
+}
+
+impl Desk {
+    /// A desk with a new conversation. `greeting` is what every viewer is told first.
+    pub(super) fn new(
+        monitor: Monitor,
+        (viewers, inbox): (Viewers, Inbox),
+        recording: Recording,
+        greeting: Value,
+    ) -> Self {
+        Self {
+            monitor,
+            viewers,
+            inbox,
+            greeting,
+            commander: None,
+            last_heard: Instant::now(),
+            was_seen: false,
+            fresh: Vec::new(),
+            recorder: None,
+            recording,
+        }
+    }
+
+    /// Takes bytes of the firmware.
+    pub(super) fn receive(&mut self, bytes: &[u8], now: Duration) {
+        for telemetry in self.monitor.receive(bytes, now) {
+            if let Some(recorder) = &mut self.recorder {
+                // Into memory, which does not fail.
+                let _ = recorder.push(&telemetry);
+                if recorder.get_ref().len() > MAX_RECORDING {
+                    self.stop_recording();
+                    self.monitor.note("the recording is full".to_owned());
+                }
+            }
+            if self.fresh.len() < MAX_FRESH {
+                let mut object = telemetry_json(&telemetry);
+                object["now"] = json!(words::instruction(&telemetry));
+                self.fresh.push(object);
+            }
+        }
+    }
+
+    /// Carries out what the viewers ask for; gives what the one in command asks of the machine.
+    pub(super) fn requests(&mut self, now: Duration) -> Vec<MachineRequest> {
+        let mut machine = Vec::new();
+        while let Some((viewer, event)) = self.inbox.next() {
+            let commands = self.commander == Some(viewer);
+            if commands {
+                self.last_heard = Instant::now();
+            }
+            match event {
+                Event::Came => {
+                    self.was_seen = true;
+                    self.viewers.tell(viewer, &json!({ "hello": self.greeting, "you": viewer }).to_string());
+                    self.take_command(viewer);
+                }
+                Event::Went if commands => self.commander = None,
+                Event::Went | Event::Asks(Request::Alive) => {}
+                Event::Asks(Request::Command) => self.take_command(viewer),
+                Event::Asks(Request::Release) if commands => self.commander = None,
+                // Anyone who sees danger may turn the motor off.
+                Event::Asks(Request::Say { line }) if commands || line == "disarm" => self.say(&line, now),
+                Event::Asks(Request::Record { on }) if commands => {
+                    if on {
+                        self.start_recording()
+                    } else {
+                        self.stop_recording()
+                    }
+                }
+                Event::Asks(Request::Machine { what }) if commands => machine.push(what),
+                Event::Asks(_) => self.viewers.tell(
+                    viewer,
+                    &json!({ "notice": "another viewer is in command; only the stop works here" })
+                        .to_string(),
+                ),
+            }
+        }
+        self.watch(now);
+        machine
+    }
+
+    fn take_command(&mut self, viewer: Id) {
+        if self.commander.is_none() {
+            (self.commander, self.last_heard) = (Some(viewer), Instant::now());
+        }
+    }
+
+    fn say(&mut self, line: &str, now: Duration) {
+        match command(line) {
+            Ok(request) => self.monitor.act(Action::Send(request), now),
+            Err(bad) => self.monitor.note(bad.to_string()),
+        }
+    }
+
+    /// Turns the motor off when the viewer in command is silent; while it is not, the firmware is told so.
+    fn watch(&mut self, now: Duration) {
+        let state = self.monitor.telemetry.as_ref().map(|telemetry| telemetry.state);
+        let is_on = matches!(state, Some(State::Armed | State::Balancing));
+        if !self.was_seen || !is_on {
+            return;
+        }
+        if self.last_heard.elapsed() > SILENCE {
+            self.turn_off(now);
+            self.monitor.wanted = None;
+            self.commander = None;
+        } else if state == Some(State::Balancing) && self.monitor.wanted.is_none() {
+            // From the first set-point on, the firmware turns the motor off by itself when this program is silent.
+            self.monitor.act(Action::Shift(0.0), now);
+        }
+    }
+
+    fn start_recording(&mut self) {
+        self.recorder = Some(Recorder::new(Vec::new()));
+        self.monitor.recording = Some("recording.csv".to_owned());
+    }
+
+    fn stop_recording(&mut self) {
+        if let Some(recorder) = self.recorder.take() {
+            *self.recording.lock().unwrap_or_else(PoisonError::into_inner) = recorder.into_bytes();
+        }
+        self.monitor.recording = None;
+    }
+
+    /// Turns the motor off.
+    pub(super) fn turn_off(&mut self, now: Duration) {
+        self.monitor.act(Action::Send(message::Request::Disarm), now);
+    }
+
+    /// The firmware has stopped: says why, until the viewer in command asks for a restart. Gives whether upright; none if
+    /// `goes_on` says no.
+    pub(super) fn wait_for_restart(&mut self, why: &str, goes_on: &dyn Fn() -> bool) -> Option<bool> {
+        self.monitor.note(format!("{why}; switch the power off and on"));
+        while goes_on() {
+            // Of what is asked, only this can be done.
+            for request in self.requests(Duration::ZERO) {
+                if let MachineRequest::Restart { upright } = request {
+                    return Some(upright);
+                }
+            }
+            self.show(&json!({ "stopped": why }));
+            std::thread::sleep(PICTURE);
+        }
+        None
+    }
+
+    /// Begins the conversation with a firmware that has just started.
+    pub(super) fn begin_again(&mut self, monitor: Monitor) {
+        let log = std::mem::take(&mut self.monitor.log);
+        self.monitor = monitor;
+        self.monitor.log = log;
+        self.monitor.note("the firmware has started".to_owned());
+        (self.last_heard, self.fresh) = (Instant::now(), Vec::new());
+    }
+
+    /// Whether anyone looks.
+    pub(super) fn has_viewers(&self) -> bool {
+        !self.viewers.is_empty()
+    }
+
+    /// Sends a picture to all viewers: the telemetry since the picture before, and `machine`.
+    pub(super) fn show(&mut self, machine: &Value) {
+        let fresh = std::mem::take(&mut self.fresh);
+        if !self.has_viewers() {
+            return;
+        }
+        let monitor = &mut self.monitor;
+        let fault = monitor.telemetry.as_ref().and_then(|telemetry| telemetry.fault);
+        let entry = fault.map(|fault| fault.entry());
+        let picture = json!({
+            "picture": {
+                "telemetry": fresh,
+                "machine": machine,
+                "commander": self.commander,
+                "recording": monitor.recording.is_some(),
+                "wanted_m": monitor.wanted,
+                "statistics": monitor.statistics,
+                "fault": entry.map(|entry| json!({
+                    "code": fault.map(|fault| fault.code()),
+                    "name": entry.name,
+                    "condition": entry.condition,
+                    "remedy": entry.remedy,
+                    "at": monitor.cause.filter(|cause| Some(cause.fault) == fault)
+                        .and_then(|cause| cause.sensor).map(words::joint),
+                })),
+                "ended": monitor.ended.as_ref().map(ToString::to_string),
+                "log": monitor.log.drain(..).collect::<Vec<_>>(),
+            }
+        });
+        self.viewers.tell_all(picture.to_string());
+    }
+}

@@ -1,0 +1,54 @@
+//! What a page is told first.
+
+use serde_json::{Value, json};
+use upright::supervision::supervisor::State;
+use upright_design::rig::{PlantDescription, Rig};
+use upright_design::table::TableValues;
+
+use super::property::Properties;
+use crate::campaign::Kind;
+use crate::figure::{CHROMATIC, curve_colour, curve_dash, limit_colour, reference_colour};
+use crate::monitor::words;
+
+/// The rig, its limits, and what can be done with it.
+pub(super) fn greeting(
+    rig: &Rig,
+    table: &TableValues,
+    place: &str,
+    is_simulated: bool,
+    has_image: bool,
+) -> Value {
+    let (lengths, travel) = match &rig.plant {
+        PlantDescription::Chain(chain) => {
+            (chain.links.iter().map(|link| link.length_m).collect::<Vec<_>>(), chain.cart.travel_m.map(Some))
+        }
+        PlantDescription::Model(_) => (Vec::new(), [None, None]),
+    };
+    let states =
+        [State::Disarmed, State::Homing, State::Calibrated, State::Armed, State::Balancing, State::Fault];
+    let defects = Kind::ALL.iter().filter(|row| row.0.can_begin_while_balancing(has_image));
+    json!({
+        "rig": rig.name,
+        "place": place,
+        "is_simulated": is_simulated,
+        "tick_s": rig.tick.period_s,
+        "lengths_m": lengths,
+        "travel_m": travel,
+        "soft_m": table.limits.rail_m,
+        "angle_limit_rad": table.limits.angle_rad,
+        "force_limit_n": table.force_limit_n,
+        "sensors": (0..table.sensors()).map(|sensor| words::joint(sensor as u8)).collect::<Vec<_>>(),
+        "laws": table.laws.present().map(|(law, _)| json!({ "name": law.option(), "title": law.title(), "value": law }))
+            .collect::<Vec<Value>>(),
+        "states": states.map(|state| json!({ "state": state, "text": words::state(state) })),
+        "properties": if is_simulated { json!(Properties::of(rig).described()) } else { json!([]) },
+        "defects": if is_simulated {
+            defects.map(|(kind, name, meaning, _)| json!({ "name": name, "meaning": meaning, "has_sensor": kind.has_sensor() }))
+                .collect::<Vec<_>>()
+        } else { Vec::new() },
+        "colours": (0..CHROMATIC).map(curve_colour).collect::<Vec<_>>(),
+        "dashes": (0..CHROMATIC).map(curve_dash).collect::<Vec<_>>(),
+        "reference": reference_colour(),
+        "limit": limit_colour(),
+    })
+}

@@ -1,0 +1,169 @@
+//! A spring between a body of the rig and the pointer.
+
+use upright_design::plant::absolute_angles;
+use upright_design::rig::Chain;
+
+/// What is pulled, and where to.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Grip {
+    /// 0: cart, 1: first link …
+    pub(super) body: usize,
+    /// Where on the link: 0 at its joint, 1 at its end.
+    pub(super) along: f64,
+    /// Where to: along the rail and up from it (m).
+    pub(super) to: [f64; 2],
+}
+
+/// The spring of a rig: a damped oscillation with the mass that it moves, for one link at 1.3 Hz.
+#[derive(Debug, Clone)]
+pub(super) struct Spring {
+    lengths_m: Vec<f64>,
+    masses_kg: Vec<f64>,
+    total_kg: f64,
+    period_s: f64,
+}
+
+/// What a spring does: a force on the rig where it is gripped (N), as a force on the cart and torques at the joints.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Pull {
+    /// Along the rail, and up (N).
+    pub(super) force_n: [f64; 2],
+    /// The generalised force on the cart (N).
+    pub(super) cart_n: f64,
+    /// The torques at the joints (N·m).
+    pub(super) torques_n_m: Vec<f64>,
+}
+
+/// Angular frequency of the spring with the mass that it moves, for one link (rad/s).
+const OMEGA: f64 = 8.0;
+/// The more links, the less they stand, and the softer the spring: the frequency falls with this power of their number.
+const SOFTER: f64 = 1.2;
+/// Its damping ratio.
+const ZETA: f64 = 0.35;
+/// Largest force, in weights of what it moves.
+const STRONGEST: f64 = 4.0;
+/// Largest change of speed of the gripped body by the damper within a tick, as a fraction.
+const DAMPED_PER_TICK: f64 = 0.3;
+/// Acceleration of a weight (m/s²).
+const GRAVITY: f64 = 9.81;
+
+impl Spring {
+    /// The spring for the links of `chain`, recomputed every `period_s`.
+    pub(super) fn of(chain: &Chain, period_s: f64) -> Self {
+        let masses_kg: Vec<f64> = chain.links.iter().map(|link| link.mass_kg).collect();
+        Self {
+            lengths_m: chain.links.iter().map(|link| link.length_m).collect(),
+            total_kg: chain.cart.mass_kg + masses_kg.iter().sum::<f64>(),
+            masses_kg,
+            period_s,
+        }
+    }
+
+    /// The pull of `grip` on the rig in `state` (`x, ẋ, θ_1, θ̇_1, …`).
+    ///
+    /// With the gripped point `p`, the generalised force on a coordinate q is `F · ∂p/∂q` (Goldstein, *Classical
+    /// Mechanics*, §1.4). An absolute angle has `Q_j = τ_j - τ_{j+1}`, so the torques are sums from the last link on.
+    pub(super) fn pull(&self, grip: &Grip, state: &[f64]) -> Pull {
+        let angles: Vec<f64> = absolute_angles(state).collect();
+        let mut rate = 0.0;
+        let rates: Vec<f64> = state
+            .iter()
+            .skip(3)
+            .step_by(2)
+            .map(|relative| {
+                rate += relative;
+                rate
+            })
+            .collect();
+        // Of each link up to the gripped point: its arm as a vector.
+        let arm = |link: usize| match link + 1 {
+            number if number < grip.body => self.lengths_m[link],
+            number if number == grip.body => self.lengths_m[link] * grip.along.clamp(0.0, 1.0),
+            _ => 0.0,
+        };
+        let (mut point, mut speed) = ([state[0], 0.0], [state[1], 0.0]);
+        for (link, (&phi, &phidot)) in angles.iter().zip(&rates).enumerate() {
+            let (sin, cos) = phi.sin_cos();
+            point = [point[0] - arm(link) * sin, point[1] + arm(link) * cos];
+            speed = [speed[0] - arm(link) * cos * phidot, speed[1] - arm(link) * sin * phidot];
+        }
+        let force_n = self.force(grip, point, speed);
+        let (mut torques_n_m, mut beyond) = (vec![0.0; angles.len()], 0.0);
+        for (link, &phi) in angles.iter().enumerate().rev() {
+            let (sin, cos) = phi.sin_cos();
+            beyond += -arm(link) * (cos * force_n[0] + sin * force_n[1]);
+            torques_n_m[link] = beyond;
+        }
+        Pull { force_n, cart_n: force_n[0], torques_n_m }
+    }
+
+    fn omega(&self) -> f64 {
+        OMEGA / (self.lengths_m.len().max(1) as f64).powf(SOFTER)
+    }
+
+    fn force(&self, grip: &Grip, point: [f64; 2], speed: [f64; 2]) -> [f64; 2] {
+        let (moved_kg, body_kg) = match grip.body.checked_sub(1).and_then(|link| self.masses_kg.get(link)) {
+            Some(&own) => (self.masses_kg.iter().sum::<f64>(), own),
+            None => (self.total_kg, self.total_kg),
+        };
+        let omega = self.omega();
+        let stiffness = moved_kg * omega * omega;
+        let damping = (2.0 * ZETA * omega * moved_kg).min(DAMPED_PER_TICK * body_kg / self.period_s);
+        let raw = [0, 1].map(|axis| stiffness * (grip.to[axis] - point[axis]) - damping * speed[axis]);
+        let size = raw[0].hypot(raw[1]);
+        let strongest = STRONGEST * GRAVITY * moved_kg;
+        let scale = if size > strongest { strongest / size } else { 1.0 };
+        // The rail takes what pulls the cart up.
+        if grip.body == 0 { [raw[0] * scale, 0.0] } else { raw.map(|component| component * scale) }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn spring(links: usize) -> Spring {
+        Spring { lengths_m: vec![0.5; links], masses_kg: vec![0.2; links], total_kg: 1.0, period_s: 1e-3 }
+    }
+
+    #[test]
+    fn a_pull_at_the_tip_turns_every_joint_by_its_lever() {
+        // Upright at rest, pulled along +x at the tip: the levers are the distances of the joints from it.
+        let grip = Grip { body: 2, along: 1.0, to: [0.01, 1.0] };
+        let spring = spring(2);
+        let pull = spring.pull(&grip, &[0.0; 6]);
+        let force = 0.4 * spring.omega() * spring.omega() * 0.01;
+        assert!((pull.force_n[0] - force).abs() < 1e-9 && pull.force_n[1].abs() < 1e-9);
+        assert!((pull.cart_n - force).abs() < 1e-9);
+        assert!(
+            (pull.torques_n_m[0] + force).abs() < 1e-9 && (pull.torques_n_m[1] + 0.5 * force).abs() < 1e-9
+        );
+    }
+
+    #[test]
+    fn the_work_of_the_pull_is_that_of_its_force() {
+        // F · v = cart force · ẋ + Σ Q_j φ̇_j, for any state: here by a small step along the motion.
+        let state = [0.1, 0.4, 0.7, -1.2, -0.3, 2.0];
+        let grip = Grip { body: 2, along: 0.6, to: [0.3, 0.2] };
+        let pull = spring(2).pull(&grip, &state);
+        let point = |state: &[f64]| {
+            let [first, second] = [state[2], state[2] + state[4]];
+            [state[0] - 0.5 * first.sin() - 0.3 * second.sin(), 0.5 * first.cos() + 0.3 * second.cos()]
+        };
+        let step = 1e-7;
+        let later: Vec<f64> =
+            (0..6).map(|i| if i % 2 == 0 { state[i] + step * state[i + 1] } else { state[i] }).collect();
+        let moved = [0, 1].map(|axis| (point(&later)[axis] - point(&state)[axis]) / step);
+        let work = pull.force_n[0] * moved[0] + pull.force_n[1] * moved[1];
+        // A joint torque works on the relative rate.
+        let joints = pull.cart_n * state[1] + pull.torques_n_m[0] * state[3] + pull.torques_n_m[1] * state[5];
+        assert!((work - joints).abs() < 1e-5, "{work} {joints}");
+    }
+
+    #[test]
+    fn a_far_pointer_does_not_tear_the_rig_apart() {
+        let grip = Grip { body: 1, along: 1.0, to: [1e9, -1e9] };
+        let pull = spring(1).pull(&grip, &[0.0; 4]);
+        assert!(pull.force_n[0].hypot(pull.force_n[1]) < STRONGEST * GRAVITY * 0.2 + 1e-9);
+    }
+}

@@ -1,0 +1,32 @@
+//! The live twin: a page on which the rig moves, run by the firmware itself, and on which a person can do what one would
+//! do at the bench.
+//!
+//! The firmware runs in this process, in an emulator, or on a board; the page sees the same conversation with it in
+//! frames. A simulated machine can be pulled, changed and broken as well.
+//!
+//! | file | what is in it |
+//! |---|---|
+//! | `door.rs` | which requests are let in |
+//! | `viewers.rs` | connections of pages |
+//! | `request.rs` | what a page asks for |
+//! | `desk.rs` | conversation with the firmware, command, recording |
+//! | `simulated.rs` | the simulated machine, with `grip.rs`, `holding.rs`, `property.rs`, `challenge.rs`, `pace.rs` |
+//! | `connected.rs` | a machine behind a serial line |
+//! | `page/` | the page |
+
+mod assets;
+mod challenge;
+mod connected;
+mod desk;
+mod door;
+mod greeting;
+mod grip;
+mod holding;
+mod pace;
+mod property;
+mod request;
+mod server;
+mod simulated;
+mod viewers;
+
+pub use server::{Server, TwinError};

@@ -1,0 +1,78 @@
+// The page: puts connection, rig, scopes and controls together.
+
+import { connect } from './link.js';
+import { RigView } from './rig.js';
+import { Scopes } from './scope.js';
+import { Controls } from './controls.js';
+
+const SCOPES_EVERY = 3; // frames between two drawings of the scopes
+
+const byId = (id) => document.getElementById(id);
+const colours = new Map();
+let hello = null;
+
+// A colour of the style sheet; of the curves in the light scheme, the one of the tool's figures.
+export function colour(name) {
+  if (!colours.has(name)) {
+    const given = getComputedStyle(document.documentElement).getPropertyValue(name).trim();
+    const curve = /^--c([0-9])$/.exec(name);
+    const figure = curve !== null ? hello.colours[curve[1]] : { '--reference': hello.reference, '--limit': hello.limit }[name];
+    colours.set(name, given || figure);
+  }
+  return colours.get(name);
+}
+matchMedia('(prefers-color-scheme: dark)').addEventListener('change', () => colours.clear());
+
+const seen = { you: null, picture: null, telemetry: null, frames: 0, since: performance.now() };
+let view = null;
+let scopes = null;
+
+const ask = connect({
+  hello(told, you) {
+    hello = told;
+    seen.you = you;
+    byId('notice').hidden = true;
+    if (view !== null) return; // connected again
+    colours.clear();
+    scopes = new Scopes(byId('panels'), hello);
+    view = new RigView(byId('rig'), byId('rail'), hello, {
+      pull: (body, along, x, y) => controls.machine({ do: 'pull', body, along, x, y }),
+      letGo: () => controls.machine({ do: 'let-go' }),
+      moveTo: (x) => controls.say(`set-point ${Math.min(hello.soft_m[1], Math.max(hello.soft_m[0], x)).toFixed(4)}`),
+    });
+    controls.hello(hello, scopes);
+  },
+  picture(picture) {
+    seen.picture = picture;
+    for (const telemetry of picture.telemetry) scopes.push(telemetry);
+    seen.telemetry = picture.telemetry.at(-1) ?? seen.telemetry;
+    controls.picture(picture, seen.telemetry, picture.commander === seen.you);
+  },
+  notice(text) {
+    byId('notice').textContent = text;
+    byId('notice').hidden = false;
+  },
+  lost() {
+    seen.picture = null;
+    byId('state').textContent = 'no connection: the motor is turned off without it';
+    delete byId('state').dataset.state;
+  },
+});
+const controls = new Controls(ask);
+
+function frame() {
+  requestAnimationFrame(frame);
+  if (view === null || seen.picture === null) return;
+  const { machine, wanted_m: wanted } = seen.picture;
+  const state = machine?.state ?? seen.telemetry?.estimate;
+  if (state !== undefined) {
+    view.draw(state, wanted ?? seen.telemetry?.setpoint_m ?? null, machine?.pull);
+    view.pull();
+  }
+  if (seen.frames % SCOPES_EVERY === 0) scopes.draw();
+  seen.frames += 1;
+}
+requestAnimationFrame(frame);
+
+// For tests, and for the curious.
+globalThis.upright = { seen, view: () => view, scopes: () => scopes };

@@ -1,0 +1,219 @@
+//! The server: listens, lets viewers in, and runs the machine.
+
+use std::net::{IpAddr, SocketAddr, TcpListener, TcpStream};
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+use std::sync::{Arc, PoisonError};
+
+use upright_design::harness::HarnessError;
+use upright_design::rig::Rig;
+use upright_design::simulate::Scenario;
+use upright_design::table::TableValues;
+
+use super::connected;
+use super::desk::{Desk, Recording};
+use super::door::{Admitted, Door, accept, send};
+use super::greeting::greeting;
+use super::property::Properties;
+use super::simulated::{Ended, Machine};
+use super::viewers::Viewers;
+use crate::in_the_loop::{EmulatorError, Place, RunError};
+use crate::monitor::{Line, Monitor};
+
+/// Most connections at a time, those that still ask included.
+const MAX_CONNECTIONS: usize = 32;
+/// Time between two telemetry messages of a simulated machine (s).
+const TELEMETRY_S: f32 = 0.005;
+
+/// A twin that has ended early.
+#[derive(Debug, thiserror::Error)]
+pub enum TwinError {
+    /// The firmware or the rig.
+    #[error(transparent)]
+    Run(#[from] RunError),
+    /// The listening socket.
+    #[error("the page cannot be served: {0}")]
+    Socket(#[from] std::io::Error),
+}
+
+impl From<HarnessError> for TwinError {
+    fn from(error: HarnessError) -> Self {
+        TwinError::Run(error.into())
+    }
+}
+
+impl From<EmulatorError> for TwinError {
+    fn from(error: EmulatorError) -> Self {
+        TwinError::Run(error.into())
+    }
+}
+
+/// A page at an address that only who started it knows.
+pub struct Server {
+    listener: TcpListener,
+    secret: String,
+    viewers: (Viewers, super::viewers::Inbox),
+    recording: Recording,
+}
+
+impl Server {
+    /// Listens at this address; port 0 takes a free one.
+    ///
+    /// # Errors
+    /// If the address cannot be listened at.
+    pub fn listen(address: SocketAddr) -> std::io::Result<Self> {
+        let secret = format!("{:032x}", rand::random::<u128>());
+        Ok(Self {
+            listener: TcpListener::bind(address)?,
+            secret,
+            viewers: Viewers::new(),
+            recording: Recording::default(),
+        })
+    }
+
+    /// The address of the page, with its secret.
+    ///
+    /// # Errors
+    /// If the system does not tell the port.
+    pub fn address(&self) -> std::io::Result<String> {
+        let local = self.listener.local_addr()?;
+        let host = match local.ip() {
+            // Every interface: the one of this machine is always among them.
+            ip if ip.is_unspecified() => SocketAddr::new(IpAddr::from([127, 0, 0, 1]), local.port()),
+            ip => SocketAddr::new(ip, local.port()),
+        };
+        Ok(format!("http://{host}/{}/", self.secret))
+    }
+
+    /// Runs the firmware of `table` in `place` with the simulated rig, in real time from the first viewer on, until
+    /// `goes_on` says no. If `upright`, the rig has been raised before.
+    ///
+    /// # Errors
+    /// [`TwinError`] if the firmware cannot be started.
+    pub fn simulate(
+        self,
+        rig: &Rig,
+        table: &TableValues,
+        scenario: &Scenario,
+        place: Place<'_>,
+        upright: bool,
+        goes_on: &dyn Fn() -> bool,
+    ) -> Result<(), TwinError> {
+        let greeting = greeting(rig, table, place.name(), true, place.has_image());
+        let (viewers, inbox) = self.viewers;
+        let _accepting = accepting(self.listener, self.secret, viewers.clone(), Arc::clone(&self.recording))?;
+        let monitor = || Monitor::with_telemetry_every(TELEMETRY_S, &rig.name);
+        let mut desk = Desk::new(monitor(), (viewers, inbox), self.recording, greeting);
+        let machine = Machine { rig, table, scenario };
+        let mut properties = Properties::of(rig);
+        let mut upright = upright;
+        loop {
+            let ended = place.with_target(table, |target| {
+                machine.run(target, &mut desk, &mut properties, upright, goes_on).map_err(TwinError::from)
+            });
+            upright = match ended {
+                Ok(Ended::Stopped) => return Ok(()),
+                Ok(Ended::Restart { upright }) => upright,
+                // It has stopped after it was running: say so, and wait for the power to be switched off and on.
+                Err(error) if desk.was_seen => match desk.wait_for_restart(&error.to_string(), goes_on) {
+                    Some(upright) => upright,
+                    None => return Ok(()),
+                },
+                Err(error) => return Err(error),
+            };
+            desk.begin_again(monitor());
+        }
+    }
+
+    /// Shows the machine behind `line`, which is that of `rig`, until `goes_on` says no.
+    ///
+    /// # Errors
+    /// [`TwinError`] if the page cannot be served.
+    pub fn connect(
+        self,
+        rig: &Rig,
+        table: &TableValues,
+        line: Line,
+        name: &str,
+        goes_on: &dyn Fn() -> bool,
+    ) -> Result<(), TwinError> {
+        let greeting = greeting(rig, table, name, false, true);
+        let (viewers, inbox) = self.viewers;
+        let _accepting = accepting(self.listener, self.secret, viewers.clone(), Arc::clone(&self.recording))?;
+        let mut desk = Desk::new(Monitor::new(name), (viewers, inbox), self.recording, greeting);
+        connected::run(line, &mut desk, rig.hash(), goes_on);
+        Ok(())
+    }
+}
+
+/// Lets viewers in, in threads of their own, until it is dropped.
+struct Accepting {
+    stop: Arc<AtomicBool>,
+    address: SocketAddr,
+}
+
+impl Drop for Accepting {
+    fn drop(&mut self) {
+        self.stop.store(true, Ordering::Relaxed);
+        // Wakes the thread that waits for a viewer.
+        let _ = TcpStream::connect(self.address);
+    }
+}
+
+fn accepting(
+    listener: TcpListener,
+    secret: String,
+    viewers: Viewers,
+    recording: Recording,
+) -> std::io::Result<Accepting> {
+    let address = listener.local_addr()?;
+    let door = Arc::new(Door::new(secret, address.ip(), address.port()));
+    let stop = Arc::new(AtomicBool::new(false));
+    let stopped = Arc::clone(&stop);
+    let connections = Arc::new(AtomicUsize::new(0));
+    std::thread::spawn(move || {
+        for stream in listener.incoming() {
+            if stopped.load(Ordering::Relaxed) {
+                return;
+            }
+            let Ok(stream) = stream else { continue };
+            if connections.fetch_add(1, Ordering::Relaxed) >= MAX_CONNECTIONS {
+                connections.fetch_sub(1, Ordering::Relaxed);
+                continue;
+            }
+            let (door, viewers, recording) = (Arc::clone(&door), viewers.clone(), Arc::clone(&recording));
+            let connections = Arc::clone(&connections);
+            std::thread::spawn(move || {
+                // A client that goes away in the middle is no error of the server.
+                let _ = let_in(stream, &door, &viewers, &recording);
+                connections.fetch_sub(1, Ordering::Relaxed);
+            });
+        }
+    });
+    Ok(Accepting { stop, address })
+}
+
+fn let_in(
+    mut stream: TcpStream,
+    door: &Door,
+    viewers: &Viewers,
+    recording: &Recording,
+) -> std::io::Result<()> {
+    match door.answer(&mut stream)? {
+        Some(Admitted::File(asset)) => {
+            send(&mut stream, "200 OK", asset.media_type, asset.content.as_bytes())
+        }
+        Some(Admitted::Recording) => {
+            let recorded = recording.lock().unwrap_or_else(PoisonError::into_inner).clone();
+            send(&mut stream, "200 OK", "text/csv", &recorded)
+        }
+        Some(Admitted::Socket(_)) if !viewers.has_room() => {
+            send(&mut stream, "503 Service Unavailable", "text/plain", b"too many viewers")
+        }
+        Some(Admitted::Socket(key)) => {
+            accept(&mut stream, &key)?;
+            viewers.serve(stream);
+            Ok(())
+        }
+        None => Ok(()),
+    }
+}

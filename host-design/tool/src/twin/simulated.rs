@@ -1,0 +1,353 @@
+//! The simulated machine: the whole firmware, the rig on its wires, and everything a person does to it.
+
+use std::collections::VecDeque;
+use std::time::{Duration, SystemTime};
+
+use serde_json::{Value, json};
+use upright::board::Output;
+use upright::control::actuator::Drive;
+use upright::control::encoder::CounterWidth;
+use upright_design::harness::{Harness, HarnessError, Pins, Target};
+use upright_design::rig::{PlantDescription, Rig};
+use upright_design::simulate::{Bench, Scenario};
+use upright_design::table::TableValues;
+use upright_design::verify::Disturbance;
+
+use super::challenge::Challenge;
+use super::desk::Desk;
+use super::grip::{Grip, Pull, Spring};
+use super::holding::Hand;
+use super::pace::Pace;
+use super::property::Properties;
+use super::request::{Holding, MachineRequest};
+use crate::campaign::{Defective, Kind, Trial};
+
+/// A rig, its table, and how it is simulated.
+#[derive(Clone, Copy)]
+pub(super) struct Machine<'a> {
+    pub(super) rig: &'a Rig,
+    pub(super) table: &'a TableValues,
+    pub(super) scenario: &'a Scenario,
+}
+
+/// Why a run has ended.
+pub(super) enum Ended {
+    /// The power is switched off and on.
+    Restart {
+        /// Whether the hand raises the rig before it goes on.
+        upright: bool,
+    },
+    /// The program ends.
+    Stopped,
+}
+
+/// End stops: stiffness and damping as fractions of what the tick allows.
+const STOP: [f64; 2] = [0.05, 0.3];
+
+struct World<'a, 't> {
+    machine: Machine<'a>,
+    harness: Harness<'t>,
+    spring: Option<Spring>,
+    grip: Option<Grip>,
+    pull: Option<Pull>,
+    hand: Hand,
+    properties: Properties,
+    defect: Option<Defective<'a>>,
+    challenge: Option<Challenge>,
+    delayed: VecDeque<Output>,
+    output: Output,
+    zero: Vec<u32>,
+    total_kg: f64,
+    /// Simulated time since the start (s).
+    t_s: f64,
+    epoch: Duration,
+    restart: Option<bool>,
+}
+
+impl<'a> Machine<'a> {
+    /// Runs the firmware `target` with the rig until `goes_on` says no, or the power is switched off.
+    ///
+    /// # Errors
+    /// [`HarnessError`] if the firmware stops.
+    pub(super) fn run(
+        self,
+        target: &mut dyn Target,
+        desk: &mut Desk,
+        properties: &mut Properties,
+        upright: bool,
+        goes_on: &dyn Fn() -> bool,
+    ) -> Result<Ended, HarnessError> {
+        let mut world = World::new(self, target, properties.clone(), upright)?;
+        let mut pace = Pace::new(self.rig.tick.period_s);
+        while goes_on() {
+            for request in desk.requests(world.now()) {
+                world.carry_out(request, &mut pace, desk)?;
+            }
+            // Nothing happens before anyone looks.
+            if desk.was_seen {
+                pace.run(|| world.tick(desk))?;
+            } else {
+                pace = Pace::new(self.rig.tick.period_s);
+                world.greet(desk)?;
+            }
+            desk.show(&world.picture(&pace));
+            if let Some(upright) = world.restart {
+                *properties = world.properties;
+                return Ok(Ended::Restart { upright });
+            }
+            pace.wait();
+        }
+        Ok(Ended::Stopped)
+    }
+}
+
+impl<'a, 't> World<'a, 't> {
+    fn new(
+        machine: Machine<'a>,
+        target: &'t mut dyn Target,
+        properties: Properties,
+        upright: bool,
+    ) -> Result<Self, HarnessError> {
+        let Machine { rig, table, scenario } = machine;
+        let mut harness = Harness::new(rig, table, scenario, target)?;
+        let output = if upright { harness.raise(None)? } else { Output::OFF };
+        let period_s = rig.tick.period_s;
+        let (spring, total_kg) = match &rig.plant {
+            PlantDescription::Chain(chain) => {
+                let links: f64 = chain.links.iter().map(|link| link.mass_kg).sum();
+                (Some(Spring::of(chain, period_s)), chain.cart.mass_kg + links)
+            }
+            PlantDescription::Model(_) => (None, 1.0),
+        };
+        let mut hand = Hand::new(rig.states(), period_s);
+        if !upright {
+            hand.take(Holding::Hanging, harness.bench.state());
+        }
+        let mut zero = vec![0; table.sensors()];
+        harness.bench.read_counters_at_zero(&mut zero);
+        let mut world = Self {
+            machine,
+            harness,
+            spring,
+            grip: None,
+            pull: None,
+            hand,
+            properties,
+            defect: None,
+            challenge: None,
+            delayed: VecDeque::new(),
+            output,
+            zero,
+            total_kg,
+            t_s: 0.0,
+            // Commands are numbered by it, and go on increasing after a restart.
+            epoch: SystemTime::UNIX_EPOCH.elapsed().unwrap_or_default(),
+            restart: None,
+        };
+        world.rebuild()?;
+        Ok(world)
+    }
+
+    /// Simulated time, as the time since 1970: in slow motion the firmware's timeouts are slow, too.
+    fn now(&self) -> Duration {
+        self.epoch + Duration::from_secs_f64(self.t_s)
+    }
+
+    /// Lets the conversation begin: a few ticks in which the rig stands still.
+    fn greet(&mut self, desk: &mut Desk) -> Result<(), HarnessError> {
+        if desk.monitor.telemetry.is_some() {
+            return Ok(());
+        }
+        self.tick(desk)
+    }
+
+    /// Builds the simulated rig again with the properties of now, in the same state.
+    fn rebuild(&mut self) -> Result<(), HarnessError> {
+        let rig = self.properties.applied_to(self.machine.rig);
+        let scenario = Scenario {
+            force_noise_n: self.properties.get("force-noise"),
+            torque_noise_n_m: Disturbance::of(self.machine.rig).torque_n_m,
+            ..self.machine.scenario.clone()
+        };
+        let state = self.harness.bench.state().to_vec();
+        self.harness.bench = Bench::new(&rig, &scenario)?;
+        self.harness.bench.hold(&state);
+        Ok(())
+    }
+
+    fn carry_out(
+        &mut self,
+        request: MachineRequest,
+        pace: &mut Pace,
+        desk: &mut Desk,
+    ) -> Result<(), HarnessError> {
+        match request {
+            MachineRequest::Pull { body, along, x, y } => {
+                self.grip = Some(Grip { body, along, to: [x, y] });
+            }
+            MachineRequest::LetGo => self.grip = None,
+            MachineRequest::Hold { how } => self.hand.take(how, self.harness.bench.state()),
+            MachineRequest::Set { name, value } => match self.properties.set(&name, value) {
+                Some(true) => self.rebuild()?,
+                Some(false) => {}
+                None => desk.monitor.note(format!("`{name}` is no property of the machine")),
+            },
+            MachineRequest::Defect { name, sensor } => self.begin_defect(name.as_deref(), sensor, desk),
+            MachineRequest::Speed { factor } => pace.set(factor),
+            MachineRequest::Pause { on } => pace.pause(on),
+            MachineRequest::Step { ticks } => pace.step(ticks),
+            MachineRequest::Challenge { on } => {
+                let limit_n = f64::from(self.machine.table.force_limit_n);
+                self.challenge = on.then(|| Challenge::new(limit_n, self.t_s.to_bits()));
+            }
+            MachineRequest::Restart { upright } => self.restart = Some(upright),
+        }
+        Ok(())
+    }
+
+    fn begin_defect(&mut self, name: Option<&str>, sensor: usize, desk: &mut Desk) {
+        let Some(name) = name else {
+            self.defect = None;
+            return;
+        };
+        let Some(kind) = Kind::ALL.iter().map(|row| row.0).find(|kind| kind.name() == name) else {
+            return desk.monitor.note(format!("`{name}` is no defect"));
+        };
+        let Machine { rig, table, scenario } = self.machine;
+        let trial = Trial::by_hand(kind, scenario, table.sensors(), sensor, self.t_s.to_bits());
+        let mut defect = Defective::new(rig, table, trial);
+        // The conversation numbers its commands by the time.
+        self.harness.session.count_from(self.now().as_micros() as u64);
+        defect.begin(&mut self.harness.session);
+        self.defect = Some(defect);
+    }
+
+    /// One tick of everything.
+    fn tick(&mut self, desk: &mut Desk) -> Result<(), HarnessError> {
+        self.move_rig();
+        desk.monitor.poll(self.now());
+        let outgoing = desk.monitor.take_outgoing();
+        if self.defect.as_ref().is_none_or(Defective::host_is_alive) {
+            self.harness.session.send_bytes(&outgoing);
+        }
+        let mut inputs = self.harness.inputs();
+        self.coarsen(&mut inputs);
+        self.press_limit_switches(&mut inputs);
+        if let Some(defect) = &mut self.defect {
+            defect.inputs(&mut inputs);
+        }
+        self.output = self.harness.session.tick(&inputs)?;
+        let session = &mut self.harness.session;
+        desk.receive(session.last_bytes(), self.epoch + Duration::from_secs_f64(self.t_s));
+        while session.next_telemetry().is_some() || session.next_reply().is_some() {}
+        self.t_s += self.machine.rig.tick.period_s;
+        Ok(())
+    }
+
+    /// Moves the rig by one tick: by hand, or by the motor and whatever pulls and pushes.
+    fn move_rig(&mut self) {
+        let mut output = self.output;
+        if let Some(defect) = &mut self.defect {
+            defect.output(&mut output);
+        }
+        self.delayed.push_back(output);
+        while self.delayed.len() > self.properties.get("delay") as usize + 1 {
+            self.delayed.pop_front();
+        }
+        let output = self.delayed.front().copied().unwrap_or(Output::OFF);
+        let push_n = self.pushes();
+        if let Some(held) = self.hand.tick(self.harness.session.status().signs) {
+            let held = held.to_vec();
+            self.pull = None;
+            return self.harness.bench.hold(&held);
+        }
+        let state = self.harness.bench.state();
+        self.pull =
+            self.grip.as_ref().zip(self.spring.as_ref()).map(|(grip, spring)| spring.pull(grip, state));
+        let stop_n = self.end_stop_n(state);
+        let (cart_n, torques) = match &self.pull {
+            Some(pull) => (pull.cart_n, pull.torques_n_m.as_slice()),
+            None => (0.0, [].as_slice()),
+        };
+        self.harness.bench.pull(push_n + stop_n + cart_n, torques);
+        self.harness.bench.tick(self.drive(&output));
+    }
+
+    /// Pushes of the defect and of the challenge on the cart (N).
+    fn pushes(&mut self) -> f64 {
+        let stands = self.output.enable;
+        let challenge = self.challenge.as_mut();
+        let defect = self.defect.as_ref().map_or(0.0, Defective::push_n);
+        defect + challenge.map_or(0.0, |challenge| challenge.tick(stands, self.machine.rig.tick.period_s))
+    }
+
+    /// What the motor is driven with. When it is off, it turns freely.
+    fn drive(&self, output: &Output) -> Drive {
+        let part = 0.01 * self.properties.get("force") as f32;
+        match output.drive {
+            _ if !output.enable => Drive::Force(0.0),
+            Drive::Force(force) => Drive::Force(force * part),
+            Drive::Duty(duty) => Drive::Duty(duty * part),
+        }
+    }
+
+    /// Force of the end stops on the cart (N): a spring and a damper at either end of the rail.
+    fn end_stop_n(&self, state: &[f64]) -> f64 {
+        let PlantDescription::Chain(chain) = &self.machine.rig.plant else { return 0.0 };
+        let [low, high] = chain.cart.travel_m;
+        let beyond = if state[0] < low { state[0] - low } else { (state[0] - high).max(0.0) };
+        if beyond == 0.0 {
+            return 0.0;
+        }
+        let rate = 1.0 / self.machine.rig.tick.period_s;
+        let force = -self.total_kg * (STOP[0] * rate * rate * beyond + STOP[1] * rate * state[1]);
+        // A stop pushes and never pulls.
+        if force * beyond < 0.0 { force } else { 0.0 }
+    }
+
+    /// Coarser encoders: the counters move in steps of several counts.
+    fn coarsen(&self, inputs: &mut Pins) {
+        let step = self.properties.get("coarseness") as i64;
+        if step <= 1 {
+            return;
+        }
+        for (sensor, (counter, &zero)) in inputs.raw_counts.iter_mut().zip(&self.zero).enumerate() {
+            let difference = counter.wrapping_sub(zero);
+            let counts = match Bench::width(sensor) {
+                CounterWidth::Bits16 => i64::from(difference as i16),
+                CounterWidth::Bits32 => i64::from(difference as i32),
+            };
+            let coarse = (counts + step / 2).div_euclid(step) * step;
+            *counter = Bench::reading(sensor, zero.wrapping_add(coarse as u32));
+        }
+    }
+
+    /// The limit switches are at the ends of the rail.
+    fn press_limit_switches(&self, inputs: &mut Pins) {
+        if let PlantDescription::Chain(chain) = &self.machine.rig.plant {
+            let [low, high] = chain.cart.travel_m;
+            let x = self.harness.bench.state()[0];
+            inputs.contacts.limit_low |= x <= low;
+            inputs.contacts.limit_high |= x >= high;
+        }
+    }
+
+    /// What only a simulation knows.
+    fn picture(&self, pace: &Pace) -> Value {
+        let is_pulled = self.pull.as_ref().zip(self.grip.as_ref());
+        json!({
+            "t_s": self.t_s,
+            "state": self.harness.bench.state(),
+            "pull": is_pulled.map(|(pull, grip)| json!({
+                "body": grip.body, "along": grip.along, "to": grip.to, "force_n": pull.force_n,
+            })),
+            "holding": self.hand.how(),
+            "properties": self.properties.all().collect::<std::collections::BTreeMap<_, _>>(),
+            "defect": self.defect.as_ref().map(|defect| defect.kind().name()),
+            "challenge": self.challenge,
+            "speed": pace.speed(),
+            "factor": pace.factor(),
+            "paused": pace.is_paused(),
+        })
+    }
+}

@@ -1,0 +1,176 @@
+//! The people who look: one connection each, one of them in command.
+
+use std::collections::BTreeMap;
+use std::io::ErrorKind;
+use std::net::TcpStream;
+use std::sync::mpsc::{Receiver, Sender, SyncSender, TrySendError, channel, sync_channel};
+use std::sync::{Arc, Mutex, PoisonError};
+use std::time::Duration;
+
+use tungstenite::protocol::{Role, WebSocketConfig};
+use tungstenite::{Error, Message, Utf8Bytes, WebSocket};
+
+use super::request::Request;
+
+/// Most viewers at a time.
+pub(super) const MAX_VIEWERS: usize = 8;
+/// Longest message of a viewer (bytes).
+const MAX_MESSAGE: usize = 2048;
+/// Most messages of a viewer that wait to be looked at; who sends more is shut out.
+const MAX_WAITING: usize = 256;
+/// Pictures that a slow viewer may be behind; more are dropped.
+const PICTURES: usize = 8;
+/// How often a connection looks for pictures to send.
+const LOOK: Duration = Duration::from_millis(4);
+/// Longest time that a viewer may take to accept bytes.
+const STUCK: Duration = Duration::from_secs(1);
+
+/// Number of a viewer.
+pub(super) type Id = u64;
+
+/// What a viewer does.
+#[derive(Debug)]
+pub(super) enum Event {
+    /// Has connected.
+    Came,
+    /// Asks for something.
+    Asks(Request),
+    /// Is gone, or was shut out.
+    Went,
+}
+
+/// All connections.
+#[derive(Clone)]
+pub(super) struct Viewers {
+    connected: Arc<Mutex<Connected>>,
+}
+
+struct Connected {
+    outlets: BTreeMap<Id, SyncSender<Utf8Bytes>>,
+    next: Id,
+    events: Sender<(Id, Event)>,
+    waiting: Arc<Mutex<BTreeMap<Id, usize>>>,
+}
+
+impl Viewers {
+    /// Nobody, and what they will do.
+    pub(super) fn new() -> (Self, Inbox) {
+        let (events, receiver) = channel();
+        let waiting = Arc::default();
+        let connected =
+            Connected { outlets: BTreeMap::new(), next: 1, events, waiting: Arc::clone(&waiting) };
+        (Self { connected: Arc::new(Mutex::new(connected)) }, Inbox { events: receiver, waiting })
+    }
+
+    fn locked(&self) -> std::sync::MutexGuard<'_, Connected> {
+        // What is inside is whole after every statement.
+        self.connected.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Whether another viewer may connect.
+    pub(super) fn has_room(&self) -> bool {
+        self.locked().outlets.len() < MAX_VIEWERS
+    }
+
+    /// Whether nobody looks.
+    pub(super) fn is_empty(&self) -> bool {
+        self.locked().outlets.is_empty()
+    }
+
+    /// Sends to one viewer.
+    pub(super) fn tell(&self, viewer: Id, text: &str) {
+        if let Some(outlet) = self.locked().outlets.get(&viewer) {
+            // A viewer that is so far behind misses it.
+            let _ = outlet.try_send(Utf8Bytes::from(text));
+        }
+    }
+
+    /// Sends to all.
+    pub(super) fn tell_all(&self, text: String) {
+        let text = Utf8Bytes::from(text);
+        for outlet in self.locked().outlets.values() {
+            match outlet.try_send(text.clone()) {
+                // A slow viewer misses pictures; a gone one is removed by its own thread.
+                Ok(()) | Err(TrySendError::Full(_) | TrySendError::Disconnected(_)) => {}
+            }
+        }
+    }
+
+    /// Serves one viewer until the connection ends.
+    pub(super) fn serve(&self, stream: TcpStream) {
+        let (outlet, pictures) = sync_channel(PICTURES);
+        let (id, events, waiting) = {
+            let mut connected = self.locked();
+            let id = connected.next;
+            connected.next += 1;
+            connected.outlets.insert(id, outlet);
+            (id, connected.events.clone(), Arc::clone(&connected.waiting))
+        };
+        let _ = events.send((id, Event::Came));
+        // However it ends, the viewer is gone.
+        let _ = converse(stream, &pictures, |request| {
+            let mut waiting = waiting.lock().unwrap_or_else(PoisonError::into_inner);
+            let count = waiting.entry(id).or_default();
+            *count += 1;
+            *count <= MAX_WAITING && events.send((id, Event::Asks(request))).is_ok()
+        });
+        self.locked().outlets.remove(&id);
+        let _ = events.send((id, Event::Went));
+    }
+}
+
+/// What the viewers do, in order.
+pub(super) struct Inbox {
+    events: Receiver<(Id, Event)>,
+    waiting: Arc<Mutex<BTreeMap<Id, usize>>>,
+}
+
+impl Inbox {
+    /// The next event, if there is one.
+    pub(super) fn next(&self) -> Option<(Id, Event)> {
+        let (id, event) = self.events.try_recv().ok()?;
+        let mut waiting = self.waiting.lock().unwrap_or_else(PoisonError::into_inner);
+        match &event {
+            Event::Asks(_) => waiting.entry(id).and_modify(|count| *count = count.saturating_sub(1)),
+            Event::Came | Event::Went => {
+                waiting.remove(&id);
+                return Some((id, event));
+            }
+        };
+        Some((id, event))
+    }
+}
+
+/// Passes requests in and pictures out. Ends with the connection, with garbage, or when `asks` refuses.
+fn converse(
+    stream: TcpStream,
+    pictures: &Receiver<Utf8Bytes>,
+    mut asks: impl FnMut(Request) -> bool,
+) -> Result<(), Error> {
+    stream.set_nodelay(true)?;
+    stream.set_read_timeout(Some(LOOK))?;
+    stream.set_write_timeout(Some(STUCK))?;
+    let config = WebSocketConfig::default()
+        .max_message_size(Some(MAX_MESSAGE))
+        .max_frame_size(Some(MAX_MESSAGE))
+        .read_buffer_size(2 * MAX_MESSAGE);
+    let mut socket = WebSocket::from_raw_socket(stream, Role::Server, Some(config));
+    loop {
+        match socket.read() {
+            Ok(Message::Text(text)) => {
+                let is_taken = serde_json::from_str(&text).is_ok_and(&mut asks);
+                if !is_taken {
+                    return socket.close(None);
+                }
+            }
+            Ok(Message::Ping(_) | Message::Pong(_)) => {}
+            Ok(_) => return Ok(()),
+            Err(Error::Io(error)) if matches!(error.kind(), ErrorKind::WouldBlock | ErrorKind::TimedOut) => {}
+            Err(error) => return Err(error),
+        }
+        for picture in pictures.try_iter() {
+            socket.write(Message::Text(picture))?;
+        }
+        socket.flush()?;
+    }
+}

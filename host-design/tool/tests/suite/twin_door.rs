@@ -1,0 +1,170 @@
+//! The twin's page can move a motor: who may, who may not, and what happens when the one in command falls silent.
+
+use std::io::{Read, Write};
+use std::net::TcpStream;
+use std::time::{Duration, Instant};
+
+use serde_json::{Value, json};
+use tungstenite::client::IntoClientRequest;
+use tungstenite::http::HeaderValue;
+use tungstenite::{Message, WebSocket, client};
+
+use crate::twin_page::Twin;
+
+type Socket = WebSocket<TcpStream>;
+
+/// Host and path of an address.
+fn parts(address: &str) -> (&str, &str) {
+    let rest = address.strip_prefix("http://").unwrap();
+    rest.split_at(rest.find('/').unwrap())
+}
+
+/// A connection to the socket at `path`, from a page at `origin`; the error is the status.
+fn connect(host: &str, path: &str, origin: &str) -> Result<Socket, u16> {
+    let stream = TcpStream::connect(host).unwrap();
+    stream.set_read_timeout(Some(Duration::from_secs(5))).unwrap();
+    let mut request = format!("ws://{host}{path}").into_client_request().unwrap();
+    request.headers_mut().insert("Origin", HeaderValue::from_str(origin).unwrap());
+    match client(request, stream) {
+        Ok((socket, _)) => Ok(socket),
+        Err(tungstenite::HandshakeError::Failure(tungstenite::Error::Http(answer))) => {
+            Err(answer.status().as_u16())
+        }
+        Err(error) => panic!("{error}"),
+    }
+}
+
+fn page(twin: &Twin) -> Socket {
+    let (host, path) = parts(&twin.address);
+    connect(host, &format!("{path}socket"), &format!("http://{host}")).unwrap()
+}
+
+fn ask(socket: &mut Socket, request: &Value) {
+    socket.send(Message::text(request.to_string())).unwrap();
+}
+
+/// Reads until `holds` for a message, and stays alive meanwhile; panics after ten seconds.
+fn read_until(socket: &mut Socket, alive: bool, holds: impl Fn(&Value) -> bool) -> Value {
+    let begin = Instant::now();
+    loop {
+        assert!(begin.elapsed() < Duration::from_secs(20), "it never comes");
+        let message: Value = match socket.read().unwrap() {
+            Message::Text(text) => serde_json::from_str(&text).unwrap(),
+            _ => continue,
+        };
+        if alive {
+            ask(socket, &json!({ "ask": "alive" }));
+        }
+        if holds(&message) {
+            return message;
+        }
+    }
+}
+
+/// State of the supervisor in a message, if it is a picture with telemetry.
+fn state(message: &Value) -> Option<&str> {
+    message["picture"]["telemetry"].as_array()?.last()?["state"].as_str()
+}
+
+fn balancing(message: &Value) -> bool {
+    state(message) == Some("Balancing")
+}
+
+fn off(message: &Value) -> bool {
+    state(message).is_some_and(|state| state != "Balancing")
+}
+
+#[test]
+fn a_foreign_page_and_a_wrong_secret_are_refused() {
+    let twin = Twin::start("single-quanser-ip02", &[]);
+    let (host, path) = parts(&twin.address);
+    let own = format!("http://{host}");
+    assert_eq!(connect(host, &format!("{path}socket"), "http://evil.example").err(), Some(403));
+    assert_eq!(connect(host, "/socket", &own).err(), Some(404));
+    let wrong = path.replace(|digit: char| digit.is_ascii_digit(), "x");
+    assert_eq!(connect(host, &format!("{wrong}socket"), &own).err(), Some(404));
+    assert!(connect(host, &format!("{path}socket"), &own).is_ok());
+    // A foreign name that resolves to this machine.
+    let mut stream = TcpStream::connect(host).unwrap();
+    write!(stream, "GET {path} HTTP/1.1\r\nHost: evil.example\r\n\r\n").unwrap();
+    let mut answer = String::new();
+    stream.read_to_string(&mut answer).unwrap();
+    assert!(answer.starts_with("HTTP/1.1 421"), "{answer}");
+}
+
+#[test]
+fn a_second_viewer_sees_and_stops_but_does_not_command() {
+    let twin = Twin::start("single-quanser-ip02", &[]);
+    let mut first = page(&twin);
+    read_until(&mut first, true, balancing);
+    let mut second = page(&twin);
+    ask(
+        &mut second,
+        &json!({ "ask": "machine", "what": { "do": "pull", "body": 1, "along": 1.0, "x": 9.0, "y": 0.0 } }),
+    );
+    ask(&mut second, &json!({ "ask": "say", "line": "set-point 0.1" }));
+    read_until(&mut second, false, |message| message["notice"].is_string());
+    let seen = read_until(&mut first, true, balancing);
+    assert!(seen["picture"]["machine"]["pull"].is_null(), "{seen}");
+    let wanted = seen["picture"]["wanted_m"].as_f64().unwrap_or(0.0);
+    assert!(wanted.abs() < 0.05, "{wanted}");
+    ask(&mut second, &json!({ "ask": "say", "line": "disarm" }));
+    read_until(&mut first, true, off);
+}
+
+#[test]
+fn garbage_and_floods_end_the_connection_and_nothing_else() {
+    let twin = Twin::start("single-quanser-ip02", &[]);
+    let mut first = page(&twin);
+    read_until(&mut first, true, balancing);
+    for garbage in ["{", "{\"ask\":\"fly\"}", "[1,2,3]", &"x".repeat(100_000)] {
+        let mut other = page(&twin);
+        let _ = other.send(Message::text(garbage));
+        let ended = (0..10_000).find_map(|_| match other.read() {
+            Ok(Message::Close(_)) | Err(_) => Some(()),
+            Ok(_) => None,
+        });
+        assert!(ended.is_some(), "it goes on after {}", &garbage[..garbage.len().min(20)]);
+        read_until(&mut first, true, balancing);
+    }
+    let mut flood = page(&twin);
+    for _ in 0..20_000 {
+        if flood.send(Message::text(json!({ "ask": "say", "line": "arm" }).to_string())).is_err() {
+            break;
+        }
+    }
+    read_until(&mut first, true, balancing);
+    let mut raw = TcpStream::connect(parts(&twin.address).0).unwrap();
+    raw.write_all(&[0xff; 20_000]).unwrap_or_default();
+    read_until(&mut first, true, balancing);
+}
+
+#[test]
+fn the_motor_is_turned_off_when_the_page_in_command_is_closed_or_sleeps() {
+    let twin = Twin::start("single-quanser-ip02", &[]);
+    let mut closed = page(&twin);
+    read_until(&mut closed, true, balancing);
+    let mut watching = page(&twin);
+    read_until(&mut watching, false, balancing);
+    drop(closed);
+    let begin = Instant::now();
+    read_until(&mut watching, false, off);
+    assert!(begin.elapsed() < Duration::from_secs(5), "{:?}", begin.elapsed());
+
+    // A computer that sleeps keeps its connection and says nothing.
+    let twin = Twin::start("single-quanser-ip02", &[]);
+    let mut sleeping = page(&twin);
+    read_until(&mut sleeping, true, balancing);
+    let mut watching = page(&twin);
+    let begin = Instant::now();
+    read_until(&mut watching, false, off);
+    assert!(begin.elapsed() < Duration::from_secs(5), "{:?}", begin.elapsed());
+    // The check can fail: with a page that is alive, the motor stays on for longer than that.
+    let twin = Twin::start("single-quanser-ip02", &[]);
+    let mut alive = page(&twin);
+    let begin = Instant::now();
+    read_until(&mut alive, true, |message| {
+        assert!(!off(message), "{message}");
+        balancing(message) && begin.elapsed() > Duration::from_secs(6)
+    });
+}
