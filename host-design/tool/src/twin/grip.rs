@@ -14,7 +14,8 @@ pub(super) struct Grip {
     pub(super) to: [f64; 2],
 }
 
-/// The spring of a rig: a damped oscillation with the mass that it moves, for one link at 1.3 Hz.
+/// The spring of a rig: a damped oscillation with the mass that it moves, for one link at 0.5 Hz: a gentle
+/// pull, because the detection takes a hard one for a broken encoder.
 #[derive(Debug, Clone)]
 pub(super) struct Spring {
     lengths_m: Vec<f64>,
@@ -35,7 +36,7 @@ pub(super) struct Pull {
 }
 
 /// Angular frequency of the spring with the mass that it moves, for one link (rad/s).
-const OMEGA: f64 = 8.0;
+const OMEGA: f64 = 3.0;
 /// The more links, the less they stand, and the softer the spring: the frequency falls with this power of their number.
 const SOFTER: f64 = 1.2;
 /// Its damping ratio.
