@@ -192,6 +192,11 @@ impl PerJoint {
         self.0.get(joint).or(self.0.first()).copied().unwrap_or_default()
     }
 
+    /// Every number with `more` added.
+    pub fn plus(&self, more: f64) -> Self {
+        Self(self.0.iter().map(|number| number + more).collect())
+    }
+
     /// Whether any joint has a number other than 0.
     pub fn is_any(&self) -> bool {
         self.0.iter().any(|&number| number != 0.0)

@@ -23,7 +23,7 @@ pub(super) struct Property {
 }
 
 /// All properties of a machine as designed for, in the order of the page.
-const PROPERTIES: [Property; 8] = {
+const PROPERTIES: [Property; 12] = {
     const fn property(
         name: &'static str,
         label: &'static str,
@@ -36,20 +36,20 @@ const PROPERTIES: [Property; 8] = {
     [
         property("mass", "masses of the links", "% more", [-50.0, 100.0, 1.0]),
         property("cart-mass", "mass of the cart", "% more", [-50.0, 100.0, 1.0]),
-        property("joint-friction", "viscous friction in each joint", "µN·m·s/rad more", [0.0, 500.0, 1.0]),
-        property("cart-friction", "viscous friction of the cart", "N·s/m more", [0.0, 10.0, 0.1]),
+        property("joint-dry", "dry friction in each joint", "mN·m more", [0.0, 20.0, 0.01]),
+        property("cart-dry", "dry friction of the cart", "N more", [0.0, 5.0, 0.05]),
+        property("joint-viscous", "viscous friction in each joint", "mN·m·s/rad more", [0.0, 1.0, 0.01]),
+        property("cart-viscous", "viscous friction of the cart", "N·s/m more", [0.0, 10.0, 0.1]),
+        property("tilt", "slope of the rail", "°", [-5.0, 5.0, 0.1]),
         property("force-noise", "force noise", "N rms", [0.0, 2.0, 0.01]),
+        property("force", "force of the motor", "% more", [-100.0, 100.0, 1.0]),
+        property("jitter", "jitter of the tick", "% of a tick", [0.0, 40.0, 1.0]),
         Property {
             rebuilds: false,
             nominal: 1.0,
             ..property("coarseness", "coarser encoders", "times", [1.0, 32.0, 1.0])
         },
         Property { rebuilds: false, ..property("delay", "more delay", "ticks", [0.0, 100.0, 1.0]) },
-        Property {
-            rebuilds: false,
-            nominal: 100.0,
-            ..property("force", "force of the motor", "%", [0.0, 100.0, 1.0])
-        },
     ]
 };
 
@@ -96,20 +96,24 @@ impl Properties {
         self.all.iter().map(|property| property.name).zip(self.values)
     }
 
-    /// The rig as it truly is.
+    /// The rig as it truly is: its file with these values in `[reality]`, and more viscous friction.
     pub(super) fn applied_to(&self, rig: &Rig) -> Rig {
         let mut rig = rig.clone();
-        if let PlantDescription::Chain(chain) = &mut rig.plant {
-            let links = 1.0 + 0.01 * self.get("mass");
-            chain.cart.mass_kg *= 1.0 + 0.01 * self.get("cart-mass");
-            chain.cart.friction_n_s_per_m += self.get("cart-friction");
-            for link in &mut chain.links {
-                link.mass_kg *= links;
-                // A given inertia follows the mass, as that of a rod does.
-                link.inertia_kg_m2 = link.inertia_kg_m2.map(|inertia| inertia * links);
-                link.friction_n_m_s_per_rad += 1e-6 * self.get("joint-friction");
-            }
+        let PlantDescription::Chain(chain) = &mut rig.plant else { return rig };
+        chain.cart.friction_n_s_per_m += self.get("cart-viscous");
+        for link in &mut chain.links {
+            link.friction_n_m_s_per_rad += 1e-3 * self.get("joint-viscous");
         }
+        let reality = &mut rig.reality;
+        let parameters = &mut reality.parameters;
+        parameters.link_mass_percent = parameters.link_mass_percent.plus(self.get("mass"));
+        parameters.cart_mass_percent += self.get("cart-mass");
+        let friction = &mut reality.friction;
+        friction.joint_friction_n_m = friction.joint_friction_n_m.plus(1e-3 * self.get("joint-dry"));
+        friction.cart_friction_n += self.get("cart-dry");
+        reality.sensors.rail_tilt_rad += self.get("tilt").to_radians();
+        reality.driver.force_percent += self.get("force");
+        reality.driver.jitter_s += 0.01 * self.get("jitter") * rig.tick.period_s;
         rig
     }
 }

@@ -270,7 +270,9 @@ impl<'a, 't> World<'a, 't> {
             None => (0.0, [].as_slice()),
         };
         self.harness.bench.pull(push_n + stop_n + cart_n, torques);
-        self.harness.bench.tick(self.drive(&output));
+        // A motor that is off turns freely.
+        let drive = if output.enable { output.drive } else { Drive::Force(0.0) };
+        self.harness.bench.tick(drive);
     }
 
     /// Pushes of the defect and of the challenge on the cart (N).
@@ -279,16 +281,6 @@ impl<'a, 't> World<'a, 't> {
         let challenge = self.challenge.as_mut();
         let defect = self.defect.as_ref().map_or(0.0, Defective::push_n);
         defect + challenge.map_or(0.0, |challenge| challenge.tick(stands, self.machine.rig.tick.period_s))
-    }
-
-    /// What the motor is driven with. When it is off, it turns freely.
-    fn drive(&self, output: &Output) -> Drive {
-        let part = 0.01 * self.properties.get("force") as f32;
-        match output.drive {
-            _ if !output.enable => Drive::Force(0.0),
-            Drive::Force(force) => Drive::Force(force * part),
-            Drive::Duty(duty) => Drive::Duty(duty * part),
-        }
     }
 
     /// Force of the end stops on the cart (N): a spring and a damper at either end of the rail.

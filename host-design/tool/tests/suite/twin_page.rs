@@ -196,10 +196,10 @@ fn a_weaker_motor_topples_the_rig_at_the_gain_margin_that_verify_gives() {
     let twin = Twin::start("quadruple-paper", &[]);
     browser.open_address(&twin.address, 1280, "light", "screen");
     until_state(&mut browser, "Balancing");
-    set(&mut browser, "force", (120.0 * margin).ceil());
+    set(&mut browser, "force", (120.0 * margin).ceil() - 100.0);
     wait(6.0);
     assert_eq!(browser.value(STATE), "Balancing", "falls with 1.2 times the force of the margin");
-    set(&mut browser, "force", (80.0 * margin).floor());
+    set(&mut browser, "force", (80.0 * margin).floor() - 100.0);
     until_state(&mut browser, "Fault");
 }
 
