@@ -191,7 +191,7 @@ export class Scopes {
     draw.font = '12px system-ui, sans-serif';
     draw.lineWidth = 1;
     draw.textAlign = 'right';
-    const step = niceStep((high - low) / 3);
+    const step = niceStep((high - low) / 4);
     for (let value = Math.ceil(low / step) * step; value <= high; value += step) {
       draw.beginPath();
       draw.moveTo(MARGIN.left, y(value));
