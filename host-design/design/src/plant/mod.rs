@@ -20,6 +20,7 @@
 
 mod angles;
 mod chain;
+mod jacobian;
 mod linear;
 mod linear_simulation;
 mod motor;
@@ -30,6 +31,7 @@ mod simulation;
 
 pub use angles::absolute_angles;
 pub use chain::{ChainPlant, ChainState, Energy};
+pub use jacobian::{ChainDerivatives, Partials};
 pub use linear::{Equilibrium, LinearModel, linearise};
 pub use linear_simulation::LinearSimulation;
 pub use motor::MotorPlant;

@@ -13,6 +13,7 @@ use super::sections::chain::{CART, GRAVITY, LINK};
 use super::sections::integral::INTEGRAL;
 use super::sections::limits::LIMITS;
 use super::sections::reality::REALITY;
+use super::sections::swing_up::SWING_UP;
 use super::sections::tick::TICK;
 use super::sections::verify::VERIFY;
 use super::{
@@ -40,6 +41,9 @@ impl Rig {
         page.section(&LIMITS, &self.limits);
         page.section(&VERIFY, &self.verify);
         page.reality(&self.reality);
+        if let Some(rules) = &self.swing_up {
+            page.section(&SWING_UP, rules);
+        }
         page.text
     }
 }

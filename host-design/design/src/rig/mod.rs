@@ -29,6 +29,7 @@ pub use sections::lqr::Lqr;
 pub use sections::model::LinearPlant;
 pub use sections::pole_placement::PolePlacement;
 pub use sections::reality::{DriveTrain, DriverFaults, DryFriction, ParameterErrors, Reality, SensorErrors};
+pub use sections::swing_up::SwingUpRules;
 pub use sections::tick::Tick;
 pub use sections::verify::Requirements;
 pub use sections::{SECTIONS, TOP};
@@ -65,6 +66,9 @@ pub struct Rig {
     /// How the simulated machine differs from the model.
     #[serde(skip)]
     pub reality: Reality,
+    /// What `upright swing-up` plans within, if the rig is to raise itself.
+    #[serde(skip)]
+    pub swing_up: Option<SwingUpRules>,
 }
 
 impl Rig {

@@ -4,7 +4,8 @@ use super::error::RigError;
 use super::key::{Keys, Section};
 use super::node::{Node, Source, Table};
 use super::sections::{
-    SECTIONS, TOP, actuator, chain, integral, kalman, limits, lqr, model, pole_placement, reality, tick,
+    SECTIONS, TOP, actuator, chain, integral, kalman, limits, lqr, model, pole_placement, reality, swing_up,
+    tick,
     verify,
 };
 use super::{Actuator, Integral, Limits, PlantDescription, Reality, Requirements, Rig, Tick};
@@ -34,6 +35,7 @@ pub(super) fn rig(source: &Source<'_>) -> Result<Rig, RigError> {
         verify: scalars(&root, &verify::VERIFY)?.unwrap_or_else(Requirements::default),
         actuator,
         tick,
+        swing_up: given(&swing_up::SWING_UP).map(|node| swing_up::swing_up(&node)).transpose()?,
         plant,
     };
     if rig.kalman.is_some() {

@@ -1,5 +1,53 @@
 //! Swing-up: planned motions from hanging to upright and back, with the gains that follow them.
+//!
+//! ```text
+//! candidates: random duration, bounds, cost ─► shooting ─► knots ─► refine ─► path at ticks, held forces
+//!                                                                                │
+//! stored file ◄── judgement ◄── random runs ◄── the best by score ◄── gains and filter along the path
+//! ```
+//!
+//! | module | what is in it |
+//! |---|---|
+//! | `problem` | ends, bounds and cost of a trajectory |
+//! | `dynamics`, `hold` | the chain over a step and over a tick with held force, with derivatives |
+//! | `riccati`, `interior_point`, `shooting` | multiple shooting with Gauss-Newton steps |
+//! | `refine` | from knots to ticks |
+//! | `tracking`, `gains` | feedback and filter along a path |
+//! | `closed_loop`, `robustness` | runs with wrong masses, friction, start and encoders |
+//! | `search`, `plan`, `advice` | candidates, selection, and what would help if there is none |
+//! | `demonstration` | one run of everything |
+//! | `check`, `stored` | independent check; the file beside the rig file |
+//!
+//! Everything that is random has a fixed seed, and every sum is taken in a fixed order, so the result does not depend on
+//! the machine or on its threads.
 
+mod advice;
+mod check;
+mod closed_loop;
+mod demonstration;
+mod dynamics;
+mod error;
+mod gains;
+mod hold;
+mod interior_point;
 mod motion;
+mod plan;
+mod problem;
+mod refine;
+mod riccati;
+mod robustness;
+mod search;
+mod setting;
+mod shooting;
+mod stored;
+mod tracking;
+mod way;
 
+pub use check::Peaks;
+pub use demonstration::{Demonstration, demonstrate};
+pub use error::SwingUpError;
 pub use motion::{Motion, Shape, SwingUp};
+pub use plan::{Judgement, Plan, Progress, Trying, judge, motions, search};
+pub use robustness::{Runs, Spread};
+pub use stored::Stored;
+pub use way::Way;

@@ -22,5 +22,6 @@ mod supervisor_false_alarms;
 mod supervisor_faults;
 mod supervisor_rules;
 mod supervisor_session;
+mod swing_up;
 mod verify_linear;
 mod verify_nonlinear;

@@ -14,6 +14,7 @@ pub(super) mod lqr;
 pub(super) mod model;
 pub(super) mod pole_placement;
 pub(super) mod reality;
+pub(super) mod swing_up;
 pub(super) mod tick;
 pub(super) mod verify;
 
@@ -36,7 +37,7 @@ pub static TOP: Section = Section {
 };
 
 /// All sections, in the order of the documentation.
-pub static SECTIONS: [&Section; 13] = [
+pub static SECTIONS: [&Section; 14] = [
     &chain::CART,
     &chain::LINK,
     &chain::GRAVITY,
@@ -49,5 +50,6 @@ pub static SECTIONS: [&Section; 13] = [
     &limits::LIMITS,
     &verify::VERIFY,
     &reality::REALITY,
+    &swing_up::SWING_UP,
     &model::MODEL,
 ];

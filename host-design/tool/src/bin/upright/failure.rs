@@ -6,6 +6,7 @@ use upright_design::design::DesignError;
 use upright_design::harness::HarnessError;
 use upright_design::rig::RigError;
 use upright_design::simulate::SimulationError;
+use upright_design::swing_up::SwingUpError;
 use upright_design::table::{NoTable, WriteError};
 use upright_design::verify::{Unverifiable, VerifyError};
 use upright_tool::campaign::CampaignError;
@@ -28,6 +29,8 @@ pub(crate) enum Failure {
     NoTable { rig: String, source: NoTable },
     #[error("{0}")]
     NoSolution(String),
+    #[error("{rig}: {source}")]
+    SwingUp { rig: String, source: SwingUpError },
     #[error(transparent)]
     Simulation(#[from] SimulationError),
     #[error(transparent)]
@@ -90,6 +93,7 @@ impl Failure {
             Failure::CheckFailed(_) => 1,
             Failure::Rig(error) => error.exit_code(),
             Failure::Design { .. } | Failure::NoTable { .. } | Failure::NoSolution(_) => 3,
+            Failure::SwingUp { source, .. } if source.is_without_solution() => 3,
             Failure::NoProgram(_)
             | Failure::Image(ImageError::NoCompiler)
             | Failure::InTheLoop(RunError::Emulator(EmulatorError::Missing | EmulatorError::NeedsUnix)) => 4,
@@ -100,7 +104,8 @@ impl Failure {
                 ..
             }) => 4,
             Failure::Campaign(_) => 1,
-            Failure::Image(_)
+            Failure::SwingUp { .. }
+            | Failure::Image(_)
             | Failure::Elf(_)
             | Failure::Size(_)
             | Failure::Relay(_)

@@ -11,6 +11,7 @@ mod report;
 mod reproduce;
 mod simulate;
 mod twin;
+mod swing_up;
 mod variation;
 mod verify;
 
@@ -26,6 +27,7 @@ Examples:
   upright simulate rigs/quadruple-paper.toml --step 1 --svg step.svg
   upright twin rigs/quadruple-paper.toml        a page on which the rig moves: pull it, break it, watch it
   upright verify rigs/quadruple-paper.toml      margins, region of attraction, noise, model errors
+  upright swing-up rigs/quadruple-paper.toml    plan how the rig raises itself, and lowers itself again
   upright report rigs/quadruple-paper.toml      all of it on one page, with an animation
   upright compare rigs/quadruple-paper.toml --sweep tick.period_s=0.0005..0.01
   upright reproduce                             the results of the paper compared with ours
@@ -56,6 +58,7 @@ enum Command {
     Reproduce(reproduce::Reproduce),
     Simulate(simulate::Simulate),
     Twin(twin::Twin),
+    SwingUp(swing_up::SwingUp),
     Verify(verify::Verify),
 }
 
@@ -70,6 +73,7 @@ fn main() -> ExitCode {
         Command::Reproduce(command) => command.run(),
         Command::Simulate(command) => command.run(),
         Command::Twin(command) => command.run(),
+        Command::SwingUp(command) => command.run(),
         Command::Verify(command) => command.run(),
     };
     match result {

@@ -3,6 +3,7 @@
 use std::time::Duration;
 
 use indicatif::{ProgressBar, ProgressStyle};
+use upright_design::swing_up::{Progress, Trying};
 
 const SPINNER_STEP: Duration = Duration::from_millis(120);
 
@@ -48,6 +49,33 @@ pub(crate) fn with_stages<T>(stages: u64, work: impl FnOnce(&dyn Fn(&'static str
     let result = work(&|stage| {
         bar.inc(1);
         bar.set_message(stage);
+    });
+    bar.finish_and_clear();
+    result
+}
+
+/// Runs the search for a swing-up with a bar that says what is being tried, if stderr is a terminal.
+pub(crate) fn with_search<T>(work: impl FnOnce(Progress<'_>) -> T) -> T {
+    let bar = ProgressBar::new(1);
+    style(&bar, "{spinner} {prefix} {bar:30} {pos}/{len} {msg} {elapsed}");
+    let best = std::sync::Mutex::new((0u32, f64::INFINITY));
+    let result = work(&|trying| match trying {
+        Trying::Stage { way, what, steps } => {
+            bar.set_prefix(format!("{way}: {what}"));
+            bar.set_length(steps);
+            bar.set_position(0);
+            if let Ok(mut best) = best.lock() {
+                *best = (0, f64::INFINITY);
+            }
+            bar.set_message("");
+        }
+        Trying::Step { score } => {
+            bar.inc(1);
+            if let (Some(score), Ok(mut best)) = (score, best.lock()) {
+                *best = (best.0 + 1, best.1.min(score));
+                bar.set_message(format!("solved {}, least fragility {:.2}", best.0, best.1));
+            }
+        }
     });
     bar.finish_and_clear();
     result

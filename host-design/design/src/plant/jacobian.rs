@@ -1,0 +1,195 @@
+//! Partial derivatives of a chain's accelerations.
+
+// The indices are those of the equations, and all are below N.
+#![allow(clippy::needless_range_loop)]
+
+use super::{ChainParameters, ChainState, sin_cos};
+
+/// Partial derivatives of one acceleration, `ẍ` or `φ̈_j`. None depends on x.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Partials<const N: usize> {
+    /// By ẋ.
+    pub xdot: f64,
+    /// By each φ.
+    pub phi: [f64; N],
+    /// By each φ̇.
+    pub phidot: [f64; N],
+    /// By the force on the cart.
+    pub force: f64,
+    /// By the torque at each joint.
+    pub torques: [f64; N],
+}
+
+impl<const N: usize> Partials<N> {
+    const ZERO: Self = Self { xdot: 0.0, phi: [0.0; N], phidot: [0.0; N], force: 0.0, torques: [0.0; N] };
+
+    #[inline]
+    fn add(&mut self, factor: f64, other: &Self) {
+        self.xdot += factor * other.xdot;
+        self.force += factor * other.force;
+        for k in 0..N {
+            self.phi[k] += factor * other.phi[k];
+            self.phidot[k] += factor * other.phidot[k];
+            self.torques[k] += factor * other.torques[k];
+        }
+    }
+
+    #[inline]
+    fn scale(&mut self, factor: f64) {
+        self.xdot *= factor;
+        self.force *= factor;
+        for k in 0..N {
+            self.phi[k] *= factor;
+            self.phidot[k] *= factor;
+            self.torques[k] *= factor;
+        }
+    }
+}
+
+/// The equations of [`ChainParameters`] as their partial derivatives need them.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ChainDerivatives<const N: usize> {
+    total_mass: f64,
+    a: [f64; N],
+    weight: [f64; N],
+    b: [[f64; N]; N],
+    cart_friction: f64,
+    joint_frictions: [f64; N],
+}
+
+impl<const N: usize> ChainDerivatives<N> {
+    /// Takes the constants of N links.
+    pub fn new(parameters: &ChainParameters<f64>) -> Self {
+        let of = |entries: &[f64]| core::array::from_fn(|j| entries[j]);
+        Self {
+            total_mass: parameters.total_mass,
+            a: of(&parameters.a),
+            weight: core::array::from_fn(|j| parameters.gravity * parameters.a[j]),
+            b: core::array::from_fn(|j| core::array::from_fn(|k| parameters.b[(j, k)])),
+            cart_friction: parameters.cart_friction,
+            joint_frictions: of(&parameters.joint_frictions),
+        }
+    }
+
+    /// Partial derivatives of `ẍ` and of each `φ̈_j` at `state`, where the plant's rate of change is `rate`.
+    ///
+    /// With the equations written `M(φ) q̈ = h`, they are
+    /// `M⁻¹ (∂h - ∂M q̈)`.
+    pub fn partials(&self, state: &ChainState<N>, rate: &ChainState<N>) -> (Partials<N>, [Partials<N>; N]) {
+        let (sin, cos) = sin_cos(&state.phi);
+        let (w, wdot) = (&state.phidot, &rate.phidot);
+        // Right-hand sides ∂h - ∂M q̈, of the cart's equation and of the links'.
+        let mut cart = Partials { xdot: -self.cart_friction, force: 1.0, ..Partials::ZERO };
+        let mut links = [Partials::<N>::ZERO; N];
+        let mut mass = [[0.0; N]; N];
+        for j in 0..N {
+            let (a, w2) = (self.a[j], w[j] * w[j]);
+            cart.phi[j] = -a * (sin[j] * wdot[j] + cos[j] * w2);
+            cart.phidot[j] = -2.0 * a * sin[j] * w[j];
+            links[j].phi[j] += self.weight[j] * cos[j] - a * sin[j] * rate.xdot;
+            for k in 0..N {
+                let (b, w2) = (self.b[j][k], w[k] * w[k]);
+                let along = b * (cos[j] * cos[k] + sin[j] * sin[k]);
+                let across = b * (sin[j] * cos[k] - cos[j] * sin[k]);
+                mass[j][k] = along;
+                links[j].phi[j] += across * wdot[k] - along * w2;
+                links[j].phi[k] += along * w2 - across * wdot[k];
+                links[j].phidot[k] -= 2.0 * across * w[k];
+            }
+            // The torque at a joint acts on its link and, with opposite sign, on the link below.
+            let friction = self.joint_frictions[j];
+            links[j].torques[j] += 1.0;
+            links[j].phidot[j] -= friction;
+            if j > 0 {
+                links[j].phidot[j - 1] += friction;
+                links[j - 1].torques[j] -= 1.0;
+                links[j - 1].phidot[j] += friction;
+                links[j - 1].phidot[j - 1] -= friction;
+            }
+        }
+        // The cart's equation eliminated: S φ̈ = r, as in `derivative`.
+        let mut s = mass;
+        for j in 0..N {
+            let share = self.a[j] * cos[j] / self.total_mass;
+            links[j].add(share, &cart);
+            for k in 0..N {
+                s[j][k] -= share * self.a[k] * cos[k];
+            }
+        }
+        solve(s, &mut links);
+        for k in 0..N {
+            cart.add(self.a[k] * cos[k], &links[k]);
+        }
+        cart.scale(1.0 / self.total_mass);
+        (cart, links)
+    }
+}
+
+/// Replaces the right-hand sides by the solution, for a symmetric positive definite matrix; no pivoting.
+fn solve<const N: usize>(mut s: [[f64; N]; N], rows: &mut [Partials<N>; N]) {
+    for k in 0..N {
+        let pivot = rows[k];
+        for i in k + 1..N {
+            let factor = s[i][k] / s[k][k];
+            for j in k..N {
+                s[i][j] -= factor * s[k][j];
+            }
+            rows[i].add(-factor, &pivot);
+        }
+    }
+    for k in (0..N).rev() {
+        for i in k + 1..N {
+            let known = rows[i];
+            rows[k].add(-s[k][i], &known);
+        }
+        rows[k].scale(1.0 / s[k][k]);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::plant::ChainPlant;
+    use crate::rig::{PlantDescription, Rig};
+    use std::path::Path;
+
+    #[test]
+    fn partial_derivatives_agree_with_differences() {
+        let rig = Rig::from_path(Path::new("../../rigs/triple-glueck-eder-kugi.toml")).unwrap();
+        let PlantDescription::Chain(chain) = &rig.plant else { panic!("a chain") };
+        let parameters = ChainParameters::of(chain);
+        let plant = ChainPlant::<3>::new(&parameters).unwrap();
+        let state = ChainState { x: 0.1, xdot: -0.7, phi: [2.0, -1.1, 0.4], phidot: [3.0, -5.0, 1.5] };
+        let (force, torques) = (17.0, [0.3, -0.2, 0.1]);
+        let rate = plant.derivative(&state, force, &torques);
+        let (cart, links) = ChainDerivatives::<3>::new(&parameters).partials(&state, &rate);
+        let agrees = |by: &str, of: &dyn Fn(&Partials<3>) -> f64, at: &dyn Fn(f64) -> ChainState<3>| {
+            let step = 1e-5;
+            let (above, below) = (at(step), at(-step));
+            let difference = |a: f64, b: f64| (a - b) / (2.0 * step);
+            let close = |exact: f64, found: f64| {
+                assert!((exact - found).abs() < 1e-6 * (1.0 + exact.abs()), "by {by}: {exact} {found}");
+            };
+            close(of(&cart), difference(above.xdot, below.xdot));
+            for j in 0..3 {
+                close(of(&links[j]), difference(above.phidot[j], below.phidot[j]));
+            }
+        };
+        let moved = |change: &dyn Fn(&mut ChainState<3>)| {
+            let mut moved = state;
+            change(&mut moved);
+            plant.derivative(&moved, force, &torques)
+        };
+        agrees("x'", &|p| p.xdot, &|d| moved(&|s| s.xdot += d));
+        agrees("force", &|p| p.force, &|d| plant.derivative(&state, force + d, &torques));
+        for k in 0..3 {
+            agrees("phi", &|p| p.phi[k], &|d| moved(&|s| s.phi[k] += d));
+            agrees("phi'", &|p| p.phidot[k], &|d| moved(&|s| s.phidot[k] += d));
+            agrees("torque", &|p| p.torques[k], &|d| {
+                let mut torques = torques;
+                torques[k] += d;
+                plant.derivative(&state, force, &torques)
+            });
+        }
+    }
+}

@@ -1,0 +1,59 @@
+//! `[swing_up]`: the motions from hanging to upright and back.
+
+use super::super::error::RigError;
+use super::super::key::{Absent, Keys, Section, keys};
+use super::super::node::Node;
+use super::super::rule::Rule;
+
+/// `[swing_up]`
+pub(in crate::rig) static SWING_UP: Section = Section {
+    name: "swing_up",
+    title: "[swing_up]",
+    meaning: "what `upright swing-up` plans within, and what its motions have to stand; changes no gain",
+    absent: Absent::Follows("as below"),
+    keys: &[SwingUpRules::KEYS],
+};
+
+const DURATION: Rule = Rule::DURATION.worded("a number > 0 and <= 60 (s), shortest_s at most longest_s");
+
+keys! {
+    /// Limits of the planned motions, and the errors that they have to stand. They change no gain, so they are not part
+    /// of the rig's hash.
+    pub struct SwingUpRules {
+        shortest_s: Option<f64>, "s", DURATION,
+            "shortest duration of a motion that is tried", Absent::Follows("9 √(L/g) for links of length L in all");
+        longest_s: Option<f64>, "s", DURATION,
+            "longest duration of a motion that is tried", Absent::Follows("20 √(L/g)");
+        force_n: Option<f64>, "N", Rule::POSITIVE,
+            "largest force of a plan", Absent::Follows("60 to 90 % of the largest force");
+        speed_m_per_s: Option<f64>, "m/s", Rule::POSITIVE,
+            "largest speed of the cart in a plan", Absent::Follows("90 % of speed_m_per_s in [limits]");
+        rail_m: Option<f64>, "m", Rule::POSITIVE,
+            "largest distance of the cart from the middle in a plan", Absent::Follows("60 to 90 % of travel_m");
+        mass_spread_percent: f64, "%", Rule::PERCENT,
+            "spread (±) of the masses of the random plants", Absent::Numbers(&[5.0]);
+        friction_spread_percent: f64, "%", Rule::PERCENT,
+            "spread (±) of the frictions of the random plants", Absent::Numbers(&[30.0]);
+        success_percent: f64, "%", Rule::PERCENT,
+            "least share of random plants that arrive, as the lower end of its 95 % interval",
+            Absent::Numbers(&[93.0]);
+    }
+}
+
+impl Default for SwingUpRules {
+    fn default() -> Self {
+        SwingUpRules::when_absent().expect("no key of [swing_up] is required")
+    }
+}
+
+/// Reads `[swing_up]`.
+pub(in crate::rig) fn swing_up(node: &Node<'_>) -> Result<SwingUpRules, RigError> {
+    let table = node.table(&SWING_UP)?;
+    let rules = SwingUpRules::read(&table)?;
+    match (rules.shortest_s, rules.longest_s, table.get("longest_s")) {
+        (Some(shortest), Some(longest), Some(node)) if longest < shortest => {
+            Err(node.out_of_range(DURATION.accepts, "give a longest_s of at least shortest_s"))
+        }
+        _ => Ok(rules),
+    }
+}

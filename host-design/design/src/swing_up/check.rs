@@ -1,0 +1,83 @@
+//! An independent check of a motion: every tick integrated again by another method, every limit held.
+
+use serde::Serialize;
+
+use super::SwingUpError;
+use super::motion::Motion;
+use super::setting::Setting;
+use super::way::Way;
+use crate::plant::chain_plant;
+use crate::plant::reference::{Tolerance, integrate};
+
+/// Largest difference that the adaptive integrator may find in a tick, in the units of the states.
+const DRIFT: f64 = 1e-7;
+/// Tolerance of the adaptive integrator.
+const TOLERANCE: Tolerance = Tolerance { relative: 1e-11, absolute: 1e-11 };
+
+/// What the check found.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Peaks {
+    /// Duration (s).
+    pub duration_s: f64,
+    /// Largest difference between a state and where the adaptive integrator leads from the one before it.
+    pub drift: f64,
+    /// Largest force (N).
+    pub force_n: f64,
+    /// Largest distance of the cart from the middle (m).
+    pub position_m: f64,
+    /// Largest speed of the cart (m/s).
+    pub speed_m_per_s: f64,
+    /// Largest rate of a joint (rad/s).
+    pub rate_rad_per_s: f64,
+    /// Share of the closest limit of the actuator and the rail that is used.
+    pub used: f64,
+}
+
+/// Checks `motion`: its ends, the equations of motion, and the limits of the machine.
+///
+/// # Errors
+/// [`SwingUpError::Broken`] with what does not hold.
+pub(super) fn check(setting: &Setting<'_>, motion: &Motion, way: Way) -> Result<Peaks, SwingUpError> {
+    let broken = |what: String| SwingUpError::Broken { way, what };
+    let ends = way.ends(setting.rig.states());
+    if [&motion.x[0], &motion.x[motion.steps()]] != [&ends[0], &ends[1]] {
+        return Err(broken("it does not begin and end at rest".to_owned()));
+    }
+    let plant = chain_plant(setting.chain)?;
+    let no_torques = vec![0.0; setting.chain.links.len()];
+    let mut drift: f64 = 0.0;
+    for (k, (x, &u)) in motion.x.iter().zip(&motion.u).enumerate() {
+        let end = integrate(&*plant, x, |_, _| u, &no_torques, motion.tick_s, TOLERANCE)
+            .map_err(|error| broken(format!("tick {k}: {error}")))?;
+        for (end, next) in end.iter().zip(&motion.x[k + 1]) {
+            drift = drift.max((end - next).abs());
+        }
+    }
+    if drift > DRIFT {
+        return Err(broken(format!(
+            "the equations of motion are missed by {drift:.1e} in a tick, more than {DRIFT:.0e}"
+        )));
+    }
+    let mut used: f64 = 0.0;
+    for (k, x) in motion.x.iter().enumerate() {
+        let u = motion.u.get(k).copied().unwrap_or(0.0);
+        for limit in setting.actuator.limits() {
+            let room = limit.room(x, u);
+            if room < 0.0 {
+                let t = k as f64 * motion.tick_s;
+                return Err(broken(format!("the limit of the {} is exceeded at {t:.3} s", limit.name)));
+            }
+            used = used.max(1.0 - room / limit.bound);
+        }
+    }
+    let largest = |of: &dyn Fn(&[f64]) -> f64| motion.x.iter().fold(0.0, |most: f64, x| most.max(of(x)));
+    Ok(Peaks {
+        duration_s: motion.duration_s(),
+        drift,
+        force_n: motion.u.iter().fold(0.0, |most: f64, u| most.max(u.abs())),
+        position_m: largest(&|x| x[0].abs()),
+        speed_m_per_s: largest(&|x| x[1].abs()),
+        rate_rad_per_s: largest(&|x| x.iter().skip(3).step_by(2).fold(0.0, |most: f64, w| most.max(w.abs()))),
+        used,
+    })
+}

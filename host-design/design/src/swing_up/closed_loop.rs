@@ -1,0 +1,207 @@
+//! A motion in closed loop: encoders, filter with the nonlinear model, feedback, actuator, and a plant that may differ
+//! from the model.
+
+use rand::SeedableRng;
+use rand_distr::{Distribution, StandardNormal};
+use rand_pcg::Pcg64;
+
+use super::SwingUpError;
+use super::motion::Motion;
+use super::setting::Setting;
+use super::way::Way;
+use crate::numerics::Matrix;
+use crate::plant::{Plant, absolute_angles, chain_plant};
+use crate::rig::Chain;
+
+/// Deviation of a link from its reference beyond which the motion counts as lost (rad).
+pub(super) const LOST_RAD: f64 = 0.35;
+/// Deviation at the end of a run below which it has arrived (rad).
+const ARRIVED_RAD: f64 = 0.1;
+
+/// One run.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Trial {
+    /// The chain that moves.
+    pub(super) chain: Chain,
+    /// Its state at the start.
+    pub(super) start: Vec<f64>,
+    /// What each encoder shows too much (m, rad).
+    pub(super) zero_error: Vec<f64>,
+    /// Whether encoders count in steps.
+    pub(super) counts: bool,
+    /// Disturbances are drawn with this seed; none without.
+    pub(super) seed: Option<u64>,
+    /// How long the balance after the motion lasts (s).
+    pub(super) after_s: f64,
+}
+
+/// What came of it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Outcome {
+    /// Whether it arrived and stayed.
+    pub(super) stood: bool,
+    /// Largest deviation of a link from its reference while moving (rad).
+    pub(super) deviation_rad: f64,
+    /// Largest deviation of the cart (m).
+    pub(super) deviation_m: f64,
+}
+
+/// A trial under way.
+pub(super) struct ClosedLoop<'a> {
+    setting: &'a Setting<'a>,
+    trial: &'a Trial,
+    plant: Box<dyn Plant>,
+    random: Option<Pcg64>,
+    torques: Vec<f64>,
+    /// The true state.
+    pub(super) state: Vec<f64>,
+    /// Estimate of this tick, and its prediction for the next.
+    pub(super) estimate: Vec<f64>,
+    predicted: Vec<f64>,
+}
+
+/// What the law does in a tick: `u = u_k - K (x̂ - x_k)` with the filter gain L; no K: no force.
+pub(super) struct Law<'a> {
+    pub(super) x: &'a [f64],
+    pub(super) u: f64,
+    pub(super) k: Option<&'a Matrix<f64>>,
+    pub(super) l: &'a Matrix<f64>,
+}
+
+impl<'a> ClosedLoop<'a> {
+    /// A trial whose filter begins at `predicted`.
+    ///
+    /// # Errors
+    /// [`SwingUpError`] if the chain cannot be simulated.
+    pub(super) fn new(
+        setting: &'a Setting<'a>,
+        trial: &'a Trial,
+        predicted: &[f64],
+    ) -> Result<Self, SwingUpError> {
+        let mut plant = chain_plant(&trial.chain)?;
+        plant.set_state(&trial.start);
+        Ok(Self {
+            setting,
+            trial,
+            plant,
+            random: trial.seed.map(Pcg64::seed_from_u64),
+            torques: vec![0.0; setting.chain.links.len()],
+            state: trial.start.clone(),
+            estimate: predicted.to_vec(),
+            predicted: predicted.to_vec(),
+        })
+    }
+
+    /// One tick: measures, corrects, applies the law; then moves the plant. `observe` sees the loop and
+    /// the force (N) before the plant moves.
+    pub(super) fn tick(&mut self, law: &Law<'_>, observe: &mut dyn FnMut(&Self, f64)) {
+        let sensors = &self.setting.noise.sensors;
+        let innovation: Vec<f64> = (0..sensors.len())
+            .map(|i| measured(self.setting, self.trial, &self.state, i) - self.predicted[sensors[i].0])
+            .collect();
+        for (i, estimate) in self.estimate.iter_mut().enumerate() {
+            let correction: f64 = innovation.iter().enumerate().map(|(j, e)| law.l[(i, j)] * e).sum();
+            *estimate = self.predicted[i] + correction;
+        }
+        let force = law.k.map_or(0.0, |k| {
+            let deviations = self.estimate.iter().zip(law.x).map(|(estimate, x)| estimate - x);
+            let feedback: f64 = deviations.enumerate().map(|(i, deviation)| k[(0, i)] * deviation).sum();
+            applied(self.setting, law.u - feedback, self.estimate[1])
+        });
+        observe(self, force);
+        let mut push = 0.0;
+        if let Some(random) = &mut self.random {
+            let mut draw = || -> f64 { StandardNormal.sample(random) };
+            push = self.setting.disturbance.force_n * draw();
+            self.torques.fill_with(|| self.setting.disturbance.torque_n_m * draw());
+        }
+        self.plant.advance(force + push, &self.torques, self.setting.tick_s, 2);
+        self.plant.write_state(&mut self.state);
+        self.predicted = self.setting.dynamics.step(&self.estimate, [force; 2], self.setting.tick_s);
+    }
+
+    /// Whether the cart has reached an end of the rail.
+    pub(super) fn is_at_the_end(&self) -> bool {
+        let [low, high] = self.setting.chain.cart.travel_m;
+        !(low < self.state[0] && self.state[0] < high)
+    }
+}
+
+/// The law in tick k of a motion and after it.
+pub(super) fn law_at<'a>(setting: &'a Setting<'_>, motion: &'a Motion, way: Way, k: usize) -> Law<'a> {
+    let steps = motion.steps();
+    match way {
+        _ if k < steps => Law { x: &motion.x[k], u: motion.u[k], k: Some(&motion.k[k]), l: &motion.l[k] },
+        Way::Up => Law { x: &motion.x[steps], u: 0.0, k: Some(&setting.upright_k), l: &setting.upright_l },
+        Way::Down => Law { x: &motion.x[steps], u: 0.0, k: None, l: &motion.l[steps - 1] },
+    }
+}
+
+/// Runs `motion` on the trial's chain.
+///
+/// # Errors
+/// [`SwingUpError`] if the chain cannot be simulated.
+pub(super) fn run(
+    setting: &Setting<'_>,
+    motion: &Motion,
+    way: Way,
+    trial: &Trial,
+) -> Result<Outcome, SwingUpError> {
+    let mut rig = ClosedLoop::new(setting, trial, &motion.x[0])?;
+    let steps = motion.steps();
+    let mut outcome = Outcome { stood: false, deviation_rad: 0.0, deviation_m: 0.0 };
+    for k in 0..steps + (trial.after_s / motion.tick_s) as usize {
+        rig.tick(&law_at(setting, motion, way, k), &mut |_, _| {});
+        let reference = motion.x.get(k + 1).unwrap_or(&motion.x[steps]);
+        let deviation = deviation(&rig.state, reference);
+        outcome.deviation_m = outcome.deviation_m.max((rig.state[0] - reference[0]).abs());
+        if k < steps {
+            outcome.deviation_rad = outcome.deviation_rad.max(deviation);
+        }
+        let watched = k < steps || way == Way::Up;
+        if (watched && deviation > LOST_RAD) || rig.is_at_the_end() {
+            outcome.deviation_rad = outcome.deviation_rad.max(LOST_RAD);
+            return Ok(outcome);
+        }
+    }
+    outcome.stood = deviation(&rig.state, &motion.x[steps]) < ARRIVED_RAD;
+    Ok(outcome)
+}
+
+/// Largest difference of a link's angle from the vertical to that of the reference (rad).
+fn deviation(state: &[f64], reference: &[f64]) -> f64 {
+    absolute_angles(state).zip(absolute_angles(reference)).fold(0.0, |largest, (a, b)| {
+        let difference = (a - b).abs();
+        if difference.is_nan() { f64::INFINITY } else { f64::max(largest, difference) }
+    })
+}
+
+fn measured(setting: &Setting<'_>, trial: &Trial, state: &[f64], sensor: usize) -> f64 {
+    let value = state[setting.noise.sensors[sensor].0] + trial.zero_error[sensor];
+    let step = setting.steps[sensor];
+    if trial.counts { libm::round(value / step) * step } else { value }
+}
+
+/// The force that the actuator gives.
+fn applied(setting: &Setting<'_>, force: f64, speed: f64) -> f64 {
+    let limit = setting.actuator.force_n;
+    let force = force.max(-limit).min(limit);
+    match setting.actuator.motor {
+        Some([stall, loss]) => force.max(-stall - loss * speed).min(stall - loss * speed),
+        None => force,
+    }
+}
+
+impl Trial {
+    /// The model itself, exactly at the start of `motion`, without counts or disturbances.
+    pub(super) fn ideal(setting: &Setting<'_>, motion: &Motion) -> Self {
+        Self {
+            chain: setting.chain.clone(),
+            start: motion.x[0].clone(),
+            zero_error: vec![0.0; setting.steps.len()],
+            counts: false,
+            seed: None,
+            after_s: 1.0,
+        }
+    }
+}

@@ -1,0 +1,90 @@
+//! Why there is no swing-up.
+
+use std::path::PathBuf;
+
+use super::motion::Shape;
+use super::way::Way;
+use crate::numerics::Singular;
+use crate::plant::PlantError;
+
+/// Why a rig cannot be raised or lowered.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum SwingUpError {
+    /// A given linear model has no hanging position.
+    #[error("swing-up needs a chain of links: a given [model] holds only near its equilibrium")]
+    NotAChain,
+    /// Something in the rig file is missing.
+    #[error("swing-up needs {0}: add it to the rig file")]
+    Needs(&'static str),
+    /// A delay is not part of the motion's law.
+    #[error("swing-up is designed for delay_ticks = 0: set it to 0 for the rig that shall raise itself")]
+    Delay,
+    /// More links than the search is compiled for.
+    #[error("swing-up is searched for 1 to 6 links, not for {0}")]
+    Links(usize),
+    /// No candidate was solved.
+    #[error("{way}: none of {tried} candidates is solved; {help}")]
+    NoTrajectory {
+        /// Which motion.
+        way: Way,
+        /// Candidates tried.
+        tried: u64,
+        /// What would help.
+        help: String,
+    },
+    /// Not enough random runs arrive.
+    #[error(
+        "{way}: {stood} of {runs} random runs arrive, and the lower end of the 95 % interval has to be {needed} % \
+         (success_percent in [swing_up]); smaller spreads of masses and friction help; {help}"
+    )]
+    NotRobust {
+        /// Which motion.
+        way: Way,
+        /// Runs that arrived.
+        stood: usize,
+        /// Runs made.
+        runs: usize,
+        /// Lower end needed (%).
+        needed: f64,
+        /// What would help.
+        help: String,
+    },
+    /// A motion does not pass the independent check.
+    #[error("{way}: {what}")]
+    Broken {
+        /// Which motion.
+        way: Way,
+        /// What does not hold.
+        what: String,
+    },
+    /// There is no stored motion.
+    #[error("{}: no such file; make it with `upright swing-up`", .0.display())]
+    NoFile(PathBuf),
+    /// The file of the stored motions cannot be used.
+    #[error("{}: {reason}; make it again with `upright swing-up`", file.display())]
+    BadFile {
+        /// The file.
+        file: PathBuf,
+        /// Why.
+        reason: String,
+    },
+    /// The stored motions belong to other values of the rig file.
+    #[error("the stored motions do not belong to this rig file: run `upright swing-up` again")]
+    Outdated,
+    /// The chain cannot be simulated.
+    #[error(transparent)]
+    Plant(#[from] PlantError),
+    /// The filter along the motion has no gain.
+    #[error("the filter along the motion is singular: every encoder needs a step above 0")]
+    Filter(#[from] Singular),
+    /// The parts of a motion do not fit together.
+    #[error(transparent)]
+    Shape(#[from] Shape),
+}
+
+impl SwingUpError {
+    /// Whether the problem has no solution, rather than a file or a rig that does not describe one.
+    pub fn is_without_solution(&self) -> bool {
+        matches!(self, Self::NoTrajectory { .. } | Self::NotRobust { .. } | Self::Broken { .. })
+    }
+}

@@ -1,0 +1,25 @@
+//! The motion along a path, with its gains.
+
+use super::SwingUpError;
+use super::motion::Motion;
+use super::refine::Path;
+use super::setting::Setting;
+use super::tracking::{Filter, feedback, ticks};
+use super::way::Way;
+use crate::numerics::Matrix;
+
+/// The motion that follows `path`, which ends upright or hanging.
+pub(super) fn motion(setting: &Setting<'_>, path: Path, way: Way) -> Result<Motion, SwingUpError> {
+    let ticks = ticks(&*setting.dynamics, &path, setting.tick_s);
+    let (at_end, covariance) = match way {
+        Way::Up => (setting.upright_cost.clone(), &setting.hanging_covariance),
+        Way::Down => (setting.hanging_cost.clone(), &setting.upright_covariance),
+    };
+    let k = feedback(&ticks, &setting.weights, setting.force_weight, &at_end, setting.tick_s);
+    let states = path.x[0].len();
+    let mut filter = Filter::new(&*setting.dynamics, &setting.noise, states, setting.tick_s);
+    filter.covariance = covariance.clone();
+    let l: Result<Vec<Matrix<f64>>, _> =
+        path.x.iter().zip(&ticks).map(|(x, tick)| filter.gain(x, tick)).collect();
+    Ok(Motion::new(setting.tick_s, path.x, path.u, k, l?)?)
+}

@@ -1,0 +1,108 @@
+//! What a trajectory has to do: ends, limits, cost.
+
+use super::dynamics::Dynamics;
+use crate::number::rounded;
+use crate::numerics::Matrix;
+
+/// Bounds of a trajectory. Each holds at every knot.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Bounds {
+    /// Largest force (N).
+    pub(super) force_n: f64,
+    /// Force of the motor at standstill (N) and its loss by back-EMF (N·s/m): `|u + loss ẋ| <= force`.
+    pub(super) motor: Option<[f64; 2]>,
+    /// Largest speed of the cart (m/s).
+    pub(super) speed_m_per_s: Option<f64>,
+    /// Ends of the rail (m).
+    pub(super) rail_m: Option<[f64; 2]>,
+}
+
+/// One linear limit: `position x + speed ẋ + force u <= bound`.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Limit {
+    pub(super) position: f64,
+    pub(super) speed: f64,
+    pub(super) force: f64,
+    pub(super) bound: f64,
+    /// Which limit it is, as a user knows it.
+    pub(super) name: &'static str,
+}
+
+impl Limit {
+    /// How far within the limit a state and a force are; negative beyond it.
+    pub(super) fn room(&self, x: &[f64], u: f64) -> f64 {
+        self.bound - self.position * x[0] - self.speed * x[1] - self.force * u
+    }
+}
+
+impl Bounds {
+    /// All bounds, each as one-sided limits.
+    pub(super) fn limits(&self) -> Vec<Limit> {
+        let free = Limit { position: 0.0, speed: 0.0, force: 0.0, bound: 0.0, name: "" };
+        let mut limits = Vec::new();
+        for sign in [1.0, -1.0] {
+            limits.push(Limit { force: sign, bound: self.force_n, name: "force", ..free });
+            if let Some([stall, loss]) = self.motor {
+                limits.push(Limit {
+                    force: sign,
+                    speed: sign * loss,
+                    bound: stall,
+                    name: "motor voltage",
+                    ..free
+                });
+            }
+            if let Some(speed) = self.speed_m_per_s {
+                limits.push(Limit { speed: sign, bound: speed, name: "cart speed", ..free });
+            }
+            if let Some([low, high]) = self.rail_m {
+                let bound = if sign > 0.0 { high } else { -low };
+                limits.push(Limit { position: sign, bound, name: "rail", ..free });
+            }
+        }
+        limits
+    }
+
+    /// The same bounds times a factor.
+    #[must_use]
+    pub(super) fn scaled(&self, factor: f64) -> Self {
+        Self {
+            force_n: self.force_n * factor,
+            motor: self.motor.map(|[stall, loss]| [stall * factor, loss]),
+            speed_m_per_s: self.speed_m_per_s.map(|speed| speed * factor),
+            rail_m: self.rail_m.map(|ends| ends.map(|end| end * factor)),
+        }
+    }
+}
+
+/// A trajectory from one state of rest to another.
+pub(super) struct Problem<'a> {
+    pub(super) dynamics: &'a dyn Dynamics,
+    /// Time between knots (s) and number of steps.
+    pub(super) knot_s: f64,
+    pub(super) steps: usize,
+    pub(super) start: Vec<f64>,
+    pub(super) end: Vec<f64>,
+    pub(super) limits: Vec<Limit>,
+    /// Cost per second: `xᵀ Q x + r_u u² + r_du u̇²`.
+    pub(super) state_weights: Matrix<f64>,
+    pub(super) force_weight: f64,
+    pub(super) rate_weight: f64,
+}
+
+/// States at the knots (steps + 1) and forces at the knots (steps + 1), linear between them.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Knots {
+    pub(super) x: Vec<Vec<f64>>,
+    pub(super) u: Vec<f64>,
+}
+
+impl Knots {
+    /// Rounded as they are stored, so that what is read again gives the same motion to the last bit.
+    pub(super) fn rounded(&self) -> Self {
+        let round = |values: &Vec<f64>| values.iter().map(|&value| rounded(value, DIGITS)).collect();
+        Self { x: self.x.iter().map(round).collect(), u: round(&self.u) }
+    }
+}
+
+/// Significant digits of stored numbers: they are only where the refinement starts.
+const DIGITS: usize = 9;

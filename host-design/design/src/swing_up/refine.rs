@@ -1,0 +1,132 @@
+//! A trajectory at knots becomes one at ticks, with the force held over each.
+
+use super::dynamics::Dynamics;
+use super::hold::{after_tick, tick};
+use super::problem::Knots;
+use super::riccati::{Stage, minimise};
+use crate::numerics::Matrix;
+
+/// States at the ticks (steps + 1) and held forces (steps).
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Path {
+    pub(super) x: Vec<Vec<f64>>,
+    pub(super) u: Vec<f64>,
+}
+
+/// Newton steps.
+const STEPS: usize = 12;
+/// Largest gap of a refined path, in the units of the states.
+pub(super) const GAP: f64 = 2e-8;
+const END_WEIGHT: f64 = 1e8;
+/// Largest change of a position by the refinement (m, rad).
+const MOVED: f64 = 0.05;
+
+/// The path at ticks with `ticks` in each step between knots: Newton steps, each the least change that closes the gaps
+/// to first order. None if they stay above [`GAP`].
+pub(super) fn refine(
+    dynamics: &dyn Dynamics,
+    knots: &Knots,
+    ticks: usize,
+    tick_s: f64,
+    end: &[f64],
+) -> Option<Path> {
+    let mut path = Path { x: Vec::new(), u: Vec::new() };
+    for (x, ends) in knots.x.iter().zip(knots.u.windows(2)) {
+        let mut state = x.clone();
+        for i in 0..ticks {
+            let force = ends[0] + (ends[1] - ends[0]) * (i as f64 + 0.5) / ticks as f64;
+            path.u.push(force);
+            path.x.push(state.clone());
+            state = after_tick(dynamics, &state, force, tick_s);
+        }
+    }
+    path.x.push(end.to_vec());
+    let path = close(dynamics, path, tick_s)?;
+    let at_knots = path.x.iter().step_by(ticks);
+    is_near(knots, at_knots.map(Vec::as_slice)).then_some(path)
+}
+
+/// Whether the positions of a refined path are still those of its knots: from knots of another spacing or of another rig,
+/// Newton steps may lead to quite another motion.
+fn is_near<'a>(knots: &Knots, path: impl Iterator<Item = &'a [f64]>) -> bool {
+    let near = |(knot, x): (&Vec<f64>, &[f64])| {
+        knot.iter().zip(x).step_by(2).all(|(knot, x)| (knot - x).abs() < MOVED)
+    };
+    knots.x.iter().zip(path).all(near)
+}
+
+/// Closes the gaps of a path whose first and last states stay.
+pub(super) fn close(dynamics: &dyn Dynamics, mut path: Path, tick_s: f64) -> Option<Path> {
+    let end = path.x[path.u.len()].clone();
+    for _ in 0..STEPS {
+        let before = largest_gap(dynamics, &path, tick_s);
+        if before < 0.1 * GAP {
+            break;
+        }
+        let step = newton(dynamics, &path, tick_s)?;
+        let mut share = 1.0;
+        let next = loop {
+            let next = moved(&path, &step, share);
+            if largest_gap(dynamics, &next, tick_s) < before {
+                break next;
+            }
+            share *= 0.5;
+            if share < 1e-3 {
+                return (before < GAP).then_some(path);
+            }
+        };
+        path = next;
+    }
+    // What is left of the distance to the end is far below the gap.
+    let last = path.u.len();
+    path.x[last] = end;
+    (largest_gap(dynamics, &path, tick_s) < GAP).then_some(path)
+}
+
+fn newton(dynamics: &dyn Dynamics, path: &Path, tick_s: f64) -> Option<super::riccati::Minimum> {
+    let s = path.x[0].len();
+    let stages: Vec<Stage> = path
+        .x
+        .iter()
+        .zip(&path.u)
+        .zip(&path.x[1..])
+        .map(|((x, &u), next)| {
+            let tick = tick(dynamics, x, u, tick_s);
+            Stage {
+                q: Matrix::identity(s).scaled(&1e-6),
+                q_linear: vec![0.0; s],
+                r: 1.0,
+                r_linear: 0.0,
+                a: tick.a(),
+                b: tick.b(),
+                d: tick.end.iter().zip(next).map(|(end, next)| end - next).collect(),
+            }
+        })
+        .collect();
+    minimise(&stages, &Matrix::identity(s).scaled(&END_WEIGHT), &vec![0.0; s])
+}
+
+fn moved(path: &Path, step: &super::riccati::Minimum, share: f64) -> Path {
+    let plus = |x: &f64, z: &f64| x + share * z;
+    Path {
+        x: path
+            .x
+            .iter()
+            .zip(&step.z)
+            .map(|(x, z)| x.iter().zip(z).map(|(x, z)| plus(x, z)).collect())
+            .collect(),
+        u: path.u.iter().zip(&step.w).map(|(u, w)| plus(u, w)).collect(),
+    }
+}
+
+/// Largest difference between a state and where the tick before it leads.
+pub(super) fn largest_gap(dynamics: &dyn Dynamics, path: &Path, tick_s: f64) -> f64 {
+    let mut largest: f64 = 0.0;
+    for ((x, &u), next) in path.x.iter().zip(&path.u).zip(&path.x[1..]) {
+        for (end, next) in after_tick(dynamics, x, u, tick_s).iter().zip(next) {
+            let gap = (end - next).abs();
+            largest = if gap.is_nan() { f64::INFINITY } else { largest.max(gap) };
+        }
+    }
+    largest
+}

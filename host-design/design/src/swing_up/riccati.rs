@@ -1,0 +1,125 @@
+//! The linear-quadratic problem along a trajectory, solved by a Riccati recursion.
+
+use crate::numerics::Matrix;
+
+/// One step of the problem, in deviations z (m entries) and one input w:
+/// cost `½ zᵀ Q z + qᵀ z + ½ r w² + g w`, next `z⁺ = A z + B w + d`.
+pub(super) struct Stage {
+    pub(super) q: Matrix<f64>,
+    pub(super) q_linear: Vec<f64>,
+    pub(super) r: f64,
+    pub(super) r_linear: f64,
+    pub(super) a: Matrix<f64>,
+    pub(super) b: Vec<f64>,
+    pub(super) d: Vec<f64>,
+}
+
+/// Deviations z (steps + 1) and inputs w (steps) of the minimum.
+pub(super) struct Minimum {
+    pub(super) z: Vec<Vec<f64>>,
+    pub(super) w: Vec<f64>,
+}
+
+/// The minimum from z = 0, with the cost `½ zᵀ Q z + qᵀ z` of the last state. None if the numbers overflow.
+pub(super) fn minimise(stages: &[Stage], last_q: &Matrix<f64>, last_q_linear: &[f64]) -> Option<Minimum> {
+    let m = last_q_linear.len();
+    let (mut p, mut p_linear) = (last_q.clone(), last_q_linear.to_vec());
+    let mut feedback: Vec<(Vec<f64>, f64)> = Vec::with_capacity(stages.len());
+    for stage in stages.iter().rev() {
+        let pa = &p * &stage.a;
+        let pb = times(&p, &stage.b);
+        let h = stage.r + dot(&stage.b, &pb);
+        // p + P d
+        let ahead: Vec<f64> = times(&p, &stage.d).iter().zip(&p_linear).map(|(pd, p)| pd + p).collect();
+        let k: Vec<f64> = (0..m).map(|j| (0..m).map(|i| stage.b[i] * pa[(i, j)]).sum::<f64>() / h).collect();
+        let k_0 = (stage.r_linear + dot(&stage.b, &ahead)) / h;
+        let mut next = stage.q.clone();
+        for l in 0..m {
+            for i in 0..m {
+                let factor = stage.a[(l, i)];
+                if factor != 0.0 {
+                    for j in i..m {
+                        next[(i, j)] += factor * pa[(l, j)];
+                    }
+                }
+            }
+        }
+        for i in 0..m {
+            for j in i..m {
+                next[(i, j)] -= h * k[i] * k[j];
+                next[(j, i)] = next[(i, j)];
+            }
+        }
+        p_linear = (0..m)
+            .map(|j| {
+                stage.q_linear[j] + (0..m).map(|i| stage.a[(i, j)] * ahead[i]).sum::<f64>() - h * k[j] * k_0
+            })
+            .collect();
+        p = next;
+        if !h.is_finite() || h <= 0.0 {
+            return None;
+        }
+        feedback.push((k, k_0));
+    }
+    let (mut z, mut w) = (vec![vec![0.0; m]], Vec::with_capacity(stages.len()));
+    for (stage, (k, k_0)) in stages.iter().zip(feedback.iter().rev()) {
+        let at = &z[z.len() - 1];
+        let input = -dot(k, at) - k_0;
+        let next = times(&stage.a, at);
+        let next = next.iter().zip(&stage.b).zip(&stage.d).map(|((az, b), d)| az + b * input + d).collect();
+        w.push(input);
+        z.push(next);
+    }
+    let finite = w.iter().chain(z.iter().flatten()).all(|value| value.is_finite());
+    finite.then_some(Minimum { z, w })
+}
+
+/// M v.
+pub(super) fn times(m: &Matrix<f64>, v: &[f64]) -> Vec<f64> {
+    m.row_slices().map(|row| dot(row, v)).collect()
+}
+
+/// aᵀ b.
+pub(super) fn dot(a: &[f64], b: &[f64]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| a * b).sum()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A double integrator from a gap of 1 in its first step, brought to 0: the last state costs, so that the
+    /// minimum is where no input lowers the cost.
+    #[test]
+    fn no_other_input_costs_less() {
+        let stage = |gap: f64| Stage {
+            q: Matrix::from_diagonal(&[0.1, 0.2]),
+            q_linear: vec![0.01, -0.02],
+            r: 0.5,
+            r_linear: 0.1,
+            a: Matrix::from_f64_rows(&[vec![1.0, 0.5], vec![0.0, 1.0]]),
+            b: vec![0.125, 0.5],
+            d: vec![gap, 0.0],
+        };
+        let stages = [stage(1.0), stage(0.0), stage(0.0)];
+        let (last, last_linear) = (Matrix::from_diagonal(&[10.0, 10.0]), vec![0.3, 0.0]);
+        let cost = |w: &[f64]| {
+            let (mut z, mut sum) = (vec![0.0, 0.0], 0.0);
+            for (stage, w) in stages.iter().zip(w) {
+                sum += 0.5 * dot(&z, &times(&stage.q, &z)) + dot(&stage.q_linear, &z);
+                sum += 0.5 * stage.r * w * w + stage.r_linear * w;
+                let next = times(&stage.a, &z);
+                z = (0..2).map(|i| next[i] + stage.b[i] * w + stage.d[i]).collect();
+            }
+            sum + 0.5 * dot(&z, &times(&last, &z)) + dot(&last_linear, &z)
+        };
+        let found = minimise(&stages, &last, &last_linear).unwrap();
+        for step in 0..3 {
+            for change in [-1e-3, 1e-3] {
+                let mut other = found.w.clone();
+                other[step] += change;
+                assert!(cost(&other) > cost(&found.w) + 1e-9, "{step} {change}");
+            }
+        }
+    }
+}

@@ -1,0 +1,148 @@
+//! How a motion stands wrong masses and friction: a score without chance, and random runs.
+
+use rand::{RngExt, SeedableRng};
+use rand_pcg::Pcg64;
+use rayon::prelude::*;
+use serde::Serialize;
+
+use super::SwingUpError;
+use super::closed_loop::{LOST_RAD, Trial, run};
+use super::motion::Motion;
+use super::setting::Setting;
+use super::way::Way;
+use crate::rig::Chain;
+use crate::verify::wilson;
+
+/// Error of one mass in a run of the score.
+const MASS_STEP: f64 = 0.005;
+
+/// The ranges from which each random run is drawn, uniformly.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Spread {
+    /// Range of the cart's and each link's mass: 0.05 is -5 % to +5 %.
+    pub mass: f64,
+    /// Range of the cart's and each joint's friction.
+    pub friction: f64,
+    /// Range of each link's angle at the start (rad).
+    pub tilt_rad: f64,
+    /// Range of the cart's position at the start (m).
+    pub position_m: f64,
+    /// Range of each encoder's zero (rad).
+    pub zero_rad: f64,
+}
+
+impl Spread {
+    /// Wrong masses and friction as given, a start off by 1° and 1 mm, encoders off by 0.1°.
+    pub fn of(mass: f64, friction: f64) -> Self {
+        let degree = core::f64::consts::PI / 180.0;
+        Self { mass, friction, tilt_rad: degree, position_m: 1e-3, zero_rad: 0.1 * degree }
+    }
+}
+
+/// Outcome of random runs.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Runs {
+    /// Seed of the first run; each following run has the next one.
+    pub base_seed: u64,
+    /// Runs made.
+    pub runs: usize,
+    /// Runs that arrived and stayed.
+    pub stood: usize,
+    /// 95 % confidence interval of their share (Wilson).
+    pub interval: [f64; 2],
+    /// Largest deviation of a link from its reference in the runs that arrived (rad).
+    pub deviation_rad: f64,
+}
+
+/// A deterministic measure of fragility, from one run for each mass, slightly wrong, and two with all friction wrong, without
+/// noise: the deviations to expect at the spreads of mass and friction, as shares of what may be lost, a link's angle
+/// and the rail that the plan leaves. Smaller is better.
+pub(super) fn score(
+    setting: &Setting<'_>,
+    motion: &Motion,
+    way: Way,
+    spread: &Spread,
+) -> Result<f64, SwingUpError> {
+    let ideal = Trial::ideal(setting, motion);
+    let [low, high] = setting.chain.cart.travel_m;
+    let room = motion.x.iter().fold(f64::INFINITY, |room, x| room.min(high - x[0]).min(x[0] - low));
+    let share = |change: &dyn Fn(&mut Chain)| -> Result<f64, SwingUpError> {
+        let mut trial = ideal.clone();
+        change(&mut trial.chain);
+        let outcome = run(setting, motion, way, &trial)?;
+        Ok(outcome.deviation_rad / LOST_RAD + outcome.deviation_m / room)
+    };
+    let mut sum = 0.0;
+    for body in 0..=setting.chain.links.len() {
+        sum += share(&|chain| scale_mass(chain, body, 1.0 + MASS_STEP))? / MASS_STEP * spread.mass;
+    }
+    for friction in [spread.friction, -spread.friction] {
+        sum += share(&|chain| scale_friction(chain, 1.0 + friction))?;
+    }
+    Ok(sum)
+}
+
+/// Body 0 is the cart. A given inertia follows the mass.
+fn scale_mass(chain: &mut Chain, body: usize, factor: f64) {
+    match body.checked_sub(1) {
+        None => chain.cart.mass_kg *= factor,
+        Some(link) => {
+            chain.links[link].mass_kg *= factor;
+            chain.links[link].inertia_kg_m2 = chain.links[link].inertia_kg_m2.map(|inertia| inertia * factor);
+        }
+    }
+}
+
+fn scale_friction(chain: &mut Chain, factor: f64) {
+    chain.cart.friction_n_s_per_m *= factor;
+    for link in &mut chain.links {
+        link.friction_n_m_s_per_rad *= factor;
+    }
+}
+
+/// The run with this seed.
+pub(super) fn sample(setting: &Setting<'_>, motion: &Motion, spread: &Spread, seed: u64) -> Trial {
+    let mut random = Pcg64::seed_from_u64(seed);
+    let mut between = |share: f64| share * random.random_range(-1.0..=1.0);
+    let mut trial = Trial { counts: true, seed: Some(seed), ..Trial::ideal(setting, motion) };
+    for body in 0..=setting.chain.links.len() {
+        scale_mass(&mut trial.chain, body, 1.0 + between(spread.mass));
+    }
+    let factor = 1.0 + between(spread.friction);
+    scale_friction(&mut trial.chain, factor);
+    trial.start[0] += between(spread.position_m);
+    let mut below = 0.0;
+    for joint in 0..setting.chain.links.len() {
+        // The angle of each link from the vertical is off; a joint's angle by the difference.
+        let tilt = between(spread.tilt_rad);
+        trial.start[2 + 2 * joint] += tilt - below;
+        below = tilt;
+        trial.zero_error[1 + joint] = between(spread.zero_rad);
+    }
+    trial
+}
+
+/// `runs` random runs with the seeds from `base_seed` on, on all threads; the outcome does not depend on their number.
+pub(super) fn random_runs(
+    setting: &Setting<'_>,
+    motion: &Motion,
+    way: Way,
+    spread: &Spread,
+    base_seed: u64,
+    runs: usize,
+) -> Result<Runs, SwingUpError> {
+    let one = |index: usize| {
+        let trial = sample(setting, motion, spread, base_seed + index as u64);
+        run(setting, motion, way, &trial)
+    };
+    let all: Vec<_> = (0..runs).into_par_iter().map(one).collect::<Result<_, _>>()?;
+    let stood = all.iter().filter(|outcome| outcome.stood).count();
+    let standing = all.iter().filter(|outcome| outcome.stood);
+    Ok(Runs {
+        base_seed,
+        runs,
+        stood,
+        interval: wilson(stood, runs),
+        deviation_rad: standing.fold(0.0, |largest, outcome| f64::max(largest, outcome.deviation_rad)),
+    })
+}

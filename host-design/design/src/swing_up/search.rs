@@ -1,0 +1,203 @@
+//! The search for a way up: many candidates, of which the most robust is kept.
+
+use rand::{RngExt, SeedableRng};
+use rand_pcg::Pcg64;
+use rayon::prelude::*;
+
+use super::SwingUpError;
+use super::gains::motion;
+use super::motion::Motion;
+use super::problem::{Bounds, Knots, Problem};
+use super::refine::{Path, refine};
+use super::robustness::{Spread, score};
+use super::setting::Setting;
+use super::shooting;
+use super::way::Way;
+use crate::numerics::Matrix;
+
+/// Share of motor and speed that a plan uses, and the ranges for force and rail: what is left is for the feedback.
+const SHARE: f64 = 0.9;
+const FORCE_SHARE: [f64; 2] = [0.6, 0.9];
+const RAIL_SHARE: [f64; 2] = [0.6, 0.9];
+/// Durations in units of √(L/g).
+const DURATION: [f64; 2] = [9.0, 20.0];
+/// Weight of the links' rates, in units of L/g: the range of its logarithm to base 10.
+const RATE_WEIGHT: [f64; 2] = [-2.0, 0.5];
+/// A change of the force by its limit in this time costs as much as the force itself (s).
+const RATE_TIME_S: f64 = 0.03;
+/// How far a refined path may exceed a bound of the plan, as a share of it.
+const EXCESS: f64 = 0.03;
+
+/// What a candidate was drawn with.
+struct Draw {
+    /// Duration (s).
+    duration_s: f64,
+    /// Bounds of the plan.
+    bounds: Bounds,
+    /// Weight of the rates (s²/rad²).
+    rate_weight: f64,
+    /// Amplitudes of the guess's force, as shares of the bound.
+    wobble: [f64; 3],
+}
+
+/// A candidate that was solved.
+pub(super) struct Candidate {
+    pub(super) knots: Knots,
+    pub(super) motion: Motion,
+    /// Smaller is more robust.
+    pub(super) score: f64,
+}
+
+/// Limits that the rig file sets to a plan.
+#[derive(Debug, Clone)]
+pub(super) struct Request {
+    /// Ranges from which duration, largest force and largest distance from the middle of the rail are drawn.
+    pub(super) duration_s: [f64; 2],
+    pub(super) force_n: [f64; 2],
+    pub(super) rail_m: [f64; 2],
+    /// The bounds that are not drawn.
+    pub(super) bounds: Bounds,
+    pub(super) spread: Spread,
+}
+
+impl Request {
+    pub(super) fn of(setting: &Setting<'_>) -> Self {
+        let (unit, rules) = (time_unit(setting), &setting.rules);
+        let mut bounds = setting.actuator.scaled(SHARE);
+        bounds.speed_m_per_s =
+            rules.speed_m_per_s.or(setting.rig.limits.speed_m_per_s.map(|speed| SHARE * speed));
+        let full = setting.actuator.force_n;
+        let force_n = match rules.force_n {
+            Some(force) => [force.min(full); 2],
+            None => FORCE_SHARE.map(|share| share * full),
+        };
+        let [low, high] = setting.chain.cart.travel_m;
+        let farthest = high.min(-low);
+        let rail_m = match rules.rail_m {
+            Some(rail) => [rail.min(farthest); 2],
+            None => RAIL_SHARE.map(|share| share * farthest),
+        };
+        let [shortest, longest] = DURATION.map(|units| units * unit);
+        let shortest = rules.shortest_s.unwrap_or_else(|| shortest.min(rules.longest_s.unwrap_or(shortest)));
+        let duration_s = [shortest, rules.longest_s.unwrap_or(longest).max(shortest)];
+        let spread = Spread::of(rules.mass_spread_percent / 100.0, rules.friction_spread_percent / 100.0);
+        Self { duration_s, force_n, rail_m, bounds, spread }
+    }
+}
+
+/// √(L/g) (s).
+fn time_unit(setting: &Setting<'_>) -> f64 {
+    let length: f64 = setting.chain.links.iter().map(|link| link.length_m).sum();
+    (length / setting.chain.gravity_m_per_s2).sqrt()
+}
+
+/// Candidate number `number`.
+fn draw(setting: &Setting<'_>, request: &Request, number: u64) -> Draw {
+    let mut random = Pcg64::seed_from_u64(number);
+    let mut between = |[low, high]: [f64; 2]| low + (high - low) * random.random_range(0.0..=1.0);
+    let unit = time_unit(setting);
+    let duration_s = between(request.duration_s);
+    let (force_n, rail_m) = (between(request.force_n), between(request.rail_m));
+    let rate_weight = libm::exp10(between(RATE_WEIGHT)) * unit * unit;
+    let wobble = core::array::from_fn(|_| if number == 0 { 0.0 } else { between([-0.05, 0.05]) });
+    let bounds = Bounds { force_n, rail_m: Some([-rail_m, rail_m]), ..request.bounds.clone() };
+    Draw { duration_s, bounds, rate_weight, wobble }
+}
+
+/// Ticks between two knots: 5 ms for the fast chains of four and more links, 10 ms otherwise.
+pub(super) fn ticks_per_knot(setting: &Setting<'_>) -> usize {
+    let knot_s = if setting.chain.links.len() >= 4 { 0.005 } else { 0.01 };
+    (knot_s / setting.tick_s).round().max(1.0) as usize
+}
+
+/// Solves candidate `number`. None if its gaps do not close, or a bound does not hold.
+fn solve(setting: &Setting<'_>, request: &Request, way: Way, number: u64) -> Option<(Knots, Path)> {
+    let draw = draw(setting, request, number);
+    let ticks = ticks_per_knot(setting);
+    let knot_s = ticks as f64 * setting.tick_s;
+    let [start, end] = way.ends(setting.rig.states());
+    let problem = Problem {
+        dynamics: &*setting.dynamics,
+        knot_s,
+        steps: (draw.duration_s / knot_s).round().max(2.0) as usize,
+        start,
+        end,
+        limits: draw.bounds.limits(),
+        state_weights: rate_weights(setting, draw.rate_weight),
+        force_weight: setting.actuator.force_n.powi(-2),
+        rate_weight: (RATE_TIME_S / setting.actuator.force_n).powi(2),
+    };
+    let knots = shooting::solve(&problem, guess(&problem, &draw))?.rounded();
+    let path = refine(&*setting.dynamics, &knots, ticks, setting.tick_s, &problem.end)?;
+    within(&path, &draw.bounds).then_some((knots, path))
+}
+
+/// How many of the candidates with these numbers are solved, on all threads.
+pub(super) fn solvable(
+    setting: &Setting<'_>,
+    request: &Request,
+    way: Way,
+    numbers: core::ops::Range<u64>,
+) -> usize {
+    numbers.into_par_iter().filter(|&number| solve(setting, request, way, number).is_some()).count()
+}
+
+/// All links turn evenly, at the force of the draw.
+fn guess(problem: &Problem<'_>, draw: &Draw) -> Knots {
+    let (steps, turn) = (problem.steps, core::f64::consts::PI);
+    let rate = (problem.end[2] - problem.start[2]) / (steps as f64 * problem.knot_s);
+    let mut knots = Knots { x: Vec::new(), u: Vec::new() };
+    for knot in 0..=steps {
+        let part = knot as f64 / steps as f64;
+        let mut x: Vec<f64> =
+            problem.start.iter().zip(&problem.end).map(|(a, b)| a + part * (b - a)).collect();
+        if knot > 0 && knot < steps {
+            x[3] = rate;
+        }
+        let wave = |(harmonic, share): (usize, &f64)| share * libm::sin(turn * part * (harmonic + 1) as f64);
+        knots.x.push(x);
+        knots.u.push(draw.bounds.force_n * draw.wobble.iter().enumerate().map(wave).sum::<f64>());
+    }
+    knots
+}
+
+/// `weight Σ φ̇_j²` in the relative rates.
+fn rate_weights(setting: &Setting<'_>, weight: f64) -> Matrix<f64> {
+    let (states, links) = (setting.rig.states(), setting.chain.links.len());
+    Matrix::from_fn(states, states, |i, j| match (i % 2, j % 2) {
+        (1, 1) if i > 1 && j > 1 => weight * (links + 1 - (i / 2).max(j / 2)) as f64,
+        _ => 0.0,
+    })
+}
+
+/// Whether the path keeps to the bounds, but for the excess that a refinement may bring.
+pub(super) fn within(path: &Path, bounds: &Bounds) -> bool {
+    let limits = bounds.limits();
+    path.x
+        .iter()
+        .zip(&path.u)
+        .all(|(x, &u)| limits.iter().all(|limit| limit.room(x, u) >= -EXCESS * limit.bound))
+}
+
+/// The candidates with these numbers that were solved, on all threads, in the order of their numbers. `done` is called
+/// after each, from any thread, with its score.
+pub(super) fn candidates(
+    setting: &Setting<'_>,
+    request: &Request,
+    way: Way,
+    numbers: core::ops::Range<u64>,
+    done: &(dyn Fn(Option<f64>) + Sync),
+) -> Result<Vec<Candidate>, SwingUpError> {
+    let one = |number: u64| -> Result<Option<Candidate>, SwingUpError> {
+        let Some((knots, path)) = solve(setting, request, way, number) else {
+            done(None);
+            return Ok(None);
+        };
+        let motion = motion(setting, path, way)?;
+        let score = score(setting, &motion, way, &request.spread)?;
+        done(Some(score));
+        Ok(Some(Candidate { knots, motion, score }))
+    };
+    let all: Vec<_> = numbers.into_par_iter().map(one).collect::<Result<_, _>>()?;
+    Ok(all.into_iter().flatten().collect())
+}

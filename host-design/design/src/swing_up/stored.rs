@@ -1,0 +1,106 @@
+//! The stored motions of a rig: knots from which the motions are computed again, to the last bit.
+
+use std::fmt::Write as _;
+use std::path::{Path as FilePath, PathBuf};
+
+use serde::Deserialize;
+use sha2::{Digest, Sha256};
+
+use super::SwingUpError;
+use super::problem::Knots;
+use crate::rig::Rig;
+
+/// What is stored of both motions.
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Stored {
+    /// Name of the rig.
+    rig: String,
+    /// [`request_hash`] of the rig and its `[swing_up]`.
+    hash: String,
+    pub(super) raise: StoredKnots,
+    pub(super) lower: StoredKnots,
+}
+
+/// Knots of one motion.
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct StoredKnots {
+    /// Ticks from one knot to the next.
+    pub(super) ticks: usize,
+    /// Force, then the states of each knot.
+    knots: Vec<Vec<f64>>,
+}
+
+impl StoredKnots {
+    pub(super) fn new(ticks: usize, knots: &Knots) -> Self {
+        let rows = knots.u.iter().zip(&knots.x);
+        Self {
+            ticks,
+            knots: rows.map(|(&u, x)| [u].into_iter().chain(x.iter().copied()).collect()).collect(),
+        }
+    }
+
+    /// The knots, if they have `states` states.
+    pub(super) fn knots(&self, states: usize) -> Option<Knots> {
+        let fits = self.knots.len() > 1 && self.knots.iter().all(|row| row.len() == states + 1);
+        let finite = self.knots.iter().flatten().all(|value| value.is_finite());
+        (fits && finite && (1..=1000).contains(&self.ticks)).then(|| Knots {
+            x: self.knots.iter().map(|row| row[1..].to_vec()).collect(),
+            u: self.knots.iter().map(|row| row[0]).collect(),
+        })
+    }
+}
+
+/// Hash of everything that a search depends on: the values of the rig file, `[swing_up]` included.
+fn request_hash(rig: &Rig) -> String {
+    // Serialising plain structs of numbers and strings into memory cannot fail.
+    let values = serde_json::to_vec(&(rig, &rig.swing_up)).expect("a rig is representable as JSON");
+    Sha256::digest(values).iter().take(8).map(|byte| format!("{byte:02x}")).collect()
+}
+
+impl Stored {
+    pub(super) fn new(rig: &Rig, raise: StoredKnots, lower: StoredKnots) -> Self {
+        Self { rig: rig.name.clone(), hash: request_hash(rig), raise, lower }
+    }
+
+    /// The file beside a rig file: `rigs/my-rig.swing-up.json` for `rigs/my-rig.toml`.
+    pub fn path_beside(rig_file: &FilePath) -> PathBuf {
+        rig_file.with_extension("swing-up.json")
+    }
+
+    /// Reads the file beside a rig file.
+    ///
+    /// # Errors
+    /// [`SwingUpError::NoFile`] if there is none; [`SwingUpError::BadFile`] if it cannot be used.
+    pub fn beside(rig_file: &FilePath) -> Result<Self, SwingUpError> {
+        let file = Self::path_beside(rig_file);
+        let text = std::fs::read_to_string(&file).map_err(|error| match error.kind() {
+            std::io::ErrorKind::NotFound => SwingUpError::NoFile(file.clone()),
+            _ => SwingUpError::BadFile { file: file.clone(), reason: error.to_string() },
+        })?;
+        serde_json::from_str(&text)
+            .map_err(|error| SwingUpError::BadFile { file: file.clone(), reason: error.to_string() })
+    }
+
+    /// Whether these motions were planned for exactly these values of the rig file.
+    pub fn is_of(&self, rig: &Rig) -> bool {
+        self.hash == request_hash(rig)
+    }
+
+    /// As JSON, one knot per line.
+    pub fn to_json(&self) -> String {
+        let mut text = format!("{{\n\"rig\": {:?},\n\"hash\": {:?}", self.rig, self.hash);
+        for (name, motion) in [("raise", &self.raise), ("lower", &self.lower)] {
+            // Writing into a string cannot fail.
+            let _ = write!(text, ",\n\"{name}\": {{ \"ticks\": {}, \"knots\": [", motion.ticks);
+            for (index, row) in motion.knots.iter().enumerate() {
+                let values: Vec<String> = row.iter().map(f64::to_string).collect();
+                let _ = write!(text, "{}\n[{}]", if index == 0 { "" } else { "," }, values.join(","));
+            }
+            text.push_str("\n] }");
+        }
+        text.push_str("\n}\n");
+        text
+    }
+}

@@ -1,0 +1,154 @@
+//! Feedback and filter along a path.
+
+use super::dynamics::Dynamics;
+use super::hold::{Tick, tick};
+use super::refine::Path;
+use crate::numerics::{Matrix, Singular, solve_right};
+
+/// The ticks of a path with their derivatives.
+pub(super) fn ticks(dynamics: &dyn Dynamics, path: &Path, tick_s: f64) -> Vec<Tick> {
+    path.x.iter().zip(&path.u).map(|(x, &u)| tick(dynamics, x, u, tick_s)).collect()
+}
+
+/// `[Q S; Sᵀ R]` of one tick in state and held force: the integral of the continuous cost over the tick, by Simpson's rule
+/// with the state's exact course to first order in the deviations.
+fn tick_cost(tick: &Tick, weights: &Matrix<f64>, force_weight: f64, tick_s: f64) -> Matrix<f64> {
+    let s = tick.whole.rows();
+    let over = |course: &Matrix<f64>| &(&course.transpose() * weights) * course;
+    let start = Matrix::identity(s).beside(&Matrix::zeros(s, 1));
+    let sum = &(&over(&start) + &over(&tick.middle).scaled(&4.0)) + &over(&tick.whole);
+    let mut cost = sum.scaled(&(tick_s / 6.0));
+    cost[(s, s)] += tick_s * force_weight;
+    cost
+}
+
+/// One step back of the Riccati recursion: the gain K (1×s), and the cost-to-go before the tick.
+fn step_back(tick: &Tick, cost: &Matrix<f64>, ahead: &Matrix<f64>) -> (Matrix<f64>, Matrix<f64>) {
+    let s = tick.whole.rows();
+    let all = cost + &(&tick.whole.transpose() * &(ahead * &tick.whole));
+    let h = all[(s, s)];
+    let k = Matrix::from_fn(1, s, |_, j| 0.5 * (all[(s, j)] + all[(j, s)]) / h);
+    let before = Matrix::from_fn(s, s, |i, j| all[(i, j)] - h * k[(0, i)] * k[(0, j)]).symmetric_part();
+    (k, before)
+}
+
+/// Gains K of each tick that minimise the sampled cost with `at_end` as the cost-to-go of the last state. Weights are
+/// those of `[lqr]`, per second.
+pub(super) fn feedback(
+    ticks: &[Tick],
+    weights: &Matrix<f64>,
+    force_weight: f64,
+    at_end: &Matrix<f64>,
+    tick_s: f64,
+) -> Vec<Matrix<f64>> {
+    let mut ahead = at_end.clone();
+    let mut gains: Vec<Matrix<f64>> = ticks
+        .iter()
+        .rev()
+        .map(|tick| {
+            let (k, before) = step_back(tick, &tick_cost(tick, weights, force_weight, tick_s), &ahead);
+            ahead = before;
+            k
+        })
+        .collect();
+    gains.reverse();
+    gains
+}
+
+/// The stationary cost-to-go and gain about a state of rest: the recursion repeated until the gain stays.
+pub(super) fn stationary(
+    tick: &Tick,
+    weights: &Matrix<f64>,
+    force_weight: f64,
+    tick_s: f64,
+) -> (Matrix<f64>, Matrix<f64>) {
+    const MOST: usize = 200_000;
+    let cost = tick_cost(tick, weights, force_weight, tick_s);
+    let (mut ahead, mut gain) = (weights.clone(), Matrix::zeros(1, tick.whole.rows()));
+    for _ in 0..MOST {
+        let (k, before) = step_back(tick, &cost, &ahead);
+        let change = (&k - &gain).largest_entry();
+        let size = k.largest_entry();
+        (ahead, gain) = (before, k);
+        if change <= 1e-13 * size {
+            break;
+        }
+    }
+    (ahead, gain)
+}
+
+/// How long the error of a friction force stays much the same in a motion (s).
+const FRICTION_TIME_S: f64 = 0.03;
+
+/// Noise that a filter expects.
+pub(super) struct Noise {
+    /// Intensities of force and joint torques (N²·s, (N·m)²·s).
+    pub(super) intensities: Vec<f64>,
+    /// Error of the friction of cart and joints that it stands (N·s/m, N·m·s/rad).
+    pub(super) friction_errors: Vec<f64>,
+    /// State that each sensor measures, and the variance of its rounding.
+    pub(super) sensors: Vec<(usize, f64)>,
+}
+
+impl Noise {
+    /// Intensities at the rates of `x`: wrong friction acts like noise that stays for a while.
+    fn at(&self, x: &[f64]) -> Vec<f64> {
+        let friction = x.iter().skip(1).step_by(2).zip(&self.friction_errors);
+        let friction = friction.map(|(rate, error)| rate * rate * error * error * FRICTION_TIME_S);
+        self.intensities.iter().zip(friction).map(|(noise, friction)| noise + friction).collect()
+    }
+}
+
+/// The covariance of a prediction, from tick to tick.
+pub(super) struct Filter<'a> {
+    dynamics: &'a dyn Dynamics,
+    noise: &'a Noise,
+    tick_s: f64,
+    /// Of the prediction, s×s.
+    pub(super) covariance: Matrix<f64>,
+}
+
+impl<'a> Filter<'a> {
+    /// A filter that knows each measured state to its encoder step and no rate.
+    pub(super) fn new(dynamics: &'a dyn Dynamics, noise: &'a Noise, states: usize, tick_s: f64) -> Self {
+        let mut covariance = Matrix::identity(states).scaled(&1e-2);
+        for &(state, variance) in &noise.sensors {
+            covariance[(state, state)] = variance;
+        }
+        Self { dynamics, noise, tick_s, covariance }
+    }
+
+    /// The gain L (filter form, s×p) of this tick; then the prediction over the tick from `x`.
+    ///
+    /// # Errors
+    /// [`Singular`] if the innovation has no covariance.
+    pub(super) fn gain(&mut self, x: &[f64], tick: &Tick) -> Result<Matrix<f64>, Singular> {
+        let (p, sensors) = (&self.covariance, &self.noise.sensors);
+        let (s, count) = (p.rows(), sensors.len());
+        let to_sensors = Matrix::from_fn(s, count, |i, j| p[(i, sensors[j].0)]);
+        let innovation = Matrix::from_fn(count, count, |i, j| {
+            p[(sensors[i].0, sensors[j].0)] + if i == j { sensors[i].1 } else { 0.0 }
+        });
+        let l = solve_right(&to_sensors, &innovation)?;
+        let corrected = (p - &(&l * &to_sensors.transpose())).symmetric_part();
+        let (a, b) = (tick.a(), self.dynamics.inputs(x));
+        let spread = &(&b * &Matrix::from_diagonal(&self.noise.at(x))) * &b.transpose();
+        // Trapezoidal rule: noise from the start of the tick goes through it, noise from its end does not.
+        let spread = spread.scaled(&(0.5 * self.tick_s));
+        let through = &(&a * &(&corrected + &spread)) * &a.transpose();
+        self.covariance = (&through + &spread).symmetric_part();
+        Ok(l)
+    }
+
+    /// Repeats the tick at a state of rest until the filter has settled.
+    ///
+    /// # Errors
+    /// As for [`gain`](Self::gain).
+    pub(super) fn settle(&mut self, x: &[f64], tick: &Tick, ticks: usize) -> Result<Matrix<f64>, Singular> {
+        let mut l = self.gain(x, tick)?;
+        for _ in 1..ticks {
+            l = self.gain(x, tick)?;
+        }
+        Ok(l)
+    }
+}

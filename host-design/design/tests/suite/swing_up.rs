@@ -1,0 +1,113 @@
+//! Swing-up: the stored motions of the rigs, in closed loop; and what must not pass.
+
+use std::path::{Path, PathBuf};
+
+use upright_design::numerics::Matrix;
+use upright_design::rig::{PlantDescription, Rig};
+use upright_design::swing_up::{Stored, SwingUp, SwingUpError, demonstrate, motions};
+
+const RIGS: [&str; 4] =
+    ["single-quanser-ip02", "double-quanser-dbpen", "triple-glueck-eder-kugi", "quadruple-paper"];
+
+fn file(rig: &str) -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("../../rigs/{rig}.toml"))
+}
+
+fn rig_and_stored(rig: &str) -> (Rig, Stored) {
+    (Rig::from_path(&file(rig)).unwrap(), Stored::beside(&file(rig)).unwrap())
+}
+
+fn arrives(rig: &Rig, motions: &SwingUp, seed: u64, is_wrong: bool) -> bool {
+    demonstrate(rig, motions, seed, is_wrong).unwrap().arrived
+}
+
+/// `motions` holds each tick against the adaptive integrator, and each limit.
+#[test]
+fn every_stored_motion_obeys_the_equations_and_the_limits_and_arrives() {
+    for name in RIGS {
+        let (rig, stored) = rig_and_stored(name);
+        let motions = motions(&rig, &stored).unwrap_or_else(|error| panic!("{name}: {error}"));
+        for seed in 1..=2 {
+            assert!(arrives(&rig, &motions, seed, false), "{name}, seed {seed}");
+        }
+        assert!(arrives(&rig, &motions, 3, true), "{name} with wrong masses and friction");
+    }
+}
+
+#[test]
+fn stored_motions_give_the_same_bits_each_time_and_survive_their_file() {
+    let (rig, stored) = rig_and_stored("single-quanser-ip02");
+    assert_eq!(motions(&rig, &stored).unwrap(), motions(&rig, &stored).unwrap());
+    assert_eq!(stored.to_json(), std::fs::read_to_string(Stored::path_beside(&file("single-quanser-ip02"))).unwrap());
+}
+
+/// The end of the raising joins the gain that balances, so that the hand-over changes no law.
+#[test]
+fn the_last_gain_is_the_gain_that_balances() {
+    for name in RIGS {
+        let (rig, stored) = rig_and_stored(name);
+        let raise = motions(&rig, &stored).unwrap().raise;
+        let balancing = upright_design::design::design(&rig).unwrap().double.sampled.lqr.unwrap().k;
+        let last = &raise.k[raise.steps() - 1];
+        let apart = (last - &balancing).largest_entry() / balancing.largest_entry();
+        assert!(apart < 0.02, "{name}: {apart}");
+        // Not so in the middle: the gain really changes along the motion.
+        let middle = &raise.k[raise.steps() / 2];
+        assert!((middle - &balancing).largest_entry() / balancing.largest_entry() > 0.1, "{name}");
+    }
+}
+
+#[test]
+fn a_motion_of_another_rig_is_refused() {
+    let (rig, _) = rig_and_stored("single-quanser-ip02");
+    let (_, other) = rig_and_stored("double-quanser-dbpen");
+    assert_eq!(motions(&rig, &other), Err(SwingUpError::Outdated));
+    let (mut heavier, stored) = rig_and_stored("single-quanser-ip02");
+    if let PlantDescription::Chain(chain) = &mut heavier.plant {
+        chain.links[0].mass_kg *= 1.001;
+    }
+    assert_eq!(motions(&heavier, &stored), Err(SwingUpError::Outdated));
+}
+
+#[test]
+fn a_reversed_gain_or_filter_falls() {
+    let (rig, stored) = rig_and_stored("single-quanser-ip02");
+    let good = motions(&rig, &stored).unwrap();
+    let reversed = |all: &[Matrix<f64>]| all.iter().map(|m| -m).collect::<Vec<_>>();
+    let mut bad = good.clone();
+    bad.raise.k = reversed(&good.raise.k);
+    assert!(!arrives(&rig, &bad, 1, false));
+    let mut bad = good.clone();
+    bad.raise.l = reversed(&good.raise.l);
+    assert!(!arrives(&rig, &bad, 1, false));
+}
+
+#[test]
+fn a_wrong_knot_spacing_is_refused_and_a_wrong_tick_falls() {
+    let (rig, stored) = rig_and_stored("single-quanser-ip02");
+    let wrong = stored.to_json().replacen("\"ticks\": 5", "\"ticks\": 4", 1);
+    assert_ne!(wrong, stored.to_json());
+    let wrong: Stored = serde_json::from_str(&wrong).unwrap();
+    assert!(motions(&rig, &wrong).is_err());
+    // Every second entry left out: the motion at twice its speed.
+    let good = motions(&rig, &stored).unwrap();
+    let mut fast = good.clone();
+    let raise = &mut fast.raise;
+    raise.x = good.raise.x.iter().step_by(2).cloned().collect();
+    let steps = raise.x.len() - 1;
+    raise.u = good.raise.u.iter().step_by(2).take(steps).copied().collect();
+    raise.k = good.raise.k.iter().step_by(2).take(steps).cloned().collect();
+    raise.l = good.raise.l.iter().step_by(2).take(steps).cloned().collect();
+    assert!(!arrives(&rig, &fast, 1, false));
+}
+
+#[test]
+fn a_damaged_file_is_named_with_what_to_do() {
+    let folder = tempfile::tempdir().unwrap();
+    let rig = folder.path().join("my.toml");
+    let error = Stored::beside(&rig).unwrap_err().to_string();
+    assert!(error.contains("my.swing-up.json") && error.contains("upright swing-up"), "{error}");
+    std::fs::write(Stored::path_beside(&rig), "{}").unwrap();
+    let error = Stored::beside(&rig).unwrap_err().to_string();
+    assert!(error.contains("my.swing-up.json") && error.contains("missing field"), "{error}");
+}

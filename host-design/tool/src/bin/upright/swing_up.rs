@@ -1,0 +1,132 @@
+//! `upright swing-up`
+
+use std::fmt::Write as _;
+use std::io::Write as _;
+use std::path::PathBuf;
+
+use clap::Args;
+use serde_json::json;
+use upright_design::rig::Rig;
+use upright_design::swing_up::{Judgement, Plan, Stored, SwingUpError, demonstrate, judge, search};
+use upright_design::table::write_atomically;
+use upright_tool::figure::run_svg;
+
+use crate::failure::Failure;
+use crate::progress::with_search;
+
+/// Plans the motions with which the rig raises itself from hanging to upright, and lowers itself again.
+///
+/// They are written beside the rig file, as RIG.swing-up.json. Nothing is written when the motions do not stand the random
+/// runs that [swing_up] asks for. Exit status 3 if there is no motion, with the limit that binds and what would help.
+#[derive(Args)]
+#[command(before_help = "\
+Examples:
+  upright swing-up rigs/quadruple-paper.toml                  search, judge, write rigs/quadruple-paper.swing-up.json
+  upright swing-up rigs/quadruple-paper.toml --stored         judge the stored motions again, in seconds
+  upright swing-up rigs/quadruple-paper.toml --check          search again; exit status 1 if the file differs
+  upright swing-up rigs/single-quanser-ip02.toml --no-write --json
+  upright swing-up rigs/quadruple-paper.toml --stored --svg run.svg --csv run.csv")]
+pub(crate) struct SwingUp {
+    /// Rig file
+    #[arg(value_name = "RIG")]
+    rig: PathBuf,
+    /// Judge the stored motions instead of searching; the rig file may have changed since
+    #[arg(long)]
+    stored: bool,
+    /// Write nothing; exit status 1 if the file beside the rig differs
+    #[arg(long)]
+    check: bool,
+    /// Write no file beside the rig
+    #[arg(long, conflicts_with = "check")]
+    no_write: bool,
+    /// Write a run of everything (up, balance, step, down) as CSV
+    #[arg(long, value_name = "FILE")]
+    csv: Option<PathBuf>,
+    /// Draw that run into an SVG file
+    #[arg(long, value_name = "FILE")]
+    svg: Option<PathBuf>,
+    /// Seed of that run
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
+    /// Print the result as one JSON object
+    #[arg(long)]
+    json: bool,
+}
+
+impl SwingUp {
+    pub(crate) fn run(self) -> Result<(), Failure> {
+        let rig = Rig::from_path(&self.rig)?;
+        let failed = |source: SwingUpError| Failure::SwingUp { rig: rig.name.clone(), source };
+        let old = Stored::beside(&self.rig);
+        let plan = if self.stored {
+            let old = old.clone().map_err(failed)?;
+            with_search(|progress| judge(&rig, &old, progress)).map_err(failed)?
+        } else {
+            with_search(|progress| search(&rig, progress)).map_err(failed)?
+        };
+        let demonstration = demonstrate(&rig, &plan.motions, self.seed, false).map_err(failed)?;
+        if let Some(path) = &self.csv {
+            let mut bytes = Vec::new();
+            demonstration.trace.write_csv(&mut bytes)?;
+            write_atomically(path, &bytes)?;
+        }
+        if let Some(path) = &self.svg {
+            let title = format!("{}: up, balance, step, down", rig.name);
+            write_atomically(path, run_svg(&rig, &demonstration.trace, &title)?.as_bytes())?;
+        }
+        let file = Stored::path_beside(&self.rig);
+        let differs = old.map_or(true, |old| old.to_json() != plan.stored.to_json());
+        if !self.check && !self.no_write && differs {
+            write_atomically(&file, plan.stored.to_json().as_bytes())?;
+        }
+        let mut out = std::io::stdout().lock();
+        if self.json {
+            let object = json!({ "rig": rig.name, "raise": plan.raise, "lower": plan.lower });
+            writeln!(out, "{object}")?;
+        } else {
+            write!(out, "{}", text(&rig, &plan))?;
+        }
+        if self.check && differs {
+            return Err(Failure::CheckFailed(format!("{} differs from these motions", file.display())));
+        }
+        Ok(())
+    }
+}
+
+fn text(rig: &Rig, plan: &Plan) -> String {
+    let mut text = format!("{}\n", rig.name);
+    for Judgement { way, search, score, peaks, runs } in [&plan.raise, &plan.lower] {
+        let percent = runs.interval.map(|end| 100.0 * end);
+        // Writing into a string cannot fail.
+        let _ = writeln!(text, "\n{way}");
+        if let Some([tried, solved]) = search {
+            let _ = writeln!(text, "  trajectories solved       {solved:>10} of {tried}");
+        }
+        let _ = write!(
+            text,
+            "  duration                  {:>10.3} s\n  \
+               largest force             {:>10.2} N\n  \
+               farthest from the middle  {:>10.3} m\n  \
+               largest speed of the cart {:>10.2} m/s\n  \
+               largest rate of a joint   {:>10.1} rad/s\n  \
+               of the nearest limit      {:>10.0} %\n  \
+               error of a tick           {:>10.1e} (adaptive integrator)\n  \
+               fragility                 {score:>10.2}\n  \
+               random runs that arrive   {:>10} of {} (95 % interval {:.1} to {:.1} %)\n  \
+               largest deviation         {:>10.3} rad\n",
+            peaks.duration_s,
+            peaks.force_n,
+            peaks.position_m,
+            peaks.speed_m_per_s,
+            peaks.rate_rad_per_s,
+            100.0 * peaks.used,
+            peaks.drift,
+            runs.stood,
+            runs.runs,
+            percent[0],
+            percent[1],
+            runs.deviation_rad,
+        );
+    }
+    text
+}
