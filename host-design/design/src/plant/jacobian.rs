@@ -3,7 +3,9 @@
 // The indices are those of the equations, and all are below N.
 #![allow(clippy::needless_range_loop)]
 
-use super::{ChainParameters, ChainState, sin_cos};
+use upright::table::Scalar;
+
+use super::{ChainPlant, ChainState};
 
 /// Partial derivatives of one acceleration, `ẍ` or `φ̈_j`. None depends on x.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -46,49 +48,26 @@ impl<const N: usize> Partials<N> {
     }
 }
 
-/// The equations of [`ChainParameters`] as their partial derivatives need them.
-#[derive(Debug, Clone, PartialEq)]
-pub struct ChainDerivatives<const N: usize> {
-    total_mass: f64,
-    a: [f64; N],
-    weight: [f64; N],
-    b: [[f64; N]; N],
-    cart_friction: f64,
-    joint_frictions: [f64; N],
-}
-
-impl<const N: usize> ChainDerivatives<N> {
-    /// Takes the constants of N links.
-    pub fn new(parameters: &ChainParameters<f64>) -> Self {
-        let of = |entries: &[f64]| core::array::from_fn(|j| entries[j]);
-        Self {
-            total_mass: parameters.total_mass,
-            a: of(&parameters.a),
-            weight: core::array::from_fn(|j| parameters.gravity * parameters.a[j]),
-            b: core::array::from_fn(|j| core::array::from_fn(|k| parameters.b[(j, k)])),
-            cart_friction: parameters.cart_friction,
-            joint_frictions: of(&parameters.joint_frictions),
-        }
-    }
-
+impl<const N: usize> ChainPlant<N> {
     /// Partial derivatives of `ẍ` and of each `φ̈_j` at `state`, where the plant's rate of change is `rate`.
     ///
     /// With the equations written `M(φ) q̈ = h`, they are
     /// `M⁻¹ (∂h - ∂M q̈)`.
     pub fn partials(&self, state: &ChainState<N>, rate: &ChainState<N>) -> (Partials<N>, [Partials<N>; N]) {
-        let (sin, cos) = sin_cos(&state.phi);
+        let model = self.model();
+        let (sin, cos) = f64::sines_and_cosines(&state.phi);
         let (w, wdot) = (&state.phidot, &rate.phidot);
         // Right-hand sides ∂h - ∂M q̈, of the cart's equation and of the links'.
-        let mut cart = Partials { xdot: -self.cart_friction, force: 1.0, ..Partials::ZERO };
+        let mut cart = Partials { xdot: -model.cart_friction, force: 1.0, ..Partials::ZERO };
         let mut links = [Partials::<N>::ZERO; N];
         let mut mass = [[0.0; N]; N];
         for j in 0..N {
-            let (a, w2) = (self.a[j], w[j] * w[j]);
+            let (a, w2) = (model.a[j], w[j] * w[j]);
             cart.phi[j] = -a * (sin[j] * wdot[j] + cos[j] * w2);
             cart.phidot[j] = -2.0 * a * sin[j] * w[j];
-            links[j].phi[j] += self.weight[j] * cos[j] - a * sin[j] * rate.xdot;
+            links[j].phi[j] += model.weight[j] * cos[j] - a * sin[j] * rate.xdot;
             for k in 0..N {
-                let (b, w2) = (self.b[j][k], w[k] * w[k]);
+                let (b, w2) = (model.b[(j, k)], w[k] * w[k]);
                 let along = b * (cos[j] * cos[k] + sin[j] * sin[k]);
                 let across = b * (sin[j] * cos[k] - cos[j] * sin[k]);
                 mass[j][k] = along;
@@ -97,7 +76,7 @@ impl<const N: usize> ChainDerivatives<N> {
                 links[j].phidot[k] -= 2.0 * across * w[k];
             }
             // The torque at a joint acts on its link and, with opposite sign, on the link below.
-            let friction = self.joint_frictions[j];
+            let friction = model.joint_frictions[j];
             links[j].torques[j] += 1.0;
             links[j].phidot[j] -= friction;
             if j > 0 {
@@ -110,17 +89,17 @@ impl<const N: usize> ChainDerivatives<N> {
         // The cart's equation eliminated: S φ̈ = r, as in `derivative`.
         let mut s = mass;
         for j in 0..N {
-            let share = self.a[j] * cos[j] / self.total_mass;
+            let share = model.a[j] * cos[j] * model.inverse_mass;
             links[j].add(share, &cart);
             for k in 0..N {
-                s[j][k] -= share * self.a[k] * cos[k];
+                s[j][k] -= share * model.a[k] * cos[k];
             }
         }
         solve(s, &mut links);
         for k in 0..N {
-            cart.add(self.a[k] * cos[k], &links[k]);
+            cart.add(model.a[k] * cos[k], &links[k]);
         }
-        cart.scale(1.0 / self.total_mass);
+        cart.scale(model.inverse_mass);
         (cart, links)
     }
 }
@@ -149,7 +128,7 @@ fn solve<const N: usize>(mut s: [[f64; N]; N], rows: &mut [Partials<N>; N]) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::plant::ChainPlant;
+    use crate::plant::ChainParameters;
     use crate::rig::{PlantDescription, Rig};
     use std::path::Path;
 
@@ -157,12 +136,11 @@ mod tests {
     fn partial_derivatives_agree_with_differences() {
         let rig = Rig::from_path(Path::new("../../rigs/triple-glueck-eder-kugi.toml")).unwrap();
         let PlantDescription::Chain(chain) = &rig.plant else { panic!("a chain") };
-        let parameters = ChainParameters::of(chain);
-        let plant = ChainPlant::<3>::new(&parameters).unwrap();
+        let plant = ChainPlant::<3>::new(&ChainParameters::of(chain)).unwrap();
         let state = ChainState { x: 0.1, xdot: -0.7, phi: [2.0, -1.1, 0.4], phidot: [3.0, -5.0, 1.5] };
         let (force, torques) = (17.0, [0.3, -0.2, 0.1]);
         let rate = plant.derivative(&state, force, &torques);
-        let (cart, links) = ChainDerivatives::<3>::new(&parameters).partials(&state, &rate);
+        let (cart, links) = plant.partials(&state, &rate);
         let agrees = |by: &str, of: &dyn Fn(&Partials<3>) -> f64, at: &dyn Fn(f64) -> ChainState<3>| {
             let step = 1e-5;
             let (above, below) = (at(step), at(-step));

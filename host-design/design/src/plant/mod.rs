@@ -31,7 +31,7 @@ mod simulation;
 
 pub use angles::absolute_angles;
 pub use chain::{ChainPlant, ChainState, Energy};
-pub use jacobian::{ChainDerivatives, Partials};
+pub use jacobian::Partials;
 pub use linear::{Equilibrium, LinearModel, linearise};
 pub use linear_simulation::LinearSimulation;
 pub use motor::MotorPlant;

@@ -10,7 +10,7 @@ use crate::plant::chain_plant;
 use crate::plant::reference::{Tolerance, integrate};
 
 /// Largest difference that the adaptive integrator may find in a tick, in the units of the states.
-const DRIFT: f64 = 1e-7;
+const DRIFT: f64 = 5e-8;
 /// Tolerance of the adaptive integrator.
 const TOLERANCE: Tolerance = Tolerance { relative: 1e-11, absolute: 1e-11 };
 

@@ -169,7 +169,7 @@ pub(super) fn run(
 }
 
 /// Largest difference of a link's angle from the vertical to that of the reference (rad).
-fn deviation(state: &[f64], reference: &[f64]) -> f64 {
+pub(super) fn deviation(state: &[f64], reference: &[f64]) -> f64 {
     absolute_angles(state).zip(absolute_angles(reference)).fold(0.0, |largest, (a, b)| {
         let difference = (a - b).abs();
         if difference.is_nan() { f64::INFINITY } else { f64::max(largest, difference) }

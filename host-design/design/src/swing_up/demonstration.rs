@@ -1,7 +1,7 @@
 //! One run of everything: up, balance, a step of the set-point, back, and down.
 
 use super::SwingUpError;
-use super::closed_loop::{ClosedLoop, Law, law_at};
+use super::closed_loop::{ClosedLoop, LOST_RAD, Law, deviation, law_at};
 use super::motion::{Motion, SwingUp};
 use super::robustness::{Spread, sample};
 use super::setting::Setting;
@@ -24,7 +24,7 @@ pub struct Demonstration {
     pub trace: Trace,
     /// Start of each part (s).
     pub parts: Vec<(f64, &'static str)>,
-    /// Whether it arrived in the end, hanging at rest.
+    /// Whether it stood all of it and hung at rest in the end. If not, the record ends where it was lost.
     pub arrived: bool,
 }
 
@@ -57,20 +57,15 @@ pub fn demonstrate(
     };
     let travel = setting.chain.cart.travel_m;
     let far = MOVE_M.min(RAIL_SHARE * travel[1].min(-travel[0]));
-    show.motion("raise", &motions.raise, Way::Up);
-    show.balance("balance", &[0.0, 0.0], ticks(PAUSE_S));
-    show.balance("step", &[0.0, far], ticks(MOVE_S));
-    show.balance("balance", &[far, far], ticks(PAUSE_S));
-    show.balance("back", &[far, 0.0], ticks(MOVE_S));
-    show.balance("balance", &[0.0, 0.0], ticks(PAUSE_S));
-    show.motion("lower", &motions.lower, Way::Down);
-    show.part("hang");
-    for k in 0..ticks(PAUSE_S) {
-        show.tick(&law_at(&setting, &motions.lower, Way::Down, motions.lower.steps() + k));
-    }
-    let end = Way::Down.ends(rig.states())[1].clone();
-    let arrived = show.at.state.iter().zip(&end).skip(2).step_by(2).all(|(x, end)| (x - end).abs() < 0.2);
-    Ok(Demonstration { trace: show.trace, parts: show.parts, arrived })
+    let stood = show.motion("raise", &motions.raise, Way::Up)
+        && show.balance("balance", [0.0, 0.0], ticks(PAUSE_S))
+        && show.balance("step", [0.0, far], ticks(MOVE_S))
+        && show.balance("balance", [far, far], ticks(PAUSE_S))
+        && show.balance("back", [far, 0.0], ticks(MOVE_S))
+        && show.balance("balance", [0.0, 0.0], ticks(PAUSE_S))
+        && show.motion("lower", &motions.lower, Way::Down)
+        && show.hang(&motions.lower, ticks(PAUSE_S));
+    Ok(Demonstration { trace: show.trace, parts: show.parts, arrived: stood })
 }
 
 struct Show<'a> {
@@ -86,7 +81,8 @@ impl Show<'_> {
         self.parts.push((self.ticks as f64 * self.setting.tick_s, name));
     }
 
-    fn tick(&mut self, law: &Law<'_>) {
+    /// Whether the rig still follows the law's reference and is on the rail.
+    fn tick(&mut self, law: &Law<'_>) -> bool {
         let t = self.ticks as f64 * self.setting.tick_s;
         let trace = &mut self.trace;
         self.at.tick(law, &mut |at, force| {
@@ -101,26 +97,36 @@ impl Show<'_> {
             });
         });
         self.ticks += 1;
+        deviation(&self.at.state, law.x) <= LOST_RAD + self.in_a_tick(law.x) && !self.at.is_at_the_end()
     }
 
-    fn motion(&mut self, name: &'static str, motion: &Motion, way: Way) {
+    /// How far the links turn in a tick at most (rad): the state is that after the tick.
+    fn in_a_tick(&self, x: &[f64]) -> f64 {
+        x.iter().skip(3).step_by(2).map(|rate| rate.abs()).sum::<f64>() * self.setting.tick_s
+    }
+
+    fn motion(&mut self, name: &'static str, motion: &Motion, way: Way) -> bool {
         self.part(name);
-        for k in 0..motion.steps() {
-            self.tick(&law_at(self.setting, motion, way, k));
-        }
+        (0..motion.steps()).all(|k| self.tick(&law_at(self.setting, motion, way, k)))
+    }
+
+    /// Hangs with the motor off.
+    fn hang(&mut self, motion: &Motion, ticks: usize) -> bool {
+        self.part("hang");
+        (0..ticks).all(|k| self.tick(&law_at(self.setting, motion, Way::Down, motion.steps() + k)))
     }
 
     /// Balances while the set-point goes smoothly from the first to the second position (m).
-    fn balance(&mut self, name: &'static str, [from, to]: &[f64; 2], ticks: usize) {
+    fn balance(&mut self, name: &'static str, [from, to]: [f64; 2], ticks: usize) -> bool {
         self.part(name);
         let mut x = vec![0.0; self.setting.rig.states()];
-        for k in 0..ticks {
+        (0..ticks).all(|k| {
             // 10 s³ - 15 s⁴ + 6 s⁵: begins and ends at rest and without acceleration.
             let s = (k + 1) as f64 / ticks as f64;
             x[0] = from + (to - from) * s * s * s * (10.0 - 15.0 * s + 6.0 * s * s);
             x[1] = (to - from) * 30.0 * s * s * (1.0 - s) * (1.0 - s) / (ticks as f64 * self.setting.tick_s);
             let (k, l) = (Some(&self.setting.upright_k), &self.setting.upright_l);
-            self.tick(&Law { x: &x, u: 0.0, k, l });
-        }
+            self.tick(&Law { x: &x, u: 0.0, k, l })
+        })
     }
 }

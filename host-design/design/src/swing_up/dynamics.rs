@@ -2,7 +2,7 @@
 
 use super::SwingUpError;
 use crate::numerics::Matrix;
-use crate::plant::{ChainDerivatives, ChainParameters, ChainPlant, ChainState, Partials};
+use crate::plant::{ChainPlant, ChainState, Partials};
 use crate::rig;
 
 /// The state at the end of a step, and its derivatives.
@@ -24,6 +24,9 @@ pub(super) trait Dynamics: Send + Sync {
     /// As [`step`](Self::step), with derivatives.
     fn step_with_derivatives(&self, state: &[f64], force: [f64; 2], dt: f64) -> Step;
 
+    /// Steps in which half a tick is integrated: the links of long chains are short and fast.
+    fn steps_in_half_a_tick(&self) -> usize;
+
     /// Columns through which a force on the cart and torques at the joints change the state: s×(n + 1).
     fn inputs(&self, state: &[f64]) -> Matrix<f64>;
 }
@@ -34,9 +37,7 @@ pub(super) trait Dynamics: Send + Sync {
 /// [`SwingUpError::Links`] for more links than are compiled.
 pub(super) fn dynamics(chain: &rig::Chain) -> Result<Box<dyn Dynamics>, SwingUpError> {
     fn boxed<const N: usize>(chain: &rig::Chain) -> Result<Box<dyn Dynamics>, SwingUpError> {
-        let parameters = ChainParameters::of(chain);
-        let derivatives = ChainDerivatives::new(&parameters);
-        Ok(Box::new(Equations::<N> { plant: ChainPlant::new(&parameters)?, derivatives }))
+        Ok(Box::new(ChainPlant::<N>::of(chain)?))
     }
     match chain.links.len() {
         1 => boxed::<1>(chain),
@@ -49,16 +50,11 @@ pub(super) fn dynamics(chain: &rig::Chain) -> Result<Box<dyn Dynamics>, SwingUpE
     }
 }
 
-struct Equations<const N: usize> {
-    plant: ChainPlant<N>,
-    derivatives: ChainDerivatives<N>,
-}
-
 /// Rate of change in the rig's states, and its derivatives by the state and the force, (2n + 2)×(2n + 3).
-fn linearised<const N: usize>(of: &Equations<N>, state: &[f64], force: f64) -> (Vec<f64>, Matrix<f64>) {
+fn linearised<const N: usize>(plant: &ChainPlant<N>, state: &[f64], force: f64) -> (Vec<f64>, Matrix<f64>) {
     let absolute = ChainState::from_relative(state);
-    let rate = of.plant.derivative(&absolute, force, &[0.0; N]);
-    let (cart, links) = of.derivatives.partials(&absolute, &rate);
+    let rate = plant.derivative(&absolute, force, &[0.0; N]);
+    let (cart, links) = plant.partials(&absolute, &rate);
     let mut relative = vec![0.0; 2 * N + 2];
     rate.write_relative(&mut relative);
     let s = 2 * N + 2;
@@ -90,14 +86,14 @@ fn plus(state: &[f64], factor: f64, rate: &[f64]) -> Vec<f64> {
     state.iter().zip(rate).map(|(x, rate)| x + factor * rate).collect()
 }
 
-impl<const N: usize> Dynamics for Equations<N> {
+impl<const N: usize> Dynamics for ChainPlant<N> {
     fn step(&self, state: &[f64], force: [f64; 2], dt: f64) -> Vec<f64> {
         let (at, none) = (ChainState::from_relative(state), [0.0; N]);
         let middle = 0.5 * (force[0] + force[1]);
-        let k1 = self.plant.derivative(&at, force[0], &none);
-        let k2 = self.plant.derivative(&at.plus(0.5 * dt, &k1), middle, &none);
-        let k3 = self.plant.derivative(&at.plus(0.5 * dt, &k2), middle, &none);
-        let k4 = self.plant.derivative(&at.plus(dt, &k3), force[1], &none);
+        let k1 = self.derivative(&at, force[0], &none);
+        let k2 = self.derivative(&at.plus(0.5 * dt, &k1), middle, &none);
+        let k3 = self.derivative(&at.plus(0.5 * dt, &k2), middle, &none);
+        let k4 = self.derivative(&at.plus(dt, &k3), force[1], &none);
         let sum = k1.plus(2.0, &k2).plus(2.0, &k3).plus(1.0, &k4);
         let mut end = vec![0.0; 2 * N + 2];
         at.plus(dt / 6.0, &sum).write_relative(&mut end);
@@ -153,10 +149,14 @@ impl<const N: usize> Dynamics for Equations<N> {
         }
     }
 
+    fn steps_in_half_a_tick(&self) -> usize {
+        if N >= 4 { 2 } else { 1 }
+    }
+
     fn inputs(&self, state: &[f64]) -> Matrix<f64> {
         let absolute = ChainState::from_relative(state);
-        let rate = self.plant.derivative(&absolute, 0.0, &[0.0; N]);
-        let (cart, links) = self.derivatives.partials(&absolute, &rate);
+        let rate = self.derivative(&absolute, 0.0, &[0.0; N]);
+        let (cart, links) = self.partials(&absolute, &rate);
         let entry = |row: usize, input: usize| {
             let of = if row == 0 { &cart } else { &links[row - 1] };
             if input == 0 { of.force } else { of.torques[input - 1] }

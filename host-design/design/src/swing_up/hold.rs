@@ -1,4 +1,4 @@
-//! One tick of the plant under a held force, integrated in two steps.
+//! One tick of the plant under a held force, integrated in two or more steps.
 
 use super::dynamics::Dynamics;
 use crate::numerics::Matrix;
@@ -27,18 +27,32 @@ impl Tick {
 
 /// The state after a tick of `tick_s`.
 pub(super) fn after_tick(dynamics: &dyn Dynamics, state: &[f64], force: f64, tick_s: f64) -> Vec<f64> {
-    let middle = dynamics.step(state, [force; 2], 0.5 * tick_s);
-    dynamics.step(&middle, [force; 2], 0.5 * tick_s)
+    let steps = 2 * dynamics.steps_in_half_a_tick();
+    let dt = tick_s / steps as f64;
+    (0..steps).fold(state.to_vec(), |state, _| dynamics.step(&state, [force; 2], dt))
 }
 
 /// The same with derivatives.
 pub(super) fn tick(dynamics: &dyn Dynamics, state: &[f64], force: f64, tick_s: f64) -> Tick {
-    let s = state.len();
-    let first = dynamics.step_with_derivatives(state, [force; 2], 0.5 * tick_s);
-    let second = dynamics.step_with_derivatives(&first.end, [force; 2], 0.5 * tick_s);
-    let held = |b: &Matrix<f64>| Matrix::from_fn(s, 1, |i, _| b[(i, 0)] + b[(i, 1)]);
-    let middle = first.a.beside(&held(&first.b));
-    let later = &second.a * &middle;
-    let whole = &later + &Matrix::zeros(s, s).beside(&held(&second.b));
-    Tick { end: second.end, middle, whole }
+    let start = Matrix::identity(state.len()).beside(&Matrix::zeros(state.len(), 1));
+    let (half, middle) = half_tick(dynamics, state, force, tick_s, start);
+    let (end, whole) = half_tick(dynamics, &half, force, tick_s, middle.clone());
+    Tick { end, middle, whole }
+}
+
+/// The state after half a tick from `state`, and its derivatives if those of `state` are `by`.
+fn half_tick(
+    dynamics: &dyn Dynamics,
+    state: &[f64],
+    force: f64,
+    tick_s: f64,
+    by: Matrix<f64>,
+) -> (Vec<f64>, Matrix<f64>) {
+    let (steps, s) = (dynamics.steps_in_half_a_tick(), state.len());
+    let dt = 0.5 * tick_s / steps as f64;
+    (0..steps).fold((state.to_vec(), by), |(state, by), _| {
+        let step = dynamics.step_with_derivatives(&state, [force; 2], dt);
+        let held = Matrix::from_fn(s, 1, |i, _| step.b[(i, 0)] + step.b[(i, 1)]);
+        (step.end, &(&step.a * &by) + &Matrix::zeros(s, s).beside(&held))
+    })
 }

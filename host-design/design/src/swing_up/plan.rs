@@ -132,9 +132,8 @@ pub fn motions(rig: &Rig, stored: &Stored) -> Result<SwingUp, SwingUpError> {
 
 fn restored(setting: &Setting<'_>, way: Way, stored: &StoredKnots) -> Result<Motion, SwingUpError> {
     let states = setting.rig.states();
-    let [_, end] = way.ends(states);
     let knots = stored.knots(states).ok_or(SwingUpError::Outdated)?;
-    let path = refine(&*setting.dynamics, &knots, stored.ticks, setting.tick_s, &end);
+    let path = refine(&*setting.dynamics, &knots, stored.ticks, setting.tick_s, &way.ends(states));
     motion(setting, path.ok_or(SwingUpError::Outdated)?, way)
 }
 

@@ -28,7 +28,7 @@ pub(super) fn refine(
     knots: &Knots,
     ticks: usize,
     tick_s: f64,
-    end: &[f64],
+    [start, end]: &[Vec<f64>; 2],
 ) -> Option<Path> {
     let mut path = Path { x: Vec::new(), u: Vec::new() };
     for (x, ends) in knots.x.iter().zip(knots.u.windows(2)) {
@@ -40,7 +40,8 @@ pub(super) fn refine(
             state = after_tick(dynamics, &state, force, tick_s);
         }
     }
-    path.x.push(end.to_vec());
+    path.x.push(end.clone());
+    path.x[0].clone_from(start);
     let path = close(dynamics, path, tick_s)?;
     let at_knots = path.x.iter().step_by(ticks);
     is_near(knots, at_knots.map(Vec::as_slice)).then_some(path)

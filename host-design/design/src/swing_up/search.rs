@@ -115,7 +115,8 @@ fn solve(setting: &Setting<'_>, request: &Request, way: Way, number: u64) -> Opt
     let draw = draw(setting, request, number);
     let ticks = ticks_per_knot(setting);
     let knot_s = ticks as f64 * setting.tick_s;
-    let [start, end] = way.ends(setting.rig.states());
+    let ends = way.ends(setting.rig.states());
+    let [start, end] = ends.clone();
     let problem = Problem {
         dynamics: &*setting.dynamics,
         knot_s,
@@ -128,7 +129,7 @@ fn solve(setting: &Setting<'_>, request: &Request, way: Way, number: u64) -> Opt
         rate_weight: (RATE_TIME_S / setting.actuator.force_n).powi(2),
     };
     let knots = shooting::solve(&problem, guess(&problem, &draw))?.rounded();
-    let path = refine(&*setting.dynamics, &knots, ticks, setting.tick_s, &problem.end)?;
+    let path = refine(&*setting.dynamics, &knots, ticks, setting.tick_s, &ends)?;
     within(&path, &draw.bounds).then_some((knots, path))
 }
 

@@ -6,8 +6,7 @@ use upright_design::numerics::Matrix;
 use upright_design::rig::{PlantDescription, Rig};
 use upright_design::swing_up::{Stored, SwingUp, SwingUpError, demonstrate, motions};
 
-const RIGS: [&str; 4] =
-    ["single-quanser-ip02", "double-quanser-dbpen", "triple-glueck-eder-kugi", "quadruple-paper"];
+const RIGS: [&str; 2] = ["single-quanser-ip02", "double-quanser-dbpen"];
 
 fn file(rig: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("../../rigs/{rig}.toml"))
@@ -38,7 +37,10 @@ fn every_stored_motion_obeys_the_equations_and_the_limits_and_arrives() {
 fn stored_motions_give_the_same_bits_each_time_and_survive_their_file() {
     let (rig, stored) = rig_and_stored("single-quanser-ip02");
     assert_eq!(motions(&rig, &stored).unwrap(), motions(&rig, &stored).unwrap());
-    assert_eq!(stored.to_json(), std::fs::read_to_string(Stored::path_beside(&file("single-quanser-ip02"))).unwrap());
+    assert_eq!(
+        stored.to_json(),
+        std::fs::read_to_string(Stored::path_beside(&file("single-quanser-ip02"))).unwrap()
+    );
 }
 
 /// The end of the raising joins the gain that balances, so that the hand-over changes no law.
@@ -59,10 +61,10 @@ fn the_last_gain_is_the_gain_that_balances() {
 
 #[test]
 fn a_motion_of_another_rig_is_refused() {
-    let (rig, _) = rig_and_stored("single-quanser-ip02");
-    let (_, other) = rig_and_stored("double-quanser-dbpen");
-    assert_eq!(motions(&rig, &other), Err(SwingUpError::Outdated));
     let (mut heavier, stored) = rig_and_stored("single-quanser-ip02");
+    let other = Rig::from_path(&file("double-quanser-dbpen")).unwrap();
+    assert_eq!(motions(&other, &stored), Err(SwingUpError::Outdated));
+    assert!(motions(&heavier, &stored).is_ok());
     if let PlantDescription::Chain(chain) = &mut heavier.plant {
         chain.links[0].mass_kg *= 1.001;
     }

@@ -12,6 +12,7 @@ mod path;
 mod png;
 mod run;
 mod scale;
+mod stroboscope;
 mod theme;
 
 pub(crate) use png::pixels;
@@ -23,6 +24,7 @@ pub use draw::{Drawing, PlotArea};
 pub use heat::HeatMap;
 pub(crate) use run::run_figure;
 pub use run::run_svg;
+pub use stroboscope::stroboscope_svg;
 
 /// A figure that could not be made.
 #[derive(Debug, thiserror::Error)]

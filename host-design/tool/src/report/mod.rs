@@ -23,6 +23,7 @@ use self::plot::Plot;
 use crate::figure::{Figure, FigureError, pixels};
 use upright_design::design::Certified;
 use upright_design::rig::{PlantDescription, Rig};
+use upright_design::swing_up::Demonstration;
 use upright_design::table::TableValues;
 use upright_design::verify::TrustReport;
 
@@ -39,6 +40,8 @@ pub struct Source<'a> {
     pub trust: &'a TrustReport,
     /// Seed of the disturbances in the runs.
     pub seed: u64,
+    /// A run of the swing-up, if the rig has stored motions.
+    pub swing_up: Option<&'a Demonstration>,
     /// The command that made the report, to make it again.
     pub command: &'a str,
 }
@@ -84,7 +87,8 @@ impl Picture {
 pub fn report(source: &Source<'_>, stage: &dyn Fn(&str)) -> Result<Report, ReportError> {
     let Source { rig, certified, table, trust, .. } = *source;
     stage("runs");
-    let scenes = runs::scenes(rig, certified, table, trust, source.seed)?;
+    let mut scenes = runs::scenes(rig, certified, table, trust, source.seed)?;
+    scenes.extend(source.swing_up.map(|run| runs::swing_up(rig, run, source.seed)));
     let laws = runs::laws(table);
     let mut pictures = Vec::new();
     let mut page = Page::new(source, &scenes)?;

@@ -7,6 +7,7 @@ use upright_design::design::Certified;
 use upright_design::number::rounded;
 use upright_design::rig::{PlantDescription, Rig};
 use upright_design::simulate::{Scenario, Sensing, SimulationError, Summary, Trace, simulate};
+use upright_design::swing_up::Demonstration;
 use upright_design::table::TableValues;
 use upright_design::verify::{Disturbance, TrustReport};
 
@@ -62,6 +63,24 @@ pub(super) fn scenes(
         plans.push(encoder_plan(rig, &stepped.unwrap_or(base)));
     }
     plans.into_iter().map(|plan| plan.run(rig, table)).collect()
+}
+
+/// The swing-up and all that follows it.
+pub(super) fn swing_up(rig: &Rig, run: &Demonstration, seed: u64) -> Scene {
+    let parts: Vec<String> =
+        run.parts.iter().map(|(at_s, name)| format!("{name} from {} s", number(rounded(*at_s, 3)))).collect();
+    let text = format!(
+        "The rig raises itself from hanging, and lowers itself again: {}. The controller measures encoder counts only; start          off by up to 1° and 1 mm, encoders off by up to 0.1°, the rig's noise (seed {seed}).",
+        parts.join(", ")
+    );
+    let scenario = Scenario::at_rest(rig, Law::Lqr);
+    let summary = Summary::of(rig, &scenario, &run.trace, None);
+    Scene {
+        id: "swing-up",
+        name: "Swing-up",
+        text,
+        runs: vec![LawRun { law: Law::Lqr, trace: run.trace.clone(), summary }],
+    }
 }
 
 /// A scene before it has run.

@@ -5,6 +5,8 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 use serde_json::json;
+use upright_design::rig::Rig;
+use upright_design::swing_up::{Demonstration, Stored, demonstrate, motions};
 use upright_design::table::write_atomically;
 use upright_design::verify::{Effort, trust};
 use upright_tool::report::{Report as Page, Source, report};
@@ -58,12 +60,14 @@ impl Report {
         let (trust, files) =
             with_random_plants(laws * u64::from(self.runs), |stage, done| -> Result<_, Failure> {
                 let trust = trust(&rig, &certified, &table, effort, stage, done)?;
+                let run = demonstration(&self.variation.rig, &rig, self.seed);
                 let source = Source {
                     rig: &rig,
                     certified: &certified,
                     table: &table,
                     trust: &trust,
                     seed: self.seed,
+                    swing_up: run.as_ref(),
                     command: &self.as_typed(),
                 };
                 let page = report(&source, stage)?;
@@ -140,6 +144,12 @@ impl Report {
         }
         typed
     }
+}
+
+/// A run of the stored motions; none if there are none, or if they belong to other values of the rig.
+fn demonstration(file: &Path, rig: &Rig, seed: u64) -> Option<Demonstration> {
+    let stored = Stored::beside(file).ok()?;
+    demonstrate(rig, &motions(rig, &stored).ok()?, seed, false).ok()
 }
 
 fn write_into(folder: &Path, name: &str, contents: &[u8]) -> Result<PathBuf, Failure> {

@@ -8,6 +8,7 @@ use serde_json::json;
 use upright::table::Law;
 use upright_design::rig::{PlantDescription, Rig};
 use upright_design::simulate::{Scenario, Sensing, Summary, Trace, simulate};
+use upright_design::swing_up::{Stored, demonstrate, motions};
 use upright_design::table::{TableValues, write_atomically};
 use upright_tool::figure::run_svg;
 
@@ -25,6 +26,7 @@ Examples:
   upright simulate rigs/quadruple-paper.toml --law pole-placement --tilt 0.01,-0.01
   upright simulate rigs/quadruple-paper.toml --disturbances paper --seed 7 --csv run.csv
   upright simulate rigs/quadruple-paper.toml --tick 0.005 --gains continuous --tilt 0.001   falls
+  upright simulate rigs/quadruple-paper.toml --swing-up --svg swing-up.svg
   upright simulate rigs/quadruple-paper.toml --csv - | head")]
 pub(crate) struct Simulate {
     #[command(flatten)]
@@ -73,6 +75,14 @@ pub(crate) struct Simulate {
     #[arg(long, default_value_t = 4, value_parser = clap::value_parser!(u16).range(1..=1000))]
     substeps: u16,
 
+    /// Raise the rig with its stored motion, balance, step, and lower it again, from encoders with the rig's noise
+    #[arg(long, conflicts_with_all = ["law", "duration", "step", "step_at", "raw_step", "sensing", "tilt", "start",
+          "disturbances", "force_noise", "torque_noise", "force_offset", "substeps"])]
+    swing_up: bool,
+    /// With --swing-up: masses and friction wrong by up to the spreads of [swing_up], drawn with the seed
+    #[arg(long, requires = "swing_up")]
+    wrong: bool,
+
     /// Write every tick as CSV to a file, or to stdout with `-`
     #[arg(long, value_name = "FILE")]
     csv: Option<PathBuf>,
@@ -98,6 +108,9 @@ enum Disturbances {
 
 impl Simulate {
     pub(crate) fn run(self) -> Result<(), Failure> {
+        if self.swing_up {
+            return self.swing_up();
+        }
         self.run_with(|rig, table, scenario| {
             Ok(with_spinner("simulating", || simulate(rig, table, scenario))?)
         })
@@ -117,8 +130,36 @@ impl Simulate {
         }
     }
 
+    /// Runs the stored motions, and what lies between them.
+    fn swing_up(&self) -> Result<(), Failure> {
+        let (rig, _, _) = self.variation.designed()?;
+        let failed = |source| Failure::SwingUp { rig: rig.name.clone(), source };
+        let stored = Stored::beside(&self.variation.rig).map_err(failed)?;
+        let run =
+            with_spinner("simulating", || demonstrate(&rig, &motions(&rig, &stored)?, self.seed, self.wrong))
+                .map_err(failed)?;
+        let parts: Vec<_> =
+            run.parts.iter().map(|(at_s, name)| json!({ "at_s": at_s, "part": name })).collect();
+        let text = if self.json {
+            json!({ "rig": rig.name, "arrived": run.arrived, "parts": parts }).to_string()
+        } else {
+            let lines: Vec<String> =
+                run.parts.iter().map(|(at_s, name)| format!("{at_s:>8.3} s  {name}")).collect();
+            lines.join("\n")
+        };
+        let title = format!("{}: up, balance, step, down", rig.name);
+        self.write_record(&rig, &run.trace, &title, &text)?;
+        if run.arrived {
+            return Ok(());
+        }
+        Err(Failure::CheckFailed(format!("{}, seed {}: it does not arrive", rig.name, self.seed)))
+    }
+
     /// The rig, its table and the scenario that the options ask for.
     pub(crate) fn prepared(&self) -> Result<(Rig, TableValues, Scenario), Failure> {
+        if self.swing_up {
+            return Err(Failure::BadArgument("--swing-up: only `upright simulate` runs it".to_owned()));
+        }
         let (rig, _, table) = self.variation.designed()?;
         let scenario = self.scenario(&rig)?;
         let table = if self.raw_step { table.without_governor() } else { table };
@@ -193,6 +234,28 @@ impl Simulate {
     }
 
     fn write(&self, rig: &Rig, trace: &Trace, summary: &Summary) -> Result<(), Failure> {
+        let law = self.law;
+        let title = format!(
+            "{}, {law}, tick {} ms",
+            rig.name,
+            format!("{:.4}", rig.tick.period_s * 1e3).trim_end_matches('0').trim_end_matches('.')
+        );
+        let text = if self.json {
+            let mut object = json!({ "rig": rig.name, "hash": format!("{:016x}", rig.hash()), "stands": summary.stands() });
+            if let (Some(object), Ok(serde_json::Value::Object(figures))) =
+                (object.as_object_mut(), serde_json::to_value(summary))
+            {
+                object.extend(figures);
+            }
+            object.to_string()
+        } else {
+            summary.to_string()
+        };
+        self.write_record(rig, trace, &title, &text)
+    }
+
+    /// Writes the files that are asked for, and prints `text`.
+    fn write_record(&self, rig: &Rig, trace: &Trace, title: &str, text: &str) -> Result<(), Failure> {
         let csv_on_stdout = self.csv.as_ref().is_some_and(|path| path.as_os_str() == "-");
         let mut out = std::io::stdout().lock();
         if let Some(path) = &self.csv {
@@ -205,25 +268,8 @@ impl Simulate {
             }
         }
         if let Some(path) = &self.svg {
-            let law = self.law;
-            let title = format!(
-                "{}, {law}, tick {} ms",
-                rig.name,
-                format!("{:.4}", rig.tick.period_s * 1e3).trim_end_matches('0').trim_end_matches('.')
-            );
-            write_atomically(path, run_svg(rig, trace, &title)?.as_bytes())?;
+            write_atomically(path, run_svg(rig, trace, title)?.as_bytes())?;
         }
-        let text = if self.json {
-            let mut object = json!({ "rig": rig.name, "hash": format!("{:016x}", rig.hash()), "stands": summary.stands() });
-            if let (Some(object), Ok(serde_json::Value::Object(figures))) =
-                (object.as_object_mut(), serde_json::to_value(summary))
-            {
-                object.extend(figures);
-            }
-            object.to_string()
-        } else {
-            summary.to_string()
-        };
         if csv_on_stdout {
             eprintln!("{text}");
         } else {

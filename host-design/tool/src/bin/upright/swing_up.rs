@@ -6,10 +6,10 @@ use std::path::PathBuf;
 
 use clap::Args;
 use serde_json::json;
-use upright_design::rig::Rig;
+use upright_design::rig::{PlantDescription, Rig};
 use upright_design::swing_up::{Judgement, Plan, Stored, SwingUpError, demonstrate, judge, search};
 use upright_design::table::write_atomically;
-use upright_tool::figure::run_svg;
+use upright_tool::figure::{run_svg, stroboscope_svg};
 
 use crate::failure::Failure;
 use crate::progress::with_search;
@@ -45,6 +45,9 @@ pub(crate) struct SwingUp {
     /// Draw that run into an SVG file
     #[arg(long, value_name = "FILE")]
     svg: Option<PathBuf>,
+    /// Draw the raising as a stroboscopic picture into an SVG file
+    #[arg(long, value_name = "FILE")]
+    picture: Option<PathBuf>,
     /// Seed of that run
     #[arg(long, default_value_t = 1)]
     seed: u64,
@@ -73,6 +76,11 @@ impl SwingUp {
         if let Some(path) = &self.svg {
             let title = format!("{}: up, balance, step, down", rig.name);
             write_atomically(path, run_svg(&rig, &demonstration.trace, &title)?.as_bytes())?;
+        }
+        if let (Some(path), PlantDescription::Chain(chain)) = (&self.picture, &rig.plant) {
+            let to_s = plan.raise.peaks.duration_s;
+            let picture = stroboscope_svg(chain, &demonstration.trace, 0.0, to_s);
+            write_atomically(path, picture.as_bytes())?;
         }
         let file = Stored::path_beside(&self.rig);
         let differs = old.map_or(true, |old| old.to_json() != plan.stored.to_json());

@@ -34,6 +34,7 @@ pub(crate) fn quick_report(rig: &Rig) -> Report {
         table: &table,
         trust: &trust,
         seed: 1,
+        swing_up: None,
         command: "upright report test",
     };
     report(&source, &|_| {}).unwrap()
