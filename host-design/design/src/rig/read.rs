@@ -5,8 +5,7 @@ use super::key::{Keys, Section};
 use super::node::{Node, Source, Table};
 use super::sections::{
     SECTIONS, TOP, actuator, chain, integral, kalman, limits, lqr, model, pole_placement, reality, swing_up,
-    tick,
-    verify,
+    tick, verify,
 };
 use super::{Actuator, Integral, Limits, PlantDescription, Reality, Requirements, Rig, Tick};
 

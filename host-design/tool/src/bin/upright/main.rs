@@ -10,8 +10,8 @@ mod progress;
 mod report;
 mod reproduce;
 mod simulate;
-mod twin;
 mod swing_up;
+mod twin;
 mod variation;
 mod verify;
 
