@@ -15,7 +15,7 @@ use crate::rig::Chain;
 
 /// Deviation of a link from its reference beyond which the motion counts as lost (rad).
 pub(super) const LOST_RAD: f64 = 0.35;
-/// Deviation at the end of a run below which it has arrived (rad).
+/// Deviation at the end of a run below which it has arrived upright (rad).
 const ARRIVED_RAD: f64 = 0.1;
 
 /// One run.
@@ -164,7 +164,9 @@ pub(super) fn run(
             return Ok(outcome);
         }
     }
-    outcome.stood = deviation(&rig.state, &motion.x[steps]) < ARRIVED_RAD;
+    // After lowering, the motor is off, and links without friction swing on.
+    let near = if way == Way::Up { ARRIVED_RAD } else { LOST_RAD };
+    outcome.stood = deviation(&rig.state, &motion.x[steps]) < near;
     Ok(outcome)
 }
 

@@ -53,9 +53,9 @@ fn the_last_gain_is_the_gain_that_balances() {
         let last = &raise.k[raise.steps() - 1];
         let apart = (last - &balancing).largest_entry() / balancing.largest_entry();
         assert!(apart < 0.02, "{name}: {apart}");
-        // Not so in the middle: the gain really changes along the motion.
-        let middle = &raise.k[raise.steps() / 2];
-        assert!((middle - &balancing).largest_entry() / balancing.largest_entry() > 0.1, "{name}");
+        // Not so on the way: the gain really changes along the motion.
+        let farthest = raise.k.iter().map(|k| (k - &balancing).largest_entry()).fold(0.0, f64::max);
+        assert!(farthest / balancing.largest_entry() > 0.2, "{name}: {farthest}");
     }
 }
 
