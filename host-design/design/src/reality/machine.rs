@@ -1,5 +1,8 @@
 //! The chain with dry friction, belt and tilted rail.
 
+// The indices are those of the equations, and all are below N.
+#![allow(clippy::needless_range_loop)]
+
 use upright::table::Scalar;
 
 use super::belt::{Belt, Rotor};

@@ -2,13 +2,14 @@
 //!
 //! [`linear`] looks at the linear model: margins, tick, noise, rounding, certificates. The rest runs the firmware's
 //! own controller against nonlinear plants: [`attraction`], [`corners`], [`monte_carlo`], [`noise_run`],
-//! [`coarsest_encoder`].
+//! [`coarsest_encoder`], [`imperfections()`].
 
 mod attraction;
 mod certificate;
 mod corners;
 mod covariance;
 mod encoder;
+mod imperfections;
 mod linear;
 mod loop_model;
 mod margins;
@@ -34,6 +35,9 @@ pub use corners::{
 };
 pub use covariance::NoiseShare;
 pub use encoder::{CoarsestEncoder, EncoderSettings, coarser, coarsest_encoder};
+pub use imperfections::{
+    IMPERFECTIONS, Imperfection, ImperfectionSettings, Imperfections, Standing, Verdict, imperfections,
+};
 pub use linear::{LinearReport, VerifyError, linear, margins_of};
 pub use loop_model::{ControllerModel, LoopModel, PlantModel};
 pub use margins::Margins;

@@ -7,9 +7,10 @@ use upright_design::design::design;
 use upright_design::harness::{record, with_firmware};
 use upright_design::numerics::{Matrix, solve};
 use upright_design::plant::{ChainParameters, Equilibrium, absolute_angles, linearise};
-use upright_design::rig::{PerJoint, PlantDescription, Reality, Rig};
+use upright_design::rig::{PerJoint, PlantDescription, Reality, Rig, SECTIONS};
 use upright_design::simulate::{Scenario, run};
 use upright_design::table::{Gains, TableValues};
+use upright_design::verify::{IMPERFECTIONS, ImperfectionSettings, imperfections};
 
 fn load(name: &str) -> (Rig, TableValues) {
     let file = Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("../../rigs/{name}.toml"));
@@ -253,4 +254,30 @@ fn a_latency_of_a_tick_is_a_delay_of_a_tick() {
     rig.tick.delay_ticks = 1;
     let delay = path(&rig, &table);
     assert!(difference(&latency, &delay) < 1e-7 && difference(&none, &delay) > 1e-4);
+}
+
+#[test]
+fn the_size_at_which_each_imperfection_topples_the_loop_is_found() {
+    let (mut rig, table) = load("quadruple-paper");
+    rig.reality.friction.joint_friction_n_m = PerJoint::all(2e-5);
+    let settings =
+        ImperfectionSettings { duration_s: 4.0, seeds: 1, relative: 0.5, ..ImperfectionSettings::of(&rig) };
+    let found = imperfections(&rig, &table, Law::Lqr, &settings, &|| ()).unwrap();
+    let of = |key: &str| found.alone.iter().find(|one| one.imperfection.key == key).unwrap();
+    // Measured with an independent program: falls between 0.8e-4 and 2e-4 N·m; bearings have 1e-4 and more.
+    let friction = of("joint_friction_n_m");
+    let falls_at = friction.falls_at.unwrap();
+    assert!((0.8e-4..3e-4).contains(&falls_at) && friction.danger > 1.0, "{friction:?}");
+    assert!(friction.leaves_limits_at.unwrap() <= falls_at);
+    assert!(found.alone.windows(2).all(|pair| pair[0].danger >= pair[1].danger));
+    assert_eq!(found.together.map(|verdict| verdict.stand), Some(1));
+}
+
+/// Keys and units of the search are those of the rig file.
+#[test]
+fn every_imperfection_is_a_key_of_reality() {
+    let reality = SECTIONS.iter().find(|section| section.name == "reality").unwrap();
+    let known = |name: &str, unit: &str| reality.keys().any(|key| key.name == name && key.unit == unit);
+    assert!(IMPERFECTIONS.iter().all(|one| known(one.key, one.unit) && one.typical[0] < one.typical[1]));
+    assert!(!known("joint_friction_n_m", "N"));
 }

@@ -8,12 +8,16 @@ use upright::table::Law;
 use upright_design::rig::Rig;
 use upright_design::simulate::simulate;
 use upright_design::table::{TableValues, write_atomically};
-use upright_design::verify::{Axis, Effort, Horizon, TrustReport, attraction_map, sample, spread, trust};
+use upright_design::verify::{
+    Axis, Effort, Horizon, IMPERFECTIONS, ImperfectionSettings, TrustReport, attraction_map, sample, spread,
+    trust,
+};
 
 use crate::failure::Failure;
 use crate::progress::{with_bar, with_random_plants, with_spinner};
 use crate::variation::{Variation, law_option};
 
+mod imperfections;
 mod text;
 
 /// Verifies the loop before a motor is connected: margins, region of attraction, noise, mass errors, random plants.
@@ -26,6 +30,7 @@ Examples:
   upright verify rigs/quadruple-paper.toml --runs 1000 --seed 1 --json
   upright verify rigs/quadruple-paper.toml --replay 17 --law lqr --csv worst.csv   the random plant of seed 17
   upright verify rigs/single-quanser-ip02.toml --map tilt.csv       from which angle and rate of link 1 it recovers
+  upright verify rigs/quadruple-paper.toml --imperfections          which friction, play or wrong zero topples it
   upright verify rigs/quadruple-paper.toml --gains continuous --tick 0.003         unstable: exit status 1")]
 pub(crate) struct Verify {
     #[command(flatten)]
@@ -48,6 +53,9 @@ pub(crate) struct Verify {
     /// Instead of the report, write a map of the initial states from which the loop recovers, as CSV
     #[arg(long, value_name = "FILE", conflicts_with = "replay")]
     map: Option<PathBuf>,
+    /// Instead of the report, the size of each imperfection of the machine at which the loop falls
+    #[arg(long, conflicts_with_all = ["replay", "map"])]
+    imperfections: bool,
     /// With --map: two states and their ranges, as index:from:to (SI; state order x, xdot, theta1, theta1dot …)
     #[arg(long, value_name = "S:A:B", num_args = 2, value_delimiter = ',', requires = "map", allow_negative_numbers = true,
           value_parser = axis, default_values = ["2:-0.5:0.5", "3:-4:4"])]
@@ -100,6 +108,9 @@ impl Verify {
         if let Some(path) = &self.map {
             return self.map(&rig, &table, path);
         }
+        if self.imperfections {
+            return self.imperfections(&rig, &table);
+        }
         let laws = table.laws.present().count() as u64;
         let effort = Effort { runs: self.runs as usize, seed: self.seed, late: self.late };
         let report = with_random_plants(laws * u64::from(self.runs), |stage, done| {
@@ -132,6 +143,24 @@ impl Verify {
             return Ok(());
         }
         Err(Failure::CheckFailed(format!("{}: not met: {}", rig.name, failed.join("; "))))
+    }
+
+    fn imperfections(&self, rig: &Rig, table: &TableValues) -> Result<(), Failure> {
+        let laws: Vec<Law> = table.laws.present().map(|(law, _)| law).collect();
+        let settings = ImperfectionSettings::of(rig);
+        let found = with_bar("imperfections", (laws.len() * IMPERFECTIONS.len()) as u64, |done| {
+            let search = |&law: &Law| upright_design::verify::imperfections(rig, table, law, &settings, done);
+            laws.iter().map(search).collect::<Result<Vec<_>, _>>()
+        })?;
+        let mut out = std::io::stdout().lock();
+        if self.json {
+            serde_json::to_writer(&mut out, &found).map_err(std::io::Error::from)?;
+            writeln!(out)?;
+        } else {
+            let tables: Vec<String> = found.iter().map(imperfections::table).collect();
+            write!(out, "{}", tables.join("\n"))?;
+        }
+        Ok(())
     }
 
     fn replay(&self, rig: &Rig, table: &TableValues, law: Law, seed: u64) -> Result<(), Failure> {
