@@ -6,39 +6,30 @@
 
 #![allow(unsafe_code)]
 
-#[cfg(not(any(
-    feature = "stm32f405",
-    feature = "stm32f407",
-    feature = "stm32f446",
-    feature = "in-the-loop",
-    feature = "in-the-loop-usart",
-)))]
-compile_error!(
-    "the image has no board: choose one with `cargo upright firmware build --board BOARD`, or with one of the features \
-     stm32f405, stm32f407, stm32f446, in-the-loop, in-the-loop-usart"
-);
+macro_rules! one_board {
+    ($($board:tt)*) => {
+        #[cfg(not(any($(feature = $board),*)))]
+        compile_error!(concat!(
+            "the image has no board: choose one with `cargo upright firmware build --board BOARD`, or with one of the \
+             features",
+            $(" ", $board),*
+        ));
+        at_most_one_board!($($board)*);
+    };
+}
 
-#[cfg(any(
-    all(
-        feature = "stm32f405",
-        any(
-            feature = "stm32f407",
-            feature = "stm32f446",
-            feature = "in-the-loop",
-            feature = "in-the-loop-usart",
-        )
-    ),
-    all(
-        feature = "stm32f407",
-        any(feature = "stm32f446", feature = "in-the-loop", feature = "in-the-loop-usart")
-    ),
-    all(feature = "stm32f446", any(feature = "in-the-loop", feature = "in-the-loop-usart")),
-    all(feature = "in-the-loop", feature = "in-the-loop-usart"),
-))]
-compile_error!(
-    "the image has two boards: choose only one of the features stm32f405, stm32f407, stm32f446, in-the-loop, \
-     in-the-loop-usart"
-);
+macro_rules! at_most_one_board {
+    () => {};
+    ($board:tt $($other:tt)*) => {
+        $(
+            #[cfg(all(feature = $board, feature = $other))]
+            compile_error!(concat!("the image has two boards: choose only one of the features ", $board, ", ", $other));
+        )*
+        at_most_one_board!($($other)*);
+    };
+}
+
+one_board!("weact-f405" "olimex-h405" "discovery-f407" "nucleo-f446" "in-the-loop" "in-the-loop-usart");
 
 #[cfg(not(any(feature = "in-the-loop", feature = "in-the-loop-usart")))]
 mod f4;

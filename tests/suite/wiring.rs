@@ -1,34 +1,99 @@
-//! The wiring in docs/board.md is the one that the image sets up.
+//! The wiring and the boards in docs/board.md are those of the image, and the tool knows them by the same names.
 
-#[path = "../../src/board/f4/wiring.rs"]
+/// The image's own files, which need no hardware.
 #[allow(dead_code, unreachable_pub)]
-mod image;
+#[path = "../../src/board/f4"]
+mod f4 {
+    pub mod boards;
+    pub mod wiring;
+}
 
-use image::{STATUS_LEDS, WIRING, Wire};
+use f4::boards::{ALL, BoardData, Chip, Source};
+use f4::wiring::{STANDARD, Signal, Wire};
+use upright_tool::image::Board;
 
 const PAGE: &str = include_str!("../../docs/board.md");
 
-fn row(wire: &Wire) -> String {
-    let pull_up = if wire.pull_up { "pull-up" } else { "" };
-    format!("| P{}{} | {} | {} | {pull_up} |", char::from(wire.port), wire.pin, wire.function, wire.signal)
+fn connected_to(signal: Signal) -> String {
+    match signal {
+        Signal::Encoder(0, channel) => format!("cart encoder, {}", char::from(channel)),
+        Signal::Encoder(link, channel) => format!("link {link} encoder, {}", char::from(channel)),
+        Signal::Pwm => "power stage, PWM: high drives".to_owned(),
+        Signal::Direction => "power stage, direction: high pushes along +x".to_owned(),
+        Signal::Enable => "power stage, enable: high; 10 kΩ to ground".to_owned(),
+        Signal::DriverFault => "power stage, fault: low; open drain".to_owned(),
+        Signal::EmergencyStop => "emergency stop: opens when pressed".to_owned(),
+        Signal::LimitLow => "limit switch, low end: opens when pressed".to_owned(),
+        Signal::LimitHigh => "limit switch, high end: opens when pressed".to_owned(),
+        Signal::Supply => "supply voltage through 10 kΩ; 1 kΩ to ground".to_owned(),
+        Signal::Transmit => "serial line to the host".to_owned(),
+        Signal::Receive => "serial line from the host".to_owned(),
+        Signal::Tick => "oscilloscope: high while a tick runs".to_owned(),
+        Signal::StatusLed => "status LED".to_owned(),
+    }
 }
 
-/// The rows of the table between the markers, without its two header lines.
-fn documented(text: &str) -> Vec<&str> {
-    let table = text.split_once("<!-- wiring -->").and_then(|(_, rest)| rest.split_once("<!-- /wiring -->"));
-    table.expect("docs/board.md has no wiring table").0.trim().lines().skip(2).collect()
+fn pin(wire: &Wire) -> String {
+    format!("P{}{}", char::from(wire.port), wire.pin)
+}
+
+fn row(wire: &Wire) -> String {
+    let pull_up = if wire.pull_up { "pull-up" } else { "" };
+    format!("| {} | {} | {} | {pull_up} |", pin(wire), wire.function, connected_to(wire.signal))
+}
+
+fn board_row(board: &BoardData) -> String {
+    let chip = match board.chip {
+        Chip::F405OrF407 => "STM32F405 or F407",
+        Chip::F446 => "STM32F446",
+    };
+    let sources = board.sources.iter().map(|source| match source {
+        Source::Crystal => "crystal",
+        Source::Clock => "clock input",
+    });
+    let led = if board.status_led_is_low { "low" } else { "high" };
+    format!(
+        "| `{}` | {} | {chip} | {} MHz {} | {}, on while {led} | {} V | {} |",
+        board.name,
+        board.title,
+        board.crystal_hz / 1_000_000,
+        sources.collect::<Vec<_>>().join(", else "),
+        pin(&board.status_led),
+        board.reference_v,
+        board.special
+    )
+}
+
+/// The rows of the table between the markers of `name`, without its two header lines.
+fn documented<'a>(text: &'a str, name: &str) -> Vec<&'a str> {
+    let table = text
+        .split_once(&format!("<!-- {name} -->"))
+        .and_then(|(_, rest)| rest.split_once(&format!("<!-- /{name} -->")));
+    table.unwrap_or_else(|| panic!("docs/board.md has no table {name}")).0.trim().lines().skip(2).collect()
 }
 
 fn defined() -> Vec<String> {
-    WIRING.iter().chain(&STATUS_LEDS).map(row).collect()
+    STANDARD.iter().map(row).collect()
 }
 
 #[test]
 fn the_page_shows_the_wiring_of_the_image() {
-    assert_eq!(documented(PAGE), defined(), "write src/board/f4/wiring.rs's table into docs/board.md");
+    assert_eq!(
+        documented(PAGE, "wiring"),
+        defined(),
+        "write src/board/f4/wiring.rs's table into docs/board.md"
+    );
 }
 
 #[test]
 fn a_wrong_pin_on_the_page_is_noticed() {
-    assert_ne!(documented(&PAGE.replace("| PB12 |", "| PB11 |")), defined());
+    assert_ne!(documented(&PAGE.replace("| PB12 |", "| PB11 |"), "wiring"), defined());
+}
+
+#[test]
+fn the_page_shows_the_boards_of_the_image_and_the_tool_names_them() {
+    let boards: Vec<_> = ALL.into_iter().map(board_row).collect();
+    assert_eq!(documented(PAGE, "boards"), boards, "write src/board/f4/boards/ into docs/board.md");
+    assert_ne!(documented(&PAGE.replace("| 3 V |", "| 3.3 V |"), "boards"), boards);
+    assert_eq!(ALL.map(|board| board.name), Board::ALL.map(Board::name));
 }

@@ -13,6 +13,8 @@
 use stm32f4xx_hal::pac::{FLASH, RCC, TIM11};
 use upright::protocol::message::Reset;
 
+use super::boards::{BOARD, Source};
+
 /// Core clock (Hz).
 pub(crate) const CLOCK_HZ: u32 = 168_000_000;
 
@@ -20,7 +22,16 @@ pub(crate) const CLOCK_HZ: u32 = 168_000_000;
 const INTERNAL_HZ: u32 = 16_000_000;
 
 /// The crystal, or the clock that comes in its place (Hz).
-const CRYSTAL_HZ: u32 = 8_000_000;
+const CRYSTAL_HZ: u32 = BOARD.crystal_hz;
+/// The PLL divides it by this: to 2 MHz, where its jitter is lowest, or to 1 MHz (RM0090, 7.3.2) …
+const PLL_M: u32 =
+    if CRYSTAL_HZ.is_multiple_of(2_000_000) { CRYSTAL_HZ / 2_000_000 } else { CRYSTAL_HZ / 1_000_000 };
+/// … and multiplies that by this, to twice the core clock.
+const PLL_N: u32 = 2 * CLOCK_HZ / (CRYSTAL_HZ / PLL_M);
+const _: () = assert!(
+    CRYSTAL_HZ / PLL_M * PLL_N == 2 * CLOCK_HZ && PLL_M >= 2 && PLL_M <= 26,
+    "the board's crystal_hz: the PLL cannot make the core clock from it"
+);
 
 /// Iterations of a waiting loop: at 16 MHz and at least 4 cycles each, 50 ms or more. A crystal starts within 10 ms.
 const PATIENCE: u32 = 200_000;
@@ -83,16 +94,26 @@ fn set(rcc: &RCC, bits: u32) {
     rcc.cr().modify(|r, w| unsafe { w.bits((r.bits() | bits) & CONTROL_BITS) });
 }
 
+/// Clears bits of RCC_CR.
+fn clear(rcc: &RCC, bits: u32) {
+    // SAFETY: only bits that code may write.
+    rcc.cr().modify(|r, w| unsafe { w.bits(r.bits() & CONTROL_BITS & !bits) });
+}
+
 const HSEON: u32 = 1 << 16;
 const HSEBYP: u32 = 1 << 18;
 const CSSON: u32 = 1 << 19;
 const PLLON: u32 = 1 << 24;
 
 fn start_crystal(rcc: &RCC) -> Option<()> {
-    // A Nucleo's debugger supplies a clock; the other boards have a crystal. The bypass changes only while HSE is off.
-    set(rcc, if cfg!(feature = "stm32f446") { HSEBYP } else { 0 });
-    set(rcc, HSEON);
-    wait(|| rcc.cr().read().hserdy().bit_is_set())
+    BOARD.sources.iter().find_map(|&source| {
+        // The bypass changes only while the oscillator is off.
+        clear(rcc, HSEON);
+        clear(rcc, HSEBYP);
+        set(rcc, if source == Source::Clock { HSEBYP } else { 0 });
+        set(rcc, HSEON);
+        wait(|| rcc.cr().read().hserdy().bit_is_set())
+    })
 }
 
 /// The crystal's clock is divided by this for the measurement …
@@ -126,19 +147,10 @@ fn measure_crystal(rcc: &RCC, timer: &TIM11) -> Option<()> {
 }
 
 fn start_pll(rcc: &RCC, flash: &FLASH) -> Option<()> {
-    // 8 MHz / 4 × 168 / 2 = 168 MHz (RM0090, 7.3.2); the PLL's input is at 2 MHz, where its jitter is lowest.
-    // SAFETY: factors within the limits given there: 2 to 63, 50 to 432, 0 for a division by 2, 2 to 15.
+    // SAFETY: factors within the limits of RM0090, 7.3.2: 2 to 63, 50 to 432, 0 for a division by 2, 2 to 15.
     rcc.pllcfgr().modify(|_, w| unsafe {
-        w.pllsrc()
-            .set_bit()
-            .pllm()
-            .bits((CRYSTAL_HZ / 2_000_000) as u8)
-            .plln()
-            .bits(168)
-            .pllp()
-            .bits(0)
-            .pllq()
-            .bits(7)
+        w.pllsrc().set_bit().pllm().bits(PLL_M as u8).plln().bits(PLL_N as u16);
+        w.pllp().bits(0).pllq().bits(7)
     });
     set(rcc, PLLON);
     // Five wait states above 150 MHz at 3.3 V (RM0090, 3.5.1; the same for F446: RM0390, 3.4.1).

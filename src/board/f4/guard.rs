@@ -3,16 +3,15 @@
 use cortex_m::peripheral::MPU;
 use stm32f4xx_hal::pac::{DBGMCU, EXTI, PWR};
 
-/// Device identifier of the chip that the image is for (RM0090, 38.6.1; RM0390, 33.6.1).
-const CHIP: u32 = if cfg!(feature = "stm32f446") { 0x421 } else { 0x413 };
+use super::boards::BOARD;
 
 /// Line of EXTI that the voltage detector is connected to (RM0090, 12.2.5).
 const DETECTOR: u32 = 1 << 16;
 
-/// Whether this is the chip that the image is for. While a debugger holds the processor, the watchdog waits.
+/// Whether this is the chip that the image is for (RM0090, 38.6.1; RM0390, 33.6.1). While a debugger holds the processor, the watchdog waits.
 pub(super) fn chip_is_right(debug: &DBGMCU) -> bool {
     debug.apb1_fz().modify(|_, w| w.dbg_iwdg_stop().set_bit());
-    debug.idcode().read().bits() & 0xfff == CHIP
+    debug.idcode().read().bits() & 0xfff == BOARD.chip as u32
 }
 
 /// Makes every access to the 64 KiB below the stack a fault: the stack is at the start of the memory, and writes to the

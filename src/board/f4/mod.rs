@@ -1,5 +1,6 @@
 //! Boards with an STM32F405, STM32F407 or STM32F446.
 
+mod boards;
 mod clock;
 mod encoders;
 mod guard;
@@ -36,6 +37,8 @@ pub(crate) struct Hardware {
     clock_fault: bool,
     wrong_chip: bool,
     overrun: bool,
+    /// Whether the limit switches were open at the end of the tick before.
+    limits: [bool; 2],
 }
 
 /// Sets up all peripherals, with the motor off. Takes at most 150 ms, even if a peripheral does not respond. `start`
@@ -74,6 +77,7 @@ pub(crate) fn set_up<T>(
         clock_fault: clock == Clock::Fallback,
         wrong_chip,
         overrun: false,
+        limits: [false; 2],
     };
     (hardware, line, started)
 }
@@ -82,18 +86,21 @@ impl Board<SENSORS> for Hardware {
     const WIDTHS: [CounterWidth; SENSORS] = encoders::WIDTHS;
 
     fn inputs(&mut self) -> Inputs<SENSORS> {
+        pins::show_tick(true);
         let raw_counts = encoders::raw_counts();
         // Clears the flag of the current tick.
         let _ = tick_is_due();
-        let levels = pins::Levels::read();
+        let [limit_low, limit_high] = pins::limits();
+        let [was_low, was_high] = self.limits;
         Inputs {
             raw_counts,
             supply_v: self.supply.volts(),
             contacts: Contacts {
-                limit_low: levels.limit_low(),
-                limit_high: levels.limit_high(),
-                emergency_stop: self.motor.was_stopped() | levels.emergency_stop(),
-                driver_fault: pins::driver_fault_was_reported(&self.exti) | levels.driver_fault(),
+                // Open at the end of the tick before and now: a spike in a wire beside a switching bridge is no contact.
+                limit_low: limit_low & was_low,
+                limit_high: limit_high & was_high,
+                emergency_stop: self.motor.was_stopped() | pins::emergency_stop(),
+                driver_fault: pins::driver_fault_was_reported(&self.exti) | pins::driver_fault(),
                 overrun: self.overrun,
                 clock_fault: self.clock_fault,
                 board_fault: self.wrong_chip
@@ -109,10 +116,12 @@ impl Board<SENSORS> for Hardware {
 
     /// Only a tick that ends before the next one is due is healthy.
     fn feed_watchdog(&mut self) {
+        self.limits = pins::limits();
         self.overrun = tick_is_due();
         if !self.overrun {
             self.watchdog.feed();
         }
+        pins::show_tick(false);
     }
 
     fn cycles(&self) -> u32 {

@@ -1,18 +1,17 @@
 //! The pins: set up from the wiring, read and written by name.
 
-use stm32f4xx_hal::pac::{EXTI, GPIOA, GPIOB, GPIOC, GPIOD, SYSCFG};
+use stm32f4xx_hal::pac::{EXTI, SYSCFG};
 
-use super::wiring::{
-    DIRECTION, DRIVER_FAULT, EMERGENCY_STOP, ENABLE, LIMIT_HIGH, LIMIT_LOW, Mode, STATUS_LEDS, WIRING, Wire,
-};
+use super::boards::BOARD;
+use super::wiring::{Mode, Signal, Wire, wire_of};
 
-const STATUS_LED: Wire = STATUS_LEDS[if cfg!(feature = "stm32f405") {
-    0
-} else if cfg!(feature = "stm32f407") {
-    1
-} else {
-    2
-}];
+const DIRECTION: Wire = wire_of(BOARD.wiring, Signal::Direction);
+const ENABLE: Wire = wire_of(BOARD.wiring, Signal::Enable);
+const DRIVER_FAULT: Wire = wire_of(BOARD.wiring, Signal::DriverFault);
+const EMERGENCY_STOP: Wire = wire_of(BOARD.wiring, Signal::EmergencyStop);
+const LIMIT_LOW: Wire = wire_of(BOARD.wiring, Signal::LimitLow);
+const LIMIT_HIGH: Wire = wire_of(BOARD.wiring, Signal::LimitHigh);
+const TICK: Wire = wire_of(BOARD.wiring, Signal::Tick);
 
 const PORTS: usize = 4;
 
@@ -29,8 +28,8 @@ struct Port {
 const SET_UP: [Port; PORTS] = {
     let mut ports = [Port { mode: 0, pull: 0, two_bits: 0, alternate: [0; 2], four_bits: [0; 2] }; PORTS];
     let mut i = 0;
-    while i <= WIRING.len() {
-        let wire = if i < WIRING.len() { WIRING[i] } else { STATUS_LED };
+    while i <= BOARD.wiring.len() {
+        let wire = if i < BOARD.wiring.len() { BOARD.wiring[i] } else { BOARD.status_led };
         let port = &mut ports[(wire.port - b'A') as usize];
         let (at, half) = (2 * wire.pin, (wire.pin / 8) as usize);
         assert!(port.two_bits & (3 << at) == 0, "a pin is used twice");
@@ -53,8 +52,8 @@ const SET_UP: [Port; PORTS] = {
 
 /// Sets up all pins. The outputs are low from the start, because the output registers hold 0 after a reset.
 pub(super) fn set_up(syscfg: &SYSCFG, exti: &EXTI) {
-    let bases = [GPIOA::PTR as usize, GPIOB::PTR as usize, GPIOC::PTR as usize, GPIOD::PTR as usize];
-    for (base, port) in bases.into_iter().zip(&SET_UP) {
+    for (number, port) in SET_UP.iter().enumerate() {
+        let base = 0x4002_0000 + 0x400 * number;
         let change = |offset: usize, covered: u32, value: u32| {
             let register = (base + offset) as *mut u32;
             // SAFETY: a register of this port; nothing else runs before the set-up is complete.
@@ -68,51 +67,43 @@ pub(super) fn set_up(syscfg: &SYSCFG, exti: &EXTI) {
     }
     // A falling edge of the power stage's fault signal, however short, stays in the pending register until the next
     // tick reads it (RM0090, 12.2.4). Its interrupt is not enabled in the NVIC.
-    // SAFETY: 1 is port B (RM0090, 9.2.6).
-    syscfg.exticr4().modify(|_, w| unsafe { w.exti13().bits(1) });
-    exti.ftsr().modify(|_, w| w.tr13().set_bit());
-    exti.imr().modify(|_, w| w.mr13().set_bit());
+    // SAFETY: the port of this line (RM0090, 9.2.6).
+    const { assert!(DRIVER_FAULT.pin / 4 == 3, "line 12 to 15") };
+    const SHIFT: u32 = 4 * (DRIVER_FAULT.pin as u32 % 4);
+    const PORT: u32 = (DRIVER_FAULT.port - b'A') as u32;
+    syscfg.exticr4().modify(|r, w| unsafe { w.bits(r.bits() & !(15 << SHIFT) | PORT << SHIFT) });
+    exti.ftsr().modify(|r, w| unsafe { w.bits(r.bits() | 1 << DRIVER_FAULT.pin) });
+    exti.imr().modify(|r, w| unsafe { w.bits(r.bits() | 1 << DRIVER_FAULT.pin) });
 }
 
-/// Levels of ports B and C at one moment; true is high.
-#[derive(Clone, Copy)]
-pub(super) struct Levels {
-    b: u32,
-    c: u32,
+/// Level of an input; true is high.
+fn is_high(wire: Wire) -> bool {
+    // SAFETY: reading the input register (8.4.5) has no side effect.
+    unsafe { ((wire.port_base() + 0x10) as *const u32).read_volatile() & 1 << wire.pin != 0 }
 }
 
-impl Levels {
-    /// Reads the levels of both ports.
-    pub(super) fn read() -> Self {
-        // SAFETY: reading levels has no side effect.
-        unsafe { Self { b: (*GPIOB::PTR).idr().read().bits(), c: (*GPIOC::PTR).idr().read().bits() } }
-    }
+/// Whether the contact of the emergency stop is open: the pull-up then pulls it high.
+pub(super) fn emergency_stop() -> bool {
+    is_high(EMERGENCY_STOP)
+}
 
-    /// An open contact reads high, because of the pull-up.
-    pub(super) fn emergency_stop(self) -> bool {
-        self.b & (1 << EMERGENCY_STOP) != 0
-    }
+/// Whether the power stage reports a fault now.
+pub(super) fn driver_fault() -> bool {
+    !is_high(DRIVER_FAULT)
+}
 
-    pub(super) fn driver_fault(self) -> bool {
-        self.b & (1 << DRIVER_FAULT) == 0
-    }
-
-    pub(super) fn limit_low(self) -> bool {
-        self.c & (1 << LIMIT_LOW) != 0
-    }
-
-    pub(super) fn limit_high(self) -> bool {
-        self.c & (1 << LIMIT_HIGH) != 0
-    }
+/// Whether the contacts of the limit switches are open, at the low end and at the high end.
+pub(super) fn limits() -> [bool; 2] {
+    [is_high(LIMIT_LOW), is_high(LIMIT_HIGH)]
 }
 
 /// Whether the power stage has reported a fault since the last call, even if the fault is over.
 pub(super) fn driver_fault_was_reported(exti: &EXTI) -> bool {
-    let reported = exti.pr().read().pr13().bit_is_set();
+    let reported = exti.pr().read().bits() & 1 << DRIVER_FAULT.pin != 0;
     if reported {
         // Writing a one clears this bit and no other.
         // SAFETY: any combination of bits is allowed.
-        exti.pr().write(|w| unsafe { w.bits(1 << DRIVER_FAULT) });
+        exti.pr().write(|w| unsafe { w.bits(1 << DRIVER_FAULT.pin) });
     }
     reported
 }
@@ -127,17 +118,18 @@ pub(super) fn push_along_x(along: bool) {
     set(DIRECTION, along);
 }
 
-fn set(pin: u8, high: bool) {
-    let pin = u32::from(pin) + if high { 0 } else { 16 };
-    // SAFETY: the bit set and reset register changes one output of the power stage at once (RM0090, 8.4.7).
-    unsafe { (*GPIOB::PTR).bsrr().write(|w| w.bits(1 << pin)) };
+/// Shows whether a tick is running.
+pub(super) fn show_tick(running: bool) {
+    set(TICK, running);
 }
 
 /// Switches the status LED.
 pub(super) fn set_status_led(on: bool) {
-    let port = [GPIOA::PTR as usize, GPIOB::PTR as usize, GPIOC::PTR as usize, GPIOD::PTR as usize]
-        [(STATUS_LED.port - b'A') as usize];
-    let pin = STATUS_LED.pin + if on { 0 } else { 16 };
-    // SAFETY: the bit set and reset register of the LED's port changes nothing but the LED.
-    unsafe { ((port + 0x18) as *mut u32).write_volatile(1 << pin) };
+    set(BOARD.status_led, on != BOARD.status_led_is_low);
+}
+
+fn set(wire: Wire, high: bool) {
+    let bit = u32::from(wire.pin) + if high { 0 } else { 16 };
+    // SAFETY: the bit set and reset register changes this output at once, and nothing else (8.4.7).
+    unsafe { ((wire.port_base() + 0x18) as *mut u32).write_volatile(1 << bit) };
 }

@@ -2,11 +2,7 @@
 
 use stm32f4xx_hal::pac::{ADC_COMMON, ADC1};
 
-/// Supply voltage over the voltage at the input: a divider of 10 kΩ and 1 kΩ.
-const DIVIDER: f32 = 11.0;
-
-/// The microcontroller's own supply (V), which the converter measures against, if it cannot be measured.
-const USUAL_REFERENCE_V: f32 = 3.3;
+use super::boards::BOARD;
 
 /// Input 12 is the supply, input 17 the internal reference (RM0090, 13.10).
 const SUPPLY: u8 = 12;
@@ -43,7 +39,7 @@ impl Supply {
         // SAFETY: the chip's own data; reading them has no side effect.
         let calibration = unsafe { CALIBRATION.read_volatile() };
         supply.volts_per_step =
-            reference_v(calibration.into(), measured.unwrap_or_default()) * DIVIDER / 4096.0;
+            reference_v(calibration.into(), measured.unwrap_or_default()) * BOARD.supply_divider / 4096.0;
         supply
     }
 
@@ -67,8 +63,8 @@ impl Supply {
 }
 
 /// The microcontroller's own supply (V), from the factory's reading of the reference and from ours. What cannot be, such
-/// as memory without a calibration, gives the usual one.
+/// as memory without a calibration, gives the board's.
 fn reference_v(calibration: f32, measured: f32) -> f32 {
     let volts = 3.3 * calibration / measured;
-    if (2.5..3.7).contains(&volts) { volts } else { USUAL_REFERENCE_V }
+    if (2.5..3.7).contains(&volts) { volts } else { BOARD.reference_v }
 }

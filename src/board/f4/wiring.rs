@@ -1,12 +1,13 @@
-//! The wiring: what is connected to which pin. This is the only definition. The pins are set up from it, and a test
-//! checks the table in docs/board.md against it.
+//! The wiring: what is connected to which pin. The pins are set up from it, and a test checks the tables in docs/board.md
+//! against it.
 //!
-//! All pins exist on the 64-pin packages of STM32F405, STM32F407 and STM32F446, with the same functions. Alternate
-//! functions: datasheets DS8626 (F405, F407) and DS10693 (F446), table "Alternate function mapping".
+//! Alternate functions: datasheets DS8626 (F405, F407) and DS10693 (F446), table "Alternate function mapping".
 
 /// A pin of port `A`, `B`, `C` or `D`, and what is connected to it.
 #[derive(Clone, Copy)]
 pub(crate) struct Wire {
+    /// What is connected.
+    pub(crate) signal: Signal,
     /// The port's letter.
     pub(crate) port: u8,
     /// Number within the port.
@@ -18,9 +19,65 @@ pub(crate) struct Wire {
     /// The peripheral behind the pin.
     #[cfg_attr(target_os = "none", allow(dead_code, reason = "for the table of the documentation"))]
     pub(crate) function: &'static str,
-    /// Signal that is connected to the pin.
-    #[cfg_attr(target_os = "none", allow(dead_code, reason = "for the table of the documentation"))]
-    pub(crate) signal: &'static str,
+}
+
+impl Wire {
+    /// Base address of the registers of its port (RM0090, 2.3).
+    pub(crate) const fn port_base(self) -> usize {
+        0x4002_0000 + 0x400 * (self.port - b'A') as usize
+    }
+}
+
+/// What is connected to a pin.
+#[derive(Clone, Copy)]
+pub(crate) enum Signal {
+    /// An encoder: sensor (0 is the cart's) and channel, 'A' or 'B'.
+    Encoder(u8, u8),
+    /// PWM of the power stage.
+    Pwm,
+    /// Its direction.
+    Direction,
+    /// Its enable input.
+    Enable,
+    /// Its fault output.
+    DriverFault,
+    /// The emergency stop.
+    EmergencyStop,
+    /// The limit switch at the low end.
+    LimitLow,
+    /// The limit switch at the high end.
+    LimitHigh,
+    /// The supply of the power stage.
+    Supply,
+    /// Serial line to the host.
+    Transmit,
+    /// Serial line from the host.
+    Receive,
+    /// For an oscilloscope.
+    Tick,
+    /// The status LED: on after a normal start, off after a crash.
+    StatusLed,
+}
+
+impl Signal {
+    /// A number of its own, for comparisons in constants.
+    const fn code(self) -> u8 {
+        match self {
+            Signal::Pwm => 0,
+            Signal::Direction => 1,
+            Signal::Enable => 2,
+            Signal::DriverFault => 3,
+            Signal::EmergencyStop => 4,
+            Signal::LimitLow => 5,
+            Signal::LimitHigh => 6,
+            Signal::Supply => 7,
+            Signal::Transmit => 8,
+            Signal::Receive => 9,
+            Signal::Tick => 10,
+            Signal::StatusLed => 11,
+            Signal::Encoder(sensor, channel) => 16 + 2 * sensor + (channel - b'A'),
+        }
+    }
 }
 
 /// Mode of a pin; the numbers are those of the register GPIOx_MODER (RM0090, 8.4.1).
@@ -36,62 +93,61 @@ pub(crate) enum Mode {
     Analog,
 }
 
-/// All pins except that of the status LED.
-pub(crate) const WIRING: [Wire; 20] = [
-    encoder(b'A', 15, 1, "TIM2_CH1", "cart encoder, A"),
-    encoder(b'B', 3, 1, "TIM2_CH2", "cart encoder, B"),
-    encoder(b'A', 0, 2, "TIM5_CH1", "link 1 encoder, A"),
-    encoder(b'A', 1, 2, "TIM5_CH2", "link 1 encoder, B"),
-    encoder(b'B', 4, 2, "TIM3_CH1", "link 2 encoder, A"),
-    encoder(b'B', 5, 2, "TIM3_CH2", "link 2 encoder, B"),
-    encoder(b'B', 6, 2, "TIM4_CH1", "link 3 encoder, A"),
-    encoder(b'B', 7, 2, "TIM4_CH2", "link 3 encoder, B"),
-    encoder(b'C', 6, 3, "TIM8_CH1", "link 4 encoder, A"),
-    encoder(b'C', 7, 3, "TIM8_CH2", "link 4 encoder, B"),
-    wire(b'A', 8, Mode::Alternate(1), false, "TIM1_CH1", "power stage, PWM: high drives"),
-    wire(b'B', DIRECTION, Mode::Output, false, "output", "power stage, direction: high pushes along +x"),
-    wire(b'B', ENABLE, Mode::Output, false, "output", "power stage, enable: high; 10 kΩ to ground"),
-    wire(b'B', DRIVER_FAULT, Mode::Input, true, "input", "power stage, fault: low; open drain"),
-    wire(b'B', EMERGENCY_STOP, Mode::Alternate(1), true, "TIM1_BKIN", "emergency stop: opens when pressed"),
-    wire(b'C', LIMIT_LOW, Mode::Input, true, "input", "limit switch, low end: opens when pressed"),
-    wire(b'C', LIMIT_HIGH, Mode::Input, true, "input", "limit switch, high end: opens when pressed"),
-    wire(b'C', 2, Mode::Analog, false, "ADC1_IN12", "supply voltage through 10 kΩ; 1 kΩ to ground"),
-    wire(b'A', 2, Mode::Alternate(7), false, "USART2_TX", "serial line to the host"),
-    wire(b'A', 3, Mode::Alternate(7), true, "USART2_RX", "serial line from the host"),
+/// The wiring of all boards whose pins are free: all pins exist on the 64-pin packages of STM32F405, STM32F407 and
+/// STM32F446, with the same functions. The status LED is the board's own.
+pub(crate) const STANDARD: [Wire; 21] = [
+    encoder(0, b'A', b'A', 15, 1, "TIM2_CH1"),
+    encoder(0, b'B', b'B', 3, 1, "TIM2_CH2"),
+    encoder(1, b'A', b'A', 0, 2, "TIM5_CH1"),
+    encoder(1, b'B', b'A', 1, 2, "TIM5_CH2"),
+    encoder(2, b'A', b'B', 4, 2, "TIM3_CH1"),
+    encoder(2, b'B', b'B', 5, 2, "TIM3_CH2"),
+    encoder(3, b'A', b'B', 6, 2, "TIM4_CH1"),
+    encoder(3, b'B', b'B', 7, 2, "TIM4_CH2"),
+    encoder(4, b'A', b'C', 6, 3, "TIM8_CH1"),
+    encoder(4, b'B', b'C', 7, 3, "TIM8_CH2"),
+    wire(Signal::Pwm, b'A', 8, Mode::Alternate(1), false, "TIM1_CH1"),
+    output(Signal::Direction, b'B', 14),
+    output(Signal::Enable, b'B', 15),
+    wire(Signal::DriverFault, b'B', 13, Mode::Input, true, "input"),
+    wire(Signal::EmergencyStop, b'B', 12, Mode::Alternate(1), true, "TIM1_BKIN"),
+    wire(Signal::LimitLow, b'C', 0, Mode::Input, true, "input"),
+    wire(Signal::LimitHigh, b'C', 1, Mode::Input, true, "input"),
+    wire(Signal::Supply, b'C', 2, Mode::Analog, false, "ADC1_IN12"),
+    wire(Signal::Transmit, b'A', 2, Mode::Alternate(7), false, "USART2_TX"),
+    wire(Signal::Receive, b'A', 3, Mode::Alternate(7), true, "USART2_RX"),
+    output(Signal::Tick, b'B', 1),
 ];
 
-/// The status LED of each board: on after a normal start, off after a crash.
-pub(crate) const STATUS_LEDS: [Wire; 3] = [
-    wire(b'C', 13, Mode::Output, false, "output", "status LED (STM32F405)"),
-    wire(b'D', 12, Mode::Output, false, "output", "status LED (STM32F407 Discovery: green)"),
-    wire(b'A', 5, Mode::Output, false, "output", "status LED (STM32F446 Nucleo: LD2)"),
-];
+/// The wire of a signal; a board without it does not compile.
+pub(crate) const fn wire_of(wiring: &[Wire], signal: Signal) -> Wire {
+    let mut i = 0;
+    while i < wiring.len() {
+        if wiring[i].signal.code() == signal.code() {
+            return wiring[i];
+        }
+        i += 1;
+    }
+    panic!("a signal has no pin")
+}
 
-/// Pin of port B: motor direction.
-pub(crate) const DIRECTION: u8 = 14;
-/// Pin of port B: enable of the power stage.
-pub(crate) const ENABLE: u8 = 15;
-/// Pin of port B: fault of the power stage.
-pub(crate) const DRIVER_FAULT: u8 = 13;
-/// Pin of port B: emergency stop.
-pub(crate) const EMERGENCY_STOP: u8 = 12;
-/// Pin of port C: limit switch at the low end.
-pub(crate) const LIMIT_LOW: u8 = 0;
-/// Pin of port C: limit switch at the high end.
-pub(crate) const LIMIT_HIGH: u8 = 1;
-
-const fn wire(
+pub(crate) const fn wire(
+    signal: Signal,
     port: u8,
     pin: u8,
     mode: Mode,
     pull_up: bool,
     function: &'static str,
-    signal: &'static str,
 ) -> Wire {
-    Wire { port, pin, mode, pull_up, function, signal }
+    Wire { signal, port, pin, mode, pull_up, function }
 }
 
-/// An input with the pull-up that open-collector encoders need.
-const fn encoder(port: u8, pin: u8, alternate: u8, function: &'static str, signal: &'static str) -> Wire {
-    wire(port, pin, Mode::Alternate(alternate), true, function, signal)
+/// An output, such as a status LED.
+pub(crate) const fn output(signal: Signal, port: u8, pin: u8) -> Wire {
+    wire(signal, port, pin, Mode::Output, false, "output")
+}
+
+/// An input with the pull-up that open-collector encoders need at the least.
+const fn encoder(sensor: u8, channel: u8, port: u8, pin: u8, number: u8, function: &'static str) -> Wire {
+    wire(Signal::Encoder(sensor, channel), port, pin, Mode::Alternate(number), true, function)
 }

@@ -3,6 +3,7 @@
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
 
+use super::board::Board;
 use super::compiler::{Compiler, compiler, target_directory};
 use crate::project::{NoCheckout, checkout};
 use upright_design::rig::Rig;
@@ -16,12 +17,8 @@ pub const PROFILE: &str = "firmware";
 /// Which image.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Kind {
-    /// For a board with an STM32F405.
-    F405,
-    /// For a board with an STM32F407.
-    F407,
-    /// For a board with an STM32F446.
-    F446,
+    /// For a board.
+    Board(Board),
     /// For QEMU, pins as files.
     InTheLoop,
     /// For QEMU, pins as a serial line.
@@ -32,9 +29,7 @@ impl Kind {
     /// The cargo feature that makes it.
     pub fn feature(self) -> &'static str {
         match self {
-            Kind::F405 => "stm32f405",
-            Kind::F407 => "stm32f407",
-            Kind::F446 => "stm32f446",
+            Kind::Board(board) => board.name(),
             Kind::InTheLoop => "in-the-loop",
             Kind::InTheLoopUsart => "in-the-loop-usart",
         }

@@ -1,5 +1,6 @@
 //! Images for the microcontroller: built with the compiler that is installed, and examined for size, stack and panics.
 
+mod board;
 mod build;
 mod compiler;
 mod elf;
@@ -8,6 +9,7 @@ mod size;
 mod stack;
 mod thumb;
 
+pub use board::{Board, NoBoard};
 pub use build::{ImageError, Kind, PROFILE, TARGET, build, build_for, build_if_possible};
 pub use compiler::{Compiler, compiler};
 pub use elf::{ElfError, Image};

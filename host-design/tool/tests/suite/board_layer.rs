@@ -6,8 +6,10 @@ use upright::protocol::message::{Answer, Command, Message, Reply, Request, Telem
 use upright::supervision::fault::Fault;
 use upright::supervision::inhibits::Inhibits;
 use upright::supervision::supervisor::State;
-use upright_board::{Board, Chip, Conditions, Image, Input, Rules, Wire, Wiring, pin, seconds};
-use upright_tool::image::{Kind, build_if_possible};
+use upright_board::{
+    Board as VirtualBoard, Chip, Conditions, Image, Input, Rules, Wire, Wiring, pin, seconds,
+};
+use upright_tool::image::{Board, Kind, build_if_possible};
 
 const BAUD: u32 = 460_800;
 const TIM1: u32 = 0x4001_0000;
@@ -15,13 +17,13 @@ const RCC_CR: u32 = 0x4002_3800;
 
 /// The image; none without a compiler.
 fn image() -> Option<Image> {
-    let elf = build_if_possible(Kind::F405).unwrap()?;
+    let elf = build_if_possible(Kind::Board(Board::WeactF405)).unwrap()?;
     Some(Image::from_elf(&std::fs::read(elf).unwrap()).unwrap())
 }
 
 /// A board with all contacts closed and the motor's supply on.
 struct Powered {
-    board: Board,
+    board: VirtualBoard,
     frames: Receiver<512>,
     telemetry: Vec<Telemetry<STATES, SENSORS>>,
     replies: Vec<Reply>,
@@ -29,7 +31,7 @@ struct Powered {
 
 impl Powered {
     fn with(image: &Image, conditions: &Conditions, rules: Rules) -> Self {
-        let mut board = Board::power_on(image, conditions, Wiring::upright(), rules).unwrap();
+        let mut board = VirtualBoard::power_on(image, conditions, Wiring::upright(), rules).unwrap();
         for contact in [pin('B', 12), pin('C', 0), pin('C', 1)] {
             board.apply(Input::Level(contact, Wire::Low));
         }
@@ -209,4 +211,43 @@ fn a_low_supply_of_the_chip_is_noticed_however_short_it_is() {
     run.board.apply(Input::ChipSupply(3.3));
     run.run(0.1);
     assert_eq!(run.last(), (State::Fault, Some(Fault::Board)));
+}
+
+/// The pin is high while a tick runs, and only then: 5 to 50 µs of each millisecond.
+#[test]
+fn a_pin_shows_the_tick() {
+    let Some(image) = image() else { return };
+    let mut run = Powered::strict(&image, &Conditions::f405(1));
+    run.run(0.05);
+    let samples = 20_000;
+    let high = (0..samples).filter(|_| {
+        run.board.run_until(run.board.now() + seconds(0.000_001)).unwrap();
+        run.board.output(pin('B', 1))
+    });
+    let share = high.count() as f64 / f64::from(samples);
+    assert!((0.005..0.05).contains(&share), "{share}");
+}
+
+#[test]
+fn every_board_starts_with_its_own_clock_and_led() {
+    let crystal = Conditions::f405(1);
+    let fitted = Conditions { chip: Chip::F446, ..Conditions::f405(1) };
+    let mut clock_input = fitted.clone();
+    clock_input.crystal.is_clock_input = true;
+    let discovery = Conditions { chip: Chip::F407, chip_v: 3.0, ..crystal.clone() };
+    for (board, conditions, led, is_low) in [
+        (Board::WeactF405, &crystal, pin('B', 2), false),
+        (Board::OlimexH405, &crystal, pin('C', 12), true),
+        (Board::DiscoveryF407, &discovery, pin('D', 12), false),
+        (Board::NucleoF446, &clock_input, pin('A', 5), false),
+        (Board::NucleoF446, &fitted, pin('A', 5), false),
+    ] {
+        let Some(elf) = build_if_possible(Kind::Board(board)).unwrap() else { return };
+        let image = Image::from_elf(&std::fs::read(elf).unwrap()).unwrap();
+        let mut run = Powered::strict(&image, conditions);
+        run.run(0.5);
+        assert_eq!(run.last(), (State::Disarmed, None), "{board}");
+        assert_eq!(run.board.output(led), !is_low, "{board}");
+        assert_eq!(run.board.core_hz(), 168_000_000);
+    }
 }

@@ -128,7 +128,9 @@ impl OnTheBoard {
 
 #[test]
 fn the_flashed_image_balances_from_power_up() {
-    let Some(elf) = build_if_possible(Kind::F405).unwrap() else { return };
+    let Some(elf) = build_if_possible(Kind::Board(upright_tool::image::Board::WeactF405)).unwrap() else {
+        return;
+    };
     let image = Image::from_elf(&std::fs::read(elf).unwrap()).unwrap();
     let rig = Rig::from_path("../../rigs/quadruple-paper.toml".as_ref()).unwrap();
     assert_eq!(rig.hash(), RIG_HASH);

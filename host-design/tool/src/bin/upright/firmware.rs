@@ -8,7 +8,7 @@ mod size;
 
 use std::path::{Path, PathBuf};
 
-use clap::{Args, Subcommand, ValueEnum};
+use clap::{Args, Subcommand};
 use upright_design::design::design;
 use upright_design::rig::Rig;
 use upright_design::table::{Gains, TableValues};
@@ -41,33 +41,6 @@ impl Firmware {
             Command::Flash(command) => command.run(),
             Command::Run(command) => command.run(),
             Command::Monitor(command) => command.run(),
-        }
-    }
-}
-
-/// A board by the name of its microcontroller.
-#[derive(Clone, Copy, ValueEnum)]
-enum Board {
-    Stm32f405,
-    Stm32f407,
-    Stm32f446,
-}
-
-impl Board {
-    fn kind(self) -> Kind {
-        match self {
-            Board::Stm32f405 => Kind::F405,
-            Board::Stm32f407 => Kind::F407,
-            Board::Stm32f446 => Kind::F446,
-        }
-    }
-
-    /// Its name in probe-rs.
-    fn chip(self) -> &'static str {
-        match self {
-            Board::Stm32f405 => "STM32F405RGTx",
-            Board::Stm32f407 => "STM32F407VGTx",
-            Board::Stm32f446 => "STM32F446RETx",
         }
     }
 }

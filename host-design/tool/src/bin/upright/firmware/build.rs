@@ -4,8 +4,9 @@ use std::io::Write;
 use std::path::PathBuf;
 
 use clap::Args;
+use upright_tool::image::{Board, Kind};
 
-use super::{Board, built};
+use super::built;
 use crate::failure::Failure;
 
 /// Builds the image of a board and prints the path of its ELF file.
@@ -17,18 +18,18 @@ use crate::failure::Failure;
 Examples:
   upright firmware build                                      with src/gains.rs as it is
   upright firmware build rigs/single-quanser-ip02.toml        with the gains of another rig
-  upright firmware build --board stm32f446")]
+  upright firmware build --board nucleo-f446")]
 pub(crate) struct Build {
     /// Rig file (TOML), to be designed [default: the table in src/gains.rs]
     rig: Option<PathBuf>,
-    /// Microcontroller of the board
-    #[arg(long, value_enum, default_value_t = Board::Stm32f405)]
+    /// Board: weact-f405, olimex-h405, discovery-f407 or nucleo-f446
+    #[arg(long, value_name = "NAME", default_value_t = Board::WeactF405)]
     board: Board,
 }
 
 impl Build {
     pub(crate) fn run(self) -> Result<(), Failure> {
-        let image = built(self.board.kind(), self.rig.as_deref())?;
+        let image = built(Kind::Board(self.board), self.rig.as_deref())?;
         writeln!(std::io::stdout(), "{}", image.display())?;
         Ok(())
     }

@@ -4,8 +4,9 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 
 use clap::Args;
+use upright_tool::image::{Board, Kind};
 
-use super::{Board, built};
+use super::built;
 use crate::failure::Failure;
 
 const PROBE_RS: &str = "probe-rs";
@@ -17,12 +18,12 @@ const PROBE_RS: &str = "probe-rs";
 #[command(before_help = "\
 Examples:
   upright firmware flash                                      with src/gains.rs as it is
-  upright firmware flash rigs/single-quanser-ip02.toml --board stm32f446")]
+  upright firmware flash rigs/single-quanser-ip02.toml --board nucleo-f446")]
 pub(crate) struct Flash {
     /// Rig file (TOML), to be designed [default: the table in src/gains.rs]
     rig: Option<PathBuf>,
-    /// Microcontroller of the board
-    #[arg(long, value_enum, default_value_t = Board::Stm32f405)]
+    /// Board: weact-f405, olimex-h405, discovery-f407 or nucleo-f446
+    #[arg(long, value_name = "NAME", default_value_t = Board::WeactF405)]
     board: Board,
 }
 
@@ -34,7 +35,7 @@ impl Flash {
                 "probe-rs is missing: install it (https://probe.rs, or `cargo install probe-rs-tools --locked`)",
             ));
         }
-        let image = built(self.board.kind(), self.rig.as_deref())?;
+        let image = built(Kind::Board(self.board), self.rig.as_deref())?;
         probe_rs(&["download", "--verify", "--chip", self.board.chip()], Some(&image))?;
         probe_rs(&["reset", "--chip", self.board.chip()], None)
     }

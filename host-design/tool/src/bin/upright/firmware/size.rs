@@ -7,10 +7,11 @@ use std::path::PathBuf;
 use clap::Args;
 use serde_json::json;
 use upright_tool::image::{
-    FLASH_LIMIT, Image, Part, RAM_LIMIT, StackBound, StackError, forbidden_functions, size, stack_bound,
+    Board, FLASH_LIMIT, Image, Kind, Part, RAM_LIMIT, StackBound, StackError, forbidden_functions, size,
+    stack_bound,
 };
 
-use super::{Board, built};
+use super::built;
 use crate::failure::Failure;
 
 /// Measures the image of a board: flash and RAM by section and by crate, a bound on its stack, and whether it can
@@ -20,13 +21,13 @@ use crate::failure::Failure;
 #[command(before_help = "\
 Examples:
   upright firmware size                                       builds it with src/gains.rs as it is
-  upright firmware size rigs/single-quanser-ip02.toml --board stm32f446
+  upright firmware size rigs/single-quanser-ip02.toml --board nucleo-f446
   upright firmware size --elf target/image.elf --json | jq .stack.bytes")]
 pub(crate) struct Size {
     /// Rig file (TOML), to be designed [default: the table in src/gains.rs]
     rig: Option<PathBuf>,
-    /// Microcontroller of the board
-    #[arg(long, value_enum, default_value_t = Board::Stm32f405)]
+    /// Board: weact-f405, olimex-h405, discovery-f407 or nucleo-f446
+    #[arg(long, value_name = "NAME", default_value_t = Board::WeactF405)]
     board: Board,
     /// Measure this image instead of building one
     #[arg(long, value_name = "FILE", conflicts_with_all = ["rig", "board"])]
@@ -40,7 +41,7 @@ impl Size {
     pub(crate) fn run(self) -> Result<(), Failure> {
         let path = match self.elf {
             Some(path) => path,
-            None => built(self.board.kind(), self.rig.as_deref())?,
+            None => built(Kind::Board(self.board), self.rig.as_deref())?,
         };
         let image = Image::read(&path)?;
         let (size, stack, forbidden) = (size(&image)?, stack_bound(&image), forbidden_functions(&image));

@@ -1,0 +1,57 @@
+//! The boards by name. What each of them is stands in the firmware: `src/board/f4/boards/`.
+
+/// A board that there is an image for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Board {
+    /// WeAct Studio STM32F405 core board.
+    WeactF405,
+    /// Olimex STM32-H405.
+    OlimexH405,
+    /// ST STM32F407G-DISC1.
+    DiscoveryF407,
+    /// ST NUCLEO-F446RE.
+    NucleoF446,
+}
+
+impl Board {
+    /// All boards; the first one is the default.
+    pub const ALL: [Self; 4] = [Self::WeactF405, Self::OlimexH405, Self::DiscoveryF407, Self::NucleoF446];
+
+    /// Name on the command line, and of the cargo feature.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Board::WeactF405 => "weact-f405",
+            Board::OlimexH405 => "olimex-h405",
+            Board::DiscoveryF407 => "discovery-f407",
+            Board::NucleoF446 => "nucleo-f446",
+        }
+    }
+
+    /// Name of its microcontroller in probe-rs.
+    pub const fn chip(self) -> &'static str {
+        match self {
+            Board::WeactF405 | Board::OlimexH405 => "STM32F405RGTx",
+            Board::DiscoveryF407 => "STM32F407VGTx",
+            Board::NucleoF446 => "STM32F446RETx",
+        }
+    }
+}
+
+/// A name that is no board's.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error("no board has this name; give {}", Board::ALL.map(Board::name).join(", "))]
+pub struct NoBoard;
+
+impl std::str::FromStr for Board {
+    type Err = NoBoard;
+
+    fn from_str(name: &str) -> Result<Self, NoBoard> {
+        Board::ALL.into_iter().find(|board| board.name() == name).ok_or(NoBoard)
+    }
+}
+
+impl std::fmt::Display for Board {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.pad(self.name())
+    }
+}

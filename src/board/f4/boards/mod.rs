@@ -1,0 +1,73 @@
+//! The boards, one file each: all that the image has to know about a board. A cargo feature of the same name selects one.
+
+#[allow(dead_code, reason = "only one board is selected")]
+mod discovery_f407;
+#[allow(dead_code, reason = "only one board is selected")]
+mod nucleo_f446;
+#[allow(dead_code, reason = "only one board is selected")]
+mod olimex_h405;
+#[allow(dead_code, reason = "only one board is selected")]
+mod weact_f405;
+
+use super::wiring::Wire;
+
+/// A board.
+pub(crate) struct BoardData {
+    /// Name of the board and of the cargo feature.
+    #[cfg_attr(target_os = "none", allow(dead_code, reason = "for the table of the documentation"))]
+    pub(crate) name: &'static str,
+    /// What is printed on it.
+    #[cfg_attr(target_os = "none", allow(dead_code, reason = "for the table of the documentation"))]
+    pub(crate) title: &'static str,
+    /// The microcontroller's type, which the image checks.
+    pub(crate) chip: Chip,
+    /// Frequency at HSE (Hz), a multiple of 1 MHz; the image measures it.
+    pub(crate) crystal_hz: u32,
+    /// Where the clock at HSE comes from, in the order in which it is tried.
+    pub(crate) sources: &'static [Source],
+    /// The pins, except that of the status LED.
+    pub(crate) wiring: &'static [Wire],
+    /// The status LED.
+    pub(crate) status_led: Wire,
+    /// Whether the status LED is on while its pin is low.
+    pub(crate) status_led_is_low: bool,
+    /// Supply voltage of the power stage over the voltage at its pin.
+    pub(crate) supply_divider: f32,
+    /// The microcontroller's supply (V), for a chip without the factory's reading of its reference.
+    pub(crate) reference_v: f32,
+    /// What else a user has to know.
+    #[cfg_attr(target_os = "none", allow(dead_code, reason = "for the table of the documentation"))]
+    pub(crate) special: &'static str,
+}
+
+/// A type of microcontroller.
+#[derive(Clone, Copy)]
+pub(crate) enum Chip {
+    /// STM32F405 and STM32F407, which their identifier does not tell apart.
+    F405OrF407 = 0x413,
+    /// STM32F446.
+    F446 = 0x421,
+}
+
+/// Where the clock at HSE comes from.
+#[derive(Clone, Copy, PartialEq)]
+pub(crate) enum Source {
+    /// A crystal.
+    Crystal,
+    /// A clock from outside: the oscillator is bypassed.
+    Clock,
+}
+
+/// All boards.
+#[cfg_attr(target_os = "none", allow(dead_code, reason = "for the table of the documentation"))]
+pub(crate) const ALL: [&BoardData; 4] =
+    [&weact_f405::BOARD, &olimex_h405::BOARD, &discovery_f407::BOARD, &nucleo_f446::BOARD];
+
+#[cfg(feature = "discovery-f407")]
+pub(crate) use discovery_f407::BOARD;
+#[cfg(feature = "nucleo-f446")]
+pub(crate) use nucleo_f446::BOARD;
+#[cfg(feature = "olimex-h405")]
+pub(crate) use olimex_h405::BOARD;
+#[cfg(feature = "weact-f405")]
+pub(crate) use weact_f405::BOARD;

@@ -1,0 +1,19 @@
+//! ST NUCLEO-F446RE, all revisions.
+
+use super::super::wiring::{STANDARD, Signal, output};
+use super::{BoardData, Chip, Source};
+
+pub(crate) const BOARD: BoardData = BoardData {
+    name: "nucleo-f446",
+    title: "NUCLEO-F446RE",
+    chip: Chip::F446,
+    crystal_hz: 8_000_000,
+    sources: &[Source::Clock, Source::Crystal],
+    wiring: &STANDARD,
+    status_led: output(Signal::StatusLed, b'A', 5),
+    status_led_is_low: false,
+    supply_divider: 11.0,
+    reference_v: 3.3,
+    special: "the debugger supplies the clock and the serial line (USB); MB1136 C-01 has neither clock nor crystal: close SB16 and \
+              SB50, or fit a crystal; PB3 is also the debugger's SWO input",
+};

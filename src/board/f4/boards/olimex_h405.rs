@@ -1,0 +1,18 @@
+//! Olimex STM32-H405.
+
+use super::super::wiring::{STANDARD, Signal, output};
+use super::{BoardData, Chip, Source};
+
+pub(crate) const BOARD: BoardData = BoardData {
+    name: "olimex-h405",
+    title: "Olimex STM32-H405",
+    chip: Chip::F405OrF407,
+    crystal_hz: 8_000_000,
+    sources: &[Source::Crystal],
+    wiring: &STANDARD,
+    status_led: output(Signal::StatusLed, b'C', 12),
+    status_led_is_low: true,
+    supply_divider: 11.0,
+    reference_v: 3.3,
+    special: "PA0 is also the button BUT: do not press it; a debugger has to use SWD, because PA15, PB3 and PB4 are JTAG pins",
+};

@@ -1,0 +1,18 @@
+//! WeAct Studio STM32F405 core board.
+
+use super::super::wiring::{STANDARD, Signal, output};
+use super::{BoardData, Chip, Source};
+
+pub(crate) const BOARD: BoardData = BoardData {
+    name: "weact-f405",
+    title: "WeAct STM32F405",
+    chip: Chip::F405OrF407,
+    crystal_hz: 8_000_000,
+    sources: &[Source::Crystal],
+    wiring: &STANDARD,
+    status_led: output(Signal::StatusLed, b'B', 2),
+    status_led_is_low: false,
+    supply_divider: 11.0,
+    reference_v: 3.3,
+    special: "PB2 is the LED and BOOT1; the key is at PC13",
+};
