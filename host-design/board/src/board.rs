@@ -41,6 +41,14 @@ pub enum Input {
     Halt(bool),
     /// The next write to this register is lost.
     LoseWrite(u32),
+    /// As [`Input::LoseWrite`], but reading gives what was written: for negative controls.
+    LoseWriteUnseen(u32),
+    /// The core stands still until this time, and everything else goes on.
+    Stall(Time),
+    /// The program counter changes, as by a defect inside the core.
+    Jump(u32),
+    /// The stack pointer changes, as after calls without end.
+    StackPointer(u32),
     /// A bit of memory (flash, SRAM) changes.
     FlipBit {
         /// Address of the byte.
@@ -65,8 +73,12 @@ pub struct PowerStage {
     pub pwm: bool,
     /// Whether the timer may drive PWM (MOE).
     pub main_output: bool,
+    /// Whether the PWM timer counts.
+    pub runs: bool,
     /// PWM period in timer clocks, as it is active now.
     pub period_clocks: u32,
+    /// Timer clocks of each period for which PWM is high, as they are active now.
+    pub high_clocks: u32,
     /// When the PWM timer was started the last time.
     pub started_at: Time,
 }
@@ -171,7 +183,16 @@ impl Board {
             Input::StopCrystal => bus.stop_crystal(),
             Input::Reset(low) => self.hold(low, 0),
             Input::Halt(halted) => bus.halt(halted),
-            Input::LoseWrite(register) => bus.lost_write = Some(register),
+            Input::LoseWrite(register) | Input::LoseWriteUnseen(register) => {
+                bus.lost_write = Some(register);
+                bus.lost_write_is_hidden = matches!(input, Input::LoseWriteUnseen(_));
+            }
+            Input::Stall(until) => machine.stalled_until = until,
+            Input::Jump(address) => {
+                machine.registers.pc = address & !1;
+                machine.asleep = false;
+            }
+            Input::StackPointer(address) => machine.registers.r[13] = address & !3,
             Input::FlipBit { address, bit } => self.flip(address, bit),
             Input::IgnoreWatchdog => bus.iwdg.ignored = true,
             Input::IgnoreBreak => bus.pwm.break_ignored = true,
@@ -253,7 +274,9 @@ impl Board {
             along: bus.output_level(bus.wiring.direction),
             pwm: bus.pwm.level(),
             main_output: bus.pwm.main_output(),
+            runs: bus.pwm.runs(),
             period_clocks: bus.pwm.period_clocks(),
+            high_clocks: bus.pwm.active_clocks(),
             started_at: bus.pwm.started_at,
         }
     }
@@ -306,6 +329,11 @@ impl Board {
             16 => registers.xpsr(),
             _ => registers.r[i],
         })
+    }
+
+    /// When SysTick interrupts the next time; `None` if it does not run.
+    pub fn next_tick(&self) -> Option<Time> {
+        self.machine.bus.system.next_tick()
     }
 
     /// Frequency of the core (Hz).

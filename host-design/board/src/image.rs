@@ -1,12 +1,13 @@
 //! Images: what an ELF file puts into flash.
 
-use object::{Object, ObjectSegment, ObjectSymbol};
+use object::{Object, ObjectSymbol};
 
 /// What is flashed.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Image {
     pub(crate) segments: Vec<(u32, Vec<u8>)>,
-    symbols: Vec<(String, u32)>,
+    /// Name, address, bytes.
+    symbols: Vec<(String, u32, u32)>,
 }
 
 /// A file that is no image.
@@ -54,9 +55,10 @@ impl Image {
         }
         let symbols = file
             .symbols()
-            .filter_map(|symbol| Some((symbol.name().ok()?.to_owned(), symbol.address() as u32)))
+            .filter_map(|symbol| {
+                Some((symbol.name().ok()?.to_owned(), symbol.address() as u32, symbol.size() as u32))
+            })
             .collect();
-        let _ = file.segments().map(|segment| segment.address());
         Ok(Self { segments, symbols })
     }
 
@@ -67,7 +69,13 @@ impl Image {
 
     /// Address of a symbol.
     pub fn symbol(&self, name: &str) -> Option<u32> {
-        self.symbols.iter().find(|(known, _)| known == name).map(|&(_, address)| address)
+        self.symbols.iter().find(|(known, ..)| known == name).map(|&(_, address, _)| address)
+    }
+
+    /// Where the first function or variable lies whose (mangled) name contains this.
+    pub fn object(&self, part_of_name: &str) -> Option<std::ops::Range<u32>> {
+        let found = self.symbols.iter().find(|(name, _, bytes)| *bytes > 0 && name.contains(part_of_name));
+        found.map(|&(_, address, bytes)| address..address + bytes)
     }
 
     /// Bytes of flash up to the end of the image.

@@ -27,6 +27,8 @@ pub(crate) struct Machine {
     pub(crate) loaded: bool,
     pub(crate) asleep: bool,
     pub(crate) locked_up: bool,
+    /// The core stands still until then, and everything else goes on.
+    pub(crate) stalled_until: Time,
     /// Held in reset, or without power.
     pub(crate) held: bool,
     pub(crate) event: bool,
@@ -55,6 +57,7 @@ impl Machine {
             loaded: false,
             asleep: false,
             locked_up: false,
+            stalled_until: 0,
             held: false,
             event: false,
             exclusive: false,
@@ -77,6 +80,7 @@ impl Machine {
         self.registers.pc = start & !1;
         self.asleep = false;
         self.locked_up = false;
+        self.stalled_until = 0;
         self.exclusive = false;
         self.resets += 1;
         if start & 1 == 0 {
@@ -117,6 +121,10 @@ impl Machine {
             }
             if self.held || self.locked_up || self.bus.rcc.stopped || self.bus.debug_freeze.halted {
                 self.bus.now = self.idle_until(end);
+                continue;
+            }
+            if self.bus.now < self.stalled_until {
+                self.bus.now = self.idle_until(end.min(self.stalled_until));
                 continue;
             }
             if self.bus.system.nvic.changed && self.take_pending()? {

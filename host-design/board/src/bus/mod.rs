@@ -39,7 +39,7 @@ pub struct Driven {
 }
 
 /// What differs from board to board and from power-on to power-on.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Conditions {
     /// The chip.
     pub chip: Chip,
@@ -112,6 +112,10 @@ pub(crate) struct Bus {
     pub(crate) watchdog_reset: bool,
     /// A register whose next write is lost.
     pub(crate) lost_write: Option<u32>,
+    /// With it, reading that register gives what was written: for negative controls.
+    pub(crate) lost_write_is_hidden: bool,
+    /// What was lost there, if reading is to give it.
+    hidden: Option<(u32, u32)>,
 }
 
 impl Bus {
@@ -169,6 +173,8 @@ impl Bus {
             driven_until: 0,
             watchdog_reset: false,
             lost_write: None,
+            lost_write_is_hidden: false,
+            hidden: None,
         }
     }
 

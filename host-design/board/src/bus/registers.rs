@@ -103,7 +103,10 @@ impl Bus {
         if !self.has_clock(place, address)? {
             return Ok(0);
         }
-        let value = self.read_place(place, offset) >> shift;
+        let value = match self.hidden {
+            Some((hidden, value)) if hidden == word => value,
+            _ => self.read_place(place, offset),
+        } >> shift;
         Ok(if bytes == 4 { value } else { value & ((1 << (8 * bytes)) - 1) })
     }
 
@@ -111,6 +114,9 @@ impl Bus {
     pub(crate) fn write_register(&mut self, address: u32, bytes: u32, value: u32) -> Result<(), Trap> {
         self.touched = true;
         if address >> 20 == 0xe00 && address & !0x3ff != 0xe004_2000 {
+            if self.is_lost(address, value) {
+                return Ok(());
+            }
             return self.write_system(address, bytes, value);
         }
         let Some((place, base)) = place(address) else {
@@ -136,8 +142,7 @@ impl Bus {
         } else {
             value & ((1 << (8 * bytes)) - 1)
         };
-        if self.lost_write == Some(address) {
-            self.lost_write = None;
+        if self.is_lost(address, value) {
             return Ok(());
         }
         if !self.has_clock(place, address)? && self.rules.early_is_lost {
@@ -151,6 +156,16 @@ impl Bus {
         }
         self.refresh();
         Ok(())
+    }
+
+    /// Whether this write is the one that is to be lost.
+    fn is_lost(&mut self, address: u32, value: u32) -> bool {
+        let lost = self.lost_write == Some(address);
+        if lost {
+            self.lost_write = None;
+            self.hidden = self.lost_write_is_hidden.then_some((address, value));
+        }
+        lost
     }
 
     fn check_bits(&mut self, address: u32, bits: Bits, value: u32) -> Result<(), Trap> {

@@ -260,6 +260,16 @@ impl PwmTimer {
         self.protection & MAIN_OUTPUT != 0
     }
 
+    /// Whether the counter counts.
+    pub(crate) fn runs(&self) -> bool {
+        self.control & ENABLED != 0
+    }
+
+    /// Timer clocks of a period in which the output is active.
+    pub(crate) fn active_clocks(&self) -> u32 {
+        self.high_clocks(0, self.period_active + 1)
+    }
+
     /// PWM period in timer clocks.
     pub(crate) fn period_clocks(&self) -> u32 {
         self.period_active + 1

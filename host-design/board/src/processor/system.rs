@@ -128,6 +128,11 @@ impl System {
         }
     }
 
+    /// When the tick's timer interrupts the next time; `None` if it does not.
+    pub(crate) fn next_tick(&self) -> Option<Time> {
+        Some(self.deadline()).filter(|&at| at != NEVER && self.systick.control & 2 != 0)
+    }
+
     /// Lets happen what is due.
     pub(crate) fn advance(&mut self, now: Time, hclk: Time) {
         while self.deadline() <= now {

@@ -24,6 +24,9 @@ pub enum HarnessError {
         /// What the emulator printed, after ": ".
         message: String,
     },
+    /// The virtual board, or what runs on it.
+    #[error("the virtual board {0}")]
+    Board(String),
     /// A frame that cannot be read.
     #[error("the firmware's answer cannot be read: {0}")]
     Frame(#[from] FrameError),

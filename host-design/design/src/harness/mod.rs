@@ -23,4 +23,4 @@ pub use in_process::{with_firmware, with_table};
 pub use record::{Recording, Tick, record};
 pub use session::{AnyTelemetry, HEARTBEAT_S, Session};
 pub use start_up::Harness;
-pub use target::{Pins, Target};
+pub use target::{Pace, Pins, Target};

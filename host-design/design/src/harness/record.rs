@@ -10,7 +10,7 @@ use upright::supervision::supervisor::State;
 use super::error::HarnessError;
 use super::session::{AnyTelemetry, HEARTBEAT_S, Session};
 use super::start_up::Harness;
-use super::target::Target;
+use super::target::{Pace, Target};
 use crate::rig::Rig;
 use crate::simulate::{Fall, Sample, Scenario, Sensing, Summary, Trace, ticks};
 use crate::table::TableValues;
@@ -54,7 +54,8 @@ pub fn record(
     target: &mut dyn Target,
 ) -> Result<Recording, HarnessError> {
     let period_s = rig.tick.period_s;
-    check(scenario, period_s)?;
+    let pace = target.pace();
+    check(scenario, period_s, pace)?;
     let mut harness = Harness::new(rig, table, scenario, target)?;
     let target_at = |tick: usize| {
         let t = tick as f64 * period_s;
@@ -63,15 +64,14 @@ pub fn record(
     let mut output = harness.raise(Some(target_at(0) as f32))?;
     let mut commanded = target_at(0);
     let last = ticks(rig, scenario)?;
-    let mut record = Record::new(rig, last);
+    let mut record = Record::new(rig, last, pace.telemetry_ticks.into());
     let heartbeat = (HEARTBEAT_S / period_s).max(1.0) as usize;
     for tick in 0..=last {
         if tick > 0 {
             let inputs = harness.inputs();
             output = harness.session.tick(&inputs)?;
         }
-        // A command that is sent now takes effect after COMMAND_TICKS.
-        let ahead = target_at(tick + COMMAND_TICKS);
+        let ahead = target_at(tick + pace.command_ticks);
         if commanded != ahead {
             harness.session.send(Request::Setpoint(ahead as f32));
             commanded = ahead;
@@ -82,7 +82,8 @@ pub fn record(
         let fall = Fall::of(rig, t, harness.bench.state());
         let state = harness.bench.state().to_vec();
         let force = harness.bench.tick(output.drive);
-        record.pending.push_back(Pending { t, target: target_at(tick), state, force, output });
+        let number = harness.session.tick_number();
+        record.pending.push_back(Pending { number, t, target: target_at(tick), state, force, output });
         record.take(&mut harness.session)?;
         if fall.is_some() {
             record.fall = fall;
@@ -97,23 +98,20 @@ pub fn record(
 }
 
 /// Whether the firmware can run this scenario.
-fn check(scenario: &Scenario, period_s: f64) -> Result<(), HarnessError> {
+fn check(scenario: &Scenario, period_s: f64, pace: Pace) -> Result<(), HarnessError> {
     if scenario.sensing != Sensing::Encoders {
         return Err(HarnessError::FullState);
     }
-    let least_s = COMMAND_TICKS as f64 * period_s;
+    let least_s = pace.command_ticks as f64 * period_s;
     if scenario.step_at_s > 0.0 && scenario.step_at_s < least_s {
         return Err(HarnessError::StepAt { at_s: scenario.step_at_s, least_s });
     }
     Ok(())
 }
 
-/// Ticks from sending a command to the first tick that follows it: it is executed at the end of the tick after the one
-/// it came with.
-const COMMAND_TICKS: usize = 3;
-
 /// A tick whose telemetry has not come yet.
 struct Pending {
+    number: u32,
     t: f64,
     target: f64,
     state: Vec<f64>,
@@ -126,18 +124,20 @@ struct Record {
     ticks: Vec<Tick>,
     pending: VecDeque<Pending>,
     next_tick: Option<u32>,
+    telemetry_ticks: u32,
     fall: Option<Fall>,
     fault: Option<Fault>,
     worst_cycles: u32,
 }
 
 impl Record {
-    fn new(rig: &Rig, ticks: usize) -> Self {
+    fn new(rig: &Rig, ticks: usize, telemetry_ticks: u32) -> Self {
         Self {
             trace: Trace::new(rig, ticks),
             ticks: Vec::with_capacity(ticks + 1),
             pending: VecDeque::new(),
             next_tick: None,
+            telemetry_ticks,
             fall: None,
             fault: None,
             worst_cycles: 0,
@@ -154,10 +154,15 @@ impl Record {
             if telemetry.tick != expected {
                 return Err(HarnessError::Lost(expected));
             }
-            let Some(Pending { t, target, state, force, output }) = self.pending.pop_front() else {
+            // Ticks in between have no telemetry.
+            let older = |first: &Pending| (first.number.wrapping_sub(telemetry.tick) as i32) < 0;
+            while self.pending.front().is_some_and(older) {
+                self.pending.pop_front();
+            }
+            let Some(Pending { t, target, state, force, output, .. }) = self.pending.pop_front() else {
                 return Ok(());
             };
-            self.next_tick = Some(expected.wrapping_add(1));
+            self.next_tick = Some(expected.wrapping_add(self.telemetry_ticks));
             self.worst_cycles = self.worst_cycles.max(telemetry.cycles);
             self.fault = self.fault.or(telemetry.fault);
             let estimate: Vec<f64> = telemetry.estimate.iter().map(|&value| f64::from(value)).collect();

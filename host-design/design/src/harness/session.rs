@@ -13,7 +13,7 @@ use upright::supervision::supervisor::State;
 
 use super::error::HarnessError;
 use super::hand::Status;
-use super::target::{Pins, Target};
+use super::target::{Pace, Pins, Target};
 use crate::table::{MAX_SENSORS, MAX_STATES};
 
 /// Telemetry of a firmware of any size: its frames are the same bytes whatever the capacity of the lists.
@@ -21,10 +21,6 @@ pub type AnyTelemetry = Telemetry<MAX_STATES, MAX_SENSORS>;
 
 /// Time between two heartbeats of a host that commands the set-point (s).
 pub const HEARTBEAT_S: f64 = 0.025;
-
-/// Ticks in which every command is answered: its bytes are read after the tick they came with, it is executed in the
-/// next, and the answer comes with the one after.
-const TICKS_TO_ANSWER: usize = 4;
 
 /// A firmware in lock step, and what it has sent.
 pub struct Session<'a> {
@@ -38,6 +34,7 @@ pub struct Session<'a> {
     replies: VecDeque<(u64, Answer)>,
     status: Status,
     fault: Option<Fault>,
+    ticks: u32,
     /// Frames from the firmware that could not be read.
     pub damaged: usize,
 }
@@ -56,6 +53,7 @@ impl<'a> Session<'a> {
             replies: VecDeque::new(),
             status: Status { state: State::Disarmed, signs: Signs::Unchecked },
             fault: None,
+            ticks: 0,
             damaged: 0,
         }
     }
@@ -75,6 +73,16 @@ impl<'a> Session<'a> {
     /// Numbers the next command from here on: somebody else has sent commands with numbers up to `id`.
     pub fn count_from(&mut self, id: u64) {
         self.last_id = self.last_id.max(id);
+    }
+
+    /// How fast the firmware's serial line is.
+    pub fn pace(&self) -> Pace {
+        self.target.pace()
+    }
+
+    /// Number of the last tick, from the start of the firmware.
+    pub fn tick_number(&self) -> u32 {
+        self.ticks.wrapping_sub(1)
     }
 
     /// Number of the last command.
@@ -106,6 +114,7 @@ impl<'a> Session<'a> {
         pins.sabotage = self.sabotage.take();
         self.serial.clear();
         let output = self.target.tick(&pins, &mut self.serial)?;
+        self.ticks = self.ticks.wrapping_add(1);
         for &byte in &self.serial {
             match self.receiver.push::<Message<MAX_STATES, MAX_SENSORS>>(byte) {
                 Some(Ok(Message::Telemetry(telemetry))) => {
@@ -160,7 +169,7 @@ impl<'a> Session<'a> {
     /// [`HarnessError`] if it is refused or not answered.
     pub fn ask(&mut self, request: Request, inputs: &Pins) -> Result<Answer, HarnessError> {
         let id = self.send(request);
-        for _ in 0..TICKS_TO_ANSWER {
+        for _ in 0..self.pace().answer_ticks {
             self.tick(inputs)?;
             if let Some(answer) = self.answer_to(id, request)? {
                 return Ok(answer);

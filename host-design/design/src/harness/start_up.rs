@@ -29,7 +29,7 @@ pub struct Harness<'t> {
 
 impl<'t> Harness<'t> {
     /// The rig hanging at rest, held by hand, and `target`, which has just started and has the table `table`. It is
-    /// told to use the law of `scenario` and to send telemetry in every tick.
+    /// told to use the law of `scenario` and to send telemetry as often as its serial line allows.
     ///
     /// # Errors
     /// [`HarnessError`] if the firmware is for another rig, or refuses the law.
@@ -53,7 +53,8 @@ impl<'t> Harness<'t> {
         let hanging = harness.inputs();
         harness.session.check_info(table.rig_hash, &hanging)?;
         harness.session.ask(Request::Select(scenario.law), &hanging)?;
-        harness.session.ask(Request::Telemetry(1), &hanging)?;
+        let every = harness.session.pace().telemetry_ticks;
+        harness.session.ask(Request::Telemetry(every), &hanging)?;
         Ok(harness)
     }
 

@@ -2,14 +2,15 @@
 
 use upright::board::Output;
 use upright::protocol::message::{Answer, Request};
+use upright::supervision::fault::Fault;
 use upright::supervision::sign_check::Signs;
 
 use super::defect::{Expected, Kind};
 use super::injection::Injection;
 use super::observed::Observed;
 use super::trial::Trial;
-use crate::in_the_loop::{Place, RunError};
-use upright_design::harness::{HEARTBEAT_S, Harness, HarnessError};
+use crate::in_the_loop::{Events, Place, RunError, VirtualBoard};
+use upright_design::harness::{HEARTBEAT_S, Harness, HarnessError, Pins, Session, Target};
 use upright_design::plant::absolute_angles;
 use upright_design::rig::{PlantDescription, Rig};
 use upright_design::table::TableValues;
@@ -25,18 +26,21 @@ pub struct Setup<'a> {
     pub place: Place<'a>,
     /// Whether the firmware has its thresholds and limits. Without them it cannot find most defects.
     pub detection: bool,
+    /// Whether a board has its guards: watchdog, break input, registers that are read back.
+    pub guards: bool,
 }
 
 /// Longest time from a defect to its verdict (s).
 const LONGEST_S: f64 = 6.0;
 /// Ticks watched after the motor went off: the fault is known a tick later, and the motor has to stay off.
 const TICKS_AFTER: usize = 12;
+/// The same at the most on a board, which may have to start again first (s): without a crystal it waits for that.
+const LONGEST_START_S: f64 = 0.8;
 /// A true angle or position beyond its limit by more than this share is too late, whatever follows.
 const BEYOND: f64 = 0.25;
 
 /// Runs the trial, with its defect or, for comparison, without.
 pub(super) fn attempt(setup: &Setup<'_>, trial: &Trial, with_defect: bool) -> Result<Observed, RunError> {
-    let attempt = Attempt { rig: setup.rig, table: setup.table, trial, with_defect };
     let without_detection;
     let table = if setup.detection {
         setup.table
@@ -44,15 +48,21 @@ pub(super) fn attempt(setup: &Setup<'_>, trial: &Trial, with_defect: bool) -> Re
         without_detection = setup.table.clone().without_detection();
         &without_detection
     };
-    setup.place.with_target(table, |target| {
-        let mut harness = Harness::new(setup.rig, setup.table, &trial.scenario, target)?;
-        Ok(match trial.kind {
-            Kind::ArmUnhomed | Kind::ArmHanging | Kind::ArmStopped | Kind::ArmHeld => {
-                attempt.arm(&mut harness)
-            }
-            _ => attempt.balance(&mut harness),
-        }?)
-    })
+    let mut attempt = Attempt { rig: setup.rig, table: setup.table, trial, with_defect, board: None };
+    let Place::Board { image, conditions } = setup.place else {
+        return setup.place.with_target(table, |target| Ok(attempt.run(target)?));
+    };
+    let conditions = trial.kind.conditions(trial, conditions);
+    let broken = trial.kind.at_power_up(trial, setup.guards);
+    let mut target = VirtualBoard::start_with(image, &conditions, table, &broken)?;
+    attempt.board = Some(OnBoard { image, events: target.events() });
+    Ok(attempt.run(&mut target)?)
+}
+
+/// The way to a board's own defects.
+struct OnBoard<'a> {
+    image: &'a upright_board::Image,
+    events: Events,
 }
 
 struct Attempt<'a> {
@@ -60,9 +70,21 @@ struct Attempt<'a> {
     table: &'a TableValues,
     trial: &'a Trial,
     with_defect: bool,
+    board: Option<OnBoard<'a>>,
 }
 
 impl Attempt<'_> {
+    fn run(&self, target: &mut dyn Target) -> Result<Observed, HarnessError> {
+        if self.trial.kind.is_at_power_up() {
+            return self.power_up(target);
+        }
+        let mut harness = Harness::new(self.rig, self.table, &self.trial.scenario, target)?;
+        match self.trial.kind {
+            Kind::ArmUnhomed | Kind::ArmHanging | Kind::ArmStopped | Kind::ArmHeld => self.arm(&mut harness),
+            _ => self.balance(&mut harness),
+        }
+    }
+
     fn balance(&self, harness: &mut Harness<'_>) -> Result<Observed, HarnessError> {
         let trial = self.trial;
         let mut observed = Observed::default();
@@ -91,8 +113,12 @@ impl Attempt<'_> {
             }
             if since == Some(0) {
                 injection.serial(&mut harness.session);
+                is_visible |= trial.kind == Kind::TableBit;
             }
             observed.output(tick, output);
+            if observed.off.is_some_and(|off| tick > off + TICKS_AFTER) {
+                observed.fault = harness.session.fault();
+            }
             let mut acting = output;
             if since.is_some() {
                 is_visible |= injection.output(&mut acting);
@@ -106,6 +132,10 @@ impl Attempt<'_> {
             harness.bench.tick(drive);
         }
         observed.fault = harness.session.fault();
+        if self.board.is_some() && observed.off.is_some() && observed.fault.is_none() {
+            observed.fault = self.reason(harness);
+        }
+        observed.dead |= observed.fault == Some(Fault::Crash);
         if trial.kind != Kind::HostDeaf && observed.off.is_none() {
             let inputs = harness.inputs();
             if let Ok(Answer::Statistics(statistics)) = harness.session.ask(Request::Statistics, &inputs) {
@@ -113,6 +143,15 @@ impl Attempt<'_> {
             }
         }
         Ok(observed)
+    }
+
+    /// Why a board that has started again has done so.
+    fn reason(&self, harness: &mut Harness<'_>) -> Option<Fault> {
+        let inputs = harness.inputs();
+        match harness.session.ask(Request::Info, &inputs) {
+            Ok(Answer::Info(info)) => info.reset.fault(),
+            _ => None,
+        }
     }
 
     /// One tick of the firmware, `since` ticks after the onset; sets `is_visible` if its inputs differ visibly.
@@ -131,6 +170,9 @@ impl Attempt<'_> {
             if let Some(fault) = self.trial.kind.inside_the_microcontroller() {
                 harness.session.sabotage(fault);
             }
+            if let Some(board) = &self.board {
+                board.events.borrow_mut().extend(self.trial.kind.events(self.trial, self.table, board.image));
+            }
             if self.trial.kind == Kind::HostDeaf {
                 harness.session.stop_reading()?;
             }
@@ -144,7 +186,13 @@ impl Attempt<'_> {
         let is_undecided = matches!(trial.kind.expected(), Expected::Off(_)) && observed.is_undecided();
         let last =
             trial.onset + if is_undecided { self.ticks(LONGEST_S).max(trial.watched) } else { trial.watched };
-        tick >= last || observed.off.is_some_and(|off| tick > off + TICKS_AFTER)
+        // A board that starts again tells the reason as soon as it runs.
+        let starts = self.board.is_some() && observed.fault.is_none();
+        let after = if starts { self.ticks(LONGEST_START_S) } else { TICKS_AFTER };
+        match observed.off {
+            Some(off) => tick > off + after || (!starts && tick >= last),
+            None => tick >= last,
+        }
     }
 
     fn ticks(&self, seconds: f64) -> usize {
@@ -158,6 +206,31 @@ impl Attempt<'_> {
         let leans = absolute_angles(state).any(|lean| lean.abs() > angle * (1.0 + BEYOND));
         let [low, high] = chain.cart.travel_m;
         leans || !(low..=high).contains(&state[0])
+    }
+
+    /// The kinds that are there at power-up: arming has to be refused.
+    fn power_up(&self, target: &mut dyn Target) -> Result<Observed, HarnessError> {
+        let mut observed = Observed::default();
+        let mut session = Session::new(target);
+        let pins = Pins {
+            raw_counts: (0..self.table.sensors()).map(|_| 0).collect(),
+            supply_v: self.table.motor.map_or(24.0, |motor| motor.supply_v),
+            contacts: Default::default(),
+            received: heapless::Vec::new(),
+            sabotage: None,
+        };
+        match session.ask(Request::Arm, &pins) {
+            Err(HarnessError::Refused { answer: Answer::NotNow(reasons), .. }) => {
+                observed.refused = Some(reasons)
+            }
+            Err(error) => return Err(error),
+            Ok(_) => (),
+        }
+        for _ in 0..4 * TICKS_AFTER {
+            observed.on_again |= session.tick(&pins)?.enable;
+        }
+        observed.fault = session.fault();
+        Ok(observed)
     }
 
     /// The kinds in which arming has to be refused.

@@ -46,6 +46,20 @@ pub enum Kind {
     Panic,
     HardFault,
     StackOverflow,
+    StalledTick,
+    LockUp,
+    CrystalStops,
+    CrystalMissing,
+    CrystalWrong,
+    ChipWrong,
+    BrownOut,
+    StopBetweenTicks,
+    HostWireOpen,
+    LineNoise,
+    LineFlood,
+    TableBit,
+    RamBit,
+    WriteLost,
 }
 
 /// The outcome that a defect must have.
@@ -61,6 +75,8 @@ pub enum Expected {
     Counted,
     /// Balancing goes on, with every output bit for bit as without the defect.
     Ignored,
+    /// Motor off, with any fault, before a link is far beyond its limit.
+    Changed,
     /// Links and cart stay within their limits until the motor is off, if it is turned off at all.
     Bounded,
     /// The firmware refuses to arm, for these reasons at least.
@@ -82,7 +98,7 @@ pub enum Ticks {
 
 impl Kind {
     /// Every kind with its name, a description, and the outcome that it must have.
-    pub const ALL: [(Kind, &str, &str, Expected); 37] = {
+    pub const ALL: [(Kind, &str, &str, Expected); 51] = {
         use Expected::*;
         use Ticks::*;
         [
@@ -168,6 +184,60 @@ impl Kind {
             (Kind::Panic, "panic", "the firmware panics", Dead),
             (Kind::HardFault, "hard-fault", "the firmware accesses memory that does not exist", Dead),
             (Kind::StackOverflow, "stack-overflow", "the firmware's stack overflows", Dead),
+            (
+                Kind::StalledTick,
+                "stalled-tick",
+                "the processor stands still during a tick",
+                Fault(F::Watchdog, Exactly(3)),
+            ),
+            (
+                Kind::LockUp,
+                "lock-up",
+                "a processor fault whose handler faults, too",
+                Fault(F::Watchdog, Exactly(3)),
+            ),
+            (Kind::CrystalStops, "crystal-stops", "the crystal stops swinging", Fault(F::Clock, Exactly(1))),
+            (Kind::CrystalMissing, "crystal-missing", "no crystal at power-up", Refused(Inhibits::FAULT)),
+            (
+                Kind::CrystalWrong,
+                "crystal-wrong",
+                "a crystal of 4, 12, 16 or 25 MHz at power-up",
+                Refused(Inhibits::FAULT),
+            ),
+            (
+                Kind::ChipWrong,
+                "chip-wrong",
+                "the image for an STM32F405 on an STM32F446",
+                Refused(Inhibits::FAULT),
+            ),
+            (
+                Kind::BrownOut,
+                "brown-out",
+                "the chip's own supply is at 2.0 to 2.6 V for 0.3 ms",
+                Fault(F::Board, Exactly(2)),
+            ),
+            (
+                Kind::StopBetweenTicks,
+                "stop-between-ticks",
+                "the emergency stop opens and closes again between two ticks",
+                Fault(F::EmergencyStop, Exactly(1)),
+            ),
+            (
+                Kind::HostWireOpen,
+                "host-wire-open",
+                "the wire from a host that commands the set-point is open",
+                Fault(F::LinkLost, Link),
+            ),
+            (Kind::LineNoise, "line-noise", "random bytes at wrong baud rates on the serial line", Ignored),
+            (Kind::LineFlood, "line-flood", "bytes without a pause on the serial line", Ignored),
+            (Kind::TableBit, "table-bit", "a bit of the gain table in flash changes", Changed),
+            (Kind::RamBit, "ram-bit", "a bit of the firmware's variables or stack changes", Bounded),
+            (
+                Kind::WriteLost,
+                "write-lost",
+                "a write to a register of the motor's timer is lost at power-up",
+                Refused(Inhibits::FAULT),
+            ),
         ]
     };
 
@@ -204,6 +274,16 @@ impl Kind {
     /// Whether it is possible only with an image.
     pub fn needs_image(self) -> bool {
         self.inside_the_microcontroller().is_some()
+    }
+
+    /// Whether it is possible only on a board.
+    pub fn needs_board(self) -> bool {
+        self as usize >= Kind::StalledTick as usize
+    }
+
+    /// Whether no board can have it: its converter gives numbers.
+    pub fn needs_simulated_pins(self) -> bool {
+        self == Kind::SupplyNotANumber
     }
 
     /// Whether it is possible only with the firmware in this process.

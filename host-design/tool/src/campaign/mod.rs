@@ -9,6 +9,7 @@ mod defect;
 mod injection;
 mod judge;
 mod observed;
+mod on_board;
 mod tally;
 mod trial;
 

@@ -80,8 +80,9 @@ pub fn kinds(table: &TableValues, place: Place<'_>) -> Vec<Kind> {
             _ => true,
         })
         .filter(|kind| match place {
-            Place::Host => !kind.needs_image(),
-            Place::Qemu { .. } => !kind.needs_process(),
+            Place::Host => !kind.needs_image() && !kind.needs_board(),
+            Place::Qemu { .. } => !kind.needs_process() && !kind.needs_board(),
+            Place::Board { .. } => !kind.needs_simulated_pins(),
         })
         .collect()
 }

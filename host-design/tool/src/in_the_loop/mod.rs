@@ -1,10 +1,12 @@
-//! Where the whole firmware runs in closed loop with the simulated rig: on the host in this process, or as an image in
-//! QEMU. The loop itself is [`upright_design::harness`].
+//! Where the whole firmware runs in closed loop with the simulated rig: on the host in this process, as an image in QEMU,
+//! or as the image that is flashed, on the virtual board. The loop itself is [`upright_design::harness`].
 
+mod board;
 mod place;
 mod qemu;
 mod relay;
 
-pub use place::{Place, RunError, run};
+pub use board::{Compared, Event, Events, RULES, VirtualBoard};
+pub use place::{Place, RunError, run, run_compared};
 pub use qemu::{Emulator, EmulatorError, Link};
 pub use relay::{RelayError, serve};

@@ -2,11 +2,13 @@
 
 use std::path::Path;
 
+use upright_board::Conditions;
 use upright_design::harness::{HarnessError, Recording, Target, record, with_firmware};
 use upright_design::rig::Rig;
 use upright_design::simulate::Scenario;
 use upright_design::table::TableValues;
 
+use super::board::{Compared, VirtualBoard};
 use super::qemu::{Emulator, EmulatorError, Link};
 
 /// Where the firmware runs.
@@ -20,6 +22,13 @@ pub enum Place<'a> {
         image: &'a Path,
         /// How its pins are connected.
         link: Link,
+    },
+    /// As the image that is flashed, on the virtual board.
+    Board {
+        /// What is flashed.
+        image: &'a upright_board::Image,
+        /// What this board is like.
+        conditions: Conditions,
     },
 }
 
@@ -63,6 +72,9 @@ impl Place<'_> {
         match self {
             Place::Host => with_firmware(table, action)?,
             Place::Qemu { image, link } => action(&mut Emulator::start(image, link)?),
+            Place::Board { image, conditions } => {
+                action(&mut VirtualBoard::start(image, &conditions, table)?)
+            }
         }
     }
 }
@@ -78,4 +90,23 @@ pub fn run(
     place: Place<'_>,
 ) -> Result<Recording, RunError> {
     place.with_target(table, |target| Ok(record(rig, table, scenario, target)?))
+}
+
+/// Runs `scenario` on the virtual board as [`run`] does, and in each tick the firmware on the host with what the board's
+/// image has latched: duty, estimate and telemetry must be the same in every bit. Gives the recording, and the numbers
+/// of ticks and of telemetry messages that were compared.
+///
+/// # Errors
+/// [`RunError`] as of [`run`], and if they differ.
+pub fn run_compared(
+    rig: &Rig,
+    table: &TableValues,
+    scenario: &Scenario,
+    board: &mut VirtualBoard,
+) -> Result<(Recording, [u64; 2]), RunError> {
+    with_firmware(table, |host| {
+        let mut compared = Compared::new(board, host);
+        let recording = record(rig, table, scenario, &mut compared)?;
+        Ok((recording, [compared.ticks, compared.messages]))
+    })?
 }

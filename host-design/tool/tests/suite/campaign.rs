@@ -17,7 +17,7 @@ fn rig(name: &str) -> (Rig, TableValues) {
 }
 
 fn on_host<'a>(rig: &'a Rig, table: &'a TableValues) -> Setup<'a> {
-    Setup { rig, table, place: Place::Host, detection: true }
+    Setup { rig, table, place: Place::Host, detection: true, guards: true }
 }
 
 fn run(setup: &Setup<'_>, kinds: &[Kind], runs: u64) -> Campaign {

@@ -4,12 +4,14 @@ use std::io::Write;
 
 use clap::{Args, ValueEnum};
 use serde_json::json;
+use upright_board::Conditions;
 use upright_design::rig::Rig;
 use upright_tool::campaign::{Campaign, Kind, Row, Setup, campaign, kinds, one};
-use upright_tool::image::{Kind as ImageKind, build_for};
+use upright_tool::image::{Board, Kind as ImageKind, build_for};
 use upright_tool::in_the_loop::{Link, Place};
 
 use crate::failure::Failure;
+use crate::firmware::read;
 use crate::progress::{with_bar, with_spinner};
 use crate::variation::Variation;
 
@@ -24,6 +26,7 @@ Examples:
   upright faults rigs/quadruple-paper.toml
   upright faults rigs/single-quanser-ip02.toml --runs 10000 --seed 7
   upright faults rigs/quadruple-paper.toml --target qemu --runs 300
+  upright faults rigs/quadruple-paper.toml --target board --runs 300
   upright faults rigs/quadruple-paper.toml --only 1234               one run again, bit for bit
   upright faults rigs/quadruple-paper.toml --kind motor-dead --json")]
 pub(crate) struct Faults {
@@ -53,6 +56,17 @@ pub(crate) struct Faults {
 enum Target {
     Host,
     Qemu,
+    Board,
+}
+
+impl Target {
+    fn name(self) -> &'static str {
+        match self {
+            Target::Host => "host",
+            Target::Qemu => "qemu",
+            Target::Board => "board",
+        }
+    }
 }
 
 /// Runs of each kind without detection.
@@ -72,13 +86,21 @@ impl Faults {
         let (rig, _, table) = self.variation.designed()?;
         let image = match self.target {
             Target::Host => None,
+            Target::Board => Some(with_spinner("building the image", || {
+                build_for(ImageKind::Board(Board::WeactF405), &rig, &table)
+            })?),
             Target::Qemu => {
                 Some(with_spinner("building the image", || build_for(ImageKind::InTheLoop, &rig, &table))?)
             }
         };
-        let place = match &image {
-            Some(image) => Place::Qemu { image, link: Link::Files },
-            None => Place::Host,
+        let flashed = match &image {
+            Some(image) if self.target == Target::Board => Some(read(image)?),
+            _ => None,
+        };
+        let place = match (&flashed, &image) {
+            (Some(image), _) => Place::Board { image, conditions: Conditions::f405(self.seed) },
+            (_, Some(image)) => Place::Qemu { image, link: Link::Files },
+            _ => Place::Host,
         };
         let possible = kinds(&table, place);
         let chosen: Vec<Kind> = match self.kind {
@@ -91,14 +113,18 @@ impl Faults {
             }
             None => possible,
         };
-        let setup = Setup { rig: &rig, table: &table, place, detection: true };
+        let setup = Setup { rig: &rig, table: &table, place, detection: true, guards: true };
         if let Some(number) = self.only {
             return self.replay(&setup, &chosen, number);
         }
         let result =
             with_bar("faults", self.runs, |tick| campaign(&setup, &chosen, self.seed, self.runs, tick))?;
         let control = self.control(&setup, &chosen)?;
+        let unguarded = self.unguarded(&setup, &chosen)?;
         self.print(&rig, &result, control.as_ref())?;
+        if let Some(unguarded) = &unguarded {
+            self.say_unguarded(unguarded)?;
+        }
         self.verdict(&result, control.as_ref())
     }
 
@@ -115,6 +141,38 @@ impl Faults {
         Ok(Some(result))
     }
 
+    /// The other negative control, on the board: without watchdog, break input, registers read back.
+    fn unguarded(&self, setup: &Setup<'_>, chosen: &[Kind]) -> Result<Option<Campaign>, Failure> {
+        let chosen: Vec<Kind> = chosen.iter().copied().filter(|kind| kind.needs_guard()).collect();
+        if self.target != Target::Board || chosen.is_empty() {
+            return Ok(None);
+        }
+        let setup = Setup { guards: false, ..*setup };
+        let runs = 2 * chosen.len() as u64;
+        let result =
+            with_bar("without guards", runs, |tick| campaign(&setup, &chosen, self.seed, runs, tick))?;
+        Ok(Some(result))
+    }
+
+    /// Each defect must be missed at least once.
+    fn say_unguarded(&self, unguarded: &Campaign) -> Result<(), Failure> {
+        let missed: usize = unguarded.rows.iter().map(|row| row.missed).sum();
+        let text = format!("without guards, {missed} of {} runs miss the defect", unguarded.runs);
+        // With --json, stdout is one object.
+        if self.json {
+            eprintln!("{text}")
+        } else {
+            writeln!(std::io::stdout(), "{text}")?
+        }
+        match unguarded.rows.iter().find(|row| row.missed == 0) {
+            Some(row) => Err(Failure::CheckFailed(format!(
+                "without guards, `{}` is never missed: the campaign proves nothing",
+                row.kind.name()
+            ))),
+            None => Ok(()),
+        }
+    }
+
     fn replay(&self, setup: &Setup<'_>, kinds: &[Kind], number: u64) -> Result<(), Failure> {
         let outcome = one(setup, kinds, self.seed, number)?;
         writeln!(std::io::stdout(), "{}", serde_json::to_string(&outcome).map_err(std::io::Error::from)?)?;
@@ -124,7 +182,7 @@ impl Faults {
     fn print(&self, rig: &Rig, result: &Campaign, control: Option<&Campaign>) -> Result<(), Failure> {
         let mut out = std::io::stdout().lock();
         if self.json {
-            let target = if self.target == Target::Host { "host" } else { "qemu" };
+            let target = self.target.name();
             let all = json!({
                 "rig": rig.name, "hash": format!("{:016x}", rig.hash()), "target": target,
                 "campaign": result, "without_detection": control,
@@ -188,7 +246,10 @@ impl Faults {
             return Ok(());
         };
         let wrong: usize = result.rows.iter().map(|row| row.wrong.len()).sum();
-        let target = if self.target == Target::Host { "" } else { " --target qemu" };
+        let target = match self.target {
+            Target::Host => String::new(),
+            other => format!(" --target {}", other.name()),
+        };
         // A campaign of one kind numbers its runs differently.
         let kind = self.kind.map_or(String::new(), |kind| format!(" --kind {}", kind.name()));
         Err(Failure::CheckFailed(format!(

@@ -6,6 +6,8 @@ mod monitor;
 mod run;
 mod size;
 
+pub(crate) use run::read;
+
 use std::path::{Path, PathBuf};
 
 use clap::{Args, Subcommand};

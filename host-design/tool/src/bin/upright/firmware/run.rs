@@ -1,21 +1,28 @@
 //! `upright firmware run`
 
 use std::net::TcpListener;
+use std::path::Path;
+use std::time::Instant;
 
 use clap::{Args, ValueEnum};
+use sha2::{Digest, Sha256};
+use upright_board::{Conditions, UNITS_PER_SECOND};
 use upright_design::harness::Recording;
 use upright_design::rig::Rig;
-use upright_design::simulate::Scenario;
+use upright_design::simulate::{Scenario, Summary, Trace};
 use upright_design::table::TableValues;
-use upright_tool::image::{self, Kind};
-use upright_tool::in_the_loop::{Link, Place, run, serve};
+use upright_tool::image::{self, Board, Kind};
+use upright_tool::in_the_loop::{Link, Place, RunError, VirtualBoard, run, run_compared, serve};
 
 use crate::failure::Failure;
 use crate::progress::with_spinner;
 use crate::simulate::Simulate;
 
-/// Builds the image for the rig, runs it in QEMU in lock step with the nonlinear plant, and compares every bit with
-/// the same run on the host; exit status 1 if the pendulum falls or a bit differs.
+/// Builds the image for the rig, runs it in lock step with the nonlinear plant, and compares every bit with the
+/// firmware on the host; exit status 1 if the pendulum falls or a bit differs.
+///
+/// In QEMU, pins are simulated, and the run is that on the host. On the virtual board, the very image that is flashed
+/// runs with its registers; its pins drive the plant, and the host gets in each tick what the image has latched.
 ///
 /// The rig is homed while it hangs, held by hand at the start of the scenario until the firmware begins to balance,
 /// and released at time 0. Options are those of `upright simulate`.
@@ -24,17 +31,27 @@ use crate::simulate::Simulate;
 Examples:
   upright firmware run rigs/quadruple-paper.toml --step 1 --svg qemu.svg
   upright firmware run rigs/quadruple-paper.toml --law pole-placement --tilt 0.004 --csv run.csv
+  upright firmware run rigs/quadruple-paper.toml --target board
   upright firmware run rigs/single-quanser-ip02.toml --link usart --duration 2
   upright firmware run rigs/single-quanser-ip02.toml --serve 127.0.0.1:7777 --duration 600")]
 pub(crate) struct Run {
     #[command(flatten)]
     simulate: Simulate,
-    /// How the pins of the image are connected: files of the emulator (fast; Unix only), or serial lines
+    /// Where the image runs
+    #[arg(long, value_enum, default_value_t = Target::Qemu)]
+    target: Target,
+    /// How the pins of the image in QEMU are connected: files of the emulator (fast; Unix only), or serial lines
     #[arg(long, value_enum, default_value_t = LinkName::Files)]
     link: LinkName,
     /// Serve `upright firmware monitor tcp:HOST:PORT`: in real time, for --duration, without the comparison
     #[arg(long, value_name = "HOST:PORT", conflicts_with_all = ["csv", "svg", "json"])]
     serve: Option<String>,
+}
+
+#[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum Target {
+    Qemu,
+    Board,
 }
 
 #[derive(Clone, Copy, ValueEnum)]
@@ -45,9 +62,10 @@ enum LinkName {
 
 impl Run {
     pub(crate) fn run(self) -> Result<(), Failure> {
-        let (link, kind) = match self.link {
-            LinkName::Files => (Link::Files, Kind::InTheLoop),
-            LinkName::Usart => (Link::Usart, Kind::InTheLoopUsart),
+        let (link, kind) = match (self.target, self.link) {
+            (Target::Board, _) => (Link::Files, Kind::Board(Board::WeactF405)),
+            (_, LinkName::Files) => (Link::Files, Kind::InTheLoop),
+            (_, LinkName::Usart) => (Link::Usart, Kind::InTheLoopUsart),
         };
         if let Some(address) = &self.serve {
             let listener = TcpListener::bind(address).map_err(|error| {
@@ -56,17 +74,63 @@ impl Run {
             let (rig, table, scenario) = self.simulate.prepared()?;
             let image = with_spinner("building the image", || image::build_for(kind, &rig, &table))?;
             eprintln!("connect with: upright firmware monitor tcp:{}", listener.local_addr()?);
-            let place = Place::Qemu { image: &image, link };
+            let flashed;
+            let place = match self.target {
+                Target::Qemu => Place::Qemu { image: &image, link },
+                Target::Board => {
+                    flashed = read(&image)?;
+                    Place::Board { image: &flashed, conditions: Conditions::f405(1) }
+                }
+            };
             return Ok(with_spinner("serving", || serve(&rig, &table, &scenario, place, &listener))?);
         }
         self.simulate.run_with(|rig, table, scenario| {
             let image = with_spinner("building the image", || image::build_for(kind, rig, table))?;
+            if self.target == Target::Board {
+                return on_the_board(rig, table, scenario, &image);
+            }
             let place = Place::Qemu { image: &image, link };
             let recording = with_spinner("running it in QEMU", || run(rig, table, scenario, place))?;
             compare(rig, table, scenario, &recording)?;
             Ok((recording.trace, recording.summary))
         })
     }
+}
+
+/// The image that is flashed.
+pub(crate) fn read(path: &Path) -> Result<upright_board::Image, Failure> {
+    let bytes = std::fs::read(path)?;
+    let hash =
+        Sha256::digest(&bytes).iter().take(8).fold(String::new(), |hash, byte| hash + &format!("{byte:02x}"));
+    eprintln!("{} ({hash})", path.display());
+    upright_board::Image::from_elf(&bytes)
+        .map_err(|error| Failure::BadArgument(format!("{}: {error}", path.display())))
+}
+
+/// The image on the virtual board, beside the firmware on the host.
+fn on_the_board(
+    rig: &Rig,
+    table: &TableValues,
+    scenario: &Scenario,
+    image: &Path,
+) -> Result<(Trace, Summary), Failure> {
+    let image = read(image)?;
+    let begin = Instant::now();
+    let mut board =
+        VirtualBoard::start(&image, &Conditions::f405(scenario.seed), table).map_err(RunError::from)?;
+    let ended =
+        with_spinner("running it on the virtual board", || run_compared(rig, table, scenario, &mut board));
+    let simulated_s = board.board().now() as f64 / UNITS_PER_SECOND as f64;
+    let (recording, [ticks, messages]) = ended?;
+    eprintln!(
+        "{ticks} ticks and {messages} telemetry messages on the virtual board, bit for bit as on the host; {simulated_s:.1} s \
+         from power-up in {:.1} s",
+        begin.elapsed().as_secs_f64()
+    );
+    if let Some(fault) = recording.fault {
+        eprintln!("the firmware has turned the motor off: {fault:?}");
+    }
+    Ok((recording.trace, recording.summary))
 }
 
 /// The same run on the host, bit by bit.

@@ -1,0 +1,121 @@
+//! Defects that only a board has, on the virtual board: what it is like at power-up, and what happens in the tick of the
+//! onset.
+
+use rand::RngExt;
+use upright_board::{
+    Chip, Conditions, Image, Input, Time, UNITS_PER_MICROSECOND as US, UNITS_PER_SECOND, Wire, pin,
+};
+
+use super::defect::Kind;
+use super::trial::Trial;
+use crate::in_the_loop::Event;
+use upright_design::table::TableValues;
+
+/// Registers of timer 1 that make the motor's force what it should be (RM0090, 17.4): ARR, RCR, CCMR1, CCER, BDTR.
+const MOTOR_REGISTERS: [u32; 5] = [0x4001_002c, 0x4001_0030, 0x4001_0018, 0x4001_0020, 0x4001_0044];
+/// Frequencies of crystals that are not this board's (Hz).
+const WRONG_CRYSTALS: [u32; 4] = [4_000_000, 12_000_000, 16_000_000, 25_000_000];
+/// The highest byte of the vector of HardFault.
+const HARD_FAULT_VECTOR: u32 = 0x0800_000f;
+/// Where nothing is.
+const NOWHERE: u32 = 0x3000_0000;
+/// Inside the tick, so long after its beginning.
+const INSIDE: Time = 3 * US;
+/// The supply of the chip is below the voltage detector's threshold for so long.
+const DIP: Time = 300 * US;
+
+impl Kind {
+    /// The trial's board.
+    pub(super) fn conditions(self, trial: &Trial, typical: Conditions) -> Conditions {
+        let mut conditions = Conditions { seed: trial.seed, ..typical };
+        // The watchdog's oscillator and the others within their tolerances (datasheet, LSI and HSI).
+        conditions.lsi_hz = (17_000.0 + 30_000.0 * trial.size) as u32;
+        conditions.hsi_hz = (16_000_000.0 * (1.0 + 0.01 * trial.sign * trial.size)) as u32;
+        match self {
+            Kind::CrystalMissing => conditions.crystal.hz = 0,
+            Kind::CrystalWrong => {
+                conditions.crystal.hz = WRONG_CRYSTALS[(trial.size * 3.99) as usize];
+            }
+            Kind::ChipWrong => conditions.chip = Chip::F446,
+            _ => {}
+        }
+        conditions
+    }
+
+    /// What is broken from power-up on; without `guarded`, so is the guard that this kind needs.
+    pub(super) fn at_power_up(self, trial: &Trial, guarded: bool) -> Vec<Input> {
+        let register = MOTOR_REGISTERS[(trial.size * 4.99) as usize];
+        match self {
+            Kind::WriteLost if guarded => vec![Input::LoseWrite(register)],
+            Kind::WriteLost => vec![Input::LoseWriteUnseen(register)],
+            Kind::StalledTick | Kind::LockUp if !guarded => vec![Input::IgnoreWatchdog],
+            Kind::StopBetweenTicks if !guarded => vec![Input::IgnoreBreak],
+            _ => Vec::new(),
+        }
+    }
+
+    /// Whether there is a guard that can be taken away: the defect must then be missed.
+    pub fn needs_guard(self) -> bool {
+        matches!(self, Kind::WriteLost | Kind::StalledTick | Kind::LockUp | Kind::StopBetweenTicks)
+    }
+
+    /// Whether it is there from power-up on, and prevents arming.
+    pub(super) fn is_at_power_up(self) -> bool {
+        matches!(self, Kind::CrystalMissing | Kind::CrystalWrong | Kind::ChipWrong | Kind::WriteLost)
+    }
+
+    /// What happens in the first tick of the defect.
+    pub(super) fn events(self, trial: &Trial, table: &TableValues, image: &Image) -> Vec<Event> {
+        let mut random = trial.random();
+        let tick = (f64::from(table.tick_s) * UNITS_PER_SECOND as f64) as Time;
+        let at = |after: Time, input: Input| Event::Input { after, input };
+        let anywhere = (trial.size * tick as f64) as Time;
+        let mut bit_of = |begin: u32, bytes: u32| Input::FlipBit {
+            address: begin + random.random_range(0..bytes.max(1)),
+            bit: random.random_range(0..8),
+        };
+        match self {
+            Kind::StalledTick => vec![at(INSIDE, Input::Stall(Time::MAX / 2))],
+            Kind::LockUp => vec![
+                at(INSIDE, Input::FlipBit { address: HARD_FAULT_VECTOR, bit: 6 }),
+                at(INSIDE, Input::Jump(NOWHERE)),
+            ],
+            Kind::CrystalStops => vec![at(anywhere, Input::StopCrystal)],
+            Kind::StopBetweenTicks => {
+                // At least the time of a tick's code away from both ticks.
+                let when = tick / 10 + (trial.size * 0.7 * tick as f64) as Time;
+                let stop = pin('B', 12);
+                vec![
+                    at(when, Input::Level(stop, Wire::Open)),
+                    at(when + tick / 20, Input::Level(stop, Wire::Low)),
+                ]
+            }
+            Kind::BrownOut => {
+                let volts = 2.0 + 0.6 * trial.size as f32;
+                vec![at(anywhere, Input::ChipSupply(volts)), at(anywhere + DIP, Input::ChipSupply(3.3))]
+            }
+            Kind::HostWireOpen => vec![at(0, Input::Level(pin('A', 3), Wire::Open)), Event::CutLine],
+            Kind::LineNoise => {
+                let bauds = [9_600, 57_600, 115_200, 460_800, 500_000, 1_000_000];
+                let mut bytes = |count: usize| (0..count).map(|_| random.random()).collect::<Vec<u8>>();
+                bauds.iter().map(|&baud| Event::Bytes { bytes: bytes(20), baud }).collect()
+            }
+            Kind::LineFlood => {
+                // Without a pause, for a third of the time after which a silent host is a fault.
+                let ticks = if table.limits.link_ticks > 0 { table.limits.link_ticks / 3 } else { 50 };
+                let bytes = (u64::from(ticks) * tick / (10 * UNITS_PER_SECOND / 460_800)) as usize;
+                let bytes = (0..bytes).map(|i| if i % 7 == 0 { 0 } else { random.random() }).collect();
+                vec![Event::Bytes { bytes, baud: 460_800 }]
+            }
+            Kind::TableBit => {
+                let table = image.object("5gains5TABLE").unwrap_or(0x0800_0200..0x0800_0201);
+                vec![at(anywhere, bit_of(table.start, table.end - table.start))]
+            }
+            Kind::RamBit => {
+                let end = image.symbol("__euninit").unwrap_or(0x2000_2000);
+                vec![at(anywhere, bit_of(0x2000_0000, end - 0x2000_0000))]
+            }
+            _ => Vec::new(),
+        }
+    }
+}

@@ -1,0 +1,131 @@
+//! The virtual board beside the firmware on the host: the same inputs in every tick, and the same bits.
+
+use std::collections::VecDeque;
+
+use upright::board::Output;
+use upright::protocol::frame::Receiver;
+use upright::protocol::message::Message;
+use upright::protocol::serial_link::MAX_MESSAGE;
+use upright_design::harness::{AnyTelemetry, HarnessError, Pace, Pins, Target};
+use upright_design::table::{MAX_SENSORS, MAX_STATES};
+
+use super::VirtualBoard;
+
+/// PWM is inactive for this share of each period at the least, whatever the duty.
+const LEAST_PAUSE: f32 = 0.02;
+
+/// A board and the firmware in this process, which gets what the board's image has latched.
+pub struct Compared<'a> {
+    board: &'a mut VirtualBoard,
+    host: &'a mut dyn Target,
+    /// Bytes that came with the tick before.
+    received: Vec<u8>,
+    was_stopped: bool,
+    streams: [Stream; 2],
+    /// Ticks that were compared.
+    pub ticks: u64,
+    /// Telemetry messages that were compared.
+    pub messages: u64,
+}
+
+/// Telemetry of one of the two.
+struct Stream {
+    receiver: Receiver<MAX_MESSAGE>,
+    telemetry: VecDeque<AnyTelemetry>,
+}
+
+impl Stream {
+    fn take(&mut self, bytes: &[u8]) {
+        for &byte in bytes {
+            if let Some(Ok(Message::Telemetry(telemetry))) =
+                self.receiver.push::<Message<MAX_STATES, MAX_SENSORS>>(byte)
+            {
+                self.telemetry.push_back(telemetry);
+            }
+        }
+    }
+}
+
+impl<'a> Compared<'a> {
+    /// Both have just started.
+    pub fn new(board: &'a mut VirtualBoard, host: &'a mut dyn Target) -> Self {
+        let streams = [(); 2].map(|()| Stream { receiver: Receiver::new(), telemetry: VecDeque::new() });
+        Self { board, host, received: Vec::new(), was_stopped: false, streams, ticks: 0, messages: 0 }
+    }
+
+    /// The duty at the pins is that of the host, to the timer's clock.
+    fn compare_duty(&self, host: &Output) -> Result<(), HarnessError> {
+        let stage = self.board.stage();
+        if stage.enable != host.enable {
+            return self
+                .differs(format!("enable is {} at the pin, {} on the host", stage.enable, host.enable));
+        }
+        if !host.enable {
+            return Ok(());
+        }
+        let duty = host.drive.duty(self.board.force_limit_n.unwrap_or(1.0));
+        let period = stage.period_clocks as f32;
+        let wanted = ((duty.abs() * period + 0.5) as u32).min((period * (1.0 - LEAST_PAUSE)) as u32 + 1);
+        let same = stage.high_clocks.abs_diff(wanted) <= u32::from(duty.abs() >= 1.0 - LEAST_PAUSE);
+        let along = stage.high_clocks == 0 || stage.along == (duty > 0.0);
+        if same && along {
+            Ok(())
+        } else {
+            self.differs(format!("a duty of {duty} on the host is {stage:?} at the pins"))
+        }
+    }
+
+    /// What the firmware says of its inputs, its estimate and its force is the same in every bit.
+    fn compare_telemetry(&mut self) -> Result<(), HarnessError> {
+        let [board, host] = &mut self.streams;
+        while let (Some(ours), Some(theirs)) = (board.telemetry.front(), host.telemetry.front()) {
+            if bits(ours) != bits(theirs) {
+                let text = format!("telemetry is {ours:?} on the board, {theirs:?} on the host");
+                return self.differs(text);
+            }
+            board.telemetry.pop_front();
+            host.telemetry.pop_front();
+            self.messages += 1;
+        }
+        Ok(())
+    }
+
+    fn differs<T>(&self, what: String) -> Result<T, HarnessError> {
+        Err(HarnessError::Board(format!("and the host differ in tick {}: {what}", self.ticks)))
+    }
+}
+
+/// All but what a clock measures, and what only one of them has.
+fn bits(telemetry: &AnyTelemetry) -> (String, Vec<u32>) {
+    let AnyTelemetry { tick, state, law, fault, cause_tick, homing, signs, arming_inhibits, counts, .. } =
+        telemetry;
+    let words =
+        format!("{:?}", (tick, state, law, fault, cause_tick, homing, signs, arming_inhibits, counts));
+    let values = telemetry.estimate.iter().chain(&telemetry.innovation);
+    let single = [telemetry.setpoint_m, telemetry.requested_n, telemetry.applied_n, telemetry.drive];
+    (words, values.chain(&single).map(|value| value.to_bits()).collect())
+}
+
+impl Target for Compared<'_> {
+    fn tick(&mut self, pins: &Pins, serial: &mut Vec<u8>) -> Result<Output, HarnessError> {
+        let begin = serial.len();
+        let output = self.board.tick(pins, serial)?;
+        let mut latched = self.board.latched(pins, &self.received);
+        self.received.clone_from(&self.board.received);
+        // The break input's flag comes again while the contact is open: it is found once more in the tick after.
+        let stopped = std::mem::replace(&mut self.was_stopped, pins.contacts.emergency_stop);
+        latched.contacts.emergency_stop |= stopped;
+        let mut from_host = Vec::new();
+        let host = self.host.tick(&latched, &mut from_host)?;
+        self.compare_duty(&host)?;
+        self.streams[0].take(&serial[begin..]);
+        self.streams[1].take(&from_host);
+        self.compare_telemetry()?;
+        self.ticks += 1;
+        Ok(output)
+    }
+
+    fn pace(&self) -> Pace {
+        self.board.pace()
+    }
+}
