@@ -34,7 +34,7 @@ impl Encoders {
     /// Measured value of the state with this index, whose true value is `value`. Only angles have errors.
     pub fn measured(&self, state: usize, value: f64) -> f64 {
         let joint = (state / 2).checked_sub(1).and_then(|joint| self.joints.get(joint));
-        joint.filter(|_| state % 2 == 0).map_or(value, |joint| joint.measured(value))
+        joint.filter(|_| state.is_multiple_of(2)).map_or(value, |joint| joint.measured(value))
     }
 }
 
