@@ -105,6 +105,9 @@ pub(super) fn sample(setting: &Setting<'_>, motion: &Motion, spread: &Spread, se
     let mut random = Pcg64::seed_from_u64(seed);
     let mut between = |share: f64| share * random.random_range(-1.0..=1.0);
     let mut trial = Trial { counts: true, seed: Some(seed), ..Trial::ideal(setting, motion) };
+    // A lowering begins in a loop that balances, whose links are as upright as its encoders' zeros.
+    let begins_upright = motion.x[0][2] == 0.0;
+    let tilt_rad = if begins_upright { spread.zero_rad } else { spread.tilt_rad };
     for body in 0..=setting.chain.links.len() {
         scale_mass(&mut trial.chain, body, 1.0 + between(spread.mass));
     }
@@ -114,7 +117,7 @@ pub(super) fn sample(setting: &Setting<'_>, motion: &Motion, spread: &Spread, se
     let mut below = 0.0;
     for joint in 0..setting.chain.links.len() {
         // The angle of each link from the vertical is off; a joint's angle by the difference.
-        let tilt = between(spread.tilt_rad);
+        let tilt = between(tilt_rad);
         trial.start[2 + 2 * joint] += tilt - below;
         below = tilt;
         trial.zero_error[1 + joint] = between(spread.zero_rad);
