@@ -3,7 +3,8 @@
 //! Every gain is the exact answer of its design problem, rounded once to f32.
 
 use upright::table::{
-    GainTable, LawGains, Limits, MotorTest, ObserverGains, PerLaw, TABLE_FORMAT, Thresholds, columns,
+    GainTable, LawGains, Limits, MotorTest, NoSwingUp, ObserverGains, PerLaw, TABLE_FORMAT, Thresholds,
+    columns,
 };
 
 /// Name of the rig.
@@ -638,3 +639,9 @@ pub static TABLE: GainTable<STATES, SENSORS> = GainTable {
     // CRC-32 of all values above.
     crc: 0x6aa6_3b4f,
 };
+
+/// This table has no swing-up.
+pub type SwingUp = NoSwingUp;
+
+/// The swing-up.
+pub static SWING_UP: SwingUp = NoSwingUp;

@@ -33,7 +33,7 @@ mod app {
     use upright::board::Board;
     use upright::firmware::Firmware;
     use upright::firmware::control_task::{COMMANDS, ControlTask, MESSAGES};
-    use upright::gains::{RIG_HASH, SENSORS, STATES, TABLE, TICK_S};
+    use upright::gains::{RIG_HASH, SENSORS, STATES, SWING_UP, SwingUp, TABLE, TICK_S};
     use upright::protocol::message::{Command, Message};
     use upright::protocol::serial_link::SerialLink;
     use upright::table::Build;
@@ -45,7 +45,7 @@ mod app {
 
     #[local]
     struct Local {
-        control: ControlTask<'static, 'static, Hardware, STATES, SENSORS>,
+        control: ControlTask<'static, 'static, Hardware, STATES, SENSORS, SwingUp>,
         link: SerialLink<'static, STATES, SENSORS>,
         line: SerialLine,
     }
@@ -58,8 +58,8 @@ mod app {
     fn init(cx: init::Context) -> (Shared, Local) {
         let build = Build { rig_hash: RIG_HASH, tick_s: TICK_S };
         let (hardware, line, firmware) = set_up(cx.device, cx.local.buffer, |reset| {
-            Firmware::new(&TABLE, &build, Hardware::WIDTHS, reset)
-                .unwrap_or_else(|_| Firmware::unusable(&TABLE, Hardware::WIDTHS, reset))
+            Firmware::with_swing_up(&TABLE, &SWING_UP, &build, Hardware::WIDTHS, reset)
+                .unwrap_or_else(|_| Firmware::unusable(&TABLE, &SWING_UP, Hardware::WIDTHS, reset))
         });
         let (to_control, commands) = cx.local.commands.split();
         let (messages, to_link) = cx.local.messages.split();

@@ -1,5 +1,7 @@
 //! The controller: one tick from encoder counts to motor duty cycle.
 
+mod motion;
+
 use nalgebra::SVector;
 use serde::{Deserialize, Serialize};
 

@@ -3,5 +3,6 @@
 pub mod actuator;
 pub mod controller;
 pub mod encoder;
+pub mod motion;
 pub mod observer;
 pub mod state_feedback;

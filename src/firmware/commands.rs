@@ -8,6 +8,7 @@ use crate::supervision::calibration::links_hang;
 use crate::supervision::inhibits::Inhibits;
 use crate::supervision::supervisor::State;
 use crate::table::ChecksumScan;
+use crate::table::SwingUp;
 
 /// Version of this crate: major, minor, patch.
 const VERSION: [u8; 3] = [
@@ -24,7 +25,7 @@ const fn number(digits: &str) -> u8 {
     }
 }
 
-impl<const NX: usize, const NY: usize> Firmware<'_, NX, NY> {
+impl<const NX: usize, const NY: usize, S: SwingUp<NX, NY>> Firmware<'_, NX, NY, S> {
     /// Carries out a command and gives the answer.
     pub(super) fn answer(&mut self, command: &Command) -> Answer {
         let done = |result: Result<(), _>| result.map_or_else(Answer::NotNow, |()| Answer::Done);
@@ -35,6 +36,8 @@ impl<const NX: usize, const NY: usize> Firmware<'_, NX, NY> {
             Request::HomeRail => done(self.home_rail()),
             Request::CheckSigns => done(self.check_signs()),
             Request::Arm => done(self.arm(command.id)),
+            Request::Up => done(self.raise(command.id)),
+            Request::Down => done(self.lower()),
             Request::Disarm => {
                 self.supervisor.disarm();
                 self.calibration.cancel();
@@ -97,19 +100,26 @@ impl<const NX: usize, const NY: usize> Firmware<'_, NX, NY> {
 
     /// Arms. `id` is that of the command.
     fn arm(&mut self, id: u64) -> Result<(), Inhibits> {
-        // A key held down since the fault sends one arm command after the other. None of them may arm: each one
-        // restarts the lockout, which ends only when the key has been released for `still_ticks`. The time that counts
-        // as standing still for homing also counts as letting go; nothing speaks for a key of its own in the rig file.
+        let inhibits = self.arming_inhibits().union(self.held_inhibit(id));
+        self.supervisor.arm(inhibits)?;
+        (self.checksum_scan, self.is_checked) = (ChecksumScan::default(), false);
+        let counts = *self.controller.encoders().counts();
+        self.calibration.restart_slow(&counts);
+        Ok(())
+    }
+
+    /// [`Inhibits::HELD`] if the command `id`, which would turn the motor on, comes from a key held since a fault.
+    pub(super) fn held_inhibit(&mut self, id: u64) -> Inhibits {
+        // A key held down since the fault sends one command after the other. None of them may turn the motor on: each
+        // one restarts the lockout, which ends only when the key has been released for `still_ticks`. The time that
+        // counts as standing still for homing also counts as letting go; nothing speaks for a key of its own in the
+        // rig file.
         if self.supervisor.state() == State::Fault || self.rearm_lockout_ticks > 0 {
             self.rearm_lockout_ticks = self.table.limits.still_ticks;
         }
         let held = self.supervisor.state() != State::Fault
             && (self.rearm_lockout_ticks > 0 || id <= self.last_clear_id);
-        self.supervisor.arm(self.arming_inhibits().union(Inhibits::HELD.when(held)))?;
-        (self.checksum_scan, self.is_checked) = (ChecksumScan::default(), false);
-        let counts = *self.controller.encoders().counts();
-        self.calibration.restart_slow(&counts);
-        Ok(())
+        Inhibits::HELD.when(held)
     }
 
     /// Inhibits of clearing: what would raise the fault again at once.

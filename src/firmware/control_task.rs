@@ -6,6 +6,7 @@ use crate::board::Board;
 use crate::firmware::Firmware;
 use crate::protocol::message::{Command, Message};
 use crate::protocol::queue;
+use crate::table::{NoSwingUp, SwingUp};
 
 /// Length of the queue of commands; it holds one less. One command is taken per tick.
 pub const COMMANDS: usize = 4;
@@ -14,18 +15,20 @@ pub const MESSAGES: usize = 8;
 
 /// Firmware, board, and this task's ends of the queues to the
 /// [`SerialLink`](crate::protocol::serial_link::SerialLink). It never waits.
-pub struct ControlTask<'q, 't, B, const NX: usize, const NY: usize> {
-    firmware: Firmware<'t, NX, NY>,
+pub struct ControlTask<'q, 't, B, const NX: usize, const NY: usize, S = NoSwingUp> {
+    firmware: Firmware<'t, NX, NY, S>,
     board: B,
     commands: Consumer<'q, Command>,
     messages: Producer<'q, Message<NX, NY>>,
     cycles: u32,
 }
 
-impl<'q, 't, B: Board<NY>, const NX: usize, const NY: usize> ControlTask<'q, 't, B, NX, NY> {
+impl<'q, 't, B: Board<NY>, const NX: usize, const NY: usize, S: SwingUp<NX, NY>>
+    ControlTask<'q, 't, B, NX, NY, S>
+{
     /// The task before its first tick; `commands` and `messages` lead from and to the serial link.
     pub fn new(
-        firmware: Firmware<'t, NX, NY>,
+        firmware: Firmware<'t, NX, NY, S>,
         board: B,
         commands: Consumer<'q, Command>,
         messages: Producer<'q, Message<NX, NY>>,
@@ -52,7 +55,7 @@ impl<'q, 't, B: Board<NY>, const NX: usize, const NY: usize> ControlTask<'q, 't,
     }
 
     /// The firmware, read-only.
-    pub fn firmware(&self) -> &Firmware<'t, NX, NY> {
+    pub fn firmware(&self) -> &Firmware<'t, NX, NY, S> {
         &self.firmware
     }
 

@@ -7,37 +7,43 @@
 mod commands;
 pub mod control_task;
 mod posture;
+mod swing_up;
 mod telemetry;
 
 use crate::board::{Contacts, Inputs, Output};
-use crate::control::controller::Controller;
+use crate::control::controller::{Controller, MotorCommand};
 use crate::control::encoder::CounterWidth;
+use crate::control::motion::Player;
 use crate::protocol::message::{Command, Reply, Reset, Statistics, Telemetry};
 use crate::supervision::calibration::Calibration;
 use crate::supervision::debounce::Debounce;
-use crate::supervision::detection::Detection;
+use crate::supervision::detection::{Detection, Finding};
 use crate::supervision::envelope;
 use crate::supervision::fault::{Cause, Fault};
 use crate::supervision::supervisor::{State, Supervisor};
-use crate::table::{Build, ChecksumScan, GainTable, TableError};
+use crate::table::{Build, ChecksumScan, GainTable, NoSwingUp, SwingUp, TableError};
 
-/// Controller and supervisor of one rig.
+/// Controller and supervisor of one rig, with its swing-up, if it has one.
 ///
 /// A tick has two halves: [`control`](Self::control) gives the output that the motor is driven with at once;
 /// [`finish`](Self::finish) does everything else and only has to end before the next tick is due.
 #[derive(Debug, Clone)]
-pub struct Firmware<'t, const NX: usize, const NY: usize> {
+pub struct Firmware<'t, const NX: usize, const NY: usize, S = NoSwingUp> {
     controller: Controller<'t, NX, NY>,
     supervisor: Supervisor,
     calibration: Calibration<NY>,
     detection: Detection<NY>,
     debounce: Debounce,
     checksum_scan: ChecksumScan,
+    swing_up_scan: ChecksumScan,
     /// Whether the table was sound at the start.
     is_usable: bool,
     /// Whether the whole table was found intact since arming.
     is_checked: bool,
     table: &'t GainTable<NX, NY>,
+    swing_up: &'t S,
+    /// The motion that is being followed.
+    moving: Option<Player<'t, NX, NY>>,
     raw_counts: [u32; NY],
     contacts: Contacts,
     supply_v: f32,
@@ -69,7 +75,7 @@ const WORDS_PER_ARMED_TICK: u32 = 8;
 const DEFAULT_TELEMETRY_PERIOD_TICKS: u16 = 10;
 
 impl<'t, const NX: usize, const NY: usize> Firmware<'t, NX, NY> {
-    /// The firmware after a `reset`, motor off.
+    /// The firmware without swing-up after a `reset`, motor off.
     ///
     /// # Errors
     /// [`TableError`] if the table is damaged or was made for another build.
@@ -79,12 +85,34 @@ impl<'t, const NX: usize, const NY: usize> Firmware<'t, NX, NY> {
         widths: [CounterWidth; NY],
         reset: Reset,
     ) -> Result<Self, TableError> {
-        Ok(Self::with_controller(table, Controller::new(table, build, widths)?, reset))
+        Self::with_swing_up(table, &NoSwingUp, build, widths, reset)
+    }
+}
+
+impl<'t, const NX: usize, const NY: usize, S: SwingUp<NX, NY>> Firmware<'t, NX, NY, S> {
+    /// The firmware after a `reset`, motor off.
+    ///
+    /// # Errors
+    /// [`TableError`] if a table is damaged or was made for another build.
+    pub fn with_swing_up(
+        table: &'t GainTable<NX, NY>,
+        swing_up: &'t S,
+        build: &Build,
+        widths: [CounterWidth; NY],
+        reset: Reset,
+    ) -> Result<Self, TableError> {
+        swing_up.check(build)?;
+        Ok(Self::with_controller(table, swing_up, Controller::new(table, build, widths)?, reset))
     }
 
     /// The firmware with a table that cannot be used: it has latched [`Fault::Table`] for good, and reports it.
-    pub fn unusable(table: &'t GainTable<NX, NY>, widths: [CounterWidth; NY], reset: Reset) -> Self {
-        let mut firmware = Self::with_controller(table, Controller::unusable(table, widths), reset);
+    pub fn unusable(
+        table: &'t GainTable<NX, NY>,
+        swing_up: &'t S,
+        widths: [CounterWidth; NY],
+        reset: Reset,
+    ) -> Self {
+        let mut firmware = Self::with_controller(table, swing_up, Controller::unusable(table, widths), reset);
         firmware.is_usable = false;
         firmware.trip(Fault::Table, None);
         firmware
@@ -92,6 +120,7 @@ impl<'t, const NX: usize, const NY: usize> Firmware<'t, NX, NY> {
 
     fn with_controller(
         table: &'t GainTable<NX, NY>,
+        swing_up: &'t S,
         controller: Controller<'t, NX, NY>,
         reset: Reset,
     ) -> Self {
@@ -103,9 +132,12 @@ impl<'t, const NX: usize, const NY: usize> Firmware<'t, NX, NY> {
             detection: Detection::default(),
             debounce: Debounce::default(),
             checksum_scan: ChecksumScan::default(),
+            swing_up_scan: ChecksumScan::default(),
             is_usable: true,
             is_checked: false,
             table,
+            swing_up,
+            moving: None,
             raw_counts: [0; NY],
             contacts: Contacts::default(),
             supply_v: 0.0,
@@ -164,11 +196,12 @@ impl<'t, const NX: usize, const NY: usize> Firmware<'t, NX, NY> {
         } else if inputs.contacts.driver_fault {
             self.trip(Fault::Driver, None);
         }
-        if self.supervisor.state() != State::Balancing {
+        if !self.supervisor.state().drives() {
             self.tick_motor_off();
         }
         self.output = match self.supervisor.state() {
             State::Balancing => self.balance(inputs),
+            State::Raising | State::Lowering if S::IS_POSSIBLE => self.move_links(inputs),
             _ => Output::OFF,
         };
         if !self.output.enable {
@@ -186,13 +219,27 @@ impl<'t, const NX: usize, const NY: usize> Firmware<'t, NX, NY> {
         let command = self.controller.control_with(&inputs.raw_counts, |counts, y, e| {
             finding = detection.test(thresholds, counts, y, e);
         });
+        let exceeded =
+            envelope::exceeded(&table.limits, self.controller.estimate().as_slice(), command.requested_n);
+        self.drive_or_trip(inputs, &command, exceeded, finding)
+    }
+
+    /// The output for `command`, unless there is a fault: of the inputs, of the limits on the state (`exceeded`), of
+    /// the tests of the innovation (`finding`) or of the force.
+    #[inline(always)]
+    fn drive_or_trip(
+        &mut self,
+        inputs: &Inputs<NY>,
+        command: &MotorCommand,
+        exceeded: Option<Fault>,
+        finding: Option<Finding>,
+    ) -> Output {
+        let table = self.table;
         (self.requested_n, self.applied_n) = (command.requested_n, command.applied_n);
         if let Some(fault) = self.debounce.check_inputs(&table.limits, inputs) {
             self.trip(fault, None);
         }
-        if let Some(fault) =
-            envelope::exceeded(&table.limits, self.controller.estimate().as_slice(), command.requested_n)
-        {
+        if let Some(fault) = exceeded {
             self.trip(fault, None);
         }
         if let Some(finding) = finding {
@@ -203,7 +250,7 @@ impl<'t, const NX: usize, const NY: usize> Firmware<'t, NX, NY> {
         {
             self.trip(fault, None);
         }
-        if self.supervisor.state() == State::Balancing {
+        if self.supervisor.state().drives() {
             Output { enable: true, drive: command.drive }
         } else {
             Output::OFF
@@ -225,7 +272,7 @@ impl<'t, const NX: usize, const NY: usize> Firmware<'t, NX, NY> {
             },
             State::Calibrated => self.calibration.update_sign_check(&counts, limits),
             State::Armed => self.tick_armed(&counts),
-            State::Disarmed | State::Balancing | State::Fault => {}
+            State::Disarmed | State::Raising | State::Balancing | State::Lowering | State::Fault => {}
         }
     }
 
@@ -246,18 +293,35 @@ impl<'t, const NX: usize, const NY: usize> Firmware<'t, NX, NY> {
 
     /// Starts balancing at these counts, which are within half a turn.
     fn start_balancing(&mut self, counts: &[i32; NY]) {
-        self.controller.encoders_mut().home(&self.raw_counts, counts);
-        if self.controller.start(&self.raw_counts).is_err() {
-            return;
+        if self.start_controller(counts) {
+            self.hold_setpoint();
+            self.supervisor.start_balancing();
         }
+    }
+
+    /// Starts the controller at rest at these counts, and with it the supervision of a rig that is driven; whether
+    /// that is possible.
+    fn start_controller(&mut self, counts: &[i32; NY]) -> bool {
+        self.controller.encoders_mut().home(&self.raw_counts, counts);
+        let started = self.controller.start(&self.raw_counts).is_ok();
+        self.restart_supervision();
+        started
+    }
+
+    /// Restarts the tests of encoders and motor, and what counts ticks towards a fault.
+    fn restart_supervision(&mut self) {
+        let counts = *self.controller.encoders().counts();
+        self.detection.start(&counts, &self.controller.positions().data.0[0]);
+        self.debounce.start();
+    }
+
+    /// Stays where the governed set-point is, unless the host commands another.
+    fn hold_setpoint(&mut self) {
         if !self.setpoint_commanded {
             let here = self.controller.law_state().setpoint;
             // Never refused: a position from the encoders is finite.
             let _ = self.controller.set_setpoint(here);
         }
-        self.detection.start(counts, &self.controller.positions().data.0[0]);
-        self.debounce.start();
-        self.supervisor.start_balancing();
     }
 
     /// Second half of a tick: telemetry if it is due, the prediction for the next tick, and the reply to `command`, if
@@ -271,8 +335,11 @@ impl<'t, const NX: usize, const NY: usize> Firmware<'t, NX, NY> {
         self.statistics.ticks = self.statistics.ticks.wrapping_add(1);
         self.statistics.worst_cycles = self.statistics.worst_cycles.max(cycles);
         let telemetry = self.telemetry_is_due().then(|| self.telemetry());
-        if self.supervisor.state() == State::Balancing {
-            self.predict();
+        if self.supervisor.state().drives() {
+            match self.supervisor.state() {
+                State::Raising | State::Lowering if S::IS_POSSIBLE => self.predict_motion(),
+                _ => self.predict(),
+            }
             if let Some(fault) =
                 self.debounce.check_link(&self.table.limits, command.is_some(), self.setpoint_commanded)
             {
@@ -286,6 +353,9 @@ impl<'t, const NX: usize, const NY: usize> Firmware<'t, NX, NY> {
                 Some(_) => self.is_checked = true,
                 None => {}
             }
+        }
+        if S::IS_POSSIBLE && self.swing_up.scan(&mut self.swing_up_scan) == Some(false) {
+            self.trip(Fault::Table, None);
         }
         let reply = command.map(|command| Reply { id: command.id, answer: self.answer(command) });
         self.tick = self.tick.wrapping_add(1);

@@ -4,7 +4,7 @@ use super::Firmware;
 use crate::board::Contacts;
 use crate::supervision::inhibits::Inhibits;
 use crate::supervision::sign_check::Signs;
-use crate::supervision::supervisor::State;
+use crate::table::SwingUp;
 
 /// Arming requires that the rig has been slow for this part of [`Limits::arm_ticks`]: long enough to refuse it while a
 /// link swings through the vertical, short enough that a steady hand is never told to wait. The whole of `arm_ticks`
@@ -13,7 +13,7 @@ use crate::supervision::supervisor::State;
 /// [`Limits::arm_ticks`]: crate::table::Limits::arm_ticks
 const MOVING_PART_OF_ARM_TICKS: u32 = 4;
 
-impl<const NX: usize, const NY: usize> Firmware<'_, NX, NY> {
+impl<const NX: usize, const NY: usize, S: SwingUp<NX, NY>> Firmware<'_, NX, NY, S> {
     /// Largest angle of a link from the vertical at these counts (rad); 0 for a rig without joints (a `[model]`).
     pub(super) fn largest_lean(&self, counts: &[i32; NY]) -> f32 {
         let Some(observer) = &self.table.observer else { return 0.0 };
@@ -51,21 +51,27 @@ impl<const NX: usize, const NY: usize> Firmware<'_, NX, NY> {
 
     /// All inhibits of arming that hold now, except [`Inhibits::HELD`], which is only known when it is tried.
     pub fn arming_inhibits(&self) -> Inhibits {
-        let state = self.supervisor.arming_inhibits();
-        if self.supervisor.state() == State::Balancing {
-            return state;
+        if self.supervisor.state().drives() {
+            return self.supervisor.arming_inhibits();
         }
         let limits = &self.table.limits;
         let counts = *self.controller.encoders().counts();
         let lean = self.largest_lean(&limits.within_half_a_turn(&counts));
+        self.inhibits_with_motor_off()
+            .union(Inhibits::TILTED.when(lean > limits.arm_angle_rad))
+            .union(self.off_centre_inhibit(&counts))
+    }
+
+    /// Inhibits of turning the motor on, however the links are.
+    pub(super) fn inhibits_with_motor_off(&self) -> Inhibits {
+        let state = self.supervisor.arming_inhibits();
+        if self.supervisor.state().drives() {
+            return state;
+        }
+        let moves = self.calibration.slow_ticks() < self.table.limits.arm_ticks / MOVING_PART_OF_ARM_TICKS;
         state
             .union(Inhibits::SIGNS.when(self.calibration.signs() != Signs::Checked))
-            .union(Inhibits::TILTED.when(lean > limits.arm_angle_rad))
-            .union(
-                Inhibits::MOVING
-                    .when(self.calibration.slow_ticks() < limits.arm_ticks / MOVING_PART_OF_ARM_TICKS),
-            )
-            .union(self.off_centre_inhibit(&counts))
+            .union(Inhibits::MOVING.when(moves))
             .union(self.input_inhibits())
             .union(Inhibits::NO_OBSERVER.when(self.table.observer.is_none()))
     }

@@ -4,9 +4,11 @@ use heapless::Vec;
 
 use super::Firmware;
 use crate::control::actuator::Drive;
+use crate::control::motion::Player;
 use crate::protocol::message::Telemetry;
+use crate::table::SwingUp;
 
-impl<const NX: usize, const NY: usize> Firmware<'_, NX, NY> {
+impl<const NX: usize, const NY: usize, S: SwingUp<NX, NY>> Firmware<'_, NX, NY, S> {
     /// Counts a message that found its queue full.
     pub fn message_dropped(&mut self) {
         self.statistics.dropped = self.statistics.dropped.saturating_add(1);
@@ -34,6 +36,8 @@ impl<const NX: usize, const NY: usize> Firmware<'_, NX, NY> {
             homing: self.calibration.homing(),
             signs: self.calibration.signs(),
             arming_inhibits: self.arming_inhibits(),
+            swing_up_inhibits: self.swing_up_inhibits(),
+            motion_tick: self.moving.as_ref().map_or(0, Player::tick),
             counts: Vec::from_slice(self.controller.encoders().counts()).unwrap_or_default(),
             estimate: Vec::from_slice(self.controller.estimate().as_slice()).unwrap_or_default(),
             innovation: Vec::from_slice(self.controller.innovation().as_slice()).unwrap_or_default(),

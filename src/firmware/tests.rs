@@ -188,8 +188,11 @@ fn of_several_faults_in_one_tick_the_first_of_the_precedence_is_latched() {
     let mut other = firmware(&TABLE, Reset::Power).unwrap();
     other.table = &damaged;
     let (ticks_of_a_pass, _) = ticks_to_fault(&mut other).unwrap();
-    for (index, first) in Fault::PRECEDENCE.into_iter().enumerate() {
-        let cause = cause_of(&Fault::PRECEDENCE[index..], ticks_of_a_pass);
+    // A balancing rig follows no motion.
+    let all: std::vec::Vec<Fault> =
+        Fault::PRECEDENCE.into_iter().filter(|fault| *fault != Fault::OffCourse).collect();
+    for (index, &first) in all.iter().enumerate() {
+        let cause = cause_of(&all[index..], ticks_of_a_pass);
         assert_eq!(cause.map(|cause| (cause.fault, cause.tick)), Some((first, ticks_of_a_pass - 1)));
         let alone = cause_of(&[first], ticks_of_a_pass);
         assert_eq!(alone.map(|cause| cause.fault), Some(first), "alone");

@@ -15,7 +15,7 @@ use crate::supervision::supervisor::State;
 use crate::table::Law;
 
 /// Version of these messages; a host with another version must not send commands.
-pub const PROTOCOL: u8 = 2;
+pub const PROTOCOL: u8 = 3;
 
 /// A command, host to firmware.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -58,6 +58,10 @@ pub enum Request {
     ResetStatistics,
     /// Send telemetry every n ticks; 0: never.
     Telemetry(u16),
+    /// Raise the hanging links and balance them.
+    Up,
+    /// Lower the balancing links until they hang, then turn the motor off.
+    Down,
 }
 
 /// Firmware to host.
@@ -177,6 +181,10 @@ pub struct Telemetry<const NX: usize, const NY: usize> {
     pub signs: Signs,
     /// Inhibits of arming that hold now.
     pub arming_inhibits: Inhibits,
+    /// Inhibits of the next motion that hold now: of lowering while the rig balances, else of raising.
+    pub swing_up_inhibits: Inhibits,
+    /// Ticks since the beginning of the motion; 0 if there is none.
+    pub motion_tick: u32,
     /// Encoder counts, from position 0.
     pub counts: Vec<i32, NY>,
     /// Corrected estimate x̂ (m, m/s, rad, rad/s …).

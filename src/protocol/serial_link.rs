@@ -97,6 +97,8 @@ mod tests {
             homing: Homing::Touch { low: true, high: true },
             signs: Signs::Swapped { asked: u8::MAX, moved: u8::MAX },
             arming_inhibits: all,
+            swing_up_inhibits: all,
+            motion_tick: u32::MAX,
             counts: Vec::from_array([i32::MIN; 15]),
             estimate: Vec::from_array([f32::MAX; 30]),
             innovation: Vec::from_array([f32::MAX; 15]),

@@ -47,6 +47,8 @@ pub enum Fault {
     Clock = 18,
     /// The chip, the registers of the motor's timer or the chip's supply are not as they have to be.
     Board = 19,
+    /// Cart or link are too far from the planned motion.
+    OffCourse = 20,
 }
 
 /// Longest time from a fault's first effect on the firmware's inputs to motor off.
@@ -87,7 +89,7 @@ pub struct Entry {
 
 impl Fault {
     /// Every fault, by code.
-    pub const ALL: [Entry; 19] = [
+    pub const ALL: [Entry; 20] = [
         Entry {
             fault: Fault::NotFinite,
             name: "not finite",
@@ -98,7 +100,7 @@ impl Fault {
         Entry {
             fault: Fault::Angle,
             name: "angle",
-            condition: "a link leans further than `angle_rad` from the vertical",
+            condition: "a link leans further than `angle_rad` from the vertical while the rig balances",
             reaction: Reaction::Ticks(1),
             remedy: "let the links hang, then raise them again; smaller disturbances, or a design with more force",
         },
@@ -119,7 +121,7 @@ impl Fault {
         Entry {
             fault: Fault::LimitSwitch,
             name: "limit switch",
-            condition: "a limit switch is pressed, or its wire is open, while balancing",
+            condition: "a limit switch is pressed, or its wire is open, while the motor is on",
             reaction: Reaction::Ticks(1),
             remedy: "push the cart off the switch; if it was not there, check the wire, and home again",
         },
@@ -229,6 +231,14 @@ impl Fault {
             reaction: Reaction::Ticks(1),
             remedy: "flash the image for this board, check its 3.3 V; then reset",
         },
+        Entry {
+            fault: Fault::OffCourse,
+            name: "off course",
+            condition: "while raising or lowering, cart or link are further from the planned motion than the swing-up's \
+                        `deviation_m` or `deviation_rad`",
+            reaction: Reaction::Ticks(1),
+            remedy: "let the links hang; check masses and friction in the rig file, and that nothing touches the links",
+        },
     ];
 
     /// Which fault is latched when several occur in one tick: the first of these. Inputs come first, then the limits on
@@ -237,7 +247,7 @@ impl Fault {
     /// [`Fault::NotFinite`] stands once for the supply voltage and the requested force: the supply comes after the limit
     /// switches, the force after the overrun. A [`Fault::Motor`] found by rejected measurements of several sensors has the
     /// place of [`Fault::Encoder`]. [`Fault::Watchdog`] and [`Fault::Crash`] reset the microcontroller.
-    pub const PRECEDENCE: [Fault; 17] = [
+    pub const PRECEDENCE: [Fault; 18] = [
         Fault::Clock,
         Fault::Board,
         Fault::EmergencyStop,
@@ -248,6 +258,7 @@ impl Fault {
         Fault::Overrun,
         Fault::Rail,
         Fault::Angle,
+        Fault::OffCourse,
         Fault::Speed,
         Fault::Encoder,
         Fault::Frozen,

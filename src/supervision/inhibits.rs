@@ -37,6 +37,11 @@ inhibits! {
     13 TABLE "the gain table does not fit its checksum or this build";
     14 NOT_HANGING "the links do not hang at rest";
     15 NO_SWITCHES "this rig has no rail with switches at its ends";
+    16 NO_SWING_UP "the gain table holds no swing-up: give the rig file `[swing_up]`";
+    17 NOT_BALANCING "the rig does not balance: there is nothing to lower";
+    18 UNSETTLED "the cart is on its way to the set-point, or a link leans: wait until it stands";
+    19 NO_ROOM "the motion does not fit on the rail from here: move the cart";
+    20 OTHER_LAW "the swing-up ends in another control law: select LQR";
 }
 
 impl Inhibits {
@@ -103,7 +108,7 @@ mod tests {
                 .fold(Inhibits::NONE, |all, (inhibit, _)| all.union(*inhibit))
                 .texts()
                 .count(),
-            16
+            21
         );
         assert_eq!(Inhibits::NONE.err_if_any(), Ok(()));
         assert_eq!(both.err_if_any(), Err(both));

@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 use crate::supervision::fault::{Cause, Fault};
 use crate::supervision::inhibits::Inhibits;
 
-/// State of the supervisor. The motor is off in all of them but [`State::Balancing`].
+/// State of the supervisor. The motor is on while [`drives`](State::drives).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default, Serialize, Deserialize)]
 pub enum State {
     /// Positions are not known.
@@ -17,19 +17,32 @@ pub enum State {
     Calibrated,
     /// Waiting until all links have been upright and slow for `arm_time_s`.
     Armed,
-    /// The controller drives the motor.
+    /// The motor raises the links by a planned motion.
+    Raising,
+    /// The controller balances the links.
     Balancing,
+    /// The motor lowers the links by a planned motion.
+    Lowering,
     /// A fault is latched.
     Fault,
+}
+
+impl State {
+    /// Whether the motor is on.
+    pub const fn drives(self) -> bool {
+        matches!(self, State::Raising | State::Balancing | State::Lowering)
+    }
 }
 
 /// The state machine, with the first cause of a fault. Each method is an event.
 ///
 /// ```text
 /// Disarmed ─ start_homing ─► Homing ─ complete_homing ─► Calibrated ─ arm ─► Armed ─ start_balancing ─► Balancing
-///     └───────────────────── complete_homing ────────────────►│◄─────────────────┘                          │
-///                                                             │     disarm, cancel_arming                   │
-///                                                             └◄───────────────── disarm ───────────────────┘
+///     └───────────────────── complete_homing ────────────────►│  │◄──────────────┘                        ▲  │  │
+///                                                             │  │  disarm, cancel_arming                 │  │  │
+///                                                             │  └─ raise ─► Raising ── finish_motion ────┘  │  │
+///                                                             │◄─ finish_motion ── Lowering ◄────── lower ───┘  │
+///                                                             └◄──────── disarm while the motor is on ──────────┘
 /// any state ─ trip ─► Fault ─ clear ─► Calibrated, or Disarmed if positions are not known
 /// ```
 #[derive(Debug, Clone, Default)]
@@ -74,7 +87,9 @@ impl Supervisor {
     /// Turns the motor off; ends homing.
     pub fn disarm(&mut self) {
         match self.state {
-            State::Armed | State::Balancing => self.state = State::Calibrated,
+            State::Armed | State::Raising | State::Balancing | State::Lowering => {
+                self.state = State::Calibrated;
+            }
             State::Homing => self.state = State::Disarmed,
             State::Disarmed | State::Calibrated | State::Fault => {}
         }
@@ -105,7 +120,7 @@ impl Supervisor {
     fn check_homing_allowed(&self) -> Result<(), Inhibits> {
         match self.state {
             State::Disarmed | State::Homing | State::Calibrated => Ok(()),
-            State::Armed | State::Balancing => Err(Inhibits::RUNNING),
+            State::Armed | State::Raising | State::Balancing | State::Lowering => Err(Inhibits::RUNNING),
             State::Fault => Err(Inhibits::FAULT),
         }
     }
@@ -125,7 +140,7 @@ impl Supervisor {
         let unknown = Inhibits::NOT_HOMED.when(!self.positions_known);
         unknown.union(match self.state {
             State::Disarmed | State::Homing | State::Calibrated => Inhibits::NONE,
-            State::Armed | State::Balancing => Inhibits::RUNNING,
+            State::Armed | State::Raising | State::Balancing | State::Lowering => Inhibits::RUNNING,
             State::Fault => Inhibits::FAULT,
         })
     }
@@ -134,6 +149,35 @@ impl Supervisor {
     pub fn start_balancing(&mut self) {
         if self.state == State::Armed {
             self.state = State::Balancing;
+        }
+    }
+
+    /// Turns the motor on to raise the links, unless the state or one of `other` inhibits it.
+    ///
+    /// # Errors
+    /// All inhibits that hold.
+    pub fn raise(&mut self, other: Inhibits) -> Result<(), Inhibits> {
+        self.arming_inhibits().union(other).err_if_any()?;
+        self.state = State::Raising;
+        Ok(())
+    }
+
+    /// Begins to lower the balancing links, unless one of `other` inhibits it.
+    ///
+    /// # Errors
+    /// All inhibits that hold.
+    pub fn lower(&mut self, other: Inhibits) -> Result<(), Inhibits> {
+        Inhibits::NOT_BALANCING.when(self.state != State::Balancing).union(other).err_if_any()?;
+        self.state = State::Lowering;
+        Ok(())
+    }
+
+    /// A planned motion has reached its end: raised links are balanced, hanging ones need no motor.
+    pub fn finish_motion(&mut self) {
+        match self.state {
+            State::Raising => self.state = State::Balancing,
+            State::Lowering => self.state = State::Calibrated,
+            _ => {}
         }
     }
 
@@ -164,7 +208,7 @@ mod tests {
     use State::*;
     use std::vec::Vec;
 
-    const STATES: [State; 6] = [Disarmed, Homing, Calibrated, Armed, Balancing, Fault];
+    const STATES: [State; 8] = [Disarmed, Homing, Calibrated, Armed, Raising, Balancing, Lowering, Fault];
 
     #[derive(Debug, Clone, Copy)]
     enum Event {
@@ -177,6 +221,11 @@ mod tests {
         ArmInhibited,
         StartBalancing,
         CancelArming,
+        Raise,
+        RaiseInhibited,
+        Lower,
+        LowerInhibited,
+        FinishMotion,
         Clear,
         ClearInhibited,
     }
@@ -202,6 +251,11 @@ mod tests {
             Event::ArmInhibited => return supervisor.arm(Inhibits::TILTED),
             Event::StartBalancing => supervisor.start_balancing(),
             Event::CancelArming => supervisor.cancel_arming(),
+            Event::Raise => return supervisor.raise(Inhibits::NONE),
+            Event::RaiseInhibited => return supervisor.raise(Inhibits::NOT_HANGING),
+            Event::Lower => return supervisor.lower(Inhibits::NONE),
+            Event::LowerInhibited => return supervisor.lower(Inhibits::UNSETTLED),
+            Event::FinishMotion => supervisor.finish_motion(),
             Event::Clear => return supervisor.clear(Inhibits::NONE),
             Event::ClearInhibited => return supervisor.clear(Inhibits::EMERGENCY_STOP),
         }
@@ -211,27 +265,41 @@ mod tests {
     #[test]
     fn every_event_in_every_state_leads_where_the_table_says() {
         use Event::*;
-        let known = [Calibrated, Armed, Balancing];
+        let known = [Calibrated, Armed, Raising, Balancing, Lowering];
+        let running = [Armed, Raising, Balancing, Lowering, Fault];
+        let not_calibrated = [Disarmed, Homing, Armed, Raising, Balancing, Lowering, Fault];
+        let not_balancing = [Disarmed, Homing, Calibrated, Armed, Raising, Lowering, Fault];
+        // Where an event leads to from each of STATES, if not to the same state.
+        let but = |changes: &[(State, State)]| {
+            STATES.map(|from| changes.iter().find(|(state, _)| *state == from).map_or(from, |(_, to)| *to))
+        };
         // One row per event: the state it leads to from each of STATES, and where it is refused.
-        let table: [(Event, [State; 6], &[State]); 11] = [
-            (Trip, [Fault; 6], &[]),
-            (TripEncoder, [Fault; 6], &[]),
-            (Disarm, [Disarmed, Disarmed, Calibrated, Calibrated, Calibrated, Fault], &[]),
-            (StartHoming, [Homing, Homing, Homing, Armed, Balancing, Fault], &[Armed, Balancing, Fault]),
+        let table: [(Event, [State; 8], &[State]); 16] = [
+            (Trip, [Fault; 8], &[]),
+            (TripEncoder, [Fault; 8], &[]),
             (
-                CompleteHoming,
-                [Calibrated, Calibrated, Calibrated, Armed, Balancing, Fault],
-                &[Armed, Balancing, Fault],
+                Disarm,
+                but(&[
+                    (Homing, Disarmed),
+                    (Armed, Calibrated),
+                    (Raising, Calibrated),
+                    (Balancing, Calibrated),
+                    (Lowering, Calibrated),
+                ]),
+                &[],
             ),
-            (
-                Arm,
-                [Disarmed, Homing, Armed, Armed, Balancing, Fault],
-                &[Disarmed, Homing, Armed, Balancing, Fault],
-            ),
+            (StartHoming, but(&[(Disarmed, Homing), (Calibrated, Homing)]), &running),
+            (CompleteHoming, but(&[(Disarmed, Calibrated), (Homing, Calibrated)]), &running),
+            (Arm, but(&[(Calibrated, Armed)]), &not_calibrated),
             (ArmInhibited, STATES, &STATES),
-            (StartBalancing, [Disarmed, Homing, Calibrated, Balancing, Balancing, Fault], &[]),
-            (CancelArming, [Disarmed, Homing, Calibrated, Calibrated, Balancing, Fault], &[]),
-            (Clear, [Disarmed, Homing, Calibrated, Armed, Balancing, Disarmed], &[]),
+            (StartBalancing, but(&[(Armed, Balancing)]), &[]),
+            (CancelArming, but(&[(Armed, Calibrated)]), &[]),
+            (Raise, but(&[(Calibrated, Raising)]), &not_calibrated),
+            (RaiseInhibited, STATES, &STATES),
+            (Lower, but(&[(Balancing, Lowering)]), &not_balancing),
+            (LowerInhibited, STATES, &STATES),
+            (FinishMotion, but(&[(Raising, Balancing), (Lowering, Calibrated)]), &[]),
+            (Clear, but(&[(Fault, Disarmed)]), &[]),
             (ClearInhibited, STATES, &[Fault]),
         ];
         for (event, leads_to, refused_in) in table {

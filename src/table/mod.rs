@@ -11,11 +11,12 @@ mod motor;
 mod observer;
 mod part;
 mod scalar;
+mod swing_up;
 mod thresholds;
 
 use nalgebra::{ArrayStorage, SMatrix};
 
-use crate::table::part::part;
+use crate::table::part::{is_finite, part};
 
 pub use chain_model::ChainModel;
 pub use checksum::ChecksumScan;
@@ -25,6 +26,7 @@ pub use motor::MotorMap;
 pub use observer::ObserverGains;
 pub use part::{Part, Reader, Resize, Shape, Words, WordsMut};
 pub use scalar::Scalar;
+pub use swing_up::{MotionTable, Motions, NoSwingUp, SwingUp, SwingUpTable};
 pub use thresholds::{MotorTest, Thresholds};
 
 /// Version of the layout of [`GainTable`]; a table with another version is refused.
@@ -163,16 +165,7 @@ impl<const NX: usize, const NY: usize> GainTable<NX, NY> {
             && self.motor.iter().all(MotorMap::is_sound)
             && self.limits.is_sound()
             && self.thresholds.is_sound();
-        if is_sound && self.is_finite() { Ok(()) } else { Err(TableError::Value) }
-    }
-
-    /// Whether the table is free of infinities and NaN.
-    fn is_finite(&self) -> bool {
-        let leaves = (0..).map_while(|leaf| self.part(&mut { leaf }));
-        leaves.into_iter().all(|words| match words {
-            Words::F32(values) => values.iter().all(|value| value.is_finite()),
-            _ => true,
-        })
+        if is_sound && is_finite(self) { Ok(()) } else { Err(TableError::Value) }
     }
 }
 

@@ -47,8 +47,8 @@ pub enum WordsMut<'a> {
     I32(&'a mut [i32]),
     /// Two words, the low one first.
     U64(&'a mut u64),
-    /// Whether an optional part is present.
-    Presence,
+    /// Words that cannot be changed here: whether an optional part is present, and those of a shared slice.
+    Fixed,
 }
 
 /// How the words of a field are arranged.
@@ -58,6 +58,8 @@ pub enum Shape {
     Value,
     /// An array.
     List,
+    /// A list whose length is not part of its type.
+    Slice,
     /// A matrix, column by column; a vector is one column.
     Columns {
         /// Number of entries in each column.
@@ -173,6 +175,28 @@ impl Resize<u64> for u64 {
     }
 }
 
+/// A list of any length, which lies elsewhere.
+impl Part for &[f32] {
+    #[inline]
+    fn part(&self, at: &mut usize) -> Option<Words<'_>> {
+        leaf(at, Words::F32(self))
+    }
+
+    fn part_mut(&mut self, at: &mut usize) -> Option<WordsMut<'_>> {
+        leaf(at, WordsMut::Fixed)
+    }
+
+    fn read(&self, reader: &mut dyn Reader) {
+        reader.words(Words::F32(self), Shape::Slice);
+    }
+}
+
+impl<'t> Resize<&'t [f32]> for &'t [f32] {
+    fn resized(&self) -> &'t [f32] {
+        self
+    }
+}
+
 impl<const R: usize, const C: usize> Part for SMatrix<f32, R, C> {
     #[inline]
     fn part(&self, at: &mut usize) -> Option<Words<'_>> {
@@ -204,7 +228,7 @@ impl<P: Part> Part for Option<P> {
     }
 
     fn part_mut(&mut self, at: &mut usize) -> Option<WordsMut<'_>> {
-        leaf(at, WordsMut::Presence).or_else(|| self.as_mut()?.part_mut(at))
+        leaf(at, WordsMut::Fixed).or_else(|| self.as_mut()?.part_mut(at))
     }
 
     fn read(&self, reader: &mut dyn Reader) {
@@ -221,6 +245,14 @@ impl<P: Resize<Q>, Q> Resize<Option<Q>> for Option<P> {
     }
 }
 
+/// Whether a part is free of infinities and NaN.
+pub(crate) fn is_finite(part: &impl Part) -> bool {
+    (0..).map_while(|leaf| part.part(&mut { leaf })).all(|words| match words {
+        Words::F32(values) => values.iter().all(|value| value.is_finite()),
+        _ => true,
+    })
+}
+
 /// `words` if `at` is 0; otherwise counts `at` down by this leaf.
 #[inline(always)]
 fn leaf<W>(at: &mut usize, words: W) -> Option<W> {
@@ -233,25 +265,26 @@ fn leaf<W>(at: &mut usize, words: W) -> Option<W> {
     }
 }
 
-/// Declares a struct of a gain table: `pub struct Name<SIZE to OTHER, …; SCALAR> { … }`. `SIZE` is a number of states
-/// or sensors and `OTHER` its name in the result of [`Resize`]. `SCALAR` is given if the host also uses the struct in
-/// another precision. Every field needs documentation. A last field `sealed by NAME` is the checksum of the others.
+/// Declares a struct of a gain table: `pub struct Name<'t, SIZE to OTHER, …; SCALAR> { … }`. `SIZE` is a number of
+/// states, sensors or links and `OTHER` its name in the result of [`Resize`]. `SCALAR` is given if the host also uses
+/// the struct in another precision, `'t` if it holds slices. Every field needs documentation. A last field `sealed by
+/// NAME` is the checksum of the others.
 macro_rules! part {
     (
         $(#[$attribute:meta])*
-        pub struct $name:ident<$($size:ident to $other:ident),*; $($scalar:ident)?> {
+        pub struct $name:ident<$($life:lifetime,)? $($size:ident to $other:ident),*; $($scalar:ident)?> {
             $($(#[doc = $doc:literal])+ pub $field:ident: $type:ty,)+
             $(sealed by $(#[$seal_attribute:meta])+ pub $seal:ident,)?
         }
     ) => {
         $(#[$attribute])*
         #[derive(Debug, Clone, PartialEq)]
-        pub struct $name<$(const $size: usize,)* $($scalar: Scalar = f32)?> {
+        pub struct $name<$($life,)? $(const $size: usize,)* $($scalar: Scalar = f32)?> {
             $($(#[doc = $doc])+ pub $field: $type,)+
             $($(#[$seal_attribute])+ pub $seal: u32,)?
         }
 
-        impl<$(const $size: usize),*> $crate::table::part::Part for $name<$($size),*> {
+        impl<$($life,)? $(const $size: usize),*> $crate::table::part::Part for $name<$($life,)? $($size),*> {
             #[inline]
             fn part(&self, at: &mut usize) -> Option<$crate::table::part::Words<'_>> {
                 let Self { $($field,)+ $($seal: _)? } = self;
@@ -280,10 +313,10 @@ macro_rules! part {
             }
         }
 
-        impl<$(const $size: usize, const $other: usize),*> $crate::table::part::Resize<$name<$($other),*>>
-            for $name<$($size),*>
+        impl<$($life,)? $(const $size: usize, const $other: usize),*>
+            $crate::table::part::Resize<$name<$($life,)? $($other),*>> for $name<$($life,)? $($size),*>
         {
-            fn resized(&self) -> $name<$($other),*> {
+            fn resized(&self) -> $name<$($life,)? $($other),*> {
                 let Self { $($field,)+ $($seal)? } = self;
                 $name {
                     $($field: $crate::table::part::Resize::resized($field),)+

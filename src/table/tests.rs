@@ -79,14 +79,14 @@ fn full() -> GainTable<4, 2> {
     table
 }
 
-/// Number of words in each leaf of a part; `None` for the presence word of an optional part.
+/// Number of words in each leaf of a part; `None` for words that cannot be changed.
 fn sizes(part: &mut impl Part) -> Vec<Option<usize>> {
     let size = |leaf: usize| match part.part_mut(&mut { leaf })? {
         WordsMut::F32(values) => Some(Some(values.len())),
         WordsMut::U32(values) => Some(Some(values.len())),
         WordsMut::I32(values) => Some(Some(values.len())),
         WordsMut::U64(_) => Some(Some(2)),
-        WordsMut::Presence => Some(None),
+        WordsMut::Fixed => Some(None),
     };
     (0..).map_while(size).collect()
 }
@@ -98,7 +98,7 @@ fn flip(part: &mut impl Part, leaf: usize, word: usize, bit: u32) {
         Some(WordsMut::U32(values)) => values[word] ^= 1 << bit,
         Some(WordsMut::I32(values)) => values[word] ^= 1 << bit,
         Some(WordsMut::U64(value)) => *value ^= 1 << (32 * word as u32 + bit),
-        Some(WordsMut::Presence) | None => panic!("leaf {leaf} has no word {word}"),
+        Some(WordsMut::Fixed) | None => panic!("leaf {leaf} has no word {word}"),
     }
 }
 
@@ -248,4 +248,82 @@ fn a_reader_hears_every_name_in_the_order_of_declaration() {
         rest = &rest[found.unwrap() + name.len()..];
     }
     assert_eq!(names.0.last().map(String::as_str), Some("energy"));
+}
+
+/// Rows of a motion for four states and two sensors: reference, force and gains; and the filter.
+const COURSE: [f32; 4 * 9] = [0.5; 4 * 9];
+const FILTER: [f32; 4 * 8] = [0.25; 4 * 8];
+
+fn motion<'t>(course: &'t [f32], filter: &'t [f32]) -> MotionTable<'t> {
+    MotionTable { ticks: 6, course_ticks: 2, filter_ticks: 2, travel_m: [-0.5, 0.5], course, filter }
+}
+
+/// The table of a swing-up of one link.
+fn swing_up<'t>(course: &'t [f32], filter: &'t [f32]) -> SwingUpTable<'t, 2, 1> {
+    let mut table = SwingUpTable {
+        format: TABLE_FORMAT,
+        rig_hash: BUILD.rig_hash,
+        tick_s: BUILD.tick_s,
+        model: ChainModel {
+            inverse_mass: 1.0,
+            a: SVector::repeat(0.1),
+            weight: SVector::repeat(1.0),
+            b: SMatrix::repeat(0.2),
+            b_reduced: SMatrix::repeat(0.1),
+            cart_friction: 0.0,
+            joint_frictions: SVector::repeat(0.0),
+        },
+        deviation_rad: 0.35,
+        deviation_m: 0.1,
+        thresholds: full().thresholds,
+        raise: motion(course, filter),
+        lower: motion(course, filter),
+        crc: 0,
+    };
+    table.crc = table.checksum();
+    table
+}
+
+#[test]
+fn every_flipped_bit_of_a_motion_is_refused() {
+    let good = swing_up(&COURSE, &FILTER);
+    assert_eq!(good.check(&BUILD, 4), Ok(()));
+    for (word, bit) in (0..COURSE.len()).flat_map(|word| (0..32).map(move |bit| (word, bit))) {
+        let mut course = COURSE;
+        course[word] = f32::from_bits(course[word].to_bits() ^ 1 << bit);
+        let damaged = SwingUpTable { lower: motion(&course, &FILTER), ..good.clone() };
+        assert_eq!(damaged.check(&BUILD, 4), Err(TableError::Crc), "word {word}, bit {bit}");
+    }
+    for (leaf, size) in sizes(&mut good.clone()).into_iter().enumerate().skip(1) {
+        for (word, bit) in (0..size.unwrap_or(0)).flat_map(|word| (0..32).map(move |bit| (word, bit))) {
+            let mut damaged = good.clone();
+            flip(&mut damaged, leaf, word, bit);
+            assert_eq!(damaged.check(&BUILD, 4), Err(TableError::Crc), "leaf {leaf}, word {word}, bit {bit}");
+        }
+    }
+    let mut scan = ChecksumScan::default();
+    assert_eq!((0..1000).find_map(|_| scan.next(&good)), Some(good.crc));
+}
+
+#[test]
+fn a_motion_that_does_not_fit_is_refused_even_with_the_right_checksum() {
+    let refused = |change: &dyn Fn(&mut SwingUpTable<'_, 2, 1>)| {
+        let mut table = swing_up(&COURSE, &FILTER);
+        change(&mut table);
+        table.crc = table.checksum();
+        table.check(&BUILD, 4)
+    };
+    assert_eq!(refused(&|_| ()), Ok(()));
+    assert_eq!(refused(&|t| t.format += 1), Err(TableError::Format));
+    assert_eq!(refused(&|t| t.rig_hash ^= 1), Err(TableError::RigHash));
+    assert_eq!(refused(&|t| t.tick_s *= 2.0), Err(TableError::Tick));
+    let dimensions = Err(TableError::Dimensions);
+    assert_eq!(refused(&|t| t.raise.course = &COURSE[9..]), dimensions, "too few rows");
+    assert_eq!(refused(&|t| t.raise.course = &COURSE[1..]), dimensions, "half a row");
+    assert_eq!(refused(&|t| t.lower.filter_ticks = 1), dimensions, "knots that end too early");
+    assert_eq!(refused(&|t| t.lower.course_ticks = 0), dimensions);
+    assert_eq!(refused(&|t| t.raise.ticks = 0), dimensions);
+    assert_eq!(refused(&|t| t.deviation_rad = f32::NAN), Err(TableError::Value));
+    assert_eq!(refused(&|t| t.raise.filter = &[f32::INFINITY; 4 * 8]), Err(TableError::Value));
+    assert_eq!(swing_up(&COURSE, &FILTER).check(&BUILD, 6), dimensions, "more states");
 }

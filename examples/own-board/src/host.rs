@@ -3,7 +3,7 @@
 use std::error::Error;
 use std::path::Path;
 
-use own_board::gains::{RIG_HASH, TABLE, TICK_S};
+use own_board::gains::{RIG_HASH, SWING_UP, TABLE, TICK_S};
 use upright::table::{Build, Law};
 use upright_design::design::design;
 use upright_design::harness::{record, with_table};
@@ -17,7 +17,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let scenario = Scenario { step_m: 0.1, duration_s: 5.0, ..Scenario::at_rest(&rig, Law::Lqr) };
     let build = Build { rig_hash: RIG_HASH, tick_s: TICK_S };
     // From power-up: homing, sign check, raising the link, arming, and then the step.
-    let run = with_table(&TABLE, &build, |firmware| record(&rig, &values, &scenario, firmware))??;
+    let run = with_table(&TABLE, &SWING_UP, &build, |firmware| record(&rig, &values, &scenario, firmware))??;
     println!("{} ticks, fault: {:?}", run.ticks.len(), run.fault);
     println!("cart {:.4} m from the set-point at the end", run.summary.final_error_m);
     match run.summary.fall {

@@ -1,4 +1,5 @@
-//! The person at the rig: homes, checks the signs, raises the links and holds them upright until the motor is on.
+//! The person at the rig: homes, checks the signs, then raises the links and holds them upright until the motor is on,
+//! or lets them hang for the swing-up.
 
 use upright::protocol::message::Request;
 use upright::supervision::sign_check::Signs;
@@ -6,6 +7,7 @@ use upright::supervision::supervisor::State;
 
 use crate::reality::hanging_by_hand;
 use crate::rig::{PlantDescription, Rig};
+use crate::simulate::Begin;
 
 /// What the hand does in one tick.
 #[derive(Debug, Clone, PartialEq)]
@@ -29,6 +31,8 @@ pub struct Status {
 #[derive(Debug, Clone)]
 pub struct Hand {
     doing: Doing,
+    /// The request that turns the motor on.
+    turn_on: Request,
     hanging: Vec<f64>,
     start: Vec<f64>,
     held: Vec<f64>,
@@ -44,7 +48,7 @@ enum Doing {
     CheckSigns,
     Follow,
     Raise,
-    Arm,
+    TurnOn,
     Hold,
 }
 
@@ -54,14 +58,19 @@ const RATE: [f64; 2] = [2.0, 0.5];
 const RETRY_S: f64 = 0.05;
 
 impl Hand {
-    /// A hand that moves `rig` from hanging to the state `start`, and lets go there.
-    pub fn new(rig: &Rig, start: &[f64]) -> Self {
+    /// A hand that moves `rig` from hanging to the state `start`, and lets go there: when the firmware balances, or
+    /// for a swing-up (`begin`) when it begins to raise the links.
+    pub fn new(rig: &Rig, start: &[f64], begin: Begin) -> Self {
         let hanging = match &rig.plant {
             PlantDescription::Chain(_) => hanging_by_hand(rig),
             PlantDescription::Model(_) => vec![0.0; rig.states()],
         };
         Self {
             doing: Doing::Home,
+            turn_on: match begin {
+                Begin::ByHand => Request::Arm,
+                Begin::Hanging { .. } => Request::Up,
+            },
             held: hanging.clone(),
             hanging,
             start: start.to_vec(),
@@ -75,9 +84,9 @@ impl Hand {
         &self.held
     }
 
-    /// What the hand does in tick number `tick`; `None` once the firmware balances and the hand has let go.
+    /// What the hand does in tick number `tick`; `None` once the motor is on and the hand has let go.
     pub fn act(&mut self, tick: u32, status: &Status) -> Option<HandTick> {
-        if status.state == State::Balancing {
+        if status.state.drives() {
             return None;
         }
         let request = match self.doing {
@@ -95,11 +104,11 @@ impl Hand {
             Doing::Raise => {
                 let start = self.start.clone();
                 if self.move_to(&start) {
-                    self.doing = Doing::Arm;
+                    self.doing = Doing::TurnOn;
                 }
                 None
             }
-            Doing::Arm => self.until(status.state == State::Armed, Doing::Hold, tick, Request::Arm),
+            Doing::TurnOn => self.until(status.state == State::Armed, Doing::Hold, tick, self.turn_on),
             Doing::Hold => None,
         };
         Some(HandTick { held: self.held.clone(), request })

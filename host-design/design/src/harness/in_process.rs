@@ -11,12 +11,12 @@ use upright::firmware::control_task::{COMMANDS, ControlTask, MESSAGES};
 use upright::protocol::frame::FrameError;
 use upright::protocol::message::{Command, Reset};
 use upright::protocol::serial_link::SerialLink;
-use upright::table::{Build, GainTable};
+use upright::table::{Build, GainTable, SwingUp};
 
 use super::error::HarnessError;
 use super::target::{Pins, Target};
 use crate::simulate::{Bench, SimulationError};
-use crate::table::{TableValues, WithSize, with_firmware_size};
+use crate::table::{SwingUpValues, TableValues, WithSize, with_firmware_size};
 
 /// Starts the firmware of `table` in this process, after a power-on reset, and does `action` with it.
 ///
@@ -34,23 +34,24 @@ pub fn with_firmware<R>(
     outcome.transpose()?.and(result).ok_or_else(|| SimulationError::Size { states, sensors }.into())
 }
 
-/// As [`with_firmware`], with a table of any size that is known when this is compiled: that of a firmware crate.
+/// As [`with_firmware`], with tables of any size that is known when this is compiled: those of a firmware crate.
 ///
 /// # Errors
-/// [`HarnessError`] if the firmware refuses the table.
-pub fn with_table<R, const NX: usize, const NY: usize>(
+/// [`HarnessError`] if the firmware refuses a table.
+pub fn with_table<R, S: SwingUp<NX, NY>, const NX: usize, const NY: usize>(
     table: &GainTable<NX, NY>,
+    swing_up: &S,
     build: &Build,
     action: impl FnOnce(&mut dyn Target) -> R,
 ) -> Result<R, HarnessError> {
-    let firmware = Firmware::new(table, build, Wires::<NY>::WIDTHS, Reset::Power)?;
+    let firmware = Firmware::with_swing_up(table, swing_up, build, Wires::<NY>::WIDTHS, Reset::Power)?;
     let (mut commands, mut messages) = (Queue::<Command, COMMANDS>::new(), Queue::<_, MESSAGES>::new());
     let (to_control, commands) = commands.split();
     let (messages, to_link) = messages.split();
     let inputs = Inputs { raw_counts: [0; NY], supply_v: 0.0, contacts: Default::default() };
     let wires = Wires { inputs, output: Output::OFF };
     Ok(action(&mut InProcess {
-        control: ControlTask::<_, NX, NY>::new(firmware, wires, commands, messages),
+        control: ControlTask::new(firmware, wires, commands, messages),
         link: SerialLink::new(to_control, to_link),
         sent: Vec::new(),
         is_read: true,
@@ -65,15 +66,16 @@ struct WithFirmware<'a> {
 impl WithSize for WithFirmware<'_> {
     type Output = Result<(), HarnessError>;
 
-    fn run<const NX: usize, const NY: usize>(self) -> Self::Output {
+    fn run<const NX: usize, const NY: usize, const N: usize>(self) -> Self::Output {
         let table = self.table.table::<NX, NY>();
-        with_table(&table, &self.table.build(), self.run)
+        let swing_up = self.table.swing_up.as_ref().map(SwingUpValues::table::<NY, N>);
+        with_table(&table, &swing_up, &self.table.build(), self.run)
     }
 }
 
 /// The image's tasks without an image.
-struct InProcess<'q, 't, const NX: usize, const NY: usize> {
-    control: ControlTask<'q, 't, Wires<NY>, NX, NY>,
+struct InProcess<'q, 't, S, const NX: usize, const NY: usize> {
+    control: ControlTask<'q, 't, Wires<NY>, NX, NY, S>,
     link: SerialLink<'q, NX, NY>,
     /// On the serial line: the host receives what is sent about a tick with the next one, as from an image.
     sent: Vec<u8>,
@@ -105,7 +107,7 @@ impl<const NY: usize> Board<NY> for Wires<NY> {
     }
 }
 
-impl<const NX: usize, const NY: usize> Target for InProcess<'_, '_, NX, NY> {
+impl<S: SwingUp<NX, NY>, const NX: usize, const NY: usize> Target for InProcess<'_, '_, S, NX, NY> {
     fn tick(&mut self, pins: &Pins, serial: &mut Vec<u8>) -> Result<Output, HarnessError> {
         let raw_counts = pins.raw_counts.as_slice().try_into().map_err(|_| FrameError::Message)?;
         self.control.board().inputs = Inputs { raw_counts, supply_v: pins.supply_v, contacts: pins.contacts };

@@ -12,7 +12,7 @@ use super::session::{AnyTelemetry, HEARTBEAT_S, Session};
 use super::start_up::Harness;
 use super::target::{Pace, Target};
 use crate::rig::Rig;
-use crate::simulate::{Fall, Sample, Scenario, Sensing, Summary, Trace, ticks};
+use crate::simulate::{Begin, Fall, Sample, Scenario, Sensing, Summary, Trace, ticks};
 use crate::table::TableValues;
 
 /// One tick of a run, bit by bit: two runs are equal if all of their ticks are.
@@ -43,7 +43,8 @@ pub struct Recording {
 
 /// Runs `scenario` with the firmware `target`, which has the table `table`, against the plant of `rig`. A hand homes
 /// the rig while it hangs, checks the signs, raises the links and holds them at the scenario's start until the
-/// firmware begins to balance. It lets go in that tick, which is time 0.
+/// firmware begins to balance. It lets go in that tick, which is time 0. For a swing-up it lets the links hang, and
+/// time 0 is the first tick in which they are raised.
 ///
 /// # Errors
 /// [`HarnessError`] if the firmware cannot run this scenario, or does not begin to balance.
@@ -65,6 +66,10 @@ pub fn record(
     let mut commanded = target_at(0);
     let last = ticks(rig, scenario)?;
     let mut record = Record::new(rig, last, pace.telemetry_ticks.into());
+    let lower_at = match scenario.begin {
+        Begin::Hanging { lower_at_s: Some(at_s) } => Some((at_s / period_s).round() as usize),
+        _ => None,
+    };
     let heartbeat = (HEARTBEAT_S / period_s).max(1.0) as usize;
     for tick in 0..=last {
         if tick > 0 {
@@ -72,14 +77,18 @@ pub fn record(
             output = harness.session.tick(&inputs)?;
         }
         let ahead = target_at(tick + pace.command_ticks);
-        if commanded != ahead {
+        if lower_at == Some(tick) {
+            harness.session.send(Request::Down);
+        } else if commanded != ahead {
             harness.session.send(Request::Setpoint(ahead as f32));
             commanded = ahead;
         } else if tick.is_multiple_of(heartbeat) {
             harness.session.send(Request::Beat);
         }
         let t = tick as f64 * period_s;
-        let fall = Fall::of(rig, t, harness.bench.state());
+        // Links that are being raised or lowered, or were, do not fall.
+        let stands = scenario.begin == Begin::ByHand || harness.session.status().state == State::Balancing;
+        let fall = Fall::of(rig, t, harness.bench.state()).filter(|_| stands);
         let state = harness.bench.state().to_vec();
         let force = harness.bench.tick(output.drive);
         let number = harness.session.tick_number();
@@ -89,6 +98,9 @@ pub fn record(
             record.fall = fall;
             break;
         }
+    }
+    if scenario.begin != Begin::ByHand && lower_at.is_none() {
+        record.fall = Fall::of(rig, last as f64 * period_s, harness.bench.state());
     }
     // The last tick's telemetry may come with the next one.
     let inputs = harness.inputs();
@@ -147,7 +159,7 @@ impl Record {
     /// Joins the telemetry of each tick with the true state of the bench in that tick.
     fn take(&mut self, session: &mut Session<'_>) -> Result<(), HarnessError> {
         while let Some(telemetry) = session.next_telemetry() {
-            if self.next_tick.is_none() && telemetry.state != State::Balancing {
+            if self.next_tick.is_none() && !telemetry.state.drives() {
                 continue;
             }
             let expected = self.next_tick.unwrap_or(telemetry.tick);

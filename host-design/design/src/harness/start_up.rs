@@ -39,7 +39,7 @@ impl<'t> Harness<'t> {
         scenario: &Scenario,
         target: &'t mut dyn Target,
     ) -> Result<Self, HarnessError> {
-        let hand = Hand::new(rig, &scenario.start);
+        let hand = Hand::new(rig, &scenario.start, scenario.begin);
         let mut bench = Bench::new(rig, scenario)?;
         bench.hold(hand.held());
         let mut harness = Self {
@@ -79,8 +79,8 @@ impl<'t> Harness<'t> {
         self.session.tick(&inputs)
     }
 
-    /// Homes, checks the signs, raises the links and arms. Ends with the first tick in which the motor is on, and
-    /// gives that tick's output.
+    /// Homes, checks the signs, raises the links and arms, or lets them hang and starts the swing-up. Ends with the
+    /// first tick in which the motor is on, and gives that tick's output.
     ///
     /// `setpoint_m` is commanded as soon as the firmware is armed; from then on it needs a command every
     /// [`HEARTBEAT_S`](super::HEARTBEAT_S). Without a set-point it holds the position in which it begins.

@@ -103,7 +103,7 @@ struct WithController<'a> {
 impl WithSize for WithController<'_> {
     type Output = Result<Option<Fall>, SimulationError>;
 
-    fn run<const NX: usize, const NY: usize>(self) -> Self::Output {
+    fn run<const NX: usize, const NY: usize, const N: usize>(self) -> Self::Output {
         let table = self.table.table::<NX, NY>();
         let mut controller = Controller::new(&table, &self.table.build(), Bench::widths())?;
         (self.action)(&mut controller)

@@ -31,6 +31,20 @@ pub struct Scenario {
     pub substeps: usize,
     /// Reading of the encoder counters at position 0.
     pub counter_start: u32,
+    /// How the run begins, with the whole firmware.
+    pub begin: Begin,
+}
+
+/// How a run begins, with the whole firmware.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Begin {
+    /// A hand holds the links upright in the state `start` until the firmware balances them.
+    ByHand,
+    /// The links hang in the state `start`; the firmware raises them, which begins at time 0.
+    Hanging {
+        /// When the firmware is told to lower them (s).
+        lower_at_s: Option<f64>,
+    },
 }
 
 /// What the controller measures.
@@ -58,7 +72,17 @@ impl Scenario {
             seed: 1,
             substeps: 4,
             counter_start: 0,
+            begin: Begin::ByHand,
         }
+    }
+
+    /// A swing-up from rest, hanging, with the cart at 0.
+    pub fn swing_up(rig: &Rig, duration_s: f64, lower_at_s: Option<f64>) -> Self {
+        let mut scenario = Self::at_rest(rig, Law::Lqr);
+        if let Some(first) = scenario.start.get_mut(2) {
+            *first = core::f64::consts::PI;
+        }
+        Self { duration_s, begin: Begin::Hanging { lower_at_s }, ..scenario }
     }
 
     /// The run that every new table must pass: a small lean of the first link (or a small offset of a

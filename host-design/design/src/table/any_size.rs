@@ -10,19 +10,20 @@ pub const MAX_SENSORS: usize = 15;
 /// The largest number of sensors for a `[model]` rig; a chain has one for the cart and one for each link.
 pub const MAX_MODEL_SENSORS: usize = 2;
 
-/// An action that needs the numbers of states (NX) and sensors (NY) as parameters of a type.
+/// An action that needs the numbers of states (NX) and sensors (NY) as parameters of a type, and of a chain's links
+/// (N).
 pub trait WithSize {
     /// Result of the action.
     type Output;
 
     /// Runs the action for one size.
-    fn run<const NX: usize, const NY: usize>(self) -> Self::Output;
+    fn run<const NX: usize, const NY: usize, const N: usize>(self) -> Self::Output;
 }
 
 macro_rules! dispatch {
     ($states:expr, $sensors:expr, $action:expr, $($nx:literal: $($ny:literal)*;)*) => {
         match ($states, $sensors) {
-            $($(($nx, $ny) => Some($action.run::<$nx, $ny>()),)*)*
+            $($(($nx, $ny) => Some($action.run::<$nx, $ny, { $ny - 1 }>()),)*)*
             _ => None,
         }
     };

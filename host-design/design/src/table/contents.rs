@@ -10,6 +10,8 @@ pub(super) enum Node {
     Value(Number),
     /// An array.
     List(Vec<Number>),
+    /// A list whose length is not part of its type.
+    Slice(Vec<Number>),
     /// A matrix, column by column.
     Columns(Vec<Vec<Number>>),
     /// A struct.
@@ -85,6 +87,7 @@ impl Reader for Builder {
         self.value(match shape {
             Shape::Value => Node::Value(numbers[0]),
             Shape::List => Node::List(numbers),
+            Shape::Slice => Node::Slice(numbers),
             Shape::Columns { rows } => Node::Columns(numbers.chunks(rows).map(<[_]>::to_vec).collect()),
         });
     }
@@ -111,7 +114,7 @@ impl Serialize for Node {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         match self {
             Node::Value(number) => number.serialize(serializer),
-            Node::List(numbers) => serializer.collect_seq(numbers),
+            Node::List(numbers) | Node::Slice(numbers) => serializer.collect_seq(numbers),
             Node::Columns(columns) => match columns.as_slice() {
                 [column] => serializer.collect_seq(column),
                 columns => {

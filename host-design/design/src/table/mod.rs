@@ -4,6 +4,7 @@ mod any_size;
 mod contents;
 mod source;
 mod supervision;
+mod swing_up;
 mod write;
 
 use core::ops::{Deref, DerefMut};
@@ -18,6 +19,7 @@ use crate::rig::{Motor, PlantDescription, Rig};
 
 pub use any_size::{MAX_MODEL_SENSORS, MAX_SENSORS, MAX_STATES, WithSize, with_firmware_size, with_size};
 pub use source::gains_source;
+pub use swing_up::{MotionValues, SwingUpValues};
 pub use write::{WriteError, write_atomically};
 
 /// Which gains go into a table.
@@ -36,6 +38,8 @@ pub enum Gains {
 pub struct TableValues {
     /// Name of the rig.
     pub rig: String,
+    /// The swing-up, if the rig has one.
+    pub swing_up: Option<SwingUpValues>,
     widest: GainTable<MAX_STATES, MAX_SENSORS>,
 }
 
@@ -80,6 +84,9 @@ pub enum NoTable {
         /// The value as `f32`.
         value: f32,
     },
+    /// There is no swing-up for this rig.
+    #[error("no table of a swing-up: {0}")]
+    SwingUp(&'static str),
     /// The firmware's types are not compiled for these dimensions.
     #[error(
         "no gain table for {states} states and {sensors} sensors: a table holds up to {MAX_STATES} states; the controller of \
@@ -157,7 +164,7 @@ impl TableValues {
             thresholds: supervision::thresholds(detection.as_ref()),
             crc: 0,
         };
-        let values = Self { rig: rig.name.clone(), widest };
+        let values = Self { rig: rig.name.clone(), swing_up: None, widest };
         if let PlantDescription::Chain(chain) = &rig.plant
             && sensors != chain.links.len() + 1
         {
@@ -182,6 +189,10 @@ impl TableValues {
         let limits = &mut self.limits;
         (limits.rail_m, limits.angle_rad, limits.speed_m_per_s) = ([-f32::MAX, f32::MAX], f32::MAX, f32::MAX);
         limits.saturated_ticks = u32::MAX;
+        if let Some(swing_up) = &mut self.swing_up {
+            swing_up.thresholds = supervision::thresholds(None);
+            (swing_up.deviation_rad, swing_up.deviation_m) = (f32::MAX, f32::MAX);
+        }
         self
     }
 
@@ -221,6 +232,12 @@ impl TableValues {
         with_size(self.states(), self.sensors(), Fields(self)).unwrap_or_default()
     }
 
+    /// Names, documentation and values of all fields of the swing-up, and its checksum, if there is one.
+    fn swing_up_fields(&self) -> Option<(Vec<contents::Field>, u32)> {
+        let swing_up = self.swing_up.as_ref()?;
+        with_size(self.states(), self.sensors(), SwingUpFields(swing_up))
+    }
+
     /// The checksum the firmware expects.
     pub fn crc(&self) -> u32 {
         // `of` makes table values only for compiled sizes.
@@ -238,7 +255,7 @@ struct Checksum<'a>(&'a TableValues);
 impl WithSize for Checksum<'_> {
     type Output = u32;
 
-    fn run<const NX: usize, const NY: usize>(self) -> u32 {
+    fn run<const NX: usize, const NY: usize, const N: usize>(self) -> u32 {
         self.0.table::<NX, NY>().crc
     }
 }
@@ -248,8 +265,19 @@ struct Fields<'a>(&'a TableValues);
 impl WithSize for Fields<'_> {
     type Output = Vec<contents::Field>;
 
-    fn run<const NX: usize, const NY: usize>(self) -> Self::Output {
+    fn run<const NX: usize, const NY: usize, const N: usize>(self) -> Self::Output {
         contents::fields(&self.0.table::<NX, NY>())
+    }
+}
+
+struct SwingUpFields<'a>(&'a SwingUpValues);
+
+impl WithSize for SwingUpFields<'_> {
+    type Output = (Vec<contents::Field>, u32);
+
+    fn run<const NX: usize, const NY: usize, const N: usize>(self) -> Self::Output {
+        let table = self.0.table::<NY, N>();
+        (contents::fields(&table), table.crc)
     }
 }
 

@@ -4,6 +4,8 @@
 
 use core::fmt::Write;
 
+use upright::table::MotionTable;
+
 use super::TableValues;
 use super::contents::{Field, Node, Number};
 use crate::rig::{PlantDescription, Rig};
@@ -41,19 +43,99 @@ fn write_source(out: &mut String, rig: &Rig, table: &TableValues) -> core::fmt::
         writer.field(&field)?;
     }
     let crc = hexadecimal(table.crc().into(), 2);
+    writeln!(out, "    // CRC-32 of all values above.\n    crc: {crc},\n}};\n")?;
+    match table.swing_up_fields() {
+        Some((fields, crc)) => write_swing_up(out, table, &fields, crc),
+        None => {
+            writeln!(out, "/// This table has no swing-up.\npub type SwingUp = NoSwingUp;\n")?;
+            writeln!(out, "/// The swing-up.\npub static SWING_UP: SwingUp = NoSwingUp;")
+        }
+    }
+}
+
+/// Writes the table of the swing-up, row by row, without rustfmt's line breaks.
+fn write_swing_up(out: &mut String, table: &TableValues, fields: &[Field], crc: u32) -> core::fmt::Result {
+    let links = table.sensors() - 1;
+    writeln!(out, "/// The swing-up's table has knots for as long as each motion lasts.")?;
+    writeln!(out, "pub type SwingUp = SwingUpTable<'static, SENSORS, {links}>;\n")?;
+    writeln!(out, "/// The swing-up.\n#[rustfmt::skip]\npub static SWING_UP: SwingUp = SwingUpTable {{")?;
+    let course = MotionTable::course_width(table.states());
+    let mut writer = Rows { out, course, filter: table.states() * table.sensors(), indent: 4 };
+    for field in fields {
+        writer.field(field)?;
+    }
+    let crc = hexadecimal(crc.into(), 2);
     writeln!(out, "    // CRC-32 of all values above.\n    crc: {crc},\n}};")
+}
+
+/// Writes fields with one row of a slice or matrix per line.
+struct Rows<'a> {
+    out: &'a mut String,
+    course: usize,
+    filter: usize,
+    indent: usize,
+}
+
+impl Rows<'_> {
+    fn line(&mut self, text: &str) -> core::fmt::Result {
+        writeln!(self.out, "{:1$}{text}", "", self.indent)
+    }
+
+    fn field(&mut self, field: &Field) -> core::fmt::Result {
+        let Field { name, documentation, value } = field;
+        for line in documentation {
+            self.line(&format!("// {}", line.trim()))?;
+        }
+        let row = |numbers: &[Number]| -> String {
+            numbers.iter().map(|&number| literal(number)).collect::<Vec<_>>().join(", ")
+        };
+        match value {
+            Node::Value(number) => match *name {
+                "format" => self.line("format: TABLE_FORMAT,"),
+                "rig_hash" => self.line("rig_hash: RIG_HASH,"),
+                "tick_s" => self.line("tick_s: TICK_S,"),
+                name => self.line(&format!("{name}: {},", literal(*number))),
+            },
+            Node::List(numbers) => self.line(&format!("{name}: [{}],", row(numbers))),
+            Node::Columns(columns) => {
+                let columns: Vec<String> =
+                    columns.iter().map(|column| format!("[{}]", row(column))).collect();
+                self.line(&format!("{name}: columns([{}]),", columns.join(", ")))
+            }
+            Node::Slice(numbers) => {
+                let width = if *name == "course" { self.course } else { self.filter };
+                self.line(&format!("{name}: &["))?;
+                self.indent += 4;
+                numbers.chunks(width).try_for_each(|numbers| self.line(&format!("{},", row(numbers))))?;
+                self.indent -= 4;
+                self.line("],")
+            }
+            Node::Struct(kind, fields) => {
+                self.line(&format!("{name}: {kind} {{"))?;
+                self.indent += 4;
+                fields.iter().try_for_each(|field| self.field(field))?;
+                self.indent -= 4;
+                self.line("},")
+            }
+            Node::Optional(_) => Err(core::fmt::Error),
+        }
+    }
 }
 
 /// Writes the imports of the table, with rustfmt's order and line breaks.
 fn write_imports(out: &mut String, table: &TableValues) -> core::fmt::Result {
     let names = [
+        ("ChainModel", table.swing_up.is_some()),
         ("GainTable", true),
         ("LawGains", true),
         ("Limits", true),
+        ("MotionTable", table.swing_up.is_some()),
         ("MotorMap", table.motor.is_some()),
         ("MotorTest", true),
+        ("NoSwingUp", table.swing_up.is_none()),
         ("ObserverGains", table.observer.is_some()),
         ("PerLaw", true),
+        ("SwingUpTable", table.swing_up.is_some()),
         ("TABLE_FORMAT", true),
         ("Thresholds", true),
         ("columns", table.observer.is_some() || table.laws.present().next().is_some()),
@@ -64,8 +146,20 @@ fn write_imports(out: &mut String, table: &TableValues) -> core::fmt::Result {
     if line.len() <= WIDTH {
         writeln!(out, "{line}\n")
     } else {
-        writeln!(out, "use upright::table::{{\n    {names},\n}};\n")
+        writeln!(out, "use upright::table::{{\n{}\n}};\n", filled(&used))
     }
+}
+
+/// The names with as many in a line as fit.
+fn filled(names: &[&str]) -> String {
+    let mut lines = vec!["   ".to_owned()];
+    for name in names {
+        match lines.last_mut() {
+            Some(line) if line.len() + name.len() + 2 <= WIDTH => *line += &format!(" {name},"),
+            _ => lines.push(format!("    {name},")),
+        }
+    }
+    lines.join("\n")
 }
 
 /// rustfmt's longest line.
@@ -112,6 +206,8 @@ impl Writer<'_> {
                 self.line("],")
             }
             Node::Columns(columns) => self.columns(name, columns),
+            // A gain table has none.
+            Node::Slice(_) => Err(core::fmt::Error),
             Node::Struct(kind, fields) => self.body(name, &format!("{kind} {{"), fields, "},"),
             Node::Optional(None) => self.line(&format!("{name}: None,")),
             Node::Optional(Some(node)) => match &**node {

@@ -32,6 +32,8 @@ pub fn action(key: &KeyEvent) -> Option<Action> {
         KeyCode::Char('H') => Action::Send(Request::HomeRail),
         KeyCode::Char('g') => Action::Send(Request::CheckSigns),
         KeyCode::Char('a') => Action::Send(Request::Arm),
+        KeyCode::Char('u') => Action::Send(Request::Up),
+        KeyCode::Char('n') => Action::Send(Request::Down),
         KeyCode::Char('d' | ' ') => Action::Send(Request::Disarm),
         KeyCode::Char('c') => Action::Send(Request::Clear),
         KeyCode::Char('0') => Action::Send(Request::Setpoint(0.0)),
@@ -47,7 +49,7 @@ pub fn action(key: &KeyEvent) -> Option<Action> {
 /// A line that is not a command.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error(
-    "`{0}` is no command; give home, home-rail, check-signs, arm, disarm, clear, set-point METRES, or law lqr|pole-placement"
+    "`{0}` is no command; give home, home-rail, check-signs, arm, up, down, disarm, clear, set-point METRES, or law lqr|pole-placement"
 )]
 pub struct BadCommand(String);
 
@@ -63,6 +65,8 @@ pub fn request(line: &str) -> Result<Request, BadCommand> {
         ["home-rail"] => Request::HomeRail,
         ["check-signs"] => Request::CheckSigns,
         ["arm"] => Request::Arm,
+        ["up"] => Request::Up,
+        ["down"] => Request::Down,
         ["disarm"] => Request::Disarm,
         ["clear"] => Request::Clear,
         ["set-point", metres] => Request::Setpoint(metres.parse().map_err(|_| bad())?),

@@ -291,6 +291,8 @@ fn name(request: Request) -> String {
         Request::HomeRail => "home on the rail's switches".to_owned(),
         Request::CheckSigns => "check signs".to_owned(),
         Request::Arm => "arm".to_owned(),
+        Request::Up => "up".to_owned(),
+        Request::Down => "down".to_owned(),
         Request::Disarm => "disarm".to_owned(),
         Request::Clear => "clear".to_owned(),
         Request::Setpoint(metres) => format!("set-point {metres:.3} m"),

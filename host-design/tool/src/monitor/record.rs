@@ -14,6 +14,7 @@ pub fn json(telemetry: &TelemetryOfAny) -> Value {
         "law": telemetry.law,
         "fault": telemetry.fault.map(|fault| fault.to_string()),
         "against_arming": telemetry.arming_inhibits.texts().collect::<Vec<_>>(),
+        "against_swing_up": telemetry.swing_up_inhibits.texts().collect::<Vec<_>>(),
         "counts": telemetry.counts,
         "estimate": telemetry.estimate,
         "innovation": telemetry.innovation,

@@ -6,12 +6,13 @@ use ratatui::style::{Color, Style, Stylize};
 use ratatui::symbols::Marker;
 use ratatui::text::Line;
 use ratatui::widgets::{Axis, Block, Chart, Dataset, GraphType, Paragraph, Wrap};
+use upright::supervision::inhibits::Inhibits;
 use upright::supervision::supervisor::State;
 
 use super::model::{Monitor, TelemetryOfAny};
 use super::words;
 
-const KEYS: &str = "h/H home (rail)  g check signs  a arm  d/space disarm  c clear  ←→ 1 cm  0 zero  l law  r record  q quit";
+const KEYS: &str = "h/H home (rail)  g check signs  a arm  u up  n down  d/space disarm  c clear  ←→ 1 cm  0 zero  l law  r record  q quit";
 const COLOURS: [Color; 6] =
     [Color::Cyan, Color::Yellow, Color::Magenta, Color::Green, Color::Blue, Color::Red];
 
@@ -83,6 +84,7 @@ fn header(monitor: &Monitor) -> Vec<Line<'_>> {
     let colour = match telemetry.state {
         State::Disarmed | State::Calibrated => Color::White,
         State::Homing | State::Armed => Color::Yellow,
+        State::Raising | State::Lowering => Color::Magenta,
         State::Balancing => Color::Green,
         State::Fault => Color::Red,
     };
@@ -103,8 +105,14 @@ fn header(monitor: &Monitor) -> Vec<Line<'_>> {
         lines.push(Line::from(format!("before: {}; {}", cause.fault, cause.fault.entry().remedy)));
     }
     lines.extend(words::instruction(telemetry).map(|what| Line::from(format!("now: {what}")).yellow()));
-    if telemetry.state != State::Balancing && !telemetry.arming_inhibits.is_empty() {
+    if !telemetry.state.drives() && !telemetry.arming_inhibits.is_empty() {
         lines.push(Line::from(format!("against arming: {}", telemetry.arming_inhibits)));
+    }
+    let against = telemetry.swing_up_inhibits;
+    let is_moving = matches!(telemetry.state, State::Raising | State::Lowering);
+    if !is_moving && !against.is_empty() && !against.contains(Inhibits::NO_SWING_UP) {
+        let motion = if telemetry.state == State::Balancing { "down" } else { "up" };
+        lines.push(Line::from(format!("against {motion}: {against}")));
     }
     lines
 }

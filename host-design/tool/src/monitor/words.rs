@@ -13,7 +13,9 @@ pub fn state(state: State) -> &'static str {
         State::Homing => "homing",
         State::Calibrated => "calibrated: motor off",
         State::Armed => "armed: waits until all links are upright and still",
+        State::Raising => "raising: the motor is on",
         State::Balancing => "balancing: the motor is on",
+        State::Lowering => "lowering: the motor is on",
         State::Fault => "fault: motor off",
     }
 }

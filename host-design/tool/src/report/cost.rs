@@ -71,7 +71,7 @@ struct Bytes;
 impl WithSize for Bytes {
     type Output = usize;
 
-    fn run<const NX: usize, const NY: usize>(self) -> usize {
+    fn run<const NX: usize, const NY: usize, const N: usize>(self) -> usize {
         size_of::<GainTable<NX, NY>>()
     }
 }

@@ -138,7 +138,7 @@ impl Desk {
     /// Turns the motor off when the viewer in command is silent; while it is not, the firmware is told so.
     fn watch(&mut self, now: Duration) {
         let state = self.monitor.telemetry.as_ref().map(|telemetry| telemetry.state);
-        let is_on = matches!(state, Some(State::Armed | State::Balancing));
+        let is_on = state.is_some_and(|state| state == State::Armed || state.drives());
         if !self.was_seen || !is_on {
             return;
         }

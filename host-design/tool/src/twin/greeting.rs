@@ -24,8 +24,16 @@ pub(super) fn greeting(
         }
         PlantDescription::Model(_) => (Vec::new(), [None, None]),
     };
-    let states =
-        [State::Disarmed, State::Homing, State::Calibrated, State::Armed, State::Balancing, State::Fault];
+    let states = [
+        State::Disarmed,
+        State::Homing,
+        State::Calibrated,
+        State::Armed,
+        State::Raising,
+        State::Balancing,
+        State::Lowering,
+        State::Fault,
+    ];
     let defects = Kind::ALL.iter().filter(|row| row.0.can_begin_while_balancing(has_image));
     json!({
         "rig": rig.name,

@@ -46,6 +46,8 @@ fn telemetry(tick: u32, state: State, fault: Option<Fault>) -> Telemetry<10, 5> 
         homing: Homing::Homed,
         signs: Signs::Checked,
         arming_inhibits: if fault.is_some() { Inhibits::FAULT } else { Inhibits::NONE },
+        swing_up_inhibits: Inhibits::NO_SWING_UP,
+        motion_tick: 0,
         counts: List::from_slice(&[1, -2, 3, -4, 5]).unwrap(),
         estimate: List::from_slice(&[0.125, 0.0, 0.01, 0.0, 0.02, 0.0, -0.01, 0.0, 0.005, -0.5]).unwrap(),
         innovation: List::from_slice(&[0.0; 5]).unwrap(),

@@ -1,0 +1,181 @@
+//! The table of a swing-up on the host: its values for any number of links.
+
+use nalgebra::{SMatrix, SVector};
+use upright::table::{ChainModel, MotionTable, SwingUpTable, TABLE_FORMAT, Thresholds};
+
+use super::{MAX_SENSORS, NoTable, TableValues, finite};
+use crate::plant::{ChainParameters, ChainPlant};
+use crate::rig::{PlantDescription, Rig};
+use crate::swing_up::{Motion, SwingUp};
+
+/// Time between two knots of reference, force and gains (s) …
+const COURSE_S: f64 = 0.01;
+/// … and of the filter.
+const FILTER_S: f64 = 0.05;
+
+/// The values of a swing-up table, with knots taken from a planned motion.
+#[derive(Debug, Clone, PartialEq)]
+pub struct SwingUpValues {
+    /// Constants of the equations of motion.
+    pub chain: ChainParameters<f64>,
+    /// See [`SwingUpTable::deviation_rad`].
+    pub deviation_rad: f32,
+    /// See [`SwingUpTable::deviation_m`].
+    pub deviation_m: f32,
+    /// See [`SwingUpTable::thresholds`].
+    pub thresholds: Thresholds<MAX_SENSORS>,
+    /// From hanging to upright.
+    pub raise: MotionValues,
+    /// From upright to hanging.
+    pub lower: MotionValues,
+    rig_hash: u64,
+    tick_s: f32,
+}
+
+/// The values of a [`MotionTable`].
+#[derive(Debug, Clone, PartialEq)]
+pub struct MotionValues {
+    /// See [`MotionTable::ticks`].
+    pub ticks: u32,
+    /// See [`MotionTable::course_ticks`].
+    pub course_ticks: u32,
+    /// See [`MotionTable::filter_ticks`].
+    pub filter_ticks: u32,
+    /// See [`MotionTable::travel_m`].
+    pub travel_m: [f32; 2],
+    /// See [`MotionTable::course`].
+    pub course: Vec<f32>,
+    /// See [`MotionTable::filter`].
+    pub filter: Vec<f32>,
+}
+
+impl SwingUpValues {
+    /// The table of `motions` for `rig`, whose gain table is `table`. It detects no fault of encoders and motor: its
+    /// thresholds are [`Thresholds::none`].
+    ///
+    /// # Errors
+    /// [`NoTable`] if the rig has no chain, a delay, or no observer, if the motions are those of another rig, or if a
+    /// value does not fit into single precision.
+    pub fn of(rig: &Rig, table: &TableValues, motions: &SwingUp) -> Result<Self, NoTable> {
+        let PlantDescription::Chain(chain) = &rig.plant else {
+            return Err(NoTable::SwingUp("a [model] has no nonlinear equations of motion"));
+        };
+        if table.observer.is_none() || table.laws.lqr.is_none() {
+            return Err(NoTable::SwingUp("it needs [lqr] and [kalman]"));
+        }
+        if rig.tick.delay_ticks != 0 {
+            return Err(NoTable::SwingUp("its control law is without delay: set delay_ticks = 0"));
+        }
+        let values = |motion: &Motion| MotionValues::of(table, motion);
+        let [low, high] = chain.cart.travel_m;
+        Ok(Self {
+            chain: ChainParameters::of(chain),
+            deviation_rad: DEVIATION_RAD,
+            deviation_m: finite("cart.travel_m", (DEVIATION_SHARE * (high - low)) as f32)?,
+            thresholds: Thresholds::none(),
+            raise: values(&motions.raise)?,
+            lower: values(&motions.lower)?,
+            rig_hash: table.rig_hash,
+            tick_s: table.tick_s,
+        })
+    }
+
+    /// The firmware's table, complete with its checksum.
+    ///
+    /// # Panics
+    /// If `N` is not the number of links, and `NY` not one more.
+    pub fn table<const NY: usize, const N: usize>(&self) -> SwingUpTable<'_, NY, N> {
+        let plant = ChainPlant::<N>::new(&self.chain).expect("a swing-up for this number of links");
+        let mut table = SwingUpTable {
+            format: TABLE_FORMAT,
+            rig_hash: self.rig_hash,
+            tick_s: self.tick_s,
+            model: narrow(plant.model()),
+            deviation_rad: self.deviation_rad,
+            deviation_m: self.deviation_m,
+            thresholds: upright::table::Resize::resized(&self.thresholds),
+            raise: self.raise.table(),
+            lower: self.lower.table(),
+            crc: 0,
+        };
+        table.crc = table.checksum();
+        table
+    }
+
+    /// Bytes of the knots of both motions.
+    pub fn bytes(&self) -> usize {
+        let values = |motion: &MotionValues| motion.course.len() + motion.filter.len();
+        4 * (values(&self.raise) + values(&self.lower))
+    }
+}
+
+/// Largest distance of a link from its planned angle (rad): beyond it, even nominal gains rarely bring it back.
+const DEVIATION_RAD: f32 = 0.35;
+/// Largest distance of the cart from its planned position, as a share of the rail.
+const DEVIATION_SHARE: f64 = 0.1;
+
+impl MotionValues {
+    fn of(table: &TableValues, motion: &Motion) -> Result<Self, NoTable> {
+        let (states, sensors, ticks) = (table.states(), table.sensors(), motion.steps());
+        let sizes = motion.x.first().map(Vec::len) == Some(states)
+            && motion.l.first().map(|l| (l.rows(), l.cols())) == Some((states, sensors));
+        if !sizes || motion.tick_s as f32 != table.tick_s {
+            return Err(NoTable::SwingUp("the motion was planned for another rig or tick"));
+        }
+        let per_knot = |seconds: f64| (seconds / motion.tick_s).round().max(1.0) as usize;
+        let (course_ticks, filter_ticks) = (per_knot(COURSE_S), per_knot(FILTER_S));
+        let knots = |every: usize| (0..=ticks.div_ceil(every).max(3)).map(move |knot| knot * every);
+        let (mut course, mut filter) = (Vec::new(), Vec::new());
+        for tick in knots(course_ticks) {
+            // After the end: at rest where the motion ends, with its last gains.
+            let last = tick.min(ticks - 1);
+            course.extend(motion.x[tick.min(ticks)].iter().copied());
+            course.push(if tick < ticks { motion.u[tick] } else { 0.0 });
+            course.extend(motion.k[last].entries());
+        }
+        for tick in knots(filter_ticks) {
+            let l = &motion.l[tick.min(ticks - 1)];
+            filter.extend((0..sensors).flat_map(|column| (0..states).map(move |row| l[(row, column)])));
+        }
+        let narrow = |values: Vec<f64>| -> Result<Vec<f32>, NoTable> {
+            values.into_iter().map(|value| finite("a value of the swing-up", value as f32)).collect()
+        };
+        let first = motion.x[0][0];
+        let travelled = || motion.x.iter().map(|x| x[0] - first);
+        Ok(Self {
+            ticks: ticks as u32,
+            course_ticks: course_ticks as u32,
+            filter_ticks: filter_ticks as u32,
+            travel_m: [travelled().fold(0.0, f64::min) as f32, travelled().fold(0.0, f64::max) as f32],
+            course: narrow(course)?,
+            filter: narrow(filter)?,
+        })
+    }
+
+    /// The firmware's part.
+    fn table(&self) -> MotionTable<'_> {
+        MotionTable {
+            ticks: self.ticks,
+            course_ticks: self.course_ticks,
+            filter_ticks: self.filter_ticks,
+            travel_m: self.travel_m,
+            course: &self.course,
+            filter: &self.filter,
+        }
+    }
+}
+
+/// The model, each constant rounded once to `f32`.
+fn narrow<const N: usize>(model: &ChainModel<N, f64>) -> ChainModel<N> {
+    let vector = |of: &SVector<f64, N>| SVector::from_fn(|j, _| of[j] as f32);
+    let matrix = |of: &SMatrix<f64, N, N>| SMatrix::from_fn(|j, k| of[(j, k)] as f32);
+    ChainModel {
+        inverse_mass: model.inverse_mass as f32,
+        a: vector(&model.a),
+        weight: vector(&model.weight),
+        b: matrix(&model.b),
+        b_reduced: matrix(&model.b_reduced),
+        cart_friction: model.cart_friction as f32,
+        joint_frictions: vector(&model.joint_frictions),
+    }
+}

@@ -1,0 +1,49 @@
+//! A tick of the controller that follows a planned motion.
+
+use super::{Controller, LawState, Mode, MotorCommand};
+use crate::control::motion::Course;
+
+impl<const NX: usize, const NY: usize> Controller<'_, NX, NY> {
+    /// First half of a tick of a started controller, as [`control_with`](Self::control_with), but on `course`:
+    ///
+    /// ```text
+    /// e = y - C x̂⁻,   x̂ = x̂⁻ + L_k e,   u = sat(u_k - K_k (x̂ - x_k))
+    /// ```
+    pub fn control_on_course(
+        &mut self,
+        raw: &[u32; NY],
+        course: &Course<NX, NY>,
+        judge: impl FnOnce(&[i32; NY], &[f32; NY], &mut [f32; NY]),
+    ) -> MotorCommand {
+        let Mode::InOrder(observer) = self.mode else {
+            self.encoders.update(raw);
+            return Self::off();
+        };
+        let y = self.encoders.measure(raw, &observer.gains.step).data.0[0];
+        let mut e = observer.innovation(|sensor| 2 * sensor, &y, &self.estimate.data.0[0]);
+        judge(self.encoders.counts(), &y, &mut e);
+        self.innovation.data.0[0] = e;
+        for (column, e) in course.l.data.0.iter().zip(e) {
+            for (x, l) in self.estimate.iter_mut().zip(column) {
+                *x += l * e;
+            }
+        }
+        let mut requested = course.u;
+        for ((k, x), planned) in course.k.iter().zip(&self.estimate).zip(&course.x) {
+            requested -= k * (x - planned);
+        }
+        self.drive(requested)
+    }
+
+    /// Second half of such a tick: `predict` replaces the state by the one a tick later, with the given force (N)
+    /// held.
+    pub fn predict_on_course(&mut self, predict: impl FnOnce(&mut [f32; NX], f32)) {
+        predict(&mut self.estimate.data.0[0], self.applied);
+    }
+
+    /// Hands over to the control law, with the governed set-point at `setpoint_m` (m): the next tick is one of
+    /// [`control_with`](Self::control_with).
+    pub fn hand_over(&mut self, setpoint_m: f32) {
+        self.state = LawState { setpoint: setpoint_m, ..LawState::default() };
+    }
+}

@@ -1,0 +1,215 @@
+//! The motions of a swing-up: from hanging to upright, and back.
+//!
+//! A motion is stored as knots, between which the firmware interpolates. Rows lie one after the other in a slice,
+//! because their number differs from rig to rig.
+
+use crate::table::checksum::{ChecksumScan, checksum};
+use crate::table::part::{is_finite, part};
+use crate::table::{Build, ChainModel, TABLE_FORMAT, TableError, Thresholds};
+
+part! {
+    /// A planned motion with its gains.
+    #[derive(Copy)]
+    pub struct MotionTable<'t,;> {
+        /// Duration (ticks).
+        pub ticks: u32,
+        /// Ticks from one row of `course` to the next.
+        pub course_ticks: u32,
+        /// Ticks from one row of `filter` to the next.
+        pub filter_ticks: u32,
+        /// Lowest and highest planned position of the cart, from its first one (m).
+        pub travel_m: [f32; 2],
+        /// For each knot: the reference state, the reference force (N), the gains K.
+        pub course: &'t [f32],
+        /// For each knot of the filter: L, a column for each sensor.
+        pub filter: &'t [f32],
+    }
+}
+
+part! {
+    /// Both motions of a rig with `NY` sensors and `N` links, and what is needed to follow them.
+    pub struct SwingUpTable<'t, NY to MY, N to M;> {
+        /// Layout of the table: `TABLE_FORMAT` of the writer.
+        pub format: u32,
+        /// Hash of the rig file's values.
+        pub rig_hash: u64,
+        /// Control period (s).
+        pub tick_s: f32,
+        /// The equations of motion, for the prediction.
+        pub model: ChainModel<N>,
+        /// Largest distance of a link from its planned angle from the vertical (rad).
+        pub deviation_rad: f32,
+        /// Largest distance of the cart from its planned position (m).
+        pub deviation_m: f32,
+        /// Thresholds at which the supervisor takes encoders and motor to be at fault while the rig follows a motion.
+        pub thresholds: Thresholds<NY>,
+        /// From hanging at rest to upright at rest.
+        pub raise: MotionTable<'t>,
+        /// From upright at rest to hanging at rest.
+        pub lower: MotionTable<'t>,
+        sealed by
+        /// CRC-32 (ISO-HDLC) of all fields above.
+        pub crc,
+    }
+}
+
+impl MotionTable<'_> {
+    /// Length of a row of `course`: a state, the force, a gain for each state.
+    pub const fn course_width(states: usize) -> usize {
+        2 * states + 1
+    }
+
+    /// Whether there are rows up to the last tick, at least four for the interpolation.
+    fn has_all_rows(&self, states: usize, sensors: usize) -> bool {
+        let has = |values: &[f32], width: usize, ticks: u32| {
+            let rows = values.len() / width.max(1);
+            let reach = (rows as u32).saturating_sub(1).saturating_mul(ticks);
+            values.len() == rows * width && rows >= 4 && reach >= self.ticks
+        };
+        self.ticks > 0
+            && has(self.course, Self::course_width(states), self.course_ticks)
+            && has(self.filter, states * sensors, self.filter_ticks)
+    }
+}
+
+impl<const NY: usize, const N: usize> SwingUpTable<'_, NY, N> {
+    /// CRC-32 (ISO-HDLC) of every field except `crc`.
+    pub fn checksum(&self) -> u32 {
+        checksum(self)
+    }
+
+    /// Checks that the table is intact, plausible and made for this build with `states` states.
+    ///
+    /// # Errors
+    /// The first [`TableError`] found.
+    pub fn check(&self, build: &Build, states: usize) -> Result<(), TableError> {
+        if self.format != TABLE_FORMAT {
+            return Err(TableError::Format);
+        }
+        if self.crc != self.checksum() {
+            return Err(TableError::Crc);
+        }
+        if self.rig_hash != build.rig_hash {
+            return Err(TableError::RigHash);
+        }
+        if self.tick_s.to_bits() != build.tick_s.to_bits() {
+            return Err(TableError::Tick);
+        }
+        let complete = |motion: &MotionTable<'_>| motion.has_all_rows(states, NY);
+        if states != 2 * N + 2 || NY != N + 1 || !complete(&self.raise) || !complete(&self.lower) {
+            return Err(TableError::Dimensions);
+        }
+        let is_sound = self.deviation_rad > 0.0 && self.deviation_m > 0.0 && self.thresholds.is_sound();
+        if is_sound && is_finite(self) { Ok(()) } else { Err(TableError::Value) }
+    }
+}
+
+/// What a build has of a swing-up: [`NoSwingUp`], for which no code is generated, or a [`SwingUpTable`].
+pub trait SwingUp<const NX: usize, const NY: usize> {
+    /// Whether there may be motions. The code for them is behind this constant.
+    const IS_POSSIBLE: bool;
+
+    /// The motions without the model, if there are any.
+    fn motions(&self) -> Option<Motions<'_, NY>>;
+
+    /// Replaces the state by the one `dt` (s) later, with `force` (N) held, by the nonlinear model.
+    fn predict(&self, state: &mut [f32; NX], force: f32, dt: f32);
+
+    /// Checks the table: see [`SwingUpTable::check`].
+    ///
+    /// # Errors
+    /// The first [`TableError`] found.
+    fn check(&self, build: &Build) -> Result<(), TableError>;
+
+    /// Adds a word to the scan of the table; after the last one, whether the table is intact.
+    fn scan(&self, scan: &mut ChecksumScan) -> Option<bool>;
+}
+
+/// The motions of a [`SwingUpTable`] and what watches them.
+#[derive(Debug, Clone, Copy)]
+pub struct Motions<'t, const NY: usize> {
+    /// From hanging to upright.
+    pub raise: MotionTable<'t>,
+    /// From upright to hanging.
+    pub lower: MotionTable<'t>,
+    /// See [`SwingUpTable::deviation_rad`].
+    pub deviation_rad: f32,
+    /// See [`SwingUpTable::deviation_m`].
+    pub deviation_m: f32,
+    /// See [`SwingUpTable::thresholds`].
+    pub thresholds: &'t Thresholds<NY>,
+}
+
+/// The rig file has no `[swing_up]`.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct NoSwingUp;
+
+impl<const NX: usize, const NY: usize> SwingUp<NX, NY> for NoSwingUp {
+    const IS_POSSIBLE: bool = false;
+
+    #[inline(always)]
+    fn motions(&self) -> Option<Motions<'_, NY>> {
+        None
+    }
+
+    fn predict(&self, _: &mut [f32; NX], _: f32, _: f32) {}
+
+    fn check(&self, _: &Build) -> Result<(), TableError> {
+        Ok(())
+    }
+
+    #[inline(always)]
+    fn scan(&self, _: &mut ChecksumScan) -> Option<bool> {
+        None
+    }
+}
+
+impl<const NX: usize, const NY: usize, const N: usize> SwingUp<NX, NY> for SwingUpTable<'_, NY, N> {
+    const IS_POSSIBLE: bool = true;
+
+    fn motions(&self) -> Option<Motions<'_, NY>> {
+        let Self { raise, lower, deviation_rad, deviation_m, thresholds, .. } = self;
+        Some(Motions {
+            raise: *raise,
+            lower: *lower,
+            deviation_rad: *deviation_rad,
+            deviation_m: *deviation_m,
+            thresholds,
+        })
+    }
+
+    fn predict(&self, state: &mut [f32; NX], force: f32, dt: f32) {
+        self.model.predict(state, force, dt);
+    }
+
+    fn check(&self, build: &Build) -> Result<(), TableError> {
+        SwingUpTable::check(self, build, NX)
+    }
+
+    fn scan(&self, scan: &mut ChecksumScan) -> Option<bool> {
+        scan.next(self).map(|crc| crc == self.crc)
+    }
+}
+
+/// A table that is only known when the program runs.
+impl<const NX: usize, const NY: usize, S: SwingUp<NX, NY>> SwingUp<NX, NY> for Option<S> {
+    const IS_POSSIBLE: bool = S::IS_POSSIBLE;
+
+    fn motions(&self) -> Option<Motions<'_, NY>> {
+        self.as_ref()?.motions()
+    }
+
+    fn predict(&self, state: &mut [f32; NX], force: f32, dt: f32) {
+        if let Some(table) = self {
+            table.predict(state, force, dt);
+        }
+    }
+
+    fn check(&self, build: &Build) -> Result<(), TableError> {
+        self.as_ref().map_or(Ok(()), |table| table.check(build))
+    }
+
+    fn scan(&self, scan: &mut ChecksumScan) -> Option<bool> {
+        self.as_ref()?.scan(scan)
+    }
+}
