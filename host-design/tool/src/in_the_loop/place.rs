@@ -49,6 +49,7 @@ impl Place<'_> {
         match self {
             Place::Host => "this computer",
             Place::Qemu { .. } => "QEMU",
+            Place::Board { .. } => "the virtual board",
         }
     }
 
