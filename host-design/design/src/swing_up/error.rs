@@ -6,6 +6,8 @@ use super::motion::Shape;
 use super::way::Way;
 use crate::numerics::Singular;
 use crate::plant::PlantError;
+use crate::simulate::SimulationError;
+use crate::table::NoTable;
 
 /// Why a rig cannot be raised or lowered.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -77,6 +79,12 @@ pub enum SwingUpError {
     /// The filter along the motion has no gain.
     #[error("the filter along the motion is singular: every encoder needs a step above 0")]
     Filter(#[from] Singular),
+    /// The motions do not fit the gain table.
+    #[error(transparent)]
+    Table(#[from] NoTable),
+    /// The firmware's controller cannot be simulated with them.
+    #[error(transparent)]
+    Simulation(#[from] SimulationError),
     /// The parts of a motion do not fit together.
     #[error(transparent)]
     Shape(#[from] Shape),

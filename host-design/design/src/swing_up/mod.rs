@@ -16,6 +16,7 @@
 //! | `closed_loop`, `robustness` | runs with wrong masses, friction, start and encoders |
 //! | `search`, `plan`, `advice` | candidates, selection, and what would help if there is none |
 //! | `demonstration` | one run of everything |
+//! | `in_table` | the table of the firmware |
 //! | `check`, `stored` | independent check; the file beside the rig file |
 //!
 //! Everything that is random has a fixed seed, and every sum is taken in a fixed order, so the result does not depend on
@@ -29,6 +30,7 @@ mod dynamics;
 mod error;
 mod gains;
 mod hold;
+mod in_table;
 mod interior_point;
 mod motion;
 mod plan;
@@ -46,6 +48,7 @@ mod way;
 pub use check::Peaks;
 pub use demonstration::{Demonstration, demonstrate};
 pub use error::SwingUpError;
+pub use in_table::with_motions;
 pub use motion::{Motion, Shape, SwingUp};
 pub use plan::{Judgement, Plan, Progress, Trying, judge, motions, search};
 pub use robustness::{Runs, Spread};

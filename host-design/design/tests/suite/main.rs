@@ -23,5 +23,6 @@ mod supervisor_faults;
 mod supervisor_rules;
 mod supervisor_session;
 mod swing_up;
+mod swing_up_firmware;
 mod verify_linear;
 mod verify_nonlinear;

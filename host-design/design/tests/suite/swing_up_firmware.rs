@@ -1,0 +1,221 @@
+//! The whole firmware raises and lowers the rigs, from encoders; and what it must not do.
+
+use std::path::{Path, PathBuf};
+
+use upright::control::actuator::Drive;
+use upright::protocol::message::{Answer, Request};
+use upright::supervision::fault::Fault;
+use upright::supervision::inhibits::Inhibits;
+use upright::supervision::supervisor::State;
+use upright::table::TableError;
+use upright_design::design::design;
+use upright_design::harness::{Harness, HarnessError, Pins, Recording, record, with_firmware};
+use upright_design::plant::absolute_angles;
+use upright_design::rig::Rig;
+use upright_design::simulate::Scenario;
+use upright_design::swing_up::{Stored, motions, with_motions};
+use upright_design::table::{Gains, TableValues};
+use upright_design::verify::Disturbance;
+
+const RIGS: [&str; 2] = ["single-quanser-ip02", "double-quanser-dbpen"];
+
+fn file(rig: &str) -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("../../rigs/{rig}.toml"))
+}
+
+/// The rig and its table with the stored motions.
+fn rig_and_table(name: &str) -> (Rig, TableValues) {
+    let rig = Rig::from_path(&file(name)).unwrap();
+    let table = TableValues::of(&rig, &design(&rig).unwrap(), Gains::Sampled).unwrap();
+    let motions = motions(&rig, &Stored::beside(&file(name)).unwrap()).unwrap();
+    let table = with_motions(&rig, table, &motions).unwrap();
+    (rig, table)
+}
+
+fn duration_s(rig: &Rig, ticks: u32) -> f64 {
+    f64::from(ticks) * rig.tick.period_s
+}
+
+/// Up, one second upright, down, and half a second after it, with the rig's disturbances.
+fn scenario(rig: &Rig, table: &TableValues, seed: u64) -> Scenario {
+    let swing_up = table.swing_up.as_ref().unwrap();
+    let (up, down) = (duration_s(rig, swing_up.raise.ticks), duration_s(rig, swing_up.lower.ticks));
+    let disturbance = Disturbance::of(rig);
+    let mut scenario = Scenario::swing_up(rig, up + 1.0 + down + 0.5, Some(up + 1.0));
+    scenario.start[0] = 0.001;
+    scenario.start[2] += 0.017;
+    Scenario {
+        force_noise_n: disturbance.force_n,
+        torque_noise_n_m: disturbance.torque_n_m,
+        seed,
+        counter_start: 65_000,
+        ..scenario
+    }
+}
+
+fn run(rig: &Rig, table: &TableValues, scenario: &Scenario) -> Result<Recording, HarnessError> {
+    with_firmware(table, |target| record(rig, table, scenario, target))?
+}
+
+/// The states in their order.
+fn states(recording: &Recording) -> Vec<State> {
+    let mut states: Vec<State> = recording.ticks.iter().map(|tick| tick.state).collect();
+    states.dedup();
+    states
+}
+
+#[test]
+fn every_rig_is_raised_balanced_and_lowered_from_encoders() {
+    for name in RIGS {
+        let (rig, table) = rig_and_table(name);
+        let recording = run(&rig, &table, &scenario(&rig, &table, 1)).unwrap();
+        let passed = [State::Raising, State::Balancing, State::Lowering, State::Calibrated];
+        assert_eq!((recording.fault, states(&recording)), (None, passed.to_vec()), "{name}");
+        let last = recording.trace.samples().last().unwrap().state.to_vec();
+        let leans = absolute_angles(&last).map(|angle| (angle.abs() - core::f64::consts::PI).abs());
+        assert!(leans.fold(0.0, f64::max) < 0.3, "{name} hangs: {last:?}");
+    }
+}
+
+#[test]
+fn a_motion_with_a_defect_is_refused_or_ends_with_the_motor_off() {
+    let (rig, table) = rig_and_table("single-quanser-ip02");
+    let scenario = scenario(&rig, &table, 1);
+    let with = |change: &dyn Fn(&mut TableValues)| {
+        let mut table = table.clone();
+        change(&mut table);
+        run(&rig, &table, &scenario)
+    };
+    let states = table.states();
+    let reversed = with(&|table| {
+        // A row is the state, the force, the gains.
+        for row in table.swing_up.as_mut().unwrap().raise.course.chunks_mut(2 * states + 1) {
+            row[states + 1..].iter_mut().for_each(|gain| *gain = -*gain);
+        }
+    });
+    assert!(reversed.unwrap().fault.is_some(), "gains of the wrong sign");
+    let spacing = with(&|table| table.swing_up.as_mut().unwrap().raise.course_ticks /= 2);
+    assert!(matches!(spacing, Err(HarnessError::Table(TableError::Dimensions))), "{spacing:?}");
+    let spacing = with(&|table| table.swing_up.as_mut().unwrap().raise.course_ticks *= 2);
+    assert!(spacing.unwrap().fault.is_some(), "knots twice as far apart");
+    let (_, other) = rig_and_table("double-quanser-dbpen");
+    let swapped = with(&|table| {
+        let rig_hash = other.rig_hash;
+        table.rig_hash = rig_hash;
+    });
+    assert!(matches!(swapped, Err(HarnessError::Table(TableError::RigHash))), "{swapped:?}");
+}
+
+/// What is wrong from the first tick of the motion on.
+#[derive(Debug, Clone, Copy)]
+enum Wrong {
+    Nothing,
+    MotorDead,
+    MotorReversed,
+    MotorHalf,
+    EncoderReversed(usize),
+    EncodersSwapped(usize),
+}
+
+/// Raises with `wrong`: the latched fault, and the largest angle of any link from hanging while the motor was on (rad).
+fn raised_with(rig: &Rig, table: &TableValues, wrong: Wrong) -> (Option<Fault>, f64) {
+    let mut scenario = scenario(rig, table, 3);
+    scenario.counter_start = 0;
+    with_firmware(table, |target| {
+        let mut harness = Harness::new(rig, table, &scenario, target).unwrap();
+        let mut output = harness.raise(None).unwrap();
+        let zero = harness.inputs().raw_counts;
+        let mut largest = 0.0f64;
+        for _ in 0..table.swing_up.as_ref().unwrap().raise.ticks {
+            if !output.enable {
+                break;
+            }
+            let hanging = |angle: f64| core::f64::consts::PI - angle.abs();
+            largest =
+                absolute_angles(harness.bench.state()).map(hanging).map(f64::abs).fold(largest, f64::max);
+            let factor = match wrong {
+                Wrong::MotorDead => 0.0,
+                Wrong::MotorReversed => -1.0,
+                Wrong::MotorHalf => 0.5,
+                _ => 1.0,
+            };
+            harness.bench.tick(match output.drive {
+                Drive::Force(force) => Drive::Force(factor * force),
+                Drive::Duty(duty) => Drive::Duty(factor * duty),
+            });
+            let mut inputs = harness.inputs();
+            disturb(&mut inputs, &zero, wrong);
+            output = harness.session.tick(&inputs).unwrap();
+        }
+        let inputs = harness.inputs();
+        harness.session.tick(&inputs).unwrap();
+        harness.session.tick(&inputs).unwrap();
+        (harness.session.fault(), largest)
+    })
+    .unwrap()
+}
+
+/// Makes the counters wrong, from their readings `zero` at the start on.
+fn disturb(inputs: &mut Pins, zero: &[u32], wrong: Wrong) {
+    let width = |sensor: usize, raw: u32| if sensor == 0 { raw } else { raw & 0xffff };
+    let moved = |inputs: &Pins, sensor: usize| inputs.raw_counts[sensor].wrapping_sub(zero[sensor]);
+    match wrong {
+        Wrong::EncoderReversed(sensor) => {
+            let back = zero[sensor].wrapping_sub(moved(inputs, sensor));
+            inputs.raw_counts[sensor] = width(sensor, back);
+        }
+        Wrong::EncodersSwapped(sensor) => {
+            let (a, b) = (moved(inputs, sensor), moved(inputs, sensor + 1));
+            inputs.raw_counts[sensor] = width(sensor, zero[sensor].wrapping_add(b));
+            inputs.raw_counts[sensor + 1] = width(sensor + 1, zero[sensor + 1].wrapping_add(a));
+        }
+        _ => (),
+    }
+}
+
+#[test]
+fn a_wrong_motor_or_encoder_is_found_before_the_links_have_left_the_lower_half() {
+    for name in RIGS {
+        let (rig, table) = rig_and_table(name);
+        let sensors = table.sensors();
+        let mut wrongs = vec![Wrong::MotorDead, Wrong::MotorReversed, Wrong::MotorHalf];
+        wrongs.extend((0..sensors).map(Wrong::EncoderReversed));
+        wrongs.extend((1..sensors - 1).map(Wrong::EncodersSwapped));
+        for wrong in wrongs {
+            let (fault, largest) = raised_with(&rig, &table, wrong);
+            println!("{name}, {wrong:?}: {fault:?} at {largest:.2} rad from hanging");
+            assert!(fault.is_some() && largest < core::f64::consts::FRAC_PI_2, "{name}, {wrong:?}");
+        }
+        // Negative control: a healthy rig leaves the lower half, without a fault.
+        let (fault, largest) = raised_with(&rig, &table, Wrong::Nothing);
+        assert!(fault.is_none() && largest > 3.0, "{name}: {fault:?}, {largest}");
+    }
+}
+
+#[test]
+fn up_and_down_are_refused_with_their_reasons() {
+    let (rig, table) = rig_and_table("single-quanser-ip02");
+    let scenario = scenario(&rig, &table, 1);
+    let refused = |table: &TableValues, request: Request| {
+        with_firmware(table, |target| {
+            let mut harness = Harness::new(&rig, table, &scenario, target).unwrap();
+            let inputs = harness.inputs();
+            match harness.session.ask(request, &inputs) {
+                Err(HarnessError::Refused { answer: Answer::NotNow(inhibits), .. }) => inhibits,
+                answer => panic!("{answer:?}"),
+            }
+        })
+        .unwrap()
+    };
+    let up = refused(&table, Request::Up);
+    assert!(up.contains(Inhibits::NOT_HOMED.union(Inhibits::SIGNS)), "{up}");
+    assert_eq!(refused(&table, Request::Down), Inhibits::NOT_BALANCING);
+    let mut without = table.clone();
+    without.swing_up = None;
+    assert_eq!(refused(&without, Request::Up), Inhibits::NO_SWING_UP);
+    assert_eq!(refused(&without, Request::Down), Inhibits::NO_SWING_UP);
+    let mut wide = table.clone();
+    wide.swing_up.as_mut().unwrap().raise.travel_m = [-1.0, 1.0];
+    let up = refused(&wide, Request::Up);
+    assert!(up.contains(Inhibits::NO_ROOM), "{up}");
+}
