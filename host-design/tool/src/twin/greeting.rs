@@ -39,6 +39,7 @@ pub(super) fn greeting(
         "rig": rig.name,
         "place": place,
         "is_simulated": is_simulated,
+        "has_swing_up": table.swing_up.is_some(),
         "tick_s": rig.tick.period_s,
         "lengths_m": lengths,
         "travel_m": travel,

@@ -1,6 +1,7 @@
 //! `upright twin`
 
 use std::net::SocketAddr;
+use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
@@ -8,7 +9,10 @@ use std::time::{Duration, Instant};
 use clap::{Args, ValueEnum};
 use signal_hook::consts::{SIGINT, SIGTERM};
 use upright::table::Law;
+use upright_design::rig::Rig;
 use upright_design::simulate::{Scenario, Sensing};
+use upright_design::swing_up::{Stored, SwingUpError, motions, with_motions};
+use upright_design::table::TableValues;
 use upright_tool::image::{self, Kind};
 use upright_tool::in_the_loop::{Link, Place};
 use upright_tool::monitor::Line;
@@ -64,6 +68,10 @@ enum Target {
 impl Twin {
     pub(crate) fn run(self) -> Result<(), Failure> {
         let (rig, _, table) = self.variation.designed()?;
+        let table = match (self.target, &self.port) {
+            (Target::Host, None) => with_stored_motions(&self.variation.rig, &rig, table)?,
+            _ => table,
+        };
         let image = match self.target {
             Target::Qemu if self.port.is_none() => {
                 Some(with_spinner("building the image", || image::build_for(Kind::InTheLoop, &rig, &table))?)
@@ -91,5 +99,17 @@ impl Twin {
         };
         let scenario = Scenario { sensing: Sensing::Encoders, ..Scenario::at_rest(&rig, self.law) };
         Ok(server.simulate(&rig, &table, &scenario, place, !self.hanging, &goes_on)?)
+    }
+}
+
+/// The table with the motions that are stored beside the rig file, if there are any and they are for these values.
+fn with_stored_motions(path: &Path, rig: &Rig, table: TableValues) -> Result<TableValues, Failure> {
+    match Stored::beside(path) {
+        Ok(stored) if stored.is_of(rig) => {
+            let swing_up = with_spinner("the motions", || with_motions(rig, table, &motions(rig, &stored)?))?;
+            Ok(swing_up)
+        }
+        Ok(_) | Err(SwingUpError::NoFile(_)) => Ok(table),
+        Err(error) => Err(error.into()),
     }
 }

@@ -4,7 +4,7 @@ const byId = (id) => document.getElementById(id);
 
 // Keys of the whole page; those of the firmware are the monitor's.
 const KEYS = {
-  h: 'home', H: 'home-rail', g: 'check-signs', a: 'arm', d: 'disarm', c: 'clear',
+  h: 'home', H: 'home-rail', g: 'check-signs', a: 'arm', d: 'disarm', c: 'clear', w: 'up', s: 'down',
 };
 const HOLDS = { f: 'free', j: 'hanging', k: 'guided', u: 'upright' };
 const KEPT_LINES = 200;
@@ -110,6 +110,7 @@ export class Controls {
     byId('name').textContent = hello.rig;
     byId('place').textContent = `firmware: ${hello.place}`;
     document.querySelectorAll('.simulated').forEach((element) => { element.hidden = !hello.is_simulated; });
+    document.querySelectorAll('.swing-up').forEach((element) => { element.hidden = !hello.has_swing_up; });
     byId('law').replaceChildren(...hello.laws.map(({ name, title }) => option(name, title)));
     this.laws = hello.laws;
     [byId('setpoint').min, byId('setpoint').max] = hello.soft_m;
