@@ -15,7 +15,7 @@ pub(super) fn advice(setting: &Setting<'_>, request: &Request, way: Way) -> Stri
         change(&mut request);
         solvable(setting, &request, way, 0..TRIED)
     };
-    let mut all = vec![
+    let mut all = [
         ("the rail", relaxed(&|r| r.rail_m = r.rail_m.map(|end| FACTOR * end))),
         (
             "the force",

@@ -110,7 +110,10 @@ impl Motion {
 mod tests {
     use super::*;
 
-    fn parts() -> (Vec<Vec<f64>>, Vec<f64>, Vec<Matrix<f64>>, Vec<Matrix<f64>>) {
+    /// States, forces, gains and filter gains.
+    type Parts = (Vec<Vec<f64>>, Vec<f64>, Vec<Matrix<f64>>, Vec<Matrix<f64>>);
+
+    fn parts() -> Parts {
         (vec![vec![0.0; 4]; 3], vec![1.0; 2], vec![Matrix::zeros(1, 4); 2], vec![Matrix::zeros(4, 2); 2])
     }
 
@@ -123,13 +126,12 @@ mod tests {
 
     #[test]
     fn parts_that_do_not_fit_are_refused() {
-        let refused =
-            |change: &dyn Fn(&mut (Vec<Vec<f64>>, Vec<f64>, Vec<Matrix<f64>>, Vec<Matrix<f64>>))| {
-                let mut all = parts();
-                change(&mut all);
-                let (x, u, k, l) = all;
-                Motion::new(0.001, x, u, k, l).unwrap_err().part
-            };
+        let refused = |change: &dyn Fn(&mut Parts)| {
+            let mut all = parts();
+            change(&mut all);
+            let (x, u, k, l) = all;
+            Motion::new(0.001, x, u, k, l).unwrap_err().part
+        };
         assert_eq!(refused(&|all| all.0.truncate(2)), "the states");
         assert_eq!(refused(&|all| all.0[1].truncate(3)), "a state");
         assert_eq!(refused(&|all| all.1.clear()), "the duration");
