@@ -232,9 +232,9 @@ fn a_pin_shows_the_tick() {
 fn every_board_starts_with_its_own_clock_and_led() {
     let crystal = Conditions::f405(1);
     let fitted = Conditions { chip: Chip::F446, ..Conditions::f405(1) };
-    let mut clock_input = fitted.clone();
+    let mut clock_input = fitted;
     clock_input.crystal.is_clock_input = true;
-    let discovery = Conditions { chip: Chip::F407, chip_v: 3.0, ..crystal.clone() };
+    let discovery = Conditions { chip: Chip::F407, chip_v: 3.0, ..crystal };
     for (board, conditions, led, is_low) in [
         (Board::WeactF405, &crystal, pin('B', 2), false),
         (Board::OlimexH405, &crystal, pin('C', 12), true),

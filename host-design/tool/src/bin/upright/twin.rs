@@ -104,12 +104,12 @@ impl Twin {
 
 /// The table with the motions that are stored beside the rig file, if there are any and they are for these values.
 fn with_stored_motions(path: &Path, rig: &Rig, table: TableValues) -> Result<TableValues, Failure> {
-    match Stored::beside(path) {
-        Ok(stored) if stored.is_of(rig) => {
-            let swing_up = with_spinner("the motions", || with_motions(rig, table, &motions(rig, &stored)?))?;
-            Ok(swing_up)
-        }
-        Ok(_) | Err(SwingUpError::NoFile(_)) => Ok(table),
-        Err(error) => Err(error.into()),
-    }
+    let failed = |source| Failure::SwingUp { rig: rig.name.clone(), source };
+    let stored = match Stored::beside(path) {
+        Ok(stored) if stored.is_of(rig) => stored,
+        Ok(_) | Err(SwingUpError::NoFile(_)) => return Ok(table),
+        Err(error) => return Err(failed(error)),
+    };
+    let motions = motions(rig, &stored).map_err(failed)?;
+    with_spinner("the motions", || with_motions(rig, table, &motions)).map_err(failed)
 }
