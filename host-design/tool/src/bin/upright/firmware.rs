@@ -31,7 +31,7 @@ enum Command {
     Build(build::Build),
     Size(size::Size),
     Flash(flash::Flash),
-    Run(run::Run),
+    Run(Box<run::Run>),
     Monitor(monitor::Monitor),
 }
 
