@@ -6,7 +6,8 @@ use upright_design::numerics::Matrix;
 use upright_design::rig::{PlantDescription, Rig};
 use upright_design::swing_up::{Stored, SwingUp, SwingUpError, demonstrate, motions};
 
-const RIGS: [&str; 3] = ["single-quanser-ip02", "double-quanser-dbpen", "quadruple-paper"];
+const RIGS: [&str; 4] =
+    ["single-quanser-ip02", "double-quanser-dbpen", "triple-glueck-eder-kugi", "quadruple-paper"];
 
 fn file(rig: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("../../rigs/{rig}.toml"))

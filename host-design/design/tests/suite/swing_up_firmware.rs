@@ -17,7 +17,8 @@ use upright_design::swing_up::{Stored, motions, with_motions};
 use upright_design::table::{Gains, TableValues};
 use upright_design::verify::Disturbance;
 
-const RIGS: [&str; 3] = ["single-quanser-ip02", "double-quanser-dbpen", "quadruple-paper"];
+const RIGS: [&str; 4] =
+    ["single-quanser-ip02", "double-quanser-dbpen", "triple-glueck-eder-kugi", "quadruple-paper"];
 
 fn file(rig: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("../../rigs/{rig}.toml"))

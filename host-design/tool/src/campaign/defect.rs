@@ -130,7 +130,7 @@ impl Kind {
             (
                 Kind::LimitSwitch,
                 "limit-switch",
-                "one of them pressed, or its wire open, for one tick",
+                "one of them pressed, or its wire open, for three ticks",
                 Fault(F::LimitSwitch, Exactly(1)),
             ),
             (Kind::OneOverrun, "one-overrun", "one or two ticks late", Ignored),

@@ -19,6 +19,8 @@ use upright_design::table::{MAX_SENSORS, TableValues};
 /// Duration of a push on the cart (s).
 const PUSH_S: f64 = 0.05;
 
+/// Ticks for which a limit switch is pressed: a board debounces it.
+const PRESSED_TICKS: usize = 3;
 /// Longest lateness of a measurement (ticks).
 const LONGEST_LATENESS: usize = 20;
 
@@ -94,8 +96,8 @@ impl<'a> Injection<'a> {
             }
             Kind::EmergencyStop if since == 0 => contacts.emergency_stop = true,
             Kind::DriverFault if since == 0 => contacts.driver_fault = true,
-            Kind::LimitSwitch if since == 0 && sign > 0.0 => contacts.limit_high = true,
-            Kind::LimitSwitch if since == 0 => contacts.limit_low = true,
+            Kind::LimitSwitch if since < PRESSED_TICKS && sign > 0.0 => contacts.limit_high = true,
+            Kind::LimitSwitch if since < PRESSED_TICKS => contacts.limit_low = true,
             Kind::OneOverrun => contacts.overrun = since < 1 + usize::from(size > 0.5),
             Kind::Overruns => contacts.overrun = since < 3,
             Kind::LinkEncoderFrozen | Kind::CartEncoderFrozen => shown.push(shows(sensor, 0)),

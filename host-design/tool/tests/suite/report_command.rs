@@ -36,7 +36,7 @@ fn page_and_figures_are_written_where_they_are_wanted() {
     assert!(files.iter().all(|file| folder.path().join(file.as_str().unwrap()).is_file()));
     let [svg, png, csv] = ["svg", "png/deep", "csv"].map(|name| names(&folder.path().join(name)));
     assert_eq!(files.len(), 1 + svg.len() + png.len() + csv.len());
-    assert_eq!((svg.len(), png.len(), csv.len()), (17, 17, 16), "the drawing of the rig is no curve");
+    assert_eq!((svg.len(), png.len(), csv.len()), (18, 18, 17), "the drawing of the rig is no curve");
     let text = |name: &str| std::fs::read_to_string(folder.path().join(name)).unwrap();
     let step = text("csv/step-lqr.csv");
     assert!(step.starts_with("panel,x_axis,curve,x,y,value\n"));

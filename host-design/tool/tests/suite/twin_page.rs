@@ -126,7 +126,8 @@ fn a_link_that_is_pulled_comes_back_and_one_that_is_pulled_too_far_is_a_fault_th
     let twin = Twin::start("single-quanser-ip02", &[]);
     browser.open_address(&twin.address, 1280, "light", "screen");
     until_state(&mut browser, "Balancing");
-    let pulled = pull(&mut browser, 1, 8.0, 0.5);
+    wait(1.0);
+    let pulled = pull(&mut browser, 1, 4.0, 0.4);
     assert_eq!(pulled["body"], 1, "{pulled}");
     until(&mut browser, &format!("{MACHINE}.pull === null"));
     wait(1.5);
