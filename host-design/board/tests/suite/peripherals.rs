@@ -1,25 +1,14 @@
 //! What the peripherals do, against the manual (RM0090).
 
-use crate::program::{Code, FOREVER, LOG, NOP, RETURN, SYNC, WFI, appended, board, image, logged};
+use crate::program::{Code, FOREVER, LOG, NOP, RETURN, WFI, appended, board, clocks_on, image, logged};
 use upright_board::{
     Board, Conditions, Input, Rules, Time, UNITS_PER_MICROSECOND as US, UNITS_PER_SECOND, Violation, Wire,
     Wiring, pin,
 };
 
-const AHB1ENR: u32 = 0x4002_3830;
-const APB1ENR: u32 = 0x4002_3840;
-const APB2ENR: u32 = 0x4002_3844;
 const TIM1: u32 = 0x4001_0000;
 const IWDG: u32 = 0x4000_3000;
 const USART2: u32 = 0x4000_4400;
-
-fn clocks_on() -> Code {
-    Code::new()
-        .write(AHB1ENR, 1 << 20 | 1 << 21 | 0x1ff)
-        .write(APB1ENR, 0x1002_000f)
-        .write(APB2ENR, 0x0004_4103)
-        .raw(&SYNC)
-}
 
 /// PA8 as TIM1_CH1, PB12 as BKIN with pull-up, PB14 and PB15 as outputs.
 fn motor_pins() -> Code {

@@ -15,6 +15,19 @@ pub(crate) const INTERRUPTS_OFF: u16 = 0xb672;
 pub(crate) const INTERRUPTS_ON: u16 = 0xb662;
 pub(crate) const SYNC: [u16; 2] = [0xf3bf, 0x8f4f];
 
+pub(crate) const AHB1ENR: u32 = 0x4002_3830;
+pub(crate) const APB1ENR: u32 = 0x4002_3840;
+pub(crate) const APB2ENR: u32 = 0x4002_3844;
+
+/// The clocks of all ports, the DMA, and the peripherals of both buses.
+pub(crate) fn clocks_on() -> Code {
+    Code::new()
+        .write(AHB1ENR, 1 << 20 | 1 << 21 | 0x1ff)
+        .write(APB1ENR, 0x1002_000f)
+        .write(APB2ENR, 0x0004_4103)
+        .raw(&SYNC)
+}
+
 /// Instructions in order.
 #[derive(Clone, Default)]
 pub(crate) struct Code(pub(crate) Vec<u16>);

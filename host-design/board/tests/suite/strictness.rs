@@ -1,20 +1,7 @@
 //! Each strictness, by a program that breaks it; and the same programs, mended, run.
 
-use crate::program::{Code, SYNC, run};
+use crate::program::{APB2ENR, Code, SYNC, clocks_on, run};
 use upright_board::Violation;
-
-const AHB1ENR: u32 = 0x4002_3830;
-const APB1ENR: u32 = 0x4002_3840;
-const APB2ENR: u32 = 0x4002_3844;
-
-/// All ports, the DMA, and the peripherals of both buses.
-fn clocks_on() -> Code {
-    Code::new()
-        .write(AHB1ENR, 1 << 20 | 1 << 21 | 0x1ff)
-        .write(APB1ENR, 0x1002_000f)
-        .write(APB2ENR, 0x0004_4103)
-        .raw(&SYNC)
-}
 
 fn breaks(code: Code) -> Violation {
     match run(&code, &[], 5_000) {

@@ -142,6 +142,14 @@ impl Bench {
         }
     }
 
+    /// The difference of two readings of sensor number `sensor`, with its sign (counts).
+    pub const fn signed(sensor: usize, difference: u32) -> i64 {
+        match Self::width(sensor) {
+            CounterWidth::Bits16 => difference as i16 as i64,
+            CounterWidth::Bits32 => difference as i32 as i64,
+        }
+    }
+
     /// Adds an external force on the cart in the next tick (N).
     pub fn push(&mut self, force_n: f64) {
         self.push_n = force_n;

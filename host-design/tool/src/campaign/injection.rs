@@ -4,7 +4,6 @@ use rand::RngExt;
 use rand_pcg::Pcg64;
 use upright::board::Output;
 use upright::control::actuator::Drive;
-use upright::control::encoder::CounterWidth;
 use upright::protocol::frame;
 use upright::protocol::message::{Command, Request};
 use upright::protocol::serial_link::MAX_COMMAND;
@@ -84,7 +83,7 @@ impl<'a> Injection<'a> {
             self.past.drain(..LONGEST_LATENESS);
         }
         let contacts = &mut inputs.contacts;
-        let moved = |sensor: usize| signed(sensor, truth[sensor].wrapping_sub(began[sensor]));
+        let moved = |sensor: usize| Bench::signed(sensor, truth[sensor].wrapping_sub(began[sensor]));
         let off = (self.visible_counts[sensor] as f64 * (2.0 + 18.0 * size) * sign) as i64;
         let shows = |sensor: usize, counts: i64| (sensor, began[sensor].wrapping_add(counts as u32));
         let mut shown = Vec::new();
@@ -117,7 +116,7 @@ impl<'a> Injection<'a> {
                 let late = 1 + ((LONGEST_LATENESS - 1) as f64 * size) as usize;
                 let then = self.past[self.past.len().saturating_sub(1 + late)][sensor];
                 inputs.raw_counts[sensor] = then;
-                return (signed(sensor, truth[sensor].wrapping_sub(then))).abs()
+                return (Bench::signed(sensor, truth[sensor].wrapping_sub(then))).abs()
                     > self.visible_counts[sensor];
             }
             _ => {}
@@ -125,7 +124,7 @@ impl<'a> Injection<'a> {
         let mut visible = false;
         for (sensor, counter) in shown {
             let counter = Bench::reading(sensor, counter);
-            let wrong = signed(sensor, counter.wrapping_sub(truth[sensor]));
+            let wrong = Bench::signed(sensor, counter.wrapping_sub(truth[sensor]));
             visible |= wrong.abs() > self.visible_counts[sensor];
             inputs.raw_counts[sensor] = counter;
         }
@@ -204,13 +203,5 @@ impl<'a> Injection<'a> {
             }
             _ => {}
         }
-    }
-}
-
-/// A difference of two readings, with its sign.
-fn signed(sensor: usize, difference: u32) -> i64 {
-    match Bench::width(sensor) {
-        CounterWidth::Bits16 => i64::from(difference as i16),
-        CounterWidth::Bits32 => i64::from(difference as i32),
     }
 }

@@ -6,7 +6,6 @@ use std::time::{Duration, SystemTime};
 use serde_json::{Value, json};
 use upright::board::Output;
 use upright::control::actuator::Drive;
-use upright::control::encoder::CounterWidth;
 use upright_design::harness::{Harness, HarnessError, Pins, Target};
 use upright_design::rig::{PlantDescription, Rig};
 use upright_design::simulate::{Bench, Scenario};
@@ -225,7 +224,8 @@ impl<'a, 't> World<'a, 't> {
     /// One tick of everything.
     fn tick(&mut self, desk: &mut Desk) -> Result<(), HarnessError> {
         self.move_rig();
-        desk.monitor.poll(self.now());
+        let now = self.now();
+        desk.monitor.poll(now);
         let outgoing = desk.monitor.take_outgoing();
         if self.defect.as_ref().is_none_or(Defective::host_is_alive) {
             self.harness.session.send_bytes(&outgoing);
@@ -238,7 +238,7 @@ impl<'a, 't> World<'a, 't> {
         }
         self.output = self.harness.session.tick(&inputs)?;
         let session = &mut self.harness.session;
-        desk.receive(session.last_bytes(), self.epoch + Duration::from_secs_f64(self.t_s));
+        desk.receive(session.last_bytes(), now);
         while session.next_telemetry().is_some() || session.next_reply().is_some() {}
         self.t_s += self.machine.rig.tick.period_s;
         Ok(())
@@ -304,11 +304,7 @@ impl<'a, 't> World<'a, 't> {
             return;
         }
         for (sensor, (counter, &zero)) in inputs.raw_counts.iter_mut().zip(&self.zero).enumerate() {
-            let difference = counter.wrapping_sub(zero);
-            let counts = match Bench::width(sensor) {
-                CounterWidth::Bits16 => i64::from(difference as i16),
-                CounterWidth::Bits32 => i64::from(difference as i32),
-            };
+            let counts = Bench::signed(sensor, counter.wrapping_sub(zero));
             let coarse = (counts + step / 2).div_euclid(step) * step;
             *counter = Bench::reading(sensor, zero.wrapping_add(coarse as u32));
         }

@@ -15,6 +15,7 @@ use upright_board::{
     Wiring, pin, seconds,
 };
 use upright_design::harness::{HarnessError, Pace, Pins, Target};
+use upright_design::simulate::Bench;
 use upright_design::table::TableValues;
 
 pub use compared::Compared;
@@ -152,7 +153,7 @@ impl VirtualBoard {
     fn latched(&self, pins: &Pins, received: &[u8]) -> Pins {
         let counts = (0..).zip(&self.positions).map(|(sensor, &position)| {
             let count = position as u32;
-            upright_design::simulate::Bench::reading(sensor, count)
+            Bench::reading(sensor, count)
         });
         Pins {
             raw_counts: counts.collect(),
@@ -194,10 +195,7 @@ impl VirtualBoard {
             counts.iter().zip(&before).zip(&mut self.positions).enumerate()
         {
             let moved = count.wrapping_sub(before);
-            *position += match upright_design::simulate::Bench::width(encoder) {
-                upright::control::encoder::CounterWidth::Bits16 => i64::from(moved as i16),
-                upright::control::encoder::CounterWidth::Bits32 => i64::from(moved as i32),
-            };
+            *position += Bench::signed(encoder, moved);
             if moved != 0 {
                 self.board.apply(Input::Encoder { encoder, position: *position, end });
             }
