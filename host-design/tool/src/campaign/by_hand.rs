@@ -18,10 +18,11 @@ pub struct Defective<'a> {
 }
 
 impl Kind {
-    /// Whether it can begin while the rig balances, with a firmware in this process or, if there is one, in an image.
-    pub fn can_begin_while_balancing(self, has_image: bool) -> bool {
+    /// Whether a person can let it begin while the rig balances: it is in what the firmware reads and drives, not in the
+    /// board's parts.
+    pub fn can_begin_while_balancing(self) -> bool {
         let is_before_balancing = matches!(self.expected(), Expected::Refused(_));
-        !is_before_balancing && !self.needs_process() && (has_image || !self.needs_image())
+        !is_before_balancing && !self.needs_process() && !self.needs_board()
     }
 
     /// Whether it is in one of the sensors.

@@ -10,14 +10,9 @@ use crate::campaign::Kind;
 use crate::figure::{CHROMATIC, curve_colour, curve_dash, limit_colour, reference_colour};
 use crate::monitor::words;
 
-/// The rig, its limits, and what can be done with it.
-pub(super) fn greeting(
-    rig: &Rig,
-    table: &TableValues,
-    place: &str,
-    is_simulated: bool,
-    has_image: bool,
-) -> Value {
+/// The rig, its limits, and what can be done with it. `defects` are those that can begin; none if it is a real machine.
+pub(super) fn greeting(rig: &Rig, table: &TableValues, place: &str, defects: Option<&[Kind]>) -> Value {
+    let is_simulated = defects.is_some();
     let (lengths, travel) = match &rig.plant {
         PlantDescription::Chain(chain) => {
             (chain.links.iter().map(|link| link.length_m).collect::<Vec<_>>(), chain.cart.travel_m.map(Some))
@@ -34,7 +29,7 @@ pub(super) fn greeting(
         State::Lowering,
         State::Fault,
     ];
-    let defects = Kind::ALL.iter().filter(|row| row.0.can_begin_while_balancing(has_image));
+    let defects = Kind::ALL.iter().filter(|row| defects.is_some_and(|defects| defects.contains(&row.0)));
     json!({
         "rig": rig.name,
         "place": place,
@@ -51,10 +46,9 @@ pub(super) fn greeting(
             .collect::<Vec<Value>>(),
         "states": states.map(|state| json!({ "state": state, "text": words::state(state) })),
         "properties": if is_simulated { json!(Properties::of(rig).described()) } else { json!([]) },
-        "defects": if is_simulated {
-            defects.map(|(kind, name, meaning, _)| json!({ "name": name, "meaning": meaning, "has_sensor": kind.has_sensor() }))
-                .collect::<Vec<_>>()
-        } else { Vec::new() },
+        "defects": defects
+            .map(|(kind, name, meaning, _)| json!({ "name": name, "meaning": meaning, "has_sensor": kind.has_sensor() }))
+            .collect::<Vec<_>>(),
         "colours": (0..CHROMATIC).map(curve_colour).collect::<Vec<_>>(),
         "dashes": (0..CHROMATIC).map(curve_dash).collect::<Vec<_>>(),
         "reference": reference_colour(),

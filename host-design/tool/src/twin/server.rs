@@ -16,12 +16,13 @@ use super::greeting::greeting;
 use super::property::Properties;
 use super::simulated::{Ended, Machine};
 use super::viewers::Viewers;
+use crate::campaign::{Kind, kinds};
 use crate::in_the_loop::{EmulatorError, Place, RunError};
 use crate::monitor::{Line, Monitor};
 
 /// Most connections at a time, those that still ask included.
 const MAX_CONNECTIONS: usize = 32;
-/// Time between two telemetry messages of a simulated machine (s).
+/// Time between two telemetry messages if nothing limits them (s).
 const TELEMETRY_S: f32 = 0.005;
 
 /// A twin that has ended early.
@@ -98,10 +99,16 @@ impl Server {
         upright: bool,
         goes_on: &dyn Fn() -> bool,
     ) -> Result<(), TwinError> {
-        let greeting = greeting(rig, table, place.name(), true, place.has_image());
+        let defects: Vec<Kind> =
+            kinds(table, place).into_iter().filter(|kind| kind.can_begin_while_balancing()).collect();
+        let greeting = greeting(rig, table, place.name(), Some(&defects));
         let (viewers, inbox) = self.viewers;
         let _accepting = accepting(self.listener, self.secret, viewers.clone(), Arc::clone(&self.recording))?;
-        let monitor = || Monitor::with_telemetry_every(TELEMETRY_S, &rig.name);
+        let monitor = || match place {
+            // As much as its serial line carries.
+            Place::Board { .. } => Monitor::new(&rig.name),
+            _ => Monitor::with_telemetry_every(TELEMETRY_S, &rig.name),
+        };
         let mut desk = Desk::new(monitor(), (viewers, inbox), self.recording, greeting);
         let machine = Machine { rig, table, scenario };
         let mut properties = Properties::of(rig);
@@ -136,7 +143,7 @@ impl Server {
         name: &str,
         goes_on: &dyn Fn() -> bool,
     ) -> Result<(), TwinError> {
-        let greeting = greeting(rig, table, name, false, true);
+        let greeting = greeting(rig, table, name, None);
         let (viewers, inbox) = self.viewers;
         let _accepting = accepting(self.listener, self.secret, viewers.clone(), Arc::clone(&self.recording))?;
         let mut desk = Desk::new(Monitor::new(name), (viewers, inbox), self.recording, greeting);

@@ -2,12 +2,22 @@
 
 use std::io::{Read, Write};
 use std::net::TcpStream;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
 use serde_json::{Value, json};
 use tungstenite::client::IntoClientRequest;
 use tungstenite::http::HeaderValue;
 use tungstenite::{Message, WebSocket, client};
+use upright::table::Law;
+use upright_board::{Conditions, Image};
+use upright_design::design::design;
+use upright_design::rig::Rig;
+use upright_design::simulate::{Scenario, Sensing};
+use upright_design::table::{Gains, TableValues};
+use upright_tool::image::{Board, Kind, build_if_possible};
+use upright_tool::in_the_loop::Place;
+use upright_tool::twin::Server;
 
 use crate::twin_page::Twin;
 
@@ -35,7 +45,11 @@ fn connect(host: &str, path: &str, origin: &str) -> Result<Socket, u16> {
 }
 
 fn page(twin: &Twin) -> Socket {
-    let (host, path) = parts(&twin.address);
+    page_at(&twin.address)
+}
+
+fn page_at(address: &str) -> Socket {
+    let (host, path) = parts(address);
     connect(host, &format!("{path}socket"), &format!("http://{host}")).unwrap()
 }
 
@@ -166,5 +180,34 @@ fn the_motor_is_turned_off_when_the_page_in_command_is_closed_or_sleeps() {
     read_until(&mut alive, true, |message| {
         assert!(!off(message), "{message}");
         balancing(message) && begin.elapsed() > Duration::from_secs(6)
+    });
+}
+
+#[test]
+fn the_flashed_image_balances_behind_the_page_and_obeys_it() {
+    let Some(elf) = build_if_possible(Kind::Board(Board::WeactF405)).unwrap() else { return };
+    let image = Image::from_elf(&std::fs::read(elf).unwrap()).unwrap();
+    let rig = Rig::from_path("../../rigs/quadruple-paper.toml".as_ref()).unwrap();
+    let table = TableValues::of(&rig, &design(&rig).unwrap(), Gains::Sampled).unwrap();
+    let scenario = Scenario { sensing: Sensing::Encoders, ..Scenario::at_rest(&rig, Law::Lqr) };
+    let place = Place::Board { image: &image, conditions: Conditions::f405(1) };
+    let server = Server::listen(([127, 0, 0, 1], 0).into()).unwrap();
+    let address = server.address().unwrap();
+    let stop = AtomicBool::new(false);
+    let goes_on = || !stop.load(Ordering::Relaxed);
+    std::thread::scope(|scope| {
+        let twin = scope.spawn(|| server.simulate(&rig, &table, &scenario, place, true, &goes_on));
+        let mut socket = page_at(&address);
+        let greeting = read_until(&mut socket, true, |message| message["hello"].is_object());
+        let defects = greeting["hello"]["defects"].to_string();
+        assert!(
+            defects.contains("\"hard-fault\"") && !defects.contains("\"supply-not-a-number\""),
+            "{defects}"
+        );
+        read_until(&mut socket, true, balancing);
+        ask(&mut socket, &json!({ "ask": "say", "line": "disarm" }));
+        read_until(&mut socket, true, off);
+        stop.store(true, Ordering::Relaxed);
+        twin.join().unwrap().unwrap();
     });
 }

@@ -52,11 +52,17 @@ fn built(kind: Kind, rig: Option<&Path>) -> Result<PathBuf, Failure> {
     let Some(path) = rig else {
         return Ok(with_spinner("building the image", || image::build(kind))?);
     };
+    let (rig, table) = designed(path)?;
+    Ok(with_spinner("building the image", || image::build_for(kind, &rig, &table))?)
+}
+
+/// The rig of this file, and its table.
+fn designed(path: &Path) -> Result<(Rig, TableValues), Failure> {
     let rig = Rig::from_path(path)?;
     let name = || path.display().to_string();
     let certified = with_spinner("designing", || design(&rig))
         .map_err(|source| Failure::Design { rig: name(), source })?;
     let table = TableValues::of(&rig, &certified, Gains::Sampled)
         .map_err(|source| Failure::NoTable { rig: name(), source })?;
-    Ok(with_spinner("building the image", || image::build_for(kind, &rig, &table))?)
+    Ok((rig, table))
 }

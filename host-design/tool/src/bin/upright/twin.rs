@@ -9,16 +9,18 @@ use std::time::{Duration, Instant};
 use clap::{Args, ValueEnum};
 use signal_hook::consts::{SIGINT, SIGTERM};
 use upright::table::Law;
+use upright_board::Conditions;
 use upright_design::rig::Rig;
 use upright_design::simulate::{Scenario, Sensing};
 use upright_design::swing_up::{Stored, SwingUpError, motions, with_motions};
 use upright_design::table::TableValues;
-use upright_tool::image::{self, Kind};
+use upright_tool::image::{self, Board, Kind};
 use upright_tool::in_the_loop::{Link, Place};
 use upright_tool::monitor::Line;
 use upright_tool::twin::Server;
 
 use crate::failure::Failure;
+use crate::firmware::read;
 use crate::progress::with_spinner;
 use crate::variation::{Variation, law_option, positive};
 
@@ -31,6 +33,7 @@ use crate::variation::{Variation, law_option, positive};
 Examples:
   upright twin rigs/quadruple-paper.toml                      the firmware on this computer, the rig simulated
   upright twin rigs/quadruple-paper.toml --target qemu        the image in QEMU
+  upright twin rigs/quadruple-paper.toml --target board       the image that is flashed, on the virtual board
   upright twin rigs/single-quanser-ip02.toml --hanging        from power-up on, with everything to do by hand
   upright twin rigs/quadruple-paper.toml --port /dev/ttyACM0  a real board, without what only a simulation has
   upright twin rigs/quadruple-paper.toml --listen 0.0.0.0:8080   for a phone in the same network: mind who hears")]
@@ -63,6 +66,8 @@ enum Target {
     Host,
     /// As an image in QEMU
     Qemu,
+    /// As the image that is flashed, on the virtual board
+    Board,
 }
 
 impl Twin {
@@ -72,10 +77,17 @@ impl Twin {
             (Target::Host, None) => with_stored_motions(&self.variation.rig, &rig, table)?,
             _ => table,
         };
-        let image = match self.target {
-            Target::Qemu if self.port.is_none() => {
-                Some(with_spinner("building the image", || image::build_for(Kind::InTheLoop, &rig, &table))?)
-            }
+        let kind = match self.target {
+            Target::Host => None,
+            Target::Qemu => Some(Kind::InTheLoop),
+            Target::Board => Some(Kind::Board(Board::WeactF405)),
+        };
+        let image = match kind.filter(|_| self.port.is_none()) {
+            Some(kind) => Some(with_spinner("building the image", || image::build_for(kind, &rig, &table))?),
+            None => None,
+        };
+        let flashed = match (&image, self.target) {
+            (Some(image), Target::Board) => Some(read(image)?),
             _ => None,
         };
         let stop = Arc::new(AtomicBool::new(false));
@@ -84,22 +96,39 @@ impl Twin {
         }
         let until = self.duration.map(|duration| Instant::now() + Duration::from_secs_f64(duration));
         let goes_on = || !stop.load(Ordering::Relaxed) && until.is_none_or(|until| Instant::now() < until);
-        let server = Server::listen(self.listen).map_err(|error| {
-            Failure::BadArgument(format!("--listen {}: {error}; give another port, or 0", self.listen))
-        })?;
-        let line = self.port.as_deref().map(Line::open).transpose()?;
-        println!("{}", server.address()?);
-        eprintln!("open this address in a browser; Ctrl-C ends");
-        if let Some((line, port)) = line.zip(self.port.as_deref()) {
-            return Ok(server.connect(&rig, &table, line, port, &goes_on)?);
+        if let Some(port) = &self.port {
+            return show(port, &rig, &table, self.listen, &goes_on);
         }
-        let place = match &image {
-            Some(image) => Place::Qemu { image, link: Link::Files },
-            None => Place::Host,
+        let place = match (&flashed, &image) {
+            (Some(image), _) => Place::Board { image, conditions: Conditions::f405(1) },
+            (None, Some(image)) => Place::Qemu { image, link: Link::Files },
+            (None, None) => Place::Host,
         };
         let scenario = Scenario { sensing: Sensing::Encoders, ..Scenario::at_rest(&rig, self.law) };
-        Ok(server.simulate(&rig, &table, &scenario, place, !self.hanging, &goes_on)?)
+        Ok(listening(self.listen)?.simulate(&rig, &table, &scenario, place, !self.hanging, &goes_on)?)
     }
+}
+
+/// Shows the machine behind a serial port, which is that of `rig`, on a page at `address` until `goes_on` says no.
+pub(crate) fn show(
+    port: &str,
+    rig: &Rig,
+    table: &TableValues,
+    address: SocketAddr,
+    goes_on: &dyn Fn() -> bool,
+) -> Result<(), Failure> {
+    let line = Line::open(port)?;
+    Ok(listening(address)?.connect(rig, table, line, port, goes_on)?)
+}
+
+/// A server that has said where its page is.
+fn listening(address: SocketAddr) -> Result<Server, Failure> {
+    let server = Server::listen(address).map_err(|error| {
+        Failure::BadArgument(format!("{address}: {error}; the page needs another port, or 0 for a free one"))
+    })?;
+    println!("{}", server.address()?);
+    eprintln!("open this address in a browser; Ctrl-C ends");
+    Ok(server)
 }
 
 /// The table with the motions that are stored beside the rig file, if there are any and they are for these values.

@@ -2,6 +2,7 @@
 
 use std::fs::File;
 use std::io::{BufRead, IsTerminal, Write};
+use std::net::{Ipv4Addr, SocketAddr};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -17,7 +18,9 @@ use signal_hook::consts::{SIGINT, SIGTERM};
 use upright_tool::monitor::record::{Recorder, json};
 use upright_tool::monitor::{Action, Line, action, request, view};
 
+use super::designed;
 use crate::failure::Failure;
+use crate::twin;
 use crate::variation::positive;
 
 /// Shows a firmware's telemetry, live, and sends commands to it; exit status 1 if the connection is lost or the
@@ -32,6 +35,7 @@ Examples:
   upright firmware monitor /dev/ttyACM0                       a board
   upright firmware monitor tcp:127.0.0.1:7777                 after: upright firmware run RIG --serve 127.0.0.1:7777
   upright firmware monitor /dev/ttyACM0 --csv run.csv
+  upright firmware monitor /dev/ttyACM0 --web 8080 --rig rigs/single-quanser-ip02.toml   as a page in the browser
   echo set-point 0.05 | upright firmware monitor tcp:127.0.0.1:7777 --json --duration 5")]
 pub(crate) struct Monitor {
     /// Serial port (/dev/ttyACM0, COM3 …), or tcp:HOST:PORT
@@ -42,6 +46,12 @@ pub(crate) struct Monitor {
     /// Print one JSON object per telemetry
     #[arg(long)]
     json: bool,
+    /// Show it on the page of `upright twin` instead, served at this port of this computer; 0 takes a free one
+    #[arg(long, value_name = "PORT", requires = "rig", conflicts_with_all = ["csv", "json"])]
+    web: Option<u16>,
+    /// Rig file of the machine, for the page
+    #[arg(long, value_name = "FILE", requires = "web")]
+    rig: Option<PathBuf>,
     /// End after this time (s)
     #[arg(long, value_name = "S", value_parser = positive)]
     duration: Option<f64>,
@@ -52,7 +62,6 @@ const PICTURE: Duration = Duration::from_millis(50);
 
 impl Monitor {
     pub(crate) fn run(self) -> Result<(), Failure> {
-        let line = Line::open(&self.port)?;
         let stop = Arc::new(AtomicBool::new(false));
         for signal in [
             SIGTERM,
@@ -62,12 +71,18 @@ impl Monitor {
         ] {
             signal_hook::flag::register(signal, Arc::clone(&stop))?;
         }
+        let until = self.duration.map(|duration| Instant::now() + Duration::from_secs_f64(duration));
+        if let Some((port, rig)) = self.web.zip(self.rig.as_deref()) {
+            let (rig, table) = designed(rig)?;
+            let address = SocketAddr::from((Ipv4Addr::LOCALHOST, port));
+            return twin::show(&self.port, &rig, &table, address, &|| goes_on(&stop, until));
+        }
         let mut conversation = Conversation {
             model: upright_tool::monitor::Monitor::new(&self.port),
-            line,
+            line: Line::open(&self.port)?,
             recorder: None,
             stop,
-            until: self.duration.map(|duration| Instant::now() + Duration::from_secs_f64(duration)),
+            until,
         };
         if let Some(path) = &self.csv {
             conversation.record(path)?;
@@ -109,7 +124,7 @@ struct Conversation {
 
 impl Conversation {
     fn goes_on(&self) -> bool {
-        !self.stop.load(Ordering::Relaxed) && self.until.is_none_or(|until| Instant::now() < until)
+        goes_on(&self.stop, self.until)
     }
 
     fn record(&mut self, path: &Path) -> Result<(), Failure> {
@@ -201,6 +216,11 @@ impl Conversation {
             self.model.note(error.to_string());
         }
     }
+}
+
+/// Whether nobody has asked it to end, and its time is not over.
+fn goes_on(stop: &AtomicBool, until: Option<Instant>) -> bool {
+    !stop.load(Ordering::Relaxed) && until.is_none_or(|until| Instant::now() < until)
 }
 
 /// Time since 1970.
