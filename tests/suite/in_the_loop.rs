@@ -14,8 +14,9 @@ use upright_design::design::design;
 use upright_design::harness::Recording;
 use upright_design::rig::Rig;
 use upright_design::simulate::{Scenario, simulate};
+use upright_design::swing_up::{Stored, hangs, motions, up_and_down, with_motions};
 use upright_design::table::{Gains, TableValues};
-use upright_tool::image::{Kind, build_if_possible};
+use upright_tool::image::{Kind, build_for, build_if_possible, if_possible};
 use upright_tool::in_the_loop::{Link, Place, run};
 
 /// Upper bound on the instructions in a tick of the image, with telemetry in every tick: 10 % above the count with
@@ -46,7 +47,12 @@ fn scenarios(rig: &Rig, disturbed: bool) -> Vec<(String, Scenario)> {
 
 /// The image, if its compiler and QEMU are both there.
 fn image(kind: Kind) -> Option<PathBuf> {
-    let image = build_if_possible(kind).unwrap()?;
+    in_qemu(build_if_possible(kind).unwrap())
+}
+
+/// The image, if there is one and QEMU is there.
+fn in_qemu(image: Option<PathBuf>) -> Option<PathBuf> {
+    let image = image?;
     match Command::new("qemu-system-arm").arg("--version").stdout(Stdio::null()).status() {
         Ok(_) => Some(image),
         Err(error) if std::env::var_os("UPRIGHT_REQUIRE_IMAGE").is_some() => panic!("no QEMU: {error}"),
@@ -89,6 +95,25 @@ fn the_image_in_qemu_gives_the_bits_of_the_host_and_of_its_last_run() {
         let other = Scenario { seed: 8, ..scenario };
         assert!(run(&rig, &table, &other, Place::Host).unwrap().ticks != host.ticks, "{name}");
     }
+}
+
+#[test]
+fn the_image_in_qemu_raises_and_lowers_the_links_with_the_bits_of_the_host() {
+    let file = Path::new("rigs/single-quanser-ip02.toml");
+    let rig = Rig::from_path(file).unwrap();
+    let table = TableValues::of(&rig, &design(&rig).unwrap(), Gains::Sampled).unwrap();
+    let motions = motions(&rig, &Stored::beside(file).unwrap()).unwrap();
+    let table = with_motions(&rig, table, &motions).unwrap();
+    let built = if_possible(build_for(Kind::InTheLoop, &rig, &table)).unwrap();
+    let Some(image) = in_qemu(built) else { return };
+    let scenario = up_and_down(&rig, &table, 0.5).unwrap();
+    let qemu = run(&rig, &table, &scenario, Place::Qemu { image: &image, link: Link::Files }).unwrap();
+    println!("{} instructions in the longest tick", qemu.worst_cycles);
+    assert!(hangs(&qemu), "{:?}", qemu.fault);
+    assert!(qemu.ticks == run(&rig, &table, &scenario, Place::Host).unwrap().ticks);
+    // Negative control: the comparison sees another seed.
+    let other = Scenario { seed: 8, ..scenario };
+    assert!(run(&rig, &table, &other, Place::Host).unwrap().ticks != qemu.ticks);
 }
 
 #[test]

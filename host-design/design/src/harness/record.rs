@@ -58,10 +58,7 @@ pub fn record(
     let pace = target.pace();
     check(scenario, period_s, pace)?;
     let mut harness = Harness::new(rig, table, scenario, target)?;
-    let target_at = |tick: usize| {
-        let t = tick as f64 * period_s;
-        if t >= scenario.step_at_s { scenario.step_m } else { 0.0 }
-    };
+    let target_at = |tick: usize| scenario.target_m(tick as f64 * period_s);
     let mut output = harness.raise(Some(target_at(0) as f32))?;
     let mut commanded = target_at(0);
     let last = ticks(rig, scenario)?;

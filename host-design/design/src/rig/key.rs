@@ -187,6 +187,11 @@ impl PerJoint {
         Self(vec![number])
     }
 
+    /// One number per joint.
+    pub fn each(numbers: Vec<f64>) -> Self {
+        Self(numbers)
+    }
+
     /// The number of joint `joint`, counted from 0.
     pub fn of(&self, joint: usize) -> f64 {
         self.0.get(joint).or(self.0.first()).copied().unwrap_or_default()

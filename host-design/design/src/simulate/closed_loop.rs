@@ -76,7 +76,7 @@ fn closed_loop(
     let (mut state, mut estimate) = (bench.state().to_vec(), vec![0.0; measured.len()]);
     for tick in 0..=ticks(rig, scenario)? {
         let t = tick as f64 * rig.tick.period_s;
-        let target = if t >= scenario.step_at_s { scenario.step_m } else { 0.0 };
+        let target = scenario.target_m(t);
         controller.set_setpoint(target as f32)?;
         state.copy_from_slice(bench.state());
         let command = match scenario.sensing {

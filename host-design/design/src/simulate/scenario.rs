@@ -15,10 +15,12 @@ pub struct Scenario {
     pub duration_s: f64,
     /// State at the start (m, m/s, rad, rad/s …).
     pub start: Vec<f64>,
-    /// Set-point from `step_at_s` on (m); 0 before.
+    /// Set-point from `step_at_s` to `step_until_s` (m); 0 before and after.
     pub step_m: f64,
     /// When the set-point steps (s).
     pub step_at_s: f64,
+    /// When it steps back (s).
+    pub step_until_s: f64,
     /// Standard deviation of the disturbing force, drawn again in every tick (N).
     pub force_noise_n: f64,
     /// Standard deviation of the disturbing torque at each joint, drawn again in every tick (N·m).
@@ -66,6 +68,7 @@ impl Scenario {
             start: vec![0.0; rig.states()],
             step_m: 0.0,
             step_at_s: 0.0,
+            step_until_s: f64::INFINITY,
             force_noise_n: 0.0,
             torque_noise_n_m: 0.0,
             force_offset_n: 0.0,
@@ -74,6 +77,11 @@ impl Scenario {
             counter_start: 0,
             begin: Begin::ByHand,
         }
+    }
+
+    /// Set-point at the time `t` (s), in m.
+    pub fn target_m(&self, t: f64) -> f64 {
+        if (self.step_at_s..self.step_until_s).contains(&t) { self.step_m } else { 0.0 }
     }
 
     /// A swing-up from rest, hanging, with the cart at 0.

@@ -73,6 +73,9 @@ pub enum SwingUpError {
     /// The stored motions belong to other values of the rig file.
     #[error("the stored motions do not belong to this rig file: run `upright swing-up` again")]
     Outdated,
+    /// The gain table has no motions.
+    #[error("the table has no motions: make them with `upright swing-up`")]
+    NoMotions,
     /// The chain cannot be simulated.
     #[error(transparent)]
     Plant(#[from] PlantError),

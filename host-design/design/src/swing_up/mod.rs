@@ -46,7 +46,7 @@ mod tracking;
 mod way;
 
 pub use check::Peaks;
-pub use demonstration::{Demonstration, demonstrate};
+pub use demonstration::{Demonstration, Script, hangs, up_and_down};
 pub use error::SwingUpError;
 pub use in_table::with_motions;
 pub use motion::{Motion, Shape, SwingUp};

@@ -10,7 +10,7 @@ use super::closed_loop::{LOST_RAD, Trial, run};
 use super::motion::Motion;
 use super::setting::Setting;
 use super::way::Way;
-use crate::rig::Chain;
+use crate::rig::{Chain, PerJoint, PlantDescription, Rig};
 use crate::verify::wilson;
 
 /// Error of one mass in a run of the score.
@@ -100,27 +100,45 @@ fn scale_friction(chain: &mut Chain, factor: f64) {
     }
 }
 
-/// The run with this seed.
-pub(super) fn sample(setting: &Setting<'_>, motion: &Motion, spread: &Spread, seed: u64) -> Trial {
+/// The rig as it may be, and the state in which it starts (m, m/s, rad, rad/s …), drawn with `seed`.
+pub(super) fn drawn(rig: &Rig, way: Way, spread: &Spread, seed: u64) -> (Rig, Vec<f64>) {
     let mut random = Pcg64::seed_from_u64(seed);
     let mut between = |share: f64| share * random.random_range(-1.0..=1.0);
-    let mut trial = Trial { counts: true, seed: Some(seed), ..Trial::ideal(setting, motion) };
-    // A lowering begins in a loop that balances, whose links are as upright as its encoders' zeros.
-    let begins_upright = motion.x[0][2] == 0.0;
-    let tilt_rad = if begins_upright { spread.zero_rad } else { spread.tilt_rad };
-    for body in 0..=setting.chain.links.len() {
-        scale_mass(&mut trial.chain, body, 1.0 + between(spread.mass));
+    let mut rig = rig.clone();
+    let [mut start, _] = way.ends(rig.states());
+    let PlantDescription::Chain(chain) = &mut rig.plant else { return (rig, start) };
+    let links = chain.links.len();
+    for body in 0..=links {
+        scale_mass(chain, body, 1.0 + between(spread.mass));
     }
     let factor = 1.0 + between(spread.friction);
-    scale_friction(&mut trial.chain, factor);
-    trial.start[0] += between(spread.position_m);
+    scale_friction(chain, factor);
+    start[0] += between(spread.position_m);
+    // A lowering begins in a loop that balances, whose links are as upright as its encoders' zeros.
+    let tilt_rad = if way == Way::Up { spread.tilt_rad } else { spread.zero_rad };
     let mut below = 0.0;
-    for joint in 0..setting.chain.links.len() {
+    let zeros = &mut rig.reality.sensors.homing_error_rad;
+    let mut wrong = Vec::new();
+    for joint in 0..links {
         // The angle of each link from the vertical is off; a joint's angle by the difference.
         let tilt = between(tilt_rad);
-        trial.start[2 + 2 * joint] += tilt - below;
+        start[2 + 2 * joint] += tilt - below;
         below = tilt;
-        trial.zero_error[1 + joint] = between(spread.zero_rad);
+        wrong.push(zeros.of(joint) + between(spread.zero_rad));
+    }
+    *zeros = PerJoint::each(wrong);
+    (rig, start)
+}
+
+/// The run with this seed.
+pub(super) fn sample(setting: &Setting<'_>, motion: &Motion, way: Way, spread: &Spread, seed: u64) -> Trial {
+    let (rig, start) = drawn(setting.rig, way, spread, seed);
+    let mut trial = Trial { counts: true, seed: Some(seed), start, ..Trial::ideal(setting, motion) };
+    for (joint, error) in trial.zero_error.iter_mut().skip(1).enumerate() {
+        *error = rig.reality.sensors.homing_error_rad.of(joint);
+    }
+    if let PlantDescription::Chain(chain) = rig.plant {
+        trial.chain = chain;
     }
     trial
 }
@@ -135,7 +153,7 @@ pub(super) fn random_runs(
     runs: usize,
 ) -> Result<Runs, SwingUpError> {
     let one = |index: usize| {
-        let trial = sample(setting, motion, spread, base_seed + index as u64);
+        let trial = sample(setting, motion, way, spread, base_seed + index as u64);
         run(setting, motion, way, &trial)
     };
     let all: Vec<_> = (0..runs).into_par_iter().map(one).collect::<Result<_, _>>()?;

@@ -244,6 +244,11 @@ impl TableValues {
         with_size(self.states(), self.sensors(), Checksum(self)).unwrap_or(0)
     }
 
+    /// The checksum the firmware expects of its swing-up, if there is one.
+    pub fn swing_up_crc(&self) -> Option<u32> {
+        self.swing_up_fields().map(|(_, crc)| crc)
+    }
+
     /// Rig and tick that a firmware image for this table is built for.
     pub fn build(&self) -> Build {
         Build { rig_hash: self.rig_hash, tick_s: self.tick_s }

@@ -2,9 +2,11 @@
 
 use std::path::{Path, PathBuf};
 
+use upright_design::design::design;
 use upright_design::numerics::Matrix;
 use upright_design::rig::{PlantDescription, Rig};
-use upright_design::swing_up::{Stored, SwingUp, SwingUpError, demonstrate, motions};
+use upright_design::swing_up::{Script, Stored, SwingUp, SwingUpError, motions, with_motions};
+use upright_design::table::{Gains, TableValues};
 
 const RIGS: [&str; 4] =
     ["single-quanser-ip02", "double-quanser-dbpen", "triple-glueck-eder-kugi", "quadruple-paper"];
@@ -17,8 +19,11 @@ fn rig_and_stored(rig: &str) -> (Rig, Stored) {
     (Rig::from_path(&file(rig)).unwrap(), Stored::beside(&file(rig)).unwrap())
 }
 
+/// Whether the firmware with these motions gets through a demonstration.
 fn arrives(rig: &Rig, motions: &SwingUp, seed: u64, is_wrong: bool) -> bool {
-    demonstrate(rig, motions, seed, is_wrong).unwrap().arrived
+    let table = TableValues::of(rig, &design(rig).unwrap(), Gains::Sampled).unwrap();
+    let table = with_motions(rig, table, motions).unwrap();
+    Script::of(rig, &table, seed, is_wrong).unwrap().run(&table).unwrap().arrived
 }
 
 /// `motions` holds each tick against the adaptive integrator, and each limit.
@@ -50,7 +55,7 @@ fn the_last_gain_is_the_gain_that_balances() {
     for name in RIGS {
         let (rig, stored) = rig_and_stored(name);
         let raise = motions(&rig, &stored).unwrap().raise;
-        let balancing = upright_design::design::design(&rig).unwrap().double.sampled.lqr.unwrap().k;
+        let balancing = design(&rig).unwrap().double.sampled.lqr.unwrap().k;
         let last = &raise.k[raise.steps() - 1];
         let apart = (last - &balancing).largest_entry() / balancing.largest_entry();
         assert!(apart < 0.02, "{name}: {apart}");

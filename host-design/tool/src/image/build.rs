@@ -75,15 +75,23 @@ pub fn build(kind: Kind) -> Result<PathBuf, ImageError> {
     compile(kind, None, kind.feature())
 }
 
-/// As [`build`], for tests: without a compiler it returns none and says so on stderr, or fails if the environment
-/// variable `UPRIGHT_REQUIRE_IMAGE` is set.
+/// [`build`] for tests: see [`if_possible`].
 ///
 /// # Errors
 /// As for [`build`].
 pub fn build_if_possible(kind: Kind) -> Result<Option<PathBuf>, ImageError> {
-    match build(kind) {
+    if_possible(build(kind))
+}
+
+/// What was built, for tests: without a compiler it is none, which is said on stderr, or an error if the environment
+/// variable `UPRIGHT_REQUIRE_IMAGE` is set.
+///
+/// # Errors
+/// That of the build.
+pub fn if_possible(built: Result<PathBuf, ImageError>) -> Result<Option<PathBuf>, ImageError> {
+    match built {
         Err(error @ ImageError::NoCompiler) if std::env::var_os("UPRIGHT_REQUIRE_IMAGE").is_none() => {
-            eprintln!("not exercised: the image {}: {error}", kind.feature());
+            eprintln!("not exercised: an image: {error}");
             Ok(None)
         }
         built => built.map(Some),
@@ -98,7 +106,10 @@ pub fn build_for(kind: Kind, rig: &Rig, table: &TableValues) -> Result<PathBuf, 
     let source = gains_source(rig, table);
     // An included file cannot have module documentation.
     let included = source.lines().filter(|line| !line.starts_with("//!")).collect::<Vec<_>>().join("\n");
-    let name = format!("{}-{:016x}-{:08x}", kind.feature(), rig.hash(), table.crc());
+    let mut name = format!("{}-{:016x}-{:08x}", kind.feature(), rig.hash(), table.crc());
+    if let Some(crc) = table.swing_up_crc() {
+        name += &format!("-{crc:08x}");
+    }
     let gains = images()?.join(format!("{name}.rs"));
     // An unchanged file stays as it is, so that nothing is compiled again.
     if std::fs::read_to_string(&gains).ok().as_deref() != Some(&included) {

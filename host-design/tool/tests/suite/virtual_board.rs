@@ -1,14 +1,17 @@
 //! The image that is flashed, on the virtual board: from power-up to balancing with no one's help but the simulated hand,
 //! with the bits of the firmware on the host.
 
+use std::path::Path;
+
 use upright::gains::RIG_HASH;
 use upright::table::Law;
 use upright_board::{Conditions, Image};
 use upright_design::design::design;
 use upright_design::rig::Rig;
 use upright_design::simulate::Scenario;
+use upright_design::swing_up::{Stored, hangs, motions, up_and_down, with_motions};
 use upright_design::table::{Gains, TableValues};
-use upright_tool::image::{Board, Kind, build_if_possible};
+use upright_tool::image::{Board, Kind, build_for, build_if_possible, if_possible};
 use upright_tool::in_the_loop::{VirtualBoard, run_compared};
 
 #[test]
@@ -40,5 +43,29 @@ fn the_flashed_image_balances_from_power_up_with_the_bits_of_the_host() {
     let other = table.clone().without_governor();
     scenario.step_m = 0.05;
     let error = run_compared(&rig, &other, &scenario, &mut power_on()).unwrap_err().to_string();
+    assert!(error.contains("differ"), "{error}");
+}
+
+#[test]
+fn the_flashed_image_raises_and_lowers_the_links_with_the_bits_of_the_host() {
+    let file = Path::new("../../rigs/single-quanser-ip02.toml");
+    let rig = Rig::from_path(file).unwrap();
+    let table = TableValues::of(&rig, &design(&rig).unwrap(), Gains::Sampled).unwrap();
+    let motions = motions(&rig, &Stored::beside(file).unwrap()).unwrap();
+    let table = with_motions(&rig, table, &motions).unwrap();
+    let built = build_for(Kind::Board(Board::WeactF405), &rig, &table);
+    let Some(elf) = if_possible(built).unwrap() else { return };
+    let image = Image::from_elf(&std::fs::read(elf).unwrap()).unwrap();
+    let scenario = up_and_down(&rig, &table, 0.5).unwrap();
+    let mut board = VirtualBoard::start(&image, &Conditions::f405(1), &table).unwrap();
+    let (recording, [ticks, messages]) = run_compared(&rig, &table, &scenario, &mut board).unwrap();
+    assert!(hangs(&recording), "{:?}", recording.fault);
+    assert!(ticks > 5_000 && messages > 500, "{ticks} {messages}");
+
+    // The negative control: a host with another last gain on the way up.
+    let mut other = table.clone();
+    *other.swing_up.as_mut().unwrap().raise.course.last_mut().unwrap() *= 1.5;
+    let mut board = VirtualBoard::start(&image, &Conditions::f405(1), &table).unwrap();
+    let error = run_compared(&rig, &other, &scenario, &mut board).unwrap_err().to_string();
     assert!(error.contains("differ"), "{error}");
 }

@@ -8,11 +8,13 @@ use upright::table::{Law, PerLaw};
 use upright_design::design::{Assessment, Certified, design};
 use upright_design::rig::Rig;
 use upright_design::simulate::{Scenario, Summary, simulate};
+use upright_design::swing_up::{Stored, SwingUpError};
 use upright_design::table::{Gains, TableValues, gains_source, write_atomically};
 use upright_tool::project::checkout;
 
 use crate::failure::Failure;
 use crate::progress::with_spinner;
+use crate::variation::with_stored_motions;
 
 mod data;
 mod text;
@@ -26,6 +28,7 @@ mod text;
 Examples:
   upright design rigs/quadruple-paper.toml
   upright design my.toml --out gains.rs
+  upright design my.toml --swing-up                       with the motions of `upright swing-up my.toml`
   upright design rigs/quadruple-paper.toml --check        exit status 1 if src/gains.rs differs
   upright design my.toml --json --no-write | jq .sampled.lqr.K")]
 pub(crate) struct Design {
@@ -40,6 +43,9 @@ pub(crate) struct Design {
     /// Write nothing
     #[arg(long)]
     no_write: bool,
+    /// Write the motions that are stored beside the rig file into the table, too
+    #[arg(long)]
+    swing_up: bool,
     /// Print the whole design as one JSON object
     #[arg(long)]
     json: bool,
@@ -82,6 +88,11 @@ impl Design {
         }
         let table = table.map_err(|source| Failure::NoTable { rig: name(), source })?;
         refuse_failing_table(&rig, &reports)?;
+        let table = if self.swing_up { with_stored_motions(&self.rig, &rig, table)? } else { table };
+        if self.swing_up && table.swing_up.is_none() {
+            let source = Stored::beside(&self.rig).err().unwrap_or(SwingUpError::Outdated);
+            return Err(Failure::SwingUp { rig: name(), source });
+        }
         let source = gains_source(&rig, &table);
         let path = self.out.map_or_else(default_table, Ok)?;
         if self.check {

@@ -18,6 +18,7 @@ use upright_tool::image::{self, Kind};
 
 use crate::failure::Failure;
 use crate::progress::with_spinner;
+use crate::variation::with_stored_motions;
 
 /// Builds, measures, runs, flashes and monitors the firmware image.
 #[derive(Args)]
@@ -47,7 +48,7 @@ impl Firmware {
     }
 }
 
-/// Builds the image with the table of the rig, or with src/gains.rs as it is.
+/// Builds the image with the table of the rig and its stored motions, or with src/gains.rs as it is.
 fn built(kind: Kind, rig: Option<&Path>) -> Result<PathBuf, Failure> {
     let Some(path) = rig else {
         return Ok(with_spinner("building the image", || image::build(kind))?);
@@ -56,7 +57,7 @@ fn built(kind: Kind, rig: Option<&Path>) -> Result<PathBuf, Failure> {
     Ok(with_spinner("building the image", || image::build_for(kind, &rig, &table))?)
 }
 
-/// The rig of this file, and its table.
+/// The rig of this file, and its table with the stored motions.
 fn designed(path: &Path) -> Result<(Rig, TableValues), Failure> {
     let rig = Rig::from_path(path)?;
     let name = || path.display().to_string();
@@ -64,5 +65,6 @@ fn designed(path: &Path) -> Result<(Rig, TableValues), Failure> {
         .map_err(|source| Failure::Design { rig: name(), source })?;
     let table = TableValues::of(&rig, &certified, Gains::Sampled)
         .map_err(|source| Failure::NoTable { rig: name(), source })?;
+    let table = with_stored_motions(path, &rig, table)?;
     Ok((rig, table))
 }

@@ -6,8 +6,8 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 use serde_json::json;
 use upright_design::rig::Rig;
-use upright_design::swing_up::{Demonstration, Stored, demonstrate, motions};
-use upright_design::table::write_atomically;
+use upright_design::swing_up::{Demonstration, Script, Stored, motions, with_motions};
+use upright_design::table::{TableValues, write_atomically};
 use upright_design::verify::{Effort, trust};
 use upright_tool::report::{Report as Page, Source, report};
 
@@ -60,7 +60,7 @@ impl Report {
         let (trust, files) =
             with_random_plants(laws * u64::from(self.runs), |stage, done| -> Result<_, Failure> {
                 let trust = trust(&rig, &certified, &table, effort, stage, done)?;
-                let run = demonstration(&self.variation.rig, &rig, self.seed);
+                let run = demonstration(&self.variation.rig, &rig, &table, self.seed);
                 let source = Source {
                     rig: &rig,
                     certified: &certified,
@@ -147,9 +147,10 @@ impl Report {
 }
 
 /// A run of the stored motions; none if there are none, or if they belong to other values of the rig.
-fn demonstration(file: &Path, rig: &Rig, seed: u64) -> Option<Demonstration> {
+fn demonstration(file: &Path, rig: &Rig, table: &TableValues, seed: u64) -> Option<Demonstration> {
     let stored = Stored::beside(file).ok()?;
-    demonstrate(rig, &motions(rig, &stored).ok()?, seed, false).ok()
+    let table = with_motions(rig, table.clone(), &motions(rig, &stored).ok()?).ok()?;
+    Script::of(rig, &table, seed, false).ok()?.run(&table).ok()
 }
 
 fn write_into(folder: &Path, name: &str, contents: &[u8]) -> Result<PathBuf, Failure> {

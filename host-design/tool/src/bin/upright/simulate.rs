@@ -8,13 +8,14 @@ use serde_json::json;
 use upright::table::Law;
 use upright_design::rig::{PlantDescription, Rig};
 use upright_design::simulate::{Scenario, Sensing, Summary, Trace, simulate};
-use upright_design::swing_up::{Stored, demonstrate, motions};
+use upright_design::swing_up::{Demonstration, Script};
 use upright_design::table::{TableValues, write_atomically};
 use upright_tool::figure::run_svg;
+use upright_tool::in_the_loop::RunError;
 
 use crate::failure::Failure;
 use crate::progress::with_spinner;
-use crate::variation::{Variation, finite, law_option, not_negative, positive};
+use crate::variation::{Variation, finite, law_option, not_negative, positive, with_stored_motions};
 
 /// Runs the firmware's own controller against the nonlinear plant.
 ///
@@ -109,7 +110,9 @@ enum Disturbances {
 impl Simulate {
     pub(crate) fn run(self) -> Result<(), Failure> {
         if self.swing_up {
-            return self.swing_up();
+            return self.swing_up_with(|_, table, script| {
+                Ok(with_spinner("simulating", || script.run(table)).map_err(RunError::from)?)
+            });
         }
         self.run_with(|rig, table, scenario| {
             Ok(with_spinner("simulating", || simulate(rig, table, scenario))?)
@@ -118,7 +121,7 @@ impl Simulate {
 
     /// Runs the scenario with `run`, and writes and prints the result.
     pub(crate) fn run_with(
-        self,
+        &self,
         run: impl FnOnce(&Rig, &TableValues, &Scenario) -> Result<(Trace, Summary), Failure>,
     ) -> Result<(), Failure> {
         let (rig, table, scenario) = self.prepared()?;
@@ -130,18 +133,32 @@ impl Simulate {
         }
     }
 
-    /// Runs the stored motions, and what lies between them.
-    fn swing_up(&self) -> Result<(), Failure> {
-        let (rig, _, _) = self.variation.designed()?;
+    /// Whether the rig is to raise itself.
+    pub(crate) fn is_swing_up(&self) -> bool {
+        self.swing_up
+    }
+
+    /// The rig, and its table with the stored motions.
+    pub(crate) fn with_motions(&self) -> Result<(Rig, TableValues), Failure> {
+        let (rig, _, table) = self.variation.designed()?;
+        let table = with_stored_motions(&self.variation.rig, &rig, table)?;
+        Ok((rig, table))
+    }
+
+    /// Runs the stored motions, and what lies between them, with `run`, and writes and prints the result.
+    pub(crate) fn swing_up_with(
+        &self,
+        run: impl FnOnce(&Rig, &TableValues, &Script) -> Result<Demonstration, Failure>,
+    ) -> Result<(), Failure> {
+        let (rig, table) = self.with_motions()?;
         let failed = |source| Failure::SwingUp { rig: rig.name.clone(), source };
-        let stored = Stored::beside(&self.variation.rig).map_err(failed)?;
-        let run =
-            with_spinner("simulating", || demonstrate(&rig, &motions(&rig, &stored)?, self.seed, self.wrong))
-                .map_err(failed)?;
+        let script = Script::of(&rig, &table, self.seed, self.wrong).map_err(failed)?;
+        let run = run(&rig, &table, &script)?;
         let parts: Vec<_> =
             run.parts.iter().map(|(at_s, name)| json!({ "at_s": at_s, "part": name })).collect();
         let text = if self.json {
-            json!({ "rig": rig.name, "arrived": run.arrived, "parts": parts }).to_string()
+            let fault = run.fault.map(|fault| fault.to_string());
+            json!({ "rig": rig.name, "arrived": run.arrived, "fault": fault, "parts": parts }).to_string()
         } else {
             let lines: Vec<String> =
                 run.parts.iter().map(|(at_s, name)| format!("{at_s:>8.3} s  {name}")).collect();
@@ -152,14 +169,12 @@ impl Simulate {
         if run.arrived {
             return Ok(());
         }
-        Err(Failure::CheckFailed(format!("{}, seed {}: it does not arrive", rig.name, self.seed)))
+        let fault = run.fault.map_or_else(String::new, |fault| format!(": {fault}"));
+        Err(Failure::CheckFailed(format!("{}, seed {}: it does not arrive{fault}", rig.name, self.seed)))
     }
 
     /// The rig, its table and the scenario that the options ask for.
     pub(crate) fn prepared(&self) -> Result<(Rig, TableValues, Scenario), Failure> {
-        if self.swing_up {
-            return Err(Failure::BadArgument("--swing-up: only `upright simulate` runs it".to_owned()));
-        }
         let (rig, _, table) = self.variation.designed()?;
         let scenario = self.scenario(&rig)?;
         let table = if self.raw_step { table.without_governor() } else { table };

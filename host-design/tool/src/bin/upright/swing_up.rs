@@ -6,13 +6,15 @@ use std::path::PathBuf;
 
 use clap::Args;
 use serde_json::json;
+use upright_design::design::design;
 use upright_design::rig::{PlantDescription, Rig};
-use upright_design::swing_up::{Judgement, Plan, Stored, SwingUpError, demonstrate, judge, search};
-use upright_design::table::write_atomically;
+use upright_design::swing_up::{Judgement, Plan, Script, Stored, SwingUpError, judge, search, with_motions};
+use upright_design::table::{Gains, TableValues, write_atomically};
 use upright_tool::figure::{run_svg, stroboscope_svg};
+use upright_tool::in_the_loop::RunError;
 
 use crate::failure::Failure;
-use crate::progress::with_search;
+use crate::progress::{with_search, with_spinner};
 
 /// Plans the motions with which the rig raises itself from hanging to upright, and lowers itself again.
 ///
@@ -67,7 +69,9 @@ impl SwingUp {
         } else {
             with_search(|progress| search(&rig, progress)).map_err(failed)?
         };
-        let demonstration = demonstrate(&rig, &plan.motions, self.seed, false).map_err(failed)?;
+        let table = table(&rig, &plan)?;
+        let script = Script::of(&rig, &table, self.seed, false).map_err(failed)?;
+        let demonstration = script.run(&table).map_err(RunError::from)?;
         if let Some(path) = &self.csv {
             let mut bytes = Vec::new();
             demonstration.trace.write_csv(&mut bytes)?;
@@ -99,6 +103,16 @@ impl SwingUp {
         }
         Ok(())
     }
+}
+
+/// The gain table with the motions.
+fn table(rig: &Rig, plan: &Plan) -> Result<TableValues, Failure> {
+    let name = || rig.name.clone();
+    let certified = with_spinner("designing", || design(rig))
+        .map_err(|source| Failure::Design { rig: name(), source })?;
+    let table = TableValues::of(rig, &certified, Gains::Sampled)
+        .map_err(|source| Failure::NoTable { rig: name(), source })?;
+    with_motions(rig, table, &plan.motions).map_err(|source| Failure::SwingUp { rig: name(), source })
 }
 
 fn text(rig: &Rig, plan: &Plan) -> String {

@@ -1,7 +1,6 @@
 //! `upright twin`
 
 use std::net::SocketAddr;
-use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
@@ -12,7 +11,6 @@ use upright::table::Law;
 use upright_board::Conditions;
 use upright_design::rig::Rig;
 use upright_design::simulate::{Scenario, Sensing};
-use upright_design::swing_up::{Stored, SwingUpError, motions, with_motions};
 use upright_design::table::TableValues;
 use upright_tool::image::{self, Board, Kind};
 use upright_tool::in_the_loop::{Link, Place};
@@ -22,7 +20,7 @@ use upright_tool::twin::Server;
 use crate::failure::Failure;
 use crate::firmware::read;
 use crate::progress::with_spinner;
-use crate::variation::{Variation, law_option, positive};
+use crate::variation::{Variation, law_option, positive, with_stored_motions};
 
 /// Serves a page on which the rig moves, run by the firmware itself: pull it, change it, break it, watch it.
 ///
@@ -73,10 +71,7 @@ enum Target {
 impl Twin {
     pub(crate) fn run(self) -> Result<(), Failure> {
         let (rig, _, table) = self.variation.designed()?;
-        let table = match (self.target, &self.port) {
-            (Target::Host, None) => with_stored_motions(&self.variation.rig, &rig, table)?,
-            _ => table,
-        };
+        let table = with_stored_motions(&self.variation.rig, &rig, table)?;
         let kind = match self.target {
             Target::Host => None,
             Target::Qemu => Some(Kind::InTheLoop),
@@ -129,16 +124,4 @@ fn listening(address: SocketAddr) -> Result<Server, Failure> {
     println!("{}", server.address()?);
     eprintln!("open this address in a browser; Ctrl-C ends");
     Ok(server)
-}
-
-/// The table with the motions that are stored beside the rig file, if there are any and they are for these values.
-fn with_stored_motions(path: &Path, rig: &Rig, table: TableValues) -> Result<TableValues, Failure> {
-    let failed = |source| Failure::SwingUp { rig: rig.name.clone(), source };
-    let stored = match Stored::beside(path) {
-        Ok(stored) if stored.is_of(rig) => stored,
-        Ok(_) | Err(SwingUpError::NoFile(_)) => return Ok(table),
-        Err(error) => return Err(failed(error)),
-    };
-    let motions = motions(rig, &stored).map_err(failed)?;
-    with_spinner("the motions", || with_motions(rig, table, &motions)).map_err(failed)
 }

@@ -1,12 +1,13 @@
 //! A rig file with some of its values changed on the command line.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 use clap::{Args, ValueEnum};
 use upright::table::Law;
 use upright_design::design::{Certified, design};
 use upright_design::rig::Rig;
+use upright_design::swing_up::{Stored, SwingUpError, motions, with_motions};
 use upright_design::table::{Gains, TableValues};
 
 use crate::failure::Failure;
@@ -78,6 +79,25 @@ impl Variation {
             .map_err(|source| Failure::NoTable { rig: name(), source })?;
         Ok((rig, certified, table))
     }
+}
+
+/// The table with the motions that are stored beside the rig file, if there are any and they are for these values.
+pub(crate) fn with_stored_motions(
+    rig_file: &Path,
+    rig: &Rig,
+    table: TableValues,
+) -> Result<TableValues, Failure> {
+    let failed = |source| Failure::SwingUp { rig: rig.name.clone(), source };
+    let stored = match Stored::beside(rig_file) {
+        Ok(stored) => stored,
+        Err(SwingUpError::NoFile(_)) => return Ok(table),
+        Err(error) => return Err(failed(error)),
+    };
+    if !stored.is_of(rig) {
+        eprintln!("warning: without swing-up: {}", SwingUpError::Outdated);
+        return Ok(table);
+    }
+    with_spinner("the motions", || with_motions(rig, table, &motions(rig, &stored)?)).map_err(failed)
 }
 
 pub(crate) fn finite(text: &str) -> Result<f64, String> {

@@ -17,7 +17,7 @@ use crate::failure::Failure;
 #[command(before_help = "\
 Examples:
   upright firmware build                                      with src/gains.rs as it is
-  upright firmware build rigs/single-quanser-ip02.toml        with the gains of another rig
+  upright firmware build rigs/single-quanser-ip02.toml        with the gains and stored motions of a rig
   upright firmware build --board nucleo-f446")]
 pub(crate) struct Build {
     /// Rig file (TOML), to be designed [default: the table in src/gains.rs]

@@ -9,7 +9,7 @@ use sha2::{Digest, Sha256};
 use upright_board::{Conditions, UNITS_PER_SECOND};
 use upright_design::harness::Recording;
 use upright_design::rig::Rig;
-use upright_design::simulate::{Scenario, Summary, Trace};
+use upright_design::simulate::Scenario;
 use upright_design::table::TableValues;
 use upright_tool::image::{self, Board, Kind};
 use upright_tool::in_the_loop::{Link, Place, RunError, VirtualBoard, run, run_compared, serve};
@@ -25,7 +25,8 @@ use crate::simulate::Simulate;
 /// runs with its registers; its pins drive the plant, and the host gets in each tick what the image has latched.
 ///
 /// The rig is homed while it hangs, held by hand at the start of the scenario until the firmware begins to balance,
-/// and released at time 0. Options are those of `upright simulate`.
+/// and released at time 0. With --swing-up, the image raises the rig from hanging, balances, moves, and lowers it again by
+/// the stored motions. Options are those of `upright simulate`.
 #[derive(Args)]
 #[command(before_help = "\
 Examples:
@@ -33,6 +34,7 @@ Examples:
   upright firmware run rigs/quadruple-paper.toml --law pole-placement --tilt 0.004 --csv run.csv
   upright firmware run rigs/quadruple-paper.toml --target board
   upright firmware run rigs/single-quanser-ip02.toml --link usart --duration 2
+  upright firmware run rigs/single-quanser-ip02.toml --swing-up
   upright firmware run rigs/single-quanser-ip02.toml --serve 127.0.0.1:7777 --duration 600")]
 pub(crate) struct Run {
     #[command(flatten)]
@@ -43,13 +45,15 @@ pub(crate) struct Run {
     /// How the pins of the image in QEMU are connected: files of the emulator (fast; Unix only), or serial lines
     #[arg(long, value_enum, default_value_t = LinkName::Files)]
     link: LinkName,
-    /// Serve `upright firmware monitor tcp:HOST:PORT`: in real time, for --duration, without the comparison
+    /// Serve `upright firmware monitor tcp:HOST:PORT`: in real time, for --duration (ten minutes with --swing-up), without
+    /// the comparison
     #[arg(long, value_name = "HOST:PORT", conflicts_with_all = ["csv", "svg", "json"])]
     serve: Option<String>,
 }
 
 #[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
 enum Target {
+    Host,
     Qemu,
     Board,
 }
@@ -60,40 +64,84 @@ enum LinkName {
     Usart,
 }
 
+/// Length of a served run with --swing-up (s).
+const SERVED_S: f64 = 600.0;
+
 impl Run {
     pub(crate) fn run(self) -> Result<(), Failure> {
-        let (link, kind) = match (self.target, self.link) {
-            (Target::Board, _) => (Link::Files, Kind::Board(Board::WeactF405)),
-            (_, LinkName::Files) => (Link::Files, Kind::InTheLoop),
-            (_, LinkName::Usart) => (Link::Usart, Kind::InTheLoopUsart),
-        };
         if let Some(address) = &self.serve {
-            let listener = TcpListener::bind(address).map_err(|error| {
-                Failure::BadArgument(format!("--serve {address}: {error}; give HOST:PORT"))
-            })?;
-            let (rig, table, scenario) = self.simulate.prepared()?;
-            let image = with_spinner("building the image", || image::build_for(kind, &rig, &table))?;
-            eprintln!("connect with: upright firmware monitor tcp:{}", listener.local_addr()?);
-            let flashed;
-            let place = match self.target {
-                Target::Qemu => Place::Qemu { image: &image, link },
-                Target::Board => {
-                    flashed = read(&image)?;
-                    Place::Board { image: &flashed, conditions: Conditions::f405(1) }
-                }
-            };
-            return Ok(with_spinner("serving", || serve(&rig, &table, &scenario, place, &listener))?);
+            return self.serve(address);
+        }
+        if self.simulate.is_swing_up() {
+            return self.simulate.swing_up_with(|rig, table, script| {
+                let recording = self.recorded([rig, &script.rig], table, &script.scenario)?;
+                Ok(script.demonstration(recording))
+            });
         }
         self.simulate.run_with(|rig, table, scenario| {
-            let image = with_spinner("building the image", || image::build_for(kind, rig, table))?;
-            if self.target == Target::Board {
-                return on_the_board(rig, table, scenario, &image);
-            }
-            let place = Place::Qemu { image: &image, link };
-            let recording = with_spinner("running it in QEMU", || run(rig, table, scenario, place))?;
-            compare(rig, table, scenario, &recording)?;
+            let recording = self.recorded([rig; 2], table, scenario)?;
             Ok((recording.trace, recording.summary))
         })
+    }
+
+    /// Which image, and how its pins are connected; none on the host.
+    fn kind(&self) -> Option<(Kind, Link)> {
+        match (self.target, self.link) {
+            (Target::Host, _) => None,
+            (Target::Board, _) => Some((Kind::Board(Board::WeactF405), Link::Files)),
+            (Target::Qemu, LinkName::Files) => Some((Kind::InTheLoop, Link::Files)),
+            (Target::Qemu, LinkName::Usart) => Some((Kind::InTheLoopUsart, Link::Usart)),
+        }
+    }
+
+    fn serve(&self, address: &str) -> Result<(), Failure> {
+        let listener = TcpListener::bind(address)
+            .map_err(|error| Failure::BadArgument(format!("--serve {address}: {error}; give HOST:PORT")))?;
+        let (rig, table, scenario) = if self.simulate.is_swing_up() {
+            let (rig, table) = self.simulate.with_motions()?;
+            let hanging = Scenario::swing_up(&rig, SERVED_S, None);
+            (rig, table, hanging)
+        } else {
+            self.simulate.prepared()?
+        };
+        let image = match self.kind() {
+            Some((kind, link)) => {
+                Some((with_spinner("building the image", || image::build_for(kind, &rig, &table))?, link))
+            }
+            None => None,
+        };
+        eprintln!("connect with: upright firmware monitor tcp:{}", listener.local_addr()?);
+        let flashed;
+        let place = match &image {
+            None => Place::Host,
+            Some((image, _)) if self.target == Target::Board => {
+                flashed = read(image)?;
+                Place::Board { image: &flashed, conditions: Conditions::f405(1) }
+            }
+            Some((image, link)) => Place::Qemu { image, link: *link },
+        };
+        Ok(with_spinner("serving", || serve(&rig, &table, &scenario, place, &listener))?)
+    }
+
+    /// Runs `scenario` with the firmware of `table` for the rig `ours` against the rig `real`, and compares every bit with the
+    /// host.
+    fn recorded(
+        &self,
+        [ours, real]: [&Rig; 2],
+        table: &TableValues,
+        scenario: &Scenario,
+    ) -> Result<Recording, Failure> {
+        let Some((kind, link)) = self.kind() else {
+            return Ok(with_spinner("running it", || run(real, table, scenario, Place::Host))?);
+        };
+        let image = with_spinner("building the image", || image::build_for(kind, ours, table))?;
+        if self.target == Target::Board {
+            return on_the_board(real, table, scenario, &image);
+        }
+        let place = Place::Qemu { image: &image, link };
+        let recording = with_spinner("running it in QEMU", || run(real, table, scenario, place))?;
+        compare(real, table, scenario, &recording)?;
+        Ok(recording)
     }
 }
 
@@ -113,7 +161,7 @@ fn on_the_board(
     table: &TableValues,
     scenario: &Scenario,
     image: &Path,
-) -> Result<(Trace, Summary), Failure> {
+) -> Result<Recording, Failure> {
     let image = read(image)?;
     let begin = Instant::now();
     let mut board =
@@ -130,7 +178,7 @@ fn on_the_board(
     if let Some(fault) = recording.fault {
         eprintln!("the firmware has turned the motor off: {fault:?}");
     }
-    Ok((recording.trace, recording.summary))
+    Ok(recording)
 }
 
 /// The same run on the host, bit by bit.
