@@ -48,7 +48,7 @@ fn the_flashed_image_balances_from_power_up_with_the_bits_of_the_host() {
 
 #[test]
 fn the_flashed_image_raises_and_lowers_the_links_with_the_bits_of_the_host() {
-    let file = Path::new("../../rigs/single-quanser-ip02.toml");
+    let file = Path::new("../../rigs/quadruple-paper.toml");
     let rig = Rig::from_path(file).unwrap();
     let table = TableValues::of(&rig, &design(&rig).unwrap(), Gains::Sampled).unwrap();
     let motions = motions(&rig, &Stored::beside(file).unwrap()).unwrap();
