@@ -13,6 +13,7 @@
 //! | [`table`] | gains and limits | the gain table of the firmware, as values and as Rust source |
 //! | [`simulate`] | table and scenario | a run of the firmware's controller against the nonlinear plant |
 //! | [`harness`] | a target and a scenario | a run of the whole firmware, from power-up on |
+//! | [`identify`] | logs of a machine that is shaken | its parameters, with deviations |
 //! | [`swing_up`] | rig file | motions from hanging to upright and back, with their gains |
 //! | [`verify`] | table and requirements | the trust report |
 //!
@@ -22,6 +23,7 @@
 
 pub mod design;
 pub mod harness;
+pub mod identify;
 pub mod number;
 pub mod numerics;
 pub mod plant;

@@ -11,6 +11,8 @@
 //! | [`monitor`] | telemetry and commands in a terminal |
 //! | [`compare`] | rigs and sweeps side by side |
 //! | [`reproduce`] | the paper's results beside ours |
+//! | [`identified`] | what was identified, as text, as JSON and as a rig file |
+//! | [`rig_text`] | changes of a rig file's text |
 //! | [`twin`] | the live twin: a page on which the rig moves |
 //! | [`project`] | finds the checkout that images are built from |
 //!
@@ -29,10 +31,12 @@
 pub mod campaign;
 pub mod compare;
 pub mod figure;
+pub mod identified;
 pub mod image;
 pub mod in_the_loop;
 pub mod monitor;
 pub mod project;
 pub mod report;
 pub mod reproduce;
+pub mod rig_text;
 pub mod twin;

@@ -1,6 +1,7 @@
 //! Tests of rig files, plant, design, simulation and verification. One program, so that linking happens once.
 
 mod design_properties;
+mod identify;
 // The paper's printed values are defined once, in the tool.
 #[allow(dead_code, unreachable_pub)]
 #[path = "../../../tool/src/reproduce/published.rs"]

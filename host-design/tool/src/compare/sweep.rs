@@ -2,10 +2,10 @@
 
 use std::path::Path;
 
-use toml_edit::{Document, Item, TableLike};
-
 use upright_design::number::rounded;
 use upright_design::rig::{Rig, RigError, RigErrorKind};
+
+use crate::rig_text::{Changed, with_value};
 
 /// Values for one key of a rig file.
 #[derive(Debug, Clone, PartialEq)]
@@ -96,16 +96,12 @@ impl Sweep {
     /// where the key had to be added.
     pub fn rig(&self, text: &str, file: &Path, value: f64) -> Result<Rig, RigError> {
         let number = if value.abs() < 1e15 { format!("{value}") } else { format!("{value:e}") };
-        match self.place(text) {
-            Place::At(span) => {
-                Rig::from_toml(&format!("{}{number}{}", &text[..span.start], &text[span.end..]), file)
+        match with_value(text, &self.key, &number) {
+            Some(Changed { text, is_new: false }) => Rig::from_toml(&text, file),
+            Some(Changed { text, .. }) => {
+                Rig::from_toml(&text, file).map_err(|error| RigError { place: None, ..error })
             }
-            Place::New { at, prefix } => {
-                let line = format!("{prefix} = {number}\n");
-                let changed = format!("{}{line}{}", &text[..at], &text[at..]);
-                Rig::from_toml(&changed, file).map_err(|error| RigError { place: None, ..error })
-            }
-            Place::Nowhere => Err(RigError {
+            None => Err(RigError {
                 file: file.to_owned(),
                 place: None,
                 key: Some(self.key.clone()),
@@ -115,88 +111,6 @@ impl Sweep {
             }),
         }
     }
-
-    /// Where the value of the key stands in `text`.
-    fn place(&self, text: &str) -> Place {
-        let Ok(document) = Document::parse(text) else { return Place::Nowhere };
-        let mut steps = self.key.split('.').peekable();
-        let mut table: &dyn TableLike = document.as_table();
-        let mut header = String::new();
-        let mut number = 0; // which of several tables of that header
-        while let Some(step) = steps.next() {
-            let (name, index) = indexed(step);
-            let item = table.get(name);
-            match (item, steps.peek(), index) {
-                (Some(item), None, None) => return item.span().map_or(Place::Nowhere, Place::At),
-                (Some(item), None, Some(index)) => {
-                    let entry = item.as_array().and_then(|array| array.get(index));
-                    return entry.and_then(|entry| entry.span()).map_or(Place::Nowhere, Place::At);
-                }
-                (Some(item), Some(_), index) => {
-                    let inner = match (item, index) {
-                        (Item::ArrayOfTables(tables), Some(index)) => {
-                            (header, number) = (format!("[[{name}]]"), index);
-                            tables.get(index).map(|table| table as &dyn TableLike)
-                        }
-                        (item, None) => {
-                            (header, number) = (format!("[{name}]"), 0);
-                            item.as_table_like()
-                        }
-                        _ => None,
-                    };
-                    match inner {
-                        Some(inner) => table = inner,
-                        None => return Place::Nowhere,
-                    }
-                }
-                (None, None, None) => return new_line(text, &header, number, name),
-                (None, Some(key), None) => {
-                    return Place::New { at: text.len(), prefix: format!("\n[{name}]\n{key}") };
-                }
-                (None, _, Some(_)) => return Place::Nowhere,
-            }
-        }
-        Place::Nowhere
-    }
-}
-
-enum Place {
-    /// In these bytes.
-    At(core::ops::Range<usize>),
-    /// Not there; it would go here, after this.
-    New { at: usize, prefix: String },
-    /// Not known.
-    Nowhere,
-}
-
-/// Splits `name[2]` into the name and the index 1.
-fn indexed(step: &str) -> (&str, Option<usize>) {
-    let index = step.strip_suffix(']').and_then(|rest| rest.split_once('['));
-    match index.and_then(|(name, index)| Some((name, index.parse::<usize>().ok()?.checked_sub(1)?))) {
-        Some((name, index)) => (name, Some(index)),
-        None => (step, None),
-    }
-}
-
-/// A new line `name = …` after the line with this header, the one with that number; at the top without header.
-fn new_line(text: &str, header: &str, number: usize, name: &str) -> Place {
-    if header.is_empty() {
-        return Place::New { at: 0, prefix: name.to_owned() };
-    }
-    let mut at = 0;
-    let mut found = 0;
-    for line in text.split_inclusive('\n') {
-        at += line.len();
-        let bare = line.split('#').next().unwrap_or_default().trim();
-        if bare == header {
-            if found == number {
-                let prefix = if line.ends_with('\n') { name.to_owned() } else { format!("\n{name}") };
-                return Place::New { at, prefix };
-            }
-            found += 1;
-        }
-    }
-    Place::Nowhere
 }
 
 #[cfg(test)]

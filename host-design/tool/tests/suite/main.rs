@@ -8,6 +8,7 @@ mod compare_command;
 mod compare_sweep;
 mod documented_tables;
 mod documents;
+mod identify_command;
 mod image;
 mod monitor;
 mod observer_design;

@@ -4,6 +4,7 @@ use std::process::ExitCode;
 
 use upright_design::design::DesignError;
 use upright_design::harness::HarnessError;
+use upright_design::identify::IdentifyError;
 use upright_design::rig::RigError;
 use upright_design::simulate::SimulationError;
 use upright_design::swing_up::SwingUpError;
@@ -31,6 +32,10 @@ pub(crate) enum Failure {
     NoSolution(String),
     #[error("{rig}: {source}")]
     SwingUp { rig: String, source: SwingUpError },
+    #[error(transparent)]
+    Identify(#[from] IdentifyError),
+    #[error("{0}")]
+    NotIdentified(String),
     #[error(transparent)]
     Simulation(#[from] SimulationError),
     #[error(transparent)]
@@ -94,6 +99,8 @@ impl Failure {
             Failure::Rig(error) => error.exit_code(),
             Failure::Design { .. } | Failure::NoTable { .. } | Failure::NoSolution(_) => 3,
             Failure::SwingUp { source, .. } if source.is_without_solution() => 3,
+            Failure::NotIdentified(_) => 3,
+            Failure::Identify(error) if error.is_without_solution() => 3,
             Failure::NoProgram(_)
             | Failure::Image(ImageError::NoCompiler)
             | Failure::InTheLoop(RunError::Emulator(EmulatorError::Missing | EmulatorError::NeedsUnix)) => 4,
@@ -105,6 +112,7 @@ impl Failure {
             }) => 4,
             Failure::Campaign(_) => 1,
             Failure::SwingUp { .. }
+            | Failure::Identify(_)
             | Failure::Image(_)
             | Failure::Elf(_)
             | Failure::Size(_)

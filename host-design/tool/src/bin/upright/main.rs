@@ -6,9 +6,11 @@ mod design;
 mod failure;
 mod faults;
 mod firmware;
+mod identify;
 mod progress;
 mod report;
 mod reproduce;
+mod shake;
 mod simulate;
 mod swing_up;
 mod twin;
@@ -28,6 +30,7 @@ Examples:
   upright twin rigs/quadruple-paper.toml        a page on which the rig moves: pull it, break it, watch it
   upright verify rigs/quadruple-paper.toml      margins, region of attraction, noise, model errors
   upright swing-up rigs/quadruple-paper.toml    plan how the rig raises itself, and lowers itself again
+  upright identify my.toml run.log --write new.toml   the real machine's parameters, from a log
   upright report rigs/quadruple-paper.toml      all of it on one page, with an animation
   upright compare rigs/quadruple-paper.toml --sweep tick.period_s=0.0005..0.01
   upright reproduce                             the results of the paper compared with ours
@@ -36,7 +39,7 @@ Exit status:
   0  done
   1  a check failed: the pendulum falls, a requirement is not met, a fault is missed, a file differs
   2  bad input: a rig file, an argument, a file that cannot be written
-  3  the design problem has no solution
+  3  the design problem has no solution; a log does not fit any machine
   4  a needed program is missing";
 
 /// Designs and verifies the gains that balance an n-link inverted pendulum on a cart, and writes them as a table.
@@ -56,6 +59,8 @@ enum Command {
     Report(report::Report),
     Compare(compare::Compare),
     Reproduce(reproduce::Reproduce),
+    Shake(shake::Shake),
+    Identify(identify::Identify),
     Simulate(simulate::Simulate),
     Twin(twin::Twin),
     SwingUp(swing_up::SwingUp),
@@ -71,6 +76,8 @@ fn main() -> ExitCode {
         Command::Report(command) => command.run(),
         Command::Compare(command) => command.run(),
         Command::Reproduce(command) => command.run(),
+        Command::Shake(command) => command.run(),
+        Command::Identify(command) => command.run(),
         Command::Simulate(command) => command.run(),
         Command::Twin(command) => command.run(),
         Command::SwingUp(command) => command.run(),

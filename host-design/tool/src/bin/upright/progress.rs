@@ -81,6 +81,22 @@ pub(crate) fn with_search<T>(work: impl FnOnce(Progress<'_>) -> T) -> T {
     result
 }
 
+/// Runs an identification with a bar that names its stages, if stderr is a terminal.
+pub(crate) fn with_identification<T>(work: impl FnOnce(upright_design::identify::Progress<'_>) -> T) -> T {
+    let bar = ProgressBar::new(1);
+    style(&bar, "{spinner} {msg} {bar:30} {pos}/{len} {elapsed}");
+    let result = work(&|step| match step {
+        Some((stage, steps)) => {
+            bar.set_message(stage.to_owned());
+            bar.set_length(steps);
+            bar.set_position(0);
+        }
+        None => bar.inc(1),
+    });
+    bar.finish_and_clear();
+    result
+}
+
 fn style(bar: &ProgressBar, template: &str) {
     // A template that does not parse leaves the usual bar.
     if let Ok(style) = ProgressStyle::with_template(template) {

@@ -1,0 +1,304 @@
+//! The whole identification: from logs to parameters, deviations and a verdict.
+
+use std::path::PathBuf;
+
+use super::chain_of;
+use super::covariance::{changes, deviations};
+use super::error::IdentifyError;
+use super::log::{DriveScale, Log};
+use super::parameters::{Kind, Layout, Prior, priors};
+use super::prediction::Filter;
+use super::realise::{Realised, realise};
+use super::record::Record;
+use super::shooting::{Shooting, WINDOW_S};
+use super::verdict::{ChannelFit, Refusal, channels, judge};
+use super::wiring::{self, WiringFound, channel_name};
+use crate::rig::Rig;
+
+/// Shortest log (s).
+const LEAST_S: f64 = 5.0;
+/// Time at the end of a log that is kept for the comparison of old and new file (s), and the share of a short log.
+const HELD_OUT: (f64, f64) = (10.0, 0.25);
+/// Length of the windows in that comparison (s).
+const HELD_OUT_WINDOW_S: f64 = 0.5;
+/// Multiple shooting finds where the prediction error begins: this much of the log is enough (s).
+const SHOOTING_S: f64 = 20.0;
+/// Iterations and rounds of multiple shooting, and iterations of the prediction error.
+const ITERATIONS: (usize, usize, usize) = (10, 3, 6);
+
+/// What an identification is told.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Settings {
+    /// Whether encoders may be eccentric.
+    pub eccentricity: bool,
+    /// First moment of the last link from a weighing (kg·m).
+    pub weighed_kg_m: Option<f64>,
+    /// Whether the wiring is taken as that of the file.
+    pub trust_wiring: bool,
+}
+
+/// Called with the name of a stage and the number of its steps, and with none after each step.
+pub type Progress<'a> = &'a (dyn Fn(Option<(&str, u64)>) + Sync);
+
+/// A parameter.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Estimate {
+    /// What it is.
+    pub kind: Kind,
+    /// Value of the rig file, or what is assumed where it has none.
+    pub old: f64,
+    /// Identified value.
+    pub new: f64,
+    /// Standard deviation.
+    pub deviation: f64,
+    /// Whether the log says little: the deviation exceeds half of that before.
+    pub held_by_prior: bool,
+}
+
+/// What was found.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Identification {
+    /// Length of the logs (s).
+    pub seconds: f64,
+    /// Ticks that are missing.
+    pub lost_ticks: u64,
+    /// Largest angle of a link from hanging (rad).
+    pub largest_angle_rad: f64,
+    /// The wiring, unless it was taken on trust.
+    pub wiring: Option<WiringFound>,
+    /// All parameters that are identified; none if the wiring is wrong.
+    pub estimates: Vec<Estimate>,
+    /// Correlations of the estimates, row by row.
+    pub correlations: Vec<f64>,
+    /// How well each channel is explained.
+    pub channels: Vec<ChannelFit>,
+    /// The numbers for the rig file.
+    pub realised: Option<Realised>,
+    /// Delay of the rig file (ticks).
+    pub delay_ticks: u8,
+    /// Why nothing may be written.
+    pub refusal: Option<Refusal>,
+}
+
+impl Identification {
+    /// The estimate of a kind.
+    pub fn estimate(&self, kind: Kind) -> Option<&Estimate> {
+        self.estimates.iter().find(|estimate| estimate.kind == kind)
+    }
+
+    /// The delay that the rig file should have (ticks), if it is another than it has.
+    pub fn other_delay(&self) -> Option<u8> {
+        let delay = self.estimate(Kind::Delay)?;
+        match self.delay_ticks {
+            0 if delay.new > 0.5 + 2.0 * delay.deviation => Some(1),
+            1 if delay.new < -0.5 - 2.0 * delay.deviation => Some(0),
+            _ => None,
+        }
+    }
+}
+
+/// Checks that a log is one of the rig.
+fn is_of(rig: &Rig, log: &Log, file: &std::path::Path) -> Result<(), IdentifyError> {
+    let other = |found: String, wanted: String, remedy: &str| {
+        Err(IdentifyError::OtherRig { file: file.to_owned(), found, wanted, remedy: remedy.to_owned() })
+    };
+    let (header, channels) = (&log.header, rig.sensors().len());
+    if header.rig != rig.name {
+        return other(
+            format!("{:?}", header.rig),
+            format!("that of {:?}", rig.name),
+            "name the rig file of this machine",
+        );
+    }
+    if log.channels() != channels {
+        return other(
+            format!("{} encoders", log.channels()),
+            format!("for {channels}"),
+            "name the rig file that the firmware was built from",
+        );
+    }
+    let period_ns = (rig.tick.period_s * 1e9).round();
+    if f64::from(header.period_ns) != period_ns {
+        return other(
+            format!("a machine with a tick of {} ns", header.period_ns),
+            format!("for {period_ns} ns"),
+            "correct period_s in [tick], or record again",
+        );
+    }
+    let has_motor = rig.actuator.motor.is_some();
+    if has_motor != (header.drive == DriveScale::Duty) {
+        let names = ["a machine that commands forces", "a machine that commands duties"];
+        let (found, wanted) =
+            (names[usize::from(!has_motor)], ["without a motor", "with a motor"][usize::from(has_motor)]);
+        return other(
+            found.to_owned(),
+            wanted.to_owned(),
+            "describe the motor in [actuator] as when it was recorded",
+        );
+    }
+    Ok(())
+}
+
+/// Identifies the machine of `rig` from its logs, each with the name of its file.
+///
+/// # Errors
+/// [`IdentifyError`] if a log is not of the rig, too short, or nothing moves in it. What does not fit is no error: see
+/// [`Identification::refusal`].
+pub fn identify(
+    rig: &Rig,
+    logs: &[(PathBuf, Log)],
+    settings: &Settings,
+    progress: Progress<'_>,
+) -> Result<Identification, IdentifyError> {
+    let chain = chain_of(rig)?;
+    logs.iter().try_for_each(|(file, log)| is_of(rig, log, file))?;
+    let lost_ticks = logs.iter().map(|(_, log)| log.lost()).sum();
+    let logs: Vec<Log> = logs.iter().map(|(_, log)| log.clone()).collect();
+    let stride = Record::usual_stride(rig.tick.period_s);
+    let record = Record::of(rig, &logs, stride);
+    record.at_least(LEAST_S)?;
+    if let Some(channel) = record.still() {
+        return Err(IdentifyError::Still(channel_name(channel)));
+    }
+    let model = record.model(chain.gravity_m_per_s2);
+    let priors = priors(rig, chain, settings.eccentricity);
+    let mut found = Identification {
+        seconds: record.seconds(),
+        lost_ticks,
+        largest_angle_rad: record.largest_angle(),
+        wiring: None,
+        estimates: Vec::new(),
+        correlations: Vec::new(),
+        channels: Vec::new(),
+        realised: None,
+        delay_ticks: rig.tick.delay_ticks,
+        refusal: None,
+    };
+    if !settings.trust_wiring {
+        progress(Some(("wiring", wiring::count(record.channels))));
+        let wiring = wiring::find(&model, &record, &priors, &|| progress(None));
+        found.wiring = Some(wiring.clone());
+        if !wiring.is_as_in_file() {
+            found.refusal = Some(Refusal::Wiring(wiring));
+            return Ok(found);
+        }
+    }
+    let held_s = HELD_OUT.0.min(HELD_OUT.1 * record.seconds());
+    let used_s = record.seconds() - held_s;
+    let finer = (stride > 1).then(|| Record::of(rig, &logs, (stride / 2).max(1)).part(0.0, used_s));
+    let (used, held) = (record.part(0.0, used_s), record.part(used_s, used_s + held_s + 1.0));
+    let fitted = Fitted { rig, priors: &priors, used: &used, held: &held, finer: finer.as_ref() };
+    fitted.run(&model, &mut found, progress)?;
+    let p: Vec<f64> = fitted.full(&found);
+    match realise(chain, &p, settings.weighed_kg_m) {
+        Ok(realised) => found.realised = Some(realised),
+        Err(error) => found.refusal = Some(error.into()),
+    }
+    if let Err(refusal) = judge(&found.channels) {
+        found.refusal = Some(refusal);
+    }
+    Ok(found)
+}
+
+/// The parts of the record and what is known before.
+struct Fitted<'a> {
+    rig: &'a Rig,
+    priors: &'a [Prior],
+    used: &'a Record,
+    held: &'a Record,
+    finer: Option<&'a Record>,
+}
+
+impl Fitted<'_> {
+    /// All parameters in their order.
+    fn full(&self, found: &Identification) -> Vec<f64> {
+        let kinds = Layout { links: self.used.channels - 1 }.kinds();
+        let of =
+            |(kind, prior): (Kind, &Prior)| found.estimate(kind).map_or(prior.value, |estimate| estimate.new);
+        kinds.into_iter().zip(self.priors).map(of).collect()
+    }
+
+    /// Multiple shooting, prediction error, deviations, and the comparison on what was held out.
+    fn run(
+        &self,
+        model: &super::model::Model,
+        found: &mut Identification,
+        progress: Progress<'_>,
+    ) -> Result<(), IdentifyError> {
+        let start: Vec<f64> = self.priors.iter().map(|prior| prior.value).collect();
+        progress(Some(("multiple shooting", 1)));
+        let first = self.used.part(0.0, SHOOTING_S);
+        let shooting = Shooting { model, record: &first, priors: self.priors, free: true };
+        let shot = shooting.fit(&start, WINDOW_S, ITERATIONS.0, ITERATIONS.1);
+        progress(Some(("prediction error", 1)));
+        let filter = Filter { model, record: self.used, priors: self.priors };
+        let noise = filter.tuned(&shot.p);
+        let undetermined = || IdentifyError::Undetermined("the equations have no solution");
+        let (p, _) = filter.fit(&shot.p, &noise, ITERATIONS.2).ok_or_else(undetermined)?;
+        // Noise and smoothing were those of other parameters.
+        let mut model = model.clone();
+        model.smoothing = filter.smoothing(&p, &noise);
+        let filter = Filter { model: &model, ..filter };
+        let noise = filter.tuned(&p);
+        let (p, normal) = filter.fit(&p, &noise, ITERATIONS.2).ok_or_else(undetermined)?;
+        progress(Some(("deviations", 1)));
+        let inverse = normal.factor(0.0).ok_or_else(undetermined)?.inverse();
+        let changes = changes(&filter, self.finer, &p, &noise);
+        let kinds = model.layout.kinds();
+        let deviations = deviations(&kinds, self.priors, &inverse, &changes, &p, &self.used.steps);
+        let active: Vec<usize> = (0..p.len()).filter(|&i| self.priors[i].deviation > 0.0).collect();
+        found.estimates = active
+            .iter()
+            .map(|&i| Estimate {
+                kind: kinds[i],
+                old: self.priors[i].value,
+                new: p[i],
+                deviation: deviations[i],
+                held_by_prior: deviations[i] > 0.5 * self.priors[i].deviation,
+            })
+            .collect();
+        let size = p.len();
+        let of = |i: usize, j: usize| {
+            inverse[i * size + j] / (inverse[i * size + i] * inverse[j * size + j]).sqrt()
+        };
+        found.correlations =
+            active.iter().flat_map(|&i| active.iter().map(move |&j| (i, j))).map(|(i, j)| of(i, j)).collect();
+        progress(Some(("held-out log", 1)));
+        let over = filter.run(&p, &noise, false).merge(&Filter { record: self.held, ..filter }.run(
+            &p,
+            &noise,
+            false,
+        ));
+        let old = self.old_values(&start, &p);
+        let [old, new] = [&old, &p].map(|p| self.held_out(&model, p));
+        let ranges: Vec<f64> = (0..self.used.channels).map(|channel| self.used.extent(channel)[1]).collect();
+        found.channels = channels(&over.normalised, over.count, &old, &new, &ranges);
+        Ok(())
+    }
+
+    /// The values of the file, but with the zeros and the tilt of this log: a file does not have them.
+    fn old_values(&self, start: &[f64], p: &[f64]) -> Vec<f64> {
+        let layout = Layout { links: self.used.channels - 1 };
+        let mut old = start.to_vec();
+        let of_log = [layout.tilt(), layout.delay()];
+        for i in of_log.into_iter().chain((0..layout.links).map(|joint| layout.zero(joint))) {
+            old[i] = p[i];
+        }
+        for contact in 0..=layout.links {
+            // What the start assumes is not in the file.
+            let friction = &self.rig.reality.friction;
+            let given = match contact.checked_sub(1) {
+                None => friction.cart_friction_n,
+                Some(joint) => friction.joint_friction_n_m.of(joint),
+            };
+            old[layout.dry(contact)] = given;
+        }
+        old
+    }
+
+    /// Error (rms) of each channel over windows whose initial states are fitted.
+    fn held_out(&self, model: &super::model::Model, p: &[f64]) -> Vec<f64> {
+        let shooting = Shooting { model, record: self.held, priors: self.priors, free: false };
+        shooting.fit(p, HELD_OUT_WINDOW_S, ITERATIONS.0, ITERATIONS.1).rms
+    }
+}

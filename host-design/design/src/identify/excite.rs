@@ -1,0 +1,278 @@
+//! What shakes the machine, and the log of a simulated machine that is shaken.
+
+use core::f64::consts::{PI, TAU};
+
+use rand::{RngExt, SeedableRng};
+use rand_pcg::Pcg64;
+use upright::control::actuator::Drive;
+use upright::table::Law;
+
+use super::error::IdentifyError;
+use super::log::{DriveScale, Header, Log, Tick};
+use super::model::Model;
+use super::parameters::{Layout, priors};
+use super::record::Record;
+use super::step::Step;
+use super::{Input, chain_of};
+use crate::numerics::{Complex, eigenvalues};
+use crate::plant::{ChainParameters, Equilibrium, linearise};
+use crate::reality::hanging_by_hand;
+use crate::rig::{Chain, Rig};
+use crate::simulate::{Bench, Scenario};
+
+/// Lines of the excitation, for one link and for more.
+const LINES: [usize; 2] = [16, 24];
+/// Its band, in parts of the lowest and the highest hanging mode.
+const BAND: [f64; 2] = [0.25, 1.6];
+/// Largest angle of a link from hanging that is aimed at (rad), and share of the rail.
+const AIM: (f64, f64) = (60.0 * PI / 180.0, 0.6);
+/// The motor goes off beyond this share of the rail.
+const STOP: f64 = 0.85;
+/// Amplitudes that are tried, one after the other, if the machine moves more than the model.
+const RETRIES: [f64; 4] = [1.0, 0.7, 0.5, 0.35];
+/// The amplitude is raised if the machine moves less than this share of the aim, by at most this factor, so often.
+const RAISE: (f64, f64, usize) = (0.8, 1.6, 3);
+/// The force rises and falls over this time (s).
+const RAMP_S: f64 = 1.0;
+/// Length of the trial runs in which the amplitude is found (s).
+const TRIAL_S: f64 = 20.0;
+/// Share of the force limit that the excitation may need.
+const FORCE_SHARE: f64 = 0.8;
+
+/// A sum of sines of equal force, with a weak spring and damper that keep the cart near the middle:
+/// `u = A r(t) Σ cos(2π f_i t + φ_i) - k_p x - k_d ẋ`.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Excitation {
+    /// Amplitude of each line (N).
+    pub amplitude_n: f64,
+    /// Frequency (Hz) and phase (rad) of each line.
+    pub lines: Vec<[f64; 2]>,
+    /// k_p (N/m).
+    pub stiffness_n_per_m: f64,
+    /// k_d (N·s/m).
+    pub damping_n_s_per_m: f64,
+    /// Length (s).
+    pub duration_s: f64,
+}
+
+impl Excitation {
+    /// The excitation for a rig, with the amplitude that its file allows.
+    ///
+    /// # Errors
+    /// [`IdentifyError`] if the rig has no chain with encoders, or its hanging modes cannot be computed.
+    pub fn of(rig: &Rig, duration_s: f64, seed: u64) -> Result<Self, IdentifyError> {
+        let chain = chain_of(rig)?;
+        let [lowest, highest] = hanging_modes(chain)?;
+        let count = LINES[usize::from(chain.links.len() > 1)];
+        let (from, to) = (BAND[0] * lowest, BAND[1] * highest);
+        let mut random = Pcg64::seed_from_u64(seed);
+        let line = |i: usize| {
+            let share = i as f64 / (count - 1) as f64;
+            [from * libm::pow(to / from, share), random.random_range(0.0..TAU)]
+        };
+        let mass = ChainParameters::<f64>::of(chain).total_mass;
+        let slow = TAU * 0.15 * lowest;
+        let mut excitation = Self {
+            amplitude_n: 0.0,
+            lines: (0..count).map(line).collect(),
+            stiffness_n_per_m: mass * slow * slow,
+            damping_n_s_per_m: 1.4 * mass * slow,
+            duration_s,
+        };
+        excitation.find_amplitude(rig, chain);
+        Ok(excitation)
+    }
+
+    /// Force at `time_s` with the cart at `x` (m) and `speed` (m/s).
+    pub fn force_n(&self, time_s: f64, x: f64, speed: f64) -> f64 {
+        let ramp = (time_s / RAMP_S).min((self.duration_s - time_s) / RAMP_S).clamp(0.0, 1.0);
+        let sum: f64 = self.lines.iter().map(|[f, phase]| libm::cos(TAU * f * time_s + phase)).sum();
+        self.amplitude_n * ramp * sum - self.stiffness_n_per_m * x - self.damping_n_s_per_m * speed
+    }
+
+    /// Bisects the largest amplitude for which the model stays within [`AIM`] and the force limit.
+    fn find_amplitude(&mut self, rig: &Rig, chain: &Chain) {
+        let record = Record::of(rig, &[], 1);
+        let model = record.model(chain.gravity_m_per_s2);
+        let mut p: Vec<f64> = priors(rig, chain, false).iter().map(|prior| prior.value).collect();
+        // Back-EMF is made up for.
+        let model = Model { back_emf: 0.0, ..model };
+        p[Layout { links: chain.links.len() }.delay()] = 0.0;
+        let weight = p[Layout::TOTAL_MASS] * chain.gravity_m_per_s2;
+        let limit = rig.force_limit_n().unwrap_or(f64::INFINITY);
+        let (mut low, mut high) = (0.0, weight.min(limit));
+        for _ in 0..12 {
+            self.amplitude_n = 0.5 * (low + high);
+            if self.stays(&model, &p, chain, rig, limit) {
+                low = self.amplitude_n;
+            } else {
+                high = self.amplitude_n;
+            }
+        }
+        self.amplitude_n = low;
+    }
+
+    fn stays(&self, model: &Model, p: &[f64], chain: &Chain, rig: &Rig, limit_n: f64) -> bool {
+        let m = model.coordinates();
+        let dt_s = rig.tick.period_s * Record::usual_stride(rig.tick.period_s) as f64;
+        let farthest = AIM.1 * half_rail(chain);
+        let mut state = vec![0.0; 2 * m];
+        state[1..m].fill(PI);
+        let mut step = Step::new(model, false);
+        for k in 0..(TRIAL_S.min(self.duration_s) / dt_s) as usize {
+            let force = self.force_n(k as f64 * dt_s, state[0], state[m]);
+            step.take(model, p, &state, &Input { force, ..Input::default() }, dt_s);
+            state.copy_from_slice(&step.end);
+            let turned = state[1..m].iter().map(|phi| (phi - PI).abs()).fold(0.0, f64::max);
+            // NaN does not stay.
+            let stays = turned <= AIM.0 && state[0].abs() <= farthest && force.abs() <= FORCE_SHARE * limit_n;
+            if !stays {
+                return false;
+            }
+        }
+        true
+    }
+}
+
+/// Half of the shorter side of the rail (m).
+fn half_rail(chain: &Chain) -> f64 {
+    let [low, high] = chain.cart.travel_m;
+    high.min(-low)
+}
+
+/// The lowest and the highest frequency of the hanging links (Hz).
+fn hanging_modes(chain: &Chain) -> Result<[f64; 2], IdentifyError> {
+    let failed = || IdentifyError::Undetermined("the hanging links have no modes");
+    let mut chain = chain.clone();
+    chain.cart.friction_n_s_per_m = 0.0;
+    chain.links.iter_mut().for_each(|link| link.friction_n_m_s_per_rad = 0.0);
+    let linear =
+        linearise(&ChainParameters::<f64>::of(&chain), Equilibrium::Hanging).map_err(|_| failed())?;
+    let values = eigenvalues(&linear.a).map_err(|_| failed())?;
+    let frequencies = values.iter().map(|Complex { im, .. }: &Complex<f64>| im.abs() / TAU);
+    let all: Vec<f64> = frequencies.collect();
+    let highest = all.iter().copied().fold(0.0, f64::max);
+    // The cart, which is free, has the frequency 0 but for rounding.
+    let modes = all.iter().copied().filter(|&frequency| frequency > 1e-3 * highest);
+    let lowest = modes.fold(f64::INFINITY, f64::min);
+    if highest > 0.0 { Ok([lowest, highest]) } else { Err(failed()) }
+}
+
+/// The log of the simulated machine of `rig`, with its `[reality]`, shaken for `duration_s`.
+///
+/// # Errors
+/// [`IdentifyError`] if it cannot be shaken within its rail.
+pub fn shake(rig: &Rig, duration_s: f64, seed: u64) -> Result<Log, IdentifyError> {
+    let mut excitation = Excitation::of(rig, duration_s, seed)?;
+    // Friction that the file does not have leaves the machine with less motion.
+    for _ in 0..RAISE.2 {
+        let trial = Excitation { duration_s: duration_s.min(TRIAL_S), ..excitation.clone() };
+        let Some(log) = run(rig, &trial, seed)? else { break };
+        let moved = motion(rig, &log)?;
+        if moved > RAISE.0 {
+            break;
+        }
+        excitation.amplitude_n *= (1.0 / moved).min(RAISE.1);
+    }
+    let amplitude = excitation.amplitude_n;
+    for share in RETRIES {
+        excitation.amplitude_n = share * amplitude;
+        if let Some(log) = run(rig, &excitation, seed)? {
+            return Ok(log);
+        }
+    }
+    Err(IdentifyError::Excitation(format!(
+        "{}: the cart leaves {:.0} % of the rail even at {:.0} % of the force; is the rail level?",
+        rig.name,
+        100.0 * STOP,
+        100.0 * RETRIES[3]
+    )))
+}
+
+/// How far the machine moved in a log, as a share of the aim.
+fn motion(rig: &Rig, log: &Log) -> Result<f64, IdentifyError> {
+    let record = Record::of(rig, core::slice::from_ref(log), Record::usual_stride(rig.tick.period_s));
+    let cart = record.extent(0)[0] / (AIM.1 * half_rail(chain_of(rig)?));
+    Ok(cart.max(record.largest_angle() / AIM.0))
+}
+
+/// One run; none if the cart goes too far.
+fn run(rig: &Rig, excitation: &Excitation, seed: u64) -> Result<Option<Log>, IdentifyError> {
+    let chain = chain_of(rig)?;
+    let channels = chain.links.len() + 1;
+    let scenario = Scenario { start: hanging_by_hand(rig), seed, ..Scenario::at_rest(rig, Law::Lqr) };
+    let failed = |error: &dyn std::fmt::Display| IdentifyError::Excitation(error.to_string());
+    let mut bench = Bench::new(rig, &scenario).map_err(|error| failed(&error))?;
+    let steps: Vec<f64> = rig.sensors().iter().map(|sensor| sensor.step()).collect();
+    let mut counters = vec![0; channels];
+    let hanging: Vec<u16> = (0..channels)
+        .map(|channel| if channel == 1 { libm::round(PI / steps[1]) as i64 as u16 } else { 0 })
+        .collect();
+    let full_n = rig.force_limit_n().unwrap_or(10.0 * excitation.amplitude_n * excitation.lines.len() as f64);
+    let scale = if rig.actuator.motor.is_some() { DriveScale::Duty } else { DriveScale::Force(full_n) };
+    let mut log = Log::new(Header {
+        rig: rig.name.clone(),
+        hash: rig.hash(),
+        period_ns: (rig.tick.period_s * 1e9).round() as u32,
+        drive: scale,
+        hanging,
+    });
+    let farthest = STOP * half_rail(chain);
+    let period_s = rig.tick.period_s;
+    let mut speed = Speed::new(period_s);
+    for number in 0..(excitation.duration_s / period_s) as u32 {
+        bench.read_counters(&mut counters);
+        let counts: Vec<u16> = counters.iter().map(|&count| count as u16).collect();
+        let x = f64::from(Bench::signed(0, counters[0]) as i32) * steps[0];
+        if x.abs() > farthest {
+            return Ok(None);
+        }
+        let speed = speed.after(x);
+        let force = excitation.force_n(f64::from(number) * period_s, x, speed);
+        let (drive, part) = driven(rig, scale, force, speed);
+        bench.tick(drive);
+        let volts = rig.actuator.motor.as_ref().map_or(0.0, |motor| motor.supply_v);
+        let supply_mv = (1e3 * volts * bench.supply_share()).round() as u16;
+        log.push(Tick { number, drive: part, supply_mv, contacts: 0 }, &counts);
+    }
+    Ok(Some(log))
+}
+
+/// What a force becomes: the command, and its 16 bits in the log.
+fn driven(rig: &Rig, scale: DriveScale, force_n: f64, speed: f64) -> (Drive, i16) {
+    let of = |part: f64| (part.clamp(-1.0, 1.0) * f64::from(i16::MAX)).round() as i16;
+    match (&rig.actuator.motor, scale) {
+        (Some(motor), _) => {
+            let per_speed = motor.volts_per_speed();
+            let volts = force_n * motor.resistance_ohm / per_speed + per_speed * speed;
+            // The dead zone is made up for as in the firmware: without a jump.
+            let lift = (10.0 * volts).clamp(-motor.dead_zone_v, motor.dead_zone_v);
+            let part = of((volts + lift) / motor.supply_v);
+            (Drive::Duty((f64::from(part) / f64::from(i16::MAX)) as f32), part)
+        }
+        (None, DriveScale::Force(full_n)) => {
+            let part = of(force_n / full_n);
+            (Drive::Force((f64::from(part) / f64::from(i16::MAX) * full_n) as f32), part)
+        }
+        (None, DriveScale::Duty) => (Drive::OFF, 0),
+    }
+}
+
+/// Speed of the cart from its positions, through a low-pass of 5 ms.
+struct Speed {
+    period_s: f64,
+    last: Option<f64>,
+    speed: f64,
+}
+
+impl Speed {
+    fn new(period_s: f64) -> Self {
+        Self { period_s, last: None, speed: 0.0 }
+    }
+
+    fn after(&mut self, x: f64) -> f64 {
+        let raw = (x - self.last.replace(x).unwrap_or(x)) / self.period_s;
+        self.speed += (raw - self.speed) * (self.period_s / 0.005).min(1.0);
+        self.speed
+    }
+}

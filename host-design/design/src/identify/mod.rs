@@ -1,0 +1,47 @@
+//! Identification: the parameters of the real machine, from the log of a machine that hangs and is shaken.
+//!
+//! - [`Log`]: every tick's counters and drive, as a file.
+//! - [`Excitation`], [`shake`]: what shakes the machine, and the log of a simulated one.
+//! - [`identify`]: first the wiring, then multiple shooting, then prediction error, then deviations and a verdict.
+//! - [`Realised`]: the numbers of a rig file with the identified parameters.
+//!
+//! `docs/identify.md` has the experiment, the format of the file, what can be known, and the accuracy reached.
+
+mod covariance;
+mod error;
+mod estimate;
+mod excite;
+mod log;
+mod model;
+mod normal;
+mod parameters;
+mod prediction;
+mod realise;
+mod record;
+mod shooting;
+mod step;
+mod verdict;
+mod wiring;
+
+pub use error::{IdentifyError, LogError};
+pub use estimate::{Estimate, Identification, Progress, Settings, identify};
+pub use excite::{Excitation, shake};
+pub use log::{CONTACTS, DriveScale, Header, Log, Tick};
+pub use parameters::Kind;
+pub use realise::{Realised, RealisedLink};
+pub use verdict::{ChannelFit, Refusal};
+pub use wiring::{Wiring, WiringFound};
+
+use crate::rig::{Chain, PlantDescription, Rig};
+use model::Input;
+
+/// The chain of a rig whose cart and links all have an encoder.
+fn chain_of(rig: &Rig) -> Result<&Chain, IdentifyError> {
+    let PlantDescription::Chain(chain) = &rig.plant else {
+        return Err(IdentifyError::NoEncoders(rig.name.clone()));
+    };
+    if rig.sensors().len() != chain.links.len() + 1 {
+        return Err(IdentifyError::NoEncoders(rig.name.clone()));
+    }
+    Ok(chain)
+}

@@ -1,0 +1,357 @@
+//! The equations of motion with friction that levels off, and their derivatives by the state and by every parameter.
+
+// The indices are those of the equations.
+#![allow(clippy::needless_range_loop)]
+
+use super::parameters::Layout;
+
+/// The chain with the letters of `ChainParameters`, for any number of links n, in the m = n + 1 coordinates x, φ_1 … φ_n.
+///
+/// The state has s = 2m entries: coordinates, then their rates. Angles are absolute and from the normal of the rail,
+/// which rises by α. With `b_jk = l_j a_k` for j < k and `b_jj = J_j` the equations are
+///
+/// ```text
+/// M_t ẍ - Σ a_j cos φ_j φ̈_j + Σ a_j sin φ_j φ̇_j² = u - (d_0 + e) ẋ - c_0 tanh(ẋ/ε) - g M_t sin α
+/// -a_j cos φ_j ẍ + Σ_k b_jk (cos(φ_j - φ_k) φ̈_k + sin(φ_j - φ_k) φ̇_k²) - g a_j sin(φ_j + α) = τ_j - τ_{j+1}
+/// τ_i = -d_i θ̇_i - c_i tanh(θ̇_i/ε),   θ̇_i = φ̇_i - φ̇_{i-1}
+/// ```
+///
+/// with e the damping of the motor's back-EMF.
+#[derive(Debug, Clone)]
+pub(super) struct Model {
+    pub(super) layout: Layout,
+    pub(super) gravity: f64,
+    /// e (N·s/m).
+    pub(super) back_emf: f64,
+    /// ε of the cart (m/s) and of the joints (rad/s).
+    pub(super) smoothing: [f64; 2],
+}
+
+/// Force on the cart in a step (N), and its derivatives.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub(super) struct Input {
+    pub(super) force: f64,
+    /// By the delay (N/tick).
+    pub(super) by_delay: f64,
+    /// By the dead zone (N/V).
+    pub(super) by_dead_zone: f64,
+}
+
+/// Accelerations at one state, and their derivatives.
+#[derive(Debug, Clone)]
+pub(super) struct Local {
+    /// Number of columns of `jacobian`: s, or s and the number of parameters of the motion.
+    columns: usize,
+    /// ẍ, φ̈_1 …, m entries.
+    pub(super) acceleration: Vec<f64>,
+    /// Derivatives of the accelerations by state and parameters, m rows of `columns`.
+    pub(super) jacobian: Vec<f64>,
+    /// L and D of the mass matrix, m×m: below the diagonal L, on it 1/D.
+    factors: Vec<f64>,
+    sine: Vec<f64>,
+    cosine: Vec<f64>,
+}
+
+impl Model {
+    /// Number of coordinates, m.
+    pub(super) fn coordinates(&self) -> usize {
+        self.layout.links + 1
+    }
+
+    /// Number of states, s.
+    pub(super) fn states(&self) -> usize {
+        2 * self.coordinates()
+    }
+
+    /// `b_jk` (kg·m²).
+    fn coupling(&self, p: &[f64], j: usize, k: usize) -> f64 {
+        let (low, high) = (j.min(k), j.max(k));
+        if low == high {
+            return p[self.layout.second_moment(j)];
+        }
+        p[self.layout.length(low)] * p[self.layout.first_moment(high)]
+    }
+
+    /// Friction in a contact (0: cart) that moves at `speed`: force or torque, its slope, and tanh.
+    fn friction(&self, p: &[f64], contact: usize, speed: f64) -> [f64; 3] {
+        let smoothing = self.smoothing[contact.min(1)];
+        let direction = libm::tanh(speed / smoothing);
+        let (viscous, dry) = (p[self.layout.viscous(contact)], p[self.layout.dry(contact)]);
+        let slope = viscous + dry * (1.0 - direction * direction) / smoothing;
+        [viscous * speed + dry * direction, slope, direction]
+    }
+}
+
+impl Local {
+    /// For derivatives by the state, and by the parameters if `parameters`.
+    pub(super) fn new(layout: Layout, parameters: bool) -> Self {
+        let m = layout.links + 1;
+        let columns = 2 * m + if parameters { layout.of_motion() } else { 0 };
+        Self {
+            columns,
+            acceleration: vec![0.0; m],
+            jacobian: vec![0.0; m * columns],
+            factors: vec![0.0; m * m],
+            sine: vec![0.0; m],
+            cosine: vec![0.0; m],
+        }
+    }
+
+    /// Accelerations at the state `at` with the parameters `p`.
+    pub(super) fn accelerate(&mut self, model: &Model, p: &[f64], at: &[f64], force: f64) {
+        let (n, m, layout) = (model.layout.links, model.coordinates(), model.layout);
+        let (v, w) = (at[m], &at[m + 1..]);
+        let (total, (slope_sine, slope_cosine)) = (p[Layout::TOTAL_MASS], libm::sincos(p[layout.tilt()]));
+        for j in 0..n {
+            (self.sine[j], self.cosine[j]) = libm::sincos(at[1 + j]);
+        }
+        let (sine, cosine) = (&self.sine, &self.cosine);
+        let right = &mut self.acceleration;
+        self.factors[0] = total;
+        right[0] =
+            force - model.back_emf * v - model.friction(p, 0, v)[0] - model.gravity * total * slope_sine;
+        let mut below = 0.0;
+        for j in 0..n {
+            let a = p[layout.first_moment(j)];
+            right[0] -= a * sine[j] * w[j] * w[j];
+            self.factors[(j + 1) * m] = -a * cosine[j];
+            let mut torque = model.gravity * a * (sine[j] * slope_cosine + cosine[j] * slope_sine);
+            for k in 0..n {
+                let b = model.coupling(p, j, k);
+                torque -= b * (sine[j] * cosine[k] - cosine[j] * sine[k]) * w[k] * w[k];
+                if k <= j {
+                    self.factors[(j + 1) * m + k + 1] = b * (cosine[j] * cosine[k] + sine[j] * sine[k]);
+                }
+            }
+            let friction = model.friction(p, j + 1, w[j] - below)[0];
+            below = w[j];
+            right[j + 1] = torque - friction;
+            if j > 0 {
+                right[j] += friction;
+            }
+        }
+        factorise(&mut self.factors, m);
+        solve(&self.factors, m, 1, &mut self.acceleration);
+    }
+
+    /// Accelerations, and their derivatives: with the equations written r = 0, `-M⁻¹ ∂r`.
+    pub(super) fn differentiate(&mut self, model: &Model, p: &[f64], at: &[f64], input: &Input) {
+        self.accelerate(model, p, at, input.force);
+        self.jacobian.fill(0.0);
+        self.by_state(model, p, at);
+        if self.columns > model.states() {
+            self.by_parameters(model, p, at, input);
+        }
+        solve(&self.factors, model.coordinates(), self.columns, &mut self.jacobian);
+    }
+
+    /// `-∂r` by the state.
+    fn by_state(&mut self, model: &Model, p: &[f64], at: &[f64]) {
+        let (n, m, layout, columns) = (model.layout.links, model.coordinates(), model.layout, self.columns);
+        let (v, w) = (at[m], &at[m + 1..]);
+        let (xdd, wdot) = (self.acceleration[0], &self.acceleration[1..]);
+        let (sine, cosine, by) = (&self.sine, &self.cosine, &mut self.jacobian);
+        let (slope_sine, slope_cosine) = libm::sincos(p[layout.tilt()]);
+        by[m] -= model.back_emf + model.friction(p, 0, v)[1];
+        let mut below = 0.0;
+        for j in 0..n {
+            let (a, row) = (p[layout.first_moment(j)], (j + 1) * columns);
+            by[1 + j] -= a * (sine[j] * wdot[j] + cosine[j] * w[j] * w[j]);
+            by[m + 1 + j] -= 2.0 * a * sine[j] * w[j];
+            by[row + 1 + j] +=
+                model.gravity * a * (cosine[j] * slope_cosine - sine[j] * slope_sine) - a * sine[j] * xdd;
+            for k in 0..n {
+                let b = model.coupling(p, j, k);
+                let along = b * (cosine[j] * cosine[k] + sine[j] * sine[k]);
+                let across = b * (sine[j] * cosine[k] - cosine[j] * sine[k]);
+                let turn = across * wdot[k] - along * w[k] * w[k];
+                by[row + 1 + j] += turn;
+                by[row + 1 + k] -= turn;
+                by[row + m + 1 + k] -= 2.0 * across * w[k];
+            }
+            let slope = model.friction(p, j + 1, w[j] - below)[1];
+            below = w[j];
+            by[row + m + 1 + j] -= slope;
+            if j > 0 {
+                by[row + m + j] += slope;
+                by[row - columns + m + 1 + j] += slope;
+                by[row - columns + m + j] -= slope;
+            }
+        }
+    }
+
+    /// `-∂r` by the parameters.
+    fn by_parameters(&mut self, model: &Model, p: &[f64], at: &[f64], input: &Input) {
+        let (n, m, layout, columns) = (model.layout.links, model.coordinates(), model.layout, self.columns);
+        let (v, w, s, gravity) = (at[m], &at[m + 1..], 2 * m, model.gravity);
+        let (xdd, wdot) = (self.acceleration[0], &self.acceleration[1..]);
+        let (sine, cosine, by) = (&self.sine, &self.cosine, &mut self.jacobian);
+        let (slope_sine, slope_cosine) = libm::sincos(p[layout.tilt()]);
+        by[s + Layout::TOTAL_MASS] -= xdd + gravity * slope_sine;
+        by[s + layout.viscous(0)] -= v;
+        by[s + layout.dry(0)] -= model.friction(p, 0, v)[2];
+        by[s + layout.tilt()] -= gravity * p[Layout::TOTAL_MASS] * slope_cosine;
+        by[s + layout.delay()] += input.by_delay;
+        by[s + layout.dead_zone()] += input.by_dead_zone;
+        let mut below = 0.0;
+        for j in 0..n {
+            let (a, row) = (p[layout.first_moment(j)], (j + 1) * columns + s);
+            let lever = sine[j] * slope_cosine + cosine[j] * slope_sine;
+            let moment = layout.first_moment(j);
+            by[s + moment] += cosine[j] * wdot[j] - sine[j] * w[j] * w[j];
+            by[row + moment] += cosine[j] * xdd + gravity * lever;
+            by[row + layout.second_moment(j)] -= wdot[j];
+            by[row + layout.tilt()] += gravity * a * (cosine[j] * slope_cosine - sine[j] * slope_sine);
+            for i in 0..j {
+                let row_i = (i + 1) * columns + s;
+                let along = cosine[i] * cosine[j] + sine[i] * sine[j];
+                let across = sine[i] * cosine[j] - cosine[i] * sine[j];
+                let on_i = along * wdot[j] + across * w[j] * w[j];
+                let on_j = along * wdot[i] - across * w[i] * w[i];
+                let length = layout.length(i);
+                by[row_i + moment] -= p[length] * on_i;
+                by[row + moment] -= p[length] * on_j;
+                by[row_i + length] -= a * on_i;
+                by[row + length] -= a * on_j;
+            }
+            let rate = w[j] - below;
+            below = w[j];
+            let direction = model.friction(p, j + 1, rate)[2];
+            by[row + layout.viscous(j + 1)] -= rate;
+            by[row + layout.dry(j + 1)] -= direction;
+            if j > 0 {
+                by[row - columns + layout.viscous(j + 1)] += rate;
+                by[row - columns + layout.dry(j + 1)] += direction;
+            }
+        }
+    }
+
+    /// Columns through which a force on the cart and a torque in each joint accelerate the coordinates, at the state
+    /// of the last call: m×m, row by row.
+    pub(super) fn inputs(&self) -> Vec<f64> {
+        let m = self.acceleration.len();
+        let mut columns = vec![0.0; m * m];
+        for i in 0..m {
+            columns[i * m + i] = 1.0;
+            if i > 1 {
+                columns[(i - 1) * m + i] = -1.0;
+            }
+        }
+        solve(&self.factors, m, m, &mut columns);
+        columns
+    }
+}
+
+/// Replaces the lower triangle of a symmetric positive definite matrix, m×m, by L and 1/D of `L D Lᵀ`.
+fn factorise(matrix: &mut [f64], m: usize) {
+    for k in 0..m {
+        let inverse = 1.0 / matrix[k * m + k];
+        matrix[k * m + k] = inverse;
+        for i in k + 1..m {
+            let l = matrix[i * m + k] * inverse;
+            for j in k + 1..=i {
+                matrix[i * m + j] -= l * matrix[j * m + k];
+            }
+        }
+        for i in k + 1..m {
+            matrix[i * m + k] *= inverse;
+        }
+    }
+}
+
+/// Replaces the m rows of `columns` right-hand sides by the solution.
+fn solve(factors: &[f64], m: usize, columns: usize, rows: &mut [f64]) {
+    let take = |rows: &mut [f64], to: usize, from: usize, factor: f64| {
+        let (low, high) = (to.min(from), to.max(from));
+        let (first, second) = rows.split_at_mut(high * columns);
+        let (first, second) = (&mut first[low * columns..][..columns], &mut second[..columns]);
+        let (to, from) = if to < from { (first, &*second) } else { (second, &*first) };
+        to.iter_mut().zip(from).for_each(|(to, from)| *to -= factor * from);
+    };
+    for i in 1..m {
+        for k in 0..i {
+            take(rows, i, k, factors[i * m + k]);
+        }
+    }
+    for i in 0..m {
+        rows[i * columns..][..columns].iter_mut().for_each(|value| *value *= factors[i * m + i]);
+    }
+    for k in (0..m).rev() {
+        for i in k + 1..m {
+            take(rows, k, i, factors[i * m + k]);
+        }
+    }
+}
+
+#[cfg(test)]
+pub(super) mod tests {
+    use super::super::parameters::priors;
+    use super::*;
+    use crate::plant::{ChainPlant, ChainState};
+    use crate::rig::{PlantDescription, Rig};
+    use std::path::Path;
+
+    pub(in crate::identify) fn triple() -> (Model, Vec<f64>, ChainPlant<3>) {
+        let rig = Rig::from_path(Path::new("../../rigs/triple-glueck-eder-kugi.toml")).unwrap();
+        let PlantDescription::Chain(chain) = &rig.plant else { panic!("a chain") };
+        let model = Model {
+            layout: Layout { links: 3 },
+            gravity: chain.gravity_m_per_s2,
+            back_emf: 0.0,
+            smoothing: [0.004, 0.02],
+        };
+        let p = priors(&rig, chain, true).iter().map(|prior| prior.value).collect();
+        (model, p, ChainPlant::of(chain).unwrap())
+    }
+
+    const AT: [f64; 8] = [0.1, 2.0, -1.1, 0.4, -0.7, 3.0, -5.0, 1.5];
+
+    #[test]
+    fn without_dry_friction_and_tilt_it_is_the_plant() {
+        let (model, mut p, plant) = triple();
+        (0..=3).for_each(|contact| p[model.layout.dry(contact)] = 0.0);
+        let mut local = Local::new(model.layout, false);
+        local.accelerate(&model, &p, &AT, 17.0);
+        let state = ChainState { x: 0.1, xdot: -0.7, phi: [2.0, -1.1, 0.4], phidot: [3.0, -5.0, 1.5] };
+        let rate = plant.derivative(&state, 17.0, &[0.0; 3]);
+        let wanted = [rate.xdot, rate.phidot[0], rate.phidot[1], rate.phidot[2]];
+        for (found, wanted) in local.acceleration.iter().zip(wanted) {
+            assert!((found - wanted).abs() < 1e-9 * wanted.abs(), "{found} {wanted}");
+        }
+    }
+
+    #[test]
+    fn derivatives_agree_with_differences() {
+        let (model, mut p, _) = triple();
+        p[model.layout.tilt()] = 0.1;
+        let mut exact = Local::new(model.layout, true);
+        exact.differentiate(&model, &p, &AT, &Input { force: 17.0, by_delay: 2.0, by_dead_zone: -3.0 });
+        let columns = 8 + model.layout.of_motion();
+        let mut other = Local::new(model.layout, false);
+        let mut at = |p: &[f64], state: &[f64], force: f64| {
+            other.accelerate(&model, p, state, force);
+            other.acceleration.clone()
+        };
+        for column in 0..columns {
+            let mut ends = [1.0, -1.0].map(|sign| {
+                let (mut p, mut state, mut force) = (p.clone(), AT.to_vec(), 17.0);
+                let step = if column < 8 { 1e-6 } else { 1e-6 * p[column - 8].abs().max(1e-2) };
+                match column.checked_sub(8) {
+                    None => state[column] += sign * step,
+                    Some(index) if index == model.layout.delay() => force += sign * step * 2.0,
+                    Some(index) if index == model.layout.dead_zone() => force -= sign * step * 3.0,
+                    Some(index) => p[index] += sign * step,
+                }
+                at(&p, &state, force).into_iter().map(|value| value / (2.0 * step)).collect::<Vec<_>>()
+            });
+            let low = std::mem::take(&mut ends[1]);
+            for (row, (high, low)) in ends[0].iter().zip(low).enumerate() {
+                let (found, wanted) = (exact.jacobian[row * columns + column], high - low);
+                assert!(
+                    (found - wanted).abs() < 1e-5 * (1.0 + wanted.abs()),
+                    "{row} {column}: {found} {wanted}"
+                );
+            }
+        }
+    }
+}

@@ -1,0 +1,165 @@
+//! Normal equations of least squares, in parameters that are scaled by their prior deviations.
+
+/// `A δ = g` with `A = Σ w J Jᵀ` and `g = Σ w J e`.
+#[derive(Debug, Clone)]
+pub(super) struct Normal {
+    size: usize,
+    /// A, row by row; the lower triangle is kept.
+    matrix: Vec<f64>,
+    pub(super) gradient: Vec<f64>,
+    /// What is minimised.
+    pub(super) cost: f64,
+    /// Sum of the squared residuals of each channel.
+    pub(super) squares: Vec<f64>,
+    /// Sum of the squared residuals of each channel over their predicted variances.
+    pub(super) normalised: Vec<f64>,
+    /// Number of residuals of each channel.
+    pub(super) count: usize,
+}
+
+impl Normal {
+    pub(super) fn new(size: usize, channels: usize) -> Self {
+        Self {
+            size,
+            matrix: vec![0.0; size * size],
+            gradient: vec![0.0; size],
+            cost: 0.0,
+            squares: vec![0.0; channels],
+            normalised: vec![0.0; channels],
+            count: 0,
+        }
+    }
+
+    /// Adds the residual `error` with its derivatives `jacobian` by the negative parameters, and the weight `weight`.
+    pub(super) fn add(&mut self, jacobian: &[f64], error: f64, weight: f64) {
+        for (i, &of_i) in jacobian.iter().enumerate() {
+            let factor = weight * of_i;
+            if factor == 0.0 {
+                continue;
+            }
+            self.gradient[i] += factor * error;
+            let row = &mut self.matrix[i * self.size..][..i + 1];
+            row.iter_mut().zip(jacobian).for_each(|(entry, &of_j)| *entry += factor * of_j);
+        }
+    }
+
+    /// Adds all of `other`.
+    pub(super) fn merge(mut self, other: &Self) -> Self {
+        let sum = |to: &mut [f64], from: &[f64]| to.iter_mut().zip(from).for_each(|(to, from)| *to += from);
+        sum(&mut self.matrix, &other.matrix);
+        sum(&mut self.gradient, &other.gradient);
+        sum(&mut self.squares, &other.squares);
+        sum(&mut self.normalised, &other.normalised);
+        self.cost += other.cost;
+        self.count += other.count;
+        self
+    }
+
+    /// Adds the prior: each parameter is 0 with deviation 1, and is now `at`.
+    pub(super) fn add_prior(&mut self, at: &[f64]) {
+        for (i, at) in at.iter().enumerate() {
+            self.matrix[i * self.size + i] += 1.0;
+            self.gradient[i] -= at;
+            self.cost += at * at;
+        }
+    }
+
+    /// Root mean square of the residuals of each channel.
+    pub(super) fn rms(&self) -> Vec<f64> {
+        self.squares.iter().map(|sum| (sum / self.count.max(1) as f64).sqrt()).collect()
+    }
+
+    /// Entry of A.
+    pub(super) fn entry(&self, i: usize, j: usize) -> f64 {
+        self.matrix[i.max(j) * self.size + i.min(j)]
+    }
+
+    /// Changes an entry of the lower triangle of A.
+    pub(super) fn subtract(&mut self, i: usize, j: usize, value: f64) {
+        self.matrix[i * self.size + j] -= value;
+    }
+
+    /// Size of A.
+    pub(super) fn size(&self) -> usize {
+        self.size
+    }
+
+    /// Factor of A with its diagonal raised by the share `damping`; none if it is not positive definite.
+    pub(super) fn factor(&self, damping: f64) -> Option<Cholesky> {
+        let n = self.size;
+        let mut l = self.matrix.clone();
+        for i in 0..n {
+            l[i * n + i] *= 1.0 + damping;
+            for j in 0..=i {
+                let (row_i, row_j) = (&l[i * n..i * n + j], &l[j * n..j * n + j]);
+                let known: f64 = row_i.iter().zip(row_j).map(|(a, b)| a * b).sum();
+                let rest = l[i * n + j] - known;
+                if i > j {
+                    l[i * n + j] = rest / l[j * n + j];
+                } else if rest > 0.0 && rest.is_finite() {
+                    l[i * n + i] = rest.sqrt();
+                } else {
+                    return None;
+                }
+            }
+        }
+        Some(Cholesky { size: n, l })
+    }
+}
+
+/// `A = L Lᵀ`.
+#[derive(Debug, Clone)]
+pub(super) struct Cholesky {
+    size: usize,
+    l: Vec<f64>,
+}
+
+impl Cholesky {
+    /// Replaces the right-hand side by the solution.
+    pub(super) fn solve(&self, b: &mut [f64]) {
+        let n = self.size;
+        for i in 0..n {
+            let known: f64 = self.l[i * n..i * n + i].iter().zip(&*b).map(|(l, x)| l * x).sum();
+            b[i] = (b[i] - known) / self.l[i * n + i];
+        }
+        for i in (0..n).rev() {
+            let known: f64 = (i + 1..n).map(|k| self.l[k * n + i] * b[k]).sum();
+            b[i] = (b[i] - known) / self.l[i * n + i];
+        }
+    }
+
+    /// The inverse of A, row by row.
+    pub(super) fn inverse(&self) -> Vec<f64> {
+        let n = self.size;
+        let mut inverse = vec![0.0; n * n];
+        for (i, row) in inverse.chunks_exact_mut(n).enumerate() {
+            row[i] = 1.0;
+            self.solve(row);
+        }
+        inverse
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::Normal;
+
+    #[test]
+    fn a_line_through_points_is_found() {
+        let mut normal = Normal::new(2, 1);
+        for x in 0..5 {
+            let x = f64::from(x);
+            normal.add(&[1.0, x], 3.0 - 2.0 * x, 0.5);
+        }
+        let factor = normal.factor(0.0).unwrap();
+        let mut line = normal.gradient.clone();
+        factor.solve(&mut line);
+        assert!((line[0] - 3.0).abs() < 1e-12 && (line[1] + 2.0).abs() < 1e-12);
+        // 0.5 Σ [1 x; x x²] = [2.5 5; 5 15]
+        let inverse = factor.inverse();
+        for (found, wanted) in inverse.iter().zip([1.2, -0.4, -0.4, 0.2]) {
+            assert!((found - wanted).abs() < 1e-12);
+        }
+        assert!(Normal::new(2, 1).factor(0.0).is_none());
+    }
+}

@@ -1,0 +1,190 @@
+//! What is identified: the parameters of a chain, their start values from the rig file, and what is known beforehand.
+
+use crate::plant::ChainParameters;
+use crate::rig::{Chain, Rig};
+
+/// Speed (m/s) and rate (rad/s) below which dry friction is taken as proportional, in `c tanh(v / ε)`.
+pub(super) const SMOOTHING: [f64; 2] = [0.004, 0.02];
+
+/// What a parameter is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Kind {
+    /// M_t: mass of cart and links (kg).
+    TotalMass,
+    /// a_j: mass times distance carried by link j (kg·m).
+    FirstMoment(usize),
+    /// l_j: distance of the joints at the ends of link j (m).
+    Length(usize),
+    /// J_j: moment of inertia at the joint of link j, of everything it carries (kg·m²).
+    SecondMoment(usize),
+    /// d_0: viscous friction of the cart (N·s/m).
+    CartViscous,
+    /// d_j: viscous friction of a joint (N·m·s/rad).
+    JointViscous(usize),
+    /// c_0: dry friction of the cart (N).
+    CartDry,
+    /// c_j: dry friction of a joint (N·m).
+    JointDry(usize),
+    /// Slope of the rail (rad).
+    Tilt,
+    /// Delay of the force (ticks).
+    Delay,
+    /// Dead zone of the motor (V).
+    DeadZone,
+    /// Zero error of a joint's encoder (rad).
+    Zero(usize),
+    /// Part of an eccentric encoder's error that goes with the sine of the angle (rad).
+    EccentricSine(usize),
+    /// Part of it that goes with the cosine (rad).
+    EccentricCosine(usize),
+}
+
+impl Kind {
+    /// Name with the number of the joint from 1, and unit.
+    pub fn name_and_unit(self) -> (String, &'static str) {
+        let of = |what: &str, joint: usize| format!("{what} {}", joint + 1);
+        match self {
+            Kind::TotalMass => ("total mass".to_owned(), "kg"),
+            Kind::FirstMoment(j) => (of("first moment, link", j), "kg·m"),
+            Kind::Length(j) => (of("length, link", j), "m"),
+            Kind::SecondMoment(j) => (of("second moment, link", j), "kg·m²"),
+            Kind::CartViscous => ("viscous friction, cart".to_owned(), "N·s/m"),
+            Kind::JointViscous(j) => (of("viscous friction, joint", j), "N·m·s/rad"),
+            Kind::CartDry => ("dry friction, cart".to_owned(), "N"),
+            Kind::JointDry(j) => (of("dry friction, joint", j), "N·m"),
+            Kind::Tilt => ("tilt of the rail".to_owned(), "rad"),
+            Kind::Delay => ("delay".to_owned(), "ticks"),
+            Kind::DeadZone => ("dead zone".to_owned(), "V"),
+            Kind::Zero(j) => (of("zero, joint", j), "rad"),
+            Kind::EccentricSine(j) => (of("eccentricity (sine), joint", j), "rad"),
+            Kind::EccentricCosine(j) => (of("eccentricity (cosine), joint", j), "rad"),
+        }
+    }
+}
+
+/// Where each parameter stands in the vector of all, for n links.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct Layout {
+    pub(super) links: usize,
+}
+
+impl Layout {
+    pub(super) const TOTAL_MASS: usize = 0;
+
+    pub(super) fn first_moment(self, link: usize) -> usize {
+        1 + link
+    }
+    pub(super) fn length(self, link: usize) -> usize {
+        1 + self.links + link
+    }
+    pub(super) fn second_moment(self, link: usize) -> usize {
+        2 * self.links + link
+    }
+    pub(super) fn viscous(self, contact: usize) -> usize {
+        3 * self.links + contact
+    }
+    pub(super) fn dry(self, contact: usize) -> usize {
+        4 * self.links + 1 + contact
+    }
+    pub(super) fn tilt(self) -> usize {
+        5 * self.links + 2
+    }
+    pub(super) fn delay(self) -> usize {
+        5 * self.links + 3
+    }
+    pub(super) fn dead_zone(self) -> usize {
+        5 * self.links + 4
+    }
+    pub(super) fn zero(self, joint: usize) -> usize {
+        5 * self.links + 5 + joint
+    }
+    pub(super) fn sine(self, joint: usize) -> usize {
+        6 * self.links + 5 + joint
+    }
+    pub(super) fn cosine(self, joint: usize) -> usize {
+        7 * self.links + 5 + joint
+    }
+    /// Number of parameters on which the motion depends: they come first; the others belong to the encoders.
+    pub(super) fn of_motion(self) -> usize {
+        5 * self.links + 5
+    }
+    pub(super) fn count(self) -> usize {
+        8 * self.links + 5
+    }
+
+    /// What each parameter is, in order.
+    pub(super) fn kinds(self) -> Vec<Kind> {
+        let n = self.links;
+        let mut kinds = vec![Kind::TotalMass];
+        kinds.extend((0..n).map(Kind::FirstMoment));
+        kinds.extend((0..n - 1).map(Kind::Length));
+        kinds.extend((0..n).map(Kind::SecondMoment));
+        kinds.push(Kind::CartViscous);
+        kinds.extend((0..n).map(Kind::JointViscous));
+        kinds.push(Kind::CartDry);
+        kinds.extend((0..n).map(Kind::JointDry));
+        kinds.extend([Kind::Tilt, Kind::Delay, Kind::DeadZone]);
+        kinds.extend((0..n).map(Kind::Zero));
+        kinds.extend((0..n).map(Kind::EccentricSine));
+        kinds.extend((0..n).map(Kind::EccentricCosine));
+        kinds
+    }
+}
+
+/// What is known about a parameter before the log is read.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Prior {
+    /// Value of the rig file.
+    pub(super) value: f64,
+    /// Standard deviation; 0: it is not identified.
+    pub(super) deviation: f64,
+}
+
+/// Relative deviation of masses, lengths and moments.
+const SHAPE: f64 = 0.5;
+/// Deviation of the zeros and of the tilt (rad).
+const ZERO_RAD: f64 = 0.03;
+/// Deviation of the eccentricity of an encoder (rad).
+const ECCENTRICITY_RAD: f64 = 0.002;
+/// Friction may be this many times what is expected.
+const FRICTION: f64 = 10.0;
+
+/// Start values and deviations of all parameters, from a rig file.
+pub(super) fn priors(rig: &Rig, chain: &Chain, eccentricity: bool) -> Vec<Prior> {
+    let layout = Layout { links: chain.links.len() };
+    let constants = ChainParameters::<f64>::of(chain);
+    let gravity = constants.gravity;
+    let weight = constants.total_mass * gravity;
+    let shape = |value: f64| Prior { value, deviation: SHAPE * value };
+    let motor = rig.actuator.motor.as_ref();
+    // One percent of critical damping, or what the file says.
+    let joint_viscous = |j: usize| 0.02 * (constants.b[(j, j)] * constants.a[j] * gravity).sqrt();
+    let viscous =
+        |given: f64, usual: f64| Prior { value: given, deviation: FRICTION * given.max(0.1 * usual) };
+    let dry = |given: f64, usual: f64| Prior {
+        value: if given > 0.0 { given } else { usual },
+        deviation: FRICTION * given.max(usual),
+    };
+    let friction = &rig.reality.friction;
+    let prior = |kind: Kind| match kind {
+        Kind::TotalMass => shape(constants.total_mass),
+        Kind::FirstMoment(j) => shape(constants.a[j]),
+        Kind::Length(j) => shape(chain.links[j].length_m),
+        Kind::SecondMoment(j) => shape(constants.b[(j, j)]),
+        Kind::CartViscous => viscous(constants.cart_friction, constants.total_mass),
+        Kind::JointViscous(j) => viscous(constants.joint_frictions[j], joint_viscous(j)),
+        Kind::CartDry => dry(friction.cart_friction_n, 0.01 * weight),
+        Kind::JointDry(j) => dry(friction.joint_friction_n_m.of(j), 0.001 * gravity * constants.a[j]),
+        Kind::Tilt => Prior { value: 0.0, deviation: ZERO_RAD },
+        Kind::Delay => Prior { value: 0.5, deviation: 0.5 },
+        Kind::DeadZone => motor.map_or(Prior { value: 0.0, deviation: 0.0 }, |motor| Prior {
+            value: motor.dead_zone_v,
+            deviation: motor.dead_zone_v.max(0.02 * motor.supply_v),
+        }),
+        Kind::Zero(_) => Prior { value: 0.0, deviation: ZERO_RAD },
+        Kind::EccentricSine(_) | Kind::EccentricCosine(_) => {
+            Prior { value: 0.0, deviation: if eccentricity { ECCENTRICITY_RAD } else { 0.0 } }
+        }
+    };
+    layout.kinds().into_iter().map(prior).collect()
+}

@@ -1,0 +1,302 @@
+//! Prediction error: an extended Kalman filter predicts each measurement from those before it.
+
+// The indices are those of the equations.
+#![allow(clippy::needless_range_loop)]
+
+use rayon::prelude::*;
+
+use super::model::{Input, Model};
+use super::normal::Normal;
+use super::parameters::{Layout, Prior};
+use super::record::Record;
+use super::shooting::scaled;
+use super::step::Step;
+
+/// Length of a run of the filter (s): they run in parallel.
+const SEGMENT_S: f64 = 10.0;
+/// After this time of a run the predictions count (s).
+const SETTLING_S: f64 = 0.25;
+/// Time over which the process noise is tuned (s).
+const TUNING_S: f64 = 6.0;
+/// Factors by which an intensity is changed while it is tuned.
+const FACTORS: [f64; 3] = [10.0, 4.0, 2.0];
+/// A fit ends when no parameter moves by more than this many of its deviations.
+const SETTLED: f64 = 0.03;
+
+/// The filter over a record.
+pub(super) struct Filter<'a> {
+    pub(super) model: &'a Model,
+    pub(super) record: &'a Record,
+    pub(super) priors: &'a [Prior],
+}
+
+/// A run: piece, first sample, number of samples.
+type Segment = (usize, usize, usize);
+
+/// Intensities of the noise on the cart (N²·s) and in each joint ((N·m)²·s) that the search begins with.
+pub(super) fn usual_noise(p: &[f64], layout: Layout, gravity: f64) -> Vec<f64> {
+    let of = |weight: f64| 1e-9 * (gravity * weight).powi(2);
+    let joints = (0..layout.links).map(|link| of(p[layout.first_moment(link)]));
+    [of(p[Layout::TOTAL_MASS])].into_iter().chain(joints).collect()
+}
+
+impl Filter<'_> {
+    fn segments(&self) -> Vec<Segment> {
+        let longest = (SEGMENT_S / self.record.dt_s).round() as usize;
+        let mut segments = Vec::new();
+        for piece in 0..self.record.pieces.len() {
+            let samples = self.record.samples(piece);
+            let parts = samples.div_ceil(longest).max(1);
+            let length = samples.div_ceil(parts);
+            segments.extend(
+                (0..samples).step_by(length).map(|first| (piece, first, length.min(samples - first))),
+            );
+        }
+        segments
+    }
+
+    /// Normal equations of all predictions with `p` and `noise`; with the parameters if `free`.
+    pub(super) fn run(&self, p: &[f64], noise: &[f64], free: bool) -> Normal {
+        let layout = self.model.layout;
+        let inputs: Vec<Vec<Input>> =
+            (0..self.record.pieces.len()).map(|piece| self.record.inputs(layout, p, piece)).collect();
+        let size = if free { layout.count() } else { 0 };
+        let each: Vec<Normal> = self
+            .segments()
+            .into_par_iter()
+            .map(|segment| self.segment(p, noise, &inputs[segment.0], segment, free))
+            .collect();
+        let mut sum = each.iter().fold(Normal::new(size, self.record.channels), Normal::merge);
+        if free {
+            sum.add_prior(&scaled(self.priors, p));
+        }
+        sum
+    }
+
+    /// Finds the noise under which the measurements are most likely.
+    pub(super) fn tuned(&self, p: &[f64]) -> Vec<f64> {
+        let short = self.record.part(1.0, 1.0 + TUNING_S);
+        let short = if short.pieces.is_empty() { self.record.clone() } else { short };
+        let filter = Filter { record: &short, ..*self };
+        let mut noise = usual_noise(p, self.model.layout, self.model.gravity);
+        let mut least = filter.run(p, &noise, false).cost;
+        for factor in FACTORS {
+            for channel in 0..noise.len() {
+                for factor in [factor, 1.0 / factor] {
+                    // On until it gets worse.
+                    for _ in 0..6 {
+                        let mut other = noise.clone();
+                        other[channel] *= factor;
+                        let cost = filter.run(p, &other, false).cost;
+                        // Not below what a longer log could tell.
+                        if cost.is_nan() || cost > least - 0.5 {
+                            break;
+                        }
+                        (noise, least) = (other, cost);
+                    }
+                }
+            }
+        }
+        noise
+    }
+
+    /// Finds the smoothing of the dry friction (m/s, rad/s) under which the measurements are most likely.
+    pub(super) fn smoothing(&self, p: &[f64], noise: &[f64]) -> [f64; 2] {
+        let mut best = (self.run(p, noise, false).cost, self.model.smoothing);
+        for contact in 0..2 {
+            for factor in [0.4, 2.5] {
+                for _ in 0..2 {
+                    let mut model = self.model.clone();
+                    model.smoothing = best.1;
+                    model.smoothing[contact] *= factor;
+                    let cost = Filter { model: &model, ..*self }.run(p, noise, false).cost;
+                    if cost.is_nan() || cost >= best.0 {
+                        break;
+                    }
+                    best = (cost, model.smoothing);
+                }
+            }
+        }
+        best.1
+    }
+
+    /// Gauss–Newton from `p` on, at most `iterations` steps; gives the parameters and the equations there.
+    pub(super) fn fit(&self, p: &[f64], noise: &[f64], iterations: usize) -> Option<(Vec<f64>, Normal)> {
+        let mut p = p.to_vec();
+        let mut normal = self.run(&p, noise, true);
+        for _ in 0..iterations {
+            let mut step = normal.gradient.clone();
+            let factor = normal.factor(0.0)?;
+            factor.solve(&mut step);
+            let inverse = factor.inverse();
+            let deviations = (0..step.len()).map(|i| inverse[i * step.len() + i].sqrt());
+            let furthest = step
+                .iter()
+                .zip(deviations)
+                .map(|(step, deviation)| step.abs() / deviation)
+                .fold(0.0, f64::max);
+            let halves = [1.0, 0.5, 0.25, 0.1];
+            let better = halves.iter().find_map(|share| {
+                let moved = p.iter().zip(self.priors).zip(&step);
+                let trial: Vec<f64> =
+                    moved.map(|((p, prior), step)| p + share * prior.deviation * step).collect();
+                let other = self.run(&trial, noise, true);
+                (other.cost < normal.cost).then_some((trial, other))
+            });
+            let Some(better) = better else { break };
+            (p, normal) = better;
+            if furthest < SETTLED {
+                break;
+            }
+        }
+        Some((p, normal))
+    }
+
+    fn segment(&self, p: &[f64], noise: &[f64], inputs: &[Input], segment: Segment, free: bool) -> Normal {
+        let (piece, first, samples) = segment;
+        let (m, s, dt_s) = (self.record.channels, self.model.states(), self.record.dt_s);
+        let size = if free { self.model.layout.count() } else { 0 };
+        let mut normal = Normal::new(size, m);
+        let mut step = Step::new(self.model, free);
+        let mut filter = State::new(self.record.state_near(p, self.model.layout, piece, first), size);
+        for channel in 0..m {
+            let step = self.record.steps[channel];
+            // Angles are sums of measurements.
+            filter.covariance[channel * s + channel] = step * step * (channel as f64).max(1.0);
+            filter.covariance[(m + channel) * s + m + channel] =
+                (step / 0.01).powi(2) * (channel as f64).max(1.0);
+        }
+        let y = &self.record.pieces[piece].y;
+        let settled = first + (SETTLING_S / dt_s) as usize;
+        let mut jacobian = vec![0.0; size];
+        for sample in first..first + samples {
+            for channel in 0..m {
+                let measured = y[sample * m + channel];
+                let variance = self.record.steps[channel].powi(2) / 12.0;
+                let (error, predicted) = filter.correct(self, p, channel, measured, variance, &mut jacobian);
+                if sample >= settled {
+                    normal.add(&jacobian, error, 1.0 / predicted);
+                    normal.cost += error * error / predicted + libm::log(predicted);
+                    normal.squares[channel] += error * error;
+                    normal.normalised[channel] += error * error / predicted;
+                }
+            }
+            normal.count += usize::from(sample >= settled);
+            step.take(self.model, p, &filter.at, &inputs[sample], dt_s);
+            filter.predict(&step, noise, dt_s);
+        }
+        normal
+    }
+}
+
+/// Estimate, its covariance, and its derivatives by the parameters.
+struct State {
+    at: Vec<f64>,
+    /// s×s.
+    covariance: Vec<f64>,
+    /// s rows of `size`.
+    by: Vec<f64>,
+    size: usize,
+    column: Vec<f64>,
+    other: Vec<f64>,
+    next_by: Vec<f64>,
+}
+
+impl State {
+    fn new(at: Vec<f64>, size: usize) -> Self {
+        let s = at.len();
+        Self {
+            at,
+            covariance: vec![0.0; s * s],
+            by: vec![0.0; s * size],
+            size,
+            column: vec![0.0; s],
+            other: vec![0.0; s * s],
+            next_by: vec![0.0; s * size],
+        }
+    }
+
+    /// Corrects by one measurement; gives the innovation and its variance, and writes the derivatives of the prediction
+    /// by the scaled parameters into `jacobian`.
+    fn correct(
+        &mut self,
+        filter: &Filter<'_>,
+        p: &[f64],
+        channel: usize,
+        y: f64,
+        variance: f64,
+        jacobian: &mut [f64],
+    ) -> (f64, f64) {
+        let (s, size) = (self.at.len(), self.size);
+        let measured = filter.model.measure(p, &self.at, channel);
+        let by = measured.by_angle;
+        let below = if channel > 1 { Some(channel - 1) } else { None };
+        for (i, column) in self.column.iter_mut().enumerate() {
+            let row = &self.covariance[i * s..][..s];
+            *column = by * (row[channel] - below.map_or(0.0, |below| row[below]));
+        }
+        let predicted =
+            variance + by * (self.column[channel] - below.map_or(0.0, |below| self.column[below]));
+        let error = y - measured.value;
+        if size > 0 {
+            for (i, entry) in jacobian.iter_mut().enumerate() {
+                *entry =
+                    by * (self.by[channel * size + i] - below.map_or(0.0, |below| self.by[below * size + i]));
+            }
+            for (index, by) in filter.model.measured_by(channel, &measured) {
+                jacobian[index] += by;
+            }
+        }
+        for i in 0..s {
+            let gain = self.column[i] / predicted;
+            self.at[i] += gain * error;
+            let row = &mut self.covariance[i * s..][..s];
+            row.iter_mut().zip(&self.column).for_each(|(entry, column)| *entry -= gain * column);
+            let row = &mut self.by[i * size..][..size];
+            row.iter_mut().zip(&*jacobian).for_each(|(entry, by)| *entry -= gain * by);
+        }
+        for (entry, prior) in jacobian.iter_mut().zip(filter.priors) {
+            *entry *= prior.deviation;
+        }
+        (error, predicted)
+    }
+
+    /// Predicts the next sample.
+    fn predict(&mut self, step: &Step, noise: &[f64], dt_s: f64) {
+        let (s, size, m) = (self.at.len(), self.size, self.at.len() / 2);
+        self.at.copy_from_slice(&step.end);
+        // F P, then (F P) Fᵀ.
+        self.other.fill(0.0);
+        for (row, local) in self.other.chunks_exact_mut(s).zip(step.by.chunks_exact(step.columns)) {
+            for (factor, from) in local[..s].iter().zip(self.covariance.chunks_exact(s)) {
+                row.iter_mut().zip(from).for_each(|(row, from)| *row += factor * from);
+            }
+        }
+        for (i, row) in self.other.chunks_exact(s).enumerate() {
+            for (j, local) in step.by.chunks_exact(step.columns).enumerate().take(i + 1) {
+                let value = row.iter().zip(&local[..s]).map(|(a, b)| a * b).sum();
+                self.covariance[i * s + j] = value;
+                self.covariance[j * s + i] = value;
+            }
+        }
+        let inputs = step.inputs();
+        for i in 0..m {
+            for j in 0..m {
+                let (row, column) = (&inputs[i * m..][..m], &inputs[j * m..][..m]);
+                let sum: f64 = row.iter().zip(column).zip(noise).map(|((a, b), noise)| a * b * noise).sum();
+                self.covariance[(m + i) * s + m + j] += sum * dt_s;
+            }
+        }
+        if size > 0 {
+            for (row, local) in self.next_by.chunks_exact_mut(size).zip(step.by.chunks_exact(step.columns)) {
+                let (of_motion, others) = row.split_at_mut(step.columns - s);
+                of_motion.copy_from_slice(&local[s..]);
+                others.fill(0.0);
+                for (factor, from) in local[..s].iter().zip(self.by.chunks_exact(size)) {
+                    row.iter_mut().zip(from).for_each(|(row, from)| *row += factor * from);
+                }
+            }
+            core::mem::swap(&mut self.by, &mut self.next_by);
+        }
+    }
+}

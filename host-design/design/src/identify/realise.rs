@@ -1,0 +1,170 @@
+//! From the identified numbers to those of a rig file.
+
+use super::error::IdentifyError;
+use super::parameters::Layout;
+use crate::rig::Chain;
+
+/// The numbers of a rig file that an identification changes.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Realised {
+    /// Mass of the cart (kg).
+    pub cart_kg: f64,
+    /// Viscous friction of the cart (N·s/m).
+    pub cart_viscous: f64,
+    /// Dry friction of the cart (N).
+    pub cart_dry_n: f64,
+    /// The links.
+    pub links: Vec<RealisedLink>,
+    /// Slope of the rail (rad).
+    pub tilt_rad: f64,
+    /// Dead zone of the motor (V).
+    pub dead_zone_v: f64,
+    /// What the winding resistance is multiplied by, if the scale of the force is known from a weighing.
+    pub resistance_factor: f64,
+}
+
+/// The numbers of a link.
+#[derive(Debug, Clone, PartialEq)]
+pub struct RealisedLink {
+    /// Mass (kg).
+    pub mass_kg: f64,
+    /// Length (m).
+    pub length_m: f64,
+    /// Distance of the centre of mass from the joint (m).
+    pub centre_m: f64,
+    /// Inertia about the centre of mass (kg·m²).
+    pub inertia_kg_m2: f64,
+    /// Viscous friction (N·m·s/rad).
+    pub viscous: f64,
+    /// Dry friction (N·m).
+    pub dry_n_m: f64,
+}
+
+/// Share by which a mass is above the least that its moments allow.
+const SPARE: f64 = 1e-6;
+
+/// The machine with the parameters `p` whose links have the masses nearest to those of the file: only M_t, a_j, l_j and
+/// J_j are known, so that each mass may be chosen, and centre and inertia follow,
+///
+/// ```text
+/// c_j = (a_j - l_j S_j) / m_j,   I_j = J_j - l_j² S_j - m_j c_j²,   S_j = m_{j+1} + … + m_n
+/// ```
+///
+/// With `weighed`, the first moment a_n of the last link is known (kg·m), and masses, frictions and forces are scaled.
+///
+/// # Errors
+/// [`IdentifyError::Physical`] if no masses make the mass matrix positive definite.
+pub(super) fn realise(chain: &Chain, p: &[f64], weighed: Option<f64>) -> Result<Realised, IdentifyError> {
+    let n = chain.links.len();
+    let layout = Layout { links: n };
+    let scale = weighed.map_or(1.0, |moment| moment / p[layout.first_moment(n - 1)]);
+    let (mut outer, mut links) = (0.0, Vec::new());
+    for j in (0..n).rev() {
+        let length = if j + 1 < n { p[layout.length(j)] } else { chain.links[j].length_m };
+        let carried = if j + 1 < n { outer } else { 0.0 };
+        let moment = scale * p[layout.first_moment(j)] - length * carried;
+        let second = scale * p[layout.second_moment(j)] - length * length * carried;
+        // NaN is no mass.
+        let is_physical = moment > 0.0 && second > 0.0;
+        if !is_physical {
+            return Err(IdentifyError::Physical(format!(
+                "link {} would have no mass of its own: the fit is not physical; is length_m or mass_kg of a link in the file \
+                 far off?",
+                j + 1
+            )));
+        }
+        // I_j >= 0, and the centre within reach.
+        let least = (moment * moment / second).max(moment / (9.9 * length));
+        let mass_kg = chain.links[j].mass_kg.max(least * (1.0 + SPARE));
+        let centre_m = moment / mass_kg;
+        links.push(RealisedLink {
+            mass_kg,
+            length_m: length,
+            centre_m,
+            inertia_kg_m2: second - mass_kg * centre_m * centre_m,
+            viscous: (scale * p[layout.viscous(j + 1)]).max(0.0),
+            dry_n_m: (scale * p[layout.dry(j + 1)]).max(0.0),
+        });
+        outer += mass_kg;
+    }
+    links.reverse();
+    let cart_kg = scale * p[Layout::TOTAL_MASS] - outer;
+    if cart_kg <= 0.0 {
+        return Err(IdentifyError::Physical(
+            "the cart would have no mass: the links of the file are too heavy, or the force is smaller than the file says"
+                .to_owned(),
+        ));
+    }
+    Ok(Realised {
+        cart_kg,
+        cart_viscous: (scale * p[layout.viscous(0)]).max(0.0),
+        cart_dry_n: (scale * p[layout.dry(0)]).max(0.0),
+        links,
+        tilt_rad: p[layout.tilt()],
+        dead_zone_v: p[layout.dead_zone()].max(0.0),
+        resistance_factor: 1.0 / scale,
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::parameters::priors;
+    use super::*;
+    use crate::plant::ChainParameters;
+    use crate::rig::{PlantDescription, Rig};
+    use std::path::Path;
+
+    fn chain_and_values(name: &str) -> (Chain, Vec<f64>) {
+        let rig = Rig::from_path(&Path::new("../../rigs").join(name)).unwrap();
+        let PlantDescription::Chain(chain) = &rig.plant else { panic!("a chain") };
+        (chain.clone(), priors(&rig, chain, false).iter().map(|prior| prior.value).collect())
+    }
+
+    #[test]
+    fn the_realised_machine_has_the_identified_numbers() {
+        for name in ["double-quanser-dbpen.toml", "triple-glueck-eder-kugi.toml", "quadruple-paper.toml"] {
+            let (chain, mut p) = chain_and_values(name);
+            let n = chain.links.len();
+            let layout = Layout { links: n };
+            for (i, value) in p[..3 * n].iter_mut().enumerate() {
+                *value *= 1.0 + 0.03 * libm::sin(i as f64);
+            }
+            let found = realise(&chain, &p, None).unwrap();
+            let mut other = chain.clone();
+            other.cart.mass_kg = found.cart_kg;
+            for (link, found) in other.links.iter_mut().zip(&found.links) {
+                (link.mass_kg, link.length_m) = (found.mass_kg, found.length_m);
+                (link.centre_of_mass_m, link.inertia_kg_m2) =
+                    (Some(found.centre_m), Some(found.inertia_kg_m2));
+                assert!(found.inertia_kg_m2 >= 0.0);
+            }
+            let constants = ChainParameters::<f64>::of(&other);
+            let close =
+                |found: f64, wanted: f64| assert!((found / wanted - 1.0).abs() < 1e-12, "{found} {wanted}");
+            close(constants.total_mass, p[0]);
+            for j in 0..n {
+                close(constants.a[j], p[layout.first_moment(j)]);
+                close(constants.b[(j, j)], p[layout.second_moment(j)]);
+            }
+        }
+    }
+
+    #[test]
+    fn a_weighing_scales_everything() {
+        let (chain, p) = chain_and_values("double-quanser-dbpen.toml");
+        let moment = p[Layout { links: 2 }.first_moment(1)];
+        let found = realise(&chain, &p, Some(1.1 * moment)).unwrap();
+        let total = found.cart_kg + found.links.iter().map(|link| link.mass_kg).sum::<f64>();
+        assert!((total / p[0] - 1.1).abs() < 1e-12 && (found.resistance_factor * 1.1 - 1.0).abs() < 1e-12);
+    }
+
+    #[test]
+    fn what_is_not_physical_is_refused() {
+        let (chain, mut p) = chain_and_values("double-quanser-dbpen.toml");
+        p[Layout { links: 2 }.second_moment(0)] *= 0.1;
+        assert!(matches!(realise(&chain, &p, None), Err(IdentifyError::Physical(_))));
+        let (chain, mut p) = chain_and_values("double-quanser-dbpen.toml");
+        p[0] *= 0.3;
+        assert!(matches!(realise(&chain, &p, None), Err(IdentifyError::Physical(_))));
+    }
+}

@@ -1,0 +1,283 @@
+//! What was measured, in the units of the model, and what drove the cart.
+
+// The indices are those of the equations.
+#![allow(clippy::needless_range_loop)]
+
+use core::f64::consts::PI;
+
+use super::error::IdentifyError;
+use super::log::{DriveScale, Log};
+use super::model::{Input, Model};
+use super::parameters::Layout;
+use crate::rig::{Motor, Rig};
+
+/// Longest time from one sample to the next (s), and longest integration step.
+const LONGEST_S: f64 = 0.0021;
+/// Shortest piece without a lost tick that is used (s).
+const SHORTEST_PIECE_S: f64 = 1.0;
+
+/// Consecutive samples: measurements every few ticks, and the drive of every tick.
+#[derive(Debug, Clone)]
+pub(super) struct Piece {
+    /// Deviations from hanging (m, rad), one row of m channels per sample.
+    pub(super) y: Vec<f64>,
+    /// Voltage, or force without a motor, of each tick.
+    drive: Vec<f64>,
+}
+
+/// The samples of all logs.
+#[derive(Debug, Clone)]
+pub(super) struct Record {
+    pub(super) pieces: Vec<Piece>,
+    pub(super) channels: usize,
+    /// Ticks from one sample to the next.
+    pub(super) stride: usize,
+    /// Time from one sample to the next (s).
+    pub(super) dt_s: f64,
+    /// Travel per count of each channel (m, rad).
+    pub(super) steps: Vec<f64>,
+    motor: Option<Motor>,
+    delay_ticks: usize,
+}
+
+impl Record {
+    /// The samples of `log`, every `stride` ticks.
+    pub(super) fn of(rig: &Rig, logs: &[Log], stride: usize) -> Self {
+        let period_s = rig.tick.period_s;
+        let steps: Vec<f64> = rig.sensors().iter().map(|sensor| sensor.step()).collect();
+        let channels = steps.len();
+        let mut record = Self {
+            pieces: Vec::new(),
+            channels,
+            stride,
+            dt_s: stride as f64 * period_s,
+            motor: rig.actuator.motor.clone(),
+            delay_ticks: usize::from(rig.tick.delay_ticks),
+            steps,
+        };
+        for log in logs {
+            record.add(rig, log);
+        }
+        record
+    }
+
+    /// The usual stride for a control period (s).
+    pub(super) fn usual_stride(period_s: f64) -> usize {
+        ((LONGEST_S / period_s) as usize).max(1)
+    }
+
+    fn add(&mut self, rig: &Rig, log: &Log) {
+        let deviations = log.deviations();
+        let ticks = log.ticks();
+        let supply = rig.actuator.motor.as_ref().map_or(0.0, |motor| motor.supply_v);
+        let drive = |index: usize| {
+            let tick = &ticks[index];
+            match log.header.drive {
+                DriveScale::Force(_) => log.drive(tick),
+                DriveScale::Duty if tick.supply_mv == 0 => log.drive(tick) * supply,
+                DriveScale::Duty => log.drive(tick) * f64::from(tick.supply_mv) * 1e-3,
+            }
+        };
+        let mut from = 0;
+        for to in 1..=ticks.len() {
+            if to < ticks.len() && ticks[to].number == ticks[to - 1].number + 1 {
+                continue;
+            }
+            if (to - from) as f64 * rig.tick.period_s >= SHORTEST_PIECE_S {
+                let samples = (from..to).step_by(self.stride);
+                let rows = samples.flat_map(|index| &deviations[index * self.channels..][..self.channels]);
+                let y = rows.enumerate().map(|(i, &counts)| counts as f64 * self.steps[i % self.channels]);
+                self.pieces.push(Piece { y: y.collect(), drive: (from..to).map(drive).collect() });
+            }
+            from = to;
+        }
+    }
+
+    /// Number of samples of a piece.
+    pub(super) fn samples(&self, piece: usize) -> usize {
+        self.pieces[piece].y.len() / self.channels
+    }
+
+    /// Length of all pieces (s).
+    pub(super) fn seconds(&self) -> f64 {
+        (0..self.pieces.len()).map(|piece| self.samples(piece) as f64 * self.dt_s).sum()
+    }
+
+    /// The samples from `from_s` to `to_s` of all, counted over the pieces one after the other.
+    pub(super) fn part(&self, from_s: f64, to_s: f64) -> Self {
+        let mut part =
+            Self { pieces: Vec::new(), steps: self.steps.clone(), motor: self.motor.clone(), ..*self };
+        let mut passed = 0;
+        let [from, to] = [from_s, to_s].map(|at_s| (at_s / self.dt_s).round() as usize);
+        for piece in &self.pieces {
+            let samples = piece.y.len() / self.channels;
+            let [low, high] = [from, to].map(|at| at.saturating_sub(passed).min(samples));
+            passed += samples;
+            if (high - low) as f64 * self.dt_s >= SHORTEST_PIECE_S {
+                let last = (high * self.stride).min(piece.drive.len());
+                part.pieces.push(Piece {
+                    y: piece.y[low * self.channels..high * self.channels].to_vec(),
+                    drive: piece.drive[low * self.stride..last].to_vec(),
+                });
+            }
+        }
+        part
+    }
+
+    /// The same with each row of measurements changed by `change`, which gets the row as it was.
+    pub(super) fn rewired(&self, change: impl Fn(&[f64]) -> Vec<f64>) -> Self {
+        let mut record = self.clone();
+        for piece in &mut record.pieces {
+            piece.y = piece.y.chunks(self.channels).flat_map(&change).collect();
+        }
+        record
+    }
+
+    /// The same with the motor reversed.
+    pub(super) fn reversed(&self) -> Self {
+        let mut record = self.clone();
+        record.pieces.iter_mut().flat_map(|piece| &mut piece.drive).for_each(|drive| *drive = -*drive);
+        record
+    }
+
+    /// Force of each interval between two samples of a piece, with the delay and the dead zone of `p`:
+    /// `u = (1 - δ) u_k + δ u_{k-1}`, averaged over the interval.
+    pub(super) fn inputs(&self, layout: Layout, p: &[f64], piece: usize) -> Vec<Input> {
+        let (delay, dead_zone) = (p[layout.delay()], p[layout.dead_zone()]);
+        let drive = &self.pieces[piece].drive;
+        let force = |tick: Option<usize>| {
+            let value = tick.map_or(0.0, |tick| drive[tick]);
+            let Some(motor) = &self.motor else { return [value, 0.0] };
+            let per_volt = motor.volts_per_speed() / motor.resistance_ohm;
+            let left = value.abs() - dead_zone;
+            if left > 0.0 { [per_volt * left.copysign(value), -per_volt.copysign(value)] } else { [0.0; 2] }
+        };
+        let mut inputs = Vec::with_capacity(self.samples(piece));
+        for first in (0..drive.len()).step_by(self.stride) {
+            let ticks = first..(first + self.stride).min(drive.len());
+            let share = 1.0 / ticks.len() as f64;
+            let mut input = Input::default();
+            for tick in ticks {
+                let now = tick.checked_sub(self.delay_ticks);
+                let ([new, new_by], [old, old_by]) =
+                    (force(now), force(now.and_then(|tick| tick.checked_sub(1))));
+                input.force += share * (new + delay * (old - new));
+                input.by_delay += share * (old - new);
+                input.by_dead_zone += share * (new_by + delay * (old_by - new_by));
+            }
+            inputs.push(input);
+        }
+        inputs
+    }
+
+    /// The state at a sample, from a parabola through the measurements around it.
+    pub(super) fn state_near(&self, p: &[f64], layout: Layout, piece: usize, sample: usize) -> Vec<f64> {
+        let m = self.channels;
+        let half = ((0.016 / self.dt_s).ceil() as usize).max(2);
+        let last = self.samples(piece) - 1;
+        let (low, high) = (sample.saturating_sub(half), (sample + half).min(last));
+        let mut state = vec![0.0; 2 * m];
+        for channel in 0..m {
+            let points = (low..=high).map(|at| {
+                let time = (at as f64 - sample as f64) * self.dt_s;
+                (time, self.pieces[piece].y[at * m + channel])
+            });
+            let [value, rate] = parabola(points);
+            (state[channel], state[m + channel]) = (value, rate);
+        }
+        for joint in 0..m - 1 {
+            state[joint + 1] -= p[layout.zero(joint)];
+        }
+        state[1] += PI - p[layout.tilt()];
+        for joint in 1..m - 1 {
+            state[joint + 1] += state[joint];
+            state[m + joint + 1] += state[m + joint];
+        }
+        state
+    }
+
+    /// Largest deviation of each channel from hanging (m, rad), and its range.
+    pub(super) fn extent(&self, channel: usize) -> [f64; 2] {
+        let values =
+            || self.pieces.iter().flat_map(|piece| piece.y.iter().skip(channel).step_by(self.channels));
+        let low = values().copied().fold(f64::INFINITY, f64::min);
+        let high = values().copied().fold(f64::NEG_INFINITY, f64::max);
+        [low.abs().max(high.abs()), high - low]
+    }
+
+    /// Largest angle of any link from hanging (rad).
+    pub(super) fn largest_angle(&self) -> f64 {
+        let rows = self.pieces.iter().flat_map(|piece| piece.y.chunks(self.channels));
+        rows.flat_map(|row| {
+            row[1..].iter().scan(0.0, |angle: &mut f64, &joint| {
+                *angle += joint;
+                Some(angle.abs())
+            })
+        })
+        .fold(0.0, f64::max)
+    }
+
+    /// The channels that hardly move: less than ten counts.
+    pub(super) fn still(&self) -> Option<usize> {
+        (0..self.channels).find(|&channel| self.extent(channel)[1] < 10.0 * self.steps[channel])
+    }
+
+    /// # Errors
+    /// [`IdentifyError::TooShort`] with less than `least` seconds.
+    pub(super) fn at_least(&self, least: f64) -> Result<(), IdentifyError> {
+        let seconds = self.seconds();
+        if seconds < least { Err(IdentifyError::TooShort { seconds, least }) } else { Ok(()) }
+    }
+
+    /// Back-EMF as damping (N·s/m).
+    pub(super) fn back_emf(&self) -> f64 {
+        self.motor.as_ref().map_or(0.0, |motor| {
+            let per_speed = motor.volts_per_speed();
+            per_speed * per_speed / motor.resistance_ohm
+        })
+    }
+
+    /// The model of the record, with the parameters of a layout.
+    pub(super) fn model(&self, gravity: f64) -> Model {
+        Model {
+            layout: Layout { links: self.channels - 1 },
+            gravity,
+            back_emf: self.back_emf(),
+            smoothing: super::parameters::SMOOTHING,
+        }
+    }
+}
+
+/// Value and slope at 0 of the parabola through `points` by least squares.
+fn parabola(points: impl Iterator<Item = (f64, f64)>) -> [f64; 2] {
+    let (mut t, mut y) = ([0.0; 5], [0.0; 3]);
+    for (time, value) in points {
+        let mut power = 1.0;
+        for k in 0..5 {
+            t[k] += power;
+            if k < 3 {
+                y[k] += power * value;
+            }
+            power *= time;
+        }
+    }
+    // Cramer's rule for [t0 t1 t2; t1 t2 t3; t2 t3 t4] c = y.
+    let minor = |a: usize, b: usize, c: usize, d: usize| t[a] * t[d] - t[b] * t[c];
+    let determinant = t[0] * minor(2, 3, 3, 4) - t[1] * minor(1, 3, 2, 4) + t[2] * minor(1, 2, 2, 3);
+    let value =
+        y[0] * minor(2, 3, 3, 4) - t[1] * (y[1] * t[4] - t[3] * y[2]) + t[2] * (y[1] * t[3] - t[2] * y[2]);
+    let slope =
+        t[0] * (y[1] * t[4] - t[3] * y[2]) - y[0] * minor(1, 3, 2, 4) + t[2] * (t[1] * y[2] - y[1] * t[2]);
+    [value / determinant, slope / determinant]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::parabola;
+
+    #[test]
+    fn a_parabola_is_found() {
+        let [value, slope] = parabola((-3..6).map(f64::from).map(|t| (t, 2.0 - 0.5 * t + 0.25 * t * t)));
+        assert!((value - 2.0).abs() < 1e-12 && (slope + 0.5).abs() < 1e-12, "{value} {slope}");
+    }
+}

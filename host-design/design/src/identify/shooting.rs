@@ -1,0 +1,259 @@
+//! Multiple shooting: short windows, each with an initial state of its own.
+
+// The indices are those of the equations.
+#![allow(clippy::needless_range_loop)]
+
+use rayon::prelude::*;
+
+use super::model::{Input, Model};
+use super::normal::{Cholesky, Normal};
+use super::parameters::Prior;
+use super::record::Record;
+use super::step::Step;
+
+/// Length of a window (s).
+pub(super) const WINDOW_S: f64 = 0.25;
+/// Factor of the damping after a step that failed, and after one that helped.
+const DAMPING: [f64; 2] = [10.0, 0.2];
+/// A fit ends when a step lowers the cost by less than this share.
+const SETTLED: f64 = 1e-3;
+
+/// A window with its initial state.
+#[derive(Debug, Clone)]
+pub(super) struct Window {
+    piece: usize,
+    first: usize,
+    samples: usize,
+    state: Vec<f64>,
+}
+
+/// The fit of a record.
+pub(super) struct Shooting<'a> {
+    pub(super) model: &'a Model,
+    pub(super) record: &'a Record,
+    pub(super) priors: &'a [Prior],
+    /// Whether the parameters are fitted, and not only the initial states.
+    pub(super) free: bool,
+}
+
+/// Where a fit is.
+#[derive(Debug, Clone)]
+pub(super) struct Fit {
+    pub(super) p: Vec<f64>,
+    windows: Vec<Window>,
+    /// Root mean square of the residuals of each channel (m, rad).
+    pub(super) rms: Vec<f64>,
+}
+
+/// The equations of one window: `H_zz δz + H_zp δp = g_z` reduced to `δp`.
+struct Reduced {
+    states: Cholesky,
+    /// H_zp, column by column, and g_z last.
+    right: Vec<Vec<f64>>,
+}
+
+impl Shooting<'_> {
+    /// Consecutive windows over all pieces, with initial states from the measurements.
+    fn windows(&self, p: &[f64], seconds: f64) -> Vec<Window> {
+        let samples = ((seconds / self.record.dt_s).round() as usize).max(4);
+        let mut windows = Vec::new();
+        for piece in 0..self.record.pieces.len() {
+            for first in (0..self.record.samples(piece)).step_by(samples) {
+                let samples = samples.min(self.record.samples(piece) - first);
+                if 2 * samples as u64 >= (seconds / self.record.dt_s) as u64 {
+                    let state = self.record.state_near(p, self.model.layout, piece, first);
+                    windows.push(Window { piece, first, samples, state });
+                }
+            }
+        }
+        windows
+    }
+
+    /// Fits from `p`, with windows of `seconds`: at most `iterations` after each of `rounds` estimates of the weights.
+    pub(super) fn fit(&self, p: &[f64], seconds: f64, iterations: usize, rounds: usize) -> Fit {
+        let mut fit =
+            Fit { p: p.to_vec(), windows: self.windows(p, seconds), rms: self.record.steps.clone() };
+        let channels = self.record.channels;
+        for _ in 0..rounds {
+            let weights: Vec<f64> = self.linearise(&fit, &vec![1.0; channels]).0.rms();
+            let floor = self.record.steps.iter().map(|step| 0.2 * step);
+            let weights: Vec<f64> =
+                weights.iter().zip(floor).map(|(rms, floor)| rms.max(floor).powi(-2)).collect();
+            self.descend(&mut fit, &weights, iterations);
+        }
+        fit.rms = self.linearise(&fit, &vec![1.0; channels]).0.rms();
+        fit
+    }
+
+    /// Levenberg–Marquardt from `fit` on.
+    fn descend(&self, fit: &mut Fit, weights: &[f64], iterations: usize) {
+        let mut damping = 1e-3;
+        let (mut normal, mut reduced) = self.linearise(fit, weights);
+        for _ in 0..iterations {
+            let Some(trial) = self.stepped(fit, &normal, &reduced, damping) else {
+                damping *= DAMPING[0];
+                continue;
+            };
+            let (other, other_reduced) = self.linearise(&trial, weights);
+            if other.cost < normal.cost {
+                let settled = normal.cost - other.cost < SETTLED * normal.cost;
+                (*fit, normal, reduced) = (trial, other, other_reduced);
+                damping *= DAMPING[1];
+                if settled {
+                    return;
+                }
+            } else {
+                damping *= DAMPING[0];
+            }
+        }
+    }
+
+    /// One damped step of parameters and initial states.
+    fn stepped(&self, fit: &Fit, normal: &Normal, reduced: &[Reduced], damping: f64) -> Option<Fit> {
+        let mut step = normal.gradient.clone();
+        normal.factor(damping)?.solve(&mut step);
+        let mut trial = fit.clone();
+        if self.free {
+            for ((p, prior), step) in trial.p.iter_mut().zip(self.priors).zip(&step) {
+                *p += prior.deviation * step;
+            }
+        }
+        for (window, reduced) in trial.windows.iter_mut().zip(reduced) {
+            let (last, columns) = reduced.right.split_last()?;
+            let mut move_by = last.clone();
+            for (column, step) in columns.iter().zip(&step) {
+                move_by.iter_mut().zip(column).for_each(|(to, of)| *to -= of * step);
+            }
+            reduced.states.solve(&mut move_by);
+            window.state.iter_mut().zip(move_by).for_each(|(state, by)| *state += by);
+        }
+        Some(trial)
+    }
+
+    /// The reduced normal equations of all windows, with the prior.
+    fn linearise(&self, fit: &Fit, weights: &[f64]) -> (Normal, Vec<Reduced>) {
+        let layout = self.model.layout;
+        let inputs: Vec<Vec<Input>> =
+            (0..self.record.pieces.len()).map(|piece| self.record.inputs(layout, &fit.p, piece)).collect();
+        let each: Vec<(Normal, Option<Reduced>)> = fit
+            .windows
+            .par_iter()
+            .map(|window| {
+                let whole = self.window(&fit.p, &inputs[window.piece], window, weights);
+                self.reduce(whole)
+            })
+            .collect();
+        let size = if self.free { layout.count() } else { 0 };
+        let mut sum = Normal::new(size, self.record.channels);
+        let mut kept = Vec::with_capacity(each.len());
+        for (normal, reduced) in each {
+            sum = sum.merge(&normal);
+            match reduced {
+                Some(reduced) => kept.push(reduced),
+                None => sum.cost = f64::NAN,
+            }
+        }
+        if self.free {
+            sum.add_prior(&scaled(self.priors, &fit.p));
+        }
+        (sum, kept)
+    }
+
+    /// The normal equations of a window in its initial state and the parameters.
+    fn window(&self, p: &[f64], inputs: &[Input], window: &Window, weights: &[f64]) -> Normal {
+        let (model, m, s) = (self.model, self.record.channels, self.model.states());
+        let mut step = Step::new(model, self.free);
+        let columns = step.columns;
+        let size = s + if self.free { model.layout.count() } else { 0 };
+        let mut normal = Normal::new(size, m);
+        let mut state = window.state.clone();
+        let mut by = vec![0.0; s * columns];
+        (0..s).for_each(|i| by[i * columns + i] = 1.0);
+        let mut next = by.clone();
+        let mut row = vec![0.0; size];
+        let y = &self.record.pieces[window.piece].y;
+        for sample in window.first..window.first + window.samples {
+            for channel in 0..m {
+                let measured = model.measure(p, &state, channel);
+                let error = y[sample * m + channel] - measured.value;
+                let own = &by[channel * columns..][..columns];
+                row[columns..].fill(0.0);
+                row.iter_mut().zip(own).for_each(|(row, own)| *row = measured.by_angle * own);
+                if channel > 1 {
+                    let below = &by[(channel - 1) * columns..][..columns];
+                    row.iter_mut().zip(below).for_each(|(row, below)| *row -= measured.by_angle * below);
+                }
+                if self.free {
+                    for (index, by) in model.measured_by(channel, &measured) {
+                        row[s + index] += by;
+                    }
+                    for (entry, prior) in row[s..].iter_mut().zip(self.priors) {
+                        *entry *= prior.deviation;
+                    }
+                }
+                normal.add(&row, error, weights[channel]);
+                normal.cost += weights[channel] * error * error;
+                normal.squares[channel] += error * error;
+            }
+            normal.count += 1;
+            step.take(model, p, &state, &inputs[sample], self.record.dt_s);
+            propagate(&step, &by, &mut next, s, columns);
+            core::mem::swap(&mut by, &mut next);
+            state.copy_from_slice(&step.end);
+        }
+        normal
+    }
+
+    /// Eliminates the initial state.
+    fn reduce(&self, whole: Normal) -> (Normal, Option<Reduced>) {
+        let s = self.model.states();
+        let size = whole.size() - s;
+        let mut rest = Normal::new(size, whole.squares.len());
+        (rest.cost, rest.count) = (whole.cost, whole.count);
+        rest.squares.clone_from(&whole.squares);
+        let mut of_states = Normal::new(s, 0);
+        for i in 0..s {
+            (0..=i).for_each(|j| of_states.subtract(i, j, -whole.entry(i, j)));
+        }
+        // A little more than nothing, where the window does not determine a rate.
+        let Some(states) = of_states.factor(1e-9) else { return (rest, None) };
+        let mut right: Vec<Vec<f64>> =
+            (0..size).map(|p| (0..s).map(|i| whole.entry(s + p, i)).collect()).collect();
+        right.push(whole.gradient[..s].to_vec());
+        let solved: Vec<Vec<f64>> = right
+            .iter()
+            .map(|column| {
+                let mut solved = column.clone();
+                states.solve(&mut solved);
+                solved
+            })
+            .collect();
+        let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
+        for i in 0..size {
+            for j in 0..=i {
+                rest.subtract(i, j, dot(&right[i], &solved[j]) - whole.entry(s + i, s + j));
+            }
+            rest.gradient[i] = whole.gradient[s + i] - dot(&right[i], &solved[size]);
+        }
+        (rest, Some(Reduced { states, right }))
+    }
+}
+
+/// The parameters as multiples of their prior deviations.
+pub(super) fn scaled(priors: &[Prior], p: &[f64]) -> Vec<f64> {
+    let one = |(prior, p): (&Prior, &f64)| {
+        if prior.deviation > 0.0 { (p - prior.value) / prior.deviation } else { 0.0 }
+    };
+    priors.iter().zip(p).map(one).collect()
+}
+
+/// `next = F by + [0 F_p]` with the derivatives `[F F_p]` of a step.
+fn propagate(step: &Step, by: &[f64], next: &mut [f64], s: usize, columns: usize) {
+    for (row, local) in next.chunks_exact_mut(columns).zip(step.by.chunks_exact(step.columns)) {
+        row[..s].fill(0.0);
+        row[s..].copy_from_slice(&local[s..]);
+        for (factor, from) in local[..s].iter().zip(by.chunks_exact(columns)) {
+            row.iter_mut().zip(from).for_each(|(row, from)| *row += factor * from);
+        }
+    }
+}

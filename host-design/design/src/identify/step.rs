@@ -1,0 +1,179 @@
+//! One step of integration with its derivatives, and what is measured.
+
+use core::f64::consts::PI;
+
+use super::model::{Input, Local, Model};
+
+/// A step of the classical Runge–Kutta method, with derivatives by the state at its start and by the parameters.
+#[derive(Debug, Clone)]
+pub(super) struct Step {
+    local: Local,
+    /// Number of columns: s, or s and the number of parameters of the motion.
+    pub(super) columns: usize,
+    /// State at the end, s entries.
+    pub(super) end: Vec<f64>,
+    /// Its derivatives, s rows of `columns`.
+    pub(super) by: Vec<f64>,
+    at: Vec<f64>,
+    at_by: Vec<f64>,
+    rate: Vec<f64>,
+    rate_by: Vec<f64>,
+}
+
+/// Each stage: how far into the step, and the weight of its rate.
+const STAGES: [(f64, f64); 4] = [(0.0, 1.0 / 6.0), (0.5, 1.0 / 3.0), (0.5, 1.0 / 3.0), (1.0, 1.0 / 6.0)];
+
+impl Step {
+    /// With derivatives by the state, and by the parameters if `parameters`.
+    pub(super) fn new(model: &Model, parameters: bool) -> Self {
+        let s = model.states();
+        let columns = s + if parameters { model.layout.of_motion() } else { 0 };
+        let (of_state, of_columns) = (vec![0.0; s], vec![0.0; s * columns]);
+        Self {
+            local: Local::new(model.layout, parameters),
+            columns,
+            end: of_state.clone(),
+            by: of_columns.clone(),
+            at: of_state.clone(),
+            at_by: of_columns.clone(),
+            rate: of_state,
+            rate_by: of_columns,
+        }
+    }
+
+    /// Goes from `start` on for `dt` (s) under `input`; the result is in `end` and `by`.
+    pub(super) fn take(&mut self, model: &Model, p: &[f64], start: &[f64], input: &Input, dt: f64) {
+        let (m, s, columns) = (model.coordinates(), model.states(), self.columns);
+        self.end.copy_from_slice(start);
+        self.by.fill(0.0);
+        (0..s).for_each(|i| self.by[i * columns + i] = 1.0);
+        self.rate.fill(0.0);
+        self.rate_by.fill(0.0);
+        for (part, weight) in STAGES {
+            let h = part * dt;
+            for ((at, &start), &rate) in self.at.iter_mut().zip(start).zip(&self.rate) {
+                *at = start + h * rate;
+            }
+            self.at_by.iter_mut().zip(&self.rate_by).for_each(|(at, &rate)| *at = h * rate);
+            (0..s).for_each(|i| self.at_by[i * columns + i] += 1.0);
+            self.local.differentiate(model, p, &self.at, input);
+            self.rate[..m].copy_from_slice(&self.at[m..]);
+            self.rate[m..].copy_from_slice(&self.local.acceleration);
+            self.rate_by[..m * columns].copy_from_slice(&self.at_by[m * columns..]);
+            let accelerations = &mut self.rate_by[m * columns..];
+            for (row, local) in
+                accelerations.chunks_exact_mut(columns).zip(self.local.jacobian.chunks_exact(columns))
+            {
+                row[..s].fill(0.0);
+                row[s..].copy_from_slice(&local[s..]);
+                // No acceleration depends on x.
+                for (factor, of_state) in local[1..s].iter().zip(self.at_by.chunks_exact(columns).skip(1)) {
+                    row.iter_mut().zip(of_state).for_each(|(row, &of_state)| *row += factor * of_state);
+                }
+            }
+            let h = weight * dt;
+            self.end.iter_mut().zip(&self.rate).for_each(|(end, &rate)| *end += h * rate);
+            self.by.iter_mut().zip(&self.rate_by).for_each(|(by, &rate)| *by += h * rate);
+        }
+    }
+
+    /// Columns through which force and torques accelerate, near the end of the step.
+    pub(super) fn inputs(&self) -> Vec<f64> {
+        self.local.inputs()
+    }
+}
+
+/// A measurement of one channel (0: cart, then the joints), as deviation from hanging, and what it depends on.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Measured {
+    pub(super) value: f64,
+    /// By the coordinate of this channel; that of the joint below has the opposite sign.
+    pub(super) by_angle: f64,
+    sine: f64,
+    cosine: f64,
+}
+
+impl Model {
+    /// What channel `channel` measures at `state`: for a joint `θ + o + s (sin θ - sin h) + c (cos θ - cos h) - h`, with
+    /// θ from the vertical and h the hanging angle.
+    pub(super) fn measure(&self, p: &[f64], state: &[f64], channel: usize) -> Measured {
+        let Some(joint) = channel.checked_sub(1) else {
+            return Measured { value: state[0], by_angle: 1.0, sine: 0.0, cosine: 0.0 };
+        };
+        let layout = self.layout;
+        let hanging = if joint == 0 { PI } else { 0.0 };
+        let below = if joint == 0 { -p[layout.tilt()] } else { state[joint] };
+        let theta = state[joint + 1] - below;
+        let (sine, cosine) = libm::sincos(theta);
+        let (s, c) = (p[layout.sine(joint)], p[layout.cosine(joint)]);
+        let (sine, cosine_less) = (sine, cosine - if joint == 0 { -1.0 } else { 1.0 });
+        Measured {
+            value: theta - hanging + p[layout.zero(joint)] + s * sine + c * cosine_less,
+            by_angle: 1.0 + s * cosine - c * sine,
+            sine,
+            cosine: cosine_less,
+        }
+    }
+
+    /// Derivatives of a measurement by the parameters that it depends on itself: each index with its derivative.
+    pub(super) fn measured_by(&self, channel: usize, measured: &Measured) -> [(usize, f64); 4] {
+        let layout = self.layout;
+        match channel.checked_sub(1) {
+            None => [(0, 0.0); 4],
+            Some(joint) => [
+                (layout.zero(joint), 1.0),
+                (layout.sine(joint), measured.sine),
+                (layout.cosine(joint), measured.cosine),
+                (layout.tilt(), if joint == 0 { measured.by_angle } else { 0.0 }),
+            ],
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::model::tests::triple;
+    use super::*;
+
+    #[test]
+    fn the_derivatives_of_a_step_agree_with_differences() {
+        let (model, p, _) = triple();
+        let start = [0.1, 2.0, -1.1, 0.4, -0.7, 3.0, -5.0, 1.5];
+        let input = Input { force: 3.0, ..Input::default() };
+        let after = |p: &[f64], start: &[f64]| {
+            let mut step = Step::new(&model, true);
+            step.take(&model, p, start, &input, 0.002);
+            step
+        };
+        let exact = after(&p, &start);
+        let check = |column: usize, high: Step, low: Step, width: f64| {
+            for row in 0..8 {
+                let wanted = (high.end[row] - low.end[row]) / width;
+                let found = exact.by[row * exact.columns + column];
+                assert!(
+                    (found - wanted).abs() < 1e-5 * (1.0 + wanted.abs()),
+                    "{row} {column}: {found} {wanted}"
+                );
+            }
+        };
+        for i in 0..8 {
+            let moved = |by: f64| {
+                let mut start = start;
+                start[i] += by;
+                after(&p, &start)
+            };
+            check(i, moved(1e-6), moved(-1e-6), 2e-6);
+        }
+        for i in (0..model.layout.of_motion())
+            .filter(|&i| i != model.layout.delay() && i != model.layout.dead_zone())
+        {
+            let width = 1e-6 * p[i].abs().max(1e-2);
+            let moved = |by: f64| {
+                let mut p = p.clone();
+                p[i] += by;
+                after(&p, &start)
+            };
+            check(8 + i, moved(width), moved(-width), 2.0 * width);
+        }
+    }
+}

@@ -1,0 +1,158 @@
+//! Identification of simulated machines that differ from the rig file.
+
+use std::path::{Path, PathBuf};
+use std::sync::OnceLock;
+
+use upright_design::identify::{
+    Excitation, Identification, IdentifyError, Kind, Log, Refusal, Settings, Wiring, identify, shake,
+};
+use upright_design::plant::ChainParameters;
+use upright_design::reality::real_chain;
+use upright_design::rig::{PlantDescription, Rig};
+
+const FILE: &str = "../../rigs/double-quanser-dbpen.toml";
+
+/// The machine differs from the file in everything that is identified.
+const REALITY: &str = "[reality]\njoint_friction_n_m = [1.5e-3, 1e-3]\ncart_friction_n = 0.2\n\
+    homing_error_rad = [0.006, -0.004]\nrail_tilt_rad = 0.003\nlatency_s = 4e-4\ncart_mass_percent = 8\n\
+    link_mass_percent = [-9, 7]\nlink_length_percent = [5, -8]\nlink_inertia_percent = [10, -10]\n";
+
+fn rig(reality: &str) -> Rig {
+    let text = std::fs::read_to_string(FILE).unwrap();
+    Rig::from_toml(&format!("{text}\n{reality}"), Path::new(FILE)).unwrap()
+}
+
+/// 15 s of the machine, recorded once.
+fn log() -> &'static Log {
+    static LOG: OnceLock<Log> = OnceLock::new();
+    LOG.get_or_init(|| shake(&rig(REALITY), 15.0, 3).unwrap())
+}
+
+fn run(rig: &Rig, log: &Log, settings: &Settings) -> Result<Identification, IdentifyError> {
+    identify(rig, &[(PathBuf::from("run.log"), log.clone())], settings, &|_| ())
+}
+
+const TRUSTED: Settings = Settings { eccentricity: false, weighed_kg_m: None, trust_wiring: true };
+
+/// The log with each row of deviations from hanging (counts) changed.
+fn rewired(log: &Log, change: impl Fn(&mut [i64])) -> Log {
+    let mut other = Log::new(log.header.clone());
+    for (tick, row) in log.ticks().iter().zip(log.deviations().chunks(log.channels())) {
+        let mut row = row.to_vec();
+        change(&mut row);
+        let counts: Vec<u16> = row
+            .iter()
+            .zip(&log.header.hanging)
+            .map(|(row, hanging)| hanging.wrapping_add(*row as u16))
+            .collect();
+        other.push(*tick, &counts);
+    }
+    other
+}
+
+#[test]
+fn the_parameters_of_a_double_pendulum_are_found_with_their_deviations() {
+    let (truth, file) = (rig(REALITY), rig(""));
+    let found = run(&file, log(), &TRUSTED).unwrap();
+    assert_eq!(found.refusal, None, "{found:?}");
+    let PlantDescription::Chain(chain) = &truth.plant else { panic!("a chain") };
+    let real = real_chain(chain, &truth.reality.parameters);
+    let constants = ChainParameters::<f64>::of(&real);
+    let of = |kind: Kind| found.estimate(kind).unwrap();
+    let within = |kind: Kind, wanted: f64, most: f64| {
+        let estimate = of(kind);
+        let error = (estimate.new - wanted).abs();
+        assert!(error < most, "{kind:?}: {} instead of {wanted}", estimate.new);
+        assert!(error < 4.0 * estimate.deviation, "{kind:?}: {error} with deviation {}", estimate.deviation);
+    };
+    // Ratios of the shape are known much better than the common scale.
+    let ratio = |one: Kind, other: Kind| of(one).new / of(other).new;
+    let shape = ratio(Kind::FirstMoment(0), Kind::FirstMoment(1)) / (constants.a[0] / constants.a[1]);
+    assert!((shape - 1.0).abs() < 1e-3, "{shape}");
+    within(Kind::Length(0), real.links[0].length_m, 1e-3 * real.links[0].length_m);
+    for j in 0..2 {
+        within(Kind::FirstMoment(j), constants.a[j], 0.01 * constants.a[j]);
+        within(Kind::SecondMoment(j), constants.b[(j, j)], 0.01 * constants.b[(j, j)]);
+        within(Kind::Zero(j), truth.reality.sensors.homing_error_rad.of(j), 0.0009);
+        within(Kind::JointViscous(j), 0.0024, 0.00024);
+    }
+    within(Kind::TotalMass, constants.total_mass, 0.02 * constants.total_mass);
+    within(Kind::Tilt, 0.003, 0.001);
+    // The old file predicts what was held out ten times worse.
+    for channel in &found.channels {
+        assert!(channel.held_out[0] > 5.0 * channel.held_out[1], "{channel:?}");
+    }
+    // A mass of its own for each link, and the moments as found.
+    let realised = found.realised.unwrap();
+    let total: f64 = realised.cart_kg + realised.links.iter().map(|link| link.mass_kg).sum::<f64>();
+    assert!((total - of_total(&found.estimates)).abs() < 1e-9);
+}
+
+fn of_total(estimates: &[upright_design::identify::Estimate]) -> f64 {
+    estimates.iter().find(|estimate| estimate.kind == Kind::TotalMass).unwrap().new
+}
+
+#[test]
+fn faults_of_the_wiring_are_named() {
+    let file = rig("");
+    let first = |log: &Log| {
+        let found = run(&file, log, &Settings::default()).unwrap();
+        (found.wiring.unwrap().best, found.refusal, found.estimates.len())
+    };
+    let faults: [(Wiring, Log); 4] = [
+        (Wiring::Reversed(2), rewired(log(), |row| row[2] = -row[2])),
+        (Wiring::Swapped(1, 2), rewired(log(), |row| row.swap(1, 2))),
+        (Wiring::Counts(1, 2.0), rewired(log(), |row| row[1] *= 2)),
+        (Wiring::MotorReversed, rewired(log(), |row| row.iter_mut().for_each(|count| *count = -*count))),
+    ];
+    for (wiring, log) in faults {
+        let (best, refusal, estimates) = first(&log);
+        assert_eq!(best, wiring);
+        assert!(matches!(refusal, Some(Refusal::Wiring(_))), "{wiring:?}");
+        assert_eq!(estimates, 0);
+    }
+}
+
+#[test]
+fn logs_that_say_nothing_are_refused() {
+    let file = rig("");
+    let still = rewired(log(), |row| row[2] = 0);
+    assert_eq!(run(&file, &still, &TRUSTED), Err(IdentifyError::Still("joint 2".to_owned())));
+    let mut short = Log::new(log().header.clone());
+    log().ticks()[..3000].iter().enumerate().for_each(|(at, tick)| short.push(*tick, log().counts(at)));
+    assert!(matches!(run(&file, &short, &TRUSTED), Err(IdentifyError::TooShort { .. })));
+    for name in ["single-quanser-ip02", "triple-glueck-eder-kugi"] {
+        let other = Rig::from_path(Path::new(&format!("../../rigs/{name}.toml"))).unwrap();
+        assert!(matches!(run(&other, log(), &TRUSTED), Err(IdentifyError::OtherRig { .. })));
+    }
+    let text = std::fs::read_to_string(FILE).unwrap().replace("period_s = 0.001", "period_s = 0.002");
+    let slower = Rig::from_toml(&text, Path::new(FILE)).unwrap();
+    assert!(matches!(run(&slower, log(), &TRUSTED), Err(IdentifyError::OtherRig { .. })));
+}
+
+#[test]
+fn a_log_that_no_machine_explains_does_not_fit() {
+    // The second encoder slips a little all the time.
+    let slipping = rewired(log(), |row| row[2] += row[0] / 40);
+    let found = run(&rig(""), &slipping, &TRUSTED).unwrap();
+    assert!(
+        matches!(found.refusal, Some(Refusal::Misfit(_) | Refusal::NotPhysical(_))),
+        "{:?}",
+        found.refusal
+    );
+}
+
+#[test]
+fn the_excitation_keeps_the_model_within_its_rail() {
+    for name in ["single-quanser-ip02", "triple-glueck-eder-kugi", "quadruple-paper"] {
+        let rig = Rig::from_path(Path::new(&format!("../../rigs/{name}.toml"))).unwrap();
+        let excitation = Excitation::of(&rig, 20.0, 1).unwrap();
+        let most = rig.force_limit_n().unwrap();
+        assert!(excitation.amplitude_n > 1e-4 * most, "{name}: {excitation:?}");
+        assert_eq!(excitation.force_n(0.0, 0.0, 0.0), 0.0);
+    }
+    let model = "name = \"m\"\n[model]\na = [[0, 1], [1, 0]]\nb = [0, 1]\n";
+    if let Ok(rig) = Rig::from_toml(model, Path::new("m.toml")) {
+        assert!(matches!(Excitation::of(&rig, 20.0, 1), Err(IdentifyError::NoEncoders(_))));
+    }
+}

@@ -1,0 +1,125 @@
+//! `upright identify`
+
+use std::io::Write as _;
+use std::path::{Path, PathBuf};
+
+use clap::Args;
+use upright_design::identify::{Identification, IdentifyError, Log, Settings, identify};
+use upright_design::rig::Rig;
+use upright_design::table::write_atomically;
+use upright_tool::identified::{json, rig_file, text};
+
+use crate::failure::Failure;
+use crate::progress::with_identification;
+use crate::variation::positive;
+
+/// Finds the parameters of the real machine from the log of a machine that hangs and is shaken.
+///
+/// First the wiring, then masses, lengths, moments, frictions, delay, dead zone and zeros, each with its deviation.
+/// Exit status 2 if a log cannot be read or is of another rig; 3 if it does not fit, and then nothing is written.
+#[derive(Args)]
+#[command(before_help = "\
+Examples:
+  upright shake rigs/quadruple-paper.toml --log run.log      the log of a simulated machine
+  upright identify rigs/quadruple-paper.toml run.log
+  upright identify rigs/quadruple-paper.toml run.log --write new.toml
+  upright identify rigs/quadruple-paper.toml run.log --json | jq .estimates
+  upright identify rigs/quadruple-paper.toml run.log --csv run.csv      only converts")]
+pub(crate) struct Identify {
+    /// Rig file that the firmware was designed for
+    #[arg(value_name = "RIG")]
+    rig: PathBuf,
+    /// Logs of this machine, all since the same homing
+    #[arg(value_name = "LOG", required = true)]
+    logs: Vec<PathBuf>,
+    /// Write the rig file with the identified numbers, if they fit
+    #[arg(long, value_name = "NEW.toml")]
+    write: Option<PathBuf>,
+    /// Also identify the eccentricity of the joints' encoders
+    #[arg(long)]
+    eccentricity: bool,
+    /// Weighed first moment of the last link: held level by its tip on a scale, reading times distance (kg·m)
+    #[arg(long, value_name = "KG_M", value_parser = positive)]
+    weigh: Option<f64>,
+    /// Take the wiring as in the file
+    #[arg(long)]
+    trust_wiring: bool,
+    /// Only write the log as CSV, to a file, or to stdout with `-`
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["write", "json", "eccentricity", "weigh", "trust_wiring"])]
+    csv: Option<PathBuf>,
+    /// Print the result as one JSON object
+    #[arg(long)]
+    json: bool,
+}
+
+impl Identify {
+    pub(crate) fn run(self) -> Result<(), Failure> {
+        let rig = Rig::from_path(&self.rig)?;
+        let read = |file: &PathBuf| match Log::from_path(file) {
+            Ok(log) => Ok((file.clone(), log)),
+            Err(source) => Err(IdentifyError::Log { file: file.clone(), source }),
+        };
+        let logs = self.logs.iter().map(read).collect::<Result<Vec<_>, _>>()?;
+        if let Some(path) = &self.csv {
+            return write_csv(&rig, &logs, path);
+        }
+        let settings = Settings {
+            eccentricity: self.eccentricity,
+            weighed_kg_m: self.weigh,
+            trust_wiring: self.trust_wiring,
+        };
+        let found = with_identification(|progress| identify(&rig, &logs, &settings, progress))?;
+        let mut out = std::io::stdout().lock();
+        if self.json {
+            writeln!(out, "{}", json(&rig.name, &found))?;
+        } else {
+            write!(out, "{}", text(&rig.name, &found, &settings))?;
+        }
+        if let Some(refusal) = &found.refusal {
+            return Err(Failure::NotIdentified(format!("{}: {refusal}; nothing is written", rig.name)));
+        }
+        match &self.write {
+            Some(path) => self.write_rig(path, &rig, &found),
+            None => Ok(()),
+        }
+    }
+
+    fn write_rig(&self, path: &Path, rig: &Rig, found: &Identification) -> Result<(), Failure> {
+        let old = std::fs::read_to_string(&self.rig)?;
+        let names: Vec<String> = self.logs.iter().map(|log| log.display().to_string()).collect();
+        let note = format!(
+            "{} with the numbers that `upright identify` found from {:.0} s of {}.",
+            self.rig.display(),
+            found.seconds,
+            names.join(", ")
+        );
+        let text = rig_file(&old, rig, found, &note.replace(['\n', '\r'], " "), path)
+            .map_err(|error| Failure::BadArgument(format!("{}: {error}", self.rig.display())))?;
+        write_atomically(path, text.as_bytes())?;
+        eprintln!("{} written", path.display());
+        Ok(())
+    }
+}
+
+fn write_csv(rig: &Rig, logs: &[(PathBuf, Log)], path: &Path) -> Result<(), Failure> {
+    let [(file, log)] = logs else {
+        return Err(Failure::BadArgument("--csv: converts one log; name one".to_owned()));
+    };
+    let steps: Vec<f64> = rig.sensors().iter().map(|sensor| sensor.step()).collect();
+    if steps.len() != log.channels() {
+        return Err(Failure::BadArgument(format!(
+            "{}: {} encoders, the rig file has {}; name the rig file of this machine",
+            file.display(),
+            log.channels(),
+            steps.len()
+        )));
+    }
+    let mut bytes = Vec::new();
+    log.write_csv(&steps, &mut bytes)?;
+    if path.as_os_str() == "-" {
+        std::io::stdout().lock().write_all(&bytes)?;
+    } else {
+        write_atomically(path, &bytes)?;
+    }
+    Ok(())
+}

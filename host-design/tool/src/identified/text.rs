@@ -1,0 +1,167 @@
+//! An identification as text and as JSON.
+
+use std::fmt::Write as _;
+
+use serde_json::{Value, json};
+use upright_design::identify::{Estimate, Identification, Kind, Settings};
+use upright_design::number::significant;
+
+/// Below this angle the scale of the force is poorly known (rad).
+const LARGE_ENOUGH_RAD: f64 = 30.0 * std::f64::consts::PI / 180.0;
+/// Without a model of the encoders' eccentricity nothing is known better than this share.
+const WITHOUT_ECCENTRICITY: f64 = 0.003;
+
+/// The identification as text.
+pub fn text(rig: &str, found: &Identification, settings: &Settings) -> String {
+    let mut text = format!(
+        "{rig}: {:.1} s of log, {} ticks lost, links up to {:.0}° from hanging\n",
+        found.seconds,
+        found.lost_ticks,
+        found.largest_angle_rad.to_degrees()
+    );
+    // Writing into a string cannot fail.
+    if let Some(wiring) = &found.wiring {
+        let _ = match wiring.is_as_in_file() {
+            true => writeln!(text, "wiring: as in the file; any fault fits {:.1} times worse", wiring.margin),
+            false => writeln!(text, "wiring: {}", wiring.best),
+        };
+    }
+    if found.estimates.is_empty() {
+        return text;
+    }
+    let _ = writeln!(
+        text,
+        "\n  {:<32}{:>13}{:>13}{:>12}{:>9}  unit",
+        "parameter", "file", "found", "deviation", "change/σ"
+    );
+    for estimate in &found.estimates {
+        let _ = writeln!(text, "{}", row(estimate));
+    }
+    let _ = writeln!(
+        text,
+        "\n  {:<10}{:>22}{:>26}{:>14}",
+        "channel", "innovation variance", "error over 0.5 s: file", "found"
+    );
+    for (index, channel) in found.channels.iter().enumerate() {
+        let [old, new] = channel.held_out.map(|error| error_text(index, error));
+        let _ =
+            writeln!(text, "  {:<10}{:>22.2}{old:>26}{new:>14}", channel.name, channel.innovation_variance);
+    }
+    text.push('\n');
+    for note in notes(found, settings) {
+        let _ = writeln!(text, "- {note}");
+    }
+    text
+}
+
+fn error_text(channel: usize, error: f64) -> String {
+    match channel {
+        0 => format!("{} mm", significant(1e3 * error, 3)),
+        _ => format!("{}°", significant(error.to_degrees(), 3)),
+    }
+}
+
+fn row(estimate: &Estimate) -> String {
+    let (name, unit) = estimate.kind.name_and_unit();
+    let digits = |value: f64| significant(value, 5);
+    let change = (estimate.new - estimate.old) / estimate.deviation;
+    let held = if estimate.held_by_prior { ", held by what was assumed" } else { "" };
+    format!(
+        "  {name:<32}{:>13}{:>13}{:>12}{change:>9.1}  {unit}{held}",
+        digits(estimate.old),
+        digits(estimate.new),
+        significant(estimate.deviation, 2)
+    )
+}
+
+/// What a reader has to know besides the numbers.
+pub(super) fn notes(found: &Identification, settings: &Settings) -> Vec<String> {
+    let mut notes = Vec::new();
+    match settings.weighed_kg_m {
+        Some(moment) => notes.push(format!(
+            "Masses and frictions in the new file are scaled to the weighed {} kg·m of the last link, and resistance_ohm with them.",
+            significant(moment, 4)
+        )),
+        None => notes.push(
+            "The scale of the force is taken from the file: masses, moments and frictions are in its newtons, and a common factor \
+             of all of them changes no motion. One weighing of the last link gives true kilograms (--weigh)."
+                .to_owned(),
+        ),
+    }
+    notes.push(
+        "Single masses cannot be seen from outside: the new file keeps those of the old one where it can, and centres and \
+         inertias follow."
+            .to_owned(),
+    );
+    if !settings.eccentricity {
+        notes.push(format!(
+            "Encoders are taken as centred: 0.1° of eccentricity alone falsifies lengths and moments by {:.1} %, whatever the \
+             deviations say. --eccentricity identifies it.",
+            100.0 * WITHOUT_ECCENTRICITY
+        ));
+    }
+    if found.largest_angle_rad < LARGE_ENOUGH_RAD {
+        notes.push(format!(
+            "The links came only {:.0}° from hanging: shake more; the scale is twenty times better known at 60° than at 10°.",
+            found.largest_angle_rad.to_degrees()
+        ));
+    }
+    match (found.other_delay(), found.estimate(Kind::Delay)) {
+        (Some(delay), Some(estimate)) => notes.push(format!(
+            "The force comes {:.2} ticks late beyond delay_ticks: set delay_ticks = {delay}; the new file has it.",
+            estimate.new
+        )),
+        (None, Some(estimate)) => {
+            notes.push(format!("delay_ticks stays: the force comes {:.2} ticks late beyond it.", estimate.new));
+        }
+        _ => (),
+    }
+    let zeros = found.estimates.iter().filter(|estimate| matches!(estimate.kind, Kind::Zero(_)));
+    let worst = zeros.map(|zero| zero.new.abs()).fold(0.0, f64::max);
+    notes.push(format!(
+        "The links were homed up to {:.2}° off. This is of this homing, and not in the file.",
+        worst.to_degrees()
+    ));
+    notes.push(format!(
+        "With four times the log, deviations halve, down to those of the friction's model; this log had {:.0} s.",
+        found.seconds
+    ));
+    notes
+}
+
+/// The identification as a JSON object.
+pub fn json(rig: &str, found: &Identification) -> Value {
+    let estimates: Vec<Value> = found
+        .estimates
+        .iter()
+        .map(|estimate| {
+            let (name, unit) = estimate.kind.name_and_unit();
+            json!({
+                "name": name, "unit": unit, "file": estimate.old, "found": estimate.new,
+                "deviation": estimate.deviation, "held_by_prior": estimate.held_by_prior,
+            })
+        })
+        .collect();
+    let channels: Vec<Value> = found
+        .channels
+        .iter()
+        .map(|channel| {
+            json!({
+                "name": channel.name, "innovation_variance": channel.innovation_variance,
+                "error_file": channel.held_out[0], "error_found": channel.held_out[1], "range": channel.range,
+            })
+        })
+        .collect();
+    let wiring = found.wiring.as_ref().map(|wiring| {
+        json!({
+            "best": wiring.best.to_string(), "as_in_file": wiring.is_as_in_file(), "margin": wiring.margin,
+            "file_is_worse_by": wiring.file_is_worse_by,
+        })
+    });
+    json!({
+        "rig": rig, "seconds": found.seconds, "lost_ticks": found.lost_ticks,
+        "largest_angle_rad": found.largest_angle_rad, "wiring": wiring, "estimates": estimates,
+        "channels": channels, "delay_ticks": found.other_delay().unwrap_or(found.delay_ticks),
+        "refused": found.refusal.as_ref().map(ToString::to_string),
+    })
+}

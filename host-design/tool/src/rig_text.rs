@@ -1,0 +1,132 @@
+//! Changes of a rig file's text, which keep its comments and its layout.
+
+use toml_edit::{Document, Item, TableLike};
+
+/// A changed text.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Changed {
+    /// The whole text.
+    pub text: String,
+    /// Whether the key is new in it.
+    pub is_new: bool,
+}
+
+/// `text` with `value` for the key, which is named as in an error: `tick.period_s`, `link[2].mass_kg`,
+/// `lqr.state_weights[1]`. A key that is not there is added to its table, and a table that is not there at the end. None
+/// if that is not possible.
+pub fn with_value(text: &str, key: &str, value: &str) -> Option<Changed> {
+    match place(text, key) {
+        Place::At(span) => {
+            let text = format!("{}{value}{}", &text[..span.start], &text[span.end..]);
+            Some(Changed { text, is_new: false })
+        }
+        Place::New { at, prefix } => {
+            let text = format!("{}{prefix} = {value}\n{}", &text[..at], &text[at..]);
+            Some(Changed { text, is_new: true })
+        }
+        Place::Nowhere => None,
+    }
+}
+
+/// Where the value of `key` stands in `text`.
+fn place(text: &str, key: &str) -> Place {
+    let Ok(document) = Document::parse(text) else { return Place::Nowhere };
+    let mut steps = key.split('.').peekable();
+    let mut table: &dyn TableLike = document.as_table();
+    let mut header = String::new();
+    let mut number = 0; // which of several tables of that header
+    while let Some(step) = steps.next() {
+        let (name, index) = indexed(step);
+        let item = table.get(name);
+        match (item, steps.peek(), index) {
+            (Some(item), None, None) => return item.span().map_or(Place::Nowhere, Place::At),
+            (Some(item), None, Some(index)) => {
+                let entry = item.as_array().and_then(|array| array.get(index));
+                return entry.and_then(|entry| entry.span()).map_or(Place::Nowhere, Place::At);
+            }
+            (Some(item), Some(_), index) => {
+                let inner = match (item, index) {
+                    (Item::ArrayOfTables(tables), Some(index)) => {
+                        (header, number) = (format!("[[{name}]]"), index);
+                        tables.get(index).map(|table| table as &dyn TableLike)
+                    }
+                    (item, None) => {
+                        (header, number) = (format!("[{name}]"), 0);
+                        item.as_table_like()
+                    }
+                    _ => None,
+                };
+                match inner {
+                    Some(inner) => table = inner,
+                    None => return Place::Nowhere,
+                }
+            }
+            (None, None, None) => return new_line(text, &header, number, name),
+            (None, Some(key), None) => {
+                return Place::New { at: text.len(), prefix: format!("\n[{name}]\n{key}") };
+            }
+            (None, _, Some(_)) => return Place::Nowhere,
+        }
+    }
+    Place::Nowhere
+}
+
+enum Place {
+    /// In these bytes.
+    At(core::ops::Range<usize>),
+    /// Not there; it would go here, after this.
+    New { at: usize, prefix: String },
+    /// Not known.
+    Nowhere,
+}
+
+/// Splits `name[2]` into the name and the index 1.
+fn indexed(step: &str) -> (&str, Option<usize>) {
+    let index = step.strip_suffix(']').and_then(|rest| rest.split_once('['));
+    match index.and_then(|(name, index)| Some((name, index.parse::<usize>().ok()?.checked_sub(1)?))) {
+        Some((name, index)) => (name, Some(index)),
+        None => (step, None),
+    }
+}
+
+/// A new line `name = …` after the line with this header, the one with that number; at the top without header.
+fn new_line(text: &str, header: &str, number: usize, name: &str) -> Place {
+    if header.is_empty() {
+        return Place::New { at: 0, prefix: name.to_owned() };
+    }
+    let mut at = 0;
+    let mut found = 0;
+    for line in text.split_inclusive('\n') {
+        at += line.len();
+        let bare = line.split('#').next().unwrap_or_default().trim();
+        if bare == header {
+            if found == number {
+                let prefix = if line.ends_with('\n') { name.to_owned() } else { format!("\n{name}") };
+                return Place::New { at, prefix };
+            }
+            found += 1;
+        }
+    }
+    Place::Nowhere
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const TEXT: &str =
+        "name = \"a\"\n[cart]\nmass_kg = 1 # one\n[[link]]\nmass_kg = 2\n[[link]]\nmass_kg = 3\n";
+
+    #[test]
+    fn values_are_replaced_and_added() {
+        let changed = |key: &str| with_value(TEXT, key, "7").map(|changed| changed.text);
+        assert_eq!(changed("cart.mass_kg").unwrap(), TEXT.replace("= 1 #", "= 7 #"));
+        assert_eq!(changed("link[2].mass_kg").unwrap(), TEXT.replace('3', "7"));
+        assert_eq!(
+            changed("link[1].length_m").unwrap(),
+            TEXT.replacen("[[link]]", "[[link]]\nlength_m = 7", 1)
+        );
+        assert!(changed("reality.rail_tilt_rad").unwrap().ends_with("[reality]\nrail_tilt_rad = 7\n"));
+        assert_eq!(changed("link[3].mass_kg"), None);
+    }
+}
