@@ -40,10 +40,8 @@ enum Mode<'t, const NX: usize, const NY: usize, T: Scalar> {
     Stopped,
     /// Running without an observer: the table holds none.
     WithoutObserver,
-    /// Running; sensor i measures state 2i, as in every chain.
-    InOrder(Observer<'t, NX, NY, T>),
-    /// Running; the table says which state each sensor measures.
-    LookingUp(Observer<'t, NX, NY, T>),
+    /// Running from encoders.
+    Running(Observer<'t, NX, NY, T>),
 }
 
 /// Result of the first half of a tick.
@@ -247,8 +245,7 @@ impl<'t, const NX: usize, const NY: usize, T: Scalar> Controller<'t, NX, NY, T> 
         (self.requested, self.applied) = (T::default(), T::default());
         self.mode = match &self.table.observer {
             None => Mode::WithoutObserver,
-            Some(gains) if gains.sensors_are_in_order() => Mode::InOrder(Observer::new(gains)),
-            Some(gains) => Mode::LookingUp(Observer::new(gains)),
+            Some(gains) => Mode::Running(Observer::new(gains)),
         };
     }
 
@@ -283,14 +280,11 @@ impl<'t, const NX: usize, const NY: usize, T: Scalar> Controller<'t, NX, NY, T> 
         raw: &[u32; NY],
         judge: impl FnOnce(&[i32; NY], &[T; NY], &mut [T; NY]),
     ) -> MotorCommand<T> {
-        let requested = match self.mode {
-            Mode::InOrder(observer) => self.observe(&observer, raw, |sensor| 2 * sensor, judge),
-            Mode::LookingUp(observer) => self.observe_looking_up(&observer, raw, judge),
-            Mode::WithoutObserver | Mode::Stopped => {
-                self.encoders.update(raw);
-                return Self::off();
-            }
+        let Mode::Running(observer) = self.mode else {
+            self.encoders.update(raw);
+            return Self::off();
         };
+        let requested = self.observe(&observer, raw, judge);
         self.drive(requested)
     }
 
@@ -305,25 +299,11 @@ impl<'t, const NX: usize, const NY: usize, T: Scalar> Controller<'t, NX, NY, T> 
         self.drive(requested)
     }
 
-    // Not inlined, so that it takes no registers from the path without look-up.
-    #[cold]
-    #[inline(never)]
-    fn observe_looking_up(
-        &mut self,
-        observer: &Observer<'t, NX, NY, T>,
-        raw: &[u32; NY],
-        judge: impl FnOnce(&[i32; NY], &[T; NY], &mut [T; NY]),
-    ) -> T {
-        let measured = &observer.gains.measured;
-        self.observe(observer, raw, |sensor| measured.get(sensor).map_or(NX, |&state| state as usize), judge)
-    }
-
     #[inline(always)]
     fn observe(
         &mut self,
         observer: &Observer<'t, NX, NY, T>,
         raw: &[u32; NY],
-        measured: impl Fn(usize) -> usize,
         judge: impl FnOnce(&[i32; NY], &[T; NY], &mut [T; NY]),
     ) -> T {
         self.state.govern(self.target, self.gains.setpoint_step);
@@ -331,7 +311,7 @@ impl<'t, const NX: usize, const NY: usize, T: Scalar> Controller<'t, NX, NY, T> 
         let estimate = &mut self.estimate.data.0[0];
         let mut sum = FeedbackSum::new(self.gains.n, self.state.setpoint);
         let counts = self.encoders.counts();
-        let mut e = observer.innovation(measured, &y, estimate);
+        let mut e = observer.innovation(&y, estimate);
         judge(counts, &y, &mut e);
         self.innovation.data.0[0] = e;
         observer.correct(&e, estimate, |joint, x| {
@@ -387,7 +367,7 @@ impl<'t, const NX: usize, const NY: usize, T: Scalar> Controller<'t, NX, NY, T> 
             let position = self.output();
             self.state.advance(self.gains.k_integral, position, self.table.tick_s, requested, applied);
         }
-        if let Mode::InOrder(observer) | Mode::LookingUp(observer) = &self.mode {
+        if let Mode::Running(observer) = &self.mode {
             observer.predict(&mut self.estimate.data.0[0], during_this_tick);
         }
     }

@@ -4,11 +4,13 @@
 //! e = y - C x̂⁻,   x̂ = x̂⁻ + L e,   x̂⁻(next tick) = Ad x̂ + Bd u
 //! ```
 
+use core::hint::black_box;
+
 use crate::table::{ObserverGains, Scalar};
 
 impl<const NX: usize, const NY: usize, T: Scalar> ObserverGains<NX, NY, T> {
     /// Whether sensor i measures state 2i, as in every chain. Then no index has to be looked up.
-    pub(crate) fn sensors_are_in_order(&self) -> bool {
+    fn sensors_are_in_order(&self) -> bool {
         self.measured.iter().zip(0..).all(|(&state, sensor)| state == 2 * sensor)
     }
 }
@@ -18,6 +20,8 @@ impl<const NX: usize, const NY: usize, T: Scalar> ObserverGains<NX, NY, T> {
 pub(crate) struct Observer<'t, const NX: usize, const NY: usize, T: Scalar = f32> {
     pub(crate) gains: &'t ObserverGains<NX, NY, T>,
     pattern: Pattern,
+    /// Whether sensor i measures state 2i.
+    is_in_order: bool,
 }
 
 /// Entries of Ad that are known in advance. They make the prediction faster; the result is the same, bit for bit.
@@ -55,25 +59,25 @@ impl Pattern {
 
 impl<'t, const NX: usize, const NY: usize, T: Scalar> Observer<'t, NX, NY, T> {
     pub(crate) fn new(gains: &'t ObserverGains<NX, NY, T>) -> Self {
-        Self { gains, pattern: Pattern::of(&gains.ad.data.0) }
+        Self { gains, pattern: Pattern::of(&gains.ad.data.0), is_in_order: gains.sensors_are_in_order() }
     }
 
     /// Innovation `e = y - C x̂⁻` (m or rad): measurement minus prediction, for the measured positions y. It is
-    /// computed explicitly: a merged `Ad - L C` would cost most of the digits of u in f32. `measured` maps a sensor to
-    /// its state.
+    /// computed explicitly: a merged `Ad - L C` would cost most of the digits of u in f32.
     #[inline(always)]
-    pub(crate) fn innovation(
-        &self,
-        measured: impl Fn(usize) -> usize,
-        y: &[T; NY],
-        estimate: &[T; NX],
-    ) -> [T; NY] {
-        let mut innovation = *y;
-        for (sensor, e) in innovation.iter_mut().enumerate() {
-            // A checked table names only states that exist.
-            *e -= estimate.get(measured(sensor)).copied().unwrap_or_default();
+    pub(crate) fn innovation(&self, y: &[T; NY], estimate: &[T; NX]) -> [T; NY] {
+        if self.is_in_order {
+            difference(|sensor| 2 * sensor, y, estimate)
+        } else {
+            self.innovation_looking_up(y, estimate)
         }
-        innovation
+    }
+
+    #[cold]
+    #[inline(never)]
+    fn innovation_looking_up(&self, y: &[T; NY], estimate: &[T; NX]) -> [T; NY] {
+        let measured = &self.gains.measured;
+        difference(|sensor| measured.get(sensor).map_or(NX, |&state| state as usize), y, estimate)
     }
 
     /// Replaces the prediction x̂⁻ by the current estimate `x̂ = x̂⁻ + L e`. Calls `corrected` for each joint, with
@@ -118,13 +122,17 @@ impl<'t, const NX: usize, const NY: usize, T: Scalar> Observer<'t, NX, NY, T> {
         if self.pattern == Pattern::Frictionless {
             self.add_frictionless(&mut next, estimate);
         } else {
-            for (state, (column, x)) in self.gains.ad.data.0.iter().zip(estimate.iter()).enumerate() {
-                if state == 0 && self.pattern == Pattern::SameEverywhere {
-                    next[0] += *x;
-                } else {
-                    for (next, a) in next.iter_mut().zip(column) {
-                        *next += *a * *x;
-                    }
+            let (mut columns, mut states) = (&self.gains.ad.data.0[..], &estimate[..]);
+            if let (Pattern::SameEverywhere, [_, others @ ..], [x, rest @ ..]) =
+                (self.pattern, columns, states)
+            {
+                next[0] += *x;
+                (columns, states) = (others, rest);
+            }
+            // The compiler does not see how many columns there are: it would write the loop out, in 2 KiB.
+            for (column, x) in black_box(columns).iter().zip(states) {
+                for (next, a) in next.iter_mut().zip(column) {
+                    *next += *a * *x;
                 }
             }
         }
@@ -155,6 +163,21 @@ impl<'t, const NX: usize, const NY: usize, T: Scalar> Observer<'t, NX, NY, T> {
     }
 }
 
+/// `y - C x̂⁻`; `measured` maps a sensor to its state.
+#[inline(always)]
+fn difference<const NX: usize, const NY: usize, T: Scalar>(
+    measured: impl Fn(usize) -> usize,
+    y: &[T; NY],
+    estimate: &[T; NX],
+) -> [T; NY] {
+    let mut innovation = *y;
+    for (sensor, e) in innovation.iter_mut().enumerate() {
+        // A checked table names only states that exist.
+        *e -= estimate.get(measured(sensor)).copied().unwrap_or_default();
+    }
+    innovation
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -171,7 +194,7 @@ mod tests {
         };
         let observer = Observer::new(&gains);
         let mut x = [1.0, -1.0];
-        let e = observer.innovation(|sensor| 2 * sensor, &[3.0], &x);
+        let e = observer.innovation(&[3.0], &x);
         observer.correct(&e, &mut x, |joint, x| assert_eq!((joint, x), (0, &[2.0, 3.0][..])));
         assert_eq!((x, e), ([2.0, 3.0], [2.0]));
         observer.predict(&mut x, 8.0);

@@ -2,7 +2,7 @@
 
 use heapless::spsc::{Consumer, Producer};
 
-use crate::board::Board;
+use crate::board::{Board, Inputs, Output};
 use crate::firmware::Firmware;
 use crate::protocol::message::{Command, Message};
 use crate::protocol::queue;
@@ -38,20 +38,40 @@ impl<'q, 't, B: Board<NY>, const NX: usize, const NY: usize, S: SwingUp<NX, NY>>
 
     /// One tick.
     pub fn tick(&mut self) {
+        self.tick_with(Firmware::drive, Firmware::predict);
+    }
+
+    /// One tick, with [`Firmware::drive`] and [`Firmware::predict`] as the caller has had them compiled.
+    #[inline(always)]
+    pub fn tick_with(
+        &mut self,
+        drive: impl FnOnce(&mut Firmware<'t, NX, NY, S>, &Inputs<NY>) -> Output,
+        predict: impl FnOnce(&mut Firmware<'t, NX, NY, S>),
+    ) {
         let begin = self.board.cycles();
         let inputs = self.board.inputs();
-        let output = self.firmware.control(&inputs);
+        self.firmware.accept(&inputs);
+        let output = drive(&mut self.firmware, &inputs);
         self.board.drive(&output);
         let command = queue::take(&mut self.commands);
-        let (telemetry, reply) = self.firmware.finish(command.as_ref(), self.cycles);
+        let telemetry = self.firmware.report(self.cycles);
+        predict(&mut self.firmware);
+        let reply = self.firmware.complete(command.as_ref());
         // The reply goes first: it is sent once, telemetry again and again.
-        for message in [reply.map(Message::Reply), telemetry.map(Message::Telemetry)].into_iter().flatten() {
-            if queue::put(&mut self.messages, message).is_err() {
-                self.firmware.message_dropped();
-            }
+        if let Some(reply) = reply {
+            self.send(Message::Reply(reply));
+        }
+        if let Some(telemetry) = telemetry {
+            self.send(Message::Telemetry(telemetry));
         }
         self.board.feed_watchdog();
         self.cycles = self.board.cycles().wrapping_sub(begin);
+    }
+
+    fn send(&mut self, message: Message<NX, NY>) {
+        if queue::put(&mut self.messages, message).is_err() {
+            self.firmware.message_dropped();
+        }
     }
 
     /// The firmware, read-only.

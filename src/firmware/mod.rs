@@ -6,6 +6,8 @@
 
 mod commands;
 pub mod control_task;
+#[cfg(feature = "image")]
+pub mod hot_path;
 mod posture;
 mod swing_up;
 mod telemetry;
@@ -183,6 +185,13 @@ impl<'t, const NX: usize, const NY: usize, S: SwingUp<NX, NY>> Firmware<'t, NX, 
 
     /// First half of a tick: from inputs to output.
     pub fn control(&mut self, inputs: &Inputs<NY>) -> Output {
+        self.accept(inputs);
+        self.drive(inputs)
+    }
+
+    /// The first part of [`control`](Self::control): contacts that turn the motor off, and all of a tick with the motor
+    /// off.
+    pub fn accept(&mut self, inputs: &Inputs<NY>) {
         (self.raw_counts, self.contacts, self.supply_v) =
             (inputs.raw_counts, inputs.contacts, inputs.supply_v);
         self.statistics.overruns =
@@ -199,6 +208,10 @@ impl<'t, const NX: usize, const NY: usize, S: SwingUp<NX, NY>> Firmware<'t, NX, 
         if !self.supervisor.state().drives() {
             self.tick_motor_off();
         }
+    }
+
+    /// The second part of [`control`](Self::control): the output, from the control law if the rig is driven.
+    pub fn drive(&mut self, inputs: &Inputs<NY>) -> Output {
         self.output = match self.supervisor.state() {
             State::Balancing => self.balance(inputs),
             State::Raising | State::Lowering if S::IS_POSSIBLE => self.move_links(inputs),
@@ -331,20 +344,35 @@ impl<'t, const NX: usize, const NY: usize, S: SwingUp<NX, NY>> Firmware<'t, NX, 
         command: Option<&Command>,
         cycles: u32,
     ) -> (Option<Telemetry<NX, NY>>, Option<Reply>) {
+        let telemetry = self.report(cycles);
+        self.predict();
+        (telemetry, self.complete(command))
+    }
+
+    /// The first part of [`finish`](Self::finish): telemetry, if it is due.
+    pub fn report(&mut self, cycles: u32) -> Option<Telemetry<NX, NY>> {
         self.cycles = cycles;
         self.statistics.ticks = self.statistics.ticks.wrapping_add(1);
         self.statistics.worst_cycles = self.statistics.worst_cycles.max(cycles);
-        let telemetry = self.telemetry_is_due().then(|| self.telemetry());
-        if self.supervisor.state().drives() {
-            match self.supervisor.state() {
-                State::Raising | State::Lowering if S::IS_POSSIBLE => self.predict_motion(),
-                _ => self.predict(),
-            }
-            if let Some(fault) =
+        self.telemetry_is_due().then(|| self.telemetry())
+    }
+
+    /// The second part of [`finish`](Self::finish): the prediction, if the rig is driven.
+    pub fn predict(&mut self) {
+        match self.supervisor.state() {
+            State::Raising | State::Lowering if S::IS_POSSIBLE => self.predict_motion(),
+            state if state.drives() => self.predict_balancing(),
+            _ => {}
+        }
+    }
+
+    /// The last part of [`finish`](Self::finish): checks of link and table, and the reply.
+    pub fn complete(&mut self, command: Option<&Command>) -> Option<Reply> {
+        if self.supervisor.state().drives()
+            && let Some(fault) =
                 self.debounce.check_link(&self.table.limits, command.is_some(), self.setpoint_commanded)
-            {
-                self.trip(fault, None);
-            }
+        {
+            self.trip(fault, None);
         }
         let words = if self.supervisor.state() == State::Armed { WORDS_PER_ARMED_TICK } else { 1 };
         for _ in 0..words {
@@ -359,11 +387,11 @@ impl<'t, const NX: usize, const NY: usize, S: SwingUp<NX, NY>> Firmware<'t, NX, 
         }
         let reply = command.map(|command| Reply { id: command.id, answer: self.answer(command) });
         self.tick = self.tick.wrapping_add(1);
-        (telemetry, reply)
+        reply
     }
 
     /// Predicts the next tick of balancing.
-    fn predict(&mut self) {
+    fn predict_balancing(&mut self) {
         let corrected = self.measured_estimate();
         self.detection.finish_tick(&self.table.thresholds.motor, corrected, self.controller.acting());
         self.controller.predict();
@@ -381,6 +409,8 @@ impl<'t, const NX: usize, const NY: usize, S: SwingUp<NX, NY>> Firmware<'t, NX, 
         positions
     }
 
+    #[cold]
+    #[inline(never)]
     fn trip(&mut self, fault: Fault, sensor: Option<u8>) {
         if self.supervisor.state() != State::Fault && fault.loses_positions() {
             self.calibration.invalidate(&self.table.limits);

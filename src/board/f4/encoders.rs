@@ -13,6 +13,17 @@ const TIMERS: [(*const u32, CounterWidth); 5] = [
     (TIM8::PTR.cast(), Bits16),
 ];
 
+/// The counters in use.
+const COUNTERS: [*const u32; SENSORS] = {
+    let mut counters = [core::ptr::null(); SENSORS];
+    let mut i = 0;
+    while i < SENSORS {
+        counters[i] = TIMERS[i].0.wrapping_byte_add(CNT);
+        i += 1;
+    }
+    counters
+};
+
 /// Widths of the counters in use.
 pub(super) const WIDTHS: [CounterWidth; SENSORS] = {
     assert!(SENSORS <= TIMERS.len(), "this board counts at most five encoders");
@@ -51,10 +62,6 @@ pub(super) fn set_up() {
 
 /// Current readings of the counters in use.
 pub(super) fn raw_counts() -> [u32; SENSORS] {
-    let mut counts = [0; SENSORS];
-    for (count, &(timer, _)) in counts.iter_mut().zip(&TIMERS) {
-        // SAFETY: reading a counter has no side effect.
-        *count = unsafe { timer.byte_add(CNT).read_volatile() };
-    }
-    counts
+    // SAFETY: reading a counter has no side effect.
+    COUNTERS.map(|counter| unsafe { counter.read_volatile() })
 }

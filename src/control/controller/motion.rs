@@ -15,12 +15,12 @@ impl<const NX: usize, const NY: usize> Controller<'_, NX, NY> {
         course: &Course<NX, NY>,
         judge: impl FnOnce(&[i32; NY], &[f32; NY], &mut [f32; NY]),
     ) -> MotorCommand {
-        let Mode::InOrder(observer) = self.mode else {
+        let Mode::Running(observer) = self.mode else {
             self.encoders.update(raw);
             return Self::off();
         };
         let y = self.encoders.measure(raw, &observer.gains.step).data.0[0];
-        let mut e = observer.innovation(|sensor| 2 * sensor, &y, &self.estimate.data.0[0]);
+        let mut e = observer.innovation(&y, &self.estimate.data.0[0]);
         judge(self.encoders.counts(), &y, &mut e);
         self.innovation.data.0[0] = e;
         for (column, e) in course.l.data.0.iter().zip(e) {

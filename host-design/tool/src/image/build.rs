@@ -134,8 +134,10 @@ fn compile(kind: Kind, gains: Option<&Path>, name: &str) -> Result<PathBuf, Imag
     };
     let output = cargo
         .current_dir(&root)
-        .args(["build", "--quiet", "--package", "upright", "--bin", "upright-image"])
+        .args(["rustc", "--quiet", "--package", "upright", "--bin", "upright-image"])
         .args(["--profile", PROFILE, "--target", TARGET, "--features", &features])
+        // The image alone, not the library: there is the part of a tick that has to be fast.
+        .args(["--", "-C", "opt-level=s"])
         .output()
         .map_err(|source| ImageError::Start(program, source))?;
     if !output.status.success() {

@@ -10,7 +10,7 @@ use object::{Object, ObjectSection};
 use super::elf::{Image, Item};
 
 /// Limit of the flash of an image for a board (bytes).
-pub const FLASH_LIMIT: u32 = 32 * 1024;
+pub const FLASH_LIMIT: u32 = 24 * 1024;
 /// Limit of the static RAM of an image for a board: variables, without the stack (bytes).
 pub const RAM_LIMIT: u32 = 4 * 1024;
 

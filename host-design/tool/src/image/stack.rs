@@ -146,7 +146,7 @@ fn node(image: &Image, index: usize) -> Result<Node, StackError> {
                 }
             }
             // A table of branches, each of which is looked at as well.
-            Effect::JumpTo(register) if before(&effects, place).contains(&Effect::Near(register)) => {}
+            Effect::JumpTo(register) if is_in_a_table(&before(&effects, place), register) => {}
             Effect::Indirect | Effect::JumpTo(_) => {
                 return Err(StackError::Indirect { function: name, address });
             }
@@ -158,6 +158,7 @@ fn node(image: &Image, index: usize) -> Result<Node, StackError> {
             Effect::Aligned(..)
             | Effect::FromFrame(_)
             | Effect::Near(_)
+            | Effect::Indexed(..)
             | Effect::Literal(..)
             | Effect::None => {}
         }
@@ -170,6 +171,16 @@ fn node(image: &Image, index: usize) -> Result<Node, StackError> {
 /// The few instructions before one.
 fn before(effects: &[(u32, Effect)], place: usize) -> Vec<Effect> {
     effects[place.saturating_sub(5)..place].iter().map(|(_, effect)| *effect).collect()
+}
+
+/// Whether a register is the address of a table near the code, or of a place in it, after these instructions.
+fn is_in_a_table(before: &[Effect], register: u8) -> bool {
+    let is_near = |register| before.contains(&Effect::Near(register));
+    let indexed = before.iter().find_map(|effect| match effect {
+        Effect::Indexed(to, from) if *to == register => Some(*from),
+        _ => None,
+    });
+    is_near(register) || indexed.is_some_and(is_near)
 }
 
 /// Largest growth of the stack when its pointer becomes this register's value; none if unknown.

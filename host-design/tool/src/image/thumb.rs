@@ -18,6 +18,8 @@ pub(crate) enum Effect {
     JumpTo(u8),
     /// This register becomes the address of something near, as that of a table of branches.
     Near(u8),
+    /// The first register becomes the second plus another: a place in a table, if the second is its address.
+    Indexed(u8, u8),
     /// This register becomes the word at this address.
     Literal(u8, u32),
     /// The stack pointer becomes this register's value.
@@ -76,6 +78,8 @@ pub(crate) fn decode(address: u32, first: u16, second: u16) -> Effect {
             Effect::FromFrame(register(second >> 8)) // SUB Rd, R7
         }
         0xF20F | 0xF60F | 0xF2AF | 0xF6AF => Effect::Near(register(second >> 8)), // ADR
+        // ADD, of a shifted register
+        _ if first & 0xFFF0 == 0xEB00 => Effect::Indexed(register(second >> 8), register(first)),
         // BFC from bit 0
         0xF36F if second & 0x70C0 == 0 => Effect::Aligned(register(second >> 8), 2 << (second & 31)),
         // LDR to PC; from the stack, it is a return
@@ -160,6 +164,7 @@ mod tests {
         ("blx r3", 0x4798, 0x0000, Effect::Indirect),
         ("mov pc, r3", 0x469F, 0x0000, Effect::JumpTo(3)),
         ("adr.w r6, #8", 0xF20F, 0x0608, Effect::Near(6)),
+        ("add.w r6, r1, r10, lsl #2", 0xEB01, 0x068A, Effect::Indexed(6, 1)),
         ("adr r3, #8", 0xA302, 0x0000, Effect::Near(3)),
         ("ldr r0, [pc, #4]", 0x4801, 0x0000, Effect::Literal(0, 0x0800_1008)),
         ("ldr.w pc, [r3]", 0xF8D3, 0xF000, Effect::Indirect),

@@ -15,7 +15,7 @@ use super::built;
 use crate::failure::Failure;
 
 /// Measures the image of a board: flash and RAM by section and by crate, a bound on its stack, and whether it can
-/// panic; exit status 1 if it takes more than 32 KiB of flash, 4 KiB of static RAM or the stack reserved in memory.x,
+/// panic; exit status 1 if it takes more than 24 KiB of flash, 4 KiB of static RAM or the stack reserved in memory.x,
 /// or can panic or allocate.
 #[derive(Args)]
 #[command(before_help = "\
