@@ -40,6 +40,8 @@ impl Supply {
         let calibration = unsafe { CALIBRATION.read_volatile() };
         supply.volts_per_step =
             reference_v(calibration.into(), measured.unwrap_or_default()) * BOARD.supply_divider / 4096.0;
+        // For the first tick.
+        supply.start_conversion();
         supply
     }
 

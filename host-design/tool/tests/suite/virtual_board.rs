@@ -69,3 +69,20 @@ fn the_flashed_image_raises_and_lowers_the_links_with_the_bits_of_the_host() {
     let error = run_compared(&rig, &other, &scenario, &mut board).unwrap_err().to_string();
     assert!(error.contains("differ"), "{error}");
 }
+
+/// Duty and supply from the first tick on: the converter has measured the supply before it.
+#[test]
+fn a_rig_with_motor_data_has_the_bits_of_the_host_from_the_first_tick_on() {
+    let rig = Rig::from_path(Path::new("../../rigs/single-quanser-ip02.toml")).unwrap();
+    let table = TableValues::of(&rig, &design(&rig).unwrap(), Gains::Sampled).unwrap();
+    let built = build_for(Kind::Board(Board::WeactF405), &rig, &table);
+    let Some(elf) = if_possible(built).unwrap() else { return };
+    let image = Image::from_elf(&std::fs::read(elf).unwrap()).unwrap();
+    let mut scenario = Scenario::at_rest(&rig, Law::Lqr);
+    scenario.start[2] = 0.002;
+    scenario.duration_s = 1.0;
+    let mut board = VirtualBoard::start(&image, &Conditions::f405(1), &table).unwrap();
+    let (recording, [ticks, messages]) = run_compared(&rig, &table, &scenario, &mut board).unwrap();
+    assert!(recording.summary.fall.is_none() && recording.fault.is_none(), "{:?}", recording.summary);
+    assert!(ticks > 1_000 && messages > 100, "{ticks} {messages}");
+}
