@@ -132,14 +132,15 @@ fn compile(kind: Kind, gains: Option<&Path>, name: &str) -> Result<PathBuf, Imag
         }
         None => kind.feature().to_owned(),
     };
-    let output = cargo
+    cargo
         .current_dir(&root)
         .args(["rustc", "--quiet", "--package", "upright", "--bin", "upright-image"])
-        .args(["--profile", PROFILE, "--target", TARGET, "--features", &features])
+        .args(["--profile", PROFILE, "--target", TARGET, "--features", &features]);
+    if let Kind::Board(_) = kind {
         // The image alone, not the library: there is the part of a tick that has to be fast.
-        .args(["--", "-C", "opt-level=s"])
-        .output()
-        .map_err(|source| ImageError::Start(program, source))?;
+        cargo.args(["--", "-C", "opt-level=s"]);
+    }
+    let output = cargo.output().map_err(|source| ImageError::Start(program, source))?;
     if !output.status.success() {
         return Err(ImageError::Compiler(String::from_utf8_lossy(&output.stderr).into_owned()));
     }
