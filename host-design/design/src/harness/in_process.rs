@@ -26,12 +26,17 @@ pub fn with_firmware<R>(
     table: &TableValues,
     action: impl FnOnce(&mut dyn Target) -> R,
 ) -> Result<R, HarnessError> {
-    let (states, sensors) = (table.states(), table.sensors());
     let (mut action, mut result) = (Some(action), None);
-    // Without R in its type, so that the firmware is compiled once per size and not once per size and caller.
-    let mut run = |target: &mut dyn Target| result = action.take().map(|action| action(target));
-    let outcome = with_firmware_size(states, sensors, WithFirmware { table, run: &mut run });
-    outcome.transpose()?.and(result).ok_or_else(|| SimulationError::Size { states, sensors }.into())
+    start(table, &mut |target| result = action.take().map(|action| action(target)))?;
+    let (states, sensors) = (table.states(), table.sensors());
+    result.ok_or_else(|| SimulationError::Size { states, sensors }.into())
+}
+
+/// [`with_firmware`] without a type of the caller's, so that all sizes of the firmware are compiled once, in this crate.
+fn start(table: &TableValues, run: &mut dyn FnMut(&mut dyn Target)) -> Result<(), HarnessError> {
+    let (states, sensors) = (table.states(), table.sensors());
+    with_firmware_size(states, sensors, WithFirmware { table, run })
+        .ok_or(SimulationError::Size { states, sensors })?
 }
 
 /// As [`with_firmware`], with tables of any size that is known when this is compiled: those of a firmware crate.

@@ -56,15 +56,24 @@ pub fn integrate(
     duration: f64,
     tolerance: Tolerance,
 ) -> Result<Vec<f64>, ReferenceError> {
+    integrate_problem(&Problem { plant, force: &force, disturbances }, start, duration, tolerance)
+}
+
+/// [`integrate`] without a type of the caller's, so that it is compiled once, with this crate's optimisation.
+fn integrate_problem(
+    problem: &Problem<'_>,
+    start: &[f64],
+    duration: f64,
+    tolerance: Tolerance,
+) -> Result<Vec<f64>, ReferenceError> {
     let positive = |x: f64| x.is_finite() && x > 0.0;
     if ![duration, tolerance.relative, tolerance.absolute].into_iter().all(positive) {
         return Err(ReferenceError::BadRequest);
     }
-    assert_eq!(start.len(), plant.states(), "length of the state");
-    let problem = Problem { plant, force, disturbances };
+    assert_eq!(start.len(), problem.plant.states(), "length of the state");
     let mut method =
         ExplicitRungeKutta::dop853().rtol(tolerance.relative).atol(tolerance.absolute).max_steps(MOST_STEPS);
-    method.init(&problem, 0.0, duration, &start.to_vec()).map_err(|error| cause(0.0, &error))?;
+    method.init(problem, 0.0, duration, &start.to_vec()).map_err(|error| cause(0.0, &error))?;
     // Stepped by hand, for two reasons. The run must end on a step of the integrator, not on an interpolated value. It
     // must stop early if a NaN in force or state makes the integrator reject every step.
     loop {
@@ -75,7 +84,7 @@ pub fn integrate(
         if method.h() > remaining {
             method.set_h(remaining);
         }
-        method.step(&problem).map_err(|error| cause(method.t(), &error))?;
+        method.step(problem).map_err(|error| cause(method.t(), &error))?;
         if *method.status() == Status::RejectedStep && method.h() < f64::EPSILON * duration {
             return Err(stopped(method.t(), "the step became too small"));
         }
@@ -98,13 +107,13 @@ fn stopped(time_s: f64, cause: &'static str) -> ReferenceError {
     ReferenceError::Stopped { time_s, cause }
 }
 
-struct Problem<'a, F> {
+struct Problem<'a> {
     plant: &'a dyn Plant,
-    force: F,
+    force: &'a dyn Fn(f64, &[f64]) -> f64,
     disturbances: &'a [f64],
 }
 
-impl<F: Fn(f64, &[f64]) -> f64> ODE<f64, Vec<f64>> for Problem<'_, F> {
+impl ODE<f64, Vec<f64>> for Problem<'_> {
     fn diff(&self, t: f64, state: &Vec<f64>, rate: &mut Vec<f64>) {
         self.plant.rate(state, (self.force)(t, state), self.disturbances, rate);
     }

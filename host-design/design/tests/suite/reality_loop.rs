@@ -2,20 +2,20 @@
 
 use std::path::Path;
 
+use crate::published::{certified, table};
 use upright::table::Law;
-use upright_design::design::design;
 use upright_design::harness::{record, with_firmware};
 use upright_design::numerics::{Matrix, solve};
 use upright_design::plant::{ChainParameters, Equilibrium, absolute_angles, linearise};
 use upright_design::rig::{PerJoint, PlantDescription, Reality, Rig, SECTIONS};
 use upright_design::simulate::{Scenario, run};
-use upright_design::table::{Gains, TableValues};
+use upright_design::table::TableValues;
 use upright_design::verify::{IMPERFECTIONS, ImperfectionSettings, imperfections};
 
 fn load(name: &str) -> (Rig, TableValues) {
     let file = Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("../../rigs/{name}.toml"));
     let rig = Rig::from_path(&file).unwrap();
-    let table = TableValues::of(&rig, &design(&rig).unwrap(), Gains::Sampled).unwrap();
+    let table = table(&rig);
     (rig, table)
 }
 
@@ -98,12 +98,12 @@ fn response(a: &Matrix<f64>, torque: &Matrix<f64>, w: f64) -> [f64; 2] {
 fn predicted_swing(rig: &Rig, law: Law, friction: f64) -> f64 {
     let PlantDescription::Chain(chain) = &rig.plant else { panic!("a chain") };
     let model = linearise(&ChainParameters::<f64>::of(chain), Equilibrium::Upright).unwrap();
-    let gains = design(rig).unwrap().double.sampled;
+    let gains = &certified(rig).double.sampled;
     let k = match law {
-        Law::Lqr => gains.lqr,
-        Law::PolePlacement => gains.pole_placement,
+        Law::Lqr => &gains.lqr,
+        Law::PolePlacement => &gains.pole_placement,
     };
-    let closed = &model.a - &(&model.b * &k.unwrap().k);
+    let closed = &model.a - &(&model.b * &k.as_ref().unwrap().k);
     let at = |w: f64| response(&closed, &model.torque_inputs, w);
     let step = 1.0005f64;
     let mut w = 0.3;
@@ -119,7 +119,7 @@ fn bare_single() -> (Rig, TableValues) {
     let (mut rig, _) = load("single-quanser-ip02");
     rig.actuator.motor = None;
     rig.kalman = None;
-    let table = TableValues::of(&rig, &design(&rig).unwrap(), Gains::Sampled).unwrap();
+    let table = table(&rig);
     (rig, table)
 }
 
@@ -157,13 +157,13 @@ fn resting_position(rig: &Rig, table: &TableValues) -> f64 {
 /// the force is zero. The observer, which knows only the measurement y, settles at
 /// `x̂ = (I - (I - L C) Ad)⁻¹ L y`, and `K x̂ = 0` gives the position in y.
 fn rest_with_wrong_zero(rig: &Rig, error: f64) -> f64 {
-    let design = design(rig).unwrap().double;
-    let (l, k) = (design.kalman.unwrap().l_filter, design.sampled.lqr.unwrap().k);
+    let design = &certified(rig).double;
+    let (l, k) = (&design.kalman.as_ref().unwrap().l_filter, &design.sampled.lqr.as_ref().unwrap().k);
     let s = l.rows();
     let c = Matrix::from_fn(l.cols(), s, |i, j| if j == 2 * i { 1.0 } else { 0.0 });
     let eye = Matrix::identity(s);
-    let settled = solve(&(&eye - &(&(&eye - &(&l * &c)) * &design.ad)), &l).unwrap();
-    let of = &k * &settled;
+    let settled = solve(&(&eye - &(&(&eye - &(l * &c)) * &design.ad)), l).unwrap();
+    let of = k * &settled;
     -of[(0, 1)] / of[(0, 0)] * error
 }
 
@@ -171,7 +171,7 @@ fn rest_with_wrong_zero(rig: &Rig, error: f64) -> f64 {
 fn a_wrong_zero_moves_the_cart_by_what_the_gains_say() {
     let (mut rig, _) = load("single-quanser-ip02");
     rig.actuator.motor = None;
-    let table = TableValues::of(&rig, &design(&rig).unwrap(), Gains::Sampled).unwrap();
+    let table = table(&rig);
     let wrong_zero = rest_with_wrong_zero(&rig, 0.005);
     for (zero, amplitude, phase) in [(0.005, 0.0, 0.0), (0.0, 0.0025, core::f64::consts::FRAC_PI_2)] {
         let mut real = rig.clone();
@@ -193,7 +193,7 @@ fn a_wrong_zero_moves_the_cart_by_what_the_gains_say() {
 #[test]
 fn a_tilted_rail_moves_the_cart_by_what_the_gains_say() {
     let (mut rig, table) = bare_single();
-    let k = design(&rig).unwrap().double.sampled.lqr.unwrap().k;
+    let k = &certified(&rig).double.sampled.lqr.as_ref().unwrap().k;
     rig.reality.sensors.rail_tilt_rad = 0.003;
     // At rest the force carries cart (1.0731 kg) and link (0.230 kg): M g sin(tilt) = -k_x x.
     let downhill = -(1.0731 + 0.230) * 9.81 * 0.003 / k[(0, 0)];

@@ -6,7 +6,8 @@ use upright_design::rig::Rig;
 use upright_design::simulate::Scenario;
 use upright_design::verify::Disturbance;
 
-use crate::supervised::{ALL_RIGS, balancing, cause, rejected, rig, table, tick};
+use crate::published::table;
+use crate::supervised::{ALL_RIGS, balancing, cause, rejected, rig, tick};
 use upright::protocol::message::Request;
 use upright::supervision::fault::Cause;
 use upright::table::Law;

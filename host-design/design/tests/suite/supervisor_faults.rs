@@ -1,6 +1,7 @@
 //! Every fault of encoders and motor turns the motor off before a link leaves its limit. Anything else does not.
 
-use crate::supervised::{ALL_RIGS, balancing, cause, rejected, rig, table};
+use crate::published::table;
+use crate::supervised::{ALL_RIGS, balancing, cause, rejected, rig};
 use upright::board::Output;
 use upright::control::actuator::Drive;
 use upright::protocol::message::Request;

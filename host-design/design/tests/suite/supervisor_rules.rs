@@ -1,6 +1,7 @@
 //! The rules of arming, clearing faults and commanding, tested on the whole firmware.
 
-use crate::supervised::{balancing as balance, rig, table};
+use crate::published::table;
+use crate::supervised::{balancing as balance, rig};
 use proptest::prelude::*;
 use upright::board::{Contacts, Output};
 use upright::control::controller::Rejected;

@@ -1,6 +1,7 @@
 //! The whole firmware, from power-up to balancing.
 
-use crate::supervised::{ALL_RIGS, balancing, cause, rejected, rig, table, tick};
+use crate::published::table;
+use crate::supervised::{ALL_RIGS, balancing, cause, rejected, rig, tick};
 use upright::supervision::supervisor::State;
 use upright::table::Law;
 use upright_design::harness::{Tick, record, with_firmware};

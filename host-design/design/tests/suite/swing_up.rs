@@ -2,11 +2,10 @@
 
 use std::path::{Path, PathBuf};
 
-use upright_design::design::design;
+use crate::published::{certified, table};
 use upright_design::numerics::Matrix;
 use upright_design::rig::{PlantDescription, Rig};
 use upright_design::swing_up::{Script, Stored, SwingUp, SwingUpError, motions, with_motions};
-use upright_design::table::{Gains, TableValues};
 
 const RIGS: [&str; 4] =
     ["single-quanser-ip02", "double-quanser-dbpen", "triple-glueck-eder-kugi", "quadruple-paper"];
@@ -21,7 +20,7 @@ fn rig_and_stored(rig: &str) -> (Rig, Stored) {
 
 /// Whether the firmware with these motions gets through a demonstration.
 fn arrives(rig: &Rig, motions: &SwingUp, seed: u64, is_wrong: bool) -> bool {
-    let table = TableValues::of(rig, &design(rig).unwrap(), Gains::Sampled).unwrap();
+    let table = table(rig);
     let table = with_motions(rig, table, motions).unwrap();
     Script::of(rig, &table, seed, is_wrong).unwrap().run(&table).unwrap().arrived
 }
@@ -55,7 +54,7 @@ fn the_last_gain_is_the_gain_that_balances() {
     for name in RIGS {
         let (rig, stored) = rig_and_stored(name);
         let raise = motions(&rig, &stored).unwrap().raise;
-        let balancing = design(&rig).unwrap().double.sampled.lqr.unwrap().k;
+        let balancing = certified(&rig).double.sampled.lqr.as_ref().unwrap().k.clone();
         let last = &raise.k[raise.steps() - 1];
         let apart = (last - &balancing).largest_entry() / balancing.largest_entry();
         assert!(apart < 0.02, "{name}: {apart}");

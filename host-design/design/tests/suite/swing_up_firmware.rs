@@ -2,18 +2,18 @@
 
 use std::path::{Path, PathBuf};
 
+use crate::published::table;
 use upright::control::actuator::Drive;
 use upright::protocol::message::{Answer, Request};
 use upright::supervision::fault::Fault;
 use upright::supervision::inhibits::Inhibits;
 use upright::table::TableError;
-use upright_design::design::design;
 use upright_design::harness::{Harness, HarnessError, Pins, Recording, record, with_firmware};
 use upright_design::plant::absolute_angles;
 use upright_design::rig::Rig;
 use upright_design::simulate::Scenario;
 use upright_design::swing_up::{Stored, hangs, motions, up_and_down, with_motions};
-use upright_design::table::{Gains, TableValues};
+use upright_design::table::TableValues;
 
 const RIGS: [&str; 4] =
     ["single-quanser-ip02", "double-quanser-dbpen", "triple-glueck-eder-kugi", "quadruple-paper"];
@@ -25,7 +25,7 @@ fn file(rig: &str) -> PathBuf {
 /// The rig and its table with the stored motions.
 fn rig_and_table(name: &str) -> (Rig, TableValues) {
     let rig = Rig::from_path(&file(name)).unwrap();
-    let table = TableValues::of(&rig, &design(&rig).unwrap(), Gains::Sampled).unwrap();
+    let table = table(&rig);
     let motions = motions(&rig, &Stored::beside(&file(name)).unwrap()).unwrap();
     let table = with_motions(&rig, table, &motions).unwrap();
     (rig, table)

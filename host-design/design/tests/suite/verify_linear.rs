@@ -2,9 +2,10 @@
 
 use std::path::Path;
 
+use crate::published::{certified, table};
 use rand::{RngExt, SeedableRng};
 use upright::table::Law;
-use upright_design::design::{Certified, design};
+use upright_design::design::Certified;
 use upright_design::numerics::{Matrix, spectral_radius};
 use upright_design::rig::Rig;
 use upright_design::simulate::{Scenario, simulate};
@@ -43,15 +44,13 @@ fn model_rig(delay: &str, further: &str) -> Rig {
     Rig::from_toml(&text, Path::new("model.toml")).unwrap_or_else(|error| panic!("{error}"))
 }
 
-fn designed(rig: &Rig) -> (Certified, TableValues) {
-    let certified = design(rig).unwrap();
-    let table = TableValues::of(rig, &certified, Gains::Sampled).unwrap();
-    (certified, table)
+fn designed(rig: &Rig) -> (&'static Certified, TableValues) {
+    (certified(rig), table(rig))
 }
 
 fn report(rig: &Rig) -> Vec<LinearReport> {
     let (certified, table) = designed(rig);
-    linear(rig, &certified, &table).unwrap()
+    linear(rig, certified, &table).unwrap()
 }
 
 fn law(report: &LinearReport) -> Law {
@@ -98,7 +97,7 @@ fn the_model_of_the_loop_moves_as_the_firmware_does() {
         let rig = model_rig(delay, further);
         let (certified, table) = designed(&rig);
         for law in [Law::Lqr, Law::PolePlacement] {
-            let model = LoopModel::<f64>::as_it_runs(&certified, &table, law).unwrap();
+            let model = LoopModel::<f64>::as_it_runs(certified, &table, law).unwrap();
             let mut scenario = Scenario::at_rest(&rig, law);
             // The links' counters have 16 bits: with a lean at the start, they would wrap at once.
             scenario.start = vec![0.004, 0.0, 0.0, 0.0];
@@ -116,7 +115,7 @@ fn the_model_of_the_loop_moves_as_the_firmware_does() {
             }
             // Only the rounding of the encoders is left, with the RMS that the noise model predicts (f32 is finer).
             // A wrong tick of delay or a lost term would be a hundred times larger.
-            let rounding = encoder_force_n(&rig, &certified, &table, law);
+            let rounding = encoder_force_n(&rig, certified, &table, law);
             assert!(
                 worst < 8.0 * rounding,
                 "{law:?} {delay} {further}: {worst:e}, rounding {rounding:e} rms"
@@ -131,8 +130,8 @@ fn the_model_of_the_loop_moves_as_the_firmware_does() {
 fn the_loop_is_on_the_edge_at_its_margins_and_nowhere_before() {
     for rig in [rig("quadruple-paper.toml"), rig("single-quanser-ip02.toml"), model_rig("1", "")] {
         let (certified, table) = designed(&rig);
-        for report in linear(&rig, &certified, &table).unwrap() {
-            let model = LoopModel::<f64>::as_it_runs(&certified, &table, law(&report)).unwrap();
+        for report in linear(&rig, certified, &table).unwrap() {
+            let model = LoopModel::<f64>::as_it_runs(certified, &table, law(&report)).unwrap();
             let margins = report.margins.unwrap();
             let edge = |name: &str, at: &dyn Fn(f64) -> f64, margin: f64, beyond: f64| {
                 let name = format!("{} {} {name} {margin}", rig.name, report.law);
@@ -166,9 +165,9 @@ fn the_loop_is_on_the_edge_at_its_margins_and_nowhere_before() {
 fn the_largest_disk_touches_the_edge() {
     let rig = rig("quadruple-paper.toml");
     let (certified, table) = designed(&rig);
-    let report = &linear(&rig, &certified, &table).unwrap()[0];
+    let report = &linear(&rig, certified, &table).unwrap()[0];
     let margins = report.margins.clone().unwrap();
-    let model = LoopModel::<f64>::as_it_runs(&certified, &table, Law::Lqr).unwrap();
+    let model = LoopModel::<f64>::as_it_runs(certified, &table, Law::Lqr).unwrap();
     // The factor (1 + δ/2) / (1 - δ/2) with δ = -2 / (S - T) at the worst frequency puts a pole on the circle.
     let response = model.response(margins.disk_margin_rad_per_s * rig.tick.period_s).unwrap();
     let half = (response.s - response.t).inv();
@@ -198,21 +197,21 @@ fn continuous_gains_held_for_three_milliseconds_are_reported_unstable() {
     rig.tick.period_s = 0.003;
     rig.kalman = None;
     rig.pole_placement = None;
-    let certified = design(&rig).unwrap();
-    let held = TableValues::of(&rig, &certified, Gains::Continuous).unwrap();
-    let report = &linear(&rig, &certified, &held).unwrap()[0];
+    let certified = certified(&rig);
+    let held = TableValues::of(&rig, certified, Gains::Continuous).unwrap();
+    let report = &linear(&rig, certified, &held).unwrap()[0];
     assert!(!report.stable && (report.spectral_radius - 1.08).abs() < 0.005, "{}", report.spectral_radius);
     assert!(report.margins.is_none() && report.tick.is_none() && report.certificates.is_empty());
     // With the gains designed for that tick, the loop is stable.
-    let sampled = TableValues::of(&rig, &certified, Gains::Sampled).unwrap();
-    assert!(linear(&rig, &certified, &sampled).unwrap()[0].stable);
+    let sampled = TableValues::of(&rig, certified, Gains::Sampled).unwrap();
+    assert!(linear(&rig, certified, &sampled).unwrap()[0].stable);
 }
 
 #[test]
 fn every_gain_is_correctly_rounded_and_a_changed_one_is_noticed() {
     let rig = rig("single-quanser-ip02.toml");
     let (certified, mut table) = designed(&rig);
-    for report in linear(&rig, &certified, &table).unwrap() {
+    for report in linear(&rig, certified, &table).unwrap() {
         let rounding = report.rounding.unwrap();
         assert!(rounding.gain_ulp <= 0.5 && rounding.observer_ulp.unwrap() <= 0.5, "{rounding:?}");
         assert!(rounding.spectral_radius_change.abs() < 1e-6);
@@ -220,7 +219,7 @@ fn every_gain_is_correctly_rounded_and_a_changed_one_is_noticed() {
     }
     let observer = table.observer.as_mut().unwrap();
     observer.l[(1, 0)] = observer.l[(1, 0)].next_up();
-    let ulp = linear(&rig, &certified, &table).unwrap()[0].rounding.clone().unwrap().observer_ulp.unwrap();
+    let ulp = linear(&rig, certified, &table).unwrap()[0].rounding.clone().unwrap().observer_ulp.unwrap();
     assert!(ulp > 0.5 && ulp < 1.6, "{ulp}");
 }
 
@@ -239,8 +238,8 @@ fn certificates_show_small_residuals() {
 fn the_predicted_rms_is_that_of_a_long_run() {
     let rig = rig("single-quanser-ip02.toml");
     let (certified, table) = designed(&rig);
-    let report = &linear(&rig, &certified, &table).unwrap()[0];
-    let model = LoopModel::<f64>::as_it_runs(&certified, &table, Law::Lqr).unwrap();
+    let report = &linear(&rig, certified, &table).unwrap()[0];
+    let model = LoopModel::<f64>::as_it_runs(certified, &table, Law::Lqr).unwrap();
     let shares = report.noise.as_ref().unwrap();
     let of_encoders = |value: &dyn Fn(&upright_design::verify::NoiseShare) -> f64| {
         shares.iter().filter(|s| s.source.starts_with("encoder")).map(|s| value(s).powi(2)).sum::<f64>()

@@ -4,11 +4,11 @@ use std::path::Path;
 use std::sync::LazyLock;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
+use crate::published::table;
 use upright::table::Law;
-use upright_design::design::design;
 use upright_design::rig::{PlantDescription, Rig};
 use upright_design::simulate::run;
-use upright_design::table::{Gains, TableValues};
+use upright_design::table::TableValues;
 use upright_design::verify::{
     AttractionSettings, Axis, CornerSettings, Disturbance, EncoderSettings, Horizon, Mass, Spread,
     attraction, attraction_map, coarser, coarsest_encoder, corners, endurance, largest_percent,
@@ -22,10 +22,6 @@ const PAPERS: Disturbance = Disturbance { force_n: 0.1, torque_n_m: 3.16e-5 };
 fn rig(name: &str) -> Rig {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../rigs");
     Rig::from_path(&folder.join(name)).unwrap()
-}
-
-fn table(rig: &Rig) -> TableValues {
-    TableValues::of(rig, &design(rig).unwrap(), Gains::Sampled).unwrap()
 }
 
 fn with_force_limit(mut rig: Rig, limit_n: f64) -> Rig {

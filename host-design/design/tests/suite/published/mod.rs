@@ -9,6 +9,7 @@ use std::sync::{Mutex, OnceLock};
 
 use upright_design::design::{Certified, design};
 use upright_design::rig::Rig;
+use upright_design::table::{Gains, TableValues};
 
 /// Path of the rig file `name`.
 pub(crate) fn rig_path(name: &str) -> PathBuf {
@@ -20,11 +21,21 @@ pub(crate) fn rig(name: &str) -> Rig {
     Rig::from_path(&rig_path(name)).unwrap()
 }
 
-/// The design of the rig in file `name`, made once for all tests.
-pub(crate) fn designed(name: &'static str) -> &'static Certified {
-    static DESIGNS: Mutex<BTreeMap<&str, &OnceLock<Certified>>> = Mutex::new(BTreeMap::new());
-    let place = *DESIGNS.lock().unwrap().entry(name).or_insert_with(|| Box::leak(Box::default()));
-    place.get_or_init(|| design(&rig(name)).unwrap())
+/// The design of the rig in file `name`.
+pub(crate) fn designed(name: &str) -> &'static Certified {
+    certified(&rig(name))
+}
+
+/// The design of `rig`, made once for all tests. Every value of a rig is in its hash.
+pub(crate) fn certified(rig: &Rig) -> &'static Certified {
+    static DESIGNS: Mutex<BTreeMap<u64, &OnceLock<Certified>>> = Mutex::new(BTreeMap::new());
+    let place = *DESIGNS.lock().unwrap().entry(rig.hash()).or_insert_with(|| Box::leak(Box::default()));
+    place.get_or_init(|| design(rig).unwrap())
+}
+
+/// The gain table of `rig`.
+pub(crate) fn table(rig: &Rig) -> TableValues {
+    TableValues::of(rig, certified(rig), Gains::Sampled).unwrap()
 }
 
 /// A rig from text.

@@ -3,21 +3,16 @@
 use upright::board::Output;
 use upright::protocol::message::{Answer, Request};
 use upright::supervision::fault::Cause;
-use upright_design::design::design;
 use upright_design::harness::{Harness, HarnessError, with_firmware};
 use upright_design::rig::Rig;
 use upright_design::simulate::Scenario;
-use upright_design::table::{Gains, TableValues};
+use upright_design::table::TableValues;
 
 pub(crate) const ALL_RIGS: [&str; 4] =
     ["single-quanser-ip02", "double-quanser-dbpen", "triple-glueck-eder-kugi", "quadruple-paper"];
 
 pub(crate) fn rig(name: &str) -> Rig {
     Rig::from_path(format!("{}/../../rigs/{name}.toml", env!("CARGO_MANIFEST_DIR")).as_ref()).unwrap()
-}
-
-pub(crate) fn table(rig: &Rig) -> TableValues {
-    TableValues::of(rig, &design(rig).unwrap(), Gains::Sampled).unwrap()
 }
 
 /// Brings the rig from hanging to balance at the start of `scenario`, releases it, and continues with `test` after the
