@@ -16,6 +16,7 @@
 //! | [`identify`] | logs of a machine that is shaken | its parameters, with deviations |
 //! | [`swing_up`] | rig file | motions from hanging to upright and back, with their gains |
 //! | [`verify`] | table and requirements | the trust report |
+//! | [`robust`] | rig file and tolerances | weights, poles and noise that stand them |
 //!
 //! The control law itself is not here: a simulation runs the firmware's own controller from the crate `upright`.
 
@@ -29,6 +30,7 @@ pub mod numerics;
 pub mod plant;
 pub mod reality;
 pub mod rig;
+pub mod robust;
 pub mod simulate;
 pub mod swing_up;
 pub mod table;

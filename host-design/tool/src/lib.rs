@@ -12,7 +12,6 @@
 //! | [`compare`] | rigs and sweeps side by side |
 //! | [`reproduce`] | the paper's results beside ours |
 //! | [`identified`] | what was identified, as text, as JSON and as a rig file |
-//! | [`rig_text`] | changes of a rig file's text |
 //! | [`twin`] | the live twin: a page on which the rig moves |
 //! | [`project`] | finds the checkout that images are built from |
 //!
@@ -38,5 +37,4 @@ pub mod monitor;
 pub mod project;
 pub mod report;
 pub mod reproduce;
-pub mod rig_text;
 pub mod twin;

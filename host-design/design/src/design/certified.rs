@@ -2,9 +2,10 @@
 
 use super::error::DesignError;
 use super::loops::DesignPoles;
-use super::synthesis::Design;
+use super::synthesis::{Design, Laws};
 use crate::numerics::{Wide, with_precision};
 use crate::rig::Rig;
+use upright::table::Law;
 
 /// A design whose numbers all round to the same values at two precisions.
 ///
@@ -20,6 +21,28 @@ pub struct Certified {
     pub poles: DesignPoles,
     /// The two precisions that agreed (bits).
     pub bits: [usize; 2],
+}
+
+impl Certified {
+    /// This design with the law `law` of `other`, a design for the same plant: every number stays a certified one.
+    pub(crate) fn with_law_of(mut self, law: Law, other: &Self) -> Self {
+        fn exchange<T: Clone>(laws: &mut Laws<T>, law: Law, other: &Laws<T>) {
+            match law {
+                Law::Lqr => (laws.lqr, laws.integral) = (other.lqr.clone(), other.integral.clone()),
+                Law::PolePlacement => laws.pole_placement = other.pole_placement.clone(),
+            }
+        }
+        exchange(&mut self.double.continuous, law, &other.double.continuous);
+        exchange(&mut self.double.sampled, law, &other.double.sampled);
+        exchange(&mut self.single.continuous, law, &other.single.continuous);
+        exchange(&mut self.single.sampled, law, &other.single.sampled);
+        self.poles.continuous[law] = other.poles.continuous[law].clone();
+        self.poles.sampled[law] = other.poles.sampled[law].clone();
+        if law == Law::Lqr {
+            self.poles.integral = other.poles.integral.clone();
+        }
+        self
+    }
 }
 
 type Attempt = Result<Certified, DesignError>;

@@ -5,7 +5,7 @@ use super::error::DesignError;
 use super::riccati::{Cost, dare};
 use super::zero_order_hold::integrated_quadratic;
 use crate::numerics::{Complex, Matrix, Real, solve_right};
-use crate::rig::{self, Sensor};
+use crate::rig::{self, PlantDescription, Rig, Sensor};
 
 /// Steady-state gains of the observer.
 #[doc(alias = "lqe")]
@@ -25,7 +25,7 @@ pub struct Kalman<T> {
 
 /// Kalman gains and the relative residual of their Riccati equation. Process noise has the intensities in `noise`,
 /// enters through the columns of `inputs` and is integrated over one tick (Van Loan). Each sensor has a rounding error
-/// of variance step²/12.
+/// of the variance that [`rounding_variances`] gives.
 ///
 /// The error covariance P of the prediction solves the sampled Riccati equation of (Adᵀ, Cᵀ);
 /// `L = P Cᵀ (C P Cᵀ + R)⁻¹` (Anderson & Moore, *Optimal Filtering*, chapter 4).
@@ -34,7 +34,7 @@ pub(super) fn kalman<R: Real>(
     ad: &Matrix<R>,
     inputs: &Matrix<R>,
     noise: &rig::Kalman,
-    sensors: &[Sensor],
+    rig: &Rig,
     period: &R,
 ) -> Result<(Kalman<R>, R), DesignError> {
     let intensities: Vec<R> = [noise.force_noise_n2_s]
@@ -45,16 +45,15 @@ pub(super) fn kalman<R: Real>(
         .collect();
     let spread = &(inputs * &Matrix::from_diagonal(&intensities)) * &inputs.transpose();
     let q = integrated_quadratic(&a.transpose(), &spread, period);
+    let sensors = rig.sensors();
     let steps: Vec<R> = sensors.iter().map(Sensor::step).collect();
-    let twelve = R::from_f64(12.0);
-    let variances: Vec<R> = steps.iter().map(|step| step.clone() * step / &twelve).collect();
     let c =
         Matrix::from_fn(
             sensors.len(),
             a.cols(),
             |i, j| if sensors[i].state == j { R::one() } else { R::zero() },
         );
-    let r = Matrix::from_diagonal(&variances);
+    let r = Matrix::from_diagonal(&rounding_variances(rig, &steps));
     let (a_t, c_t) = (ad.transpose(), c.transpose());
     let solution = dare(&a_t, &c_t, &Cost::new(q, r.clone())).map_err(|_| why_no_kalman(&a_t, &c_t))?;
     let p_c = &solution.x * &c_t;
@@ -67,6 +66,24 @@ pub(super) fn kalman<R: Real>(
         innovation_variances: Matrix::from_fn(s.rows(), 1, |i, _| s[(i, i)].clone()),
     };
     Ok((gains, solution.residual))
+}
+
+/// Shortest tick (s) in which the counts of a chain's encoder round anew.
+const WHITE_S: f64 = 1e-3;
+
+/// Variance of each sensor's rounding error, `step²/12`.
+///
+/// The filter takes the errors of successive ticks as independent. In ticks below 1 ms a link near rest often keeps its
+/// count, and with it the error: measured twice as often, it says no more. So the variance of a chain's encoders is larger
+/// by 1 ms over the tick, which keeps variance times tick.
+pub(super) fn rounding_variances<R: Real>(rig: &Rig, steps: &[R]) -> Vec<R> {
+    let twelve = R::from_f64(12.0);
+    let is_correlated = matches!(rig.plant, PlantDescription::Chain(_)) && rig.tick.period_s < WHITE_S;
+    let variance = |step: &R| {
+        let white = step.clone() * step / &twelve;
+        if is_correlated { white * &R::from_f64(WHITE_S) / &R::from_f64(rig.tick.period_s) } else { white }
+    };
+    steps.iter().map(variance).collect()
 }
 
 fn why_no_kalman<R: Real>(a_t: &Matrix<R>, c_t: &Matrix<R>) -> DesignError {

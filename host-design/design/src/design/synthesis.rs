@@ -134,7 +134,7 @@ impl<R: Real> Design<R> {
         }
         let kalman = rig.kalman.as_ref().map(|noise| {
             let inputs = noise_inputs(rig, &b, &torque_inputs);
-            let (gains, residual) = kalman(&a, &ad, &inputs, noise, &rig.sensors(), &period)?;
+            let (gains, residual) = kalman(&a, &ad, &inputs, noise, rig, &period)?;
             residuals.push((OBSERVER.to_owned(), residual.to_f64()));
             Ok(gains)
         });

@@ -1,6 +1,7 @@
 //! Thresholds of the innovation that indicate a faulty encoder or motor, from the Kalman filter's covariance.
 
 use super::Design;
+use super::kalman::rounding_variances;
 use crate::rig::{PlantDescription, Rig};
 
 /// Share of the motor's force that may be missing.
@@ -56,8 +57,9 @@ pub fn detection_thresholds(rig: &Rig, design: &Design<f64>) -> Option<Detection
     let g = deviations(1.0 / tests);
     let keep = f64::from(1.0 - 1.0 / upright::supervision::detection::MEMORY);
     let innovation = variances.iter().zip(steps).map(|(s, step)| g * s.sqrt() + 0.5 * step).collect();
-    let frozen = variances.iter().zip(steps).map(|(s, step)| {
-        let corrected = (s - step * step / 12.0).max(0.0) / (1.0 - keep * keep);
+    let rounding = rounding_variances(rig, steps);
+    let frozen = variances.iter().zip(steps).zip(rounding).map(|((s, step), r)| {
+        let corrected = (s - r).max(0.0) / (1.0 - keep * keep);
         step + g * corrected.sqrt()
     });
     let motor = matches!(rig.plant, PlantDescription::Chain(_)).then(|| {

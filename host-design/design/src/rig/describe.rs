@@ -13,6 +13,7 @@ use super::sections::chain::{CART, GRAVITY, LINK};
 use super::sections::integral::INTEGRAL;
 use super::sections::limits::LIMITS;
 use super::sections::reality::REALITY;
+use super::sections::robust::ROBUST;
 use super::sections::swing_up::SWING_UP;
 use super::sections::tick::TICK;
 use super::sections::verify::VERIFY;
@@ -41,6 +42,9 @@ impl Rig {
         page.section(&LIMITS, &self.limits);
         page.section(&VERIFY, &self.verify);
         page.reality(&self.reality);
+        if let Some(tolerances) = &self.robust {
+            page.section(&ROBUST, tolerances);
+        }
         if let Some(rules) = &self.swing_up {
             page.section(&SWING_UP, rules);
         }

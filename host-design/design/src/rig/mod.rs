@@ -7,6 +7,7 @@
 pub mod defaults;
 mod describe;
 mod document;
+mod edit;
 mod error;
 mod key;
 mod load;
@@ -17,6 +18,7 @@ mod sections;
 mod sensors;
 
 pub use document::key_table;
+pub use edit::{Edited, with_value};
 pub use error::{MAX_BYTES, Place, RigError, RigErrorKind};
 pub use key::{Absent, Key, PerJoint, Section, unit_in_names};
 pub use rule::Rule;
@@ -29,6 +31,7 @@ pub use sections::lqr::Lqr;
 pub use sections::model::LinearPlant;
 pub use sections::pole_placement::PolePlacement;
 pub use sections::reality::{DriveTrain, DriverFaults, DryFriction, ParameterErrors, Reality, SensorErrors};
+pub use sections::robust::Tolerances;
 pub use sections::swing_up::SwingUpRules;
 pub use sections::tick::Tick;
 pub use sections::verify::Requirements;
@@ -66,6 +69,9 @@ pub struct Rig {
     /// How the simulated machine differs from the model.
     #[serde(skip)]
     pub reality: Reality,
+    /// The tolerances that `upright robust` chooses gains for, if stated.
+    #[serde(skip)]
+    pub robust: Option<Tolerances>,
     /// What `upright swing-up` plans within, if the rig is to raise itself.
     #[serde(skip)]
     pub swing_up: Option<SwingUpRules>,

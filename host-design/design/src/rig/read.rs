@@ -4,8 +4,8 @@ use super::error::RigError;
 use super::key::{Keys, Section};
 use super::node::{Node, Source, Table};
 use super::sections::{
-    SECTIONS, TOP, actuator, chain, integral, kalman, limits, lqr, model, pole_placement, reality, swing_up,
-    tick, verify,
+    SECTIONS, TOP, actuator, chain, integral, kalman, limits, lqr, model, pole_placement, reality, robust,
+    swing_up, tick, verify,
 };
 use super::{Actuator, Integral, Limits, PlantDescription, Reality, Requirements, Rig, Tick};
 
@@ -24,6 +24,9 @@ pub(super) fn rig(source: &Source<'_>) -> Result<Rig, RigError> {
     let rig = Rig {
         name,
         reality: given(&reality::REALITY).map_or(Ok(Reality::default()), reality)?,
+        robust: given(&robust::ROBUST)
+            .map(|node| robust::robust(&node, &plant, tick.period_s))
+            .transpose()?,
         lqr: given(&lqr::LQR).map(|node| lqr::lqr(&node, states)).transpose()?,
         pole_placement: given(&pole_placement::POLE_PLACEMENT)
             .map(|node| pole_placement::pole_placement(&node, states))

@@ -72,7 +72,11 @@ pub(super) fn covariance(
     Ok(Some(shares))
 }
 
-fn stationary(m: &Matrix<f64>, q: &Matrix<f64>) -> Result<Matrix<f64>, VerifyError> {
+/// P = M P Mᵀ + Q, by doubling.
+///
+/// # Errors
+/// [`VerifyError::NoStationaryState`] if the sum does not converge.
+pub(crate) fn stationary(m: &Matrix<f64>, q: &Matrix<f64>) -> Result<Matrix<f64>, VerifyError> {
     let (mut p, mut m) = (q.clone(), m.clone());
     for _ in 0..60 {
         let increment = &(&m * &p) * &m.transpose();

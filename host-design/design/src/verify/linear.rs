@@ -126,6 +126,6 @@ fn poles(model: &LoopModel<f64>) -> Result<(Vec<[f64; 2]>, f64), VerifyError> {
     Ok((poles, spectral_radius))
 }
 
-pub(super) fn radius<R: Real>(model: &LoopModel<R>) -> Result<f64, VerifyError> {
+pub(crate) fn radius<R: Real>(model: &LoopModel<R>) -> Result<f64, VerifyError> {
     spectral_radius(&model.matrix).map(|radius| radius.to_f64()).map_err(|_| VerifyError::Poles)
 }

@@ -5,7 +5,7 @@
 
 use upright::table::Law;
 
-use crate::design::{Certified, Feedback, zero_order_hold};
+use crate::design::{Certified, Design, Feedback, Kalman, zero_order_hold};
 use crate::numerics::{Matrix, Real};
 use crate::rig::Rig;
 use crate::table::{MAX_STATES, TableValues};
@@ -48,13 +48,13 @@ pub struct LoopModel<R> {
 
 /// The numbers of a control law and its observer, in a working precision.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) struct Numbers<R> {
+pub(crate) struct Numbers<R> {
     pub(super) k: Matrix<R>,
     pub(super) k_pending: R,
     pub(super) k_integral: R,
     pub(super) n: R,
     pub(super) observer: Option<ObserverNumbers<R>>,
-    pub(super) measured: Vec<usize>,
+    pub(crate) measured: Vec<usize>,
     pub(super) output: usize,
     pub(super) tick_s: R,
     pub(super) delay_ticks: usize,
@@ -98,7 +98,18 @@ impl<R: Real> Numbers<R> {
     /// The `f64` numbers from which the table's were rounded; none if the table's gains are not those of the design.
     pub(super) fn exact(rig: &Rig, certified: &Certified, table: &TableValues, law: Law) -> Option<Self> {
         let feedback = exact_law(certified, table, law)?;
-        let (double, states) = (&certified.double, table.states());
+        let kalman = certified.double.kalman.as_ref().filter(|_| table.observer.is_some());
+        Self::of_design(rig, &certified.double, feedback, kalman)
+    }
+
+    /// Those of `feedback`, with the observer `kalman` or from the whole state, for the plant of `design`.
+    pub(crate) fn of_design(
+        rig: &Rig,
+        design: &Design<f64>,
+        feedback: &Feedback<f64>,
+        kalman: Option<&Kalman<f64>>,
+    ) -> Option<Self> {
+        let states = rig.states();
         let entries: Vec<R> = feedback.k.entries().iter().map(|&gain| R::from_f64(gain)).collect();
         let (k, further) = entries.split_at_checked(states)?;
         let (k_integral, k_pending) = match (further, feedback.integral) {
@@ -108,22 +119,26 @@ impl<R: Real> Numbers<R> {
             _ => (R::zero(), R::zero()),
         };
         let exact = |m: &Matrix<f64>| m.map(|&entry| R::from_f64(entry));
-        let kalman = double.kalman.as_ref().filter(|_| table.observer.is_some());
+        let sensors = rig.sensors();
+        let measured = match kalman {
+            Some(_) => sensors.iter().map(|sensor| sensor.state).collect(),
+            None => (0..states).collect(),
+        };
         Some(Self {
             k: Matrix::column(k).transpose(),
             k_pending,
             k_integral,
             n: R::from_f64(feedback.n.unwrap_or(0.0)),
             observer: kalman.map(|kalman| ObserverNumbers {
-                ad: exact(&double.ad),
-                bd: exact(&double.bd),
+                ad: exact(&design.ad),
+                bd: exact(&design.bd),
                 l: exact(&kalman.l_filter),
-                step: rig.sensors().iter().map(crate::rig::Sensor::step).collect(),
+                step: sensors.iter().map(crate::rig::Sensor::step).collect(),
             }),
-            measured: measured(table),
-            output: table.output as usize,
+            measured,
+            output: rig.output(),
             tick_s: R::from_f64(rig.tick.period_s),
-            delay_ticks: table.delay_ticks as usize,
+            delay_ticks: usize::from(rig.tick.delay_ticks),
         })
     }
 }
@@ -151,7 +166,7 @@ pub(super) fn exact_law<'c>(
 
 impl<R: Real> PlantModel<R> {
     /// The plant sampled at its tick, with a delay of whole ticks.
-    pub(super) fn held(ad: &Matrix<R>, bd: &Matrix<R>, delay_ticks: usize, measured: &[usize]) -> Self {
+    pub(crate) fn held(ad: &Matrix<R>, bd: &Matrix<R>, delay_ticks: usize, measured: &[usize]) -> Self {
         let mut taps = vec![Matrix::zeros(ad.rows(), 1); delay_ticks];
         taps.push(bd.clone());
         Self::with_taps(ad, &taps, measured)
@@ -160,7 +175,7 @@ impl<R: Real> PlantModel<R> {
     /// `ẋ = a x + b u` sampled every `period` seconds, with a force that arrives `delay_ticks` (any real number)
     /// later. A fraction f splits the tick: the old force acts for f of it, the new one for 1 - f (Åström &
     /// Wittenmark, *Computer-Controlled Systems*, section 2.3).
-    pub(super) fn delayed(
+    pub(crate) fn delayed(
         a: &Matrix<R>,
         b: &Matrix<R>,
         period: f64,
@@ -201,7 +216,7 @@ impl<R: Real> ControllerModel<R> {
     /// x̂ = x̂⁻ + L (y - C x̂⁻),   u = -K x̂ - k_pending u_pending - k_integral z,
     /// x̂⁻⁺ = Ad x̂ + Bd (u or u_pending),   z⁺ = z + T x̂_output,   u_pending⁺ = u
     /// ```
-    pub(super) fn of(numbers: &Numbers<R>) -> Self {
+    pub(crate) fn of(numbers: &Numbers<R>) -> Self {
         let (s, p) = (numbers.k.cols(), numbers.measured.len());
         let late = numbers.delay_ticks == 1;
         let observed = if numbers.observer.is_some() { s } else { 0 };

@@ -22,7 +22,10 @@ mod rows;
 mod tick;
 mod trial;
 
-use linear::radius;
+pub(crate) use covariance::stationary;
+pub(crate) use linear::radius;
+pub(crate) use loop_model::Numbers;
+pub(crate) use trial::{chain, leaning, scenario};
 
 pub use attraction::{
     Attraction, AttractionSettings, Axis, Edge, Map, Tilt, WorstTilt, attraction, attraction_map,

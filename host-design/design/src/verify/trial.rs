@@ -173,14 +173,14 @@ fn largest_angle(rig: &Rig, state: &[f64]) -> f64 {
 /// The rig's run at rest for `horizon`, with integration steps of at most 1 ms: on the fastest rig a run then differs
 /// from one with steps of 0.25 ms by less than 1e-6. Behind a motor the steps are finer, because the back-EMF is held
 /// in each.
-pub(super) fn scenario(rig: &Rig, law: Law, duration_s: f64) -> Scenario {
+pub(crate) fn scenario(rig: &Rig, law: Law, duration_s: f64) -> Scenario {
     let steps = (rig.tick.period_s / 1e-3 - 1e-9).ceil().clamp(1.0, 1e4) as usize;
     let finer = if rig.actuator.motor.is_some() { 2 } else { 1 };
     Scenario { duration_s, substeps: finer * steps, ..Scenario::at_rest(rig, law) }
 }
 
 /// A start at rest with these angles from the vertical (rad).
-pub(super) fn leaning(rig: &Rig, angles: &[f64]) -> Vec<f64> {
+pub(crate) fn leaning(rig: &Rig, angles: &[f64]) -> Vec<f64> {
     let mut start = vec![0.0; rig.states()];
     let mut below = 0.0;
     for (joint, &angle) in start[2..].chunks_exact_mut(2).zip(angles) {
@@ -191,7 +191,7 @@ pub(super) fn leaning(rig: &Rig, angles: &[f64]) -> Vec<f64> {
 }
 
 /// The chain of a rig that has one.
-pub(super) fn chain<'a>(rig: &'a Rig, what: &'static str) -> Result<&'a Chain, Unverifiable> {
+pub(crate) fn chain<'a>(rig: &'a Rig, what: &'static str) -> Result<&'a Chain, Unverifiable> {
     match &rig.plant {
         PlantDescription::Chain(chain) => Ok(chain),
         PlantDescription::Model(_) => Err(Unverifiable::NotAChain(what)),

@@ -43,6 +43,7 @@ fn bare(chain: Chain) -> Rig {
     Rig {
         verify: Default::default(),
         reality: Default::default(),
+        robust: None,
         swing_up: None,
         name: "random".into(),
         plant: PlantDescription::Chain(chain),

@@ -18,6 +18,7 @@ mod reality_loop;
 mod rig_errors;
 mod rig_files;
 mod rig_fuzz;
+mod robust;
 mod supervised;
 mod supervisor_false_alarms;
 mod supervisor_faults;

@@ -76,6 +76,7 @@ fn what_is_left_out_gets_its_documented_default() {
     let expected = Rig {
         verify: Default::default(),
         reality: Default::default(),
+        robust: None,
         swing_up: None,
         name: "minimal".to_owned(),
         plant: PlantDescription::Chain(Chain { cart, links: vec![link], gravity_m_per_s2: 9.81 }),

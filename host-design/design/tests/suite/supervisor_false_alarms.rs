@@ -112,3 +112,57 @@ fn twenty_times_the_disturbance_is_an_alarm() {
     rough.verify.force_rms_n = Some(20.0 * 0.1);
     assert!(nominal(&rough, Law::Lqr, 1, 30.0 / 3600.0).cause.is_some());
 }
+
+/// The rig as machines of its tolerances: masses ±`percent` in every combination whose first bit is that of the cart.
+fn machines(name: &str, percent: f64, more: &str) -> Vec<Rig> {
+    let file = format!("{}/../../rigs/{name}.toml", env!("CARGO_MANIFEST_DIR"));
+    let text = std::fs::read_to_string(&file).unwrap();
+    let parts = rig(name).states() / 2;
+    let machine = |mask: u32| {
+        let sign = |part: usize| if mask >> part & 1 == 1 { percent } else { -percent };
+        let links: Vec<String> = (1..parts).map(|part| sign(part).to_string()).collect();
+        let real = format!(
+            "{text}\n[reality]\n{more}\ncart_mass_percent = {}\nlink_mass_percent = [{}]\n",
+            sign(0),
+            links.join(", ")
+        );
+        Rig::from_toml(&real, file.as_ref()).unwrap()
+    };
+    (0..1u32 << parts).map(machine).collect()
+}
+
+/// Law, number of the machine, and what was found in `seconds` on each machine.
+fn alarms(machines: &[Rig], seconds: f64) -> Vec<(Law, usize, Found)> {
+    let all: Vec<_> =
+        Law::ALL.into_iter().flat_map(|law| (0..machines.len()).map(move |one| (law, one))).collect();
+    all.into_par_iter()
+        .map(|(law, one)| (law, one, nominal(&machines[one], law, 1, seconds / 3600.0)))
+        .collect()
+}
+
+#[test]
+#[ignore = "a minute: prints how near the innovations come to the thresholds on machines unlike their model"]
+fn how_near_machines_within_the_tolerances_come_to_an_alarm() {
+    for (name, percent, more) in [
+        ("quadruple-paper", 5.0, ""),
+        ("quadruple-paper", 5.0, "joint_friction_n_m = 5e-5"),
+        ("quadruple-robust", 5.0, ""),
+        ("quadruple-robust", 5.0, "joint_friction_n_m = 1.2e-4"),
+        ("quadruple-robust", 5.0, "joint_friction_n_m = 5e-5\nhoming_error_rad = 1e-3\nrail_tilt_rad = 1e-3"),
+        ("triple-glueck-eder-kugi", 5.0, "joint_friction_n_m = 3e-3"),
+        ("double-quanser-dbpen", 5.0, "joint_friction_n_m = 3e-3"),
+        ("single-quanser-ip02", 5.0, "joint_friction_n_m = 3e-2"),
+    ] {
+        let found = alarms(&machines(name, percent, more), 20.0);
+        let closest = found.iter().map(|(.., found)| found.closest).fold(0.0, f32::max);
+        let causes: Vec<String> = found
+            .iter()
+            .filter_map(|(law, one, found)| Some(format!("{law:?} {one} {:?}", found.cause?.fault)))
+            .collect();
+        let rejected: u32 = found.iter().map(|(.., found)| found.rejected).sum();
+        println!(
+            "{name} {more:?}: closest {closest}, rejected {rejected}, of {} off: {causes:?}",
+            found.len()
+        );
+    }
+}

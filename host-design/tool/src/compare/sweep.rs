@@ -3,9 +3,7 @@
 use std::path::Path;
 
 use upright_design::number::rounded;
-use upright_design::rig::{Rig, RigError, RigErrorKind};
-
-use crate::rig_text::{Changed, with_value};
+use upright_design::rig::{Edited, Rig, RigError, RigErrorKind, with_value};
 
 /// Values for one key of a rig file.
 #[derive(Debug, Clone, PartialEq)]
@@ -97,8 +95,8 @@ impl Sweep {
     pub fn rig(&self, text: &str, file: &Path, value: f64) -> Result<Rig, RigError> {
         let number = if value.abs() < 1e15 { format!("{value}") } else { format!("{value:e}") };
         match with_value(text, &self.key, &number) {
-            Some(Changed { text, is_new: false }) => Rig::from_toml(&text, file),
-            Some(Changed { text, .. }) => {
+            Some(Edited { text, added: false }) => Rig::from_toml(&text, file),
+            Some(Edited { text, added: true }) => {
                 Rig::from_toml(&text, file).map_err(|error| RigError { place: None, ..error })
             }
             None => Err(RigError {

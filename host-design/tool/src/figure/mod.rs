@@ -5,6 +5,7 @@
 
 mod csv;
 mod draw;
+mod front;
 mod heat;
 mod legend;
 mod outlines;
@@ -21,6 +22,7 @@ pub(crate) use theme::{
 };
 
 pub use draw::{Drawing, PlotArea};
+pub use front::front_figure;
 pub use heat::HeatMap;
 pub(crate) use run::run_figure;
 pub use run::run_svg;

@@ -4,9 +4,7 @@ use std::path::Path;
 
 use upright_design::identify::{Identification, Realised};
 use upright_design::number::rounded;
-use upright_design::rig::{Actuator, Rig, RigError};
-
-use crate::rig_text::with_value;
+use upright_design::rig::{Actuator, Rig, RigError, with_value};
 
 /// Why there is no rig file.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]

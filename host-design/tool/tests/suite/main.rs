@@ -22,6 +22,7 @@ mod report_figures;
 mod report_page;
 mod report_rigs;
 mod reproduce_numbers;
+mod robust_command;
 mod twin_door;
 mod twin_page;
 mod verify_command;

@@ -14,6 +14,7 @@ pub(super) mod lqr;
 pub(super) mod model;
 pub(super) mod pole_placement;
 pub(super) mod reality;
+pub(super) mod robust;
 pub(super) mod swing_up;
 pub(super) mod tick;
 pub(super) mod verify;
@@ -37,7 +38,7 @@ pub static TOP: Section = Section {
 };
 
 /// All sections, in the order of the documentation.
-pub static SECTIONS: [&Section; 14] = [
+pub static SECTIONS: [&Section; 15] = [
     &chain::CART,
     &chain::LINK,
     &chain::GRAVITY,
@@ -50,6 +51,7 @@ pub static SECTIONS: [&Section; 14] = [
     &limits::LIMITS,
     &verify::VERIFY,
     &reality::REALITY,
+    &robust::ROBUST,
     &swing_up::SWING_UP,
     &model::MODEL,
 ];

@@ -6,6 +6,7 @@ use upright_design::design::DesignError;
 use upright_design::harness::HarnessError;
 use upright_design::identify::IdentifyError;
 use upright_design::rig::RigError;
+use upright_design::robust::RobustError;
 use upright_design::simulate::SimulationError;
 use upright_design::swing_up::SwingUpError;
 use upright_design::table::{NoTable, WriteError};
@@ -32,6 +33,8 @@ pub(crate) enum Failure {
     NoSolution(String),
     #[error("{rig}: {source}")]
     SwingUp { rig: String, source: SwingUpError },
+    #[error("{rig}: {source}")]
+    Robust { rig: String, source: RobustError },
     #[error(transparent)]
     Identify(#[from] IdentifyError),
     #[error("{0}")]
@@ -98,6 +101,7 @@ impl Failure {
             Failure::CheckFailed(_) => 1,
             Failure::Rig(error) => error.exit_code(),
             Failure::Design { .. } | Failure::NoTable { .. } | Failure::NoSolution(_) => 3,
+            Failure::Robust { source: RobustError::Unhelped(_) | RobustError::Design(_), .. } => 3,
             Failure::SwingUp { source, .. } if source.is_without_solution() => 3,
             Failure::NotIdentified(_) => 3,
             Failure::Identify(error) if error.is_without_solution() => 3,
@@ -112,6 +116,7 @@ impl Failure {
             }) => 4,
             Failure::Campaign(_) => 1,
             Failure::SwingUp { .. }
+            | Failure::Robust { .. }
             | Failure::Identify(_)
             | Failure::Image(_)
             | Failure::Elf(_)

@@ -10,6 +10,7 @@ mod identify;
 mod progress;
 mod report;
 mod reproduce;
+mod robust;
 mod shake;
 mod simulate;
 mod swing_up;
@@ -30,6 +31,7 @@ Examples:
   upright twin rigs/quadruple-paper.toml        a page on which the rig moves: pull it, break it, watch it
   upright verify rigs/quadruple-paper.toml      margins, region of attraction, noise, model errors
   upright swing-up rigs/quadruple-paper.toml    plan how the rig raises itself, and lowers itself again
+  upright robust rigs/quadruple-robust.toml     gains that stand wrong masses, friction, wrong zeros
   upright identify my.toml run.log --write new.toml   the real machine's parameters, from a log
   upright report rigs/quadruple-paper.toml      all of it on one page, with an animation
   upright compare rigs/quadruple-paper.toml --sweep tick.period_s=0.0005..0.01
@@ -59,6 +61,7 @@ enum Command {
     Report(report::Report),
     Compare(compare::Compare),
     Reproduce(reproduce::Reproduce),
+    Robust(robust::Robust),
     Shake(shake::Shake),
     Identify(identify::Identify),
     Simulate(simulate::Simulate),
@@ -76,6 +79,7 @@ fn main() -> ExitCode {
         Command::Report(command) => command.run(),
         Command::Compare(command) => command.run(),
         Command::Reproduce(command) => command.run(),
+        Command::Robust(command) => command.run(),
         Command::Shake(command) => command.run(),
         Command::Identify(command) => command.run(),
         Command::Simulate(command) => command.run(),

@@ -1,28 +1,27 @@
-//! Changes of a rig file's text, which keep its comments and its layout.
+//! Changes of single values in the text of a rig file. Everything else of the text stays, comments too.
 
 use toml_edit::{Document, Item, TableLike};
 
-/// A changed text.
+/// A text in which a value was changed.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Changed {
-    /// The whole text.
+pub struct Edited {
+    /// The new text.
     pub text: String,
-    /// Whether the key is new in it.
-    pub is_new: bool,
+    /// Whether the key was not there and was added.
+    pub added: bool,
 }
 
-/// `text` with `value` for the key, which is named as in an error: `tick.period_s`, `link[2].mass_kg`,
-/// `lqr.state_weights[1]`. A key that is not there is added to its table, and a table that is not there at the end. None
-/// if that is not possible.
-pub fn with_value(text: &str, key: &str, value: &str) -> Option<Changed> {
+/// `text` with `value`, as it is written in TOML, for `key`: `tick.period_s`, `link[2].mass_kg`, `lqr.state_weights[1]`.
+/// A key that is not there is added; none if it has no place.
+pub fn with_value(text: &str, key: &str, value: &str) -> Option<Edited> {
     match place(text, key) {
         Place::At(span) => {
             let text = format!("{}{value}{}", &text[..span.start], &text[span.end..]);
-            Some(Changed { text, is_new: false })
+            Some(Edited { text, added: false })
         }
         Place::New { at, prefix } => {
             let text = format!("{}{prefix} = {value}\n{}", &text[..at], &text[at..]);
-            Some(Changed { text, is_new: true })
+            Some(Edited { text, added: true })
         }
         Place::Nowhere => None,
     }
@@ -114,19 +113,15 @@ fn new_line(text: &str, header: &str, number: usize, name: &str) -> Place {
 mod tests {
     use super::*;
 
-    const TEXT: &str =
-        "name = \"a\"\n[cart]\nmass_kg = 1 # one\n[[link]]\nmass_kg = 2\n[[link]]\nmass_kg = 3\n";
-
     #[test]
-    fn values_are_replaced_and_added() {
-        let changed = |key: &str| with_value(TEXT, key, "7").map(|changed| changed.text);
-        assert_eq!(changed("cart.mass_kg").unwrap(), TEXT.replace("= 1 #", "= 7 #"));
-        assert_eq!(changed("link[2].mass_kg").unwrap(), TEXT.replace('3', "7"));
-        assert_eq!(
-            changed("link[1].length_m").unwrap(),
-            TEXT.replacen("[[link]]", "[[link]]\nlength_m = 7", 1)
-        );
-        assert!(changed("reality.rail_tilt_rad").unwrap().ends_with("[reality]\nrail_tilt_rad = 7\n"));
-        assert_eq!(changed("link[3].mass_kg"), None);
+    fn a_value_changes_and_all_else_stays() {
+        let text = "name = \"a\" # mine\n[[link]]\nmass_kg = 1\n[[link]]\nmass_kg = 2 # second\n[tick]\nperiod_s = 0.001\n";
+        let edited = |key: &str, value: &str| with_value(text, key, value).unwrap();
+        assert_eq!(edited("link[2].mass_kg", "3").text, text.replace("2 # second", "3 # second"));
+        assert_eq!(edited("name", "\"b\"").text, text.replace("\"a\"", "\"b\""));
+        let added = edited("tick.delay_ticks", "1");
+        assert!(added.added && added.text.contains("[tick]\ndelay_ticks = 1\nperiod_s"));
+        assert!(edited("verify.tilt_rad", "0.1").text.ends_with("\n[verify]\ntilt_rad = 0.1\n"));
+        assert_eq!(with_value(text, "link[3].mass_kg", "1"), None);
     }
 }

@@ -1,0 +1,34 @@
+//! Why no gains were chosen.
+
+use crate::design::DesignError;
+use crate::simulate::SimulationError;
+use crate::table::NoTable;
+use crate::verify::{Unverifiable, VerifyError};
+
+/// Why no gains were chosen.
+#[derive(Debug, thiserror::Error)]
+pub enum RobustError {
+    /// No tolerance is above 0.
+    #[error(
+        "no tolerance is stated: give [robust] in the rig file, or an option such as --joint-friction 1e-4"
+    )]
+    NoTolerance,
+    /// No candidate stands the tolerances.
+    #[error("nothing helps: {0}")]
+    Unhelped(String),
+    /// The rig has no chain or no observer, or too many links.
+    #[error(transparent)]
+    Unverifiable(#[from] Unverifiable),
+    /// The rig file's own numbers have no design.
+    #[error(transparent)]
+    Design(#[from] DesignError),
+    /// A design makes no table.
+    #[error(transparent)]
+    NoTable(#[from] NoTable),
+    /// A run cannot be started.
+    #[error(transparent)]
+    Simulation(#[from] SimulationError),
+    /// A figure of a linear loop cannot be computed.
+    #[error(transparent)]
+    Verify(#[from] VerifyError),
+}

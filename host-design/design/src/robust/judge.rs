@@ -1,0 +1,168 @@
+//! Whether a loop stands its tolerances, by simulation.
+
+use rayon::prelude::*;
+use serde::Serialize;
+use upright::table::Law;
+
+use crate::plant::absolute_angles;
+use crate::rig::{PerJoint, Rig, Tolerances};
+use crate::simulate::{Scenario, SimulationError, run};
+use crate::table::TableValues;
+use crate::verify::{CornerSettings, Disturbance, Unverifiable, corners, leaning, scenario};
+
+/// Shares of the tolerances that are tried. A loop with friction can stand much of it and fall with little.
+pub(super) const SHARES: [f64; 4] = [0.0, 0.5, 1.0, 1.25];
+/// Every link leans by this at the start (rad).
+const LEAN_RAD: f64 = 5e-4;
+
+/// How many runs a loop has to stand, and their disturbances.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct JudgeSettings {
+    /// Runs of each share of the tolerances, with the seeds from 1.
+    pub runs: u64,
+    /// Length of each (s).
+    pub duration_s: f64,
+    /// Their disturbances.
+    pub disturbance: Disturbance,
+}
+
+impl JudgeSettings {
+    /// 4 runs of 60 s with the disturbances that the rig file expects.
+    pub fn of(rig: &Rig) -> Self {
+        Self { runs: 4, duration_s: 60.0, disturbance: Disturbance::of(rig) }
+    }
+}
+
+/// Runs on one machine.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Runs {
+    /// Share of the tolerances that the machine has.
+    pub share: f64,
+    /// Runs.
+    pub runs: u64,
+    /// How many stood to the end within the supervisor's limits of angle and rail.
+    pub stood: u64,
+    /// Force on the cart (N rms), over the runs that stood, after the first tenth.
+    pub force_rms_n: f64,
+    /// Largest angle of a link from the vertical in the runs that stood (rad).
+    pub peak_angle_rad: f64,
+    /// Largest distance of the cart from its set-point in the runs that stood (m).
+    pub peak_position_m: f64,
+}
+
+/// What a loop stands.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Judgement {
+    /// The law.
+    pub law: Law,
+    /// Friction, wrong zeros and latency together, none of them first.
+    pub machines: Vec<Runs>,
+    /// Combinations of mass errors, without friction: how many there are and how many stand.
+    pub corners: Option<[usize; 2]>,
+}
+
+impl Judgement {
+    /// Whether all runs stood.
+    pub fn stands(&self) -> bool {
+        self.machines.iter().all(|machine| machine.stood == machine.runs)
+            && self.corners.is_none_or(|[all, stand]| stand == all)
+    }
+}
+
+/// Runs the loop of `table` on machines with shares of the tolerances, and at every combination of mass errors.
+///
+/// # Errors
+/// [`Unverifiable`] if the runs cannot be started.
+pub fn judge(
+    rig: &Rig,
+    table: &TableValues,
+    law: Law,
+    tolerances: &Tolerances,
+    settings: &JudgeSettings,
+) -> Result<Judgement, Unverifiable> {
+    if let Some((what, value, accepts)) = tolerances.too_large(rig.tick.period_s) {
+        return Err(Unverifiable::Setting { what, value, accepts });
+    }
+    let machines = SHARES.into_iter().map(|share| {
+        let of_seed = |seed: u64| one(&machine(rig, tolerances, share), table, law, settings, seed);
+        let all: Vec<Outcome> =
+            (1..=settings.runs).into_par_iter().map(of_seed).collect::<Result<_, SimulationError>>()?;
+        Ok(summary(share, &all))
+    });
+    let machines = machines.collect::<Result<_, Unverifiable>>()?;
+    let corners = if tolerances.mass_percent > 0.0 {
+        let settings = CornerSettings { disturbance: settings.disturbance, ..CornerSettings::of(rig) };
+        let ideal = machine(rig, tolerances, 0.0);
+        let found = corners(&ideal, table, law, tolerances.mass_percent, &settings)?;
+        Some([found.corners, found.stand])
+    } else {
+        None
+    };
+    Ok(Judgement { law, machines, corners })
+}
+
+/// The rig with `share` of its tolerances, but with its own masses.
+pub(super) fn machine(rig: &Rig, tolerances: &Tolerances, share: f64) -> Rig {
+    let mut rig = rig.clone();
+    let (real, tolerances) = (&mut rig.reality, tolerances.scaled(share));
+    real.friction.joint_friction_n_m = PerJoint::all(tolerances.joint_friction_n_m);
+    real.friction.cart_friction_n = tolerances.cart_friction_n;
+    real.sensors.homing_error_rad = PerJoint::all(tolerances.homing_error_rad);
+    real.driver.latency_s = tolerances.latency_s;
+    rig
+}
+
+/// Outcome of one run.
+pub(super) struct Outcome {
+    pub(super) stands: bool,
+    ticks: f64,
+    force: f64,
+    angle_rad: f64,
+    position_m: f64,
+}
+
+/// One run on `machine`.
+pub(super) fn one(
+    machine: &Rig,
+    table: &TableValues,
+    law: Law,
+    settings: &JudgeSettings,
+    seed: u64,
+) -> Result<Outcome, SimulationError> {
+    let scenario = Scenario {
+        start: leaning(machine, &vec![LEAN_RAD; machine.states() / 2 - 1]),
+        force_noise_n: settings.disturbance.force_n,
+        torque_noise_n_m: settings.disturbance.torque_n_m,
+        seed,
+        ..scenario(machine, law, settings.duration_s)
+    };
+    let mut outcome = Outcome { stands: false, ticks: 0.0, force: 0.0, angle_rad: 0.0, position_m: 0.0 };
+    let fall = run(machine, table, &scenario, &mut |sample| {
+        let angles = absolute_angles(sample.state);
+        outcome.angle_rad = angles.fold(outcome.angle_rad, |largest, angle| largest.max(angle.abs()));
+        outcome.position_m = outcome.position_m.max(sample.state[0].abs());
+        if sample.t >= 0.1 * settings.duration_s {
+            outcome.ticks += 1.0;
+            outcome.force += sample.force * sample.force;
+        }
+    })?;
+    let limits = &table.limits;
+    let [low, high] = limits.rail_m.map(f64::from);
+    outcome.stands = fall.is_none()
+        && outcome.angle_rad <= f64::from(limits.angle_rad)
+        && outcome.position_m <= high.min(-low);
+    Ok(outcome)
+}
+
+fn summary(share: f64, all: &[Outcome]) -> Runs {
+    let stood = || all.iter().filter(|outcome| outcome.stands);
+    let ticks: f64 = stood().map(|outcome| outcome.ticks).sum();
+    Runs {
+        share,
+        runs: all.len() as u64,
+        stood: stood().count() as u64,
+        force_rms_n: (stood().map(|outcome| outcome.force).sum::<f64>() / ticks.max(1.0)).sqrt(),
+        peak_angle_rad: stood().map(|outcome| outcome.angle_rad).fold(0.0, f64::max),
+        peak_position_m: stood().map(|outcome| outcome.position_m).fold(0.0, f64::max),
+    }
+}

@@ -1,0 +1,112 @@
+//! What the linear model says of a candidate, in f64: ripple, and stability at every combination of mass errors.
+
+use crate::design::{Design, DesignError, Kalman, continuous_plant, integrated_quadratic, noise_columns};
+use crate::numerics::Matrix;
+use crate::rig::{Rig, Tolerances};
+use crate::verify::{
+    ControllerModel, Disturbance, LoopModel, Numbers, PlantModel, VerifyError, radius, stationary,
+    wrong_masses,
+};
+
+/// A loop this close to instability falls in a long run.
+const MARGIN: f64 = 2e-4;
+
+/// The linear plants of a rig: the nominal one, and one for each combination of mass errors.
+pub(super) struct LinearPlants<'a> {
+    rig: &'a Rig,
+    tolerances: &'a Tolerances,
+    nominal: PlantModel<f64>,
+    /// Covariance of the disturbances over one tick.
+    process: Matrix<f64>,
+    sensor_variances: Vec<f64>,
+}
+
+impl<'a> LinearPlants<'a> {
+    /// Of `rig`, whose own design is `design`.
+    pub(super) fn of(
+        rig: &'a Rig,
+        design: &Design<f64>,
+        tolerances: &'a Tolerances,
+        disturbance: Disturbance,
+    ) -> Result<Self, DesignError> {
+        let measured: Vec<usize> = rig.sensors().iter().map(|sensor| sensor.state).collect();
+        let delay_ticks = usize::from(rig.tick.delay_ticks);
+        let inputs = noise_columns(rig)?;
+        let period_s = rig.tick.period_s;
+        let intensity = |input: usize| {
+            let rms = if input == 0 { disturbance.force_n } else { disturbance.torque_n_m };
+            rms * rms * period_s
+        };
+        let intensities: Vec<f64> = (0..inputs.cols()).map(intensity).collect();
+        let spread = &(&inputs * &Matrix::from_diagonal(&intensities)) * &inputs.transpose();
+        let square = |sensor: &crate::rig::Sensor| sensor.step::<f64>().powi(2) / 12.0;
+        Ok(Self {
+            rig,
+            tolerances,
+            nominal: PlantModel::held(&design.ad, &design.bd, delay_ticks, &measured),
+            process: integrated_quadratic(&design.a.transpose(), &spread, &period_s),
+            sensor_variances: rig.sensors().iter().map(square).collect(),
+        })
+    }
+
+    /// The controller of one candidate; none if its numbers do not fit.
+    pub(super) fn controller(
+        &self,
+        law: &Design<f64>,
+        which: upright::table::Law,
+        kalman: &Kalman<f64>,
+    ) -> Option<ControllerModel<f64>> {
+        let feedback = law.sampled.in_table()[which]?;
+        Some(ControllerModel::of(&Numbers::of_design(self.rig, law, feedback, Some(kalman))?))
+    }
+
+    /// Predicted rms of the force (N) from encoders and disturbances; none for a loop that is not stable.
+    pub(super) fn ripple_n(&self, controller: &ControllerModel<f64>) -> Option<f64> {
+        let model = LoopModel::of(&self.nominal, controller);
+        if radius(&model).ok()? >= 1.0 {
+            return None;
+        }
+        let size = model.matrix.rows();
+        let variances = Matrix::from_diagonal(&self.sensor_variances);
+        let q = &Matrix::zeros(size, size).with_block(0, 0, &self.process)
+            + &(&(&model.sensor_input * &variances) * &model.sensor_input.transpose());
+        let p = stationary(&model.matrix, &q).ok()?;
+        let (c, d) = (&model.force_output, &model.sensor_to_force);
+        let variance = (&(c * &p) * &c.transpose())[(0, 0)] + (&(d * &variances) * &d.transpose())[(0, 0)];
+        Some(variance.max(0.0).sqrt())
+    }
+
+    /// The plants with every combination of masses wrong by `scale` times the tolerance, and that much latency.
+    pub(super) fn corners(&self, scale: f64) -> Result<Vec<PlantModel<f64>>, DesignError> {
+        let tolerances = self.tolerances.scaled(scale);
+        let measured: Vec<usize> = self.rig.sensors().iter().map(|sensor| sensor.state).collect();
+        let period_s = self.rig.tick.period_s;
+        let delay_ticks = f64::from(self.rig.tick.delay_ticks) + tolerances.latency_s / period_s;
+        let parts = self.rig.states() / 2;
+        let corners = if tolerances.mass_percent > 0.0 { 1u32 << parts } else { 1 };
+        let corner = |mask: u32| {
+            let factors: Vec<f64> =
+                (0..parts).map(|part| if mask >> part & 1 == 1 { 1.0 } else { -1.0 }).collect();
+            let plant = continuous_plant::<f64>(&wrong_masses(self.rig, tolerances.mass_percent, &factors))?;
+            Ok(PlantModel::delayed(&plant.a, &plant.b, period_s, delay_ticks, &measured))
+        };
+        (0..corners).map(corner).collect()
+    }
+
+    /// Whether the loop is stable, with a margin, with each of these plants.
+    pub(super) fn holds(
+        &self,
+        controller: &ControllerModel<f64>,
+        corners: &[PlantModel<f64>],
+    ) -> Result<bool, VerifyError> {
+        let nominal = radius(&LoopModel::of(&self.nominal, controller))?;
+        // A loop with slow poles has less than that margin from the outset.
+        let most = 1.0 - MARGIN.min(0.5 * (1.0 - nominal));
+        for corner in corners {
+            if radius(&LoopModel::of(corner, controller))? >= most {
+                return Ok(false);
+            }
+        }
+        Ok(true)
+    }
+}

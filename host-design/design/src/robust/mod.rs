@@ -1,0 +1,17 @@
+//! Gains that stand a machine which is not as its file says: a choice among multiples of the file's own numbers.
+//!
+//! [`choose`] designs every candidate exactly, sorts by predicted ripple, and simulates the cheapest whose linear loop
+//! stands all mass errors. Friction is judged by simulation only: neither margins nor norms order designs as friction does.
+
+mod candidate;
+mod error;
+mod file;
+mod judge;
+mod linear;
+mod search;
+
+pub use candidate::{Candidate, LawNumbers};
+pub use error::RobustError;
+pub use file::rewritten;
+pub use judge::{JudgeSettings, Judgement, Runs, judge};
+pub use search::{Choice, Chosen, Front, FrontPoint, LawRipple, LeastRipple, choose};

@@ -1,0 +1,190 @@
+//! `upright robust`
+
+use std::io::Write;
+use std::path::{Path, PathBuf};
+
+use clap::Args;
+use serde_json::json;
+use upright::table::Law;
+use upright_design::design::design;
+use upright_design::rig::{Rig, Tolerances};
+use upright_design::robust::{
+    Choice, Front, JudgeSettings, Judgement, RobustError, choose, judge, rewritten,
+};
+use upright_design::table::{Gains, TableValues, write_atomically};
+use upright_tool::figure::front_figure;
+
+use crate::failure::Failure;
+use crate::progress::{with_spinner, with_stages};
+use crate::variation::{not_negative, positive};
+
+mod text;
+
+/// Chooses weights, far poles and joint noise that stand wrong masses, friction, wrong zeros and latency.
+///
+/// The tolerances are those of [robust] in the rig file, or of the options. Exit status 3 if nothing helps, with the reason.
+#[derive(Args)]
+#[command(before_help = "\
+Examples:
+  upright robust rigs/quadruple-paper.toml --mass 10 --joint-friction 1.5e-4 --out rigs/quadruple-robust.toml
+  upright robust rigs/quadruple-robust.toml --as-it-is --runs 104      how many runs stand with the file's own numbers
+  upright robust my.toml --mass 5 --front --svg front.svg              least ripple over multiples of the tolerances
+  upright robust my.toml --joint-friction 1e-3 --json")]
+pub(crate) struct Robust {
+    /// Rig file (TOML)
+    rig: PathBuf,
+    /// Error (±) of the masses instead of mass_percent (%)
+    #[arg(long, value_name = "PERCENT", value_parser = not_negative)]
+    mass: Option<f64>,
+    /// Coulomb friction of each joint instead of joint_friction_n_m (N·m)
+    #[arg(long, value_name = "N_M", value_parser = not_negative)]
+    joint_friction: Option<f64>,
+    /// Coulomb friction of the cart instead of cart_friction_n (N)
+    #[arg(long, value_name = "N", value_parser = not_negative)]
+    cart_friction: Option<f64>,
+    /// Error of each joint's zero instead of homing_error_rad (rad)
+    #[arg(long, value_name = "RAD", value_parser = not_negative)]
+    homing: Option<f64>,
+    /// Delay of the force instead of latency_s (s)
+    #[arg(long, value_name = "S", value_parser = not_negative)]
+    latency: Option<f64>,
+    /// Choose nothing: judge the numbers of the file; exit status 1 if a run falls
+    #[arg(long, conflicts_with_all = ["out", "front", "svg"])]
+    as_it_is: bool,
+    /// Runs at each share of the tolerances that a choice has to stand
+    #[arg(long, default_value_t = 4, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=100_000))]
+    runs: u32,
+    /// Length of each run (s)
+    #[arg(long, default_value_t = 60.0, value_name = "S", value_parser = positive)]
+    duration: f64,
+    /// Also look for the least ripple at multiples of the tolerances
+    #[arg(long)]
+    front: bool,
+    /// Draw that as SVG
+    #[arg(long, value_name = "FILE", requires = "front")]
+    svg: Option<PathBuf>,
+    /// Write the rig file with the choice; its name is that of the rig
+    #[arg(long, value_name = "FILE")]
+    out: Option<PathBuf>,
+    /// Write nothing; exit status 1 if the file of --out differs
+    #[arg(long, requires = "out")]
+    check: bool,
+    /// Print the result as one JSON object
+    #[arg(long)]
+    json: bool,
+}
+
+impl Robust {
+    pub(crate) fn run(self) -> Result<(), Failure> {
+        let rig = Rig::from_path(&self.rig)?;
+        let tolerances = self.tolerances(&rig);
+        let settings =
+            JudgeSettings { runs: self.runs.into(), duration_s: self.duration, ..JudgeSettings::of(&rig) };
+        if self.as_it_is {
+            return self.judge(&rig, &tolerances, &settings);
+        }
+        let failed = |source: RobustError| Failure::Robust { rig: rig.name.clone(), source };
+        let (choice, front) = with_stages(4, |stage| choose(&rig, &tolerances, &settings, self.front, stage))
+            .map_err(failed)?;
+        if let (Some(path), Some(front)) = (&self.svg, &front) {
+            let figure = front_figure(front, &format!("{}: least ripple that stands", rig.name));
+            write_atomically(path, figure.svg()?.as_bytes())?;
+        }
+        let differs = match &self.out {
+            Some(path) => self.write(path, &rig, &tolerances, &choice)?,
+            None => false,
+        };
+        self.print(&rig, &tolerances, &choice, front.as_ref())?;
+        match &self.out {
+            Some(path) if self.check && differs => {
+                Err(Failure::CheckFailed(format!("{} differs from this choice", path.display())))
+            }
+            _ => Ok(()),
+        }
+    }
+
+    /// Those of the rig file, where no option gives another.
+    fn tolerances(&self, rig: &Rig) -> Tolerances {
+        let stated = rig.robust.clone().unwrap_or_default();
+        Tolerances {
+            mass_percent: self.mass.unwrap_or(stated.mass_percent),
+            joint_friction_n_m: self.joint_friction.unwrap_or(stated.joint_friction_n_m),
+            cart_friction_n: self.cart_friction.unwrap_or(stated.cart_friction_n),
+            homing_error_rad: self.homing.unwrap_or(stated.homing_error_rad),
+            latency_s: self.latency.unwrap_or(stated.latency_s),
+        }
+    }
+
+    /// The file's own numbers.
+    fn judge(&self, rig: &Rig, tolerances: &Tolerances, settings: &JudgeSettings) -> Result<(), Failure> {
+        let name = || self.rig.display().to_string();
+        let certified = design(rig).map_err(|source| Failure::Design { rig: name(), source })?;
+        let table = TableValues::of(rig, &certified, Gains::Sampled)
+            .map_err(|source| Failure::NoTable { rig: name(), source })?;
+        let laws: Vec<Law> = table.laws.present().map(|(law, _)| law).collect();
+        let judgements = with_spinner("judging", || {
+            let of_law = |&law: &Law| judge(rig, &table, law, tolerances, settings);
+            laws.iter().map(of_law).collect::<Result<Vec<Judgement>, _>>()
+        })?;
+        let mut out = std::io::stdout().lock();
+        if self.json {
+            let object = json!({ "rig": rig.name, "tolerances": tolerances, "laws": judgements });
+            writeln!(out, "{object}")?;
+        } else {
+            write!(out, "{}", text::judged(rig, tolerances, settings, &judgements))?;
+        }
+        let fallen: Vec<&str> =
+            judgements.iter().filter(|one| !one.stands()).map(|one| one.law.key()).collect();
+        if fallen.is_empty() {
+            return Ok(());
+        }
+        Err(Failure::CheckFailed(format!(
+            "{}: runs fall or leave the limits: {}",
+            rig.name,
+            fallen.join(", ")
+        )))
+    }
+
+    /// Writes the rig file with the choice, unless with --check; whether it differs from what was there.
+    fn write(
+        &self,
+        path: &Path,
+        rig: &Rig,
+        tolerances: &Tolerances,
+        choice: &Choice,
+    ) -> Result<bool, Failure> {
+        let bad = |reason: &str| Failure::BadArgument(format!("{}: {reason}", self.rig.display()));
+        let text = std::fs::read_to_string(&self.rig)?;
+        let part = |name: Option<&std::ffi::OsStr>| name.and_then(|name| name.to_str()).map(str::to_owned);
+        let name = part(path.file_stem()).ok_or_else(|| bad("--out needs a file name"))?;
+        let file = part(self.rig.file_name()).unwrap_or_default();
+        let text = rewritten(&text, &file, &name, rig, tolerances, choice).ok_or_else(|| {
+            bad("write its sections with headers and one key per line: only then can they change")
+        })?;
+        // What is written is a rig file.
+        Rig::from_toml(&text, path)?;
+        let differs = std::fs::read_to_string(path).map_or(true, |old| old != text);
+        if differs && !self.check {
+            write_atomically(path, text.as_bytes())?;
+        }
+        Ok(differs)
+    }
+
+    fn print(
+        &self,
+        rig: &Rig,
+        tolerances: &Tolerances,
+        choice: &Choice,
+        front: Option<&Front>,
+    ) -> Result<(), Failure> {
+        let mut out = std::io::stdout().lock();
+        if self.json {
+            let object =
+                json!({ "rig": rig.name, "tolerances": tolerances, "choice": choice, "front": front });
+            writeln!(out, "{object}")?;
+        } else {
+            write!(out, "{}", text::chosen(rig, tolerances, choice, front))?;
+        }
+        Ok(())
+    }
+}

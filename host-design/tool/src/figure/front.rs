@@ -1,0 +1,27 @@
+//! The least ripple over multiples of the tolerances.
+
+use upright::table::Law;
+use upright_design::robust::{Front, FrontPoint};
+
+use super::{Axis, Curve, Figure, Panel};
+
+/// One curve for each law. A multiple that nothing stands interrupts the lines.
+pub fn front_figure(front: &Front, title: &str) -> Figure {
+    let ends = front.0.iter().map(|point| point.scale);
+    let largest = ends.fold(0.0, f64::max);
+    let x = Axis::linear("multiple of the tolerances").range(0.0, 1.05 * largest);
+    let mut panel = Panel::new(x, Axis::linear("predicted ripple of the force (N rms)"));
+    for (number, law) in Law::ALL.into_iter().enumerate() {
+        let ripple = |point: &FrontPoint| {
+            let mut laws = point.best.iter().flat_map(|best| &best.laws);
+            laws.find(|one| one.law == law).map_or(f64::NAN, |one| one.ripple_n)
+        };
+        let points: Vec<[f64; 2]> = front.0.iter().map(|point| [point.scale, ripple(point)]).collect();
+        if points.iter().any(|point| point[1].is_finite()) {
+            // Number 0 is that of the crosses.
+            panel = panel.with(Curve::line(law.to_string(), 1 + number, points.clone()));
+            panel = panel.with(Curve::markers("", 1 + number, points));
+        }
+    }
+    Figure::new(title).with(panel)
+}
