@@ -7,10 +7,11 @@ use rand_pcg::Pcg64;
 
 use super::SwingUpError;
 use super::motion::Motion;
+use super::robustness::deviation;
 use super::setting::Setting;
 use super::way::Way;
 use crate::numerics::Matrix;
-use crate::plant::{Plant, absolute_angles, chain_plant};
+use crate::plant::{Plant, chain_plant};
 use crate::rig::Chain;
 
 /// Deviation of a link from its reference beyond which the motion counts as lost (rad).
@@ -47,25 +48,25 @@ pub(super) struct Outcome {
 }
 
 /// A trial under way.
-pub(super) struct ClosedLoop<'a> {
+struct ClosedLoop<'a> {
     setting: &'a Setting<'a>,
     trial: &'a Trial,
     plant: Box<dyn Plant>,
     random: Option<Pcg64>,
     torques: Vec<f64>,
     /// The true state.
-    pub(super) state: Vec<f64>,
+    state: Vec<f64>,
     /// Estimate of this tick, and its prediction for the next.
-    pub(super) estimate: Vec<f64>,
+    estimate: Vec<f64>,
     predicted: Vec<f64>,
 }
 
 /// What the law does in a tick: `u = u_k - K (x̂ - x_k)` with the filter gain L; no K: no force.
-pub(super) struct Law<'a> {
-    pub(super) x: &'a [f64],
-    pub(super) u: f64,
-    pub(super) k: Option<&'a Matrix<f64>>,
-    pub(super) l: &'a Matrix<f64>,
+struct Law<'a> {
+    x: &'a [f64],
+    u: f64,
+    k: Option<&'a Matrix<f64>>,
+    l: &'a Matrix<f64>,
 }
 
 impl<'a> ClosedLoop<'a> {
@@ -73,11 +74,7 @@ impl<'a> ClosedLoop<'a> {
     ///
     /// # Errors
     /// [`SwingUpError`] if the chain cannot be simulated.
-    pub(super) fn new(
-        setting: &'a Setting<'a>,
-        trial: &'a Trial,
-        predicted: &[f64],
-    ) -> Result<Self, SwingUpError> {
+    fn new(setting: &'a Setting<'a>, trial: &'a Trial, predicted: &[f64]) -> Result<Self, SwingUpError> {
         let mut plant = chain_plant(&trial.chain)?;
         plant.set_state(&trial.start);
         Ok(Self {
@@ -92,9 +89,8 @@ impl<'a> ClosedLoop<'a> {
         })
     }
 
-    /// One tick: measures, corrects, applies the law; then moves the plant. `observe` sees the loop and
-    /// the force (N) before the plant moves.
-    pub(super) fn tick(&mut self, law: &Law<'_>, observe: &mut dyn FnMut(&Self, f64)) {
+    /// One tick: measures, corrects, applies the law; then moves the plant.
+    fn tick(&mut self, law: &Law<'_>) {
         let sensors = &self.setting.noise.sensors;
         let innovation: Vec<f64> = (0..sensors.len())
             .map(|i| measured(self.setting, self.trial, &self.state, i) - self.predicted[sensors[i].0])
@@ -108,7 +104,6 @@ impl<'a> ClosedLoop<'a> {
             let feedback: f64 = deviations.enumerate().map(|(i, deviation)| k[(0, i)] * deviation).sum();
             applied(self.setting, law.u - feedback, self.estimate[1])
         });
-        observe(self, force);
         let mut push = 0.0;
         if let Some(random) = &mut self.random {
             let mut draw = || -> f64 { StandardNormal.sample(random) };
@@ -121,14 +116,14 @@ impl<'a> ClosedLoop<'a> {
     }
 
     /// Whether the cart has reached an end of the rail.
-    pub(super) fn is_at_the_end(&self) -> bool {
+    fn is_at_the_end(&self) -> bool {
         let [low, high] = self.setting.chain.cart.travel_m;
         !(low < self.state[0] && self.state[0] < high)
     }
 }
 
 /// The law in tick k of a motion and after it.
-pub(super) fn law_at<'a>(setting: &'a Setting<'_>, motion: &'a Motion, way: Way, k: usize) -> Law<'a> {
+fn law_at<'a>(setting: &'a Setting<'_>, motion: &'a Motion, way: Way, k: usize) -> Law<'a> {
     let steps = motion.steps();
     match way {
         _ if k < steps => Law { x: &motion.x[k], u: motion.u[k], k: Some(&motion.k[k]), l: &motion.l[k] },
@@ -151,7 +146,7 @@ pub(super) fn run(
     let steps = motion.steps();
     let mut outcome = Outcome { stood: false, deviation_rad: 0.0, deviation_m: 0.0 };
     for k in 0..steps + (trial.after_s / motion.tick_s) as usize {
-        rig.tick(&law_at(setting, motion, way, k), &mut |_, _| {});
+        rig.tick(&law_at(setting, motion, way, k));
         let reference = motion.x.get(k + 1).unwrap_or(&motion.x[steps]);
         let deviation = deviation(&rig.state, reference);
         outcome.deviation_m = outcome.deviation_m.max((rig.state[0] - reference[0]).abs());
@@ -168,14 +163,6 @@ pub(super) fn run(
     let near = if way == Way::Up { ARRIVED_RAD } else { LOST_RAD };
     outcome.stood = deviation(&rig.state, &motion.x[steps]) < near;
     Ok(outcome)
-}
-
-/// Largest difference of a link's angle from the vertical to that of the reference (rad).
-pub(super) fn deviation(state: &[f64], reference: &[f64]) -> f64 {
-    absolute_angles(state).zip(absolute_angles(reference)).fold(0.0, |largest, (a, b)| {
-        let difference = (a - b).abs();
-        if difference.is_nan() { f64::INFINITY } else { f64::max(largest, difference) }
-    })
 }
 
 fn measured(setting: &Setting<'_>, trial: &Trial, state: &[f64], sensor: usize) -> f64 {

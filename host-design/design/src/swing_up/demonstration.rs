@@ -137,10 +137,12 @@ pub struct Demonstration {
 pub fn hangs(recording: &Recording) -> bool {
     let mut states: Vec<State> = recording.ticks.iter().map(|tick| tick.state).collect();
     states.dedup();
-    let hang = |state: &[f64]| {
-        absolute_angles(state).all(|angle| (angle.abs() - core::f64::consts::PI).abs() < HANGS_RAD)
-    };
     recording.fault.is_none()
         && states == [State::Raising, State::Balancing, State::Lowering, State::Calibrated]
         && recording.trace.samples().last().is_some_and(|sample| hang(sample.state))
+}
+
+/// Whether all links hang: within [`HANGS_RAD`] of the vertical.
+pub(super) fn hang(state: &[f64]) -> bool {
+    absolute_angles(state).all(|angle| (angle.abs() - core::f64::consts::PI).abs() < HANGS_RAD)
 }

@@ -4,6 +4,7 @@ use std::path::PathBuf;
 
 use super::motion::Shape;
 use super::way::Way;
+use crate::design::DesignError;
 use crate::numerics::Singular;
 use crate::plant::PlantError;
 use crate::simulate::SimulationError;
@@ -73,6 +74,12 @@ pub enum SwingUpError {
     /// The stored motions belong to other values of the rig file.
     #[error("the stored motions do not belong to this rig file: run `upright swing-up` again")]
     Outdated,
+    /// The firmware cannot be run with the motions.
+    #[error("the firmware does not run: {0}")]
+    Firmware(String),
+    /// The rig has no gains.
+    #[error(transparent)]
+    Design(#[from] DesignError),
     /// The gain table has no motions.
     #[error("the table has no motions: make them with `upright swing-up`")]
     NoMotions,

@@ -2,9 +2,10 @@
 
 use super::SwingUpError;
 use super::motion::SwingUp;
+use crate::design::design;
 use crate::rig::Rig;
 use crate::simulate::set_motion_thresholds;
-use crate::table::{SwingUpValues, TableValues};
+use crate::table::{Gains, SwingUpValues, TableValues};
 
 /// The table with the motions in it, and the thresholds with which the firmware supervises them.
 ///
@@ -19,4 +20,12 @@ pub fn with_motions(
     table.swing_up = Some(SwingUpValues::of(rig, &table, motions)?);
     set_motion_thresholds(rig, &mut table)?;
     Ok(table)
+}
+
+/// The rig's gain table with the motions in it.
+///
+/// # Errors
+/// As for [`with_motions`]; [`SwingUpError::Design`] if the rig has no gains.
+pub fn designed_table(rig: &Rig, motions: &SwingUp) -> Result<TableValues, SwingUpError> {
+    with_motions(rig, TableValues::of(rig, &design(rig)?, Gains::Sampled)?, motions)
 }

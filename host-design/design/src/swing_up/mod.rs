@@ -14,6 +14,7 @@
 //! | `refine` | from knots to ticks |
 //! | `tracking`, `gains` | feedback and filter along a path |
 //! | `closed_loop`, `robustness` | runs with wrong masses, friction, start and encoders |
+//! | `firmware_runs` | such runs of the whole firmware |
 //! | `search`, `plan`, `advice` | candidates, selection, and what would help if there is none |
 //! | `demonstration` | one run of everything |
 //! | `in_table` | the table of the firmware |
@@ -28,6 +29,7 @@ mod closed_loop;
 mod demonstration;
 mod dynamics;
 mod error;
+mod firmware_runs;
 mod gains;
 mod hold;
 mod in_table;
@@ -48,9 +50,10 @@ mod way;
 pub use check::Peaks;
 pub use demonstration::{Demonstration, Script, hangs, up_and_down};
 pub use error::SwingUpError;
-pub use in_table::with_motions;
+pub use firmware_runs::{Condition, FirmwareRuns, firmware_runs};
+pub use in_table::{designed_table, with_motions};
 pub use motion::{Motion, Shape, SwingUp};
-pub use plan::{Judgement, Plan, Progress, Trying, judge, motions, search};
+pub use plan::{Judgement, Plan, Progress, Trying, judge, motions, refined, search};
 pub use robustness::{Runs, Spread};
 pub use stored::Stored;
 pub use way::Way;

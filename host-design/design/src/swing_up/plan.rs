@@ -118,9 +118,14 @@ pub fn judge(rig: &Rig, stored: &Stored, progress: Progress<'_>) -> Result<Plan,
 /// # Errors
 /// [`SwingUpError::Outdated`] if the rig file has changed since.
 pub fn motions(rig: &Rig, stored: &Stored) -> Result<SwingUp, SwingUpError> {
-    if !stored.is_of(rig) {
-        return Err(SwingUpError::Outdated);
-    }
+    if stored.is_of(rig) { refined(rig, stored) } else { Err(SwingUpError::Outdated) }
+}
+
+/// Stored motions, refined for `rig`, which may differ a little from the one that they are stored for.
+///
+/// # Errors
+/// [`SwingUpError::Outdated`] if they do not fit the rig any more.
+pub fn refined(rig: &Rig, stored: &Stored) -> Result<SwingUp, SwingUpError> {
     let setting = Setting::of(rig)?;
     let checked = |way, knots| -> Result<Motion, SwingUpError> {
         let motion = restored(&setting, way, knots)?;

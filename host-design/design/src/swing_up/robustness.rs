@@ -10,6 +10,7 @@ use super::closed_loop::{LOST_RAD, Trial, run};
 use super::motion::Motion;
 use super::setting::Setting;
 use super::way::Way;
+use crate::plant::absolute_angles;
 use crate::rig::{Chain, PerJoint, PlantDescription, Rig};
 use crate::verify::wilson;
 
@@ -165,5 +166,13 @@ pub(super) fn random_runs(
         stood,
         interval: wilson(stood, runs),
         deviation_rad: standing.fold(0.0, |largest, outcome| f64::max(largest, outcome.deviation_rad)),
+    })
+}
+
+/// Largest difference of a link's angle from the vertical to that of the reference (rad).
+pub(super) fn deviation(state: &[f64], reference: &[f64]) -> f64 {
+    absolute_angles(state).zip(absolute_angles(reference)).fold(0.0, |largest, (a, b)| {
+        let difference = (a - b).abs();
+        if difference.is_nan() { f64::INFINITY } else { f64::max(largest, difference) }
     })
 }

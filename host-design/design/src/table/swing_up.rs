@@ -152,6 +152,16 @@ impl MotionValues {
         })
     }
 
+    /// The planned state in `tick`, from the nearest knots; after the end, the last one.
+    pub fn planned(&self, states: usize, tick: usize) -> Vec<f64> {
+        let (width, every) = (MotionTable::course_width(states), self.course_ticks as usize);
+        let last = self.course.len() / width - 1;
+        let row = |index: usize| self.course[index.min(last) * width..][..states].iter();
+        let share = (tick % every) as f64 / every as f64;
+        let between = |(a, b): (&f32, &f32)| f64::from(*a) + share * f64::from(b - a);
+        row(tick / every).zip(row(tick / every + 1)).map(between).collect()
+    }
+
     /// The firmware's part.
     fn table(&self) -> MotionTable<'_> {
         MotionTable {

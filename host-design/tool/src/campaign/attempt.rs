@@ -8,11 +8,12 @@ use upright::supervision::sign_check::Signs;
 use super::defect::{Expected, Kind};
 use super::injection::Injection;
 use super::observed::Observed;
-use super::trial::Trial;
+use super::trial::{COMMAND_TICKS, Phase, Trial};
 use crate::in_the_loop::{Events, Place, RunError, VirtualBoard};
 use upright_design::harness::{HEARTBEAT_S, Harness, HarnessError, Pins, Session, Target};
 use upright_design::plant::absolute_angles;
 use upright_design::rig::{PlantDescription, Rig};
+use upright_design::simulate::Begin;
 use upright_design::table::TableValues;
 
 /// What a campaign is run with.
@@ -91,6 +92,7 @@ impl Attempt<'_> {
         let mut injection = Injection::new(self.rig, self.table, trial.clone());
         let mut output = harness.raise(Some(0.0))?;
         let heartbeat = self.ticks(HEARTBEAT_S);
+        let lower_at = self.lower_at();
         for tick in 0.. {
             if self.is_over(tick, &observed) {
                 break;
@@ -106,7 +108,9 @@ impl Attempt<'_> {
                     output => output?,
                 };
             }
-            if tick == 1 {
+            if Some(tick) == lower_at {
+                harness.session.send(Request::Down);
+            } else if tick == 1 {
                 harness.session.send(Request::Setpoint(trial.scenario.step_m as f32));
             } else if tick.is_multiple_of(heartbeat) && injection.host_is_alive(since) {
                 harness.session.send(Request::Beat);
@@ -126,7 +130,7 @@ impl Attempt<'_> {
             if is_visible {
                 observed.visible.get_or_insert(tick);
             }
-            observed.outside |= observed.off.is_none() && self.is_outside(harness.bench.state());
+            observed.outside |= observed.off.is_none() && self.is_outside(tick, harness.bench.state());
             let drive = if acting.enable { acting.drive } else { output.drive };
             harness.bench.push(since.map_or(0.0, |since| injection.push_n(since)));
             harness.bench.tick(drive);
@@ -183,7 +187,10 @@ impl Attempt<'_> {
     /// Whether nothing is left to be observed before `tick`.
     fn is_over(&self, tick: usize, observed: &Observed) -> bool {
         let trial = self.trial;
-        let is_undecided = matches!(trial.kind.expected(), Expected::Off(_)) && observed.is_undecided();
+        // A motor that goes off when the rig hangs proves nothing.
+        let may_wait = trial.phase != Phase::Lowering;
+        let is_undecided =
+            may_wait && matches!(trial.kind.expected(), Expected::Off(_)) && observed.is_undecided();
         let last =
             trial.onset + if is_undecided { self.ticks(LONGEST_S).max(trial.watched) } else { trial.watched };
         // A board that starts again tells the reason as soon as it runs.
@@ -199,13 +206,45 @@ impl Attempt<'_> {
         (seconds / self.rig.tick.period_s).max(1.0) as usize
     }
 
-    fn is_outside(&self, state: &[f64]) -> bool {
+    /// Whether a link is far beyond its limit in `tick`: from the vertical, or in a motion from its planned angle; or the
+    /// cart is off its rail.
+    fn is_outside(&self, tick: usize, state: &[f64]) -> bool {
         let PlantDescription::Chain(chain) = &self.rig.plant else { return false };
+        let [low, high] = chain.cart.travel_m;
+        if !(low..=high).contains(&state[0]) {
+            return true;
+        }
+        if let Some(planned) = self.planned(tick) {
+            let allowed = self.table.swing_up.as_ref().map_or(f32::MAX, |swing_up| swing_up.deviation_rad);
+            let away = absolute_angles(state).zip(planned).map(|(angle, planned)| (angle - planned).abs());
+            return away.fold(0.0, f64::max) > f64::from(allowed) * (1.0 + BEYOND);
+        }
         let angle =
             f64::from(self.rig.limits.angle_rad.unwrap_or(f64::from(self.table.limits.angle_rad)) as f32);
-        let leans = absolute_angles(state).any(|lean| lean.abs() > angle * (1.0 + BEYOND));
-        let [low, high] = chain.cart.travel_m;
-        leans || !(low..=high).contains(&state[0])
+        absolute_angles(state).any(|lean| lean.abs() > angle * (1.0 + BEYOND))
+    }
+
+    /// Planned angles of the links from the vertical in `tick` of a run with a motion (rad).
+    fn planned(&self, tick: usize) -> Option<Vec<f64>> {
+        let swing_up = self.table.swing_up.as_ref()?;
+        let state = match (self.lower_at(), self.trial.scenario.begin) {
+            (_, Begin::ByHand) => return None,
+            (Some(at), _) if tick >= at + COMMAND_TICKS => {
+                swing_up.lower.planned(self.table.states(), tick - at - COMMAND_TICKS)
+            }
+            _ => swing_up.raise.planned(self.table.states(), tick),
+        };
+        Some(absolute_angles(&state).collect())
+    }
+
+    /// Tick in which the firmware is told to lower the links.
+    fn lower_at(&self) -> Option<usize> {
+        match self.trial.scenario.begin {
+            Begin::Hanging { lower_at_s } => {
+                lower_at_s.map(|at_s| self.ticks(at_s + 0.5 * self.rig.tick.period_s))
+            }
+            Begin::ByHand => None,
+        }
     }
 
     /// The kinds that are there at power-up: arming has to be refused.

@@ -8,7 +8,7 @@ use upright_design::table::TableValues;
 
 use super::defect::{Expected, Kind};
 use super::injection::Injection;
-use super::trial::Trial;
+use super::trial::{Phase, Trial};
 
 /// A rig with a defect, tick by tick.
 pub struct Defective<'a> {
@@ -54,6 +54,7 @@ impl Trial {
         Self {
             number: 0,
             kind,
+            phase: Phase::Balancing,
             scenario: scenario.clone(),
             onset: 0,
             watched: 0,

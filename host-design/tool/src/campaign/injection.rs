@@ -7,9 +7,10 @@ use upright::control::actuator::Drive;
 use upright::protocol::frame;
 use upright::protocol::message::{Command, Request};
 use upright::protocol::serial_link::MAX_COMMAND;
+use upright::table::Thresholds;
 
 use super::defect::Kind;
-use super::trial::Trial;
+use super::trial::{Phase, Trial};
 use upright_design::harness::{Pins, Session};
 use upright_design::rig::Rig;
 use upright_design::simulate::Bench;
@@ -34,6 +35,8 @@ pub(super) struct Injection<'a> {
     /// Counters at the onset.
     at_onset: Option<Counters>,
     past: Vec<Counters>,
+    /// Thresholds of the firmware's tests.
+    thresholds: &'a Thresholds<MAX_SENSORS>,
     /// Error of each sensor above which the firmware's tests can see it (counts).
     visible_counts: Vec<i64>,
     /// Position and speed that the missing force would have given the cart (m, m/s).
@@ -46,9 +49,13 @@ pub(super) struct Injection<'a> {
 impl<'a> Injection<'a> {
     pub(super) fn new(rig: &Rig, table: &'a TableValues, trial: Trial) -> Self {
         let ticks = |seconds: f64| (seconds / rig.tick.period_s).ceil() as usize;
+        let thresholds = match (&table.swing_up, trial.phase) {
+            (None, _) | (_, Phase::Balancing) => &table.thresholds,
+            (Some(swing_up), Phase::Raising | Phase::Lowering) => &swing_up.thresholds,
+        };
         let visible = |sensor: usize| match &table.observer {
             Some(observer) => {
-                let threshold = table.thresholds.innovation[sensor];
+                let threshold = thresholds.innovation[sensor];
                 (threshold / observer.step[sensor]).ceil().min(1e9) as i64
             }
             None => i64::MAX,
@@ -57,6 +64,7 @@ impl<'a> Injection<'a> {
             random: trial.random(),
             trial,
             table,
+            thresholds,
             at_onset: None,
             past: Vec::new(),
             visible_counts: (0..table.sensors()).map(visible).collect(),
@@ -152,7 +160,7 @@ impl<'a> Injection<'a> {
         let [b_p, b_v] = [0, 1].map(|state| f64::from(observer.bd[state]));
         let [p, v] = self.missing;
         self.missing = [p + v * f64::from(self.table.tick_s) + b_p * missing_n, v + b_v * missing_n];
-        self.missing[0].abs() > f64::from(self.table.thresholds.innovation[0])
+        self.missing[0].abs() > f64::from(self.thresholds.innovation[0])
     }
 
     /// External force on the cart (N).

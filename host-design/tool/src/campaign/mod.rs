@@ -18,4 +18,4 @@ pub use by_hand::Defective;
 pub use defect::{Expected, Kind, Ticks};
 pub use judge::{Class, Outcome};
 pub use tally::{Campaign, CampaignError, Row, campaign, kinds, one};
-pub use trial::Trial;
+pub use trial::{Phase, Trial};

@@ -7,7 +7,7 @@ use upright::table::Law;
 use super::defect::Kind;
 use upright_design::rig::Rig;
 use upright_design::simulate::{Scenario, Sensing};
-use upright_design::table::TableValues;
+use upright_design::table::{SwingUpValues, TableValues};
 use upright_design::verify::Disturbance;
 
 /// A defect, and the run that it happens in.
@@ -17,6 +17,8 @@ pub struct Trial {
     pub number: u64,
     /// Kind of the defect.
     pub kind: Kind,
+    /// What the rig does when the defect begins.
+    pub phase: Phase,
     /// Set-point and disturbances of the run.
     pub scenario: Scenario,
     /// First tick of the defect, counted from the release.
@@ -33,8 +35,26 @@ pub struct Trial {
     pub seed: u64,
 }
 
+/// What the rig does when a defect begins.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Phase {
+    /// It balances, raised by hand.
+    Balancing,
+    /// It is raised by the motor.
+    Raising,
+    /// It is lowered by the motor.
+    Lowering,
+}
+
+/// Ticks in which a command has taken effect.
+pub(super) const COMMAND_TICKS: usize = 4;
+/// Time for which a raised rig balances before it is lowered (s).
+const UPRIGHT_S: f64 = 0.5;
+
 impl Trial {
-    /// The trial `number` of a campaign: its kind is one of `kinds`, in turn.
+    /// The trial `number` of a campaign: its kind is one of `kinds`, in turn. With a table that has a swing-up, the defects
+    /// of the motion are tried while raising and lowering, in turn.
     pub fn draw(rig: &Rig, table: &TableValues, kinds: &[Kind], seed: u64, number: u64) -> Self {
         let kind = kinds[(number % kinds.len() as u64) as usize];
         // A generator for each trial, so that it does not depend on the others.
@@ -68,9 +88,10 @@ impl Trial {
             Kind::EncodersSwapped => random.random_range(0..sensors.saturating_sub(1).max(1)),
             _ => random.random_range(0..sensors),
         };
-        Self {
+        let trial = Self {
             number,
             kind,
+            phase: Phase::Balancing,
             scenario,
             onset: random.random_range((0.2 * per_second) as usize..(0.7 * per_second) as usize),
             watched: (0.8 * per_second) as usize,
@@ -78,7 +99,34 @@ impl Trial {
             sign: sign(&mut random),
             size: random.random(),
             seed: random.random(),
+        };
+        let moves = !matches!(kind, Kind::ArmUnhomed | Kind::ArmHanging | Kind::ArmStopped | Kind::ArmHeld);
+        match &table.swing_up {
+            Some(swing_up) if moves => {
+                let is_raised = (number / kinds.len() as u64).is_multiple_of(2);
+                trial.in_motion(rig, swing_up, is_raised, random.random())
+            }
+            _ => trial,
         }
+    }
+
+    /// The same defect while the rig is raised, or lowered; `when` (0 to 1) says how far.
+    fn in_motion(self, rig: &Rig, swing_up: &SwingUpValues, is_raised: bool, when: f64) -> Self {
+        let (up, down) = (swing_up.raise.ticks as usize, swing_up.lower.ticks as usize);
+        let upright = (UPRIGHT_S / rig.tick.period_s) as usize;
+        let (phase, begin, ticks) = match is_raised {
+            true => (Phase::Raising, 0, up),
+            false => (Phase::Lowering, up + upright, down),
+        };
+        let onset = begin + COMMAND_TICKS + (0.8 * when * (ticks as f64)) as usize;
+        let lower_at_s = (!is_raised).then_some(begin as f64 * rig.tick.period_s);
+        let swing = Scenario::swing_up(rig, 0.0, lower_at_s);
+        let scenario =
+            Scenario { start: swing.start, begin: swing.begin, step_m: 0.0, law: Law::Lqr, ..self.scenario };
+        // A raised rig then balances for a while; a lowered one turns its motor off.
+        let after = if is_raised { upright / 2 } else { 0 };
+        let watched = (begin + ticks + after).saturating_sub(onset).max(1);
+        Self { phase, scenario, onset, watched, ..self }
     }
 
     /// Generator of whatever is random after the onset.

@@ -6,6 +6,7 @@ use clap::{Args, ValueEnum};
 use serde_json::json;
 use upright_board::Conditions;
 use upright_design::rig::Rig;
+use upright_design::swing_up::SwingUpError;
 use upright_tool::campaign::{Campaign, Kind, Row, Setup, campaign, kinds, one};
 use upright_tool::image::{Board, Kind as ImageKind, build_for};
 use upright_tool::in_the_loop::{Link, Place};
@@ -13,7 +14,7 @@ use upright_tool::in_the_loop::{Link, Place};
 use crate::failure::Failure;
 use crate::firmware::read;
 use crate::progress::{with_bar, with_spinner};
-use crate::variation::Variation;
+use crate::variation::{Variation, with_stored_motions};
 
 /// Fault injection: runs the firmware with one defect at a time and checks that the motor is off in time; exit status
 /// 1 if it ever is not, or is turned off without a reason.
@@ -27,11 +28,15 @@ Examples:
   upright faults rigs/single-quanser-ip02.toml --runs 10000 --seed 7
   upright faults rigs/quadruple-paper.toml --target qemu --runs 300
   upright faults rigs/quadruple-paper.toml --target board --runs 300
+  upright faults rigs/quadruple-paper.toml --swing-up                while it is raised and lowered
   upright faults rigs/quadruple-paper.toml --only 1234               one run again, bit for bit
   upright faults rigs/quadruple-paper.toml --kind motor-dead --json")]
 pub(crate) struct Faults {
     #[command(flatten)]
     variation: Variation,
+    /// Begin the defects while the rig is raised and lowered by the stored motions
+    #[arg(long)]
+    swing_up: bool,
     /// Where the firmware runs
     #[arg(long, value_enum, default_value_t = Target::Host)]
     target: Target,
@@ -84,6 +89,11 @@ fn kind(name: &str) -> Result<Kind, String> {
 impl Faults {
     pub(crate) fn run(self) -> Result<(), Failure> {
         let (rig, _, table) = self.variation.designed()?;
+        let table =
+            if self.swing_up { with_stored_motions(&self.variation.rig, &rig, table)? } else { table };
+        if self.swing_up && table.swing_up.is_none() {
+            return Err(Failure::SwingUp { rig: rig.name, source: SwingUpError::NoMotions });
+        }
         let image = match self.target {
             Target::Host => None,
             Target::Board => Some(with_spinner("building the image", || {
@@ -252,8 +262,9 @@ impl Faults {
         };
         // A campaign of one kind numbers its runs differently.
         let kind = self.kind.map_or(String::new(), |kind| format!(" --kind {}", kind.name()));
+        let swing_up = if self.swing_up { " --swing-up" } else { "" };
         Err(Failure::CheckFailed(format!(
-            "{wrong} of {} runs have a wrong outcome; to repeat the first of `{}`: upright faults {} --seed {}{target}{kind} --only {number}",
+            "{wrong} of {} runs have a wrong outcome; to repeat the first of `{}`: upright faults {} --seed {}{target}{kind}{swing_up} --only {number}",
             result.runs,
             row.kind.name(),
             self.variation.as_typed(),

@@ -6,10 +6,12 @@ use std::path::PathBuf;
 
 use clap::Args;
 use serde_json::json;
-use upright_design::design::design;
 use upright_design::rig::{PlantDescription, Rig};
-use upright_design::swing_up::{Judgement, Plan, Script, Stored, SwingUpError, judge, search, with_motions};
-use upright_design::table::{Gains, TableValues, write_atomically};
+use upright_design::swing_up::{
+    Condition, FirmwareRuns, Judgement, Plan, Script, Stored, SwingUpError, designed_table, firmware_runs,
+    judge, refined, search,
+};
+use upright_design::table::write_atomically;
 use upright_tool::figure::{run_svg, stroboscope_svg};
 use upright_tool::in_the_loop::RunError;
 
@@ -26,6 +28,7 @@ Examples:
   upright swing-up rigs/quadruple-paper.toml                  search, judge, write rigs/quadruple-paper.swing-up.json
   upright swing-up rigs/quadruple-paper.toml --stored         judge the stored motions again, in seconds
   upright swing-up rigs/quadruple-paper.toml --check          search again; exit status 1 if the file differs
+  upright swing-up rigs/quadruple-paper.toml --table          200 runs of the firmware with each of eight errors
   upright swing-up rigs/single-quanser-ip02.toml --no-write --json
   upright swing-up rigs/quadruple-paper.toml --stored --svg run.svg --csv run.csv")]
 pub(crate) struct SwingUp {
@@ -50,6 +53,9 @@ pub(crate) struct SwingUp {
     /// Draw the raising as a stroboscopic picture into an SVG file
     #[arg(long, value_name = "FILE")]
     picture: Option<PathBuf>,
+    /// Run the firmware with the stored motions 200 times under each of several conditions, and print the table
+    #[arg(long, conflicts_with_all = ["stored", "check", "no_write", "csv", "svg", "picture", "seed"])]
+    table: bool,
     /// Seed of that run
     #[arg(long, default_value_t = 1)]
     seed: u64,
@@ -58,10 +64,34 @@ pub(crate) struct SwingUp {
     json: bool,
 }
 
+/// Runs under each condition, with the seeds from 1 on.
+const RUNS: usize = 200;
+
 impl SwingUp {
+    /// Runs of the stored motions under all conditions.
+    fn rows(&self, rig: &Rig) -> Result<Vec<Row>, SwingUpError> {
+        let stored = Stored::beside(&self.rig)?;
+        let designed = |rig: &Rig| -> Result<_, SwingUpError> {
+            let motions = refined(rig, &stored)?;
+            Ok((designed_table(rig, &motions)?, motions))
+        };
+        let usual = designed(rig)?;
+        let row = |condition: Condition| {
+            let rig = condition.designed(rig);
+            let (table, motions) = if condition.joint_counts.is_some() { &designed(&rig)? } else { &usual };
+            let runs = firmware_runs(&rig, table, motions, &condition, 1, RUNS)?;
+            Ok(Row { condition, runs })
+        };
+        Condition::all().into_iter().map(row).collect()
+    }
+
     pub(crate) fn run(self) -> Result<(), Failure> {
         let rig = Rig::from_path(&self.rig)?;
         let failed = |source: SwingUpError| Failure::SwingUp { rig: rig.name.clone(), source };
+        if self.table {
+            let rows = with_spinner("random runs", || self.rows(&rig)).map_err(failed)?;
+            return print_rows(&rig, &rows, self.json);
+        }
         let old = Stored::beside(&self.rig);
         let plan = if self.stored {
             let old = old.clone().map_err(failed)?;
@@ -69,7 +99,7 @@ impl SwingUp {
         } else {
             with_search(|progress| search(&rig, progress)).map_err(failed)?
         };
-        let table = table(&rig, &plan)?;
+        let table = designed_table(&rig, &plan.motions).map_err(failed)?;
         let script = Script::of(&rig, &table, self.seed, false).map_err(failed)?;
         let demonstration = script.run(&table).map_err(RunError::from)?;
         if let Some(path) = &self.csv {
@@ -105,14 +135,39 @@ impl SwingUp {
     }
 }
 
-/// The gain table with the motions.
-fn table(rig: &Rig, plan: &Plan) -> Result<TableValues, Failure> {
-    let name = || rig.name.clone();
-    let certified = with_spinner("designing", || design(rig))
-        .map_err(|source| Failure::Design { rig: name(), source })?;
-    let table = TableValues::of(rig, &certified, Gains::Sampled)
-        .map_err(|source| Failure::NoTable { rig: name(), source })?;
-    with_motions(rig, table, &plan.motions).map_err(|source| Failure::SwingUp { rig: name(), source })
+/// Runs under a condition.
+struct Row {
+    condition: Condition,
+    runs: FirmwareRuns,
+}
+
+/// As Markdown, or one JSON object.
+fn print_rows(rig: &Rig, rows: &[Row], is_json: bool) -> Result<(), Failure> {
+    let mut out = std::io::stdout().lock();
+    if is_json {
+        let rows: Vec<_> = rows
+            .iter()
+            .map(|Row { condition, runs }| json!({ "condition": condition, "runs": runs }))
+            .collect();
+        return Ok(writeln!(out, "{}", json!({ "rig": rig.name, "rows": rows }))?);
+    }
+    for Row { condition, runs: FirmwareRuns { refused, raise, lower, faults } } in rows {
+        let refused = (*refused > 0).then(|| format!("not hanging: {refused}"));
+        let faults = faults.iter().map(|(fault, count)| format!("{fault}: {count}"));
+        let ended: Vec<String> = refused.into_iter().chain(faults).collect();
+        writeln!(
+            out,
+            "| {} | {} | {} of {} | {} of {} | {} |",
+            rig.name,
+            condition.name,
+            raise.stood,
+            raise.runs,
+            lower.stood,
+            lower.runs,
+            ended.join(", ")
+        )?;
+    }
+    Ok(())
 }
 
 fn text(rig: &Rig, plan: &Plan) -> String {

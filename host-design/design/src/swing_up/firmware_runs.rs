@@ -1,0 +1,182 @@
+//! Random runs of the whole firmware: the rig is raised from hanging, balances, is lowered, and hangs.
+
+use std::collections::BTreeMap;
+
+use rayon::prelude::*;
+use serde::Serialize;
+use upright::protocol::message::Request;
+use upright::supervision::supervisor::State;
+
+use super::SwingUpError;
+use super::demonstration::{hang, up_and_down};
+use super::motion::SwingUp;
+use super::robustness::{Runs, Spread, deviation, drawn};
+use super::way::Way;
+use crate::harness::{Harness, HarnessError, Target, with_firmware};
+use crate::rig::{LinkEncoder, PlantDescription, Rig};
+use crate::simulate::{Begin, Scenario};
+use crate::table::TableValues;
+use crate::verify::wilson;
+
+/// How long a raised rig balances before it is lowered (s).
+const UPRIGHT_S: f64 = 1.0;
+/// Ticks between two telemetry messages of a run.
+const TELEMETRY_TICKS: u16 = 20;
+
+/// What is wrong in a set of runs.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Condition {
+    /// In words.
+    pub name: &'static str,
+    /// Masses, friction, start and zeros.
+    pub spread: Spread,
+    /// Counts per turn of the joints' encoders, instead of the rig's; the table is designed with them.
+    pub joint_counts: Option<f64>,
+    /// Whether the force comes a tick later than the firmware knows.
+    pub is_late: bool,
+}
+
+impl Condition {
+    /// The rows of the table in the documentation.
+    pub fn all() -> [Self; 8] {
+        let degree = core::f64::consts::PI / 180.0;
+        let usual = Spread::of(0.0, 0.0);
+        let named = |name, spread| Self { name, spread, joint_counts: None, is_late: false };
+        [
+            named("masses and friction as in the file", usual),
+            named("masses ±2 %, friction ±30 %", Spread::of(0.02, 0.3)),
+            named("masses ±5 %, friction ±30 %", Spread::of(0.05, 0.3)),
+            named("start off by 10°", Spread { tilt_rad: 10.0 * degree, ..usual }),
+            named("start off by 20 mm", Spread { position_m: 0.02, ..usual }),
+            named("zeros off by 0.3°", Spread { zero_rad: 0.3 * degree, ..usual }),
+            Self { joint_counts: Some(1024.0), ..named("1024 counts per turn", usual) },
+            Self { is_late: true, ..named("force a tick late", usual) },
+        ]
+    }
+
+    /// The rig that the table for this condition is designed for.
+    pub fn designed(&self, rig: &Rig) -> Rig {
+        let mut rig = rig.clone();
+        if let (PlantDescription::Chain(chain), Some(counts)) = (&mut rig.plant, self.joint_counts) {
+            for link in &mut chain.links {
+                link.encoder = Some(LinkEncoder::CountsPerRev(counts));
+            }
+        }
+        rig
+    }
+}
+
+/// What came of a set of runs.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct FirmwareRuns {
+    /// Runs in which the firmware refused to raise the rig, because the links do not hang.
+    pub refused: usize,
+    /// Of the runs that were not refused: those that are upright until they are lowered.
+    pub raise: Runs,
+    /// Of those that are upright: those that hang in the end, the motor off, without a fault.
+    pub lower: Runs,
+    /// Faults that ended a run, and how often.
+    pub faults: BTreeMap<String, usize>,
+}
+
+/// One run.
+#[derive(Debug, Default)]
+struct Reached {
+    refused: bool,
+    stood: bool,
+    hung: bool,
+    fault: Option<String>,
+    /// Largest distance of a link from its planned angle, up and down (rad).
+    deviation_rad: [f64; 2],
+}
+
+/// `runs` runs of the firmware of `table`, which is designed for `rig`, with the seeds from `base_seed` on, on all threads; the
+/// outcome does not depend on their number. `motions` are those of the table.
+///
+/// # Errors
+/// [`SwingUpError`] if the table has no motions, or the firmware does not run.
+pub fn firmware_runs(
+    rig: &Rig,
+    table: &TableValues,
+    motions: &SwingUp,
+    condition: &Condition,
+    base_seed: u64,
+    runs: usize,
+) -> Result<FirmwareRuns, SwingUpError> {
+    let scenario = Scenario { substeps: 2, ..up_and_down(rig, table, UPRIGHT_S)? };
+    let one = |index: usize| {
+        let seed = base_seed + index as u64;
+        let (mut real, start) = drawn(rig, Way::Up, &condition.spread, seed);
+        real.tick.delay_ticks = u8::from(condition.is_late);
+        let scenario = Scenario { start, seed, ..scenario.clone() };
+        with_firmware(table, |target| raised_and_lowered(&real, table, motions, &scenario, target))
+            .flatten()
+            .map_err(|error| SwingUpError::Firmware(error.to_string()))
+    };
+    let all: Vec<Reached> = (0..runs).into_par_iter().map(one).collect::<Result<_, _>>()?;
+    let mut faults = BTreeMap::new();
+    for fault in all.iter().filter_map(|run| run.fault.clone()) {
+        *faults.entry(fault).or_default() += 1;
+    }
+    let counted = |begun: &dyn Fn(&Reached) -> bool, arrived: &dyn Fn(&Reached) -> bool, way: usize| {
+        let (tried, stood) =
+            (all.iter().filter(|run| begun(run)).count(), all.iter().filter(|run| arrived(run)).count());
+        let arrived = all.iter().filter(|run| arrived(run));
+        let deviation_rad = arrived.fold(0.0, |largest, run| f64::max(largest, run.deviation_rad[way]));
+        Runs { base_seed, runs: tried, stood, interval: wilson(stood, tried), deviation_rad }
+    };
+    Ok(FirmwareRuns {
+        refused: all.iter().filter(|run| run.refused).count(),
+        raise: counted(&|run| !run.refused, &|run| run.stood, 0),
+        lower: counted(&|run| run.stood, &|run| run.hung, 1),
+        faults,
+    })
+}
+
+fn raised_and_lowered(
+    rig: &Rig,
+    table: &TableValues,
+    motions: &SwingUp,
+    scenario: &Scenario,
+    target: &mut dyn Target,
+) -> Result<Reached, HarnessError> {
+    let ticks = |seconds: f64| (seconds / rig.tick.period_s).round() as usize;
+    let Begin::Hanging { lower_at_s: Some(lower_at_s) } = scenario.begin else {
+        return Ok(Reached::default());
+    };
+    let lower_at = ticks(lower_at_s);
+    let mut harness = Harness::new(rig, table, scenario, target)?;
+    let inputs = harness.inputs();
+    harness.session.ask(Request::Telemetry(TELEMETRY_TICKS), &inputs)?;
+    let mut reached = Reached::default();
+    let mut output = match harness.raise(None) {
+        Err(HarnessError::NotBalancing(_)) => return Ok(Reached { refused: true, ..reached }),
+        output => output?,
+    };
+    let begins = [0, lower_at + harness.session.pace().command_ticks];
+    for tick in 0..=ticks(scenario.duration_s) {
+        if tick > 0 {
+            let inputs = harness.inputs();
+            output = harness.session.tick(&inputs)?;
+        }
+        if tick == lower_at {
+            reached.stood = harness.session.status().state == State::Balancing;
+            harness.session.send(Request::Down);
+        }
+        for ((motion, begin), largest) in
+            [&motions.raise, &motions.lower].into_iter().zip(begins).zip(&mut reached.deviation_rad)
+        {
+            if let Some(planned) = tick.checked_sub(begin).and_then(|tick| motion.x.get(tick)) {
+                *largest = largest.max(deviation(harness.bench.state(), planned));
+            }
+        }
+        harness.bench.tick(output.drive);
+        while harness.session.next_telemetry().is_some() || harness.session.next_reply().is_some() {}
+    }
+    reached.fault = harness.session.fault().map(|fault| fault.to_string());
+    reached.hung = reached.stood
+        && reached.fault.is_none()
+        && harness.session.status().state == State::Calibrated
+        && hang(harness.bench.state());
+    Ok(reached)
+}
