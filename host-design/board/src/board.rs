@@ -15,6 +15,9 @@ use crate::peripherals::rcc::{BROWN_OUT_FLAG, Crystal, PIN_FLAG, POWER_FLAG};
 use crate::peripherals::usart::LineByte;
 use crate::wiring::{Pin, Wiring};
 
+/// Reserved space below the SRAM that the firmware's MPU region covers.
+const BELOW_SRAM_BYTES: usize = 64 << 10;
+
 /// What can happen to a board.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Input {
@@ -60,6 +63,9 @@ pub enum Input {
     IgnoreWatchdog,
     /// The break input is disconnected: for negative controls.
     IgnoreBreak,
+    /// The memory protection unit allows everything, and the 64 KiB below the SRAM answer like memory, as reserved space
+    /// may: for negative controls.
+    IgnoreMpu,
 }
 
 /// What the power stage sees at its inputs now.
@@ -196,6 +202,10 @@ impl Board {
             Input::FlipBit { address, bit } => self.flip(address, bit),
             Input::IgnoreWatchdog => bus.iwdg.ignored = true,
             Input::IgnoreBreak => bus.pwm.break_ignored = true,
+            Input::IgnoreMpu => {
+                bus.system.mpu.ignored = true;
+                bus.below_sram = vec![0; BELOW_SRAM_BYTES];
+            }
         }
         self.machine.bus.system.nvic.changed = true;
     }
@@ -341,13 +351,21 @@ impl Board {
         crate::clock::frequency(self.machine.bus.hclk)
     }
 
+    /// Runs one instruction, or takes an exception; time passes at least by one unit.
+    ///
+    /// # Errors
+    /// [`Stopped`]
+    pub fn step(&mut self) -> Result<(), Stopped> {
+        self.run_until(self.now() + 1)
+    }
+
     /// Runs single instructions until the program counter has a value, or until `end`; gives whether it has.
     ///
     /// # Errors
     /// [`Stopped`]
     pub fn run_to(&mut self, program_counter: u32, end: Time) -> Result<bool, Stopped> {
         while self.now() < end {
-            self.machine.run_until(self.machine.bus.now + 1)?;
+            self.step()?;
             if self.machine.registers.pc == program_counter & !1 {
                 return Ok(true);
             }

@@ -1,6 +1,10 @@
 //! Images: what an ELF file puts into flash.
 
+use std::sync::Arc;
+
 use object::{Object, ObjectSymbol};
+
+use crate::lines::Lines;
 
 /// What is flashed.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -8,6 +12,8 @@ pub struct Image {
     pub(crate) segments: Vec<(u32, Vec<u8>)>,
     /// Name, address, bytes.
     symbols: Vec<(String, u32, u32)>,
+    /// The whole file, for its debug information.
+    file: Arc<[u8]>,
 }
 
 /// A file that is no image.
@@ -59,12 +65,28 @@ impl Image {
                 Some((symbol.name().ok()?.to_owned(), symbol.address() as u32, symbol.size() as u32))
             })
             .collect();
-        Ok(Self { segments, symbols })
+        Ok(Self { segments, symbols, file: bytes.into() })
     }
 
     /// Code at the beginning of flash, as directed programs have it: two vectors, then instructions.
     pub fn from_flash(bytes: Vec<u8>) -> Self {
-        Self { segments: vec![(0x0800_0000, bytes)], symbols: Vec::new() }
+        Self { segments: vec![(0x0800_0000, bytes)], symbols: Vec::new(), file: Arc::default() }
+    }
+
+    /// The same image with other bytes at an address of flash: for negative controls.
+    pub fn with_bytes(mut self, address: u32, bytes: Vec<u8>) -> Self {
+        self.segments.push((address, bytes));
+        self
+    }
+
+    /// The way from addresses to the source; none if the file has no debug information that can be read.
+    pub fn lines(&self) -> Option<Lines<'_>> {
+        Lines::of(&self.file)
+    }
+
+    /// File and line of the instruction at an address, where the debug information knows it.
+    pub fn source_line(&self, address: u32) -> Option<String> {
+        self.lines()?.line(address)
     }
 
     /// Address of a symbol.
@@ -79,7 +101,7 @@ impl Image {
     }
 
     /// Bytes of flash up to the end of the image.
-    pub(crate) fn end(&self) -> usize {
+    pub fn end(&self) -> usize {
         let end = |(address, bytes): &(u32, Vec<u8>)| (address & 0x00ff_ffff) as usize + bytes.len();
         self.segments.iter().map(end).max().unwrap_or(0)
     }

@@ -332,7 +332,8 @@ impl Machine {
 
     /// The core splits unaligned accesses to memory; to registers they fault.
     fn unaligned(&mut self, address: u32) -> Result<(), Trap> {
-        let memory = matches!(address >> 24, 0x00 | 0x08 | 0x10 | 0x20);
+        let memory =
+            matches!(address >> 24, 0x00 | 0x08 | 0x10 | 0x20) || self.bus.below_sram(address).is_some();
         if !memory {
             return Err(Violation::Unaligned(address).into());
         }

@@ -39,7 +39,10 @@ impl Bus {
             0x08 => get(&self.flash, offset, unit),
             0x00 => get(&self.flash, offset, unit),
             0x10 => get(&self.core_coupled, offset, unit),
-            0x1f => self.identity(address, unit),
+            0x1f => match self.below_sram(address) {
+                Some(offset) => get(&self.below_sram, offset, unit),
+                None => self.identity(address, unit),
+            },
             _ => None,
         }
     }
@@ -51,8 +54,18 @@ impl Bus {
         match address >> 24 {
             0x20 => put(&mut self.sram, offset, unit, value),
             0x10 => put(&mut self.core_coupled, offset, unit, value),
+            0x1f => match self.below_sram(address) {
+                Some(offset) => put(&mut self.below_sram, offset, unit, value),
+                None => false,
+            },
             _ => false,
         }
+    }
+
+    /// Place in the reserved space below the SRAM, if that answers.
+    pub(crate) fn below_sram(&self, address: u32) -> Option<usize> {
+        let offset = address.checked_sub(0x2000_0000 - self.below_sram.len() as u32)? as usize;
+        (offset < self.below_sram.len()).then_some(offset)
     }
 
     /// An aligned word of memory.

@@ -90,6 +90,8 @@ pub(crate) struct Bus {
     pub(crate) flash: Vec<u8>,
     pub(crate) sram: Vec<u8>,
     core_coupled: Vec<u8>,
+    /// Reserved space that ends at the SRAM; empty unless it answers like memory.
+    pub(crate) below_sram: Vec<u8>,
     pub(crate) cache: FlashCache,
     pub(crate) system: System,
     pub(crate) rcc: Rcc,
@@ -153,6 +155,7 @@ impl Bus {
             flash,
             sram,
             core_coupled,
+            below_sram: Vec::new(),
             cache: FlashCache::new(),
             system: System::new(),
             rcc,
@@ -181,7 +184,9 @@ impl Bus {
     /// A system reset: registers begin again, memory stays; `flags` say why.
     pub(crate) fn reset(&mut self, flags: u32) {
         self.settle_output();
+        let mpu_is_ignored = self.system.mpu.ignored;
         self.system = System::new();
+        self.system.mpu.ignored = mpu_is_ignored;
         self.rcc.reset(flags | crate::peripherals::rcc::PIN_FLAG);
         self.cache = FlashCache::new();
         self.flash_control = 0;

@@ -16,6 +16,8 @@ pub(crate) struct Mpu {
     pub(crate) control: u32,
     pub(crate) number: u32,
     regions: [Region; REGIONS],
+    /// It allows everything, whatever its registers say.
+    pub(crate) ignored: bool,
 }
 
 #[derive(Debug, Clone, Copy, Default)]
@@ -43,7 +45,7 @@ impl Region {
 
 impl Mpu {
     pub(crate) fn enabled(&self) -> bool {
-        self.control & 1 != 0
+        self.control & 1 != 0 && !self.ignored
     }
 
     /// Whether an access is allowed. `suspended`: in HardFault, NMI or with FAULTMASK.

@@ -1,0 +1,56 @@
+//! From the address of an instruction to its source, by the debug information of an image.
+
+use addr2line::Context;
+use addr2line::gimli::{Dwarf, EndianSlice, Error, LittleEndian, SectionId};
+use object::{Object, ObjectSection};
+
+/// The debug information of an image.
+pub struct Lines<'a> {
+    context: Context<EndianSlice<'a, LittleEndian>>,
+}
+
+impl<'a> Lines<'a> {
+    /// Of the bytes of an ELF file.
+    pub(crate) fn of(file: &'a [u8]) -> Option<Self> {
+        let elf = object::read::elf::ElfFile32::<object::Endianness>::parse(file).ok()?;
+        let section = |id: SectionId| {
+            let found = elf.section_by_name(id.name());
+            let data = found.and_then(|section| section.data().ok()).unwrap_or_default();
+            Ok::<_, Error>(EndianSlice::new(data, LittleEndian))
+        };
+        let context = Context::from_dwarf(Dwarf::load(section).ok()?).ok()?;
+        Some(Self { context })
+    }
+
+    /// File and line of an instruction, as `src/main.rs:42`: in the program itself, if a library's function is inlined
+    /// there.
+    pub fn line(&self, address: u32) -> Option<String> {
+        let mut frames = self.context.find_frames(address.into()).skip_all_loads().ok()?;
+        let mut innermost = None;
+        while let Ok(Some(frame)) = frames.next() {
+            let Some((file, line)) = frame.location.and_then(|place| Some((place.file?, place.line?))) else {
+                continue;
+            };
+            let text = format!("{file}:{line}");
+            if !["/registry/", "/library/"].iter().any(|library| file.replace('\\', "/").contains(library)) {
+                return Some(text);
+            }
+            innermost.get_or_insert(text);
+        }
+        innermost
+    }
+
+    /// The functions that an instruction belongs to, by their linker's names: the innermost inlined one first, the one
+    /// that is called last.
+    pub fn functions(&self, address: u32) -> Vec<String> {
+        let Ok(mut frames) = self.context.find_frames(address.into()).skip_all_loads() else {
+            return Vec::new();
+        };
+        let mut names = Vec::new();
+        while let Ok(Some(frame)) = frames.next() {
+            let name = frame.function.and_then(|function| Some(function.raw_name().ok()?.into_owned()));
+            names.push(name.unwrap_or_default());
+        }
+        names
+    }
+}
