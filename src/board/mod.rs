@@ -66,8 +66,9 @@ pub trait Board<const NY: usize> {
     /// Drives the motor until the next call.
     fn drive(&mut self, output: &Output);
 
-    /// Called at the end of a tick. Restarts the independent watchdog if the next tick is not due yet. If the watchdog
-    /// is not restarted in time, it resets the microcontroller, which turns the motor off.
+    /// Called at the end of a tick. Restarts the independent watchdog, but not if this is the third tick in a row that
+    /// has ended after the next one was due. If the watchdog is not restarted in time, it resets the microcontroller,
+    /// which turns the motor off.
     fn feed_watchdog(&mut self);
 
     /// A free-running counter of processor cycles.

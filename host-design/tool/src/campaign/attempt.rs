@@ -4,6 +4,7 @@ use upright::board::Output;
 use upright::protocol::message::{Answer, Request};
 use upright::supervision::fault::Fault;
 use upright::supervision::sign_check::Signs;
+use upright_board::UNITS_PER_MICROSECOND;
 
 use super::defect::{Expected, Kind};
 use super::injection::Injection;
@@ -27,7 +28,7 @@ pub struct Setup<'a> {
     pub place: Place<'a>,
     /// Whether the firmware has its thresholds and limits. Without them it cannot find most defects.
     pub detection: bool,
-    /// Whether a board has its guards: watchdog, break input, registers that are read back.
+    /// Whether a board has its guards: watchdog, break input, MPU, registers that are read back.
     pub guards: bool,
 }
 
@@ -57,7 +58,9 @@ pub(super) fn attempt(setup: &Setup<'_>, trial: &Trial, with_defect: bool) -> Re
     let broken = trial.kind.at_power_up(trial, setup.guards);
     let mut target = VirtualBoard::start_with(image, &conditions, table, &broken)?;
     attempt.board = Some(OnBoard { image, events: target.events() });
-    Ok(attempt.run(&mut target)?)
+    let mut observed = attempt.run(&mut target)?;
+    observed.stop_to_off_us = target.stop_to_off().map(|time| time as f64 / UNITS_PER_MICROSECOND as f64);
+    Ok(observed)
 }
 
 /// The way to a board's own defects.

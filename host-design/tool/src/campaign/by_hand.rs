@@ -37,6 +37,7 @@ impl Kind {
                 | Kind::CountsLost
                 | Kind::SensorLate
                 | Kind::SensorIntermittent
+                | Kind::EncoderWireOpen
         )
     }
 }

@@ -60,6 +60,7 @@ pub enum Kind {
     TableBit,
     RamBit,
     WriteLost,
+    EncoderWireOpen,
 }
 
 /// The outcome that a defect must have.
@@ -98,7 +99,7 @@ pub enum Ticks {
 
 impl Kind {
     /// Every kind with its name, a description, and the outcome that it must have.
-    pub const ALL: [(Kind, &str, &str, Expected); 51] = {
+    pub const ALL: [(Kind, &str, &str, Expected); 52] = {
         use Expected::*;
         use Ticks::*;
         [
@@ -238,6 +239,12 @@ impl Kind {
                 "a write to a register of the motor's timer is lost at power-up",
                 Refused(Inhibits::FAULT),
             ),
+            (
+                Kind::EncoderWireOpen,
+                "encoder-wire-open",
+                "a wire of an encoder is open: its count goes to and fro between two values",
+                Off(10),
+            ),
         ]
     };
 
@@ -278,7 +285,7 @@ impl Kind {
 
     /// Whether it is possible only on a board.
     pub fn needs_board(self) -> bool {
-        self as usize >= Kind::StalledTick as usize
+        (Kind::StalledTick as usize..=Kind::WriteLost as usize).contains(&(self as usize))
     }
 
     /// Whether no board can have it: its converter gives numbers.
@@ -303,6 +310,7 @@ impl Kind {
                 | Kind::MotorDead
                 | Kind::MotorReversed
                 | Kind::MotorStuck
+                | Kind::EncoderWireOpen
         )
     }
 }

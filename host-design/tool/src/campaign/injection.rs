@@ -112,6 +112,10 @@ impl<'a> Injection<'a> {
             Kind::EncoderJump => shown.push(shows(sensor, moved(sensor) + off)),
             Kind::SensorIntermittent if since % 3 < 2 => shown.push(shows(sensor, moved(sensor) + off)),
             Kind::EncoderReversed => shown.push(shows(sensor, -moved(sensor))),
+            Kind::EncoderWireOpen => {
+                // Of the edges of the other channel, every second one counts up and every other one down.
+                shown.push(shows(sensor, i64::from(moved(sensor).rem_euclid(4) >= 2)));
+            }
             Kind::EncodersSwapped if truth.len() > 1 => {
                 shown.push(shows(sensor, moved(sensor + 1)));
                 shown.push(shows(sensor + 1, moved(sensor)));

@@ -44,6 +44,9 @@ pub struct Outcome {
     pub from_onset: Option<u32>,
     /// Code of the latched fault.
     pub fault: Option<u8>,
+    /// Time from the edge of the emergency stop to an inactive PWM, if it opened between ticks (µs).
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub stop_to_off_us: Option<f64>,
 }
 
 /// Runs and judges a trial.
@@ -94,7 +97,8 @@ pub(super) fn judge(setup: &Setup<'_>, trial: &Trial) -> Result<Outcome, RunErro
         Expected::Dead => Class::Missed,
     };
     let fault = observed.fault.map(Fault::code);
-    Ok(Outcome { number: trial.number, kind: trial.kind, class, ticks, from_onset, fault })
+    let stop_to_off_us = observed.stop_to_off_us;
+    Ok(Outcome { number: trial.number, kind: trial.kind, class, ticks, from_onset, fault, stop_to_off_us })
 }
 
 fn of_fault(

@@ -25,6 +25,8 @@ pub(super) struct Observed {
     pub(super) refused: Option<Inhibits>,
     /// Whether the firmware has stopped running.
     pub(super) dead: bool,
+    /// Time from the edge of the emergency stop to an output that is off (µs).
+    pub(super) stop_to_off_us: Option<f64>,
 }
 
 impl Observed {

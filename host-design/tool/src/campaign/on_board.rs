@@ -50,13 +50,17 @@ impl Kind {
             Kind::WriteLost => vec![Input::LoseWriteUnseen(register)],
             Kind::StalledTick | Kind::LockUp if !guarded => vec![Input::IgnoreWatchdog],
             Kind::StopBetweenTicks if !guarded => vec![Input::IgnoreBreak],
+            Kind::StackOverflow if !guarded => vec![Input::IgnoreMpu],
             _ => Vec::new(),
         }
     }
 
     /// Whether there is a guard that can be taken away: the defect must then be missed.
     pub fn needs_guard(self) -> bool {
-        matches!(self, Kind::WriteLost | Kind::StalledTick | Kind::LockUp | Kind::StopBetweenTicks)
+        matches!(
+            self,
+            Kind::WriteLost | Kind::StalledTick | Kind::LockUp | Kind::StopBetweenTicks | Kind::StackOverflow
+        )
     }
 
     /// Whether it is there from power-up on, and prevents arming.
@@ -84,11 +88,7 @@ impl Kind {
             Kind::StopBetweenTicks => {
                 // At least the time of a tick's code away from both ticks.
                 let when = tick / 10 + (trial.size * 0.7 * tick as f64) as Time;
-                let stop = pin('B', 12);
-                vec![
-                    at(when, Input::Level(stop, Wire::Open)),
-                    at(when + tick / 20, Input::Level(stop, Wire::Low)),
-                ]
+                vec![Event::Stop { after: when, open: tick / 20 }]
             }
             Kind::BrownOut => {
                 let volts = 2.0 + 0.6 * trial.size as f32;

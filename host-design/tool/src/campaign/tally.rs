@@ -50,6 +50,9 @@ pub struct Row {
     pub worst: Option<u32>,
     /// The same, counted from the first tick of the defect.
     pub worst_from_onset: Option<u32>,
+    /// Longest time from the edge of the emergency stop to an inactive PWM, if it opened between ticks (µs).
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub stop_to_off_us: Option<f64>,
     /// Names of the faults that were latched.
     pub faults: Vec<&'static str>,
     /// Numbers of the trials with a wrong outcome.
@@ -147,6 +150,7 @@ impl Row {
             false_alarms: count(Class::FalseAlarm),
             worst: of_kind().filter_map(|outcome| outcome.ticks).max(),
             worst_from_onset: of_kind().filter_map(|outcome| outcome.from_onset).max(),
+            stop_to_off_us: of_kind().filter_map(|outcome| outcome.stop_to_off_us).max_by(f64::total_cmp),
             faults: faults.into_iter().filter_map(name).collect(),
             wrong: of_kind()
                 .filter(|outcome| is_wrong(outcome.class))

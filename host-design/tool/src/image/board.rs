@@ -1,5 +1,7 @@
 //! The boards by name. What each of them is stands in the firmware: `src/board/f4/boards/`.
 
+use upright_board::{Chip, Conditions};
+
 /// A board that there is an image for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Board {
@@ -34,6 +36,20 @@ impl Board {
             Board::DiscoveryF407 => "STM32F407VGTx",
             Board::NucleoF446 => "STM32F446RETx",
         }
+    }
+
+    /// The board as a virtual one, everything as it typically is; what is random follows from `seed`.
+    pub fn conditions(self, seed: u64) -> Conditions {
+        let mut conditions = Conditions::f405(seed);
+        match self {
+            Board::WeactF405 | Board::OlimexH405 => {}
+            Board::DiscoveryF407 => (conditions.chip, conditions.chip_v) = (Chip::F407, 3.0),
+            Board::NucleoF446 => {
+                conditions.chip = Chip::F446;
+                conditions.crystal.is_clock_input = true;
+            }
+        }
+        conditions
     }
 }
 

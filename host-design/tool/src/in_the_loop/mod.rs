@@ -6,7 +6,7 @@ mod place;
 mod qemu;
 mod relay;
 
-pub use board::{Compared, Event, Events, RULES, VirtualBoard};
+pub use board::{Compared, Cycles, Event, Events, Figures, RULES, Span, TooLong, VirtualBoard, measure};
 pub use place::{Place, RunError, run, run_compared};
 pub use qemu::{Emulator, EmulatorError, Link};
 pub use relay::{RelayError, serve};

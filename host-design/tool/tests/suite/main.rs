@@ -6,6 +6,7 @@ mod command;
 mod command_line;
 mod compare_command;
 mod compare_sweep;
+mod cycles;
 mod documented_tables;
 mod documents;
 mod identify_command;

@@ -7,7 +7,7 @@ use upright::gains::RIG_HASH;
 use upright::table::Law;
 use upright_board::{Conditions, Image};
 use upright_design::design::design;
-use upright_design::rig::Rig;
+use upright_design::rig::{Integral, Rig};
 use upright_design::simulate::Scenario;
 use upright_design::swing_up::{Stored, hangs, motions, up_and_down, with_motions};
 use upright_design::table::{Gains, TableValues};
@@ -70,19 +70,40 @@ fn the_flashed_image_raises_and_lowers_the_links_with_the_bits_of_the_host() {
     assert!(error.contains("differ"), "{error}");
 }
 
-/// Duty and supply from the first tick on: the converter has measured the supply before it.
+/// The supply of the chip is too low for the wait states that the image sets.
 #[test]
-fn a_rig_with_motor_data_has_the_bits_of_the_host_from_the_first_tick_on() {
-    let rig = Rig::from_path(Path::new("../../rigs/single-quanser-ip02.toml")).unwrap();
+fn a_stopped_run_names_address_and_source_line() {
+    let Some(elf) = build_if_possible(Kind::Board(Board::WeactF405)).unwrap() else { return };
+    let image = Image::from_elf(&std::fs::read(elf).unwrap()).unwrap();
+    let rig = Rig::from_path("../../rigs/quadruple-paper.toml".as_ref()).unwrap();
     let table = TableValues::of(&rig, &design(&rig).unwrap(), Gains::Sampled).unwrap();
+    let conditions = Conditions { chip_v: 2.5, ..Conditions::f405(1) };
+    let error = VirtualBoard::start(&image, &conditions, &table).err().unwrap().to_string();
+    for part in ["at program counter 0x0800", "wait states", "src/board/f4/clock.rs:"] {
+        assert!(error.contains(part), "{part}: {error}");
+    }
+    // Negative control: without debug information there is no line.
+    let stripped = Image::from_flash(vec![0; 64]);
+    assert!(stripped.source_line(0x0800_0010).is_none() && image.source_line(0x0800_0000).is_none());
+}
+
+/// Motor data, a delay of a tick, and integral action, with both laws.
+#[test]
+fn motor_delay_and_integral_action_give_the_bits_of_the_host() {
+    let mut rig = Rig::from_path("../../rigs/single-quanser-ip02.toml".as_ref()).unwrap();
+    rig.tick.delay_ticks = 1;
+    rig.integral = Some(Integral { position_weight: 100.0 });
+    let table = TableValues::of(&rig, &design(&rig).unwrap(), Gains::Sampled).unwrap();
+    assert!(table.motor.is_some() && table.sensors() == 2);
     let built = build_for(Kind::Board(Board::WeactF405), &rig, &table);
     let Some(elf) = if_possible(built).unwrap() else { return };
     let image = Image::from_elf(&std::fs::read(elf).unwrap()).unwrap();
-    let mut scenario = Scenario::at_rest(&rig, Law::Lqr);
-    scenario.start[2] = 0.002;
-    scenario.duration_s = 1.0;
-    let mut board = VirtualBoard::start(&image, &Conditions::f405(1), &table).unwrap();
-    let (recording, [ticks, messages]) = run_compared(&rig, &table, &scenario, &mut board).unwrap();
-    assert!(recording.summary.fall.is_none() && recording.fault.is_none(), "{:?}", recording.summary);
-    assert!(ticks > 1_000 && messages > 100, "{ticks} {messages}");
+    for law in Law::ALL {
+        let scenario =
+            Scenario { duration_s: 1.0, step_m: 0.05, force_noise_n: 0.05, ..Scenario::at_rest(&rig, law) };
+        let mut board = VirtualBoard::start(&image, &Conditions::f405(2), &table).unwrap();
+        let (recording, [ticks, messages]) = run_compared(&rig, &table, &scenario, &mut board).unwrap();
+        assert!(recording.summary.fall.is_none() && recording.fault.is_none(), "{law:?}: {recording:?}");
+        assert!(ticks > 2_000 && messages > 200, "{law:?}: {ticks} {messages}");
+    }
 }

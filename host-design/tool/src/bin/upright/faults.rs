@@ -12,7 +12,7 @@ use upright_tool::image::{Board, Kind as ImageKind, build_for};
 use upright_tool::in_the_loop::{Link, Place};
 
 use crate::failure::Failure;
-use crate::firmware::read;
+use crate::firmware::{announced, read};
 use crate::progress::{with_bar, with_spinner};
 use crate::variation::{Variation, with_stored_motions};
 
@@ -105,7 +105,8 @@ impl Faults {
         };
         let flashed = match &image {
             Some(image) if self.target == Target::Board => Some(read(image)?),
-            _ => None,
+            Some(image) => announced(image).map(|_| None)?,
+            None => None,
         };
         let place = match (&flashed, &image) {
             (Some(image), _) => Place::Board { image, conditions: Conditions::f405(self.seed) },
@@ -151,7 +152,7 @@ impl Faults {
         Ok(Some(result))
     }
 
-    /// The other negative control, on the board: without watchdog, break input, registers read back.
+    /// The other negative control, on the board: without watchdog, break input, MPU, registers read back.
     fn unguarded(&self, setup: &Setup<'_>, chosen: &[Kind]) -> Result<Option<Campaign>, Failure> {
         let chosen: Vec<Kind> = chosen.iter().copied().filter(|kind| kind.needs_guard()).collect();
         if self.target != Target::Board || chosen.is_empty() {
@@ -233,6 +234,9 @@ impl Faults {
                 ticks(row.worst_from_onset),
                 row.faults.join(", ")
             )?;
+        }
+        if let Some(us) = result.rows.iter().find_map(|row| row.stop_to_off_us) {
+            writeln!(out, "emergency stop between ticks: PWM inactive at most {us:.3} µs after the edge")?;
         }
         if let Some(control) = control {
             let missed: usize = control.rows.iter().map(|row| row.missed).sum();

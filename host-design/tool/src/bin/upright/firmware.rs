@@ -1,12 +1,13 @@
 //! `upright firmware`: everything about the image, from building to monitoring.
 
 mod build;
+mod cycles;
 mod flash;
 mod monitor;
 mod run;
 mod size;
 
-pub(crate) use run::read;
+pub(crate) use run::{announced, read};
 
 use std::path::{Path, PathBuf};
 
@@ -30,6 +31,7 @@ pub(crate) struct Firmware {
 #[derive(Subcommand)]
 enum Command {
     Build(build::Build),
+    Cycles(Box<cycles::Cycles>),
     Size(size::Size),
     Flash(flash::Flash),
     Run(Box<run::Run>),
@@ -40,6 +42,7 @@ impl Firmware {
     pub(crate) fn run(self) -> Result<(), Failure> {
         match self.command {
             Command::Build(command) => command.run(),
+            Command::Cycles(command) => command.run(),
             Command::Size(command) => command.run(),
             Command::Flash(command) => command.run(),
             Command::Run(command) => command.run(),

@@ -21,8 +21,6 @@ pub struct Compared<'a> {
     /// Bytes that came with the tick before.
     received: Vec<u8>,
     was_stopped: bool,
-    /// The converter's result is that of the tick before; before the first it has none.
-    supply_v: f32,
     streams: [Stream; 2],
     /// Ticks that were compared.
     pub ticks: u64,
@@ -52,16 +50,7 @@ impl<'a> Compared<'a> {
     /// Both have just started.
     pub fn new(board: &'a mut VirtualBoard, host: &'a mut dyn Target) -> Self {
         let streams = [(); 2].map(|()| Stream { receiver: Receiver::new(), telemetry: VecDeque::new() });
-        Self {
-            board,
-            host,
-            received: Vec::new(),
-            was_stopped: false,
-            supply_v: 0.0,
-            streams,
-            ticks: 0,
-            messages: 0,
-        }
+        Self { board, host, received: Vec::new(), was_stopped: false, streams, ticks: 0, messages: 0 }
     }
 
     /// The duty at the pins is that of the host, to the timer's clock.
@@ -126,7 +115,6 @@ impl Target for Compared<'_> {
         // The break input's flag comes again while the contact is open: it is found once more in the tick after.
         let stopped = std::mem::replace(&mut self.was_stopped, pins.contacts.emergency_stop);
         latched.contacts.emergency_stop |= stopped;
-        latched.supply_v = std::mem::replace(&mut self.supply_v, pins.supply_v);
         let mut from_host = Vec::new();
         let host = self.host.tick(&latched, &mut from_host)?;
         self.compare_duty(&host)?;

@@ -1,6 +1,8 @@
 //! The image that is flashed, on the virtual board: its pins are edges, levels, volts and bytes at their baud rate.
 
 mod compared;
+mod cycles;
+mod meter;
 
 use std::cell::RefCell;
 use std::collections::VecDeque;
@@ -11,14 +13,16 @@ use upright::control::actuator::Drive;
 use upright::protocol::BAUD;
 use upright::protocol::simulated_pins::Sabotage;
 use upright_board::{
-    Board, Conditions, Image, Input, PowerStage, Rules, Time, UNITS_PER_MICROSECOND, UNITS_PER_SECOND, Wire,
-    Wiring, pin, seconds,
+    Board, Conditions, Image, Input, Pin, PowerStage, Rules, Stopped, Time, UNITS_PER_MICROSECOND,
+    UNITS_PER_SECOND, Wire, Wiring, pin, seconds,
 };
 use upright_design::harness::{HarnessError, Pace, Pins, Target};
 use upright_design::simulate::Bench;
 use upright_design::table::TableValues;
 
 pub use compared::Compared;
+pub use cycles::{Cycles, Figures, Span, TooLong, measure};
+use meter::{Meter, TickCost};
 
 /// Inputs change so long before a tick.
 const LEAD: Time = 2 * UNITS_PER_MICROSECOND;
@@ -34,6 +38,9 @@ const NOWHERE: u32 = 0x3000_0000;
 const STACK_END: u32 = 0x2000_0000;
 /// Number of SysTick among the exceptions.
 const SYS_TICK: u16 = 15;
+/// High while a tick runs.
+const TICK_PIN: Pin = pin('B', 1);
+const EMERGENCY_STOP: Pin = pin('B', 12);
 
 /// What the firmware's image may do: what the processor faults at, it does; everything else that the manuals do not
 /// allow ends the run.
@@ -58,6 +65,13 @@ pub enum Event {
     },
     /// From now on no byte of the host arrives.
     CutLine,
+    /// The emergency stop opens so long after the beginning of the tick, and closes again.
+    Stop {
+        /// How long.
+        after: Time,
+        /// How long it stays open.
+        open: Time,
+    },
 }
 
 /// The way to let something happen to a board that someone else runs.
@@ -81,6 +95,10 @@ pub struct VirtualBoard {
     is_cut: bool,
     events: Events,
     stage: PowerStage,
+    /// Longest time from an edge of the emergency stop to an output that is off, if it was off before the next tick.
+    stop_to_off: Option<Time>,
+    image: Image,
+    meter: Option<Meter>,
 }
 
 impl VirtualBoard {
@@ -102,7 +120,8 @@ impl VirtualBoard {
         table: &TableValues,
         at_power_up: &[Input],
     ) -> Result<Self, HarnessError> {
-        let mut board = Board::power_on(image, conditions, Wiring::upright(), RULES).map_err(stopped)?;
+        let mut board = Board::power_on(image, conditions, Wiring::upright(), RULES)
+            .map_err(|error| stopped(image, error))?;
         let stage = board.power_stage();
         let mut target = Self {
             board,
@@ -118,6 +137,9 @@ impl VirtualBoard {
             is_cut: false,
             events: Events::default(),
             stage,
+            stop_to_off: None,
+            image: image.clone(),
+            meter: None,
         };
         target.connect(&Contacts::default());
         target.supply(table.motor.map_or(24.0, |motor| motor.supply_v));
@@ -148,6 +170,22 @@ impl VirtualBoard {
         self.stage
     }
 
+    /// From now on measures every tick: slower, and otherwise the same.
+    fn measure_ticks(&mut self) {
+        self.meter = Some(Meter::new(&self.image));
+    }
+
+    /// The ticks that were measured.
+    fn ticks(&self) -> &[TickCost] {
+        self.meter.as_ref().map_or(&[], |meter| &meter.ticks)
+    }
+
+    /// Longest time from an edge of the emergency stop to an output that is off; none if it never opened between ticks,
+    /// or nothing was off before the next tick.
+    pub fn stop_to_off(&self) -> Option<Time> {
+        self.stop_to_off
+    }
+
     /// What the image has latched in the last tick, for a firmware that shall do the same. `received` came with the
     /// tick before: the image looks for bytes after each tick.
     fn latched(&self, pins: &Pins, received: &[u8]) -> Pins {
@@ -163,7 +201,16 @@ impl VirtualBoard {
     }
 
     fn run(&mut self, end: Time) -> Result<(), HarnessError> {
-        self.board.run_until(end).map_err(stopped)
+        let run = match &mut self.meter {
+            Some(meter) => meter.run(&mut self.board, end),
+            None => self.board.run_until(end),
+        };
+        run.map_err(|error| stopped(&self.image, error))
+    }
+
+    /// One instruction.
+    fn step(&mut self) -> Result<(), HarnessError> {
+        self.run(self.board.now() + 1)
     }
 
     /// Contacts as levels: those of the emergency stop and the limits are closed to ground while all is well, the
@@ -172,7 +219,7 @@ impl VirtualBoard {
         let level = |low: bool| if low { Wire::Low } else { Wire::High };
         let closed = |open: bool| if open { Wire::Open } else { Wire::Low };
         for (at, wire) in [
-            (pin('B', 12), closed(contacts.emergency_stop)),
+            (EMERGENCY_STOP, closed(contacts.emergency_stop)),
             (pin('C', 0), closed(contacts.limit_low)),
             (pin('C', 1), closed(contacts.limit_high)),
             (pin('B', 13), level(contacts.driver_fault)),
@@ -211,29 +258,86 @@ impl VirtualBoard {
         self.received = bytes;
     }
 
-    /// What shall happen in the tick that begins soon after `now`.
-    fn happen(&mut self, now: Time) {
+    /// What shall happen in the tick that begins soon after `now`; gives when the emergency stop opens, and for how
+    /// long.
+    fn happen(&mut self, now: Time) -> Option<(Time, Time)> {
         let begin = self.board.next_tick().unwrap_or(now);
+        let mut stop = None;
         for event in self.events.take() {
             match event {
                 Event::Input { after, input } => self.board.at(begin + after, input),
                 Event::Bytes { bytes, baud } => drop(self.board.send(&bytes, baud)),
                 Event::CutLine => self.is_cut = true,
+                Event::Stop { after, open } => stop = Some((begin + after, open)),
             }
+        }
+        stop
+    }
+
+    /// The emergency stop opens between two ticks: how long until the output is off?
+    fn press_stop(&mut self, edge: Time, open: Time) -> Result<(), HarnessError> {
+        self.run(edge)?;
+        let edge = self.board.now();
+        self.board.apply(Input::Level(EMERGENCY_STOP, Wire::Open));
+        self.board.at(edge + open, Input::Level(EMERGENCY_STOP, Wire::Low));
+        let end = self.board.next_tick().map_or(edge, |next| next.saturating_sub(LEAD));
+        while self.board.power_stage().main_output && self.board.now() < end {
+            self.step()?;
+        }
+        if !self.board.power_stage().main_output {
+            self.stop_to_off = self.stop_to_off.max(Some(self.board.now() - edge));
+        }
+        Ok(())
+    }
+
+    /// The tick that comes next ends after the one after it is due: it stands still once it has driven the motor.
+    fn make_late(&mut self, period: Time) -> Result<(), HarnessError> {
+        let due = self.board.next_tick().unwrap_or(self.board.now());
+        self.run(due)?;
+        // If the tick before is late itself, this one begins when that has ended.
+        for begun in [false, true] {
+            while self.board.output(TICK_PIN) != begun && self.board.now() < due + period / 2 {
+                self.step()?;
+            }
+        }
+        let begin = self.board.now();
+        while self.board.power_stage().started_at < begin && self.board.output(TICK_PIN) {
+            self.step()?;
+        }
+        self.board.apply(Input::Stall(due + period + INSIDE));
+        Ok(())
+    }
+
+    /// A defect inside the microcontroller, in the tick that comes next.
+    fn sabotage(&mut self, sabotage: Sabotage) -> Result<(), HarnessError> {
+        let begin = self.board.next_tick().unwrap_or(self.board.now());
+        match sabotage {
+            // A panic that cannot be reported is an undefined instruction, which is a processor fault.
+            Sabotage::Panic | Sabotage::HardFault => {
+                self.run(begin + INSIDE)?;
+                debug_assert!(self.board.exception() == SYS_TICK || self.board.resets() > 0);
+                self.board.apply(Input::Jump(NOWHERE));
+                Ok(())
+            }
+            Sabotage::StackOverflow => self.fill_stack(begin),
         }
     }
 
-    /// A defect inside the microcontroller, in the middle of the tick that begins now.
-    fn sabotage(&mut self, sabotage: Sabotage) -> Result<(), HarnessError> {
-        let begin = self.board.next_tick().unwrap_or(self.board.now());
-        self.run(begin + INSIDE)?;
-        let input = match sabotage {
-            // A panic that cannot be reported is an undefined instruction, which is a processor fault.
-            Sabotage::Panic | Sabotage::HardFault => Input::Jump(NOWHERE),
-            Sabotage::StackOverflow => Input::StackPointer(STACK_END + 8),
-        };
-        debug_assert!(self.board.exception() == SYS_TICK || self.board.resets() > 0);
-        self.board.apply(input);
+    /// The stack is full but for two words when the tick comes. If that does not stop the program, it goes on with the
+    /// stack that it had.
+    fn fill_stack(&mut self, begin: Time) -> Result<(), HarnessError> {
+        self.run(begin - 1)?;
+        let (stack, below) = (self.board.registers()[13], self.board.exception());
+        self.board.apply(Input::StackPointer(STACK_END + 8));
+        while self.board.exception() == below && self.board.now() < begin + INSIDE {
+            self.step()?;
+        }
+        while self.board.exception() == SYS_TICK && self.board.now() < begin + seconds(self.tick_s) / 2 {
+            self.step()?;
+        }
+        if self.board.exception() == below {
+            self.board.apply(Input::StackPointer(stack));
+        }
         Ok(())
     }
 }
@@ -250,16 +354,17 @@ impl Target for VirtualBoard {
         }
         self.turn(&pins.raw_counts);
         self.outgoing.extend(&pins.received);
-        self.happen(begin);
+        let before = self.board.driven();
+        let stop = self.happen(begin);
         if self.is_cut {
             self.outgoing.clear();
         }
         self.send(period);
-        let before = self.board.driven();
         if pins.contacts.overrun {
-            // The tick ends after the next one is due.
-            let due = self.board.next_tick().unwrap_or(begin) + period;
-            self.board.at(due - period + INSIDE, Input::Stall(due + 4 * INSIDE));
+            self.make_late(period)?;
+        }
+        if let Some((edge, open)) = stop {
+            self.press_stop(edge, open)?;
         }
         if let Some(sabotage) = pins.sabotage {
             self.sabotage(sabotage)?;
@@ -299,6 +404,7 @@ impl Target for VirtualBoard {
     }
 }
 
-fn stopped(stopped: upright_board::Stopped) -> HarnessError {
-    HarnessError::Board(format!("has stopped {stopped}"))
+fn stopped(image: &Image, stopped: Stopped) -> HarnessError {
+    let line = image.source_line(stopped.program_counter).map_or(String::new(), |line| format!(" ({line})"));
+    HarnessError::Board(format!("has stopped {stopped}{line}"))
 }

@@ -7,9 +7,11 @@ use clap::Args;
 use upright_tool::image::{Board, Kind};
 
 use super::built;
+use super::cycles::check_ticks;
 use crate::failure::Failure;
 
-/// Builds the image of a board and prints the path of its ELF file.
+/// Builds the image of a board, runs it on the virtual board, and prints the path of its ELF file; exit status 1 if a
+/// tick takes longer than a quarter of its period.
 ///
 /// The compiler is that of rustup, if its target thumbv7em-none-eabihf is installed, otherwise that of Debian; exit
 /// status 4, with what to install, if there is neither.
@@ -30,6 +32,7 @@ pub(crate) struct Build {
 impl Build {
     pub(crate) fn run(self) -> Result<(), Failure> {
         let image = built(Kind::Board(self.board), self.rig.as_deref())?;
+        check_ticks(self.board, self.rig.as_deref(), &image)?;
         writeln!(std::io::stdout(), "{}", image.display())?;
         Ok(())
     }

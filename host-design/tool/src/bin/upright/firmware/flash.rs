@@ -7,11 +7,13 @@ use clap::Args;
 use upright_tool::image::{Board, Kind};
 
 use super::built;
+use super::cycles::check_ticks;
 use crate::failure::Failure;
 
 const PROBE_RS: &str = "probe-rs";
 
-/// Builds the image of a board, writes it to the board with probe-rs, verifies it, and starts it.
+/// Builds and checks the image of a board as `build` does, writes it to the board with probe-rs, verifies it, and starts
+/// it.
 ///
 /// The firmware starts disarmed: the motor stays off.
 #[derive(Args)]
@@ -36,6 +38,7 @@ impl Flash {
             ));
         }
         let image = built(Kind::Board(self.board), self.rig.as_deref())?;
+        check_ticks(self.board, self.rig.as_deref(), &image)?;
         probe_rs(&["download", "--verify", "--chip", self.board.chip()], Some(&image))?;
         probe_rs(&["reset", "--chip", self.board.chip()], None)
     }

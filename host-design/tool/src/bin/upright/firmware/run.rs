@@ -118,7 +118,10 @@ impl Run {
                 flashed = read(image)?;
                 Place::Board { image: &flashed, conditions: Conditions::f405(1) }
             }
-            Some((image, link)) => Place::Qemu { image, link: *link },
+            Some((image, link)) => {
+                announced(image)?;
+                Place::Qemu { image, link: *link }
+            }
         };
         Ok(with_spinner("serving", || serve(&rig, &table, &scenario, place, &listener))?)
     }
@@ -138,6 +141,7 @@ impl Run {
         if self.target == Target::Board {
             return on_the_board(real, table, scenario, &image);
         }
+        announced(&image)?;
         let place = Place::Qemu { image: &image, link };
         let recording = with_spinner("running it in QEMU", || run(real, table, scenario, place))?;
         compare(real, table, scenario, &recording)?;
@@ -145,14 +149,19 @@ impl Run {
     }
 }
 
-/// The image that is flashed.
+/// The image that is flashed; says which one it is.
 pub(crate) fn read(path: &Path) -> Result<upright_board::Image, Failure> {
+    upright_board::Image::from_elf(&announced(path)?)
+        .map_err(|error| Failure::BadArgument(format!("{}: {error}", path.display())))
+}
+
+/// The bytes of an ELF file that will run; says its path and its hash.
+pub(crate) fn announced(path: &Path) -> Result<Vec<u8>, Failure> {
     let bytes = std::fs::read(path)?;
     let hash =
         Sha256::digest(&bytes).iter().take(8).fold(String::new(), |hash, byte| hash + &format!("{byte:02x}"));
     eprintln!("{} ({hash})", path.display());
-    upright_board::Image::from_elf(&bytes)
-        .map_err(|error| Failure::BadArgument(format!("{}: {error}", path.display())))
+    Ok(bytes)
 }
 
 /// The image on the virtual board, beside the firmware on the host.

@@ -1,0 +1,175 @@
+//! `upright firmware cycles`
+
+use std::fmt::Write as _;
+use std::io::Write;
+use std::path::{Path, PathBuf};
+
+use clap::Args;
+use serde_json::json;
+use upright::gains::RIG_HASH;
+use upright::table::Law;
+use upright_board::Image;
+use upright_design::rig::Rig;
+use upright_design::simulate::{Scenario, Sensing};
+use upright_design::table::TableValues;
+use upright_design::verify::Disturbance;
+use upright_tool::image::{self, Board, Kind};
+use upright_tool::in_the_loop::{self, Figures, Span};
+use upright_tool::project::checkout;
+
+use super::designed;
+use super::run::read;
+use crate::failure::Failure;
+use crate::progress::with_spinner;
+use crate::variation::{law_option, positive};
+
+/// Measures what the ticks of the flashed image cost, on the virtual board: from the tick to the output, jitter of the
+/// output, and the whole task by part, from power-up through arming to balancing.
+///
+/// Cycles follow ARM's table and the flash's wait states; they are approximate. Exit status 1 if a tick takes longer
+/// than a quarter of its period.
+#[derive(Args)]
+#[command(before_help = "\
+Examples:
+  upright firmware cycles rigs/quadruple-paper.toml
+  upright firmware cycles rigs/single-quanser-ip02.toml --law pole-placement --board nucleo-f446
+  upright firmware cycles rigs/quadruple-paper.toml --json | jq .cycles.balancing.latency.us")]
+pub(crate) struct Cycles {
+    /// Rig file (TOML)
+    rig: PathBuf,
+    /// Board: weact-f405, olimex-h405, discovery-f407 or nucleo-f446
+    #[arg(long, value_name = "NAME", default_value_t = Board::WeactF405)]
+    board: Board,
+    /// Control law
+    #[arg(long, value_parser = law_option(), default_value = Law::Lqr.option())]
+    law: Law,
+    /// Time of balancing (s)
+    #[arg(long, default_value_t = 2.0, value_name = "S", value_parser = positive)]
+    duration: f64,
+    /// Print the figures as one JSON object
+    #[arg(long)]
+    json: bool,
+}
+
+impl Cycles {
+    pub(crate) fn run(self) -> Result<(), Failure> {
+        let (rig, table) = designed(&self.rig)?;
+        let image =
+            with_spinner("building the image", || image::build_for(Kind::Board(self.board), &rig, &table))?;
+        let image = read(&image)?;
+        let cycles = measured(&rig, &table, &image, self.board, self.law, self.duration)?;
+        let text = if self.json {
+            json!({ "rig": rig.name, "board": self.board.name(), "law": self.law.option(), "cycles": cycles })
+                .to_string()
+        } else {
+            table_of(&cycles)
+        };
+        writeln!(std::io::stdout(), "{}", text.trim_end())?;
+        if let Some(ended) = &cycles.ended {
+            eprintln!("it does not balance for {} s: {ended}", self.duration);
+        }
+        cycles.check().map_err(|error| Failure::CheckFailed(error.to_string()))
+    }
+}
+
+/// The ticks of the image, with the disturbances that the rig file expects.
+pub(super) fn measured(
+    rig: &Rig,
+    table: &TableValues,
+    image: &Image,
+    board: Board,
+    law: Law,
+    duration_s: f64,
+) -> Result<in_the_loop::Cycles, Failure> {
+    let disturbance = Disturbance::of(rig);
+    let scenario = Scenario {
+        sensing: Sensing::Encoders,
+        duration_s,
+        force_noise_n: disturbance.force_n,
+        torque_noise_n_m: disturbance.torque_n_m,
+        substeps: 2,
+        ..Scenario::at_rest(rig, law)
+    };
+    Ok(with_spinner("measuring its ticks", || {
+        in_the_loop::measure(rig, table, &scenario, image, &board.conditions(1))
+    })?)
+}
+
+/// Time of balancing in the check of an image (s).
+const CHECKED_S: f64 = 0.5;
+
+/// Refuses an image with a tick that the board cannot keep. Without a rig, that of src/gains.rs is looked for in
+/// `rigs/`.
+pub(super) fn check_ticks(board: Board, rig: Option<&Path>, image: &Path) -> Result<(), Failure> {
+    let Some(path) = rig.map(Path::to_owned).or_else(rig_of_the_gains) else {
+        eprintln!(
+            "the ticks are not checked: the rig of src/gains.rs is not in rigs/; check them with `upright firmware \
+             cycles RIG`"
+        );
+        return Ok(());
+    };
+    let (rig, table) = designed(&path)?;
+    let law = table.laws.present().next().map_or(Law::Lqr, |(law, _)| law);
+    let cycles = measured(&rig, &table, &read(image)?, board, law, CHECKED_S)?;
+    let Span { cycles: longest, us } = cycles.all.whole;
+    eprintln!(
+        "the longest of {} ticks takes {us:.1} µs ({longest} cycles, approximately), {:.1} % of its period",
+        cycles.all.ticks,
+        100.0 * us / cycles.period.us
+    );
+    if let Some(ended) = &cycles.ended {
+        eprintln!("these are ticks with the motor off alone: {ended}");
+    }
+    cycles.check().map_err(|error| Failure::CheckFailed(error.to_string()))
+}
+
+/// The file in `rigs/` that src/gains.rs is made from.
+fn rig_of_the_gains() -> Option<PathBuf> {
+    let files = std::fs::read_dir(checkout().ok()?.join("rigs")).ok()?;
+    let mut rigs = files.filter_map(|file| Some(file.ok()?.path()));
+    rigs.find(|path| Rig::from_path(path).is_ok_and(|rig| rig.hash() == RIG_HASH))
+}
+
+fn table_of(cycles: &in_the_loop::Cycles) -> String {
+    let columns = [
+        ("motor off, most", cycles.off),
+        ("balancing, median", cycles.typical),
+        ("balancing, most", cycles.balancing),
+        ("all ticks, most", Some(cycles.all)),
+    ];
+    let mut text = format!("{:28}", "");
+    for (name, _) in columns {
+        // Writing to a string cannot fail.
+        _ = write!(text, "{name:>20}");
+    }
+    _ = write!(text, "\n{:28}", "");
+    for _ in columns {
+        _ = write!(text, "{:>10}{:>10}", "cycles", "µs");
+    }
+    let mut row = |name: &str, of: &dyn Fn(&Figures) -> Option<Span>| {
+        _ = write!(text, "\n{name:28}");
+        for (_, worst) in &columns {
+            match worst.as_ref().and_then(of) {
+                Some(Span { cycles, us }) => _ = write!(text, "{cycles:>10}{us:>10.2}"),
+                None => _ = write!(text, "{:>10}{:>10}", "-", "-"),
+            }
+        }
+    };
+    row("from tick to output", &|worst| worst.latency);
+    row("jitter of the output", &|worst| worst.jitter);
+    row("whole task", &|worst| Some(worst.whole));
+    row("  interrupt entry", &|worst| Some(worst.entry));
+    row("  read inputs", &|worst| Some(worst.inputs));
+    row("  supervise and control", &|worst| Some(worst.control));
+    row("  drive the motor", &|worst| Some(worst.output));
+    row("  command … prediction", &|worst| Some(worst.rest));
+    row("controller alone", &|worst| Some(worst.controller));
+    _ = write!(
+        text,
+        "\n{} ticks from power-up on, at {} MHz; the longest takes {:.1} % of its period. Cycles are approximate.",
+        cycles.all.ticks,
+        cycles.core_hz / 1_000_000,
+        100.0 * cycles.all.whole.us / cycles.period.us
+    );
+    text
+}

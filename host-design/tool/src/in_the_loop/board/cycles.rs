@@ -1,0 +1,196 @@
+//! What a tick costs on the board, from the run of the image that is flashed.
+
+use serde::Serialize;
+use upright_board::{Conditions, Image, Time, UNITS_PER_MICROSECOND};
+use upright_design::harness::{Harness, HarnessError};
+use upright_design::rig::Rig;
+use upright_design::simulate::Scenario;
+use upright_design::table::TableValues;
+
+use super::VirtualBoard;
+use super::meter::{Part, TickCost};
+use crate::in_the_loop::RunError;
+
+/// A stretch of time: cycles of the core, which are approximate, and microseconds.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Span {
+    /// Cycles of the core.
+    pub cycles: u32,
+    /// Microseconds.
+    pub us: f64,
+}
+
+/// The largest figures of some ticks, or their medians.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Figures {
+    /// How many ticks.
+    pub ticks: usize,
+    /// From the time at which the tick is due to the motor's new duty; none with the motor off.
+    pub latency: Option<Span>,
+    /// Difference of it from that of the quickest tick.
+    pub jitter: Option<Span>,
+    /// From the time at which the tick is due to its end.
+    pub whole: Span,
+    /// The interrupt's entry.
+    pub entry: Span,
+    /// All inputs are read.
+    pub inputs: Span,
+    /// Supervisor and controller.
+    pub control: Span,
+    /// The motor is driven.
+    pub output: Span,
+    /// A command, telemetry, the prediction, checks of the table.
+    pub rest: Span,
+    /// The controller alone, with its prediction; part of the above.
+    pub controller: Span,
+}
+
+/// What the ticks of a run cost.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Cycles {
+    /// Frequency of the core (Hz).
+    pub core_hz: u32,
+    /// The tick's period.
+    pub period: Span,
+    /// Ticks with the motor off: disarmed, homing, armed.
+    pub off: Option<Figures>,
+    /// Ticks of balancing.
+    pub balancing: Option<Figures>,
+    /// The medians of balancing.
+    pub typical: Option<Figures>,
+    /// All ticks since the reset.
+    pub all: Figures,
+    /// Why the run ended before its time.
+    pub ended: Option<String>,
+}
+
+/// A tick that takes more than a quarter of its period.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[error(
+    "the longest tick takes {whole_us:.1} µs ({cycles} cycles, by ARM's table), more than a quarter of its period, {quarter_us:.1} µs: \
+     give `[tick] period_s` at least {least_s:.2e}, or take a rig with fewer states"
+)]
+pub struct TooLong {
+    whole_us: f64,
+    cycles: u32,
+    quarter_us: f64,
+    least_s: f64,
+}
+
+impl Cycles {
+    /// No tick may take longer than a quarter of its period: the rest is for what a model does not know.
+    ///
+    /// # Errors
+    /// [`TooLong`]
+    pub fn check(&self) -> Result<(), TooLong> {
+        let (whole, quarter_us) = (self.all.whole, self.period.us / 4.0);
+        if whole.us <= quarter_us {
+            return Ok(());
+        }
+        let (whole_us, cycles) = (whole.us, whole.cycles);
+        // Rounded up to two digits.
+        let exact_s = 4e-6 * whole_us;
+        let digit = 10f64.powf(exact_s.log10().floor() - 1.0);
+        Err(TooLong { whole_us, cycles, quarter_us, least_s: (exact_s / digit).ceil() * digit })
+    }
+
+    fn of(ticks: &[TickCost], core_hz: u32, period_s: f64, ended: Option<String>) -> Option<Self> {
+        let select = |drives: bool| -> Vec<TickCost> {
+            ticks.iter().copied().filter(|tick| tick.latency.is_some() == drives).collect()
+        };
+        let (off, balancing) = (select(false), select(true));
+        let period = Span { cycles: (period_s * f64::from(core_hz)).round() as u32, us: 1e6 * period_s };
+        Some(Self {
+            core_hz,
+            period,
+            off: Figures::of(&off, core_hz, largest),
+            balancing: Figures::of(&balancing, core_hz, largest),
+            typical: Figures::of(&balancing, core_hz, median),
+            all: Figures::of(ticks, core_hz, largest)?,
+            ended,
+        })
+    }
+}
+
+fn largest(times: &mut [Time]) -> Option<Time> {
+    times.iter().copied().max()
+}
+
+fn median(times: &mut [Time]) -> Option<Time> {
+    times.sort_unstable();
+    times.get(times.len() / 2).copied()
+}
+
+impl Figures {
+    /// Of these ticks; each figure is `choose`n from those of all.
+    fn of(ticks: &[TickCost], core_hz: u32, choose: fn(&mut [Time]) -> Option<Time>) -> Option<Self> {
+        let span = |time: Time| {
+            let us = time as f64 / UNITS_PER_MICROSECOND as f64;
+            Span { cycles: (us * 1e-6 * f64::from(core_hz)).round() as u32, us }
+        };
+        let chosen = |of: &dyn Fn(&TickCost) -> Option<Time>| {
+            choose(&mut ticks.iter().filter_map(of).collect::<Vec<_>>()).map(span)
+        };
+        let part = |part: Part| chosen(&|tick| Some(tick.parts[part as usize]));
+        let quickest = ticks.iter().filter_map(|tick| tick.latency).min().unwrap_or(0);
+        Some(Self {
+            ticks: ticks.len(),
+            latency: chosen(&|tick| tick.latency),
+            jitter: chosen(&|tick| tick.latency.map(|latency| latency - quickest)),
+            whole: chosen(&|tick| Some(tick.whole))?,
+            entry: part(Part::Entry)?,
+            inputs: part(Part::Inputs)?,
+            control: part(Part::Control)?,
+            output: part(Part::Output)?,
+            rest: part(Part::Rest)?,
+            controller: chosen(&|tick| Some(tick.controller))?,
+        })
+    }
+}
+
+/// Runs the image from power-up through homing, sign check and arming to balancing, for the duration of `scenario`, and
+/// measures every tick.
+///
+/// # Errors
+/// [`RunError`] if the image does what the hardware does not allow, or has no tick. A rig that does not come to
+/// balancing is no error: see [`Cycles::ended`].
+pub fn measure(
+    rig: &Rig,
+    table: &TableValues,
+    scenario: &Scenario,
+    image: &Image,
+    conditions: &Conditions,
+) -> Result<Cycles, RunError> {
+    let mut board = VirtualBoard::start(image, conditions, table)?;
+    board.measure_ticks();
+    let ended = match balance(rig, table, scenario, &mut board) {
+        Ok(()) => None,
+        Err(error @ HarnessError::Board(_)) => return Err(error.into()),
+        Err(error) => Some(error.to_string()),
+    };
+    let core_hz = board.board().core_hz();
+    let cycles = Cycles::of(board.ticks(), core_hz, rig.tick.period_s, ended);
+    cycles.ok_or_else(|| HarnessError::Board("has no tick".to_owned()).into())
+}
+
+fn balance(
+    rig: &Rig,
+    table: &TableValues,
+    scenario: &Scenario,
+    board: &mut VirtualBoard,
+) -> Result<(), HarnessError> {
+    let mut harness = Harness::new(rig, table, scenario, board)?;
+    if table.observer.is_none() {
+        // It never balances.
+        let inputs = harness.inputs();
+        (0..1000).try_for_each(|_| harness.session.tick(&inputs).map(drop))?;
+        return Err(HarnessError::FullState);
+    }
+    let mut output = harness.raise(None)?;
+    for _ in 0..(scenario.duration_s / rig.tick.period_s) as usize {
+        harness.bench.tick(output.drive);
+        let inputs = harness.inputs();
+        output = harness.session.tick(&inputs)?;
+    }
+    Ok(())
+}

@@ -1,0 +1,90 @@
+//! What a tick of the flashed image costs, on the virtual board.
+
+use upright::table::Law;
+use upright_board::{Board as VirtualBoard, Conditions, Image, Rules, Wiring};
+use upright_design::design::design;
+use upright_design::rig::Rig;
+use upright_design::simulate::Scenario;
+use upright_design::table::{Gains, TableValues};
+use upright_tool::image::{Board, Kind, build_if_possible};
+use upright_tool::in_the_loop::{Cycles, measure};
+
+/// From the tick to the output (µs), 10 % above the value with Rust 1.96, as below.
+const LATENCY_US: f64 = 25.0;
+/// The whole task, in any state (µs).
+const TASK_US: f64 = 46.0;
+/// Difference of the latency between any two ticks (µs).
+const JITTER_US: f64 = 14.4;
+/// The controller alone.
+const CONTROLLER_CYCLES: u32 = 2_480;
+
+fn measured(image: &Image) -> Cycles {
+    let rig = Rig::from_path("../../rigs/quadruple-paper.toml".as_ref()).unwrap();
+    let table = TableValues::of(&rig, &design(&rig).unwrap(), Gains::Sampled).unwrap();
+    let scenario =
+        Scenario { duration_s: 0.5, force_noise_n: 0.1, substeps: 2, ..Scenario::at_rest(&rig, Law::Lqr) };
+    let cycles = measure(&rig, &table, &scenario, image, &Conditions::f405(1)).unwrap();
+    assert_eq!(cycles.ended, None);
+    cycles
+}
+
+/// What is above its limit.
+fn beyond(cycles: &Cycles) -> Vec<&'static str> {
+    let balancing = cycles.balancing.unwrap();
+    let (latency, jitter) = (balancing.latency.unwrap().us, balancing.jitter.unwrap().us);
+    let all = [
+        ("latency", latency > LATENCY_US),
+        ("jitter", jitter > JITTER_US),
+        ("task", cycles.all.whole.us > TASK_US),
+        ("controller", cycles.all.controller.cycles > CONTROLLER_CYCLES),
+        ("quarter", cycles.check().is_err()),
+    ];
+    all.into_iter().filter(|(_, is_beyond)| *is_beyond).map(|(name, _)| name).collect()
+}
+
+/// The image with a wait of `turns` turns before each tick: SysTick's vector leads to a loop behind the image.
+fn slower(image: &Image, turns: u16) -> Image {
+    const SYS_TICK: u32 = 0x0800_0000 + 4 * 15;
+    let board =
+        VirtualBoard::power_on(image, &Conditions::f405(1), Wiring::upright(), Rules::STRICT).unwrap();
+    let handler = board.word(SYS_TICK).unwrap();
+    let at = (0x0800_0000 + image.end() as u32).next_multiple_of(16);
+    let [low, high] = turns.to_le_bytes();
+    let half_words = [
+        // movw r0, #turns
+        0xf240 | u16::from(high & 8) << 7 | u16::from(high >> 4),
+        u16::from(high & 7) << 12 | u16::from(low),
+        0x3801, // subs r0, #1
+        0xd1fd, // bne to it
+        0x4900, // ldr r1, the word below
+        0x4708, // bx r1
+    ];
+    let mut code: Vec<u8> = half_words.into_iter().flat_map(u16::to_le_bytes).collect();
+    code.extend(handler.to_le_bytes());
+    let vector = (at | 1).to_le_bytes().to_vec();
+    image.clone().with_bytes(SYS_TICK, vector).with_bytes(at, code)
+}
+
+#[test]
+fn the_ticks_of_the_image_stay_within_their_limits_and_those_of_a_slower_one_do_not() {
+    let Some(elf) = build_if_possible(Kind::Board(Board::WeactF405)).unwrap() else { return };
+    let image = Image::from_elf(&std::fs::read(elf).unwrap()).unwrap();
+    let cycles = measured(&image);
+    println!("{cycles:#?}");
+    assert_eq!(beyond(&cycles), [""; 0]);
+    let (off, balancing) = (cycles.off.unwrap(), cycles.balancing.unwrap());
+    assert!(off.ticks > 1000 && balancing.ticks >= 500 && cycles.all.ticks == off.ticks + balancing.ticks);
+    // All parts are found in the code, and make up the whole.
+    let parts = |worst: upright_tool::in_the_loop::Figures| {
+        [worst.entry, worst.inputs, worst.control, worst.output, worst.rest].map(|part| part.cycles)
+    };
+    assert!(parts(balancing).into_iter().all(|cycles| cycles > 10), "{balancing:?}");
+    let sum: u32 = parts(balancing).into_iter().sum();
+    assert!(sum >= balancing.whole.cycles && sum < 2 * balancing.whole.cycles, "{balancing:?}");
+    assert!(balancing.controller.cycles > 300, "{balancing:?}");
+
+    // Negative controls: 10 µs more, and half a period more.
+    assert_eq!(beyond(&measured(&slower(&image, 500))), ["latency", "task"]);
+    let error = measured(&slower(&image, 25_000)).check().unwrap_err().to_string();
+    assert!(error.contains("a quarter of its period") && error.contains("period_s"), "{error}");
+}
