@@ -39,7 +39,7 @@ Examples:
 
 Exit status:
   0  done
-  1  a check failed: the pendulum falls, a requirement is not met, a fault is missed, a tick too long, a file differs
+  1  a check failed: pendulum falls, requirement not met, fault missed, tick too long, file differs
   2  bad input: a rig file, an argument, a file that cannot be written
   3  the design problem has no solution; a log does not fit any machine
   4  a needed program is missing";
