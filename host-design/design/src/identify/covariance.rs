@@ -8,8 +8,13 @@ use super::record::Record;
 const SMOOTHINGS: [f64; 2] = [0.4, 2.5];
 /// Steps of each refit.
 const ITERATIONS: usize = 2;
-/// Least relative deviation of masses, lengths and moments.
-const LEAST_SHAPE: f64 = 2e-4;
+/// Least relative deviation of lengths.
+const LEAST_LENGTH: f64 = 2e-4;
+/// Least relative deviation of masses and moments with a motor: the friction's model falsifies the scale of the force.
+/// Without one it is that of lengths.
+const LEAST_SCALE: f64 = 1.5e-3;
+/// Least relative deviation of viscous friction, for the same reason.
+const LEAST_VISCOUS: f64 = 5e-3;
 /// Least relative deviation of dry friction, whose model is coarse, and of the dead zone.
 const LEAST_DRY: f64 = 0.1;
 const LEAST_DEAD_ZONE: f64 = 0.01;
@@ -49,12 +54,15 @@ pub(super) fn deviations(
     steps: &[f64],
 ) -> Vec<f64> {
     let size = p.len();
+    let has_motor =
+        kinds.iter().zip(priors).any(|(kind, prior)| *kind == Kind::DeadZone && prior.deviation > 0.0);
     let of = |i: usize| {
         let statistical = priors[i].deviation * inverse[i * size + i].sqrt();
         let least = match kinds[i] {
-            Kind::TotalMass | Kind::FirstMoment(_) | Kind::Length(_) | Kind::SecondMoment(_) => {
-                LEAST_SHAPE * p[i]
-            }
+            Kind::Length(_) => LEAST_LENGTH * p[i],
+            Kind::TotalMass | Kind::FirstMoment(_) | Kind::SecondMoment(_) if has_motor => LEAST_SCALE * p[i],
+            Kind::TotalMass | Kind::FirstMoment(_) | Kind::SecondMoment(_) => LEAST_LENGTH * p[i],
+            Kind::CartViscous | Kind::JointViscous(_) => LEAST_VISCOUS * p[i],
             Kind::Zero(joint) => LEAST_ZERO_COUNTS * steps[joint + 1],
             Kind::CartDry | Kind::JointDry(_) => LEAST_DRY * p[i],
             Kind::DeadZone => LEAST_DEAD_ZONE * p[i],
