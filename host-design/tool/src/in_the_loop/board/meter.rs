@@ -140,16 +140,17 @@ impl Place {
 
 /// The part of the tick that a function is, by its path.
 fn part_of(path: &str) -> Option<Part> {
-    let is = |owner: &str, name: &str| path.contains(owner) && path.ends_with(name);
-    if is("Hardware", "::inputs") {
+    let is =
+        |owner: &str, names: &[&str]| path.contains(owner) && names.iter().any(|name| path.ends_with(name));
+    if is("Hardware", &["::inputs"]) {
         Some(Part::Inputs)
-    } else if is("firmware::Firmware", "::control") {
-        Some(Part::Control)
-    } else if is("Hardware", "::drive") {
+    } else if is("Hardware", &["::drive"]) {
         Some(Part::Output)
-    } else if is("firmware::Firmware", "::finish")
-        || is("protocol::queue", "")
-        || is("Hardware", "feed_watchdog")
+    } else if is("firmware::Firmware", &["::accept", "::drive"]) {
+        Some(Part::Control)
+    } else if is("firmware::Firmware", &["::report", "::predict", "::complete"])
+        || path.contains("protocol::queue")
+        || is("Hardware", &["::feed_watchdog"])
     {
         Some(Part::Rest)
     } else {
@@ -178,7 +179,7 @@ mod tests {
             ["core::f32::abs", "upright::control::controller::Controller::predict"].map(str::to_owned);
         let mut chain = names.to_vec();
         assert_eq!(Place::of(&chain), Place { part: None, controller: Some(true) });
-        chain.push("upright::firmware::Firmware<_,_,_>::finish".to_owned());
+        chain.push("upright::firmware::Firmware<_,_,_>::complete".to_owned());
         assert_eq!(Place::of(&chain), Place { part: Some(Part::Rest), controller: Some(true) });
         assert_eq!(Place::of(&[]), Place::default());
     }
