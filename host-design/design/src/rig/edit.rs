@@ -124,4 +124,19 @@ mod tests {
         assert!(edited("verify.tilt_rad", "0.1").text.ends_with("\n[verify]\ntilt_rad = 0.1\n"));
         assert_eq!(with_value(text, "link[3].mass_kg", "1"), None);
     }
+
+    #[test]
+    fn values_are_replaced_and_added() {
+        const TEXT: &str =
+            "name = \"a\"\n[cart]\nmass_kg = 1 # one\n[[link]]\nmass_kg = 2\n[[link]]\nmass_kg = 3\n";
+        let changed = |key: &str| with_value(TEXT, key, "7").map(|edited| edited.text);
+        assert_eq!(changed("cart.mass_kg").unwrap(), TEXT.replace("= 1 #", "= 7 #"));
+        assert_eq!(changed("link[2].mass_kg").unwrap(), TEXT.replace('3', "7"));
+        assert_eq!(
+            changed("link[1].length_m").unwrap(),
+            TEXT.replacen("[[link]]", "[[link]]\nlength_m = 7", 1)
+        );
+        assert!(changed("reality.rail_tilt_rad").unwrap().ends_with("[reality]\nrail_tilt_rad = 7\n"));
+        assert_eq!(changed("link[3].mass_kg"), None);
+    }
 }
