@@ -14,5 +14,5 @@ pub use build::{ImageError, Kind, PROFILE, TARGET, build, build_for, build_if_po
 pub use compiler::{Compiler, compiler};
 pub use elf::{ElfError, Image};
 pub use forbidden::forbidden_functions;
-pub use size::{FLASH_LIMIT, Part, RAM_LIMIT, Size, SizeError, size};
+pub use size::{FLASH_LIMIT, FLASH_LIMIT_WITH_MOTIONS, Part, RAM_LIMIT, Size, SizeError, size};
 pub use stack::{StackBound, StackError, StackLevel, stack_bound};

@@ -9,16 +9,23 @@ use object::{Object, ObjectSection};
 
 use super::elf::{Image, Item};
 
-/// Limit of the flash of an image for a board (bytes).
+/// Limit of the flash of an image for a board without motions (bytes).
 pub const FLASH_LIMIT: u32 = 24 * 1024;
+/// Limit of the flash of an image for a board with motions: their tables, and the nonlinear model (bytes).
+pub const FLASH_LIMIT_WITH_MOTIONS: u32 = 128 * 1024;
 /// Limit of the static RAM of an image for a board: variables, without the stack (bytes).
 pub const RAM_LIMIT: u32 = 4 * 1024;
+
+/// The table of motions; an image without motions has none.
+const MOTIONS: &str = "upright::gains::SWING_UP";
 
 /// Bytes of an image.
 #[derive(Debug, Clone, PartialEq, Eq, serde::Serialize)]
 pub struct Size {
     /// All in flash, with the initial values of variables.
     pub flash: u32,
+    /// What that is limited to.
+    pub flash_limit: u32,
     /// All variables, without the stack.
     pub ram: u32,
     /// By section, in the order of addresses.
@@ -74,7 +81,9 @@ pub fn size(image: &Image) -> Result<Size, SizeError> {
     rest.ram += ram.saturating_sub(counted_ram);
     let mut crates: Vec<Part> = shares.into_iter().map(|(name, part)| Part { name, ..part }).collect();
     crates.sort_by_key(|part| std::cmp::Reverse((part.flash, part.ram)));
-    Ok(Size { flash, ram, sections, crates })
+    let has_motions = image.data.iter().any(|item| item.name == MOTIONS && item.size > 0);
+    let flash_limit = if has_motions { FLASH_LIMIT_WITH_MOTIONS } else { FLASH_LIMIT };
+    Ok(Size { flash, flash_limit, ram, sections, crates })
 }
 
 /// Bytes of machine code by the crate of their source line.

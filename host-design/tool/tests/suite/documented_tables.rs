@@ -7,7 +7,7 @@ use ratatui::crossterm::event::{KeyCode, KeyEvent, KeyModifiers};
 use upright::supervision::fault::Fault;
 use upright::supervision::inhibits::Inhibits;
 use upright_tool::campaign::Kind;
-use upright_tool::image::{FLASH_LIMIT, RAM_LIMIT};
+use upright_tool::image::{FLASH_LIMIT, FLASH_LIMIT_WITH_MOTIONS, RAM_LIMIT};
 use upright_tool::monitor::{Action, action, request};
 
 use crate::documents::{read, root};
@@ -246,5 +246,6 @@ fn the_page_about_the_board_names_the_limits_of_the_image() {
     };
     let page = read("docs/board.md");
     assert!(page.contains(&limits(FLASH_LIMIT, RAM_LIMIT)));
+    assert!(page.contains(&format!("more than {} KiB of flash;", FLASH_LIMIT_WITH_MOTIONS / 1024)));
     assert!(!page.contains(&limits(2 * FLASH_LIMIT, RAM_LIMIT)));
 }

@@ -7,16 +7,15 @@ use std::path::PathBuf;
 use clap::Args;
 use serde_json::json;
 use upright_tool::image::{
-    Board, FLASH_LIMIT, Image, Kind, Part, RAM_LIMIT, StackBound, StackError, forbidden_functions, size,
-    stack_bound,
+    Board, Image, Kind, Part, RAM_LIMIT, StackBound, StackError, forbidden_functions, size, stack_bound,
 };
 
 use super::built;
 use crate::failure::Failure;
 
 /// Measures the image of a board: flash and RAM by section and by crate, a bound on its stack, and whether it can
-/// panic; exit status 1 if it takes more than 24 KiB of flash, 4 KiB of static RAM or the stack reserved in memory.x,
-/// or can panic or allocate.
+/// panic; exit status 1 if it takes more than 24 KiB of flash (128 KiB with motions), 4 KiB of static RAM or the stack
+/// reserved in memory.x, or can panic or allocate.
 #[derive(Args)]
 #[command(before_help = "\
 Examples:
@@ -51,7 +50,7 @@ impl Size {
                 "image": path,
                 "flash": size.flash,
                 "ram": size.ram,
-                "limits": { "flash": FLASH_LIMIT, "ram": RAM_LIMIT },
+                "limits": { "flash": size.flash_limit, "ram": RAM_LIMIT },
                 "sections": size.sections,
                 "crates": size.crates,
                 "stack": stack.as_ref().ok(),
@@ -79,7 +78,7 @@ fn wrong(
             wrong.push(format!("{what}: {bytes} bytes, {} above the limit of {limit}", bytes - limit));
         }
     };
-    limit("flash", size.flash, FLASH_LIMIT);
+    limit("flash", size.flash, size.flash_limit);
     limit("static RAM", size.ram, RAM_LIMIT);
     match stack {
         Ok(stack) => limit("stack", stack.bytes, stack.reserved),
@@ -105,7 +104,7 @@ fn table(size: &upright_tool::image::Size, stack: &Result<StackBound, StackError
     rows("crate (bytes)", &size.crates);
     let all = [
         Part { name: "sum".to_owned(), flash: size.flash, ram: size.ram },
-        Part { name: "limit".to_owned(), flash: FLASH_LIMIT, ram: RAM_LIMIT },
+        Part { name: "limit".to_owned(), flash: size.flash_limit, ram: RAM_LIMIT },
     ];
     rows("image (bytes)", &all);
     if let Ok(stack) = stack {
