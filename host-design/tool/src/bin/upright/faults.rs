@@ -2,18 +2,16 @@
 
 use std::io::Write;
 
-use clap::{Args, ValueEnum};
+use clap::Args;
 use serde_json::json;
-use upright_board::Conditions;
 use upright_design::rig::Rig;
 use upright_design::swing_up::SwingUpError;
 use upright_tool::campaign::{Campaign, Kind, Row, Setup, campaign, kinds, one};
-use upright_tool::image::{Board, Kind as ImageKind, build_for};
 use upright_tool::in_the_loop::{Link, Place};
 
 use crate::failure::Failure;
-use crate::firmware::{announced, read};
-use crate::progress::{with_bar, with_spinner};
+use crate::firmware::Target;
+use crate::progress::with_bar;
 use crate::variation::{Variation, with_stored_motions};
 
 /// Fault injection: runs the firmware with one defect at a time and checks that the motor is off in time; exit status
@@ -57,23 +55,6 @@ pub(crate) struct Faults {
     json: bool,
 }
 
-#[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
-enum Target {
-    Host,
-    Qemu,
-    Board,
-}
-
-impl Target {
-    fn name(self) -> &'static str {
-        match self {
-            Target::Host => "host",
-            Target::Qemu => "qemu",
-            Target::Board => "board",
-        }
-    }
-}
-
 /// Runs of each kind without detection.
 const CONTROL_RUNS: u64 = 12;
 
@@ -94,25 +75,8 @@ impl Faults {
         if self.swing_up && table.swing_up.is_none() {
             return Err(Failure::SwingUp { rig: rig.name, source: SwingUpError::NoMotions });
         }
-        let image = match self.target {
-            Target::Host => None,
-            Target::Board => Some(with_spinner("building the image", || {
-                build_for(ImageKind::Board(Board::WeactF405), &rig, &table)
-            })?),
-            Target::Qemu => {
-                Some(with_spinner("building the image", || build_for(ImageKind::InTheLoop, &rig, &table))?)
-            }
-        };
-        let flashed = match &image {
-            Some(image) if self.target == Target::Board => Some(read(image)?),
-            Some(image) => announced(image).map(|_| None)?,
-            None => None,
-        };
-        let place = match (&flashed, &image) {
-            (Some(image), _) => Place::Board { image, conditions: Conditions::f405(self.seed) },
-            (_, Some(image)) => Place::Qemu { image, link: Link::Files },
-            _ => Place::Host,
-        };
+        let built = self.target.built(Link::Files, &rig, &table)?;
+        let place = built.place(self.seed);
         let possible = kinds(&table, place);
         let chosen: Vec<Kind> = match self.kind {
             Some(kind) if possible.contains(&kind) => vec![kind],

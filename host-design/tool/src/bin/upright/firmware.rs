@@ -6,20 +6,20 @@ mod flash;
 mod monitor;
 mod run;
 mod size;
+mod target;
 
-pub(crate) use run::{announced, read};
+pub(crate) use target::Target;
 
 use std::path::{Path, PathBuf};
 
 use clap::{Args, Subcommand};
-use upright_design::design::design;
 use upright_design::rig::Rig;
 use upright_design::table::{Gains, TableValues};
 use upright_tool::image::{self, Kind};
 
 use crate::failure::Failure;
 use crate::progress::with_spinner;
-use crate::variation::with_stored_motions;
+use crate::variation::{with_stored_motions, with_table};
 
 /// Builds, measures, runs, flashes and monitors the firmware image.
 #[derive(Args)]
@@ -63,11 +63,7 @@ fn built(kind: Kind, rig: Option<&Path>) -> Result<PathBuf, Failure> {
 /// The rig of this file, and its table with the stored motions.
 fn designed(path: &Path) -> Result<(Rig, TableValues), Failure> {
     let rig = Rig::from_path(path)?;
-    let name = || path.display().to_string();
-    let certified = with_spinner("designing", || design(&rig))
-        .map_err(|source| Failure::Design { rig: name(), source })?;
-    let table = TableValues::of(&rig, &certified, Gains::Sampled)
-        .map_err(|source| Failure::NoTable { rig: name(), source })?;
+    let (_, table) = with_table(&rig, path, Gains::Sampled)?;
     let table = with_stored_motions(path, &rig, table)?;
     Ok((rig, table))
 }

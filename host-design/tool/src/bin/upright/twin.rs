@@ -5,21 +5,18 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
-use clap::{Args, ValueEnum};
+use clap::Args;
 use signal_hook::consts::{SIGINT, SIGTERM};
 use upright::table::Law;
-use upright_board::Conditions;
 use upright_design::rig::Rig;
 use upright_design::simulate::{Scenario, Sensing};
 use upright_design::table::TableValues;
-use upright_tool::image::{self, Board, Kind};
 use upright_tool::in_the_loop::{Link, Place};
 use upright_tool::monitor::Line;
 use upright_tool::twin::Server;
 
 use crate::failure::Failure;
-use crate::firmware::read;
-use crate::progress::with_spinner;
+use crate::firmware::Target;
 use crate::variation::{Variation, law_option, positive, with_stored_motions};
 
 /// Serves a page on which the rig moves, run by the firmware itself: pull it, change it, break it, watch it.
@@ -58,32 +55,13 @@ pub(crate) struct Twin {
     duration: Option<f64>,
 }
 
-#[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
-enum Target {
-    /// In this process
-    Host,
-    /// As an image in QEMU
-    Qemu,
-    /// As the image that is flashed, on the virtual board
-    Board,
-}
-
 impl Twin {
     pub(crate) fn run(self) -> Result<(), Failure> {
         let (rig, _, table) = self.variation.designed()?;
         let table = with_stored_motions(&self.variation.rig, &rig, table)?;
-        let kind = match self.target {
-            Target::Host => None,
-            Target::Qemu => Some(Kind::InTheLoop),
-            Target::Board => Some(Kind::Board(Board::WeactF405)),
-        };
-        let image = match kind.filter(|_| self.port.is_none()) {
-            Some(kind) => Some(with_spinner("building the image", || image::build_for(kind, &rig, &table))?),
-            None => None,
-        };
-        let flashed = match (&image, self.target) {
-            (Some(image), Target::Board) => Some(read(image)?),
-            _ => None,
+        let built = match self.port {
+            None => Some(self.target.built(Link::Files, &rig, &table)?),
+            Some(_) => None,
         };
         let stop = Arc::new(AtomicBool::new(false));
         for signal in [SIGINT, SIGTERM] {
@@ -94,11 +72,7 @@ impl Twin {
         if let Some(port) = &self.port {
             return show(port, &rig, &table, self.listen, &goes_on);
         }
-        let place = match (&flashed, &image) {
-            (Some(image), _) => Place::Board { image, conditions: Conditions::f405(1) },
-            (None, Some(image)) => Place::Qemu { image, link: Link::Files },
-            (None, None) => Place::Host,
-        };
+        let place = built.as_ref().map_or(Place::Host, |built| built.place(1));
         let scenario = Scenario { sensing: Sensing::Encoders, ..Scenario::at_rest(&rig, self.law) };
         Ok(listening(self.listen)?.simulate(&rig, &table, &scenario, place, !self.hanging, &goes_on)?)
     }

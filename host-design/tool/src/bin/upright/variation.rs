@@ -68,17 +68,23 @@ impl Variation {
         rig.tick.period_s = self.tick.unwrap_or(rig.tick.period_s);
         rig.tick.delay_ticks = self.delay.unwrap_or(rig.tick.delay_ticks);
         rig.actuator.force_limit_n = self.force_limit.or(rig.actuator.force_limit_n);
-        let name = || self.rig.display().to_string();
-        let certified = with_spinner("designing", || design(&rig))
-            .map_err(|source| Failure::Design { rig: name(), source })?;
         let gains = match self.gains {
             GainsName::Sampled => Gains::Sampled,
             GainsName::Continuous => Gains::Continuous,
         };
-        let table = TableValues::of(&rig, &certified, gains)
-            .map_err(|source| Failure::NoTable { rig: name(), source })?;
+        let (certified, table) = with_table(&rig, &self.rig, gains)?;
         Ok((rig, certified, table))
     }
+}
+
+/// The design of the rig of this file, and the table with these gains.
+pub(crate) fn with_table(rig: &Rig, file: &Path, gains: Gains) -> Result<(Certified, TableValues), Failure> {
+    let name = || file.display().to_string();
+    let certified = with_spinner("designing", || design(rig))
+        .map_err(|source| Failure::Design { rig: name(), source })?;
+    let table =
+        TableValues::of(rig, &certified, gains).map_err(|source| Failure::NoTable { rig: name(), source })?;
+    Ok((certified, table))
 }
 
 /// The table with the motions that are stored beside the rig file, if there are any and they are for these values.

@@ -18,7 +18,7 @@ use upright_tool::in_the_loop::{self, Figures, Span};
 use upright_tool::project::checkout;
 
 use super::designed;
-use super::run::read;
+use super::target::read;
 use crate::failure::Failure;
 use crate::progress::with_spinner;
 use crate::variation::{law_option, positive};

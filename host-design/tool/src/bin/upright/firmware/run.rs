@@ -1,19 +1,17 @@
 //! `upright firmware run`
 
 use std::net::TcpListener;
-use std::path::Path;
 use std::time::Instant;
 
 use clap::{Args, ValueEnum};
-use sha2::{Digest, Sha256};
-use upright_board::{Conditions, UNITS_PER_SECOND};
+use upright_board::{Conditions, Image, UNITS_PER_SECOND};
 use upright_design::harness::Recording;
 use upright_design::rig::Rig;
 use upright_design::simulate::Scenario;
 use upright_design::table::TableValues;
-use upright_tool::image::{self, Board, Kind};
 use upright_tool::in_the_loop::{Link, Place, RunError, VirtualBoard, run, run_compared, serve};
 
+use super::Target;
 use crate::failure::Failure;
 use crate::progress::with_spinner;
 use crate::simulate::Simulate;
@@ -51,13 +49,6 @@ pub(crate) struct Run {
     serve: Option<String>,
 }
 
-#[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
-enum Target {
-    Host,
-    Qemu,
-    Board,
-}
-
 #[derive(Clone, Copy, ValueEnum)]
 enum LinkName {
     Files,
@@ -84,13 +75,10 @@ impl Run {
         })
     }
 
-    /// Which image, and how its pins are connected; none on the host.
-    fn kind(&self) -> Option<(Kind, Link)> {
-        match (self.target, self.link) {
-            (Target::Host, _) => None,
-            (Target::Board, _) => Some((Kind::Board(Board::WeactF405), Link::Files)),
-            (Target::Qemu, LinkName::Files) => Some((Kind::InTheLoop, Link::Files)),
-            (Target::Qemu, LinkName::Usart) => Some((Kind::InTheLoopUsart, Link::Usart)),
+    fn link(&self) -> Link {
+        match self.link {
+            LinkName::Files => Link::Files,
+            LinkName::Usart => Link::Usart,
         }
     }
 
@@ -104,26 +92,9 @@ impl Run {
         } else {
             self.simulate.prepared()?
         };
-        let image = match self.kind() {
-            Some((kind, link)) => {
-                Some((with_spinner("building the image", || image::build_for(kind, &rig, &table))?, link))
-            }
-            None => None,
-        };
+        let built = self.target.built(self.link(), &rig, &table)?;
         eprintln!("connect with: upright firmware monitor tcp:{}", listener.local_addr()?);
-        let flashed;
-        let place = match &image {
-            None => Place::Host,
-            Some((image, _)) if self.target == Target::Board => {
-                flashed = read(image)?;
-                Place::Board { image: &flashed, conditions: Conditions::f405(1) }
-            }
-            Some((image, link)) => {
-                announced(image)?;
-                Place::Qemu { image, link: *link }
-            }
-        };
-        Ok(with_spinner("serving", || serve(&rig, &table, &scenario, place, &listener))?)
+        Ok(with_spinner("serving", || serve(&rig, &table, &scenario, built.place(1), &listener))?)
     }
 
     /// Runs `scenario` with the firmware of `table` for the rig `ours` against the rig `real`, and compares every bit with the
@@ -134,34 +105,17 @@ impl Run {
         table: &TableValues,
         scenario: &Scenario,
     ) -> Result<Recording, Failure> {
-        let Some((kind, link)) = self.kind() else {
-            return Ok(with_spinner("running it", || run(real, table, scenario, Place::Host))?);
-        };
-        let image = with_spinner("building the image", || image::build_for(kind, ours, table))?;
-        if self.target == Target::Board {
-            return on_the_board(real, table, scenario, &image);
+        let built = self.target.built(self.link(), ours, table)?;
+        match built.place(scenario.seed) {
+            Place::Host => Ok(with_spinner("running it", || run(real, table, scenario, Place::Host))?),
+            Place::Board { image, conditions } => on_the_board(real, table, scenario, image, &conditions),
+            place @ Place::Qemu { .. } => {
+                let recording = with_spinner("running it in QEMU", || run(real, table, scenario, place))?;
+                compare(real, table, scenario, &recording)?;
+                Ok(recording)
+            }
         }
-        announced(&image)?;
-        let place = Place::Qemu { image: &image, link };
-        let recording = with_spinner("running it in QEMU", || run(real, table, scenario, place))?;
-        compare(real, table, scenario, &recording)?;
-        Ok(recording)
     }
-}
-
-/// The image that is flashed; says which one it is.
-pub(crate) fn read(path: &Path) -> Result<upright_board::Image, Failure> {
-    upright_board::Image::from_elf(&announced(path)?)
-        .map_err(|error| Failure::BadArgument(format!("{}: {error}", path.display())))
-}
-
-/// The bytes of an ELF file that will run; says its path and its hash.
-pub(crate) fn announced(path: &Path) -> Result<Vec<u8>, Failure> {
-    let bytes = std::fs::read(path)?;
-    let hash =
-        Sha256::digest(&bytes).iter().take(8).fold(String::new(), |hash, byte| hash + &format!("{byte:02x}"));
-    eprintln!("{} ({hash})", path.display());
-    Ok(bytes)
 }
 
 /// The image on the virtual board, beside the firmware on the host.
@@ -169,12 +123,11 @@ fn on_the_board(
     rig: &Rig,
     table: &TableValues,
     scenario: &Scenario,
-    image: &Path,
+    image: &Image,
+    conditions: &Conditions,
 ) -> Result<Recording, Failure> {
-    let image = read(image)?;
     let begin = Instant::now();
-    let mut board =
-        VirtualBoard::start(&image, &Conditions::f405(scenario.seed), table).map_err(RunError::from)?;
+    let mut board = VirtualBoard::start(image, conditions, table).map_err(RunError::from)?;
     let ended =
         with_spinner("running it on the virtual board", || run_compared(rig, table, scenario, &mut board));
     let simulated_s = board.board().now() as f64 / UNITS_PER_SECOND as f64;

@@ -1,0 +1,89 @@
+//! Where the firmware runs, by the names of the command line, with the image that is needed there.
+
+use std::path::{Path, PathBuf};
+
+use clap::ValueEnum;
+use sha2::{Digest, Sha256};
+use upright_board::Image;
+use upright_design::rig::Rig;
+use upright_design::table::TableValues;
+use upright_tool::image::{self, Board, Kind};
+use upright_tool::in_the_loop::{Link, Place};
+
+use crate::failure::Failure;
+use crate::progress::with_spinner;
+
+/// The board that is a virtual one.
+const BOARD: Board = Board::WeactF405;
+
+/// Where the firmware runs.
+#[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(crate) enum Target {
+    /// In this process
+    Host,
+    /// As an image in QEMU
+    Qemu,
+    /// As the image that is flashed, on the virtual board
+    Board,
+}
+
+/// What runs there.
+pub(crate) enum Built {
+    Host,
+    Qemu { image: PathBuf, link: Link },
+    Board(Image),
+}
+
+impl Target {
+    /// Its name on the command line.
+    pub(crate) fn name(self) -> &'static str {
+        match self {
+            Target::Host => "host",
+            Target::Qemu => "qemu",
+            Target::Board => "board",
+        }
+    }
+
+    /// Builds the image with the table of the rig, and says which one it is; on the host there is none. `link` connects the
+    /// pins of an image in QEMU.
+    pub(crate) fn built(self, link: Link, rig: &Rig, table: &TableValues) -> Result<Built, Failure> {
+        let kind = match (self, link) {
+            (Target::Host, _) => return Ok(Built::Host),
+            (Target::Qemu, Link::Files) => Kind::InTheLoop,
+            (Target::Qemu, Link::Usart) => Kind::InTheLoopUsart,
+            (Target::Board, _) => Kind::Board(BOARD),
+        };
+        let image = with_spinner("building the image", || image::build_for(kind, rig, table))?;
+        if self == Target::Board {
+            return Ok(Built::Board(read(&image)?));
+        }
+        announced(&image)?;
+        Ok(Built::Qemu { image, link })
+    }
+}
+
+impl Built {
+    /// The place to run it; what is random of the virtual board follows from `seed`.
+    pub(crate) fn place(&self, seed: u64) -> Place<'_> {
+        match self {
+            Built::Host => Place::Host,
+            Built::Qemu { image, link } => Place::Qemu { image, link: *link },
+            Built::Board(image) => Place::Board { image, conditions: BOARD.conditions(seed) },
+        }
+    }
+}
+
+/// The image that is flashed; says which one it is.
+pub(super) fn read(path: &Path) -> Result<Image, Failure> {
+    Image::from_elf(&announced(path)?)
+        .map_err(|error| Failure::BadArgument(format!("{}: {error}", path.display())))
+}
+
+/// The bytes of an ELF file that will run; says its path and its hash.
+fn announced(path: &Path) -> Result<Vec<u8>, Failure> {
+    let bytes = std::fs::read(path)?;
+    let hash =
+        Sha256::digest(&bytes).iter().take(8).fold(String::new(), |hash, byte| hash + &format!("{byte:02x}"));
+    eprintln!("{} ({hash})", path.display());
+    Ok(bytes)
+}
