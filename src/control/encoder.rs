@@ -56,14 +56,13 @@ impl<const NY: usize> Encoders<NY> {
     #[inline(always)]
     pub(crate) fn measure<T: Scalar>(&mut self, raw: &[u32; NY], step: &SVector<T, NY>) -> SVector<T, NY> {
         let mut y = *step;
-        let counters = self.last.iter_mut().zip(&mut self.position).zip(raw).zip(y.iter_mut());
-        for (counter, (((last, position), &raw), y)) in counters.enumerate() {
-            let moved = raw.wrapping_sub(*last) as i32;
+        for (counter, &raw) in raw.iter().enumerate() {
+            let moved = raw.wrapping_sub(self.last[counter]) as i32;
             // The inner cast keeps the low 16 bits: the signed distance modulo the counter's range.
             let moved = if self.of_16_bits & (1 << counter) != 0 { i32::from(moved as i16) } else { moved };
-            *last = raw;
-            *position = position.wrapping_add(moved);
-            *y *= T::from_counts(*position);
+            self.last[counter] = raw;
+            self.position[counter] = self.position[counter].wrapping_add(moved);
+            y[counter] *= T::from_counts(self.position[counter]);
         }
         y
     }

@@ -89,11 +89,12 @@ impl<'t, const NX: usize, const NY: usize, T: Scalar> Observer<'t, NX, NY, T> {
         estimate: &mut [T; NX],
         mut corrected: impl FnMut(usize, &[T]),
     ) {
+        let l = &self.gains.l.data.0;
         let (joints, last) = estimate.as_chunks_mut::<2>();
         for (joint, estimate) in joints.iter_mut().enumerate() {
             let [mut position, mut rate] = *estimate;
-            for (column, e) in self.gains.l.data.0.iter().zip(innovation) {
-                if let Some([to_position, to_rate]) = column.as_chunks::<2>().0.get(joint) {
+            for (sensor, e) in innovation.iter().enumerate() {
+                if let Some([to_position, to_rate]) = l[sensor].as_chunks::<2>().0.get(joint) {
                     // Both products before both sums, so that no instruction waits for the one before it.
                     let (a, b) = (*to_position * *e, *to_rate * *e);
                     position += a;
@@ -104,8 +105,8 @@ impl<'t, const NX: usize, const NY: usize, T: Scalar> Observer<'t, NX, NY, T> {
             corrected(joint, estimate);
         }
         if let [x] = last {
-            for (column, e) in self.gains.l.data.0.iter().zip(innovation) {
-                *x += column.last().copied().unwrap_or_default() * *e;
+            for (sensor, e) in innovation.iter().enumerate() {
+                *x += l[sensor].last().copied().unwrap_or_default() * *e;
             }
             corrected(NX / 2, last);
         }
@@ -118,7 +119,10 @@ impl<'t, const NX: usize, const NY: usize, T: Scalar> Observer<'t, NX, NY, T> {
     // in a tick with five sensors.
     #[inline(always)]
     pub(crate) fn predict(&self, estimate: &mut [T; NX], u: T) {
-        let mut next = self.gains.bd.data.0[0].map(|b| b * u);
+        let mut next = self.gains.bd.data.0[0];
+        for next in &mut next {
+            *next *= u;
+        }
         if self.pattern == Pattern::Frictionless {
             self.add_frictionless(&mut next, estimate);
         } else {
@@ -131,8 +135,8 @@ impl<'t, const NX: usize, const NY: usize, T: Scalar> Observer<'t, NX, NY, T> {
             }
             // The compiler does not see how many columns there are: it would write the loop out, in 2 KiB.
             for (column, x) in black_box(columns).iter().zip(states) {
-                for (next, a) in next.iter_mut().zip(column) {
-                    *next += *a * *x;
+                for (row, next) in next.iter_mut().enumerate() {
+                    *next += column[row] * *x;
                 }
             }
         }
@@ -141,18 +145,19 @@ impl<'t, const NX: usize, const NY: usize, T: Scalar> Observer<'t, NX, NY, T> {
 
     #[inline(always)]
     fn add_frictionless(&self, next: &mut [T; NX], estimate: &[T; NX]) {
-        let from = self.gains.ad.data.0.as_chunks::<2>().0.iter().zip(estimate.as_chunks::<2>().0);
-        for (joint, ([from_position, from_rate], [position, rate])) in from.enumerate() {
-            let blocks = from_position.as_chunks::<2>().0.iter().zip(from_rate.as_chunks::<2>().0);
-            let mut rows = next.as_chunks_mut::<2>().0.iter_mut().zip(blocks);
+        let (columns, states) = (self.gains.ad.data.0.as_chunks::<2>().0, estimate.as_chunks::<2>().0);
+        let next = next.as_chunks_mut::<2>().0;
+        for (joint, [position, rate]) in states.iter().enumerate() {
+            let [from_position, from_rate] = &columns[joint];
+            let (from_position, from_rate) = (from_position.as_chunks::<2>().0, from_rate.as_chunks::<2>().0);
             if joint == 0 {
                 // The cart's position and speed affect only the cart, through the block 1, T; 0, 1.
-                if let Some((next, (_, [to_position, _]))) = rows.next() {
-                    *next = [next[0] + *position + *to_position * *rate, next[1] + *rate];
-                }
+                let [to_position, _] = from_rate[0];
+                next[0] = [next[0][0] + *position + to_position * *rate, next[0][1] + *rate];
                 continue;
             }
-            for (next, ([diagonal, to_rate], [to_position, _])) in rows {
+            for (row, next) in next.iter_mut().enumerate() {
+                let ([diagonal, to_rate], [to_position, _]) = (&from_position[row], &from_rate[row]);
                 // All products before the sums, so that no instruction waits for the one before it.
                 let (a, b) = (*diagonal * *position, *to_rate * *position);
                 let (c, d) = (*to_position * *rate, *diagonal * *rate);

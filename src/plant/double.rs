@@ -38,13 +38,13 @@ const LARGEST: f64 = 1e6;
 #[inline]
 pub(crate) fn sines_and_cosines<const N: usize>(angles: &[f64; N]) -> ([f64; N], [f64; N]) {
     let (mut sines, mut cosines) = ([0.0; N], [0.0; N]);
-    for ((x, sine), cosine) in angles.iter().zip(&mut sines).zip(&mut cosines) {
-        (*sine, *cosine) = within_range(*x);
+    for (j, x) in angles.iter().enumerate() {
+        (sines[j], cosines[j]) = within_range(*x);
     }
     // NaN must take this path, too.
     if !angles.iter().all(|x| x.abs() <= LARGEST) {
-        for ((x, sine), cosine) in angles.iter().zip(&mut sines).zip(&mut cosines) {
-            (*sine, *cosine) = libm::sincos(*x);
+        for (j, x) in angles.iter().enumerate() {
+            (sines[j], cosines[j]) = libm::sincos(*x);
         }
     }
     (sines, cosines)

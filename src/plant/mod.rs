@@ -39,10 +39,10 @@ impl<const N: usize, T: Scalar> ChainState<N, T> {
             (absolute.x, absolute.xdot) = (x, xdot);
         }
         let (mut angle, mut rate) = (T::default(), T::default());
-        for ((phi, phidot), joint) in absolute.phi.iter_mut().zip(&mut absolute.phidot).zip(joints) {
+        for (j, joint) in joints.take(N).enumerate() {
             angle += joint[0];
             rate += joint[1];
-            (*phi, *phidot) = (angle, rate);
+            (absolute.phi[j], absolute.phidot[j]) = (angle, rate);
         }
         absolute
     }
@@ -55,9 +55,9 @@ impl<const N: usize, T: Scalar> ChainState<N, T> {
             *cart = [self.x, self.xdot];
         }
         let (mut angle, mut rate) = (T::default(), T::default());
-        for ((&phi, &phidot), joint) in self.phi.iter().zip(&self.phidot).zip(joints) {
-            *joint = [phi - angle, phidot - rate];
-            (angle, rate) = (phi, phidot);
+        for (j, joint) in joints.take(N).enumerate() {
+            *joint = [self.phi[j] - angle, self.phidot[j] - rate];
+            (angle, rate) = (self.phi[j], self.phidot[j]);
         }
     }
 
@@ -67,11 +67,9 @@ impl<const N: usize, T: Scalar> ChainState<N, T> {
         let mut sum = *self;
         sum.x += factor * rate.x;
         sum.xdot += factor * rate.xdot;
-        for (sum, &rate) in sum.phi.iter_mut().zip(&rate.phi) {
-            *sum += factor * rate;
-        }
-        for (sum, &rate) in sum.phidot.iter_mut().zip(&rate.phidot) {
-            *sum += factor * rate;
+        for j in 0..N {
+            sum.phi[j] += factor * rate.phi[j];
+            sum.phidot[j] += factor * rate.phidot[j];
         }
         sum
     }

@@ -22,8 +22,8 @@ const LARGEST: f32 = 8192.0;
 #[inline]
 pub(crate) fn sines_and_cosines<const N: usize>(angles: &[f32; N]) -> ([f32; N], [f32; N]) {
     let (mut sines, mut cosines) = ([0.0; N], [0.0; N]);
-    for ((x, sine), cosine) in angles.iter().zip(&mut sines).zip(&mut cosines) {
-        (*sine, *cosine) = sine_and_cosine(*x);
+    for (j, x) in angles.iter().enumerate() {
+        (sines[j], cosines[j]) = sine_and_cosine(*x);
     }
     (sines, cosines)
 }

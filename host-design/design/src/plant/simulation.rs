@@ -56,8 +56,7 @@ impl<const N: usize> ChainSimulation<N> {
 }
 
 fn joint_torques<const N: usize>(disturbances: &[f64]) -> [f64; N] {
-    assert_eq!(disturbances.len(), N, "a chain of {N} links has {N} joint torques");
-    core::array::from_fn(|i| disturbances[i])
+    disturbances.try_into().unwrap_or_else(|_| panic!("a chain of {N} links has {N} joint torques"))
 }
 
 impl<const N: usize> Plant for ChainSimulation<N> {

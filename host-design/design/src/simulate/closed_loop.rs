@@ -113,6 +113,7 @@ fn single(state: &[f64]) -> Vec<f32> {
     state.iter().map(|&value| value as f32).collect()
 }
 
+#[inline]
 fn copy_converted<A: Copy, B>(to: &mut [B], from: &[A], convert: impl Fn(A) -> B) {
     for (to, &from) in to.iter_mut().zip(from) {
         *to = convert(from);
