@@ -24,6 +24,8 @@ pub struct Controller<'t, const NX: usize, const NY: usize, T: Scalar = f32> {
     /// Whether the force depends on earlier ticks, through a pending force or an integral.
     has_memory: bool,
     mode: Mode<'t, NX, NY, T>,
+    /// The mode of a started controller. What the observer finds out about its gains is too slow for a tick.
+    started: Mode<'t, NX, NY, T>,
     target: T,
     encoders: Encoders<NY>,
     /// Current estimate x̂ within a tick, predicted estimate x̂⁻ between ticks.
@@ -131,6 +133,10 @@ impl<'t, const NX: usize, const NY: usize, T: Scalar> Controller<'t, NX, NY, T> 
             gains,
             has_memory: table.has_memory(gains),
             mode: Mode::Stopped,
+            started: table
+                .observer
+                .as_ref()
+                .map_or(Mode::WithoutObserver, |gains| Mode::Running(Observer::new(gains))),
             target: zero,
             encoders: Encoders::new(widths),
             estimate: SVector::repeat(zero),
@@ -243,10 +249,7 @@ impl<'t, const NX: usize, const NY: usize, T: Scalar> Controller<'t, NX, NY, T> 
         self.state = LawState { setpoint: self.output(), ..LawState::default() };
         self.last_volts = T::default();
         (self.requested, self.applied) = (T::default(), T::default());
-        self.mode = match &self.table.observer {
-            None => Mode::WithoutObserver,
-            Some(gains) => Mode::Running(Observer::new(gains)),
-        };
+        self.mode = self.started;
     }
 
     /// Stops. The controller must be started again before it drives the motor.

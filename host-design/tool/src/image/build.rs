@@ -1,7 +1,7 @@
 //! Building an image.
 
+use std::fs::File;
 use std::path::{Path, PathBuf};
-use std::sync::{Mutex, PoisonError};
 
 use super::board::Board;
 use super::compiler::{Compiler, compiler, target_directory};
@@ -54,10 +54,10 @@ pub enum ImageError {
     /// The compiler reports errors.
     #[error("the image cannot be built; the compiler says:\n{0}")]
     Compiler(String),
-    /// The gain table for it cannot be written.
+    /// Its gain table, or the image itself, cannot be written.
     #[error(transparent)]
     Write(#[from] WriteError),
-    /// A file of the image cannot be copied.
+    /// A file of the image cannot be read.
     #[error("{}: {source}", path.display())]
     File {
         /// Which.
@@ -118,12 +118,17 @@ pub fn build_for(kind: Kind, rig: &Rig, table: &TableValues) -> Result<PathBuf, 
     compile(kind, Some(&gains), &name)
 }
 
-/// The compiler writes all images to the same place; each is copied from there before the next.
-static COMPILING: Mutex<()> = Mutex::new(());
+/// Waits until nobody else compiles an image, and keeps others waiting until the file is dropped. The compiler writes
+/// all images to the same place; each has to be copied from there before the next, by whichever process.
+fn one_at_a_time() -> Result<File, ImageError> {
+    let path = images()?.join("compiling");
+    let locked = File::create(&path).and_then(|file| file.lock().map(|()| file));
+    locked.map_err(|source| ImageError::File { path, source })
+}
 
 fn compile(kind: Kind, gains: Option<&Path>, name: &str) -> Result<PathBuf, ImageError> {
-    let _one_at_a_time = COMPILING.lock().unwrap_or_else(PoisonError::into_inner);
     let root = checkout()?;
+    let _others_wait = one_at_a_time()?;
     let Compiler { program, mut cargo, target_directory } = compiler()?;
     let features = match gains {
         Some(gains) => {
@@ -147,7 +152,8 @@ fn compile(kind: Kind, gains: Option<&Path>, name: &str) -> Result<PathBuf, Imag
     let built = target_directory.join(TARGET).join(PROFILE).join("upright-image");
     let directory = images()?;
     let image = directory.join(format!("{name}.elf"));
-    std::fs::copy(&built, &image).map_err(|source| ImageError::File { path: image.clone(), source })?;
+    let elf = std::fs::read(&built).map_err(|source| ImageError::File { path: built, source })?;
+    write_atomically(&image, &elf)?;
     Ok(image)
 }
 

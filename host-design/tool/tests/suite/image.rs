@@ -1,9 +1,12 @@
 //! Inspection of images: defects of an image are found. The image for the emulator is not fit for a board: it can be
 //! told to panic and to overflow its stack.
 
+use std::fs::File;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 use std::sync::OnceLock;
+use std::sync::mpsc::{self, RecvTimeoutError};
+use std::time::Duration;
 
 use serde_json::Value;
 use upright_tool::image::{
@@ -24,6 +27,20 @@ fn upright(arguments: &[&str]) -> Output {
 fn upright_alone(arguments: &[&str]) -> Output {
     let nowhere = tempfile::tempdir().unwrap();
     Command::new(env!("CARGO_BIN_EXE_upright")).args(arguments).env("PATH", nowhere.path()).output().unwrap()
+}
+
+/// The compiler writes every image to the same file, and other processes compile, too.
+#[test]
+fn an_image_waits_for_the_one_that_is_being_compiled() {
+    let Some(path) = path_in_the_loop() else { return };
+    let other = File::create(path.with_file_name("compiling")).unwrap();
+    other.lock().unwrap();
+    let (done, is_done) = mpsc::channel();
+    let builder = std::thread::spawn(move || done.send(build_if_possible(Kind::InTheLoop).unwrap()).unwrap());
+    assert_eq!(is_done.recv_timeout(Duration::from_secs(3)), Err(RecvTimeoutError::Timeout));
+    other.unlock().unwrap();
+    assert_eq!(is_done.recv().unwrap().as_deref(), Some(path));
+    builder.join().unwrap();
 }
 
 #[test]
