@@ -57,9 +57,9 @@ mod app {
     ])]
     fn init(cx: init::Context) -> (Shared, Local) {
         let build = Build { rig_hash: RIG_HASH, tick_s: TICK_S };
-        let (hardware, line, firmware) = set_up(cx.device, cx.local.buffer, |reset| {
-            Firmware::with_swing_up(&TABLE, &SWING_UP, &build, Hardware::WIDTHS, reset)
-                .unwrap_or_else(|_| Firmware::unusable(&TABLE, &SWING_UP, Hardware::WIDTHS, reset))
+        let (hardware, line, firmware) = set_up(cx.device, cx.local.buffer, |start| {
+            Firmware::with_swing_up(&TABLE, &SWING_UP, &build, Hardware::WIDTHS, start)
+                .unwrap_or_else(|_| Firmware::unusable(&TABLE, &SWING_UP, Hardware::WIDTHS, start))
         });
         let (to_control, commands) = cx.local.commands.split();
         let (messages, to_link) = cx.local.messages.split();

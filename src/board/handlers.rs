@@ -7,13 +7,14 @@ use super::stop;
 
 #[panic_handler]
 fn panicked(_: &PanicInfo) -> ! {
-    crashed()
+    crashed(core::ptr::null())
 }
 
-/// Turns the motor off for good. Disables interrupts first, so that the tick cannot turn it on again.
-extern "C" fn crashed() -> ! {
+/// Turns the motor off for good. Disables interrupts first, so that the tick cannot turn it on again. `frame` is where the
+/// processor has saved its registers at the entry of an exception; null after a panic.
+extern "C" fn crashed(frame: *const u32) -> ! {
     cortex_m::interrupt::disable();
-    stop()
+    stop(frame)
 }
 
 // After a stack overflow the stack pointer is below the memory. Pushing a register would fault again and lock up the
@@ -24,8 +25,9 @@ global_asm!(
     ".type HardFault, %function",
     ".thumb_func",
     "HardFault:",
-    "ldr r0, =_stack_start",
-    "mov sp, r0",
+    "mov r0, sp",
+    "ldr r1, =_stack_start",
+    "mov sp, r1",
     "b {crashed}",
     ".size HardFault, . - HardFault",
     // All exceptions that have no handler of their own.

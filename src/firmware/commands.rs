@@ -54,6 +54,7 @@ impl<const NX: usize, const NY: usize, S: SwingUp<NX, NY>> Firmware<'_, NX, NY, 
             Request::Select(law) => taken(self.controller.select(law)),
             Request::Info => Answer::Info(self.info()),
             Request::Cause => Answer::Cause(self.supervisor.cause()),
+            Request::Crash => Answer::Crash(self.start.crash),
             Request::Statistics => Answer::Statistics(self.statistics()),
             Request::ResetStatistics => {
                 self.statistics = Statistics::default();
@@ -151,7 +152,8 @@ impl<const NX: usize, const NY: usize, S: SwingUp<NX, NY>> Firmware<'_, NX, NY, 
             tick_s: self.table.tick_s,
             states: NX as u8,
             sensors: NY as u8,
-            reset: self.reset,
+            reset: self.start.reset,
+            image: self.start.image,
         }
     }
 }

@@ -16,7 +16,7 @@ use crate::board::{Contacts, Inputs, Output};
 use crate::control::controller::{Controller, MotorCommand};
 use crate::control::encoder::CounterWidth;
 use crate::control::motion::Player;
-use crate::protocol::message::{Command, Reply, Reset, Statistics, Telemetry};
+use crate::protocol::message::{Command, Reply, Start, Statistics, Telemetry};
 use crate::supervision::calibration::Calibration;
 use crate::supervision::debounce::Debounce;
 use crate::supervision::detection::{Detection, Finding};
@@ -62,8 +62,9 @@ pub struct Firmware<'t, const NX: usize, const NY: usize, S = NoSwingUp> {
     requested_n: f32,
     applied_n: f32,
     cycles: u32,
+    worst_cycles: u32,
     statistics: Statistics,
-    reset: Reset,
+    start: Start,
     /// Telemetry is sent every n ticks; 0: never.
     telemetry_period_ticks: u16,
     ticks_to_telemetry: u16,
@@ -77,7 +78,8 @@ const WORDS_PER_ARMED_TICK: u32 = 8;
 const DEFAULT_TELEMETRY_PERIOD_TICKS: u16 = 10;
 
 impl<'t, const NX: usize, const NY: usize> Firmware<'t, NX, NY> {
-    /// The firmware without swing-up after a `reset`, motor off.
+    /// The firmware without swing-up, motor off. `start` is what the board knows: a [`Start`], or just a
+    /// [`Reset`](crate::protocol::message::Reset).
     ///
     /// # Errors
     /// [`TableError`] if the table is damaged or was made for another build.
@@ -85,14 +87,14 @@ impl<'t, const NX: usize, const NY: usize> Firmware<'t, NX, NY> {
         table: &'t GainTable<NX, NY>,
         build: &Build,
         widths: [CounterWidth; NY],
-        reset: Reset,
+        start: impl Into<Start>,
     ) -> Result<Self, TableError> {
-        Self::with_swing_up(table, &NoSwingUp, build, widths, reset)
+        Self::with_swing_up(table, &NoSwingUp, build, widths, start)
     }
 }
 
 impl<'t, const NX: usize, const NY: usize, S: SwingUp<NX, NY>> Firmware<'t, NX, NY, S> {
-    /// The firmware after a `reset`, motor off.
+    /// The firmware, motor off; `start` as for [`new`](Self::new).
     ///
     /// # Errors
     /// [`TableError`] if a table is damaged or was made for another build.
@@ -101,10 +103,10 @@ impl<'t, const NX: usize, const NY: usize, S: SwingUp<NX, NY>> Firmware<'t, NX, 
         swing_up: &'t S,
         build: &Build,
         widths: [CounterWidth; NY],
-        reset: Reset,
+        start: impl Into<Start>,
     ) -> Result<Self, TableError> {
         swing_up.check(build)?;
-        Ok(Self::with_controller(table, swing_up, Controller::new(table, build, widths)?, reset))
+        Ok(Self::with_controller(table, swing_up, Controller::new(table, build, widths)?, start.into()))
     }
 
     /// The firmware with a table that cannot be used: it has latched [`Fault::Table`] for good, and reports it.
@@ -112,9 +114,9 @@ impl<'t, const NX: usize, const NY: usize, S: SwingUp<NX, NY>> Firmware<'t, NX, 
         table: &'t GainTable<NX, NY>,
         swing_up: &'t S,
         widths: [CounterWidth; NY],
-        reset: Reset,
+        start: Start,
     ) -> Self {
-        let mut firmware = Self::with_controller(table, swing_up, Controller::unusable(table, widths), reset);
+        let mut firmware = Self::with_controller(table, swing_up, Controller::unusable(table, widths), start);
         firmware.is_usable = false;
         firmware.trip(Fault::Table, None);
         firmware
@@ -124,9 +126,9 @@ impl<'t, const NX: usize, const NY: usize, S: SwingUp<NX, NY>> Firmware<'t, NX, 
         table: &'t GainTable<NX, NY>,
         swing_up: &'t S,
         controller: Controller<'t, NX, NY>,
-        reset: Reset,
+        start: Start,
     ) -> Self {
-        let cause = reset.fault().map(|fault| Cause { fault, tick: 0, sensor: None });
+        let cause = start.reset.fault().map(|fault| Cause { fault, tick: 0, sensor: None });
         Self {
             controller,
             supervisor: Supervisor::new(cause),
@@ -151,8 +153,9 @@ impl<'t, const NX: usize, const NY: usize, S: SwingUp<NX, NY>> Firmware<'t, NX, 
             requested_n: 0.0,
             applied_n: 0.0,
             cycles: 0,
+            worst_cycles: 0,
             statistics: Statistics::default(),
-            reset,
+            start,
             telemetry_period_ticks: DEFAULT_TELEMETRY_PERIOD_TICKS,
             ticks_to_telemetry: 0,
         }
@@ -353,7 +356,7 @@ impl<'t, const NX: usize, const NY: usize, S: SwingUp<NX, NY>> Firmware<'t, NX, 
     pub fn report(&mut self, cycles: u32) -> Option<Telemetry<NX, NY>> {
         self.cycles = cycles;
         self.statistics.ticks = self.statistics.ticks.wrapping_add(1);
-        self.statistics.worst_cycles = self.statistics.worst_cycles.max(cycles);
+        self.worst_cycles = self.worst_cycles.max(cycles);
         self.telemetry_is_due().then(|| self.telemetry())
     }
 

@@ -38,6 +38,8 @@ impl<const NX: usize, const NY: usize, S: SwingUp<NX, NY>> Firmware<'_, NX, NY, 
             arming_inhibits: self.arming_inhibits(),
             swing_up_inhibits: self.swing_up_inhibits(),
             motion_tick: self.moving.as_ref().map_or(0, Player::tick),
+            contacts: self.contacts,
+            supply_v: self.supply_v,
             counts: Vec::from_slice(self.controller.encoders().counts()).unwrap_or_default(),
             estimate: Vec::from_slice(self.controller.estimate().as_slice()).unwrap_or_default(),
             innovation: Vec::from_slice(self.controller.innovation().as_slice()).unwrap_or_default(),
@@ -46,6 +48,7 @@ impl<const NX: usize, const NY: usize, S: SwingUp<NX, NY>> Firmware<'_, NX, NY, 
             applied_n: self.applied_n,
             drive,
             cycles: self.cycles,
+            worst_cycles: self.worst_cycles,
         }
     }
 }

@@ -2,7 +2,7 @@
 
 use super::*;
 use crate::gains::{RIG_HASH, SENSORS, STATES, TABLE, TICK_S};
-use crate::protocol::message::{Answer, Request};
+use crate::protocol::message::{Answer, Request, Reset};
 use crate::supervision::inhibits::Inhibits;
 
 const BUILD: Build = Build { rig_hash: RIG_HASH, tick_s: TICK_S };

@@ -6,6 +6,7 @@
 use heapless::Vec;
 use serde::{Deserialize, Serialize};
 
+use crate::board::Contacts;
 use crate::control::controller::Rejected;
 use crate::supervision::fault::{Cause, Fault};
 use crate::supervision::homing::Homing;
@@ -15,7 +16,7 @@ use crate::supervision::supervisor::State;
 use crate::table::Law;
 
 /// Version of these messages; a host with another version must not send commands.
-pub const PROTOCOL: u8 = 3;
+pub const PROTOCOL: u8 = 4;
 
 /// A command, host to firmware.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -52,6 +53,8 @@ pub enum Request {
     Info,
     /// Report the first cause of the fault, or of the last reset.
     Cause,
+    /// Report where the program crashed the last time.
+    Crash,
     /// Report [`Statistics`].
     Statistics,
     /// Set the counters of [`Statistics`] to 0, except those of the serial link.
@@ -97,6 +100,8 @@ pub enum Answer {
     Info(Info),
     /// Answer to [`Request::Cause`].
     Cause(Option<Cause>),
+    /// Answer to [`Request::Crash`]: none since power-on, or the hardware keeps no record.
+    Crash(Option<CrashRecord>),
     /// Answer to [`Request::Statistics`].
     Statistics(Statistics),
 }
@@ -118,6 +123,41 @@ pub struct Info {
     pub sensors: u8,
     /// Why the microcontroller started.
     pub reset: Reset,
+    /// CRC-32 of the image in flash, which `upright firmware build` prints, too; 0 for a firmware that is not in flash.
+    pub image: u32,
+}
+
+/// What a board knows when the firmware starts.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Start {
+    /// Why the microcontroller started.
+    pub reset: Reset,
+    /// Where the program crashed the last time, if it has crashed since power-on.
+    pub crash: Option<CrashRecord>,
+    /// As [`Info::image`].
+    pub image: u32,
+}
+
+impl From<Reset> for Start {
+    fn from(reset: Reset) -> Self {
+        Self { reset, ..Self::default() }
+    }
+}
+
+/// Where the program crashed, and what the processor says about it (ARM DDI 0403, B3.2). Program counter and link
+/// register are 0 after a panic, and after a stack overflow, which leaves no room for them.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+pub struct CrashRecord {
+    /// Program counter (PC).
+    pub pc: u32,
+    /// Link register (LR): where the function returns to, unless it has used the register for something else.
+    pub lr: u32,
+    /// Configurable fault status (CFSR).
+    pub cfsr: u32,
+    /// HardFault status (HFSR).
+    pub hfsr: u32,
+    /// Address of a bus fault (BFAR); valid if bit 15 of CFSR is set.
+    pub bfar: u32,
 }
 
 /// Why the microcontroller started.
@@ -148,8 +188,6 @@ impl Reset {
 pub struct Statistics {
     /// Number of ticks.
     pub ticks: u32,
-    /// Longest execution of a tick (processor cycles).
-    pub worst_cycles: u32,
     /// Ticks that were not finished in time.
     pub overruns: u32,
     /// Single measurements that were rejected as implausible.
@@ -185,6 +223,10 @@ pub struct Telemetry<const NX: usize, const NY: usize> {
     pub swing_up_inhibits: Inhibits,
     /// Ticks since the beginning of the motion; 0 if there is none.
     pub motion_tick: u32,
+    /// Contacts and flags of this tick, as read.
+    pub contacts: Contacts,
+    /// Supply voltage of the power stage (V).
+    pub supply_v: f32,
     /// Encoder counts, from position 0.
     pub counts: Vec<i32, NY>,
     /// Corrected estimate x̂ (m, m/s, rad, rad/s …).
@@ -201,4 +243,6 @@ pub struct Telemetry<const NX: usize, const NY: usize> {
     pub drive: f32,
     /// Execution time of the tick before (processor cycles).
     pub cycles: u32,
+    /// Longest execution of a tick since the start of the firmware, in every state (processor cycles).
+    pub worst_cycles: u32,
 }

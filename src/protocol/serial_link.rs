@@ -13,7 +13,7 @@ use crate::protocol::queue;
 /// Longest frame from the host (bytes).
 pub const MAX_COMMAND: usize = 32;
 /// Longest frame to the host (bytes): enough for 30 states and 15 sensors.
-pub const MAX_MESSAGE: usize = 320;
+pub const MAX_MESSAGE: usize = 336;
 
 /// Receiver and transmitter of frames, with this side's ends of the queues to the control task.
 pub struct SerialLink<'q, const NX: usize, const NY: usize> {
@@ -76,6 +76,7 @@ fn send<'a, T: Serialize>(message: &T, scratch: &mut [u8], out: &'a mut [u8]) ->
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::board::Contacts;
     use crate::protocol::message::Telemetry;
     use crate::supervision::fault::Fault;
     use crate::supervision::homing::Homing;
@@ -99,6 +100,8 @@ mod tests {
             arming_inhibits: all,
             swing_up_inhibits: all,
             motion_tick: u32::MAX,
+            contacts: Contacts::default(),
+            supply_v: f32::MAX,
             counts: Vec::from_array([i32::MIN; 15]),
             estimate: Vec::from_array([f32::MAX; 30]),
             innovation: Vec::from_array([f32::MAX; 15]),
@@ -107,6 +110,7 @@ mod tests {
             applied_n: f32::MAX,
             drive: f32::MAX,
             cycles: u32::MAX,
+            worst_cycles: u32::MAX,
         });
         let (mut scratch, mut out) = ([0; MAX_MESSAGE], [0; MAX_MESSAGE]);
         assert!(send(&telemetry, &mut scratch, &mut out).is_some());

@@ -100,6 +100,16 @@ impl Image {
         found.map(|&(_, address, bytes)| address..address + bytes)
     }
 
+    /// What flash holds up to the end of the image; what nothing is written to is erased.
+    pub fn flash(&self) -> Vec<u8> {
+        let mut flash = vec![0xff; self.end()];
+        for (address, bytes) in &self.segments {
+            let begin = (address & 0x00ff_ffff) as usize;
+            flash[begin..begin + bytes.len()].copy_from_slice(bytes);
+        }
+        flash
+    }
+
     /// Bytes of flash up to the end of the image.
     pub fn end(&self) -> usize {
         let end = |(address, bytes): &(u32, Vec<u8>)| (address & 0x00ff_ffff) as usize + bytes.len();

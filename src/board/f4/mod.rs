@@ -2,6 +2,7 @@
 
 mod boards;
 mod clock;
+mod crash;
 mod encoders;
 mod guard;
 mod motor;
@@ -11,14 +12,12 @@ mod supply;
 mod watchdog;
 mod wiring;
 
-use core::mem::MaybeUninit;
-
 use cortex_m::peripheral::{DWT, SYST};
 use stm32f4xx_hal::pac::{EXTI, PWR, Peripherals};
 use upright::board::{Board, Contacts, Inputs, Output};
 use upright::control::encoder::CounterWidth;
 use upright::gains::SENSORS;
-use upright::protocol::message::Reset;
+use upright::protocol::message::Start;
 
 pub(crate) use clock::CLOCK_HZ;
 use clock::Clock;
@@ -44,17 +43,18 @@ pub(crate) struct Hardware {
 }
 
 /// Sets up all peripherals, with the motor off. Takes at most 150 ms, even if a peripheral does not respond. `start`
-/// takes the reason for the reset and makes what has to be ready before the watchdog runs.
+/// takes what the board knows and makes what has to be ready before the watchdog runs.
 pub(crate) fn set_up<T>(
     device: Peripherals,
     buffer: &'static mut Buffer,
-    start: impl FnOnce(Reset) -> T,
+    start: impl FnOnce(Start) -> T,
 ) -> (Hardware, SerialLine, T) {
     let rcc = &device.RCC;
     clock::enable_peripherals(rcc);
     pins::set_up(&device.SYSCFG, &device.EXTI);
     let motor = Motor::set_up(device.TIM1);
-    let reset = clock::reset_reason(rcc, take_crash());
+    let (has_crashed, crash) = crash::take();
+    let reset = clock::reset_reason(rcc, has_crashed);
     let clock = clock::set_up(rcc, &device.FLASH, &device.TIM11);
     encoders::set_up();
     let supply = Supply::set_up(device.ADC1, &device.ADC_COMMON);
@@ -69,7 +69,7 @@ pub(crate) fn set_up<T>(
     pins::set_status_led(clock == Clock::Full && !wrong_chip && !motor.has_failed());
     // Clears flags that were set while the pull-ups charged the inputs.
     let _ = (motor.was_stopped(), pins::driver_fault_was_reported(&device.EXTI));
-    let started = start(reset);
+    let started = start(Start { reset, crash, image: crash::image_checksum() });
     let hardware = Hardware {
         motor,
         supply,
@@ -139,30 +139,13 @@ fn tick_is_due() -> bool {
     unsafe { (*SYST::PTR).csr.read() & 1 << 16 != 0 }
 }
 
-/// Records a panic or processor fault, so that the firmware knows the reason after the watchdog's reset. It is not
-/// initialised at start-up, so it survives the reset.
-#[unsafe(link_section = ".uninit.CRASH")]
-static mut CRASH: MaybeUninit<u32> = MaybeUninit::uninit();
-const CRASHED: u32 = 0x5afe_0ff5;
-
-/// Whether the firmware crashed before this reset; clears the record.
-fn take_crash() -> bool {
-    let cell = (&raw mut CRASH).cast::<u32>();
-    // SAFETY: nothing else runs yet. After power-on the memory holds arbitrary bits, which are valid for this type.
-    unsafe {
-        let crashed = cell.read_volatile() == CRASHED;
-        cell.write_volatile(0);
-        crashed
-    }
-}
-
-/// Turns the motor off for good. If the watchdog is running, it resets the microcontroller.
-pub(crate) fn stop() -> ! {
+/// Turns the motor off for good. If the watchdog is running, it resets the microcontroller. `frame` is where the processor
+/// has saved its registers, or null.
+pub(crate) fn stop(frame: *const u32) -> ! {
     // SAFETY: nothing else runs any more.
-    unsafe {
-        motor::off(&Peripherals::steal().TIM1);
-        (&raw mut CRASH).cast::<u32>().write_volatile(CRASHED);
-    }
+    let device = unsafe { Peripherals::steal() };
+    motor::off(&device.TIM1);
+    crash::record(frame);
     pins::set_status_led(false);
     loop {
         cortex_m::asm::nop();

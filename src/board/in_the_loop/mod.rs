@@ -16,7 +16,7 @@ use upright::board::{Board, Inputs, Output};
 use upright::control::encoder::CounterWidth;
 use upright::gains::SENSORS;
 use upright::protocol::frame::{self, Receiver as Frames};
-use upright::protocol::message::Reset;
+use upright::protocol::message::Start;
 use upright::protocol::simulated_pins::{MAX_PINS_IN, MAX_PINS_OUT, PinsIn, PinsOut, Sabotage};
 
 #[cfg(feature = "in-the-loop")]
@@ -79,7 +79,7 @@ impl SerialLine {
 pub(crate) fn set_up<T>(
     device: Peripherals,
     buffer: &'static mut Buffer,
-    start: impl FnOnce(Reset) -> T,
+    start: impl FnOnce(Start) -> T,
 ) -> (Hardware, SerialLine, T) {
     let clock = device.TIM5;
     // 32 bits, one count per instruction.
@@ -88,7 +88,7 @@ pub(crate) fn set_up<T>(
     let (pins, serial) = open(device.USART1, device.USART2);
     let (producer, consumer) = buffer.0.split();
     let hardware = Hardware { pins, frames: Frames::new(), received: producer, clock, spent: 0 };
-    (hardware, SerialLine { received: consumer, serial }, start(Reset::Power))
+    (hardware, SerialLine { received: consumer, serial }, start(Start::default()))
 }
 
 impl Board<SENSORS> for Hardware {
@@ -171,7 +171,7 @@ fn dig(depth: u32) -> u32 {
 }
 
 /// Turns the motor off and ends the run with exit status 1.
-pub(crate) fn stop() -> ! {
+pub(crate) fn stop(_: *const u32) -> ! {
     // SAFETY: nothing else runs any more.
     send(&mut unsafe { Channel::steal() }, &Output::OFF);
     exit(Err(()))

@@ -2,6 +2,7 @@
 
 mod board;
 mod build;
+mod checksum;
 mod compiler;
 mod elf;
 mod forbidden;
@@ -11,6 +12,7 @@ mod thumb;
 
 pub use board::{Board, NoBoard};
 pub use build::{ImageError, Kind, PROFILE, TARGET, build, build_for, build_if_possible, if_possible};
+pub use checksum::flash_checksum;
 pub use compiler::{Compiler, compiler};
 pub use elf::{ElfError, Image};
 pub use forbidden::forbidden_functions;

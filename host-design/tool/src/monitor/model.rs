@@ -5,13 +5,14 @@ use std::time::Duration;
 
 use upright::protocol::frame::{self, Receiver};
 use upright::protocol::message::{
-    Answer, Command, Info, Message, PROTOCOL, Reply, Request, Statistics, Telemetry,
+    Answer, Command, CrashRecord, Info, Message, PROTOCOL, Reply, Request, Statistics, Telemetry,
 };
 use upright::protocol::serial_link::{MAX_COMMAND, MAX_MESSAGE};
 use upright::supervision::fault::Cause;
 use upright::table::Law;
 
 use super::command::Action;
+use super::words;
 
 /// Telemetry of a firmware of any size: a list is sent as its length and its items.
 pub type TelemetryOfAny = Telemetry<30, 15>;
@@ -62,6 +63,8 @@ pub struct Monitor {
     pub statistics: Option<Statistics>,
     /// The first cause of the fault or of the last reset.
     pub cause: Option<Cause>,
+    /// Where the program crashed the last time, if it did.
+    pub crash: Option<CrashRecord>,
     /// Requests and replies, oldest first.
     pub log: VecDeque<String>,
     /// Telemetry of the last 10 s.
@@ -93,6 +96,7 @@ impl Monitor {
             telemetry: None,
             statistics: None,
             cause: None,
+            crash: None,
             log: VecDeque::new(),
             history: VecDeque::new(),
             wanted: None,
@@ -154,7 +158,8 @@ impl Monitor {
         // The firmware has restarted: what was shown belongs to the run before.
         if self.history.back().is_some_and(|last| last.tick > telemetry.tick) {
             self.history.clear();
-            self.note("the firmware has started anew".to_owned());
+            self.note("the firmware has started again".to_owned());
+            self.send(Request::Crash, now);
         }
         let tick_s = self.info.map_or(0.0, |info| info.tick_s);
         while let Some(first) = self.history.front()
@@ -179,6 +184,11 @@ impl Monitor {
                 let ticks = (self.telemetry_s / info.tick_s).round().clamp(1.0, f32::from(u16::MAX));
                 self.send(Request::Telemetry(ticks as u16), now);
                 self.send(Request::Cause, now);
+                self.send(Request::Crash, now);
+            }
+            Answer::Crash(crash) => {
+                self.crash = crash;
+                crash.iter().for_each(|record| self.note(words::crash(record)));
             }
             Answer::Cause(cause) => self.cause = cause,
             Answer::Statistics(statistics) => self.statistics = Some(statistics),

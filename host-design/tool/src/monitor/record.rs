@@ -15,6 +15,8 @@ pub fn json(telemetry: &TelemetryOfAny) -> Value {
         "fault": telemetry.fault.map(|fault| fault.to_string()),
         "against_arming": telemetry.arming_inhibits.texts().collect::<Vec<_>>(),
         "against_swing_up": telemetry.swing_up_inhibits.texts().collect::<Vec<_>>(),
+        "contacts": telemetry.contacts,
+        "supply_v": telemetry.supply_v,
         "counts": telemetry.counts,
         "estimate": telemetry.estimate,
         "innovation": telemetry.innovation,
@@ -23,6 +25,7 @@ pub fn json(telemetry: &TelemetryOfAny) -> Value {
         "applied_n": telemetry.applied_n,
         "drive": telemetry.drive,
         "cycles": telemetry.cycles,
+        "worst_cycles": telemetry.worst_cycles,
     })
 }
 

@@ -76,7 +76,8 @@ fn header(monitor: &Monitor) -> Vec<Line<'_>> {
     };
     let recording = monitor.recording.as_ref().map_or(String::new(), |file| format!("  recording {file}"));
     lines.push(Line::from(format!(
-        "firmware {major}.{minor}.{patch}  rig {:016x}  tick {} ms  law {law}{recording}",
+        "firmware {major}.{minor}.{patch}  image {:08x}  rig {:016x}  tick {} ms  law {law}{recording}",
+        info.image,
         info.rig_hash,
         info.tick_s * 1e3,
     )));
@@ -104,6 +105,8 @@ fn header(monitor: &Monitor) -> Vec<Line<'_>> {
     } else if let Some(cause) = monitor.cause.filter(|_| telemetry.state == State::Disarmed) {
         lines.push(Line::from(format!("before: {}; {}", cause.fault, cause.fault.entry().remedy)));
     }
+    lines.extend(monitor.crash.iter().map(|record| Line::from(words::crash(record))));
+    lines.push(Line::from(words::inputs(telemetry)));
     lines.extend(words::instruction(telemetry).map(|what| Line::from(format!("now: {what}")).yellow()));
     if !telemetry.state.drives() && !telemetry.arming_inhibits.is_empty() {
         lines.push(Line::from(format!("against arming: {}", telemetry.arming_inhibits)));
@@ -148,8 +151,7 @@ fn force_and_timing(monitor: &Monitor) -> Vec<Line<'_>> {
             telemetry.requested_n, telemetry.applied_n
         )));
         lines.push(Line::from(format!("drive {:>7.3} {}", telemetry.drive, bar(telemetry.drive))));
-        let worst = monitor.statistics.map_or("-".to_owned(), |all| all.worst_cycles.to_string());
-        lines.push(Line::from(format!("cycles {}, worst {worst}", telemetry.cycles)));
+        lines.push(Line::from(format!("cycles {}, worst {}", telemetry.cycles, telemetry.worst_cycles)));
     }
     if let Some(all) = monitor.statistics {
         lines.push(Line::from(format!("overruns {}, dropped {}", all.overruns, all.dropped)));

@@ -1,5 +1,7 @@
 //! States, sensors and instructions in words.
 
+use upright::board::Contacts;
+use upright::protocol::message::CrashRecord;
 use upright::supervision::homing::Homing;
 use upright::supervision::sign_check::Signs;
 use upright::supervision::supervisor::State;
@@ -23,6 +25,30 @@ pub fn state(state: State) -> &'static str {
 /// A sensor by its number.
 pub fn joint(sensor: u8) -> String {
     if sensor == 0 { "cart".to_owned() } else { format!("link {sensor}") }
+}
+
+/// Where the program has crashed, with the processor's registers as its manual names them.
+pub fn crash(record: &CrashRecord) -> String {
+    let CrashRecord { pc, lr, cfsr, hfsr, bfar } = record;
+    format!("crash at PC {pc:#010x}, LR {lr:#010x}, CFSR {cfsr:#010x}, HFSR {hfsr:#010x}, BFAR {bfar:#010x}")
+}
+
+/// Supply of the power stage, and the contacts and flags that are active in this tick.
+pub fn inputs(telemetry: &TelemetryOfAny) -> String {
+    let Contacts { limit_low, limit_high, emergency_stop, driver_fault, overrun, clock_fault, board_fault } =
+        telemetry.contacts;
+    let all = [
+        (limit_low, "limit switch low"),
+        (limit_high, "limit switch high"),
+        (emergency_stop, "emergency stop"),
+        (driver_fault, "driver fault"),
+        (overrun, "overrun"),
+        (clock_fault, "clock"),
+        (board_fault, "board"),
+    ];
+    let active: Vec<&str> = all.into_iter().filter(|(active, _)| *active).map(|(_, name)| name).collect();
+    let active = if active.is_empty() { "none".to_owned() } else { active.join(", ") };
+    format!("supply {:.1} V, active inputs: {active}", telemetry.supply_v)
 }
 
 /// The next thing to do by hand.

@@ -78,6 +78,7 @@ impl Desk {
             if self.fresh.len() < MAX_FRESH {
                 let mut object = telemetry_json(&telemetry);
                 object["now"] = json!(words::instruction(&telemetry));
+                object["inputs"] = json!(words::inputs(&telemetry));
                 self.fresh.push(object);
             }
         }

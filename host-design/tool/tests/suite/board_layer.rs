@@ -1,15 +1,19 @@
 //! What the flashed image does with hardware that is not as it has to be, on the virtual board.
 
+use upright::board::Contacts;
 use upright::gains::{SENSORS, STATES, TABLE, TICK_S};
 use upright::protocol::frame::{self, Receiver};
-use upright::protocol::message::{Answer, Command, Message, Reply, Request, Telemetry};
+use upright::protocol::message::{
+    Answer, Command, CrashRecord, Info, Message, Reply, Request, Reset, Telemetry,
+};
 use upright::supervision::fault::Fault;
 use upright::supervision::inhibits::Inhibits;
 use upright::supervision::supervisor::State;
 use upright_board::{
     Board as VirtualBoard, Chip, Conditions, Image, Input, Rules, Wire, Wiring, pin, seconds,
 };
-use upright_tool::image::{Board, Kind, build_if_possible};
+use upright_tool::image::{Board, Kind, build_if_possible, flash_checksum};
+use upright_tool::monitor::Monitor;
 
 const BAUD: u32 = 460_800;
 const TIM1: u32 = 0x4001_0000;
@@ -63,6 +67,11 @@ impl Powered {
         let (mut scratch, mut out) = ([0; 64], [0; 64]);
         let frame = frame::encode(&Command { id, request }, &mut scratch, &mut out).unwrap();
         self.board.send(frame, BAUD);
+    }
+
+    /// Time since power-on (s).
+    fn seconds(&self) -> f64 {
+        self.board.now() as f64 / seconds(1.0) as f64
     }
 
     fn last(&self) -> (State, Option<Fault>) {
@@ -159,16 +168,20 @@ fn another_chip_is_noticed() {
     assert_eq!(run.last(), (State::Fault, Some(Fault::Board)));
 }
 
+/// Where the table's first gain is in flash.
+fn first_gain(board: &VirtualBoard) -> u32 {
+    let gains: Vec<u32> =
+        TABLE.laws.lqr.as_ref().unwrap().k.iter().take(3).map(|gain| gain.to_bits()).collect();
+    let here = |at: &u32| (0..3).all(|i| board.word(at + 4 * i) == Some(gains[i as usize]));
+    (0x0800_0000..0x0801_0000).step_by(4).find(here).expect("the table is in flash")
+}
+
 /// A bit of the first gain flips in flash before power comes.
 #[test]
 fn a_damaged_table_is_told_and_cannot_be_cleared() {
     let Some(image) = image() else { return };
-    let gains: Vec<u32> =
-        TABLE.laws.lqr.as_ref().unwrap().k.iter().take(3).map(|gain| gain.to_bits()).collect();
     let mut run = Powered::strict(&image, &Conditions::f405(1));
-    let words = (0x0800_0000..0x0801_0000).step_by(4);
-    let here = |at: &u32| (0..3).all(|i| run.board.word(at + 4 * i) == Some(gains[i as usize]));
-    let address = words.into_iter().find(here).expect("the table is in flash");
+    let address = first_gain(&run.board);
     run.board.apply(Input::FlipBit { address, bit: 5 });
     run.run(0.05);
     assert_eq!(run.last(), (State::Fault, Some(Fault::Table)));
@@ -249,5 +262,97 @@ fn every_board_starts_with_its_own_clock_and_led() {
         assert_eq!(run.last(), (State::Disarmed, None), "{board}");
         assert_eq!(run.board.output(led), !is_low, "{board}");
         assert_eq!(run.board.core_hz(), 168_000_000);
+    }
+}
+
+#[test]
+fn contacts_supply_and_the_longest_tick_are_told_with_the_motor_off() {
+    let Some(image) = image() else { return };
+    let mut run = Powered::strict(&image, &Conditions::f405(1));
+    run.run(0.05);
+    let told = run.telemetry.last().unwrap();
+    assert!((told.supply_v - 24.0).abs() < 0.15, "{} V", told.supply_v);
+    assert_eq!(told.contacts, Contacts::default());
+    for (wire, expected) in [
+        (pin('C', 0), Contacts { limit_low: true, ..Contacts::default() }),
+        (pin('C', 1), Contacts { limit_high: true, ..Contacts::default() }),
+        (pin('B', 12), Contacts { emergency_stop: true, ..Contacts::default() }),
+    ] {
+        // An open wire: the pull-up inside pulls it high.
+        run.board.apply(Input::Level(wire, Wire::Open));
+        run.run(run.seconds() + 0.05);
+        assert_eq!(run.telemetry.last().unwrap().contacts, expected);
+        run.board.apply(Input::Level(wire, Wire::Low));
+    }
+    run.board.apply(Input::Supply(11.0));
+    run.run(run.seconds() + 0.05);
+    assert!((run.telemetry.last().unwrap().supply_v - 11.0).abs() < 0.15);
+    let cycles: Vec<_> = run.telemetry.iter().map(|told| (told.cycles, told.worst_cycles)).collect();
+    assert!(cycles.windows(2).all(|two| two[0].1 <= two[1].1), "it never falls: {cycles:?}");
+    assert!(cycles.iter().all(|(cycles, worst)| cycles <= worst) && cycles[1].1 > 0, "{cycles:?}");
+    // The tick that clears the counters is no shorter for it, and the longest tick stays.
+    let worst = run.telemetry.last().unwrap().worst_cycles;
+    run.ask(1, Request::ResetStatistics);
+    run.run(run.seconds() + 0.05);
+    assert!(run.telemetry.last().unwrap().worst_cycles >= worst);
+}
+
+/// What the monitor says of a board from now on, for so long (s).
+fn monitored(run: &mut Powered, time_s: f64) -> Monitor {
+    let mut monitor = Monitor::new("the virtual board");
+    let end = run.seconds() + time_s;
+    while run.seconds() < end {
+        // Seconds since 1970: they only have to grow.
+        let now = std::time::Duration::from_secs_f64(1.8e9 + run.seconds());
+        monitor.poll(now);
+        let bytes = monitor.take_outgoing();
+        if !bytes.is_empty() {
+            run.board.send(&bytes, BAUD);
+        }
+        run.board.run_until(run.board.now() + seconds(0.005)).unwrap();
+        let sent: Vec<u8> = run.board.sent().iter().map(|byte| byte.value).collect();
+        monitor.receive(&sent, now);
+    }
+    monitor
+}
+
+/// The pointers to the gain table that the firmware keeps in RAM lose a bit: the next tick reads where nothing is.
+#[test]
+fn a_crash_is_recorded_over_the_reset_and_shown_by_the_monitor() {
+    let Some(image) = image() else { return };
+    let rules = Rules { faults_are_taken: true, ..Rules::STRICT };
+    let mut run = Powered::with(&image, &Conditions::f405(1), rules);
+    run.run(0.05);
+    // The negative control: without a crash there is no record, whatever memory holds at power-on.
+    let monitor = monitored(&mut run, 0.3);
+    let Some(Info { reset: Reset::Power, image: number, .. }) = monitor.info else {
+        panic!("{:?}", monitor.info)
+    };
+    assert_eq!((monitor.crash, number), (None, flash_checksum(&image)));
+
+    let gain = first_gain(&run.board);
+    let points_to_table = |word: u32| word.is_multiple_of(4) && (gain - 1024..=gain).contains(&word);
+    let pointers: Vec<u32> = (0x2000_1000..0x2000_2000)
+        .step_by(4)
+        .filter(|&at| run.board.word(at).is_some_and(points_to_table))
+        .collect();
+    assert!(!pointers.is_empty());
+    for address in pointers {
+        // 0x08… becomes 0x28…
+        run.board.apply(Input::FlipBit { address: address + 3, bit: 5 });
+    }
+    run.run(run.seconds() + 0.05);
+    assert_eq!(run.board.resets(), 1);
+    for _ in 0..2 {
+        let monitor = monitored(&mut run, 0.3);
+        assert_eq!(monitor.info.map(|info| info.reset), Some(Reset::Software));
+        assert_eq!(monitor.cause.map(|cause| cause.fault), Some(Fault::Crash));
+        let Some(CrashRecord { pc, cfsr, hfsr, bfar, .. }) = monitor.crash else { panic!("no record") };
+        let line = image.source_line(pc);
+        println!("{:?} in {line:?}", monitor.crash);
+        assert!(line.is_some_and(|line| line.contains(".rs:")), "{pc:#x}");
+        // A precise bus fault with its address, escalated.
+        assert_eq!((cfsr & 0x8200, hfsr), (0x8200, 1 << 30), "{cfsr:#x}");
+        assert_eq!(bfar >> 16, (gain | 1 << 29) >> 16, "{bfar:#x}");
     }
 }

@@ -12,11 +12,12 @@ use ratatui::backend::TestBackend;
 use ratatui::crossterm::event::{KeyCode, KeyEvent, KeyModifiers};
 use serde::Serialize;
 use serde_json::Value;
+use upright::board::Contacts;
 use upright::protocol::frame::{self, Receiver};
 use upright::protocol::message::{
-    Answer, Command as Asked, Info, Message, PROTOCOL, Reply, Request, Reset, Telemetry,
+    Answer, Command as Asked, CrashRecord, Info, Message, PROTOCOL, Reply, Request, Reset, Telemetry,
 };
-use upright::protocol::serial_link::MAX_COMMAND;
+use upright::protocol::serial_link::{MAX_COMMAND, MAX_MESSAGE};
 use upright::supervision::fault::Fault;
 use upright::supervision::homing::Homing;
 use upright::supervision::inhibits::Inhibits;
@@ -33,7 +34,7 @@ use upright_tool::monitor::{Ended, Monitor, action, view};
 const NOW: Duration = Duration::from_secs(1_800_000_000);
 
 fn framed(message: &impl Serialize) -> Vec<u8> {
-    frame::encode(message, &mut [0; 320], &mut [0; 320]).unwrap().to_vec()
+    frame::encode(message, &mut [0; MAX_MESSAGE], &mut [0; MAX_MESSAGE]).unwrap().to_vec()
 }
 
 fn telemetry(tick: u32, state: State, fault: Option<Fault>) -> Telemetry<10, 5> {
@@ -48,6 +49,8 @@ fn telemetry(tick: u32, state: State, fault: Option<Fault>) -> Telemetry<10, 5> 
         arming_inhibits: if fault.is_some() { Inhibits::FAULT } else { Inhibits::NONE },
         swing_up_inhibits: Inhibits::NO_SWING_UP,
         motion_tick: 0,
+        contacts: Contacts::default(),
+        supply_v: 23.9,
         counts: List::from_slice(&[1, -2, 3, -4, 5]).unwrap(),
         estimate: List::from_slice(&[0.125, 0.0, 0.01, 0.0, 0.02, 0.0, -0.01, 0.0, 0.005, -0.5]).unwrap(),
         innovation: List::from_slice(&[0.0; 5]).unwrap(),
@@ -56,6 +59,7 @@ fn telemetry(tick: u32, state: State, fault: Option<Fault>) -> Telemetry<10, 5> 
         applied_n: 3.25,
         drive: 0.5,
         cycles: 1234,
+        worst_cycles: 2345,
     }
 }
 
@@ -87,6 +91,7 @@ fn met(protocol: u8) -> Monitor {
         states: 10,
         sensors: 5,
         reset: Reset::Power,
+        image: 0x1234_abcd,
     };
     answer(&mut monitor, first[0].id, Answer::Info(info));
     monitor
@@ -121,7 +126,9 @@ fn the_screen_shows_state_fault_and_remedy() {
         "0.1250 m",
         "link 4",
         "applied 3.25 N",
-        "cycles 1234",
+        "cycles 1234, worst 2345",
+        "image 1234abcd",
+        "supply 23.9 V, active inputs: none",
         "law LQR",
     ] {
         assert!(healthy.contains(words), "{words}\n{healthy}");
@@ -136,6 +143,34 @@ fn the_screen_shows_state_fault_and_remedy() {
         assert!(faulty.contains(words), "{words}\n{faulty}");
     }
     assert!(!faulty.contains("balancing: the motor is on"));
+}
+
+#[test]
+fn active_contacts_and_the_last_crash_are_shown() {
+    let mut monitor = met(PROTOCOL);
+    let contacts = Contacts { limit_low: true, driver_fault: true, ..Contacts::default() };
+    told(&mut monitor, Telemetry { contacts, ..telemetry(1, State::Disarmed, None) });
+    assert!(screen(&monitor).contains("active inputs: limit switch low, driver fault"));
+    // Negative control: nothing is said of a crash before the firmware has.
+    assert!(!screen(&monitor).contains("PC"));
+    let question = asked(&mut monitor).into_iter().find(|command| command.request == Request::Crash);
+    let record =
+        CrashRecord { pc: 0x0800_1234, lr: 0x0800_0101, cfsr: 0x8200, hfsr: 1 << 30, bfar: 0x6000_0004 };
+    answer(&mut monitor, question.unwrap().id, Answer::Crash(Some(record)));
+    let line = "crash at PC 0x08001234, LR 0x08000101, CFSR 0x00008200, HFSR 0x40000000, BFAR 0x60000004";
+    assert!(screen(&monitor).contains(line) && monitor.log.iter().any(|said| said == line));
+}
+
+/// A crash resets the firmware while the monitor looks on: it asks again.
+#[test]
+fn a_firmware_that_starts_again_is_asked_for_its_crash() {
+    let mut monitor = met(PROTOCOL);
+    told(&mut monitor, telemetry(500, State::Balancing, None));
+    asked(&mut monitor);
+    told(&mut monitor, telemetry(510, State::Balancing, None));
+    assert!(asked(&mut monitor).is_empty());
+    told(&mut monitor, telemetry(10, State::Disarmed, None));
+    assert!(asked(&mut monitor).iter().any(|command| command.request == Request::Crash));
 }
 
 #[test]

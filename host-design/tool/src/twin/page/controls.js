@@ -162,6 +162,7 @@ export class Controls {
     state.textContent = this.states.get(latest.state) ?? latest.state;
     state.dataset.state = latest.state;
     byId('now').textContent = latest.now === null ? '' : `now: ${latest.now}`;
+    byId('inputs').textContent = latest.inputs;
     const isOn = ['Armed', 'Raising', 'Balancing', 'Lowering'].includes(latest.state);
     const against = isOn ? [] : latest.against_arming;
     const shown = [...byId('against').children].map((element) => element.textContent);

@@ -22,7 +22,8 @@ function panels(hello) {
       { name: 'asked for', value: (t) => t.requested_n }, { name: 'applied', value: (t) => t.applied_n }] },
     { title: 'innovation (mm, mrad)', least: 0.1, curves: hello.sensors.map((name, sensor) => (
       { name, value: (t) => t.innovation[sensor] * 1e3 })) },
-    { title: 'tick (processor cycles)', least: 10, curves: [{ name: 'cycles', value: (t) => t.cycles }] },
+    { title: 'tick (processor cycles)', least: 10, curves: [
+      { name: 'cycles', value: (t) => t.cycles }, { name: 'worst', value: (t) => t.worst_cycles }] },
   ].filter((panel) => panel.curves.length > 0);
 }
 

@@ -73,10 +73,12 @@ impl Built {
     }
 }
 
-/// The image that is flashed; says which one it is.
+/// The image that is flashed; says which one it is, and what it says of itself.
 pub(super) fn read(path: &Path) -> Result<Image, Failure> {
-    Image::from_elf(&announced(path)?)
-        .map_err(|error| Failure::BadArgument(format!("{}: {error}", path.display())))
+    let image = Image::from_elf(&announced(path)?)
+        .map_err(|error| Failure::BadArgument(format!("{}: {error}", path.display())))?;
+    eprintln!("the monitor shows it as image {:08x}", image::flash_checksum(&image));
+    Ok(image)
 }
 
 /// The bytes of an ELF file that will run; says its path and its hash.
