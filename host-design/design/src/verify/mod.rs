@@ -39,7 +39,8 @@ pub use corners::{
 pub use covariance::NoiseShare;
 pub use encoder::{CoarsestEncoder, EncoderSettings, coarser, coarsest_encoder};
 pub use imperfections::{
-    IMPERFECTIONS, Imperfection, ImperfectionSettings, Imperfections, Standing, Verdict, imperfections,
+    IMPERFECTIONS, Imperfection, ImperfectionSettings, Imperfections, RequiredStanding, Standing, Verdict,
+    imperfections, limit_cycle, required_imperfections,
 };
 pub use linear::{LinearReport, VerifyError, linear, margins_of};
 pub use loop_model::{ControllerModel, LoopModel, PlantModel};

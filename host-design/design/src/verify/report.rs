@@ -6,8 +6,9 @@ use upright::table::Law;
 use super::corners::MOST_LINKS;
 use super::{
     Attraction, AttractionSettings, CoarsestEncoder, CornerSettings, Corners, Disturbance, EncoderSettings,
-    LinearReport, Margins, MassTolerance, MonteCarlo, NoiseRun, Spread, Unverifiable, VerifyError,
-    attraction, coarsest_encoder, corners, linear, mass_tolerances, monte_carlo, noise_run,
+    ImperfectionSettings, LinearReport, Margins, MassTolerance, MonteCarlo, NoiseRun, RequiredStanding,
+    Spread, Unverifiable, VerifyError, attraction, coarsest_encoder, corners, linear, mass_tolerances,
+    monte_carlo, noise_run, required_imperfections,
 };
 use crate::design::Certified;
 use crate::number::significant;
@@ -41,6 +42,8 @@ pub struct LawTrust {
     pub mass_tolerances: Vec<MassTolerance>,
     /// Random plants.
     pub monte_carlo: Option<MonteCarlo>,
+    /// Imperfections of the machine that `[verify]` requires the loop to stand.
+    pub imperfections: Vec<RequiredStanding>,
 }
 
 /// One requirement.
@@ -114,6 +117,7 @@ fn law_trust(
         corners: None,
         mass_tolerances: Vec::new(),
         monte_carlo: None,
+        imperfections: Vec::new(),
     };
     if !trust.linear.stable {
         return Ok(trust);
@@ -136,6 +140,9 @@ fn law_trust(
         trust.mass_tolerances = tolerances;
     }
     if is_chain {
+        stage("imperfections");
+        let found = required_imperfections(rig, table, law, &ImperfectionSettings::of(rig));
+        trust.imperfections = known(found)?.unwrap_or_default();
         stage("random plants");
         trust.monte_carlo =
             known(monte_carlo(rig, table, law, &spread(rig, effort.late), effort.seed, effort.runs, done))?;
@@ -247,5 +254,9 @@ fn counted_checks(trust: &LawTrust) -> Vec<Check> {
     let nominal = trust.noise_run.as_ref().map(|noise| {
         Check::all_stand(law, "nominal runs that stand", noise.seeds as f64, noise.stood as f64)
     });
-    [corners, nominal].into_iter().flatten().collect()
+    let imperfections = trust.imperfections.iter().map(|required| {
+        let (runs, within) = (required.runs as f64, required.verdict.within_limits as f64);
+        Check::all_stand(law, required.requirement, runs, within)
+    });
+    corners.into_iter().chain(nominal).chain(imperfections).collect()
 }

@@ -10,7 +10,7 @@ use upright_design::plant::{ChainParameters, Equilibrium, absolute_angles, linea
 use upright_design::rig::{PerJoint, PlantDescription, Reality, Rig, SECTIONS};
 use upright_design::simulate::{Scenario, run};
 use upright_design::table::TableValues;
-use upright_design::verify::{IMPERFECTIONS, ImperfectionSettings, imperfections};
+use upright_design::verify::{IMPERFECTIONS, ImperfectionSettings, imperfections, required_imperfections};
 
 fn load(name: &str) -> (Rig, TableValues) {
     let file = Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("../../rigs/{name}.toml"));
@@ -280,4 +280,27 @@ fn every_imperfection_is_a_key_of_reality() {
     let known = |name: &str, unit: &str| reality.keys().any(|key| key.name == name && key.unit == unit);
     assert!(IMPERFECTIONS.iter().all(|one| known(one.key, one.unit) && one.typical[0] < one.typical[1]));
     assert!(!known("joint_friction_n_m", "N"));
+    let verify = SECTIONS.iter().find(|section| section.name == "verify").unwrap();
+    let required = |key: &str, unit: &str| verify.keys().any(|one| one.name == key && one.unit == unit);
+    for one in &IMPERFECTIONS {
+        assert!(required(one.key, one.unit), "{}", one.key);
+        assert_eq!(one.requirement, format!("runs within the limits ({})", one.key));
+    }
+}
+
+#[test]
+fn a_required_size_is_run_and_one_that_topples_the_loop_is_found() {
+    let (mut rig, table) = load("quadruple-paper");
+    let settings = ImperfectionSettings { duration_s: 4.0, seeds: 2, ..ImperfectionSettings::of(&rig) };
+    let stood = |rig: &Rig| {
+        let found = required_imperfections(rig, &table, Law::Lqr, &settings).unwrap();
+        found.iter().map(|one| (one.key, one.size, one.verdict.within_limits)).collect::<Vec<_>>()
+    };
+    assert_eq!(stood(&rig), []);
+    rig.verify.driver_lag_s = Some(2e-4);
+    rig.verify.joint_friction_n_m = Some(2e-5);
+    assert_eq!(stood(&rig), [("joint_friction_n_m", 2e-5, 2), ("driver_lag_s", 2e-4, 2)]);
+    // Negative control: twice what the loop stands.
+    rig.verify.joint_friction_n_m = Some(3e-4);
+    assert_eq!(stood(&rig)[0], ("joint_friction_n_m", 3e-4, 0));
 }

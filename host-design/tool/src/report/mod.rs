@@ -5,6 +5,7 @@ mod cost;
 mod drawing;
 mod error;
 mod frequency;
+mod imperfections;
 mod number;
 mod page;
 mod plot;
@@ -25,7 +26,7 @@ use upright_design::design::Certified;
 use upright_design::rig::{PlantDescription, Rig};
 use upright_design::swing_up::Demonstration;
 use upright_design::table::TableValues;
-use upright_design::verify::TrustReport;
+use upright_design::verify::{Imperfections, TrustReport};
 
 /// Input of a report.
 #[derive(Debug, Clone, Copy)]
@@ -38,6 +39,8 @@ pub struct Source<'a> {
     pub table: &'a TableValues,
     /// The trust report of this table.
     pub trust: &'a TrustReport,
+    /// What each law stands of each imperfection; empty: the page has no such part.
+    pub imperfections: &'a [Imperfections],
     /// Seed of the disturbances in the runs.
     pub seed: u64,
     /// A run of the swing-up, if the rig has stored motions.
@@ -134,6 +137,18 @@ pub fn report(source: &Source<'_>, stage: &dyn Fn(&str)) -> Result<Report, Repor
             let figure = region::figure(rig, table, law)?;
             keep("region", law, &figure)?;
             page.regions.push(Plot::of(&figure, law.title().to_owned())?);
+        }
+    }
+    if !source.imperfections.is_empty() {
+        stage("imperfections");
+        let limit_cycles = imperfections::limit_cycles(source)?;
+        pictures.push(Picture::of("limit-cycle".to_owned(), &limit_cycles)?);
+        page.imperfect
+            .push(Plot::of(&limit_cycles, "Limit cycle over the friction of the joints".to_owned())?);
+        stage("wrong masses");
+        if let Some(masses) = imperfections::wrong_masses(source)? {
+            pictures.push(Picture::of("wrong-masses".to_owned(), &masses)?);
+            page.imperfect.push(Plot::of(&masses, "Every combination of wrong masses".to_owned())?);
         }
     }
     Ok(Report { html: page.html()?, pictures })

@@ -5,6 +5,7 @@ use upright::table::{Law, TABLE_FORMAT};
 
 use super::animation::Animation;
 use super::cost::Cost;
+use super::imperfections::StandingTable;
 use super::number::{number, poles, significant};
 use super::plot::Plot;
 use super::runs::{LawRun, Scene, laws};
@@ -44,6 +45,8 @@ pub(super) struct Page<'a> {
     pub(super) bode: Vec<Plot>,
     pub(super) nyquist: Vec<Plot>,
     pub(super) regions: Vec<Plot>,
+    standings: Vec<StandingTable>,
+    pub(super) imperfect: Vec<Plot>,
     trust: Vec<TrustRow>,
     seed: u64,
     table_format: u32,
@@ -127,6 +130,8 @@ impl<'a> Page<'a> {
             bode: Vec::new(),
             nyquist: Vec::new(),
             regions: Vec::new(),
+            standings: source.imperfections.iter().map(StandingTable::of).collect(),
+            imperfect: Vec::new(),
             trust: trust_rows(rig, trust),
             seed: source.seed,
             table_format: TABLE_FORMAT,

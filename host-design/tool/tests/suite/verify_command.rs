@@ -198,3 +198,18 @@ fn the_documentation_lists_every_row_with_its_meaning() {
         assert!(!has(name, "something else"));
     }
 }
+
+#[test]
+fn an_imperfection_that_the_file_requires_to_be_stood_is_a_requirement() {
+    let required = |lag: &str| {
+        let section = format!("[verify]\ndriver_lag_s = {lag}\n\n[limits]\n");
+        let (_folder, path) = changed(SINGLE, &[("[limits]\n", &section)]);
+        let output = verify(&path, &["--law", "lqr", "--runs", "1", "--json"], None);
+        let report = object(&output);
+        let mut checks = report["checks"].as_array().unwrap().iter();
+        let check = checks.find(|check| check["requirement"] == "runs within the limits (driver_lag_s)");
+        (check.unwrap()["holds"].as_bool().unwrap(), check.unwrap()["required"].as_f64().unwrap())
+    };
+    assert_eq!(required("1e-3"), (true, 4.0));
+    assert_eq!(required("1.0"), (false, 4.0), "a driver that topples it");
+}

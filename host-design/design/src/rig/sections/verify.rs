@@ -12,6 +12,8 @@ pub(in crate::rig) static VERIFY: Section = Section {
     keys: &[Requirements::KEYS],
 };
 
+const NOT_REQUIRED: Absent = Absent::Follows("not required");
+
 keys! {
     /// Thresholds of the trust report. They change no gain, so they are not part of the rig's hash.
     ///
@@ -41,6 +43,26 @@ keys! {
         torque_rms_n_m: Option<f64>, "N·m", Rule::NOT_NEGATIVE,
             "rms of the disturbing torque at each joint in the runs, drawn again each tick",
             Absent::Follows("what [kalman] expects");
+        joint_friction_n_m: Option<f64>, "N·m", Rule::POSITIVE,
+            "Coulomb friction in each joint that the loop has to stand alone", NOT_REQUIRED;
+        cart_friction_n: Option<f64>, "N", Rule::POSITIVE,
+            "Coulomb friction of the cart that the loop has to stand alone", NOT_REQUIRED;
+        homing_error_rad: Option<f64>, "rad", Rule::ANGLE,
+            "error of each joint's zero that the loop has to stand alone", NOT_REQUIRED;
+        eccentricity_rad: Option<f64>, "rad", Rule::ANGLE,
+            "error of each joint's encoder over a turn that the loop has to stand alone", NOT_REQUIRED;
+        rail_tilt_rad: Option<f64>, "rad", Rule::ANGLE,
+            "slope of the rail that the loop has to stand alone", NOT_REQUIRED;
+        backlash_m: Option<f64>, "m", Rule::POSITIVE,
+            "play between motor and cart that the loop has to stand alone", NOT_REQUIRED;
+        belt_compliance_m_per_n: Option<f64>, "m/N", Rule::POSITIVE,
+            "stretch of belt or gear per force that the loop has to stand alone", NOT_REQUIRED;
+        driver_lag_s: Option<f64>, "s", Rule::POSITIVE,
+            "time constant of the motor driver that the loop has to stand alone", NOT_REQUIRED;
+        force_percent: Option<f64>, "%", Rule::POSITIVE,
+            "excess of the real force that the loop has to stand alone", NOT_REQUIRED;
+        parameter_spread_percent: Option<f64>, "%", Rule::SPREAD,
+            "spread (±) of all masses, lengths and inertias that the loop has to stand alone", NOT_REQUIRED;
     }
 }
 

@@ -11,6 +11,7 @@ use upright_design::table::{TableValues, write_atomically};
 use upright_design::verify::{Effort, trust};
 use upright_tool::report::{Report as Page, Source, report};
 
+use super::verify::search;
 use crate::failure::Failure;
 use crate::progress::with_random_plants;
 use crate::variation::Variation;
@@ -24,6 +25,7 @@ Examples:
   upright report rigs/quadruple-paper.toml                      writes quadruple-paper.html
   upright report rigs/quadruple-paper.toml --out report.html --svg figures --csv data
   upright report rigs/single-quanser-ip02.toml --runs 1000 --png figures
+  upright report rigs/single-quanser-ip02.toml --imperfections  with what topples it
   upright report rigs/quadruple-paper.toml --gains continuous --tick 0.005     effect of a wrong tick")]
 pub(crate) struct Report {
     #[command(flatten)]
@@ -46,6 +48,9 @@ pub(crate) struct Report {
     /// Seed of the disturbances and of the first random plant
     #[arg(long, default_value_t = 1)]
     seed: u64,
+    /// With the size of each imperfection at which the loop falls, and two figures about it; slower
+    #[arg(long)]
+    imperfections: bool,
     /// Print the names of the files and the trust report as one JSON object
     #[arg(long)]
     json: bool,
@@ -56,6 +61,7 @@ impl Report {
         self.prepare()?;
         let (rig, certified, table) = self.variation.designed()?;
         let laws = table.laws.present().count() as u64;
+        let imperfections = if self.imperfections { search(&rig, &table)? } else { Vec::new() };
         let effort = Effort { runs: self.runs as usize, seed: self.seed, late: 0.0 };
         let (trust, files) =
             with_random_plants(laws * u64::from(self.runs), |stage, done| -> Result<_, Failure> {
@@ -66,6 +72,7 @@ impl Report {
                     certified: &certified,
                     table: &table,
                     trust: &trust,
+                    imperfections: &imperfections,
                     seed: self.seed,
                     swing_up: run.as_ref(),
                     command: &self.as_typed(),
@@ -141,6 +148,9 @@ impl Report {
         }
         if self.seed != 1 {
             typed.push_str(&format!(" --seed {}", self.seed));
+        }
+        if self.imperfections {
+            typed.push_str(" --imperfections");
         }
         typed
     }

@@ -9,8 +9,8 @@ use upright_design::rig::Rig;
 use upright_design::simulate::simulate;
 use upright_design::table::{TableValues, write_atomically};
 use upright_design::verify::{
-    Axis, Effort, Horizon, IMPERFECTIONS, ImperfectionSettings, TrustReport, attraction_map, sample, spread,
-    trust,
+    Axis, Effort, Horizon, IMPERFECTIONS, ImperfectionSettings, Imperfections, TrustReport, attraction_map,
+    sample, spread, trust,
 };
 
 use crate::failure::Failure;
@@ -91,6 +91,16 @@ fn share(text: &str) -> Result<f64, String> {
     }
 }
 
+/// What each law stands of each imperfection, with a bar.
+pub(crate) fn search(rig: &Rig, table: &TableValues) -> Result<Vec<Imperfections>, Failure> {
+    let laws: Vec<Law> = table.laws.present().map(|(law, _)| law).collect();
+    let settings = ImperfectionSettings::of(rig);
+    Ok(with_bar("imperfections", (laws.len() * IMPERFECTIONS.len()) as u64, |done| {
+        let search = |&law: &Law| upright_design::verify::imperfections(rig, table, law, &settings, done);
+        laws.iter().map(search).collect::<Result<_, _>>()
+    })?)
+}
+
 impl Verify {
     pub(crate) fn run(self) -> Result<(), Failure> {
         let (rig, certified, mut table) = self.variation.designed()?;
@@ -146,12 +156,7 @@ impl Verify {
     }
 
     fn imperfections(&self, rig: &Rig, table: &TableValues) -> Result<(), Failure> {
-        let laws: Vec<Law> = table.laws.present().map(|(law, _)| law).collect();
-        let settings = ImperfectionSettings::of(rig);
-        let found = with_bar("imperfections", (laws.len() * IMPERFECTIONS.len()) as u64, |done| {
-            let search = |&law: &Law| upright_design::verify::imperfections(rig, table, law, &settings, done);
-            laws.iter().map(search).collect::<Result<Vec<_>, _>>()
-        })?;
+        let found = search(rig, table)?;
         let mut out = std::io::stdout().lock();
         if self.json {
             serde_json::to_writer(&mut out, &found).map_err(std::io::Error::from)?;

@@ -2,10 +2,11 @@
 
 use std::path::Path;
 
+use upright::table::Law;
 use upright_design::design::design;
 use upright_design::rig::Rig;
 use upright_design::table::{Gains, TableValues};
-use upright_design::verify::{LawTrust, TrustReport, linear};
+use upright_design::verify::{ImperfectionSettings, LawTrust, TrustReport, imperfections, linear};
 use upright_tool::report::{Report, Source, report};
 
 /// A rig from this repository.
@@ -16,6 +17,17 @@ pub(crate) fn rig(name: &str) -> Rig {
 
 /// The report on a rig, without the slow half of the trust report.
 pub(crate) fn quick_report(rig: &Rig) -> Report {
+    made(rig, None)
+}
+
+/// The same with what the LQR stands of each imperfection, from short runs.
+pub(crate) fn report_with_imperfections(rig: &Rig) -> Report {
+    let settings =
+        ImperfectionSettings { duration_s: 2.0, seeds: 1, relative: 0.5, ..ImperfectionSettings::of(rig) };
+    made(rig, Some(settings))
+}
+
+fn made(rig: &Rig, settings: Option<ImperfectionSettings>) -> Report {
     let certified = design(rig).unwrap();
     let table = TableValues::of(rig, &certified, Gains::Sampled).unwrap();
     let laws = linear(rig, &certified, &table).unwrap().into_iter().map(|linear| LawTrust {
@@ -26,13 +38,16 @@ pub(crate) fn quick_report(rig: &Rig) -> Report {
         corners: None,
         mass_tolerances: Vec::new(),
         monte_carlo: None,
+        imperfections: Vec::new(),
     });
     let trust = TrustReport { laws: laws.collect(), checks: Vec::new() };
+    let found = settings.map(|settings| imperfections(rig, &table, Law::Lqr, &settings, &|| ()).unwrap());
     let source = Source {
         rig,
         certified: &certified,
         table: &table,
         trust: &trust,
+        imperfections: found.as_slice(),
         seed: 1,
         swing_up: None,
         command: "upright report test",

@@ -2,7 +2,6 @@
 
 use core::fmt::Write;
 
-use upright_design::number::significant;
 use upright_design::verify::{Imperfections, Standing};
 
 /// The table of one law: the most dangerous imperfection first.
@@ -14,7 +13,12 @@ pub(super) fn table(found: &Imperfections) -> String {
 }
 
 fn write_table(out: &mut String, found: &Imperfections) -> core::fmt::Result {
-    writeln!(out, "{}: each imperfection alone, {} runs of each size", found.law.key(), found.seeds)?;
+    writeln!(
+        out,
+        "{}: each imperfection alone, {} runs of each size",
+        found.law.key(),
+        found.settings.seeds
+    )?;
     writeln!(out, "  {:<26}{:<6}{:>12}{:>12}   typical", "", "", "falls at", "motor off")?;
     for standing in &found.alone {
         write_standing(out, standing)?;
@@ -24,20 +28,15 @@ fn write_table(out: &mut String, found: &Imperfections) -> core::fmt::Result {
         Some(all) => writeln!(
             out,
             "  [reality] of the rig file: {} of {} stand, up to {:.3} rad and {:.3} m",
-            all.stand, found.seeds, all.peak_angle_rad, all.peak_position_m
+            all.stand, found.settings.seeds, all.peak_angle_rad, all.peak_position_m
         ),
     }
 }
 
 fn write_standing(out: &mut String, standing: &Standing) -> core::fmt::Result {
-    let size = |size: Option<f64>| match size {
-        Some(size) => significant(size, 2),
-        None => format!("> {}", significant(standing.largest_tried, 2)),
-    };
     let one = standing.imperfection;
-    let [good, poor] = one.typical.map(|size| significant(size, 2));
-    let (falls, off) = (size(standing.falls_at), size(standing.leaves_limits_at));
-    let (key, unit, source) = (one.key, one.unit, one.source);
-    writeln!(out, "  {key:<26}{unit:<6}{falls:>12}{off:>12}   {good} to {poor} ({source})")?;
+    let (falls, off) = (standing.falls_text(), standing.leaves_limits_text());
+    let (key, unit, typical, source) = (one.key, one.unit, one.typical_text(), one.source);
+    writeln!(out, "  {key:<26}{unit:<6}{falls:>12}{off:>12}   {typical} ({source})")?;
     if standing.danger > 1.0 { writeln!(out, "      do: {}", one.remedy) } else { Ok(()) }
 }

@@ -1,119 +1,20 @@
 //! Which imperfection of the machine topples the loop, and at what size: each one alone, beside what is typical.
 
+mod catalogue;
+
 use std::collections::BTreeMap;
 
 use rayon::prelude::*;
 use serde::Serialize;
 use upright::table::Law;
 
-use super::trial::{Disturbance, Horizon, Unverifiable, chain, scenario, trial, within};
-use crate::rig::{PerJoint, Reality, Rig};
+use super::trial::{Disturbance, Horizon, Outcome, Unverifiable, chain, scenario, trial, within};
+use crate::number::significant;
+use crate::rig::{Reality, Rig};
 use crate::simulate::{Scenario, SimulationError};
 use crate::table::TableValues;
 
-/// One kind of imperfection.
-#[derive(Debug, Serialize)]
-pub struct Imperfection {
-    /// Its key in `[reality]`.
-    pub key: &'static str,
-    /// Its unit.
-    pub unit: &'static str,
-    /// What is typical of a carefully built machine, from a good one to a poor one.
-    pub typical: [f64; 2],
-    /// Where that comes from.
-    pub source: &'static str,
-    /// What to do about it.
-    pub remedy: &'static str,
-    #[serde(skip)]
-    set: fn(&mut Reality, f64),
-}
-
-/// Every imperfection that a size can be searched for.
-pub static IMPERFECTIONS: [Imperfection; 10] = [
-    Imperfection {
-        key: "joint_friction_n_m",
-        unit: "N·m",
-        typical: [1e-4, 1e-3],
-        source: "estimate: greased ball bearings of 3 to 8 mm bore",
-        remedy: "smaller bearings without seals, with oil instead of grease; more weight on the angles",
-        set: |reality, size| reality.friction.joint_friction_n_m = PerJoint::all(size),
-    },
-    Imperfection {
-        key: "cart_friction_n",
-        unit: "N",
-        typical: [0.2, 2.0],
-        source: "estimate: miniature ball guides, light to sealed",
-        remedy: "a guide without seals; less preload",
-        set: |reality, size| reality.friction.cart_friction_n = size,
-    },
-    Imperfection {
-        key: "homing_error_rad",
-        unit: "rad",
-        typical: [1e-3, 1e-2],
-        source: "a hanging link stops within F / (m g c) of the vertical: friction over weight times distance",
-        remedy: "tap the hanging links before homing; integral action brings the cart back",
-        set: |reality, size| reality.sensors.homing_error_rad = PerJoint::all(size),
-    },
-    Imperfection {
-        key: "eccentricity_rad",
-        unit: "rad",
-        typical: [1e-3, 5e-3],
-        source: "2 e / D: a disk of 20 mm, 0.01 to 0.05 mm off its centre",
-        remedy: "centre the disk; an encoder with its own bearing",
-        set: |reality, size| {
-            reality.sensors.eccentricity_rad = PerJoint::all(size);
-            reality.sensors.eccentricity_phase_rad = PerJoint::all(core::f64::consts::FRAC_PI_4);
-        },
-    },
-    Imperfection {
-        key: "rail_tilt_rad",
-        unit: "rad",
-        typical: [5e-4, 5e-3],
-        source: "estimate: 0.5 to 5 mm over a metre, with and without a spirit level",
-        remedy: "level the rail; integral action brings the cart back",
-        set: |reality, size| reality.sensors.rail_tilt_rad = size,
-    },
-    Imperfection {
-        key: "backlash_m",
-        unit: "m",
-        typical: [2e-5, 2e-4],
-        source: "estimate: toothed belt under tension, to rack and pinion",
-        remedy: "a tensioned belt instead of a rack; an encoder on the cart",
-        set: |reality, size| reality.drive_train.backlash_m = size,
-    },
-    Imperfection {
-        key: "belt_compliance_m_per_n",
-        unit: "m/N",
-        typical: [2e-6, 2e-5],
-        source: "estimate: toothed belts 6 to 15 mm wide, a metre long",
-        remedy: "a wider or shorter belt, or one with steel cords",
-        set: |reality, size| reality.drive_train.belt_compliance_m_per_n = size,
-    },
-    Imperfection {
-        key: "driver_lag_s",
-        unit: "s",
-        typical: [5e-5, 1e-3],
-        source: "L / R of small motors (0.18 mH / 2.6 Ω: 70 µs) to large ones",
-        remedy: "a driver with a current loop; tell the design with delay_ticks",
-        set: |reality, size| reality.driver.driver_lag_s = size,
-    },
-    Imperfection {
-        key: "force_percent",
-        unit: "%",
-        typical: [2.0, 15.0],
-        source: "estimate: measured, to the tolerance of a catalogue's torque constant with that of the gear",
-        remedy: "measure the force at standstill and correct torque_constant_n_m_per_a",
-        set: |reality, size| reality.driver.force_percent = size,
-    },
-    Imperfection {
-        key: "parameter_spread_percent",
-        unit: "%",
-        typical: [0.5, 5.0],
-        source: "estimate: weighed and measured parts, to a drawing",
-        remedy: "weigh and measure the links with their screws and encoders",
-        set: |reality, size| reality.parameters.parameter_spread_percent = size,
-    },
-];
+pub use catalogue::{IMPERFECTIONS, Imperfection};
 
 /// How the sizes are searched for.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
@@ -140,6 +41,8 @@ impl ImperfectionSettings {
 pub struct Verdict {
     /// Runs that stand.
     pub stand: u64,
+    /// Runs that stay within the supervisor's limits of angle and rail, so that the motor stays on.
+    pub within_limits: u64,
     /// Largest angle of any link from the vertical in any run (rad).
     pub peak_angle_rad: f64,
     /// Largest distance of the cart from its set-point in any run (m).
@@ -162,21 +65,54 @@ pub struct Standing {
     pub danger: f64,
 }
 
+impl Standing {
+    /// [`Self::falls_at`] for reading.
+    pub fn falls_text(&self) -> String {
+        self.size_text(self.falls_at)
+    }
+
+    /// [`Self::leaves_limits_at`] for reading.
+    pub fn leaves_limits_text(&self) -> String {
+        self.size_text(self.leaves_limits_at)
+    }
+
+    fn size_text(&self, size: Option<f64>) -> String {
+        size.map_or_else(|| format!("> {}", significant(self.largest_tried, 2)), |size| significant(size, 2))
+    }
+}
+
 /// What a law stands: each imperfection alone, the most dangerous one first, and those of the rig file together.
 #[derive(Debug, Clone, Serialize)]
 pub struct Imperfections {
     /// The law.
     pub law: Law,
-    /// Runs of each size.
-    pub seeds: u64,
+    /// How the sizes were searched for.
+    pub settings: ImperfectionSettings,
     /// Each alone.
     pub alone: Vec<Standing>,
     /// All of the rig file's `[reality]` together; none without.
     pub together: Option<Verdict>,
 }
 
+/// A size that `[verify]` requires the loop to stand, and how it did.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct RequiredStanding {
+    /// The key of the imperfection.
+    pub key: &'static str,
+    /// The requirement, with this key.
+    pub requirement: &'static str,
+    /// The required size.
+    pub size: f64,
+    /// Runs of this size.
+    pub runs: u64,
+    /// How they ended.
+    pub verdict: Verdict,
+}
+
 /// Sizes are tried from this share of a good machine's to this multiple of a poor one's.
 const RANGE: [f64; 2] = [1.0 / 64.0, 64.0];
+/// Sizes at which a limit cycle is shown, as shares of the one at which the loop falls.
+const SHARES: [f64; 7] = [1.0 / 32.0, 1.0 / 16.0, 0.125, 0.25, 0.5, 0.7, 0.9];
 
 /// Searches for every imperfection alone the sizes at which `law` falls and at which it leaves the limits. `done` is called
 /// after each imperfection, from any thread.
@@ -203,7 +139,50 @@ pub fn imperfections(
     alone.sort_by(|a, b| b.danger.total_cmp(&a.danger));
     let together =
         (rig.reality != Reality::default()).then(|| search.verdict(rig.reality.clone())).transpose()?;
-    Ok(Imperfections { law, seeds: settings.seeds, alone, together })
+    Ok(Imperfections { law, settings: *settings, alone, together })
+}
+
+/// How `law` stands the sizes that `[verify]` requires; nothing if it requires none.
+///
+/// # Errors
+/// As [`imperfections()`].
+pub fn required_imperfections(
+    rig: &Rig,
+    table: &TableValues,
+    law: Law,
+    settings: &ImperfectionSettings,
+) -> Result<Vec<RequiredStanding>, Unverifiable> {
+    chain(rig, "imperfections")?;
+    let search = Search { rig, table, law, settings };
+    let required = |imperfection: &'static Imperfection| {
+        let size = (imperfection.required)(&rig.verify)?;
+        let Imperfection { key, requirement, .. } = *imperfection;
+        let standing = |verdict| RequiredStanding { key, requirement, size, runs: settings.seeds, verdict };
+        Some(search.alone(imperfection, size).map(standing))
+    };
+    Ok(IMPERFECTIONS.iter().filter_map(required).collect::<Result<_, SimulationError>>()?)
+}
+
+/// The limit cycle over the size of an imperfection: sizes below the one at which the loop falls, or below the largest
+/// one tried, each with its runs.
+///
+/// # Errors
+/// As [`imperfections()`].
+pub fn limit_cycle(
+    rig: &Rig,
+    table: &TableValues,
+    law: Law,
+    settings: &ImperfectionSettings,
+    standing: &Standing,
+) -> Result<Vec<(f64, Verdict)>, Unverifiable> {
+    chain(rig, "imperfections")?;
+    let search = Search { rig, table, law, settings };
+    let end = standing.falls_at.unwrap_or(standing.largest_tried);
+    let at = |share: f64| {
+        let size = share * end;
+        search.alone(standing.imperfection, size).map(|verdict| (size, verdict))
+    };
+    Ok(SHARES.into_iter().map(at).collect::<Result<_, SimulationError>>()?)
 }
 
 struct Search<'a> {
@@ -225,17 +204,15 @@ impl Search<'_> {
             if let Some(verdict) = known.get(&size.to_bits()) {
                 return Ok(*verdict);
             }
-            let mut reality = Reality::default();
-            (imperfection.set)(&mut reality, size);
-            let verdict = self.verdict(reality)?;
+            let verdict = self.alone(imperfection, size)?;
             known.insert(size.to_bits(), verdict);
             Ok(verdict)
         };
-        let falls_at = first(sizes, self.settings.relative, |size| {
-            at(size).map(|verdict| verdict.stand == self.settings.seeds)
-        })?;
-        let leaves_limits_at = first(sizes, self.settings.relative, |size| {
-            at(size).map(|verdict| self.is_within_limits(&verdict))
+        let all = self.settings.seeds;
+        let falls_at =
+            first(sizes, poor, self.settings.relative, |size| at(size).map(|verdict| verdict.stand == all))?;
+        let leaves_limits_at = first(sizes, poor, self.settings.relative, |size| {
+            at(size).map(|verdict| verdict.within_limits == all)
         })?;
         let least = falls_at.unwrap_or(sizes[1]).min(leaves_limits_at.unwrap_or(sizes[1]));
         Ok(Standing {
@@ -247,12 +224,11 @@ impl Search<'_> {
         })
     }
 
-    fn is_within_limits(&self, verdict: &Verdict) -> bool {
-        let limits = &self.table.limits;
-        let [low, high] = limits.rail_m.map(f64::from);
-        verdict.stand == self.settings.seeds
-            && verdict.peak_angle_rad <= f64::from(limits.angle_rad)
-            && verdict.peak_position_m <= high.min(-low)
+    /// All seeds on a machine with this imperfection alone.
+    fn alone(&self, imperfection: &Imperfection, size: f64) -> Result<Verdict, SimulationError> {
+        let mut reality = Reality::default();
+        (imperfection.set)(&mut reality, size);
+        self.verdict(reality)
     }
 
     /// All seeds on a machine like this.
@@ -271,29 +247,50 @@ impl Search<'_> {
             (1..=self.settings.seeds).into_par_iter().map(one).collect::<Result<_, SimulationError>>()?;
         Ok(Verdict {
             stand: all.iter().filter(|outcome| outcome.stands()).count() as u64,
+            within_limits: all.iter().filter(|outcome| self.is_within_limits(outcome)).count() as u64,
             peak_angle_rad: all.iter().map(|outcome| outcome.peak_angle_rad).fold(0.0, f64::max),
             peak_position_m: all.iter().map(|outcome| outcome.peak_error_m).fold(0.0, f64::max),
         })
     }
+
+    fn is_within_limits(&self, outcome: &Outcome) -> bool {
+        let limits = &self.table.limits;
+        let [low, high] = limits.rail_m.map(f64::from);
+        outcome.stands()
+            && outcome.peak_angle_rad <= f64::from(limits.angle_rad)
+            && outcome.peak_error_m <= high.min(-low)
+    }
 }
 
-/// The first size that is not held: from the smallest by factors of 4, then by bisection of the logarithm to within
-/// `relative`. None if even the largest is held.
+/// The first size that is not held: from `start` by factors of 4, up if it is held and down if not, then by bisection of
+/// the logarithm to within `relative`. None if even the largest is held; the smallest if that is not.
+///
+/// Small plays and stiff belts take long to simulate, so the search does not begin with them.
 fn first<E>(
     [smallest, largest]: [f64; 2],
+    start: f64,
     relative: f64,
     mut holds: impl FnMut(f64) -> Result<bool, E>,
 ) -> Result<Option<f64>, E> {
-    let (mut held, mut size) = (0.0, smallest);
-    while holds(size)? {
-        if size >= largest {
-            return Ok(None);
+    let (mut held, mut lost) = (None, None);
+    let mut size = start.clamp(smallest, largest);
+    while held.is_none() || lost.is_none() {
+        if holds(size)? {
+            held = Some(size);
+            if size >= largest {
+                return Ok(None);
+            }
+            size = (4.0 * size).min(largest);
+        } else {
+            lost = Some(size);
+            if size <= smallest {
+                return Ok(lost);
+            }
+            size = (0.25 * size).max(smallest);
         }
-        held = size;
-        size = (4.0 * size).min(largest);
     }
-    let mut lost = size;
-    while held > 0.0 && lost - held > relative * held {
+    let (mut held, mut lost) = (held.unwrap_or(smallest), lost.unwrap_or(largest));
+    while lost - held > relative * held {
         let middle = (held * lost).sqrt();
         if holds(middle)? { held = middle } else { lost = middle }
     }
@@ -306,8 +303,10 @@ mod tests {
 
     #[test]
     fn the_first_size_that_is_not_held_is_found() {
-        let find = |edge: f64| first::<()>([0.01, 10.0], 0.01, |size| Ok(size < edge)).unwrap();
-        assert!(find(0.5).is_some_and(|found| (0.5..0.505).contains(&found)));
-        assert_eq!((find(20.0), find(0.001)), (None, Some(0.01)));
+        for start in [0.01, 0.3, 2.0, 10.0] {
+            let find = |edge: f64| first::<()>([0.01, 10.0], start, 0.01, |size| Ok(size < edge)).unwrap();
+            assert!(find(0.5).is_some_and(|found| (0.5..0.505).contains(&found)));
+            assert_eq!((find(20.0), find(0.001)), (None, Some(0.01)));
+        }
     }
 }

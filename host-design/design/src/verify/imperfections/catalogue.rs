@@ -1,0 +1,143 @@
+//! The imperfections that a machine may have, what is typical of each, and what to do about it.
+
+use serde::Serialize;
+
+use crate::number::significant;
+use crate::rig::{PerJoint, Reality, Requirements};
+
+/// One kind of imperfection.
+#[derive(Debug, Serialize)]
+pub struct Imperfection {
+    /// Its key in `[reality]`.
+    pub key: &'static str,
+    /// Its unit.
+    pub unit: &'static str,
+    /// What is typical of a carefully built machine, from a good one to a poor one.
+    pub typical: [f64; 2],
+    /// Where that comes from.
+    pub source: &'static str,
+    /// What to do about it.
+    pub remedy: &'static str,
+    /// The requirement that it can be part of, with the same key in `[verify]`.
+    pub requirement: &'static str,
+    /// The size that `[verify]` requires the loop to stand.
+    #[serde(skip)]
+    pub(super) required: fn(&Requirements) -> Option<f64>,
+    #[serde(skip)]
+    pub(super) set: fn(&mut Reality, f64),
+}
+
+impl Imperfection {
+    /// What is typical, for reading: `1e-4 to 0.001`.
+    pub fn typical_text(&self) -> String {
+        let [good, poor] = self.typical.map(|size| significant(size, 2));
+        format!("{good} to {poor}")
+    }
+}
+
+/// Every imperfection that a size can be searched for.
+pub static IMPERFECTIONS: [Imperfection; 10] = [
+    Imperfection {
+        key: "joint_friction_n_m",
+        unit: "N·m",
+        typical: [1e-4, 1e-3],
+        source: "estimate: greased ball bearings of 3 to 8 mm bore",
+        remedy: "smaller bearings without seals, with oil instead of grease; more weight on the angles",
+        requirement: "runs within the limits (joint_friction_n_m)",
+        required: |verify| verify.joint_friction_n_m,
+        set: |reality, size| reality.friction.joint_friction_n_m = PerJoint::all(size),
+    },
+    Imperfection {
+        key: "cart_friction_n",
+        unit: "N",
+        typical: [0.2, 2.0],
+        source: "estimate: miniature ball guides, light to sealed",
+        remedy: "a guide without seals; less preload",
+        requirement: "runs within the limits (cart_friction_n)",
+        required: |verify| verify.cart_friction_n,
+        set: |reality, size| reality.friction.cart_friction_n = size,
+    },
+    Imperfection {
+        key: "homing_error_rad",
+        unit: "rad",
+        typical: [1e-3, 1e-2],
+        source: "a hanging link stops within F / (m g c) of the vertical: friction over weight times distance",
+        remedy: "tap the hanging links before homing; integral action brings the cart back",
+        requirement: "runs within the limits (homing_error_rad)",
+        required: |verify| verify.homing_error_rad,
+        set: |reality, size| reality.sensors.homing_error_rad = PerJoint::all(size),
+    },
+    Imperfection {
+        key: "eccentricity_rad",
+        unit: "rad",
+        typical: [1e-3, 5e-3],
+        source: "2 e / D: a disk of 20 mm, 0.01 to 0.05 mm off its centre",
+        remedy: "centre the disk; an encoder with its own bearing",
+        requirement: "runs within the limits (eccentricity_rad)",
+        required: |verify| verify.eccentricity_rad,
+        set: |reality, size| {
+            reality.sensors.eccentricity_rad = PerJoint::all(size);
+            reality.sensors.eccentricity_phase_rad = PerJoint::all(core::f64::consts::FRAC_PI_4);
+        },
+    },
+    Imperfection {
+        key: "rail_tilt_rad",
+        unit: "rad",
+        typical: [5e-4, 5e-3],
+        source: "estimate: 0.5 to 5 mm over a metre, with and without a spirit level",
+        remedy: "level the rail; integral action brings the cart back",
+        requirement: "runs within the limits (rail_tilt_rad)",
+        required: |verify| verify.rail_tilt_rad,
+        set: |reality, size| reality.sensors.rail_tilt_rad = size,
+    },
+    Imperfection {
+        key: "backlash_m",
+        unit: "m",
+        typical: [2e-5, 2e-4],
+        source: "estimate: toothed belt under tension, to rack and pinion",
+        remedy: "a tensioned belt instead of a rack; an encoder on the cart",
+        requirement: "runs within the limits (backlash_m)",
+        required: |verify| verify.backlash_m,
+        set: |reality, size| reality.drive_train.backlash_m = size,
+    },
+    Imperfection {
+        key: "belt_compliance_m_per_n",
+        unit: "m/N",
+        typical: [2e-6, 2e-5],
+        source: "estimate: toothed belts 6 to 15 mm wide, a metre long",
+        remedy: "a wider or shorter belt, or one with steel cords",
+        requirement: "runs within the limits (belt_compliance_m_per_n)",
+        required: |verify| verify.belt_compliance_m_per_n,
+        set: |reality, size| reality.drive_train.belt_compliance_m_per_n = size,
+    },
+    Imperfection {
+        key: "driver_lag_s",
+        unit: "s",
+        typical: [5e-5, 1e-3],
+        source: "L / R of small motors (0.18 mH / 2.6 Ω: 70 µs) to large ones",
+        remedy: "a driver with a current loop; tell the design with delay_ticks",
+        requirement: "runs within the limits (driver_lag_s)",
+        required: |verify| verify.driver_lag_s,
+        set: |reality, size| reality.driver.driver_lag_s = size,
+    },
+    Imperfection {
+        key: "force_percent",
+        unit: "%",
+        typical: [2.0, 15.0],
+        source: "estimate: measured, to the tolerance of a catalogue's torque constant with that of the gear",
+        remedy: "measure the force at standstill and correct torque_constant_n_m_per_a",
+        requirement: "runs within the limits (force_percent)",
+        required: |verify| verify.force_percent,
+        set: |reality, size| reality.driver.force_percent = size,
+    },
+    Imperfection {
+        key: "parameter_spread_percent",
+        unit: "%",
+        typical: [0.5, 5.0],
+        source: "estimate: weighed and measured parts, to a drawing",
+        remedy: "weigh and measure the links with their screws and encoders",
+        requirement: "runs within the limits (parameter_spread_percent)",
+        required: |verify| verify.parameter_spread_percent,
+        set: |reality, size| reality.parameters.parameter_spread_percent = size,
+    },
+];

@@ -1,0 +1,106 @@
+//! What each law stands of each imperfection of the machine, as tables and figures.
+
+use super::Source;
+use crate::figure::{Axis, Curve, Figure, Panel};
+use upright_design::verify::{CornerSettings, Imperfections, Standing, Unverifiable, corners, limit_cycle};
+
+/// Errors of the masses for which every combination is run (%).
+const PERCENTS: [f64; 7] = [2.0, 5.0, 7.0, 10.0, 15.0, 20.0, 30.0];
+/// With more links there are too many combinations for each percentage.
+const MOST_LINKS: usize = 5;
+
+/// What one law stands.
+pub(super) struct StandingTable {
+    pub(super) law: &'static str,
+    pub(super) rows: Vec<StandingRow>,
+    pub(super) together: Option<String>,
+}
+
+/// One imperfection alone.
+pub(super) struct StandingRow {
+    pub(super) is_dangerous: bool,
+    pub(super) key: &'static str,
+    pub(super) falls_at: String,
+    pub(super) leaves_limits_at: String,
+    pub(super) typical: String,
+    pub(super) source: &'static str,
+    pub(super) remedy: &'static str,
+}
+
+impl StandingTable {
+    pub(super) fn of(found: &Imperfections) -> Self {
+        let together = found.together.map(|all| {
+            let (angle_rad, position_m) = (all.peak_angle_rad, all.peak_position_m);
+            format!(
+                "{} of {} stand, up to {angle_rad:.3} rad and {position_m:.3} m",
+                all.stand, found.settings.seeds
+            )
+        });
+        Self { law: found.law.title(), rows: found.alone.iter().map(StandingRow::of).collect(), together }
+    }
+}
+
+impl StandingRow {
+    fn of(standing: &Standing) -> Self {
+        let one = standing.imperfection;
+        let unit = one.unit;
+        Self {
+            is_dangerous: standing.danger > 1.0,
+            key: one.key,
+            falls_at: format!("{} {unit}", standing.falls_text()),
+            leaves_limits_at: format!("{} {unit}", standing.leaves_limits_text()),
+            typical: format!("{} {unit}", one.typical_text()),
+            source: one.source,
+            remedy: one.remedy,
+        }
+    }
+}
+
+/// Amplitude of the limit cycle over the friction of the joints, a curve for each law.
+pub(super) fn limit_cycles(source: &Source<'_>) -> Result<Figure, Unverifiable> {
+    let Source { rig, table, imperfections, .. } = *source;
+    let x = Axis::log("Coulomb friction of each joint (N·m)");
+    let mut panel = Panel::new(x, Axis::linear("largest angle of a link (mrad)")).high(360);
+    for (number, found) in imperfections.iter().enumerate() {
+        let friction = found.alone.iter().find(|one| one.imperfection.key == "joint_friction_n_m");
+        let Some(friction) = friction else { continue };
+        let cycle = limit_cycle(rig, table, found.law, &found.settings, friction)?;
+        let standing = cycle.iter().filter(|(_, verdict)| verdict.stand == found.settings.seeds);
+        let points: Vec<[f64; 2]> =
+            standing.map(|(size, verdict)| [*size, 1e3 * verdict.peak_angle_rad]).collect();
+        panel = with_line(panel, found.law.title(), number, points);
+    }
+    Ok(Figure::narrow(format!("{}: limit cycle over friction", rig.name)).with(panel))
+}
+
+/// Share of the combinations of wrong masses that stand, over the percentage, a curve for each law; none for a chain with
+/// too many combinations.
+pub(super) fn wrong_masses(source: &Source<'_>) -> Result<Option<Figure>, Unverifiable> {
+    let Source { rig, table, imperfections, .. } = *source;
+    if rig.states() / 2 - 1 > MOST_LINKS {
+        return Ok(None);
+    }
+    let x = Axis::linear("error of the masses (±%)");
+    let y = Axis::linear("combinations that stand (%)").range(0.0, 105.0);
+    let mut panel = Panel::new(x, y).high(360);
+    for (number, found) in imperfections.iter().enumerate() {
+        let settings = CornerSettings { duration_s: found.settings.duration_s, ..CornerSettings::of(rig) };
+        let mut points = vec![[0.0, 100.0]];
+        for percent in PERCENTS {
+            let tried = corners(rig, table, found.law, percent, &settings)?;
+            points.push([percent, 100.0 * tried.stand as f64 / tried.corners as f64]);
+            if tried.stand == 0 {
+                break;
+            }
+        }
+        panel = with_line(panel, found.law.title(), number, points);
+    }
+    Ok(Some(Figure::narrow(format!("{}: wrong masses", rig.name)).with(panel)))
+}
+
+/// A line through markers.
+fn with_line(panel: Panel, name: &str, number: usize, points: Vec<[f64; 2]>) -> Panel {
+    // Number 0 is that of the crosses.
+    let line = Curve::line(name, 1 + number, points.clone());
+    panel.with(line).with(Curve::markers("", 1 + number, points))
+}
