@@ -92,10 +92,8 @@ impl<const NX: usize, const NY: usize, S: SwingUp<NX, NY>> Firmware<'_, NX, NY, 
         let command = self.controller.control_on_course(&inputs.raw_counts, course, |counts, y, e| {
             finding = detection.test(motions.thresholds, counts, y, e);
         });
-        let allowed = [motions.deviation_m, motions.deviation_rad];
         let exceeded = envelope::exceeded_in_motion(
-            &self.table.limits,
-            allowed,
+            motions.limits,
             self.controller.estimate().as_slice(),
             course.x.as_slice(),
             command.requested_n,

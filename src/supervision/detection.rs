@@ -143,6 +143,12 @@ impl<const NY: usize> Detection<NY> {
         self.missing = [pp * p + pv * v - b_p * u, vp * p + vv * v - b_v * u];
     }
 
+    /// What the test for a frozen counter compares: the predicted motion of each sensor while its counter stands still
+    /// (m or rad).
+    pub fn moved(&self) -> [f32; NY] {
+        self.sensors.map(|sensor| sensor.moved)
+    }
+
     /// Number of measurements rejected since power-up or the last [`reset_rejected`](Self::reset_rejected).
     pub fn rejected(&self) -> u32 {
         self.rejected

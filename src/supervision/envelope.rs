@@ -3,7 +3,7 @@
 //! A new limit on the state belongs here; its value belongs to [`Limits`].
 
 use crate::supervision::fault::Fault;
-use crate::table::Limits;
+use crate::table::{Limits, MotionLimits};
 
 /// The fault of the first limit that the state `x` (m, m/s, rad, rad/s …) or the requested force (N) exceeds.
 ///
@@ -33,32 +33,34 @@ pub fn exceeded<const NY: usize>(limits: &Limits<NY>, x: &[f32], requested_n: f3
     (speed.abs() > limits.speed_m_per_s).then_some(Fault::Speed)
 }
 
-/// The same for a rig that follows a planned motion: instead of the angles from the vertical, the distances from the
-/// `planned` state are limited, of the cart's position (m) and of each link's angle (rad) to `allowed`.
+/// The same for a rig that follows a planned motion, in this order: request not finite, rail, off course, speed. Instead of
+/// the angles from the vertical, the distances of cart and links from the `planned` state are limited.
 #[inline]
-pub fn exceeded_in_motion<const NY: usize>(
-    limits: &Limits<NY>,
-    [allowed_m, allowed_rad]: [f32; 2],
+pub fn exceeded_in_motion(
+    limits: &MotionLimits,
     x: &[f32],
     planned: &[f32],
     requested_n: f32,
 ) -> Option<Fault> {
-    let upright = Limits::<NY> { angle_rad: f32::MAX, ..Limits::none() };
-    let limits = Limits { rail_m: limits.rail_m, speed_m_per_s: limits.speed_m_per_s, ..upright };
-    let (mut away, mut is_off) = (0.0, false);
-    for (joint, (x, planned)) in x.iter().zip(planned).step_by(2).enumerate() {
-        match joint {
-            0 => is_off |= f32::abs(x - planned) > allowed_m,
-            _ => {
-                away += x - planned;
-                is_off |= f32::abs(away) > allowed_rad;
-            }
-        }
+    if !requested_n.is_finite() {
+        return Some(Fault::NotFinite);
     }
-    match exceeded(&limits, x, requested_n) {
-        None | Some(Fault::Speed) if is_off => Some(Fault::OffCourse),
-        fault => fault,
+    let mut states = x.iter();
+    let mut next = || states.next().copied().unwrap_or_default();
+    let (position, speed) = (next(), next());
+    let [low, high] = limits.rail_m;
+    if position < low || position > high {
+        return Some(Fault::Rail);
     }
+    let mut positions = x.iter().zip(planned).step_by(2).map(|(x, planned)| x - planned);
+    let mut is_off = f32::abs(positions.next().unwrap_or_default()) > limits.deviation_m;
+    let mut angle = 0.0;
+    for joint in positions {
+        angle += joint;
+        is_off |= f32::abs(angle) > limits.deviation_rad;
+    }
+    let is_fast = speed.abs() > limits.speed_m_per_s;
+    is_off.then_some(Fault::OffCourse).or(is_fast.then_some(Fault::Speed))
 }
 
 #[cfg(test)]
@@ -101,18 +103,20 @@ mod tests {
     #[test]
     fn a_planned_motion_may_pass_any_angle_but_is_not_left() {
         let limits =
-            Limits::<3> { rail_m: [-1.0, 2.0], angle_rad: 0.3, speed_m_per_s: 1.5, ..Limits::none() };
+            MotionLimits { deviation_rad: 0.35, deviation_m: 0.1, speed_m_per_s: 1.5, rail_m: [-1.0, 0.58] };
         let planned = [0.5, 1.0, 3.0, 9.0, -2.0, 5.0];
-        let found = |x: [f32; 6]| exceeded_in_motion(&limits, [0.1, 0.35], &x, &planned, 0.0);
+        let found = |x: [f32; 6]| exceeded_in_motion(&limits, &x, &planned, 0.0);
         assert_eq!(found(planned), None);
-        assert_eq!(found([0.59, 1.4, 3.3, 0.0, -2.0, 0.0]), None);
-        assert_eq!(found([0.61, 1.0, 3.0, 9.0, -2.0, 5.0]), Some(Fault::OffCourse));
+        assert_eq!(found([0.57, 1.4, 3.3, 0.0, -2.0, 0.0]), None);
+        assert_eq!(found([0.39, 1.0, 3.0, 9.0, -2.0, 5.0]), Some(Fault::OffCourse));
         assert_eq!(found([0.5, 1.0, 2.64, 9.0, -2.0, 5.0]), Some(Fault::OffCourse));
         // Each joint is near its own plan, the second link is not near its angle from the vertical.
         assert_eq!(found([0.5, 1.0, 3.2, 9.0, -1.8, 5.0]), Some(Fault::OffCourse));
-        assert_eq!(found([2.1, 1.0, 3.0, 9.0, -2.0, 5.0]), Some(Fault::Rail));
+        assert_eq!(found([0.59, 1.0, 3.0, 9.0, -2.0, 5.0]), Some(Fault::Rail));
+        assert_eq!(found([-1.1, 1.0, 3.0, 9.0, -2.0, 5.0]), Some(Fault::Rail));
         assert_eq!(found([0.5, 1.6, 3.0, 9.0, -2.0, 5.0]), Some(Fault::Speed));
-        let request = exceeded_in_motion(&limits, [0.1, 0.35], &planned, &planned, f32::NAN);
+        assert_eq!(found([0.5, -1.6, 3.0, 9.0, -2.0, 5.0]), Some(Fault::Speed));
+        let request = exceeded_in_motion(&limits, &planned, &planned, f32::NAN);
         assert_eq!(request, Some(Fault::NotFinite));
     }
 }

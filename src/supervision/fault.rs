@@ -107,14 +107,15 @@ impl Fault {
         Entry {
             fault: Fault::Rail,
             name: "rail",
-            condition: "the cart is closer than `rail_margin_m` to an end of the rail",
+            condition: "the cart is closer than `rail_margin_m` to an end of the rail; while raising or lowering, than a \
+                        quarter of it",
             reaction: Reaction::Ticks(1),
             remedy: "push the cart to the middle; if it drifted there, an encoder loses counts, or the rail is not level",
         },
         Entry {
             fault: Fault::Speed,
             name: "speed",
-            condition: "the cart is faster than `speed_m_per_s`",
+            condition: "the cart is faster than `speed_m_per_s`; while raising or lowering, than the swing-up's limit",
             reaction: Reaction::Ticks(1),
             remedy: "smaller disturbances, or a higher limit if the rig can take it",
         },

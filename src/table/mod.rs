@@ -26,11 +26,11 @@ pub use motor::MotorMap;
 pub use observer::ObserverGains;
 pub use part::{Part, Reader, Resize, Shape, Words, WordsMut};
 pub use scalar::Scalar;
-pub use swing_up::{MotionTable, Motions, NoSwingUp, SwingUp, SwingUpTable};
+pub use swing_up::{MotionLimits, MotionTable, Motions, NoSwingUp, SwingUp, SwingUpTable};
 pub use thresholds::{MotorTest, Thresholds};
 
 /// Version of the layout of [`GainTable`]; a table with another version is refused.
-pub const TABLE_FORMAT: u32 = 4;
+pub const TABLE_FORMAT: u32 = 5;
 
 part! {
     /// The constants of a controller with `NX` states and `NY` sensors. `upright design` writes them to

@@ -27,6 +27,39 @@ part! {
 }
 
 part! {
+    /// Limits of the supervisor while the rig follows a motion. They take the place of those on angle, speed and rail.
+    #[derive(Copy)]
+    pub struct MotionLimits<;> {
+        /// Largest distance of a link from its planned angle from the vertical (rad).
+        pub deviation_rad: f32,
+        /// Largest distance of the cart from its planned position (m).
+        pub deviation_m: f32,
+        /// Largest speed of the cart (m/s).
+        pub speed_m_per_s: f32,
+        /// Lowest and highest position of the cart (m).
+        pub rail_m: [f32; 2],
+    }
+}
+
+impl MotionLimits {
+    /// Limits that are never exceeded.
+    pub const fn none() -> Self {
+        Self {
+            deviation_rad: f32::MAX,
+            deviation_m: f32::MAX,
+            speed_m_per_s: f32::MAX,
+            rail_m: [-f32::MAX, f32::MAX],
+        }
+    }
+
+    fn is_sound(&self) -> bool {
+        let [low, high] = self.rail_m;
+        let others = [self.deviation_rad, self.deviation_m, self.speed_m_per_s];
+        low < high && others.into_iter().all(|limit| limit > 0.0)
+    }
+}
+
+part! {
     /// Both motions of a rig with `NY` sensors and `N` links, and what is needed to follow them.
     pub struct SwingUpTable<'t, NY to MY, N to M;> {
         /// Layout of the table: `TABLE_FORMAT` of the writer.
@@ -37,10 +70,8 @@ part! {
         pub tick_s: f32,
         /// The equations of motion, for the prediction.
         pub model: ChainModel<N>,
-        /// Largest distance of a link from its planned angle from the vertical (rad).
-        pub deviation_rad: f32,
-        /// Largest distance of the cart from its planned position (m).
-        pub deviation_m: f32,
+        /// What the supervisor allows while the rig follows a motion.
+        pub limits: MotionLimits,
         /// Thresholds at which the supervisor takes encoders and motor to be at fault while the rig follows a motion.
         pub thresholds: Thresholds<NY>,
         /// From hanging at rest to upright at rest.
@@ -99,7 +130,7 @@ impl<const NY: usize, const N: usize> SwingUpTable<'_, NY, N> {
         if states != 2 * N + 2 || NY != N + 1 || !complete(&self.raise) || !complete(&self.lower) {
             return Err(TableError::Dimensions);
         }
-        let is_sound = self.deviation_rad > 0.0 && self.deviation_m > 0.0 && self.thresholds.is_sound();
+        let is_sound = self.limits.is_sound() && self.thresholds.is_sound();
         if is_sound && is_finite(self) { Ok(()) } else { Err(TableError::Value) }
     }
 }
@@ -132,10 +163,8 @@ pub struct Motions<'t, const NY: usize> {
     pub raise: MotionTable<'t>,
     /// From upright to hanging.
     pub lower: MotionTable<'t>,
-    /// See [`SwingUpTable::deviation_rad`].
-    pub deviation_rad: f32,
-    /// See [`SwingUpTable::deviation_m`].
-    pub deviation_m: f32,
+    /// See [`SwingUpTable::limits`].
+    pub limits: &'t MotionLimits,
     /// See [`SwingUpTable::thresholds`].
     pub thresholds: &'t Thresholds<NY>,
 }
@@ -168,14 +197,8 @@ impl<const NX: usize, const NY: usize, const N: usize> SwingUp<NX, NY> for Swing
     const IS_POSSIBLE: bool = true;
 
     fn motions(&self) -> Option<Motions<'_, NY>> {
-        let Self { raise, lower, deviation_rad, deviation_m, thresholds, .. } = self;
-        Some(Motions {
-            raise: *raise,
-            lower: *lower,
-            deviation_rad: *deviation_rad,
-            deviation_m: *deviation_m,
-            thresholds,
-        })
+        let Self { raise, lower, limits, thresholds, .. } = self;
+        Some(Motions { raise: *raise, lower: *lower, limits, thresholds })
     }
 
     fn predict(&self, state: &mut [f32; NX], force: f32, dt: f32) {

@@ -273,8 +273,12 @@ fn swing_up<'t>(course: &'t [f32], filter: &'t [f32]) -> SwingUpTable<'t, 2, 1> 
             cart_friction: 0.0,
             joint_frictions: SVector::repeat(0.0),
         },
-        deviation_rad: 0.35,
-        deviation_m: 0.1,
+        limits: MotionLimits {
+            deviation_rad: 0.35,
+            deviation_m: 0.1,
+            speed_m_per_s: 1.5,
+            rail_m: [-0.4, 0.4],
+        },
         thresholds: full().thresholds,
         raise: motion(course, filter),
         lower: motion(course, filter),
@@ -323,7 +327,9 @@ fn a_motion_that_does_not_fit_is_refused_even_with_the_right_checksum() {
     assert_eq!(refused(&|t| t.lower.filter_ticks = 1), dimensions, "knots that end too early");
     assert_eq!(refused(&|t| t.lower.course_ticks = 0), dimensions);
     assert_eq!(refused(&|t| t.raise.ticks = 0), dimensions);
-    assert_eq!(refused(&|t| t.deviation_rad = f32::NAN), Err(TableError::Value));
+    assert_eq!(refused(&|t| t.limits.deviation_rad = f32::NAN), Err(TableError::Value));
+    assert_eq!(refused(&|t| t.limits.speed_m_per_s = 0.0), Err(TableError::Value));
+    assert_eq!(refused(&|t| t.limits.rail_m = [0.4, -0.4]), Err(TableError::Value));
     assert_eq!(refused(&|t| t.raise.filter = &[f32::INFINITY; 4 * 8]), Err(TableError::Value));
     assert_eq!(swing_up(&COURSE, &FILTER).check(&BUILD, 6), dimensions, "more states");
 }

@@ -12,7 +12,7 @@ mod trace;
 pub use bench::Bench;
 pub use closed_loop::{run, simulate, ticks};
 pub use error::SimulationError;
-pub use motion::{Direction, Extremes, follow, set_motion_thresholds};
+pub(crate) use motion::{Extremes, follow};
 pub use scenario::{Begin, Scenario, Sensing};
 pub use summary::{Fall, FallKind, Summary};
 pub use trace::{Sample, Trace};

@@ -1,52 +1,90 @@
-//! A planned motion, followed by the firmware's controller against the nonlinear plant.
+//! Raising, balancing and lowering by the firmware's controller against the nonlinear plant, without a supervisor.
 
 use upright::control::controller::Controller;
 use upright::control::motion::Player;
-use upright::table::SwingUp;
+use upright::supervision::detection::Detection;
+use upright::table::{MotionTable, SwingUp, SwingUpTable, Thresholds};
 
 use super::bench::Bench;
 use super::error::SimulationError;
 use super::scenario::Scenario;
-use crate::rig::{PlantDescription, Rig};
+use crate::rig::Rig;
 use crate::table::{SwingUpValues, TableValues, WithSize, with_firmware_size};
 
-/// Which motion.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Direction {
-    /// From hanging to upright.
-    Raise,
-    /// From upright to hanging.
-    Lower,
-}
-
-/// What a run along a motion has reached.
+/// What a run reaches while it raises and lowers, by the controller's own estimate.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Extremes {
+pub(crate) struct Extremes {
     /// Largest innovation of each sensor (m or rad).
-    pub innovation: Vec<f64>,
+    pub(crate) innovation: Vec<f64>,
+    /// Largest predicted motion of each sensor while its counter stands still (m or rad): [`Detection::moved`].
+    pub(crate) moved: Vec<f64>,
     /// Largest distance of the cart from its planned position (m).
-    pub deviation_m: f64,
+    pub(crate) deviation_m: f64,
     /// Largest distance of a link from its planned angle from the vertical (rad).
-    pub deviation_rad: f64,
-    /// True state at the end of the motion (m, m/s, rad, rad/s …).
-    pub end: Vec<f64>,
+    pub(crate) deviation_rad: f64,
+    /// Largest speed of the cart (m/s).
+    pub(crate) speed_m_per_s: f64,
+    /// Lowest and highest position of the cart (m).
+    pub(crate) travel_m: [f64; 2],
 }
 
-/// Follows a motion of `table` with the rig `rig`, which may differ from the one that the table is for. Start and
-/// disturbances are those of `scenario`. No supervisor ends the run.
+impl Extremes {
+    /// Nothing reached yet.
+    pub(crate) fn none(sensors: usize) -> Self {
+        Self {
+            innovation: vec![0.0; sensors],
+            moved: vec![0.0; sensors],
+            deviation_m: 0.0,
+            deviation_rad: 0.0,
+            speed_m_per_s: 0.0,
+            travel_m: [f64::INFINITY, f64::NEG_INFINITY],
+        }
+    }
+
+    /// The largest of both.
+    pub(crate) fn include(&mut self, other: &Self) {
+        raise_to(&mut self.innovation, &other.innovation);
+        raise_to(&mut self.moved, &other.moved);
+        self.deviation_m = self.deviation_m.max(other.deviation_m);
+        self.deviation_rad = self.deviation_rad.max(other.deviation_rad);
+        self.speed_m_per_s = self.speed_m_per_s.max(other.speed_m_per_s);
+        self.travel_m = [self.travel_m[0].min(other.travel_m[0]), self.travel_m[1].max(other.travel_m[1])];
+    }
+
+    /// A tick with this estimate, `away` from the planned state.
+    fn note(&mut self, estimate: &[f32], away: &[f32]) {
+        self.deviation_m = self.deviation_m.max(f64::from(away[0].abs()));
+        let mut lean = 0.0;
+        for joint in away.iter().skip(2).step_by(2) {
+            lean += f64::from(*joint);
+            self.deviation_rad = self.deviation_rad.max(lean.abs());
+        }
+        let [position, speed] = [estimate[0], estimate[1]].map(f64::from);
+        self.speed_m_per_s = self.speed_m_per_s.max(speed.abs());
+        self.travel_m = [self.travel_m[0].min(position), self.travel_m[1].max(position)];
+    }
+}
+
+/// Raises each of `largest` to its value.
+fn raise_to(largest: &mut [f64], values: &[f64]) {
+    largest.iter_mut().zip(values).for_each(|(largest, value)| *largest = largest.max(*value));
+}
+
+/// Raises the links of `rig` by the motions of `table`, balances for some ticks, and lowers them. `rig` may differ from the
+/// one that the table is for. Start and disturbances are those of `scenario`. None if the table has no motions.
 ///
 /// # Errors
 /// [`SimulationError`] if the plant cannot be built or the firmware refuses the table.
-pub fn follow(
+pub(crate) fn follow(
     rig: &Rig,
     table: &TableValues,
-    direction: Direction,
     scenario: &Scenario,
+    balance_ticks: usize,
 ) -> Result<Option<Extremes>, SimulationError> {
     let Some(swing_up) = &table.swing_up else { return Ok(None) };
     let bench = Bench::new(rig, scenario)?;
     let (states, sensors) = (table.states(), table.sensors());
-    with_firmware_size(states, sensors, Follow { table, swing_up, direction, bench })
+    with_firmware_size(states, sensors, Follow { table, swing_up, bench, balance_ticks })
         .ok_or(SimulationError::Size { states, sensors })?
         .map(Some)
 }
@@ -54,14 +92,14 @@ pub fn follow(
 struct Follow<'a> {
     table: &'a TableValues,
     swing_up: &'a SwingUpValues,
-    direction: Direction,
     bench: Bench,
+    balance_ticks: usize,
 }
 
 impl WithSize for Follow<'_> {
     type Output = Result<Extremes, SimulationError>;
 
-    fn run<const NX: usize, const NY: usize, const N: usize>(mut self) -> Self::Output {
+    fn run<const NX: usize, const NY: usize, const N: usize>(self) -> Self::Output {
         let table = self.table.table::<NX, NY>();
         let swing_up = self.swing_up.table::<NY, N>();
         let build = self.table.build();
@@ -71,102 +109,62 @@ impl WithSize for Follow<'_> {
         self.bench.read_counters_at_zero(&mut at_zero);
         controller.encoders_mut().home(&at_zero, &[0; NY]);
         controller.start(&self.bench.counters())?;
-        let motion = match self.direction {
-            Direction::Raise => swing_up.raise,
-            Direction::Lower => swing_up.lower,
-        };
-        let mut player = Player::<NX, NY>::new(motion, controller.estimate()[0]);
-        let mut innovation = vec![0.0f64; NY];
-        let (mut deviation_m, mut deviation_rad) = (0.0f64, 0.0f64);
+        let tick_s = table.tick_s;
+        let mut run =
+            Run { controller, swing_up: &swing_up, bench: self.bench, tick_s, reached: Extremes::none(NY) };
+        run.follow(swing_up.raise);
+        run.balance(self.balance_ticks)?;
+        run.follow(swing_up.lower);
+        Ok(run.reached)
+    }
+}
+
+struct Run<'t, const NX: usize, const NY: usize, const N: usize> {
+    controller: Controller<'t, NX, NY>,
+    swing_up: &'t SwingUpTable<'t, NY, N>,
+    bench: Bench,
+    tick_s: f32,
+    reached: Extremes,
+}
+
+impl<'t, const NX: usize, const NY: usize, const N: usize> Run<'t, NX, NY, N> {
+    /// Follows `motion` from the set-point, with the tests of the supervisor but without its thresholds; then hands over.
+    fn follow(&mut self, motion: MotionTable<'t>) {
+        let Self { controller, bench, reached, .. } = self;
+        let mut player = Player::<NX, NY>::new(motion, controller.law_state().setpoint);
+        let (mut detection, nothing) = (Detection::<NY>::default(), Thresholds::none());
+        detection.start(controller.encoders().counts(), &controller.positions().data.0[0]);
         loop {
-            let counters = self.bench.counters();
-            let command = controller.control_on_course(&counters, player.now(), |_, _, e| {
-                for (largest, e) in innovation.iter_mut().zip(e) {
-                    *largest = largest.max(f64::from(e.abs()));
-                }
+            let counters = bench.counters();
+            let command = controller.control_on_course(&counters, player.now(), |counts, y, e| {
+                raise_to(&mut reached.innovation, &e.map(|e| f64::from(e.abs())));
+                detection.test(&nothing, counts, y, e);
+                raise_to(&mut reached.moved, &detection.moved().map(|moved| f64::from(moved.abs())));
             });
-            let away = controller.estimate() - player.now().x;
-            deviation_m = deviation_m.max(f64::from(away[0].abs()));
-            let mut lean = 0.0;
-            for joint in away.as_slice().iter().skip(2).step_by(2) {
-                lean += f64::from(*joint);
-                deviation_rad = deviation_rad.max(lean.abs());
-            }
-            self.bench.tick(command.drive);
+            let estimate = controller.estimate();
+            reached.note(estimate.as_slice(), (estimate - player.now().x).as_slice());
+            bench.tick(command.drive);
+            let corrected = core::array::from_fn(|sensor| controller.estimate()[2 * sensor]);
+            detection.finish_tick(&nothing.motor, corrected, controller.acting());
             controller.predict_on_course(|state, force| {
-                SwingUp::<NX, NY>::predict(&swing_up, state, force, table.tick_s);
+                SwingUp::<NX, NY>::predict(self.swing_up, state, force, self.tick_s);
             });
             if player.advance() {
                 break;
             }
         }
-        Ok(Extremes { innovation, deviation_m, deviation_rad, end: self.bench.state().to_vec() })
+        controller.hand_over(player.now().x[0]);
     }
-}
 
-/// Spread of the masses and frictions with which a motion's thresholds are found.
-const SPREAD: [f64; 2] = [0.05, 0.3];
-/// Rigs with other masses and frictions for them.
-const RIGS: u32 = 8;
-/// What such a rig reaches is allowed this many times.
-const MARGIN: f64 = 2.0;
-/// Least distance that the cart may have from its planned position (m).
-const LEAST_DEVIATION_M: f32 = 0.02;
-
-/// Sets the thresholds with which the firmware supervises the motions of `table`: those of balancing, and twice the
-/// innovation that rigs with masses off by 5 % and frictions off by 30 %, in several combinations of signs, reach on
-/// either motion. Does nothing without a swing-up.
-///
-/// # Errors
-/// [`SimulationError`] if the runs cannot be made.
-pub fn set_motion_thresholds(rig: &Rig, table: &mut TableValues) -> Result<(), SimulationError> {
-    let sensors = table.sensors();
-    let (mut largest, mut deviation_m) = (vec![0.0f64; sensors], 0.0f64);
-    for number in 0..RIGS {
-        let other = with_other_masses(rig, number);
-        for direction in [Direction::Raise, Direction::Lower] {
-            let mut scenario = Scenario::swing_up(&other, 0.0, None);
-            if direction == Direction::Lower {
-                scenario.start.fill(0.0);
-            }
-            let Some(reached) = follow(&other, table, direction, &scenario)? else { return Ok(()) };
-            deviation_m = deviation_m.max(reached.deviation_m);
-            for (largest, reached) in largest.iter_mut().zip(&reached.innovation) {
-                *largest = largest.max(*reached);
-            }
+    /// Balances where the motion has ended.
+    fn balance(&mut self, ticks: usize) -> Result<(), SimulationError> {
+        let here = self.controller.law_state().setpoint;
+        self.controller.set_setpoint(here)?;
+        for _ in 0..ticks {
+            let command = self.controller.control(&self.bench.counters());
+            self.bench.tick(command.drive);
+            self.controller.predict();
         }
+        Ok(())
     }
-    let balancing = table.thresholds.clone();
-    let Some(swing_up) = &mut table.swing_up else { return Ok(()) };
-    swing_up.deviation_m = ((1.0 + MARGIN) * deviation_m) as f32 + LEAST_DEVIATION_M;
-    swing_up.thresholds = balancing;
-    let thresholds = &mut swing_up.thresholds;
-    let mut wider = vec![1.0f32; sensors];
-    for (sensor, wider) in wider.iter_mut().enumerate() {
-        *wider = 1.0 + (MARGIN * largest[sensor]) as f32 / thresholds.innovation[sensor];
-        thresholds.innovation[sensor] *= *wider;
-        thresholds.frozen[sensor] *= *wider;
-    }
-    thresholds.motor.energy *= wider[0] * wider[0];
-    Ok(())
-}
-
-/// `rig` with every mass and friction off by [`SPREAD`], up or down as the bits of a number say.
-fn with_other_masses(rig: &Rig, number: u32) -> Rig {
-    let mut other = rig.clone();
-    let PlantDescription::Chain(chain) = &mut other.plant else { return other };
-    let mut bits = number.wrapping_mul(0x9e37_79b9).rotate_left(9);
-    let mut off = |spread: f64| {
-        bits = bits.rotate_left(1);
-        if bits & 1 == 1 { 1.0 + spread } else { 1.0 - spread }
-    };
-    chain.cart.mass_kg *= off(SPREAD[0]);
-    chain.cart.friction_n_s_per_m *= off(SPREAD[1]);
-    for link in &mut chain.links {
-        let factor = off(SPREAD[0]);
-        link.mass_kg *= factor;
-        link.inertia_kg_m2 = link.inertia_kg_m2.map(|inertia| factor * inertia);
-        link.friction_n_m_s_per_rad *= off(SPREAD[1]);
-    }
-    other
 }

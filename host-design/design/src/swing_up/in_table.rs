@@ -2,15 +2,15 @@
 
 use super::SwingUpError;
 use super::motion::SwingUp;
+use super::supervision::set_limits;
 use crate::design::design;
 use crate::rig::Rig;
-use crate::simulate::set_motion_thresholds;
 use crate::table::{Gains, SwingUpValues, TableValues};
 
-/// The table with the motions in it, and the thresholds with which the firmware supervises them.
+/// The table with the motions in it, and the limits and thresholds with which the firmware supervises them.
 ///
 /// # Errors
-/// [`SwingUpError::Table`] if the motions do not fit the table; [`SwingUpError::Simulation`] if the runs for the thresholds
+/// [`SwingUpError::Table`] if the motions do not fit the table; [`SwingUpError::Simulation`] if the runs for the limits
 /// cannot be made.
 pub fn with_motions(
     rig: &Rig,
@@ -18,7 +18,7 @@ pub fn with_motions(
     motions: &SwingUp,
 ) -> Result<TableValues, SwingUpError> {
     table.swing_up = Some(SwingUpValues::of(rig, &table, motions)?);
-    set_motion_thresholds(rig, &mut table)?;
+    set_limits(rig, &mut table)?;
     Ok(table)
 }
 

@@ -17,6 +17,7 @@
 //! | `firmware_runs` | such runs of the whole firmware |
 //! | `search`, `plan`, `advice` | candidates, selection, and what would help if there is none |
 //! | `demonstration` | one run of everything |
+//! | `supervision` | what the supervisor allows in motion |
 //! | `in_table` | the table of the firmware |
 //! | `check`, `stored` | independent check; the file beside the rig file |
 //!
@@ -44,6 +45,7 @@ mod search;
 mod setting;
 mod shooting;
 mod stored;
+mod supervision;
 mod tracking;
 mod way;
 

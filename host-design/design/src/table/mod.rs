@@ -11,7 +11,9 @@ use core::ops::{Deref, DerefMut};
 
 use nalgebra::{SMatrix, SVector};
 use serde::{Serialize, Serializer};
-use upright::table::{Build, GainTable, LawGains, MotorMap, ObserverGains, PerLaw, Resize, TABLE_FORMAT};
+use upright::table::{
+    Build, GainTable, LawGains, MotionLimits, MotorMap, ObserverGains, PerLaw, Resize, TABLE_FORMAT,
+};
 
 use crate::design::{Certified, Feedback, detection_thresholds, setpoint_step};
 use crate::numerics::Matrix;
@@ -191,7 +193,7 @@ impl TableValues {
         limits.saturated_ticks = u32::MAX;
         if let Some(swing_up) = &mut self.swing_up {
             swing_up.thresholds = supervision::thresholds(None);
-            (swing_up.deviation_rad, swing_up.deviation_m) = (f32::MAX, f32::MAX);
+            swing_up.limits = MotionLimits::none();
         }
         self
     }

@@ -129,6 +129,7 @@ fn write_imports(out: &mut String, table: &TableValues) -> core::fmt::Result {
         ("GainTable", true),
         ("LawGains", true),
         ("Limits", true),
+        ("MotionLimits", table.swing_up.is_some()),
         ("MotionTable", table.swing_up.is_some()),
         ("MotorMap", table.motor.is_some()),
         ("MotorTest", true),

@@ -1,7 +1,7 @@
 //! The table of a swing-up on the host: its values for any number of links.
 
 use nalgebra::{SMatrix, SVector};
-use upright::table::{ChainModel, MotionTable, SwingUpTable, TABLE_FORMAT, Thresholds};
+use upright::table::{ChainModel, MotionLimits, MotionTable, SwingUpTable, TABLE_FORMAT, Thresholds};
 
 use super::{MAX_SENSORS, NoTable, TableValues, finite};
 use crate::plant::{ChainParameters, ChainPlant};
@@ -18,10 +18,8 @@ const FILTER_S: f64 = 0.05;
 pub struct SwingUpValues {
     /// Constants of the equations of motion.
     pub chain: ChainParameters<f64>,
-    /// See [`SwingUpTable::deviation_rad`].
-    pub deviation_rad: f32,
-    /// See [`SwingUpTable::deviation_m`].
-    pub deviation_m: f32,
+    /// See [`SwingUpTable::limits`].
+    pub limits: MotionLimits,
     /// See [`SwingUpTable::thresholds`].
     pub thresholds: Thresholds<MAX_SENSORS>,
     /// From hanging to upright.
@@ -50,8 +48,8 @@ pub struct MotionValues {
 }
 
 impl SwingUpValues {
-    /// The table of `motions` for `rig`, whose gain table is `table`. It detects no fault of encoders and motor: its
-    /// thresholds are [`Thresholds::none`].
+    /// The table of `motions` for `rig`, whose gain table is `table`. The supervisor detects nothing in its motions: its
+    /// limits are [`MotionLimits::none`], its thresholds [`Thresholds::none`].
     ///
     /// # Errors
     /// [`NoTable`] if the rig has no chain, a delay, or no observer, if the motions are those of another rig, or if a
@@ -67,11 +65,9 @@ impl SwingUpValues {
             return Err(NoTable::SwingUp("its control law is without delay: set delay_ticks = 0"));
         }
         let values = |motion: &Motion| MotionValues::of(table, motion);
-        let [low, high] = chain.cart.travel_m;
         Ok(Self {
             chain: ChainParameters::of(chain),
-            deviation_rad: DEVIATION_RAD,
-            deviation_m: finite("cart.travel_m", (DEVIATION_SHARE * (high - low)) as f32)?,
+            limits: MotionLimits::none(),
             thresholds: Thresholds::none(),
             raise: values(&motions.raise)?,
             lower: values(&motions.lower)?,
@@ -91,8 +87,7 @@ impl SwingUpValues {
             rig_hash: self.rig_hash,
             tick_s: self.tick_s,
             model: narrow(plant.model()),
-            deviation_rad: self.deviation_rad,
-            deviation_m: self.deviation_m,
+            limits: self.limits,
             thresholds: upright::table::Resize::resized(&self.thresholds),
             raise: self.raise.table(),
             lower: self.lower.table(),
@@ -108,11 +103,6 @@ impl SwingUpValues {
         4 * (values(&self.raise) + values(&self.lower))
     }
 }
-
-/// Largest distance of a link from its planned angle (rad): beyond it, even nominal gains rarely bring it back.
-const DEVIATION_RAD: f32 = 0.35;
-/// Largest distance of the cart from its planned position, as a share of the rail.
-const DEVIATION_SHARE: f64 = 0.1;
 
 impl MotionValues {
     fn of(table: &TableValues, motion: &Motion) -> Result<Self, NoTable> {

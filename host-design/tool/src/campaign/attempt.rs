@@ -218,7 +218,8 @@ impl Attempt<'_> {
             return true;
         }
         if let Some(planned) = self.planned(tick) {
-            let allowed = self.table.swing_up.as_ref().map_or(f32::MAX, |swing_up| swing_up.deviation_rad);
+            let allowed =
+                self.table.swing_up.as_ref().map_or(f32::MAX, |swing_up| swing_up.limits.deviation_rad);
             let away = absolute_angles(state).zip(planned).map(|(angle, planned)| (angle - planned).abs());
             return away.fold(0.0, f64::max) > f64::from(allowed) * (1.0 + BEYOND);
         }

@@ -1,0 +1,97 @@
+//! What the supervisor allows while the rig moves: more than healthy machines reach.
+
+use rayon::prelude::*;
+use upright::table::MotionLimits;
+
+use super::closed_loop::LOST_RAD;
+use super::robustness::{Spread, drawn};
+use super::way::Way;
+use crate::rig::{PlantDescription, Rig};
+use crate::simulate::{Extremes, Scenario, SimulationError, follow};
+use crate::table::TableValues;
+use crate::verify::Disturbance;
+
+/// Healthy machines that are raised and lowered; with the first one, nothing is wrong.
+const MACHINES: u64 = 12;
+/// Seed of the first one; apart from the seeds with which motions are chosen and judged.
+const BASE_SEED: u64 = 20_000;
+/// How long they balance before they are lowered (s): wrong zeros of the encoders move the cart away from its set-point.
+const BALANCE_S: f64 = 1.5;
+/// The largest that one of them reaches is allowed this many times.
+const MARGIN: f64 = 2.0;
+/// Least distance of the cart from its planned position that is allowed (m).
+const LEAST_DEVIATION_M: f64 = 0.02;
+/// The cart may be this many times as fast as one of them.
+const SPEED_MARGIN: f64 = 1.2;
+/// Share of the rail's margin that stays free while the rig moves: its plan turns within the soft limits, but it may
+/// stand off its set-point.
+const FREE_SHARE: f64 = 0.25;
+
+/// Sets limits and thresholds with which the firmware supervises the motions of `table`, from runs of machines with the
+/// spreads of `[swing_up]`: masses, friction, start, encoders' zeros, and the rig's noise. Does nothing without motions.
+///
+/// # Errors
+/// [`SimulationError`] if the runs cannot be made.
+pub(super) fn set_limits(rig: &Rig, table: &mut TableValues) -> Result<(), SimulationError> {
+    let PlantDescription::Chain(chain) = &rig.plant else { return Ok(()) };
+    let reached = healthy(rig, table)?;
+    let (usual, balancing) = (table.limits.clone(), table.thresholds.clone());
+    let Some(swing_up) = &mut table.swing_up else { return Ok(()) };
+    let end = |side: usize| {
+        let end = chain.cart.travel_m[side];
+        (end - FREE_SHARE * (end - f64::from(usual.rail_m[side]))) as f32
+    };
+    swing_up.limits = MotionLimits {
+        deviation_rad: (MARGIN * reached.deviation_rad).max(LOST_RAD) as f32,
+        deviation_m: (MARGIN * reached.deviation_m).max(LEAST_DEVIATION_M) as f32,
+        speed_m_per_s: usual.speed_m_per_s.max((SPEED_MARGIN * reached.speed_m_per_s) as f32),
+        rail_m: [end(0), end(1)],
+    };
+    swing_up.thresholds = balancing;
+    let thresholds = &mut swing_up.thresholds;
+    let of_cart = thresholds.innovation[0];
+    for (sensor, (innovation, moved)) in reached.innovation.iter().zip(&reached.moved).enumerate() {
+        // What the rig's noise does at rest comes on top of what a wrong model does in motion.
+        let wider = 1.0 + (MARGIN * innovation) as f32 / thresholds.innovation[sensor];
+        thresholds.innovation[sensor] *= wider;
+        thresholds.frozen[sensor] = (thresholds.frozen[sensor] * wider).max((MARGIN * moved) as f32);
+    }
+    thresholds.motor.energy *= (thresholds.innovation[0] / of_cart).powi(2);
+    Ok(())
+}
+
+/// The most that healthy machines reach; those that are lost do not count.
+fn healthy(rig: &Rig, table: &TableValues) -> Result<Extremes, SimulationError> {
+    let rules = rig.swing_up.clone().unwrap_or_default();
+    let spread = Spread::of(rules.mass_spread_percent / 100.0, rules.friction_spread_percent / 100.0);
+    let disturbance = Disturbance::of(rig);
+    let balance_ticks = (BALANCE_S / rig.tick.period_s) as usize;
+    let quiet = Scenario { substeps: 2, ..Scenario::swing_up(rig, 0.0, None) };
+    let one = |number: u64| {
+        if number == 0 {
+            return follow(rig, table, &quiet, balance_ticks);
+        }
+        let seed = BASE_SEED + number;
+        let (machine, start) = drawn(rig, Way::Up, &spread, seed);
+        let scenario = Scenario {
+            start,
+            seed,
+            force_noise_n: disturbance.force_n,
+            torque_noise_n_m: disturbance.torque_n_m,
+            ..quiet.clone()
+        };
+        follow(&machine, table, &scenario, balance_ticks)
+    };
+    let all: Vec<_> = (0..MACHINES).into_par_iter().map(one).collect::<Result<_, _>>()?;
+    let mut most = Extremes::none(table.sensors());
+    let arrived = all.iter().flatten().filter(|reached| has_arrived(rig, reached));
+    arrived.for_each(|reached| most.include(reached));
+    Ok(most)
+}
+
+/// Whether a run has kept to its plan and to the rail.
+fn has_arrived(rig: &Rig, reached: &Extremes) -> bool {
+    let PlantDescription::Chain(chain) = &rig.plant else { return false };
+    let [low, high] = chain.cart.travel_m;
+    reached.deviation_rad <= LOST_RAD && low < reached.travel_m[0] && reached.travel_m[1] < high
+}
