@@ -46,6 +46,7 @@ pub(crate) fn check(bytes: &[u8]) {
         invariants: Invariants::new(&start.firmware),
         sent: Vec::new(),
         last_frame: Vec::new(),
+        answered_id: 0,
         id: start.id,
         ticks: 0,
         hash: hash(bytes),
@@ -67,6 +68,8 @@ struct Run<'q> {
     invariants: Invariants,
     sent: Vec<Command>,
     last_frame: Vec<u8>,
+    /// Id of the last command that was answered.
+    answered_id: u64,
     id: u64,
     ticks: u32,
     hash: u16,
@@ -151,7 +154,11 @@ impl Run<'_> {
             for message in frame.iter().filter_map(|&byte| receiver.push::<Message<STATES, SENSORS>>(byte)) {
                 match message.expect("a frame that the firmware sends can be read") {
                     Message::Telemetry(telemetry) => invariants::telemetry(&telemetry),
+                    // The same command has come again: so does its reply.
+                    Message::Reply(Reply { id, .. }) if id == self.answered_id => {}
                     Message::Reply(Reply { id, answer }) => {
+                        assert!(id > self.answered_id, "only the last command is answered again");
+                        self.answered_id = id;
                         // A damaged frame has its own id only by a collision of the checksum.
                         let command = self.sent.iter().find(|command| command.id == id);
                         let command = command.expect("a reply belongs to a command that was sent");

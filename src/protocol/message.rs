@@ -22,7 +22,8 @@ pub const PROTOCOL: u8 = 4;
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Command {
     /// Larger than the id of every command before, even after a restart of the host (microseconds since 1970 are). A
-    /// command with another id is taken for a replay and ignored.
+    /// command with another id is taken for a replay and ignored; only the last command, when it comes again, has its
+    /// reply sent again.
     pub id: u64,
     /// The request.
     pub request: Request,

@@ -1,7 +1,8 @@
 //! The serial link, below the control task: bytes to commands, telemetry and replies to bytes.
 //!
 //! Control task and serial link share only two single-producer, single-consumer queues, so neither ever waits for the
-//! other: there is no lock, and what finds its queue full is dropped.
+//! other: there is no lock, and what finds its queue full is dropped. A command that comes again, with the same id, is not
+//! carried out again, but its reply is sent again: the host repeats a command until it has the reply.
 
 use heapless::spsc::{Consumer, Producer};
 use serde::Serialize;
@@ -23,6 +24,9 @@ pub struct SerialLink<'q, const NX: usize, const NY: usize> {
     last_id: u64,
     malformed: u32,
     replayed: u32,
+    /// The last reply, and whether the host has asked for it again.
+    last_reply: Option<Reply>,
+    is_asked_again: bool,
     scratch: [u8; MAX_MESSAGE],
     out: [u8; MAX_MESSAGE],
 }
@@ -37,6 +41,8 @@ impl<'q, const NX: usize, const NY: usize> SerialLink<'q, NX, NY> {
             last_id: 0,
             malformed: 0,
             replayed: 0,
+            last_reply: None,
+            is_asked_again: false,
             scratch: [0; MAX_MESSAGE],
             out: [0; MAX_MESSAGE],
         }
@@ -49,7 +55,11 @@ impl<'q, const NX: usize, const NY: usize> SerialLink<'q, NX, NY> {
         };
         match command {
             Err(_) => self.malformed = self.malformed.saturating_add(1),
-            Ok(command) if command.id <= self.last_id => self.replayed = self.replayed.saturating_add(1),
+            Ok(command) if command.id <= self.last_id => {
+                self.replayed = self.replayed.saturating_add(1);
+                // Its reply may have been lost. The command itself is not carried out twice.
+                self.is_asked_again |= self.last_reply.is_some_and(|reply| reply.id == command.id);
+            }
             Ok(command) => {
                 // A host that sends more than one command per tick gets no answer to those that find the queue full.
                 if queue::put(&mut self.commands, command).is_ok() {
@@ -61,9 +71,16 @@ impl<'q, const NX: usize, const NY: usize> SerialLink<'q, NX, NY> {
 
     /// The next frame for the line, if there is one.
     pub fn transmit(&mut self) -> Option<&[u8]> {
-        let mut message = queue::take(&mut self.messages)?;
-        if let Message::Reply(Reply { answer: Answer::Statistics(statistics), .. }) = &mut message {
-            (statistics.malformed, statistics.replayed) = (self.malformed, self.replayed);
+        let again = core::mem::take(&mut self.is_asked_again).then_some(self.last_reply).flatten();
+        let mut message = match again {
+            Some(reply) => Message::Reply(reply),
+            None => queue::take(&mut self.messages)?,
+        };
+        if let Message::Reply(reply) = &mut message {
+            if let Answer::Statistics(statistics) = &mut reply.answer {
+                (statistics.malformed, statistics.replayed) = (self.malformed, self.replayed);
+            }
+            self.last_reply = Some(*reply);
         }
         send(&message, &mut self.scratch, &mut self.out)
     }
@@ -116,5 +133,33 @@ mod tests {
         assert!(send(&telemetry, &mut scratch, &mut out).is_some());
         let (mut scratch, mut out) = ([0; MAX_MESSAGE], [0; MAX_MESSAGE - 20]);
         assert!(send(&telemetry, &mut scratch, &mut out).is_none(), "not even without 20 bytes");
+    }
+
+    #[test]
+    fn a_repeated_command_is_answered_again_and_carried_out_once() {
+        use crate::protocol::message::Request;
+        use heapless::spsc::Queue;
+        let (mut commands, mut messages) = (Queue::<Command, 4>::new(), Queue::<Message<2, 1>, 4>::new());
+        let ((to_control, mut from_link), (mut to_link, from_control)) = (commands.split(), messages.split());
+        let mut link = SerialLink::new(to_control, from_control);
+        let say = |link: &mut SerialLink<'_, 2, 1>, id| {
+            let command = Command { id, request: Request::Home };
+            let (mut scratch, mut out) = ([0; MAX_COMMAND], [0; MAX_COMMAND]);
+            send(&command, &mut scratch, &mut out).unwrap().iter().for_each(|&byte| link.receive(byte));
+        };
+        say(&mut link, 7);
+        assert_eq!(from_link.dequeue().map(|command| command.id), Some(7));
+        // Not answered yet: nothing to send again.
+        say(&mut link, 7);
+        assert_eq!((from_link.dequeue(), link.transmit()), (None, None));
+        to_link.enqueue(Message::Reply(Reply { id: 7, answer: Answer::Done })).unwrap();
+        let reply: Vec<u8, 64> = Vec::from_slice(link.transmit().unwrap()).unwrap();
+        assert_eq!(link.transmit(), None);
+        say(&mut link, 7);
+        assert_eq!(from_link.dequeue(), None, "carried out once");
+        assert_eq!(link.transmit(), Some(&reply[..]));
+        // The negative control: an older command is a replay, and not answered.
+        say(&mut link, 6);
+        assert_eq!((from_link.dequeue(), link.transmit()), (None, None));
     }
 }

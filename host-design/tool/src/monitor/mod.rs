@@ -6,6 +6,7 @@
 mod command;
 mod line;
 mod model;
+mod outgoing;
 pub mod record;
 pub mod view;
 pub mod words;

@@ -3,15 +3,16 @@
 use std::collections::VecDeque;
 use std::time::Duration;
 
-use upright::protocol::frame::{self, Receiver};
+use upright::protocol::frame::Receiver;
 use upright::protocol::message::{
-    Answer, Command, CrashRecord, Info, Message, PROTOCOL, Reply, Request, Statistics, Telemetry,
+    Answer, CrashRecord, Info, Message, PROTOCOL, Reply, Request, Statistics, Telemetry,
 };
-use upright::protocol::serial_link::{MAX_COMMAND, MAX_MESSAGE};
+use upright::protocol::serial_link::MAX_MESSAGE;
 use upright::supervision::fault::Cause;
 use upright::table::Law;
 
 use super::command::Action;
+use super::outgoing::{Outgoing, Unanswered};
 use super::words;
 
 /// Telemetry of a firmware of any size: a list is sent as its length and its items.
@@ -22,7 +23,6 @@ const HISTORY_S: f32 = 10.0;
 /// Time between two telemetry messages (s).
 const TELEMETRY_S: f32 = 0.02;
 const BEAT: Duration = Duration::from_millis(25);
-const ASK: Duration = Duration::from_millis(500);
 const STATISTICS: Duration = Duration::from_secs(1);
 const LOG_LINES: usize = 100;
 
@@ -78,9 +78,7 @@ pub struct Monitor {
     /// Why it has ended.
     pub ended: Option<Ended>,
     receiver: Receiver<MAX_MESSAGE>,
-    to_send: Vec<u8>,
-    last_id: u64,
-    asked: VecDeque<(u64, Request)>,
+    outgoing: Outgoing,
     telemetry_s: f32,
     beating: bool,
     next_beat: Duration,
@@ -104,9 +102,7 @@ impl Monitor {
             unreadable: 0,
             ended: None,
             receiver: Receiver::new(),
-            to_send: Vec::new(),
-            last_id: 0,
-            asked: VecDeque::new(),
+            outgoing: Outgoing::default(),
             telemetry_s: TELEMETRY_S,
             beating: false,
             next_beat: Duration::ZERO,
@@ -124,7 +120,7 @@ impl Monitor {
         if let Some(Info { rig_hash: found, .. }) = self.info
             && found != wanted
         {
-            self.to_send.clear();
+            self.outgoing.clear();
             self.ended.get_or_insert(Ended::Rig { found, wanted });
         }
     }
@@ -172,11 +168,10 @@ impl Monitor {
     }
 
     fn answered(&mut self, id: u64, answer: Answer, now: Duration) {
-        let Some(place) = self.asked.iter().position(|(asked, _)| *asked == id) else { return };
-        let Some((_, request)) = self.asked.remove(place) else { return };
+        let Some(request) = self.outgoing.answered(id, now) else { return };
         match answer {
             Answer::Info(info) if info.protocol != PROTOCOL => {
-                self.to_send.clear();
+                self.outgoing.clear();
                 self.ended = Some(Ended::Protocol(info.protocol));
             }
             Answer::Info(info) => {
@@ -244,16 +239,18 @@ impl Monitor {
     /// Sends what is due: the request for the identity, the keep-alive of the dead-man timer, the request for the
     /// counters.
     pub fn poll(&mut self, now: Duration) {
-        if now >= self.next_ask {
-            let (request, pause) = match self.info {
-                None => (Request::Info, ASK),
-                Some(_) => (Request::Statistics, STATISTICS),
-            };
-            self.send(request, now);
-            self.next_ask = now + pause;
+        if self.ended.is_some() {
+            return;
+        }
+        for unanswered in self.outgoing.repeat(now) {
+            self.tell(unanswered);
+        }
+        if now >= self.next_ask && !self.outgoing.is_waiting() {
+            self.send(if self.info.is_none() { Request::Info } else { Request::Statistics }, now);
+            self.next_ask = now + STATISTICS;
         }
         if self.beating && now >= self.next_beat {
-            self.send(Request::Beat, now);
+            self.outgoing.beat(now);
             self.next_beat = now + BEAT;
         }
     }
@@ -265,7 +262,12 @@ impl Monitor {
 
     /// Bytes for the line.
     pub fn take_outgoing(&mut self) -> Vec<u8> {
-        std::mem::take(&mut self.to_send)
+        self.outgoing.take()
+    }
+
+    /// Whether a request has no answer yet.
+    pub fn is_waiting(&self) -> bool {
+        self.outgoing.is_waiting()
     }
 
     /// Adds a line to the log.
@@ -280,16 +282,16 @@ impl Monitor {
         if self.ended.is_some() {
             return;
         }
-        self.last_id = (now.as_micros() as u64).max(self.last_id + 1);
-        let command = Command { id: self.last_id, request };
-        let (mut scratch, mut out) = ([0; MAX_COMMAND], [0; MAX_COMMAND]);
-        // Every command fits: a test of the messages says so.
-        if let Ok(frame) = frame::encode(&command, &mut scratch, &mut out) {
-            self.to_send.extend_from_slice(frame);
+        for unanswered in self.outgoing.send(request, now) {
+            self.tell(unanswered);
         }
-        self.asked.push_back((self.last_id, request));
-        if self.asked.len() > LOG_LINES {
-            self.asked.pop_front();
+    }
+
+    fn tell(&mut self, Unanswered { request, is_given_up }: Unanswered) {
+        let then = if is_given_up { "given up; it may have been carried out" } else { "it is repeated" };
+        self.note(format!("{}: not answered, {then}", name(request)));
+        if is_given_up {
+            self.forget(request);
         }
     }
 }

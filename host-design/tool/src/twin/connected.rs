@@ -8,6 +8,9 @@ use super::desk::Desk;
 use super::pace::PICTURE;
 use crate::monitor::Line;
 
+/// At the end, the motor is turned off: longest wait for the answer.
+const LAST_WAIT: Duration = Duration::from_millis(500);
+
 /// Passes bytes between the line and the viewers until `goes_on` says no. The firmware has to be that of the rig with this
 /// hash; commands to another one are not sent.
 pub(super) fn run(mut line: Line, desk: &mut Desk, rig_hash: u64, goes_on: &dyn Fn() -> bool) {
@@ -17,16 +20,8 @@ pub(super) fn run(mut line: Line, desk: &mut Desk, rig_hash: u64, goes_on: &dyn 
         // What only a simulation can do is not asked of a machine.
         let _ = desk.requests(now());
         if desk.monitor.ended.is_none() {
-            match line.receive(&mut buffer) {
-                Ok(bytes) => desk.receive(bytes, now()),
-                Err(error) => desk.monitor.close(&error),
-            }
+            exchange(&mut line, desk, &mut buffer);
             desk.monitor.expect_rig(rig_hash);
-            desk.monitor.poll(now());
-            let bytes = desk.monitor.take_outgoing();
-            if let Err(error) = line.send(&bytes) {
-                desk.monitor.close(&error);
-            }
         } else {
             std::thread::sleep(PICTURE);
         }
@@ -37,7 +32,22 @@ pub(super) fn run(mut line: Line, desk: &mut Desk, rig_hash: u64, goes_on: &dyn 
     }
     // Whoever was in command is no longer heard.
     desk.turn_off(now());
-    let _ = line.send(&desk.monitor.take_outgoing());
+    let end = Instant::now() + LAST_WAIT;
+    while desk.monitor.ended.is_none() && desk.monitor.is_waiting() && Instant::now() < end {
+        exchange(&mut line, desk, &mut buffer);
+    }
+}
+
+/// Sends what is due, and receives.
+fn exchange(line: &mut Line, desk: &mut Desk, buffer: &mut [u8]) {
+    desk.monitor.poll(now());
+    if let Err(error) = line.send(&desk.monitor.take_outgoing()) {
+        return desk.monitor.close(&error);
+    }
+    match line.receive(buffer) {
+        Ok(bytes) => desk.receive(bytes, now()),
+        Err(error) => desk.monitor.close(&error),
+    }
 }
 
 /// Time since 1970.

@@ -11,6 +11,7 @@ mod documented_tables;
 mod documents;
 mod identify_command;
 mod image;
+mod lossy_line;
 mod monitor;
 mod observer_design;
 mod paper;

@@ -105,10 +105,24 @@ fn screen(monitor: &Monitor) -> String {
     rows.map(|row| row.iter().map(|cell| cell.symbol()).collect::<String>() + "\n").collect()
 }
 
+/// Answers whatever is asked, until nothing more is.
+fn answer_all(monitor: &mut Monitor) {
+    loop {
+        let all = asked(monitor);
+        if all.is_empty() {
+            return;
+        }
+        all.iter().for_each(|command| answer(monitor, command.id, Answer::Done));
+    }
+}
+
+/// The requests that a key sends, all of which are answered.
 fn press(monitor: &mut Monitor, code: KeyCode) -> Vec<Request> {
-    asked(monitor);
+    answer_all(monitor);
     monitor.act(action(&KeyEvent::new(code, KeyModifiers::NONE)).unwrap(), NOW);
-    asked(monitor).into_iter().map(|command| command.request).collect()
+    let said = asked(monitor);
+    said.iter().for_each(|command| answer(monitor, command.id, Answer::Done));
+    said.into_iter().map(|command| command.request).collect()
 }
 
 #[test]
@@ -153,10 +167,16 @@ fn active_contacts_and_the_last_crash_are_shown() {
     assert!(screen(&monitor).contains("active inputs: limit switch low, driver fault"));
     // Negative control: nothing is said of a crash before the firmware has.
     assert!(!screen(&monitor).contains("PC"));
-    let question = asked(&mut monitor).into_iter().find(|command| command.request == Request::Crash);
+    let question = loop {
+        let [command] = asked(&mut monitor)[..] else { panic!("one at a time") };
+        if command.request == Request::Crash {
+            break command;
+        }
+        answer(&mut monitor, command.id, Answer::Done);
+    };
     let record =
         CrashRecord { pc: 0x0800_1234, lr: 0x0800_0101, cfsr: 0x8200, hfsr: 1 << 30, bfar: 0x6000_0004 };
-    answer(&mut monitor, question.unwrap().id, Answer::Crash(Some(record)));
+    answer(&mut monitor, question.id, Answer::Crash(Some(record)));
     let line = "crash at PC 0x08001234, LR 0x08000101, CFSR 0x00008200, HFSR 0x40000000, BFAR 0x60000004";
     assert!(screen(&monitor).contains(line) && monitor.log.iter().any(|said| said == line));
 }
@@ -166,7 +186,7 @@ fn active_contacts_and_the_last_crash_are_shown() {
 fn a_firmware_that_starts_again_is_asked_for_its_crash() {
     let mut monitor = met(PROTOCOL);
     told(&mut monitor, telemetry(500, State::Balancing, None));
-    asked(&mut monitor);
+    answer_all(&mut monitor);
     told(&mut monitor, telemetry(510, State::Balancing, None));
     assert!(asked(&mut monitor).is_empty());
     told(&mut monitor, telemetry(10, State::Disarmed, None));
@@ -202,7 +222,9 @@ fn beats_begin_with_the_first_setpoint_and_numbers_always_grow() {
         let said: Vec<_> = (1..=100)
             .flat_map(|ms| {
                 monitor.poll(NOW + Duration::from_millis(ms));
-                asked(monitor)
+                let said = asked(monitor);
+                said.iter().for_each(|command| answer(monitor, command.id, Answer::Done));
+                said
             })
             .collect();
         assert!(said.windows(2).all(|pair| pair[0].id < pair[1].id));
@@ -217,7 +239,7 @@ fn beats_begin_with_the_first_setpoint_and_numbers_always_grow() {
 #[test]
 fn a_refusal_is_shown_with_all_reasons() {
     let mut monitor = met(PROTOCOL);
-    asked(&mut monitor);
+    answer_all(&mut monitor);
     monitor.act(action(&KeyEvent::new(KeyCode::Char('a'), KeyModifiers::NONE)).unwrap(), NOW);
     let id = asked(&mut monitor)[0].id;
     answer(&mut monitor, id + 1, Answer::NotNow(Inhibits::TILTED));

@@ -136,13 +136,19 @@ impl Conversation {
         Ok(())
     }
 
-    /// Receives and sends whatever is due; takes at most 5 ms if the line is silent.
+    /// Sends whatever is due, and receives; takes at most 5 ms if the line is silent.
     fn exchange(
         &mut self,
         mut each: impl FnMut(&serde_json::Value) -> std::io::Result<()>,
     ) -> Result<(), Failure> {
         if self.model.ended.is_some() {
             std::thread::sleep(PICTURE);
+            return Ok(());
+        }
+        self.model.poll(now());
+        let bytes = self.model.take_outgoing();
+        if let Err(error) = self.line.send(&bytes) {
+            self.model.close(&error);
             return Ok(());
         }
         let mut buffer = [0; 4096];
@@ -156,11 +162,6 @@ impl Conversation {
                 }
             }
             Err(error) => self.model.close(&error),
-        }
-        self.model.poll(now());
-        let bytes = self.model.take_outgoing();
-        if let Err(error) = self.line.send(&bytes) {
-            self.model.close(&error);
         }
         Ok(())
     }
