@@ -13,6 +13,7 @@ mod place;
 mod riccati;
 mod synthesis;
 mod thresholds;
+mod tolerated;
 mod zero_order_hold;
 
 pub use assessment::Assessment;

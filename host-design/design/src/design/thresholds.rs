@@ -2,6 +2,7 @@
 
 use super::Design;
 use super::kalman::rounding_variances;
+use super::tolerated::Tolerated;
 use crate::rig::{PlantDescription, Rig};
 
 /// Share of the motor's force that may be missing.
@@ -48,6 +49,9 @@ pub struct MotorDesign {
 ///   `ρ̂ = Σ e p / Σ p²`, where p is the innovation caused by a completely missing force. With a healthy motor its
 ///   standard deviation is `√(S_00 / Σ p²)`; there is no verdict until that is at most 1/g of the share that may be
 ///   missing.
+///
+/// With `[robust]`, each is wider by the largest error `B` that the stated friction and wrong zeros can cause (see the
+/// source of `tolerated`). In the motor's test, `Σ e p <= B √(M Σ p²)`.
 pub fn detection_thresholds(rig: &Rig, design: &Design<f64>) -> Option<DetectionDesign> {
     let kalman = design.kalman.as_ref()?;
     let variances = kalman.innovation_variances.entries();
@@ -56,12 +60,19 @@ pub fn detection_thresholds(rig: &Rig, design: &Design<f64>) -> Option<Detection
     let tests = (2 * steps.len() + 1) as f64 * rig.limits.false_alarm_h * 3600.0 / rig.tick.period_s;
     let g = deviations(1.0 / tests);
     let keep = f64::from(1.0 - 1.0 / upright::supervision::detection::MEMORY);
-    let innovation = variances.iter().zip(steps).map(|(s, step)| g * s.sqrt() + 0.5 * step).collect();
+    let tolerated = Tolerated::of(rig, design, kalman, keep)?;
+    let wider = tolerated.lighter;
+    let innovation = (variances.iter().zip(steps).zip(&tolerated.innovation))
+        .map(|((s, step), bound)| wider * (g * s.sqrt() + bound) + 0.5 * step)
+        .collect();
     let rounding = rounding_variances(rig, steps);
-    let frozen = variances.iter().zip(steps).zip(rounding).map(|((s, step), r)| {
-        let corrected = (s - r).max(0.0) / (1.0 - keep * keep);
-        step + g * corrected.sqrt()
-    });
+    let frozen = (variances.iter().zip(steps).zip(rounding).zip(&tolerated.corrected)).map(
+        |(((s, step), r), bound)| {
+            let corrected = (s - r).max(0.0) / (1.0 - keep * keep);
+            step + wider * (g * corrected.sqrt() + bound)
+        },
+    );
+    let wrong = f64::from(upright::supervision::detection::MEMORY).sqrt() * tolerated.innovation[0];
     let motor = matches!(rig.plant, PlantDescription::Chain(_)).then(|| {
         let (ad, bd, l) = (&design.ad, &design.bd, &kalman.l_filter);
         let corrected = |row: usize| ad[(row, 0)] * (1.0 - l[(0, 0)]) - ad[(row, 1)] * l[(1, 0)];
@@ -69,7 +80,9 @@ pub fn detection_thresholds(rig: &Rig, design: &Design<f64>) -> Option<Detection
             a: [corrected(0), ad[(0, 1)], corrected(1), ad[(1, 1)]],
             b: [bd[(0, 0)], bd[(1, 0)]],
             ratio: MISSING_SHARE,
-            energy: (g / MISSING_SHARE).powi(2) * variances[0],
+            energy: (g / MISSING_SHARE).powi(2)
+                * variances[0]
+                * (wider * (1.0 + wrong / (g * variances[0].sqrt()))).powi(2),
         }
     });
     Some(DetectionDesign { deviations: g, innovation, frozen: frozen.collect(), motor })

@@ -1,0 +1,85 @@
+//! How far the innovation of a machine within the tolerances of `[robust]` can be off.
+
+use super::zero_order_hold::zero_order_hold;
+use super::{Design, Kalman, continuous_plant};
+use crate::numerics::Matrix;
+use crate::rig::{PlantDescription, Rig};
+
+/// A response is followed until it has decayed to this share of its start.
+const DECAYED: f64 = 1e-6;
+/// The longest response that is followed (ticks).
+const LONGEST: usize = 100_000;
+
+/// Bounds on what friction and wrong zeros do to the innovation.
+///
+/// The error of the prediction follows `ε⁺ = Ad (I - L C) ε + w`, whatever the law does. Dry friction is an unknown torque
+/// of at most F in each joint, and at most that force on the cart; a wrong zero δ of joint j is the constant input
+/// `(I - Ad) δ e_j`. An output whose response to a unit input is h stays within `Σ |h|` times the largest input (Dahleh and
+/// Pearson, *l¹-optimal feedback controllers for MIMO discrete-time systems*, IEEE Trans. Automatic Control 32, 1987), and
+/// the bounds of several inputs add up.
+pub(super) struct Tolerated {
+    /// Bound on each sensor's innovation (m or rad).
+    pub(super) innovation: Vec<f64>,
+    /// Bound on the sum of the observer's corrections of each sensor's position, with a memory (m or rad).
+    pub(super) corrected: Vec<f64>,
+    /// The same forces move a machine with lighter parts more, by up to this factor.
+    pub(super) lighter: f64,
+}
+
+impl Tolerated {
+    /// For the tolerances of `rig`, all 0 without `[robust]`; each tick keeps `keep` of the sum of the corrections. None if
+    /// the model has no plant.
+    pub(super) fn of(rig: &Rig, design: &Design<f64>, kalman: &Kalman<f64>, keep: f64) -> Option<Self> {
+        let sensors = kalman.steps.entries().len();
+        let mut bounds = Self { innovation: vec![0.0; sensors], corrected: vec![0.0; sensors], lighter: 1.0 };
+        let tolerances = match (&rig.robust, &rig.plant) {
+            (Some(tolerances), PlantDescription::Chain(_)) => tolerances,
+            _ => return Some(bounds),
+        };
+        bounds.lighter = 1.0 / (1.0 - 0.01 * tolerances.mass_percent);
+        let plant = continuous_plant::<f64>(rig).ok()?;
+        let states = plant.a.rows();
+        let held = |column: &Matrix<f64>| zero_order_hold(&plant.a, column, &rig.tick.period_s).1;
+        let mut inputs = vec![(held(&plant.b), tolerances.cart_friction_n)];
+        for joint in 0..plant.torque_inputs.cols() {
+            let torque = held(&plant.torque_inputs.block(0, joint, states, 1));
+            inputs.push((torque, tolerances.joint_friction_n_m));
+            let angle = 2 + 2 * joint;
+            let zero = &Matrix::identity(states) - &design.ad;
+            inputs.push((zero.block(0, angle, states, 1), tolerances.homing_error_rad));
+        }
+        let measured: Vec<usize> = rig.sensors().iter().map(|sensor| sensor.state).collect();
+        for (input, largest) in inputs.iter().filter(|(_, largest)| *largest > 0.0) {
+            bounds.add(input, *largest, design, kalman, &measured, keep);
+        }
+        Some(bounds)
+    }
+
+    /// Adds what an input of at most `largest` can do.
+    fn add(
+        &mut self,
+        input: &Matrix<f64>,
+        largest: f64,
+        design: &Design<f64>,
+        kalman: &Kalman<f64>,
+        measured: &[usize],
+        keep: f64,
+    ) {
+        let mut error = input.clone();
+        let mut sums = vec![0.0; measured.len()];
+        let end = DECAYED * input.norm();
+        for _ in 0..LONGEST {
+            let seen: Vec<f64> = measured.iter().map(|&state| error[(state, 0)]).collect();
+            let correction = &kalman.l_filter * &Matrix::column(&seen);
+            for (sensor, &state) in measured.iter().enumerate() {
+                self.innovation[sensor] += largest * seen[sensor].abs();
+                sums[sensor] = keep * sums[sensor] + correction[(state, 0)];
+                self.corrected[sensor] += largest * sums[sensor].abs();
+            }
+            error = &design.ad * &(&error - &correction);
+            if error.norm() < end {
+                break;
+            }
+        }
+    }
+}
