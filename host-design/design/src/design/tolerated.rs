@@ -12,11 +12,11 @@ const LONGEST: usize = 100_000;
 
 /// Bounds on what friction and wrong zeros do to the innovation.
 ///
-/// The error of the prediction follows `ε⁺ = Ad (I - L C) ε + w`, whatever the law does. Dry friction is an unknown torque
-/// of at most F in each joint, and at most that force on the cart; a wrong zero δ of joint j is the constant input
-/// `(I - Ad) δ e_j`. An output whose response to a unit input is h stays within `Σ |h|` times the largest input (Dahleh and
-/// Pearson, *l¹-optimal feedback controllers for MIMO discrete-time systems*, IEEE Trans. Automatic Control 32, 1987), and
-/// the bounds of several inputs add up.
+/// The error of the prediction follows `ε⁺ = Ad (I - L C) ε + w`, whatever the law does. Dry friction is an unknown
+/// torque of at most F in each joint, and at most that force on the cart; a wrong zero δ of joint j is the constant
+/// input `(I - Ad) δ e_j`. An output whose response to a unit input is h stays within `Σ |h|` times the largest input
+/// (Dahleh and Pearson, *l¹-optimal feedback controllers for MIMO discrete-time systems*, IEEE Trans. Automatic
+/// Control 32, 1987), and the bounds of several inputs add up.
 pub(super) struct Tolerated {
     /// Bound on each sensor's innovation (m or rad).
     pub(super) innovation: Vec<f64>,
@@ -27,8 +27,8 @@ pub(super) struct Tolerated {
 }
 
 impl Tolerated {
-    /// For the tolerances of `rig`, all 0 without `[robust]`; each tick keeps `keep` of the sum of the corrections. None if
-    /// the model has no plant.
+    /// For the tolerances of `rig`, all 0 without `[robust]`; each tick keeps `keep` of the sum of the corrections.
+    /// None if the model has no plant.
     pub(super) fn of(rig: &Rig, design: &Design<f64>, kalman: &Kalman<f64>, keep: f64) -> Option<Self> {
         let sensors = kalman.steps.entries().len();
         let mut bounds = Self { innovation: vec![0.0; sensors], corrected: vec![0.0; sensors], lighter: 1.0 };

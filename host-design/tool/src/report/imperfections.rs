@@ -73,8 +73,8 @@ pub(super) fn limit_cycles(source: &Source<'_>) -> Result<Figure, Unverifiable> 
     Ok(Figure::narrow(format!("{}: limit cycle over friction", rig.name)).with(panel))
 }
 
-/// Share of the combinations of wrong masses that stand, over the percentage, a curve for each law; none for a chain with
-/// too many combinations.
+/// Share of the combinations of wrong masses that stand, over the percentage, a curve for each law; none for a chain
+/// with too many combinations.
 pub(super) fn wrong_masses(source: &Source<'_>) -> Result<Option<Figure>, Unverifiable> {
     let Source { rig, table, imperfections, .. } = *source;
     if rig.states() / 2 - 1 > MOST_LINKS {

@@ -56,8 +56,8 @@ pub struct Standing {
     pub imperfection: &'static Imperfection,
     /// Size from which a run falls; none: it stands the largest one tried.
     pub falls_at: Option<f64>,
-    /// Size from which a link or the cart leaves the supervisor's limits, so that the motor is turned off; none: the largest
-    /// one tried stays within.
+    /// Size from which a link or the cart leaves the supervisor's limits, so that the motor is turned off; none: the
+    /// largest one tried stays within.
     pub leaves_limits_at: Option<f64>,
     /// Largest size tried.
     pub largest_tried: f64,
@@ -114,8 +114,8 @@ const RANGE: [f64; 2] = [1.0 / 64.0, 64.0];
 /// Sizes at which a limit cycle is shown, as shares of the one at which the loop falls.
 const SHARES: [f64; 7] = [1.0 / 32.0, 1.0 / 16.0, 0.125, 0.25, 0.5, 0.7, 0.9];
 
-/// Searches for every imperfection alone the sizes at which `law` falls and at which it leaves the limits. `done` is called
-/// after each imperfection, from any thread.
+/// Searches for every imperfection alone the sizes at which `law` falls and at which it leaves the limits. `done` is
+/// called after each imperfection, from any thread.
 ///
 /// # Errors
 /// [`Unverifiable`] for a model, and if a run cannot be started.
@@ -262,8 +262,8 @@ impl Search<'_> {
     }
 }
 
-/// The first size that is not held: from `start` by factors of 4, up if it is held and down if not, then by bisection of
-/// the logarithm to within `relative`. None if even the largest is held; the smallest if that is not.
+/// The first size that is not held: from `start` by factors of 4, up if it is held and down if not, then by bisection
+/// of the logarithm to within `relative`. None if even the largest is held; the smallest if that is not.
 ///
 /// Small plays and stiff belts take long to simulate, so the search does not begin with them.
 fn first<E>(
