@@ -11,7 +11,7 @@ pub(in crate::rig) static ROBUST: Section = Section {
     name: "robust",
     title: "[robust]",
     meaning: "tolerances that `upright robust` chooses weights, far poles and joint noise for, not with [model]; changes \
-              no gain by itself",
+              no gain by itself, but widens the thresholds of fault detection",
     absent: Absent::Follows("no tolerances"),
     keys: &[Tolerances::KEYS],
 };
