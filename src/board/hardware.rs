@@ -29,7 +29,7 @@ macro_rules! at_most_one_board {
     };
 }
 
-one_board!("weact-f405" "olimex-h405" "discovery-f407" "nucleo-f446" "in-the-loop" "in-the-loop-usart");
+one_board!("weact-f405" "olimex-h405" "feather-f405" "discovery-f407" "nucleo-f446" "in-the-loop" "in-the-loop-usart");
 
 #[cfg(not(any(feature = "in-the-loop", feature = "in-the-loop-usart")))]
 mod f4;

@@ -9,7 +9,7 @@ mod f4 {
 }
 
 use f4::boards::{ALL, BoardData, Chip, Source};
-use f4::wiring::{STANDARD, Signal, Wire};
+use f4::wiring::{STANDARD, Signal, Wire, encoders};
 use upright_tool::image::Board;
 
 const PAGE: &str = include_str!("../../docs/board.md");
@@ -53,9 +53,10 @@ fn board_row(board: &BoardData) -> String {
     });
     let led = if board.status_led_is_low { "low" } else { "high" };
     format!(
-        "| `{}` | {} | {chip} | {} MHz {} | {}, on while {led} | {} V | {} |",
+        "| `{}` | {} | {chip} | {} | {} MHz {} | {}, on while {led} | {} V | {} |",
         board.name,
         board.title,
+        encoders(board.wiring) - 1,
         board.crystal_hz / 1_000_000,
         sources.collect::<Vec<_>>().join(", else "),
         pin(&board.status_led),
@@ -72,22 +73,21 @@ fn documented<'a>(text: &'a str, name: &str) -> Vec<&'a str> {
     table.unwrap_or_else(|| panic!("docs/board.md has no table {name}")).0.trim().lines().skip(2).collect()
 }
 
-fn defined() -> Vec<String> {
-    STANDARD.iter().map(row).collect()
+fn defined(wiring: &[Wire]) -> Vec<String> {
+    wiring.iter().map(row).collect()
 }
 
 #[test]
 fn the_page_shows_the_wiring_of_the_image() {
-    assert_eq!(
-        documented(PAGE, "wiring"),
-        defined(),
-        "write src/board/f4/wiring.rs's table into docs/board.md"
-    );
+    for board in ALL {
+        let table = if board.name == "feather-f405" { "wiring of the Feather" } else { "wiring" };
+        assert_eq!(documented(PAGE, table), defined(board.wiring), "write its table into docs/board.md");
+    }
 }
 
 #[test]
 fn a_wrong_pin_on_the_page_is_noticed() {
-    assert_ne!(documented(&PAGE.replace("| PB12 |", "| PB11 |"), "wiring"), defined());
+    assert_ne!(documented(&PAGE.replace("| PB12 |", "| PB11 |"), "wiring"), defined(&STANDARD));
 }
 
 #[test]
@@ -96,4 +96,5 @@ fn the_page_shows_the_boards_of_the_image_and_the_tool_names_them() {
     assert_eq!(documented(PAGE, "boards"), boards, "write src/board/f4/boards/ into docs/board.md");
     assert_ne!(documented(&PAGE.replace("| 3 V |", "| 3.3 V |"), "boards"), boards);
     assert_eq!(ALL.map(|board| board.name), Board::ALL.map(Board::name));
+    assert_eq!(ALL.map(|board| encoders(board.wiring)), Board::ALL.map(Board::encoders));
 }

@@ -5,7 +5,7 @@
 
 use std::time::Instant;
 
-use upright_board::{Board, Conditions, Image, Input, Rules, Wire, Wiring, pin, seconds};
+use upright_board::{Board, Conditions, Image, Input, Rules, Wire, pin, seconds};
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let arguments: Vec<String> = std::env::args().collect();
@@ -24,7 +24,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     conditions.crystal.hz = value("crystal").map_or(8_000_000, |hz| hz as u32);
     conditions.lsi_hz = value("lsi").map_or(32_000, |hz| hz as u32);
     let begin = Instant::now();
-    let mut board = Board::power_on(&image, &conditions, Wiring::upright(), rules)?;
+    let mut board = Board::power_on(&image, &conditions, rules)?;
     board.skip_waiting(!has("no-skip"));
     if let Some(at) = value("stop-crystal") {
         board.at(seconds(at), Input::StopCrystal);

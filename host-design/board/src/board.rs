@@ -102,15 +102,16 @@ pub struct Board {
 }
 
 impl Conditions {
-    /// An STM32F405 with a crystal of 8 MHz, everything as it typically is.
+    /// An STM32F405 with a crystal of 8 MHz and the standard wiring, everything as it typically is.
     pub fn f405(seed: u64) -> Self {
         Self::typical(Chip::F405, seed)
     }
 
-    /// A chip with a crystal of 8 MHz, everything as it typically is.
+    /// A chip with a crystal of 8 MHz and the standard wiring, everything as it typically is.
     pub fn typical(chip: Chip, seed: u64) -> Self {
         Self {
             chip,
+            wiring: Wiring::upright(),
             crystal: Crystal { hz: 8_000_000, start: 2_000 * UNITS_PER_MICROSECOND, is_clock_input: false },
             hsi_hz: 16_000_000,
             lsi_hz: 32_000,
@@ -126,13 +127,8 @@ impl Board {
     ///
     /// # Errors
     /// [`Stopped`] if the image has no usable vectors.
-    pub fn power_on(
-        image: &Image,
-        conditions: &Conditions,
-        wiring: Wiring,
-        rules: Rules,
-    ) -> Result<Self, Stopped> {
-        let mut bus = Bus::new(conditions, wiring, rules, &image.segments);
+    pub fn power_on(image: &Image, conditions: &Conditions, rules: Rules) -> Result<Self, Stopped> {
+        let mut bus = Bus::new(conditions, rules, &image.segments);
         bus.rcc.status = POWER_FLAG | PIN_FLAG | BROWN_OUT_FLAG;
         // The internal reference of 1.21 V.
         bus.adc.inputs[17] = 1.21 / conditions.chip_v;

@@ -6,10 +6,10 @@
 //! Inputs are edges, levels, volts and bytes at their baud rate; the output is what the pins do.
 //!
 //! ```no_run
-//! use upright_board::{Board, Conditions, Image, Input, Rules, Wire, Wiring, pin, seconds};
+//! use upright_board::{Board, Conditions, Image, Input, Rules, Wire, pin, seconds};
 //!
 //! let image = Image::from_elf(&std::fs::read("upright-image")?)?;
-//! let mut board = Board::power_on(&image, &Conditions::f405(1), Wiring::upright(), Rules::NOTED)?;
+//! let mut board = Board::power_on(&image, &Conditions::f405(1), Rules::NOTED)?;
 //! board.apply(Input::Level(pin('B', 12), Wire::Low));
 //! board.apply(Input::Supply(24.0));
 //! board.run_until(seconds(0.1))?;

@@ -3,7 +3,6 @@
 use crate::bus::{Bus, Conditions};
 use crate::error::{Rules, Stopped};
 use crate::machine::Machine;
-use crate::wiring::Wiring;
 
 /// Registers as the comparison has them.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -33,7 +32,7 @@ impl Default for Stepper {
 impl Stepper {
     /// With the floating-point unit on, and unaligned accesses allowed.
     pub fn new() -> Self {
-        let mut bus = Bus::new(&Conditions::f405(1), Wiring::upright(), Rules::NOTED, &[]);
+        let mut bus = Bus::new(&Conditions::f405(1), Rules::NOTED, &[]);
         // CPACR, FPCCR without lazy stacking.
         let _ = bus.system.write(0xe000_ed88, 0x00f0_0000, 0, 1);
         bus.rules = Rules::NOTED;

@@ -17,17 +17,29 @@ pub const fn pin(letter: char, number: u8) -> Pin {
     Pin { port: letter as usize - 'A' as usize, number }
 }
 
-/// The power stage, the encoders and the supply divider.
-#[derive(Debug, Clone, PartialEq)]
+/// The power stage, the encoders, the contacts and the serial line.
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Wiring {
     /// Channels A and B of each encoder.
-    pub encoders: Vec<(Pin, Pin)>,
-    /// PWM of the power stage; channel 1 of TIM1.
+    pub encoders: &'static [(Pin, Pin)],
+    /// PWM of the power stage; channel 1 of TIM1, or its complementary output.
     pub pwm: Pin,
     /// Direction; high drives along +x.
     pub direction: Pin,
     /// Enable; high lets the power stage switch.
     pub enable: Pin,
+    /// Fault output of the power stage.
+    pub driver_fault: Pin,
+    /// Contact of the emergency stop.
+    pub emergency_stop: Pin,
+    /// Contacts of the limit switches, at the low end and at the high end.
+    pub limits: [Pin; 2],
+    /// Output that is high while a tick runs.
+    pub tick: Pin,
+    /// The serial line to the board; what comes from the board is at the same USART.
+    pub receive: Pin,
+    /// Number of its USART: 2 or 3.
+    pub usart: u8,
     /// Input of the converter that sees the supply.
     pub supply_channel: usize,
     /// Supply voltage over the voltage at that input.
@@ -36,24 +48,57 @@ pub struct Wiring {
     pub reference_v: f32,
 }
 
+const STANDARD_ENCODERS: [(Pin, Pin); 5] = [
+    (pin('A', 15), pin('B', 3)),
+    (pin('A', 0), pin('A', 1)),
+    (pin('B', 4), pin('B', 5)),
+    (pin('B', 6), pin('B', 7)),
+    (pin('C', 6), pin('C', 7)),
+];
+const FEATHER_ENCODERS: [(Pin, Pin); 2] = [(pin('C', 6), pin('C', 7)), (pin('B', 6), pin('B', 7))];
+
 impl Wiring {
-    /// The table of the README.
-    pub fn upright() -> Self {
-        Self {
-            encoders: vec![
-                (pin('A', 15), pin('B', 3)),
-                (pin('A', 0), pin('A', 1)),
-                (pin('B', 4), pin('B', 5)),
-                (pin('B', 6), pin('B', 7)),
-                (pin('C', 6), pin('C', 7)),
-            ],
+    /// The standard table of docs/board.md.
+    pub const fn upright() -> &'static Self {
+        const WIRING: Wiring = Wiring {
+            encoders: &STANDARD_ENCODERS,
             pwm: pin('A', 8),
             direction: pin('B', 14),
             enable: pin('B', 15),
+            driver_fault: pin('B', 13),
+            emergency_stop: pin('B', 12),
+            limits: [pin('C', 0), pin('C', 1)],
+            tick: pin('B', 1),
+            receive: pin('A', 3),
+            usart: 2,
             supply_channel: 12,
             supply_divider: 11.0,
             reference_v: 3.3,
-        }
+        };
+        &WIRING
+    }
+
+    /// The table of the Feather in docs/board.md.
+    pub const fn feather() -> &'static Self {
+        const WIRING: Wiring = Wiring {
+            encoders: &FEATHER_ENCODERS,
+            pwm: pin('B', 13),
+            direction: pin('B', 9),
+            enable: pin('B', 14),
+            driver_fault: pin('B', 15),
+            emergency_stop: pin('A', 6),
+            limits: [pin('C', 4), pin('C', 5)],
+            tick: pin('B', 8),
+            receive: pin('B', 11),
+            usart: 3,
+            ..*Wiring::upright()
+        };
+        &WIRING
+    }
+
+    /// Whether PWM is at the complementary output.
+    pub(crate) fn is_complementary(&self) -> bool {
+        COMPLEMENTARY_PINS.contains(&self.pwm)
     }
 }
 
@@ -83,8 +128,16 @@ pub(crate) const ENCODER_INPUTS: [(usize, usize, Pin, u32); 17] = [
 pub(crate) const BREAK_PINS: [Pin; 3] = [pin('B', 12), pin('A', 6), pin('E', 15)];
 /// Outputs of channel 1 of TIM1, with alternate function 1.
 pub(crate) const PWM_PINS: [Pin; 2] = [pin('A', 8), pin('E', 9)];
-/// TX and RX of USART2, with alternate function 7.
-pub(crate) const SERIAL_PINS: [(Pin, Pin); 2] = [(pin('A', 2), pin('A', 3)), (pin('D', 5), pin('D', 6))];
+/// Its complementary outputs, with the same function.
+pub(crate) const COMPLEMENTARY_PINS: [Pin; 3] = [pin('A', 7), pin('B', 13), pin('E', 8)];
+/// USART, TX and RX, with alternate function 7.
+pub(crate) const SERIAL_PINS: [(u8, Pin, Pin); 5] = [
+    (2, pin('A', 2), pin('A', 3)),
+    (2, pin('D', 5), pin('D', 6)),
+    (3, pin('B', 10), pin('B', 11)),
+    (3, pin('C', 10), pin('C', 11)),
+    (3, pin('D', 8), pin('D', 9)),
+];
 
 /// The pin of an input of converter 1 (datasheet, pin definitions).
 pub(crate) fn analog_pin(channel: usize) -> Option<Pin> {

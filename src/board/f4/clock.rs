@@ -3,7 +3,7 @@
 //! | clock | frequency | for |
 //! |---|---|---|
 //! | SYSCLK, HCLK | 168 MHz | core, SysTick |
-//! | PCLK1 | 42 MHz | USART2; timers 2 to 5 at 84 MHz |
+//! | PCLK1 | 42 MHz | the USART; timers 2 to 5 at 84 MHz |
 //! | PCLK2 | 84 MHz | ADC at 21 MHz; timers 1 and 8 at 168 MHz |
 //!
 //! The crystal is measured against the internal oscillator before it is used. If it has another frequency, or if
@@ -14,6 +14,7 @@ use stm32f4xx_hal::pac::{FLASH, RCC, TIM11};
 use upright::protocol::message::Reset;
 
 use super::boards::{BOARD, Source};
+use super::serial;
 
 /// Core clock (Hz).
 pub(crate) const CLOCK_HZ: u32 = 168_000_000;
@@ -49,8 +50,8 @@ pub(super) enum Clock {
 }
 
 impl Clock {
-    /// Frequency of the bus of USART2 (Hz).
-    pub(super) fn usart2_bus_hz(self) -> u32 {
+    /// Frequency of the bus of USART2 and USART3 (Hz).
+    pub(super) fn usart_bus_hz(self) -> u32 {
         match self {
             Clock::Full => CLOCK_HZ / 4,
             Clock::Fallback => INTERNAL_HZ,
@@ -65,7 +66,7 @@ pub(super) fn enable_peripherals(rcc: &RCC) {
     });
     rcc.apb1enr().modify(|_, w| {
         w.tim2en().set_bit().tim3en().set_bit().tim4en().set_bit().tim5en().set_bit();
-        w.usart2en().set_bit().pwren().set_bit()
+        w.usart2en().bit(serial::NUMBER == 2).usart3en().bit(serial::NUMBER == 3).pwren().set_bit()
     });
     rcc.apb2enr().modify(|_, w| {
         w.tim1en().set_bit().tim8en().set_bit().tim11en().set_bit().adc1en().set_bit().syscfgen().set_bit()

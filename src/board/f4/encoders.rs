@@ -4,14 +4,27 @@ use stm32f4xx_hal::pac::{TIM2, TIM3, TIM4, TIM5, TIM8};
 use upright::control::encoder::CounterWidth::{self, Bits16, Bits32};
 use upright::gains::SENSORS;
 
-/// Cart first, then the links from the lowest up; a rig with fewer sensors uses the first timers.
-const TIMERS: [(*const u32, CounterWidth); 5] = [
-    (TIM2::PTR.cast(), Bits32),
-    (TIM5::PTR.cast(), Bits32),
-    (TIM3::PTR.cast(), Bits16),
-    (TIM4::PTR.cast(), Bits16),
-    (TIM8::PTR.cast(), Bits16),
-];
+use super::boards::BOARD;
+use super::wiring::{Signal, encoders, wire_of};
+
+/// The timers in use, cart first, then the links from the lowest up.
+const TIMERS: [(*const u32, CounterWidth); SENSORS] = {
+    assert!(SENSORS <= encoders(BOARD.wiring), "this board counts fewer encoders than the rig has");
+    let mut timers = [(core::ptr::null(), Bits16); SENSORS];
+    let mut i = 0;
+    while i < SENSORS {
+        timers[i] = match wire_of(BOARD.wiring, Signal::Encoder(i as u8, b'A')).number("TIM") {
+            2 => (TIM2::PTR.cast(), Bits32),
+            3 => (TIM3::PTR.cast(), Bits16),
+            4 => (TIM4::PTR.cast(), Bits16),
+            5 => (TIM5::PTR.cast(), Bits32),
+            8 => (TIM8::PTR.cast(), Bits16),
+            _ => panic!("this timer has no encoder mode, or no clock here"),
+        };
+        i += 1;
+    }
+    timers
+};
 
 /// The counters in use.
 const COUNTERS: [*const u32; SENSORS] = {
@@ -26,7 +39,6 @@ const COUNTERS: [*const u32; SENSORS] = {
 
 /// Widths of the counters in use.
 pub(super) const WIDTHS: [CounterWidth; SENSORS] = {
-    assert!(SENSORS <= TIMERS.len(), "this board counts at most five encoders");
     let mut widths = [Bits16; SENSORS];
     let mut i = 0;
     while i < SENSORS {
@@ -45,7 +57,7 @@ const ARR: usize = 0x2c;
 
 /// Starts the counters in use, at 0.
 pub(super) fn set_up() {
-    for &(timer, width) in TIMERS.iter().take(SENSORS) {
+    for &(timer, width) in &TIMERS {
         let write = |offset, value: u32| {
             // SAFETY: a register of this timer, which nothing else uses.
             unsafe { timer.byte_add(offset).cast_mut().write_volatile(value) };

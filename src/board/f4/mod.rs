@@ -58,7 +58,7 @@ pub(crate) fn set_up<T>(
     let clock = clock::set_up(rcc, &device.FLASH, &device.TIM11);
     encoders::set_up();
     let supply = Supply::set_up(device.ADC1, &device.ADC_COMMON);
-    let line = serial::set_up(&device.USART2, device.DMA1, clock.usart2_bus_hz(), buffer);
+    let line = serial::set_up(device.DMA1, clock.usart_bus_hz(), buffer);
     guard::watch_supply(&device.PWR, &device.EXTI);
     // SAFETY: the tick's timer belongs to RTIC and stays untouched; nothing else uses the others.
     let mut core = unsafe { cortex_m::Peripherals::steal() };

@@ -16,7 +16,9 @@ use stm32f4xx_hal::pac::TIM1;
 use upright::board::Output;
 use upright::gains::TABLE;
 
+use super::boards::BOARD;
 use super::pins;
+use super::wiring::{Signal, wire_of};
 use crate::CYCLES_PER_TICK;
 
 /// Approximate PWM frequency (Hz): above hearing.
@@ -50,6 +52,12 @@ const RESTART: u32 = 20;
 
 /// OC1M = 111, PWM mode 2; OC1PE: compare values change with a restart, not within a period (17.4.7).
 const MODE: u32 = 0b111 << 4 | 1 << 3;
+/// CC1E, or CC1NE for the complementary output, which alone has the level of the channel, too (17.4.9).
+const OUTPUT: u32 = match wire_of(BOARD.wiring, Signal::Pwm).function.as_bytes() {
+    b"TIM1_CH1" => 1,
+    b"TIM1_CH1N" => 1 << 2,
+    _ => panic!("the board's PWM is not at channel 1 of timer 1"),
+};
 /// OSSI: outputs are low instead of floating while the main output is off. The break input is active high, that is, when
 /// the contact or its wire is open. LOCK level 1 keeps these settings until the next reset (17.4.18).
 const PROTECTION: u32 = 1 << 13 | 1 << 12 | 1 << 10 | 0b01 << 8;
@@ -70,7 +78,7 @@ impl Motor {
         timer.ccr1().write(|w| unsafe { w.bits(PERIOD) });
         timer.rcr().write(|w| unsafe { w.bits(PERIODS - 1) });
         timer.ccmr1_output().write(|w| unsafe { w.bits(MODE) });
-        timer.ccer().write(|w| w.cc1e().set_bit());
+        timer.ccer().write(|w| unsafe { w.bits(OUTPUT) });
         timer.bdtr().write(|w| unsafe { w.bits(PROTECTION) });
         let failed = !is_set_up(&timer);
         Self { timer, on: false, failed }
@@ -131,7 +139,7 @@ fn is_set_up(timer: &TIM1) -> bool {
     timer.arr().read().bits() == PERIOD - 1
         && timer.rcr().read().bits() == PERIODS - 1
         && timer.ccmr1_output().read().bits() == MODE
-        && timer.ccer().read().bits() == 1
+        && timer.ccer().read().bits() == OUTPUT
         && timer.bdtr().read().bits() & !MAIN_OUTPUT == PROTECTION
 }
 

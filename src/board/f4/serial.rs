@@ -1,11 +1,14 @@
-//! The serial line: USART2, 460 800 baud, 8 data bits, no parity. Both directions go to and from memory without code, so
+//! The serial line: USART2 or USART3, 460 800 baud, 8 data bits, no parity. Both directions go to and from memory without code, so
 //! no tick can be too long for a byte.
 
 use core::cell::UnsafeCell;
 
-use stm32f4xx_hal::pac::{DMA1, USART2};
+use stm32f4xx_hal::pac::{DMA1, USART2, USART3, usart1};
 use upright::protocol::BAUD;
 use upright::protocol::serial_link::MAX_MESSAGE;
+
+use super::boards::BOARD;
+use super::wiring::{Signal, wire_of};
 
 /// Received bytes that wait for the background task: more than arrive while it is not run.
 const RECEIVED: usize = 512;
@@ -25,13 +28,17 @@ impl Buffer {
     }
 }
 
-// Streams of DMA1 (RM0090, 10.3.3: channel 4 of both).
-const RECEIVE: usize = 5;
-const SEND: usize = 6;
+/// Number of the USART.
+pub(super) const NUMBER: u8 = wire_of(BOARD.wiring, Signal::Transmit).number("USART");
+const _: () = assert!(NUMBER == 2 || NUMBER == 3, "the board's serial line is not at USART2 or USART3");
+
+// Streams of DMA1 (RM0090, 10.3.3: channel 4 of all).
+const RECEIVE: usize = if NUMBER == 2 { 5 } else { 1 };
+const SEND: usize = if NUMBER == 2 { 6 } else { 3 };
 /// Channel 4, and memory addresses that count up.
-const BYTES_OF_USART2: u32 = 4 << 25 | 1 << 10;
-/// The flags of stream 6 in HIFCR.
-const SEND_FLAGS: u32 = 0x3d << 16;
+const BYTES_OF_USART: u32 = 4 << 25 | 1 << 10;
+/// The flags of stream 6 in HIFCR, or of stream 3 in LIFCR (10.5.3, 10.5.4).
+const SEND_FLAGS: u32 = if NUMBER == 2 { 0x3d << 16 } else { 0x3d << 22 };
 
 /// Both directions of the line.
 pub(crate) struct SerialLine {
@@ -42,8 +49,11 @@ pub(crate) struct SerialLine {
 }
 
 /// Enables both directions; `clock` is the frequency of the bus (Hz).
-pub(super) fn set_up(usart: &USART2, dma: DMA1, clock: u32, buffer: &'static mut Buffer) -> SerialLine {
-    let data = USART2::PTR as u32 + 4;
+pub(super) fn set_up(dma: DMA1, clock: u32, buffer: &'static mut Buffer) -> SerialLine {
+    let registers: *const usart1::RegisterBlock = if NUMBER == 2 { USART2::PTR } else { USART3::PTR };
+    // SAFETY: the registers of this USART, which nothing else uses.
+    let usart = unsafe { &*registers };
+    let data = registers as u32 + 4;
     let receive = dma.st(RECEIVE);
     // SAFETY, here and below: values of the fields of RM0090, 10.5, and addresses of memory that is only the DMA
     // controller's and this module's.
@@ -51,7 +61,7 @@ pub(super) fn set_up(usart: &USART2, dma: DMA1, clock: u32, buffer: &'static mut
     receive.m0ar().write(|w| unsafe { w.bits(buffer.received.get() as u32) });
     receive.ndtr().write(|w| unsafe { w.bits(RECEIVED as u32) });
     // Circular, from the peripheral.
-    receive.cr().write(|w| unsafe { w.bits(BYTES_OF_USART2 | 1 << 8 | 1) });
+    receive.cr().write(|w| unsafe { w.bits(BYTES_OF_USART | 1 << 8 | 1) });
     let send = dma.st(SEND);
     send.par().write(|w| unsafe { w.bits(data) });
     send.m0ar().write(|w| unsafe { w.bits(buffer.sent.get() as u32) });
@@ -93,10 +103,14 @@ impl SerialLine {
         let send = self.dma.st(SEND);
         // SAFETY: values of the fields of RM0090, 10.5; the stream is off.
         unsafe {
-            self.dma.hifcr().write(|w| w.bits(SEND_FLAGS));
+            if NUMBER == 2 {
+                self.dma.hifcr().write(|w| w.bits(SEND_FLAGS));
+            } else {
+                self.dma.lifcr().write(|w| w.bits(SEND_FLAGS));
+            }
             send.ndtr().write(|w| w.bits(length as u32));
             // To the peripheral.
-            send.cr().write(|w| w.bits(BYTES_OF_USART2 | 1 << 6 | 1));
+            send.cr().write(|w| w.bits(BYTES_OF_USART | 1 << 6 | 1));
         }
     }
 }

@@ -16,8 +16,7 @@ pub(crate) struct Wire {
     pub(crate) mode: Mode,
     /// Whether the pin is pulled to 3.3 V inside the microcontroller (about 40 kΩ).
     pub(crate) pull_up: bool,
-    /// The peripheral behind the pin.
-    #[cfg_attr(target_os = "none", allow(dead_code, reason = "for the table of the documentation"))]
+    /// The peripheral behind the pin, which says which timer and which USART are used.
     pub(crate) function: &'static str,
 }
 
@@ -25,6 +24,11 @@ impl Wire {
     /// Base address of the registers of its port (RM0090, 2.3).
     pub(crate) const fn port_base(self) -> usize {
         0x4002_0000 + 0x400 * (self.port - b'A') as usize
+    }
+
+    /// The digit behind `name` in its function: 3 for `TIM` in `TIM3_CH1`.
+    pub(crate) const fn number(self, name: &str) -> u8 {
+        self.function.as_bytes()[name.len()] - b'0'
     }
 }
 
@@ -119,6 +123,18 @@ pub(crate) const STANDARD: [Wire; 21] = [
     output(Signal::Tick, b'B', 1),
 ];
 
+/// How many encoders a board counts.
+pub(crate) const fn encoders(wiring: &[Wire]) -> usize {
+    let (mut count, mut i) = (0, 0);
+    while i < wiring.len() {
+        if let Signal::Encoder(_, b'A') = wiring[i].signal {
+            count += 1;
+        }
+        i += 1;
+    }
+    count
+}
+
 /// The wire of a signal; a board without it does not compile.
 pub(crate) const fn wire_of(wiring: &[Wire], signal: Signal) -> Wire {
     let mut i = 0;
@@ -148,6 +164,13 @@ pub(crate) const fn output(signal: Signal, port: u8, pin: u8) -> Wire {
 }
 
 /// An input with the pull-up that open-collector encoders need at the least.
-const fn encoder(sensor: u8, channel: u8, port: u8, pin: u8, number: u8, function: &'static str) -> Wire {
+pub(crate) const fn encoder(
+    sensor: u8,
+    channel: u8,
+    port: u8,
+    pin: u8,
+    number: u8,
+    function: &'static str,
+) -> Wire {
     wire(Signal::Encoder(sensor, channel), port, pin, Mode::Alternate(number), true, function)
 }

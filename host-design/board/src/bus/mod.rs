@@ -43,6 +43,8 @@ pub struct Driven {
 pub struct Conditions {
     /// The chip.
     pub chip: Chip,
+    /// What is connected to it.
+    pub wiring: &'static Wiring,
     /// The clock at HSE.
     pub crystal: Crystal,
     /// What the internal oscillator of nominally 16 MHz has (Hz).
@@ -85,7 +87,7 @@ pub(crate) struct Bus {
     pub(crate) rules: Rules,
     pub(crate) notes: Vec<Note>,
     pub(crate) chip: Chip,
-    pub(crate) wiring: Wiring,
+    pub(crate) wiring: &'static Wiring,
     pub(crate) noise: u64,
     pub(crate) flash: Vec<u8>,
     pub(crate) sram: Vec<u8>,
@@ -121,13 +123,8 @@ pub(crate) struct Bus {
 }
 
 impl Bus {
-    pub(crate) fn new(
-        conditions: &Conditions,
-        wiring: Wiring,
-        rules: Rules,
-        image: &[(u32, Vec<u8>)],
-    ) -> Self {
-        let chip = conditions.chip;
+    pub(crate) fn new(conditions: &Conditions, rules: Rules, image: &[(u32, Vec<u8>)]) -> Self {
+        let Conditions { chip, wiring, .. } = *conditions;
         let mut noise = conditions.seed | 1;
         let mut random = |bytes: usize| (0..bytes).map(|_| next_noise(&mut noise) as u8).collect::<Vec<_>>();
         let (sram, core_coupled) = (random(128 << 10), random(chip.core_coupled_bytes()));
@@ -163,13 +160,13 @@ impl Bus {
             debug_freeze: DebugFreeze::default(),
             ports: (0..PORTS as u8).map(|i| Port::new(b'A' + i)).collect(),
             exti: Exti::default(),
-            pwm: PwmTimer::new(),
+            pwm: PwmTimer::new(wiring.is_complementary()),
             encoders: [true, false, false, true, false].map(EncoderTimer::new),
             shafts,
             capture: CaptureTimer::new(),
             adc: Adc::default(),
             usart: Usart::new(),
-            dma: Dma::default(),
+            dma: Dma::of_usart(wiring.usart),
             iwdg: Iwdg::new(conditions.lsi_hz),
             power: Power::new(chip, conditions.chip_v, conditions.brown_out),
             driven: Driven::default(),
@@ -199,7 +196,7 @@ impl Bus {
         self.capture = CaptureTimer::new();
         self.adc.reset();
         self.usart.reset();
-        self.dma = Dma::default();
+        self.dma = Dma::of_usart(self.wiring.usart);
         self.iwdg.reset();
         self.power.reset();
         self.debug_freeze = DebugFreeze { halted: self.debug_freeze.halted, ..DebugFreeze::default() };
@@ -278,9 +275,10 @@ impl Bus {
 
     /// Interrupt lines and the next deadline, after anything has changed.
     pub(crate) fn refresh(&mut self) {
-        self.system.nvic.line(38, self.usart.interrupt());
-        self.system.nvic.line(16, self.dma.interrupt(crate::peripherals::dma::RECEIVE));
-        self.system.nvic.line(17, self.dma.interrupt(crate::peripherals::dma::TRANSMIT));
+        self.system.nvic.line(36 + usize::from(self.wiring.usart), self.usart.interrupt());
+        for (interrupt, high) in self.dma.interrupts() {
+            self.system.nvic.line(interrupt, high);
+        }
         for (interrupt, high) in self.exti.interrupts() {
             self.system.nvic.line(interrupt, high);
         }
@@ -298,18 +296,18 @@ impl Bus {
     }
 
     fn move_by_dma(&mut self) {
-        use crate::peripherals::dma::{RECEIVE, TRANSMIT};
-        if let Some(address) = self.dma.next(RECEIVE).filter(|_| self.usart.wants_fetch()) {
+        let (receive, transmit) = self.dma.serial();
+        if let Some(address) = self.dma.next(receive).filter(|_| self.usart.wants_fetch()) {
             let byte = self.usart.fetch();
             self.poke(address, byte);
-            self.dma.moved(RECEIVE);
+            self.dma.moved(receive);
         }
         while self.usart.wants_byte() {
-            let Some(address) = self.dma.next(TRANSMIT) else { break };
+            let Some(address) = self.dma.next(transmit) else { break };
             let byte = self.peek(address & !3).unwrap_or(0).to_le_bytes()[address as usize & 3];
             let apb1 = self.rcc.pclk(crate::peripherals::rcc::Domain::Apb1);
             self.usart.transmit(byte, self.now, apb1);
-            self.dma.moved(TRANSMIT);
+            self.dma.moved(transmit);
         }
     }
 

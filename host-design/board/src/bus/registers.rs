@@ -30,13 +30,14 @@ enum Place {
     Debug,
 }
 
-/// The peripheral and its base.
-fn place(address: u32) -> Option<(Place, u32)> {
+/// The peripheral and its base; of the USARTs, there is that of the serial line.
+fn place(address: u32, usart: u8) -> Option<(Place, u32)> {
     let block = address & !0x3ff;
     let found = match block {
         0x4000_0000..=0x4000_0c00 => (Place::Encoder((block as usize >> 10) & 3), block),
         0x4000_3000 => (Place::Iwdg, block),
-        0x4000_4400 => (Place::Usart, block),
+        0x4000_4400 if usart == 2 => (Place::Usart, block),
+        0x4000_4800 if usart == 3 => (Place::Usart, block),
         0x4000_7000 => (Place::Power, block),
         0x4001_0000 => (Place::Pwm, block),
         0x4001_0400 => (Place::Encoder(4), block),
@@ -55,11 +56,11 @@ fn place(address: u32) -> Option<(Place, u32)> {
 }
 
 /// The bit that gives a peripheral its clock (7.3.10 to 7.3.14).
-fn clock(place: Place) -> Option<(Domain, u32)> {
+fn clock(place: Place, usart: u8) -> Option<(Domain, u32)> {
     Some(match place {
         Place::Encoder(4) => (Domain::Apb2, 1),
         Place::Encoder(i) => (Domain::Apb1, i as u32),
-        Place::Usart => (Domain::Apb1, 17),
+        Place::Usart => (Domain::Apb1, 15 + u32::from(usart)),
         Place::Power => (Domain::Apb1, 28),
         Place::Pwm => (Domain::Apb2, 0),
         Place::Adc => (Domain::Apb2, 8),
@@ -88,7 +89,7 @@ impl Bus {
         if address >> 20 == 0xe00 && address & !0x3ff != 0xe004_2000 {
             return self.read_system(address, bytes);
         }
-        let Some((place, base)) = place(address) else {
+        let Some((place, base)) = place(address, self.wiring.usart) else {
             return Err(self.nothing_at(address, Violation::Unmapped(address)));
         };
         if self.now >= self.deadline {
@@ -119,7 +120,7 @@ impl Bus {
             }
             return self.write_system(address, bytes, value);
         }
-        let Some((place, base)) = place(address) else {
+        let Some((place, base)) = place(address, self.wiring.usart) else {
             return Err(self.nothing_at(address, Violation::Unmapped(address)));
         };
         if self.now >= self.deadline {
@@ -183,7 +184,7 @@ impl Bus {
 
     /// Whether the peripheral's clock runs long enough; without clock the run ends.
     fn has_clock(&mut self, place: Place, address: u32) -> Result<bool, Trap> {
-        let Some((domain, bit)) = clock(place) else { return Ok(true) };
+        let Some((domain, bit)) = clock(place, self.wiring.usart) else { return Ok(true) };
         let Some(at) = self.rcc.usable_at(domain, bit) else {
             return Err(Violation::NoClock(address).into());
         };

@@ -5,7 +5,7 @@ use crate::clock::Time;
 use crate::peripherals::encoder_timer::Shaft;
 use crate::peripherals::gpio::Wire;
 use crate::peripherals::rcc::Domain;
-use crate::wiring::{BREAK_PINS, ENCODER_INPUTS, PWM_PINS, Pin, SERIAL_PINS};
+use crate::wiring::{BREAK_PINS, COMPLEMENTARY_PINS, ENCODER_INPUTS, PWM_PINS, Pin, SERIAL_PINS};
 
 impl Bus {
     /// The shaft whose signals reach a timer, and the period of that timer.
@@ -42,16 +42,17 @@ impl Bus {
 
     /// Whether TX and RX are at pins.
     pub(super) fn serial_connected(&self) -> (bool, bool) {
-        let any = |choose: fn(&(Pin, Pin)) -> Pin| {
-            SERIAL_PINS.iter().any(|pins| self.is_alternate(choose(pins), 7))
+        let any = |choose: fn(&(u8, Pin, Pin)) -> Pin| {
+            let of_usart = |pins: &&(u8, Pin, Pin)| pins.0 == self.wiring.usart;
+            SERIAL_PINS.iter().filter(of_usart).any(|pins| self.is_alternate(choose(pins), 7))
         };
-        (any(|pins| pins.0), any(|pins| pins.1))
+        (any(|pins| pins.1), any(|pins| pins.2))
     }
 
     /// Levels that the timer gives to the pins of a port.
     pub(super) fn alternate_levels(&self, port: usize) -> u32 {
-        PWM_PINS
-            .iter()
+        let pins: &[Pin] = if self.wiring.is_complementary() { &COMPLEMENTARY_PINS } else { &PWM_PINS };
+        pins.iter()
             .filter(|pin| pin.port == port && self.is_alternate(**pin, 1) && self.pwm.level())
             .fold(0, |levels, pin| levels | 1 << pin.number)
     }

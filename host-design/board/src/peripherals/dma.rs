@@ -1,4 +1,4 @@
-//! Controller 1, streams 5 and 6 (RM0090, 10.5): bytes from and to USART2.
+//! Controller 1 (RM0090, 10.5): bytes from and to the USART of the serial line.
 
 use super::Bits;
 use crate::error::Violation;
@@ -20,24 +20,44 @@ struct Stream {
 }
 
 /// Streams 0 to 7 and their flags.
-#[derive(Debug, Clone, Default)]
+#[derive(Debug, Clone)]
 pub(crate) struct Dma {
     streams: [Stream; 8],
     flags: [u32; 2],
+    requests: Requests,
 }
+
+/// Which streams a USART's requests go to, all by channel 4 (10.3.3), and its data register.
+#[derive(Debug, Clone, Copy)]
+struct Requests {
+    receive: usize,
+    transmit: usize,
+    data: u32,
+}
+
+const USART2: Requests = Requests { receive: 5, transmit: 6, data: 0x4000_4404 };
+const USART3: Requests = Requests { receive: 1, transmit: 3, data: 0x4000_4804 };
+const CHANNEL: u32 = 4;
+/// Interrupts of streams 0 to 6 (12.2).
+const FIRST_INTERRUPT: usize = 11;
 
 /// Position of a stream's flags in LISR or HISR.
 fn place(stream: usize) -> (usize, u32) {
     (stream / 4, [0, 6, 16, 22][stream % 4])
 }
 
-/// USART2_RX and USART2_TX are channel 4 of these (10.3.3).
-pub(crate) const RECEIVE: usize = 5;
-pub(crate) const TRANSMIT: usize = 6;
-const CHANNEL: u32 = 4;
-const USART2_DATA: u32 = 0x4000_4404;
-
 impl Dma {
+    /// After a reset, for the USART of this number.
+    pub(crate) fn of_usart(number: u8) -> Self {
+        let requests = if number == 3 { USART3 } else { USART2 };
+        Self { streams: Default::default(), flags: [0; 2], requests }
+    }
+
+    /// The streams that receive and transmit.
+    pub(crate) fn serial(&self) -> (usize, usize) {
+        (self.requests.receive, self.requests.transmit)
+    }
+
     pub(crate) fn bits(offset: u32) -> Option<Bits> {
         let flags = 0x0f7d_0f7d;
         Some(match offset {
@@ -89,7 +109,7 @@ impl Dma {
                     if self.flags[flags.0] >> flags.1 & 0x3d != 0 {
                         return Err(Violation::Forbidden("a stream starts with flags still set (10.3.17)"));
                     }
-                    stream.check(number, value)?;
+                    stream.check(self.requests, number, value)?;
                     stream.length = stream.left;
                 }
                 stream.control = value;
@@ -131,8 +151,13 @@ impl Dma {
         }
     }
 
-    /// Whether the interrupt's line is high.
-    pub(crate) fn interrupt(&self, number: usize) -> bool {
+    /// Numbers of its interrupts, and whether each line is high.
+    pub(crate) fn interrupts(&self) -> [(usize, bool); 2] {
+        [self.requests.receive, self.requests.transmit]
+            .map(|stream| (FIRST_INTERRUPT + stream, self.interrupt(stream)))
+    }
+
+    fn interrupt(&self, number: usize) -> bool {
         let (word, at) = place(number);
         let flags = self.flags[word] >> at;
         let control = self.streams[number].control;
@@ -141,15 +166,17 @@ impl Dma {
 }
 
 impl Stream {
-    /// Bytes between USART2 and memory, in the right direction.
-    fn check(&self, number: usize, control: u32) -> Result<(), Violation> {
+    /// Bytes between the USART and memory, in the right direction.
+    fn check(&self, requests: Requests, number: usize, control: u32) -> Result<(), Violation> {
         let direction = control >> 6 & 3;
-        let expected = match number {
-            RECEIVE => 0,
-            TRANSMIT => 1,
-            _ => return Err(Violation::NotModelled("this DMA stream")),
+        let expected = if number == requests.receive {
+            0
+        } else if number == requests.transmit {
+            1
+        } else {
+            return Err(Violation::NotModelled("this DMA stream"));
         };
-        if control >> 25 & 7 != CHANNEL || direction != expected || self.peripheral != USART2_DATA {
+        if control >> 25 & 7 != CHANNEL || direction != expected || self.peripheral != requests.data {
             return Err(Violation::NotModelled("this DMA request"));
         }
         if control & 0x7800 != 0 || control & (1 << 18 | 1 << 9 | 1 << 5) != 0 {

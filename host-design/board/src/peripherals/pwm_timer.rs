@@ -1,4 +1,5 @@
-//! Timer 1, channel 1 (RM0090, 17.4): PWM in one-pulse mode with repetition counter, break input, and its pin.
+//! Timer 1, channel 1 (RM0090, 17.4): PWM in one-pulse mode with repetition counter, break input, and one pin: that of
+//! the channel or that of its complementary output.
 
 use super::Bits;
 use crate::clock::Time;
@@ -13,6 +14,8 @@ const BREAK_FLAG: u32 = 1 << 7;
 /// Registers, their active copies, and the counter.
 #[derive(Debug, Clone)]
 pub(crate) struct PwmTimer {
+    /// The pin is that of the complementary output.
+    is_complementary: bool,
     control: u32,
     control2: u32,
     status: u32,
@@ -41,8 +44,9 @@ pub(crate) struct PwmTimer {
 }
 
 impl PwmTimer {
-    pub(crate) fn new() -> Self {
+    pub(crate) fn new(is_complementary: bool) -> Self {
         Self {
+            is_complementary,
             control: 0,
             control2: 0,
             status: 0,
@@ -69,7 +73,7 @@ impl PwmTimer {
 
     pub(crate) fn reset(&mut self, now: Time) {
         let old = self.clone();
-        *self = Self::new();
+        *self = Self::new(old.is_complementary);
         (self.high, self.synced, self.break_level) = (old.high, now, old.break_level);
         self.break_ignored = old.break_ignored;
     }
@@ -143,7 +147,8 @@ impl PwmTimer {
                 }
                 self.mode = value;
             }
-            0x20 if value & !3 == 0 => self.outputs = value,
+            // One of both outputs: the other one's influence is not modelled.
+            0x20 if value & !(3 * self.output()) == 0 => self.outputs = value,
             0x24 => self.count = value,
             0x28 => self.prescaler = value,
             0x2c => {
@@ -233,20 +238,30 @@ impl PwmTimer {
         }
     }
 
+    /// The bit that enables the output: CC1E or CC1NE; the next one inverts it. By itself, the complementary output has
+    /// the reference's level, not its complement (17.4.9).
+    fn output(&self) -> u32 {
+        if self.is_complementary { 1 << 2 } else { 1 }
+    }
+
+    fn is_inverted(&self) -> bool {
+        self.outputs & (2 * self.output()) != 0
+    }
+
     /// Whether the pin is high while the reference is.
     fn driven(&self) -> bool {
-        self.protection & MAIN_OUTPUT != 0 && self.outputs & 1 != 0
+        self.protection & MAIN_OUTPUT != 0 && self.outputs & self.output() != 0
     }
 
     fn level_at(&self, count: u32) -> bool {
         if self.driven() {
-            self.reference(count) != (self.outputs & 2 != 0)
+            self.reference(count) != self.is_inverted()
         } else {
             // Idle level, if OSSI drives it; else the resistor to ground.
             self.protection & MAIN_OUTPUT == 0
                 && self.protection & 1 << 10 != 0
-                && self.outputs & 1 != 0
-                && self.control2 & 1 << 8 != 0
+                && self.outputs & self.output() != 0
+                && self.control2 & if self.is_complementary { 1 << 9 } else { 1 << 8 } != 0
         }
     }
 
@@ -318,6 +333,6 @@ impl PwmTimer {
             5 => to - from,
             _ => 0,
         };
-        if self.outputs & 2 != 0 { to - from - high } else { high }
+        if self.is_inverted() { to - from - high } else { high }
     }
 }

@@ -1,4 +1,4 @@
-//! USART2 (RM0090, 30.6): bytes at their baud rate, both ways.
+//! USART2 or USART3 (RM0090, 30.6): bytes at their baud rate, both ways.
 
 use std::collections::VecDeque;
 

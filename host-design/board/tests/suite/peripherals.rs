@@ -3,7 +3,7 @@
 use crate::program::{Code, FOREVER, LOG, NOP, RETURN, WFI, appended, board, clocks_on, image, logged};
 use upright_board::{
     Board, Conditions, Input, Rules, Time, UNITS_PER_MICROSECOND as US, UNITS_PER_SECOND, Violation, Wire,
-    Wiring, pin,
+    pin,
 };
 
 const TIM1: u32 = 0x4001_0000;
@@ -293,8 +293,7 @@ fn the_crystal_can_be_measured_against_the_internal_oscillator() {
     for (hz, clocks) in [(8_000_000, 400), (12_000_000, 267), (16_000_000, 200)] {
         let mut conditions = Conditions::f405(1);
         conditions.crystal.hz = hz;
-        let mut board =
-            Board::power_on(&image(&main, &[]), &conditions, Wiring::upright(), Rules::STRICT).unwrap();
+        let mut board = Board::power_on(&image(&main, &[]), &conditions, Rules::STRICT).unwrap();
         board.run_until(20_000 * US).unwrap();
         let between = logged(&board, 5).wrapping_sub(logged(&board, 4)) & 0xffff;
         let turns = (between + clocks / 2) / clocks;
@@ -327,8 +326,7 @@ fn memory_is_random_at_power_on_and_stays_over_a_reset() {
     let main = Code::new().raw(&[NOP]);
     let word = |seed| {
         let conditions = Conditions::f405(seed);
-        let board =
-            Board::power_on(&image(&main, &[]), &conditions, Wiring::upright(), Rules::STRICT).unwrap();
+        let board = Board::power_on(&image(&main, &[]), &conditions, Rules::STRICT).unwrap();
         board.word(0x2000_8000).unwrap()
     };
     assert_ne!(word(1), word(2));

@@ -1,6 +1,6 @@
 //! Small programs for the board, put together from instructions.
 
-use upright_board::{Board, Conditions, Image, Rules, Stopped, Wiring};
+use upright_board::{Board, Conditions, Image, Rules, Stopped};
 
 /// End of the stack of every program.
 pub(crate) const STACK: u32 = 0x2000_2000;
@@ -95,8 +95,7 @@ pub(crate) fn image(main: &Code, handlers: &[(usize, Code)]) -> Image {
 
 /// A board with this program.
 pub(crate) fn board(main: &Code, handlers: &[(usize, Code)], rules: Rules) -> Board {
-    Board::power_on(&image(main, handlers), &Conditions::f405(7), Wiring::upright(), rules)
-        .expect("good vectors")
+    Board::power_on(&image(main, handlers), &Conditions::f405(7), rules).expect("good vectors")
 }
 
 /// Runs a program for some microseconds.

@@ -57,7 +57,7 @@ pub(super) fn attempt(setup: &Setup<'_>, trial: &Trial, with_defect: bool) -> Re
     let conditions = trial.kind.conditions(trial, conditions);
     let broken = trial.kind.at_power_up(trial, setup.guards);
     let mut target = VirtualBoard::start_with(image, &conditions, table, &broken)?;
-    attempt.board = Some(OnBoard { image, events: target.events() });
+    attempt.board = Some(OnBoard { image, receive: conditions.wiring.receive, events: target.events() });
     let mut observed = attempt.run(&mut target)?;
     observed.stop_to_off_us = target.stop_to_off().map(|time| time as f64 / UNITS_PER_MICROSECOND as f64);
     Ok(observed)
@@ -66,6 +66,7 @@ pub(super) fn attempt(setup: &Setup<'_>, trial: &Trial, with_defect: bool) -> Re
 /// The way to a board's own defects.
 struct OnBoard<'a> {
     image: &'a upright_board::Image,
+    receive: upright_board::Pin,
     events: Events,
 }
 
@@ -178,7 +179,8 @@ impl Attempt<'_> {
                 harness.session.sabotage(fault);
             }
             if let Some(board) = &self.board {
-                board.events.borrow_mut().extend(self.trial.kind.events(self.trial, self.table, board.image));
+                let events = self.trial.kind.events(self.trial, self.table, board.image, board.receive);
+                board.events.borrow_mut().extend(events);
             }
             if self.trial.kind == Kind::HostDeaf {
                 harness.session.stop_reading()?;

@@ -3,7 +3,7 @@
 
 use rand::RngExt;
 use upright_board::{
-    Chip, Conditions, Image, Input, Time, UNITS_PER_MICROSECOND as US, UNITS_PER_SECOND, Wire, pin,
+    Chip, Conditions, Image, Input, Pin, Time, UNITS_PER_MICROSECOND as US, UNITS_PER_SECOND, Wire,
 };
 
 use super::defect::Kind;
@@ -68,8 +68,14 @@ impl Kind {
         matches!(self, Kind::CrystalMissing | Kind::CrystalWrong | Kind::ChipWrong | Kind::WriteLost)
     }
 
-    /// What happens in the first tick of the defect.
-    pub(super) fn events(self, trial: &Trial, table: &TableValues, image: &Image) -> Vec<Event> {
+    /// What happens in the first tick of the defect, to a board that hears the host at the pin `receive`.
+    pub(super) fn events(
+        self,
+        trial: &Trial,
+        table: &TableValues,
+        image: &Image,
+        receive: Pin,
+    ) -> Vec<Event> {
         let mut random = trial.random();
         let tick = (f64::from(table.tick_s) * UNITS_PER_SECOND as f64) as Time;
         let at = |after: Time, input: Input| Event::Input { after, input };
@@ -94,7 +100,7 @@ impl Kind {
                 let volts = 2.0 + 0.6 * trial.size as f32;
                 vec![at(anywhere, Input::ChipSupply(volts)), at(anywhere + DIP, Input::ChipSupply(3.3))]
             }
-            Kind::HostWireOpen => vec![at(0, Input::Level(pin('A', 3), Wire::Open)), Event::CutLine],
+            Kind::HostWireOpen => vec![at(0, Input::Level(receive, Wire::Open)), Event::CutLine],
             Kind::LineNoise => {
                 let bauds = [9_600, 57_600, 115_200, 460_800, 500_000, 1_000_000];
                 let mut bytes = |count: usize| (0..count).map(|_| random.random()).collect::<Vec<u8>>();

@@ -1,6 +1,6 @@
 //! The boards by name. What each of them is stands in the firmware: `src/board/f4/boards/`.
 
-use upright_board::{Chip, Conditions};
+use upright_board::{Chip, Conditions, Wiring};
 
 /// A board that there is an image for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -9,6 +9,8 @@ pub enum Board {
     WeactF405,
     /// Olimex STM32-H405.
     OlimexH405,
+    /// Adafruit Feather STM32F405 Express.
+    FeatherF405,
     /// ST STM32F407G-DISC1.
     DiscoveryF407,
     /// ST NUCLEO-F446RE.
@@ -17,13 +19,15 @@ pub enum Board {
 
 impl Board {
     /// All boards; the first one is the default.
-    pub const ALL: [Self; 4] = [Self::WeactF405, Self::OlimexH405, Self::DiscoveryF407, Self::NucleoF446];
+    pub const ALL: [Self; 5] =
+        [Self::WeactF405, Self::OlimexH405, Self::FeatherF405, Self::DiscoveryF407, Self::NucleoF446];
 
     /// Name on the command line, and of the cargo feature.
     pub const fn name(self) -> &'static str {
         match self {
             Board::WeactF405 => "weact-f405",
             Board::OlimexH405 => "olimex-h405",
+            Board::FeatherF405 => "feather-f405",
             Board::DiscoveryF407 => "discovery-f407",
             Board::NucleoF446 => "nucleo-f446",
         }
@@ -32,9 +36,17 @@ impl Board {
     /// Name of its microcontroller in probe-rs.
     pub const fn chip(self) -> &'static str {
         match self {
-            Board::WeactF405 | Board::OlimexH405 => "STM32F405RGTx",
+            Board::WeactF405 | Board::OlimexH405 | Board::FeatherF405 => "STM32F405RGTx",
             Board::DiscoveryF407 => "STM32F407VGTx",
             Board::NucleoF446 => "STM32F446RETx",
+        }
+    }
+
+    /// How many encoders it counts: the cart's and those of the links.
+    pub const fn encoders(self) -> usize {
+        match self {
+            Board::FeatherF405 => 2,
+            Board::WeactF405 | Board::OlimexH405 | Board::DiscoveryF407 | Board::NucleoF446 => 5,
         }
     }
 
@@ -43,6 +55,10 @@ impl Board {
         let mut conditions = Conditions::f405(seed);
         match self {
             Board::WeactF405 | Board::OlimexH405 => {}
+            Board::FeatherF405 => {
+                conditions.wiring = Wiring::feather();
+                conditions.crystal.hz = 12_000_000;
+            }
             Board::DiscoveryF407 => (conditions.chip, conditions.chip_v) = (Chip::F407, 3.0),
             Board::NucleoF446 => {
                 conditions.chip = Chip::F446;

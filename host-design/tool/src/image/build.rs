@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 use super::board::Board;
 use super::compiler::{Compiler, compiler, target_directory};
 use crate::project::{NoCheckout, checkout};
+use upright::gains::SENSORS;
 use upright_design::rig::Rig;
 use upright_design::table::{TableValues, WriteError, gains_source, write_atomically};
 
@@ -45,6 +46,14 @@ pub enum ImageError {
          `apt-get install lld rustc-web cargo-web rust-web-src`"
     )]
     NoCompiler,
+    /// The board has too few timers.
+    #[error("{board} counts {} encoders, and this rig has {needed}: take another board (docs/board.md)", board.encoders())]
+    Encoders {
+        /// Which board.
+        board: Board,
+        /// Sensors of the rig.
+        needed: usize,
+    },
     /// There is no source to build from.
     #[error(transparent)]
     NoCheckout(#[from] NoCheckout),
@@ -72,6 +81,7 @@ pub enum ImageError {
 /// # Errors
 /// [`ImageError`] if there is no compiler, or it fails.
 pub fn build(kind: Kind) -> Result<PathBuf, ImageError> {
+    check_encoders(kind, SENSORS)?;
     compile(kind, None, kind.feature())
 }
 
@@ -103,6 +113,7 @@ pub fn if_possible(built: Result<PathBuf, ImageError>) -> Result<Option<PathBuf>
 /// # Errors
 /// As for [`build`].
 pub fn build_for(kind: Kind, rig: &Rig, table: &TableValues) -> Result<PathBuf, ImageError> {
+    check_encoders(kind, table.sensors())?;
     let source = gains_source(rig, table);
     // An included file cannot have module documentation.
     let included = source.lines().filter(|line| !line.starts_with("//!")).collect::<Vec<_>>().join("\n");
@@ -116,6 +127,13 @@ pub fn build_for(kind: Kind, rig: &Rig, table: &TableValues) -> Result<PathBuf, 
         write_atomically(&gains, included.as_bytes())?;
     }
     compile(kind, Some(&gains), &name)
+}
+
+fn check_encoders(kind: Kind, needed: usize) -> Result<(), ImageError> {
+    match kind {
+        Kind::Board(board) if needed > board.encoders() => Err(ImageError::Encoders { board, needed }),
+        _ => Ok(()),
+    }
 }
 
 /// Waits until nobody else compiles an image, and keeps others waiting until the file is dropped. The compiler writes

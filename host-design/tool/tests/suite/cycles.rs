@@ -1,7 +1,7 @@
 //! What a tick of the flashed image costs, on the virtual board.
 
 use upright::table::Law;
-use upright_board::{Board as VirtualBoard, Conditions, Image, Rules, Wiring};
+use upright_board::{Board as VirtualBoard, Conditions, Image, Rules};
 use upright_design::design::design;
 use upright_design::rig::Rig;
 use upright_design::simulate::Scenario;
@@ -45,8 +45,7 @@ fn beyond(cycles: &Cycles) -> Vec<&'static str> {
 /// The image with a wait of `turns` turns before each tick: SysTick's vector leads to a loop behind the image.
 fn slower(image: &Image, turns: u16) -> Image {
     const SYS_TICK: u32 = 0x0800_0000 + 4 * 15;
-    let board =
-        VirtualBoard::power_on(image, &Conditions::f405(1), Wiring::upright(), Rules::STRICT).unwrap();
+    let board = VirtualBoard::power_on(image, &Conditions::f405(1), Rules::STRICT).unwrap();
     let handler = board.word(SYS_TICK).unwrap();
     let at = (0x0800_0000 + image.end() as u32).next_multiple_of(16);
     let [low, high] = turns.to_le_bytes();

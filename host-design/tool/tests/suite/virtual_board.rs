@@ -4,9 +4,12 @@
 use std::path::Path;
 
 use upright::gains::RIG_HASH;
+use upright::protocol::message::Request;
+use upright::supervision::fault::Fault;
 use upright::table::Law;
-use upright_board::{Conditions, Image};
+use upright_board::{Chip, Conditions, Crystal, Image, pin};
 use upright_design::design::design;
+use upright_design::harness::{Pins, Session};
 use upright_design::rig::{Integral, Rig};
 use upright_design::simulate::Scenario;
 use upright_design::swing_up::{Stored, hangs, motions, up_and_down, with_motions};
@@ -106,4 +109,50 @@ fn motor_delay_and_integral_action_give_the_bits_of_the_host() {
         assert!(recording.summary.fall.is_none() && recording.fault.is_none(), "{law:?}: {recording:?}");
         assert!(ticks > 2_000 && messages > 200, "{law:?}: {ticks} {messages}");
     }
+}
+
+/// The image for the Feather, which counts a single link; none without a compiler.
+fn feather() -> Option<(Rig, TableValues, Image)> {
+    let rig = Rig::from_path("../../rigs/single-quanser-ip02.toml".as_ref()).unwrap();
+    let table = TableValues::of(&rig, &design(&rig).unwrap(), Gains::Sampled).unwrap();
+    let elf = if_possible(build_for(Kind::Board(Board::FeatherF405), &rig, &table)).unwrap()?;
+    Some((rig, table, Image::from_elf(&std::fs::read(elf).unwrap()).unwrap()))
+}
+
+/// The board with its own pins: PWM at a complementary output, another USART, sixteen-bit counters for the cart.
+#[test]
+fn the_feather_balances_a_link_with_the_bits_of_the_host_and_refuses_another_chip_or_crystal() {
+    let Some((rig, table, image)) = feather() else { return };
+    let own = Board::FeatherF405.conditions(1);
+    let scenario = Scenario { duration_s: 1.0, step_m: 0.05, ..Scenario::at_rest(&rig, Law::Lqr) };
+    let mut power_on = VirtualBoard::start(&image, &own, &table).unwrap();
+    let (recording, [ticks, messages]) = run_compared(&rig, &table, &scenario, &mut power_on).unwrap();
+    assert!(recording.summary.fall.is_none() && recording.fault.is_none(), "{recording:?}");
+    assert!(ticks > 2_000 && messages > 200, "{ticks} {messages}");
+    assert!(power_on.board().output(pin('C', 1)), "the status LED");
+
+    let fault_of = |conditions: &Conditions| {
+        let mut board = VirtualBoard::start(&image, conditions, &table).unwrap();
+        let mut session = Session::new(&mut board);
+        let pins = Pins {
+            raw_counts: heapless::Vec::from_slice(&[0; 2]).unwrap(),
+            supply_v: table.motor.unwrap().supply_v,
+            contacts: Default::default(),
+            received: heapless::Vec::new(),
+            sabotage: None,
+        };
+        assert!(session.ask(Request::Arm, &pins).is_err());
+        session.fault()
+    };
+    assert_eq!(fault_of(&own), None);
+    assert_eq!(fault_of(&Conditions { chip: Chip::F446, ..own }), Some(Fault::Board));
+    let crystal = Crystal { hz: 8_000_000, ..own.crystal };
+    assert_eq!(fault_of(&Conditions { crystal, ..own }), Some(Fault::Clock));
+
+    // A rig with more encoders than the board counts.
+    let error = build_if_possible(Kind::Board(Board::FeatherF405)).unwrap_err().to_string();
+    assert_eq!(
+        error,
+        "feather-f405 counts 2 encoders, and this rig has 5: take another board (docs/board.md)"
+    );
 }

@@ -14,6 +14,7 @@ pub(crate) const BOARD: BoardData = BoardData {
     status_led_is_low: false,
     supply_divider: 11.0,
     reference_v: 3.3,
-    special: "the debugger supplies the clock and the serial line (USB); MB1136 C-01 has neither clock nor crystal: close SB16 and \
-              SB50, or fit a crystal; PB3 is also the debugger's SWO input",
+    special: "the debugger supplies the clock and the serial line (USB); MB1136 C-02 and later come like this; C-01 comes without a \
+              clock, which is fault *clock*: open SB55, close SB16 and SB50, or fit the crystal X3; PB3 is also the \
+              debugger's SWO input",
 };

@@ -13,8 +13,8 @@ use upright::control::actuator::Drive;
 use upright::protocol::BAUD;
 use upright::protocol::simulated_pins::Sabotage;
 use upright_board::{
-    Board, Conditions, Image, Input, Pin, PowerStage, Rules, Stopped, Time, UNITS_PER_MICROSECOND,
-    UNITS_PER_SECOND, Wire, Wiring, pin, seconds,
+    Board, Conditions, Image, Input, PowerStage, Rules, Stopped, Time, UNITS_PER_MICROSECOND,
+    UNITS_PER_SECOND, Wire, Wiring, seconds,
 };
 use upright_design::harness::{HarnessError, Pace, Pins, Target};
 use upright_design::simulate::Bench;
@@ -38,9 +38,6 @@ const NOWHERE: u32 = 0x3000_0000;
 const STACK_END: u32 = 0x2000_0000;
 /// Number of SysTick among the exceptions.
 const SYS_TICK: u16 = 15;
-/// High while a tick runs.
-const TICK_PIN: Pin = pin('B', 1);
-const EMERGENCY_STOP: Pin = pin('B', 12);
 
 /// What the firmware's image may do: what the processor faults at, it does; everything else that the manuals do not
 /// allow ends the run.
@@ -80,6 +77,7 @@ pub type Events = Rc<RefCell<Vec<Event>>>;
 /// A board with the image, in lock step.
 pub struct VirtualBoard {
     board: Board,
+    wiring: &'static Wiring,
     /// Force that full duty stands for (N); none for a rig with motor data.
     force_limit_n: Option<f32>,
     tick_s: f64,
@@ -120,11 +118,11 @@ impl VirtualBoard {
         table: &TableValues,
         at_power_up: &[Input],
     ) -> Result<Self, HarnessError> {
-        let mut board = Board::power_on(image, conditions, Wiring::upright(), RULES)
-            .map_err(|error| stopped(image, error))?;
+        let mut board = Board::power_on(image, conditions, RULES).map_err(|error| stopped(image, error))?;
         let stage = board.power_stage();
         let mut target = Self {
             board,
+            wiring: conditions.wiring,
             force_limit_n: table.motor.is_none().then_some(table.force_limit_n),
             tick_s: f64::from(table.tick_s),
             positions: vec![0; table.sensors()],
@@ -218,11 +216,12 @@ impl VirtualBoard {
     fn connect(&mut self, contacts: &Contacts) {
         let level = |low: bool| if low { Wire::Low } else { Wire::High };
         let closed = |open: bool| if open { Wire::Open } else { Wire::Low };
+        let Wiring { emergency_stop, limits: [low, high], driver_fault, .. } = *self.wiring;
         for (at, wire) in [
-            (EMERGENCY_STOP, closed(contacts.emergency_stop)),
-            (pin('C', 0), closed(contacts.limit_low)),
-            (pin('C', 1), closed(contacts.limit_high)),
-            (pin('B', 13), level(contacts.driver_fault)),
+            (emergency_stop, closed(contacts.emergency_stop)),
+            (low, closed(contacts.limit_low)),
+            (high, closed(contacts.limit_high)),
+            (driver_fault, level(contacts.driver_fault)),
         ] {
             self.board.apply(Input::Level(at, wire));
         }
@@ -278,8 +277,8 @@ impl VirtualBoard {
     fn press_stop(&mut self, edge: Time, open: Time) -> Result<(), HarnessError> {
         self.run(edge)?;
         let edge = self.board.now();
-        self.board.apply(Input::Level(EMERGENCY_STOP, Wire::Open));
-        self.board.at(edge + open, Input::Level(EMERGENCY_STOP, Wire::Low));
+        self.board.apply(Input::Level(self.wiring.emergency_stop, Wire::Open));
+        self.board.at(edge + open, Input::Level(self.wiring.emergency_stop, Wire::Low));
         let end = self.board.next_tick().map_or(edge, |next| next.saturating_sub(LEAD));
         while self.board.power_stage().main_output && self.board.now() < end {
             self.step()?;
@@ -296,12 +295,12 @@ impl VirtualBoard {
         self.run(due)?;
         // If the tick before is late itself, this one begins when that has ended.
         for begun in [false, true] {
-            while self.board.output(TICK_PIN) != begun && self.board.now() < due + period / 2 {
+            while self.board.output(self.wiring.tick) != begun && self.board.now() < due + period / 2 {
                 self.step()?;
             }
         }
         let begin = self.board.now();
-        while self.board.power_stage().started_at < begin && self.board.output(TICK_PIN) {
+        while self.board.power_stage().started_at < begin && self.board.output(self.wiring.tick) {
             self.step()?;
         }
         self.board.apply(Input::Stall(due + period + INSIDE));

@@ -24,7 +24,7 @@ Examples:
 pub(crate) struct Flash {
     /// Rig file (TOML), to be designed [default: the table in src/gains.rs]
     rig: Option<PathBuf>,
-    /// Board: weact-f405, olimex-h405, discovery-f407 or nucleo-f446
+    /// Board: weact-f405, olimex-h405, feather-f405, discovery-f407 or nucleo-f446
     #[arg(long, value_name = "NAME", default_value_t = Board::WeactF405)]
     board: Board,
 }
