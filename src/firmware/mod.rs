@@ -252,7 +252,7 @@ impl<'t, const NX: usize, const NY: usize, S: SwingUp<NX, NY>> Firmware<'t, NX, 
     ) -> Output {
         let table = self.table;
         (self.requested_n, self.applied_n) = (command.requested_n, command.applied_n);
-        if let Some(fault) = self.debounce.check_inputs(&table.limits, inputs) {
+        if let Some(fault) = self.debounce.check_inputs(&table.limits, table.supply_max_v(), inputs) {
             self.trip(fault, None);
         }
         if let Some(fault) = exceeded {

@@ -8,11 +8,14 @@ use crate::table::Limits;
 
 /// This many overruns in a row are a fault.
 const OVERRUNS: u32 = 3;
+/// This many measurements of too high a supply in a row are a fault: one may be a spike beside a switching bridge.
+const OVER_VOLTAGES: u32 = 3;
 
 /// Number of ticks in a row for which each condition has held.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Debounce {
     supply: u32,
+    over_voltages: u32,
     overruns: u32,
     saturated: u32,
     link_silent: u32,
@@ -24,21 +27,24 @@ impl Debounce {
         *self = Self::default();
     }
 
-    /// Checks the inputs of a tick while balancing: limit switches, then the supply, then overruns.
+    /// Checks the inputs of a tick while balancing: limit switches, then the supply, then overruns. `supply_max_v` is the
+    /// highest supply voltage (V), see [`GainTable::supply_max_v`](crate::table::GainTable::supply_max_v).
     #[inline]
     pub fn check_inputs<const NY: usize>(
         &mut self,
         limits: &Limits<NY>,
+        supply_max_v: f32,
         inputs: &Inputs<NY>,
     ) -> Option<Fault> {
         let contacts = &inputs.contacts;
         count(&mut self.overruns, contacts.overrun);
         count(&mut self.supply, inputs.supply_v < limits.supply_min_v);
+        count(&mut self.over_voltages, inputs.supply_v > supply_max_v);
         if contacts.limit_low || contacts.limit_high {
             Some(Fault::LimitSwitch)
         } else if !inputs.supply_v.is_finite() {
             Some(Fault::NotFinite)
-        } else if self.supply > limits.supply_ticks {
+        } else if self.supply > limits.supply_ticks || self.over_voltages >= OVER_VOLTAGES {
             Some(Fault::Supply)
         } else if self.overruns >= OVERRUNS {
             Some(Fault::Overrun)
@@ -95,7 +101,7 @@ mod tests {
     /// The tick in which it becomes a fault.
     fn tick_of(inputs: Inputs<1>) -> Option<(usize, Fault)> {
         let mut debounce = Debounce::default();
-        (1..100).find_map(|tick| debounce.check_inputs(&LIMITS, &inputs).map(|fault| (tick, fault)))
+        (1..100).find_map(|tick| debounce.check_inputs(&LIMITS, 15.0, &inputs).map(|fault| (tick, fault)))
     }
 
     #[test]
@@ -111,6 +117,8 @@ mod tests {
         assert_eq!(contacts(&|c| c.overrun = true), Some((3, Fault::Overrun)));
         assert_eq!(tick_of(Inputs { supply_v: f32::NAN, ..GOOD }), Some((1, Fault::NotFinite)));
         assert_eq!(tick_of(Inputs { supply_v: 8.9, ..GOOD }), Some((5, Fault::Supply)));
+        assert_eq!(tick_of(Inputs { supply_v: 15.1, ..GOOD }), Some((3, Fault::Supply)));
+        assert_eq!(tick_of(Inputs { supply_v: 15.0, ..GOOD }), None);
     }
 
     #[test]
@@ -119,8 +127,9 @@ mod tests {
         for tick in 0..100 {
             let mut inputs = GOOD;
             inputs.contacts.overrun = tick % 3 != 0;
-            inputs.supply_v = if tick % 5 == 0 { 12.0 } else { 5.0 };
-            assert_eq!(debounce.check_inputs(&LIMITS, &inputs), None);
+            // Four ticks too low, or two too high.
+            inputs.supply_v = [12.0, 5.0, 5.0, 5.0, 5.0, 12.0, 20.0, 20.0][tick % 8];
+            assert_eq!(debounce.check_inputs(&LIMITS, 15.0, &inputs), None);
             assert_eq!(debounce.check_force(&LIMITS, tick % 6 != 0), None);
             assert_eq!(debounce.check_link(&LIMITS, tick % 6 == 0, true), None);
         }

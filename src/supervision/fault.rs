@@ -23,7 +23,7 @@ pub enum Fault {
     EmergencyStop = 6,
     /// The power stage has reported a fault.
     Driver = 7,
-    /// The supply of the power stage is too low.
+    /// The supply of the power stage is too low or too high.
     Supply = 8,
     /// Measurements of one encoder contradict the model.
     Encoder = 9,
@@ -143,9 +143,11 @@ impl Fault {
         Entry {
             fault: Fault::Supply,
             name: "supply",
-            condition: "the supply is below `supply_min_v` for `supply_time_s`",
+            condition: "the supply is below `supply_min_v` for `supply_time_s`, or above 1.25 times the motor's `supply_v` for \
+                        three ticks",
             reaction: Reaction::After("supply_time_s", 1),
-            remedy: "check the supply and its current limit",
+            remedy: "check the supply and its current limit; if it rises while the motor brakes, give it a capacitor or a brake \
+                     chopper",
         },
         Entry {
             fault: Fault::Encoder,

@@ -31,7 +31,7 @@ inhibits! {
     7 LIMIT_SWITCH "a limit switch is pressed, or its wire is open";
     8 EMERGENCY_STOP "the emergency stop is pressed, or its wire is open";
     9 DRIVER "the power stage reports a fault";
-    10 SUPPLY "the supply is too low";
+    10 SUPPLY "the supply is too low or too high";
     11 HELD "the arm command was held since the fault: let go, then arm again";
     12 NO_OBSERVER "the gain table holds no observer: give the rig its encoders and `[kalman]`";
     13 TABLE "the gain table does not fit its checksum or this build";

@@ -130,6 +130,12 @@ impl<const NX: usize, const NY: usize> GainTable<NX, NY> {
         checksum::checksum(self)
     }
 
+    /// Highest supply voltage of the power stage (V); no limit without motor data.
+    #[inline]
+    pub fn supply_max_v(&self) -> f32 {
+        self.motor.as_ref().map_or(f32::INFINITY, MotorMap::supply_max_v)
+    }
+
     /// Checks that the table is intact, plausible and made for this build.
     ///
     /// # Errors

@@ -20,7 +20,16 @@ part! {
     }
 }
 
+/// Highest supply voltage as a share of the table's. A force is larger by as much, and most power stages and brake
+/// choppers have their limit above it.
+const OVER_VOLTAGE: f32 = 1.25;
+
 impl MotorMap {
+    /// Highest supply voltage of the power stage (V). A motor that brakes feeds its energy back and raises it.
+    pub fn supply_max_v(&self) -> f32 {
+        OVER_VOLTAGE * self.supply_v
+    }
+
     /// Whether every force maps to a voltage, and every voltage to a duty cycle.
     pub(crate) fn is_sound(&self) -> bool {
         self.volts_per_newton > 0.0 && self.supply_v > 0.0

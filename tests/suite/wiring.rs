@@ -25,7 +25,7 @@ fn connected_to(signal: Signal) -> String {
         Signal::EmergencyStop => "emergency stop: opens when pressed".to_owned(),
         Signal::LimitLow => "limit switch, low end: opens when pressed".to_owned(),
         Signal::LimitHigh => "limit switch, high end: opens when pressed".to_owned(),
-        Signal::Supply => "supply voltage through 10 kΩ; 1 kΩ to ground".to_owned(),
+        Signal::Supply => "supply voltage through 22 kΩ; 1 kΩ to ground".to_owned(),
         Signal::Transmit => "serial line to the host".to_owned(),
         Signal::Receive => "serial line from the host".to_owned(),
         Signal::Tick => "oscilloscope: high while a tick runs".to_owned(),

@@ -72,7 +72,7 @@ impl Wiring {
             receive: pin('A', 3),
             usart: 2,
             supply_channel: 12,
-            supply_divider: 11.0,
+            supply_divider: 23.0,
             reference_v: 3.3,
         };
         &WIRING

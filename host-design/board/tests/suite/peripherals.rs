@@ -249,7 +249,7 @@ fn the_converter_measures_the_supply() {
         .raw(&[FOREVER]);
     let board = after(&main, &[Input::Supply(24.0)], 200);
     assert_eq!(logged(&board, 4) & 2, 2);
-    assert_eq!(logged(&board, 5), (24.0 / 11.0 / 3.3 * 4096.0) as u32);
+    assert_eq!(logged(&board, 5), (24.0 / 23.0 / 3.3 * 4096.0) as u32);
     assert_eq!(logged(&board, 6) & 2, 0, "reading clears EOC");
 }
 

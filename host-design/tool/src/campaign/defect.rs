@@ -12,6 +12,8 @@ pub enum Kind {
     SupplyNotANumber,
     SupplySag,
     SupplyDip,
+    SupplySurge,
+    SupplySpike,
     EmergencyStop,
     DriverFault,
     LimitSwitch,
@@ -99,7 +101,7 @@ pub enum Ticks {
 
 impl Kind {
     /// Every kind with its name, a description, and the outcome that it must have.
-    pub const ALL: [(Kind, &str, &str, Expected); 52] = {
+    pub const ALL: [(Kind, &str, &str, Expected); 54] = {
         use Expected::*;
         use Ticks::*;
         [
@@ -121,6 +123,13 @@ impl Kind {
                 "the supply is too low for less than the time that makes it a fault",
                 Ignored,
             ),
+            (
+                Kind::SupplySurge,
+                "supply-surge",
+                "the supply rises to 1.3 to 1.6 times the motor's voltage, as by a motor that brakes",
+                Fault(F::Supply, Exactly(3)),
+            ),
+            (Kind::SupplySpike, "supply-spike", "the same for one or two ticks", Ignored),
             (
                 Kind::EmergencyStop,
                 "emergency-stop",

@@ -101,6 +101,10 @@ impl<'a> Injection<'a> {
             Kind::SupplyDip if since < self.supply_ticks => {
                 inputs.supply_v = self.table.limits.supply_min_v * (0.2 + 0.7 * size as f32);
             }
+            Kind::SupplySurge => inputs.supply_v *= 1.3 + 0.3 * size as f32,
+            Kind::SupplySpike if since < 1 + usize::from(size > 0.5) => {
+                inputs.supply_v *= 1.3 + 0.3 * size as f32;
+            }
             Kind::EmergencyStop if since == 0 => contacts.emergency_stop = true,
             Kind::DriverFault if since == 0 => contacts.driver_fault = true,
             Kind::LimitSwitch if since < PRESSED_TICKS && sign > 0.0 => contacts.limit_high = true,

@@ -14,8 +14,9 @@ use upright_design::rig::{Integral, Rig};
 use upright_design::simulate::Scenario;
 use upright_design::swing_up::{Stored, hangs, motions, up_and_down, with_motions};
 use upright_design::table::{Gains, TableValues};
+use upright_tool::campaign::{Class, Kind as Defect, Setup, one};
 use upright_tool::image::{Board, Kind, build_for, build_if_possible, if_possible};
-use upright_tool::in_the_loop::{VirtualBoard, run_compared};
+use upright_tool::in_the_loop::{Place, VirtualBoard, run_compared};
 
 #[test]
 fn the_flashed_image_balances_from_power_up_with_the_bits_of_the_host() {
@@ -111,10 +112,13 @@ fn motor_delay_and_integral_action_give_the_bits_of_the_host() {
     }
 }
 
-/// The image for the Feather, which counts a single link; none without a compiler.
+/// The image for the Feather, which counts a single link, with its motions; none without a compiler.
 fn feather() -> Option<(Rig, TableValues, Image)> {
-    let rig = Rig::from_path("../../rigs/single-quanser-ip02.toml".as_ref()).unwrap();
+    let file = Path::new("../../rigs/single-quanser-ip02.toml");
+    let rig = Rig::from_path(file).unwrap();
     let table = TableValues::of(&rig, &design(&rig).unwrap(), Gains::Sampled).unwrap();
+    let motions = motions(&rig, &Stored::beside(file).unwrap()).unwrap();
+    let table = with_motions(&rig, table, &motions).unwrap();
     let elf = if_possible(build_for(Kind::Board(Board::FeatherF405), &rig, &table)).unwrap()?;
     Some((rig, table, Image::from_elf(&std::fs::read(elf).unwrap()).unwrap()))
 }
@@ -155,4 +159,17 @@ fn the_feather_balances_a_link_with_the_bits_of_the_host_and_refuses_another_chi
         error,
         "feather-f405 counts 2 encoders, and this rig has 5: take another board (docs/board.md)"
     );
+}
+
+/// On the board's own measurement of the supply, through the divider.
+#[test]
+fn a_supply_that_a_braking_motor_pumps_up_turns_the_motor_off_and_a_spike_does_not() {
+    let Some((rig, table, image)) = feather() else { return };
+    let place = Place::Board { image: &image, conditions: Board::FeatherF405.conditions(1) };
+    let setup = Setup { rig: &rig, table: &table, place, detection: true, guards: true };
+    let surge = one(&setup, &[Defect::SupplySurge], 1, 0).unwrap();
+    assert_eq!((surge.class, surge.fault), (Class::Detected, Some(Fault::Supply.code())), "{surge:?}");
+    // The negative control: one or two ticks of it.
+    let spike = one(&setup, &[Defect::SupplySpike], 1, 0).unwrap();
+    assert_eq!((spike.class, spike.fault), (Class::Rejected, None), "{spike:?}");
 }

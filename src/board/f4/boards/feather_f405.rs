@@ -32,7 +32,7 @@ pub(crate) const BOARD: BoardData = BoardData {
     wiring: &WIRING,
     status_led: output(Signal::StatusLed, b'C', 1),
     status_led_is_low: false,
-    supply_divider: 11.0,
+    supply_divider: 23.0,
     reference_v: 3.3,
     special: "its own [wiring](#wiring-of-the-feather); its memory chip has PA15, PB3, PB4 and PB5; leave the STEMMA QT socket \
               empty: its two signals count link 1",

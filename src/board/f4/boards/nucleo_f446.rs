@@ -12,7 +12,7 @@ pub(crate) const BOARD: BoardData = BoardData {
     wiring: &STANDARD,
     status_led: output(Signal::StatusLed, b'A', 5),
     status_led_is_low: false,
-    supply_divider: 11.0,
+    supply_divider: 23.0,
     reference_v: 3.3,
     special: "the debugger supplies the clock and the serial line (USB); MB1136 C-02 and later come like this; C-01 comes without a \
               clock, which is fault *clock*: open SB55, close SB16 and SB50, or fit the crystal X3; PB3 is also the \

@@ -12,7 +12,7 @@ pub(crate) const BOARD: BoardData = BoardData {
     wiring: &STANDARD,
     status_led: output(Signal::StatusLed, b'C', 12),
     status_led_is_low: true,
-    supply_divider: 11.0,
+    supply_divider: 23.0,
     reference_v: 3.3,
     special: "PA0 is also the button BUT: do not press it; a debugger has to use SWD, because PA15, PB3 and PB4 are JTAG pins",
 };

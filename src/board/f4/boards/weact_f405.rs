@@ -12,7 +12,7 @@ pub(crate) const BOARD: BoardData = BoardData {
     wiring: &STANDARD,
     status_led: output(Signal::StatusLed, b'B', 2),
     status_led_is_low: false,
-    supply_divider: 11.0,
+    supply_divider: 23.0,
     reference_v: 3.3,
     special: "PB2 is the LED and BOOT1; the key is at PC13",
 };
