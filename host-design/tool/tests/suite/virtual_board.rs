@@ -16,7 +16,7 @@ use upright_design::swing_up::{Stored, hangs, motions, up_and_down, with_motions
 use upright_design::table::{Gains, TableValues};
 use upright_tool::campaign::{Class, Kind as Defect, Setup, one};
 use upright_tool::image::{Board, Kind, build_for, build_if_possible, if_possible};
-use upright_tool::in_the_loop::{Place, VirtualBoard, run_compared};
+use upright_tool::in_the_loop::{Place, VirtualBoard, measure, run_compared};
 
 #[test]
 fn the_flashed_image_balances_from_power_up_with_the_bits_of_the_host() {
@@ -172,4 +172,21 @@ fn a_supply_that_a_braking_motor_pumps_up_turns_the_motor_off_and_a_spike_does_n
     // The negative control: one or two ticks of it.
     let spike = one(&setup, &[Defect::SupplySpike], 1, 0).unwrap();
     assert_eq!((spike.class, spike.fault), (Class::Rejected, None), "{spike:?}");
+}
+
+/// Raising and lowering included; the negative control of the quarter is in `cycles.rs`.
+#[test]
+fn no_tick_of_raising_and_lowering_takes_longer_than_a_quarter_of_its_period() {
+    let Some((rig, table, image)) = feather() else { return };
+    let scenario = Scenario { duration_s: 0.2, ..Scenario::at_rest(&rig, Law::Lqr) };
+    let conditions = Board::FeatherF405.conditions(1);
+    let cycles = measure(&rig, &table, &scenario, &image, &conditions).unwrap();
+    assert_eq!((cycles.ended.as_deref(), cycles.check()), (None, Ok(())));
+    let (balancing, moving) = (cycles.balancing.unwrap(), cycles.moving.unwrap());
+    assert!(balancing.ticks >= 100 && moving.ticks > 1_000, "{} {}", balancing.ticks, moving.ticks);
+    assert!(moving.whole.us > balancing.controller.us && cycles.all.whole.us >= moving.whole.us);
+    // Without motions nothing moves.
+    let mut table = table;
+    table.swing_up = None;
+    assert_eq!(measure(&rig, &table, &scenario, &image, &conditions).unwrap().moving, None);
 }

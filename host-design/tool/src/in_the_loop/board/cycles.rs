@@ -1,10 +1,12 @@
 //! What a tick costs on the board, from the run of the image that is flashed.
 
 use serde::Serialize;
+use upright::supervision::fault::Fault;
 use upright_board::{Conditions, Image, Time, UNITS_PER_MICROSECOND};
-use upright_design::harness::{Harness, HarnessError};
+use upright_design::harness::{Harness, HarnessError, record};
 use upright_design::rig::Rig;
 use upright_design::simulate::Scenario;
+use upright_design::swing_up::up_and_down;
 use upright_design::table::TableValues;
 
 use super::VirtualBoard;
@@ -58,6 +60,8 @@ pub struct Cycles {
     pub balancing: Option<Figures>,
     /// The medians of balancing.
     pub typical: Option<Figures>,
+    /// Ticks of raising and lowering, and of balancing in between.
+    pub moving: Option<Figures>,
     /// All ticks since the reset.
     pub all: Figures,
     /// Why the run ended before its time.
@@ -94,11 +98,14 @@ impl Cycles {
         Err(TooLong { whole_us, cycles, quarter_us, least_s: (exact_s / digit).ceil() * digit })
     }
 
-    fn of(ticks: &[TickCost], core_hz: u32, period_s: f64, ended: Option<String>) -> Option<Self> {
-        let select = |drives: bool| -> Vec<TickCost> {
+    /// Of runs that balance, and of runs that move.
+    fn of(balances: Run, moves: Run, period_s: f64) -> Option<Self> {
+        let all = [balances.ticks.as_slice(), &moves.ticks].concat();
+        let select = |ticks: &[TickCost], drives: bool| -> Vec<TickCost> {
             ticks.iter().copied().filter(|tick| tick.latency.is_some() == drives).collect()
         };
-        let (off, balancing) = (select(false), select(true));
+        let (off, balancing) = (select(&all, false), select(&balances.ticks, true));
+        let (moving, core_hz) = (select(&moves.ticks, true), balances.core_hz);
         let period = Span { cycles: (period_s * f64::from(core_hz)).round() as u32, us: 1e6 * period_s };
         Some(Self {
             core_hz,
@@ -106,8 +113,9 @@ impl Cycles {
             off: Figures::of(&off, core_hz, largest),
             balancing: Figures::of(&balancing, core_hz, largest),
             typical: Figures::of(&balancing, core_hz, median),
-            all: Figures::of(ticks, core_hz, largest)?,
-            ended,
+            moving: Figures::of(&moving, core_hz, largest),
+            all: Figures::of(&all, core_hz, largest)?,
+            ended: balances.ended.or(moves.ended),
         })
     }
 }
@@ -148,8 +156,19 @@ impl Figures {
     }
 }
 
+/// Time of balancing between raising and lowering (s).
+const UPRIGHT_S: f64 = 0.1;
+
+/// The measured ticks of a run.
+#[derive(Default)]
+struct Run {
+    ticks: Vec<TickCost>,
+    core_hz: u32,
+    ended: Option<String>,
+}
+
 /// Runs the image from power-up through homing, sign check and arming to balancing, for the duration of `scenario`, and
-/// measures every tick.
+/// measures every tick. If the table has a swing-up, does the same from power-up through raising and lowering.
 ///
 /// # Errors
 /// [`RunError`] if the image does what the hardware does not allow, or has no tick. A rig that does not come to
@@ -161,24 +180,32 @@ pub fn measure(
     image: &Image,
     conditions: &Conditions,
 ) -> Result<Cycles, RunError> {
-    let mut board = VirtualBoard::start(image, conditions, table)?;
-    board.measure_ticks();
-    let ended = match balance(rig, table, scenario, &mut board) {
-        Ok(()) => None,
-        Err(error @ HarnessError::Board(_)) => return Err(error.into()),
-        Err(error) => Some(error.to_string()),
+    let run = |action: &dyn Fn(&mut VirtualBoard) -> Result<Option<Fault>, HarnessError>| {
+        let mut board = VirtualBoard::start(image, conditions, table)?;
+        board.measure_ticks();
+        let ended = match action(&mut board) {
+            Ok(fault) => fault.map(|fault| format!("it ends with fault {fault}")),
+            Err(error @ HarnessError::Board(_)) => return Err(error),
+            Err(error) => Some(error.to_string()),
+        };
+        Ok(Run { core_hz: board.board().core_hz(), ticks: board.ticks().to_vec(), ended })
     };
-    let core_hz = board.board().core_hz();
-    let cycles = Cycles::of(board.ticks(), core_hz, rig.tick.period_s, ended);
+    let balances = run(&|board| balance(rig, table, scenario, board))?;
+    let moves = match up_and_down(rig, table, UPRIGHT_S) {
+        Ok(motion) => run(&|board| Ok(record(rig, table, &motion, board)?.fault))?,
+        Err(_) => Run::default(),
+    };
+    let cycles = Cycles::of(balances, moves, rig.tick.period_s);
     cycles.ok_or_else(|| HarnessError::Board("has no tick".to_owned()).into())
 }
 
+/// Balances for the duration of `scenario`; gives the fault that has ended it.
 fn balance(
     rig: &Rig,
     table: &TableValues,
     scenario: &Scenario,
     board: &mut VirtualBoard,
-) -> Result<(), HarnessError> {
+) -> Result<Option<Fault>, HarnessError> {
     let mut harness = Harness::new(rig, table, scenario, board)?;
     if table.observer.is_none() {
         // It never balances.
@@ -192,5 +219,5 @@ fn balance(
         let inputs = harness.inputs();
         output = harness.session.tick(&inputs)?;
     }
-    Ok(())
+    Ok(harness.session.fault())
 }
