@@ -118,8 +118,11 @@ impl Kind {
                 vec![at(anywhere, bit_of(table.start, table.end - table.start))]
             }
             Kind::RamBit => {
-                let end = image.symbol("__euninit").unwrap_or(0x2000_2000);
-                vec![at(anywhere, bit_of(0x2000_0000, end - 0x2000_0000))]
+                // Half of them in the state of the control task, which is a ninth of all.
+                let control = image.object("local_resource_control").filter(|_| trial.sign > 0.0);
+                let all = 0x2000_0000..image.symbol("__euninit").unwrap_or(0x2000_2000);
+                let memory = control.unwrap_or(all);
+                vec![at(anywhere, bit_of(memory.start, memory.end - memory.start))]
             }
             _ => Vec::new(),
         }
