@@ -106,7 +106,7 @@ impl<'t, const NX: usize, const NY: usize, S: SwingUp<NX, NY>> Firmware<'t, NX, 
         start: impl Into<Start>,
     ) -> Result<Self, TableError> {
         swing_up.check(build)?;
-        Ok(Self::with_controller(table, swing_up, Controller::new(table, build, widths)?, start.into()))
+        Ok(Self::with_controller(table, swing_up, Controller::new(table, build, widths)?, start.into(), true))
     }
 
     /// The firmware with a table that cannot be used: it has latched [`Fault::Table`] for good, and reports it.
@@ -116,10 +116,7 @@ impl<'t, const NX: usize, const NY: usize, S: SwingUp<NX, NY>> Firmware<'t, NX, 
         widths: [CounterWidth; NY],
         start: Start,
     ) -> Self {
-        let mut firmware = Self::with_controller(table, swing_up, Controller::unusable(table, widths), start);
-        firmware.is_usable = false;
-        firmware.trip(Fault::Table, None);
-        firmware
+        Self::with_controller(table, swing_up, Controller::unusable(table, widths), start, false)
     }
 
     fn with_controller(
@@ -127,17 +124,23 @@ impl<'t, const NX: usize, const NY: usize, S: SwingUp<NX, NY>> Firmware<'t, NX, 
         swing_up: &'t S,
         controller: Controller<'t, NX, NY>,
         start: Start,
+        is_usable: bool,
     ) -> Self {
-        let cause = start.reset.fault().map(|fault| Cause { fault, tick: 0, sensor: None });
+        let at_start = |fault| Cause { fault, tick: 0, sensor: None };
+        let mut supervisor = Supervisor::new(start.reset.fault().map(at_start));
+        if !is_usable {
+            supervisor.trip(at_start(Fault::Table));
+        }
+        // Nothing is changed in the new firmware afterwards: a copy of it would need a quarter of the board's stack.
         Self {
             controller,
-            supervisor: Supervisor::new(cause),
+            supervisor,
             calibration: Calibration::new(&table.limits),
             detection: Detection::default(),
             debounce: Debounce::default(),
             checksum_scan: ChecksumScan::default(),
             swing_up_scan: ChecksumScan::default(),
-            is_usable: true,
+            is_usable,
             is_checked: false,
             table,
             swing_up,
