@@ -24,10 +24,10 @@
 //! | clock tree, clock security, reset flags, delays after enabling | 7.3; ES0182 2.1.13 |
 //! | flash wait states by supply, approximate accelerator; option bytes are read | 3.5, 3.9 |
 //! | ports, external interrupts 0 to 15 and 16 (voltage detector) | 8.4, 12.3 |
-//! | TIM1 channel 1: one pulse, repetition, preload, PWM, break, lock | 17.4 |
+//! | TIM1 channel 1 or its complementary output: one pulse, repetition, preload, PWM, break, lock | 17.4 |
 //! | TIM2 to 5, TIM8: encoder mode 3 with filter | 18.4 |
 //! | TIM11: HSE against HSI | 19.5 |
-//! | ADC1, single conversions; USART2; DMA1 between USART2 and SRAM; IWDG | 13.13, 30.6, 10.5, 21.4 |
+//! | ADC1, single conversions; USART2 or USART3, whichever is wired; DMA1 between it and SRAM; IWDG | 13.13, 30.6, 10.5, 21.4 |
 //! | PWR with the voltage detector; brown-out reset at the level of the option bytes | 5.2.2, 5.4 |
 //! | DBGMCU: identity, and the watchdog while a debugger halts the core | 38.6, 38.16 |
 //!
