@@ -516,6 +516,8 @@ pub static TABLE: GainTable<STATES, SENSORS> = GainTable {
         angle_rad: 0.35,
         // Largest speed of the cart (m/s).
         speed_m_per_s: 2.0,
+        // Largest force of the bench drive (N).
+        bench_force_n: 2.0,
         // Least supply voltage of the power stage (V).
         supply_min_v: 0.0,
         // Longest time for which the supply may be too low (ticks).
@@ -637,7 +639,7 @@ pub static TABLE: GainTable<STATES, SENSORS> = GainTable {
         },
     },
     // CRC-32 of all values above.
-    crc: 0x45fb_bc73,
+    crc: 0x70d4_88d4,
 };
 
 /// This table has no swing-up.

@@ -125,6 +125,7 @@ impl Run<'_> {
                     self.tick();
                 }
             }
+            26 | 27 => self.send(Request::Drive { along: next() % 2 == 0 }),
             _ => {}
         }
         const TICKS: [u8; 8] = [1, 0, 1, 2, 1, 3, 0, 4];

@@ -7,6 +7,7 @@ use upright::board::Output;
 use upright::control::actuator::Drive;
 use upright::gains::{SENSORS, STATES, TABLE};
 use upright::protocol::message::{Answer, Request, Telemetry};
+use upright::supervision::bench_drive::MotorSign;
 use upright::supervision::fault::{Cause, Fault};
 use upright::supervision::sign_check::Signs;
 use upright::supervision::supervisor::State;
@@ -55,7 +56,7 @@ impl Invariants {
         (self.state, self.cause) = (firmware.state(), firmware.cause());
     }
 
-    /// The motor is on only while balancing, within its limits, and off in the tick of a fault or after a disarm.
+    /// The motor is on only while balancing or driving, within its limits, and off in the tick of a fault or after a disarm.
     fn motor(&self, firmware: &Tested, rig: &SimulatedRig, answered: Option<&(Request, Answer)>) {
         let (before, after) = (self.state, firmware.state());
         let Output { enable, drive } = rig.output;
@@ -66,12 +67,18 @@ impl Invariants {
             Drive::Duty(duty) => assert!(duty.is_finite() && duty.abs() <= 1.0, "{duty}"),
         }
         let disarmed = matches!(answered, Some((Request::Disarm, Answer::Done)));
+        if enable && before == State::Driving {
+            let most = TABLE.limits.bench_force_n;
+            assert!(matches!(drive, Drive::Force(force) if force.abs() <= most), "{drive:?}");
+        }
         if enable {
-            assert!(matches!(before, State::Armed | State::Balancing), "motor on after {before:?}");
+            let may = [State::Driving, State::Armed, State::Balancing];
+            assert!(may.contains(&before), "motor on after {before:?}");
             // Found in the second half of the tick; the motor is off from the next one.
             let late =
                 firmware.cause().is_some_and(|cause| matches!(cause.fault, Fault::LinkLost | Fault::Table));
-            assert!(after == State::Balancing || disarmed || late, "motor on in {after:?}");
+            let goes_on = matches!(after, State::Driving | State::Balancing);
+            assert!(goes_on || disarmed || late, "motor on in {after:?}");
             let contacts = rig.contacts;
             assert!(!contacts.emergency_stop && !contacts.driver_fault);
             assert!(!contacts.clock_fault && !contacts.board_fault);
@@ -80,7 +87,8 @@ impl Invariants {
             assert_eq!(drive, Drive::OFF);
             assert_ne!(after, State::Balancing, "balancing with the motor off");
         }
-        assert!(!disarmed || !matches!(after, State::Armed | State::Balancing | State::Homing), "{after:?}");
+        let is_off = !matches!(after, State::Driving | State::Armed | State::Balancing | State::Homing);
+        assert!(!disarmed || is_off, "{after:?}");
     }
 
     /// The first cause of a fault stays until it is cleared.
@@ -102,6 +110,14 @@ impl Invariants {
                     self.arm_held_at = Some(self.tick);
                 }
             }
+            Some((Request::Drive { .. }, Answer::Done)) if self.state != State::Driving => {
+                assert!(
+                    matches!(self.state, State::Calibrated | State::Homing),
+                    "driven in {:?}",
+                    self.state
+                );
+                self.nothing_against_driving(firmware, rig);
+            }
             _ => assert!(firmware.state() != State::Armed || self.state == State::Armed, "armed unasked"),
         }
         assert!(
@@ -110,10 +126,32 @@ impl Invariants {
         );
     }
 
+    /// The links hang, the cart is on its rail, and all contacts are closed.
+    fn nothing_against_driving(&self, firmware: &Tested, rig: &SimulatedRig) {
+        let limits = &TABLE.limits;
+        assert_eq!(firmware.calibration().signs(), Signs::Checked);
+        let contacts = rig.contacts;
+        assert!(!contacts.limit_low && !contacts.limit_high, "driven on a limit switch");
+        assert!(!contacts.emergency_stop && !contacts.driver_fault);
+        assert!(!contacts.clock_fault && !contacts.board_fault);
+        assert!(rig.supply_v >= limits.supply_min_v && rig.supply_v.is_finite(), "driven without supply");
+        let Some(counts) = self.counts.back() else { panic!("a tick has counts") };
+        for (sensor, &count) in counts.iter().enumerate().skip(1) {
+            let turn = i64::from(limits.turn_counts[sensor]);
+            let from_rest = i64::from(count) - i64::from(limits.rest_counts[sensor]);
+            let away = from_rest.rem_euclid(turn).min((-from_rest).rem_euclid(turn));
+            assert!(
+                away <= i64::from(limits.sign_counts[sensor]) / 2 + 1,
+                "driven while a link does not hang"
+            );
+        }
+    }
+
     fn no_inhibit(&self, firmware: &Tested, rig: &SimulatedRig) {
         let limits = &TABLE.limits;
         assert!(matches!(self.state, State::Calibrated | State::Homing), "armed in {:?}", self.state);
         assert_eq!(firmware.calibration().signs(), Signs::Checked);
+        assert_eq!(firmware.motor_sign(), MotorSign::Checked);
         let contacts = rig.contacts;
         assert!(!contacts.limit_low && !contacts.limit_high, "armed on a limit switch");
         assert!(!contacts.emergency_stop && !contacts.driver_fault);

@@ -7,6 +7,7 @@ use upright::control::encoder::CounterWidth;
 use upright::firmware::Firmware;
 use upright::gains::{RIG_HASH, SENSORS, STATES, TABLE, TICK_S};
 use upright::protocol::message::{Answer, Command, Request, Reset};
+use upright::supervision::bench_drive::MotorSign;
 use upright::supervision::sign_check::Signs;
 use upright::supervision::supervisor::State;
 use upright::table::Build;
@@ -132,6 +133,16 @@ pub(crate) fn starts() -> [Start; 4] {
             signs => panic!("{signs:?}"),
         }
     }
+    // The motor pushes the cart; the links hang all the time.
+    start.rig.offset = limits.rest_counts;
+    start.wait(limits.arm_ticks);
+    start.ask(Request::Drive { along: true });
+    while start.firmware.state() == State::Driving {
+        start.tick(Some(Request::Drive { along: true }));
+        start.rig.state = [0.0; STATES];
+        start.rig.offset[0] += limits.sign_counts[0] / 20;
+    }
+    assert_eq!(start.firmware.motor_sign(), MotorSign::Checked);
     start.rig.offset = [0; SENSORS];
     start.wait(limits.arm_ticks + 1);
     let raised = start.clone();

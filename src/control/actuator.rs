@@ -18,6 +18,14 @@ impl Drive {
     /// No force, motor off.
     pub const OFF: Self = Drive::Force(0.0);
 
+    /// The command for `force` (N) on a cart at rest. Without a motor's map it is the force itself.
+    pub fn at_rest(force: f32, motor: Option<&MotorMap>) -> Self {
+        match motor {
+            None => Drive::Force(force),
+            Some(motor) => Drive::Duty(motor.duty(motor.volts_per_newton * force)),
+        }
+    }
+
     /// The command as a duty cycle from -1 to 1. A force becomes a fraction of `force_limit` (N): for a power stage
     /// that controls the motor current and reaches the limit at full scale.
     pub fn duty(self, force_limit: f32) -> f32 {
@@ -100,6 +108,8 @@ mod tests {
         assert_eq!(Drive::Force(30.0).duty(20.0), 1.0);
         assert_eq!(Drive::Duty(-0.5).duty(20.0), -0.5);
         assert_eq!(Drive::OFF.duty(20.0), 0.0);
+        assert_eq!(Drive::at_rest(-5.0, None), Drive::Force(-5.0));
+        assert_eq!(Drive::at_rest(-2.5, Some(&MOTOR)), Drive::Duty(-0.5));
         assert_eq!(Drive::Force(f32::NAN).duty(20.0), 0.0);
     }
 

@@ -4,6 +4,7 @@
 //! it to a board and to the serial link. The answer to a new request is written in `commands.rs`; a new condition on
 //! arming in `posture.rs`; a new field of telemetry in `telemetry.rs`.
 
+mod bench_drive;
 mod commands;
 pub mod control_task;
 #[cfg(feature = "image")]
@@ -17,6 +18,7 @@ use crate::control::controller::{Controller, MotorCommand};
 use crate::control::encoder::CounterWidth;
 use crate::control::motion::Player;
 use crate::protocol::message::{Command, Reply, Start, Statistics, Telemetry};
+use crate::supervision::bench_drive::{BenchDrive, MotorSign};
 use crate::supervision::calibration::Calibration;
 use crate::supervision::debounce::Debounce;
 use crate::supervision::detection::{Detection, Finding};
@@ -34,6 +36,7 @@ pub struct Firmware<'t, const NX: usize, const NY: usize, S = NoSwingUp> {
     controller: Controller<'t, NX, NY>,
     supervisor: Supervisor,
     calibration: Calibration<NY>,
+    bench_drive: BenchDrive,
     detection: Detection<NY>,
     debounce: Debounce,
     checksum_scan: ChecksumScan,
@@ -136,6 +139,7 @@ impl<'t, const NX: usize, const NY: usize, S: SwingUp<NX, NY>> Firmware<'t, NX, 
             controller,
             supervisor,
             calibration: Calibration::new(&table.limits),
+            bench_drive: BenchDrive::new(table.limits.sign_counts.first().copied().unwrap_or_default()),
             detection: Detection::default(),
             debounce: Debounce::default(),
             checksum_scan: ChecksumScan::default(),
@@ -184,6 +188,11 @@ impl<'t, const NX: usize, const NY: usize, S: SwingUp<NX, NY>> Firmware<'t, NX, 
         &self.calibration
     }
 
+    /// What is known of the motor's sign.
+    pub fn motor_sign(&self) -> MotorSign {
+        self.bench_drive.sign()
+    }
+
     /// The counters of events; those of the serial link are 0 here.
     pub fn statistics(&self) -> Statistics {
         Statistics { rejected_samples: self.detection.rejected(), ..self.statistics }
@@ -195,8 +204,8 @@ impl<'t, const NX: usize, const NY: usize, S: SwingUp<NX, NY>> Firmware<'t, NX, 
         self.drive(inputs)
     }
 
-    /// The first part of [`control`](Self::control): contacts that turn the motor off, and all of a tick with the motor
-    /// off.
+    /// The first part of [`control`](Self::control): contacts that turn the motor off, and all of a tick without the
+    /// control law.
     pub fn accept(&mut self, inputs: &Inputs<NY>) {
         (self.raw_counts, self.contacts, self.supply_v) =
             (inputs.raw_counts, inputs.contacts, inputs.supply_v);
@@ -211,8 +220,10 @@ impl<'t, const NX: usize, const NY: usize, S: SwingUp<NX, NY>> Firmware<'t, NX, 
         } else if inputs.contacts.driver_fault {
             self.trip(Fault::Driver, None);
         }
-        if !self.supervisor.state().drives() {
-            self.tick_motor_off();
+        match self.supervisor.state() {
+            State::Driving => self.push_cart(inputs),
+            state if !state.drives() => self.tick_motor_off(),
+            _ => {}
         }
     }
 
@@ -220,6 +231,7 @@ impl<'t, const NX: usize, const NY: usize, S: SwingUp<NX, NY>> Firmware<'t, NX, 
     pub fn drive(&mut self, inputs: &Inputs<NY>) -> Output {
         self.output = match self.supervisor.state() {
             State::Balancing => self.balance(inputs),
+            State::Driving => self.output,
             State::Raising | State::Lowering if S::IS_POSSIBLE => self.move_links(inputs),
             _ => Output::OFF,
         };
@@ -276,12 +288,19 @@ impl<'t, const NX: usize, const NY: usize, S: SwingUp<NX, NY>> Firmware<'t, NX, 
         }
     }
 
+    /// Takes the counts of a tick without the control law.
+    fn follow(&mut self) -> [i32; NY] {
+        self.controller.follow(&self.raw_counts);
+        let counts = *self.controller.encoders().counts();
+        self.calibration.update(&counts, &self.table.limits);
+        counts
+    }
+
     /// A tick with the motor off: homing, sign check, and waiting for the links to be upright.
     fn tick_motor_off(&mut self) {
-        self.controller.follow(&self.raw_counts);
+        let counts = self.follow();
         let limits = &self.table.limits;
-        let counts = *self.controller.encoders().counts();
-        self.calibration.update(&counts, limits);
+        self.bench_drive.wait();
         self.rearm_lockout_ticks = self.rearm_lockout_ticks.saturating_sub(1);
         match self.supervisor.state() {
             State::Homing => match self.calibration.update_rail_homing(&counts, &self.contacts, limits) {
@@ -291,7 +310,12 @@ impl<'t, const NX: usize, const NY: usize, S: SwingUp<NX, NY>> Firmware<'t, NX, 
             },
             State::Calibrated => self.calibration.update_sign_check(&counts, limits),
             State::Armed => self.tick_armed(&counts),
-            State::Disarmed | State::Raising | State::Balancing | State::Lowering | State::Fault => {}
+            State::Disarmed
+            | State::Driving
+            | State::Raising
+            | State::Balancing
+            | State::Lowering
+            | State::Fault => {}
         }
     }
 
@@ -367,14 +391,14 @@ impl<'t, const NX: usize, const NY: usize, S: SwingUp<NX, NY>> Firmware<'t, NX, 
     pub fn predict(&mut self) {
         match self.supervisor.state() {
             State::Raising | State::Lowering if S::IS_POSSIBLE => self.predict_motion(),
-            state if state.drives() => self.predict_balancing(),
+            state if state.controls() => self.predict_balancing(),
             _ => {}
         }
     }
 
     /// The last part of [`finish`](Self::finish): checks of link and table, and the reply.
     pub fn complete(&mut self, command: Option<&Command>) -> Option<Reply> {
-        if self.supervisor.state().drives()
+        if self.supervisor.state().controls()
             && let Some(fault) =
                 self.debounce.check_link(&self.table.limits, command.is_some(), self.setpoint_commanded)
         {
@@ -418,8 +442,13 @@ impl<'t, const NX: usize, const NY: usize, S: SwingUp<NX, NY>> Firmware<'t, NX, 
     #[cold]
     #[inline(never)]
     fn trip(&mut self, fault: Fault, sensor: Option<u8>) {
-        if self.supervisor.state() != State::Fault && fault.loses_positions() {
-            self.calibration.invalidate(&self.table.limits);
+        if self.supervisor.state() != State::Fault {
+            if fault.loses_positions() {
+                self.calibration.invalidate(&self.table.limits);
+            }
+            if fault.doubts_motor() {
+                self.bench_drive.forget(self.cart_sign_counts());
+            }
         }
         self.calibration.cancel();
         self.setpoint_commanded = false;

@@ -2,6 +2,7 @@
 
 use super::Firmware;
 use crate::board::Contacts;
+use crate::supervision::bench_drive::MotorSign;
 use crate::supervision::inhibits::Inhibits;
 use crate::supervision::sign_check::Signs;
 use crate::table::SwingUp;
@@ -27,6 +28,7 @@ impl<const NX: usize, const NY: usize, S: SwingUp<NX, NY>> Firmware<'_, NX, NY, 
     }
 
     /// [`Inhibits::OFF_CENTRE`] if the cart is outside the soft limits of the rail at these counts.
+    #[inline(never)]
     pub(super) fn off_centre_inhibit(&self, counts: &[i32; NY]) -> Inhibits {
         let [low, high] = self.table.limits.rail_m;
         let step = self
@@ -39,6 +41,7 @@ impl<const NX: usize, const NY: usize, S: SwingUp<NX, NY>> Firmware<'_, NX, NY, 
     }
 
     /// Inhibits by the contacts and the supply.
+    #[inline(never)]
     pub(super) fn input_inhibits(&self) -> Inhibits {
         let Contacts { limit_low, limit_high, emergency_stop, driver_fault, .. } = self.contacts;
         let supply_v = self.table.limits.supply_min_v..=self.table.supply_max_v();
@@ -65,6 +68,12 @@ impl<const NX: usize, const NY: usize, S: SwingUp<NX, NY>> Firmware<'_, NX, NY, 
 
     /// Inhibits of turning the motor on, however the links are.
     pub(super) fn inhibits_with_motor_off(&self) -> Inhibits {
+        let is_unchecked = self.bench_drive.sign() != MotorSign::Checked;
+        self.inhibits_before_motor_check().union(Inhibits::MOTOR.when(is_unchecked))
+    }
+
+    /// The same, as long as the motor's sign is not known.
+    pub(super) fn inhibits_before_motor_check(&self) -> Inhibits {
         let state = self.supervisor.arming_inhibits();
         if self.supervisor.state().drives() {
             return state;

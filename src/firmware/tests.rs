@@ -70,6 +70,21 @@ fn a_reset_by_the_watchdog_starts_disarmed_and_tells_why() {
 }
 
 #[test]
+fn a_fault_of_motor_or_encoder_puts_the_motors_sign_in_doubt_and_no_other_does() {
+    for entry in Fault::ALL {
+        let mut firmware = firmware(&TABLE, Reset::Power).unwrap();
+        let sign_counts = TABLE.limits.sign_counts[0];
+        firmware.bench_drive.hold();
+        firmware.bench_drive.begin(true, 0);
+        assert_eq!(firmware.bench_drive.update(sign_counts, sign_counts, TICK_S), None);
+        assert_eq!(firmware.motor_sign(), MotorSign::Checked);
+        firmware.trip(entry.fault, None);
+        let doubted = [Fault::Encoder, Fault::Frozen, Fault::Motor, Fault::Watchdog, Fault::Crash];
+        assert_eq!(firmware.motor_sign() == MotorSign::Unchecked, doubted.contains(&entry.fault));
+    }
+}
+
+#[test]
 fn the_cart_is_homed_between_its_switches() {
     let mut firmware = firmware(&TABLE, Reset::Power).unwrap();
     let mut step = |cart: i32, request: Option<Request>| {

@@ -8,6 +8,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::board::Contacts;
 use crate::control::controller::Rejected;
+use crate::supervision::bench_drive::MotorSign;
 use crate::supervision::fault::{Cause, Fault};
 use crate::supervision::homing::Homing;
 use crate::supervision::inhibits::Inhibits;
@@ -16,7 +17,7 @@ use crate::supervision::supervisor::State;
 use crate::table::Law;
 
 /// Version of these messages; a host with another version must not send commands.
-pub const PROTOCOL: u8 = 4;
+pub const PROTOCOL: u8 = 5;
 
 /// A command, host to firmware.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -66,6 +67,12 @@ pub enum Request {
     Up,
     /// Lower the balancing links until they hang, then turn the motor off.
     Down,
+    /// A key is held: push the cart a little with the motor, for as long as this is repeated. See
+    /// [bench drive](crate::supervision::bench_drive).
+    Drive {
+        /// Along +x; else against it.
+        along: bool,
+    },
 }
 
 /// Firmware to host.
@@ -218,6 +225,8 @@ pub struct Telemetry<const NX: usize, const NY: usize> {
     pub homing: Homing,
     /// Progress of the sign check.
     pub signs: Signs,
+    /// What is known of the motor's sign.
+    pub motor: MotorSign,
     /// Inhibits of arming that hold now.
     pub arming_inhibits: Inhibits,
     /// Inhibits of the next motion that hold now: of lowering while the rig balances, else of raising.

@@ -14,7 +14,7 @@ use crate::protocol::queue;
 /// Longest frame from the host (bytes).
 pub const MAX_COMMAND: usize = 32;
 /// Longest frame to the host (bytes): enough for 30 states and 15 sensors.
-pub const MAX_MESSAGE: usize = 336;
+pub const MAX_MESSAGE: usize = 340;
 
 /// Receiver and transmitter of frames, with this side's ends of the queues to the control task.
 pub struct SerialLink<'q, const NX: usize, const NY: usize> {
@@ -95,6 +95,7 @@ mod tests {
     use super::*;
     use crate::board::Contacts;
     use crate::protocol::message::Telemetry;
+    use crate::supervision::bench_drive::MotorSign;
     use crate::supervision::fault::Fault;
     use crate::supervision::homing::Homing;
     use crate::supervision::inhibits::Inhibits;
@@ -114,6 +115,7 @@ mod tests {
             cause_tick: u32::MAX,
             homing: Homing::Touch { low: true, high: true },
             signs: Signs::Swapped { asked: u8::MAX, moved: u8::MAX },
+            motor: MotorSign::Reversed,
             arming_inhibits: all,
             swing_up_inhibits: all,
             motion_tick: u32::MAX,

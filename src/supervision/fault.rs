@@ -287,6 +287,12 @@ impl Fault {
     pub fn loses_positions(self) -> bool {
         matches!(self, Fault::Encoder | Fault::Frozen | Fault::Watchdog | Fault::Crash)
     }
+
+    /// Whether the motor's sign has to be checked again after this fault: the motor, or the encoder that it was checked
+    /// against, is in doubt.
+    pub fn doubts_motor(self) -> bool {
+        self.loses_positions() || self == Fault::Motor
+    }
 }
 
 impl core::fmt::Display for Fault {

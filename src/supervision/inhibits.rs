@@ -32,7 +32,7 @@ inhibits! {
     8 EMERGENCY_STOP "the emergency stop is pressed, or its wire is open";
     9 DRIVER "the power stage reports a fault";
     10 SUPPLY "the supply is too low or too high";
-    11 HELD "the arm command was held since the fault: let go, then arm again";
+    11 HELD "the key was held since the motor went off: let go, then try again";
     12 NO_OBSERVER "the gain table holds no observer: give the rig its encoders and `[kalman]`";
     13 TABLE "the gain table does not fit its checksum or this build";
     14 NOT_HANGING "the links do not hang at rest";
@@ -42,6 +42,7 @@ inhibits! {
     18 UNSETTLED "the cart is on its way to the set-point, or a link leans: wait until it stands";
     19 NO_ROOM "the motion does not fit on the rail from here: move the cart";
     20 OTHER_LAW "the swing-up ends in another control law: select LQR";
+    21 MOTOR "the motor's sign is not checked since power-up: drive the cart a little";
 }
 
 impl Inhibits {
@@ -108,7 +109,7 @@ mod tests {
                 .fold(Inhibits::NONE, |all, (inhibit, _)| all.union(*inhibit))
                 .texts()
                 .count(),
-            21
+            22
         );
         assert_eq!(Inhibits::NONE.err_if_any(), Ok(()));
         assert_eq!(both.err_if_any(), Err(both));

@@ -15,6 +15,8 @@ pub enum State {
     Homing,
     /// Positions are known.
     Calibrated,
+    /// The motor pushes the cart a little, while a person holds a key.
+    Driving,
     /// Waiting until all links have been upright and slow for `arm_time_s`.
     Armed,
     /// The motor raises the links by a planned motion.
@@ -30,6 +32,11 @@ pub enum State {
 impl State {
     /// Whether the motor is on.
     pub const fn drives(self) -> bool {
+        self.controls() || matches!(self, State::Driving)
+    }
+
+    /// Whether the controller commands the motor.
+    pub const fn controls(self) -> bool {
         matches!(self, State::Raising | State::Balancing | State::Lowering)
     }
 }
@@ -42,7 +49,8 @@ impl State {
 ///                                                             │  │  disarm, cancel_arming                 │  │  │
 ///                                                             │  └─ raise ─► Raising ── finish_motion ────┘  │  │
 ///                                                             │◄─ finish_motion ── Lowering ◄────── lower ───┘  │
-///                                                             └◄──────── disarm while the motor is on ──────────┘
+///                                                             │◄──────── disarm while the motor is on ──────────┘
+///                                                             └◄─ disarm ── Driving ◄─ start_driving ── Calibrated
 /// any state ─ trip ─► Fault ─ clear ─► Calibrated, or Disarmed if positions are not known
 /// ```
 #[derive(Debug, Clone, Default)]
@@ -87,7 +95,7 @@ impl Supervisor {
     /// Turns the motor off; ends homing.
     pub fn disarm(&mut self) {
         match self.state {
-            State::Armed | State::Raising | State::Balancing | State::Lowering => {
+            State::Driving | State::Armed | State::Raising | State::Balancing | State::Lowering => {
                 self.state = State::Calibrated;
             }
             State::Homing => self.state = State::Disarmed,
@@ -120,7 +128,9 @@ impl Supervisor {
     fn check_homing_allowed(&self) -> Result<(), Inhibits> {
         match self.state {
             State::Disarmed | State::Homing | State::Calibrated => Ok(()),
-            State::Armed | State::Raising | State::Balancing | State::Lowering => Err(Inhibits::RUNNING),
+            State::Driving | State::Armed | State::Raising | State::Balancing | State::Lowering => {
+                Err(Inhibits::RUNNING)
+            }
             State::Fault => Err(Inhibits::FAULT),
         }
     }
@@ -140,9 +150,21 @@ impl Supervisor {
         let unknown = Inhibits::NOT_HOMED.when(!self.positions_known);
         unknown.union(match self.state {
             State::Disarmed | State::Homing | State::Calibrated => Inhibits::NONE,
-            State::Armed | State::Raising | State::Balancing | State::Lowering => Inhibits::RUNNING,
+            State::Driving | State::Armed | State::Raising | State::Balancing | State::Lowering => {
+                Inhibits::RUNNING
+            }
             State::Fault => Inhibits::FAULT,
         })
+    }
+
+    /// Turns the motor on to push the cart a little, unless the state or one of `other` inhibits it.
+    ///
+    /// # Errors
+    /// All inhibits that hold.
+    pub fn start_driving(&mut self, other: Inhibits) -> Result<(), Inhibits> {
+        self.arming_inhibits().union(other).err_if_any()?;
+        self.state = State::Driving;
+        Ok(())
     }
 
     /// Turns the motor on if armed: the links have been upright and slow for long enough.
@@ -208,7 +230,8 @@ mod tests {
     use State::*;
     use std::vec::Vec;
 
-    const STATES: [State; 8] = [Disarmed, Homing, Calibrated, Armed, Raising, Balancing, Lowering, Fault];
+    const STATES: [State; 9] =
+        [Disarmed, Homing, Calibrated, Driving, Armed, Raising, Balancing, Lowering, Fault];
 
     #[derive(Debug, Clone, Copy)]
     enum Event {
@@ -217,6 +240,8 @@ mod tests {
         Disarm,
         StartHoming,
         CompleteHoming,
+        StartDriving,
+        StartDrivingInhibited,
         Arm,
         ArmInhibited,
         StartBalancing,
@@ -247,6 +272,8 @@ mod tests {
             Event::Disarm => supervisor.disarm(),
             Event::StartHoming => return supervisor.start_homing(),
             Event::CompleteHoming => return supervisor.complete_homing(),
+            Event::StartDriving => return supervisor.start_driving(Inhibits::NONE),
+            Event::StartDrivingInhibited => return supervisor.start_driving(Inhibits::MOVING),
             Event::Arm => return supervisor.arm(Inhibits::NONE),
             Event::ArmInhibited => return supervisor.arm(Inhibits::TILTED),
             Event::StartBalancing => supervisor.start_balancing(),
@@ -265,22 +292,23 @@ mod tests {
     #[test]
     fn every_event_in_every_state_leads_where_the_table_says() {
         use Event::*;
-        let known = [Calibrated, Armed, Raising, Balancing, Lowering];
-        let running = [Armed, Raising, Balancing, Lowering, Fault];
-        let not_calibrated = [Disarmed, Homing, Armed, Raising, Balancing, Lowering, Fault];
-        let not_balancing = [Disarmed, Homing, Calibrated, Armed, Raising, Lowering, Fault];
+        let known = [Calibrated, Driving, Armed, Raising, Balancing, Lowering];
+        let running = [Driving, Armed, Raising, Balancing, Lowering, Fault];
+        let not_calibrated = [Disarmed, Homing, Driving, Armed, Raising, Balancing, Lowering, Fault];
+        let not_balancing = [Disarmed, Homing, Calibrated, Driving, Armed, Raising, Lowering, Fault];
         // Where an event leads to from each of STATES, if not to the same state.
         let but = |changes: &[(State, State)]| {
             STATES.map(|from| changes.iter().find(|(state, _)| *state == from).map_or(from, |(_, to)| *to))
         };
         // One row per event: the state it leads to from each of STATES, and where it is refused.
-        let table: [(Event, [State; 8], &[State]); 16] = [
-            (Trip, [Fault; 8], &[]),
-            (TripEncoder, [Fault; 8], &[]),
+        let table: [(Event, [State; 9], &[State]); 18] = [
+            (Trip, [Fault; 9], &[]),
+            (TripEncoder, [Fault; 9], &[]),
             (
                 Disarm,
                 but(&[
                     (Homing, Disarmed),
+                    (Driving, Calibrated),
                     (Armed, Calibrated),
                     (Raising, Calibrated),
                     (Balancing, Calibrated),
@@ -290,6 +318,8 @@ mod tests {
             ),
             (StartHoming, but(&[(Disarmed, Homing), (Calibrated, Homing)]), &running),
             (CompleteHoming, but(&[(Disarmed, Calibrated), (Homing, Calibrated)]), &running),
+            (StartDriving, but(&[(Calibrated, Driving)]), &not_calibrated),
+            (StartDrivingInhibited, STATES, &STATES),
             (Arm, but(&[(Calibrated, Armed)]), &not_calibrated),
             (ArmInhibited, STATES, &STATES),
             (StartBalancing, but(&[(Armed, Balancing)]), &[]),

@@ -54,6 +54,7 @@ fn full() -> GainTable<4, 2> {
             rail_m: [-1.0, 1.0],
             angle_rad: 0.35,
             speed_m_per_s: 2.0,
+            bench_force_n: 1.5,
             supply_min_v: 9.0,
             supply_ticks: 2,
             saturated_ticks: 3,

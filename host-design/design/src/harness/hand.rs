@@ -1,13 +1,16 @@
-//! The person at the rig: homes, checks the signs, then raises the links and holds them upright until the motor is on,
-//! or lets them hang for the swing-up.
+//! The person at the rig: homes, checks the signs and the motor, then raises the links and holds them upright until the
+//! motor is on, or lets them hang for the swing-up.
 
+use upright::board::Output;
+use upright::control::actuator::Drive;
 use upright::protocol::message::Request;
+use upright::supervision::bench_drive::MotorSign;
 use upright::supervision::sign_check::Signs;
 use upright::supervision::supervisor::State;
 
 use crate::reality::hanging_by_hand;
 use crate::rig::{PlantDescription, Rig};
-use crate::simulate::Begin;
+use crate::simulate::{Begin, Bench, Scenario, SimulationError};
 
 /// What the hand does in one tick.
 #[derive(Debug, Clone, PartialEq)]
@@ -25,10 +28,11 @@ pub struct Status {
     pub state: State,
     /// Progress of the sign check.
     pub signs: Signs,
+    /// What is known of the motor's sign.
+    pub motor: MotorSign,
 }
 
 /// The hand, tick by tick. It follows the firmware's instructions, as a person would.
-#[derive(Debug, Clone)]
 pub struct Hand {
     doing: Doing,
     /// The request that turns the motor on.
@@ -38,8 +42,15 @@ pub struct Hand {
     held: Vec<f64>,
     /// Largest movement per tick of a joint (rad) and of the cart (m).
     step: [f64; 2],
+    /// The rig while the motor pushes the cart. It is not that of the run, whose random numbers and whose state must not
+    /// depend on how it was started.
+    pushed: Bench,
     /// Ticks between two tries of the same request.
     retry_ticks: u32,
+    /// Ticks between two commands of a key that is held.
+    key_ticks: u32,
+    /// Ticks for which the rig stands still before the motor pushes.
+    settle_ticks: u32,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -47,6 +58,10 @@ enum Doing {
     Home,
     CheckSigns,
     Follow,
+    /// Lets the rig stand still for some ticks.
+    Settle(u32),
+    /// Holds the key with which the motor pushes the cart.
+    Push,
     Raise,
     TurnOn,
     Hold,
@@ -56,27 +71,39 @@ enum Doing {
 const RATE: [f64; 2] = [2.0, 0.5];
 /// Time between two tries of the same request (s).
 const RETRY_S: f64 = 0.05;
+/// Time between two commands of a key that is held (s).
+const KEY_S: f64 = 0.025;
 
 impl Hand {
-    /// A hand that moves `rig` from hanging to the state `start`, and lets go there: when the firmware balances, or
-    /// for a swing-up (`begin`) when it begins to raise the links.
-    pub fn new(rig: &Rig, start: &[f64], begin: Begin) -> Self {
+    /// A hand that moves `rig` from hanging to the start of `scenario`, and lets go there: when the firmware balances, or
+    /// for a swing-up when it begins to raise the links.
+    ///
+    /// # Errors
+    /// [`SimulationError`] if the plant cannot be built.
+    pub fn new(rig: &Rig, scenario: &Scenario) -> Result<Self, SimulationError> {
         let hanging = match &rig.plant {
             PlantDescription::Chain(_) => hanging_by_hand(rig),
             PlantDescription::Model(_) => vec![0.0; rig.states()],
         };
-        Self {
+        let undisturbed =
+            Scenario { force_noise_n: 0.0, torque_noise_n_m: 0.0, force_offset_n: 0.0, ..scenario.clone() };
+        let ticks = |seconds: f64| (seconds / rig.tick.period_s).ceil() as u32;
+        Ok(Self {
             doing: Doing::Home,
-            turn_on: match begin {
+            turn_on: match scenario.begin {
                 Begin::ByHand => Request::Arm,
                 Begin::Hanging { .. } => Request::Up,
             },
             held: hanging.clone(),
             hanging,
-            start: start.to_vec(),
+            start: scenario.start.clone(),
             step: RATE.map(|rate| rate * rig.tick.period_s),
-            retry_ticks: (RETRY_S / rig.tick.period_s).ceil() as u32,
-        }
+            pushed: Bench::new(rig, &undisturbed)?,
+            retry_ticks: ticks(RETRY_S),
+            key_ticks: ticks(KEY_S),
+            // The firmware asks for a quarter of arm_time_s.
+            settle_ticks: ticks(0.5 * rig.limits.arm_time_s),
+        })
     }
 
     /// The state in which the rig is held now.
@@ -84,9 +111,15 @@ impl Hand {
         &self.held
     }
 
-    /// What the hand does in tick number `tick`; `None` once the motor is on and the hand has let go.
-    pub fn act(&mut self, tick: u32, status: &Status) -> Option<HandTick> {
-        if status.state.drives() {
+    /// Whether the motor pushes the cart while the hand waits.
+    pub fn lets_the_motor_push(&self) -> bool {
+        self.doing == Doing::Push
+    }
+
+    /// What the hand does in tick number `tick`, before which the firmware has given `output`; `None` once the controller
+    /// commands the motor and the hand has let go.
+    pub fn act(&mut self, tick: u32, status: &Status, output: &Output) -> Option<HandTick> {
+        if status.state.controls() {
             return None;
         }
         let request = match self.doing {
@@ -98,9 +131,19 @@ impl Hand {
                 self.until(begun, Doing::Follow, tick, Request::CheckSigns)
             }
             Doing::Follow => {
-                self.follow(status.signs);
+                self.follow(status);
                 None
             }
+            Doing::Settle(0) => {
+                self.doing = Doing::Push;
+                self.pushed.hold(&self.held);
+                None
+            }
+            Doing::Settle(ticks) => {
+                self.doing = Doing::Settle(ticks - 1);
+                None
+            }
+            Doing::Push => self.push(tick, status, output),
             Doing::Raise => {
                 let start = self.start.clone();
                 if self.move_to(&start) {
@@ -124,8 +167,8 @@ impl Hand {
     }
 
     /// Moves what the sign check asks for.
-    fn follow(&mut self, signs: Signs) {
-        match signs {
+    fn follow(&mut self, status: &Status) {
+        match status.signs {
             Signs::Rest(_) => {
                 // The cart stays where it is.
                 let mut rest = self.hanging.clone();
@@ -141,8 +184,29 @@ impl Hand {
                     *outer -= self.step[0];
                 }
             }
-            Signs::Checked => self.doing = Doing::Raise,
+            Signs::Checked if status.motor == MotorSign::Checked => self.doing = Doing::Raise,
+            Signs::Checked => self.doing = Doing::Settle(self.settle_ticks),
             Signs::Unchecked | Signs::Reversed(_) | Signs::Swapped { .. } => {}
+        }
+    }
+
+    /// Lets the motor push the cart with all links free, and holds the key until it is known whether it does.
+    fn push(&mut self, tick: u32, status: &Status, output: &Output) -> Option<Request> {
+        // A motor that is off turns freely.
+        let drive = if output.enable { output.drive } else { Drive::Force(0.0) };
+        self.pushed.tick(drive);
+        self.held.copy_from_slice(self.pushed.state());
+        match status.motor {
+            MotorSign::Unchecked if tick.is_multiple_of(self.key_ticks) => {
+                Some(Request::Drive { along: false })
+            }
+            MotorSign::Checked if status.state == State::Calibrated => {
+                // The hand stops everything.
+                self.held.iter_mut().skip(1).step_by(2).for_each(|rate| *rate = 0.0);
+                self.doing = Doing::Raise;
+                None
+            }
+            _ => None,
         }
     }
 

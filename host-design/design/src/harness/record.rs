@@ -156,7 +156,7 @@ impl Record {
     /// Joins the telemetry of each tick with the true state of the bench in that tick.
     fn take(&mut self, session: &mut Session<'_>) -> Result<(), HarnessError> {
         while let Some(telemetry) = session.next_telemetry() {
-            if self.next_tick.is_none() && !telemetry.state.drives() {
+            if self.next_tick.is_none() && !telemetry.state.controls() {
                 continue;
             }
             let expected = self.next_tick.unwrap_or(telemetry.tick);

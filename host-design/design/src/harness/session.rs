@@ -7,6 +7,7 @@ use upright::protocol::frame::{self, Receiver};
 use upright::protocol::message::{Answer, Command, Info, Message, PROTOCOL, Reply, Request, Telemetry};
 use upright::protocol::serial_link::{MAX_COMMAND, MAX_MESSAGE};
 use upright::protocol::simulated_pins::Sabotage;
+use upright::supervision::bench_drive::MotorSign;
 use upright::supervision::fault::Fault;
 use upright::supervision::sign_check::Signs;
 use upright::supervision::supervisor::State;
@@ -51,7 +52,7 @@ impl<'a> Session<'a> {
             sabotage: None,
             telemetry: VecDeque::new(),
             replies: VecDeque::new(),
-            status: Status { state: State::Disarmed, signs: Signs::Unchecked },
+            status: Status { state: State::Disarmed, signs: Signs::Unchecked, motor: MotorSign::Unchecked },
             fault: None,
             ticks: 0,
             damaged: 0,
@@ -119,7 +120,8 @@ impl<'a> Session<'a> {
             match self.receiver.push::<Message<MAX_STATES, MAX_SENSORS>>(byte) {
                 Some(Ok(Message::Telemetry(telemetry))) => {
                     self.fault = telemetry.fault;
-                    self.status = Status { state: telemetry.state, signs: telemetry.signs };
+                    let AnyTelemetry { state, signs, motor, .. } = telemetry;
+                    self.status = Status { state, signs, motor };
                     self.telemetry.push_back(telemetry);
                 }
                 Some(Ok(Message::Reply(Reply { id, answer }))) => self.replies.push_back((id, answer)),

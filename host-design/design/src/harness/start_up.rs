@@ -22,6 +22,8 @@ pub struct Harness<'t> {
     /// The rig.
     pub bench: Bench,
     hand: Hand,
+    /// The firmware's output in the last tick.
+    output: Output,
     counters: Vec<u32>,
     supply_v: f32,
     period_s: f64,
@@ -39,13 +41,14 @@ impl<'t> Harness<'t> {
         scenario: &Scenario,
         target: &'t mut dyn Target,
     ) -> Result<Self, HarnessError> {
-        let hand = Hand::new(rig, &scenario.start, scenario.begin);
+        let hand = Hand::new(rig, scenario)?;
         let mut bench = Bench::new(rig, scenario)?;
         bench.hold(hand.held());
         let mut harness = Self {
             session: Session::new(target),
             bench,
             hand,
+            output: Output::OFF,
             counters: vec![0; table.sensors()],
             supply_v: table.motor.map_or(0.0, |motor| motor.supply_v),
             period_s: rig.tick.period_s,
@@ -69,18 +72,19 @@ impl<'t> Harness<'t> {
     /// # Errors
     /// [`HarnessError`] if the firmware does not answer.
     pub fn by_hand(&mut self, tick: u32) -> Result<Output, HarnessError> {
-        if let Some(HandTick { held, request }) = self.hand.act(tick, &self.session.status()) {
+        if let Some(HandTick { held, request }) = self.hand.act(tick, &self.session.status(), &self.output) {
             self.bench.hold(&held);
             if let Some(request) = request {
                 self.session.send(request);
             }
         }
         let inputs = self.inputs();
-        self.session.tick(&inputs)
+        self.output = self.session.tick(&inputs)?;
+        Ok(self.output)
     }
 
-    /// Homes, checks the signs, raises the links and arms, or lets them hang and starts the swing-up. Ends with the
-    /// first tick in which the motor is on, and gives that tick's output.
+    /// Homes, checks the signs, has the motor push the cart, raises the links and arms, or lets them hang and starts the
+    /// swing-up. Ends with the first tick in which the controller commands the motor, and gives that tick's output.
     ///
     /// `setpoint_m` is commanded as soon as the firmware is armed; from then on it needs a command every
     /// [`HEARTBEAT_S`](super::HEARTBEAT_S). Without a set-point it holds the position in which it begins.
@@ -96,7 +100,7 @@ impl<'t> Harness<'t> {
                 self.session.send(Request::Setpoint(position_m));
             }
             let output = self.by_hand(tick)?;
-            if output.enable {
+            if output.enable && !self.hand.lets_the_motor_push() {
                 return Ok(output);
             }
         }

@@ -269,7 +269,10 @@ macro_rules! keys {
     (
         $(#[$attribute:meta])*
         pub struct $name:ident {
-            $( $field:ident: $type:ty, $unit:literal, $rule:expr, $meaning:literal, $absent:expr; )+
+            $(
+                $(#[$of_field:meta])*
+                $field:ident: $type:ty, $unit:literal, $rule:expr, $meaning:literal, $absent:expr;
+            )+
         }
     ) => {
         $(#[$attribute])*
@@ -277,6 +280,7 @@ macro_rules! keys {
         pub struct $name {
             $(
                 #[doc = concat!("The ", $meaning, ".")]
+                $(#[$of_field])*
                 pub $field: $type,
             )+
         }

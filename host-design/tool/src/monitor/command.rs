@@ -31,6 +31,8 @@ pub fn action(key: &KeyEvent) -> Option<Action> {
         KeyCode::Char('h') => Action::Send(Request::Home),
         KeyCode::Char('H') => Action::Send(Request::HomeRail),
         KeyCode::Char('g') => Action::Send(Request::CheckSigns),
+        KeyCode::Char('m') => Action::Send(Request::Drive { along: true }),
+        KeyCode::Char('M') => Action::Send(Request::Drive { along: false }),
         KeyCode::Char('a') => Action::Send(Request::Arm),
         KeyCode::Char('u') => Action::Send(Request::Up),
         KeyCode::Char('n') => Action::Send(Request::Down),
@@ -49,7 +51,7 @@ pub fn action(key: &KeyEvent) -> Option<Action> {
 /// A line that is not a command.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error(
-    "`{0}` is no command; give home, home-rail, check-signs, arm, up, down, disarm, clear, set-point METRES, or law lqr|pole-placement"
+    "`{0}` is no command; give home, home-rail, check-signs, drive +x|-x, arm, up, down, disarm, clear, set-point METRES, or law lqr|pole-placement"
 )]
 pub struct BadCommand(String);
 
@@ -64,6 +66,8 @@ pub fn request(line: &str) -> Result<Request, BadCommand> {
         ["home"] => Request::Home,
         ["home-rail"] => Request::HomeRail,
         ["check-signs"] => Request::CheckSigns,
+        ["drive", "+x"] => Request::Drive { along: true },
+        ["drive", "-x"] => Request::Drive { along: false },
         ["arm"] => Request::Arm,
         ["up"] => Request::Up,
         ["down"] => Request::Down,

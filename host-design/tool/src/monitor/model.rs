@@ -9,6 +9,7 @@ use upright::protocol::message::{
 };
 use upright::protocol::serial_link::MAX_MESSAGE;
 use upright::supervision::fault::Cause;
+use upright::supervision::inhibits::Inhibits;
 use upright::table::Law;
 
 use super::command::Action;
@@ -188,10 +189,12 @@ impl Monitor {
             Answer::Cause(cause) => self.cause = cause,
             Answer::Statistics(statistics) => self.statistics = Some(statistics),
             Answer::Done => match request {
-                Request::Beat | Request::Telemetry(_) => (),
+                Request::Beat | Request::Drive { .. } | Request::Telemetry(_) => (),
                 _ => self.note(format!("{}: done", name(request))),
             },
-            Answer::NotNow(_) if request == Request::Beat => (),
+            // The reasons stood in the first answer to the key.
+            Answer::NotNow(reasons)
+                if matches!(request, Request::Drive { .. }) && reasons.contains(Inhibits::HELD) => {}
             Answer::NotNow(reasons) => {
                 self.note(format!("{}: refused", name(request)));
                 reasons.texts().for_each(|text| self.note(format!("  because {text}")));
@@ -230,6 +233,9 @@ impl Monitor {
             }
             Action::Record | Action::Quit => return,
         };
+        if matches!(request, Request::Drive { .. }) {
+            return self.outgoing.beat(request, now);
+        }
         if let Request::Setpoint(wanted) = request {
             (self.wanted, self.beating) = (Some(wanted), true);
         }
@@ -250,7 +256,7 @@ impl Monitor {
             self.next_ask = now + STATISTICS;
         }
         if self.beating && now >= self.next_beat {
-            self.outgoing.beat(now);
+            self.outgoing.beat(Request::Beat, now);
             self.next_beat = now + BEAT;
         }
     }
@@ -302,6 +308,8 @@ fn name(request: Request) -> String {
         Request::Home => "home".to_owned(),
         Request::HomeRail => "home on the rail's switches".to_owned(),
         Request::CheckSigns => "check signs".to_owned(),
+        Request::Drive { along: true } => "drive along +x".to_owned(),
+        Request::Drive { along: false } => "drive against +x".to_owned(),
         Request::Arm => "arm".to_owned(),
         Request::Up => "up".to_owned(),
         Request::Down => "down".to_owned(),

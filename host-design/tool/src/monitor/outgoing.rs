@@ -87,10 +87,11 @@ impl Outgoing {
         given_up
     }
 
-    /// Sends a keep-alive, unless a command is repeated anyway.
-    pub(super) fn beat(&mut self, now: Duration) {
+    /// Sends a request of which the next one is as good: a keep-alive, or a held key. It is not repeated, and left out while
+    /// another command is.
+    pub(super) fn beat(&mut self, request: Request, now: Duration) {
         if self.waiting.is_empty() {
-            let command = self.number(Request::Beat, now);
+            let command = self.number(request, now);
             self.encode(&command);
             self.beats.push_back(command);
             if self.beats.len() > MOST_BEATS {
@@ -256,16 +257,22 @@ mod tests {
     #[test]
     fn beats_make_way_for_commands_and_set_points_for_the_last_one() {
         let mut outgoing = Outgoing::default();
-        outgoing.beat(ms(0));
+        outgoing.beat(Request::Beat, ms(0));
         assert!(!outgoing.take().is_empty());
         for tenths in 0..4_u8 {
             outgoing.send(Request::Setpoint(f32::from(tenths) / 10.0), ms(1));
         }
         outgoing.take();
-        outgoing.beat(ms(2));
+        outgoing.beat(Request::Drive { along: true }, ms(2));
         assert!(outgoing.take().is_empty());
         assert_eq!(outgoing.answered(id(1), ms(3)), Some(Request::Setpoint(0.0)));
         assert_eq!(outgoing.answered(id(3), ms(4)), Some(Request::Setpoint(0.3)));
         assert!(!outgoing.is_waiting());
+        outgoing.take();
+        outgoing.beat(Request::Drive { along: true }, ms(5));
+        assert!(!outgoing.take().is_empty());
+        outgoing.repeat(ms(1_000));
+        assert!(outgoing.take().is_empty(), "a key that is let go sends nothing");
+        assert_eq!(outgoing.answered(id(5), ms(1_001)), Some(Request::Drive { along: true }));
     }
 }

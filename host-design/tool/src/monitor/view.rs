@@ -12,7 +12,7 @@ use upright::supervision::supervisor::State;
 use super::model::{Monitor, TelemetryOfAny};
 use super::words;
 
-const KEYS: &str = "h/H home (rail)  g check signs  a arm  u up  n down  d/space disarm  c clear  ←→ 1 cm  0 zero  l law  r record  q quit";
+const KEYS: &str = "h/H home (rail)  g check signs  m/M drive (held)  a arm  u up  n down  d/space disarm  c clear  ←→ 1 cm  0 zero  l law  r record  q quit";
 const COLOURS: [Color; 6] =
     [Color::Cyan, Color::Yellow, Color::Magenta, Color::Green, Color::Blue, Color::Red];
 
@@ -85,7 +85,7 @@ fn header(monitor: &Monitor) -> Vec<Line<'_>> {
     let colour = match telemetry.state {
         State::Disarmed | State::Calibrated => Color::White,
         State::Homing | State::Armed => Color::Yellow,
-        State::Raising | State::Lowering => Color::Magenta,
+        State::Driving | State::Raising | State::Lowering => Color::Magenta,
         State::Balancing => Color::Green,
         State::Fault => Color::Red,
     };

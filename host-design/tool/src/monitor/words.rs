@@ -2,6 +2,7 @@
 
 use upright::board::Contacts;
 use upright::protocol::message::CrashRecord;
+use upright::supervision::bench_drive::MotorSign;
 use upright::supervision::homing::Homing;
 use upright::supervision::sign_check::Signs;
 use upright::supervision::supervisor::State;
@@ -14,6 +15,7 @@ pub fn state(state: State) -> &'static str {
         State::Disarmed => "disarmed: positions are not known",
         State::Homing => "homing",
         State::Calibrated => "calibrated: motor off",
+        State::Driving => "driving: the motor pushes the cart while the key is held",
         State::Armed => "armed: waits until all links are upright and still",
         State::Raising => "raising: the motor is on",
         State::Balancing => "balancing: the motor is on",
@@ -76,6 +78,21 @@ pub fn instruction(telemetry: &TelemetryOfAny) -> Option<String> {
             joint(moved),
             joint(asked)
         )),
-        _ => None,
+        _ => motor(telemetry.motor),
+    }
+}
+
+/// What to do about the motor, once the encoders' signs are checked.
+fn motor(sign: MotorSign) -> Option<String> {
+    match sign {
+        MotorSign::Reversed => Some(
+            "the motor pushes the wrong way: switch its supply off and swap its wires, or its direction signal"
+                .to_owned(),
+        ),
+        MotorSign::Still => Some(
+            "the motor has not moved the cart: check its supply, its wires, the cart, and `bench_force_n` of the rig file"
+                .to_owned(),
+        ),
+        MotorSign::Unchecked | MotorSign::Checked => None,
     }
 }

@@ -23,6 +23,7 @@ pub(super) fn greeting(rig: &Rig, table: &TableValues, place: &str, defects: Opt
         State::Disarmed,
         State::Homing,
         State::Calibrated,
+        State::Driving,
         State::Armed,
         State::Raising,
         State::Balancing,

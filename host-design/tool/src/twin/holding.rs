@@ -3,6 +3,8 @@
 use std::f64::consts::{PI, TAU};
 
 use upright::supervision::sign_check::Signs;
+use upright::supervision::supervisor::State;
+use upright_design::harness::Status;
 
 use super::request::Holding;
 
@@ -39,8 +41,14 @@ impl Hand {
         self.how = how;
     }
 
-    /// Where the hand holds the rig in the next tick; none if it does not.
-    pub(super) fn tick(&mut self, signs: Signs) -> Option<&[f64]> {
+    /// Where the hand holds the rig, which is in `state`, in the next tick; none if it does not. While the motor pushes the
+    /// cart it does not, and takes hold again afterwards.
+    pub(super) fn tick(&mut self, status: &Status, state: &[f64]) -> Option<&[f64]> {
+        if status.state == State::Driving {
+            let how = std::mem::replace(&mut self.how, Holding::Free);
+            self.take(how, state);
+            return None;
+        }
         match self.how {
             Holding::Free => return None,
             Holding::Hanging => self.move_to(&hanging(self.held.len(), 0.0)),
@@ -49,7 +57,7 @@ impl Hand {
                 upright[0] = self.held[0];
                 self.move_to(&upright);
             }
-            Holding::Guided => self.follow(signs),
+            Holding::Guided => self.follow(status.signs),
         }
         Some(&self.held)
     }
@@ -94,6 +102,19 @@ fn hanging(states: usize, x_m: f64) -> Vec<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use upright::supervision::bench_drive::MotorSign;
+
+    const CALIBRATED: Status =
+        Status { state: State::Calibrated, signs: Signs::Checked, motor: MotorSign::Unchecked };
+
+    #[test]
+    fn a_cart_that_the_motor_pushes_is_held_again_where_it_is() {
+        let mut hand = Hand::new(4, 0.01);
+        hand.take(Holding::Upright, &[0.2, 0.0, 0.0, 0.0]);
+        let driving = Status { state: State::Driving, ..CALIBRATED };
+        assert_eq!(hand.tick(&driving, &[0.25, 0.3, 0.0, 0.1]), None);
+        assert_eq!(hand.tick(&CALIBRATED, &[0.3; 4]), Some([0.25, 0.0, 0.0, 0.0].as_slice()));
+    }
 
     #[test]
     fn a_rig_that_has_turned_over_is_raised_on_the_shorter_way() {
@@ -101,11 +122,11 @@ mod tests {
         hand.take(Holding::Upright, &[0.2, 1.0, 4.0 * TAU + 0.5, 30.0]);
         let mut held = Vec::new();
         for _ in 0..100 {
-            held = hand.tick(Signs::Unchecked).unwrap_or_default().to_vec();
+            held = hand.tick(&CALIBRATED, &held).unwrap_or_default().to_vec();
         }
         assert_eq!(held[1..2], [0.0]);
         assert!((held[2] - 4.0 * TAU).abs() < 1e-9 && held[0] == 0.2, "{held:?}");
         hand.take(Holding::Free, &held);
-        assert_eq!(hand.tick(Signs::Unchecked), None);
+        assert_eq!(hand.tick(&CALIBRATED, &held), None);
     }
 }

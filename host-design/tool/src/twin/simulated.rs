@@ -256,7 +256,8 @@ impl<'a, 't> World<'a, 't> {
         }
         let output = self.delayed.front().copied().unwrap_or(Output::OFF);
         let push_n = self.pushes();
-        if let Some(held) = self.hand.tick(self.harness.session.status().signs) {
+        let status = self.harness.session.status();
+        if let Some(held) = self.hand.tick(&status, self.harness.bench.state()) {
             let held = held.to_vec();
             self.pull = None;
             return self.harness.bench.hold(&held);

@@ -1,5 +1,6 @@
 //! Tests of the command line and of the modules behind it. One program, so that linking happens once.
 
+mod bench_drive;
 mod board_layer;
 mod campaign;
 mod command;
@@ -9,6 +10,7 @@ mod compare_sweep;
 mod cycles;
 mod documented_tables;
 mod documents;
+mod first_power_up;
 mod identify_command;
 mod image;
 mod lossy_line;

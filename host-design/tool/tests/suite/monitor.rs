@@ -18,6 +18,7 @@ use upright::protocol::message::{
     Answer, Command as Asked, CrashRecord, Info, Message, PROTOCOL, Reply, Request, Reset, Telemetry,
 };
 use upright::protocol::serial_link::{MAX_COMMAND, MAX_MESSAGE};
+use upright::supervision::bench_drive::MotorSign;
 use upright::supervision::fault::Fault;
 use upright::supervision::homing::Homing;
 use upright::supervision::inhibits::Inhibits;
@@ -46,6 +47,7 @@ fn telemetry(tick: u32, state: State, fault: Option<Fault>) -> Telemetry<10, 5> 
         cause_tick: 7,
         homing: Homing::Homed,
         signs: Signs::Checked,
+        motor: MotorSign::Checked,
         arming_inhibits: if fault.is_some() { Inhibits::FAULT } else { Inhibits::NONE },
         swing_up_inhibits: Inhibits::NO_SWING_UP,
         motion_tick: 0,
@@ -123,6 +125,33 @@ fn press(monitor: &mut Monitor, code: KeyCode) -> Vec<Request> {
     let said = asked(monitor);
     said.iter().for_each(|command| answer(monitor, command.id, Answer::Done));
     said.into_iter().map(|command| command.request).collect()
+}
+
+#[test]
+fn a_held_key_sends_the_drive_again_and_tells_a_refusal_once() {
+    let mut monitor = met(PROTOCOL);
+    told(&mut monitor, telemetry(1, State::Calibrated, None));
+    answer_all(&mut monitor);
+    let before = monitor.log.len();
+    assert_eq!(press(&mut monitor, KeyCode::Char('m')), [Request::Drive { along: true }]);
+    assert_eq!(press(&mut monitor, KeyCode::Char('M')), [Request::Drive { along: false }]);
+    assert_eq!(monitor.log.len(), before, "{:?}", monitor.log);
+    // It is not repeated by itself: a key that is let go sends nothing.
+    monitor.poll(NOW + Duration::from_millis(100));
+    assert!(asked(&mut monitor).iter().all(|command| !matches!(command.request, Request::Drive { .. })));
+    answer_all(&mut monitor);
+    for reasons in [Inhibits::SIGNS, Inhibits::SIGNS.union(Inhibits::HELD), Inhibits::HELD] {
+        answer_all(&mut monitor);
+        monitor.act(action(&KeyEvent::new(KeyCode::Char('m'), KeyModifiers::NONE)).unwrap(), NOW);
+        let id = asked(&mut monitor).last().unwrap().id;
+        answer(&mut monitor, id, Answer::NotNow(reasons));
+    }
+    let refused = monitor.log.iter().filter(|line| line.contains("drive along +x: refused")).count();
+    assert_eq!(refused, 1, "{:?}", monitor.log);
+    for (motor, what) in [(MotorSign::Reversed, "wrong way"), (MotorSign::Still, "not moved the cart")] {
+        told(&mut monitor, Telemetry { motor, ..telemetry(2, State::Calibrated, None) });
+        assert!(screen(&monitor).contains(what));
+    }
 }
 
 #[test]

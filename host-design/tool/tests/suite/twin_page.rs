@@ -156,6 +156,16 @@ fn a_link_that_is_pulled_comes_back_and_one_that_is_pulled_too_far_is_a_fault_th
         browser.key("k");
         until(&mut browser, "!upright.seen.telemetry.against_arming.join().includes('signs')");
     }
+    for _ in 0..10 {
+        if browser.value("upright.seen.telemetry.against_arming.join().includes('motor')") == false {
+            break;
+        }
+        // A key that is held until the motor has moved the cart.
+        browser.value("document.dispatchEvent(new KeyboardEvent('keydown', { key: 'm' }))");
+        wait(1.0);
+        browser.value("document.dispatchEvent(new KeyboardEvent('keyup', { key: 'm' }))");
+        wait(0.5);
+    }
     browser.key("u");
     until(&mut browser, &format!("Math.abs(Math.sin({MACHINE}.state[2] / 2)) < 1e-9"));
     until_done(&mut browser, "a", &format!("({STATE}) === 'Armed' || ({STATE}) === 'Balancing'"));

@@ -31,6 +31,11 @@ keys! {
         travel_tolerance_m: Option<f64>, "m", Rule::POSITIVE,
             "difference allowed between travel_m and the distance of the limit switches",
             Absent::Follows("1 % of the rail");
+        // A rig without it keeps its hash, by which stored motions and gain tables know it.
+        #[serde(skip_serializing_if = "Option::is_none")]
+        bench_force_n: Option<f64>, "N", Rule::POSITIVE,
+            "largest force of the bench drive, of which no more than force_limit_n is used",
+            Absent::Follows("10 % of force_limit_n");
         supply_min_v: Option<f64>, "V", Rule::NOT_NEGATIVE,
             "least supply voltage of the power stage", Absent::Follows("80 % of supply_v; 0 without a motor");
         supply_time_s: f64, "s", Rule::DURATION,

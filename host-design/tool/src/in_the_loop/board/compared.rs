@@ -97,10 +97,21 @@ impl<'a> Compared<'a> {
 
 /// All but what a clock measures, and what only one of them has.
 fn bits(telemetry: &AnyTelemetry) -> (String, Vec<u32>) {
-    let AnyTelemetry { tick, state, law, fault, cause_tick, homing, signs, arming_inhibits, counts, .. } =
-        telemetry;
+    let AnyTelemetry {
+        tick,
+        state,
+        law,
+        fault,
+        cause_tick,
+        homing,
+        signs,
+        motor,
+        arming_inhibits,
+        counts,
+        ..
+    } = telemetry;
     let words =
-        format!("{:?}", (tick, state, law, fault, cause_tick, homing, signs, arming_inhibits, counts));
+        format!("{:?}", (tick, state, law, fault, cause_tick, homing, signs, motor, arming_inhibits, counts));
     let values = telemetry.estimate.iter().chain(&telemetry.innovation);
     let single = [telemetry.setpoint_m, telemetry.requested_n, telemetry.applied_n, telemetry.drive];
     (words, values.chain(&single).map(|value| value.to_bits()).collect())

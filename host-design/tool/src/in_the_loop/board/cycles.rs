@@ -54,7 +54,7 @@ pub struct Cycles {
     pub core_hz: u32,
     /// The tick's period.
     pub period: Span,
-    /// Ticks with the motor off: disarmed, homing, armed.
+    /// Ticks without the control law: with the motor off (disarmed, homing, armed), and those of the bench drive.
     pub off: Option<Figures>,
     /// Ticks of balancing.
     pub balancing: Option<Figures>,
@@ -180,31 +180,40 @@ pub fn measure(
     image: &Image,
     conditions: &Conditions,
 ) -> Result<Cycles, RunError> {
-    let run = |action: &dyn Fn(&mut VirtualBoard) -> Result<Option<Fault>, HarnessError>| {
+    let run = |action: &dyn Fn(&mut VirtualBoard, &mut usize) -> Result<Option<Fault>, HarnessError>| {
         let mut board = VirtualBoard::start(image, conditions, table)?;
         board.measure_ticks();
-        let ended = match action(&mut board) {
+        let mut driven = 0;
+        let ended = match action(&mut board, &mut driven) {
             Ok(fault) => fault.map(|fault| format!("it ends with fault {fault}")),
             Err(error @ HarnessError::Board(_)) => return Err(error),
             Err(error) => Some(error.to_string()),
         };
-        Ok(Run { core_hz: board.board().core_hz(), ticks: board.ticks().to_vec(), ended })
+        let mut ticks = board.ticks().to_vec();
+        // Before the law drives, the bench drive has an output, too.
+        let before = ticks.len().saturating_sub(driven);
+        ticks.iter_mut().take(before).for_each(|tick| tick.latency = None);
+        Ok(Run { core_hz: board.board().core_hz(), ticks, ended })
     };
-    let balances = run(&|board| balance(rig, table, scenario, board))?;
+    let balances = run(&|board, driven| balance(rig, table, scenario, board, driven))?;
     let moves = match up_and_down(rig, table, UPRIGHT_S) {
-        Ok(motion) => run(&|board| Ok(record(rig, table, &motion, board)?.fault))?,
+        Ok(motion) => run(&|board, driven| {
+            *driven = (motion.duration_s / rig.tick.period_s) as usize;
+            Ok(record(rig, table, &motion, board)?.fault)
+        })?,
         Err(_) => Run::default(),
     };
     let cycles = Cycles::of(balances, moves, rig.tick.period_s);
     cycles.ok_or_else(|| HarnessError::Board("has no tick".to_owned()).into())
 }
 
-/// Balances for the duration of `scenario`; gives the fault that has ended it.
+/// Balances for the duration of `scenario`, and counts its ticks in `balanced`; gives the fault that has ended it.
 fn balance(
     rig: &Rig,
     table: &TableValues,
     scenario: &Scenario,
     board: &mut VirtualBoard,
+    balanced: &mut usize,
 ) -> Result<Option<Fault>, HarnessError> {
     let mut harness = Harness::new(rig, table, scenario, board)?;
     if table.observer.is_none() {
@@ -214,10 +223,12 @@ fn balance(
         return Err(HarnessError::FullState);
     }
     let mut output = harness.raise(None)?;
+    *balanced = 1;
     for _ in 0..(scenario.duration_s / rig.tick.period_s) as usize {
         harness.bench.tick(output.drive);
         let inputs = harness.inputs();
         output = harness.session.tick(&inputs)?;
+        *balanced += 1;
     }
     Ok(harness.session.fault())
 }

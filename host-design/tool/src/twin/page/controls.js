@@ -6,6 +6,10 @@ const byId = (id) => document.getElementById(id);
 const KEYS = {
   h: 'home', H: 'home-rail', g: 'check-signs', a: 'arm', d: 'disarm', c: 'clear', w: 'up', s: 'down',
 };
+// Keys that work while they are held.
+const HELD = { m: 'drive +x', M: 'drive -x' };
+// Time between two commands of a held key (ms): the firmware takes the key for let go after 100 ms.
+const REPEAT_MS = 25;
 const HOLDS = { f: 'free', j: 'hanging', k: 'guided', u: 'upright' };
 const KEPT_LINES = 200;
 
@@ -32,6 +36,7 @@ export class Controls {
     this.say = (line) => ask({ ask: 'say', line });
     this.machine = (what) => ask({ ask: 'machine', what });
     this.isPaused = false;
+    this.held = null;
     this.isRecording = false;
     this.sliders = new Map();
     this.listen();
@@ -77,6 +82,12 @@ export class Controls {
     // Before anything else sees the key, whatever has the focus.
     document.addEventListener('keydown', (event) => this.stopKey(event), true);
     document.addEventListener('keydown', (event) => this.key(event));
+    document.addEventListener('keyup', () => this.letGo());
+    for (const element of document.querySelectorAll('[data-held]')) {
+      element.addEventListener('pointerdown', () => this.hold(element.dataset.held));
+      for (const end of ['pointerup', 'pointerleave', 'pointercancel']) element.addEventListener(end, () => this.letGo());
+    }
+    window.addEventListener('blur', () => this.letGo());
   }
 
   stopKey(event) {
@@ -87,9 +98,21 @@ export class Controls {
     event.stopPropagation();
   }
 
+  hold(line) {
+    this.letGo();
+    this.say(line);
+    this.held = setInterval(() => this.say(line), REPEAT_MS);
+  }
+
+  letGo() {
+    clearInterval(this.held);
+    this.held = null;
+  }
+
   key(event) {
     if (event.ctrlKey || event.altKey || event.metaKey || ['INPUT', 'SELECT'].includes(event.target.tagName)) return;
     if (KEYS[event.key] !== undefined) this.say(KEYS[event.key]);
+    else if (HELD[event.key] !== undefined && !event.repeat) this.hold(HELD[event.key]);
     else if (HOLDS[event.key] !== undefined) this.machine({ do: 'hold', how: HOLDS[event.key] });
     else if (event.key === 'p') this.machine({ do: 'pause', on: !this.isPaused });
     else if (event.key === '.') this.machine({ do: 'step', ticks: 1 });
@@ -163,7 +186,7 @@ export class Controls {
     state.dataset.state = latest.state;
     byId('now').textContent = latest.now === null ? '' : `now: ${latest.now}`;
     byId('inputs').textContent = latest.inputs;
-    const isOn = ['Armed', 'Raising', 'Balancing', 'Lowering'].includes(latest.state);
+    const isOn = ['Driving', 'Armed', 'Raising', 'Balancing', 'Lowering'].includes(latest.state);
     const against = isOn ? [] : latest.against_arming;
     const shown = [...byId('against').children].map((element) => element.textContent);
     if (shown.join() !== against.join()) {

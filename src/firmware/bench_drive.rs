@@ -1,0 +1,65 @@
+//! The bench drive: when it may begin, and a tick of it.
+
+use super::Firmware;
+use crate::board::{Inputs, Output};
+use crate::control::actuator::Drive;
+use crate::supervision::calibration::links_hang;
+use crate::supervision::inhibits::Inhibits;
+use crate::supervision::supervisor::State;
+use crate::table::SwingUp;
+
+impl<const NX: usize, const NY: usize, S: SwingUp<NX, NY>> Firmware<'_, NX, NY, S> {
+    /// Keeps the drive going, or begins it: along +x, or against it.
+    pub(super) fn hold_drive(&mut self, along: bool) -> Result<(), Inhibits> {
+        let is_driving = self.supervisor.state() == State::Driving;
+        if is_driving && along != self.bench_drive.is_along() {
+            return Err(Inhibits::RUNNING);
+        }
+        let is_released = self.bench_drive.is_released(self.table.tick_s);
+        self.bench_drive.hold();
+        if is_driving {
+            return Ok(());
+        }
+        let counts = self.controller.encoders().counts();
+        let inhibits = self
+            .inhibits_before_motor_check()
+            .union(Inhibits::HELD.when(!is_released))
+            .union(Inhibits::NOT_HANGING.when(!links_hang(counts, &self.table.limits)))
+            .union(self.off_centre_inhibit(counts));
+        let cart_counts = cart(counts);
+        self.supervisor.start_driving(inhibits)?;
+        self.debounce.start();
+        self.bench_drive.begin(along, cart_counts);
+        Ok(())
+    }
+
+    /// What the sign check requires of the cart; 0 without a cart (counts).
+    pub(super) fn cart_sign_counts(&self) -> i32 {
+        cart(&self.table.limits.sign_counts)
+    }
+
+    /// A tick of the drive.
+    // Not part of the tick in which it is called: the bound on the stack has to follow every jump there.
+    #[inline(never)]
+    pub(super) fn push_cart(&mut self, inputs: &Inputs<NY>) {
+        let table = self.table;
+        let counts = self.follow();
+        if let Some(fault) = self.debounce.check_inputs(&table.limits, table.supply_max_v(), inputs) {
+            return self.trip(fault, None);
+        }
+        match self.bench_drive.update(cart(&counts), self.cart_sign_counts(), table.tick_s) {
+            Some(share) => {
+                let force_n = share * table.limits.bench_force_n;
+                (self.requested_n, self.applied_n) = (force_n, force_n);
+                let drive = Drive::at_rest(force_n, table.motor.as_ref());
+                self.output = Output { enable: true, drive };
+            }
+            None => self.supervisor.disarm(),
+        }
+    }
+}
+
+/// What is the cart's of the sensors' counts.
+fn cart<const NY: usize>(counts: &[i32; NY]) -> i32 {
+    counts.first().copied().unwrap_or_default()
+}

@@ -1,0 +1,189 @@
+//! The bench drive: while a person holds a key, the motor pushes the cart a little, with the links hanging.
+//!
+//! It shows whether the motor pushes the way in which the cart's encoder counts, before anything is balanced, and lets PWM,
+//! break input and dead-man time be measured. The force rises slowly to
+//! [`bench_force_n`](crate::table::Limits::bench_force_n). The drive ends when the key is let go, when the cart has moved far
+//! enough to tell the sign, or after [`LONGEST_S`]. A key that stays held after that does not begin another one.
+
+use serde::{Deserialize, Serialize};
+
+/// The key is let go when the host has been silent for so long (s).
+pub const SILENCE_S: f32 = 0.1;
+/// Longest drive (s). A cart that has not moved by then is not moved by the motor.
+pub const LONGEST_S: f32 = 1.0;
+/// Rise of the force, in full sizes per second.
+const RISE_PER_S: f32 = 10.0;
+/// Motion that tells the sign, as a part of that by which the sign check has the cart pushed.
+const PART_OF_SIGN_COUNTS: i32 = 10;
+
+/// What is known of the motor's sign.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+pub enum MotorSign {
+    /// Not driven since power-up, or since a fault that puts the motor in doubt.
+    #[default]
+    Unchecked,
+    /// The cart has moved the way that the motor pushed it.
+    Checked,
+    /// The cart has moved the other way.
+    Reversed,
+    /// The cart has not moved.
+    Still,
+}
+
+/// A drive, and what the last one has shown.
+#[derive(Debug, Clone)]
+pub struct BenchDrive {
+    sign: MotorSign,
+    /// Whether it pushes along +x.
+    along: bool,
+    start_counts: i32,
+    /// Ticks since its beginning.
+    ticks: u32,
+    /// Ticks since the last command to drive.
+    silent_ticks: u32,
+}
+
+impl BenchDrive {
+    /// No drive, and nothing known of the motor; `sign_counts` is what the sign check requires of the cart. Without a cart
+    /// (0), there is nothing to check.
+    pub fn new(sign_counts: i32) -> Self {
+        let sign = if sign_counts == 0 { MotorSign::Checked } else { MotorSign::Unchecked };
+        Self { sign, along: true, start_counts: 0, ticks: 0, silent_ticks: u32::MAX }
+    }
+
+    /// What is known of the motor's sign.
+    pub fn sign(&self) -> MotorSign {
+        self.sign
+    }
+
+    /// Whether the drive in progress, or the last one, pushes along +x.
+    pub fn is_along(&self) -> bool {
+        self.along
+    }
+
+    /// Forgets what is known of the motor, except that there is nothing to check.
+    pub fn forget(&mut self, sign_counts: i32) {
+        if sign_counts != 0 {
+            self.sign = MotorSign::Unchecked;
+        }
+    }
+
+    /// Whether the key has been let go, in ticks of `tick_s` (s).
+    pub fn is_released(&self, tick_s: f32) -> bool {
+        self.silent_ticks as f32 * tick_s >= SILENCE_S
+    }
+
+    /// A command to drive has come: the key is held.
+    pub fn hold(&mut self) {
+        self.silent_ticks = 0;
+    }
+
+    /// Begins a drive with the cart at `cart_counts`.
+    pub fn begin(&mut self, along: bool, cart_counts: i32) {
+        (self.along, self.start_counts, self.ticks) = (along, cart_counts, 0);
+    }
+
+    /// Counts a tick of silence.
+    pub fn wait(&mut self) {
+        self.silent_ticks = self.silent_ticks.saturating_add(1);
+    }
+
+    /// A tick of the drive with the cart at `cart_counts`: the force, as a share of the largest one and with its sign; none
+    /// when the drive has ended. `sign_counts` as in [`new`](Self::new).
+    pub fn update(&mut self, cart_counts: i32, sign_counts: i32, tick_s: f32) -> Option<f32> {
+        self.wait();
+        if self.is_released(tick_s) {
+            return None;
+        }
+        let moved = cart_counts.wrapping_sub(self.start_counts);
+        let moved = if self.along { moved } else { moved.wrapping_neg() };
+        let enough = sign_counts / PART_OF_SIGN_COUNTS;
+        let found = if moved > enough {
+            MotorSign::Checked
+        } else if moved < -enough {
+            MotorSign::Reversed
+        } else if self.ticks as f32 * tick_s >= LONGEST_S {
+            MotorSign::Still
+        } else {
+            self.ticks += 1;
+            let share = (self.ticks as f32 * tick_s * RISE_PER_S).min(1.0);
+            return Some(if self.along { share } else { -share });
+        };
+        if sign_counts != 0 {
+            self.sign = found;
+        }
+        None
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const TICK_S: f32 = 0.001;
+    const SIGN_COUNTS: i32 = 400;
+
+    /// Number of ticks with the motor on and what is then known, for a key that is repeated every `repeat` ticks, and a cart
+    /// that moves by `speed` counts per tick.
+    fn drive(along: bool, repeat: u32, speed: i32) -> (u32, MotorSign) {
+        let mut drive = BenchDrive::new(SIGN_COUNTS);
+        assert!(drive.is_released(TICK_S));
+        drive.hold();
+        drive.begin(along, 7);
+        let (mut counts, mut driven) = (7, 0);
+        for tick in 1..3000 {
+            if tick % repeat == 0 {
+                drive.hold();
+            }
+            match drive.update(counts, SIGN_COUNTS, TICK_S) {
+                Some(share) => {
+                    assert_eq!(share > 0.0, along);
+                    assert!(share.abs() <= 1.0 && share.abs() <= 0.0101 * tick as f32, "{share}");
+                }
+                None => break,
+            }
+            driven += 1;
+            counts += speed;
+        }
+        (driven, drive.sign())
+    }
+
+    #[test]
+    fn it_ends_when_the_key_is_let_go_and_after_a_second() {
+        assert_eq!(drive(true, 5000, 0), (99, MotorSign::Unchecked));
+        assert_eq!(drive(true, 50, 0), (1000, MotorSign::Still));
+    }
+
+    #[test]
+    fn the_cart_tells_the_sign() {
+        assert_eq!(drive(true, 50, 10), (5, MotorSign::Checked));
+        assert_eq!(drive(false, 50, -10), (5, MotorSign::Checked));
+        assert_eq!(drive(true, 50, -10), (5, MotorSign::Reversed));
+        assert_eq!(drive(false, 50, 10), (5, MotorSign::Reversed));
+    }
+
+    #[test]
+    fn a_key_that_stays_held_is_not_released() {
+        let mut drive = BenchDrive::new(SIGN_COUNTS);
+        drive.hold();
+        for _ in 0..5 {
+            (0..99).for_each(|_| drive.wait());
+            assert!(!drive.is_released(TICK_S));
+            drive.hold();
+        }
+        (0..100).for_each(|_| drive.wait());
+        assert!(drive.is_released(TICK_S));
+    }
+
+    #[test]
+    fn without_a_cart_there_is_nothing_to_check() {
+        let mut drive = BenchDrive::new(0);
+        assert_eq!(drive.sign(), MotorSign::Checked);
+        drive.hold();
+        drive.begin(true, 0);
+        assert!(drive.update(0, 0, TICK_S).is_some());
+        assert_eq!(drive.update(-1, 0, TICK_S), None);
+        drive.forget(0);
+        assert_eq!(drive.sign(), MotorSign::Checked);
+    }
+}
