@@ -32,7 +32,7 @@ const NIBBLES: [u32; 16] = {
 };
 
 /// Checksum of all words of `table`, as little-endian bytes in the order of declaration.
-pub(crate) fn checksum(table: &impl Part) -> u32 {
+pub(crate) fn checksum(table: &dyn Part) -> u32 {
     let leaves = (0..).map_while(|leaf| table.part(&mut { leaf }));
     leaves.fold(0, |crc, leaf| {
         (0..).map_while(|word| leaf.get(word)).fold(crc, |crc, word| crc32(crc, &word.to_le_bytes()))
@@ -52,7 +52,7 @@ pub struct ChecksumScan {
 
 impl ChecksumScan {
     /// Adds the next word of `table`. After the last word, returns the checksum of all words and starts again.
-    pub fn next(&mut self, table: &impl Part) -> Option<u32> {
+    pub fn next(&mut self, table: &dyn Part) -> Option<u32> {
         let Some(words) = table.part(&mut usize::from(self.leaf)) else {
             return Some(core::mem::take(self).crc);
         };

@@ -246,7 +246,7 @@ impl<P: Resize<Q>, Q> Resize<Option<Q>> for Option<P> {
 }
 
 /// Whether a part is free of infinities and NaN.
-pub(crate) fn is_finite(part: &impl Part) -> bool {
+pub(crate) fn is_finite(part: &dyn Part) -> bool {
     (0..).map_while(|leaf| part.part(&mut { leaf })).all(|words| match words {
         Words::F32(values) => values.iter().all(|value| value.is_finite()),
         _ => true,

@@ -2,7 +2,7 @@
 //!
 //! # Modules
 //!
-//! Data flows in this order, on top of [`numerics`]:
+//! Data flows in this order, on top of [`numerics`]; long studies are spread over all processors by [`parallel`]:
 //!
 //! | module | from | to |
 //! |---|---|---|
@@ -27,6 +27,7 @@ pub mod harness;
 pub mod identify;
 pub mod number;
 pub mod numerics;
+pub mod parallel;
 pub mod plant;
 pub mod reality;
 pub mod rig;

@@ -55,6 +55,14 @@ pub struct Feedback<T> {
     pub integral: bool,
 }
 
+impl Feedback<f64> {
+    /// `u = N r - K x` (N) at the set-point `setpoint`, for a K over the state x alone.
+    pub fn force_n(&self, setpoint: f64, x: &[f64]) -> f64 {
+        let fed_back: f64 = self.k.entries().iter().zip(x).map(|(gain, entry)| gain * entry).sum();
+        self.n.unwrap_or(0.0) * setpoint - fed_back
+    }
+}
+
 impl<T> Laws<T> {
     /// The laws without integral action.
     pub fn each(&self) -> PerLaw<Option<&Feedback<T>>> {

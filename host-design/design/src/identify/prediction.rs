@@ -3,14 +3,13 @@
 // The indices are those of the equations.
 #![allow(clippy::needless_range_loop)]
 
-use rayon::prelude::*;
-
 use super::model::{Input, Model};
 use super::normal::Normal;
 use super::parameters::{Layout, Prior};
 use super::record::Record;
 use super::shooting::scaled;
 use super::step::Step;
+use crate::parallel;
 
 /// Length of a run of the filter (s): they run in parallel.
 const SEGMENT_S: f64 = 10.0;
@@ -61,11 +60,8 @@ impl Filter<'_> {
         let inputs: Vec<Vec<Input>> =
             (0..self.record.pieces.len()).map(|piece| self.record.inputs(layout, p, piece)).collect();
         let size = if free { layout.count() } else { 0 };
-        let each: Vec<Normal> = self
-            .segments()
-            .into_par_iter()
-            .map(|segment| self.segment(p, noise, &inputs[segment.0], segment, free))
-            .collect();
+        let one = |segment: (usize, usize, usize)| self.segment(p, noise, &inputs[segment.0], segment, free);
+        let each = parallel::map(self.segments(), one);
         let mut sum = each.iter().fold(Normal::new(size, self.record.channels), Normal::merge);
         if free {
             sum.add_prior(&scaled(self.priors, p));

@@ -3,13 +3,12 @@
 // The indices are those of the equations.
 #![allow(clippy::needless_range_loop)]
 
-use rayon::prelude::*;
-
 use super::model::{Input, Model};
 use super::normal::{Cholesky, Normal};
 use super::parameters::Prior;
 use super::record::Record;
 use super::step::Step;
+use crate::parallel;
 
 /// Length of a window (s).
 pub(super) const WINDOW_S: f64 = 0.25;
@@ -135,14 +134,10 @@ impl Shooting<'_> {
         let layout = self.model.layout;
         let inputs: Vec<Vec<Input>> =
             (0..self.record.pieces.len()).map(|piece| self.record.inputs(layout, &fit.p, piece)).collect();
-        let each: Vec<(Normal, Option<Reduced>)> = fit
-            .windows
-            .par_iter()
-            .map(|window| {
-                let whole = self.window(&fit.p, &inputs[window.piece], window, weights);
-                self.reduce(whole)
-            })
-            .collect();
+        let each = parallel::map(&fit.windows, |window| {
+            let whole = self.window(&fit.p, &inputs[window.piece], window, weights);
+            self.reduce(whole)
+        });
         let size = if self.free { layout.count() } else { 0 };
         let mut sum = Normal::new(size, self.record.channels);
         let mut kept = Vec::with_capacity(each.len());

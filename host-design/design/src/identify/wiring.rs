@@ -1,11 +1,10 @@
 //! Signs, swapped encoders, counts per turn and the sign of the motor: which wiring explains the log best.
 
-use rayon::prelude::*;
-
 use super::model::Model;
 use super::parameters::Prior;
 use super::record::Record;
 use super::shooting::{Shooting, WINDOW_S};
+use crate::parallel;
 
 /// Time of the log that is used (s).
 const TIME_S: [f64; 2] = [0.5, 5.0];
@@ -121,21 +120,19 @@ pub(super) fn find(
     let short = if short.pieces.is_empty() { record.clone() } else { short };
     let start: Vec<f64> = priors.iter().map(|prior| prior.value).collect();
     let all = wirings(record.channels);
-    let mut scores: Vec<(f64, Wiring)> = all
-        .par_iter()
-        .map(|&wiring| {
-            let record = undone(&short, wiring);
-            let shooting = Shooting { model, record: &record, priors, free: true };
-            let fit = shooting.fit(&start, WINDOW_S, ITERATIONS, 1);
-            // Relative to the motion: a factor on the counts must not make residuals small.
-            let of = |(channel, rms): (usize, &f64)| {
-                libm::log(rms.max(0.2 * record.steps[channel]) / record.extent(channel)[1])
-            };
-            let score = fit.rms.iter().enumerate().map(of).sum::<f64>() / record.channels as f64;
-            progress();
-            (if score.is_nan() { f64::INFINITY } else { score }, wiring)
-        })
-        .collect();
+    let score = |&wiring: &Wiring| {
+        let record = undone(&short, wiring);
+        let shooting = Shooting { model, record: &record, priors, free: true };
+        let fit = shooting.fit(&start, WINDOW_S, ITERATIONS, 1);
+        // Relative to the motion: a factor on the counts must not make residuals small.
+        let of = |(channel, rms): (usize, &f64)| {
+            libm::log(rms.max(0.2 * record.steps[channel]) / record.extent(channel)[1])
+        };
+        let score = fit.rms.iter().enumerate().map(of).sum::<f64>() / record.channels as f64;
+        progress();
+        (if score.is_nan() { f64::INFINITY } else { score }, wiring)
+    };
+    let mut scores = parallel::map(&all, score);
     let of_file = scores[0].0;
     scores.sort_by(|one, other| one.0.total_cmp(&other.0));
     WiringFound {

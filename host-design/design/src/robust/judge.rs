@@ -1,9 +1,9 @@
 //! Whether a loop stands its tolerances, by simulation.
 
-use rayon::prelude::*;
 use serde::Serialize;
 use upright::table::Law;
 
+use crate::parallel;
 use crate::plant::absolute_angles;
 use crate::rig::{PerJoint, Rig, Tolerances};
 use crate::simulate::{Scenario, SimulationError, run};
@@ -85,8 +85,7 @@ pub fn judge(
     }
     let machines = SHARES.into_iter().map(|share| {
         let of_seed = |seed: u64| one(&machine(rig, tolerances, share), table, law, settings, seed);
-        let all: Vec<Outcome> =
-            (1..=settings.runs).into_par_iter().map(of_seed).collect::<Result<_, SimulationError>>()?;
+        let all: Vec<Outcome> = parallel::try_map(1..=settings.runs, of_seed)?;
         Ok(summary(share, &all))
     });
     let machines = machines.collect::<Result<_, Unverifiable>>()?;

@@ -1,6 +1,5 @@
 //! The choice among the candidates.
 
-use rayon::prelude::*;
 use serde::Serialize;
 use upright::table::Law;
 
@@ -9,6 +8,7 @@ use super::error::RobustError;
 use super::judge::{JudgeSettings, Judgement, SHARES, judge, machine, one};
 use super::linear::LinearPlants;
 use crate::design::{Certified, DesignError, design};
+use crate::parallel;
 use crate::rig::{Rig, Tolerances};
 use crate::table::{Gains, TableValues};
 use crate::verify::{ControllerModel, PlantModel, Unverifiable, chain};
@@ -152,25 +152,23 @@ impl<'a> Search<'a> {
             let alone = Rig { kalman: None, ..rig.with_law_alone(law) };
             let all = candidates(rig, law)?;
             // A candidate without a design is no candidate.
-            let designed: Vec<_> = all
-                .into_par_iter()
-                .filter_map(|one| design(&one.applied(&alone)).ok().map(|certified| (one, certified)))
-                .collect();
+            let designed = parallel::map(&all, |one| {
+                design(&one.applied(&alone)).ok().map(|certified| (one.clone(), certified))
+            });
+            let designed: Vec<_> = designed.into_iter().flatten().collect();
             if !designed.is_empty() {
                 pools.push(Pool { law, designs: designed });
             }
         }
         let noises = joint_noises(rig.kalman.as_ref().map_or(&[][..], |kalman| &kalman.joint_noise));
-        let observers: Vec<Observer> = noises
-            .into_par_iter()
-            .filter_map(|(factor, joint_noise)| {
-                let alone = Rig { lqr: None, pole_placement: None, integral: None, ..rig.clone() };
-                let certified = design(&with_noise(&alone, &joint_noise)).ok()?;
-                Some(Observer { factor, joint_noise, certified })
-            })
-            .collect();
+        let observers = parallel::map(&noises, |(factor, joint_noise)| {
+            let alone = Rig { lqr: None, pole_placement: None, integral: None, ..rig.clone() };
+            let certified = design(&with_noise(&alone, joint_noise)).ok()?;
+            Some(Observer { factor: *factor, joint_noise: joint_noise.clone(), certified })
+        });
+        let observers = observers.into_iter().flatten().collect();
         let mut search = Self { rig, tolerances, settings, plants, pools, observers, ranked: Vec::new() };
-        let of_pool = |pool| search.observers.par_iter().map(|one| search.rank(pool, one)).collect();
+        let of_pool = |pool| parallel::map(&search.observers, |one| search.rank(pool, one));
         let ranked = search.pools.iter().map(of_pool).collect();
         search.ranked = ranked;
         Ok(search)
@@ -252,7 +250,7 @@ impl<'a> Search<'a> {
     fn choice(&self, stage: &dyn Fn(&'static str)) -> Result<Choice, RobustError> {
         let corners = self.plants.corners(1.0)?;
         let first = |&[pool, observer]: &[usize; 2]| self.next([pool, observer, 0], 1.0, &corners);
-        let found: Vec<Option<usize>> = self.pairs().par_iter().map(first).collect::<Result<_, _>>()?;
+        let found: Vec<Option<usize>> = parallel::try_map(&self.pairs(), first)?;
         let mut heads: Vec<Vec<Option<usize>>> =
             found.chunks(self.observers.len()).map(<[_]>::to_vec).collect();
         stage("judging");
@@ -334,7 +332,7 @@ impl<'a> Search<'a> {
             best.resize(scales.len(), None);
             Ok(best)
         };
-        self.pairs().par_iter().map(climb).collect()
+        parallel::try_map(&self.pairs(), climb)
     }
 
     fn front(&self, scales: &[f64]) -> Result<Front, RobustError> {
@@ -372,7 +370,7 @@ impl<'a> Search<'a> {
                 self.plants.holds(&self.ranked[pool][observer][place].controller, corners)
             };
             let places: Vec<[usize; 3]> = all().collect();
-            let stable: Vec<bool> = places.par_iter().map(linear).collect::<Result<_, _>>()?;
+            let stable: Vec<bool> = parallel::try_map(&places, linear)?;
             if !stable.contains(&true) {
                 let percent = self.tolerances.mass_percent;
                 reasons.push(format!(
@@ -382,7 +380,7 @@ impl<'a> Search<'a> {
                 continue;
             }
             let stands = |at: &[usize; 3]| self.runs_stand(*at, 1.0);
-            let stand: Vec<bool> = places.par_iter().map(stands).collect::<Result<_, _>>()?;
+            let stand: Vec<bool> = parallel::try_map(&places, stands)?;
             if !stand.contains(&true) {
                 reasons.push(format!(
                     "{law}: none of {count} loops stands friction, zeros and latency within the limits; \

@@ -2,7 +2,6 @@
 
 use std::collections::BTreeMap;
 
-use rayon::prelude::*;
 use serde::Serialize;
 use upright::protocol::message::Request;
 use upright::supervision::supervisor::State;
@@ -13,6 +12,7 @@ use super::motion::SwingUp;
 use super::robustness::{Runs, Spread, deviation, drawn};
 use super::way::Way;
 use crate::harness::{Harness, HarnessError, Target, with_firmware};
+use crate::parallel;
 use crate::rig::{LinkEncoder, PlantDescription, Rig};
 use crate::simulate::{Begin, Scenario};
 use crate::table::TableValues;
@@ -113,7 +113,7 @@ pub fn firmware_runs(
             .flatten()
             .map_err(|error| SwingUpError::Firmware(error.to_string()))
     };
-    let all: Vec<Reached> = (0..runs).into_par_iter().map(one).collect::<Result<_, _>>()?;
+    let all: Vec<Reached> = parallel::try_map(0..runs, one)?;
     let mut faults = BTreeMap::new();
     for fault in all.iter().filter_map(|run| run.fault.clone()) {
         *faults.entry(fault).or_default() += 1;

@@ -2,7 +2,6 @@
 
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
-use rayon::prelude::*;
 use serde::Serialize;
 
 use super::SwingUpError;
@@ -10,6 +9,7 @@ use super::closed_loop::{LOST_RAD, Trial, run};
 use super::motion::Motion;
 use super::setting::Setting;
 use super::way::Way;
+use crate::parallel;
 use crate::plant::absolute_angles;
 use crate::rig::{Chain, PerJoint, PlantDescription, Rig};
 use crate::verify::wilson;
@@ -157,7 +157,7 @@ pub(super) fn random_runs(
         let trial = sample(setting, motion, way, spread, base_seed + index as u64);
         run(setting, motion, way, &trial)
     };
-    let all: Vec<_> = (0..runs).into_par_iter().map(one).collect::<Result<_, _>>()?;
+    let all: Vec<_> = parallel::try_map(0..runs, one)?;
     let stood = all.iter().filter(|outcome| outcome.stood).count();
     let standing = all.iter().filter(|outcome| outcome.stood);
     Ok(Runs {

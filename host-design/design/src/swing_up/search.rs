@@ -2,7 +2,6 @@
 
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
-use rayon::prelude::*;
 
 use super::SwingUpError;
 use super::gains::motion;
@@ -14,6 +13,7 @@ use super::setting::Setting;
 use super::shooting;
 use super::way::Way;
 use crate::numerics::Matrix;
+use crate::parallel;
 
 /// Share of motor and speed that a plan uses, and the ranges for force and rail: what is left is for the feedback.
 const SHARE: f64 = 0.9;
@@ -140,7 +140,8 @@ pub(super) fn solvable(
     way: Way,
     numbers: core::ops::Range<u64>,
 ) -> usize {
-    numbers.into_par_iter().filter(|&number| solve(setting, request, way, number).is_some()).count()
+    let found = parallel::map(numbers, |number| solve(setting, request, way, number).is_some());
+    found.into_iter().filter(|&found| found).count()
 }
 
 /// All links turn evenly, at the force of the draw.
@@ -199,6 +200,6 @@ pub(super) fn candidates(
         done(Some(score));
         Ok(Some(Candidate { knots, motion, score }))
     };
-    let all: Vec<_> = numbers.into_par_iter().map(one).collect::<Result<_, _>>()?;
+    let all: Vec<_> = parallel::try_map(numbers, one)?;
     Ok(all.into_iter().flatten().collect())
 }

@@ -1,11 +1,11 @@
 //! What the supervisor allows while the rig moves: more than healthy machines reach.
 
-use rayon::prelude::*;
 use upright::table::MotionLimits;
 
 use super::closed_loop::LOST_RAD;
 use super::robustness::{Spread, drawn};
 use super::way::Way;
+use crate::parallel;
 use crate::rig::{PlantDescription, Rig};
 use crate::simulate::{Extremes, Scenario, SimulationError, follow};
 use crate::table::TableValues;
@@ -82,7 +82,7 @@ fn healthy(rig: &Rig, table: &TableValues) -> Result<Extremes, SimulationError> 
         };
         follow(&machine, table, &scenario, balance_ticks)
     };
-    let all: Vec<_> = (0..MACHINES).into_par_iter().map(one).collect::<Result<_, _>>()?;
+    let all: Vec<_> = parallel::try_map(0..MACHINES, one)?;
     let mut most = Extremes::none(table.sensors());
     let arrived = all.iter().flatten().filter(|reached| has_arrived(rig, reached));
     arrived.for_each(|reached| most.include(reached));

@@ -37,7 +37,7 @@ pub(super) enum Number {
 }
 
 /// The fields of a table, in the order of their declaration.
-pub(super) fn fields(table: &impl Part) -> Vec<Field> {
+pub(super) fn fields(table: &dyn Part) -> Vec<Field> {
     let mut builder = Builder::default();
     table.read(&mut builder);
     match builder.done {

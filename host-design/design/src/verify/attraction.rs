@@ -1,11 +1,11 @@
 //! Region of attraction on the nonlinear plant: the largest initial tilts and the largest step from which the loop
 //! recovers.
 
-use rayon::prelude::*;
 use serde::Serialize;
 use upright::table::Law;
 
 use super::trial::{Horizon, Outcome, Unverifiable, chain, edge, leaning, scenario, trial, within};
+use crate::parallel;
 use crate::rig::Rig;
 use crate::simulate::{Scenario, SimulationError};
 use crate::table::TableValues;
@@ -162,7 +162,7 @@ fn single_tilts(
         .flat_map(|link| [(link, 1), (link, -1)])
         .filter(|&(_, side)| side > 0 || !mirrored)
         .collect();
-    let all: Vec<Tilt> = single.into_par_iter().map(alone).collect::<Result<_, SimulationError>>()?;
+    let all: Vec<Tilt> = parallel::try_map::<_, _, SimulationError>(single, alone)?;
     let worse = |pair: &[Tilt]| pair.iter().min_by(|a, b| a.edge.size.total_cmp(&b.edge.size)).cloned();
     Ok(all.chunks(if mirrored { 1 } else { 2 }).filter_map(worse).collect())
 }
@@ -175,10 +175,7 @@ fn worst_tilt(
 ) -> Result<Option<WorstTilt>, SimulationError> {
     let (links, mirrored) = links(rig);
     let sides = sides(links, mirrored);
-    let edges: Vec<Edge> = sides
-        .par_iter()
-        .map(|signs| lean(rig, table, law, settings, signs))
-        .collect::<Result<_, SimulationError>>()?;
+    let edges = parallel::try_map(&sides, |signs| lean(rig, table, law, settings, signs))?;
     let worst = sides.iter().zip(edges).min_by(|(_, a), (_, b)| a.size.total_cmp(&b.size));
     Ok(worst.map(|(signs, edge)| WorstTilt { signs: signs.clone(), edge, tried: sides.len() }))
 }
@@ -302,8 +299,7 @@ pub fn attraction_map(
     let (_, is_rail_symmetric) = links(rig);
     let mirrored = is_rail_symmetric && [across, down].iter().all(|axis| axis.range[0] == -axis.range[1]);
     let run = if mirrored { all.div_ceil(2) } else { all };
-    let mut cells: Vec<Option<f64>> =
-        (0..run).into_par_iter().map(cell).collect::<Result<_, SimulationError>>()?;
+    let mut cells: Vec<Option<f64>> = parallel::try_map::<_, _, SimulationError>(0..run, cell)?;
     for image in (0..all - run).rev() {
         cells.push(cells[image]);
         done();

@@ -1,6 +1,5 @@
 //! Mass errors: every combination of too light and too heavy, and each mass alone.
 
-use rayon::prelude::*;
 use serde::Serialize;
 use upright::table::Law;
 
@@ -8,6 +7,7 @@ use super::monte_carlo::is_worse;
 use super::trial::{
     Disturbance, Horizon, Outcome, Unverifiable, chain, edge, leaning, scenario, trial, within,
 };
+use crate::parallel;
 use crate::rig::{PlantDescription, Rig};
 use crate::simulate::{Scenario, SimulationError};
 use crate::table::TableValues;
@@ -123,8 +123,7 @@ pub fn corners(
         let outcome = trial(&wrong_masses(rig, percent, &factors), table, &scenario, &Horizon::default())?;
         Ok(Corner { signs, outcome })
     };
-    let all: Vec<Corner> =
-        (0..2u32 << links).into_par_iter().map(corner).collect::<Result<_, SimulationError>>()?;
+    let all: Vec<Corner> = parallel::try_map::<_, _, SimulationError>(0..2u32 << links, corner)?;
     let mut weakest = &all[0];
     for corner in &all {
         if is_worse(&corner.outcome, &weakest.outcome) {
@@ -201,7 +200,7 @@ pub fn mass_tolerances(
     };
     let cases: Vec<(usize, f64, f64)> =
         (0..parts).flat_map(|part| [(part, -1.0, 90.0), (part, 1.0, 900.0)]).collect();
-    let found: Vec<f64> = cases.into_par_iter().map(tolerated).collect::<Result<_, SimulationError>>()?;
+    let found: Vec<f64> = parallel::try_map::<_, _, SimulationError>(cases, tolerated)?;
     let mass = |part: usize| if part == 0 { Mass::Cart } else { Mass::Link(part) };
     let mut tolerances: Vec<MassTolerance> = found
         .chunks_exact(2)

@@ -1,11 +1,11 @@
 //! The coarsest encoders with which a law still stands.
 
-use rayon::prelude::*;
 use serde::Serialize;
 use upright::table::Law;
 
 use super::trial::{Disturbance, Horizon, Unverifiable, chain, edge, scenario, trial, within};
 use crate::design::design;
+use crate::parallel;
 use crate::rig::{LinkEncoder, PlantDescription, Rig};
 use crate::simulate::{Scenario, SimulationError};
 use crate::table::{Gains, TableValues};
@@ -106,8 +106,7 @@ pub fn coarsest_encoder(
             };
             Ok(trial(&coarse, &table, &scenario, &Horizon::default())?.stands())
         };
-        let all: Vec<bool> =
-            (1..=settings.seeds).into_par_iter().map(stands).collect::<Result<_, SimulationError>>()?;
+        let all: Vec<bool> = parallel::try_map::<_, _, SimulationError>(1..=settings.seeds, stands)?;
         Ok(all.iter().all(|&stands| stands).then_some(()))
     })?;
     let factor = found.map(|(factor, ())| factor);

@@ -2,7 +2,6 @@
 
 use core::f64::consts::PI;
 
-use rayon::prelude::*;
 use serde::Serialize;
 
 use super::loop_model::{ControllerModel, LoopModel, Numbers, PlantModel};
@@ -10,6 +9,7 @@ use super::response::Response;
 use super::{VerifyError, radius};
 use crate::design::Certified;
 use crate::numerics::eigenvalues;
+use crate::parallel;
 
 /// Margins of a stable loop, broken at the plant's input.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -68,7 +68,7 @@ impl<'m> Grid<'m> {
         omegas.retain(|omega| (low..PI).contains(omega));
         omegas.extend([0.0, PI]);
         omegas.sort_by(f64::total_cmp);
-        let points = omegas.into_par_iter().map(|omega| (omega, model.response(omega))).collect();
+        let points = parallel::map(omegas, |omega| (omega, model.response(omega)));
         Ok(Self { model, points })
     }
 

@@ -2,11 +2,11 @@
 
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
-use rayon::prelude::*;
 use serde::Serialize;
 use upright::table::Law;
 
 use super::trial::{Disturbance, Horizon, Outcome, Unverifiable, leaning, scenario, trial, within};
+use crate::parallel;
 use crate::rig::{Chain, Link, PlantDescription, Rig};
 use crate::simulate::{Scenario, SimulationError};
 use crate::table::TableValues;
@@ -150,7 +150,7 @@ pub fn monte_carlo(
         done();
         Ok(WorstCase { seed, outcome })
     };
-    let all: Vec<WorstCase> = (0..runs).into_par_iter().map(one).collect::<Result<_, SimulationError>>()?;
+    let all: Vec<WorstCase> = parallel::try_map::<_, _, SimulationError>(0..runs, one)?;
     let stood = all.iter().filter(|case| case.outcome.stands()).count();
     Ok(MonteCarlo {
         base_seed,

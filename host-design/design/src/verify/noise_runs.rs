@@ -1,10 +1,10 @@
 //! Ripple and endurance under encoder resolution and disturbances, in long runs.
 
-use rayon::prelude::*;
 use serde::Serialize;
 use upright::table::Law;
 
 use super::trial::{Disturbance, Horizon, Unverifiable, chain, scenario, trial};
+use crate::parallel;
 use crate::plant::absolute_angles;
 use crate::rig::Rig;
 use crate::simulate::{Scenario, SimulationError, run};
@@ -82,7 +82,7 @@ pub fn noise_run(
         })?;
         Ok(Sums { stands: fall.is_none(), ..sums })
     };
-    let all: Vec<Sums> = (1..=seeds).into_par_iter().map(one).collect::<Result<_, SimulationError>>()?;
+    let all: Vec<Sums> = parallel::try_map::<_, _, SimulationError>(1..=seeds, one)?;
     // In the order of the seeds, whichever thread made them.
     let ticks: f64 = all.iter().map(|sums| sums.ticks).sum();
     let rms = |part: &dyn Fn(&Sums) -> f64| (all.iter().map(part).sum::<f64>() / ticks.max(1.0)).sqrt();
@@ -144,7 +144,7 @@ pub fn endurance(
         done();
         Ok((seed, outcome))
     };
-    let all: Vec<_> = (1..=seeds).into_par_iter().map(one).collect::<Result<_, SimulationError>>()?;
+    let all: Vec<_> = parallel::try_map::<_, _, SimulationError>(1..=seeds, one)?;
     let fallen: Vec<u64> =
         all.iter().filter(|(_, outcome)| outcome.fall.is_some()).map(|&(seed, _)| seed).collect();
     Ok(Endurance {

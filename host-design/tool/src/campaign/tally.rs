@@ -1,6 +1,5 @@
 //! Many trials in parallel, and their counts by kind.
 
-use rayon::prelude::*;
 use serde::Serialize;
 use upright::supervision::fault::Fault;
 
@@ -9,6 +8,7 @@ use super::defect::{Expected, Kind};
 use super::judge::{Class, Outcome, allowed, judge};
 use super::trial::Trial;
 use crate::in_the_loop::{Place, RunError};
+use upright_design::parallel;
 use upright_design::table::TableValues;
 
 /// A trial that could not be run.
@@ -111,14 +111,11 @@ pub fn campaign(
     runs: u64,
     done: &(dyn Fn() + Sync),
 ) -> Result<Campaign, CampaignError> {
-    let outcomes: Vec<Outcome> = (0..runs)
-        .into_par_iter()
-        .map(|number| {
-            let outcome = one(setup, kinds, seed, number);
-            done();
-            outcome
-        })
-        .collect::<Result<_, _>>()?;
+    let outcomes = parallel::try_map(0..runs, |number| {
+        let outcome = one(setup, kinds, seed, number);
+        done();
+        outcome
+    })?;
     let rows = kinds.iter().map(|&kind| Row::of(kind, setup.table, &outcomes)).collect();
     Ok(Campaign { seed, runs, rows })
 }

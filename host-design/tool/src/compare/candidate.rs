@@ -1,11 +1,11 @@
 //! From a rig to its row.
 
-use rayon::prelude::*;
 use serde::Serialize;
 use upright::table::Law;
 
 use super::row::{Fate, Figures, Row};
 use upright_design::design::{Certified, design};
+use upright_design::parallel;
 use upright_design::rig::Rig;
 use upright_design::simulate::{Scenario, SimulationError, Summary, simulate};
 use upright_design::table::{Gains, TableValues};
@@ -80,14 +80,11 @@ pub fn compare(
     conditions: &Conditions,
     done: &(dyn Fn() + Sync),
 ) -> Result<Vec<Row>, SimulationError> {
-    jobs(candidates, conditions)
-        .into_par_iter()
-        .map(|(candidate, law)| {
-            let row = row(candidate, law, conditions);
-            done();
-            row
-        })
-        .collect()
+    parallel::try_map(jobs(candidates, conditions), |(candidate, law)| {
+        let row = row(candidate, law, conditions);
+        done();
+        row
+    })
 }
 
 fn row(candidate: &Candidate, law: Law, conditions: &Conditions) -> Result<Row, SimulationError> {

@@ -47,10 +47,7 @@ impl ContinuousRun {
     /// [`ReproduceError`] if the integrator gives up or the plant cannot be built.
     pub fn course(&self, chain: &Chain, law: &Feedback<f64>) -> Result<Course, ReproduceError> {
         let plant = chain_plant(chain)?;
-        let (k, n) = (law.k.entries(), law.n.unwrap_or(0.0));
-        let force = |_: f64, state: &[f64]| {
-            n * self.step_m - k.iter().zip(state).map(|(gain, entry)| gain * entry).sum::<f64>()
-        };
+        let force_n = |state: &[f64]| law.force_n(self.step_m, state);
         let mut disturbances = Disturbances::of(self.disturbances, plant.disturbances())?;
         let samples = (self.duration_s / self.sample_s).round() as usize;
         let mut state = vec![0.0; plant.states()];
@@ -62,13 +59,13 @@ impl ContinuousRun {
         };
         for sample in 0..=samples {
             course.states.push(state.clone());
-            course.forces_n.push(force(0.0, &state));
+            course.forces_n.push(force_n(&state));
             course.fall = fall_of(&state, sample as f64 * self.sample_s);
             if course.fall.is_some() {
                 break;
             }
             let push = disturbances.next_force();
-            let pushed = |t: f64, state: &[f64]| force(t, state) + push;
+            let pushed = |_: f64, state: &[f64]| force_n(state) + push;
             let torques = &disturbances.torques;
             state = integrate(&*plant, &state, pushed, torques, self.sample_s, self.tolerance)?;
         }

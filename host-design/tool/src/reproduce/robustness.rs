@@ -1,7 +1,6 @@
 //! What the paper says about the two laws without numbers, measured: that the response under LQR "has less frequency"
 //! and that it is "more robust".
 
-use rayon::prelude::*;
 use serde::Serialize;
 use upright::table::Law;
 
@@ -12,6 +11,7 @@ use super::course::Course;
 use super::designs::open_loop_poles;
 use super::responses::{Loop, Loops};
 use super::spectrum::{Bandwidth, SEGMENT, Spectrum};
+use upright_design::parallel;
 use upright_design::plant::reference::Tolerance;
 use upright_design::rig::Rig;
 use upright_design::table::{Gains, TableValues};
@@ -87,20 +87,18 @@ pub fn robustness(loops: &Loops) -> Result<Vec<Robustness>, ReproduceError> {
     };
     let jobs: Vec<(Law, Loop)> =
         Law::ALL.into_iter().flat_map(|law| Loop::ALL.map(|kind| (law, kind))).collect();
-    jobs.into_par_iter()
-        .map(|(law, kind)| {
-            let course = loops.course(law, kind, &RUN)?;
-            let forces = &course.forces_n[after(&course)..];
-            Ok(Robustness {
-                law,
-                kind,
-                margins: margins(law, kind),
-                ripples: ripples(&course),
-                peak_force_n: forces.iter().map(|force| force.abs()).fold(0.0, f64::max),
-                effort_n2: forces.iter().map(|force| force * force).sum::<f64>() / forces.len() as f64,
-            })
+    parallel::try_map(jobs, |(law, kind)| {
+        let course = loops.course(law, kind, &RUN)?;
+        let forces = &course.forces_n[after(&course)..];
+        Ok(Robustness {
+            law,
+            kind,
+            margins: margins(law, kind),
+            ripples: ripples(&course),
+            peak_force_n: forces.iter().map(|force| force.abs()).fold(0.0, f64::max),
+            effort_n2: forces.iter().map(|force| force * force).sum::<f64>() / forces.len() as f64,
         })
-        .collect()
+    })
 }
 
 /// Number of the first sample that counts.

@@ -3,7 +3,6 @@
 //! The paper says neither how long its runs are nor what counts as stabilised. Here it means: no link is beyond the
 //! horizontal and the cart is within 2 % of the set-point when the run ends. Everything about the horizon is a fit.
 
-use rayon::prelude::*;
 use serde::Serialize;
 use upright::table::Law;
 
@@ -11,6 +10,7 @@ use super::continuous_loop::ContinuousRun;
 use super::course::Course;
 use super::{PaperRigs, ReproduceError, SEED, chain, published};
 use upright_design::design::{Feedback, design};
+use upright_design::parallel;
 use upright_design::plant::reference::Tolerance;
 use upright_design::rig::{PolePlacement, Rig, Tick};
 use upright_design::simulate::{Fall, Scenario, Sensing, simulate};
@@ -83,18 +83,16 @@ pub fn printed() -> [bool; 7] {
 /// # Errors
 /// [`ReproduceError`] if a design or a run fails.
 pub fn settling(rigs: &PaperRigs) -> Result<Settling, ReproduceError> {
-    let exact: Vec<Feedback<f64>> = published::TABLE_2
-        .par_iter()
-        .map(|&(settling_time_s, _)| placement(&asking_for(&rigs.exact, settling_time_s)))
-        .collect::<Result<_, _>>()?;
+    let exact = parallel::try_map(published::TABLE_2, |(settling_time_s, _)| {
+        placement(&asking_for(&rigs.exact, settling_time_s))
+    })?;
     let changes = Change::all();
     let jobs: Vec<(usize, f64, &Feedback<f64>)> = (0..changes.len())
         .flat_map(|change| published::TABLE_2.iter().zip(&exact).map(move |(row, law)| (change, row.0, law)))
         .collect();
-    let courses: Vec<Course> = jobs
-        .par_iter()
-        .map(|&(change, settling_time_s, exact)| changes[change].1.course(rigs, settling_time_s, exact))
-        .collect::<Result<_, _>>()?;
+    let courses = parallel::try_map(jobs, |(change, settling_time_s, exact)| {
+        changes[change].1.course(rigs, settling_time_s, exact)
+    })?;
     let mut groups = courses.chunks_exact(published::TABLE_2.len()).zip(&changes);
     let sensitivity = groups
         .clone()

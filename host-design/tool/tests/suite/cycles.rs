@@ -42,22 +42,27 @@ fn beyond(cycles: &Cycles) -> Vec<&'static str> {
     all.into_iter().filter(|(_, is_beyond)| *is_beyond).map(|(name, _)| name).collect()
 }
 
-/// The image with a wait of `turns` turns before each tick: SysTick's vector leads to a loop behind the image.
-fn slower(image: &Image, turns: u16) -> Image {
+/// The image with a wait before each tick, about 400 cycles for each of `turns`: SysTick's vector leads to a loop behind
+/// the image. It divides, which takes many cycles and the host little time.
+fn slower(image: &Image, turns: u8) -> Image {
     const SYS_TICK: u32 = 0x0800_0000 + 4 * 15;
+    const DIVIDE: [u16; 2] = [0xfbb1, 0xf3f2]; // udiv r3, r1, r2
     let board = VirtualBoard::power_on(image, &Conditions::f405(1), Rules::STRICT).unwrap();
     let handler = board.word(SYS_TICK).unwrap();
     let at = (0x0800_0000 + image.end() as u32).next_multiple_of(16);
-    let [low, high] = turns.to_le_bytes();
-    let half_words = [
-        // movw r0, #turns
-        0xf240 | u16::from(high & 8) << 7 | u16::from(high >> 4),
-        u16::from(high & 7) << 12 | u16::from(low),
+    let mut half_words = vec![
+        0x2000 | u16::from(turns), // movs r0, #turns
+        0x2201,                    // movs r2, #1
+        0xf04f,                    // mov.w r1, #0xffff_ffff
+        0x31ff,
+    ];
+    half_words.extend(DIVIDE.repeat(32));
+    half_words.extend([
         0x3801, // subs r0, #1
-        0xd1fd, // bne to it
+        0xd1bd, // bne to the first division
         0x4900, // ldr r1, the word below
         0x4708, // bx r1
-    ];
+    ]);
     let mut code: Vec<u8> = half_words.into_iter().flat_map(u16::to_le_bytes).collect();
     code.extend(handler.to_le_bytes());
     let vector = (at | 1).to_le_bytes().to_vec();
@@ -83,8 +88,8 @@ fn the_ticks_of_the_image_stay_within_their_limits_and_those_of_a_slower_one_do_
     assert!(balancing.controller.cycles > 300, "{balancing:?}");
 
     // Negative controls: 10 µs more, and half a period more.
-    assert_eq!(beyond(&measured(&slower(&image, 500))), ["latency", "task"]);
-    let error = measured(&slower(&image, 25_000)).check().unwrap_err().to_string();
+    assert_eq!(beyond(&measured(&slower(&image, 4))), ["latency", "task"]);
+    let error = measured(&slower(&image, 210)).check().unwrap_err().to_string();
     assert!(error.contains("a quarter of its period") && error.contains("period_s"), "{error}");
 }
 

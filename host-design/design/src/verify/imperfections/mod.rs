@@ -4,12 +4,12 @@ mod catalogue;
 
 use std::collections::BTreeMap;
 
-use rayon::prelude::*;
 use serde::Serialize;
 use upright::table::Law;
 
 use super::trial::{Disturbance, Horizon, Outcome, Unverifiable, chain, scenario, trial, within};
 use crate::number::significant;
+use crate::parallel;
 use crate::rig::{Reality, Rig};
 use crate::simulate::{Scenario, SimulationError};
 use crate::table::TableValues;
@@ -134,8 +134,7 @@ pub fn imperfections(
         done();
         standing
     };
-    let mut alone: Vec<Standing> =
-        IMPERFECTIONS.par_iter().map(one).collect::<Result<_, SimulationError>>()?;
+    let mut alone: Vec<Standing> = parallel::try_map(&IMPERFECTIONS, one)?;
     alone.sort_by(|a, b| b.danger.total_cmp(&a.danger));
     let together =
         (rig.reality != Reality::default()).then(|| search.verdict(rig.reality.clone())).transpose()?;
@@ -243,8 +242,7 @@ impl Search<'_> {
             };
             trial(&real, self.table, &scenario, &Horizon::default())
         };
-        let all: Vec<_> =
-            (1..=self.settings.seeds).into_par_iter().map(one).collect::<Result<_, SimulationError>>()?;
+        let all: Vec<_> = parallel::try_map(1..=self.settings.seeds, one)?;
         Ok(Verdict {
             stand: all.iter().filter(|outcome| outcome.stands()).count() as u64,
             within_limits: all.iter().filter(|outcome| self.is_within_limits(outcome)).count() as u64,

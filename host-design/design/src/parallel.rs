@@ -1,0 +1,77 @@
+//! Independent computations, spread over all processors.
+//!
+//! The threads are rayon's. Its own iterators are compiled again for each use; these functions share one loop.
+
+use std::sync::OnceLock;
+use std::sync::atomic::{AtomicUsize, Ordering::Relaxed};
+
+use rayon::prelude::*;
+
+/// What `one` gives for each item, in the order of the items.
+pub fn map<I, T>(items: impl IntoIterator<Item = I>, one: impl Fn(I) -> T + Sync) -> Vec<T>
+where
+    I: Copy + Sync,
+    T: Send + Sync,
+{
+    let items: Vec<I> = items.into_iter().collect();
+    let results: Vec<OnceLock<T>> = items.iter().map(|_| OnceLock::new()).collect();
+    for_each(items.len(), &|index| {
+        results[index].get_or_init(|| one(items[index]));
+    });
+    results.into_iter().filter_map(OnceLock::into_inner).collect()
+}
+
+/// As [`map`], for computations that may fail. After an error, items behind it are left out.
+///
+/// # Errors
+/// That of the first item that has one.
+pub fn try_map<I, T, E>(
+    items: impl IntoIterator<Item = I>,
+    one: impl Fn(I) -> Result<T, E> + Sync,
+) -> Result<Vec<T>, E>
+where
+    I: Copy + Sync,
+    T: Send + Sync,
+    E: Send + Sync,
+{
+    let first_error = AtomicUsize::new(usize::MAX);
+    let results = map(items.into_iter().enumerate(), |(index, item)| {
+        let is_wanted = index < first_error.load(Relaxed);
+        let result = is_wanted.then(|| one(item));
+        if let Some(Err(_)) = result {
+            first_error.fetch_min(index, Relaxed);
+        }
+        result
+    });
+    results.into_iter().flatten().collect()
+}
+
+/// Calls `one` for 0 to `count` - 1. Each call is a task of its own: they may take very different times.
+fn for_each(count: usize, one: &(dyn Fn(usize) + Sync)) {
+    (0..count).into_par_iter().with_max_len(1).for_each(one);
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{map, try_map};
+
+    #[test]
+    fn results_come_in_the_order_of_the_items() {
+        assert_eq!(map(0..1000, |number| number * number), (0..1000).map(|n| n * n).collect::<Vec<u64>>());
+        assert_eq!(map([0; 0], |number| number), [0; 0]);
+    }
+
+    #[test]
+    fn the_error_of_the_first_item_is_given_whichever_thread_is_faster() {
+        let slow = |number: u32| {
+            if number == 3 {
+                std::thread::sleep(std::time::Duration::from_millis(20));
+            }
+            if number < 3 { Ok(number) } else { Err(number) }
+        };
+        for _ in 0..20 {
+            assert_eq!(try_map(0..100, slow), Err(3));
+        }
+        assert_eq!(try_map(0..3, slow), Ok(vec![0, 1, 2]));
+    }
+}
