@@ -17,6 +17,7 @@
 //! | [`swing_up`] | rig file | motions from hanging to upright and back, with their gains |
 //! | [`verify`] | table and requirements | the trust report |
 //! | [`robust`] | rig file and tolerances | weights, poles and noise that stand them |
+//! | [`study`] | a function of a run's number | outcomes of all runs, made here or split over machines |
 //!
 //! The control law itself is not here: a simulation runs the firmware's own controller from the crate `upright`.
 
@@ -33,6 +34,7 @@ pub mod reality;
 pub mod rig;
 pub mod robust;
 pub mod simulate;
+pub mod study;
 pub mod swing_up;
 pub mod table;
 pub mod verify;

@@ -1,12 +1,12 @@
 //! Whether a loop stands its tolerances, by simulation.
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 use upright::table::Law;
 
-use crate::parallel;
 use crate::plant::absolute_angles;
 use crate::rig::{PerJoint, Rig, Tolerances};
 use crate::simulate::{Scenario, SimulationError, run};
+use crate::study::{Study, infinite_if_null};
 use crate::table::TableValues;
 use crate::verify::{CornerSettings, Disturbance, Unverifiable, corners, leaning, scenario};
 
@@ -69,7 +69,8 @@ impl Judgement {
     }
 }
 
-/// Runs the loop of `table` on machines with shares of the tolerances, and at every combination of mass errors.
+/// Runs the loop of `table` on machines with shares of the tolerances, and at every combination of mass errors. The
+/// machines with each share are a part of `study`; a shard leaves the combinations of mass errors to the merge.
 ///
 /// # Errors
 /// [`Unverifiable`] if the runs cannot be started.
@@ -79,17 +80,21 @@ pub fn judge(
     law: Law,
     tolerances: &Tolerances,
     settings: &JudgeSettings,
+    study: &Study,
 ) -> Result<Judgement, Unverifiable> {
     if let Some((what, value, accepts)) = tolerances.too_large(rig.tick.period_s) {
         return Err(Unverifiable::Setting { what, value, accepts });
     }
     let machines = SHARES.into_iter().map(|share| {
-        let of_seed = |seed: u64| one(&machine(rig, tolerances, share), table, law, settings, seed);
-        let all: Vec<Outcome> = parallel::try_map(1..=settings.runs, of_seed)?;
-        Ok(summary(share, &all))
+        let machine = machine(rig, tolerances, share);
+        let of_number = |number: u64| -> Result<Outcome, Unverifiable> {
+            Ok(one(&machine, table, law, settings, number + 1)?)
+        };
+        let part = format!("{}, share {share}", law.key());
+        Ok(summary(share, &study.outcomes(&part, settings.runs, of_number)?))
     });
     let machines = machines.collect::<Result<_, Unverifiable>>()?;
-    let corners = if tolerances.mass_percent > 0.0 {
+    let corners = if tolerances.mass_percent > 0.0 && !study.is_shard() {
         let settings = CornerSettings { disturbance: settings.disturbance, ..CornerSettings::of(rig) };
         let ideal = machine(rig, tolerances, 0.0);
         let found = corners(&ideal, table, law, tolerances.mass_percent, &settings)?;
@@ -112,11 +117,15 @@ pub(super) fn machine(rig: &Rig, tolerances: &Tolerances, share: f64) -> Rig {
 }
 
 /// Outcome of one run.
+#[derive(Serialize, Deserialize)]
 pub(super) struct Outcome {
     pub(super) stands: bool,
     ticks: f64,
+    #[serde(deserialize_with = "infinite_if_null")]
     force: f64,
+    #[serde(deserialize_with = "infinite_if_null")]
     angle_rad: f64,
+    #[serde(deserialize_with = "infinite_if_null")]
     position_m: f64,
 }
 

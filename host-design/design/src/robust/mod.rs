@@ -2,9 +2,11 @@
 //!
 //! [`choose`] designs every candidate exactly, sorts by predicted ripple, and simulates the cheapest whose linear loop
 //! stands all mass errors. Friction is judged by simulation only: neither margins nor norms order designs as friction does.
+//! [`false_alarms`] balances machines within the tolerances with the whole firmware.
 
 mod candidate;
 mod error;
+mod false_alarms;
 mod file;
 mod judge;
 mod linear;
@@ -12,6 +14,7 @@ mod search;
 
 pub use candidate::{Candidate, LawNumbers};
 pub use error::RobustError;
+pub use false_alarms::{FalseAlarms, Healthy, balance, false_alarms, healthy_machine};
 pub use file::rewritten;
 pub use judge::{JudgeSettings, Judgement, Runs, judge};
 pub use search::{Choice, Chosen, Front, FrontPoint, LawRipple, LeastRipple, choose};

@@ -10,6 +10,7 @@ use super::linear::LinearPlants;
 use crate::design::{Certified, DesignError, design};
 use crate::parallel;
 use crate::rig::{Rig, Tolerances};
+use crate::study::Study;
 use crate::table::{Gains, TableValues};
 use crate::verify::{ControllerModel, PlantModel, Unverifiable, chain};
 
@@ -300,7 +301,7 @@ impl<'a> Search<'a> {
             let loop_ = &self.ranked[pool][observer][place];
             let Some((rig, table)) = self.table(pool, observer, loop_.design) else { return Ok(Err(pool)) };
             let law = self.pools[pool].law;
-            let judgement = judge(&rig, &table, law, self.tolerances, self.settings)?;
+            let judgement = judge(&rig, &table, law, self.tolerances, self.settings, &Study::whole())?;
             if !judgement.stands() {
                 return Ok(Err(pool));
             }

@@ -2,7 +2,7 @@
 
 use core::fmt;
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use super::scenario::Scenario;
 use super::trace::Trace;
@@ -10,7 +10,7 @@ use crate::plant::absolute_angles;
 use crate::rig::{PlantDescription, Rig};
 
 /// Loss of balance, which ends a run.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Fall {
     /// When (s).
     pub at_s: f64,
@@ -19,7 +19,7 @@ pub struct Fall {
 }
 
 /// Kind of a loss of balance.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum FallKind {
     /// This link (from 1) leans further than the horizontal.

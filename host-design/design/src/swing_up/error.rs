@@ -8,6 +8,7 @@ use crate::design::DesignError;
 use crate::numerics::Singular;
 use crate::plant::PlantError;
 use crate::simulate::SimulationError;
+use crate::study::StudyError;
 use crate::table::NoTable;
 
 /// Why a rig cannot be raised or lowered.
@@ -95,6 +96,9 @@ pub enum SwingUpError {
     /// The firmware's controller cannot be simulated with them.
     #[error(transparent)]
     Simulation(#[from] SimulationError),
+    /// The runs of another process cannot be used.
+    #[error(transparent)]
+    Study(#[from] StudyError),
     /// The parts of a motion do not fit together.
     #[error(transparent)]
     Shape(#[from] Shape),

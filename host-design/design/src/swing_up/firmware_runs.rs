@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 use upright::protocol::message::Request;
 use upright::supervision::supervisor::State;
 
@@ -12,9 +12,9 @@ use super::motion::SwingUp;
 use super::robustness::{Runs, Spread, deviation, drawn};
 use super::way::Way;
 use crate::harness::{Harness, HarnessError, Target, with_firmware};
-use crate::parallel;
 use crate::rig::{LinkEncoder, PlantDescription, Rig};
 use crate::simulate::{Begin, Scenario};
+use crate::study::{Study, infinite_if_null};
 use crate::table::TableValues;
 use crate::verify::wilson;
 
@@ -80,18 +80,21 @@ pub struct FirmwareRuns {
 }
 
 /// One run.
-#[derive(Debug, Default)]
+#[derive(Debug, Default, Serialize, Deserialize)]
 struct Reached {
     refused: bool,
     stood: bool,
     hung: bool,
     fault: Option<String>,
     /// Largest distance of a link from its planned angle, up and down (rad).
-    deviation_rad: [f64; 2],
+    deviation_rad: [Deviation; 2],
 }
 
+#[derive(Debug, Clone, Copy, Default, Serialize, Deserialize)]
+struct Deviation(#[serde(deserialize_with = "infinite_if_null")] f64);
+
 /// `runs` runs of the firmware of `table`, which is designed for `rig`, with the seeds from `base_seed` on, on all threads; the
-/// outcome does not depend on their number. `motions` are those of the table.
+/// outcome does not depend on their number. `motions` are those of the table. The condition is a part of `study`.
 ///
 /// # Errors
 /// [`SwingUpError`] if the table has no motions, or the firmware does not run.
@@ -102,10 +105,11 @@ pub fn firmware_runs(
     condition: &Condition,
     base_seed: u64,
     runs: usize,
+    study: &Study,
 ) -> Result<FirmwareRuns, SwingUpError> {
     let scenario = Scenario { substeps: 2, ..up_and_down(rig, table, UPRIGHT_S)? };
-    let one = |index: usize| {
-        let seed = base_seed + index as u64;
+    let one = |number: u64| {
+        let seed = base_seed + number;
         let (mut real, start) = drawn(rig, Way::Up, &condition.spread, seed);
         real.tick.delay_ticks = u8::from(condition.is_late);
         let scenario = Scenario { start, seed, ..scenario.clone() };
@@ -113,7 +117,7 @@ pub fn firmware_runs(
             .flatten()
             .map_err(|error| SwingUpError::Firmware(error.to_string()))
     };
-    let all: Vec<Reached> = parallel::try_map(0..runs, one)?;
+    let all: Vec<Reached> = study.outcomes(condition.name, runs as u64, one)?;
     let mut faults = BTreeMap::new();
     for fault in all.iter().filter_map(|run| run.fault.clone()) {
         *faults.entry(fault).or_default() += 1;
@@ -122,7 +126,7 @@ pub fn firmware_runs(
         let (tried, stood) =
             (all.iter().filter(|run| begun(run)).count(), all.iter().filter(|run| arrived(run)).count());
         let arrived = all.iter().filter(|run| arrived(run));
-        let deviation_rad = arrived.fold(0.0, |largest, run| f64::max(largest, run.deviation_rad[way]));
+        let deviation_rad = arrived.fold(0.0, |largest, run| f64::max(largest, run.deviation_rad[way].0));
         Runs { base_seed, runs: tried, stood, interval: wilson(stood, tried), deviation_rad }
     };
     Ok(FirmwareRuns {
@@ -167,7 +171,7 @@ fn raised_and_lowered(
             [&motions.raise, &motions.lower].into_iter().zip(begins).zip(&mut reached.deviation_rad)
         {
             if let Some(planned) = tick.checked_sub(begin).and_then(|tick| motion.x.get(tick)) {
-                *largest = largest.max(deviation(harness.bench.state(), planned));
+                largest.0 = largest.0.max(deviation(harness.bench.state(), planned));
             }
         }
         harness.bench.tick(output.drive);

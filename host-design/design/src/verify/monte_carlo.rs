@@ -2,13 +2,13 @@
 
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 use upright::table::Law;
 
+use super::report::Effort;
 use super::trial::{Disturbance, Horizon, Outcome, Unverifiable, leaning, scenario, trial, within};
-use crate::parallel;
 use crate::rig::{Chain, Link, PlantDescription, Rig};
-use crate::simulate::{Scenario, SimulationError};
+use crate::simulate::Scenario;
 use crate::table::TableValues;
 
 /// The ranges from which each run's plant and start are drawn, uniformly. A share of 0.02 means from -2 % to +2 %.
@@ -51,7 +51,7 @@ impl Spread {
 }
 
 /// The worst run: the first to fall, or, if none falls, that with the largest angle.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct WorstCase {
     /// Seed with which [`sample`] returns its plant and scenario.
     pub seed: u64,
@@ -119,8 +119,8 @@ fn draw_chain(chain: &mut Chain, spread: &Spread, between: &mut impl FnMut(f64) 
     }
 }
 
-/// Makes `runs` runs with the seeds from `base_seed` on, on all threads; the outcome does not depend on their number.
-/// `done` is called after each run, from any thread.
+/// Runs with the seeds from `effort.seed` on, a part of `study`, on all threads; the outcome does not depend on their
+/// number. `done` is called after each run, from any thread.
 ///
 /// # Errors
 /// [`Unverifiable`] if a run cannot be started or a setting is invalid.
@@ -129,8 +129,7 @@ pub fn monte_carlo(
     table: &TableValues,
     law: Law,
     spread: &Spread,
-    base_seed: u64,
-    runs: usize,
+    effort: &Effort<'_>,
     done: &(dyn Fn() + Sync),
 ) -> Result<MonteCarlo, Unverifiable> {
     for (what, share) in [
@@ -143,14 +142,16 @@ pub fn monte_carlo(
     }
     within("other_delay", spread.other_delay, 0.0..=1.0, "a share from 0 to 1")?;
     within("tilt_rad", spread.tilt_rad, 0.0..=1.5, "an angle from 0 to 1.5 rad")?;
-    let one = |index: usize| {
-        let seed = base_seed.wrapping_add(index as u64);
+    let &Effort { runs, seed: base_seed, study, .. } = effort;
+    let one = |number: u64| -> Result<WorstCase, Unverifiable> {
+        let seed = base_seed.wrapping_add(number);
         let (plant, scenario) = sample(rig, law, spread, seed);
         let outcome = trial(&plant, table, &scenario, &Horizon::default())?;
         done();
         Ok(WorstCase { seed, outcome })
     };
-    let all: Vec<WorstCase> = parallel::try_map::<_, _, SimulationError>(0..runs, one)?;
+    let all = study.outcomes(law.key(), runs as u64, one)?;
+    let runs = all.len();
     let stood = all.iter().filter(|case| case.outcome.stands()).count();
     Ok(MonteCarlo {
         base_seed,

@@ -13,6 +13,7 @@ use super::{
 use crate::design::Certified;
 use crate::number::significant;
 use crate::rig::{PlantDescription, Requirements, Rig};
+use crate::study::Study;
 use crate::table::TableValues;
 
 /// The trust report of a rig.
@@ -62,14 +63,16 @@ pub struct Check {
 }
 
 /// Size of the Monte Carlo part.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Effort {
+#[derive(Debug, Clone, Copy)]
+pub struct Effort<'a> {
     /// Monte Carlo runs for each law.
     pub runs: usize,
     /// Seed of the first of them.
     pub seed: u64,
     /// Share of the runs with one tick more delay than designed for.
     pub late: f64,
+    /// Where they are made.
+    pub study: &'a Study,
 }
 
 /// How random plants are drawn for `rig`: by its `[verify]`, a share `late` of them with one more tick of delay.
@@ -86,7 +89,7 @@ pub fn trust(
     rig: &Rig,
     certified: &Certified,
     table: &TableValues,
-    effort: Effort,
+    effort: Effort<'_>,
     stage: &dyn Fn(&str),
     done: &(dyn Fn() + Sync),
 ) -> Result<TrustReport, VerifyError> {
@@ -103,7 +106,7 @@ fn law_trust(
     rig: &Rig,
     table: &TableValues,
     linear: LinearReport,
-    effort: Effort,
+    effort: Effort<'_>,
     stage: &dyn Fn(&str),
     done: &(dyn Fn() + Sync),
 ) -> Result<LawTrust, VerifyError> {
@@ -144,8 +147,7 @@ fn law_trust(
         let found = required_imperfections(rig, table, law, &ImperfectionSettings::of(rig));
         trust.imperfections = known(found)?.unwrap_or_default();
         stage("random plants");
-        trust.monte_carlo =
-            known(monte_carlo(rig, table, law, &spread(rig, effort.late), effort.seed, effort.runs, done))?;
+        trust.monte_carlo = known(monte_carlo(rig, table, law, &spread(rig, effort.late), &effort, done))?;
     }
     Ok(trust)
 }

@@ -1,12 +1,13 @@
 //! One run of the loop as it will run, reduced to what a verdict needs.
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 use upright::table::Law;
 
 use crate::design::DesignError;
 use crate::plant::absolute_angles;
 use crate::rig::{Chain, PlantDescription, Rig};
 use crate::simulate::{Fall, Scenario, SimulationError, run};
+use crate::study::{StudyError, infinite_if_null};
 use crate::table::{NoTable, TableValues};
 
 /// A quantity that cannot be computed for this rig.
@@ -21,6 +22,12 @@ pub enum Unverifiable {
     /// A changed rig makes no table.
     #[error(transparent)]
     NoTable(#[from] NoTable),
+    /// The firmware does not run.
+    #[error("the firmware does not run: {0}")]
+    Firmware(String),
+    /// The runs of another process cannot be used.
+    #[error(transparent)]
+    Study(#[from] StudyError),
     /// Masses, angles and encoders of a `[model]` are not known.
     #[error("a rig given by [model] has no {0}: describe it by [cart] and [[link]]")]
     NotAChain(&'static str),
@@ -110,17 +117,20 @@ impl Horizon {
 }
 
 /// Outcome of a run.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Outcome {
     /// How it fell, if it did.
     pub fall: Option<Fall>,
     /// Time from which it stayed near rest (s); none if it was not near rest when the run ended.
     pub at_rest_after_s: Option<f64>,
     /// Largest angle of any link from the vertical (rad); 0 for a model.
+    #[serde(deserialize_with = "infinite_if_null")]
     pub peak_angle_rad: f64,
     /// Largest distance from the set-point (m, or the unit of a model's output).
+    #[serde(deserialize_with = "infinite_if_null")]
     pub peak_error_m: f64,
     /// Largest force on the cart (N).
+    #[serde(deserialize_with = "infinite_if_null")]
     pub peak_force_n: f64,
 }
 

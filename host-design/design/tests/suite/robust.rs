@@ -6,6 +6,7 @@ use upright::table::Law;
 use upright_design::design::design;
 use upright_design::rig::{Rig, Tolerances};
 use upright_design::robust::{JudgeSettings, Judgement, RobustError, choose, judge, rewritten};
+use upright_design::study::Study;
 use upright_design::table::{Gains, TableValues};
 
 fn text(name: &str) -> String {
@@ -24,7 +25,7 @@ fn short(rig: &Rig) -> JudgeSettings {
 
 fn judged(rig: &Rig, tolerances: &Tolerances, settings: &JudgeSettings) -> Vec<Judgement> {
     let table = TableValues::of(rig, &design(rig).unwrap(), Gains::Sampled).unwrap();
-    Law::ALL.map(|law| judge(rig, &table, law, tolerances, settings).unwrap()).to_vec()
+    Law::ALL.map(|law| judge(rig, &table, law, tolerances, settings, &Study::whole()).unwrap()).to_vec()
 }
 
 #[test]
@@ -112,5 +113,5 @@ fn tolerances_that_no_run_can_have_are_refused() {
     let single = rig(&own);
     let table = TableValues::of(&single, &design(&single).unwrap(), Gains::Sampled).unwrap();
     let wrong = Tolerances { mass_percent: 50.0, ..Tolerances::default() };
-    assert!(judge(&single, &table, Law::Lqr, &wrong, &short(&single)).is_err());
+    assert!(judge(&single, &table, Law::Lqr, &wrong, &short(&single), &Study::whole()).is_err());
 }

@@ -1,79 +1,18 @@
 //! A healthy rig is never switched off.
 
 use rayon::prelude::*;
-use upright_design::harness::Harness;
 use upright_design::rig::{PerJoint, Rig, Tolerances};
-use upright_design::simulate::Scenario;
-use upright_design::verify::Disturbance;
+use upright_design::robust::{Healthy, balance, false_alarms, healthy_machine};
+use upright_design::study::Study;
 
 use crate::published::table;
-use crate::supervised::{ALL_RIGS, balancing, cause, rejected, rig, tick};
-use upright::protocol::message::Request;
-use upright::supervision::fault::{Cause, Fault};
+use crate::supervised::{ALL_RIGS, rig};
+use upright::supervision::fault::Fault;
 use upright::table::Law;
 
 /// Balances for some hours. The set-point changes sides every minute.
-struct Nominal {
-    ticks: u64,
-    minute: u64,
-    setpoint_m: f32,
-    /// Thresholds of the innovation.
-    thresholds: Vec<f32>,
-}
-
-#[derive(Debug, PartialEq)]
-struct Found {
-    cause: Option<Cause>,
-    rejected: u32,
-    /// Largest innovation so far, as a share of its threshold.
-    closest: f32,
-}
-
-impl Nominal {
-    fn run(&self, harness: &mut Harness<'_>) -> Found {
-        let mut closest = 0.0f32;
-        for number in 0..self.ticks {
-            // A heartbeat every 50 ticks: the host commands the set-point.
-            let side = if (number / self.minute).is_multiple_of(2) { 1.0 } else { -1.0 };
-            if number % self.minute == 0 {
-                harness.session.send(Request::Setpoint(side * self.setpoint_m));
-            } else if number % 50 == 0 {
-                harness.session.send(Request::Beat);
-            }
-            tick(harness);
-            while harness.session.next_reply().is_some() {}
-            while let Some(telemetry) = harness.session.next_telemetry() {
-                for (e, threshold) in telemetry.innovation.iter().zip(&self.thresholds) {
-                    closest = closest.max(e.abs() / threshold);
-                }
-            }
-            if harness.session.fault().is_some() {
-                break;
-            }
-        }
-        let fault = harness.session.fault();
-        Found { cause: cause(harness).filter(|_| fault.is_some()), rejected: rejected(harness), closest }
-    }
-}
-
-fn nominal(rig: &Rig, law: Law, seed: u64, hours: f64) -> Found {
-    let disturbance = Disturbance::of(rig);
-    let scenario = Scenario {
-        force_noise_n: disturbance.force_n,
-        torque_noise_n_m: disturbance.torque_n_m,
-        seed,
-        substeps: 2,
-        ..Scenario::at_rest(rig, law)
-    };
-    let ticks = |seconds: f64| (seconds / rig.tick.period_s) as u64;
-    let values = table(rig);
-    let nominal = Nominal {
-        ticks: ticks(3600.0 * hours),
-        minute: ticks(60.0),
-        setpoint_m: 0.1,
-        thresholds: values.thresholds.innovation[..values.sensors()].to_vec(),
-    };
-    balancing(rig, &values, &scenario, |harness| nominal.run(harness)).unwrap()
+fn nominal(rig: &Rig, law: Law, seed: u64, hours: f64) -> Healthy {
+    balance(rig, &table(rig), law, seed, 3600.0 * hours).unwrap()
 }
 
 /// Balances for `hours` in total with each rig and law, in `parts` runs with different disturbances.
@@ -90,7 +29,7 @@ fn no_alarm(hours: f64, parts: u64) {
         println!("{name} {law:?} seed {seed}: {found:?}");
     }
     for (name, law, seed, found) in found {
-        assert_eq!(found.cause, None, "{name} {law:?} seed {seed}: {found:?}");
+        assert_eq!(found.fault, None, "{name} {law:?} seed {seed}: {found:?}");
     }
 }
 
@@ -110,7 +49,28 @@ fn twenty_times_the_disturbance_is_an_alarm() {
     // Negative control: larger disturbances do raise an alarm.
     let mut rough = rig("quadruple-paper");
     rough.verify.force_rms_n = Some(20.0 * 0.1);
-    assert!(nominal(&rough, Law::Lqr, 1, 30.0 / 3600.0).cause.is_some());
+    assert!(nominal(&rough, Law::Lqr, 1, 30.0 / 3600.0).fault.is_some());
+}
+
+#[test]
+fn machines_of_a_study_are_within_the_tolerances_and_their_alarms_are_counted() {
+    let tolerating = tolerating("single-quanser-ip02", 5.0, 3e-2);
+    for number in 0..50 {
+        let reality = healthy_machine(&tolerating, number).reality;
+        assert!(reality.parameters.cart_mass_percent.abs() <= 5.0, "{reality:?}");
+        assert!((0.0..=3e-2).contains(&reality.friction.joint_friction_n_m.of(0)), "{reality:?}");
+    }
+    assert_ne!(healthy_machine(&tolerating, 1), healthy_machine(&tolerating, 2));
+    let count =
+        |rig: &Rig| false_alarms(rig, &table(rig), Law::Lqr, (2, 5.0), &Study::whole(), &|| ()).unwrap();
+    let found = count(&tolerating);
+    assert_eq!((found.runs, found.alarms.len()), (2, 0), "{found:?}");
+    assert!((found.hours * 3600.0 - 10.0).abs() < 0.1, "{found:?}");
+    // Negative control.
+    let mut rough = tolerating;
+    rough.verify.force_rms_n = Some(20.0);
+    let found = count(&rough);
+    assert_eq!(found.alarms.len(), 2, "{found:?}");
 }
 
 /// The rig as machines of its tolerances: masses ±`percent` in every combination whose first bit is that of the cart.
@@ -132,7 +92,7 @@ fn machines(name: &str, percent: f64, more: &str, tolerances: Option<Tolerances>
 }
 
 /// Law, number of the machine, and what was found in `seconds` on each machine.
-fn alarms(machines: &[Rig], seconds: f64) -> Vec<(Law, usize, Found)> {
+fn alarms(machines: &[Rig], seconds: f64) -> Vec<(Law, usize, Healthy)> {
     let all: Vec<_> =
         Law::ALL.into_iter().flat_map(|law| (0..machines.len()).map(move |one| (law, one))).collect();
     all.into_par_iter()
@@ -154,11 +114,11 @@ fn friction_that_the_file_tolerates_is_no_alarm_and_without_the_tolerance_it_is(
     let mut sticking = tolerating("single-quanser-ip02", 5.0, 3e-2);
     sticking.reality.friction.joint_friction_n_m = PerJoint::all(3e-2);
     let found = nominal(&sticking, Law::Lqr, 1, 20.0 / 3600.0);
-    assert_eq!((found.cause, found.rejected), (None, 0), "{found:?}");
+    assert_eq!((&found.fault, found.rejected), (&None, 0), "{found:?}");
     // Negative control: the same machine, with thresholds for the exact model.
     sticking.robust = None;
     let found = nominal(&sticking, Law::Lqr, 1, 20.0 / 3600.0);
-    assert_eq!(found.cause.map(|cause| cause.fault), Some(Fault::Encoder), "{found:?}");
+    assert_eq!(found.fault, Some(Fault::Encoder.to_string()), "{found:?}");
 }
 
 #[test]
@@ -193,7 +153,7 @@ fn how_near_machines_within_the_tolerances_come_to_an_alarm() {
             let closest = found.iter().map(|(.., found)| found.closest).fold(0.0, f32::max);
             let causes: Vec<String> = found
                 .iter()
-                .filter_map(|(law, one, found)| Some(format!("{law:?} {one} {:?}", found.cause?.fault)))
+                .filter_map(|(law, one, found)| Some(format!("{law:?} {one} {}", found.fault.as_ref()?)))
                 .collect();
             let rejected: u32 = found.iter().map(|(.., found)| found.rejected).sum();
             println!(

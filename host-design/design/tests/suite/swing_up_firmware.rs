@@ -12,6 +12,7 @@ use upright_design::harness::{Harness, HarnessError, Pins, Recording, record, wi
 use upright_design::plant::absolute_angles;
 use upright_design::rig::Rig;
 use upright_design::simulate::Scenario;
+use upright_design::study::Study;
 use upright_design::swing_up::{Condition, Stored, firmware_runs, hangs, motions, up_and_down, with_motions};
 use upright_design::table::TableValues;
 
@@ -176,7 +177,7 @@ fn random_runs(name: &str, table: &TableValues, base_seed: u64) -> [usize; 2] {
     let rig = Rig::from_path(&file(name)).unwrap();
     let motions = motions(&rig, &Stored::beside(&file(name)).unwrap()).unwrap();
     let condition = &Condition::all()[2];
-    let found = firmware_runs(&rig, table, &motions, condition, base_seed, 3).unwrap();
+    let found = firmware_runs(&rig, table, &motions, condition, base_seed, 3, &Study::whole()).unwrap();
     println!("{name}, {}: {found:?}", condition.name);
     [found.raise.stood, found.lower.stood]
 }

@@ -8,9 +8,10 @@ use crate::published::table;
 use upright::table::Law;
 use upright_design::rig::{PlantDescription, Rig};
 use upright_design::simulate::run;
+use upright_design::study::Study;
 use upright_design::table::TableValues;
 use upright_design::verify::{
-    AttractionSettings, Axis, CornerSettings, Disturbance, EncoderSettings, Horizon, Mass, Spread,
+    AttractionSettings, Axis, CornerSettings, Disturbance, Effort, EncoderSettings, Horizon, Mass, Spread,
     attraction, attraction_map, coarser, coarsest_encoder, corners, endurance, largest_percent,
     mass_tolerances, monte_carlo, noise_run, sample, trial,
 };
@@ -157,6 +158,10 @@ fn masses_wrong_by_a_third_do_not_stand_and_the_weakest_is_named() {
     assert!(tolerances.iter().any(|tolerance| tolerance.mass == Mass::Cart));
 }
 
+fn effort(seed: u64, runs: usize, study: &Study) -> Effort<'_> {
+    Effort { runs, seed, late: 0.0, study }
+}
+
 #[test]
 fn monte_carlo_does_not_depend_on_the_threads_and_its_worst_case_can_be_replayed() {
     let (rig, table) = &*PAPER;
@@ -170,7 +175,9 @@ fn monte_carlo_does_not_depend_on_the_threads_and_its_worst_case_can_be_replayed
         let count = || {
             done.fetch_add(1, Ordering::Relaxed);
         };
-        let found = pool.install(|| monte_carlo(rig, table, Law::Lqr, &spread, 7, 60, &count).unwrap());
+        let found = pool.install(|| {
+            monte_carlo(rig, table, Law::Lqr, &spread, &effort(7, 60, &Study::whole()), &count).unwrap()
+        });
         assert_eq!(done.into_inner(), 60);
         found
     };
@@ -205,7 +212,7 @@ fn a_drawn_plant_is_within_its_spread() {
     }
     assert!((60..140).contains(&late), "{late} of 200 late");
     let spread = Spread { mass: 1.5, ..spread };
-    assert!(monte_carlo(rig, &PAPER.1, Law::Lqr, &spread, 0, 1, &|| ()).is_err());
+    assert!(monte_carlo(rig, &PAPER.1, Law::Lqr, &spread, &effort(0, 1, &Study::whole()), &|| ()).is_err());
 }
 
 #[test]

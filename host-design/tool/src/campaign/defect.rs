@@ -5,7 +5,7 @@ use upright::supervision::fault::Fault;
 use upright::supervision::inhibits::Inhibits;
 
 /// A kind of defect.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, serde::Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "kebab-case")]
 #[allow(missing_docs)] // the table below says what each is
 pub enum Kind {

@@ -1,6 +1,6 @@
 //! The verdict on a trial: its outcome compared with the one that its kind must have.
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 use upright::supervision::fault::Fault;
 
 use super::attempt::{Setup, attempt};
@@ -11,7 +11,7 @@ use crate::in_the_loop::{Place, RunError};
 use upright_design::table::TableValues;
 
 /// Class of an outcome.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Class {
     /// The defect had no visible effect, and the motor stayed on.
@@ -30,7 +30,7 @@ pub enum Class {
 }
 
 /// The outcome of a trial.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Outcome {
     /// Number of the trial.
     pub number: u64,
@@ -45,7 +45,7 @@ pub struct Outcome {
     /// Code of the latched fault.
     pub fault: Option<u8>,
     /// Time from the edge of the emergency stop to an inactive PWM, if it opened between ticks (µs).
-    #[serde(skip_serializing_if = "Option::is_none")]
+    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub stop_to_off_us: Option<f64>,
 }
 

@@ -8,19 +8,25 @@ use super::defect::{Expected, Kind};
 use super::judge::{Class, Outcome, allowed, judge};
 use super::trial::Trial;
 use crate::in_the_loop::{Place, RunError};
-use upright_design::parallel;
+use upright_design::study::{Study, StudyError};
 use upright_design::table::TableValues;
 
 /// A trial that could not be run.
 #[derive(Debug, thiserror::Error)]
-#[error("trial {number} ({kind}): {source}")]
-pub struct CampaignError {
-    /// Number of the trial.
-    pub number: u64,
-    /// Name of its kind.
-    pub kind: &'static str,
-    /// The cause.
-    pub source: RunError,
+pub enum CampaignError {
+    /// Made here.
+    #[error("trial {number} ({kind}): {source}")]
+    Trial {
+        /// Number of the trial.
+        number: u64,
+        /// Name of its kind.
+        kind: &'static str,
+        /// The cause.
+        source: RunError,
+    },
+    /// Made by another process.
+    #[error(transparent)]
+    Study(#[from] StudyError),
 }
 
 /// All trials of one kind.
@@ -79,7 +85,6 @@ pub fn kinds(table: &TableValues, place: Place<'_>) -> Vec<Kind> {
         .map(|(kind, ..)| *kind)
         .filter(|kind| match kind {
             Kind::SupplySag | Kind::SupplyDip => has_supply,
-            Kind::SupplySurge | Kind::SupplySpike => table.motor.is_some(),
             Kind::LinkEncoderFrozen | Kind::EncodersSwapped => has_links,
             _ => true,
         })
@@ -97,10 +102,10 @@ pub fn kinds(table: &TableValues, place: Place<'_>) -> Vec<Kind> {
 /// [`CampaignError`] if it cannot be run.
 pub fn one(setup: &Setup<'_>, kinds: &[Kind], seed: u64, number: u64) -> Result<Outcome, CampaignError> {
     let trial = Trial::draw(setup.rig, setup.table, kinds, seed, number);
-    judge(setup, &trial).map_err(|source| CampaignError { number, kind: trial.kind.name(), source })
+    judge(setup, &trial).map_err(|source| CampaignError::Trial { number, kind: trial.kind.name(), source })
 }
 
-/// Runs `runs` trials of `kinds`, in turn; `done` is called after each.
+/// Runs `runs` trials of `kinds`, in turn, which are the part `part` of `study`; `done` is called after each.
 ///
 /// # Errors
 /// The first [`CampaignError`].
@@ -109,13 +114,15 @@ pub fn campaign(
     kinds: &[Kind],
     seed: u64,
     runs: u64,
+    (study, part): (&Study, &str),
     done: &(dyn Fn() + Sync),
 ) -> Result<Campaign, CampaignError> {
-    let outcomes = parallel::try_map(0..runs, |number| {
+    let of_number = |number: u64| {
         let outcome = one(setup, kinds, seed, number);
         done();
         outcome
-    })?;
+    };
+    let outcomes: Vec<Outcome> = study.outcomes(part, runs, of_number)?;
     let rows = kinds.iter().map(|&kind| Row::of(kind, setup.table, &outcomes)).collect();
     Ok(Campaign { seed, runs, rows })
 }

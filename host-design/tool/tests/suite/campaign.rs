@@ -5,6 +5,7 @@ use std::path::Path;
 
 use upright_design::design::design;
 use upright_design::rig::Rig;
+use upright_design::study::Study;
 use upright_design::table::{Gains, TableValues};
 use upright_tool::campaign::{Campaign, Kind, Setup, Trial, campaign, kinds, one};
 use upright_tool::in_the_loop::Place;
@@ -21,7 +22,7 @@ fn on_host<'a>(rig: &'a Rig, table: &'a TableValues) -> Setup<'a> {
 }
 
 fn run(setup: &Setup<'_>, kinds: &[Kind], runs: u64) -> Campaign {
-    campaign(setup, kinds, 3, runs, &|| ()).unwrap()
+    campaign(setup, kinds, 3, runs, (&Study::whole(), ""), &|| ()).unwrap()
 }
 
 #[test]
@@ -58,7 +59,7 @@ fn a_trial_is_the_same_every_time_and_does_not_depend_on_the_others() {
     let backwards: Vec<_> = (0..6).rev().map(alone).collect();
     let forwards: Vec<_> = (0..6).map(alone).collect();
     assert!(forwards.iter().eq(backwards.iter().rev()));
-    let together = campaign(&setup, &kinds, 5, 6, &|| ()).unwrap();
+    let together = campaign(&setup, &kinds, 5, 6, (&Study::whole(), ""), &|| ()).unwrap();
     for row in &together.rows {
         let of_kind = || forwards.iter().filter(|outcome| outcome.kind == row.kind);
         assert_eq!(of_kind().count(), row.runs);

@@ -8,6 +8,7 @@ use upright_design::identify::IdentifyError;
 use upright_design::rig::RigError;
 use upright_design::robust::RobustError;
 use upright_design::simulate::SimulationError;
+use upright_design::study::StudyError;
 use upright_design::swing_up::SwingUpError;
 use upright_design::table::{NoTable, WriteError};
 use upright_design::verify::{Unverifiable, VerifyError};
@@ -62,6 +63,8 @@ pub(crate) enum Failure {
     #[error(transparent)]
     Campaign(#[from] CampaignError),
     #[error(transparent)]
+    Study(#[from] StudyError),
+    #[error(transparent)]
     Reproduce(#[from] ReproduceError),
     #[error(transparent)]
     Figure(#[from] FigureError),
@@ -110,12 +113,14 @@ impl Failure {
             | Failure::InTheLoop(RunError::Emulator(EmulatorError::Missing | EmulatorError::NeedsUnix)) => 4,
             Failure::InTheLoop(RunError::Harness(error)) if is_bad_scenario(error) => 2,
             Failure::InTheLoop(_) => 1,
-            Failure::Campaign(CampaignError {
+            Failure::Campaign(CampaignError::Trial {
                 source: RunError::Emulator(EmulatorError::Missing | EmulatorError::NeedsUnix),
                 ..
             }) => 4,
-            Failure::Campaign(_) => 1,
+            Failure::Campaign(CampaignError::Trial { .. }) => 1,
             Failure::SwingUp { .. }
+            | Failure::Campaign(CampaignError::Study(_))
+            | Failure::Study(_)
             | Failure::Robust { .. }
             | Failure::Identify(_)
             | Failure::Image(_)

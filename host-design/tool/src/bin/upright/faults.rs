@@ -5,6 +5,7 @@ use std::io::Write;
 use clap::Args;
 use serde_json::json;
 use upright_design::rig::Rig;
+use upright_design::study::Study;
 use upright_design::swing_up::SwingUpError;
 use upright_tool::campaign::{Campaign, Kind, Row, Setup, campaign, kinds, one};
 use upright_tool::in_the_loop::{Link, Place};
@@ -12,6 +13,7 @@ use upright_tool::in_the_loop::{Link, Place};
 use crate::failure::Failure;
 use crate::firmware::Target;
 use crate::progress::with_bar;
+use crate::split::Split;
 use crate::variation::{Variation, with_stored_motions};
 
 /// Fault injection: runs the firmware with one defect at a time and checks that the motor is off in time; exit status
@@ -28,6 +30,8 @@ Examples:
   upright faults rigs/quadruple-paper.toml --target board --runs 300
   upright faults rigs/quadruple-paper.toml --swing-up                while it is raised and lowered
   upright faults rigs/quadruple-paper.toml --only 1234               one run again, bit for bit
+  upright faults rigs/quadruple-paper.toml --shard 2/3 > 2.jsonl     the second third of the runs
+  upright faults rigs/quadruple-paper.toml --merge 1.jsonl 2.jsonl 3.jsonl
   upright faults rigs/quadruple-paper.toml --kind motor-dead --json")]
 pub(crate) struct Faults {
     #[command(flatten)]
@@ -48,8 +52,10 @@ pub(crate) struct Faults {
     #[arg(long, value_parser = kind)]
     kind: Option<Kind>,
     /// Only the run with this number
-    #[arg(long, value_name = "NUMBER")]
+    #[arg(long, value_name = "NUMBER", conflicts_with_all = ["shard", "merge"])]
     only: Option<u64>,
+    #[command(flatten)]
+    split: Split,
     /// Print the result as one JSON object
     #[arg(long)]
     json: bool,
@@ -92,11 +98,24 @@ impl Faults {
         if let Some(number) = self.only {
             return self.replay(&setup, &chosen, number);
         }
-        let result =
-            with_bar("faults", self.runs, |tick| campaign(&setup, &chosen, self.seed, self.runs, tick))?;
-        let control = self.control(&setup, &chosen)?;
-        let unguarded = self.unguarded(&setup, &chosen)?;
-        self.print(&rig, &result, control.as_ref())?;
+        let options = json!({
+            "gains": self.variation.changes(), "swing_up": self.swing_up, "target": self.target.name(),
+            "seed": self.seed, "runs": self.runs, "kind": self.kind,
+        });
+        self.split.study("faults", &rig, &options, |study| self.inject(&setup, &chosen, study))
+    }
+
+    /// The whole campaign.
+    fn inject(&self, setup: &Setup<'_>, chosen: &[Kind], study: &Study) -> Result<(), Failure> {
+        let result = with_bar("faults", self.runs, |tick| {
+            campaign(setup, chosen, self.seed, self.runs, (study, "faults"), tick)
+        })?;
+        let control = self.control(setup, chosen, study)?;
+        let unguarded = self.unguarded(setup, chosen, study)?;
+        if study.is_shard() {
+            return Ok(());
+        }
+        self.print(setup.rig, &result, control.as_ref())?;
         if let Some(unguarded) = &unguarded {
             self.say_unguarded(unguarded)?;
         }
@@ -104,28 +123,40 @@ impl Faults {
     }
 
     /// The negative control: the same on the host, without thresholds and limits.
-    fn control(&self, setup: &Setup<'_>, chosen: &[Kind]) -> Result<Option<Campaign>, Failure> {
+    fn control(
+        &self,
+        setup: &Setup<'_>,
+        chosen: &[Kind],
+        study: &Study,
+    ) -> Result<Option<Campaign>, Failure> {
         let chosen: Vec<Kind> = chosen.iter().copied().filter(|kind| kind.needs_detection()).collect();
         if chosen.is_empty() {
             return Ok(None);
         }
         let setup = Setup { place: Place::Host, detection: false, ..*setup };
         let runs = CONTROL_RUNS * chosen.len() as u64;
+        let part = "without detection";
         let result =
-            with_bar("without detection", runs, |tick| campaign(&setup, &chosen, self.seed, runs, tick))?;
+            with_bar(part, runs, |tick| campaign(&setup, &chosen, self.seed, runs, (study, part), tick))?;
         Ok(Some(result))
     }
 
     /// The other negative control, on the board: without watchdog, break input, MPU, registers read back.
-    fn unguarded(&self, setup: &Setup<'_>, chosen: &[Kind]) -> Result<Option<Campaign>, Failure> {
+    fn unguarded(
+        &self,
+        setup: &Setup<'_>,
+        chosen: &[Kind],
+        study: &Study,
+    ) -> Result<Option<Campaign>, Failure> {
         let chosen: Vec<Kind> = chosen.iter().copied().filter(|kind| kind.needs_guard()).collect();
         if self.target != Target::Board || chosen.is_empty() {
             return Ok(None);
         }
         let setup = Setup { guards: false, ..*setup };
         let runs = 2 * chosen.len() as u64;
+        let part = "without guards";
         let result =
-            with_bar("without guards", runs, |tick| campaign(&setup, &chosen, self.seed, runs, tick))?;
+            with_bar(part, runs, |tick| campaign(&setup, &chosen, self.seed, runs, (study, part), tick))?;
         Ok(Some(result))
     }
 

@@ -4,6 +4,7 @@ mod check;
 mod compare;
 mod design;
 mod failure;
+mod false_alarms;
 mod faults;
 mod firmware;
 mod identify;
@@ -13,6 +14,7 @@ mod reproduce;
 mod robust;
 mod shake;
 mod simulate;
+mod split;
 mod swing_up;
 mod twin;
 mod variation;
@@ -56,6 +58,7 @@ struct Arguments {
 enum Command {
     Check(check::Check),
     Design(design::Design),
+    FalseAlarms(false_alarms::HealthyHours),
     Faults(faults::Faults),
     Firmware(firmware::Firmware),
     Report(report::Report),
@@ -74,6 +77,7 @@ fn main() -> ExitCode {
     let result = match Arguments::parse().command {
         Command::Check(command) => command.run(),
         Command::Design(command) => command.run(),
+        Command::FalseAlarms(command) => command.run(),
         Command::Faults(command) => command.run(),
         Command::Firmware(command) => command.run(),
         Command::Report(command) => command.run(),

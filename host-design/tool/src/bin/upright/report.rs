@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 use serde_json::json;
 use upright_design::rig::Rig;
+use upright_design::study::Study;
 use upright_design::swing_up::{Demonstration, Script, Stored, motions, with_motions};
 use upright_design::table::{TableValues, write_atomically};
 use upright_design::verify::{Effort, trust};
@@ -62,7 +63,8 @@ impl Report {
         let (rig, certified, table) = self.variation.designed()?;
         let laws = table.laws.present().count() as u64;
         let imperfections = if self.imperfections { search(&rig, &table)? } else { Vec::new() };
-        let effort = Effort { runs: self.runs as usize, seed: self.seed, late: 0.0 };
+        let study = Study::whole();
+        let effort = Effort { runs: self.runs as usize, seed: self.seed, late: 0.0, study: &study };
         let (trust, files) =
             with_random_plants(laws * u64::from(self.runs), |stage, done| -> Result<_, Failure> {
                 let trust = trust(&rig, &certified, &table, effort, stage, done)?;

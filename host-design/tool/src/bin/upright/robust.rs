@@ -16,6 +16,7 @@ use upright_tool::figure::front_figure;
 
 use crate::failure::Failure;
 use crate::progress::{with_spinner, with_stages};
+use crate::split::Split;
 use crate::variation::{not_negative, positive};
 
 mod text;
@@ -69,6 +70,8 @@ pub(crate) struct Robust {
     /// Write nothing; exit status 1 if the file of --out differs
     #[arg(long, requires = "out")]
     check: bool,
+    #[command(flatten)]
+    split: Split,
     /// Print the result as one JSON object
     #[arg(long)]
     json: bool,
@@ -82,6 +85,9 @@ impl Robust {
             JudgeSettings { runs: self.runs.into(), duration_s: self.duration, ..JudgeSettings::of(&rig) };
         if self.as_it_is {
             return self.judge(&rig, &tolerances, &settings);
+        }
+        if self.split.is_used() {
+            return Err(Failure::BadArgument("--shard and --merge are for --as-it-is".to_owned()));
         }
         let failed = |source: RobustError| Failure::Robust { rig: rig.name.clone(), source };
         let (choice, front) = with_stages(4, |stage| choose(&rig, &tolerances, &settings, self.front, stage))
@@ -122,16 +128,29 @@ impl Robust {
         let table = TableValues::of(rig, &certified, Gains::Sampled)
             .map_err(|source| Failure::NoTable { rig: name(), source })?;
         let laws: Vec<Law> = table.laws.present().map(|(law, _)| law).collect();
-        let judgements = with_spinner("judging", || {
-            let of_law = |&law: &Law| judge(rig, &table, law, tolerances, settings);
-            laws.iter().map(of_law).collect::<Result<Vec<Judgement>, _>>()
-        })?;
+        let options = json!({ "tolerances": tolerances, "settings": settings });
+        self.split.study("robust --as-it-is", rig, &options, |study| {
+            let judgements = with_spinner("judging", || {
+                let of_law = |&law: &Law| judge(rig, &table, law, tolerances, settings, study);
+                laws.iter().map(of_law).collect::<Result<Vec<Judgement>, _>>()
+            })?;
+            if study.is_shard() { Ok(()) } else { self.print_judged(rig, tolerances, settings, &judgements) }
+        })
+    }
+
+    fn print_judged(
+        &self,
+        rig: &Rig,
+        tolerances: &Tolerances,
+        settings: &JudgeSettings,
+        judgements: &[Judgement],
+    ) -> Result<(), Failure> {
         let mut out = std::io::stdout().lock();
         if self.json {
             let object = json!({ "rig": rig.name, "tolerances": tolerances, "laws": judgements });
             writeln!(out, "{object}")?;
         } else {
-            write!(out, "{}", text::judged(rig, tolerances, settings, &judgements))?;
+            write!(out, "{}", text::judged(rig, tolerances, settings, judgements))?;
         }
         let fallen: Vec<&str> =
             judgements.iter().filter(|one| !one.stands()).map(|one| one.law.key()).collect();

@@ -7,6 +7,7 @@ use std::path::PathBuf;
 use clap::Args;
 use serde_json::json;
 use upright_design::rig::{PlantDescription, Rig};
+use upright_design::study::Study;
 use upright_design::swing_up::{
     Condition, FirmwareRuns, Judgement, Plan, Script, Stored, SwingUpError, designed_table, firmware_runs,
     judge, refined, search,
@@ -17,6 +18,7 @@ use upright_tool::in_the_loop::RunError;
 
 use crate::failure::Failure;
 use crate::progress::{with_search, with_spinner};
+use crate::split::Split;
 
 /// Plans the motions with which the rig raises itself from hanging to upright, and lowers itself again.
 ///
@@ -53,10 +55,15 @@ pub(crate) struct SwingUp {
     /// Draw the raising as a stroboscopic picture into an SVG file
     #[arg(long, value_name = "FILE")]
     picture: Option<PathBuf>,
-    /// Run the firmware with the stored motions 200 times under each of several conditions, and print the table
+    /// Run the firmware with the stored motions under each of several conditions, and print the table
     #[arg(long, conflicts_with_all = ["stored", "check", "no_write", "csv", "svg", "picture", "seed"])]
     table: bool,
-    /// Seed of that run
+    /// With --table: runs under each condition, with the seeds from 1 on
+    #[arg(long, value_name = "N", default_value_t = 200, value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
+    runs: u32,
+    #[command(flatten)]
+    split: Split,
+    /// Seed of the run of everything
     #[arg(long, default_value_t = 1)]
     seed: u64,
     /// Print the result as one JSON object
@@ -64,12 +71,9 @@ pub(crate) struct SwingUp {
     json: bool,
 }
 
-/// Runs under each condition, with the seeds from 1 on.
-const RUNS: usize = 200;
-
 impl SwingUp {
     /// Runs of the stored motions under all conditions.
-    fn rows(&self, rig: &Rig) -> Result<Vec<Row>, SwingUpError> {
+    fn rows(&self, rig: &Rig, study: &Study) -> Result<Vec<Row>, SwingUpError> {
         let stored = Stored::beside(&self.rig)?;
         let designed = |rig: &Rig| -> Result<_, SwingUpError> {
             let motions = refined(rig, &stored)?;
@@ -79,7 +83,7 @@ impl SwingUp {
         let row = |condition: Condition| {
             let rig = condition.designed(rig);
             let (table, motions) = if condition.joint_counts.is_some() { &designed(&rig)? } else { &usual };
-            let runs = firmware_runs(&rig, table, motions, &condition, 1, RUNS)?;
+            let runs = firmware_runs(&rig, table, motions, &condition, 1, self.runs as usize, study)?;
             Ok(Row { condition, runs })
         };
         Condition::all().into_iter().map(row).collect()
@@ -89,8 +93,16 @@ impl SwingUp {
         let rig = Rig::from_path(&self.rig)?;
         let failed = |source: SwingUpError| Failure::SwingUp { rig: rig.name.clone(), source };
         if self.table {
-            let rows = with_spinner("random runs", || self.rows(&rig)).map_err(failed)?;
-            return print_rows(&rig, &rows, self.json);
+            // The motions decide the outcome, besides the rig file.
+            let stored = Stored::beside(&self.rig).map_err(failed)?.to_json();
+            let options = json!({ "runs": self.runs, "motions": stored });
+            return self.split.study("swing-up --table", &rig, &options, |study| {
+                let rows = with_spinner("random runs", || self.rows(&rig, study)).map_err(failed)?;
+                if study.is_shard() { Ok(()) } else { print_rows(&rig, &rows, self.json) }
+            });
+        }
+        if self.split.is_used() {
+            return Err(Failure::BadArgument("--shard and --merge are for --table".to_owned()));
         }
         let old = Stored::beside(&self.rig);
         let plan = if self.stored {

@@ -47,7 +47,12 @@ pub(crate) fn law_option() -> impl TypedValueParser<Value = Law> {
 impl Variation {
     /// The rig file and all changes as command-line arguments.
     pub(crate) fn as_typed(&self) -> String {
-        let mut typed = self.rig.display().to_string();
+        self.rig.display().to_string() + &self.changes()
+    }
+
+    /// The changes as command-line arguments.
+    pub(crate) fn changes(&self) -> String {
+        let mut typed = String::new();
         if let GainsName::Continuous = self.gains {
             typed.push_str(" --gains continuous");
         }

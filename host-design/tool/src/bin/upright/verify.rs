@@ -4,17 +4,19 @@ use std::io::Write;
 use std::path::PathBuf;
 
 use clap::Args;
+use serde_json::json;
 use upright::table::Law;
 use upright_design::rig::Rig;
 use upright_design::simulate::simulate;
 use upright_design::table::{TableValues, write_atomically};
 use upright_design::verify::{
     Axis, Effort, Horizon, IMPERFECTIONS, ImperfectionSettings, Imperfections, TrustReport, attraction_map,
-    sample, spread, trust,
+    monte_carlo, sample, spread, trust,
 };
 
 use crate::failure::Failure;
 use crate::progress::{with_bar, with_random_plants, with_spinner};
+use crate::split::Split;
 use crate::variation::{Variation, law_option};
 
 mod imperfections;
@@ -45,16 +47,16 @@ pub(crate) struct Verify {
     #[arg(long, value_parser = law_option())]
     law: Option<Law>,
     /// Instead of the report, repeat the Monte Carlo run of this seed
-    #[arg(long, value_name = "SEED", requires = "law")]
+    #[arg(long, value_name = "SEED", requires = "law", conflicts_with_all = ["shard", "merge"])]
     replay: Option<u64>,
     /// With --replay: write every tick as CSV
     #[arg(long, value_name = "FILE", requires = "replay")]
     csv: Option<PathBuf>,
     /// Instead of the report, write a map of the initial states from which the loop recovers, as CSV
-    #[arg(long, value_name = "FILE", conflicts_with = "replay")]
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["replay", "shard", "merge"])]
     map: Option<PathBuf>,
     /// Instead of the report, the size of each imperfection of the machine at which the loop falls
-    #[arg(long, conflicts_with_all = ["replay", "map"])]
+    #[arg(long, conflicts_with_all = ["replay", "map", "shard", "merge"])]
     imperfections: bool,
     /// With --map: two states and their ranges, as index:from:to (SI; state order x, xdot, theta1, theta1dot …)
     #[arg(long, value_name = "S:A:B", num_args = 2, value_delimiter = ',', requires = "map", allow_negative_numbers = true,
@@ -63,6 +65,8 @@ pub(crate) struct Verify {
     /// Share of the random plants with one more tick of delay than designed for (0 to 1)
     #[arg(long, value_name = "SHARE", default_value_t = 0.0, value_parser = share)]
     late: f64,
+    #[command(flatten)]
+    split: Split,
     /// Print the report as one JSON object
     #[arg(long)]
     json: bool,
@@ -101,6 +105,19 @@ pub(crate) fn search(rig: &Rig, table: &TableValues) -> Result<Vec<Imperfections
     })?)
 }
 
+/// The random plants of each law alone: the part of the report that is split.
+fn random_plants(
+    rig: &Rig,
+    table: &TableValues,
+    effort: &Effort<'_>,
+    done: &(dyn Fn() + Sync),
+) -> Result<(), Failure> {
+    for (law, _) in table.laws.present() {
+        monte_carlo(rig, table, law, &spread(rig, effort.late), effort, done)?;
+    }
+    Ok(())
+}
+
 impl Verify {
     pub(crate) fn run(self) -> Result<(), Failure> {
         let (rig, certified, mut table) = self.variation.designed()?;
@@ -121,12 +138,23 @@ impl Verify {
         if self.imperfections {
             return self.imperfections(&rig, &table);
         }
-        let laws = table.laws.present().count() as u64;
-        let effort = Effort { runs: self.runs as usize, seed: self.seed, late: self.late };
-        let report = with_random_plants(laws * u64::from(self.runs), |stage, done| {
-            trust(&rig, &certified, &table, effort, stage, done)
+        let law = self.law.map(Law::key);
+        let options = json!({
+            "gains": self.variation.changes(), "seed": self.seed, "runs": self.runs, "law": law, "late": self.late,
         });
-        self.print(&rig, &report?)
+        self.split.study("verify", &rig, &options, |study| {
+            let effort = Effort { runs: self.runs as usize, seed: self.seed, late: self.late, study };
+            let runs = table.laws.present().count() as u64 * u64::from(self.runs);
+            if study.is_shard() {
+                return with_random_plants(runs, |stage, done| {
+                    stage("random plants");
+                    random_plants(&rig, &table, &effort, done)
+                });
+            }
+            let report =
+                with_random_plants(runs, |stage, done| trust(&rig, &certified, &table, effort, stage, done));
+            self.print(&rig, &report?)
+        })
     }
 
     /// The arguments that a replay has to repeat.

@@ -1,0 +1,233 @@
+//! Hours of balancing with the whole firmware on machines without a defect: how often is one turned off?
+
+use rand::{RngExt, SeedableRng};
+use rand_pcg::Pcg64;
+use serde::{Deserialize, Serialize};
+use upright::protocol::message::{Answer, Request};
+use upright::table::Law;
+
+use super::judge::machine;
+use crate::harness::{HEARTBEAT_S, Harness, HarnessError, with_firmware};
+use crate::rig::{PerJoint, PlantDescription, Rig};
+use crate::simulate::Scenario;
+use crate::study::Study;
+use crate::table::TableValues;
+use crate::verify::{Disturbance, Unverifiable};
+
+/// The set-point changes sides this often (s).
+const SIDE_S: f64 = 60.0;
+/// Its largest distance from the middle (m).
+const SETPOINT_M: f64 = 0.1;
+
+/// How one machine balanced.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Healthy {
+    /// Time for which it balanced (s).
+    pub balanced_s: f64,
+    /// Why it was turned off, if it was: the name of the fault.
+    pub fault: Option<String>,
+    /// Measurements that the firmware rejected.
+    pub rejected: u32,
+    /// Largest innovation in the telemetry, as a share of its threshold.
+    pub closest: f32,
+}
+
+/// How the machines of one law balanced.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct FalseAlarms {
+    /// The law.
+    pub law: Law,
+    /// Machines.
+    pub runs: u64,
+    /// Time for which they balanced, all together (h).
+    pub hours: f64,
+    /// Faults, with the number of each run that ended with one.
+    pub alarms: Vec<(u64, String)>,
+    /// With a probability of 95 %, alarms are not more frequent than this (1/h).
+    pub most_per_hour: f64,
+    /// Measurements that the firmware rejected.
+    pub rejected: u64,
+    /// Largest innovation in the telemetry, as a share of its threshold.
+    pub closest: f32,
+}
+
+/// Machine of the run with this number: drawn within `[robust]`, or, if the rig file has none, the machine of `[reality]`.
+///
+/// Friction, wrong zeros and latency have the same share of their tolerances, and each mass its own, all even from none to
+/// all.
+pub fn healthy_machine(rig: &Rig, number: u64) -> Rig {
+    let (Some(tolerances), PlantDescription::Chain(chain)) = (&rig.robust, &rig.plant) else {
+        return rig.clone();
+    };
+    let mut random = Pcg64::seed_from_u64(number);
+    let mut machine = machine(rig, tolerances, random.random_range(0.0..=1.0));
+    let percent = tolerances.mass_percent;
+    let mut wrong = || percent * random.random_range(-1.0..=1.0);
+    let parameters = &mut machine.reality.parameters;
+    parameters.cart_mass_percent = wrong();
+    parameters.link_mass_percent = PerJoint::each(chain.links.iter().map(|_| wrong()).collect());
+    machine
+}
+
+/// Balances `runs` machines for `seconds` each, a part of `study`. `done` is called after each, from any thread.
+///
+/// # Errors
+/// [`Unverifiable`] if a run cannot be started.
+pub fn false_alarms(
+    rig: &Rig,
+    table: &TableValues,
+    law: Law,
+    (runs, seconds): (u64, f64),
+    study: &Study,
+    done: &(dyn Fn() + Sync),
+) -> Result<FalseAlarms, Unverifiable> {
+    if !matches!(rig.plant, PlantDescription::Chain(_)) {
+        return Err(Unverifiable::NotAChain("healthy machines"));
+    }
+    let one = |number: u64| -> Result<(u64, Healthy), Unverifiable> {
+        let found = balance(&healthy_machine(rig, number), table, law, number, seconds);
+        done();
+        Ok((number, found.map_err(|error| Unverifiable::Firmware(error.to_string()))?))
+    };
+    let all = study.outcomes(law.key(), runs, one)?;
+    let hours = all.iter().map(|(_, one)| one.balanced_s).sum::<f64>() / 3600.0;
+    let alarms: Vec<(u64, String)> =
+        all.iter().filter_map(|(number, one)| Some((*number, one.fault.clone()?))).collect();
+    Ok(FalseAlarms {
+        law,
+        runs: all.len() as u64,
+        hours,
+        most_per_hour: largest_mean(alarms.len()) / hours.max(f64::MIN_POSITIVE),
+        alarms,
+        rejected: all.iter().map(|(_, one)| u64::from(one.rejected)).sum(),
+        closest: all.iter().map(|(_, one)| one.closest).fold(0.0, f32::max),
+    })
+}
+
+/// Balances one machine for `seconds` after it was raised by hand, with the disturbances that the rig file expects. The
+/// set-point changes sides every minute.
+///
+/// # Errors
+/// [`HarnessError`] if the firmware does not run with this rig and table.
+pub fn balance(
+    machine: &Rig,
+    table: &TableValues,
+    law: Law,
+    seed: u64,
+    seconds: f64,
+) -> Result<Healthy, HarnessError> {
+    let disturbance = Disturbance::of(machine);
+    let scenario = Scenario {
+        force_noise_n: disturbance.force_n,
+        torque_noise_n_m: disturbance.torque_n_m,
+        seed,
+        substeps: 2,
+        ..Scenario::at_rest(machine, law)
+    };
+    with_firmware(table, |target| {
+        let mut harness = Harness::new(machine, table, &scenario, target)?;
+        match harness.raise(None) {
+            Ok(output) => {
+                harness.bench.tick(output.drive);
+                balanced(machine, table, &mut harness, seconds)
+            }
+            // Turned off before it balanced.
+            Err(error) => match harness.session.fault() {
+                Some(fault) => {
+                    Ok(Healthy { balanced_s: 0.0, fault: Some(fault.to_string()), rejected: 0, closest: 0.0 })
+                }
+                None => Err(error),
+            },
+        }
+    })?
+}
+
+fn balanced(
+    rig: &Rig,
+    table: &TableValues,
+    harness: &mut Harness<'_>,
+    seconds: f64,
+) -> Result<Healthy, HarnessError> {
+    let ticks = |seconds: f64| (seconds / rig.tick.period_s) as u64;
+    let (side, heartbeat) = (ticks(SIDE_S).max(1), ticks(HEARTBEAT_S).max(1));
+    let [low, high] = table.limits.rail_m.map(f64::from);
+    let setpoint_m = SETPOINT_M.min(0.5 * high.min(-low)) as f32;
+    let mut found = Healthy { balanced_s: 0.0, fault: None, rejected: 0, closest: 0.0 };
+    for number in 0..ticks(seconds) {
+        if number % side == 0 {
+            let sign = if (number / side).is_multiple_of(2) { 1.0 } else { -1.0 };
+            harness.session.send(Request::Setpoint(sign * setpoint_m));
+        } else if number % heartbeat == 0 {
+            harness.session.send(Request::Beat);
+        }
+        tick(harness)?;
+        while harness.session.next_reply().is_some() {}
+        while let Some(telemetry) = harness.session.next_telemetry() {
+            for (innovation, threshold) in telemetry.innovation.iter().zip(&table.thresholds.innovation) {
+                found.closest = found.closest.max(innovation.abs() / threshold);
+            }
+        }
+        found.fault = harness.session.fault().map(|fault| fault.to_string());
+        if found.fault.is_some() {
+            break;
+        }
+        found.balanced_s = (number + 1) as f64 * rig.tick.period_s;
+    }
+    found.rejected = rejected(harness)?;
+    Ok(found)
+}
+
+/// One tick of firmware and rig.
+fn tick(harness: &mut Harness<'_>) -> Result<(), HarnessError> {
+    let inputs = harness.inputs();
+    let output = harness.session.tick(&inputs)?;
+    harness.bench.tick(output.drive);
+    Ok(())
+}
+
+/// Measurements that the firmware has rejected so far; the rig goes on balancing until the answer is there.
+fn rejected(harness: &mut Harness<'_>) -> Result<u32, HarnessError> {
+    let id = harness.session.send(Request::Statistics);
+    for _ in 0..harness.session.pace().answer_ticks {
+        tick(harness)?;
+        while let Some((answered, answer)) = harness.session.next_reply() {
+            if let (true, Answer::Statistics(statistics)) = (answered == id, answer) {
+                return Ok(statistics.rejected_samples);
+            }
+        }
+    }
+    Err(HarnessError::NoAnswer(Request::Statistics))
+}
+
+/// The mean of a Poisson distribution of which `seen` or fewer are drawn with a probability of 5 %: the largest that is
+/// plausible (F. Garwood, "Fiducial limits for the Poisson distribution", Biometrika 28 (1936) 437-442).
+fn largest_mean(seen: usize) -> f64 {
+    let probability = |mean: f64| {
+        let mut term = (-mean).exp();
+        let mut sum = term;
+        for k in 1..=seen {
+            term *= mean / k as f64;
+            sum += term;
+        }
+        sum
+    };
+    let (mut low, mut high) = (0.0, 10.0 + 3.0 * seen as f64);
+    for _ in 0..60 {
+        let middle = 0.5 * (low + high);
+        if probability(middle) > 0.05 { low = middle } else { high = middle }
+    }
+    high
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_largest_plausible_mean_has_its_known_values() {
+        // R: qchisq(0.95, 2 * (n + 1)) / 2
+        for (seen, mean) in [(0, 2.995732), (1, 4.743865), (5, 10.513034), (100, 118.079273)] {
+            assert!((largest_mean(seen) - mean).abs() < 1e-4, "{seen}: {}", largest_mean(seen));
+        }
+    }
+}

@@ -1,0 +1,144 @@
+//! Studies: many numbered runs, made in this process or split over several.
+//!
+//! A run depends on nothing but its number, so it does not matter where it is made. A shard makes every N-th run and
+//! writes the outcomes, one JSON object per line. A merged study reads them from these files instead of making runs. All
+//! that follows is the code of a study that makes every run, so that it prints the same bytes.
+
+mod error;
+mod files;
+mod shard;
+
+use std::cell::RefCell;
+use std::collections::BTreeMap;
+use std::io::Write;
+use std::path::PathBuf;
+
+use serde::de::DeserializeOwned;
+use serde::{Deserialize, Deserializer, Serialize};
+use serde_json::{Value, json};
+use sha2::{Digest, Sha256};
+
+pub use error::StudyError;
+pub use shard::Shard;
+
+use crate::parallel;
+use crate::rig::Rig;
+use files::{Header, Line, Outcomes};
+
+/// Where the outcomes of numbered runs come from.
+#[derive(Debug)]
+pub struct Study(Source);
+
+#[derive(Debug)]
+enum Source {
+    /// All runs are made.
+    All,
+    /// Those of the shard are made, and their outcomes kept.
+    Shard(Shard, RefCell<Made>),
+    /// None is made.
+    Files(Outcomes),
+}
+
+/// What a shard has made.
+#[derive(Debug, Default)]
+struct Made {
+    /// Number of runs of each part, those of the other shards included.
+    parts: BTreeMap<String, u64>,
+    lines: Vec<Line>,
+}
+
+impl Study {
+    /// A study that makes every run.
+    pub fn whole() -> Self {
+        Self(Source::All)
+    }
+
+    /// A study that makes the runs of one shard.
+    pub fn shard(shard: Shard) -> Self {
+        Self(Source::Shard(shard, RefCell::default()))
+    }
+
+    /// A study that takes the outcomes of all shards from files. `about` is what [`about`] gives for this study.
+    ///
+    /// # Errors
+    /// [`StudyError`] if a file is not of this study, or a shard or a run is missing or comes twice.
+    pub fn merged(files: &[PathBuf], about: &Value) -> Result<Self, StudyError> {
+        Ok(Self(Source::Files(files::merged(files, about)?)))
+    }
+
+    /// Outcomes of the runs 0 to `runs` - 1 of this part of the study, in order; of a shard, only those that it makes.
+    /// Runs are made on all threads.
+    ///
+    /// # Errors
+    /// The error of a run, or [`StudyError`] if the files do not have this part.
+    pub fn outcomes<T, E>(
+        &self,
+        part: &str,
+        runs: u64,
+        one: impl Fn(u64) -> Result<T, E> + Sync,
+    ) -> Result<Vec<T>, E>
+    where
+        T: Serialize + DeserializeOwned + Send + Sync,
+        E: From<StudyError> + Send + Sync,
+    {
+        match &self.0 {
+            Source::All => parallel::try_map(0..runs, one),
+            Source::Shard(shard, made) => {
+                let numbers: Vec<u64> = shard.numbers(runs).collect();
+                let outcomes = parallel::try_map(numbers.iter().copied(), one)?;
+                let mut made = made.borrow_mut();
+                made.parts.insert(part.to_owned(), runs);
+                for (&run, outcome) in numbers.iter().zip(&outcomes) {
+                    let outcome = serde_json::to_value(outcome)
+                        .map_err(|error| StudyError::outcome(part, run, &error))?;
+                    made.lines.push(Line { part: part.to_owned(), run, outcome });
+                }
+                Ok(outcomes)
+            }
+            Source::Files(parts) => {
+                let outcomes = parts
+                    .get(part)
+                    .filter(|outcomes| outcomes.len() as u64 == runs)
+                    .ok_or_else(|| StudyError::NoPart { part: part.to_owned(), runs })?;
+                let read = |(&run, outcome): (&u64, &Value)| {
+                    T::deserialize(outcome).map_err(|error| StudyError::outcome(part, run, &error).into())
+                };
+                outcomes.iter().map(read).collect()
+            }
+        }
+    }
+
+    /// Whether this is a shard.
+    pub fn is_shard(&self) -> bool {
+        matches!(self.0, Source::Shard(..))
+    }
+
+    /// Writes what a shard has made: a line about the study, then one for each run. Nothing for a study that is no shard.
+    ///
+    /// # Errors
+    /// That of the writer.
+    pub fn write(&self, about: &Value, mut out: impl Write) -> std::io::Result<()> {
+        let Source::Shard(shard, made) = &self.0 else { return Ok(()) };
+        let made = made.borrow();
+        let header = Header { study: about.clone(), shard: *shard, parts: made.parts.clone() };
+        writeln!(out, "{}", serde_json::to_string(&header)?)?;
+        for line in &made.lines {
+            writeln!(out, "{}", serde_json::to_string(line)?)?;
+        }
+        Ok(())
+    }
+}
+
+/// What a study is about: shards belong together if this is equal. `options` are those on which the outcomes depend.
+pub fn about(command: &str, rig: &Rig, options: &Value) -> Value {
+    // All values of the file, also those that change no gain.
+    let values = Sha256::digest(format!("{rig:?}"));
+    let values: String = values.iter().take(8).map(|byte| format!("{byte:02x}")).collect();
+    let version = env!("CARGO_PKG_VERSION");
+    json!({ "command": command, "version": version, "rig": rig.name, "values": values, "options": options })
+}
+
+/// JSON has no infinite numbers; a number without bound is written as null.
+pub(crate) fn infinite_if_null<'de, D: Deserializer<'de>>(from: D) -> Result<f64, D::Error> {
+    Ok(Option::deserialize(from)?.unwrap_or(f64::INFINITY))
+}

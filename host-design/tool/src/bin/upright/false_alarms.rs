@@ -1,0 +1,109 @@
+//! `upright false-alarms`
+
+use std::io::Write;
+
+use clap::Args;
+use serde_json::json;
+use upright::table::Law;
+use upright_design::rig::Rig;
+use upright_design::robust::{FalseAlarms, false_alarms};
+
+use crate::failure::Failure;
+use crate::progress::with_bar;
+use crate::split::Split;
+use crate::variation::{Variation, law_option, positive};
+
+/// Balances machines without a defect with the whole firmware, and counts how many are turned off; exit status 1 if any is.
+///
+/// The machines are drawn within [robust] of the rig file; without it, all are the machine of [reality].
+#[derive(Args)]
+#[command(
+    name = "false-alarms",
+    before_help = "\
+Examples:
+  upright false-alarms rigs/quadruple-robust.toml                      2 h of each law, 6 minutes for each machine
+  upright false-alarms rigs/single-quanser-ip02.toml --runs 100 --duration 3600
+  upright false-alarms rigs/quadruple-robust.toml --shard 2/3 > 2.jsonl
+  upright false-alarms rigs/quadruple-robust.toml --merge 1.jsonl 2.jsonl 3.jsonl"
+)]
+pub(crate) struct HealthyHours {
+    #[command(flatten)]
+    variation: Variation,
+    /// Machines of each law
+    #[arg(long, default_value_t = 20, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
+    runs: u32,
+    /// Time for which each balances (s)
+    #[arg(long, default_value_t = 360.0, value_name = "S", value_parser = positive)]
+    duration: f64,
+    /// Only this law
+    #[arg(long, value_parser = law_option())]
+    law: Option<Law>,
+    #[command(flatten)]
+    split: Split,
+    /// Print the result as one JSON object
+    #[arg(long)]
+    json: bool,
+}
+
+impl HealthyHours {
+    pub(crate) fn run(self) -> Result<(), Failure> {
+        let (rig, _, table) = self.variation.designed()?;
+        let laws: Vec<Law> = table
+            .laws
+            .present()
+            .map(|(law, _)| law)
+            .filter(|law| self.law.is_none_or(|only| only == *law))
+            .collect();
+        if laws.is_empty() {
+            return Err(Failure::BadArgument(
+                "--law: the rig file does not ask for this control law".to_owned(),
+            ));
+        }
+        let options = json!({
+            "gains": self.variation.changes(), "runs": self.runs, "duration": self.duration,
+            "law": self.law.map(Law::key),
+        });
+        self.split.study("false-alarms", &rig, &options, |study| {
+            let runs = u64::from(self.runs);
+            let found = with_bar("machines", laws.len() as u64 * runs, |done| {
+                let of_law = |&law: &Law| false_alarms(&rig, &table, law, (runs, self.duration), study, done);
+                laws.iter().map(of_law).collect::<Result<Vec<FalseAlarms>, _>>()
+            })?;
+            if study.is_shard() { Ok(()) } else { self.print(&rig, &found) }
+        })
+    }
+
+    fn print(&self, rig: &Rig, found: &[FalseAlarms]) -> Result<(), Failure> {
+        let mut out = std::io::stdout().lock();
+        if self.json {
+            let duration_s = self.duration;
+            writeln!(out, "{}", json!({ "rig": rig.name, "duration_s": duration_s, "laws": found }))?;
+        } else {
+            writeln!(
+                out,
+                "{:16}{:>10}{:>9}{:>9}{:>12}{:>11}{:>12}",
+                "law", "machines", "hours", "alarms", "at most", "rejected", "innovation"
+            )?;
+            for one in found {
+                let most = format!("{:.2} /h", one.most_per_hour);
+                let FalseAlarms { law, runs, hours, alarms, rejected, closest, .. } = one;
+                writeln!(
+                    out,
+                    "{:16}{runs:>10}{hours:>9.2}{:>9}{most:>12}{rejected:>11}{closest:>12.2}",
+                    law.key(),
+                    alarms.len()
+                )?;
+            }
+        }
+        let alarms: Vec<String> = found
+            .iter()
+            .flat_map(|one| {
+                one.alarms.iter().map(|(run, fault)| format!("{} run {run}: {fault}", one.law.key()))
+            })
+            .collect();
+        if alarms.is_empty() {
+            return Ok(());
+        }
+        Err(Failure::CheckFailed(format!("{}: turned off: {}", rig.name, alarms.join("; "))))
+    }
+}

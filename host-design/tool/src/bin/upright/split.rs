@@ -1,0 +1,46 @@
+//! A study split over several processes or machines.
+
+use std::path::PathBuf;
+
+use clap::Args;
+use serde_json::Value;
+use upright_design::rig::Rig;
+use upright_design::study::{Shard, Study, about};
+
+use crate::failure::Failure;
+
+#[derive(Args)]
+pub(crate) struct Split {
+    /// Make only every N-th run, from the K-th on, and print the outcomes as lines of JSON for --merge
+    #[arg(long, value_name = "K/N", conflicts_with = "merge")]
+    shard: Option<Shard>,
+    /// Make no run, but take the outcomes from the files of all shards; the other options have to be the same
+    #[arg(long, value_name = "FILE", num_args = 1..)]
+    merge: Vec<PathBuf>,
+}
+
+impl Split {
+    /// Whether runs are made elsewhere or for elsewhere.
+    pub(crate) fn is_used(&self) -> bool {
+        self.shard.is_some() || !self.merge.is_empty()
+    }
+
+    /// Does `work` with the study that the options ask for. A shard prints what it has made, and `work` has to print nothing
+    /// then. `options` are those on which the outcomes depend.
+    pub(crate) fn study(
+        &self,
+        command: &str,
+        rig: &Rig,
+        options: &Value,
+        work: impl FnOnce(&Study) -> Result<(), Failure>,
+    ) -> Result<(), Failure> {
+        let about = about(command, rig, options);
+        let study = match self.shard {
+            Some(shard) => Study::shard(shard),
+            None if self.merge.is_empty() => Study::whole(),
+            None => Study::merged(&self.merge, &about)?,
+        };
+        work(&study)?;
+        Ok(study.write(&about, std::io::stdout().lock())?)
+    }
+}
