@@ -34,9 +34,10 @@ impl<'t, const NX: usize, const NY: usize> Player<'t, NX, NY> {
     pub fn new(motion: MotionTable<'t>, position_m: f32) -> Self {
         let now = Course { x: SVector::zeros(), u: 0.0, k: SVector::zeros(), l: SMatrix::zeros() };
         let mut player = Self { motion, tick: 0, shift_m: 0.0, now };
-        player.interpolate();
+        player.interpolate_course();
         player.shift_m = position_m - player.now.x.as_slice().first().copied().unwrap_or_default();
-        player.interpolate();
+        player.interpolate_course();
+        (0..NY).for_each(|sensor| player.interpolate_filter(sensor));
         player
     }
 
@@ -53,45 +54,84 @@ impl<'t, const NX: usize, const NY: usize> Player<'t, NX, NY> {
     /// Goes to the next tick. After the last one, `now` is where the motion ends, and the result is `true`.
     pub fn advance(&mut self) -> bool {
         self.tick = self.tick.saturating_add(1).min(self.motion.ticks);
-        self.interpolate();
+        self.interpolate_course();
+        // The filter changes slowly: the gains from one sensor in every tick are enough.
+        if let Some(sensor) = (self.tick as usize).checked_rem(NY) {
+            self.interpolate_filter(sensor);
+        }
         self.tick == self.motion.ticks
     }
 
-    fn interpolate(&mut self) {
-        let width = MotionTable::course_width(NX);
-        let (rows, weights) = around(self.motion.course, width, self.tick, self.motion.course_ticks);
-        blend(&rows, 0, &weights, self.now.x.as_mut_slice());
-        blend(&rows, NX, &weights, core::slice::from_mut(&mut self.now.u));
-        blend(&rows, NX + 1, &weights, self.now.k.as_mut_slice());
-        let (rows, weights) = around(self.motion.filter, NX * NY, self.tick, self.motion.filter_ticks);
-        blend(&rows, 0, &weights, self.now.l.as_mut_slice());
+    fn interpolate_course(&mut self) {
+        let MotionTable { course, course_units, course_ticks, .. } = self.motion;
+        let columns = Columns { values: course, units: course_units };
+        let window = columns.window(self.tick, course_ticks);
+        columns.blend(&window, 0, self.now.x.as_mut_slice());
+        columns.blend(&window, NX, core::slice::from_mut(&mut self.now.u));
+        columns.blend(&window, NX + 1, self.now.k.as_mut_slice());
         if let Some(position) = self.now.x.as_mut_slice().first_mut() {
             *position += self.shift_m;
         }
     }
+
+    fn interpolate_filter(&mut self, sensor: usize) {
+        let MotionTable { filter, filter_units, filter_ticks, .. } = self.motion;
+        let columns = Columns { values: filter, units: filter_units };
+        let window = columns.window(self.tick, filter_ticks);
+        if let Some(column) = self.now.l.data.0.get_mut(sensor) {
+            columns.blend(&window, NX * sensor, column);
+        }
+    }
 }
 
-/// The four rows nearest to `tick`, and their weights: those of the cubic through four equidistant points.
-fn around(values: &[f32], width: usize, tick: u32, ticks_per_row: u32) -> ([&[f32]; 4], [f32; 4]) {
-    // A checked table has at least four rows.
-    let last = (values.len() / width.max(1)).saturating_sub(4) as u32;
-    let first = (tick / ticks_per_row.max(1)).saturating_sub(1).min(last);
-    let p = tick.saturating_sub(first * ticks_per_row) as f32 / ticks_per_row as f32;
-    let [a, b, c, d] = [p, p - 1.0, p - 2.0, p - 3.0];
-    let weights = [b * c * d * (-1.0 / 6.0), a * c * d * 0.5, a * b * d * -0.5, a * b * c * (1.0 / 6.0)];
-    let row = |index: usize| {
-        let begin = (first as usize + index) * width;
-        values.get(begin..begin + width).unwrap_or_default()
-    };
-    ([row(0), row(1), row(2), row(3)], weights)
+/// 1 as a weight. The weighted sums of entries are exact integers: they stay below 2³⁰ times 1.7.
+const ONE: i32 = 1 << 14;
+
+/// Columns of a motion, each with its values at all knots.
+#[derive(Debug, Clone, Copy)]
+struct Columns<'t> {
+    values: &'t [i16],
+    units: &'t [f32],
 }
 
-/// The weighted sum of the rows' entries from `offset` on.
-fn blend(rows: &[&[f32]; 4], offset: usize, weights: &[f32; 4], to: &mut [f32]) {
-    let [a, b, c, d] = rows.map(|row| row.get(offset..).unwrap_or_default());
-    let [w_a, w_b, w_c, w_d] = *weights;
-    for ((((to, a), b), c), d) in to.iter_mut().zip(a).zip(b).zip(c).zip(d) {
-        *to = (w_a * a + w_b * b) + (w_c * c + w_d * d);
+/// Where a tick is in a column.
+#[derive(Debug, Clone, Copy)]
+struct Window {
+    /// Length of a column.
+    knots: usize,
+    /// The first of the four nearest knots.
+    first: usize,
+    /// Weights of these knots: those of the cubic through four equidistant points. Their sum is exactly [`ONE`], so that
+    /// what is constant stays constant.
+    weights: [i32; 4],
+}
+
+impl Columns<'_> {
+    fn window(&self, tick: u32, ticks_per_knot: u32) -> Window {
+        let knots = self.values.len() / self.units.len().max(1);
+        // A checked table has at least four knots.
+        let last = knots.saturating_sub(4) as u32;
+        let first = (tick / ticks_per_knot.max(1)).saturating_sub(1).min(last);
+        let p = tick.saturating_sub(first * ticks_per_knot) as f32 / ticks_per_knot as f32;
+        let [a, b, c, d] = [p, p - 1.0, p - 2.0, p - 3.0];
+        let cubics = [b * c * d * (-1.0 / 6.0), a * b * d * -0.5, a * b * c * (1.0 / 6.0)];
+        let [w_a, w_c, w_d] = cubics.map(|weight| (weight * ONE as f32) as i32);
+        Window { knots, first: first as usize, weights: [w_a, ONE - w_a - w_c - w_d, w_c, w_d] }
+    }
+
+    /// The weighted sums of the columns from number `column` on, in SI units.
+    // Not inlined: written out for each number of columns, it would have to be fetched from flash in every tick.
+    #[inline(never)]
+    fn blend(&self, window: &Window, column: usize, to: &mut [f32]) {
+        let Window { knots, first, weights: [w_a, w_b, w_c, w_d] } = *window;
+        let columns = self.values.get(column * knots..).unwrap_or_default().chunks_exact(knots.max(1));
+        let units = self.units.get(column..).unwrap_or_default();
+        for ((to, column), unit) in to.iter_mut().zip(columns).zip(units) {
+            let Some([a, b, c, d]) = column.get(first..).and_then(|rest| rest.first_chunk()) else { return };
+            let [a, b, c, d] = [*a, *b, *c, *d].map(i32::from);
+            let sum = w_a * a + w_b * b + w_c * c + w_d * d;
+            *to = sum as f32 * (1.0 / ONE as f32) * unit;
+        }
     }
 }
 
@@ -105,35 +145,80 @@ mod tests {
         0.125 * t * t * t - t * t + 0.5 * t + 2.0
     }
 
-    fn motion<'t>(course: &'t [f32], filter: &'t [f32]) -> MotionTable<'t> {
-        MotionTable { ticks: 20, course_ticks: 4, filter_ticks: 5, travel_m: [0.0; 2], course, filter }
+    /// What an entry of 1 is in each column: all knots below are whole numbers of it.
+    const UNITS: [f32; 5] = [0.0625, 0.125, 0.03125, 0.0625, 0.125];
+
+    fn motion<'t>(course: &'t [i16], filter: &'t [i16]) -> MotionTable<'t> {
+        MotionTable {
+            ticks: 20,
+            course_ticks: 4,
+            filter_ticks: 5,
+            travel_m: [0.0; 2],
+            course_units: &UNITS,
+            course,
+            filter_units: &UNITS[..2],
+            filter,
+        }
     }
 
-    fn rows(ticks_per_row: u32, width: usize) -> Vec<f32> {
-        let row = |row: u32| (0..width).map(move |entry| cubic((row * ticks_per_row) as f32) + entry as f32);
-        (0..=20_u32.div_ceil(ticks_per_row)).flat_map(row).collect()
+    fn columns(ticks_per_knot: u32, columns: usize) -> Vec<i16> {
+        let value = |column: usize, knot: u32| cubic((knot * ticks_per_knot) as f32) + column as f32;
+        let column = |column: usize| {
+            (0..=20 / ticks_per_knot).map(move |knot| (value(column, knot) / UNITS[column]) as i16)
+        };
+        (0..columns).flat_map(column).collect()
     }
 
     #[test]
-    fn a_cubic_is_followed_exactly_between_its_knots_and_ends_in_the_last_one() {
-        let (course, filter) = (rows(4, 5), rows(5, 2));
+    fn a_cubic_is_followed_between_its_knots_and_ends_in_the_last_one() {
+        let (course, filter) = (columns(4, 5), columns(5, 2));
         let mut player = Player::<2, 1>::new(motion(&course, &filter), 7.0);
         for tick in 0..20 {
             let (now, wanted) = (player.now(), cubic(tick as f32));
             assert_eq!(player.tick(), tick);
-            let near = |found: f32, wanted: f32| (found - wanted).abs() < 1e-3;
+            // Three weights are rounded by 2^-14 each; knots are up to 580 apart.
+            let near = |found: f32, wanted: f32| (found - wanted).abs() < 0.05;
             assert!(near(now.x[0], wanted - cubic(0.0) + 7.0), "the cart starts where it is");
             assert!(near(now.x[1], wanted + 1.0) && near(now.u, wanted + 2.0));
             assert!(near(now.k[0], wanted + 3.0) && near(now.k[1], wanted + 4.0));
             assert!(near(now.l[0], wanted) && near(now.l[1], wanted + 1.0));
             assert_eq!(player.advance(), tick == 19);
         }
-        assert!((player.now().x[1] - cubic(20.0) - 1.0).abs() < 1e-3);
+        assert_eq!(player.now().x[1], cubic(20.0) + 1.0);
+    }
+
+    #[test]
+    fn what_is_constant_stays_constant_to_the_last_bit() {
+        let (course, filter) = ([-1234; 6 * 5], [32_767; 5 * 2]);
+        let mut player = Player::<2, 1>::new(motion(&course, &filter), -1234.0 * UNITS[0]);
+        let first = player.now().clone();
+        assert_eq!((first.u, first.l[1]), (-1234.0 * UNITS[2], 32_767.0 * UNITS[1]));
+        while !player.advance() {
+            assert_eq!(player.now(), &first);
+        }
+    }
+
+    #[test]
+    fn the_gains_from_each_sensor_are_renewed_in_turn() {
+        // Two states, two sensors: knots 5 ticks apart that rise by 10 each.
+        let course = [0; 6 * 5];
+        let filter: Vec<i16> = (0..4).flat_map(|_| (0..5).map(|knot| 10 * knot)).collect();
+        let table = MotionTable { filter_units: &[1.0; 4], ..motion(&course, &filter) };
+        let mut player = Player::<2, 2>::new(table, 0.0);
+        for tick in 1..=20 {
+            player.advance();
+            let columns = player.now().l;
+            let renewed = |sensor: i32| tick - (tick - sensor).rem_euclid(2);
+            let wanted = [renewed(0), renewed(1)].map(|tick| 2.0 * tick as f32);
+            for (sensor, wanted) in wanted.into_iter().enumerate() {
+                assert!((columns[(0, sensor)] - wanted).abs() < 0.01, "tick {tick}: {columns}");
+            }
+        }
     }
 
     #[test]
     fn a_wrong_spacing_of_the_knots_is_another_motion() {
-        let (course, filter) = (rows(4, 5), rows(5, 2));
+        let (course, filter) = (columns(4, 5), columns(5, 2));
         let wrong = MotionTable { course_ticks: 5, ..motion(&course, &filter) };
         let mut player = Player::<2, 1>::new(wrong, 2.0);
         (0..10).for_each(|_| {

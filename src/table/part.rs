@@ -15,6 +15,8 @@ pub enum Words<'a> {
     U32(&'a [u32]),
     /// Signed integers.
     I32(&'a [i32]),
+    /// Signed integers of 16 bits, two in a word, the first one in its low half.
+    I16(&'a [i16]),
     /// Two words, the low one first.
     U64(u64),
 }
@@ -27,6 +29,10 @@ impl Words<'_> {
             Words::F32(values) => values.get(index).map(|value| value.to_bits()),
             Words::U32(values) => values.get(index).copied(),
             Words::I32(values) => values.get(index).map(|&value| value as u32),
+            Words::I16(values) => {
+                let half = |at: usize| values.get(at).map(|&value| u32::from(value as u16));
+                Some(half(2 * index)? | half(2 * index + 1).unwrap_or(0) << 16)
+            }
             Words::U64(value) => match index {
                 0 => Some(*value as u32),
                 1 => Some((value >> 32) as u32),
@@ -176,26 +182,33 @@ impl Resize<u64> for u64 {
 }
 
 /// A list of any length, which lies elsewhere.
-impl Part for &[f32] {
-    #[inline]
-    fn part(&self, at: &mut usize) -> Option<Words<'_>> {
-        leaf(at, Words::F32(self))
-    }
+macro_rules! slice {
+    ($kind:ident, $type:ty) => {
+        impl Part for &[$type] {
+            #[inline]
+            fn part(&self, at: &mut usize) -> Option<Words<'_>> {
+                leaf(at, Words::$kind(self))
+            }
 
-    fn part_mut(&mut self, at: &mut usize) -> Option<WordsMut<'_>> {
-        leaf(at, WordsMut::Fixed)
-    }
+            fn part_mut(&mut self, at: &mut usize) -> Option<WordsMut<'_>> {
+                leaf(at, WordsMut::Fixed)
+            }
 
-    fn read(&self, reader: &mut dyn Reader) {
-        reader.words(Words::F32(self), Shape::Slice);
-    }
+            fn read(&self, reader: &mut dyn Reader) {
+                reader.words(Words::$kind(self), Shape::Slice);
+            }
+        }
+
+        impl<'t> Resize<&'t [$type]> for &'t [$type] {
+            fn resized(&self) -> &'t [$type] {
+                self
+            }
+        }
+    };
 }
 
-impl<'t> Resize<&'t [f32]> for &'t [f32] {
-    fn resized(&self) -> &'t [f32] {
-        self
-    }
-}
+slice!(F32, f32);
+slice!(I16, i16);
 
 impl<const R: usize, const C: usize> Part for SMatrix<f32, R, C> {
     #[inline]

@@ -1,7 +1,8 @@
 //! The motions of a swing-up: from hanging to upright, and back.
 //!
-//! A motion is stored as knots, between which the firmware interpolates. Rows lie one after the other in a slice,
-//! because their number differs from rig to rig.
+//! A motion is stored as knots, between which the firmware interpolates. The columns, each with its values at
+//! all knots, lie one after the other in a slice, because the number of knots differs from rig to rig. Values have 16 bits,
+//! with a unit for each column: that is finer than what encoders resolve, and takes half of the flash.
 
 use crate::table::checksum::{ChecksumScan, checksum};
 use crate::table::part::{is_finite, part};
@@ -13,16 +14,20 @@ part! {
     pub struct MotionTable<'t,;> {
         /// Duration (ticks).
         pub ticks: u32,
-        /// Ticks from one row of `course` to the next.
+        /// Ticks from one knot of `course` to the next.
         pub course_ticks: u32,
-        /// Ticks from one row of `filter` to the next.
+        /// Ticks from one knot of `filter` to the next.
         pub filter_ticks: u32,
         /// Lowest and highest planned position of the cart, from its first one (m).
         pub travel_m: [f32; 2],
-        /// For each knot: the reference state, the reference force (N), the gains K.
-        pub course: &'t [f32],
-        /// For each knot of the filter: L, a column for each sensor.
-        pub filter: &'t [f32],
+        /// For each column of `course`: what a value of 1 is.
+        pub course_units: &'t [f32],
+        /// Columns of the reference state, the reference force (N) and the gains K, each with its values at all knots.
+        pub course: &'t [i16],
+        /// For each column of `filter`: what a value of 1 is.
+        pub filter_units: &'t [f32],
+        /// Columns of L, sensor by sensor, each with its values at all knots of the filter.
+        pub filter: &'t [i16],
     }
 }
 
@@ -85,21 +90,21 @@ part! {
 }
 
 impl MotionTable<'_> {
-    /// Length of a row of `course`: a state, the force, a gain for each state.
-    pub const fn course_width(states: usize) -> usize {
+    /// Columns of `course`: a state, the force, a gain for each state.
+    pub const fn course_columns(states: usize) -> usize {
         2 * states + 1
     }
 
-    /// Whether there are rows up to the last tick, at least four for the interpolation.
-    fn has_all_rows(&self, states: usize, sensors: usize) -> bool {
-        let has = |values: &[f32], width: usize, ticks: u32| {
-            let rows = values.len() / width.max(1);
-            let reach = (rows as u32).saturating_sub(1).saturating_mul(ticks);
-            values.len() == rows * width && rows >= 4 && reach >= self.ticks
+    /// Whether there are knots up to the last tick, at least four for the interpolation.
+    fn has_all_knots(&self, states: usize, sensors: usize) -> bool {
+        let has = |values: &[i16], units: &[f32], columns: usize, ticks: u32| {
+            let knots = values.len() / columns.max(1);
+            let reach = (knots as u32).saturating_sub(1).saturating_mul(ticks);
+            units.len() == columns && values.len() == knots * columns && knots >= 4 && reach >= self.ticks
         };
         self.ticks > 0
-            && has(self.course, Self::course_width(states), self.course_ticks)
-            && has(self.filter, states * sensors, self.filter_ticks)
+            && has(self.course, self.course_units, Self::course_columns(states), self.course_ticks)
+            && has(self.filter, self.filter_units, states * sensors, self.filter_ticks)
     }
 }
 
@@ -126,7 +131,7 @@ impl<const NY: usize, const N: usize> SwingUpTable<'_, NY, N> {
         if self.tick_s.to_bits() != build.tick_s.to_bits() {
             return Err(TableError::Tick);
         }
-        let complete = |motion: &MotionTable<'_>| motion.has_all_rows(states, NY);
+        let complete = |motion: &MotionTable<'_>| motion.has_all_knots(states, NY);
         if states != 2 * N + 2 || NY != N + 1 || !complete(&self.raise) || !complete(&self.lower) {
             return Err(TableError::Dimensions);
         }

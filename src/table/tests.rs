@@ -251,16 +251,26 @@ fn a_reader_hears_every_name_in_the_order_of_declaration() {
     assert_eq!(names.0.last().map(String::as_str), Some("energy"));
 }
 
-/// Rows of a motion for four states and two sensors: reference, force and gains; and the filter.
-const COURSE: [f32; 4 * 9] = [0.5; 4 * 9];
-const FILTER: [f32; 4 * 8] = [0.25; 4 * 8];
+/// Columns of a motion for four states and two sensors, with four knots: reference, force and gains; and the filter.
+const COURSE: [i16; 4 * 9] = [5; 4 * 9];
+const FILTER: [i16; 4 * 8] = [-25; 4 * 8];
 
-fn motion<'t>(course: &'t [f32], filter: &'t [f32]) -> MotionTable<'t> {
-    MotionTable { ticks: 6, course_ticks: 2, filter_ticks: 2, travel_m: [-0.5, 0.5], course, filter }
+fn motion<'t>(course: &'t [i16], filter: &'t [i16]) -> MotionTable<'t> {
+    let (course_units, filter_units) = (&[0.5; 9], &[0.25; 8]);
+    MotionTable {
+        ticks: 6,
+        course_ticks: 2,
+        filter_ticks: 2,
+        travel_m: [-0.5, 0.5],
+        course_units,
+        course,
+        filter_units,
+        filter,
+    }
 }
 
 /// The table of a swing-up of one link.
-fn swing_up<'t>(course: &'t [f32], filter: &'t [f32]) -> SwingUpTable<'t, 2, 1> {
+fn swing_up<'t>(course: &'t [i16], filter: &'t [i16]) -> SwingUpTable<'t, 2, 1> {
     let mut table = SwingUpTable {
         format: TABLE_FORMAT,
         rig_hash: BUILD.rig_hash,
@@ -293,9 +303,9 @@ fn swing_up<'t>(course: &'t [f32], filter: &'t [f32]) -> SwingUpTable<'t, 2, 1> 
 fn every_flipped_bit_of_a_motion_is_refused() {
     let good = swing_up(&COURSE, &FILTER);
     assert_eq!(good.check(&BUILD, 4), Ok(()));
-    for (word, bit) in (0..COURSE.len()).flat_map(|word| (0..32).map(move |bit| (word, bit))) {
+    for (word, bit) in (0..COURSE.len()).flat_map(|word| (0..16).map(move |bit| (word, bit))) {
         let mut course = COURSE;
-        course[word] = f32::from_bits(course[word].to_bits() ^ 1 << bit);
+        course[word] ^= 1 << bit;
         let damaged = SwingUpTable { lower: motion(&course, &FILTER), ..good.clone() };
         assert_eq!(damaged.check(&BUILD, 4), Err(TableError::Crc), "word {word}, bit {bit}");
     }
@@ -323,14 +333,15 @@ fn a_motion_that_does_not_fit_is_refused_even_with_the_right_checksum() {
     assert_eq!(refused(&|t| t.rig_hash ^= 1), Err(TableError::RigHash));
     assert_eq!(refused(&|t| t.tick_s *= 2.0), Err(TableError::Tick));
     let dimensions = Err(TableError::Dimensions);
-    assert_eq!(refused(&|t| t.raise.course = &COURSE[9..]), dimensions, "too few rows");
-    assert_eq!(refused(&|t| t.raise.course = &COURSE[1..]), dimensions, "half a row");
+    assert_eq!(refused(&|t| t.raise.course = &COURSE[9..]), dimensions, "too few values");
+    assert_eq!(refused(&|t| t.raise.course = &COURSE[4..]), dimensions, "a column less");
     assert_eq!(refused(&|t| t.lower.filter_ticks = 1), dimensions, "knots that end too early");
     assert_eq!(refused(&|t| t.lower.course_ticks = 0), dimensions);
     assert_eq!(refused(&|t| t.raise.ticks = 0), dimensions);
     assert_eq!(refused(&|t| t.limits.deviation_rad = f32::NAN), Err(TableError::Value));
     assert_eq!(refused(&|t| t.limits.speed_m_per_s = 0.0), Err(TableError::Value));
     assert_eq!(refused(&|t| t.limits.rail_m = [0.4, -0.4]), Err(TableError::Value));
-    assert_eq!(refused(&|t| t.raise.filter = &[f32::INFINITY; 4 * 8]), Err(TableError::Value));
+    assert_eq!(refused(&|t| t.raise.filter_units = &[1.0; 7]), dimensions, "a column without a unit");
+    assert_eq!(refused(&|t| t.raise.filter_units = &[f32::INFINITY; 8]), Err(TableError::Value));
     assert_eq!(swing_up(&COURSE, &FILTER).check(&BUILD, 6), dimensions, "more states");
 }

@@ -53,14 +53,14 @@ fn write_source(out: &mut String, rig: &Rig, table: &TableValues) -> core::fmt::
     }
 }
 
-/// Writes the table of the swing-up, row by row, without rustfmt's line breaks.
+/// Writes the table of the swing-up, column by column, without rustfmt's line breaks.
 fn write_swing_up(out: &mut String, table: &TableValues, fields: &[Field], crc: u32) -> core::fmt::Result {
     let links = table.sensors() - 1;
     writeln!(out, "/// The swing-up's table has knots for as long as each motion lasts.")?;
     writeln!(out, "pub type SwingUp = SwingUpTable<'static, SENSORS, {links}>;\n")?;
     writeln!(out, "/// The swing-up.\n#[rustfmt::skip]\npub static SWING_UP: SwingUp = SwingUpTable {{")?;
-    let course = MotionTable::course_width(table.states());
-    let mut writer = Rows { out, course, filter: table.states() * table.sensors(), indent: 4 };
+    let course = MotionTable::course_columns(table.states());
+    let mut writer = Columns { out, course, filter: table.states() * table.sensors(), indent: 4 };
     for field in fields {
         writer.field(field)?;
     }
@@ -68,15 +68,16 @@ fn write_swing_up(out: &mut String, table: &TableValues, fields: &[Field], crc: 
     writeln!(out, "    // CRC-32 of all values above.\n    crc: {crc},\n}};")
 }
 
-/// Writes fields with one row of a slice or matrix per line.
-struct Rows<'a> {
+/// Writes fields with one column of a motion or matrix per line.
+struct Columns<'a> {
     out: &'a mut String,
+    /// Columns of `course` and of `filter`.
     course: usize,
     filter: usize,
     indent: usize,
 }
 
-impl Rows<'_> {
+impl Columns<'_> {
     fn line(&mut self, text: &str) -> core::fmt::Result {
         writeln!(self.out, "{:1$}{text}", "", self.indent)
     }
@@ -103,10 +104,15 @@ impl Rows<'_> {
                 self.line(&format!("{name}: columns([{}]),", columns.join(", ")))
             }
             Node::Slice(numbers) => {
-                let width = if *name == "course" { self.course } else { self.filter };
+                let columns = match *name {
+                    "course" => self.course,
+                    "filter" => self.filter,
+                    _ => 1,
+                };
+                let knots = (numbers.len() / columns).max(1);
                 self.line(&format!("{name}: &["))?;
                 self.indent += 4;
-                numbers.chunks(width).try_for_each(|numbers| self.line(&format!("{},", row(numbers))))?;
+                numbers.chunks(knots).try_for_each(|numbers| self.line(&format!("{},", row(numbers))))?;
                 self.indent -= 4;
                 self.line("],")
             }

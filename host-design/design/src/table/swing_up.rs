@@ -41,10 +41,14 @@ pub struct MotionValues {
     pub filter_ticks: u32,
     /// See [`MotionTable::travel_m`].
     pub travel_m: [f32; 2],
+    /// See [`MotionTable::course_units`].
+    pub course_units: Vec<f32>,
     /// See [`MotionTable::course`].
-    pub course: Vec<f32>,
+    pub course: Vec<i16>,
+    /// See [`MotionTable::filter_units`].
+    pub filter_units: Vec<f32>,
     /// See [`MotionTable::filter`].
-    pub filter: Vec<f32>,
+    pub filter: Vec<i16>,
 }
 
 impl SwingUpValues {
@@ -97,10 +101,15 @@ impl SwingUpValues {
         table
     }
 
-    /// Bytes of the knots of both motions.
+    /// Bytes of the knots of both motions, with their units.
     pub fn bytes(&self) -> usize {
-        let values = |motion: &MotionValues| motion.course.len() + motion.filter.len();
-        4 * (values(&self.raise) + values(&self.lower))
+        let bytes = |motion: &MotionValues| {
+            size_of_val(&motion.course[..])
+                + size_of_val(&motion.filter[..])
+                + size_of_val(&motion.course_units[..])
+                + size_of_val(&motion.filter_units[..])
+        };
+        bytes(&self.raise) + bytes(&self.lower)
     }
 }
 
@@ -127,9 +136,8 @@ impl MotionValues {
             let l = &motion.l[tick.min(ticks - 1)];
             filter.extend((0..sensors).flat_map(|column| (0..states).map(move |row| l[(row, column)])));
         }
-        let narrow = |values: Vec<f64>| -> Result<Vec<f32>, NoTable> {
-            values.into_iter().map(|value| finite("a value of the swing-up", value as f32)).collect()
-        };
+        let (course_units, course) = in_units(&course, MotionTable::course_columns(states))?;
+        let (filter_units, filter) = in_units(&filter, states * sensors)?;
         let first = motion.x[0][0];
         let travelled = || motion.x.iter().map(|x| x[0] - first);
         Ok(Self {
@@ -137,19 +145,23 @@ impl MotionValues {
             course_ticks: course_ticks as u32,
             filter_ticks: filter_ticks as u32,
             travel_m: [travelled().fold(0.0, f64::min) as f32, travelled().fold(0.0, f64::max) as f32],
-            course: narrow(course)?,
-            filter: narrow(filter)?,
+            course_units,
+            course,
+            filter_units,
+            filter,
         })
     }
 
     /// The planned state in `tick`, from the nearest knots; after the end, the last one.
     pub fn planned(&self, states: usize, tick: usize) -> Vec<f64> {
-        let (width, every) = (MotionTable::course_width(states), self.course_ticks as usize);
-        let last = self.course.len() / width - 1;
-        let row = |index: usize| self.course[index.min(last) * width..][..states].iter();
+        let (knots, every) = (self.course.len() / self.course_units.len(), self.course_ticks as usize);
         let share = (tick % every) as f64 / every as f64;
-        let between = |(a, b): (&f32, &f32)| f64::from(*a) + share * f64::from(b - a);
-        row(tick / every).zip(row(tick / every + 1)).map(between).collect()
+        let between = |state: usize| {
+            let at = |knot: usize| f64::from(self.course[state * knots + knot.min(knots - 1)]);
+            let (before, after) = (at(tick / every), at(tick / every + 1));
+            f64::from(self.course_units[state]) * (before + share * (after - before))
+        };
+        (0..states).map(between).collect()
     }
 
     /// The firmware's part.
@@ -159,10 +171,26 @@ impl MotionValues {
             course_ticks: self.course_ticks,
             filter_ticks: self.filter_ticks,
             travel_m: self.travel_m,
+            course_units: &self.course_units,
             course: &self.course,
+            filter_units: &self.filter_units,
             filter: &self.filter,
         }
     }
+}
+
+/// Rows of `width` values, column by column, as whole numbers of the column's unit; the largest value is `i16::MAX` units.
+fn in_units(rows: &[f64], width: usize) -> Result<(Vec<f32>, Vec<i16>), NoTable> {
+    let (mut units, mut values) = (Vec::new(), Vec::new());
+    for column in 0..width {
+        let of_column = || rows.iter().skip(column).step_by(width);
+        let largest = of_column().fold(0.0, |largest: f64, value| largest.max(value.abs()));
+        let unit = if largest > 0.0 { largest / f64::from(i16::MAX) } else { 1.0 };
+        let unit = finite("a value of the swing-up", unit as f32)?;
+        units.push(unit);
+        values.extend(of_column().map(|value| (value / f64::from(unit)).round() as i16));
+    }
+    Ok((units, values))
 }
 
 /// The model, each constant rounded once to `f32`.

@@ -53,6 +53,26 @@ fn every_rig_is_raised_balanced_and_lowered_from_encoders() {
     }
 }
 
+/// Reverses the gains of the raising: all columns after state and force.
+fn reverse_gains(table: &mut TableValues) {
+    let states = table.states();
+    let raise = &mut table.swing_up.as_mut().unwrap().raise;
+    let knots = raise.course.len() / raise.course_units.len();
+    raise.course[(states + 1) * knots..].iter_mut().for_each(|gain| *gain = -*gain);
+}
+
+/// The table of both motions fits into the flash that is left for it.
+#[test]
+fn the_motions_of_four_links_take_at_most_45_kb() {
+    let (_, table) = rig_and_table("quadruple-paper");
+    let motions = table.swing_up.as_ref().unwrap();
+    println!("{} bytes", motions.bytes());
+    assert!(motions.bytes() <= 45_000, "{}", motions.bytes());
+    // Negative control: with a knot of the filter in every tick it would not fit.
+    let dense = 2 * motions.raise.ticks as usize * motions.raise.filter_units.len();
+    assert!(dense > 45_000, "{dense}");
+}
+
 #[test]
 fn a_motion_with_a_defect_is_refused_or_ends_with_the_motor_off() {
     let (rig, table) = rig_and_table("single-quanser-ip02");
@@ -62,13 +82,7 @@ fn a_motion_with_a_defect_is_refused_or_ends_with_the_motor_off() {
         change(&mut table);
         run(&rig, &table, &scenario)
     };
-    let states = table.states();
-    let reversed = with(&|table| {
-        // A row is the state, the force, the gains.
-        for row in table.swing_up.as_mut().unwrap().raise.course.chunks_mut(2 * states + 1) {
-            row[states + 1..].iter_mut().for_each(|gain| *gain = -*gain);
-        }
-    });
+    let reversed = with(&reverse_gains);
     assert!(reversed.unwrap().fault.is_some(), "gains of the wrong sign");
     let spacing = with(&|table| table.swing_up.as_mut().unwrap().raise.course_ticks /= 2);
     assert!(matches!(spacing, Err(HarnessError::Table(TableError::Dimensions))), "{spacing:?}");
@@ -202,10 +216,7 @@ fn with_reversed_gains_no_random_run_arrives() {
     let name = "single-quanser-ip02";
     let (_, mut table) = rig_and_table(name);
     assert_eq!(random_runs(name, &table, 1), [3, 3]);
-    let states = table.states();
-    for row in table.swing_up.as_mut().unwrap().raise.course.chunks_mut(2 * states + 1) {
-        row[states + 1..].iter_mut().for_each(|gain| *gain = -*gain);
-    }
+    reverse_gains(&mut table);
     assert_eq!(random_runs(name, &table, 1), [0, 0]);
 }
 

@@ -68,7 +68,7 @@ fn the_flashed_image_raises_and_lowers_the_links_with_the_bits_of_the_host() {
 
     // The negative control: a host with another last gain on the way up.
     let mut other = table.clone();
-    *other.swing_up.as_mut().unwrap().raise.course.last_mut().unwrap() *= 1.5;
+    *other.swing_up.as_mut().unwrap().raise.course.last_mut().unwrap() /= 2;
     let mut board = VirtualBoard::start(&image, &Conditions::f405(1), &table).unwrap();
     let error = run_compared(&rig, &other, &scenario, &mut board).unwrap_err().to_string();
     assert!(error.contains("differ"), "{error}");

@@ -62,6 +62,8 @@ pub struct Cycles {
     pub typical: Option<Figures>,
     /// Ticks of raising and lowering, and of balancing in between.
     pub moving: Option<Figures>,
+    /// The medians of these.
+    pub typical_moving: Option<Figures>,
     /// All ticks since the reset.
     pub all: Figures,
     /// Why the run ended before its time.
@@ -114,6 +116,7 @@ impl Cycles {
             balancing: Figures::of(&balancing, core_hz, largest),
             typical: Figures::of(&balancing, core_hz, median),
             moving: Figures::of(&moving, core_hz, largest),
+            typical_moving: Figures::of(&moving, core_hz, median),
             all: Figures::of(&all, core_hz, largest)?,
             ended: balances.ended.or(moves.ended),
         })

@@ -147,6 +147,7 @@ fn table_of(cycles: &in_the_loop::Cycles) -> String {
         ("motor off, most", cycles.off),
         ("balancing, median", cycles.typical),
         ("balancing, most", cycles.balancing),
+        ("swinging up, median", cycles.typical_moving),
         ("swinging up, most", cycles.moving),
         ("all ticks, most", Some(cycles.all)),
     ];
