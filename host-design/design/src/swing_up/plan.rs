@@ -205,8 +205,7 @@ fn judgement(
     progress(Trying::Step { score: Some(score) });
     let needed = setting.rules.success_percent;
     if 100.0 * runs.interval[0] < needed {
-        let help = advice(setting, request, way);
-        return Err(SwingUpError::NotRobust { way, stood: runs.stood, runs: RUNS, needed, help });
+        return Err(SwingUpError::NotRobust { way, stood: runs.stood, runs: RUNS, needed });
     }
     Ok(Judgement { way, search, score, peaks, runs })
 }

@@ -133,15 +133,9 @@ fn solve(setting: &Setting<'_>, request: &Request, way: Way, number: u64) -> Opt
     within(&path, &draw.bounds).then_some((knots, path))
 }
 
-/// How many of the candidates with these numbers are solved, on all threads.
-pub(super) fn solvable(
-    setting: &Setting<'_>,
-    request: &Request,
-    way: Way,
-    numbers: core::ops::Range<u64>,
-) -> usize {
-    let found = parallel::map(numbers, |number| solve(setting, request, way, number).is_some());
-    found.into_iter().filter(|&found| found).count()
+/// Whether candidate `number` is solved.
+pub(super) fn is_solvable(setting: &Setting<'_>, request: &Request, way: Way, number: u64) -> bool {
+    solve(setting, request, way, number).is_some()
 }
 
 /// All links turn evenly, at the force of the draw.
