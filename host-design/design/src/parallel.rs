@@ -46,6 +46,11 @@ where
     results.into_iter().flatten().collect()
 }
 
+/// Whether `holds` for any item. After the first, items behind it are left out.
+pub fn any<I: Copy + Sync>(items: impl IntoIterator<Item = I>, holds: impl Fn(I) -> bool + Sync) -> bool {
+    try_map(items, |item| if holds(item) { Err(()) } else { Ok(()) }).is_err()
+}
+
 /// Calls `one` for 0 to `count` - 1. Each call is a task of its own: they may take very different times.
 fn for_each(count: usize, one: &(dyn Fn(usize) + Sync)) {
     (0..count).into_par_iter().with_max_len(1).for_each(one);
@@ -53,12 +58,13 @@ fn for_each(count: usize, one: &(dyn Fn(usize) + Sync)) {
 
 #[cfg(test)]
 mod tests {
-    use super::{map, try_map};
+    use super::{any, map, try_map};
 
     #[test]
     fn results_come_in_the_order_of_the_items() {
         assert_eq!(map(0..1000, |number| number * number), (0..1000).map(|n| n * n).collect::<Vec<u64>>());
         assert_eq!(map([0; 0], |number| number), [0; 0]);
+        assert!(any(0..100, |number| number == 70) && !any(0..100, |number| number == 100));
     }
 
     #[test]

@@ -1,10 +1,9 @@
 //! What would help when there is no motion: the same search with one limit relaxed.
 
-use rayon::prelude::*;
-
 use super::search::{Request, is_solvable};
 use super::setting::Setting;
 use super::way::Way;
+use crate::parallel;
 
 /// Candidates tried with each relaxation.
 const TRIED: u64 = 12;
@@ -59,9 +58,8 @@ pub(super) fn advice(setting: &Setting<'_>, request: &Request, way: Way) -> Stri
 }
 
 fn advice_from(setting: &Setting<'_>, request: &Request, way: Way, tried: u64) -> String {
-    let solvable = |request: &Request| {
-        (0..tried).into_par_iter().any(|number| is_solvable(setting, request, way, number))
-    };
+    let solvable =
+        |request: &Request| parallel::any(0..tried, |number| is_solvable(setting, request, way, number));
     let (mut helps, mut no_help): (Vec<(f64, &str, String)>, Vec<String>) = Default::default();
     for Limit { name, unit, value, relax } in LIMITS {
         let Some(value) = value(request) else { continue };

@@ -19,6 +19,7 @@
 //! | `demonstration` | one run of everything |
 //! | `supervision` | what the supervisor allows in motion |
 //! | `in_table` | the table of the firmware |
+//! | `margins`, `trade` | pushes that a motion stands; what candidates are like |
 //! | `check`, `stored` | independent check; the file beside the rig file |
 //!
 //! Everything that is random has a fixed seed, and every sum is taken in a fixed order, so the result does not depend on
@@ -35,6 +36,7 @@ mod gains;
 mod hold;
 mod in_table;
 mod interior_point;
+mod margins;
 mod motion;
 mod plan;
 mod problem;
@@ -47,6 +49,7 @@ mod shooting;
 mod stored;
 mod supervision;
 mod tracking;
+mod trade;
 mod way;
 
 pub use check::Peaks;
@@ -54,8 +57,10 @@ pub use demonstration::{Demonstration, Script, hangs, up_and_down};
 pub use error::SwingUpError;
 pub use firmware_runs::{Condition, FirmwareRuns, firmware_runs};
 pub use in_table::{designed_table, with_motions};
+pub use margins::{Margin, margins};
 pub use motion::{Motion, Shape, SwingUp};
 pub use plan::{Judgement, Plan, Progress, Trying, judge, motions, refined, search};
 pub use robustness::{Runs, Spread};
 pub use stored::Stored;
+pub use trade::{Solved, solved};
 pub use way::Way;

@@ -5,7 +5,9 @@ use std::path::{Path, PathBuf};
 use crate::published::{certified, table};
 use upright_design::numerics::Matrix;
 use upright_design::rig::{PlantDescription, Rig};
-use upright_design::swing_up::{Script, Stored, SwingUp, SwingUpError, motions, with_motions};
+use upright_design::swing_up::{
+    Motion, Script, Stored, SwingUp, SwingUpError, Way, margins, motions, with_motions,
+};
 
 const RIGS: [&str; 4] =
     ["single-quanser-ip02", "double-quanser-dbpen", "triple-glueck-eder-kugi", "quadruple-paper"];
@@ -87,6 +89,20 @@ fn a_reversed_gain_or_filter_falls() {
     let mut bad = good.clone();
     bad.raise.l = reversed(&good.raise.l);
     assert!(!arrives(&rig, &bad, 1, false));
+}
+
+#[test]
+fn a_hanging_link_may_be_pushed_far_and_with_reversed_gains_not_at_all() {
+    let (rig, stored) = rig_and_stored("single-quanser-ip02");
+    let raise = motions(&rig, &stored).unwrap().raise;
+    let of = |motion: &Motion| -> Vec<f64> {
+        let all = margins(&rig, motion, Way::Up, 3, &|| ()).unwrap();
+        all.iter().map(|margin| margin.links_rad[0]).collect()
+    };
+    let good = of(&raise);
+    assert!(good[0] > 0.3 && good.iter().all(|&margin| margin > 0.02), "{good:?}");
+    let reversed = Motion { k: raise.k.iter().map(|k| -k).collect(), ..raise };
+    assert_eq!(of(&reversed), [0.0; 3]);
 }
 
 #[test]

@@ -14,6 +14,7 @@ mod png;
 mod run;
 mod scale;
 mod stroboscope;
+mod swing_up;
 mod theme;
 
 pub(crate) use png::pixels;
@@ -27,6 +28,7 @@ pub use heat::HeatMap;
 pub(crate) use run::run_figure;
 pub use run::run_svg;
 pub use stroboscope::stroboscope_svg;
+pub use swing_up::{margins_figure, trade_figure};
 
 /// A figure that could not be made.
 #[derive(Debug, thiserror::Error)]

@@ -9,15 +9,15 @@ use serde_json::json;
 use upright_design::rig::{PlantDescription, Rig};
 use upright_design::study::Study;
 use upright_design::swing_up::{
-    Condition, FirmwareRuns, Judgement, Plan, Script, Stored, SwingUpError, designed_table, firmware_runs,
-    judge, refined, search,
+    Condition, FirmwareRuns, Judgement, Margin, Plan, Script, Stored, SwingUpError, Way, designed_table,
+    firmware_runs, judge, margins, motions, refined, search, solved,
 };
 use upright_design::table::write_atomically;
-use upright_tool::figure::{run_svg, stroboscope_svg};
+use upright_tool::figure::{Figure, margins_figure, run_svg, stroboscope_svg, trade_figure};
 use upright_tool::in_the_loop::RunError;
 
 use crate::failure::Failure;
-use crate::progress::{with_search, with_spinner};
+use crate::progress::{with_bar, with_search, with_spinner};
 use crate::split::Split;
 
 /// Plans the motions with which the rig raises itself from hanging to upright, and lowers itself again.
@@ -31,6 +31,8 @@ Examples:
   upright swing-up rigs/quadruple-paper.toml --stored         judge the stored motions again, in seconds
   upright swing-up rigs/quadruple-paper.toml --check          search again; exit status 1 if the file differs
   upright swing-up rigs/quadruple-paper.toml --table          200 runs of the firmware with each of eight errors
+  upright swing-up rigs/quadruple-paper.toml --margins        how far each link may be pushed on the way
+  upright swing-up rigs/quadruple-paper.toml --trade --svg trade.svg
   upright swing-up rigs/single-quanser-ip02.toml --no-write --json
   upright swing-up rigs/quadruple-paper.toml --stored --svg run.svg --csv run.csv")]
 pub(crate) struct SwingUp {
@@ -46,10 +48,10 @@ pub(crate) struct SwingUp {
     /// Write no file beside the rig
     #[arg(long, conflicts_with = "check")]
     no_write: bool,
-    /// Write a run of everything (up, balance, step, down) as CSV
+    /// Write a run of everything (up, balance, step, down) as CSV; with --margins and --trade, what is drawn there
     #[arg(long, value_name = "FILE")]
     csv: Option<PathBuf>,
-    /// Draw that run into an SVG file
+    /// Draw it into an SVG file
     #[arg(long, value_name = "FILE")]
     svg: Option<PathBuf>,
     /// Draw the raising as a stroboscopic picture into an SVG file
@@ -63,6 +65,12 @@ pub(crate) struct SwingUp {
     runs: u32,
     #[command(flatten)]
     split: Split,
+    /// How far each link may be pushed at each moment of the stored motions
+    #[arg(long, conflicts_with_all = ["table", "stored", "check", "no_write", "picture", "seed"])]
+    margins: bool,
+    /// Duration against force and robustness: what the candidates of a search are like
+    #[arg(long, conflicts_with_all = ["margins", "table", "stored", "check", "no_write", "picture", "seed"])]
+    trade: bool,
     /// Seed of the run of everything
     #[arg(long, default_value_t = 1)]
     seed: u64,
@@ -70,6 +78,11 @@ pub(crate) struct SwingUp {
     #[arg(long)]
     json: bool,
 }
+
+/// Moments of a motion for which margins are found.
+const MOMENTS: usize = 20;
+/// Candidates of --trade.
+const TRADED: u64 = 40;
 
 impl SwingUp {
     /// Runs of the stored motions under all conditions.
@@ -89,6 +102,61 @@ impl SwingUp {
         Condition::all().into_iter().map(row).collect()
     }
 
+    /// Margins of both stored motions.
+    fn margins(&self, rig: &Rig) -> Result<(), Failure> {
+        let failed = |source: SwingUpError| Failure::SwingUp { rig: rig.name.clone(), source };
+        let stored = Stored::beside(&self.rig).map_err(failed)?;
+        let motions = motions(rig, &stored).map_err(failed)?;
+        let both = with_bar("margins", 2 * MOMENTS as u64, |done| {
+            [(Way::Up, &motions.raise), (Way::Down, &motions.lower)]
+                .map(|(way, motion)| Ok((way, margins(rig, motion, way, MOMENTS, done)?)))
+                .into_iter()
+                .collect::<Result<Vec<_>, _>>()
+        });
+        let both = both.map_err(failed)?;
+        let title = format!("{}: how far a link may be pushed", rig.name);
+        self.draw(&margins_figure(&title, &both))?;
+        let mut out = std::io::stdout().lock();
+        if self.json {
+            let ways = both.iter().map(|(way, margins)| json!({ "way": way, "margins": margins }));
+            return Ok(writeln!(out, "{}", json!({ "rig": rig.name, "ways": ways.collect::<Vec<_>>() }))?);
+        }
+        for (way, margins) in &both {
+            writeln!(out, "{}", least_margins(*way, margins))?;
+        }
+        Ok(())
+    }
+
+    /// What the candidates of a search are like.
+    fn trade(&self, rig: &Rig) -> Result<(), Failure> {
+        let failed = |source: SwingUpError| Failure::SwingUp { rig: rig.name.clone(), source };
+        let solved = with_search(|progress| solved(rig, TRADED, progress)).map_err(failed)?;
+        self.draw(&trade_figure(&format!("{}: candidates of a raising", rig.name), &solved))?;
+        let mut out = std::io::stdout().lock();
+        if self.json {
+            return Ok(writeln!(out, "{}", json!({ "rig": rig.name, "tried": TRADED, "solved": solved }))?);
+        }
+        writeln!(out, "{} of {TRADED} candidates are solved", solved.len())?;
+        writeln!(out, "duration (s)  force (N)  farthest (m)  fragility")?;
+        for one in &solved {
+            let (duration_s, force_n, position_m, score) =
+                (one.duration_s, one.force_n, one.position_m, one.score);
+            writeln!(out, "{duration_s:>12.2} {force_n:>10.2} {position_m:>13.3} {score:>10.2}")?;
+        }
+        Ok(())
+    }
+
+    /// Writes a figure as --svg and --csv say.
+    fn draw(&self, figure: &Figure) -> Result<(), Failure> {
+        if let Some(path) = &self.csv {
+            write_atomically(path, figure.csv()?.as_bytes())?;
+        }
+        if let Some(path) = &self.svg {
+            write_atomically(path, figure.svg()?.as_bytes())?;
+        }
+        Ok(())
+    }
+
     pub(crate) fn run(self) -> Result<(), Failure> {
         let rig = Rig::from_path(&self.rig)?;
         let failed = |source: SwingUpError| Failure::SwingUp { rig: rig.name.clone(), source };
@@ -103,6 +171,12 @@ impl SwingUp {
         }
         if self.split.is_used() {
             return Err(Failure::BadArgument("--shard and --merge are for --table".to_owned()));
+        }
+        if self.margins {
+            return self.margins(&rig);
+        }
+        if self.trade {
+            return self.trade(&rig);
         }
         let old = Stored::beside(&self.rig);
         let plan = if self.stored {
@@ -145,6 +219,25 @@ impl SwingUp {
         }
         Ok(())
     }
+}
+
+/// For each link, the least margin and when.
+fn least_margins(way: Way, margins: &[Margin]) -> String {
+    let mut text = format!("{way}: least margins");
+    for link in 0..margins.first().map_or(0, |margin| margin.links_rad.len()) {
+        let least = margins.iter().min_by(|a, b| a.links_rad[link].total_cmp(&b.links_rad[link]));
+        if let Some(Margin { at_s, links_rad }) = least {
+            let separator = if link == 0 { " " } else { ", " };
+            // Writing into a string cannot fail.
+            let _ = write!(
+                text,
+                "{separator}link {} {:.1}° at {at_s:.2} s",
+                link + 1,
+                links_rad[link].to_degrees()
+            );
+        }
+    }
+    text
 }
 
 /// Runs under a condition.
