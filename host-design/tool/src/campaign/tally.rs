@@ -85,6 +85,7 @@ pub fn kinds(table: &TableValues, place: Place<'_>) -> Vec<Kind> {
         .map(|(kind, ..)| *kind)
         .filter(|kind| match kind {
             Kind::SupplySag | Kind::SupplyDip => has_supply,
+            Kind::SupplySurge | Kind::SupplySpike => table.motor.is_some(),
             Kind::LinkEncoderFrozen | Kind::EncodersSwapped => has_links,
             _ => true,
         })
