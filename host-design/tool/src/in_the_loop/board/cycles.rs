@@ -162,6 +162,9 @@ impl Figures {
 /// Time of balancing between raising and lowering (s).
 const UPRIGHT_S: f64 = 0.1;
 
+/// What a board does in a run: gives the fault that has ended it, and counts the ticks that count.
+type Action<'a> = dyn Fn(&mut VirtualBoard, &mut usize) -> Result<Option<Fault>, HarnessError> + 'a;
+
 /// The measured ticks of a run.
 #[derive(Default)]
 struct Run {
@@ -183,7 +186,7 @@ pub fn measure(
     image: &Image,
     conditions: &Conditions,
 ) -> Result<Cycles, RunError> {
-    let run = |action: &dyn Fn(&mut VirtualBoard, &mut usize) -> Result<Option<Fault>, HarnessError>| {
+    let run = |action: &Action<'_>| {
         let mut board = VirtualBoard::start(image, conditions, table)?;
         board.measure_ticks();
         let mut driven = 0;
