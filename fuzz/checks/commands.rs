@@ -1,4 +1,5 @@
-//! Commands to the whole firmware: a run starts from a clone of one that balances, is armed, is raised, or hangs.
+//! Commands to the whole firmware: a run starts from a clone of one that balances, is armed, is raised, hangs, or has
+//! a fault.
 //!
 //! The bytes of a run spell what happens to it: requests in good frames, which get past the checksum, damaged and
 //! repeated frames, bytes that are no frame, contacts, the supply, a push by hand, and time.
@@ -28,13 +29,14 @@ const MOST_TICKS: u32 = 48;
 /// # Panics
 /// If the firmware panics or an [invariant](invariants) does not hold.
 pub(crate) fn check(bytes: &[u8]) {
-    static STARTS: OnceLock<[Start; 4]> = OnceLock::new();
+    static STARTS: OnceLock<[Start; 5]> = OnceLock::new();
     let Some((&first, bytes)) = bytes.split_first() else { return };
-    let [hanging, raised, armed, balancing] = STARTS.get_or_init(starts);
+    let [hanging, raised, armed, balancing, stopped] = STARTS.get_or_init(starts);
     let start = match first % 8 {
         0 => hanging,
         1 => armed,
         2 | 3 => raised,
+        7 => stopped,
         _ => balancing,
     };
     let (mut commands, mut messages) =
@@ -116,7 +118,7 @@ impl Run<'_> {
                 *offset = offset.wrapping_add(moved.into());
             }
             24 => (0..next() % 32).for_each(|_| self.tick()),
-            25 => {
+            25 | 28 | 29 => {
                 // Coverage does not lead to a single value of 16 bits. So every input tries 32 values of its own,
                 // which its hash chooses: mutations alone prefer few values.
                 let first = self.hash & !31;

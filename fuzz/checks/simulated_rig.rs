@@ -110,10 +110,11 @@ impl Start {
 }
 
 /// The way from power-up to balancing as a person goes it, with the states on it:
-/// `[hanging, raised, armed, balancing]`.
+/// `[hanging, raised, armed, balancing, stopped]`.
 ///
 /// Hanging is just powered up; raised is homed, checked, upright and still; armed is two ticks before balancing.
-pub(crate) fn starts() -> [Start; 4] {
+/// Stopped is armed and then stopped by the emergency stop, which is released again: the fault is latched.
+pub(crate) fn starts() -> [Start; 5] {
     let limits = &TABLE.limits;
     let build = Build { rig_hash: RIG_HASH, tick_s: TICK_S };
     let firmware = Firmware::new(&TABLE, &build, SimulatedRig::WIDTHS, Reset::Power).expect("a sound table");
@@ -150,8 +151,14 @@ pub(crate) fn starts() -> [Start; 4] {
     start.wait(limits.arm_ticks - 2);
     let armed = start.clone();
     assert_eq!(armed.firmware.state(), State::Armed);
+    let mut stopped = armed.clone();
+    stopped.rig.contacts.emergency_stop = true;
+    stopped.wait(limits.arm_ticks);
+    stopped.rig.contacts.emergency_stop = false;
+    stopped.wait(limits.arm_ticks);
+    assert_eq!(stopped.firmware.state(), State::Fault);
     start.wait(3);
     assert_eq!(start.firmware.state(), State::Balancing);
     start.wait(50);
-    [hanging, raised, armed, start]
+    [hanging, raised, armed, start, stopped]
 }
