@@ -51,6 +51,11 @@ pub fn any<I: Copy + Sync>(items: impl IntoIterator<Item = I>, holds: impl Fn(I)
     try_map(items, |item| if holds(item) { Err(()) } else { Ok(()) }).is_err()
 }
 
+/// The results of two computations at the same time.
+pub fn both<A: Send, B: Send>(a: impl FnOnce() -> A + Send, b: impl FnOnce() -> B + Send) -> (A, B) {
+    rayon::join(a, b)
+}
+
 /// Calls `one` for 0 to `count` - 1. Each call is a task of its own: they may take very different times.
 fn for_each(count: usize, one: &(dyn Fn(usize) + Sync)) {
     (0..count).into_par_iter().with_max_len(1).for_each(one);

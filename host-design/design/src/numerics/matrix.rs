@@ -160,12 +160,14 @@ impl Matrix<Wide> {
 
 impl<R> Index<(usize, usize)> for Matrix<R> {
     type Output = R;
+    #[inline]
     fn index(&self, (i, j): (usize, usize)) -> &R {
         &self.data[i * self.cols + j]
     }
 }
 
 impl<R> IndexMut<(usize, usize)> for Matrix<R> {
+    #[inline]
     fn index_mut(&mut self, (i, j): (usize, usize)) -> &mut R {
         &mut self.data[i * self.cols + j]
     }
@@ -176,16 +178,17 @@ impl<R: Real> Mul for &Matrix<R> {
     fn mul(self, right: &Matrix<R>) -> Matrix<R> {
         assert_eq!(self.cols, right.rows, "inner dimensions of a product");
         let mut product = Matrix::zeros(self.rows, right.cols);
+        let columns = right.cols;
         for i in 0..self.rows {
+            let entries = &mut product.data[i * columns..][..columns];
             for k in 0..self.cols {
                 let factor = &self[(i, k)];
                 if factor.is_zero() {
                     continue; // models are sparse, and products of wide numbers are slow
                 }
-                for j in 0..right.cols {
-                    let term = right[(k, j)].times(factor);
-                    let entry = &mut product[(i, j)];
-                    *entry = term + entry;
+                let row = &right.data[k * columns..][..columns];
+                for j in 0..columns {
+                    entries[j] = row[j].times(factor) + &entries[j];
                 }
             }
         }

@@ -42,14 +42,17 @@ pub trait Real:
     fn scale_by_power_of_two(&self, power: i32) -> Self;
 
     /// `self · other`, without the copy that the operator needs.
+    #[inline]
     fn times(&self, other: &Self) -> Self {
         self.clone() * other
     }
     /// `self - other`, without the copy that the operator needs.
+    #[inline]
     fn minus(&self, other: &Self) -> Self {
         self.clone() - other
     }
     /// 0.
+    #[inline]
     fn zero() -> Self {
         Self::from_f64(0.0)
     }
@@ -62,10 +65,12 @@ pub trait Real:
         Self::one().scale_by_power_of_two(1 - Self::bits() as i32)
     }
     /// Absolute value.
+    #[inline]
     fn abs(&self) -> Self {
         if *self < Self::zero() { -self.clone() } else { self.clone() }
     }
     /// Whether the number is exactly zero.
+    #[inline]
     fn is_zero(&self) -> bool {
         *self == Self::zero()
     }
@@ -80,9 +85,11 @@ impl Real for f64 {
         53
     }
 
+    #[inline]
     fn from_f64(x: f64) -> Self {
         x
     }
+    #[inline]
     fn to_f64(&self) -> f64 {
         *self
     }
@@ -104,6 +111,7 @@ impl Real for f64 {
     fn pi() -> Self {
         core::f64::consts::PI
     }
+    #[inline]
     fn is_finite(&self) -> bool {
         f64::is_finite(*self)
     }

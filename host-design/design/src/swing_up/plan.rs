@@ -13,6 +13,7 @@ use super::search::{Candidate, Request, candidates, ticks_per_knot};
 use super::setting::Setting;
 use super::stored::{Stored, StoredKnots};
 use super::way::Way;
+use crate::parallel;
 use crate::rig::Rig;
 
 /// Candidates of the way up and of the way down; of chains with four and more links.
@@ -132,7 +133,9 @@ pub fn refined(rig: &Rig, stored: &Stored) -> Result<SwingUp, SwingUpError> {
         check(&setting, &motion, way)?;
         Ok(motion)
     };
-    Ok(SwingUp { raise: checked(Way::Up, &stored.raise)?, lower: checked(Way::Down, &stored.lower)? })
+    let (raise, lower) =
+        parallel::both(|| checked(Way::Up, &stored.raise), || checked(Way::Down, &stored.lower));
+    Ok(SwingUp { raise: raise?, lower: lower? })
 }
 
 fn restored(setting: &Setting<'_>, way: Way, stored: &StoredKnots) -> Result<Motion, SwingUpError> {
