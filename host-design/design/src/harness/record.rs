@@ -74,8 +74,8 @@ pub fn record(
             output = harness.session.tick(&inputs)?;
         }
         let ahead = target_at(tick + pace.command_ticks);
-        if lower_at == Some(tick) {
-            harness.session.send(Request::Down);
+        if harness.ask_to_lower(tick, lower_at) {
+            // One command in a tick.
         } else if commanded != ahead {
             harness.session.send(Request::Setpoint(ahead as f32));
             commanded = ahead;

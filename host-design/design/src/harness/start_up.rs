@@ -14,6 +14,8 @@ use crate::table::TableValues;
 
 /// Longest time from power-up to balancing (s).
 const LONGEST_WAIT_S: f64 = 60.0;
+/// Time between two tries of lowering (s).
+const RETRY_S: f64 = 0.05;
 
 /// Firmware, simulated rig, and the hand that raises it.
 pub struct Harness<'t> {
@@ -27,6 +29,9 @@ pub struct Harness<'t> {
     counters: Vec<u32>,
     supply_v: f32,
     period_s: f64,
+    /// The last tick in which lowering was asked for.
+    asked_to_lower: Option<usize>,
+    lowered_from: Option<usize>,
 }
 
 impl<'t> Harness<'t> {
@@ -52,6 +57,8 @@ impl<'t> Harness<'t> {
             counters: vec![0; table.sensors()],
             supply_v: table.motor.map_or(0.0, |motor| motor.supply_v),
             period_s: rig.tick.period_s,
+            asked_to_lower: None,
+            lowered_from: None,
         };
         let hanging = harness.inputs();
         harness.session.check_info(table.rig_hash, &hanging)?;
@@ -105,5 +112,27 @@ impl<'t> Harness<'t> {
             }
         }
         Err(HarnessError::NotBalancing(self.session.status().state))
+    }
+
+    /// Asks for lowering in tick `at`, and again as long as the rig balances, as a person does: it is refused while a link
+    /// leans. To be called in every tick; gives whether it has asked in this one.
+    pub fn ask_to_lower(&mut self, tick: usize, at: Option<usize>) -> bool {
+        let state = self.session.status().state;
+        if state == State::Lowering && self.lowered_from.is_none() {
+            self.lowered_from = self.asked_to_lower.map(|asked| asked + self.session.pace().command_ticks);
+        }
+        let retry_ticks = (RETRY_S / self.period_s).max(1.0) as usize;
+        let since = at.and_then(|at| tick.checked_sub(at));
+        let asks = state == State::Balancing && since.is_some_and(|since| since.is_multiple_of(retry_ticks));
+        if asks {
+            self.asked_to_lower = Some(tick);
+            self.session.send(Request::Down);
+        }
+        asks
+    }
+
+    /// The tick from which on the rig is lowered.
+    pub fn lowered_from(&self) -> Option<usize> {
+        self.lowered_from
     }
 }

@@ -157,25 +157,27 @@ fn raised_and_lowered(
         Err(HarnessError::NotBalancing(_)) => return Ok(Reached { refused: true, ..reached }),
         output => output?,
     };
-    let begins = [0, lower_at + harness.session.pace().command_ticks];
-    for tick in 0..=ticks(scenario.duration_s) {
+    let last = ticks(scenario.duration_s);
+    let mut tick = 0;
+    while tick <= last + harness.lowered_from().map_or(0, |from| from - lower_at) {
         if tick > 0 {
             let inputs = harness.inputs();
             output = harness.session.tick(&inputs)?;
         }
         if tick == lower_at {
             reached.stood = harness.session.status().state == State::Balancing;
-            harness.session.send(Request::Down);
         }
-        for ((motion, begin), largest) in
-            [&motions.raise, &motions.lower].into_iter().zip(begins).zip(&mut reached.deviation_rad)
-        {
-            if let Some(planned) = tick.checked_sub(begin).and_then(|tick| motion.x.get(tick)) {
+        harness.ask_to_lower(tick, Some(lower_at));
+        let moves = [(&motions.raise, Some(0)), (&motions.lower, harness.lowered_from())];
+        for ((motion, begin), largest) in moves.into_iter().zip(&mut reached.deviation_rad) {
+            let planned = begin.and_then(|begin| motion.x.get(tick.checked_sub(begin)?));
+            if let Some(planned) = planned {
                 largest.0 = largest.0.max(deviation(harness.bench.state(), planned));
             }
         }
         harness.bench.tick(output.drive);
         while harness.session.next_telemetry().is_some() || harness.session.next_reply().is_some() {}
+        tick += 1;
     }
     reached.fault = harness.session.fault().map(|fault| fault.to_string());
     reached.hung = reached.stood

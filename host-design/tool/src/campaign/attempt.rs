@@ -9,7 +9,7 @@ use upright_board::UNITS_PER_MICROSECOND;
 use super::defect::{Expected, Kind};
 use super::injection::Injection;
 use super::observed::Observed;
-use super::trial::{COMMAND_TICKS, Phase, Trial};
+use super::trial::{Phase, Trial};
 use crate::in_the_loop::{Events, Place, RunError, VirtualBoard};
 use upright_design::harness::{HEARTBEAT_S, Harness, HarnessError, Pins, Session, Target};
 use upright_design::plant::absolute_angles;
@@ -112,8 +112,8 @@ impl Attempt<'_> {
                     output => output?,
                 };
             }
-            if Some(tick) == lower_at {
-                harness.session.send(Request::Down);
+            if harness.ask_to_lower(tick, lower_at) {
+                // One command in a tick.
             } else if tick == 1 {
                 harness.session.send(Request::Setpoint(trial.scenario.step_m as f32));
             } else if tick.is_multiple_of(heartbeat) && injection.host_is_alive(since) {
@@ -134,7 +134,8 @@ impl Attempt<'_> {
             if is_visible {
                 observed.visible.get_or_insert(tick);
             }
-            observed.outside |= observed.off.is_none() && self.is_outside(tick, harness.bench.state());
+            observed.outside |= observed.off.is_none()
+                && self.is_outside(tick, harness.lowered_from(), harness.bench.state());
             let drive = if acting.enable { acting.drive } else { output.drive };
             harness.bench.push(since.map_or(0.0, |since| injection.push_n(since)));
             harness.bench.tick(drive);
@@ -212,14 +213,14 @@ impl Attempt<'_> {
     }
 
     /// Whether a link is far beyond its limit in `tick`: from the vertical, or in a motion from its planned angle; or the
-    /// cart is off its rail.
-    fn is_outside(&self, tick: usize, state: &[f64]) -> bool {
+    /// cart is off its rail. The rig is lowered from the tick `lowered_from` on.
+    fn is_outside(&self, tick: usize, lowered_from: Option<usize>, state: &[f64]) -> bool {
         let PlantDescription::Chain(chain) = &self.rig.plant else { return false };
         let [low, high] = chain.cart.travel_m;
         if !(low..=high).contains(&state[0]) {
             return true;
         }
-        if let Some(planned) = self.planned(tick) {
+        if let Some(planned) = self.planned(tick, lowered_from) {
             let allowed =
                 self.table.swing_up.as_ref().map_or(f32::MAX, |swing_up| swing_up.limits.deviation_rad);
             let away = absolute_angles(state).zip(planned).map(|(angle, planned)| (angle - planned).abs());
@@ -231,15 +232,16 @@ impl Attempt<'_> {
     }
 
     /// Planned angles of the links from the vertical in `tick` of a run with a motion (rad).
-    fn planned(&self, tick: usize) -> Option<Vec<f64>> {
+    fn planned(&self, tick: usize, lowered_from: Option<usize>) -> Option<Vec<f64>> {
         let swing_up = self.table.swing_up.as_ref()?;
-        let state = match (self.lower_at(), self.trial.scenario.begin) {
-            (_, Begin::ByHand) => return None,
-            (Some(at), _) if tick >= at + COMMAND_TICKS => {
-                swing_up.lower.planned(self.table.states(), tick - at - COMMAND_TICKS)
-            }
-            _ => swing_up.raise.planned(self.table.states(), tick),
+        if self.trial.scenario.begin == Begin::ByHand {
+            return None;
+        }
+        let (motion, begin) = match lowered_from {
+            Some(begin) => (&swing_up.lower, begin),
+            None => (&swing_up.raise, 0),
         };
+        let state = motion.planned(self.table.states(), tick.saturating_sub(begin));
         Some(absolute_angles(&state).collect())
     }
 

@@ -48,7 +48,7 @@ pub enum Phase {
 }
 
 /// Ticks in which a command has taken effect.
-pub(super) const COMMAND_TICKS: usize = 4;
+const COMMAND_TICKS: usize = 4;
 /// Time for which a raised rig balances before it is lowered (s).
 const UPRIGHT_S: f64 = 0.5;
 
