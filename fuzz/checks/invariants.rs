@@ -56,7 +56,8 @@ impl Invariants {
         (self.state, self.cause) = (firmware.state(), firmware.cause());
     }
 
-    /// The motor is on only while balancing or driving, within its limits, and off in the tick of a fault or after a disarm.
+    /// The motor is on only while balancing or driving, within its limits, and off in the tick of a fault or after a
+    /// disarm.
     fn motor(&self, firmware: &Tested, rig: &SimulatedRig, answered: Option<&(Request, Answer)>) {
         let (before, after) = (self.state, firmware.state());
         let Output { enable, drive } = rig.output;

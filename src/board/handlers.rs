@@ -10,8 +10,8 @@ fn panicked(_: &PanicInfo) -> ! {
     crashed(core::ptr::null())
 }
 
-/// Turns the motor off for good. Disables interrupts first, so that the tick cannot turn it on again. `frame` is where the
-/// processor has saved its registers at the entry of an exception; null after a panic.
+/// Turns the motor off for good. Disables interrupts first, so that the tick cannot turn it on again. `frame` is where
+/// the processor has saved its registers at the entry of an exception; null after a panic.
 extern "C" fn crashed(frame: *const u32) -> ! {
     cortex_m::interrupt::disable();
     stop(frame)

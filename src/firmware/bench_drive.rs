@@ -60,6 +60,6 @@ impl<const NX: usize, const NY: usize, S: SwingUp<NX, NY>> Firmware<'_, NX, NY, 
 }
 
 /// What is the cart's of the sensors' counts.
-fn cart<const NY: usize>(counts: &[i32; NY]) -> i32 {
+pub(super) fn cart<const NY: usize>(counts: &[i32; NY]) -> i32 {
     counts.first().copied().unwrap_or_default()
 }

@@ -1,7 +1,7 @@
 //! Frames on a serial line: postcard, then a CRC-32, then COBS, then a zero byte.
 //!
-//! One definition for host and firmware and for every type of message. A receiver that has lost synchronisation finds the
-//! start of the next frame after the next zero byte.
+//! One definition for host and firmware and for every type of message. A receiver that has lost synchronisation finds
+//! the start of the next frame after the next zero byte.
 
 use cobs::{DecodeResult, DecoderState};
 use serde::{Deserialize, Serialize};

@@ -1,7 +1,7 @@
 //! The messages between host and firmware. [`frame`](crate::protocol::frame) puts them into frames.
 //!
-//! A new request is a variant of [`Request`], with an answer in `firmware/commands.rs`; a new value to report is a field of
-//! [`Telemetry`] or [`Statistics`]. Any change of these types raises [`PROTOCOL`].
+//! A new request is a variant of [`Request`], with an answer in `firmware/commands.rs`; a new value to report is a
+//! field of [`Telemetry`] or [`Statistics`]. Any change of these types raises [`PROTOCOL`].
 
 use heapless::Vec;
 use serde::{Deserialize, Serialize};
@@ -131,7 +131,8 @@ pub struct Info {
     pub sensors: u8,
     /// Why the microcontroller started.
     pub reset: Reset,
-    /// CRC-32 of the image in flash, which `upright firmware build` prints, too; 0 for a firmware that is not in flash.
+    /// CRC-32 of the image in flash, which `upright firmware build` prints, too; 0 for a firmware that is not in
+    /// flash.
     pub image: u32,
 }
 

@@ -43,8 +43,8 @@ pub enum Sabotage {
 pub struct PinsOut {
     /// What the motor is driven with.
     pub output: Output,
-    /// Number of bytes sent over the serial line before this tick. A host that reads just these gets the same data at the
-    /// same tick in every run, however fast it is.
+    /// Number of bytes sent over the serial line before this tick. A host that reads just these gets the same data at
+    /// the same tick in every run, however fast it is.
     pub sent: u32,
 }
 

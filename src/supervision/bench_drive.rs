@@ -1,9 +1,10 @@
 //! The bench drive: while a person holds a key, the motor pushes the cart a little, with the links hanging.
 //!
-//! It shows whether the motor pushes the way in which the cart's encoder counts, before anything is balanced, and lets PWM,
-//! break input and dead-man time be measured. The force rises slowly to
-//! [`bench_force_n`](crate::table::Limits::bench_force_n). The drive ends when the key is let go, when the cart has moved far
-//! enough to tell the sign, or after [`LONGEST_S`]. A key that stays held after that does not begin another one.
+//! It shows whether the motor pushes the way in which the cart's encoder counts, before anything is balanced, and lets
+//! PWM, break input and dead-man time be measured. The force rises slowly to
+//! [`bench_force_n`](crate::table::Limits::bench_force_n). The drive ends when the key is let go, when the cart has
+//! moved far enough to tell the sign, or after [`LONGEST_S`]. A key that stays held after that does not begin another
+//! one.
 
 use serde::{Deserialize, Serialize};
 
@@ -44,8 +45,8 @@ pub struct BenchDrive {
 }
 
 impl BenchDrive {
-    /// No drive, and nothing known of the motor; `sign_counts` is what the sign check requires of the cart. Without a cart
-    /// (0), there is nothing to check.
+    /// No drive, and nothing known of the motor; `sign_counts` is what the sign check requires of the cart. Without a
+    /// cart (0), there is nothing to check.
     pub fn new(sign_counts: i32) -> Self {
         let sign = if sign_counts == 0 { MotorSign::Checked } else { MotorSign::Unchecked };
         Self { sign, along: true, start_counts: 0, ticks: 0, silent_ticks: u32::MAX }
@@ -88,8 +89,8 @@ impl BenchDrive {
         self.silent_ticks = self.silent_ticks.saturating_add(1);
     }
 
-    /// A tick of the drive with the cart at `cart_counts`: the force, as a share of the largest one and with its sign; none
-    /// when the drive has ended. `sign_counts` as in [`new`](Self::new).
+    /// A tick of the drive with the cart at `cart_counts`: the force, as a share of the largest one and with its sign;
+    /// none when the drive has ended. `sign_counts` as in [`new`](Self::new).
     pub fn update(&mut self, cart_counts: i32, sign_counts: i32, tick_s: f32) -> Option<f32> {
         self.wait();
         if self.is_released(tick_s) {
@@ -123,8 +124,8 @@ mod tests {
     const TICK_S: f32 = 0.001;
     const SIGN_COUNTS: i32 = 400;
 
-    /// Number of ticks with the motor on and what is then known, for a key that is repeated every `repeat` ticks, and a cart
-    /// that moves by `speed` counts per tick.
+    /// Number of ticks with the motor on and what is then known, for a key that is repeated every `repeat` ticks, and
+    /// a cart that moves by `speed` counts per tick.
     fn drive(along: bool, repeat: u32, speed: i32) -> (u32, MotorSign) {
         let mut drive = BenchDrive::new(SIGN_COUNTS);
         assert!(drive.is_released(TICK_S));

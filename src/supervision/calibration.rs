@@ -75,8 +75,8 @@ impl<const NY: usize> Calibration<NY> {
         self.homing = self.rail.progress();
     }
 
-    /// One tick of homing by the limit switches. Gives the counts of all sensors once both switches were found, the cart
-    /// is off them, and everything is still.
+    /// One tick of homing by the limit switches. Gives the counts of all sensors once both switches were found, the
+    /// cart is off them, and everything is still.
     ///
     /// # Errors
     /// [`WrongTravel`]: the rail is not the one in the rig file; homing ends.

@@ -27,8 +27,8 @@ impl Debounce {
         *self = Self::default();
     }
 
-    /// Checks the inputs of a tick while balancing: limit switches, then the supply, then overruns. `supply_max_v` is the
-    /// highest supply voltage (V), see [`GainTable::supply_max_v`](crate::table::GainTable::supply_max_v).
+    /// Checks the inputs of a tick while balancing: limit switches, then the supply, then overruns. `supply_max_v` is
+    /// the highest supply voltage (V), see [`GainTable::supply_max_v`](crate::table::GainTable::supply_max_v).
     #[inline]
     pub fn check_inputs<const NY: usize>(
         &mut self,
@@ -60,7 +60,8 @@ impl Debounce {
         (self.saturated > limits.saturated_ticks).then_some(Fault::Saturated)
     }
 
-    /// Checks the link at the end of a tick: whether a command was received, and whether the host commands the set-point.
+    /// Checks the link at the end of a tick: whether a command was received, and whether the host commands the
+    /// set-point.
     #[inline]
     pub fn check_link<const NY: usize>(
         &mut self,

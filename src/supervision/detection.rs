@@ -1,15 +1,15 @@
 //! Fault detection by the innovation: do encoders and motor behave as the model says?
 //!
-//! Three tests run in every tick of balancing. `upright design` computes all thresholds from the covariance of the Kalman
-//! filter and a stated rate of false alarms.
+//! Three tests run in every tick of balancing. `upright design` computes all thresholds from the covariance of the
+//! Kalman filter and a stated rate of false alarms.
 //!
-//! - *Plausible*: `|e_i|` within its threshold. A measurement beyond it is rejected (the prediction takes its place) and
-//!   counted; the third in a row is a fault: of the encoder if no other measurement of the tick is rejected, else of the
-//!   motor, because a wrong force moves all of them.
+//! - *Plausible*: `|e_i|` within its threshold. A measurement beyond it is rejected (the prediction takes its place)
+//!   and counted; the third in a row is a fault: of the encoder if no other measurement of the tick is rejected, else
+//!   of the motor, because a wrong force moves all of them.
 //! - *Not frozen*: while a counter stands still, the motion that the model predicts for it stays small. The predicted
 //!   motion is summed with a memory of [`MEMORY`] ticks, so that a small constant model error raises no alarm.
-//! - *Motor*: the innovation of the cart is compared with the one that a missing force `-u` would cause. Their ratio, by
-//!   least squares with the same memory, is 0 for a healthy motor, 1 for a dead one and 2 for a reversed one.
+//! - *Motor*: the innovation of the cart is compared with the one that a missing force `-u` would cause. Their ratio,
+//!   by least squares with the same memory, is 0 for a healthy motor, 1 for a dead one and 2 for a reversed one.
 
 use crate::supervision::fault::Fault;
 use crate::table::{MotorTest, Thresholds};
@@ -132,8 +132,8 @@ impl<const NY: usize> Detection<NY> {
         found.then_some(Finding { fault: Fault::Motor, sensor: 0 })
     }
 
-    /// Second half of a tick: stores the corrected estimate of the sensors' positions (m or rad) and the force `u` (N) that
-    /// acts during this tick.
+    /// Second half of a tick: stores the corrected estimate of the sensors' positions (m or rad) and the force `u` (N)
+    /// that acts during this tick.
     #[inline]
     pub fn finish_tick(&mut self, test: &MotorTest, corrected: [f32; NY], u: f32) {
         for (sensor, corrected) in self.sensors.iter_mut().zip(corrected) {

@@ -7,9 +7,9 @@ use crate::table::{Limits, MotionLimits};
 
 /// The fault of the first limit that the state `x` (m, m/s, rad, rad/s …) or the requested force (N) exceeds.
 ///
-/// In this order: request not finite, rail, angle, speed. Joint angles are added up, because the limit is on each link's
-/// angle from the vertical. `x` is the corrected estimate: a single bad measurement was rejected before and does not
-/// count.
+/// In this order: request not finite, rail, angle, speed. Joint angles are added up, because the limit is on each
+/// link's angle from the vertical. `x` is the corrected estimate: a single bad measurement was rejected before and
+/// does not count.
 #[inline]
 pub fn exceeded<const NY: usize>(limits: &Limits<NY>, x: &[f32], requested_n: f32) -> Option<Fault> {
     // The request is a sum over all states: if one of them is not finite, neither is the sum.
@@ -33,8 +33,8 @@ pub fn exceeded<const NY: usize>(limits: &Limits<NY>, x: &[f32], requested_n: f3
     (speed.abs() > limits.speed_m_per_s).then_some(Fault::Speed)
 }
 
-/// The same for a rig that follows a planned motion, in this order: request not finite, rail, off course, speed. Instead of
-/// the angles from the vertical, the distances of cart and links from the `planned` state are limited.
+/// The same for a rig that follows a planned motion, in this order: request not finite, rail, off course, speed.
+/// Instead of the angles from the vertical, the distances of cart and links from the `planned` state are limited.
 #[inline]
 pub fn exceeded_in_motion(
     limits: &MotionLimits,

@@ -1,7 +1,7 @@
 //! The faults: one list for code, documentation and tests.
 //!
-//! A new fault gets a variant with the next code, an [`Entry`] in [`Fault::ALL`] and a place in [`Fault::PRECEDENCE`]; the
-//! test that the documentation lists it then fails until `docs/faults.md` has it, too.
+//! A new fault gets a variant with the next code, an [`Entry`] in [`Fault::ALL`] and a place in [`Fault::PRECEDENCE`];
+//! the test that the documentation lists it then fails until `docs/faults.md` has it, too.
 
 use serde::{Deserialize, Serialize};
 
@@ -244,12 +244,13 @@ impl Fault {
         },
     ];
 
-    /// Which fault is latched when several occur in one tick: the first of these. Inputs come first, then the limits on
-    /// the estimate, then the tests of the innovation, and last what is checked after the motor was driven.
+    /// Which fault is latched when several occur in one tick: the first of these. Inputs come first, then the limits
+    /// on the estimate, then the tests of the innovation, and last what is checked after the motor was driven.
     ///
-    /// [`Fault::NotFinite`] stands once for the supply voltage and the requested force: the supply comes after the limit
-    /// switches, the force after the overrun. A [`Fault::Motor`] found by rejected measurements of several sensors has the
-    /// place of [`Fault::Encoder`]. [`Fault::Watchdog`] and [`Fault::Crash`] reset the microcontroller.
+    /// [`Fault::NotFinite`] stands once for the supply voltage and the requested force: the supply comes after the
+    /// limit switches, the force after the overrun. A [`Fault::Motor`] found by rejected measurements of several
+    /// sensors has the place of [`Fault::Encoder`]. [`Fault::Watchdog`] and [`Fault::Crash`] reset the
+    /// microcontroller.
     pub const PRECEDENCE: [Fault; 18] = [
         Fault::Clock,
         Fault::Board,
@@ -288,8 +289,8 @@ impl Fault {
         matches!(self, Fault::Encoder | Fault::Frozen | Fault::Watchdog | Fault::Crash)
     }
 
-    /// Whether the motor's sign has to be checked again after this fault: the motor, or the encoder that it was checked
-    /// against, is in doubt.
+    /// Whether the motor's sign has to be checked again after this fault: the motor, or the encoder that it was
+    /// checked against, is in doubt.
     pub fn doubts_motor(self) -> bool {
         self.loses_positions() || self == Fault::Motor
     }

@@ -1,11 +1,11 @@
 //! The sign check: does every encoder count in the right direction, and is it plugged in at its own place?
 //!
-//! A person turns the links counter-clockwise one by one, from the outermost inwards, and then pushes the cart along +x.
-//! Each step starts with the links hanging at rest and lasts until a sensor has moved by its
-//! [`sign_counts`](crate::table::Limits::sign_counts). The requested sensor has to be the first to do so, among
-//! itself and all sensors further inwards, and in the positive direction. (Links further out keep hanging and so turn
-//! backwards against the one being turned; they were checked before.) A reversed encoder moves in the negative direction;
-//! of two swapped encoders, the inner one moves instead of the outer one.
+//! A person turns the links counter-clockwise one by one, from the outermost inwards, and then pushes the cart along
+//! +x. Each step starts with the links hanging at rest and lasts until a sensor has moved by its
+//! [`sign_counts`](crate::table::Limits::sign_counts). The requested sensor has to be the first to do so, among itself
+//! and all sensors further inwards, and in the positive direction. (Links further out keep hanging and so turn
+//! backwards against the one being turned; they were checked before.) A reversed encoder moves in the negative
+//! direction; of two swapped encoders, the inner one moves instead of the outer one.
 
 use serde::{Deserialize, Serialize};
 

@@ -81,8 +81,8 @@ impl Supervisor {
         self.cause
     }
 
-    /// Latches `cause` unless a fault is latched already: the first cause stays. Faults of the same tick are tripped in
-    /// the order of [`Fault::PRECEDENCE`].
+    /// Latches `cause` unless a fault is latched already: the first cause stays. Faults of the same tick are tripped
+    /// in the order of [`Fault::PRECEDENCE`].
     pub fn trip(&mut self, cause: Cause) {
         if self.state == State::Fault {
             return;

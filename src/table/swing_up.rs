@@ -1,8 +1,8 @@
 //! The motions of a swing-up: from hanging to upright, and back.
 //!
 //! A motion is stored as knots, between which the firmware interpolates. The columns, each with its values at
-//! all knots, lie one after the other in a slice, because the number of knots differs from rig to rig. Values have 16 bits,
-//! with a unit for each column: that is finer than what encoders resolve, and takes half of the flash.
+//! all knots, lie one after the other in a slice, because the number of knots differs from rig to rig. Values have 16
+//! bits, with a unit for each column: that is finer than what encoders resolve, and takes half of the flash.
 
 use crate::table::checksum::{ChecksumScan, checksum};
 use crate::table::part::{is_finite, part};

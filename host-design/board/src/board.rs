@@ -63,8 +63,8 @@ pub enum Input {
     IgnoreWatchdog,
     /// The break input is disconnected: for negative controls.
     IgnoreBreak,
-    /// The memory protection unit allows everything, and the 64 KiB below the SRAM answer like memory, as reserved space
-    /// may: for negative controls.
+    /// The memory protection unit allows everything, and the 64 KiB below the SRAM answer like memory, as reserved
+    /// space may: for negative controls.
     IgnoreMpu,
 }
 

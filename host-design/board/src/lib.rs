@@ -32,8 +32,8 @@
 //! | DBGMCU: identity, and the watchdog while a debugger halts the core | 38.6, 38.16 |
 //!
 //! Not modelled, and an error if used: every other peripheral, other modes of these, rounding modes other than to
-//! nearest, sleep deeper than WFI, bit-banding, writing flash. The rise time of pull-ups, the over-drive of the F446, and
-//! what a supply that is too low for the clock does to the core are not modelled either.
+//! nearest, sleep deeper than WFI, bit-banding, writing flash. The rise time of pull-ups, the over-drive of the F446,
+//! and what a supply that is too low for the clock does to the core are not modelled either.
 //!
 //! # What is approximate
 //! Cycles: ARM's table, with the flash accelerator looked up by address. DWT_CYCCNT counts during WFI, too. What is

@@ -102,8 +102,8 @@ impl Wiring {
     }
 }
 
-/// Inputs of the timers in encoder mode: timer, channel (0 or 1), pin, alternate function (datasheet, alternate function
-/// mapping).
+/// Inputs of the timers in encoder mode: timer, channel (0 or 1), pin, alternate function (datasheet, alternate
+/// function mapping).
 pub(crate) const ENCODER_INPUTS: [(usize, usize, Pin, u32); 17] = [
     (0, 0, pin('A', 15), 1),
     (0, 0, pin('A', 0), 1),

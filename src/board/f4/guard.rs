@@ -8,14 +8,15 @@ use super::boards::BOARD;
 /// Line of EXTI that the voltage detector is connected to (RM0090, 12.2.5).
 const DETECTOR: u32 = 1 << 16;
 
-/// Whether this is the chip that the image is for (RM0090, 38.6.1; RM0390, 33.6.1). While a debugger holds the processor, the watchdog waits.
+/// Whether this is the chip that the image is for (RM0090, 38.6.1; RM0390, 33.6.1). While a debugger holds the
+/// processor, the watchdog waits.
 pub(super) fn chip_is_right(debug: &DBGMCU) -> bool {
     debug.apb1_fz().modify(|_, w| w.dbg_iwdg_stop().set_bit());
     debug.idcode().read().bits() & 0xfff == BOARD.chip as u32
 }
 
-/// Makes every access to the 64 KiB below the stack a fault: the stack is at the start of the memory, and writes to the
-/// reserved space before it may be ignored. (The factory's data are there, too: read them before.)
+/// Makes every access to the 64 KiB below the stack a fault: the stack is at the start of the memory, and writes to
+/// the reserved space before it may be ignored. (The factory's data are there, too: read them before.)
 pub(super) fn protect_stack(mpu: &MPU) {
     // SAFETY: nothing uses this space; all other memory stays as it is (PRIVDEFENA).
     unsafe {

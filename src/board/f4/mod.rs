@@ -99,7 +99,8 @@ impl Board<SENSORS> for Hardware {
             raw_counts,
             supply_v: self.supply.volts(),
             contacts: Contacts {
-                // Open at the end of the tick before and now: a spike in a wire beside a switching bridge is no contact.
+                // Open at the end of the tick before and now: a spike in a wire beside a switching bridge is no
+                // contact.
                 limit_low: limit_low & was_low,
                 limit_high: limit_high & was_high,
                 emergency_stop: self.motor.was_stopped() | pins::emergency_stop(),
@@ -139,8 +140,8 @@ fn tick_is_due() -> bool {
     unsafe { (*SYST::PTR).csr.read() & 1 << 16 != 0 }
 }
 
-/// Turns the motor off for good. If the watchdog is running, it resets the microcontroller. `frame` is where the processor
-/// has saved its registers, or null.
+/// Turns the motor off for good. If the watchdog is running, it resets the microcontroller. `frame` is where the
+/// processor has saved its registers, or null.
 pub(crate) fn stop(frame: *const u32) -> ! {
     // SAFETY: nothing else runs any more.
     let device = unsafe { Peripherals::steal() };

@@ -1,10 +1,10 @@
 //! The motor: PWM with a dead-man timer, direction and enable.
 //!
-//! Every tick with the motor on restarts timer 1 for a fixed number of PWM periods, three ticks long: one-pulse mode with
-//! the repetition counter (RM0090, 17.3.10, 17.3.3). When ticks stop, for whatever reason, the timer stops too, at the
-//! end of a period, with its counter at 0. In PWM mode 2 the output is inactive while the counter is below the compare
-//! value (17.3.9). The compare value is never 0 here, so the output stops inactive. This needs no code and no other
-//! clock.
+//! Every tick with the motor on restarts timer 1 for a fixed number of PWM periods, three ticks long: one-pulse mode
+//! with the repetition counter (RM0090, 17.3.10, 17.3.3). When ticks stop, for whatever reason, the timer stops too,
+//! at the end of a period, with its counter at 0. In PWM mode 2 the output is inactive while the counter is below the
+//! compare value (17.3.9). The compare value is never 0 here, so the output stops inactive. This needs no code and no
+//! other clock.
 //!
 //! A restart sets the counter to 0, which would cut a period short. So the counter goes on where it was: the PWM keeps
 //! its phase, however much the time from the tick to the restart varies.
@@ -58,8 +58,8 @@ const OUTPUT: u32 = match wire_of(BOARD.wiring, Signal::Pwm).function.as_bytes()
     b"TIM1_CH1N" => 1 << 2,
     _ => panic!("the board's PWM is not at channel 1 of timer 1"),
 };
-/// OSSI: outputs are low instead of floating while the main output is off. The break input is active high, that is, when
-/// the contact or its wire is open. LOCK level 1 keeps these settings until the next reset (17.4.18).
+/// OSSI: outputs are low instead of floating while the main output is off. The break input is active high, that is,
+/// when the contact or its wire is open. LOCK level 1 keeps these settings until the next reset (17.4.18).
 const PROTECTION: u32 = 1 << 13 | 1 << 12 | 1 << 10 | 0b01 << 8;
 const MAIN_OUTPUT: u32 = 1 << 15;
 

@@ -1,5 +1,5 @@
-//! The serial line: USART2 or USART3, 460 800 baud, 8 data bits, no parity. Both directions go to and from memory without code, so
-//! no tick can be too long for a byte.
+//! The serial line: USART2 or USART3, 460 800 baud, 8 data bits, no parity. Both directions go to and from memory
+//! without code, so no tick can be too long for a byte.
 
 use core::cell::UnsafeCell;
 

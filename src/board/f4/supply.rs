@@ -64,8 +64,8 @@ impl Supply {
     }
 }
 
-/// The microcontroller's own supply (V), from the factory's reading of the reference and from ours. What cannot be, such
-/// as memory without a calibration, gives the board's.
+/// The microcontroller's own supply (V), from the factory's reading of the reference and from ours. What cannot be,
+/// such as memory without a calibration, gives the board's.
 fn reference_v(calibration: f32, measured: f32) -> f32 {
     let volts = 3.3 * calibration / measured;
     if (2.5..3.7).contains(&volts) { volts } else { BOARD.reference_v }

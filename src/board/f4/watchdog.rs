@@ -23,9 +23,9 @@ pub(super) struct Watchdog {
 }
 
 impl Watchdog {
-    /// Starts the watchdog and waits until the values have arrived: until then, a restart would begin at the value after
-    /// a reset, 512 ms (21.4.4). On the internal oscillator, ticks are 10.5 times as long; the watchdog then counts
-    /// 16 times as slowly.
+    /// Starts the watchdog and waits until the values have arrived: until then, a restart would begin at the value
+    /// after a reset, 512 ms (21.4.4). On the internal oscillator, ticks are 10.5 times as long; the watchdog then
+    /// counts 16 times as slowly.
     pub(super) fn start(registers: IWDG, clock: Clock) -> Self {
         let prescaler = if clock == Clock::Full { 0 } else { 4 };
         // SAFETY: keys, prescaler and reload value of RM0090, 21.4.

@@ -1,5 +1,5 @@
-//! The wiring: what is connected to which pin. The pins are set up from it, and a test checks the tables in docs/board.md
-//! against it.
+//! The wiring: what is connected to which pin. The pins are set up from it, and a test checks the tables in
+//! docs/board.md against it.
 //!
 //! Alternate functions: datasheets DS8626 (F405, F407) and DS10693 (F446), table "Alternate function mapping".
 

@@ -27,7 +27,8 @@ pub enum BrownOut {
 }
 
 impl BrownOut {
-    /// The supply that resets the chip as it falls, and the one that lets it go as it rises (V; datasheet, VBOR, VPDR).
+    /// The supply that resets the chip as it falls, and the one that lets it go as it rises (V; datasheet, VBOR,
+    /// VPDR).
     pub(crate) fn thresholds_v(self) -> (f32, f32) {
         match self {
             BrownOut::Off => (POWER_DOWN_V, 1.72),

@@ -238,8 +238,8 @@ impl PwmTimer {
         }
     }
 
-    /// The bit that enables the output: CC1E or CC1NE; the next one inverts it. By itself, the complementary output has
-    /// the reference's level, not its complement (17.4.9).
+    /// The bit that enables the output: CC1E or CC1NE; the next one inverts it. By itself, the complementary output
+    /// has the reference's level, not its complement (17.4.9).
     fn output(&self) -> u32 {
         if self.is_complementary { 1 << 2 } else { 1 }
     }

@@ -212,8 +212,8 @@ impl Attempt<'_> {
         (seconds / self.rig.tick.period_s).max(1.0) as usize
     }
 
-    /// Whether a link is far beyond its limit in `tick`: from the vertical, or in a motion from its planned angle; or the
-    /// cart is off its rail. The rig is lowered from the tick `lowered_from` on.
+    /// Whether a link is far beyond its limit in `tick`: from the vertical, or in a motion from its planned angle; or
+    /// the cart is off its rail. The rig is lowered from the tick `lowered_from` on.
     fn is_outside(&self, tick: usize, lowered_from: Option<usize>, state: &[f64]) -> bool {
         let PlantDescription::Chain(chain) = &self.rig.plant else { return false };
         let [low, high] = chain.cart.travel_m;

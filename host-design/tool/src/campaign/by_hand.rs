@@ -18,8 +18,8 @@ pub struct Defective<'a> {
 }
 
 impl Kind {
-    /// Whether a person can let it begin while the rig balances: it is in what the firmware reads and drives, not in the
-    /// board's parts.
+    /// Whether a person can let it begin while the rig balances: it is in what the firmware reads and drives, not in
+    /// the board's parts.
     pub fn can_begin_while_balancing(self) -> bool {
         let is_before_balancing = matches!(self.expected(), Expected::Refused(_));
         !is_before_balancing && !self.needs_process() && !self.needs_board()

@@ -1,5 +1,5 @@
-//! Defects that only a board has, on the virtual board: what it is like at power-up, and what happens in the tick of the
-//! onset.
+//! Defects that only a board has, on the virtual board: what it is like at power-up, and what happens in the tick of
+//! the onset.
 
 use rand::RngExt;
 use upright_board::{

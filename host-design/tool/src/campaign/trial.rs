@@ -53,8 +53,8 @@ const COMMAND_TICKS: usize = 4;
 const UPRIGHT_S: f64 = 0.5;
 
 impl Trial {
-    /// The trial `number` of a campaign: its kind is one of `kinds`, in turn. With a table that has a swing-up, the defects
-    /// of the motion are tried while raising and lowering, in turn.
+    /// The trial `number` of a campaign: its kind is one of `kinds`, in turn. With a table that has a swing-up, the
+    /// defects of the motion are tried while raising and lowering, in turn.
     pub fn draw(rig: &Rig, table: &TableValues, kinds: &[Kind], seed: u64, number: u64) -> Self {
         let kind = kinds[(number % kinds.len() as u64) as usize];
         // A generator for each trial, so that it does not depend on the others.

@@ -43,11 +43,8 @@ impl Board {
     }
 
     /// How many encoders it counts: the cart's and those of the links.
-    pub const fn encoders(self) -> usize {
-        match self {
-            Board::FeatherF405 => 2,
-            Board::WeactF405 | Board::OlimexH405 | Board::DiscoveryF407 | Board::NucleoF446 => 5,
-        }
+    pub fn encoders(self) -> usize {
+        self.conditions(0).wiring.encoders.len()
     }
 
     /// The board as a virtual one, everything as it typically is; what is random follows from `seed`.

@@ -93,9 +93,9 @@ pub fn run(
     place.with_target(table, |target| Ok(record(rig, table, scenario, target)?))
 }
 
-/// Runs `scenario` on the virtual board as [`run`] does, and in each tick the firmware on the host with what the board's
-/// image has latched: duty, estimate and telemetry must be the same in every bit. Gives the recording, and the numbers
-/// of ticks and of telemetry messages that were compared.
+/// Runs `scenario` on the virtual board as [`run`] does, and in each tick the firmware on the host with what the
+/// board's image has latched: duty, estimate and telemetry must be the same in every bit. Gives the recording, and the
+/// numbers of ticks and of telemetry messages that were compared.
 ///
 /// # Errors
 /// [`RunError`] as of [`run`], and if they differ.

@@ -51,9 +51,9 @@ pub(super) struct Outgoing {
     beats: VecDeque<Command>,
 }
 
-/// Whether the firmware may carry it out late and more than once: questions, and motor off. All else keeps its number when
-/// it is repeated, so that it is carried out once, and is given up in the end: what a person wanted to happen long ago must
-/// not happen when the line is plugged in again.
+/// Whether the firmware may carry it out late and more than once: questions, and motor off. All else keeps its number
+/// when it is repeated, so that it is carried out once, and is given up in the end: what a person wanted to happen
+/// long ago must not happen when the line is plugged in again.
 fn may_come_late(request: Request) -> bool {
     use Request::{Cause, Crash, Disarm, Info, Statistics, Telemetry};
     matches!(request, Disarm | Info | Cause | Crash | Statistics | Telemetry(_))
@@ -87,8 +87,8 @@ impl Outgoing {
         given_up
     }
 
-    /// Sends a request of which the next one is as good: a keep-alive, or a held key. It is not repeated, and left out while
-    /// another command is.
+    /// Sends a request of which the next one is as good: a keep-alive, or a held key. It is not repeated, and left out
+    /// while another command is.
     pub(super) fn beat(&mut self, request: Request, now: Duration) {
         if self.waiting.is_empty() {
             let command = self.number(request, now);

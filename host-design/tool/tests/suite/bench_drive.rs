@@ -1,5 +1,5 @@
-//! The bench drive in closed loop with the simulated rig: on the host, as the image in QEMU, and as the flashed image on the
-//! virtual board.
+//! The bench drive in closed loop with the simulated rig: on the host, as the image in QEMU, and as the flashed image
+//! on the virtual board.
 
 use std::path::Path;
 use std::process::{Command, Stdio};

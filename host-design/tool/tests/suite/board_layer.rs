@@ -48,8 +48,8 @@ impl Powered {
         Self::with(image, conditions, Rules::STRICT)
     }
 
-    /// Runs to this time after power-on, and reads what the board sends at its baud rate: a byte with another length of
-    /// its bits cannot be read.
+    /// Runs to this time after power-on, and reads what the board sends at its baud rate: a byte with another length
+    /// of its bits cannot be read.
     fn run(&mut self, time_s: f64) {
         self.board.run_until(seconds(time_s)).unwrap();
         for byte in self.board.sent() {

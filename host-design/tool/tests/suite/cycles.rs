@@ -42,8 +42,8 @@ fn beyond(cycles: &Cycles) -> Vec<&'static str> {
     all.into_iter().filter(|(_, is_beyond)| *is_beyond).map(|(name, _)| name).collect()
 }
 
-/// The image with a wait before each tick, about 400 cycles for each of `turns`: SysTick's vector leads to a loop behind
-/// the image. It divides, which takes many cycles and the host little time.
+/// The image with a wait before each tick, about 400 cycles for each of `turns`: SysTick's vector leads to a loop
+/// behind the image. It divides, which takes many cycles and the host little time.
 fn slower(image: &Image, turns: u8) -> Image {
     const SYS_TICK: u32 = 0x0800_0000 + 4 * 15;
     const DIVIDE: [u16; 2] = [0xfbb1, 0xf3f2]; // udiv r3, r1, r2

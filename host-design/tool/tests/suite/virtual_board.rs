@@ -1,5 +1,5 @@
-//! The image that is flashed, on the virtual board: from power-up to balancing with no one's help but the simulated hand,
-//! with the bits of the firmware on the host.
+//! The image that is flashed, on the virtual board: from power-up to balancing with no one's help but the simulated
+//! hand, with the bits of the firmware on the host.
 
 use std::path::Path;
 

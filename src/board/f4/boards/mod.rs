@@ -1,4 +1,5 @@
-//! The boards, one file each: all that the image has to know about a board. A cargo feature of the same name selects one.
+//! The boards, one file each: all that the image has to know about a board. A cargo feature of the same name selects
+//! one.
 
 #[allow(dead_code, reason = "only one board is selected")]
 mod discovery_f407;

@@ -1,5 +1,6 @@
 //! `upright firmware`: everything about the image, from building to monitoring.
 
+mod board;
 mod build;
 mod cycles;
 mod flash;

@@ -173,8 +173,8 @@ struct Run {
     ended: Option<String>,
 }
 
-/// Runs the image from power-up through homing, sign check and arming to balancing, for the duration of `scenario`, and
-/// measures every tick. If the table has a swing-up, does the same from power-up through raising and lowering.
+/// Runs the image from power-up through homing, sign check and arming to balancing, for the duration of `scenario`,
+/// and measures every tick. If the table has a swing-up, does the same from power-up through raising and lowering.
 ///
 /// # Errors
 /// [`RunError`] if the image does what the hardware does not allow, or has no tick. A rig that does not come to

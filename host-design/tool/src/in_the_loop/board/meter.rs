@@ -33,7 +33,8 @@ struct Place {
 /// One tick.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub(super) struct TickCost {
-    /// From the time at which it is due to the restart of the motor's timer with its new duty; none with the motor off.
+    /// From the time at which it is due to the restart of the motor's timer with its new duty; none with the motor
+    /// off.
     pub(super) latency: Option<Time>,
     /// By part.
     pub(super) parts: [Time; PARTS],

@@ -178,8 +178,8 @@ impl VirtualBoard {
         self.meter.as_ref().map_or(&[], |meter| &meter.ticks)
     }
 
-    /// Longest time from an edge of the emergency stop to an output that is off; none if it never opened between ticks,
-    /// or nothing was off before the next tick.
+    /// Longest time from an edge of the emergency stop to an output that is off; none if it never opened between
+    /// ticks, or nothing was off before the next tick.
     pub fn stop_to_off(&self) -> Option<Time> {
         self.stop_to_off
     }

@@ -4,8 +4,9 @@ use std::io::Write;
 use std::path::PathBuf;
 
 use clap::Args;
-use upright_tool::image::{Board, Kind};
+use upright_tool::image::Kind;
 
+use super::board::BoardOption;
 use super::built;
 use super::cycles::check_ticks;
 use crate::failure::Failure;
@@ -24,15 +25,14 @@ Examples:
 pub(crate) struct Build {
     /// Rig file (TOML), to be designed [default: the table in src/gains.rs]
     rig: Option<PathBuf>,
-    /// Board: weact-f405, olimex-h405, feather-f405, discovery-f407 or nucleo-f446
-    #[arg(long, value_name = "NAME", default_value_t = Board::WeactF405)]
-    board: Board,
+    #[command(flatten)]
+    on: BoardOption,
 }
 
 impl Build {
     pub(crate) fn run(self) -> Result<(), Failure> {
-        let image = built(Kind::Board(self.board), self.rig.as_deref())?;
-        check_ticks(self.board, self.rig.as_deref(), &image)?;
+        let image = built(Kind::Board(self.on.board), self.rig.as_deref())?;
+        check_ticks(self.on.board, self.rig.as_deref(), &image)?;
         writeln!(std::io::stdout(), "{}", image.display())?;
         Ok(())
     }

@@ -17,6 +17,7 @@ use upright_tool::image::{self, Board, Kind};
 use upright_tool::in_the_loop::{self, Figures, Span};
 use upright_tool::project::checkout;
 
+use super::board::BoardOption;
 use super::designed;
 use super::target::read;
 use crate::failure::Failure;
@@ -38,9 +39,8 @@ Examples:
 pub(crate) struct Cycles {
     /// Rig file (TOML)
     rig: PathBuf,
-    /// Board: weact-f405, olimex-h405, feather-f405, discovery-f407 or nucleo-f446
-    #[arg(long, value_name = "NAME", default_value_t = Board::WeactF405)]
-    board: Board,
+    #[command(flatten)]
+    on: BoardOption,
     /// Control law
     #[arg(long, value_parser = law_option(), default_value = Law::Lqr.option())]
     law: Law,
@@ -55,12 +55,13 @@ pub(crate) struct Cycles {
 impl Cycles {
     pub(crate) fn run(self) -> Result<(), Failure> {
         let (rig, table) = designed(&self.rig)?;
-        let image =
-            with_spinner("building the image", || image::build_for(Kind::Board(self.board), &rig, &table))?;
+        let image = with_spinner("building the image", || {
+            image::build_for(Kind::Board(self.on.board), &rig, &table)
+        })?;
         let image = read(&image)?;
-        let cycles = measured(&rig, &table, &image, self.board, self.law, self.duration)?;
+        let cycles = measured(&rig, &table, &image, self.on.board, self.law, self.duration)?;
         let text = if self.json {
-            json!({ "rig": rig.name, "board": self.board.name(), "law": self.law.option(), "cycles": cycles })
+            json!({ "rig": rig.name, "board": self.on.board.name(), "law": self.law.option(), "cycles": cycles })
                 .to_string()
         } else {
             table_of(&cycles)

@@ -4,16 +4,17 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 
 use clap::Args;
-use upright_tool::image::{Board, Kind};
+use upright_tool::image::Kind;
 
+use super::board::BoardOption;
 use super::built;
 use super::cycles::check_ticks;
 use crate::failure::Failure;
 
 const PROBE_RS: &str = "probe-rs";
 
-/// Builds and checks the image of a board as `build` does, writes it to the board with probe-rs, verifies it, and starts
-/// it.
+/// Builds and checks the image of a board as `build` does, writes it to the board with probe-rs, verifies it, and
+/// starts it.
 ///
 /// The firmware starts disarmed: the motor stays off.
 #[derive(Args)]
@@ -24,9 +25,8 @@ Examples:
 pub(crate) struct Flash {
     /// Rig file (TOML), to be designed [default: the table in src/gains.rs]
     rig: Option<PathBuf>,
-    /// Board: weact-f405, olimex-h405, feather-f405, discovery-f407 or nucleo-f446
-    #[arg(long, value_name = "NAME", default_value_t = Board::WeactF405)]
-    board: Board,
+    #[command(flatten)]
+    on: BoardOption,
 }
 
 impl Flash {
@@ -37,10 +37,10 @@ impl Flash {
                 "probe-rs is missing: install it (https://probe.rs, or `cargo install probe-rs-tools --locked`)",
             ));
         }
-        let image = built(Kind::Board(self.board), self.rig.as_deref())?;
-        check_ticks(self.board, self.rig.as_deref(), &image)?;
-        probe_rs(&["download", "--verify", "--chip", self.board.chip()], Some(&image))?;
-        probe_rs(&["reset", "--chip", self.board.chip()], None)
+        let image = built(Kind::Board(self.on.board), self.rig.as_deref())?;
+        check_ticks(self.on.board, self.rig.as_deref(), &image)?;
+        probe_rs(&["download", "--verify", "--chip", self.on.board.chip()], Some(&image))?;
+        probe_rs(&["reset", "--chip", self.on.board.chip()], None)
     }
 }
 

@@ -23,8 +23,8 @@ use crate::simulate::Simulate;
 /// runs with its registers; its pins drive the plant, and the host gets in each tick what the image has latched.
 ///
 /// The rig is homed while it hangs, held by hand at the start of the scenario until the firmware begins to balance,
-/// and released at time 0. With --swing-up, the image raises the rig from hanging, balances, moves, and lowers it again by
-/// the stored motions. Options are those of `upright simulate`.
+/// and released at time 0. With --swing-up, the image raises the rig from hanging, balances, moves, and lowers it
+/// again by the stored motions. Options are those of `upright simulate`.
 #[derive(Args)]
 #[command(before_help = "\
 Examples:
@@ -43,8 +43,8 @@ pub(crate) struct Run {
     /// How the pins of the image in QEMU are connected: files of the emulator (fast; Unix only), or serial lines
     #[arg(long, value_enum, default_value_t = LinkName::Files)]
     link: LinkName,
-    /// Serve `upright firmware monitor tcp:HOST:PORT`: in real time, for --duration (ten minutes with --swing-up), without
-    /// the comparison
+    /// Serve `upright firmware monitor tcp:HOST:PORT`: in real time, for --duration (ten minutes with --swing-up),
+    /// without the comparison
     #[arg(long, value_name = "HOST:PORT", conflicts_with_all = ["csv", "svg", "json"])]
     serve: Option<String>,
 }
@@ -97,8 +97,8 @@ impl Run {
         Ok(with_spinner("serving", || serve(&rig, &table, &scenario, built.place(1), &listener))?)
     }
 
-    /// Runs `scenario` with the firmware of `table` for the rig `ours` against the rig `real`, and compares every bit with the
-    /// host.
+    /// Runs `scenario` with the firmware of `table` for the rig `ours` against the rig `real`, and compares every bit
+    /// with the host.
     fn recorded(
         &self,
         [ours, real]: [&Rig; 2],

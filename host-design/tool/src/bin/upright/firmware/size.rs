@@ -7,9 +7,10 @@ use std::path::PathBuf;
 use clap::Args;
 use serde_json::json;
 use upright_tool::image::{
-    Board, Image, Kind, Part, RAM_LIMIT, StackBound, StackError, forbidden_functions, size, stack_bound,
+    Image, Kind, Part, RAM_LIMIT, StackBound, StackError, forbidden_functions, size, stack_bound,
 };
 
+use super::board::BoardOption;
 use super::built;
 use crate::failure::Failure;
 
@@ -25,9 +26,8 @@ Examples:
 pub(crate) struct Size {
     /// Rig file (TOML), to be designed [default: the table in src/gains.rs]
     rig: Option<PathBuf>,
-    /// Board: weact-f405, olimex-h405, feather-f405, discovery-f407 or nucleo-f446
-    #[arg(long, value_name = "NAME", default_value_t = Board::WeactF405)]
-    board: Board,
+    #[command(flatten)]
+    on: BoardOption,
     /// Measure this image instead of building one
     #[arg(long, value_name = "FILE", conflicts_with_all = ["rig", "board"])]
     elf: Option<PathBuf>,
@@ -40,7 +40,7 @@ impl Size {
     pub(crate) fn run(self) -> Result<(), Failure> {
         let path = match self.elf {
             Some(path) => path,
-            None => built(Kind::Board(self.board), self.rig.as_deref())?,
+            None => built(Kind::Board(self.on.board), self.rig.as_deref())?,
         };
         let image = Image::read(&path)?;
         let (size, stack, forbidden) = (size(&image)?, stack_bound(&image), forbidden_functions(&image));

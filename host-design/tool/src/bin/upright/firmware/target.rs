@@ -44,8 +44,8 @@ impl Target {
         }
     }
 
-    /// Builds the image with the table of the rig, and says which one it is; on the host there is none. `link` connects the
-    /// pins of an image in QEMU.
+    /// Builds the image with the table of the rig, and says which one it is; on the host there is none. `link`
+    /// connects the pins of an image in QEMU.
     pub(crate) fn built(self, link: Link, rig: &Rig, table: &TableValues) -> Result<Built, Failure> {
         let kind = match (self, link) {
             (Target::Host, _) => return Ok(Built::Host),
