@@ -6,6 +6,7 @@
 use cobs::{DecodeResult, DecoderState};
 use serde::{Deserialize, Serialize};
 
+use crate::protocol::encoder;
 use crate::table::checksum::crc32;
 
 const CRC_BYTES: usize = 4;
@@ -48,7 +49,7 @@ pub fn encode<'a, T: Serialize>(
     scratch: &mut [u8],
     out: &'a mut [u8],
 ) -> Result<&'a [u8], FrameError> {
-    let length = postcard::to_slice(message, scratch).map_err(|_| FrameError::Long)?.len();
+    let length = encoder::encode(message, scratch)?;
     let (body, rest) = scratch.split_at_mut_checked(length).ok_or(FrameError::Long)?;
     let crc = crc32(0, body).to_le_bytes();
     rest.get_mut(..CRC_BYTES).ok_or(FrameError::Long)?.copy_from_slice(&crc);

@@ -7,6 +7,7 @@
 /// Speed of the serial line (Bd). Telemetry of a quadruple rig at every tenth tick needs a third of it.
 pub const BAUD: u32 = 460_800;
 
+mod encoder;
 pub mod frame;
 pub mod message;
 pub mod queue;
