@@ -405,12 +405,10 @@ impl<'t, const NX: usize, const NY: usize, S: SwingUp<NX, NY>> Firmware<'t, NX, 
             self.trip(fault, None);
         }
         let words = if self.supervisor.state() == State::Armed { WORDS_PER_ARMED_TICK } else { 1 };
-        for _ in 0..words {
-            match self.checksum_scan.next(self.table) {
-                Some(crc) if crc != self.table.crc => self.trip(Fault::Table, None),
-                Some(_) => self.is_checked = true,
-                None => {}
-            }
+        match self.checksum_scan.next_words(self.table, words) {
+            Some(crc) if crc != self.table.crc => self.trip(Fault::Table, None),
+            Some(_) => self.is_checked = true,
+            None => {}
         }
         if S::IS_POSSIBLE && self.swing_up.scan(&mut self.swing_up_scan) == Some(false) {
             self.trip(Fault::Table, None);

@@ -33,13 +33,15 @@ const NIBBLES: [u32; 16] = {
 
 /// Checksum of all words of `table`, as little-endian bytes in the order of declaration.
 pub(crate) fn checksum(table: &dyn Part) -> u32 {
-    let leaves = (0..).map_while(|leaf| table.part(&mut { leaf }));
-    leaves.fold(0, |crc, leaf| {
-        (0..).map_while(|word| leaf.get(word)).fold(crc, |crc, word| crc32(crc, &word.to_le_bytes()))
-    })
+    let mut scan = ChecksumScan::default();
+    loop {
+        if let Some(crc) = scan.next_words(table, u32::MAX) {
+            return crc;
+        }
+    }
 }
 
-/// The same checksum, one word per call, so that the work is spread over many ticks.
+/// The same checksum, some words per call, so that the work is spread over many ticks.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct ChecksumScan {
     /// Current leaf of the table, see [`Part::part`].
@@ -53,12 +55,25 @@ pub struct ChecksumScan {
 impl ChecksumScan {
     /// Adds the next word of `table`. After the last word, returns the checksum of all words and starts again.
     pub fn next(&mut self, table: &dyn Part) -> Option<u32> {
-        let Some(words) = table.part(&mut usize::from(self.leaf)) else {
-            return Some(core::mem::take(self).crc);
-        };
-        match words.get(usize::from(self.word)) {
-            Some(word) => (self.crc, self.word) = (crc32(self.crc, &word.to_le_bytes()), self.word + 1),
-            None => (self.leaf, self.word) = (self.leaf + 1, 0),
+        self.next_words(table, 1)
+    }
+
+    /// The same with up to `words` words. The end of a leaf counts as one, and so does the end of the table.
+    #[inline(never)]
+    pub fn next_words(&mut self, table: &dyn Part, mut words: u32) -> Option<u32> {
+        while words > 0 {
+            // Finding a leaf takes as long as several of its words.
+            let Some(leaf) = table.part(&mut usize::from(self.leaf)) else {
+                return Some(core::mem::take(self).crc);
+            };
+            while words > 0 {
+                words -= 1;
+                let Some(word) = leaf.get(usize::from(self.word)) else {
+                    (self.leaf, self.word) = (self.leaf + 1, 0);
+                    break;
+                };
+                (self.crc, self.word) = (crc32(self.crc, &word.to_le_bytes()), self.word + 1);
+            }
         }
         None
     }
@@ -66,7 +81,8 @@ impl ChecksumScan {
 
 #[cfg(test)]
 mod tests {
-    use super::crc32;
+    use super::{ChecksumScan, checksum, crc32};
+    use crate::gains::TABLE;
 
     #[test]
     fn the_check_value_of_the_catalogue_comes_out() {
@@ -76,5 +92,17 @@ mod tests {
     #[test]
     fn a_checksum_in_pieces_is_that_of_the_whole() {
         assert_eq!(crc32(crc32(0, b"1234"), b"56789"), 0xcbf4_3926);
+    }
+
+    #[test]
+    fn a_scan_gives_the_same_checksum_however_many_words_it_takes_at_once() {
+        for words in [1, 2, 7, 8, 1000, u32::MAX] {
+            let mut scan = ChecksumScan::default();
+            // Twice, because it starts again.
+            for _ in 0..2 {
+                let found = (0..10_000).find_map(|_| scan.next_words(&TABLE, words));
+                assert_eq!(found, Some(checksum(&TABLE)), "{words}");
+            }
+        }
     }
 }

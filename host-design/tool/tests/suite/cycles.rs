@@ -12,7 +12,7 @@ use upright_tool::in_the_loop::{Cycles, measure};
 /// From the tick to the output (µs), 10 % above the value with Rust 1.96, as below.
 const LATENCY_US: f64 = 26.5;
 /// The whole task, in any state (µs).
-const TASK_US: f64 = 44.8;
+const TASK_US: f64 = 37.0;
 /// Difference of the latency between any two ticks (µs).
 const JITTER_US: f64 = 15.8;
 /// The controller alone.
