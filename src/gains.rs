@@ -506,6 +506,8 @@ pub static TABLE: GainTable<STATES, SENSORS> = GainTable {
             0.0015339808,
         ]]),
     }),
+    // Known Coulomb friction, if there is any: it is compensated.
+    friction: None,
     // The motor, if described: without it the controller gives a force.
     motor: None,
     // Limits that the supervisor enforces.
@@ -639,7 +641,7 @@ pub static TABLE: GainTable<STATES, SENSORS> = GainTable {
         },
     },
     // CRC-32 of all values above.
-    crc: 0x70d4_88d4,
+    crc: 0xf4ce_9751,
 };
 
 /// This table has no swing-up.

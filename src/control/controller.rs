@@ -33,6 +33,8 @@ pub struct Controller<'t, const NX: usize, const NY: usize, T: Scalar = f32> {
     innovation: SVector<T, NY>,
     state: LawState<T>,
     last_volts: T,
+    /// Known friction of each axis in this tick (N or N m).
+    friction: [T; NY],
     requested: T,
     applied: T,
 }
@@ -143,6 +145,7 @@ impl<'t, const NX: usize, const NY: usize, T: Scalar> Controller<'t, NX, NY, T> 
             innovation: SVector::repeat(zero),
             state: LawState::default(),
             last_volts: zero,
+            friction: [zero; NY],
             requested: zero,
             applied: zero,
         }
@@ -248,6 +251,7 @@ impl<'t, const NX: usize, const NY: usize, T: Scalar> Controller<'t, NX, NY, T> 
         self.innovation = SVector::repeat(T::default());
         self.state = LawState { setpoint: self.output(), ..LawState::default() };
         self.last_volts = T::default();
+        self.friction = [T::default(); NY];
         (self.requested, self.applied) = (T::default(), T::default());
         self.mode = self.started;
     }
@@ -322,7 +326,12 @@ impl<'t, const NX: usize, const NY: usize, T: Scalar> Controller<'t, NX, NY, T> 
                 sum.feed_back(k, x);
             }
         });
-        self.request(sum.force())
+        let estimate = &self.estimate.data.0[0];
+        let mut force = sum.force();
+        if let Some(map) = &self.table.friction {
+            force += map.force(self.law, estimate, &mut self.friction);
+        }
+        self.request(force)
     }
 
     /// The force requested by the law, from its state feedback.
@@ -362,7 +371,7 @@ impl<'t, const NX: usize, const NY: usize, T: Scalar> Controller<'t, NX, NY, T> 
         (self.requested, self.applied) = (requested, applied);
     }
 
-    /// Second half of a tick: `x̂⁻ = Ad x̂ + Bd u` with the force really applied, and the integral.
+    /// Second half of a tick: `x̂⁻ = Ad x̂ + Bd u` with the force really applied and known friction, and the integral.
     pub fn predict(&mut self) {
         let (requested, applied) = (self.requested, self.applied);
         let during_this_tick = self.acting();
@@ -371,7 +380,11 @@ impl<'t, const NX: usize, const NY: usize, T: Scalar> Controller<'t, NX, NY, T> 
             self.state.advance(self.gains.k_integral, position, self.table.tick_s, requested, applied);
         }
         if let Mode::Running(observer) = &self.mode {
-            observer.predict(&mut self.estimate.data.0[0], during_this_tick);
+            let estimate = &mut self.estimate.data.0[0];
+            observer.predict(estimate, during_this_tick);
+            if let Some(map) = &self.table.friction {
+                map.add_to(estimate, &self.friction);
+            }
         }
     }
 
@@ -419,6 +432,7 @@ mod tests {
                 measured: [0],
                 step: vector![0.25],
             }),
+            friction: None,
             motor: None,
             limits: Limits::none(),
             thresholds: Thresholds::none(),

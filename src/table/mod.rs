@@ -5,6 +5,7 @@
 
 mod chain_model;
 pub mod checksum;
+mod friction;
 mod law;
 mod limits;
 mod motor;
@@ -20,6 +21,7 @@ use crate::table::part::{is_finite, part};
 
 pub use chain_model::ChainModel;
 pub use checksum::ChecksumScan;
+pub use friction::FrictionMap;
 pub use law::{Law, LawGains, PerLaw};
 pub use limits::Limits;
 pub use motor::MotorMap;
@@ -30,7 +32,7 @@ pub use swing_up::{MotionLimits, MotionTable, Motions, NoSwingUp, SwingUp, Swing
 pub use thresholds::{MotorTest, Thresholds};
 
 /// Version of the layout of [`GainTable`]; a table with another version is refused.
-pub const TABLE_FORMAT: u32 = 6;
+pub const TABLE_FORMAT: u32 = 7;
 
 part! {
     /// The constants of a controller with `NX` states and `NY` sensors. `upright design` writes them to
@@ -56,6 +58,8 @@ part! {
         pub laws: PerLaw<Option<LawGains<NX, T>>>,
         /// The observer, if designed: without it the controller needs the whole state.
         pub observer: Option<ObserverGains<NX, NY, T>>,
+        /// Known Coulomb friction, if there is any: it is compensated.
+        pub friction: Option<FrictionMap<NX, NY, T>>,
         /// The motor, if described: without it the controller gives a force.
         pub motor: Option<MotorMap<T>>,
         /// Limits that the supervisor enforces.

@@ -43,6 +43,10 @@ fn full() -> GainTable<4, 2> {
             measured: [0, 2],
             step: SVector::from_fn(|_, _| next()),
         }),
+        friction: Some(FrictionMap {
+            axes: SMatrix::from_fn(|_, _| next()),
+            effect: SMatrix::from_fn(|_, _| next()),
+        }),
         motor: Some(MotorMap {
             volts_per_newton: next(),
             volts_per_speed: next(),

@@ -8,7 +8,9 @@ use proptest::test_runner::{TestCaseError, TestRunner};
 use upright::control::controller::Controller;
 use upright::control::encoder::CounterWidth;
 use upright::control::state_feedback::saturate;
-use upright::table::{Build, GainTable, LawGains, Limits, ObserverGains, PerLaw, TABLE_FORMAT, Thresholds};
+use upright::table::{
+    Build, FrictionMap, GainTable, LawGains, Limits, ObserverGains, PerLaw, TABLE_FORMAT, Thresholds,
+};
 
 const BUILD: Build = Build { rig_hash: 1, tick_s: 0.01 };
 
@@ -25,7 +27,7 @@ fn table<const NX: usize, const NY: usize>(
     pattern: Pattern,
     in_order: bool,
     delay_ticks: u32,
-    integral: bool,
+    [integral, friction]: [bool; 2],
     numbers: &[f32],
 ) -> GainTable<NX, NY> {
     let mut numbers = numbers.iter().copied().cycle();
@@ -70,6 +72,10 @@ fn table<const NX: usize, const NY: usize>(
             }),
             step: SVector::from_fn(|_, _| number().abs()),
         }),
+        friction: friction.then(|| FrictionMap {
+            axes: SMatrix::from_fn(|row, _| if row < 2 { number().abs() } else { number() }),
+            effect: SMatrix::from_fn(|_, _| number()),
+        }),
         motor: None,
         limits: Limits::none(),
         thresholds: Thresholds::none(),
@@ -104,7 +110,17 @@ impl<'t, const NX: usize, const NY: usize> Plain<'t, NX, NY> {
         self.setpoint += saturate(target - self.setpoint, law.setpoint_step);
         let over =
             |start: f32, first: usize| (first..NX).step_by(2).fold(start, |sum, i| sum - law.k[i] * x[i]);
-        let requested = over(law.n * self.setpoint, 0) + over(-0.0, 1)
+        let rate = |i: usize| x.get(2 * i + 1).copied().unwrap_or_default();
+        let friction: [f32; NY] = core::array::from_fn(|i| {
+            let map = self.table.friction.as_ref();
+            map.map_or(0.0, |map| -saturate(map.axes[(1, i)] * rate(i), map.axes[(0, i)]))
+        });
+        let fed_forward = self
+            .table
+            .friction
+            .as_ref()
+            .map_or(-0.0, |map| (0..NY).fold(0.0, |sum, i| sum + map.axes[(2, i)] * friction[i]));
+        let requested = over(law.n * self.setpoint, 0) + over(-0.0, 1) + fed_forward
             - law.k_pending * self.pending
             - law.k_integral * self.integral;
         let applied = saturate(requested, self.table.force_limit_n);
@@ -115,7 +131,9 @@ impl<'t, const NX: usize, const NY: usize> Plain<'t, NX, NY> {
         }
         self.pending = applied;
         self.x = core::array::from_fn(|i| {
-            (0..NX).fold(observer.bd[i] * now, |sum, j| sum + observer.ad[(i, j)] * x[j])
+            let effect = |j: usize| self.table.friction.as_ref().map_or(-0.0, |map| map.effect[(i, j)]);
+            let linear = (0..NX).fold(observer.bd[i] * now, |sum, j| sum + observer.ad[(i, j)] * x[j]);
+            (0..NY).fold(linear, |sum, j| sum + effect(j) * friction[j])
         });
         e.into_iter().chain(x).chain([requested, applied]).chain(self.x).collect()
     }
@@ -165,9 +183,9 @@ fn patterns() -> impl Strategy<Value = Pattern> {
 }
 
 fn same_bits<const NX: usize, const NY: usize>(patterns: impl Strategy<Value = Pattern>) {
-    let inputs = (patterns, any::<bool>(), 0..2u32, any::<bool>(), numbers(), ticks::<NY>());
-    let same = |(pattern, in_order, delay, integral, numbers, ticks): (_, _, _, _, Vec<f32>, _)| {
-        let table = table::<NX, NY>(pattern, in_order, delay, integral, &numbers);
+    let inputs = (patterns, any::<bool>(), 0..2u32, any::<[bool; 2]>(), numbers(), ticks::<NY>());
+    let same = |(pattern, in_order, delay, options, numbers, ticks): (_, _, _, _, Vec<f32>, _)| {
+        let table = table::<NX, NY>(pattern, in_order, delay, options, &numbers);
         difference(&table, &table, &ticks).map_or(Ok(()), |difference| Err(TestCaseError::fail(difference)))
     };
     TestRunner::default().run(&inputs, same).unwrap();
@@ -187,7 +205,7 @@ proptest! {
     /// Every single entry matters: the comparison above would notice a shortcut that skips one.
     #[test]
     fn one_entry_off_by_one_bit_is_noticed(numbers in numbers(), pattern in patterns(), row in 0..10usize, column in 0..10usize) {
-        let table = table::<10, 5>(pattern, true, 0, false, &numbers);
+        let table = table::<10, 5>(pattern, true, 0, [false; 2], &numbers);
         let mut other = table.clone();
         let entry = &mut other.observer.as_mut().unwrap().ad[(row, column)];
         // Makes an entry of 0 large enough to be visible in a sum.

@@ -10,6 +10,7 @@ use crate::number::significant;
 use super::key::{Absent, Key, Keys, Section};
 use super::sections::actuator::ACTUATOR;
 use super::sections::chain::{CART, GRAVITY, LINK};
+use super::sections::friction::FRICTION;
 use super::sections::integral::INTEGRAL;
 use super::sections::limits::LIMITS;
 use super::sections::reality::REALITY;
@@ -270,6 +271,9 @@ impl Page {
         }
         if let Some(integral) = &rig.integral {
             self.section(&INTEGRAL, integral);
+        }
+        if let Some(friction) = &rig.friction {
+            self.section(&FRICTION, friction);
         }
     }
 }

@@ -24,6 +24,7 @@ pub use key::{Absent, Key, PerJoint, Section, unit_in_names};
 pub use rule::Rule;
 pub use sections::actuator::{Actuator, Motor};
 pub use sections::chain::{Cart, Chain, Link, LinkEncoder, MAX_LINKS, PlantDescription};
+pub use sections::friction::KnownFriction;
 pub use sections::integral::Integral;
 pub use sections::kalman::Kalman;
 pub use sections::limits::Limits;
@@ -61,6 +62,9 @@ pub struct Rig {
     pub kalman: Option<Kalman>,
     /// Integral action on the controlled output, if wanted.
     pub integral: Option<Integral>,
+    /// Coulomb friction that the controller compensates, if any is known.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub friction: Option<KnownFriction>,
     /// Limits the supervisor enforces.
     pub limits: Limits,
     /// What `upright verify` requires.

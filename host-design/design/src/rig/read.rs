@@ -4,8 +4,8 @@ use super::error::RigError;
 use super::key::{Keys, Section};
 use super::node::{Node, Source, Table};
 use super::sections::{
-    SECTIONS, TOP, actuator, chain, integral, kalman, limits, lqr, model, pole_placement, reality, robust,
-    swing_up, tick, verify,
+    SECTIONS, TOP, actuator, chain, friction, integral, kalman, limits, lqr, model, pole_placement, reality,
+    robust, swing_up, tick, verify,
 };
 use super::{Actuator, Integral, Limits, PlantDescription, Reality, Requirements, Rig, Tick};
 
@@ -33,6 +33,9 @@ pub(super) fn rig(source: &Source<'_>) -> Result<Rig, RigError> {
             .transpose()?,
         kalman: given(&kalman::KALMAN).map(|node| kalman::kalman(&node, &plant)).transpose()?,
         integral: scalars::<Integral>(&root, &integral::INTEGRAL)?,
+        friction: given(&friction::FRICTION)
+            .map(|node| friction::friction(&node, &plant, given(&kalman::KALMAN).is_some()))
+            .transpose()?,
         limits: given(&limits::LIMITS).map_or(Ok(Limits::default()), |node| limits::limits(&node, &plant))?,
         verify: scalars(&root, &verify::VERIFY)?.unwrap_or_else(Requirements::default),
         actuator,

@@ -2,6 +2,7 @@
 
 mod any_size;
 mod contents;
+mod friction;
 mod source;
 mod supervision;
 mod swing_up;
@@ -143,6 +144,7 @@ impl TableValues {
         };
         let steps = design.double.kalman.as_ref().map_or(&[][..], |kalman| kalman.steps.entries());
         let detection = detection_thresholds(rig, &design.double);
+        let friction = friction::friction_map(rig, design)?;
         let widest = GainTable {
             format: TABLE_FORMAT,
             states: states as u32,
@@ -156,6 +158,7 @@ impl TableValues {
                 .map_or(Ok(f32::MAX), |limit| finite("actuator.force_limit_n", limit as f32))?,
             laws,
             observer,
+            friction,
             motor: rig
                 .actuator
                 .motor

@@ -132,6 +132,7 @@ impl Columns<'_> {
 fn write_imports(out: &mut String, table: &TableValues) -> core::fmt::Result {
     let names = [
         ("ChainModel", table.swing_up.is_some()),
+        ("FrictionMap", table.friction.is_some()),
         ("GainTable", true),
         ("LawGains", true),
         ("Limits", true),
@@ -301,10 +302,13 @@ impl Meanings {
     fn entry(&self, field: &str, index: usize) -> Option<String> {
         const ERROR: [&str; 4] =
             ["position from position", "position from speed", "speed from position", "speed from speed"];
+        const FRICTION: [&str; 4] =
+            ["largest", "per rate", "force with the LQR", "force with pole placement"];
         Some(match field {
             "rail_m" | "travel_counts" | "measured" | "b" => return None,
             "k" => self.states.get(index).map_or(String::new(), |(name, unit)| format!("{unit}: {name}")),
-            "ad" | "bd" | "l" => format!("to {}", self.state(index)),
+            "ad" | "bd" | "l" | "effect" => format!("to {}", self.state(index)),
+            "axes" => FRICTION.get(index).copied().unwrap_or_default().to_owned(),
             "a" => ERROR.get(index).copied().unwrap_or_default().to_owned(),
             "step" => format!("sensor of {}", self.sensor(index)),
             _ => self.sensor(index).to_owned(),
@@ -313,12 +317,13 @@ impl Meanings {
 
     /// Whether the field is a matrix.
     fn has_columns(&self, field: &str) -> bool {
-        matches!(field, "ad" | "l")
+        matches!(field, "ad" | "l" | "effect" | "axes")
     }
 
     fn column(&self, field: &str, index: usize) -> String {
         match field {
             "l" => format!("from the sensor of {}", self.sensor(index)),
+            "effect" | "axes" => format!("friction in {}", self.sensor(index)),
             _ => format!("from {}", self.state(index)),
         }
     }

@@ -5,7 +5,7 @@ use serde::Serialize;
 use upright::control::controller::Controller;
 use upright::control::encoder::CounterWidth;
 use upright::control::state_feedback::saturate;
-use upright::table::{GainTable, Law, LawGains, Limits, ObserverGains, PerLaw, Thresholds};
+use upright::table::{FrictionMap, GainTable, Law, LawGains, Limits, ObserverGains, PerLaw, Thresholds};
 
 use super::loop_model::{LoopModel, Numbers};
 use super::{VerifyError, radius};
@@ -155,6 +155,10 @@ fn in_double_precision(exact: &Numbers<f64>, table: &TableValues, law: Law) -> D
             l: widest(&exact.l),
             measured: single.measured,
             step: widest(&Matrix::column(&exact.step)),
+        }),
+        friction: table.friction.as_ref().map(|single| FrictionMap {
+            axes: single.axes.map(f64::from),
+            effect: single.effect.map(f64::from),
         }),
         motor: None,
         limits: Limits::none(),

@@ -53,6 +53,7 @@ fn bare(chain: Chain) -> Rig {
         pole_placement: None,
         kalman: None,
         integral: None,
+        friction: None,
         limits: Limits::default(),
     }
 }

@@ -2,6 +2,7 @@
 
 mod design_properties;
 mod identify;
+mod known_friction;
 // The paper's printed values are defined once, in the tool.
 #[allow(dead_code, unreachable_pub)]
 #[path = "../../../tool/src/reproduce/published.rs"]

@@ -86,6 +86,7 @@ fn what_is_left_out_gets_its_documented_default() {
         pole_placement: None,
         kalman: None,
         integral: None,
+        friction: None,
         limits: Limits::default(),
     };
     assert_eq!(parse(MINIMAL), expected);

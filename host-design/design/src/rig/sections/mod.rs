@@ -7,6 +7,7 @@
 
 pub(super) mod actuator;
 pub(super) mod chain;
+pub(super) mod friction;
 pub(super) mod integral;
 pub(super) mod kalman;
 pub(super) mod limits;
@@ -38,7 +39,7 @@ pub static TOP: Section = Section {
 };
 
 /// All sections, in the order of the documentation.
-pub static SECTIONS: [&Section; 15] = [
+pub static SECTIONS: [&Section; 16] = [
     &chain::CART,
     &chain::LINK,
     &chain::GRAVITY,
@@ -48,6 +49,7 @@ pub static SECTIONS: [&Section; 15] = [
     &pole_placement::POLE_PLACEMENT,
     &kalman::KALMAN,
     &integral::INTEGRAL,
+    &friction::FRICTION,
     &limits::LIMITS,
     &verify::VERIFY,
     &reality::REALITY,

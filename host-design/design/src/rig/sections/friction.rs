@@ -1,0 +1,54 @@
+//! `[friction]`: Coulomb friction that is known, and that the controller compensates.
+
+use super::super::error::RigError;
+use super::super::key::{Absent, Keys, PerJoint, Section, keys};
+use super::super::node::{Node, Table};
+use super::super::rule::Rule;
+use super::chain::PlantDescription;
+
+/// `[friction]`
+pub(in crate::rig) static FRICTION: Section = Section {
+    name: "friction",
+    title: "[friction]",
+    meaning: "Coulomb friction that is known and compensated, with [kalman], not with [model]",
+    absent: Absent::Follows("nothing is compensated"),
+    keys: &[KnownFriction::KEYS],
+};
+
+const NONE: Absent = Absent::Numbers(&[0.0]);
+
+keys! {
+    /// `[friction]`. The friction that the simulated machine has is in `[reality]`.
+    pub struct KnownFriction {
+        joint_n_m: PerJoint, "N·m", Rule::NOT_NEGATIVE.worded("a number >= 0, or one per joint"),
+            "known Coulomb friction of each joint", NONE;
+        cart_n: f64, "N", Rule::NOT_NEGATIVE, "known Coulomb friction of the cart; 90 % of it is compensated", NONE;
+        joint_rate_rad_per_s: f64, "rad/s", Rule::POSITIVE,
+            "rate of a joint from which all of its friction is compensated", Absent::Numbers(&[0.07]);
+        cart_speed_m_per_s: f64, "m/s", Rule::POSITIVE,
+            "speed of the cart from which all of that is compensated", Absent::Numbers(&[0.01]);
+        fed_forward_percent: f64, "%", Rule::SPREAD,
+            "share of the joints' friction whose static effect the force works against", Absent::Numbers(&[30.0]);
+    }
+}
+
+/// Reads `[friction]`, which needs a chain and an observer.
+pub(in crate::rig) fn friction(
+    node: &Node<'_>,
+    plant: &PlantDescription,
+    has_observer: bool,
+) -> Result<KnownFriction, RigError> {
+    let PlantDescription::Chain(chain) = plant else {
+        let remedy = "describe the machine by [cart] and [[link]], or leave [friction] out";
+        return Err(node.out_of_range("only a chain of links", remedy));
+    };
+    if !has_observer {
+        return Err(node.out_of_range("only with [kalman]", "add [kalman], or leave [friction] out"));
+    }
+    let table: Table<'_> = node.table(&FRICTION)?;
+    let known = KnownFriction::read(&table)?;
+    if let Some(list) = table.get("joint_n_m").filter(Node::is_list) {
+        list.numbers(chain.links.len(), Rule::ANY, &table.asks_for("joint_n_m"))?;
+    }
+    Ok(known)
+}
