@@ -18,6 +18,7 @@ use crate::control::controller::{Controller, MotorCommand};
 use crate::control::encoder::CounterWidth;
 use crate::control::motion::Player;
 use crate::protocol::message::{Command, Reply, Start, Statistics, Telemetry};
+use crate::protocol::telemetry_ticks;
 use crate::supervision::bench_drive::{BenchDrive, MotorSign};
 use crate::supervision::calibration::Calibration;
 use crate::supervision::debounce::Debounce;
@@ -76,9 +77,6 @@ pub struct Firmware<'t, const NX: usize, const NY: usize, S = NoSwingUp> {
 /// Words of the table that are checked in a tick while armed, when the whole table has to be read before the motor is
 /// on. Otherwise it is one.
 const WORDS_PER_ARMED_TICK: u32 = 8;
-
-/// [`Firmware::telemetry_period_ticks`] until the host sets it.
-const DEFAULT_TELEMETRY_PERIOD_TICKS: u16 = 10;
 
 impl<'t, const NX: usize, const NY: usize> Firmware<'t, NX, NY> {
     /// The firmware without swing-up, motor off. `start` is what the board knows: a [`Start`], or just a
@@ -163,7 +161,7 @@ impl<'t, const NX: usize, const NY: usize, S: SwingUp<NX, NY>> Firmware<'t, NX, 
             worst_cycles: 0,
             statistics: Statistics::default(),
             start,
-            telemetry_period_ticks: DEFAULT_TELEMETRY_PERIOD_TICKS,
+            telemetry_period_ticks: telemetry_ticks(table.tick_s),
             ticks_to_telemetry: 0,
         }
     }

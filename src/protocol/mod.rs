@@ -4,8 +4,18 @@
 //! for all of them, [`serial_link`] sends and receives them beside the control task, [`queue`] connects the two, and
 //! [`simulated_pins`] replaces the wires when an image runs in the loop with a simulation.
 
-/// Speed of the serial line (Bd). Telemetry of a quadruple rig at every tenth tick needs a third of it.
+/// Speed of the serial line (Bd).
 pub const BAUD: u32 = 460_800;
+
+/// Time between two messages of telemetry until the host sets another (s). Those of a quadruple rig then need a third of
+/// the line, the longest ones three quarters.
+const TELEMETRY_S: f32 = 0.01;
+
+/// The same in ticks of `tick_s` (s), at least one.
+pub fn telemetry_ticks(tick_s: f32) -> u16 {
+    // Rounded up, unless only the division has made it more than a whole number.
+    ((TELEMETRY_S / tick_s + 0.999) as u16).max(1)
+}
 
 mod encoder;
 pub mod frame;
@@ -13,3 +23,22 @@ pub mod message;
 pub mod queue;
 pub mod serial_link;
 pub mod simulated_pins;
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_longest_telemetry_fits_on_the_line_at_every_tick() {
+        for microseconds in 119..20_000 {
+            let tick_s = microseconds as f32 * 1e-6;
+            let ticks = telemetry_ticks(tick_s);
+            let bits_per_s = 10.0 * serial_link::MAX_MESSAGE as f32 / (f32::from(ticks) * tick_s);
+            assert!(bits_per_s < BAUD as f32, "{tick_s} s, {ticks} ticks: {bits_per_s} Bd");
+            // Negative control: at every tenth tick it does not fit if the tick is short.
+            let at_tenth = serial_link::MAX_MESSAGE as f32 / tick_s;
+            assert_eq!(at_tenth > BAUD as f32, microseconds < 738);
+        }
+        assert_eq!([0.000_5, 0.001, 0.002, 0.005, 0.02].map(telemetry_ticks), [20, 10, 5, 2, 1]);
+    }
+}

@@ -10,8 +10,8 @@ use std::rc::Rc;
 
 use upright::board::{Contacts, Output};
 use upright::control::actuator::Drive;
-use upright::protocol::BAUD;
 use upright::protocol::simulated_pins::Sabotage;
+use upright::protocol::{BAUD, telemetry_ticks};
 use upright_board::{
     Board, Conditions, Image, Input, PowerStage, Rules, Stopped, Time, UNITS_PER_MICROSECOND,
     UNITS_PER_SECOND, Wire, Wiring, seconds,
@@ -394,7 +394,7 @@ impl Target for VirtualBoard {
         // An answer may wait for two telemetry messages, each of some 150 bytes.
         let byte_s = 10.0 / f64::from(BAUD);
         let answer_ticks = 10 + (600.0 * byte_s / self.tick_s).ceil() as usize;
-        Pace { answer_ticks, telemetry_ticks: 10, command_ticks: 4 }
+        Pace { answer_ticks, telemetry_ticks: telemetry_ticks(self.tick_s as f32), command_ticks: 4 }
     }
 
     fn stop_reading(&mut self) -> Result<(), HarnessError> {
