@@ -11,7 +11,7 @@ use crate::instruction::Unit;
 use crate::machine::Machine;
 use crate::peripherals::gpio::Wire;
 use crate::peripherals::power::{BrownOut, POWER_DOWN_V};
-use crate::peripherals::rcc::{BROWN_OUT_FLAG, Crystal, PIN_FLAG, POWER_FLAG};
+use crate::peripherals::rcc::{BROWN_OUT_FLAG, Crystal, PIN_FLAG, POWER_FLAG, SOFTWARE_FLAG};
 use crate::peripherals::usart::LineByte;
 use crate::wiring::{Pin, Wiring};
 
@@ -42,6 +42,8 @@ pub enum Input {
     Reset(bool),
     /// A debugger halts the core, or lets it go on.
     Halt(bool),
+    /// A debugger resets the chip (SYSRESETREQ).
+    DebuggerReset,
     /// The next write to this register is lost.
     LoseWrite(u32),
     /// As [`Input::LoseWrite`], but reading gives what was written: for negative controls.
@@ -118,6 +120,7 @@ impl Conditions {
             seed,
             chip_v: 3.3,
             brown_out: BrownOut::Off,
+            is_calibrated: true,
         }
     }
 }
@@ -185,6 +188,7 @@ impl Board {
             Input::StopCrystal => bus.stop_crystal(),
             Input::Reset(low) => self.hold(low, 0),
             Input::Halt(halted) => bus.halt(halted),
+            Input::DebuggerReset => self.hold(false, SOFTWARE_FLAG),
             Input::LoseWrite(register) | Input::LoseWriteUnseen(register) => {
                 bus.lost_write = Some(register);
                 bus.lost_write_is_hidden = matches!(input, Input::LoseWriteUnseen(_));

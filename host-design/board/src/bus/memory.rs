@@ -85,8 +85,9 @@ impl Bus {
         let mut data = [0u8; 0x40];
         data[0x10..0x1c].copy_from_slice(b"\x2a\0\x31\0\x0c5133713");
         data[0x22..0x24].copy_from_slice(&((self.chip.flash_bytes() >> 10) as u16).to_le_bytes());
-        // 1.21 V of 3.3 V in 12 bits.
-        data[0x2a..0x2c].copy_from_slice(&1502u16.to_le_bytes());
+        // 1.21 V of 3.3 V in 12 bits; erased without.
+        let calibration = if self.is_calibrated { 1502u16 } else { u16::MAX };
+        data[0x2a..0x2c].copy_from_slice(&calibration.to_le_bytes());
         let offset = address.checked_sub(0x1fff_7a00)? as usize;
         get(&data, offset, unit)
     }

@@ -57,6 +57,8 @@ pub struct Conditions {
     pub chip_v: f32,
     /// The brown-out level in the option bytes.
     pub brown_out: BrownOut,
+    /// Whether the factory's reading of the reference is in the chip; for negative controls.
+    pub is_calibrated: bool,
 }
 
 /// What the debugger freezes with the core (DBGMCU; RM0090, 38.16).
@@ -87,6 +89,7 @@ pub(crate) struct Bus {
     pub(crate) rules: Rules,
     pub(crate) notes: Vec<Note>,
     pub(crate) chip: Chip,
+    is_calibrated: bool,
     pub(crate) wiring: &'static Wiring,
     pub(crate) noise: u64,
     pub(crate) flash: Vec<u8>,
@@ -169,6 +172,7 @@ impl Bus {
             dma: Dma::of_usart(wiring.usart),
             iwdg: Iwdg::new(conditions.lsi_hz),
             power: Power::new(chip, conditions.chip_v, conditions.brown_out),
+            is_calibrated: conditions.is_calibrated,
             driven: Driven::default(),
             driven_until: 0,
             watchdog_reset: false,

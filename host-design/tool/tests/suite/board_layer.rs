@@ -227,6 +227,49 @@ fn a_low_supply_of_the_chip_is_noticed_however_short_it_is() {
     assert_eq!(run.last(), (State::Fault, Some(Fault::Board)));
 }
 
+/// A debugger resets the chip, after power-on and after a crash that was reported: only a new crash is one.
+#[test]
+fn a_debuggers_reset_is_no_crash() {
+    let Some(image) = image() else { return };
+    let mut run = Powered::strict(&image, &Conditions::f405(1));
+    run.run(0.05);
+    for time_s in [0.1, 0.15] {
+        let before = run.telemetry.len();
+        run.board.apply(Input::DebuggerReset);
+        run.run(time_s);
+        assert!(run.telemetry.len() > before);
+        assert_eq!(run.last(), (State::Disarmed, None));
+    }
+    assert_eq!(run.board.resets(), 2);
+    run.ask(1, Request::Info);
+    run.run(0.2);
+    let Some(Reply { answer: Answer::Info(info), .. }) = run.replies.last() else {
+        panic!("{:?}", run.replies)
+    };
+    assert_eq!(info.reset, Reset::Power);
+}
+
+/// What the motor's supply of 24 V is read as (V), by a chip that runs from this voltage.
+fn supply_read(image: &Image, conditions: &Conditions) -> f32 {
+    let mut run = Powered::strict(image, conditions);
+    run.run(0.05);
+    run.telemetry.last().unwrap().supply_v
+}
+
+/// Some boards run from 3.0 V: without the correction by the chip's reference, the reading would be 10 % high there.
+#[test]
+fn the_reading_of_the_supply_does_not_depend_on_the_chips_own() {
+    let Some(image) = image() else { return };
+    for chip_v in [2.9, 3.0, 3.3, 3.5] {
+        let read = supply_read(&image, &Conditions { chip_v, ..Conditions::f405(1) });
+        assert!((read - 24.0).abs() < 0.15, "{read} V from {chip_v} V");
+    }
+    // Negative control: a chip without the factory's reading is taken for one that runs from the board's 3.3 V.
+    let uncalibrated = Conditions { is_calibrated: false, chip_v: 3.0, ..Conditions::f405(1) };
+    let read = supply_read(&image, &uncalibrated);
+    assert!((read - 24.0 * 1.1).abs() < 0.15, "{read} V");
+}
+
 /// The pin is high while a tick runs, and only then: 5 to 50 µs of each millisecond.
 #[test]
 fn a_pin_shows_the_tick() {
