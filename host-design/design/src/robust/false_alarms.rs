@@ -9,10 +9,9 @@ use upright::table::Law;
 use super::judge::machine;
 use crate::harness::{HEARTBEAT_S, Harness, HarnessError, with_firmware};
 use crate::rig::{PerJoint, PlantDescription, Rig};
-use crate::simulate::Scenario;
 use crate::study::Study;
 use crate::table::TableValues;
-use crate::verify::{Disturbance, Unverifiable};
+use crate::verify::{Unverifiable, at_rest_disturbed, chain};
 
 /// The set-point changes sides this often (s).
 const SIDE_S: f64 = 60.0;
@@ -81,9 +80,7 @@ pub fn false_alarms(
     study: &Study,
     done: &(dyn Fn() + Sync),
 ) -> Result<FalseAlarms, Unverifiable> {
-    if !matches!(rig.plant, PlantDescription::Chain(_)) {
-        return Err(Unverifiable::NotAChain("healthy machines"));
-    }
+    chain(rig, "healthy machines")?;
     let one = |number: u64| -> Result<(u64, Healthy), Unverifiable> {
         let found = balance(&healthy_machine(rig, number), table, law, number, seconds);
         done();
@@ -116,14 +113,7 @@ pub fn balance(
     seed: u64,
     seconds: f64,
 ) -> Result<Healthy, HarnessError> {
-    let disturbance = Disturbance::of(machine);
-    let scenario = Scenario {
-        force_noise_n: disturbance.force_n,
-        torque_noise_n_m: disturbance.torque_n_m,
-        seed,
-        substeps: 2,
-        ..Scenario::at_rest(machine, law)
-    };
+    let scenario = at_rest_disturbed(machine, law, seed);
     with_firmware(table, |target| {
         let mut harness = Harness::new(machine, table, &scenario, target)?;
         match harness.raise(None) {

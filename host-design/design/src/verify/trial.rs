@@ -189,6 +189,19 @@ pub(crate) fn scenario(rig: &Rig, law: Law, duration_s: f64) -> Scenario {
     Scenario { duration_s, substeps: finer * steps, ..Scenario::at_rest(rig, law) }
 }
 
+/// The rig at rest with the disturbances that its file expects, as the whole firmware is run: with two integration steps per
+/// tick.
+pub fn at_rest_disturbed(rig: &Rig, law: Law, seed: u64) -> Scenario {
+    let disturbance = Disturbance::of(rig);
+    Scenario {
+        force_noise_n: disturbance.force_n,
+        torque_noise_n_m: disturbance.torque_n_m,
+        seed,
+        substeps: 2,
+        ..Scenario::at_rest(rig, law)
+    }
+}
+
 /// A start at rest with these angles from the vertical (rad).
 pub(crate) fn leaning(rig: &Rig, angles: &[f64]) -> Vec<f64> {
     let mut start = vec![0.0; rig.states()];

@@ -1,6 +1,6 @@
 //! A healthy rig is never switched off.
 
-use rayon::prelude::*;
+use upright_design::parallel;
 use upright_design::rig::{PerJoint, Rig, Tolerances};
 use upright_design::robust::{Healthy, balance, false_alarms, healthy_machine};
 use upright_design::study::Study;
@@ -20,11 +20,9 @@ fn no_alarm(hours: f64, parts: u64) {
     let of_rig = |name: &'static str| [Law::Lqr, Law::PolePlacement].map(|law| (name, law));
     let runs: Vec<_> = ALL_RIGS.into_iter().flat_map(of_rig).collect();
     let runs = runs.into_iter().flat_map(|(name, law)| (1..=parts).map(move |seed| (name, law, seed)));
-    let found: Vec<_> = runs
-        .collect::<Vec<_>>()
-        .into_par_iter()
-        .map(|(name, law, seed)| (name, law, seed, nominal(&rig(name), law, seed, hours / parts as f64)))
-        .collect();
+    let found = parallel::map(runs, |(name, law, seed)| {
+        (name, law, seed, nominal(&rig(name), law, seed, hours / parts as f64))
+    });
     for (name, law, seed, found) in &found {
         println!("{name} {law:?} seed {seed}: {found:?}");
     }
@@ -93,11 +91,8 @@ fn machines(name: &str, percent: f64, more: &str, tolerances: Option<Tolerances>
 
 /// Law, number of the machine, and what was found in `seconds` on each machine.
 fn alarms(machines: &[Rig], seconds: f64) -> Vec<(Law, usize, Healthy)> {
-    let all: Vec<_> =
-        Law::ALL.into_iter().flat_map(|law| (0..machines.len()).map(move |one| (law, one))).collect();
-    all.into_par_iter()
-        .map(|(law, one)| (law, one, nominal(&machines[one], law, 1, seconds / 3600.0)))
-        .collect()
+    let all = Law::ALL.into_iter().flat_map(|law| (0..machines.len()).map(move |one| (law, one)));
+    parallel::map(all, |(law, one)| (law, one, nominal(&machines[one], law, 1, seconds / 3600.0)))
 }
 
 /// The rig file with these tolerances in place of its own.

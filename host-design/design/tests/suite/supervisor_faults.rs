@@ -9,9 +9,9 @@ use upright::supervision::fault::Fault;
 use upright::table::Law;
 use upright_design::harness::{Harness, Pins};
 use upright_design::rig::Rig;
-use upright_design::simulate::{Bench, Scenario};
+use upright_design::simulate::Bench;
 use upright_design::table::TableValues;
-use upright_design::verify::Disturbance;
+use upright_design::verify::at_rest_disturbed;
 
 /// A defect, with the number of the sensor.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -130,14 +130,7 @@ fn observe(harness: &mut Harness<'_>, mut injection: Injection, ticks: u32) -> O
 }
 
 fn watch(rig: &Rig, values: &TableValues, law: Law, defect: Defect, seed: u64, ticks: u32) -> Outcome {
-    let disturbance = Disturbance::of(rig);
-    let scenario = Scenario {
-        force_noise_n: disturbance.force_n,
-        torque_noise_n_m: disturbance.torque_n_m,
-        seed,
-        substeps: 2,
-        ..Scenario::at_rest(rig, law)
-    };
+    let scenario = at_rest_disturbed(rig, law, seed);
     let full = if rig.actuator.motor.is_some() { 1.0 } else { rig.force_limit_n().unwrap() as f32 };
     let injection = Injection { defect, from: 1000 + 17 * seed as u32, frozen: None, past: Vec::new(), full };
     balancing(rig, values, &scenario, |harness| observe(harness, injection, ticks)).unwrap()

@@ -7,6 +7,7 @@ use serde_json::json;
 use upright::table::Law;
 use upright_design::rig::Rig;
 use upright_design::robust::{FalseAlarms, false_alarms};
+use upright_design::study::Study;
 
 use crate::failure::Failure;
 use crate::progress::with_bar;
@@ -63,14 +64,14 @@ impl HealthyHours {
             "gains": self.variation.changes(), "runs": self.runs, "duration": self.duration,
             "law": self.law.map(Law::key),
         });
-        self.split.study("false-alarms", &rig, &options, |study| {
-            let runs = u64::from(self.runs);
-            let found = with_bar("machines", laws.len() as u64 * runs, |done| {
+        let runs = u64::from(self.runs);
+        let work = |study: &Study| -> Result<Vec<FalseAlarms>, Failure> {
+            Ok(with_bar("machines", laws.len() as u64 * runs, |done| {
                 let of_law = |&law: &Law| false_alarms(&rig, &table, law, (runs, self.duration), study, done);
-                laws.iter().map(of_law).collect::<Result<Vec<FalseAlarms>, _>>()
-            })?;
-            if study.is_shard() { Ok(()) } else { self.print(&rig, &found) }
-        })
+                laws.iter().map(of_law).collect::<Result<_, _>>()
+            })?)
+        };
+        self.split.study("false-alarms", &rig, &options, work, |found| self.print(&rig, &found))
     }
 
     fn print(&self, rig: &Rig, found: &[FalseAlarms]) -> Result<(), Failure> {

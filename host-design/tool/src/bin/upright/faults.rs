@@ -102,24 +102,20 @@ impl Faults {
             "gains": self.variation.changes(), "swing_up": self.swing_up, "target": self.target.name(),
             "seed": self.seed, "runs": self.runs, "kind": self.kind,
         });
-        self.split.study("faults", &rig, &options, |study| self.inject(&setup, &chosen, study))
-    }
-
-    /// The whole campaign.
-    fn inject(&self, setup: &Setup<'_>, chosen: &[Kind], study: &Study) -> Result<(), Failure> {
-        let result = with_bar("faults", self.runs, |tick| {
-            campaign(setup, chosen, self.seed, self.runs, (study, "faults"), tick)
-        })?;
-        let control = self.control(setup, chosen, study)?;
-        let unguarded = self.unguarded(setup, chosen, study)?;
-        if study.is_shard() {
-            return Ok(());
-        }
-        self.print(setup.rig, &result, control.as_ref())?;
-        if let Some(unguarded) = &unguarded {
-            self.say_unguarded(unguarded)?;
-        }
-        self.verdict(&result, control.as_ref())
+        let work = |study: &Study| -> Result<_, Failure> {
+            let result = with_bar("faults", self.runs, |tick| {
+                campaign(&setup, &chosen, self.seed, self.runs, (study, "faults"), tick)
+            })?;
+            let control = self.control(&setup, &chosen, study)?;
+            Ok((result, control, self.unguarded(&setup, &chosen, study)?))
+        };
+        self.split.study("faults", &rig, &options, work, |(result, control, unguarded)| {
+            self.print(&rig, &result, control.as_ref())?;
+            if let Some(unguarded) = &unguarded {
+                self.say_unguarded(unguarded)?;
+            }
+            self.verdict(&result, control.as_ref())
+        })
     }
 
     /// The negative control: the same on the host, without thresholds and limits.

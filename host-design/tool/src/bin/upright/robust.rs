@@ -11,6 +11,7 @@ use upright_design::rig::{Rig, Tolerances};
 use upright_design::robust::{
     Choice, Front, JudgeSettings, Judgement, RobustError, choose, judge, rewritten,
 };
+use upright_design::study::Study;
 use upright_design::table::{Gains, TableValues, write_atomically};
 use upright_tool::figure::front_figure;
 
@@ -129,12 +130,14 @@ impl Robust {
             .map_err(|source| Failure::NoTable { rig: name(), source })?;
         let laws: Vec<Law> = table.laws.present().map(|(law, _)| law).collect();
         let options = json!({ "tolerances": tolerances, "settings": settings });
-        self.split.study("robust --as-it-is", rig, &options, |study| {
-            let judgements = with_spinner("judging", || {
+        let work = |study: &Study| -> Result<Vec<Judgement>, Failure> {
+            Ok(with_spinner("judging", || {
                 let of_law = |&law: &Law| judge(rig, &table, law, tolerances, settings, study);
-                laws.iter().map(of_law).collect::<Result<Vec<Judgement>, _>>()
-            })?;
-            if study.is_shard() { Ok(()) } else { self.print_judged(rig, tolerances, settings, &judgements) }
+                laws.iter().map(of_law).collect::<Result<_, _>>()
+            })?)
+        };
+        self.split.study("robust --as-it-is", rig, &options, work, |judgements| {
+            self.print_judged(rig, tolerances, settings, &judgements)
         })
     }
 

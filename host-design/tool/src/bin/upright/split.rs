@@ -25,14 +25,15 @@ impl Split {
         self.shard.is_some() || !self.merge.is_empty()
     }
 
-    /// Does `work` with the study that the options ask for. A shard prints what it has made, and `work` has to print nothing
-    /// then. `options` are those on which the outcomes depend.
-    pub(crate) fn study(
+    /// Does `work` with the study that the options ask for, then `print` with what it gives; a shard prints the outcomes of
+    /// its runs instead. `options` are those on which the outcomes depend.
+    pub(crate) fn study<T>(
         &self,
         command: &str,
         rig: &Rig,
         options: &Value,
-        work: impl FnOnce(&Study) -> Result<(), Failure>,
+        work: impl FnOnce(&Study) -> Result<T, Failure>,
+        print: impl FnOnce(T) -> Result<(), Failure>,
     ) -> Result<(), Failure> {
         let about = about(command, rig, options);
         let study = match self.shard {
@@ -40,7 +41,7 @@ impl Split {
             None if self.merge.is_empty() => Study::whole(),
             None => Study::merged(&self.merge, &about)?,
         };
-        work(&study)?;
-        Ok(study.write(&about, std::io::stdout().lock())?)
+        let made = work(&study)?;
+        if study.is_shard() { Ok(study.write(&about, std::io::stdout().lock())?) } else { print(made) }
     }
 }

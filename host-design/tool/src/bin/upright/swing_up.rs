@@ -164,10 +164,10 @@ impl SwingUp {
             // The motions decide the outcome, besides the rig file.
             let stored = Stored::beside(&self.rig).map_err(failed)?.to_json();
             let options = json!({ "runs": self.runs, "motions": stored });
-            return self.split.study("swing-up --table", &rig, &options, |study| {
-                let rows = with_spinner("random runs", || self.rows(&rig, study)).map_err(failed)?;
-                if study.is_shard() { Ok(()) } else { print_rows(&rig, &rows, self.json) }
-            });
+            let work = |study: &Study| with_spinner("random runs", || self.rows(&rig, study)).map_err(failed);
+            return self
+                .split
+                .study("swing-up --table", &rig, &options, work, |rows| print_rows(&rig, &rows, self.json));
         }
         if self.split.is_used() {
             return Err(Failure::BadArgument("--shard and --merge are for --table".to_owned()));

@@ -8,6 +8,7 @@ use serde_json::json;
 use upright::table::Law;
 use upright_design::rig::Rig;
 use upright_design::simulate::simulate;
+use upright_design::study::Study;
 use upright_design::table::{TableValues, write_atomically};
 use upright_design::verify::{
     Axis, Effort, Horizon, IMPERFECTIONS, ImperfectionSettings, Imperfections, TrustReport, attraction_map,
@@ -142,18 +143,23 @@ impl Verify {
         let options = json!({
             "gains": self.variation.changes(), "seed": self.seed, "runs": self.runs, "law": law, "late": self.late,
         });
-        self.split.study("verify", &rig, &options, |study| {
+        let work = |study: &Study| -> Result<_, Failure> {
             let effort = Effort { runs: self.runs as usize, seed: self.seed, late: self.late, study };
             let runs = table.laws.present().count() as u64 * u64::from(self.runs);
+            // A shard makes the random plants only.
             if study.is_shard() {
-                return with_random_plants(runs, |stage, done| {
+                with_random_plants(runs, |stage, done| {
                     stage("random plants");
                     random_plants(&rig, &table, &effort, done)
-                });
+                })?;
+                return Ok(None);
             }
             let report =
                 with_random_plants(runs, |stage, done| trust(&rig, &certified, &table, effort, stage, done));
-            self.print(&rig, &report?)
+            Ok(Some(report?))
+        };
+        self.split.study("verify", &rig, &options, work, |report| {
+            report.map_or(Ok(()), |report| self.print(&rig, &report))
         })
     }
 

@@ -12,7 +12,7 @@ use upright_board::Image;
 use upright_design::rig::Rig;
 use upright_design::simulate::{Scenario, Sensing};
 use upright_design::table::TableValues;
-use upright_design::verify::Disturbance;
+use upright_design::verify::at_rest_disturbed;
 use upright_tool::image::{self, Board, Kind};
 use upright_tool::in_the_loop::{self, Figures, Span};
 use upright_tool::project::checkout;
@@ -83,15 +83,7 @@ pub(super) fn measured(
     law: Law,
     duration_s: f64,
 ) -> Result<in_the_loop::Cycles, Failure> {
-    let disturbance = Disturbance::of(rig);
-    let scenario = Scenario {
-        sensing: Sensing::Encoders,
-        duration_s,
-        force_noise_n: disturbance.force_n,
-        torque_noise_n_m: disturbance.torque_n_m,
-        substeps: 2,
-        ..Scenario::at_rest(rig, law)
-    };
+    let scenario = Scenario { sensing: Sensing::Encoders, duration_s, ..at_rest_disturbed(rig, law, 1) };
     Ok(with_spinner("measuring its ticks", || {
         in_the_loop::measure(rig, table, &scenario, image, &board.conditions(1))
     })?)
