@@ -2,7 +2,7 @@
 //!
 //! A file is a header and frames; all numbers are little-endian. `docs/identify.md` describes it byte by byte.
 
-use std::io::{self, Read, Write};
+use std::io::{self, Read};
 use std::path::Path;
 
 use upright::table::checksum::crc32;
@@ -200,36 +200,6 @@ impl Log {
             from += count;
         }
         bytes
-    }
-
-    /// Writes every tick as CSV: its number and time, each channel's deviation from hanging in counts and in its unit,
-    /// the drive as duty or force, supply and contacts. `steps` are the travels per count (m, rad).
-    ///
-    /// # Errors
-    /// Those of `out`.
-    pub fn write_csv(&self, steps: &[f64], out: &mut dyn Write) -> io::Result<()> {
-        let mut head = vec!["tick".to_owned(), "time_s".to_owned(), "x_counts".to_owned()];
-        head.extend((1..self.channels()).map(|joint| format!("joint{joint}_counts")));
-        head.push("x_m".to_owned());
-        head.extend((1..self.channels()).map(|joint| format!("joint{joint}_rad")));
-        head.push(if self.header.drive == DriveScale::Duty { "duty" } else { "force_n" }.to_owned());
-        head.push("supply_v".to_owned());
-        head.extend(CONTACTS.map(|contact| contact.replace(' ', "_")));
-        writeln!(out, "{}", head.join(","))?;
-        let first = self.ticks.first().map_or(0, |tick| tick.number);
-        for (tick, counts) in self.ticks.iter().zip(self.deviations().chunks(self.channels())) {
-            let time_s = f64::from(tick.number - first) * f64::from(self.header.period_ns) * 1e-9;
-            write!(out, "{},{time_s:.6}", tick.number)?;
-            counts.iter().try_for_each(|count| write!(out, ",{count}"))?;
-            counts
-                .iter()
-                .zip(steps)
-                .try_for_each(|(&count, step)| write!(out, ",{:.7}", count as f64 * step))?;
-            write!(out, ",{:.6},{:.3}", self.drive(tick), f64::from(tick.supply_mv) * 1e-3)?;
-            (0..CONTACTS.len()).try_for_each(|bit| write!(out, ",{}", tick.contacts >> bit & 1))?;
-            writeln!(out)?;
-        }
-        Ok(())
     }
 
     /// What drove the cart in a tick: a duty, or a force (N).

@@ -7,6 +7,7 @@
 //!
 //! `docs/identify.md` has the experiment, the format of the file, what can be known, and the accuracy reached.
 
+mod convert;
 mod covariance;
 mod error;
 mod estimate;

@@ -1,6 +1,6 @@
 //! `upright identify`
 
-use std::io::Write as _;
+use std::io::Write;
 use std::path::{Path, PathBuf};
 
 use clap::Args;
@@ -24,7 +24,8 @@ Examples:
   upright identify rigs/quadruple-paper.toml run.log
   upright identify rigs/quadruple-paper.toml run.log --write new.toml
   upright identify rigs/quadruple-paper.toml run.log --json | jq .estimates
-  upright identify rigs/quadruple-paper.toml run.log --csv run.csv      only converts")]
+  upright identify rigs/quadruple-paper.toml run.log --csv run.csv      only converts
+  upright identify rigs/quadruple-paper.toml run.log --mcap run.mcap    for Foxglove and PlotJuggler")]
 pub(crate) struct Identify {
     /// Rig file that the firmware was designed for
     #[arg(value_name = "RIG")]
@@ -47,6 +48,9 @@ pub(crate) struct Identify {
     /// Only write the log as CSV, to a file, or to stdout with `-`
     #[arg(long, value_name = "FILE", conflicts_with_all = ["write", "json", "eccentricity", "weigh", "trust_wiring"])]
     csv: Option<PathBuf>,
+    /// Only write the log as MCAP, to a file, or to stdout with `-`
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["csv", "write", "json", "eccentricity", "weigh", "trust_wiring"])]
+    mcap: Option<PathBuf>,
     /// Print the result as one JSON object
     #[arg(long)]
     json: bool,
@@ -61,7 +65,10 @@ impl Identify {
         };
         let logs = self.logs.iter().map(read).collect::<Result<Vec<_>, _>>()?;
         if let Some(path) = &self.csv {
-            return write_csv(&rig, &logs, path);
+            return convert(&rig, &logs, path, |log, steps, out| log.write_csv(steps, out));
+        }
+        if let Some(path) = &self.mcap {
+            return convert(&rig, &logs, path, |log, steps, out| log.write_mcap(steps, out));
         }
         let settings = Settings {
             eccentricity: self.eccentricity,
@@ -101,9 +108,15 @@ impl Identify {
     }
 }
 
-fn write_csv(rig: &Rig, logs: &[(PathBuf, Log)], path: &Path) -> Result<(), Failure> {
+/// Writes one log in another format.
+fn convert(
+    rig: &Rig,
+    logs: &[(PathBuf, Log)],
+    path: &Path,
+    write: impl Fn(&Log, &[f64], &mut dyn Write) -> std::io::Result<()>,
+) -> Result<(), Failure> {
     let [(file, log)] = logs else {
-        return Err(Failure::BadArgument("--csv: converts one log; name one".to_owned()));
+        return Err(Failure::BadArgument("--csv and --mcap convert one log; name one".to_owned()));
     };
     let steps: Vec<f64> = rig.sensors().iter().map(|sensor| sensor.step()).collect();
     if steps.len() != log.channels() {
@@ -115,7 +128,7 @@ fn write_csv(rig: &Rig, logs: &[(PathBuf, Log)], path: &Path) -> Result<(), Fail
         )));
     }
     let mut bytes = Vec::new();
-    log.write_csv(&steps, &mut bytes)?;
+    write(log, &steps, &mut bytes)?;
     if path.as_os_str() == "-" {
         std::io::stdout().lock().write_all(&bytes)?;
     } else {
