@@ -82,6 +82,11 @@ pub enum IdentifyError {
         "{0} does not move in the log: it is blocked, or its encoder is not connected; nothing is identified"
     )]
     Still(String),
+    /// No channel moves.
+    #[error(
+        "nothing moves in the log; is the motor connected and its supply on, and were the links released?"
+    )]
+    NothingMoves,
     /// No machine has the numbers that were found.
     #[error("{0}")]
     Physical(String),

@@ -12,7 +12,7 @@ use super::realise::{Realised, realise};
 use super::record::Record;
 use super::shooting::{Shooting, WINDOW_S};
 use super::verdict::{ChannelFit, Refusal, channels, judge};
-use super::wiring::{self, WiringFound, channel_name};
+use super::wiring::{self, WiringFound};
 use crate::rig::Rig;
 
 /// Shortest log (s).
@@ -157,9 +157,7 @@ pub fn identify(
     let stride = Record::usual_stride(rig.tick.period_s);
     let record = Record::of(rig, &logs, stride);
     record.at_least(LEAST_S)?;
-    if let Some(channel) = record.still() {
-        return Err(IdentifyError::Still(channel_name(channel)));
-    }
+    record.moves()?;
     let model = record.model(chain.gravity_m_per_s2);
     let priors = priors(rig, chain, settings.eccentricity);
     let mut found = Identification {

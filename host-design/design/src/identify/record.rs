@@ -9,6 +9,7 @@ use super::error::IdentifyError;
 use super::log::{DriveScale, Log};
 use super::model::{Input, Model};
 use super::parameters::Layout;
+use super::wiring::channel_name;
 use crate::rig::{Motor, Rig};
 
 /// Longest time from one sample to the next (s), and longest integration step.
@@ -217,9 +218,16 @@ impl Record {
         .fold(0.0, f64::max)
     }
 
-    /// The channels that hardly move: less than ten counts.
-    pub(super) fn still(&self) -> Option<usize> {
-        (0..self.channels).find(|&channel| self.extent(channel)[1] < 10.0 * self.steps[channel])
+    /// # Errors
+    /// [`IdentifyError::NothingMoves`], or [`IdentifyError::Still`] for the first channel that moves by less than ten
+    /// counts.
+    pub(super) fn moves(&self) -> Result<(), IdentifyError> {
+        let is_still = |channel: usize| self.extent(channel)[1] < 10.0 * self.steps[channel];
+        match (0..self.channels).find(|&channel| is_still(channel)) {
+            Some(_) if (0..self.channels).all(is_still) => Err(IdentifyError::NothingMoves),
+            Some(channel) => Err(IdentifyError::Still(channel_name(channel))),
+            None => Ok(()),
+        }
     }
 
     /// # Errors

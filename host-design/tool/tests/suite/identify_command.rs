@@ -1,7 +1,9 @@
 //! `upright shake` and `upright identify`.
 
 use std::path::Path;
+use std::sync::OnceLock;
 
+use upright_design::identify::{Log, shake};
 use upright_design::rig::{PlantDescription, Rig};
 
 use crate::command::{SINGLE, path_of, status, stderr, stdout, upright};
@@ -50,32 +52,104 @@ fn a_shaken_machine_gives_a_rig_file() {
     let rows = std::fs::read_to_string(&table).unwrap();
     assert_eq!(rows.lines().count(), 5_001);
     assert!(rows.starts_with("tick,time_s,x_counts,joint1_counts,x_m,joint1_rad,duty,supply_v,"));
+    let output = upright(&["identify", &file, text(&log), "--mcap", text(&table)]);
+    assert_eq!(status(&output), 0, "{}", stderr(&output));
+    let bytes = std::fs::read(&table).unwrap();
+    assert!(bytes.starts_with(b"\x89MCAP0\r\n") && bytes.ends_with(b"\x89MCAP0\r\n"));
+}
+
+/// Identifies the bytes of `log`: the exit status is `wanted`, stderr says `words`, and no rig file is written.
+fn refused(rig: &str, log: &[u8], wanted: i32, words: &str) {
+    let folder = tempfile::tempdir().unwrap();
+    let [file, new] = ["run.log", "new.toml"].map(|name| folder.path().join(name));
+    std::fs::write(&file, log).unwrap();
+    let output = upright(&["identify", rig, text(&file), "--write", text(&new), "--trust-wiring"]);
+    assert_eq!(status(&output), wanted, "{}", stderr(&output));
+    assert!(stderr(&output).contains(words), "{}", stderr(&output));
+    assert!(stderr(&output).contains("run.log") || wanted == 3, "{}", stderr(&output));
+    assert!(!new.exists());
+}
+
+/// 6 s of the simulated rig, recorded once.
+fn shaken() -> &'static Log {
+    static LOG: OnceLock<Log> = OnceLock::new();
+    LOG.get_or_init(|| shake(&Rig::from_path(Path::new(&path_of(SINGLE))).unwrap(), 6.0, 1).unwrap())
+}
+
+/// The log with each row of counters changed.
+fn changed(change: impl Fn(&mut [u16])) -> Vec<u8> {
+    let mut log = Log::new(shaken().header.clone());
+    for (index, tick) in shaken().ticks().iter().enumerate() {
+        let mut counts = shaken().counts(index).to_vec();
+        change(&mut counts);
+        log.push(*tick, &counts);
+    }
+    log.to_bytes()
 }
 
 #[test]
-fn bad_logs_end_with_status_2_and_write_nothing() {
+fn a_log_that_is_not_there_ends_with_status_2() {
+    let output = upright(&["identify", &path_of(SINGLE), "nowhere.log"]);
+    assert_eq!(status(&output), 2);
+    assert!(stderr(&output).contains("nowhere.log: cannot be read"), "{}", stderr(&output));
+}
+
+#[test]
+fn an_empty_log_ends_with_status_2() {
+    refused(&path_of(SINGLE), b"", 2, "holds no tick");
+}
+
+#[test]
+fn a_foreign_file_ends_with_status_2() {
+    refused(&path_of(SINGLE), b"tick,time_s\n0,0\n", 2, "no log of Upright");
+}
+
+#[test]
+fn a_damaged_log_ends_with_status_2() {
+    let mut damaged = shaken().to_bytes();
+    let middle = damaged.len() / 2;
+    damaged[middle] ^= 1;
+    refused(&path_of(SINGLE), &damaged, 2, "is damaged");
+}
+
+#[test]
+fn a_truncated_log_ends_with_status_2() {
+    let whole = shaken().to_bytes();
+    refused(&path_of(SINGLE), &whole[..whole.len() - 7], 2, "ends in the middle");
+}
+
+#[test]
+fn a_log_of_another_rig_ends_with_status_2() {
+    let words = "name the rig file of this machine";
+    refused(&path_of("double-quanser-dbpen"), &shaken().to_bytes(), 2, words);
+}
+
+#[test]
+fn a_log_with_another_tick_ends_with_status_2() {
+    let mut log = shaken().clone();
+    log.header.period_ns = 1_000_000;
+    refused(&path_of(SINGLE), &log.to_bytes(), 2, "correct period_s in [tick]");
+}
+
+#[test]
+fn a_log_in_which_nothing_moves_ends_with_status_3() {
+    let hanging = shaken().header.hanging.clone();
+    refused(&path_of(SINGLE), &changed(|row| row.copy_from_slice(&hanging)), 3, "nothing moves in the log");
+}
+
+#[test]
+fn a_link_that_is_blocked_ends_with_status_3() {
+    let hanging = shaken().header.hanging[1];
+    refused(&path_of(SINGLE), &changed(|row| row[1] = hanging), 3, "joint 1 does not move in the log");
+}
+
+#[test]
+fn a_sound_log_is_written() {
     let folder = tempfile::tempdir().unwrap();
     let [log, new] = ["run.log", "new.toml"].map(|name| folder.path().join(name));
-    let file = path_of(SINGLE);
-    let refused = |rig: &str, wanted: &str| {
-        let output = upright(&["identify", rig, text(&log), "--write", text(&new)]);
-        assert_eq!(status(&output), 2, "{}", stderr(&output));
-        assert!(stderr(&output).contains(wanted), "{}", stderr(&output));
-        assert!(!new.exists());
-    };
-    refused(&file, "cannot be read");
-    std::fs::write(&log, b"").unwrap();
-    refused(&file, "holds no tick");
-    std::fs::write(&log, b"tick,time_s\n0,0\n").unwrap();
-    refused(&file, "no log of Upright");
-    let output = upright(&["shake", &file, "--log", text(&log), "--seconds", "5"]);
+    std::fs::write(&log, changed(|_| ())).unwrap();
+    let output =
+        upright(&["identify", &path_of(SINGLE), text(&log), "--write", text(&new), "--trust-wiring"]);
     assert_eq!(status(&output), 0, "{}", stderr(&output));
-    let whole = std::fs::read(&log).unwrap();
-    refused(&path_of("double-quanser-dbpen"), "name the rig file of this machine");
-    std::fs::write(&log, &whole[..whole.len() - 7]).unwrap();
-    refused(&file, "ends in the middle");
-    let mut damaged = whole.clone();
-    damaged[whole.len() / 2] ^= 1;
-    std::fs::write(&log, &damaged).unwrap();
-    refused(&file, "is damaged");
+    assert!(new.exists());
 }
