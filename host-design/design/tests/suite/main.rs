@@ -4,6 +4,7 @@ mod design_properties;
 mod identify;
 mod known_friction;
 // The paper's printed values are defined once, in the tool.
+mod log_fuzz;
 #[allow(dead_code, unreachable_pub)]
 #[path = "../../../tool/src/reproduce/published.rs"]
 mod paper_numbers;
