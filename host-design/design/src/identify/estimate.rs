@@ -11,7 +11,7 @@ use super::prediction::Filter;
 use super::realise::{Realised, realise};
 use super::record::Record;
 use super::shooting::{Shooting, WINDOW_S};
-use super::verdict::{ChannelFit, Refusal, channels, judge};
+use super::verdict::{ChannelFit, HeldOut, Predicted, Refusal, channels, judge};
 use super::wiring::{self, WiringFound};
 use crate::rig::Rig;
 
@@ -68,6 +68,8 @@ pub struct Identification {
     pub wiring: Option<WiringFound>,
     /// All parameters that are identified; none if the wiring is wrong.
     pub estimates: Vec<Estimate>,
+    /// Time from one sample to the next (s).
+    pub sample_s: f64,
     /// Correlations of the estimates, row by row.
     pub correlations: Vec<f64>,
     /// How well each channel is explained.
@@ -166,6 +168,7 @@ pub fn identify(
         largest_angle_rad: record.largest_angle(),
         wiring: None,
         estimates: Vec::new(),
+        sample_s: record.dt_s,
         correlations: Vec::new(),
         channels: Vec::new(),
         realised: None,
@@ -268,9 +271,9 @@ impl Fitted<'_> {
             false,
         ));
         let old = self.old_values(&start, &p);
-        let [old, new] = [&old, &p].map(|p| self.held_out(&model, p));
+        let held = self.held_out(&model, [&old, &p]);
         let ranges: Vec<f64> = (0..self.used.channels).map(|channel| self.used.extent(channel)[1]).collect();
-        found.channels = channels(&over.normalised, over.count, &old, &new, &ranges);
+        found.channels = channels(&over, held, &ranges);
         Ok(())
     }
 
@@ -294,9 +297,22 @@ impl Fitted<'_> {
         old
     }
 
-    /// Error (rms) of each channel over windows whose initial states are fitted.
-    fn held_out(&self, model: &super::model::Model, p: &[f64]) -> Vec<f64> {
+    /// Predictions over windows whose initial states are fitted, with the values of the old file and with the new ones.
+    fn held_out(&self, model: &super::model::Model, values: [&[f64]; 2]) -> HeldOut {
         let shooting = Shooting { model, record: self.held, priors: self.priors, free: false };
-        shooting.fit(p, HELD_OUT_WINDOW_S, ITERATIONS.0, ITERATIONS.1).rms
+        let fits = values.map(|p| shooting.fit(p, HELD_OUT_WINDOW_S, ITERATIONS.0, ITERATIONS.1));
+        let [by_file, by_found] = fits.each_ref().map(|fit| shooting.predictions(fit));
+        let (count, dt_s) = (self.held.channels, self.held.dt_s);
+        let of = |channel: usize| {
+            let both = by_file.iter().zip(&by_found).enumerate();
+            let one = both.map(|(index, ((piece, sample, by_file), (.., by_found)))| Predicted {
+                time_s: index as f64 * dt_s,
+                measured: self.held.pieces[*piece].y[sample * count + channel],
+                by_file: by_file[channel],
+                by_found: by_found[channel],
+            });
+            one.collect()
+        };
+        HeldOut { predictions: (0..count).map(of).collect(), rms: fits.map(|fit| fit.rms) }
     }
 }

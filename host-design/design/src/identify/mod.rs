@@ -30,7 +30,7 @@ pub use excite::{Excitation, shake};
 pub use log::{CONTACTS, DriveScale, Header, Log, Tick};
 pub use parameters::Kind;
 pub use realise::{Realised, RealisedLink};
-pub use verdict::{ChannelFit, Refusal};
+pub use verdict::{ChannelFit, Predicted, Refusal};
 pub use wiring::{Wiring, WiringFound};
 
 use crate::rig::{Chain, PlantDescription, Rig};

@@ -15,6 +15,8 @@ pub(super) struct Normal {
     pub(super) normalised: Vec<f64>,
     /// Number of residuals of each channel.
     pub(super) count: usize,
+    /// Residuals over their predicted deviations, one row of channels per sample; only of a filter without parameters.
+    pub(super) innovations: Vec<f64>,
 }
 
 impl Normal {
@@ -27,6 +29,7 @@ impl Normal {
             squares: vec![0.0; channels],
             normalised: vec![0.0; channels],
             count: 0,
+            innovations: Vec::new(),
         }
     }
 
@@ -52,6 +55,7 @@ impl Normal {
         sum(&mut self.normalised, &other.normalised);
         self.cost += other.cost;
         self.count += other.count;
+        self.innovations.extend(&other.innovations);
         self
     }
 

@@ -175,6 +175,9 @@ impl Filter<'_> {
                     normal.cost += error * error / predicted + libm::log(predicted);
                     normal.squares[channel] += error * error;
                     normal.normalised[channel] += error * error / predicted;
+                    if !free {
+                        normal.innovations.push(error / predicted.sqrt());
+                    }
                 }
             }
             normal.count += usize::from(sample >= settled);

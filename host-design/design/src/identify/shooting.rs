@@ -84,6 +84,24 @@ impl Shooting<'_> {
         fit
     }
 
+    /// What `fit` predicts in its windows: piece and sample, and the measurements of all channels there.
+    pub(super) fn predictions(&self, fit: &Fit) -> Vec<(usize, usize, Vec<f64>)> {
+        let (model, layout) = (self.model, self.model.layout);
+        let mut rows = Vec::new();
+        let mut step = Step::new(model, false);
+        for window in &fit.windows {
+            let inputs = self.record.inputs(layout, &fit.p, window.piece);
+            let mut state = window.state.clone();
+            for sample in window.first..window.first + window.samples {
+                let measure = |channel| model.measure(&fit.p, &state, channel).value;
+                rows.push((window.piece, sample, (0..self.record.channels).map(measure).collect()));
+                step.take(model, &fit.p, &state, &inputs[sample], self.record.dt_s);
+                state.copy_from_slice(&step.end);
+            }
+        }
+        rows
+    }
+
     /// Levenberg–Marquardt from `fit` on.
     fn descend(&self, fit: &mut Fit, weights: &[f64], iterations: usize) {
         let mut damping = 1e-3;

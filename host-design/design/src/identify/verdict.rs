@@ -1,6 +1,7 @@
 //! Whether an identification may be written.
 
 use super::error::IdentifyError;
+use super::normal::Normal;
 use super::wiring::{WiringFound, channel_name};
 
 /// Largest variance of the innovations, as a multiple of what the filter expects.
@@ -19,6 +20,23 @@ pub struct ChannelFit {
     pub held_out: [f64; 2],
     /// How far the channel moved from end to end (m, rad).
     pub range: f64,
+    /// What was held out and how it was predicted, sample by sample.
+    pub predictions: Vec<Predicted>,
+    /// Innovations over their expected deviations, every [`sample_s`](super::Identification::sample_s).
+    pub innovations: Vec<f64>,
+}
+
+/// A sample that was not used, predicted from the beginning of a window of 0.5 s.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Predicted {
+    /// Time from the first of these samples on (s).
+    pub time_s: f64,
+    /// What was measured (m, rad).
+    pub measured: f64,
+    /// What the old file predicts.
+    pub by_file: f64,
+    /// What the new numbers predict.
+    pub by_found: f64,
 }
 
 /// Why nothing is written.
@@ -73,22 +91,26 @@ pub(super) fn judge(channels: &[ChannelFit]) -> Result<(), Refusal> {
     Ok(())
 }
 
-/// The channels, with their names.
-pub(super) fn channels(
-    normalised: &[f64],
-    count: usize,
-    old: &[f64],
-    new: &[f64],
-    ranges: &[f64],
-) -> Vec<ChannelFit> {
-    (0..ranges.len())
-        .map(|channel| ChannelFit {
-            name: channel_name(channel),
-            innovation_variance: normalised[channel] / count.max(1) as f64,
-            held_out: [old[channel], new[channel]],
-            range: ranges[channel],
-        })
-        .collect()
+/// The predictions of a record that was held out: of the old file and of the new numbers.
+pub(super) struct HeldOut {
+    /// Error (rms) of each channel, with each.
+    pub(super) rms: [Vec<f64>; 2],
+    /// Of each channel.
+    pub(super) predictions: Vec<Vec<Predicted>>,
+}
+
+/// The channels, with their names; `over` are the innovations of the whole log, `ranges` how far each channel moved.
+pub(super) fn channels(over: &Normal, held: HeldOut, ranges: &[f64]) -> Vec<ChannelFit> {
+    let count = ranges.len();
+    let one = |(channel, predictions): (usize, Vec<Predicted>)| ChannelFit {
+        name: channel_name(channel),
+        innovation_variance: over.normalised[channel] / over.count.max(1) as f64,
+        held_out: [held.rms[0][channel], held.rms[1][channel]],
+        range: ranges[channel],
+        predictions,
+        innovations: over.innovations.iter().skip(channel).step_by(count).copied().collect(),
+    };
+    held.predictions.into_iter().enumerate().map(one).collect()
 }
 
 impl From<IdentifyError> for Refusal {

@@ -62,16 +62,23 @@ fn error_text(channel: usize, error: f64) -> String {
 }
 
 fn row(estimate: &Estimate) -> String {
+    let [name, file, found, deviation, change, unit, held] = row_texts(estimate);
+    let held = if held.is_empty() { held } else { format!(", {held}") };
+    format!("  {name:<32}{file:>13}{found:>13}{deviation:>12}{change:>9}  {unit}{held}")
+}
+
+/// Name, value of the file, value found, its deviation, change over deviation, unit, and whether it was held.
+pub(super) fn row_texts(estimate: &Estimate) -> [String; 7] {
     let (name, unit) = estimate.kind.name_and_unit();
-    let digits = |value: f64| significant(value, 5);
-    let change = (estimate.new - estimate.old) / estimate.deviation;
-    let held = if estimate.held_by_prior { ", held by what was assumed" } else { "" };
-    format!(
-        "  {name:<32}{:>13}{:>13}{:>12}{change:>9.1}  {unit}{held}",
-        digits(estimate.old),
-        digits(estimate.new),
-        significant(estimate.deviation, 2)
-    )
+    [
+        name,
+        significant(estimate.old, 5),
+        significant(estimate.new, 5),
+        significant(estimate.deviation, 2),
+        format!("{:.1}", (estimate.new - estimate.old) / estimate.deviation),
+        unit.to_owned(),
+        if estimate.held_by_prior { "held by what was assumed".to_owned() } else { String::new() },
+    ]
 }
 
 /// What a reader has to know besides the numbers.

@@ -20,7 +20,7 @@ pub use error::ReportError;
 use upright::table::Law;
 
 use self::page::Page;
-use self::plot::Plot;
+pub(crate) use self::plot::Plot;
 use crate::figure::{Figure, FigureError, pixels};
 use upright_design::design::Certified;
 use upright_design::rig::{PlantDescription, Rig};

@@ -4,23 +4,23 @@ use super::ReportError;
 use crate::figure::{Figure, PlotArea};
 
 /// A figure with its caption.
-pub(super) struct Plot {
-    pub(super) title: String,
-    pub(super) svg: String,
+pub(crate) struct Plot {
+    pub(crate) title: String,
+    pub(crate) svg: String,
     /// Of a figure over time: left, right, upper and lower end of each panel in its view box, for the script.
-    pub(super) areas: Option<String>,
+    pub(crate) areas: Option<String>,
     /// Of a figure over time: first and last time (s).
-    pub(super) times: String,
+    pub(crate) times: String,
 }
 
 impl Plot {
     /// With the title in the caption instead of the drawing.
-    pub(super) fn of(figure: &Figure, title: String) -> Result<Self, ReportError> {
+    pub(crate) fn of(figure: &Figure, title: String) -> Result<Self, ReportError> {
         Self::with_areas(figure, title, false)
     }
 
     /// As [`of`](Self::of), with what the script needs to show a time in it.
-    pub(super) fn over_time(figure: &Figure, title: String) -> Result<Self, ReportError> {
+    pub(crate) fn over_time(figure: &Figure, title: String) -> Result<Self, ReportError> {
         Self::with_areas(figure, title, true)
     }
 

@@ -18,15 +18,16 @@ fn text(path: &Path) -> &str {
 #[test]
 fn a_shaken_machine_gives_a_rig_file() {
     let folder = tempfile::tempdir().unwrap();
-    let [machine, log, new, table] =
-        ["machine.toml", "run.log", "new.toml", "run.csv"].map(|name| folder.path().join(name));
+    let [machine, log, new, table, page] =
+        ["machine.toml", "run.log", "new.toml", "run.csv", "run.html"].map(|name| folder.path().join(name));
     let file = path_of(SINGLE);
     let nominal = std::fs::read_to_string(&file).unwrap();
     std::fs::write(&machine, nominal.clone() + REALITY).unwrap();
-    let output = upright(&["shake", text(&machine), "--log", text(&log), "--seconds", "10"]);
+    let output = upright(&["shake", text(&machine), "--log", text(&log), "--seconds", "24"]);
     assert_eq!(status(&output), 0, "{}", stderr(&output));
 
-    let output = upright(&["identify", &file, text(&log), "--write", text(&new), "--json"]);
+    let output =
+        upright(&["identify", &file, text(&log), "--write", text(&new), "--report", text(&page), "--json"]);
     assert_eq!(status(&output), 0, "{}", stderr(&output));
     let found: serde_json::Value = serde_json::from_str(stdout(&output)).unwrap();
     assert_eq!(found["wiring"]["as_in_file"], true);
@@ -46,11 +47,14 @@ fn a_shaken_machine_gives_a_rig_file() {
     let ratio = length(&chain.links[0]) / length(&old.links[0]);
     assert!((ratio - 1.08).abs() < 2e-3, "{ratio}");
     assert!(std::fs::read_to_string(&new).unwrap().contains("# Quanser"), "comments stay");
+    let page = std::fs::read_to_string(&page).unwrap();
+    assert_eq!(page.matches("<svg").count(), 3, "fits, residuals, spectra");
+    assert!(page.contains("✓ The numbers fit.") && page.contains("second moment, link 1"));
 
     let output = upright(&["identify", &file, text(&log), "--csv", text(&table)]);
     assert_eq!(status(&output), 0, "{}", stderr(&output));
     let rows = std::fs::read_to_string(&table).unwrap();
-    assert_eq!(rows.lines().count(), 5_001);
+    assert_eq!(rows.lines().count(), 12_001);
     assert!(rows.starts_with("tick,time_s,x_counts,joint1_counts,x_m,joint1_rad,duty,supply_v,"));
     let output = upright(&["identify", &file, text(&log), "--mcap", text(&table)]);
     assert_eq!(status(&output), 0, "{}", stderr(&output));

@@ -7,7 +7,7 @@ use clap::Args;
 use upright_design::identify::{Identification, IdentifyError, Log, Settings, identify};
 use upright_design::rig::Rig;
 use upright_design::table::write_atomically;
-use upright_tool::identified::{json, rig_file, text};
+use upright_tool::identified::{json, page, rig_file, text};
 
 use crate::failure::Failure;
 use crate::progress::with_identification;
@@ -23,6 +23,7 @@ Examples:
   upright shake rigs/quadruple-paper.toml --log run.log      the log of a simulated machine
   upright identify rigs/quadruple-paper.toml run.log
   upright identify rigs/quadruple-paper.toml run.log --write new.toml
+  upright identify rigs/quadruple-paper.toml run.log --report run.html     fits, residuals, spectra, correlations
   upright identify rigs/quadruple-paper.toml run.log --json | jq .estimates
   upright identify rigs/quadruple-paper.toml run.log --csv run.csv      only converts
   upright identify rigs/quadruple-paper.toml run.log --mcap run.mcap    for Foxglove and PlotJuggler")]
@@ -45,11 +46,14 @@ pub(crate) struct Identify {
     /// Take the wiring as in the file
     #[arg(long)]
     trust_wiring: bool,
+    /// Write a page with the fits, residuals, spectra and correlations, also if the numbers do not fit
+    #[arg(long, value_name = "PAGE.html")]
+    report: Option<PathBuf>,
     /// Only write the log as CSV, to a file, or to stdout with `-`
-    #[arg(long, value_name = "FILE", conflicts_with_all = ["write", "json", "eccentricity", "weigh", "trust_wiring"])]
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["write", "report", "json", "eccentricity", "weigh", "trust_wiring"])]
     csv: Option<PathBuf>,
     /// Only write the log as MCAP, to a file, or to stdout with `-`
-    #[arg(long, value_name = "FILE", conflicts_with_all = ["csv", "write", "json", "eccentricity", "weigh", "trust_wiring"])]
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["csv", "write", "report", "json", "eccentricity", "weigh", "trust_wiring"])]
     mcap: Option<PathBuf>,
     /// Print the result as one JSON object
     #[arg(long)]
@@ -82,6 +86,11 @@ impl Identify {
         } else {
             write!(out, "{}", text(&rig.name, &found, &settings))?;
         }
+        if let Some(path) = &self.report {
+            let page = page(&rig.name, &found, &settings, &self.as_typed())?;
+            write_atomically(path, page.as_bytes())?;
+            eprintln!("{} written", path.display());
+        }
         if let Some(refusal) = &found.refusal {
             return Err(Failure::NotIdentified(format!("{}: {refusal}; nothing is written", rig.name)));
         }
@@ -89,6 +98,22 @@ impl Identify {
             Some(path) => self.write_rig(path, &rig, &found),
             None => Ok(()),
         }
+    }
+
+    /// The command that makes the same page.
+    fn as_typed(&self) -> String {
+        let logs: Vec<String> = self.logs.iter().map(|log| log.display().to_string()).collect();
+        let mut typed = format!("upright identify {} {}", self.rig.display(), logs.join(" "));
+        if self.eccentricity {
+            typed.push_str(" --eccentricity");
+        }
+        if let Some(weighed) = self.weigh {
+            typed.push_str(&format!(" --weigh {weighed}"));
+        }
+        if self.trust_wiring {
+            typed.push_str(" --trust-wiring");
+        }
+        typed
     }
 
     fn write_rig(&self, path: &Path, rig: &Rig, found: &Identification) -> Result<(), Failure> {
