@@ -30,6 +30,8 @@ pub struct Setup<'a> {
     pub detection: bool,
     /// Whether a board has its guards: watchdog, break input, MPU, registers that are read back.
     pub guards: bool,
+    /// Whether the defects begin in a bench drive.
+    pub bench_drive: bool,
 }
 
 /// Longest time from a defect to its verdict (s).
@@ -47,7 +49,12 @@ pub(super) fn attempt(setup: &Setup<'_>, trial: &Trial, with_defect: bool) -> Re
     let table = if setup.detection {
         setup.table
     } else {
-        without_detection = setup.table.clone().without_detection();
+        let mut blind = setup.table.clone().without_detection();
+        if setup.bench_drive {
+            // What it takes to tell the motor's sign.
+            blind.limits.sign_counts[0] = 0;
+        }
+        without_detection = blind;
         &without_detection
     };
     let mut attempt = Attempt { rig: setup.rig, table: setup.table, trial, with_defect, board: None };
@@ -64,18 +71,18 @@ pub(super) fn attempt(setup: &Setup<'_>, trial: &Trial, with_defect: bool) -> Re
 }
 
 /// The way to a board's own defects.
-struct OnBoard<'a> {
+pub(super) struct OnBoard<'a> {
     image: &'a upright_board::Image,
     receive: upright_board::Pin,
     events: Events,
 }
 
-struct Attempt<'a> {
-    rig: &'a Rig,
-    table: &'a TableValues,
-    trial: &'a Trial,
-    with_defect: bool,
-    board: Option<OnBoard<'a>>,
+pub(super) struct Attempt<'a> {
+    pub(super) rig: &'a Rig,
+    pub(super) table: &'a TableValues,
+    pub(super) trial: &'a Trial,
+    pub(super) with_defect: bool,
+    pub(super) board: Option<OnBoard<'a>>,
 }
 
 impl Attempt<'_> {
@@ -85,6 +92,7 @@ impl Attempt<'_> {
         }
         let mut harness = Harness::new(self.rig, self.table, &self.trial.scenario, target)?;
         match self.trial.kind {
+            _ if self.trial.phase == Phase::Driving => self.drive(&mut harness),
             Kind::ArmUnhomed | Kind::ArmHanging | Kind::ArmStopped | Kind::ArmHeld => self.arm(&mut harness),
             _ => self.balance(&mut harness),
         }
@@ -155,7 +163,7 @@ impl Attempt<'_> {
     }
 
     /// Why a board that has started again has done so.
-    fn reason(&self, harness: &mut Harness<'_>) -> Option<Fault> {
+    pub(super) fn reason(&self, harness: &mut Harness<'_>) -> Option<Fault> {
         let inputs = harness.inputs();
         match harness.session.ask(Request::Info, &inputs) {
             Ok(Answer::Info(info)) => info.reset.fault(),
@@ -164,7 +172,7 @@ impl Attempt<'_> {
     }
 
     /// One tick of the firmware, `since` ticks after the onset; sets `is_visible` if its inputs differ visibly.
-    fn control(
+    pub(super) fn control(
         &self,
         harness: &mut Harness<'_>,
         injection: &mut Injection<'_>,
@@ -172,6 +180,9 @@ impl Attempt<'_> {
         is_visible: &mut bool,
     ) -> Result<Output, HarnessError> {
         let mut inputs = harness.inputs();
+        if self.trial.phase == Phase::Driving {
+            self.press_limit_switches(harness.bench.state(), &mut inputs);
+        }
         if let Some(since) = since {
             *is_visible |= injection.inputs(since, &mut inputs);
         }
@@ -196,28 +207,33 @@ impl Attempt<'_> {
         // A motor that goes off when the rig hangs proves nothing.
         let may_wait = trial.phase != Phase::Lowering;
         let is_undecided =
-            may_wait && matches!(trial.kind.expected(), Expected::Off(_)) && observed.is_undecided();
+            may_wait && matches!(trial.expected(), Expected::Off(_)) && observed.is_undecided();
         let last =
             trial.onset + if is_undecided { self.ticks(LONGEST_S).max(trial.watched) } else { trial.watched };
         // A board that starts again tells the reason as soon as it runs.
         let starts = self.board.is_some() && observed.fault.is_none();
-        let after = if starts { self.ticks(LONGEST_START_S) } else { TICKS_AFTER };
         match observed.off {
-            Some(off) => tick > off + after || (!starts && tick >= last),
+            Some(off) => tick > off + self.ticks_after(starts) || (!starts && tick >= last),
             None => tick >= last,
         }
     }
 
-    fn ticks(&self, seconds: f64) -> usize {
+    /// Ticks watched after the motor went off, on a board that may have to start again first (`starts`).
+    pub(super) fn ticks_after(&self, starts: bool) -> usize {
+        if starts { self.ticks(LONGEST_START_S) } else { TICKS_AFTER }
+    }
+
+    pub(super) fn ticks(&self, seconds: f64) -> usize {
         (seconds / self.rig.tick.period_s).max(1.0) as usize
     }
 
     /// Whether a link is far beyond its limit in `tick`: from the vertical, or in a motion from its planned angle; or
     /// the cart is off its rail. The rig is lowered from the tick `lowered_from` on.
     fn is_outside(&self, tick: usize, lowered_from: Option<usize>, state: &[f64]) -> bool {
-        let PlantDescription::Chain(chain) = &self.rig.plant else { return false };
-        let [low, high] = chain.cart.travel_m;
-        if !(low..=high).contains(&state[0]) {
+        if !matches!(self.rig.plant, PlantDescription::Chain(_)) {
+            return false;
+        }
+        if self.is_off_rail(state) {
             return true;
         }
         if let Some(planned) = self.planned(tick, lowered_from) {
@@ -229,6 +245,13 @@ impl Attempt<'_> {
         let angle =
             f64::from(self.rig.limits.angle_rad.unwrap_or(f64::from(self.table.limits.angle_rad)) as f32);
         absolute_angles(state).any(|lean| lean.abs() > angle * (1.0 + BEYOND))
+    }
+
+    /// Whether the cart is off its rail.
+    pub(super) fn is_off_rail(&self, state: &[f64]) -> bool {
+        let PlantDescription::Chain(chain) = &self.rig.plant else { return false };
+        let [low, high] = chain.cart.travel_m;
+        !(low..=high).contains(&state[0])
     }
 
     /// Planned angles of the links from the vertical in `tick` of a run with a motion (rad).
@@ -280,18 +303,23 @@ impl Attempt<'_> {
         Ok(observed)
     }
 
+    /// Until the links hang, homed and checked.
+    pub(super) fn until_checked(&self, harness: &mut Harness<'_>) -> Result<(), HarnessError> {
+        for tick in 0.. {
+            harness.by_hand(tick)?;
+            if harness.session.status().signs == Signs::Checked {
+                break;
+            }
+        }
+        Ok(())
+    }
+
     /// The kinds in which arming has to be refused.
     fn arm(&self, harness: &mut Harness<'_>) -> Result<Observed, HarnessError> {
         let mut observed = Observed::default();
         let mut stopped = false;
         if self.trial.kind != Kind::ArmUnhomed {
-            // Until the links hang, homed and checked.
-            for tick in 0.. {
-                harness.by_hand(tick)?;
-                if harness.session.status().signs == Signs::Checked {
-                    break;
-                }
-            }
+            self.until_checked(harness)?;
         }
         if matches!(self.trial.kind, Kind::ArmStopped | Kind::ArmHeld) {
             let mut inputs = harness.inputs();

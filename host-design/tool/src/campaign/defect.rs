@@ -1,6 +1,7 @@
 //! The kinds of defects, and the outcome that each must have.
 
 use upright::protocol::simulated_pins::Sabotage;
+use upright::supervision::bench_drive::MotorSign;
 use upright::supervision::fault::Fault;
 use upright::supervision::inhibits::Inhibits;
 
@@ -86,6 +87,10 @@ pub enum Expected {
     Refused(Inhibits),
     /// The motor is off in the same tick, and the firmware does not run on.
     Dead,
+    /// A bench drive ends without a fault, so long after the last command as after a key that was let go.
+    LetGo,
+    /// A bench drive ends with this finding about the motor, which keeps it from arming.
+    Found(MotorSign),
 }
 
 /// A number of ticks.

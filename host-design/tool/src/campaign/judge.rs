@@ -1,7 +1,9 @@
 //! The verdict on a trial: its outcome compared with the one that its kind must have.
 
 use serde::{Deserialize, Serialize};
+use upright::supervision::bench_drive::{MotorSign, SILENCE_S};
 use upright::supervision::fault::Fault;
+use upright::supervision::inhibits::Inhibits;
 
 use super::attempt::{Setup, attempt};
 use super::defect::{Expected, Kind, Ticks};
@@ -61,7 +63,7 @@ pub(super) fn judge(setup: &Setup<'_>, trial: &Trial) -> Result<Outcome, RunErro
         None => (from(trial.onset), observed.off.map(|_| 1)),
     };
     let on_board = matches!(setup.place, Place::Board { .. });
-    let expected = trial.kind.expected();
+    let expected = trial.expected();
     let ticks = if let Expected::Fault(..) | Expected::Dead = expected { from_onset } else { ticks };
     let class = match expected {
         _ if before => Class::FalseAlarm,
@@ -93,6 +95,18 @@ pub(super) fn judge(setup: &Setup<'_>, trial: &Trial) -> Result<Outcome, RunErro
             Some(refused) if refused.contains(reasons) => Class::Rejected,
             _ => Class::Missed,
         },
+        Expected::LetGo if observed.fault.is_some() => Class::FalseAlarm,
+        Expected::LetGo => match from_onset {
+            Some(ticks) if ticks <= silence_ticks(setup.table) => Class::Detected,
+            _ => Class::Missed,
+        },
+        Expected::Found(_) if observed.outside || observed.off.is_none() => Class::Missed,
+        Expected::Found(sign) => match observed.refused {
+            Some(refused) if refused.contains(Inhibits::MOTOR) && has_found(&observed, sign) => {
+                Class::Detected
+            }
+            _ => Class::Missed,
+        },
         Expected::Dead if observed.dead && ticks == Some(1) => Class::Detected,
         Expected::Dead => Class::Missed,
     };
@@ -120,6 +134,19 @@ fn of_fault(
         }
         _ => Class::Missed,
     }
+}
+
+/// Whether a bench drive has shown this of the motor, or was ended by a limit switch before it could show that nothing
+/// moves.
+fn has_found(observed: &Observed, sign: MotorSign) -> bool {
+    let is_at_the_end = sign == MotorSign::Still && observed.fault == Some(Fault::LimitSwitch);
+    observed.motor == Some(sign) || is_at_the_end
+}
+
+/// Ticks from a host's last command to the end of a bench drive: bytes take a tick to the link and one to the control
+/// task, and on a board some more.
+pub(super) fn silence_ticks(table: &TableValues) -> u32 {
+    (SILENCE_S / table.tick_s) as u32 + 5
 }
 
 /// The number of ticks for this table.

@@ -6,6 +6,7 @@
 mod attempt;
 mod by_hand;
 mod defect;
+mod drive;
 mod injection;
 mod judge;
 mod observed;

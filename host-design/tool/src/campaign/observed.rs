@@ -1,6 +1,7 @@
 //! What is observed in a trial.
 
 use upright::board::Output;
+use upright::supervision::bench_drive::MotorSign;
 use upright::supervision::fault::Fault;
 use upright::supervision::inhibits::Inhibits;
 
@@ -21,6 +22,8 @@ pub(super) struct Observed {
     pub(super) fault: Option<Fault>,
     /// Measurements that were rejected.
     pub(super) rejected: u32,
+    /// What the bench drive has shown of the motor.
+    pub(super) motor: Option<MotorSign>,
     /// Reasons against arming.
     pub(super) refused: Option<Inhibits>,
     /// Whether the firmware has stopped running.

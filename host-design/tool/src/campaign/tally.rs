@@ -5,7 +5,7 @@ use upright::supervision::fault::Fault;
 
 use super::attempt::Setup;
 use super::defect::{Expected, Kind};
-use super::judge::{Class, Outcome, allowed, judge};
+use super::judge::{Class, Outcome, allowed, judge, silence_ticks};
 use super::trial::Trial;
 use crate::in_the_loop::{Place, RunError};
 use upright_design::study::{Study, StudyError};
@@ -102,7 +102,10 @@ pub fn kinds(table: &TableValues, place: Place<'_>) -> Vec<Kind> {
 /// # Errors
 /// [`CampaignError`] if it cannot be run.
 pub fn one(setup: &Setup<'_>, kinds: &[Kind], seed: u64, number: u64) -> Result<Outcome, CampaignError> {
-    let trial = Trial::draw(setup.rig, setup.table, kinds, seed, number);
+    let mut trial = Trial::draw(setup.rig, setup.table, kinds, seed, number);
+    if setup.bench_drive {
+        trial = trial.in_bench_drive(setup.rig);
+    }
     judge(setup, &trial).map_err(|source| CampaignError::Trial { number, kind: trial.kind.name(), source })
 }
 
@@ -124,12 +127,13 @@ pub fn campaign(
         outcome
     };
     let outcomes: Vec<Outcome> = study.outcomes(part, runs, of_number)?;
-    let rows = kinds.iter().map(|&kind| Row::of(kind, setup.table, &outcomes)).collect();
+    let rows = kinds.iter().map(|&kind| Row::of(kind, setup, &outcomes)).collect();
     Ok(Campaign { seed, runs, rows })
 }
 
 impl Row {
-    fn of(kind: Kind, table: &TableValues, outcomes: &[Outcome]) -> Self {
+    fn of(kind: Kind, setup: &Setup<'_>, outcomes: &[Outcome]) -> Self {
+        let expected = kind.while_driving().filter(|_| setup.bench_drive).unwrap_or_else(|| kind.expected());
         let of_kind = || outcomes.iter().filter(move |outcome| outcome.kind == kind);
         let count = |class: Class| of_kind().filter(|outcome| outcome.class == class).count();
         let is_wrong = |class: Class| matches!(class, Class::Missed | Class::FalseAlarm);
@@ -141,8 +145,9 @@ impl Row {
         Self {
             kind,
             meaning: kind.meaning(),
-            allowed: match kind.expected() {
-                Expected::Fault(_, within) => Some(allowed(table, within)),
+            allowed: match expected {
+                Expected::Fault(_, within) => Some(allowed(setup.table, within)),
+                Expected::LetGo => Some(silence_ticks(setup.table)),
                 Expected::Off(ticks) => Some(ticks),
                 Expected::Dead => Some(1),
                 _ => None,

@@ -45,6 +45,8 @@ pub enum Phase {
     Raising,
     /// It is lowered by the motor.
     Lowering,
+    /// Its links hang, and the motor pushes the cart while a key is held.
+    Driving,
 }
 
 /// Ticks in which a command has taken effect.

@@ -3,11 +3,13 @@
 
 use std::path::Path;
 
+use upright_board::{Conditions, Image};
 use upright_design::design::design;
 use upright_design::rig::Rig;
 use upright_design::study::Study;
 use upright_design::table::{Gains, TableValues};
 use upright_tool::campaign::{Campaign, Kind, Setup, Trial, campaign, kinds, one};
+use upright_tool::image::{self, Board, build_if_possible};
 use upright_tool::in_the_loop::Place;
 
 fn rig(name: &str) -> (Rig, TableValues) {
@@ -18,7 +20,7 @@ fn rig(name: &str) -> (Rig, TableValues) {
 }
 
 fn on_host<'a>(rig: &'a Rig, table: &'a TableValues) -> Setup<'a> {
-    Setup { rig, table, place: Place::Host, detection: true, guards: true }
+    Setup { rig, table, place: Place::Host, detection: true, guards: true, bench_drive: false }
 }
 
 fn run(setup: &Setup<'_>, kinds: &[Kind], runs: u64) -> Campaign {
@@ -46,6 +48,50 @@ fn without_detection_every_defect_that_needs_it_is_missed() {
     let result = run(&blind, &kinds, 4 * kinds.len() as u64);
     for row in &result.rows {
         assert!(row.missed > 0, "{row:?}");
+    }
+}
+
+/// The kinds that prove something in a bench drive.
+fn while_driving(table: &TableValues, place: Place<'_>) -> Vec<Kind> {
+    kinds(table, place).into_iter().filter(|kind| kind.while_driving().is_some()).collect()
+}
+
+#[test]
+fn every_defect_of_a_bench_drive_is_found_and_nothing_else() {
+    for name in ["quadruple-paper.toml", "single-quanser-ip02.toml"] {
+        let (rig, table) = rig(name);
+        let kinds = while_driving(&table, Place::Host);
+        let setup = Setup { bench_drive: true, ..on_host(&rig, &table) };
+        let result = run(&setup, &kinds, 3 * kinds.len() as u64);
+        for row in &result.rows {
+            assert!(row.wrong.is_empty() && row.runs == 3, "{name}: {row:?}");
+        }
+        // Negative control: a firmware that does not check the motor's sign misses what is wrong with it.
+        let found: Vec<Kind> = kinds.into_iter().filter(|kind| kind.needs_detection()).collect();
+        assert!(found.len() >= 4, "{found:?}");
+        let blind = Setup { detection: false, ..setup };
+        for row in run(&blind, &found, 2 * found.len() as u64).rows {
+            assert_eq!(row.missed, 2, "{name}: {row:?}");
+        }
+    }
+}
+
+#[test]
+fn on_the_virtual_board_a_bench_drive_ends_with_its_defects_and_does_not_without_the_guards() {
+    let (rig, table) = rig("quadruple-paper.toml");
+    let Some(elf) = build_if_possible(image::Kind::Board(Board::WeactF405)).unwrap() else { return };
+    let image = Image::from_elf(&std::fs::read(elf).unwrap()).unwrap();
+    let place = Place::Board { image: &image, conditions: Conditions::f405(1) };
+    let setup = Setup { place, bench_drive: true, ..on_host(&rig, &table) };
+    let kinds = while_driving(&table, place);
+    for row in run(&setup, &kinds, kinds.len() as u64).rows {
+        assert!(row.wrong.is_empty() && row.runs == 1, "{row:?}");
+    }
+    let guarded: Vec<Kind> = kinds.into_iter().filter(|kind| kind.needs_guard()).collect();
+    assert!(guarded.len() >= 4, "{guarded:?}");
+    let unguarded = Setup { guards: false, ..setup };
+    for row in run(&unguarded, &guarded, guarded.len() as u64).rows {
+        assert_eq!(row.missed, 1, "{row:?}");
     }
 }
 

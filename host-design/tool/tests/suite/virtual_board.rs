@@ -166,7 +166,7 @@ fn the_feather_balances_a_link_with_the_bits_of_the_host_and_refuses_another_chi
 fn a_supply_that_a_braking_motor_pumps_up_turns_the_motor_off_and_a_spike_does_not() {
     let Some((rig, table, image)) = feather() else { return };
     let place = Place::Board { image: &image, conditions: Board::FeatherF405.conditions(1) };
-    let setup = Setup { rig: &rig, table: &table, place, detection: true, guards: true };
+    let setup = Setup { rig: &rig, table: &table, place, detection: true, guards: true, bench_drive: false };
     let surge = one(&setup, &[Defect::SupplySurge], 1, 0).unwrap();
     assert_eq!((surge.class, surge.fault), (Class::Detected, Some(Fault::Supply.code())), "{surge:?}");
     // The negative control: one or two ticks of it.

@@ -29,6 +29,7 @@ Examples:
   upright faults rigs/quadruple-paper.toml --target qemu --runs 300
   upright faults rigs/quadruple-paper.toml --target board --runs 300
   upright faults rigs/quadruple-paper.toml --swing-up                while it is raised and lowered
+  upright faults rigs/quadruple-paper.toml --bench-drive             while the motor pushes the cart a little
   upright faults rigs/quadruple-paper.toml --only 1234               one run again, bit for bit
   upright faults rigs/quadruple-paper.toml --shard 2/3 > 2.jsonl     the second third of the runs
   upright faults rigs/quadruple-paper.toml --merge 1.jsonl 2.jsonl 3.jsonl
@@ -39,6 +40,9 @@ pub(crate) struct Faults {
     /// Begin the defects while the rig is raised and lowered by the stored motions
     #[arg(long)]
     swing_up: bool,
+    /// Begin the defects while the motor pushes the cart a little, with the links hanging
+    #[arg(long, conflicts_with = "swing_up")]
+    bench_drive: bool,
     /// Where the firmware runs
     #[arg(long, value_enum, default_value_t = Target::Host)]
     target: Target,
@@ -83,7 +87,8 @@ impl Faults {
         }
         let built = self.target.built(Link::Files, &rig, &table)?;
         let place = built.place(self.seed);
-        let possible = kinds(&table, place);
+        let mut possible = kinds(&table, place);
+        possible.retain(|kind| !self.bench_drive || kind.while_driving().is_some());
         let chosen: Vec<Kind> = match self.kind {
             Some(kind) if possible.contains(&kind) => vec![kind],
             Some(kind) => {
@@ -94,13 +99,14 @@ impl Faults {
             }
             None => possible,
         };
-        let setup = Setup { rig: &rig, table: &table, place, detection: true, guards: true };
+        let bench_drive = self.bench_drive;
+        let setup = Setup { rig: &rig, table: &table, place, detection: true, guards: true, bench_drive };
         if let Some(number) = self.only {
             return self.replay(&setup, &chosen, number);
         }
         let options = json!({
-            "gains": self.variation.changes(), "swing_up": self.swing_up, "target": self.target.name(),
-            "seed": self.seed, "runs": self.runs, "kind": self.kind,
+            "gains": self.variation.changes(), "swing_up": self.swing_up, "bench_drive": self.bench_drive,
+            "target": self.target.name(), "seed": self.seed, "runs": self.runs, "kind": self.kind,
         });
         let work = |study: &Study| -> Result<_, Failure> {
             let result = with_bar("faults", self.runs, |tick| {
@@ -257,9 +263,13 @@ impl Faults {
         };
         // A campaign of one kind numbers its runs differently.
         let kind = self.kind.map_or(String::new(), |kind| format!(" --kind {}", kind.name()));
-        let swing_up = if self.swing_up { " --swing-up" } else { "" };
+        let phase = match (self.swing_up, self.bench_drive) {
+            (true, _) => " --swing-up",
+            (_, true) => " --bench-drive",
+            _ => "",
+        };
         Err(Failure::CheckFailed(format!(
-            "{wrong} of {} runs have a wrong outcome; to repeat the first of `{}`: upright faults {} --seed {}{target}{kind}{swing_up} --only {number}",
+            "{wrong} of {} runs have a wrong outcome; to repeat the first of `{}`: upright faults {} --seed {}{target}{kind}{phase} --only {number}",
             result.runs,
             row.kind.name(),
             self.variation.as_typed(),

@@ -1,0 +1,197 @@
+//! Defects in a bench drive: which prove something there, and what has to come of them.
+
+use upright::protocol::message::{Answer, Request};
+use upright::supervision::bench_drive::{LONGEST_S, MotorSign};
+use upright::supervision::fault::Fault;
+use upright::supervision::inhibits::Inhibits;
+use upright_design::harness::{Harness, HarnessError, Pins};
+use upright_design::rig::{PlantDescription, Rig};
+use upright_design::simulate::{Scenario, Sensing};
+
+use super::attempt::Attempt;
+use super::defect::{Expected, Kind};
+use super::injection::Injection;
+use super::observed::Observed;
+use super::trial::{Phase, Trial};
+
+/// Time between two commands of the key that is held (s).
+const KEY_S: f64 = 0.025;
+/// Longest time from the key to the motor (s).
+const BEGIN_S: f64 = 0.5;
+/// The limit switches are so far before the ends of the rail (m).
+const SWITCH_M: f64 = 0.01;
+/// Time for which a drive is watched from the onset on (s).
+const WATCHED_S: f64 = 0.4;
+
+impl Kind {
+    /// The outcome that it must have in a bench drive; none if it proves nothing there.
+    pub fn while_driving(self) -> Option<Expected> {
+        match self {
+            Kind::HostSilent | Kind::HostWireOpen => Some(Expected::LetGo),
+            Kind::MotorDead | Kind::CartEncoderFrozen | Kind::EncoderWireOpen => {
+                Some(Expected::Found(MotorSign::Still))
+            }
+            Kind::MotorReversed | Kind::EncoderReversed => Some(Expected::Found(MotorSign::Reversed)),
+            Kind::SupplyNotANumber
+            | Kind::SupplySag
+            | Kind::SupplyDip
+            | Kind::SupplySurge
+            | Kind::SupplySpike
+            | Kind::EmergencyStop
+            | Kind::DriverFault
+            | Kind::LimitSwitch
+            | Kind::OneOverrun
+            | Kind::Overruns
+            | Kind::FrameDamaged
+            | Kind::FrameTruncated
+            | Kind::FrameReplayed
+            | Kind::Rubbish
+            | Kind::Panic
+            | Kind::HardFault
+            | Kind::StackOverflow
+            | Kind::StalledTick
+            | Kind::LockUp
+            | Kind::CrystalStops
+            | Kind::BrownOut
+            | Kind::StopBetweenTicks => Some(self.expected()),
+            _ => None,
+        }
+    }
+}
+
+impl Trial {
+    /// The same defect in a bench drive. Ticks count from the first one with the motor on.
+    pub(super) fn in_bench_drive(self, rig: &Rig) -> Self {
+        let ticks = |seconds: f64| (seconds / rig.tick.period_s) as usize;
+        let is_there_before = matches!(self.kind.while_driving(), Some(Expected::Found(_)));
+        let (onset, watched) = match is_there_before {
+            true => (0, ticks(f64::from(LONGEST_S)) + 2),
+            // In a drive with the cart held, which lasts for 1 s.
+            false => (self.onset / 2, ticks(WATCHED_S)),
+        };
+        let scenario = Scenario {
+            sensing: Sensing::Encoders,
+            seed: self.scenario.seed,
+            substeps: self.scenario.substeps,
+            counter_start: self.scenario.counter_start,
+            ..Scenario::at_rest(rig, self.scenario.law)
+        };
+        Self { phase: Phase::Driving, scenario, onset, watched, sensor: 0, ..self }
+    }
+
+    /// The outcome that it must have.
+    pub(super) fn expected(&self) -> Expected {
+        match (self.phase, self.kind.while_driving()) {
+            (Phase::Driving, Some(expected)) => expected,
+            _ => self.kind.expected(),
+        }
+    }
+}
+
+impl Attempt<'_> {
+    /// A bench drive: a person holds the key, and goes on doing so.
+    pub(super) fn drive(&self, harness: &mut Harness<'_>) -> Result<Observed, HarnessError> {
+        let trial = self.trial;
+        let is_there_before = matches!(trial.expected(), Expected::Found(_));
+        let mut held = harness.bench.state().to_vec();
+        self.until_checked(harness)?;
+        // The links hang again, wherever the cart is.
+        held[0] = harness.bench.state()[0];
+        for _ in 0..self.ticks(self.rig.limits.arm_time_s) {
+            harness.bench.hold(&held);
+            let inputs = harness.inputs();
+            harness.session.tick(&inputs)?;
+        }
+        let mut observed = Observed::default();
+        let mut injection = Injection::new(self.rig, self.table, trial.clone());
+        // Since the motor came on.
+        let mut tick: Option<usize> = None;
+        for turn in 0.. {
+            let since = match tick {
+                _ if !self.with_defect => None,
+                _ if is_there_before => Some(turn),
+                Some(tick) => (tick + 1).checked_sub(trial.onset),
+                None => None,
+            };
+            if turn % self.ticks(KEY_S) == 0 && injection.host_is_alive(since) {
+                harness.session.send(Request::Drive { along: trial.sign > 0.0 });
+            }
+            let output = match self.control(harness, &mut injection, since, &mut false) {
+                Err(HarnessError::Stopped { .. }) if observed.off.is_some() => {
+                    observed.dead = true;
+                    return Ok(observed);
+                }
+                output => output?,
+            };
+            if since == Some(0) {
+                injection.serial(&mut harness.session);
+            }
+            tick = match tick {
+                Some(tick) => Some(tick + 1),
+                None => output.enable.then_some(0),
+            };
+            let mut acting = output;
+            if since.is_some() {
+                injection.output(&mut acting);
+            }
+            if is_there_before && output.enable {
+                harness.bench.tick(acting.drive);
+                held[0] = harness.bench.state()[0];
+            } else {
+                harness.bench.hold(&held);
+            }
+            let Some(tick) = tick else {
+                if turn > self.ticks(BEGIN_S) {
+                    return Err(HarnessError::NotBalancing(harness.session.status().state));
+                }
+                continue;
+            };
+            observed.output(tick, output);
+            observed.outside |= observed.off.is_none() && self.is_off_rail(harness.bench.state());
+            if observed.off.is_some() {
+                observed.fault = harness.session.fault();
+            }
+            if self.drive_is_over(tick, &observed) {
+                break;
+            }
+        }
+        self.after_drive(harness, &mut observed)?;
+        Ok(observed)
+    }
+
+    /// With a wrong encoder, the limit switches are what keeps the cart on its rail.
+    pub(super) fn press_limit_switches(&self, state: &[f64], inputs: &mut Pins) {
+        if let PlantDescription::Chain(chain) = &self.rig.plant {
+            let [low, high] = chain.cart.travel_m;
+            inputs.contacts.limit_low |= state[0] < low + SWITCH_M;
+            inputs.contacts.limit_high |= state[0] > high - SWITCH_M;
+        }
+    }
+
+    fn drive_is_over(&self, tick: usize, observed: &Observed) -> bool {
+        let wants_reason = matches!(self.trial.expected(), Expected::Fault(..) | Expected::Dead);
+        match observed.off {
+            Some(off) => tick > off + self.ticks_after(wants_reason && observed.fault.is_none()),
+            None => tick >= self.trial.onset + self.trial.watched,
+        }
+    }
+
+    /// What the firmware has found out, and whether it would arm.
+    fn after_drive(&self, harness: &mut Harness<'_>, observed: &mut Observed) -> Result<(), HarnessError> {
+        let is_on_board = self.board.is_some();
+        if is_on_board && observed.off.is_some() && observed.fault.is_none() {
+            observed.fault = self.reason(harness);
+        }
+        observed.dead |= observed.fault == Some(Fault::Crash);
+        observed.motor = Some(harness.session.status().motor);
+        let inputs = harness.inputs();
+        observed.refused = match harness.session.ask(Request::Arm, &inputs) {
+            Err(HarnessError::Refused { answer: Answer::NotNow(reasons), .. }) => Some(reasons),
+            // A wire that is open, or a board that has stopped.
+            Err(HarnessError::NoAnswer(_)) => Some(Inhibits::NONE),
+            Err(error) => return Err(error),
+            Ok(_) => None,
+        };
+        Ok(())
+    }
+}
