@@ -4,9 +4,9 @@
 #![allow(clippy::needless_range_loop)]
 
 use super::ChainState;
-use crate::table::{ChainModel, Scalar};
+use crate::table::{ChainModel, Number, Scalar};
 
-impl<const N: usize, T: Scalar> ChainModel<N, T> {
+impl<const N: usize, T: Number> ChainModel<N, T> {
     /// Rate of change of `state` under a force on the cart (N, along +x) and torques at the joints (N·m).
     ///
     /// The first equation gives `ẍ = (f + Σ_k a_k cos φ_k φ̈_k) / M_t` with `f = u - d_0 ẋ - Σ_k a_k sin φ_k φ̇_k²`.
@@ -20,7 +20,18 @@ impl<const N: usize, T: Scalar> ChainModel<N, T> {
     /// ```
     #[inline]
     pub fn derivative(&self, state: &ChainState<N, T>, force: T, torques: &[T; N]) -> ChainState<N, T> {
-        let zero = T::default();
+        self.derivative_inline(state, force, torques)
+    }
+
+    /// [`derivative`](Self::derivative), always inlined: vectors are fast only in a function that is compiled for them.
+    #[inline(always)]
+    pub fn derivative_inline(
+        &self,
+        state: &ChainState<N, T>,
+        force: T,
+        torques: &[T; N],
+    ) -> ChainState<N, T> {
+        let zero = force.constant(0.0);
         let ([a], [weight]) = (&self.a.data.0, &self.weight.data.0);
         let (b, b_reduced) = (&self.b.data.0, &self.b_reduced.data.0);
         let [joint_frictions] = &self.joint_frictions.data.0;
@@ -64,7 +75,7 @@ impl<const N: usize, T: Scalar> ChainModel<N, T> {
             }
         }
 
-        let phiddot = solve_symmetric(s, r);
+        let phiddot = solve_symmetric(s, r, zero);
         let mut reaction = zero;
         for k in 0..N {
             reaction += ac[k] * phiddot[k];
@@ -76,7 +87,9 @@ impl<const N: usize, T: Scalar> ChainModel<N, T> {
             phidot: phiddot,
         }
     }
+}
 
+impl<const N: usize, T: Scalar> ChainModel<N, T> {
     /// Replaces the state `x, ẋ, θ_1, θ̇_1, …` (2N + 2 entries) by the one `dt` (s) later, with `force` (N) held: one step
     /// of the explicit midpoint rule, whose error within a tick is far below what the encoders resolve.
     #[inline]
@@ -90,11 +103,12 @@ impl<const N: usize, T: Scalar> ChainModel<N, T> {
 
 /// Solves `S x = r` for a symmetric positive definite S, given by its lower triangle, by `S = L D Lᵀ` without pivoting
 /// (Golub & Van Loan, *Matrix Computations*, §4.1).
-#[inline]
-fn solve_symmetric<const N: usize, T: Scalar>(mut s: [[T; N]; N], mut r: [T; N]) -> [T; N] {
-    let mut inverse_d = [T::default(); N];
+#[cfg_attr(target_os = "none", inline)]
+#[cfg_attr(not(target_os = "none"), inline(always))]
+fn solve_symmetric<const N: usize, T: Number>(mut s: [[T; N]; N], mut r: [T; N], zero: T) -> [T; N] {
+    let mut inverse_d = [zero; N];
     for k in 0..N {
-        let inverse = T::from_f32(1.0) / s[k][k];
+        let inverse = zero.constant(1.0) / s[k][k];
         inverse_d[k] = inverse;
         for i in k + 1..N {
             let l = s[i][k] * inverse;

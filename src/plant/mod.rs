@@ -8,7 +8,9 @@ pub(crate) mod double;
 mod equations;
 pub(crate) mod single;
 
-use crate::table::Scalar;
+pub use double::{LARGEST_RAD, in_quadrant};
+
+use crate::table::{Number, Scalar};
 
 /// State of a chain in absolute angles. A state's rate of change has the same type.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -60,9 +62,12 @@ impl<const N: usize, T: Scalar> ChainState<N, T> {
             (angle, rate) = (self.phi[j], self.phidot[j]);
         }
     }
+}
 
+impl<const N: usize, T: Number> ChainState<N, T> {
     /// `self + factor · rate`, entry by entry.
-    #[inline]
+    #[cfg_attr(target_os = "none", inline)]
+    #[cfg_attr(not(target_os = "none"), inline(always))]
     pub fn plus(&self, factor: T, rate: &Self) -> Self {
         let mut sum = *self;
         sum.x += factor * rate.x;

@@ -3,7 +3,6 @@
 use nalgebra::{SMatrix, SVector};
 
 use crate::table::part::part;
-use crate::table::scalar::Scalar;
 
 part! {
     /// Constants of the equations of motion of `N` links on a cart; the equations are in [`plant`](crate::plant).

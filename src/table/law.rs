@@ -8,7 +8,6 @@ use serde::{Deserialize, Serialize};
 
 use crate::table::columns;
 use crate::table::part::{Part, Reader, Resize, Words, WordsMut, part};
-use crate::table::scalar::Scalar;
 
 /// A control law.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]

@@ -27,7 +27,7 @@ pub use limits::Limits;
 pub use motor::MotorMap;
 pub use observer::ObserverGains;
 pub use part::{Part, Reader, Resize, Shape, Words, WordsMut};
-pub use scalar::Scalar;
+pub use scalar::{Number, Scalar};
 pub use swing_up::{MotionLimits, MotionTable, Motions, NoSwingUp, SwingUp, SwingUpTable};
 pub use thresholds::{MotorTest, Thresholds};
 

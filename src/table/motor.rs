@@ -1,7 +1,6 @@
 //! The motor, as seen by the cart.
 
 use crate::table::part::part;
-use crate::table::scalar::Scalar;
 
 part! {
     /// A DC motor that drives the cart through a gear and a pulley.

@@ -3,7 +3,6 @@
 use nalgebra::{SMatrix, SVector};
 
 use crate::table::part::part;
-use crate::table::scalar::Scalar;
 
 part! {
     /// Model and gain of the observer for `NX` states and `NY` sensors: a steady-state Kalman filter in filter form.

@@ -292,7 +292,7 @@ macro_rules! part {
     ) => {
         $(#[$attribute])*
         #[derive(Debug, Clone, PartialEq)]
-        pub struct $name<$($life,)? $(const $size: usize,)* $($scalar: Scalar = f32)?> {
+        pub struct $name<$($life,)? $(const $size: usize,)* $($scalar: $crate::table::Number = f32)?> {
             $($(#[doc = $doc])+ pub $field: $type,)+
             $($(#[$seal_attribute])+ pub $seal: u32,)?
         }

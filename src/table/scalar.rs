@@ -2,13 +2,10 @@
 
 use core::ops::{Add, AddAssign, Div, Mul, MulAssign, Neg, Sub, SubAssign};
 
-/// A number for control law and equations of motion: `f32` in the firmware; on the host also `f64`, to compare the
-/// firmware with the same law in double precision and to simulate, or a type that carries derivatives.
-pub trait Scalar:
+/// A number of the equations of motion: a [`Scalar`], or on the host a vector with one number for each of several plants.
+pub trait Number:
     nalgebra::Scalar
     + Copy
-    + Default
-    + PartialOrd
     + Neg<Output = Self>
     + Add<Output = Self>
     + Sub<Output = Self>
@@ -18,6 +15,17 @@ pub trait Scalar:
     + SubAssign
     + MulAssign
 {
+    /// `value`, rounded to this type; in a vector that is as long as `self`, everywhere.
+    fn constant(self, value: f64) -> Self;
+
+    /// Sines and cosines of `angles` (rad), with the same bits on every machine; mirrored angles give exactly mirrored
+    /// results.
+    fn sines_and_cosines<const N: usize>(angles: &[Self; N]) -> ([Self; N], [Self; N]);
+}
+
+/// A number for control law and equations of motion: `f32` in the firmware; on the host also `f64`, to compare the
+/// firmware with the same law in double precision and to simulate.
+pub trait Scalar: Number + Default + PartialOrd {
     /// Converts from `f32`, exactly.
     fn from_f32(value: f32) -> Self;
 
@@ -29,14 +37,22 @@ pub trait Scalar:
 
     /// Whether the value is neither infinite nor NaN.
     fn is_finite(self) -> bool;
-
-    /// Sines and cosines of `angles` (rad), with the same bits on every machine; mirrored angles give exactly mirrored
-    /// results.
-    fn sines_and_cosines<const N: usize>(angles: &[Self; N]) -> ([Self; N], [Self; N]);
 }
 
 macro_rules! scalar {
     ($type:ty, $sines_and_cosines:path) => {
+        impl Number for $type {
+            #[inline(always)]
+            fn constant(self, value: f64) -> Self {
+                value as Self
+            }
+
+            #[inline(always)]
+            fn sines_and_cosines<const N: usize>(angles: &[Self; N]) -> ([Self; N], [Self; N]) {
+                $sines_and_cosines(angles)
+            }
+        }
+
         impl Scalar for $type {
             #[inline(always)]
             fn from_f32(value: f32) -> Self {
@@ -56,11 +72,6 @@ macro_rules! scalar {
             #[inline(always)]
             fn is_finite(self) -> bool {
                 self.is_finite()
-            }
-
-            #[inline(always)]
-            fn sines_and_cosines<const N: usize>(angles: &[Self; N]) -> ([Self; N], [Self; N]) {
-                $sines_and_cosines(angles)
             }
         }
     };

@@ -46,6 +46,24 @@ where
     results.into_iter().flatten().collect()
 }
 
+/// As [`try_map`], with up to `size` items for each computation.
+///
+/// # Errors
+/// That of the first batch that has one.
+pub fn try_map_in_batches<I, T, E>(
+    items: &[I],
+    size: usize,
+    batch: impl Fn(&[I]) -> Result<Vec<T>, E> + Sync,
+) -> Result<Vec<T>, E>
+where
+    I: Sync,
+    T: Send + Sync,
+    E: Send + Sync,
+{
+    let batches: Vec<Vec<T>> = try_map(items.chunks(size.max(1)), batch)?;
+    Ok(batches.into_iter().flatten().collect())
+}
+
 /// Whether `holds` for any item. After the first, items behind it are left out.
 pub fn any<I: Copy + Sync>(items: impl IntoIterator<Item = I>, holds: impl Fn(I) -> bool + Sync) -> bool {
     try_map(items, |item| if holds(item) { Err(()) } else { Ok(()) }).is_err()

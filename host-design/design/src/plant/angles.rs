@@ -3,7 +3,8 @@
 /// The n angles of a chain's links from the vertical, `φ_i = θ_1 + … + θ_i` (rad), from the state `x, ẋ, θ_1, θ̇_1, …`
 /// (2n + 2 entries) with angles relative to the link below.
 pub fn absolute_angles(state: &[f64]) -> impl Iterator<Item = f64> + '_ {
-    state.iter().skip(2).step_by(2).scan(0.0, |angle, relative| {
+    let joints = state.as_chunks::<2>().0.get(1..).unwrap_or_default();
+    joints.iter().scan(0.0, |angle, [relative, _]| {
         *angle += relative;
         Some(*angle)
     })

@@ -4,7 +4,7 @@
 #![allow(clippy::needless_range_loop)]
 
 use nalgebra::{SMatrix, SVector};
-use upright::table::{ChainModel, Scalar};
+use upright::table::{ChainModel, Number};
 
 use super::{ChainParameters, PlantError};
 use crate::rig;

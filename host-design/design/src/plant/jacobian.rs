@@ -3,7 +3,7 @@
 // The indices are those of the equations, and all are below N.
 #![allow(clippy::needless_range_loop)]
 
-use upright::table::Scalar;
+use upright::table::Number;
 
 use super::{ChainPlant, ChainState};
 

@@ -16,11 +16,13 @@
 //! - [`linearise`]: the exact linear model about an equilibrium, in any precision.
 //! - [`ChainPlant`]: the nonlinear equations in `f64`, fast, with n in the type; their source is [`upright::plant`].
 //! - [`Plant`]: the interface of a simulation of any size; [`chain_plant`] and [`LinearSimulation`] provide it.
+//! - [`ChainLanes`]: several chains that advance together, in the vectors of the processor; bit for bit as each alone.
 //! - [`reference::integrate`]: an adaptive integrator of high order, the reference for the fast one.
 
 mod angles;
 mod chain;
 mod jacobian;
+mod lanes;
 mod linear;
 mod linear_simulation;
 mod motor;
@@ -28,6 +30,7 @@ mod parameters;
 pub mod reference;
 mod rk4;
 mod simulation;
+mod together;
 
 pub use angles::absolute_angles;
 pub use chain::{ChainPlant, ChainState, Energy};
@@ -37,6 +40,7 @@ pub use linear_simulation::LinearSimulation;
 pub use motor::MotorPlant;
 pub use parameters::ChainParameters;
 pub use simulation::{ChainSimulation, Plant, WithLinks, chain_plant, with_links};
+pub use together::{ChainLanes, LANES, chain_lanes};
 
 /// The plant cannot be built for this number of links.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]

@@ -1,17 +1,41 @@
 //! Fixed-step integration of a chain.
 
-use super::{ChainPlant, ChainState};
+use upright::plant::ChainState;
+use upright::table::Number;
+
+use super::ChainPlant;
+
+/// One step of length `dt` (s) of the classical fourth-order Runge–Kutta method (Hairer, Nørsett & Wanner, *Solving
+/// Ordinary Differential Equations I*, table II.1.2).
+#[inline(always)]
+pub(super) fn rk4<const N: usize, T: Number>(
+    state: &ChainState<N, T>,
+    dt: f64,
+    mut rate: impl FnMut(&ChainState<N, T>) -> ChainState<N, T>,
+) -> ChainState<N, T> {
+    let of = |value: f64| state.x.constant(value);
+    let k1 = rate(state);
+    let mut at = state.plus(of(0.5 * dt), &k1);
+    let mut sum = k1;
+    // In a loop, so that an inlined rate is there only twice.
+    for (step, weight) in [(0.5 * dt, 2.0), (dt, 2.0), (0.0, 1.0)] {
+        let k = rate(&at);
+        at = state.plus(of(step), &k);
+        sum = sum.plus(of(weight), &k);
+    }
+    state.plus(of(dt / 6.0), &sum)
+}
 
 impl<const N: usize> ChainPlant<N> {
-    /// One step of length `dt` (s) of the classical fourth-order Runge–Kutta method (Hairer, Nørsett & Wanner,
-    /// *Solving Ordinary Differential Equations I*, table II.1.2) with `force` (N) and `torques` (N·m) held constant.
+    /// [`rk4`] with `force` (N) and `torques` (N·m) held constant.
     #[inline]
-    pub fn rk4(&self, state: &ChainState<N>, force: f64, torques: &[f64; N], dt: f64) -> ChainState<N> {
-        let k1 = self.derivative(state, force, torques);
-        let k2 = self.derivative(&state.plus(0.5 * dt, &k1), force, torques);
-        let k3 = self.derivative(&state.plus(0.5 * dt, &k2), force, torques);
-        let k4 = self.derivative(&state.plus(dt, &k3), force, torques);
-        let sum = k1.plus(2.0, &k2).plus(2.0, &k3).plus(1.0, &k4);
-        state.plus(dt / 6.0, &sum)
+    pub fn rk4(
+        &self,
+        state: &ChainState<N, f64>,
+        force: f64,
+        torques: &[f64; N],
+        dt: f64,
+    ) -> ChainState<N, f64> {
+        rk4(state, dt, |at| self.derivative(at, force, torques))
     }
 }

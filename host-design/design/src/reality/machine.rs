@@ -3,7 +3,7 @@
 // The indices are those of the equations, and all are below N.
 #![allow(clippy::needless_range_loop)]
 
-use upright::table::Scalar;
+use upright::table::Number;
 
 use super::belt::{Belt, Rotor};
 use super::bristle::{Bristle, Contact};
@@ -313,14 +313,19 @@ pub fn real_plant(chain: &Chain, rig: &Rig) -> Result<Box<dyn Plant>, PlantError
             Ok(Box::new(RealChain::<N>::new(self.0, self.1)?))
         }
     }
+    match ideal_chain(chain, rig) {
+        Some(ideal) => chain_plant(&ideal),
+        None => with_links(chain.links.len(), Real(chain, rig))?,
+    }
+}
+
+/// The chain with its real masses and lengths, if nothing else in `[reality]` changes its motion.
+pub fn ideal_chain(chain: &Chain, rig: &Rig) -> Option<Chain> {
     let (friction, drive_train) = (&rig.reality.friction, &rig.reality.drive_train);
     let is_ideal = !friction.joint_friction_n_m.is_any()
         && friction.cart_friction_n == 0.0
         && drive_train.backlash_m == 0.0
         && drive_train.belt_compliance_m_per_n == 0.0
         && rig.reality.sensors.rail_tilt_rad == 0.0;
-    if is_ideal {
-        return chain_plant(&real_chain(chain, &rig.reality.parameters));
-    }
-    with_links(chain.links.len(), Real(chain, rig))?
+    is_ideal.then(|| real_chain(chain, &rig.reality.parameters))
 }

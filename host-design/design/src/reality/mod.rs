@@ -22,6 +22,6 @@ pub use belt::{Belt, Rotor};
 pub use bristle::{Bristle, Contact};
 pub use driver::Driver;
 pub use encoders::{Encoders, hanging_by_hand};
-pub use machine::{RealChain, real_plant};
+pub use machine::{RealChain, ideal_chain, real_plant};
 pub use parameters::real_chain;
 pub use timing::Timing;

@@ -78,34 +78,37 @@ fn array<const N: usize>(counters: &[u32]) -> &[u32; N] {
     counters.try_into().expect("one counter per sensor of the table")
 }
 
-/// What is done with a controller.
+/// What is done with controllers; it gives how each run ended.
 pub(super) type Action<'a> =
-    &'a mut dyn FnMut(&mut dyn AnyController) -> Result<Option<Fall>, SimulationError>;
+    &'a mut dyn FnMut(Vec<&mut dyn AnyController>) -> Result<Vec<Option<Fall>>, SimulationError>;
 
-/// Makes the controller of `table` and does `action` with it.
+/// Makes `count` controllers of `table` and does `action` with them.
 ///
 /// # Errors
 /// [`SimulationError`] if the firmware refuses the table or is not compiled for its size; those of `action`.
-pub(super) fn with_controller(
+pub(super) fn with_controllers(
     table: &TableValues,
+    count: usize,
     action: Action<'_>,
-) -> Result<Option<Fall>, SimulationError> {
+) -> Result<Vec<Option<Fall>>, SimulationError> {
     let (states, sensors) = (table.states(), table.sensors());
-    with_size(states, sensors, WithController { table, action })
+    with_size(states, sensors, WithControllers { table, count, action })
         .ok_or(SimulationError::Size { states, sensors })?
 }
 
-struct WithController<'a> {
+struct WithControllers<'a> {
     table: &'a TableValues,
+    count: usize,
     action: Action<'a>,
 }
 
-impl WithSize for WithController<'_> {
-    type Output = Result<Option<Fall>, SimulationError>;
+impl WithSize for WithControllers<'_> {
+    type Output = Result<Vec<Option<Fall>>, SimulationError>;
 
     fn run<const NX: usize, const NY: usize, const N: usize>(self) -> Self::Output {
         let table = self.table.table::<NX, NY>();
-        let mut controller = Controller::new(&table, &self.table.build(), Bench::widths())?;
-        (self.action)(&mut controller)
+        let controller = Controller::new(&table, &self.table.build(), Bench::widths())?;
+        let mut controllers = vec![controller; self.count];
+        (self.action)(controllers.iter_mut().map(|one| one as &mut dyn AnyController).collect())
     }
 }

@@ -8,9 +8,9 @@ use upright::control::encoder::CounterWidth;
 
 use super::error::SimulationError;
 use super::scenario::Scenario;
-use crate::plant::{LinearSimulation, MotorPlant, Plant};
-use crate::reality::{Driver, Encoders, Timing, real_plant};
-use crate::rig::{PlantDescription, Rig};
+use crate::plant::{ChainLanes, LinearSimulation, MotorPlant, Plant};
+use crate::reality::{Driver, Encoders, Timing, ideal_chain, real_plant};
+use crate::rig::{Chain, PlantDescription, Rig};
 
 /// The simulated rig: everything outside the controller.
 pub struct Bench {
@@ -110,13 +110,14 @@ impl Bench {
 
     /// Writes what the hardware counters show into `counters`; those without a sensor keep their value.
     pub fn read_counters(&self, counters: &mut [u32]) {
-        for (index, (counter, &(state, step))) in counters.iter_mut().zip(&self.sensors).enumerate() {
-            let position = self
-                .encoders
-                .as_ref()
-                .map_or(self.state[state], |errors| errors.measured(state, self.state[state]));
-            let counts = libm::round(position / step) as i64;
-            *counter = Self::reading(index, self.counter_start.wrapping_add(counts as u32));
+        for index in 0..counters.len().min(self.sensors.len()) {
+            let (state, step) = self.sensors[index];
+            let position = match &self.encoders {
+                Some(errors) => errors.measured(state, self.state[state]),
+                None => self.state[state],
+            };
+            let counts = nearest(position / step);
+            counters[index] = Self::reading(index, self.counter_start.wrapping_add(counts as u32));
         }
     }
 
@@ -165,20 +166,51 @@ impl Bench {
     /// Simulates one tick with the command `drive` from its start; gives the motor's force on the cart at the start of the
     /// tick (N), without the disturbance.
     pub fn tick(&mut self, drive: Drive) -> f64 {
-        let now = if self.delay { std::mem::replace(&mut self.pending_drive, drive) } else { drive };
-        let push = std::mem::take(&mut self.push_n);
-        let disturbance = self.force_offset + push + self.force_noise.sample(&mut self.random);
-        let (torque_noise, random) = (&self.torque_noise, &mut self.random);
-        self.torques.fill_with(|| torque_noise.sample(random));
-        for (torque, pull) in self.torques.iter_mut().zip(&mut self.pull_n_m) {
-            *torque += std::mem::take(pull);
-        }
+        let (now, disturbance) = self.begin(drive);
         let before = std::mem::replace(&mut self.acting_drive, now);
         let [latency, rest] = self.timing.next_tick();
         if latency > 0.0 {
             self.advance(before, disturbance, latency);
         }
         self.advance(now, disturbance, rest)
+    }
+
+    /// Begins a tick with the command `drive`: gives the one that acts, and the disturbing force (N). The joint torques are
+    /// drawn, too.
+    fn begin(&mut self, drive: Drive) -> (Drive, f64) {
+        let now = if self.delay { std::mem::replace(&mut self.pending_drive, drive) } else { drive };
+        let push = std::mem::take(&mut self.push_n);
+        let disturbance = self.force_offset + push + self.force_noise.sample(&mut self.random);
+        for joint in 0..self.torques.len() {
+            let noise = self.torque_noise.sample(&mut self.random);
+            self.torques[joint] = noise + std::mem::take(&mut self.pull_n_m[joint]);
+        }
+        (now, disturbance)
+    }
+
+    /// The chain, if it can be simulated in lockstep: nothing in `[reality]` changes its motion, and in a tick there is one
+    /// force for one length.
+    pub(super) fn lockstep_chain(rig: &Rig) -> Option<Chain> {
+        let PlantDescription::Chain(chain) = &rig.plant else { return None };
+        let driver = &rig.reality.driver;
+        let is_simple = rig.actuator.motor.is_none()
+            && Driver::of(rig).is_none()
+            && driver.latency_s == 0.0
+            && driver.jitter_s == 0.0;
+        ideal_chain(chain, rig).filter(|_| is_simple)
+    }
+
+    /// Begins a tick in lockstep: puts force and torques into a lane, and gives the motor's force (N).
+    pub(super) fn push_lane(&mut self, drive: Drive, lanes: &mut dyn ChainLanes, lane: usize) -> f64 {
+        let (now, disturbance) = self.begin(drive);
+        let force = self.force(now, self.period_s);
+        lanes.push(lane, force + disturbance, &self.torques);
+        force
+    }
+
+    /// Ends a tick in lockstep.
+    pub(super) fn read_lane(&mut self, lanes: &dyn ChainLanes, lane: usize) {
+        lanes.write_state(lane, &mut self.state);
     }
 
     /// The supply voltage, as a share of that without load.
@@ -219,6 +251,28 @@ impl Bench {
             (None, Drive::Force(force), _) => f64::from(force),
             (None, Drive::Duty(duty), Some(motor)) => motor.force(f64::from(duty), speed),
             (None, Drive::Duty(_), None) => 0.0,
+        }
+    }
+}
+
+/// The nearest integer, that away from 0 if there are two.
+#[inline]
+fn nearest(value: f64) -> i64 {
+    // The largest number below a half: with a half, a value just below a half would be rounded up.
+    (value + 0.499_999_999_999_999_94_f64.copysign(value)) as i64
+}
+
+#[cfg(test)]
+mod tests {
+    use super::nearest;
+    use proptest::prelude::*;
+
+    proptest! {
+        #[test]
+        fn counts_are_rounded_as_by_the_library(value in -1e9..1e9f64, counts in -1_000_000..1_000_000i64, ulps in -2..3i64) {
+            prop_assert_eq!(nearest(value), libm::round(value) as i64);
+            let half = f64::from_bits((counts as f64 + 0.5).to_bits().wrapping_add_signed(ulps));
+            prop_assert_eq!(nearest(half), libm::round(half) as i64);
         }
     }
 }

@@ -1,6 +1,10 @@
 //! Ticks of the firmware's controller, and of the plant in between.
 
-use super::any_controller::{AnyController, with_controller};
+use core::ops::ControlFlow;
+
+use upright::control::controller::MotorCommand;
+
+use super::any_controller::{AnyController, with_controllers};
 use super::bench::Bench;
 use super::error::{MAX_TICKS, SimulationError};
 use super::scenario::{Scenario, Sensing};
@@ -36,7 +40,28 @@ pub fn run(
     scenario: &Scenario,
     observe: &mut dyn FnMut(&Sample<&[f64]>),
 ) -> Result<Option<Fall>, SimulationError> {
-    with_controller(table, &mut |controller| closed_loop(rig, controller, table.sensors(), scenario, observe))
+    let falls = with_controllers(table, 1, &mut |controllers| {
+        let mut falls = Vec::new();
+        for controller in controllers {
+            falls.push(alone(Run::start(rig, controller, table.sensors(), scenario)?, observe)?);
+        }
+        Ok(falls)
+    })?;
+    Ok(falls.into_iter().next().flatten())
+}
+
+/// This run to its end.
+pub(super) fn alone(
+    mut run: Run<'_>,
+    observe: &mut dyn FnMut(&Sample<&[f64]>),
+) -> Result<Option<Fall>, SimulationError> {
+    loop {
+        let command = run.control()?;
+        let force = run.bench.tick(command.drive);
+        if let ControlFlow::Break(fall) = run.finish(&command, force, observe) {
+            return Ok(fall);
+        }
+    }
 }
 
 /// Number of the run's last tick.
@@ -52,61 +77,94 @@ pub fn ticks(rig: &Rig, scenario: &Scenario) -> Result<usize, SimulationError> {
     Ok(ticks as usize)
 }
 
-/// A run with this controller, which has `sensors` counters.
-fn closed_loop(
-    rig: &Rig,
-    controller: &mut dyn AnyController,
-    sensors: usize,
-    scenario: &Scenario,
-    observe: &mut dyn FnMut(&Sample<&[f64]>),
-) -> Result<Option<Fall>, SimulationError> {
-    controller.select(scenario.law)?;
-    let mut bench = Bench::new(rig, scenario)?;
-    let (mut counters, mut at_zero) = (vec![0; sensors], vec![0; sensors]);
-    let mut measured = single(bench.state());
-    match scenario.sensing {
-        Sensing::FullState => controller.start_in_state(&measured),
-        Sensing::Encoders => {
-            // Homed where the counters show `counter_start`.
-            bench.read_counters_at_zero(&mut at_zero);
-            bench.read_counters(&mut counters);
-            controller.home_and_start(&at_zero, &counters)?;
+/// A run with its controller, tick by tick.
+pub(super) struct Run<'a> {
+    rig: &'a Rig,
+    scenario: &'a Scenario,
+    controller: &'a mut dyn AnyController,
+    pub(super) bench: Bench,
+    counters: Vec<u32>,
+    measured: Vec<f32>,
+    state: Vec<f64>,
+    estimate: Vec<f64>,
+    tick: usize,
+    last_tick: usize,
+}
+
+impl<'a> Run<'a> {
+    /// The run through `scenario` with this controller, which has `sensors` counters.
+    pub(super) fn start(
+        rig: &'a Rig,
+        controller: &'a mut dyn AnyController,
+        sensors: usize,
+        scenario: &'a Scenario,
+    ) -> Result<Self, SimulationError> {
+        controller.select(scenario.law)?;
+        let bench = Bench::new(rig, scenario)?;
+        let (mut counters, mut at_zero) = (vec![0; sensors], vec![0; sensors]);
+        let measured = single(bench.state());
+        match scenario.sensing {
+            Sensing::FullState => controller.start_in_state(&measured),
+            Sensing::Encoders => {
+                // Homed where the counters show `counter_start`.
+                bench.read_counters_at_zero(&mut at_zero);
+                bench.read_counters(&mut counters);
+                controller.home_and_start(&at_zero, &counters)?;
+            }
         }
+        let (state, estimate) = (bench.state().to_vec(), vec![0.0; measured.len()]);
+        let last_tick = ticks(rig, scenario)?;
+        Ok(Self { rig, scenario, controller, bench, counters, measured, state, estimate, tick: 0, last_tick })
     }
-    let (mut state, mut estimate) = (bench.state().to_vec(), vec![0.0; measured.len()]);
-    for tick in 0..=ticks(rig, scenario)? {
-        let t = tick as f64 * rig.tick.period_s;
-        let target = scenario.target_m(t);
-        controller.set_setpoint(target as f32)?;
-        state.copy_from_slice(bench.state());
-        let command = match scenario.sensing {
+
+    fn time_s(&self) -> f64 {
+        self.tick as f64 * self.rig.tick.period_s
+    }
+
+    /// The command of this tick.
+    pub(super) fn control(&mut self) -> Result<MotorCommand, SimulationError> {
+        self.controller.set_setpoint(self.scenario.target_m(self.time_s()) as f32)?;
+        self.state.copy_from_slice(self.bench.state());
+        let command = match self.scenario.sensing {
             Sensing::FullState => {
-                copy_converted(&mut measured, &state, |value| value as f32);
-                controller.control_from_state(&measured)
+                copy_converted(&mut self.measured, &self.state, |value| value as f32);
+                self.controller.control_from_state(&self.measured)
             }
             Sensing::Encoders => {
-                bench.read_counters(&mut counters);
-                controller.control(&counters)
+                self.bench.read_counters(&mut self.counters);
+                self.controller.control(&self.counters)
             }
         };
-        copy_converted(&mut estimate, controller.estimate(), f64::from);
-        let fall = Fall::of(rig, t, &state);
-        let force = bench.tick(command.drive);
+        copy_converted(&mut self.estimate, self.controller.estimate(), f64::from);
+        Ok(command)
+    }
+
+    /// Ends this tick, in which the bench was simulated with `force` (N) at its start. Breaks with the fall, if there was
+    /// one, when the run ends.
+    pub(super) fn finish(
+        &mut self,
+        command: &MotorCommand,
+        force: f64,
+        observe: &mut dyn FnMut(&Sample<&[f64]>),
+    ) -> ControlFlow<Option<Fall>> {
+        let t = self.time_s();
         observe(&Sample {
             t,
-            target,
-            setpoint: f64::from(controller.governed_setpoint_m()),
+            target: self.scenario.target_m(t),
+            setpoint: f64::from(self.controller.governed_setpoint_m()),
             requested: f64::from(command.requested_n),
             force,
-            state: &state,
-            estimate: &estimate,
+            state: &self.state,
+            estimate: &self.estimate,
         });
-        if fall.is_some() {
-            return Ok(fall);
+        let fall = Fall::of(self.rig, t, &self.state);
+        if fall.is_some() || self.tick == self.last_tick {
+            return ControlFlow::Break(fall);
         }
-        controller.predict();
+        self.controller.predict();
+        self.tick += 1;
+        ControlFlow::Continue(())
     }
-    Ok(None)
 }
 
 fn single(state: &[f64]) -> Vec<f32> {
@@ -115,7 +173,7 @@ fn single(state: &[f64]) -> Vec<f32> {
 
 #[inline]
 fn copy_converted<A: Copy, B>(to: &mut [B], from: &[A], convert: impl Fn(A) -> B) {
-    for (to, &from) in to.iter_mut().zip(from) {
-        *to = convert(from);
+    for index in 0..to.len().min(from.len()) {
+        to[index] = convert(from[index]);
     }
 }

@@ -81,17 +81,37 @@ impl Study {
         T: Serialize + DeserializeOwned + Send + Sync,
         E: From<StudyError> + Send + Sync,
     {
+        self.outcomes_in_batches(part, runs, 1, |numbers| numbers.iter().map(|&number| one(number)).collect())
+    }
+
+    /// As [`outcomes`](Self::outcomes), with up to `size` runs made by one call, in the order of the numbers that it is
+    /// given.
+    ///
+    /// # Errors
+    /// As for [`outcomes`](Self::outcomes).
+    pub fn outcomes_in_batches<T, E>(
+        &self,
+        part: &str,
+        runs: u64,
+        size: usize,
+        batch: impl Fn(&[u64]) -> Result<Vec<T>, E> + Sync,
+    ) -> Result<Vec<T>, E>
+    where
+        T: Serialize + DeserializeOwned + Send + Sync,
+        E: From<StudyError> + Send + Sync,
+    {
+        let made = |numbers: &[u64]| parallel::try_map_in_batches(numbers, size, &batch);
         match &self.0 {
-            Source::All => parallel::try_map(0..runs, one),
-            Source::Shard(shard, made) => {
+            Source::All => made(&(0..runs).collect::<Vec<u64>>()),
+            Source::Shard(shard, kept) => {
                 let numbers: Vec<u64> = shard.numbers(runs).collect();
-                let outcomes = parallel::try_map(numbers.iter().copied(), one)?;
-                let mut made = made.borrow_mut();
-                made.parts.insert(part.to_owned(), runs);
+                let outcomes = made(&numbers)?;
+                let mut kept = kept.borrow_mut();
+                kept.parts.insert(part.to_owned(), runs);
                 for (&run, outcome) in numbers.iter().zip(&outcomes) {
                     let outcome = serde_json::to_value(outcome)
                         .map_err(|error| StudyError::outcome(part, run, &error))?;
-                    made.lines.push(Line { part: part.to_owned(), run, outcome });
+                    kept.lines.push(Line { part: part.to_owned(), run, outcome });
                 }
                 Ok(outcomes)
             }

@@ -4,8 +4,9 @@
 use serde::Serialize;
 use upright::table::Law;
 
-use super::trial::{Horizon, Outcome, Unverifiable, chain, edge, leaning, scenario, trial, within};
+use super::trial::{Horizon, Unverifiable, chain, edge, leaning, scenario, trial, trials, within};
 use crate::parallel;
+use crate::plant::LANES;
 use crate::rig::Rig;
 use crate::simulate::{Scenario, SimulationError};
 use crate::table::TableValues;
@@ -287,19 +288,24 @@ pub fn attraction_map(
         within("the axis' points", axis.points as f64, 1.0..=1e4, "1 to 10000 points")?;
     }
     let horizon = &horizon.widened(rig, table, law)?;
-    let cell = |index: usize| {
+    let case = |&index: &usize| {
         let mut scenario = scenario(rig, law, horizon.duration_s);
         scenario.start[down.state] = down.value(index / across.points);
         scenario.start[across.state] = across.value(index % across.points);
-        let outcome: Outcome = trial(rig, table, &scenario, horizon)?;
-        done();
-        Ok(outcome.at_rest_after_s)
+        (rig.clone(), scenario)
+    };
+    let batch = |indices: &[usize]| -> Result<Vec<Option<f64>>, SimulationError> {
+        let outcomes = trials(table, &indices.iter().map(case).collect::<Vec<_>>(), horizon)?;
+        indices.iter().for_each(|_| done());
+        Ok(outcomes.into_iter().map(|outcome| outcome.at_rest_after_s).collect())
     };
     let all = across.points * down.points;
     let (_, is_rail_symmetric) = links(rig);
     let mirrored = is_rail_symmetric && [across, down].iter().all(|axis| axis.range[0] == -axis.range[1]);
     let run = if mirrored { all.div_ceil(2) } else { all };
-    let mut cells: Vec<Option<f64>> = parallel::try_map::<_, _, SimulationError>(0..run, cell)?;
+    let indices: Vec<usize> = (0..run).collect();
+    // Many fall early, and make room for others.
+    let mut cells = parallel::try_map_in_batches(&indices, 4 * LANES, batch)?;
     for image in (0..all - run).rev() {
         cells.push(cells[image]);
         done();

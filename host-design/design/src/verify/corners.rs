@@ -5,9 +5,10 @@ use upright::table::Law;
 
 use super::monte_carlo::is_worse;
 use super::trial::{
-    Disturbance, Horizon, Outcome, Unverifiable, chain, edge, leaning, scenario, trial, within,
+    Disturbance, Horizon, Outcome, Unverifiable, chain, edge, leaning, scenario, trial, trials, within,
 };
 use crate::parallel;
+use crate::plant::LANES;
 use crate::rig::{PlantDescription, Rig};
 use crate::simulate::{Scenario, SimulationError};
 use crate::table::TableValues;
@@ -117,13 +118,20 @@ pub fn corners(
     within("percent", percent, 0.0..=90.0, "0 to 90 %")?;
     within("links", links as f64, 1.0..=MOST_LINKS as f64, "a chain of at most 9 links")?;
     let scenario = run_of(rig, law, settings);
-    let corner = |mask: u32| {
-        let signs: Vec<i8> = (0..=links).map(|part| if mask >> part & 1 == 1 { 1 } else { -1 }).collect();
-        let factors: Vec<f64> = signs.iter().copied().map(f64::from).collect();
-        let outcome = trial(&wrong_masses(rig, percent, &factors), table, &scenario, &Horizon::default())?;
-        Ok(Corner { signs, outcome })
+    let signs = |mask: u32| -> Vec<i8> {
+        (0..=links).map(|part| if mask >> part & 1 == 1 { 1 } else { -1 }).collect()
     };
-    let all: Vec<Corner> = parallel::try_map::<_, _, SimulationError>(0..2u32 << links, corner)?;
+    let batch = |masks: &[u32]| -> Result<Vec<Corner>, SimulationError> {
+        let case = |&mask: &u32| {
+            let factors: Vec<f64> = signs(mask).into_iter().map(f64::from).collect();
+            (wrong_masses(rig, percent, &factors), scenario.clone())
+        };
+        let outcomes = trials(table, &masks.iter().map(case).collect::<Vec<_>>(), &Horizon::default())?;
+        let corner = |(&mask, outcome)| Corner { signs: signs(mask), outcome };
+        Ok(masks.iter().zip(outcomes).map(corner).collect())
+    };
+    let masks: Vec<u32> = (0..2u32 << links).collect();
+    let all = parallel::try_map_in_batches(&masks, LANES, batch)?;
     let mut weakest = &all[0];
     for corner in &all {
         if is_worse(&corner.outcome, &weakest.outcome) {

@@ -52,4 +52,4 @@ pub use response::Response;
 pub use rounding::Rounding;
 pub use rows::{Quantity, Row, quantities, rows};
 pub use tick::TickLimits;
-pub use trial::{Disturbance, Horizon, Outcome, Unverifiable, at_rest_disturbed, trial};
+pub use trial::{Disturbance, Horizon, Outcome, Unverifiable, at_rest_disturbed, trial, trials};

@@ -6,7 +6,8 @@ use serde::{Deserialize, Serialize};
 use upright::table::Law;
 
 use super::report::Effort;
-use super::trial::{Disturbance, Horizon, Outcome, Unverifiable, leaning, scenario, trial, within};
+use super::trial::{Disturbance, Horizon, Outcome, Unverifiable, leaning, scenario, trials, within};
+use crate::plant::LANES;
 use crate::rig::{Chain, Link, PlantDescription, Rig};
 use crate::simulate::Scenario;
 use crate::table::TableValues;
@@ -143,14 +144,14 @@ pub fn monte_carlo(
     within("other_delay", spread.other_delay, 0.0..=1.0, "a share from 0 to 1")?;
     within("tilt_rad", spread.tilt_rad, 0.0..=1.5, "an angle from 0 to 1.5 rad")?;
     let &Effort { runs, seed: base_seed, study, .. } = effort;
-    let one = |number: u64| -> Result<WorstCase, Unverifiable> {
-        let seed = base_seed.wrapping_add(number);
-        let (plant, scenario) = sample(rig, law, spread, seed);
-        let outcome = trial(&plant, table, &scenario, &Horizon::default())?;
-        done();
-        Ok(WorstCase { seed, outcome })
+    let batch = |numbers: &[u64]| -> Result<Vec<WorstCase>, Unverifiable> {
+        let seeds: Vec<u64> = numbers.iter().map(|number| base_seed.wrapping_add(*number)).collect();
+        let cases: Vec<(Rig, Scenario)> = seeds.iter().map(|&seed| sample(rig, law, spread, seed)).collect();
+        let outcomes = trials(table, &cases, &Horizon::default())?;
+        seeds.iter().for_each(|_| done());
+        Ok(seeds.into_iter().zip(outcomes).map(|(seed, outcome)| WorstCase { seed, outcome }).collect())
     };
-    let all = study.outcomes(law.key(), runs as u64, one)?;
+    let all = study.outcomes_in_batches(law.key(), runs as u64, LANES, batch)?;
     let runs = all.len();
     let stood = all.iter().filter(|case| case.outcome.stands()).count();
     Ok(MonteCarlo {

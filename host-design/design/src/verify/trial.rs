@@ -6,7 +6,7 @@ use upright::table::Law;
 use crate::design::DesignError;
 use crate::plant::absolute_angles;
 use crate::rig::{Chain, PlantDescription, Rig};
-use crate::simulate::{Fall, Scenario, SimulationError, run};
+use crate::simulate::{Fall, Job, Sample, Scenario, SimulationError, run, run_all};
 use crate::study::{StudyError, infinite_if_null};
 use crate::table::{NoTable, TableValues};
 
@@ -140,6 +140,24 @@ impl Outcome {
         self.fall.is_none()
     }
 
+    const NOTHING_SEEN: Self =
+        Self { fall: None, at_rest_after_s: None, peak_angle_rad: 0.0, peak_error_m: 0.0, peak_force_n: 0.0 };
+
+    fn see(&mut self, rig: &Rig, horizon: &Horizon, sample: &Sample<&[f64]>) {
+        let angle = largest_angle(rig, sample.state);
+        let error = (sample.state[rig.output()] - sample.target).abs();
+        self.peak_angle_rad = self.peak_angle_rad.max(angle);
+        self.peak_error_m = self.peak_error_m.max(error);
+        self.peak_force_n = self.peak_force_n.max(sample.force.abs());
+        // Compared this way round so that NaN does not count as near rest.
+        let quiet = angle <= horizon.angle_rad && error <= horizon.position_m;
+        self.at_rest_after_s = if quiet { self.at_rest_after_s.or(Some(sample.t)) } else { None };
+    }
+
+    fn ended(self, fall: Option<Fall>) -> Self {
+        Self { at_rest_after_s: self.at_rest_after_s.filter(|_| fall.is_none()), fall, ..self }
+    }
+
     /// No fall, and near rest when the run ended.
     pub fn comes_to_rest(&self) -> bool {
         self.at_rest_after_s.is_some()
@@ -156,21 +174,33 @@ pub fn trial(
     scenario: &Scenario,
     horizon: &Horizon,
 ) -> Result<Outcome, SimulationError> {
-    let output = rig.output();
-    let (mut peak_angle_rad, mut peak_error_m, mut peak_force_n) = (0.0f64, 0.0f64, 0.0f64);
-    let mut quiet_since = None;
-    let fall = run(rig, table, scenario, &mut |sample| {
-        let angle = largest_angle(rig, sample.state);
-        let error = (sample.state[output] - sample.target).abs();
-        peak_angle_rad = peak_angle_rad.max(angle);
-        peak_error_m = peak_error_m.max(error);
-        peak_force_n = peak_force_n.max(sample.force.abs());
-        // Compared this way round so that NaN does not count as near rest.
-        let quiet = angle <= horizon.angle_rad && error <= horizon.position_m;
-        quiet_since = if quiet { quiet_since.or(Some(sample.t)) } else { None };
-    })?;
-    let at_rest_after_s = quiet_since.filter(|_| fall.is_none());
-    Ok(Outcome { fall, at_rest_after_s, peak_angle_rad, peak_error_m, peak_force_n })
+    let mut outcome = Outcome::NOTHING_SEEN;
+    let fall = run(rig, table, scenario, &mut |sample| outcome.see(rig, horizon, sample))?;
+    Ok(outcome.ended(fall))
+}
+
+/// [`trial`] of each of these rigs, several in lockstep.
+///
+/// # Errors
+/// As for [`trial`].
+pub fn trials(
+    table: &TableValues,
+    cases: &[(Rig, Scenario)],
+    horizon: &Horizon,
+) -> Result<Vec<Outcome>, SimulationError> {
+    let mut outcomes = vec![Outcome::NOTHING_SEEN; cases.len()];
+    let mut observers: Vec<_> = outcomes
+        .iter_mut()
+        .zip(cases)
+        .map(|(outcome, (rig, _))| move |sample: &Sample<&[f64]>| outcome.see(rig, horizon, sample))
+        .collect();
+    let mut jobs: Vec<Job<'_>> = observers
+        .iter_mut()
+        .zip(cases)
+        .map(|(observe, (rig, scenario))| Job { rig, scenario, observe })
+        .collect();
+    let falls = run_all(table, &mut jobs)?;
+    Ok(outcomes.into_iter().zip(falls).map(|(outcome, fall)| outcome.ended(fall)).collect())
 }
 
 fn largest_angle(rig: &Rig, state: &[f64]) -> f64 {

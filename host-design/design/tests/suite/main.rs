@@ -3,6 +3,7 @@
 mod design_properties;
 mod identify;
 mod known_friction;
+mod lockstep;
 // The paper's printed values are defined once, in the tool.
 mod log_fuzz;
 #[allow(dead_code, unreachable_pub)]

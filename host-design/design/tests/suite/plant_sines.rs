@@ -1,7 +1,7 @@
 //! Sines and cosines of the equations of motion, in `f64`.
 
 use proptest::prelude::*;
-use upright::table::Scalar;
+use upright::table::Number;
 use upright_design::numerics::{Real, Wide};
 
 fn sin_cos<const N: usize>(angles: &[f64; N]) -> ([f64; N], [f64; N]) {
