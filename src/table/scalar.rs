@@ -2,7 +2,8 @@
 
 use core::ops::{Add, AddAssign, Div, Mul, MulAssign, Neg, Sub, SubAssign};
 
-/// A number of the equations of motion: a [`Scalar`], or on the host a vector with one number for each of several plants.
+/// A number of the equations of motion: a [`Scalar`], or on the host a vector with one number for each of several
+/// plants.
 pub trait Number:
     nalgebra::Scalar
     + Copy

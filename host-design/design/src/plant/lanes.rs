@@ -10,8 +10,8 @@ use pulp::{Simd, bytemuck};
 use upright::plant::{LARGEST_RAD, in_quadrant};
 use upright::table::Number;
 
-/// As many `f64` as a vector of this processor holds, one for each of so many plants. An operation gives in each lane the
-/// bits that it gives for an `f64`.
+/// As many `f64` as a vector of this processor holds, one for each of so many plants. An operation gives in each lane
+/// the bits that it gives for an `f64`.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Lanes<S: Simd> {
     simd: S,

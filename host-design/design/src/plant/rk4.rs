@@ -27,8 +27,8 @@ pub(super) fn rk4<const N: usize, T: Number>(
 }
 
 impl<const N: usize> ChainPlant<N> {
-    /// One step of length `dt` (s) of the classical fourth-order Runge–Kutta method with `force` (N) and `torques` (N·m)
-    /// held constant.
+    /// One step of length `dt` (s) of the classical fourth-order Runge–Kutta method with `force` (N) and `torques`
+    /// (N·m) held constant.
     #[inline]
     pub fn rk4(
         &self,

@@ -19,8 +19,9 @@ pub const LANES: usize = 8;
 /// One number for each chain.
 type Row = [f64; LANES];
 
-/// [`LANES`] chains with the same number of links. Each has the same bits as a [`ChainSimulation`](super::ChainSimulation)
-/// with the same inputs. Every method that takes a slice of the wrong length panics.
+/// [`LANES`] chains with the same number of links. Each has the same bits as a
+/// [`ChainSimulation`](super::ChainSimulation) with the same inputs. Every method that takes a slice of the wrong
+/// length panics.
 pub trait ChainLanes: Send {
     /// Puts `chain` in this state (`x, ẋ, θ_1, θ̇_1, …`) into a lane.
     ///
@@ -41,8 +42,8 @@ pub trait ChainLanes: Send {
     fn write_state(&self, lane: usize, state: &mut [f64]);
 }
 
-/// Empty lanes for chains of `links` links; none for a number of links that is not compiled for vectors: what is simulated
-/// in thousands of runs are three to five links.
+/// Empty lanes for chains of `links` links; none for a number of links that is not compiled for vectors: what is
+/// simulated in thousands of runs are three to five links.
 pub fn chain_lanes(links: usize) -> Option<Box<dyn ChainLanes>> {
     match links {
         3 => Some(Box::new(Together::<3>::empty())),

@@ -175,8 +175,8 @@ impl Bench {
         self.advance(now, disturbance, rest)
     }
 
-    /// Begins a tick with the command `drive`: gives the one that acts, and the disturbing force (N). The joint torques are
-    /// drawn, too.
+    /// Begins a tick with the command `drive`: gives the one that acts, and the disturbing force (N). The joint
+    /// torques are drawn, too.
     fn begin(&mut self, drive: Drive) -> (Drive, f64) {
         let now = if self.delay { std::mem::replace(&mut self.pending_drive, drive) } else { drive };
         let push = std::mem::take(&mut self.push_n);
@@ -188,8 +188,8 @@ impl Bench {
         (now, disturbance)
     }
 
-    /// The chain, if it can be simulated in lockstep: nothing in `[reality]` changes its motion, and in a tick there is one
-    /// force for one length.
+    /// The chain, if it can be simulated in lockstep: nothing in `[reality]` changes its motion, and in a tick there
+    /// is one force for one length.
     pub(super) fn lockstep_chain(rig: &Rig) -> Option<Chain> {
         let PlantDescription::Chain(chain) = &rig.plant else { return None };
         let driver = &rig.reality.driver;

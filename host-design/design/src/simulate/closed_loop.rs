@@ -139,8 +139,8 @@ impl<'a> Run<'a> {
         Ok(command)
     }
 
-    /// Ends this tick, in which the bench was simulated with `force` (N) at its start. Breaks with the fall, if there was
-    /// one, when the run ends.
+    /// Ends this tick, in which the bench was simulated with `force` (N) at its start. Breaks with the fall, if there
+    /// was one, when the run ends.
     pub(super) fn finish(
         &mut self,
         command: &MotorCommand,

@@ -25,9 +25,9 @@ pub struct Job<'a> {
 
 /// Runs all jobs, each as [`run`](super::run) does, bit for bit, and gives how each ended.
 ///
-/// [`LANES`] plants advance together; a run that ends makes room for the next one. Alone run rigs whose `[reality]` changes
-/// motion, driver or timing, those with a motor, those with fewer than 3 or more than 5 links, and jobs with different
-/// ticks or integration steps.
+/// [`LANES`] plants advance together; a run that ends makes room for the next one. Alone run rigs whose `[reality]`
+/// changes motion, driver or timing, those with a motor, those with fewer than 3 or more than 5 links, and jobs with
+/// different ticks or integration steps.
 ///
 /// # Errors
 /// Those of the first job that has one.

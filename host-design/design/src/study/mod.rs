@@ -84,8 +84,8 @@ impl Study {
         self.outcomes_in_batches(part, runs, 1, |numbers| numbers.iter().map(|&number| one(number)).collect())
     }
 
-    /// As [`outcomes`](Self::outcomes), with up to `size` runs made by one call, in the order of the numbers that it is
-    /// given.
+    /// As [`outcomes`](Self::outcomes), with up to `size` runs made by one call, in the order of the numbers that it
+    /// is given.
     ///
     /// # Errors
     /// As for [`outcomes`](Self::outcomes).

@@ -219,8 +219,8 @@ pub(crate) fn scenario(rig: &Rig, law: Law, duration_s: f64) -> Scenario {
     Scenario { duration_s, substeps: finer * steps, ..Scenario::at_rest(rig, law) }
 }
 
-/// The rig at rest with the disturbances that its file expects, as the whole firmware is run: with two integration steps per
-/// tick.
+/// The rig at rest with the disturbances that its file expects, as the whole firmware is run: with two integration
+/// steps per tick.
 pub fn at_rest_disturbed(rig: &Rig, law: Law, seed: u64) -> Scenario {
     let disturbance = Disturbance::of(rig);
     Scenario {

@@ -25,8 +25,8 @@ impl Split {
         self.shard.is_some() || !self.merge.is_empty()
     }
 
-    /// Does `work` with the study that the options ask for, then `print` with what it gives; a shard prints the outcomes of
-    /// its runs instead. `options` are those on which the outcomes depend.
+    /// Does `work` with the study that the options ask for, then `print` with what it gives; a shard prints the
+    /// outcomes of its runs instead. `options` are those on which the outcomes depend.
     pub(crate) fn study<T>(
         &self,
         command: &str,
