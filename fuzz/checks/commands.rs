@@ -13,6 +13,7 @@ use upright::gains::{SENSORS, STATES, TABLE};
 use upright::protocol::frame::{Receiver, encode};
 use upright::protocol::message::{Command, Message, Reply, Request};
 use upright::protocol::serial_link::{MAX_COMMAND, MAX_MESSAGE, SerialLink};
+use upright::supervision::shaking::Shaking;
 use upright::table::Law;
 
 use invariants::Invariants;
@@ -118,7 +119,7 @@ impl Run<'_> {
                 *offset = offset.wrapping_add(moved.into());
             }
             24 => (0..next() % 32).for_each(|_| self.tick()),
-            25 | 28 | 29 => {
+            25 | 31 => {
                 // Coverage does not lead to a single value of 16 bits. So every input tries 32 values of its own,
                 // which its hash chooses: mutations alone prefer few values.
                 let first = self.hash & !31;
@@ -126,6 +127,17 @@ impl Run<'_> {
                     self.send(Request::Telemetry(period_ticks));
                     self.tick();
                 }
+            }
+            28 => self.send(Request::Log(next() % 2 == 0)),
+            29 => {
+                let [most_n, stiffness_n_per_m, damping_n_s_per_m] =
+                    core::array::from_fn(|_| setpoint(next()));
+                self.send(Request::Shake(Shaking { most_n, stiffness_n_per_m, damping_n_s_per_m }));
+            }
+            30 => {
+                let first = self.control.firmware().statistics().ticks as u16;
+                let forces = core::array::from_fn(|_| next() as i8);
+                self.send(Request::Forces { first: first.wrapping_add(u16::from(next())), forces });
             }
             26 | 27 => self.send(Request::Drive { along: next() % 2 == 0 }),
             _ => {}
@@ -157,6 +169,7 @@ impl Run<'_> {
             for message in frame.iter().filter_map(|&byte| receiver.push::<Message<STATES, SENSORS>>(byte)) {
                 match message.expect("a frame that the firmware sends can be read") {
                     Message::Telemetry(telemetry) => invariants::telemetry(&telemetry),
+                    Message::Log(log) => assert!(!log.ticks.is_empty()),
                     // The same command has come again: so does its reply.
                     Message::Reply(Reply { id, .. }) if id == self.answered_id => {}
                     Message::Reply(Reply { id, answer }) => {

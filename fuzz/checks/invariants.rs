@@ -73,12 +73,12 @@ impl Invariants {
             assert!(matches!(drive, Drive::Force(force) if force.abs() <= most), "{drive:?}");
         }
         if enable {
-            let may = [State::Driving, State::Armed, State::Balancing];
+            let may = [State::Driving, State::Identifying, State::Armed, State::Balancing];
             assert!(may.contains(&before), "motor on after {before:?}");
             // Found in the second half of the tick; the motor is off from the next one.
             let late =
                 firmware.cause().is_some_and(|cause| matches!(cause.fault, Fault::LinkLost | Fault::Table));
-            let goes_on = matches!(after, State::Driving | State::Balancing);
+            let goes_on = matches!(after, State::Driving | State::Identifying | State::Balancing);
             assert!(goes_on || disarmed || late, "motor on in {after:?}");
             let contacts = rig.contacts;
             assert!(!contacts.emergency_stop && !contacts.driver_fault);
@@ -88,7 +88,8 @@ impl Invariants {
             assert_eq!(drive, Drive::OFF);
             assert_ne!(after, State::Balancing, "balancing with the motor off");
         }
-        let is_off = !matches!(after, State::Driving | State::Armed | State::Balancing | State::Homing);
+        let on = [State::Driving, State::Identifying, State::Armed, State::Balancing, State::Homing];
+        let is_off = !on.contains(&after);
         assert!(!disarmed || is_off, "{after:?}");
     }
 
@@ -117,6 +118,15 @@ impl Invariants {
                     "driven in {:?}",
                     self.state
                 );
+                self.nothing_against_driving(firmware, rig);
+            }
+            Some((Request::Shake(_), Answer::Done)) => {
+                assert!(
+                    matches!(self.state, State::Calibrated | State::Homing),
+                    "shaken in {:?}",
+                    self.state
+                );
+                assert_eq!(firmware.motor_sign(), MotorSign::Checked);
                 self.nothing_against_driving(firmware, rig);
             }
             _ => assert!(firmware.state() != State::Armed || self.state == State::Armed, "armed unasked"),

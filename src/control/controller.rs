@@ -70,6 +70,8 @@ pub enum Rejected {
     Setpoint,
     /// The table holds no observer, so the controller cannot run from encoders.
     NoObserver,
+    /// The forces or the spring with which the rig is to be shaken are not possible.
+    Shaking,
 }
 
 impl core::fmt::Display for Rejected {
@@ -81,6 +83,7 @@ impl core::fmt::Display for Rejected {
             Rejected::NoObserver => {
                 "the gain table holds no observer: give the rig its encoders and [kalman]"
             }
+            Rejected::Shaking => "the rig cannot be shaken with these forces",
         })
     }
 }

@@ -66,6 +66,15 @@ impl<const NX: usize, const NY: usize, S: SwingUp<NX, NY>> Firmware<'_, NX, NY, 
                 (self.telemetry_period_ticks, self.ticks_to_telemetry) = (period_ticks, 0);
                 Answer::Done
             }
+            #[cfg(feature = "identify")]
+            Request::Shake(shaking) => self.begin_shaking(shaking, command.id),
+            #[cfg(feature = "identify")]
+            Request::Forces { first, forces } => self.take_forces(first, &forces),
+            #[cfg(feature = "identify")]
+            Request::Log(is_kept) => {
+                self.keep_log(is_kept);
+                Answer::Done
+            }
         }
     }
 

@@ -53,6 +53,8 @@ impl<'q, 't, B: Board<NY>, const NX: usize, const NY: usize, S: SwingUp<NX, NY>>
         self.firmware.accept(&inputs);
         let output = drive(&mut self.firmware, &inputs);
         self.board.drive(&output);
+        #[cfg(feature = "identify")]
+        let log = self.firmware.log_tick();
         let command = queue::take(&mut self.commands);
         let telemetry = self.firmware.report(self.cycles);
         predict(&mut self.firmware);
@@ -63,6 +65,10 @@ impl<'q, 't, B: Board<NY>, const NX: usize, const NY: usize, S: SwingUp<NX, NY>>
         }
         if let Some(telemetry) = telemetry {
             self.send(Message::Telemetry(telemetry));
+        }
+        #[cfg(feature = "identify")]
+        if let Some(log) = log {
+            self.send(Message::Log(log));
         }
         self.board.feed_watchdog();
         self.cycles = self.board.cycles().wrapping_sub(begin);

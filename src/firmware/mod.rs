@@ -10,8 +10,12 @@ pub mod control_task;
 #[cfg(feature = "image")]
 pub mod hot_path;
 mod posture;
+#[cfg(feature = "identify")]
+mod shake;
 mod swing_up;
 mod telemetry;
+#[cfg(feature = "identify")]
+mod tick_log;
 
 use crate::board::{Contacts, Inputs, Output};
 use crate::control::controller::{Controller, MotorCommand};
@@ -19,12 +23,16 @@ use crate::control::encoder::CounterWidth;
 use crate::control::motion::Player;
 use crate::protocol::message::{Command, Reply, Start, Statistics, Telemetry};
 use crate::protocol::telemetry_ticks;
+#[cfg(feature = "identify")]
+use crate::protocol::tick_log::TickLog;
 use crate::supervision::bench_drive::{BenchDrive, MotorSign};
 use crate::supervision::calibration::Calibration;
 use crate::supervision::debounce::Debounce;
 use crate::supervision::detection::{Detection, Finding};
 use crate::supervision::envelope;
 use crate::supervision::fault::{Cause, Fault};
+#[cfg(feature = "identify")]
+use crate::supervision::shaking::Shaker;
 use crate::supervision::supervisor::{State, Supervisor};
 use crate::table::{Build, ChecksumScan, GainTable, NoSwingUp, SwingUp, TableError};
 
@@ -72,6 +80,14 @@ pub struct Firmware<'t, const NX: usize, const NY: usize, S = NoSwingUp> {
     /// Telemetry is sent every n ticks; 0: never.
     telemetry_period_ticks: u16,
     ticks_to_telemetry: u16,
+    #[cfg(feature = "identify")]
+    shaker: Shaker<NY>,
+    /// Voltage of the tick before, while the rig is shaken (V).
+    #[cfg(feature = "identify")]
+    last_volts: f32,
+    /// Ticks of the log that are not yet sent; none while no log is kept.
+    #[cfg(feature = "identify")]
+    log: Option<TickLog<NY>>,
 }
 
 /// Words of the table that are checked in a tick while armed, when the whole table has to be read before the motor is
@@ -163,6 +179,12 @@ impl<'t, const NX: usize, const NY: usize, S: SwingUp<NX, NY>> Firmware<'t, NX, 
             start,
             telemetry_period_ticks: telemetry_ticks(table.tick_s),
             ticks_to_telemetry: 0,
+            #[cfg(feature = "identify")]
+            shaker: Shaker::default(),
+            #[cfg(feature = "identify")]
+            last_volts: 0.0,
+            #[cfg(feature = "identify")]
+            log: None,
         }
     }
 
@@ -220,6 +242,8 @@ impl<'t, const NX: usize, const NY: usize, S: SwingUp<NX, NY>> Firmware<'t, NX, 
         }
         match self.supervisor.state() {
             State::Driving => self.push_cart(inputs),
+            #[cfg(feature = "identify")]
+            State::Identifying => self.shake(inputs),
             state if !state.drives() => self.tick_motor_off(),
             _ => {}
         }
@@ -230,6 +254,8 @@ impl<'t, const NX: usize, const NY: usize, S: SwingUp<NX, NY>> Firmware<'t, NX, 
         self.output = match self.supervisor.state() {
             State::Balancing => self.balance(inputs),
             State::Driving => self.output,
+            #[cfg(feature = "identify")]
+            State::Identifying => self.output,
             State::Raising | State::Lowering if S::IS_POSSIBLE => self.move_links(inputs),
             _ => Output::OFF,
         };
@@ -314,6 +340,8 @@ impl<'t, const NX: usize, const NY: usize, S: SwingUp<NX, NY>> Firmware<'t, NX, 
             | State::Balancing
             | State::Lowering
             | State::Fault => {}
+            #[cfg(feature = "identify")]
+            State::Identifying => {}
         }
     }
 

@@ -8,16 +8,20 @@ use serde::{Deserialize, Serialize};
 
 use crate::board::Contacts;
 use crate::control::controller::Rejected;
+#[cfg(feature = "identify")]
+use crate::protocol::tick_log::TickLog;
 use crate::supervision::bench_drive::MotorSign;
 use crate::supervision::fault::{Cause, Fault};
 use crate::supervision::homing::Homing;
 use crate::supervision::inhibits::Inhibits;
+#[cfg(feature = "identify")]
+use crate::supervision::shaking::{FORCES, Shaking};
 use crate::supervision::sign_check::Signs;
 use crate::supervision::supervisor::State;
 use crate::table::Law;
 
 /// Version of these messages; a host with another version must not send commands.
-pub const PROTOCOL: u8 = 5;
+pub const PROTOCOL: u8 = 6;
 
 /// A command, host to firmware.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -73,6 +77,20 @@ pub enum Request {
         /// Along +x; else against it.
         along: bool,
     },
+    /// Shake the hanging rig with the forces that follow. Only an image for identification knows this and what follows.
+    #[cfg(feature = "identify")]
+    Shake(Shaking),
+    /// Forces of coming ticks, as parts of the largest one: [`FULL`](crate::supervision::shaking::FULL) is all of it.
+    #[cfg(feature = "identify")]
+    Forces {
+        /// Low bits of the number of the tick that the first one is for.
+        first: u16,
+        /// One for each tick.
+        forces: [i8; FORCES],
+    },
+    /// Send a log of every tick, or no longer.
+    #[cfg(feature = "identify")]
+    Log(bool),
 }
 
 /// Firmware to host.
@@ -84,6 +102,9 @@ pub enum Message<const NX: usize, const NY: usize> {
     Telemetry(Telemetry<NX, NY>),
     /// The answer to a command.
     Reply(Reply),
+    /// Every tick, from an image for identification.
+    #[cfg(feature = "identify")]
+    Log(TickLog<NY>),
 }
 
 /// The answer to one command.

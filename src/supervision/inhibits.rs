@@ -43,6 +43,7 @@ inhibits! {
     19 NO_ROOM "the motion does not fit on the rail from here: move the cart";
     20 OTHER_LAW "the swing-up ends in another control law: select LQR";
     21 MOTOR "the motor's sign is not checked since power-up: drive the cart a little";
+    22 NOT_SHAKEN "the rig is not being shaken: begin again";
 }
 
 impl Inhibits {
@@ -109,7 +110,7 @@ mod tests {
                 .fold(Inhibits::NONE, |all, (inhibit, _)| all.union(*inhibit))
                 .texts()
                 .count(),
-            22
+            23
         );
         assert_eq!(Inhibits::NONE.err_if_any(), Ok(()));
         assert_eq!(both.err_if_any(), Err(both));

@@ -13,6 +13,8 @@ pub mod envelope;
 pub mod fault;
 pub mod homing;
 pub mod inhibits;
+#[cfg(feature = "identify")]
+pub mod shaking;
 pub mod sign_check;
 pub mod stillness;
 pub mod supervisor;

@@ -27,11 +27,18 @@ pub enum State {
     Lowering,
     /// A fault is latched.
     Fault,
+    /// The motor shakes the hanging links, for an identification. Only an image for identification has it.
+    #[cfg(feature = "identify")]
+    Identifying,
 }
 
 impl State {
     /// Whether the motor is on.
     pub const fn drives(self) -> bool {
+        #[cfg(feature = "identify")]
+        if matches!(self, State::Identifying) {
+            return true;
+        }
         self.controls() || matches!(self, State::Driving)
     }
 
@@ -50,7 +57,8 @@ impl State {
 ///                                                             │  └─ raise ─► Raising ── finish_motion ────┘  │  │
 ///                                                             │◄─ finish_motion ── Lowering ◄────── lower ───┘  │
 ///                                                             │◄──────── disarm while the motor is on ──────────┘
-///                                                             └◄─ disarm ── Driving ◄─ start_driving ── Calibrated
+///                                                             ├◄─ disarm ── Driving ◄─ start_driving ── Calibrated
+///                                                             └◄─ disarm ── Identifying ◄─ start_identifying ── Calibrated
 /// any state ─ trip ─► Fault ─ clear ─► Calibrated, or Disarmed if positions are not known
 /// ```
 #[derive(Debug, Clone, Default)]
@@ -98,6 +106,8 @@ impl Supervisor {
             State::Driving | State::Armed | State::Raising | State::Balancing | State::Lowering => {
                 self.state = State::Calibrated;
             }
+            #[cfg(feature = "identify")]
+            State::Identifying => self.state = State::Calibrated,
             State::Homing => self.state = State::Disarmed,
             State::Disarmed | State::Calibrated | State::Fault => {}
         }
@@ -131,6 +141,8 @@ impl Supervisor {
             State::Driving | State::Armed | State::Raising | State::Balancing | State::Lowering => {
                 Err(Inhibits::RUNNING)
             }
+            #[cfg(feature = "identify")]
+            State::Identifying => Err(Inhibits::RUNNING),
             State::Fault => Err(Inhibits::FAULT),
         }
     }
@@ -153,6 +165,8 @@ impl Supervisor {
             State::Driving | State::Armed | State::Raising | State::Balancing | State::Lowering => {
                 Inhibits::RUNNING
             }
+            #[cfg(feature = "identify")]
+            State::Identifying => Inhibits::RUNNING,
             State::Fault => Inhibits::FAULT,
         })
     }
@@ -164,6 +178,17 @@ impl Supervisor {
     pub fn start_driving(&mut self, other: Inhibits) -> Result<(), Inhibits> {
         self.arming_inhibits().union(other).err_if_any()?;
         self.state = State::Driving;
+        Ok(())
+    }
+
+    /// Turns the motor on to shake the rig, unless the state or one of `other` inhibits it.
+    ///
+    /// # Errors
+    /// All inhibits that hold.
+    #[cfg(feature = "identify")]
+    pub fn start_identifying(&mut self, other: Inhibits) -> Result<(), Inhibits> {
+        self.arming_inhibits().union(other).err_if_any()?;
+        self.state = State::Identifying;
         Ok(())
     }
 
@@ -230,8 +255,8 @@ mod tests {
     use State::*;
     use std::vec::Vec;
 
-    const STATES: [State; 9] =
-        [Disarmed, Homing, Calibrated, Driving, Armed, Raising, Balancing, Lowering, Fault];
+    const STATES: [State; 10] =
+        [Disarmed, Homing, Calibrated, Driving, Identifying, Armed, Raising, Balancing, Lowering, Fault];
 
     #[derive(Debug, Clone, Copy)]
     enum Event {
@@ -242,6 +267,8 @@ mod tests {
         CompleteHoming,
         StartDriving,
         StartDrivingInhibited,
+        StartIdentifying,
+        StartIdentifyingInhibited,
         Arm,
         ArmInhibited,
         StartBalancing,
@@ -274,6 +301,8 @@ mod tests {
             Event::CompleteHoming => return supervisor.complete_homing(),
             Event::StartDriving => return supervisor.start_driving(Inhibits::NONE),
             Event::StartDrivingInhibited => return supervisor.start_driving(Inhibits::MOVING),
+            Event::StartIdentifying => return supervisor.start_identifying(Inhibits::NONE),
+            Event::StartIdentifyingInhibited => return supervisor.start_identifying(Inhibits::MOTOR),
             Event::Arm => return supervisor.arm(Inhibits::NONE),
             Event::ArmInhibited => return supervisor.arm(Inhibits::TILTED),
             Event::StartBalancing => supervisor.start_balancing(),
@@ -292,23 +321,26 @@ mod tests {
     #[test]
     fn every_event_in_every_state_leads_where_the_table_says() {
         use Event::*;
-        let known = [Calibrated, Driving, Armed, Raising, Balancing, Lowering];
-        let running = [Driving, Armed, Raising, Balancing, Lowering, Fault];
-        let not_calibrated = [Disarmed, Homing, Driving, Armed, Raising, Balancing, Lowering, Fault];
-        let not_balancing = [Disarmed, Homing, Calibrated, Driving, Armed, Raising, Lowering, Fault];
+        let known = [Calibrated, Driving, Identifying, Armed, Raising, Balancing, Lowering];
+        let running = [Driving, Identifying, Armed, Raising, Balancing, Lowering, Fault];
+        let not_calibrated =
+            [Disarmed, Homing, Driving, Identifying, Armed, Raising, Balancing, Lowering, Fault];
+        let not_balancing =
+            [Disarmed, Homing, Calibrated, Driving, Identifying, Armed, Raising, Lowering, Fault];
         // Where an event leads to from each of STATES, if not to the same state.
         let but = |changes: &[(State, State)]| {
             STATES.map(|from| changes.iter().find(|(state, _)| *state == from).map_or(from, |(_, to)| *to))
         };
         // One row per event: the state it leads to from each of STATES, and where it is refused.
-        let table: [(Event, [State; 9], &[State]); 18] = [
-            (Trip, [Fault; 9], &[]),
-            (TripEncoder, [Fault; 9], &[]),
+        let table: [(Event, [State; 10], &[State]); 20] = [
+            (Trip, [Fault; 10], &[]),
+            (TripEncoder, [Fault; 10], &[]),
             (
                 Disarm,
                 but(&[
                     (Homing, Disarmed),
                     (Driving, Calibrated),
+                    (Identifying, Calibrated),
                     (Armed, Calibrated),
                     (Raising, Calibrated),
                     (Balancing, Calibrated),
@@ -320,6 +352,8 @@ mod tests {
             (CompleteHoming, but(&[(Disarmed, Calibrated), (Homing, Calibrated)]), &running),
             (StartDriving, but(&[(Calibrated, Driving)]), &not_calibrated),
             (StartDrivingInhibited, STATES, &STATES),
+            (StartIdentifying, but(&[(Calibrated, Identifying)]), &not_calibrated),
+            (StartIdentifyingInhibited, STATES, &STATES),
             (Arm, but(&[(Calibrated, Armed)]), &not_calibrated),
             (ArmInhibited, STATES, &STATES),
             (StartBalancing, but(&[(Armed, Balancing)]), &[]),

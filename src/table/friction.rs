@@ -3,7 +3,6 @@
 use nalgebra::SMatrix;
 
 use crate::table::part::part;
-use crate::table::scalar::Scalar;
 
 part! {
     /// Coulomb friction of `NY` axes, the cart's and the joints', and what it does to `NX` states. At a rate ω it is

@@ -7,6 +7,7 @@ use upright::protocol::frame::{self, Receiver};
 use upright::protocol::message::{Answer, Command, Info, Message, PROTOCOL, Reply, Request, Telemetry};
 use upright::protocol::serial_link::{MAX_COMMAND, MAX_MESSAGE};
 use upright::protocol::simulated_pins::Sabotage;
+use upright::protocol::tick_log::TickLog;
 use upright::supervision::bench_drive::MotorSign;
 use upright::supervision::fault::Fault;
 use upright::supervision::sign_check::Signs;
@@ -19,6 +20,9 @@ use crate::table::{MAX_SENSORS, MAX_STATES};
 
 /// Telemetry of a firmware of any size: its frames are the same bytes whatever the capacity of the lists.
 pub type AnyTelemetry = Telemetry<MAX_STATES, MAX_SENSORS>;
+
+/// A part of the log of every tick, of a firmware of any size.
+pub type AnyTickLog = TickLog<MAX_SENSORS>;
 
 /// Time between two heartbeats of a host that commands the set-point (s).
 pub const HEARTBEAT_S: f64 = 0.025;
@@ -33,6 +37,7 @@ pub struct Session<'a> {
     sabotage: Option<Sabotage>,
     telemetry: VecDeque<AnyTelemetry>,
     replies: VecDeque<(u64, Answer)>,
+    logs: VecDeque<AnyTickLog>,
     status: Status,
     fault: Option<Fault>,
     ticks: u32,
@@ -52,6 +57,7 @@ impl<'a> Session<'a> {
             sabotage: None,
             telemetry: VecDeque::new(),
             replies: VecDeque::new(),
+            logs: VecDeque::new(),
             status: Status { state: State::Disarmed, signs: Signs::Unchecked, motor: MotorSign::Unchecked },
             fault: None,
             ticks: 0,
@@ -125,6 +131,7 @@ impl<'a> Session<'a> {
                     self.telemetry.push_back(telemetry);
                 }
                 Some(Ok(Message::Reply(Reply { id, answer }))) => self.replies.push_back((id, answer)),
+                Some(Ok(Message::Log(log))) => self.logs.push_back(log),
                 Some(Err(_)) => self.damaged += 1,
                 None => (),
             }
@@ -158,6 +165,11 @@ impl<'a> Session<'a> {
     /// Takes the oldest telemetry that was not yet taken.
     pub fn next_telemetry(&mut self) -> Option<AnyTelemetry> {
         self.telemetry.pop_front()
+    }
+
+    /// Takes the oldest part of the log of every tick that was not yet taken.
+    pub fn next_log(&mut self) -> Option<AnyTickLog> {
+        self.logs.pop_front()
     }
 
     /// Takes the oldest answer that was not yet taken, with the number of its command.

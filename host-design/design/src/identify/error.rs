@@ -82,6 +82,9 @@ pub enum IdentifyError {
         "{0} does not move in the log: it is blocked, or its encoder is not connected; nothing is identified"
     )]
     Still(String),
+    /// The firmware sends no log.
+    #[error("the firmware has sent no log of its ticks: build its image with --identify")]
+    NothingRecorded,
     /// No channel moves.
     #[error(
         "nothing moves in the log; is the motor connected and its supply on, and were the links released?"

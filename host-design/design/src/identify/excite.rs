@@ -25,7 +25,7 @@ const LINES: [usize; 2] = [16, 24];
 /// Its band, in parts of the lowest and the highest hanging mode.
 const BAND: [f64; 2] = [0.25, 1.6];
 /// Largest angle of a link from hanging that is aimed at (rad), and share of the rail.
-const AIM: (f64, f64) = (60.0 * PI / 180.0, 0.6);
+pub(super) const AIM: (f64, f64) = (60.0 * PI / 180.0, 0.6);
 /// The motor goes off beyond this share of the rail.
 const STOP: f64 = 0.85;
 /// Amplitudes that are tried, one after the other, if the machine moves more than the model.
@@ -85,9 +85,14 @@ impl Excitation {
 
     /// Force at `time_s` with the cart at `x` (m) and `speed` (m/s).
     pub fn force_n(&self, time_s: f64, x: f64, speed: f64) -> f64 {
+        self.sines_n(time_s) - self.stiffness_n_per_m * x - self.damping_n_s_per_m * speed
+    }
+
+    /// The same without spring and damper.
+    pub fn sines_n(&self, time_s: f64) -> f64 {
         let ramp = (time_s / RAMP_S).min((self.duration_s - time_s) / RAMP_S).clamp(0.0, 1.0);
         let sum: f64 = self.lines.iter().map(|[f, phase]| libm::cos(TAU * f * time_s + phase)).sum();
-        self.amplitude_n * ramp * sum - self.stiffness_n_per_m * x - self.damping_n_s_per_m * speed
+        self.amplitude_n * ramp * sum
     }
 
     /// Bisects the largest amplitude for which the model stays within [`AIM`] and the force limit.
@@ -95,8 +100,6 @@ impl Excitation {
         let record = Record::of(rig, &[], 1);
         let model = record.model(chain.gravity_m_per_s2);
         let mut p: Vec<f64> = priors(rig, chain, false).iter().map(|prior| prior.value).collect();
-        // Back-EMF is made up for.
-        let model = Model { back_emf: 0.0, ..model };
         p[Layout { links: chain.links.len() }.delay()] = 0.0;
         let weight = p[Layout::TOTAL_MASS] * chain.gravity_m_per_s2;
         let limit = rig.force_limit_n().unwrap_or(f64::INFINITY);
@@ -135,7 +138,7 @@ impl Excitation {
 }
 
 /// Half of the shorter side of the rail (m).
-fn half_rail(chain: &Chain) -> f64 {
+pub(super) fn half_rail(chain: &Chain) -> f64 {
     let [low, high] = chain.cart.travel_m;
     high.min(-low)
 }

@@ -5,6 +5,7 @@
 use std::io::{self, Read};
 use std::path::Path;
 
+use upright::protocol::tick_log::OFF;
 use upright::table::checksum::crc32;
 
 use super::error::LogError;
@@ -47,7 +48,7 @@ pub struct Header {
 pub struct Tick {
     /// Number of the tick.
     pub number: u32,
-    /// Applied duty or force, 32767 at full scale.
+    /// Applied duty or force, 32767 at full scale; [`OFF`] while the motor is off, and turns freely.
     pub drive: i16,
     /// Supply (mV); 0 if it is not measured.
     pub supply_mv: u16,
@@ -204,7 +205,7 @@ impl Log {
 
     /// What drove the cart in a tick: a duty, or a force (N).
     pub fn drive(&self, tick: &Tick) -> f64 {
-        let part = f64::from(tick.drive) / f64::from(i16::MAX);
+        let part = if tick.drive == OFF { 0.0 } else { f64::from(tick.drive) / f64::from(i16::MAX) };
         match self.header.drive {
             DriveScale::Duty => part,
             DriveScale::Force(full_n) => part * full_n,

@@ -2,6 +2,8 @@
 //!
 //! - [`Log`]: every tick's counters and drive, as a file.
 //! - [`Excitation`], [`shake`]: what shakes the machine, and the log of a simulated one.
+//! - [`shake_with`]: the log of a simulated machine that the whole firmware shakes; [`Feed`] and [`Recorder`] are the host's
+//!   part of it.
 //! - [`identify`]: first the wiring, then multiple shooting, then prediction error, then deviations and a verdict.
 //! - [`Realised`]: the numbers of a rig file with the identified parameters.
 //!
@@ -12,6 +14,7 @@ mod covariance;
 mod error;
 mod estimate;
 mod excite;
+mod feed;
 mod log;
 mod model;
 mod normal;
@@ -19,19 +22,24 @@ mod parameters;
 mod prediction;
 mod realise;
 mod record;
+mod recorder;
 mod shooting;
 mod step;
 mod verdict;
 mod wiring;
+mod with_firmware;
 
 pub use error::{IdentifyError, LogError};
 pub use estimate::{Estimate, Identification, Progress, Settings, identify};
 pub use excite::{Excitation, shake};
+pub use feed::Feed;
 pub use log::{CONTACTS, DriveScale, Header, Log, Tick};
 pub use parameters::Kind;
 pub use realise::{Realised, RealisedLink};
+pub use recorder::Recorder;
 pub use verdict::{ChannelFit, Predicted, Refusal};
 pub use wiring::{Wiring, WiringFound};
+pub use with_firmware::{ShakeError, Shaken, shake_with};
 
 use crate::rig::{Chain, PlantDescription, Rig};
 use model::Input;

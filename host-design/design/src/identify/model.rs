@@ -21,8 +21,6 @@ use super::parameters::Layout;
 pub(super) struct Model {
     pub(super) layout: Layout,
     pub(super) gravity: f64,
-    /// e (N·s/m).
-    pub(super) back_emf: f64,
     /// ε of the cart (m/s) and of the joints (rad/s).
     pub(super) smoothing: [f64; 2],
 }
@@ -35,6 +33,8 @@ pub(super) struct Input {
     pub(super) by_delay: f64,
     /// By the dead zone (N/V).
     pub(super) by_dead_zone: f64,
+    /// e: back-EMF as damping (N·s/m); 0 while the motor turns freely.
+    pub(super) back_emf: f64,
 }
 
 /// Accelerations at one state, and their derivatives.
@@ -98,7 +98,7 @@ impl Local {
     }
 
     /// Accelerations at the state `at` with the parameters `p`.
-    pub(super) fn accelerate(&mut self, model: &Model, p: &[f64], at: &[f64], force: f64) {
+    pub(super) fn accelerate(&mut self, model: &Model, p: &[f64], at: &[f64], input: &Input) {
         let (n, m, layout) = (model.layout.links, model.coordinates(), model.layout);
         let (v, w) = (at[m], &at[m + 1..]);
         let (total, (slope_sine, slope_cosine)) = (p[Layout::TOTAL_MASS], libm::sincos(p[layout.tilt()]));
@@ -108,8 +108,10 @@ impl Local {
         let (sine, cosine) = (&self.sine, &self.cosine);
         let right = &mut self.acceleration;
         self.factors[0] = total;
-        right[0] =
-            force - model.back_emf * v - model.friction(p, 0, v)[0] - model.gravity * total * slope_sine;
+        right[0] = input.force
+            - input.back_emf * v
+            - model.friction(p, 0, v)[0]
+            - model.gravity * total * slope_sine;
         let mut below = 0.0;
         for j in 0..n {
             let a = p[layout.first_moment(j)];
@@ -136,9 +138,9 @@ impl Local {
 
     /// Accelerations, and their derivatives: with the equations written r = 0, `-M⁻¹ ∂r`.
     pub(super) fn differentiate(&mut self, model: &Model, p: &[f64], at: &[f64], input: &Input) {
-        self.accelerate(model, p, at, input.force);
+        self.accelerate(model, p, at, input);
         self.jacobian.fill(0.0);
-        self.by_state(model, p, at);
+        self.by_state(model, p, at, input);
         if self.columns > model.states() {
             self.by_parameters(model, p, at, input);
         }
@@ -146,13 +148,13 @@ impl Local {
     }
 
     /// `-∂r` by the state.
-    fn by_state(&mut self, model: &Model, p: &[f64], at: &[f64]) {
+    fn by_state(&mut self, model: &Model, p: &[f64], at: &[f64], input: &Input) {
         let (n, m, layout, columns) = (model.layout.links, model.coordinates(), model.layout, self.columns);
         let (v, w) = (at[m], &at[m + 1..]);
         let (xdd, wdot) = (self.acceleration[0], &self.acceleration[1..]);
         let (sine, cosine, by) = (&self.sine, &self.cosine, &mut self.jacobian);
         let (slope_sine, slope_cosine) = libm::sincos(p[layout.tilt()]);
-        by[m] -= model.back_emf + model.friction(p, 0, v)[1];
+        by[m] -= input.back_emf + model.friction(p, 0, v)[1];
         let mut below = 0.0;
         for j in 0..n {
             let (a, row) = (p[layout.first_moment(j)], (j + 1) * columns);
@@ -294,12 +296,8 @@ pub(super) mod tests {
     pub(in crate::identify) fn triple() -> (Model, Vec<f64>, ChainPlant<3>) {
         let rig = Rig::from_path(Path::new("../../rigs/triple-glueck-eder-kugi.toml")).unwrap();
         let PlantDescription::Chain(chain) = &rig.plant else { panic!("a chain") };
-        let model = Model {
-            layout: Layout { links: 3 },
-            gravity: chain.gravity_m_per_s2,
-            back_emf: 0.0,
-            smoothing: [0.004, 0.02],
-        };
+        let model =
+            Model { layout: Layout { links: 3 }, gravity: chain.gravity_m_per_s2, smoothing: [0.004, 0.02] };
         let p = priors(&rig, chain, true).iter().map(|prior| prior.value).collect();
         (model, p, ChainPlant::of(chain).unwrap())
     }
@@ -311,7 +309,7 @@ pub(super) mod tests {
         let (model, mut p, plant) = triple();
         (0..=3).for_each(|contact| p[model.layout.dry(contact)] = 0.0);
         let mut local = Local::new(model.layout, false);
-        local.accelerate(&model, &p, &AT, 17.0);
+        local.accelerate(&model, &p, &AT, &Input { force: 17.0, ..Input::default() });
         let state = ChainState { x: 0.1, xdot: -0.7, phi: [2.0, -1.1, 0.4], phidot: [3.0, -5.0, 1.5] };
         let rate = plant.derivative(&state, 17.0, &[0.0; 3]);
         let wanted = [rate.xdot, rate.phidot[0], rate.phidot[1], rate.phidot[2]];
@@ -325,11 +323,16 @@ pub(super) mod tests {
         let (model, mut p, _) = triple();
         p[model.layout.tilt()] = 0.1;
         let mut exact = Local::new(model.layout, true);
-        exact.differentiate(&model, &p, &AT, &Input { force: 17.0, by_delay: 2.0, by_dead_zone: -3.0 });
+        exact.differentiate(
+            &model,
+            &p,
+            &AT,
+            &Input { force: 17.0, by_delay: 2.0, by_dead_zone: -3.0, back_emf: 0.7 },
+        );
         let columns = 8 + model.layout.of_motion();
         let mut other = Local::new(model.layout, false);
         let mut at = |p: &[f64], state: &[f64], force: f64| {
-            other.accelerate(&model, p, state, force);
+            other.accelerate(&model, p, state, &Input { force, back_emf: 0.7, ..Input::default() });
             other.acceleration.clone()
         };
         for column in 0..columns {

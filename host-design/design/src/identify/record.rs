@@ -5,6 +5,8 @@
 
 use core::f64::consts::PI;
 
+use upright::protocol::tick_log::OFF;
+
 use super::error::IdentifyError;
 use super::log::{DriveScale, Log};
 use super::model::{Input, Model};
@@ -22,8 +24,8 @@ const SHORTEST_PIECE_S: f64 = 1.0;
 pub(super) struct Piece {
     /// Deviations from hanging (m, rad), one row of m channels per sample.
     pub(super) y: Vec<f64>,
-    /// Voltage, or force without a motor, of each tick.
-    drive: Vec<f64>,
+    /// Voltage, or force without a motor, of each tick; none while the motor is off.
+    drive: Vec<Option<f64>>,
 }
 
 /// The samples of all logs.
@@ -73,11 +75,12 @@ impl Record {
         let supply = rig.actuator.motor.as_ref().map_or(0.0, |motor| motor.supply_v);
         let drive = |index: usize| {
             let tick = &ticks[index];
-            match log.header.drive {
+            let drive = match log.header.drive {
                 DriveScale::Force(_) => log.drive(tick),
                 DriveScale::Duty if tick.supply_mv == 0 => log.drive(tick) * supply,
                 DriveScale::Duty => log.drive(tick) * f64::from(tick.supply_mv) * 1e-3,
-            }
+            };
+            (tick.drive != OFF).then_some(drive)
         };
         let mut from = 0;
         for to in 1..=ticks.len() {
@@ -137,7 +140,12 @@ impl Record {
     /// The same with the motor reversed.
     pub(super) fn reversed(&self) -> Self {
         let mut record = self.clone();
-        record.pieces.iter_mut().flat_map(|piece| &mut piece.drive).for_each(|drive| *drive = -*drive);
+        record
+            .pieces
+            .iter_mut()
+            .flat_map(|piece| &mut piece.drive)
+            .flatten()
+            .for_each(|drive| *drive = -*drive);
         record
     }
 
@@ -147,12 +155,13 @@ impl Record {
         let (delay, dead_zone) = (p[layout.delay()], p[layout.dead_zone()]);
         let drive = &self.pieces[piece].drive;
         let force = |tick: Option<usize>| {
-            let value = tick.map_or(0.0, |tick| drive[tick]);
+            let value = tick.and_then(|tick| drive[tick]).unwrap_or_default();
             let Some(motor) = &self.motor else { return [value, 0.0] };
             let per_volt = motor.volts_per_speed() / motor.resistance_ohm;
             let left = value.abs() - dead_zone;
             if left > 0.0 { [per_volt * left.copysign(value), -per_volt.copysign(value)] } else { [0.0; 2] }
         };
+        let back_emf = self.back_emf();
         let mut inputs = Vec::with_capacity(self.samples(piece));
         for first in (0..drive.len()).step_by(self.stride) {
             let ticks = first..(first + self.stride).min(drive.len());
@@ -162,6 +171,9 @@ impl Record {
                 let now = tick.checked_sub(self.delay_ticks);
                 let ([new, new_by], [old, old_by]) =
                     (force(now), force(now.and_then(|tick| tick.checked_sub(1))));
+                if drive[tick].is_some() {
+                    input.back_emf += share * back_emf;
+                }
                 input.force += share * (new + delay * (old - new));
                 input.by_delay += share * (old - new);
                 input.by_dead_zone += share * (new_by + delay * (old_by - new_by));
@@ -238,7 +250,7 @@ impl Record {
     }
 
     /// Back-EMF as damping (N·s/m).
-    pub(super) fn back_emf(&self) -> f64 {
+    fn back_emf(&self) -> f64 {
         self.motor.as_ref().map_or(0.0, |motor| {
             let per_speed = motor.volts_per_speed();
             per_speed * per_speed / motor.resistance_ohm
@@ -250,7 +262,6 @@ impl Record {
         Model {
             layout: Layout { links: self.channels - 1 },
             gravity,
-            back_emf: self.back_emf(),
             smoothing: super::parameters::SMOOTHING,
         }
     }

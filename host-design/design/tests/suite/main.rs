@@ -4,8 +4,8 @@ mod design_properties;
 mod identify;
 mod known_friction;
 mod lockstep;
-// The paper's printed values are defined once, in the tool.
 mod log_fuzz;
+// The paper's printed values are defined once, in the tool.
 #[allow(dead_code, unreachable_pub)]
 #[path = "../../../tool/src/reproduce/published.rs"]
 mod paper_numbers;

@@ -20,6 +20,8 @@ pub const PROFILE: &str = "firmware";
 pub enum Kind {
     /// For a board.
     Board(Board),
+    /// For a board, to shake its rig and to log every tick.
+    Identification(Board),
     /// For QEMU, pins as files.
     InTheLoop,
     /// For QEMU, pins as a serial line.
@@ -27,12 +29,26 @@ pub enum Kind {
 }
 
 impl Kind {
-    /// The cargo feature that makes it.
-    pub fn feature(self) -> &'static str {
+    /// The cargo features that make it, with commas.
+    fn features(self) -> String {
         match self {
-            Kind::Board(board) => board.name(),
-            Kind::InTheLoop => "in-the-loop",
-            Kind::InTheLoopUsart => "in-the-loop-usart",
+            Kind::Board(board) => board.name().to_owned(),
+            Kind::Identification(board) => format!("{},identify", board.name()),
+            Kind::InTheLoop => "in-the-loop".to_owned(),
+            Kind::InTheLoopUsart => "in-the-loop-usart".to_owned(),
+        }
+    }
+
+    /// The begin of its file's name.
+    fn name(self) -> String {
+        self.features().replace(',', "-")
+    }
+
+    /// The board that it is for.
+    fn board(self) -> Option<Board> {
+        match self {
+            Kind::Board(board) | Kind::Identification(board) => Some(board),
+            Kind::InTheLoop | Kind::InTheLoopUsart => None,
         }
     }
 }
@@ -82,7 +98,7 @@ pub enum ImageError {
 /// [`ImageError`] if there is no compiler, or it fails.
 pub fn build(kind: Kind) -> Result<PathBuf, ImageError> {
     check_encoders(kind, SENSORS)?;
-    compile(kind, None, kind.feature())
+    compile(kind, None, &kind.name())
 }
 
 /// [`build`] for tests: see [`if_possible`].
@@ -117,7 +133,7 @@ pub fn build_for(kind: Kind, rig: &Rig, table: &TableValues) -> Result<PathBuf, 
     let source = gains_source(rig, table);
     // An included file cannot have module documentation.
     let included = source.lines().filter(|line| !line.starts_with("//!")).collect::<Vec<_>>().join("\n");
-    let mut name = format!("{}-{:016x}-{:08x}", kind.feature(), rig.hash(), table.crc());
+    let mut name = format!("{}-{:016x}-{:08x}", kind.name(), rig.hash(), table.crc());
     if let Some(crc) = table.swing_up_crc() {
         name += &format!("-{crc:08x}");
     }
@@ -130,8 +146,8 @@ pub fn build_for(kind: Kind, rig: &Rig, table: &TableValues) -> Result<PathBuf, 
 }
 
 fn check_encoders(kind: Kind, needed: usize) -> Result<(), ImageError> {
-    match kind {
-        Kind::Board(board) if needed > board.encoders() => Err(ImageError::Encoders { board, needed }),
+    match kind.board() {
+        Some(board) if needed > board.encoders() => Err(ImageError::Encoders { board, needed }),
         _ => Ok(()),
     }
 }
@@ -151,15 +167,15 @@ fn compile(kind: Kind, gains: Option<&Path>, name: &str) -> Result<PathBuf, Imag
     let features = match gains {
         Some(gains) => {
             cargo.env("UPRIGHT_GAINS", gains);
-            format!("{},gains-from-env", kind.feature())
+            format!("{},gains-from-env", kind.features())
         }
-        None => kind.feature().to_owned(),
+        None => kind.features(),
     };
     cargo
         .current_dir(&root)
         .args(["rustc", "--quiet", "--package", "upright", "--bin", "upright-image"])
         .args(["--profile", PROFILE, "--target", TARGET, "--features", &features]);
-    if let Kind::Board(_) = kind {
+    if kind.board().is_some() {
         // The image alone, not the library: there is the part of a tick that has to be fast.
         cargo.args(["--", "-C", "opt-level=s"]);
     }

@@ -13,11 +13,18 @@ use super::elf::{Image, Item};
 pub const FLASH_LIMIT: u32 = 24 * 1024;
 /// Limit of the flash of an image for a board with motions: their tables, and the nonlinear model (bytes).
 pub const FLASH_LIMIT_WITH_MOTIONS: u32 = 128 * 1024;
+/// Limit of the flash of an image for identification, without motions (bytes).
+pub const FLASH_LIMIT_FOR_IDENTIFICATION: u32 = 30 * 1024;
 /// Limit of the static RAM of an image for a board: variables, without the stack (bytes).
 pub const RAM_LIMIT: u32 = 4 * 1024;
+/// The same of an image for identification.
+pub const RAM_LIMIT_FOR_IDENTIFICATION: u32 = 5 * 1024;
 
 /// The table of motions; an image without motions has none.
 const MOTIONS: &str = "upright::gains::SWING_UP";
+
+/// The end of the name of a function that only an image for identification has.
+const SHAKES: &str = ">::shake";
 
 /// Bytes of an image.
 #[derive(Debug, Clone, PartialEq, Eq, serde::Serialize)]
@@ -28,6 +35,8 @@ pub struct Size {
     pub flash_limit: u32,
     /// All variables, without the stack.
     pub ram: u32,
+    /// What that is limited to.
+    pub ram_limit: u32,
     /// By section, in the order of addresses.
     pub sections: Vec<Part>,
     /// By crate, the largest first. Code belongs to the crate of its source line, also where it is inlined.
@@ -82,8 +91,14 @@ pub fn size(image: &Image) -> Result<Size, SizeError> {
     let mut crates: Vec<Part> = shares.into_iter().map(|(name, part)| Part { name, ..part }).collect();
     crates.sort_by_key(|part| std::cmp::Reverse((part.flash, part.ram)));
     let has_motions = image.data.iter().any(|item| item.name == MOTIONS && item.size > 0);
-    let flash_limit = if has_motions { FLASH_LIMIT_WITH_MOTIONS } else { FLASH_LIMIT };
-    Ok(Size { flash, flash_limit, ram, sections, crates })
+    let shakes = image.functions.iter().any(|item| item.name.ends_with(SHAKES));
+    let flash_limit = match (has_motions, shakes) {
+        (true, _) => FLASH_LIMIT_WITH_MOTIONS,
+        (false, true) => FLASH_LIMIT_FOR_IDENTIFICATION,
+        (false, false) => FLASH_LIMIT,
+    };
+    let ram_limit = if shakes { RAM_LIMIT_FOR_IDENTIFICATION } else { RAM_LIMIT };
+    Ok(Size { flash, flash_limit, ram, ram_limit, sections, crates })
 }
 
 /// Bytes of machine code by the crate of their source line.

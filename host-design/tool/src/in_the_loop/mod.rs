@@ -7,6 +7,6 @@ mod qemu;
 mod relay;
 
 pub use board::{Compared, Cycles, Event, Events, Figures, RULES, Span, TooLong, VirtualBoard, measure};
-pub use place::{Place, RunError, run, run_compared};
+pub use place::{Place, RunError, run, run_compared, run_shaken};
 pub use qemu::{Emulator, EmulatorError, Link};
 pub use relay::{RelayError, serve};

@@ -4,6 +4,7 @@ use std::path::Path;
 
 use upright_board::Conditions;
 use upright_design::harness::{HarnessError, Recording, Target, record, with_firmware};
+use upright_design::identify::{IdentifyError, Log, ShakeError, shake_with};
 use upright_design::rig::Rig;
 use upright_design::simulate::Scenario;
 use upright_design::table::TableValues;
@@ -41,6 +42,18 @@ pub enum RunError {
     /// QEMU does not run it.
     #[error(transparent)]
     Emulator(#[from] EmulatorError),
+    /// The rig cannot be shaken, or does not do what it should.
+    #[error(transparent)]
+    Shaken(#[from] IdentifyError),
+}
+
+impl From<ShakeError> for RunError {
+    fn from(error: ShakeError) -> Self {
+        match error {
+            ShakeError::Harness(error) => error.into(),
+            ShakeError::Identify(error) => error.into(),
+        }
+    }
 }
 
 impl Place<'_> {
@@ -91,6 +104,20 @@ pub fn run(
     place: Place<'_>,
 ) -> Result<Recording, RunError> {
     place.with_target(table, |target| Ok(record(rig, table, scenario, target)?))
+}
+
+/// The log of the machine of `rig` that the firmware of `table` shakes: see [`shake_with`].
+///
+/// # Errors
+/// [`RunError`] if the firmware does not run or turns the motor off, or the cart does not follow.
+pub fn run_shaken(
+    rig: &Rig,
+    table: &TableValues,
+    duration_s: f64,
+    seed: u64,
+    place: Place<'_>,
+) -> Result<Log, RunError> {
+    place.with_target(table, |target| Ok(shake_with(rig, table, target, duration_s, seed)?))
 }
 
 /// Runs `scenario` on the virtual board as [`run`] does, and in each tick the firmware on the host with what the

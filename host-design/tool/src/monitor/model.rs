@@ -138,7 +138,7 @@ impl Monitor {
                 Some(Ok(Message::Reply(Reply { id, answer }))) => self.answered(id, answer, now),
                 Some(Err(_)) => self.unreadable = self.unreadable.saturating_add(1),
                 // Until the firmware has named its version of the messages, telemetry may mean anything.
-                Some(Ok(Message::Telemetry(_))) | None => (),
+                Some(Ok(Message::Telemetry(_) | Message::Log(_))) | None => (),
             }
         }
         all

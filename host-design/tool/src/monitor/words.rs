@@ -16,6 +16,7 @@ pub fn state(state: State) -> &'static str {
         State::Homing => "homing",
         State::Calibrated => "calibrated: motor off",
         State::Driving => "driving: the motor pushes the cart while the key is held",
+        State::Identifying => "identifying: the motor shakes the links",
         State::Armed => "armed: waits until all links are upright and still",
         State::Raising => "raising: the motor is on",
         State::Balancing => "balancing: the motor is on",

@@ -24,6 +24,7 @@ pub(super) fn greeting(rig: &Rig, table: &TableValues, place: &str, defects: Opt
         State::Homing,
         State::Calibrated,
         State::Driving,
+        State::Identifying,
         State::Armed,
         State::Raising,
         State::Balancing,

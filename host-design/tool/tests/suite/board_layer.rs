@@ -58,6 +58,7 @@ impl Powered {
             match self.frames.push::<Message<STATES, SENSORS>>(byte.value) {
                 Some(Ok(Message::Telemetry(telemetry))) => self.telemetry.push(telemetry),
                 Some(Ok(Message::Reply(reply))) => self.replies.push(reply),
+                Some(Ok(Message::Log(_))) => panic!("nobody has asked for a log"),
                 Some(Err(error)) => panic!("{error:?}"),
                 None => {}
             }

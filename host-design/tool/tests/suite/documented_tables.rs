@@ -7,7 +7,10 @@ use ratatui::crossterm::event::{KeyCode, KeyEvent, KeyModifiers};
 use upright::supervision::fault::Fault;
 use upright::supervision::inhibits::Inhibits;
 use upright_tool::campaign::Kind;
-use upright_tool::image::{FLASH_LIMIT, FLASH_LIMIT_WITH_MOTIONS, RAM_LIMIT};
+use upright_tool::image::{
+    FLASH_LIMIT, FLASH_LIMIT_FOR_IDENTIFICATION, FLASH_LIMIT_WITH_MOTIONS, RAM_LIMIT,
+    RAM_LIMIT_FOR_IDENTIFICATION,
+};
 use upright_tool::monitor::{Action, action, request};
 
 use crate::documents::{read, root};
@@ -246,6 +249,7 @@ fn the_page_about_the_board_names_the_limits_of_the_image() {
     };
     let page = read("docs/board.md");
     assert!(page.contains(&limits(FLASH_LIMIT, RAM_LIMIT)));
+    assert!(page.contains(&limits(FLASH_LIMIT_FOR_IDENTIFICATION, RAM_LIMIT_FOR_IDENTIFICATION)));
     assert!(page.contains(&format!("more than {} KiB of flash;", FLASH_LIMIT_WITH_MOTIONS / 1024)));
     assert!(!page.contains(&limits(2 * FLASH_LIMIT, RAM_LIMIT)));
 }

@@ -27,6 +27,7 @@ mod report_page;
 mod report_rigs;
 mod reproduce_numbers;
 mod robust_command;
+mod shaken;
 mod split_command;
 mod twin_door;
 mod twin_page;

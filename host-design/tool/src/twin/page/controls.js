@@ -186,7 +186,7 @@ export class Controls {
     state.dataset.state = latest.state;
     byId('now').textContent = latest.now === null ? '' : `now: ${latest.now}`;
     byId('inputs').textContent = latest.inputs;
-    const isOn = ['Driving', 'Armed', 'Raising', 'Balancing', 'Lowering'].includes(latest.state);
+    const isOn = ['Driving', 'Identifying', 'Armed', 'Raising', 'Balancing', 'Lowering'].includes(latest.state);
     const against = isOn ? [] : latest.against_arming;
     const shown = [...byId('against').children].map((element) => element.textContent);
     if (shown.join() !== against.join()) {

@@ -4,7 +4,7 @@ use std::io::Write;
 use std::path::PathBuf;
 
 use clap::Args;
-use upright_tool::image::Kind;
+use upright_tool::image::{Board, Kind};
 
 use super::board::BoardOption;
 use super::built;
@@ -21,17 +21,26 @@ use crate::failure::Failure;
 Examples:
   upright firmware build                                      with src/gains.rs as it is
   upright firmware build rigs/single-quanser-ip02.toml        with the gains and stored motions of a rig
-  upright firmware build --board nucleo-f446")]
+  upright firmware build --board nucleo-f446
+  upright firmware build rigs/single-quanser-ip02.toml --identify")]
 pub(crate) struct Build {
     /// Rig file (TOML), to be designed [default: the table in src/gains.rs]
     rig: Option<PathBuf>,
     #[command(flatten)]
     on: BoardOption,
+    /// The image for identification: it shakes the hanging rig and logs every tick, for `upright identify`
+    #[arg(long)]
+    identify: bool,
+}
+
+/// The usual image of a board, or that for identification.
+pub(super) fn kind(board: Board, identify: bool) -> Kind {
+    if identify { Kind::Identification(board) } else { Kind::Board(board) }
 }
 
 impl Build {
     pub(crate) fn run(self) -> Result<(), Failure> {
-        let image = built(Kind::Board(self.on.board), self.rig.as_deref())?;
+        let image = built(kind(self.on.board, self.identify), self.rig.as_deref())?;
         check_ticks(self.on.board, self.rig.as_deref(), &image)?;
         writeln!(std::io::stdout(), "{}", image.display())?;
         Ok(())

@@ -6,11 +6,10 @@ use std::path::PathBuf;
 
 use clap::Args;
 use serde_json::json;
-use upright_tool::image::{
-    Image, Kind, Part, RAM_LIMIT, StackBound, StackError, forbidden_functions, size, stack_bound,
-};
+use upright_tool::image::{Image, Part, StackBound, StackError, forbidden_functions, size, stack_bound};
 
 use super::board::BoardOption;
+use super::build::kind;
 use super::built;
 use crate::failure::Failure;
 
@@ -28,6 +27,9 @@ pub(crate) struct Size {
     rig: Option<PathBuf>,
     #[command(flatten)]
     on: BoardOption,
+    /// The image for identification, which may take 30 KiB of flash and 5 KiB of RAM
+    #[arg(long, conflicts_with = "elf")]
+    identify: bool,
     /// Measure this image instead of building one
     #[arg(long, value_name = "FILE", conflicts_with_all = ["rig", "board"])]
     elf: Option<PathBuf>,
@@ -40,7 +42,7 @@ impl Size {
     pub(crate) fn run(self) -> Result<(), Failure> {
         let path = match self.elf {
             Some(path) => path,
-            None => built(Kind::Board(self.on.board), self.rig.as_deref())?,
+            None => built(kind(self.on.board, self.identify), self.rig.as_deref())?,
         };
         let image = Image::read(&path)?;
         let (size, stack, forbidden) = (size(&image)?, stack_bound(&image), forbidden_functions(&image));
@@ -50,7 +52,7 @@ impl Size {
                 "image": path,
                 "flash": size.flash,
                 "ram": size.ram,
-                "limits": { "flash": size.flash_limit, "ram": RAM_LIMIT },
+                "limits": { "flash": size.flash_limit, "ram": size.ram_limit },
                 "sections": size.sections,
                 "crates": size.crates,
                 "stack": stack.as_ref().ok(),
@@ -79,7 +81,7 @@ fn wrong(
         }
     };
     limit("flash", size.flash, size.flash_limit);
-    limit("static RAM", size.ram, RAM_LIMIT);
+    limit("static RAM", size.ram, size.ram_limit);
     match stack {
         Ok(stack) => limit("stack", stack.bytes, stack.reserved),
         Err(error) => wrong.push(error.to_string()),
@@ -104,7 +106,7 @@ fn table(size: &upright_tool::image::Size, stack: &Result<StackBound, StackError
     rows("crate (bytes)", &size.crates);
     let all = [
         Part { name: "sum".to_owned(), flash: size.flash, ram: size.ram },
-        Part { name: "limit".to_owned(), flash: size.flash_limit, ram: RAM_LIMIT },
+        Part { name: "limit".to_owned(), flash: size.flash_limit, ram: size.ram_limit },
     ];
     rows("image (bytes)", &all);
     if let Ok(stack) = stack {

@@ -47,11 +47,20 @@ impl Target {
     /// Builds the image with the table of the rig, and says which one it is; on the host there is none. `link`
     /// connects the pins of an image in QEMU.
     pub(crate) fn built(self, link: Link, rig: &Rig, table: &TableValues) -> Result<Built, Failure> {
+        self.built_as(Kind::Board(BOARD), link, rig, table)
+    }
+
+    /// The same with the image for identification.
+    pub(crate) fn built_for_identification(self, rig: &Rig, table: &TableValues) -> Result<Built, Failure> {
+        self.built_as(Kind::Identification(BOARD), Link::Files, rig, table)
+    }
+
+    fn built_as(self, board: Kind, link: Link, rig: &Rig, table: &TableValues) -> Result<Built, Failure> {
         let kind = match (self, link) {
             (Target::Host, _) => return Ok(Built::Host),
             (Target::Qemu, Link::Files) => Kind::InTheLoop,
             (Target::Qemu, Link::Usart) => Kind::InTheLoopUsart,
-            (Target::Board, _) => Kind::Board(BOARD),
+            (Target::Board, _) => board,
         };
         let image = with_spinner("building the image", || image::build_for(kind, rig, table))?;
         if self == Target::Board {

@@ -1,0 +1,213 @@
+//! What a host tells a firmware that shakes its rig, tick by tick.
+
+use upright::protocol::message::Request;
+use upright::supervision::shaking::{AHEAD, FORCES, FULL, Shaking};
+
+use super::chain_of;
+use super::error::IdentifyError;
+use super::excite::{AIM, Excitation, half_rail};
+use super::log::Log;
+use crate::rig::Rig;
+use crate::table::TableValues;
+
+/// Begin and end of the low pulses along +x and against it (s).
+const PULSES_S: [[f64; 2]; 2] = [[0.2, 0.32], [0.7, 0.82]];
+/// Time after which the excitation begins (s).
+const LEAD_S: f64 = 1.2;
+/// Time over which the speed before and after a pulse is taken (s).
+const SPEED_S: f64 = 0.04;
+/// The force of a pulse has to change the speed by this part of what it does to the file's total mass alone.
+const FOLLOWS: f64 = 0.1;
+/// Time after which the amplitude is changed, if the rig moves too much or too little (s).
+const ADAPT_S: f64 = 4.0;
+/// The amplitude is raised if the rig moves less than this share of the aim, by at most this factor each time, and by at
+/// most this one altogether.
+const RAISE: (f64, f64, f64) = (0.8, 1.3, 3.0);
+/// It is lowered by this factor if the rig moves more.
+const LOWER: f64 = 0.7;
+/// Forces are sent as many ticks ahead.
+const SENT_AHEAD: u32 = 3 * AHEAD as u32 / 4;
+/// Room for spring and damper beside the largest force of the excitation.
+const ROOM: f64 = 1.5;
+
+/// The forces of one run: a short low pulse each way, then the excitation.
+#[derive(Debug, Clone)]
+pub struct Feed {
+    excitation: Excitation,
+    period_s: f64,
+    steps: Vec<f64>,
+    half_rail_m: f64,
+    pulse_n: f64,
+    most_n: f64,
+    /// Change of the speed by a pulse that the file expects (m/s).
+    jolt_m_per_s: f64,
+    /// Tick in which the shaking has begun.
+    begun: Option<u32>,
+    /// First tick whose force is not sent.
+    unsent: u32,
+    checked: usize,
+    /// Factor of the amplitude, and the tick from which on the motion is judged again.
+    gain: f64,
+    judged: u32,
+}
+
+impl Feed {
+    /// The forces for a rig, as its file has it.
+    ///
+    /// # Errors
+    /// [`IdentifyError`] if the rig has no chain with encoders.
+    pub fn new(rig: &Rig, table: &TableValues, duration_s: f64, seed: u64) -> Result<Self, IdentifyError> {
+        let chain = chain_of(rig)?;
+        let excitation = Excitation::of(rig, duration_s, seed)?;
+        let period_s = rig.tick.period_s;
+        let limit_n = f64::from(table.force_limit_n);
+        let pulse_n = f64::from(table.limits.bench_force_n).min(limit_n);
+        let ticks = (duration_s / period_s) as u32;
+        let peak_n =
+            (0..ticks).map(|tick| excitation.sines_n(f64::from(tick) * period_s).abs()).fold(0.0, f64::max);
+        let links: f64 = chain.links.iter().map(|link| link.mass_kg).sum();
+        let jolt_m_per_s = pulse_n * (PULSES_S[0][1] - PULSES_S[0][0]) / (chain.cart.mass_kg + links);
+        Ok(Self {
+            excitation,
+            period_s,
+            steps: rig.sensors().iter().map(|sensor| sensor.step()).collect(),
+            half_rail_m: half_rail(chain),
+            pulse_n,
+            most_n: (ROOM * RAISE.2 * peak_n).max(pulse_n).min(limit_n),
+            jolt_m_per_s,
+            begun: None,
+            unsent: 0,
+            checked: 0,
+            gain: 1.0,
+            judged: 0,
+        })
+    }
+
+    /// The request that begins it.
+    pub fn begin(&self) -> Request {
+        Request::Shake(Shaking {
+            most_n: self.most_n as f32,
+            stiffness_n_per_m: self.excitation.stiffness_n_per_m as f32,
+            damping_n_s_per_m: self.excitation.damping_n_s_per_m as f32,
+        })
+    }
+
+    /// The shaking has begun, and the log ends with tick `last`.
+    pub fn begun(&mut self, last: u32) {
+        self.begun = Some(last);
+        self.unsent = last + 1;
+        self.judged = last + self.ticks(LEAD_S + ADAPT_S);
+    }
+
+    /// Forces that are due, with the log as far as it is known.
+    ///
+    /// # Errors
+    /// [`IdentifyError::Excitation`] if the cart does not follow the pulses.
+    pub fn due(&mut self, log: &Log) -> Result<Vec<Request>, IdentifyError> {
+        let (Some(begun), Some(last)) = (self.begun, log.ticks().last().map(|tick| tick.number)) else {
+            return Ok(Vec::new());
+        };
+        self.check_pulses(log, begun)?;
+        if last >= self.judged {
+            self.adapt(log, last);
+        }
+        let mut requests = Vec::new();
+        // The last ticks are left to spring and damper.
+        let end = begun + self.ticks(LEAD_S + self.excitation.duration_s);
+        self.unsent = self.unsent.max(last + 1);
+        while self.unsent < end.min(last + SENT_AHEAD) {
+            let first = self.unsent;
+            let forces = core::array::from_fn(|index| {
+                let part =
+                    self.force_n(f64::from(first + index as u32 - begun) * self.period_s) / self.most_n;
+                (part.clamp(-1.0, 1.0) * f64::from(FULL)).round() as i8
+            });
+            requests.push(Request::Forces { first: first as u16, forces });
+            self.unsent += FORCES as u32;
+        }
+        Ok(requests)
+    }
+
+    /// Whether all forces are sent and the log has their ticks.
+    pub fn is_over(&self, log: &Log) -> bool {
+        let last = log.ticks().last().map_or(0, |tick| tick.number);
+        self.begun.is_some_and(|begun| last >= begun + self.ticks(LEAD_S + self.excitation.duration_s))
+    }
+
+    /// Whether [`begun`](Self::begun) was called.
+    pub fn has_begun(&self) -> bool {
+        self.begun.is_some()
+    }
+
+    fn ticks(&self, seconds: f64) -> u32 {
+        (seconds / self.period_s).ceil() as u32
+    }
+
+    /// Force at this time from the beginning on, without spring and damper.
+    fn force_n(&self, time_s: f64) -> f64 {
+        let is_in = |pulse: &[f64; 2]| (pulse[0]..pulse[1]).contains(&time_s);
+        match PULSES_S.iter().position(is_in) {
+            Some(0) => self.pulse_n,
+            Some(_) => -self.pulse_n,
+            None if time_s < LEAD_S => 0.0,
+            None => self.gain * self.excitation.sines_n(time_s - LEAD_S),
+        }
+    }
+
+    /// The cart has to follow each pulse, once it is in the log.
+    fn check_pulses(&mut self, log: &Log, begun: u32) -> Result<(), IdentifyError> {
+        let Some([from_s, to_s]) = PULSES_S.get(self.checked) else { return Ok(()) };
+        let [from, to] = [*from_s, to_s + 2.0 * SPEED_S].map(|at_s| begun + self.ticks(at_s));
+        let [Some(before), Some(after)] = [from, to].map(|at| self.speed(log, at)) else { return Ok(()) };
+        let sign = if self.checked == 0 { 1.0 } else { -1.0 };
+        self.checked += 1;
+        if sign * (after - before) < FOLLOWS * self.jolt_m_per_s {
+            return Err(IdentifyError::Excitation(format!(
+                "the cart does not follow a force of {:.2} N {}: its speed changes by {:.4} m/s, {:.4} m/s are expected; check \
+                 motor, belt and rail",
+                self.pulse_n,
+                if sign > 0.0 { "along +x" } else { "against +x" },
+                sign * (after - before),
+                self.jolt_m_per_s
+            )));
+        }
+        Ok(())
+    }
+
+    /// Speed of the cart just before a tick (m/s).
+    fn speed(&self, log: &Log, at: u32) -> Option<f64> {
+        let since = at.checked_sub(self.ticks(SPEED_S))?;
+        let [from, to] =
+            [since, at].map(|number| log.ticks().binary_search_by_key(&number, |tick| tick.number));
+        let (from, to) = (from.ok()?, to.ok()?);
+        let moved = log.counts(to)[0].wrapping_sub(log.counts(from)[0]) as i16;
+        Some(f64::from(moved) * self.steps[0] / (f64::from(at - since) * self.period_s))
+    }
+
+    /// Changes the amplitude after what moved since the last time.
+    fn adapt(&mut self, log: &Log, last: u32) {
+        let from = self.judged.saturating_sub(self.ticks(ADAPT_S));
+        self.judged = last + self.ticks(ADAPT_S);
+        let mut most = 0.0f64;
+        let first = log.ticks().partition_point(|tick| tick.number < from);
+        for index in first..log.ticks().len() {
+            let deviation = |channel: usize| {
+                let counts = log.counts(index)[channel].wrapping_sub(log.header.hanging[channel]) as i16;
+                f64::from(counts) * self.steps[channel]
+            };
+            let mut angle = 0.0;
+            for joint in 1..log.channels() {
+                angle += deviation(joint);
+                most = most.max(angle.abs() / AIM.0);
+            }
+            most = most.max(deviation(0).abs() / (AIM.1 * self.half_rail_m));
+        }
+        self.gain = if most > 1.0 {
+            LOWER * self.gain
+        } else if most < RAISE.0 {
+            (self.gain * (1.0 / most).min(RAISE.1)).min(RAISE.2)
+        } else {
+            self.gain
+        };
+    }
+}

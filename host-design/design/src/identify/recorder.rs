@@ -1,0 +1,82 @@
+//! The log of a firmware that sends every tick.
+
+use super::error::IdentifyError;
+use super::log::{DriveScale, Header, Log, Tick};
+use crate::harness::AnyTickLog;
+use crate::rig::Rig;
+use crate::table::TableValues;
+
+/// Puts the messages of a firmware together to a log.
+#[derive(Debug, Clone)]
+pub struct Recorder {
+    log: Log,
+    /// Counts of a whole turn of each sensor; 0 for the cart.
+    turns: Vec<i32>,
+    /// Messages that did not follow the one before.
+    pub out_of_order: u32,
+}
+
+impl Recorder {
+    /// An empty log of the rig with this table.
+    pub fn new(rig: &Rig, table: &TableValues) -> Self {
+        let sensors = table.sensors();
+        let drive = match table.motor {
+            Some(_) => DriveScale::Duty,
+            None => DriveScale::Force(table.force_limit_n.into()),
+        };
+        let log = Log::new(Header {
+            rig: rig.name.clone(),
+            hash: rig.hash(),
+            period_ns: (rig.tick.period_s * 1e9).round() as u32,
+            drive,
+            hanging: table.limits.rest_counts.iter().take(sensors).map(|&count| count as u16).collect(),
+        });
+        let turns = table.limits.turn_counts.iter().take(sensors).copied().collect();
+        Self { log, turns, out_of_order: 0 }
+    }
+
+    /// Adds a message. The first one says how many whole turns the links have made since they were homed: the links hang.
+    pub fn push(&mut self, message: &AnyTickLog) {
+        if self.log.ticks().last().is_some_and(|last| message.first <= last.number) {
+            self.out_of_order += 1;
+            return;
+        }
+        for (logged, number) in message.ticks.iter().zip(message.first..) {
+            let counts: Vec<u16> = logged.counts.iter().map(|&word| u16::from_le_bytes(word)).collect();
+            if counts.len() != self.log.channels() {
+                self.out_of_order += 1;
+                return;
+            }
+            if self.log.ticks().is_empty() {
+                self.take_turns(&counts);
+            }
+            let drive = i16::from_le_bytes(logged.drive);
+            let tick = Tick { number, drive, supply_mv: message.supply_mv, contacts: message.contacts };
+            self.log.push(tick, &counts);
+        }
+    }
+
+    /// Adds whole turns to what counts as hanging, so that the first tick is within half a turn of it.
+    fn take_turns(&mut self, counts: &[u16]) {
+        for ((hanging, &count), &turn) in self.log.header.hanging.iter_mut().zip(counts).zip(&self.turns) {
+            if turn > 0 {
+                let away = f64::from(count.wrapping_sub(*hanging) as i16);
+                let turns = (away / f64::from(turn)).round() as i32;
+                *hanging = hanging.wrapping_add((turns * turn) as u16);
+            }
+        }
+    }
+
+    /// The log so far.
+    pub fn log(&self) -> &Log {
+        &self.log
+    }
+
+    /// The log.
+    ///
+    /// # Errors
+    /// [`IdentifyError::NothingRecorded`] if the firmware has sent none.
+    pub fn finish(self) -> Result<Log, IdentifyError> {
+        if self.log.ticks().is_empty() { Err(IdentifyError::NothingRecorded) } else { Ok(self.log) }
+    }
+}

@@ -1,0 +1,156 @@
+//! The log of a simulated machine that the whole firmware shakes.
+
+use upright::board::Output;
+use upright::control::actuator::Drive;
+use upright::protocol::message::Request;
+use upright::supervision::bench_drive::MotorSign;
+use upright::supervision::supervisor::State;
+use upright::table::Law;
+
+use super::error::IdentifyError;
+use super::feed::Feed;
+use super::log::Log;
+use super::recorder::Recorder;
+use crate::harness::{Harness, HarnessError, Pins, Target};
+use crate::reality::hanging_by_hand;
+use crate::rig::Rig;
+use crate::simulate::Scenario;
+use crate::table::TableValues;
+
+/// Longest time from power-up until the rig is ready (s).
+const READY_S: f64 = 60.0;
+/// The links hang still for so long before they are shaken (s).
+const STILL_S: f64 = 1.0;
+/// Time between two telemetry messages (s).
+const TELEMETRY_S: f64 = 0.05;
+/// Longest time in which the cart returns (s).
+const RETURN_S: f64 = 6.0;
+
+/// A run that was not recorded.
+#[derive(Debug, thiserror::Error)]
+pub enum ShakeError {
+    /// The firmware does not run, or refuses.
+    #[error(transparent)]
+    Harness(#[from] HarnessError),
+    /// The machine does not do what it should.
+    #[error(transparent)]
+    Identify(#[from] IdentifyError),
+}
+
+/// A simulated machine while the firmware shakes it.
+pub struct Shaken<'t> {
+    /// Firmware and machine.
+    pub harness: Harness<'t>,
+    feed: Feed,
+    recorder: Recorder,
+}
+
+/// The log of the machine of `rig`, with its `[reality]`, which the firmware on `target` shakes for `duration_s`, from
+/// power-up on: homed, signs and motor checked, a pulse each way, the excitation, and back to the middle.
+///
+/// # Errors
+/// [`ShakeError`] if the firmware does not run or turns the motor off, or the cart does not follow.
+pub fn shake_with(
+    rig: &Rig,
+    table: &TableValues,
+    target: &mut dyn Target,
+    duration_s: f64,
+    seed: u64,
+) -> Result<Log, ShakeError> {
+    let mut shaken = Shaken::begin(rig, table, target, duration_s, seed)?;
+    let longest = ticks(rig, duration_s + 2.0 + RETURN_S);
+    for _ in 0..longest {
+        shaken.tick(|_| (), |drive| drive)?;
+        if let Some(fault) = shaken.harness.session.fault() {
+            let words = format!("{}: the firmware has turned the motor off: {fault}", rig.name);
+            return Err(IdentifyError::Excitation(words).into());
+        }
+        if shaken.is_over() {
+            break;
+        }
+    }
+    Ok(shaken.recorder.finish()?)
+}
+
+impl<'t> Shaken<'t> {
+    /// From power-up to the tick in which the firmware begins to shake the machine.
+    ///
+    /// # Errors
+    /// [`ShakeError`] if the firmware does not run, or refuses.
+    pub fn begin(
+        rig: &Rig,
+        table: &TableValues,
+        target: &'t mut dyn Target,
+        duration_s: f64,
+        seed: u64,
+    ) -> Result<Self, ShakeError> {
+        let feed = Feed::new(rig, table, duration_s, seed)?;
+        let mut state = hanging_by_hand(rig);
+        let scenario = Scenario { start: state.clone(), seed, ..Scenario::at_rest(rig, Law::Lqr) };
+        let mut harness = Harness::new(rig, table, &scenario, target)?;
+        for tick in 0.. {
+            harness.by_hand(tick)?;
+            let status = harness.session.status();
+            if status.state == State::Calibrated && status.motor == MotorSign::Checked {
+                break;
+            }
+            if tick > ticks(rig, READY_S) {
+                return Err(HarnessError::NotBalancing(status.state).into());
+            }
+        }
+        state[0] = harness.bench.state()[0];
+        harness.bench.hold(&state);
+        for _ in 0..ticks(rig, STILL_S) {
+            let inputs = harness.inputs();
+            harness.session.tick(&inputs)?;
+        }
+        let inputs = harness.inputs();
+        // The line of a board has room for the log and a little telemetry.
+        harness.session.ask(Request::Telemetry(ticks(rig, TELEMETRY_S) as u16), &inputs)?;
+        harness.session.ask(Request::Log(true), &inputs)?;
+        harness.session.ask(feed.begin(), &inputs)?;
+        Ok(Self { harness, feed, recorder: Recorder::new(rig, table) })
+    }
+
+    /// One tick of firmware and machine: `pins` may change what the firmware reads, `motor` what drives the cart.
+    ///
+    /// # Errors
+    /// [`ShakeError`] if the firmware does not answer, or the cart does not follow the pulses.
+    pub fn tick(
+        &mut self,
+        pins: impl FnOnce(&mut Pins),
+        motor: impl FnOnce(Drive) -> Drive,
+    ) -> Result<Output, ShakeError> {
+        let session = &mut self.harness.session;
+        while session.next_reply().is_some() || session.next_telemetry().is_some() {}
+        let mut inputs = self.harness.inputs();
+        pins(&mut inputs);
+        let output = self.harness.session.tick(&inputs)?;
+        // A motor that is off turns freely.
+        self.harness.bench.tick(motor(if output.enable { output.drive } else { Drive::Force(0.0) }));
+        while let Some(message) = self.harness.session.next_log() {
+            self.recorder.push(&message);
+            if let Some(last) = self.recorder.log().ticks().last().filter(|_| !self.feed.has_begun()) {
+                self.feed.begun(last.number);
+            }
+        }
+        for request in self.feed.due(self.recorder.log())? {
+            self.harness.session.send(request);
+        }
+        Ok(output)
+    }
+
+    /// Whether everything is shaken and logged, and the motor is off.
+    pub fn is_over(&self) -> bool {
+        self.feed.is_over(self.recorder.log()) && self.harness.session.status().state == State::Calibrated
+    }
+
+    /// The log so far.
+    pub fn log(&self) -> &Log {
+        self.recorder.log()
+    }
+}
+
+fn ticks(rig: &Rig, seconds: f64) -> u32 {
+    (seconds / rig.tick.period_s).ceil() as u32
+}

@@ -1,0 +1,232 @@
+//! The firmware shakes the simulated machine, and its log is identified: on the host, and as the image in QEMU.
+
+use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
+use std::sync::OnceLock;
+
+use upright::control::actuator::Drive;
+use upright::protocol::message::Request;
+use upright::protocol::tick_log::OFF;
+use upright::supervision::fault::Fault;
+use upright::supervision::supervisor::State;
+use upright_design::design::design;
+use upright_design::harness::{Pins, with_firmware};
+use upright_design::identify::{Kind as Parameter, Log, Settings, ShakeError, Shaken, identify};
+use upright_design::plant::ChainParameters;
+use upright_design::reality::real_chain;
+use upright_design::rig::{PlantDescription, Rig};
+use upright_design::table::{Gains, TableValues};
+use upright_tool::image::{Kind, build_for, if_possible};
+use upright_tool::in_the_loop::{Link, Place, run_shaken};
+
+const REALITY: &str = "[reality]\njoint_friction_n_m = [1.5e-3, 1e-3]\ncart_friction_n = 0.2\n\
+    homing_error_rad = [0.006, -0.004]\nrail_tilt_rad = 0.003\nlatency_s = 4e-4\ncart_mass_percent = 8\n\
+    link_mass_percent = [-9, 7]\nlink_length_percent = [5, -8]\nlink_inertia_percent = [10, -10]\n";
+
+/// The double pendulum of the file, designed once.
+fn double() -> &'static (Rig, TableValues) {
+    static DOUBLE: OnceLock<(Rig, TableValues)> = OnceLock::new();
+    DOUBLE.get_or_init(|| rig("double-quanser-dbpen", ""))
+}
+
+fn rig(name: &str, reality: &str) -> (Rig, TableValues) {
+    let path = PathBuf::from(format!("../../rigs/{name}.toml"));
+    let text = std::fs::read_to_string(&path).unwrap() + "\n" + reality;
+    let rig = Rig::from_toml(&text, &path).unwrap();
+    let table = TableValues::of(&rig, &design(&rig).unwrap(), Gains::Sampled).unwrap();
+    (rig, table)
+}
+
+#[test]
+fn the_log_of_the_firmware_gives_the_parameters_of_the_machine() {
+    let (machine, table) = rig("double-quanser-dbpen", REALITY);
+    let (file, _) = double();
+    let log = run_shaken(&machine, &table, 15.0, 3, Place::Host).unwrap();
+    assert_eq!(log.lost(), 0);
+    assert!(log.ticks().iter().any(|tick| tick.drive == OFF), "the motor goes off at the end");
+    let settings = Settings { trust_wiring: true, ..Settings::default() };
+    let found = identify(file, &[(PathBuf::from("run.log"), log)], &settings, &|_| ()).unwrap();
+    assert_eq!(found.refusal, None);
+    let PlantDescription::Chain(chain) = &machine.plant else { panic!("a chain") };
+    let real = real_chain(chain, &machine.reality.parameters);
+    let constants = ChainParameters::<f64>::of(&real);
+    let close = |kind: Parameter, wanted: f64| {
+        let estimate = found.estimate(kind).unwrap();
+        let error = (estimate.new - wanted).abs();
+        assert!(
+            error < 3.0 * estimate.deviation,
+            "{kind:?}: {} instead of {wanted}, {estimate:?}",
+            estimate.new
+        );
+        assert!(estimate.deviation < 0.02 * wanted.abs().max(0.05), "{estimate:?}");
+    };
+    close(Parameter::TotalMass, constants.total_mass);
+    close(Parameter::Length(0), real.links[0].length_m);
+    for joint in 0..2 {
+        close(Parameter::FirstMoment(joint), constants.a[joint]);
+        close(Parameter::SecondMoment(joint), constants.b[(joint, joint)]);
+        close(Parameter::Zero(joint), machine.reality.sensors.homing_error_rad.of(joint));
+    }
+}
+
+#[test]
+fn the_image_in_qemu_logs_the_ticks_of_the_host() {
+    let (machine, table) = rig("single-quanser-ip02", "");
+    let Some(image) = if_possible(build_for(Kind::InTheLoop, &machine, &table)).unwrap() else { return };
+    if let Err(error) = Command::new("qemu-system-arm").arg("--version").stdout(Stdio::null()).status() {
+        assert!(std::env::var_os("UPRIGHT_REQUIRE_IMAGE").is_none(), "no QEMU: {error}");
+        return eprintln!("not exercised: the image in QEMU: install qemu-system-arm");
+    }
+    let log = |seed: u64, place: Place<'_>| run_shaken(&machine, &table, 3.0, seed, place).unwrap();
+    let qemu = log(1, Place::Qemu { image: Path::new(&image), link: Link::Files });
+    assert!(qemu.ticks().len() > 2_000 && qemu == log(1, Place::Host));
+    // Negative control: other phases give another log.
+    assert!(qemu != log(2, Place::Host));
+}
+
+/// What goes wrong: in what the firmware reads, with what it read before the defect and the ticks since then; and in what
+/// drives the cart.
+type Pinned = fn(&mut Pins, &Pins, u32);
+type Driven = fn(Drive) -> Drive;
+
+const AS_IT_IS: Driven = |drive| drive;
+const STUCK: Driven = |_| Drive::Duty(1.0);
+
+/// Shakes the double pendulum for 2.5 s, then with a defect. Gives the fault, the ticks from the defect to
+/// motor off, how far the cart was out then (m), and whether the motor came on again.
+fn defective(pins: Pinned, motor: Driven) -> (Option<Fault>, u32, f64, bool) {
+    let (machine, table) = double();
+    let run = with_firmware(table, |target| {
+        let mut shaken = Shaken::begin(machine, table, target, 20.0, 1).unwrap();
+        for _ in 0..2_500 {
+            assert!(shaken.tick(|_| (), AS_IT_IS).unwrap().enable || shaken.log().ticks().len() < 20);
+        }
+        assert_eq!(shaken.harness.session.status().state, State::Identifying);
+        let before = shaken.harness.inputs();
+        let (mut off, mut on_again, mut cart_m) = (None, false, 0.0);
+        for tick in 0..2_000 {
+            match shaken.tick(|now| pins(now, &before, tick), motor) {
+                Ok(output) if output.enable => on_again |= off.is_some(),
+                Ok(_) => {
+                    if off.is_none() {
+                        (off, cart_m) = (Some(tick + 1), shaken.harness.bench.state()[0]);
+                    }
+                }
+                Err(ShakeError::Identify(_)) => break,
+                Err(error) => panic!("{error}"),
+            }
+            if off.is_some_and(|off| tick > off + 200) {
+                break;
+            }
+        }
+        (shaken.harness.session.fault(), off.unwrap_or(u32::MAX), cart_m, on_again)
+    });
+    run.unwrap()
+}
+
+#[test]
+fn no_defect_is_missed_while_the_rig_is_shaken() {
+    type Case = (&'static str, Pinned, Driven, Fault, u32);
+    let cases: [Case; 12] = [
+        ("supply not a number", |pins, _, _| pins.supply_v = f32::NAN, AS_IT_IS, Fault::NotFinite, 1),
+        (
+            "emergency stop",
+            |pins, _, tick| pins.contacts.emergency_stop = tick == 0,
+            AS_IT_IS,
+            Fault::EmergencyStop,
+            1,
+        ),
+        ("driver", |pins, _, tick| pins.contacts.driver_fault = tick == 0, AS_IT_IS, Fault::Driver, 1),
+        ("limit switch", |pins, _, _| pins.contacts.limit_high = true, AS_IT_IS, Fault::LimitSwitch, 1),
+        ("clock", |pins, _, _| pins.contacts.clock_fault = true, AS_IT_IS, Fault::Clock, 1),
+        ("board", |pins, _, _| pins.contacts.board_fault = true, AS_IT_IS, Fault::Board, 1),
+        ("overruns", |pins, _, _| pins.contacts.overrun = true, AS_IT_IS, Fault::Overrun, 3),
+        ("supply too high", |pins, _, _| pins.supply_v *= 1.4, AS_IT_IS, Fault::Supply, 3),
+        (
+            "cart's encoder frozen",
+            |pins, before, _| pins.raw_counts[0] = before.raw_counts[0],
+            AS_IT_IS,
+            Fault::Frozen,
+            1_200,
+        ),
+        (
+            "a link's encoder frozen",
+            |pins, before, _| pins.raw_counts[2] = before.raw_counts[2],
+            AS_IT_IS,
+            Fault::Frozen,
+            1_800,
+        ),
+        (
+            "a link's encoder jumps",
+            |pins, _, _| pins.raw_counts[1] = pins.raw_counts[1].wrapping_add(300),
+            AS_IT_IS,
+            Fault::Encoder,
+            1,
+        ),
+        ("motor stuck at full force", |_, _, _| (), STUCK, Fault::Speed, 400),
+    ];
+    for (name, pins, motor, wanted, most_ticks) in cases {
+        let (fault, ticks, cart_m, on_again) = defective(pins, motor);
+        assert_eq!(fault, Some(wanted), "{name}, {ticks} ticks");
+        assert!(ticks <= most_ticks && !on_again, "{name}: {ticks} ticks");
+        assert!(cart_m.abs() < 0.3, "{name}: the cart is at {cart_m} m");
+    }
+    // Negative control: without a defect nothing ends it.
+    assert_eq!(defective(|_, _, _| (), AS_IT_IS), (None, u32::MAX, 0.0, false));
+}
+
+#[test]
+fn a_silent_host_and_the_stop_key_end_it() {
+    let (machine, table) = double();
+    let ended = |stop: bool| {
+        with_firmware(table, |target| {
+            let mut shaken = Shaken::begin(machine, table, target, 20.0, 1).unwrap();
+            (0..2_500).for_each(|_| {
+                shaken.tick(|_| (), AS_IT_IS).unwrap();
+            });
+            if stop {
+                shaken.harness.session.send(Request::Disarm);
+            }
+            let mut on = 0;
+            for _ in 0..6_000 {
+                // Nothing more is fed.
+                let inputs = shaken.harness.inputs();
+                let output = shaken.harness.session.tick(&inputs).unwrap();
+                shaken.harness.bench.tick(if output.enable { output.drive } else { Drive::Force(0.0) });
+                on += u32::from(output.enable);
+            }
+            let session = &shaken.harness.session;
+            (on, session.status().state, session.fault(), shaken.harness.bench.state()[0])
+        })
+        .unwrap()
+    };
+    let (on, state, fault, _) = ended(true);
+    assert!(on <= 3 && (state, fault) == (State::Calibrated, None), "{on} {state:?} {fault:?}");
+    let (on, state, fault, _) = ended(false);
+    assert!(
+        (100..5_200).contains(&on) && (state, fault) == (State::Calibrated, None),
+        "{on} {state:?} {fault:?}"
+    );
+}
+
+#[test]
+fn the_log_of_four_links_fits_the_line() {
+    let (machine, table) = rig("quadruple-paper", "");
+    let log = with_firmware(&table, |target| {
+        let mut shaken = Shaken::begin(&machine, &table, target, 5.0, 1).unwrap();
+        let (mut bytes, mut most) = (0, 0);
+        for _ in 0..2_000 {
+            shaken.tick(|_| (), AS_IT_IS).unwrap();
+            let sent = shaken.harness.session.last_bytes().len();
+            (bytes, most) = (bytes + sent, most.max(sent));
+        }
+        assert_eq!(shaken.log().lost(), 0);
+        // 10 bits per byte at 460 800 Bd.
+        let per_second = f64::from(bytes as u32) / 2.0;
+        assert!((13_000.0..0.6 * 46_080.0).contains(&per_second), "{per_second} bytes per second");
+        println!("{per_second} bytes per second with telemetry");
+        shaken.log().clone()
+    });
+    let log: Log = log.unwrap();
+    assert!(log.ticks().len() > 1_900);
+}

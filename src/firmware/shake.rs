@@ -1,0 +1,80 @@
+//! Shaking the rig: when it may begin, and a tick of it.
+
+use super::Firmware;
+use crate::board::{Inputs, Output};
+use crate::control::actuator::Drive;
+use crate::control::controller::Rejected;
+use crate::protocol::message::Answer;
+use crate::supervision::calibration::links_hang;
+use crate::supervision::inhibits::Inhibits;
+use crate::supervision::shaking::{FORCES, Shaking};
+use crate::supervision::supervisor::State;
+use crate::table::SwingUp;
+
+/// The cart has to begin within this part of the rail's soft limits.
+const CENTRE: f32 = 0.25;
+
+impl<const NX: usize, const NY: usize, S: SwingUp<NX, NY>> Firmware<'_, NX, NY, S> {
+    /// Begins to shake the rig. `id` is that of the command.
+    pub(super) fn begin_shaking(&mut self, shaking: Shaking, id: u64) -> Answer {
+        if !shaking.is_sound(self.table.force_limit_n) {
+            return Answer::Rejected(Rejected::Shaking);
+        }
+        let counts = *self.controller.encoders().counts();
+        let limits = &self.table.limits;
+        let position_m = self.controller.positions().iter().next().copied().unwrap_or_default();
+        let [low, high] = limits.rail_m.map(|end| CENTRE * end);
+        // Without a cart there is nothing to shake.
+        let hangs = links_hang(&counts, limits) && self.cart_sign_counts() > 0;
+        let inhibits = self
+            .inhibits_with_motor_off()
+            .union(self.held_inhibit(id))
+            .union(Inhibits::NOT_HANGING.when(!hangs))
+            .union(Inhibits::OFF_CENTRE.when(!(low..=high).contains(&position_m)));
+        if let Err(inhibits) = self.supervisor.start_identifying(inhibits) {
+            return Answer::NotNow(inhibits);
+        }
+        self.debounce.start();
+        self.last_volts = 0.0;
+        self.shaker.begin(shaking, &counts);
+        Answer::Done
+    }
+
+    /// Takes the forces of coming ticks.
+    pub(super) fn take_forces(&mut self, first: u16, forces: &[i8; FORCES]) -> Answer {
+        if self.supervisor.state() != State::Identifying {
+            return Answer::NotNow(Inhibits::NOT_SHAKEN);
+        }
+        self.shaker.take(self.tick, first, forces);
+        Answer::Done
+    }
+
+    /// A tick in which the rig is shaken.
+    // Not part of the tick in which it is called: the bound on the stack has to follow every jump there.
+    #[inline(never)]
+    pub(super) fn shake(&mut self, inputs: &Inputs<NY>) {
+        let table = self.table;
+        let counts = self.follow();
+        if let Some(fault) = self.debounce.check_inputs(&table.limits, table.supply_max_v(), inputs) {
+            return self.trip(fault, None);
+        }
+        let Some(observer) = &table.observer else { return self.supervisor.disarm() };
+        match self.shaker.update(self.tick, &counts, &observer.step, &table.limits, table.tick_s) {
+            Ok(Some(force_n)) => {
+                let (drive, applied_n) = self.driven(force_n);
+                (self.requested_n, self.applied_n) = (force_n, applied_n);
+                self.output = Output { enable: true, drive };
+            }
+            Ok(None) => self.supervisor.disarm(),
+            Err((fault, sensor)) => self.trip(fault, sensor),
+        }
+    }
+
+    /// What drives the cart with this force, and the force that this gives (N).
+    fn driven(&mut self, force_n: f32) -> (Drive, f32) {
+        let Some(motor) = &self.table.motor else { return (Drive::Force(force_n), force_n) };
+        let (volts, applied_n) = motor.drive(force_n, self.shaker.speed_m_per_s(), self.last_volts);
+        self.last_volts = volts;
+        (Drive::Duty(motor.duty(volts)), applied_n)
+    }
+}
