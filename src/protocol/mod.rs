@@ -7,8 +7,8 @@
 /// Speed of the serial line (Bd).
 pub const BAUD: u32 = 460_800;
 
-/// Time between two messages of telemetry until the host sets another (s). Those of a quadruple rig then need a third of
-/// the line, the longest ones three quarters.
+/// Time between two messages of telemetry until the host sets another (s). Those of a quadruple rig then need a third
+/// of the line, the longest ones three quarters.
 const TELEMETRY_S: f32 = 0.01;
 
 /// The same in ticks of `tick_s` (s), at least one.
