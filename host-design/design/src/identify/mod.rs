@@ -4,6 +4,7 @@
 //! - [`Excitation`], [`shake`]: what shakes the machine, and the log of a simulated one.
 //! - [`shake_with`]: the log of a simulated machine that the whole firmware shakes; [`Feed`] and [`Recorder`] are the host's
 //!   part of it.
+//! - [`OverLine`]: the same for a machine behind a serial line.
 //! - [`identify`]: first the wiring, then multiple shooting, then prediction error, then deviations and a verdict.
 //! - [`Realised`]: the numbers of a rig file with the identified parameters.
 //!
@@ -18,6 +19,7 @@ mod feed;
 mod log;
 mod model;
 mod normal;
+mod over_line;
 mod parameters;
 mod prediction;
 mod realise;
@@ -34,12 +36,13 @@ pub use estimate::{Estimate, Identification, Progress, Settings, identify};
 pub use excite::{Excitation, shake};
 pub use feed::Feed;
 pub use log::{CONTACTS, DriveScale, Header, Log, Tick};
+pub use over_line::{LineError, OverLine};
 pub use parameters::Kind;
 pub use realise::{Realised, RealisedLink};
 pub use recorder::Recorder;
 pub use verdict::{ChannelFit, Predicted, Refusal};
 pub use wiring::{Wiring, WiringFound};
-pub use with_firmware::{ShakeError, Shaken, shake_with};
+pub use with_firmware::{ShakeError, Shaken, checked_and_hanging, shake_with};
 
 use crate::rig::{Chain, PlantDescription, Rig};
 use model::Input;

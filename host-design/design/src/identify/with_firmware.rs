@@ -72,6 +72,38 @@ pub fn shake_with(
     Ok(shaken.recorder.finish()?)
 }
 
+/// The machine of `rig` from power-up on until signs and motor are checked and it hangs still.
+///
+/// # Errors
+/// [`HarnessError`] if the firmware does not run, or does not get there.
+pub fn checked_and_hanging<'t>(
+    rig: &Rig,
+    table: &TableValues,
+    target: &'t mut dyn Target,
+    seed: u64,
+) -> Result<Harness<'t>, HarnessError> {
+    let mut state = hanging_by_hand(rig);
+    let scenario = Scenario { start: state.clone(), seed, ..Scenario::at_rest(rig, Law::Lqr) };
+    let mut harness = Harness::new(rig, table, &scenario, target)?;
+    for tick in 0.. {
+        harness.by_hand(tick)?;
+        let status = harness.session.status();
+        if status.state == State::Calibrated && status.motor == MotorSign::Checked {
+            break;
+        }
+        if tick > ticks(rig, READY_S) {
+            return Err(HarnessError::NotBalancing(status.state));
+        }
+    }
+    state[0] = harness.bench.state()[0];
+    harness.bench.hold(&state);
+    for _ in 0..ticks(rig, STILL_S) {
+        let inputs = harness.inputs();
+        harness.session.tick(&inputs)?;
+    }
+    Ok(harness)
+}
+
 impl<'t> Shaken<'t> {
     /// From power-up to the tick in which the firmware begins to shake the machine.
     ///
@@ -85,25 +117,7 @@ impl<'t> Shaken<'t> {
         seed: u64,
     ) -> Result<Self, ShakeError> {
         let feed = Feed::new(rig, table, duration_s, seed)?;
-        let mut state = hanging_by_hand(rig);
-        let scenario = Scenario { start: state.clone(), seed, ..Scenario::at_rest(rig, Law::Lqr) };
-        let mut harness = Harness::new(rig, table, &scenario, target)?;
-        for tick in 0.. {
-            harness.by_hand(tick)?;
-            let status = harness.session.status();
-            if status.state == State::Calibrated && status.motor == MotorSign::Checked {
-                break;
-            }
-            if tick > ticks(rig, READY_S) {
-                return Err(HarnessError::NotBalancing(status.state).into());
-            }
-        }
-        state[0] = harness.bench.state()[0];
-        harness.bench.hold(&state);
-        for _ in 0..ticks(rig, STILL_S) {
-            let inputs = harness.inputs();
-            harness.session.tick(&inputs)?;
-        }
+        let mut harness = checked_and_hanging(rig, table, target, seed)?;
         let inputs = harness.inputs();
         // The line of a board has room for the log and a little telemetry.
         harness.session.ask(Request::Telemetry(ticks(rig, TELEMETRY_S) as u16), &inputs)?;

@@ -3,18 +3,23 @@
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 use std::sync::OnceLock;
+use std::time::Duration;
 
 use upright::control::actuator::Drive;
 use upright::protocol::message::Request;
 use upright::protocol::tick_log::OFF;
 use upright::supervision::fault::Fault;
 use upright::supervision::supervisor::State;
+use upright::table::Law;
 use upright_design::design::design;
-use upright_design::harness::{Pins, with_firmware};
-use upright_design::identify::{Kind as Parameter, Log, Settings, ShakeError, Shaken, identify};
+use upright_design::harness::{Harness, HarnessError, Pins, with_firmware};
+use upright_design::identify::{
+    Kind as Parameter, LineError, Log, OverLine, Settings, ShakeError, Shaken, checked_and_hanging, identify,
+};
 use upright_design::plant::ChainParameters;
 use upright_design::reality::real_chain;
 use upright_design::rig::{PlantDescription, Rig};
+use upright_design::simulate::Scenario;
 use upright_design::table::{Gains, TableValues};
 use upright_tool::image::{Kind, build_for, if_possible};
 use upright_tool::in_the_loop::{Link, Place, run_shaken};
@@ -229,4 +234,77 @@ fn the_log_of_four_links_fits_the_line() {
     });
     let log: Log = log.unwrap();
     assert!(log.ticks().len() > 1_900);
+}
+
+/// The double pendulum, ready to be shaken, and a host at the other end of its line, which loses the bytes of the ticks
+/// for which `is_lost` holds. Gives the log, and the ticks with the motor on after the host has ended.
+fn over_line(host: &(Rig, TableValues), is_lost: fn(u32) -> bool) -> (Result<Log, LineError>, u32) {
+    let (machine, table) = double();
+    with_firmware(table, |target| {
+        let mut harness = checked_and_hanging(machine, table, target, 1).unwrap();
+        let since_1970 =
+            |tick: u32| Duration::from_secs(1_800_000_000) + Duration::from_millis(2 * u64::from(tick));
+        let mut line = OverLine::new(&host.0, &host.1, 5.0, 1, since_1970(0)).unwrap();
+        let (mut ended, mut on) = (None, 0);
+        for tick in 0..20_000 {
+            let now = since_1970(tick);
+            if ended.is_none() {
+                let done = line.poll(now);
+                let arrived = if is_lost(tick) { Vec::new() } else { line.take_outgoing() };
+                harness.session.send_bytes(&arrived);
+                ended = done.err().map(Err).or_else(|| line.is_over().then_some(Ok(())));
+            }
+            let inputs = harness.inputs();
+            let output = harness.session.tick(&inputs).unwrap();
+            on += u32::from(ended.is_some() && output.enable);
+            harness.bench.tick(if output.enable { output.drive } else { Drive::Force(0.0) });
+            if ended.is_none() && !is_lost(tick) {
+                ended = line.receive(harness.session.last_bytes(), now).err().map(Err);
+            }
+            while harness.session.next_telemetry().is_some() || harness.session.next_reply().is_some() {}
+            while harness.session.next_log().is_some() {}
+        }
+        let ended = ended.expect("it ends");
+        (ended.and_then(|()| Ok(line.finish()?)), on)
+    })
+    .unwrap()
+}
+
+#[test]
+fn a_machine_behind_a_line_is_shaken_and_logged_and_hangs_with_the_motor_off_when_the_line_is_cut() {
+    let (log, on) = over_line(double(), |_| false);
+    let log = log.unwrap();
+    assert_eq!((log.lost(), on), (0, 0));
+    let seconds =
+        log.ticks().iter().filter(|tick| tick.drive != OFF).count() as f64 * double().0.tick.period_s;
+    assert!((6.2..10.0).contains(&seconds), "{seconds} s");
+    // Requests and forces that are lost now and then are sent again, or their ticks are left to spring and damper.
+    let (log, on) = over_line(double(), |tick| tick % 97 < 2);
+    assert_eq!((log.is_ok(), on), (true, 0));
+    // The host gives up; by then the cart is back.
+    let (cut, on) = over_line(double(), |tick| tick > 2_000);
+    assert!(matches!(cut, Err(LineError::Silent)) && on < 5_000, "{on}");
+}
+
+#[test]
+fn a_machine_that_is_not_the_files_or_is_not_checked_is_not_shaken() {
+    let other = rig("single-quanser-ip02", "");
+    let (refused, on) = over_line(&other, |_| false);
+    assert!(matches!(refused, Err(LineError::Harness(HarnessError::Rig { .. }))) && on == 0);
+    let (machine, table) = double();
+    let refused = with_firmware(table, |target| {
+        let scenario = Scenario::at_rest(machine, Law::Lqr);
+        let mut harness = Harness::new(machine, table, &scenario, target).unwrap();
+        let mut line = OverLine::new(machine, table, 5.0, 1, Duration::from_secs(1)).unwrap();
+        (0..1_000).find_map(|tick| {
+            let now = Duration::from_secs(1) + Duration::from_millis(tick);
+            line.poll(now).unwrap();
+            harness.session.send_bytes(&line.take_outgoing());
+            let inputs = harness.inputs();
+            harness.session.tick(&inputs).unwrap();
+            line.receive(harness.session.last_bytes(), now).err()
+        })
+    });
+    let refused = refused.unwrap().expect("it is refused").to_string();
+    assert!(refused.contains("home first") && refused.contains("firmware monitor"), "{refused}");
 }

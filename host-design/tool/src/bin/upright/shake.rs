@@ -2,28 +2,37 @@
 
 use std::io::Write as _;
 use std::path::PathBuf;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::{Duration, Instant, SystemTime};
 
 use clap::Args;
-use upright_design::identify::{Log, shake};
+use signal_hook::consts::{SIGINT, SIGTERM};
+use upright_design::identify::{LineError, Log, OverLine, shake};
 use upright_design::rig::Rig;
 use upright_design::table::{Gains, write_atomically};
 use upright_tool::in_the_loop::run_shaken;
+use upright_tool::monitor::Line;
 
 use crate::failure::Failure;
 use crate::firmware::Target;
 use crate::progress::with_spinner;
 use crate::variation::with_table;
 
-/// Shakes the simulated machine, hanging, and writes its log for `upright identify`.
+/// Shakes the hanging machine, and writes its log for `upright identify`.
 ///
-/// The machine is that of the rig file with its [reality]; the force is computed from the file alone. With --target, the
-/// whole firmware shakes it, from power-up on, and sends the log over its serial line.
+/// Without --port, the machine is the simulated one of the rig file with its [reality]; the force is computed from the file
+/// alone. With --target, the whole firmware shakes it, from power-up on, and sends the log over its serial line.
+///
+/// With --port, the machine is the real one. Its board runs the image for identification, and is homed, with signs and
+/// motor checked (`upright firmware monitor`). The links hang still, and nobody is within reach. Ctrl-C turns the motor off.
 #[derive(Args)]
 #[command(before_help = "\
 Examples:
   upright shake rigs/quadruple-paper.toml --log run.log
   upright shake rigs/single-quanser-ip02.toml --log run.log --target qemu
-  upright shake my-rig-as-it-is.toml --log run.log --seconds 20 --seed 7")]
+  upright shake my-rig-as-it-is.toml --log run.log --seconds 20 --seed 7
+  upright shake my-rig.toml --log run.log --port /dev/ttyACM0       the real machine")]
 pub(crate) struct Shake {
     /// Rig file
     #[arg(value_name = "RIG")]
@@ -40,7 +49,13 @@ pub(crate) struct Shake {
     /// Where the firmware runs that shakes it [default: no firmware]
     #[arg(long, value_enum)]
     target: Option<Target>,
+    /// Serial port of a board (/dev/ttyACM0, COM3 …), or tcp:HOST:PORT
+    #[arg(long, conflicts_with = "target")]
+    port: Option<String>,
 }
+
+/// Longest wait for the motor to be off, after the shaking was stopped.
+const LAST_WAIT: Duration = Duration::from_millis(500);
 
 impl Shake {
     pub(crate) fn run(self) -> Result<(), Failure> {
@@ -67,6 +82,9 @@ impl Shake {
 
     fn shaken(&self, rig: &Rig) -> Result<Log, Failure> {
         let seconds = f64::from(self.seconds);
+        if let Some(port) = &self.port {
+            return self.over_line(rig, seconds, port);
+        }
         let Some(target) = self.target else {
             return Ok(with_spinner("shaking", || shake(rig, seconds, self.seed))?);
         };
@@ -74,4 +92,44 @@ impl Shake {
         let built = target.built_for_identification(rig, &table)?;
         Ok(with_spinner("shaking", || run_shaken(rig, &table, seconds, self.seed, built.place(self.seed)))?)
     }
+    /// The log of the machine behind a port.
+    fn over_line(&self, rig: &Rig, seconds: f64, port: &str) -> Result<Log, Failure> {
+        let (_, table) = with_table(rig, &self.rig, Gains::Sampled)?;
+        let stop = Arc::new(AtomicBool::new(false));
+        for signal in [SIGINT, SIGTERM] {
+            signal_hook::flag::register(signal, Arc::clone(&stop))?;
+        }
+        let mut line = Line::open(port)?;
+        let mut shaking = OverLine::new(rig, &table, seconds, self.seed, now())?;
+        let failed = |error: LineError| Failure::CheckFailed(format!("{port}: {error}"));
+        let ended = with_spinner("shaking; Ctrl-C turns the motor off", || {
+            while !shaking.is_over() {
+                if stop.load(Ordering::Relaxed) {
+                    return Err(Failure::CheckFailed(format!("{port}: stopped; no log is written")));
+                }
+                shaking.poll(now()).map_err(failed)?;
+                exchange(&mut line, &mut shaking)?.map_err(failed)?;
+            }
+            Ok(())
+        });
+        // Whatever has ended it: the motor has to be off.
+        shaking.stop(now());
+        let end = Instant::now() + LAST_WAIT;
+        while Instant::now() < end && exchange(&mut line, &mut shaking).is_ok() && !shaking.is_off() {}
+        ended?;
+        Ok(shaking.finish()?)
+    }
+}
+
+/// Sends what is due, and receives.
+fn exchange(line: &mut Line, shaking: &mut OverLine) -> Result<Result<(), LineError>, std::io::Error> {
+    line.send(&shaking.take_outgoing())?;
+    let mut buffer = [0; 4096];
+    let bytes = line.receive(&mut buffer)?;
+    Ok(shaking.receive(bytes, now()))
+}
+
+/// Time since 1970.
+fn now() -> Duration {
+    SystemTime::UNIX_EPOCH.elapsed().unwrap_or_default()
 }
