@@ -19,6 +19,9 @@ pub const FLASH_LIMIT_FOR_IDENTIFICATION: u32 = 30 * 1024;
 pub const RAM_LIMIT: u32 = 4 * 1024;
 /// The same of an image for identification.
 pub const RAM_LIMIT_FOR_IDENTIFICATION: u32 = 5 * 1024;
+/// Limit of the stack of an image (bytes); memory.x reserves 5 KiB, which an image for identification may use.
+const STACK_LIMIT: u32 = 4 * 1024;
+const STACK_LIMIT_FOR_IDENTIFICATION: u32 = 5 * 1024;
 
 /// The table of motions; an image without motions has none.
 const MOTIONS: &str = "upright::gains::SWING_UP";
@@ -37,6 +40,8 @@ pub struct Size {
     pub ram: u32,
     /// What that is limited to.
     pub ram_limit: u32,
+    /// What the stack is limited to.
+    pub stack_limit: u32,
     /// By section, in the order of addresses.
     pub sections: Vec<Part>,
     /// By crate, the largest first. Code belongs to the crate of its source line, also where it is inlined.
@@ -97,8 +102,11 @@ pub fn size(image: &Image) -> Result<Size, SizeError> {
         (false, true) => FLASH_LIMIT_FOR_IDENTIFICATION,
         (false, false) => FLASH_LIMIT,
     };
-    let ram_limit = if shakes { RAM_LIMIT_FOR_IDENTIFICATION } else { RAM_LIMIT };
-    Ok(Size { flash, flash_limit, ram, ram_limit, sections, crates })
+    let (ram_limit, stack_limit) = match shakes {
+        true => (RAM_LIMIT_FOR_IDENTIFICATION, STACK_LIMIT_FOR_IDENTIFICATION),
+        false => (RAM_LIMIT, STACK_LIMIT),
+    };
+    Ok(Size { flash, flash_limit, ram, ram_limit, stack_limit, sections, crates })
 }
 
 /// Bytes of machine code by the crate of their source line.

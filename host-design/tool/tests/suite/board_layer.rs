@@ -388,7 +388,7 @@ fn a_crash_is_recorded_over_the_reset_and_shown_by_the_monitor() {
 
     let gain = first_gain(&run.board);
     let points_to_table = |word: u32| word.is_multiple_of(4) && (gain - 1024..=gain).contains(&word);
-    let pointers: Vec<u32> = (0x2000_1000..0x2000_2000)
+    let pointers: Vec<u32> = (0x2000_1400..0x2000_2400)
         .step_by(4)
         .filter(|&at| run.board.word(at).is_some_and(points_to_table))
         .collect();

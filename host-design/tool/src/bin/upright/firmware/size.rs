@@ -14,8 +14,8 @@ use super::built;
 use crate::failure::Failure;
 
 /// Measures the image of a board: flash and RAM by section and by crate, a bound on its stack, and whether it can
-/// panic; exit status 1 if it takes more than 24 KiB of flash (128 KiB with motions), 4 KiB of static RAM or the stack
-/// reserved in memory.x, or can panic or allocate.
+/// panic; exit status 1 if it takes more than 24 KiB of flash (128 KiB with motions), 4 KiB of static RAM or 4 KiB of
+/// stack, or can panic or allocate.
 #[derive(Args)]
 #[command(before_help = "\
 Examples:
@@ -83,7 +83,7 @@ fn wrong(
     limit("flash", size.flash, size.flash_limit);
     limit("static RAM", size.ram, size.ram_limit);
     match stack {
-        Ok(stack) => limit("stack", stack.bytes, stack.reserved),
+        Ok(stack) => limit("stack", stack.bytes, size.stack_limit),
         Err(error) => wrong.push(error.to_string()),
     }
     if !forbidden.is_empty() {
@@ -116,7 +116,7 @@ fn table(size: &upright_tool::image::Size, stack: &Result<StackBound, StackError
             _ = writeln!(text, "  {:<47} {:>8}", deepest.join(" → "), level.bytes);
         }
         _ = writeln!(text, "  {:<47} {:>8}", "sum, each interrupting the one above", stack.bytes);
-        _ = writeln!(text, "  {:<47} {:>8}", "reserved", stack.reserved);
+        _ = writeln!(text, "  {:<47} {:>8}", "limit", size.stack_limit);
     }
     text
 }
