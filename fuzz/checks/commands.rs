@@ -1,5 +1,5 @@
-//! Commands to the whole firmware: a run starts from a clone of one that balances, is armed, is raised, hangs, or has
-//! a fault.
+//! Commands to the whole firmware: a run starts from a clone of one that balances, is armed, is raised, hangs, is shaken,
+//! or has a fault.
 //!
 //! The bytes of a run spell what happens to it: requests in good frames, which get past the checksum, damaged and
 //! repeated frames, bytes that are no frame, contacts, the supply, a push by hand, and time.
@@ -30,13 +30,14 @@ const MOST_TICKS: u32 = 48;
 /// # Panics
 /// If the firmware panics or an [invariant](invariants) does not hold.
 pub(crate) fn check(bytes: &[u8]) {
-    static STARTS: OnceLock<[Start; 5]> = OnceLock::new();
+    static STARTS: OnceLock<[Start; 6]> = OnceLock::new();
     let Some((&first, bytes)) = bytes.split_first() else { return };
-    let [hanging, raised, armed, balancing, stopped] = STARTS.get_or_init(starts);
+    let [hanging, shaken, raised, armed, balancing, stopped] = STARTS.get_or_init(starts);
     let start = match first % 8 {
         0 => hanging,
         1 => armed,
         2 | 3 => raised,
+        6 => shaken,
         7 => stopped,
         _ => balancing,
     };

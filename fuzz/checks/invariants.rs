@@ -12,7 +12,7 @@ use upright::supervision::fault::{Cause, Fault};
 use upright::supervision::sign_check::Signs;
 use upright::supervision::supervisor::State;
 
-use super::simulated_rig::{SimulatedRig, Tested};
+use super::simulated_rig::{SHAKING, SimulatedRig, Tested};
 
 /// What was known before a tick.
 pub(crate) struct Invariants {
@@ -23,6 +23,8 @@ pub(crate) struct Invariants {
     counts: VecDeque<[i32; SENSORS]>,
     /// When arming was last refused because of a latched fault, or soon after that.
     arm_held_at: Option<u32>,
+    /// Largest force while the rig is shaken (N).
+    most_n: f32,
 }
 
 /// Arming needs this many slow ticks.
@@ -31,7 +33,7 @@ const SLOW_TICKS: usize = TABLE.limits.arm_ticks as usize / 4;
 impl Invariants {
     pub(crate) fn new(firmware: &Tested) -> Self {
         let (state, cause) = (firmware.state(), firmware.cause());
-        Self { state, cause, tick: 0, counts: VecDeque::new(), arm_held_at: None }
+        Self { state, cause, tick: 0, counts: VecDeque::new(), arm_held_at: None, most_n: SHAKING.most_n }
     }
 
     /// Checks a tick; `answered` is the request whose reply it gave.
@@ -71,6 +73,13 @@ impl Invariants {
         if enable && before == State::Driving {
             let most = TABLE.limits.bench_force_n;
             assert!(matches!(drive, Drive::Force(force) if force.abs() <= most), "{drive:?}");
+        }
+        if enable && before == State::Identifying {
+            assert!(
+                matches!(drive, Drive::Force(force) if force.abs() <= self.most_n),
+                "shaken with {drive:?}, at most {} N are asked for",
+                self.most_n
+            );
         }
         if enable {
             let may = [State::Driving, State::Identifying, State::Armed, State::Balancing];
@@ -120,7 +129,8 @@ impl Invariants {
                 );
                 self.nothing_against_driving(firmware, rig);
             }
-            Some((Request::Shake(_), Answer::Done)) => {
+            Some((Request::Shake(shaking), Answer::Done)) => {
+                self.most_n = shaking.most_n;
                 assert!(
                     matches!(self.state, State::Calibrated | State::Homing),
                     "shaken in {:?}",

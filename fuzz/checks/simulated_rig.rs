@@ -8,9 +8,13 @@ use upright::firmware::Firmware;
 use upright::gains::{RIG_HASH, SENSORS, STATES, TABLE, TICK_S};
 use upright::protocol::message::{Answer, Command, Request, Reset};
 use upright::supervision::bench_drive::MotorSign;
+use upright::supervision::shaking::{FORCES, Shaking};
 use upright::supervision::sign_check::Signs;
 use upright::supervision::supervisor::State;
 use upright::table::Build;
+
+/// How the rig is shaken in the state that is shaken.
+pub(crate) const SHAKING: Shaking = Shaking { most_n: 2.0, stiffness_n_per_m: 5.0, damping_n_s_per_m: 2.0 };
 
 /// The whole firmware with the committed gains.
 pub(crate) type Tested = Firmware<'static, STATES, SENSORS>;
@@ -110,11 +114,11 @@ impl Start {
 }
 
 /// The way from power-up to balancing as a person goes it, with the states on it:
-/// `[hanging, raised, armed, balancing, stopped]`.
+/// `[hanging, shaken, raised, armed, balancing, stopped]`.
 ///
-/// Hanging is just powered up; raised is homed, checked, upright and still; armed is two ticks before balancing.
+/// Hanging is just powered up; shaken is homed, checked, and shaken for some ticks; raised is homed, checked, upright and still; armed is two ticks before balancing.
 /// Stopped is armed and then stopped by the emergency stop, which is released again: the fault is latched.
-pub(crate) fn starts() -> [Start; 5] {
+pub(crate) fn starts() -> [Start; 6] {
     let limits = &TABLE.limits;
     let build = Build { rig_hash: RIG_HASH, tick_s: TICK_S };
     let firmware = Firmware::new(&TABLE, &build, SimulatedRig::WIDTHS, Reset::Power).expect("a sound table");
@@ -144,6 +148,7 @@ pub(crate) fn starts() -> [Start; 5] {
         start.rig.offset[0] += limits.sign_counts[0] / 20;
     }
     assert_eq!(start.firmware.motor_sign(), MotorSign::Checked);
+    let shaken = shaken(start.clone());
     start.rig.offset = [0; SENSORS];
     start.wait(limits.arm_ticks + 1);
     let raised = start.clone();
@@ -160,5 +165,19 @@ pub(crate) fn starts() -> [Start; 5] {
     start.wait(3);
     assert_eq!(start.firmware.state(), State::Balancing);
     start.wait(50);
-    [hanging, raised, armed, start, stopped]
+    [hanging, shaken, raised, armed, start, stopped]
+}
+
+/// From hanging with a motor that is checked to being shaken.
+fn shaken(mut start: Start) -> Start {
+    start.rig.offset = TABLE.limits.rest_counts;
+    start.wait(TABLE.limits.still_ticks + 1);
+    start.ask(Request::Shake(SHAKING));
+    for force in [10, -10] {
+        let first = start.firmware.statistics().ticks as u16 + 2;
+        start.ask(Request::Forces { first, forces: [force; FORCES] });
+        start.wait(FORCES as u32);
+    }
+    assert_eq!(start.firmware.state(), State::Identifying);
+    start
 }

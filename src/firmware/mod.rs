@@ -48,8 +48,8 @@ pub struct Firmware<'t, const NX: usize, const NY: usize, S = NoSwingUp> {
     bench_drive: BenchDrive,
     detection: Detection<NY>,
     debounce: Debounce,
-    checksum_scan: ChecksumScan,
-    swing_up_scan: ChecksumScan,
+    checksum_scan: ChecksumScan<'t>,
+    swing_up_scan: ChecksumScan<'t>,
     /// Whether the table was sound at the start.
     is_usable: bool,
     /// Whether the whole table was found intact since arming.

@@ -12,16 +12,14 @@ impl<const NX: usize, const NY: usize, S: SwingUp<NX, NY>> Firmware<'_, NX, NY, 
 
     /// Logs this tick, after its output; gives the message that the tick before has completed.
     pub fn log_tick(&mut self) -> Option<TickLog<NY>> {
-        let counts = *self.controller.encoders().counts();
-        let duty = self.output.drive.duty(self.table.force_limit_n);
-        let duty = Some(duty).filter(|_| self.output.enable);
         let log = self.log.as_mut()?;
         let mut complete = None;
         if log.ticks.is_empty() || log.is_complete(&self.contacts) {
             let next = TickLog::new(self.tick, &self.contacts, self.supply_v);
             complete = Some(core::mem::replace(log, next)).filter(|log| !log.ticks.is_empty());
         }
-        log.push(LoggedTick::new(&counts, duty));
+        let duty = self.output.enable.then(|| self.output.drive.duty(self.table.force_limit_n));
+        log.push(LoggedTick::new(self.controller.encoders().counts(), duty));
         complete
     }
 }

@@ -36,7 +36,7 @@ const FILTER_S: f32 = 0.005;
 /// Largest angle of a link from where it hung (rad).
 pub const ANGLE_RAD: f32 = 2.1;
 /// Largest rate of a joint (rad/s): an encoder that counts faster is defective.
-pub const RATE_RAD_PER_S: f32 = 60.0;
+pub const RATE_RAD_PER_S: f32 = 90.0;
 /// The same for the cart, in largest speeds.
 const RATE_OF_SPEED: f32 = 4.0;
 /// Longest time in which the force of the bench drive moves everything by more than a count: cart, links (s). Other forces

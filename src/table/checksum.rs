@@ -1,6 +1,6 @@
 //! The checksum of frames and gain tables.
 
-use crate::table::part::Part;
+use crate::table::part::{Part, Words};
 
 /// Continues the CRC-32 (ISO-HDLC) `crc` of earlier bytes (0 if there are none) with `bytes`.
 ///
@@ -32,7 +32,7 @@ const NIBBLES: [u32; 16] = {
 };
 
 /// Checksum of all words of `table`, as little-endian bytes in the order of declaration.
-pub(crate) fn checksum(table: &dyn Part) -> u32 {
+pub(crate) fn checksum(table: &impl Part) -> u32 {
     let mut scan = ChecksumScan::default();
     loop {
         if let Some(crc) = scan.next_words(table, u32::MAX) {
@@ -43,36 +43,38 @@ pub(crate) fn checksum(table: &dyn Part) -> u32 {
 
 /// The same checksum, some words per call, so that the work is spread over many ticks.
 #[derive(Debug, Clone, Copy, Default)]
-pub struct ChecksumScan {
-    /// Current leaf of the table, see [`Part::part`].
-    leaf: u16,
+pub struct ChecksumScan<'t> {
+    /// Number of the current leaf of the table, see [`Part::part`].
+    at: u16,
+    /// The current leaf, once it is found: that takes as long as several of its words.
+    leaf: Option<Words<'t>>,
     /// Next word within the leaf.
     word: u16,
     /// Checksum of the words so far.
     crc: u32,
 }
 
-impl ChecksumScan {
+impl<'t> ChecksumScan<'t> {
     /// Adds the next word of `table`. After the last word, returns the checksum of all words and starts again.
-    pub fn next(&mut self, table: &dyn Part) -> Option<u32> {
+    pub fn next(&mut self, table: &'t impl Part) -> Option<u32> {
         self.next_words(table, 1)
     }
 
     /// The same with up to `words` words. The end of a leaf counts as one, and so does the end of the table.
+    ///
+    /// Generic, because a call through a pointer would leave the stack of the image without a bound.
     #[inline(never)]
-    pub fn next_words(&mut self, table: &dyn Part, mut words: u32) -> Option<u32> {
-        while words > 0 {
-            // Finding a leaf takes as long as several of its words.
-            let Some(leaf) = table.part(&mut usize::from(self.leaf)) else {
+    pub fn next_words(&mut self, table: &'t impl Part, words: u32) -> Option<u32> {
+        for _ in 0..words {
+            if self.leaf.is_none() {
+                self.leaf = table.part(&mut usize::from(self.at));
+            }
+            let Some(leaf) = self.leaf else {
                 return Some(core::mem::take(self).crc);
             };
-            while words > 0 {
-                words -= 1;
-                let Some(word) = leaf.get(usize::from(self.word)) else {
-                    (self.leaf, self.word) = (self.leaf + 1, 0);
-                    break;
-                };
-                (self.crc, self.word) = (crc32(self.crc, &word.to_le_bytes()), self.word + 1);
+            match leaf.get(usize::from(self.word)) {
+                Some(word) => (self.crc, self.word) = (crc32(self.crc, &word.to_le_bytes()), self.word + 1),
+                None => (self.at, self.leaf, self.word) = (self.at + 1, None, 0),
             }
         }
         None

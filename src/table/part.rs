@@ -18,7 +18,7 @@ pub enum Words<'a> {
     /// Signed integers of 16 bits, two in a word, the first one in its low half.
     I16(&'a [i16]),
     /// Two words, the low one first.
-    U64(u64),
+    U64(&'a u64),
 }
 
 impl Words<'_> {
@@ -34,8 +34,8 @@ impl Words<'_> {
                 Some(half(2 * index)? | half(2 * index + 1).unwrap_or(0) << 16)
             }
             Words::U64(value) => match index {
-                0 => Some(*value as u32),
-                1 => Some((value >> 32) as u32),
+                0 => Some(**value as u32),
+                1 => Some((**value >> 32) as u32),
                 _ => None,
             },
         }
@@ -163,7 +163,7 @@ words!(I32, i32);
 impl Part for u64 {
     #[inline]
     fn part(&self, at: &mut usize) -> Option<Words<'_>> {
-        leaf(at, Words::U64(*self))
+        leaf(at, Words::U64(self))
     }
 
     fn part_mut(&mut self, at: &mut usize) -> Option<WordsMut<'_>> {
@@ -171,7 +171,7 @@ impl Part for u64 {
     }
 
     fn read(&self, reader: &mut dyn Reader) {
-        reader.words(Words::U64(*self), Shape::Value);
+        reader.words(Words::U64(self), Shape::Value);
     }
 }
 
@@ -259,7 +259,7 @@ impl<P: Resize<Q>, Q> Resize<Option<Q>> for Option<P> {
 }
 
 /// Whether a part is free of infinities and NaN.
-pub(crate) fn is_finite(part: &dyn Part) -> bool {
+pub(crate) fn is_finite(part: &impl Part) -> bool {
     (0..).map_while(|leaf| part.part(&mut { leaf })).all(|words| match words {
         Words::F32(values) => values.iter().all(|value| value.is_finite()),
         _ => true,

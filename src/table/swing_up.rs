@@ -158,7 +158,7 @@ pub trait SwingUp<const NX: usize, const NY: usize> {
     fn check(&self, build: &Build) -> Result<(), TableError>;
 
     /// Adds a word to the scan of the table; after the last one, whether the table is intact.
-    fn scan(&self, scan: &mut ChecksumScan) -> Option<bool>;
+    fn scan<'a>(&'a self, scan: &mut ChecksumScan<'a>) -> Option<bool>;
 }
 
 /// The motions of a [`SwingUpTable`] and what watches them.
@@ -193,7 +193,7 @@ impl<const NX: usize, const NY: usize> SwingUp<NX, NY> for NoSwingUp {
     }
 
     #[inline(always)]
-    fn scan(&self, _: &mut ChecksumScan) -> Option<bool> {
+    fn scan(&self, _: &mut ChecksumScan<'_>) -> Option<bool> {
         None
     }
 }
@@ -214,7 +214,7 @@ impl<const NX: usize, const NY: usize, const N: usize> SwingUp<NX, NY> for Swing
         SwingUpTable::check(self, build, NX)
     }
 
-    fn scan(&self, scan: &mut ChecksumScan) -> Option<bool> {
+    fn scan<'a>(&'a self, scan: &mut ChecksumScan<'a>) -> Option<bool> {
         scan.next(self).map(|crc| crc == self.crc)
     }
 }
@@ -237,7 +237,7 @@ impl<const NX: usize, const NY: usize, S: SwingUp<NX, NY>> SwingUp<NX, NY> for O
         self.as_ref().map_or(Ok(()), |table| table.check(build))
     }
 
-    fn scan(&self, scan: &mut ChecksumScan) -> Option<bool> {
+    fn scan<'a>(&'a self, scan: &mut ChecksumScan<'a>) -> Option<bool> {
         self.as_ref()?.scan(scan)
     }
 }

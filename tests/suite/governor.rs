@@ -187,7 +187,7 @@ fn to_and_fro_at_any_pace_stays_within_the_limits_and_does_not_without_governor(
 #[test]
 fn integral_action_is_governed_too() {
     let mut rig = FAST.0.clone();
-    rig.integral = Some(upright_design::rig::Integral { position_weight: 10.0 });
+    rig.integral = Some(upright_design::rig::Integral { position_weight: 10.0, setpoint_weight: 1.0 });
     let table = table(&rig);
     let (trace, summary) = simulate(&rig, &table, &step(&rig, Law::Lqr, 1.0, 40.0)).unwrap();
     assert!(table.laws.lqr.as_ref().unwrap().setpoint_step < 0.1);

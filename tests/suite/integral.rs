@@ -7,11 +7,11 @@ use nalgebra::SVector;
 use upright::control::controller::Controller;
 use upright::control::encoder::CounterWidth;
 use upright::table::Law;
-use upright_design::rig::{Integral, PlantDescription, Rig};
+use upright_design::rig::{Integral, PerJoint, PlantDescription, Rig};
 use upright_design::simulate::{Bench, Scenario, Sensing, simulate};
 
 fn with_integral(name: &str, position_weight: f64) -> Rig {
-    Rig { integral: Some(Integral { position_weight }), ..rig(name) }
+    Rig { integral: Some(Integral { position_weight, setpoint_weight: 1.0 }), ..rig(name) }
 }
 
 /// Mean distance from the set-point over the second half of the run (m): encoder steps keep the cart moving back and
@@ -51,6 +51,48 @@ fn a_constant_force_moves_the_cart_without_integral_action_and_not_with_it() {
                 assert!(moved.abs() > 5e-3, "{name} {sensing:?} {delay_ticks}: {moved}");
                 assert!(held.abs() < 1e-3, "{name} {sensing:?} {delay_ticks}: {held} where {moved} was");
             }
+        }
+    }
+}
+
+/// By how much the cart goes beyond a step of the set-point, as a share of the step.
+fn overshoot(rig: &Rig, step_m: f64) -> f64 {
+    let sensing = Sensing::FullState;
+    let scenario =
+        Scenario { step_m, duration_s: 60.0, substeps: 2, sensing, ..Scenario::at_rest(rig, Law::Lqr) };
+    let (trace, summary) = simulate(rig, &table(rig), &scenario).unwrap();
+    assert!(summary.stands() && summary.final_error_m.abs() < 1e-3, "{}: {summary}", rig.name);
+    trace.samples().map(|sample| sample.state[0]).fold(0.0, f64::max) / step_m - 1.0
+}
+
+#[test]
+fn a_smaller_weight_of_the_set_point_overshoots_less_and_arrives_all_the_same() {
+    for (name, weight, step_m) in [("single-quanser-ip02", 100.0, 0.25), ("quadruple-paper", 10.0, 0.5)] {
+        let overshoots = [1.0, 0.75, 0.5, 0.25, 0.0].map(|setpoint_weight| {
+            let integral = Some(Integral { position_weight: weight, setpoint_weight });
+            overshoot(&Rig { integral, ..rig(name) }, step_m)
+        });
+        // The negative control: all of N.
+        assert!(overshoots[0] > 0.25, "{name}: {overshoots:?}");
+        assert!(overshoots[2] < 0.05, "{name}: {overshoots:?}");
+        assert!(overshoots[4] < 0.01, "{name}: {overshoots:?}");
+    }
+}
+
+#[test]
+fn what_wrong_zeros_and_a_tilted_rail_leave_over_is_removed() {
+    for (name, weight) in [("single-quanser-ip02", 100.0), ("quadruple-paper", 10.0)] {
+        let with = with_integral(name, weight);
+        let mut zeros = with.clone();
+        zeros.reality.sensors.homing_error_rad = PerJoint::all(0.5_f64.to_radians());
+        let mut tilted = with.clone();
+        tilted.reality.sensors.rail_tilt_rad = 5e-3;
+        for real in [zeros, tilted] {
+            let without = Rig { integral: None, ..real.clone() };
+            let scenario = Scenario { duration_s: 120.0, ..pulled(&with, Sensing::Encoders, 0.0) };
+            let (moved, held) = (offset(&without, &scenario), offset(&real, &scenario));
+            assert!(moved.abs() > 1e-3, "{name}: {moved}");
+            assert!(held.abs() < 1e-3, "{name}: {held} where {moved} was");
         }
     }
 }

@@ -7,6 +7,9 @@ use std::sync::atomic::{AtomicUsize, Ordering::Relaxed};
 
 use rayon::prelude::*;
 
+/// Is called with the name of a stage and the number of its steps, and with none after each step.
+pub type Progress<'a> = &'a (dyn Fn(Option<(&str, u64)>) + Sync);
+
 /// What `one` gives for each item, in the order of the items.
 pub fn map<I, T>(items: impl IntoIterator<Item = I>, one: impl Fn(I) -> T + Sync) -> Vec<T>
 where

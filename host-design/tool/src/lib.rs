@@ -8,6 +8,7 @@
 //! | [`image`] | builds firmware images, measures flash, stack and panics |
 //! | [`in_the_loop`] | runs the whole firmware, on the host or as an image in QEMU |
 //! | [`campaign`] | fault injection |
+//! | [`commission`] | from a wired rig to a balancing one, step by step |
 //! | [`monitor`] | telemetry and commands in a terminal |
 //! | [`compare`] | rigs and sweeps side by side |
 //! | [`reproduce`] | the paper's results beside ours |
@@ -28,6 +29,7 @@
 #![forbid(unsafe_code)]
 
 pub mod campaign;
+pub mod commission;
 pub mod compare;
 pub mod figure;
 pub mod identified;

@@ -23,27 +23,47 @@ pub struct Certified {
     pub bits: [usize; 2],
 }
 
-impl Certified {
-    /// This design with the law `law` of `other`, a design for the same plant: every number stays a certified one.
+/// A design at one precision, rounded as a certified one but without proof: to sort designs by, and to try them.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Uncertified {
+    pub(crate) double: Design<f64>,
+    pub(crate) single: Design<f32>,
+}
+
+impl Uncertified {
+    /// The design at the first of the precisions that [`design`] compares.
+    pub(crate) fn of(rig: &Rig) -> Result<Self, DesignError> {
+        with_precision(FIRST_BITS, || {
+            let design = Design::<Wide>::of(rig)?;
+            Ok(Self {
+                double: design.rounded(Wide::round_to_f64),
+                single: design.rounded(Wide::round_to_f32),
+            })
+        })
+    }
+
+    /// This design with the law `law` of `other`, a design for the same plant.
     pub(crate) fn with_law_of(mut self, law: Law, other: &Self) -> Self {
-        fn exchange<T: Clone>(laws: &mut Laws<T>, law: Law, other: &Laws<T>) {
-            match law {
-                Law::Lqr => (laws.lqr, laws.integral) = (other.lqr.clone(), other.integral.clone()),
-                Law::PolePlacement => laws.pole_placement = other.pole_placement.clone(),
-            }
-        }
-        exchange(&mut self.double.continuous, law, &other.double.continuous);
-        exchange(&mut self.double.sampled, law, &other.double.sampled);
-        exchange(&mut self.single.continuous, law, &other.single.continuous);
-        exchange(&mut self.single.sampled, law, &other.single.sampled);
-        self.poles.continuous[law] = other.poles.continuous[law].clone();
-        self.poles.sampled[law] = other.poles.sampled[law].clone();
-        if law == Law::Lqr {
-            self.poles.integral = other.poles.integral.clone();
-        }
+        self.double.sampled.exchange(law, &other.double.sampled);
+        self.double.continuous.exchange(law, &other.double.continuous);
+        self.single.sampled.exchange(law, &other.single.sampled);
+        self.single.continuous.exchange(law, &other.single.continuous);
         self
     }
 }
+
+impl<T: Clone> Laws<T> {
+    /// Takes `law` from `other`.
+    fn exchange(&mut self, law: Law, other: &Self) {
+        match law {
+            Law::Lqr => (self.lqr, self.integral) = (other.lqr.clone(), other.integral.clone()),
+            Law::PolePlacement => self.pole_placement = other.pole_placement.clone(),
+        }
+    }
+}
+
+/// The first precision (bits).
+const FIRST_BITS: usize = 256;
 
 type Attempt = Result<Certified, DesignError>;
 
@@ -70,8 +90,8 @@ fn attempt(rig: &Rig, bits: usize) -> Attempt {
 #[doc(alias = "kalman")]
 pub fn design(rig: &Rig) -> Result<Certified, DesignError> {
     let (first, second) = std::thread::scope(|scope| {
-        let first = scope.spawn(|| attempt(rig, 256));
-        let second = attempt(rig, 512);
+        let first = scope.spawn(|| attempt(rig, FIRST_BITS));
+        let second = attempt(rig, 2 * FIRST_BITS);
         (first.join(), second)
     });
     let first = first.unwrap_or_else(|panic| std::panic::resume_unwind(panic));
@@ -96,5 +116,32 @@ fn agree(low: &Attempt, high: &Attempt) -> bool {
         (_, Err(DesignError::Unresolved { .. } | DesignError::NoKalman { .. })) => false,
         (Err(low), Err(high)) => core::mem::discriminant(low) == core::mem::discriminant(high),
         _ => false,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use super::*;
+
+    #[test]
+    fn the_first_precision_has_the_certified_numbers_of_the_rigs_here() {
+        for name in
+            ["single-quanser-ip02", "double-quanser-dbpen", "triple-glueck-eder-kugi", "quadruple-paper"]
+        {
+            let file = Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("../../rigs/{name}.toml"));
+            let rig = Rig::from_path(&file).unwrap();
+            let (quick, certified) = (Uncertified::of(&rig).unwrap(), design(&rig).unwrap());
+            assert!(quick.double == certified.double && quick.single == certified.single, "{name}");
+        }
+    }
+
+    #[test]
+    fn a_design_in_double_precision_has_other_numbers() {
+        let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../rigs/quadruple-paper.toml");
+        let rig = Rig::from_path(&file).unwrap();
+        let double = Design::<f64>::of(&rig);
+        assert!(double.map_or(true, |double| double != design(&rig).unwrap().double));
     }
 }

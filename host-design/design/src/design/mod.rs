@@ -17,6 +17,7 @@ mod tolerated;
 mod zero_order_hold;
 
 pub use assessment::Assessment;
+pub(crate) use certified::Uncertified;
 pub use certified::{Certified, design};
 pub use controllability::Reach;
 pub use error::{DesignError, Task};

@@ -8,8 +8,8 @@ use upright::supervision::bench_drive::MotorSign;
 use upright::supervision::sign_check::Signs;
 use upright::supervision::supervisor::State;
 
-use crate::reality::hanging_by_hand;
-use crate::rig::{PlantDescription, Rig};
+use super::grasp::Grasp;
+use crate::rig::Rig;
 use crate::simulate::{Begin, Bench, Scenario, SimulationError};
 
 /// What the hand does in one tick.
@@ -37,11 +37,8 @@ pub struct Hand {
     doing: Doing,
     /// The request that turns the motor on.
     turn_on: Request,
-    hanging: Vec<f64>,
+    grasp: Grasp,
     start: Vec<f64>,
-    held: Vec<f64>,
-    /// Largest movement per tick of a joint (rad) and of the cart (m).
-    step: [f64; 2],
     /// The rig while the motor pushes the cart. It is not that of the run, whose random numbers and whose state must not
     /// depend on how it was started.
     pushed: Bench,
@@ -67,10 +64,8 @@ enum Doing {
     Hold,
 }
 
-/// Speed of the hand: joints (rad/s), cart (m/s).
-const RATE: [f64; 2] = [2.0, 0.5];
 /// Time between two tries of the same request (s).
-const RETRY_S: f64 = 0.05;
+pub(super) const RETRY_S: f64 = 0.05;
 /// Time between two commands of a key that is held (s).
 const KEY_S: f64 = 0.025;
 
@@ -81,10 +76,6 @@ impl Hand {
     /// # Errors
     /// [`SimulationError`] if the plant cannot be built.
     pub fn new(rig: &Rig, scenario: &Scenario) -> Result<Self, SimulationError> {
-        let hanging = match &rig.plant {
-            PlantDescription::Chain(_) => hanging_by_hand(rig),
-            PlantDescription::Model(_) => vec![0.0; rig.states()],
-        };
         let undisturbed =
             Scenario { force_noise_n: 0.0, torque_noise_n_m: 0.0, force_offset_n: 0.0, ..scenario.clone() };
         let ticks = |seconds: f64| (seconds / rig.tick.period_s).ceil() as u32;
@@ -94,10 +85,8 @@ impl Hand {
                 Begin::ByHand => Request::Arm,
                 Begin::Hanging { .. } => Request::Up,
             },
-            held: hanging.clone(),
-            hanging,
+            grasp: Grasp::hanging(rig),
             start: scenario.start.clone(),
-            step: RATE.map(|rate| rate * rig.tick.period_s),
             pushed: Bench::new(rig, &undisturbed)?,
             retry_ticks: ticks(RETRY_S),
             key_ticks: ticks(KEY_S),
@@ -108,7 +97,7 @@ impl Hand {
 
     /// The state in which the rig is held now.
     pub fn held(&self) -> &[f64] {
-        &self.held
+        self.grasp.held()
     }
 
     /// Whether the motor pushes the cart while the hand waits.
@@ -136,7 +125,7 @@ impl Hand {
             }
             Doing::Settle(0) => {
                 self.doing = Doing::Push;
-                self.pushed.hold(&self.held);
+                self.pushed.hold(self.grasp.held());
                 None
             }
             Doing::Settle(ticks) => {
@@ -145,8 +134,7 @@ impl Hand {
             }
             Doing::Push => self.push(tick, status, output),
             Doing::Raise => {
-                let start = self.start.clone();
-                if self.move_to(&start) {
+                if self.grasp.move_to(&self.start) {
                     self.doing = Doing::TurnOn;
                 }
                 None
@@ -154,7 +142,7 @@ impl Hand {
             Doing::TurnOn => self.until(status.state == State::Armed, Doing::Hold, tick, self.turn_on),
             Doing::Hold => None,
         };
-        Some(HandTick { held: self.held.clone(), request })
+        Some(HandTick { held: self.grasp.held().to_vec(), request })
     }
 
     /// Repeats a request until it is `done`, then goes on with `then`.
@@ -170,20 +158,9 @@ impl Hand {
     fn follow(&mut self, status: &Status) {
         match status.signs {
             Signs::Rest(_) => {
-                // The cart stays where it is.
-                let mut rest = self.hanging.clone();
-                rest[0] = self.held[0];
-                self.move_to(&rest);
+                self.grasp.rest();
             }
-            Signs::Move(0) => self.held[0] += self.step[1],
-            Signs::Move(sensor) => {
-                let joint = 2 * usize::from(sensor);
-                self.held[joint] += self.step[0];
-                // The next link keeps hanging.
-                if let Some(outer) = self.held.get_mut(joint + 2) {
-                    *outer -= self.step[0];
-                }
-            }
+            Signs::Move(sensor) => self.grasp.turn(sensor),
             Signs::Checked if status.motor == MotorSign::Checked => self.doing = Doing::Raise,
             Signs::Checked => self.doing = Doing::Settle(self.settle_ticks),
             Signs::Unchecked | Signs::Reversed(_) | Signs::Swapped { .. } => {}
@@ -195,29 +172,17 @@ impl Hand {
         // A motor that is off turns freely.
         let drive = if output.enable { output.drive } else { Drive::Force(0.0) };
         self.pushed.tick(drive);
-        self.held.copy_from_slice(self.pushed.state());
+        self.grasp.take(self.pushed.state());
         match status.motor {
             MotorSign::Unchecked if tick.is_multiple_of(self.key_ticks) => {
                 Some(Request::Drive { along: false })
             }
             MotorSign::Checked if status.state == State::Calibrated => {
-                // The hand stops everything.
-                self.held.iter_mut().skip(1).step_by(2).for_each(|rate| *rate = 0.0);
+                self.grasp.stop();
                 self.doing = Doing::Raise;
                 None
             }
             _ => None,
         }
-    }
-
-    /// Moves every position towards `to`; gives whether all are there.
-    fn move_to(&mut self, to: &[f64]) -> bool {
-        let mut there = true;
-        for (index, (held, &to)) in self.held.iter_mut().zip(to).enumerate().step_by(2) {
-            let step = self.step[usize::from(index == 0)];
-            *held += (to - *held).clamp(-step, step);
-            there &= *held == to;
-        }
-        there
     }
 }

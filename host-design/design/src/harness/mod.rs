@@ -10,6 +10,7 @@
 //! Nothing here has the numbers of states and sensors in its type, except the firmware itself.
 
 mod error;
+mod grasp;
 mod hand;
 mod in_process;
 mod record;
@@ -18,6 +19,7 @@ mod start_up;
 mod target;
 
 pub use error::HarnessError;
+pub use grasp::Grasp;
 pub use hand::{Hand, HandTick, Status};
 pub use in_process::{with_firmware, with_table};
 pub use record::{Recording, Tick, record};

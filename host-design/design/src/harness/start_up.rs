@@ -5,7 +5,7 @@ use upright::protocol::message::Request;
 use upright::supervision::supervisor::State;
 
 use super::error::HarnessError;
-use super::hand::{Hand, HandTick};
+use super::hand::{Hand, HandTick, RETRY_S};
 use super::session::Session;
 use super::target::{Pins, Target, healthy};
 use crate::rig::Rig;
@@ -14,8 +14,6 @@ use crate::table::TableValues;
 
 /// Longest time from power-up to balancing (s).
 const LONGEST_WAIT_S: f64 = 60.0;
-/// Time between two tries of lowering (s).
-const RETRY_S: f64 = 0.05;
 
 /// Firmware, simulated rig, and the hand that raises it.
 pub struct Harness<'t> {
@@ -114,8 +112,8 @@ impl<'t> Harness<'t> {
         Err(HarnessError::NotBalancing(self.session.status().state))
     }
 
-    /// Asks for lowering in tick `at`, and again as long as the rig balances, as a person does: it is refused while a link
-    /// leans. To be called in every tick; gives whether it has asked in this one.
+    /// Asks for lowering in tick `at`, and again as long as the rig balances, as a person does: it is refused while a
+    /// link leans. To be called in every tick; gives whether it has asked in this one.
     pub fn ask_to_lower(&mut self, tick: usize, at: Option<usize>) -> bool {
         let state = self.session.status().state;
         if state == State::Lowering && self.lowered_from.is_none() {

@@ -8,20 +8,25 @@ use super::record::Record;
 const SMOOTHINGS: [f64; 2] = [0.4, 2.5];
 /// Steps of each refit.
 const ITERATIONS: usize = 2;
-/// Least relative deviation of lengths.
-const LEAST_LENGTH: f64 = 2e-4;
-/// Least relative deviation of masses and moments with a motor: the friction's model falsifies the scale of the force.
-/// Without one it is that of lengths.
+/// The model's friction turns its sign earlier than the real one, and other smoothings show only a part of what that does
+/// to delay and dead zone.
+const SHOWN: f64 = 1.6;
+/// Least relative deviation of lengths, and of moments without a motor.
+const LEAST_LENGTH: f64 = 1.5e-4;
+const LEAST_MOMENT: f64 = 2e-4;
+/// Least relative deviation of the total mass, and of moments with a motor: the friction's model falsifies the scale of the
+/// force.
 const LEAST_SCALE: f64 = 1.5e-3;
-/// Least relative deviation of viscous friction, for the same reason.
+/// Least relative deviation of viscous friction, of the cart and of joints, for the same reason.
+const LEAST_CART_VISCOUS: f64 = 2e-3;
 const LEAST_VISCOUS: f64 = 5e-3;
 /// Least relative deviation of dry friction, whose model is coarse, and of the dead zone.
-const LEAST_DRY: f64 = 0.1;
-const LEAST_DEAD_ZONE: f64 = 0.01;
+const LEAST_DRY: f64 = 0.04;
+const LEAST_DEAD_ZONE: f64 = 0.02;
 /// Least deviation of the tilt (rad).
 const LEAST_TILT: f64 = 1e-4;
 /// Least deviation of a zero (counts).
-const LEAST_ZERO_COUNTS: f64 = 0.1;
+const LEAST_ZERO_COUNTS: f64 = 0.02;
 
 /// Largest change of each parameter under other smoothings of the friction, and under finer sampling if there is one.
 pub(super) fn changes(filter: &Filter<'_>, finer: Option<&Record>, p: &[f64], noise: &[f64]) -> Vec<f64> {
@@ -60,19 +65,23 @@ pub(super) fn deviations(
         let statistical = priors[i].deviation * inverse[i * size + i].sqrt();
         let least = match kinds[i] {
             Kind::Length(_) => LEAST_LENGTH * p[i],
-            Kind::TotalMass | Kind::FirstMoment(_) | Kind::SecondMoment(_) if has_motor => LEAST_SCALE * p[i],
-            Kind::TotalMass | Kind::FirstMoment(_) | Kind::SecondMoment(_) => LEAST_LENGTH * p[i],
-            Kind::CartViscous | Kind::JointViscous(_) => LEAST_VISCOUS * p[i],
+            Kind::TotalMass => LEAST_SCALE * p[i],
+            Kind::FirstMoment(_) | Kind::SecondMoment(_) if has_motor => LEAST_SCALE * p[i],
+            Kind::FirstMoment(_) | Kind::SecondMoment(_) => LEAST_MOMENT * p[i],
+            Kind::CartViscous => LEAST_CART_VISCOUS * p[i],
+            Kind::JointViscous(_) => LEAST_VISCOUS * p[i],
             Kind::Zero(joint) => LEAST_ZERO_COUNTS * steps[joint + 1],
             Kind::CartDry | Kind::JointDry(_) => LEAST_DRY * p[i],
             Kind::DeadZone => LEAST_DEAD_ZONE * p[i],
             Kind::Tilt => LEAST_TILT,
             _ => 0.0,
         };
+        let shown = if matches!(kinds[i], Kind::Delay | Kind::DeadZone) { SHOWN } else { 1.0 };
+        let changed = shown * changes[i];
         if priors[i].deviation == 0.0 {
             return 0.0;
         }
-        (statistical * statistical + changes[i] * changes[i] + least * least).sqrt()
+        (statistical * statistical + changed * changed + least * least).sqrt()
     };
     (0..size).map(of).collect()
 }

@@ -13,6 +13,7 @@ use super::record::Record;
 use super::shooting::{Shooting, WINDOW_S};
 use super::verdict::{ChannelFit, HeldOut, Predicted, Refusal, channels, judge};
 use super::wiring::{self, WiringFound};
+use crate::parallel::Progress;
 use crate::rig::Rig;
 
 /// Shortest log (s).
@@ -36,9 +37,6 @@ pub struct Settings {
     /// Whether the wiring is taken as that of the file.
     pub trust_wiring: bool,
 }
-
-/// Called with the name of a stage and the number of its steps, and with none after each step.
-pub type Progress<'a> = &'a (dyn Fn(Option<(&str, u64)>) + Sync);
 
 /// A parameter.
 #[derive(Debug, Clone, PartialEq)]

@@ -166,12 +166,22 @@ fn hanging_modes(chain: &Chain) -> Result<[f64; 2], IdentifyError> {
 /// # Errors
 /// [`IdentifyError`] if it cannot be shaken within its rail.
 pub fn shake(rig: &Rig, duration_s: f64, seed: u64) -> Result<Log, IdentifyError> {
-    let mut excitation = Excitation::of(rig, duration_s, seed)?;
+    shake_machine(rig, rig, duration_s, seed)
+}
+
+/// The same for a machine that is another one than that of its `file`, which only the force is computed from.
+pub(super) fn shake_machine(
+    file: &Rig,
+    machine: &Rig,
+    duration_s: f64,
+    seed: u64,
+) -> Result<Log, IdentifyError> {
+    let mut excitation = Excitation::of(file, duration_s, seed)?;
     // Friction that the file does not have leaves the machine with less motion.
     for _ in 0..RAISE.2 {
         let trial = Excitation { duration_s: duration_s.min(TRIAL_S), ..excitation.clone() };
-        let Some(log) = run(rig, &trial, seed)? else { break };
-        let moved = motion(rig, &log)?;
+        let Some(log) = run(file, machine, &trial, seed)? else { break };
+        let moved = motion(file, &log)?;
         if moved > RAISE.0 {
             break;
         }
@@ -180,13 +190,13 @@ pub fn shake(rig: &Rig, duration_s: f64, seed: u64) -> Result<Log, IdentifyError
     let amplitude = excitation.amplitude_n;
     for share in RETRIES {
         excitation.amplitude_n = share * amplitude;
-        if let Some(log) = run(rig, &excitation, seed)? {
+        if let Some(log) = run(file, machine, &excitation, seed)? {
             return Ok(log);
         }
     }
     Err(IdentifyError::Excitation(format!(
         "{}: the cart leaves {:.0} % of the rail even at {:.0} % of the force; is the rail level?",
-        rig.name,
+        file.name,
         100.0 * STOP,
         100.0 * RETRIES[3]
     )))
@@ -199,13 +209,13 @@ fn motion(rig: &Rig, log: &Log) -> Result<f64, IdentifyError> {
     Ok(cart.max(record.largest_angle() / AIM.0))
 }
 
-/// One run; none if the cart goes too far.
-fn run(rig: &Rig, excitation: &Excitation, seed: u64) -> Result<Option<Log>, IdentifyError> {
+/// One run of the machine of the file `rig`; none if the cart goes too far.
+fn run(rig: &Rig, machine: &Rig, excitation: &Excitation, seed: u64) -> Result<Option<Log>, IdentifyError> {
     let chain = chain_of(rig)?;
     let channels = chain.links.len() + 1;
-    let scenario = Scenario { start: hanging_by_hand(rig), seed, ..Scenario::at_rest(rig, Law::Lqr) };
+    let scenario = Scenario { start: hanging_by_hand(machine), seed, ..Scenario::at_rest(machine, Law::Lqr) };
     let failed = |error: &dyn std::fmt::Display| IdentifyError::Excitation(error.to_string());
-    let mut bench = Bench::new(rig, &scenario).map_err(|error| failed(&error))?;
+    let mut bench = Bench::new(machine, &scenario).map_err(|error| failed(&error))?;
     let steps: Vec<f64> = rig.sensors().iter().map(|sensor| sensor.step()).collect();
     let mut counters = vec![0; channels];
     let hanging: Vec<u16> = (0..channels)

@@ -6,17 +6,20 @@
 //!   part of it.
 //! - [`OverLine`]: the same for a machine behind a serial line.
 //! - [`identify`]: first the wiring, then multiple shooting, then prediction error, then deviations and a verdict.
+//! - [`coverage`]: how far the deviations hold, over many machines that differ from their file.
 //! - [`Realised`]: the numbers of a rig file with the identified parameters.
 //!
 //! `docs/identify.md` has the experiment, the format of the file, what can be known, and the accuracy reached.
 
 mod convert;
 mod covariance;
+mod coverage;
 mod error;
 mod estimate;
 mod excite;
 mod feed;
 mod log;
+mod machines;
 mod model;
 mod normal;
 mod over_line;
@@ -31,11 +34,15 @@ mod verdict;
 mod wiring;
 mod with_firmware;
 
+pub use coverage::{
+    Coverage, CoverageError, CoverageRow, Drawn, Identified, Missed, Quantity, coverage, identified,
+};
 pub use error::{IdentifyError, LogError};
-pub use estimate::{Estimate, Identification, Progress, Settings, identify};
+pub use estimate::{Estimate, Identification, Settings, identify};
 pub use excite::{Excitation, shake};
 pub use feed::Feed;
 pub use log::{CONTACTS, DriveScale, Header, Log, Tick};
+pub use machines::Machine;
 pub use over_line::{LineError, OverLine};
 pub use parameters::Kind;
 pub use realise::{Realised, RealisedLink};

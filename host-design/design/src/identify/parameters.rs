@@ -147,7 +147,7 @@ const ZERO_RAD: f64 = 0.03;
 /// Deviation of the eccentricity of an encoder (rad).
 const ECCENTRICITY_RAD: f64 = 0.002;
 /// Friction may be this many times what is expected.
-const FRICTION: f64 = 10.0;
+pub(super) const FRICTION: f64 = 10.0;
 
 /// Start values and deviations of all parameters, from a rig file.
 pub(super) fn priors(rig: &Rig, chain: &Chain, eccentricity: bool) -> Vec<Prior> {

@@ -117,6 +117,20 @@ impl<'t> Shaken<'t> {
         seed: u64,
     ) -> Result<Self, ShakeError> {
         let feed = Feed::new(rig, table, duration_s, seed)?;
+        Ok(Self::begin_with(feed, rig, table, target, seed)?)
+    }
+
+    /// The same with forces that are there already.
+    ///
+    /// # Errors
+    /// [`HarnessError`] if the firmware does not run, or refuses.
+    pub fn begin_with(
+        feed: Feed,
+        rig: &Rig,
+        table: &TableValues,
+        target: &'t mut dyn Target,
+        seed: u64,
+    ) -> Result<Self, HarnessError> {
         let mut harness = checked_and_hanging(rig, table, target, seed)?;
         let inputs = harness.inputs();
         // The line of a board has room for the log and a little telemetry.
@@ -126,7 +140,7 @@ impl<'t> Shaken<'t> {
         Ok(Self { harness, feed, recorder: Recorder::new(rig, table) })
     }
 
-    /// One tick of firmware and machine: `pins` may change what the firmware reads, `motor` what drives the cart.
+    /// One tick of firmware and machine: `pins` may change what the firmware reads, `motor` what drives the cart while the motor is on.
     ///
     /// # Errors
     /// [`ShakeError`] if the firmware does not answer, or the cart does not follow the pulses.
@@ -135,13 +149,31 @@ impl<'t> Shaken<'t> {
         pins: impl FnOnce(&mut Pins),
         motor: impl FnOnce(Drive) -> Drive,
     ) -> Result<Output, ShakeError> {
-        let session = &mut self.harness.session;
-        while session.next_reply().is_some() || session.next_telemetry().is_some() {}
         let mut inputs = self.harness.inputs();
         pins(&mut inputs);
-        let output = self.harness.session.tick(&inputs)?;
+        let output = self.act(&inputs, motor)?;
+        self.feed()?;
+        Ok(output)
+    }
+
+    /// One tick without a host.
+    ///
+    /// # Errors
+    /// [`HarnessError`] if the firmware does not answer.
+    pub fn act(&mut self, inputs: &Pins, motor: impl FnOnce(Drive) -> Drive) -> Result<Output, HarnessError> {
+        let session = &mut self.harness.session;
+        while session.next_reply().is_some() || session.next_telemetry().is_some() {}
+        let output = session.tick(inputs)?;
         // A motor that is off turns freely.
-        self.harness.bench.tick(motor(if output.enable { output.drive } else { Drive::Force(0.0) }));
+        self.harness.bench.tick(if output.enable { motor(output.drive) } else { Drive::Force(0.0) });
+        Ok(output)
+    }
+
+    /// The host takes the log, and sends the forces that are due.
+    ///
+    /// # Errors
+    /// [`IdentifyError`] if the cart does not follow the pulses.
+    pub fn feed(&mut self) -> Result<(), IdentifyError> {
         while let Some(message) = self.harness.session.next_log() {
             self.recorder.push(&message);
             if let Some(last) = self.recorder.log().ticks().last().filter(|_| !self.feed.has_begun()) {
@@ -151,7 +183,7 @@ impl<'t> Shaken<'t> {
         for request in self.feed.due(self.recorder.log())? {
             self.harness.session.send(request);
         }
-        Ok(output)
+        Ok(())
     }
 
     /// Whether everything is shaken and logged, and the motor is off.

@@ -32,6 +32,9 @@ impl Rule {
         accepts: "a number from 1e-6 to 10 (s)",
         admits: |x| x.iter().all(|&x| (1e-6..=10.0).contains(&x)),
     };
+    /// A share of 1.
+    pub(super) const SHARE: Rule =
+        Rule { accepts: "a number from 0 to 1", admits: |x| x.iter().all(|&x| (0.0..=1.0).contains(&x)) };
     /// A share (%).
     pub(super) const PERCENT: Rule =
         Rule { accepts: "a number > 0 and < 100 (%)", admits: |x| x.iter().all(|&x| x > 0.0 && x < 100.0) };

@@ -47,12 +47,17 @@ pub fn rewritten(
     if rig.verify.force_rms_n.is_none() {
         set("verify.force_rms_n", significant(disturbance.force_n, DIGITS))?;
     }
+    Some(format!("{}{}", head(file, choice), with_tolerances(&text, tolerances)?))
+}
+
+/// The text of a rig file with these tolerances as its `[robust]`; those that are 0 are left out. None if a key of
+/// `text` has no place of its own.
+pub fn with_tolerances(text: &str, tolerances: &Tolerances) -> Option<String> {
     // A new key comes first in its section.
     let stated: Vec<_> = tolerances.each().filter(|(_, _, value)| *value != 0.0).collect();
-    for (key, _, value) in stated.into_iter().rev() {
-        set(&format!("robust.{key}"), significant(value, DIGITS))?;
-    }
-    Some(format!("{}{text}", head(file, choice)))
+    stated.into_iter().rev().try_fold(text.to_owned(), |text, (key, _, value)| {
+        Some(with_value(&text, &format!("robust.{key}"), &significant(value, DIGITS))?.text)
+    })
 }
 
 fn head(file: &str, choice: &Choice) -> String {

@@ -120,6 +120,9 @@ pub(super) fn machine(rig: &Rig, tolerances: &Tolerances, share: f64) -> Rig {
 #[derive(Serialize, Deserialize)]
 pub(super) struct Outcome {
     pub(super) stands: bool,
+    /// Time of the last tick (s): that of a fall.
+    #[serde(skip)]
+    pub(super) stood_s: f64,
     ticks: f64,
     #[serde(deserialize_with = "infinite_if_null")]
     force: f64,
@@ -144,8 +147,10 @@ pub(super) fn one(
         seed,
         ..scenario(machine, law, settings.duration_s)
     };
-    let mut outcome = Outcome { stands: false, ticks: 0.0, force: 0.0, angle_rad: 0.0, position_m: 0.0 };
+    let mut outcome =
+        Outcome { stands: false, stood_s: 0.0, ticks: 0.0, force: 0.0, angle_rad: 0.0, position_m: 0.0 };
     let fall = run(machine, table, &scenario, &mut |sample| {
+        outcome.stood_s = sample.t;
         let angles = absolute_angles(sample.state);
         outcome.angle_rad = angles.fold(outcome.angle_rad, |largest, angle| largest.max(angle.abs()));
         outcome.position_m = outcome.position_m.max(sample.state[0].abs());

@@ -83,7 +83,7 @@ impl Reader for Builder {
             Words::U32(values) => values.iter().map(|&value| Number::Integer(value.into())).collect(),
             Words::I32(values) => values.iter().map(|&value| Number::Integer(value.into())).collect(),
             Words::I16(values) => values.iter().map(|&value| Number::Integer(value.into())).collect(),
-            Words::U64(value) => vec![Number::Hash(value)],
+            Words::U64(value) => vec![Number::Hash(*value)],
         };
         self.value(match shape {
             Shape::Value => Node::Value(numbers[0]),

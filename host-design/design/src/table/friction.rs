@@ -4,7 +4,7 @@ use nalgebra::SMatrix;
 use upright::table::FrictionMap;
 
 use super::{MAX_SENSORS, MAX_STATES, NoTable, finite, widest};
-use crate::design::{Certified, continuous_plant, zero_order_hold};
+use crate::design::{Design, continuous_plant, zero_order_hold};
 use crate::numerics::{Matrix, solve};
 use crate::rig::Rig;
 
@@ -20,7 +20,7 @@ const OF_CART: f64 = 0.9;
 /// [`NoTable::Range`] if a value does not fit.
 pub(super) fn friction_map(
     rig: &Rig,
-    design: &Certified,
+    design: &Design<f64>,
 ) -> Result<Option<FrictionMap<MAX_STATES, MAX_SENSORS>>, NoTable> {
     let (Some(known), Ok(plant)) = (&rig.friction, continuous_plant::<f64>(rig)) else { return Ok(None) };
     let states = plant.a.rows();
@@ -28,7 +28,7 @@ pub(super) fn friction_map(
     let axes = inputs.cols();
     let effect = zero_order_hold(&plant.a, &inputs, &rig.tick.period_s).1;
     let at_rest = at_rest(&plant.a, &plant.b, &plant.torque_inputs);
-    let laws = design.double.sampled.in_table();
+    let laws = design.sampled.in_table();
     let fed_forward = |axis: usize, k: Option<&Matrix<f64>>| match (axis, k, &at_rest) {
         (0, Some(_), _) => -1.0,
         (joint, Some(k), Some(at_rest)) => {

@@ -16,7 +16,7 @@ use upright::table::{
     Build, GainTable, LawGains, MotionLimits, MotorMap, ObserverGains, PerLaw, Resize, TABLE_FORMAT,
 };
 
-use crate::design::{Certified, Feedback, detection_thresholds, setpoint_step};
+use crate::design::{Certified, Design, Feedback, Uncertified, detection_thresholds, setpoint_step};
 use crate::numerics::Matrix;
 use crate::rig::{Motor, PlantDescription, Rig};
 
@@ -109,14 +109,26 @@ impl TableValues {
     /// # Errors
     /// [`NoTable`] if there is no law, a value does not fit, or the firmware has no types of this size.
     pub fn of(rig: &Rig, design: &Certified, gains: Gains) -> Result<Self, NoTable> {
+        Self::of_rounded(rig, &design.single, &design.double, gains)
+    }
+
+    /// The table of a design without proof, for the tick: for trials.
+    pub(crate) fn of_uncertified(rig: &Rig, design: &Uncertified) -> Result<Self, NoTable> {
+        Self::of_rounded(rig, &design.single, &design.double, Gains::Sampled)
+    }
+
+    fn of_rounded(
+        rig: &Rig,
+        single: &Design<f32>,
+        double: &Design<f64>,
+        gains: Gains,
+    ) -> Result<Self, NoTable> {
         let states = rig.states();
-        let single = &design.single;
         let laws = match gains {
             Gains::Sampled => single.sampled.in_table(),
             Gains::Continuous => single.continuous.in_table(),
         };
         // The governor's step comes from the loop the law was designed for.
-        let double = &design.double;
         let steps = double.sampled.in_table().map(|law| setpoint_step(rig, double, law?));
         let laws =
             PerLaw::from_fn(|law| laws[law].map(|gains| law_gains(gains, states, steps[law])).transpose())
@@ -142,9 +154,9 @@ impl TableValues {
             (None, PlantDescription::Chain(chain)) => chain.links.len() + 1,
             (None, PlantDescription::Model(_)) => 1,
         };
-        let steps = design.double.kalman.as_ref().map_or(&[][..], |kalman| kalman.steps.entries());
-        let detection = detection_thresholds(rig, &design.double);
-        let friction = friction::friction_map(rig, design)?;
+        let steps = double.kalman.as_ref().map_or(&[][..], |kalman| kalman.steps.entries());
+        let detection = detection_thresholds(rig, double);
+        let friction = friction::friction_map(rig, double)?;
         let widest = GainTable {
             format: TABLE_FORMAT,
             states: states as u32,

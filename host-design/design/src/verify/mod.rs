@@ -47,7 +47,7 @@ pub use loop_model::{ControllerModel, LoopModel, PlantModel};
 pub use margins::Margins;
 pub use monte_carlo::{MonteCarlo, Spread, WorstCase, monte_carlo, sample, wilson};
 pub use noise_runs::{Endurance, NoiseRun, endurance, noise_run};
-pub use report::{Check, Effort, LawTrust, TrustReport, spread, trust};
+pub use report::{Check, Effort, LawTrust, TrustReport, brief, spread, trust};
 pub use response::Response;
 pub use rounding::Rounding;
 pub use rows::{Quantity, Row, quantities, rows};

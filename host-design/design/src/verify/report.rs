@@ -47,6 +47,14 @@ pub struct LawTrust {
     pub imperfections: Vec<RequiredStanding>,
 }
 
+impl TrustReport {
+    /// The requirements that are not met, with their laws.
+    pub fn failed(&self) -> Vec<String> {
+        let failed = self.checks.iter().filter(|check| !check.holds);
+        failed.map(|check| format!("{}: {}", check.law.key(), check.requirement)).collect()
+    }
+}
+
 /// One requirement.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Check {
@@ -102,6 +110,44 @@ pub fn trust(
     Ok(TrustReport { laws, checks })
 }
 
+/// The part of the report that takes seconds: margins, and nominal runs with noise on the machine of `[reality]`.
+///
+/// # Errors
+/// [`VerifyError`] if a value cannot be computed.
+pub fn brief(rig: &Rig, certified: &Certified, table: &TableValues) -> Result<TrustReport, VerifyError> {
+    let mut laws = Vec::new();
+    for part in linear(rig, certified, table)? {
+        let mut trust = LawTrust::of(part);
+        if trust.linear.stable {
+            trust.noise_run = noise(rig, table, trust.linear.law)?;
+        }
+        laws.push(trust);
+    }
+    let checks = laws.iter().flat_map(|law| checks(rig, law)).collect();
+    Ok(TrustReport { laws, checks })
+}
+
+/// Runs with noise on the machine of `[reality]`.
+fn noise(rig: &Rig, table: &TableValues, law: Law) -> Result<Option<NoiseRun>, VerifyError> {
+    known(noise_run(rig, table, law, &Disturbance::of(rig), 4, 20.0))
+}
+
+impl LawTrust {
+    /// Only the linear part.
+    fn of(linear: LinearReport) -> Self {
+        Self {
+            linear,
+            attraction: None,
+            noise_run: None,
+            coarsest_encoder: None,
+            corners: None,
+            mass_tolerances: Vec::new(),
+            monte_carlo: None,
+            imperfections: Vec::new(),
+        }
+    }
+}
+
 fn law_trust(
     rig: &Rig,
     table: &TableValues,
@@ -112,23 +158,14 @@ fn law_trust(
 ) -> Result<LawTrust, VerifyError> {
     let law = linear.law;
     let is_chain = matches!(rig.plant, PlantDescription::Chain(_));
-    let mut trust = LawTrust {
-        linear,
-        attraction: None,
-        noise_run: None,
-        coarsest_encoder: None,
-        corners: None,
-        mass_tolerances: Vec::new(),
-        monte_carlo: None,
-        imperfections: Vec::new(),
-    };
+    let mut trust = LawTrust::of(linear);
     if !trust.linear.stable {
         return Ok(trust);
     }
     stage("region of attraction");
     trust.attraction = known(attraction(rig, table, law, &AttractionSettings::default()))?;
     stage("noise");
-    trust.noise_run = known(noise_run(rig, table, law, &Disturbance::of(rig), 4, 20.0))?;
+    trust.noise_run = noise(rig, table, law)?;
     if table.observer.is_some() && is_chain {
         stage("coarsest encoder");
         trust.coarsest_encoder = known(coarsest_encoder(rig, law, &EncoderSettings::of(rig)))?;

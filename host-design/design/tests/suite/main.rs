@@ -2,6 +2,7 @@
 
 mod design_properties;
 mod identify;
+mod identify_coverage;
 mod known_friction;
 mod lockstep;
 mod log_fuzz;
@@ -22,6 +23,7 @@ mod rig_errors;
 mod rig_files;
 mod rig_fuzz;
 mod robust;
+mod robust_generated;
 mod supervised;
 mod supervisor_false_alarms;
 mod supervisor_faults;

@@ -12,6 +12,7 @@ use super::observed::Observed;
 use super::trial::{Phase, Trial};
 use crate::in_the_loop::{Events, Place, RunError, VirtualBoard};
 use upright_design::harness::{HEARTBEAT_S, Harness, HarnessError, Pins, Session, Target};
+use upright_design::identify::Feed;
 use upright_design::plant::absolute_angles;
 use upright_design::rig::{PlantDescription, Rig};
 use upright_design::simulate::Begin;
@@ -30,8 +31,19 @@ pub struct Setup<'a> {
     pub detection: bool,
     /// Whether a board has its guards: watchdog, break input, MPU, registers that are read back.
     pub guards: bool,
-    /// Whether the defects begin in a bench drive.
-    pub bench_drive: bool,
+    /// What the rig does when the defects begin.
+    pub during: During<'a>,
+}
+
+/// What the rig does when the defects of a campaign begin.
+#[derive(Debug, Clone, Copy)]
+pub enum During<'a> {
+    /// It balances; if the table has motions, it is raised or lowered.
+    Balancing,
+    /// A bench drive.
+    BenchDrive,
+    /// It is shaken by these forces.
+    Shaking(&'a Feed),
 }
 
 /// Longest time from a defect to its verdict (s).
@@ -40,8 +52,11 @@ const LONGEST_S: f64 = 6.0;
 const TICKS_AFTER: usize = 12;
 /// The same at the most on a board, which may have to start again first (s): without a crystal it waits for that.
 const LONGEST_START_S: f64 = 0.8;
+/// While the rig is shaken, a firmware without limits takes angles for so many times smaller ones, and waits for so
+/// many times the impulse until it says that something stands still.
+const BLIND: f32 = 100.0;
 /// A true angle or position beyond its limit by more than this share is too late, whatever follows.
-const BEYOND: f64 = 0.25;
+pub(super) const BEYOND: f64 = 0.25;
 
 /// Runs the trial, with its defect or, for comparison, without.
 pub(super) fn attempt(setup: &Setup<'_>, trial: &Trial, with_defect: bool) -> Result<Observed, RunError> {
@@ -50,14 +65,16 @@ pub(super) fn attempt(setup: &Setup<'_>, trial: &Trial, with_defect: bool) -> Re
         setup.table
     } else {
         let mut blind = setup.table.clone().without_detection();
-        if setup.bench_drive {
+        match setup.during {
+            During::Balancing => {}
             // What it takes to tell the motor's sign.
-            blind.limits.sign_counts[0] = 0;
+            During::BenchDrive => blind.limits.sign_counts[0] = 0,
+            During::Shaking(_) => blind_while_shaken(&mut blind),
         }
         without_detection = blind;
         &without_detection
     };
-    let mut attempt = Attempt { rig: setup.rig, table: setup.table, trial, with_defect, board: None };
+    let mut attempt = Attempt { setup, rig: setup.rig, table: setup.table, trial, with_defect, board: None };
     let Place::Board { image, conditions } = setup.place else {
         return setup.place.with_target(table, |target| Ok(attempt.run(target)?));
     };
@@ -70,6 +87,14 @@ pub(super) fn attempt(setup: &Setup<'_>, trial: &Trial, with_defect: bool) -> Re
     Ok(observed)
 }
 
+/// The limits of angles and rates while the rig is shaken are not in the table, so angles are taken for smaller ones.
+fn blind_while_shaken(table: &mut TableValues) {
+    table.limits.bench_force_n *= BLIND;
+    if let Some(observer) = &mut table.observer {
+        observer.step.iter_mut().skip(1).for_each(|step| *step /= BLIND);
+    }
+}
+
 /// The way to a board's own defects.
 pub(super) struct OnBoard<'a> {
     image: &'a upright_board::Image,
@@ -78,6 +103,7 @@ pub(super) struct OnBoard<'a> {
 }
 
 pub(super) struct Attempt<'a> {
+    pub(super) setup: &'a Setup<'a>,
     pub(super) rig: &'a Rig,
     pub(super) table: &'a TableValues,
     pub(super) trial: &'a Trial,
@@ -89,6 +115,9 @@ impl Attempt<'_> {
     fn run(&self, target: &mut dyn Target) -> Result<Observed, HarnessError> {
         if self.trial.kind.is_at_power_up() {
             return self.power_up(target);
+        }
+        if let During::Shaking(feed) = self.setup.during {
+            return self.shake(feed, target);
         }
         let mut harness = Harness::new(self.rig, self.table, &self.trial.scenario, target)?;
         match self.trial.kind {
@@ -149,10 +178,7 @@ impl Attempt<'_> {
             harness.bench.tick(drive);
         }
         observed.fault = harness.session.fault();
-        if self.board.is_some() && observed.off.is_some() && observed.fault.is_none() {
-            observed.fault = self.reason(harness);
-        }
-        observed.dead |= observed.fault == Some(Fault::Crash);
+        self.find_reason(harness, &mut observed);
         if trial.kind != Kind::HostDeaf && observed.off.is_none() {
             let inputs = harness.inputs();
             if let Ok(Answer::Statistics(statistics)) = harness.session.ask(Request::Statistics, &inputs) {
@@ -162,8 +188,16 @@ impl Attempt<'_> {
         Ok(observed)
     }
 
+    /// Asks a board that went off without a fault why it has started again.
+    pub(super) fn find_reason(&self, harness: &mut Harness<'_>, observed: &mut Observed) {
+        if self.board.is_some() && observed.off.is_some() && observed.fault.is_none() {
+            observed.fault = self.reason(harness);
+        }
+        observed.dead |= observed.fault == Some(Fault::Crash);
+    }
+
     /// Why a board that has started again has done so.
-    pub(super) fn reason(&self, harness: &mut Harness<'_>) -> Option<Fault> {
+    fn reason(&self, harness: &mut Harness<'_>) -> Option<Fault> {
         let inputs = harness.inputs();
         match harness.session.ask(Request::Info, &inputs) {
             Ok(Answer::Info(info)) => info.reset.fault(),
@@ -179,8 +213,25 @@ impl Attempt<'_> {
         since: Option<usize>,
         is_visible: &mut bool,
     ) -> Result<Output, HarnessError> {
+        let inputs = self.pins(harness, injection, since, is_visible)?;
+        harness.session.tick(&inputs)
+    }
+
+    /// What the firmware reads in this tick, and what begins in it.
+    pub(super) fn pins(
+        &self,
+        harness: &mut Harness<'_>,
+        injection: &mut Injection<'_>,
+        since: Option<usize>,
+        is_visible: &mut bool,
+    ) -> Result<Pins, HarnessError> {
         let mut inputs = harness.inputs();
-        if self.trial.phase == Phase::Driving {
+        let has_switches = match self.trial.phase {
+            Phase::Driving => true,
+            Phase::Shaken => self.setup.detection,
+            Phase::Balancing | Phase::Raising | Phase::Lowering => false,
+        };
+        if has_switches {
             self.press_limit_switches(harness.bench.state(), &mut inputs);
         }
         if let Some(since) = since {
@@ -198,7 +249,7 @@ impl Attempt<'_> {
                 harness.session.stop_reading()?;
             }
         }
-        harness.session.tick(&inputs)
+        Ok(inputs)
     }
 
     /// Whether nothing is left to be observed before `tick`.

@@ -5,6 +5,8 @@ use upright::supervision::bench_drive::MotorSign;
 use upright::supervision::fault::Fault;
 use upright::supervision::inhibits::Inhibits;
 
+use super::trial::Phase;
+
 /// A kind of defect.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "kebab-case")]
@@ -87,7 +89,8 @@ pub enum Expected {
     Refused(Inhibits),
     /// The motor is off in the same tick, and the firmware does not run on.
     Dead,
-    /// A bench drive ends without a fault, so long after the last command as after a key that was let go.
+    /// A bench drive ends without a fault, so long after the last command as after a key that was let go; a rig that
+    /// was shaken brings its cart back first.
     LetGo,
     /// A bench drive ends with this finding about the motor, which keeps it from arming.
     Found(MotorSign),
@@ -280,6 +283,16 @@ impl Kind {
     /// The outcome that it must have.
     pub fn expected(self) -> Expected {
         self.row().3
+    }
+
+    /// The outcome that it must have in a phase; in a bench drive and while the rig is shaken some prove nothing.
+    pub(super) fn expected_in(self, phase: Phase) -> Expected {
+        let special = match phase {
+            Phase::Driving => self.while_driving(),
+            Phase::Shaken => self.while_shaken(),
+            Phase::Balancing | Phase::Raising | Phase::Lowering => None,
+        };
+        special.unwrap_or_else(|| self.expected())
     }
 
     /// The fault inside the microcontroller, if it is one.

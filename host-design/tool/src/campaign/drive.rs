@@ -2,7 +2,6 @@
 
 use upright::protocol::message::{Answer, Request};
 use upright::supervision::bench_drive::{LONGEST_S, MotorSign};
-use upright::supervision::fault::Fault;
 use upright::supervision::inhibits::Inhibits;
 use upright_design::harness::{Harness, HarnessError, Pins};
 use upright_design::rig::{PlantDescription, Rig};
@@ -78,14 +77,6 @@ impl Trial {
         };
         Self { phase: Phase::Driving, scenario, onset, watched, sensor: 0, ..self }
     }
-
-    /// The outcome that it must have.
-    pub(super) fn expected(&self) -> Expected {
-        match (self.phase, self.kind.while_driving()) {
-            (Phase::Driving, Some(expected)) => expected,
-            _ => self.kind.expected(),
-        }
-    }
 }
 
 impl Attempt<'_> {
@@ -151,7 +142,7 @@ impl Attempt<'_> {
             if observed.off.is_some() {
                 observed.fault = harness.session.fault();
             }
-            if self.drive_is_over(tick, &observed) {
+            if self.hanging_is_over(tick, &observed) {
                 break;
             }
         }
@@ -168,8 +159,9 @@ impl Attempt<'_> {
         }
     }
 
-    fn drive_is_over(&self, tick: usize, observed: &Observed) -> bool {
-        let wants_reason = matches!(self.trial.expected(), Expected::Fault(..) | Expected::Dead);
+    /// Whether nothing is left to be observed after `tick` of a rig that hangs.
+    pub(super) fn hanging_is_over(&self, tick: usize, observed: &Observed) -> bool {
+        let wants_reason = !matches!(self.trial.expected(), Expected::Found(_) | Expected::LetGo);
         match observed.off {
             Some(off) => tick > off + self.ticks_after(wants_reason && observed.fault.is_none()),
             None => tick >= self.trial.onset + self.trial.watched,
@@ -178,11 +170,7 @@ impl Attempt<'_> {
 
     /// What the firmware has found out, and whether it would arm.
     fn after_drive(&self, harness: &mut Harness<'_>, observed: &mut Observed) -> Result<(), HarnessError> {
-        let is_on_board = self.board.is_some();
-        if is_on_board && observed.off.is_some() && observed.fault.is_none() {
-            observed.fault = self.reason(harness);
-        }
-        observed.dead |= observed.fault == Some(Fault::Crash);
+        self.find_reason(harness, observed);
         observed.motor = Some(harness.session.status().motor);
         let inputs = harness.inputs();
         observed.refused = match harness.session.ask(Request::Arm, &inputs) {

@@ -4,11 +4,12 @@ use serde::{Deserialize, Serialize};
 use upright::supervision::bench_drive::{MotorSign, SILENCE_S};
 use upright::supervision::fault::Fault;
 use upright::supervision::inhibits::Inhibits;
+use upright::supervision::shaking;
 
 use super::attempt::{Setup, attempt};
 use super::defect::{Expected, Kind, Ticks};
 use super::observed::Observed;
-use super::trial::Trial;
+use super::trial::{Phase, Trial};
 use crate::in_the_loop::{Place, RunError};
 use upright_design::table::TableValues;
 
@@ -97,7 +98,7 @@ pub(super) fn judge(setup: &Setup<'_>, trial: &Trial) -> Result<Outcome, RunErro
         },
         Expected::LetGo if observed.fault.is_some() => Class::FalseAlarm,
         Expected::LetGo => match from_onset {
-            Some(ticks) if ticks <= silence_ticks(setup.table) => Class::Detected,
+            Some(ticks) if ticks <= silence_ticks(setup.table, trial.phase) => Class::Detected,
             _ => Class::Missed,
         },
         Expected::Found(_) if observed.outside || observed.off.is_none() => Class::Missed,
@@ -143,10 +144,14 @@ fn has_found(observed: &Observed, sign: MotorSign) -> bool {
     observed.motor == Some(sign) || is_at_the_end
 }
 
-/// Ticks from a host's last command to the end of a bench drive: bytes take a tick to the link and one to the control
-/// task, and on a board some more.
-pub(super) fn silence_ticks(table: &TableValues) -> u32 {
-    (SILENCE_S / table.tick_s) as u32 + 5
+/// Ticks from a host's last command to the motor off: bytes take a tick to the link and one to the control task, and on
+/// a board some more. A rig that was shaken first brings its cart back.
+pub(super) fn silence_ticks(table: &TableValues, phase: Phase) -> u32 {
+    let longest_s = match phase {
+        Phase::Shaken => shaking::SILENCE_S + shaking::RETURN_S,
+        _ => SILENCE_S,
+    };
+    (longest_s / table.tick_s) as u32 + 5
 }
 
 /// The number of ticks for this table.

@@ -11,12 +11,14 @@ mod injection;
 mod judge;
 mod observed;
 mod on_board;
+mod shaken;
 mod tally;
 mod trial;
 
-pub use attempt::Setup;
+pub use attempt::{During, Setup};
 pub use by_hand::Defective;
 pub use defect::{Expected, Kind, Ticks};
 pub use judge::{Class, Outcome};
+pub use shaken::feed;
 pub use tally::{Campaign, CampaignError, Row, campaign, kinds, one};
 pub use trial::{Phase, Trial};

@@ -3,7 +3,7 @@
 use serde::Serialize;
 use upright::supervision::fault::Fault;
 
-use super::attempt::Setup;
+use super::attempt::{During, Setup};
 use super::defect::{Expected, Kind};
 use super::judge::{Class, Outcome, allowed, judge, silence_ticks};
 use super::trial::Trial;
@@ -102,10 +102,12 @@ pub fn kinds(table: &TableValues, place: Place<'_>) -> Vec<Kind> {
 /// # Errors
 /// [`CampaignError`] if it cannot be run.
 pub fn one(setup: &Setup<'_>, kinds: &[Kind], seed: u64, number: u64) -> Result<Outcome, CampaignError> {
-    let mut trial = Trial::draw(setup.rig, setup.table, kinds, seed, number);
-    if setup.bench_drive {
-        trial = trial.in_bench_drive(setup.rig);
-    }
+    let trial = Trial::draw(setup.rig, setup.table, kinds, seed, number);
+    let trial = match setup.during {
+        During::Balancing => trial,
+        During::BenchDrive => trial.in_bench_drive(setup.rig),
+        During::Shaking(_) => trial.in_shaking(setup.rig),
+    };
     judge(setup, &trial).map_err(|source| CampaignError::Trial { number, kind: trial.kind.name(), source })
 }
 
@@ -133,9 +135,9 @@ pub fn campaign(
 
 impl Row {
     fn of(kind: Kind, setup: &Setup<'_>, outcomes: &[Outcome]) -> Self {
-        let expected = kind.while_driving().filter(|_| setup.bench_drive).unwrap_or_else(|| kind.expected());
         let of_kind = || outcomes.iter().filter(move |outcome| outcome.kind == kind);
         let count = |class: Class| of_kind().filter(|outcome| outcome.class == class).count();
+        let phase = setup.during.phase();
         let is_wrong = |class: Class| matches!(class, Class::Missed | Class::FalseAlarm);
         let mut faults: Vec<u8> = of_kind().filter_map(|outcome| outcome.fault).collect();
         faults.sort_unstable();
@@ -145,9 +147,9 @@ impl Row {
         Self {
             kind,
             meaning: kind.meaning(),
-            allowed: match expected {
+            allowed: match kind.expected_in(phase) {
                 Expected::Fault(_, within) => Some(allowed(setup.table, within)),
-                Expected::LetGo => Some(silence_ticks(setup.table)),
+                Expected::LetGo => Some(silence_ticks(setup.table, phase)),
                 Expected::Off(ticks) => Some(ticks),
                 Expected::Dead => Some(1),
                 _ => None,

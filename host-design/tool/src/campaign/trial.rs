@@ -4,7 +4,7 @@ use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
 use upright::table::Law;
 
-use super::defect::Kind;
+use super::defect::{Expected, Kind};
 use upright_design::rig::Rig;
 use upright_design::simulate::{Scenario, Sensing};
 use upright_design::table::{SwingUpValues, TableValues};
@@ -47,6 +47,8 @@ pub enum Phase {
     Lowering,
     /// Its links hang, and the motor pushes the cart while a key is held.
     Driving,
+    /// Its links hang, and the motor shakes them.
+    Shaken,
 }
 
 /// Ticks in which a command has taken effect.
@@ -129,6 +131,11 @@ impl Trial {
         let after = if is_raised { upright / 2 } else { 0 };
         let watched = (begin + ticks + after).saturating_sub(onset).max(1);
         Self { phase, scenario, onset, watched, ..self }
+    }
+
+    /// The outcome that it must have.
+    pub(super) fn expected(&self) -> Expected {
+        self.kind.expected_in(self.phase)
     }
 
     /// Generator of whatever is random after the onset.

@@ -2,7 +2,7 @@
 
 use std::io::{ErrorKind, Read, Write};
 use std::net::TcpStream;
-use std::time::Duration;
+use std::time::{Duration, SystemTime};
 
 use serialport::SerialPort;
 use upright::protocol::BAUD;
@@ -107,4 +107,18 @@ impl Line {
             Line::Tcp(stream) => stream.write_all(bytes),
         }
     }
+
+    /// Sends all of these, and gives what is received then.
+    ///
+    /// # Errors
+    /// As for [`send`](Self::send) and [`receive`](Self::receive).
+    pub fn exchange<'a>(&mut self, bytes: &[u8], buffer: &'a mut [u8]) -> std::io::Result<&'a [u8]> {
+        self.send(bytes)?;
+        self.receive(buffer)
+    }
+}
+
+/// Time since 1970: commands are numbered by it.
+pub fn now() -> Duration {
+    SystemTime::UNIX_EPOCH.elapsed().unwrap_or_default()
 }

@@ -12,5 +12,5 @@ pub mod view;
 pub mod words;
 
 pub use command::{Action, BadCommand, action, request};
-pub use line::{Line, OpenError};
+pub use line::{Line, OpenError, now};
 pub use model::{Ended, Monitor, TelemetryOfAny};

@@ -1,12 +1,12 @@
 //! A machine behind a serial line: telemetry comes in, commands go out.
 
-use std::time::{Duration, Instant, SystemTime};
+use std::time::{Duration, Instant};
 
 use serde_json::Value;
 
 use super::desk::Desk;
 use super::pace::PICTURE;
-use crate::monitor::Line;
+use crate::monitor::{Line, now};
 
 /// At the end, the motor is turned off: longest wait for the answer.
 const LAST_WAIT: Duration = Duration::from_millis(500);
@@ -41,16 +41,8 @@ pub(super) fn run(mut line: Line, desk: &mut Desk, rig_hash: u64, goes_on: &dyn 
 /// Sends what is due, and receives.
 fn exchange(line: &mut Line, desk: &mut Desk, buffer: &mut [u8]) {
     desk.monitor.poll(now());
-    if let Err(error) = line.send(&desk.monitor.take_outgoing()) {
-        return desk.monitor.close(&error);
-    }
-    match line.receive(buffer) {
+    match line.exchange(&desk.monitor.take_outgoing(), buffer) {
         Ok(bytes) => desk.receive(bytes, now()),
         Err(error) => desk.monitor.close(&error),
     }
-}
-
-/// Time since 1970.
-fn now() -> Duration {
-    SystemTime::UNIX_EPOCH.elapsed().unwrap_or_default()
 }

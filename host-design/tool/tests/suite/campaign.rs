@@ -8,7 +8,7 @@ use upright_design::design::design;
 use upright_design::rig::Rig;
 use upright_design::study::Study;
 use upright_design::table::{Gains, TableValues};
-use upright_tool::campaign::{Campaign, Kind, Setup, Trial, campaign, kinds, one};
+use upright_tool::campaign::{Campaign, During, Kind, Setup, Trial, campaign, feed, kinds, one};
 use upright_tool::image::{self, Board, build_if_possible};
 use upright_tool::in_the_loop::Place;
 
@@ -20,7 +20,7 @@ fn rig(name: &str) -> (Rig, TableValues) {
 }
 
 fn on_host<'a>(rig: &'a Rig, table: &'a TableValues) -> Setup<'a> {
-    Setup { rig, table, place: Place::Host, detection: true, guards: true, bench_drive: false }
+    Setup { rig, table, place: Place::Host, detection: true, guards: true, during: During::Balancing }
 }
 
 fn run(setup: &Setup<'_>, kinds: &[Kind], runs: u64) -> Campaign {
@@ -61,7 +61,7 @@ fn every_defect_of_a_bench_drive_is_found_and_nothing_else() {
     for name in ["quadruple-paper.toml", "single-quanser-ip02.toml"] {
         let (rig, table) = rig(name);
         let kinds = while_driving(&table, Place::Host);
-        let setup = Setup { bench_drive: true, ..on_host(&rig, &table) };
+        let setup = Setup { during: During::BenchDrive, ..on_host(&rig, &table) };
         let result = run(&setup, &kinds, 3 * kinds.len() as u64);
         for row in &result.rows {
             assert!(row.wrong.is_empty() && row.runs == 3, "{name}: {row:?}");
@@ -82,7 +82,7 @@ fn on_the_virtual_board_a_bench_drive_ends_with_its_defects_and_does_not_without
     let Some(elf) = build_if_possible(image::Kind::Board(Board::WeactF405)).unwrap() else { return };
     let image = Image::from_elf(&std::fs::read(elf).unwrap()).unwrap();
     let place = Place::Board { image: &image, conditions: Conditions::f405(1) };
-    let setup = Setup { place, bench_drive: true, ..on_host(&rig, &table) };
+    let setup = Setup { place, during: During::BenchDrive, ..on_host(&rig, &table) };
     let kinds = while_driving(&table, place);
     for row in run(&setup, &kinds, kinds.len() as u64).rows {
         assert!(row.wrong.is_empty() && row.runs == 1, "{row:?}");
@@ -92,6 +92,28 @@ fn on_the_virtual_board_a_bench_drive_ends_with_its_defects_and_does_not_without
     let unguarded = Setup { guards: false, ..setup };
     for row in run(&unguarded, &guarded, guarded.len() as u64).rows {
         assert_eq!(row.missed, 1, "{row:?}");
+    }
+}
+
+#[test]
+fn every_defect_of_a_rig_that_is_shaken_is_found_and_nothing_else() {
+    for name in ["quadruple-paper.toml", "single-quanser-ip02.toml"] {
+        let (rig, table) = rig(name);
+        let forces = feed(&rig, &table, 3).unwrap();
+        let during = During::Shaking(&forces);
+        let setup = Setup { during, ..on_host(&rig, &table) };
+        let kinds: Vec<Kind> =
+            kinds(&table, Place::Host).into_iter().filter(|&kind| during.is_proof(kind)).collect();
+        for row in &run(&setup, &kinds, 2 * kinds.len() as u64).rows {
+            assert!(row.wrong.is_empty() && row.runs == 2, "{name}: {row:?}");
+        }
+        // Negative control: a firmware without limits misses what runs away and what stands still.
+        let found: Vec<Kind> = kinds.into_iter().filter(|&kind| during.needs_detection(kind)).collect();
+        assert!(found.len() >= 4, "{found:?}");
+        let blind = Setup { detection: false, ..setup };
+        for row in run(&blind, &found, 2 * found.len() as u64).rows {
+            assert!(row.missed > 0, "{name}: {row:?}");
+        }
     }
 }
 

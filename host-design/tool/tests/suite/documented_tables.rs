@@ -7,6 +7,7 @@ use ratatui::crossterm::event::{KeyCode, KeyEvent, KeyModifiers};
 use upright::supervision::fault::Fault;
 use upright::supervision::inhibits::Inhibits;
 use upright_tool::campaign::Kind;
+use upright_tool::commission::{Planted, Step};
 use upright_tool::image::{
     FLASH_LIMIT, FLASH_LIMIT_FOR_IDENTIFICATION, FLASH_LIMIT_WITH_MOTIONS, RAM_LIMIT,
     RAM_LIMIT_FOR_IDENTIFICATION,
@@ -76,6 +77,22 @@ fn defects() -> String {
     "| kind | defect |\n|---|---|\n".to_owned() + &rows.collect::<String>()
 }
 
+fn steps() -> String {
+    let rows = Step::ALL.iter().map(|(_, name, finds_out)| format!("| {name} | {finds_out} |\n"));
+    "| step | what is found out |\n|---|---|\n".to_owned() + &rows.collect::<String>()
+}
+
+fn planted() -> String {
+    let row = |one: Planted| {
+        let [single, double] = [1, 2].map(|links| one.found_in(links).name());
+        let step =
+            if single == double { single.to_owned() } else { format!("{double}; with one link {single}") };
+        format!("| `{one}` | {} | {step} |\n", one.meaning())
+    };
+    "| defect | what is wrong | found in |\n|---|---|---|\n".to_owned()
+        + &Planted::all().map(row).collect::<String>()
+}
+
 /// The statuses that `upright --help` lists.
 fn exit_statuses(help: &str) -> String {
     let list = help.split_once("Exit status:\n").unwrap().1.split_once("\n\n").unwrap().0;
@@ -114,13 +131,27 @@ fn the_page_about_faults_holds_the_kinds_of_defects() {
 }
 
 #[test]
+fn the_page_about_commissioning_holds_steps_and_planted_defects() {
+    hold("docs/commission.md", "steps", &steps());
+    hold("docs/commission.md", "planted", &planted());
+}
+
+#[test]
 fn the_page_about_commands_holds_the_exit_statuses_of_the_help() {
     hold("docs/commands.md", "exit statuses", &exit_statuses(&upright(&["--help"])));
 }
 
 #[test]
 fn a_changed_word_of_a_table_would_be_noticed() {
-    for table in [faults(), inhibits(), defects(), quantities(), exit_statuses(&upright(&["--help"]))] {
+    for table in [
+        faults(),
+        inhibits(),
+        defects(),
+        steps(),
+        planted(),
+        quantities(),
+        exit_statuses(&upright(&["--help"])),
+    ] {
         let page = format!("before\n<!-- x -->\n{table}\n<!-- /x -->\nafter");
         assert_eq!(between(&page, "x"), Some(table.trim()));
         let word = table.trim().rsplit(' ').nth(1).unwrap();

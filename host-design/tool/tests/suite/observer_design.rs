@@ -179,7 +179,7 @@ fn integral_action_of_a_scalar_plant_is_the_closed_form_correctly_rounded() {
 
 /// The LQR alone, with integral action and without observer: neither of the others depends on it.
 fn with_weight(name: &str, position_weight: f64, delay_ticks: u8) -> Rig {
-    let integral = Some(Integral { position_weight });
+    let integral = Some(Integral { position_weight, setpoint_weight: 1.0 });
     let mut rig = Rig { integral, pole_placement: None, kalman: None, ..rig(name) };
     rig.tick.delay_ticks = delay_ticks;
     rig

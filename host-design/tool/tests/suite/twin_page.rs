@@ -252,17 +252,22 @@ fn a_minute_of_running_needs_no_more_memory() {
     };
     let (before, resident) = (heap(&mut browser), resident_kib(&twin));
     let frames = browser.value("upright.seen.frames").as_f64().unwrap();
+    let worked_s = browser.worked_s();
     let begin = Instant::now();
     wait(50.0);
     let seconds = begin.elapsed().as_secs_f64();
-    let rate = (browser.value("upright.seen.frames").as_f64().unwrap() - frames) / seconds;
+    let frames = browser.value("upright.seen.frames").as_f64().unwrap() - frames;
+    let (rate, work_ms) = (frames / seconds, 1e3 * (browser.worked_s() - worked_s) / frames);
     let (after, grown) = (heap(&mut browser), resident_kib(&twin) as f64 / resident as f64);
     assert_eq!(browser.value(STATE), "Balancing");
     assert!(after < 1.2 * before + 1e6, "the page grows from {before} to {after} bytes");
     assert!(grown < 1.2, "the server grows {grown} times");
-    eprintln!("{rate:.1} frames per second; page {before} to {after} bytes; server {grown:.2} times");
+    eprintln!(
+        "{rate:.1} frames per second, {work_ms:.1} ms of scripts and layout for each; page {before} to {after} bytes; server {grown:.2} times"
+    );
     // A machine without a graphics card that runs other tests meanwhile draws fewer than 60.
     assert!(rate > 3.0, "{rate} frames per second");
+    assert!(work_ms < 1e3 / 60.0, "scripts and layout take {work_ms} ms for each frame");
 }
 
 /// Memory of the server (KiB); 0 where the system does not tell.

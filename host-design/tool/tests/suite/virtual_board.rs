@@ -14,7 +14,7 @@ use upright_design::rig::{Integral, Rig};
 use upright_design::simulate::Scenario;
 use upright_design::swing_up::{Stored, hangs, motions, up_and_down, with_motions};
 use upright_design::table::{Gains, TableValues};
-use upright_tool::campaign::{Class, Kind as Defect, Setup, one};
+use upright_tool::campaign::{Class, During, Kind as Defect, Setup, one};
 use upright_tool::image::{Board, Kind, build_for, build_if_possible, if_possible};
 use upright_tool::in_the_loop::{Place, VirtualBoard, measure, run_compared};
 
@@ -96,7 +96,7 @@ fn a_stopped_run_names_address_and_source_line() {
 fn motor_delay_and_integral_action_give_the_bits_of_the_host() {
     let mut rig = Rig::from_path("../../rigs/single-quanser-ip02.toml".as_ref()).unwrap();
     rig.tick.delay_ticks = 1;
-    rig.integral = Some(Integral { position_weight: 100.0 });
+    rig.integral = Some(Integral { position_weight: 100.0, setpoint_weight: 1.0 });
     let table = TableValues::of(&rig, &design(&rig).unwrap(), Gains::Sampled).unwrap();
     assert!(table.motor.is_some() && table.sensors() == 2);
     let built = build_for(Kind::Board(Board::WeactF405), &rig, &table);
@@ -166,7 +166,8 @@ fn the_feather_balances_a_link_with_the_bits_of_the_host_and_refuses_another_chi
 fn a_supply_that_a_braking_motor_pumps_up_turns_the_motor_off_and_a_spike_does_not() {
     let Some((rig, table, image)) = feather() else { return };
     let place = Place::Board { image: &image, conditions: Board::FeatherF405.conditions(1) };
-    let setup = Setup { rig: &rig, table: &table, place, detection: true, guards: true, bench_drive: false };
+    let setup =
+        Setup { rig: &rig, table: &table, place, detection: true, guards: true, during: During::Balancing };
     let surge = one(&setup, &[Defect::SupplySurge], 1, 0).unwrap();
     assert_eq!((surge.class, surge.fault), (Class::Detected, Some(Fault::Supply.code())), "{surge:?}");
     // The negative control: one or two ticks of it.

@@ -17,5 +17,7 @@ keys! {
     pub struct Integral {
         position_weight: f64, "", Rule::POSITIVE,
             "weight of the integrated position error in the cost", Absent::Required;
+        setpoint_weight: f64, "", Rule::SHARE,
+            "share of the precompensation gain that is used: less overshoots less", Absent::Numbers(&[1.0]);
     }
 }

@@ -4,7 +4,7 @@ use std::process::ExitCode;
 
 use upright_design::design::DesignError;
 use upright_design::harness::HarnessError;
-use upright_design::identify::IdentifyError;
+use upright_design::identify::{CoverageError, IdentifyError};
 use upright_design::rig::RigError;
 use upright_design::robust::RobustError;
 use upright_design::simulate::SimulationError;
@@ -13,6 +13,7 @@ use upright_design::swing_up::SwingUpError;
 use upright_design::table::{NoTable, WriteError};
 use upright_design::verify::{Unverifiable, VerifyError};
 use upright_tool::campaign::CampaignError;
+use upright_tool::commission::Stop;
 use upright_tool::figure::FigureError;
 use upright_tool::image::{ElfError, ImageError, SizeError};
 use upright_tool::in_the_loop::{EmulatorError, RelayError, RunError};
@@ -40,6 +41,8 @@ pub(crate) enum Failure {
     Identify(#[from] IdentifyError),
     #[error("{0}")]
     NotIdentified(String),
+    #[error("{0}")]
+    MustNotRun(String),
     #[error(transparent)]
     Simulation(#[from] SimulationError),
     #[error(transparent)]
@@ -89,6 +92,26 @@ impl From<RelayError> for Failure {
     }
 }
 
+impl From<Stop> for Failure {
+    fn from(stop: Stop) -> Self {
+        match stop {
+            Stop::Machine(words) => Failure::MustNotRun(words),
+            Stop::Line(_) | Stop::Aborted => Failure::CheckFailed(stop.to_string()),
+            Stop::Simulated(error) => Failure::InTheLoop(error),
+            Stop::Record(error) => Failure::Write(error),
+        }
+    }
+}
+
+impl From<CoverageError> for Failure {
+    fn from(error: CoverageError) -> Self {
+        match error {
+            CoverageError::Identify(error) => Failure::Identify(error),
+            CoverageError::Study(error) => Failure::Study(error),
+        }
+    }
+}
+
 impl From<TwinError> for Failure {
     fn from(error: TwinError) -> Self {
         match error {
@@ -106,7 +129,7 @@ impl Failure {
             Failure::Design { .. } | Failure::NoTable { .. } | Failure::NoSolution(_) => 3,
             Failure::Robust { source: RobustError::Unhelped(_) | RobustError::Design(_), .. } => 3,
             Failure::SwingUp { source, .. } if source.is_without_solution() => 3,
-            Failure::NotIdentified(_) => 3,
+            Failure::NotIdentified(_) | Failure::MustNotRun(_) => 3,
             Failure::Identify(error) if error.is_without_solution() => 3,
             Failure::NoProgram(_)
             | Failure::Image(ImageError::NoCompiler)

@@ -7,7 +7,7 @@ use serde_json::json;
 use upright_design::rig::Rig;
 use upright_design::study::Study;
 use upright_design::swing_up::SwingUpError;
-use upright_tool::campaign::{Campaign, Kind, Row, Setup, campaign, kinds, one};
+use upright_tool::campaign::{Campaign, During, Kind, Row, Setup, campaign, feed, kinds, one};
 use upright_tool::in_the_loop::{Link, Place};
 
 use crate::failure::Failure;
@@ -30,6 +30,7 @@ Examples:
   upright faults rigs/quadruple-paper.toml --target board --runs 300
   upright faults rigs/quadruple-paper.toml --swing-up                while it is raised and lowered
   upright faults rigs/quadruple-paper.toml --bench-drive             while the motor pushes the cart a little
+  upright faults rigs/quadruple-paper.toml --shake                   while the motor shakes the links
   upright faults rigs/quadruple-paper.toml --only 1234               one run again, bit for bit
   upright faults rigs/quadruple-paper.toml --shard 2/3 > 2.jsonl     the second third of the runs
   upright faults rigs/quadruple-paper.toml --merge 1.jsonl 2.jsonl 3.jsonl
@@ -43,6 +44,9 @@ pub(crate) struct Faults {
     /// Begin the defects while the motor pushes the cart a little, with the links hanging
     #[arg(long, conflicts_with = "swing_up")]
     bench_drive: bool,
+    /// Begin the defects while the motor shakes the hanging links, as for `upright identify`
+    #[arg(long, conflicts_with_all = ["swing_up", "bench_drive"])]
+    shake: bool,
     /// Where the firmware runs
     #[arg(long, value_enum, default_value_t = Target::Host)]
     target: Target,
@@ -85,10 +89,19 @@ impl Faults {
         if self.swing_up && table.swing_up.is_none() {
             return Err(Failure::SwingUp { rig: rig.name, source: SwingUpError::NoMotions });
         }
-        let built = self.target.built(Link::Files, &rig, &table)?;
+        let built = match self.shake {
+            true => self.target.built_for_identification(&rig, &table)?,
+            false => self.target.built(Link::Files, &rig, &table)?,
+        };
         let place = built.place(self.seed);
         let mut possible = kinds(&table, place);
-        possible.retain(|kind| !self.bench_drive || kind.while_driving().is_some());
+        let forces = if self.shake { Some(feed(&rig, &table, self.seed)?) } else { None };
+        let during = match &forces {
+            Some(forces) => During::Shaking(forces),
+            None if self.bench_drive => During::BenchDrive,
+            None => During::Balancing,
+        };
+        possible.retain(|&kind| during.is_proof(kind));
         let chosen: Vec<Kind> = match self.kind {
             Some(kind) if possible.contains(&kind) => vec![kind],
             Some(kind) => {
@@ -99,14 +112,13 @@ impl Faults {
             }
             None => possible,
         };
-        let bench_drive = self.bench_drive;
-        let setup = Setup { rig: &rig, table: &table, place, detection: true, guards: true, bench_drive };
+        let setup = Setup { rig: &rig, table: &table, place, detection: true, guards: true, during };
         if let Some(number) = self.only {
             return self.replay(&setup, &chosen, number);
         }
         let options = json!({
             "gains": self.variation.changes(), "swing_up": self.swing_up, "bench_drive": self.bench_drive,
-            "target": self.target.name(), "seed": self.seed, "runs": self.runs, "kind": self.kind,
+            "shake": self.shake, "target": self.target.name(), "seed": self.seed, "runs": self.runs, "kind": self.kind,
         });
         let work = |study: &Study| -> Result<_, Failure> {
             let result = with_bar("faults", self.runs, |tick| {
@@ -131,7 +143,8 @@ impl Faults {
         chosen: &[Kind],
         study: &Study,
     ) -> Result<Option<Campaign>, Failure> {
-        let chosen: Vec<Kind> = chosen.iter().copied().filter(|kind| kind.needs_detection()).collect();
+        let chosen: Vec<Kind> =
+            chosen.iter().copied().filter(|&kind| setup.during.needs_detection(kind)).collect();
         if chosen.is_empty() {
             return Ok(None);
         }
@@ -263,9 +276,10 @@ impl Faults {
         };
         // A campaign of one kind numbers its runs differently.
         let kind = self.kind.map_or(String::new(), |kind| format!(" --kind {}", kind.name()));
-        let phase = match (self.swing_up, self.bench_drive) {
-            (true, _) => " --swing-up",
-            (_, true) => " --bench-drive",
+        let phase = match (self.swing_up, self.bench_drive, self.shake) {
+            (true, ..) => " --swing-up",
+            (_, true, _) => " --bench-drive",
+            (.., true) => " --shake",
             _ => "",
         };
         Err(Failure::CheckFailed(format!(

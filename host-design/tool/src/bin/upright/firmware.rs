@@ -9,7 +9,8 @@ mod run;
 mod size;
 mod target;
 
-pub(crate) use target::Target;
+pub(crate) use monitor::lines_of_stdin;
+pub(crate) use target::{Built, Target};
 
 use std::path::{Path, PathBuf};
 

@@ -10,7 +10,7 @@ use upright_design::table::write_atomically;
 use upright_tool::identified::{json, page, rig_file, text};
 
 use crate::failure::Failure;
-use crate::progress::with_identification;
+use crate::progress::with_steps;
 use crate::variation::positive;
 
 /// Finds the parameters of the real machine from the log of a machine that hangs and is shaken.
@@ -79,7 +79,7 @@ impl Identify {
             weighed_kg_m: self.weigh,
             trust_wiring: self.trust_wiring,
         };
-        let found = with_identification(|progress| identify(&rig, &logs, &settings, progress))?;
+        let found = with_steps(|progress| identify(&rig, &logs, &settings, progress))?;
         let mut out = std::io::stdout().lock();
         if self.json {
             writeln!(out, "{}", json(&rig.name, &found))?;

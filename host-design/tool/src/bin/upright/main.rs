@@ -1,7 +1,9 @@
 //! The command-line tool: from a rig file to gains, gain table and closed loop.
 
 mod check;
+mod commission;
 mod compare;
+mod coverage;
 mod design;
 mod failure;
 mod false_alarms;
@@ -43,7 +45,7 @@ Exit status:
   0  done
   1  a check failed: pendulum falls, requirement not met, fault missed, tick too long, file differs
   2  bad input: a rig file, an argument, a file that cannot be written
-  3  the design problem has no solution; a log does not fit any machine
+  3  the design problem has no solution; a log does not fit any machine; a machine must not be run
   4  a needed program is missing";
 
 /// Designs and verifies the gains that balance an n-link inverted pendulum on a cart, and writes them as a table.
@@ -57,12 +59,14 @@ struct Arguments {
 #[derive(Subcommand)]
 enum Command {
     Check(check::Check),
+    Commission(commission::Commission),
     Design(design::Design),
     FalseAlarms(false_alarms::HealthyHours),
     Faults(faults::Faults),
     Firmware(firmware::Firmware),
     Report(report::Report),
     Compare(compare::Compare),
+    Coverage(coverage::IdentifiedMachines),
     Reproduce(reproduce::Reproduce),
     Robust(robust::Robust),
     Shake(shake::Shake),
@@ -76,12 +80,14 @@ enum Command {
 fn main() -> ExitCode {
     let result = match Arguments::parse().command {
         Command::Check(command) => command.run(),
+        Command::Commission(command) => command.run(),
         Command::Design(command) => command.run(),
         Command::FalseAlarms(command) => command.run(),
         Command::Faults(command) => command.run(),
         Command::Firmware(command) => command.run(),
         Command::Report(command) => command.run(),
         Command::Compare(command) => command.run(),
+        Command::Coverage(command) => command.run(),
         Command::Reproduce(command) => command.run(),
         Command::Robust(command) => command.run(),
         Command::Shake(command) => command.run(),

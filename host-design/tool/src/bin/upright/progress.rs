@@ -81,8 +81,8 @@ pub(crate) fn with_search<T>(work: impl FnOnce(Progress<'_>) -> T) -> T {
     result
 }
 
-/// Runs an identification with a bar that names its stages, if stderr is a terminal.
-pub(crate) fn with_identification<T>(work: impl FnOnce(upright_design::identify::Progress<'_>) -> T) -> T {
+/// Runs `work` with a bar that names its stages and counts their steps, if stderr is a terminal.
+pub(crate) fn with_steps<T>(work: impl FnOnce(upright_design::parallel::Progress<'_>) -> T) -> T {
     let bar = ProgressBar::new(1);
     style(&bar, "{spinner} {msg} {bar:30} {pos}/{len} {elapsed}");
     let result = work(&|step| match step {

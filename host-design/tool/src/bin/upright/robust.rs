@@ -16,7 +16,7 @@ use upright_design::table::{Gains, TableValues, write_atomically};
 use upright_tool::figure::front_figure;
 
 use crate::failure::Failure;
-use crate::progress::{with_spinner, with_stages};
+use crate::progress::{with_spinner, with_steps};
 use crate::split::Split;
 use crate::variation::{not_negative, positive};
 
@@ -91,8 +91,9 @@ impl Robust {
             return Err(Failure::BadArgument("--shard and --merge are for --as-it-is".to_owned()));
         }
         let failed = |source: RobustError| Failure::Robust { rig: rig.name.clone(), source };
-        let (choice, front) = with_stages(4, |stage| choose(&rig, &tolerances, &settings, self.front, stage))
-            .map_err(failed)?;
+        let (choice, front) =
+            with_steps(|progress| choose(&rig, &tolerances, &settings, self.front, progress))
+                .map_err(failed)?;
         if let (Some(path), Some(front)) = (&self.svg, &front) {
             let figure = front_figure(front, &format!("{}: least ripple that stands", rig.name));
             write_atomically(path, figure.svg()?.as_bytes())?;

@@ -4,7 +4,7 @@ use std::io::Write as _;
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::time::{Duration, Instant, SystemTime};
+use std::time::{Duration, Instant};
 
 use clap::Args;
 use signal_hook::consts::{SIGINT, SIGTERM};
@@ -12,7 +12,7 @@ use upright_design::identify::{LineError, Log, OverLine, shake};
 use upright_design::rig::Rig;
 use upright_design::table::{Gains, write_atomically};
 use upright_tool::in_the_loop::run_shaken;
-use upright_tool::monitor::Line;
+use upright_tool::monitor::{Line, now};
 
 use crate::failure::Failure;
 use crate::firmware::Target;
@@ -123,13 +123,7 @@ impl Shake {
 
 /// Sends what is due, and receives.
 fn exchange(line: &mut Line, shaking: &mut OverLine) -> Result<Result<(), LineError>, std::io::Error> {
-    line.send(&shaking.take_outgoing())?;
     let mut buffer = [0; 4096];
-    let bytes = line.receive(&mut buffer)?;
+    let bytes = line.exchange(&shaking.take_outgoing(), &mut buffer)?;
     Ok(shaking.receive(bytes, now()))
-}
-
-/// Time since 1970.
-fn now() -> Duration {
-    SystemTime::UNIX_EPOCH.elapsed().unwrap_or_default()
 }

@@ -177,12 +177,7 @@ impl Verify {
         } else {
             write!(out, "{}", text::report(rig, report, &self.as_typed()))?;
         }
-        let failed: Vec<String> = report
-            .checks
-            .iter()
-            .filter(|check| !check.holds)
-            .map(|check| format!("{}: {}", check.law.key(), check.requirement))
-            .collect();
+        let failed = report.failed();
         if failed.is_empty() {
             return Ok(());
         }

@@ -5,8 +5,6 @@ import { RigView } from './rig.js';
 import { Scopes } from './scope.js';
 import { Controls } from './controls.js';
 
-const SCOPES_EVERY = 3; // frames between two drawings of the scopes
-
 const byId = (id) => document.getElementById(id);
 const colours = new Map();
 let hello = null;
@@ -69,7 +67,7 @@ function frame() {
     view.draw(state, wanted ?? seen.telemetry?.setpoint_m ?? null, machine?.pull);
     view.pull();
   }
-  if (seen.frames % SCOPES_EVERY === 0) scopes.draw();
+  scopes.drawNext();
   seen.frames += 1;
 }
 requestAnimationFrame(frame);

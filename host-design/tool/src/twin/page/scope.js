@@ -68,6 +68,7 @@ export class Scopes {
     this.end = 0;
     this.back = 0;
     this.cursor = null;
+    this.drawn = 0;
     place.replaceChildren();
     this.panels = panels(hello).map((panel) => this.add(place, panel));
     this.history = new History(this.panels.flatMap((panel) => panel.curves));
@@ -139,9 +140,11 @@ export class Scopes {
     this.back = 0;
   }
 
-  draw() {
+  // Draws one panel, the next time the next one: so every frame takes equally long.
+  drawNext() {
     this.end = (this.isHeld ? this.heldAt : this.history.last) + this.back;
-    for (const panel of this.panels) this.drawPanel(panel);
+    this.drawn = (this.drawn + 1) % this.panels.length;
+    this.drawPanel(this.panels[this.drawn]);
   }
 
   drawPanel(panel) {
@@ -202,7 +205,7 @@ export class Scopes {
     }
     draw.textAlign = 'center';
     const seconds = niceStep(this.span / 5);
-    for (let t = Math.ceil(begin / seconds) * seconds; t <= this.end; t += seconds) {
+    for (let t = Math.ceil(Math.max(0, begin) / seconds) * seconds; t <= this.end; t += seconds) {
       draw.fillText(`${Number(t.toFixed(2))} s`, Math.min(x(t), width - 24), height - 4);
     }
   }

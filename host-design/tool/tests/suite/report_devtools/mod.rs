@@ -108,6 +108,17 @@ impl Browser {
         self.call("HeapProfiler.collectGarbage", json!({}));
     }
 
+    /// Processor time of the page's thread for scripts, styles and layout since the first call (s): all but the drawing
+    /// itself, which a graphics card does where there is one.
+    pub(crate) fn worked_s(&mut self) -> f64 {
+        self.call("Performance.enable", json!({ "timeDomain": "threadTicks" }));
+        let answer = self.call("Performance.getMetrics", json!({}));
+        let metrics = answer["metrics"].as_array().unwrap();
+        let work = ["ScriptDuration", "RecalcStyleDuration", "LayoutDuration"];
+        let is_work = |metric: &&Value| work.iter().any(|name| metric["name"] == *name);
+        metrics.iter().filter(is_work).map(|metric| metric["value"].as_f64().unwrap()).sum()
+    }
+
     /// Moves, presses or releases the mouse at a point of the window (CSS pixels), as the system would.
     pub(crate) fn mouse(&mut self, kind: &str, [x, y]: [f64; 2]) {
         let buttons = i32::from(kind != "mouseReleased");

@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, channel};
-use std::time::{Duration, Instant, SystemTime};
+use std::time::{Duration, Instant};
 
 use clap::Args;
 use ratatui::DefaultTerminal;
@@ -16,7 +16,7 @@ use ratatui::crossterm::event::{self, Event, KeyEventKind};
 use signal_hook::consts::SIGHUP;
 use signal_hook::consts::{SIGINT, SIGTERM};
 use upright_tool::monitor::record::{Recorder, json};
-use upright_tool::monitor::{Action, Line, action, request, view};
+use upright_tool::monitor::{Action, Line, action, now, request, view};
 
 use super::designed;
 use crate::failure::Failure;
@@ -146,13 +146,8 @@ impl Conversation {
             return Ok(());
         }
         self.model.poll(now());
-        let bytes = self.model.take_outgoing();
-        if let Err(error) = self.line.send(&bytes) {
-            self.model.close(&error);
-            return Ok(());
-        }
         let mut buffer = [0; 4096];
-        match self.line.receive(&mut buffer) {
+        match self.line.exchange(&self.model.take_outgoing(), &mut buffer) {
             Ok(bytes) => {
                 for telemetry in self.model.receive(bytes, now()) {
                     each(&json(&telemetry))?;
@@ -224,13 +219,8 @@ fn goes_on(stop: &AtomicBool, until: Option<Instant>) -> bool {
     !stop.load(Ordering::Relaxed) && until.is_none_or(|until| Instant::now() < until)
 }
 
-/// Time since 1970.
-fn now() -> Duration {
-    SystemTime::UNIX_EPOCH.elapsed().unwrap_or_default()
-}
-
 /// Lines of stdin as they come. A thread of its own, because stdin may stay open for ever.
-fn lines_of_stdin() -> Receiver<String> {
+pub(crate) fn lines_of_stdin() -> Receiver<String> {
     let (sender, lines) = channel();
     std::thread::spawn(move || {
         for line in std::io::stdin().lock().lines().map_while(Result::ok) {

@@ -1,0 +1,252 @@
+//! How far deviations hold: many machines that differ from their file are shaken and identified.
+
+use std::path::PathBuf;
+
+use serde::{Deserialize, Serialize};
+
+use super::chain_of;
+use super::error::IdentifyError;
+use super::estimate::{Identification, Settings, identify};
+use super::excite::shake_machine;
+use super::machines::Machine;
+use super::parameters::Kind;
+use crate::rig::Rig;
+use crate::study::{Study, StudyError};
+
+/// Half width of an interval of 95 %, in deviations.
+const INTERVAL: f64 = 1.96;
+
+/// A study that was not made.
+#[derive(Debug, thiserror::Error)]
+pub enum CoverageError {
+    /// The rig cannot be identified.
+    #[error(transparent)]
+    Identify(#[from] IdentifyError),
+    /// The runs were made elsewhere.
+    #[error(transparent)]
+    Study(#[from] StudyError),
+}
+
+/// What is identified, over all links.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+#[allow(missing_docs)] // `ALL` says what each is
+pub enum Quantity {
+    Length,
+    Moment,
+    TotalMass,
+    CartViscous,
+    JointViscous,
+    CartDry,
+    JointDry,
+    DeadZone,
+    Tilt,
+    Delay,
+    Zero,
+    Shape,
+    Scale,
+}
+
+impl Quantity {
+    /// Every quantity with its name, the unit of its error, and the factor from SI units, or from parts of the truth.
+    pub const ALL: [(Quantity, &str, &str, f64); 13] = {
+        let degrees = 180.0 / core::f64::consts::PI;
+        [
+            (Quantity::Length, "lengths", "%", 100.0),
+            (Quantity::Moment, "moments a, J", "%", 100.0),
+            (Quantity::TotalMass, "total mass", "%", 100.0),
+            (Quantity::CartViscous, "viscous friction, cart", "%", 100.0),
+            (Quantity::JointViscous, "viscous friction, joints", "%", 100.0),
+            (Quantity::CartDry, "dry friction, cart", "%", 100.0),
+            (Quantity::JointDry, "dry friction, joints", "%", 100.0),
+            (Quantity::DeadZone, "dead zone", "%", 100.0),
+            (Quantity::Tilt, "tilt", "°", degrees),
+            (Quantity::Delay, "delay", "ticks", 1.0),
+            (Quantity::Zero, "zeros", "°", degrees),
+            (Quantity::Shape, "shape: lengths, a/a_n, J/a_n", "%", 100.0),
+            (Quantity::Scale, "scale: a_n", "%", 100.0),
+        ]
+    };
+
+    fn of(kind: Kind) -> Option<Self> {
+        Some(match kind {
+            Kind::Length(_) => Self::Length,
+            Kind::FirstMoment(_) | Kind::SecondMoment(_) => Self::Moment,
+            Kind::TotalMass => Self::TotalMass,
+            Kind::CartViscous => Self::CartViscous,
+            Kind::JointViscous(_) => Self::JointViscous,
+            Kind::CartDry => Self::CartDry,
+            Kind::JointDry(_) => Self::JointDry,
+            Kind::DeadZone => Self::DeadZone,
+            Kind::Tilt => Self::Tilt,
+            Kind::Delay => Self::Delay,
+            Kind::Zero(_) => Self::Zero,
+            Kind::EccentricSine(_) | Kind::EccentricCosine(_) => return None,
+        })
+    }
+
+    fn is_absolute(self) -> bool {
+        matches!(self, Self::Tilt | Self::Delay | Self::Zero)
+    }
+}
+
+/// How far one number is from the truth.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Missed {
+    /// What it is.
+    pub quantity: Quantity,
+    /// Identified minus true value: of a tilt or zero in rad, of the delay in ticks, otherwise as a part of the truth.
+    pub error: f64,
+    /// Its deviation in the same unit; a shape and a scale have none.
+    pub deviation: Option<f64>,
+}
+
+/// One machine.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Identified {
+    /// Number of the machine.
+    pub number: u64,
+    /// Why no rig file would be written, if so.
+    pub refused: Option<String>,
+    /// How far each number is from the truth, also of what is not written.
+    pub missed: Vec<Missed>,
+}
+
+/// All machines, one quantity.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct CoverageRow {
+    /// What it is.
+    pub quantity: Quantity,
+    /// Its name.
+    pub name: &'static str,
+    /// Unit of the errors.
+    pub unit: &'static str,
+    /// Numbers that were identified and would be written.
+    pub count: usize,
+    /// Those whose interval of 95 % covers the truth; none if they have no interval.
+    pub covered: Option<usize>,
+    /// Error (rms).
+    pub rms: f64,
+    /// Largest error.
+    pub worst: f64,
+    /// Deviation (rms) that is stated.
+    pub stated: Option<f64>,
+}
+
+/// All machines.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Coverage {
+    /// Number of machines.
+    pub machines: usize,
+    /// Those of which no rig file would be written, and why.
+    pub refused: Vec<(u64, String)>,
+    /// The quantities that the rig has.
+    pub rows: Vec<CoverageRow>,
+}
+
+/// What is drawn and how long it is shaken.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Drawn {
+    /// Number of machines.
+    pub runs: u64,
+    /// Largest error of the file's masses, lengths and inertias (%).
+    pub off_percent: f64,
+    /// Length of each log (s).
+    pub seconds: f64,
+    /// Seed of the machines.
+    pub seed: u64,
+    /// Whether the wiring is taken as that of the file, which it is.
+    pub trust_wiring: bool,
+}
+
+/// Shakes and identifies machines that differ from `file`; `done` is called after each, from any thread.
+///
+/// # Errors
+/// [`CoverageError`] if the rig cannot be identified, or what other processes made is not of this study.
+pub fn coverage(
+    file: &Rig,
+    drawn: &Drawn,
+    study: &Study,
+    done: &(dyn Fn() + Sync),
+) -> Result<Coverage, CoverageError> {
+    chain_of(file)?;
+    let one = |number: u64| -> Result<Identified, CoverageError> {
+        let found = identified(file, drawn, number);
+        done();
+        found
+    };
+    let all = study.outcomes("machines", drawn.runs, one)?;
+    let written = || all.iter().filter(|one| one.refused.is_none()).flat_map(|one| &one.missed);
+    let row = |(quantity, name, unit, factor): (Quantity, &'static str, &'static str, f64)| {
+        let of: Vec<&Missed> = written().filter(|missed| missed.quantity == quantity).collect();
+        let rms = |values: &mut dyn Iterator<Item = f64>| {
+            factor * (values.map(|value| value * value).sum::<f64>() / of.len() as f64).sqrt()
+        };
+        let has_interval = of.iter().all(|missed| missed.deviation.is_some());
+        let covers = |missed: &&&Missed| missed.deviation.is_some_and(|s| missed.error.abs() <= INTERVAL * s);
+        (!of.is_empty()).then(|| CoverageRow {
+            quantity,
+            name,
+            unit,
+            count: of.len(),
+            covered: has_interval.then(|| of.iter().filter(covers).count()),
+            rms: rms(&mut of.iter().map(|missed| missed.error)),
+            worst: factor * of.iter().map(|missed| missed.error.abs()).fold(0.0, f64::max),
+            stated: has_interval.then(|| rms(&mut of.iter().filter_map(|missed| missed.deviation))),
+        })
+    };
+    Ok(Coverage {
+        machines: all.len(),
+        refused: all.iter().filter_map(|one| Some((one.number, one.refused.clone()?))).collect(),
+        rows: Quantity::ALL.into_iter().filter_map(row).collect(),
+    })
+}
+
+/// Shakes and identifies one machine.
+///
+/// # Errors
+/// [`IdentifyError`] if the rig has no chain with encoders; what goes wrong later is [`Identified::refused`].
+pub fn identified(file: &Rig, drawn: &Drawn, number: u64) -> Result<Identified, CoverageError> {
+    let machine = Machine::draw(file, drawn.off_percent, drawn.seed, number)?;
+    let settings = Settings { trust_wiring: drawn.trust_wiring, ..Settings::default() };
+    let found = shake_machine(file, &machine.rig, drawn.seconds, number)
+        .and_then(|log| identify(file, &[(PathBuf::from("log"), log)], &settings, &|_| ()));
+    Ok(match found {
+        Ok(found) => Identified {
+            number,
+            refused: found.refusal.as_ref().map(ToString::to_string),
+            missed: missed(&machine, &found),
+        },
+        Err(error) => Identified { number, refused: Some(error.to_string()), missed: Vec::new() },
+    })
+}
+
+fn missed(machine: &Machine, found: &Identification) -> Vec<Missed> {
+    let mut all = Vec::new();
+    for estimate in &found.estimates {
+        let (Some(truth), Some(quantity)) = (machine.truth(estimate.kind), Quantity::of(estimate.kind))
+        else {
+            continue;
+        };
+        let unit = if quantity.is_absolute() { 1.0 } else { truth };
+        let error = (estimate.new - truth) / unit;
+        all.push(Missed { quantity, error, deviation: Some(estimate.deviation / unit) });
+    }
+    // The shape is what does not depend on the scale of the force.
+    let ratio = |kind: Kind| Some(found.estimate(kind)?.new / machine.truth(kind)?);
+    let moments = found.estimates.iter().filter_map(|estimate| match estimate.kind {
+        Kind::FirstMoment(link) => Some(link),
+        _ => None,
+    });
+    let Some(last) = moments.max() else { return all };
+    let Some(scale) = ratio(Kind::FirstMoment(last)) else { return all };
+    let error = |quantity: Quantity, error: f64| Missed { quantity, error, deviation: None };
+    for link in 0..=last {
+        let [first, second] = [Kind::FirstMoment(link), Kind::SecondMoment(link)].map(ratio);
+        let first = first.filter(|_| link < last);
+        let shapes = first.into_iter().chain(second).map(|ratio| ratio / scale);
+        all.extend(shapes.chain(ratio(Kind::Length(link))).map(|ratio| error(Quantity::Shape, ratio - 1.0)));
+    }
+    all.push(error(Quantity::Scale, scale - 1.0));
+    all
+}

@@ -1,0 +1,108 @@
+//! Machines that differ from their rig file in everything that is identified.
+
+use core::f64::consts::PI;
+
+use rand::{RngExt, SeedableRng};
+use rand_pcg::Pcg64;
+
+use super::chain_of;
+use super::error::IdentifyError;
+use super::parameters::{FRICTION, Kind, Layout, priors};
+use crate::plant::ChainParameters;
+use crate::reality::real_chain;
+use crate::rig::{PerJoint, PlantDescription, Rig};
+
+/// Friction is between the usual one divided by this and multiplied by it.
+const FRICTION_FACTOR: f64 = 3.0;
+/// Largest homing error of a joint (rad), and largest tilt of the rail.
+const HOMING_RAD: f64 = 0.5 * PI / 180.0;
+const TILT_RAD: f64 = 0.3 * PI / 180.0;
+/// Largest latency, in ticks: less than one.
+const LATENCY_TICKS: f64 = 0.95;
+/// The dead zone of the motor is off by at most this share.
+const DEAD_ZONE: f64 = 0.5;
+
+/// A machine, and the true value of each parameter that is identified.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Machine {
+    /// Its rig.
+    pub rig: Rig,
+    truth: Vec<(Kind, f64)>,
+}
+
+impl Machine {
+    /// The machine with this number, of those that differ from `file` by up to `off_percent` in masses, lengths and
+    /// inertias. Friction, homing, tilt, latency and dead zone are drawn, too; the motor's other constants are those of
+    /// the file.
+    ///
+    /// # Errors
+    /// [`IdentifyError`] if the rig has no chain with encoders.
+    pub fn draw(file: &Rig, off_percent: f64, seed: u64, number: u64) -> Result<Self, IdentifyError> {
+        let chain = chain_of(file)?;
+        // A generator for each machine, so that it does not depend on the others.
+        let mut random = Pcg64::seed_from_u64(seed.rotate_left(32) ^ number);
+        let links = chain.links.len();
+        let layout = Layout { links };
+        let priors = priors(file, chain, false);
+        let mut percent = || off_percent * random.random_range(-1.0..=1.0);
+        let mut rig = file.clone();
+        let parameters = &mut rig.reality.parameters;
+        parameters.cart_mass_percent = percent();
+        let mut each = || PerJoint::each((0..links).map(|_| percent()).collect());
+        (parameters.link_mass_percent, parameters.link_length_percent) = (each(), each());
+        parameters.link_inertia_percent = each();
+        let mut friction = |index: usize| {
+            let usual = priors[index].deviation / FRICTION;
+            usual * libm::pow(FRICTION_FACTOR, random.random_range(-1.0..=1.0))
+        };
+        if let PlantDescription::Chain(chain) = &mut rig.plant {
+            chain.cart.friction_n_s_per_m = friction(layout.viscous(0));
+            for (joint, link) in chain.links.iter_mut().enumerate() {
+                link.friction_n_m_s_per_rad = friction(layout.viscous(joint + 1));
+            }
+        }
+        let dry = &mut rig.reality.friction;
+        dry.cart_friction_n = friction(layout.dry(0));
+        let joints = (0..links).map(|joint| friction(layout.dry(joint + 1)));
+        dry.joint_friction_n_m = PerJoint::each(joints.collect());
+        let mut within = |most: f64| most * random.random_range(-1.0..=1.0);
+        rig.reality.sensors.homing_error_rad =
+            PerJoint::each((0..links).map(|_| within(HOMING_RAD)).collect());
+        rig.reality.sensors.rail_tilt_rad = within(TILT_RAD);
+        if let Some(motor) = &mut rig.actuator.motor {
+            motor.dead_zone_v *= 1.0 + within(DEAD_ZONE);
+        }
+        rig.reality.driver.latency_s = 0.5 * (LATENCY_TICKS + within(LATENCY_TICKS)) * rig.tick.period_s;
+        let truth = truth(&rig)?;
+        Ok(Self { rig, truth })
+    }
+
+    /// The true value of a parameter, if the machine has it.
+    pub fn truth(&self, kind: Kind) -> Option<f64> {
+        self.truth.iter().find(|(known, _)| *known == kind).map(|(_, value)| *value)
+    }
+}
+
+/// The parameters of the machine of `rig`, with its `[reality]`.
+fn truth(rig: &Rig) -> Result<Vec<(Kind, f64)>, IdentifyError> {
+    let real = real_chain(chain_of(rig)?, &rig.reality.parameters);
+    let constants = ChainParameters::<f64>::of(&real);
+    let (friction, sensors) = (&rig.reality.friction, &rig.reality.sensors);
+    let value = |kind: Kind| match kind {
+        Kind::TotalMass => Some(constants.total_mass),
+        Kind::FirstMoment(j) => Some(constants.a[j]),
+        Kind::Length(j) => Some(real.links[j].length_m),
+        Kind::SecondMoment(j) => Some(constants.b[(j, j)]),
+        Kind::CartViscous => Some(constants.cart_friction),
+        Kind::JointViscous(j) => Some(constants.joint_frictions[j]),
+        Kind::CartDry => Some(friction.cart_friction_n),
+        Kind::JointDry(j) => Some(friction.joint_friction_n_m.of(j)),
+        Kind::Tilt => Some(sensors.rail_tilt_rad),
+        Kind::Delay => Some(rig.reality.driver.latency_s / rig.tick.period_s),
+        Kind::DeadZone => rig.actuator.motor.as_ref().map(|motor| motor.dead_zone_v),
+        Kind::Zero(j) => Some(sensors.homing_error_rad.of(j)),
+        Kind::EccentricSine(_) | Kind::EccentricCosine(_) => None,
+    };
+    let kinds = Layout { links: real.links.len() }.kinds();
+    Ok(kinds.into_iter().filter_map(|kind| Some((kind, value(kind)?))).collect())
+}

@@ -1,0 +1,86 @@
+//! Machines that differ from their file, and how many intervals cover the truth.
+
+use std::path::Path;
+
+use upright_design::identify::{CoverageError, Drawn, Kind, Machine, Missed, Quantity, coverage, identified};
+use upright_design::rig::Rig;
+use upright_design::study::Study;
+
+fn rig(name: &str) -> Rig {
+    Rig::from_path(Path::new(&format!("../../rigs/{name}.toml"))).unwrap()
+}
+
+const DRAWN: Drawn = Drawn { runs: 2, off_percent: 10.0, seconds: 8.0, seed: 5, trust_wiring: true };
+
+#[test]
+fn a_machine_is_the_same_every_time_and_within_what_is_stated() {
+    let file = rig("triple-glueck-eder-kugi");
+    let draw = |off_percent: f64, number: u64| Machine::draw(&file, off_percent, 5, number).unwrap();
+    for number in 0..20 {
+        let machine = draw(10.0, number);
+        let parameters = &machine.rig.reality.parameters;
+        let of_links = [&parameters.link_mass_percent, &parameters.link_length_percent];
+        assert!(of_links.iter().all(|each| (0..3).all(|link| each.of(link).abs() <= 10.0)), "{parameters:?}");
+        let delay = machine.truth(Kind::Delay).unwrap();
+        assert!((0.0..1.0).contains(&delay), "{delay}");
+        // The file has 10 N s/m and 1 % of the weight is 0.62 N.
+        let [viscous, dry] = [Kind::CartViscous, Kind::CartDry].map(|kind| machine.truth(kind).unwrap());
+        assert!((10.0 / 3.0..=30.0).contains(&viscous) && (0.2..=1.9).contains(&dry), "{viscous} {dry}");
+    }
+    assert_eq!(draw(10.0, 3), draw(10.0, 3));
+    assert_ne!(draw(10.0, 3).rig, draw(10.0, 4).rig);
+    // With a file that has the masses right.
+    let exact = draw(0.0, 3);
+    assert_eq!(exact.truth(Kind::Length(1)), Some(0.419));
+    assert!((exact.truth(Kind::TotalMass).unwrap() - 6.367).abs() < 1e-9);
+}
+
+#[test]
+fn intervals_that_cover_the_truth_are_counted() {
+    let file = rig("single-quanser-ip02");
+    let found = coverage(&file, &DRAWN, &Study::whole(), &|| ()).unwrap();
+    assert_eq!((found.machines, found.refused.len()), (2, 0), "{found:?}");
+    let row = |quantity: Quantity| found.rows.iter().find(|row| row.quantity == quantity);
+    // One link has no length that matters, and two moments.
+    assert!(row(Quantity::Length).is_none());
+    let (moments, scale) = (row(Quantity::Moment).unwrap(), row(Quantity::Scale).unwrap());
+    assert_eq!((moments.count, scale.covered), (4, None));
+    let [numbers, covered] = [|row: &_| count(row).0, |row: &_| count(row).1].map(
+        |of: fn(&upright_design::identify::CoverageRow) -> usize| found.rows.iter().map(of).sum::<usize>(),
+    );
+    assert!(covered * 10 >= numbers * 8, "{covered} of {numbers}: {found:?}");
+    // Negative control: a hundredth of the deviations covers hardly anything.
+    let missed = |missed: &&Missed| missed.deviation.is_some_and(|s| missed.error.abs() > 0.0196 * s);
+    let one = identified(&file, &DRAWN, 0).unwrap();
+    let outside = one.missed.iter().filter(missed).count();
+    assert!(outside >= 7, "{outside} of {}: {one:?}", one.missed.len());
+}
+
+/// Numbers with an interval, and those that are covered.
+fn count(row: &upright_design::identify::CoverageRow) -> (usize, usize) {
+    row.covered.map_or((0, 0), |covered| (row.count, covered))
+}
+
+#[test]
+fn a_rig_without_encoders_has_no_coverage() {
+    let mut file = rig("single-quanser-ip02");
+    if let upright_design::rig::PlantDescription::Chain(chain) = &mut file.plant {
+        chain.links[0].encoder = None;
+    }
+    let found = coverage(&file, &DRAWN, &Study::whole(), &|| ());
+    assert!(matches!(found, Err(CoverageError::Identify(_))), "{found:?}");
+}
+
+#[test]
+#[ignore = "minutes: cargo test -p upright-design --test suite identify_coverage -- --ignored --nocapture"]
+fn nine_of_ten_intervals_cover_the_truth_of_forty_machines() {
+    for name in ["single-quanser-ip02", "double-quanser-dbpen"] {
+        let drawn = Drawn { runs: 40, seconds: 20.0, seed: 2, ..DRAWN };
+        let found = coverage(&rig(name), &drawn, &Study::whole(), &|| ()).unwrap();
+        for row in &found.rows {
+            println!("{name}: {row:?}");
+            let (numbers, covered) = count(row);
+            assert!(covered * 10 >= numbers * 9, "{name}: {row:?}");
+        }
+    }
+}

@@ -1,0 +1,199 @@
+//! `upright commission`
+
+use std::io::Write as _;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
+
+use clap::Args;
+use signal_hook::consts::{SIGINT, SIGTERM};
+use upright_design::identify::IdentifyError;
+use upright_design::rig::{PlantDescription, Rig};
+use upright_design::table::{Gains, write_atomically};
+use upright_tool::commission::{
+    AtPort, Commissioning, Designed, Journal, Plan, Planted, Record, Simulated, Step,
+};
+use upright_tool::in_the_loop::Link;
+use upright_tool::monitor::Line;
+
+use crate::failure::Failure;
+use crate::firmware::{Built, Target, lines_of_stdin};
+use crate::variation::with_table;
+
+/// Leads from a wired rig to a balancing one, step by step: what to do, what was found, and whether it is right.
+///
+/// With --target, the machine is a simulated one, and so is the person beside it. With --port it is the real one: its
+/// board runs the image for identification of the rig file (upright firmware flash RIG --identify); Ctrl-C turns the
+/// motor off. A machine that must not be run is stopped at the step that finds out: exit status 3.
+#[derive(Args)]
+#[command(before_help = "\
+Examples:
+  upright commission rigs/single-quanser-ip02.toml --target host --write as-it-is.toml
+  upright commission rigs/double-quanser-dbpen.toml --target host --defect encoders-swapped    exit status 3
+  upright commission my.toml --target qemu --machine as-it-is.toml --record record.json
+  upright commission my.toml --port /dev/ttyACM0 --write as-it-is.toml --record record.json    the real machine")]
+pub(crate) struct Commission {
+    /// Rig file
+    #[arg(value_name = "RIG")]
+    rig: PathBuf,
+    /// Where the firmware runs, with a simulated machine
+    #[arg(long, value_enum, required_unless_present = "port")]
+    target: Option<Target>,
+    /// The real machine: serial port of its board (/dev/ttyACM0, COM3 …), or tcp:HOST:PORT
+    #[arg(long, conflicts_with_all = ["target", "machine", "defect"], requires = "write")]
+    port: Option<String>,
+    /// Rig file that tells what the simulated machine really is, with its [reality] [default: RIG]
+    #[arg(long, value_name = "TRUE.toml")]
+    machine: Option<PathBuf>,
+    /// A defect in the simulated machine
+    #[arg(long, value_name = "NAME")]
+    defect: Option<Planted>,
+    /// Seed of whatever is random in the simulated machine
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
+    /// How long the machine is shaken (s)
+    #[arg(long, default_value_t = 20, value_name = "S", value_parser = clap::value_parser!(u16).range(5..=3600))]
+    seconds: u16,
+    /// Write the rig file of the machine as it was found, once its design is verified
+    #[arg(long, value_name = "NEW.toml")]
+    write: Option<PathBuf>,
+    /// Write what was asked, found and decided into this file, after each step
+    #[arg(long, value_name = "FILE")]
+    record: Option<PathBuf>,
+    /// Print the record as one JSON object
+    #[arg(long)]
+    json: bool,
+}
+
+impl Commission {
+    pub(crate) fn run(self) -> Result<(), Failure> {
+        let rig = Rig::from_path(&self.rig)?;
+        commissionable(&rig)?;
+        let text = std::fs::read_to_string(&self.rig)?;
+        let (_, table) = with_table(&rig, &self.rig, Gains::Sampled)?;
+        let seconds = f64::from(self.seconds);
+        let plan = Plan { rig: &rig, table: &table, file: &self.rig, text: &text, seconds, seed: self.seed };
+        let journal =
+            |machine: &str| Journal::new(Record::new(&rig, machine), self.record.clone(), self.show());
+        let (journal, result) = match (&self.port, self.target) {
+            (Some(port), _) => {
+                let mut journal = journal(port);
+                let result = self.at_port(plan, port, &mut journal);
+                (journal, result)
+            }
+            (None, target) => {
+                let target = target.unwrap_or(Target::Host);
+                let machine = self.true_machine(&rig)?;
+                let built = target.built_for_identification(&rig, &table)?;
+                let mut journal = journal(built.place(self.seed).name());
+                let result = self.simulated(plan, &machine, target, &built, &mut journal);
+                (journal, result)
+            }
+        };
+        if self.json {
+            let mut out = std::io::stdout().lock();
+            serde_json::to_writer(&mut out, &journal.record).map_err(std::io::Error::from)?;
+            writeln!(out)?;
+        }
+        result
+    }
+
+    /// All steps with the real machine.
+    fn at_port(&self, plan: Plan<'_>, port: &str, journal: &mut Journal) -> Result<(), Failure> {
+        let stop = Arc::new(AtomicBool::new(false));
+        for signal in [SIGINT, SIGTERM] {
+            signal_hook::flag::register(signal, Arc::clone(&stop))?;
+        }
+        let mut machine = AtPort::new(Line::open(port)?, lines_of_stdin(), stop, self.show());
+        let designed = Commissioning::first(plan, &mut machine, journal)?;
+        self.write(&designed)?;
+        let new = self.write.as_deref().unwrap_or(&self.rig).display();
+        journal.step(Step::Image, |journal| {
+            journal.asked(format!("flash it: upright firmware flash {new}, with --board as before"));
+            machine.consent("    Enter when it is flashed; Ctrl-C stops").map(drop)
+        })?;
+        Ok(Commissioning::second(designed.plan(plan), &mut machine, journal)?)
+    }
+
+    /// All steps with the simulated machine.
+    fn simulated(
+        &self,
+        plan: Plan<'_>,
+        machine: &Rig,
+        target: Target,
+        built: &Built,
+        journal: &mut Journal,
+    ) -> Result<(), Failure> {
+        let designed = built.place(self.seed).with_target(plan.table, |target| {
+            let mut machine = Simulated::new(machine, plan.table, self.defect, target, self.seed)?;
+            Commissioning::first(plan, &mut machine, journal)
+        })?;
+        self.write(&designed)?;
+        let (rig, table) = (&designed.rig, &designed.table);
+        let built = journal.step(Step::Image, |journal| {
+            let built = target.built(Link::Files, rig, table)?;
+            journal.found(format!("rig {:016x}, table {:08x}", table.rig_hash, table.crc()));
+            Ok::<_, Failure>(built)
+        })?;
+        // Another day: what is random is different.
+        let seed = self.seed.wrapping_add(1);
+        Ok(built.place(seed).with_target(table, |target| {
+            let mut machine = Simulated::new(machine, table, self.defect, target, seed)?;
+            Commissioning::second(designed.plan(plan), &mut machine, journal)
+        })?)
+    }
+
+    /// Writes the rig file of the machine as it was found.
+    fn write(&self, designed: &Designed) -> Result<(), Failure> {
+        let Some(path) = &self.write else { return Ok(()) };
+        write_atomically(path, designed.text.as_bytes())?;
+        eprintln!("{} written", path.display());
+        Ok(())
+    }
+
+    /// Where the lines go.
+    fn show(&self) -> Box<dyn FnMut(&str)> {
+        // A reader of a pipe that has closed it is no reason to stop.
+        match self.json {
+            true => Box::new(|line| {
+                let _ = writeln!(std::io::stderr(), "{line}");
+            }),
+            false => Box::new(|line| {
+                let _ = writeln!(std::io::stdout(), "{line}");
+            }),
+        }
+    }
+
+    /// The simulated machine, as it really is.
+    fn true_machine(&self, rig: &Rig) -> Result<Rig, Failure> {
+        let Some(path) = &self.machine else { return Ok(rig.clone()) };
+        let machine = Rig::from_path(path)?;
+        commissionable(&machine)?;
+        let differs = |what: &str| {
+            let [path, rig] = [path, &self.rig].map(|path: &PathBuf| Path::display(path));
+            Failure::BadArgument(format!(
+                "{path}: has another {what} than {rig}; give a file of the same machine"
+            ))
+        };
+        if machine.states() != rig.states() {
+            return Err(differs("number of links"));
+        }
+        if machine.tick.period_s != rig.tick.period_s {
+            return Err(differs("period_s"));
+        }
+        if machine.actuator.motor.is_some() != rig.actuator.motor.is_some() {
+            return Err(differs("kind of actuator"));
+        }
+        Ok(machine)
+    }
+}
+
+/// Whether every part of the rig has an encoder.
+fn commissionable(rig: &Rig) -> Result<(), IdentifyError> {
+    let is_chain = matches!(rig.plant, PlantDescription::Chain(_));
+    if is_chain && rig.sensors().len() == rig.states() / 2 {
+        Ok(())
+    } else {
+        Err(IdentifyError::NoEncoders(rig.name.clone()))
+    }
+}

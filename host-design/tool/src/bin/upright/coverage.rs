@@ -1,0 +1,107 @@
+//! `upright coverage`
+
+use std::io::Write;
+use std::path::PathBuf;
+
+use clap::Args;
+use serde_json::json;
+use upright_design::identify::{Coverage, Drawn, coverage};
+use upright_design::rig::Rig;
+use upright_design::study::Study;
+
+use crate::failure::Failure;
+use crate::progress::with_bar;
+use crate::split::Split;
+use crate::variation::not_negative;
+
+/// Shakes and identifies machines unlike the rig file, and counts how many intervals of 95 % cover the truth.
+///
+/// Masses, lengths and inertias are drawn within --off of the file; friction within a factor of 3 of what is usual;
+/// zeros, tilt, latency and dead zone, too.
+#[derive(Args)]
+#[command(before_help = "\
+Examples:
+  upright coverage rigs/double-quanser-dbpen.toml
+  upright coverage rigs/quadruple-paper.toml --off 30 --seed 7
+  upright coverage rigs/quadruple-paper.toml --shard 2/3 > 2.jsonl
+  upright coverage rigs/quadruple-paper.toml --merge 1.jsonl 2.jsonl 3.jsonl")]
+pub(crate) struct IdentifiedMachines {
+    /// Rig file
+    #[arg(value_name = "RIG")]
+    rig: PathBuf,
+    /// Machines
+    #[arg(long, default_value_t = 40, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
+    runs: u32,
+    /// Largest error of the file's masses, lengths and inertias (%)
+    #[arg(long, default_value_t = 10.0, value_name = "PERCENT", value_parser = below_90)]
+    off: f64,
+    /// Length of each log (s)
+    #[arg(long, default_value_t = 20, value_name = "S", value_parser = clap::value_parser!(u16).range(5..=3600))]
+    seconds: u16,
+    /// Seed of the machines
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
+    /// Take the wiring as in the file: faster
+    #[arg(long)]
+    trust_wiring: bool,
+    #[command(flatten)]
+    split: Split,
+    /// Print the result as one JSON object
+    #[arg(long)]
+    json: bool,
+}
+
+fn below_90(text: &str) -> Result<f64, String> {
+    not_negative(text).and_then(|value| {
+        if value < 90.0 { Ok(value) } else { Err("give a number from 0 to below 90 (%)".to_owned()) }
+    })
+}
+
+impl IdentifiedMachines {
+    pub(crate) fn run(self) -> Result<(), Failure> {
+        let rig = Rig::from_path(&self.rig)?;
+        let drawn = Drawn {
+            runs: u64::from(self.runs),
+            off_percent: self.off,
+            seconds: f64::from(self.seconds),
+            seed: self.seed,
+            trust_wiring: self.trust_wiring,
+        };
+        let options = json!({
+            "runs": self.runs, "off": self.off, "seconds": self.seconds, "seed": self.seed,
+            "trust_wiring": self.trust_wiring,
+        });
+        let work = |study: &Study| -> Result<Coverage, Failure> {
+            Ok(with_bar("machines", drawn.runs, |done| coverage(&rig, &drawn, study, done))?)
+        };
+        self.split.study("coverage", &rig, &options, work, |found| self.print(&rig, &found))
+    }
+
+    fn print(&self, rig: &Rig, found: &Coverage) -> Result<(), Failure> {
+        let mut out = std::io::stdout().lock();
+        if self.json {
+            writeln!(out, "{}", json!({ "rig": rig.name, "off_percent": self.off, "coverage": found }))?;
+            return Ok(());
+        }
+        writeln!(
+            out,
+            "{:28}{:>8}{:>9}{:>11}{:>11}{:>11}",
+            "", "numbers", "covered", "stated", "rms", "worst"
+        )?;
+        for row in &found.rows {
+            let share = |covered: usize| format!("{:.0} %", 100.0 * covered as f64 / row.count as f64);
+            let covered = row.covered.map_or("-".to_owned(), share);
+            let stated = row.stated.map_or("-".to_owned(), |stated| format!("{stated:.3}"));
+            writeln!(
+                out,
+                "{:28}{:>8}{covered:>9}{stated:>11}{:>11.3}{:>11.3} {}",
+                row.name, row.count, row.rms, row.worst, row.unit
+            )?;
+        }
+        writeln!(out, "{} of {} machines are refused", found.refused.len(), found.machines)?;
+        for (number, reason) in &found.refused {
+            writeln!(out, "{number}: {reason}")?;
+        }
+        Ok(())
+    }
+}

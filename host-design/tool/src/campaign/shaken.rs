@@ -1,0 +1,162 @@
+//! Defects while the rig is shaken: which prove something there, and what has to come of them.
+
+use core::f64::consts::PI;
+
+use rand::RngExt;
+use upright::control::actuator::Drive;
+use upright::protocol::message::Request;
+use upright::supervision::shaking::{ANGLE_RAD, RETURN_S, SILENCE_S};
+use upright_design::harness::{HarnessError, Target};
+use upright_design::identify::{Feed, IdentifyError, Shaken};
+use upright_design::plant::absolute_angles;
+use upright_design::rig::Rig;
+use upright_design::table::TableValues;
+
+use super::attempt::{Attempt, BEYOND, During};
+use super::defect::{Expected, Kind};
+use super::injection::Injection;
+use super::observed::Observed;
+use super::trial::{Phase, Trial};
+
+/// The defects begin between these times (s): while the cart is pushed each way, and while all is shaken.
+const ONSET_S: [f64; 2] = [0.05, 5.0];
+/// A defect is watched for so long (s), and one that has to turn the motor off at the most for the longer time.
+const WATCHED_S: [f64; 2] = [1.0, 6.0];
+/// Length of the excitation (s).
+const LENGTH_S: f64 = ONSET_S[1] + WATCHED_S[1];
+
+/// The forces of a campaign's runs.
+///
+/// # Errors
+/// [`IdentifyError`] if the rig cannot be shaken.
+pub fn feed(rig: &Rig, table: &TableValues, seed: u64) -> Result<Feed, IdentifyError> {
+    Feed::new(rig, table, LENGTH_S, seed)
+}
+
+impl During<'_> {
+    /// Of the phases, the one with the outcomes that the defects must have.
+    pub(super) fn phase(&self) -> Phase {
+        match self {
+            During::Balancing => Phase::Balancing,
+            During::BenchDrive => Phase::Driving,
+            During::Shaking(_) => Phase::Shaken,
+        }
+    }
+
+    /// Whether a defect proves something.
+    pub fn is_proof(&self, kind: Kind) -> bool {
+        match self {
+            During::Balancing => true,
+            During::BenchDrive => kind.while_driving().is_some(),
+            During::Shaking(_) => kind.while_shaken().is_some(),
+        }
+    }
+
+    /// Whether a defect must be missed without thresholds and limits.
+    pub fn needs_detection(&self, kind: Kind) -> bool {
+        let must_end = match self {
+            During::Shaking(_) => kind.while_shaken() == Some(Expected::Changed),
+            During::Balancing | During::BenchDrive => true,
+        };
+        must_end && kind.needs_detection()
+    }
+}
+
+impl Kind {
+    /// The outcome that it must have while the rig is shaken; none if it proves nothing there.
+    pub fn while_shaken(self) -> Option<Expected> {
+        match self {
+            Kind::HostSilent | Kind::HostWireOpen | Kind::HostDeaf => Some(Expected::LetGo),
+            // What stands still while the motor pushes, and a cart that runs away.
+            Kind::LinkEncoderFrozen | Kind::CartEncoderFrozen | Kind::EncoderWireOpen | Kind::MotorStuck => {
+                Some(Expected::Changed)
+            }
+            // There is no observer: only what leads beyond a limit is found. The log shows the rest to the host.
+            Kind::BadSample
+            | Kind::EncoderJump
+            | Kind::EncoderReversed
+            | Kind::EncodersSwapped
+            | Kind::MotorDead
+            | Kind::MotorReversed => Some(Expected::Bounded),
+            Kind::ArmUnhomed
+            | Kind::ArmHanging
+            | Kind::ArmStopped
+            | Kind::ArmHeld
+            | Kind::CrystalMissing
+            | Kind::CrystalWrong
+            | Kind::ChipWrong
+            | Kind::WriteLost => None,
+            _ => Some(self.expected()),
+        }
+    }
+}
+
+impl Trial {
+    /// The same defect while the rig is shaken. Ticks count from the first one with the motor on.
+    pub(super) fn in_shaking(self, rig: &Rig) -> Self {
+        let ticks = |seconds: f64| (seconds / rig.tick.period_s) as usize;
+        let watched_s = match self.kind.while_shaken() {
+            Some(Expected::LetGo) => f64::from(SILENCE_S + RETURN_S) + WATCHED_S[0],
+            Some(Expected::Changed) => WATCHED_S[1],
+            _ => WATCHED_S[0],
+        };
+        let onset = self.random().random_range(ticks(ONSET_S[0])..ticks(ONSET_S[1]));
+        Self { phase: Phase::Shaken, onset, watched: ticks(watched_s), ..self }
+    }
+}
+
+impl Attempt<'_> {
+    /// The rig is shaken by a host that turns the motor off if the cart does not follow.
+    pub(super) fn shake(&self, feed: &Feed, target: &mut dyn Target) -> Result<Observed, HarnessError> {
+        let trial = self.trial;
+        let mut shaken = Shaken::begin_with(feed.clone(), self.rig, self.table, target, trial.seed)?;
+        let mut observed = Observed::default();
+        let mut injection = Injection::new(self.rig, self.table, trial.clone());
+        let mut host_is_content = true;
+        for tick in 0usize.. {
+            let since = tick.checked_sub(trial.onset).filter(|_| self.with_defect);
+            let inputs = self.pins(&mut shaken.harness, &mut injection, since, &mut false)?;
+            shaken.harness.bench.push(since.map_or(0.0, |since| injection.push_n(since)));
+            let acted = shaken.act(&inputs, |drive| self.driven(&mut injection, since, drive));
+            let output = match acted {
+                Err(HarnessError::Stopped { .. }) if observed.off.is_some() => {
+                    observed.dead = true;
+                    return Ok(observed);
+                }
+                output => output?,
+            };
+            observed.output(tick, output);
+            observed.outside |= observed.off.is_none() && self.is_out_of_bounds(shaken.harness.bench.state());
+            if observed.off.is_some() {
+                observed.fault = shaken.harness.session.fault();
+            }
+            if self.hanging_is_over(tick, &observed) {
+                break;
+            }
+            if since == Some(0) {
+                injection.serial(&mut shaken.harness.session);
+            }
+            if host_is_content && injection.host_is_alive(since) && shaken.feed().is_err() {
+                host_is_content = false;
+                shaken.harness.session.send(Request::Disarm);
+            }
+        }
+        self.find_reason(&mut shaken.harness, &mut observed);
+        Ok(observed)
+    }
+
+    /// What drives the cart.
+    fn driven(&self, injection: &mut Injection<'_>, since: Option<usize>, drive: Drive) -> Drive {
+        let mut acting = upright::board::Output { enable: true, drive };
+        if since.is_some() {
+            injection.output(&mut acting);
+        }
+        acting.drive
+    }
+
+    /// Whether a link has turned too far from hanging, or the cart is off its rail.
+    fn is_out_of_bounds(&self, state: &[f64]) -> bool {
+        let farthest = f64::from(ANGLE_RAD) * (1.0 + BEYOND);
+        self.is_off_rail(state) || absolute_angles(state).any(|angle| (angle - PI).abs() > farthest)
+    }
+}

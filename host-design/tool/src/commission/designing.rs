@@ -1,0 +1,180 @@
+//! From the log to a rig file, gains, and a verdict.
+
+use std::path::{Path, PathBuf};
+
+use upright::table::Law;
+use upright_design::design::{Certified, design};
+use upright_design::identify::{Estimate, Identification, Kind, Log, Settings, identify};
+use upright_design::number::significant;
+use upright_design::rig::{Rig, Tolerances};
+use upright_design::robust::{JudgeSettings, RobustError, choose, judge, rewritten, with_tolerances};
+use upright_design::study::Study;
+use upright_design::table::{Gains, TableValues};
+use upright_design::verify::{Unverifiable, brief};
+
+use super::commissioning::Plan;
+use super::machine::Stop;
+use super::record::Journal;
+use crate::identified::{json, rig_file, text};
+
+/// Length of the runs that the gains have to stand (s).
+const RUN_S: f64 = 10.0;
+/// Tolerances are that many deviations wide.
+const DEVIATIONS: f64 = 2.0;
+/// Smallest tolerance of the masses (%).
+const LEAST_PERCENT: f64 = 1.0;
+/// Largest one (%), as a rig file accepts it.
+const MOST_PERCENT: f64 = 45.0;
+/// Largest latency, as a share of a tick.
+const MOST_LATENCY: f64 = 0.3;
+
+/// The rig as it was found, with its gains.
+#[derive(Debug, Clone)]
+pub struct Designed {
+    /// The text of its file.
+    pub text: String,
+    /// The rig.
+    pub rig: Rig,
+    /// Its gain table.
+    pub table: TableValues,
+    certified: Certified,
+}
+
+impl Designed {
+    /// The `plan` with this rig in place of that of the file.
+    pub fn plan<'a>(&'a self, plan: Plan<'a>) -> Plan<'a> {
+        Plan { rig: &self.rig, table: &self.table, text: &self.text, ..plan }
+    }
+}
+
+/// The parameters of the machine, from its log.
+pub(super) fn identified(journal: &mut Journal, plan: Plan<'_>, log: &Log) -> Result<Identification, Stop> {
+    let settings = Settings::default();
+    let logs = [(PathBuf::from("the log"), log.clone())];
+    let found =
+        identify(plan.rig, &logs, &settings, &|_| ()).map_err(|error| Stop::Machine(error.to_string()))?;
+    text(&plan.rig.name, &found, &settings).lines().for_each(|line| journal.found(line));
+    journal.data(json(&plan.rig.name, &found));
+    match &found.refusal {
+        None => Ok(found),
+        Some(refusal) => Err(Stop::Machine(refusal.to_string())),
+    }
+}
+
+/// The rig file with the numbers that were found, and gains for them.
+pub(super) fn designed(
+    journal: &mut Journal,
+    plan: Plan<'_>,
+    found: &Identification,
+) -> Result<Designed, Stop> {
+    let machine = |words: String| Stop::Machine(words);
+    let note = format!(
+        "{} with the numbers that `upright commission` found from {:.0} s of shaking.",
+        plan.file.display(),
+        found.seconds
+    );
+    let text = rig_file(plan.text, plan.rig, found, &note.replace(['\n', '\r'], " "), plan.file)
+        .map_err(|error| machine(error.to_string()))?;
+    let tolerances = tolerances(plan.rig, found);
+    let words: Vec<String> = tolerances
+        .each()
+        .map(|(key, unit, value)| format!("{key} {} {unit}", significant(value, 2)))
+        .collect();
+    journal.found(format!("the machine may differ from the new file by: {}", words.join(", ")));
+    let text = with_tolerances(&text, &tolerances)
+        .ok_or_else(|| machine("[robust] has no place in the rig file: write one key per line".to_owned()))?;
+    let own = of_text(text, plan.file)?;
+    robust(journal, plan, own, &tolerances)
+}
+
+/// How far the machine may be from the new file: its deviations, its friction, and zeros and delay of this run.
+fn tolerances(rig: &Rig, found: &Identification) -> Tolerances {
+    let largest = |which: fn(Kind) -> bool, value: fn(&Estimate) -> f64| {
+        found.estimates.iter().filter(|one| which(one.kind)).map(value).fold(0.0, f64::max)
+    };
+    let upper = |one: &Estimate| one.new.abs() + DEVIATIONS * one.deviation;
+    let mass = largest(
+        |kind| matches!(kind, Kind::TotalMass | Kind::FirstMoment(_) | Kind::SecondMoment(_)),
+        |one| DEVIATIONS * one.deviation / one.new.abs(),
+    );
+    // The new file may have another delay than the old one.
+    let delay_ticks =
+        found.other_delay().map_or(0.0, |delay| f64::from(delay) - f64::from(found.delay_ticks));
+    let late_ticks = found.estimate(Kind::Delay).map_or(0.0, |one| one.new + DEVIATIONS * one.deviation);
+    let period_s = rig.tick.period_s;
+    Tolerances {
+        mass_percent: (100.0 * mass).clamp(LEAST_PERCENT, MOST_PERCENT),
+        joint_friction_n_m: largest(|kind| matches!(kind, Kind::JointDry(_)), upper),
+        cart_friction_n: largest(|kind| kind == Kind::CartDry, upper),
+        homing_error_rad: largest(|kind| matches!(kind, Kind::Zero(_)), upper),
+        latency_s: (late_ticks - delay_ticks).clamp(0.0, MOST_LATENCY) * period_s,
+    }
+}
+
+/// The file's own weights if they stand the tolerances; else those that a search finds; else the file's own again.
+fn robust(
+    journal: &mut Journal,
+    plan: Plan<'_>,
+    own: Designed,
+    tolerances: &Tolerances,
+) -> Result<Designed, Stop> {
+    let settings = JudgeSettings { runs: 1, duration_s: RUN_S, ..JudgeSettings::of(&own.rig) };
+    let laws: Vec<Law> = own.table.laws.present().map(|(law, _)| law).collect();
+    let stands = |law: &Law| -> Result<bool, Unverifiable> {
+        Ok(judge(&own.rig, &own.table, *law, tolerances, &settings, &Study::whole())?.stands())
+    };
+    let all = laws.iter().map(stands).collect::<Result<Vec<_>, _>>();
+    if all.map_err(|error| Stop::Machine(error.to_string()))?.iter().all(|&stands| stands) {
+        journal.found("the weights of the file stand that");
+        return Ok(own);
+    }
+    match choose(&own.rig, tolerances, &settings, false, &|_| ()) {
+        Ok((choice, _)) => {
+            for one in &choice.laws {
+                journal.found(format!("{}: {}", one.law, one.candidate.name));
+            }
+            let file = plan.file.display().to_string();
+            let text = rewritten(&own.text, &file, &own.rig.name, &own.rig, tolerances, &choice);
+            of_text(text.unwrap_or(own.text), plan.file)
+        }
+        Err(RobustError::Unhelped(reason)) => {
+            journal
+                .found(format!("no other weights stand all of that ({reason}): those of the file are kept"));
+            Ok(own)
+        }
+        Err(error) => Err(Stop::Machine(error.to_string())),
+    }
+}
+
+/// The rig of a text, with its gains.
+fn of_text(text: String, file: &Path) -> Result<Designed, Stop> {
+    let machine = |error: &dyn std::error::Error| Stop::Machine(error.to_string());
+    let rig = Rig::from_toml(&text, file).map_err(|error| machine(&error))?;
+    let certified = design(&rig).map_err(|error| machine(&error))?;
+    let table = TableValues::of(&rig, &certified, Gains::Sampled).map_err(|error| machine(&error))?;
+    Ok(Designed { text, rig, table, certified })
+}
+
+/// Margins, and runs with the friction that was found.
+pub(super) fn verified(journal: &mut Journal, designed: &Designed) -> Result<(), Stop> {
+    let Designed { rig, table, certified, .. } = designed;
+    let report = brief(rig, certified, table).map_err(|error| Stop::Machine(error.to_string()))?;
+    for check in &report.checks {
+        journal.found(format!(
+            "{}: {}: {}, {} required",
+            check.law.key(),
+            check.requirement,
+            check.found_text(),
+            check.required_text()
+        ));
+    }
+    let failed = report.failed();
+    if failed.is_empty() {
+        return Ok(());
+    }
+    Err(Stop::Machine(format!(
+        "the machine as it was found would not be balanced: not met: {}; look for friction, or ask upright verify with the \
+         new file",
+        failed.join("; ")
+    )))
+}

@@ -1,0 +1,100 @@
+//! Homing by the limit switches.
+
+use upright::protocol::message::Request;
+use upright::supervision::homing::Homing;
+
+use super::commissioning::Plan;
+use super::guide::Guide;
+use super::machine::Stop;
+use super::task::{End, Task};
+use crate::monitor::TelemetryOfAny;
+
+/// A sensor that counts at least this share of what it has to has moved.
+const MOVED: f64 = 0.1;
+
+/// Both switches are touched, and their distance is that of the file; the links hang still.
+pub(super) fn home(guide: &mut Guide<'_>, plan: Plan<'_>) -> Result<(), Stop> {
+    if plan.table.limits.travel_counts[0] == 0 {
+        guide.ask(Task::Centre)?;
+        return guide.request_until(Request::Home, |now| now.homing == Homing::Homed);
+    }
+    guide.ask(Task::Centre)?;
+    let is_free = |now: &TelemetryOfAny| !now.contacts.limit_low && !now.contacts.limit_high;
+    if guide.wait_for_person(|now| is_free(now).then_some(()))?.is_none() {
+        return Err(Stop::Machine("a limit switch stays open, or the cart is still at an end".to_owned()));
+    }
+    let is_begun = |now: &TelemetryOfAny| matches!(now.homing, Homing::Touch { .. });
+    guide.request_until(Request::HomeRail, is_begun)?;
+    let mut ends = Vec::new();
+    for end in [End::Low, End::High] {
+        guide.ask(Task::PushTo(end))?;
+        let touched = move |now: &TelemetryOfAny| {
+            let is_there = match (now.homing, end) {
+                (Homing::Touch { low, .. }, End::Low) => low,
+                (Homing::Touch { high, .. }, End::High) => high,
+                (Homing::HoldStill | Homing::WrongTravel, _) => true,
+                _ => false,
+            };
+            is_there.then(|| now.counts.iter().map(|&count| f64::from(count)).collect::<Vec<_>>())
+        };
+        match guide.wait_for_person(touched)? {
+            Some(counts) => ends.push(counts),
+            None => {
+                return Err(Stop::Machine("the cart has not touched both limit switches".to_owned()));
+            }
+        }
+    }
+    let moved: Vec<f64> = ends[1].iter().zip(&ends[0]).map(|(high, low)| high - low).collect();
+    let homing = guide.conversation().telemetry.as_ref().map(|now| now.homing);
+    if homing == Some(Homing::WrongTravel) {
+        return Err(Stop::Machine(wrong_travel(plan, &moved)));
+    }
+    guide.found(format!(
+        "{:.4} m between the switches, {:.4} m in the file",
+        moved[0] * step(plan, 0),
+        wanted_m(plan)
+    ));
+    guide.ask(Task::Centre)?;
+    if guide.wait_for_person(|now| (now.homing == Homing::Homed).then_some(()))?.is_none() {
+        return Err(Stop::Machine("cart and links do not come to rest between the switches".to_owned()));
+    }
+    Ok(())
+}
+
+/// What is wrong if the switches are not as far apart as the file says; `moved` are all sensors' counts from one to
+/// the other.
+fn wrong_travel(plan: Plan<'_>, moved: &[f64]) -> String {
+    let wanted = f64::from(plan.table.limits.travel_counts[0]);
+    let tolerance = f64::from(plan.table.limits.travel_counts[1]);
+    let other = moved.iter().skip(1).position(|counts| counts.abs() > MOVED * wanted);
+    if moved[0].abs() < MOVED * wanted {
+        return match other {
+            Some(link) => format!(
+                "the encoder of link {} counts when the cart is pushed, that of the cart does not: exchange their plugs",
+                link + 1
+            ),
+            None => {
+                "the cart's encoder does not count when the cart is pushed: check its plug, its supply and its wheel".to_owned()
+            }
+        };
+    }
+    if (moved[0] + wanted).abs() <= tolerance {
+        return "the encoder of the cart counts the wrong way: swap its channels".to_owned();
+    }
+    format!(
+        "the cart's encoder says {:.4} m between the switches, the file says {:.4} m: correct encoder_step_m or travel_m of \
+         [cart]",
+        moved[0] * step(plan, 0),
+        wanted_m(plan)
+    )
+}
+
+/// Distance between the switches by the file (m).
+fn wanted_m(plan: Plan<'_>) -> f64 {
+    f64::from(plan.table.limits.travel_counts[0]) * step(plan, 0)
+}
+
+/// Travel per count (m, rad).
+pub(super) fn step(plan: Plan<'_>, sensor: usize) -> f64 {
+    plan.rig.sensors().get(sensor).map_or(0.0, |sensor| sensor.step())
+}

@@ -1,0 +1,36 @@
+//! From a wired rig to a balancing one, step by step.
+//!
+//! A [`Machine`] is a rig with its firmware and the person beside it: the real ones, or simulated ones. The guide
+//! tells the person what to do ([`Task`]), watches the telemetry, and stops at the first [`Step`] in which the machine
+//! is not as it has to be. Everything goes into a [`Record`].
+//!
+//! - [`AtPort`]: the real machine behind a port, and the person at the terminal.
+//! - [`Simulated`]: a machine that differs from its file, with a person who does what is asked; [`Planted`] defects.
+//! - [`Commissioning`]: the steps.
+
+mod at_port;
+mod balance;
+mod commissioning;
+mod contacts;
+mod designing;
+mod guide;
+mod homing;
+mod machine;
+mod motor;
+mod planted;
+mod record;
+mod shaking;
+mod signs;
+mod simulated;
+mod step;
+mod task;
+
+pub use at_port::AtPort;
+pub use commissioning::{Commissioning, Plan};
+pub use designing::Designed;
+pub use machine::{Machine, Stop};
+pub use planted::{NoSuchDefect, Planted};
+pub use record::{Journal, Outcome, Record, StepRecord};
+pub use simulated::Simulated;
+pub use step::Step;
+pub use task::{End, Task};

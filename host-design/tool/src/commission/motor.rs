@@ -1,0 +1,68 @@
+//! The bench drive: the sign of the motor.
+
+use std::time::Duration;
+
+use upright::protocol::message::Request;
+use upright::supervision::bench_drive::MotorSign;
+use upright::supervision::supervisor::State;
+
+use super::guide::Guide;
+use super::machine::Stop;
+use super::task::Task;
+use crate::monitor::words;
+
+/// Time between two commands of a key that is held.
+const KEY: Duration = Duration::from_millis(25);
+/// The rig stands still for so long before, and the key is let go for so long between two tries.
+const STILL: Duration = Duration::from_secs(1);
+/// A drive begins within this time, or is refused.
+const BEGINS: Duration = Duration::from_millis(300);
+/// Longest drive, and some time for the telemetry.
+const LONGEST: Duration = Duration::from_millis(1_500);
+
+/// The motor pushes the cart along +x until it has moved a little.
+pub(super) fn check(guide: &mut Guide<'_>) -> Result<(), Stop> {
+    guide.ask(Task::HandsOff)?;
+    let end = guide.machine.now() + guide.machine.patience();
+    while !push(guide)? {
+        if guide.machine.now() > end {
+            return Err(Stop::Machine(format!("the motor is not driven: {}", guide.refusal())));
+        }
+    }
+    let now = guide.conversation().telemetry.as_ref();
+    let (motor, fault) = now.map_or((MotorSign::Unchecked, None), |now| (now.motor, now.fault));
+    let words = now.and_then(words::instruction);
+    guide.ask(Task::Centre)?;
+    match (motor, fault) {
+        (MotorSign::Checked, None) => guide.found("the motor moves the cart along +x"),
+        (_, Some(fault)) => {
+            return Err(Stop::Machine(format!("fault {fault} while the motor pushed the cart")));
+        }
+        _ => {
+            let words = words.unwrap_or_else(|| "the drive has ended too early: do it again".to_owned());
+            return Err(Stop::Machine(words));
+        }
+    }
+    Ok(())
+}
+
+/// Holds the key until the drive has ended; gives whether it has begun.
+fn push(guide: &mut Guide<'_>) -> Result<bool, Stop> {
+    guide.pause(STILL)?;
+    let begin = guide.machine.now();
+    let mut has_begun = false;
+    loop {
+        guide.send(Request::Drive { along: true });
+        guide.pause(KEY)?;
+        let is_driving =
+            guide.conversation().telemetry.as_ref().is_some_and(|now| now.state == State::Driving);
+        let since = guide.machine.now().saturating_sub(begin);
+        if (has_begun && !is_driving) || since > LONGEST {
+            return Ok(has_begun);
+        }
+        has_begun |= is_driving;
+        if !has_begun && since > BEGINS {
+            return Ok(false);
+        }
+    }
+}

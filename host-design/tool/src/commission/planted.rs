@@ -1,0 +1,237 @@
+//! Defects that are planted in a simulated machine, and the step that has to find each.
+
+use core::fmt;
+use core::str::FromStr;
+
+use upright::board::Output;
+use upright_design::harness::Pins;
+use upright_design::rig::{Link, PerJoint, PlantDescription, Rig};
+use upright_design::simulate::{Bench, Scenario};
+use upright_design::table::TableValues;
+
+use super::step::Step;
+use crate::campaign::{Defective, Kind, Trial};
+
+/// What is wrong.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum What {
+    /// A defect of the fault campaign, from power-up on.
+    Campaign(Kind),
+    StopMissing,
+    SwitchMissing,
+    SwitchesExchanged,
+    CountsWrong,
+    CartFriction,
+    JointFriction,
+}
+
+/// A defect in a simulated machine.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Planted {
+    what: What,
+    /// Number of the sensor (0: cart).
+    sensor: usize,
+}
+
+/// Its name on the command line, what is wrong, the sensor if it is in one, and the step that finds it.
+type Row = (&'static str, What, usize, &'static str, Step);
+
+/// Force of the dry friction at the cart, as a share of the motor's force in the bench drive.
+const STUCK: f64 = 1.5;
+
+/// Torque of the dry friction of each joint, as a share of the largest one by the weight of its link: the sine of 9°.
+const HELD: f64 = 0.15;
+
+const ALL: [Row; 15] = [
+    ("emergency-stop-missing", What::StopMissing, 0, "the emergency stop never opens", Step::Contacts),
+    (
+        "limit-switch-missing",
+        What::SwitchMissing,
+        0,
+        "the limit switch at the high end never opens",
+        Step::Contacts,
+    ),
+    (
+        "limit-switches-exchanged",
+        What::SwitchesExchanged,
+        0,
+        "the two limit switches are exchanged",
+        Step::Contacts,
+    ),
+    ("supply-sag", What::Campaign(Kind::SupplySag), 0, "the supply is too low", Step::Contacts),
+    (
+        "cart-encoder-reversed",
+        What::Campaign(Kind::EncoderReversed),
+        0,
+        "the cart's encoder counts backwards",
+        Step::Homing,
+    ),
+    (
+        "cart-encoder-frozen",
+        What::Campaign(Kind::CartEncoderFrozen),
+        0,
+        "the cart's encoder does not count",
+        Step::Homing,
+    ),
+    ("cart-counts-wrong", What::CountsWrong, 0, "the cart's encoder gives twice the counts", Step::Homing),
+    (
+        "encoder-reversed",
+        What::Campaign(Kind::EncoderReversed),
+        1,
+        "the encoder of link 1 counts backwards",
+        Step::Signs,
+    ),
+    (
+        "encoder-frozen",
+        What::Campaign(Kind::LinkEncoderFrozen),
+        1,
+        "the encoder of link 1 does not count",
+        Step::Signs,
+    ),
+    (
+        "encoder-wire-open",
+        What::Campaign(Kind::EncoderWireOpen),
+        1,
+        "a wire of the encoder of link 1 is open",
+        Step::Signs,
+    ),
+    (
+        "encoders-swapped",
+        What::Campaign(Kind::EncodersSwapped),
+        1,
+        "the encoders of links 1 and 2 are exchanged; with one link those of cart and link",
+        Step::Signs,
+    ),
+    ("counts-wrong", What::CountsWrong, 1, "the encoder of link 1 gives twice the counts", Step::Turns),
+    (
+        "motor-reversed",
+        What::Campaign(Kind::MotorReversed),
+        0,
+        "the motor's wires are exchanged",
+        Step::Motor,
+    ),
+    (
+        "cart-stuck",
+        What::CartFriction,
+        0,
+        "the cart's friction is more than the motor's force in the bench drive",
+        Step::Motor,
+    ),
+    (
+        "joints-stick",
+        What::JointFriction,
+        0,
+        "the dry friction of each joint holds its link up to 9° from hanging",
+        Step::Excitation,
+    ),
+];
+
+/// A name that no defect has.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error("no such defect; give one of {}", ALL.map(|row| row.0).join(", "))]
+pub struct NoSuchDefect;
+
+impl Planted {
+    /// Every defect.
+    pub fn all() -> impl Iterator<Item = Self> {
+        ALL.iter().map(|&(_, what, sensor, ..)| Self { what, sensor })
+    }
+
+    fn row(self) -> &'static Row {
+        // Every defect is made from a row.
+        ALL.iter().find(|row| (row.1, row.2) == (self.what, self.sensor)).unwrap_or(&ALL[0])
+    }
+
+    /// What is wrong.
+    pub fn meaning(self) -> &'static str {
+        self.row().3
+    }
+
+    /// The step that has to find it in a rig with this many links.
+    pub fn found_in(self, links: usize) -> Step {
+        match self.what {
+            // Then it is the cart's plug.
+            What::Campaign(Kind::EncodersSwapped) if links == 1 => Step::Homing,
+            _ => self.row().4,
+        }
+    }
+
+    /// Changes the machine itself.
+    pub(super) fn change(self, machine: &mut Rig, table: &TableValues) {
+        let PlantDescription::Chain(chain) = &machine.plant else { return };
+        let friction = &mut machine.reality.friction;
+        match self.what {
+            What::CartFriction => friction.cart_friction_n = STUCK * f64::from(table.limits.bench_force_n),
+            What::JointFriction => {
+                let torque = |link: &Link| {
+                    let centre_m = link.centre_of_mass_m.unwrap_or(0.5 * link.length_m);
+                    HELD * link.mass_kg * centre_m * chain.gravity_m_per_s2
+                };
+                friction.joint_friction_n_m = PerJoint::each(chain.links.iter().map(torque).collect());
+            }
+            _ => {}
+        }
+    }
+}
+
+impl fmt::Display for Planted {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.row().0)
+    }
+}
+
+impl FromStr for Planted {
+    type Err = NoSuchDefect;
+
+    fn from_str(name: &str) -> Result<Self, NoSuchDefect> {
+        let row = ALL.iter().find(|row| row.0 == name).ok_or(NoSuchDefect)?;
+        Ok(Self { what: row.1, sensor: row.2 })
+    }
+}
+
+/// A defect between machine and firmware, tick by tick.
+pub(super) struct Wires<'a> {
+    planted: Planted,
+    defective: Option<Defective<'a>>,
+    at_power_up: Option<u32>,
+}
+
+impl<'a> Wires<'a> {
+    pub(super) fn new(rig: &Rig, table: &'a TableValues, scenario: &Scenario, planted: Planted) -> Self {
+        let of_kind = |kind: Kind| {
+            let trial = Trial::by_hand(kind, scenario, table.sensors(), planted.sensor, scenario.seed);
+            Defective::new(rig, table, trial)
+        };
+        let defective = match planted.what {
+            What::Campaign(kind) => Some(of_kind(kind)),
+            _ => None,
+        };
+        Self { planted, defective, at_power_up: None }
+    }
+
+    /// Changes what the firmware reads.
+    pub(super) fn inputs(&mut self, pins: &mut Pins) {
+        let sensor = self.planted.sensor;
+        match (self.planted.what, &mut self.defective) {
+            (What::Campaign(_), Some(defective)) => defective.inputs(pins),
+            (What::StopMissing, _) => pins.contacts.emergency_stop = false,
+            (What::SwitchMissing, _) => pins.contacts.limit_high = false,
+            (What::SwitchesExchanged, _) => {
+                std::mem::swap(&mut pins.contacts.limit_low, &mut pins.contacts.limit_high);
+            }
+            (What::CountsWrong, _) => {
+                let count = &mut pins.raw_counts[sensor];
+                let begin = *self.at_power_up.get_or_insert(*count);
+                *count = Bench::reading(sensor, count.wrapping_mul(2).wrapping_sub(begin));
+            }
+            (What::Campaign(_) | What::CartFriction | What::JointFriction, _) => {}
+        }
+    }
+
+    /// Changes what the motor gets.
+    pub(super) fn output(&mut self, output: &mut Output) {
+        if let Some(defective) = &mut self.defective {
+            defective.output(output);
+        }
+    }
+}

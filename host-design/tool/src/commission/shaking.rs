@@ -1,0 +1,71 @@
+//! The machine is shaken, and logged.
+
+use std::time::Duration;
+
+use upright::supervision::fault::Fault;
+use upright::supervision::inhibits::Inhibits;
+use upright_design::identify::{LineError, Log, OverLine};
+
+use super::commissioning::Plan;
+use super::guide::Guide;
+use super::machine::Stop;
+use super::task::Task;
+use crate::monitor::{TelemetryOfAny, words};
+
+/// Time in which the firmware tells the cause of a fault.
+const CAUSE: Duration = Duration::from_millis(300);
+
+/// The log of the machine, which its firmware shakes.
+pub(super) fn shake(guide: &mut Guide<'_>, plan: Plan<'_>) -> Result<Log, Stop> {
+    guide.ask(Task::Centre)?;
+    let is_still = |now: &TelemetryOfAny| (!now.arming_inhibits.contains(Inhibits::MOVING)).then_some(());
+    guide.wait_for_person(is_still)?;
+    guide.ask(Task::HandsOff)?;
+    if guide.wait_for_person(is_still)?.is_none() {
+        return Err(Stop::Machine("the links do not come to rest".to_owned()));
+    }
+    let begin = guide.machine.now();
+    let mut line = OverLine::new(plan.rig, plan.table, plan.seconds, plan.seed, begin)
+        .map_err(|error| Stop::Machine(error.to_string()))?;
+    let shaken = until_over(guide, &mut line);
+    // Whatever has ended it: the motor is turned off, and the log too.
+    line.stop(guide.machine.now());
+    let ended = guide.machine.exchange(&line.take_outgoing());
+    guide.listen();
+    if let Err(stop) = shaken {
+        return Err(with_cause(guide, stop));
+    }
+    ended?;
+    guide.ask(Task::Centre)?;
+    let log = line.finish().map_err(|error| Stop::Machine(error.to_string()))?;
+    guide.found(format!("{} ticks, {} of them lost", log.ticks().len() as u64 + log.lost(), log.lost()));
+    Ok(log)
+}
+
+fn until_over(guide: &mut Guide<'_>, line: &mut OverLine) -> Result<(), Stop> {
+    let failed = |error: LineError| match error {
+        LineError::Silent => Stop::Line(error.to_string()),
+        LineError::Fault(Fault::Frozen) => Stop::Machine(format!(
+            "{error}: it has counted by hand, so it sticks; look for friction, or give the rig file a larger bench_force_n"
+        )),
+        error => Stop::Machine(error.to_string()),
+    };
+    while !line.is_over() {
+        line.poll(guide.machine.now()).map_err(failed)?;
+        let bytes = guide.machine.exchange(&line.take_outgoing())?;
+        line.receive(&bytes, guide.machine.now()).map_err(failed)?;
+    }
+    Ok(())
+}
+
+/// Adds the sensor of a fault, once the firmware has told it.
+fn with_cause(guide: &mut Guide<'_>, stop: Stop) -> Stop {
+    let told = guide.pause(CAUSE);
+    let cause = guide.conversation().cause.and_then(|cause| cause.sensor);
+    match (stop, told, cause) {
+        (Stop::Machine(words), Ok(()), Some(sensor)) => {
+            Stop::Machine(format!("{words} ({})", words::joint(sensor)))
+        }
+        (stop, ..) => stop,
+    }
+}

@@ -1,0 +1,90 @@
+//! What a person at the rig is asked to do.
+
+use core::fmt;
+
+/// An end of the rail.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum End {
+    /// At the smallest position.
+    Low,
+    /// At the largest position.
+    High,
+}
+
+/// Something to do by hand. Its text is what the person is told.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Task {
+    /// Press the emergency stop.
+    PressStop,
+    /// Release it.
+    ReleaseStop,
+    /// Push the cart until it presses the switch at an end.
+    PushTo(End),
+    /// Push the cart to the middle of the rail, and let the links hang still.
+    Centre,
+    /// Switch the motor's supply on.
+    SwitchOn,
+    /// Let the links hang still where the cart is.
+    Rest,
+    /// Turn a link counter-clockwise, or push the cart (0) along +x.
+    Move(u8),
+    /// Turn a link once around, counter-clockwise.
+    TurnAround(u8),
+    /// Let go of everything: the motor is going to move the cart.
+    HandsOff,
+    /// Hold the links upright and still, until the motor comes on.
+    Raise,
+    /// Take hold of the links before the motor goes off.
+    Catch,
+}
+
+impl Task {
+    /// Whether cart and links are free meanwhile; `is_on`: the motor is on.
+    pub fn lets_go(self, is_on: bool) -> bool {
+        match self {
+            Task::HandsOff => true,
+            Task::Raise | Task::Catch => is_on,
+            _ => false,
+        }
+    }
+
+    /// Whether it only goes on once the person says so: the motor comes on, or goes off.
+    pub fn needs_consent(self) -> bool {
+        matches!(self, Task::SwitchOn | Task::HandsOff | Task::Raise | Task::Catch)
+    }
+}
+
+impl fmt::Display for Task {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Task::PressStop => f.write_str("press the emergency stop, and keep it pressed"),
+            Task::ReleaseStop => f.write_str("release the emergency stop"),
+            Task::PushTo(End::Low) => {
+                f.write_str("push the cart to the low end of the rail until it presses the switch")
+            }
+            Task::PushTo(End::High) => {
+                f.write_str("push the cart to the high end of the rail, along +x, until it presses the switch")
+            }
+            Task::Centre => {
+                f.write_str("push the cart to the middle of the rail, and let the links hang still")
+            }
+            Task::SwitchOn => f.write_str("switch the motor's supply on, with the emergency stop in your hand"),
+            Task::Rest => f.write_str("let the links hang still"),
+            Task::Move(0) => f.write_str("push the cart along +x"),
+            Task::Move(link) => write!(f, "turn link {link} counter-clockwise; let the links beyond it hang"),
+            Task::TurnAround(link) => write!(
+                f,
+                "turn link {link} once around, counter-clockwise, until it hangs again; do not stop on the way, then keep it \
+                 still"
+            ),
+            Task::HandsOff => f.write_str(
+                "take your hands off the rig, with the emergency stop in one of them: the motor is going to move the cart",
+            ),
+            Task::Raise => f.write_str(
+                "raise the links and hold them upright and still; when the motor comes on, let go, with the emergency stop in \
+                 your hand",
+            ),
+            Task::Catch => f.write_str("take hold of the links: the motor is going to be turned off"),
+        }
+    }
+}

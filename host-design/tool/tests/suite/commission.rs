@@ -1,0 +1,196 @@
+//! From a wired rig to a balancing one: simulated machines with planted defects, and the step that stops each.
+
+use std::path::{Path, PathBuf};
+use std::sync::OnceLock;
+
+use upright_design::design::design;
+use upright_design::harness::with_firmware;
+use upright_design::rig::{PlantDescription, Rig};
+use upright_design::table::{Gains, TableValues};
+use upright_tool::commission::{Commissioning, Journal, Plan, Planted, Record, Simulated, Step, Stop};
+
+use crate::command::{SINGLE, path_of, status, stderr, stdout, upright};
+
+const DOUBLE: &str = "double-quanser-dbpen";
+
+/// A rig of the repository, designed once.
+fn designed(name: &str) -> &'static (Rig, TableValues) {
+    static BOTH: OnceLock<[(Rig, TableValues); 2]> = OnceLock::new();
+    let both = BOTH.get_or_init(|| {
+        [SINGLE, DOUBLE].map(|name| {
+            let rig = Rig::from_path(&PathBuf::from(format!("../../rigs/{name}.toml"))).unwrap();
+            let table = TableValues::of(&rig, &design(&rig).unwrap(), Gains::Sampled).unwrap();
+            (rig, table)
+        })
+    });
+    &both[usize::from(name == DOUBLE)]
+}
+
+fn plan<'a>(rig: &'a Rig, table: &'a TableValues, text: &'a str) -> Plan<'a> {
+    Plan { rig, table, file: Path::new("rig.toml"), text, seconds: 8.0, seed: 1 }
+}
+
+/// Does these steps with the machine of a rig, whose firmware has `table`; gives the step that was not passed, and
+/// why.
+fn stopped(
+    name: &str,
+    table: &TableValues,
+    planted: Option<Planted>,
+    steps: &[Step],
+) -> Option<(Step, String)> {
+    let (rig, own) = designed(name);
+    let mut journal = Journal::new(Record::new(rig, "this computer"), None, Box::new(|_| ()));
+    let result = with_firmware(table, |target| {
+        let mut machine = Simulated::new(rig, table, planted, target, 1).unwrap();
+        Commissioning::new(plan(rig, own, "")).run(&mut machine, &mut journal, steps)
+    });
+    match result.unwrap() {
+        Ok(()) => None,
+        Err(Stop::Machine(words)) => {
+            let last = journal.record.steps.last().unwrap();
+            assert!(!last.passed && last.stopped.as_ref() == Some(&words), "{last:?}");
+            Some((last.step, words))
+        }
+        Err(error) => panic!("{error}: {:?}", journal.record.steps.last()),
+    }
+}
+
+#[test]
+fn a_sound_machine_passes_every_early_step() {
+    for name in [SINGLE, DOUBLE] {
+        let (_, table) = designed(name);
+        assert_eq!(stopped(name, table, None, &Step::EARLY), None);
+    }
+}
+
+#[test]
+fn every_planted_defect_is_found_in_its_step() {
+    for (name, links) in [(SINGLE, 1), (DOUBLE, 2)] {
+        let (_, table) = designed(name);
+        for planted in Planted::all() {
+            let (step, words) = stopped(name, table, Some(planted), &Step::FIRST).expect("it is found");
+            assert_eq!(step, planted.found_in(links), "{planted}: {words}");
+        }
+    }
+}
+
+/// The table without the firmware's own check of a step.
+fn blind(table: &TableValues, step: Step) -> TableValues {
+    let mut table = table.clone();
+    let limits = &mut table.limits;
+    match step {
+        Step::Homing => limits.travel_counts[1] = i32::MAX,
+        Step::Signs => limits.sign_counts = [0; 15],
+        Step::Motor => limits.sign_counts[0] = 0,
+        _ => {}
+    }
+    table
+}
+
+#[test]
+fn without_the_check_of_its_step_no_defect_is_found_there() {
+    for (name, links) in [(SINGLE, 1), (DOUBLE, 2)] {
+        let (_, table) = designed(name);
+        let early = |planted: &Planted| Step::EARLY.contains(&planted.found_in(links));
+        for planted in Planted::all().filter(early) {
+            let step = planted.found_in(links);
+            let mut steps = Step::EARLY.to_vec();
+            steps.truncate(steps.iter().position(|&one| one == step).unwrap() + 1);
+            // These checks are the tool's own.
+            if matches!(step, Step::Contacts | Step::Turns) {
+                steps.pop();
+            }
+            assert_eq!(stopped(name, &blind(table, step), Some(planted), &steps), None, "{planted}");
+        }
+    }
+}
+
+#[test]
+fn the_firmware_of_another_rig_is_refused_at_once() {
+    let (rig, table) = designed(DOUBLE);
+    let mut other = table.clone();
+    other.rig_hash ^= 1;
+    let (step, words) = stopped(DOUBLE, &other, None, &Step::EARLY).unwrap();
+    assert!(step == Step::Connect && words.contains("flash the firmware again"), "{words}");
+    assert_eq!(rig.hash(), table.rig_hash);
+}
+
+/// The machine differs from the file in masses, lengths, friction, zeros and timing.
+const REALITY: &str = "\n[reality]\njoint_friction_n_m = 5e-4\ncart_friction_n = 0.1\nhoming_error_rad = 0.006\n\
+    cart_mass_percent = -9\nlink_mass_percent = 10\nlink_length_percent = -8\nlatency_s = 5e-4\n";
+
+#[test]
+fn a_machine_that_differs_from_its_file_is_commissioned_and_balances() {
+    let folder = tempfile::tempdir().unwrap();
+    let [machine, new, file] = ["machine.toml", "new.toml", "record.json"]
+        .map(|name| folder.path().join(name).display().to_string());
+    let rig = path_of(SINGLE);
+    std::fs::write(&machine, std::fs::read_to_string(&rig).unwrap() + REALITY).unwrap();
+    let arguments =
+        ["--target", "host", "--machine", &machine, "--write", &new, "--record", &file, "--seconds", "12"];
+    let output = upright(&[&["commission", &rig, "--json"], arguments.as_slice()].concat());
+    assert_eq!(status(&output), 0, "{}", stderr(&output));
+
+    let printed: serde_json::Value = serde_json::from_str(stdout(&output)).unwrap();
+    let written: serde_json::Value = serde_json::from_slice(&std::fs::read(&file).unwrap()).unwrap();
+    assert_eq!((&printed, &printed["outcome"]), (&written, &"done".into()));
+    let steps = printed["steps"].as_array().unwrap();
+    assert_eq!(steps.len(), Step::FIRST.len() + 1 + Step::SECOND.len());
+    assert!(steps.iter().all(|step| step["passed"] == true));
+    assert!(steps.last().unwrap()["found"][0].as_str().unwrap().starts_with("balanced for 10 s"));
+    assert_eq!(steps[7]["data"]["wiring"]["as_in_file"], true);
+
+    let mass = |file: &str| {
+        let PlantDescription::Chain(chain) = Rig::from_path(Path::new(file)).unwrap().plant else {
+            panic!("a chain")
+        };
+        chain.cart.mass_kg + chain.links[0].mass_kg
+    };
+    let true_mass = 1.0731 * 0.91 + 0.230 * 1.1;
+    assert!((mass(&new) / true_mass - 1.0).abs() < 0.01, "{} instead of {true_mass}", mass(&new));
+    // Negative control: the old file is further off.
+    assert!((mass(&rig) / true_mass - 1.0).abs() > 0.03);
+}
+
+#[test]
+fn a_machine_that_does_not_meet_its_requirements_is_not_balanced() {
+    // Without this line, such a machine is commissioned: see above.
+    let text = std::fs::read_to_string(path_of(SINGLE)).unwrap() + "\n[verify]\ngain_margin = 30\n";
+    let (rig, table) = designed(SINGLE);
+    let mut journal = Journal::new(Record::new(rig, "this computer"), None, Box::new(|_| ()));
+    let result = with_firmware(table, |target| {
+        let mut machine = Simulated::new(rig, table, None, target, 1).unwrap();
+        Commissioning::first(plan(rig, table, &text), &mut machine, &mut journal).map(drop)
+    });
+    assert!(matches!(result.unwrap(), Err(Stop::Machine(words)) if words.contains("gain_margin")));
+    assert_eq!(journal.record.steps.last().unwrap().step, Step::Verification);
+}
+
+#[test]
+fn the_command_ends_with_status_3_if_the_machine_must_not_be_run() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("record.json");
+    let rig = path_of(SINGLE);
+    let run = |more: &[&str]| {
+        upright(
+            &[&["commission", &rig, "--target", "host", "--record", file.to_str().unwrap()], more].concat(),
+        )
+    };
+    let record = || -> serde_json::Value { serde_json::from_slice(&std::fs::read(&file).unwrap()).unwrap() };
+
+    let output = run(&["--defect", "motor-reversed"]);
+    assert_eq!(status(&output), 3, "{}", stderr(&output));
+    assert!(stderr(&output).contains("swap its wires") && stdout(&output).contains("NOT PASSED"));
+    let (record, last) = (record(), Step::EARLY.len() - 1);
+    assert_eq!((&record["outcome"], &record["steps"][last]["passed"]), (&"stopped".into(), &false.into()));
+
+    let other = path_of(DOUBLE);
+    for (more, words) in [
+        (["--defect", "gremlins"], "give one of emergency-stop-missing"),
+        (["--machine", &other], "another number of links"),
+    ] {
+        let output = run(&more);
+        assert_eq!(status(&output), 2);
+        assert!(stderr(&output).contains(words), "{}", stderr(&output));
+    }
+}

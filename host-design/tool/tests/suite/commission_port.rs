@@ -1,0 +1,144 @@
+//! The first steps with a machine behind a port: its firmware answers over TCP, and lines that a person types.
+
+use std::io::{Read, Write};
+use std::net::TcpListener;
+use std::path::Path;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::mpsc::{Receiver, Sender, channel};
+use std::time::Duration;
+
+use upright_design::design::design;
+use upright_design::harness::with_firmware;
+use upright_design::rig::Rig;
+use upright_design::table::{Gains, TableValues};
+use upright_tool::commission::{
+    AtPort, Commissioning, Journal, Machine, Plan, Planted, Record, Simulated, Step, Stop, Task,
+};
+use upright_tool::monitor::Line;
+
+use crate::command::{SINGLE, path_of};
+
+/// The machine of the file behind a TCP port, whose hand does what comes through `tasks`; four times as fast as real.
+fn serve(
+    listener: &TcpListener,
+    rig: &Rig,
+    table: &TableValues,
+    planted: Option<Planted>,
+    tasks: &Receiver<Task>,
+) {
+    let (mut stream, _) = listener.accept().unwrap();
+    stream.set_read_timeout(Some(Duration::from_millis(1))).unwrap();
+    with_firmware(table, |target| {
+        let mut machine = Simulated::new(rig, table, planted, target, 1).unwrap();
+        loop {
+            while let Ok(task) = tasks.try_recv() {
+                machine.ask(task).unwrap();
+            }
+            let mut buffer = [0; 256];
+            let received = match stream.read(&mut buffer) {
+                Ok(0) => return,
+                Ok(length) => &buffer[..length],
+                Err(_) => &[],
+            };
+            let answer = machine.exchange(received).unwrap();
+            if stream.write_all(&answer).is_err() {
+                return;
+            }
+        }
+    })
+    .unwrap();
+}
+
+/// The port, and the hand at the machine behind it, which hears what the person is asked.
+struct Heard {
+    port: AtPort,
+    hand: Sender<Task>,
+}
+
+impl Machine for Heard {
+    fn exchange(&mut self, bytes: &[u8]) -> Result<Vec<u8>, Stop> {
+        self.port.exchange(bytes)
+    }
+
+    fn now(&self) -> Duration {
+        self.port.now()
+    }
+
+    fn ask(&mut self, task: Task) -> Result<(), Stop> {
+        self.hand.send(task).unwrap();
+        self.port.ask(task)
+    }
+
+    fn patience(&self) -> Duration {
+        Duration::from_secs(4)
+    }
+
+    fn again(&mut self, failed: Step) -> bool {
+        self.port.again(failed)
+    }
+}
+
+/// Does the first steps with a person who types `answers`, one each time when asked; gives how it ended, and the
+/// steps.
+fn commissioned(
+    planted: Option<Planted>,
+    answers: &'static [&'static str],
+    is_stopped: bool,
+) -> (Result<(), Stop>, Vec<(Step, bool)>) {
+    let rig = Rig::from_path(Path::new(&path_of(SINGLE))).unwrap();
+    let table = TableValues::of(&rig, &design(&rig).unwrap(), Gains::Sampled).unwrap();
+    let listener = TcpListener::bind("127.0.0.1:0").unwrap();
+    let address = format!("tcp:{}", listener.local_addr().unwrap());
+    let (hand, tasks) = channel();
+    std::thread::scope(|threads| {
+        let (rig, table, listener) = (&rig, &table, &listener);
+        threads.spawn(move || serve(listener, rig, table, planted, &tasks));
+        let (typed, said) = channel();
+        let mut answers = answers.iter();
+        // The person reads that Enter is asked for, and answers, or goes away.
+        let mut typed = Some(typed);
+        let show = move |_: &str| match (answers.next(), &typed) {
+            (Some(answer), Some(typed)) => typed.send((*answer).to_owned()).unwrap(),
+            _ => typed = None,
+        };
+        let stop = Arc::new(AtomicBool::new(false));
+        stop.store(is_stopped, Ordering::Relaxed);
+        let port = AtPort::new(Line::open(&address).unwrap(), said, stop, Box::new(show));
+        let mut machine = Heard { port, hand };
+        let mut journal = Journal::new(Record::new(rig, &address), None, Box::new(|_| ()));
+        let plan = Plan { rig, table, file: Path::new("rig.toml"), text: "", seconds: 10.0, seed: 1 };
+        let steps = [Step::Connect, Step::Contacts];
+        let result = Commissioning::new(plan).run(&mut machine, &mut journal, &steps);
+        (result, journal.record.steps.iter().map(|step| (step.step, step.passed)).collect())
+    })
+}
+
+#[test]
+fn a_person_at_a_port_is_led_through_the_contacts() {
+    let (result, steps) = commissioned(None, &[""], false);
+    assert!(result.is_ok(), "{result:?}");
+    assert_eq!(steps, [(Step::Connect, true), (Step::Contacts, true)]);
+}
+
+#[test]
+fn a_person_at_a_port_may_go_back_to_a_step_and_give_up() {
+    let planted = "limit-switches-exchanged".parse().unwrap();
+    let (result, steps) = commissioned(Some(planted), &["r", ""], false);
+    assert!(
+        matches!(&result, Err(Stop::Machine(words)) if words.contains("exchange the wires")),
+        "{result:?}"
+    );
+    assert_eq!(steps, [(Step::Connect, true), (Step::Contacts, false), (Step::Contacts, false)]);
+}
+
+#[test]
+fn nobody_at_the_terminal_and_ctrl_c_end_it() {
+    let (result, steps) = commissioned(None, &[], false);
+    assert!(
+        matches!(result, Err(Stop::Aborted)) && steps.last() == Some(&(Step::Contacts, false)),
+        "{result:?}"
+    );
+    let (result, steps) = commissioned(None, &[""], true);
+    assert!(matches!(result, Err(Stop::Aborted)) && steps == [(Step::Connect, false)], "{result:?}");
+}
