@@ -47,6 +47,17 @@ impl LinearSimulation {
     }
 }
 
+/// `product = a x`, without the memory that a product of matrices needs.
+fn times(a: &Matrix<f64>, x: &[f64], product: &mut [f64]) {
+    for (row, product) in a.row_slices().zip(product) {
+        let mut sum = 0.0;
+        for i in 0..x.len() {
+            sum += row[i] * x[i];
+        }
+        *product = sum;
+    }
+}
+
 impl Plant for LinearSimulation {
     fn links(&self) -> usize {
         0
@@ -80,16 +91,23 @@ impl Plant for LinearSimulation {
         let drive = self.drive(force, disturbances);
         let pieces = (self.a.norm() * dt.abs()).ceil().max(substeps as f64).max(1.0);
         let h = dt / pieces;
-        let mut x = Matrix::column(&self.state);
+        let mut term = vec![0.0; self.state.len()];
+        let mut product = term.clone();
         for _ in 0..pieces as u64 {
-            let mut term = (&(&self.a * &x) + &drive).scaled(&h);
-            x = &x + &term;
-            for i in 2..=TERMS {
-                term = (&self.a * &term).scaled(&(h / f64::from(i)));
-                x = &x + &term;
+            times(&self.a, &self.state, &mut product);
+            for i in 0..term.len() {
+                term[i] = (product[i] + drive.entries()[i]) * h;
+                self.state[i] += term[i];
+            }
+            for order in 2..=TERMS {
+                times(&self.a, &term, &mut product);
+                let factor = h / f64::from(order);
+                for i in 0..term.len() {
+                    term[i] = product[i] * factor;
+                    self.state[i] += term[i];
+                }
             }
         }
-        self.state.copy_from_slice(x.entries());
     }
 
     fn energy(&self) -> Option<Energy> {

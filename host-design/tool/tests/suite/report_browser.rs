@@ -5,6 +5,7 @@
 use std::path::Path;
 
 use crate::report_devtools::Browser;
+use crate::report_rigs::{LINEAR, SINGLE};
 
 /// Width of a phone (CSS pixels).
 const TELEPHONE: u32 = 390;
@@ -102,8 +103,8 @@ fn the_page_works_in_a_browser_and_each_of_its_faults_is_found() {
     };
     let folder = tempfile::tempdir().unwrap();
     let page = folder.path().join("report.html");
-    let html = crate::report_rigs::quick_report(&crate::report_rigs::rig("single-quanser-ip02")).html;
-    std::fs::write(&page, &html).unwrap();
+    let html = &SINGLE.html;
+    std::fs::write(&page, html).unwrap();
     assert_eq!(faults(&mut browser, &page, true), Vec::<String>::new());
 
     let broken = [
@@ -137,10 +138,6 @@ fn the_page_works_in_a_browser_and_each_of_its_faults_is_found() {
         assert!(found.iter().any(|found| found.contains(fault)), "{fault}: {found:?}");
     }
 
-    std::fs::write(
-        &page,
-        crate::report_rigs::quick_report(&crate::report_rigs::rig("quadruple-paper-printed")).html,
-    )
-    .unwrap();
+    std::fs::write(&page, &LINEAR.html).unwrap();
     assert_eq!(faults(&mut browser, &page, false), Vec::<String>::new());
 }

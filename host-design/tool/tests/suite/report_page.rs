@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use crate::report_rigs::{quick_report, report_with_imperfections};
+use crate::report_rigs::{LINEAR, SINGLE, quick_report, report_with_imperfections};
 use upright_design::rig::Rig;
 
 const LARGEST: usize = 5_000_000;
@@ -52,7 +52,7 @@ fn the_same_rig_gets_the_same_page() {
 
 #[test]
 fn a_linear_model_has_no_drawing_and_the_page_says_so() {
-    let report = quick_report(&crate::report_rigs::rig("quadruple-paper-printed"));
+    let report = &LINEAR;
     assert!(report.html.contains("nothing to draw and no\nanimation"));
     assert!(report.html.contains("No drawing: the rig file gives a linear model"));
     assert!(report.html.contains("gives no disturbances"));
@@ -91,7 +91,7 @@ fn a_name_from_a_rig_file_cannot_become_a_script() {
 
 #[test]
 fn the_margins_in_the_bode_plot_are_on_the_curve() {
-    let report = quick_report(&crate::report_rigs::rig("single-quanser-ip02"));
+    let report = &SINGLE;
     let mut marked = 0;
     for picture in report.pictures.iter().filter(|picture| picture.name.starts_with("bode-")) {
         for line in picture.csv.as_ref().unwrap().lines() {
@@ -117,10 +117,9 @@ fn the_margins_in_the_bode_plot_are_on_the_curve() {
 
 #[test]
 fn imperfections_have_a_table_and_two_figures_where_they_are_asked_for() {
-    let rig = crate::report_rigs::rig("single-quanser-ip02");
-    let plain = quick_report(&rig);
+    let plain = &SINGLE;
     assert!(!plain.html.contains("id=\"imperfections\""));
-    let report = report_with_imperfections(&rig);
+    let report = report_with_imperfections(&crate::report_rigs::rig("single-quanser-ip02"));
     assert!(report.html.contains("id=\"imperfections\"") && report.html.len() < LARGEST);
     for key in ["joint_friction_n_m", "parameter_spread_percent"] {
         assert_eq!(report.html.matches(&format!("<td><code>{key}</code></td>")).count(), 1, "{key}");

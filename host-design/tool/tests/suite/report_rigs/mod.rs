@@ -1,6 +1,7 @@
 //! Reports for the tests, without the slow half of the trust report.
 
 use std::path::Path;
+use std::sync::LazyLock;
 
 use upright::table::Law;
 use upright_design::design::design;
@@ -20,7 +21,13 @@ pub(crate) fn quick_report(rig: &Rig) -> Report {
     made(rig, None)
 }
 
-/// The same with what the LQR stands of each imperfection, from short runs.
+/// [`quick_report`] on `single-quanser-ip02`: made once, several tests look at it.
+pub(crate) static SINGLE: LazyLock<Report> = LazyLock::new(|| quick_report(&rig("single-quanser-ip02")));
+
+/// [`quick_report`] on a linear model, `quadruple-paper-printed`.
+pub(crate) static LINEAR: LazyLock<Report> = LazyLock::new(|| quick_report(&rig("quadruple-paper-printed")));
+
+/// [`quick_report`] with what the LQR stands of each imperfection, from short runs.
 pub(crate) fn report_with_imperfections(rig: &Rig) -> Report {
     let settings =
         ImperfectionSettings { duration_s: 2.0, seeds: 1, relative: 0.5, ..ImperfectionSettings::of(rig) };
