@@ -7,21 +7,24 @@ use super::parameters::Layout;
 
 /// The chain with the letters of `ChainParameters`, for any number of links n, in the m = n + 1 coordinates x, φ_1 … φ_n.
 ///
-/// The state has s = 2m entries: coordinates, then their rates. Angles are absolute and from the normal of the rail,
+/// The state has s = 2m + 1 entries: coordinates, their rates, and the bristle ζ of the cart. Angles are absolute and from the normal of the rail,
 /// which rises by α. With `b_jk = l_j a_k` for j < k and `b_jj = J_j` the equations are
 ///
 /// ```text
-/// M_t ẍ - Σ a_j cos φ_j φ̈_j + Σ a_j sin φ_j φ̇_j² = u - (d_0 + e) ẋ - c_0 tanh(ẋ/ε) - g M_t sin α
+/// M_t ẍ - Σ a_j cos φ_j φ̈_j + Σ a_j sin φ_j φ̇_j² = u - (d_0 + e) ẋ - c_0 ζ - g M_t sin α
 /// -a_j cos φ_j ẍ + Σ_k b_jk (cos(φ_j - φ_k) φ̈_k + sin(φ_j - φ_k) φ̇_k²) - g a_j sin(φ_j + α) = τ_j - τ_{j+1}
 /// τ_i = -d_i θ̇_i - c_i tanh(θ̇_i/ε),   θ̇_i = φ̇_i - φ̇_{i-1}
+/// dζ/dx = (1 - ζ sgn ẋ)/δ
 /// ```
 ///
-/// with e the damping of the motor's back-EMF.
+/// with e the damping of the motor's back-EMF. A cart that turns round is held by its friction until the bristle has turned,
+/// too (P. R. Dahl, "Solid friction damping of mechanical vibrations", AIAA Journal 14(12), 1976): a friction without
+/// memory lets it creep instead.
 #[derive(Debug, Clone)]
 pub(super) struct Model {
     pub(super) layout: Layout,
     pub(super) gravity: f64,
-    /// ε of the cart (m/s) and of the joints (rad/s).
+    /// δ of the cart (m) and ε of the joints (rad/s).
     pub(super) smoothing: [f64; 2],
 }
 
@@ -60,7 +63,15 @@ impl Model {
 
     /// Number of states, s.
     pub(super) fn states(&self) -> usize {
-        2 * self.coordinates()
+        2 * self.coordinates() + 1
+    }
+
+    /// The bristle of the cart after a travel from where it was `bristle`, and its derivatives by both.
+    pub(super) fn bristle(&self, bristle: f64, travel: f64) -> [f64; 3] {
+        let direction = 1f64.copysign(travel);
+        let left = libm::exp(-travel.abs() / self.smoothing[0]);
+        let after = direction + (bristle - direction) * left;
+        [after, left, (1.0 - direction * bristle) * left / self.smoothing[0]]
     }
 
     /// `b_jk` (kg·m²).
@@ -72,13 +83,13 @@ impl Model {
         p[self.layout.length(low)] * p[self.layout.first_moment(high)]
     }
 
-    /// Friction in a contact (0: cart) that moves at `speed`: force or torque, its slope, and tanh.
-    fn friction(&self, p: &[f64], contact: usize, speed: f64) -> [f64; 3] {
-        let smoothing = self.smoothing[contact.min(1)];
-        let direction = libm::tanh(speed / smoothing);
-        let (viscous, dry) = (p[self.layout.viscous(contact)], p[self.layout.dry(contact)]);
+    /// Friction in a joint that moves at `rate`: torque, its slope, and tanh.
+    fn friction(&self, p: &[f64], joint: usize, rate: f64) -> [f64; 3] {
+        let smoothing = self.smoothing[1];
+        let direction = libm::tanh(rate / smoothing);
+        let (viscous, dry) = (p[self.layout.viscous(joint + 1)], p[self.layout.dry(joint + 1)]);
         let slope = viscous + dry * (1.0 - direction * direction) / smoothing;
-        [viscous * speed + dry * direction, slope, direction]
+        [viscous * rate + dry * direction, slope, direction]
     }
 }
 
@@ -86,7 +97,7 @@ impl Local {
     /// For derivatives by the state, and by the parameters if `parameters`.
     pub(super) fn new(layout: Layout, parameters: bool) -> Self {
         let m = layout.links + 1;
-        let columns = 2 * m + if parameters { layout.of_motion() } else { 0 };
+        let columns = 2 * m + 1 + if parameters { layout.of_motion() } else { 0 };
         Self {
             columns,
             acceleration: vec![0.0; m],
@@ -100,7 +111,7 @@ impl Local {
     /// Accelerations at the state `at` with the parameters `p`.
     pub(super) fn accelerate(&mut self, model: &Model, p: &[f64], at: &[f64], input: &Input) {
         let (n, m, layout) = (model.layout.links, model.coordinates(), model.layout);
-        let (v, w) = (at[m], &at[m + 1..]);
+        let (v, w, bristle) = (at[m], &at[m + 1..2 * m], at[2 * m]);
         let (total, (slope_sine, slope_cosine)) = (p[Layout::TOTAL_MASS], libm::sincos(p[layout.tilt()]));
         for j in 0..n {
             (self.sine[j], self.cosine[j]) = libm::sincos(at[1 + j]);
@@ -109,8 +120,8 @@ impl Local {
         let right = &mut self.acceleration;
         self.factors[0] = total;
         right[0] = input.force
-            - input.back_emf * v
-            - model.friction(p, 0, v)[0]
+            - (p[layout.viscous(0)] + input.back_emf) * v
+            - p[layout.dry(0)] * bristle
             - model.gravity * total * slope_sine;
         let mut below = 0.0;
         for j in 0..n {
@@ -125,7 +136,7 @@ impl Local {
                     self.factors[(j + 1) * m + k + 1] = b * (cosine[j] * cosine[k] + sine[j] * sine[k]);
                 }
             }
-            let friction = model.friction(p, j + 1, w[j] - below)[0];
+            let friction = model.friction(p, j, w[j] - below)[0];
             below = w[j];
             right[j + 1] = torque - friction;
             if j > 0 {
@@ -150,11 +161,12 @@ impl Local {
     /// `-∂r` by the state.
     fn by_state(&mut self, model: &Model, p: &[f64], at: &[f64], input: &Input) {
         let (n, m, layout, columns) = (model.layout.links, model.coordinates(), model.layout, self.columns);
-        let (v, w) = (at[m], &at[m + 1..]);
+        let w = &at[m + 1..2 * m];
         let (xdd, wdot) = (self.acceleration[0], &self.acceleration[1..]);
         let (sine, cosine, by) = (&self.sine, &self.cosine, &mut self.jacobian);
         let (slope_sine, slope_cosine) = libm::sincos(p[layout.tilt()]);
-        by[m] -= input.back_emf + model.friction(p, 0, v)[1];
+        by[m] -= input.back_emf + p[layout.viscous(0)];
+        by[2 * m] -= p[layout.dry(0)];
         let mut below = 0.0;
         for j in 0..n {
             let (a, row) = (p[layout.first_moment(j)], (j + 1) * columns);
@@ -171,7 +183,7 @@ impl Local {
                 by[row + 1 + k] -= turn;
                 by[row + m + 1 + k] -= 2.0 * across * w[k];
             }
-            let slope = model.friction(p, j + 1, w[j] - below)[1];
+            let slope = model.friction(p, j, w[j] - below)[1];
             below = w[j];
             by[row + m + 1 + j] -= slope;
             if j > 0 {
@@ -185,13 +197,13 @@ impl Local {
     /// `-∂r` by the parameters.
     fn by_parameters(&mut self, model: &Model, p: &[f64], at: &[f64], input: &Input) {
         let (n, m, layout, columns) = (model.layout.links, model.coordinates(), model.layout, self.columns);
-        let (v, w, s, gravity) = (at[m], &at[m + 1..], 2 * m, model.gravity);
+        let (v, w, s, gravity) = (at[m], &at[m + 1..2 * m], model.states(), model.gravity);
         let (xdd, wdot) = (self.acceleration[0], &self.acceleration[1..]);
         let (sine, cosine, by) = (&self.sine, &self.cosine, &mut self.jacobian);
         let (slope_sine, slope_cosine) = libm::sincos(p[layout.tilt()]);
         by[s + Layout::TOTAL_MASS] -= xdd + gravity * slope_sine;
         by[s + layout.viscous(0)] -= v;
-        by[s + layout.dry(0)] -= model.friction(p, 0, v)[2];
+        by[s + layout.dry(0)] -= at[2 * m];
         by[s + layout.tilt()] -= gravity * p[Layout::TOTAL_MASS] * slope_cosine;
         by[s + layout.delay()] += input.by_delay;
         by[s + layout.dead_zone()] += input.by_dead_zone;
@@ -218,7 +230,7 @@ impl Local {
             }
             let rate = w[j] - below;
             below = w[j];
-            let direction = model.friction(p, j + 1, rate)[2];
+            let direction = model.friction(p, j, rate)[2];
             by[row + layout.viscous(j + 1)] -= rate;
             by[row + layout.dry(j + 1)] -= direction;
             if j > 0 {
@@ -287,7 +299,7 @@ fn solve(factors: &[f64], m: usize, columns: usize, rows: &mut [f64]) {
 
 #[cfg(test)]
 pub(super) mod tests {
-    use super::super::parameters::priors;
+    use super::super::parameters::{SMOOTHING, priors};
     use super::*;
     use crate::plant::{ChainPlant, ChainState};
     use crate::rig::{PlantDescription, Rig};
@@ -297,12 +309,12 @@ pub(super) mod tests {
         let rig = Rig::from_path(Path::new("../../rigs/triple-glueck-eder-kugi.toml")).unwrap();
         let PlantDescription::Chain(chain) = &rig.plant else { panic!("a chain") };
         let model =
-            Model { layout: Layout { links: 3 }, gravity: chain.gravity_m_per_s2, smoothing: [0.004, 0.02] };
+            Model { layout: Layout { links: 3 }, gravity: chain.gravity_m_per_s2, smoothing: SMOOTHING };
         let p = priors(&rig, chain, true).iter().map(|prior| prior.value).collect();
         (model, p, ChainPlant::of(chain).unwrap())
     }
 
-    const AT: [f64; 8] = [0.1, 2.0, -1.1, 0.4, -0.7, 3.0, -5.0, 1.5];
+    const AT: [f64; 9] = [0.1, 2.0, -1.1, 0.4, -0.7, 3.0, -5.0, 1.5, 0.4];
 
     #[test]
     fn without_dry_friction_and_tilt_it_is_the_plant() {
@@ -329,7 +341,7 @@ pub(super) mod tests {
             &AT,
             &Input { force: 17.0, by_delay: 2.0, by_dead_zone: -3.0, back_emf: 0.7 },
         );
-        let columns = 8 + model.layout.of_motion();
+        let columns = 9 + model.layout.of_motion();
         let mut other = Local::new(model.layout, false);
         let mut at = |p: &[f64], state: &[f64], force: f64| {
             other.accelerate(&model, p, state, &Input { force, back_emf: 0.7, ..Input::default() });
@@ -338,8 +350,8 @@ pub(super) mod tests {
         for column in 0..columns {
             let mut ends = [1.0, -1.0].map(|sign| {
                 let (mut p, mut state, mut force) = (p.clone(), AT.to_vec(), 17.0);
-                let step = if column < 8 { 1e-6 } else { 1e-6 * p[column - 8].abs().max(1e-2) };
-                match column.checked_sub(8) {
+                let step = if column < 9 { 1e-6 } else { 1e-6 * p[column - 9].abs().max(1e-2) };
+                match column.checked_sub(9) {
                     None => state[column] += sign * step,
                     Some(index) if index == model.layout.delay() => force += sign * step * 2.0,
                     Some(index) if index == model.layout.dead_zone() => force -= sign * step * 3.0,

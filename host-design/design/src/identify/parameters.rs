@@ -3,8 +3,9 @@
 use crate::plant::ChainParameters;
 use crate::rig::{Chain, Rig};
 
-/// Speed (m/s) and rate (rad/s) below which dry friction is taken as proportional, in `c tanh(v / ε)`.
-pub(super) const SMOOTHING: [f64; 2] = [0.004, 0.02];
+/// Travel (m) over which the bristle of the cart turns, and rate (rad/s) below which the dry friction of a joint is taken as
+/// proportional: δ and ε of the model.
+pub(super) const SMOOTHING: [f64; 2] = [3e-5, 0.02];
 
 /// What a parameter is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

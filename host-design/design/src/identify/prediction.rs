@@ -21,6 +21,8 @@ const TUNING_S: f64 = 6.0;
 const FACTORS: [f64; 3] = [10.0, 4.0, 2.0];
 /// A fit ends when no parameter moves by more than this many of its deviations.
 const SETTLED: f64 = 0.03;
+/// Intensity of the noise of the bristle (1/s): what a bristle of another kind does while the cart sticks.
+const BRISTLE_NOISE_PER_S: f64 = 0.3;
 
 /// The filter over a record.
 pub(super) struct Filter<'a> {
@@ -96,7 +98,7 @@ impl Filter<'_> {
         noise
     }
 
-    /// Finds the smoothing of the dry friction (m/s, rad/s) under which the measurements are most likely.
+    /// Finds the smoothing of the dry friction (m, rad/s) under which the measurements are most likely.
     pub(super) fn smoothing(&self, p: &[f64], noise: &[f64]) -> [f64; 2] {
         let mut best = (self.run(p, noise, false).cost, self.model.smoothing);
         for contact in 0..2 {
@@ -162,6 +164,7 @@ impl Filter<'_> {
             filter.covariance[(m + channel) * s + m + channel] =
                 (step / 0.01).powi(2) * (channel as f64).max(1.0);
         }
+        filter.covariance[s * s - 1] = 1.0;
         let y = &self.record.pieces[piece].y;
         let settled = first + (SETTLING_S / dt_s) as usize;
         let mut jacobian = vec![0.0; size];
@@ -264,6 +267,7 @@ impl State {
     fn predict(&mut self, step: &Step, noise: &[f64], dt_s: f64) {
         let (s, size, m) = (self.at.len(), self.size, self.at.len() / 2);
         self.at.copy_from_slice(&step.end);
+        self.at[s - 1] = self.at[s - 1].clamp(-1.0, 1.0);
         // F P, then (F P) Fᵀ.
         self.other.fill(0.0);
         for (row, local) in self.other.chunks_exact_mut(s).zip(step.by.chunks_exact(step.columns)) {
@@ -286,6 +290,7 @@ impl State {
                 self.covariance[(m + i) * s + m + j] += sum * dt_s;
             }
         }
+        self.covariance[s * s - 1] += BRISTLE_NOISE_PER_S * dt_s;
         if size > 0 {
             for (row, local) in self.next_by.chunks_exact_mut(size).zip(step.by.chunks_exact(step.columns)) {
                 let (of_motion, others) = row.split_at_mut(step.columns - s);

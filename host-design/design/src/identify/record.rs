@@ -189,7 +189,7 @@ impl Record {
         let half = ((0.016 / self.dt_s).ceil() as usize).max(2);
         let last = self.samples(piece) - 1;
         let (low, high) = (sample.saturating_sub(half), (sample + half).min(last));
-        let mut state = vec![0.0; 2 * m];
+        let mut state = vec![0.0; 2 * m + 1];
         for channel in 0..m {
             let points = (low..=high).map(|at| {
                 let time = (at as f64 - sample as f64) * self.dt_s;
@@ -206,6 +206,8 @@ impl Record {
             state[joint + 1] += state[joint];
             state[m + joint + 1] += state[m + joint];
         }
+        // A cart that moves bends its bristle.
+        state[2 * m] = libm::tanh(state[m] / (self.steps[0] / 0.016));
         state
     }
 

@@ -24,6 +24,8 @@ pub(super) struct Window {
     first: usize,
     samples: usize,
     state: Vec<f64>,
+    /// The bristle that is expected at the start, with a deviation of 1.
+    bristle: f64,
 }
 
 /// The fit of a record.
@@ -61,7 +63,8 @@ impl Shooting<'_> {
                 let samples = samples.min(self.record.samples(piece) - first);
                 if 2 * samples as u64 >= (seconds / self.record.dt_s) as u64 {
                     let state = self.record.state_near(p, self.model.layout, piece, first);
-                    windows.push(Window { piece, first, samples, state });
+                    let bristle = state[state.len() - 1];
+                    windows.push(Window { piece, first, samples, state, bristle });
                 }
             }
         }
@@ -143,6 +146,9 @@ impl Shooting<'_> {
             }
             reduced.states.solve(&mut move_by);
             window.state.iter_mut().zip(move_by).for_each(|(state, by)| *state += by);
+            if let Some(bristle) = window.state.last_mut() {
+                *bristle = bristle.clamp(-1.0, 1.0);
+            }
         }
         Some(trial)
     }
@@ -184,6 +190,10 @@ impl Shooting<'_> {
         (0..s).for_each(|i| by[i * columns + i] = 1.0);
         let mut next = by.clone();
         let mut row = vec![0.0; size];
+        row[s - 1] = 1.0;
+        let off = window.bristle - state[s - 1];
+        normal.add(&row, off, 1.0);
+        normal.cost += off * off;
         let y = &self.record.pieces[window.piece].y;
         for sample in window.first..window.first + window.samples {
             for channel in 0..m {
