@@ -14,6 +14,8 @@ use crate::parallel;
 pub(super) const WINDOW_S: f64 = 0.25;
 /// Factor of the damping after a step that failed, and after one that helped.
 const DAMPING: [f64; 2] = [10.0, 0.2];
+/// Shares of a step that are tried on the initial state of a window alone.
+const STEPS: [f64; 6] = [1.0, 0.5, 0.25, 0.1, 0.03, 0.01];
 /// A fit ends when a step lowers the cost by less than this share.
 const SETTLED: f64 = 1e-3;
 
@@ -81,7 +83,14 @@ impl Shooting<'_> {
             let floor = self.record.steps.iter().map(|step| 0.2 * step);
             let weights: Vec<f64> =
                 weights.iter().zip(floor).map(|(rms, floor)| rms.max(floor).powi(-2)).collect();
-            self.descend(&mut fit, &weights, iterations);
+            if self.free {
+                self.descend(&mut fit, &weights, iterations);
+            } else {
+                let windows = std::mem::take(&mut fit.windows);
+                fit.windows = parallel::map(&windows, |window| {
+                    self.descend_alone(p, window.clone(), &weights, iterations)
+                });
+            }
         }
         fit.rms = self.linearise(&fit, &vec![1.0; channels]).0.rms();
         fit
@@ -110,7 +119,7 @@ impl Shooting<'_> {
         let mut damping = 1e-3;
         let (mut normal, mut reduced) = self.linearise(fit, weights);
         for _ in 0..iterations {
-            let Some(trial) = self.stepped(fit, &normal, &reduced, damping) else {
+            let Some(trial) = self.stepped(fit, &normal, &reduced, damping, 1.0) else {
                 damping *= DAMPING[0];
                 continue;
             };
@@ -128,8 +137,36 @@ impl Shooting<'_> {
         }
     }
 
-    /// One damped step of parameters and initial states.
-    fn stepped(&self, fit: &Fit, normal: &Normal, reduced: &[Reduced], damping: f64) -> Option<Fit> {
+    /// Gauss–Newton on the initial state of one window. Each window has steps of its own: one that comes to no better state
+    /// holds up no other.
+    fn descend_alone(&self, p: &[f64], window: Window, weights: &[f64], iterations: usize) -> Window {
+        let mut fit = Fit { p: p.to_vec(), windows: vec![window], rms: Vec::new() };
+        let (mut normal, mut reduced) = self.linearise(&fit, weights);
+        for _ in 0..iterations {
+            let better = STEPS.iter().find_map(|share| {
+                let trial = self.stepped(&fit, &normal, &reduced, 0.0, *share)?;
+                let (other, other_reduced) = self.linearise(&trial, weights);
+                (other.cost < normal.cost).then_some((trial, other, other_reduced))
+            });
+            let Some((trial, other, other_reduced)) = better else { break };
+            let settled = normal.cost - other.cost < SETTLED * normal.cost;
+            (fit, normal, reduced) = (trial, other, other_reduced);
+            if settled {
+                break;
+            }
+        }
+        fit.windows.swap_remove(0)
+    }
+
+    /// One damped step of parameters, and `share` of that of the initial states.
+    fn stepped(
+        &self,
+        fit: &Fit,
+        normal: &Normal,
+        reduced: &[Reduced],
+        damping: f64,
+        share: f64,
+    ) -> Option<Fit> {
         let mut step = normal.gradient.clone();
         normal.factor(damping)?.solve(&mut step);
         let mut trial = fit.clone();
@@ -145,7 +182,7 @@ impl Shooting<'_> {
                 move_by.iter_mut().zip(column).for_each(|(to, of)| *to -= of * step);
             }
             reduced.states.solve(&mut move_by);
-            window.state.iter_mut().zip(move_by).for_each(|(state, by)| *state += by);
+            window.state.iter_mut().zip(move_by).for_each(|(state, by)| *state += share * by);
             if let Some(bristle) = window.state.last_mut() {
                 *bristle = bristle.clamp(-1.0, 1.0);
             }
@@ -278,5 +315,41 @@ fn propagate(step: &Step, by: &[f64], next: &mut [f64], s: usize, columns: usize
         for (factor, from) in local[..s].iter().zip(by.chunks_exact(columns)) {
             row.iter_mut().zip(from).for_each(|(row, from)| *row += factor * from);
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use super::super::chain_of;
+    use super::super::excite::shake;
+    use super::super::parameters::priors;
+    use super::*;
+    use crate::rig::Rig;
+
+    #[test]
+    fn a_window_that_comes_to_no_better_state_holds_up_no_other() {
+        let rig = Rig::from_path(Path::new("../../rigs/single-quanser-ip02.toml")).unwrap();
+        let chain = chain_of(&rig).unwrap();
+        let record = Record::of(&rig, &[shake(&rig, 5.0, 1).unwrap()], 1);
+        let (model, priors) = (record.model(chain.gravity_m_per_s2), priors(&rig, chain, false));
+        let p: Vec<f64> = priors.iter().map(|prior| prior.value).collect();
+        let shooting = Shooting { model: &model, record: &record, priors: &priors, free: false };
+        let mut windows = shooting.windows(&p, 0.5);
+        windows[2].state.fill(f64::NAN);
+        let weights: Vec<f64> = record.steps.iter().map(|step| step.powi(-2)).collect();
+        let cost = |window: &Window| {
+            let fit = Fit { p: p.clone(), windows: vec![window.clone()], rms: Vec::new() };
+            shooting.linearise(&fit, &weights).0.cost
+        };
+        let sum = |windows: &[Window]| windows[3..].iter().map(cost).sum::<f64>();
+        let alone: Vec<Window> =
+            windows.iter().map(|window| shooting.descend_alone(&p, window.clone(), &weights, 10)).collect();
+        assert!(sum(&alone) < 0.5 * sum(&windows), "{} {}", sum(&alone), sum(&windows));
+        // The negative control: a step of all of them at once.
+        let mut together = Fit { p: p.clone(), windows: windows.clone(), rms: Vec::new() };
+        shooting.descend(&mut together, &weights, 10);
+        assert!(sum(&together.windows) == sum(&windows));
     }
 }
