@@ -75,8 +75,20 @@ impl Shooting<'_> {
 
     /// Fits from `p`, with windows of `seconds`: at most `iterations` after each of `rounds` estimates of the weights.
     pub(super) fn fit(&self, p: &[f64], seconds: f64, iterations: usize, rounds: usize) -> Fit {
-        let mut fit =
-            Fit { p: p.to_vec(), windows: self.windows(p, seconds), rms: self.record.steps.clone() };
+        self.fit_windows(p, self.windows(p, seconds), iterations, rounds)
+    }
+
+    /// The same, with initial states that were fitted to `p` before: with few iterations, a bad one would spoil the whole fit.
+    pub(super) fn fit_settled(&self, p: &[f64], seconds: f64, iterations: usize, rounds: usize) -> Fit {
+        let weights: Vec<f64> = self.record.steps.iter().map(|step| step.powi(-2)).collect();
+        let windows = self.windows(p, seconds);
+        let alone = Shooting { free: false, ..*self };
+        let settle = |window: &Window| alone.descend_alone(p, window.clone(), &weights, iterations);
+        self.fit_windows(p, windows.iter().map(settle).collect(), iterations, rounds)
+    }
+
+    fn fit_windows(&self, p: &[f64], windows: Vec<Window>, iterations: usize, rounds: usize) -> Fit {
+        let mut fit = Fit { p: p.to_vec(), windows, rms: self.record.steps.clone() };
         let channels = self.record.channels;
         for _ in 0..rounds {
             let weights: Vec<f64> = self.linearise(&fit, &vec![1.0; channels]).0.rms();

@@ -123,7 +123,7 @@ pub(super) fn find(
     let score = |&wiring: &Wiring| {
         let record = undone(&short, wiring);
         let shooting = Shooting { model, record: &record, priors, free: true };
-        let fit = shooting.fit(&start, WINDOW_S, ITERATIONS, 1);
+        let fit = shooting.fit_settled(&start, WINDOW_S, ITERATIONS, 1);
         // Relative to the motion: a factor on the counts must not make residuals small.
         let of = |(channel, rms): (usize, &f64)| {
             libm::log(rms.max(0.2 * record.steps[channel]) / record.extent(channel)[1])
