@@ -33,13 +33,11 @@ pub(crate) struct Uncertified {
 impl Uncertified {
     /// The design at the first of the precisions that [`design`] compares.
     pub(crate) fn of(rig: &Rig) -> Result<Self, DesignError> {
-        with_precision(FIRST_BITS, || {
-            let design = Design::<Wide>::of(rig)?;
-            Ok(Self {
-                double: design.rounded(Wide::round_to_f64),
-                single: design.rounded(Wide::round_to_f32),
-            })
-        })
+        with_precision(FIRST_BITS, || Ok(Self::rounded(&Design::<Wide>::of(rig)?)))
+    }
+
+    fn rounded(design: &Design<Wide>) -> Self {
+        Self { double: design.rounded(Wide::round_to_f64), single: design.rounded(Wide::round_to_f32) }
     }
 
     /// This design with the law `law` of `other`, a design for the same plant.
@@ -65,18 +63,18 @@ impl<T: Clone> Laws<T> {
 /// The first precision (bits).
 const FIRST_BITS: usize = 256;
 
-type Attempt = Result<Certified, DesignError>;
+/// A design at one precision and its poles.
+type Attempt = Result<(Uncertified, DesignPoles), DesignError>;
 
 fn attempt(rig: &Rig, bits: usize) -> Attempt {
     with_precision(bits, || {
         let design = Design::<Wide>::of(rig)?;
-        Ok(Certified {
-            double: design.rounded(Wide::round_to_f64),
-            single: design.rounded(Wide::round_to_f32),
-            poles: design.poles(rig)?,
-            bits: [bits / 2, bits],
-        })
+        Ok((Uncertified::rounded(&design), design.poles(rig)?))
     })
+}
+
+fn certified((design, poles): (Uncertified, DesignPoles), bits: usize) -> Certified {
+    Certified { double: design.double, single: design.single, poles, bits: [bits / 2, bits] }
 }
 
 /// Designs what `rig` asks for and certifies it.
@@ -90,28 +88,28 @@ fn attempt(rig: &Rig, bits: usize) -> Attempt {
 #[doc(alias = "kalman")]
 pub fn design(rig: &Rig) -> Result<Certified, DesignError> {
     let (first, second) = std::thread::scope(|scope| {
-        let first = scope.spawn(|| attempt(rig, FIRST_BITS));
+        let first = scope.spawn(|| Uncertified::of(rig));
         let second = attempt(rig, 2 * FIRST_BITS);
         (first.join(), second)
     });
     let first = first.unwrap_or_else(|panic| std::panic::resume_unwind(panic));
     if agree(&first, &second) {
-        return second;
+        return second.map(|second| certified(second, 2 * FIRST_BITS));
     }
     let mut before = second;
     for bits in [1024, 2048, 4096] {
         let after = attempt(rig, bits);
-        if agree(&before, &after) {
-            return after;
+        if agree(&before.map(|(design, _)| design), &after) {
+            return after.map(|after| certified(after, bits));
         }
         before = after;
     }
     Err(before.err().unwrap_or(DesignError::Disagreement(2048, 4096)))
 }
 
-fn agree(low: &Attempt, high: &Attempt) -> bool {
+fn agree(low: &Result<Uncertified, DesignError>, high: &Attempt) -> bool {
     match (low, high) {
-        (Ok(low), Ok(high)) => low.double == high.double && low.single == high.single,
+        (Ok(low), Ok((high, _))) => low == high,
         // A failure to resolve the problem is no agreement: more bits may help.
         (_, Err(DesignError::Unresolved { .. } | DesignError::NoKalman { .. })) => false,
         (Err(low), Err(high)) => core::mem::discriminant(low) == core::mem::discriminant(high),
