@@ -95,7 +95,7 @@ impl Desk {
             match event {
                 Event::Came => {
                     self.was_seen = true;
-                    self.viewers.tell(viewer, &json!({ "hello": self.greeting, "you": viewer }).to_string());
+                    self.viewers.greet(viewer, &json!({ "hello": self.greeting, "you": viewer }).to_string());
                     self.take_command(viewer);
                 }
                 Event::Went if commands => self.commander = None,

@@ -46,10 +46,17 @@ pub(super) struct Viewers {
 }
 
 struct Connected {
-    outlets: BTreeMap<Id, SyncSender<Utf8Bytes>>,
+    outlets: BTreeMap<Id, Outlet>,
     next: Id,
     events: Sender<(Id, Event)>,
     waiting: Arc<Mutex<BTreeMap<Id, usize>>>,
+}
+
+/// Where what is sent to a viewer goes.
+struct Outlet {
+    sender: SyncSender<Utf8Bytes>,
+    /// A page can make nothing of a picture that comes before the greeting.
+    is_greeted: bool,
 }
 
 impl Viewers {
@@ -77,19 +84,28 @@ impl Viewers {
         self.locked().outlets.is_empty()
     }
 
+    /// Sends the first message to a viewer.
+    pub(super) fn greet(&self, viewer: Id, text: &str) {
+        if let Some(outlet) = self.locked().outlets.get_mut(&viewer) {
+            outlet.is_greeted = true;
+            // Nothing else waits there yet, so it has room.
+            let _ = outlet.sender.try_send(Utf8Bytes::from(text));
+        }
+    }
+
     /// Sends to one viewer.
     pub(super) fn tell(&self, viewer: Id, text: &str) {
         if let Some(outlet) = self.locked().outlets.get(&viewer) {
             // A viewer that is so far behind misses it.
-            let _ = outlet.try_send(Utf8Bytes::from(text));
+            let _ = outlet.sender.try_send(Utf8Bytes::from(text));
         }
     }
 
-    /// Sends to all.
+    /// Sends to all who have been greeted.
     pub(super) fn tell_all(&self, text: String) {
         let text = Utf8Bytes::from(text);
-        for outlet in self.locked().outlets.values() {
-            match outlet.try_send(text.clone()) {
+        for outlet in self.locked().outlets.values().filter(|outlet| outlet.is_greeted) {
+            match outlet.sender.try_send(text.clone()) {
                 // A slow viewer misses pictures; a gone one is removed by its own thread.
                 Ok(()) | Err(TrySendError::Full(_) | TrySendError::Disconnected(_)) => {}
             }
@@ -98,12 +114,12 @@ impl Viewers {
 
     /// Serves one viewer until the connection ends.
     pub(super) fn serve(&self, stream: TcpStream) {
-        let (outlet, pictures) = sync_channel(PICTURES);
+        let (sender, pictures) = sync_channel(PICTURES);
         let (id, events, waiting) = {
             let mut connected = self.locked();
             let id = connected.next;
             connected.next += 1;
-            connected.outlets.insert(id, outlet);
+            connected.outlets.insert(id, Outlet { sender, is_greeted: false });
             (id, connected.events.clone(), Arc::clone(&connected.waiting))
         };
         let _ = events.send((id, Event::Came));
@@ -172,5 +188,32 @@ fn converse(
             socket.write(Message::Text(picture))?;
         }
         socket.flush()?;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::net::TcpListener;
+
+    use super::*;
+
+    #[test]
+    fn no_picture_comes_before_the_greeting() {
+        let (viewers, inbox) = Viewers::new();
+        let listener = TcpListener::bind("127.0.0.1:0").unwrap();
+        let page = TcpStream::connect(listener.local_addr().unwrap()).unwrap();
+        let serving = viewers.clone();
+        std::thread::spawn(move || serving.serve(listener.accept().unwrap().0));
+        let viewer = loop {
+            if let Some((viewer, Event::Came)) = inbox.next() {
+                break viewer;
+            }
+        };
+        viewers.tell_all("too early".to_owned());
+        viewers.greet(viewer, "greeting");
+        viewers.tell_all("picture".to_owned());
+        let mut page = WebSocket::from_raw_socket(page, Role::Client, None);
+        let mut read = || page.read().unwrap().into_text().unwrap().to_string();
+        assert_eq!([read(), read()], ["greeting", "picture"]);
     }
 }
