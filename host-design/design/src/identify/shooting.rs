@@ -78,13 +78,13 @@ impl Shooting<'_> {
         self.fit_windows(p, self.windows(p, seconds), iterations, rounds)
     }
 
-    /// The same, with initial states that were fitted to `p` before: with few iterations, a bad one would spoil the whole fit.
+    /// The same, with initial states that were fitted to `p` before: with few iterations, a bad one would spoil the
+    /// whole fit.
     pub(super) fn fit_settled(&self, p: &[f64], seconds: f64, iterations: usize, rounds: usize) -> Fit {
         let weights: Vec<f64> = self.record.steps.iter().map(|step| step.powi(-2)).collect();
-        let windows = self.windows(p, seconds);
         let alone = Shooting { free: false, ..*self };
-        let settle = |window: &Window| alone.descend_alone(p, window.clone(), &weights, iterations);
-        self.fit_windows(p, windows.iter().map(settle).collect(), iterations, rounds)
+        let windows = alone.settled(p, &self.windows(p, seconds), &weights, iterations);
+        self.fit_windows(p, windows, iterations, rounds)
     }
 
     fn fit_windows(&self, p: &[f64], windows: Vec<Window>, iterations: usize, rounds: usize) -> Fit {
@@ -98,10 +98,7 @@ impl Shooting<'_> {
             if self.free {
                 self.descend(&mut fit, &weights, iterations);
             } else {
-                let windows = std::mem::take(&mut fit.windows);
-                fit.windows = parallel::map(&windows, |window| {
-                    self.descend_alone(p, window.clone(), &weights, iterations)
-                });
+                fit.windows = self.settled(p, &fit.windows, &weights, iterations);
             }
         }
         fit.rms = self.linearise(&fit, &vec![1.0; channels]).0.rms();
@@ -149,15 +146,22 @@ impl Shooting<'_> {
         }
     }
 
-    /// Gauss–Newton on the initial state of one window. Each window has steps of its own: one that comes to no better state
+    /// Gauss–Newton on the initial states alone. Each window has steps of its own: one that comes to no better state
     /// holds up no other.
-    fn descend_alone(&self, p: &[f64], window: Window, weights: &[f64], iterations: usize) -> Window {
-        let mut fit = Fit { p: p.to_vec(), windows: vec![window], rms: Vec::new() };
-        let (mut normal, mut reduced) = self.linearise(&fit, weights);
+    fn settled(&self, p: &[f64], windows: &[Window], weights: &[f64], iterations: usize) -> Vec<Window> {
+        let inputs = self.inputs(p);
+        parallel::map(windows, |window| {
+            let fit = Fit { p: p.to_vec(), windows: vec![window.clone()], rms: Vec::new() };
+            self.descend_alone(&inputs, fit, weights, iterations).windows.swap_remove(0)
+        })
+    }
+
+    fn descend_alone(&self, inputs: &[Vec<Input>], mut fit: Fit, weights: &[f64], iterations: usize) -> Fit {
+        let (mut normal, mut reduced) = self.linearise_with(inputs, &fit, weights);
         for _ in 0..iterations {
             let better = STEPS.iter().find_map(|share| {
                 let trial = self.stepped(&fit, &normal, &reduced, 0.0, *share)?;
-                let (other, other_reduced) = self.linearise(&trial, weights);
+                let (other, other_reduced) = self.linearise_with(inputs, &trial, weights);
                 (other.cost < normal.cost).then_some((trial, other, other_reduced))
             });
             let Some((trial, other, other_reduced)) = better else { break };
@@ -167,7 +171,7 @@ impl Shooting<'_> {
                 break;
             }
         }
-        fit.windows.swap_remove(0)
+        fit
     }
 
     /// One damped step of parameters, and `share` of that of the initial states.
@@ -204,14 +208,22 @@ impl Shooting<'_> {
 
     /// The reduced normal equations of all windows, with the prior.
     fn linearise(&self, fit: &Fit, weights: &[f64]) -> (Normal, Vec<Reduced>) {
-        let layout = self.model.layout;
-        let inputs: Vec<Vec<Input>> =
-            (0..self.record.pieces.len()).map(|piece| self.record.inputs(layout, &fit.p, piece)).collect();
+        self.linearise_with(&self.inputs(&fit.p), fit, weights)
+    }
+
+    /// The inputs of all pieces.
+    fn inputs(&self, p: &[f64]) -> Vec<Vec<Input>> {
+        let pieces = 0..self.record.pieces.len();
+        pieces.map(|piece| self.record.inputs(self.model.layout, p, piece)).collect()
+    }
+
+    /// [`Self::linearise`] with `inputs` that are known: with the same parameters they are the same.
+    fn linearise_with(&self, inputs: &[Vec<Input>], fit: &Fit, weights: &[f64]) -> (Normal, Vec<Reduced>) {
         let each = parallel::map(&fit.windows, |window| {
             let whole = self.window(&fit.p, &inputs[window.piece], window, weights);
             self.reduce(whole)
         });
-        let size = if self.free { layout.count() } else { 0 };
+        let size = if self.free { self.model.layout.count() } else { 0 };
         let mut sum = Normal::new(size, self.record.channels);
         let mut kept = Vec::with_capacity(each.len());
         for (normal, reduced) in each {
@@ -356,8 +368,7 @@ mod tests {
             shooting.linearise(&fit, &weights).0.cost
         };
         let sum = |windows: &[Window]| windows[3..].iter().map(cost).sum::<f64>();
-        let alone: Vec<Window> =
-            windows.iter().map(|window| shooting.descend_alone(&p, window.clone(), &weights, 10)).collect();
+        let alone = shooting.settled(&p, &windows, &weights, 10);
         assert!(sum(&alone) < 0.5 * sum(&windows), "{} {}", sum(&alone), sum(&windows));
         // The negative control: a step of all of them at once.
         let mut together = Fit { p: p.clone(), windows: windows.clone(), rms: Vec::new() };

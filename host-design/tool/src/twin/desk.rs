@@ -32,7 +32,6 @@ pub(super) struct Desk {
     pub(super) monitor: Monitor,
     viewers: Viewers,
     inbox: Inbox,
-    greeting: Value,
     commander: Option<Id>,
     last_heard: Instant,
     /// Whether anyone has ever looked.
@@ -43,18 +42,12 @@ pub(super) struct Desk {
 }
 
 impl Desk {
-    /// A desk with a new conversation. `greeting` is what every viewer is told first.
-    pub(super) fn new(
-        monitor: Monitor,
-        (viewers, inbox): (Viewers, Inbox),
-        recording: Recording,
-        greeting: Value,
-    ) -> Self {
+    /// A desk with a new conversation.
+    pub(super) fn new(monitor: Monitor, (viewers, inbox): (Viewers, Inbox), recording: Recording) -> Self {
         Self {
             monitor,
             viewers,
             inbox,
-            greeting,
             commander: None,
             last_heard: Instant::now(),
             was_seen: false,
@@ -95,7 +88,6 @@ impl Desk {
             match event {
                 Event::Came => {
                     self.was_seen = true;
-                    self.viewers.greet(viewer, &json!({ "hello": self.greeting, "you": viewer }).to_string());
                     self.take_command(viewer);
                 }
                 Event::Went if commands => self.commander = None,

@@ -52,7 +52,6 @@ impl From<EmulatorError> for TwinError {
 pub struct Server {
     listener: TcpListener,
     secret: String,
-    viewers: (Viewers, super::viewers::Inbox),
     recording: Recording,
 }
 
@@ -63,12 +62,7 @@ impl Server {
     /// If the address cannot be listened at.
     pub fn listen(address: SocketAddr) -> std::io::Result<Self> {
         let secret = format!("{:032x}", rand::random::<u128>());
-        Ok(Self {
-            listener: TcpListener::bind(address)?,
-            secret,
-            viewers: Viewers::new(),
-            recording: Recording::default(),
-        })
+        Ok(Self { listener: TcpListener::bind(address)?, secret, recording: Recording::default() })
     }
 
     /// The address of the page, with its secret.
@@ -101,15 +95,14 @@ impl Server {
     ) -> Result<(), TwinError> {
         let defects: Vec<Kind> =
             kinds(table, place).into_iter().filter(|kind| kind.can_begin_while_balancing()).collect();
-        let greeting = greeting(rig, table, place.name(), Some(&defects));
-        let (viewers, inbox) = self.viewers;
+        let (viewers, inbox) = Viewers::new(greeting(rig, table, place.name(), Some(&defects)));
         let _accepting = accepting(self.listener, self.secret, viewers.clone(), Arc::clone(&self.recording))?;
         let monitor = || match place {
             // As much as its serial line carries.
             Place::Board { .. } => Monitor::new(&rig.name),
             _ => Monitor::with_telemetry_every(TELEMETRY_S, &rig.name),
         };
-        let mut desk = Desk::new(monitor(), (viewers, inbox), self.recording, greeting);
+        let mut desk = Desk::new(monitor(), (viewers, inbox), self.recording);
         let machine = Machine { rig, table, scenario };
         let mut properties = Properties::of(rig);
         let mut upright = upright;
@@ -143,10 +136,9 @@ impl Server {
         name: &str,
         goes_on: &dyn Fn() -> bool,
     ) -> Result<(), TwinError> {
-        let greeting = greeting(rig, table, name, None);
-        let (viewers, inbox) = self.viewers;
+        let (viewers, inbox) = Viewers::new(greeting(rig, table, name, None));
         let _accepting = accepting(self.listener, self.secret, viewers.clone(), Arc::clone(&self.recording))?;
-        let mut desk = Desk::new(Monitor::new(name), (viewers, inbox), self.recording, greeting);
+        let mut desk = Desk::new(Monitor::new(name), (viewers, inbox), self.recording);
         connected::run(line, &mut desk, rig.hash(), goes_on);
         Ok(())
     }

@@ -7,6 +7,7 @@ use std::sync::mpsc::{Receiver, Sender, SyncSender, TrySendError, channel, sync_
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
 
+use serde_json::{Value, json};
 use tungstenite::protocol::{Role, WebSocketConfig};
 use tungstenite::{Error, Message, Utf8Bytes, WebSocket};
 
@@ -42,31 +43,26 @@ pub(super) enum Event {
 /// All connections.
 #[derive(Clone)]
 pub(super) struct Viewers {
+    greeting: Arc<Value>,
     connected: Arc<Mutex<Connected>>,
 }
 
 struct Connected {
-    outlets: BTreeMap<Id, Outlet>,
+    outlets: BTreeMap<Id, SyncSender<Utf8Bytes>>,
     next: Id,
     events: Sender<(Id, Event)>,
     waiting: Arc<Mutex<BTreeMap<Id, usize>>>,
 }
 
-/// Where what is sent to a viewer goes.
-struct Outlet {
-    sender: SyncSender<Utf8Bytes>,
-    /// A page can make nothing of a picture that comes before the greeting.
-    is_greeted: bool,
-}
-
 impl Viewers {
-    /// Nobody, and what they will do.
-    pub(super) fn new() -> (Self, Inbox) {
+    /// Nobody, and what they will do. `greeting` is what every viewer is told first.
+    pub(super) fn new(greeting: Value) -> (Self, Inbox) {
         let (events, receiver) = channel();
         let waiting = Arc::default();
         let connected =
             Connected { outlets: BTreeMap::new(), next: 1, events, waiting: Arc::clone(&waiting) };
-        (Self { connected: Arc::new(Mutex::new(connected)) }, Inbox { events: receiver, waiting })
+        let viewers = Self { greeting: Arc::new(greeting), connected: Arc::new(Mutex::new(connected)) };
+        (viewers, Inbox { events: receiver, waiting })
     }
 
     fn locked(&self) -> std::sync::MutexGuard<'_, Connected> {
@@ -84,28 +80,19 @@ impl Viewers {
         self.locked().outlets.is_empty()
     }
 
-    /// Sends the first message to a viewer.
-    pub(super) fn greet(&self, viewer: Id, text: &str) {
-        if let Some(outlet) = self.locked().outlets.get_mut(&viewer) {
-            outlet.is_greeted = true;
-            // Nothing else waits there yet, so it has room.
-            let _ = outlet.sender.try_send(Utf8Bytes::from(text));
-        }
-    }
-
     /// Sends to one viewer.
     pub(super) fn tell(&self, viewer: Id, text: &str) {
         if let Some(outlet) = self.locked().outlets.get(&viewer) {
             // A viewer that is so far behind misses it.
-            let _ = outlet.sender.try_send(Utf8Bytes::from(text));
+            let _ = outlet.try_send(Utf8Bytes::from(text));
         }
     }
 
-    /// Sends to all who have been greeted.
+    /// Sends to all.
     pub(super) fn tell_all(&self, text: String) {
         let text = Utf8Bytes::from(text);
-        for outlet in self.locked().outlets.values().filter(|outlet| outlet.is_greeted) {
-            match outlet.sender.try_send(text.clone()) {
+        for outlet in self.locked().outlets.values() {
+            match outlet.try_send(text.clone()) {
                 // A slow viewer misses pictures; a gone one is removed by its own thread.
                 Ok(()) | Err(TrySendError::Full(_) | TrySendError::Disconnected(_)) => {}
             }
@@ -114,12 +101,15 @@ impl Viewers {
 
     /// Serves one viewer until the connection ends.
     pub(super) fn serve(&self, stream: TcpStream) {
-        let (sender, pictures) = sync_channel(PICTURES);
+        let (outlet, pictures) = sync_channel(PICTURES);
         let (id, events, waiting) = {
             let mut connected = self.locked();
             let id = connected.next;
             connected.next += 1;
-            connected.outlets.insert(id, Outlet { sender, is_greeted: false });
+            let hello = json!({ "hello": *self.greeting, "you": id }).to_string();
+            // A page can make nothing of a picture that comes before it. There is room: nothing else is sent yet.
+            let _ = outlet.try_send(Utf8Bytes::from(hello));
+            connected.outlets.insert(id, outlet);
             (id, connected.events.clone(), Arc::clone(&connected.waiting))
         };
         let _ = events.send((id, Event::Came));
@@ -199,21 +189,19 @@ mod tests {
 
     #[test]
     fn no_picture_comes_before_the_greeting() {
-        let (viewers, inbox) = Viewers::new();
+        let (viewers, inbox) = Viewers::new(json!("greeting"));
         let listener = TcpListener::bind("127.0.0.1:0").unwrap();
         let page = TcpStream::connect(listener.local_addr().unwrap()).unwrap();
         let serving = viewers.clone();
         std::thread::spawn(move || serving.serve(listener.accept().unwrap().0));
-        let viewer = loop {
-            if let Some((viewer, Event::Came)) = inbox.next() {
-                break viewer;
-            }
-        };
-        viewers.tell_all("too early".to_owned());
-        viewers.greet(viewer, "greeting");
+        while viewers.is_empty() {
+            std::thread::yield_now();
+        }
         viewers.tell_all("picture".to_owned());
         let mut page = WebSocket::from_raw_socket(page, Role::Client, None);
         let mut read = || page.read().unwrap().into_text().unwrap().to_string();
-        assert_eq!([read(), read()], ["greeting", "picture"]);
+        let hello = json!({ "hello": "greeting", "you": 1 }).to_string();
+        assert_eq!([read(), read()], [hello.as_str(), "picture"]);
+        assert!(matches!(inbox.next(), Some((1, Event::Came))));
     }
 }
