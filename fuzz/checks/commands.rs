@@ -23,7 +23,7 @@ mod invariants;
 mod simulated_rig;
 
 /// A run ends after this many ticks at the latest.
-const MOST_TICKS: u32 = 48;
+const MOST_TICKS: u32 = 32;
 
 /// Runs what `bytes` spell.
 ///
@@ -121,10 +121,10 @@ impl Run<'_> {
             }
             24 => (0..next() % 32).for_each(|_| self.tick()),
             25 | 31 => {
-                // Coverage does not lead to a single value of 16 bits. So every input tries 32 values of its own,
+                // Coverage does not lead to a single value of 16 bits. So every input tries 16 values of its own,
                 // which its hash chooses: mutations alone prefer few values.
-                let first = self.hash & !31;
-                for period_ticks in first..=first | 31 {
+                let first = self.hash & !15;
+                for period_ticks in first..=first | 15 {
                     self.send(Request::Telemetry(period_ticks));
                     self.tick();
                 }

@@ -2,9 +2,11 @@
 
 use std::fs::File;
 use std::path::{Path, PathBuf};
+use std::time::SystemTime;
 
 use super::board::Board;
 use super::compiler::{Compiler, compiler, target_directory};
+use super::kept;
 use crate::project::{NoCheckout, checkout};
 use upright::gains::SENSORS;
 use upright_design::rig::Rig;
@@ -163,7 +165,7 @@ fn one_at_a_time() -> Result<File, ImageError> {
 fn compile(kind: Kind, gains: Option<&Path>, name: &str) -> Result<PathBuf, ImageError> {
     let root = checkout()?;
     let _others_wait = one_at_a_time()?;
-    let Compiler { program, mut cargo, target_directory } = compiler()?;
+    let Compiler { program, version, mut cargo, target_directory } = compiler()?;
     let features = match gains {
         Some(gains) => {
             cargo.env("UPRIGHT_GAINS", gains);
@@ -179,15 +181,22 @@ fn compile(kind: Kind, gains: Option<&Path>, name: &str) -> Result<PathBuf, Imag
         // The image alone, not the library: there is the part of a tick that has to be fast.
         cargo.args(["--", "-C", "opt-level=s"]);
     }
+    let image = images()?.join(format!("{name}.elf"));
+    if kept::is_current(&image, &cargo, &version) {
+        return Ok(image);
+    }
+    kept::forget(&image);
+    let begin = SystemTime::now();
     let output = cargo.output().map_err(|source| ImageError::Start(program, source))?;
     if !output.status.success() {
         return Err(ImageError::Compiler(String::from_utf8_lossy(&output.stderr).into_owned()));
     }
     let built = target_directory.join(TARGET).join(PROFILE).join("upright-image");
-    let directory = images()?;
-    let image = directory.join(format!("{name}.elf"));
+    let list = built.with_extension("d");
     let elf = std::fs::read(&built).map_err(|source| ImageError::File { path: built, source })?;
     write_atomically(&image, &elf)?;
+    kept::keep(&image, &cargo, &version, begin, &list, &root)
+        .map_err(|source| ImageError::File { path: list, source })?;
     Ok(image)
 }
 

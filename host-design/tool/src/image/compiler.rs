@@ -15,6 +15,8 @@ const DEBIAN_RUSTC: &str = "/usr/bin/rustc";
 pub struct Compiler {
     /// Name of the program, for messages.
     pub program: &'static str,
+    /// What `rustc -vV` says.
+    pub version: String,
     /// The call so far: its arguments begin with the command, such as `build`. Nothing of an outer cargo's environment
     /// is left in it.
     pub cargo: Command,
@@ -29,13 +31,23 @@ pub struct Compiler {
 pub fn compiler() -> Result<Compiler, ImageError> {
     let target_directory = target_directory()?;
     let mut compiler = if rustup_has_the_target() {
-        Compiler { program: "cargo", cargo: Command::new("cargo"), target_directory }
+        Compiler {
+            program: "cargo",
+            version: version("rustc"),
+            cargo: Command::new("cargo"),
+            target_directory,
+        }
     } else if debian_has_a_compiler() {
         let mut cargo = Command::new(DEBIAN_CARGO);
         cargo.env("RUSTC_BOOTSTRAP", "1").env("RUSTC", DEBIAN_RUSTC).arg("-Zbuild-std=core");
         cargo.env("CARGO_TARGET_THUMBV7EM_NONE_EABIHF_LINKER", "ld.lld");
         // Two compilers cannot share a directory.
-        Compiler { program: DEBIAN_CARGO, cargo, target_directory: target_directory.join("debian") }
+        Compiler {
+            program: DEBIAN_CARGO,
+            version: version(DEBIAN_RUSTC),
+            cargo,
+            target_directory: target_directory.join("debian"),
+        }
     } else {
         return Err(ImageError::NoCompiler);
     };
@@ -58,6 +70,11 @@ pub(super) fn target_directory() -> Result<PathBuf, ImageError> {
         None => checkout()?.join("target"),
     };
     Ok(base.join("firmware"))
+}
+
+fn version(rustc: &str) -> String {
+    let output = Command::new(rustc).arg("-vV").output();
+    output.map(|output| String::from_utf8_lossy(&output.stdout).into_owned()).unwrap_or_default()
 }
 
 fn rustup_has_the_target() -> bool {

@@ -6,6 +6,7 @@ mod checksum;
 mod compiler;
 mod elf;
 mod forbidden;
+mod kept;
 mod size;
 mod stack;
 mod thumb;
