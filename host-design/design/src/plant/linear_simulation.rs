@@ -85,11 +85,11 @@ impl Plant for LinearSimulation {
         rate.copy_from_slice(sum.entries());
     }
 
-    /// Exact to rounding with any number of substeps: with the input held,
+    /// Exact to rounding without substeps: with the input held,
     /// `x(t + h) = x + Σ_{i>=1} h^i / i! A^(i-1) (A x + B u)`, summed over pieces with `‖A‖ h <= 1`.
-    fn advance(&mut self, force: f64, disturbances: &[f64], dt: f64, substeps: usize) {
+    fn advance(&mut self, force: f64, disturbances: &[f64], dt: f64, _substeps: usize) {
         let drive = self.drive(force, disturbances);
-        let pieces = (self.a.norm() * dt.abs()).ceil().max(substeps as f64).max(1.0);
+        let pieces = (self.a.norm() * dt.abs()).ceil().max(1.0);
         let h = dt / pieces;
         let mut term = vec![0.0; self.state.len()];
         let mut product = term.clone();
