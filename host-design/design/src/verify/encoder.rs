@@ -4,7 +4,7 @@ use serde::Serialize;
 use upright::table::Law;
 
 use super::trial::{Disturbance, Horizon, Unverifiable, chain, edge, scenario, trial, within};
-use crate::design::design;
+use crate::design::{Certified, DesignError, design};
 use crate::parallel;
 use crate::rig::{LinkEncoder, PlantDescription, Rig};
 use crate::simulate::{Scenario, SimulationError};
@@ -76,8 +76,18 @@ pub fn coarser(rig: &Rig, factor: f64) -> Rig {
     coarse
 }
 
-/// Finds the coarsest encoders by doubling and bisection of a common factor. The gains are redesigned for every
-/// factor, as a user with such encoders would do: the observer knows their resolution.
+/// `own`, with the observer for `rig`, which differs from the rig of `own` in its encoders alone.
+fn with_observer_of(own: &Certified, rig: &Rig) -> Result<Certified, DesignError> {
+    let observer = design(&Rig { lqr: None, pole_placement: None, integral: None, ..rig.clone() })?;
+    let mut found = own.clone();
+    found.double.kalman = observer.double.kalman;
+    found.single.kalman = observer.single.kalman;
+    found.bits = own.bits.max(observer.bits);
+    Ok(found)
+}
+
+/// Finds the coarsest encoders by doubling and bisection of a common factor. The observer is redesigned for every
+/// factor, as a user with such encoders would do: it knows their resolution. The law does not depend on it.
 ///
 /// # Errors
 /// [`Unverifiable`] for a model or a rig without observer, and if a design or run fails.
@@ -87,13 +97,14 @@ pub fn coarsest_encoder(
     settings: &EncoderSettings,
 ) -> Result<CoarsestEncoder, Unverifiable> {
     chain(rig, "encoders")?;
-    // The gains of the other law, which is not run, would be redesigned for nothing.
+    // The gains of the other law, which is not run, would be designed for nothing.
     let rig = &rig.with_law_alone(law);
+    let own = design(rig)?;
     within("largest_factor", settings.largest_factor, 1.0..=1e6, "a factor from 1 to 1e6")?;
     within("relative", settings.relative, 1e-3..=1.0, "a width from 0.001 to 1")?;
     let found = edge([1.0, settings.largest_factor], settings.relative, |factor| {
         let coarse = coarser(rig, factor);
-        let table = TableValues::of(&coarse, &design(&coarse)?, Gains::Sampled)?;
+        let table = TableValues::of(&coarse, &with_observer_of(&own, &coarse)?, Gains::Sampled)?;
         if table.observer.is_none() {
             return Err(Unverifiable::NoObserver);
         }
@@ -126,4 +137,20 @@ pub fn coarsest_encoder(
             })
             .collect(),
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use super::*;
+
+    #[test]
+    fn the_design_for_coarser_encoders_differs_in_its_observer_alone() {
+        let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../rigs/triple-glueck-eder-kugi.toml");
+        let rig = Rig::from_path(&file).unwrap();
+        let (own, coarse) = (design(&rig).unwrap(), coarser(&rig, 7.0));
+        let (whole, found) = (design(&coarse).unwrap(), with_observer_of(&own, &coarse).unwrap());
+        assert!(found == whole && found.double.kalman != own.double.kalman);
+    }
 }

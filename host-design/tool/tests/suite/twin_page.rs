@@ -3,10 +3,16 @@
 //! Needs Chromium or Chrome. Without one the tests say so and pass, unless `UPRIGHT_REQUIRE_BROWSER=1` is set.
 
 use std::io::{BufRead, BufReader};
+use std::path::Path;
 use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
 
 use serde_json::Value;
+use upright::table::Law;
+use upright_design::design::design;
+use upright_design::rig::Rig;
+use upright_design::table::{Gains, TableValues};
+use upright_design::verify::linear;
 
 use crate::report_devtools::Browser;
 
@@ -196,14 +202,11 @@ fn until_done(browser: &mut Browser, key: &str, expression: &str) {
 #[test]
 fn a_weaker_motor_topples_the_rig_at_the_gain_margin_that_verify_gives() {
     let Some(mut browser) = browser() else { return };
-    let rig = format!("{}/../../rigs/quadruple-paper.toml", env!("CARGO_MANIFEST_DIR"));
-    let verified = Command::new(env!("CARGO_BIN_EXE_upright"))
-        .args(["verify", &rig, "--law", "lqr", "--runs", "1"])
-        .output()
-        .unwrap();
-    let verified = String::from_utf8(verified.stdout).unwrap();
-    let row = verified.lines().find(|line| line.trim().starts_with("gain margin")).unwrap();
-    let margin: f64 = row.split_whitespace().nth(3).unwrap().parse().unwrap();
+    let file = format!("{}/../../rigs/quadruple-paper.toml", env!("CARGO_MANIFEST_DIR"));
+    let rig = Rig::from_path(Path::new(&file)).unwrap().with_law_alone(Law::Lqr);
+    let certified = design(&rig).unwrap();
+    let table = TableValues::of(&rig, &certified, Gains::Sampled).unwrap();
+    let margin = linear(&rig, &certified, &table).unwrap()[0].margins.as_ref().unwrap().lowest_gain;
     let twin = Twin::start("quadruple-paper", &[]);
     browser.open_address(&twin.address, 1280, "light", "screen");
     until_state(&mut browser, "Balancing");
@@ -253,7 +256,7 @@ fn the_page_records_draws_its_scopes_and_fits_on_a_telephone() {
 fn a_minute_of_running_needs_no_more_memory() {
     let Some(mut browser) = browser() else { return };
     let twin = Twin::start("quadruple-paper", &[]);
-    browser.open_address(&twin.address, 1280, "light", "screen");
+    browser.open_address(&twin.address, 640, "light", "screen");
     until_state(&mut browser, "Balancing");
     wait(10.0);
     let heap = |browser: &mut Browser| {
