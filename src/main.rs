@@ -36,7 +36,7 @@ mod app {
     use upright::gains::{RIG_HASH, SENSORS, STATES, SWING_UP, SwingUp, TABLE, TICK_S};
     use upright::protocol::message::{Command, Message};
     use upright::protocol::serial_link::SerialLink;
-    use upright::table::Build;
+    use upright::table::{Build, GainTable};
 
     use crate::board::{Buffer, Hardware, SerialLine, set_up};
 
@@ -54,12 +54,15 @@ mod app {
         commands: Queue<Command, COMMANDS> = Queue::new(),
         messages: Queue<Message<STATES, SENSORS>, MESSAGES> = Queue::new(),
         buffer: Buffer = Buffer::new(),
+        // In RAM, where every word is there at once: in flash, many cost five wait states.
+        table: GainTable<STATES, SENSORS> = TABLE,
     ])]
     fn init(cx: init::Context) -> (Shared, Local) {
         let build = Build { rig_hash: RIG_HASH, tick_s: TICK_S };
+        let table = &*cx.local.table;
         let (hardware, line, firmware) = set_up(cx.device, cx.local.buffer, |start| {
-            Firmware::with_swing_up(&TABLE, &SWING_UP, &build, Hardware::WIDTHS, start)
-                .unwrap_or_else(|_| Firmware::unusable(&TABLE, &SWING_UP, Hardware::WIDTHS, start))
+            Firmware::with_swing_up(table, &SWING_UP, &build, Hardware::WIDTHS, start)
+                .unwrap_or_else(|_| Firmware::unusable(table, &SWING_UP, Hardware::WIDTHS, start))
         });
         let (to_control, commands) = cx.local.commands.split();
         let (messages, to_link) = cx.local.messages.split();
@@ -89,7 +92,7 @@ mod app {
             {
                 cx.local.line.write(frame);
             }
-            cortex_m::asm::wfi();
+            crate::board::wait_for_interrupt();
         }
     }
 }

@@ -23,6 +23,8 @@ pub struct Controller<'t, const NX: usize, const NY: usize, T: Scalar = f32> {
     gains: &'t LawGains<NX, T>,
     /// Whether the force depends on earlier ticks, through a pending force or an integral.
     has_memory: bool,
+    /// Whether neither such memory nor known friction has to be looked for in a tick.
+    is_plain: bool,
     mode: Mode<'t, NX, NY, T>,
     /// The mode of a started controller. What the observer finds out about its gains is too slow for a tick.
     started: Mode<'t, NX, NY, T>,
@@ -137,6 +139,7 @@ impl<'t, const NX: usize, const NY: usize, T: Scalar> Controller<'t, NX, NY, T> 
             law,
             gains,
             has_memory: table.has_memory(gains),
+            is_plain: !table.has_memory(gains) && table.friction.is_none(),
             mode: Mode::Stopped,
             started: table
                 .observer
@@ -175,6 +178,7 @@ impl<'t, const NX: usize, const NY: usize, T: Scalar> Controller<'t, NX, NY, T> 
         }
         self.gains = self.table.law(law).ok_or(Rejected::NoSuchLaw)?;
         self.has_memory = self.table.has_memory(self.gains);
+        self.is_plain = !self.has_memory && self.table.friction.is_none();
         self.law = law;
         Ok(())
     }
@@ -320,17 +324,19 @@ impl<'t, const NX: usize, const NY: usize, T: Scalar> Controller<'t, NX, NY, T> 
         let y = self.encoders.measure(raw, &observer.gains.step).data.0[0];
         let estimate = &mut self.estimate.data.0[0];
         let mut sum = FeedbackSum::new(self.gains.n, self.state.setpoint);
-        let counts = self.encoders.counts();
-        let mut e = observer.innovation(&y, estimate);
-        judge(counts, &y, &mut e);
-        self.innovation.data.0[0] = e;
-        observer.correct(&e, estimate, |joint, x| {
+        let e = &mut self.innovation.data.0[0];
+        *e = observer.innovation(&y, estimate);
+        judge(self.encoders.counts(), &y, e);
+        observer.correct(e, estimate, |joint, x| {
             if let Some(k) = self.gains.k.as_slice().chunks(2).nth(joint) {
                 sum.feed_back(k, x);
             }
         });
         let estimate = &self.estimate.data.0[0];
         let mut force = sum.force();
+        if self.is_plain {
+            return force;
+        }
         if let Some(map) = &self.table.friction {
             force += map.force(self.law, estimate, &mut self.friction);
         }
@@ -376,19 +382,35 @@ impl<'t, const NX: usize, const NY: usize, T: Scalar> Controller<'t, NX, NY, T> 
 
     /// Second half of a tick: `x̂⁻ = Ad x̂ + Bd u` with the force really applied and known friction, and the integral.
     pub fn predict(&mut self) {
-        let (requested, applied) = (self.requested, self.applied);
-        let during_this_tick = self.acting();
-        if self.has_memory {
-            let position = self.output();
-            self.state.advance(self.gains.k_integral, position, self.table.tick_s, requested, applied);
-        }
+        self.predict_with(|_, _| ());
+    }
+
+    /// The same as [`predict`](Self::predict), but a controller that runs from encoders first calls `finish` with the
+    /// current estimate of what the sensors measure (m or rad) and the force during this tick (N).
+    #[inline(always)]
+    pub fn predict_with(&mut self, finish: impl FnOnce([T; NY], T)) {
+        let during_this_tick = if self.is_plain { self.applied } else { self.advance() };
         if let Mode::Running(observer) = &self.mode {
             let estimate = &mut self.estimate.data.0[0];
+            finish(observer.measured(estimate), during_this_tick);
             observer.predict(estimate, during_this_tick);
-            if let Some(map) = &self.table.friction {
+            if !self.is_plain
+                && let Some(map) = &self.table.friction
+            {
                 map.add_to(estimate, &self.friction);
             }
         }
+    }
+
+    /// Ends a tick of the law, if it has a memory; gives the force that acted during it (N).
+    #[inline]
+    fn advance(&mut self) -> T {
+        let during_this_tick = self.acting();
+        if self.has_memory {
+            let (position, tick_s) = (self.output(), self.table.tick_s);
+            self.state.advance(self.gains.k_integral, position, tick_s, self.requested, self.applied);
+        }
+        during_this_tick
     }
 
     /// Force on the cart during this tick (N), between [`control`](Self::control) and [`predict`](Self::predict).

@@ -66,18 +66,28 @@ impl<'t, const NX: usize, const NY: usize, T: Scalar> Observer<'t, NX, NY, T> {
     /// computed explicitly: a merged `Ad - L C` would cost most of the digits of u in f32.
     #[inline(always)]
     pub(crate) fn innovation(&self, y: &[T; NY], estimate: &[T; NX]) -> [T; NY] {
+        let (mut innovation, measured) = (*y, self.measured(estimate));
+        for (sensor, e) in innovation.iter_mut().enumerate() {
+            *e -= measured[sensor];
+        }
+        innovation
+    }
+
+    /// The states that the sensors measure, `C x̂` (m or rad).
+    #[inline(always)]
+    pub(crate) fn measured(&self, estimate: &[T; NX]) -> [T; NY] {
         if self.is_in_order {
-            difference(|sensor| 2 * sensor, y, estimate)
+            select(|sensor| 2 * sensor, estimate)
         } else {
-            self.innovation_looking_up(y, estimate)
+            self.measured_looking_up(estimate)
         }
     }
 
     #[cold]
     #[inline(never)]
-    fn innovation_looking_up(&self, y: &[T; NY], estimate: &[T; NX]) -> [T; NY] {
+    fn measured_looking_up(&self, estimate: &[T; NX]) -> [T; NY] {
         let measured = &self.gains.measured;
-        difference(|sensor| measured.get(sensor).map_or(NX, |&state| state as usize), y, estimate)
+        select(|sensor| measured.get(sensor).map_or(NX, |&state| state as usize), estimate)
     }
 
     /// Replaces the prediction x̂⁻ by the current estimate `x̂ = x̂⁻ + L e`. Calls `corrected` for each joint, with
@@ -168,19 +178,14 @@ impl<'t, const NX: usize, const NY: usize, T: Scalar> Observer<'t, NX, NY, T> {
     }
 }
 
-/// `y - C x̂⁻`; `measured` maps a sensor to its state.
+/// `C x̂`; `measured` maps a sensor to its state.
 #[inline(always)]
-fn difference<const NX: usize, const NY: usize, T: Scalar>(
+fn select<const NX: usize, const NY: usize, T: Scalar>(
     measured: impl Fn(usize) -> usize,
-    y: &[T; NY],
     estimate: &[T; NX],
 ) -> [T; NY] {
-    let mut innovation = *y;
-    for (sensor, e) in innovation.iter_mut().enumerate() {
-        // A checked table names only states that exist.
-        *e -= estimate.get(measured(sensor)).copied().unwrap_or_default();
-    }
-    innovation
+    // A checked table names only states that exist.
+    core::array::from_fn(|sensor| estimate.get(measured(sensor)).copied().unwrap_or_default())
 }
 
 #[cfg(test)]

@@ -55,10 +55,14 @@ impl<T: Scalar> FeedbackSum<T> {
 /// Limits `u` to ±`limit`; 0 if `u` is NaN, which must never reach a motor.
 #[inline]
 pub fn saturate<T: Scalar>(u: T, limit: T) -> T {
+    if u >= -limit && u <= limit { u } else { beyond(u, limit) }
+}
+
+/// [`saturate`] where `u` is not within the limits.
+#[cold]
+fn beyond<T: Scalar>(u: T, limit: T) -> T {
     if u > limit {
         limit
-    } else if u >= -limit {
-        u
     } else if u < -limit {
         -limit
     } else {

@@ -45,14 +45,14 @@ impl<'q, 't, B: Board<NY>, const NX: usize, const NY: usize, S: SwingUp<NX, NY>>
     #[inline(always)]
     pub fn tick_with(
         &mut self,
-        drive: impl FnOnce(&mut Firmware<'t, NX, NY, S>, &Inputs<NY>) -> Output,
+        drive: impl for<'f> FnOnce(&'f mut Firmware<'t, NX, NY, S>, &Inputs<NY>) -> &'f Output,
         predict: impl FnOnce(&mut Firmware<'t, NX, NY, S>),
     ) {
         let begin = self.board.cycles();
         let inputs = self.board.inputs();
         self.firmware.accept(&inputs);
         let output = drive(&mut self.firmware, &inputs);
-        self.board.drive(&output);
+        self.board.drive(output);
         #[cfg(feature = "identify")]
         let log = self.firmware.log_tick();
         let command = queue::take(&mut self.commands);

@@ -12,7 +12,7 @@ pub type RigFirmware = Firmware<'static, STATES, SENSORS, SwingUp>;
 
 /// [`Firmware::drive`].
 #[inline(never)]
-pub fn drive(firmware: &mut RigFirmware, inputs: &Inputs<SENSORS>) -> Output {
+pub fn drive<'f>(firmware: &'f mut RigFirmware, inputs: &Inputs<SENSORS>) -> &'f Output {
     firmware.drive(inputs)
 }
 

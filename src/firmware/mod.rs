@@ -221,7 +221,7 @@ impl<'t, const NX: usize, const NY: usize, S: SwingUp<NX, NY>> Firmware<'t, NX, 
     /// First half of a tick: from inputs to output.
     pub fn control(&mut self, inputs: &Inputs<NY>) -> Output {
         self.accept(inputs);
-        self.drive(inputs)
+        *self.drive(inputs)
     }
 
     /// The first part of [`control`](Self::control): contacts that turn the motor off, and all of a tick without the
@@ -250,7 +250,7 @@ impl<'t, const NX: usize, const NY: usize, S: SwingUp<NX, NY>> Firmware<'t, NX, 
     }
 
     /// The second part of [`control`](Self::control): the output, from the control law if the rig is driven.
-    pub fn drive(&mut self, inputs: &Inputs<NY>) -> Output {
+    pub fn drive(&mut self, inputs: &Inputs<NY>) -> &Output {
         self.output = match self.supervisor.state() {
             State::Balancing => self.balance(inputs),
             State::Driving => self.output,
@@ -263,7 +263,7 @@ impl<'t, const NX: usize, const NY: usize, S: SwingUp<NX, NY>> Firmware<'t, NX, 
             (self.requested_n, self.applied_n) = (0.0, 0.0);
             self.controller.stop();
         }
-        self.output
+        &self.output
     }
 
     /// A tick with the motor on. Faults are checked in the order of [`Fault::PRECEDENCE`].
@@ -291,25 +291,18 @@ impl<'t, const NX: usize, const NY: usize, S: SwingUp<NX, NY>> Firmware<'t, NX, 
     ) -> Output {
         let table = self.table;
         (self.requested_n, self.applied_n) = (command.requested_n, command.applied_n);
-        if let Some(fault) = self.debounce.check_inputs(&table.limits, table.supply_max_v(), inputs) {
+        let of_inputs = self.debounce.check_inputs(&table.limits, table.supply_max_v(), inputs);
+        let of_force = self.debounce.check_force(&table.limits, command.requested_n != command.applied_n);
+        if let Some(fault) = of_inputs.or(exceeded) {
             self.trip(fault, None);
-        }
-        if let Some(fault) = exceeded {
+        } else if let Some(Finding { fault, sensor }) = finding {
+            self.trip(fault, Some(sensor));
+        } else if let Some(fault) = of_force {
             self.trip(fault, None);
-        }
-        if let Some(finding) = finding {
-            self.trip(finding.fault, Some(finding.sensor));
-        }
-        if let Some(fault) =
-            self.debounce.check_force(&table.limits, command.requested_n != command.applied_n)
-        {
-            self.trip(fault, None);
-        }
-        if self.supervisor.state().drives() {
-            Output { enable: true, drive: command.drive }
         } else {
-            Output::OFF
+            return Output { enable: true, drive: command.drive };
         }
+        Output::OFF
     }
 
     /// Takes the counts of a tick without the control law.
@@ -446,21 +439,8 @@ impl<'t, const NX: usize, const NY: usize, S: SwingUp<NX, NY>> Firmware<'t, NX, 
 
     /// Predicts the next tick of balancing.
     fn predict_balancing(&mut self) {
-        let corrected = self.measured_estimate();
-        self.detection.finish_tick(&self.table.thresholds.motor, corrected, self.controller.acting());
-        self.controller.predict();
-    }
-
-    /// Estimated position of each sensor (m or rad).
-    fn measured_estimate(&self) -> [f32; NY] {
-        let mut positions = [0.0; NY];
-        if let Some(observer) = &self.table.observer {
-            let estimate = self.controller.estimate();
-            for (position, &state) in positions.iter_mut().zip(&observer.measured) {
-                *position = estimate.get(state as usize).copied().unwrap_or_default();
-            }
-        }
-        positions
+        let (detection, test) = (&mut self.detection, &self.table.thresholds.motor);
+        self.controller.predict_with(|corrected, force| detection.finish_tick(test, corrected, force));
     }
 
     #[cold]

@@ -107,9 +107,11 @@ impl<const NX: usize, const NY: usize, S: SwingUp<NX, NY>> Firmware<'_, NX, NY, 
         let (swing_up, tick_s) = (self.swing_up, self.table.tick_s);
         let has_ended = player.advance();
         let end = player.now().x.as_slice().first().copied().unwrap_or_default();
-        let corrected = self.measured_estimate();
-        self.detection.finish_tick(&motions.thresholds.motor, corrected, self.controller.acting());
-        self.controller.predict_on_course(|state, force| swing_up.predict(state, force, tick_s));
+        let (detection, test) = (&mut self.detection, &motions.thresholds.motor);
+        self.controller.predict_on_course_with(
+            |corrected, force| detection.finish_tick(test, corrected, force),
+            |state, force| swing_up.predict(state, force, tick_s),
+        );
         if has_ended {
             self.moving = None;
             self.supervisor.finish_motion();

@@ -25,6 +25,8 @@ impl<const NX: usize, const NY: usize, S: SwingUp<NX, NY>> Firmware<'_, NX, NY, 
     }
 
     /// The telemetry of this tick.
+    // Not inlined: most ticks do not need the registers and the stack that it takes.
+    #[inline(never)]
     pub(super) fn telemetry(&self) -> Telemetry<NX, NY> {
         let (Drive::Force(drive) | Drive::Duty(drive)) = self.output.drive;
         Telemetry {

@@ -39,8 +39,8 @@ fn ticks_to_fault(firmware: &mut Firmware<'_, STATES, SENSORS>) -> Option<(u32, 
 
 #[test]
 fn a_table_that_changes_in_memory_is_found_within_one_pass() {
-    let sound = TABLE.clone();
-    let mut damaged = TABLE.clone();
+    let sound = TABLE;
+    let mut damaged = TABLE;
     damaged.limits.sign_counts[2] ^= 1 << 20;
     assert_eq!(firmware(&damaged, Reset::Power).err(), Some(TableError::Crc));
     let mut firmware = firmware(&sound, Reset::Power).unwrap();
@@ -136,7 +136,7 @@ fn cause_of(faults: &[Fault], ticks_of_a_pass: u32) -> Option<Cause> {
     let due = |fault| faults.contains(&fault);
     // The first table finds nothing but a bad encoder, of which the third measurement in a row counts. The second one
     // finds whatever is due.
-    let mut calm = TABLE.clone();
+    let mut calm = TABLE;
     calm.limits.angle_rad = f32::MAX;
     calm.thresholds.innovation = [f32::MAX; SENSORS];
     calm.thresholds.frozen = [f32::MAX; SENSORS];
@@ -144,7 +144,7 @@ fn cause_of(faults: &[Fault], ticks_of_a_pass: u32) -> Option<Cause> {
     if due(Fault::Encoder) {
         calm.thresholds.innovation[1] = -1.0;
     }
-    let mut strict = calm.clone();
+    let mut strict = calm;
     let (limits, thresholds) = (&mut strict.limits, &mut strict.thresholds);
     (limits.supply_ticks, limits.link_ticks, limits.saturated_ticks) = (TICKS - 1, TICKS, 0);
     limits.rail_m = if due(Fault::Rail) { [5.0, 6.0] } else { limits.rail_m };
@@ -198,7 +198,7 @@ fn cause_of(faults: &[Fault], ticks_of_a_pass: u32) -> Option<Cause> {
 
 #[test]
 fn of_several_faults_in_one_tick_the_first_of_the_precedence_is_latched() {
-    let mut damaged = TABLE.clone();
+    let mut damaged = TABLE;
     damaged.crc ^= 1;
     let mut other = firmware(&TABLE, Reset::Power).unwrap();
     other.table = &damaged;

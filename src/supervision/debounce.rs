@@ -2,7 +2,7 @@
 //!
 //! A new fault with a time limit gets a counter here; its time belongs to [`Limits`].
 
-use crate::board::Inputs;
+use crate::board::{Contacts, Inputs};
 use crate::supervision::fault::Fault;
 use crate::table::Limits;
 
@@ -31,6 +31,26 @@ impl Debounce {
     /// the highest supply voltage (V), see [`GainTable::supply_max_v`](crate::table::GainTable::supply_max_v).
     #[inline]
     pub fn check_inputs<const NY: usize>(
+        &mut self,
+        limits: &Limits<NY>,
+        supply_max_v: f32,
+        inputs: &Inputs<NY>,
+    ) -> Option<Fault> {
+        let Contacts { limit_low, limit_high, overrun, .. } = inputs.contacts;
+        let supply_is_good = inputs.supply_v >= limits.supply_min_v
+            && inputs.supply_v <= supply_max_v
+            && inputs.supply_v.is_finite();
+        if supply_is_good && !(limit_low | limit_high | overrun) {
+            (self.supply, self.over_voltages, self.overruns) = (0, 0, 0);
+            return None;
+        }
+        self.check_bad_inputs(limits, supply_max_v, inputs)
+    }
+
+    /// [`check_inputs`](Self::check_inputs), if anything is wrong.
+    #[cold]
+    #[inline(never)]
+    fn check_bad_inputs<const NY: usize>(
         &mut self,
         limits: &Limits<NY>,
         supply_max_v: f32,
@@ -81,7 +101,6 @@ fn count(ticks: &mut u32, holds: bool) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::board::Contacts;
 
     const LIMITS: Limits<1> =
         Limits { supply_min_v: 9.0, supply_ticks: 4, saturated_ticks: 5, link_ticks: 6, ..Limits::none() };

@@ -78,7 +78,7 @@ impl<const NY: usize> Detection<NY> {
     /// Tests the innovation `e = y - C x̂⁻` of a tick (m or rad); sets that of an implausible measurement to 0.
     ///
     /// If several tests fail in one tick, the result is the first of: implausible, frozen, motor.
-    #[inline]
+    #[inline(always)]
     pub fn test(
         &mut self,
         thresholds: &Thresholds<NY>,
@@ -86,9 +86,9 @@ impl<const NY: usize> Detection<NY> {
         y: &[f32; NY],
         e: &mut [f32; NY],
     ) -> Option<Finding> {
-        let (mut rejected_now, mut implausible, mut frozen) = (0, None, None);
+        let (mut is_plausible, mut frozen) = (true, None);
         let limits = thresholds.innovation.iter().zip(&thresholds.frozen);
-        let measured = counts.iter().zip(y).zip(e.iter_mut());
+        let measured = counts.iter().zip(y).zip(e.iter());
         // One pass over the sensors for both tests: every value is loaded once.
         for (((memory, ((&counts, y), e)), (&plausible, &still)), sensor) in
             self.sensors.iter_mut().zip(measured).zip(limits).zip(0..)
@@ -102,25 +102,41 @@ impl<const NY: usize> Detection<NY> {
             } else {
                 (memory.moved, memory.counts) = (0.0, counts);
             }
-            if e.abs() <= plausible {
-                memory.implausible = 0;
-            } else {
-                *e = 0.0;
-                memory.implausible = memory.implausible.saturating_add(1);
-                self.rejected = self.rejected.saturating_add(1);
-                rejected_now += 1;
-                if memory.implausible >= IN_A_ROW && implausible.is_none() {
-                    implausible = Some(sensor);
-                }
-            }
+            // Not so for NaN.
+            is_plausible &= e.abs() <= plausible;
         }
+        let implausible = if is_plausible {
+            self.sensors.iter_mut().for_each(|memory| memory.implausible = 0);
+            None
+        } else {
+            self.reject(thresholds, e)
+        };
         // The innovation of a rejected measurement is 0: it says nothing about the motor.
         let motor = self.test_motor(&thresholds.motor, e.first().copied().unwrap_or_default());
-        let implausible = implausible.map(|sensor| Finding {
-            fault: if rejected_now > 1 { Fault::Motor } else { Fault::Encoder },
-            sensor,
-        });
         implausible.or(frozen.map(|sensor| Finding { fault: Fault::Frozen, sensor })).or(motor)
+    }
+
+    /// Sets implausible innovations to 0, and counts them.
+    #[cold]
+    #[inline(never)]
+    fn reject(&mut self, thresholds: &Thresholds<NY>, e: &mut [f32; NY]) -> Option<Finding> {
+        let (mut rejected_now, mut implausible) = (0, None);
+        let limits = thresholds.innovation.iter().zip(0..);
+        for ((memory, e), (&plausible, sensor)) in self.sensors.iter_mut().zip(e).zip(limits) {
+            if e.abs() <= plausible {
+                memory.implausible = 0;
+                continue;
+            }
+            *e = 0.0;
+            memory.implausible = memory.implausible.saturating_add(1);
+            self.rejected = self.rejected.saturating_add(1);
+            rejected_now += 1;
+            if memory.implausible >= IN_A_ROW && implausible.is_none() {
+                implausible = Some(sensor);
+            }
+        }
+        let fault = if rejected_now > 1 { Fault::Motor } else { Fault::Encoder };
+        implausible.map(|sensor| Finding { fault, sensor })
     }
 
     #[inline]

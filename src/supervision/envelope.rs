@@ -23,14 +23,13 @@ pub fn exceeded<const NY: usize>(limits: &Limits<NY>, x: &[f32], requested_n: f3
     if position < low || position > high {
         return Some(Fault::Rail);
     }
-    let mut angle = 0.0;
-    for joint in x.iter().skip(2).step_by(2) {
-        angle += joint;
-        if f32::abs(angle) > limits.angle_rad {
-            return Some(Fault::Angle);
-        }
+    let is_fast = speed.abs() > limits.speed_m_per_s;
+    let (mut angle, mut leans) = (0.0, false);
+    for joint in x.chunks(2).skip(1) {
+        angle += joint.first().copied().unwrap_or_default();
+        leans |= f32::abs(angle) > limits.angle_rad;
     }
-    (speed.abs() > limits.speed_m_per_s).then_some(Fault::Speed)
+    leans.then_some(Fault::Angle).or(is_fast.then_some(Fault::Speed))
 }
 
 /// The same for a rig that follows a planned motion, in this order: request not finite, rail, off course, speed.
@@ -98,6 +97,10 @@ mod tests {
         for requested_n in [f32::INFINITY, f32::NAN] {
             assert_eq!(exceeded(&limits, &[0.0; 6], requested_n), Some(Fault::NotFinite));
         }
+        // A linear model may have an odd number of states.
+        assert_eq!(exceeded(&limits, &[2.1], 0.0), Some(Fault::Rail));
+        assert_eq!(exceeded(&limits, &[0.0, 0.0, 0.31], 0.0), Some(Fault::Angle));
+        assert_eq!(exceeded(&limits, &[0.0, 0.0, 0.29], 0.0), None);
     }
 
     #[test]

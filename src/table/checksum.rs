@@ -25,8 +25,12 @@ fn with_a_small_table(crc: u32, bytes: &[u8]) -> u32 {
     })
 }
 
+/// [`crc32`] of the four bytes of `word`, the low one first.
+fn crc32_of_word(crc: u32, word: u32) -> u32 {
+    !(0..8).fold(!crc ^ word, |crc, _| (crc >> 4) ^ NIBBLES[(crc & 15) as usize])
+}
+
 /// Change of the register for each value of the four bits shifted out.
-#[cfg(any(test, target_os = "none"))]
 const NIBBLES: [u32; 16] = {
     let mut nibbles = [0; 16];
     let mut nibble = 0;
@@ -81,21 +85,27 @@ impl<'t> ChecksumScan<'t> {
             if self.leaf.is_none() {
                 self.leaf = table.part(&mut usize::from(self.at));
             }
-            let Some(leaf) = self.leaf else {
-                return Some(core::mem::take(self).crc);
-            };
-            match leaf.get(usize::from(self.word)) {
-                Some(word) => (self.crc, self.word) = (crc32(self.crc, &word.to_le_bytes()), self.word + 1),
-                None => (self.at, self.leaf, self.word) = (self.at + 1, None, 0),
+            match self.leaf {
+                Some(leaf) => self.next_of(leaf),
+                None => return Some(core::mem::take(self).crc),
             }
         }
         None
+    }
+
+    /// Adds the next word of the current leaf, or leaves the leaf at its end.
+    #[inline(never)]
+    fn next_of(&mut self, leaf: Words<'t>) {
+        match leaf.get(usize::from(self.word)) {
+            Some(word) => (self.crc, self.word) = (crc32_of_word(self.crc, word), self.word + 1),
+            None => (self.at, self.leaf, self.word) = (self.at + 1, None, 0),
+        }
     }
 }
 
 #[cfg(test)]
 mod tests {
-    use super::{ChecksumScan, checksum, crc32, with_a_small_table};
+    use super::{ChecksumScan, checksum, crc32, crc32_of_word, with_a_small_table};
     use crate::gains::TABLE;
     use proptest::prelude::*;
 
@@ -109,6 +119,13 @@ mod tests {
         #[test]
         fn host_and_target_have_the_same_checksum(crc: u32, bytes: std::vec::Vec<u8>) {
             prop_assert_eq!(crc32(crc, &bytes), with_a_small_table(crc, &bytes));
+        }
+    }
+
+    #[test]
+    fn a_word_counts_as_its_bytes() {
+        for (crc, word) in [(0, 0x0403_0201u32), (0x1234_5678, 0x8765_4321)] {
+            assert_eq!(crc32_of_word(crc, word), crc32(crc, &word.to_le_bytes()));
         }
     }
 

@@ -178,6 +178,7 @@ impl<P: Resize<Q>, Q> Resize<PerLaw<Q>> for PerLaw<P> {
 
 part! {
     /// Gains of one control law `u = N r - K x - k_pending u_pending - k_integral z`.
+    #[derive(Copy)]
     pub struct LawGains<NX to MX; T> {
         /// K, one gain per state (N/m, N s/m, N/rad, N s/rad …).
         pub k: SVector<T, NX>,

@@ -6,6 +6,7 @@ part! {
     /// Limits for `NY` sensors. `upright design` computes them from `[limits]` of the rig file. Times are in ticks. If
     /// the rig has no such limit, a maximum is `f32::MAX` and a minimum 0. If a sensor has no turns, rest position or
     /// sign to check (any sensor of a `[model]`), the value is 0.
+    #[derive(Copy)]
     pub struct Limits<NY to MY;> {
         /// Soft limits of the rail, low and high (m).
         pub rail_m: [f32; 2],

@@ -37,6 +37,7 @@ pub const TABLE_FORMAT: u32 = 7;
 part! {
     /// The constants of a controller with `NX` states and `NY` sensors. `upright design` writes them to
     /// `src/gains.rs`.
+    #[derive(Copy)]
     pub struct GainTable<NX to MX, NY to MY; T> {
         /// Layout of the table: `TABLE_FORMAT` of the writer.
         pub format: u32,

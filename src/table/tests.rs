@@ -121,7 +121,7 @@ fn every_flipped_bit_of_a_full_table_is_refused() {
     let mut flipped = 0;
     for (leaf, size) in sizes(&mut good.clone()).into_iter().enumerate() {
         for (word, bit) in (0..size.unwrap_or(0)).flat_map(|word| (0..32).map(move |bit| (word, bit))) {
-            let mut damaged = good.clone();
+            let mut damaged = good;
             flip(&mut damaged, leaf, word, bit);
             let expected = match leaf {
                 0 => TableError::Format,
@@ -133,7 +133,7 @@ fn every_flipped_bit_of_a_full_table_is_refused() {
         }
     }
     for bit in 0..32 {
-        let damaged = GainTable { crc: good.crc ^ 1 << bit, ..good.clone() };
+        let damaged = GainTable { crc: good.crc ^ 1 << bit, ..good };
         assert_eq!(damaged.check(&BUILD), Err(TableError::Crc));
     }
     // All words except the checksum itself; the 64-bit hash counts as two.
@@ -196,7 +196,7 @@ fn every_number_that_is_not_finite_is_refused_even_with_the_right_checksum() {
     let good = full();
     for (leaf, size) in sizes(&mut good.clone()).into_iter().enumerate() {
         for word in 0..size.unwrap_or(0) {
-            let mut damaged = good.clone();
+            let mut damaged = good;
             let Some(WordsMut::F32(values)) = damaged.part_mut(&mut { leaf }) else { continue };
             values[word] = f32::INFINITY;
             damaged.crc = damaged.checksum();

@@ -5,6 +5,7 @@ use crate::table::part::part;
 
 part! {
     /// Thresholds of the fault tests for `NY` sensors; `f32::MAX` where there is nothing to test.
+    #[derive(Copy)]
     pub struct Thresholds<NY to MY;> {
         /// Largest plausible innovation of each sensor (m or rad).
         pub innovation: [f32; NY],

@@ -80,7 +80,7 @@ fn a_flipped_bit_of_any_committed_gain_is_refused() {
     let build = Build { rig_hash: RIG_HASH, tick_s: TICK_S };
     for entry in 0..STATES {
         for bit in 0..32 {
-            let mut damaged = TABLE.clone();
+            let mut damaged = TABLE;
             for law in damaged.laws.present_mut() {
                 law.k[entry] = f32::from_bits(law.k[entry].to_bits() ^ 1 << bit);
             }

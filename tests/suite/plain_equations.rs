@@ -206,7 +206,7 @@ proptest! {
     #[test]
     fn one_entry_off_by_one_bit_is_noticed(numbers in numbers(), pattern in patterns(), row in 0..10usize, column in 0..10usize) {
         let table = table::<10, 5>(pattern, true, 0, [false; 2], &numbers);
-        let mut other = table.clone();
+        let mut other = table;
         let entry = &mut other.observer.as_mut().unwrap().ad[(row, column)];
         // Makes an entry of 0 large enough to be visible in a sum.
         *entry = if *entry == 0.0 { 0.25 } else { f32::from_bits(entry.to_bits() ^ 1 << 20) };

@@ -26,16 +26,10 @@ const TIMERS: [(*const u32, CounterWidth); SENSORS] = {
     timers
 };
 
-/// The counters in use.
-const COUNTERS: [*const u32; SENSORS] = {
-    let mut counters = [core::ptr::null(); SENSORS];
-    let mut i = 0;
-    while i < SENSORS {
-        counters[i] = TIMERS[i].0.wrapping_byte_add(CNT);
-        i += 1;
-    }
-    counters
-};
+/// The counter of a sensor, if it is in use.
+const fn counter(sensor: usize) -> Option<*const u32> {
+    if sensor < SENSORS { Some(TIMERS[sensor].0.wrapping_byte_add(CNT)) } else { None }
+}
 
 /// Widths of the counters in use.
 pub(super) const WIDTHS: [CounterWidth; SENSORS] = {
@@ -74,6 +68,17 @@ pub(super) fn set_up() {
 
 /// Current readings of the counters in use.
 pub(super) fn raw_counts() -> [u32; SENSORS] {
-    // SAFETY: reading a counter has no side effect.
-    COUNTERS.map(|counter| unsafe { counter.read_volatile() })
+    const { assert!(SENSORS <= 5, "more encoders than are read here") };
+    let mut counts = [0; SENSORS];
+    // Written out, because a loop would fetch the addresses from a table in flash.
+    macro_rules! read {
+        ($($sensor:literal)*) => {
+            $(if let (Some(count), Some(counter)) = (counts.get_mut($sensor), const { counter($sensor) }) {
+                // SAFETY: reading a counter has no side effect.
+                *count = unsafe { counter.read_volatile() };
+            })*
+        };
+    }
+    read!(0 1 2 3 4);
+    counts
 }

@@ -46,5 +46,6 @@ pub(super) fn supply_was_low(power: &PWR, exti: &EXTI) -> bool {
         // SAFETY: any combination of bits is allowed.
         exti.pr().write(|w| unsafe { w.bits(DETECTOR) });
     }
-    was_low || power.csr().read().pvdo().bit_is_set()
+    // Without a branch: this is read in every tick.
+    was_low | power.csr().read().pvdo().bit_is_set()
 }

@@ -20,10 +20,10 @@ impl<const NX: usize, const NY: usize> Controller<'_, NX, NY> {
             return Self::off();
         };
         let y = self.encoders.measure(raw, &observer.gains.step).data.0[0];
-        let mut e = observer.innovation(&y, &self.estimate.data.0[0]);
-        judge(self.encoders.counts(), &y, &mut e);
-        self.innovation.data.0[0] = e;
-        for (column, e) in course.l.data.0.iter().zip(e) {
+        let e = &mut self.innovation.data.0[0];
+        *e = observer.innovation(&y, &self.estimate.data.0[0]);
+        judge(self.encoders.counts(), &y, e);
+        for (column, e) in course.l.data.0.iter().zip(*e) {
             for (x, l) in self.estimate.iter_mut().zip(column) {
                 *x += l * e;
             }
@@ -38,7 +38,23 @@ impl<const NX: usize, const NY: usize> Controller<'_, NX, NY> {
     /// Second half of such a tick: `predict` replaces the state by the one a tick later, with the given force (N)
     /// held.
     pub fn predict_on_course(&mut self, predict: impl FnOnce(&mut [f32; NX], f32)) {
-        predict(&mut self.estimate.data.0[0], self.applied);
+        self.predict_on_course_with(|_, _| (), predict);
+    }
+
+    /// The same as [`predict_on_course`](Self::predict_on_course), but first calls `finish` as
+    /// [`predict_with`](Self::predict_with) does.
+    #[inline(always)]
+    pub fn predict_on_course_with(
+        &mut self,
+        finish: impl FnOnce([f32; NY], f32),
+        predict: impl FnOnce(&mut [f32; NX], f32),
+    ) {
+        let force = self.acting();
+        let estimate = &mut self.estimate.data.0[0];
+        if let Mode::Running(observer) = &self.mode {
+            finish(observer.measured(estimate), force);
+        }
+        predict(estimate, self.applied);
     }
 
     /// Hands over to the control law, with the governed set-point at `setpoint_m` (m): the next tick is one of

@@ -35,7 +35,7 @@ const FREE_SHARE: f64 = 0.25;
 pub(super) fn set_limits(rig: &Rig, table: &mut TableValues) -> Result<(), SimulationError> {
     let PlantDescription::Chain(chain) = &rig.plant else { return Ok(()) };
     let reached = healthy(rig, table)?;
-    let (usual, balancing) = (table.limits.clone(), table.thresholds.clone());
+    let (usual, balancing) = (table.limits, table.thresholds);
     let Some(swing_up) = &mut table.swing_up else { return Ok(()) };
     let end = |side: usize| {
         let end = chain.cart.travel_m[side];

@@ -118,9 +118,9 @@ fn friction_that_the_file_tolerates_is_no_alarm_and_without_the_tolerance_it_is(
 
 #[test]
 fn thresholds_follow_from_the_tolerances() {
-    let exact = table(&rig("quadruple-paper")).thresholds.clone();
+    let exact = table(&rig("quadruple-paper")).thresholds;
     assert_eq!(table(&tolerating("quadruple-paper", 0.0, 0.0)).thresholds, exact);
-    let wider = table(&tolerating("quadruple-paper", 5.0, 5e-5)).thresholds.clone();
+    let wider = table(&tolerating("quadruple-paper", 5.0, 5e-5)).thresholds;
     let by =
         |wide: &[f32], exact: &[f32]| wide.iter().zip(exact).take(5).map(|(a, b)| a / b).fold(0.0, f32::max);
     let found = [by(&wider.innovation, &exact.innovation), by(&wider.frozen, &exact.frozen)];

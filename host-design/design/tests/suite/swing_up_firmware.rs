@@ -205,7 +205,7 @@ fn machines_that_the_law_brings_up_are_not_switched_off() {
     let mut table = rig_and_table(triple).1;
     assert_eq!(random_runs(triple, &table, 10), [3, 3]);
     // Negative control: with the limits of balancing it is switched off.
-    let usual = table.limits.clone();
+    let usual = table.limits;
     let limits = &mut table.swing_up.as_mut().unwrap().limits;
     (limits.rail_m, limits.speed_m_per_s) = (usual.rail_m, usual.speed_m_per_s);
     assert_eq!(random_runs(triple, &table, 10), [3, 2]);

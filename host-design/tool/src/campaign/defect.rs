@@ -248,7 +248,7 @@ impl Kind {
             ),
             (Kind::LineNoise, "line-noise", "random bytes at wrong baud rates on the serial line", Ignored),
             (Kind::LineFlood, "line-flood", "bytes without a pause on the serial line", Ignored),
-            (Kind::TableBit, "table-bit", "a bit of the gain table in flash changes", Changed),
+            (Kind::TableBit, "table-bit", "a bit of the gain table in use changes", Changed),
             (Kind::RamBit, "ram-bit", "a bit of the firmware's variables or stack changes", Bounded),
             (
                 Kind::WriteLost,

@@ -114,7 +114,7 @@ impl Kind {
                 vec![Event::Bytes { bytes, baud: 460_800 }]
             }
             Kind::TableBit => {
-                let table = image.object("5gains5TABLE").unwrap_or(0x0800_0200..0x0800_0201);
+                let table = image.object("local_init_table").unwrap_or(0x2000_1400..0x2000_1401);
                 vec![at(anywhere, bit_of(table.start, table.end - table.start))]
             }
             Kind::RamBit => {

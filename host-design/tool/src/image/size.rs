@@ -9,13 +9,13 @@ use object::{Object, ObjectSection};
 
 use super::elf::{Image, Item};
 
-/// Limit of the flash of an image for a board without motions (bytes).
+/// Limit of the flash of an image for a board without motions and without its gain table (bytes).
 pub const FLASH_LIMIT: u32 = 24 * 1024;
 /// Limit of the flash of an image for a board with motions: their tables, and the nonlinear model (bytes).
 pub const FLASH_LIMIT_WITH_MOTIONS: u32 = 128 * 1024;
 /// Limit of the flash of an image for identification, without motions (bytes).
 pub const FLASH_LIMIT_FOR_IDENTIFICATION: u32 = 30 * 1024;
-/// Limit of the static RAM of an image for a board: variables, without the stack (bytes).
+/// Limit of the static RAM of an image for a board: variables, without the stack and the gain table (bytes).
 pub const RAM_LIMIT: u32 = 4 * 1024;
 /// The same of an image for identification.
 pub const RAM_LIMIT_FOR_IDENTIFICATION: u32 = 5 * 1024;
@@ -26,6 +26,9 @@ const STACK_LIMIT_FOR_IDENTIFICATION: u32 = 5 * 1024;
 /// The table of motions; an image without motions has none.
 const MOTIONS: &str = "upright::gains::SWING_UP";
 
+/// The gain table: in flash, and from the start on in RAM.
+const TABLE: &str = "upright_image::app::__rtic_internal_local_init_table";
+
 /// The end of the name of a function that only an image for identification has.
 const SHAKES: &str = ">::shake";
 
@@ -34,12 +37,14 @@ const SHAKES: &str = ">::shake";
 pub struct Size {
     /// All in flash, with the initial values of variables.
     pub flash: u32,
-    /// What that is limited to.
+    /// What that is limited to, without the gain table.
     pub flash_limit: u32,
     /// All variables, without the stack.
     pub ram: u32,
-    /// What that is limited to.
+    /// What that is limited to, without the gain table.
     pub ram_limit: u32,
+    /// The gain table, in flash and in RAM.
+    pub table: u32,
     /// What the stack is limited to.
     pub stack_limit: u32,
     /// By section, in the order of addresses.
@@ -82,9 +87,14 @@ pub fn size(image: &Image) -> Result<Size, SizeError> {
     for (name, bytes) in code_by_crate(image)? {
         shares.entry(name).or_default().flash += bytes;
     }
+    let mut table = 0;
     for item in &image.data {
         let share = shares.entry(crate_of_symbol(item)).or_default();
-        // Initial values of variables are few: they count as part of their section.
+        // Initial values of variables other than the table are few: they count as part of their section.
+        if item.name == TABLE {
+            table = item.size;
+            share.flash += item.size;
+        }
         let place = if item.address >= 0x1000_0000 { &mut share.ram } else { &mut share.flash };
         *place += item.size;
     }
@@ -106,7 +116,7 @@ pub fn size(image: &Image) -> Result<Size, SizeError> {
         true => (RAM_LIMIT_FOR_IDENTIFICATION, STACK_LIMIT_FOR_IDENTIFICATION),
         false => (RAM_LIMIT, STACK_LIMIT),
     };
-    Ok(Size { flash, flash_limit, ram, ram_limit, stack_limit, sections, crates })
+    Ok(Size { flash, flash_limit, ram, ram_limit, table, stack_limit, sections, crates })
 }
 
 /// Bytes of machine code by the crate of their source line.

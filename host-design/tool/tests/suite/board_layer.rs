@@ -1,5 +1,7 @@
 //! What the flashed image does with hardware that is not as it has to be, on the virtual board.
 
+use std::ops::Range;
+
 use upright::board::Contacts;
 use upright::gains::{SENSORS, STATES, TABLE, TICK_S};
 use upright::protocol::frame::{self, Receiver};
@@ -170,12 +172,21 @@ fn another_chip_is_noticed() {
     assert_eq!(run.last(), (State::Fault, Some(Fault::Board)));
 }
 
-/// Where the table's first gain is in flash.
+/// Where the table's first gain is in flash, among the initial values of variables.
 fn first_gain(board: &VirtualBoard) -> u32 {
+    gain_within(board, 0x0800_0000..0x0801_0000)
+}
+
+/// Where the first gain is that the image uses, in RAM.
+fn first_gain_in_use(board: &VirtualBoard) -> u32 {
+    gain_within(board, 0x2000_1400..0x2000_3000)
+}
+
+fn gain_within(board: &VirtualBoard, addresses: Range<u32>) -> u32 {
     let gains: Vec<u32> =
         TABLE.laws.lqr.as_ref().unwrap().k.iter().take(3).map(|gain| gain.to_bits()).collect();
     let here = |at: &u32| (0..3).all(|i| board.word(at + 4 * i) == Some(gains[i as usize]));
-    (0x0800_0000..0x0801_0000).step_by(4).find(here).expect("the table is in flash")
+    addresses.step_by(4).find(here).expect("the table is there")
 }
 
 /// A bit of the first gain flips in flash before power comes.
@@ -192,6 +203,29 @@ fn a_damaged_table_is_told_and_cannot_be_cleared() {
     assert_eq!(run.last(), (State::Fault, Some(Fault::Table)));
     assert_eq!(run.replies, [Reply { id: 1, answer: Answer::NotNow(Inhibits::TABLE) }]);
     stop_the_crystal(&mut run);
+}
+
+/// The image uses a copy of the table in RAM, and checks that again and again; flash is read at the next start.
+#[test]
+fn a_flipped_bit_of_the_table_is_found_in_ram_within_two_passes_and_in_flash_at_the_next_start() {
+    let Some(image) = image() else { return };
+    let two_passes_s = 1.0;
+    let mut run = Powered::strict(&image, &Conditions::f405(1));
+    run.run(0.055);
+    let address = first_gain_in_use(&run.board);
+    run.board.apply(Input::FlipBit { address, bit: 5 });
+    run.run(0.055 + two_passes_s);
+    assert_eq!(run.last(), (State::Fault, Some(Fault::Table)));
+
+    let mut run = Powered::strict(&image, &Conditions::f405(1));
+    run.run(0.055);
+    let address = first_gain(&run.board);
+    run.board.apply(Input::FlipBit { address, bit: 5 });
+    run.run(0.055 + two_passes_s);
+    assert_eq!(run.last(), (State::Disarmed, None));
+    run.board.apply(Input::DebuggerReset);
+    run.run(0.1 + two_passes_s);
+    assert_eq!(run.last(), (State::Fault, Some(Fault::Table)));
 }
 
 /// The crystal stops: the handler stops the program, and the watchdog resets within six ticks.
@@ -233,7 +267,8 @@ fn a_low_supply_of_the_chip_is_noticed_however_short_it_is() {
 fn a_debuggers_reset_is_no_crash() {
     let Some(image) = image() else { return };
     let mut run = Powered::strict(&image, &Conditions::f405(1));
-    run.run(0.05);
+    // Between two frames.
+    run.run(0.055);
     for time_s in [0.1, 0.15] {
         let before = run.telemetry.len();
         run.board.apply(Input::DebuggerReset);
@@ -378,7 +413,8 @@ fn a_crash_is_recorded_over_the_reset_and_shown_by_the_monitor() {
     let Some(image) = image() else { return };
     let rules = Rules { faults_are_taken: true, ..Rules::STRICT };
     let mut run = Powered::with(&image, &Conditions::f405(1), rules);
-    run.run(0.05);
+    // Between two frames, as is the crash.
+    run.run(0.055);
     // The negative control: without a crash there is no record, whatever memory holds at power-on.
     let monitor = monitored(&mut run, 0.3);
     let Some(Info { reset: Reset::Power, image: number, .. }) = monitor.info else {
@@ -386,16 +422,16 @@ fn a_crash_is_recorded_over_the_reset_and_shown_by_the_monitor() {
     };
     assert_eq!((monitor.crash, number), (None, flash_checksum(&image)));
 
-    let gain = first_gain(&run.board);
-    let points_to_table = |word: u32| word.is_multiple_of(4) && (gain - 1024..=gain).contains(&word);
-    let pointers: Vec<u32> = (0x2000_1400..0x2000_2400)
+    let table = image.object("local_init_table").unwrap();
+    let points_to_table = |word: u32| word.is_multiple_of(4) && table.contains(&word);
+    let pointers: Vec<u32> = (0x2000_1400..0x2000_3000)
         .step_by(4)
         .filter(|&at| run.board.word(at).is_some_and(points_to_table))
         .collect();
     assert!(!pointers.is_empty());
     for address in pointers {
-        // 0x08… becomes 0x28…
-        run.board.apply(Input::FlipBit { address: address + 3, bit: 5 });
+        // 0x20… becomes 0x30…
+        run.board.apply(Input::FlipBit { address: address + 3, bit: 4 });
     }
     run.run(run.seconds() + 0.05);
     assert_eq!(run.board.resets(), 1);
@@ -409,6 +445,6 @@ fn a_crash_is_recorded_over_the_reset_and_shown_by_the_monitor() {
         assert!(line.is_some_and(|line| line.contains(".rs:")), "{pc:#x}");
         // A precise bus fault with its address, escalated.
         assert_eq!((cfsr & 0x8200, hfsr), (0x8200, 1 << 30), "{cfsr:#x}");
-        assert_eq!(bfar >> 16, (gain | 1 << 29) >> 16, "{bfar:#x}");
+        assert_eq!(bfar >> 16, (table.start | 1 << 28) >> 16, "{bfar:#x}");
     }
 }
