@@ -316,7 +316,11 @@ impl<'t, const NX: usize, const NY: usize, S: SwingUp<NX, NY>> Firmware<'t, NX, 
     fn follow(&mut self) -> [i32; NY] {
         self.controller.follow(&self.raw_counts);
         let counts = *self.controller.encoders().counts();
-        self.calibration.update(&counts, &self.table.limits);
+        let limits = &self.table.limits;
+        self.calibration.update(&counts, limits);
+        if let Some(observer) = &self.table.observer {
+            self.calibration.update_swinging(&counts, &observer.step.data.0[0], limits, self.table.tick_s);
+        }
         counts
     }
 
