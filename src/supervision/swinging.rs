@@ -116,3 +116,68 @@ impl<const NY: usize> Swinging<NY> {
         Err(Inhibits::MOVING.union(Inhibits::ZEROS.when(self.verdict == Verdict::Contradicts)))
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const TICK_S: f32 = 0.002;
+    const STEPS: [f32; 2] = [1e-4, 1e-3];
+
+    /// What is known after `time_s` of a cart at `cart` and a joint that swings at 7 rad/s; both are functions of time,
+    /// and give the cart's position, and amplitude and mean of the joint (counts).
+    fn after(
+        time_s: f32,
+        cart: impl Fn(f32) -> f32,
+        joint: impl Fn(f32) -> [f32; 2],
+    ) -> Result<[f32; 2], Inhibits> {
+        let mut swinging = Swinging::default();
+        for tick in 0..(time_s / TICK_S) as u32 {
+            let t = tick as f32 * TICK_S;
+            let [amplitude, mean] = joint(t);
+            let angle = mean + amplitude * libm::cosf(7.0 * t + 1.0);
+            let counts = [libm::roundf(cart(t)) as i32, libm::roundf(angle) as i32];
+            swinging.update(&counts, &STEPS, &[0, 6283], TICK_S);
+        }
+        swinging.zeros().copied()
+    }
+
+    #[test]
+    fn the_mean_of_a_decaying_swing_is_its_zero() {
+        let zeros = after(10.1, |_| 7.0, |t| [100.0 * libm::expf(-0.2 * t), 3141.3]).unwrap();
+        assert!(f32::abs(zeros[0] - 7.0) < 0.01 && f32::abs(zeros[1] - 3141.3) < 0.1, "{zeros:?}");
+    }
+
+    #[test]
+    fn what_is_not_known_is_refused() {
+        let swing = |_| [50.0, 0.0];
+        assert!(after(10.1, |_| 0.0, swing).is_ok());
+        assert_eq!(after(9.9, |_| 0.0, swing), Err(Inhibits::MOVING), "one window only");
+        assert_eq!(after(10.1, |_| 0.0, |_| [4.0, 0.0]), Err(Inhibits::MOVING), "it hardly swings");
+        let stuck = |t| if t < 5.0 { [50.0, 0.0] } else { [0.0, 1.0] };
+        assert_eq!(after(10.1, |_| 0.0, stuck), Err(Inhibits::MOVING), "it has stopped");
+        let pushed = |t| if t < 10.01 { 0.0 } else { 60.0 };
+        assert_eq!(after(10.1, pushed, swing), Err(Inhibits::MOVING), "the cart is elsewhere");
+        let contradicts = Err(Inhibits::MOVING.union(Inhibits::ZEROS));
+        assert_eq!(after(10.1, |_| 0.0, |t| [50.0, if t < 5.0 { 0.0 } else { 3.0 }]), contradicts);
+        assert!(after(10.1, |_| 0.0, |t| [50.0, if t < 5.0 { 0.0 } else { 1.0 }]).is_ok());
+        assert_eq!(after(10.1, |t| 30.0 * t, swing), contradicts, "the cart rolls away");
+    }
+
+    #[test]
+    fn after_homing_the_means_before_do_not_count() {
+        let mut swinging = Swinging::default();
+        let mut swing_for = |ticks: u32, zero: i32| {
+            for tick in 0..ticks {
+                let angle = zero as f32 + 50.0 * libm::cosf(7.0 * TICK_S * tick as f32);
+                swinging.update(&[0, angle as i32], &STEPS, &[0, 6283], TICK_S);
+            }
+            let zeros = swinging.zeros().map(|zeros| libm::roundf(zeros[1]));
+            swinging.forget();
+            zeros
+        };
+        assert_eq!(swing_for(5010, 20), Ok(20.0));
+        assert_eq!(swing_for(2600, 3141), Err(Inhibits::MOVING), "a window of both");
+        assert_eq!(swing_for(10_100, 3141), Ok(3141.0));
+    }
+}
