@@ -316,11 +316,7 @@ impl<'t, const NX: usize, const NY: usize, S: SwingUp<NX, NY>> Firmware<'t, NX, 
     fn follow(&mut self) -> [i32; NY] {
         self.controller.follow(&self.raw_counts);
         let counts = *self.controller.encoders().counts();
-        let limits = &self.table.limits;
-        self.calibration.update(&counts, limits);
-        if let Some(observer) = &self.table.observer {
-            self.calibration.update_swinging(&counts, &observer.step.data.0[0], limits, self.table.tick_s);
-        }
+        self.calibration.update(&counts, &self.table.limits);
         counts
     }
 
@@ -328,6 +324,12 @@ impl<'t, const NX: usize, const NY: usize, S: SwingUp<NX, NY>> Firmware<'t, NX, 
     fn tick_motor_off(&mut self) {
         let counts = self.follow();
         let limits = &self.table.limits;
+        // Not while armed, when the tick may go on with the control law.
+        if let Some(observer) = &self.table.observer
+            && self.supervisor.state() != State::Armed
+        {
+            self.calibration.update_swinging(&counts, &observer.step.data.0[0], limits, self.table.tick_s);
+        }
         self.bench_drive.wait();
         self.rearm_lockout_ticks = self.rearm_lockout_ticks.saturating_sub(1);
         match self.supervisor.state() {

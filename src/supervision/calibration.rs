@@ -53,7 +53,7 @@ impl<const NY: usize> Calibration<NY> {
         self.slow.update(counts, &limits.slow_counts);
     }
 
-    /// The same for links that swing out; `steps` is the travel per count (m or rad).
+    /// Takes the counts of a tick in which the links may swing out; `steps` is the travel per count (m or rad).
     pub fn update_swinging(
         &mut self,
         counts: &[i32; NY],
