@@ -170,7 +170,7 @@ mod tests {
         let mut swing_for = |ticks: u32, zero: i32| {
             for tick in 0..ticks {
                 let angle = zero as f32 + 50.0 * libm::cosf(7.0 * TICK_S * tick as f32);
-                swinging.update(&[0, angle as i32], &STEPS, &[0, 6283], TICK_S);
+                swinging.update(&[0, libm::roundf(angle) as i32], &STEPS, &[0, 6283], TICK_S);
             }
             let zeros = swinging.zeros().map(|zeros| libm::roundf(zeros[1]));
             swinging.forget();
