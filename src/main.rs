@@ -60,19 +60,18 @@ mod app {
     fn init(cx: init::Context) -> (Shared, Local) {
         let build = Build { rig_hash: RIG_HASH, tick_s: TICK_S };
         let table = &*cx.local.table;
-        let (hardware, line, firmware) = set_up(cx.device, cx.local.buffer, |start| {
-            Firmware::with_swing_up(table, &SWING_UP, &build, Hardware::WIDTHS, start)
-                .unwrap_or_else(|_| Firmware::unusable(table, &SWING_UP, Hardware::WIDTHS, start))
-        });
+        let (hardware, line, start) = set_up(cx.device, cx.local.buffer);
         let (to_control, commands) = cx.local.commands.split();
         let (messages, to_link) = cx.local.messages.split();
+        let firmware = Firmware::of_any_table(table, &SWING_UP, &build, Hardware::WIDTHS, start);
+        let mut control = ControlTask::new(firmware, hardware, commands, messages);
+        control.board().start_watchdog();
         let mut systick = cx.core.SYST;
         systick.set_clock_source(SystClkSource::Core);
         systick.set_reload(crate::CYCLES_PER_TICK - 1);
         systick.clear_current();
         systick.enable_interrupt();
         systick.enable_counter();
-        let control = ControlTask::new(firmware, hardware, commands, messages);
         (Shared {}, Local { control, link: SerialLink::new(to_control, to_link), line })
     }
 

@@ -78,11 +78,11 @@ impl<const NX: usize, const NY: usize, S: SwingUp<NX, NY>> Firmware<'_, NX, NY, 
         }
     }
 
-    /// Takes the present position as cart at 0, links hanging.
+    /// Takes the present position as cart at 0, links hanging or swinging about that.
     fn home_here(&mut self) -> Result<(), Inhibits> {
-        Inhibits::MOVING.when(!self.calibration.is_still(&self.table.limits)).err_if_any()?;
+        let position = self.calibration.hanging(self.controller.encoders().counts(), &self.table.limits)?;
         self.supervisor.complete_homing()?;
-        self.home(&self.table.limits.rest_counts);
+        self.home(&position);
         Ok(())
     }
 

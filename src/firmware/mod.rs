@@ -126,6 +126,23 @@ impl<'t, const NX: usize, const NY: usize, S: SwingUp<NX, NY>> Firmware<'t, NX, 
         Ok(Self::with_controller(table, swing_up, Controller::new(table, build, widths)?, start.into(), true))
     }
 
+    /// [`with_swing_up`](Self::with_swing_up), or [`unusable`](Self::unusable) if a table is. Without a result in between,
+    /// which would be a copy of the firmware on the stack.
+    #[inline(never)]
+    pub fn of_any_table(
+        table: &'t GainTable<NX, NY>,
+        swing_up: &'t S,
+        build: &Build,
+        widths: [CounterWidth; NY],
+        start: Start,
+    ) -> Self {
+        let are_sound = swing_up.check(build).is_ok() && table.check(build).is_ok();
+        match Controller::with_checked(table, widths) {
+            Ok(controller) if are_sound => Self::with_controller(table, swing_up, controller, start, true),
+            _ => Self::unusable(table, swing_up, widths, start),
+        }
+    }
+
     /// The firmware with a table that cannot be used: it has latched [`Fault::Table`] for good, and reports it.
     pub fn unusable(
         table: &'t GainTable<NX, NY>,
@@ -317,6 +334,12 @@ impl<'t, const NX: usize, const NY: usize, S: SwingUp<NX, NY>> Firmware<'t, NX, 
     fn tick_motor_off(&mut self) {
         let counts = self.follow();
         let limits = &self.table.limits;
+        // Not while armed, when the tick may go on with the control law.
+        if let Some(observer) = &self.table.observer
+            && self.supervisor.state() != State::Armed
+        {
+            self.calibration.update_swinging(&counts, &observer.step.data.0[0], limits, self.table.tick_s);
+        }
         self.bench_drive.wait();
         self.rearm_lockout_ticks = self.rearm_lockout_ticks.saturating_sub(1);
         match self.supervisor.state() {

@@ -39,9 +39,10 @@ pub struct Command {
 pub enum Request {
     /// Heartbeat: the host is alive. Nothing else.
     Beat,
-    /// Home here: the cart is at its zero, and the links hang still.
+    /// Home here: the cart is at its zero, and the links hang still or [swing](crate::supervision::swinging).
     Home,
-    /// Home by the limit switches: a person pushes the cart to both and then lets the links hang still.
+    /// Home by the limit switches: a person pushes the cart to both and then lets the links hang still
+    /// or swing.
     HomeRail,
     /// Start the [sign check](crate::supervision::sign_check).
     CheckSigns,

@@ -2,8 +2,10 @@
 
 use crate::board::Contacts;
 use crate::supervision::homing::{Homing, Rail, WrongTravel};
+use crate::supervision::inhibits::Inhibits;
 use crate::supervision::sign_check::{SignCheck, Signs};
 use crate::supervision::stillness::Stillness;
+use crate::supervision::swinging::Swinging;
 use crate::table::Limits;
 
 /// Progress of homing and sign check, and how long the rig has been still or slow.
@@ -14,6 +16,7 @@ pub struct Calibration<const NY: usize> {
     signs: SignCheck<NY>,
     still: Stillness<NY>,
     slow: Stillness<NY>,
+    swinging: Swinging<NY>,
 }
 
 impl<const NY: usize> Calibration<NY> {
@@ -25,6 +28,7 @@ impl<const NY: usize> Calibration<NY> {
             signs: SignCheck::new(&limits.sign_counts),
             still: Stillness::default(),
             slow: Stillness::default(),
+            swinging: Swinging::default(),
         }
     }
 
@@ -49,6 +53,36 @@ impl<const NY: usize> Calibration<NY> {
         self.slow.update(counts, &limits.slow_counts);
     }
 
+    /// Takes the counts of a tick in which the links may swing out; `steps` is the travel per count (m or rad).
+    pub fn update_swinging(
+        &mut self,
+        counts: &[i32; NY],
+        steps: &[f32; NY],
+        limits: &Limits<NY>,
+        tick_s: f32,
+    ) {
+        self.swinging.update(counts, steps, &limits.turn_counts, tick_s);
+    }
+
+    /// Position of each sensor (counts) if the cart is at 0, and the links hang still, or swing about hanging.
+    ///
+    /// # Errors
+    /// The inhibits of homing.
+    #[inline(never)]
+    pub fn hanging(&self, counts: &[i32; NY], limits: &Limits<NY>) -> Result<[i32; NY], Inhibits> {
+        let mut home = limits.rest_counts;
+        match self.swinging.zeros() {
+            Ok(zeros) => {
+                for ((home, &count), &zero) in home.iter_mut().zip(counts).zip(zeros) {
+                    let away = count as f32 - zero;
+                    *home = home.wrapping_add((away + f32::copysign(0.5, away)) as i32);
+                }
+            }
+            Err(inhibits) => inhibits.when(!self.is_still(limits)).err_if_any()?,
+        }
+        Ok(home)
+    }
+
     /// Whether nothing has moved by more than a count for [`Limits::still_ticks`], as homing requires.
     pub fn is_still(&self, limits: &Limits<NY>) -> bool {
         self.still.ticks() >= limits.still_ticks
@@ -67,6 +101,8 @@ impl<const NY: usize> Calibration<NY> {
     /// Records that positions are known.
     pub fn set_homed(&mut self) {
         self.homing = Homing::Homed;
+        // Its means are of counts from another position.
+        self.swinging.forget();
     }
 
     /// Starts homing by the limit switches.
@@ -76,7 +112,7 @@ impl<const NY: usize> Calibration<NY> {
     }
 
     /// One tick of homing by the limit switches. Gives the counts of all sensors once both switches were found, the
-    /// cart is off them, and everything is still.
+    /// cart is off them, and the links hang still or have swung for long enough.
     ///
     /// # Errors
     /// [`WrongTravel`]: the rail is not the one in the rig file; homing ends.
@@ -90,12 +126,12 @@ impl<const NY: usize> Calibration<NY> {
         let found = self.rail.update(cart, contacts, limits.travel_counts, limits.middle_counts);
         self.homing = if found.is_err() { Homing::WrongTravel } else { self.rail.progress() };
         let off_the_switches = !(contacts.limit_low || contacts.limit_high);
-        Ok(found?.filter(|_| off_the_switches && self.is_still(limits)).map(|position| {
-            let mut home = limits.rest_counts;
+        Ok(found?.filter(|_| off_the_switches).and_then(|position| {
+            let mut home = self.hanging(counts, limits).ok()?;
             if let Some(cart) = home.first_mut() {
                 *cart = position;
             }
-            home
+            Some(home)
         }))
     }
 

@@ -44,6 +44,7 @@ inhibits! {
     20 OTHER_LAW "the swing-up ends in another control law: select LQR";
     21 MOTOR "the motor's sign is not checked since power-up: drive the cart a little";
     22 NOT_SHAKEN "the rig is not being shaken: begin again";
+    23 ZEROS "the links swing about different zeros every 5 s: let go of them, hold the cart";
 }
 
 impl Inhibits {
@@ -110,7 +111,7 @@ mod tests {
                 .fold(Inhibits::NONE, |all, (inhibit, _)| all.union(*inhibit))
                 .texts()
                 .count(),
-            23
+            24
         );
         assert_eq!(Inhibits::NONE.err_if_any(), Ok(()));
         assert_eq!(both.err_if_any(), Err(both));

@@ -18,3 +18,4 @@ pub mod shaking;
 pub mod sign_check;
 pub mod stillness;
 pub mod supervisor;
+pub mod swinging;

@@ -8,16 +8,18 @@ use std::fmt::Write;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
+use upright::protocol::message::Request;
+use upright::supervision::supervisor::State;
 use upright::table::Law;
 use upright::table::checksum::crc32;
 use upright_design::design::design;
-use upright_design::harness::Recording;
+use upright_design::harness::{Pins, Recording, Session, Target};
 use upright_design::rig::Rig;
 use upright_design::simulate::{Scenario, simulate};
 use upright_design::swing_up::{Stored, hangs, motions, up_and_down, with_motions};
 use upright_design::table::{Gains, TableValues};
 use upright_tool::image::{Kind, build_for, build_if_possible, if_possible};
-use upright_tool::in_the_loop::{Link, Place, run};
+use upright_tool::in_the_loop::{Link, Place, RunError, run};
 
 /// Upper bound on the instructions in a tick of the image, with telemetry in every tick: 10 % above the count with
 /// Rust 1.96.
@@ -114,6 +116,48 @@ fn the_image_in_qemu_raises_and_lowers_the_links_with_the_bits_of_the_host() {
     // Negative control: the comparison sees another seed.
     let other = Scenario { seed: 8, ..scenario };
     assert!(run(&rig, &table, &other, Place::Host).unwrap().ticks != qemu.ticks);
+}
+
+/// Counts of the joints and state in all telemetry of a rig whose links swing out, about so many counts off, while homing is
+/// asked for.
+fn homed_swinging(table: &TableValues, off: f64, place: Place<'_>) -> Vec<(State, Vec<i32>)> {
+    let run = |target: &mut dyn Target| -> Result<_, RunError> {
+        let (mut session, mut seen) = (Session::new(target), Vec::new());
+        for tick in 0..11_000_u32 {
+            let t = f64::from(tick) * f64::from(table.tick_s);
+            let joint = |rate: f64| (off + 80.0 * (-0.2 * t).exp() * (rate * t).cos()).round() as i32 as u32;
+            let counts =
+                [0.0, 9.0, 11.0, 17.0, 23.0].map(|rate| if rate == 0.0 { 0 } else { joint(rate) & 0xffff });
+            let raw_counts = heapless::Vec::from_slice(&counts).unwrap();
+            let contacts = Default::default();
+            let received = heapless::Vec::new();
+            if tick.is_multiple_of(500) {
+                session.send(Request::Home);
+            }
+            session.tick(&Pins { raw_counts, supply_v: 12.0, contacts, received, sabotage: None })?;
+            seen.extend(
+                std::iter::from_fn(|| session.next_telemetry()).map(|at| (at.state, at.counts.to_vec())),
+            );
+        }
+        Ok(seen)
+    };
+    place.with_target(table, run).unwrap()
+}
+
+#[test]
+fn swinging_links_are_homed_in_qemu_with_the_bits_of_the_host() {
+    let Some(image) = image(Kind::InTheLoop) else { return };
+    let (_, table) = quadruple();
+    let host = homed_swinging(&table, 3.4, Place::Host);
+    assert!(homed_swinging(&table, 3.4, Place::Qemu { image: &image, link: Link::Files }) == host);
+    let homed = |seen: &[(State, Vec<i32>)]| {
+        let first = seen.windows(2).find(|pair| pair[1].0 == State::Calibrated)?;
+        Some(first[1].1[2] - first[0].1[2])
+    };
+    // Links 2 to 4 were 3.4 counts off; in between, they move by a count or two.
+    assert!(homed(&host).is_some_and(|moved| (-5..=-1).contains(&moved)), "{:?}", homed(&host));
+    // Negative control: other counts are seen.
+    assert!(homed_swinging(&table, 3.6, Place::Host) != host);
 }
 
 /// On the rig with the fewest bytes per second: over these lines, QEMU takes long for each.

@@ -42,13 +42,9 @@ pub(crate) struct Hardware {
     limits: [bool; 2],
 }
 
-/// Sets up all peripherals, with the motor off. Takes at most 150 ms, even if a peripheral does not respond. `start`
-/// takes what the board knows and makes what has to be ready before the watchdog runs.
-pub(crate) fn set_up<T>(
-    device: Peripherals,
-    buffer: &'static mut Buffer,
-    start: impl FnOnce(Start) -> T,
-) -> (Hardware, SerialLine, T) {
+/// Sets up all peripherals but the watchdog, with the motor off. Takes at most 150 ms, even if a peripheral does not
+/// respond. Gives what the board knows, too.
+pub(crate) fn set_up(device: Peripherals, buffer: &'static mut Buffer) -> (Hardware, SerialLine, Start) {
     let rcc = &device.RCC;
     clock::enable_peripherals(rcc);
     pins::set_up(&device.SYSCFG, &device.EXTI);
@@ -69,20 +65,26 @@ pub(crate) fn set_up<T>(
     pins::set_status_led(clock == Clock::Full && !wrong_chip && !motor.has_failed());
     // Clears flags that were set while the pull-ups charged the inputs.
     let _ = (motor.was_stopped(), pins::driver_fault_was_reported(&device.EXTI));
-    let started = start(Start { reset, crash, image: crash::image_checksum() });
     let hardware = Hardware {
         motor,
         supply,
         exti: device.EXTI,
         power: device.PWR,
-        watchdog: Watchdog::start(device.IWDG, clock),
+        watchdog: Watchdog::new(device.IWDG),
         clock_fault: clock == Clock::Fallback,
         wrong_chip,
         overrun: false,
         late_ticks: 0,
         limits: [false; 2],
     };
-    (hardware, line, started)
+    (hardware, line, Start { reset, crash, image: crash::image_checksum() })
+}
+
+impl Hardware {
+    /// Starts the watchdog. Everything has to be ready for the first tick.
+    pub(crate) fn start_watchdog(&self) {
+        self.watchdog.start(if self.clock_fault { Clock::Fallback } else { Clock::Full });
+    }
 }
 
 impl Board<SENSORS> for Hardware {

@@ -17,16 +17,22 @@ const COUNTS: u16 = {
 /// the watchdog's oscillator, 0.3 ms, once it has started.
 const PATIENCE: u32 = 100_000;
 
-/// The watchdog, running. Nothing can stop it (RM0090, 21.3).
+/// The watchdog. Once it runs, nothing can stop it (RM0090, 21.3).
 pub(super) struct Watchdog {
     registers: IWDG,
 }
 
 impl Watchdog {
+    /// The watchdog, not yet started.
+    pub(super) fn new(registers: IWDG) -> Self {
+        Self { registers }
+    }
+
     /// Starts the watchdog and waits until the values have arrived: until then, a restart would begin at the value
     /// after a reset, 512 ms (21.4.4). On the internal oscillator, ticks are 10.5 times as long; the watchdog then
     /// counts 16 times as slowly.
-    pub(super) fn start(registers: IWDG, clock: Clock) -> Self {
+    pub(super) fn start(&self, clock: Clock) {
+        let registers = &self.registers;
         let prescaler = if clock == Clock::Full { 0 } else { 4 };
         // SAFETY: keys, prescaler and reload value of RM0090, 21.4.
         unsafe {
@@ -37,9 +43,7 @@ impl Watchdog {
         }
         // If it waits in vain, the watchdog starts at 512 ms; the motor's timer does not need it.
         let _ = (0..PATIENCE).any(|_| registers.sr().read().bits() == 0);
-        let watchdog = Self { registers };
-        watchdog.feed();
-        watchdog
+        self.feed();
     }
 
     /// Restarts the watchdog's count.

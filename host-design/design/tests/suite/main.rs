@@ -1,6 +1,7 @@
 //! Tests of rig files, plant, design, simulation and verification. One program, so that linking happens once.
 
 mod design_properties;
+mod homing;
 mod identify;
 mod identify_coverage;
 mod known_friction;

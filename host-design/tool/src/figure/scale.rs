@@ -98,7 +98,9 @@ impl Ranged for Scale {
         // 1 is a tick wherever it is on the axis.
         let first = (low.log10().floor() as i32).div_euclid(every as i32) * every as i32;
         let powers = (first..=high.log10().ceil() as i32).step_by(every);
-        let points = powers.flat_map(|power| factors.iter().map(move |factor| factor * 10f64.powi(power)));
+        // The numbers nearest to these decimals: the product of 5 and a millionth is another one.
+        let nearest = |factor: &f64, power: i32| format!("{factor}e{power}").parse().unwrap_or(f64::NAN);
+        let points = powers.flat_map(|power| factors.iter().map(move |factor| nearest(factor, power)));
         points.filter(|point| (low..=high).contains(point)).collect()
     }
 

@@ -65,7 +65,9 @@ pub fn instruction(telemetry: &TelemetryOfAny) -> Option<String> {
             Some("push the cart to the switch at the low end".to_owned())
         }
         (Homing::Touch { .. }, _) => Some("push the cart to the switch at the high end".to_owned()),
-        (Homing::HoldStill, _) => Some("let the links hang still, away from the switches".to_owned()),
+        (Homing::HoldStill, _) => {
+            Some("let the links hang still, or swing for 15 s, away from the switches".to_owned())
+        }
         (Homing::WrongTravel, _) => {
             Some("the switches are not as far apart as the rig file says; check them, home again".to_owned())
         }

@@ -5,7 +5,9 @@ use crate::figure::{Axis, Curve, Figure, Panel};
 use upright_design::verify::{CornerSettings, Imperfections, Standing, Unverifiable, corners, limit_cycle};
 
 /// Errors of the masses for which every combination is run (%).
-const PERCENTS: [f64; 7] = [2.0, 5.0, 7.0, 10.0, 15.0, 20.0, 30.0];
+const PERCENTS: [f64; 9] = [2.0, 5.0, 7.0, 10.0, 15.0, 20.0, 30.0, 50.0, 70.0];
+/// Larger ones only as long as all combinations stand (%).
+const ENOUGH_PERCENT: f64 = 30.0;
 /// With more links there are too many combinations for each percentage.
 const MOST_LINKS: usize = 5;
 
@@ -89,7 +91,7 @@ pub(super) fn wrong_masses(source: &Source<'_>) -> Result<Option<Figure>, Unveri
         for percent in PERCENTS {
             let tried = corners(rig, table, found.law, percent, &settings)?;
             points.push([percent, 100.0 * tried.stand as f64 / tried.corners as f64]);
-            if tried.stand == 0 {
+            if tried.stand == 0 || (percent >= ENOUGH_PERCENT && tried.stand < tried.corners) {
                 break;
             }
         }

@@ -40,6 +40,17 @@ fn axes_name_quantity_and_unit() {
 }
 
 #[test]
+fn ticks_of_a_logarithmic_axis_are_short_numbers() {
+    for power in -9..6 {
+        let low = 10f64.powi(power);
+        let panel = Panel::new(Axis::log("x"), Axis::linear("y"));
+        let svg = one(panel.with(Curve::line("", 0, vec![[low, 0.0], [60.0 * low, 1.0]]))).svg().unwrap();
+        // 5 times a millionth is 4.9999999999999996e-6.
+        assert!(!svg.contains("99999") && !svg.contains("00000000"), "{power}");
+    }
+}
+
+#[test]
 fn text_from_a_rig_file_cannot_become_markup() {
     let svg = one(plain().with(Curve::line("<script>alert(1)</script>", 0, wave(1.0)))).svg().unwrap();
     assert!(!svg.contains("<script"));

@@ -119,21 +119,28 @@ fn the_margins_in_the_bode_plot_are_on_the_curve() {
 fn imperfections_have_a_table_and_two_figures_where_they_are_asked_for() {
     let plain = &SINGLE;
     assert!(!plain.html.contains("id=\"imperfections\""));
-    let report = report_with_imperfections(&crate::report_rigs::rig("single-quanser-ip02"));
-    assert!(report.html.contains("id=\"imperfections\"") && report.html.len() < LARGEST);
-    for key in ["joint_friction_n_m", "parameter_spread_percent"] {
-        assert_eq!(report.html.matches(&format!("<td><code>{key}</code></td>")).count(), 1, "{key}");
+    for name in ["single-quanser-ip02", "double-quanser-dbpen", "quadruple-paper"] {
+        let report = report_with_imperfections(&crate::report_rigs::rig(name));
+        assert!(report.html.contains("id=\"imperfections\"") && report.html.len() < LARGEST, "{name}");
+        for key in ["joint_friction_n_m", "parameter_spread_percent"] {
+            assert_eq!(
+                report.html.matches(&format!("<td><code>{key}</code></td>")).count(),
+                1,
+                "{name} {key}"
+            );
+        }
+        let pictures: Vec<&str> = report.pictures.iter().map(|one| &*one.name).collect();
+        assert!(pictures.ends_with(&["limit-cycle", "wrong-masses"]), "{name} {pictures:?}");
+        let csv = |figure: &str| {
+            let picture = report.pictures.iter().find(|one| one.name == figure).unwrap();
+            let rows = picture.csv.as_ref().unwrap().lines().filter(|line| line.contains(",LQR,"));
+            let numbers =
+                rows.map(|line| line.split(',').skip(3).take(2).map(|x| x.parse().unwrap()).collect());
+            numbers.collect::<Vec<Vec<f64>>>()
+        };
+        // More friction makes a larger limit cycle; no mass error at all is stood.
+        let cycle = csv("limit-cycle");
+        assert!(cycle.len() >= 5 && cycle[cycle.len() - 1][1] > 2.0 * cycle[0][1], "{name} {cycle:?}");
+        assert_eq!(csv("wrong-masses")[0], [0.0, 100.0], "{name}");
     }
-    let more: Vec<&str> = report.pictures[plain.pictures.len()..].iter().map(|one| &*one.name).collect();
-    assert_eq!(more, ["limit-cycle", "wrong-masses"]);
-    let csv = |name: &str| {
-        let picture = report.pictures.iter().find(|one| one.name == name).unwrap();
-        let rows = picture.csv.as_ref().unwrap().lines().filter(|line| line.contains(",LQR,"));
-        let numbers = rows.map(|line| line.split(',').skip(3).take(2).map(|x| x.parse().unwrap()).collect());
-        numbers.collect::<Vec<Vec<f64>>>()
-    };
-    // More friction makes a larger limit cycle; no mass error at all is stood.
-    let cycle = csv("limit-cycle");
-    assert!(cycle.len() >= 5 && cycle[cycle.len() - 1][1] > 2.0 * cycle[0][1], "{cycle:?}");
-    assert_eq!(csv("wrong-masses")[0], [0.0, 100.0]);
 }

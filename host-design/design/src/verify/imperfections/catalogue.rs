@@ -62,7 +62,7 @@ pub static IMPERFECTIONS: [Imperfection; 10] = [
         unit: "rad",
         typical: [1e-3, 1e-2],
         source: "a hanging link stops within F / (m g c) of the vertical: friction over weight times distance",
-        remedy: "tap the hanging links before homing; integral action brings the cart back",
+        remedy: "home while the links swing out; integral action brings the cart back",
         requirement: "runs within the limits (homing_error_rad)",
         required: |verify| verify.homing_error_rad,
         set: |reality, size| reality.sensors.homing_error_rad = PerJoint::all(size),
