@@ -19,8 +19,10 @@ const FACTORS: [f64; 4] = [1.2, 1.5, 2.0, 3.0];
 const NARROWER: [f64; 4] = [0.8, 0.6, 0.4, 0.2];
 
 /// What came of a changed rig file.
-#[derive(Debug, Default)]
+#[derive(Debug)]
 struct Outcome {
+    /// Candidates tried.
+    tried: u64,
     /// Candidates that were solved.
     solved: usize,
     /// Random runs of the best one.
@@ -28,18 +30,18 @@ struct Outcome {
 }
 
 impl Outcome {
-    /// Of the first candidates of the search for the motion `way` of `rig`.
-    fn of(rig: &Rig, way: Way) -> Result<Self, SwingUpError> {
+    /// Of the first `tried` candidates of the search for the motion `way` of `rig`.
+    fn of(rig: &Rig, way: Way, tried: u64) -> Result<Self, SwingUpError> {
         let setting = Setting::of(rig)?;
         let request = Request::of(&setting);
-        let mut found = candidates(&setting, &request, way, 0..TRIED, &|_| ())?;
+        let mut found = candidates(&setting, &request, way, 0..tried, &|_| ())?;
         let solved = found.len();
         found.retain(|candidate| check(&setting, &candidate.motion, way).is_ok());
         found.sort_by(|a, b| a.score.total_cmp(&b.score));
         let runs = |motion| random_runs(&setting, motion, way, &request.spread, 1, RUNS);
         let all = found.iter().take(KEPT).map(|candidate| runs(&candidate.motion));
         let all: Vec<Runs> = all.collect::<Result<_, _>>()?;
-        Ok(Self { solved, runs: all.into_iter().max_by_key(|runs| runs.stood) })
+        Ok(Self { tried, solved, runs: all.into_iter().max_by_key(|runs| runs.stood) })
     }
 
     /// Whether it is a motion that would be stored.
@@ -48,11 +50,12 @@ impl Outcome {
     }
 
     fn text(&self) -> String {
-        match &self.runs {
+        let Self { tried, solved, runs } = self;
+        match runs {
             Some(Runs { stood, runs, .. }) => {
-                format!("{} of {TRIED} candidates solved, {stood} of {runs} random runs arrive", self.solved)
+                format!("{solved} of {tried} candidates solved, {stood} of {runs} random runs arrive")
             }
-            None => format!("none of {TRIED} candidates solved"),
+            None => format!("none of {tried} candidates solved"),
         }
     }
 }
@@ -69,10 +72,14 @@ pub(super) fn is_enough(rig: &Rig, runs: &Runs) -> bool {
 /// # Errors
 /// [`SwingUpError`] if the rig cannot be raised at all.
 pub(super) fn advice(rig: &Rig, way: Way) -> Result<String, SwingUpError> {
+    advice_from(rig, way, TRIED)
+}
+
+fn advice_from(rig: &Rig, way: Way, tried: u64) -> Result<String, SwingUpError> {
     let longest_s = Request::of(&Setting::of(rig)?).duration_s[1];
     let (mut helps, mut no_help): (Vec<Help>, Vec<String>) = Default::default();
     for limit in Limit::ALL {
-        match tried(rig, way, &[limit], longest_s)? {
+        match relaxed(rig, way, tried, &[limit], longest_s)? {
             Some(Tried::Helps(help)) => helps.push(help),
             Some(Tried::NoHelp(text)) => no_help.push(text),
             None => {}
@@ -84,7 +91,7 @@ pub(super) fn advice(rig: &Rig, way: Way) -> Result<String, SwingUpError> {
         Some(Help { name, .. }) => {
             format!("what binds is the {name}; there is a motion with {}", texts.join(", or with "))
         }
-        None => match tried(rig, way, &Limit::ALL, longest_s)? {
+        None => match relaxed(rig, way, tried, &Limit::ALL, longest_s)? {
             Some(Tried::Helps(help)) => format!("no limit binds alone; there is a motion with {}", help.text),
             _ => "no limit binds alone, and more of everything does not help".to_owned(),
         },
@@ -111,13 +118,19 @@ struct Help {
 }
 
 /// Relaxes all of `limits` by the same factor, more and more until it helps. None if the rig has none of them.
-fn tried(rig: &Rig, way: Way, limits: &[Limit], longest_s: f64) -> Result<Option<Tried>, SwingUpError> {
+fn relaxed(
+    rig: &Rig,
+    way: Way,
+    tried: u64,
+    limits: &[Limit],
+    longest_s: f64,
+) -> Result<Option<Tried>, SwingUpError> {
     let mut last = None;
     for factor in FACTORS {
         let mut remedy = Remedy::of(rig);
-        let relaxed = limits.iter().filter(|limit| limit.relax(&mut remedy, longest_s, factor).is_some());
-        let Some(name) = relaxed.map(|limit| limit.name()).reduce(|first, _| first) else { return Ok(None) };
-        let outcome = Outcome::of(&remedy.rig, way)?;
+        let changed = limits.iter().filter(|limit| limit.relax(&mut remedy, longest_s, factor).is_some());
+        let Some(name) = changed.map(|limit| limit.name()).reduce(|first, _| first) else { return Ok(None) };
+        let outcome = Outcome::of(&remedy.rig, way, tried)?;
         let text = format!("{} ({})", remedy.text(), outcome.text());
         if outcome.is_good(&remedy.rig) {
             return Ok(Some(Tried::Helps(Help { factor, name, text })));
@@ -153,6 +166,9 @@ mod tests {
     use super::*;
     use crate::rig::with_value;
 
+    /// Candidates: enough to find a motion.
+    const FEW: u64 = 3;
+
     /// The file of the single, with more values.
     fn single(values: &str) -> Rig {
         let mut text = std::fs::read_to_string("../../rigs/single-quanser-ip02.toml").unwrap();
@@ -166,8 +182,8 @@ mod tests {
     #[test]
     fn every_advised_number_gives_a_motion() {
         let short = "swing_up.longest_s = 2.2";
-        assert_eq!(Outcome::of(&single(short), Way::Up).unwrap().solved, 0);
-        let text = advice(&single(short), Way::Up).unwrap();
+        assert_eq!(Outcome::of(&single(short), Way::Up, FEW).unwrap().solved, 0);
+        let text = advice_from(&single(short), Way::Up, FEW).unwrap();
         println!("{text}");
         let (helps, no_help) = text.split_once("; there is none with ").unwrap();
         let (binds, helps) = helps.split_once("; there is a motion with ").unwrap();
@@ -179,7 +195,7 @@ mod tests {
             for change in advised.split(", or with ") {
                 let (values, found) = change.split_once(" (").unwrap();
                 let rig = single(&format!("{short} and {values}"));
-                let outcome = Outcome::of(&rig, Way::Up).unwrap();
+                let outcome = Outcome::of(&rig, Way::Up, FEW).unwrap();
                 assert_eq!(outcome.text(), found.trim_end_matches(')'), "{change}");
                 assert_eq!(outcome.is_good(&rig), is_good, "{change}");
             }

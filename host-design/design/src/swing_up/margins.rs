@@ -200,3 +200,38 @@ impl Push {
         (-self.force_n * libm::cos(across), torques_n_m)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The work of the force on a small move of any coordinate is that of the generalised forces.
+    #[test]
+    fn a_push_is_across_the_end_of_its_link() {
+        let rig = Rig::from_path("../../rigs/quadruple-paper.toml".as_ref()).unwrap();
+        let PlantDescription::Chain(chain) = &rig.plant else { panic!() };
+        let state = [0.1, 0.2, 0.7, 0.3, -1.9, 0.4, 2.2, 0.5, 0.6, 0.7];
+        for link in 0..4 {
+            let end = |state: &[f64]| {
+                absolute_angles(state).zip(&chain.links).take(link + 1).fold(
+                    [state[0], 0.0],
+                    |[x, y], (angle, link)| {
+                        [x - link.length_m * libm::sin(angle), y + link.length_m * libm::cos(angle)]
+                    },
+                )
+            };
+            let phi = absolute_angles(&state).nth(link).unwrap();
+            let push = Push { tick: 0, link, force_n: 0.3 };
+            let force = [-libm::cos(phi), -libm::sin(phi)].map(|part| push.force_n * part);
+            let (cart_n, torques_n_m) = push.on(&rig, &state);
+            for (coordinate, generalised) in [cart_n].into_iter().chain(torques_n_m).enumerate() {
+                let small = 1e-6;
+                let mut moved = state;
+                moved[2 * coordinate] += small;
+                let (from, to) = (end(&state), end(&moved));
+                let work: f64 = (0..2).map(|axis| force[axis] * (to[axis] - from[axis])).sum();
+                assert!((work / small - generalised).abs() < 1e-6, "{link}, {coordinate}: {generalised}");
+            }
+        }
+    }
+}
