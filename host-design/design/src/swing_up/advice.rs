@@ -2,7 +2,7 @@
 
 use super::SwingUpError;
 use super::check::check;
-use super::plan::RUNS;
+use super::plan::{Progress, RUNS, Trying};
 use super::remedy::{Limit, Remedy};
 use super::robustness::{Runs, random_runs};
 use super::search::{Request, candidates};
@@ -71,15 +71,20 @@ pub(super) fn is_enough(rig: &Rig, runs: &Runs) -> bool {
 ///
 /// # Errors
 /// [`SwingUpError`] if the rig cannot be raised at all.
-pub(super) fn advice(rig: &Rig, way: Way) -> Result<String, SwingUpError> {
-    advice_from(rig, way, TRIED)
+pub(super) fn advice(rig: &Rig, way: Way, progress: Progress<'_>) -> Result<String, SwingUpError> {
+    progress(Trying::Stage {
+        way,
+        what: "what would help",
+        steps: (Limit::ALL.len() * FACTORS.len()) as u64,
+    });
+    advice_from(rig, way, TRIED, &|| progress(Trying::Step { score: None }))
 }
 
-fn advice_from(rig: &Rig, way: Way, tried: u64) -> Result<String, SwingUpError> {
+fn advice_from(rig: &Rig, way: Way, tried: u64, done: &dyn Fn()) -> Result<String, SwingUpError> {
     let longest_s = Request::of(&Setting::of(rig)?).duration_s[1];
     let (mut helps, mut no_help): (Vec<Help>, Vec<String>) = Default::default();
     for limit in Limit::ALL {
-        match relaxed(rig, way, tried, &[limit], longest_s)? {
+        match relaxed(rig, way, tried, &[limit], longest_s, done)? {
             Some(Tried::Helps(help)) => helps.push(help),
             Some(Tried::NoHelp(text)) => no_help.push(text),
             None => {}
@@ -91,7 +96,7 @@ fn advice_from(rig: &Rig, way: Way, tried: u64) -> Result<String, SwingUpError> 
         Some(Help { name, .. }) => {
             format!("what binds is the {name}; there is a motion with {}", texts.join(", or with "))
         }
-        None => match relaxed(rig, way, tried, &Limit::ALL, longest_s)? {
+        None => match relaxed(rig, way, tried, &Limit::ALL, longest_s, done)? {
             Some(Tried::Helps(help)) => format!("no limit binds alone; there is a motion with {}", help.text),
             _ => "no limit binds alone, and more of everything does not help".to_owned(),
         },
@@ -124,6 +129,7 @@ fn relaxed(
     tried: u64,
     limits: &[Limit],
     longest_s: f64,
+    done: &dyn Fn(),
 ) -> Result<Option<Tried>, SwingUpError> {
     let mut last = None;
     for factor in FACTORS {
@@ -131,6 +137,7 @@ fn relaxed(
         let changed = limits.iter().filter(|limit| limit.relax(&mut remedy, longest_s, factor).is_some());
         let Some(name) = changed.map(|limit| limit.name()).reduce(|first, _| first) else { return Ok(None) };
         let outcome = Outcome::of(&remedy.rig, way, tried)?;
+        done();
         let text = format!("{} ({})", remedy.text(), outcome.text());
         if outcome.is_good(&remedy.rig) {
             return Ok(Some(Tried::Helps(Help { factor, name, text })));
@@ -183,7 +190,7 @@ mod tests {
     fn every_advised_number_gives_a_motion() {
         let short = "swing_up.longest_s = 2.2";
         assert_eq!(Outcome::of(&single(short), Way::Up, FEW).unwrap().solved, 0);
-        let text = advice_from(&single(short), Way::Up, FEW).unwrap();
+        let text = advice_from(&single(short), Way::Up, FEW, &|| ()).unwrap();
         println!("{text}");
         let (helps, no_help) = text.split_once("; there is none with ").unwrap();
         let (binds, helps) = helps.split_once("; there is a motion with ").unwrap();

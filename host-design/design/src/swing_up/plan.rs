@@ -157,7 +157,7 @@ fn best(
     progress(Trying::Stage { way, what: "trajectories", steps: tried });
     let mut solved = candidates(setting, request, way, 0..tried, &|score| progress(Trying::Step { score }))?;
     if solved.is_empty() {
-        return Err(SwingUpError::NoTrajectory { way, tried, help: advice(setting.rig, way)? });
+        return Err(SwingUpError::NoTrajectory { way, tried, help: advice(setting.rig, way, progress)? });
     }
     let count = solved.len();
     solved.sort_by(|a, b| a.score.total_cmp(&b.score));
@@ -217,7 +217,7 @@ fn judgement(
             random_runs(&setting, &motion, way, &Request::of(&setting).spread, 1, RUNS)
         })?;
         if search.is_some() {
-            help = format!("{help}; {}", advice(setting.rig, way)?);
+            help = format!("{help}; {}", advice(setting.rig, way, progress)?);
         }
         let needed = setting.rules.success_percent;
         return Err(SwingUpError::NotRobust { way, stood: runs.stood, runs: RUNS, needed, help });

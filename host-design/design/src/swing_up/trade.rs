@@ -4,7 +4,7 @@ use serde::Serialize;
 
 use super::SwingUpError;
 use super::plan::{Progress, Trying};
-use super::robustness::{Runs, random_runs};
+use super::robustness::{Runs, Spread, random_runs};
 use super::search::{Candidate, Request, candidates};
 use super::setting::Setting;
 use super::way::Way;
@@ -24,8 +24,10 @@ pub struct Solved {
     pub position_m: f64,
     /// Fragility: the smaller, the more errors of masses and friction it stands.
     pub score: f64,
-    /// Random runs with the spreads of `[swing_up]`.
+    /// Random runs with the spreads of masses and friction of `[swing_up]`.
     pub runs: Runs,
+    /// The same with twice the spreads.
+    pub wider: Runs,
 }
 
 /// Of `tried` candidates of the search for a raising, those that are solved, in their order. Seed 1 stands for the first
@@ -41,10 +43,13 @@ pub fn solved(rig: &Rig, tried: u64, seed: u64, progress: Progress<'_>) -> Resul
     let step = |score| progress(Trying::Step { score });
     let found = candidates(&setting, &request, way, first..first.saturating_add(tried), &step)?;
     progress(Trying::Stage { way, what: "random runs", steps: found.len() as u64 });
+    let Spread { mass, friction, .. } = request.spread;
+    let twice = Spread { mass: 2.0 * mass, friction: 2.0 * friction, ..request.spread };
     let largest = |most: f64, value: f64| most.max(value.abs());
     let judged = |candidate: &Candidate| {
         let (motion, score) = (&candidate.motion, candidate.score);
-        let runs = random_runs(&setting, motion, way, &request.spread, seed, RUNS)?;
+        let runs = |spread: &Spread| random_runs(&setting, motion, way, spread, seed, RUNS);
+        let (runs, wider) = (runs(&request.spread)?, runs(&twice)?);
         step(Some(score));
         Ok(Solved {
             duration_s: motion.duration_s(),
@@ -52,6 +57,7 @@ pub fn solved(rig: &Rig, tried: u64, seed: u64, progress: Progress<'_>) -> Resul
             position_m: motion.x.iter().map(|x| x[0]).fold(0.0, largest),
             score,
             runs,
+            wider,
         })
     };
     found.iter().map(judged).collect()

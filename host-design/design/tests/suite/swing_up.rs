@@ -5,7 +5,9 @@ use std::path::{Path, PathBuf};
 use crate::published::{certified, table};
 use upright_design::numerics::Matrix;
 use upright_design::rig::{PlantDescription, Rig};
-use upright_design::swing_up::{Script, Stored, SwingUp, SwingUpError, judge, motions, with_motions};
+use upright_design::swing_up::{
+    Script, Solved, Stored, SwingUp, SwingUpError, judge, motions, solved, with_motions,
+};
 
 const RIGS: [&str; 4] =
     ["single-quanser-ip02", "double-quanser-dbpen", "triple-glueck-eder-kugi", "quadruple-paper"];
@@ -126,6 +128,24 @@ fn the_errors_that_a_fragile_motion_would_stand_are_told() {
     };
     let found = with(number("mass"), number("friction")).unwrap();
     assert!(found > stood && help.starts_with(&format!("{found} of 200 arrive with ")), "{found}: {help}");
+}
+
+#[test]
+fn candidates_are_the_same_for_a_seed_and_fewer_runs_arrive_with_larger_errors() {
+    let (mut rig, _) = rig_and_stored("single-quanser-ip02");
+    let all = solved(&rig, 16, 1, &|_| ()).unwrap();
+    let [first, second] = [1, 2].map(|seed| solved(&rig, 8, seed, &|_| ()).unwrap());
+    println!("{all:?}");
+    assert!(!first.is_empty() && all.len() >= 2, "{}", all.len());
+    assert_eq!(all[..first.len()], first);
+    // Seed 2 goes on where seed 1 has ended, with other runs.
+    let durations = |some: &[Solved]| some.iter().map(|one| one.duration_s).collect::<Vec<_>>();
+    assert_eq!(durations(&all[first.len()..]), durations(&second));
+    let rules = rig.swing_up.as_mut().unwrap();
+    (rules.mass_spread_percent, rules.friction_spread_percent) = (60.0, 60.0);
+    let wrong = solved(&rig, 8, 1, &|_| ()).unwrap();
+    let stood = |some: &[Solved]| some.iter().map(|one| one.runs.stood).sum::<usize>();
+    assert!(stood(&wrong) < stood(&first), "{wrong:?}");
 }
 
 #[test]
