@@ -67,11 +67,6 @@ where
     Ok(batches.into_iter().flatten().collect())
 }
 
-/// Whether `holds` for any item. After the first, items behind it are left out.
-pub fn any<I: Copy + Sync>(items: impl IntoIterator<Item = I>, holds: impl Fn(I) -> bool + Sync) -> bool {
-    try_map(items, |item| if holds(item) { Err(()) } else { Ok(()) }).is_err()
-}
-
 /// The results of two computations at the same time.
 pub fn both<A: Send, B: Send>(a: impl FnOnce() -> A + Send, b: impl FnOnce() -> B + Send) -> (A, B) {
     rayon::join(a, b)
@@ -84,13 +79,12 @@ fn for_each(count: usize, one: &(dyn Fn(usize) + Sync)) {
 
 #[cfg(test)]
 mod tests {
-    use super::{any, map, try_map};
+    use super::{map, try_map};
 
     #[test]
     fn results_come_in_the_order_of_the_items() {
         assert_eq!(map(0..1000, |number| number * number), (0..1000).map(|n| n * n).collect::<Vec<u64>>());
         assert_eq!(map([0; 0], |number| number), [0; 0]);
-        assert!(any(0..100, |number| number == 70) && !any(0..100, |number| number == 100));
     }
 
     #[test]

@@ -1,111 +1,234 @@
-//! What would help when there is no motion: the same search with one limit relaxed.
+//! What would help when there is no motion: the search again with other values in the rig file.
 
-use super::search::{Request, is_solvable};
+use super::SwingUpError;
+use super::check::check;
+use super::plan::{Progress, RUNS, Trying};
+use super::remedy::{Limit, Remedy};
+use super::robustness::{Runs, random_runs};
+use super::search::{Request, candidates};
 use super::setting::Setting;
 use super::way::Way;
-use crate::parallel;
+use crate::rig::Rig;
 
-/// Candidates tried with each relaxation.
+/// Candidates tried with each change, of which so many with the best scores go through the random runs.
 const TRIED: u64 = 12;
-/// Factors by which a limit is relaxed, one after the other, until a candidate is solved.
-const FACTORS: [f64; 2] = [1.4, 2.0];
+const KEPT: usize = 3;
+/// Factors by which a limit is relaxed, one after the other, until there is a motion.
+const FACTORS: [f64; 4] = [1.2, 1.5, 2.0, 3.0];
+/// Factors by which the errors that a motion has to stand are made smaller.
+const NARROWER: [f64; 4] = [0.8, 0.6, 0.4, 0.2];
 
-/// A limit of plans.
-struct Limit {
-    name: &'static str,
-    unit: &'static str,
-    /// Its largest value in a plan; none if the rig has no such limit.
-    value: fn(&Request) -> Option<f64>,
-    relax: fn(&mut Request, f64),
+/// What came of a changed rig file.
+#[derive(Debug)]
+struct Outcome {
+    /// Candidates tried.
+    tried: u64,
+    /// Candidates that were solved.
+    solved: usize,
+    /// Random runs of the best one.
+    runs: Option<Runs>,
 }
 
-const LIMITS: [Limit; 4] = [
-    Limit {
-        name: "rail",
-        unit: "m to each side",
-        value: |request| Some(request.rail_m[1]),
-        relax: |request, factor| request.rail_m = request.rail_m.map(|end| factor * end),
-    },
-    Limit {
-        name: "force",
-        unit: "N",
-        value: |request| Some(request.force_n[1]),
-        relax: |request, factor| {
-            request.force_n = request.force_n.map(|force| factor * force);
-            request.bounds.motor = request.bounds.motor.map(|[stall, loss]| [factor * stall, loss]);
-        },
-    },
-    Limit {
-        name: "speed of the cart",
-        unit: "m/s",
-        value: |request| request.bounds.speed_m_per_s,
-        relax: |request, factor| {
-            request.bounds.speed_m_per_s = request.bounds.speed_m_per_s.map(|speed| factor * speed);
-        },
-    },
-    Limit {
-        name: "duration",
-        unit: "s",
-        value: |request| Some(request.duration_s[1]),
-        relax: |request, factor| request.duration_s = request.duration_s.map(|duration| factor * duration),
-    },
-];
+impl Outcome {
+    /// Of the first `tried` candidates of the search for the motion `way` of `rig`.
+    fn of(rig: &Rig, way: Way, tried: u64) -> Result<Self, SwingUpError> {
+        let setting = Setting::of(rig)?;
+        let request = Request::of(&setting);
+        let mut found = candidates(&setting, &request, way, 0..tried, &|_| ())?;
+        let solved = found.len();
+        found.retain(|candidate| check(&setting, &candidate.motion, way).is_ok());
+        found.sort_by(|a, b| a.score.total_cmp(&b.score));
+        let runs = |motion| random_runs(&setting, motion, way, &request.spread, 1, RUNS);
+        let all = found.iter().take(KEPT).map(|candidate| runs(&candidate.motion));
+        let all: Vec<Runs> = all.collect::<Result<_, _>>()?;
+        Ok(Self { tried, solved, runs: all.into_iter().max_by_key(|runs| runs.stood) })
+    }
 
-/// The limit that binds: that of which the smallest factor helps; and what helps else, with the values that plans then
-/// have.
-pub(super) fn advice(setting: &Setting<'_>, request: &Request, way: Way) -> String {
-    advice_from(setting, request, way, TRIED)
-}
+    /// Whether it is a motion that would be stored.
+    fn is_good(&self, rig: &Rig) -> bool {
+        self.runs.as_ref().is_some_and(|runs| is_enough(rig, runs))
+    }
 
-fn advice_from(setting: &Setting<'_>, request: &Request, way: Way, tried: u64) -> String {
-    let solvable =
-        |request: &Request| parallel::any(0..tried, |number| is_solvable(setting, request, way, number));
-    let (mut helps, mut no_help): (Vec<(f64, &str, String)>, Vec<String>) = Default::default();
-    for Limit { name, unit, value, relax } in LIMITS {
-        let Some(value) = value(request) else { continue };
-        let relaxed = |factor: f64| {
-            let mut request = request.clone();
-            relax(&mut request, factor);
-            request
-        };
-        let text = |factor: f64| format!("{factor} times the {name} ({:.3} {unit})", factor * value);
-        match FACTORS.into_iter().find(|&factor| solvable(&relaxed(factor))) {
-            Some(factor) => helps.push((factor, name, text(factor))),
-            None => no_help.push(text(FACTORS[FACTORS.len() - 1])),
+    fn text(&self) -> String {
+        let Self { tried, solved, runs } = self;
+        match runs {
+            Some(Runs { stood, runs, .. }) => {
+                format!("{solved} of {tried} candidates solved, {stood} of {runs} random runs arrive")
+            }
+            None => format!("none of {tried} candidates solved"),
         }
     }
-    helps.sort_by(|(a, ..), (b, ..)| a.total_cmp(b));
-    let texts: Vec<String> = helps.iter().map(|(.., text)| text.clone()).collect();
-    let mut advice = match helps.first() {
-        Some((_, name, _)) => {
-            format!("what binds is the {name}: one of {tried} is solved with {}", texts.join(", or with "))
+}
+
+/// Whether the lower end of the interval is as high as `[swing_up]` asks for.
+pub(super) fn is_enough(rig: &Rig, runs: &Runs) -> bool {
+    let needed = rig.swing_up.clone().unwrap_or_default().success_percent;
+    100.0 * runs.interval[0] >= needed
+}
+
+/// The limit that binds: that of which the smallest factor helps; and what helps else. Each number was tried: with it in
+/// the rig file there is a motion `way`, or none.
+///
+/// # Errors
+/// [`SwingUpError`] if the rig cannot be raised at all.
+pub(super) fn advice(rig: &Rig, way: Way, progress: Progress<'_>) -> Result<String, SwingUpError> {
+    progress(Trying::Stage {
+        way,
+        what: "what would help",
+        steps: (Limit::ALL.len() * FACTORS.len()) as u64,
+    });
+    advice_from(rig, way, TRIED, &|| progress(Trying::Step { score: None }))
+}
+
+fn advice_from(rig: &Rig, way: Way, tried: u64, done: &dyn Fn()) -> Result<String, SwingUpError> {
+    let longest_s = Request::of(&Setting::of(rig)?).duration_s[1];
+    let (mut helps, mut no_help): (Vec<Help>, Vec<String>) = Default::default();
+    for limit in Limit::ALL {
+        match relaxed(rig, way, tried, &[limit], longest_s, done)? {
+            Some(Tried::Helps(help)) => helps.push(help),
+            Some(Tried::NoHelp(text)) => no_help.push(text),
+            None => {}
         }
-        None => "no limit binds alone".to_owned(),
+    }
+    helps.sort_by(|a, b| a.factor.total_cmp(&b.factor));
+    let texts: Vec<String> = helps.iter().map(|help| help.text.clone()).collect();
+    let mut advice = match helps.first() {
+        Some(Help { name, .. }) => {
+            format!("what binds is the {name}; there is a motion with {}", texts.join(", or with "))
+        }
+        None => match relaxed(rig, way, tried, &Limit::ALL, longest_s, done)? {
+            Some(Tried::Helps(help)) => format!("no limit binds alone; there is a motion with {}", help.text),
+            _ => "no limit binds alone, and more of everything does not help".to_owned(),
+        },
     };
     if !no_help.is_empty() {
-        advice += &format!("; none of {tried} is solved with {}", no_help.join(", or with "));
+        advice += &format!("; there is none with {}", no_help.join(", or with "));
     }
-    advice
+    Ok(advice)
+}
+
+/// What became of relaxing some limits.
+enum Tried {
+    Helps(Help),
+    /// The last change, in words.
+    NoHelp(String),
+}
+
+struct Help {
+    factor: f64,
+    /// The first of the limits.
+    name: &'static str,
+    /// The change, in words.
+    text: String,
+}
+
+/// Relaxes all of `limits` by the same factor, more and more until it helps. None if the rig has none of them.
+fn relaxed(
+    rig: &Rig,
+    way: Way,
+    tried: u64,
+    limits: &[Limit],
+    longest_s: f64,
+    done: &dyn Fn(),
+) -> Result<Option<Tried>, SwingUpError> {
+    let mut last = None;
+    for factor in FACTORS {
+        let mut remedy = Remedy::of(rig);
+        let changed = limits.iter().filter(|limit| limit.relax(&mut remedy, longest_s, factor).is_some());
+        let Some(name) = changed.map(|limit| limit.name()).reduce(|first, _| first) else { return Ok(None) };
+        let outcome = Outcome::of(&remedy.rig, way, tried)?;
+        done();
+        let text = format!("{} ({})", remedy.text(), outcome.text());
+        if outcome.is_good(&remedy.rig) {
+            return Ok(Some(Tried::Helps(Help { factor, name, text })));
+        }
+        last = Some(Tried::NoHelp(text));
+    }
+    Ok(last)
+}
+
+/// With which smaller errors of masses and friction enough runs would arrive; `runs` makes them for the changed rig.
+///
+/// # Errors
+/// Those of `runs`.
+pub(super) fn narrower(
+    rig: &Rig,
+    runs: impl Fn(&Rig) -> Result<Runs, SwingUpError>,
+) -> Result<String, SwingUpError> {
+    let mut last = String::new();
+    for factor in NARROWER {
+        let mut remedy = Remedy::of(rig);
+        remedy.narrow(factor);
+        let found = runs(&remedy.rig)?;
+        last = format!("{} of {} arrive with {}", found.stood, found.runs, remedy.text());
+        if is_enough(&remedy.rig, &found) {
+            break;
+        }
+    }
+    Ok(last)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::rig::Rig;
+    use crate::rig::with_value;
+
+    /// Candidates: enough to find a motion.
+    const FEW: u64 = 3;
+
+    /// The file of the single, with more values.
+    fn single(values: &str) -> Rig {
+        let mut text = std::fs::read_to_string("../../rigs/single-quanser-ip02.toml").unwrap();
+        for (key, value) in values.split(" and ").map(|value| value.split_once(" = ").unwrap()) {
+            text = with_value(&text, key, value).unwrap().text;
+        }
+        Rig::from_toml(&text, "single.toml".as_ref()).unwrap()
+    }
+
+    /// Written into the file, the values that are advised give a motion, and those that are not do not.
+    #[test]
+    fn every_advised_number_gives_a_motion() {
+        let short = "swing_up.longest_s = 2.2";
+        assert_eq!(Outcome::of(&single(short), Way::Up, FEW).unwrap().solved, 0);
+        let text = advice_from(&single(short), Way::Up, FEW, &|| ()).unwrap();
+        println!("{text}");
+        let (helps, no_help) = text.split_once("; there is none with ").unwrap();
+        let (binds, helps) = helps.split_once("; there is a motion with ").unwrap();
+        assert_eq!(binds, "what binds is the duration");
+        assert!(
+            no_help.contains("cart.travel_m = [-1.2, 1.2]") && no_help.contains("actuator.supply_v = 30")
+        );
+        for (advised, is_good) in [(helps, true), (no_help, false)] {
+            for change in advised.split(", or with ") {
+                let (values, found) = change.split_once(" (").unwrap();
+                let rig = single(&format!("{short} and {values}"));
+                let outcome = Outcome::of(&rig, Way::Up, FEW).unwrap();
+                assert_eq!(outcome.text(), found.trim_end_matches(')'), "{change}");
+                assert_eq!(outcome.is_good(&rig), is_good, "{change}");
+            }
+        }
+    }
 
     #[test]
-    fn on_a_short_rail_more_time_helps_and_more_force_does_not() {
-        let mut rig = Rig::from_path("../../rigs/single-quanser-ip02.toml".as_ref()).unwrap();
-        rig.swing_up.get_or_insert_default().rail_m = Some(0.1);
-        let setting = Setting::of(&rig).unwrap();
-        let request = Request::of(&setting);
-        // Without help, the same candidates are not solved.
-        assert!((0..2).all(|number| !is_solvable(&setting, &request, Way::Up, number)));
-        let text = advice_from(&setting, &request, Way::Up, 2);
-        println!("{text}");
-        let time = "what binds is the duration: one of 2 is solved with 2 times the duration (10.227 s)";
-        assert!(text.starts_with(time), "{text}");
-        assert!(text.contains("none of 2 is solved with 2 times the rail (0.200 m to each side)"), "{text}");
-        assert!(text.contains("2 times the force (23.400 N)"), "{text}");
+    fn a_key_is_raised_as_far_as_the_machine_goes_and_then_the_machine() {
+        let relaxed = |limit: Limit, values: &str, factor: f64| {
+            let mut remedy = Remedy::of(&single(values));
+            limit.relax(&mut remedy, 5.0, factor).unwrap();
+            // As if the values were written into the file.
+            assert_eq!(single(&format!("{values} and {}", remedy.text())), remedy.rig);
+            remedy.text()
+        };
+        let rail = "swing_up.rail_m = 0.25";
+        assert_eq!(relaxed(Limit::Rail, rail, 1.2), "swing_up.rail_m = 0.3");
+        assert_eq!(relaxed(Limit::Rail, rail, 2.0), "swing_up.rail_m = 0.5 and cart.travel_m = [-0.5, 0.5]");
+        let force = "swing_up.force_n = 10";
+        assert_eq!(relaxed(Limit::Force, force, 1.2), "swing_up.force_n = 12");
+        assert_eq!(
+            relaxed(Limit::Force, force, 2.0),
+            "swing_up.force_n = 20 and actuator.force_limit_n = 20 and actuator.supply_v = 15.4"
+        );
+        assert_eq!(relaxed(Limit::Speed, rail, 2.0), "limits.speed_m_per_s = 3");
+        assert_eq!(relaxed(Limit::Speed, "swing_up.speed_m_per_s = 1", 2.0), "swing_up.speed_m_per_s = 2");
+        assert_eq!(relaxed(Limit::Duration, rail, 1.5), "swing_up.longest_s = 7.5");
     }
 }

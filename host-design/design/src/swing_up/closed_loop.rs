@@ -142,25 +142,10 @@ pub(super) fn run(
     way: Way,
     trial: &Trial,
 ) -> Result<Outcome, SwingUpError> {
-    run_from(setting, motion, way, trial, 0, &motion.x[0])
-}
-
-/// The same from tick `first` on, with a filter that expects the state `predicted`.
-///
-/// # Errors
-/// As for [`run`].
-pub(super) fn run_from(
-    setting: &Setting<'_>,
-    motion: &Motion,
-    way: Way,
-    trial: &Trial,
-    first: usize,
-    predicted: &[f64],
-) -> Result<Outcome, SwingUpError> {
-    let mut rig = ClosedLoop::new(setting, trial, predicted)?;
+    let mut rig = ClosedLoop::new(setting, trial, &motion.x[0])?;
     let steps = motion.steps();
     let mut outcome = Outcome { stood: false, deviation_rad: 0.0, deviation_m: 0.0 };
-    for k in first..steps + (trial.after_s / motion.tick_s) as usize {
+    for k in 0..steps + (trial.after_s / motion.tick_s) as usize {
         rig.tick(&law_at(setting, motion, way, k));
         let reference = motion.x.get(k + 1).unwrap_or(&motion.x[steps]);
         let deviation = deviation(&rig.state, reference);

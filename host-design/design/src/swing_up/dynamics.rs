@@ -150,7 +150,11 @@ impl<const N: usize> Dynamics for ChainPlant<N> {
     }
 
     fn steps_in_half_a_tick(&self) -> usize {
-        if N >= 4 { 2 } else { 1 }
+        match N {
+            ..4 => 1,
+            4 => 2,
+            _ => 3,
+        }
     }
 
     fn inputs(&self, state: &[f64]) -> Matrix<f64> {

@@ -39,7 +39,7 @@ pub enum SwingUpError {
     /// Not enough random runs arrive.
     #[error(
         "{way}: {stood} of {runs} random runs arrive, and the lower end of the 95 % interval has to be {needed} % \
-         (success_percent in [swing_up]); smaller spreads of masses and friction help, or more force, rail or time"
+         (success_percent in [swing_up]); {help}"
     )]
     NotRobust {
         /// Which motion.
@@ -50,6 +50,8 @@ pub enum SwingUpError {
         runs: usize,
         /// Lower end needed (%).
         needed: f64,
+        /// What would help.
+        help: String,
     },
     /// A motion does not pass the independent check.
     #[error("{way}: {what}")]

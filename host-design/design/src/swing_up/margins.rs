@@ -1,80 +1,237 @@
 //! How far each link may be pushed at each moment of a motion.
 
 use serde::Serialize;
+use upright::protocol::message::Request;
+use upright::supervision::supervisor::State;
 
 use super::SwingUpError;
-use super::closed_loop::{LOST_RAD, Trial, run_from};
-use super::motion::Motion;
-use super::setting::Setting;
+use super::demonstration::{hang, up_and_down};
 use super::way::Way;
+use crate::harness::{Harness, HarnessError, Target, with_firmware};
 use crate::parallel;
-use crate::rig::Rig;
+use crate::plant::absolute_angles;
+use crate::rig::{PlantDescription, Rig};
+use crate::simulate::{Begin, Scenario};
+use crate::table::TableValues;
 
-/// Halvings of the range in which a margin is looked for: to 0.3°.
-const HALVINGS: u32 = 6;
+/// How long a push lasts (s): a tap of a finger.
+const PUSH_S: f64 = 0.05;
+/// The first push that is tried, and the largest and the smallest (N).
+const FIRST_N: f64 = 0.125;
+const LARGEST_N: f64 = 32.0;
+const SMALLEST_N: f64 = 1.0 / 4096.0;
+/// Halvings between a push that is stood and its double, which is not: to 1/16 of it.
+const HALVINGS: u32 = 4;
+/// How long it balances before it is lowered, and is watched after a motion (s).
+const UPRIGHT_S: f64 = 0.5;
+const AFTER_S: f64 = 1.0;
+/// Longest time until a lowering is begun (s).
+const LONGEST_WAIT_S: f64 = 5.0;
+/// Ticks between two telemetry messages.
+const TELEMETRY_TICKS: u16 = 20;
 
 /// Margins at one moment of a motion.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Margin {
     /// Time since the beginning (s).
     pub at_s: f64,
-    /// For each link: the largest turn to either side after which the motion still arrives (rad).
-    pub links_rad: Vec<f64>,
+    /// For each link: the largest push against its angle and along it after which the motion still arrives (N, both
+    /// positive). A push of 32 N is the largest that is tried; 0: not even one of 1/4096 N is stood.
+    pub links_n: Vec<[f64; 2]>,
 }
 
-/// Margins of one of the motions of `rig` at so many moments, evenly from its beginning on; `done` is called after each.
+/// A force at the end of one link, across it.
+#[derive(Debug, Clone, Copy)]
+struct Push {
+    /// Its first tick.
+    tick: usize,
+    link: usize,
+    /// Positive: it makes the link's angle larger (N).
+    force_n: f64,
+}
+
+/// Margins of one of the motions of `table`, which is designed for `rig`, at so many moments, evenly from its beginning
+/// on; `done` is called after each.
 ///
-/// The machine is the rig of the file, without noise. At a moment it is where the plan wants it, with one link turned and
-/// all others as they were, and the filter has followed; encoders, filter and law do the rest. A run arrives as in the
-/// judgement, so no margin is larger than the 0.35 rad at which a link counts as lost.
+/// A push is a force at the end of one link, across it, that begins at this moment and lasts 50 ms. The firmware knows of it
+/// from its encoders only, and its supervision is on. The machine is the rig of the file, without
+/// noise. A raised rig has to balance for a second; a lowered one to hang after as long, without a fault.
+///
+/// Pushes are doubled until one is not stood; then halving finds the edge. Larger ones may be stood again. All margins
+/// are 0 if the motion does not arrive without a push either.
 ///
 /// # Errors
-/// [`SwingUpError`] if the chain cannot be simulated.
+/// [`SwingUpError`] if the table has no motions, or the firmware does not run.
 pub fn margins(
     rig: &Rig,
-    motion: &Motion,
+    table: &TableValues,
     way: Way,
     moments: usize,
     done: &(dyn Fn() + Sync),
 ) -> Result<Vec<Margin>, SwingUpError> {
-    let setting = Setting::of(rig)?;
+    let scenario =
+        Scenario { force_noise_n: 0.0, torque_noise_n_m: 0.0, ..up_and_down(rig, table, UPRIGHT_S)? };
+    let scenario = match way {
+        Way::Up => scenario,
+        Way::Down => Scenario { begin: Begin::ByHand, start: vec![0.0; rig.states()], ..scenario },
+    };
+    let pushed = |push: Option<Push>| -> Result<Option<usize>, SwingUpError> {
+        with_firmware(table, |target| arrival(rig, table, &scenario, push, target))
+            .flatten()
+            .map_err(|error| SwingUpError::Firmware(error.to_string()))
+    };
+    let (ticks, begin) = (motion_ticks(table, way), pushed(None)?);
+    let edge = |tick: usize, link: usize, side: f64| -> Result<f64, SwingUpError> {
+        let Some(begin) = begin else { return Ok(0.0) };
+        let stands =
+            |size: f64| Ok(pushed(Some(Push { tick: begin + tick, link, force_n: side * size }))?.is_some());
+        largest(stands)
+    };
+    let links = rig.states() / 2 - 1;
     let at = |moment: usize| -> Result<Margin, SwingUpError> {
-        let tick = moment * motion.steps() / moments;
-        let links = 0..setting.chain.links.len();
-        let of_link = |link| margin(&setting, motion, way, tick, link);
-        let links_rad = links.map(of_link).collect::<Result<_, _>>()?;
+        let tick = moment * ticks / moments;
+        let both = |link| Ok([edge(tick, link, -1.0)?, edge(tick, link, 1.0)?]);
+        let links_n = (0..links).map(both).collect::<Result<_, SwingUpError>>()?;
         done();
-        Ok(Margin { at_s: tick as f64 * motion.tick_s, links_rad })
+        Ok(Margin { at_s: tick as f64 * rig.tick.period_s, links_n })
     };
     parallel::try_map(0..moments, at)
 }
 
-/// The smaller of the margins to both sides (rad).
-fn margin(
-    setting: &Setting<'_>,
-    motion: &Motion,
-    way: Way,
-    tick: usize,
-    link: usize,
-) -> Result<f64, SwingUpError> {
-    let arrives = |turn_rad: f64| -> Result<bool, SwingUpError> {
-        let mut trial = Trial { counts: true, ..Trial::ideal(setting, motion) };
-        trial.start.clone_from(&motion.x[tick]);
-        // The angle of a joint is that of its link less that of the link below.
-        trial.start[2 + 2 * link] += turn_rad;
-        if let Some(above) = trial.start.get_mut(4 + 2 * link) {
-            *above -= turn_rad;
+fn motion_ticks(table: &TableValues, way: Way) -> usize {
+    let motions = table.swing_up.as_ref();
+    motions.map_or(0, |motions| if way == Way::Up { motions.raise.ticks } else { motions.lower.ticks })
+        as usize
+}
+
+/// The largest size that is stood, below the first one that is not.
+fn largest(stands: impl Fn(f64) -> Result<bool, SwingUpError>) -> Result<f64, SwingUpError> {
+    let mut good = FIRST_N;
+    if stands(good)? {
+        while good < LARGEST_N && stands(2.0 * good)? {
+            good *= 2.0;
         }
-        Ok(run_from(setting, motion, way, &trial, tick, &trial.start)?.stood)
-    };
-    let mut least = LOST_RAD;
-    for side in [1.0, -1.0] {
-        let (mut stands, mut falls) = (0.0, LOST_RAD);
-        for _ in 0..HALVINGS {
-            let middle = 0.5 * (stands + falls);
-            if arrives(side * middle)? { stands = middle } else { falls = middle }
+        if good >= LARGEST_N {
+            return Ok(good);
         }
-        least = least.min(stands);
+    } else {
+        good *= 0.5;
+        while !stands(good)? {
+            good *= 0.5;
+            if good < SMALLEST_N {
+                return Ok(0.0);
+            }
+        }
     }
-    Ok(least)
+    let mut bad = 2.0 * good;
+    for _ in 0..HALVINGS {
+        let middle = 0.5 * (good + bad);
+        if stands(middle)? { good = middle } else { bad = middle }
+    }
+    Ok(good)
+}
+
+/// The tick in which the motion of `scenario` began, if it arrives in spite of `push`: the raising of a rig that hangs,
+/// the lowering of one that was raised by hand.
+fn arrival(
+    rig: &Rig,
+    table: &TableValues,
+    scenario: &Scenario,
+    push: Option<Push>,
+    target: &mut dyn Target,
+) -> Result<Option<usize>, HarnessError> {
+    let in_ticks = |seconds: f64| (seconds / rig.tick.period_s).round() as usize;
+    let mut harness = Harness::new(rig, table, scenario, target)?;
+    let inputs = harness.inputs();
+    harness.session.ask(Request::Telemetry(TELEMETRY_TICKS), &inputs)?;
+    let mut output = harness.raise(None)?;
+    let (way, lower_at) = match scenario.begin {
+        Begin::Hanging { .. } => (Way::Up, None),
+        Begin::ByHand => (Way::Down, Some(in_ticks(UPRIGHT_S))),
+    };
+    let ticks = motion_ticks(table, way);
+    let mut tick = 0;
+    loop {
+        let begin = if way == Way::Up { Some(0) } else { harness.lowered_from() };
+        let Some(end) = begin.map(|begin| begin + ticks).or(lower_at.map(|at| at + in_ticks(LONGEST_WAIT_S)))
+        else {
+            return Ok(None);
+        };
+        if !output.enable && (way == Way::Up || tick < end) {
+            return Ok(None);
+        }
+        if tick == end + in_ticks(AFTER_S) {
+            let is_well = match way {
+                Way::Up => harness.session.status().state == State::Balancing,
+                Way::Down => {
+                    harness.session.status().state == State::Calibrated && hang(harness.bench.state())
+                }
+            };
+            return Ok(begin.filter(|_| is_well && harness.session.fault().is_none()));
+        }
+        harness.ask_to_lower(tick, lower_at);
+        if let Some(push) = push.filter(|push| (push.tick..push.tick + in_ticks(PUSH_S)).contains(&tick)) {
+            let (force_n, torques_n_m) = push.on(rig, harness.bench.state());
+            harness.bench.pull(force_n, &torques_n_m);
+        }
+        harness.bench.tick(output.drive);
+        while harness.session.next_telemetry().is_some() || harness.session.next_reply().is_some() {}
+        let inputs = harness.inputs();
+        output = harness.session.tick(&inputs)?;
+        tick += 1;
+    }
+}
+
+impl Push {
+    /// The generalised forces in `state`: on the cart (N), and at the joints (N·m).
+    ///
+    /// With the end `p` of the link, that on a coordinate q is `F · ∂p/∂q`. Turning the angle φ_l of a link below moves `p` across
+    /// that link, and the torque at a joint is the sum over all links from it on.
+    fn on(&self, rig: &Rig, state: &[f64]) -> (f64, Vec<f64>) {
+        let PlantDescription::Chain(chain) = &rig.plant else { return (0.0, Vec::new()) };
+        let angles: Vec<f64> = absolute_angles(state).collect();
+        let across = angles[self.link];
+        let mut torques_n_m = vec![0.0; angles.len()];
+        let mut beyond = 0.0;
+        for joint in (0..=self.link).rev() {
+            beyond += self.force_n * chain.links[joint].length_m * libm::cos(angles[joint] - across);
+            torques_n_m[joint] = beyond;
+        }
+        (-self.force_n * libm::cos(across), torques_n_m)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The work of the force on a small move of any coordinate is that of the generalised forces.
+    #[test]
+    fn a_push_is_across_the_end_of_its_link() {
+        let rig = Rig::from_path("../../rigs/quadruple-paper.toml".as_ref()).unwrap();
+        let PlantDescription::Chain(chain) = &rig.plant else { panic!() };
+        let state = [0.1, 0.2, 0.7, 0.3, -1.9, 0.4, 2.2, 0.5, 0.6, 0.7];
+        for link in 0..4 {
+            let end = |state: &[f64]| {
+                absolute_angles(state).zip(&chain.links).take(link + 1).fold(
+                    [state[0], 0.0],
+                    |[x, y], (angle, link)| {
+                        [x - link.length_m * libm::sin(angle), y + link.length_m * libm::cos(angle)]
+                    },
+                )
+            };
+            let phi = absolute_angles(&state).nth(link).unwrap();
+            let push = Push { tick: 0, link, force_n: 0.3 };
+            let force = [-libm::cos(phi), -libm::sin(phi)].map(|part| push.force_n * part);
+            let (cart_n, torques_n_m) = push.on(&rig, &state);
+            for (coordinate, generalised) in [cart_n].into_iter().chain(torques_n_m).enumerate() {
+                let small = 1e-6;
+                let mut moved = state;
+                moved[2 * coordinate] += small;
+                let (from, to) = (end(&state), end(&moved));
+                let work: f64 = (0..2).map(|axis| force[axis] * (to[axis] - from[axis])).sum();
+                assert!((work / small - generalised).abs() < 1e-6, "{link}, {coordinate}: {generalised}");
+            }
+        }
+    }
 }

@@ -15,7 +15,8 @@
 //! | `tracking`, `gains` | feedback and filter along a path |
 //! | `closed_loop`, `robustness` | runs with wrong masses, friction, start and encoders |
 //! | `firmware_runs` | such runs of the whole firmware |
-//! | `search`, `plan`, `advice` | candidates, selection, and what would help if there is none |
+//! | `search`, `plan` | candidates and selection |
+//! | `advice`, `remedy` | what would help if there is no motion |
 //! | `demonstration` | one run of everything |
 //! | `supervision` | what the supervisor allows in motion |
 //! | `in_table` | the table of the firmware |
@@ -41,6 +42,7 @@ mod motion;
 mod plan;
 mod problem;
 mod refine;
+mod remedy;
 mod riccati;
 mod robustness;
 mod search;

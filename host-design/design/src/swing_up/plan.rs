@@ -3,7 +3,7 @@
 use serde::Serialize;
 
 use super::SwingUpError;
-use super::advice::advice;
+use super::advice::{advice, is_enough, narrower};
 use super::check::{Peaks, check};
 use super::gains::motion;
 use super::motion::{Motion, SwingUp};
@@ -22,7 +22,7 @@ const CANDIDATES_OF_LONG_CHAINS: [u64; 2] = [40, 24];
 /// So many candidates with the best scores go through so many random runs each, in two rounds.
 const ROUNDS: [(usize, usize); 2] = [(30, 40), (4, 160)];
 /// Random runs of the judgement, with the seeds from 1 on. Those of the rounds come after them.
-const RUNS: usize = 200;
+pub(super) const RUNS: usize = 200;
 
 /// What is being tried.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -104,7 +104,7 @@ pub fn judge(rig: &Rig, stored: &Stored, progress: Progress<'_>) -> Result<Plan,
     let judged = |way, stored: &StoredKnots| -> Result<(Motion, Judgement), SwingUpError> {
         let motion = restored(&setting, way, stored)?;
         let score = score(&setting, &motion, way, &request.spread)?;
-        let judgement = judgement(&setting, &request, way, &motion, score, None, progress)?;
+        let judgement = judgement(&setting, &request, way, (&motion, stored), score, None, progress)?;
         Ok((motion, judgement))
     };
     let (raise, up) = judged(Way::Up, &stored.raise)?;
@@ -157,7 +157,7 @@ fn best(
     progress(Trying::Stage { way, what: "trajectories", steps: tried });
     let mut solved = candidates(setting, request, way, 0..tried, &|score| progress(Trying::Step { score }))?;
     if solved.is_empty() {
-        return Err(SwingUpError::NoTrajectory { way, tried, help: advice(setting, request, way) });
+        return Err(SwingUpError::NoTrajectory { way, tried, help: advice(setting.rig, way, progress)? });
     }
     let count = solved.len();
     solved.sort_by(|a, b| a.score.total_cmp(&b.score));
@@ -165,10 +165,14 @@ fn best(
         solved.truncate(kept);
         solved = ranked(setting, request, way, solved, runs, progress)?;
     }
-    let chosen = solved.swap_remove(0);
+    // The first that passes the check; else the best, whose judgement then says what does not hold.
+    let passes = |candidate: &Candidate| check(setting, &candidate.motion, way).is_ok();
+    let chosen = solved.swap_remove(solved.iter().position(passes).unwrap_or(0));
     let search = Some([tried as usize, count]);
-    let judgement = judgement(setting, request, way, &chosen.motion, chosen.score, search, progress)?;
-    Ok((chosen.motion, StoredKnots::new(ticks_per_knot(setting), &chosen.knots), judgement))
+    let stored = StoredKnots::new(ticks_per_knot(setting), &chosen.knots);
+    let motion = (&chosen.motion, &stored);
+    let judgement = judgement(setting, request, way, motion, chosen.score, search, progress)?;
+    Ok((chosen.motion, stored, judgement))
 }
 
 /// The candidates by the number of random runs that they stand; of equals, the one with the smallest largest deviation
@@ -197,7 +201,7 @@ fn judgement(
     setting: &Setting<'_>,
     request: &Request,
     way: Way,
-    motion: &Motion,
+    (motion, stored): (&Motion, &StoredKnots),
     score: f64,
     search: Option<[usize; 2]>,
     progress: Progress<'_>,
@@ -206,9 +210,17 @@ fn judgement(
     progress(Trying::Stage { way, what: "random runs", steps: 1 });
     let runs = random_runs(setting, motion, way, &request.spread, 1, RUNS)?;
     progress(Trying::Step { score: Some(score) });
-    let needed = setting.rules.success_percent;
-    if 100.0 * runs.interval[0] < needed {
-        return Err(SwingUpError::NotRobust { way, stood: runs.stood, runs: RUNS, needed });
+    if !is_enough(setting.rig, &runs) {
+        let mut help = narrower(setting.rig, |rig| {
+            let setting = Setting::of(rig)?;
+            let motion = restored(&setting, way, stored)?;
+            random_runs(&setting, &motion, way, &Request::of(&setting).spread, 1, RUNS)
+        })?;
+        if search.is_some() {
+            help = format!("{help}; {}", advice(setting.rig, way, progress)?);
+        }
+        let needed = setting.rules.success_percent;
+        return Err(SwingUpError::NotRobust { way, stood: runs.stood, runs: RUNS, needed, help });
     }
     Ok(Judgement { way, search, score, peaks, runs })
 }

@@ -133,11 +133,6 @@ fn solve(setting: &Setting<'_>, request: &Request, way: Way, number: u64) -> Opt
     within(&path, &draw.bounds).then_some((knots, path))
 }
 
-/// Whether candidate `number` is solved.
-pub(super) fn is_solvable(setting: &Setting<'_>, request: &Request, way: Way, number: u64) -> bool {
-    solve(setting, request, way, number).is_some()
-}
-
 /// All links turn evenly, at the force of the draw.
 fn guess(problem: &Problem<'_>, draw: &Draw) -> Knots {
     let (steps, turn) = (problem.steps, core::f64::consts::PI);

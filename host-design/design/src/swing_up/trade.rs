@@ -4,13 +4,17 @@ use serde::Serialize;
 
 use super::SwingUpError;
 use super::plan::{Progress, Trying};
-use super::search::{Request, candidates};
+use super::robustness::{Runs, Spread, random_runs};
+use super::search::{Candidate, Request, candidates};
 use super::setting::Setting;
 use super::way::Way;
 use crate::rig::Rig;
 
+/// Random runs of each candidate.
+const RUNS: usize = 100;
+
 /// A candidate that was solved.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Solved {
     /// Duration (s).
     pub duration_s: f64,
@@ -20,26 +24,41 @@ pub struct Solved {
     pub position_m: f64,
     /// Fragility: the smaller, the more errors of masses and friction it stands.
     pub score: f64,
+    /// Random runs with the spreads of masses and friction of `[swing_up]`.
+    pub runs: Runs,
+    /// The same with twice the spreads.
+    pub wider: Runs,
 }
 
-/// The first `tried` candidates of the search for a raising that are solved, in their order.
+/// Of `tried` candidates of the search for a raising, those that are solved, in their order. Seed 1 stands for the first
+/// candidates of the search, 2 for those after them, and so on; it is also the seed of the first random run.
 ///
 /// # Errors
 /// [`SwingUpError`] if the rig cannot be raised at all.
-pub fn solved(rig: &Rig, tried: u64, progress: Progress<'_>) -> Result<Vec<Solved>, SwingUpError> {
+pub fn solved(rig: &Rig, tried: u64, seed: u64, progress: Progress<'_>) -> Result<Vec<Solved>, SwingUpError> {
     let setting = Setting::of(rig)?;
     let (request, way) = (Request::of(&setting), Way::Up);
+    let first = seed.saturating_sub(1).saturating_mul(tried);
     progress(Trying::Stage { way, what: "trajectories", steps: tried });
-    let found = candidates(&setting, &request, way, 0..tried, &|score| progress(Trying::Step { score }))?;
-    let solved = found.iter().map(|candidate| {
-        let motion = &candidate.motion;
-        let largest = |most: f64, value: f64| most.max(value.abs());
-        Solved {
+    let step = |score| progress(Trying::Step { score });
+    let found = candidates(&setting, &request, way, first..first.saturating_add(tried), &step)?;
+    progress(Trying::Stage { way, what: "random runs", steps: found.len() as u64 });
+    let Spread { mass, friction, .. } = request.spread;
+    let twice = Spread { mass: 2.0 * mass, friction: 2.0 * friction, ..request.spread };
+    let largest = |most: f64, value: f64| most.max(value.abs());
+    let judged = |candidate: &Candidate| {
+        let (motion, score) = (&candidate.motion, candidate.score);
+        let runs = |spread: &Spread| random_runs(&setting, motion, way, spread, seed, RUNS);
+        let (runs, wider) = (runs(&request.spread)?, runs(&twice)?);
+        step(Some(score));
+        Ok(Solved {
             duration_s: motion.duration_s(),
             force_n: motion.u.iter().copied().fold(0.0, largest),
             position_m: motion.x.iter().map(|x| x[0]).fold(0.0, largest),
-            score: candidate.score,
-        }
-    });
-    Ok(solved.collect())
+            score,
+            runs,
+            wider,
+        })
+    };
+    found.iter().map(judged).collect()
 }

@@ -13,7 +13,9 @@ use upright_design::plant::absolute_angles;
 use upright_design::rig::Rig;
 use upright_design::simulate::Scenario;
 use upright_design::study::Study;
-use upright_design::swing_up::{Condition, Stored, firmware_runs, hangs, motions, up_and_down, with_motions};
+use upright_design::swing_up::{
+    Condition, Stored, Way, firmware_runs, hangs, margins, motions, up_and_down, with_motions,
+};
 use upright_design::table::TableValues;
 
 const RIGS: [&str; 4] =
@@ -246,4 +248,22 @@ fn up_and_down_are_refused_with_their_reasons() {
     wide.swing_up.as_mut().unwrap().raise.travel_m = [-1.0, 1.0];
     let up = refused(&wide, Request::Up);
     assert!(up.contains(Inhibits::NO_ROOM), "{up}");
+}
+
+#[test]
+fn a_hanging_link_may_be_pushed_hard_and_with_reversed_gains_not_at_all() {
+    let (rig, mut table) = rig_and_table("single-quanser-ip02");
+    let of = |table: &TableValues, way: Way| -> Vec<[f64; 2]> {
+        let all = margins(&rig, table, way, 3, &|| ()).unwrap();
+        all.iter().map(|margin| margin.links_n[0]).collect()
+    };
+    let (up, down) = (of(&table, Way::Up), of(&table, Way::Down));
+    println!("{up:?}, {down:?}");
+    assert!(up.iter().chain(&down).flatten().all(|&push| push > 0.1), "{up:?}, {down:?}");
+    // Hanging, it stands more than upright.
+    let is_less =
+        |upright: [f64; 2], hanging: [f64; 2]| (0..2).all(|side| 1.5 * upright[side] < hanging[side]);
+    assert!(is_less(up[2], up[0]) && is_less(down[0], down[2]), "{up:?}, {down:?}");
+    reverse_gains(&mut table);
+    assert_eq!(of(&table, Way::Up), [[0.0; 2]; 3]);
 }

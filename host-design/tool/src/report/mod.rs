@@ -21,10 +21,10 @@ use upright::table::Law;
 
 use self::page::Page;
 pub(crate) use self::plot::Plot;
-use crate::figure::{Figure, FigureError, pixels};
+use crate::figure::{Figure, FigureError, margins_figure, pixels};
 use upright_design::design::Certified;
 use upright_design::rig::{PlantDescription, Rig};
-use upright_design::swing_up::Demonstration;
+use upright_design::swing_up::{Demonstration, Margin, Way};
 use upright_design::table::TableValues;
 use upright_design::verify::{Imperfections, TrustReport};
 
@@ -45,6 +45,8 @@ pub struct Source<'a> {
     pub seed: u64,
     /// A run of the swing-up, if the rig has stored motions.
     pub swing_up: Option<&'a Demonstration>,
+    /// How far its links may be pushed on the way; empty: the page has no such part.
+    pub margins: &'a [(Way, Vec<Margin>)],
     /// The command that made the report, to make it again.
     pub command: &'a str,
 }
@@ -138,6 +140,11 @@ pub fn report(source: &Source<'_>, stage: &dyn Fn(&str)) -> Result<Report, Repor
             keep("region", law, &figure)?;
             page.regions.push(Plot::of(&figure, law.title().to_owned())?);
         }
+    }
+    if !source.margins.is_empty() {
+        let figure = margins_figure("How far a link may be pushed", source.margins);
+        pictures.push(Picture::of("margins".to_owned(), &figure)?);
+        page.pushes.push(Plot::of(&figure, figure.title.clone())?);
     }
     if !source.imperfections.is_empty() {
         stage("imperfections");

@@ -2,7 +2,9 @@
 
 use std::path::Path;
 
-use crate::report_rigs::{LINEAR, SINGLE, quick_report, report_with_imperfections};
+use upright_design::swing_up::{Margin, Way};
+
+use crate::report_rigs::{LINEAR, SINGLE, quick_report, report_with_imperfections, report_with_margins};
 use upright_design::rig::Rig;
 
 const LARGEST: usize = 5_000_000;
@@ -113,6 +115,22 @@ fn the_margins_in_the_bode_plot_are_on_the_curve() {
         }
     }
     assert!(marked >= 4, "{marked}");
+}
+
+#[test]
+fn margins_have_a_figure_where_they_are_asked_for() {
+    let plain = &SINGLE;
+    assert!(!plain.html.contains("id=\"pushes\""));
+    let margins = [0.5, 0.0].map(|along| Margin { at_s: 1.0 - along, links_n: vec![[0.25, along]] });
+    let rig = crate::report_rigs::rig("single-quanser-ip02");
+    let report = report_with_margins(&rig, &[(Way::Up, margins.to_vec())]);
+    assert!(report.html.contains("id=\"pushes\"") && report.html.contains("href=\"#pushes\""));
+    let [picture] = &report.pictures[plain.pictures.len()..] else { panic!("one more picture") };
+    let csv = picture.csv.as_ref().unwrap();
+    println!("{csv}");
+    assert!(csv.contains("raising: push against") && csv.contains("raising: push along"), "{csv}");
+    // A push that is not stood at all has no place on a logarithmic axis.
+    assert!(csv.lines().filter(|line| line.contains(",link 1,")).count() >= 3, "{csv}");
 }
 
 #[test]

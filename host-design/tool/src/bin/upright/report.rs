@@ -12,6 +12,7 @@ use upright_design::table::{TableValues, write_atomically};
 use upright_design::verify::{Effort, trust};
 use upright_tool::report::{Report as Page, Source, report};
 
+use super::swing_up::with_margins;
 use super::verify::search;
 use crate::failure::Failure;
 use crate::progress::with_random_plants;
@@ -27,6 +28,7 @@ Examples:
   upright report rigs/quadruple-paper.toml --out report.html --svg figures --csv data
   upright report rigs/single-quanser-ip02.toml --runs 1000 --png figures
   upright report rigs/single-quanser-ip02.toml --imperfections  with what topples it
+  upright report rigs/single-quanser-ip02.toml --margins        with how far it may be pushed while it is raised
   upright report rigs/quadruple-paper.toml --gains continuous --tick 0.005     effect of a wrong tick")]
 pub(crate) struct Report {
     #[command(flatten)]
@@ -52,6 +54,9 @@ pub(crate) struct Report {
     /// With the size of each imperfection at which the loop falls, and two figures about it; slower
     #[arg(long)]
     imperfections: bool,
+    /// With how far each link may be pushed while the stored motions raise and lower the rig; slower
+    #[arg(long)]
+    margins: bool,
     /// Print the names of the files and the trust report as one JSON object
     #[arg(long)]
     json: bool,
@@ -63,12 +68,22 @@ impl Report {
         let (rig, certified, table) = self.variation.designed()?;
         let laws = table.laws.present().count() as u64;
         let imperfections = if self.imperfections { search(&rig, &table)? } else { Vec::new() };
+        let motions = with_stored_motions(&self.variation.rig, &rig, &table);
+        let pushes = match &motions {
+            Some(table) if self.margins => with_margins(&rig, table)?,
+            None if self.margins => {
+                let text =
+                    "--margins needs motions that are stored for this rig: make them with upright swing-up";
+                return Err(Failure::BadArgument(text.to_owned()));
+            }
+            _ => Vec::new(),
+        };
         let study = Study::whole();
         let effort = Effort { runs: self.runs as usize, seed: self.seed, late: 0.0, study: &study };
         let (trust, files) =
             with_random_plants(laws * u64::from(self.runs), |stage, done| -> Result<_, Failure> {
                 let trust = trust(&rig, &certified, &table, effort, stage, done)?;
-                let run = demonstration(&self.variation.rig, &rig, &table, self.seed);
+                let run = motions.as_ref().and_then(|table| demonstration(&rig, table, self.seed));
                 let source = Source {
                     rig: &rig,
                     certified: &certified,
@@ -77,6 +92,7 @@ impl Report {
                     imperfections: &imperfections,
                     seed: self.seed,
                     swing_up: run.as_ref(),
+                    margins: &pushes,
                     command: &self.as_typed(),
                 };
                 let page = report(&source, stage)?;
@@ -154,15 +170,22 @@ impl Report {
         if self.imperfections {
             typed.push_str(" --imperfections");
         }
+        if self.margins {
+            typed.push_str(" --margins");
+        }
         typed
     }
 }
 
-/// A run of the stored motions; none if there are none, or if they belong to other values of the rig.
-fn demonstration(file: &Path, rig: &Rig, table: &TableValues, seed: u64) -> Option<Demonstration> {
+/// The table with the stored motions; none if there are none, or if they belong to other values of the rig.
+fn with_stored_motions(file: &Path, rig: &Rig, table: &TableValues) -> Option<TableValues> {
     let stored = Stored::beside(file).ok()?;
-    let table = with_motions(rig, table.clone(), &motions(rig, &stored).ok()?).ok()?;
-    Script::of(rig, &table, seed, false).ok()?.run(&table).ok()
+    with_motions(rig, table.clone(), &motions(rig, &stored).ok()?).ok()
+}
+
+/// A run of the motions of `table`.
+fn demonstration(rig: &Rig, table: &TableValues, seed: u64) -> Option<Demonstration> {
+    Script::of(rig, table, seed, false).ok()?.run(table).ok()
 }
 
 fn write_into(folder: &Path, name: &str, contents: &[u8]) -> Result<PathBuf, Failure> {

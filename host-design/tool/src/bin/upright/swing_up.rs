@@ -9,10 +9,10 @@ use serde_json::json;
 use upright_design::rig::{PlantDescription, Rig};
 use upright_design::study::Study;
 use upright_design::swing_up::{
-    Condition, FirmwareRuns, Judgement, Margin, Plan, Script, Stored, SwingUpError, Way, designed_table,
-    firmware_runs, judge, margins, motions, refined, search, solved,
+    Condition, FirmwareRuns, Judgement, Margin, Plan, Script, Solved, Stored, SwingUpError, Way,
+    designed_table, firmware_runs, judge, margins, motions, refined, search, solved,
 };
-use upright_design::table::write_atomically;
+use upright_design::table::{TableValues, write_atomically};
 use upright_tool::figure::{Figure, margins_figure, run_svg, stroboscope_svg, trade_figure};
 use upright_tool::in_the_loop::RunError;
 
@@ -69,9 +69,9 @@ pub(crate) struct SwingUp {
     #[arg(long, conflicts_with_all = ["table", "stored", "check", "no_write", "picture", "seed"])]
     margins: bool,
     /// Duration against force and robustness: what the candidates of a search are like
-    #[arg(long, conflicts_with_all = ["margins", "table", "stored", "check", "no_write", "picture", "seed"])]
+    #[arg(long, conflicts_with_all = ["margins", "table", "stored", "check", "no_write", "picture"])]
     trade: bool,
-    /// Seed of the run of everything
+    /// Seed of the run of everything; with --trade, of candidates and random runs
     #[arg(long, default_value_t = 1)]
     seed: u64,
     /// Print the result as one JSON object
@@ -80,7 +80,7 @@ pub(crate) struct SwingUp {
 }
 
 /// Moments of a motion for which margins are found.
-const MOMENTS: usize = 20;
+const MOMENTS: usize = 40;
 /// Candidates of --trade.
 const TRADED: u64 = 40;
 
@@ -106,14 +106,9 @@ impl SwingUp {
     fn margins(&self, rig: &Rig) -> Result<(), Failure> {
         let failed = |source: SwingUpError| Failure::SwingUp { rig: rig.name.clone(), source };
         let stored = Stored::beside(&self.rig).map_err(failed)?;
-        let motions = motions(rig, &stored).map_err(failed)?;
-        let both = with_bar("margins", 2 * MOMENTS as u64, |done| {
-            [(Way::Up, &motions.raise), (Way::Down, &motions.lower)]
-                .map(|(way, motion)| Ok((way, margins(rig, motion, way, MOMENTS, done)?)))
-                .into_iter()
-                .collect::<Result<Vec<_>, _>>()
-        });
-        let both = both.map_err(failed)?;
+        let table =
+            motions(rig, &stored).and_then(|motions| designed_table(rig, &motions)).map_err(failed)?;
+        let both = with_margins(rig, &table)?;
         let title = format!("{}: how far a link may be pushed", rig.name);
         self.draw(&margins_figure(&title, &both))?;
         let mut out = std::io::stdout().lock();
@@ -122,7 +117,7 @@ impl SwingUp {
             return Ok(writeln!(out, "{}", json!({ "rig": rig.name, "ways": ways.collect::<Vec<_>>() }))?);
         }
         for (way, margins) in &both {
-            writeln!(out, "{}", least_margins(*way, margins))?;
+            write!(out, "{}", margins_text(*way, margins))?;
         }
         Ok(())
     }
@@ -130,18 +125,18 @@ impl SwingUp {
     /// What the candidates of a search are like.
     fn trade(&self, rig: &Rig) -> Result<(), Failure> {
         let failed = |source: SwingUpError| Failure::SwingUp { rig: rig.name.clone(), source };
-        let solved = with_search(|progress| solved(rig, TRADED, progress)).map_err(failed)?;
+        let solved = with_search(|progress| solved(rig, TRADED, self.seed, progress)).map_err(failed)?;
         self.draw(&trade_figure(&format!("{}: candidates of a raising", rig.name), &solved))?;
         let mut out = std::io::stdout().lock();
         if self.json {
             return Ok(writeln!(out, "{}", json!({ "rig": rig.name, "tried": TRADED, "solved": solved }))?);
         }
         writeln!(out, "{} of {TRADED} candidates are solved", solved.len())?;
-        writeln!(out, "duration (s)  force (N)  farthest (m)  fragility")?;
-        for one in &solved {
-            let (duration_s, force_n, position_m, score) =
-                (one.duration_s, one.force_n, one.position_m, one.score);
-            writeln!(out, "{duration_s:>12.2} {force_n:>10.2} {position_m:>13.3} {score:>10.2}")?;
+        writeln!(out, "duration (s)  force (N)  farthest (m)  fragility     arrive  with twice the errors")?;
+        for Solved { duration_s, force_n, position_m, score, runs, wider } in &solved {
+            let [arrive, twice] = [runs, wider].map(|runs| format!("{} of {}", runs.stood, runs.runs));
+            write!(out, "{duration_s:>12.2} {force_n:>10.2} {position_m:>13.3} {score:>10.2} ")?;
+            writeln!(out, "{arrive:>10} {twice:>22}")?;
         }
         Ok(())
     }
@@ -221,21 +216,33 @@ impl SwingUp {
     }
 }
 
-/// For each link, the least margin and when.
-fn least_margins(way: Way, margins: &[Margin]) -> String {
-    let mut text = format!("{way}: least margins");
-    for link in 0..margins.first().map_or(0, |margin| margin.links_rad.len()) {
-        let least = margins.iter().min_by(|a, b| a.links_rad[link].total_cmp(&b.links_rad[link]));
-        if let Some(Margin { at_s, links_rad }) = least {
-            let separator = if link == 0 { " " } else { ", " };
-            // Writing into a string cannot fail.
-            let _ = write!(
-                text,
-                "{separator}link {} {:.1}° at {at_s:.2} s",
-                link + 1,
-                links_rad[link].to_degrees()
-            );
-        }
+/// Margins of both motions of `table`, with a bar.
+pub(crate) fn with_margins(rig: &Rig, table: &TableValues) -> Result<Vec<(Way, Vec<Margin>)>, Failure> {
+    let of = |way, done: &(dyn Fn() + Sync)| Ok((way, margins(rig, table, way, MOMENTS, done)?));
+    let both: Result<_, SwingUpError> = with_bar("margins", (Way::BOTH.len() * MOMENTS) as u64, |done| {
+        Way::BOTH.into_iter().map(|way| of(way, done)).collect()
+    });
+    both.map_err(|source| Failure::SwingUp { rig: rig.name.clone(), source })
+}
+
+/// Both margins of each link at each moment, and the least of each link.
+fn margins_text(way: Way, margins: &[Margin]) -> String {
+    let links = margins.first().map_or(0, |margin| margin.links_n.len());
+    let least = |link: usize| {
+        let of_link = |margin: &Margin| margin.links_n[link].into_iter().fold(f64::INFINITY, f64::min);
+        margins.iter().map(|margin| (of_link(margin), margin.at_s)).min_by(|(a, _), (b, _)| a.total_cmp(b))
+    };
+    let mut text = format!("{way}: largest push against each link's angle and along it (N)\n  time (s)");
+    // Writing into a string cannot fail.
+    (1..=links).for_each(|link| _ = write!(text, "{:>16}", format!("link {link}")));
+    text.push('\n');
+    for Margin { at_s, links_n } in margins {
+        let _ = write!(text, "{at_s:>10.3}");
+        links_n.iter().for_each(|[down, up]| _ = write!(text, "{:>8.3}{up:>8.3}", -down));
+        text.push('\n');
+    }
+    for (link, (least, at_s)) in (0..links).filter_map(|link| Some((link, least(link)?))) {
+        let _ = writeln!(text, "  least of link {}: {least:.3} N at {at_s:.3} s", link + 1);
     }
     text
 }

@@ -6,6 +6,7 @@ use std::sync::LazyLock;
 use upright::table::Law;
 use upright_design::design::design;
 use upright_design::rig::Rig;
+use upright_design::swing_up::{Margin, Way};
 use upright_design::table::{Gains, TableValues};
 use upright_design::verify::{ImperfectionSettings, LawTrust, TrustReport, imperfections, linear};
 use upright_tool::report::{Report, Source, report};
@@ -18,7 +19,7 @@ pub(crate) fn rig(name: &str) -> Rig {
 
 /// The report on a rig, without the slow half of the trust report.
 pub(crate) fn quick_report(rig: &Rig) -> Report {
-    made(rig, None)
+    made(rig, None, &[])
 }
 
 /// [`quick_report`] on `single-quanser-ip02`: made once, several tests look at it.
@@ -31,10 +32,15 @@ pub(crate) static LINEAR: LazyLock<Report> = LazyLock::new(|| quick_report(&rig(
 pub(crate) fn report_with_imperfections(rig: &Rig) -> Report {
     let settings =
         ImperfectionSettings { duration_s: 2.0, seeds: 1, relative: 0.5, ..ImperfectionSettings::of(rig) };
-    made(rig, Some(settings))
+    made(rig, Some(settings), &[])
 }
 
-fn made(rig: &Rig, settings: Option<ImperfectionSettings>) -> Report {
+/// [`quick_report`] with these margins.
+pub(crate) fn report_with_margins(rig: &Rig, margins: &[(Way, Vec<Margin>)]) -> Report {
+    made(rig, None, margins)
+}
+
+fn made(rig: &Rig, settings: Option<ImperfectionSettings>, margins: &[(Way, Vec<Margin>)]) -> Report {
     let certified = design(rig).unwrap();
     let table = TableValues::of(rig, &certified, Gains::Sampled).unwrap();
     let laws = linear(rig, &certified, &table).unwrap().into_iter().map(|linear| LawTrust {
@@ -57,6 +63,7 @@ fn made(rig: &Rig, settings: Option<ImperfectionSettings>) -> Report {
         imperfections: found.as_slice(),
         seed: 1,
         swing_up: None,
+        margins,
         command: "upright report test",
     };
     report(&source, &|_| {}).unwrap()

@@ -1,0 +1,131 @@
+//! Changes of the rig file that relax one limit of the plans.
+
+use crate::number::rounded;
+use crate::rig::{PlantDescription, Rig};
+
+/// Significant digits of an advised number. It is tried as it is printed.
+const DIGITS: usize = 3;
+
+/// A limit of plans.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Limit {
+    Rail,
+    Force,
+    Speed,
+    Duration,
+}
+
+impl Limit {
+    pub(super) const ALL: [Self; 4] = [Self::Rail, Self::Force, Self::Speed, Self::Duration];
+
+    /// As a user knows it.
+    pub(super) fn name(self) -> &'static str {
+        match self {
+            Self::Rail => "rail",
+            Self::Force => "force",
+            Self::Speed => "speed of the cart",
+            Self::Duration => "duration",
+        }
+    }
+
+    /// Changes the file of `remedy` to `factor` times as much of this; none if the rig has no such limit. `longest_s` is the
+    /// longest duration that is tried without a change.
+    pub(super) fn relax(self, remedy: &mut Remedy, longest_s: f64, factor: f64) -> Option<()> {
+        match self {
+            Self::Rail => remedy.lengthen_rail(factor),
+            Self::Force => remedy.strengthen(factor),
+            Self::Speed => remedy.hasten(factor),
+            Self::Duration => remedy.lengthen_time(factor * longest_s),
+        }
+    }
+}
+
+/// A rig file with other values.
+#[derive(Debug, Clone)]
+pub(super) struct Remedy {
+    pub(super) rig: Rig,
+    /// The changed keys with their new values, as in the file.
+    keys: Vec<String>,
+}
+
+impl Remedy {
+    /// `rig` without a change.
+    pub(super) fn of(rig: &Rig) -> Self {
+        Self { rig: rig.clone(), keys: Vec::new() }
+    }
+
+    /// The changed keys with their new values.
+    pub(super) fn text(&self) -> String {
+        self.keys.join(" and ")
+    }
+
+    /// With `factor` times as much rail in the plan: what `[swing_up]` allows as far as the rail goes, then the rail.
+    fn lengthen_rail(&mut self, factor: f64) -> Option<()> {
+        let PlantDescription::Chain(chain) = &mut self.rig.plant else { return None };
+        let travel_m = &mut chain.cart.travel_m;
+        let farthest = travel_m[1].min(-travel_m[0]);
+        let rules = self.rig.swing_up.get_or_insert_default();
+        let wanted = rounded(factor * rules.rail_m.map_or(farthest, |rail| rail.min(farthest)), DIGITS);
+        if let Some(rail) = &mut rules.rail_m {
+            *rail = wanted;
+            self.keys.push(format!("swing_up.rail_m = {wanted}"));
+        }
+        if wanted > farthest {
+            *travel_m = travel_m.map(|end| rounded(end * wanted / farthest, DIGITS));
+            self.keys.push(format!("cart.travel_m = {travel_m:?}"));
+        }
+        Some(())
+    }
+
+    /// With `factor` times as much force in the plan: what `[swing_up]` allows as far as the actuator goes, then the actuator.
+    fn strengthen(&mut self, factor: f64) -> Option<()> {
+        let full = self.rig.force_limit_n()?;
+        let rules = self.rig.swing_up.get_or_insert_default();
+        let wanted = rounded(factor * rules.force_n.map_or(full, |force| force.min(full)), DIGITS);
+        if let Some(force) = &mut rules.force_n {
+            *force = wanted;
+            self.keys.push(format!("swing_up.force_n = {wanted}"));
+        }
+        if wanted > full {
+            let actuator = &mut self.rig.actuator;
+            if let Some(limit) = &mut actuator.force_limit_n {
+                *limit = rounded(*limit * wanted / full, DIGITS);
+                self.keys.push(format!("actuator.force_limit_n = {limit}"));
+            }
+            if let Some(motor) = &mut actuator.motor {
+                motor.supply_v = rounded(motor.supply_v * wanted / full, DIGITS);
+                self.keys.push(format!("actuator.supply_v = {}", motor.supply_v));
+            }
+        }
+        Some(())
+    }
+
+    fn hasten(&mut self, factor: f64) -> Option<()> {
+        let of_plan = self.rig.swing_up.as_mut().and_then(|rules| rules.speed_m_per_s.as_mut());
+        let section = if of_plan.is_some() { "swing_up" } else { "limits" };
+        let speed = of_plan.or(self.rig.limits.speed_m_per_s.as_mut())?;
+        *speed = rounded(factor * *speed, DIGITS);
+        self.keys.push(format!("{section}.speed_m_per_s = {speed}"));
+        Some(())
+    }
+
+    fn lengthen_time(&mut self, longest_s: f64) -> Option<()> {
+        let longest_s = rounded(longest_s, DIGITS);
+        self.rig.swing_up.get_or_insert_default().longest_s = Some(longest_s);
+        self.keys.push(format!("swing_up.longest_s = {longest_s}"));
+        Some(())
+    }
+
+    /// With `factor` times the errors that a motion has to stand.
+    pub(super) fn narrow(&mut self, factor: f64) {
+        let rules = self.rig.swing_up.get_or_insert_default();
+        let spreads = [
+            ("mass_spread_percent", &mut rules.mass_spread_percent),
+            ("friction_spread_percent", &mut rules.friction_spread_percent),
+        ];
+        for (key, percent) in spreads {
+            *percent = rounded(factor * *percent, DIGITS);
+            self.keys.push(format!("swing_up.{key} = {percent}"));
+        }
+    }
+}
