@@ -114,8 +114,9 @@ impl Kind {
                 vec![Event::Bytes { bytes, baud: 460_800 }]
             }
             Kind::TableBit => {
-                let table = image.object("local_init_table").unwrap_or(0x2000_1400..0x2000_1401);
-                vec![at(anywhere, bit_of(table.start, table.end - table.start))]
+                let words = table_words(image);
+                let word = words[(trial.size * words.len() as f64) as usize % words.len()];
+                vec![at(anywhere, bit_of(word, 4))]
             }
             Kind::RamBit => {
                 // Half of them in the state of the control task, which is a ninth of all.
@@ -127,4 +128,19 @@ impl Kind {
             _ => Vec::new(),
         }
     }
+}
+
+/// Addresses in RAM of the gain table's words that are not 0. Nothing reads the space of an absent part, which is 0.
+///
+/// # Panics
+/// If the image has no such table: it is one of ours.
+fn table_words(image: &Image) -> Vec<u32> {
+    let symbols = ["__sdata", "__sidata"].map(|name| image.symbol(name));
+    let (Some(table), [Some(ram), Some(flash)]) = (image.object("local_init_table"), symbols) else {
+        panic!("an image without a gain table in RAM");
+    };
+    let bytes = image.flash();
+    let initial = &bytes[(table.start - ram + (flash & 0x00ff_ffff)) as usize..];
+    let words = table.step_by(4).zip(initial.as_chunks::<4>().0);
+    words.filter(|(_, word)| **word != [0; 4]).map(|(address, _)| address).collect()
 }
