@@ -199,7 +199,7 @@ impl Fault {
             fault: Fault::Table,
             name: "table",
             condition: "the gain table no longer fits its checksum; it is read all the time, and before arming",
-            reaction: Reaction::Hardware("one pass over the table"),
+            reaction: Reaction::Hardware("at most two passes over the table"),
             remedy: "flash the firmware again; if it comes again, the memory is damaged",
         },
         Entry {
