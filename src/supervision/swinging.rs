@@ -1,9 +1,9 @@
 //! The zeros of joints that swing out. A joint with friction comes to rest anywhere near hanging; while it swings, its
-//! friction pulls it to either side in turn, and the mean of its counts is where it would hang without.
+//! friction acts to both sides in turn, and the mean of its counts is where it would hang without friction.
 //!
 //! The mean is taken over windows of [`WINDOW_S`], with the weight `(1 - s²)²` for times `s` from -1 to 1: a swing of
-//! angular frequency ω leaves at most `15 / (ω WINDOW_S / 2)³` of its amplitude in it. Zeros are taken if each joint has swung
-//! to both sides by [`SWING`], and those of two windows in a row differ by no more than [`TOLERANCE`].
+//! angular frequency ω leaves at most `15 / (ω WINDOW_S / 2)³` of its amplitude in it. Zeros are taken if each joint
+//! has swung to both sides by [`SWING`], and those of two windows in a row differ by no more than [`TOLERANCE`].
 
 use crate::supervision::inhibits::Inhibits;
 
