@@ -22,7 +22,10 @@ impl<const NX: usize, const NY: usize, S: SwingUp<NX, NY>> Firmware<'_, NX, NY, 
         let joints = counts.iter().zip(observer.step.iter()).zip(&self.table.limits.turn_counts);
         for ((&count, step), _) in joints.filter(|(_, turn)| **turn > 0) {
             angle += step * count as f32;
-            largest = largest.max(f32::abs(angle));
+            // A comparison, because `f32::max` is a function of its own in the image.
+            if f32::abs(angle) > largest {
+                largest = f32::abs(angle);
+            }
         }
         largest
     }

@@ -107,7 +107,8 @@ impl BenchDrive {
             MotorSign::Still
         } else {
             self.ticks += 1;
-            let share = (self.ticks as f32 * tick_s * RISE_PER_S).min(1.0);
+            let rise = self.ticks as f32 * tick_s * RISE_PER_S;
+            let share = if rise < 1.0 { rise } else { 1.0 };
             return Some(if self.along { share } else { -share });
         };
         if sign_counts != 0 {

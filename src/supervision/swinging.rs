@@ -88,7 +88,7 @@ impl<const NY: usize> Swinging<NY> {
             }
         }
         if ends {
-            self.verdict = if self.verdict == Verdict::None || joints == 0 || self.sides != joints {
+            self.verdict = if self.verdict == Verdict::None || self.sides != joints {
                 Verdict::Unknown
             } else if agrees {
                 Verdict::Agrees
