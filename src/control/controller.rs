@@ -414,7 +414,7 @@ impl<'t, const NX: usize, const NY: usize, T: Scalar> Controller<'t, NX, NY, T> 
     }
 
     /// Force on the cart during this tick (N), between [`control`](Self::control) and [`predict`](Self::predict).
-    pub fn acting(&self) -> T {
+    fn acting(&self) -> T {
         if self.has_memory && self.table.delay_ticks == 1 { self.state.pending } else { self.applied }
     }
 

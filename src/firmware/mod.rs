@@ -126,8 +126,8 @@ impl<'t, const NX: usize, const NY: usize, S: SwingUp<NX, NY>> Firmware<'t, NX, 
         Ok(Self::with_controller(table, swing_up, Controller::new(table, build, widths)?, start.into(), true))
     }
 
-    /// [`with_swing_up`](Self::with_swing_up), or [`unusable`](Self::unusable) if a table is. Without a result in between,
-    /// which would be a copy of the firmware on the stack.
+    /// [`with_swing_up`](Self::with_swing_up), or [`unusable`](Self::unusable) if a table is. Without a result in
+    /// between, which would be a copy of the firmware on the stack.
     #[inline(never)]
     pub fn of_any_table(
         table: &'t GainTable<NX, NY>,

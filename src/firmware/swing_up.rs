@@ -108,7 +108,7 @@ impl<const NX: usize, const NY: usize, S: SwingUp<NX, NY>> Firmware<'_, NX, NY, 
         let has_ended = player.advance();
         let end = player.now().x.as_slice().first().copied().unwrap_or_default();
         let (detection, test) = (&mut self.detection, &motions.thresholds.motor);
-        self.controller.predict_on_course_with(
+        self.controller.predict_on_course(
             |corrected, force| detection.finish_tick(test, corrected, force),
             |state, force| swing_up.predict(state, force, tick_s),
         );

@@ -58,8 +58,8 @@ impl<const NY: usize> Default for Swinging<NY> {
 }
 
 impl<const NY: usize> Swinging<NY> {
-    /// Takes the counts of a tick. `steps` is the travel per count (m or rad), `turn_counts` a whole turn of each joint, 0 for
-    /// the cart.
+    /// Takes the counts of a tick. `steps` is the travel per count (m or rad), `turn_counts` a whole turn of each
+    /// joint, 0 for the cart.
     #[inline(never)]
     pub fn update(&mut self, counts: &[i32; NY], steps: &[f32; NY], turn_counts: &[i32; NY], tick_s: f32) {
         let part = tick_s / WINDOW_S;
@@ -107,8 +107,8 @@ impl<const NY: usize> Swinging<NY> {
     /// The counts at which the links would hang, and where the cart is.
     ///
     /// # Errors
-    /// [`Inhibits::MOVING`] if they are not known, or the cart is not where it was; [`Inhibits::ZEROS`], too, if two windows
-    /// contradict each other.
+    /// [`Inhibits::MOVING`] if they are not known, or the cart is not where it was; [`Inhibits::ZEROS`], too, if two
+    /// windows contradict each other.
     pub fn zeros(&self) -> Result<&[f32; NY], Inhibits> {
         if self.is_near && self.verdict == Verdict::Agrees {
             return Ok(&self.mean);

@@ -118,8 +118,8 @@ fn the_image_in_qemu_raises_and_lowers_the_links_with_the_bits_of_the_host() {
     assert!(run(&rig, &table, &other, Place::Host).unwrap().ticks != qemu.ticks);
 }
 
-/// Counts of the joints and state in all telemetry of a rig whose links swing out, about so many counts off, while homing is
-/// asked for.
+/// Counts of the joints and state in all telemetry of a rig whose links swing out, about so many counts off, while
+/// homing is asked for.
 fn homed_swinging(table: &TableValues, off: f64, place: Place<'_>) -> Vec<(State, Vec<i32>)> {
     let run = |target: &mut dyn Target| -> Result<_, RunError> {
         let (mut session, mut seen) = (Session::new(target), Vec::new());

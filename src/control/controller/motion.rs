@@ -35,16 +35,10 @@ impl<const NX: usize, const NY: usize> Controller<'_, NX, NY> {
         self.drive(requested)
     }
 
-    /// Second half of such a tick: `predict` replaces the state by the one a tick later, with the given force (N)
-    /// held.
-    pub fn predict_on_course(&mut self, predict: impl FnOnce(&mut [f32; NX], f32)) {
-        self.predict_on_course_with(|_, _| (), predict);
-    }
-
-    /// The same as [`predict_on_course`](Self::predict_on_course), but first calls `finish` as
-    /// [`predict_with`](Self::predict_with) does.
+    /// Second half of such a tick: calls `finish` as [`predict_with`](Self::predict_with) does; then `predict` replaces
+    /// the state by the one a tick later, with the given force (N) held.
     #[inline(always)]
-    pub fn predict_on_course_with(
+    pub fn predict_on_course(
         &mut self,
         finish: impl FnOnce([f32; NY], f32),
         predict: impl FnOnce(&mut [f32; NX], f32),

@@ -144,11 +144,10 @@ impl<'t, const NX: usize, const NY: usize, const N: usize> Run<'t, NX, NY, N> {
             let estimate = controller.estimate();
             reached.note(estimate.as_slice(), (estimate - player.now().x).as_slice());
             bench.tick(command.drive);
-            let corrected = core::array::from_fn(|sensor| controller.estimate()[2 * sensor]);
-            detection.finish_tick(&nothing.motor, corrected, controller.acting());
-            controller.predict_on_course(|state, force| {
-                SwingUp::<NX, NY>::predict(self.swing_up, state, force, self.tick_s);
-            });
+            controller.predict_on_course(
+                |corrected, force| detection.finish_tick(&nothing.motor, corrected, force),
+                |state, force| SwingUp::<NX, NY>::predict(self.swing_up, state, force, self.tick_s),
+            );
             if player.advance() {
                 break;
             }

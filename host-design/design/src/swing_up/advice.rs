@@ -66,8 +66,8 @@ pub(super) fn is_enough(rig: &Rig, runs: &Runs) -> bool {
     100.0 * runs.interval[0] >= needed
 }
 
-/// The limit that binds: that of which the smallest factor helps; and what helps else. Each number was tried: with it in
-/// the rig file there is a motion `way`, or none.
+/// The limit that binds: that of which the smallest factor helps; and what helps else. Each number was tried: with it
+/// in the rig file there is a motion `way`, or none.
 ///
 /// # Errors
 /// [`SwingUpError`] if the rig cannot be raised at all.

@@ -53,8 +53,8 @@ struct Push {
 /// Margins of one of the motions of `table`, which is designed for `rig`, at so many moments, evenly from its beginning
 /// on; `done` is called after each.
 ///
-/// A push is a force at the end of one link, across it, that begins at this moment and lasts 50 ms. The firmware knows of it
-/// from its encoders only, and its supervision is on. The machine is the rig of the file, without
+/// A push is a force at the end of one link, across it, that begins at this moment and lasts 50 ms. The firmware knows
+/// of it from its encoders only, and its supervision is on. The machine is the rig of the file, without
 /// noise. A raised rig has to balance for a second; a lowered one to hang after as long, without a fault.
 ///
 /// Pushes are doubled until one is not stood; then halving finds the edge. Larger ones may be stood again. All margins
@@ -185,8 +185,8 @@ fn arrival(
 impl Push {
     /// The generalised forces in `state`: on the cart (N), and at the joints (N·m).
     ///
-    /// With the end `p` of the link, that on a coordinate q is `F · ∂p/∂q`. Turning the angle φ_l of a link below moves `p` across
-    /// that link, and the torque at a joint is the sum over all links from it on.
+    /// With the end `p` of the link, that on a coordinate q is `F · ∂p/∂q`. Turning the angle φ_l of a link below moves
+    /// `p` across that link, and the torque at a joint is the sum over all links from it on.
     fn on(&self, rig: &Rig, state: &[f64]) -> (f64, Vec<f64>) {
         let PlantDescription::Chain(chain) = &rig.plant else { return (0.0, Vec::new()) };
         let angles: Vec<f64> = absolute_angles(state).collect();

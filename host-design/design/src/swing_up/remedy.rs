@@ -28,8 +28,8 @@ impl Limit {
         }
     }
 
-    /// Changes the file of `remedy` to `factor` times as much of this; none if the rig has no such limit. `longest_s` is the
-    /// longest duration that is tried without a change.
+    /// Changes the file of `remedy` to `factor` times as much of this; none if the rig has no such limit. `longest_s`
+    /// is the longest duration that is tried without a change.
     pub(super) fn relax(self, remedy: &mut Remedy, longest_s: f64, factor: f64) -> Option<()> {
         match self {
             Self::Rail => remedy.lengthen_rail(factor),
@@ -77,7 +77,8 @@ impl Remedy {
         Some(())
     }
 
-    /// With `factor` times as much force in the plan: what `[swing_up]` allows as far as the actuator goes, then the actuator.
+    /// With `factor` times as much force in the plan: what `[swing_up]` allows as far as the actuator goes, then the
+    /// actuator.
     fn strengthen(&mut self, factor: f64) -> Option<()> {
         let full = self.rig.force_limit_n()?;
         let rules = self.rig.swing_up.get_or_insert_default();

@@ -15,7 +15,8 @@ use crate::verify::Disturbance;
 const MACHINES: u64 = 12;
 /// Seed of the first one; apart from the seeds with which motions are chosen and judged.
 const BASE_SEED: u64 = 20_000;
-/// How long they balance before they are lowered (s): wrong zeros of the encoders move the cart away from its set-point.
+/// How long they balance before they are lowered (s): wrong zeros of the encoders move the cart away from its
+/// set-point.
 const BALANCE_S: f64 = 1.5;
 /// The largest that one of them reaches is allowed this many times.
 const MARGIN: f64 = 2.0;
@@ -28,7 +29,8 @@ const SPEED_MARGIN: f64 = 1.2;
 const FREE_SHARE: f64 = 0.25;
 
 /// Sets limits and thresholds with which the firmware supervises the motions of `table`, from runs of machines with the
-/// spreads of `[swing_up]`: masses, friction, start, encoders' zeros, and the rig's noise. Does nothing without motions.
+/// spreads of `[swing_up]`: masses, friction, start, encoders' zeros, and the rig's noise. Does nothing without
+/// motions.
 ///
 /// # Errors
 /// [`SimulationError`] if the runs cannot be made.

@@ -30,8 +30,8 @@ pub struct Solved {
     pub wider: Runs,
 }
 
-/// Of `tried` candidates of the search for a raising, those that are solved, in their order. Seed 1 stands for the first
-/// candidates of the search, 2 for those after them, and so on; it is also the seed of the first random run.
+/// Of `tried` candidates of the search for a raising, those that are solved, in their order. Seed 1 stands for the
+/// first candidates of the search, 2 for those after them, and so on; it is also the seed of the first random run.
 ///
 /// # Errors
 /// [`SwingUpError`] if the rig cannot be raised at all.

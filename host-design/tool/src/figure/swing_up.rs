@@ -23,7 +23,8 @@ pub fn margins_figure(title: &str, motions: &[(Way, Vec<Margin>)]) -> Figure {
     panels.fold(Figure::new(title), Figure::with)
 }
 
-/// Largest force, use of the rail, random runs that arrive, and fragility over the duration, a point for each candidate.
+/// Largest force, use of the rail, random runs that arrive, and fragility over the duration, a point for each
+/// candidate.
 pub fn trade_figure(title: &str, solved: &[Solved]) -> Figure {
     let durations = solved.iter().map(|one| one.duration_s);
     let (shortest, longest) =

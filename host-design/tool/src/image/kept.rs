@@ -1,12 +1,11 @@
 //! Images from earlier builds that nothing has changed since: cargo keeps one image for each set of features, and
 //! would compile it again whenever another rig's table was compiled in between.
 
-use std::fmt::Write;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::time::SystemTime;
 
-use sha2::{Digest, Sha256};
+use super::checksum::file_hash;
 
 /// Files at the root of the repository that decide what is compiled, beside the sources.
 const SETTINGS: [&str; 4] = ["Cargo.toml", "Cargo.lock", "memory.x", ".cargo/config.toml"];
@@ -23,7 +22,7 @@ pub(super) fn is_current(image: &Path, cargo: &Command, version: &str) -> bool {
 
 /// Notes what `image` was made from by the `cargo` that was started at `begin`: the files that the compiler lists in
 /// `dependencies`, and the settings of the repository at `root`. Nothing is noted, so that the next build compiles
-/// again, if a file has changed since `begin`.
+/// again, if a file has changed since `begin`, or no source is listed.
 pub(super) fn keep(
     image: &Path,
     cargo: &Command,
@@ -33,6 +32,9 @@ pub(super) fn keep(
     root: &Path,
 ) -> std::io::Result<()> {
     let mut files = sources(&std::fs::read_to_string(dependencies)?);
+    if files.is_empty() {
+        return Ok(());
+    }
     files.extend(SETTINGS.iter().map(|name| root.join(name)).filter(|path| path.exists()));
     for file in &files {
         if std::fs::metadata(file)?.modified()? >= begin {
@@ -66,11 +68,7 @@ fn origin(
     variables.sort();
     text += &format!("{variables:?}\n");
     for file in files {
-        for byte in Sha256::digest(std::fs::read(&file)?) {
-            // Writing to a string does not fail.
-            let _ = write!(text, "{byte:02x}");
-        }
-        let _ = writeln!(text, "  {}", file.display());
+        text += &format!("{}  {}\n", file_hash(&std::fs::read(&file)?), file.display());
     }
     Ok(text)
 }
@@ -158,6 +156,14 @@ mod tests {
         assert!(!folder.is_current(&call("b")));
         assert!(!is_current(&folder.file("image.elf"), &call("a"), "rustc 1.1"));
         forget(&folder.file("image.elf"));
+        assert!(!folder.is_current(&call("a")));
+    }
+
+    #[test]
+    fn an_image_without_known_sources_is_compiled_again() {
+        let folder = Folder::new();
+        std::fs::write(folder.file("image.d"), "of another form").unwrap();
+        folder.keep(&call("a"));
         assert!(!folder.is_current(&call("a")));
     }
 

@@ -13,7 +13,7 @@ mod thumb;
 
 pub use board::{Board, NoBoard};
 pub use build::{ImageError, Kind, PROFILE, TARGET, build, build_for, build_if_possible, if_possible};
-pub use checksum::flash_checksum;
+pub use checksum::{file_hash, flash_checksum};
 pub use compiler::{Compiler, compiler};
 pub use elf::{ElfError, Image};
 pub use forbidden::forbidden_functions;

@@ -3,7 +3,6 @@
 use std::path::{Path, PathBuf};
 
 use clap::ValueEnum;
-use sha2::{Digest, Sha256};
 use upright_board::Image;
 use upright_design::rig::Rig;
 use upright_design::table::TableValues;
@@ -93,8 +92,6 @@ pub(super) fn read(path: &Path) -> Result<Image, Failure> {
 /// The bytes of an ELF file that will run; says its path and its hash.
 fn announced(path: &Path) -> Result<Vec<u8>, Failure> {
     let bytes = std::fs::read(path)?;
-    let hash =
-        Sha256::digest(&bytes).iter().take(8).fold(String::new(), |hash, byte| hash + &format!("{byte:02x}"));
-    eprintln!("{} ({hash})", path.display());
+    eprintln!("{} ({:.16})", path.display(), image::file_hash(&bytes));
     Ok(bytes)
 }
