@@ -50,6 +50,33 @@ pub struct FalseAlarms {
     pub closest: f32,
 }
 
+/// Which machines balance.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Machines {
+    /// So many, drawn within `[robust]`: [`healthy_machine`].
+    Drawn(u64),
+    /// One at each combination of wrong masses: [`corner_machine`].
+    Corners,
+}
+
+impl Machines {
+    /// How many there are of this rig.
+    pub fn count(self, rig: &Rig) -> u64 {
+        match (self, &rig.plant) {
+            (Self::Drawn(runs), _) => runs,
+            (Self::Corners, PlantDescription::Chain(chain)) => 2 << chain.links.len(),
+            (Self::Corners, PlantDescription::Model(_)) => 0,
+        }
+    }
+
+    fn machine(self, rig: &Rig, number: u64) -> Rig {
+        match self {
+            Self::Drawn(_) => healthy_machine(rig, number),
+            Self::Corners => corner_machine(rig, number),
+        }
+    }
+}
+
 /// Machine of the run with this number: drawn within `[robust]`, or, if the rig file has none, the machine of `[reality]`.
 ///
 /// Friction, wrong zeros and latency have the same share of their tolerances, and each mass its own, all even from none to
@@ -68,7 +95,23 @@ pub fn healthy_machine(rig: &Rig, number: u64) -> Rig {
     machine
 }
 
-/// Balances `runs` machines for `seconds` each, a part of `study`. `done` is called after each, from any thread.
+/// Machine at the combination of wrong masses with this number, with all of friction, wrong zeros and latency of `[robust]`.
+///
+/// The cart is too heavy if the lowest bit of the number is set, the first link if the next is, and so on.
+pub fn corner_machine(rig: &Rig, number: u64) -> Rig {
+    let (Some(tolerances), PlantDescription::Chain(chain)) = (&rig.robust, &rig.plant) else {
+        return rig.clone();
+    };
+    let mut machine = machine(rig, tolerances, 1.0);
+    let percent = tolerances.mass_percent;
+    let wrong = |part: usize| if number >> part & 1 == 1 { percent } else { -percent };
+    let parameters = &mut machine.reality.parameters;
+    parameters.cart_mass_percent = wrong(0);
+    parameters.link_mass_percent = PerJoint::each((1..=chain.links.len()).map(wrong).collect());
+    machine
+}
+
+/// Balances `machines` for `seconds` each, a part of `study`. `done` is called after each, from any thread.
 ///
 /// # Errors
 /// [`Unverifiable`] if a run cannot be started.
@@ -76,17 +119,17 @@ pub fn false_alarms(
     rig: &Rig,
     table: &TableValues,
     law: Law,
-    (runs, seconds): (u64, f64),
+    (machines, seconds): (Machines, f64),
     study: &Study,
     done: &(dyn Fn() + Sync),
 ) -> Result<FalseAlarms, Unverifiable> {
     chain(rig, "healthy machines")?;
     let one = |number: u64| -> Result<(u64, Healthy), Unverifiable> {
-        let found = balance(&healthy_machine(rig, number), table, law, number, seconds);
+        let found = balance(&machines.machine(rig, number), table, law, number, seconds);
         done();
         Ok((number, found.map_err(|error| Unverifiable::Firmware(error.to_string()))?))
     };
-    let all = study.outcomes(law.key(), runs, one)?;
+    let all = study.outcomes(law.key(), machines.count(rig), one)?;
     let hours = all.iter().map(|(_, one)| one.balanced_s).sum::<f64>() / 3600.0;
     let alarms: Vec<(u64, String)> =
         all.iter().filter_map(|(number, one)| Some((*number, one.fault.clone()?))).collect();

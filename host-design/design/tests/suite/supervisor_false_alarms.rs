@@ -2,7 +2,7 @@
 
 use upright_design::parallel;
 use upright_design::rig::{PerJoint, Rig, Tolerances};
-use upright_design::robust::{Healthy, balance, false_alarms, healthy_machine};
+use upright_design::robust::{Healthy, Machines, balance, corner_machine, false_alarms, healthy_machine};
 use upright_design::study::Study;
 
 use crate::published::table;
@@ -59,8 +59,9 @@ fn machines_of_a_study_are_within_the_tolerances_and_their_alarms_are_counted() 
         assert!((0.0..=3e-2).contains(&reality.friction.joint_friction_n_m.of(0)), "{reality:?}");
     }
     assert_ne!(healthy_machine(&tolerating, 1), healthy_machine(&tolerating, 2));
-    let count =
-        |rig: &Rig| false_alarms(rig, &table(rig), Law::Lqr, (2, 5.0), &Study::whole(), &|| ()).unwrap();
+    let count = |rig: &Rig| {
+        false_alarms(rig, &table(rig), Law::Lqr, (Machines::Drawn(2), 5.0), &Study::whole(), &|| ()).unwrap()
+    };
     let found = count(&tolerating);
     assert_eq!((found.runs, found.alarms.len()), (2, 0), "{found:?}");
     assert!((found.hours * 3600.0 - 10.0).abs() < 0.1, "{found:?}");
@@ -69,6 +70,24 @@ fn machines_of_a_study_are_within_the_tolerances_and_their_alarms_are_counted() 
     rough.verify.force_rms_n = Some(20.0);
     let found = count(&rough);
     assert_eq!(found.alarms.len(), 2, "{found:?}");
+}
+
+#[test]
+fn machines_at_the_corners_have_every_combination_of_wrong_masses_and_all_of_the_friction() {
+    let tolerating = tolerating("double-quanser-dbpen", 5.0, 3e-3);
+    let machines: Vec<Rig> = (0..8).map(|number| corner_machine(&tolerating, number)).collect();
+    assert_eq!(Machines::Corners.count(&tolerating), 8);
+    let masses = |machine: &Rig| {
+        let parameters = &machine.reality.parameters;
+        [parameters.cart_mass_percent, parameters.link_mass_percent.of(0), parameters.link_mass_percent.of(1)]
+    };
+    assert_eq!(masses(&machines[0]), [-5.0, -5.0, -5.0]);
+    assert_eq!(masses(&machines[6]), [-5.0, 5.0, 5.0]);
+    for (number, machine) in machines.iter().enumerate() {
+        assert_eq!(machine.reality.friction.joint_friction_n_m.of(1), 3e-3);
+        assert!(masses(machine).iter().all(|percent| percent.abs() == 5.0));
+        assert!(!machines[..number].contains(machine), "{number}");
+    }
 }
 
 /// The rig as machines of its tolerances: masses ±`percent` in every combination whose first bit is that of the cart.

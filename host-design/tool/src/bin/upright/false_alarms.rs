@@ -6,7 +6,7 @@ use clap::Args;
 use serde_json::json;
 use upright::table::Law;
 use upright_design::rig::Rig;
-use upright_design::robust::{FalseAlarms, false_alarms};
+use upright_design::robust::{FalseAlarms, Machines, false_alarms};
 use upright_design::study::Study;
 
 use crate::failure::Failure;
@@ -24,6 +24,7 @@ use crate::variation::{Variation, law_option, positive};
 Examples:
   upright false-alarms rigs/quadruple-robust.toml                      2 h of each law, 6 minutes for each machine
   upright false-alarms rigs/single-quanser-ip02.toml --runs 100 --duration 3600
+  upright false-alarms rigs/quadruple-robust.toml --corners            every combination of wrong masses
   upright false-alarms rigs/quadruple-robust.toml --shard 2/3 > 2.jsonl
   upright false-alarms rigs/quadruple-robust.toml --merge 1.jsonl 2.jsonl 3.jsonl"
 )]
@@ -33,6 +34,9 @@ pub(crate) struct HealthyHours {
     /// Machines of each law
     #[arg(long, default_value_t = 20, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
     runs: u32,
+    /// One machine at each combination of wrong masses, with all of the friction, wrong zeros and latency of [robust]
+    #[arg(long, conflicts_with = "runs")]
+    corners: bool,
     /// Time for which each balances (s)
     #[arg(long, default_value_t = 360.0, value_name = "S", value_parser = positive)]
     duration: f64,
@@ -60,14 +64,23 @@ impl HealthyHours {
                 "--law: the rig file does not ask for this control law".to_owned(),
             ));
         }
+        let machines = match &rig.robust {
+            _ if !self.corners => Machines::Drawn(self.runs.into()),
+            Some(tolerances) if tolerances.mass_percent > 0.0 => Machines::Corners,
+            _ => {
+                return Err(Failure::BadArgument(
+                    "--corners: the rig file has no mass_percent in [robust]".to_owned(),
+                ));
+            }
+        };
         let options = json!({
-            "gains": self.variation.changes(), "runs": self.runs, "duration": self.duration,
+            "gains": self.variation.changes(), "runs": (!self.corners).then_some(self.runs), "duration": self.duration,
             "law": self.law.map(Law::key),
         });
-        let runs = u64::from(self.runs);
         let work = |study: &Study| -> Result<Vec<FalseAlarms>, Failure> {
-            Ok(with_bar("machines", laws.len() as u64 * runs, |done| {
-                let of_law = |&law: &Law| false_alarms(&rig, &table, law, (runs, self.duration), study, done);
+            Ok(with_bar("machines", laws.len() as u64 * machines.count(&rig), |done| {
+                let of_law =
+                    |&law: &Law| false_alarms(&rig, &table, law, (machines, self.duration), study, done);
                 laws.iter().map(of_law).collect::<Result<_, _>>()
             })?)
         };
