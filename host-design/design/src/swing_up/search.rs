@@ -80,8 +80,7 @@ impl Request {
         let [shortest, longest] = DURATION.map(|units| units * unit);
         let shortest = rules.shortest_s.unwrap_or_else(|| shortest.min(rules.longest_s.unwrap_or(shortest)));
         let duration_s = [shortest, rules.longest_s.unwrap_or(longest).max(shortest)];
-        let spread = Spread::of(rules.mass_spread_percent / 100.0, rules.friction_spread_percent / 100.0);
-        Self { duration_s, force_n, rail_m, bounds, spread }
+        Self { duration_s, force_n, rail_m, bounds, spread: Spread::asked(setting.rig) }
     }
 }
 
