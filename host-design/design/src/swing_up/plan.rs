@@ -6,7 +6,7 @@ use super::SwingUpError;
 use super::advice::{advice, is_enough, narrower};
 use super::check::{Peaks, check};
 use super::firmware_runs::{Condition, firmware_runs};
-use super::gains::motion;
+use super::gains::{POSITION_WEIGHT, motion};
 use super::in_table::designed_table;
 use super::motion::{Motion, SwingUp};
 use super::refine::refine;
@@ -141,7 +141,7 @@ fn restored(setting: &Setting<'_>, way: Way, stored: &StoredKnots) -> Result<Mot
     let states = setting.rig.states();
     let knots = stored.knots(states).ok_or(SwingUpError::Outdated)?;
     let path = refine(&*setting.dynamics, &knots, stored.ticks, setting.tick_s, &way.ends(states));
-    motion(setting, path.ok_or(SwingUpError::Outdated)?, way)
+    motion(setting, path.ok_or(SwingUpError::Outdated)?, way, POSITION_WEIGHT)
 }
 
 /// A motion that is to be judged.
@@ -151,6 +151,13 @@ struct Found {
     /// See [`Judgement::score`] and [`Judgement::search`].
     score: f64,
     search: Option<[usize; 2]>,
+}
+
+/// The motion of these knots.
+fn found(setting: &Setting<'_>, way: Way, stored: StoredKnots) -> Result<Found, SwingUpError> {
+    let motion = restored(setting, way, &stored)?;
+    let score = score(setting, &motion, way, &Spread::asked(setting.rig))?;
+    Ok(Found { motion, stored, score, search: None })
 }
 
 /// The most robust candidate of one way.
@@ -177,7 +184,7 @@ fn best(
     let passes = |candidate: &Candidate| check(setting, &candidate.motion, way).is_ok();
     let chosen = solved.swap_remove(solved.iter().position(passes).unwrap_or(0));
     let stored = StoredKnots::new(ticks_per_knot(setting), &chosen.knots);
-    Ok(Found { motion: chosen.motion, stored, score: chosen.score, search: Some([tried as usize, count]) })
+    Ok(Found { search: Some([tried as usize, count]), ..found(setting, way, stored)? })
 }
 
 /// The candidates by the number of random runs that they stand; of equals, the one with the smallest largest deviation
@@ -271,7 +278,7 @@ mod tests {
         let [raise, lower] = arriving(&rig, &table, &motions).unwrap();
         assert!(is_enough(&rig, &raise) && is_enough(&rig, &lower), "{raise:?}, {lower:?}");
         let limits = &mut table.swing_up.as_mut().unwrap().limits;
-        limits.speed_m_per_s *= 0.6;
+        limits.speed_m_per_s *= 0.5;
         let [raise, _] = arriving(&rig, &table, &motions).unwrap();
         assert!(!is_enough(&rig, &raise), "{raise:?}");
         // A rail on which the firmware does not begin.
