@@ -30,7 +30,7 @@ struct Outcome {
 }
 
 impl Outcome {
-    /// Of the first `tried` candidates of the search for the motion `way` of `rig`.
+    /// Of the first `tried` candidates of the search for the motion `way` of `rig`, run without a supervisor.
     fn of(rig: &Rig, way: Way, tried: u64) -> Result<Self, SwingUpError> {
         let setting = Setting::of(rig)?;
         let request = Request::of(&setting);

@@ -3,7 +3,7 @@
 //! ```text
 //! candidates: random duration, bounds, cost ─► shooting ─► knots ─► refine ─► path at ticks, held forces
 //!                                                                                │
-//! stored file ◄── judgement ◄── random runs ◄── the best by score ◄── gains and filter along the path
+//! stored file ◄── runs of the firmware ◄── random runs ◄── the best by score ◄── gains and filter along the path
 //! ```
 //!
 //! | module | what is in it |
@@ -13,8 +13,8 @@
 //! | `riccati`, `interior_point`, `shooting` | multiple shooting with Gauss-Newton steps |
 //! | `refine` | from knots to ticks |
 //! | `tracking`, `gains` | feedback and filter along a path |
-//! | `closed_loop`, `robustness` | runs with wrong masses, friction, start and encoders |
-//! | `firmware_runs` | such runs of the whole firmware |
+//! | `closed_loop`, `robustness` | runs with wrong masses, friction, start and encoders: to choose candidates |
+//! | `firmware_runs` | such runs of the whole firmware: to judge the chosen ones |
 //! | `search`, `plan` | candidates and selection |
 //! | `advice`, `remedy` | what would help if there is no motion |
 //! | `demonstration` | one run of everything |

@@ -1,20 +1,25 @@
-//! From a rig to its two motions: search, selection, random runs, independent check.
+//! From a rig to its two motions: search, selection, independent check, random runs of the firmware.
 
 use serde::Serialize;
 
 use super::SwingUpError;
 use super::advice::{advice, is_enough, narrower};
 use super::check::{Peaks, check};
-use super::gains::motion;
+use super::firmware_runs::{Condition, firmware_runs};
+use super::gains::{POSITION_WEIGHT, motion};
+use super::in_table::designed_table;
 use super::motion::{Motion, SwingUp};
 use super::refine::refine;
-use super::robustness::{Runs, random_runs, score};
+use super::robustness::{Runs, Spread, random_runs, score};
 use super::search::{Candidate, Request, candidates, ticks_per_knot};
 use super::setting::Setting;
 use super::stored::{Stored, StoredKnots};
 use super::way::Way;
 use crate::parallel;
 use crate::rig::Rig;
+use crate::study::Study;
+use crate::table::TableValues;
+use crate::verify::wilson;
 
 /// Candidates of the way up and of the way down; of chains with four and more links.
 const CANDIDATES: [u64; 2] = [100, 40];
@@ -51,6 +56,8 @@ pub type Progress<'a> = &'a (dyn Fn(Trying) + Sync);
 pub struct Plan {
     /// The motions with their gains.
     pub motions: SwingUp,
+    /// The rig's gain table with the motions in it, with which they were judged.
+    pub table: TableValues,
     /// What is stored of them.
     pub stored: Stored,
     /// How the raising was found to be.
@@ -70,7 +77,7 @@ pub struct Judgement {
     pub score: f64,
     /// What the independent check found.
     pub peaks: Peaks,
-    /// The random runs.
+    /// Random runs of the whole firmware with the table of [`Plan`]; of a lowering, those that were raised.
     pub runs: Runs,
 }
 
@@ -84,14 +91,9 @@ pub struct Judgement {
 pub fn search(rig: &Rig, progress: Progress<'_>) -> Result<Plan, SwingUpError> {
     let setting = Setting::of(rig)?;
     let request = Request::of(&setting);
-    let (raise, stored_raise, up) = best(&setting, &request, Way::Up, progress)?;
-    let (lower, stored_lower, down) = best(&setting, &request, Way::Down, progress)?;
-    Ok(Plan {
-        motions: SwingUp { raise, lower },
-        stored: Stored::new(rig, stored_raise, stored_lower),
-        raise: up,
-        lower: down,
-    })
+    let raise = best(&setting, &request, Way::Up, progress)?;
+    let lower = best(&setting, &request, Way::Down, progress)?;
+    judged(&setting, raise, lower, progress)
 }
 
 /// Judges stored motions again, as if they had just been found. The rig file may have changed since.
@@ -100,17 +102,14 @@ pub fn search(rig: &Rig, progress: Progress<'_>) -> Result<Plan, SwingUpError> {
 /// As for [`search`]; [`SwingUpError::Outdated`] if a stored motion does not fit the rig any more.
 pub fn judge(rig: &Rig, stored: &Stored, progress: Progress<'_>) -> Result<Plan, SwingUpError> {
     let setting = Setting::of(rig)?;
-    let request = Request::of(&setting);
-    let judged = |way, stored: &StoredKnots| -> Result<(Motion, Judgement), SwingUpError> {
+    let spread = Spread::asked(rig);
+    let found = |way, stored: &StoredKnots| -> Result<Found, SwingUpError> {
         let motion = restored(&setting, way, stored)?;
-        let score = score(&setting, &motion, way, &request.spread)?;
-        let judgement = judgement(&setting, &request, way, (&motion, stored), score, None, progress)?;
-        Ok((motion, judgement))
+        let score = score(&setting, &motion, way, &spread)?;
+        Ok(Found { motion, stored: stored.clone(), score, search: None })
     };
-    let (raise, up) = judged(Way::Up, &stored.raise)?;
-    let (lower, down) = judged(Way::Down, &stored.lower)?;
-    let stored = Stored::new(rig, stored.raise.clone(), stored.lower.clone());
-    Ok(Plan { motions: SwingUp { raise, lower }, stored, raise: up, lower: down })
+    let (raise, lower) = parallel::both(|| found(Way::Up, &stored.raise), || found(Way::Down, &stored.lower));
+    judged(&setting, raise?, lower?, progress)
 }
 
 /// The motions that are stored for exactly this rig, with their gains, checked but for the random runs: those they have
@@ -142,7 +141,23 @@ fn restored(setting: &Setting<'_>, way: Way, stored: &StoredKnots) -> Result<Mot
     let states = setting.rig.states();
     let knots = stored.knots(states).ok_or(SwingUpError::Outdated)?;
     let path = refine(&*setting.dynamics, &knots, stored.ticks, setting.tick_s, &way.ends(states));
-    motion(setting, path.ok_or(SwingUpError::Outdated)?, way)
+    motion(setting, path.ok_or(SwingUpError::Outdated)?, way, POSITION_WEIGHT)
+}
+
+/// A motion that is to be judged.
+struct Found {
+    motion: Motion,
+    stored: StoredKnots,
+    /// See [`Judgement::score`] and [`Judgement::search`].
+    score: f64,
+    search: Option<[usize; 2]>,
+}
+
+/// The motion of these knots.
+fn found(setting: &Setting<'_>, way: Way, stored: StoredKnots) -> Result<Found, SwingUpError> {
+    let motion = restored(setting, way, &stored)?;
+    let score = score(setting, &motion, way, &Spread::asked(setting.rig))?;
+    Ok(Found { motion, stored, score, search: None })
 }
 
 /// The most robust candidate of one way.
@@ -151,7 +166,7 @@ fn best(
     request: &Request,
     way: Way,
     progress: Progress<'_>,
-) -> Result<(Motion, StoredKnots, Judgement), SwingUpError> {
+) -> Result<Found, SwingUpError> {
     let counts = if setting.chain.links.len() >= 4 { CANDIDATES_OF_LONG_CHAINS } else { CANDIDATES };
     let tried = counts[usize::from(way == Way::Down)];
     progress(Trying::Stage { way, what: "trajectories", steps: tried });
@@ -168,11 +183,8 @@ fn best(
     // The first that passes the check; else the best, whose judgement then says what does not hold.
     let passes = |candidate: &Candidate| check(setting, &candidate.motion, way).is_ok();
     let chosen = solved.swap_remove(solved.iter().position(passes).unwrap_or(0));
-    let search = Some([tried as usize, count]);
     let stored = StoredKnots::new(ticks_per_knot(setting), &chosen.knots);
-    let motion = (&chosen.motion, &stored);
-    let judgement = judgement(setting, request, way, motion, chosen.score, search, progress)?;
-    Ok((chosen.motion, stored, judgement))
+    Ok(Found { search: Some([tried as usize, count]), ..found(setting, way, stored)? })
 }
 
 /// The candidates by the number of random runs that they stand; of equals, the one with the smallest largest deviation
@@ -197,30 +209,81 @@ fn ranked(
     Ok(all.into_iter().map(|(_, candidate)| candidate).collect())
 }
 
-fn judgement(
+/// Checks both motions, and runs the whole firmware with the table that has them.
+fn judged(
     setting: &Setting<'_>,
-    request: &Request,
-    way: Way,
-    (motion, stored): (&Motion, &StoredKnots),
-    score: f64,
-    search: Option<[usize; 2]>,
+    raise: Found,
+    lower: Found,
     progress: Progress<'_>,
-) -> Result<Judgement, SwingUpError> {
-    let peaks = check(setting, motion, way)?;
-    progress(Trying::Stage { way, what: "random runs", steps: 1 });
-    let runs = random_runs(setting, motion, way, &request.spread, 1, RUNS)?;
-    progress(Trying::Step { score: Some(score) });
-    if !is_enough(setting.rig, &runs) {
-        let mut help = narrower(setting.rig, |rig| {
-            let setting = Setting::of(rig)?;
-            let motion = restored(&setting, way, stored)?;
-            random_runs(&setting, &motion, way, &Request::of(&setting).spread, 1, RUNS)
+) -> Result<Plan, SwingUpError> {
+    let rig = setting.rig;
+    let peaks = [check(setting, &raise.motion, Way::Up)?, check(setting, &lower.motion, Way::Down)?];
+    let stored = Stored::new(rig, raise.stored, lower.stored);
+    let motions = SwingUp { raise: raise.motion, lower: lower.motion };
+    let table = designed_table(rig, &motions)?;
+    progress(Trying::Stage { way: Way::Up, what: "random runs of the firmware", steps: 1 });
+    let runs = arriving(rig, &table, &motions)?;
+    progress(Trying::Step { score: None });
+    let is_searched = raise.search.is_some();
+    for (way, runs) in Way::BOTH.into_iter().zip(&runs) {
+        if is_enough(rig, runs) {
+            continue;
+        }
+        let mut help = narrower(rig, |rig| {
+            let motions = refined(rig, &stored)?;
+            let [raise, lower] = arriving(rig, &designed_table(rig, &motions)?, &motions)?;
+            Ok(if way == Way::Up { raise } else { lower })
         })?;
-        if search.is_some() {
-            help = format!("{help}; {}", advice(setting.rig, way, progress)?);
+        if is_searched {
+            help = format!("{help}; {}", advice(rig, way, progress)?);
         }
         let needed = setting.rules.success_percent;
-        return Err(SwingUpError::NotRobust { way, stood: runs.stood, runs: RUNS, needed, help });
+        return Err(SwingUpError::NotRobust { way, stood: runs.stood, runs: runs.runs, needed, help });
     }
-    Ok(Judgement { way, search, score, peaks, runs })
+    let ([up, down], [raised, lowered]) = (peaks, runs);
+    let raise = Judgement { way: Way::Up, search: raise.search, score: raise.score, peaks: up, runs: raised };
+    let lower =
+        Judgement { way: Way::Down, search: lower.search, score: lower.score, peaks: down, runs: lowered };
+    Ok(Plan { motions, table, stored, raise, lower })
+}
+
+/// How many runs of the whole firmware of `table` are raised, and of those lowered, with the errors of `[swing_up]`. A
+/// run that the supervisor ends or does not begin has not arrived.
+fn arriving(rig: &Rig, table: &TableValues, motions: &SwingUp) -> Result<[Runs; 2], SwingUpError> {
+    let condition = Condition {
+        name: "errors of [swing_up]",
+        spread: Spread::asked(rig),
+        joint_counts: None,
+        is_late: false,
+    };
+    let found = firmware_runs(rig, table, motions, &condition, 1, RUNS, &Study::whole())?;
+    let raise = Runs { runs: RUNS, interval: wilson(found.raise.stood, RUNS), ..found.raise };
+    Ok([raise, found.lower])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// What the law brings up counts for nothing if the table's limits end it.
+    #[test]
+    fn a_motion_that_the_supervisor_ends_has_not_arrived() {
+        let file = "../../rigs/single-quanser-ip02.toml";
+        let rig = Rig::from_path(file.as_ref()).unwrap();
+        let motions = motions(&rig, &Stored::beside(file.as_ref()).unwrap()).unwrap();
+        let setting = Setting::of(&rig).unwrap();
+        let law = random_runs(&setting, &motions.raise, Way::Up, &Spread::asked(&rig), 1, RUNS).unwrap();
+        assert!(is_enough(&rig, &law), "{law:?}");
+        let mut table = designed_table(&rig, &motions).unwrap();
+        let [raise, lower] = arriving(&rig, &table, &motions).unwrap();
+        assert!(is_enough(&rig, &raise) && is_enough(&rig, &lower), "{raise:?}, {lower:?}");
+        let limits = &mut table.swing_up.as_mut().unwrap().limits;
+        limits.speed_m_per_s *= 0.5;
+        let [raise, _] = arriving(&rig, &table, &motions).unwrap();
+        assert!(!is_enough(&rig, &raise), "{raise:?}");
+        // A rail on which the firmware does not begin.
+        table.limits.rail_m = [-0.2, 0.2];
+        let [raise, _] = arriving(&rig, &table, &motions).unwrap();
+        assert_eq!((raise.stood, raise.runs), (0, RUNS));
+    }
 }

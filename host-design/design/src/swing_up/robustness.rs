@@ -38,6 +38,12 @@ impl Spread {
         let degree = core::f64::consts::PI / 180.0;
         Self { mass, friction, tilt_rad: degree, position_m: 1e-3, zero_rad: 0.1 * degree }
     }
+
+    /// Masses and friction wrong by the spreads of `[swing_up]`, the rest as in [`of`](Self::of).
+    pub(super) fn asked(rig: &Rig) -> Self {
+        let rules = rig.swing_up.clone().unwrap_or_default();
+        Self::of(rules.mass_spread_percent / 100.0, rules.friction_spread_percent / 100.0)
+    }
 }
 
 /// Outcome of random runs.

@@ -28,6 +28,10 @@ const RATE_TIME_S: f64 = 0.03;
 /// How far a refined path may exceed a bound of the plan, as a share of it.
 const EXCESS: f64 = 0.03;
 
+/// Candidates are ranked with the weights of `[lqr]`. With [`POSITION_WEIGHT`](super::gains::POSITION_WEIGHT), most of
+/// them stand all runs, and those that are chosen then stand coarse encoders and wrong zeros worse.
+const RANKING_WEIGHT: f64 = 1.0;
+
 /// What a candidate was drawn with.
 struct Draw {
     /// Duration (s).
@@ -80,8 +84,7 @@ impl Request {
         let [shortest, longest] = DURATION.map(|units| units * unit);
         let shortest = rules.shortest_s.unwrap_or_else(|| shortest.min(rules.longest_s.unwrap_or(shortest)));
         let duration_s = [shortest, rules.longest_s.unwrap_or(longest).max(shortest)];
-        let spread = Spread::of(rules.mass_spread_percent / 100.0, rules.friction_spread_percent / 100.0);
-        Self { duration_s, force_n, rail_m, bounds, spread }
+        Self { duration_s, force_n, rail_m, bounds, spread: Spread::asked(setting.rig) }
     }
 }
 
@@ -184,7 +187,7 @@ pub(super) fn candidates(
             done(None);
             return Ok(None);
         };
-        let motion = motion(setting, path, way)?;
+        let motion = motion(setting, path, way, RANKING_WEIGHT)?;
         let score = score(setting, &motion, way, &request.spread)?;
         done(Some(score));
         Ok(Some(Candidate { knots, motion, score }))

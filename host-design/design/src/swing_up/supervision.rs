@@ -64,8 +64,7 @@ pub(super) fn set_limits(rig: &Rig, table: &mut TableValues) -> Result<(), Simul
 
 /// The most that healthy machines reach; those that are lost do not count.
 fn healthy(rig: &Rig, table: &TableValues) -> Result<Extremes, SimulationError> {
-    let rules = rig.swing_up.clone().unwrap_or_default();
-    let spread = Spread::of(rules.mass_spread_percent / 100.0, rules.friction_spread_percent / 100.0);
+    let spread = Spread::asked(rig);
     let disturbance = Disturbance::of(rig);
     let balance_ticks = (BALANCE_S / rig.tick.period_s) as usize;
     let quiet = Scenario { substeps: 2, ..Scenario::swing_up(rig, 0.0, None) };

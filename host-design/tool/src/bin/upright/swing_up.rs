@@ -180,9 +180,8 @@ impl SwingUp {
         } else {
             with_search(|progress| search(&rig, progress)).map_err(failed)?
         };
-        let table = designed_table(&rig, &plan.motions).map_err(failed)?;
-        let script = Script::of(&rig, &table, self.seed, false).map_err(failed)?;
-        let demonstration = script.run(&table).map_err(RunError::from)?;
+        let script = Script::of(&rig, &plan.table, self.seed, false).map_err(failed)?;
+        let demonstration = script.run(&plan.table).map_err(RunError::from)?;
         if let Some(path) = &self.csv {
             let mut bytes = Vec::new();
             demonstration.trace.write_csv(&mut bytes)?;
