@@ -1,5 +1,5 @@
-//! Commands to the whole firmware: a run starts from a clone of one that balances, is armed, is raised, hangs, is shaken,
-//! or has a fault.
+//! Commands to the whole firmware: a run starts from a clone of one that balances, is armed, is raised, hangs, is
+//! shaken, or has a fault.
 //!
 //! The bytes of a run spell what happens to it: requests in good frames, which get past the checksum, damaged and
 //! repeated frames, bytes that are no frame, contacts, the supply, a push by hand, and time.

@@ -116,8 +116,9 @@ impl Start {
 /// The way from power-up to balancing as a person goes it, with the states on it:
 /// `[hanging, shaken, raised, armed, balancing, stopped]`.
 ///
-/// Hanging is just powered up; shaken is homed, checked, and shaken for some ticks; raised is homed, checked, upright and still; armed is two ticks before balancing.
-/// Stopped is armed and then stopped by the emergency stop, which is released again: the fault is latched.
+/// Hanging is just powered up; shaken is homed, checked, and shaken for some ticks; raised is homed, checked, upright
+/// and still; armed is two ticks before balancing. Stopped is armed and then stopped by the emergency stop, which is
+/// released again: the fault is latched.
 pub(crate) fn starts() -> [Start; 6] {
     let limits = &TABLE.limits;
     let build = Build { rig_hash: RIG_HASH, tick_s: TICK_S };

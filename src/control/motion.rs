@@ -101,8 +101,8 @@ struct Window {
     knots: usize,
     /// The first of the four nearest knots.
     first: usize,
-    /// Weights of these knots: those of the cubic through four equidistant points. Their sum is exactly [`ONE`], so that
-    /// what is constant stays constant.
+    /// Weights of these knots: those of the cubic through four equidistant points. Their sum is exactly [`ONE`], so
+    /// that what is constant stays constant.
     weights: [i32; 4],
 }
 

@@ -91,8 +91,8 @@ impl<const N: usize, T: Number> ChainModel<N, T> {
 }
 
 impl<const N: usize, T: Scalar> ChainModel<N, T> {
-    /// Replaces the state `x, ẋ, θ_1, θ̇_1, …` (2N + 2 entries) by the one `dt` (s) later, with `force` (N) held: one step
-    /// of the explicit midpoint rule, whose error within a tick is far below what the encoders resolve.
+    /// Replaces the state `x, ẋ, θ_1, θ̇_1, …` (2N + 2 entries) by the one `dt` (s) later, with `force` (N) held: one
+    /// step of the explicit midpoint rule, whose error within a tick is far below what the encoders resolve.
     #[inline]
     pub fn predict(&self, state: &mut [T], force: T, dt: T) {
         let (now, no_torques) = (ChainState::from_relative(state), [T::default(); N]);

@@ -10,7 +10,8 @@ const HALF_PI_3: f32 = 7.549_79e-8;
 const S: [f32; 3] = [-0.166_666_55, 0.008_332_161, -0.000_195_152_96];
 const C: [f32; 3] = [0.041_666_646, -0.001_388_731_6, 2.443_315_7e-5];
 
-/// Adding and then subtracting this rounds to the nearest integer; the lowest bits of the sum are those of that integer.
+/// Adding and then subtracting this rounds to the nearest integer; the lowest bits of the sum are those of that
+/// integer.
 const ROUND: f32 = 1.5 * (1u32 << 23) as f32;
 
 /// Up to this angle (rad) the multiple of π/2 is below 2^13.

@@ -1,9 +1,9 @@
 //! Shaking: the motor shakes the hanging rig, so that the host can identify its parameters from a log of every tick.
 //!
 //! The host sends the forces of the coming ticks ahead; they wait in a ring. A spring and a damper, whose constants the
-//! host gives, too, keep the cart near the middle. Whatever the host sends, the force is bounded and changes slowly, and
-//! the rig stays within limits of its own: rail, speed, angle, rates, duration. When the host is silent or the time is
-//! over, spring and damper bring the cart back, and then the motor goes off.
+//! host gives, too, keep the cart near the middle. Whatever the host sends, the force is bounded and changes slowly,
+//! and the rig stays within limits of its own: rail, speed, angle, rates, duration. When the host is silent or the time
+//! is over, spring and damper bring the cart back, and then the motor goes off.
 
 use nalgebra::SVector;
 use serde::{Deserialize, Serialize};
@@ -39,8 +39,8 @@ pub const ANGLE_RAD: f32 = 2.1;
 pub const RATE_RAD_PER_S: f32 = 90.0;
 /// The same for the cart, in largest speeds.
 const RATE_OF_SPEED: f32 = 4.0;
-/// Longest time in which the force of the bench drive moves everything by more than a count: cart, links (s). Other forces
-/// have as long as for the same impulse.
+/// Longest time in which the force of the bench drive moves everything by more than a count: cart, links (s). Other
+/// forces have as long as for the same impulse.
 pub const STILL_S: [f32; 2] = [0.25, 0.5];
 /// Counted unit of an impulse: this part of the bench drive's force in a tick.
 const IMPULSE: f32 = 1.0 / 32.0;
@@ -112,8 +112,8 @@ impl<const NY: usize> Shaker<NY> {
         *self = Self { shaking, start: *counts, last: *counts, seen: *counts, ..Self::default() };
     }
 
-    /// Takes forces from the host, in tick `now`: the first one is for the tick with these low bits. Those of ticks that
-    /// are over, or too far ahead, are left out.
+    /// Takes forces from the host, in tick `now`: the first one is for the tick with these low bits. Those of ticks
+    /// that are over, or too far ahead, are left out.
     pub fn take(&mut self, now: u32, first: u16, forces: &[i8; FORCES]) {
         self.silent_ticks = 0;
         for (tick, &force) in (0..).map(|index| first.wrapping_add(index)).zip(forces) {

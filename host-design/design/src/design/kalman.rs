@@ -74,8 +74,8 @@ const WHITE_S: f64 = 1e-3;
 /// Variance of each sensor's rounding error, `step²/12`.
 ///
 /// The filter takes the errors of successive ticks as independent. In ticks below 1 ms a link near rest often keeps its
-/// count, and with it the error: measured twice as often, it says no more. So the variance of a chain's encoders is larger
-/// by 1 ms over the tick, which keeps variance times tick.
+/// count, and with it the error: measured twice as often, it says no more. So the variance of a chain's encoders is
+/// larger by 1 ms over the tick, which keeps variance times tick.
 pub(super) fn rounding_variances<R: Real>(rig: &Rig, steps: &[R]) -> Vec<R> {
     let twelve = R::from_f64(12.0);
     let is_correlated = matches!(rig.plant, PlantDescription::Chain(_)) && rig.tick.period_s < WHITE_S;

@@ -39,8 +39,8 @@ pub struct Hand {
     turn_on: Request,
     grasp: Grasp,
     start: Vec<f64>,
-    /// The rig while the motor pushes the cart. It is not that of the run, whose random numbers and whose state must not
-    /// depend on how it was started.
+    /// The rig while the motor pushes the cart. It is not that of the run, whose random numbers and whose state must
+    /// not depend on how it was started.
     pushed: Bench,
     /// Ticks between two tries of the same request.
     retry_ticks: u32,
@@ -70,8 +70,8 @@ pub(super) const RETRY_S: f64 = 0.05;
 const KEY_S: f64 = 0.025;
 
 impl Hand {
-    /// A hand that moves `rig` from hanging to the start of `scenario`, and lets go there: when the firmware balances, or
-    /// for a swing-up when it begins to raise the links.
+    /// A hand that moves `rig` from hanging to the start of `scenario`, and lets go there: when the firmware balances,
+    /// or for a swing-up when it begins to raise the links.
     ///
     /// # Errors
     /// [`SimulationError`] if the plant cannot be built.
@@ -105,8 +105,8 @@ impl Hand {
         self.doing == Doing::Push
     }
 
-    /// What the hand does in tick number `tick`, before which the firmware has given `output`; `None` once the controller
-    /// commands the motor and the hand has let go.
+    /// What the hand does in tick number `tick`, before which the firmware has given `output`; `None` once the
+    /// controller commands the motor and the hand has let go.
     pub fn act(&mut self, tick: u32, status: &Status, output: &Output) -> Option<HandTick> {
         if status.state.controls() {
             return None;

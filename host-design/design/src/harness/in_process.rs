@@ -32,7 +32,8 @@ pub fn with_firmware<R>(
     result.ok_or_else(|| SimulationError::Size { states, sensors }.into())
 }
 
-/// [`with_firmware`] without a type of the caller's, so that all sizes of the firmware are compiled once, in this crate.
+/// [`with_firmware`] without a type of the caller's, so that all sizes of the firmware are compiled once, in this
+/// crate.
 fn start(table: &TableValues, run: &mut dyn FnMut(&mut dyn Target)) -> Result<(), HarnessError> {
     let (states, sensors) = (table.states(), table.sensors());
     with_firmware_size(states, sensors, WithFirmware { table, run })

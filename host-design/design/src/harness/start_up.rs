@@ -88,8 +88,8 @@ impl<'t> Harness<'t> {
         Ok(self.output)
     }
 
-    /// Homes, checks the signs, has the motor push the cart, raises the links and arms, or lets them hang and starts the
-    /// swing-up. Ends with the first tick in which the controller commands the motor, and gives that tick's output.
+    /// Homes, checks the signs, has the motor push the cart, raises the links and arms, or lets them hang and starts
+    /// the swing-up. Ends with the first tick in which the controller commands the motor, and gives that tick's output.
     ///
     /// `setpoint_m` is commanded as soon as the firmware is armed; from then on it needs a command every
     /// [`HEARTBEAT_S`](super::HEARTBEAT_S). Without a set-point it holds the position in which it begins.

@@ -28,8 +28,8 @@ const BAND: [f64; 2] = [0.25, 1.6];
 pub(super) const AIM: (f64, f64) = (60.0 * PI / 180.0, 0.6);
 /// The motor goes off beyond this share of the rail.
 const STOP: f64 = 0.85;
-/// Substeps of a tick with a motor. Its force is held for a substep, so the back-EMF comes half of one late. With the usual 4
-/// the machine is identified with 0.15 to 0.4 % too little mass.
+/// Substeps of a tick with a motor. Its force is held for a substep, so the back-EMF comes half of one late. With the
+/// usual 4 the machine is identified with 0.15 to 0.4 % too little mass.
 const SUBSTEPS: usize = 32;
 /// Amplitudes that are tried, one after the other, if the machine moves more than the model.
 const RETRIES: [f64; 4] = [1.0, 0.7, 0.5, 0.35];

@@ -20,8 +20,8 @@ const SPEED_S: f64 = 0.04;
 const FOLLOWS: f64 = 0.1;
 /// Time after which the amplitude is changed, if the rig moves too much or too little (s).
 const ADAPT_S: f64 = 4.0;
-/// The amplitude is raised if the rig moves less than this share of the aim, by at most this factor each time, and by at
-/// most this one altogether.
+/// The amplitude is raised if the rig moves less than this share of the aim, by at most this factor each time, and by
+/// at most this one altogether.
 const RAISE: (f64, f64, f64) = (0.8, 1.3, 3.0);
 /// It is lowered by this factor if the rig moves more.
 const LOWER: f64 = 0.7;

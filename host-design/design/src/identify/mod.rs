@@ -2,8 +2,8 @@
 //!
 //! - [`Log`]: every tick's counters and drive, as a file.
 //! - [`Excitation`], [`shake`]: what shakes the machine, and the log of a simulated one.
-//! - [`shake_with`]: the log of a simulated machine that the whole firmware shakes; [`Feed`] and [`Recorder`] are the host's
-//!   part of it.
+//! - [`shake_with`]: the log of a simulated machine that the whole firmware shakes; [`Feed`] and [`Recorder`] are the
+//!   host's part of it.
 //! - [`OverLine`]: the same for a machine behind a serial line.
 //! - [`identify`]: first the wiring, then multiple shooting, then prediction error, then deviations and a verdict.
 //! - [`coverage`]: how far the deviations hold, over many machines that differ from their file.

@@ -5,10 +5,11 @@
 
 use super::parameters::Layout;
 
-/// The chain with the letters of `ChainParameters`, for any number of links n, in the m = n + 1 coordinates x, φ_1 … φ_n.
+/// The chain with the letters of `ChainParameters`, for any number of links n, in the m = n + 1 coordinates x, φ_1 …
+/// φ_n.
 ///
-/// The state has s = 2m + 1 entries: coordinates, their rates, and the bristle ζ of the cart. Angles are absolute and from the normal of the rail,
-/// which rises by α. With `b_jk = l_j a_k` for j < k and `b_jj = J_j` the equations are
+/// The state has s = 2m + 1 entries: coordinates, their rates, and the bristle ζ of the cart. Angles are absolute and
+/// from the normal of the rail, which rises by α. With `b_jk = l_j a_k` for j < k and `b_jj = J_j` the equations are
 ///
 /// ```text
 /// M_t ẍ - Σ a_j cos φ_j φ̈_j + Σ a_j sin φ_j φ̇_j² = u - (d_0 + e) ẋ - c_0 ζ - g M_t sin α
@@ -17,9 +18,9 @@ use super::parameters::Layout;
 /// dζ/dx = (1 - ζ sgn ẋ)/δ
 /// ```
 ///
-/// with e the damping of the motor's back-EMF. A cart that turns round is held by its friction until the bristle has turned,
-/// too (P. R. Dahl, "Solid friction damping of mechanical vibrations", AIAA Journal 14(12), 1976): a friction without
-/// memory lets it creep instead.
+/// with e the damping of the motor's back-EMF. A cart that turns round is held by its friction until the bristle has
+/// turned, too (P. R. Dahl, "Solid friction damping of mechanical vibrations", AIAA Journal 14(12), 1976): a friction
+/// without memory lets it creep instead.
 #[derive(Debug, Clone)]
 pub(super) struct Model {
     pub(super) layout: Layout,

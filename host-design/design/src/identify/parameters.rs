@@ -3,8 +3,8 @@
 use crate::plant::ChainParameters;
 use crate::rig::{Chain, Rig};
 
-/// Travel (m) over which the bristle of the cart turns, and rate (rad/s) below which the dry friction of a joint is taken as
-/// proportional: δ and ε of the model.
+/// Travel (m) over which the bristle of the cart turns, and rate (rad/s) below which the dry friction of a joint is
+/// taken as proportional: δ and ε of the model.
 pub(super) const SMOOTHING: [f64; 2] = [3e-5, 0.02];
 
 /// What a parameter is.

@@ -35,7 +35,8 @@ impl Recorder {
         Self { log, turns, out_of_order: 0 }
     }
 
-    /// Adds a message. The first one says how many whole turns the links have made since they were homed: the links hang.
+    /// Adds a message. The first one says how many whole turns the links have made since they were homed: the links
+    /// hang.
     pub fn push(&mut self, message: &AnyTickLog) {
         if self.log.ticks().last().is_some_and(|last| message.first <= last.number) {
             self.out_of_order += 1;

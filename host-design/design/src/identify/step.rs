@@ -108,8 +108,8 @@ pub(super) struct Measured {
 }
 
 impl Model {
-    /// What channel `channel` measures at `state`: for a joint `θ + o + s (sin θ - sin h) + c (cos θ - cos h) - h`, with
-    /// θ from the vertical and h the hanging angle.
+    /// What channel `channel` measures at `state`: for a joint `θ + o + s (sin θ - sin h) + c (cos θ - cos h) - h`,
+    /// with θ from the vertical and h the hanging angle.
     pub(super) fn measure(&self, p: &[f64], state: &[f64], channel: usize) -> Measured {
         let Some(joint) = channel.checked_sub(1) else {
             return Measured { value: state[0], by_angle: 1.0, sine: 0.0, cosine: 0.0 };

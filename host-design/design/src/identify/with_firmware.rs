@@ -140,7 +140,8 @@ impl<'t> Shaken<'t> {
         Ok(Self { harness, feed, recorder: Recorder::new(rig, table) })
     }
 
-    /// One tick of firmware and machine: `pins` may change what the firmware reads, `motor` what drives the cart while the motor is on.
+    /// One tick of firmware and machine: `pins` may change what the firmware reads, `motor` what drives the cart while
+    /// the motor is on.
     ///
     /// # Errors
     /// [`ShakeError`] if the firmware does not answer, or the cart does not follow the pulses.

@@ -28,8 +28,8 @@ impl Energy {
     }
 }
 
-/// Equations of motion of N links on a cart: those of [`ChainParameters`] with the same symbols, arranged for speed. The
-/// firmware predicts with the same source, in `f32`.
+/// Equations of motion of N links on a cart: those of [`ChainParameters`] with the same symbols, arranged for speed.
+/// The firmware predicts with the same source, in `f32`.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ChainPlant<const N: usize> {
     total_mass: f64,

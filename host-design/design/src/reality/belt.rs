@@ -29,8 +29,8 @@ impl Rotor {
 }
 
 /// Two masses with a play and a spring between them (M. Nordin, P.-O. Gutman, "Controlling mechanical systems with
-/// backlash: a survey", Automatica 38, 2002). With the stretch `s` beyond the play, the belt pulls with `k s + c ṡ`, but
-/// never pushes when it is slack: the force has the sign of `s` or is zero.
+/// backlash: a survey", Automatica 38, 2002). With the stretch `s` beyond the play, the belt pulls with `k s + c ṡ`,
+/// but never pushes when it is slack: the force has the sign of `s` or is zero.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Belt {
     /// Mass of the rotor, as seen by the cart (kg).

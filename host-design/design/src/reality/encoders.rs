@@ -6,9 +6,9 @@ use crate::rig::{Rig, SensorErrors};
 
 /// What the encoders measure instead of the joints' angles: `θ + e + a (sin(θ + p) - sin(h + p))` for each joint.
 ///
-/// The zero error `e` comes from homing, and so does `h`: the links are homed hanging, where the first joint's angle is π
-/// and the others are straight, and there the eccentricity makes no difference. (Amplitude and phase of an encoder on an
-/// eccentric disk: Heidenhain, *Rotary Encoders*, "Measuring accuracy".)
+/// The zero error `e` comes from homing, and so does `h`: the links are homed hanging, where the first joint's angle is
+/// π and the others are straight, and there the eccentricity makes no difference. (Amplitude and phase of an encoder on
+/// an eccentric disk: Heidenhain, *Rotary Encoders*, "Measuring accuracy".)
 #[derive(Debug, Clone, PartialEq)]
 pub struct Encoders {
     joints: Vec<Joint>,
@@ -54,8 +54,8 @@ impl Joint {
     }
 }
 
-/// The state (m, m/s, rad, rad/s …) in which the links of a chain are homed: hanging, but each joint off by its zero error,
-/// because the firmware takes it as exactly hanging.
+/// The state (m, m/s, rad, rad/s …) in which the links of a chain are homed: hanging, but each joint off by its zero
+/// error, because the firmware takes it as exactly hanging.
 pub fn hanging_by_hand(rig: &Rig) -> Vec<f64> {
     let mut hanging = vec![0.0; rig.states()];
     hanging[2] = PI;

@@ -14,8 +14,8 @@ use crate::plant::{
 };
 use crate::rig::{Chain, Rig};
 
-/// Largest phase (rad) by which the fastest stuck contact may advance in a step. A Runge–Kutta step then has an error of
-/// about 1e-5 of its swing; at half of it, the runs differ by less than by another seed.
+/// Largest phase (rad) by which the fastest stuck contact may advance in a step. A Runge–Kutta step then has an error
+/// of about 1e-5 of its swing; at half of it, the runs differ by less than by another seed.
 const LARGEST_PHASE: f64 = 0.25;
 
 /// A chain with dry friction, belt and tilted rail.
@@ -152,8 +152,8 @@ impl<const N: usize> RealChain<N> {
         Motion { chain: self.plant.derivative(here, on_cart, &torques), rotor }
     }
 
-    /// One step of the classical Runge–Kutta method. The friction at a stage is a function of the travel since the start of
-    /// the step, so that the bristles need no stages of their own.
+    /// One step of the classical Runge–Kutta method. The friction at a stage is a function of the travel since the
+    /// start of the step, so that the bristles need no stages of their own.
     fn step(&mut self, force: f64, torques: &[f64; N], dt: f64) {
         let from = self.motion;
         let rate = |at: &Motion<N>| self.derivative(&from, at, force, torques);

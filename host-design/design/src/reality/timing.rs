@@ -5,8 +5,8 @@ use rand_pcg::Pcg64;
 
 use crate::rig::Rig;
 
-/// Latency of the force and jitter of the tick: tick k begins at `k T + j_k` with `j_k` drawn evenly from ± the jitter, and
-/// the force of tick k begins to act one latency later.
+/// Latency of the force and jitter of the tick: tick k begins at `k T + j_k` with `j_k` drawn evenly from ± the jitter,
+/// and the force of tick k begins to act one latency later.
 #[derive(Debug, Clone)]
 pub struct Timing {
     period_s: f64,

@@ -77,10 +77,11 @@ impl Machines {
     }
 }
 
-/// Machine of the run with this number: drawn within `[robust]`, or, if the rig file has none, the machine of `[reality]`.
+/// Machine of the run with this number: drawn within `[robust]`, or, if the rig file has none, the machine of
+/// `[reality]`.
 ///
-/// Friction, wrong zeros and latency have the same share of their tolerances, and each mass its own, all even from none to
-/// all.
+/// Friction, wrong zeros and latency have the same share of their tolerances, and each mass its own, all even from none
+/// to all.
 pub fn healthy_machine(rig: &Rig, number: u64) -> Rig {
     let (Some(tolerances), PlantDescription::Chain(chain)) = (&rig.robust, &rig.plant) else {
         return rig.clone();
@@ -95,7 +96,8 @@ pub fn healthy_machine(rig: &Rig, number: u64) -> Rig {
     machine
 }
 
-/// Machine at the combination of wrong masses with this number, with all of friction, wrong zeros and latency of `[robust]`.
+/// Machine at the combination of wrong masses with this number, with all of friction, wrong zeros and latency of
+/// `[robust]`.
 ///
 /// The cart is too heavy if the lowest bit of the number is set, the first link if the next is, and so on.
 pub fn corner_machine(rig: &Rig, number: u64) -> Rig {

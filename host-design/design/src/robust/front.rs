@@ -70,8 +70,8 @@ pub(super) fn front(loops: &Loops<'_>, scales: &[f64], progress: Progress<'_>) -
     Ok(Front(scales.iter().enumerate().map(at).collect()))
 }
 
-/// The place of the loop with the least ripple at each scale, for every pair of a law and an observer. A loop that falls
-/// at a smaller scale is not tried at a larger one.
+/// The place of the loop with the least ripple at each scale, for every pair of a law and an observer. A loop that
+/// falls at a smaller scale is not tried at a larger one.
 fn climbed(
     loops: &Loops<'_>,
     scales: &[f64],

@@ -158,7 +158,8 @@ impl<'a> Loops<'a> {
         TableValues::of_uncertified(rig, &both).ok()
     }
 
-    /// What this loop stands of the whole tolerances, with `corners` their combinations of wrong masses. It is tried once.
+    /// What this loop stands of the whole tolerances, with `corners` their combinations of wrong masses. It is tried
+    /// once.
     pub(super) fn trial(&self, at: At, corners: &[PlantModel<f64>]) -> Result<Trial, RobustError> {
         let [pool, observer, place] = at;
         let one = &self.ranked[pool][observer][place];
@@ -206,8 +207,8 @@ impl<'a> Loops<'a> {
     }
 
     /// The observer with which the ripple of all laws, each relative to that of the file, is least in sum; then the one
-    /// with the next larger sum, and so on. `heads` are the places of the loops; an observer whose list of a law is at its
-    /// end is left out.
+    /// with the next larger sum, and so on. `heads` are the places of the loops; an observer whose list of a law is at
+    /// its end is left out.
     pub(super) fn by_ripple(&self, heads: &[Vec<usize>]) -> Vec<usize> {
         let sum = |observer: usize| {
             let ripple = |(pool, heads): (usize, &Vec<usize>)| {

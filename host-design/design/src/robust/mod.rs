@@ -1,9 +1,8 @@
 //! Gains that stand a machine which is not as its file says: a choice among multiples of the file's own numbers.
 //!
-//! [`choose`] sorts all candidates by predicted ripple, and simulates the cheapest whose linear loop stands all mass errors.
-//! The choice is designed again and certified. Friction is judged by simulation only: neither margins nor norms order
-//! designs as friction does.
-//! [`false_alarms`] balances machines within the tolerances with the whole firmware.
+//! [`choose`] sorts all candidates by predicted ripple, and simulates the cheapest whose linear loop stands all mass
+//! errors. The choice is designed again and certified. Friction is judged by simulation only: neither margins nor norms
+//! order designs as friction does. [`false_alarms`] balances machines within the tolerances with the whole firmware.
 
 mod candidate;
 mod error;

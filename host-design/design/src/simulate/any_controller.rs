@@ -1,7 +1,7 @@
 //! The firmware's controller behind an interface without its numbers of states and sensors.
 //!
-//! These are parameters of the controller's type, so each pair is compiled separately. Only what is in this file is; the
-//! loop around it is compiled once.
+//! These are parameters of the controller's type, so each pair is compiled separately. Only what is in this file is;
+//! the loop around it is compiled once.
 
 use nalgebra::SVector;
 use upright::control::controller::{Controller, MotorCommand, Rejected};

@@ -156,15 +156,15 @@ impl Bench {
         self.push_n = force_n;
     }
 
-    /// Adds an external force on the cart (N) and external torques at the joints (N·m; missing ones are 0) in the next tick:
-    /// those of a hand that pulls.
+    /// Adds an external force on the cart (N) and external torques at the joints (N·m; missing ones are 0) in the next
+    /// tick: those of a hand that pulls.
     pub fn pull(&mut self, force_n: f64, torques_n_m: &[f64]) {
         self.push_n = force_n;
         self.pull_n_m.iter_mut().zip(torques_n_m).for_each(|(pull, &torque)| *pull = torque);
     }
 
-    /// Simulates one tick with the command `drive` from its start; gives the motor's force on the cart at the start of the
-    /// tick (N), without the disturbance.
+    /// Simulates one tick with the command `drive` from its start; gives the motor's force on the cart at the start of
+    /// the tick (N), without the disturbance.
     pub fn tick(&mut self, drive: Drive) -> f64 {
         let (now, disturbance) = self.begin(drive);
         let before = std::mem::replace(&mut self.acting_drive, now);

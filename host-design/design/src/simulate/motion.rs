@@ -70,8 +70,8 @@ fn raise_to(largest: &mut [f64], values: &[f64]) {
     largest.iter_mut().zip(values).for_each(|(largest, value)| *largest = largest.max(*value));
 }
 
-/// Raises the links of `rig` by the motions of `table`, balances for some ticks, and lowers them. `rig` may differ from the
-/// one that the table is for. Start and disturbances are those of `scenario`. None if the table has no motions.
+/// Raises the links of `rig` by the motions of `table`, balances for some ticks, and lowers them. `rig` may differ from
+/// the one that the table is for. Start and disturbances are those of `scenario`. None if the table has no motions.
 ///
 /// # Errors
 /// [`SimulationError`] if the plant cannot be built or the firmware refuses the table.
@@ -128,7 +128,8 @@ struct Run<'t, const NX: usize, const NY: usize, const N: usize> {
 }
 
 impl<'t, const NX: usize, const NY: usize, const N: usize> Run<'t, NX, NY, N> {
-    /// Follows `motion` from the set-point, with the tests of the supervisor but without its thresholds; then hands over.
+    /// Follows `motion` from the set-point, with the tests of the supervisor but without its thresholds; then hands
+    /// over.
     fn follow(&mut self, motion: MotionTable<'t>) {
         let Self { controller, bench, reached, .. } = self;
         let mut player = Player::<NX, NY>::new(motion, controller.law_state().setpoint);

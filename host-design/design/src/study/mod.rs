@@ -1,8 +1,8 @@
 //! Studies: many numbered runs, made in this process or split over several.
 //!
 //! A run depends on nothing but its number, so it does not matter where it is made. A shard makes every N-th run and
-//! writes the outcomes, one JSON object per line. A merged study reads them from these files instead of making runs. All
-//! that follows is the code of a study that makes every run, so that it prints the same bytes.
+//! writes the outcomes, one JSON object per line. A merged study reads them from these files instead of making runs.
+//! All that follows is the code of a study that makes every run, so that it prints the same bytes.
 
 mod error;
 mod files;
@@ -133,7 +133,8 @@ impl Study {
         matches!(self.0, Source::Shard(..))
     }
 
-    /// Writes what a shard has made: a line about the study, then one for each run. Nothing for a study that is no shard.
+    /// Writes what a shard has made: a line about the study, then one for each run. Nothing for a study that is no
+    /// shard.
     ///
     /// # Errors
     /// That of the writer.

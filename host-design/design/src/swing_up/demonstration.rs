@@ -37,8 +37,9 @@ pub struct Script {
 }
 
 impl Script {
-    /// Both motions of `table`, from encoders and with the rig's noise, from a start that is off by 1° and 1 mm, with encoders
-    /// off by 0.1°, drawn with `seed`. Masses and friction are the rig's, or wrong by up to the spreads of `[swing_up]`.
+    /// Both motions of `table`, from encoders and with the rig's noise, from a start that is off by 1° and 1 mm, with
+    /// encoders off by 0.1°, drawn with `seed`. Masses and friction are the rig's, or wrong by up to the spreads of
+    /// `[swing_up]`.
     ///
     /// # Errors
     /// [`SwingUpError::NoMotions`] if the table has none.

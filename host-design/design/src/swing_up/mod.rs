@@ -23,8 +23,8 @@
 //! | `margins`, `trade` | pushes that a motion stands; what candidates are like |
 //! | `check`, `stored` | independent check; the file beside the rig file |
 //!
-//! Everything that is random has a fixed seed, and every sum is taken in a fixed order, so the result does not depend on
-//! the machine or on its threads.
+//! Everything that is random has a fixed seed, and every sum is taken in a fixed order, so the result does not depend
+//! on the machine or on its threads.
 
 mod advice;
 mod check;

@@ -47,8 +47,8 @@ pub(super) fn refine(
     is_near(knots, at_knots.map(Vec::as_slice)).then_some(path)
 }
 
-/// Whether the positions of a refined path are still those of its knots: from knots of another spacing or of another rig,
-/// Newton steps may lead to quite another motion.
+/// Whether the positions of a refined path are still those of its knots: from knots of another spacing or of another
+/// rig, Newton steps may lead to quite another motion.
 fn is_near<'a>(knots: &Knots, path: impl Iterator<Item = &'a [f64]>) -> bool {
     let near = |(knot, x): (&Vec<f64>, &[f64])| {
         knot.iter().zip(x).step_by(2).all(|(knot, x)| (knot - x).abs() < MOVED)

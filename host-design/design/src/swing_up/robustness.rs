@@ -61,9 +61,9 @@ pub struct Runs {
     pub deviation_rad: f64,
 }
 
-/// A deterministic measure of fragility, from one run for each mass, slightly wrong, and two with all friction wrong, without
-/// noise: the deviations to expect at the spreads of mass and friction, as shares of what may be lost, a link's angle
-/// and the rail that the plan leaves. Smaller is better.
+/// A deterministic measure of fragility, from one run for each mass, slightly wrong, and two with all friction wrong,
+/// without noise: the deviations to expect at the spreads of mass and friction, as shares of what may be lost, a link's
+/// angle and the rail that the plan leaves. Smaller is better.
 pub(super) fn score(
     setting: &Setting<'_>,
     motion: &Motion,

@@ -9,8 +9,8 @@ use crate::numerics::Matrix;
 use crate::rig::{Chain, Motor, PlantDescription, Rig, Sensor, SwingUpRules};
 use crate::verify::Disturbance;
 
-/// Process noise that the filter expects in motion, as multiples of the rig's: in motion, wrong masses disturb more than
-/// at rest.
+/// Process noise that the filter expects in motion, as multiples of the rig's: in motion, wrong masses disturb more
+/// than at rest.
 const JOINT_NOISE: f64 = 100.0;
 const FORCE_NOISE: f64 = 10.0;
 /// Time after which the filter at rest has settled.

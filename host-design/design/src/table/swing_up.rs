@@ -52,8 +52,8 @@ pub struct MotionValues {
 }
 
 impl SwingUpValues {
-    /// The table of `motions` for `rig`, whose gain table is `table`. The supervisor detects nothing in its motions: its
-    /// limits are [`MotionLimits::none`], its thresholds [`Thresholds::none`].
+    /// The table of `motions` for `rig`, whose gain table is `table`. The supervisor detects nothing in its motions:
+    /// its limits are [`MotionLimits::none`], its thresholds [`Thresholds::none`].
     ///
     /// # Errors
     /// [`NoTable`] if the rig has no chain, a delay, or no observer, if the motions are those of another rig, or if a
@@ -179,7 +179,8 @@ impl MotionValues {
     }
 }
 
-/// Rows of `width` values, column by column, as whole numbers of the column's unit; the largest value is `i16::MAX` units.
+/// Rows of `width` values, column by column, as whole numbers of the column's unit; the largest value is `i16::MAX`
+/// units.
 fn in_units(rows: &[f64], width: usize) -> Result<(Vec<f32>, Vec<i16>), NoTable> {
     let (mut units, mut values) = (Vec::new(), Vec::new());
     for column in 0..width {

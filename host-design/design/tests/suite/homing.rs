@@ -43,8 +43,8 @@ impl Case {
         Self { rig, lift_rad, pull_n_m: 0.0, longest_s: 60.0 }
     }
 
-    /// The links are let go; homing is asked for every 0.05 s until it is done. The counts of an encoder have any phase to
-    /// its zero.
+    /// The links are let go; homing is asked for every 0.05 s until it is done. The counts of an encoder have any phase
+    /// to its zero.
     fn home(&self, seed: u64) -> Homed {
         let mut rig = self.rig.clone();
         let mut random = Pcg64::seed_from_u64(seed);

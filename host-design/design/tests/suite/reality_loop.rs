@@ -153,8 +153,8 @@ fn resting_position(rig: &Rig, table: &TableValues) -> f64 {
     sum / ticks
 }
 
-/// Where the cart rests if the first joint is measured wrong by `error` (rad), with the LQR (m). The links are upright and
-/// the force is zero. The observer, which knows only the measurement y, settles at
+/// Where the cart rests if the first joint is measured wrong by `error` (rad), with the LQR (m). The links are upright
+/// and the force is zero. The observer, which knows only the measurement y, settles at
 /// `x̂ = (I - (I - L C) Ad)⁻¹ L y`, and `K x̂ = 0` gives the position in y.
 fn rest_with_wrong_zero(rig: &Rig, error: f64) -> f64 {
     let design = &certified(rig).double;

@@ -46,8 +46,8 @@ pub struct Simulated<'a> {
 }
 
 impl<'a> Simulated<'a> {
-    /// The machine as `machine` describes it, with its `[reality]` and a `planted` defect, and the firmware `target` with
-    /// the gain table `table`, which has just started. The links hang, and the cart is in the middle.
+    /// The machine as `machine` describes it, with its `[reality]` and a `planted` defect, and the firmware `target`
+    /// with the gain table `table`, which has just started. The links hang, and the cart is in the middle.
     ///
     /// # Errors
     /// [`SimulationError`] if the machine cannot be simulated.

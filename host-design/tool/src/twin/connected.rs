@@ -11,8 +11,8 @@ use crate::monitor::{Line, now};
 /// At the end, the motor is turned off: longest wait for the answer.
 const LAST_WAIT: Duration = Duration::from_millis(500);
 
-/// Passes bytes between the line and the viewers until `goes_on` says no. The firmware has to be that of the rig with this
-/// hash; commands to another one are not sent.
+/// Passes bytes between the line and the viewers until `goes_on` says no. The firmware has to be that of the rig with
+/// this hash; commands to another one are not sent.
 pub(super) fn run(mut line: Line, desk: &mut Desk, rig_hash: u64, goes_on: &dyn Fn() -> bool) {
     let mut buffer = [0; 4096];
     let mut next = Instant::now();

@@ -15,8 +15,8 @@ use super::viewers::{Event, Id, Inbox, Viewers};
 use crate::monitor::record::{Recorder, json as telemetry_json};
 use crate::monitor::{Action, Monitor, request as command, words};
 
-/// Longest silence of the viewer in command while the motor may move. A page answers every few pictures, in a background
-/// tab as well; a sleeping computer does not.
+/// Longest silence of the viewer in command while the motor may move. A page answers every few pictures, in a
+/// background tab as well; a sleeping computer does not.
 const SILENCE: Duration = Duration::from_secs(2);
 /// Longest recording (bytes).
 const MAX_RECORDING: usize = 256 << 20;
@@ -162,7 +162,8 @@ impl Desk {
         self.monitor.act(Action::Send(message::Request::Disarm), now);
     }
 
-    /// The firmware has stopped: says why, until the viewer in command asks for a restart. Gives whether upright; none if
+    /// The firmware has stopped: says why, until the viewer in command asks for a restart. Gives whether upright; none
+    /// if
     /// `goes_on` says no.
     pub(super) fn wait_for_restart(&mut self, why: &str, goes_on: &dyn Fn() -> bool) -> Option<bool> {
         self.monitor.note(format!("{why}; switch the power off and on"));

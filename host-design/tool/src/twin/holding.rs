@@ -41,8 +41,8 @@ impl Hand {
         self.how = how;
     }
 
-    /// Where the hand holds the rig, which is in `state`, in the next tick; none if it does not. While the motor pushes the
-    /// cart it does not, and takes hold again afterwards.
+    /// Where the hand holds the rig, which is in `state`, in the next tick; none if it does not. While the motor pushes
+    /// the cart it does not, and takes hold again afterwards.
     pub(super) fn tick(&mut self, status: &Status, state: &[f64]) -> Option<&[f64]> {
         if status.state == State::Driving {
             let how = std::mem::replace(&mut self.how, Holding::Free);

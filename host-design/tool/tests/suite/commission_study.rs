@@ -64,8 +64,8 @@ fn with_weights_of(file: &Rig, chosen: &Rig) -> Rig {
     }
 }
 
-/// Commissions machine number `number`; gives whether it balances with the identified file, with the true parameters and
-/// with the original ones, all with the weights that were chosen for it, and with the original file as it was.
+/// Commissions machine number `number`; gives whether it balances with the identified file, with the true parameters
+/// and with the original ones, all with the weights that were chosen for it, and with the original file as it was.
 fn one(name: &str, number: u8) -> [bool; 4] {
     let path = path_of(name);
     let text = std::fs::read_to_string(&path).unwrap();

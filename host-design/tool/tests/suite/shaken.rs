@@ -89,8 +89,8 @@ fn the_image_in_qemu_logs_the_ticks_of_the_host() {
     assert!(qemu != log(2, Place::Host));
 }
 
-/// What goes wrong: in what the firmware reads, with what it read before the defect and the ticks since then; and in what
-/// drives the cart.
+/// What goes wrong: in what the firmware reads, with what it read before the defect and the ticks since then; and in
+/// what drives the cart.
 type Pinned = fn(&mut Pins, &Pins, u32);
 type Driven = fn(Drive) -> Drive;
 

@@ -100,7 +100,8 @@ keys! {
     }
 }
 
-/// How the simulated machine differs from the model, `[reality]`. It changes no gain, so it is not part of the rig's hash.
+/// How the simulated machine differs from the model, `[reality]`. It changes no gain, so it is not part of the rig's
+/// hash.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Reality {
     /// Dry friction of joints and cart.

@@ -14,7 +14,8 @@ use crate::progress::with_bar;
 use crate::split::Split;
 use crate::variation::{Variation, law_option, positive};
 
-/// Balances machines without a defect with the whole firmware, and counts how many are turned off; exit status 1 if any is.
+/// Balances machines without a defect with the whole firmware, and counts how many are turned off; exit status 1 if any
+/// is.
 ///
 /// The machines are drawn within [robust] of the rig file; without it, all are the machine of [reality].
 #[derive(Args)]

@@ -24,7 +24,8 @@ mod text;
 
 /// Chooses weights, far poles and joint noise that stand wrong masses, friction, wrong zeros and latency.
 ///
-/// The tolerances are those of [robust] in the rig file, or of the options. Exit status 3 if nothing helps, with the reason.
+/// The tolerances are those of [robust] in the rig file, or of the options. Exit status 3 if nothing helps, with the
+/// reason.
 #[derive(Args)]
 #[command(before_help = "\
 Examples:

@@ -21,11 +21,12 @@ use crate::variation::with_table;
 
 /// Shakes the hanging machine, and writes its log for `upright identify`.
 ///
-/// Without --port, the machine is the simulated one of the rig file with its [reality]; the force is computed from the file
-/// alone. With --target, the whole firmware shakes it, from power-up on, and sends the log over its serial line.
+/// Without --port, the machine is the simulated one of the rig file with its [reality]; the force is computed from the
+/// file alone. With --target, the whole firmware shakes it, from power-up on, and sends the log over its serial line.
 ///
 /// With --port, the machine is the real one. Its board runs the image for identification, and is homed, with signs and
-/// motor checked (`upright firmware monitor`). The links hang still, and nobody is within reach. Ctrl-C turns the motor off.
+/// motor checked (`upright firmware monitor`). The links hang still, and nobody is within reach. Ctrl-C turns the motor
+/// off.
 #[derive(Args)]
 #[command(before_help = "\
 Examples:
