@@ -62,6 +62,14 @@ impl<'t, const NX: usize, const NY: usize> Player<'t, NX, NY> {
         self.tick == self.motion.ticks
     }
 
+    /// Moves the planned positions so that the cart is now at `position_m`.
+    pub fn stay_at(&mut self, position_m: f32) {
+        if let Some(position) = self.now.x.as_mut_slice().first_mut() {
+            self.shift_m += position_m - *position;
+            *position = position_m;
+        }
+    }
+
     fn interpolate_course(&mut self) {
         let MotionTable { course, course_units, course_ticks, .. } = self.motion;
         let columns = Columns { values: course, units: course_units };

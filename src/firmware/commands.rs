@@ -37,8 +37,7 @@ impl<const NX: usize, const NY: usize, S: SwingUp<NX, NY>> Firmware<'_, NX, NY, 
             Request::CheckSigns => done(self.check_signs()),
             Request::Drive { along } => done(self.hold_drive(along)),
             Request::Arm => done(self.arm(command.id)),
-            Request::Up => done(self.raise(command.id)),
-            Request::Down => done(self.lower()),
+            Request::Goto(to) => done(self.go_to(to, command.id)),
             Request::Disarm => {
                 self.supervisor.disarm();
                 self.calibration.cancel();

@@ -34,7 +34,7 @@ use crate::supervision::fault::{Cause, Fault};
 #[cfg(feature = "identify")]
 use crate::supervision::shaking::Shaker;
 use crate::supervision::supervisor::{State, Supervisor};
-use crate::table::{Build, ChecksumScan, GainTable, NoSwingUp, SwingUp, TableError};
+use crate::table::{Build, ChecksumScan, Equilibrium, GainTable, NoSwingUp, SwingUp, TableError};
 
 /// Controller and supervisor of one rig, with its swing-up, if it has one.
 ///
@@ -58,6 +58,8 @@ pub struct Firmware<'t, const NX: usize, const NY: usize, S = NoSwingUp> {
     swing_up: &'t S,
     /// The motion that is being followed.
     moving: Option<Player<'t, NX, NY>>,
+    /// Where it ends; while the rig holds, where it has ended.
+    goal: Equilibrium,
     raw_counts: [u32; NY],
     contacts: Contacts,
     supply_v: f32,
@@ -180,6 +182,7 @@ impl<'t, const NX: usize, const NY: usize, S: SwingUp<NX, NY>> Firmware<'t, NX, 
             table,
             swing_up,
             moving: None,
+            goal: Equilibrium::UPRIGHT,
             raw_counts: [0; NY],
             contacts: Contacts::default(),
             supply_v: 0.0,
@@ -273,7 +276,7 @@ impl<'t, const NX: usize, const NY: usize, S: SwingUp<NX, NY>> Firmware<'t, NX, 
             State::Driving => self.output,
             #[cfg(feature = "identify")]
             State::Identifying => self.output,
-            State::Raising | State::Lowering if S::IS_POSSIBLE => self.move_links(inputs),
+            State::Raising | State::Holding | State::Lowering if S::IS_POSSIBLE => self.move_links(inputs),
             _ => Output::OFF,
         };
         if !self.output.enable {
@@ -354,6 +357,7 @@ impl<'t, const NX: usize, const NY: usize, S: SwingUp<NX, NY>> Firmware<'t, NX, 
             | State::Driving
             | State::Raising
             | State::Balancing
+            | State::Holding
             | State::Lowering
             | State::Fault => {}
             #[cfg(feature = "identify")]
@@ -432,7 +436,7 @@ impl<'t, const NX: usize, const NY: usize, S: SwingUp<NX, NY>> Firmware<'t, NX, 
     /// The second part of [`finish`](Self::finish): the prediction, if the rig is driven.
     pub fn predict(&mut self) {
         match self.supervisor.state() {
-            State::Raising | State::Lowering if S::IS_POSSIBLE => self.predict_motion(),
+            State::Raising | State::Holding | State::Lowering if S::IS_POSSIBLE => self.predict_motion(),
             state if state.controls() => self.predict_balancing(),
             _ => {}
         }

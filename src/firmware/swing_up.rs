@@ -1,4 +1,4 @@
-//! Raising and lowering: when they may begin, a tick of them, and how they end.
+//! Planned motions from one equilibrium to another: when they may begin, a tick of them, and how they end.
 
 use super::Firmware;
 use crate::board::{Inputs, Output};
@@ -7,16 +7,45 @@ use crate::supervision::calibration::links_hang;
 use crate::supervision::envelope;
 use crate::supervision::inhibits::Inhibits;
 use crate::supervision::supervisor::State;
-use crate::table::{Law, MotionTable, SwingUp};
+use crate::table::{Equilibrium, Law, MotionTable, SwingUp};
 
-impl<const NX: usize, const NY: usize, S: SwingUp<NX, NY>> Firmware<'_, NX, NY, S> {
-    /// What prevents the next motion: lowering while the rig balances, else raising; without [`Inhibits::HELD`], which
-    /// is only known when it is tried.
+impl<'t, const NX: usize, const NY: usize, S: SwingUp<NX, NY>> Firmware<'t, NX, NY, S> {
+    /// What prevents the next motion: lowering while the rig balances, else to upright; without [`Inhibits::HELD`],
+    /// which is only known when it is tried.
     pub fn swing_up_inhibits(&self) -> Inhibits {
-        let Some(motions) = self.swing_up.motions() else { return Inhibits::NO_SWING_UP };
+        let to = match self.supervisor.state() {
+            State::Balancing => Equilibrium::HANGING,
+            _ => Equilibrium::UPRIGHT,
+        };
+        self.way(to).map_or_else(|inhibits| inhibits, |motion| self.motion_inhibits(&motion))
+    }
+
+    /// The motion from where the links are to the equilibrium `to`.
+    fn way(&self, to: Equilibrium) -> Result<MotionTable<'t>, Inhibits> {
+        let swing_up = self.swing_up;
+        let Some(motions) = swing_up.motions() else { return Err(Inhibits::NO_SWING_UP) };
+        let (from, to) = (self.equilibrium(), to.of_links(NY - 1));
+        if from == to {
+            let is_balanced = self.supervisor.state().controls();
+            return Err(if is_balanced { Inhibits::RUNNING } else { Inhibits::NOT_BALANCING });
+        }
+        motions.between(from, to).copied().ok_or(Inhibits::NO_WAY)
+    }
+
+    /// The equilibrium at which the links are balanced; hanging, if they are not.
+    fn equilibrium(&self) -> Equilibrium {
         match self.supervisor.state() {
-            State::Balancing => self.lowering_inhibits(&motions.lower),
-            _ => self.raising_inhibits(&motions.raise),
+            State::Balancing => Equilibrium::UPRIGHT,
+            State::Holding => self.goal,
+            _ => Equilibrium::hanging(NY - 1),
+        }
+    }
+
+    /// What prevents `motion`, which begins where the links are.
+    fn motion_inhibits(&self, motion: &MotionTable<'_>) -> Inhibits {
+        match self.supervisor.state() {
+            State::Balancing | State::Holding => self.leaving_inhibits(motion),
+            _ => self.raising_inhibits(motion),
         }
     }
 
@@ -30,15 +59,22 @@ impl<const NX: usize, const NY: usize, S: SwingUp<NX, NY>> Firmware<'_, NX, NY, 
             .union(Inhibits::OTHER_LAW.when(self.controller.law() != Law::Lqr))
     }
 
-    fn lowering_inhibits(&self, motion: &MotionTable<'_>) -> Inhibits {
-        if self.supervisor.state() != State::Balancing {
-            return Inhibits::NOT_BALANCING;
-        }
+    fn leaving_inhibits(&self, motion: &MotionTable<'_>) -> Inhibits {
         let setpoint = self.controller.law_state().setpoint;
         let limits = &self.table.limits;
-        let lean = self.largest_lean(&limits.within_half_a_turn(self.controller.encoders().counts()));
+        let lean = self.largest_lean_from(self.equilibrium());
         let settled = setpoint == self.controller.setpoint() && lean <= limits.arm_angle_rad;
         Inhibits::UNSETTLED.when(!settled).union(Inhibits::NO_ROOM.when(!self.has_room(motion, setpoint)))
+    }
+
+    /// Largest angle of a link from where it is `at` an equilibrium (rad).
+    fn largest_lean_from(&self, at: Equilibrium) -> f32 {
+        let limits = &self.table.limits;
+        let mut counts = limits.unwound(self.controller.encoders().counts(), at);
+        for (joint, (count, turn)) in counts.iter_mut().zip(&limits.turn_counts).skip(1).enumerate() {
+            *count -= at.half_turns(joint) * (turn / 2);
+        }
+        self.largest_lean(&counts)
     }
 
     /// Whether `motion` stays within the soft limits of the rail when it begins at `position` (m).
@@ -47,36 +83,28 @@ impl<const NX: usize, const NY: usize, S: SwingUp<NX, NY>> Firmware<'_, NX, NY, 
         position + lowest >= low && position + highest <= high
     }
 
-    /// Starts to raise the links, which hang at rest. `id` is that of the command.
-    pub(super) fn raise(&mut self, id: u64) -> Result<(), Inhibits> {
-        let Some(motions) = self.swing_up.motions() else { return Err(Inhibits::NO_SWING_UP) };
-        let inhibits = self.raising_inhibits(&motions.raise).union(self.held_inhibit(id));
-        self.supervisor.raise(inhibits)?;
-        // Whole turns that the links have made by hand do not count.
-        let limits = &self.table.limits;
-        let mut counts = *self.controller.encoders().counts();
-        counts
-            .iter_mut()
-            .zip(&limits.rest_counts)
-            .for_each(|(count, rest)| *count = count.wrapping_sub(*rest));
-        counts = limits.within_half_a_turn(&counts);
-        counts
-            .iter_mut()
-            .zip(&limits.rest_counts)
-            .for_each(|(count, rest)| *count = count.wrapping_add(*rest));
-        if self.start_controller(&counts) {
-            let position = self.controller.law_state().setpoint;
-            self.moving = Some(Player::new(motions.raise, position));
+    /// Begins to bring the links to the equilibrium `to`. `id` is that of the command.
+    pub(super) fn go_to(&mut self, to: Equilibrium, id: u64) -> Result<(), Inhibits> {
+        let motion = self.way(to)?;
+        let (from, to) = (self.equilibrium(), to.of_links(NY - 1));
+        let inhibits = self.motion_inhibits(&motion);
+        let counts = self.table.limits.unwound(self.controller.encoders().counts(), from);
+        if let State::Balancing | State::Holding = self.supervisor.state() {
+            match to == Equilibrium::hanging(NY - 1) {
+                true => self.supervisor.lower(inhibits)?,
+                false => self.supervisor.move_on(inhibits)?,
+            }
+            self.controller.unwind(&self.raw_counts, &counts);
+            self.restart_supervision();
+        } else {
+            let held = self.held_inhibit(id);
+            self.supervisor.raise(inhibits.union(held))?;
+            if !self.start_controller(&counts) {
+                return Ok(());
+            }
         }
-        Ok(())
-    }
-
-    /// Starts to lower the balancing links.
-    pub(super) fn lower(&mut self) -> Result<(), Inhibits> {
-        let Some(motions) = self.swing_up.motions() else { return Err(Inhibits::NO_SWING_UP) };
-        self.supervisor.lower(self.lowering_inhibits(&motions.lower))?;
-        self.moving = Some(Player::new(motions.lower, self.controller.law_state().setpoint));
-        self.restart_supervision();
+        self.goal = to;
+        self.moving = Some(Player::new(motion, self.controller.law_state().setpoint));
         Ok(())
     }
 
@@ -101,7 +129,7 @@ impl<const NX: usize, const NY: usize, S: SwingUp<NX, NY>> Firmware<'_, NX, NY, 
         self.drive_or_trip(inputs, &command, exceeded, finding)
     }
 
-    /// Predicts the next tick of a motion; at its end, hands over to the control law or turns the motor off.
+    /// Predicts the next tick of a motion; at its end, hands over to the control law, holds, or turns the motor off.
     pub(super) fn predict_motion(&mut self) {
         let (Some(motions), Some(player)) = (self.swing_up.motions(), &mut self.moving) else { return };
         let (swing_up, tick_s) = (self.swing_up, self.table.tick_s);
@@ -112,11 +140,18 @@ impl<const NX: usize, const NY: usize, S: SwingUp<NX, NY>> Firmware<'_, NX, NY, 
             |corrected, force| detection.finish_tick(test, corrected, force),
             |state, force| swing_up.predict(state, force, tick_s),
         );
-        if has_ended {
-            self.moving = None;
-            self.supervisor.finish_motion();
+        if self.supervisor.state() == State::Holding {
+            player.stay_at(self.controller.govern());
+        } else if has_ended {
+            let is_upright = self.goal == Equilibrium::UPRIGHT;
+            self.supervisor.finish_motion(is_upright);
             self.controller.hand_over(end);
             self.hold_setpoint();
+            if self.supervisor.state() != State::Holding {
+                self.moving = None;
+                let counts = self.table.limits.unwound(self.controller.encoders().counts(), self.goal);
+                self.controller.unwind(&self.raw_counts, &counts);
+            }
             self.restart_supervision();
         }
     }

@@ -18,10 +18,10 @@ use crate::supervision::inhibits::Inhibits;
 use crate::supervision::shaking::{FORCES, Shaking};
 use crate::supervision::sign_check::Signs;
 use crate::supervision::supervisor::State;
-use crate::table::Law;
+use crate::table::{Equilibrium, Law};
 
 /// Version of these messages; a host with another version must not send commands.
-pub const PROTOCOL: u8 = 6;
+pub const PROTOCOL: u8 = 7;
 
 /// A command, host to firmware.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -68,10 +68,9 @@ pub enum Request {
     ResetStatistics,
     /// Send telemetry every n ticks; 0: never.
     Telemetry(u16),
-    /// Raise the hanging links and balance them.
-    Up,
-    /// Lower the balancing links until they hang, then turn the motor off.
-    Down,
+    /// Bring the links to this equilibrium by a planned motion: raise those that hang, or lower those that balance.
+    /// Where all of them hang in the end, the motor is turned off; elsewhere they are balanced.
+    Goto(Equilibrium),
     /// A key is held: push the cart a little with the motor, for as long as this is repeated. See
     /// [bench drive](crate::supervision::bench_drive).
     Drive {

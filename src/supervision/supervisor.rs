@@ -19,10 +19,12 @@ pub enum State {
     Driving,
     /// Waiting until all links have been upright and slow for `arm_time_s`.
     Armed,
-    /// The motor raises the links by a planned motion.
+    /// The motor brings the links to an equilibrium by a planned motion: to upright, or to one at which some hang.
     Raising,
-    /// The controller balances the links.
+    /// The controller balances the links upright.
     Balancing,
+    /// The controller balances the links at an equilibrium at which some hang.
+    Holding,
     /// The motor lowers the links by a planned motion.
     Lowering,
     /// A fault is latched.
@@ -44,7 +46,7 @@ impl State {
 
     /// Whether the controller commands the motor.
     pub const fn controls(self) -> bool {
-        matches!(self, State::Raising | State::Balancing | State::Lowering)
+        matches!(self, State::Raising | State::Balancing | State::Holding | State::Lowering)
     }
 }
 
@@ -56,6 +58,8 @@ impl State {
 ///                                                             │  │  disarm, cancel_arming                 │  │  │
 ///                                                             │  └─ raise ─► Raising ── finish_motion ────┘  │  │
 ///                                                             │◄─ finish_motion ── Lowering ◄────── lower ───┘  │
+///                                                             │  Raising ── finish_motion ─► Holding ─ lower ─► Lowering
+///                                                             │  Balancing, Holding ─ move_on ─► Raising        │
 ///                                                             │◄──────── disarm while the motor is on ──────────┘
 ///                                                             ├◄─ disarm ── Driving ◄─ start_driving ── Calibrated
 ///                                                             └◄─ disarm ── Identifying ◄─ start_identifying ── Calibrated
@@ -103,9 +107,12 @@ impl Supervisor {
     /// Turns the motor off; ends homing.
     pub fn disarm(&mut self) {
         match self.state {
-            State::Driving | State::Armed | State::Raising | State::Balancing | State::Lowering => {
-                self.state = State::Calibrated;
-            }
+            State::Driving
+            | State::Armed
+            | State::Raising
+            | State::Balancing
+            | State::Holding
+            | State::Lowering => self.state = State::Calibrated,
             #[cfg(feature = "identify")]
             State::Identifying => self.state = State::Calibrated,
             State::Homing => self.state = State::Disarmed,
@@ -138,9 +145,12 @@ impl Supervisor {
     fn check_homing_allowed(&self) -> Result<(), Inhibits> {
         match self.state {
             State::Disarmed | State::Homing | State::Calibrated => Ok(()),
-            State::Driving | State::Armed | State::Raising | State::Balancing | State::Lowering => {
-                Err(Inhibits::RUNNING)
-            }
+            State::Driving
+            | State::Armed
+            | State::Raising
+            | State::Balancing
+            | State::Holding
+            | State::Lowering => Err(Inhibits::RUNNING),
             #[cfg(feature = "identify")]
             State::Identifying => Err(Inhibits::RUNNING),
             State::Fault => Err(Inhibits::FAULT),
@@ -162,9 +172,12 @@ impl Supervisor {
         let unknown = Inhibits::NOT_HOMED.when(!self.positions_known);
         unknown.union(match self.state {
             State::Disarmed | State::Homing | State::Calibrated => Inhibits::NONE,
-            State::Driving | State::Armed | State::Raising | State::Balancing | State::Lowering => {
-                Inhibits::RUNNING
-            }
+            State::Driving
+            | State::Armed
+            | State::Raising
+            | State::Balancing
+            | State::Holding
+            | State::Lowering => Inhibits::RUNNING,
             #[cfg(feature = "identify")]
             State::Identifying => Inhibits::RUNNING,
             State::Fault => Inhibits::FAULT,
@@ -209,20 +222,34 @@ impl Supervisor {
         Ok(())
     }
 
-    /// Begins to lower the balancing links, unless one of `other` inhibits it.
+    /// Begins to lower the balanced links, unless one of `other` inhibits it.
     ///
     /// # Errors
     /// All inhibits that hold.
     pub fn lower(&mut self, other: Inhibits) -> Result<(), Inhibits> {
-        Inhibits::NOT_BALANCING.when(self.state != State::Balancing).union(other).err_if_any()?;
-        self.state = State::Lowering;
+        self.leave(State::Lowering, other)
+    }
+
+    /// Begins to bring the balanced links to another equilibrium, unless one of `other` inhibits it.
+    ///
+    /// # Errors
+    /// All inhibits that hold.
+    pub fn move_on(&mut self, other: Inhibits) -> Result<(), Inhibits> {
+        self.leave(State::Raising, other)
+    }
+
+    fn leave(&mut self, to: State, other: Inhibits) -> Result<(), Inhibits> {
+        let balances = matches!(self.state, State::Balancing | State::Holding);
+        Inhibits::NOT_BALANCING.when(!balances).union(other).err_if_any()?;
+        self.state = to;
         Ok(())
     }
 
     /// A planned motion has reached its end: raised links are balanced, hanging ones need no motor.
-    pub fn finish_motion(&mut self) {
+    pub fn finish_motion(&mut self, is_upright: bool) {
         match self.state {
-            State::Raising => self.state = State::Balancing,
+            State::Raising if is_upright => self.state = State::Balancing,
+            State::Raising => self.state = State::Holding,
             State::Lowering => self.state = State::Calibrated,
             _ => {}
         }
@@ -255,8 +282,19 @@ mod tests {
     use State::*;
     use std::vec::Vec;
 
-    const STATES: [State; 10] =
-        [Disarmed, Homing, Calibrated, Driving, Identifying, Armed, Raising, Balancing, Lowering, Fault];
+    const STATES: [State; 11] = [
+        Disarmed,
+        Homing,
+        Calibrated,
+        Driving,
+        Identifying,
+        Armed,
+        Raising,
+        Balancing,
+        Holding,
+        Lowering,
+        Fault,
+    ];
 
     #[derive(Debug, Clone, Copy)]
     enum Event {
@@ -277,7 +315,10 @@ mod tests {
         RaiseInhibited,
         Lower,
         LowerInhibited,
+        MoveOn,
+        MoveOnInhibited,
         FinishMotion,
+        FinishMotionElsewhere,
         Clear,
         ClearInhibited,
     }
@@ -311,7 +352,10 @@ mod tests {
             Event::RaiseInhibited => return supervisor.raise(Inhibits::NOT_HANGING),
             Event::Lower => return supervisor.lower(Inhibits::NONE),
             Event::LowerInhibited => return supervisor.lower(Inhibits::UNSETTLED),
-            Event::FinishMotion => supervisor.finish_motion(),
+            Event::MoveOn => return supervisor.move_on(Inhibits::NONE),
+            Event::MoveOnInhibited => return supervisor.move_on(Inhibits::NO_ROOM),
+            Event::FinishMotion => supervisor.finish_motion(true),
+            Event::FinishMotionElsewhere => supervisor.finish_motion(false),
             Event::Clear => return supervisor.clear(Inhibits::NONE),
             Event::ClearInhibited => return supervisor.clear(Inhibits::EMERGENCY_STOP),
         }
@@ -321,10 +365,10 @@ mod tests {
     #[test]
     fn every_event_in_every_state_leads_where_the_table_says() {
         use Event::*;
-        let known = [Calibrated, Driving, Identifying, Armed, Raising, Balancing, Lowering];
-        let running = [Driving, Identifying, Armed, Raising, Balancing, Lowering, Fault];
+        let known = [Calibrated, Driving, Identifying, Armed, Raising, Balancing, Holding, Lowering];
+        let running = [Driving, Identifying, Armed, Raising, Balancing, Holding, Lowering, Fault];
         let not_calibrated =
-            [Disarmed, Homing, Driving, Identifying, Armed, Raising, Balancing, Lowering, Fault];
+            [Disarmed, Homing, Driving, Identifying, Armed, Raising, Balancing, Holding, Lowering, Fault];
         let not_balancing =
             [Disarmed, Homing, Calibrated, Driving, Identifying, Armed, Raising, Lowering, Fault];
         // Where an event leads to from each of STATES, if not to the same state.
@@ -332,9 +376,9 @@ mod tests {
             STATES.map(|from| changes.iter().find(|(state, _)| *state == from).map_or(from, |(_, to)| *to))
         };
         // One row per event: the state it leads to from each of STATES, and where it is refused.
-        let table: [(Event, [State; 10], &[State]); 20] = [
-            (Trip, [Fault; 10], &[]),
-            (TripEncoder, [Fault; 10], &[]),
+        let table: [(Event, [State; 11], &[State]); 23] = [
+            (Trip, [Fault; 11], &[]),
+            (TripEncoder, [Fault; 11], &[]),
             (
                 Disarm,
                 but(&[
@@ -344,6 +388,7 @@ mod tests {
                     (Armed, Calibrated),
                     (Raising, Calibrated),
                     (Balancing, Calibrated),
+                    (Holding, Calibrated),
                     (Lowering, Calibrated),
                 ]),
                 &[],
@@ -360,9 +405,12 @@ mod tests {
             (CancelArming, but(&[(Armed, Calibrated)]), &[]),
             (Raise, but(&[(Calibrated, Raising)]), &not_calibrated),
             (RaiseInhibited, STATES, &STATES),
-            (Lower, but(&[(Balancing, Lowering)]), &not_balancing),
+            (Lower, but(&[(Balancing, Lowering), (Holding, Lowering)]), &not_balancing),
             (LowerInhibited, STATES, &STATES),
+            (MoveOn, but(&[(Balancing, Raising), (Holding, Raising)]), &not_balancing),
+            (MoveOnInhibited, STATES, &STATES),
             (FinishMotion, but(&[(Raising, Balancing), (Lowering, Calibrated)]), &[]),
+            (FinishMotionElsewhere, but(&[(Raising, Holding), (Lowering, Calibrated)]), &[]),
             (Clear, but(&[(Fault, Disarmed)]), &[]),
             (ClearInhibited, STATES, &[Fault]),
         ];

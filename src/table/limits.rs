@@ -1,5 +1,6 @@
 //! The limits that the supervisor enforces, as part of the gain table.
 
+use crate::table::Equilibrium;
 use crate::table::part::part;
 
 part! {
@@ -94,11 +95,36 @@ impl<const NY: usize> Limits<NY> {
         }
         wrapped
     }
+
+    /// These counts without whole turns of the joints, so that each is within half a turn of where it rests `at` an
+    /// equilibrium. The first sensor is the cart's, and every joint has one.
+    pub fn unwound(&self, counts: &[i32; NY], at: Equilibrium) -> [i32; NY] {
+        let mut rest = [0; NY];
+        for (joint, (rest, turn)) in rest.iter_mut().zip(&self.turn_counts).skip(1).enumerate() {
+            *rest = at.half_turns(joint) * (turn / 2);
+        }
+        let mut unwound = *counts;
+        unwound.iter_mut().zip(&rest).for_each(|(count, rest)| *count = count.wrapping_sub(*rest));
+        unwound = self.within_half_a_turn(&unwound);
+        unwound.iter_mut().zip(&rest).for_each(|(count, rest)| *count = count.wrapping_add(*rest));
+        unwound
+    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn whole_turns_are_taken_off_where_the_joint_rests() {
+        let limits = Limits::<3> { turn_counts: [0, 4096, 1000], ..Limits::none() };
+        let unwound = |counts, bits| limits.unwound(&counts, Equilibrium::of_bits(bits));
+        assert_eq!(unwound([7, 3 * 4096 + 5, -1003], 0b00), [7, 5, -3]);
+        assert_eq!(unwound([70_000, -2047, 998], 0b11), [70_000, 2049, -2]);
+        // Link 1 is down, link 2 up: its joint rests half a turn back.
+        assert_eq!(unwound([0, 2040, 502], 0b01), [0, 2040, -498]);
+        assert_eq!(unwound([0, -5, -502], 0b10), [0, -5, 498]);
+    }
 
     pub(crate) fn limits() -> Limits<3> {
         Limits {

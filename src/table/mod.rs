@@ -5,6 +5,7 @@
 
 mod chain_model;
 pub mod checksum;
+mod equilibrium;
 mod friction;
 mod law;
 mod limits;
@@ -21,6 +22,7 @@ use crate::table::part::{is_finite, part};
 
 pub use chain_model::ChainModel;
 pub use checksum::ChecksumScan;
+pub use equilibrium::Equilibrium;
 pub use friction::FrictionMap;
 pub use law::{Law, LawGains, PerLaw};
 pub use limits::Limits;
@@ -28,7 +30,7 @@ pub use motor::MotorMap;
 pub use observer::ObserverGains;
 pub use part::{Part, Reader, Resize, Shape, Words, WordsMut};
 pub use scalar::{Number, Scalar};
-pub use swing_up::{MotionLimits, MotionTable, Motions, NoSwingUp, SwingUp, SwingUpTable};
+pub use swing_up::{MotionLimits, MotionTable, Motions, NoSwingUp, SwingUp, SwingUpTable, Transition};
 pub use thresholds::{MotorTest, Thresholds};
 
 /// Version of the layout of [`GainTable`]; a table with another version is refused.

@@ -100,6 +100,9 @@ pub trait Reader {
     /// The value of an optional field. If `is_there`, the value itself follows.
     fn option(&mut self, is_there: bool);
 
+    /// The value of a field is a list of so many structs, which follow.
+    fn list(&mut self, length: usize);
+
     /// End of the struct.
     fn end(&mut self);
 }

@@ -1,12 +1,12 @@
-//! The motions of a swing-up: from hanging to upright, and back.
+//! The motions of a swing-up: from hanging to upright, and back; also between other equilibria, if they are planned.
 //!
 //! A motion is stored as knots, between which the firmware interpolates. The columns, each with its values at
 //! all knots, lie one after the other in a slice, because the number of knots differs from rig to rig. Values have 16
 //! bits, with a unit for each column: that is finer than what encoders resolve, and takes half of the flash.
 
 use crate::table::checksum::{ChecksumScan, checksum};
-use crate::table::part::{is_finite, part};
-use crate::table::{Build, ChainModel, TABLE_FORMAT, TableError, Thresholds};
+use crate::table::part::{Part, Reader, Resize, Words, WordsMut, is_finite, part};
+use crate::table::{Build, ChainModel, Equilibrium, TABLE_FORMAT, TableError, Thresholds};
 
 part! {
     /// A planned motion with its gains.
@@ -28,6 +28,40 @@ part! {
         pub filter_units: &'t [f32],
         /// Columns of L, sensor by sensor, each with its values at all knots of the filter.
         pub filter: &'t [i16],
+    }
+}
+
+part! {
+    /// A motion between two equilibria, at least one of which is neither upright nor hanging.
+    #[derive(Copy)]
+    pub struct Transition<'t,;> {
+        /// [`Equilibrium::bits`] of where it begins.
+        pub from: u32,
+        /// [`Equilibrium::bits`] of where it ends.
+        pub to: u32,
+        /// The motion. It begins with all joints within half a turn of 0, and may end whole turns away from that.
+        pub motion: MotionTable<'t>,
+    }
+}
+
+impl Part for &[Transition<'_>] {
+    fn part(&self, at: &mut usize) -> Option<Words<'_>> {
+        self.iter().find_map(|transition| transition.part(at))
+    }
+
+    fn part_mut(&mut self, _: &mut usize) -> Option<WordsMut<'_>> {
+        None
+    }
+
+    fn read(&self, reader: &mut dyn Reader) {
+        reader.list(self.len());
+        self.iter().for_each(|transition| transition.read(reader));
+    }
+}
+
+impl<'t> Resize<&'t [Transition<'t>]> for &'t [Transition<'t>] {
+    fn resized(&self) -> &'t [Transition<'t>] {
+        self
     }
 }
 
@@ -83,6 +117,8 @@ part! {
         pub raise: MotionTable<'t>,
         /// From upright at rest to hanging at rest.
         pub lower: MotionTable<'t>,
+        /// Between other equilibria.
+        pub others: &'t [Transition<'t>],
         sealed by
         /// CRC-32 (ISO-HDLC) of all fields above.
         pub crc,
@@ -135,6 +171,12 @@ impl<const NY: usize, const N: usize> SwingUpTable<'_, NY, N> {
         if states != 2 * N + 2 || NY != N + 1 || !complete(&self.raise) || !complete(&self.lower) {
             return Err(TableError::Dimensions);
         }
+        let fits = |Transition { from, to, motion }: &Transition<'_>| {
+            from != to && *from < 1 << N && *to < 1 << N && complete(motion)
+        };
+        if !self.others.iter().all(fits) {
+            return Err(TableError::Dimensions);
+        }
         let is_sound = self.limits.is_sound() && self.thresholds.is_sound();
         if is_sound && is_finite(self) { Ok(()) } else { Err(TableError::Value) }
     }
@@ -168,10 +210,27 @@ pub struct Motions<'t, const NY: usize> {
     pub raise: MotionTable<'t>,
     /// From upright to hanging.
     pub lower: MotionTable<'t>,
+    /// Between other equilibria.
+    pub others: &'t [Transition<'t>],
     /// See [`SwingUpTable::limits`].
     pub limits: &'t MotionLimits,
     /// See [`SwingUpTable::thresholds`].
     pub thresholds: &'t Thresholds<NY>,
+}
+
+impl<'t, const NY: usize> Motions<'t, NY> {
+    /// The motion from one equilibrium to another, if there is one.
+    pub fn between(&self, from: Equilibrium, to: Equilibrium) -> Option<&MotionTable<'t>> {
+        let hanging = Equilibrium::hanging(NY - 1);
+        if (from, to) == (hanging, Equilibrium::UPRIGHT) {
+            return Some(&self.raise);
+        }
+        if (from, to) == (Equilibrium::UPRIGHT, hanging) {
+            return Some(&self.lower);
+        }
+        let leads = |other: &&Transition<'_>| (other.from, other.to) == (from.bits(), to.bits());
+        self.others.iter().find(leads).map(|other| &other.motion)
+    }
 }
 
 /// The rig file has no `[swing_up]`.
@@ -202,8 +261,8 @@ impl<const NX: usize, const NY: usize, const N: usize> SwingUp<NX, NY> for Swing
     const IS_POSSIBLE: bool = true;
 
     fn motions(&self) -> Option<Motions<'_, NY>> {
-        let Self { raise, lower, limits, thresholds, .. } = self;
-        Some(Motions { raise: *raise, lower: *lower, limits, thresholds })
+        let Self { raise, lower, others, limits, thresholds, .. } = self;
+        Some(Motions { raise: *raise, lower: *lower, others, limits, thresholds })
     }
 
     fn predict(&self, state: &mut [f32; NX], force: f32, dt: f32) {

@@ -297,6 +297,7 @@ fn swing_up<'t>(course: &'t [i16], filter: &'t [i16]) -> SwingUpTable<'t, 2, 1> 
         thresholds: full().thresholds,
         raise: motion(course, filter),
         lower: motion(course, filter),
+        others: &[],
         crc: 0,
     };
     table.crc = table.checksum();

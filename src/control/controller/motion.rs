@@ -51,6 +51,26 @@ impl<const NX: usize, const NY: usize> Controller<'_, NX, NY> {
         predict(estimate, self.applied);
     }
 
+    /// Takes whole turns off the joints: from now on, the counter readings `raw` are the positions `counts`.
+    pub fn unwind(&mut self, raw: &[u32; NY], counts: &[i32; NY]) {
+        if let Mode::Running(observer) = &self.mode {
+            let (measured, step) = (&observer.gains.measured, &observer.gains.step);
+            let turns = counts.iter().zip(self.encoders.counts()).map(|(new, old)| new.wrapping_sub(*old));
+            for ((&state, step), turn) in measured.iter().zip(step).zip(turns) {
+                if let Some(position) = self.estimate.get_mut(state as usize) {
+                    *position += step * turn as f32;
+                }
+            }
+        }
+        self.encoders.home(raw, counts);
+    }
+
+    /// Moves the governed set-point on, and gives it (m).
+    pub fn govern(&mut self) -> f32 {
+        self.state.govern(self.target, self.gains.setpoint_step);
+        self.state.setpoint
+    }
+
     /// Hands over to the control law, with the governed set-point at `setpoint_m` (m): the next tick is one of
     /// [`control_with`](Self::control_with).
     pub fn hand_over(&mut self, setpoint_m: f32) {

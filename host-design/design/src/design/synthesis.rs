@@ -7,9 +7,9 @@ use super::place::{Pole, dominant_pair, place};
 use super::riccati::{Cost, care, dare};
 use super::zero_order_hold::{sampled_cost, zero_order_hold};
 use crate::numerics::{Complex, Matrix, Real, Wide, eigenvalues, solve};
-use crate::plant::{ChainParameters, Equilibrium, LinearModel, linearise};
+use crate::plant::{ChainParameters, LinearModel, linearise};
 use crate::rig::{LinearPlant, Lqr, PlantDescription, PolePlacement, Rig};
-use upright::table::PerLaw;
+use upright::table::{Equilibrium, PerLaw};
 
 /// Plant and gains with entries of type `T`: a working precision, or the type they were rounded to.
 #[derive(Debug, Clone, PartialEq)]
@@ -209,7 +209,7 @@ pub(crate) fn noise_columns(rig: &Rig) -> Result<Matrix<f64>, DesignError> {
 pub fn continuous_plant<R: Real>(rig: &Rig) -> Result<LinearModel<R>, DesignError> {
     match &rig.plant {
         PlantDescription::Chain(chain) => {
-            linearise(&ChainParameters::of(chain), Equilibrium::Upright).map_err(|_| DesignError::MassMatrix)
+            linearise(&ChainParameters::of(chain), Equilibrium::UPRIGHT).map_err(|_| DesignError::MassMatrix)
         }
         PlantDescription::Model(model) => Ok(LinearModel {
             a: Matrix::from_f64_rows(&model.a),

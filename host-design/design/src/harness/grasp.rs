@@ -54,6 +54,16 @@ impl Grasp {
         rest
     }
 
+    /// Lets the links hang, whatever whole turns they have made, and moves the cart to the middle; gives whether they are
+    /// there.
+    pub fn put_back(&mut self) -> bool {
+        let nearest = |(hanging, held): (&f64, &f64)| hanging + TAU * libm::round((held - hanging) / TAU);
+        let mut middle = self.hanging.clone();
+        let joints = self.hanging.iter().zip(&self.held).skip(2).step_by(2).map(nearest);
+        middle.iter_mut().skip(2).step_by(2).zip(joints).for_each(|(to, nearest)| *to = nearest);
+        self.move_to(&middle)
+    }
+
     /// From now on the link of this sensor hangs a turn further, counter-clockwise, and the next one as before.
     pub fn wind(&mut self, sensor: u8) {
         let joint = 2 * usize::from(sensor);

@@ -7,6 +7,7 @@ use upright::protocol::message::Request;
 use upright::supervision::bench_drive::MotorSign;
 use upright::supervision::sign_check::Signs;
 use upright::supervision::supervisor::State;
+use upright::table::Equilibrium;
 
 use super::grasp::Grasp;
 use crate::rig::Rig;
@@ -83,7 +84,7 @@ impl Hand {
             doing: Doing::Home,
             turn_on: match scenario.begin {
                 Begin::ByHand => Request::Arm,
-                Begin::Hanging { .. } => Request::Up,
+                Begin::Hanging => Request::Goto(Equilibrium::UPRIGHT),
             },
             grasp: Grasp::hanging(rig),
             start: scenario.start.clone(),

@@ -74,7 +74,8 @@ impl WithSize for WithFirmware<'_> {
 
     fn run<const NX: usize, const NY: usize, const N: usize>(self) -> Self::Output {
         let table = self.table.table::<NX, NY>();
-        let swing_up = self.table.swing_up.as_ref().map(SwingUpValues::table::<NY, N>);
+        let others = self.table.swing_up.as_ref().map(SwingUpValues::transitions).unwrap_or_default();
+        let swing_up = self.table.swing_up.as_ref().map(|values| values.table::<NY, N>(&others));
         with_table(&table, &swing_up, &self.table.build(), self.run)
     }
 }

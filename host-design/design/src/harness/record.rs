@@ -6,11 +6,13 @@ use upright::board::Output;
 use upright::protocol::message::Request;
 use upright::supervision::fault::Fault;
 use upright::supervision::supervisor::State;
+use upright::table::Equilibrium;
 
 use super::error::HarnessError;
 use super::session::{AnyTelemetry, HEARTBEAT_S, Session};
 use super::start_up::Harness;
 use super::target::{Pace, Target};
+use crate::plant::without_turns;
 use crate::rig::Rig;
 use crate::simulate::{Begin, Fall, Sample, Scenario, Sensing, Summary, Trace, ticks};
 use crate::table::TableValues;
@@ -63,10 +65,7 @@ pub fn record(
     let mut commanded = target_at(0);
     let last = ticks(rig, scenario)?;
     let mut record = Record::new(rig, last, pace.telemetry_ticks.into());
-    let lower_at = match scenario.begin {
-        Begin::Hanging { lower_at_s: Some(at_s) } => Some((at_s / period_s).round() as usize),
-        _ => None,
-    };
+    let goals = goals(scenario, period_s);
     let heartbeat = (HEARTBEAT_S / period_s).max(1.0) as usize;
     for tick in 0..=last {
         if tick > 0 {
@@ -74,7 +73,7 @@ pub fn record(
             output = harness.session.tick(&inputs)?;
         }
         let ahead = target_at(tick + pace.command_ticks);
-        if harness.ask_to_lower(tick, lower_at) {
+        if harness.ask_for(tick, &goals) {
             // One command in a tick.
         } else if commanded != ahead {
             harness.session.send(Request::Setpoint(ahead as f32));
@@ -85,7 +84,7 @@ pub fn record(
         let t = tick as f64 * period_s;
         // Links that are being raised or lowered, or were, do not fall.
         let stands = scenario.begin == Begin::ByHand || harness.session.status().state == State::Balancing;
-        let fall = Fall::of(rig, t, harness.bench.state()).filter(|_| stands);
+        let fall = Fall::of(rig, t, &without_turns(harness.bench.state())).filter(|_| stands);
         let state = harness.bench.state().to_vec();
         let force = harness.bench.tick(output.drive);
         let number = harness.session.tick_number();
@@ -96,7 +95,7 @@ pub fn record(
             break;
         }
     }
-    if scenario.begin != Begin::ByHand && lower_at.is_none() {
+    if scenario.begin != Begin::ByHand && goals.is_empty() {
         record.fall = Fall::of(rig, last as f64 * period_s, harness.bench.state());
     }
     // The last tick's telemetry may come with the next one.
@@ -104,6 +103,11 @@ pub fn record(
     harness.session.tick(&inputs)?;
     record.take(&mut harness.session)?;
     Ok(record.finish(rig, scenario))
+}
+
+/// The goals of a scenario with the ticks from which on they are asked for.
+pub fn goals(scenario: &Scenario, period_s: f64) -> Vec<(usize, Equilibrium)> {
+    scenario.goals.iter().map(|goal| ((goal.at_s / period_s).round() as usize, goal.to)).collect()
 }
 
 /// Whether the firmware can run this scenario.

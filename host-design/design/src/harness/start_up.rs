@@ -3,8 +3,10 @@
 use upright::board::Output;
 use upright::protocol::message::Request;
 use upright::supervision::supervisor::State;
+use upright::table::Equilibrium;
 
 use super::error::HarnessError;
+use super::grasp::Grasp;
 use super::hand::{Hand, HandTick, RETRY_S};
 use super::session::Session;
 use super::target::{Pins, Target, healthy};
@@ -27,10 +29,16 @@ pub struct Harness<'t> {
     counters: Vec<u32>,
     supply_v: f32,
     period_s: f64,
-    /// The last tick in which lowering was asked for.
-    asked_to_lower: Option<usize>,
-    lowered_from: Option<usize>,
+    /// The last tick in which the next goal was asked for.
+    asked: Option<usize>,
+    begun: Vec<usize>,
+    /// Puts back the rig that has been lowered.
+    grasp: Grasp,
+    is_grasped: bool,
 }
+
+/// So long before the links are raised again, a hand takes the rig (s): time enough for both ends of the rail.
+const PUT_BACK_S: f64 = 5.0;
 
 impl<'t> Harness<'t> {
     /// The rig hanging at rest, held by hand, and `target`, which has just started and has the table `table`. It is
@@ -55,8 +63,10 @@ impl<'t> Harness<'t> {
             counters: vec![0; table.sensors()],
             supply_v: table.motor.map_or(0.0, |motor| motor.supply_v),
             period_s: rig.tick.period_s,
-            asked_to_lower: None,
-            lowered_from: None,
+            asked: None,
+            begun: Vec::new(),
+            grasp: Grasp::hanging(rig),
+            is_grasped: false,
         };
         let hanging = harness.inputs();
         harness.session.check_info(table.rig_hash, &hanging)?;
@@ -112,25 +122,51 @@ impl<'t> Harness<'t> {
         Err(HarnessError::NotBalancing(self.session.status().state))
     }
 
-    /// Asks for lowering in tick `at`, and again as long as the rig balances, as a person does: it is refused while a
-    /// link leans. To be called in every tick; gives whether it has asked in this one.
-    pub fn ask_to_lower(&mut self, tick: usize, at: Option<usize>) -> bool {
+    /// Asks for each of `goals` in turn, from its tick on, and again until its motion begins, as a person does: it is
+    /// refused while a link leans or the cart moves. Before a lowered rig is raised again, a hand stills its links and
+    /// pushes the cart to the middle. To be called in every tick; gives whether it has asked in this one.
+    pub fn ask_for(&mut self, tick: usize, goals: &[(usize, Equilibrium)]) -> bool {
         let state = self.session.status().state;
-        if state == State::Lowering && self.lowered_from.is_none() {
-            self.lowered_from = self.asked_to_lower.map(|asked| asked + self.session.pace().command_ticks);
+        if matches!(state, State::Raising | State::Lowering)
+            && let Some(asked) = self.asked.take()
+        {
+            self.begun.push(asked + self.session.pace().command_ticks);
         }
+        let Some(&(at, to)) = goals.get(self.begun.len()) else { return false };
+        let ahead = at.saturating_sub(tick) as f64 * self.period_s;
+        if state == State::Calibrated && to != Equilibrium::HANGING && ahead > 0.0 && ahead <= PUT_BACK_S {
+            self.put_back();
+        } else {
+            self.is_grasped = false;
+        }
+        let rests = match state {
+            State::Balancing | State::Holding => true,
+            State::Calibrated => to != Equilibrium::HANGING,
+            _ => false,
+        };
         let retry_ticks = (RETRY_S / self.period_s).max(1.0) as usize;
-        let since = at.and_then(|at| tick.checked_sub(at));
-        let asks = state == State::Balancing && since.is_some_and(|since| since.is_multiple_of(retry_ticks));
+        let asks = rests && tick.checked_sub(at).is_some_and(|since| since.is_multiple_of(retry_ticks));
         if asks {
-            self.asked_to_lower = Some(tick);
-            self.session.send(Request::Down);
+            self.asked = Some(tick);
+            self.session.send(Request::Goto(to));
         }
         asks
     }
 
-    /// The tick from which on the rig is lowered.
-    pub fn lowered_from(&self) -> Option<usize> {
-        self.lowered_from
+    /// The hand moves the hanging rig on towards where it rests in the middle of the rail, and lets go of it there.
+    fn put_back(&mut self) {
+        if !self.is_grasped {
+            self.grasp.take(self.bench.state());
+            self.grasp.stop();
+            self.is_grasped = true;
+        }
+        if !self.grasp.put_back() {
+            self.bench.hold(self.grasp.held());
+        }
+    }
+
+    /// The ticks from which on the rig moves to each goal, as far as it has begun to.
+    pub fn begun(&self) -> &[usize] {
+        &self.begun
     }
 }

@@ -5,7 +5,7 @@ use core::f64::consts::{PI, TAU};
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
 use upright::control::actuator::Drive;
-use upright::table::Law;
+use upright::table::{Equilibrium, Law};
 
 use super::error::IdentifyError;
 use super::log::{DriveScale, Header, Log, Tick};
@@ -15,7 +15,7 @@ use super::record::Record;
 use super::step::Step;
 use super::{Input, chain_of};
 use crate::numerics::{Complex, eigenvalues};
-use crate::plant::{ChainParameters, Equilibrium, linearise};
+use crate::plant::{ChainParameters, linearise};
 use crate::reality::hanging_by_hand;
 use crate::rig::{Chain, Rig};
 use crate::simulate::{Bench, Scenario};
@@ -153,7 +153,7 @@ fn hanging_modes(chain: &Chain) -> Result<[f64; 2], IdentifyError> {
     chain.cart.friction_n_s_per_m = 0.0;
     chain.links.iter_mut().for_each(|link| link.friction_n_m_s_per_rad = 0.0);
     let linear =
-        linearise(&ChainParameters::<f64>::of(&chain), Equilibrium::Hanging).map_err(|_| failed())?;
+        linearise(&ChainParameters::<f64>::of(&chain), Equilibrium::HANGING).map_err(|_| failed())?;
     let values = eigenvalues(&linear.a).map_err(|_| failed())?;
     let frequencies = values.iter().map(|Complex { im, .. }: &Complex<f64>| im.abs() / TAU);
     let all: Vec<f64> = frequencies.collect();

@@ -1,5 +1,7 @@
 //! Link angles from the vertical, from joint angles.
 
+use core::f64::consts::TAU;
+
 /// The n angles of a chain's links from the vertical, `φ_i = θ_1 + … + θ_i` (rad), from the state `x, ẋ, θ_1, θ̇_1, …`
 /// (2n + 2 entries) with angles relative to the link below.
 pub fn absolute_angles(state: &[f64]) -> impl Iterator<Item = f64> + '_ {
@@ -8,6 +10,15 @@ pub fn absolute_angles(state: &[f64]) -> impl Iterator<Item = f64> + '_ {
         *angle += relative;
         Some(*angle)
     })
+}
+
+/// The state without whole turns of the joints: every angle is within half a turn of 0.
+pub fn without_turns(state: &[f64]) -> Vec<f64> {
+    let mut state = state.to_vec();
+    for angle in state.iter_mut().skip(2).step_by(2) {
+        *angle -= TAU * libm::round(*angle / TAU);
+    }
+    state
 }
 
 #[cfg(test)]

@@ -1,16 +1,9 @@
 //! The exact linear model of a chain about an equilibrium.
 
+use upright::table::Equilibrium;
+
 use super::ChainParameters;
 use crate::numerics::{Matrix, Real, Singular, solve};
-
-/// A configuration in which the chain rests without force.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Equilibrium {
-    /// Every link upright: all `θ_i = 0`.
-    Upright,
-    /// Every link hanging: `θ_1 = π`, the others 0.
-    Hanging,
-}
 
 /// Linear model `ẋ = A x + B u + G τ` in deviations from an equilibrium. A chain has s = 2n + 2 states, in the order
 /// that the module `plant` defines.
@@ -26,11 +19,11 @@ pub struct LinearModel<R> {
 
 /// Linearises the equations of motion of [`ChainParameters`], frictions included, about an equilibrium.
 ///
-/// With `σ = 1` upright and `-1` hanging, and `φ` now a deviation from the equilibrium, the equations to first order
+/// With `σ_j = 1` for a link that is up and `-1` for one that is down, and `φ` now a deviation from the equilibrium, the equations to first order
 /// are:
 ///
 /// ```text
-/// M [ẍ; φ̈] = [u - d_0 ẋ;  σ g a_j φ_j + τ_j - τ_{j+1} - d_j θ̇_j + d_{j+1} θ̇_{j+1}],
+/// M [ẍ; φ̈] = [u - d_0 ẋ;  σ_j g a_j φ_j + τ_j - τ_{j+1} - d_j θ̇_j + d_{j+1} θ̇_{j+1}],
 /// φ_j = θ_1 + … + θ_j,   θ̈_i = φ̈_i - φ̈_{i-1}
 /// ```
 ///
@@ -42,17 +35,15 @@ pub fn linearise<R: Real>(
     about: Equilibrium,
 ) -> Result<LinearModel<R>, Singular> {
     let n = parameters.links();
-    let (angle, sigma) = match about {
-        Equilibrium::Upright => (R::zero(), R::one()),
-        Equilibrium::Hanging => (R::pi(), -R::one()),
-    };
+    let rest = |link: usize| if about.is_down(link) { (R::pi(), -R::one()) } else { (R::zero(), R::one()) };
+    let (angles, sigma): (Vec<R>, Vec<R>) = (0..n).map(rest).unzip();
     // Columns: forces and torques on x, φ caused by each of θ_1 … θ_n, ẋ, θ̇_1 … θ̇_n, u, τ_1 … τ_n.
     let (rates, inputs) = (n, 2 * n + 1);
     let mut causes = Matrix::zeros(n + 1, 3 * n + 2);
     causes[(0, rates)] = -parameters.cart_friction.clone();
     causes[(0, inputs)] = R::one();
     for j in 1..=n {
-        let gravity_torque = sigma.clone() * &parameters.gravity * &parameters.a[j - 1];
+        let gravity_torque = sigma[j - 1].clone() * &parameters.gravity * &parameters.a[j - 1];
         for i in 1..=j {
             causes[(j, i - 1)] = gravity_torque.clone();
         }
@@ -65,7 +56,7 @@ pub fn linearise<R: Real>(
             causes[(j - 1, rates + j)] = friction;
         }
     }
-    let absolute = solve(&parameters.mass_matrix(&vec![angle; n]), &causes)?;
+    let absolute = solve(&parameters.mass_matrix(&angles), &causes)?;
     let acceleration = |i: usize, cause: usize| match i {
         0 | 1 => absolute[(i, cause)].clone(),
         _ => absolute[(i, cause)].clone() - &absolute[(i - 1, cause)],

@@ -32,10 +32,10 @@ mod rk4;
 mod simulation;
 mod together;
 
-pub use angles::absolute_angles;
+pub use angles::{absolute_angles, without_turns};
 pub use chain::{ChainPlant, ChainState, Energy};
 pub use jacobian::Partials;
-pub use linear::{Equilibrium, LinearModel, linearise};
+pub use linear::{LinearModel, linearise};
 pub use linear_simulation::LinearSimulation;
 pub use motor::MotorPlant;
 pub use parameters::ChainParameters;

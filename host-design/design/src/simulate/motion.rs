@@ -3,7 +3,7 @@
 use upright::control::controller::Controller;
 use upright::control::motion::Player;
 use upright::supervision::detection::Detection;
-use upright::table::{MotionTable, SwingUp, SwingUpTable, Thresholds};
+use upright::table::{Equilibrium, MotionTable, SwingUp, SwingUpTable, Thresholds};
 
 use super::bench::Bench;
 use super::error::SimulationError;
@@ -84,9 +84,28 @@ pub(crate) fn follow(
     let Some(swing_up) = &table.swing_up else { return Ok(None) };
     let bench = Bench::new(rig, scenario)?;
     let (states, sensors) = (table.states(), table.sensors());
-    with_firmware_size(states, sensors, Follow { table, swing_up, bench, balance_ticks })
+    with_firmware_size(states, sensors, Follow { table, swing_up, bench, balance_ticks, other: None })
         .ok_or(SimulationError::Size { states, sensors })?
         .map(Some)
+}
+
+/// Brings the links of `rig`, which rest in the state in which `scenario` begins, to another equilibrium by motion
+/// `other` of the table's others, and holds them there for some ticks.
+///
+/// # Errors
+/// As for [`follow`].
+pub(crate) fn follow_other(
+    rig: &Rig,
+    table: &TableValues,
+    scenario: &Scenario,
+    other: usize,
+    hold_ticks: usize,
+) -> Result<Option<Extremes>, SimulationError> {
+    let Some(swing_up) = &table.swing_up else { return Ok(None) };
+    let bench = Bench::new(rig, scenario)?;
+    let (states, sensors) = (table.states(), table.sensors());
+    let follow = Follow { table, swing_up, bench, balance_ticks: hold_ticks, other: Some(other) };
+    with_firmware_size(states, sensors, follow).ok_or(SimulationError::Size { states, sensors })?.map(Some)
 }
 
 struct Follow<'a> {
@@ -94,6 +113,8 @@ struct Follow<'a> {
     swing_up: &'a SwingUpValues,
     bench: Bench,
     balance_ticks: usize,
+    /// A motion of the table's others, instead of raising and lowering.
+    other: Option<usize>,
 }
 
 impl WithSize for Follow<'_> {
@@ -101,7 +122,8 @@ impl WithSize for Follow<'_> {
 
     fn run<const NX: usize, const NY: usize, const N: usize>(self) -> Self::Output {
         let table = self.table.table::<NX, NY>();
-        let swing_up = self.swing_up.table::<NY, N>();
+        let others = self.swing_up.transitions();
+        let swing_up = self.swing_up.table::<NY, N>(&others);
         let build = self.table.build();
         swing_up.check(&build, NX)?;
         let mut controller = Controller::new(&table, &build, Bench::widths())?;
@@ -112,9 +134,17 @@ impl WithSize for Follow<'_> {
         let tick_s = table.tick_s;
         let mut run =
             Run { controller, swing_up: &swing_up, bench: self.bench, tick_s, reached: Extremes::none(NY) };
-        run.follow(swing_up.raise);
-        run.balance(self.balance_ticks)?;
-        run.follow(swing_up.lower);
+        match self.other.and_then(|other| others.get(other)) {
+            None => {
+                run.follow(swing_up.raise, 0);
+                run.balance(self.balance_ticks)?;
+                run.follow(swing_up.lower, 0);
+            }
+            Some(other) => {
+                let hangs = other.to == Equilibrium::hanging(N).bits();
+                run.follow(other.motion, if hangs { 0 } else { self.balance_ticks });
+            }
+        }
         Ok(run.reached)
     }
 }
@@ -128,13 +158,14 @@ struct Run<'t, const NX: usize, const NY: usize, const N: usize> {
 }
 
 impl<'t, const NX: usize, const NY: usize, const N: usize> Run<'t, NX, NY, N> {
-    /// Follows `motion` from the set-point, with the tests of the supervisor but without its thresholds; then hands
-    /// over.
-    fn follow(&mut self, motion: MotionTable<'t>) {
+    /// Follows `motion` from the set-point, with the tests of the supervisor but without its thresholds, and stays at
+    /// its end for some ticks; then hands over.
+    fn follow(&mut self, motion: MotionTable<'t>, hold_ticks: usize) {
         let Self { controller, bench, reached, .. } = self;
         let mut player = Player::<NX, NY>::new(motion, controller.law_state().setpoint);
         let (mut detection, nothing) = (Detection::<NY>::default(), Thresholds::none());
         detection.start(controller.encoders().counts(), &controller.positions().data.0[0]);
+        let mut held = 0;
         loop {
             let counters = bench.counters();
             let command = controller.control_on_course(&counters, player.now(), |counts, y, e| {
@@ -150,7 +181,10 @@ impl<'t, const NX: usize, const NY: usize, const N: usize> Run<'t, NX, NY, N> {
                 |state, force| SwingUp::<NX, NY>::predict(self.swing_up, state, force, self.tick_s),
             );
             if player.advance() {
-                break;
+                if held == hold_ticks {
+                    break;
+                }
+                held += 1;
             }
         }
         controller.hand_over(player.now().x[0]);

@@ -1,6 +1,6 @@
 //! Scenario of a run: start, set-point, disturbances, sensors.
 
-use upright::table::Law;
+use upright::table::{Equilibrium, Law};
 
 use crate::rig::{PlantDescription, Rig};
 
@@ -35,6 +35,17 @@ pub struct Scenario {
     pub counter_start: u32,
     /// How the run begins, with the whole firmware.
     pub begin: Begin,
+    /// What the whole firmware is told to do after that, in this order.
+    pub goals: Vec<Goal>,
+}
+
+/// An equilibrium to which the firmware is told to bring the links.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Goal {
+    /// When it is told (s).
+    pub at_s: f64,
+    /// The equilibrium.
+    pub to: Equilibrium,
 }
 
 /// How a run begins, with the whole firmware.
@@ -43,10 +54,7 @@ pub enum Begin {
     /// A hand holds the links upright in the state `start` until the firmware balances them.
     ByHand,
     /// The links hang in the state `start`; the firmware raises them, which begins at time 0.
-    Hanging {
-        /// When the firmware is told to lower them (s).
-        lower_at_s: Option<f64>,
-    },
+    Hanging,
 }
 
 /// What the controller measures.
@@ -76,6 +84,7 @@ impl Scenario {
             substeps: 4,
             counter_start: 0,
             begin: Begin::ByHand,
+            goals: Vec::new(),
         }
     }
 
@@ -84,13 +93,19 @@ impl Scenario {
         if (self.step_at_s..self.step_until_s).contains(&t) { self.step_m } else { 0.0 }
     }
 
-    /// A swing-up from rest, hanging, with the cart at 0.
+    /// A swing-up from rest, hanging, with the cart at 0. The links are lowered again at `lower_at_s` (s).
     pub fn swing_up(rig: &Rig, duration_s: f64, lower_at_s: Option<f64>) -> Self {
         let mut scenario = Self::at_rest(rig, Law::Lqr);
         if let Some(first) = scenario.start.get_mut(2) {
             *first = core::f64::consts::PI;
         }
-        Self { duration_s, begin: Begin::Hanging { lower_at_s }, ..scenario }
+        let lower = |at_s| Goal { at_s, to: Equilibrium::HANGING };
+        Self {
+            duration_s,
+            begin: Begin::Hanging,
+            goals: lower_at_s.map(lower).into_iter().collect(),
+            ..scenario
+        }
     }
 
     /// The run that every new table must pass: a small lean of the first link (or a small offset of a

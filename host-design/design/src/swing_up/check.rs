@@ -39,7 +39,7 @@ pub struct Peaks {
 /// [`SwingUpError::Broken`] with what does not hold.
 pub(super) fn check(setting: &Setting<'_>, motion: &Motion, way: Way) -> Result<Peaks, SwingUpError> {
     let broken = |what: String| SwingUpError::Broken { way, what };
-    let ends = way.ends(setting.rig.states());
+    let ends = way.ends_near(&motion.x[motion.steps()]);
     if [&motion.x[0], &motion.x[motion.steps()]] != [&ends[0], &ends[1]] {
         return Err(broken("it does not begin and end at rest".to_owned()));
     }

@@ -127,8 +127,11 @@ fn law_at<'a>(setting: &'a Setting<'_>, motion: &'a Motion, way: Way, k: usize) 
     let steps = motion.steps();
     match way {
         _ if k < steps => Law { x: &motion.x[k], u: motion.u[k], k: Some(&motion.k[k]), l: &motion.l[k] },
-        Way::Up => Law { x: &motion.x[steps], u: 0.0, k: Some(&setting.upright_k), l: &setting.upright_l },
-        Way::Down => Law { x: &motion.x[steps], u: 0.0, k: None, l: &motion.l[steps - 1] },
+        way if way.ends_hanging() => Law { x: &motion.x[steps], u: 0.0, k: None, l: &motion.l[steps - 1] },
+        way => {
+            let at_end = setting.at_end(way);
+            Law { x: &motion.x[steps], u: 0.0, k: Some(&at_end.k), l: &at_end.l }
+        }
     }
 }
 
@@ -153,14 +156,14 @@ pub(super) fn run(
         if k < steps {
             outcome.deviation_rad = outcome.deviation_rad.max(deviation);
         }
-        let watched = k < steps || way == Way::Up;
+        let watched = k < steps || !way.ends_hanging();
         if (watched && deviation > LOST_RAD) || rig.is_at_the_end() {
             outcome.deviation_rad = outcome.deviation_rad.max(LOST_RAD);
             return Ok(outcome);
         }
     }
     // After lowering, the motor is off, and links without friction swing on.
-    let near = if way == Way::Up { ARRIVED_RAD } else { LOST_RAD };
+    let near = if way.ends_hanging() { LOST_RAD } else { ARRIVED_RAD };
     outcome.stood = deviation(&rig.state, &motion.x[steps]) < near;
     Ok(outcome)
 }

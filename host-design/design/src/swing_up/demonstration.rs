@@ -2,14 +2,16 @@
 
 use upright::supervision::fault::Fault;
 use upright::supervision::supervisor::State;
+use upright::table::Equilibrium;
 
 use super::SwingUpError;
 use super::robustness::{Spread, drawn};
+use super::tour::Tour;
 use super::way::Way;
 use crate::harness::{HarnessError, Recording, record, with_firmware};
 use crate::plant::absolute_angles;
 use crate::rig::{PlantDescription, Rig};
-use crate::simulate::{Begin, Scenario, Trace};
+use crate::simulate::{Scenario, Trace};
 use crate::table::TableValues;
 use crate::verify::Disturbance;
 
@@ -33,7 +35,9 @@ pub struct Script {
     /// Start, set-point and commands.
     pub scenario: Scenario,
     /// Start of each part (s).
-    pub parts: Vec<(f64, &'static str)>,
+    pub parts: Vec<(f64, String)>,
+    /// The supervisor's states, one after the other, if all goes well.
+    states: Vec<State>,
 }
 
 impl Script {
@@ -73,16 +77,38 @@ impl Script {
         let disturbance = Disturbance::of(rig);
         let scenario = Scenario {
             start,
-            begin: Begin::Hanging { lower_at_s: Some(lower_at_s) },
             step_m: far,
             step_at_s,
             step_until_s,
             force_noise_n: disturbance.force_n,
             torque_noise_n_m: disturbance.torque_n_m,
             seed,
-            ..Scenario::swing_up(rig, end_s, None)
+            ..Scenario::swing_up(rig, end_s, Some(lower_at_s))
         };
-        Ok(Self { rig: real, scenario, parts: parts.to_vec() })
+        let parts = parts.map(|(at_s, name)| (at_s, name.to_owned())).to_vec();
+        Ok(Self { rig: real, scenario, parts, states: UP_AND_DOWN.to_vec() })
+    }
+
+    /// A tour through all motions of `table`, under the same conditions; the parts have the names of the motions.
+    ///
+    /// # Errors
+    /// [`SwingUpError::NoTour`] if no tour leads through all of them.
+    pub fn tour(rig: &Rig, table: &TableValues, seed: u64) -> Result<Self, SwingUpError> {
+        let tour = Tour::of(rig, table).ok_or(SwingUpError::NoTour)?;
+        let links = rig.states() / 2 - 1;
+        let (real, start) = drawn(rig, Way::Up, &Spread::of(0.0, 0.0), seed);
+        let names = tour.ways.iter().map(|way| way.name(links));
+        let states = tour.ways.iter().flat_map(|way| match way.to(links) {
+            Equilibrium::UPRIGHT => [State::Raising, State::Balancing],
+            _ if way.ends_hanging() => [State::Lowering, State::Calibrated],
+            _ => [State::Raising, State::Holding],
+        });
+        Ok(Self {
+            parts: tour.begin_s.iter().copied().zip(names).collect(),
+            states: states.collect(),
+            scenario: Scenario { start, ..tour.scenario(rig, seed) },
+            rig: real,
+        })
     }
 
     /// Runs it on the host.
@@ -98,7 +124,7 @@ impl Script {
     pub fn demonstration(&self, recording: Recording) -> Demonstration {
         Demonstration {
             parts: self.parts.clone(),
-            arrived: hangs(&recording),
+            arrived: hangs_after(&recording, &self.states),
             fault: recording.fault,
             trace: recording.trace,
         }
@@ -127,7 +153,7 @@ pub struct Demonstration {
     /// The record.
     pub trace: Trace,
     /// Start of each part (s).
-    pub parts: Vec<(f64, &'static str)>,
+    pub parts: Vec<(f64, String)>,
     /// Whether all of it was done without a fault, and the links hang in the end.
     pub arrived: bool,
     /// The fault that turned the motor off, if there was one.
@@ -136,14 +162,23 @@ pub struct Demonstration {
 
 /// Whether the firmware has raised and lowered the links without a fault, and they hang in the end.
 pub fn hangs(recording: &Recording) -> bool {
+    hangs_after(recording, &UP_AND_DOWN)
+}
+
+/// The supervisor's states while the links are raised, balanced and lowered.
+const UP_AND_DOWN: [State; 4] = [State::Raising, State::Balancing, State::Lowering, State::Calibrated];
+
+/// Whether the firmware has gone through these states without a fault, and the links hang in the end.
+fn hangs_after(recording: &Recording, wanted: &[State]) -> bool {
     let mut states: Vec<State> = recording.ticks.iter().map(|tick| tick.state).collect();
     states.dedup();
     recording.fault.is_none()
-        && states == [State::Raising, State::Balancing, State::Lowering, State::Calibrated]
+        && states == wanted
         && recording.trace.samples().last().is_some_and(|sample| hang(sample.state))
 }
 
 /// Whether all links hang: within [`HANGS_RAD`] of the vertical.
 pub(super) fn hang(state: &[f64]) -> bool {
-    absolute_angles(state).all(|angle| (angle.abs() - core::f64::consts::PI).abs() < HANGS_RAD)
+    // Whatever whole turns they have made.
+    absolute_angles(state).all(|angle| libm::acos(-libm::cos(angle)) < HANGS_RAD)
 }

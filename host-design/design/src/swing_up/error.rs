@@ -84,6 +84,9 @@ pub enum SwingUpError {
     /// The gain table has no motions.
     #[error("the table has no motions: make them with `upright swing-up`")]
     NoMotions,
+    /// Motions do not lead from one to the other.
+    #[error("no tour leads from hanging through all of these motions and back to hanging")]
+    NoTour,
     /// The chain cannot be simulated.
     #[error(transparent)]
     Plant(#[from] PlantError),

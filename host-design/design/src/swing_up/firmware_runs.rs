@@ -11,9 +11,9 @@ use super::demonstration::{hang, up_and_down};
 use super::motion::SwingUp;
 use super::robustness::{Runs, Spread, deviation, drawn};
 use super::way::Way;
-use crate::harness::{Harness, HarnessError, Target, with_firmware};
+use crate::harness::{Harness, HarnessError, Target, goals, with_firmware};
 use crate::rig::{LinkEncoder, PlantDescription, Rig};
-use crate::simulate::{Begin, Scenario};
+use crate::simulate::Scenario;
 use crate::study::{Study, infinite_if_null};
 use crate::table::TableValues;
 use crate::verify::wilson;
@@ -145,10 +145,8 @@ fn raised_and_lowered(
     target: &mut dyn Target,
 ) -> Result<Reached, HarnessError> {
     let ticks = |seconds: f64| (seconds / rig.tick.period_s).round() as usize;
-    let Begin::Hanging { lower_at_s: Some(lower_at_s) } = scenario.begin else {
-        return Ok(Reached::default());
-    };
-    let lower_at = ticks(lower_at_s);
+    let goals = goals(scenario, rig.tick.period_s);
+    let Some(&(lower_at, _)) = goals.first() else { return Ok(Reached::default()) };
     let mut harness = Harness::new(rig, table, scenario, target)?;
     let inputs = harness.inputs();
     harness.session.ask(Request::Telemetry(TELEMETRY_TICKS), &inputs)?;
@@ -159,7 +157,7 @@ fn raised_and_lowered(
     };
     let last = ticks(scenario.duration_s);
     let mut tick = 0;
-    while tick <= last + harness.lowered_from().map_or(0, |from| from - lower_at) {
+    while tick <= last + harness.begun().first().map_or(0, |from| from - lower_at) {
         if tick > 0 {
             let inputs = harness.inputs();
             output = harness.session.tick(&inputs)?;
@@ -167,8 +165,8 @@ fn raised_and_lowered(
         if tick == lower_at {
             reached.stood = harness.session.status().state == State::Balancing;
         }
-        harness.ask_to_lower(tick, Some(lower_at));
-        let moves = [(&motions.raise, Some(0)), (&motions.lower, harness.lowered_from())];
+        harness.ask_for(tick, &goals);
+        let moves = [(&motions.raise, Some(0)), (&motions.lower, harness.begun().first().copied())];
         for ((motion, begin), largest) in moves.into_iter().zip(&mut reached.deviation_rad) {
             let planned = begin.and_then(|begin| motion.x.get(tick.checked_sub(begin)?));
             if let Some(planned) = planned {

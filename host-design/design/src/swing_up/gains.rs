@@ -12,7 +12,7 @@ use crate::numerics::Matrix;
 /// is soon lost. With 10 times, more runs are lost where encoders are coarse.
 pub(super) const POSITION_WEIGHT: f64 = 4.0;
 
-/// The motion that follows `path`, which ends upright or hanging. The positions weigh `position_weight` times what they
+/// The motion that follows `path`, which ends at rest. The positions weigh `position_weight` times what they
 /// weigh in `[lqr]`.
 pub(super) fn motion(
     setting: &Setting<'_>,
@@ -21,18 +21,14 @@ pub(super) fn motion(
     position_weight: f64,
 ) -> Result<Motion, SwingUpError> {
     let ticks = ticks(&*setting.dynamics, &path, setting.tick_s);
-    let (at_end, covariance) = match way {
-        Way::Up => (setting.upright_cost.clone(), &setting.hanging_covariance),
-        Way::Down => (setting.hanging_cost.clone(), &setting.upright_covariance),
-    };
     let states = path.x[0].len();
     let weights = Matrix::from_fn(states, states, |i, j| {
         let factor = if i % 2 == 0 && j % 2 == 0 { position_weight } else { 1.0 };
         factor * setting.weights[(i, j)]
     });
-    let k = feedback(&ticks, &weights, setting.force_weight, &at_end, setting.tick_s);
+    let k = feedback(&ticks, &weights, setting.force_weight, &setting.at_end(way).cost, setting.tick_s);
     let mut filter = Filter::new(&*setting.dynamics, &setting.noise, states, setting.tick_s);
-    filter.covariance = covariance.clone();
+    filter.covariance = setting.at_start(way).covariance.clone();
     let l: Result<Vec<Matrix<f64>>, _> =
         path.x.iter().zip(&ticks).map(|(x, tick)| filter.gain(x, tick)).collect();
     Ok(Motion::new(setting.tick_s, path.x, path.u, k, l?)?)

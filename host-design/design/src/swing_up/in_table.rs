@@ -3,11 +3,12 @@
 use super::SwingUpError;
 use super::motion::SwingUp;
 use super::supervision::set_limits;
+use super::transitions::Transition;
 use crate::design::design;
 use crate::rig::Rig;
 use crate::table::{Gains, SwingUpValues, TableValues};
 
-/// The table with the motions in it, and the limits and thresholds with which the firmware supervises them.
+/// The table with raising and lowering in it, and motions between other equilibria, if there are any; with the limits and thresholds with which the firmware supervises them.
 ///
 /// # Errors
 /// [`SwingUpError::Table`] if the motions do not fit the table; [`SwingUpError::Simulation`] if the runs for the limits
@@ -16,8 +17,13 @@ pub fn with_motions(
     rig: &Rig,
     mut table: TableValues,
     motions: &SwingUp,
+    transitions: &[Transition],
 ) -> Result<TableValues, SwingUpError> {
-    table.swing_up = Some(SwingUpValues::of(rig, &table, motions)?);
+    let mut swing_up = SwingUpValues::of(rig, &table, motions)?;
+    for Transition { way, motion, .. } in transitions {
+        swing_up.add(&table, *way, motion)?;
+    }
+    table.swing_up = Some(swing_up);
     set_limits(rig, &mut table)?;
     Ok(table)
 }
@@ -27,5 +33,17 @@ pub fn with_motions(
 /// # Errors
 /// As for [`with_motions`]; [`SwingUpError::Design`] if the rig has no gains.
 pub fn designed_table(rig: &Rig, motions: &SwingUp) -> Result<TableValues, SwingUpError> {
-    with_motions(rig, TableValues::of(rig, &design(rig)?, Gains::Sampled)?, motions)
+    designed_table_with(rig, motions, &[])
+}
+
+/// The same with motions between other equilibria.
+///
+/// # Errors
+/// As for [`designed_table`].
+pub fn designed_table_with(
+    rig: &Rig,
+    motions: &SwingUp,
+    transitions: &[Transition],
+) -> Result<TableValues, SwingUpError> {
+    with_motions(rig, TableValues::of(rig, &design(rig)?, Gains::Sampled)?, motions, transitions)
 }

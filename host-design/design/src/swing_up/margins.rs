@@ -3,15 +3,16 @@
 use serde::Serialize;
 use upright::protocol::message::Request;
 use upright::supervision::supervisor::State;
+use upright::table::Equilibrium;
 
 use super::SwingUpError;
 use super::demonstration::{hang, up_and_down};
 use super::way::Way;
-use crate::harness::{Harness, HarnessError, Target, with_firmware};
+use crate::harness::{Harness, HarnessError, Target, goals, with_firmware};
 use crate::parallel;
 use crate::plant::absolute_angles;
 use crate::rig::{PlantDescription, Rig};
-use crate::simulate::{Begin, Scenario};
+use crate::simulate::{Begin, Goal, Scenario};
 use crate::table::TableValues;
 
 /// How long a push lasts (s): a tap of a finger.
@@ -50,7 +51,7 @@ struct Push {
     force_n: f64,
 }
 
-/// Margins of one of the motions of `table`, which is designed for `rig`, at so many moments, evenly from its beginning
+/// Margins of the raising or the lowering of `table`, which is designed for `rig`, at so many moments, evenly from its beginning
 /// on; `done` is called after each.
 ///
 /// A push is a force at the end of one link, across it, that begins at this moment and lasts 50 ms. The firmware knows
@@ -73,7 +74,13 @@ pub fn margins(
         Scenario { force_noise_n: 0.0, torque_noise_n_m: 0.0, ..up_and_down(rig, table, UPRIGHT_S)? };
     let scenario = match way {
         Way::Up => scenario,
-        Way::Down => Scenario { begin: Begin::ByHand, start: vec![0.0; rig.states()], ..scenario },
+        Way::Down => Scenario {
+            begin: Begin::ByHand,
+            start: vec![0.0; rig.states()],
+            goals: vec![Goal { at_s: UPRIGHT_S, to: Equilibrium::HANGING }],
+            ..scenario
+        },
+        Way::Between { .. } => return Err(SwingUpError::NoMotions),
     };
     let pushed = |push: Option<Push>| -> Result<Option<usize>, SwingUpError> {
         with_firmware(table, |target| arrival(rig, table, &scenario, push, target))
@@ -145,16 +152,16 @@ fn arrival(
     let inputs = harness.inputs();
     harness.session.ask(Request::Telemetry(TELEMETRY_TICKS), &inputs)?;
     let mut output = harness.raise(None)?;
-    let (way, lower_at) = match scenario.begin {
-        Begin::Hanging { .. } => (Way::Up, None),
-        Begin::ByHand => (Way::Down, Some(in_ticks(UPRIGHT_S))),
+    let (way, goals) = match scenario.begin {
+        Begin::Hanging => (Way::Up, Vec::new()),
+        Begin::ByHand => (Way::Down, goals(scenario, rig.tick.period_s)),
     };
     let ticks = motion_ticks(table, way);
     let mut tick = 0;
     loop {
-        let begin = if way == Way::Up { Some(0) } else { harness.lowered_from() };
-        let Some(end) = begin.map(|begin| begin + ticks).or(lower_at.map(|at| at + in_ticks(LONGEST_WAIT_S)))
-        else {
+        let begin = if way == Way::Up { Some(0) } else { harness.begun().first().copied() };
+        let latest = goals.first().map(|(at, _)| at + in_ticks(LONGEST_WAIT_S));
+        let Some(end) = begin.map(|begin| begin + ticks).or(latest) else {
             return Ok(None);
         };
         if !output.enable && (way == Way::Up || tick < end) {
@@ -163,13 +170,11 @@ fn arrival(
         if tick == end + in_ticks(AFTER_S) {
             let is_well = match way {
                 Way::Up => harness.session.status().state == State::Balancing,
-                Way::Down => {
-                    harness.session.status().state == State::Calibrated && hang(harness.bench.state())
-                }
+                _ => harness.session.status().state == State::Calibrated && hang(harness.bench.state()),
             };
             return Ok(begin.filter(|_| is_well && harness.session.fault().is_none()));
         }
-        harness.ask_to_lower(tick, lower_at);
+        harness.ask_for(tick, &goals);
         if let Some(push) = push.filter(|push| (push.tick..push.tick + in_ticks(PUSH_S)).contains(&tick)) {
             let (force_n, torques_n_m) = push.on(rig, harness.bench.state());
             harness.bench.pull(force_n, &torques_n_m);

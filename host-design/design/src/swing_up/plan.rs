@@ -1,5 +1,7 @@
 //! From a rig to its two motions: search, selection, independent check, random runs of the firmware.
 
+use core::ops::Range;
+
 use serde::Serialize;
 
 use super::SwingUpError;
@@ -91,8 +93,15 @@ pub struct Judgement {
 pub fn search(rig: &Rig, progress: Progress<'_>) -> Result<Plan, SwingUpError> {
     let setting = Setting::of(rig)?;
     let request = Request::of(&setting);
-    let raise = best(&setting, &request, Way::Up, progress)?;
-    let lower = best(&setting, &request, Way::Down, progress)?;
+    let found = |way| -> Result<Found, SwingUpError> {
+        let counts = if setting.chain.links.len() >= 4 { CANDIDATES_OF_LONG_CHAINS } else { CANDIDATES };
+        let tried = counts[usize::from(way == Way::Down)];
+        match best(&setting, &request, way, 0..tried, progress)? {
+            Some(found) => Ok(found),
+            None => Err(SwingUpError::NoTrajectory { way, tried, help: advice(rig, way, progress)? }),
+        }
+    };
+    let (raise, lower) = (found(Way::Up)?, found(Way::Down)?);
     judged(&setting, raise, lower, progress)
 }
 
@@ -137,42 +146,47 @@ pub fn refined(rig: &Rig, stored: &Stored) -> Result<SwingUp, SwingUpError> {
     Ok(SwingUp { raise: raise?, lower: lower? })
 }
 
-fn restored(setting: &Setting<'_>, way: Way, stored: &StoredKnots) -> Result<Motion, SwingUpError> {
+pub(super) fn restored(
+    setting: &Setting<'_>,
+    way: Way,
+    stored: &StoredKnots,
+) -> Result<Motion, SwingUpError> {
     let states = setting.rig.states();
     let knots = stored.knots(states).ok_or(SwingUpError::Outdated)?;
-    let path = refine(&*setting.dynamics, &knots, stored.ticks, setting.tick_s, &way.ends(states));
+    let ends = way.ends_near(knots.x.last().ok_or(SwingUpError::Outdated)?);
+    let path = refine(&*setting.dynamics, &knots, stored.ticks, setting.tick_s, &ends);
     motion(setting, path.ok_or(SwingUpError::Outdated)?, way, POSITION_WEIGHT)
 }
 
 /// A motion that is to be judged.
-struct Found {
-    motion: Motion,
-    stored: StoredKnots,
+pub(super) struct Found {
+    pub(super) motion: Motion,
+    pub(super) stored: StoredKnots,
     /// See [`Judgement::score`] and [`Judgement::search`].
-    score: f64,
-    search: Option<[usize; 2]>,
+    pub(super) score: f64,
+    pub(super) search: Option<[usize; 2]>,
 }
 
 /// The motion of these knots.
-fn found(setting: &Setting<'_>, way: Way, stored: StoredKnots) -> Result<Found, SwingUpError> {
+pub(super) fn found(setting: &Setting<'_>, way: Way, stored: StoredKnots) -> Result<Found, SwingUpError> {
     let motion = restored(setting, way, &stored)?;
     let score = score(setting, &motion, way, &Spread::asked(setting.rig))?;
     Ok(Found { motion, stored, score, search: None })
 }
 
-/// The most robust candidate of one way.
-fn best(
+/// The most robust of the candidates of one way with these numbers, if any is solved.
+pub(super) fn best(
     setting: &Setting<'_>,
     request: &Request,
     way: Way,
+    numbers: Range<u64>,
     progress: Progress<'_>,
-) -> Result<Found, SwingUpError> {
-    let counts = if setting.chain.links.len() >= 4 { CANDIDATES_OF_LONG_CHAINS } else { CANDIDATES };
-    let tried = counts[usize::from(way == Way::Down)];
+) -> Result<Option<Found>, SwingUpError> {
+    let tried = numbers.end.saturating_sub(numbers.start);
     progress(Trying::Stage { way, what: "trajectories", steps: tried });
-    let mut solved = candidates(setting, request, way, 0..tried, &|score| progress(Trying::Step { score }))?;
+    let mut solved = candidates(setting, request, way, numbers, &|score| progress(Trying::Step { score }))?;
     if solved.is_empty() {
-        return Err(SwingUpError::NoTrajectory { way, tried, help: advice(setting.rig, way, progress)? });
+        return Ok(None);
     }
     let count = solved.len();
     solved.sort_by(|a, b| a.score.total_cmp(&b.score));
@@ -184,7 +198,7 @@ fn best(
     let passes = |candidate: &Candidate| check(setting, &candidate.motion, way).is_ok();
     let chosen = solved.swap_remove(solved.iter().position(passes).unwrap_or(0));
     let stored = StoredKnots::new(ticks_per_knot(setting), &chosen.knots);
-    Ok(Found { search: Some([tried as usize, count]), ..found(setting, way, stored)? })
+    Ok(Some(Found { search: Some([tried as usize, count]), ..found(setting, way, stored)? }))
 }
 
 /// The candidates by the number of random runs that they stand; of equals, the one with the smallest largest deviation

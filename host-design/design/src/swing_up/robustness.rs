@@ -112,7 +112,7 @@ pub(super) fn drawn(rig: &Rig, way: Way, spread: &Spread, seed: u64) -> (Rig, Ve
     let mut random = Pcg64::seed_from_u64(seed);
     let mut between = |share: f64| share * random.random_range(-1.0..=1.0);
     let mut rig = rig.clone();
-    let [mut start, _] = way.ends(rig.states());
+    let [mut start, _] = way.ends(rig.states(), |_| false);
     let PlantDescription::Chain(chain) = &mut rig.plant else { return (rig, start) };
     let links = chain.links.len();
     for body in 0..=links {
@@ -121,8 +121,8 @@ pub(super) fn drawn(rig: &Rig, way: Way, spread: &Spread, seed: u64) -> (Rig, Ve
     let factor = 1.0 + between(spread.friction);
     scale_friction(chain, factor);
     start[0] += between(spread.position_m);
-    // A lowering begins in a loop that balances, whose links are as upright as its encoders' zeros.
-    let tilt_rad = if way == Way::Up { spread.tilt_rad } else { spread.zero_rad };
+    // Any other motion begins in a loop that balances, whose links are as near to rest as its encoders' zeros.
+    let tilt_rad = if way.begins_hanging() { spread.tilt_rad } else { spread.zero_rad };
     let mut below = 0.0;
     let zeros = &mut rig.reality.sensors.homing_error_rad;
     let mut wrong = Vec::new();

@@ -21,6 +21,9 @@ const FORCE_SHARE: [f64; 2] = [0.6, 0.9];
 const RAIL_SHARE: [f64; 2] = [0.6, 0.9];
 /// Durations in units of √(L/g).
 const DURATION: [f64; 2] = [9.0, 20.0];
+/// Between other equilibria, candidates from this number on may last so many times as long.
+const LATE: u64 = 100;
+const STRETCH: f64 = 2.0;
 /// Weight of the links' rates, in units of L/g: the range of its logarithm to base 10.
 const RATE_WEIGHT: [f64; 2] = [-2.0, 0.5];
 /// A change of the force by its limit in this time costs as much as the force itself (s).
@@ -42,6 +45,8 @@ struct Draw {
     rate_weight: f64,
     /// Amplitudes of the guess's force, as shares of the bound.
     wobble: [f64; 3],
+    /// Links that turn the other way if they change: a bit for each.
+    reversed: u32,
 }
 
 /// A candidate that was solved.
@@ -95,16 +100,20 @@ fn time_unit(setting: &Setting<'_>) -> f64 {
 }
 
 /// Candidate number `number`.
-fn draw(setting: &Setting<'_>, request: &Request, number: u64) -> Draw {
+fn draw(setting: &Setting<'_>, request: &Request, way: Way, number: u64) -> Draw {
     let mut random = Pcg64::seed_from_u64(number);
     let mut between = |[low, high]: [f64; 2]| low + (high - low) * random.random_range(0.0..=1.0);
     let unit = time_unit(setting);
-    let duration_s = between(request.duration_s);
+    let [shortest, longest] = request.duration_s;
+    let is_late = matches!(way, Way::Between { .. }) && number >= LATE;
+    let duration_s = between([shortest, if is_late { STRETCH * longest } else { longest }]);
     let (force_n, rail_m) = (between(request.force_n), between(request.rail_m));
     let rate_weight = libm::exp10(between(RATE_WEIGHT)) * unit * unit;
     let wobble = core::array::from_fn(|_| if number == 0 { 0.0 } else { between([-0.05, 0.05]) });
     let bounds = Bounds { force_n, rail_m: Some([-rail_m, rail_m]), ..request.bounds.clone() };
-    Draw { duration_s, bounds, rate_weight, wobble }
+    // All links together first, as they are raised and lowered.
+    let reversed = if number == 0 { 0 } else { random.random_range(0..1 << setting.chain.links.len()) };
+    Draw { duration_s, bounds, rate_weight, wobble, reversed }
 }
 
 /// Ticks between two knots: 5 ms for the fast chains of four and more links, 10 ms otherwise.
@@ -115,10 +124,12 @@ pub(super) fn ticks_per_knot(setting: &Setting<'_>) -> usize {
 
 /// Solves candidate `number`. None if its gaps do not close, or a bound does not hold.
 fn solve(setting: &Setting<'_>, request: &Request, way: Way, number: u64) -> Option<(Knots, Path)> {
-    let draw = draw(setting, request, number);
+    let draw = draw(setting, request, way, number);
     let ticks = ticks_per_knot(setting);
     let knot_s = ticks as f64 * setting.tick_s;
-    let ends = way.ends(setting.rig.states());
+    let is_reversed = |link: usize| matches!(way, Way::Between { .. }) && draw.reversed >> link & 1 != 0;
+    let [_, end] = way.ends(setting.rig.states(), is_reversed);
+    let ends = way.ends_near(&end);
     let [start, end] = ends.clone();
     let problem = Problem {
         dynamics: &*setting.dynamics,
@@ -139,14 +150,16 @@ fn solve(setting: &Setting<'_>, request: &Request, way: Way, number: u64) -> Opt
 /// All links turn evenly, at the force of the draw.
 fn guess(problem: &Problem<'_>, draw: &Draw) -> Knots {
     let (steps, turn) = (problem.steps, core::f64::consts::PI);
-    let rate = (problem.end[2] - problem.start[2]) / (steps as f64 * problem.knot_s);
+    let duration_s = steps as f64 * problem.knot_s;
     let mut knots = Knots { x: Vec::new(), u: Vec::new() };
     for knot in 0..=steps {
         let part = knot as f64 / steps as f64;
         let mut x: Vec<f64> =
             problem.start.iter().zip(&problem.end).map(|(a, b)| a + part * (b - a)).collect();
         if knot > 0 && knot < steps {
-            x[3] = rate;
+            for joint in (2..x.len()).step_by(2) {
+                x[joint + 1] = (problem.end[joint] - problem.start[joint]) / duration_s;
+            }
         }
         let wave = |(harmonic, share): (usize, &f64)| share * libm::sin(turn * part * (harmonic + 1) as f64);
         knots.x.push(x);

@@ -1,10 +1,16 @@
 //! What the rig file says about swing-up, with every default filled in.
 
+use std::collections::BTreeMap;
+use std::collections::btree_map::Entry;
+
+use upright::table::Equilibrium;
+
 use super::SwingUpError;
 use super::dynamics::{Dynamics, dynamics};
 use super::hold::tick;
 use super::problem::Bounds;
 use super::tracking::{Filter, Noise, stationary};
+use super::way::{Way, rest};
 use crate::numerics::Matrix;
 use crate::rig::{Chain, Motor, PlantDescription, Rig, Sensor, SwingUpRules};
 use crate::verify::Disturbance;
@@ -31,19 +37,29 @@ pub(super) struct Setting<'a> {
     pub(super) steps: Vec<f64>,
     pub(super) weights: Matrix<f64>,
     pub(super) force_weight: f64,
-    /// Cost-to-go, K and the filter's gain about upright, all stationary.
-    pub(super) upright_cost: Matrix<f64>,
-    pub(super) upright_k: Matrix<f64>,
-    pub(super) upright_l: Matrix<f64>,
-    /// Cost-to-go about hanging.
-    pub(super) hanging_cost: Matrix<f64>,
-    /// Covariances of the settled filters.
-    pub(super) hanging_covariance: Matrix<f64>,
-    pub(super) upright_covariance: Matrix<f64>,
+    rests: BTreeMap<Equilibrium, AtRest>,
+}
+
+/// Law and filter about a state of rest, all stationary.
+pub(super) struct AtRest {
+    /// Cost-to-go.
+    pub(super) cost: Matrix<f64>,
+    /// Gain K.
+    pub(super) k: Matrix<f64>,
+    /// Gain of the filter.
+    pub(super) l: Matrix<f64>,
+    /// Covariance of the settled filter.
+    pub(super) covariance: Matrix<f64>,
 }
 
 impl<'a> Setting<'a> {
+    /// For raising and lowering.
     pub(super) fn of(rig: &'a Rig) -> Result<Self, SwingUpError> {
+        Self::with_ways(rig, &Way::BOTH)
+    }
+
+    /// For these ways.
+    pub(super) fn with_ways(rig: &'a Rig, ways: &[Way]) -> Result<Self, SwingUpError> {
         let PlantDescription::Chain(chain) = &rig.plant else { return Err(SwingUpError::NotAChain) };
         let (Some(lqr), Some(kalman)) = (&rig.lqr, &rig.kalman) else {
             return Err(SwingUpError::Needs("[lqr] and [kalman]"));
@@ -72,18 +88,21 @@ impl<'a> Setting<'a> {
         };
         let weights = Matrix::from_diagonal(&lqr.state_weights);
         let (states, force_weight) = (rig.states(), lqr.force_weight);
-        let (upright, hanging) = (vec![0.0; states], hanging(states));
-        let at_upright = tick(&*dynamics, &upright, 0.0, tick_s);
-        let at_hanging = tick(&*dynamics, &hanging, 0.0, tick_s);
-        let (upright_cost, upright_k) = stationary(&at_upright, &weights, force_weight, tick_s);
-        let (hanging_cost, _) = stationary(&at_hanging, &weights, force_weight, tick_s);
-        let settle = (SETTLE_S / tick_s) as usize;
-        let mut filter = Filter::new(&*dynamics, &noise, states, tick_s);
-        filter.settle(&hanging, &at_hanging, settle)?;
-        let hanging_covariance = filter.covariance.clone();
-        let mut filter = Filter::new(&*dynamics, &noise, states, tick_s);
-        let upright_l = filter.settle(&upright, &at_upright, settle)?;
-        let upright_covariance = filter.covariance.clone();
+        let at_rest = |at: Equilibrium| -> Result<AtRest, SwingUpError> {
+            let state = rest(at, states);
+            let tick = tick(&*dynamics, &state, 0.0, tick_s);
+            let (cost, k) = stationary(&tick, &weights, force_weight, tick_s);
+            let mut filter = Filter::new(&*dynamics, &noise, states, tick_s);
+            let l = filter.settle(&state, &tick, (SETTLE_S / tick_s) as usize)?;
+            Ok(AtRest { cost, k, l, covariance: filter.covariance })
+        };
+        let links = chain.links.len();
+        let mut rests = BTreeMap::new();
+        for at in ways.iter().flat_map(|way| [way.from(links), way.to(links)]) {
+            if let Entry::Vacant(vacant) = rests.entry(at) {
+                vacant.insert(at_rest(at)?);
+            }
+        }
         Ok(Self {
             actuator: Bounds {
                 force_n,
@@ -100,22 +119,20 @@ impl<'a> Setting<'a> {
             steps,
             weights,
             force_weight,
-            upright_cost,
-            upright_k,
-            upright_l,
-            hanging_cost,
-            hanging_covariance,
-            upright_covariance,
+            rests,
             dynamics,
         })
     }
-}
 
-/// Hanging at rest with the cart at 0.
-pub(super) fn hanging(states: usize) -> Vec<f64> {
-    let mut state = vec![0.0; states];
-    state[2] = core::f64::consts::PI;
-    state
+    /// Law and filter where one of the ways begins.
+    pub(super) fn at_start(&self, way: Way) -> &AtRest {
+        &self.rests[&way.from(self.chain.links.len())]
+    }
+
+    /// Law and filter where one of the ways ends.
+    pub(super) fn at_end(&self, way: Way) -> &AtRest {
+        &self.rests[&way.to(self.chain.links.len())]
+    }
 }
 
 /// Force at standstill with the voltage beyond the dead zone, and its loss with speed by back-EMF.

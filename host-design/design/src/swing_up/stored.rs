@@ -50,10 +50,21 @@ impl StoredKnots {
             u: self.knots.iter().map(|row| row[0]).collect(),
         })
     }
+
+    /// As the next member of an object, one knot per line.
+    pub(super) fn write(&self, text: &mut String, name: &str) {
+        // Writing into a string cannot fail.
+        let _ = write!(text, ",\n\"{name}\": {{ \"ticks\": {}, \"knots\": [", self.ticks);
+        for (index, row) in self.knots.iter().enumerate() {
+            let values: Vec<String> = row.iter().map(f64::to_string).collect();
+            let _ = write!(text, "{}\n[{}]", if index == 0 { "" } else { "," }, values.join(","));
+        }
+        text.push_str("\n] }");
+    }
 }
 
 /// Hash of everything that a search depends on: the values of the rig file, `[swing_up]` included.
-fn request_hash(rig: &Rig) -> String {
+pub(super) fn request_hash(rig: &Rig) -> String {
     // Serialising plain structs of numbers and strings into memory cannot fail.
     let values = serde_json::to_vec(&(rig, &rig.swing_up)).expect("a rig is representable as JSON");
     Sha256::digest(values).iter().take(8).map(|byte| format!("{byte:02x}")).collect()
@@ -92,13 +103,7 @@ impl Stored {
     pub fn to_json(&self) -> String {
         let mut text = format!("{{\n\"rig\": {:?},\n\"hash\": {:?}", self.rig, self.hash);
         for (name, motion) in [("raise", &self.raise), ("lower", &self.lower)] {
-            // Writing into a string cannot fail.
-            let _ = write!(text, ",\n\"{name}\": {{ \"ticks\": {}, \"knots\": [", motion.ticks);
-            for (index, row) in motion.knots.iter().enumerate() {
-                let values: Vec<String> = row.iter().map(f64::to_string).collect();
-                let _ = write!(text, "{}\n[{}]", if index == 0 { "" } else { "," }, values.join(","));
-            }
-            text.push_str("\n] }");
+            motion.write(&mut text, name);
         }
         text.push_str("\n}\n");
         text

@@ -7,11 +7,11 @@ use super::robustness::{Spread, drawn};
 use super::way::Way;
 use crate::parallel;
 use crate::rig::{PlantDescription, Rig};
-use crate::simulate::{Extremes, Scenario, SimulationError, follow};
+use crate::simulate::{Extremes, Scenario, SimulationError, follow, follow_other};
 use crate::table::TableValues;
 use crate::verify::Disturbance;
 
-/// Healthy machines that are raised and lowered; with the first one, nothing is wrong.
+/// Healthy machines that make all motions; with the first one, nothing is wrong.
 const MACHINES: u64 = 12;
 /// Seed of the first one; apart from the seeds with which motions are chosen and judged.
 const BASE_SEED: u64 = 20_000;
@@ -68,12 +68,22 @@ fn healthy(rig: &Rig, table: &TableValues) -> Result<Extremes, SimulationError> 
     let disturbance = Disturbance::of(rig);
     let balance_ticks = (BALANCE_S / rig.tick.period_s) as usize;
     let quiet = Scenario { substeps: 2, ..Scenario::swing_up(rig, 0.0, None) };
+    let others: Vec<Way> =
+        table.swing_up.iter().flat_map(|swing_up| swing_up.others.iter().map(|(way, _)| *way)).collect();
+    let run = |machine: &Rig, scenario: &Scenario, motion: usize| match motion.checked_sub(1) {
+        None => follow(machine, table, scenario, balance_ticks),
+        Some(other) => follow_other(machine, table, scenario, other, balance_ticks),
+    };
+    // Each machine is raised and lowered, and then makes each of the other motions from rest.
     let one = |number: u64| {
+        let (number, motion) = (number % MACHINES, (number / MACHINES) as usize);
+        let way = motion.checked_sub(1).map_or(Way::Up, |other| others[other]);
         if number == 0 {
-            return follow(rig, table, &quiet, balance_ticks);
+            let [start, _] = way.ends(rig.states(), |_| false);
+            return run(rig, &Scenario { start, ..quiet.clone() }, motion);
         }
         let seed = BASE_SEED + number;
-        let (machine, start) = drawn(rig, Way::Up, &spread, seed);
+        let (machine, start) = drawn(rig, way, &spread, seed);
         let scenario = Scenario {
             start,
             seed,
@@ -81,9 +91,9 @@ fn healthy(rig: &Rig, table: &TableValues) -> Result<Extremes, SimulationError> 
             torque_noise_n_m: disturbance.torque_n_m,
             ..quiet.clone()
         };
-        follow(&machine, table, &scenario, balance_ticks)
+        run(&machine, &scenario, motion)
     };
-    let all: Vec<_> = parallel::try_map(0..MACHINES, one)?;
+    let all: Vec<_> = parallel::try_map(0..MACHINES * (1 + others.len() as u64), one)?;
     let mut most = Extremes::none(table.sensors());
     let arrived = all.iter().flatten().filter(|reached| has_arrived(rig, reached));
     arrived.for_each(|reached| most.include(reached));

@@ -1,38 +1,200 @@
-//! The two ways: up and down.
+//! The ways from one state of rest to another.
 
-use serde::Serialize;
+use core::f64::consts::PI;
 
-use super::setting::hanging;
+use serde::{Serialize, Serializer};
+use upright::table::Equilibrium;
 
-/// Which of the two motions.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
-#[serde(rename_all = "lowercase")]
+/// From where to where a motion leads.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Way {
     /// From hanging to upright; then it balances.
     Up,
     /// From upright to hanging; then the motor is off.
     Down,
+    /// Between two others.
+    Between {
+        /// Where it begins.
+        from: Equilibrium,
+        /// Where it ends.
+        to: Equilibrium,
+        /// Number of links.
+        links: usize,
+    },
 }
 
 impl Way {
-    /// Both, in the order of a session.
+    /// Both ways between hanging and upright, in the order of a session.
     pub const BOTH: [Self; 2] = [Self::Up, Self::Down];
 
-    /// States of rest at the start and the end of the motion.
-    pub(super) fn ends(self, states: usize) -> [Vec<f64>; 2] {
-        let (hanging, upright) = (hanging(states), vec![0.0; states]);
-        match self {
-            Self::Up => [hanging, upright],
-            Self::Down => [upright, hanging],
+    /// The way of a chain of `links` links from one equilibrium to another.
+    pub fn between(from: Equilibrium, to: Equilibrium, links: usize) -> Self {
+        let hanging = Equilibrium::hanging(links);
+        match (from, to) {
+            (Equilibrium::UPRIGHT, to) if to == hanging => Self::Down,
+            (from, Equilibrium::UPRIGHT) if from == hanging => Self::Up,
+            _ => Self::Between { from, to, links },
         }
     }
+
+    /// All ways between two equilibria of a chain of `links` links.
+    pub fn all(links: usize) -> Vec<Self> {
+        let equilibria = || (0..1 << links).map(Equilibrium::of_bits);
+        let others = |from| equilibria().filter(move |&to| to != from);
+        equilibria().flat_map(|from| others(from).map(move |to| Self::between(from, to, links))).collect()
+    }
+
+    /// The way of this name, as `uu-ud`; none if there is no such way.
+    pub fn named(name: &str, links: usize) -> Option<Self> {
+        let (from, to) = name.split_once('-')?;
+        let (from, to) = (equilibrium(from, links)?, equilibrium(to, links)?);
+        (from != to).then(|| Self::between(from, to, links))
+    }
+
+    /// The name as in [`named`](Self::named).
+    pub fn name(self, links: usize) -> String {
+        format!("{}-{}", letters(self.from(links), links), letters(self.to(links), links))
+    }
+
+    /// Where it begins.
+    pub fn from(self, links: usize) -> Equilibrium {
+        match self {
+            Self::Up => Equilibrium::hanging(links),
+            Self::Down => Equilibrium::UPRIGHT,
+            Self::Between { from, .. } => from,
+        }
+    }
+
+    /// Where it ends.
+    pub fn to(self, links: usize) -> Equilibrium {
+        match self {
+            Self::Up => Equilibrium::UPRIGHT,
+            Self::Down => Equilibrium::hanging(links),
+            Self::Between { to, .. } => to,
+        }
+    }
+
+    /// Whether all links hang at its beginning.
+    pub(super) fn begins_hanging(self) -> bool {
+        match self {
+            Self::Up => true,
+            Self::Down => false,
+            Self::Between { from, links, .. } => from == Equilibrium::hanging(links),
+        }
+    }
+
+    /// Whether all links hang at its end.
+    pub(super) fn ends_hanging(self) -> bool {
+        match self {
+            Self::Up => false,
+            Self::Down => true,
+            Self::Between { to, links, .. } => to == Equilibrium::hanging(links),
+        }
+    }
+
+    /// States of rest at the start and the end of the motion. A link that changes turns the other way if it is among
+    /// `reversed`.
+    pub(super) fn ends(self, states: usize, reversed: impl Fn(usize) -> bool) -> [Vec<f64>; 2] {
+        let links = states / 2 - 1;
+        let (from, to) = (self.from(links), self.to(links));
+        let [start, mut end] = [from, to].map(|at| rest(at, states));
+        let changed = |link: usize| from.is_down(link) != to.is_down(link);
+        for link in (0..links).filter(|&link| changed(link) && reversed(link)) {
+            // From π to 0 becomes from π to 2π, from 0 to π becomes from 0 to -π.
+            let turn = if from.is_down(link) { 2.0 * PI } else { -2.0 * PI };
+            end[2 + 2 * link] += turn;
+            if link + 1 < links {
+                end[4 + 2 * link] -= turn;
+            }
+        }
+        [start, end]
+    }
+
+    /// The ends of a motion whose last state is near `last`.
+    pub(super) fn ends_near(self, last: &[f64]) -> [Vec<f64>; 2] {
+        let [start, mut end] = self.ends(last.len(), |_| false);
+        if let Self::Between { .. } = self {
+            for (end, last) in end.iter_mut().zip(last).skip(2).step_by(2) {
+                *end += 2.0 * PI * libm::round((last - *end) / (2.0 * PI));
+            }
+        }
+        [start, end]
+    }
+}
+
+/// The state at rest with the cart at 0, its angles within half a turn.
+pub(super) fn rest(at: Equilibrium, states: usize) -> Vec<f64> {
+    let mut state = vec![0.0; states];
+    for (joint, angle) in state.iter_mut().skip(2).step_by(2).enumerate() {
+        *angle = f64::from(at.half_turns(joint)) * PI;
+    }
+    state
+}
+
+/// A letter for each link, `u` if it is up and `d` if it is down.
+pub fn letters(at: Equilibrium, links: usize) -> String {
+    (0..links).map(|link| if at.is_down(link) { 'd' } else { 'u' }).collect()
+}
+
+/// The equilibrium with these [`letters`]; none if they are not one for each link.
+pub fn equilibrium(letters: &str, links: usize) -> Option<Equilibrium> {
+    let bit = |(link, letter)| match letter {
+        'u' => Some(0),
+        'd' => Some(1u32 << link),
+        _ => None,
+    };
+    let bits = letters.chars().enumerate().take(u32::BITS as usize).map(bit).sum::<Option<u32>>()?;
+    (letters.chars().count() == links).then(|| Equilibrium::of_bits(bits))
 }
 
 impl core::fmt::Display for Way {
     fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
-        f.write_str(match self {
-            Self::Up => "raising",
-            Self::Down => "lowering",
-        })
+        match *self {
+            Self::Up => f.write_str("raising"),
+            Self::Down => f.write_str("lowering"),
+            Self::Between { links, .. } => f.write_str(&self.name(links)),
+        }
+    }
+}
+
+impl Serialize for Way {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        match *self {
+            Self::Up => serializer.serialize_str("up"),
+            Self::Down => serializer.serialize_str("down"),
+            Self::Between { links, .. } => serializer.serialize_str(&self.name(links)),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_way_has_a_name_of_its_own() {
+        let ways = Way::all(2);
+        assert_eq!(ways.len(), 12);
+        assert_eq!(Way::all(3).len(), 56);
+        for way in &ways {
+            assert_eq!(Way::named(&way.name(2), 2), Some(*way));
+        }
+        assert_eq!(Way::named("dd-uu", 2), Some(Way::Up));
+        assert_eq!(Way::named("uuu-ddd", 3), Some(Way::Down));
+        for name in ["uu", "uu-uu", "uu-u", "uu-uuu", "uu-ux", ""] {
+            assert_eq!(Way::named(name, 2), None, "{name}");
+        }
+    }
+
+    #[test]
+    fn a_way_ends_at_rest_however_its_links_turn() {
+        let way = Way::named("udu-ddu", 3).unwrap();
+        let [start, end] = way.ends(8, |_| false);
+        assert_eq!(start, [0.0, 0.0, 0.0, 0.0, PI, 0.0, -PI, 0.0]);
+        assert_eq!(end, [0.0, 0.0, PI, 0.0, 0.0, 0.0, -PI, 0.0]);
+        let [_, end] = way.ends(8, |_| true);
+        assert_eq!(end, [0.0, 0.0, -PI, 0.0, 2.0 * PI, 0.0, -PI, 0.0]);
+        assert_eq!(way.ends_near(&end)[1], end);
+        assert_eq!(Way::Up.ends(4, |_| false), [vec![0.0, 0.0, PI, 0.0], vec![0.0; 4]]);
     }
 }

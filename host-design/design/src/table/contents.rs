@@ -18,6 +18,8 @@ pub(super) enum Node {
     Struct(&'static str, Vec<Field>),
     /// A struct that may be missing.
     Optional(Option<Box<Node>>),
+    /// A list of structs.
+    Structs(Vec<Node>),
 }
 
 /// A field of a struct.
@@ -52,11 +54,23 @@ struct Builder {
     open: Vec<(&'static str, Vec<Field>)>,
     /// Fields still without a value, each with whether it is optional; innermost last.
     waiting: Vec<(&'static str, Vec<&'static str>, bool)>,
+    /// Lists of structs: how many of them are not yet complete, and those that are; with the number of structs that
+    /// are open around the list.
+    lists: Vec<(usize, usize, Vec<Node>)>,
     done: Option<Node>,
 }
 
 impl Builder {
     fn value(&mut self, node: Node) {
+        if let Some((depth, missing, nodes)) = self.lists.last_mut()
+            && *depth == self.open.len()
+            && *missing > 0
+        {
+            nodes.push(node);
+            *missing -= 1;
+            self.complete_list();
+            return;
+        }
         let (Some((_, fields)), Some((name, documentation, is_optional))) =
             (self.open.last_mut(), self.waiting.pop())
         else {
@@ -65,6 +79,13 @@ impl Builder {
         };
         let value = if is_optional { Node::Optional(Some(Box::new(node))) } else { node };
         fields.push(Field { name, documentation, value });
+    }
+
+    /// Gives the innermost list to its field, if all of its structs are there.
+    fn complete_list(&mut self) {
+        if let Some((_, _, nodes)) = self.lists.pop_if(|(_, missing, _)| *missing == 0) {
+            self.value(Node::Structs(nodes));
+        }
     }
 }
 
@@ -103,6 +124,11 @@ impl Reader for Builder {
         }
     }
 
+    fn list(&mut self, length: usize) {
+        self.lists.push((self.open.len(), length, Vec::new()));
+        self.complete_list();
+    }
+
     fn end(&mut self) {
         if let Some((name, fields)) = self.open.pop() {
             self.value(Node::Struct(name, fields));
@@ -126,6 +152,7 @@ impl Serialize for Node {
             },
             Node::Struct(_, fields) => object(fields.iter(), serializer),
             Node::Optional(node) => node.serialize(serializer),
+            Node::Structs(nodes) => serializer.collect_seq(nodes),
         }
     }
 }

@@ -298,7 +298,8 @@ impl WithSize for SwingUpFields<'_> {
     type Output = (Vec<contents::Field>, u32);
 
     fn run<const NX: usize, const NY: usize, const N: usize>(self) -> Self::Output {
-        let table = self.0.table::<NY, N>();
+        let others = self.0.transitions();
+        let table = self.0.table::<NY, N>(&others);
         (contents::fields(&table), table.crc)
     }
 }

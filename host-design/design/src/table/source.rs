@@ -82,6 +82,14 @@ impl Columns<'_> {
         writeln!(self.out, "{:1$}{text}", "", self.indent)
     }
 
+    fn body(&mut self, opening: &str, fields: &[Field]) -> core::fmt::Result {
+        self.line(opening)?;
+        self.indent += 4;
+        fields.iter().try_for_each(|field| self.field(field))?;
+        self.indent -= 4;
+        self.line("},")
+    }
+
     fn field(&mut self, field: &Field) -> core::fmt::Result {
         let Field { name, documentation, value } = field;
         for line in documentation {
@@ -116,12 +124,17 @@ impl Columns<'_> {
                 self.indent -= 4;
                 self.line("],")
             }
-            Node::Struct(kind, fields) => {
-                self.line(&format!("{name}: {kind} {{"))?;
+            Node::Struct(kind, fields) => self.body(&format!("{name}: {kind} {{"), fields),
+            Node::Structs(nodes) if nodes.is_empty() => self.line(&format!("{name}: &[],")),
+            Node::Structs(nodes) => {
+                self.line(&format!("{name}: &["))?;
                 self.indent += 4;
-                fields.iter().try_for_each(|field| self.field(field))?;
+                for node in nodes {
+                    let Node::Struct(kind, fields) = node else { return Err(core::fmt::Error) };
+                    self.body(&format!("{kind} {{"), fields)?;
+                }
                 self.indent -= 4;
-                self.line("},")
+                self.line("],")
             }
             Node::Optional(_) => Err(core::fmt::Error),
         }
@@ -146,6 +159,7 @@ fn write_imports(out: &mut String, table: &TableValues) -> core::fmt::Result {
         ("SwingUpTable", table.swing_up.is_some()),
         ("TABLE_FORMAT", true),
         ("Thresholds", true),
+        ("Transition", table.swing_up.as_ref().is_some_and(|swing_up| !swing_up.others.is_empty())),
         ("columns", table.observer.is_some() || table.laws.present().next().is_some()),
     ];
     let used: Vec<&str> = names.into_iter().filter(|(_, used)| *used).map(|(name, _)| name).collect();
@@ -215,7 +229,7 @@ impl Writer<'_> {
             }
             Node::Columns(columns) => self.columns(name, columns),
             // A gain table has none.
-            Node::Slice(_) => Err(core::fmt::Error),
+            Node::Slice(_) | Node::Structs(_) => Err(core::fmt::Error),
             Node::Struct(kind, fields) => self.body(name, &format!("{kind} {{"), fields, "},"),
             Node::Optional(None) => self.line(&format!("{name}: None,")),
             Node::Optional(Some(node)) => match &**node {

@@ -1,12 +1,14 @@
 //! The table of a swing-up on the host: its values for any number of links.
 
 use nalgebra::{SMatrix, SVector};
-use upright::table::{ChainModel, MotionLimits, MotionTable, SwingUpTable, TABLE_FORMAT, Thresholds};
+use upright::table::{
+    ChainModel, MotionLimits, MotionTable, SwingUpTable, TABLE_FORMAT, Thresholds, Transition,
+};
 
 use super::{MAX_SENSORS, NoTable, TableValues, finite};
 use crate::plant::{ChainParameters, ChainPlant};
 use crate::rig::{PlantDescription, Rig};
-use crate::swing_up::{Motion, SwingUp};
+use crate::swing_up::{Motion, SwingUp, Way};
 
 /// Time between two knots of reference, force and gains (s) …
 const COURSE_S: f64 = 0.01;
@@ -26,6 +28,8 @@ pub struct SwingUpValues {
     pub raise: MotionValues,
     /// From upright to hanging.
     pub lower: MotionValues,
+    /// Between other equilibria.
+    pub others: Vec<(Way, MotionValues)>,
     rig_hash: u64,
     tick_s: f32,
 }
@@ -75,16 +79,37 @@ impl SwingUpValues {
             thresholds: Thresholds::none(),
             raise: values(&motions.raise)?,
             lower: values(&motions.lower)?,
+            others: Vec::new(),
             rig_hash: table.rig_hash,
             tick_s: table.tick_s,
         })
+    }
+
+    /// Adds a motion between other equilibria.
+    ///
+    /// # Errors
+    /// As for [`of`](Self::of).
+    pub(crate) fn add(&mut self, table: &TableValues, way: Way, motion: &Motion) -> Result<(), NoTable> {
+        self.others.push((way, MotionValues::of(table, motion)?));
+        Ok(())
+    }
+
+    /// The firmware's motions between other equilibria, a part of its [`table`](Self::table).
+    pub fn transitions(&self) -> Vec<Transition<'_>> {
+        let links = self.chain.a.len();
+        let ends = |way: &Way| [way.from(links).bits(), way.to(links).bits()];
+        let others = self.others.iter().map(|(way, motion)| (ends(way), motion.table()));
+        others.map(|([from, to], motion)| Transition { from, to, motion }).collect()
     }
 
     /// The firmware's table, complete with its checksum.
     ///
     /// # Panics
     /// If `N` is not the number of links, and `NY` not one more.
-    pub fn table<const NY: usize, const N: usize>(&self) -> SwingUpTable<'_, NY, N> {
+    pub fn table<'a, const NY: usize, const N: usize>(
+        &'a self,
+        others: &'a [Transition<'a>],
+    ) -> SwingUpTable<'a, NY, N> {
         let plant = ChainPlant::<N>::new(&self.chain).expect("a swing-up for this number of links");
         let mut table = SwingUpTable {
             format: TABLE_FORMAT,
@@ -95,13 +120,14 @@ impl SwingUpValues {
             thresholds: upright::table::Resize::resized(&self.thresholds),
             raise: self.raise.table(),
             lower: self.lower.table(),
+            others,
             crc: 0,
         };
         table.crc = table.checksum();
         table
     }
 
-    /// Bytes of the knots of both motions, with their units.
+    /// Bytes of the knots of all motions, with their units.
     pub fn bytes(&self) -> usize {
         let bytes = |motion: &MotionValues| {
             size_of_val(&motion.course[..])
@@ -109,7 +135,8 @@ impl SwingUpValues {
                 + size_of_val(&motion.course_units[..])
                 + size_of_val(&motion.filter_units[..])
         };
-        bytes(&self.raise) + bytes(&self.lower)
+        let others: usize = self.others.iter().map(|(_, motion)| bytes(motion)).sum();
+        bytes(&self.raise) + bytes(&self.lower) + others
     }
 }
 

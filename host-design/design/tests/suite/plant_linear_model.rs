@@ -1,8 +1,9 @@
 //! Simulation of a plant that is given as a linear model.
 
 use crate::plant_rigs::paper;
+use upright::table::Equilibrium;
 use upright_design::plant::reference::{Tolerance, integrate};
-use upright_design::plant::{ChainParameters, Equilibrium, LinearSimulation, Plant, chain_plant, linearise};
+use upright_design::plant::{ChainParameters, LinearSimulation, Plant, chain_plant, linearise};
 use upright_design::rig::LinearPlant;
 
 fn model(a: Vec<Vec<f64>>, b: Vec<f64>, noise_input: Option<Vec<Vec<f64>>>) -> LinearPlant {
@@ -35,7 +36,7 @@ fn an_oscillator_follows_its_closed_form() {
 
 #[test]
 fn the_number_of_substeps_changes_nothing() {
-    let chain = linearise(&ChainParameters::<f64>::of(&paper()), Equilibrium::Upright).unwrap();
+    let chain = linearise(&ChainParameters::<f64>::of(&paper()), Equilibrium::UPRIGHT).unwrap();
     let b = chain.b.entries().to_vec();
     let rig = model(chain.a.to_f64_rows(), b, None);
     let start = [0.1, 0.0, 0.01, 0.0, 0.0, 0.2, 0.0, 0.0, -0.01, 0.0];
@@ -55,7 +56,7 @@ fn the_number_of_substeps_changes_nothing() {
 
 #[test]
 fn near_upright_the_chain_moves_as_its_linear_model() {
-    let chain = linearise(&ChainParameters::<f64>::of(&paper()), Equilibrium::Upright).unwrap();
+    let chain = linearise(&ChainParameters::<f64>::of(&paper()), Equilibrium::UPRIGHT).unwrap();
     let mut linear = LinearSimulation::of(&model(chain.a.to_f64_rows(), chain.b.entries().to_vec(), None));
     let mut nonlinear = chain_plant(&paper()).unwrap();
     // The difference is of third order in the amplitude of the motion.

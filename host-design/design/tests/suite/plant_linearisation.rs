@@ -3,8 +3,9 @@
 use crate::paper_numbers::{A, B};
 use crate::plant_rigs::{any_chain, any_link, chain, paper};
 use proptest::prelude::*;
+use upright::table::Equilibrium;
 use upright_design::numerics::{Matrix, Wide, solve};
-use upright_design::plant::{ChainParameters, Equilibrium, LinearModel, chain_plant, linearise};
+use upright_design::plant::{ChainParameters, LinearModel, chain_plant, linearise};
 use upright_design::rig::Chain;
 
 type W = Wide;
@@ -28,7 +29,7 @@ fn misprints(model: &LinearModel<f64>) -> usize {
 
 #[test]
 fn the_papers_matrices_come_out_to_every_printed_digit() {
-    let ours = model(&paper(), Equilibrium::Upright);
+    let ours = model(&paper(), Equilibrium::UPRIGHT);
     assert_eq!(misprints(&ours), 0, "{ours:?}");
     // The paper prints seven digits of this entry.
     assert_eq!(format!("{:.5}", ours.a[(1, 2)]), "28.25280");
@@ -43,7 +44,7 @@ fn the_papers_matrices_come_out_to_every_printed_digit() {
             }
         }
     }
-    let wide = linearise(&ChainParameters::<W>::of(&paper()), Equilibrium::Upright).unwrap();
+    let wide = linearise(&ChainParameters::<W>::of(&paper()), Equilibrium::UPRIGHT).unwrap();
     let rounded = LinearModel {
         a: wide.a.map(W::round_to_f64),
         b: wide.b.map(W::round_to_f64),
@@ -61,7 +62,7 @@ fn slightly_wrong_rigs_do_not_give_the_papers_matrices() {
     let mut points = paper();
     points.links[0].inertia_kg_m2 = Some(0.0);
     for wrong in [heavier_cart, longer_link, points] {
-        assert!(misprints(&model(&wrong, Equilibrium::Upright)) >= 5);
+        assert!(misprints(&model(&wrong, Equilibrium::UPRIGHT)) >= 5);
     }
 }
 
@@ -81,8 +82,8 @@ fn differences(chain: &Chain, about: Equilibrium) -> LinearModel<f64> {
     let plant = chain_plant(chain).expect("a size that is compiled");
     let (s, n) = (plant.states(), plant.links());
     let mut rest = vec![0.0; s];
-    if about == Equilibrium::Hanging {
-        rest[2] = core::f64::consts::PI;
+    for joint in 0..n {
+        rest[2 + 2 * joint] = core::f64::consts::PI * f64::from(about.half_turns(joint));
     }
     // One column out of s + 1 + n: a step in a state, in the force or in a torque.
     let column = |index: usize| {
@@ -111,8 +112,8 @@ proptest! {
 
     // Central differences at 1e-5 are accurate to about 1e-9; a wrong term would be of order 1.
     #[test]
-    fn the_linear_model_is_the_derivative_of_the_nonlinear_plant(chain in any_chain(1..=8), hanging: bool) {
-        let about = if hanging { Equilibrium::Hanging } else { Equilibrium::Upright };
+    fn the_linear_model_is_the_derivative_of_the_nonlinear_plant(chain in any_chain(1..=8), down: u8) {
+        let about = Equilibrium::of_bits(down.into()).of_links(chain.links.len());
         let (exact, measured) = (model(&chain, about), differences(&chain, about));
         prop_assert!(difference(&exact.a, &measured.a) < 1e-7);
         prop_assert!(difference(&exact.b, &measured.b) < 1e-7);
@@ -128,7 +129,7 @@ proptest! {
     fn one_link_has_the_textbook_linear_model(cart_mass in 0.05..5.0f64, link in any_link(), friction in 0.0..3.0f64, hanging: bool) {
         let mut rig = chain(cart_mass, vec![link.clone()]);
         rig.cart.friction_n_s_per_m = friction;
-        let (about, sign) = if hanging { (Equilibrium::Hanging, -1.0) } else { (Equilibrium::Upright, 1.0) };
+        let (about, sign) = if hanging { (Equilibrium::HANGING, -1.0) } else { (Equilibrium::UPRIGHT, 1.0) };
         // M ẍ - s m c θ̈ = u - d_0 ẋ,  -s m c ẍ + J θ̈ = s m g c θ - d_1 θ̇ + τ, by Cramer's rule; s = ±1.
         let (m, l) = (link.mass_kg, link.length_m);
         let c = link.centre_of_mass_m.unwrap_or(l / 2.0);
@@ -149,8 +150,8 @@ proptest! {
     }
 
     #[test]
-    fn double_and_extended_precision_agree(chain in any_chain(1..=8), hanging: bool) {
-        let about = if hanging { Equilibrium::Hanging } else { Equilibrium::Upright };
+    fn double_and_extended_precision_agree(chain in any_chain(1..=8), down: u8) {
+        let about = Equilibrium::of_bits(down.into());
         let wide = linearise(&ChainParameters::<W>::of(&chain), about).unwrap();
         let double = model(&chain, about);
         // A few rounding errors, times the condition number of the solved equations.
@@ -168,6 +169,6 @@ proptest! {
 fn a_chain_that_moves_no_mass_has_no_linear_model() {
     let mut nothing = paper();
     nothing.links[3].mass_kg = 0.0;
-    assert!(linearise(&ChainParameters::<f64>::of(&nothing), Equilibrium::Upright).is_err());
-    assert!(linearise(&ChainParameters::<W>::of(&nothing), Equilibrium::Upright).is_err());
+    assert!(linearise(&ChainParameters::<f64>::of(&nothing), Equilibrium::UPRIGHT).is_err());
+    assert!(linearise(&ChainParameters::<W>::of(&nothing), Equilibrium::UPRIGHT).is_err());
 }

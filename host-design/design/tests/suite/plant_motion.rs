@@ -1,10 +1,11 @@
 //! Motion over time: energy, natural frequencies and the agreement of the two integrators.
 
 use crate::plant_rigs::{chain, paper, rod, unequal_rods, with_friction};
+use upright::table::Equilibrium;
 use upright_design::numerics::{Matrix, Real, Wide};
 use upright_design::plant::reference::{ReferenceError, Tolerance, integrate};
 use upright_design::plant::{
-    ChainParameters, ChainPlant, ChainState, Equilibrium, Plant, PlantError, chain_plant, linearise,
+    ChainParameters, ChainPlant, ChainState, Plant, PlantError, chain_plant, linearise,
 };
 use upright_design::rig::{Chain, Link, MAX_LINKS};
 
@@ -86,7 +87,7 @@ fn a_hanging_link_on_a_cart_swings_with_the_textbook_period() {
     let (total, m, l, g) = (1.1, 0.4, 0.5, 9.81);
     let mc: f64 = m * l / 2.0;
     let omega = (total * mc * g / (total * m * l * l / 3.0 - mc * mc)).sqrt();
-    let model = linearise(&ChainParameters::<f64>::of(&rig), Equilibrium::Hanging).unwrap();
+    let model = linearise(&ChainParameters::<f64>::of(&rig), Equilibrium::HANGING).unwrap();
     assert!((model.a[(3, 2)] + omega * omega).abs() < 1e-13 * omega * omega);
 
     // A small swing of the nonlinear plant, cart included, returns after that period. The true period is longer by an
@@ -130,7 +131,7 @@ fn differs_from_laguerre(links: &[Link]) -> f64 {
     type W = Wide;
     let n = links.len();
     let rig = chain(1e60, links.to_vec()); // a cart that does not move
-    let model = linearise(&ChainParameters::<W>::of(&rig), Equilibrium::Hanging).unwrap();
+    let model = linearise(&ChainParameters::<W>::of(&rig), Equilibrium::HANGING).unwrap();
     let l_over_g = W::from_f64(0.25) / &W::from_f64(rig.gravity_m_per_s2);
     let mut worst = 0.0f64;
     for point in 0..=n {

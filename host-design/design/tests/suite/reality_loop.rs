@@ -3,10 +3,11 @@
 use std::path::Path;
 
 use crate::published::{certified, table};
+use upright::table::Equilibrium;
 use upright::table::Law;
 use upright_design::harness::{record, with_firmware};
 use upright_design::numerics::{Matrix, solve};
-use upright_design::plant::{ChainParameters, Equilibrium, absolute_angles, linearise};
+use upright_design::plant::{ChainParameters, absolute_angles, linearise};
 use upright_design::rig::{PerJoint, PlantDescription, Reality, Rig, SECTIONS};
 use upright_design::simulate::{Scenario, run};
 use upright_design::table::TableValues;
@@ -97,7 +98,7 @@ fn response(a: &Matrix<f64>, torque: &Matrix<f64>, w: f64) -> [f64; 2] {
 /// (Gelb & Vander Velde, *Multiple-Input Describing Functions*, 1968, §2.3): where the response is real and negative.
 fn predicted_swing(rig: &Rig, law: Law, friction: f64) -> f64 {
     let PlantDescription::Chain(chain) = &rig.plant else { panic!("a chain") };
-    let model = linearise(&ChainParameters::<f64>::of(chain), Equilibrium::Upright).unwrap();
+    let model = linearise(&ChainParameters::<f64>::of(chain), Equilibrium::UPRIGHT).unwrap();
     let gains = &certified(rig).double.sampled;
     let k = match law {
         Law::Lqr => &gains.lqr,

@@ -23,7 +23,7 @@ fn rig_and_stored(rig: &str) -> (Rig, Stored) {
 /// Whether the firmware with these motions gets through a demonstration.
 fn arrives(rig: &Rig, motions: &SwingUp, seed: u64, is_wrong: bool) -> bool {
     let table = table(rig);
-    let table = with_motions(rig, table, motions).unwrap();
+    let table = with_motions(rig, table, motions, &[]).unwrap();
     Script::of(rig, &table, seed, is_wrong).unwrap().run(&table).unwrap().arrived
 }
 

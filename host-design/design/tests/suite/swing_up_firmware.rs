@@ -7,7 +7,7 @@ use upright::control::actuator::Drive;
 use upright::protocol::message::{Answer, Request};
 use upright::supervision::fault::Fault;
 use upright::supervision::inhibits::Inhibits;
-use upright::table::TableError;
+use upright::table::{Equilibrium, TableError};
 use upright_design::harness::{Harness, HarnessError, Pins, Recording, record, with_firmware};
 use upright_design::plant::absolute_angles;
 use upright_design::rig::Rig;
@@ -30,7 +30,7 @@ fn rig_and_table(name: &str) -> (Rig, TableValues) {
     let rig = Rig::from_path(&file(name)).unwrap();
     let table = table(&rig);
     let motions = motions(&rig, &Stored::beside(&file(name)).unwrap()).unwrap();
-    let table = with_motions(&rig, table, &motions).unwrap();
+    let table = with_motions(&rig, table, &motions, &[]).unwrap();
     (rig, table)
 }
 
@@ -237,16 +237,16 @@ fn up_and_down_are_refused_with_their_reasons() {
         })
         .unwrap()
     };
-    let up = refused(&table, Request::Up);
+    let up = refused(&table, Request::Goto(Equilibrium::UPRIGHT));
     assert!(up.contains(Inhibits::NOT_HOMED.union(Inhibits::SIGNS)), "{up}");
-    assert_eq!(refused(&table, Request::Down), Inhibits::NOT_BALANCING);
+    assert_eq!(refused(&table, Request::Goto(Equilibrium::HANGING)), Inhibits::NOT_BALANCING);
     let mut without = table.clone();
     without.swing_up = None;
-    assert_eq!(refused(&without, Request::Up), Inhibits::NO_SWING_UP);
-    assert_eq!(refused(&without, Request::Down), Inhibits::NO_SWING_UP);
+    assert_eq!(refused(&without, Request::Goto(Equilibrium::UPRIGHT)), Inhibits::NO_SWING_UP);
+    assert_eq!(refused(&without, Request::Goto(Equilibrium::HANGING)), Inhibits::NO_SWING_UP);
     let mut wide = table.clone();
     wide.swing_up.as_mut().unwrap().raise.travel_m = [-1.0, 1.0];
-    let up = refused(&wide, Request::Up);
+    let up = refused(&wide, Request::Goto(Equilibrium::UPRIGHT));
     assert!(up.contains(Inhibits::NO_ROOM), "{up}");
 }
 

@@ -4,6 +4,7 @@ use upright::board::Output;
 use upright::protocol::message::{Answer, Request};
 use upright::supervision::fault::Fault;
 use upright::supervision::sign_check::Signs;
+use upright::table::Equilibrium;
 use upright_board::UNITS_PER_MICROSECOND;
 
 use super::defect::{Expected, Kind};
@@ -11,7 +12,7 @@ use super::injection::Injection;
 use super::observed::Observed;
 use super::trial::{Phase, Trial};
 use crate::in_the_loop::{Events, Place, RunError, VirtualBoard};
-use upright_design::harness::{HEARTBEAT_S, Harness, HarnessError, Pins, Session, Target};
+use upright_design::harness::{HEARTBEAT_S, Harness, HarnessError, Pins, Session, Target, goals};
 use upright_design::identify::Feed;
 use upright_design::plant::absolute_angles;
 use upright_design::rig::{PlantDescription, Rig};
@@ -133,7 +134,7 @@ impl Attempt<'_> {
         let mut injection = Injection::new(self.rig, self.table, trial.clone());
         let mut output = harness.raise(Some(0.0))?;
         let heartbeat = self.ticks(HEARTBEAT_S);
-        let lower_at = self.lower_at();
+        let goals = self.goals();
         for tick in 0.. {
             if self.is_over(tick, &observed) {
                 break;
@@ -149,7 +150,7 @@ impl Attempt<'_> {
                     output => output?,
                 };
             }
-            if harness.ask_to_lower(tick, lower_at) {
+            if harness.ask_for(tick, &goals) {
                 // One command in a tick.
             } else if tick == 1 {
                 harness.session.send(Request::Setpoint(trial.scenario.step_m as f32));
@@ -172,7 +173,7 @@ impl Attempt<'_> {
                 observed.visible.get_or_insert(tick);
             }
             observed.outside |= observed.off.is_none()
-                && self.is_outside(tick, harness.lowered_from(), harness.bench.state());
+                && self.is_outside(tick, harness.begun().first().copied(), harness.bench.state());
             let drive = if acting.enable { acting.drive } else { output.drive };
             harness.bench.push(since.map_or(0.0, |since| injection.push_n(since)));
             harness.bench.tick(drive);
@@ -319,14 +320,9 @@ impl Attempt<'_> {
         Some(absolute_angles(&state).collect())
     }
 
-    /// Tick in which the firmware is told to lower the links.
-    fn lower_at(&self) -> Option<usize> {
-        match self.trial.scenario.begin {
-            Begin::Hanging { lower_at_s } => {
-                lower_at_s.map(|at_s| self.ticks(at_s + 0.5 * self.rig.tick.period_s))
-            }
-            Begin::ByHand => None,
-        }
+    /// Where the firmware is told to bring the links, and from which tick on.
+    fn goals(&self) -> Vec<(usize, Equilibrium)> {
+        goals(&self.trial.scenario, self.rig.tick.period_s)
     }
 
     /// The kinds that are there at power-up: arming has to be refused.

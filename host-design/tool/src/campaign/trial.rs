@@ -125,8 +125,14 @@ impl Trial {
         let onset = begin + COMMAND_TICKS + (0.8 * when * (ticks as f64)) as usize;
         let lower_at_s = (!is_raised).then_some(begin as f64 * rig.tick.period_s);
         let swing = Scenario::swing_up(rig, 0.0, lower_at_s);
-        let scenario =
-            Scenario { start: swing.start, begin: swing.begin, step_m: 0.0, law: Law::Lqr, ..self.scenario };
+        let scenario = Scenario {
+            start: swing.start,
+            begin: swing.begin,
+            goals: swing.goals,
+            step_m: 0.0,
+            law: Law::Lqr,
+            ..self.scenario
+        };
         // A raised rig then balances for a while; a lowered one turns its motor off.
         let after = if is_raised { upright / 2 } else { 0 };
         let watched = (begin + ticks + after).saturating_sub(onset).max(1);

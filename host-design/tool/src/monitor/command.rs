@@ -2,7 +2,7 @@
 
 use ratatui::crossterm::event::{KeyCode, KeyEvent, KeyModifiers};
 use upright::protocol::message::Request;
-use upright::table::Law;
+use upright::table::{Equilibrium, Law};
 
 /// The action of a key.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -34,8 +34,8 @@ pub fn action(key: &KeyEvent) -> Option<Action> {
         KeyCode::Char('m') => Action::Send(Request::Drive { along: true }),
         KeyCode::Char('M') => Action::Send(Request::Drive { along: false }),
         KeyCode::Char('a') => Action::Send(Request::Arm),
-        KeyCode::Char('u') => Action::Send(Request::Up),
-        KeyCode::Char('n') => Action::Send(Request::Down),
+        KeyCode::Char('u') => Action::Send(Request::Goto(Equilibrium::UPRIGHT)),
+        KeyCode::Char('n') => Action::Send(Request::Goto(Equilibrium::HANGING)),
         KeyCode::Char('d' | ' ') => Action::Send(Request::Disarm),
         KeyCode::Char('c') => Action::Send(Request::Clear),
         KeyCode::Char('0') => Action::Send(Request::Setpoint(0.0)),
@@ -69,8 +69,8 @@ pub fn request(line: &str) -> Result<Request, BadCommand> {
         ["drive", "+x"] => Request::Drive { along: true },
         ["drive", "-x"] => Request::Drive { along: false },
         ["arm"] => Request::Arm,
-        ["up"] => Request::Up,
-        ["down"] => Request::Down,
+        ["up"] => Request::Goto(Equilibrium::UPRIGHT),
+        ["down"] => Request::Goto(Equilibrium::HANGING),
         ["disarm"] => Request::Disarm,
         ["clear"] => Request::Clear,
         ["set-point", metres] => Request::Setpoint(metres.parse().map_err(|_| bad())?),

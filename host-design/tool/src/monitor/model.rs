@@ -10,7 +10,7 @@ use upright::protocol::message::{
 use upright::protocol::serial_link::MAX_MESSAGE;
 use upright::supervision::fault::Cause;
 use upright::supervision::inhibits::Inhibits;
-use upright::table::Law;
+use upright::table::{Equilibrium, Law};
 
 use super::command::Action;
 use super::outgoing::{Outgoing, Unanswered};
@@ -311,8 +311,8 @@ fn name(request: Request) -> String {
         Request::Drive { along: true } => "drive along +x".to_owned(),
         Request::Drive { along: false } => "drive against +x".to_owned(),
         Request::Arm => "arm".to_owned(),
-        Request::Up => "up".to_owned(),
-        Request::Down => "down".to_owned(),
+        Request::Goto(Equilibrium::UPRIGHT) => "up".to_owned(),
+        Request::Goto(Equilibrium::HANGING) => "down".to_owned(),
         Request::Disarm => "disarm".to_owned(),
         Request::Clear => "clear".to_owned(),
         Request::Setpoint(metres) => format!("set-point {metres:.3} m"),

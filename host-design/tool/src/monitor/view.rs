@@ -86,7 +86,7 @@ fn header(monitor: &Monitor) -> Vec<Line<'_>> {
         State::Disarmed | State::Calibrated => Color::White,
         State::Homing | State::Armed => Color::Yellow,
         State::Driving | State::Identifying | State::Raising | State::Lowering => Color::Magenta,
-        State::Balancing => Color::Green,
+        State::Balancing | State::Holding => Color::Green,
         State::Fault => Color::Red,
     };
     lines.push(Line::from(words::state(telemetry.state)).style(Style::new().fg(colour).bold()));

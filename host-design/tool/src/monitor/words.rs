@@ -20,6 +20,7 @@ pub fn state(state: State) -> &'static str {
         State::Armed => "armed: waits until all links are upright and still",
         State::Raising => "raising: the motor is on",
         State::Balancing => "balancing: the motor is on",
+        State::Holding => "holding where some links hang: the motor is on",
         State::Lowering => "lowering: the motor is on",
         State::Fault => "fault: motor off",
     }

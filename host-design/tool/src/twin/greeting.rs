@@ -28,6 +28,7 @@ pub(super) fn greeting(rig: &Rig, table: &TableValues, place: &str, defects: Opt
         State::Armed,
         State::Raising,
         State::Balancing,
+        State::Holding,
         State::Lowering,
         State::Fault,
     ];

@@ -14,7 +14,7 @@ use upright_tool::project::checkout;
 
 use crate::failure::Failure;
 use crate::progress::with_spinner;
-use crate::variation::with_stored_motions;
+use crate::variation::{Wanted, with_stored_motions};
 
 mod data;
 mod text;
@@ -46,6 +46,9 @@ pub(crate) struct Design {
     /// Write the motions that are stored beside the rig file into the table, too
     #[arg(long)]
     swing_up: bool,
+    /// Put them and the stored motions between other equilibria into the table
+    #[arg(long)]
+    transitions: bool,
     /// Print the whole design as one JSON object
     #[arg(long)]
     json: bool,
@@ -88,8 +91,12 @@ impl Design {
         }
         let table = table.map_err(|source| Failure::NoTable { rig: name(), source })?;
         refuse_failing_table(&rig, &reports)?;
-        let table = if self.swing_up { with_stored_motions(&self.rig, &rig, table)? } else { table };
-        if self.swing_up && table.swing_up.is_none() {
+        let table = match (self.swing_up, self.transitions) {
+            (_, true) => with_stored_motions(&self.rig, &rig, table, Wanted::Transitions)?,
+            (true, false) => with_stored_motions(&self.rig, &rig, table, Wanted::SwingUp)?,
+            (false, false) => table,
+        };
+        if (self.swing_up || self.transitions) && table.swing_up.is_none() {
             let source = Stored::beside(&self.rig).err().unwrap_or(SwingUpError::Outdated);
             return Err(Failure::SwingUp { rig: name(), source });
         }

@@ -14,7 +14,7 @@ use crate::failure::Failure;
 use crate::firmware::Target;
 use crate::progress::with_bar;
 use crate::split::Split;
-use crate::variation::{Variation, with_stored_motions};
+use crate::variation::{Variation, Wanted, with_stored_motions};
 
 /// Fault injection: runs the firmware with one defect at a time and checks that the motor is off in time; exit status
 /// 1 if it ever is not, or is turned off without a reason.
@@ -84,8 +84,11 @@ fn kind(name: &str) -> Result<Kind, String> {
 impl Faults {
     pub(crate) fn run(self) -> Result<(), Failure> {
         let (rig, _, table) = self.variation.designed()?;
-        let table =
-            if self.swing_up { with_stored_motions(&self.variation.rig, &rig, table)? } else { table };
+        let table = if self.swing_up {
+            with_stored_motions(&self.variation.rig, &rig, table, Wanted::SwingUp)?
+        } else {
+            table
+        };
         if self.swing_up && table.swing_up.is_none() {
             return Err(Failure::SwingUp { rig: rig.name, source: SwingUpError::NoMotions });
         }

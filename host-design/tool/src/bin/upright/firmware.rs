@@ -21,7 +21,7 @@ use upright_tool::image::{self, Kind};
 
 use crate::failure::Failure;
 use crate::progress::with_spinner;
-use crate::variation::{with_stored_motions, with_table};
+use crate::variation::{Wanted, with_stored_motions, with_table};
 
 /// Builds, measures, runs, flashes and monitors the firmware image.
 #[derive(Args)]
@@ -54,18 +54,18 @@ impl Firmware {
 }
 
 /// Builds the image with the table of the rig and its stored motions, or with src/gains.rs as it is.
-fn built(kind: Kind, rig: Option<&Path>) -> Result<PathBuf, Failure> {
+fn built(kind: Kind, rig: Option<&Path>, wanted: Wanted) -> Result<PathBuf, Failure> {
     let Some(path) = rig else {
         return Ok(with_spinner("building the image", || image::build(kind))?);
     };
-    let (rig, table) = designed(path)?;
+    let (rig, table) = designed(path, wanted)?;
     Ok(with_spinner("building the image", || image::build_for(kind, &rig, &table))?)
 }
 
 /// The rig of this file, and its table with the stored motions.
-fn designed(path: &Path) -> Result<(Rig, TableValues), Failure> {
+fn designed(path: &Path, wanted: Wanted) -> Result<(Rig, TableValues), Failure> {
     let rig = Rig::from_path(path)?;
     let (_, table) = with_table(&rig, path, Gains::Sampled)?;
-    let table = with_stored_motions(path, &rig, table)?;
+    let table = with_stored_motions(path, &rig, table, wanted)?;
     Ok((rig, table))
 }

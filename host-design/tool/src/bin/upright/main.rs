@@ -18,6 +18,7 @@ mod shake;
 mod simulate;
 mod split;
 mod swing_up;
+mod transitions;
 mod twin;
 mod variation;
 mod verify;
@@ -74,6 +75,7 @@ enum Command {
     Simulate(simulate::Simulate),
     Twin(twin::Twin),
     SwingUp(swing_up::SwingUp),
+    Transitions(transitions::Transitions),
     Verify(verify::Verify),
 }
 
@@ -95,6 +97,7 @@ fn main() -> ExitCode {
         Command::Simulate(command) => command.run(),
         Command::Twin(command) => command.run(),
         Command::SwingUp(command) => command.run(),
+        Command::Transitions(command) => command.run(),
         Command::Verify(command) => command.run(),
     };
     match result {

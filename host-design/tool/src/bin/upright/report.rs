@@ -180,7 +180,7 @@ impl Report {
 /// The table with the stored motions; none if there are none, or if they belong to other values of the rig.
 fn with_stored_motions(file: &Path, rig: &Rig, table: &TableValues) -> Option<TableValues> {
     let stored = Stored::beside(file).ok()?;
-    with_motions(rig, table.clone(), &motions(rig, &stored).ok()?).ok()
+    with_motions(rig, table.clone(), &motions(rig, &stored).ok()?, &[]).ok()
 }
 
 /// A run of the motions of `table`.

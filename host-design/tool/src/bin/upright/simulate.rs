@@ -15,7 +15,7 @@ use upright_tool::in_the_loop::RunError;
 
 use crate::failure::Failure;
 use crate::progress::with_spinner;
-use crate::variation::{Variation, finite, law_option, not_negative, positive, with_stored_motions};
+use crate::variation::{Variation, Wanted, finite, law_option, not_negative, positive, with_stored_motions};
 
 /// Runs the firmware's own controller against the nonlinear plant.
 ///
@@ -28,6 +28,7 @@ Examples:
   upright simulate rigs/quadruple-paper.toml --disturbances paper --seed 7 --csv run.csv
   upright simulate rigs/quadruple-paper.toml --tick 0.005 --gains continuous --tilt 0.001   falls
   upright simulate rigs/quadruple-paper.toml --swing-up --svg swing-up.svg
+  upright simulate rigs/double-quanser-dbpen.toml --transitions --svg tour.svg
   upright simulate rigs/quadruple-paper.toml --csv - | head")]
 pub(crate) struct Simulate {
     #[command(flatten)]
@@ -80,6 +81,10 @@ pub(crate) struct Simulate {
     #[arg(long, conflicts_with_all = ["law", "duration", "step", "step_at", "raw_step", "sensing", "tilt", "start",
           "disturbances", "force_noise", "torque_noise", "force_offset", "substeps"])]
     swing_up: bool,
+    /// A tour through all stored motions between equilibria, one after the other
+    #[arg(long, conflicts_with_all = ["swing_up", "law", "duration", "step", "step_at", "raw_step", "sensing", "tilt",
+          "start", "disturbances", "force_noise", "torque_noise", "force_offset", "substeps"])]
+    transitions: bool,
     /// With --swing-up: masses and friction wrong by up to the spreads of [swing_up], drawn with the seed
     #[arg(long, requires = "swing_up")]
     wrong: bool,
@@ -109,7 +114,7 @@ enum Disturbances {
 
 impl Simulate {
     pub(crate) fn run(self) -> Result<(), Failure> {
-        if self.swing_up {
+        if self.is_swing_up() {
             return self.swing_up_with(|_, table, script| {
                 Ok(with_spinner("simulating", || script.run(table)).map_err(RunError::from)?)
             });
@@ -135,13 +140,13 @@ impl Simulate {
 
     /// Whether the rig is to raise itself.
     pub(crate) fn is_swing_up(&self) -> bool {
-        self.swing_up
+        self.swing_up || self.transitions
     }
 
     /// The rig, and its table with the stored motions.
     pub(crate) fn with_motions(&self) -> Result<(Rig, TableValues), Failure> {
         let (rig, _, table) = self.variation.designed()?;
-        let table = with_stored_motions(&self.variation.rig, &rig, table)?;
+        let table = with_stored_motions(&self.variation.rig, &rig, table, Wanted::of(self.transitions))?;
         Ok((rig, table))
     }
 
@@ -152,7 +157,11 @@ impl Simulate {
     ) -> Result<(), Failure> {
         let (rig, table) = self.with_motions()?;
         let failed = |source| Failure::SwingUp { rig: rig.name.clone(), source };
-        let script = Script::of(&rig, &table, self.seed, self.wrong).map_err(failed)?;
+        let script = match self.transitions {
+            true => Script::tour(&rig, &table, self.seed),
+            false => Script::of(&rig, &table, self.seed, self.wrong),
+        };
+        let script = script.map_err(failed)?;
         let run = run(&rig, &table, &script)?;
         let parts: Vec<_> =
             run.parts.iter().map(|(at_s, name)| json!({ "at_s": at_s, "part": name })).collect();
@@ -164,7 +173,9 @@ impl Simulate {
                 run.parts.iter().map(|(at_s, name)| format!("{at_s:>8.3} s  {name}")).collect();
             lines.join("\n")
         };
-        let title = format!("{}: up, balance, step, down", rig.name);
+        let what =
+            if self.transitions { "from equilibrium to equilibrium" } else { "up, balance, step, down" };
+        let title = format!("{}: {what}", rig.name);
         self.write_record(&rig, &run.trace, &title, &text)?;
         if run.arrived {
             return Ok(());

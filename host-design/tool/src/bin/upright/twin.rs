@@ -17,7 +17,7 @@ use upright_tool::twin::Server;
 
 use crate::failure::Failure;
 use crate::firmware::Target;
-use crate::variation::{Variation, law_option, positive, with_stored_motions};
+use crate::variation::{Variation, Wanted, law_option, positive, with_stored_motions};
 
 /// Serves a page on which the rig moves, run by the firmware itself: pull it, change it, break it, watch it.
 ///
@@ -41,6 +41,9 @@ pub(crate) struct Twin {
     /// A board instead of a simulation: its serial port (/dev/ttyACM0, COM3 …), or tcp:HOST:PORT
     #[arg(long, conflicts_with_all = ["target", "hanging"])]
     port: Option<String>,
+    /// With the stored motions between other equilibria, too
+    #[arg(long)]
+    transitions: bool,
     /// Begin with the links hanging, not homed
     #[arg(long)]
     hanging: bool,
@@ -58,7 +61,7 @@ pub(crate) struct Twin {
 impl Twin {
     pub(crate) fn run(self) -> Result<(), Failure> {
         let (rig, _, table) = self.variation.designed()?;
-        let table = with_stored_motions(&self.variation.rig, &rig, table)?;
+        let table = with_stored_motions(&self.variation.rig, &rig, table, Wanted::of(self.transitions))?;
         let built = match self.port {
             None => Some(self.target.built(Link::Files, &rig, &table)?),
             Some(_) => None,

@@ -7,7 +7,7 @@ use clap::{Args, ValueEnum};
 use upright::table::Law;
 use upright_design::design::{Certified, design};
 use upright_design::rig::Rig;
-use upright_design::swing_up::{Stored, SwingUpError, motions, with_motions};
+use upright_design::swing_up::{Stored, StoredTransitions, SwingUpError, motions, with_motions};
 use upright_design::table::{Gains, TableValues};
 
 use crate::failure::Failure;
@@ -92,23 +92,46 @@ pub(crate) fn with_table(rig: &Rig, file: &Path, gains: Gains) -> Result<(Certif
     Ok((certified, table))
 }
 
-/// The table with the motions that are stored beside the rig file, if there are any and they are for these values.
+/// Which of the motions beside a rig file are wanted.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) enum Wanted {
+    /// Raising and lowering, if they are stored and for these values of the rig file.
+    SwingUp,
+    /// Also those between other equilibria, which have to be there.
+    Transitions,
+}
+
+impl Wanted {
+    /// As the option `--transitions` says.
+    pub(crate) fn of(transitions: bool) -> Self {
+        if transitions { Self::Transitions } else { Self::SwingUp }
+    }
+}
+
+/// The table with the motions that are stored beside the rig file.
 pub(crate) fn with_stored_motions(
     rig_file: &Path,
     rig: &Rig,
     table: TableValues,
+    wanted: Wanted,
 ) -> Result<TableValues, Failure> {
     let failed = |source| Failure::SwingUp { rig: rig.name.clone(), source };
     let stored = match Stored::beside(rig_file) {
         Ok(stored) => stored,
-        Err(SwingUpError::NoFile(_)) => return Ok(table),
+        Err(SwingUpError::NoFile(_)) if wanted == Wanted::SwingUp => return Ok(table),
         Err(error) => return Err(failed(error)),
+    };
+    let others = match wanted {
+        Wanted::SwingUp => Vec::new(),
+        Wanted::Transitions => {
+            StoredTransitions::beside(rig_file).and_then(|stored| stored.transitions(rig)).map_err(failed)?
+        }
     };
     if !stored.is_of(rig) {
         eprintln!("warning: without swing-up: {}", SwingUpError::Outdated);
         return Ok(table);
     }
-    with_spinner("the motions", || with_motions(rig, table, &motions(rig, &stored)?)).map_err(failed)
+    with_spinner("the motions", || with_motions(rig, table, &motions(rig, &stored)?, &others)).map_err(failed)
 }
 
 pub(crate) fn finite(text: &str) -> Result<f64, String> {

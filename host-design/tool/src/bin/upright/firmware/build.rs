@@ -10,6 +10,7 @@ use super::board::BoardOption;
 use super::built;
 use super::cycles::check_ticks;
 use crate::failure::Failure;
+use crate::variation::Wanted;
 
 /// Builds the image of a board, runs it on the virtual board, and prints the path of its ELF file; exit status 1 if a
 /// tick takes longer than a quarter of its period.
@@ -31,6 +32,9 @@ pub(crate) struct Build {
     /// The image for identification: it shakes the hanging rig and logs every tick, for `upright identify`
     #[arg(long)]
     identify: bool,
+    /// With the stored motions between other equilibria, too
+    #[arg(long, requires = "rig")]
+    transitions: bool,
 }
 
 /// The usual image of a board, or that for identification.
@@ -40,8 +44,9 @@ pub(super) fn kind(board: Board, identify: bool) -> Kind {
 
 impl Build {
     pub(crate) fn run(self) -> Result<(), Failure> {
-        let image = built(kind(self.on.board, self.identify), self.rig.as_deref())?;
-        check_ticks(self.on.board, self.rig.as_deref(), &image)?;
+        let image =
+            built(kind(self.on.board, self.identify), self.rig.as_deref(), Wanted::of(self.transitions))?;
+        check_ticks(self.on.board, self.rig.as_deref(), Wanted::of(self.transitions), &image)?;
         writeln!(std::io::stdout(), "{}", image.display())?;
         Ok(())
     }

@@ -22,7 +22,7 @@ use super::designed;
 use super::target::read;
 use crate::failure::Failure;
 use crate::progress::with_spinner;
-use crate::variation::{law_option, positive};
+use crate::variation::{Wanted, law_option, positive};
 
 /// Measures what the ticks of the flashed image cost, on the virtual board: from the tick to the output, jitter of the
 /// output, and the whole task by part, from power-up through arming to balancing, and through raising and lowering if
@@ -54,7 +54,7 @@ pub(crate) struct Cycles {
 
 impl Cycles {
     pub(crate) fn run(self) -> Result<(), Failure> {
-        let (rig, table) = designed(&self.rig)?;
+        let (rig, table) = designed(&self.rig, Wanted::SwingUp)?;
         let image = with_spinner("building the image", || {
             image::build_for(Kind::Board(self.on.board), &rig, &table)
         })?;
@@ -94,7 +94,12 @@ const CHECKED_S: f64 = 0.5;
 
 /// Refuses an image with a tick that the board cannot keep, or one that could balance but does not, so that its ticks
 /// cannot be measured. Without a rig, that of src/gains.rs is looked for in `rigs/`.
-pub(super) fn check_ticks(board: Board, rig: Option<&Path>, image: &Path) -> Result<(), Failure> {
+pub(super) fn check_ticks(
+    board: Board,
+    rig: Option<&Path>,
+    wanted: Wanted,
+    image: &Path,
+) -> Result<(), Failure> {
     let Some(path) = rig.map(Path::to_owned).or_else(rig_of_the_gains) else {
         eprintln!(
             "the ticks are not checked: the rig of src/gains.rs is not in rigs/; check them with `upright firmware \
@@ -102,7 +107,7 @@ pub(super) fn check_ticks(board: Board, rig: Option<&Path>, image: &Path) -> Res
         );
         return Ok(());
     };
-    let (of_file, mut table) = designed(&path)?;
+    let (of_file, mut table) = designed(&path, wanted)?;
     if rig.is_none() {
         // src/gains.rs has no motions.
         table.swing_up = None;

@@ -10,6 +10,7 @@ use super::build::kind;
 use super::built;
 use super::cycles::check_ticks;
 use crate::failure::Failure;
+use crate::variation::Wanted;
 
 const PROBE_RS: &str = "probe-rs";
 
@@ -31,6 +32,9 @@ pub(crate) struct Flash {
     /// The image for identification: it shakes the hanging rig and logs every tick, for `upright identify`
     #[arg(long)]
     identify: bool,
+    /// With the stored motions between other equilibria, too
+    #[arg(long, requires = "rig")]
+    transitions: bool,
 }
 
 impl Flash {
@@ -41,8 +45,9 @@ impl Flash {
                 "probe-rs is missing: install it (https://probe.rs, or `cargo install probe-rs-tools --locked`)",
             ));
         }
-        let image = built(kind(self.on.board, self.identify), self.rig.as_deref())?;
-        check_ticks(self.on.board, self.rig.as_deref(), &image)?;
+        let image =
+            built(kind(self.on.board, self.identify), self.rig.as_deref(), Wanted::of(self.transitions))?;
+        check_ticks(self.on.board, self.rig.as_deref(), Wanted::of(self.transitions), &image)?;
         probe_rs(&["download", "--verify", "--chip", self.on.board.chip()], Some(&image))?;
         probe_rs(&["reset", "--chip", self.on.board.chip()], None)
     }

@@ -21,6 +21,7 @@ use upright_tool::monitor::{Action, Line, action, now, request, view};
 use super::designed;
 use crate::failure::Failure;
 use crate::twin;
+use crate::variation::Wanted;
 use crate::variation::positive;
 
 /// Shows a firmware's telemetry, live, and sends commands to it; exit status 1 if the connection is lost or the
@@ -73,7 +74,7 @@ impl Monitor {
         }
         let until = self.duration.map(|duration| Instant::now() + Duration::from_secs_f64(duration));
         if let Some((port, rig)) = self.web.zip(self.rig.as_deref()) {
-            let (rig, table) = designed(rig)?;
+            let (rig, table) = designed(rig, Wanted::SwingUp)?;
             let address = SocketAddr::from((Ipv4Addr::LOCALHOST, port));
             return twin::show(&self.port, &rig, &table, address, &|| goes_on(&stop, until));
         }

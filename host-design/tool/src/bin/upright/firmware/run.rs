@@ -33,6 +33,7 @@ Examples:
   upright firmware run rigs/quadruple-paper.toml --target board
   upright firmware run rigs/single-quanser-ip02.toml --link usart --duration 2
   upright firmware run rigs/single-quanser-ip02.toml --swing-up
+  upright firmware run rigs/double-quanser-dbpen.toml --transitions
   upright firmware run rigs/single-quanser-ip02.toml --serve 127.0.0.1:7777 --duration 600")]
 pub(crate) struct Run {
     #[command(flatten)]

@@ -12,6 +12,7 @@ use super::board::BoardOption;
 use super::build::kind;
 use super::built;
 use crate::failure::Failure;
+use crate::variation::Wanted;
 
 /// Measures the image of a board: flash and RAM by section and by crate, a bound on its stack, and whether it can
 /// panic; exit status 1 if, without its gain table, it takes more than 24 KiB of flash (128 KiB with motions) or 4 KiB
@@ -42,7 +43,7 @@ impl Size {
     pub(crate) fn run(self) -> Result<(), Failure> {
         let path = match self.elf {
             Some(path) => path,
-            None => built(kind(self.on.board, self.identify), self.rig.as_deref())?,
+            None => built(kind(self.on.board, self.identify), self.rig.as_deref(), Wanted::SwingUp)?,
         };
         let image = Image::read(&path)?;
         let (size, stack, forbidden) = (size(&image)?, stack_bound(&image), forbidden_functions(&image));

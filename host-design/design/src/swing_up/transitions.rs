@@ -1,0 +1,158 @@
+//! Motions between any two equilibria: search, check, storage. Runs of the firmware, in which one motion follows on the
+//! other, are in `tour`.
+
+use core::ops::Range;
+use std::collections::BTreeMap;
+use std::path::{Path as FilePath, PathBuf};
+
+use serde::{Deserialize, Serialize};
+
+use super::SwingUpError;
+use super::check::{Peaks, check};
+use super::motion::Motion;
+use super::plan::{Found, Progress, RUNS, best, restored};
+use super::robustness::{Runs, Spread, random_runs};
+use super::search::Request;
+use super::setting::Setting;
+use super::stored::{StoredKnots, request_hash};
+use super::way::Way;
+use crate::parallel;
+use crate::rig::Rig;
+
+/// Share of random runs with the law alone that have to arrive before the firmware tries a motion.
+const WORTH_A_TOUR: f64 = 0.8;
+
+/// A motion from one equilibrium to another.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Transition {
+    /// From where to where.
+    pub way: Way,
+    /// The motion with its gains.
+    pub motion: Motion,
+    /// What the independent check found.
+    pub peaks: Peaks,
+}
+
+/// How the search for a way has ended.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Searched {
+    /// From where to where.
+    pub way: Way,
+    /// Candidates solved.
+    pub solved: usize,
+    /// Random runs of the best of them with the law alone; none if none is solved or the best does not pass the
+    /// independent check.
+    pub runs: Option<Runs>,
+    /// Whether its knots are stored now: most runs arrive.
+    pub is_stored: bool,
+}
+
+/// Knots of motions between any equilibria.
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+pub struct StoredTransitions {
+    /// Name of the rig.
+    rig: String,
+    /// Hash of the rig and its `[swing_up]`.
+    hash: String,
+    /// By the name of the way.
+    #[serde(flatten)]
+    ways: BTreeMap<String, StoredKnots>,
+}
+
+impl StoredTransitions {
+    /// Searches a motion of `rig` for `way` among the candidates with these numbers, and stores it if most random runs
+    /// with the law alone arrive; tours of the firmware then judge it. If not, what is stored for the way stays.
+    ///
+    /// # Errors
+    /// [`SwingUpError`] if the rig cannot be raised at all.
+    pub fn search(
+        &mut self,
+        rig: &Rig,
+        way: Way,
+        numbers: Range<u64>,
+        progress: Progress<'_>,
+    ) -> Result<Searched, SwingUpError> {
+        let setting = Setting::with_ways(rig, &[way])?;
+        let none = Searched { way, solved: 0, runs: None, is_stored: false };
+        let Some(found) = best(&setting, &Request::of(&setting), way, numbers, progress)? else {
+            return Ok(none);
+        };
+        let Found { motion, stored, search, .. } = found;
+        let solved = search.map_or(0, |[_, solved]| solved);
+        if check(&setting, &motion, way).is_err() {
+            return Ok(Searched { solved, ..none });
+        }
+        let runs = random_runs(&setting, &motion, way, &Spread::asked(rig), 1, RUNS)?;
+        let is_stored = runs.stood as f64 >= WORTH_A_TOUR * runs.runs as f64;
+        if is_stored {
+            self.ways.insert(way.name(setting.chain.links.len()), stored);
+        }
+        Ok(Searched { way, solved, runs: Some(runs), is_stored })
+    }
+
+    /// Nothing stored yet.
+    pub fn none(rig: &Rig) -> Self {
+        Self { rig: rig.name.clone(), hash: request_hash(rig), ways: BTreeMap::new() }
+    }
+
+    /// Whether these motions were planned for exactly these values of the rig file.
+    pub fn is_of(&self, rig: &Rig) -> bool {
+        self.hash == request_hash(rig)
+    }
+
+    /// Drops the motion of this way.
+    pub fn drop(&mut self, way: Way, links: usize) {
+        self.ways.remove(&way.name(links));
+    }
+
+    /// The file beside a rig file: `rigs/my-rig.transitions.json` for `rigs/my-rig.toml`.
+    pub fn path_beside(rig_file: &FilePath) -> PathBuf {
+        rig_file.with_extension("transitions.json")
+    }
+
+    /// Reads the file beside a rig file.
+    ///
+    /// # Errors
+    /// [`SwingUpError::NoFile`] if there is none; [`SwingUpError::BadFile`] if it cannot be used.
+    pub fn beside(rig_file: &FilePath) -> Result<Self, SwingUpError> {
+        let file = Self::path_beside(rig_file);
+        let text = std::fs::read_to_string(&file).map_err(|error| match error.kind() {
+            std::io::ErrorKind::NotFound => SwingUpError::NoFile(file.clone()),
+            _ => SwingUpError::BadFile { file: file.clone(), reason: error.to_string() },
+        })?;
+        serde_json::from_str(&text)
+            .map_err(|error| SwingUpError::BadFile { file: file.clone(), reason: error.to_string() })
+    }
+
+    /// The motions, refined for `rig`, with their gains, checked but for the random runs: those that are neither a
+    /// raising nor a lowering.
+    ///
+    /// # Errors
+    /// [`SwingUpError::Outdated`] if the rig file has changed since.
+    pub fn transitions(&self, rig: &Rig) -> Result<Vec<Transition>, SwingUpError> {
+        let links = rig.states() / 2 - 1;
+        if !self.is_of(rig) {
+            return Err(SwingUpError::Outdated);
+        }
+        let named = |name: &String| Way::named(name, links).ok_or(SwingUpError::Outdated);
+        let ways = self.ways.keys().map(named).collect::<Result<Vec<_>, _>>()?;
+        let setting = Setting::with_ways(rig, &ways)?;
+        let all: Vec<_> = ways.into_iter().zip(self.ways.values()).collect();
+        let others: Vec<_> = all.into_iter().filter(|(way, _)| !Way::BOTH.contains(way)).collect();
+        let one = |index: usize| -> Result<Transition, SwingUpError> {
+            let (way, knots) = others[index];
+            let motion = restored(&setting, way, knots)?;
+            let peaks = check(&setting, &motion, way)?;
+            Ok(Transition { way, motion, peaks })
+        };
+        parallel::try_map(0..others.len(), one)
+    }
+
+    /// As JSON, one knot per line.
+    pub fn to_json(&self) -> String {
+        let mut text = format!("{{\n\"rig\": {:?},\n\"hash\": {:?}", self.rig, self.hash);
+        self.ways.iter().for_each(|(name, motion)| motion.write(&mut text, name));
+        text.push_str("\n}\n");
+        text
+    }
+}

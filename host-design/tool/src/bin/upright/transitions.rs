@@ -1,0 +1,161 @@
+//! `upright transitions`
+
+use std::fmt::Write as _;
+use std::io::Write as _;
+use std::path::PathBuf;
+
+use clap::Args;
+use serde_json::json;
+use upright_design::rig::Rig;
+use upright_design::study::Study;
+use upright_design::swing_up::{
+    Leg, Searched, Stored, StoredTransitions, SwingUpError, Tour, Transition, Way, designed_table_with,
+    motions, tours,
+};
+use upright_design::table::write_atomically;
+
+use crate::failure::Failure;
+use crate::progress::{with_search, with_spinner};
+
+/// Plans motions between any two equilibria, at which each link is up or down, and tries them one after the other.
+///
+/// An equilibrium is written with a letter for each link, from the cart outwards: u if it is up, d if it is down. The
+/// motions between hanging and upright are those of `upright swing-up`, and have to be there. What is found is written
+/// beside the rig file, as RIG.transitions.json; a motion that does not arrive in as many tours of the firmware as
+/// success_percent in [swing_up] asks for is dropped.
+#[derive(Args)]
+#[command(before_help = "\
+Examples:
+  upright transitions rigs/double-quanser-dbpen.toml --stored            try the stored motions, print the table
+  upright transitions rigs/double-quanser-dbpen.toml                     search all ways first, which takes minutes
+  upright transitions rigs/double-quanser-dbpen.toml --ways ud-uu --candidates 100..400
+  upright firmware run rigs/double-quanser-dbpen.toml --transitions      all of them in QEMU, bit for bit")]
+pub(crate) struct Transitions {
+    /// Rig file
+    #[arg(value_name = "RIG")]
+    rig: PathBuf,
+    /// Search only these ways; the stored motions of others stay
+    #[arg(long, value_name = "FROM-TO,…", value_delimiter = ',', conflicts_with = "stored")]
+    ways: Vec<String>,
+    /// Numbers of the candidates that are tried for each way
+    #[arg(long, value_name = "FIRST..END", default_value = "0..100", value_parser = numbers, conflicts_with = "stored")]
+    candidates: (u64, u64),
+    /// Do not search, try the stored motions
+    #[arg(long)]
+    stored: bool,
+    /// With --stored: tours of the firmware, each with another machine, with the seeds from 1 on
+    #[arg(long, value_name = "N", default_value_t = 200, requires = "stored", value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
+    runs: u32,
+    /// Write no file beside the rig
+    #[arg(long)]
+    no_write: bool,
+    /// Print the result as one JSON object
+    #[arg(long)]
+    json: bool,
+}
+
+fn numbers(text: &str) -> Result<(u64, u64), String> {
+    let ends = text.split_once("..").and_then(|(first, end)| Some((first.parse().ok()?, end.parse().ok()?)));
+    ends.filter(|(first, end)| first < end).ok_or_else(|| "give two numbers as 0..100".to_owned())
+}
+
+impl Transitions {
+    pub(crate) fn run(self) -> Result<(), Failure> {
+        let rig = Rig::from_path(&self.rig)?;
+        let failed = |source: SwingUpError| Failure::SwingUp { rig: rig.name.clone(), source };
+        let links = rig.states() / 2 - 1;
+        let swing_up = Stored::beside(&self.rig).and_then(|stored| motions(&rig, &stored)).map_err(failed)?;
+        let old = StoredTransitions::beside(&self.rig);
+        let mut stored = match &old {
+            Ok(stored) if stored.is_of(&rig) => stored.clone(),
+            Err(SwingUpError::NoFile(_)) | Ok(_) if !self.stored => StoredTransitions::none(&rig),
+            Ok(_) => return Err(failed(SwingUpError::Outdated)),
+            Err(error) => return Err(failed(error.clone())),
+        };
+        let mut searched = Vec::new();
+        if !self.stored {
+            for way in self.ways(links)? {
+                let (first, end) = self.candidates;
+                let found =
+                    with_search(|progress| stored.search(&rig, way, first..end, progress)).map_err(failed)?;
+                eprintln!("{}", searched_line(&found, end - first, links));
+                searched.push(found);
+            }
+        }
+        let (transitions, legs, faults) = loop {
+            let transitions = stored.transitions(&rig).map_err(failed)?;
+            let table = with_spinner("the table", || designed_table_with(&rig, &swing_up, &transitions))
+                .map_err(failed)?;
+            let tour = Tour::of(&rig, &table).ok_or_else(|| failed(SwingUpError::NoTour))?;
+            let (legs, faults) =
+                with_spinner("tours", || tours(&rig, &table, &tour, 1, self.runs as usize, &Study::whole()))
+                    .map_err(failed)?;
+            let needed = rig.swing_up.clone().unwrap_or_default().success_percent;
+            let fails = |leg: &&Leg| !Way::BOTH.contains(&leg.way) && 100.0 * leg.interval[0] < needed;
+            match legs.iter().find(fails) {
+                Some(leg) if !self.stored => {
+                    eprintln!("{} is dropped: {} of {} arrive", leg.way.name(links), leg.arrived, leg.tried);
+                    stored.drop(leg.way, links);
+                }
+                _ => break (transitions, legs, faults),
+            }
+        };
+        if !self.stored && !self.no_write {
+            write_atomically(&StoredTransitions::path_beside(&self.rig), stored.to_json().as_bytes())?;
+        }
+        let mut out = std::io::stdout().lock();
+        if self.json {
+            let faults: Vec<_> = faults.iter().map(|(way, fault)| json!([way.name(links), fault])).collect();
+            let object = json!({ "rig": rig.name, "searched": searched, "tour": legs, "faults": faults });
+            return Ok(writeln!(out, "{object}")?);
+        }
+        write!(out, "{}", text(&rig, links, &transitions, &legs))?;
+        for (way, fault) in faults {
+            writeln!(out, "a tour ended at {}: {fault}", way.name(links))?;
+        }
+        Ok(())
+    }
+
+    /// The ways to search.
+    fn ways(&self, links: usize) -> Result<Vec<Way>, Failure> {
+        if self.ways.is_empty() {
+            return Ok(Way::all(links).into_iter().filter(|way| !Way::BOTH.contains(way)).collect());
+        }
+        let named = |name: &String| match Way::named(name, links) {
+            Some(way) if !Way::BOTH.contains(&way) => Ok(way),
+            Some(_) => Err(Failure::BadArgument(format!("{name} belongs to `upright swing-up`"))),
+            None => {
+                Err(Failure::BadArgument(format!("{name}: give {links} letters for each end, as in uu-ud")))
+            }
+        };
+        self.ways.iter().map(named).collect()
+    }
+}
+
+fn searched_line(searched: &Searched, tried: u64, links: usize) -> String {
+    let Searched { way, solved, runs, is_stored } = searched;
+    let runs = runs.as_ref().map_or_else(String::new, |runs| {
+        format!(", {} of {} random runs of the law arrive", runs.stood, runs.runs)
+    });
+    let kept = if *is_stored { "" } else { ": not stored" };
+    format!("{}: {solved} of {tried} candidates solved{runs}{kept}", way.name(links))
+}
+
+/// The legs of the tour as a table.
+fn text(rig: &Rig, links: usize, transitions: &[Transition], legs: &[Leg]) -> String {
+    let mut text = format!("{}, one motion after the other\n", rig.name);
+    // Writing into a string cannot fail.
+    let _ = writeln!(text, "motion      duration (s)  force (N)  farthest (m)     arrive  95 % interval (%)");
+    for Leg { way, tried, arrived, interval } in legs {
+        let peaks =
+            transitions.iter().find(|transition| transition.way == *way).map(|transition| &transition.peaks);
+        let peaks = peaks.map_or_else(
+            || format!("{:>12} {:>10} {:>13}", "", "", ""),
+            |peaks| format!("{:>12.2} {:>10.1} {:>13.3}", peaks.duration_s, peaks.force_n, peaks.position_m),
+        );
+        let [low, high] = interval.map(|end| 100.0 * end);
+        let arrive = format!("{arrived} of {tried}");
+        let _ = writeln!(text, "{:<11} {peaks} {arrive:>10}  {low:.1} to {high:.1}", way.name(links));
+    }
+    text
+}
