@@ -41,6 +41,7 @@ impl Rail {
     ///
     /// # Errors
     /// [`WrongTravel`] if both are pressed at once, or the distance is out of tolerance.
+    #[inline(always)]
     pub fn update(
         &mut self,
         cart: i32,

@@ -238,6 +238,8 @@ impl Reader for Names {
 
     fn option(&mut self, _: bool) {}
 
+    fn list(&mut self, _: usize) {}
+
     fn end(&mut self) {}
 }
 
@@ -323,6 +325,46 @@ fn every_flipped_bit_of_a_motion_is_refused() {
     }
     let mut scan = ChecksumScan::default();
     assert_eq!((0..1000).find_map(|_| scan.next(&good)), Some(good.crc));
+}
+
+fn transition(from: u32, to: u32, course: &[i16]) -> Transition<'_> {
+    Transition { from, to, motion: motion(course, &FILTER) }
+}
+
+/// The table with these transitions and its checksum.
+fn with_others<'t>(others: &'t [Transition<'t>]) -> SwingUpTable<'t, 2, 1> {
+    let mut table = SwingUpTable { others, ..swing_up(&COURSE, &FILTER) };
+    table.crc = table.checksum();
+    table
+}
+
+#[test]
+fn every_flipped_bit_of_a_transition_is_refused() {
+    let good = [transition(0, 1, &COURSE), transition(1, 0, &COURSE)];
+    let table = with_others(&good);
+    assert_eq!(table.check(&BUILD, 4), Ok(()));
+    for (word, bit) in (0..COURSE.len()).flat_map(|word| (0..16).map(move |bit| (word, bit))) {
+        let mut course = COURSE;
+        course[word] ^= 1 << bit;
+        let damaged = [good[0], transition(1, 0, &course)];
+        let damaged = SwingUpTable { others: &damaged, ..table.clone() };
+        assert_eq!(damaged.check(&BUILD, 4), Err(TableError::Crc), "word {word}, bit {bit}");
+    }
+    for bit in 0..32 {
+        let damaged = [transition(1 << bit ^ 1, 0, &COURSE), good[1]];
+        let damaged = SwingUpTable { others: &damaged, ..table.clone() };
+        assert_eq!(damaged.check(&BUILD, 4), Err(TableError::Crc), "bit {bit}");
+    }
+    let shorter = SwingUpTable { others: &good[..1], ..table.clone() };
+    assert_eq!(shorter.check(&BUILD, 4), Err(TableError::Crc));
+    // With the right checksum: equilibria that there are not, or twice the same, or too few knots.
+    let dimensions = Err(TableError::Dimensions);
+    assert_eq!(with_others(&[transition(0, 2, &COURSE)]).check(&BUILD, 4), dimensions);
+    assert_eq!(with_others(&[transition(1, 1, &COURSE)]).check(&BUILD, 4), dimensions);
+    let cut = [Transition { motion: motion(&COURSE[9..], &FILTER), ..good[0] }];
+    assert_eq!(with_others(&cut).check(&BUILD, 4), dimensions);
+    let mut scan = ChecksumScan::default();
+    assert_eq!((0..1000).find_map(|_| scan.next(&table)), Some(table.crc));
 }
 
 #[test]

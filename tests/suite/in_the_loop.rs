@@ -105,7 +105,7 @@ fn the_image_in_qemu_raises_and_lowers_the_links_with_the_bits_of_the_host() {
     let rig = Rig::from_path(file).unwrap();
     let table = TableValues::of(&rig, &design(&rig).unwrap(), Gains::Sampled).unwrap();
     let motions = motions(&rig, &Stored::beside(file).unwrap()).unwrap();
-    let table = with_motions(&rig, table, &motions).unwrap();
+    let table = with_motions(&rig, table, &motions, &[]).unwrap();
     let built = if_possible(build_for(Kind::InTheLoop, &rig, &table)).unwrap();
     let Some(image) = in_qemu(built) else { return };
     let scenario = up_and_down(&rig, &table, 0.5).unwrap();

@@ -32,5 +32,6 @@ mod supervisor_rules;
 mod supervisor_session;
 mod swing_up;
 mod swing_up_firmware;
+mod transitions;
 mod verify_linear;
 mod verify_nonlinear;

@@ -3,6 +3,7 @@
 use ratatui::crossterm::event::{KeyCode, KeyEvent, KeyModifiers};
 use upright::protocol::message::Request;
 use upright::table::{Equilibrium, Law};
+use upright_design::swing_up::equilibrium;
 
 /// The action of a key.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -11,6 +12,8 @@ pub enum Action {
     Send(Request),
     /// Move the set-point by this (m).
     Shift(f32),
+    /// Bring the links to the equilibrium at which the link of this number is the other way up; the first one has 0.
+    Turn(usize),
     /// Switch to the other control law.
     OtherLaw,
     /// Start or stop a recording.
@@ -39,6 +42,7 @@ pub fn action(key: &KeyEvent) -> Option<Action> {
         KeyCode::Char('d' | ' ') => Action::Send(Request::Disarm),
         KeyCode::Char('c') => Action::Send(Request::Clear),
         KeyCode::Char('0') => Action::Send(Request::Setpoint(0.0)),
+        KeyCode::Char(link @ '1'..='6') => Action::Turn(usize::from(link as u8 - b'1')),
         KeyCode::Left => Action::Shift(-SHIFT_M),
         KeyCode::Right => Action::Shift(SHIFT_M),
         KeyCode::Char('l') => Action::OtherLaw,
@@ -51,7 +55,7 @@ pub fn action(key: &KeyEvent) -> Option<Action> {
 /// A line that is not a command.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error(
-    "`{0}` is no command; give home, home-rail, check-signs, drive +x|-x, arm, up, down, disarm, clear, set-point METRES, or law lqr|pole-placement"
+    "`{0}` is no command; give home, home-rail, check-signs, drive +x|-x, arm, up, down, goto LINKS (as ud), disarm, clear, set-point METRES, or law lqr|pole-placement"
 )]
 pub struct BadCommand(String);
 
@@ -71,6 +75,7 @@ pub fn request(line: &str) -> Result<Request, BadCommand> {
         ["arm"] => Request::Arm,
         ["up"] => Request::Goto(Equilibrium::UPRIGHT),
         ["down"] => Request::Goto(Equilibrium::HANGING),
+        ["goto", links] => Request::Goto(equilibrium(links, links.len()).ok_or_else(bad)?),
         ["disarm"] => Request::Disarm,
         ["clear"] => Request::Clear,
         ["set-point", metres] => Request::Setpoint(metres.parse().map_err(|_| bad())?),

@@ -10,7 +10,10 @@ use upright::protocol::message::{
 use upright::protocol::serial_link::MAX_MESSAGE;
 use upright::supervision::fault::Cause;
 use upright::supervision::inhibits::Inhibits;
+use upright::supervision::supervisor::State;
 use upright::table::{Equilibrium, Law};
+use upright_design::plant::absolute_angles;
+use upright_design::swing_up::letters;
 
 use super::command::Action;
 use super::outgoing::{Outgoing, Unanswered};
@@ -190,18 +193,18 @@ impl Monitor {
             Answer::Statistics(statistics) => self.statistics = Some(statistics),
             Answer::Done => match request {
                 Request::Beat | Request::Drive { .. } | Request::Telemetry(_) => (),
-                _ => self.note(format!("{}: done", name(request))),
+                _ => self.note(format!("{}: done", name(request, self.links()))),
             },
             // The reasons stood in the first answer to the key.
             Answer::NotNow(reasons)
                 if matches!(request, Request::Drive { .. }) && reasons.contains(Inhibits::HELD) => {}
             Answer::NotNow(reasons) => {
-                self.note(format!("{}: refused", name(request)));
+                self.note(format!("{}: refused", name(request, self.links())));
                 reasons.texts().for_each(|text| self.note(format!("  because {text}")));
                 self.forget(request);
             }
             Answer::Rejected(rejected) => {
-                self.note(format!("{}: {rejected}", name(request)));
+                self.note(format!("{}: {rejected}", name(request, self.links())));
                 self.forget(request);
             }
         }
@@ -225,6 +228,10 @@ impl Monitor {
                 let governed = self.telemetry.as_ref().map_or(0.0, |telemetry| telemetry.setpoint_m);
                 Request::Setpoint(self.wanted.unwrap_or(governed) + by)
             }
+            Action::Turn(link) => match self.equilibrium() {
+                Some(at) => Request::Goto(Equilibrium::of_bits(at.bits() ^ 1 << link)),
+                None => return self.note("the links are at no equilibrium".to_owned()),
+            },
             Action::OtherLaw => {
                 Request::Select(match self.telemetry.as_ref().map(|telemetry| telemetry.law) {
                     None | Some(Law::Lqr) => Law::PolePlacement,
@@ -240,6 +247,25 @@ impl Monitor {
             (self.wanted, self.beating) = (Some(wanted), true);
         }
         self.send(request, now);
+    }
+
+    /// The equilibrium at which the links are balanced, or hang; none while they move or their positions are not known.
+    pub fn equilibrium(&self) -> Option<Equilibrium> {
+        let telemetry = self.telemetry.as_ref()?;
+        match telemetry.state {
+            State::Balancing => Some(Equilibrium::UPRIGHT),
+            State::Calibrated => Some(Equilibrium::hanging(self.links())),
+            State::Holding => {
+                let state: Vec<f64> = telemetry.estimate.iter().map(|&value| f64::from(value)).collect();
+                let downward = absolute_angles(&state).enumerate().filter(|(_, angle)| angle.cos() < 0.0);
+                Some(Equilibrium::of_bits(downward.map(|(link, _)| 1 << link).sum()))
+            }
+            _ => None,
+        }
+    }
+
+    fn links(&self) -> usize {
+        self.info.as_ref().map_or(0, |info| usize::from(info.sensors).saturating_sub(1))
     }
 
     /// Sends what is due: the request for the identity, the keep-alive of the dead-man timer, the request for the
@@ -295,7 +321,7 @@ impl Monitor {
 
     fn tell(&mut self, Unanswered { request, is_given_up }: Unanswered) {
         let then = if is_given_up { "given up; it may have been carried out" } else { "it is repeated" };
-        self.note(format!("{}: not answered, {then}", name(request)));
+        self.note(format!("{}: not answered, {then}", name(request, self.links())));
         if is_given_up {
             self.forget(request);
         }
@@ -303,7 +329,7 @@ impl Monitor {
 }
 
 /// A request, for the log.
-fn name(request: Request) -> String {
+fn name(request: Request, links: usize) -> String {
     match request {
         Request::Home => "home".to_owned(),
         Request::HomeRail => "home on the rail's switches".to_owned(),
@@ -313,6 +339,7 @@ fn name(request: Request) -> String {
         Request::Arm => "arm".to_owned(),
         Request::Goto(Equilibrium::UPRIGHT) => "up".to_owned(),
         Request::Goto(Equilibrium::HANGING) => "down".to_owned(),
+        Request::Goto(to) => format!("go to {}", letters(to, links)),
         Request::Disarm => "disarm".to_owned(),
         Request::Clear => "clear".to_owned(),
         Request::Setpoint(metres) => format!("set-point {metres:.3} m"),

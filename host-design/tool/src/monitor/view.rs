@@ -12,7 +12,7 @@ use upright::supervision::supervisor::State;
 use super::model::{Monitor, TelemetryOfAny};
 use super::words;
 
-const KEYS: &str = "h/H home (rail)  g check signs  m/M drive (held)  a arm  u up  n down  d/space disarm  c clear  ←→ 1 cm  0 zero  l law  r record  q quit";
+const KEYS: &str = "h/H home (rail)  g check signs  m/M drive (held)  a arm  u up  n down  1…6 turn a link over  d/space disarm  c clear  ←→ 1 cm  0 zero  l law  r record  q quit";
 const COLOURS: [Color; 6] =
     [Color::Cyan, Color::Yellow, Color::Magenta, Color::Green, Color::Blue, Color::Red];
 

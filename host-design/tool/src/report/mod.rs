@@ -45,6 +45,8 @@ pub struct Source<'a> {
     pub seed: u64,
     /// A run of the swing-up, if the rig has stored motions.
     pub swing_up: Option<&'a Demonstration>,
+    /// A run from equilibrium to equilibrium, if it is wanted.
+    pub tour: Option<&'a Demonstration>,
     /// How far its links may be pushed on the way; empty: the page has no such part.
     pub margins: &'a [(Way, Vec<Margin>)],
     /// The command that made the report, to make it again.
@@ -94,6 +96,7 @@ pub fn report(source: &Source<'_>, stage: &dyn Fn(&str)) -> Result<Report, Repor
     stage("runs");
     let mut scenes = runs::scenes(rig, certified, table, trust, source.seed)?;
     scenes.extend(source.swing_up.map(|run| runs::swing_up(rig, run, source.seed)));
+    scenes.extend(source.tour.map(|run| runs::tour(rig, run, source.seed)));
     let laws = runs::laws(table);
     let mut pictures = Vec::new();
     let mut page = Page::new(source, &scenes)?;

@@ -67,20 +67,29 @@ pub(super) fn scenes(
 
 /// The swing-up and all that follows it.
 pub(super) fn swing_up(rig: &Rig, run: &Demonstration, seed: u64) -> Scene {
-    let parts: Vec<String> =
-        run.parts.iter().map(|(at_s, name)| format!("{name} from {} s", number(rounded(*at_s, 3)))).collect();
+    let does = "The rig raises itself from hanging, and lowers itself again";
+    demonstrated(rig, run, ["swing-up", "Swing-up", does], seed)
+}
+
+/// The run from equilibrium to equilibrium.
+pub(super) fn tour(rig: &Rig, run: &Demonstration, seed: u64) -> Scene {
+    let does = "The rig goes from equilibrium to equilibrium, each link up (u) or down (d), by all of its stored motions. \
+                Where all links hang, the motor is off, and a hand puts the rig back into the middle";
+    demonstrated(rig, run, ["tour", "From equilibrium to equilibrium", does], seed)
+}
+
+/// A run of the whole firmware as a scene with this id and name that does this.
+fn demonstrated(rig: &Rig, run: &Demonstration, [id, name, does]: [&'static str; 3], seed: u64) -> Scene {
+    let part = |(at_s, part): &(f64, String)| format!("{part} from {} s", number(rounded(*at_s, 3)));
+    let parts: Vec<String> = run.parts.iter().map(part).collect();
     let text = format!(
-        "The rig raises itself from hanging, and lowers itself again: {}. The controller measures encoder counts only; start          off by up to 1° and 1 mm, encoders off by up to 0.1°, the rig's noise (seed {seed}).",
+        "{does}: {}. The controller measures encoder counts only; start off by up to 1° and 1 mm, encoders off by up to \
+         0.1°, the rig's noise (seed {seed}).",
         parts.join(", ")
     );
     let scenario = Scenario::at_rest(rig, Law::Lqr);
     let summary = Summary::of(rig, &scenario, &run.trace, None);
-    Scene {
-        id: "swing-up",
-        name: "Swing-up",
-        text,
-        runs: vec![LawRun { law: Law::Lqr, trace: run.trace.clone(), summary }],
-    }
+    Scene { id, name, text, runs: vec![LawRun { law: Law::Lqr, trace: run.trace.clone(), summary }] }
 }
 
 /// A scene before it has run.

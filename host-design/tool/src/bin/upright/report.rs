@@ -10,13 +10,14 @@ use upright_design::study::Study;
 use upright_design::swing_up::{Demonstration, Script, Stored, motions, with_motions};
 use upright_design::table::{TableValues, write_atomically};
 use upright_design::verify::{Effort, trust};
+use upright_tool::in_the_loop::RunError;
 use upright_tool::report::{Report as Page, Source, report};
 
 use super::swing_up::with_margins;
 use super::verify::search;
 use crate::failure::Failure;
-use crate::progress::with_random_plants;
-use crate::variation::Variation;
+use crate::progress::{with_random_plants, with_spinner};
+use crate::variation::{Variation, Wanted, with_stored_motions as with_stored};
 
 /// Writes one HTML page about a rig and its loop: animated runs, model, gains, margins, trust report.
 ///
@@ -29,6 +30,7 @@ Examples:
   upright report rigs/single-quanser-ip02.toml --runs 1000 --png figures
   upright report rigs/single-quanser-ip02.toml --imperfections  with what topples it
   upright report rigs/single-quanser-ip02.toml --margins        with how far it may be pushed while it is raised
+  upright report rigs/double-quanser-dbpen.toml --transitions   with a run from equilibrium to equilibrium
   upright report rigs/quadruple-paper.toml --gains continuous --tick 0.005     effect of a wrong tick")]
 pub(crate) struct Report {
     #[command(flatten)]
@@ -57,6 +59,9 @@ pub(crate) struct Report {
     /// With how far each link may be pushed while the stored motions raise and lower the rig; slower
     #[arg(long)]
     margins: bool,
+    /// With a run through all stored motions between equilibria
+    #[arg(long)]
+    transitions: bool,
     /// Print the names of the files and the trust report as one JSON object
     #[arg(long)]
     json: bool,
@@ -78,6 +83,8 @@ impl Report {
             }
             _ => Vec::new(),
         };
+        let tour =
+            if self.transitions { Some(tour(&self.variation.rig, &rig, &table, self.seed)?) } else { None };
         let study = Study::whole();
         let effort = Effort { runs: self.runs as usize, seed: self.seed, late: 0.0, study: &study };
         let (trust, files) =
@@ -92,6 +99,7 @@ impl Report {
                     imperfections: &imperfections,
                     seed: self.seed,
                     swing_up: run.as_ref(),
+                    tour: tour.as_ref(),
                     margins: &pushes,
                     command: &self.as_typed(),
                 };
@@ -173,6 +181,9 @@ impl Report {
         if self.margins {
             typed.push_str(" --margins");
         }
+        if self.transitions {
+            typed.push_str(" --transitions");
+        }
         typed
     }
 }
@@ -186,6 +197,14 @@ fn with_stored_motions(file: &Path, rig: &Rig, table: &TableValues) -> Option<Ta
 /// A run of the motions of `table`.
 fn demonstration(rig: &Rig, table: &TableValues, seed: u64) -> Option<Demonstration> {
     Script::of(rig, table, seed, false).ok()?.run(table).ok()
+}
+
+/// A run through all motions that are stored beside the rig file.
+fn tour(file: &Path, rig: &Rig, table: &TableValues, seed: u64) -> Result<Demonstration, Failure> {
+    let table = with_stored(file, rig, table.clone(), Wanted::Transitions)?;
+    let failed = |source| Failure::SwingUp { rig: rig.name.clone(), source };
+    let script = Script::tour(rig, &table, seed).map_err(failed)?;
+    Ok(with_spinner("the tour", || script.run(&table)).map_err(RunError::from)?)
 }
 
 fn write_into(folder: &Path, name: &str, contents: &[u8]) -> Result<PathBuf, Failure> {

@@ -1,0 +1,237 @@
+//! The whole firmware brings the double from equilibrium to equilibrium; and what it must not do.
+
+use std::path::{Path, PathBuf};
+
+use crate::published::table;
+use upright::board::Output;
+use upright::control::actuator::Drive;
+use upright::protocol::message::{Answer, Request};
+use upright::supervision::fault::Fault;
+use upright::supervision::inhibits::Inhibits;
+use upright::supervision::supervisor::State;
+use upright::table::Equilibrium;
+use upright_design::harness::{Harness, Pins, with_firmware};
+use upright_design::rig::Rig;
+use upright_design::simulate::Scenario;
+use upright_design::study::Study;
+use upright_design::swing_up::{Script, Stored, StoredTransitions, Tour, Way, motions, tours, with_motions};
+use upright_design::table::TableValues;
+
+fn file() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("../../rigs/double-quanser-dbpen.toml")
+}
+
+/// The double and its table with all stored motions.
+fn double() -> (Rig, TableValues) {
+    let rig = Rig::from_path(&file()).unwrap();
+    let others = StoredTransitions::beside(&file()).unwrap().transitions(&rig).unwrap();
+    let up_and_down = motions(&rig, &Stored::beside(&file()).unwrap()).unwrap();
+    let table = with_motions(&rig, table(&rig), &up_and_down, &others).unwrap();
+    (rig, table)
+}
+
+fn way(name: &str) -> Way {
+    Way::named(name, 2).unwrap()
+}
+
+/// The same table with these of its other motions only.
+fn with_ways(table: &TableValues, ways: &[&str]) -> TableValues {
+    let mut table = table.clone();
+    let wanted: Vec<Way> = ways.iter().map(|name| way(name)).collect();
+    table.swing_up.as_mut().unwrap().others.retain(|(way, _)| wanted.contains(way));
+    table
+}
+
+#[test]
+fn the_double_goes_every_way_between_its_equilibria_one_after_the_other() {
+    let (rig, table) = double();
+    let tour = Tour::of(&rig, &table).unwrap();
+    let missing: Vec<Way> = Way::all(2).into_iter().filter(|way| !tour.ways.contains(way)).collect();
+    assert_eq!(missing, []);
+    let script = Script::tour(&rig, &table, 3).unwrap();
+    let demonstration = script.run(&table).unwrap();
+    assert!(demonstration.arrived, "{:?}", demonstration.fault);
+}
+
+#[test]
+fn machines_with_wrong_masses_make_the_tour_and_with_reversed_gains_none_does() {
+    let (rig, table) = double();
+    let mut table = with_ways(&table, &["uu-ud", "ud-du", "du-uu"]);
+    let tour = Tour::of(&rig, &table).unwrap();
+    let arrived = |table: &TableValues| {
+        let (legs, _) = tours(&rig, table, &tour, 1, 4, &Study::whole()).unwrap();
+        legs.iter().map(|leg| leg.arrived).collect::<Vec<_>>()
+    };
+    assert_eq!(tour.ways, ["dd-uu", "uu-ud", "ud-du", "du-uu", "uu-dd"].map(way));
+    assert_eq!(arrived(&table), [4; 5]);
+    let motion =
+        &mut table.swing_up.as_mut().unwrap().others.iter_mut().find(|(w, _)| *w == way("ud-du")).unwrap().1;
+    let knots = motion.course.len() / motion.course_units.len();
+    motion.course[5 * knots..].iter_mut().for_each(|gain| *gain = -*gain);
+    assert_eq!(arrived(&table), [4, 4, 0, 0, 0]);
+}
+
+/// Raises the double, brings it to where its second link hangs, and holds it there until `then` ends the run, which is
+/// called after each tick with their number since then. `read` may change what the board reads, `then` what the motor
+/// is driven with.
+fn hold(
+    table: &TableValues,
+    rig: &Rig,
+    mut read: impl FnMut(usize, &mut Pins),
+    mut then: impl FnMut(usize, &mut Harness<'_>, &mut Output) -> bool,
+) {
+    let scenario =
+        Scenario { force_noise_n: 0.0, torque_noise_n_m: 0.0, ..Scenario::swing_up(rig, 0.0, None) };
+    let goals = [(5400, way("uu-ud").to(2))];
+    with_firmware(table, |target| {
+        let mut harness = Harness::new(rig, table, &scenario, target).unwrap();
+        let mut output = harness.raise(None).unwrap();
+        let mut held = 0;
+        for tick in 0..20_000 {
+            harness.ask_for(tick, &goals);
+            if held > 0 && then(held, &mut harness, &mut output) {
+                return;
+            }
+            harness.bench.tick(output.drive);
+            let mut inputs = harness.inputs();
+            read(held, &mut inputs);
+            output = harness.session.tick(&inputs).unwrap();
+            held += usize::from(held > 0 || harness.session.status().state == State::Holding);
+        }
+        panic!("it does not end: {:?}, {:?}", harness.session.status().state, harness.session.fault());
+    })
+    .unwrap();
+}
+
+/// Ticks of holding after which a defect begins, and for which somebody taps the cart then.
+const ONSET: usize = 500;
+const TAP: usize = 50;
+
+/// The table with few motions, to which the second link hangs and from there.
+fn table_to_hold(table: &TableValues) -> TableValues {
+    with_ways(table, &["uu-ud", "ud-uu", "ud-dd"])
+}
+
+/// The fault with which a defect ends the run, and ticks from the defect on; none if it does not within 3 s.
+fn ended(
+    rig: &Rig,
+    table: &TableValues,
+    read: impl FnMut(usize, &mut Pins),
+    drive: impl Fn(&mut Drive),
+) -> Option<(Fault, usize)> {
+    let mut ended = None;
+    hold(table, rig, read, |held, harness, output| {
+        ended = harness.session.fault().map(|fault| (fault, held.saturating_sub(ONSET)));
+        assert!(ended.is_none() || !output.enable, "a fault turns the motor off");
+        if (ONSET..ONSET + TAP).contains(&held) {
+            harness.bench.pull(2.0, &[0.0; 2]);
+        }
+        if held >= ONSET {
+            drive(&mut output.drive);
+        }
+        ended.is_some() || held == ONSET + 3000
+    });
+    ended
+}
+
+#[test]
+fn where_a_link_hangs_the_cart_follows_its_setpoint() {
+    let (rig, table) = double();
+    hold(
+        &table_to_hold(&table),
+        &rig,
+        |_, _| (),
+        |held, harness, _| {
+            assert_eq!(harness.session.fault(), None);
+            match held {
+                500 => _ = harness.session.send(Request::Setpoint(0.05)),
+                501.. if held % 25 == 0 => _ = harness.session.send(Request::Beat),
+                _ => {}
+            }
+            if held == 8000 {
+                let x = harness.bench.state()[0];
+                assert!((x - 0.05).abs() < 0.01, "{x}");
+                assert_eq!(harness.session.status().state, State::Holding);
+            }
+            held == 8000
+        },
+    );
+}
+
+#[test]
+fn where_a_link_hangs_a_defect_turns_the_motor_off() {
+    let (rig, table) = double();
+    let table = table_to_hold(&table);
+    let as_asked = |_: &mut Drive| ();
+    assert_eq!(ended(&rig, &table, |_, _| (), as_asked), None, "the negative control");
+    // The link that hangs hardly moves, so that its encoder may freeze unnoticed; but it may not jump.
+    for (sensor, most) in [(0, 3000), (1, 1000)] {
+        let mut seen = 0;
+        let frozen = |held: usize, pins: &mut Pins| {
+            if held <= ONSET {
+                seen = pins.raw_counts[sensor];
+            }
+            pins.raw_counts[sensor] = seen;
+        };
+        let (fault, ticks) = ended(&rig, &table, frozen, as_asked).expect("a frozen encoder");
+        assert!(
+            matches!(fault, Fault::Encoder | Fault::Frozen) && ticks <= most,
+            "{sensor}: {fault} {ticks}"
+        );
+    }
+    for sensor in 0..3 {
+        let jumps = |held: usize, pins: &mut Pins| {
+            let counter = &mut pins.raw_counts[sensor];
+            *counter = counter.wrapping_add(if held >= ONSET { 2000 } else { 0 });
+        };
+        let (fault, ticks) = ended(&rig, &table, jumps, as_asked).expect("an encoder that jumps");
+        assert!(fault == Fault::Encoder && ticks <= 100, "{sensor}: {fault} {ticks}");
+    }
+    let stop = |held: usize, pins: &mut Pins| pins.contacts.emergency_stop = held >= ONSET;
+    let (fault, ticks) = ended(&rig, &table, stop, as_asked).expect("the emergency stop");
+    assert!(fault == Fault::EmergencyStop && ticks <= 2, "{fault} {ticks}");
+    for factor in [0.0, -1.0] {
+        let broken = |drive: &mut Drive| match drive {
+            Drive::Duty(value) | Drive::Force(value) => *value *= factor,
+        };
+        let (fault, ticks) =
+            ended(&rig, &table, |_, _| (), broken).expect("a motor that is dead or reversed");
+        assert!(fault == Fault::Motor && ticks <= 100, "{factor}: {fault} {ticks}");
+    }
+}
+
+#[test]
+fn a_goal_is_refused_with_its_reasons() {
+    let (rig, table) = double();
+    let table = with_ways(&table, &["uu-ud", "ud-dd"]);
+    let mut answers = Vec::new();
+    hold(
+        &table,
+        &rig,
+        |_, _| (),
+        |held, harness, _| {
+            let mut ask = |to: &str| {
+                let to = Equilibrium::of_bits(
+                    way(&format!("{to}-{}", if to == "uu" { "dd" } else { "uu" })).from(2).bits(),
+                );
+                let id = harness.session.send(Request::Goto(to));
+                for _ in 0..5 {
+                    let inputs = harness.inputs();
+                    harness.session.tick(&inputs).unwrap();
+                    while let Some((answered, answer)) = harness.session.next_reply() {
+                        if answered == id {
+                            return answer;
+                        }
+                    }
+                }
+                panic!("no answer");
+            };
+            if held == ONSET {
+                answers = ["ud", "du", "uu", "dd"].map(&mut ask).to_vec();
+            }
+            held == ONSET
+        },
+    );
+    let no_way = Answer::NotNow(Inhibits::NO_WAY);
+    assert_eq!(answers, [Answer::NotNow(Inhibits::RUNNING), no_way, no_way, Answer::Done]);
+}
