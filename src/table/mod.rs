@@ -34,7 +34,7 @@ pub use swing_up::{MotionLimits, MotionTable, Motions, NoSwingUp, SwingUp, Swing
 pub use thresholds::{MotorTest, Thresholds};
 
 /// Version of the layout of [`GainTable`]; a table with another version is refused.
-pub const TABLE_FORMAT: u32 = 7;
+pub const TABLE_FORMAT: u32 = 8;
 
 part! {
     /// The constants of a controller with `NX` states and `NY` sensors. `upright design` writes them to

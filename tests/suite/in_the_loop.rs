@@ -16,7 +16,7 @@ use upright_design::design::design;
 use upright_design::harness::{Pins, Recording, Session, Target};
 use upright_design::rig::Rig;
 use upright_design::simulate::{Scenario, simulate};
-use upright_design::swing_up::{Stored, hangs, motions, up_and_down, with_motions};
+use upright_design::swing_up::{Stored, StoredTransitions, Tour, hangs, motions, up_and_down, with_motions};
 use upright_design::table::{Gains, TableValues};
 use upright_tool::image::{Kind, build_for, build_if_possible, if_possible};
 use upright_tool::in_the_loop::{Link, Place, RunError, run};
@@ -116,6 +116,34 @@ fn the_image_in_qemu_raises_and_lowers_the_links_with_the_bits_of_the_host() {
     // Negative control: the comparison sees another seed.
     let other = Scenario { seed: 8, ..scenario };
     assert!(run(&rig, &table, &other, Place::Host).unwrap().ticks != qemu.ticks);
+}
+
+#[test]
+fn the_image_in_qemu_goes_from_equilibrium_to_equilibrium_with_the_bits_of_the_host() {
+    let file = Path::new("rigs/double-quanser-dbpen.toml");
+    let rig = Rig::from_path(file).unwrap();
+    let table = TableValues::of(&rig, &design(&rig).unwrap(), Gains::Sampled).unwrap();
+    let up_and_down = motions(&rig, &Stored::beside(file).unwrap()).unwrap();
+    let mut others = StoredTransitions::beside(file).unwrap().transitions(&rig).unwrap();
+    others.retain(|other| ["uu-ud", "ud-dd"].contains(&other.way.name(2).as_str()));
+    let table = with_motions(&rig, table, &up_and_down, &others).unwrap();
+    let built = if_possible(build_for(Kind::InTheLoop, &rig, &table)).unwrap();
+    let Some(image) = in_qemu(built) else { return };
+    // Up, over the equilibrium at which the second link hangs, and down.
+    let tour = Tour::of(&rig, &table).unwrap();
+    let mut scenario = tour.scenario(&rig, 7);
+    scenario.goals.truncate(2);
+    scenario.duration_s = tour.begin_s[3] - 7.0;
+    let qemu = run(&rig, &table, &scenario, Place::Qemu { image: &image, link: Link::Files }).unwrap();
+    let mut states: Vec<State> = qemu.ticks.iter().map(|tick| tick.state).collect();
+    states.dedup();
+    let [raising, balancing, holding] = [State::Raising, State::Balancing, State::Holding];
+    let wanted = [raising, balancing, raising, holding, State::Lowering, State::Calibrated];
+    assert_eq!(states, wanted, "{:?}", qemu.fault);
+    assert!(qemu.ticks == run(&rig, &table, &scenario, Place::Host).unwrap().ticks);
+    // Negative control: the comparison sees another seed.
+    scenario.seed = 8;
+    assert!(run(&rig, &table, &scenario, Place::Host).unwrap().ticks != qemu.ticks);
 }
 
 /// Counts of the joints and state in all telemetry of a rig whose links swing out, about so many counts off, while

@@ -7,6 +7,7 @@ use upright::table::Equilibrium;
 
 use super::SwingUpError;
 use super::robustness::{Spread, drawn};
+use super::transitions::Transition;
 use super::way::{Way, rest};
 use crate::harness::{Harness, HarnessError, Target, goals, with_firmware};
 use crate::plant::{absolute_angles, without_turns};
@@ -103,6 +104,14 @@ fn walk(ways: Vec<Way>, links: usize) -> Option<Vec<Way>> {
     Some(walk)
 }
 
+/// Whether this motion can be reached from hanging, and hanging from where it ends, with these motions.
+pub fn is_on_tour(transition: &Transition, transitions: &[Transition], links: usize) -> bool {
+    let ways: Vec<Way> = Way::BOTH.into_iter().chain(transitions.iter().map(|other| other.way)).collect();
+    let hanging = Equilibrium::hanging(links);
+    let leads = |from, goal| from == goal || shortest(&ways, from, &|at| at == goal, links).is_some();
+    leads(hanging, transition.way.from(links)) && leads(transition.way.to(links), hanging)
+}
+
 /// The fewest ways that lead from `here` to a goal.
 fn shortest(
     ways: &[Way],
@@ -146,6 +155,15 @@ pub struct Leg {
     pub interval: [f64; 2],
 }
 
+/// What came of a set of tours.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Tours {
+    /// The motions in the order of the tour.
+    pub legs: Vec<Leg>,
+    /// Of each tour that did not come to its end: the motion that did not arrive, and the fault.
+    pub faults: Vec<(Way, String)>,
+}
+
 /// One tour: motions that have arrived, and the fault that ended it.
 #[derive(Debug, Default, Serialize, Deserialize)]
 struct Gone {
@@ -155,7 +173,7 @@ struct Gone {
 
 /// `runs` tours with the firmware of `table`, each with another machine: masses, friction, start and encoders' zeros
 /// wrong by the spreads of `[swing_up]`, drawn with the seeds from `base_seed` on. A tour ends with the first motion
-/// that does not arrive. Also gives the faults that ended them.
+/// that does not arrive.
 ///
 /// # Errors
 /// [`SwingUpError`] if the firmware does not run.
@@ -166,7 +184,7 @@ pub fn tours(
     base_seed: u64,
     runs: usize,
     study: &Study,
-) -> Result<(Vec<Leg>, Vec<(Way, String)>), SwingUpError> {
+) -> Result<Tours, SwingUpError> {
     let scenario = Scenario { substeps: 2, ..tour.scenario(rig, base_seed) };
     let spread = Spread::asked(rig);
     let one = |number: u64| {
@@ -187,7 +205,10 @@ pub fn tours(
         let way = *tour.ways.get(gone.arrived)?;
         Some((way, gone.fault.clone().unwrap_or_else(|| "no fault".to_owned())))
     };
-    Ok(((0..tour.ways.len()).map(leg).collect(), all.iter().filter_map(fault).collect()))
+    Ok(Tours {
+        legs: (0..tour.ways.len()).map(leg).collect(),
+        faults: all.iter().filter_map(fault).collect(),
+    })
 }
 
 fn gone(

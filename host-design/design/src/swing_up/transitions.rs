@@ -1,6 +1,7 @@
 //! Motions between any two equilibria: search, check, storage. Runs of the firmware, in which one motion follows on the
 //! other, are in `tour`.
 
+use core::fmt::Write as _;
 use core::ops::Range;
 use std::collections::BTreeMap;
 use std::path::{Path as FilePath, PathBuf};
@@ -54,6 +55,8 @@ pub struct StoredTransitions {
     rig: String,
     /// Hash of the rig and its `[swing_up]`.
     hash: String,
+    /// By the name of the way: tours in which it arrived, and in which it was tried. One that is not here is not judged.
+    tours: BTreeMap<String, [usize; 2]>,
     /// By the name of the way.
     #[serde(flatten)]
     ways: BTreeMap<String, StoredKnots>,
@@ -85,14 +88,16 @@ impl StoredTransitions {
         let runs = random_runs(&setting, &motion, way, &Spread::asked(rig), 1, RUNS)?;
         let is_stored = runs.stood as f64 >= WORTH_A_TOUR * runs.runs as f64;
         if is_stored {
-            self.ways.insert(way.name(setting.chain.links.len()), stored);
+            let name = way.name(setting.chain.links.len());
+            self.tours.remove(&name);
+            self.ways.insert(name, stored);
         }
         Ok(Searched { way, solved, runs: Some(runs), is_stored })
     }
 
     /// Nothing stored yet.
     pub fn none(rig: &Rig) -> Self {
-        Self { rig: rig.name.clone(), hash: request_hash(rig), ways: BTreeMap::new() }
+        Self { rig: rig.name.clone(), hash: request_hash(rig), tours: BTreeMap::new(), ways: BTreeMap::new() }
     }
 
     /// Whether these motions were planned for exactly these values of the rig file.
@@ -102,7 +107,14 @@ impl StoredTransitions {
 
     /// Drops the motion of this way.
     pub fn drop(&mut self, way: Way, links: usize) {
+        self.tours.remove(&way.name(links));
         self.ways.remove(&way.name(links));
+    }
+
+    /// Notes in how many tours this motion arrived, and was tried: from now on it is one of
+    /// [`transitions`](Self::transitions).
+    pub fn judge(&mut self, way: Way, links: usize, [arrived, tried]: [usize; 2]) {
+        self.tours.insert(way.name(links), [arrived, tried]);
     }
 
     /// The file beside a rig file: `rigs/my-rig.transitions.json` for `rigs/my-rig.toml`.
@@ -124,33 +136,53 @@ impl StoredTransitions {
             .map_err(|error| SwingUpError::BadFile { file: file.clone(), reason: error.to_string() })
     }
 
-    /// The motions, refined for `rig`, with their gains, checked but for the random runs: those that are neither a
-    /// raising nor a lowering.
+    /// The motions that tours have judged, refined for `rig`, with their gains.
     ///
     /// # Errors
     /// [`SwingUpError::Outdated`] if the rig file has changed since.
     pub fn transitions(&self, rig: &Rig) -> Result<Vec<Transition>, SwingUpError> {
+        self.restored(rig, |name| self.tours.contains_key(name))
+    }
+
+    /// As [`transitions`](Self::transitions), also those that are not judged yet.
+    ///
+    /// # Errors
+    /// As there.
+    pub fn all(&self, rig: &Rig) -> Result<Vec<Transition>, SwingUpError> {
+        self.restored(rig, |_| true)
+    }
+
+    fn restored(
+        &self,
+        rig: &Rig,
+        is_wanted: impl Fn(&String) -> bool,
+    ) -> Result<Vec<Transition>, SwingUpError> {
         let links = rig.states() / 2 - 1;
         if !self.is_of(rig) {
             return Err(SwingUpError::Outdated);
         }
-        let named = |name: &String| Way::named(name, links).ok_or(SwingUpError::Outdated);
-        let ways = self.ways.keys().map(named).collect::<Result<Vec<_>, _>>()?;
-        let setting = Setting::with_ways(rig, &ways)?;
-        let all: Vec<_> = ways.into_iter().zip(self.ways.values()).collect();
-        let others: Vec<_> = all.into_iter().filter(|(way, _)| !Way::BOTH.contains(way)).collect();
+        let named = |name| Way::named(name, links).filter(|way| !Way::BOTH.contains(way));
+        let wanted = self.ways.iter().filter(|(name, _)| is_wanted(name));
+        let ways: Option<Vec<_>> = wanted.map(|(name, knots)| Some((named(name)?, knots))).collect();
+        let ways = ways.ok_or(SwingUpError::Outdated)?;
+        let setting = Setting::with_ways(rig, &ways.iter().map(|(way, _)| *way).collect::<Vec<_>>())?;
         let one = |index: usize| -> Result<Transition, SwingUpError> {
-            let (way, knots) = others[index];
+            let (way, knots) = ways[index];
             let motion = restored(&setting, way, knots)?;
             let peaks = check(&setting, &motion, way)?;
             Ok(Transition { way, motion, peaks })
         };
-        parallel::try_map(0..others.len(), one)
+        parallel::try_map(0..ways.len(), one)
     }
 
     /// As JSON, one knot per line.
     pub fn to_json(&self) -> String {
         let mut text = format!("{{\n\"rig\": {:?},\n\"hash\": {:?}", self.rig, self.hash);
+        let tours =
+            |(name, [arrived, tried]): (&String, &[usize; 2])| format!("\n\"{name}\": [{arrived}, {tried}]");
+        let tours: Vec<String> = self.tours.iter().map(tours).collect();
+        // Writing into a string cannot fail.
+        let _ = write!(text, ",\n\"tours\": {{{}\n}}", tours.join(","));
         self.ways.iter().for_each(|(name, motion)| motion.write(&mut text, name));
         text.push_str("\n}\n");
         text

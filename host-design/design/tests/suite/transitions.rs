@@ -1,6 +1,7 @@
 //! The whole firmware brings the double from equilibrium to equilibrium; and what it must not do.
 
 use std::path::{Path, PathBuf};
+use std::sync::OnceLock;
 
 use crate::published::table;
 use upright::board::Output;
@@ -23,11 +24,15 @@ fn file() -> PathBuf {
 
 /// The double and its table with all stored motions.
 fn double() -> (Rig, TableValues) {
-    let rig = Rig::from_path(&file()).unwrap();
-    let others = StoredTransitions::beside(&file()).unwrap().transitions(&rig).unwrap();
-    let up_and_down = motions(&rig, &Stored::beside(&file()).unwrap()).unwrap();
-    let table = with_motions(&rig, table(&rig), &up_and_down, &others).unwrap();
-    (rig, table)
+    static DOUBLE: OnceLock<(Rig, TableValues)> = OnceLock::new();
+    let made = || {
+        let rig = Rig::from_path(&file()).unwrap();
+        let others = StoredTransitions::beside(&file()).unwrap().transitions(&rig).unwrap();
+        let up_and_down = motions(&rig, &Stored::beside(&file()).unwrap()).unwrap();
+        let table = with_motions(&rig, table(&rig), &up_and_down, &others).unwrap();
+        (rig, table)
+    };
+    DOUBLE.get_or_init(made).clone()
 }
 
 fn way(name: &str) -> Way {
@@ -59,7 +64,7 @@ fn machines_with_wrong_masses_make_the_tour_and_with_reversed_gains_none_does() 
     let mut table = with_ways(&table, &["uu-ud", "ud-du", "du-uu"]);
     let tour = Tour::of(&rig, &table).unwrap();
     let arrived = |table: &TableValues| {
-        let (legs, _) = tours(&rig, table, &tour, 1, 4, &Study::whole()).unwrap();
+        let legs = tours(&rig, table, &tour, 1, 4, &Study::whole()).unwrap().legs;
         legs.iter().map(|leg| leg.arrived).collect::<Vec<_>>()
     };
     assert_eq!(tour.ways, ["dd-uu", "uu-ud", "ud-du", "du-uu", "uu-dd"].map(way));

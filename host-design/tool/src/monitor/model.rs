@@ -228,6 +228,9 @@ impl Monitor {
                 let governed = self.telemetry.as_ref().map_or(0.0, |telemetry| telemetry.setpoint_m);
                 Request::Setpoint(self.wanted.unwrap_or(governed) + by)
             }
+            Action::Turn(link) if link >= self.links() => {
+                return self.note(format!("there is no link {}", link + 1));
+            }
             Action::Turn(link) => match self.equilibrium() {
                 Some(at) => Request::Goto(Equilibrium::of_bits(at.bits() ^ 1 << link)),
                 None => return self.note("the links are at no equilibrium".to_owned()),

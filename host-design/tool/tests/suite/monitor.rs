@@ -24,7 +24,7 @@ use upright::supervision::homing::Homing;
 use upright::supervision::inhibits::Inhibits;
 use upright::supervision::sign_check::Signs;
 use upright::supervision::supervisor::State;
-use upright::table::Law;
+use upright::table::{Equilibrium, Law};
 use upright_design::design::design;
 use upright_design::rig::Rig;
 use upright_design::simulate::Scenario;
@@ -241,6 +241,9 @@ fn every_key_gives_its_command() {
     ] {
         assert_eq!(press(&mut monitor, key), [request], "{key:?}");
     }
+    // The links hang: the second one shall stand, and the others hang on.
+    assert_eq!(press(&mut monitor, KeyCode::Char('2')), [Request::Goto(Equilibrium::of_bits(0b1101))]);
+    assert!(press(&mut monitor, KeyCode::Char('6')).is_empty(), "there is no sixth link");
     assert!(press(&mut monitor, KeyCode::Char('q')).is_empty());
     assert_eq!(action(&KeyEvent::new(KeyCode::Char('x'), KeyModifiers::NONE)), None);
 }

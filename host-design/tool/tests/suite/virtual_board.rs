@@ -56,7 +56,7 @@ fn the_flashed_image_raises_and_lowers_the_links_with_the_bits_of_the_host() {
     let rig = Rig::from_path(file).unwrap();
     let table = TableValues::of(&rig, &design(&rig).unwrap(), Gains::Sampled).unwrap();
     let motions = motions(&rig, &Stored::beside(file).unwrap()).unwrap();
-    let table = with_motions(&rig, table, &motions).unwrap();
+    let table = with_motions(&rig, table, &motions, &[]).unwrap();
     let built = build_for(Kind::Board(Board::WeactF405), &rig, &table);
     let Some(elf) = if_possible(built).unwrap() else { return };
     let image = Image::from_elf(&std::fs::read(elf).unwrap()).unwrap();
@@ -118,7 +118,7 @@ fn feather() -> Option<(Rig, TableValues, Image)> {
     let rig = Rig::from_path(file).unwrap();
     let table = TableValues::of(&rig, &design(&rig).unwrap(), Gains::Sampled).unwrap();
     let motions = motions(&rig, &Stored::beside(file).unwrap()).unwrap();
-    let table = with_motions(&rig, table, &motions).unwrap();
+    let table = with_motions(&rig, table, &motions, &[]).unwrap();
     let elf = if_possible(build_for(Kind::Board(Board::FeatherF405), &rig, &table)).unwrap()?;
     Some((rig, table, Image::from_elf(&std::fs::read(elf).unwrap()).unwrap()))
 }

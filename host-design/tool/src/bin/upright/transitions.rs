@@ -9,8 +9,8 @@ use serde_json::json;
 use upright_design::rig::Rig;
 use upright_design::study::Study;
 use upright_design::swing_up::{
-    Leg, Searched, Stored, StoredTransitions, SwingUpError, Tour, Transition, Way, designed_table_with,
-    motions, tours,
+    Leg, Searched, Stored, StoredTransitions, SwingUpError, Tour, Tours, Transition, Way,
+    designed_table_with, is_on_tour, motions, tours,
 };
 use upright_design::table::write_atomically;
 
@@ -72,6 +72,12 @@ impl Transitions {
             Ok(_) => return Err(failed(SwingUpError::Outdated)),
             Err(error) => return Err(failed(error.clone())),
         };
+        let write = |stored: &StoredTransitions| -> Result<(), Failure> {
+            if !self.stored && !self.no_write {
+                write_atomically(&StoredTransitions::path_beside(&self.rig), stored.to_json().as_bytes())?;
+            }
+            Ok(())
+        };
         let mut searched = Vec::new();
         if !self.stored {
             for way in self.ways(links)? {
@@ -79,30 +85,41 @@ impl Transitions {
                 let found =
                     with_search(|progress| stored.search(&rig, way, first..end, progress)).map_err(failed)?;
                 eprintln!("{}", searched_line(&found, end - first, links));
+                // Whoever stops the search keeps what is found.
+                write(&stored)?;
                 searched.push(found);
             }
         }
         let (transitions, legs, faults) = loop {
-            let transitions = stored.transitions(&rig).map_err(failed)?;
+            let transitions = if self.stored { stored.transitions(&rig) } else { stored.all(&rig) };
+            let (transitions, lost): (Vec<_>, Vec<_>) = {
+                let all = transitions.map_err(failed)?;
+                all.iter().cloned().partition(|transition| is_on_tour(transition, &all, links))
+            };
             let table = with_spinner("the table", || designed_table_with(&rig, &swing_up, &transitions))
                 .map_err(failed)?;
             let tour = Tour::of(&rig, &table).ok_or_else(|| failed(SwingUpError::NoTour))?;
-            let (legs, faults) =
+            let Tours { legs, faults } =
                 with_spinner("tours", || tours(&rig, &table, &tour, 1, self.runs as usize, &Study::whole()))
                     .map_err(failed)?;
-            let needed = rig.swing_up.clone().unwrap_or_default().success_percent;
-            let fails = |leg: &&Leg| !Way::BOTH.contains(&leg.way) && 100.0 * leg.interval[0] < needed;
-            match legs.iter().find(fails) {
-                Some(leg) if !self.stored => {
-                    eprintln!("{} is dropped: {} of {} arrive", leg.way.name(links), leg.arrived, leg.tried);
-                    stored.drop(leg.way, links);
-                }
-                _ => break (transitions, legs, faults),
+            if self.stored {
+                break (transitions, legs, faults);
             }
+            let needed = rig.swing_up.clone().unwrap_or_default().success_percent;
+            let others = || legs.iter().filter(|leg| !Way::BOTH.contains(&leg.way));
+            if let Some(leg) = others().find(|leg| 100.0 * leg.interval[0] < needed) {
+                eprintln!("{} is dropped: {} of {} arrive", leg.way.name(links), leg.arrived, leg.tried);
+                stored.drop(leg.way, links);
+                continue;
+            }
+            others().for_each(|leg| stored.judge(leg.way, links, [leg.arrived, leg.tried]));
+            for Transition { way, .. } in lost {
+                let name = way.name(links);
+                eprintln!("{name} is not judged: the other motions do not lead there from hanging, and back");
+            }
+            write(&stored)?;
+            break (transitions, legs, faults);
         };
-        if !self.stored && !self.no_write {
-            write_atomically(&StoredTransitions::path_beside(&self.rig), stored.to_json().as_bytes())?;
-        }
         let mut out = std::io::stdout().lock();
         if self.json {
             let faults: Vec<_> = faults.iter().map(|(way, fault)| json!([way.name(links), fault])).collect();

@@ -63,6 +63,7 @@ fn made(rig: &Rig, settings: Option<ImperfectionSettings>, margins: &[(Way, Vec<
         imperfections: found.as_slice(),
         seed: 1,
         swing_up: None,
+        tour: None,
         margins,
         command: "upright report test",
     };
