@@ -104,6 +104,16 @@ impl Motion {
     pub fn duration_s(&self) -> f64 {
         self.steps() as f64 * self.tick_s
     }
+
+    /// Largest force (N).
+    pub fn force_n(&self) -> f64 {
+        self.u.iter().fold(0.0, |most, u| most.max(u.abs()))
+    }
+
+    /// Largest distance of the cart from the middle (m).
+    pub fn position_m(&self) -> f64 {
+        self.x.iter().fold(0.0, |most, x| most.max(x[0].abs()))
+    }
 }
 
 #[cfg(test)]

@@ -9,7 +9,7 @@ use std::path::{Path as FilePath, PathBuf};
 use serde::{Deserialize, Serialize};
 
 use super::SwingUpError;
-use super::check::{Peaks, check};
+use super::check::check;
 use super::motion::Motion;
 use super::plan::{Found, Progress, RUNS, best, restored};
 use super::robustness::{Runs, Spread, random_runs};
@@ -30,8 +30,6 @@ pub struct Transition {
     pub way: Way,
     /// The motion with its gains.
     pub motion: Motion,
-    /// What the independent check found.
-    pub peaks: Peaks,
 }
 
 /// How the search for a way has ended.
@@ -169,8 +167,8 @@ impl StoredTransitions {
         let one = |index: usize| -> Result<Transition, SwingUpError> {
             let (way, knots) = ways[index];
             let motion = restored(&setting, way, knots)?;
-            let peaks = check(&setting, &motion, way)?;
-            Ok(Transition { way, motion, peaks })
+            check(&setting, &motion, way)?;
+            Ok(Transition { way, motion })
         };
         parallel::try_map(0..ways.len(), one)
     }

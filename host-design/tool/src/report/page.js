@@ -42,6 +42,11 @@
   const place = (element, x1, y1, x2, y2) => {
     for (const [key, value] of Object.entries({ x1, y1: -y1, x2, y2: -y2 })) element.setAttribute(key, value);
   };
+  // How far the lowest joint or end of a link is below the rail.
+  const hangsBelow = (angles) => {
+    let y = cart.height + 0.03 * total;
+    return -Math.min(...data.lengths.map((length, link) => (y += length * Math.cos(angles[link]))));
+  };
   let drawn = [];
   const setStage = () => {
     if (!stages) return;
@@ -55,8 +60,10 @@
     // Labels stay legible on a telephone.
     const room = (stages.clientWidth - 20 * (runs.length - 1)) / runs.length;
     const letter = Math.max(0.09 * total, 10 * Math.max(width / room, 1.6 * total / (0.24 * window.innerHeight)));
-    // As high as the links get, with the labels below.
-    const view = { width, height: 1.4 * total + 1.3 * letter, top: 1.3 * total };
+    // As high as the links get, with the labels below, and with the links where they hang.
+    const depth = Math.max(...runs.flatMap((run) => run.angles.map(hangsBelow)));
+    const below = Math.max(0.1 * total + 1.3 * letter, depth + 0.05 * total);
+    const view = { width, height: 1.3 * total + below, top: 1.3 * total };
     const steps = [1, 2, 5, 10, 20, 50].map((s) => s * 10 ** (Math.floor(Math.log10(total)) - 1));
     const step = steps.find((s) => s > 4.2 * letter) ?? steps.at(-1);
     drawn = runs.map((run) => {

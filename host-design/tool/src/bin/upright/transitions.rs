@@ -9,7 +9,7 @@ use serde_json::json;
 use upright_design::rig::Rig;
 use upright_design::study::Study;
 use upright_design::swing_up::{
-    Leg, Searched, Stored, StoredTransitions, SwingUpError, Tour, Tours, Transition, Way,
+    Leg, Searched, Stored, StoredTransitions, SwingUp, SwingUpError, Tour, Tours, Transition, Way,
     designed_table_with, is_on_tour, motions, tours,
 };
 use upright_design::table::write_atomically;
@@ -126,7 +126,7 @@ impl Transitions {
             let object = json!({ "rig": rig.name, "searched": searched, "tour": legs, "faults": faults });
             return Ok(writeln!(out, "{object}")?);
         }
-        write!(out, "{}", text(&rig, links, &transitions, &legs))?;
+        write!(out, "{}", text(&rig, &swing_up, &transitions, &legs))?;
         for (way, fault) in faults {
             writeln!(out, "a tour ended at {}: {fault}", way.name(links))?;
         }
@@ -159,20 +159,26 @@ fn searched_line(searched: &Searched, tried: u64, links: usize) -> String {
 }
 
 /// The legs of the tour as a table.
-fn text(rig: &Rig, links: usize, transitions: &[Transition], legs: &[Leg]) -> String {
+fn text(rig: &Rig, swing_up: &SwingUp, transitions: &[Transition], legs: &[Leg]) -> String {
+    let links = rig.states() / 2 - 1;
     let mut text = format!("{}, one motion after the other\n", rig.name);
     // Writing into a string cannot fail.
     let _ = writeln!(text, "motion      duration (s)  force (N)  farthest (m)     arrive  95 % interval (%)");
     for Leg { way, tried, arrived, interval } in legs {
-        let peaks =
-            transitions.iter().find(|transition| transition.way == *way).map(|transition| &transition.peaks);
-        let peaks = peaks.map_or_else(
-            || format!("{:>12} {:>10} {:>13}", "", "", ""),
-            |peaks| format!("{:>12.2} {:>10.1} {:>13.3}", peaks.duration_s, peaks.force_n, peaks.position_m),
-        );
+        let motion = match way {
+            Way::Up => Some(&swing_up.raise),
+            Way::Down => Some(&swing_up.lower),
+            way => transitions.iter().find(|transition| transition.way == *way).map(|found| &found.motion),
+        };
+        let [duration_s, force_n, position_m] =
+            motion.map_or([0.0; 3], |motion| [motion.duration_s(), motion.force_n(), motion.position_m()]);
         let [low, high] = interval.map(|end| 100.0 * end);
         let arrive = format!("{arrived} of {tried}");
-        let _ = writeln!(text, "{:<11} {peaks} {arrive:>10}  {low:.1} to {high:.1}", way.name(links));
+        let _ = writeln!(
+            text,
+            "{:<11} {duration_s:>12.2} {force_n:>10.1} {position_m:>13.3} {arrive:>10}  {low:.1} to {high:.1}",
+            way.name(links)
+        );
     }
     text
 }
