@@ -90,9 +90,10 @@ impl<'t, const NX: usize, const NY: usize, S: SwingUp<NX, NY>> Firmware<'t, NX, 
         let inhibits = self.motion_inhibits(&motion);
         let counts = self.table.limits.unwound(self.controller.encoders().counts(), from);
         if let State::Balancing | State::Holding = self.supervisor.state() {
-            match to == Equilibrium::hanging(NY - 1) {
-                true => self.supervisor.lower(inhibits)?,
-                false => self.supervisor.move_on(inhibits)?,
+            if to == Equilibrium::hanging(NY - 1) {
+                self.supervisor.lower(inhibits)?;
+            } else {
+                self.supervisor.move_on(inhibits)?;
             }
             self.controller.unwind(&self.raw_counts, &counts);
             self.restart_supervision();

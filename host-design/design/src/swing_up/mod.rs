@@ -66,7 +66,7 @@ pub use motion::{Motion, Shape, SwingUp};
 pub use plan::{Judgement, Plan, Progress, Trying, judge, motions, refined, search};
 pub use robustness::{Runs, Spread};
 pub use stored::Stored;
-pub use tour::{Leg, Tour, Tours, is_on_tour, tours};
+pub use tour::{Leg, Tour, Tours, on_tour, tours};
 pub use trade::{Solved, solved};
 pub use transitions::{Searched, StoredTransitions, Transition};
 pub use way::{Way, equilibrium, letters};

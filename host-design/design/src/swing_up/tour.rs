@@ -7,7 +7,6 @@ use upright::table::Equilibrium;
 
 use super::SwingUpError;
 use super::robustness::{Spread, drawn};
-use super::transitions::Transition;
 use super::way::{Way, rest};
 use crate::harness::{Harness, HarnessError, Target, goals, with_firmware};
 use crate::plant::{absolute_angles, without_turns};
@@ -104,12 +103,13 @@ fn walk(ways: Vec<Way>, links: usize) -> Option<Vec<Way>> {
     Some(walk)
 }
 
-/// Whether this motion can be reached from hanging, and hanging from where it ends, with these motions.
-pub fn is_on_tour(transition: &Transition, transitions: &[Transition], links: usize) -> bool {
-    let ways: Vec<Way> = Way::BOTH.into_iter().chain(transitions.iter().map(|other| other.way)).collect();
+/// Those of `ways` that a tour can hold: they can be reached from hanging, and hanging from where they end.
+pub fn on_tour(ways: &[Way], links: usize) -> Vec<Way> {
+    let all: Vec<Way> = Way::BOTH.into_iter().chain(ways.iter().copied()).collect();
     let hanging = Equilibrium::hanging(links);
-    let leads = |from, goal| from == goal || shortest(&ways, from, &|at| at == goal, links).is_some();
-    leads(hanging, transition.way.from(links)) && leads(transition.way.to(links), hanging)
+    let leads = |from, goal| from == goal || shortest(&all, from, &|at| at == goal, links).is_some();
+    let is_held = |way: &&Way| leads(hanging, way.from(links)) && leads(way.to(links), hanging);
+    ways.iter().filter(is_held).copied().collect()
 }
 
 /// The fewest ways that lead from `here` to a goal.
@@ -290,6 +290,8 @@ mod tests {
         let named = |name| Way::named(name, 2).unwrap();
         assert_eq!(walk(vec![Way::Up, Way::Down, named("uu-ud")], 2), None);
         let detour = walk(vec![Way::Up, Way::Down, named("uu-ud"), named("ud-uu")], 2).unwrap();
+        let ways = ["uu-ud", "du-uu", "uu-du"].map(named);
+        assert_eq!(on_tour(&ways, 2), ways[1..]);
         assert_eq!(detour, [Way::Up, named("uu-ud"), named("ud-uu"), Way::Down]);
     }
 }

@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
 
 use crate::published::table;
+use serde_json::Value;
 use upright::board::Output;
 use upright::control::actuator::Drive;
 use upright::protocol::message::{Answer, Request};
@@ -15,7 +16,9 @@ use upright_design::harness::{Harness, Pins, with_firmware};
 use upright_design::rig::Rig;
 use upright_design::simulate::Scenario;
 use upright_design::study::Study;
-use upright_design::swing_up::{Script, Stored, StoredTransitions, Tour, Way, motions, tours, with_motions};
+use upright_design::swing_up::{
+    Script, Stored, StoredTransitions, Tour, Transition, Way, motions, tours, with_motions,
+};
 use upright_design::table::TableValues;
 
 fn file() -> PathBuf {
@@ -56,6 +59,22 @@ fn the_double_goes_every_way_between_its_equilibria_one_after_the_other() {
     let script = Script::tour(&rig, &table, 3).unwrap();
     let demonstration = script.run(&table).unwrap();
     assert!(demonstration.arrived, "{:?}", demonstration.fault);
+}
+
+#[test]
+fn a_motion_that_no_tour_has_judged_does_not_get_into_a_table() {
+    let mut object: Value =
+        serde_json::from_str(&std::fs::read_to_string(StoredTransitions::path_beside(&file())).unwrap())
+            .unwrap();
+    object["tours"].as_object_mut().unwrap().remove("uu-ud").unwrap();
+    let stored: StoredTransitions = serde_json::from_value(object).unwrap();
+    let rig = Rig::from_path(&file()).unwrap();
+    let ways = |transitions: Vec<Transition>| -> Vec<Way> {
+        transitions.iter().map(|transition| transition.way).collect()
+    };
+    let (judged, all) = (ways(stored.transitions(&rig).unwrap()), ways(stored.all(&rig).unwrap()));
+    let missing: Vec<Way> = all.into_iter().filter(|way| !judged.contains(way)).collect();
+    assert_eq!(missing, [way("uu-ud")]);
 }
 
 #[test]

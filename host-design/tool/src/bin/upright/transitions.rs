@@ -10,7 +10,7 @@ use upright_design::rig::Rig;
 use upright_design::study::Study;
 use upright_design::swing_up::{
     Leg, Searched, Stored, StoredTransitions, SwingUp, SwingUpError, Tour, Tours, Transition, Way,
-    designed_table_with, is_on_tour, motions, tours,
+    designed_table_with, motions, on_tour, tours,
 };
 use upright_design::table::write_atomically;
 
@@ -91,11 +91,11 @@ impl Transitions {
             }
         }
         let (transitions, legs, faults) = loop {
-            let transitions = if self.stored { stored.transitions(&rig) } else { stored.all(&rig) };
-            let (transitions, lost): (Vec<_>, Vec<_>) = {
-                let all = transitions.map_err(failed)?;
-                all.iter().cloned().partition(|transition| is_on_tour(transition, &all, links))
-            };
+            let all = if self.stored { stored.transitions(&rig) } else { stored.all(&rig) };
+            let all = all.map_err(failed)?;
+            let held = on_tour(&all.iter().map(|transition| transition.way).collect::<Vec<_>>(), links);
+            let (transitions, lost): (Vec<_>, Vec<_>) =
+                all.into_iter().partition(|transition| held.contains(&transition.way));
             let table = with_spinner("the table", || designed_table_with(&rig, &swing_up, &transitions))
                 .map_err(failed)?;
             let tour = Tour::of(&rig, &table).ok_or_else(|| failed(SwingUpError::NoTour))?;
