@@ -1,4 +1,4 @@
-//! The whole firmware brings the double from equilibrium to equilibrium; and what it must not do.
+//! The whole firmware brings double and triple from equilibrium to equilibrium; and what it must not do.
 
 use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
@@ -21,21 +21,26 @@ use upright_design::swing_up::{
 };
 use upright_design::table::TableValues;
 
-fn file() -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("../../rigs/double-quanser-dbpen.toml")
+fn file(name: &str) -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("../../rigs").join(name).with_extension("toml")
+}
+
+const DOUBLE: &str = "double-quanser-dbpen";
+
+/// A rig and its table with all stored motions.
+fn with_all_motions(name: &str) -> (Rig, TableValues) {
+    let file = file(name);
+    let rig = Rig::from_path(&file).unwrap();
+    let others = StoredTransitions::beside(&file).unwrap().transitions(&rig).unwrap();
+    let up_and_down = motions(&rig, &Stored::beside(&file).unwrap()).unwrap();
+    let table = with_motions(&rig, table(&rig), &up_and_down, &others).unwrap();
+    (rig, table)
 }
 
 /// The double and its table with all stored motions.
 fn double() -> (Rig, TableValues) {
-    static DOUBLE: OnceLock<(Rig, TableValues)> = OnceLock::new();
-    let made = || {
-        let rig = Rig::from_path(&file()).unwrap();
-        let others = StoredTransitions::beside(&file()).unwrap().transitions(&rig).unwrap();
-        let up_and_down = motions(&rig, &Stored::beside(&file()).unwrap()).unwrap();
-        let table = with_motions(&rig, table(&rig), &up_and_down, &others).unwrap();
-        (rig, table)
-    };
-    DOUBLE.get_or_init(made).clone()
+    static MADE: OnceLock<(Rig, TableValues)> = OnceLock::new();
+    MADE.get_or_init(|| with_all_motions(DOUBLE)).clone()
 }
 
 fn way(name: &str) -> Way {
@@ -62,13 +67,21 @@ fn the_double_goes_every_way_between_its_equilibria_one_after_the_other() {
 }
 
 #[test]
+fn the_triple_goes_every_stored_way_one_after_the_other() {
+    let (rig, table) = with_all_motions("triple-glueck-eder-kugi");
+    let demonstration = Script::tour(&rig, &table, 3).unwrap().run(&table).unwrap();
+    assert!(demonstration.arrived, "{:?}", demonstration.fault);
+}
+
+#[test]
 fn a_motion_that_no_tour_has_judged_does_not_get_into_a_table() {
-    let mut object: Value =
-        serde_json::from_str(&std::fs::read_to_string(StoredTransitions::path_beside(&file())).unwrap())
-            .unwrap();
+    let mut object: Value = serde_json::from_str(
+        &std::fs::read_to_string(StoredTransitions::path_beside(&file(DOUBLE))).unwrap(),
+    )
+    .unwrap();
     object["tours"].as_object_mut().unwrap().remove("uu-ud").unwrap();
     let stored: StoredTransitions = serde_json::from_value(object).unwrap();
-    let rig = Rig::from_path(&file()).unwrap();
+    let rig = Rig::from_path(&file(DOUBLE)).unwrap();
     let ways = |transitions: Vec<Transition>| -> Vec<Way> {
         transitions.iter().map(|transition| transition.way).collect()
     };

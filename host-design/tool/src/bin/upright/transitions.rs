@@ -112,7 +112,8 @@ impl Transitions {
                 stored.drop(leg.way, links);
                 continue;
             }
-            others().for_each(|leg| stored.judge(leg.way, links, [leg.arrived, leg.tried]));
+            // A motion that comes more than once counts as it came first.
+            others().rev().for_each(|leg| stored.judge(leg.way, links, [leg.arrived, leg.tried]));
             for Transition { way, .. } in lost {
                 let name = way.name(links);
                 eprintln!("{name} is not judged: the other motions do not lead there from hanging, and back");
