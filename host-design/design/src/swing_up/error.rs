@@ -62,18 +62,28 @@ pub enum SwingUpError {
         what: String,
     },
     /// There is no stored motion.
-    #[error("{}: no such file; make it with `upright swing-up`", .0.display())]
-    NoFile(PathBuf),
+    #[error("{}: no such file; make it with `upright {command}`", file.display())]
+    NoFile {
+        /// The file.
+        file: PathBuf,
+        /// The command that writes it.
+        command: &'static str,
+    },
     /// The file of the stored motions cannot be used.
-    #[error("{}: {reason}; make it again with `upright swing-up`", file.display())]
+    #[error("{}: {reason}; make it again with `upright {command}`", file.display())]
     BadFile {
         /// The file.
         file: PathBuf,
         /// Why.
         reason: String,
+        /// The command that writes it.
+        command: &'static str,
     },
     /// The stored motions belong to other values of the rig file.
-    #[error("the stored motions do not belong to this rig file: run `upright swing-up` again")]
+    #[error(
+        "the stored motions do not belong to this rig file: run `upright swing-up` again, and `upright transitions` \
+         for those between other equilibria"
+    )]
     Outdated,
     /// The firmware cannot be run with the motions.
     #[error("the firmware does not run: {0}")]

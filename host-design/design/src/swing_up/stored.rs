@@ -1,9 +1,11 @@
 //! The stored motions of a rig: knots from which the motions are computed again, to the last bit.
 
 use std::fmt::Write as _;
+use std::io::ErrorKind;
 use std::path::{Path as FilePath, PathBuf};
 
 use serde::Deserialize;
+use serde::de::DeserializeOwned;
 use sha2::{Digest, Sha256};
 
 use super::SwingUpError;
@@ -70,6 +72,16 @@ pub(super) fn request_hash(rig: &Rig) -> String {
     Sha256::digest(values).iter().take(8).map(|byte| format!("{byte:02x}")).collect()
 }
 
+/// Reads a file of stored motions, which this command writes.
+pub(super) fn read<T: DeserializeOwned>(file: PathBuf, command: &'static str) -> Result<T, SwingUpError> {
+    let bad = |file, reason| SwingUpError::BadFile { file, reason, command };
+    match std::fs::read_to_string(&file) {
+        Ok(text) => serde_json::from_str(&text).map_err(|error| bad(file, error.to_string())),
+        Err(error) if error.kind() == ErrorKind::NotFound => Err(SwingUpError::NoFile { file, command }),
+        Err(error) => Err(bad(file, error.to_string())),
+    }
+}
+
 impl Stored {
     pub(super) fn new(rig: &Rig, raise: StoredKnots, lower: StoredKnots) -> Self {
         Self { rig: rig.name.clone(), hash: request_hash(rig), raise, lower }
@@ -85,13 +97,7 @@ impl Stored {
     /// # Errors
     /// [`SwingUpError::NoFile`] if there is none; [`SwingUpError::BadFile`] if it cannot be used.
     pub fn beside(rig_file: &FilePath) -> Result<Self, SwingUpError> {
-        let file = Self::path_beside(rig_file);
-        let text = std::fs::read_to_string(&file).map_err(|error| match error.kind() {
-            std::io::ErrorKind::NotFound => SwingUpError::NoFile(file.clone()),
-            _ => SwingUpError::BadFile { file: file.clone(), reason: error.to_string() },
-        })?;
-        serde_json::from_str(&text)
-            .map_err(|error| SwingUpError::BadFile { file: file.clone(), reason: error.to_string() })
+        read(Self::path_beside(rig_file), "swing-up")
     }
 
     /// Whether these motions were planned for exactly these values of the rig file.

@@ -15,7 +15,7 @@ use super::plan::{Found, Progress, RUNS, best, restored};
 use super::robustness::{Runs, Spread, random_runs};
 use super::search::Request;
 use super::setting::Setting;
-use super::stored::{StoredKnots, request_hash};
+use super::stored::{StoredKnots, read, request_hash};
 use super::way::Way;
 use crate::parallel;
 use crate::rig::Rig;
@@ -125,13 +125,7 @@ impl StoredTransitions {
     /// # Errors
     /// [`SwingUpError::NoFile`] if there is none; [`SwingUpError::BadFile`] if it cannot be used.
     pub fn beside(rig_file: &FilePath) -> Result<Self, SwingUpError> {
-        let file = Self::path_beside(rig_file);
-        let text = std::fs::read_to_string(&file).map_err(|error| match error.kind() {
-            std::io::ErrorKind::NotFound => SwingUpError::NoFile(file.clone()),
-            _ => SwingUpError::BadFile { file: file.clone(), reason: error.to_string() },
-        })?;
-        serde_json::from_str(&text)
-            .map_err(|error| SwingUpError::BadFile { file: file.clone(), reason: error.to_string() })
+        read(Self::path_beside(rig_file), "transitions")
     }
 
     /// The motions that tours have judged, refined for `rig`, with their gains.

@@ -68,7 +68,7 @@ impl Transitions {
         let old = StoredTransitions::beside(&self.rig);
         let mut stored = match &old {
             Ok(stored) if stored.is_of(&rig) => stored.clone(),
-            Err(SwingUpError::NoFile(_)) | Ok(_) if !self.stored => StoredTransitions::none(&rig),
+            Err(SwingUpError::NoFile { .. }) | Ok(_) if !self.stored => StoredTransitions::none(&rig),
             Ok(_) => return Err(failed(SwingUpError::Outdated)),
             Err(error) => return Err(failed(error.clone())),
         };

@@ -118,7 +118,7 @@ pub(crate) fn with_stored_motions(
     let failed = |source| Failure::SwingUp { rig: rig.name.clone(), source };
     let stored = match Stored::beside(rig_file) {
         Ok(stored) => stored,
-        Err(SwingUpError::NoFile(_)) if wanted == Wanted::SwingUp => return Ok(table),
+        Err(SwingUpError::NoFile { .. }) if wanted == Wanted::SwingUp => return Ok(table),
         Err(error) => return Err(failed(error)),
     };
     let others = match wanted {
