@@ -32,6 +32,7 @@ mod reproduce_numbers;
 mod robust_command;
 mod shaken;
 mod split_command;
+mod transitions_command;
 mod twin_door;
 mod twin_page;
 mod verify_command;

@@ -143,7 +143,8 @@ impl Transitions {
             Some(way) if !Way::BOTH.contains(&way) => Ok(way),
             Some(_) => Err(Failure::BadArgument(format!("{name} belongs to `upright swing-up`"))),
             None => {
-                Err(Failure::BadArgument(format!("{name}: give {links} letters for each end, as in uu-ud")))
+                let example = format!("{}-{}", "u".repeat(links), "d".repeat(links));
+                Err(Failure::BadArgument(format!("{name}: give a letter for each link, as in {example}")))
             }
         };
         self.ways.iter().map(named).collect()
