@@ -50,8 +50,8 @@ pub struct MotorDesign {
 ///   standard deviation is `√(S_00 / Σ p²)`; there is no verdict until that is at most 1/g of the share that may be
 ///   missing.
 ///
-/// With `[robust]`, each is wider by the largest error `B` that the stated friction and wrong zeros can cause (see the
-/// source of `tolerated`). In the motor's test, `Σ e p <= B √(M Σ p²)`.
+/// With `[robust]`, each is wider by the largest error `B` that the stated friction and wrong zeros can cause, the first
+/// also by a factor for wrong masses (see the source of `tolerated`). In the motor's test, `Σ e p <= B √(M Σ p²)`.
 pub fn detection_thresholds(rig: &Rig, design: &Design<f64>) -> Option<DetectionDesign> {
     let kalman = design.kalman.as_ref()?;
     let variances = kalman.innovation_variances.entries();
@@ -63,7 +63,7 @@ pub fn detection_thresholds(rig: &Rig, design: &Design<f64>) -> Option<Detection
     let tolerated = Tolerated::of(rig, design, kalman, keep)?;
     let wider = tolerated.lighter;
     let innovation = (variances.iter().zip(steps).zip(&tolerated.innovation))
-        .map(|((s, step), bound)| wider * (g * s.sqrt() + bound) + 0.5 * step)
+        .map(|((s, step), bound)| tolerated.mismatch * wider * (g * s.sqrt() + bound) + 0.5 * step)
         .collect();
     let rounding = rounding_variances(rig, steps);
     let frozen = (variances.iter().zip(steps).zip(rounding).zip(&tolerated.corrected)).map(

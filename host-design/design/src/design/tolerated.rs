@@ -5,6 +5,9 @@ use super::{Design, Kalman, continuous_plant};
 use crate::numerics::Matrix;
 use crate::rig::{PlantDescription, Rig};
 
+/// Growth of the innovation with the share by which masses are wrong. Measured, not derived: on the robust quadruple with
+/// all masses 5 % off and all friction, it reaches 1.11 of the bounds of friction and wrong zeros in 5 h of each law.
+const MISMATCH: f64 = 6.0;
 /// A response is followed until it has decayed to this share of its start.
 const DECAYED: f64 = 1e-6;
 /// The longest response that is followed (ticks).
@@ -24,6 +27,8 @@ pub(super) struct Tolerated {
     pub(super) corrected: Vec<f64>,
     /// The same forces move a machine with lighter parts more, by up to this factor.
     pub(super) lighter: f64,
+    /// Factor for what the model gets wrong besides: how force and gravity move a machine with other masses.
+    pub(super) mismatch: f64,
 }
 
 impl Tolerated {
@@ -31,12 +36,18 @@ impl Tolerated {
     /// None if the model has no plant.
     pub(super) fn of(rig: &Rig, design: &Design<f64>, kalman: &Kalman<f64>, keep: f64) -> Option<Self> {
         let sensors = kalman.steps.entries().len();
-        let mut bounds = Self { innovation: vec![0.0; sensors], corrected: vec![0.0; sensors], lighter: 1.0 };
+        let mut bounds = Self {
+            innovation: vec![0.0; sensors],
+            corrected: vec![0.0; sensors],
+            lighter: 1.0,
+            mismatch: 1.0,
+        };
         let tolerances = match (&rig.robust, &rig.plant) {
             (Some(tolerances), PlantDescription::Chain(_)) => tolerances,
             _ => return Some(bounds),
         };
-        bounds.lighter = 1.0 / (1.0 - 0.01 * tolerances.mass_percent);
+        let wrong = 0.01 * tolerances.mass_percent;
+        (bounds.lighter, bounds.mismatch) = (1.0 / (1.0 - wrong), 1.0 + MISMATCH * wrong);
         let plant = continuous_plant::<f64>(rig).ok()?;
         let states = plant.a.rows();
         let held = |column: &Matrix<f64>| zero_order_hold(&plant.a, column, &rig.tick.period_s).1;
