@@ -4,6 +4,8 @@ use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
 
 use crate::published::table;
+use rand::{RngExt, SeedableRng};
+use rand_pcg::Pcg64;
 use serde_json::Value;
 use upright::board::Output;
 use upright::control::actuator::Drive;
@@ -17,7 +19,7 @@ use upright_design::rig::Rig;
 use upright_design::simulate::Scenario;
 use upright_design::study::Study;
 use upright_design::swing_up::{
-    Script, Stored, StoredTransitions, Tour, Transition, Way, motions, tours, with_motions,
+    Script, Stored, StoredTransitions, Tour, Transition, Way, equilibrium, motions, tours, with_motions,
 };
 use upright_design::table::TableValues;
 
@@ -238,6 +240,41 @@ fn where_a_link_hangs_a_defect_turns_the_motor_off() {
 }
 
 #[test]
+fn goals_and_set_points_at_any_moment_never_end_in_a_fault() {
+    let (rig, table) = double();
+    let mut states = Vec::new();
+    for seed in 1..=8 {
+        let mut random = Pcg64::seed_from_u64(seed);
+        let mut next = 1;
+        hold(
+            &table,
+            &rig,
+            |_, _| (),
+            |held, harness, output| {
+                assert_eq!(harness.session.fault(), None, "seed {seed}, tick {held}");
+                let (Drive::Duty(drive) | Drive::Force(drive)) = output.drive;
+                assert!(drive.is_finite());
+                states.push(harness.session.status().state);
+                if held == next {
+                    next += random.random_range(1..1500);
+                    harness.session.send(match random.random_range(0..4) {
+                        0 => Request::Setpoint(random.random_range(-0.1..0.1)),
+                        _ => Request::Goto(Equilibrium::of_bits(random.random_range(0..256))),
+                    });
+                } else if held % 25 == 0 {
+                    harness.session.send(Request::Beat);
+                }
+                while harness.session.next_reply().is_some() || harness.session.next_telemetry().is_some() {}
+                held == 11_000
+            },
+        );
+        states.dedup();
+        println!("{states:?}");
+        assert!(states.len() > 3);
+    }
+}
+
+#[test]
 fn a_goal_is_refused_with_its_reasons() {
     let (rig, table) = double();
     let table = with_ways(&table, &["uu-ud", "ud-dd"]);
@@ -248,10 +285,7 @@ fn a_goal_is_refused_with_its_reasons() {
         |_, _| (),
         |held, harness, _| {
             let mut ask = |to: &str| {
-                let to = Equilibrium::of_bits(
-                    way(&format!("{to}-{}", if to == "uu" { "dd" } else { "uu" })).from(2).bits(),
-                );
-                let id = harness.session.send(Request::Goto(to));
+                let id = harness.session.send(Request::Goto(equilibrium(to, 2).unwrap()));
                 for _ in 0..5 {
                     let inputs = harness.inputs();
                     harness.session.tick(&inputs).unwrap();
