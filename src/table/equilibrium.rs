@@ -2,16 +2,16 @@
 
 use serde::{Deserialize, Serialize};
 
-/// Which links are up and which are down, all at rest.
+/// Which of at most 31 links are up and which are down, all at rest.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Default, Serialize, Deserialize)]
-pub struct Equilibrium(u8);
+pub struct Equilibrium(u32);
 
 impl Equilibrium {
     /// All links are up.
     pub const UPRIGHT: Self = Self(0);
 
     /// All links are down, however many there are: see [`of_links`](Self::of_links).
-    pub const HANGING: Self = Self(u8::MAX);
+    pub const HANGING: Self = Self(u32::MAX);
 
     /// All of `links` links are down.
     pub const fn hanging(links: usize) -> Self {
@@ -21,17 +21,17 @@ impl Equilibrium {
     /// The same for a chain of `links` links: what it says of further ones is dropped.
     #[must_use]
     pub const fn of_links(self, links: usize) -> Self {
-        Self((self.0 as u32 & ((1 << links) - 1)) as u8)
+        Self(self.0 & ((1 << links) - 1))
     }
 
     /// Bit 0 is set if link 1 is down, bit 1 if link 2 is, and so on.
     pub const fn of_bits(bits: u32) -> Self {
-        Self(bits as u8)
+        Self(bits)
     }
 
     /// See [`of_bits`](Self::of_bits).
     pub const fn bits(self) -> u32 {
-        self.0 as u32
+        self.0
     }
 
     /// Whether this link is down; the first one has number 0.
