@@ -2,16 +2,16 @@
 
 use serde::{Deserialize, Serialize};
 
-/// Which of at most 31 links are up and which are down, all at rest.
+/// Which links are up and which are down, all at rest: each of the first eight, and all further ones together (up to 31).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Default, Serialize, Deserialize)]
-pub struct Equilibrium(u32);
+pub struct Equilibrium(u8);
 
 impl Equilibrium {
     /// All links are up.
     pub const UPRIGHT: Self = Self(0);
 
     /// All links are down, however many there are: see [`of_links`](Self::of_links).
-    pub const HANGING: Self = Self(u32::MAX);
+    pub const HANGING: Self = Self(u8::MAX);
 
     /// All of `links` links are down.
     pub const fn hanging(links: usize) -> Self {
@@ -21,22 +21,23 @@ impl Equilibrium {
     /// The same for a chain of `links` links: what it says of further ones is dropped.
     #[must_use]
     pub const fn of_links(self, links: usize) -> Self {
-        Self(self.0 & ((1 << links) - 1))
+        Self((self.0 as u32 & ((1 << links) - 1)) as u8)
     }
 
     /// Bit 0 is set if link 1 is down, bit 1 if link 2 is, and so on.
     pub const fn of_bits(bits: u32) -> Self {
-        Self(bits)
+        Self(bits as u8)
     }
 
     /// See [`of_bits`](Self::of_bits).
     pub const fn bits(self) -> u32 {
-        self.0
+        self.0 as u32
     }
 
     /// Whether this link is down; the first one has number 0.
     pub const fn is_down(self, link: usize) -> bool {
-        self.0 >> link & 1 != 0
+        // As a signed number: links beyond the eighth are as the eighth, so that all of them hang in `HANGING`.
+        (self.0 as i8 as i32) >> link & 1 != 0
     }
 
     /// Half turns of this joint from the link before it, -1, 0 or 1; the first one has number 0.
