@@ -62,19 +62,10 @@ impl<'t, const NX: usize, const NY: usize, S: SwingUp<NX, NY>> Firmware<'t, NX, 
     fn leaving_inhibits(&self, motion: &MotionTable<'_>) -> Inhibits {
         let setpoint = self.controller.law_state().setpoint;
         let limits = &self.table.limits;
-        let lean = self.largest_lean_from(self.equilibrium());
+        let lean =
+            self.largest_lean(&limits.from_rest(self.controller.encoders().counts(), self.equilibrium()));
         let settled = setpoint == self.controller.setpoint() && lean <= limits.arm_angle_rad;
         Inhibits::UNSETTLED.when(!settled).union(Inhibits::NO_ROOM.when(!self.has_room(motion, setpoint)))
-    }
-
-    /// Largest angle of a link from where it is `at` an equilibrium (rad).
-    fn largest_lean_from(&self, at: Equilibrium) -> f32 {
-        let limits = &self.table.limits;
-        let mut counts = limits.unwound(self.controller.encoders().counts(), at);
-        for (joint, (count, turn)) in counts.iter_mut().zip(&limits.turn_counts).skip(1).enumerate() {
-            *count -= at.half_turns(joint) * (turn / 2);
-        }
-        self.largest_lean(&counts)
     }
 
     /// Whether `motion` stays within the soft limits of the rail when it begins at `position` (m).

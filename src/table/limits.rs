@@ -96,17 +96,27 @@ impl<const NY: usize> Limits<NY> {
         wrapped
     }
 
-    /// These counts without whole turns of the joints, so that each is within half a turn of where it rests `at` an
-    /// equilibrium. The first sensor is the cart's, and every joint has one.
-    pub fn unwound(&self, counts: &[i32; NY], at: Equilibrium) -> [i32; NY] {
+    /// Counts at rest `at` an equilibrium. The first sensor is the cart's, and every joint has one.
+    fn rest(&self, at: Equilibrium) -> [i32; NY] {
         let mut rest = [0; NY];
         for (joint, (rest, turn)) in rest.iter_mut().zip(&self.turn_counts).skip(1).enumerate() {
             *rest = at.half_turns(joint) * (turn / 2);
         }
-        let mut unwound = *counts;
-        unwound.iter_mut().zip(&rest).for_each(|(count, rest)| *count = count.wrapping_sub(*rest));
-        unwound = self.within_half_a_turn(&unwound);
-        unwound.iter_mut().zip(&rest).for_each(|(count, rest)| *count = count.wrapping_add(*rest));
+        rest
+    }
+
+    /// How far these counts are from rest `at` an equilibrium, without whole turns of the joints.
+    pub fn from_rest(&self, counts: &[i32; NY], at: Equilibrium) -> [i32; NY] {
+        let mut from_rest = *counts;
+        from_rest.iter_mut().zip(self.rest(at)).for_each(|(count, rest)| *count = count.wrapping_sub(rest));
+        self.within_half_a_turn(&from_rest)
+    }
+
+    /// These counts without whole turns of the joints, so that each is within half a turn of where it rests `at` an
+    /// equilibrium.
+    pub fn unwound(&self, counts: &[i32; NY], at: Equilibrium) -> [i32; NY] {
+        let mut unwound = self.from_rest(counts, at);
+        unwound.iter_mut().zip(self.rest(at)).for_each(|(count, rest)| *count = count.wrapping_add(rest));
         unwound
     }
 }

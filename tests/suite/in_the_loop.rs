@@ -31,6 +31,22 @@ fn quadruple() -> (Rig, TableValues) {
     (rig, table)
 }
 
+/// A rig and its table with the stored raising and lowering, and with these of its other stored motions.
+fn with_stored_motions(file: &str, others: &[&str]) -> (Rig, TableValues) {
+    let file = Path::new(file);
+    let rig = Rig::from_path(file).unwrap();
+    let table = TableValues::of(&rig, &design(&rig).unwrap(), Gains::Sampled).unwrap();
+    let up_and_down = motions(&rig, &Stored::beside(file).unwrap()).unwrap();
+    let mut transitions = if others.is_empty() {
+        Vec::new()
+    } else {
+        StoredTransitions::beside(file).unwrap().transitions(&rig).unwrap()
+    };
+    transitions.retain(|transition| others.contains(&transition.way.name(rig.states() / 2 - 1).as_str()));
+    let table = with_motions(&rig, table, &up_and_down, &transitions).unwrap();
+    (rig, table)
+}
+
 /// Step and tilt with each law, with or without disturbances.
 fn scenarios(rig: &Rig, disturbed: bool) -> Vec<(String, Scenario)> {
     let mut scenarios = Vec::new();
@@ -101,11 +117,7 @@ fn the_image_in_qemu_gives_the_bits_of_the_host_and_of_its_last_run() {
 
 #[test]
 fn the_image_in_qemu_raises_and_lowers_the_links_with_the_bits_of_the_host() {
-    let file = Path::new("rigs/single-quanser-ip02.toml");
-    let rig = Rig::from_path(file).unwrap();
-    let table = TableValues::of(&rig, &design(&rig).unwrap(), Gains::Sampled).unwrap();
-    let motions = motions(&rig, &Stored::beside(file).unwrap()).unwrap();
-    let table = with_motions(&rig, table, &motions, &[]).unwrap();
+    let (rig, table) = with_stored_motions("rigs/single-quanser-ip02.toml", &[]);
     let built = if_possible(build_for(Kind::InTheLoop, &rig, &table)).unwrap();
     let Some(image) = in_qemu(built) else { return };
     let scenario = up_and_down(&rig, &table, 0.5).unwrap();
@@ -120,13 +132,7 @@ fn the_image_in_qemu_raises_and_lowers_the_links_with_the_bits_of_the_host() {
 
 #[test]
 fn the_image_in_qemu_goes_from_equilibrium_to_equilibrium_with_the_bits_of_the_host() {
-    let file = Path::new("rigs/double-quanser-dbpen.toml");
-    let rig = Rig::from_path(file).unwrap();
-    let table = TableValues::of(&rig, &design(&rig).unwrap(), Gains::Sampled).unwrap();
-    let up_and_down = motions(&rig, &Stored::beside(file).unwrap()).unwrap();
-    let mut others = StoredTransitions::beside(file).unwrap().transitions(&rig).unwrap();
-    others.retain(|other| ["uu-ud", "ud-dd"].contains(&other.way.name(2).as_str()));
-    let table = with_motions(&rig, table, &up_and_down, &others).unwrap();
+    let (rig, table) = with_stored_motions("rigs/double-quanser-dbpen.toml", &["uu-ud", "ud-dd"]);
     let built = if_possible(build_for(Kind::InTheLoop, &rig, &table)).unwrap();
     let Some(image) = in_qemu(built) else { return };
     // Up, over the equilibrium at which the second link hangs, and down.

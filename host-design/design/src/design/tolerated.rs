@@ -5,8 +5,9 @@ use super::{Design, Kalman, continuous_plant};
 use crate::numerics::Matrix;
 use crate::rig::{PlantDescription, Rig};
 
-/// Growth of the innovation with the share by which masses are wrong. Measured, not derived: on the robust quadruple with
-/// all masses 5 % off and all friction, it reaches 1.11 of the bounds of friction and wrong zeros in 5 h of each law.
+/// Growth of the innovation with the share by which masses are wrong. Measured, not derived: on the robust quadruple
+/// with all masses 5 % off and all friction, it reaches 1.11 of the bounds of friction and wrong zeros in 5 h of each
+/// law.
 const MISMATCH: f64 = 6.0;
 /// A response is followed until it has decayed to this share of its start.
 const DECAYED: f64 = 1e-6;

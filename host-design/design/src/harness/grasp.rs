@@ -2,6 +2,7 @@
 
 use std::f64::consts::TAU;
 
+use crate::plant::whole_turns;
 use crate::reality::hanging_by_hand;
 use crate::rig::{PlantDescription, Rig};
 
@@ -57,7 +58,7 @@ impl Grasp {
     /// Lets the links hang, whatever whole turns they have made, and moves the cart to the middle; gives whether they are
     /// there.
     pub fn put_back(&mut self) -> bool {
-        let nearest = |(hanging, held): (&f64, &f64)| hanging + TAU * libm::round((held - hanging) / TAU);
+        let nearest = |(hanging, held): (&f64, &f64)| hanging + whole_turns(held - hanging);
         let mut middle = self.hanging.clone();
         let joints = self.hanging.iter().zip(&self.held).skip(2).step_by(2).map(nearest);
         middle.iter_mut().skip(2).step_by(2).zip(joints).for_each(|(to, nearest)| *to = nearest);

@@ -84,7 +84,7 @@ pub fn record(
         let t = tick as f64 * period_s;
         // Links that are being raised or lowered, or were, do not fall.
         let stands = scenario.begin == Begin::ByHand || harness.session.status().state == State::Balancing;
-        let fall = Fall::of(rig, t, &without_turns(harness.bench.state())).filter(|_| stands);
+        let fall = if stands { Fall::of(rig, t, &without_turns(harness.bench.state())) } else { None };
         let state = harness.bench.state().to_vec();
         let force = harness.bench.tick(output.drive);
         let number = harness.session.tick_number();

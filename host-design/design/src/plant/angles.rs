@@ -12,11 +12,16 @@ pub fn absolute_angles(state: &[f64]) -> impl Iterator<Item = f64> + '_ {
     })
 }
 
+/// The whole turns that are nearest to an angle (rad).
+pub fn whole_turns(angle: f64) -> f64 {
+    TAU * libm::round(angle / TAU)
+}
+
 /// The state without whole turns of the joints: every angle is within half a turn of 0.
 pub fn without_turns(state: &[f64]) -> Vec<f64> {
     let mut state = state.to_vec();
     for angle in state.iter_mut().skip(2).step_by(2) {
-        *angle -= TAU * libm::round(*angle / TAU);
+        *angle -= whole_turns(*angle);
     }
     state
 }

@@ -32,7 +32,7 @@ mod rk4;
 mod simulation;
 mod together;
 
-pub use angles::{absolute_angles, without_turns};
+pub use angles::{absolute_angles, whole_turns, without_turns};
 pub use chain::{ChainPlant, ChainState, Energy};
 pub use jacobian::Partials;
 pub use linear::{LinearModel, linearise};

@@ -14,7 +14,7 @@ pub use bench::Bench;
 pub use closed_loop::{run, simulate, ticks};
 pub use error::SimulationError;
 pub use lockstep::{Job, run_all};
-pub(crate) use motion::{Extremes, follow, follow_other};
+pub(crate) use motion::{Extremes, follow};
 pub use scenario::{Begin, Goal, Scenario, Sensing};
 pub use summary::{Fall, FallKind, Summary};
 pub use trace::{Sample, Trace};

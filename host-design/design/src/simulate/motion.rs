@@ -70,8 +70,10 @@ fn raise_to(largest: &mut [f64], values: &[f64]) {
     largest.iter_mut().zip(values).for_each(|(largest, value)| *largest = largest.max(*value));
 }
 
-/// Raises the links of `rig` by the motions of `table`, balances for some ticks, and lowers them. `rig` may differ from
-/// the one that the table is for. Start and disturbances are those of `scenario`. None if the table has no motions.
+/// Makes motions of `table` with `rig`, which may differ from the one that the table is for, from the state in which
+/// `scenario` begins and with its disturbances: motion `other` of the table's others, at whose end the links are held for
+/// some ticks if one of them is up; without `other`, the links are raised, balanced for these ticks, and lowered. None if
+/// the table has no motions.
 ///
 /// # Errors
 /// [`SimulationError`] if the plant cannot be built or the firmware refuses the table.
@@ -79,42 +81,24 @@ pub(crate) fn follow(
     rig: &Rig,
     table: &TableValues,
     scenario: &Scenario,
+    other: Option<usize>,
     balance_ticks: usize,
 ) -> Result<Option<Extremes>, SimulationError> {
     let Some(swing_up) = &table.swing_up else { return Ok(None) };
     let bench = Bench::new(rig, scenario)?;
     let (states, sensors) = (table.states(), table.sensors());
-    with_firmware_size(states, sensors, Follow { table, swing_up, bench, balance_ticks, other: None })
+    with_firmware_size(states, sensors, Follow { table, swing_up, bench, other, balance_ticks })
         .ok_or(SimulationError::Size { states, sensors })?
         .map(Some)
-}
-
-/// Brings the links of `rig`, which rest in the state in which `scenario` begins, to another equilibrium by motion
-/// `other` of the table's others, and holds them there for some ticks.
-///
-/// # Errors
-/// As for [`follow`].
-pub(crate) fn follow_other(
-    rig: &Rig,
-    table: &TableValues,
-    scenario: &Scenario,
-    other: usize,
-    hold_ticks: usize,
-) -> Result<Option<Extremes>, SimulationError> {
-    let Some(swing_up) = &table.swing_up else { return Ok(None) };
-    let bench = Bench::new(rig, scenario)?;
-    let (states, sensors) = (table.states(), table.sensors());
-    let follow = Follow { table, swing_up, bench, balance_ticks: hold_ticks, other: Some(other) };
-    with_firmware_size(states, sensors, follow).ok_or(SimulationError::Size { states, sensors })?.map(Some)
 }
 
 struct Follow<'a> {
     table: &'a TableValues,
     swing_up: &'a SwingUpValues,
     bench: Bench,
-    balance_ticks: usize,
     /// A motion of the table's others, instead of raising and lowering.
     other: Option<usize>,
+    balance_ticks: usize,
 }
 
 impl WithSize for Follow<'_> {

@@ -2,11 +2,10 @@
 
 use upright::supervision::fault::Fault;
 use upright::supervision::supervisor::State;
-use upright::table::Equilibrium;
 
 use super::SwingUpError;
 use super::robustness::{Spread, drawn};
-use super::tour::Tour;
+use super::tour::{Tour, states};
 use super::way::Way;
 use crate::harness::{HarnessError, Recording, record, with_firmware};
 use crate::plant::absolute_angles;
@@ -98,11 +97,7 @@ impl Script {
         let links = rig.states() / 2 - 1;
         let (real, start) = drawn(rig, Way::Up, &Spread::of(0.0, 0.0), seed);
         let names = tour.ways.iter().map(|way| way.name(links));
-        let states = tour.ways.iter().flat_map(|way| match way.to(links) {
-            Equilibrium::UPRIGHT => [State::Raising, State::Balancing],
-            _ if way.ends_hanging() => [State::Lowering, State::Calibrated],
-            _ => [State::Raising, State::Holding],
-        });
+        let states = tour.ways.iter().flat_map(|way| states(*way, links));
         Ok(Self {
             parts: tour.begin_s.iter().copied().zip(names).collect(),
             states: states.collect(),

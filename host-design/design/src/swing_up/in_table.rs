@@ -8,7 +8,8 @@ use crate::design::design;
 use crate::rig::Rig;
 use crate::table::{Gains, SwingUpValues, TableValues};
 
-/// The table with raising and lowering in it, and motions between other equilibria, if there are any; with the limits and thresholds with which the firmware supervises them.
+/// The table with raising and lowering in it, motions between other equilibria, if there are any, and the limits and
+/// thresholds with which the firmware supervises them.
 ///
 /// # Errors
 /// [`SwingUpError::Table`] if the motions do not fit the table; [`SwingUpError::Simulation`] if the runs for the limits

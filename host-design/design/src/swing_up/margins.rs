@@ -51,8 +51,8 @@ struct Push {
     force_n: f64,
 }
 
-/// Margins of the raising or the lowering of `table`, which is designed for `rig`, at so many moments, evenly from its beginning
-/// on; `done` is called after each.
+/// Margins of the raising or the lowering of `table`, which is designed for `rig`, at so many moments, evenly from its
+/// beginning on; `done` is called after each.
 ///
 /// A push is a force at the end of one link, across it, that begins at this moment and lasts 50 ms. The firmware knows
 /// of it from its encoders only, and its supervision is on. The machine is the rig of the file, without

@@ -163,12 +163,12 @@ pub(super) struct Found {
     pub(super) motion: Motion,
     pub(super) stored: StoredKnots,
     /// See [`Judgement::score`] and [`Judgement::search`].
-    pub(super) score: f64,
+    score: f64,
     pub(super) search: Option<[usize; 2]>,
 }
 
 /// The motion of these knots.
-pub(super) fn found(setting: &Setting<'_>, way: Way, stored: StoredKnots) -> Result<Found, SwingUpError> {
+fn found(setting: &Setting<'_>, way: Way, stored: StoredKnots) -> Result<Found, SwingUpError> {
     let motion = restored(setting, way, &stored)?;
     let score = score(setting, &motion, way, &Spread::asked(setting.rig))?;
     Ok(Found { motion, stored, score, search: None })

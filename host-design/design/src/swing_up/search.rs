@@ -104,15 +104,17 @@ fn draw(setting: &Setting<'_>, request: &Request, way: Way, number: u64) -> Draw
     let mut random = Pcg64::seed_from_u64(number);
     let mut between = |[low, high]: [f64; 2]| low + (high - low) * random.random_range(0.0..=1.0);
     let unit = time_unit(setting);
+    let is_between = matches!(way, Way::Between { .. });
     let [shortest, longest] = request.duration_s;
-    let is_late = matches!(way, Way::Between { .. }) && number >= LATE;
-    let duration_s = between([shortest, if is_late { STRETCH * longest } else { longest }]);
+    let duration_s =
+        between([shortest, if is_between && number >= LATE { STRETCH * longest } else { longest }]);
     let (force_n, rail_m) = (between(request.force_n), between(request.rail_m));
     let rate_weight = libm::exp10(between(RATE_WEIGHT)) * unit * unit;
     let wobble = core::array::from_fn(|_| if number == 0 { 0.0 } else { between([-0.05, 0.05]) });
     let bounds = Bounds { force_n, rail_m: Some([-rail_m, rail_m]), ..request.bounds.clone() };
     // All links together first, as they are raised and lowered.
-    let reversed = if number == 0 { 0 } else { random.random_range(0..1 << setting.chain.links.len()) };
+    let reversed =
+        if is_between && number > 0 { random.random_range(0..1 << setting.chain.links.len()) } else { 0 };
     Draw { duration_s, bounds, rate_weight, wobble, reversed }
 }
 
@@ -127,8 +129,8 @@ fn solve(setting: &Setting<'_>, request: &Request, way: Way, number: u64) -> Opt
     let draw = draw(setting, request, way, number);
     let ticks = ticks_per_knot(setting);
     let knot_s = ticks as f64 * setting.tick_s;
-    let is_reversed = |link: usize| matches!(way, Way::Between { .. }) && draw.reversed >> link & 1 != 0;
-    let [_, end] = way.ends(setting.rig.states(), is_reversed);
+    let [_, end] = way.ends(setting.rig.states(), |link| draw.reversed >> link & 1 != 0);
+    // To the last bit those with which it will be restored.
     let ends = way.ends_near(&end);
     let [start, end] = ends.clone();
     let problem = Problem {

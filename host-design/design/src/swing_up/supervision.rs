@@ -7,7 +7,7 @@ use super::robustness::{Spread, drawn};
 use super::way::Way;
 use crate::parallel;
 use crate::rig::{PlantDescription, Rig};
-use crate::simulate::{Extremes, Scenario, SimulationError, follow, follow_other};
+use crate::simulate::{Extremes, Scenario, SimulationError, follow};
 use crate::table::TableValues;
 use crate::verify::Disturbance;
 
@@ -70,17 +70,14 @@ fn healthy(rig: &Rig, table: &TableValues) -> Result<Extremes, SimulationError> 
     let quiet = Scenario { substeps: 2, ..Scenario::swing_up(rig, 0.0, None) };
     let others: Vec<Way> =
         table.swing_up.iter().flat_map(|swing_up| swing_up.others.iter().map(|(way, _)| *way)).collect();
-    let run = |machine: &Rig, scenario: &Scenario, motion: usize| match motion.checked_sub(1) {
-        None => follow(machine, table, scenario, balance_ticks),
-        Some(other) => follow_other(machine, table, scenario, other, balance_ticks),
-    };
     // Each machine is raised and lowered, and then makes each of the other motions from rest.
     let one = |number: u64| {
         let (number, motion) = (number % MACHINES, (number / MACHINES) as usize);
-        let way = motion.checked_sub(1).map_or(Way::Up, |other| others[other]);
+        let other = motion.checked_sub(1);
+        let way = other.map_or(Way::Up, |other| others[other]);
         if number == 0 {
             let [start, _] = way.ends(rig.states(), |_| false);
-            return run(rig, &Scenario { start, ..quiet.clone() }, motion);
+            return follow(rig, table, &Scenario { start, ..quiet.clone() }, other, balance_ticks);
         }
         let seed = BASE_SEED + number;
         let (machine, start) = drawn(rig, way, &spread, seed);
@@ -91,7 +88,7 @@ fn healthy(rig: &Rig, table: &TableValues) -> Result<Extremes, SimulationError> 
             torque_noise_n_m: disturbance.torque_n_m,
             ..quiet.clone()
         };
-        run(&machine, &scenario, motion)
+        follow(&machine, table, &scenario, other, balance_ticks)
     };
     let all: Vec<_> = parallel::try_map(0..MACHINES * (1 + others.len() as u64), one)?;
     let mut most = Extremes::none(table.sensors());

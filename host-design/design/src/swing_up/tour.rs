@@ -68,6 +68,15 @@ impl Tour {
     }
 }
 
+/// The supervisor's states during a motion and after it.
+pub(super) fn states(way: Way, links: usize) -> [State; 2] {
+    match way.to(links) {
+        Equilibrium::UPRIGHT => [State::Raising, State::Balancing],
+        to if to == Equilibrium::hanging(links) => [State::Lowering, State::Calibrated],
+        _ => [State::Raising, State::Holding],
+    }
+}
+
 /// The motion of this way.
 fn motion(swing_up: &SwingUpValues, way: Way) -> Option<&MotionValues> {
     match way {
@@ -247,15 +256,11 @@ fn gone(
 
 /// Whether motion `index` of the tour has begun and ended where it should.
 fn has_arrived(harness: &Harness<'_>, tour: &Tour, index: usize) -> bool {
-    let to = tour.ways[index].to(tour.links);
-    let state = match to {
-        Equilibrium::UPRIGHT => State::Balancing,
-        to if to == Equilibrium::hanging(tour.links) => State::Calibrated,
-        _ => State::Holding,
-    };
+    let way = tour.ways[index];
+    let [_, after] = states(way, tour.links);
     harness.begun().len() >= index
-        && harness.session.status().state == state
-        && is_near(harness.bench.state(), to)
+        && harness.session.status().state == after
+        && is_near(harness.bench.state(), way.to(tour.links))
 }
 
 /// Whether all links are near `at`, whole turns apart.

@@ -5,6 +5,8 @@ use core::f64::consts::PI;
 use serde::{Serialize, Serializer};
 use upright::table::Equilibrium;
 
+use crate::plant::whole_turns;
+
 /// From where to where a motion leads.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Way {
@@ -115,7 +117,7 @@ impl Way {
         let [start, mut end] = self.ends(last.len(), |_| false);
         if let Self::Between { .. } = self {
             for (end, last) in end.iter_mut().zip(last).skip(2).step_by(2) {
-                *end += 2.0 * PI * libm::round((last - *end) / (2.0 * PI));
+                *end += whole_turns(last - *end);
             }
         }
         [start, end]

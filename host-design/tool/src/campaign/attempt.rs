@@ -4,7 +4,6 @@ use upright::board::Output;
 use upright::protocol::message::{Answer, Request};
 use upright::supervision::fault::Fault;
 use upright::supervision::sign_check::Signs;
-use upright::table::Equilibrium;
 use upright_board::UNITS_PER_MICROSECOND;
 
 use super::defect::{Expected, Kind};
@@ -134,7 +133,7 @@ impl Attempt<'_> {
         let mut injection = Injection::new(self.rig, self.table, trial.clone());
         let mut output = harness.raise(Some(0.0))?;
         let heartbeat = self.ticks(HEARTBEAT_S);
-        let goals = self.goals();
+        let goals = goals(&self.trial.scenario, self.rig.tick.period_s);
         for tick in 0.. {
             if self.is_over(tick, &observed) {
                 break;
@@ -318,11 +317,6 @@ impl Attempt<'_> {
         };
         let state = motion.planned(self.table.states(), tick.saturating_sub(begin));
         Some(absolute_angles(&state).collect())
-    }
-
-    /// Where the firmware is told to bring the links, and from which tick on.
-    fn goals(&self) -> Vec<(usize, Equilibrium)> {
-        goals(&self.trial.scenario, self.rig.tick.period_s)
     }
 
     /// The kinds that are there at power-up: arming has to be refused.

@@ -17,7 +17,7 @@ use super::swing_up::with_margins;
 use super::verify::search;
 use crate::failure::Failure;
 use crate::progress::{with_random_plants, with_spinner};
-use crate::variation::{Variation, Wanted, with_stored_motions as with_stored};
+use crate::variation::{Variation, Wanted, with_stored_motions};
 
 /// Writes one HTML page about a rig and its loop: animated runs, model, gains, margins, trust report.
 ///
@@ -73,7 +73,7 @@ impl Report {
         let (rig, certified, table) = self.variation.designed()?;
         let laws = table.laws.present().count() as u64;
         let imperfections = if self.imperfections { search(&rig, &table)? } else { Vec::new() };
-        let motions = with_stored_motions(&self.variation.rig, &rig, &table);
+        let motions = with_swing_up(&self.variation.rig, &rig, &table);
         let pushes = match &motions {
             Some(table) if self.margins => with_margins(&rig, table)?,
             None if self.margins => {
@@ -189,7 +189,7 @@ impl Report {
 }
 
 /// The table with the stored motions; none if there are none, or if they belong to other values of the rig.
-fn with_stored_motions(file: &Path, rig: &Rig, table: &TableValues) -> Option<TableValues> {
+fn with_swing_up(file: &Path, rig: &Rig, table: &TableValues) -> Option<TableValues> {
     let stored = Stored::beside(file).ok()?;
     with_motions(rig, table.clone(), &motions(rig, &stored).ok()?, &[]).ok()
 }
@@ -201,7 +201,7 @@ fn demonstration(rig: &Rig, table: &TableValues, seed: u64) -> Option<Demonstrat
 
 /// A run through all motions that are stored beside the rig file.
 fn tour(file: &Path, rig: &Rig, table: &TableValues, seed: u64) -> Result<Demonstration, Failure> {
-    let table = with_stored(file, rig, table.clone(), Wanted::Transitions)?;
+    let table = with_stored_motions(file, rig, table.clone(), Wanted::Transitions)?;
     let failed = |source| Failure::SwingUp { rig: rig.name.clone(), source };
     let script = Script::tour(rig, &table, seed).map_err(failed)?;
     Ok(with_spinner("the tour", || script.run(&table)).map_err(RunError::from)?)

@@ -90,12 +90,12 @@ impl Transitions {
                 searched.push(found);
             }
         }
+        let mut all =
+            if self.stored { stored.transitions(&rig) } else { stored.all(&rig) }.map_err(failed)?;
         let (transitions, legs, faults) = loop {
-            let all = if self.stored { stored.transitions(&rig) } else { stored.all(&rig) };
-            let all = all.map_err(failed)?;
             let held = on_tour(&all.iter().map(|transition| transition.way).collect::<Vec<_>>(), links);
             let (transitions, lost): (Vec<_>, Vec<_>) =
-                all.into_iter().partition(|transition| held.contains(&transition.way));
+                all.iter().cloned().partition(|transition| held.contains(&transition.way));
             let table = with_spinner("the table", || designed_table_with(&rig, &swing_up, &transitions))
                 .map_err(failed)?;
             let tour = Tour::of(&rig, &table).ok_or_else(|| failed(SwingUpError::NoTour))?;
@@ -110,6 +110,7 @@ impl Transitions {
             if let Some(leg) = others().find(|leg| 100.0 * leg.interval[0] < needed) {
                 eprintln!("{} is dropped: {} of {} arrive", leg.way.name(links), leg.arrived, leg.tried);
                 stored.drop(leg.way, links);
+                all.retain(|transition| transition.way != leg.way);
                 continue;
             }
             // A motion that comes more than once counts as it came first.

@@ -21,8 +21,7 @@ use upright_tool::monitor::{Action, Line, action, now, request, view};
 use super::designed;
 use crate::failure::Failure;
 use crate::twin;
-use crate::variation::Wanted;
-use crate::variation::positive;
+use crate::variation::{Wanted, positive};
 
 /// Shows a firmware's telemetry, live, and sends commands to it; exit status 1 if the connection is lost or the
 /// firmware uses another version of the messages.
