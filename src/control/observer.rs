@@ -184,8 +184,12 @@ fn select<const NX: usize, const NY: usize, T: Scalar>(
     measured: impl Fn(usize) -> usize,
     estimate: &[T; NX],
 ) -> [T; NY] {
-    // A checked table names only states that exist.
-    core::array::from_fn(|sensor| estimate.get(measured(sensor)).copied().unwrap_or_default())
+    let mut selected = [T::default(); NY];
+    for (sensor, selected) in selected.iter_mut().enumerate() {
+        // A checked table names only states that exist.
+        *selected = estimate.get(measured(sensor)).copied().unwrap_or_default();
+    }
+    selected
 }
 
 #[cfg(test)]

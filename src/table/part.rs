@@ -6,6 +6,8 @@
 
 use nalgebra::SMatrix;
 
+use super::columns;
+
 /// Consecutive words of a table, all of one type.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Words<'a> {
@@ -38,6 +40,14 @@ impl Words<'_> {
                 1 => Some((**value >> 32) as u32),
                 _ => None,
             },
+        }
+    }
+
+    /// Whether none of them is an infinity or NaN.
+    fn are_finite(&self) -> bool {
+        match self {
+            Words::F32(values) => values.iter().all(|value| value.is_finite()),
+            _ => true,
         }
     }
 }
@@ -153,7 +163,9 @@ macro_rules! words {
 
         impl<const N: usize, const M: usize> Resize<[$type; M]> for [$type; N] {
             fn resized(&self) -> [$type; M] {
-                core::array::from_fn(|index| self.get(index).copied().unwrap_or_default())
+                let mut resized = [<$type>::default(); M];
+                copy(self, &mut resized);
+                resized
             }
         }
     };
@@ -182,6 +194,11 @@ impl Resize<u64> for u64 {
     fn resized(&self) -> Self {
         *self
     }
+}
+
+/// Copies as many as there are in both.
+fn copy<T: Copy>(from: &[T], to: &mut [T]) {
+    to.iter_mut().zip(from).for_each(|(to, from)| *to = *from);
 }
 
 /// A list of any length, which lies elsewhere.
@@ -232,7 +249,11 @@ impl<const R: usize, const C: usize, const S: usize, const D: usize> Resize<SMat
     for SMatrix<f32, R, C>
 {
     fn resized(&self) -> SMatrix<f32, S, D> {
-        SMatrix::from_fn(|row, column| self.get((row, column)).copied().unwrap_or_default())
+        let mut resized = [[0.0; S]; D];
+        for (to, from) in resized.iter_mut().zip(&self.data.0) {
+            copy(from, to);
+        }
+        columns(resized)
     }
 }
 
@@ -240,11 +261,17 @@ impl<P: Part> Part for Option<P> {
     #[inline]
     fn part(&self, at: &mut usize) -> Option<Words<'_>> {
         let presence: &[u32] = if self.is_some() { &[1] } else { &[0] };
-        leaf(at, Words::U32(presence)).or_else(|| self.as_ref()?.part(at))
+        match (leaf(at, Words::U32(presence)), self) {
+            (None, Some(part)) => part.part(at),
+            (words, _) => words,
+        }
     }
 
     fn part_mut(&mut self, at: &mut usize) -> Option<WordsMut<'_>> {
-        leaf(at, WordsMut::Fixed).or_else(|| self.as_mut()?.part_mut(at))
+        match (leaf(at, WordsMut::Fixed), self) {
+            (None, Some(part)) => part.part_mut(at),
+            (words, _) => words,
+        }
     }
 
     fn read(&self, reader: &mut dyn Reader) {
@@ -263,10 +290,14 @@ impl<P: Resize<Q>, Q> Resize<Option<Q>> for Option<P> {
 
 /// Whether a part is free of infinities and NaN.
 pub(crate) fn is_finite(part: &impl Part) -> bool {
-    (0..).map_while(|leaf| part.part(&mut { leaf })).all(|words| match words {
-        Words::F32(values) => values.iter().all(|value| value.is_finite()),
-        _ => true,
-    })
+    let mut leaf = 0;
+    while let Some(words) = part.part(&mut { leaf }) {
+        if !words.are_finite() {
+            return false;
+        }
+        leaf += 1;
+    }
+    true
 }
 
 /// `words` if `at` is 0; otherwise counts `at` down by this leaf.
@@ -301,7 +332,6 @@ macro_rules! part {
         }
 
         impl<$($life,)? $(const $size: usize),*> $crate::table::part::Part for $name<$($life,)? $($size),*> {
-            #[inline]
             fn part(&self, at: &mut usize) -> Option<$crate::table::part::Words<'_>> {
                 let Self { $($field,)+ $($seal: _)? } = self;
                 $(if let Some(words) = $crate::table::part::Part::part($field, at) {

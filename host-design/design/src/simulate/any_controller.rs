@@ -80,7 +80,7 @@ fn array<const N: usize>(counters: &[u32]) -> &[u32; N] {
 
 /// What is done with controllers; it gives how each run ended.
 pub(super) type Action<'a> =
-    &'a mut dyn FnMut(Vec<&mut dyn AnyController>) -> Result<Vec<Option<Fall>>, SimulationError>;
+    &'a mut dyn FnMut(Vec<Box<dyn AnyController + '_>>) -> Result<Vec<Option<Fall>>, SimulationError>;
 
 /// Makes `count` controllers of `table` and does `action` with them.
 ///
@@ -108,7 +108,10 @@ impl WithSize for WithControllers<'_> {
     fn run<const NX: usize, const NY: usize, const N: usize>(self) -> Self::Output {
         let table = self.table.table::<NX, NY>();
         let controller = Controller::new(&table, &self.table.build(), Bench::widths())?;
-        let mut controllers = vec![controller; self.count];
-        (self.action)(controllers.iter_mut().map(|one| one as &mut dyn AnyController).collect())
+        let mut controllers: Vec<Box<dyn AnyController>> = Vec::with_capacity(self.count);
+        for _ in 0..self.count {
+            controllers.push(Box::new(controller.clone()));
+        }
+        (self.action)(controllers)
     }
 }

@@ -42,8 +42,8 @@ pub fn run(
 ) -> Result<Option<Fall>, SimulationError> {
     let falls = with_controllers(table, 1, &mut |controllers| {
         let mut falls = Vec::new();
-        for controller in controllers {
-            falls.push(alone(Run::start(rig, controller, table.sensors(), scenario)?, observe)?);
+        for mut controller in controllers {
+            falls.push(alone(Run::start(rig, controller.as_mut(), table.sensors(), scenario)?, observe)?);
         }
         Ok(falls)
     })?;

@@ -39,10 +39,10 @@ pub fn run_all(table: &TableValues, jobs: &mut [Job<'_>]) -> Result<Vec<Option<F
     });
     let (count, sensors) = (jobs.len(), table.sensors());
     let (mut lanes, chains) = (lanes, chains.unwrap_or_default());
-    with_controllers(table, count, &mut |controllers| {
-        let runs = jobs.iter().zip(controllers);
+    with_controllers(table, count, &mut |mut controllers| {
+        let runs = jobs.iter().zip(&mut controllers);
         let runs: Vec<Run<'_>> = runs
-            .map(|(job, controller)| Run::start(job.rig, controller, sensors, job.scenario))
+            .map(|(job, controller)| Run::start(job.rig, controller.as_mut(), sensors, job.scenario))
             .collect::<Result<_, _>>()?;
         match &mut lanes {
             Some(lanes) => Lockstep { lanes: lanes.as_mut(), chains: &chains, runs, jobs, next: 0 }.run(),

@@ -39,13 +39,10 @@ pub(super) enum Number {
 }
 
 /// The fields of a table, in the order of their declaration.
-pub(super) fn fields(table: &dyn Part) -> Vec<Field> {
+pub(super) fn fields(table: &impl Part) -> Vec<Field> {
     let mut builder = Builder::default();
     table.read(&mut builder);
-    match builder.done {
-        Some(Node::Struct(_, fields)) => fields,
-        _ => Vec::new(),
-    }
+    builder.fields()
 }
 
 #[derive(Default)]
@@ -61,6 +58,13 @@ struct Builder {
 }
 
 impl Builder {
+    fn fields(self) -> Vec<Field> {
+        match self.done {
+            Some(Node::Struct(_, fields)) => fields,
+            _ => Vec::new(),
+        }
+    }
+
     fn value(&mut self, node: Node) {
         if let Some((depth, missing, nodes)) = self.lists.last_mut()
             && *depth == self.open.len()
