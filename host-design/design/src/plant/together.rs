@@ -46,9 +46,9 @@ pub trait ChainLanes: Send {
 /// simulated in thousands of runs are three to five links.
 pub fn chain_lanes(links: usize) -> Option<Box<dyn ChainLanes>> {
     match links {
-        3 => Some(Box::new(Together::<3>::empty())),
-        4 => Some(Box::new(Together::<4>::empty())),
-        5 => Some(Box::new(Together::<5>::empty())),
+        3 => Some(Box::new(Together::<3>::empty(Arch::new()))),
+        4 => Some(Box::new(Together::<4>::empty(Arch::new()))),
+        5 => Some(Box::new(Together::<5>::empty(Arch::new()))),
         _ => None,
     }
 }
@@ -74,10 +74,10 @@ struct Chains<const N: usize> {
 }
 
 impl<const N: usize> Together<N> {
-    fn empty() -> Self {
+    fn empty(processor: Arch) -> Self {
         let row = [0.0; LANES];
         Self {
-            processor: Arch::new(),
+            processor,
             occupied: [false; LANES],
             chains: Chains {
                 inverse_mass: row,
@@ -238,6 +238,45 @@ impl<const N: usize> Chains<N> {
         for j in 0..N {
             state.phi[j].store(&mut self.state.phi[j], first);
             state.phidot[j].store(&mut self.state.phidot[j], first);
+        }
+    }
+}
+
+#[cfg(all(test, target_arch = "x86_64"))]
+mod tests {
+    use std::path::Path;
+
+    use pulp::x86::{V3, V4};
+
+    use super::*;
+    use crate::plant::chain_plant;
+    use crate::rig::{PlantDescription, Rig};
+
+    #[test]
+    fn every_kind_of_vector_that_this_processor_has_gives_the_bits_of_the_plant() {
+        let rig = Rig::from_path(Path::new("../../rigs/quadruple-paper.toml")).unwrap();
+        let PlantDescription::Chain(chain) = &rig.plant else { panic!() };
+        let start = |lane: usize| [0.1, -0.2, 0.3 * lane as f64, 3.0, -0.3, 1e-3, 2.0, -9.0, 0.0, 0.5];
+        let wide = [V3::try_new().map(Arch::V3), V4::try_new().map(Arch::V4)];
+        for processor in [Arch::Scalar].into_iter().chain(wide.into_iter().flatten()) {
+            let mut lanes = Together::<4>::empty(processor);
+            for lane in 0..LANES {
+                lanes.place(lane, chain, &start(lane)).unwrap();
+                lanes.push(lane, lane as f64 - 3.0, &[1e-3, -2e-3, 0.0, 1e-4]);
+            }
+            lanes.advance(1e-2, 20);
+            for lane in 0..LANES {
+                let mut plant = chain_plant(chain).unwrap();
+                plant.set_state(&start(lane));
+                plant.advance(lane as f64 - 3.0, &[1e-3, -2e-3, 0.0, 1e-4], 1e-2, 20);
+                let (mut expected, mut found) = ([0.0; 10], [0.0; 10]);
+                plant.write_state(&mut expected);
+                lanes.write_state(lane, &mut found);
+                assert_eq!(expected.map(f64::to_bits), found.map(f64::to_bits), "{processor:?}, lane {lane}");
+                // Negative control: another lane has other bits.
+                lanes.write_state((lane + 1) % LANES, &mut found);
+                assert_ne!(expected.map(f64::to_bits), found.map(f64::to_bits), "{processor:?}, lane {lane}");
+            }
         }
     }
 }

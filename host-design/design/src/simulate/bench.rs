@@ -1,7 +1,7 @@
 //! The simulated rig: plant, motor, encoders and disturbances, one tick at a time.
 
 use rand::SeedableRng;
-use rand_distr::{Distribution, Normal};
+use rand_distr::{Distribution, StandardNormal};
 use rand_pcg::Pcg64;
 use upright::control::actuator::Drive;
 use upright::control::encoder::CounterWidth;
@@ -22,8 +22,8 @@ pub struct Bench {
     sensors: Vec<(usize, f64)>,
     counter_start: u32,
     random: Pcg64,
-    force_noise: Normal<f64>,
-    torque_noise: Normal<f64>,
+    force_noise_n: f64,
+    torque_noise_n_m: f64,
     force_offset: f64,
     push_n: f64,
     pull_n_m: Vec<f64>,
@@ -49,8 +49,7 @@ impl Bench {
         };
         plant.set_state(&scenario.start);
         let noise = |level: f64| {
-            let possible = level.is_finite() && level >= 0.0;
-            Normal::new(0.0, level).ok().filter(|_| possible).ok_or(SimulationError::Noise(level))
+            if level.is_finite() && level >= 0.0 { Ok(level) } else { Err(SimulationError::Noise(level)) }
         };
         let finite =
             |offset: f64| if offset.is_finite() { Ok(offset) } else { Err(SimulationError::Offset(offset)) };
@@ -65,8 +64,8 @@ impl Bench {
             sensors: rig.sensors().iter().map(|sensor| (sensor.state, sensor.step())).collect(),
             counter_start: scenario.counter_start,
             random: Pcg64::seed_from_u64(scenario.seed),
-            force_noise: noise(scenario.force_noise_n)?,
-            torque_noise: noise(scenario.torque_noise_n_m)?,
+            force_noise_n: noise(scenario.force_noise_n)?,
+            torque_noise_n_m: noise(scenario.torque_noise_n_m)?,
             force_offset: finite(scenario.force_offset_n)?,
             push_n: 0.0,
             state: scenario.start.clone(),
@@ -180,12 +179,18 @@ impl Bench {
     fn begin(&mut self, drive: Drive) -> (Drive, f64) {
         let now = if self.delay { std::mem::replace(&mut self.pending_drive, drive) } else { drive };
         let push = std::mem::take(&mut self.push_n);
-        let disturbance = self.force_offset + push + self.force_noise.sample(&mut self.random);
+        let disturbance = self.force_offset + push + self.force_noise_n * self.standard_normal();
         for joint in 0..self.torques.len() {
-            let noise = self.torque_noise.sample(&mut self.random);
+            let noise = self.torque_noise_n_m * self.standard_normal();
             self.torques[joint] = noise + std::mem::take(&mut self.pull_n_m[joint]);
         }
         (now, disturbance)
+    }
+
+    /// The next random number of the standard normal distribution.
+    #[inline]
+    fn standard_normal(&mut self) -> f64 {
+        StandardNormal.sample(&mut self.random)
     }
 
     /// The chain, if it can be simulated in lockstep: nothing in `[reality]` changes its motion, and in a tick there

@@ -89,6 +89,7 @@ impl Scenario {
     }
 
     /// Set-point at the time `t` (s), in m.
+    #[inline]
     pub fn target_m(&self, t: f64) -> f64 {
         if (self.step_at_s..self.step_until_s).contains(&t) { self.step_m } else { 0.0 }
     }

@@ -36,16 +36,19 @@ impl Fall {
     /// Whether `state` is beyond rescue: a link below the horizontal, the cart off its rail, a model's state out of
     /// all proportion, or a value that is not finite.
     pub fn of(rig: &Rig, at_s: f64, state: &[f64]) -> Option<Self> {
+        let is_finite = state.iter().fold(true, |all, value| all & value.is_finite());
         let kind = match &rig.plant {
-            _ if !state.iter().all(|value| value.is_finite()) => FallKind::NotFinite,
+            _ if !is_finite => FallKind::NotFinite,
             PlantDescription::Chain(chain) => {
-                let fallen =
-                    absolute_angles(state).position(|angle| angle.abs() > core::f64::consts::FRAC_PI_2);
+                let is_up = |angle: f64| angle.abs() <= core::f64::consts::FRAC_PI_2;
                 let [left, right] = chain.cart.travel_m;
-                match fallen {
-                    Some(index) => FallKind::Link(index + 1),
-                    None if state[0] < left || state[0] > right => FallKind::EndOfRail,
-                    None => return None,
+                // Without branches, because nearly always all are up.
+                if !absolute_angles(state).fold(true, |all, angle| all & is_up(angle)) {
+                    FallKind::Link(1 + absolute_angles(state).take_while(|&angle| is_up(angle)).count())
+                } else if state[0] < left || state[0] > right {
+                    FallKind::EndOfRail
+                } else {
+                    return None;
                 }
             }
             PlantDescription::Model(_) if state.iter().any(|value| value.abs() > 1e6) => FallKind::Diverged,
