@@ -2,7 +2,8 @@
 
 use serde::{Deserialize, Serialize};
 
-/// Which links are up and which are down, all at rest: each of the first eight, and all further ones together (up to 31).
+/// Which links are up and which are down, all at rest: each of the first eight, and all further ones together (up
+/// to 31).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Default, Serialize, Deserialize)]
 pub struct Equilibrium(u8);
 

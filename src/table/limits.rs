@@ -107,16 +107,21 @@ impl<const NY: usize> Limits<NY> {
 
     /// How far these counts are from rest `at` an equilibrium, without whole turns of the joints.
     pub fn from_rest(&self, counts: &[i32; NY], at: Equilibrium) -> [i32; NY] {
-        let mut from_rest = *counts;
-        from_rest.iter_mut().zip(self.rest(at)).for_each(|(count, rest)| *count = count.wrapping_sub(rest));
-        self.within_half_a_turn(&from_rest)
+        self.away(counts, &self.rest(at))
+    }
+
+    fn away(&self, counts: &[i32; NY], rest: &[i32; NY]) -> [i32; NY] {
+        let mut away = *counts;
+        away.iter_mut().zip(rest).for_each(|(count, rest)| *count = count.wrapping_sub(*rest));
+        self.within_half_a_turn(&away)
     }
 
     /// These counts without whole turns of the joints, so that each is within half a turn of where it rests `at` an
     /// equilibrium.
     pub fn unwound(&self, counts: &[i32; NY], at: Equilibrium) -> [i32; NY] {
-        let mut unwound = self.from_rest(counts, at);
-        unwound.iter_mut().zip(self.rest(at)).for_each(|(count, rest)| *count = count.wrapping_add(rest));
+        let rest = self.rest(at);
+        let mut unwound = self.away(counts, &rest);
+        unwound.iter_mut().zip(&rest).for_each(|(count, rest)| *count = count.wrapping_add(*rest));
         unwound
     }
 }

@@ -55,8 +55,8 @@ impl Grasp {
         rest
     }
 
-    /// Lets the links hang, whatever whole turns they have made, and moves the cart to the middle; gives whether they are
-    /// there.
+    /// Lets the links hang, whatever whole turns they have made, and moves the cart to the middle; gives whether they
+    /// are there.
     pub fn put_back(&mut self) -> bool {
         let nearest = |(hanging, held): (&f64, &f64)| hanging + whole_turns(held - hanging);
         let mut middle = self.hanging.clone();

@@ -19,8 +19,8 @@ pub struct LinearModel<R> {
 
 /// Linearises the equations of motion of [`ChainParameters`], frictions included, about an equilibrium.
 ///
-/// With `σ_j = 1` for a link that is up and `-1` for one that is down, and `φ` now a deviation from the equilibrium, the
-/// equations to first order are:
+/// With `σ_j = 1` for a link that is up and `-1` for one that is down, and `φ` now a deviation from the equilibrium,
+/// the equations to first order are:
 ///
 /// ```text
 /// M [ẍ; φ̈] = [u - d_0 ẋ;  σ_j g a_j φ_j + τ_j - τ_{j+1} - d_j θ̇_j + d_{j+1} θ̇_{j+1}],

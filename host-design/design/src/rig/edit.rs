@@ -11,8 +11,8 @@ pub struct Edited {
     pub added: bool,
 }
 
-/// `text` with `value`, as it is written in TOML, for `key`: `tick.period_s`, `link[2].mass_kg`, `lqr.state_weights[1]`.
-/// A key that is not there is added; none if it has no place.
+/// `text` with `value`, as it is written in TOML, for `key`: `tick.period_s`, `link[2].mass_kg`,
+/// `lqr.state_weights[1]`. A key that is not there is added; none if it has no place.
 pub fn with_value(text: &str, key: &str, value: &str) -> Option<Edited> {
     match place(text, key) {
         Place::At(span) => {

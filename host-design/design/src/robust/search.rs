@@ -83,8 +83,8 @@ struct Search<'a> {
 impl Search<'_> {
     /// The loops with the least ripple that hold, one of each law with the same observer.
     ///
-    /// `heads` has, for each law and observer, the place of the first loop that is not known to fall. The observer whose
-    /// heads have the least ripple in sum comes first, so a loop is only tried if nothing with less ripple is left.
+    /// `heads` has, for each law and observer, the place of the first loop that is not known to fall. The observer
+    /// whose heads have the least ripple in sum comes first, so a loop is only tried if nothing with less ripple is left.
     fn choice(&self, progress: Progress<'_>) -> Result<Choice, RobustError> {
         let loops = self.loops;
         let corners = loops.plants.corners(1.0)?;

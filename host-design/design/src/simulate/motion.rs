@@ -71,9 +71,9 @@ fn raise_to(largest: &mut [f64], values: &[f64]) {
 }
 
 /// Makes motions of `table` with `rig`, which may differ from the one that the table is for, from the state in which
-/// `scenario` begins and with its disturbances: motion `other` of the table's others, at whose end the links are held for
-/// some ticks if one of them is up; without `other`, the links are raised, balanced for these ticks, and lowered. None if
-/// the table has no motions.
+/// `scenario` begins and with its disturbances. With `other`, it is this one of the table's other motions, at whose end
+/// the links are held for `balance_ticks` if one of them is up. Without, the links are raised, balanced for these ticks
+/// and lowered. None if the table has no motions.
 ///
 /// # Errors
 /// [`SimulationError`] if the plant cannot be built or the firmware refuses the table.

@@ -72,7 +72,7 @@ impl Tour {
 pub(super) fn states(way: Way, links: usize) -> [State; 2] {
     match way.to(links) {
         Equilibrium::UPRIGHT => [State::Raising, State::Balancing],
-        to if to == Equilibrium::hanging(links) => [State::Lowering, State::Calibrated],
+        _ if way.ends_hanging() => [State::Lowering, State::Calibrated],
         _ => [State::Raising, State::Holding],
     }
 }

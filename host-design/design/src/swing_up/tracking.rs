@@ -10,8 +10,8 @@ pub(super) fn ticks(dynamics: &dyn Dynamics, path: &Path, tick_s: f64) -> Vec<Ti
     path.x.iter().zip(&path.u).map(|(x, &u)| tick(dynamics, x, u, tick_s)).collect()
 }
 
-/// `[Q S; Sᵀ R]` of one tick in state and held force: the integral of the continuous cost over the tick, by Simpson's rule
-/// with the state's exact course to first order in the deviations.
+/// `[Q S; Sᵀ R]` of one tick in state and held force: the integral of the continuous cost over the tick, by Simpson's
+/// rule with the state's exact course to first order in the deviations.
 fn tick_cost(tick: &Tick, weights: &Matrix<f64>, force_weight: f64, tick_s: f64) -> Matrix<f64> {
     let s = tick.whole.rows();
     let over = |course: &Matrix<f64>| &(&course.transpose() * weights) * course;

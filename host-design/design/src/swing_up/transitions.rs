@@ -53,7 +53,8 @@ pub struct StoredTransitions {
     rig: String,
     /// Hash of the rig and its `[swing_up]`.
     hash: String,
-    /// By the name of the way: tours in which it arrived, and in which it was tried. One that is not here is not judged.
+    /// By the name of the way: tours in which it arrived, and in which it was tried. One that is not here is not
+    /// judged.
     tours: BTreeMap<String, [usize; 2]>,
     /// By the name of the way.
     #[serde(flatten)]
