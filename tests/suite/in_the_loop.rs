@@ -5,19 +5,19 @@
 //! variable `UPRIGHT_REQUIRE_IMAGE` is set, they fail.
 
 use std::fmt::Write;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::process::{Command, Stdio};
 
+use crate::published::{rig, rig_path, stored_motions, table};
 use upright::protocol::message::Request;
 use upright::supervision::supervisor::State;
 use upright::table::Law;
 use upright::table::checksum::crc32;
-use upright_design::design::design;
 use upright_design::harness::{Pins, Recording, Session, Target};
 use upright_design::rig::Rig;
 use upright_design::simulate::{Scenario, simulate};
-use upright_design::swing_up::{Stored, StoredTransitions, Tour, hangs, motions, up_and_down, with_motions};
-use upright_design::table::{Gains, TableValues};
+use upright_design::swing_up::{StoredTransitions, Tour, hangs, up_and_down, with_motions};
+use upright_design::table::TableValues;
 use upright_tool::image::{Kind, build_for, build_if_possible, if_possible};
 use upright_tool::in_the_loop::{Link, Place, RunError, run};
 
@@ -26,24 +26,21 @@ use upright_tool::in_the_loop::{Link, Place, RunError, run};
 const MOST_INSTRUCTIONS: u32 = 3850;
 
 fn quadruple() -> (Rig, TableValues) {
-    let rig = Rig::from_path(Path::new("rigs/quadruple-paper.toml")).unwrap();
-    let table = TableValues::of(&rig, &design(&rig).unwrap(), Gains::Sampled).unwrap();
+    let rig = rig("quadruple-paper");
+    let table = table(&rig);
     (rig, table)
 }
 
 /// A rig and its table with the stored raising and lowering, and with these of its other stored motions.
-fn with_stored_motions(file: &str, others: &[&str]) -> (Rig, TableValues) {
-    let file = Path::new(file);
-    let rig = Rig::from_path(file).unwrap();
-    let table = TableValues::of(&rig, &design(&rig).unwrap(), Gains::Sampled).unwrap();
-    let up_and_down = motions(&rig, &Stored::beside(file).unwrap()).unwrap();
+fn with_stored_motions(name: &'static str, others: &[&str]) -> (Rig, TableValues) {
+    let rig = rig(name);
     let mut transitions = if others.is_empty() {
         Vec::new()
     } else {
-        StoredTransitions::beside(file).unwrap().transitions(&rig).unwrap()
+        StoredTransitions::beside(&rig_path(name)).unwrap().transitions(&rig).unwrap()
     };
     transitions.retain(|transition| others.contains(&transition.way.name(rig.states() / 2 - 1).as_str()));
-    let table = with_motions(&rig, table, &up_and_down, &transitions).unwrap();
+    let table = with_motions(&rig, table(&rig), stored_motions(name), &transitions).unwrap();
     (rig, table)
 }
 
@@ -117,7 +114,7 @@ fn the_image_in_qemu_gives_the_bits_of_the_host_and_of_its_last_run() {
 
 #[test]
 fn the_image_in_qemu_raises_and_lowers_the_links_with_the_bits_of_the_host() {
-    let (rig, table) = with_stored_motions("rigs/single-quanser-ip02.toml", &[]);
+    let (rig, table) = with_stored_motions("single-quanser-ip02", &[]);
     let built = if_possible(build_for(Kind::InTheLoop, &rig, &table)).unwrap();
     let Some(image) = in_qemu(built) else { return };
     let scenario = up_and_down(&rig, &table, 0.5).unwrap();
@@ -132,7 +129,7 @@ fn the_image_in_qemu_raises_and_lowers_the_links_with_the_bits_of_the_host() {
 
 #[test]
 fn the_image_in_qemu_goes_from_equilibrium_to_equilibrium_with_the_bits_of_the_host() {
-    let (rig, table) = with_stored_motions("rigs/double-quanser-dbpen.toml", &["uu-ud", "ud-dd"]);
+    let (rig, table) = with_stored_motions("double-quanser-dbpen", &["uu-ud", "ud-dd"]);
     let built = if_possible(build_for(Kind::InTheLoop, &rig, &table)).unwrap();
     let Some(image) = in_qemu(built) else { return };
     // Up, over the equilibrium at which the second link hangs, and down.
@@ -197,8 +194,8 @@ fn swinging_links_are_homed_in_qemu_with_the_bits_of_the_host() {
 /// On the rig with the fewest bytes per second: over these lines, QEMU takes long for each.
 #[test]
 fn the_image_runs_with_serial_lines_too() {
-    let rig = Rig::from_path(Path::new("rigs/single-quanser-ip02.toml")).unwrap();
-    let table = TableValues::of(&rig, &design(&rig).unwrap(), Gains::Sampled).unwrap();
+    let rig = rig("single-quanser-ip02");
+    let table = table(&rig);
     let built = if_possible(build_for(Kind::InTheLoopUsart, &rig, &table)).unwrap();
     let Some(image) = in_qemu(built) else { return };
     let (_, scenario) = scenarios(&rig, true).remove(0);

@@ -12,4 +12,6 @@ mod integral;
 mod lost_loops;
 mod own_board;
 mod plain_equations;
+#[path = "../../host-design/design/tests/suite/published/mod.rs"]
+mod published;
 mod wiring;

@@ -5,9 +5,9 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-use upright_design::design::design;
+use crate::published::table;
 use upright_design::rig::Rig;
-use upright_design::table::{Gains, TableValues, gains_source};
+use upright_design::table::gains_source;
 use upright_tool::image::{Compiler, ImageError, PROFILE, TARGET, compiler};
 
 const DOCUMENT: &str = include_str!("../../docs/own-board.md");
@@ -83,8 +83,7 @@ fn foreign_crate(folder: &Path) {
         std::fs::write(path, text.replace("\"../..\"", &format!("\"{root}\""))).unwrap();
     }
     let rig = Rig::from_path(&folder.join("rig.toml")).unwrap();
-    let table = TableValues::of(&rig, &design(&rig).unwrap(), Gains::Sampled).unwrap();
-    std::fs::write(folder.join("src/gains.rs"), gains_source(&rig, &table)).unwrap();
+    std::fs::write(folder.join("src/gains.rs"), gains_source(&rig, &table(&rig))).unwrap();
     // The same versions as in this repository, for packages that both need.
     std::fs::copy(root().join("Cargo.lock"), folder.join("Cargo.lock")).unwrap();
 }

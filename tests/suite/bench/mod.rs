@@ -3,29 +3,21 @@
 // Each test program uses only some of these.
 #![allow(dead_code)]
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use upright::table::Law;
-use upright_design::design::{Certified, design};
 use upright_design::rig::{Rig, Tick};
 use upright_design::simulate::{Scenario, Sensing, Summary, simulate};
 use upright_design::table::{Gains, TableValues};
 
+pub(crate) use crate::published::{certified, rig, table};
+
 pub(crate) const LAWS: [Law; 2] = Law::ALL;
-
-fn rigs() -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("rigs")
-}
-
-/// The rig in file `name`.
-pub(crate) fn rig(name: &str) -> Rig {
-    Rig::from_path(&rigs().join(name).with_extension("toml")).unwrap_or_else(|error| panic!("{error}"))
-}
 
 /// The rig whose gains are in `src/gains.rs`: the one with that name in `rigs/`, whatever its file is called.
 pub(crate) fn rig_of_the_firmware() -> Rig {
     let wanted = upright::gains::RIG;
-    std::fs::read_dir(rigs())
+    std::fs::read_dir(Path::new(env!("CARGO_MANIFEST_DIR")).join("rigs"))
         .unwrap()
         .map(|entry| entry.unwrap().path())
         .filter(|path| path.extension().is_some_and(|extension| extension == "toml"))
@@ -41,15 +33,6 @@ pub(crate) fn paper_at(period_s: f64, delay_ticks: u8) -> Rig {
     rig
 }
 
-pub(crate) fn designed(rig: &Rig) -> Certified {
-    design(rig).unwrap_or_else(|error| panic!("{}: {error}", rig.name))
-}
-
-/// The table that `upright design` would write.
-pub(crate) fn table(rig: &Rig) -> TableValues {
-    TableValues::of(rig, &designed(rig), Gains::Sampled).unwrap()
-}
-
 /// The same as [`table`], but steps of the set-point pass unshaped: the law alone, as the paper simulates it.
 pub(crate) fn raw_table(rig: &Rig) -> TableValues {
     table(rig).without_governor()
@@ -57,7 +40,7 @@ pub(crate) fn raw_table(rig: &Rig) -> TableValues {
 
 /// A table with the gains for continuous time, as in the paper.
 pub(crate) fn continuous_table(rig: &Rig) -> TableValues {
-    TableValues::of(rig, &designed(rig), Gains::Continuous).unwrap().without_governor()
+    TableValues::of(rig, certified(rig), Gains::Continuous).unwrap().without_governor()
 }
 
 /// Ten seconds at rest with the whole state measured, as the paper simulates it.

@@ -53,7 +53,7 @@ impl<R: Real> Matrix<R> {
 
     /// A `rows`×`cols` matrix of zeros.
     pub fn zeros(rows: usize, cols: usize) -> Self {
-        Self::from_fn(rows, cols, |_, _| R::zero())
+        Self { rows, cols, data: vec![R::zero(); rows * cols] }
     }
 
     /// The identity, `size`×`size`.

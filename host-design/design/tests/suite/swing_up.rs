@@ -1,8 +1,6 @@
 //! Swing-up: the stored motions of the rigs, in closed loop; and what must not pass.
 
-use std::path::{Path, PathBuf};
-
-use crate::published::{certified, table};
+use crate::published::{designed, rig, rig_path, stored_motions, table};
 use upright_design::numerics::Matrix;
 use upright_design::rig::{PlantDescription, Rig};
 use upright_design::swing_up::{
@@ -12,12 +10,8 @@ use upright_design::swing_up::{
 const RIGS: [&str; 4] =
     ["single-quanser-ip02", "double-quanser-dbpen", "triple-glueck-eder-kugi", "quadruple-paper"];
 
-fn file(rig: &str) -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("../../rigs/{rig}.toml"))
-}
-
-fn rig_and_stored(rig: &str) -> (Rig, Stored) {
-    (Rig::from_path(&file(rig)).unwrap(), Stored::beside(&file(rig)).unwrap())
+fn rig_and_stored(name: &str) -> (Rig, Stored) {
+    (rig(name), Stored::beside(&rig_path(name)).unwrap())
 }
 
 /// Whether the firmware with these motions gets through a demonstration.
@@ -31,12 +25,11 @@ fn arrives(rig: &Rig, motions: &SwingUp, seed: u64, is_wrong: bool) -> bool {
 #[test]
 fn every_stored_motion_obeys_the_equations_and_the_limits_and_arrives() {
     for name in RIGS {
-        let (rig, stored) = rig_and_stored(name);
-        let motions = motions(&rig, &stored).unwrap_or_else(|error| panic!("{name}: {error}"));
+        let (rig, motions) = (rig(name), stored_motions(name));
         for seed in 1..=2 {
-            assert!(arrives(&rig, &motions, seed, false), "{name}, seed {seed}");
+            assert!(arrives(&rig, motions, seed, false), "{name}, seed {seed}");
         }
-        assert!(arrives(&rig, &motions, 3, true), "{name} with wrong masses and friction");
+        assert!(arrives(&rig, motions, 3, true), "{name} with wrong masses and friction");
     }
 }
 
@@ -46,7 +39,7 @@ fn stored_motions_give_the_same_bits_each_time_and_survive_their_file() {
     assert_eq!(motions(&rig, &stored).unwrap(), motions(&rig, &stored).unwrap());
     assert_eq!(
         stored.to_json(),
-        std::fs::read_to_string(Stored::path_beside(&file("single-quanser-ip02"))).unwrap()
+        std::fs::read_to_string(Stored::path_beside(&rig_path("single-quanser-ip02"))).unwrap()
     );
 }
 
@@ -54,9 +47,8 @@ fn stored_motions_give_the_same_bits_each_time_and_survive_their_file() {
 #[test]
 fn the_last_gain_is_the_gain_that_balances() {
     for name in RIGS {
-        let (rig, stored) = rig_and_stored(name);
-        let raise = motions(&rig, &stored).unwrap().raise;
-        let balancing = certified(&rig).double.sampled.lqr.as_ref().unwrap().k.clone();
+        let raise = &stored_motions(name).raise;
+        let balancing = designed(name).double.sampled.lqr.as_ref().unwrap().k.clone();
         let last = &raise.k[raise.steps() - 1];
         let apart = (last - &balancing).largest_entry() / balancing.largest_entry();
         assert!(apart < 0.02, "{name}: {apart}");
@@ -69,7 +61,7 @@ fn the_last_gain_is_the_gain_that_balances() {
 #[test]
 fn a_motion_of_another_rig_is_refused() {
     let (mut heavier, stored) = rig_and_stored("single-quanser-ip02");
-    let other = Rig::from_path(&file("double-quanser-dbpen")).unwrap();
+    let other = rig("double-quanser-dbpen");
     assert_eq!(motions(&other, &stored), Err(SwingUpError::Outdated));
     assert!(motions(&heavier, &stored).is_ok());
     if let PlantDescription::Chain(chain) = &mut heavier.plant {
@@ -80,8 +72,7 @@ fn a_motion_of_another_rig_is_refused() {
 
 #[test]
 fn a_reversed_gain_or_filter_falls() {
-    let (rig, stored) = rig_and_stored("single-quanser-ip02");
-    let good = motions(&rig, &stored).unwrap();
+    let (rig, good) = (rig("single-quanser-ip02"), stored_motions("single-quanser-ip02"));
     let reversed = |all: &[Matrix<f64>]| all.iter().map(|m| -m).collect::<Vec<_>>();
     let mut bad = good.clone();
     bad.raise.k = reversed(&good.raise.k);
@@ -99,7 +90,7 @@ fn a_wrong_knot_spacing_is_refused_and_a_wrong_tick_falls() {
     let wrong: Stored = serde_json::from_str(&wrong).unwrap();
     assert!(motions(&rig, &wrong).is_err());
     // Every second entry left out: the motion at twice its speed.
-    let good = motions(&rig, &stored).unwrap();
+    let good = stored_motions("single-quanser-ip02");
     let mut fast = good.clone();
     let raise = &mut fast.raise;
     raise.x = good.raise.x.iter().step_by(2).cloned().collect();

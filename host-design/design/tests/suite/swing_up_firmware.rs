@@ -1,8 +1,6 @@
 //! The whole firmware raises and lowers the rigs, from encoders; and what it must not do.
 
-use std::path::{Path, PathBuf};
-
-use crate::published::table;
+use crate::published::{rig, stored_motions, table};
 use upright::control::actuator::Drive;
 use upright::protocol::message::{Answer, Request};
 use upright::supervision::fault::Fault;
@@ -13,24 +11,16 @@ use upright_design::plant::absolute_angles;
 use upright_design::rig::Rig;
 use upright_design::simulate::Scenario;
 use upright_design::study::Study;
-use upright_design::swing_up::{
-    Condition, Stored, Way, firmware_runs, hangs, margins, motions, up_and_down, with_motions,
-};
+use upright_design::swing_up::{Condition, Way, firmware_runs, hangs, margins, up_and_down, with_motions};
 use upright_design::table::TableValues;
 
 const RIGS: [&str; 4] =
     ["single-quanser-ip02", "double-quanser-dbpen", "triple-glueck-eder-kugi", "quadruple-paper"];
 
-fn file(rig: &str) -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("../../rigs/{rig}.toml"))
-}
-
 /// The rig and its table with the stored motions.
-fn rig_and_table(name: &str) -> (Rig, TableValues) {
-    let rig = Rig::from_path(&file(name)).unwrap();
-    let table = table(&rig);
-    let motions = motions(&rig, &Stored::beside(&file(name)).unwrap()).unwrap();
-    let table = with_motions(&rig, table, &motions, &[]).unwrap();
+fn rig_and_table(name: &'static str) -> (Rig, TableValues) {
+    let rig = rig(name);
+    let table = with_motions(&rig, table(&rig), stored_motions(name), &[]).unwrap();
     (rig, table)
 }
 
@@ -189,11 +179,11 @@ fn a_wrong_motor_or_encoder_is_found_before_the_links_have_left_the_lower_half()
 
 /// How many of three runs of the firmware of `table` stand and hang, with masses ±5 %, friction ±30 % and seeds from
 /// `base_seed` on.
-fn random_runs(name: &str, table: &TableValues, base_seed: u64) -> [usize; 2] {
-    let rig = Rig::from_path(&file(name)).unwrap();
-    let motions = motions(&rig, &Stored::beside(&file(name)).unwrap()).unwrap();
+fn random_runs(name: &'static str, table: &TableValues, base_seed: u64) -> [usize; 2] {
     let condition = &Condition::all()[2];
-    let found = firmware_runs(&rig, table, &motions, condition, base_seed, 3, &Study::whole()).unwrap();
+    let found =
+        firmware_runs(&rig(name), table, stored_motions(name), condition, base_seed, 3, &Study::whole())
+            .unwrap();
     println!("{name}, {}: {found:?}", condition.name);
     [found.raise.stood, found.lower.stood]
 }

@@ -1,9 +1,8 @@
 //! The whole firmware brings double and triple from equilibrium to equilibrium; and what it must not do.
 
-use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
 
-use crate::published::table;
+use crate::published::{rig, rig_path, stored_motions, table};
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
 use serde_json::Value;
@@ -19,23 +18,17 @@ use upright_design::rig::Rig;
 use upright_design::simulate::Scenario;
 use upright_design::study::Study;
 use upright_design::swing_up::{
-    Script, Stored, StoredTransitions, Tour, Transition, Way, equilibrium, motions, tours, with_motions,
+    Script, StoredTransitions, Tour, Transition, Way, equilibrium, tours, with_motions,
 };
 use upright_design::table::TableValues;
-
-fn file(name: &str) -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("../../rigs").join(name).with_extension("toml")
-}
 
 const DOUBLE: &str = "double-quanser-dbpen";
 
 /// A rig and its table with all stored motions.
-fn with_all_motions(name: &str) -> (Rig, TableValues) {
-    let file = file(name);
-    let rig = Rig::from_path(&file).unwrap();
-    let others = StoredTransitions::beside(&file).unwrap().transitions(&rig).unwrap();
-    let up_and_down = motions(&rig, &Stored::beside(&file).unwrap()).unwrap();
-    let table = with_motions(&rig, table(&rig), &up_and_down, &others).unwrap();
+fn with_all_motions(name: &'static str) -> (Rig, TableValues) {
+    let rig = rig(name);
+    let others = StoredTransitions::beside(&rig_path(name)).unwrap().transitions(&rig).unwrap();
+    let table = with_motions(&rig, table(&rig), stored_motions(name), &others).unwrap();
     (rig, table)
 }
 
@@ -78,12 +71,12 @@ fn the_triple_goes_every_stored_way_one_after_the_other() {
 #[test]
 fn a_motion_that_no_tour_has_judged_does_not_get_into_a_table() {
     let mut object: Value = serde_json::from_str(
-        &std::fs::read_to_string(StoredTransitions::path_beside(&file(DOUBLE))).unwrap(),
+        &std::fs::read_to_string(StoredTransitions::path_beside(&rig_path(DOUBLE))).unwrap(),
     )
     .unwrap();
     object["tours"].as_object_mut().unwrap().remove("uu-ud").unwrap();
     let stored: StoredTransitions = serde_json::from_value(object).unwrap();
-    let rig = Rig::from_path(&file(DOUBLE)).unwrap();
+    let rig = rig(DOUBLE);
     let ways = |transitions: Vec<Transition>| -> Vec<Way> {
         transitions.iter().map(|transition| transition.way).collect()
     };

@@ -9,11 +9,13 @@ use std::sync::{Mutex, OnceLock};
 
 use upright_design::design::{Certified, design};
 use upright_design::rig::Rig;
+use upright_design::swing_up::{Stored, SwingUp, motions};
 use upright_design::table::{Gains, TableValues};
 
 /// Path of the rig file `name`.
 pub(crate) fn rig_path(name: &str) -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("../../rigs").join(name).with_extension("toml")
+    let mut folders = Path::new(env!("CARGO_MANIFEST_DIR")).ancestors().map(|folder| folder.join("rigs"));
+    folders.find(|rigs| rigs.is_dir()).unwrap().join(name).with_extension("toml")
 }
 
 /// The rig in file `name`.
@@ -30,7 +32,15 @@ pub(crate) fn designed(name: &str) -> &'static Certified {
 pub(crate) fn certified(rig: &Rig) -> &'static Certified {
     static DESIGNS: Mutex<BTreeMap<u64, &OnceLock<Certified>>> = Mutex::new(BTreeMap::new());
     let place = *DESIGNS.lock().unwrap().entry(rig.hash()).or_insert_with(|| Box::leak(Box::default()));
-    place.get_or_init(|| design(rig).unwrap())
+    place.get_or_init(|| design(rig).unwrap_or_else(|error| panic!("{}: {error}", rig.name)))
+}
+
+/// The stored motions of the rig in file `name`, restored once for all tests.
+pub(crate) fn stored_motions(name: &'static str) -> &'static SwingUp {
+    static RESTORED: Mutex<BTreeMap<&str, &OnceLock<SwingUp>>> = Mutex::new(BTreeMap::new());
+    let place = *RESTORED.lock().unwrap().entry(name).or_insert_with(|| Box::leak(Box::default()));
+    let restore = || motions(&rig(name), &Stored::beside(&rig_path(name)).unwrap());
+    place.get_or_init(|| restore().unwrap_or_else(|error| panic!("{name}: {error}")))
 }
 
 /// The gain table of `rig`.
