@@ -54,6 +54,12 @@ impl Condition {
         ]
     }
 
+    /// The errors that `[swing_up]` asks a motion to stand.
+    pub fn asked(rig: &Rig) -> Self {
+        let (spread, name) = (Spread::asked(rig), "errors of [swing_up]");
+        Self { name, spread, joint_counts: None, is_late: false }
+    }
+
     /// The rig that the table for this condition is designed for.
     pub fn designed(&self, rig: &Rig) -> Rig {
         let mut rig = rig.clone();
@@ -77,6 +83,14 @@ pub struct FirmwareRuns {
     pub lower: Runs,
     /// Faults that ended a run, and how often.
     pub faults: BTreeMap<String, usize>,
+}
+
+impl FirmwareRuns {
+    /// The raising in all runs: one that was refused has not arrived.
+    pub fn raise_in_all(&self) -> Runs {
+        let runs = self.refused + self.raise.runs;
+        Runs { runs, interval: wilson(self.raise.stood, runs), ..self.raise.clone() }
+    }
 }
 
 /// One run.

@@ -11,7 +11,9 @@ use upright_design::plant::absolute_angles;
 use upright_design::rig::Rig;
 use upright_design::simulate::Scenario;
 use upright_design::study::Study;
-use upright_design::swing_up::{Condition, Way, firmware_runs, hangs, margins, up_and_down, with_motions};
+use upright_design::swing_up::{
+    Condition, Runs, Way, firmware_runs, hangs, margins, up_and_down, with_motions,
+};
 use upright_design::table::TableValues;
 
 const RIGS: [&str; 4] =
@@ -201,6 +203,30 @@ fn machines_that_the_law_brings_up_are_not_switched_off() {
     let limits = &mut table.swing_up.as_mut().unwrap().limits;
     (limits.rail_m, limits.speed_m_per_s) = (usual.rail_m, usual.speed_m_per_s);
     assert_eq!(random_runs(triple, &table, 10), [3, 2]);
+}
+
+/// What the law brings up counts for nothing if the table's limits end it.
+#[test]
+fn a_motion_that_the_supervisor_ends_has_not_arrived() {
+    const RUNS: usize = 200;
+    let name = "single-quanser-ip02";
+    let (rig, mut table) = rig_and_table(name);
+    let arriving = |table: &TableValues| {
+        let (motions, condition) = (stored_motions(name), Condition::asked(&rig));
+        let found = firmware_runs(&rig, table, motions, &condition, 1, RUNS, &Study::whole()).unwrap();
+        [found.raise_in_all(), found.lower]
+    };
+    let is_enough = |runs: &Runs| 100.0 * runs.interval[0] >= rig.swing_up.as_ref().unwrap().success_percent;
+    let [raise, lower] = arriving(&table);
+    assert!(is_enough(&raise) && is_enough(&lower), "{raise:?}, {lower:?}");
+    let limits = &mut table.swing_up.as_mut().unwrap().limits;
+    limits.speed_m_per_s *= 0.5;
+    let [raise, _] = arriving(&table);
+    assert!(!is_enough(&raise), "{raise:?}");
+    // A rail on which the firmware does not begin.
+    table.limits.rail_m = [-0.2, 0.2];
+    let [raise, _] = arriving(&table);
+    assert_eq!((raise.stood, raise.runs), (0, RUNS));
 }
 
 #[test]
