@@ -1,9 +1,12 @@
 //! Adaptive integrator of order 8: slow and accurate, the reference for the fixed-step one.
 
+use std::sync::LazyLock;
+
 use differential_equations::error::Error;
-use differential_equations::methods::ExplicitRungeKutta;
+use differential_equations::methods::{DormandPrince, ExplicitRungeKutta, Ordinary};
 use differential_equations::ode::{ODE, OrdinaryNumericalMethod};
 use differential_equations::status::Status;
+use differential_equations::traits::State;
 
 use super::Plant;
 
@@ -59,6 +62,9 @@ pub fn integrate(
     integrate_problem(&Problem { plant, force: &force, disturbances }, start, duration, tolerance)
 }
 
+/// DOP853 for a state of this type.
+type Method<Y> = ExplicitRungeKutta<Ordinary, DormandPrince, f64, Y, 8, 12, 16>;
+
 /// [`integrate`] without a type of the caller's, so that it is compiled once, with this crate's optimisation.
 fn integrate_problem(
     problem: &Problem<'_>,
@@ -66,35 +72,53 @@ fn integrate_problem(
     duration: f64,
     tolerance: Tolerance,
 ) -> Result<Vec<f64>, ReferenceError> {
+    /// Its many coefficients are copied faster than they are made.
+    static SMALL: LazyLock<Method<Small>> = LazyLock::new(Method::dop853);
     let positive = |x: f64| x.is_finite() && x > 0.0;
     if ![duration, tolerance.relative, tolerance.absolute].into_iter().all(positive) {
         return Err(ReferenceError::BadRequest);
     }
     assert_eq!(start.len(), problem.plant.states(), "length of the state");
-    let mut method =
-        ExplicitRungeKutta::dop853().rtol(tolerance.relative).atol(tolerance.absolute).max_steps(MOST_STEPS);
-    method.init(problem, 0.0, duration, &start.to_vec()).map_err(|error| cause(0.0, &error))?;
+    match Small::of(start) {
+        Some(start) => integrate_with(SMALL.clone(), problem, &start, duration, tolerance),
+        None => integrate_with(Method::dop853(), problem, &start.to_vec(), duration, tolerance),
+    }
+}
+
+fn integrate_with<Y: State<f64> + AsRef<[f64]>>(
+    mut method: Method<Y>,
+    problem: &Problem<'_>,
+    start: &Y,
+    duration: f64,
+    tolerance: Tolerance,
+) -> Result<Vec<f64>, ReferenceError>
+where
+    for<'a> Problem<'a>: ODE<f64, Y>,
+{
+    (method.rtol, method.atol) = (tolerance.relative.into(), tolerance.absolute.into());
+    method.max_steps = MOST_STEPS;
+    method.init(problem, 0.0, duration, start).map_err(|error| cause(0.0, &error))?;
     // Stepped by hand, for two reasons. The run must end on a step of the integrator, not on an interpolated value. It
     // must stop early if a NaN in force or state makes the integrator reject every step.
     loop {
         let remaining = duration - method.t();
         if remaining <= 2.0 * f64::EPSILON * duration {
-            return Ok(method.y().clone());
+            return Ok(method.y().as_ref().to_vec());
         }
         if method.h() > remaining {
             method.set_h(remaining);
         }
         method.step(problem).map_err(|error| cause(method.t(), &error))?;
-        if *method.status() == Status::RejectedStep && method.h() < f64::EPSILON * duration {
+        if matches!(method.status(), Status::RejectedStep) && method.h() < f64::EPSILON * duration {
             return Err(stopped(method.t(), "the step became too small"));
         }
-        if !method.y().iter().all(|entry| entry.is_finite()) {
+        if !method.y().as_ref().iter().all(|entry| entry.is_finite()) {
             return Err(ReferenceError::NotFinite);
         }
     }
 }
 
-fn cause(time_s: f64, error: &Error<f64, Vec<f64>>) -> ReferenceError {
+fn cause<Y: State<f64>>(time_s: f64, error: &Error<f64, Y>) -> ReferenceError {
     match error {
         Error::StepSize { .. } => stopped(time_s, "the step became too small"),
         Error::MaxSteps { .. } => stopped(time_s, "too many steps"),
@@ -116,5 +140,80 @@ struct Problem<'a> {
 impl ODE<f64, Vec<f64>> for Problem<'_> {
     fn diff(&self, t: f64, state: &Vec<f64>, rate: &mut Vec<f64>) {
         self.plant.rate(state, (self.force)(t, state), self.disturbances, rate);
+    }
+}
+
+impl ODE<f64, Small> for Problem<'_> {
+    fn diff(&self, t: f64, state: &Small, rate: &mut Small) {
+        let state = state.as_ref();
+        self.plant.rate(state, (self.force)(t, state), self.disturbances, &mut rate.values[..rate.length]);
+    }
+}
+
+/// The state of a plant of up to four links. A step makes hundreds of states, which are faster without allocations.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Small {
+    length: usize,
+    /// Those beyond the length stay 0.
+    values: [f64; 10],
+}
+
+impl Small {
+    fn of(state: &[f64]) -> Option<Self> {
+        let mut values = [0.0; 10];
+        values.get_mut(..state.len())?.copy_from_slice(state);
+        Some(Self { length: state.len(), values })
+    }
+}
+
+impl AsRef<[f64]> for Small {
+    fn as_ref(&self) -> &[f64] {
+        &self.values[..self.length]
+    }
+}
+
+impl State<f64> for Small {
+    fn len(&self) -> usize {
+        self.length
+    }
+
+    fn get_component(&self, index: usize) -> f64 {
+        self.values[index]
+    }
+
+    fn set_component(&mut self, index: usize, value: f64) {
+        self.values[index] = value;
+    }
+
+    fn map_components_mut<F: FnMut(usize, &mut f64)>(&mut self, mut f: F) {
+        for index in 0..self.length {
+            f(index, &mut self.values[index]);
+        }
+    }
+
+    fn zeros_like(&self) -> Self {
+        Self { values: [0.0; 10], ..*self }
+    }
+
+    fn zeros() -> Self {
+        Self { length: 0, values: [0.0; 10] }
+    }
+
+    fn mul_add_assign(&mut self, alpha: f64, other: &Self) {
+        self.add_scaled(alpha, other);
+    }
+
+    fn scale_mut(&mut self, alpha: f64) {
+        for index in 0..10 {
+            self.values[index] *= alpha;
+        }
+    }
+
+    #[inline(always)]
+    fn add_scaled(&mut self, alpha: f64, other: &Self) -> &mut Self {
+        for index in 0..10 {
+            self.values[index] += alpha * other.values[index];
+        }
+        self
     }
 }
