@@ -5,8 +5,8 @@ use serde::Serialize;
 use upright::table::Law;
 
 use super::comparison::{Digits, Row};
-use super::{PaperRigs, ReproduceError, published};
-use upright_design::design::{Feedback, continuous_plant, design, dominant_pair};
+use super::{PaperDesigns, PaperRigs, ReproduceError, published};
+use upright_design::design::{Feedback, continuous_plant, dominant_pair};
 use upright_design::numerics::{Complex, Matrix, Wide, eigenvalues};
 use upright_design::rig::Rig;
 
@@ -32,15 +32,17 @@ pub struct PoleSet {
 const EXACT: &str = "exact model";
 const PRINTED: &str = "printed A and B";
 
-/// Designs both laws from the exact model and from the printed matrices and compares.
+/// Compares both laws, designed from the exact model and from the printed matrices.
 ///
 /// # Errors
-/// [`ReproduceError`] if a design fails.
-pub fn designs(rigs: &PaperRigs) -> Result<Designs, ReproduceError> {
-    let (exact, printed) = (design(&rigs.exact)?, design(&rigs.printed)?);
+/// [`ReproduceError`] if poles cannot be computed.
+pub fn designs(
+    rigs: &PaperRigs,
+    PaperDesigns { exact, printed }: &PaperDesigns,
+) -> Result<Designs, ReproduceError> {
     let mut rows = plant_rows(&exact.double.a, &exact.double.b);
     rows.extend(dominant_rows());
-    for (from, certified) in [(PRINTED, &printed), (EXACT, &exact)] {
+    for (from, certified) in [(PRINTED, printed), (EXACT, exact)] {
         let designed = certified.double.continuous.each();
         for (law, gains) in designed.present() {
             let (k, n) = published::gains(law);

@@ -3,8 +3,8 @@
 use serde::Serialize;
 
 use super::designs::{gain_rows, plant_rows};
-use super::{PaperRigs, ReproduceError, Row, chain, published};
-use upright_design::design::{Feedback, continuous_plant, design};
+use super::{PaperDesigns, PaperRigs, ReproduceError, Row, chain, published};
+use upright_design::design::{Certified, Feedback, continuous_plant, design};
 use upright_design::numerics::Wide;
 use upright_design::plant::chain_plant;
 use upright_design::plant::reference::{Tolerance, integrate};
@@ -36,13 +36,14 @@ pub struct Evidence {
 ///
 /// # Errors
 /// [`ReproduceError`] if a design fails that should exist.
-pub fn errata(rigs: &PaperRigs) -> Result<Vec<Erratum>, ReproduceError> {
+pub fn errata(rigs: &PaperRigs, designed: &PaperDesigns) -> Result<Vec<Erratum>, ReproduceError> {
+    let (exact, printed) = ((&rigs.exact, &designed.exact), (&rigs.printed, &designed.printed));
     Ok(vec![
-        weights(&rigs.printed)?,
+        weights(printed)?,
         cart_mass(&rigs.exact)?,
-        far_poles(&rigs.printed)?,
+        far_poles(printed)?,
         rate_for_position(&rigs.exact)?,
-        rounded_matrices(rigs)?,
+        rounded_matrices(exact, printed)?,
     ])
 }
 
@@ -52,7 +53,10 @@ fn counted(reading: impl Into<String>, rows: &[Row], of: &str) -> Evidence {
     Evidence { reading: reading.into(), outcome, agree: Some(agree) }
 }
 
-fn weights(printed: &Rig) -> Result<Erratum, ReproduceError> {
+/// A rig file and its design.
+type Known<'a> = (&'a Rig, &'a Certified);
+
+fn weights(printed: Known<'_>) -> Result<Erratum, ReproduceError> {
     let mut evidence = Vec::new();
     let pattern: Vec<f64> = [10.0, 1.0].repeat(5);
     let q = published::Q_DIAGONAL;
@@ -61,11 +65,11 @@ fn weights(printed: &Rig) -> Result<Erratum, ReproduceError> {
         ("the first ten entries as printed", q[..10].to_vec()),
         ("the last ten entries as printed", q[5..].to_vec()),
     ] {
-        let mut rig = printed.clone();
+        let mut rig = printed.0.clone();
         if let Some(lqr) = &mut rig.lqr {
             lqr.state_weights = weights;
         }
-        let law = lqr_of(&rig)?;
+        let law = lqr_of(&rig, printed)?;
         let rows = gain_rows("LQR", "", &law, &published::LQR_K, published::LQR_N);
         evidence.push(counted(reading, &rows, "K and N"));
     }
@@ -102,7 +106,7 @@ fn cart_mass(exact: &Rig) -> Result<Erratum, ReproduceError> {
     })
 }
 
-fn far_poles(printed: &Rig) -> Result<Erratum, ReproduceError> {
+fn far_poles(printed: Known<'_>) -> Result<Erratum, ReproduceError> {
     let mut evidence = Vec::new();
     let real = -4.0 / published::SETTLING_TIME_S;
     let imaginary = upright_design::design::dominant_pair::<f64>(
@@ -126,9 +130,8 @@ fn far_poles(printed: &Rig) -> Result<Erratum, ReproduceError> {
         ("eight times ten times the real part, -6.67", far(vec![10.0 * real; 8])),
         ("four times the pair of ten times s1 and s2", PolePlacement::Poles(literal)),
     ] {
-        let mut rig = printed.clone();
-        rig.pole_placement = Some(placement);
-        let law = placement_of(&rig)?;
+        let rig = Rig { pole_placement: Some(placement), ..printed.0.clone() };
+        let law = placement_of(&rig, printed)?;
         let rows = gain_rows("", "", &law, &published::PLACEMENT_K, published::PLACEMENT_N);
         let mut found = counted(reading, &rows, "K and N");
         let sizes = law.k.entries().iter().map(|gain| gain.abs());
@@ -184,12 +187,12 @@ fn rate_for_position(exact: &Rig) -> Result<Erratum, ReproduceError> {
     })
 }
 
-fn rounded_matrices(rigs: &PaperRigs) -> Result<Erratum, ReproduceError> {
+fn rounded_matrices(exact: Known<'_>, printed: Known<'_>) -> Result<Erratum, ReproduceError> {
     let mut evidence = Vec::new();
-    for (reading, rig) in [("the printed, rounded matrices", &rigs.printed), ("the exact model", &rigs.exact)]
-    {
-        let mut rows = gain_rows("LQR", "", &lqr_of(rig)?, &published::LQR_K, published::LQR_N);
-        let placement = placement_of(rig)?;
+    for (reading, known) in [("the printed, rounded matrices", printed), ("the exact model", exact)] {
+        let lqr = lqr_of(known.0, known)?;
+        let mut rows = gain_rows("LQR", "", &lqr, &published::LQR_K, published::LQR_N);
+        let placement = placement_of(known.0, known)?;
         rows.extend(gain_rows("", "", &placement, &published::PLACEMENT_K, published::PLACEMENT_N));
         evidence.push(counted(reading, &rows, "both K and N"));
     }
@@ -200,12 +203,18 @@ fn rounded_matrices(rigs: &PaperRigs) -> Result<Erratum, ReproduceError> {
     })
 }
 
-fn lqr_of(rig: &Rig) -> Result<Feedback<f64>, ReproduceError> {
-    let rig = Rig { pole_placement: None, kalman: None, ..rig.clone() };
-    design(&rig)?.double.continuous.lqr.ok_or(ReproduceError::OneLaw(rig.name))
+/// The LQR of `rig`: that of the known design, if it is the same rig.
+fn lqr_of(rig: &Rig, known: Known<'_>) -> Result<Feedback<f64>, ReproduceError> {
+    let alone = Rig { pole_placement: None, kalman: None, ..rig.clone() };
+    let laws =
+        if rig == known.0 { known.1.double.continuous.clone() } else { design(&alone)?.double.continuous };
+    laws.lqr.ok_or(ReproduceError::OneLaw(alone.name))
 }
 
-fn placement_of(rig: &Rig) -> Result<Feedback<f64>, ReproduceError> {
-    let rig = Rig { lqr: None, kalman: None, ..rig.clone() };
-    design(&rig)?.double.continuous.pole_placement.ok_or(ReproduceError::OneLaw(rig.name))
+/// The pole placement of `rig` likewise.
+fn placement_of(rig: &Rig, known: Known<'_>) -> Result<Feedback<f64>, ReproduceError> {
+    let alone = Rig { lqr: None, kalman: None, ..rig.clone() };
+    let laws =
+        if rig == known.0 { known.1.double.continuous.clone() } else { design(&alone)?.double.continuous };
+    laws.pole_placement.ok_or(ReproduceError::OneLaw(alone.name))
 }

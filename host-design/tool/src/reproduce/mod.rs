@@ -38,7 +38,7 @@ pub use robustness::{Ripple, Robustness, SEED, robustness};
 pub use settling::{HORIZON_S, LONGEST_S, Sensitivity, Settling, SettlingRow, printed, settling};
 pub use spectrum::{Bandwidth, SEGMENT, Spectrum};
 
-use upright_design::design::DesignError;
+use upright_design::design::{Certified, DesignError, design};
 use upright_design::plant::PlantError;
 use upright_design::plant::reference::ReferenceError;
 use upright_design::rig::{Chain, PlantDescription, Rig, RigError};
@@ -113,11 +113,12 @@ pub const STAGES: u64 = 5;
 /// [`ReproduceError`] if a result cannot be computed.
 pub fn reproduce(rigs: &PaperRigs, stage: &dyn Fn(&'static str)) -> Result<Reproduction, ReproduceError> {
     stage("matrices, gains and poles");
-    let designs = designs(rigs)?;
+    let designed = PaperDesigns::of(rigs)?;
+    let designs = designs(rigs, &designed)?;
     stage("errata");
-    let errata = errata(rigs)?;
+    let errata = errata(rigs, &designed)?;
     stage("step responses");
-    let loops = Loops::of(&rigs.exact)?;
+    let loops = Loops::with(&rigs.exact, designed.exact)?;
     let responses = responses(&loops)?;
     stage("Table 2");
     let settling = settling(rigs)?;
@@ -146,6 +147,25 @@ impl PaperRigs {
             if file.is_file() { Ok(Rig::from_path(&file)?) } else { Err(ReproduceError::NoRigs(file)) }
         };
         Ok(Self { exact: read("quadruple-paper.toml")?, printed: read("quadruple-paper-printed.toml")? })
+    }
+}
+
+/// The designs of both rig files.
+#[derive(Debug, Clone, PartialEq)]
+pub struct PaperDesigns {
+    /// That of [`PaperRigs::exact`].
+    pub exact: Certified,
+    /// That of [`PaperRigs::printed`].
+    pub printed: Certified,
+}
+
+impl PaperDesigns {
+    /// Designs both.
+    ///
+    /// # Errors
+    /// [`ReproduceError::Design`] if one has no solution.
+    pub fn of(rigs: &PaperRigs) -> Result<Self, ReproduceError> {
+        Ok(Self { exact: design(&rigs.exact)?, printed: design(&rigs.printed)? })
     }
 }
 

@@ -55,7 +55,11 @@ impl Loops {
     /// [`ReproduceError`] if the rig is not a chain, asks for one law only, or has no design.
     pub fn of(rig: &Rig) -> Result<Self, ReproduceError> {
         chain(rig)?;
-        let certified = design(rig)?;
+        Self::with(rig, design(rig)?)
+    }
+
+    /// With this design of `rig`, a chain.
+    pub(super) fn with(rig: &Rig, certified: Certified) -> Result<Self, ReproduceError> {
         if certified.double.continuous.each().into_array().contains(&None) {
             return Err(ReproduceError::OneLaw(rig.name.clone()));
         }

@@ -9,7 +9,7 @@ use upright::table::Law;
 use super::continuous_loop::ContinuousRun;
 use super::course::Course;
 use super::{PaperRigs, ReproduceError, SEED, chain, published};
-use upright_design::design::{Feedback, design};
+use upright_design::design::{Certified, DesignError, Feedback, design};
 use upright_design::parallel;
 use upright_design::plant::reference::Tolerance;
 use upright_design::rig::{PolePlacement, Rig, Tick};
@@ -83,15 +83,13 @@ pub fn printed() -> [bool; 7] {
 /// # Errors
 /// [`ReproduceError`] if a design or a run fails.
 pub fn settling(rigs: &PaperRigs) -> Result<Settling, ReproduceError> {
-    let exact = parallel::try_map(published::TABLE_2, |(settling_time_s, _)| {
-        placement(&asking_for(&rigs.exact, settling_time_s))
-    })?;
     let changes = Change::all();
-    let jobs: Vec<(usize, f64, &Feedback<f64>)> = (0..changes.len())
-        .flat_map(|change| published::TABLE_2.iter().zip(&exact).map(move |(row, law)| (change, row.0, law)))
+    let exact = ExactDesigns::of(&rigs.exact, &changes)?;
+    let jobs: Vec<(usize, f64)> = (0..changes.len())
+        .flat_map(|change| published::TABLE_2.iter().map(move |row| (change, row.0)))
         .collect();
-    let courses = parallel::try_map(jobs, |(change, settling_time_s, exact)| {
-        changes[change].1.course(rigs, settling_time_s, exact)
+    let courses = parallel::try_map(jobs, |(change, settling_time_s)| {
+        changes[change].1.course(rigs, settling_time_s, &exact)
     })?;
     let mut groups = courses.chunks_exact(published::TABLE_2.len()).zip(&changes);
     let sensitivity = groups
@@ -138,6 +136,37 @@ fn agreeing(courses: &[Course], step_m: f64) -> Option<[f64; 2]> {
     let first = (0..=steps).find(agrees)?;
     let last = (first..=steps).rev().find(agrees)?;
     (first..=last).all(|step| agrees(&step)).then_some([first as f64 * STEP_S, last as f64 * STEP_S])
+}
+
+/// The designs of the exact model for every settling time, at each tick once: several changes have the same one.
+struct ExactDesigns(Vec<(Tick, f64, Certified)>);
+
+impl ExactDesigns {
+    fn of(exact: &Rig, changes: &[(&'static str, Change)]) -> Result<Self, ReproduceError> {
+        let mut ticks = vec![&exact.tick];
+        for (_, change) in changes {
+            if let Change::Firmware { tick, .. } = change
+                && !ticks.contains(&tick)
+            {
+                ticks.push(tick);
+            }
+        }
+        let asked: Vec<(&Tick, f64)> = ticks
+            .iter()
+            .flat_map(|&tick| published::TABLE_2.map(|(settling_time_s, _)| (tick, settling_time_s)))
+            .collect();
+        let designed = parallel::try_map(asked, |(tick, settling_time_s)| {
+            let rig = Rig { tick: tick.clone(), ..asking_for(exact, settling_time_s) };
+            Ok::<_, DesignError>((tick.clone(), settling_time_s, design(&rig)?))
+        })?;
+        Ok(Self(designed))
+    }
+
+    /// The design of `rig`, the exact model at any tick for this settling time.
+    fn at(&self, rig: &Rig, settling_time_s: f64) -> Result<Certified, DesignError> {
+        let found = self.0.iter().find(|(tick, time, _)| (tick, *time) == (&rig.tick, settling_time_s));
+        found.map_or_else(|| design(rig), |(.., found)| Ok(found.clone()))
+    }
 }
 
 /// What is changed.
@@ -198,12 +227,11 @@ impl Change {
         }
     }
 
-    /// `exact` are the gains of the exact model.
     fn course(
         &self,
         rigs: &PaperRigs,
         settling_time_s: f64,
-        exact: &Feedback<f64>,
+        exact: &ExactDesigns,
     ) -> Result<Course, ReproduceError> {
         let mut rig = asking_for(&rigs.exact, settling_time_s);
         match self {
@@ -216,7 +244,8 @@ impl Change {
                 if let upright_design::rig::PlantDescription::Chain(chain) = &mut rig.plant {
                     chain.cart.travel_m = [-1e3, 1e3]; // the paper has no rail
                 }
-                let table = TableValues::of(&rig, &design(&rig)?, *gains)?.without_governor();
+                let table =
+                    TableValues::of(&rig, &exact.at(&rig, settling_time_s)?, *gains)?.without_governor();
                 let scenario = Scenario {
                     sensing: Sensing::FullState,
                     step_m: RUN.step_m,
@@ -240,13 +269,17 @@ fn asking_for(rig: &Rig, wanted_s: f64) -> Rig {
 }
 
 impl GainsFrom {
-    /// The gains for this settling time; `exact` are those of the exact model.
+    /// The gains for this settling time.
     fn law(
         &self,
         rigs: &PaperRigs,
         settling_time_s: f64,
-        exact: &Feedback<f64>,
+        exact: &ExactDesigns,
     ) -> Result<Feedback<f64>, ReproduceError> {
+        let of_file = || {
+            let rig = asking_for(&rigs.exact, settling_time_s);
+            placed(&rig, exact.at(&rig, settling_time_s)?)
+        };
         let moved = |to: &dyn Fn(f64) -> f64| {
             let mut rig = asking_for(&rigs.exact, settling_time_s);
             if let Some(PolePlacement::Response { far_poles, .. }) = &mut rig.pole_placement {
@@ -257,8 +290,8 @@ impl GainsFrom {
             placement(&rig)
         };
         match self {
-            GainsFrom::Exact => Ok(exact.clone()),
-            GainsFrom::Rounded => Ok(Feedback {
+            GainsFrom::Exact => of_file(),
+            GainsFrom::Rounded => of_file().map(|exact| Feedback {
                 k: exact.k.map(|gain| (gain * 1e2).round() / 1e2),
                 n: exact.n.map(|n| (n * 1e4).round() / 1e4),
                 integral: false,
@@ -272,6 +305,11 @@ impl GainsFrom {
 
 /// Continuous gains of the pole placement that `rig` asks for.
 fn placement(rig: &Rig) -> Result<Feedback<f64>, ReproduceError> {
-    let law = design(rig)?.double.continuous.pole_placement;
+    placed(rig, design(rig)?)
+}
+
+/// Continuous gains of the pole placement in this design of `rig`.
+fn placed(rig: &Rig, designed: Certified) -> Result<Feedback<f64>, ReproduceError> {
+    let law = designed.double.continuous.pole_placement;
     law.ok_or_else(|| ReproduceError::OneLaw(rig.name.clone()))
 }
