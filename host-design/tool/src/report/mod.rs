@@ -49,9 +49,14 @@ pub struct Source<'a> {
     pub tour: Option<&'a Demonstration>,
     /// How far its links may be pushed on the way; empty: the page has no such part.
     pub margins: &'a [(Way, Vec<Margin>)],
+    /// Starts along each axis of the map of the region of attraction, at least 2; usually [`REGION_POINTS`].
+    pub region_points: usize,
     /// The command that made the report, to make it again.
     pub command: &'a str,
 }
+
+/// Starts along each axis of the map of the region of attraction.
+pub const REGION_POINTS: usize = 31;
 
 /// A report.
 #[derive(Debug, Clone, PartialEq)]
@@ -139,7 +144,7 @@ pub fn report(source: &Source<'_>, stage: &dyn Fn(&str)) -> Result<Report, Repor
     if page.drawing.is_some() && !stable.is_empty() {
         stage("region of attraction");
         for law in stable {
-            let figure = region::figure(rig, table, law)?;
+            let figure = region::figure(rig, table, law, source.region_points)?;
             keep("region", law, &figure)?;
             page.regions.push(Plot::of(&figure, law.title().to_owned())?);
         }

@@ -7,19 +7,23 @@ use upright_design::rig::Rig;
 use upright_design::table::TableValues;
 use upright_design::verify::{Axis, Horizon, Map, Unverifiable, attraction_map};
 
-/// Starts along each axis of the map.
-const POINTS: usize = 31;
 const ANGLE: usize = 2;
 const RATE: usize = 3;
 /// Approximate largest angle (rad) and rate (rad/s) of the map.
 const LARGEST: [f64; 2] = [0.8, 8.0];
 
-/// Map over angle and rate of the first joint, wide enough to show the whole region.
-pub(super) fn figure(rig: &Rig, table: &TableValues, law: Law) -> Result<Figure, Unverifiable> {
+/// Map over angle and rate of the first joint, wide enough to show the whole region, with `points` starts along each
+/// axis.
+pub(super) fn figure(
+    rig: &Rig,
+    table: &TableValues,
+    law: Law,
+    points: usize,
+) -> Result<Figure, Unverifiable> {
     const WIDER: f64 = 1.6;
     let axis = |state: usize, largest: f64| -> Result<Axis, Unverifiable> {
         let end = 1.4 * extent(rig, table, law, state, largest)?;
-        Ok(Axis { state, range: [-end, end], points: POINTS })
+        Ok(Axis { state, range: [-end, end], points })
     };
     let mut axes = [axis(ANGLE, LARGEST[0])?, axis(RATE, LARGEST[1])?];
     let map = loop {

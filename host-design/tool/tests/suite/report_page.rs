@@ -4,8 +4,11 @@ use std::path::Path;
 
 use upright_design::swing_up::{Margin, Way};
 
-use crate::report_rigs::{LINEAR, SINGLE, quick_report, report_with_imperfections, report_with_margins};
+use crate::report_rigs::{
+    LINEAR, SINGLE, coarse_report, quick_report, report_with_imperfections, report_with_margins,
+};
 use upright_design::rig::Rig;
+use upright_tool::report::{REGION_POINTS, Report};
 
 const LARGEST: usize = 5_000_000;
 
@@ -18,6 +21,12 @@ fn chain(links: usize, name: &str) -> Rig {
         weights.join(", ")
     );
     Rig::from_toml(&text, Path::new("test.toml")).unwrap()
+}
+
+/// The most that a page with coarse maps would have with fine ones: a rectangle of 200 bytes for each start.
+fn with_fine_maps(report: &Report) -> usize {
+    let maps = report.pictures.iter().filter(|picture| picture.name.starts_with("region-")).count();
+    report.html.len() + maps * REGION_POINTS * REGION_POINTS * 200
 }
 
 fn ids(html: &str) -> Vec<&str> {
@@ -49,7 +58,7 @@ fn a_rig_gets_a_whole_page_that_needs_nothing_else() {
 #[test]
 fn the_same_rig_gets_the_same_page() {
     let rig = chain(1, "twice");
-    assert_eq!(quick_report(&rig), quick_report(&rig));
+    assert_eq!(coarse_report(&rig), coarse_report(&rig));
 }
 
 #[test]
@@ -65,8 +74,8 @@ fn a_linear_model_has_no_drawing_and_the_page_says_so() {
 #[test]
 fn a_chain_of_one_or_six_links_without_encoders_has_a_page() {
     for links in [1, 6] {
-        let report = quick_report(&chain(links, "links"));
-        assert!(report.html.len() < LARGEST, "{links} links: {}", report.html.len());
+        let report = coarse_report(&chain(links, "links"));
+        assert!(with_fine_maps(&report) < LARGEST, "{links} links: {}", with_fine_maps(&report));
         assert!(report.html.contains(&format!("{links} link")));
         let names: Vec<&str> = report.pictures.iter().map(|picture| picture.name.as_str()).collect();
         assert_eq!(
@@ -79,7 +88,7 @@ fn a_chain_of_one_or_six_links_without_encoders_has_a_page() {
 #[test]
 fn a_name_from_a_rig_file_cannot_become_a_script() {
     let name = "</title><script>alert(1)</script><img src=x onerror=alert(2)>";
-    let report = quick_report(&chain(1, name));
+    let report = coarse_report(&chain(1, name));
     assert!(!report.html.contains("<script>alert"), "the name is markup");
     assert!(!report.html.contains("<img"), "the name is markup");
     assert_eq!(report.html.matches("<script").count(), 2);
@@ -139,7 +148,7 @@ fn imperfections_have_a_table_and_two_figures_where_they_are_asked_for() {
     assert!(!plain.html.contains("id=\"imperfections\""));
     for name in ["single-quanser-ip02", "double-quanser-dbpen", "quadruple-paper"] {
         let report = report_with_imperfections(&crate::report_rigs::rig(name));
-        assert!(report.html.contains("id=\"imperfections\"") && report.html.len() < LARGEST, "{name}");
+        assert!(report.html.contains("id=\"imperfections\"") && with_fine_maps(&report) < LARGEST, "{name}");
         for key in ["joint_friction_n_m", "parameter_spread_percent"] {
             assert_eq!(
                 report.html.matches(&format!("<td><code>{key}</code></td>")).count(),

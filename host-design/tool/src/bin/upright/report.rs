@@ -11,7 +11,7 @@ use upright_design::swing_up::{Demonstration, Script, Stored, motions, with_moti
 use upright_design::table::{TableValues, write_atomically};
 use upright_design::verify::{Effort, trust};
 use upright_tool::in_the_loop::RunError;
-use upright_tool::report::{Report as Page, Source, report};
+use upright_tool::report::{REGION_POINTS, Report as Page, Source, report};
 
 use super::swing_up::with_margins;
 use super::verify::search;
@@ -101,6 +101,7 @@ impl Report {
                     swing_up: run.as_ref(),
                     tour: tour.as_ref(),
                     margins: &pushes,
+                    region_points: REGION_POINTS,
                     command: &self.as_typed(),
                 };
                 let page = report(&source, stage)?;

@@ -9,7 +9,7 @@ use upright_design::rig::Rig;
 use upright_design::swing_up::{Margin, Way};
 use upright_design::table::{Gains, TableValues};
 use upright_design::verify::{ImperfectionSettings, LawTrust, TrustReport, imperfections, linear};
-use upright_tool::report::{Report, Source, report};
+use upright_tool::report::{REGION_POINTS, Report, Source, report};
 
 /// A rig from this repository.
 pub(crate) fn rig(name: &str) -> Rig {
@@ -19,7 +19,15 @@ pub(crate) fn rig(name: &str) -> Rig {
 
 /// The report on a rig, without the slow half of the trust report.
 pub(crate) fn quick_report(rig: &Rig) -> Report {
-    made(rig, None, &[])
+    made(rig, None, &[], REGION_POINTS)
+}
+
+/// Starts along each axis of a coarse map of the region of attraction.
+const COARSE: usize = 7;
+
+/// [`quick_report`] with a coarse map, for what does not depend on it.
+pub(crate) fn coarse_report(rig: &Rig) -> Report {
+    made(rig, None, &[], COARSE)
 }
 
 /// [`quick_report`] on `single-quanser-ip02`: made once, several tests look at it.
@@ -28,19 +36,24 @@ pub(crate) static SINGLE: LazyLock<Report> = LazyLock::new(|| quick_report(&rig(
 /// [`quick_report`] on a linear model, `quadruple-paper-printed`.
 pub(crate) static LINEAR: LazyLock<Report> = LazyLock::new(|| quick_report(&rig("quadruple-paper-printed")));
 
-/// [`quick_report`] with what the LQR stands of each imperfection, from short runs.
+/// [`coarse_report`] with what the LQR stands of each imperfection, from short runs.
 pub(crate) fn report_with_imperfections(rig: &Rig) -> Report {
     let settings =
         ImperfectionSettings { duration_s: 2.0, seeds: 1, relative: 0.5, ..ImperfectionSettings::of(rig) };
-    made(rig, Some(settings), &[])
+    made(rig, Some(settings), &[], COARSE)
 }
 
-/// [`quick_report`] with these margins.
+/// [`coarse_report`] with these margins.
 pub(crate) fn report_with_margins(rig: &Rig, margins: &[(Way, Vec<Margin>)]) -> Report {
-    made(rig, None, margins)
+    made(rig, None, margins, COARSE)
 }
 
-fn made(rig: &Rig, settings: Option<ImperfectionSettings>, margins: &[(Way, Vec<Margin>)]) -> Report {
+fn made(
+    rig: &Rig,
+    settings: Option<ImperfectionSettings>,
+    margins: &[(Way, Vec<Margin>)],
+    region_points: usize,
+) -> Report {
     let certified = design(rig).unwrap();
     let table = TableValues::of(rig, &certified, Gains::Sampled).unwrap();
     let laws = linear(rig, &certified, &table).unwrap().into_iter().map(|linear| LawTrust {
@@ -65,6 +78,7 @@ fn made(rig: &Rig, settings: Option<ImperfectionSettings>, margins: &[(Way, Vec<
         swing_up: None,
         tour: None,
         margins,
+        region_points,
         command: "upright report test",
     };
     report(&source, &|_| {}).unwrap()
