@@ -4,6 +4,8 @@
 
 use std::path::Path;
 
+use serde_json::Value;
+
 use crate::report_devtools::Browser;
 use crate::report_rigs::{LINEAR, SINGLE};
 
@@ -13,16 +15,37 @@ const TELEPHONE: u32 = 390;
 const GEOMETRY: &str =
     "[...document.querySelectorAll('.stage line, .stage circle')].map((e) => e.outerHTML).join()";
 const CURSORS: &str = "[...document.querySelectorAll('.cursor')].map((line) => line.getAttribute('x1'))";
-const WAIT: &str = "new Promise((done) => setTimeout(done, 500))";
+/// Frames in which an animation that runs has moved on.
+const WAIT: &str = "new Promise((done) => { let frames = 12; \
+                    const next = () => { frames -= 1; frames ? requestAnimationFrame(next) : done(); }; next(); })";
+
+/// Adds a fault unless this holds.
+fn require(faults: &mut Vec<String>, holds: bool, fault: &str) {
+    if !holds {
+        faults.push(fault.to_owned());
+    }
+}
+
+/// What a page is looked at on.
+#[derive(Debug, Clone, Copy)]
+enum Medium {
+    Screen,
+    Telephone,
+    Paper,
+}
 
 /// Everything that is wrong with a page.
 fn faults(browser: &mut Browser, page: &Path, is_drawn: bool) -> Vec<String> {
+    let (mut faults, light) = on_a_screen(browser, page, is_drawn);
+    faults.extend(on_a_telephone(browser, page, &light));
+    faults.extend(on_paper(browser, page, &light));
+    faults
+}
+
+/// Its faults on a wide screen, and the colour of the page there.
+fn on_a_screen(browser: &mut Browser, page: &Path, is_drawn: bool) -> (Vec<String>, Value) {
     let mut faults = Vec::new();
-    let mut check = |holds: bool, fault: &str| {
-        if !holds {
-            faults.push(fault.to_owned());
-        }
-    };
+    let mut check = |holds: bool, fault: &str| require(&mut faults, holds, fault);
     browser.open(page, 1200, "light", "screen");
     check(browser.value("!document.getElementById('player').hidden") == true, "no player");
     if is_drawn {
@@ -45,15 +68,14 @@ fn faults(browser: &mut Browser, page: &Path, is_drawn: bool) -> Vec<String> {
     let before = browser.value(CURSORS);
     browser.value(scrub);
     let after = browser.value(CURSORS);
-    let moved =
-        |before: &serde_json::Value, after: &serde_json::Value| match (before.as_array(), after.as_array()) {
-            (Some(before), Some(after)) => {
-                panels > 0
-                    && before.len() == panels
-                    && before.iter().zip(after).all(|(before, after)| before != after)
-            }
-            _ => false,
-        };
+    let moved = |before: &Value, after: &Value| match (before.as_array(), after.as_array()) {
+        (Some(before), Some(after)) => {
+            panels > 0
+                && before.len() == panels
+                && before.iter().zip(after).all(|(before, after)| before != after)
+        }
+        _ => false,
+    };
     check(moved(&before, &after), "scrubbing does not move every cursor");
     let press = "{ const p = document.querySelector('figure[data-areas] svg'); const b = p.getBoundingClientRect(); \
                  p.dispatchEvent(new PointerEvent('pointerdown', { clientX: b.left + 0.5 * b.width })); }";
@@ -66,6 +88,13 @@ fn faults(browser: &mut Browser, page: &Path, is_drawn: bool) -> Vec<String> {
     for error in browser.errors() {
         check(false, &format!("error: {error}"));
     }
+    (faults, light)
+}
+
+/// Its faults on a dark telephone, for a page that has the colour `light` elsewhere.
+fn on_a_telephone(browser: &mut Browser, page: &Path, light: &Value) -> Vec<String> {
+    let mut faults = Vec::new();
+    let mut check = |holds: bool, fault: &str| require(&mut faults, holds, fault);
     browser.open(page, TELEPHONE, "dark", "screen");
     let width = browser.value("document.documentElement.scrollWidth").as_u64();
     check(width.is_some_and(|width| width <= u64::from(TELEPHONE)), "it scrolls sideways on a telephone");
@@ -75,12 +104,19 @@ fn faults(browser: &mut Browser, page: &Path, is_drawn: bool) -> Vec<String> {
         "text too small for a telephone",
     );
     let dark = browser.value("getComputedStyle(document.body).backgroundColor");
-    check(light != dark, "the page does not follow the dark scheme");
+    check(*light != dark, "the page does not follow the dark scheme");
     let ink = browser.value("getComputedStyle(document.querySelector('svg.plot text')).fill");
     check(ink != "rgb(0, 0, 0)", "the plots do not follow the dark scheme");
+    faults
+}
+
+/// Its faults when it is printed.
+fn on_paper(browser: &mut Browser, page: &Path, light: &Value) -> Vec<String> {
+    let mut faults = Vec::new();
+    let mut check = |holds: bool, fault: &str| require(&mut faults, holds, fault);
     browser.open(page, 800, "dark", "print");
     check(
-        browser.value("getComputedStyle(document.body).backgroundColor") == light,
+        browser.value("getComputedStyle(document.body).backgroundColor") == *light,
         "it prints on dark paper",
     );
     let controls = browser.value("getComputedStyle(document.querySelector('.controls')).display");
@@ -106,35 +142,50 @@ fn the_page_works_in_a_browser_and_each_of_its_faults_is_found() {
     let html = &SINGLE.html;
     std::fs::write(&page, html).unwrap();
     assert_eq!(faults(&mut browser, &page, true), Vec::<String>::new());
+    browser.open(&page, 1200, "light", "screen");
+    let light = browser.value("getComputedStyle(document.body).backgroundColor");
 
+    use Medium::{Paper, Screen, Telephone};
     let broken = [
-        ("</body>", "<script>throw new Error('on purpose')</script></body>", "on purpose"),
+        (Screen, "</body>", "<script>throw new Error('on purpose')</script></body>", "on purpose"),
         (
+            Screen,
             "</body>",
             "<script src=\"https://upright.invalid/x.js\"></script></body>",
             "request for https://upright.invalid",
         ),
-        ("<main>", "<main><div style=\"width: 600px\">too wide</div>", "it scrolls sideways on a telephone"),
-        ("drawMachine();", "", "the animation does not move"),
-        ("requestAnimationFrame(tick);", "", "the animation does not move"),
-        ("moveCursors();", "", "scrubbing does not move every cursor"),
         (
+            Telephone,
+            "<main>",
+            "<main><div style=\"width: 600px\">too wide</div>",
+            "it scrolls sideways on a telephone",
+        ),
+        (Screen, "drawMachine();", "", "the animation does not move"),
+        (Screen, "requestAnimationFrame(tick);", "", "the animation does not move"),
+        (Screen, "moveCursors();", "", "scrubbing does not move every cursor"),
+        (
+            Telephone,
             "prefers-color-scheme: dark",
             "prefers-color-scheme: none",
             "the page does not follow the dark scheme",
         ),
-        ("@media screen and (prefers", "@media (prefers", "it prints on dark paper"),
-        ("nav, .controls, noscript", "nav, noscript", "it prints its buttons"),
+        (Paper, "@media screen and (prefers", "@media (prefers", "it prints on dark paper"),
+        (Paper, "nav, .controls, noscript", "nav, noscript", "it prints its buttons"),
         (
+            Telephone,
             "<svg class=\"plot\"",
             "<svg style=\"width: 150px\" class=\"plot\"",
             "text too small for a telephone",
         ),
     ];
-    for (part, instead, fault) in broken {
+    for (medium, part, instead, fault) in broken {
         assert!(html.contains(part), "{part}");
         std::fs::write(&page, html.replace(part, instead)).unwrap();
-        let found = faults(&mut browser, &page, true);
+        let found = match medium {
+            Screen => on_a_screen(&mut browser, &page, true).0,
+            Telephone => on_a_telephone(&mut browser, &page, &light),
+            Paper => on_paper(&mut browser, &page, &light),
+        };
         assert!(found.iter().any(|found| found.contains(fault)), "{fault}: {found:?}");
     }
 
