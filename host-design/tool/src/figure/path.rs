@@ -33,8 +33,10 @@ impl Map<'_> {
     /// The pieces of a line within the panel.
     pub(super) fn lines(&self, points: &[[f64; 2]]) -> Vec<Vec<(i32, i32)>> {
         let mut lines: Vec<Vec<(i32, i32)>> = Vec::new();
-        for pair in points.windows(2) {
-            let [from, to] = [self.share(pair[0]), self.share(pair[1])];
+        let mut before = None;
+        for point in points {
+            let to = self.share(*point);
+            let Some(from) = before.replace(to) else { continue };
             let Some([from, to]) = clip(from, to) else { continue };
             let [from, to] = [self.units(from), self.units(to)];
             match lines.last_mut() {
@@ -48,6 +50,11 @@ impl Map<'_> {
 
 /// The part of a segment within the unit square (Liang and Barsky, 1984).
 fn clip(from: [f64; 2], to: [f64; 2]) -> Option<[[f64; 2]; 2]> {
+    let is_inside = |[x, y]: [f64; 2]| x >= 0.0 && x <= 1.0 && y >= 0.0 && y <= 1.0;
+    if is_inside(from) && is_inside(to) {
+        // Most segments, and all of their ends: the same sums as below.
+        return Some([from, [from[0] + (to[0] - from[0]), from[1] + (to[1] - from[1])]]);
+    }
     if !from.iter().chain(&to).all(|value| value.is_finite()) {
         return None;
     }
