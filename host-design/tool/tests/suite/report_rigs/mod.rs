@@ -30,8 +30,8 @@ pub(crate) fn coarse_report(rig: &Rig) -> Report {
     made(rig, None, &[], COARSE)
 }
 
-/// [`quick_report`] on `single-quanser-ip02`: made once, several tests look at it.
-pub(crate) static SINGLE: LazyLock<Report> = LazyLock::new(|| quick_report(&rig("single-quanser-ip02")));
+/// [`coarse_report`] on `single-quanser-ip02`: made once, several tests look at it.
+pub(crate) static SINGLE: LazyLock<Report> = LazyLock::new(|| coarse_report(&rig("single-quanser-ip02")));
 
 /// [`quick_report`] on a linear model, `quadruple-paper-printed`.
 pub(crate) static LINEAR: LazyLock<Report> = LazyLock::new(|| quick_report(&rig("quadruple-paper-printed")));
