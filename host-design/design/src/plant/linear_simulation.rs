@@ -57,8 +57,8 @@ impl LinearSimulation {
 fn times(a_transposed: &Matrix<f64>, x: &[f64], product: &mut [f64]) {
     product.fill(0.0);
     let states = product.len();
-    for i in 0..x.len() {
-        let (column, factor) = (&a_transposed.entries()[i * states..(i + 1) * states], x[i]);
+    for (i, factor) in x.iter().enumerate() {
+        let column = &a_transposed.entries()[i * states..(i + 1) * states];
         for j in 0..states {
             product[j] += column[j] * factor;
         }

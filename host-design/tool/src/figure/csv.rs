@@ -18,7 +18,7 @@ impl Figure {
             for curve in &panel.curves {
                 let start = start(&curve.name)?;
                 for [x, y] in &curve.points {
-                    write!(text, "{start}{x},{y},\n").map_err(failed)?;
+                    writeln!(text, "{start}{x},{y},").map_err(failed)?;
                 }
             }
             for map in panel.heat.iter() {

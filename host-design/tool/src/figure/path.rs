@@ -50,7 +50,7 @@ impl Map<'_> {
 
 /// The part of a segment within the unit square (Liang and Barsky, 1984).
 fn clip(from: [f64; 2], to: [f64; 2]) -> Option<[[f64; 2]; 2]> {
-    let is_inside = |[x, y]: [f64; 2]| x >= 0.0 && x <= 1.0 && y >= 0.0 && y <= 1.0;
+    let is_inside = |[x, y]: [f64; 2]| (0.0..=1.0).contains(&x) && (0.0..=1.0).contains(&y);
     if is_inside(from) && is_inside(to) {
         // Most segments, and all of their ends: the same sums as below.
         return Some([from, [from[0] + (to[0] - from[0]), from[1] + (to[1] - from[1])]]);
