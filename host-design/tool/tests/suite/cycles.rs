@@ -23,12 +23,10 @@ const TASK_US: f64 = 31.5;
 const JITTER_US: f64 = 15.8;
 const CONTROLLER_CYCLES: u32 = 2_230;
 
-fn measured(image: &Image) -> Cycles {
-    let rig = Rig::from_path("../../rigs/quadruple-paper.toml".as_ref()).unwrap();
-    let table = TableValues::of(&rig, &design(&rig).unwrap(), Gains::Sampled).unwrap();
+fn measured(rig: &Rig, table: &TableValues, image: &Image) -> Cycles {
     let scenario =
-        Scenario { duration_s: 0.5, force_noise_n: 0.1, substeps: 2, ..Scenario::at_rest(&rig, Law::Lqr) };
-    let cycles = measure(&rig, &table, &scenario, image, &Conditions::f405(1)).unwrap();
+        Scenario { duration_s: 0.5, force_noise_n: 0.1, substeps: 2, ..Scenario::at_rest(rig, Law::Lqr) };
+    let cycles = measure(rig, table, &scenario, image, &Conditions::f405(1)).unwrap();
     assert_eq!(cycles.ended, None);
     cycles
 }
@@ -82,6 +80,9 @@ fn slower(image: &Image, turns: u8) -> Image {
 fn the_ticks_of_the_image_stay_within_their_limits_and_those_of_a_slower_one_do_not() {
     let Some(elf) = build_if_possible(Kind::Board(Board::WeactF405)).unwrap() else { return };
     let image = Image::from_elf(&std::fs::read(elf).unwrap()).unwrap();
+    let rig = Rig::from_path("../../rigs/quadruple-paper.toml".as_ref()).unwrap();
+    let table = TableValues::of(&rig, &design(&rig).unwrap(), Gains::Sampled).unwrap();
+    let measured = |image: &Image| measured(&rig, &table, image);
     let cycles = measured(&image);
     println!("{cycles:#?}");
     assert_eq!(beyond(&cycles), [""; 0]);

@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 use upright::supervision::fault::Fault;
-use upright_board::{Conditions, Image, Time, UNITS_PER_MICROSECOND};
+use upright_board::{Conditions, Image, Part, TickCost, Time, UNITS_PER_MICROSECOND};
 use upright_design::harness::{Harness, HarnessError, record};
 use upright_design::rig::Rig;
 use upright_design::simulate::Scenario;
@@ -10,7 +10,7 @@ use upright_design::swing_up::up_and_down;
 use upright_design::table::TableValues;
 
 use super::VirtualBoard;
-use super::meter::{Part, TickCost};
+use super::places::places;
 use crate::in_the_loop::RunError;
 
 /// A stretch of time: cycles of the core, which are approximate, and microseconds.
@@ -186,9 +186,10 @@ pub fn measure(
     image: &Image,
     conditions: &Conditions,
 ) -> Result<Cycles, RunError> {
+    let places = places(image);
     let run = |action: &Action<'_>| {
         let mut board = VirtualBoard::start(image, conditions, table)?;
-        board.measure_ticks();
+        board.measure_ticks(places.clone());
         let mut driven = 0;
         let ended = match action(&mut board, &mut driven) {
             Ok(fault) => fault.map(|fault| format!("it ends with fault {fault}")),

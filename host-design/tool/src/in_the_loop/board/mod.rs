@@ -2,7 +2,7 @@
 
 mod compared;
 mod cycles;
-mod meter;
+mod places;
 
 use std::cell::RefCell;
 use std::collections::VecDeque;
@@ -13,8 +13,8 @@ use upright::control::actuator::Drive;
 use upright::protocol::simulated_pins::Sabotage;
 use upright::protocol::{BAUD, telemetry_ticks};
 use upright_board::{
-    Board, Conditions, Image, Input, PowerStage, Rules, Stopped, Time, UNITS_PER_MICROSECOND,
-    UNITS_PER_SECOND, Wire, Wiring, seconds,
+    Board, Conditions, Image, Input, Meter, Place, PowerStage, Rules, Stopped, TickCost, Time,
+    UNITS_PER_MICROSECOND, UNITS_PER_SECOND, Wire, Wiring, seconds,
 };
 use upright_design::harness::{HarnessError, Pace, Pins, Target};
 use upright_design::simulate::Bench;
@@ -22,7 +22,6 @@ use upright_design::table::TableValues;
 
 pub use compared::Compared;
 pub use cycles::{Cycles, Figures, Span, TooLong, measure};
-use meter::{Meter, TickCost};
 
 /// Inputs change so long before a tick.
 const LEAD: Time = 2 * UNITS_PER_MICROSECOND;
@@ -168,14 +167,14 @@ impl VirtualBoard {
         self.stage
     }
 
-    /// From now on measures every tick: slower, and otherwise the same.
-    fn measure_ticks(&mut self) {
-        self.meter = Some(Meter::new(&self.image));
+    /// From now on measures every tick, with the places of its half-words: slower, and otherwise the same.
+    fn measure_ticks(&mut self, places: Vec<Place>) {
+        self.meter = Some(Meter::new(places));
     }
 
     /// The ticks that were measured.
     fn ticks(&self) -> &[TickCost] {
-        self.meter.as_ref().map_or(&[], |meter| &meter.ticks)
+        self.meter.as_ref().map_or(&[], Meter::ticks)
     }
 
     /// Longest time from an edge of the emergency stop to an output that is off; none if it never opened between

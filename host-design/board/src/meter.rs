@@ -1,0 +1,135 @@
+//! Where the time of each tick goes, instruction by instruction.
+
+use crate::board::Board;
+use crate::clock::Time;
+use crate::error::Stopped;
+use crate::processor::nvic;
+
+/// Number of the tick's interrupt among the exceptions.
+const SYS_TICK: u16 = nvic::SYS_TICK as u16;
+/// Where code is.
+const FLASH: u32 = 0x0800_0000;
+
+/// A part of the tick.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Part {
+    /// From the time at which the tick is due to the first input: the interrupt's entry.
+    Entry,
+    /// All inputs are read.
+    Inputs,
+    /// Supervisor and controller.
+    Control,
+    /// The motor is driven.
+    Output,
+    /// After the output: a command, telemetry, the prediction, checks of the table, the return.
+    Rest,
+}
+
+/// Number of parts.
+const PARTS: usize = 5;
+
+/// What the source says of an instruction; nothing if it belongs to whatever has called it.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct Place {
+    /// Its part.
+    pub part: Option<Part>,
+    /// Whether it is in the controller.
+    pub controller: Option<bool>,
+}
+
+/// One tick.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct TickCost {
+    /// From the time at which it is due to the restart of the motor's timer with its new duty; none with the motor
+    /// off.
+    pub latency: Option<Time>,
+    /// By part.
+    pub parts: [Time; PARTS],
+    /// Of this, the controller: the control law with its estimate, and the prediction.
+    pub controller: Time,
+    /// From the time at which it is due to its end.
+    pub whole: Time,
+}
+
+/// Runs a board and measures its ticks.
+#[derive(Debug)]
+pub struct Meter {
+    /// By half-words of flash.
+    places: Vec<Place>,
+    running: Option<Running>,
+    ticks: Vec<TickCost>,
+}
+
+#[derive(Debug, Clone, Copy)]
+struct Running {
+    due: Time,
+    part: Part,
+    in_controller: bool,
+    cost: TickCost,
+}
+
+impl Meter {
+    /// With the place of each half-word of flash; what is beyond belongs to whatever has called it.
+    pub fn new(places: Vec<Place>) -> Self {
+        Self { places, running: None, ticks: Vec::new() }
+    }
+
+    /// All ticks that have ended.
+    pub fn ticks(&self) -> &[TickCost] {
+        &self.ticks
+    }
+
+    /// Runs until `end`; ticks are executed one instruction after the other.
+    ///
+    /// # Errors
+    /// [`Stopped`]
+    pub fn run(&mut self, board: &mut Board, end: Time) -> Result<(), Stopped> {
+        while board.now() < end {
+            let Some(mut running) = self.running.take() else {
+                let due = board.next_tick().unwrap_or(end);
+                board.run_until(due.min(end))?;
+                self.running = (due < end).then(|| Running::new(due));
+                continue;
+            };
+            let (begin, pc, exception) = (board.now(), board.program_counter(), board.exception());
+            board.step()?;
+            let time = board.now() - begin;
+            if exception == SYS_TICK {
+                running.enter(self.places.get((pc.wrapping_sub(FLASH) / 2) as usize));
+            }
+            running.spend(time);
+            if exception == SYS_TICK && board.exception() != SYS_TICK {
+                self.ticks.push(running.end(board));
+            } else {
+                self.running = Some(running);
+            }
+        }
+        Ok(())
+    }
+}
+
+impl Running {
+    fn new(due: Time) -> Self {
+        Self { due, part: Part::Entry, in_controller: false, cost: TickCost::default() }
+    }
+
+    fn enter(&mut self, place: Option<&Place>) {
+        let Place { part, controller } = place.copied().unwrap_or_default();
+        self.part = part.unwrap_or(self.part);
+        self.in_controller = controller.unwrap_or(self.in_controller);
+    }
+
+    fn spend(&mut self, time: Time) {
+        self.cost.parts[self.part as usize] += time;
+        if self.in_controller {
+            self.cost.controller += time;
+        }
+    }
+
+    fn end(self, board: &mut Board) -> TickCost {
+        let stage = board.power_stage();
+        let drives = stage.main_output && stage.started_at >= self.due;
+        let latency = drives.then(|| stage.started_at - self.due);
+        TickCost { latency, whole: board.now() - self.due, ..self.cost }
+    }
+}

@@ -1,0 +1,80 @@
+//! What the functions of the image are in a tick.
+
+use std::collections::HashMap;
+
+use rustc_demangle::demangle;
+use upright_board::{Image, Part, Place};
+
+/// Where code is.
+const FLASH: u32 = 0x0800_0000;
+
+/// The places of all half-words, by the image's debug information; without it, nothing is known of any.
+pub(super) fn places(image: &Image) -> Vec<Place> {
+    let lines = image.lines();
+    // Some hundred functions have thousands of instructions.
+    let mut known = HashMap::new();
+    let place = |half_word: usize| {
+        let names = lines.as_ref().map_or(Vec::new(), |lines| lines.functions(FLASH + 2 * half_word as u32));
+        place_of(names, &mut known)
+    };
+    (0..image.end() / 2).map(place).collect()
+}
+
+/// By the functions that an instruction is in, the innermost first; what is `known` of each is not found out again.
+fn place_of(names: Vec<String>, known: &mut HashMap<String, Place>) -> Place {
+    names.into_iter().fold(Place::default(), |place, name| {
+        let own = known.entry(name).or_insert_with_key(|name| {
+            let path = format!("{:#}", demangle(name));
+            Place { part: part_of(&path), controller: is_controller(&path) }
+        });
+        Place { part: place.part.or(own.part), controller: place.controller.or(own.controller) }
+    })
+}
+
+/// The part of the tick that a function is, by its path.
+fn part_of(path: &str) -> Option<Part> {
+    let is =
+        |owner: &str, names: &[&str]| path.contains(owner) && names.iter().any(|name| path.ends_with(name));
+    if is("Hardware", &["::inputs"]) {
+        Some(Part::Inputs)
+    } else if is("Hardware", &["::drive"]) {
+        Some(Part::Output)
+    } else if is("firmware::Firmware", &["::accept", "::drive"]) {
+        Some(Part::Control)
+    } else if is("firmware::Firmware", &["::report", "::predict", "::complete"])
+        || path.contains("protocol::queue")
+        || is("Hardware", &["::feed_watchdog"])
+    {
+        Some(Part::Rest)
+    } else {
+        None
+    }
+}
+
+/// Whether a function belongs to the controller; nothing if its caller says so.
+fn is_controller(path: &str) -> Option<bool> {
+    if path.contains("control::controller::Controller") {
+        Some(true)
+    } else if ["firmware::", "supervision::", "Hardware"].iter().any(|other| path.contains(other)) {
+        Some(false)
+    } else {
+        None
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_innermost_function_with_a_part_decides() {
+        let names =
+            ["core::f32::abs", "upright::control::controller::Controller::predict"].map(str::to_owned);
+        let mut chain = names.to_vec();
+        let place_of = |chain: &[String]| place_of(chain.to_vec(), &mut HashMap::new());
+        assert_eq!(place_of(&chain), Place { part: None, controller: Some(true) });
+        chain.push("upright::firmware::Firmware<_,_,_>::complete".to_owned());
+        assert_eq!(place_of(&chain), Place { part: Some(Part::Rest), controller: Some(true) });
+        assert_eq!(place_of(&[]), Place::default());
+    }
+}
