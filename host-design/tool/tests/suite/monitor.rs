@@ -343,12 +343,13 @@ fn monitored(said: &str) -> Vec<Value> {
 
 #[test]
 fn a_set_point_from_the_monitor_moves_the_firmware_and_holds_it() {
+    // Negative control: without a request, nobody moves it. Both in real time, so at the same time.
+    let control = std::thread::spawn(|| monitored(""));
     let moved = monitored("set-point 0.05\n");
+    let still = control.join().unwrap();
     let last = moved.last().unwrap();
     assert!(moved.len() > 50, "{}", moved.len());
     assert!(moved.iter().all(|telemetry| telemetry["state"] == "Balancing"), "{last}");
     assert!((last["setpoint_m"].as_f64().unwrap() - 0.05).abs() < 1e-6, "{last}");
-    // Negative control: without a request, nobody moves it.
-    let still = monitored("");
     assert_eq!(still.last().unwrap()["setpoint_m"], 0.0);
 }

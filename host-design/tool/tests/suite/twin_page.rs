@@ -18,6 +18,8 @@ use crate::report_devtools::Browser;
 
 const TELEPHONE: u32 = 390;
 const STATE: &str = "document.getElementById('state').dataset.state ?? ''";
+/// The fastest that the page offers.
+const FASTEST: f64 = 4.0;
 const MACHINE: &str = "upright.seen.picture.machine";
 
 /// A running twin. Dropping it ends it.
@@ -70,17 +72,37 @@ fn wait(seconds: f64) {
     std::thread::sleep(Duration::from_secs_f64(seconds));
 }
 
-/// Waits until an expression is true.
-fn until(browser: &mut Browser, expression: &str) {
+/// Waits for so long at the most (s) until an expression is true; gives whether it is.
+fn comes_within(browser: &mut Browser, seconds: f64, expression: &str) -> bool {
     let begin = Instant::now();
     while browser.value(&format!("Boolean({expression})")) != true {
-        assert!(
-            begin.elapsed() < Duration::from_secs(90),
-            "never: {expression}; state {}",
-            browser.value(STATE)
-        );
+        if begin.elapsed().as_secs_f64() > seconds {
+            return false;
+        }
         wait(0.05);
     }
+    true
+}
+
+/// Waits until an expression is true.
+fn until(browser: &mut Browser, expression: &str) {
+    let is_there = comes_within(browser, 90.0, expression);
+    assert!(is_there, "never: {expression}; state {}", browser.value(STATE));
+}
+
+/// From now on, time of the rig goes so many times as fast as real time.
+fn set_speed(browser: &mut Browser, factor: f64) {
+    browser.value(&format!(
+        "{{ const speed = document.getElementById('speed'); speed.value = '{factor}'; \
+         speed.dispatchEvent(new Event('change')); }}"
+    ));
+    until(browser, &format!("{MACHINE}.factor === {factor}"));
+}
+
+/// Waits until so much time of the rig has passed.
+fn let_pass(browser: &mut Browser, seconds: f64) {
+    let begin = browser.value(&format!("{MACHINE}.t_s")).as_f64().unwrap();
+    until(browser, &format!("{MACHINE}.t_s > {}", begin + seconds));
 }
 
 fn until_state(browser: &mut Browser, state: &str) {
@@ -136,11 +158,13 @@ fn a_link_that_is_pulled_comes_back_and_one_that_is_pulled_too_far_is_a_fault_th
     let pulled = pull(&mut browser, 1, 4.0, 0.4);
     assert_eq!(pulled["body"], 1, "{pulled}");
     until(&mut browser, &format!("{MACHINE}.pull === null"));
-    wait(1.5);
+    set_speed(&mut browser, FASTEST);
+    let_pass(&mut browser, 1.5);
     assert_eq!(browser.value(STATE), "Balancing");
     let angle = browser.value(&format!("Math.abs({MACHINE}.state[2])"));
     assert!(angle.as_f64().is_some_and(|angle| angle < 0.05), "{angle}");
 
+    set_speed(&mut browser, 1.0);
     pull(&mut browser, 1, 250.0, 1.0);
     until_state(&mut browser, "Fault");
     let told = browser.value("document.getElementById('fault').textContent");
@@ -162,15 +186,16 @@ fn a_link_that_is_pulled_comes_back_and_one_that_is_pulled_too_far_is_a_fault_th
         browser.key("k");
         until(&mut browser, "!upright.seen.telemetry.against_arming.join().includes('signs')");
     }
+    let sign_is_known = "!upright.seen.telemetry.against_arming.join().includes('motor')";
     for _ in 0..10 {
-        if browser.value("upright.seen.telemetry.against_arming.join().includes('motor')") == false {
+        if browser.value(sign_is_known) == true {
             break;
         }
         // A key that is held until the motor has moved the cart.
         browser.value("document.dispatchEvent(new KeyboardEvent('keydown', { key: 'm' }))");
-        wait(1.0);
+        comes_within(&mut browser, 1.0, sign_is_known);
         browser.value("document.dispatchEvent(new KeyboardEvent('keyup', { key: 'm' }))");
-        wait(0.5);
+        comes_within(&mut browser, 0.5, sign_is_known);
     }
     browser.key("u");
     until(&mut browser, &format!("Math.abs(Math.sin({MACHINE}.state[2] / 2)) < 1e-9"));
@@ -194,7 +219,9 @@ fn until_done(browser: &mut Browser, key: &str, expression: &str) {
             return;
         }
         browser.key(key);
-        wait(0.5);
+        if comes_within(browser, 0.5, expression) {
+            return;
+        }
     }
     panic!("never: {expression}; {}", browser.value("document.getElementById('log').textContent"));
 }
@@ -212,8 +239,9 @@ fn a_weaker_motor_topples_the_rig_at_the_gain_margin_that_verify_gives() {
     until_state(&mut browser, "Balancing");
     // So near to the margin, the rig's usual force noise topples it in 1 of 100 runs.
     set(&mut browser, "force-noise", 0.0);
+    set_speed(&mut browser, FASTEST);
     set(&mut browser, "force", (120.0 * margin).ceil() - 100.0);
-    wait(6.0);
+    let_pass(&mut browser, 6.0);
     let fault = browser.value("document.getElementById('fault').textContent");
     assert_eq!(browser.value(STATE), "Balancing", "falls with 1.2 times the force of the margin: {fault}");
     set(&mut browser, "force", (80.0 * margin).floor() - 100.0);
@@ -243,11 +271,7 @@ fn the_page_records_draws_its_scopes_and_fits_on_a_telephone() {
     until_state(&mut browser, "Balancing");
     assert_ne!(browser.value("getComputedStyle(document.body).backgroundColor"), dark);
     for factor in [4.0, 0.1, 1.0] {
-        browser.value(&format!(
-            "{{ const speed = document.getElementById('speed'); speed.value = '{factor}'; \
-             speed.dispatchEvent(new Event('change')); }}"
-        ));
-        until(&mut browser, &format!("{MACHINE}.factor === {factor}"));
+        set_speed(&mut browser, factor);
     }
     assert_eq!(browser.errors(), Vec::<String>::new());
 }
@@ -258,7 +282,8 @@ fn a_minute_of_running_needs_no_more_memory() {
     let twin = Twin::start("quadruple-paper", &[]);
     browser.open_address(&twin.address, 640, "light", "screen");
     until_state(&mut browser, "Balancing");
-    wait(10.0);
+    set_speed(&mut browser, FASTEST);
+    let_pass(&mut browser, 10.0);
     let heap = |browser: &mut Browser| {
         browser.collect_garbage();
         browser.value("performance.memory.usedJSHeapSize").as_f64().unwrap()
@@ -267,7 +292,7 @@ fn a_minute_of_running_needs_no_more_memory() {
     let frames = browser.value("upright.seen.frames").as_f64().unwrap();
     let worked_s = browser.worked_s();
     let begin = Instant::now();
-    wait(50.0);
+    let_pass(&mut browser, 50.0);
     let seconds = begin.elapsed().as_secs_f64();
     let frames = browser.value("upright.seen.frames").as_f64().unwrap() - frames;
     let (rate, work_ms) = (frames / seconds, 1e3 * (browser.worked_s() - worked_s) / frames);
