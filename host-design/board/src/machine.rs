@@ -277,7 +277,8 @@ impl Machine {
         Ok(instruction)
     }
 
-    fn allowed(&self, address: u32, purpose: Purpose) -> bool {
+    #[inline]
+    fn allowed(&mut self, address: u32, purpose: Purpose) -> bool {
         let registers = &self.registers;
         let suspended = registers.faultmask || matches!(registers.ipsr, 2 | 3);
         self.bus.system.mpu.allows(address, purpose, registers.privileged(), suspended)

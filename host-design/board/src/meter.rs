@@ -85,7 +85,7 @@ impl Meter {
     /// [`Stopped`]
     pub fn run(&mut self, board: &mut Board, end: Time) -> Result<(), Stopped> {
         while board.now() < end {
-            let Some(mut running) = self.running.take() else {
+            let Some(running) = &mut self.running else {
                 let due = board.next_tick().unwrap_or(end);
                 board.run_until(due.min(end))?;
                 self.running = (due < end).then(|| Running::new(due));
@@ -100,8 +100,7 @@ impl Meter {
             running.spend(time);
             if exception == SYS_TICK && board.exception() != SYS_TICK {
                 self.ticks.push(running.end(board));
-            } else {
-                self.running = Some(running);
+                self.running = None;
             }
         }
         Ok(())
@@ -126,7 +125,7 @@ impl Running {
         }
     }
 
-    fn end(self, board: &mut Board) -> TickCost {
+    fn end(&self, board: &mut Board) -> TickCost {
         let stage = board.power_stage();
         let drives = stage.main_output && stage.started_at >= self.due;
         let latency = drives.then(|| stage.started_at - self.due);

@@ -18,6 +18,24 @@ pub(crate) struct Mpu {
     regions: [Region; REGIONS],
     /// It allows everything, whatever its registers say.
     pub(crate) ignored: bool,
+    /// The last addresses that were allowed, by purpose and by the upper three bits; nothing since a register changed.
+    known: [[Known; 8]; 3],
+}
+
+/// Addresses that are all allowed: those that are `begin` where `mask` is set.
+#[derive(Debug, Clone, Copy)]
+struct Known {
+    begin: u32,
+    mask: u32,
+    privileged: bool,
+    suspended: bool,
+}
+
+impl Default for Known {
+    /// None.
+    fn default() -> Self {
+        Self { begin: 1, mask: 0, privileged: false, suspended: false }
+    }
 }
 
 #[derive(Debug, Clone, Copy, Default)]
@@ -29,6 +47,21 @@ struct Region {
 impl Region {
     fn size_bits(self) -> u32 {
         (self.attributes >> 1 & 31) + 1
+    }
+
+    /// Of how many bits the block around an address may be, at the most, for the region to cover all of it or nothing.
+    fn uniform_bits(self, address: u32) -> u32 {
+        let bits = self.size_bits();
+        if self.attributes & 1 == 0 || bits < 5 {
+            return 32;
+        }
+        // The base counts from the size on.
+        let differs = address.checked_shr(bits).unwrap_or(0) ^ self.base.checked_shr(bits).unwrap_or(0);
+        match differs.checked_ilog2() {
+            Some(highest) => bits + highest,
+            None if bits >= 8 => bits - 3,
+            None => bits,
+        }
     }
 
     fn covers(self, address: u32) -> bool {
@@ -49,7 +82,34 @@ impl Mpu {
     }
 
     /// Whether an access is allowed. `suspended`: in HardFault, NMI or with FAULTMASK.
-    pub(crate) fn allows(&self, address: u32, purpose: Purpose, privileged: bool, suspended: bool) -> bool {
+    #[inline]
+    pub(crate) fn allows(
+        &mut self,
+        address: u32,
+        purpose: Purpose,
+        privileged: bool,
+        suspended: bool,
+    ) -> bool {
+        let known = self.known[purpose as usize][(address >> 29) as usize];
+        if address & known.mask == known.begin
+            && (known.privileged, known.suspended) == (privileged, suspended)
+        {
+            return true;
+        }
+        let allowed = self.decide(address, purpose, privileged, suspended);
+        if allowed {
+            // What is decided by the address alone changes with its upper bits.
+            let by_address = if address >> 29 == 7 { 20 } else { 29 };
+            let bits =
+                self.regions.iter().fold(by_address, |bits, region| bits.min(region.uniform_bits(address)));
+            let mask = u32::MAX << bits;
+            self.known[purpose as usize][(address >> 29) as usize] =
+                Known { begin: address & mask, mask, privileged, suspended };
+        }
+        allowed
+    }
+
+    fn decide(&self, address: u32, purpose: Purpose, privileged: bool, suspended: bool) -> bool {
         if !self.enabled() || (suspended && self.control & 2 == 0) || address >> 20 == 0xe00 {
             return true;
         }
@@ -84,6 +144,7 @@ impl Mpu {
     }
 
     pub(crate) fn write(&mut self, offset: u32, value: u32) -> bool {
+        self.known = Default::default();
         match offset {
             0x94 => self.control = value & 7,
             0x98 => self.number = value & 7,
@@ -97,5 +158,54 @@ impl Mpu {
             _ => return false,
         }
         true
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The answers that are remembered are those that are found anew.
+    #[test]
+    fn what_was_allowed_around_an_address_is_allowed_there() {
+        let mut noise = 1u64;
+        let mut random = || {
+            noise ^= noise << 13;
+            noise ^= noise >> 7;
+            noise ^= noise << 17;
+            noise.wrapping_mul(0x2545_f491_4f6c_dd1d) >> 32
+        };
+        let mut known = 0;
+        for _ in 0..300 {
+            let mut mpu = Mpu::default();
+            // Regions and accesses near each other, of all sizes, some switched off, some with subregions.
+            let near = |random: &mut dyn FnMut() -> u64| {
+                let upper = [0, 0x0800_0000, 0x2000_0000, 0x4000_0000, 0xe000_0000][random() as usize % 5];
+                upper + (random() as u32 >> (8 + random() % 24))
+            };
+            for number in 0..REGIONS as u32 {
+                let base = near(&mut random);
+                mpu.write(0x9c, base & !0x1f | 0x10 | number);
+                let subregions = [0, 0xff & random() as u32][number as usize % 2] << 8;
+                let size = [random() as u32 % 32, 3 + random() as u32 % 14][number as usize / 4];
+                let access = random() as u32 & 0x1700_0000;
+                mpu.write(0xa0, access | subregions | size << 1 | u32::from(random() % 4 > 0));
+            }
+            mpu.write(0x94, 1 | random() as u32 & 6);
+            for _ in 0..1000 {
+                let address = near(&mut random);
+                let purpose = [Purpose::Read, Purpose::Write, Purpose::Execute][random() as usize % 3];
+                let (privileged, suspended) = (random() % 8 > 0, random() % 8 == 0);
+                let entry = mpu.known[purpose as usize][(address >> 29) as usize];
+                known += usize::from(address & entry.mask == entry.begin);
+                let decided = mpu.decide(address, purpose, privileged, suspended);
+                assert_eq!(
+                    mpu.allows(address, purpose, privileged, suspended),
+                    decided,
+                    "{address:x} {mpu:?}"
+                );
+            }
+        }
+        assert!(known > 10_000, "{known}");
     }
 }
