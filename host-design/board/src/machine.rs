@@ -18,7 +18,7 @@ const FLASH: u32 = 0x0800_0000;
 pub(crate) struct Machine {
     pub(crate) registers: Registers,
     pub(crate) bus: Bus,
-    /// Decoded flash, by half-words.
+    /// Decoded flash, by half-words. The last one is for code elsewhere, decoded every time.
     decoded: Vec<Instruction>,
     pub(crate) next: u32,
     pub(crate) cycles: u32,
@@ -50,7 +50,7 @@ impl Machine {
         Self {
             registers,
             bus,
-            decoded: vec![undecoded; code_bytes / 2 + 1],
+            decoded: vec![undecoded; code_bytes / 2 + 2],
             next: 0,
             cycles: 0,
             in_it: false,
@@ -184,8 +184,9 @@ impl Machine {
         self.executed += 1;
         self.cycles = 1;
         let it = self.registers.it;
-        let done = match self.instruction(pc) {
-            Ok(instruction) => {
+        let done = match self.decoded_at(pc) {
+            Ok(place) => {
+                let instruction = self.decoded[place];
                 self.next = pc.wrapping_add(instruction.length.into());
                 self.registers.r[15] = pc.wrapping_add(4);
                 if it == 0 {
@@ -239,21 +240,29 @@ impl Machine {
         }
     }
 
-    /// The instruction at an address, from the cache if it is in flash.
-    #[inline]
+    /// The instruction at an address.
     pub(crate) fn instruction(&mut self, pc: u32) -> Result<Instruction, Trap> {
+        self.decoded_at(pc).map(|place| self.decoded[place])
+    }
+
+    /// The place among the decoded instructions of the one at an address.
+    #[inline]
+    fn decoded_at(&mut self, pc: u32) -> Result<usize, Trap> {
         if self.bus.system.mpu.enabled() && !self.allowed(pc, Purpose::Execute) {
             return Err(Fault::MemoryInstruction.into());
         }
-        let index = (pc.wrapping_sub(FLASH) >> 1) as usize;
-        match self.decoded.get(index) {
-            Some(instruction) if instruction.op != Op::Undecoded => Ok(*instruction),
-            _ => self.decode_at(pc, index),
+        let elsewhere = self.decoded.len() - 1;
+        let place = (pc.wrapping_sub(FLASH) >> 1) as usize;
+        if place < elsewhere && !matches!(self.decoded[place].op, Op::Undecoded) {
+            return Ok(place);
         }
+        let place = place.min(elsewhere);
+        self.decoded[place] = self.decode_at(pc)?;
+        Ok(place)
     }
 
     #[cold]
-    fn decode_at(&mut self, pc: u32, index: usize) -> Result<Instruction, Trap> {
+    fn decode_at(&mut self, pc: u32) -> Result<Instruction, Trap> {
         let nothing = |bus: &Bus, address| bus.nothing_at(address, Violation::Unmapped(address));
         let first = self.bus.fetch(pc).ok_or_else(|| nothing(&self.bus, pc))?;
         let second = if is_wide(first) {
@@ -261,7 +270,7 @@ impl Machine {
         } else {
             0
         };
-        let instruction = decode(first, second, pc).map_err(|undecodable| {
+        decode(first, second, pc).map_err(|undecodable| {
             if self.bus.rules.faults_are_taken {
                 return Fault::UndefinedInstruction.into();
             }
@@ -270,11 +279,7 @@ impl Machine {
                 Undecodable::Unknown => Violation::UnknownInstruction(code),
                 Undecodable::Unpredictable => Violation::Unpredictable(code),
             })
-        })?;
-        if let Some(place) = self.decoded.get_mut(index) {
-            *place = instruction;
-        }
-        Ok(instruction)
+        })
     }
 
     #[inline]

@@ -96,6 +96,12 @@ impl Mpu {
         {
             return true;
         }
+        self.ask(address, purpose, privileged, suspended)
+    }
+
+    /// Decides, and remembers what is allowed.
+    #[cold]
+    fn ask(&mut self, address: u32, purpose: Purpose, privileged: bool, suspended: bool) -> bool {
         let allowed = self.decide(address, purpose, privileged, suspended);
         if allowed {
             // What is decided by the address alone changes with its upper bits.
