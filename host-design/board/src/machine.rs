@@ -256,12 +256,15 @@ impl Machine {
         if place < elsewhere && !matches!(self.decoded[place].op, Op::Undecoded) {
             return Ok(place);
         }
-        let place = place.min(elsewhere);
+        self.decode_into(place.min(elsewhere), pc)
+    }
+
+    #[cold]
+    fn decode_into(&mut self, place: usize, pc: u32) -> Result<usize, Trap> {
         self.decoded[place] = self.decode_at(pc)?;
         Ok(place)
     }
 
-    #[cold]
     fn decode_at(&mut self, pc: u32) -> Result<Instruction, Trap> {
         let nothing = |bus: &Bus, address| bus.nothing_at(address, Violation::Unmapped(address));
         let first = self.bus.fetch(pc).ok_or_else(|| nothing(&self.bus, pc))?;

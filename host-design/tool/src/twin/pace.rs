@@ -9,7 +9,7 @@ const BUDGET: Duration = Duration::from_millis(14);
 /// Slowest motion.
 const SLOWEST: f64 = 1.0 / 50.0;
 /// Fastest.
-const FASTEST: f64 = 4.0;
+const FASTEST: f64 = 10.0;
 
 /// How many ticks are due.
 #[derive(Debug)]
