@@ -28,6 +28,7 @@ mod prediction;
 mod realise;
 mod record;
 mod recorder;
+mod rows;
 mod shooting;
 mod step;
 mod verdict;

@@ -4,6 +4,7 @@
 #![allow(clippy::needless_range_loop)]
 
 use super::parameters::Layout;
+use super::rows::add_multiple;
 
 /// The chain with the letters of `ChainParameters`, for any number of links n, in the m = n + 1 coordinates x, φ_1 …
 /// φ_n.
@@ -281,7 +282,7 @@ fn solve(factors: &[f64], m: usize, columns: usize, rows: &mut [f64]) {
         let (first, second) = rows.split_at_mut(high * columns);
         let (first, second) = (&mut first[low * columns..][..columns], &mut second[..columns]);
         let (to, from) = if to < from { (first, &*second) } else { (second, &*first) };
-        to.iter_mut().zip(from).for_each(|(to, from)| *to -= factor * from);
+        add_multiple(to, -factor, from);
     };
     for i in 1..m {
         for k in 0..i {

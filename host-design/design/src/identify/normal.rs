@@ -1,5 +1,7 @@
 //! Normal equations of least squares, in parameters that are scaled by their prior deviations.
 
+use super::rows::add_multiple;
+
 /// `A δ = g` with `A = Σ w J Jᵀ` and `g = Σ w J e`.
 #[derive(Debug, Clone)]
 pub(super) struct Normal {
@@ -42,7 +44,7 @@ impl Normal {
             }
             self.gradient[i] += factor * error;
             let row = &mut self.matrix[i * self.size..][..i + 1];
-            row.iter_mut().zip(jacobian).for_each(|(entry, &of_j)| *entry += factor * of_j);
+            add_multiple(row, factor, jacobian);
         }
     }
 

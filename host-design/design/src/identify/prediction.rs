@@ -7,6 +7,7 @@ use super::model::{Input, Model};
 use super::normal::Normal;
 use super::parameters::{Layout, Prior};
 use super::record::Record;
+use super::rows::add_multiple;
 use super::shooting::scaled;
 use super::step::Step;
 use crate::parallel;
@@ -253,9 +254,9 @@ impl State {
             let gain = self.column[i] / predicted;
             self.at[i] += gain * error;
             let row = &mut self.covariance[i * s..][..s];
-            row.iter_mut().zip(&self.column).for_each(|(entry, column)| *entry -= gain * column);
+            add_multiple(row, -gain, &self.column);
             let row = &mut self.by[i * size..][..size];
-            row.iter_mut().zip(&*jacobian).for_each(|(entry, by)| *entry -= gain * by);
+            add_multiple(row, -gain, jacobian);
         }
         for (entry, prior) in jacobian.iter_mut().zip(filter.priors) {
             *entry *= prior.deviation;
@@ -272,7 +273,7 @@ impl State {
         self.other.fill(0.0);
         for (row, local) in self.other.chunks_exact_mut(s).zip(step.by.chunks_exact(step.columns)) {
             for (factor, from) in local[..s].iter().zip(self.covariance.chunks_exact(s)) {
-                row.iter_mut().zip(from).for_each(|(row, from)| *row += factor * from);
+                add_multiple(row, *factor, from);
             }
         }
         for (i, row) in self.other.chunks_exact(s).enumerate() {
@@ -297,7 +298,7 @@ impl State {
                 of_motion.copy_from_slice(&local[s..]);
                 others.fill(0.0);
                 for (factor, from) in local[..s].iter().zip(self.by.chunks_exact(size)) {
-                    row.iter_mut().zip(from).for_each(|(row, from)| *row += factor * from);
+                    add_multiple(row, *factor, from);
                 }
             }
             core::mem::swap(&mut self.by, &mut self.next_by);

@@ -7,6 +7,7 @@ use super::model::{Input, Model};
 use super::normal::{Cholesky, Normal};
 use super::parameters::Prior;
 use super::record::Record;
+use super::rows::{add_multiple, set_multiple};
 use super::step::Step;
 use crate::parallel;
 
@@ -262,10 +263,10 @@ impl Shooting<'_> {
                 let error = y[sample * m + channel] - measured.value;
                 let own = &by[channel * columns..][..columns];
                 row[columns..].fill(0.0);
-                row.iter_mut().zip(own).for_each(|(row, own)| *row = measured.by_angle * own);
+                set_multiple(&mut row, measured.by_angle, own);
                 if channel > 1 {
                     let below = &by[(channel - 1) * columns..][..columns];
-                    row.iter_mut().zip(below).for_each(|(row, below)| *row -= measured.by_angle * below);
+                    add_multiple(&mut row, -measured.by_angle, below);
                 }
                 if self.free {
                     for (index, by) in model.measured_by(channel, &measured) {
@@ -337,7 +338,7 @@ fn propagate(step: &Step, by: &[f64], next: &mut [f64], s: usize, columns: usize
         row[..s].fill(0.0);
         row[s..].copy_from_slice(&local[s..]);
         for (factor, from) in local[..s].iter().zip(by.chunks_exact(columns)) {
-            row.iter_mut().zip(from).for_each(|(row, from)| *row += factor * from);
+            add_multiple(row, *factor, from);
         }
     }
 }

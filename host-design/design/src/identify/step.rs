@@ -3,6 +3,7 @@
 use core::f64::consts::PI;
 
 use super::model::{Input, Local, Model};
+use super::rows::{add_multiple, set_multiple};
 
 /// A step of the classical Runge–Kutta method, with derivatives by the state at its start and by the parameters.
 #[derive(Debug, Clone)]
@@ -51,10 +52,8 @@ impl Step {
         self.rate_by.fill(0.0);
         for (part, weight) in STAGES {
             let h = part * dt;
-            for ((at, &start), &rate) in self.at.iter_mut().zip(start).zip(&self.rate) {
-                *at = start + h * rate;
-            }
-            self.at_by.iter_mut().zip(&self.rate_by).for_each(|(at, &rate)| *at = h * rate);
+            (0..s).for_each(|i| self.at[i] = start[i] + h * self.rate[i]);
+            set_multiple(&mut self.at_by, h, &self.rate_by);
             (0..s).for_each(|i| self.at_by[i * columns + i] += 1.0);
             bend(model, start, &mut self.at, &mut self.at_by);
             self.local.differentiate(model, p, &self.at, input);
@@ -69,12 +68,12 @@ impl Step {
                 row[s..].copy_from_slice(&local[s..]);
                 // No acceleration depends on x.
                 for (factor, of_state) in local[1..s].iter().zip(self.at_by.chunks_exact(columns).skip(1)) {
-                    row.iter_mut().zip(of_state).for_each(|(row, &of_state)| *row += factor * of_state);
+                    add_multiple(row, *factor, of_state);
                 }
             }
             let h = weight * dt;
-            self.end.iter_mut().zip(&self.rate).for_each(|(end, &rate)| *end += h * rate);
-            self.by.iter_mut().zip(&self.rate_by).for_each(|(by, &rate)| *by += h * rate);
+            add_multiple(&mut self.end, h, &self.rate);
+            add_multiple(&mut self.by, h, &self.rate_by);
         }
         bend(model, start, &mut self.end, &mut self.by);
     }
@@ -92,7 +91,7 @@ fn bend(model: &Model, start: &[f64], at: &mut [f64], by: &mut [f64]) {
     at[last] = bent;
     let columns = by.len() / at.len();
     let (others, row) = by.split_at_mut(last * columns);
-    row.iter_mut().zip(&others[..columns]).for_each(|(row, of_cart)| *row = by_travel * of_cart);
+    set_multiple(row, by_travel, &others[..columns]);
     row[0] -= by_travel;
     row[last] += by_start;
 }

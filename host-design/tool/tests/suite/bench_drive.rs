@@ -14,13 +14,12 @@ use upright::supervision::sign_check::Signs;
 use upright::supervision::supervisor::State;
 use upright::table::Law;
 use upright_board::{Conditions, Image};
-use upright_design::design::design;
 use upright_design::harness::{AnyTelemetry, Harness};
-use upright_design::rig::Rig;
 use upright_design::simulate::Scenario;
-use upright_design::table::{Gains, TableValues};
 use upright_tool::image::{Board, Kind, build_if_possible};
 use upright_tool::in_the_loop::{Link, Place, RunError};
+
+use crate::designed::designed;
 
 const ALONG: Request = Request::Drive { along: true };
 const AGAINST: Request = Request::Drive { along: false };
@@ -129,18 +128,12 @@ impl Person<'_, '_> {
     }
 }
 
-fn quadruple() -> (Rig, TableValues) {
-    let rig = Rig::from_path("../../rigs/quadruple-paper.toml".as_ref()).unwrap();
-    let table = TableValues::of(&rig, &design(&rig).unwrap(), Gains::Sampled).unwrap();
-    (rig, table)
-}
-
 /// Homed and with checked signs, the links hanging: then `test`. Gives all telemetry.
 fn at_the_bench(place: Place<'_>, test: impl FnOnce(&mut Person<'_, '_>)) -> Vec<AnyTelemetry> {
-    let (rig, table) = quadruple();
-    let scenario = Scenario::at_rest(&rig, Law::Lqr);
-    let run = place.with_target(&table, |target| -> Result<_, RunError> {
-        let mut harness = Harness::new(&rig, &table, &scenario, target)?;
+    let (rig, table) = designed("quadruple-paper");
+    let scenario = Scenario::at_rest(rig, Law::Lqr);
+    let run = place.with_target(table, |target| -> Result<_, RunError> {
+        let mut harness = Harness::new(rig, table, &scenario, target)?;
         for tick in 0.. {
             harness.by_hand(tick)?;
             if harness.session.status().signs == Signs::Checked {

@@ -1,23 +1,15 @@
 //! A short campaign: every defect is found in time, there are no false alarms, and without detection the defects are
 //! missed.
 
-use std::path::Path;
-
 use upright_board::{Conditions, Image};
-use upright_design::design::design;
 use upright_design::rig::Rig;
 use upright_design::study::Study;
-use upright_design::table::{Gains, TableValues};
+use upright_design::table::TableValues;
 use upright_tool::campaign::{Campaign, During, Kind, Setup, Trial, campaign, feed, kinds, one};
 use upright_tool::image::{self, Board, build_if_possible};
 use upright_tool::in_the_loop::Place;
 
-fn rig(name: &str) -> (Rig, TableValues) {
-    let rig =
-        Rig::from_path(&Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../../rigs")).join(name)).unwrap();
-    let table = TableValues::of(&rig, &design(&rig).unwrap(), Gains::Sampled).unwrap();
-    (rig, table)
-}
+use crate::designed::designed;
 
 fn on_host<'a>(rig: &'a Rig, table: &'a TableValues) -> Setup<'a> {
     Setup { rig, table, place: Place::Host, detection: true, guards: true, during: During::Balancing }
@@ -29,10 +21,10 @@ fn run(setup: &Setup<'_>, kinds: &[Kind], runs: u64) -> Campaign {
 
 #[test]
 fn every_defect_is_found_and_nothing_else() {
-    for name in ["quadruple-paper.toml", "single-quanser-ip02.toml"] {
-        let (rig, table) = rig(name);
-        let kinds = kinds(&table, Place::Host);
-        let result = run(&on_host(&rig, &table), &kinds, 5 * kinds.len() as u64);
+    for name in ["quadruple-paper", "single-quanser-ip02"] {
+        let (rig, table) = designed(name);
+        let kinds = kinds(table, Place::Host);
+        let result = run(&on_host(rig, table), &kinds, 5 * kinds.len() as u64);
         for row in &result.rows {
             assert!(row.wrong.is_empty() && row.runs == 5, "{name}: {row:?}");
         }
@@ -41,10 +33,10 @@ fn every_defect_is_found_and_nothing_else() {
 
 #[test]
 fn without_detection_every_defect_that_needs_it_is_missed() {
-    let (rig, table) = rig("quadruple-paper.toml");
+    let (rig, table) = designed("quadruple-paper");
     let kinds: Vec<Kind> =
-        kinds(&table, Place::Host).into_iter().filter(|kind| kind.needs_detection()).collect();
-    let blind = Setup { detection: false, ..on_host(&rig, &table) };
+        kinds(table, Place::Host).into_iter().filter(|kind| kind.needs_detection()).collect();
+    let blind = Setup { detection: false, ..on_host(rig, table) };
     let result = run(&blind, &kinds, 4 * kinds.len() as u64);
     for row in &result.rows {
         assert!(row.missed > 0, "{row:?}");
@@ -58,10 +50,10 @@ fn while_driving(table: &TableValues, place: Place<'_>) -> Vec<Kind> {
 
 #[test]
 fn every_defect_of_a_bench_drive_is_found_and_nothing_else() {
-    for name in ["quadruple-paper.toml", "single-quanser-ip02.toml"] {
-        let (rig, table) = rig(name);
-        let kinds = while_driving(&table, Place::Host);
-        let setup = Setup { during: During::BenchDrive, ..on_host(&rig, &table) };
+    for name in ["quadruple-paper", "single-quanser-ip02"] {
+        let (rig, table) = designed(name);
+        let kinds = while_driving(table, Place::Host);
+        let setup = Setup { during: During::BenchDrive, ..on_host(rig, table) };
         let result = run(&setup, &kinds, 3 * kinds.len() as u64);
         for row in &result.rows {
             assert!(row.wrong.is_empty() && row.runs == 3, "{name}: {row:?}");
@@ -78,12 +70,12 @@ fn every_defect_of_a_bench_drive_is_found_and_nothing_else() {
 
 #[test]
 fn on_the_virtual_board_a_bench_drive_ends_with_its_defects_and_does_not_without_the_guards() {
-    let (rig, table) = rig("quadruple-paper.toml");
+    let (rig, table) = designed("quadruple-paper");
     let Some(elf) = build_if_possible(image::Kind::Board(Board::WeactF405)).unwrap() else { return };
     let image = Image::from_elf(&std::fs::read(elf).unwrap()).unwrap();
     let place = Place::Board { image: &image, conditions: Conditions::f405(1) };
-    let setup = Setup { place, during: During::BenchDrive, ..on_host(&rig, &table) };
-    let kinds = while_driving(&table, place);
+    let setup = Setup { place, during: During::BenchDrive, ..on_host(rig, table) };
+    let kinds = while_driving(table, place);
     for row in run(&setup, &kinds, kinds.len() as u64).rows {
         assert!(row.wrong.is_empty() && row.runs == 1, "{row:?}");
     }
@@ -97,13 +89,13 @@ fn on_the_virtual_board_a_bench_drive_ends_with_its_defects_and_does_not_without
 
 #[test]
 fn every_defect_of_a_rig_that_is_shaken_is_found_and_nothing_else() {
-    for name in ["quadruple-paper.toml", "single-quanser-ip02.toml"] {
-        let (rig, table) = rig(name);
-        let forces = feed(&rig, &table, 3).unwrap();
+    for name in ["quadruple-paper", "single-quanser-ip02"] {
+        let (rig, table) = designed(name);
+        let forces = feed(rig, table, 3).unwrap();
         let during = During::Shaking(&forces);
-        let setup = Setup { during, ..on_host(&rig, &table) };
+        let setup = Setup { during, ..on_host(rig, table) };
         let kinds: Vec<Kind> =
-            kinds(&table, Place::Host).into_iter().filter(|&kind| during.is_proof(kind)).collect();
+            kinds(table, Place::Host).into_iter().filter(|&kind| during.is_proof(kind)).collect();
         for row in &run(&setup, &kinds, 2 * kinds.len() as u64).rows {
             assert!(row.wrong.is_empty() && row.runs == 2, "{name}: {row:?}");
         }
@@ -119,8 +111,8 @@ fn every_defect_of_a_rig_that_is_shaken_is_found_and_nothing_else() {
 
 #[test]
 fn a_trial_is_the_same_every_time_and_does_not_depend_on_the_others() {
-    let (rig, table) = rig("quadruple-paper.toml");
-    let setup = on_host(&rig, &table);
+    let (rig, table) = designed("quadruple-paper");
+    let setup = on_host(rig, table);
     let kinds = [Kind::Overruns, Kind::MotorReversed, Kind::EncoderJump];
     let alone = |number| one(&setup, &kinds, 5, number).unwrap();
     // Alone, in any order, and as part of a campaign, whose rows summarise its trials.
@@ -135,7 +127,7 @@ fn a_trial_is_the_same_every_time_and_does_not_depend_on_the_others() {
         assert_eq!(of_kind().filter_map(|outcome| outcome.from_onset).max(), row.worst_from_onset, "{row:?}");
     }
     // Negative control: another seed or another number is another trial.
-    let trial = |seed, number| Trial { number: 0, ..Trial::draw(&rig, &table, &kinds, seed, number) };
+    let trial = |seed, number| Trial { number: 0, ..Trial::draw(rig, table, &kinds, seed, number) };
     assert_eq!(trial(5, 1), trial(5, 1));
     assert_ne!(trial(5, 1), trial(6, 1));
     assert_ne!(trial(5, 1), trial(5, 4));

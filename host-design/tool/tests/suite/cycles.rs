@@ -9,6 +9,8 @@ use upright_design::table::{Gains, TableValues};
 use upright_tool::image::{Board, Kind, build_for, build_if_possible, if_possible};
 use upright_tool::in_the_loop::{Cycles, Span, measure};
 
+use crate::designed::designed;
+
 /// Goals for the median of balancing: from the tick to the output, the whole task and the jitter of the output (µs).
 const GOAL_LATENCY_US: f64 = 8.0;
 const GOAL_TASK_US: f64 = 15.0;
@@ -80,8 +82,7 @@ fn slower(image: &Image, turns: u8) -> Image {
 fn the_ticks_of_the_image_stay_within_their_limits_and_those_of_a_slower_one_do_not() {
     let Some(elf) = build_if_possible(Kind::Board(Board::WeactF405)).unwrap() else { return };
     let image = Image::from_elf(&std::fs::read(elf).unwrap()).unwrap();
-    let rig = Rig::from_path("../../rigs/quadruple-paper.toml".as_ref()).unwrap();
-    let table = TableValues::of(&rig, &design(&rig).unwrap(), Gains::Sampled).unwrap();
+    let (rig, table) = designed("quadruple-paper").clone();
     let measured = |image: &Image| measured(&rig, &table, image);
     let cycles = measured(&image);
     println!("{cycles:#?}");

@@ -13,14 +13,13 @@ use upright::supervision::sign_check::Signs;
 use upright::supervision::supervisor::State;
 use upright::table::Law;
 use upright_board::{Conditions, Image};
-use upright_design::design::design;
 use upright_design::harness::{Pins, Session};
-use upright_design::rig::Rig;
 use upright_design::simulate::{Bench, Scenario};
-use upright_design::table::{Gains, TableValues};
 use upright_tool::image::{Board, Kind, build_if_possible, flash_checksum};
 use upright_tool::in_the_loop::VirtualBoard;
 use upright_tool::monitor::{Monitor, action, view};
+
+use crate::designed::designed;
 
 /// What the motor's force is multiplied with: 0 without the motor, -1 with its wires swapped.
 type Motor = f32;
@@ -249,8 +248,7 @@ fn first_balance(person: &mut Person<'_>) {
 fn the_guide_can_be_followed_step_by_step() {
     let Some(elf) = build_if_possible(Kind::Board(Board::WeactF405)).unwrap() else { return };
     let image = Image::from_elf(&std::fs::read(elf).unwrap()).unwrap();
-    let rig = Rig::from_path("../../rigs/quadruple-paper.toml".as_ref()).unwrap();
-    let table = TableValues::of(&rig, &design(&rig).unwrap(), Gains::Sampled).unwrap();
+    let (rig, table) = designed("quadruple-paper").clone();
     let mut board = VirtualBoard::start(&image, &Conditions::f405(1), &table).unwrap();
     let mut held = vec![0.0; rig.states()];
     held[2] = std::f64::consts::PI;

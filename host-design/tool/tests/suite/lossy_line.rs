@@ -7,11 +7,10 @@ use upright::board::Contacts;
 use upright::protocol::message::Request;
 use upright::supervision::supervisor::State;
 use upright::table::Law;
-use upright_design::design::design;
 use upright_design::harness::{Pins, with_firmware};
-use upright_design::rig::Rig;
-use upright_design::table::{Gains, TableValues};
 use upright_tool::monitor::{Action, Monitor};
+
+use crate::designed::designed;
 
 /// One direction of the line.
 struct Direction {
@@ -48,9 +47,8 @@ fn talk(
     duration_ms: u64,
     mut each: impl FnMut(u64, Duration, &mut Monitor, &mut [Direction; 2]),
 ) -> Monitor {
-    let rig = Rig::from_path("../../rigs/single-quanser-ip02.toml".as_ref()).unwrap();
+    let (rig, table) = designed("single-quanser-ip02").clone();
     assert_eq!(rig.tick.period_s, 0.002);
-    let table = TableValues::of(&rig, &design(&rig).unwrap(), Gains::Sampled).unwrap();
     let mut pins = Pins {
         raw_counts: heapless::Vec::from_slice(&vec![0; table.sensors()]).unwrap(),
         supply_v: 24.0,

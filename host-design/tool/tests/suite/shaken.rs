@@ -12,9 +12,10 @@ use upright::supervision::fault::Fault;
 use upright::supervision::supervisor::State;
 use upright::table::Law;
 use upright_design::design::design;
-use upright_design::harness::{Harness, HarnessError, Pins, with_firmware};
+use upright_design::harness::{Harness, HarnessError, Pins, Target, with_firmware};
 use upright_design::identify::{
-    Kind as Parameter, LineError, Log, OverLine, Settings, ShakeError, Shaken, checked_and_hanging, identify,
+    Feed, Kind as Parameter, LineError, Log, OverLine, Settings, ShakeError, Shaken, checked_and_hanging,
+    identify,
 };
 use upright_design::plant::ChainParameters;
 use upright_design::reality::real_chain;
@@ -24,27 +25,30 @@ use upright_design::table::{Gains, TableValues};
 use upright_tool::image::{Kind, build_for, if_possible};
 use upright_tool::in_the_loop::{Link, Place, run_shaken};
 
+use crate::designed::designed;
+
 const REALITY: &str = "[reality]\njoint_friction_n_m = [1.5e-3, 1e-3]\ncart_friction_n = 0.2\n\
     homing_error_rad = [0.006, -0.004]\nrail_tilt_rad = 0.003\nlatency_s = 4e-4\ncart_mass_percent = 8\n\
     link_mass_percent = [-9, 7]\nlink_length_percent = [5, -8]\nlink_inertia_percent = [10, -10]\n";
 
-/// The double pendulum of the file, designed once.
 fn double() -> &'static (Rig, TableValues) {
-    static DOUBLE: OnceLock<(Rig, TableValues)> = OnceLock::new();
-    DOUBLE.get_or_init(|| rig("double-quanser-dbpen", ""))
+    designed("double-quanser-dbpen")
 }
 
-fn rig(name: &str, reality: &str) -> (Rig, TableValues) {
-    let path = PathBuf::from(format!("../../rigs/{name}.toml"));
-    let text = std::fs::read_to_string(&path).unwrap() + "\n" + reality;
-    let rig = Rig::from_toml(&text, &path).unwrap();
-    let table = TableValues::of(&rig, &design(&rig).unwrap(), Gains::Sampled).unwrap();
-    (rig, table)
+/// The double pendulum with its table, ready to be shaken with the same forces for 20 s.
+fn shaken(target: &mut dyn Target) -> Shaken<'_> {
+    static FEED: OnceLock<Feed> = OnceLock::new();
+    let (machine, table) = double();
+    let feed = FEED.get_or_init(|| Feed::new(machine, table, 20.0, 1).unwrap());
+    Shaken::begin_with(feed.clone(), machine, table, target, 1).unwrap()
 }
 
 #[test]
 fn the_log_of_the_firmware_gives_the_parameters_of_the_machine() {
-    let (machine, table) = rig("double-quanser-dbpen", REALITY);
+    let path = PathBuf::from("../../rigs/double-quanser-dbpen.toml");
+    let text = std::fs::read_to_string(&path).unwrap() + "\n" + REALITY;
+    let machine = Rig::from_toml(&text, &path).unwrap();
+    let table = TableValues::of(&machine, &design(&machine).unwrap(), Gains::Sampled).unwrap();
     let (file, _) = double();
     let log = run_shaken(&machine, &table, 15.0, 3, Place::Host).unwrap();
     assert_eq!(log.lost(), 0);
@@ -76,7 +80,7 @@ fn the_log_of_the_firmware_gives_the_parameters_of_the_machine() {
 
 #[test]
 fn the_image_in_qemu_logs_the_ticks_of_the_host() {
-    let (machine, table) = rig("single-quanser-ip02", "");
+    let (machine, table) = designed("single-quanser-ip02").clone();
     let Some(image) = if_possible(build_for(Kind::InTheLoop, &machine, &table)).unwrap() else { return };
     if let Err(error) = Command::new("qemu-system-arm").arg("--version").stdout(Stdio::null()).status() {
         assert!(std::env::var_os("UPRIGHT_REQUIRE_IMAGE").is_none(), "no QEMU: {error}");
@@ -100,9 +104,8 @@ const STUCK: Driven = |_| Drive::Duty(1.0);
 /// Shakes the double pendulum for 2.5 s, then with a defect. Gives the fault, the ticks from the defect to
 /// motor off, how far the cart was out then (m), and whether the motor came on again.
 fn defective(pins: Pinned, motor: Driven) -> (Option<Fault>, u32, f64, bool) {
-    let (machine, table) = double();
-    let run = with_firmware(table, |target| {
-        let mut shaken = Shaken::begin(machine, table, target, 20.0, 1).unwrap();
+    let run = with_firmware(&double().1, |target| {
+        let mut shaken = shaken(target);
         for _ in 0..2_500 {
             assert!(shaken.tick(|_| (), AS_IT_IS).unwrap().enable || shaken.log().ticks().len() < 20);
         }
@@ -182,10 +185,9 @@ fn no_defect_is_missed_while_the_rig_is_shaken() {
 
 #[test]
 fn a_silent_host_and_the_stop_key_end_it() {
-    let (machine, table) = double();
     let ended = |stop: bool| {
-        with_firmware(table, |target| {
-            let mut shaken = Shaken::begin(machine, table, target, 20.0, 1).unwrap();
+        with_firmware(&double().1, |target| {
+            let mut shaken = shaken(target);
             (0..2_500).for_each(|_| {
                 shaken.tick(|_| (), AS_IT_IS).unwrap();
             });
@@ -216,7 +218,7 @@ fn a_silent_host_and_the_stop_key_end_it() {
 
 #[test]
 fn the_log_of_four_links_fits_the_line() {
-    let (machine, table) = rig("quadruple-paper", "");
+    let (machine, table) = designed("quadruple-paper").clone();
     let log = with_firmware(&table, |target| {
         let mut shaken = Shaken::begin(&machine, &table, target, 5.0, 1).unwrap();
         let (mut bytes, mut most) = (0, 0);
@@ -288,8 +290,8 @@ fn a_machine_behind_a_line_is_shaken_and_logged_and_hangs_with_the_motor_off_whe
 
 #[test]
 fn a_machine_that_is_not_the_files_or_is_not_checked_is_not_shaken() {
-    let other = rig("single-quanser-ip02", "");
-    let (refused, on) = over_line(&other, |_| false);
+    let other = designed("single-quanser-ip02");
+    let (refused, on) = over_line(other, |_| false);
     assert!(matches!(refused, Err(LineError::Harness(HarnessError::Rig { .. }))) && on == 0);
     let (machine, table) = double();
     let refused = with_firmware(table, |target| {

@@ -18,13 +18,14 @@ use upright_tool::campaign::{Class, During, Kind as Defect, Setup, one};
 use upright_tool::image::{Board, Kind, build_for, build_if_possible, if_possible};
 use upright_tool::in_the_loop::{Place, VirtualBoard, measure, run_compared};
 
+use crate::designed::designed;
+
 #[test]
 fn the_flashed_image_balances_from_power_up_with_the_bits_of_the_host() {
     let Some(elf) = build_if_possible(Kind::Board(Board::WeactF405)).unwrap() else { return };
     let image = Image::from_elf(&std::fs::read(elf).unwrap()).unwrap();
-    let rig = Rig::from_path("../../rigs/quadruple-paper.toml".as_ref()).unwrap();
+    let (rig, table) = designed("quadruple-paper").clone();
     assert_eq!(rig.hash(), RIG_HASH);
-    let table = TableValues::of(&rig, &design(&rig).unwrap(), Gains::Sampled).unwrap();
     let mut scenario = Scenario::at_rest(&rig, Law::Lqr);
     scenario.start[2] = 0.002;
     scenario.duration_s = 5.0;
@@ -53,8 +54,7 @@ fn the_flashed_image_balances_from_power_up_with_the_bits_of_the_host() {
 #[test]
 fn the_flashed_image_raises_and_lowers_the_links_with_the_bits_of_the_host() {
     let file = Path::new("../../rigs/quadruple-paper.toml");
-    let rig = Rig::from_path(file).unwrap();
-    let table = TableValues::of(&rig, &design(&rig).unwrap(), Gains::Sampled).unwrap();
+    let (rig, table) = designed("quadruple-paper").clone();
     let motions = motions(&rig, &Stored::beside(file).unwrap()).unwrap();
     let table = with_motions(&rig, table, &motions, &[]).unwrap();
     let built = build_for(Kind::Board(Board::WeactF405), &rig, &table);
@@ -79,10 +79,9 @@ fn the_flashed_image_raises_and_lowers_the_links_with_the_bits_of_the_host() {
 fn a_stopped_run_names_address_and_source_line() {
     let Some(elf) = build_if_possible(Kind::Board(Board::WeactF405)).unwrap() else { return };
     let image = Image::from_elf(&std::fs::read(elf).unwrap()).unwrap();
-    let rig = Rig::from_path("../../rigs/quadruple-paper.toml".as_ref()).unwrap();
-    let table = TableValues::of(&rig, &design(&rig).unwrap(), Gains::Sampled).unwrap();
+    let (_, table) = designed("quadruple-paper");
     let conditions = Conditions { chip_v: 2.5, ..Conditions::f405(1) };
-    let error = VirtualBoard::start(&image, &conditions, &table).err().unwrap().to_string();
+    let error = VirtualBoard::start(&image, &conditions, table).err().unwrap().to_string();
     for part in ["at program counter 0x0800", "wait states", "src/board/f4/clock.rs:"] {
         assert!(error.contains(part), "{part}: {error}");
     }
@@ -115,8 +114,7 @@ fn motor_delay_and_integral_action_give_the_bits_of_the_host() {
 /// The image for the Feather, which counts a single link, with its motions; none without a compiler.
 fn feather() -> Option<(Rig, TableValues, Image)> {
     let file = Path::new("../../rigs/single-quanser-ip02.toml");
-    let rig = Rig::from_path(file).unwrap();
-    let table = TableValues::of(&rig, &design(&rig).unwrap(), Gains::Sampled).unwrap();
+    let (rig, table) = designed("single-quanser-ip02").clone();
     let motions = motions(&rig, &Stored::beside(file).unwrap()).unwrap();
     let table = with_motions(&rig, table, &motions, &[]).unwrap();
     let elf = if_possible(build_for(Kind::Board(Board::FeatherF405), &rig, &table)).unwrap()?;
