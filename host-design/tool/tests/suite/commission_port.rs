@@ -5,7 +5,7 @@ use std::net::TcpListener;
 use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::mpsc::{Receiver, Sender, channel};
+use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
 use std::time::Duration;
 
 use upright_design::design::design;
@@ -19,7 +19,10 @@ use upright_tool::monitor::Line;
 
 use crate::command::{SINGLE, path_of};
 
-/// The machine of the file behind a TCP port, whose hand does what comes through `tasks`; four times as fast as real.
+/// Real time for each of its ticks of 2 ms.
+const TICK: Duration = Duration::from_micros(200);
+
+/// The machine of the file behind a TCP port, whose hand does what comes through `tasks`; some times as fast as real.
 fn serve(
     listener: &TcpListener,
     rig: &Rig,
@@ -28,20 +31,25 @@ fn serve(
     tasks: &Receiver<Task>,
 ) {
     let (mut stream, _) = listener.accept().unwrap();
-    stream.set_read_timeout(Some(Duration::from_millis(1))).unwrap();
+    let (reader, received) = channel();
+    let mut incoming = stream.try_clone().unwrap();
+    std::thread::spawn(move || {
+        let mut buffer = [0; 256];
+        while let Ok(length @ 1..) = incoming.read(&mut buffer)
+            && reader.send(buffer[..length].to_vec()).is_ok()
+        {}
+    });
     with_firmware(table, |target| {
         let mut machine = Simulated::new(rig, table, planted, target, 1).unwrap();
         loop {
             while let Ok(task) = tasks.try_recv() {
                 machine.ask(task).unwrap();
             }
-            let mut buffer = [0; 256];
-            let received = match stream.read(&mut buffer) {
-                Ok(0) => return,
-                Ok(length) => &buffer[..length],
-                Err(_) => &[],
+            let bytes = match received.recv_timeout(TICK) {
+                Err(RecvTimeoutError::Disconnected) => return,
+                bytes => bytes.unwrap_or_default(),
             };
-            let answer = machine.exchange(received).unwrap();
+            let answer = machine.exchange(&bytes).unwrap();
             if stream.write_all(&answer).is_err() {
                 return;
             }

@@ -2,6 +2,7 @@
 //! hand, with the bits of the firmware on the host.
 
 use std::path::Path;
+use std::sync::OnceLock;
 
 use upright::gains::RIG_HASH;
 use upright::protocol::message::Request;
@@ -113,6 +114,11 @@ fn motor_delay_and_integral_action_give_the_bits_of_the_host() {
 
 /// The image for the Feather, which counts a single link, with its motions; none without a compiler.
 fn feather() -> Option<(Rig, TableValues, Image)> {
+    static FEATHER: OnceLock<Option<(Rig, TableValues, Image)>> = OnceLock::new();
+    FEATHER.get_or_init(built_for_the_feather).clone()
+}
+
+fn built_for_the_feather() -> Option<(Rig, TableValues, Image)> {
     let file = Path::new("../../rigs/single-quanser-ip02.toml");
     let (rig, table) = designed("single-quanser-ip02").clone();
     let motions = motions(&rig, &Stored::beside(file).unwrap()).unwrap();
