@@ -8,7 +8,7 @@ use std::fmt::Write;
 use std::path::PathBuf;
 use std::process::{Command, Stdio};
 
-use crate::published::{rig, rig_path, stored_motions, table};
+use crate::published::{rig, rig_and_table, rig_path, stored_motions, table};
 use upright::protocol::message::Request;
 use upright::supervision::supervisor::State;
 use upright::table::Law;
@@ -26,9 +26,7 @@ use upright_tool::in_the_loop::{Link, Place, RunError, run};
 const MOST_INSTRUCTIONS: u32 = 3850;
 
 fn quadruple() -> (Rig, TableValues) {
-    let rig = rig("quadruple-paper");
-    let table = table(&rig);
-    (rig, table)
+    rig_and_table("quadruple-paper").clone()
 }
 
 /// A rig and its table with the stored raising and lowering, and with these of its other stored motions.
@@ -194,8 +192,7 @@ fn swinging_links_are_homed_in_qemu_with_the_bits_of_the_host() {
 /// On the rig with the fewest bytes per second: over these lines, QEMU takes long for each.
 #[test]
 fn the_image_runs_with_serial_lines_too() {
-    let rig = rig("single-quanser-ip02");
-    let table = table(&rig);
+    let (rig, table) = rig_and_table("single-quanser-ip02").clone();
     let built = if_possible(build_for(Kind::InTheLoopUsart, &rig, &table)).unwrap();
     let Some(image) = in_qemu(built) else { return };
     let (_, scenario) = scenarios(&rig, true).remove(0);

@@ -11,7 +11,7 @@ use crate::processor::mpu::Purpose;
 use crate::processor::registers::Registers;
 use crate::processor::waiting::Watch;
 
-const FLASH: u32 = 0x0800_0000;
+pub(crate) const FLASH: u32 = 0x0800_0000;
 
 /// Core and everything it reaches.
 #[derive(Debug, Clone)]

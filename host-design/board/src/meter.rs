@@ -3,12 +3,11 @@
 use crate::board::Board;
 use crate::clock::Time;
 use crate::error::Stopped;
+use crate::machine::FLASH;
 use crate::processor::nvic;
 
 /// Number of the tick's interrupt among the exceptions.
 const SYS_TICK: u16 = nvic::SYS_TICK as u16;
-/// Where code is.
-const FLASH: u32 = 0x0800_0000;
 
 /// A part of the tick.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

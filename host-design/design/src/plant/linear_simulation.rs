@@ -7,7 +7,6 @@ use crate::rig;
 /// `ẋ = A x + B u + G w` with its current state. G holds the noise columns of the rig file, if there are any.
 #[derive(Debug, Clone, PartialEq)]
 pub struct LinearSimulation {
-    a: Matrix<f64>,
     a_transposed: Matrix<f64>,
     norm: f64,
     inputs: Matrix<f64>,
@@ -32,7 +31,6 @@ impl LinearSimulation {
         Self {
             a_transposed: a.transpose(),
             norm: a.norm(),
-            a,
             inputs: Matrix::from_fn(s, 1 + noise.len(), |i, j| match j {
                 0 => model.b[i],
                 _ => noise[j - 1][i],
@@ -88,8 +86,9 @@ impl Plant for LinearSimulation {
 
     fn rate(&self, state: &[f64], force: f64, disturbances: &[f64], rate: &mut [f64]) {
         assert_eq!(state.len(), self.states(), "length of the state");
-        let sum = &(&self.a * &Matrix::column(state)) + &self.drive(force, disturbances);
-        rate.copy_from_slice(sum.entries());
+        times(&self.a_transposed, state, rate);
+        let drive = self.drive(force, disturbances);
+        rate.iter_mut().zip(drive.entries()).for_each(|(rate, drive)| *rate += drive);
     }
 
     /// Exact to rounding without substeps: with the input held,

@@ -20,7 +20,7 @@ const RIGS: [&str; 4] =
     ["single-quanser-ip02", "double-quanser-dbpen", "triple-glueck-eder-kugi", "quadruple-paper"];
 
 /// The rig and its table with the stored motions.
-fn rig_and_table(name: &'static str) -> (Rig, TableValues) {
+fn with_stored_motions(name: &'static str) -> (Rig, TableValues) {
     let rig = rig(name);
     let table = with_motions(&rig, table(&rig), stored_motions(name), &[]).unwrap();
     (rig, table)
@@ -41,7 +41,7 @@ fn run(rig: &Rig, table: &TableValues, scenario: &Scenario) -> Result<Recording,
 #[test]
 fn every_rig_is_raised_balanced_and_lowered_from_encoders() {
     for name in RIGS {
-        let (rig, table) = rig_and_table(name);
+        let (rig, table) = with_stored_motions(name);
         let recording = run(&rig, &table, &scenario(&rig, &table, 1)).unwrap();
         assert!(hangs(&recording), "{name}: {:?}, {:?}", recording.fault, recording.ticks.last());
     }
@@ -58,7 +58,7 @@ fn reverse_gains(table: &mut TableValues) {
 /// The table of both motions fits into the flash that is left for it.
 #[test]
 fn the_motions_of_four_links_take_at_most_45_kb() {
-    let (_, table) = rig_and_table("quadruple-paper");
+    let (_, table) = with_stored_motions("quadruple-paper");
     let motions = table.swing_up.as_ref().unwrap();
     println!("{} bytes", motions.bytes());
     assert!(motions.bytes() <= 45_000, "{}", motions.bytes());
@@ -69,7 +69,7 @@ fn the_motions_of_four_links_take_at_most_45_kb() {
 
 #[test]
 fn a_motion_with_a_defect_is_refused_or_ends_with_the_motor_off() {
-    let (rig, table) = rig_and_table("single-quanser-ip02");
+    let (rig, table) = with_stored_motions("single-quanser-ip02");
     let scenario = scenario(&rig, &table, 1);
     let with = |change: &dyn Fn(&mut TableValues)| {
         let mut table = table.clone();
@@ -82,7 +82,7 @@ fn a_motion_with_a_defect_is_refused_or_ends_with_the_motor_off() {
     assert!(matches!(spacing, Err(HarnessError::Table(TableError::Dimensions))), "{spacing:?}");
     let spacing = with(&|table| table.swing_up.as_mut().unwrap().raise.course_ticks *= 2);
     assert!(spacing.unwrap().fault.is_some(), "knots twice as far apart");
-    let (_, other) = rig_and_table("double-quanser-dbpen");
+    let (_, other) = with_stored_motions("double-quanser-dbpen");
     let swapped = with(&|table| {
         let rig_hash = other.rig_hash;
         table.rig_hash = rig_hash;
@@ -163,7 +163,7 @@ fn disturb(inputs: &mut Pins, zero: &[u32], wrong: Wrong) {
 #[test]
 fn a_wrong_motor_or_encoder_is_found_before_the_links_have_left_the_lower_half() {
     for name in RIGS {
-        let (rig, table) = rig_and_table(name);
+        let (rig, table) = with_stored_motions(name);
         let sensors = table.sensors();
         let mut wrongs = vec![Wrong::MotorDead, Wrong::MotorReversed, Wrong::MotorHalf];
         wrongs.extend((0..sensors).map(Wrong::EncoderReversed));
@@ -195,8 +195,8 @@ fn machines_that_the_law_brings_up_are_not_switched_off() {
     // One of these leaves the usual limits of the rail while it is lowered (triple), or stands far from the set-point
     // before that (quadruple).
     let (triple, quadruple) = ("triple-glueck-eder-kugi", "quadruple-paper");
-    assert_eq!(random_runs(quadruple, &rig_and_table(quadruple).1, 4), [3, 3]);
-    let mut table = rig_and_table(triple).1;
+    assert_eq!(random_runs(quadruple, &with_stored_motions(quadruple).1, 4), [3, 3]);
+    let mut table = with_stored_motions(triple).1;
     assert_eq!(random_runs(triple, &table, 10), [3, 3]);
     // Negative control: with the limits of balancing it is switched off.
     let usual = table.limits;
@@ -210,7 +210,7 @@ fn machines_that_the_law_brings_up_are_not_switched_off() {
 fn a_motion_that_the_supervisor_ends_has_not_arrived() {
     const RUNS: usize = 200;
     let name = "single-quanser-ip02";
-    let (rig, mut table) = rig_and_table(name);
+    let (rig, mut table) = with_stored_motions(name);
     let arriving = |table: &TableValues| {
         let (motions, condition) = (stored_motions(name), Condition::asked(&rig));
         let found = firmware_runs(&rig, table, motions, &condition, 1, RUNS, &Study::whole()).unwrap();
@@ -232,7 +232,7 @@ fn a_motion_that_the_supervisor_ends_has_not_arrived() {
 #[test]
 fn with_reversed_gains_no_random_run_arrives() {
     let name = "single-quanser-ip02";
-    let (_, mut table) = rig_and_table(name);
+    let (_, mut table) = with_stored_motions(name);
     assert_eq!(random_runs(name, &table, 1), [3, 3]);
     reverse_gains(&mut table);
     assert_eq!(random_runs(name, &table, 1), [0, 0]);
@@ -240,7 +240,7 @@ fn with_reversed_gains_no_random_run_arrives() {
 
 #[test]
 fn up_and_down_are_refused_with_their_reasons() {
-    let (rig, table) = rig_and_table("single-quanser-ip02");
+    let (rig, table) = with_stored_motions("single-quanser-ip02");
     let scenario = scenario(&rig, &table, 1);
     let refused = |table: &TableValues, request: Request| {
         with_firmware(table, |target| {
@@ -268,7 +268,7 @@ fn up_and_down_are_refused_with_their_reasons() {
 
 #[test]
 fn a_hanging_link_may_be_pushed_hard_and_with_reversed_gains_not_at_all() {
-    let (rig, mut table) = rig_and_table("single-quanser-ip02");
+    let (rig, mut table) = with_stored_motions("single-quanser-ip02");
     let of = |table: &TableValues, way: Way| -> Vec<[f64; 2]> {
         let all = margins(&rig, table, way, 3, &|| ()).unwrap();
         all.iter().map(|margin| margin.links_n[0]).collect()

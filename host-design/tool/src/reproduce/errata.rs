@@ -4,7 +4,7 @@ use serde::Serialize;
 
 use super::designs::{gain_rows, plant_rows};
 use super::{PaperDesigns, PaperRigs, ReproduceError, Row, chain, published};
-use upright_design::design::{Certified, Feedback, continuous_plant, design};
+use upright_design::design::{Certified, Feedback, Laws, continuous_plant, design};
 use upright_design::numerics::Wide;
 use upright_design::plant::chain_plant;
 use upright_design::plant::reference::{Tolerance, integrate};
@@ -203,18 +203,22 @@ fn rounded_matrices(exact: Known<'_>, printed: Known<'_>) -> Result<Erratum, Rep
     })
 }
 
-/// The LQR of `rig`: that of the known design, if it is the same rig.
+/// The LQR of `rig`.
 fn lqr_of(rig: &Rig, known: Known<'_>) -> Result<Feedback<f64>, ReproduceError> {
     let alone = Rig { pole_placement: None, kalman: None, ..rig.clone() };
-    let laws =
-        if rig == known.0 { known.1.double.continuous.clone() } else { design(&alone)?.double.continuous };
-    laws.lqr.ok_or(ReproduceError::OneLaw(alone.name))
+    laws(rig, &alone, known)?.lqr.ok_or(ReproduceError::OneLaw(alone.name))
 }
 
-/// The pole placement of `rig` likewise.
+/// The pole placement of `rig`.
 fn placement_of(rig: &Rig, known: Known<'_>) -> Result<Feedback<f64>, ReproduceError> {
     let alone = Rig { lqr: None, kalman: None, ..rig.clone() };
-    let laws =
-        if rig == known.0 { known.1.double.continuous.clone() } else { design(&alone)?.double.continuous };
-    laws.pole_placement.ok_or(ReproduceError::OneLaw(alone.name))
+    laws(rig, &alone, known)?.pole_placement.ok_or(ReproduceError::OneLaw(alone.name))
+}
+
+/// The continuous gains of the known design, if it is that of `rig`; otherwise those of a rig with one law alone.
+fn laws(rig: &Rig, alone: &Rig, (known, designed): Known<'_>) -> Result<Laws<f64>, ReproduceError> {
+    if rig == known {
+        return Ok(designed.double.continuous.clone());
+    }
+    Ok(design(alone)?.double.continuous)
 }

@@ -19,7 +19,7 @@ use upright_design::simulate::Scenario;
 use upright_tool::image::{Board, Kind, build_if_possible};
 use upright_tool::in_the_loop::{Link, Place, RunError};
 
-use crate::designed::designed;
+use crate::published::rig_and_table;
 
 const ALONG: Request = Request::Drive { along: true };
 const AGAINST: Request = Request::Drive { along: false };
@@ -130,7 +130,7 @@ impl Person<'_, '_> {
 
 /// Homed and with checked signs, the links hanging: then `test`. Gives all telemetry.
 fn at_the_bench(place: Place<'_>, test: impl FnOnce(&mut Person<'_, '_>)) -> Vec<AnyTelemetry> {
-    let (rig, table) = designed("quadruple-paper");
+    let (rig, table) = rig_and_table("quadruple-paper");
     let scenario = Scenario::at_rest(rig, Law::Lqr);
     let run = place.with_target(table, |target| -> Result<_, RunError> {
         let mut harness = Harness::new(rig, table, &scenario, target)?;

@@ -9,7 +9,7 @@ use upright_tool::campaign::{Campaign, During, Kind, Setup, Trial, campaign, fee
 use upright_tool::image::{self, Board, build_if_possible};
 use upright_tool::in_the_loop::Place;
 
-use crate::designed::designed;
+use crate::published::rig_and_table;
 
 fn on_host<'a>(rig: &'a Rig, table: &'a TableValues) -> Setup<'a> {
     Setup { rig, table, place: Place::Host, detection: true, guards: true, during: During::Balancing }
@@ -22,7 +22,7 @@ fn run(setup: &Setup<'_>, kinds: &[Kind], runs: u64) -> Campaign {
 #[test]
 fn every_defect_is_found_and_nothing_else() {
     for name in ["quadruple-paper", "single-quanser-ip02"] {
-        let (rig, table) = designed(name);
+        let (rig, table) = rig_and_table(name);
         let kinds = kinds(table, Place::Host);
         let result = run(&on_host(rig, table), &kinds, 5 * kinds.len() as u64);
         for row in &result.rows {
@@ -33,7 +33,7 @@ fn every_defect_is_found_and_nothing_else() {
 
 #[test]
 fn without_detection_every_defect_that_needs_it_is_missed() {
-    let (rig, table) = designed("quadruple-paper");
+    let (rig, table) = rig_and_table("quadruple-paper");
     let kinds: Vec<Kind> =
         kinds(table, Place::Host).into_iter().filter(|kind| kind.needs_detection()).collect();
     let blind = Setup { detection: false, ..on_host(rig, table) };
@@ -51,7 +51,7 @@ fn while_driving(table: &TableValues, place: Place<'_>) -> Vec<Kind> {
 #[test]
 fn every_defect_of_a_bench_drive_is_found_and_nothing_else() {
     for name in ["quadruple-paper", "single-quanser-ip02"] {
-        let (rig, table) = designed(name);
+        let (rig, table) = rig_and_table(name);
         let kinds = while_driving(table, Place::Host);
         let setup = Setup { during: During::BenchDrive, ..on_host(rig, table) };
         let result = run(&setup, &kinds, 3 * kinds.len() as u64);
@@ -70,7 +70,7 @@ fn every_defect_of_a_bench_drive_is_found_and_nothing_else() {
 
 #[test]
 fn on_the_virtual_board_a_bench_drive_ends_with_its_defects_and_does_not_without_the_guards() {
-    let (rig, table) = designed("quadruple-paper");
+    let (rig, table) = rig_and_table("quadruple-paper");
     let Some(elf) = build_if_possible(image::Kind::Board(Board::WeactF405)).unwrap() else { return };
     let image = Image::from_elf(&std::fs::read(elf).unwrap()).unwrap();
     let place = Place::Board { image: &image, conditions: Conditions::f405(1) };
@@ -90,7 +90,7 @@ fn on_the_virtual_board_a_bench_drive_ends_with_its_defects_and_does_not_without
 #[test]
 fn every_defect_of_a_rig_that_is_shaken_is_found_and_nothing_else() {
     for name in ["quadruple-paper", "single-quanser-ip02"] {
-        let (rig, table) = designed(name);
+        let (rig, table) = rig_and_table(name);
         let forces = feed(rig, table, 3).unwrap();
         let during = During::Shaking(&forces);
         let setup = Setup { during, ..on_host(rig, table) };
@@ -111,7 +111,7 @@ fn every_defect_of_a_rig_that_is_shaken_is_found_and_nothing_else() {
 
 #[test]
 fn a_trial_is_the_same_every_time_and_does_not_depend_on_the_others() {
-    let (rig, table) = designed("quadruple-paper");
+    let (rig, table) = rig_and_table("quadruple-paper");
     let setup = on_host(rig, table);
     let kinds = [Kind::Overruns, Kind::MotorReversed, Kind::EncoderJump];
     let alone = |number| one(&setup, &kinds, 5, number).unwrap();

@@ -1,30 +1,16 @@
 //! From a wired rig to a balancing one: simulated machines with planted defects, and the step that stops each.
 
-use std::path::{Path, PathBuf};
-use std::sync::OnceLock;
+use std::path::Path;
 
-use upright_design::design::design;
 use upright_design::harness::with_firmware;
 use upright_design::rig::{PlantDescription, Rig};
-use upright_design::table::{Gains, TableValues};
+use upright_design::table::TableValues;
 use upright_tool::commission::{Commissioning, Journal, Plan, Planted, Record, Simulated, Step, Stop};
 
 use crate::command::{SINGLE, path_of, status, stderr, stdout, upright};
+use crate::published::rig_and_table;
 
 const DOUBLE: &str = "double-quanser-dbpen";
-
-/// A rig of the repository, designed once.
-fn designed(name: &str) -> &'static (Rig, TableValues) {
-    static BOTH: OnceLock<[(Rig, TableValues); 2]> = OnceLock::new();
-    let both = BOTH.get_or_init(|| {
-        [SINGLE, DOUBLE].map(|name| {
-            let rig = Rig::from_path(&PathBuf::from(format!("../../rigs/{name}.toml"))).unwrap();
-            let table = TableValues::of(&rig, &design(&rig).unwrap(), Gains::Sampled).unwrap();
-            (rig, table)
-        })
-    });
-    &both[usize::from(name == DOUBLE)]
-}
 
 fn plan<'a>(rig: &'a Rig, table: &'a TableValues, text: &'a str) -> Plan<'a> {
     Plan { rig, table, file: Path::new("rig.toml"), text, seconds: 8.0, seed: 1 }
@@ -33,12 +19,12 @@ fn plan<'a>(rig: &'a Rig, table: &'a TableValues, text: &'a str) -> Plan<'a> {
 /// Does these steps with the machine of a rig, whose firmware has `table`; gives the step that was not passed, and
 /// why.
 fn stopped(
-    name: &str,
+    name: &'static str,
     table: &TableValues,
     planted: Option<Planted>,
     steps: &[Step],
 ) -> Option<(Step, String)> {
-    let (rig, own) = designed(name);
+    let (rig, own) = rig_and_table(name);
     let mut journal = Journal::new(Record::new(rig, "this computer"), None, Box::new(|_| ()));
     let result = with_firmware(table, |target| {
         let mut machine = Simulated::new(rig, table, planted, target, 1).unwrap();
@@ -58,7 +44,7 @@ fn stopped(
 #[test]
 fn a_sound_machine_passes_every_early_step() {
     for name in [SINGLE, DOUBLE] {
-        let (_, table) = designed(name);
+        let (_, table) = rig_and_table(name);
         assert_eq!(stopped(name, table, None, &Step::EARLY), None);
     }
 }
@@ -66,7 +52,7 @@ fn a_sound_machine_passes_every_early_step() {
 #[test]
 fn every_planted_defect_is_found_in_its_step() {
     for (name, links) in [(SINGLE, 1), (DOUBLE, 2)] {
-        let (_, table) = designed(name);
+        let (_, table) = rig_and_table(name);
         for planted in Planted::all() {
             let (step, words) = stopped(name, table, Some(planted), &Step::FIRST).expect("it is found");
             assert_eq!(step, planted.found_in(links), "{planted}: {words}");
@@ -90,7 +76,7 @@ fn blind(table: &TableValues, step: Step) -> TableValues {
 #[test]
 fn without_the_check_of_its_step_no_defect_is_found_there() {
     for (name, links) in [(SINGLE, 1), (DOUBLE, 2)] {
-        let (_, table) = designed(name);
+        let (_, table) = rig_and_table(name);
         let early = |planted: &Planted| Step::EARLY.contains(&planted.found_in(links));
         for planted in Planted::all().filter(early) {
             let step = planted.found_in(links);
@@ -107,7 +93,7 @@ fn without_the_check_of_its_step_no_defect_is_found_there() {
 
 #[test]
 fn the_firmware_of_another_rig_is_refused_at_once() {
-    let (rig, table) = designed(DOUBLE);
+    let (rig, table) = rig_and_table(DOUBLE);
     let mut other = table.clone();
     other.rig_hash ^= 1;
     let (step, words) = stopped(DOUBLE, &other, None, &Step::EARLY).unwrap();
@@ -156,7 +142,7 @@ fn a_machine_that_differs_from_its_file_is_commissioned_and_balances() {
 fn a_machine_that_does_not_meet_its_requirements_is_not_balanced() {
     // Without this line, such a machine is commissioned: see above.
     let text = std::fs::read_to_string(path_of(SINGLE)).unwrap() + "\n[verify]\ngain_margin = 30\n";
-    let (rig, table) = designed(SINGLE);
+    let (rig, table) = rig_and_table(SINGLE);
     let mut journal = Journal::new(Record::new(rig, "this computer"), None, Box::new(|_| ()));
     let result = with_firmware(table, |target| {
         let mut machine = Simulated::new(rig, table, None, target, 1).unwrap();

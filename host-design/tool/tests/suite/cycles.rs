@@ -9,7 +9,7 @@ use upright_design::table::{Gains, TableValues};
 use upright_tool::image::{Board, Kind, build_for, build_if_possible, if_possible};
 use upright_tool::in_the_loop::{Cycles, Span, measure};
 
-use crate::designed::designed;
+use crate::published::rig_and_table;
 
 /// Goals for the median of balancing: from the tick to the output, the whole task and the jitter of the output (µs).
 const GOAL_LATENCY_US: f64 = 8.0;
@@ -82,7 +82,7 @@ fn slower(image: &Image, turns: u8) -> Image {
 fn the_ticks_of_the_image_stay_within_their_limits_and_those_of_a_slower_one_do_not() {
     let Some(elf) = build_if_possible(Kind::Board(Board::WeactF405)).unwrap() else { return };
     let image = Image::from_elf(&std::fs::read(elf).unwrap()).unwrap();
-    let (rig, table) = designed("quadruple-paper").clone();
+    let (rig, table) = rig_and_table("quadruple-paper").clone();
     let measured = |image: &Image| measured(&rig, &table, image);
     let cycles = measured(&image);
     println!("{cycles:#?}");

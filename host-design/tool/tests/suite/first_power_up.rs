@@ -19,7 +19,7 @@ use upright_tool::image::{Board, Kind, build_if_possible, flash_checksum};
 use upright_tool::in_the_loop::VirtualBoard;
 use upright_tool::monitor::{Monitor, action, view};
 
-use crate::designed::designed;
+use crate::published::rig_and_table;
 
 /// What the motor's force is multiplied with: 0 without the motor, -1 with its wires swapped.
 type Motor = f32;
@@ -248,7 +248,7 @@ fn first_balance(person: &mut Person<'_>) {
 fn the_guide_can_be_followed_step_by_step() {
     let Some(elf) = build_if_possible(Kind::Board(Board::WeactF405)).unwrap() else { return };
     let image = Image::from_elf(&std::fs::read(elf).unwrap()).unwrap();
-    let (rig, table) = designed("quadruple-paper").clone();
+    let (rig, table) = rig_and_table("quadruple-paper").clone();
     let mut board = VirtualBoard::start(&image, &Conditions::f405(1), &table).unwrap();
     let mut held = vec![0.0; rig.states()];
     held[2] = std::f64::consts::PI;

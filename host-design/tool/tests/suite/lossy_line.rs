@@ -10,7 +10,7 @@ use upright::table::Law;
 use upright_design::harness::{Pins, with_firmware};
 use upright_tool::monitor::{Action, Monitor};
 
-use crate::designed::designed;
+use crate::published::rig_and_table;
 
 /// One direction of the line.
 struct Direction {
@@ -47,7 +47,7 @@ fn talk(
     duration_ms: u64,
     mut each: impl FnMut(u64, Duration, &mut Monitor, &mut [Direction; 2]),
 ) -> Monitor {
-    let (rig, table) = designed("single-quanser-ip02").clone();
+    let (rig, table) = rig_and_table("single-quanser-ip02").clone();
     assert_eq!(rig.tick.period_s, 0.002);
     let mut pins = Pins {
         raw_counts: heapless::Vec::from_slice(&vec![0; table.sensors()]).unwrap(),

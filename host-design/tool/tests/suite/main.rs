@@ -11,7 +11,6 @@ mod commission_study;
 mod compare_command;
 mod compare_sweep;
 mod cycles;
-mod designed;
 mod documented_tables;
 mod documents;
 mod first_power_up;

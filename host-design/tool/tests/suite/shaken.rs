@@ -25,14 +25,14 @@ use upright_design::table::{Gains, TableValues};
 use upright_tool::image::{Kind, build_for, if_possible};
 use upright_tool::in_the_loop::{Link, Place, run_shaken};
 
-use crate::designed::designed;
+use crate::published::rig_and_table;
 
 const REALITY: &str = "[reality]\njoint_friction_n_m = [1.5e-3, 1e-3]\ncart_friction_n = 0.2\n\
     homing_error_rad = [0.006, -0.004]\nrail_tilt_rad = 0.003\nlatency_s = 4e-4\ncart_mass_percent = 8\n\
     link_mass_percent = [-9, 7]\nlink_length_percent = [5, -8]\nlink_inertia_percent = [10, -10]\n";
 
 fn double() -> &'static (Rig, TableValues) {
-    designed("double-quanser-dbpen")
+    rig_and_table("double-quanser-dbpen")
 }
 
 /// The double pendulum with its table, ready to be shaken with the same forces for 20 s.
@@ -80,7 +80,7 @@ fn the_log_of_the_firmware_gives_the_parameters_of_the_machine() {
 
 #[test]
 fn the_image_in_qemu_logs_the_ticks_of_the_host() {
-    let (machine, table) = designed("single-quanser-ip02").clone();
+    let (machine, table) = rig_and_table("single-quanser-ip02").clone();
     let Some(image) = if_possible(build_for(Kind::InTheLoop, &machine, &table)).unwrap() else { return };
     if let Err(error) = Command::new("qemu-system-arm").arg("--version").stdout(Stdio::null()).status() {
         assert!(std::env::var_os("UPRIGHT_REQUIRE_IMAGE").is_none(), "no QEMU: {error}");
@@ -218,7 +218,7 @@ fn a_silent_host_and_the_stop_key_end_it() {
 
 #[test]
 fn the_log_of_four_links_fits_the_line() {
-    let (machine, table) = designed("quadruple-paper").clone();
+    let (machine, table) = rig_and_table("quadruple-paper").clone();
     let log = with_firmware(&table, |target| {
         let mut shaken = Shaken::begin(&machine, &table, target, 5.0, 1).unwrap();
         let (mut bytes, mut most) = (0, 0);
@@ -290,7 +290,7 @@ fn a_machine_behind_a_line_is_shaken_and_logged_and_hangs_with_the_motor_off_whe
 
 #[test]
 fn a_machine_that_is_not_the_files_or_is_not_checked_is_not_shaken() {
-    let other = designed("single-quanser-ip02");
+    let other = rig_and_table("single-quanser-ip02");
     let (refused, on) = over_line(other, |_| false);
     assert!(matches!(refused, Err(LineError::Harness(HarnessError::Rig { .. }))) && on == 0);
     let (machine, table) = double();

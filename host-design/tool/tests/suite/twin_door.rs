@@ -16,7 +16,7 @@ use upright_tool::image::{Board, Kind, build_if_possible};
 use upright_tool::in_the_loop::Place;
 use upright_tool::twin::Server;
 
-use crate::designed::designed;
+use crate::published::rig_and_table;
 use crate::twin_page::Twin;
 
 type Socket = WebSocket<TcpStream>;
@@ -194,7 +194,7 @@ fn the_motor_is_turned_off_when_the_page_in_command_is_closed_or_sleeps() {
 fn the_flashed_image_balances_behind_the_page_and_obeys_it() {
     let Some(elf) = build_if_possible(Kind::Board(Board::WeactF405)).unwrap() else { return };
     let image = Image::from_elf(&std::fs::read(elf).unwrap()).unwrap();
-    let (rig, table) = designed("quadruple-paper").clone();
+    let (rig, table) = rig_and_table("quadruple-paper").clone();
     let scenario = Scenario { sensing: Sensing::Encoders, ..Scenario::at_rest(&rig, Law::Lqr) };
     let place = Place::Board { image: &image, conditions: Conditions::f405(1) };
     let server = Server::listen(([127, 0, 0, 1], 0).into()).unwrap();

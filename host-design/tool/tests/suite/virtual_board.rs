@@ -19,13 +19,13 @@ use upright_tool::campaign::{Class, During, Kind as Defect, Setup, one};
 use upright_tool::image::{Board, Kind, build_for, build_if_possible, if_possible};
 use upright_tool::in_the_loop::{Place, VirtualBoard, measure, run_compared};
 
-use crate::designed::designed;
+use crate::published::rig_and_table;
 
 #[test]
 fn the_flashed_image_balances_from_power_up_with_the_bits_of_the_host() {
     let Some(elf) = build_if_possible(Kind::Board(Board::WeactF405)).unwrap() else { return };
     let image = Image::from_elf(&std::fs::read(elf).unwrap()).unwrap();
-    let (rig, table) = designed("quadruple-paper").clone();
+    let (rig, table) = rig_and_table("quadruple-paper").clone();
     assert_eq!(rig.hash(), RIG_HASH);
     let mut scenario = Scenario::at_rest(&rig, Law::Lqr);
     scenario.start[2] = 0.002;
@@ -55,7 +55,7 @@ fn the_flashed_image_balances_from_power_up_with_the_bits_of_the_host() {
 #[test]
 fn the_flashed_image_raises_and_lowers_the_links_with_the_bits_of_the_host() {
     let file = Path::new("../../rigs/quadruple-paper.toml");
-    let (rig, table) = designed("quadruple-paper").clone();
+    let (rig, table) = rig_and_table("quadruple-paper").clone();
     let motions = motions(&rig, &Stored::beside(file).unwrap()).unwrap();
     let table = with_motions(&rig, table, &motions, &[]).unwrap();
     let built = build_for(Kind::Board(Board::WeactF405), &rig, &table);
@@ -80,7 +80,7 @@ fn the_flashed_image_raises_and_lowers_the_links_with_the_bits_of_the_host() {
 fn a_stopped_run_names_address_and_source_line() {
     let Some(elf) = build_if_possible(Kind::Board(Board::WeactF405)).unwrap() else { return };
     let image = Image::from_elf(&std::fs::read(elf).unwrap()).unwrap();
-    let (_, table) = designed("quadruple-paper");
+    let (_, table) = rig_and_table("quadruple-paper");
     let conditions = Conditions { chip_v: 2.5, ..Conditions::f405(1) };
     let error = VirtualBoard::start(&image, &conditions, table).err().unwrap().to_string();
     for part in ["at program counter 0x0800", "wait states", "src/board/f4/clock.rs:"] {
@@ -120,7 +120,7 @@ fn feather() -> Option<(Rig, TableValues, Image)> {
 
 fn built_for_the_feather() -> Option<(Rig, TableValues, Image)> {
     let file = Path::new("../../rigs/single-quanser-ip02.toml");
-    let (rig, table) = designed("single-quanser-ip02").clone();
+    let (rig, table) = rig_and_table("single-quanser-ip02").clone();
     let motions = motions(&rig, &Stored::beside(file).unwrap()).unwrap();
     let table = with_motions(&rig, table, &motions, &[]).unwrap();
     let elf = if_possible(build_for(Kind::Board(Board::FeatherF405), &rig, &table)).unwrap()?;

@@ -28,19 +28,36 @@ pub(crate) fn designed(name: &str) -> &'static Certified {
     certified(&rig(name))
 }
 
+/// What is made once for all tests, by what it is made from.
+type Once<K, T> = Mutex<BTreeMap<K, &'static OnceLock<T>>>;
+
+/// What is known for `key`, or what `make` gives now. Tests that want something else meanwhile do not wait.
+fn once<K: Ord, T>(known: &Once<K, T>, key: K, make: impl FnOnce() -> T) -> &'static T {
+    let place = *known.lock().unwrap().entry(key).or_insert_with(|| Box::leak(Box::default()));
+    place.get_or_init(make)
+}
+
 /// The design of `rig`, made once for all tests. Every value of a rig is in its hash.
 pub(crate) fn certified(rig: &Rig) -> &'static Certified {
-    static DESIGNS: Mutex<BTreeMap<u64, &OnceLock<Certified>>> = Mutex::new(BTreeMap::new());
-    let place = *DESIGNS.lock().unwrap().entry(rig.hash()).or_insert_with(|| Box::leak(Box::default()));
-    place.get_or_init(|| design(rig).unwrap_or_else(|error| panic!("{}: {error}", rig.name)))
+    static DESIGNS: Once<u64, Certified> = Mutex::new(BTreeMap::new());
+    once(&DESIGNS, rig.hash(), || design(rig).unwrap_or_else(|error| panic!("{}: {error}", rig.name)))
 }
 
 /// The stored motions of the rig in file `name`, restored once for all tests.
 pub(crate) fn stored_motions(name: &'static str) -> &'static SwingUp {
-    static RESTORED: Mutex<BTreeMap<&str, &OnceLock<SwingUp>>> = Mutex::new(BTreeMap::new());
-    let place = *RESTORED.lock().unwrap().entry(name).or_insert_with(|| Box::leak(Box::default()));
+    static RESTORED: Once<&str, SwingUp> = Mutex::new(BTreeMap::new());
     let restore = || motions(&rig(name), &Stored::beside(&rig_path(name)).unwrap());
-    place.get_or_init(|| restore().unwrap_or_else(|error| panic!("{name}: {error}")))
+    once(&RESTORED, name, || restore().unwrap_or_else(|error| panic!("{name}: {error}")))
+}
+
+/// The rig in file `name` with its gain table, made once for all tests.
+pub(crate) fn rig_and_table(name: &'static str) -> &'static (Rig, TableValues) {
+    static ALL: Once<&str, (Rig, TableValues)> = Mutex::new(BTreeMap::new());
+    once(&ALL, name, || {
+        let rig = rig(name);
+        let table = table(&rig);
+        (rig, table)
+    })
 }
 
 /// The gain table of `rig`.
