@@ -2,7 +2,7 @@
 //! it balances with its own table.
 
 use std::collections::BTreeMap;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::process::Command;
 
 use crate::published::table;
@@ -122,9 +122,11 @@ fn a_crate_made_from_the_document_balances_on_the_host() {
     foreign_crate(folder.path());
     let host = |folder: &Path| {
         let mut cargo = Command::new(env!("CARGO"));
-        cargo.current_dir(folder).env("CARGO_TARGET_DIR", target_of_its_own());
-        // A fifth of the time to compile.
-        cargo.env("CARGO_PROFILE_DEV_DEBUG", "false");
+        // With the settings of the tests, what they are built from need not be compiled again.
+        cargo.current_dir(folder).env("CARGO_TARGET_DIR", target_of_the_tests());
+        for (setting, value) in [("DEBUG", "false"), ("CODEGEN_UNITS", "2"), ("LTO", "off")] {
+            cargo.env(format!("CARGO_PROFILE_DEV_{setting}"), value);
+        }
         cargo.args(["run", "--quiet", "--bin", "host"]);
         cargo
     };
@@ -137,6 +139,7 @@ fn a_crate_made_from_the_document_balances_on_the_host() {
     assert!(!host(folder.path()).output().unwrap().status.success());
 }
 
-fn target_of_its_own() -> PathBuf {
-    Path::new(env!("CARGO_TARGET_TMPDIR")).join("own-board")
+fn target_of_the_tests() -> &'static Path {
+    let temporary = Path::new(env!("CARGO_TARGET_TMPDIR"));
+    temporary.parent().unwrap_or(temporary)
 }

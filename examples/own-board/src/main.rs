@@ -22,14 +22,14 @@ use upright::table::Build;
 
 use crate::board::OwnBoard;
 
-const CLOCK_HZ: u32 = 96_000_000;
+const CLOCK_HZ: u32 = 168_000_000;
 
 #[cortex_m_rt::entry]
 fn main() -> ! {
     let (Some(chip), Some(core)) = (pac::Peripherals::take(), cortex_m::Peripherals::take()) else {
         loop {}
     };
-    let mut rcc = chip.RCC.freeze(Config::hse(25.MHz()).sysclk(CLOCK_HZ.Hz()));
+    let mut rcc = chip.RCC.freeze(Config::hse(8.MHz()).sysclk(CLOCK_HZ.Hz()));
     let (a, b) = (chip.GPIOA.split(&mut rcc), chip.GPIOB.split(&mut rcc));
     let (_, (pwm, ..)) = chip.TIM1.pwm_hz(20.kHz(), &mut rcc);
     let mut board = OwnBoard {
