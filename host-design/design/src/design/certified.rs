@@ -2,7 +2,7 @@
 
 use super::error::DesignError;
 use super::loops::DesignPoles;
-use super::synthesis::{Design, Laws};
+use super::synthesis::{Design, Laws, continuous_plant};
 use crate::numerics::{Wide, with_precision};
 use crate::rig::Rig;
 use upright::table::Law;
@@ -24,6 +24,7 @@ pub struct Certified {
 }
 
 /// A design at one precision, rounded as a certified one but without proof: to sort designs by, and to try them.
+/// Those that are only tried have no gains for continuous time.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Uncertified {
     pub(crate) double: Design<f64>,
@@ -31,9 +32,12 @@ pub(crate) struct Uncertified {
 }
 
 impl Uncertified {
-    /// The design at the first of the precisions that [`design`] compares.
-    pub(crate) fn of(rig: &Rig) -> Result<Self, DesignError> {
-        with_precision(FIRST_BITS, || Ok(Self::rounded(&Design::<Wide>::of(rig)?)))
+    /// The gains for the tick, at the first of the precisions that [`design`] compares.
+    pub(crate) fn sampled_alone(rig: &Rig) -> Result<Self, DesignError> {
+        with_precision(FIRST_BITS, || {
+            let plant = continuous_plant::<Wide>(rig)?;
+            Ok(Self::rounded(&Design::sampled_alone(rig, plant, &mut Vec::new())?))
+        })
     }
 
     fn rounded(design: &Design<Wide>) -> Self {
@@ -43,10 +47,14 @@ impl Uncertified {
     /// This design with the law `law` of `other`, a design for the same plant.
     pub(crate) fn with_law_of(mut self, law: Law, other: &Self) -> Self {
         self.double.sampled.exchange(law, &other.double.sampled);
-        self.double.continuous.exchange(law, &other.double.continuous);
         self.single.sampled.exchange(law, &other.single.sampled);
-        self.single.continuous.exchange(law, &other.single.continuous);
         self
+    }
+}
+
+impl From<Certified> for Uncertified {
+    fn from(Certified { double, single, .. }: Certified) -> Self {
+        Self { double, single }
     }
 }
 
@@ -88,7 +96,8 @@ fn certified((design, poles): (Uncertified, DesignPoles), bits: usize) -> Certif
 #[doc(alias = "kalman")]
 pub fn design(rig: &Rig) -> Result<Certified, DesignError> {
     let (first, second) = std::thread::scope(|scope| {
-        let first = scope.spawn(|| Uncertified::of(rig));
+        let first = scope
+            .spawn(|| with_precision(FIRST_BITS, || Ok(Uncertified::rounded(&Design::<Wide>::of(rig)?))));
         let second = attempt(rig, 2 * FIRST_BITS);
         (first.join(), second)
     });
@@ -130,8 +139,11 @@ mod tests {
         {
             let file = Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("../../rigs/{name}.toml"));
             let rig = Rig::from_path(&file).unwrap();
-            let (quick, certified) = (Uncertified::of(&rig).unwrap(), design(&rig).unwrap());
-            assert!(quick.double == certified.double && quick.single == certified.single, "{name}");
+            let (quick, certified) = (Uncertified::sampled_alone(&rig).unwrap(), design(&rig).unwrap());
+            let Design { sampled, kalman, .. } = quick.double;
+            assert!(sampled == certified.double.sampled && kalman == certified.double.kalman, "{name}");
+            let Design { sampled, kalman, .. } = quick.single;
+            assert!(sampled == certified.single.sampled && kalman == certified.single.kalman, "{name}");
         }
     }
 

@@ -92,61 +92,44 @@ impl<R: Real> Design<R> {
     /// # Errors
     /// [`DesignError`] with the reason if some law has no solution.
     pub fn of(rig: &Rig) -> Result<Self, DesignError> {
-        Self::of_plant(rig, continuous_plant::<R>(rig)?, &mut Vec::new())
+        let plant = continuous_plant::<R>(rig)?;
+        refuse_unbridgeable_tick(&plant.a, rig)?;
+        let continuous = continuous_laws(rig, &plant)?;
+        Ok(Self { continuous, ..Self::sampled_alone(rig, plant, &mut Vec::new())? })
     }
 
-    /// As [`of`](Self::of), for a linear plant other than the rig's; records the relative residual of each Riccati
-    /// equation under the name of its gain.
-    pub(crate) fn of_plant(
+    /// What the table needs, the gains for the tick, for a linear plant that need not be the rig's; records the
+    /// relative residual of each Riccati equation under the name of its gain.
+    pub(crate) fn sampled_alone(
         rig: &Rig,
         plant: LinearModel<R>,
         residuals: &mut Vec<(String, f64)>,
     ) -> Result<Self, DesignError> {
         let LinearModel { a, b, torque_inputs } = plant;
         let period = R::from_f64(rig.tick.period_s);
-        refuse_unbridgeable_tick(&a, rig)?;
         let (ad, bd) = zero_order_hold(&a, &b, &period);
         let output = rig.output();
         let late = rig.tick.delay_ticks == 1;
 
-        let mut continuous = Laws::none();
         let mut sampled = Laws::none();
         if let Some(weights) = &rig.lqr {
-            let cost = lqr_cost(weights);
-            let k = lqr(Task::ContinuousLqr, &a, &b, &cost, residuals)?;
-            continuous.lqr = Some(feedback(k, &a, &b, output));
-            let tick_cost = sampled_cost(&a, &b, &cost, &period);
-            let k = lqr(Task::SampledLqr, &ad, &bd, &tick_cost, residuals)?;
+            let cost = sampled_cost(&a, &b, &lqr_cost(weights), &period);
+            let k = lqr(Task::SampledLqr, &ad, &bd, &cost, residuals)?;
             sampled.lqr = Some(sampled_feedback(k, &ad, &bd, output, late));
             if let Some(integral) = &rig.integral {
-                let weight = R::from_f64(integral.position_weight);
-                let share = R::from_f64(integral.setpoint_weight);
-                let (a_z, b_z) = with_integral(&a, &b, output, &R::one(), &R::zero());
-                let k = lqr(
-                    Task::ContinuousIntegral,
-                    &a_z,
-                    &b_z,
-                    &with_integral_weight(&cost, &weight),
-                    residuals,
-                )?;
-                continuous.integral = Some(feedback(k, &a, &b, output).with_share_of_n(&share));
                 let (a_z, b_z) = with_integral(&ad, &bd, output, &period, &R::one());
                 // z is constant during a tick: its cost over the tick is T w z².
-                let tick_cost = with_integral_weight(&tick_cost, &(weight * &period));
-                let k = lqr(Task::SampledIntegral, &a_z, &b_z, &tick_cost, residuals)?;
+                let weight = R::from_f64(integral.position_weight) * &period;
+                let cost = with_integral_weight(&cost, &weight);
+                let k = lqr(Task::SampledIntegral, &a_z, &b_z, &cost, residuals)?;
                 let feedback = sampled_feedback_over(k, &ad, &bd, &a_z, &b_z, output, late);
-                sampled.integral = Some(feedback.with_share_of_n(&share));
+                sampled.integral = Some(feedback.with_share_of_n(&R::from_f64(integral.setpoint_weight)));
             }
         }
         if let Some(placement) = &rig.pole_placement {
             let poles = wanted_poles(placement, rig)?;
-            let place = |task, a, b, poles: &[Pole<R>]| {
-                place(a, b, poles).map_err(|_| why_no_placement::<R>(task, a, b))
-            };
-            let k = place(Task::ContinuousPlacement, &a, &b, &poles)?;
-            continuous.pole_placement = Some(feedback(k, &a, &b, output));
             let poles: Vec<Pole<R>> = poles.iter().map(|pole| pole.sampled(&period)).collect();
-            let k = place(Task::SampledPlacement, &ad, &bd, &poles)?;
+            let k = placed(Task::SampledPlacement, &ad, &bd, &poles)?;
             sampled.pole_placement = Some(sampled_feedback(k, &ad, &bd, output, late));
         }
         let kalman = rig.kalman.as_ref().map(|noise| {
@@ -155,8 +138,31 @@ impl<R: Real> Design<R> {
             residuals.push((OBSERVER.to_owned(), residual.to_f64()));
             Ok(gains)
         });
-        Ok(Self { continuous, sampled, kalman: kalman.transpose()?, a, b, ad, bd })
+        Ok(Self { continuous: Laws::none(), sampled, kalman: kalman.transpose()?, a, b, ad, bd })
     }
+}
+
+/// The gains for continuous time.
+fn continuous_laws<R: Real>(rig: &Rig, plant: &LinearModel<R>) -> Result<Laws<R>, DesignError> {
+    let (a, b, output) = (&plant.a, &plant.b, rig.output());
+    let mut laws = Laws::none();
+    if let Some(weights) = &rig.lqr {
+        let cost = lqr_cost(weights);
+        let k = lqr(Task::ContinuousLqr, a, b, &cost, &mut Vec::new())?;
+        laws.lqr = Some(feedback(k, a, b, output));
+        if let Some(integral) = &rig.integral {
+            let (a_z, b_z) = with_integral(a, b, output, &R::one(), &R::zero());
+            let cost = with_integral_weight(&cost, &R::from_f64(integral.position_weight));
+            let k = lqr(Task::ContinuousIntegral, &a_z, &b_z, &cost, &mut Vec::new())?;
+            let share = R::from_f64(integral.setpoint_weight);
+            laws.integral = Some(feedback(k, a, b, output).with_share_of_n(&share));
+        }
+    }
+    if let Some(placement) = &rig.pole_placement {
+        let k = placed(Task::ContinuousPlacement, a, b, &wanted_poles(placement, rig)?)?;
+        laws.pole_placement = Some(feedback(k, a, b, output));
+    }
+    Ok(laws)
 }
 
 impl Design<Wide> {
@@ -253,6 +259,16 @@ fn lqr<R: Real>(
     let regulator = solution.map_err(|_| why_no_lqr(task, a, b, cost))?;
     residuals.push((task.to_string(), regulator.residual.to_f64()));
     Ok(regulator.k)
+}
+
+/// The gain that puts the poles of (a, b) where they are wanted.
+fn placed<R: Real>(
+    task: Task,
+    a: &Matrix<R>,
+    b: &Matrix<R>,
+    poles: &[Pole<R>],
+) -> Result<Matrix<R>, DesignError> {
+    place(a, b, poles).map_err(|_| why_no_placement::<R>(task, a, b))
 }
 
 /// Continuous feedback with N = -1 / (C (A - B K)⁻¹ B): the paper's equation for the precompensation gain. K is over

@@ -105,6 +105,20 @@ impl<R: Real> Matrix<R> {
         })
     }
 
+    /// The product with `right` where it is known to be symmetric: half of it is computed.
+    pub fn times_to_symmetric(&self, right: &Self) -> Self {
+        assert_eq!((self.cols, self.rows), (right.rows, right.cols), "dimensions of a symmetric product");
+        let mut product = Self::zeros(self.rows, self.rows);
+        for i in 0..self.rows {
+            for j in i..self.rows {
+                let terms = (0..self.cols).map(|k| self[(i, k)].times(&right[(k, j)]));
+                let entry = terms.fold(R::zero(), |sum, term| term + &sum);
+                (product[(i, j)], product[(j, i)]) = (entry.clone(), entry);
+            }
+        }
+        product
+    }
+
     /// The `rows`×`cols` block whose first entry is at (`top`, `left`).
     pub fn block(&self, top: usize, left: usize, rows: usize, cols: usize) -> Self {
         Self::from_fn(rows, cols, |i, j| self[(top + i, left + j)].clone())

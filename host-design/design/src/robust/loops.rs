@@ -83,7 +83,7 @@ impl<'a> Loops<'a> {
         progress(Some(("designing the candidates", count as u64)));
         let designed = |rig: &Rig| {
             // A candidate without a design is no candidate.
-            let design = Uncertified::of(rig).ok();
+            let design = Uncertified::sampled_alone(rig).ok();
             progress(None);
             design
         };

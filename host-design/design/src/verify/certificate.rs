@@ -52,7 +52,7 @@ impl Certificates {
                 disturb(&mut plant, seed);
             }
             let mut residuals = Vec::new();
-            Ok((Design::of_plant(rig, plant, &mut residuals)?, residuals))
+            Ok((Design::sampled_alone(rig, plant, &mut residuals)?, residuals))
         };
         let (mut solved, mut disturbed) = (None, Vec::new());
         std::thread::scope(|scope| {

@@ -4,11 +4,11 @@ use serde::Serialize;
 use upright::table::Law;
 
 use super::trial::{Disturbance, Horizon, Unverifiable, chain, edge, scenario, trial, within};
-use crate::design::{Certified, DesignError, design};
+use crate::design::{DesignError, Uncertified, design};
 use crate::parallel;
 use crate::rig::{LinkEncoder, PlantDescription, Rig};
 use crate::simulate::{Scenario, SimulationError};
-use crate::table::{Gains, TableValues};
+use crate::table::TableValues;
 
 /// Settings of the search for the coarsest encoders.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
@@ -76,13 +76,14 @@ pub fn coarser(rig: &Rig, factor: f64) -> Rig {
     coarse
 }
 
-/// `own`, with the observer for `rig`, which differs from the rig of `own` in its encoders alone.
-fn with_observer_of(own: &Certified, rig: &Rig) -> Result<Certified, DesignError> {
-    let observer = design(&Rig { lqr: None, pole_placement: None, integral: None, ..rig.clone() })?;
+/// `own`, with the observer for `rig`, which differs from the rig of `own` in its encoders alone. Without proof, unless
+/// the observer needs more bits than are tried first.
+fn with_observer_of(own: &Uncertified, rig: &Rig) -> Result<Uncertified, DesignError> {
+    let alone = Rig { lqr: None, pole_placement: None, integral: None, ..rig.clone() };
+    let observer = Uncertified::sampled_alone(&alone).or_else(|_| Ok(design(&alone)?.into()))?;
     let mut found = own.clone();
     found.double.kalman = observer.double.kalman;
     found.single.kalman = observer.single.kalman;
-    found.bits = own.bits.max(observer.bits);
     Ok(found)
 }
 
@@ -99,12 +100,12 @@ pub fn coarsest_encoder(
     chain(rig, "encoders")?;
     // The gains of the other law, which is not run, would be designed for nothing.
     let rig = &rig.with_law_alone(law);
-    let own = design(rig)?;
+    let own = design(rig)?.into();
     within("largest_factor", settings.largest_factor, 1.0..=1e6, "a factor from 1 to 1e6")?;
     within("relative", settings.relative, 1e-3..=1.0, "a width from 0.001 to 1")?;
     let found = edge([1.0, settings.largest_factor], settings.relative, |factor| {
         let coarse = coarser(rig, factor);
-        let table = TableValues::of(&coarse, &with_observer_of(&own, &coarse)?, Gains::Sampled)?;
+        let table = TableValues::of_uncertified(&coarse, &with_observer_of(&own, &coarse)?)?;
         if table.observer.is_none() {
             return Err(Unverifiable::NoObserver);
         }
@@ -149,8 +150,9 @@ mod tests {
     fn the_design_for_coarser_encoders_differs_in_its_observer_alone() {
         let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../rigs/triple-glueck-eder-kugi.toml");
         let rig = Rig::from_path(&file).unwrap();
-        let (own, coarse) = (design(&rig).unwrap(), coarser(&rig, 7.0));
-        let (whole, found) = (design(&coarse).unwrap(), with_observer_of(&own, &coarse).unwrap());
+        let (own, coarse) = (Uncertified::from(design(&rig).unwrap()), coarser(&rig, 7.0));
+        let (whole, found) =
+            (Uncertified::from(design(&coarse).unwrap()), with_observer_of(&own, &coarse).unwrap());
         assert!(found == whole && found.double.kalman != own.double.kalman);
     }
 }
