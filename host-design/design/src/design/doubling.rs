@@ -27,8 +27,8 @@ pub(super) fn doubling<R: Real>(a: &Matrix<R>, g: &Matrix<R>, h: &Matrix<R>) -> 
         let w_a = w.solve(&a);
         let w_g = w.solve(&g);
         let a_transposed = a.transpose();
-        let increment = (&a_transposed * &h).times_to_symmetric(&w_a);
-        g = &g + &(&a * &w_g).times_to_symmetric(&a_transposed);
+        let increment = (&a_transposed * &h).symmetric_product(&w_a);
+        g = &g + &(&a * &w_g).symmetric_product(&a_transposed);
         a = &a * &w_a;
         h = &h + &increment;
         if !(h.is_finite() && g.is_finite() && a.is_finite()) {

@@ -105,8 +105,8 @@ impl<R: Real> Matrix<R> {
         })
     }
 
-    /// The product with `right` where it is known to be symmetric: half of it is computed.
-    pub fn times_to_symmetric(&self, right: &Self) -> Self {
+    /// The product with `right`, which is known to be symmetric: half of it is computed.
+    pub fn symmetric_product(&self, right: &Self) -> Self {
         assert_eq!((self.cols, self.rows), (right.rows, right.cols), "dimensions of a symmetric product");
         let mut product = Self::zeros(self.rows, self.rows);
         for i in 0..self.rows {
