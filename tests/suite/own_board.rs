@@ -2,7 +2,8 @@
 //! it balances with its own table.
 
 use std::collections::BTreeMap;
-use std::path::Path;
+use std::hash::{DefaultHasher, Hash, Hasher};
+use std::path::{Path, PathBuf};
 use std::process::Command;
 
 use crate::published::table;
@@ -72,20 +73,36 @@ fn a_changed_line_in_the_document_is_noticed() {
     assert_eq!(differing(&DOCUMENT.replace("Bits16", "Bits32")), ["src/board.rs"]);
 }
 
-/// Writes the document's crate to a folder outside the repository, with the table of its rig.
-fn foreign_crate(folder: &Path) {
-    for (name, text) in files(DOCUMENT) {
-        let path = folder.join(name);
-        std::fs::create_dir_all(path.parent().unwrap()).unwrap();
-        let root = root().to_str().unwrap().replace('\\', "/");
-        // Published crates would be found by version. These are not published yet, so their paths become absolute.
+/// The document's crate with the table of its rig, in a folder outside the repository that is named after its content:
+/// it stays, so that cargo compiles the crate again only when a file of it has changed.
+fn foreign_crate() -> PathBuf {
+    let root = root().to_str().unwrap().replace('\\', "/");
+    // Published crates would be found by version. These are not published yet, so their paths become absolute.
+    let absolute = |text: String| {
         let text = text.replace("\"../../host-design", &format!("\"{root}/host-design"));
-        std::fs::write(path, text.replace("\"../..\"", &format!("\"{root}\""))).unwrap();
-    }
-    let rig = Rig::from_path(&folder.join("rig.toml")).unwrap();
-    std::fs::write(folder.join("src/gains.rs"), gains_source(&rig, &table(&rig))).unwrap();
+        text.replace("\"../..\"", &format!("\"{root}\""))
+    };
+    let mut files: BTreeMap<_, _> =
+        files(DOCUMENT).into_iter().map(|(name, text)| (name, absolute(text))).collect();
+    let rig = Rig::from_toml(&files["rig.toml"], Path::new("rig.toml")).unwrap();
+    files.insert("src/gains.rs", gains_source(&rig, &table(&rig)));
     // The same versions as in this repository, for packages that both need.
-    std::fs::copy(root().join("Cargo.lock"), folder.join("Cargo.lock")).unwrap();
+    files.insert("Cargo.lock", std::fs::read_to_string(Path::new(&root).join("Cargo.lock")).unwrap());
+
+    let mut hash = DefaultHasher::new();
+    files.hash(&mut hash);
+    let folder = std::env::temp_dir().join(format!("upright-own-board-{:016x}", hash.finish()));
+    if !folder.exists() {
+        let unfinished = tempfile::tempdir().unwrap();
+        for (name, text) in &files {
+            let path = unfinished.path().join(name);
+            std::fs::create_dir_all(path.parent().unwrap()).unwrap();
+            std::fs::write(path, text).unwrap();
+        }
+        // Fails if another test was faster.
+        let _ = std::fs::rename(unfinished.path(), &folder);
+    }
+    folder
 }
 
 fn run(command: &mut Command) -> String {
@@ -105,10 +122,8 @@ fn a_crate_made_from_the_document_builds_for_the_target() {
         }
         compiler => compiler.unwrap(),
     };
-    let folder = tempfile::tempdir().unwrap();
-    foreign_crate(folder.path());
     let build = ["build", "--quiet", "--bin", "image", "--features", "image"];
-    run(cargo.current_dir(&folder).args(build).args(["--profile", PROFILE, "--target", TARGET]));
+    run(cargo.current_dir(foreign_crate()).args(build).args(["--profile", PROFILE, "--target", TARGET]));
     let image = std::fs::read(target_directory.join(TARGET).join(PROFILE).join("image")).unwrap();
     // The image contains the control task and the serial link of the library.
     for function in [&b"ControlTask"[..], b"SerialLink"] {
@@ -118,25 +133,24 @@ fn a_crate_made_from_the_document_builds_for_the_target() {
 
 #[test]
 fn a_crate_made_from_the_document_balances_on_the_host() {
-    let folder = tempfile::tempdir().unwrap();
-    foreign_crate(folder.path());
-    let host = |folder: &Path| {
+    let folder = foreign_crate();
+    let host = |with_the_rig_of: &Path| {
         let mut cargo = Command::new(env!("CARGO"));
         // With the settings of the tests, what they are built from need not be compiled again.
-        cargo.current_dir(folder).env("CARGO_TARGET_DIR", target_of_the_tests());
+        cargo.current_dir(with_the_rig_of).env("CARGO_TARGET_DIR", target_of_the_tests());
         for (setting, value) in [("DEBUG", "false"), ("CODEGEN_UNITS", "2"), ("LTO", "off")] {
             cargo.env(format!("CARGO_PROFILE_DEV_{setting}"), value);
         }
-        cargo.args(["run", "--quiet", "--bin", "host"]);
+        cargo.args(["run", "--quiet", "--bin", "host", "--manifest-path"]).arg(folder.join("Cargo.toml"));
         cargo
     };
-    let said = run(&mut host(folder.path()));
+    let said = run(&mut host(&folder));
     assert!(said.starts_with("5001 ticks, fault: None\n"), "{said}");
     // Negative control: a table for another rig.
-    let rig = folder.path().join("rig.toml");
-    let other = std::fs::read_to_string(&rig).unwrap().replace("mass_kg = 0.2", "mass_kg = 0.3");
-    std::fs::write(&rig, other).unwrap();
-    assert!(!host(folder.path()).output().unwrap().status.success());
+    let other = tempfile::tempdir().unwrap();
+    let rig = std::fs::read_to_string(folder.join("rig.toml")).unwrap();
+    std::fs::write(other.path().join("rig.toml"), rig.replace("mass_kg = 0.2", "mass_kg = 0.3")).unwrap();
+    assert!(!host(other.path()).output().unwrap().status.success());
 }
 
 fn target_of_the_tests() -> &'static Path {
