@@ -157,7 +157,7 @@ fn send(pins: &mut Channel, output: &Output) {
 fn inject(sabotage: Sabotage) {
     match sabotage {
         Sabotage::Panic => panic!(),
-        // SAFETY: unsound by intention: nothing is mapped at this address, so the access faults.
+        // SAFETY: deliberately unsound: nothing is mapped at this address, so the access faults.
         Sabotage::HardFault => unsafe { core::ptr::write_volatile(0x4fff_fffc as *mut u32, 0) },
         Sabotage::StackOverflow => {
             dig(1);
