@@ -73,7 +73,7 @@ impl Debounce {
         }
     }
 
-    /// Checks the force of a tick; `limited` says that less than the requested force was applied.
+    /// Checks the force of a tick; `limited` says that the force applied is not the one requested.
     #[inline]
     pub fn check_force<const NY: usize>(&mut self, limits: &Limits<NY>, limited: bool) -> Option<Fault> {
         count(&mut self.saturated, limited);

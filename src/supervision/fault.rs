@@ -45,7 +45,8 @@ pub enum Fault {
     Crash = 17,
     /// The crystal or the PLL has failed to start, or the crystal has the wrong frequency.
     Clock = 18,
-    /// The chip is the wrong one, a register of the motor's timer has lost its value, or the chip's supply is low.
+    /// The chip is the wrong one, a register of the motor's timer has lost what was written to it, or the chip's
+    /// supply is low.
     Board = 19,
     /// The cart or a link is too far from the planned motion.
     OffCourse = 20,
@@ -58,7 +59,7 @@ pub enum Reaction {
     Ticks(u32),
     /// This many ticks after the time that the rig file gives under this key of `[limits]`.
     After(&'static str, u32),
-    /// Not by the control task, or not within a fixed number of ticks: how and when.
+    /// Not a number of ticks: the text says how or when the motor is turned off.
     Hardware(&'static str),
 }
 

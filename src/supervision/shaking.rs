@@ -14,7 +14,7 @@ use crate::table::Limits;
 
 /// Number of forces in a command.
 pub const FORCES: usize = 10;
-/// Length of the ring buffer; it holds the forces for one tick less.
+/// Length of the ring buffer; it holds the forces for the next `AHEAD - 1` ticks.
 pub const AHEAD: usize = 64;
 /// Value in a command that stands for the largest force.
 pub const FULL: i8 = i8::MAX;
@@ -25,11 +25,11 @@ pub const SILENCE_S: f32 = 0.1;
 pub const LONGEST_S: f32 = 120.0;
 /// The motor goes off when the cart has not come back within this time (s).
 pub const RETURN_S: f32 = 5.0;
-/// The cart is back when it is within this fraction of the length between the soft limits from 0 …
+/// The cart is back when it is slow and within this fraction of the length between the soft limits from 0.
 const BACK: f32 = 0.05;
-/// … and so slow that it would need at least this time for the same distance (s).
+/// A cart is slow if it would need at least this time for that distance (s).
 const SLOW_S: f32 = 0.5;
-/// Slew rate of the force, relative to the largest force (1/s).
+/// Largest slew rate of the force, relative to the largest force (1/s).
 const SLEW_PER_S: f32 = 100.0;
 /// Time constant of the filter for the cart's speed (s).
 const FILTER_S: f32 = 0.005;
@@ -39,8 +39,8 @@ pub const ANGLE_RAD: f32 = 2.1;
 pub const RATE_RAD_PER_S: f32 = 90.0;
 /// The same for the cart, as a multiple of its speed limit.
 const RATE_OF_SPEED: f32 = 4.0;
-/// Within this time, the force of the bench drive has to move everything by more than a count: cart, links (s). For
-/// other forces, it is the impulse that counts.
+/// Time within which the force of the bench drive has to move everything by more than a count: cart, links (s). Other
+/// forces have to do so within the same impulse.
 pub const STILL_S: [f32; 2] = [0.25, 0.5];
 /// Unit in which impulses are counted: this fraction of the bench drive's force, for one tick.
 const IMPULSE: f32 = 1.0 / 32.0;
@@ -132,8 +132,8 @@ impl<const NY: usize> Shaker<NY> {
         self.speed_m_per_s
     }
 
-    /// Tick `now`, with the sensors at `counts`, each of them `step` (m or rad) wide. Returns the force (N), or `None`
-    /// when the shaking has ended.
+    /// Tick `now`, with the sensors at `counts`; `step` is the travel per count (m or rad). Returns the force (N), or
+    /// `None` when the shaking has ended.
     ///
     /// # Errors
     /// The fault, and the sensor, if it concerns one.

@@ -201,7 +201,7 @@ fn copy<T: Copy>(from: &[T], to: &mut [T]) {
     to.iter_mut().zip(from).for_each(|(to, from)| *to = *from);
 }
 
-/// Implements [`Part`] for a slice, whose values are not part of the table itself.
+/// Implements [`Part`] for a slice, whose values are stored outside the struct.
 macro_rules! slice {
     ($kind:ident, $type:ty) => {
         impl Part for &[$type] {
