@@ -417,7 +417,7 @@ impl<'t, const NX: usize, const NY: usize, S: SwingUp<NX, NY>> Firmware<'t, NX, 
     }
 
     /// Second half of a tick: telemetry if it is due, the prediction for the next tick, and the reply to `command`, if
-    /// one has arrived. `cycles` is the execution time of the tick before (processor cycles).
+    /// one has arrived. `cycles` is the execution time of the previous tick (processor cycles).
     pub fn finish(
         &mut self,
         command: Option<&Command>,

@@ -2,7 +2,7 @@
 //!
 //! Before anything is balanced, it shows whether the motor pushes in the direction in which the cart's encoder counts.
 //! It also allows PWM, break input and dead-man time to be measured. The force rises slowly to
-//! [`bench_force_n`](crate::table::Limits::bench_force_n). The drive ends when the key is let go, when the cart has
+//! [`bench_force_n`](crate::table::Limits::bench_force_n). The drive ends when the key is released, when the cart has
 //! moved far enough to tell the sign, or after [`LONGEST_S`]. A key that stays held after that does not begin another
 //! drive.
 
@@ -125,8 +125,8 @@ mod tests {
     const TICK_S: f32 = 0.001;
     const SIGN_COUNTS: i32 = 400;
 
-    /// Number of ticks with the motor on and what is then known, for a key that is repeated every `repeat` ticks, and
-    /// a cart that moves by `speed` counts per tick.
+    /// Number of ticks with the motor on, and the sign found, for a key that is repeated every `repeat` ticks and a
+    /// cart that moves by `speed` counts per tick.
     fn drive(along: bool, repeat: u32, speed: i32) -> (u32, MotorSign) {
         let mut drive = BenchDrive::new(SIGN_COUNTS);
         assert!(drive.is_released(TICK_S));

@@ -46,7 +46,7 @@ pub struct Detection<const NY: usize> {
 #[derive(Debug, Clone, Copy, Default)]
 struct SensorMemory {
     counts: i32,
-    /// Corrected estimate of its position in the tick before (m or rad).
+    /// Corrected estimate of its position in the previous tick (m or rad).
     corrected: f32,
     /// Predicted motion while the counter stands still (m or rad).
     moved: f32,

@@ -265,7 +265,7 @@ mod tests {
         panic!("it does not end")
     }
 
-    /// Everything goes to and fro.
+    /// Everything moves back and forth.
     fn swings(tick: i32) -> [i32; 3] {
         let to_and_fro = (tick % 400 - 200).abs() - 100;
         [to_and_fro, 3 * to_and_fro, 5 * to_and_fro]

@@ -58,12 +58,12 @@ fn scenarios(rig: &Rig, disturbed: bool) -> Vec<(String, Scenario)> {
     scenarios
 }
 
-/// The image, if its compiler and QEMU are both there.
+/// The image, if its compiler and QEMU are both installed.
 fn image(kind: Kind) -> Option<PathBuf> {
     in_qemu(build_if_possible(kind).unwrap())
 }
 
-/// The image, if there is one and QEMU is there.
+/// The image, if there is one and QEMU is installed.
 fn in_qemu(image: Option<PathBuf>) -> Option<PathBuf> {
     let image = image?;
     match Command::new("qemu-system-arm").arg("--version").stdout(Stdio::null()).status() {

@@ -185,7 +185,7 @@ pub(super) fn reset_reason(rcc: &RCC, crashed: bool) -> Reset {
     // SAFETY: RMVF; the other bits are the hardware's.
     rcc.csr().write(|w| unsafe { w.bits(1 << 24) });
     // Every reset also sets the reset pin's flag, and power-on sets that of the brown-out detector, so the rarer flags
-    // come first. The flag of a reset by software comes from a debugger: this firmware never asks for one.
+    // come first. The flag of a reset by software comes from a debugger: this firmware never requests one.
     if flags.porrstf().bit_is_set() {
         Reset::Power
     } else if crashed {
