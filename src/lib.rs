@@ -13,9 +13,9 @@
 //! | [`supervision`] | states, faults, what prevents arming, homing, sign check, limits, fault detection |
 //! | [`protocol`] | messages, frames, the serial link |
 //! | [`board`] | the trait that a board implements: inputs of a tick, output to the motor |
-//! | [`firmware`] | one tick of all of it, and the control task that a timer starts |
+//! | [`firmware`] | one tick of all of the above, and the control task that a timer starts |
 //!
-//! The whole firmware, as a control task runs it: the motor stays off until everything that prevents arming is gone.
+//! The whole firmware, as a control task runs it: the motor stays off until nothing prevents arming any more.
 //!
 //! ```
 //! use upright::board::{Contacts, Inputs};
@@ -64,7 +64,7 @@
 #![no_std]
 #![forbid(unsafe_code)]
 
-// A generated table names this crate as another one would: the same file serves inside and outside.
+// A generated gain table refers to this crate as `upright`, so the same file compiles inside this crate and in others.
 extern crate self as upright;
 #[cfg(test)]
 extern crate std;
@@ -75,7 +75,7 @@ pub mod firmware;
 #[cfg(not(feature = "gains-from-env"))]
 pub mod gains;
 #[cfg(feature = "gains-from-env")]
-/// Gains of another rig than the committed one, for an image that the host tool builds to try them.
+/// Gains of a rig other than the committed one, for an image that the host tool builds to try them.
 pub mod gains {
     include!(env!("UPRIGHT_GAINS"));
 }

@@ -54,7 +54,7 @@ mod app {
         commands: Queue<Command, COMMANDS> = Queue::new(),
         messages: Queue<Message<STATES, SENSORS>, MESSAGES> = Queue::new(),
         buffer: Buffer = Buffer::new(),
-        // In RAM, where every word is there at once: in flash, many cost five wait states.
+        // In RAM, which is read without wait states: in flash, many words cost five.
         table: GainTable<STATES, SENSORS> = TABLE,
     ])]
     fn init(cx: init::Context) -> (Shared, Local) {

@@ -1,8 +1,8 @@
-//! Commands to the whole firmware: a run starts from a clone of one that balances, is armed, is raised, hangs, is
-//! shaken, or has a fault.
+//! Commands to the whole firmware: a run starts from a clone of a firmware whose rig balances, is armed, is raised,
+//! hangs, is shaken, or has a fault.
 //!
-//! The bytes of a run spell what happens to it: requests in good frames, which get past the checksum, damaged and
-//! repeated frames, bytes that are no frame, contacts, the supply, a push by hand, and time.
+//! The bytes of a run encode what happens to it: requests in valid frames, which get past the checksum, damaged and
+//! repeated frames, bytes that are not a frame, contacts, the supply, a push by hand, and time.
 
 use std::sync::OnceLock;
 
@@ -25,7 +25,7 @@ mod simulated_rig;
 /// A run ends after this many ticks at the latest.
 const MOST_TICKS: u32 = 32;
 
-/// Runs what `bytes` spell.
+/// Runs what `bytes` encode.
 ///
 /// # Panics
 /// If the firmware panics or an [invariant](invariants) does not hold.
@@ -80,8 +80,8 @@ struct Run<'q> {
 }
 
 impl Run<'_> {
-    /// One step: three bits of `what` say how many ticks follow it, five bits what happens, with the next bytes as
-    /// operand.
+    /// One step: the high five bits of `what` say what happens, with the next bytes as operands; the low three bits
+    /// say how many ticks follow.
     fn step(&mut self, what: u8, bytes: &mut impl Iterator<Item = u8>) {
         let mut next = || bytes.next().unwrap_or_default();
         match what >> 3 {
@@ -121,8 +121,8 @@ impl Run<'_> {
             }
             24 => (0..next() % 32).for_each(|_| self.tick()),
             25 | 31 => {
-                // Coverage does not lead to a single value of 16 bits. So every input tries 16 values of its own,
-                // which its hash chooses: mutations alone prefer few values.
+                // Coverage cannot guide the fuzzer to a single 16-bit value. So every input tries 16 values that its
+                // hash chooses: mutations alone favour a few values.
                 let first = self.hash & !15;
                 for period_ticks in first..=first | 15 {
                     self.send(Request::Telemetry(period_ticks));
@@ -157,7 +157,7 @@ impl Run<'_> {
         frame.clone_into(&mut self.last_frame);
     }
 
-    /// One tick, with all that has to hold after it.
+    /// Runs one tick and checks everything that has to hold after it.
     fn tick(&mut self) {
         if self.ticks >= MOST_TICKS + 2 {
             return;
@@ -171,12 +171,12 @@ impl Run<'_> {
                 match message.expect("a frame that the firmware sends can be read") {
                     Message::Telemetry(telemetry) => invariants::telemetry(&telemetry),
                     Message::Log(log) => assert!(!log.ticks.is_empty()),
-                    // The same command has come again: so does its reply.
+                    // The last command was repeated, and so is its reply.
                     Message::Reply(Reply { id, .. }) if id == self.answered_id => {}
                     Message::Reply(Reply { id, answer }) => {
                         assert!(id > self.answered_id, "only the last command is answered again");
                         self.answered_id = id;
-                        // A damaged frame has its own id only by a collision of the checksum.
+                        // A damaged frame could carry an id of its own only if its checksum collided.
                         let command = self.sent.iter().find(|command| command.id == id);
                         let command = command.expect("a reply belongs to a command that was sent");
                         assert!(answered.replace((command.request, answer)).is_none(), "one reply per tick");
@@ -195,7 +195,7 @@ fn hash(bytes: &[u8]) -> u16 {
     (bytes.iter().fold(0x811c_9dc5, mix) >> 16) as u16
 }
 
-/// Set-points at the edges.
+/// Set-points: 0, the ends of the rail and just beyond, numbers that are not finite, and some others.
 fn setpoint(which: u8) -> f32 {
     let [low, high] = TABLE.limits.rail_m;
     let edges = [0.0, -0.0, low, high, low.next_down(), high.next_up(), f32::INFINITY, f32::NEG_INFINITY];
@@ -203,7 +203,7 @@ fn setpoint(which: u8) -> f32 {
     edges.into_iter().nth(usize::from(which % 15)).unwrap_or_default()
 }
 
-/// Voltages of the supply; most are good.
+/// Supply voltages (V), valid and invalid.
 fn supply(which: u8) -> f32 {
     [24.0, 12.0, 0.0, -1.0, f32::NAN, f32::INFINITY][usize::from(which % 6)]
 }

@@ -1,4 +1,4 @@
-//! Bytes from a line: whatever is read from them is what a frame of it gives again.
+//! Bytes from a serial line: whatever message is read from them is read again, unchanged, from a frame of its own.
 
 use serde::Serialize;
 use serde::de::DeserializeOwned;
@@ -7,7 +7,7 @@ use upright::protocol::frame::{Receiver, encode};
 use upright::protocol::message::{Command, Message};
 use upright::protocol::serial_link::{MAX_COMMAND, MAX_MESSAGE};
 
-/// Reads `bytes` as a stream of frames, and as a message without a frame, which gets past the checksum.
+/// Reads `bytes` as a stream of frames, and also as a message without a frame, which needs no checksum.
 ///
 /// # Panics
 /// If a message changes on its way through a frame.
@@ -26,7 +26,7 @@ fn both<T: Serialize + DeserializeOwned, const N: usize>(bytes: &[u8]) {
     }
 }
 
-/// Compares frames, not messages: a number that is NaN is not equal to itself.
+/// Compares frames, not messages: NaN is not equal to itself.
 fn comes_back<T: Serialize + DeserializeOwned, const N: usize>(message: &T) {
     let (mut scratch, mut out) = ([0; N], [0; N]);
     let frame = encode(message, &mut scratch, &mut out).expect("a message fits into its frame");

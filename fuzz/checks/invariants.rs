@@ -1,5 +1,5 @@
-//! What holds after every tick, whatever was sent. Worked out from the inputs and the replies alone, not by the
-//! firmware's own functions: a condition that the firmware forgets is still known here.
+//! What has to hold after every tick, whatever was sent. It is derived from the inputs and the replies alone, not with
+//! the firmware's own functions: a condition that the firmware forgets is still checked here.
 
 use std::collections::VecDeque;
 
@@ -21,7 +21,7 @@ pub(crate) struct Invariants {
     tick: u32,
     /// Counts of the last ticks with the motor off.
     counts: VecDeque<[i32; SENSORS]>,
-    /// When arming was last refused because of a latched fault, or soon after that.
+    /// Tick in which arming was last refused because of a latched fault, or soon after one.
     arm_held_at: Option<u32>,
     /// Largest force while the rig is shaken (N).
     most_n: f32,
@@ -36,7 +36,7 @@ impl Invariants {
         Self { state, cause, tick: 0, counts: VecDeque::new(), arm_held_at: None, most_n: SHAKING.most_n }
     }
 
-    /// Checks a tick; `answered` is the request whose reply it gave.
+    /// Checks a tick; `answered` is the request that was answered in it, with the answer.
     pub(crate) fn check(
         &mut self,
         firmware: &Tested,
@@ -58,8 +58,8 @@ impl Invariants {
         (self.state, self.cause) = (firmware.state(), firmware.cause());
     }
 
-    /// The motor is on only while balancing or driving, within its limits, and off in the tick of a fault or after a
-    /// disarm.
+    /// The motor is on only while balancing, driving or shaking, within its limits, and off in the tick of a fault or
+    /// after a disarm.
     fn motor(&self, firmware: &Tested, rig: &SimulatedRig, answered: Option<&(Request, Answer)>) {
         let (before, after) = (self.state, firmware.state());
         let Output { enable, drive } = rig.output;
@@ -199,7 +199,7 @@ impl Invariants {
     }
 }
 
-/// A set-point that is taken is finite and on the rail, and so is the one that the law follows.
+/// An accepted set-point is finite and on the rail, and so is the one that the law follows.
 fn setpoint(firmware: &Tested, answered: Option<&(Request, Answer)>) {
     let [low, high] = TABLE.limits.rail_m;
     if let Some((Request::Setpoint(wanted), answer)) = answered {
@@ -212,7 +212,7 @@ fn setpoint(firmware: &Tested, answered: Option<&(Request, Answer)>) {
     }
 }
 
-/// All numbers of a telemetry are finite, and the force is within its limit.
+/// All numbers of a telemetry message are finite, and the force is within its limit.
 pub(crate) fn telemetry(telemetry: &Telemetry<STATES, SENSORS>) {
     let vectors = telemetry.estimate.iter().chain(&telemetry.innovation);
     let numbers = [telemetry.setpoint_m, telemetry.requested_n, telemetry.applied_n, telemetry.drive];

@@ -1,4 +1,4 @@
-//! Bytes of a log: a log that comes back from its own bytes, or an error in one line.
+//! Bytes of a log: either a log that is the same after it is written and read again, or an error of one line.
 
 use upright::table::checksum::crc32;
 use upright_design::identify::Log;
@@ -6,10 +6,10 @@ use upright_design::identify::Log;
 /// First bytes of a log.
 const MAGIC: &[u8] = b"UPRTLOG1";
 
-/// Reads `bytes` as a log, as they are and with its checksums made right, which gets past them.
+/// Reads `bytes` as a log: as they are, and with the right checksums put in, to get past their check.
 ///
 /// # Panics
-/// If a log does not come back, or an error is not one line.
+/// If a log is not the same when it is read again, or an error is not one line.
 pub(crate) fn check(bytes: &[u8]) {
     read(bytes);
     read(&sealed(bytes));
@@ -32,7 +32,8 @@ fn read(bytes: &[u8]) {
     }
 }
 
-/// `bytes` with the first bytes of a log and the right checksum after header and each frame, as far as they go.
+/// `bytes` with the first bytes of a log and the right checksum after the header and after each frame, as far as
+/// `bytes` reach.
 fn sealed(bytes: &[u8]) -> Vec<u8> {
     let mut sealed = bytes.to_vec();
     let Some(begin) = sealed.get_mut(..MAGIC.len()) else { return sealed };

@@ -1,4 +1,4 @@
-//! Text of a rig file: a rig, or an error in one line with an exit code for bad input.
+//! Text of a rig file: either a rig, or an error of one line with an exit code for bad input.
 
 use std::path::Path;
 
@@ -7,7 +7,7 @@ use upright_design::rig::Rig;
 /// Reads `bytes` as a rig file.
 ///
 /// # Panics
-/// If an error is not one line that begins with the file's name, or has another exit code than 2 or 3.
+/// If an error is not one line that begins with the file's name, or has an exit code other than 2 or 3.
 pub(crate) fn check(bytes: &[u8]) {
     let Ok(text) = std::str::from_utf8(bytes) else { return };
     match Rig::from_toml(text, Path::new("fuzz.toml")) {

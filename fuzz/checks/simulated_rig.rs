@@ -13,7 +13,7 @@ use upright::supervision::sign_check::Signs;
 use upright::supervision::supervisor::State;
 use upright::table::Build;
 
-/// How the rig is shaken in the state that is shaken.
+/// How the rig is shaken in the starting state `shaken`.
 pub(crate) const SHAKING: Shaking = Shaking { most_n: 2.0, stiffness_n_per_m: 5.0, damping_n_s_per_m: 2.0 };
 
 /// The whole firmware with the committed gains.
@@ -23,7 +23,7 @@ pub(crate) type Tested = Firmware<'static, STATES, SENSORS>;
 #[derive(Clone)]
 pub(crate) struct SimulatedRig {
     state: [f32; STATES],
-    /// Counts that are added to those of the simulated state: the hand moves something.
+    /// Counts that are added to those of the simulated state, as if a hand had moved cart or links.
     pub(crate) offset: [i32; SENSORS],
     pub(crate) contacts: Contacts,
     pub(crate) supply_v: f32,
@@ -37,7 +37,7 @@ impl SimulatedRig {
         Self { state: [0.0; STATES], offset, contacts, supply_v: 24.0, output: Output::OFF }
     }
 
-    /// One tick under the output's force; the hand stops the rig when the motor is off.
+    /// One tick with the force of the output; while the motor is off, the hand stops the rig.
     fn advance(&mut self) {
         let observer = TABLE.observer.as_ref().expect("the committed table has an observer");
         if !self.output.enable {
@@ -113,12 +113,12 @@ impl Start {
     }
 }
 
-/// The way from power-up to balancing as a person goes it, with the states on it:
+/// Goes from power-up to balancing as a person would, and returns the states on the way:
 /// `[hanging, shaken, raised, armed, balancing, stopped]`.
 ///
-/// Hanging is just powered up; shaken is homed, checked, and shaken for some ticks; raised is homed, checked, upright
-/// and still; armed is two ticks before balancing. Stopped is armed and then stopped by the emergency stop, which is
-/// released again: the fault is latched.
+/// Hanging is just after power-up; shaken is homed, checked, and shaken for some ticks; raised is homed, checked,
+/// upright and still; armed is two ticks before balancing. Stopped is armed and then stopped by the emergency stop,
+/// which is released again: the fault is latched.
 pub(crate) fn starts() -> [Start; 6] {
     let limits = &TABLE.limits;
     let build = Build { rig_hash: RIG_HASH, tick_s: TICK_S };
@@ -169,7 +169,7 @@ pub(crate) fn starts() -> [Start; 6] {
     [hanging, shaken, raised, armed, start, stopped]
 }
 
-/// From hanging with a motor that is checked to being shaken.
+/// From hanging, with the motor checked, to being shaken.
 fn shaken(mut start: Start) -> Start {
     start.rig.offset = TABLE.limits.rest_counts;
     start.wait(TABLE.limits.still_ticks + 1);

@@ -29,7 +29,7 @@ pub struct Contacts {
     pub limit_high: bool,
     /// The emergency stop is pressed, or its wire is open.
     pub emergency_stop: bool,
-    /// The power stage has reported a fault since the last tick, even a short one.
+    /// The power stage has reported a fault since the last tick, even briefly.
     pub driver_fault: bool,
     /// The previous tick was still running when this one was due.
     pub overrun: bool,

@@ -1,4 +1,4 @@
-//! From force to motor duty cycle, and back to the force really applied.
+//! From force to motor duty cycle, and back to the force actually applied.
 
 use serde::{Deserialize, Serialize};
 
@@ -18,7 +18,7 @@ impl Drive {
     /// No force, motor off.
     pub const OFF: Self = Drive::Force(0.0);
 
-    /// The command for `force` (N) on a cart at rest. Without a motor's map it is the force itself.
+    /// The command for `force` (N) on a cart at rest. Without motor data, it is the force itself.
     pub fn at_rest(force: f32, motor: Option<&MotorMap>) -> Self {
         match motor {
             None => Drive::Force(force),
@@ -46,7 +46,7 @@ impl<T: Scalar> MotorMap<T> {
     pub fn drive(&self, force: T, speed: T, last_v: T) -> (T, T) {
         let back_emf = self.volts_per_speed * speed;
         let wanted = self.volts_per_newton * force + back_emf;
-        // The duty cycle adds the dead zone again, so the voltage leaves room for it.
+        // The duty cycle adds the dead zone on top of this voltage, so the limit leaves room for it.
         let within_supply = saturate(wanted, self.supply_v - self.dead_zone_v);
         let volts = last_v + saturate(within_supply - last_v, self.slew_v_per_tick);
         if volts == wanted { (volts, force) } else { (volts, (volts - back_emf) / self.volts_per_newton) }
@@ -55,7 +55,7 @@ impl<T: Scalar> MotorMap<T> {
     /// Duty cycle for `volts`, with the dead zone compensated.
     ///
     /// The compensation rises ten times as fast as the voltage, up to the whole dead zone. So the duty cycle does not
-    /// jump around 0, and less than a tenth of the dead zone remains.
+    /// jump at 0, and less than a tenth of the dead zone is left uncompensated.
     pub fn duty(&self, volts: T) -> T {
         let lift = saturate(T::from_f32(10.0) * volts, self.dead_zone_v);
         saturate((volts + lift) / self.supply_v, T::from_f32(1.0))

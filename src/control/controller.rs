@@ -23,10 +23,10 @@ pub struct Controller<'t, const NX: usize, const NY: usize, T: Scalar = f32> {
     gains: &'t LawGains<NX, T>,
     /// Whether the force depends on earlier ticks, through a pending force or an integral.
     has_memory: bool,
-    /// Whether neither such memory nor known friction has to be looked for in a tick.
+    /// Whether the law has no such memory and the table no known friction, so that a tick can skip both.
     is_plain: bool,
     mode: Mode<'t, NX, NY, T>,
-    /// The mode of a started controller. What the observer finds out about its gains is too slow for a tick.
+    /// The mode to start in, prepared in advance: analysing the structure of the gains takes too long for a tick.
     started: Mode<'t, NX, NY, T>,
     target: T,
     encoders: Encoders<NY>,
@@ -61,7 +61,7 @@ pub struct MotorCommand<T = f32> {
     pub drive: Drive,
 }
 
-/// Reason for rejecting a request; the earlier setting stays.
+/// Reason for rejecting a request; the previous setting is kept.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Rejected {
     /// The table holds no gains for this law.
@@ -72,7 +72,8 @@ pub enum Rejected {
     Setpoint,
     /// The table holds no observer, so the controller cannot run from encoders.
     NoObserver,
-    /// The forces or the spring with which the rig is to be shaken are not possible.
+    /// Invalid parameters for shaking: the largest force is not positive or exceeds the force limit, or the spring or
+    /// damper constant is negative or not finite.
     Shaking,
 }
 
@@ -115,7 +116,7 @@ impl<'t, const NX: usize, const NY: usize> Controller<'t, NX, NY> {
 
 impl<'t, const NX: usize, const NY: usize, T: Scalar> Controller<'t, NX, NY, T> {
     /// The same as [`new`](Controller::new), but without checking the table: for a table in another precision, which a
-    /// host compares with that of the firmware.
+    /// host compares with the table of the firmware.
     ///
     /// # Errors
     /// [`TableError::NoLaw`] if the table holds no law.
@@ -225,7 +226,7 @@ impl<'t, const NX: usize, const NY: usize, T: Scalar> Controller<'t, NX, NY, T> 
         &mut self.encoders
     }
 
-    /// Positions from the encoders (m, rad); all 0 without observer.
+    /// Positions from the encoders (m, rad); all 0 without an observer.
     pub fn positions(&self) -> SVector<T, NY> {
         self.table
             .observer
@@ -380,13 +381,14 @@ impl<'t, const NX: usize, const NY: usize, T: Scalar> Controller<'t, NX, NY, T> 
         (self.requested, self.applied) = (requested, applied);
     }
 
-    /// Second half of a tick: `x̂⁻ = Ad x̂ + Bd u` with the force really applied and known friction, and the integral.
+    /// Second half of a tick: `x̂⁻ = Ad x̂ + Bd u` with the force actually applied and known friction; also updates
+    /// the integral.
     pub fn predict(&mut self) {
         self.predict_with(|_, _| ());
     }
 
     /// The same as [`predict`](Self::predict), but a controller that runs from encoders first calls `finish` with the
-    /// current estimate of what the sensors measure (m or rad) and the force during this tick (N).
+    /// current estimates of the measured positions (m or rad) and the force during this tick (N).
     #[inline(always)]
     pub fn predict_with(&mut self, finish: impl FnOnce([T; NY], T)) {
         let during_this_tick = if self.is_plain { self.applied } else { self.advance() };
@@ -402,7 +404,8 @@ impl<'t, const NX: usize, const NY: usize, T: Scalar> Controller<'t, NX, NY, T> 
         }
     }
 
-    /// Ends a tick of the law, if it has a memory; gives the force that acted during it (N).
+    /// Updates the memory of the law at the end of a tick, if it has one; returns the force that acted during the tick
+    /// (N).
     #[inline]
     fn advance(&mut self) -> T {
         let during_this_tick = self.acting();
@@ -413,7 +416,8 @@ impl<'t, const NX: usize, const NY: usize, T: Scalar> Controller<'t, NX, NY, T> 
         during_this_tick
     }
 
-    /// Force on the cart during this tick (N), between [`control`](Self::control) and [`predict`](Self::predict).
+    /// Force on the cart during this tick (N); valid between [`control`](Self::control) and
+    /// [`predict`](Self::predict).
     fn acting(&self) -> T {
         if self.has_memory && self.table.delay_ticks == 1 { self.state.pending } else { self.applied }
     }
@@ -501,7 +505,7 @@ mod tests {
         let command = controller.control(&[4]);
         assert_eq!(command.applied_n, -2.5);
         controller.predict();
-        // With a tick of delay that force is still pending: Ad x̂ alone.
+        // With a delay of one tick, that force is still pending: the prediction is Ad x̂ alone.
         assert_eq!(controller.estimate(), &vector![1.0, 1.0]);
         controller.control(&[4]);
         controller.predict();

@@ -19,7 +19,7 @@ pub struct Encoders<const NY: usize> {
     /// Bit i is set if counter i has 16 bits; one word holds all of them.
     of_16_bits: u32,
     last: [u32; NY],
-    /// Counts from position 0. Wraps silently after 2³¹ counts, which is a hundred kilometres on any rail.
+    /// Counts from position 0. Wraps silently after 2³¹ counts: 49 km at 23 µm per count.
     position: [i32; NY],
 }
 
@@ -27,7 +27,7 @@ impl<const NY: usize> Encoders<NY> {
     /// Encoders at position 0 with their counters at 0.
     ///
     /// # Panics
-    /// When compiled, for more than 32 counters.
+    /// At compile time, for more than 32 counters.
     pub const fn new(widths: [CounterWidth; NY]) -> Self {
         const { assert!(NY <= 32, "at most 32 counters") };
         let mut of_16_bits = 0;

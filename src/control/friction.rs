@@ -4,7 +4,8 @@
 //! f_i = -clamp(slope_i ω_i, ±coulomb_i),   u = … + Σ p_i f_i,   x̂⁻(next tick) = … + Σ g_i f_i
 //! ```
 //!
-//! The rate ω_i of axis i is state 2i + 1. Loops are kept as loops: written out they would take 2 KiB of flash.
+//! The rate ω_i of axis i is state 2i + 1. The compiler is kept from unrolling the loops, which would take 2 KiB of
+//! flash.
 
 use core::hint::black_box;
 
@@ -12,8 +13,8 @@ use crate::control::state_feedback::saturate;
 use crate::table::{FrictionMap, Law, Scalar};
 
 impl<const NX: usize, const NY: usize, T: Scalar> FrictionMap<NX, NY, T> {
-    /// Force on the cart against the friction of each axis at the rates of `estimate`, which goes to `friction` (N; of
-    /// joints N m).
+    /// Force on the cart (N) that compensates the friction of all axes at the rates of `estimate`. Writes the friction
+    /// of each axis to `friction` (N, for joints N m).
     #[inline(never)]
     pub(crate) fn force(&self, law: Law, estimate: &[T; NX], friction: &mut [T; NY]) -> T {
         let mut force = T::default();
@@ -30,7 +31,7 @@ impl<const NX: usize, const NY: usize, T: Scalar> FrictionMap<NX, NY, T> {
         force
     }
 
-    /// Adds to the prediction what this friction of each axis does in a tick.
+    /// Adds the effect of this friction during one tick to the prediction.
     #[inline(never)]
     pub(crate) fn add_to(&self, prediction: &mut [T; NX], friction: &[T; NY]) {
         for (column, friction) in black_box(&self.effect.data.0[..]).iter().zip(friction) {

@@ -1,36 +1,37 @@
-//! Where a planned motion is: its reference, force and gains, tick by tick, interpolated between the knots of the
+//! Plays back a planned motion: reference state, force and gains of each tick, interpolated between the knots of the
 //! table.
 
 use nalgebra::{SMatrix, SVector};
 
 use crate::table::MotionTable;
 
-/// What the controller follows in one tick.
+/// What the controller follows in one tick of a planned motion: reference and gains.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Course<const NX: usize, const NY: usize> {
     /// Reference state (m, m/s, rad, rad/s …).
     pub x: SVector<f32, NX>,
     /// Reference force (N).
     pub u: f32,
-    /// K of `u - K (x̂ - x)`.
+    /// State feedback K of `u - K (x̂ - x)` (N/m, N s/m, N/rad, N s/rad …).
     pub k: SVector<f32, NX>,
-    /// L of `x̂ = x̂⁻ + L e`.
+    /// Observer gain L of `x̂ = x̂⁻ + L e`: a column for each sensor, a row for each state.
     pub l: SMatrix<f32, NX, NY>,
 }
 
-/// A motion that is being followed.
+/// Steps through a planned motion, tick by tick.
 #[derive(Debug, Clone)]
 pub struct Player<'t, const NX: usize, const NY: usize> {
     motion: MotionTable<'t>,
     tick: u32,
-    /// Distance from the planned positions of the cart to those that are followed (m): the equations of motion are the
-    /// same everywhere on the rail.
+    /// Offset added to the planned positions of the cart (m), so that a motion can begin anywhere: the equations of
+    /// motion are the same everywhere on the rail.
     shift_m: f32,
     now: Course<NX, NY>,
 }
 
 impl<'t, const NX: usize, const NY: usize> Player<'t, NX, NY> {
-    /// The beginning of `motion`, with the cart at `position_m`.
+    /// Starts at the beginning of `motion`, shifted along the rail so that its first cart position is `position_m`
+    /// (m).
     pub fn new(motion: MotionTable<'t>, position_m: f32) -> Self {
         let now = Course { x: SVector::zeros(), u: 0.0, k: SVector::zeros(), l: SMatrix::zeros() };
         let mut player = Self { motion, tick: 0, shift_m: 0.0, now };
@@ -41,28 +42,28 @@ impl<'t, const NX: usize, const NY: usize> Player<'t, NX, NY> {
         player
     }
 
-    /// What to follow in this tick.
+    /// Reference and gains of the current tick.
     pub fn now(&self) -> &Course<NX, NY> {
         &self.now
     }
 
-    /// Ticks since the beginning.
+    /// Ticks since the beginning of the motion; stops at its duration.
     pub fn tick(&self) -> u32 {
         self.tick
     }
 
-    /// Goes to the next tick. After the last one, `now` is where the motion ends, and the result is `true`.
+    /// Goes to the next tick. Returns `true` once the motion has ended; [`now`](Self::now) then stays at its end.
     pub fn advance(&mut self) -> bool {
         self.tick = self.tick.saturating_add(1).min(self.motion.ticks);
         self.interpolate_course();
-        // The filter changes slowly: the gains from one sensor in every tick are enough.
+        // The filter gains change slowly: updating those of one sensor per tick is enough.
         if let Some(sensor) = (self.tick as usize).checked_rem(NY) {
             self.interpolate_filter(sensor);
         }
         self.tick == self.motion.ticks
     }
 
-    /// Moves the planned positions so that the cart is now at `position_m`.
+    /// Shifts the motion along the rail so that its current cart position is `position_m` (m).
     pub fn stay_at(&mut self, position_m: f32) {
         if let Some(position) = self.now.x.as_mut_slice().first_mut() {
             self.shift_m += position_m - *position;
@@ -92,7 +93,7 @@ impl<'t, const NX: usize, const NY: usize> Player<'t, NX, NY> {
     }
 }
 
-/// 1 as a weight. The weighted sums of entries are exact integers: they stay below 2³⁰ times 1.7.
+/// The weight 1 in fixed point. The weighted sums of entries are exact integers: they stay below 1.7 · 2³⁰.
 const ONE: i32 = 1 << 14;
 
 /// Columns of a motion, each with its values at all knots.
@@ -102,7 +103,7 @@ struct Columns<'t> {
     units: &'t [f32],
 }
 
-/// Where a tick is in a column.
+/// The four knots nearest to a tick, and their interpolation weights.
 #[derive(Debug, Clone, Copy)]
 struct Window {
     /// Length of a column.
@@ -110,7 +111,7 @@ struct Window {
     /// The first of the four nearest knots.
     first: usize,
     /// Weights of these knots: those of the cubic through four equidistant points. Their sum is exactly [`ONE`], so
-    /// that what is constant stays constant.
+    /// that a constant column is reproduced exactly.
     weights: [i32; 4],
 }
 
@@ -127,8 +128,8 @@ impl Columns<'_> {
         Window { knots, first: first as usize, weights: [w_a, ONE - w_a - w_c - w_d, w_c, w_d] }
     }
 
-    /// The weighted sums of the columns from number `column` on, in SI units.
-    // Not inlined: written out for each number of columns, it would have to be fetched from flash in every tick.
+    /// Interpolates the columns from number `column` on and writes them to `to`, in SI units.
+    // Not inlined: a copy for each number of columns would have to be fetched from flash in every tick.
     #[inline(never)]
     fn blend(&self, window: &Window, column: usize, to: &mut [f32]) {
         let Window { knots, first, weights: [w_a, w_b, w_c, w_d] } = *window;
@@ -153,7 +154,7 @@ mod tests {
         0.125 * t * t * t - t * t + 0.5 * t + 2.0
     }
 
-    /// What an entry of 1 is in each column: all knots below are whole numbers of it.
+    /// Unit of an entry in each column; all knots below are whole multiples of it.
     const UNITS: [f32; 5] = [0.0625, 0.125, 0.03125, 0.0625, 0.125];
 
     fn motion<'t>(course: &'t [i16], filter: &'t [i16]) -> MotionTable<'t> {

@@ -122,7 +122,7 @@ impl<'t, const NX: usize, const NY: usize, T: Scalar> Observer<'t, NX, NY, T> {
         }
     }
 
-    /// Prediction for the next tick, `x̂⁻ = Ad x̂ + Bd u`, with the force `u` (N) really applied.
+    /// Prediction for the next tick, `x̂⁻ = Ad x̂ + Bd u`, with the force `u` (N) actually applied.
     ///
     /// The terms of an entry are added in a fixed order, column by column, so every machine computes the same bits.
     // Factors stay references until they are multiplied, so that each is loaded where it is used: this saves 13 cycles
@@ -143,7 +143,7 @@ impl<'t, const NX: usize, const NY: usize, T: Scalar> Observer<'t, NX, NY, T> {
                 next[0] += *x;
                 (columns, states) = (others, rest);
             }
-            // The compiler does not see how many columns there are: it would write the loop out, in 2 KiB.
+            // Hides the number of columns from the compiler, which would otherwise unroll the loop into 2 KiB.
             for (column, x) in black_box(columns).iter().zip(states) {
                 for (row, next) in next.iter_mut().enumerate() {
                     *next += column[row] * *x;
@@ -230,7 +230,7 @@ mod tests {
             other[(row, column)] += 0.01;
             let expected = match (row, column) {
                 (_, 0) => Pattern::Any,
-                // Only the diagonals of the blocks are repeated, and only the links must not feel the cart.
+                // The blocks' diagonals have to agree, and the links must not depend on the cart's speed.
                 (2 | 3, 1) | (0, 2) | (1, 3) | (2, 2) | (3, 3) | (1, 1) => Pattern::SameEverywhere,
                 _ => Pattern::Frictionless,
             };

@@ -58,7 +58,7 @@ pub fn saturate<T: Scalar>(u: T, limit: T) -> T {
     if u >= -limit && u <= limit { u } else { beyond(u, limit) }
 }
 
-/// [`saturate`] where `u` is not within the limits.
+/// [`saturate`] for a `u` outside the limits, or NaN.
 #[cold]
 fn beyond<T: Scalar>(u: T, limit: T) -> T {
     if u > limit {
@@ -70,7 +70,7 @@ fn beyond<T: Scalar>(u: T, limit: T) -> T {
     }
 }
 
-/// The memory of a control law.
+/// What a control law remembers from one tick to the next.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct LawState<T = f32> {
     /// Governed set-point (m), which the law follows.

@@ -1,4 +1,4 @@
-//! The bench drive: when it may begin, and a tick of it.
+//! The bench drive: the conditions for its start, and one tick of it.
 
 use super::Firmware;
 use crate::board::{Inputs, Output};
@@ -9,7 +9,7 @@ use crate::supervision::supervisor::State;
 use crate::table::SwingUp;
 
 impl<const NX: usize, const NY: usize, S: SwingUp<NX, NY>> Firmware<'_, NX, NY, S> {
-    /// Keeps the drive going, or begins it: along +x, or against it.
+    /// A command to drive: continues the drive in progress, or starts one, along +x or against it.
     pub(super) fn hold_drive(&mut self, along: bool) -> Result<(), Inhibits> {
         let is_driving = self.supervisor.state() == State::Driving;
         if is_driving && along != self.bench_drive.is_along() {
@@ -33,13 +33,13 @@ impl<const NX: usize, const NY: usize, S: SwingUp<NX, NY>> Firmware<'_, NX, NY, 
         Ok(())
     }
 
-    /// What the sign check requires of the cart; 0 without a cart (counts).
+    /// How far the cart has to move in the sign check (counts); 0 without a cart.
     pub(super) fn cart_sign_counts(&self) -> i32 {
         cart(&self.table.limits.sign_counts)
     }
 
     /// A tick of the drive.
-    // Not part of the tick in which it is called: the bound on the stack has to follow every jump there.
+    // Not inlined into the tick: the tool that computes the bound on the stack has to follow every jump there.
     #[inline(never)]
     pub(super) fn push_cart(&mut self, inputs: &Inputs<NY>) {
         let table = self.table;
@@ -59,7 +59,7 @@ impl<const NX: usize, const NY: usize, S: SwingUp<NX, NY>> Firmware<'_, NX, NY, 
     }
 }
 
-/// What is the cart's of the sensors' counts.
+/// The cart's entry among the sensors' counts; 0 without sensors.
 pub(super) fn cart<const NY: usize>(counts: &[i32; NY]) -> i32 {
     counts.first().copied().unwrap_or_default()
 }

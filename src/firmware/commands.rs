@@ -17,7 +17,7 @@ const VERSION: [u8; 3] = [
     number(env!("CARGO_PKG_VERSION_PATCH")),
 ];
 
-/// Reads a decimal number when the crate is compiled; too large a number does not compile.
+/// Parses a decimal number at compile time; a number above 255 does not compile.
 const fn number(digits: &str) -> u8 {
     match u8::from_str_radix(digits, 10) {
         Ok(number) => number,
@@ -26,7 +26,7 @@ const fn number(digits: &str) -> u8 {
 }
 
 impl<const NX: usize, const NY: usize, S: SwingUp<NX, NY>> Firmware<'_, NX, NY, S> {
-    /// Carries out a command and gives the answer.
+    /// Carries out a command and returns the answer.
     pub(super) fn answer(&mut self, command: &Command) -> Answer {
         let done = |result: Result<(), _>| result.map_or_else(Answer::NotNow, |()| Answer::Done);
         let taken = |result: Result<(), _>| result.map_or_else(Answer::Rejected, |()| Answer::Done);
@@ -77,7 +77,7 @@ impl<const NX: usize, const NY: usize, S: SwingUp<NX, NY>> Firmware<'_, NX, NY, 
         }
     }
 
-    /// Takes the present position as cart at 0, links hanging or swinging about that.
+    /// Homes at the present position: the cart is at 0, and the links hang still or swing about hanging.
     fn home_here(&mut self) -> Result<(), Inhibits> {
         let position = self.calibration.hanging(self.controller.encoders().counts(), &self.table.limits)?;
         self.supervisor.complete_homing()?;
@@ -121,9 +121,9 @@ impl<const NX: usize, const NY: usize, S: SwingUp<NX, NY>> Firmware<'_, NX, NY, 
     /// [`Inhibits::HELD`] if the command `id`, which would turn the motor on, comes from a key held since a fault.
     pub(super) fn held_inhibit(&mut self, id: u64) -> Inhibits {
         // A key held down since the fault sends one command after the other. None of them may turn the motor on: each
-        // one restarts the lockout, which ends only when the key has been released for `still_ticks`. The time that
-        // counts as standing still for homing also counts as letting go; nothing speaks for a key of its own in the
-        // rig file.
+        // one restarts the lockout, which ends only when the key has been released for `still_ticks`. The time for
+        // which homing wants everything still also serves for this; there is no need for another setting in the rig
+        // file.
         if self.supervisor.state() == State::Fault || self.rearm_lockout_ticks > 0 {
             self.rearm_lockout_ticks = self.table.limits.still_ticks;
         }
@@ -132,7 +132,7 @@ impl<const NX: usize, const NY: usize, S: SwingUp<NX, NY>> Firmware<'_, NX, NY, 
         Inhibits::HELD.when(held)
     }
 
-    /// Inhibits of clearing: what would raise the fault again at once.
+    /// Inhibits of clearing: conditions that would trip the fault again at once.
     fn clearing_inhibits(&self) -> Inhibits {
         let Contacts { emergency_stop, driver_fault, .. } = self.contacts;
         Inhibits::EMERGENCY_STOP
@@ -141,7 +141,7 @@ impl<const NX: usize, const NY: usize, S: SwingUp<NX, NY>> Firmware<'_, NX, NY, 
             .union(Inhibits::TABLE.when(!self.is_usable))
     }
 
-    /// Takes the wanted cart position (m), which has to be within the soft limits of the rail.
+    /// Takes a commanded cart position (m), which has to be within the soft limits of the rail.
     fn take_setpoint(&mut self, position_m: f32) -> Result<(), Rejected> {
         let [low, high] = self.table.limits.rail_m;
         if !(low..=high).contains(&position_m) {

@@ -41,7 +41,7 @@ impl<'q, 't, B: Board<NY>, const NX: usize, const NY: usize, S: SwingUp<NX, NY>>
         self.tick_with(Firmware::drive, Firmware::predict);
     }
 
-    /// One tick, with [`Firmware::drive`] and [`Firmware::predict`] as the caller has had them compiled.
+    /// One tick, with the caller's own compiled versions of [`Firmware::drive`] and [`Firmware::predict`].
     #[inline(always)]
     pub fn tick_with(
         &mut self,
@@ -59,7 +59,7 @@ impl<'q, 't, B: Board<NY>, const NX: usize, const NY: usize, S: SwingUp<NX, NY>>
         let telemetry = self.firmware.report(self.cycles);
         predict(&mut self.firmware);
         let reply = self.firmware.complete(command.as_ref());
-        // The reply goes first: it is sent once, telemetry again and again.
+        // The reply goes first: it is sent only once, telemetry again and again.
         if let Some(reply) = reply {
             self.send(Message::Reply(reply));
         }
@@ -85,7 +85,7 @@ impl<'q, 't, B: Board<NY>, const NX: usize, const NY: usize, S: SwingUp<NX, NY>>
         &self.firmware
     }
 
-    /// The board.
+    /// The board, for example to start its watchdog.
     pub fn board(&mut self) -> &mut B {
         &mut self.board
     }

@@ -10,13 +10,13 @@ use crate::gains::{SENSORS, STATES, SwingUp};
 /// The firmware for the rig of the gain table.
 pub type RigFirmware = Firmware<'static, STATES, SENSORS, SwingUp>;
 
-/// [`Firmware::drive`].
+/// [`Firmware::drive`], compiled for speed.
 #[inline(never)]
 pub fn drive<'f>(firmware: &'f mut RigFirmware, inputs: &Inputs<SENSORS>) -> &'f Output {
     firmware.drive(inputs)
 }
 
-/// [`Firmware::predict`].
+/// [`Firmware::predict`], compiled for speed.
 #[inline(never)]
 pub fn predict(firmware: &mut RigFirmware) {
     firmware.predict();

@@ -1,8 +1,8 @@
 //! The whole firmware, tick by tick: inputs → supervisor → controller → output, then commands and telemetry.
 //!
-//! Here the other rooms are put together. [`Firmware`] knows neither registers nor frames; [`control_task`] connects
-//! it to a board and to the serial link. The answer to a new request is written in `commands.rs`; a new condition on
-//! arming in `posture.rs`; a new field of telemetry in `telemetry.rs`.
+//! This module combines all the others. [`Firmware`] knows neither registers nor frames; [`control_task`] connects it
+//! to a board and to the serial link. The answer to a new request goes into `commands.rs`, a new condition on arming
+//! into `posture.rs`, a new field of telemetry into `telemetry.rs`.
 
 mod bench_drive;
 mod commands;
@@ -38,8 +38,8 @@ use crate::table::{Build, ChecksumScan, Equilibrium, GainTable, NoSwingUp, Swing
 
 /// Controller and supervisor of one rig, with its swing-up, if it has one.
 ///
-/// A tick has two halves: [`control`](Self::control) gives the output that the motor is driven with at once;
-/// [`finish`](Self::finish) does everything else and only has to end before the next tick is due.
+/// A tick has two halves: [`control`](Self::control) computes the output, with which the motor has to be driven at
+/// once; [`finish`](Self::finish) does everything else and only has to end before the next tick is due.
 #[derive(Debug, Clone)]
 pub struct Firmware<'t, const NX: usize, const NY: usize, S = NoSwingUp> {
     controller: Controller<'t, NX, NY>,
@@ -52,18 +52,18 @@ pub struct Firmware<'t, const NX: usize, const NY: usize, S = NoSwingUp> {
     swing_up_scan: ChecksumScan<'t>,
     /// Whether the table was sound at the start.
     is_usable: bool,
-    /// Whether the whole table was found intact since arming.
+    /// Whether the whole table has been found intact since arming.
     is_checked: bool,
     table: &'t GainTable<NX, NY>,
     swing_up: &'t S,
-    /// The motion that is being followed.
+    /// The motion that is being followed; while the rig holds, the last one.
     moving: Option<Player<'t, NX, NY>>,
-    /// Where it ends; while the rig holds, where it has ended.
+    /// The equilibrium at which that motion ends, or has ended.
     goal: Equilibrium,
     raw_counts: [u32; NY],
     contacts: Contacts,
     supply_v: f32,
-    /// Whether the host has given a set-point since the motor was last turned off.
+    /// Whether the host has commanded a set-point since the last fault or disarm command.
     setpoint_commanded: bool,
     /// Ticks for which arming stays refused after it was refused because of a fault: see [`Inhibits::HELD`].
     ///
@@ -84,21 +84,21 @@ pub struct Firmware<'t, const NX: usize, const NY: usize, S = NoSwingUp> {
     ticks_to_telemetry: u16,
     #[cfg(feature = "identify")]
     shaker: Shaker<NY>,
-    /// Voltage of the tick before, while the rig is shaken (V).
+    /// Motor voltage of the previous tick, while the rig is shaken (V).
     #[cfg(feature = "identify")]
     last_volts: f32,
-    /// Ticks of the log that are not yet sent; none while no log is kept.
+    /// Logged ticks that are not yet sent; `None` while no log is kept.
     #[cfg(feature = "identify")]
     log: Option<TickLog<NY>>,
 }
 
-/// Words of the table that are checked in a tick while armed, when the whole table has to be read before the motor is
-/// on. Otherwise it is one.
+/// Number of words of the table that are checked per tick while armed, when the whole table has to be read before the
+/// motor comes on. In other states it is one.
 const WORDS_PER_ARMED_TICK: u32 = 8;
 
 impl<'t, const NX: usize, const NY: usize> Firmware<'t, NX, NY> {
-    /// The firmware without swing-up, motor off. `start` is what the board knows: a [`Start`], or just a
-    /// [`Reset`](crate::protocol::message::Reset).
+    /// The firmware without swing-up, motor off. `start` is what the board knows about its start: a [`Start`], or just
+    /// a [`Reset`](crate::protocol::message::Reset).
     ///
     /// # Errors
     /// [`TableError`] if the table is damaged or was made for another build.
@@ -128,8 +128,8 @@ impl<'t, const NX: usize, const NY: usize, S: SwingUp<NX, NY>> Firmware<'t, NX, 
         Ok(Self::with_controller(table, swing_up, Controller::new(table, build, widths)?, start.into(), true))
     }
 
-    /// [`with_swing_up`](Self::with_swing_up), or [`unusable`](Self::unusable) if a table is. Without a result in
-    /// between, which would be a copy of the firmware on the stack.
+    /// [`with_swing_up`](Self::with_swing_up) if the tables are sound, otherwise [`unusable`](Self::unusable). Returns
+    /// no `Result`, which would put a copy of the firmware on the stack.
     #[inline(never)]
     pub fn of_any_table(
         table: &'t GainTable<NX, NY>,
@@ -145,7 +145,8 @@ impl<'t, const NX: usize, const NY: usize, S: SwingUp<NX, NY>> Firmware<'t, NX, 
         }
     }
 
-    /// The firmware with a table that cannot be used: it has latched [`Fault::Table`] for good, and reports it.
+    /// The firmware with a table that cannot be used: it has latched [`Fault::Table`], which cannot be cleared, and
+    /// reports it.
     pub fn unusable(
         table: &'t GainTable<NX, NY>,
         swing_up: &'t S,
@@ -167,7 +168,8 @@ impl<'t, const NX: usize, const NY: usize, S: SwingUp<NX, NY>> Firmware<'t, NX, 
         if !is_usable {
             supervisor.trip(at_start(Fault::Table));
         }
-        // Nothing is changed in the new firmware afterwards: a copy of it would need a quarter of the board's stack.
+        // The new firmware is not changed after this expression: that would make a copy, which needs a quarter of the
+        // board's stack.
         Self {
             controller,
             supervisor,
@@ -228,7 +230,7 @@ impl<'t, const NX: usize, const NY: usize, S: SwingUp<NX, NY>> Firmware<'t, NX, 
         &self.calibration
     }
 
-    /// What is known of the motor's sign.
+    /// What is known about the motor's sign.
     pub fn motor_sign(&self) -> MotorSign {
         self.bench_drive.sign()
     }
@@ -244,8 +246,8 @@ impl<'t, const NX: usize, const NY: usize, S: SwingUp<NX, NY>> Firmware<'t, NX, 
         *self.drive(inputs)
     }
 
-    /// The first part of [`control`](Self::control): contacts that turn the motor off, and all of a tick without the
-    /// control law.
+    /// The first part of [`control`](Self::control): checks the contacts that turn the motor off, and does all of a
+    /// tick in states without the control law.
     pub fn accept(&mut self, inputs: &Inputs<NY>) {
         (self.raw_counts, self.contacts, self.supply_v) =
             (inputs.raw_counts, inputs.contacts, inputs.supply_v);
@@ -269,7 +271,8 @@ impl<'t, const NX: usize, const NY: usize, S: SwingUp<NX, NY>> Firmware<'t, NX, 
         }
     }
 
-    /// The second part of [`control`](Self::control): the output, from the control law if the rig is driven.
+    /// The second part of [`control`](Self::control): the output, from the control law or a planned motion while one
+    /// of them commands the motor.
     pub fn drive(&mut self, inputs: &Inputs<NY>) -> &Output {
         self.output = match self.supervisor.state() {
             State::Balancing => self.balance(inputs),
@@ -286,7 +289,7 @@ impl<'t, const NX: usize, const NY: usize, S: SwingUp<NX, NY>> Firmware<'t, NX, 
         &self.output
     }
 
-    /// A tick with the motor on. Faults are checked in the order of [`Fault::PRECEDENCE`].
+    /// A tick of balancing. Faults are checked in the order of [`Fault::PRECEDENCE`].
     fn balance(&mut self, inputs: &Inputs<NY>) -> Output {
         let table = self.table;
         let (detection, thresholds) = (&mut self.detection, &table.thresholds);
@@ -325,7 +328,7 @@ impl<'t, const NX: usize, const NY: usize, S: SwingUp<NX, NY>> Firmware<'t, NX, 
         Output::OFF
     }
 
-    /// Takes the counts of a tick without the control law.
+    /// Takes and returns the counts of a tick without the control law.
     fn follow(&mut self) -> [i32; NY] {
         self.controller.follow(&self.raw_counts);
         let counts = *self.controller.encoders().counts();
@@ -337,7 +340,7 @@ impl<'t, const NX: usize, const NY: usize, S: SwingUp<NX, NY>> Firmware<'t, NX, 
     fn tick_motor_off(&mut self) {
         let counts = self.follow();
         let limits = &self.table.limits;
-        // Not while armed, when the tick may go on with the control law.
+        // Not while armed, when the same tick may go on with the control law.
         if let Some(observer) = &self.table.observer
             && self.supervisor.state() != State::Armed
         {
@@ -388,8 +391,8 @@ impl<'t, const NX: usize, const NY: usize, S: SwingUp<NX, NY>> Firmware<'t, NX, 
         }
     }
 
-    /// Starts the controller at rest at these counts, and with it the supervision of a rig that is driven; whether
-    /// that is possible.
+    /// Starts the controller at rest at these counts, and restarts the tests and counters that supervise it. Returns
+    /// whether the controller has started.
     fn start_controller(&mut self, counts: &[i32; NY]) -> bool {
         self.controller.encoders_mut().home(&self.raw_counts, counts);
         let started = self.controller.start(&self.raw_counts).is_ok();
@@ -397,14 +400,14 @@ impl<'t, const NX: usize, const NY: usize, S: SwingUp<NX, NY>> Firmware<'t, NX, 
         started
     }
 
-    /// Restarts the tests of encoders and motor, and what counts ticks towards a fault.
+    /// Restarts the tests of encoders and motor, and the counters of ticks towards a fault.
     fn restart_supervision(&mut self) {
         let counts = *self.controller.encoders().counts();
         self.detection.start(&counts, &self.controller.positions().data.0[0]);
         self.debounce.start();
     }
 
-    /// Stays where the governed set-point is, unless the host commands another.
+    /// Requests the position of the governed set-point, unless the host has commanded another.
     fn hold_setpoint(&mut self) {
         if !self.setpoint_commanded {
             let here = self.controller.law_state().setpoint;
@@ -414,7 +417,7 @@ impl<'t, const NX: usize, const NY: usize, S: SwingUp<NX, NY>> Firmware<'t, NX, 
     }
 
     /// Second half of a tick: telemetry if it is due, the prediction for the next tick, and the reply to `command`, if
-    /// one has arrived. `cycles` is the execution time of the tick before (processor cycles).
+    /// one has arrived. `cycles` is the execution time of the previous tick (processor cycles).
     pub fn finish(
         &mut self,
         command: Option<&Command>,
@@ -433,7 +436,7 @@ impl<'t, const NX: usize, const NY: usize, S: SwingUp<NX, NY>> Firmware<'t, NX, 
         self.telemetry_is_due().then(|| self.telemetry())
     }
 
-    /// The second part of [`finish`](Self::finish): the prediction, if the rig is driven.
+    /// The second part of [`finish`](Self::finish): the prediction, while the controller commands the motor.
     pub fn predict(&mut self) {
         match self.supervisor.state() {
             State::Raising | State::Holding | State::Lowering if S::IS_POSSIBLE => self.predict_motion(),

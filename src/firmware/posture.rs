@@ -1,4 +1,4 @@
-//! Inhibits of arming: does the rig stand so that balancing may start?
+//! Inhibits of arming: is the rig in a posture from which balancing may start?
 
 use super::Firmware;
 use crate::board::Contacts;
@@ -7,9 +7,9 @@ use crate::supervision::inhibits::Inhibits;
 use crate::supervision::sign_check::Signs;
 use crate::table::SwingUp;
 
-/// Arming requires that the rig has been slow for this part of [`Limits::arm_ticks`]: long enough to refuse it while a
-/// link swings through the vertical, short enough that a steady hand is never told to wait. The whole of `arm_ticks`
-/// has to pass after arming before the motor is on.
+/// Arming requires that the rig has been slow for [`Limits::arm_ticks`] divided by this: long enough to refuse it
+/// while a link swings through the vertical, short enough that a steady hand is never told to wait. The whole of
+/// `arm_ticks` has to pass after arming before the motor is on.
 ///
 /// [`Limits::arm_ticks`]: crate::table::Limits::arm_ticks
 const MOVING_PART_OF_ARM_TICKS: u32 = 4;
@@ -22,7 +22,7 @@ impl<const NX: usize, const NY: usize, S: SwingUp<NX, NY>> Firmware<'_, NX, NY, 
         let joints = counts.iter().zip(observer.step.iter()).zip(&self.table.limits.turn_counts);
         for ((&count, step), _) in joints.filter(|(_, turn)| **turn > 0) {
             angle += step * count as f32;
-            // A comparison, because `f32::max` is a function of its own in the image.
+            // A comparison, because `f32::max` would be a function call in the image.
             if f32::abs(angle) > largest {
                 largest = f32::abs(angle);
             }
@@ -43,7 +43,7 @@ impl<const NX: usize, const NY: usize, S: SwingUp<NX, NY>> Firmware<'_, NX, NY, 
         Inhibits::OFF_CENTRE.when(position < low || position > high)
     }
 
-    /// Inhibits by the contacts and the supply.
+    /// Inhibits that follow from the contacts and the supply.
     #[inline(never)]
     pub(super) fn input_inhibits(&self) -> Inhibits {
         let Contacts { limit_low, limit_high, emergency_stop, driver_fault, .. } = self.contacts;
@@ -56,7 +56,8 @@ impl<const NX: usize, const NY: usize, S: SwingUp<NX, NY>> Firmware<'_, NX, NY, 
             .union(Inhibits::SUPPLY.when(!supply_is_good))
     }
 
-    /// All inhibits of arming that hold now, except [`Inhibits::HELD`], which is only known when it is tried.
+    /// All inhibits of arming that hold now, except [`Inhibits::HELD`], which is only known once a command to arm
+    /// arrives.
     pub fn arming_inhibits(&self) -> Inhibits {
         if self.supervisor.state().drives() {
             return self.supervisor.arming_inhibits();
@@ -69,13 +70,13 @@ impl<const NX: usize, const NY: usize, S: SwingUp<NX, NY>> Firmware<'_, NX, NY, 
             .union(self.off_centre_inhibit(&counts))
     }
 
-    /// Inhibits of turning the motor on, however the links are.
+    /// Inhibits of turning the motor on, whatever the posture of the links.
     pub(super) fn inhibits_with_motor_off(&self) -> Inhibits {
         let is_unchecked = self.bench_drive.sign() != MotorSign::Checked;
         self.inhibits_before_motor_check().union(Inhibits::MOTOR.when(is_unchecked))
     }
 
-    /// The same, as long as the motor's sign is not known.
+    /// The same, but without the check of the motor's sign: for the bench drive, which makes that check.
     pub(super) fn inhibits_before_motor_check(&self) -> Inhibits {
         let state = self.supervisor.arming_inhibits();
         if self.supervisor.state().drives() {

@@ -1,4 +1,4 @@
-//! Shaking the rig: when it may begin, and a tick of it.
+//! Shaking the rig: the conditions for its start, and one tick of it.
 
 use super::Firmware;
 use crate::board::{Inputs, Output};
@@ -11,7 +11,7 @@ use crate::supervision::shaking::{FORCES, Shaking};
 use crate::supervision::supervisor::State;
 use crate::table::SwingUp;
 
-/// The cart has to begin within this part of the rail's soft limits.
+/// At the start, the cart has to be within this fraction of the rail's soft limits.
 const CENTRE: f32 = 0.25;
 
 impl<const NX: usize, const NY: usize, S: SwingUp<NX, NY>> Firmware<'_, NX, NY, S> {
@@ -40,7 +40,7 @@ impl<const NX: usize, const NY: usize, S: SwingUp<NX, NY>> Firmware<'_, NX, NY, 
         Answer::Done
     }
 
-    /// Takes the forces of coming ticks.
+    /// Takes the forces for coming ticks.
     pub(super) fn take_forces(&mut self, first: u16, forces: &[i8; FORCES]) -> Answer {
         if self.supervisor.state() != State::Identifying {
             return Answer::NotNow(Inhibits::NOT_SHAKEN);
@@ -50,7 +50,7 @@ impl<const NX: usize, const NY: usize, S: SwingUp<NX, NY>> Firmware<'_, NX, NY, 
     }
 
     /// A tick in which the rig is shaken.
-    // Not part of the tick in which it is called: the bound on the stack has to follow every jump there.
+    // Not inlined into the tick: the tool that computes the bound on the stack has to follow every jump there.
     #[inline(never)]
     pub(super) fn shake(&mut self, inputs: &Inputs<NY>) {
         let table = self.table;
@@ -70,7 +70,7 @@ impl<const NX: usize, const NY: usize, S: SwingUp<NX, NY>> Firmware<'_, NX, NY, 
         }
     }
 
-    /// What drives the cart with this force, and the force that this gives (N).
+    /// The motor command for this force (N) on the moving cart, and the force that it produces (N).
     fn driven(&mut self, force_n: f32) -> (Drive, f32) {
         let Some(motor) = &self.table.motor else { return (Drive::Force(force_n), force_n) };
         let (volts, applied_n) = motor.drive(force_n, self.shaker.speed_m_per_s(), self.last_volts);

@@ -1,4 +1,4 @@
-//! Planned motions from one equilibrium to another: when they may begin, a tick of them, and how they end.
+//! Planned motions from one equilibrium to another: the conditions for their start, one tick, and their end.
 
 use super::Firmware;
 use crate::board::{Inputs, Output};
@@ -10,8 +10,8 @@ use crate::supervision::supervisor::State;
 use crate::table::{Equilibrium, Law, MotionTable, SwingUp};
 
 impl<'t, const NX: usize, const NY: usize, S: SwingUp<NX, NY>> Firmware<'t, NX, NY, S> {
-    /// What prevents the next motion: lowering while the rig balances, else to upright; without [`Inhibits::HELD`],
-    /// which is only known when it is tried.
+    /// Inhibits of the next motion: to hanging while the rig balances, otherwise to upright. Without
+    /// [`Inhibits::HELD`], which is only known once a command arrives.
     pub fn swing_up_inhibits(&self) -> Inhibits {
         let to = match self.supervisor.state() {
             State::Balancing => Equilibrium::HANGING,
@@ -20,7 +20,7 @@ impl<'t, const NX: usize, const NY: usize, S: SwingUp<NX, NY>> Firmware<'t, NX, 
         self.way(to).map_or_else(|inhibits| inhibits, |motion| self.motion_inhibits(&motion))
     }
 
-    /// The motion from where the links are to the equilibrium `to`.
+    /// The motion from the present equilibrium to the equilibrium `to`.
     fn way(&self, to: Equilibrium) -> Result<MotionTable<'t>, Inhibits> {
         let swing_up = self.swing_up;
         let Some(motions) = swing_up.motions() else { return Err(Inhibits::NO_SWING_UP) };
@@ -32,7 +32,7 @@ impl<'t, const NX: usize, const NY: usize, S: SwingUp<NX, NY>> Firmware<'t, NX, 
         motions.between(from, to).copied().ok_or(Inhibits::NO_WAY)
     }
 
-    /// The equilibrium at which the links are balanced; hanging, if they are not.
+    /// The present equilibrium: the one at which the links are balanced; hanging, if they are not balanced.
     fn equilibrium(&self) -> Equilibrium {
         match self.supervisor.state() {
             State::Balancing => Equilibrium::UPRIGHT,
@@ -41,7 +41,7 @@ impl<'t, const NX: usize, const NY: usize, S: SwingUp<NX, NY>> Firmware<'t, NX, 
         }
     }
 
-    /// What prevents `motion`, which begins where the links are.
+    /// Inhibits of `motion`, which begins at the present equilibrium.
     fn motion_inhibits(&self, motion: &MotionTable<'_>) -> Inhibits {
         match self.supervisor.state() {
             State::Balancing | State::Holding => self.leaving_inhibits(motion),
@@ -74,7 +74,7 @@ impl<'t, const NX: usize, const NY: usize, S: SwingUp<NX, NY>> Firmware<'t, NX, 
         position + lowest >= low && position + highest <= high
     }
 
-    /// Begins to bring the links to the equilibrium `to`. `id` is that of the command.
+    /// Begins the motion to the equilibrium `to`. `id` is that of the command.
     pub(super) fn go_to(&mut self, to: Equilibrium, id: u64) -> Result<(), Inhibits> {
         let motion = self.way(to)?;
         let (from, to) = (self.equilibrium(), to.of_links(NY - 1));

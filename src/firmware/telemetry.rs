@@ -9,12 +9,12 @@ use crate::protocol::message::Telemetry;
 use crate::table::SwingUp;
 
 impl<const NX: usize, const NY: usize, S: SwingUp<NX, NY>> Firmware<'_, NX, NY, S> {
-    /// Counts a message that found its queue full.
+    /// Counts a message that was dropped because its queue was full.
     pub fn message_dropped(&mut self) {
         self.statistics.dropped = self.statistics.dropped.saturating_add(1);
     }
 
-    /// Whether telemetry is sent in this tick; counts the ticks.
+    /// Whether telemetry is sent in this tick. Has to be called once per tick, because it counts the ticks.
     pub(super) fn telemetry_is_due(&mut self) -> bool {
         if self.ticks_to_telemetry > 0 {
             self.ticks_to_telemetry -= 1;

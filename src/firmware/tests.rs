@@ -28,7 +28,7 @@ const INPUTS: Inputs<SENSORS> = Inputs {
     },
 };
 
-/// Ticks until a fault.
+/// Number of ticks until a fault, and the fault.
 fn ticks_to_fault(firmware: &mut Firmware<'_, STATES, SENSORS>) -> Option<(u32, Fault)> {
     (1..2000).find_map(|tick| {
         firmware.control(&INPUTS);
@@ -48,7 +48,7 @@ fn a_table_that_changes_in_memory_is_found_within_one_pass() {
     firmware.table = &damaged;
     let (tick, fault) = ticks_to_fault(&mut firmware).unwrap();
     assert_eq!(fault, Fault::Table);
-    // One word a tick, and what was left of the pass before.
+    // One word per tick, after the rest of the pass in progress.
     assert!(tick < 1000, "{tick}");
 }
 
@@ -128,14 +128,14 @@ fn a_rail_of_another_length_is_not_homed() {
     );
 }
 
-/// Ticks of [`cause_of`]; those of a pass of the table's checksum are before it.
+/// Ticks of balancing in [`cause_of`], at the end of a pass of the table's checksum.
 const TICKS: u32 = 3;
 
 /// The cause that is latched when all of `faults` are due in the same tick of balancing, the last of [`TICKS`].
 fn cause_of(faults: &[Fault], ticks_of_a_pass: u32) -> Option<Cause> {
     let due = |fault| faults.contains(&fault);
-    // The first table finds nothing but a bad encoder, of which the third measurement in a row counts. The second one
-    // finds whatever is due.
+    // The limits of the first table catch only a bad encoder, because it takes three measurements in a row. Those of
+    // the second one catch whatever is due.
     let mut calm = TABLE;
     calm.limits.angle_rad = f32::MAX;
     calm.thresholds.innovation = [f32::MAX; SENSORS];
@@ -158,7 +158,8 @@ fn cause_of(faults: &[Fault], ticks_of_a_pass: u32) -> Option<Cause> {
     strict.crc ^= u32::from(due(Fault::Table));
 
     let mut firmware = firmware(&TABLE, Reset::Power).unwrap();
-    // The pass ends in the last tick if the table is due, else later: it would find that the tables differ.
+    // If a table fault is due, the pass ends in the last tick. Otherwise it ends later: it would find that the tables
+    // differ.
     let sooner = if due(Fault::Table) { 0 } else { 10 };
     for _ in 0..ticks_of_a_pass - TICKS - sooner {
         firmware.control(&INPUTS);
@@ -167,7 +168,7 @@ fn cause_of(faults: &[Fault], ticks_of_a_pass: u32) -> Option<Cause> {
     firmware.supervisor.complete_homing().unwrap();
     firmware.supervisor.arm(Inhibits::NONE).unwrap();
     firmware.start_balancing(&[0; SENSORS]);
-    // For a force that the test of the motor can miss.
+    // To make the controller request a force that the motor test can find missing.
     firmware.controller.set_setpoint(0.5).unwrap();
     firmware.table = &calm;
     let mut inputs = INPUTS;

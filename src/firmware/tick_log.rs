@@ -10,7 +10,7 @@ impl<const NX: usize, const NY: usize, S: SwingUp<NX, NY>> Firmware<'_, NX, NY, 
         self.log = is_kept.then(TickLog::default);
     }
 
-    /// Logs this tick, after its output; gives the message that the tick before has completed.
+    /// Logs this tick, once its output is known; returns the message that the previous tick completed, if it did.
     pub fn log_tick(&mut self) -> Option<TickLog<NY>> {
         let log = self.log.as_mut()?;
         let mut complete = None;

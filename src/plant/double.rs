@@ -1,4 +1,4 @@
-//! In `f64`, within 1 ulp.
+//! Sines and cosines in `f64`, within 1 ulp.
 
 use crate::table::Number;
 
@@ -31,7 +31,7 @@ const C: [f64; 6] = [
 /// bits of the sum are those of that integer (in two's complement).
 const ROUND: f64 = 1.5 * (1u64 << 52) as f64;
 
-/// Up to this angle (rad) the multiple of π/2 is below 2^20, and [`in_quadrant`] is right.
+/// Up to this angle (rad) the multiple of π/2 is below 2^20, and [`in_quadrant`] is valid.
 pub const LARGEST_RAD: f64 = 1e6;
 
 /// Sines and cosines of `angles` (rad).
@@ -63,9 +63,9 @@ fn within_range(x: f64) -> (f64, f64) {
     (f64::from_bits(s.to_bits() ^ sign_of_sine), f64::from_bits(c.to_bits() ^ sign_of_cosine))
 }
 
-/// Of the angle `x = k π/2 + y` with `|y| <= π/4`: a number whose lowest two bits are those of k, sin y and cos y. The
-/// sine of x is sin y, or, for odd k, cos y, with the opposite sign if `k & 2`; the cosine is the other one, with the
-/// opposite sign if `(k + 1) & 2`.
+/// Reduces the angle `x = k π/2 + y` with `|y| <= π/4`. Returns a number whose lowest two bits are those of k, then
+/// sin y, then cos y. The sine of x is sin y, or, for odd k, cos y, with the opposite sign if `k & 2`; the cosine is
+/// the other one, with the opposite sign if `(k + 1) & 2`.
 #[inline(always)]
 pub fn in_quadrant<T: Number>(x: T) -> (T, T, T) {
     let of = |value: f64| x.constant(value);

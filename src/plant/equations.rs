@@ -23,8 +23,8 @@ impl<const N: usize, T: Number> ChainModel<N, T> {
         self.derivative_inline(state, force, torques)
     }
 
-    /// [`derivative`](Self::derivative), always inlined: vectors are fast only in a function that is compiled for
-    /// them.
+    /// [`derivative`](Self::derivative), always inlined: SIMD vectors are fast only in a function that is compiled for
+    /// their instructions.
     #[inline(always)]
     pub fn derivative_inline(
         &self,

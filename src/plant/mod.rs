@@ -1,8 +1,8 @@
 //! The nonlinear equations of motion of links on a cart: one source for the firmware, which predicts with them in
 //! `f32`, and for the host, which simulates with them in `f64`.
 //!
-//! The state is in relative angles outside, `x, ẋ, θ_1, θ̇_1, …`, and in absolute angles `φ_i = θ_1 + … + θ_i` inside,
-//! where the mass matrix is simple.
+//! Other modules use states with relative angles, `x, ẋ, θ_1, θ̇_1, …`. The equations here use absolute angles
+//! `φ_i = θ_1 + … + θ_i`, in which the mass matrix is simple.
 
 pub(crate) mod double;
 mod equations;

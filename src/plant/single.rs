@@ -1,4 +1,4 @@
-//! In `f32`, with an error of at most 1.2e-7.
+//! Sines and cosines in `f32`, with an error of at most 1.2e-7.
 
 // 2/π, and π/2 as a sum of three parts. The first two have 8 and 11 bits, so an integer below 2^13 times such a part is
 // exact. The coefficients on [-π/4, π/4] are those of Cephes (S. L. Moshier, 1992).

@@ -1,4 +1,4 @@
-//! Writes messages in postcard's format. Postcard's own serializer would take 1.8 kB more of the image, because it is
+//! Writes messages in postcard's format. Postcard's own serializer would make the image 1.8 kB larger, because it is
 //! compiled again for each field that holds a number.
 //!
 //! Messages are read with postcard; the tests compare the two serializers byte by byte.
@@ -13,7 +13,7 @@ use serde::ser::{
 
 use super::frame::FrameError;
 
-/// Writes `message` to the beginning of `out`; gives its length (bytes).
+/// Writes `message` to the beginning of `out`; returns its length (bytes).
 ///
 /// # Errors
 /// [`FrameError::Long`] if `out` is too small, [`FrameError::Message`] if the message holds a map or a single `char`.
@@ -25,7 +25,7 @@ pub(super) fn encode<T: Serialize>(message: &T, out: &mut [u8]) -> Result<usize,
 
 struct Encoder<'a> {
     out: &'a mut [u8],
-    /// Bytes so far. What does not fit is only counted, so that no field has to be checked.
+    /// Number of bytes so far. Bytes that do not fit are only counted: then one check at the end is enough.
     length: usize,
 }
 
@@ -38,7 +38,8 @@ impl Encoder<'_> {
         self.length = self.length.saturating_add(1);
     }
 
-    /// Seven bits in each byte, the low ones first; the eighth bit says that more follow.
+    /// Writes an integer of variable length: seven bits in each byte, the low ones first; the eighth bit says that
+    /// more follow.
     #[inline(never)]
     fn number(&mut self, mut value: u64) {
         while value >= 0x80 {
@@ -55,7 +56,7 @@ impl Encoder<'_> {
         }
     }
 
-    /// Small numbers of both signs become small numbers: 0, -1, 1, -2 … are 0, 1, 2, 3 …
+    /// Writes a signed integer: 0, -1, 1, -2 … become 0, 1, 2, 3 …, so that small numbers of both signs stay short.
     fn signed(&mut self, value: i64) {
         self.number(((value << 1) ^ (value >> 63)) as u64);
     }
@@ -209,7 +210,7 @@ impl ser::Serializer for &mut Encoder<'_> {
     }
 }
 
-/// Contents that are written one after the other.
+/// Implements a trait for compound values, whose contents are written one after the other.
 macro_rules! contents {
     ($($trait:ident::$method:ident($($name:ty)?);)*) => {
         $(impl $trait for &mut Encoder<'_> {

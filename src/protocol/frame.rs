@@ -39,8 +39,8 @@ impl core::fmt::Display for FrameError {
 
 impl core::error::Error for FrameError {}
 
-/// Encodes `message` as a frame, delimiter included, into `out`, and gives the part of `out` that it fills. `scratch`
-/// holds the message before COBS.
+/// Encodes `message` as a frame, delimiter included, into `out`, and returns the part of `out` that it fills.
+/// `scratch` holds the message before COBS.
 ///
 /// # Errors
 /// [`FrameError::Long`] if either buffer is too small.
@@ -76,7 +76,7 @@ pub fn decode<T: for<'de> Deserialize<'de>>(frame: &mut [u8]) -> Result<T, Frame
     }
 }
 
-/// Decodes COBS in place; gives the length of the result.
+/// Decodes COBS in place; returns the length of the result.
 fn unstuff(frame: &mut [u8]) -> Option<usize> {
     let (mut decoder, mut length) = (DecoderState::Idle, 0);
     for i in 0..frame.len() {
@@ -111,11 +111,11 @@ impl<const N: usize> Receiver<N> {
         Self { buffer: [0; N], length: 0 }
     }
 
-    /// Takes the next byte. If it completes a frame, gives its message, or why it cannot be decoded. Empty frames are
-    /// ignored.
+    /// Takes the next byte. If it completes a frame, returns its message, or why it cannot be decoded. Empty frames
+    /// are ignored.
     pub fn push<T: for<'de> Deserialize<'de>>(&mut self, byte: u8) -> Option<Result<T, FrameError>> {
         if byte != DELIMITER {
-            // Too long a frame is dropped as a whole: its length is larger than the buffer.
+            // Bytes that do not fit are only counted: a frame longer than the buffer is then dropped as a whole.
             if let Some(place) = self.buffer.get_mut(self.length) {
                 *place = byte;
             }

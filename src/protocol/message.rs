@@ -26,9 +26,9 @@ pub const PROTOCOL: u8 = 7;
 /// A command, host to firmware.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Command {
-    /// Larger than the id of every command before, even after a restart of the host (microseconds since 1970 are). A
-    /// command with another id is taken for a replay and ignored; only the last command, when it comes again, has its
-    /// reply sent again.
+    /// Has to be larger than the id of every earlier command, even after a restart of the host (microseconds since
+    /// 1970 are). A command with any other id is taken for a replay and ignored; but if the last command is repeated,
+    /// its reply is sent again.
     pub id: u64,
     /// The request.
     pub request: Request,
@@ -37,12 +37,11 @@ pub struct Command {
 /// The host's requests.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub enum Request {
-    /// Heartbeat: the host is alive. Nothing else.
+    /// Heartbeat: shows that the host is alive, and does nothing else.
     Beat,
     /// Home here: the cart is at its zero, and the links hang still or [swing](crate::supervision::swinging).
     Home,
-    /// Home by the limit switches: a person pushes the cart to both and then lets the links hang still
-    /// or swing.
+    /// Home by the limit switches: a person pushes the cart to both and then lets the links hang still or swing.
     HomeRail,
     /// Start the [sign check](crate::supervision::sign_check).
     CheckSigns,
@@ -68,32 +67,34 @@ pub enum Request {
     ResetStatistics,
     /// Send telemetry every n ticks; 0: never.
     Telemetry(u16),
-    /// Bring the links to this equilibrium by a planned motion: raise those that hang, or lower those that balance.
-    /// Where all of them hang in the end, the motor is turned off; elsewhere they are balanced.
+    /// Bring the links to this equilibrium by a planned motion: raise those that hang, or lower those that balance. If
+    /// all of them hang at the end, the motor is turned off; otherwise they are balanced there.
     Goto(Equilibrium),
     /// A key is held: push the cart a little with the motor, for as long as this is repeated. See
     /// [bench drive](crate::supervision::bench_drive).
     Drive {
-        /// Along +x; else against it.
+        /// Whether to push along +x, or against it.
         along: bool,
     },
-    /// Shake the hanging rig with the forces that follow. Only an image for identification knows this and what follows.
+    /// Shake the hanging rig with the forces that follow. Only an image for identification knows this request and
+    /// those below.
     #[cfg(feature = "identify")]
     Shake(Shaking),
-    /// Forces of coming ticks, as parts of the largest one: [`FULL`](crate::supervision::shaking::FULL) is all of it.
+    /// Forces for coming ticks, relative to the largest one: [`FULL`](crate::supervision::shaking::FULL) stands for
+    /// all of it.
     #[cfg(feature = "identify")]
     Forces {
-        /// Low bits of the number of the tick that the first one is for.
+        /// Low 16 bits of the number of the tick that the first force is for.
         first: u16,
-        /// One for each tick.
+        /// One force for each tick.
         forces: [i8; FORCES],
     },
-    /// Send a log of every tick, or no longer.
+    /// Start sending a log of every tick (`true`), or stop (`false`).
     #[cfg(feature = "identify")]
     Log(bool),
 }
 
-/// Firmware to host.
+/// A message, firmware to host.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 // The larger variant is the frequent one.
 #[allow(clippy::large_enum_variant)]
@@ -102,24 +103,24 @@ pub enum Message<const NX: usize, const NY: usize> {
     Telemetry(Telemetry<NX, NY>),
     /// The answer to a command.
     Reply(Reply),
-    /// Every tick, from an image for identification.
+    /// Consecutive ticks of the log, from an image for identification.
     #[cfg(feature = "identify")]
     Log(TickLog<NY>),
 }
 
-/// The answer to one command.
+/// The reply to one command.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Reply {
     /// [`Command::id`] of the command.
     pub id: u64,
-    /// What became of it.
+    /// The answer to it.
     pub answer: Answer,
 }
 
 /// The answer to a command.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub enum Answer {
-    /// Done.
+    /// The request was carried out.
     Done,
     /// Refused for now, because of these inhibits.
     NotNow(Inhibits),
@@ -129,13 +130,13 @@ pub enum Answer {
     Info(Info),
     /// Answer to [`Request::Cause`].
     Cause(Option<Cause>),
-    /// Answer to [`Request::Crash`]: none since power-on, or the hardware keeps no record.
+    /// Answer to [`Request::Crash`]; `None` if there was no crash since power-on, or the hardware keeps no record.
     Crash(Option<CrashRecord>),
     /// Answer to [`Request::Statistics`].
     Statistics(Statistics),
 }
 
-/// Identity of a firmware.
+/// Identity of a firmware: version, rig and image.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Info {
     /// Its [`PROTOCOL`].
@@ -174,7 +175,7 @@ impl From<Reset> for Start {
     }
 }
 
-/// Where the program crashed, and what the processor says about it (ARM DDI 0403, B3.2). Program counter and link
+/// Where the program crashed, and the processor's fault registers (ARM DDI 0403, B3.2). Program counter and link
 /// register are 0 after a panic, and after a stack overflow, which leaves no room for them.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub struct CrashRecord {
@@ -230,7 +231,7 @@ pub struct Statistics {
     pub replayed: u32,
 }
 
-/// State of the firmware in one tick, with the very values that it computes with.
+/// State of the firmware in one tick. The values are exactly those that it computes with.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Telemetry<const NX: usize, const NY: usize> {
     /// Number of the tick since the start of the firmware.
@@ -241,17 +242,17 @@ pub struct Telemetry<const NX: usize, const NY: usize> {
     pub law: Law,
     /// The latched fault.
     pub fault: Option<Fault>,
-    /// Tick of its first cause; 0 without.
+    /// Tick of the fault's first cause; 0 if there is none.
     pub cause_tick: u32,
     /// Progress of homing.
     pub homing: Homing,
     /// Progress of the sign check.
     pub signs: Signs,
-    /// What is known of the motor's sign.
+    /// What is known about the motor's sign.
     pub motor: MotorSign,
     /// Inhibits of arming that hold now.
     pub arming_inhibits: Inhibits,
-    /// Inhibits of the next motion that hold now: of lowering while the rig balances, else of raising.
+    /// Inhibits of the next motion that hold now: of lowering while the rig balances, otherwise of raising.
     pub swing_up_inhibits: Inhibits,
     /// Ticks since the beginning of the motion; 0 if there is none.
     pub motion_tick: u32,
@@ -267,14 +268,14 @@ pub struct Telemetry<const NX: usize, const NY: usize> {
     pub innovation: Vec<f32, NY>,
     /// Governed set-point (m).
     pub setpoint_m: f32,
-    /// Force that the law asks for (N).
+    /// Force requested by the control law (N).
     pub requested_n: f32,
-    /// Force within all limits (N).
+    /// Force applied after all limits (N).
     pub applied_n: f32,
     /// Command to the power stage: a duty cycle from -1 to 1, or a force (N) for a rig without motor data.
     pub drive: f32,
-    /// Execution time of the tick before (processor cycles).
+    /// Execution time of the previous tick (processor cycles).
     pub cycles: u32,
-    /// Longest execution of a tick since the start of the firmware, in every state (processor cycles).
+    /// Longest execution time of a tick since the start of the firmware, in whatever state (processor cycles).
     pub worst_cycles: u32,
 }

@@ -7,13 +7,13 @@
 /// Speed of the serial line (Bd).
 pub const BAUD: u32 = 460_800;
 
-/// Time between two messages of telemetry until the host sets another (s). Those of a quadruple rig then need a third
-/// of the line, the longest ones three quarters.
+/// Period of telemetry until the host sets another (s). Telemetry of a quadruple rig then takes a third of the
+/// capacity of the line, the longest telemetry three quarters.
 const TELEMETRY_S: f32 = 0.01;
 
-/// The same in ticks of `tick_s` (s), at least one.
+/// The initial period of telemetry in ticks of `tick_s` (s), at least one.
 pub fn telemetry_ticks(tick_s: f32) -> u16 {
-    // Rounded up, unless only the division has made it more than a whole number.
+    // Rounded up, unless only the rounding of the division has made it more than a whole number.
     ((TELEMETRY_S / tick_s + 0.999) as u16).max(1)
 }
 

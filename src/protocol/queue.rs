@@ -14,7 +14,7 @@ pub fn put<T>(queue: &mut Producer<'_, T>, item: T) -> Result<(), T> {
     if is_sound(queue.capacity()) { queue.enqueue(item) } else { Err(item) }
 }
 
-/// Removes and gives the oldest item.
+/// Removes and returns the oldest item, if there is one.
 #[inline]
 pub fn take<T>(queue: &mut Consumer<'_, T>) -> Option<T> {
     if is_sound(queue.capacity()) { queue.dequeue() } else { None }

@@ -1,8 +1,9 @@
-//! The serial link, below the control task: bytes to commands, telemetry and replies to bytes.
+//! The serial link, which runs below the control task: turns bytes into commands, and telemetry and replies into
+//! bytes.
 //!
 //! Control task and serial link share only two single-producer, single-consumer queues, so neither ever waits for the
-//! other: there is no lock, and what finds its queue full is dropped. A command that comes again, with the same id, is
-//! not carried out again, but its reply is sent again: the host repeats a command until it has the reply.
+//! other: there is no lock, and a message that finds its queue full is dropped. A command that is repeated with the
+//! same id is not carried out again, but its reply is sent again: the host repeats a command until it has the reply.
 
 use heapless::spsc::{Consumer, Producer};
 use serde::Serialize;

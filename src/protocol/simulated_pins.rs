@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::board::{Contacts, Inputs, Output};
 
-/// Bytes of the serial line that fit into one tick.
+/// Largest number of bytes that can arrive on the serial line in one tick.
 pub const BYTES_PER_TICK: usize = 64;
 /// Longest frame of [`PinsIn`] for `NY` sensors up to 15.
 pub const MAX_PINS_IN: usize = 192;
@@ -27,7 +27,7 @@ pub struct PinsIn<const NY: usize> {
     pub sabotage: Option<Sabotage>,
 }
 
-/// Fault injection inside the microcontroller, which no input could cause.
+/// A fault injected inside the microcontroller, which no input could cause.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Sabotage {
     /// A panic.

@@ -5,14 +5,14 @@ use serde::{Deserialize, Serialize};
 
 use crate::board::Contacts;
 
-/// Ticks of a message, at the most.
+/// Largest number of ticks in a message.
 pub const TICKS: usize = 10;
-/// [`LoggedTick::drive`] of a motor that is off: it turns freely.
+/// [`LoggedTick::drive`] while the motor is off and coasts.
 pub const OFF: i16 = i16::MIN;
 /// Bytes of a message that its ticks may take, so that it fits into a frame for any number of sensors.
 const TICK_BYTES: usize = 300;
 
-/// Consecutive ticks.
+/// A message of the log: consecutive ticks with the same contacts.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct TickLog<const NY: usize> {
     /// Number of the first tick since the start of the firmware: a lost message shows as a gap.
@@ -30,12 +30,13 @@ pub struct TickLog<const NY: usize> {
 pub struct LoggedTick<const NY: usize> {
     /// Low 16 bits of each sensor's counts from position 0.
     pub counts: Vec<[u8; 2], NY, u8>,
-    /// What drove the motor: a duty, or a share of the largest force, 32767 at full scale; [`OFF`].
+    /// Command to the motor: a duty cycle, or a share of the largest force, 32767 at full scale; [`OFF`] if there was
+    /// none.
     pub drive: [u8; 2],
 }
 
 impl<const NY: usize> LoggedTick<NY> {
-    /// A tick at these counts, with this duty from -1 to 1; none: the motor is off.
+    /// A tick at these counts, with this duty from -1 to 1; `None`: the motor is off.
     pub fn new(counts: &[i32; NY], duty: Option<f32>) -> Self {
         let rounded = |duty: f32| (f32::from(i16::MAX) * duty + f32::copysign(0.5, duty)) as i16;
         Self {
@@ -53,7 +54,7 @@ impl<const NY: usize> TickLog<NY> {
 
     /// Adds the next tick, if there is room for it.
     pub fn push(&mut self, tick: LoggedTick<NY>) {
-        // Full only if nobody has asked.
+        // Full only if the caller has not asked `is_complete`.
         let _ = self.ticks.push(tick);
     }
 

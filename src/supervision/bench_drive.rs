@@ -1,37 +1,37 @@
 //! The bench drive: while a person holds a key, the motor pushes the cart a little, with the links hanging.
 //!
-//! It shows whether the motor pushes the way in which the cart's encoder counts, before anything is balanced, and lets
-//! PWM, break input and dead-man time be measured. The force rises slowly to
-//! [`bench_force_n`](crate::table::Limits::bench_force_n). The drive ends when the key is let go, when the cart has
+//! Before anything is balanced, it shows whether the motor pushes in the direction in which the cart's encoder counts.
+//! It also allows PWM, break input and dead-man time to be measured. The force rises slowly to
+//! [`bench_force_n`](crate::table::Limits::bench_force_n). The drive ends when the key is released, when the cart has
 //! moved far enough to tell the sign, or after [`LONGEST_S`]. A key that stays held after that does not begin another
-//! one.
+//! drive.
 
 use serde::{Deserialize, Serialize};
 
-/// The key is let go when the host has been silent for so long (s).
+/// The key counts as released when the host has been silent for this time (s).
 pub const SILENCE_S: f32 = 0.1;
 /// Longest drive (s). A cart that has not moved by then is not moved by the motor.
 pub const LONGEST_S: f32 = 1.0;
-/// Rise of the force, in full sizes per second.
+/// Rate at which the force rises, relative to the largest force (1/s).
 const RISE_PER_S: f32 = 10.0;
-/// Motion that tells the sign, as a part of that by which the sign check has the cart pushed.
+/// The drive has found the sign once the cart has moved by more than `sign_counts` divided by this.
 const PART_OF_SIGN_COUNTS: i32 = 10;
 
-/// What is known of the motor's sign.
+/// What is known about the motor's sign.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub enum MotorSign {
     /// Not driven since power-up, or since a fault that puts the motor in doubt.
     #[default]
     Unchecked,
-    /// The cart has moved the way that the motor pushed it.
+    /// The cart has moved in the direction in which the motor pushed it.
     Checked,
-    /// The cart has moved the other way.
+    /// The cart has moved in the other direction.
     Reversed,
-    /// The cart has not moved.
+    /// The cart has not moved far enough within [`LONGEST_S`].
     Still,
 }
 
-/// A drive, and what the last one has shown.
+/// State of a drive, and the result of the last one.
 #[derive(Debug, Clone)]
 pub struct BenchDrive {
     sign: MotorSign,
@@ -45,14 +45,14 @@ pub struct BenchDrive {
 }
 
 impl BenchDrive {
-    /// No drive, and nothing known of the motor; `sign_counts` is what the sign check requires of the cart. Without a
-    /// cart (0), there is nothing to check.
+    /// No drive, and nothing known about the motor; `sign_counts` is how far the cart has to move in the sign check.
+    /// Without a cart (0), there is nothing to check.
     pub fn new(sign_counts: i32) -> Self {
         let sign = if sign_counts == 0 { MotorSign::Checked } else { MotorSign::Unchecked };
         Self { sign, along: true, start_counts: 0, ticks: 0, silent_ticks: u32::MAX }
     }
 
-    /// What is known of the motor's sign.
+    /// What is known about the motor's sign.
     pub fn sign(&self) -> MotorSign {
         self.sign
     }
@@ -62,14 +62,14 @@ impl BenchDrive {
         self.along
     }
 
-    /// Forgets what is known of the motor, except that there is nothing to check.
+    /// Forgets the result of the last drive. Without a cart (`sign_counts` is 0), the sign stays checked.
     pub fn forget(&mut self, sign_counts: i32) {
         if sign_counts != 0 {
             self.sign = MotorSign::Unchecked;
         }
     }
 
-    /// Whether the key has been let go, in ticks of `tick_s` (s).
+    /// Whether the key has been released; a tick takes `tick_s` (s).
     pub fn is_released(&self, tick_s: f32) -> bool {
         self.silent_ticks as f32 * tick_s >= SILENCE_S
     }
@@ -89,8 +89,8 @@ impl BenchDrive {
         self.silent_ticks = self.silent_ticks.saturating_add(1);
     }
 
-    /// A tick of the drive with the cart at `cart_counts`: the force, as a share of the largest one and with its sign;
-    /// none when the drive has ended. `sign_counts` as in [`new`](Self::new).
+    /// A tick of the drive with the cart at `cart_counts`. Returns the force as a signed share of the largest one, or
+    /// `None` when the drive has ended. `sign_counts` as in [`new`](Self::new).
     pub fn update(&mut self, cart_counts: i32, sign_counts: i32, tick_s: f32) -> Option<f32> {
         self.wait();
         if self.is_released(tick_s) {
@@ -125,8 +125,8 @@ mod tests {
     const TICK_S: f32 = 0.001;
     const SIGN_COUNTS: i32 = 400;
 
-    /// Number of ticks with the motor on and what is then known, for a key that is repeated every `repeat` ticks, and
-    /// a cart that moves by `speed` counts per tick.
+    /// Number of ticks with the motor on, and the sign found, for a key that is repeated every `repeat` ticks and a
+    /// cart that moves by `speed` counts per tick.
     fn drive(along: bool, repeat: u32, speed: i32) -> (u32, MotorSign) {
         let mut drive = BenchDrive::new(SIGN_COUNTS);
         assert!(drive.is_released(TICK_S));

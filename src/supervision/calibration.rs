@@ -64,7 +64,8 @@ impl<const NY: usize> Calibration<NY> {
         self.swinging.update(counts, steps, &limits.turn_counts, tick_s);
     }
 
-    /// Position of each sensor (counts) if the cart is at 0, and the links hang still, or swing about hanging.
+    /// Position of each sensor (counts) for homing here: the cart is at 0, and the links hang still or swing about
+    /// hanging.
     ///
     /// # Errors
     /// The inhibits of homing.
@@ -101,7 +102,7 @@ impl<const NY: usize> Calibration<NY> {
     /// Records that positions are known.
     pub fn set_homed(&mut self) {
         self.homing = Homing::Homed;
-        // Its means are of counts from another position.
+        // Its means are those of counts relative to another position.
         self.swinging.forget();
     }
 
@@ -111,8 +112,8 @@ impl<const NY: usize> Calibration<NY> {
         self.homing = self.rail.progress();
     }
 
-    /// One tick of homing by the limit switches. Gives the counts of all sensors once both switches were found, the
-    /// cart is off them, and the links hang still or have swung for long enough.
+    /// One tick of homing by the limit switches. Returns the positions of all sensors (counts) once both switches have
+    /// been pressed, the cart is off them, and the links hang still or have swung for long enough.
     ///
     /// # Errors
     /// [`WrongTravel`]: the rail is not the one in the rig file; homing ends.

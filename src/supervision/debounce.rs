@@ -22,13 +22,13 @@ pub struct Debounce {
 }
 
 impl Debounce {
-    /// Clears all counters: balancing starts.
+    /// Clears all counters, at the start of each state with the motor on.
     pub fn start(&mut self) {
         *self = Self::default();
     }
 
-    /// Checks the inputs of a tick while balancing: limit switches, then the supply, then overruns. `supply_max_v` is
-    /// the highest supply voltage (V), see [`GainTable::supply_max_v`](crate::table::GainTable::supply_max_v).
+    /// Checks the inputs of a tick with the motor on: limit switches, then the supply, then overruns. `supply_max_v`
+    /// is the highest supply voltage (V), see [`GainTable::supply_max_v`](crate::table::GainTable::supply_max_v).
     #[inline]
     pub fn check_inputs<const NY: usize>(
         &mut self,
@@ -73,7 +73,7 @@ impl Debounce {
         }
     }
 
-    /// Checks the force of a tick; `limited` says that the law asked for more than there is.
+    /// Checks the force of a tick; `limited` says that the force applied is not the one requested.
     #[inline]
     pub fn check_force<const NY: usize>(&mut self, limits: &Limits<NY>, limited: bool) -> Option<Fault> {
         count(&mut self.saturated, limited);
@@ -118,7 +118,7 @@ mod tests {
         },
     };
 
-    /// The tick in which it becomes a fault.
+    /// The tick in which these inputs, if they persist, become a fault, and the fault.
     fn tick_of(inputs: Inputs<1>) -> Option<(usize, Fault)> {
         let mut debounce = Debounce::default();
         (1..100).find_map(|tick| debounce.check_inputs(&LIMITS, 15.0, &inputs).map(|fault| (tick, fault)))

@@ -1,7 +1,7 @@
 //! Fault detection by the innovation: do encoders and motor behave as the model says?
 //!
-//! Three tests run in every tick of balancing. `upright design` computes all thresholds from the covariance of the
-//! Kalman filter and a stated rate of false alarms.
+//! Three tests run in every tick of balancing and of a planned motion. `upright design` computes all thresholds from
+//! the covariance of the Kalman filter and a stated rate of false alarms.
 //!
 //! - *Plausible*: `|e_i|` within its threshold. A measurement beyond it is rejected (the prediction takes its place)
 //!   and counted; the third in a row is a fault: of the encoder if no other measurement of the tick is rejected, else
@@ -20,7 +20,7 @@ const KEEP: f32 = 1.0 - 1.0 / MEMORY;
 /// This many implausible measurements in a row are a fault.
 pub const IN_A_ROW: u32 = 3;
 
-/// Result of the tests in a tick.
+/// What the tests of a tick have found.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Finding {
     /// [`Fault::Encoder`], [`Fault::Frozen`] or [`Fault::Motor`].
@@ -46,7 +46,7 @@ pub struct Detection<const NY: usize> {
 #[derive(Debug, Clone, Copy, Default)]
 struct SensorMemory {
     counts: i32,
-    /// Corrected estimate of its position in the tick before (m or rad).
+    /// Corrected estimate of its position in the previous tick (m or rad).
     corrected: f32,
     /// Predicted motion while the counter stands still (m or rad).
     moved: f32,
@@ -102,7 +102,7 @@ impl<const NY: usize> Detection<NY> {
             } else {
                 (memory.moved, memory.counts) = (0.0, counts);
             }
-            // Not so for NaN.
+            // False for NaN, too.
             is_plausible &= e.abs() <= plausible;
         }
         let implausible = if is_plausible {
@@ -187,7 +187,7 @@ mod tests {
         motor: MotorTest { a: [0.0; 4], b: [1.0, 0.0], ratio: 0.5, energy: 4.0 },
     };
 
-    /// Innovations tick by tick, with counters that move; the tick of the first finding.
+    /// The first finding and its tick, for the innovations `of` each tick and counters that move.
     fn first(of: impl Fn(i32) -> [f32; 2]) -> Option<(i32, Finding)> {
         let mut detection = Detection::default();
         detection.start(&[0; 2], &[0.0; 2]);
@@ -228,12 +228,12 @@ mod tests {
         assert_eq!(detection.rejected(), 0);
     }
 
-    /// The second counter stands still while the model moves it by `per_tick`; the tick of the finding.
+    /// The finding and its tick, for a second counter that stands still while the model moves it by `per_tick`.
     fn frozen(per_tick: f32) -> Option<(i32, Finding)> {
         let mut detection = Detection::<2>::default();
         detection.start(&[0; 2], &[0.0; 2]);
         (1..1000).find_map(|tick| {
-            // The observer holds on to the measurement: every tick it predicts the same motion again.
+            // The observer keeps following the measurement: every tick it predicts the same motion again.
             let mut e = [0.0, -per_tick];
             let found = detection.test(&THRESHOLDS, &[tick, 0], &[tick as f32, 0.0], &mut e);
             detection.finish_tick(&THRESHOLDS.motor, [tick as f32, 0.0], 0.0);
@@ -249,7 +249,7 @@ mod tests {
         assert_eq!(frozen(0.18), None);
     }
 
-    /// A motor of which a share is missing, pushed to and fro; the tick of the finding.
+    /// The finding and its tick, for a motor that lacks the share `missing` of an alternating force.
     fn motor(missing: f32) -> Option<(i32, Finding)> {
         let mut detection = Detection::<2>::default();
         detection.start(&[0; 2], &[0.0; 2]);
@@ -267,7 +267,7 @@ mod tests {
     fn a_motor_of_which_more_than_half_is_missing_is_found() {
         assert_eq!(motor(0.0), None);
         assert_eq!(motor(0.45), None);
-        // Not enough has been moved for a verdict: 0.16 a tick gives at most 16 · 0.16 = 2.56.
+        // Not enough excitation for a verdict: 0.16 per tick sums up to at most 16 · 0.16 = 2.56.
         assert_eq!(motor(1.0), None);
         let found = |missing: f32| {
             let mut detection = Detection::<2>::default();

@@ -1,7 +1,7 @@
 //! The faults: one list for code, documentation and tests.
 //!
 //! A new fault gets a variant with the next code, an [`Entry`] in [`Fault::ALL`] and a place in [`Fault::PRECEDENCE`];
-//! the test that the documentation lists it then fails until `docs/faults.md` has it, too.
+//! the test of the documentation then fails until `docs/faults.md` lists it, too.
 
 use serde::{Deserialize, Serialize};
 
@@ -27,11 +27,11 @@ pub enum Fault {
     Supply = 8,
     /// Measurements of one encoder contradict the model.
     Encoder = 9,
-    /// An encoder stands still while the model moves.
+    /// An encoder stands still while the model predicts motion.
     Frozen = 10,
     /// The rig does not move as the motor's force should move it.
     Motor = 11,
-    /// The law has asked for more force than there is for too long.
+    /// The law has requested more than the largest force for too long.
     Saturated = 12,
     /// Ticks were not finished in time.
     Overrun = 13,
@@ -43,11 +43,12 @@ pub enum Fault {
     Watchdog = 16,
     /// The program has failed: panic, processor fault or stack overflow.
     Crash = 17,
-    /// The clock has failed to start: crystal or PLL. Or the crystal is another one.
+    /// The crystal or the PLL has failed to start, or the crystal has the wrong frequency.
     Clock = 18,
-    /// The chip, the registers of the motor's timer or the chip's supply are not as they have to be.
+    /// The chip is the wrong one, a register of the motor's timer has lost what was written to it, or the chip's
+    /// supply is low.
     Board = 19,
-    /// Cart or link are too far from the planned motion.
+    /// The cart or a link is too far from the planned motion.
     OffCourse = 20,
 }
 
@@ -58,7 +59,7 @@ pub enum Reaction {
     Ticks(u32),
     /// This many ticks after the time that the rig file gives under this key of `[limits]`.
     After(&'static str, u32),
-    /// Not by the control task: see the condition.
+    /// Not a number of ticks: the text says how or when the motor is turned off.
     Hardware(&'static str),
 }
 
@@ -75,7 +76,7 @@ impl core::fmt::Display for Reaction {
 /// A fault's row in the table of faults.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Entry {
-    /// The fault, which gives the code.
+    /// The fault, whose discriminant is the code.
     pub fault: Fault,
     /// Short name.
     pub name: &'static str,
@@ -247,9 +248,9 @@ impl Fault {
     /// Which fault is latched when several occur in one tick: the first of these. Inputs come first, then the limits
     /// on the estimate, then the tests of the innovation, and last what is checked after the motor was driven.
     ///
-    /// [`Fault::NotFinite`] stands once for the supply voltage and the requested force: the supply comes after the
-    /// limit switches, the force after the overrun. A [`Fault::Motor`] found by rejected measurements of several
-    /// sensors has the place of [`Fault::Encoder`]. [`Fault::Watchdog`] and [`Fault::Crash`] reset the
+    /// [`Fault::NotFinite`] is listed once but has two checks: that of the supply voltage comes after the limit
+    /// switches, that of the requested force after the overrun. A [`Fault::Motor`] found by rejected measurements of
+    /// several sensors has the place of [`Fault::Encoder`]. [`Fault::Watchdog`] and [`Fault::Crash`] reset the
     /// microcontroller.
     pub const PRECEDENCE: [Fault; 18] = [
         Fault::Clock,
@@ -309,7 +310,7 @@ pub struct Cause {
     pub fault: Fault,
     /// Number of the tick since the start of the firmware.
     pub tick: u32,
-    /// The sensor at which it was found (0: cart, 1: first link …), if at one.
+    /// The sensor at which it was found (0: cart, 1: first link …), if it concerns one.
     pub sensor: Option<u8>,
 }
 

@@ -33,8 +33,8 @@ pub struct Rail {
 }
 
 impl Rail {
-    /// Takes the cart's counts and the contacts of a tick. Once both switches were pressed, gives the cart's position
-    /// (counts). Of each switch, the first press is used.
+    /// Takes the cart's counts and the contacts of a tick. Once both switches have been pressed, returns the cart's
+    /// position (counts). The first press of each switch counts.
     ///
     /// `travel` holds the distance between the switches and its tolerance (counts); `middle` is the position of their
     /// middle (counts).
@@ -68,7 +68,7 @@ impl Rail {
         Ok(Some(cart.wrapping_sub(middle_found).wrapping_add(middle)))
     }
 
-    /// Which switches are still to be pressed.
+    /// Which switches have been pressed, or [`Homing::HoldStill`] after both.
     pub fn progress(&self) -> Homing {
         match (self.low, self.high) {
             (Some(_), Some(_)) => Homing::HoldStill,
@@ -96,7 +96,8 @@ mod tests {
         board_fault: false,
     };
 
-    /// The cart pushed along these counts, with the switches closing at `low` and below, `high` and above.
+    /// Result for a cart that is pushed along these counts, with the switches pressed at `low` and below, `high` and
+    /// above.
     fn push(path: &[i32], low: i32, high: i32, middle: i32) -> Result<Option<i32>, WrongTravel> {
         let mut rail = Rail::default();
         path.iter().try_fold(None, |_, &cart| {

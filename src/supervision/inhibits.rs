@@ -1,4 +1,4 @@
-//! The inhibits: conditions that keep the firmware from following a command now.
+//! The inhibits: conditions that keep the firmware from carrying out a command now.
 //!
 //! A new one is a line in the list below. The functions that check for it are in `firmware/posture.rs` and
 //! `firmware/commands.rs`.

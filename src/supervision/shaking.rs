@@ -1,9 +1,9 @@
 //! Shaking: the motor shakes the hanging rig, so that the host can identify its parameters from a log of every tick.
 //!
-//! The host sends the forces of the coming ticks ahead; they wait in a ring. A spring and a damper, whose constants the
-//! host gives, too, keep the cart near the middle. Whatever the host sends, the force is bounded and changes slowly,
-//! and the rig stays within limits of its own: rail, speed, angle, rates, duration. When the host is silent or the time
-//! is over, spring and damper bring the cart back, and then the motor goes off.
+//! The host sends the forces for coming ticks ahead; they wait in a ring buffer. A virtual spring and damper, whose
+//! constants also come from the host, keep the cart near the middle. Whatever the host sends, the force is bounded and
+//! changes slowly, and the rig stays within limits of its own: rail, speed, angle, rates, duration. When the host is
+//! silent or the time is over, spring and damper bring the cart back, and then the motor goes off.
 
 use nalgebra::SVector;
 use serde::{Deserialize, Serialize};
@@ -12,52 +12,53 @@ use crate::control::state_feedback::saturate;
 use crate::supervision::fault::Fault;
 use crate::table::Limits;
 
-/// Forces of a command.
+/// Number of forces in a command.
 pub const FORCES: usize = 10;
-/// Forces that can wait: those of the next ticks, one less.
+/// Length of the ring buffer; it holds the forces for the next `AHEAD - 1` ticks.
 pub const AHEAD: usize = 64;
-/// Size of a force that is the largest one.
+/// Value in a command that stands for the largest force.
 pub const FULL: i8 = i8::MAX;
 
-/// The cart returns when the host has been silent for so long (s).
+/// The cart returns when the host has been silent for this time (s).
 pub const SILENCE_S: f32 = 0.1;
 /// The cart returns after this time (s).
 pub const LONGEST_S: f32 = 120.0;
 /// The motor goes off when the cart has not come back within this time (s).
 pub const RETURN_S: f32 = 5.0;
-/// Where the cart is back, as a part of the rail within its soft limits.
+/// The cart is back when it is slow and within this fraction of the length between the soft limits from 0.
 const BACK: f32 = 0.05;
-/// Slow is a cart that would need longer than this for the same distance (s).
+/// A cart is slow if it would need at least this time for that distance (s).
 const SLOW_S: f32 = 0.5;
-/// Largest change of the force, in largest forces per second.
+/// Largest slew rate of the force, relative to the largest force (1/s).
 const SLEW_PER_S: f32 = 100.0;
-/// Time constant of the speed (s).
+/// Time constant of the filter for the cart's speed (s).
 const FILTER_S: f32 = 0.005;
 /// Largest angle of a link from where it hung (rad).
 pub const ANGLE_RAD: f32 = 2.1;
 /// Largest rate of a joint (rad/s): an encoder that counts faster is defective.
 pub const RATE_RAD_PER_S: f32 = 90.0;
-/// The same for the cart, in largest speeds.
+/// The same for the cart, as a multiple of its speed limit.
 const RATE_OF_SPEED: f32 = 4.0;
-/// Longest time in which the force of the bench drive moves everything by more than a count: cart, links (s). Other
-/// forces have as long as for the same impulse.
+/// Time within which the force of the bench drive has to move everything by more than a count: cart, links (s). Other
+/// forces have to do so within the same impulse.
 pub const STILL_S: [f32; 2] = [0.25, 0.5];
-/// Counted unit of an impulse: this part of the bench drive's force in a tick.
+/// Unit in which impulses are counted: this fraction of the bench drive's force, for one tick.
 const IMPULSE: f32 = 1.0 / 32.0;
 
-/// How the rig is shaken.
+/// How the rig is shaken, as commanded by the host.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct Shaking {
     /// Largest force (N).
     pub most_n: f32,
-    /// Spring that pulls the cart to the middle (N/m).
+    /// Stiffness of the spring that pulls the cart to the middle (N/m).
     pub stiffness_n_per_m: f32,
-    /// Damper of the cart (N·s/m).
+    /// Constant of the damper on the cart (N·s/m).
     pub damping_n_s_per_m: f32,
 }
 
 impl Shaking {
-    /// Whether all numbers are possible, with forces up to `force_limit_n`.
+    /// Whether the largest force is positive and at most `force_limit_n` (N), and both constants are finite and not
+    /// negative.
     pub fn is_sound(&self, force_limit_n: f32) -> bool {
         let constants = [self.stiffness_n_per_m, self.damping_n_s_per_m];
         self.most_n > 0.0
@@ -66,10 +67,10 @@ impl Shaking {
     }
 }
 
-/// A fault, and the sensor if it is one.
+/// A fault, and the sensor, if it concerns one.
 type Found = (Fault, Option<u8>);
 
-/// A rig that is shaken, with `NY` encoders: the cart's, then those of the joints.
+/// State of the shaking of a rig with `NY` encoders: the cart's, then those of the joints.
 #[derive(Debug, Clone)]
 pub struct Shaker<const NY: usize> {
     shaking: Shaking,
@@ -112,8 +113,8 @@ impl<const NY: usize> Shaker<NY> {
         *self = Self { shaking, start: *counts, last: *counts, seen: *counts, ..Self::default() };
     }
 
-    /// Takes forces from the host, in tick `now`: the first one is for the tick with these low bits. Those of ticks
-    /// that are over, or too far ahead, are left out.
+    /// Takes forces from the host, in tick `now`: `first` holds the low 16 bits of the number of the tick that the
+    /// first one is for. Forces for ticks that are over, or too far ahead, are ignored.
     pub fn take(&mut self, now: u32, first: u16, forces: &[i8; FORCES]) {
         self.silent_ticks = 0;
         for (tick, &force) in (0..).map(|index| first.wrapping_add(index)).zip(forces) {
@@ -131,10 +132,11 @@ impl<const NY: usize> Shaker<NY> {
         self.speed_m_per_s
     }
 
-    /// Tick `now`, with everything at these counts of `step` (m, rad): the force (N), or none when the cart is back.
+    /// Tick `now`, with the sensors at `counts`; `step` is the travel per count (m or rad). Returns the force (N), or
+    /// `None` when the shaking has ended.
     ///
     /// # Errors
-    /// The fault, and the sensor if it is one.
+    /// The fault, and the sensor, if it concerns one.
     pub fn update(
         &mut self,
         now: u32,
@@ -171,7 +173,7 @@ impl<const NY: usize> Shaker<NY> {
         if self.force_n.is_finite() { Ok(Some(self.force_n)) } else { Err((Fault::NotFinite, None)) }
     }
 
-    /// Follows the positions and checks their limits; gives the cart's (m).
+    /// Updates the positions and checks their limits; returns the cart's position (m).
     fn measure(
         &mut self,
         counts: &[i32; NY],
@@ -208,7 +210,7 @@ impl<const NY: usize> Shaker<NY> {
         Ok(position_m)
     }
 
-    /// Checks that nothing stands still that the force has to move.
+    /// Checks that every sensor moves that the force has to move.
     fn moves(&mut self, counts: &[i32; NY], bench_force_n: f32, tick_s: f32) -> Result<(), Found> {
         let impulse = (f32::abs(self.force_n) / (IMPULSE * bench_force_n)) as u16;
         let sensors = counts.iter().zip(self.seen.iter_mut().zip(&mut self.idle));
@@ -236,7 +238,7 @@ mod tests {
     const STEP: [f32; 3] = [1e-4, 1e-3, 1e-3];
     const SHAKING: Shaking = Shaking { most_n: 2.0, stiffness_n_per_m: 1.0, damping_n_s_per_m: 1.0 };
 
-    /// Cart and links as functions of the tick, and whether the host sends full force along +x.
+    /// Counts of cart and links as functions of the tick, and for how many ticks the host sends full force along +x.
     struct Run {
         counts: fn(i32) -> [i32; 3],
         fed_ticks: u32,
@@ -244,7 +246,7 @@ mod tests {
 
     type Outcome = Result<Option<f32>, Found>;
 
-    /// What is shaken in such a run: the ticks with the motor on, the largest force, and how it ended.
+    /// Result of such a run: the ticks with the motor on, the largest force, and how it ended.
     fn run(run: &Run) -> (u32, f32, Outcome) {
         let limits =
             Limits::<3> { rail_m: [-1.0, 1.0], speed_m_per_s: 2.0, bench_force_n: 1.0, ..Limits::none() };
@@ -263,7 +265,7 @@ mod tests {
         panic!("it does not end")
     }
 
-    /// Everything goes to and fro.
+    /// Everything moves back and forth.
     fn swings(tick: i32) -> [i32; 3] {
         let to_and_fro = (tick % 400 - 200).abs() - 100;
         [to_and_fro, 3 * to_and_fro, 5 * to_and_fro]

@@ -23,7 +23,7 @@ pub enum Signs {
     Checked,
     /// This sensor has moved in the wrong direction.
     Reversed(u8),
-    /// Another sensor has moved than the requested one.
+    /// A sensor other than the requested one has moved.
     Swapped {
         /// Requested sensor.
         asked: u8,

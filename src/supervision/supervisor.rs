@@ -255,7 +255,7 @@ impl Supervisor {
         }
     }
 
-    /// Ends arming, because the rig no longer stands as it has to: a link has fallen, a limit switch is pressed …
+    /// Cancels arming, because the rig is no longer ready to balance: a link has fallen, a limit switch is pressed …
     pub fn cancel_arming(&mut self) {
         if self.state == State::Armed {
             self.state = State::Calibrated;
@@ -265,7 +265,7 @@ impl Supervisor {
     /// Clears a latched fault and its cause, unless one of `inhibits` holds.
     ///
     /// # Errors
-    /// `inhibits`.
+    /// `inhibits`, if a fault is latched and the set is not empty.
     pub fn clear(&mut self, inhibits: Inhibits) -> Result<(), Inhibits> {
         if self.state == State::Fault {
             inhibits.err_if_any()?;

@@ -1,5 +1,5 @@
 //! The zeros of joints that swing out. A joint with friction comes to rest anywhere near hanging; while it swings, its
-//! friction acts to both sides in turn, and the mean of its counts is where it would hang without friction.
+//! friction acts in both directions in turn, and the mean of its counts is where it would hang without friction.
 //!
 //! The mean is taken over windows of [`WINDOW_S`], with the weight `(1 - s²)²` for times `s` from -1 to 1: a swing of
 //! angular frequency ω leaves at most `15 / (ω WINDOW_S / 2)³` of its amplitude in it. Zeros are taken if each joint
@@ -11,20 +11,21 @@ use crate::supervision::inhibits::Inhibits;
 pub const WINDOW_S: f32 = 5.0;
 /// Largest difference between the means of two windows (rad, m).
 pub const TOLERANCE: f32 = 0.002;
-/// A joint that turns by this to both sides of the mean swings (rad); the cart stays within this (m).
+/// A joint swings if it turns by more than this to both sides of the mean (rad); the cart has to stay within this of
+/// its mean (m).
 pub const SWING: f32 = 0.005;
 
-/// What the last window says.
+/// Result of the last window.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 enum Verdict {
-    /// There was none yet.
+    /// No window has ended yet.
     #[default]
     None,
     /// A joint has not swung, or there was no window before.
     Unknown,
-    /// Its mean differs from that of the window before.
+    /// A mean differs from that of the window before.
     Contradicts,
-    /// Both are the same.
+    /// All means agree with those of the window before.
     Agrees,
 }
 
@@ -33,13 +34,13 @@ enum Verdict {
 pub struct Swinging<const NY: usize> {
     /// Mean of the last window (counts).
     mean: [f32; NY],
-    /// Mean of this window so far, from there (counts).
+    /// Weighted mean of this window so far, relative to `mean` (counts).
     moved: [f32; NY],
-    /// Share of this window that is over.
+    /// Share of this window that has passed.
     time: f32,
     /// Two bits for each joint: to which sides it has swung in this window.
     sides: u32,
-    /// Whether the cart is where it was on the mean of the last window.
+    /// Whether the cart is within [`SWING`] of its mean in the last window.
     is_near: bool,
     verdict: Verdict,
 }
@@ -64,7 +65,7 @@ impl<const NY: usize> Swinging<NY> {
     pub fn update(&mut self, counts: &[i32; NY], steps: &[f32; NY], turn_counts: &[i32; NY], tick_s: f32) {
         let part = tick_s / WINDOW_S;
         let weight = self.time - self.time * self.time;
-        // The mean of the square is 1/30.
+        // 1/30 is the mean of this square over the window.
         let weight = weight * weight * 30.0 * part;
         self.time += part;
         let ends = self.time >= 1.0;
@@ -99,7 +100,7 @@ impl<const NY: usize> Swinging<NY> {
         }
     }
 
-    /// Forgets all means: from now on the counts are from another position.
+    /// Forgets all means: from now on the counts are relative to another position.
     pub fn forget(&mut self) {
         self.verdict = Verdict::None;
     }

@@ -58,7 +58,7 @@ pub(crate) fn checksum(table: &impl Part) -> u32 {
     }
 }
 
-/// The same, many words at once.
+/// The same, with many words at once.
 #[cfg(not(target_os = "none"))]
 pub(crate) fn checksum(table: &impl Part) -> u32 {
     let leaves = (0..).map_while(|mut leaf| table.part(&mut leaf));
@@ -76,12 +76,12 @@ pub(crate) fn checksum(table: &impl Part) -> u32 {
     })
 }
 
-/// The same checksum, some words per call, so that the work is spread over many ticks.
+/// Computes the same checksum a few words per call, so that the work is spread over many ticks.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct ChecksumScan<'t> {
     /// Number of the current leaf of the table, see [`Part::part`].
     at: u16,
-    /// The current leaf, once it is found: that takes as long as several of its words.
+    /// The current leaf, once it is found: finding it takes as long as several of its words.
     leaf: Option<Words<'t>>,
     /// Next word within the leaf.
     word: u16,
@@ -112,7 +112,7 @@ impl<'t> ChecksumScan<'t> {
         None
     }
 
-    /// Adds the next word of the current leaf, or leaves the leaf at its end.
+    /// Adds the next word of the current leaf, or, at its end, moves on to the next leaf.
     #[inline(never)]
     fn next_of(&mut self, leaf: Words<'t>) {
         match leaf.get(usize::from(self.word)) {

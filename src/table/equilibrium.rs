@@ -19,29 +19,29 @@ impl Equilibrium {
         Self::HANGING.of_links(links)
     }
 
-    /// The same for a chain of `links` links: what it says of further ones is dropped.
+    /// The same equilibrium for a chain of `links` links: what it says about further links is dropped.
     #[must_use]
     pub const fn of_links(self, links: usize) -> Self {
         Self((self.0 as u32 & ((1 << links) - 1)) as u8)
     }
 
-    /// Bit 0 is set if link 1 is down, bit 1 if link 2 is, and so on.
+    /// The equilibrium with these bits: bit 0 is set if link 1 is down, bit 1 if link 2 is, and so on.
     pub const fn of_bits(bits: u32) -> Self {
         Self(bits as u8)
     }
 
-    /// See [`of_bits`](Self::of_bits).
+    /// The bits, as in [`of_bits`](Self::of_bits).
     pub const fn bits(self) -> u32 {
         self.0 as u32
     }
 
     /// Whether this link is down; the first one has number 0.
     pub const fn is_down(self, link: usize) -> bool {
-        // As a signed number: links beyond the eighth are as the eighth, so that all of them hang in `HANGING`.
+        // Sign-extended: links beyond the eighth are like the eighth, so that all of them hang in `HANGING`.
         (self.0 as i8 as i32) >> link & 1 != 0
     }
 
-    /// Half turns of this joint from the link before it, -1, 0 or 1; the first one has number 0.
+    /// Half turns of this joint relative to the link before it, -1, 0 or 1; the first one has number 0.
     pub const fn half_turns(self, joint: usize) -> i32 {
         let before = joint > 0 && self.is_down(joint - 1);
         self.is_down(joint) as i32 - before as i32

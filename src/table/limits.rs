@@ -105,7 +105,7 @@ impl<const NY: usize> Limits<NY> {
         rest
     }
 
-    /// How far these counts are from rest `at` an equilibrium, without whole turns of the joints.
+    /// Distance of these counts from rest `at` an equilibrium, without whole turns of the joints.
     pub fn from_rest(&self, counts: &[i32; NY], at: Equilibrium) -> [i32; NY] {
         self.away(counts, &self.rest(at))
     }

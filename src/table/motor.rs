@@ -19,8 +19,8 @@ part! {
     }
 }
 
-/// Highest supply voltage as a share of the table's. A force is larger by as much, and most power stages and brake
-/// choppers have their limit above it.
+/// Highest supply voltage as a multiple of the table's. There, forces are larger by the same factor; most power stages
+/// and brake choppers have their limit above it.
 const OVER_VOLTAGE: f32 = 1.25;
 
 impl MotorMap {

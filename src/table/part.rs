@@ -110,7 +110,7 @@ pub trait Reader {
     /// The value of an optional field. If `is_there`, the value itself follows.
     fn option(&mut self, is_there: bool);
 
-    /// The value of a field is a list of so many structs, which follow.
+    /// The value of a field is a list of `length` structs, which follow.
     fn list(&mut self, length: usize);
 
     /// End of the struct.
@@ -196,12 +196,12 @@ impl Resize<u64> for u64 {
     }
 }
 
-/// Copies as many as there are in both.
+/// Copies as many entries as both slices have.
 fn copy<T: Copy>(from: &[T], to: &mut [T]) {
     to.iter_mut().zip(from).for_each(|(to, from)| *to = *from);
 }
 
-/// A list of any length, which lies elsewhere.
+/// Implements [`Part`] for a slice, whose values are stored outside the struct.
 macro_rules! slice {
     ($kind:ident, $type:ty) => {
         impl Part for &[$type] {

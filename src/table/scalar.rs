@@ -16,7 +16,7 @@ pub trait Number:
     + SubAssign
     + MulAssign
 {
-    /// `value`, rounded to this type; in a vector that is as long as `self`, everywhere.
+    /// `value`, rounded to this type; for a vector, the same value in each of as many entries as `self` has.
     fn constant(self, value: f64) -> Self;
 
     /// Sines and cosines of `angles` (rad), with the same bits on every machine; mirrored angles give exactly mirrored
@@ -24,8 +24,8 @@ pub trait Number:
     fn sines_and_cosines<const N: usize>(angles: &[Self; N]) -> ([Self; N], [Self; N]);
 }
 
-/// A number for control law and equations of motion: `f32` in the firmware; on the host also `f64`, to compare the
-/// firmware with the same law in double precision and to simulate.
+/// A number of the control law and the equations of motion: `f32` in the firmware; on the host also `f64`, to compare
+/// the firmware with the same law in double precision and to simulate.
 pub trait Scalar: Number + Default + PartialOrd {
     /// Converts from `f32`, exactly.
     fn from_f32(value: f32) -> Self;

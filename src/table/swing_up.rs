@@ -1,8 +1,8 @@
 //! The motions of a swing-up: from hanging to upright, and back; also between other equilibria, if they are planned.
 //!
-//! A motion is stored as knots, between which the firmware interpolates. The columns, each with its values at
-//! all knots, lie one after the other in a slice, because the number of knots differs from rig to rig. Values have 16
-//! bits, with a unit for each column: that is finer than what encoders resolve, and takes half of the flash.
+//! A motion is stored as knots, between which the firmware interpolates. The columns, each with its values at all
+//! knots, lie one after the other in a slice, because the number of knots differs from rig to rig. Values have 16
+//! bits, with a unit for each column: that is finer than encoders resolve, and takes half the flash of `f32`.
 
 use crate::table::checksum::{ChecksumScan, checksum};
 use crate::table::part::{Part, Reader, Resize, Words, WordsMut, is_finite, part};
@@ -99,7 +99,7 @@ impl MotionLimits {
 }
 
 part! {
-    /// Both motions of a rig with `NY` sensors and `N` links, and what is needed to follow them.
+    /// The motions of a rig with `NY` sensors and `N` links, and what is needed to follow them.
     pub struct SwingUpTable<'t, NY to MY, N to M;> {
         /// Layout of the table: `TABLE_FORMAT` of the writer.
         pub format: u32,
@@ -182,9 +182,9 @@ impl<const NY: usize, const N: usize> SwingUpTable<'_, NY, N> {
     }
 }
 
-/// What a build has of a swing-up: [`NoSwingUp`], for which no code is generated, or a [`SwingUpTable`].
+/// The swing-up of a build: [`NoSwingUp`], for which no code is generated, or a [`SwingUpTable`].
 pub trait SwingUp<const NX: usize, const NY: usize> {
-    /// Whether there may be motions. The code for them is behind this constant.
+    /// Whether there may be motions. If not, the code for them is left out.
     const IS_POSSIBLE: bool;
 
     /// The motions without the model, if there are any.
@@ -199,11 +199,11 @@ pub trait SwingUp<const NX: usize, const NY: usize> {
     /// The first [`TableError`] found.
     fn check(&self, build: &Build) -> Result<(), TableError>;
 
-    /// Adds a word to the scan of the table; after the last one, whether the table is intact.
+    /// Adds a word to the scan of the table; after the last word, returns whether the table is intact.
     fn scan<'a>(&'a self, scan: &mut ChecksumScan<'a>) -> Option<bool>;
 }
 
-/// The motions of a [`SwingUpTable`] and what watches them.
+/// The motions of a [`SwingUpTable`] and the limits and thresholds that supervise them.
 #[derive(Debug, Clone, Copy)]
 pub struct Motions<'t, const NY: usize> {
     /// From hanging to upright.
@@ -233,7 +233,7 @@ impl<'t, const NY: usize> Motions<'t, NY> {
     }
 }
 
-/// The rig file has no `[swing_up]`.
+/// The swing-up of a rig file without `[swing_up]`: there are no motions.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct NoSwingUp;
 
@@ -278,7 +278,7 @@ impl<const NX: usize, const NY: usize, const N: usize> SwingUp<NX, NY> for Swing
     }
 }
 
-/// A table that is only known when the program runs.
+/// A swing-up that is only known at run time; `None`: there are no motions.
 impl<const NX: usize, const NY: usize, S: SwingUp<NX, NY>> SwingUp<NX, NY> for Option<S> {
     const IS_POSSIBLE: bool = S::IS_POSSIBLE;
 

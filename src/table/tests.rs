@@ -357,7 +357,7 @@ fn every_flipped_bit_of_a_transition_is_refused() {
     }
     let shorter = SwingUpTable { others: &good[..1], ..table.clone() };
     assert_eq!(shorter.check(&BUILD, 4), Err(TableError::Crc));
-    // With the right checksum: equilibria that there are not, or twice the same, or too few knots.
+    // With the right checksum: an equilibrium that does not exist, the same one twice, or too few knots.
     let dimensions = Err(TableError::Dimensions);
     assert_eq!(with_others(&[transition(0, 2, &COURSE)]).check(&BUILD, 4), dimensions);
     assert_eq!(with_others(&[transition(1, 1, &COURSE)]).check(&BUILD, 4), dimensions);

@@ -1,4 +1,4 @@
-//! The firmware's controller against the nonlinear plant: what must stand, stands.
+//! The firmware's controller against the nonlinear plant: every loop that has to stay upright does so.
 
 use crate::bench::*;
 use upright::control::controller::Controller;
@@ -6,7 +6,8 @@ use upright::gains::{RIG_HASH, STATES, TABLE, TICK_S};
 use upright::table::{Build, Law};
 use upright_design::simulate::{Bench, Scenario, Summary, simulate};
 
-/// `gains::TABLE` in the firmware's own controller, in the simplest possible loop; every state at every tick.
+/// Runs `gains::TABLE` in the firmware's own controller, in the simplest possible loop. Returns the whole state at
+/// every tick.
 fn firmware_alone(scenario: &Scenario) -> Vec<[f64; STATES]> {
     let rig = rig_of_the_firmware();
     let build = Build { rig_hash: RIG_HASH, tick_s: TICK_S };
@@ -91,7 +92,7 @@ fn the_papers_continuous_gains_give_the_published_responses() {
     }
 }
 
-/// Gains for the tick request less force at first, and keep the response as intended.
+/// Gains that are designed for the tick request less peak force, and keep the response as intended.
 #[test]
 fn sampled_gains_keep_the_response_of_the_continuous_design() {
     let (continuous, sampled) = (paper_at(1e-4, 0), paper_at(1e-3, 0));
@@ -120,7 +121,7 @@ fn single_double_and_triple_rigs_stand_under_both_laws_with_and_without_delay() 
                 let scenario = Scenario { step_m: 0.1, duration_s: 12.0, ..lean(&rig, law, 0.01) };
                 let summary = run(&rig, &table, &scenario);
                 assert!(
-                    // The rest of the dead zone lets the cart stop, or creep, a little beside the set-point.
+                    // What is left of the dead zone lets the cart stop, or creep, a little off the set-point.
                     summary.settled && summary.final_error_m.abs() < 2e-3,
                     "{name} {law:?} delay {delay_ticks}: {summary}"
                 );

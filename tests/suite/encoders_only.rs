@@ -70,9 +70,9 @@ fn single_double_and_triple_with_motor_dead_zone_and_friction_take_a_step_throug
             let step = Scenario { step_m: 0.1, duration_s: 20.0, ..Scenario::at_rest(&rig, law) };
             assert_eq!(step.sensing, Sensing::Encoders);
             let summary = run(&rig, &table, &step);
-            // The rest of the dead zone and the encoder's steps let the cart creep beside the set-point.
+            // What is left of the dead zone, and the encoder's steps, let the cart creep off the set-point.
             assert!(summary.stands() && summary.final_error_m.abs() < 5e-3, "{name} {law:?}: {summary}");
-            // Negative control: a hundredth of the supply cannot hold a lean that the full supply holds.
+            // Negative control: a hundredth of the supply cannot recover from a lean from which the full supply does.
             let mut tired = rig.clone();
             tired.actuator.motor.as_mut().unwrap().supply_v /= 100.0;
             let mut push = step.clone();
@@ -95,7 +95,7 @@ fn bits(rig: &Rig, table: &TableValues, scenario: &Scenario, counter_start: u32)
     trace.samples().map(row).collect()
 }
 
-/// How often each counter wraps in that run.
+/// Number of times that each counter wraps in that run.
 fn wraps(rig: &Rig, table: &TableValues, scenario: &Scenario, counter_start: u32) -> Vec<usize> {
     let (trace, _) = simulate(rig, table, scenario).unwrap();
     rig.sensors()

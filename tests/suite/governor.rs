@@ -14,8 +14,8 @@ use upright_design::rig::{PolePlacement, Rig};
 use upright_design::simulate::{Bench, Scenario, Sensing, simulate};
 use upright_design::table::TableValues;
 
-/// The criterion holds for the linear model: at half of the limit, 0.175 rad, sin θ and cos θ differ from it by up to
-/// 1.5 %.
+/// The criterion holds for the linear model: at half of the limit, 0.175 rad, sin θ and cos θ differ from their linear
+/// approximations by up to 1.5 %.
 const NONLINEAR: f64 = 1.03;
 
 /// The paper's rig with the settling time at which its pole placement falls on a step of 1 m.

@@ -58,12 +58,12 @@ fn scenarios(rig: &Rig, disturbed: bool) -> Vec<(String, Scenario)> {
     scenarios
 }
 
-/// The image, if its compiler and QEMU are both there.
+/// The image, if its compiler and QEMU are both installed.
 fn image(kind: Kind) -> Option<PathBuf> {
     in_qemu(build_if_possible(kind).unwrap())
 }
 
-/// The image, if there is one and QEMU is there.
+/// The image, if there is one and QEMU is installed.
 fn in_qemu(image: Option<PathBuf>) -> Option<PathBuf> {
     let image = image?;
     match Command::new("qemu-system-arm").arg("--version").stdout(Stdio::null()).status() {
@@ -130,7 +130,7 @@ fn the_image_in_qemu_goes_from_equilibrium_to_equilibrium_with_the_bits_of_the_h
     let (rig, table) = with_stored_motions("double-quanser-dbpen", &["uu-ud", "ud-dd"]);
     let built = if_possible(build_for(Kind::InTheLoop, &rig, &table)).unwrap();
     let Some(image) = in_qemu(built) else { return };
-    // Up, over the equilibrium at which the second link hangs, and down.
+    // Up, on to the equilibrium at which the second link hangs, and down.
     let tour = Tour::of(&rig, &table).unwrap();
     let mut scenario = tour.scenario(&rig, 7);
     scenario.goals.truncate(2);
@@ -147,8 +147,8 @@ fn the_image_in_qemu_goes_from_equilibrium_to_equilibrium_with_the_bits_of_the_h
     assert!(run(&rig, &table, &scenario, Place::Host).unwrap().ticks != qemu.ticks);
 }
 
-/// Counts of the joints and state in all telemetry of a rig whose links swing out, about so many counts off, while
-/// homing is asked for.
+/// State and encoder counts in all telemetry of a rig whose links swing out about positions that are `off` counts from
+/// 0, while homing is requested every 500 ticks.
 fn homed_swinging(table: &TableValues, off: f64, place: Place<'_>) -> Vec<(State, Vec<i32>)> {
     let run = |target: &mut dyn Target| -> Result<_, RunError> {
         let (mut session, mut seen) = (Session::new(target), Vec::new());
@@ -185,11 +185,11 @@ fn swinging_links_are_homed_in_qemu_with_the_bits_of_the_host() {
     };
     // Links 2 to 4 were 3.4 counts off; in between, they move by a count or two.
     assert!(homed(&host).is_some_and(|moved| (-5..=-1).contains(&moved)), "{:?}", homed(&host));
-    // Negative control: other counts are seen.
+    // Negative control: the comparison notices other counts.
     assert!(homed_swinging(&table, 3.6, Place::Host) != host);
 }
 
-/// On the rig with the fewest bytes per second: over these lines, QEMU takes long for each.
+/// On the rig with the fewest bytes per second, because QEMU takes long for each byte on these lines.
 #[test]
 fn the_image_runs_with_serial_lines_too() {
     let (rig, table) = rig_and_table("single-quanser-ip02").clone();

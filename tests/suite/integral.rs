@@ -55,7 +55,7 @@ fn a_constant_force_moves_the_cart_without_integral_action_and_not_with_it() {
     }
 }
 
-/// By how much the cart goes beyond a step of the set-point, as a share of the step.
+/// Overshoot of the cart after a step of the set-point, as a share of the step.
 fn overshoot(rig: &Rig, step_m: f64) -> f64 {
     let sensing = Sensing::FullState;
     let scenario =
@@ -72,7 +72,7 @@ fn a_smaller_weight_of_the_set_point_overshoots_less_and_arrives_all_the_same() 
             let integral = Some(Integral { position_weight: weight, setpoint_weight });
             overshoot(&Rig { integral, ..rig(name) }, step_m)
         });
-        // The negative control: all of N.
+        // Negative control: the whole precompensation N.
         assert!(overshoots[0] > 0.25, "{name}: {overshoots:?}");
         assert!(overshoots[2] < 0.05, "{name}: {overshoots:?}");
         assert!(overshoots[4] < 0.01, "{name}: {overshoots:?}");
@@ -108,7 +108,7 @@ fn a_rig_that_is_not_as_described_arrives_all_the_same() {
     chain.links[0].mass_kg *= 0.8;
     let scenario = pulled(&with, Sensing::Encoders, 0.5);
     let summary = run(&heavier, &table, &scenario);
-    // The rest of the dead zone lets the cart move by a millimetre or two.
+    // What is left of the dead zone lets the cart move by a millimetre or two.
     assert!(summary.stands() && summary.final_error_m.abs() < 3e-3, "{summary}");
 }
 

@@ -1,4 +1,4 @@
-//! What must fall, falls: the closed-loop tests can fail. Also the limits and seeds of a run.
+//! Loops that have to fall do so, which shows that the closed-loop tests can fail. Also the limits and seeds of a run.
 
 use crate::bench::*;
 use upright::table::{Law, TableError};

@@ -136,7 +136,7 @@ fn a_crate_made_from_the_document_balances_on_the_host() {
     let folder = foreign_crate();
     let host = |with_the_rig_of: &Path| {
         let mut cargo = Command::new(env!("CARGO"));
-        // With the settings of the tests, what they are built from need not be compiled again.
+        // With the same settings as the tests, the dependencies that they share need not be compiled again.
         cargo.current_dir(with_the_rig_of).env("CARGO_TARGET_DIR", target_of_the_tests());
         for (setting, value) in [("DEBUG", "false"), ("CODEGEN_UNITS", "2"), ("LTO", "off")] {
             cargo.env(format!("CARGO_PROFILE_DEV_{setting}"), value);

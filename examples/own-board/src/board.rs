@@ -1,4 +1,4 @@
-//! A board of one's own: the black STM32F407VET6 board with the encoders of a cart and one link.
+//! A board of your own: the black STM32F407VET6 board with the encoders of a cart and one link.
 
 use stm32f4xx_hal::adc::{Adc, config::SampleTime};
 use stm32f4xx_hal::gpio::{Analog, Input, Output as OutputPin, PA4, PB0, PB1, PB2, PB10, PB12, PB13};

@@ -6,9 +6,9 @@
 //! | PCLK1 | 42 MHz | the USART; timers 2 to 5 at 84 MHz |
 //! | PCLK2 | 84 MHz | ADC at 21 MHz; timers 1 and 8 at 168 MHz |
 //!
-//! The crystal is measured against the internal oscillator before it is used. If it has another frequency, or if
+//! The crystal is measured against the internal oscillator before it is used. If its frequency is wrong, or if
 //! anything does not start, the core stays on the internal 16 MHz oscillator with all buses undivided: slow, but able
-//! to report the fault. The voltage scaling for 168 MHz is the one after a reset (RM0090, 5.4.1; RM0390, 5.4.1).
+//! to report the fault. The voltage scaling for 168 MHz is the default after a reset (RM0090, 5.4.1; RM0390, 5.4.1).
 
 use stm32f4xx_hal::pac::{FLASH, RCC, TIM11};
 use upright::protocol::message::Reset;
@@ -19,15 +19,15 @@ use super::serial;
 /// Core clock (Hz).
 pub(crate) const CLOCK_HZ: u32 = 168_000_000;
 
-/// The internal oscillator (Hz), within 1 % at room temperature.
+/// Frequency of the internal oscillator (Hz), within 1 % at room temperature.
 const INTERNAL_HZ: u32 = 16_000_000;
 
-/// The crystal, or the clock that comes in its place (Hz).
+/// Frequency of the crystal, or of the external clock in its place (Hz).
 const CRYSTAL_HZ: u32 = BOARD.crystal_hz;
-/// The PLL divides it by this: to 2 MHz, where its jitter is lowest, or to 1 MHz (RM0090, 7.3.2) …
+/// Input divider of the PLL: to 2 MHz, where its jitter is lowest, or to 1 MHz (RM0090, 7.3.2).
 const PLL_M: u32 =
     if CRYSTAL_HZ.is_multiple_of(2_000_000) { CRYSTAL_HZ / 2_000_000 } else { CRYSTAL_HZ / 1_000_000 };
-/// … and multiplies that by this, to twice the core clock.
+/// Multiplier of the PLL: to twice the core clock.
 const PLL_N: u32 = 2 * CLOCK_HZ / (CRYSTAL_HZ / PLL_M);
 const _: () = assert!(
     CRYSTAL_HZ / PLL_M * PLL_N == 2 * CLOCK_HZ && PLL_M >= 2 && PLL_M <= 26,
@@ -59,7 +59,7 @@ impl Clock {
     }
 }
 
-/// Gives all peripherals in use their clocks.
+/// Enables the clocks of all peripherals in use.
 pub(super) fn enable_peripherals(rcc: &RCC) {
     rcc.ahb1enr().modify(|_, w| {
         w.gpioaen().set_bit().gpioben().set_bit().gpiocen().set_bit().gpioden().set_bit().dma1en().set_bit()
@@ -71,13 +71,14 @@ pub(super) fn enable_peripherals(rcc: &RCC) {
     rcc.apb2enr().modify(|_, w| {
         w.tim1en().set_bit().tim8en().set_bit().tim11en().set_bit().adc1en().set_bit().syscfgen().set_bit()
     });
-    // A write to a peripheral may be lost until two cycles of its bus after its clock was enabled (ES0182 2.1.13,
+    // A write to a peripheral may be lost during the first two bus cycles after its clock was enabled (ES0182 2.1.13,
     // ES0298 2.1.6). The barrier waits for the write to the enable register, the delay for those cycles.
     cortex_m::asm::dsb();
     cortex_m::asm::delay(16);
 }
 
-/// Starts the crystal and the PLL. If both start, and the crystal has its frequency, switches the core to them.
+/// Starts the crystal and the PLL. If both start and the crystal has the right frequency, switches the core to the
+/// PLL.
 pub(super) fn set_up(rcc: &RCC, flash: &FLASH, timer: &TIM11) -> Clock {
     match start_crystal(rcc).and_then(|()| measure_crystal(rcc, timer)).and_then(|()| start_pll(rcc, flash)) {
         Some(()) => Clock::Full,
@@ -108,7 +109,7 @@ const PLLON: u32 = 1 << 24;
 
 fn start_crystal(rcc: &RCC) -> Option<()> {
     BOARD.sources.iter().find_map(|&source| {
-        // The bypass changes only while the oscillator is off.
+        // The bypass can be changed only while the oscillator is off.
         clear(rcc, HSEON);
         clear(rcc, HSEBYP);
         set(rcc, if source == Source::Clock { HSEBYP } else { 0 });
@@ -117,17 +118,18 @@ fn start_crystal(rcc: &RCC) -> Option<()> {
     })
 }
 
-/// The crystal's clock is divided by this for the measurement …
+/// Divider of the crystal's clock for the measurement.
 const DIVISOR: u32 = 25;
-/// … and the timer captures every eighth edge of that, so often.
+/// Number of captures after the first one; the timer captures every eighth edge of the divided clock.
 const CAPTURES: u32 = 16;
-/// Largest deviation of the crystal from its frequency: the internal oscillator's, with a margin (%).
+/// Largest accepted deviation of the crystal from its frequency (%): the tolerance of the internal oscillator, with a
+/// margin.
 const DEVIATION_PERCENT: u32 = 3;
 
 /// Measures the crystal: timer 11 counts the internal oscillator between edges of the crystal (RM0090, 19.5.11:
-/// TI1_RMP = 10). Nothing if the frequency is not [`CRYSTAL_HZ`].
+/// TI1_RMP = 10). `None` if the frequency is not [`CRYSTAL_HZ`].
 fn measure_crystal(rcc: &RCC, timer: &TIM11) -> Option<()> {
-    // SAFETY, here and below: values of the fields described there.
+    // SAFETY, here and below: values within the fields described there.
     rcc.cfgr().write(|w| unsafe { w.rtcpre().bits(DIVISOR as u8) });
     timer.or().write(|w| unsafe { w.bits(0b10) });
     timer.ccmr1_input().write(|w| unsafe { w.bits(0b11 << 2 | 0b01) });
@@ -140,7 +142,8 @@ fn measure_crystal(rcc: &RCC, timer: &TIM11) -> Option<()> {
     let first = capture()?;
     let last = (0..CAPTURES).try_fold(first, |_, _| capture())?;
     timer.cr1().write(|w| w.cen().clear_bit());
-    // The counter wraps at 16 bits; between the first edge and the last, it does not come round at 1 MHz or more.
+    // The counter wraps at 16 bits. With a crystal of 1 MHz or more, it counts less than one whole range between the
+    // first edge and the last.
     let counted = u32::from(last.wrapping_sub(first));
     const EXPECTED: u32 = (INTERNAL_HZ as u64 * (8 * DIVISOR * CAPTURES) as u64 / CRYSTAL_HZ as u64) as u32;
     const { assert!(EXPECTED < 32_768, "the crystal is too slow for this measurement") };
@@ -159,8 +162,9 @@ fn start_pll(rcc: &RCC, flash: &FLASH) -> Option<()> {
     flash.acr().write(|w| unsafe { w.bits(5 | 1 << 8 | 1 << 9 | 1 << 10) });
     wait(|| flash.acr().read().bits() & 15 == 5)?;
     wait(|| rcc.cr().read().pllrdy().bit_is_set())?;
-    // Buses before the core, so that they never run too fast: HCLK / 4 and / 2 (RM0090, 7.3.3).
-    // SAFETY: divisors of this register; 2 is the PLL.
+    // The buses are divided before the core is switched, so that they never run too fast: HCLK / 4 and / 2 (RM0090,
+    // 7.3.3).
+    // SAFETY: valid dividers; source 2 is the PLL.
     rcc.cfgr().write(|w| unsafe { w.ppre1().bits(0b101).ppre2().bits(0b100) });
     rcc.cfgr().write(|w| unsafe { w.ppre1().bits(0b101).ppre2().bits(0b100).sw().bits(2) });
     wait(|| rcc.cfgr().read().sws().bits() == 2)?;
@@ -181,7 +185,7 @@ pub(super) fn reset_reason(rcc: &RCC, crashed: bool) -> Reset {
     // SAFETY: RMVF; the other bits are the hardware's.
     rcc.csr().write(|w| unsafe { w.bits(1 << 24) });
     // Every reset also sets the reset pin's flag, and power-on sets that of the brown-out detector, so the rarer flags
-    // come first. The flag of a reset by software comes from a debugger: this firmware never asks for one.
+    // come first. The flag of a reset by software comes from a debugger: this firmware never requests one.
     if flags.porrstf().bit_is_set() {
         Reset::Power
     } else if crashed {

@@ -1,4 +1,4 @@
-//! What survives a reset: where the program crashed. And what identifies the program.
+//! The record of a crash, which survives a reset, and the checksum that identifies the image.
 
 use core::mem::MaybeUninit;
 
@@ -35,7 +35,7 @@ pub(super) fn take() -> (bool, Option<CrashRecord>) {
 }
 
 /// Records a crash. At `frame` the processor has saved R0 to R3, R12, LR, PC and XPSR (ARM DDI 0403, B1.5.6), unless
-/// it is outside the memory: null after a panic, below it after a stack overflow.
+/// `frame` is outside the memory: null after a panic, below the memory after a stack overflow.
 pub(super) fn record(frame: *const u32) {
     let is_saved = (0x2000_0000..=0x2001_ffe0).contains(&(frame as u32)) && frame.is_aligned();
     // SAFETY: the frame is in memory; nothing else runs any more; reading these registers has no side effect.

@@ -26,7 +26,7 @@ const TIMERS: [(*const u32, CounterWidth); SENSORS] = {
     timers
 };
 
-/// The counter of a sensor, if it is in use.
+/// Address of a sensor's counter register, if the sensor is in use.
 const fn counter(sensor: usize) -> Option<*const u32> {
     if sensor < SENSORS { Some(TIMERS[sensor].0.wrapping_byte_add(CNT)) } else { None }
 }
@@ -56,8 +56,8 @@ pub(super) fn set_up() {
             // SAFETY: a register of this timer, which nothing else uses.
             unsafe { timer.byte_add(offset).cast_mut().write_volatile(value) };
         };
-        // Both inputs directly to their channels. A level counts only after eight equal samples of the timer's clock
-        // (48 ns or 95 ns); anything shorter is noise (RM0090, 18.4.7: CCxS = 01, ICxF = 0011).
+        // Each input goes directly to its own channel. A level counts only after eight equal samples of the timer's
+        // clock (48 ns or 95 ns); anything shorter is noise (RM0090, 18.4.7: CCxS = 01, ICxF = 0011).
         write(CCMR1, 0x3131);
         // Encoder mode 3: every edge of both inputs counts (RM0090, 18.3.12).
         write(SMCR, 3);
@@ -70,7 +70,7 @@ pub(super) fn set_up() {
 pub(super) fn raw_counts() -> [u32; SENSORS] {
     const { assert!(SENSORS <= 5, "more encoders than are read here") };
     let mut counts = [0; SENSORS];
-    // Written out, because a loop would fetch the addresses from a table in flash.
+    // Unrolled, because a loop would fetch the addresses from a table in flash.
     macro_rules! read {
         ($($sensor:literal)*) => {
             $(if let (Some(count), Some(counter)) = (counts.get_mut($sensor), const { counter($sensor) }) {

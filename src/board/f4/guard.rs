@@ -1,22 +1,22 @@
-//! What guards the program: memory below the stack, the microcontroller's own supply, the chip itself.
+//! Guards against a stack overflow, a low supply of the microcontroller, and an image on the wrong chip.
 
 use cortex_m::peripheral::MPU;
 use stm32f4xx_hal::pac::{DBGMCU, EXTI, PWR};
 
 use super::boards::BOARD;
 
-/// Line of EXTI that the voltage detector is connected to (RM0090, 12.2.5).
+/// Bit of the EXTI line to which the voltage detector is connected (RM0090, 12.2.5).
 const DETECTOR: u32 = 1 << 16;
 
-/// Whether this is the chip that the image is for (RM0090, 38.6.1; RM0390, 33.6.1). While a debugger holds the
-/// processor, the watchdog waits.
+/// Whether this is the chip that the image is for (RM0090, 38.6.1; RM0390, 33.6.1). Also makes the watchdog wait while
+/// a debugger halts the processor.
 pub(super) fn chip_is_right(debug: &DBGMCU) -> bool {
     debug.apb1_fz().modify(|_, w| w.dbg_iwdg_stop().set_bit());
     debug.idcode().read().bits() & 0xfff == BOARD.chip as u32
 }
 
-/// Makes every access to the 64 KiB below the stack a fault: the stack is at the start of the memory, and writes to
-/// the reserved space before it may be ignored. (The factory's data are there, too: read them before.)
+/// Makes every access to the 64 KiB below the stack a fault: the stack is at the start of the SRAM, and without this,
+/// writes to the reserved space before it may be ignored. (The factory data are in this range, too: read them first.)
 pub(super) fn protect_stack(mpu: &MPU) {
     // SAFETY: nothing uses this space; all other memory stays as it is (PRIVDEFENA).
     unsafe {
@@ -29,7 +29,7 @@ pub(super) fn protect_stack(mpu: &MPU) {
     cortex_m::asm::isb();
 }
 
-/// Starts the detector of a low supply: below 2.76 V or so; 168 MHz needs 2.7 V (RM0090, 5.4.1).
+/// Starts the voltage detector with a threshold of about 2.76 V: 168 MHz needs 2.7 V (RM0090, 5.4.1).
 pub(super) fn watch_supply(power: &PWR, exti: &EXTI) {
     // Full voltage scaling, as after a reset; level 5; on.
     // SAFETY: values of the fields described there.

@@ -36,14 +36,14 @@ pub(crate) struct Hardware {
     clock_fault: bool,
     wrong_chip: bool,
     overrun: bool,
-    /// How many ticks in a row have ended after the next one was due.
+    /// Number of ticks in a row that ended after the next one was due.
     late_ticks: u8,
-    /// Whether the limit switches were open at the end of the tick before.
+    /// Whether the limit switches were open at the end of the previous tick.
     limits: [bool; 2],
 }
 
 /// Sets up all peripherals but the watchdog, with the motor off. Takes at most 150 ms, even if a peripheral does not
-/// respond. Gives what the board knows, too.
+/// respond. Also returns what the board knows about the start.
 pub(crate) fn set_up(device: Peripherals, buffer: &'static mut Buffer) -> (Hardware, SerialLine, Start) {
     let rcc = &device.RCC;
     clock::enable_peripherals(rcc);
@@ -101,8 +101,8 @@ impl Board<SENSORS> for Hardware {
             raw_counts,
             supply_v: self.supply.volts(),
             contacts: Contacts {
-                // Open at the end of the tick before and now: a spike in a wire beside a switching bridge is no
-                // contact.
+                // A contact counts only if it was open at the end of the previous tick, too: a spike that a wire picks
+                // up from the switching bridge must not trip.
                 limit_low: limit_low & was_low,
                 limit_high: limit_high & was_high,
                 emergency_stop: self.motor.was_stopped() | pins::emergency_stop(),
@@ -120,7 +120,8 @@ impl Board<SENSORS> for Hardware {
         self.motor.drive(output);
     }
 
-    /// Not after three late ticks in a row, which are a fault. (Without a feed, the fastest watchdog waits for two.)
+    /// Does not feed the watchdog after three late ticks in a row, which are a fault. (If it is not fed, the fastest
+    /// watchdog waits for two ticks.)
     fn feed_watchdog(&mut self) {
         self.limits = pins::limits();
         self.overrun = tick_is_due();

@@ -6,8 +6,8 @@
 //! compare value (17.3.9). The compare value is never 0 here, so the output stops inactive. This needs no code and no
 //! other clock.
 //!
-//! A restart sets the counter to 0, which would cut a period short. So the counter goes on where it was: the PWM keeps
-//! its phase, however much the time from the tick to the restart varies.
+//! A restart sets the counter to 0, which would cut a period short. So the counter is set back to where it was: the
+//! PWM keeps its phase, however much the time from the tick to the restart varies.
 //!
 //! The emergency stop is the timer's break input: it switches the output off in hardware (17.3.12). Only code can
 //! switch the output on again, once the contact is closed.
@@ -41,18 +41,18 @@ const _: () =
     assert!(PERIOD <= 65_535, "tick.period_s: this board's PWM cannot be kept up over so long a tick");
 /// PWM periods until the motor is off after ticks stop.
 const PERIODS: u32 = 3 * PERIODS_PER_TICK;
-/// Timer clocks of each period, at the least, in which the output is inactive: power stages with a bootstrap supply
-/// need the pause, and none can follow a pause of nanoseconds. The duty is at most 98 %.
+/// Shortest inactive time of the output in each period (timer clocks): power stages with a bootstrap supply need the
+/// pause, and none can follow a pause of nanoseconds. The duty is at most 98 %.
 const LEAST_PAUSE: u32 = PERIOD / 50;
-/// Counter at the first start. Restarts follow at about this place of the period, where the output is inactive up to
-/// a duty of three quarters.
+/// Counter at the first start. Later restarts fall at about the same place in the period, where the output is inactive
+/// up to a duty of three quarters.
 const FIRST_PHASE: u32 = PERIOD / 5;
 /// Timer clocks from reading the counter to starting it again.
 const RESTART: u32 = 20;
 
 /// OC1M = 111, PWM mode 2; OC1PE: compare values change with a restart, not within a period (17.4.7).
 const MODE: u32 = 0b111 << 4 | 1 << 3;
-/// CC1E, or CC1NE for the complementary output, which alone has the level of the channel, too (17.4.9).
+/// CC1E, or CC1NE for the complementary output, which is not inverted while it is the only one enabled (17.4.9).
 const OUTPUT: u32 = match wire_of(BOARD.wiring, Signal::Pwm).function.as_bytes() {
     b"TIM1_CH1" => 1,
     b"TIM1_CH1N" => 1 << 2,
@@ -84,7 +84,7 @@ impl Motor {
         Self { timer, on: false, failed }
     }
 
-    /// Whether the timer was found to hold something else than what was written to it; the motor then stays off.
+    /// Whether the timer once did not hold what was written to it; the motor then stays off.
     pub(super) fn has_failed(&self) -> bool {
         self.failed
     }
@@ -104,10 +104,10 @@ impl Motor {
         self.timer.ccr1().write(|w| unsafe { w.bits(PERIOD - active.min(PERIOD - LEAST_PAUSE)) });
         let phase = if self.on { self.timer.cnt().read().bits() } else { FIRST_PHASE };
         // The update loads the compare value and the repetition counter and sets the counter to 0 (17.4.6: UG), where
-        // the output is inactive: the direction changes there.
+        // the output is inactive: a safe moment to change the direction.
         self.timer.egr().write(|w| w.ug().set_bit());
         pins::push_along_x(duty > 0.0);
-        // Never beyond the period: the counter would go on to its end, with the output active.
+        // Never beyond the period: the counter would run on to the end of its range, with the output active.
         let phase = phase + RESTART;
         let phase = if phase < PERIOD { phase } else { 0 };
         self.timer.cnt().write(|w| unsafe { w.bits(phase) });

@@ -118,7 +118,7 @@ pub(super) fn push_along_x(along: bool) {
     set(DIRECTION, along);
 }
 
-/// Shows whether a tick is running.
+/// Sets the pin that shows on an oscilloscope whether a tick is running.
 pub(super) fn show_tick(running: bool) {
     set(TICK, running);
 }

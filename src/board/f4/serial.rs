@@ -1,5 +1,5 @@
-//! The serial line: USART2 or USART3, 460 800 baud, 8 data bits, no parity. Both directions go to and from memory
-//! without code, so no tick can be too long for a byte.
+//! The serial line: USART2 or USART3, 460 800 baud, 8 data bits, no parity. DMA moves the bytes of both directions, so
+//! none is lost while a tick runs.
 
 use core::cell::UnsafeCell;
 
@@ -10,12 +10,12 @@ use upright::protocol::serial_link::MAX_MESSAGE;
 use super::boards::BOARD;
 use super::wiring::{Signal, wire_of};
 
-/// Received bytes that wait for the background task: more than arrive while it is not run.
+/// Size of the receive buffer (bytes): more than arrive while the background task does not run.
 const RECEIVED: usize = 512;
 
 /// Memory for both directions, which the DMA controller shares with the code.
 pub(crate) struct Buffer {
-    /// Received bytes, round and round.
+    /// Circular buffer of received bytes.
     received: UnsafeCell<[u8; RECEIVED]>,
     /// The frame that is being sent.
     sent: UnsafeCell<[u8; MAX_MESSAGE]>,
@@ -28,14 +28,14 @@ impl Buffer {
     }
 }
 
-/// Number of the USART.
+/// Number of the USART, from the wiring.
 pub(super) const NUMBER: u8 = wire_of(BOARD.wiring, Signal::Transmit).number("USART");
 const _: () = assert!(NUMBER == 2 || NUMBER == 3, "the board's serial line is not at USART2 or USART3");
 
 // Streams of DMA1 (RM0090, 10.3.3: channel 4 of all).
 const RECEIVE: usize = if NUMBER == 2 { 5 } else { 1 };
 const SEND: usize = if NUMBER == 2 { 6 } else { 3 };
-/// Channel 4, and memory addresses that count up.
+/// Channel 4, with the memory address incremented.
 const BYTES_OF_USART: u32 = 4 << 25 | 1 << 10;
 /// The flags of stream 6 in HIFCR, or of stream 3 in LIFCR (10.5.3, 10.5.4).
 const SEND_FLAGS: u32 = if NUMBER == 2 { 0x3d << 16 } else { 0x3d << 22 };
@@ -86,7 +86,7 @@ impl SerialLine {
         Some(byte)
     }
 
-    /// Whether the last frame is on its way, so that there is room for another one.
+    /// Whether the last frame has been passed to the USART, so that there is room for another one.
     pub(crate) fn is_free(&self) -> bool {
         self.dma.st(SEND).cr().read().bits() & 1 == 0
     }
@@ -98,7 +98,7 @@ impl SerialLine {
         for (byte, &from) in sent.iter_mut().zip(frame) {
             *byte = from;
         }
-        // The controller must not read before the bytes are there.
+        // The DMA controller must not read before the bytes are in memory.
         cortex_m::asm::dmb();
         let send = self.dma.st(SEND);
         // SAFETY: values of the fields of RM0090, 10.5; the stream is off.

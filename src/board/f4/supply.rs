@@ -24,9 +24,9 @@ impl Supply {
     /// Turns the converter on and measures the microcontroller's own supply, which is 3.0 V on some boards.
     pub(super) fn set_up(converter: ADC1, common: &ADC_COMMON) -> Self {
         // PCLK2 / 4 = 21 MHz; the maximum is 30 MHz (RM0090, 13.13.16). TSVREFE: the internal reference.
-        // SAFETY, here and below: values of the fields described there.
+        // SAFETY, here and below: values within the fields described there.
         common.ccr().write(|w| unsafe { w.adcpre().bits(0b01).tsvrefe().set_bit() });
-        // Input 12 is sampled for 84 cycles, enough for 1 kΩ; input 17 for 480 cycles, 23 µs, of the 10 µs it needs.
+        // Input 12 is sampled for 84 cycles, enough for 1 kΩ; input 17 for 480 cycles, which is 23 µs; it needs 10 µs.
         converter.smpr1().write(|w| unsafe { w.bits(0b100 << 6 | 0b111 << 21) });
         converter.sqr3().write(|w| unsafe { w.bits(REFERENCE.into()) });
         converter.cr2().write(|w| w.adon().set_bit());
@@ -64,8 +64,8 @@ impl Supply {
     }
 }
 
-/// The microcontroller's own supply (V), from the factory's reading of the reference and from ours. What cannot be,
-/// such as memory without a calibration, gives the board's.
+/// The microcontroller's own supply (V), from the factory's reading of the reference and from ours. If the result is
+/// impossible, for example because there is no calibration, returns the board's nominal voltage.
 fn reference_v(calibration: f32, measured: f32) -> f32 {
     let volts = 3.3 * calibration / measured;
     if (2.5..3.7).contains(&volts) { volts } else { BOARD.reference_v }

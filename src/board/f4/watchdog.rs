@@ -13,8 +13,8 @@ const COUNTS: u16 = {
     counts as u16
 };
 
-/// Iterations of the loop that waits for the new values: at least 2 ms at 168 MHz. They arrive within five periods of
-/// the watchdog's oscillator, 0.3 ms, once it has started.
+/// Iterations of the loop that waits for the new values: at least 2 ms at 168 MHz. They take effect within five
+/// periods of the watchdog's oscillator, 0.3 ms, once it has started.
 const PATIENCE: u32 = 100_000;
 
 /// The watchdog. Once it runs, nothing can stop it (RM0090, 21.3).
@@ -28,9 +28,9 @@ impl Watchdog {
         Self { registers }
     }
 
-    /// Starts the watchdog and waits until the values have arrived: until then, a restart would begin at the value
-    /// after a reset, 512 ms (21.4.4). On the internal oscillator, ticks are 10.5 times as long; the watchdog then
-    /// counts 16 times as slowly.
+    /// Starts the watchdog and waits until the new values have taken effect: until then, a restart would use the reset
+    /// value, 512 ms (21.4.4). On the internal oscillator, ticks are 10.5 times as long; the watchdog then counts 16
+    /// times as slowly.
     pub(super) fn start(&self, clock: Clock) {
         let registers = &self.registers;
         let prescaler = if clock == Clock::Full { 0 } else { 4 };
@@ -41,7 +41,7 @@ impl Watchdog {
             registers.pr().write(|w| w.bits(prescaler));
             registers.rlr().write(|w| w.bits(COUNTS.into()));
         }
-        // If it waits in vain, the watchdog starts at 512 ms; the motor's timer does not need it.
+        // If they do not take effect in time, the watchdog starts at 512 ms; the motor's timer does not need it.
         let _ = (0..PATIENCE).any(|_| registers.sr().read().bits() == 0);
         self.feed();
     }

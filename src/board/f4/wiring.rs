@@ -26,7 +26,7 @@ impl Wire {
         0x4002_0000 + 0x400 * (self.port - b'A') as usize
     }
 
-    /// The digit behind `name` in its function: 3 for `TIM` in `TIM3_CH1`.
+    /// The digit after `name` in its function: 3 for `TIM` in `TIM3_CH1`.
     pub(crate) const fn number(self, name: &str) -> u8 {
         self.function.as_bytes()[name.len()] - b'0'
     }
@@ -37,34 +37,34 @@ impl Wire {
 pub(crate) enum Signal {
     /// An encoder: sensor (0 is the cart's) and channel, 'A' or 'B'.
     Encoder(u8, u8),
-    /// PWM of the power stage.
+    /// PWM input of the power stage: high drives.
     Pwm,
-    /// Its direction.
+    /// Direction input of the power stage: high pushes along +x.
     Direction,
-    /// Its enable input.
+    /// Enable input of the power stage: high enables it.
     Enable,
-    /// Its fault output.
+    /// Fault output of the power stage: low during a fault.
     DriverFault,
-    /// The emergency stop.
+    /// The emergency stop: its contact opens when pressed.
     EmergencyStop,
-    /// The limit switch at the low end.
+    /// The limit switch at the low end of the rail: opens when pressed.
     LimitLow,
-    /// The limit switch at the high end.
+    /// The limit switch at the high end of the rail: opens when pressed.
     LimitHigh,
-    /// The supply of the power stage.
+    /// The supply voltage of the power stage, through a divider.
     Supply,
     /// Serial line to the host.
     Transmit,
     /// Serial line from the host.
     Receive,
-    /// For an oscilloscope.
+    /// High while a tick runs, for an oscilloscope.
     Tick,
     /// The status LED: on after a normal start, off after a crash.
     StatusLed,
 }
 
 impl Signal {
-    /// A number of its own, for comparisons in constants.
+    /// A distinct number for each signal, for comparisons in constants.
     const fn code(self) -> u8 {
         match self {
             Signal::Pwm => 0,
@@ -97,8 +97,8 @@ pub(crate) enum Mode {
     Analog,
 }
 
-/// The wiring of all boards whose pins are free: all pins exist on the 64-pin packages of STM32F405, STM32F407 and
-/// STM32F446, with the same functions. The status LED is the board's own.
+/// The wiring of all boards that leave these pins free: the pins exist on the 64-pin packages of STM32F405, STM32F407
+/// and STM32F446, with the same functions. The status LED differs from board to board.
 pub(crate) const STANDARD: [Wire; 21] = [
     encoder(0, b'A', b'A', 15, 1, "TIM2_CH1"),
     encoder(0, b'B', b'B', 3, 1, "TIM2_CH2"),
@@ -123,7 +123,7 @@ pub(crate) const STANDARD: [Wire; 21] = [
     output(Signal::Tick, b'B', 1),
 ];
 
-/// How many encoders a board counts.
+/// Number of encoders that a board can count.
 pub(crate) const fn encoders(wiring: &[Wire]) -> usize {
     let (mut count, mut i) = (0, 0);
     while i < wiring.len() {
@@ -163,7 +163,7 @@ pub(crate) const fn output(signal: Signal, port: u8, pin: u8) -> Wire {
     wire(signal, port, pin, Mode::Output, false, "output")
 }
 
-/// An input with the pull-up that open-collector encoders need at the least.
+/// An encoder input, with the internal pull-up: the least that an open-collector encoder needs.
 pub(crate) const fn encoder(
     sensor: u8,
     channel: u8,

@@ -36,11 +36,12 @@ pub(crate) struct Hardware {
     frames: Frames<MAX_PINS_IN>,
     received: Producer<'static, u8>,
     clock: TIM5,
-    /// Instructions spent on the simulated pins; a real board does not have them.
+    /// Instructions spent on the simulated pins, which a real board does not spend: [`cycles`](Board::cycles) leaves
+    /// them out.
     spent: u32,
 }
 
-/// The bytes that have arrived with the pins.
+/// Queue of the serial bytes that have arrived with the pins.
 pub(crate) struct Buffer(Queue<u8, 128>);
 
 impl Buffer {
@@ -62,7 +63,7 @@ impl SerialLine {
         self.received.dequeue()
     }
 
-    /// There is always room for a frame.
+    /// Always true: a frame is written at once.
     pub(crate) fn is_free(&self) -> bool {
         true
     }
@@ -88,7 +89,7 @@ pub(crate) fn set_up(device: Peripherals, buffer: &'static mut Buffer) -> (Hardw
 }
 
 impl Hardware {
-    /// There is none.
+    /// Does nothing: the emulated board has no watchdog.
     pub(crate) fn start_watchdog(&self) {}
 }
 
@@ -156,7 +157,7 @@ fn send(pins: &mut Channel, output: &Output) {
 fn inject(sabotage: Sabotage) {
     match sabotage {
         Sabotage::Panic => panic!(),
-        // SAFETY: unsound on purpose: nothing is mapped there, so the access faults.
+        // SAFETY: deliberately unsound: nothing is mapped at this address, so the access faults.
         Sabotage::HardFault => unsafe { core::ptr::write_volatile(0x4fff_fffc as *mut u32, 0) },
         Sabotage::StackOverflow => {
             dig(1);

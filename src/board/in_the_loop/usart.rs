@@ -1,4 +1,5 @@
-//! Channels to the host as serial lines: USART1 for the pins, USART2 for the serial line. Slow, but boards have them.
+//! Channels to the host as serial lines: USART1 for the pins, USART2 for the serial line. Slow, but real boards have
+//! them, too.
 
 use stm32f4xx_hal::pac::{USART1, USART2};
 

@@ -4,7 +4,8 @@ use super::{Controller, LawState, Mode, MotorCommand};
 use crate::control::motion::Course;
 
 impl<const NX: usize, const NY: usize> Controller<'_, NX, NY> {
-    /// First half of a tick of a started controller, as [`control_with`](Self::control_with), but on `course`:
+    /// First half of a tick of a started controller that follows a planned motion: as
+    /// [`control_with`](Self::control_with), but with the reference and the gains of `course`:
     ///
     /// ```text
     /// e = y - C x̂⁻,   x̂ = x̂⁻ + L_k e,   u = sat(u_k - K_k (x̂ - x_k))
@@ -35,8 +36,8 @@ impl<const NX: usize, const NY: usize> Controller<'_, NX, NY> {
         self.drive(requested)
     }
 
-    /// Second half of such a tick: calls `finish` as [`predict_with`](Self::predict_with) does; then `predict` replaces
-    /// the state by the one a tick later, with the given force (N) held.
+    /// Second half of such a tick: calls `finish` as [`predict_with`](Self::predict_with) does; then `predict`
+    /// replaces the estimate by the one a tick later, with the given force (N) held.
     #[inline(always)]
     pub fn predict_on_course(
         &mut self,
@@ -51,7 +52,8 @@ impl<const NX: usize, const NY: usize> Controller<'_, NX, NY> {
         predict(estimate, self.applied);
     }
 
-    /// Takes whole turns off the joints: from now on, the counter readings `raw` are the positions `counts`.
+    /// Removes whole turns from the joints: from now on, the counter readings `raw` stand for the positions `counts`,
+    /// and the estimate is shifted by as much.
     pub fn unwind(&mut self, raw: &[u32; NY], counts: &[i32; NY]) {
         if let Mode::Running(observer) = &self.mode {
             let (measured, step) = (&observer.gains.measured, &observer.gains.step);
@@ -65,14 +67,14 @@ impl<const NX: usize, const NY: usize> Controller<'_, NX, NY> {
         self.encoders.home(raw, counts);
     }
 
-    /// Moves the governed set-point on, and gives it (m).
+    /// Moves the governed set-point by one tick towards the requested one, and returns it (m).
     pub fn govern(&mut self) -> f32 {
         self.state.govern(self.target, self.gains.setpoint_step);
         self.state.setpoint
     }
 
-    /// Hands over to the control law, with the governed set-point at `setpoint_m` (m): the next tick is one of
-    /// [`control_with`](Self::control_with).
+    /// Hands over to the control law, with the governed set-point at `setpoint_m` (m), no integral and no pending
+    /// force. The next tick has to be one of [`control_with`](Self::control_with).
     pub fn hand_over(&mut self, setpoint_m: f32) {
         self.state = LawState { setpoint: setpoint_m, ..LawState::default() };
     }

@@ -33,7 +33,8 @@ pub(crate) fn paper_at(period_s: f64, delay_ticks: u8) -> Rig {
     rig
 }
 
-/// The same as [`table`], but steps of the set-point pass unshaped: the law alone, as the paper simulates it.
+/// The same as [`table`], but without the governor, which shapes steps of the set-point: the law alone, as the paper
+/// simulates it.
 pub(crate) fn raw_table(rig: &Rig) -> TableValues {
     table(rig).without_governor()
 }

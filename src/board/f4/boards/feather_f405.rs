@@ -3,8 +3,8 @@
 use super::super::wiring::{Mode, Signal, Wire, encoder, output, wire};
 use super::{BoardData, Chip, Source};
 
-/// All at the edge of the board, under the names printed there. Only two timers have both encoder inputs there beside
-/// the break input, so it counts the cart and one link.
+/// All pins are at the edge of the board, under the names printed there. Besides the break input, only two timers have
+/// both encoder inputs there, so this board counts the cart and one link.
 const WIRING: [Wire; 15] = [
     encoder(0, b'A', b'C', 6, 2, "TIM3_CH1"),
     encoder(0, b'B', b'C', 7, 2, "TIM3_CH2"),

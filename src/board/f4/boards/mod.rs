@@ -1,5 +1,4 @@
-//! The boards, one file each: all that the image has to know about a board. A cargo feature of the same name selects
-//! one.
+//! The boards, one file each. The cargo feature with the name of a board selects it.
 
 #[allow(dead_code, reason = "only one board is selected")]
 mod discovery_f407;
@@ -14,19 +13,19 @@ mod weact_f405;
 
 use super::wiring::Wire;
 
-/// A board.
+/// What the image has to know about a board, and what the documentation says about it.
 pub(crate) struct BoardData {
     /// Name of the board and of the cargo feature.
     #[cfg_attr(target_os = "none", allow(dead_code, reason = "for the table of the documentation"))]
     pub(crate) name: &'static str,
-    /// What is printed on it.
+    /// Product name.
     #[cfg_attr(target_os = "none", allow(dead_code, reason = "for the table of the documentation"))]
     pub(crate) title: &'static str,
-    /// The microcontroller's type, which the image checks.
+    /// Type of the microcontroller, which the image checks at start-up.
     pub(crate) chip: Chip,
-    /// Frequency at HSE (Hz), a multiple of 1 MHz; the image measures it.
+    /// Frequency at HSE (Hz), a multiple of 1 MHz; the image measures it at start-up.
     pub(crate) crystal_hz: u32,
-    /// Where the clock at HSE comes from, in the order in which it is tried.
+    /// Sources of the clock at HSE, in the order in which they are tried.
     pub(crate) sources: &'static [Source],
     /// The pins, except that of the status LED.
     pub(crate) wiring: &'static [Wire],
@@ -34,30 +33,30 @@ pub(crate) struct BoardData {
     pub(crate) status_led: Wire,
     /// Whether the status LED is on while its pin is low.
     pub(crate) status_led_is_low: bool,
-    /// Supply voltage of the power stage over the voltage at its pin.
+    /// Ratio of the power stage's supply voltage to the voltage at the pin that measures it.
     pub(crate) supply_divider: f32,
-    /// The microcontroller's supply (V), for a chip without the factory's reading of its reference.
+    /// Supply voltage of the microcontroller (V), for a chip without a valid factory calibration of its reference.
     pub(crate) reference_v: f32,
-    /// What else a user has to know.
+    /// Anything else that a user has to know.
     #[cfg_attr(target_os = "none", allow(dead_code, reason = "for the table of the documentation"))]
     pub(crate) special: &'static str,
 }
 
-/// A type of microcontroller.
+/// A type of microcontroller, with its device identifier (DBGMCU_IDCODE).
 #[derive(Clone, Copy)]
 pub(crate) enum Chip {
-    /// STM32F405 and STM32F407, which their identifier does not tell apart.
+    /// STM32F405 and STM32F407, which share an identifier.
     F405OrF407 = 0x413,
     /// STM32F446.
     F446 = 0x421,
 }
 
-/// Where the clock at HSE comes from.
+/// Source of the clock at HSE.
 #[derive(Clone, Copy, PartialEq)]
 pub(crate) enum Source {
     /// A crystal.
     Crystal,
-    /// A clock from outside: the oscillator is bypassed.
+    /// An external clock signal: the oscillator is bypassed.
     Clock,
 }
 
