@@ -7,7 +7,8 @@ use std::sync::atomic::{AtomicUsize, Ordering::Relaxed};
 
 use rayon::prelude::*;
 
-/// Progress callback: called with a stage's name and number of steps before the stage, and with `None` after each step.
+/// Progress callback: called with a stage's name and number of steps before the stage, and with `None` after each
+/// step.
 pub type Progress<'a> = &'a (dyn Fn(Option<(&str, u64)>) + Sync);
 
 /// Applies `one` to every item in parallel and returns the results in the order of the items.

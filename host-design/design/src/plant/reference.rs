@@ -65,7 +65,8 @@ pub fn integrate(
 /// DOP853 for a state of this type.
 type Method<Y> = ExplicitRungeKutta<Ordinary, DormandPrince, f64, Y, 8, 12, 16>;
 
-/// [`integrate`] without a type parameter from the caller, so that it is compiled once, with this crate's optimisation.
+/// [`integrate`] without a type parameter from the caller, so that it is compiled once, with this crate's
+/// optimisation.
 fn integrate_problem(
     problem: &Problem<'_>,
     start: &[f64],
@@ -150,8 +151,8 @@ impl ODE<f64, Small> for Problem<'_> {
     }
 }
 
-/// The state of a plant of up to four links, stored inline: a step creates hundreds of states, and allocating each would
-/// be slow.
+/// The state of a plant of up to four links, stored inline: a step creates hundreds of states, and allocating each
+/// would be slow.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Small {
     length: usize,

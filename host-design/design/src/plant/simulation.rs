@@ -34,7 +34,8 @@ pub trait Plant: Send {
     /// Mechanical energy (J); none for a linear model.
     fn energy(&self) -> Option<Energy>;
 
-    /// Speed of the motor, converted to speed of the cart (m/s), if a belt or backlash between them makes the two differ.
+    /// Speed of the motor, converted to speed of the cart (m/s), if a belt or backlash between them makes the two
+    /// differ.
     fn motor_speed(&self) -> Option<f64> {
         None
     }

@@ -42,8 +42,8 @@ pub trait ChainLanes: Send {
     fn write_state(&self, lane: usize, state: &mut [f64]);
 }
 
-/// Empty lanes for chains of `links` links. `None` unless there are 3 to 5 links: only these are simulated in thousands
-/// of runs, so only these are compiled for vectors.
+/// Empty lanes for chains of `links` links. `None` unless there are 3 to 5 links: only these are simulated in
+/// thousands of runs, so only these are compiled for vectors.
 pub fn chain_lanes(links: usize) -> Option<Box<dyn ChainLanes>> {
     match links {
         3 => Some(Box::new(Together::<3>::empty(Arch::new()))),

@@ -88,8 +88,8 @@ fn indexed(step: &str) -> (&str, Option<usize>) {
     }
 }
 
-/// The place of a new line `name = …`: below the occurrence `number` (from 0) of `header`, or at the top of the file if
-/// `header` is empty.
+/// The place of a new line `name = …`: below the occurrence `number` (from 0) of `header`, or at the top of the file
+/// if `header` is empty.
 fn new_line(text: &str, header: &str, number: usize, name: &str) -> Place {
     if header.is_empty() {
         return Place::New { at: 0, prefix: name.to_owned() };

@@ -18,8 +18,8 @@ pub(in crate::rig) static FRICTION: Section = Section {
 const NONE: Absent = Absent::Numbers(&[0.0]);
 
 keys! {
-    /// Known Coulomb friction, which the controller compensates, `[friction]`. The friction of the simulated machine is in
-    /// `[reality]`.
+    /// Known Coulomb friction, which the controller compensates, `[friction]`. The friction of the simulated machine
+    /// is in `[reality]`.
     pub struct KnownFriction {
         joint_n_m: PerJoint, "N·m", Rule::NOT_NEGATIVE.worded("a number >= 0, or one per joint"),
             "known Coulomb friction of each joint", NONE;

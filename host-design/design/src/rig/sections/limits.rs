@@ -16,8 +16,8 @@ pub(in crate::rig) static LIMITS: Section = Section {
 };
 
 keys! {
-    /// Limits of the rig and times of the supervisor, `[limits]`. A limit that is not given is derived from other values
-    /// when the gain table is made.
+    /// Limits of the rig and times of the supervisor, `[limits]`. A limit that is not given is derived from other
+    /// values when the gain table is made.
     pub struct Limits {
         angle_rad: Option<f64>, "rad", Rule::ANGLE,
             "largest angle of a link from upright; the governor uses half of it",
@@ -31,7 +31,7 @@ keys! {
         travel_tolerance_m: Option<f64>, "m", Rule::POSITIVE,
             "allowed difference between the length of travel_m and the distance between the limit switches",
             Absent::Follows("1 % of the rail");
-        // Skipped if absent, so that a rig without it keeps the hash by which stored motions and gain tables identify it.
+        // Skipped if absent: a rig without it keeps the hash by which stored motions and gain tables identify it.
         #[serde(skip_serializing_if = "Option::is_none")]
         bench_force_n: Option<f64>, "N", Rule::POSITIVE,
             "largest force of the bench drive; at most force_limit_n is used",

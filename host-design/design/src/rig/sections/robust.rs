@@ -17,8 +17,8 @@ pub(in crate::rig) static ROBUST: Section = Section {
 };
 
 const NONE: Absent = Absent::Numbers(&[0.0]);
-/// Largest accepted error of the masses (%) and latency (ticks): twice these values, which the front tries, can still be
-/// simulated.
+/// Largest accepted error of the masses (%) and latency (ticks): twice these values, which the front tries, can still
+/// be simulated.
 const MOST: [f64; 2] = [45.0, 0.3];
 
 keys! {

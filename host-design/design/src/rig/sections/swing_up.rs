@@ -18,8 +18,8 @@ pub(in crate::rig) static SWING_UP: Section = Section {
 const DURATION: Rule = Rule::DURATION.worded("a number > 0 and <= 60 (s), shortest_s at most longest_s");
 
 keys! {
-    /// Limits of the planned motions, and the errors that they have to stand. They change no gain, so they are not part
-    /// of the rig's hash.
+    /// Limits of the planned motions, and the errors that they have to withstand. They change no gain, so they are not
+    /// part of the rig's hash.
     pub struct SwingUpRules {
         shortest_s: Option<f64>, "s", DURATION,
             "shortest duration of a motion that is tried", Absent::Follows("9 √(L/g) for links of total length L");
