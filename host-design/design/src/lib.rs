@@ -8,7 +8,7 @@
 //! |---|---|---|
 //! | [`rig`] | a file in TOML | checked values in SI units |
 //! | [`plant`] | masses, lengths, friction | equations of motion, linear model |
-//! | [`reality`] | plant, `[reality]` of the rig | the plant with friction, backlash and sensor errors |
+//! | [`reality`] | plant, `[reality]` of the rig | the plant with friction, backlash, sensor and driver errors |
 //! | [`design`] | linear model, weights, poles, noise | certified gains and observer |
 //! | [`table`] | gains and limits | the gain table of the firmware, as values and as Rust source |
 //! | [`simulate`] | table and scenario | a run of the firmware's controller against the nonlinear plant |

@@ -167,7 +167,7 @@ impl Record {
             if telemetry.tick != expected {
                 return Err(HarnessError::Lost(expected));
             }
-            // Drop the ticks that have no telemetry of their own.
+            // The ticks in between have no telemetry of their own.
             let older = |first: &Pending| (first.number.wrapping_sub(telemetry.tick) as i32) < 0;
             while self.pending.front().is_some_and(older) {
                 self.pending.pop_front();

@@ -44,7 +44,7 @@ pub use parameters::ChainParameters;
 pub use simulation::{ChainSimulation, Plant, WithLinks, chain_plant, with_links};
 pub use together::{ChainLanes, LANES, chain_lanes};
 
-/// Why a plant cannot be built: the number of links.
+/// Why the plant of a chain cannot be built.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum PlantError {
     /// The number of links in the type is not that of the chain.

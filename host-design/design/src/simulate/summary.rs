@@ -14,7 +14,7 @@ use crate::rig::{PlantDescription, Rig};
 pub struct Fall {
     /// Time of the fall (s).
     pub at_s: f64,
-    /// What fell or failed.
+    /// Kind of the fall.
     pub kind: FallKind,
 }
 
@@ -70,8 +70,8 @@ impl fmt::Display for Fall {
     }
 }
 
-/// Figures of one run. The settling band is 2 % of the step around the set-point, and at least 1 mm (of the output, for
-/// a model).
+/// Figures of one run. The settling band is 2 % of the step around the set-point, and at least 1 mm (of the output,
+/// for a model).
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Summary {
     /// The loss of balance, if there was one.

@@ -73,7 +73,7 @@ impl Serialize for TableValues {
     }
 }
 
-/// Why no table can be made of a design.
+/// Why no table can be made from a design.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum NoTable {
     /// The rig file asks for no control law.

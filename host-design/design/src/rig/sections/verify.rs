@@ -17,8 +17,8 @@ const NOT_REQUIRED: Absent = Absent::Follows("not required");
 keys! {
     /// Thresholds of the trust report. They change no gain, so they are not part of the rig's hash.
     ///
-    /// The disturbances of the simulated runs can be set apart from the noise of `[kalman]`, because the observer's
-    /// noise may have been raised deliberately to make it robust.
+    /// The disturbances of the simulated runs can be set separately from the noise of `[kalman]`, because the
+    /// observer's noise may have been raised deliberately to make it robust.
     pub struct Requirements {
         gain_margin: f64, "", Rule::POSITIVE,
             "least factor by which the loop's gain may be too large, and too small", Absent::Numbers(&[1.2]);
