@@ -1,5 +1,5 @@
-//! The person at the rig: homes, checks the signs and the motor, then raises the links and holds them upright until
-//! the motor is on, or lets them hang for the swing-up.
+//! The person at the rig: homes, checks the signs and the motor, then raises the links and holds them upright until the
+//! motor is on, or lets them hang for the swing-up.
 
 use upright::board::Output;
 use upright::control::actuator::Drive;

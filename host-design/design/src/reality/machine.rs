@@ -107,9 +107,9 @@ impl<const N: usize> RealChain<N> {
         Ok(machine)
     }
 
-    /// Longest integration step (s) that resolves the fastest contact; infinite without one. The sum of stiffness
-    /// times mobility over all contacts bounds the square of the highest natural frequency (the trace bounds the
-    /// largest eigenvalue).
+    /// Longest integration step (s) that resolves the fastest contact; infinite without one. The sum of stiffness times
+    /// mobility over all contacts bounds the square of the highest natural frequency (the trace bounds the largest
+    /// eigenvalue).
     pub fn longest_step_s(&self) -> f64 {
         self.longest_step_s
     }

@@ -29,8 +29,8 @@ pub fn simulate(
     Ok((trace, summary))
 }
 
-/// As [`simulate`], but without a record: `observe` is called in every tick. The plant is that of `rig`, which need
-/// not be the one that the table was designed for.
+/// As [`simulate`], but without a record: `observe` is called in every tick. The plant is that of `rig`, which need not
+/// be the one that the table was designed for.
 ///
 /// # Errors
 /// As for [`simulate`].

@@ -70,8 +70,8 @@ impl fmt::Display for Fall {
     }
 }
 
-/// Figures of one run. The settling band is 2 % of the step around the set-point, and at least 1 mm (of the output,
-/// for a model).
+/// Figures of one run. The settling band is 2 % of the step around the set-point, and at least 1 mm (of the output, for
+/// a model).
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Summary {
     /// The loss of balance, if there was one.
