@@ -1,7 +1,7 @@
 //! Time of one derivative of the nonlinear plant, for chains of 1 to 8 links, and of one second of simulation:
 //! `cargo bench -p upright-design --bench plant`.
 
-#![allow(missing_docs)] // of a function that criterion's macro makes
+#![allow(missing_docs)] // criterion's macro generates a public function without documentation
 
 use std::hint::black_box;
 use std::time::Duration;
@@ -10,7 +10,7 @@ use criterion::{BenchmarkGroup, Criterion, criterion_group, criterion_main, meas
 use upright_design::plant::{ChainPlant, ChainState, chain_plant};
 use upright_design::rig::{Cart, Chain, Link};
 
-/// Uniform rods like the paper's, with friction so that no term is free.
+/// Uniform rods like the paper's, with friction, so that no term vanishes.
 fn rods(links: usize) -> Chain {
     let link = |i: usize| Link {
         mass_kg: 0.1,
@@ -44,7 +44,7 @@ fn derivative<const N: usize>(group: &mut BenchmarkGroup<'_, WallTime>) {
     });
 }
 
-/// A second at a tick of 1 ms with four Runge–Kutta steps each, as a closed-loop simulation runs it.
+/// One second in ticks of 1 ms with four Runge–Kutta steps each, as a closed-loop simulation runs it.
 fn simulated_second(group: &mut BenchmarkGroup<'_, WallTime>, links: usize) {
     let mut plant = chain_plant(&rods(links)).expect("a supported size");
     let torques = vec![0.0; links];

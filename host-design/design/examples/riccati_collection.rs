@@ -4,10 +4,10 @@
 //! cargo run --release -p upright-design --example riccati_collection -- COLLECTION.json …
 //! ```
 //!
-//! A collection is a JSON array of objects with `id`, matrices `A`, `B`, `Q`, `R` as row arrays, an optional `S`
-//! (its presence makes the problem a sampled one), the known gain `K` (from 1000 bits), and `degenerate` for problems
-//! whose closed loop lies on the stability boundary. Exit status 1 if the gain of any non-degenerate problem is not
-//! correctly rounded.
+//! A collection is a JSON array of objects with `id`, matrices `A`, `B`, `Q`, `R` as arrays of rows, an optional `S`
+//! (its presence makes the problem a sampled one), the known gain `K` (computed with 1000 bits), and `degenerate` for
+//! problems whose closed loop lies on the stability boundary. Exit status 1 if the gain of any non-degenerate problem
+//! is not correctly rounded.
 
 use std::process::ExitCode;
 use std::time::Instant;
@@ -57,7 +57,8 @@ impl Problem {
             .collect()
     }
 
-    /// Doubles the precision until two in a row round to the same gain; with it, the bits of the first of them.
+    /// Doubles the precision until two in a row round to the same gain; returns it with the lower of the two
+    /// precisions (bits).
     fn certified_gain(&self) -> Result<(Vec<Vec<f64>>, usize), NoStabilisingSolution> {
         let mut before = Err(NoStabilisingSolution);
         for bits in [256, 512, 1024, 2048] {

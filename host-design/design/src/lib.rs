@@ -8,16 +8,16 @@
 //! |---|---|---|
 //! | [`rig`] | a file in TOML | checked values in SI units |
 //! | [`plant`] | masses, lengths, friction | equations of motion, linear model |
-//! | [`reality`] | plant, `[reality]` of the rig | the plant as it really is: friction, play, errors of sensors and driver |
+//! | [`reality`] | plant, `[reality]` of the rig | the plant with friction, backlash, sensor and driver errors |
 //! | [`design`] | linear model, weights, poles, noise | certified gains and observer |
 //! | [`table`] | gains and limits | the gain table of the firmware, as values and as Rust source |
 //! | [`simulate`] | table and scenario | a run of the firmware's controller against the nonlinear plant |
 //! | [`harness`] | a target and a scenario | a run of the whole firmware, from power-up on |
-//! | [`identify`] | logs of a machine that is shaken | its parameters, with deviations |
+//! | [`identify`] | logs of a machine under excitation | its parameters, with standard deviations |
 //! | [`swing_up`] | rig file | motions from hanging to upright and back, with their gains |
 //! | [`verify`] | table and requirements | the trust report |
-//! | [`robust`] | rig file and tolerances | weights, poles and noise that stand them |
-//! | [`study`] | a function of a run's number | outcomes of all runs, made here or split over machines |
+//! | [`robust`] | rig file and tolerances | weights, poles and noise that withstand them |
+//! | [`study`] | a function of a run's number | outcomes of all runs, computed here or split over several machines |
 //!
 //! The control law itself is not here: a simulation runs the firmware's own controller from the crate `upright`.
 

@@ -1,11 +1,11 @@
-//! Numbers as text for reading.
+//! Numbers formatted for people to read.
 
 /// `x` rounded to `digits` significant digits.
 pub fn rounded(x: f64, digits: usize) -> f64 {
     format!("{x:.*e}", digits.saturating_sub(1)).parse().unwrap_or(x)
 }
 
-/// `x` with `digits` significant digits; with an exponent below 1e-4 and from 1e6 on.
+/// `x` as text with `digits` significant digits; in exponent form if its magnitude is below 1e-4 or at least 1e6.
 pub fn significant(x: f64, digits: usize) -> String {
     let rounded = rounded(x, digits);
     if rounded == 0.0 {
@@ -17,8 +17,8 @@ pub fn significant(x: f64, digits: usize) -> String {
     }
 }
 
-/// Poles `[re, im]`, each conjugate pair once, as `re±imi`. What rounding leaves of a pole at the origin is shown as
-/// 0.
+/// Poles `[re, im]` as text, each conjugate pair once, as `re±imi`. A pole of magnitude below 1e-60 is a pole at the
+/// origin plus rounding error and is shown as 0.
 pub fn poles(poles: &[[f64; 2]], digits: usize) -> Vec<String> {
     let upper = poles.iter().filter(|pole| pole[1] >= 0.0);
     upper

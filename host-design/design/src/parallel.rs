@@ -1,16 +1,17 @@
 //! Independent computations, spread over all processors.
 //!
-//! The threads are rayon's. Its own iterators are compiled again for each use; these functions share one loop.
+//! The threads are rayon's. Its own iterators are compiled again for each use; the functions here share one loop.
 
 use std::sync::OnceLock;
 use std::sync::atomic::{AtomicUsize, Ordering::Relaxed};
 
 use rayon::prelude::*;
 
-/// Is called with the name of a stage and the number of its steps, and with none after each step.
+/// Progress callback: called with a stage's name and number of steps before the stage, and with `None` after each
+/// step.
 pub type Progress<'a> = &'a (dyn Fn(Option<(&str, u64)>) + Sync);
 
-/// What `one` gives for each item, in the order of the items.
+/// Applies `one` to every item in parallel and returns the results in the order of the items.
 pub fn map<I, T>(items: impl IntoIterator<Item = I>, one: impl Fn(I) -> T + Sync) -> Vec<T>
 where
     I: Copy + Sync,
@@ -24,10 +25,10 @@ where
     results.into_iter().filter_map(OnceLock::into_inner).collect()
 }
 
-/// As [`map`], for computations that may fail. After an error, items behind it are left out.
+/// As [`map`], for computations that may fail. Once an item has failed, later items are skipped.
 ///
 /// # Errors
-/// That of the first item that has one.
+/// The error of the first item that fails, in the order of the items.
 pub fn try_map<I, T, E>(
     items: impl IntoIterator<Item = I>,
     one: impl Fn(I) -> Result<T, E> + Sync,
@@ -49,10 +50,10 @@ where
     results.into_iter().flatten().collect()
 }
 
-/// As [`try_map`], with up to `size` items for each computation.
+/// As [`try_map`], but each call of `batch` takes up to `size` consecutive items and returns their results.
 ///
 /// # Errors
-/// That of the first batch that has one.
+/// The error of the first batch that fails, in the order of the items.
 pub fn try_map_in_batches<I, T, E>(
     items: &[I],
     size: usize,
@@ -67,12 +68,12 @@ where
     Ok(batches.into_iter().flatten().collect())
 }
 
-/// The results of two computations at the same time.
+/// Runs two computations in parallel and returns both results.
 pub fn both<A: Send, B: Send>(a: impl FnOnce() -> A + Send, b: impl FnOnce() -> B + Send) -> (A, B) {
     rayon::join(a, b)
 }
 
-/// Calls `one` for 0 to `count` - 1. Each call is a task of its own: they may take very different times.
+/// Calls `one` for 0 to `count` - 1. Each call is a separate task, because their durations may differ widely.
 fn for_each(count: usize, one: &(dyn Fn(usize) + Sync)) {
     (0..count).into_par_iter().with_max_len(1).for_each(one);
 }

@@ -23,8 +23,8 @@ pub struct Certified {
     pub bits: [usize; 2],
 }
 
-/// A design at one precision, rounded as a certified one but without proof: to sort designs by, and to try them.
-/// Those that are only tried have no gains for continuous time.
+/// A design at one precision, rounded like a certified one but not certified: for ranking designs and for trials.
+/// Those for trials have no gains for continuous time.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Uncertified {
     pub(crate) double: Design<f64>,
@@ -44,7 +44,7 @@ impl Uncertified {
         Self { double: design.rounded(Wide::round_to_f64), single: design.rounded(Wide::round_to_f32) }
     }
 
-    /// This design with the law `law` of `other`, a design for the same plant.
+    /// This design with `law` taken from `other`, a design for the same plant.
     pub(crate) fn with_law_of(mut self, law: Law, other: &Self) -> Self {
         self.double.sampled.exchange(law, &other.double.sampled);
         self.single.sampled.exchange(law, &other.single.sampled);
@@ -68,7 +68,7 @@ impl<T: Clone> Laws<T> {
     }
 }
 
-/// The first precision (bits).
+/// The first precision that is tried (bits).
 const FIRST_BITS: usize = 256;
 
 /// A design at one precision and its poles.
@@ -88,8 +88,8 @@ fn certified((design, poles): (Uncertified, DesignPoles), bits: usize) -> Certif
 /// Designs what `rig` asks for and certifies it.
 ///
 /// # Errors
-/// [`DesignError`] with a reason on which two precisions agree; [`DesignError::Disagreement`] if even the two highest
-/// precisions give different gains.
+/// [`DesignError`] with the reason on which two precisions agree; [`DesignError::Disagreement`] if even the two
+/// highest precisions give different gains.
 #[doc(alias = "lqr")]
 #[doc(alias = "dlqr")]
 #[doc(alias = "acker")]
@@ -119,7 +119,7 @@ pub fn design(rig: &Rig) -> Result<Certified, DesignError> {
 fn agree(low: &Result<Uncertified, DesignError>, high: &Attempt) -> bool {
     match (low, high) {
         (Ok(low), Ok((high, _))) => low == high,
-        // A failure to resolve the problem is no agreement: more bits may help.
+        // A failure to resolve the problem does not count as agreement: more bits may help.
         (_, Err(DesignError::Unresolved { .. } | DesignError::NoKalman { .. })) => false,
         (Err(low), Err(high)) => core::mem::discriminant(low) == core::mem::discriminant(high),
         _ => false,

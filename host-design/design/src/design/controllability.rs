@@ -1,8 +1,8 @@
-//! Which modes an input can reach.
+//! Controllability: which modes the inputs can reach.
 
 use crate::numerics::{Complex, Matrix, NoConvergence, Real, eigenvalues};
 
-/// The state space, split into what the inputs reach and the rest.
+/// The state space, split into the controllable subspace and the rest.
 #[derive(Debug, Clone)]
 #[doc(alias = "ctrb")]
 #[doc(alias = "obsv")]

@@ -18,7 +18,7 @@ pub(super) fn why_no_placement<R: Real>(task: Task, a: &Matrix<R>, b: &Matrix<R>
 
 /// Why a regulator does not exist.
 pub(super) fn why_no_lqr<R: Real>(task: Task, a: &Matrix<R>, b: &Matrix<R>, cost: &Cost<R>) -> DesignError {
-    // A quarter of the bits: a repeated mode is known only to that many.
+    // An eighth of the bits: a k-fold mode is known only to about bits / k.
     let fuzz = R::one().scale_by_power_of_two(-(R::bits() as i32) / 8);
     // How far outside the stability region a mode lies, relative to the size of the plant.
     let excess = |mode: &Complex<R>| {

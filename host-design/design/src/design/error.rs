@@ -49,7 +49,7 @@ pub enum DesignError {
     /// Poles cannot be placed because the force does not reach some modes.
     #[error("{task}: the force does not reach {}: these poles cannot be moved; choose another input b, or use [lqr] alone if they are stable", mode_list(.modes))]
     Uncontrollable {
-        /// Which design.
+        /// The design that failed.
         task: Task,
         /// The modes that the force does not reach, [re, im].
         modes: Vec<[f64; 2]>,
@@ -57,7 +57,7 @@ pub enum DesignError {
     /// The force does not reach an unstable mode.
     #[error("{task}: no stabilising gain exists: the force does not reach {}, and it does not decay by itself; choose another input b", mode_list(.modes))]
     NotStabilisable {
-        /// Which design.
+        /// The design that failed.
         task: Task,
         /// The modes that the force does not reach, [re, im].
         modes: Vec<[f64; 2]>,
@@ -65,7 +65,7 @@ pub enum DesignError {
     /// A mode on the stability boundary carries no weight.
     #[error("{task}: no stabilising gain exists: {} on the stability boundary costs nothing; give a state that shows it a positive entry in lqr.state_weights", mode_list(.modes))]
     Unweighted {
-        /// Which design.
+        /// The design that failed.
         task: Task,
         /// The modes without weight, [re, im].
         modes: Vec<[f64; 2]>,
@@ -84,7 +84,7 @@ pub enum DesignError {
         /// Working precision (bits).
         bits: usize,
     },
-    /// The number of poles is not the number of states.
+    /// The number of poles differs from the number of states.
     #[error("pole_placement: {given} poles were given for {wanted} states; give exactly {wanted}")]
     PoleCount {
         /// Poles in the rig file.
@@ -104,12 +104,12 @@ pub enum DesignError {
         /// Growth `e^(pT)` within one tick.
         growth: f64,
     },
-    /// No solution was found, for an unknown reason.
+    /// No solution was found, and the diagnosis found no reason.
     #[error(
         "{task}: no stabilising solution could be resolved with {bits} bits: the problem is degenerate (a closed-loop pole on the stability boundary) or extremely badly scaled; check weights and units"
     )]
     Unresolved {
-        /// Which design.
+        /// The design that failed.
         task: Task,
         /// Working precision (bits).
         bits: usize,

@@ -4,16 +4,16 @@ use super::synthesis::{Design, Feedback};
 use crate::numerics::Matrix;
 use crate::rig::{PlantDescription, Rig, defaults};
 
-/// Share of the angle and force limits that a motion of the set-point may use; the rest is for disturbances.
+/// Share of the angle and force limits that a motion of the set-point may use; the rest is left for disturbances.
 const SHARE: f64 = 0.5;
 
-/// Largest change of the set-point per tick (m). In the linear model it keeps every link and the force within half of
-/// their limits, however the set-point moves. None if the plant is not a chain, or if no such bound is found.
+/// Largest change of the set-point per tick (m). In the linear model, every link and the force then stay within half
+/// of their limits, whatever path the set-point takes. None if the plant is not a chain, or if no such bound is found.
 ///
 /// The set-point's path is a sum of small steps, one per tick, and the response is the same sum of step responses:
 /// `|θ(k)| <= step · Σ_j |s(j)|` with the unit step response s of the design's own sampled loop. The paper says that a
-/// criterion for keeping the states in their linear zone is missing; this is one. It holds for every path and needs
-/// one number in the table.
+/// criterion for keeping the states in their linear zone is missing; this is such a criterion. It holds for every path
+/// and needs one number in the table.
 #[doc(alias = "reference_governor")]
 #[doc(alias = "command_governor")]
 pub fn setpoint_step(rig: &Rig, design: &Design<f64>, law: &Feedback<f64>) -> Option<f64> {

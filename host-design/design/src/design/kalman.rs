@@ -25,7 +25,7 @@ pub struct Kalman<T> {
 
 /// Kalman gains and the relative residual of their Riccati equation. Process noise has the intensities in `noise`,
 /// enters through the columns of `inputs` and is integrated over one tick (Van Loan). Each sensor has a rounding error
-/// of the variance that [`rounding_variances`] gives.
+/// with the variance of [`rounding_variances`].
 ///
 /// The error covariance P of the prediction solves the sampled Riccati equation of (Adᵀ, Cᵀ);
 /// `L = P Cᵀ (C P Cᵀ + R)⁻¹` (Anderson & Moore, *Optimal Filtering*, chapter 4).
@@ -68,14 +68,14 @@ pub(super) fn kalman<R: Real>(
     Ok((gains, solution.residual))
 }
 
-/// Shortest tick (s) in which the counts of a chain's encoder round anew.
+/// Shortest tick (s) for which the rounding errors of successive counts of a chain's encoder are taken as independent.
 const WHITE_S: f64 = 1e-3;
 
 /// Variance of each sensor's rounding error, `step²/12`.
 ///
-/// The filter takes the errors of successive ticks as independent. In ticks below 1 ms a link near rest often keeps its
-/// count, and with it the error: measured twice as often, it says no more. So the variance of a chain's encoders is
-/// larger by 1 ms over the tick, which keeps variance times tick.
+/// The filter takes the errors of successive ticks as independent. With ticks below 1 ms a link near rest often keeps
+/// its count, and with it the error: sampling more often then adds no information. So the variance of a chain's
+/// encoders is multiplied by 1 ms over the tick, which keeps the product of variance and tick constant.
 pub(super) fn rounding_variances<R: Real>(rig: &Rig, steps: &[R]) -> Vec<R> {
     let twelve = R::from_f64(12.0);
     let is_correlated = matches!(rig.plant, PlantDescription::Chain(_)) && rig.tick.period_s < WHITE_S;

@@ -74,7 +74,7 @@ impl<R: Real> Design<R> {
     }
 }
 
-/// Poles of each closed loop, where designed. If there is a delay, the pending force is a further state.
+/// Poles of each closed loop that was designed. If there is a delay, the pending force is a further state.
 #[derive(Debug, Clone, PartialEq)]
 pub struct DesignPoles {
     /// Poles of the continuous loops (1/s).

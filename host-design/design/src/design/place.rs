@@ -35,8 +35,8 @@ impl<R: Real> Pole<R> {
 /// The gain K, 1×s, with which `A - B K` has exactly these poles, for A s×s and B s×1. Repeated poles are allowed.
 ///
 /// Ackermann's formula `K = [0 … 0 1] [B AB … Aˢ⁻¹B]⁻¹ p(A)` (J. Ackermann, *Regelungstechnik* 20, 1972): useless in
-/// double precision beyond a few states, exact with bits to spare. The polynomial is applied to the row factor by
-/// factor, never expanded.
+/// double precision beyond a few states, but exact with enough bits. The polynomial is applied to the row factor by
+/// factor and never expanded.
 ///
 /// # Errors
 /// [`Singular`]: the pair (A, B) is not controllable, or working precision cannot tell.

@@ -56,14 +56,14 @@ pub fn care<R: Real>(
     cost: &Cost<R>,
 ) -> Result<Regulator<R>, NoStabilisingSolution> {
     let r_inverse = solve(&cost.r, &Matrix::identity(cost.r.rows())).map_err(|_| NoStabilisingSolution)?;
-    // Without cross term: A - B R⁻¹ Sᵀ and Q - S R⁻¹ Sᵀ.
+    // Remove the cross term: A - B R⁻¹ Sᵀ and Q - S R⁻¹ Sᵀ.
     let s_r = &cost.s * &r_inverse;
     let a_free = a - &(&(b * &r_inverse) * &cost.s.transpose());
     let q_free = &cost.q - &(&s_r * &cost.s.transpose());
     let g = (&(b * &r_inverse) * &b.transpose()).symmetric_part();
 
     for x_0 in solution_shifts::<R>(a.rows()) {
-        // X = X₀ + Y moves the linear and constant terms.
+        // With X = X₀ + Y, only the linear and constant terms change.
         let g_x = &g * &x_0;
         let a_shifted = &a_free - &g_x;
         let q_shifted = &(&q_free + &(&a_free.transpose() * &x_0)) + &(&(&x_0 * &a_free) - &(&x_0 * &g_x));
@@ -80,8 +80,8 @@ pub fn care<R: Real>(
     Err(NoStabilisingSolution)
 }
 
-/// Shifts γ > 0 around the size of the Hamiltonian's eigenvalues. Fixed fractions of 1 would hit an eigenvalue of some
-/// plant exactly (a shift of 1 does, on textbook examples): these odd factors do not.
+/// Shifts γ > 0 around the size of the Hamiltonian's eigenvalues. A round number can equal an eigenvalue exactly (a
+/// shift of 1 does, on textbook examples); these odd factors do not.
 fn cayley_shifts<R: Real>(a: &Matrix<R>, g: &Matrix<R>, q: &Matrix<R>) -> Vec<R> {
     let product = (g.norm() * &q.norm()).sqrt();
     let size = a.norm().max(product);
@@ -135,7 +135,7 @@ pub fn dare<R: Real>(
 ) -> Result<Regulator<R>, NoStabilisingSolution> {
     let (a_t, b_t) = (a.transpose(), b.transpose());
     for x_0 in solution_shifts::<R>(a.rows()) {
-        // X = X₀ + Y: the same equation for Y with other weights.
+        // With X = X₀ + Y, Y solves the same equation with other weights.
         let shifted = Cost {
             q: &(&cost.q + &(&(&a_t * &x_0) * a)) - &x_0,
             r: &cost.r + &(&(&b_t * &x_0) * b),
@@ -174,8 +174,8 @@ fn relative<R: Real>(left: &Matrix<R>, terms: &[&Matrix<R>]) -> R {
     if size.is_zero() { left.norm() } else { left.norm() / &size }
 }
 
-/// At least half of the working bits are correct: enough to tell a solution from a failed iteration. Whether a gain is
-/// correct to the last bit of an `f64` is decided by repeating the design at twice the precision.
+/// Whether at least half of the working bits are correct: enough to tell a solution from a failed iteration. Whether a
+/// gain is correct to the last bit of an `f64` is decided by repeating the design at twice the precision.
 fn accurate<R: Real>(residual: &R) -> bool {
     *residual <= R::one().scale_by_power_of_two(-(R::bits() as i32) / 2)
 }

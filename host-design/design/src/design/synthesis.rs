@@ -17,11 +17,11 @@ use upright::table::{Equilibrium, PerLaw};
 #[doc(alias = "lqi")]
 #[doc(alias = "lqrd")]
 pub struct Design<T> {
-    /// `ẋ = A x + B u`, s×s.
+    /// A of `ẋ = A x + B u`, s×s.
     pub a: Matrix<T>,
     /// B, s×1.
     pub b: Matrix<T>,
-    /// `x⁺ = Ad x + Bd u` for a force held over one tick, s×s.
+    /// Ad of `x⁺ = Ad x + Bd u` for a force held over one tick, s×s.
     pub ad: Matrix<T>,
     /// Bd, s×1.
     pub bd: Matrix<T>,
@@ -44,10 +44,10 @@ pub struct Laws<T> {
     pub integral: Option<Feedback<T>>,
 }
 
-/// `u = N r - K x`.
+/// State feedback with precompensation, `u = N r - K x` for the set-point r.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Feedback<T> {
-    /// K, 1×s (or 1×(s+1) with a delay).
+    /// K, 1×s; one more entry each for integral action and for a delay.
     pub k: Matrix<T>,
     /// N; none if no constant force can hold the output away from 0.
     pub n: Option<T>,
@@ -56,7 +56,7 @@ pub struct Feedback<T> {
 }
 
 impl<R: Real> Feedback<R> {
-    /// The same with N times `share`. With an integral the output arrives all the same; the way there overshoots less.
+    /// The same with N times `share`. Integral action still brings the output to the set-point, with less overshoot.
     fn with_share_of_n(self, share: &R) -> Self {
         Self { n: self.n.map(|n| n * share), ..self }
     }
@@ -98,8 +98,8 @@ impl<R: Real> Design<R> {
         Ok(Self { continuous, ..Self::sampled_alone(rig, plant, &mut Vec::new())? })
     }
 
-    /// What the table needs, the gains for the tick, for a linear plant that need not be the rig's; records the
-    /// relative residual of each Riccati equation under the name of its gain.
+    /// Only what the table needs, the gains for the tick, for a linear plant that may differ from the rig's. Records
+    /// the relative residual of each Riccati equation under the name of its gain.
     pub(crate) fn sampled_alone(
         rig: &Rig,
         plant: LinearModel<R>,
@@ -272,7 +272,7 @@ fn placed<R: Real>(
 }
 
 /// Continuous feedback with N = -1 / (C (A - B K)⁻¹ B): the paper's equation for the precompensation gain. K is over
-/// x, or over [x; z]; N belongs to the part over x: with the right N the integral has nothing to do.
+/// x, or over [x; z]; N is computed from the part over x, because with the exact N the integral settles at 0.
 fn feedback<R: Real>(k: Matrix<R>, a: &Matrix<R>, b: &Matrix<R>, output: usize) -> Feedback<R> {
     let k_x = k.block(0, 0, 1, a.cols());
     let n = precompensation(&-&(a - &(b * &k_x)), b, output);

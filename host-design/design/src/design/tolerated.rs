@@ -1,20 +1,20 @@
-//! How far the innovation of a machine within the tolerances of `[robust]` can be off.
+//! Bounds on the innovation of a machine that is within the tolerances of `[robust]`.
 
 use super::zero_order_hold::zero_order_hold;
 use super::{Design, Kalman, continuous_plant};
 use crate::numerics::Matrix;
 use crate::rig::{PlantDescription, Rig};
 
-/// Growth of the innovation with the share by which masses are wrong. Measured, not derived: on the robust quadruple
-/// with all masses 5 % off and all friction, it reaches 1.11 of the bounds of friction and wrong zeros in 5 h of each
-/// law.
+/// Growth of the innovation per relative error of the masses. Measured, not derived: on the robust quadruple with all
+/// masses 5 % off and all friction, the innovation reaches 1.11 times the bounds for friction and wrong zeros in 5 h
+/// of each law.
 const MISMATCH: f64 = 6.0;
-/// A response is followed until it has decayed to this share of its start.
+/// A response is computed until it has decayed to this share of its start.
 const DECAYED: f64 = 1e-6;
-/// The longest response that is followed (ticks).
+/// Longest response that is computed (ticks).
 const LONGEST: usize = 100_000;
 
-/// Bounds on what friction and wrong zeros do to the innovation.
+/// Bounds on the effect of friction and wrong zeros on the innovation.
 ///
 /// The error of the prediction follows `ε⁺ = Ad (I - L C) ε + w`, whatever the law does. Dry friction is an unknown
 /// torque of at most F in each joint, and at most that force on the cart; a wrong zero δ of joint j is the constant
@@ -24,17 +24,17 @@ const LONGEST: usize = 100_000;
 pub(super) struct Tolerated {
     /// Bound on each sensor's innovation (m or rad).
     pub(super) innovation: Vec<f64>,
-    /// Bound on the sum of the observer's corrections of each sensor's position, with a memory (m or rad).
+    /// Bound on the decaying sum of the observer's corrections of each sensor's position (m or rad).
     pub(super) corrected: Vec<f64>,
     /// The same forces move a machine with lighter parts more, by up to this factor.
     pub(super) lighter: f64,
-    /// Factor for what the model gets wrong besides: how force and gravity move a machine with other masses.
+    /// Factor for the remaining model error: force and gravity move a machine with other masses differently.
     pub(super) mismatch: f64,
 }
 
 impl Tolerated {
     /// For the tolerances of `rig`, all 0 without `[robust]`; each tick keeps `keep` of the sum of the corrections.
-    /// None if the model has no plant.
+    /// None if the plant has no linear model.
     pub(super) fn of(rig: &Rig, design: &Design<f64>, kalman: &Kalman<f64>, keep: f64) -> Option<Self> {
         let sensors = kalman.steps.entries().len();
         let mut bounds = Self {
@@ -67,7 +67,7 @@ impl Tolerated {
         Some(bounds)
     }
 
-    /// Adds what an input of at most `largest` can do.
+    /// Adds the effect of an input of magnitude at most `largest`.
     fn add(
         &mut self,
         input: &Matrix<f64>,

@@ -1,4 +1,4 @@
-//! Why a firmware does not run, or does not do what it is asked for.
+//! Why a firmware does not run, or does not do what it is told.
 
 use upright::protocol::frame::FrameError;
 use upright::protocol::message::{Answer, PROTOCOL, Request};
@@ -13,10 +13,10 @@ pub enum HarnessError {
     /// The firmware refuses its table.
     #[error("the firmware refuses the table: {0}")]
     Table(#[from] TableError),
-    /// The simulated rig.
+    /// The simulated rig cannot be run.
     #[error(transparent)]
     Simulation(#[from] SimulationError),
-    /// The image has ended in mid-run.
+    /// The image in the emulator has stopped in mid-run.
     #[error("the image has stopped in mid-run (exit status {status}){message}")]
     Stopped {
         /// The emulator's exit status; −1 if it was killed.
@@ -24,22 +24,22 @@ pub enum HarnessError {
         /// What the emulator printed, after ": ".
         message: String,
     },
-    /// The virtual board, or what runs on it.
+    /// The virtual board stopped, saw no tick, or differs from the host; the text completes "the virtual board".
     #[error("the virtual board {0}")]
     Board(String),
-    /// A frame that cannot be read.
+    /// A frame from the firmware cannot be read.
     #[error("the firmware's answer cannot be read: {0}")]
     Frame(#[from] FrameError),
-    /// The target cannot do this.
+    /// The target does not support this.
     #[error("this is not possible where the firmware runs: {0}")]
     Unsupported(&'static str),
-    /// No answer within the ticks in which every command is answered.
+    /// No answer within the number of ticks in which the target answers every command.
     #[error("the firmware does not answer {0:?}")]
     NoAnswer(Request),
-    /// A command that the firmware refuses.
+    /// The firmware refuses a command.
     #[error("the firmware refuses {request:?}: {answer:?}")]
     Refused {
-        /// The command's request.
+        /// The request of the refused command.
         request: Request,
         /// The firmware's answer.
         answer: Answer,

@@ -33,30 +33,30 @@ impl Grasp {
         &self.held
     }
 
-    /// Takes hold of the rig in `state`, which goes on moving.
+    /// Takes hold of the rig in `state` and keeps its rates.
     pub fn take(&mut self, state: &[f64]) {
         self.held.copy_from_slice(state);
     }
 
-    /// Stops everything.
+    /// Sets all rates to 0.
     pub fn stop(&mut self) {
         self.held.iter_mut().skip(1).step_by(2).for_each(|rate| *rate = 0.0);
     }
 
-    /// Lets the links hang; the cart stays where it is. Gives whether they do.
+    /// Moves the links by one tick's step towards hanging; the cart stays where it is. Returns whether they hang.
     pub fn rest(&mut self) -> bool {
         self.move_to(&self.at_rest())
     }
 
-    /// The state in which the links hang and the cart is where it is.
+    /// The state in which the links hang and the cart stays where it is.
     pub fn at_rest(&self) -> Vec<f64> {
         let mut rest = self.hanging.clone();
         rest[0] = self.held[0];
         rest
     }
 
-    /// Lets the links hang, whatever whole turns they have made, and moves the cart to the middle; gives whether they
-    /// are there.
+    /// Moves the rig by one tick's step towards the cart at 0 and the links hanging, whatever whole turns they have
+    /// made; returns whether it is there.
     pub fn put_back(&mut self) -> bool {
         let nearest = |(hanging, held): (&f64, &f64)| hanging + whole_turns(held - hanging);
         let mut middle = self.hanging.clone();
@@ -65,7 +65,8 @@ impl Grasp {
         self.move_to(&middle)
     }
 
-    /// From now on the link of this sensor hangs a turn further, counter-clockwise, and the next one as before.
+    /// Moves the hanging position of the link of this sensor by one turn counter-clockwise; the next link hangs as
+    /// before.
     pub fn wind(&mut self, sensor: u8) {
         let joint = 2 * usize::from(sensor);
         self.hanging[joint] += TAU;
@@ -74,7 +75,7 @@ impl Grasp {
         }
     }
 
-    /// Turns the link of this sensor counter-clockwise, or pushes the cart (0) along +x.
+    /// Turns the link of this sensor by one tick's step counter-clockwise, or pushes the cart (0) along +x.
     pub fn turn(&mut self, sensor: u8) {
         if sensor == 0 {
             self.held[0] += self.step[1];
@@ -88,7 +89,7 @@ impl Grasp {
         }
     }
 
-    /// Moves every position towards `to`; gives whether all are there.
+    /// Moves every position by one tick's step towards `to`; returns whether all are there.
     pub fn move_to(&mut self, to: &[f64]) -> bool {
         let mut there = true;
         for (index, (held, &to)) in self.held.iter_mut().zip(to).enumerate().step_by(2) {

@@ -29,7 +29,7 @@ pub struct Status {
     pub state: State,
     /// Progress of the sign check.
     pub signs: Signs,
-    /// What is known of the motor's sign.
+    /// Progress of the check of the motor's sign.
     pub motor: MotorSign,
 }
 
@@ -40,8 +40,8 @@ pub struct Hand {
     turn_on: Request,
     grasp: Grasp,
     start: Vec<f64>,
-    /// The rig while the motor pushes the cart. It is not that of the run, whose random numbers and whose state must
-    /// not depend on how it was started.
+    /// A second rig, simulated while the motor pushes the cart: the random numbers and the state of the run's own rig
+    /// must not depend on how it was started.
     pushed: Bench,
     /// Ticks between two tries of the same request.
     retry_ticks: u32,
@@ -106,7 +106,7 @@ impl Hand {
         self.doing == Doing::Push
     }
 
-    /// What the hand does in tick number `tick`, before which the firmware has given `output`; `None` once the
+    /// What the hand does in tick number `tick`, when `output` was the firmware's last output; `None` once the
     /// controller commands the motor and the hand has let go.
     pub fn act(&mut self, tick: u32, status: &Status, output: &Output) -> Option<HandTick> {
         if status.state.controls() {
@@ -146,7 +146,7 @@ impl Hand {
         Some(HandTick { held: self.grasp.held().to_vec(), request })
     }
 
-    /// Repeats a request until it is `done`, then goes on with `then`.
+    /// Repeats a request until it is `done`, then continues with `then`.
     fn until(&mut self, done: bool, then: Doing, tick: u32, request: Request) -> Option<Request> {
         if done {
             self.doing = then;
@@ -168,7 +168,7 @@ impl Hand {
         }
     }
 
-    /// Lets the motor push the cart with all links free, and holds the key until it is known whether it does.
+    /// Lets the motor push the cart with all links free, and holds the key until the motor's sign is known.
     fn push(&mut self, tick: u32, status: &Status, output: &Output) -> Option<Request> {
         // A motor that is off turns freely.
         let drive = if output.enable { output.drive } else { Drive::Force(0.0) };

@@ -1,7 +1,7 @@
 //! The firmware in this process: the tasks of the image, one after the other.
 //!
-//! The numbers of states and sensors are parameters of the firmware's type, so each pair is compiled separately. Only
-//! what is in this file is; everything around a [`Target`] is compiled once.
+//! The numbers of states and sensors are parameters of the firmware's type, so each pair is compiled separately. This
+//! applies only to the code in this file; everything around a [`Target`] is compiled once.
 
 use heapless::spsc::Queue;
 use upright::board::{Board, Inputs, Output};
@@ -18,7 +18,7 @@ use super::target::{Pins, Target};
 use crate::simulate::{Bench, SimulationError};
 use crate::table::{SwingUpValues, TableValues, WithSize, with_firmware_size};
 
-/// Starts the firmware of `table` in this process, after a power-on reset, and does `action` with it.
+/// Starts the firmware of `table` in this process, after a power-on reset, and runs `action` with it.
 ///
 /// # Errors
 /// [`HarnessError`] if the firmware refuses the table, or is not compiled for its size.
@@ -32,15 +32,15 @@ pub fn with_firmware<R>(
     result.ok_or_else(|| SimulationError::Size { states, sensors }.into())
 }
 
-/// [`with_firmware`] without a type of the caller's, so that all sizes of the firmware are compiled once, in this
-/// crate.
+/// [`with_firmware`] without a type parameter from the caller, so that all sizes of the firmware are compiled once, in
+/// this crate.
 fn start(table: &TableValues, run: &mut dyn FnMut(&mut dyn Target)) -> Result<(), HarnessError> {
     let (states, sensors) = (table.states(), table.sensors());
     with_firmware_size(states, sensors, WithFirmware { table, run })
         .ok_or(SimulationError::Size { states, sensors })?
 }
 
-/// As [`with_firmware`], with tables of any size that is known when this is compiled: those of a firmware crate.
+/// As [`with_firmware`], with tables whose size is known at compile time: those of a firmware crate.
 ///
 /// # Errors
 /// [`HarnessError`] if the firmware refuses a table.
@@ -84,9 +84,9 @@ impl WithSize for WithFirmware<'_> {
 struct InProcess<'q, 't, S, const NX: usize, const NY: usize> {
     control: ControlTask<'q, 't, Wires<NY>, NX, NY, S>,
     link: SerialLink<'q, NX, NY>,
-    /// On the serial line: the host receives what is sent about a tick with the next one, as from an image.
+    /// Bytes on the serial line: the host receives what was sent about a tick with the next one, as from an image.
     sent: Vec<u8>,
-    /// Whether the serial line takes bytes.
+    /// Whether the host reads the serial line.
     is_read: bool,
 }
 

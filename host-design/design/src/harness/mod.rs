@@ -1,13 +1,12 @@
 //! The whole firmware in closed loop with the simulated rig, from power-up on.
 //!
-//! A firmware is a [`Target`]: it takes the pins of one tick and gives the output of that tick, and what it has sent
+//! A firmware is a [`Target`]: it takes the pins of one tick and returns the output of that tick, and what it has sent
 //! over its serial line. [`with_firmware`] runs the firmware's tasks in this process; an image in an emulator is
-//! another target. Everything else is the same code for all of them, so that two runs of a scenario can be compared
+//! another target. Everything else is the same code for all targets, so that two runs of a scenario can be compared
 //! bit by bit: a [`Session`] sends commands and collects telemetry, a [`Harness`] adds the rig and the person who
-//! raises it, and
-//! [`record`] runs a scenario.
+//! raises it, and [`record`] runs a scenario.
 //!
-//! Nothing here has the numbers of states and sensors in its type, except the firmware itself.
+//! No type here depends on the numbers of states and sensors, except the firmware itself.
 
 mod error;
 mod grasp;

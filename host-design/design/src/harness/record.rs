@@ -24,16 +24,16 @@ pub struct Tick {
     pub output: Output,
     /// State of the supervisor.
     pub state: State,
-    /// Raw bits of estimate, innovation, governed set-point, force asked for and force applied, in this order.
+    /// Raw bits of estimate, innovation, governed set-point, requested force and applied force, in this order.
     pub bits: Vec<u32>,
 }
 
 /// A run with the whole firmware.
 #[derive(Debug, Clone)]
 pub struct Recording {
-    /// The record, as of a simulation.
+    /// The record, in the form of a simulation's.
     pub trace: Trace,
-    /// Figures of the run, as of a simulation.
+    /// Figures of the run, in the form of a simulation's.
     pub summary: Summary,
     /// The firmware's own bits, tick by tick.
     pub ticks: Vec<Tick>,
@@ -74,7 +74,7 @@ pub fn record(
         }
         let ahead = target_at(tick + pace.command_ticks);
         if harness.ask_for(tick, &goals) {
-            // One command in a tick.
+            // At most one command per tick.
         } else if commanded != ahead {
             harness.session.send(Request::Setpoint(ahead as f32));
             commanded = ahead;
@@ -82,7 +82,7 @@ pub fn record(
             harness.session.send(Request::Beat);
         }
         let t = tick as f64 * period_s;
-        // Links that are being raised or lowered, or were, do not fall.
+        // In a run that begins hanging, a link below the horizontal has fallen only while the firmware balances.
         let stands = scenario.begin == Begin::ByHand || harness.session.status().state == State::Balancing;
         let fall = if stands { Fall::of(rig, t, &without_turns(harness.bench.state())) } else { None };
         let state = harness.bench.state().to_vec();
@@ -105,7 +105,7 @@ pub fn record(
     Ok(record.finish(rig, scenario))
 }
 
-/// The goals of a scenario with the ticks from which on they are asked for.
+/// The goals of a scenario, each with the tick from which it is requested.
 pub fn goals(scenario: &Scenario, period_s: f64) -> Vec<(usize, Equilibrium)> {
     scenario.goals.iter().map(|goal| ((goal.at_s / period_s).round() as usize, goal.to)).collect()
 }
@@ -122,7 +122,7 @@ fn check(scenario: &Scenario, period_s: f64, pace: Pace) -> Result<(), HarnessEr
     Ok(())
 }
 
-/// A tick whose telemetry has not come yet.
+/// A tick whose telemetry has not arrived yet.
 struct Pending {
     number: u32,
     t: f64,
@@ -167,7 +167,7 @@ impl Record {
             if telemetry.tick != expected {
                 return Err(HarnessError::Lost(expected));
             }
-            // Ticks in between have no telemetry.
+            // The ticks in between have no telemetry of their own.
             let older = |first: &Pending| (first.number.wrapping_sub(telemetry.tick) as i32) < 0;
             while self.pending.front().is_some_and(older) {
                 self.pending.pop_front();

@@ -21,7 +21,7 @@ use crate::table::{MAX_SENSORS, MAX_STATES};
 /// Telemetry of a firmware of any size: its frames are the same bytes whatever the capacity of the lists.
 pub type AnyTelemetry = Telemetry<MAX_STATES, MAX_SENSORS>;
 
-/// A part of the log of every tick, of a firmware of any size.
+/// A part of the tick log (a record of every tick), of a firmware of any size.
 pub type AnyTickLog = TickLog<MAX_SENSORS>;
 
 /// Time between two heartbeats of a host that commands the set-point (s).
@@ -65,7 +65,7 @@ impl<'a> Session<'a> {
         }
     }
 
-    /// Sends a command with the next tick and gives its number.
+    /// Queues a command for the next tick and returns its number.
     pub fn send(&mut self, request: Request) -> u64 {
         self.last_id += 1;
         let command = Command { id: self.last_id, request };
@@ -77,17 +77,17 @@ impl<'a> Session<'a> {
         self.last_id
     }
 
-    /// Numbers the next command from here on: somebody else has sent commands with numbers up to `id`.
+    /// Numbers the next commands from above `id`, because somebody else has sent commands with numbers up to it.
     pub fn count_from(&mut self, id: u64) {
         self.last_id = self.last_id.max(id);
     }
 
-    /// How fast the firmware's serial line is.
+    /// Delays of the firmware's serial line.
     pub fn pace(&self) -> Pace {
         self.target.pace()
     }
 
-    /// Number of the last tick, from the start of the firmware.
+    /// Number of the last tick, counted from 0 at the start of the firmware.
     pub fn tick_number(&self) -> u32 {
         self.ticks.wrapping_sub(1)
     }
@@ -97,7 +97,7 @@ impl<'a> Session<'a> {
         self.last_id
     }
 
-    /// Sends bytes, which need not be a command, with the next tick.
+    /// Queues bytes for the next tick; they need not be a command.
     pub fn send_bytes(&mut self, bytes: &[u8]) {
         self.to_send.extend(bytes);
     }
@@ -107,7 +107,7 @@ impl<'a> Session<'a> {
         self.sabotage = Some(sabotage);
     }
 
-    /// One tick with these inputs.
+    /// Runs one tick with these inputs and collects what the firmware has sent.
     ///
     /// # Errors
     /// [`HarnessError`] if the firmware does not answer.
@@ -115,7 +115,7 @@ impl<'a> Session<'a> {
         let mut pins = inputs.clone();
         while !pins.received.is_full() {
             let Some(byte) = self.to_send.pop_front() else { break };
-            // Not full.
+            // Cannot fail: the loop has checked that there is room.
             let _ = pins.received.push(byte);
         }
         pins.sabotage = self.sabotage.take();
@@ -144,7 +144,7 @@ impl<'a> Session<'a> {
         &self.serial
     }
 
-    /// From now on nobody reads the firmware's serial line.
+    /// Stops reading the firmware's serial line.
     ///
     /// # Errors
     /// [`HarnessError::Unsupported`] unless the firmware runs in this process.
@@ -167,7 +167,7 @@ impl<'a> Session<'a> {
         self.telemetry.pop_front()
     }
 
-    /// Takes the oldest part of the log of every tick that was not yet taken.
+    /// Takes the oldest part of the tick log that was not yet taken.
     pub fn next_log(&mut self) -> Option<AnyTickLog> {
         self.logs.pop_front()
     }
@@ -205,7 +205,7 @@ impl<'a> Session<'a> {
         Ok(None)
     }
 
-    /// Asks for the firmware's identity, and checks that it is made for the rig with this hash.
+    /// Asks for the firmware's identity, and checks that it was built for the rig with this hash.
     ///
     /// # Errors
     /// [`HarnessError`] if it is for another rig, or does not answer.

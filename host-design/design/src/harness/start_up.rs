@@ -21,7 +21,7 @@ const LONGEST_WAIT_S: f64 = 60.0;
 pub struct Harness<'t> {
     /// The conversation with the firmware.
     pub session: Session<'t>,
-    /// The rig.
+    /// The simulated rig.
     pub bench: Bench,
     hand: Hand,
     /// The firmware's output in the last tick.
@@ -29,15 +29,16 @@ pub struct Harness<'t> {
     counters: Vec<u32>,
     supply_v: f32,
     period_s: f64,
-    /// The last tick in which the next goal was asked for.
+    /// The last tick in which the next goal was requested.
     asked: Option<usize>,
     begun: Vec<usize>,
-    /// Puts back the rig that has been lowered.
+    /// Puts the rig back after it has been lowered.
     grasp: Grasp,
     is_grasped: bool,
 }
 
-/// So long before the links are raised again, a hand takes the rig (s): time enough for both ends of the rail.
+/// Time before the links are raised again at which a hand takes hold of the rig (s): enough to come from either end of
+/// the rail.
 const PUT_BACK_S: f64 = 5.0;
 
 impl<'t> Harness<'t> {
@@ -76,13 +77,13 @@ impl<'t> Harness<'t> {
         Ok(harness)
     }
 
-    /// What a healthy board reads now.
+    /// The input pins of a healthy board in the present state of the rig.
     pub fn inputs(&mut self) -> Pins {
         self.bench.read_counters(&mut self.counters);
         healthy(&self.counters, self.supply_v * self.bench.supply_share() as f32)
     }
 
-    /// One tick in which the hand does what comes next; gives the firmware's output.
+    /// Runs one tick in which the hand does what comes next; returns the firmware's output.
     ///
     /// # Errors
     /// [`HarnessError`] if the firmware does not answer.
@@ -99,7 +100,8 @@ impl<'t> Harness<'t> {
     }
 
     /// Homes, checks the signs, has the motor push the cart, raises the links and arms, or lets them hang and starts
-    /// the swing-up. Ends with the first tick in which the controller commands the motor, and gives that tick's output.
+    /// the swing-up. Ends with the first tick in which the controller commands the motor, and returns that tick's
+    /// output.
     ///
     /// `setpoint_m` is commanded as soon as the firmware is armed; from then on it needs a command every
     /// [`HEARTBEAT_S`](super::HEARTBEAT_S). Without a set-point it holds the position in which it begins.
@@ -122,9 +124,10 @@ impl<'t> Harness<'t> {
         Err(HarnessError::NotBalancing(self.session.status().state))
     }
 
-    /// Asks for each of `goals` in turn, from its tick on, and again until its motion begins, as a person does: it is
-    /// refused while a link leans or the cart moves. Before a lowered rig is raised again, a hand stills its links and
-    /// pushes the cart to the middle. To be called in every tick; gives whether it has asked in this one.
+    /// Requests each of `goals` in turn, from its tick on, and again until its motion begins, as a person does: the
+    /// firmware refuses it while a link leans or the cart moves. Before a lowered rig is raised again, a hand stills
+    /// its links and pushes the cart to 0. To be called in every tick; returns whether it has sent a request in this
+    /// one.
     pub fn ask_for(&mut self, tick: usize, goals: &[(usize, Equilibrium)]) -> bool {
         let state = self.session.status().state;
         if matches!(state, State::Raising | State::Lowering)
@@ -153,7 +156,7 @@ impl<'t> Harness<'t> {
         asks
     }
 
-    /// The hand moves the hanging rig on towards where it rests in the middle of the rail, and lets go of it there.
+    /// The hand moves the hanging rig by one tick's step towards rest with the cart at 0, and lets go of it there.
     fn put_back(&mut self) {
         if !self.is_grasped {
             self.grasp.take(self.bench.state());
@@ -165,7 +168,7 @@ impl<'t> Harness<'t> {
         }
     }
 
-    /// The ticks from which on the rig moves to each goal, as far as it has begun to.
+    /// The tick in which the motion to each goal began, for the goals whose motion has begun.
     pub fn begun(&self) -> &[usize] {
         &self.begun
     }

@@ -1,4 +1,4 @@
-//! Something that runs the firmware in lock step with the simulated rig.
+//! The interface to a firmware that runs in lock step with the simulated rig.
 
 use upright::board::{Contacts, Output};
 use upright::protocol::simulated_pins::PinsIn;
@@ -6,18 +6,18 @@ use upright::protocol::simulated_pins::PinsIn;
 use super::error::HarnessError;
 use crate::table::MAX_SENSORS;
 
-/// The pins of one tick, with as many counters as the firmware has sensors. Its frames are the same bytes as those of
-/// the firmware's own type.
+/// The input pins of one tick, with as many counters as the firmware has sensors. Its frames are the same bytes as
+/// those of the firmware's own type.
 pub type Pins = PinsIn<MAX_SENSORS>;
 
-/// How fast the serial line of a target is.
+/// Delays of the serial line of a target.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Pace {
-    /// Ticks in which every command is answered.
+    /// Number of ticks within which every command is answered.
     pub answer_ticks: usize,
     /// Ticks between two telemetry messages.
     pub telemetry_ticks: u16,
-    /// Ticks from sending a command to the first tick that follows it.
+    /// Ticks from sending a command to the first tick that acts on it.
     pub command_ticks: usize,
 }
 
@@ -27,21 +27,21 @@ impl Pace {
     pub const LOCK_STEP: Self = Self { answer_ticks: 4, telemetry_ticks: 1, command_ticks: 3 };
 }
 
-/// The firmware, wherever it runs.
+/// A running firmware: in this process, in an emulator, or on the virtual board.
 pub trait Target {
-    /// One tick: takes the pins, gives the output, and appends to `serial` what the firmware has sent over the serial
-    /// line since the tick before. What it sends about this tick comes with the next one.
+    /// Runs one tick: takes the pins, returns the output, and appends to `serial` what the firmware has sent over the
+    /// serial line since the tick before. What it sends about this tick comes with the next one.
     ///
     /// # Errors
     /// [`HarnessError`] if the firmware does not answer.
     fn tick(&mut self, pins: &Pins, serial: &mut Vec<u8>) -> Result<Output, HarnessError>;
 
-    /// How fast its serial line is.
+    /// Delays of its serial line.
     fn pace(&self) -> Pace {
         Pace::LOCK_STEP
     }
 
-    /// From now on nobody reads the firmware's serial line, and its buffers fill up.
+    /// Stops reading the firmware's serial line, so that its buffers fill up.
     ///
     /// # Errors
     /// [`HarnessError::Unsupported`] unless the firmware runs in this process.
@@ -50,7 +50,7 @@ pub trait Target {
     }
 }
 
-/// The pins of a healthy board.
+/// The input pins of a healthy board.
 pub(super) fn healthy(counts: &[u32], supply_v: f32) -> Pins {
     Pins {
         // At most MAX_SENSORS, as a table has.

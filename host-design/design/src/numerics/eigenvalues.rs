@@ -24,7 +24,7 @@ impl<R: Real> Complex<R> {
     }
 }
 
-/// The QR iteration did not converge. In extended precision this was seen only with entries that are not finite.
+/// The QR iteration did not converge. In extended precision this has been seen only with entries that are not finite.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[error("the eigenvalue iteration did not converge")]
 pub struct NoConvergence;
@@ -202,7 +202,7 @@ fn francis_step<R: Real>(h: &mut Matrix<R>, start: usize, last: usize, exception
         (a.clone() + d, a.clone() * d - &(b.clone() * c))
     };
     if exceptional {
-        // The iteration cycles: shift by values of the right size that are not eigenvalues of the corner block.
+        // The iteration may cycle: shift by values of the right size that are not eigenvalues of the corner block.
         let size = h[(last, last - 1)].abs() + &h[(last - 1, last - 2)].abs();
         sum = size.clone() * &R::from_f64(1.5);
         product = size.clone() * &size;

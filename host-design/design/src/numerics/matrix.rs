@@ -105,7 +105,7 @@ impl<R: Real> Matrix<R> {
         })
     }
 
-    /// The product with `right`, which is known to be symmetric: half of it is computed.
+    /// `self · right` for a product that is known to be symmetric: one triangle is computed and mirrored.
     pub fn symmetric_product(&self, right: &Self) -> Self {
         assert_eq!((self.cols, self.rows), (right.rows, right.cols), "dimensions of a symmetric product");
         let mut product = Self::zeros(self.rows, self.rows);
@@ -124,7 +124,7 @@ impl<R: Real> Matrix<R> {
         Self::from_fn(rows, cols, |i, j| self[(top + i, left + j)].clone())
     }
 
-    /// A copy with `block` written over the entries from (`top`, `left`).
+    /// The matrix with `block` written over the entries from (`top`, `left`) on.
     pub fn with_block(mut self, top: usize, left: usize, block: &Self) -> Self {
         for i in 0..block.rows {
             for j in 0..block.cols {

@@ -1,4 +1,4 @@
-//! Extended precision: a pure-Rust big float whose number of bits is set per thread, for the length of a call.
+//! Extended precision: a pure-Rust big float whose number of bits is set per thread, for the duration of a call.
 
 use core::cmp::Ordering;
 use core::ops::{Add, Div, Mul, Neg, Sub};
@@ -17,8 +17,8 @@ thread_local! {
     static PRECISION_BITS: Cell<usize> = const { Cell::new(256) };
 }
 
-/// Runs `calculate` on this thread with significands of `bits` bits (a multiple of 64) instead of 256. Threads that it
-/// starts use 256 again.
+/// Runs `calculate` on this thread with significands of `bits` bits (a multiple of 64) instead of 256. Threads that
+/// `calculate` starts use 256 bits again.
 pub fn with_precision<T>(bits: usize, calculate: impl FnOnce() -> T) -> T {
     struct Restore(usize);
     impl Drop for Restore {
@@ -30,8 +30,8 @@ pub fn with_precision<T>(bits: usize, calculate: impl FnOnce() -> T) -> T {
     calculate()
 }
 
-/// A real number: each operation rounds its result to the thread's working precision ([`with_precision`]), to nearest
-/// even.
+/// A real number in extended precision. Each operation rounds its result to the thread's working precision
+/// ([`with_precision`]), to nearest with ties to even.
 ///
 /// The precision is not a type parameter, because the whole design would then be compiled once per precision.
 #[derive(Clone, Debug)]
@@ -42,7 +42,7 @@ impl Wide {
     /// that is exactly a short number then comes out as that number.
     fn without_noise(&self) -> BigFloat {
         let mut short = self.0.clone();
-        // The only error is a precision out of range; a shorter precision is in range.
+        // Fails only for a precision out of range, which a shorter precision never is.
         let _ = short.set_precision(Self::bits() - Self::bits() / 4, ROUNDING);
         short
     }

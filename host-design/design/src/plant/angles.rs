@@ -12,12 +12,12 @@ pub fn absolute_angles(state: &[f64]) -> impl Iterator<Item = f64> + '_ {
     })
 }
 
-/// The whole turns that are nearest to an angle (rad).
+/// The multiple of 2π that is nearest to an angle (rad).
 pub fn whole_turns(angle: f64) -> f64 {
     TAU * libm::round(angle / TAU)
 }
 
-/// The state without whole turns of the joints: every angle is within half a turn of 0.
+/// The state of a chain with whole turns removed from the joint angles, so that each is within half a turn of 0.
 pub fn without_turns(state: &[f64]) -> Vec<f64> {
     let mut state = state.to_vec();
     for angle in state.iter_mut().skip(2).step_by(2) {

@@ -29,7 +29,7 @@ impl Energy {
 }
 
 /// Equations of motion of N links on a cart: those of [`ChainParameters`] with the same symbols, arranged for speed.
-/// The firmware predicts with the same source, in `f32`.
+/// The firmware's prediction uses the same source code, in `f32`.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ChainPlant<const N: usize> {
     total_mass: f64,

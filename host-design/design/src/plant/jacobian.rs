@@ -10,15 +10,15 @@ use super::{ChainPlant, ChainState};
 /// Partial derivatives of one acceleration, `ẍ` or `φ̈_j`. None depends on x.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Partials<const N: usize> {
-    /// By ẋ.
+    /// With respect to ẋ.
     pub xdot: f64,
-    /// By each φ.
+    /// With respect to each φ.
     pub phi: [f64; N],
-    /// By each φ̇.
+    /// With respect to each φ̇.
     pub phidot: [f64; N],
-    /// By the force on the cart.
+    /// With respect to the force on the cart.
     pub force: f64,
-    /// By the torque at each joint.
+    /// With respect to the torque at each joint.
     pub torques: [f64; N],
 }
 
@@ -51,8 +51,7 @@ impl<const N: usize> Partials<N> {
 impl<const N: usize> ChainPlant<N> {
     /// Partial derivatives of `ẍ` and of each `φ̈_j` at `state`, where the plant's rate of change is `rate`.
     ///
-    /// With the equations written `M(φ) q̈ = h`, they are
-    /// `M⁻¹ (∂h - ∂M q̈)`.
+    /// With the equations written `M(φ) q̈ = h`, they are `M⁻¹ (∂h - ∂M q̈)`.
     pub fn partials(&self, state: &ChainState<N>, rate: &ChainState<N>) -> (Partials<N>, [Partials<N>; N]) {
         let model = self.model();
         let (sin, cos) = f64::sines_and_cosines(&state.phi);
@@ -86,7 +85,7 @@ impl<const N: usize> ChainPlant<N> {
                 links[j - 1].phidot[j - 1] -= friction;
             }
         }
-        // The cart's equation eliminated: S φ̈ = r, as in `derivative`.
+        // Eliminate the cart's equation: S φ̈ = r, as in `derivative`.
         let mut s = mass;
         for j in 0..N {
             let share = model.a[j] * cos[j] * model.inverse_mass;

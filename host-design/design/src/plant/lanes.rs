@@ -1,4 +1,4 @@
-//! Numbers of several plants side by side in one vector of the processor.
+//! Numbers of several plants side by side in one SIMD vector.
 
 // Iterators are not inlined everywhere, and vectors are fast only in a function that is compiled for them.
 #![allow(clippy::needless_range_loop)]
@@ -10,8 +10,8 @@ use pulp::{Simd, bytemuck};
 use upright::plant::{LARGEST_RAD, in_quadrant};
 use upright::table::Number;
 
-/// As many `f64` as a vector of this processor holds, one for each of so many plants. An operation gives in each lane
-/// the bits that it gives for an `f64`.
+/// A SIMD vector of `f64`, one number per plant. Every operation has in each lane the same bits as the operation on an
+/// `f64`.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Lanes<S: Simd> {
     simd: S,
@@ -25,13 +25,13 @@ impl<S: Simd> Lanes<S> {
         Self { simd, values: simd.splat_f64s(value) }
     }
 
-    /// The numbers at and behind index `first`. There have to be enough.
+    /// Loads a vector from `numbers`, starting at index `first`. Panics if fewer numbers than lanes are left.
     #[inline(always)]
     pub(super) fn load(simd: S, numbers: &[f64], first: usize) -> Self {
         Self { simd, values: S::as_simd_f64s(&numbers[first..first + S::F64_LANES]).0[0] }
     }
 
-    /// Writes the numbers to index `first` and behind.
+    /// Stores the vector in `numbers`, starting at index `first`. Panics if fewer numbers than lanes are left.
     #[inline(always)]
     pub(super) fn store(self, numbers: &mut [f64], first: usize) {
         S::as_mut_simd_f64s(&mut numbers[first..first + S::F64_LANES]).0[0] = self.values;
@@ -41,7 +41,7 @@ impl<S: Simd> Lanes<S> {
         bytemuck::cast_slice(from_ref(&self.values))
     }
 
-    /// Sine and cosine, and bits that are 0 in the lanes where they are right.
+    /// Sine and cosine, and flags that are 0 in the lanes where both are valid: the angle is at most [`LARGEST_RAD`].
     #[inline(always)]
     fn sine_and_cosine(self) -> (Self, Self, S::u64s) {
         let simd = self.simd;
@@ -60,7 +60,7 @@ impl<S: Simd> Lanes<S> {
         let next = simd.add_u64s(quadrant, one);
         let cosine = simd.xor_u64s(simd.xor_u64s(bits(cosine), exchange), where_set(next, two, sign));
         let magnitude = simd.transmute_f64s_u64s(simd.and_u64s(bits(self), simd.splat_u64s(u64::MAX >> 1)));
-        // NaN is beyond it, too.
+        // The comparison is false for NaN, so NaN counts as out of range.
         let in_range = simd.less_than_or_equal_f64s(magnitude, simd.splat_f64s(LARGEST_RAD));
         (numbers(sine), numbers(cosine), simd.select_u64s(in_range, none, one))
     }
@@ -136,7 +136,7 @@ impl<S: Simd> Number for Lanes<S> {
     }
 }
 
-/// As for each plant alone.
+/// Fallback for angles out of range: computes each lane as an `f64`.
 #[cold]
 #[inline(never)]
 fn one_by_one<S: Simd, const N: usize>(

@@ -50,8 +50,8 @@ impl LinearSimulation {
     }
 }
 
-/// `product = a x`, without the memory that a product of matrices needs. Column by column all sums grow together, each
-/// in the same order as alone.
+/// `product = A x` without allocating. All sums grow together, column by column, each in the same order as in a
+/// product row by row.
 fn times(a_transposed: &Matrix<f64>, x: &[f64], product: &mut [f64]) {
     product.fill(0.0);
     let states = product.len();

@@ -14,9 +14,11 @@
 //! - [`ChainParameters`]: the constants of the equations, in any precision.
 //! - [`absolute_angles`]: the angles `φ` of a state.
 //! - [`linearise`]: the exact linear model about an equilibrium, in any precision.
-//! - [`ChainPlant`]: the nonlinear equations in `f64`, fast, with n in the type; their source is [`upright::plant`].
+//! - [`ChainPlant`]: the nonlinear equations in `f64`, fast, with n as a const parameter; their source is
+//!   [`upright::plant`].
 //! - [`Plant`]: the interface of a simulation of any size; [`chain_plant`] and [`LinearSimulation`] provide it.
-//! - [`ChainLanes`]: several chains that advance together, in the vectors of the processor; bit for bit as each alone.
+//! - [`ChainLanes`]: several chains that advance together in the processor's SIMD vectors, with the same bits as each
+//!   alone.
 //! - [`reference::integrate`]: an adaptive integrator of high order, the reference for the fast one.
 
 mod angles;
@@ -42,7 +44,7 @@ pub use parameters::ChainParameters;
 pub use simulation::{ChainSimulation, Plant, WithLinks, chain_plant, with_links};
 pub use together::{ChainLanes, LANES, chain_lanes};
 
-/// The plant cannot be built for this number of links.
+/// Why the plant of a chain cannot be built.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum PlantError {
     /// The number of links in the type is not that of the chain.

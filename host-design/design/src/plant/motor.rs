@@ -12,7 +12,7 @@ pub struct MotorPlant {
 }
 
 impl MotorPlant {
-    /// Creates the motor that a rig file describes.
+    /// The motor that a rig file describes.
     pub fn of(motor: &rig::Motor) -> Self {
         let volts_per_speed = motor.volts_per_speed();
         Self {

@@ -1,4 +1,4 @@
-//! Adaptive integrator of order 8: slow and accurate, the reference for the fixed-step one.
+//! Adaptive integrator of order 8: slow and accurate, the reference for the fixed-step integrator.
 
 use std::sync::LazyLock;
 
@@ -65,14 +65,15 @@ pub fn integrate(
 /// DOP853 for a state of this type.
 type Method<Y> = ExplicitRungeKutta<Ordinary, DormandPrince, f64, Y, 8, 12, 16>;
 
-/// [`integrate`] without a type of the caller's, so that it is compiled once, with this crate's optimisation.
+/// [`integrate`] without a type parameter from the caller, so that it is compiled once, with this crate's
+/// optimisation.
 fn integrate_problem(
     problem: &Problem<'_>,
     start: &[f64],
     duration: f64,
     tolerance: Tolerance,
 ) -> Result<Vec<f64>, ReferenceError> {
-    /// Its many coefficients are copied faster than they are made.
+    /// Copying the method's many coefficients is faster than computing them again.
     static SMALL: LazyLock<Method<Small>> = LazyLock::new(Method::dop853);
     let positive = |x: f64| x.is_finite() && x > 0.0;
     if ![duration, tolerance.relative, tolerance.absolute].into_iter().all(positive) {
@@ -150,11 +151,12 @@ impl ODE<f64, Small> for Problem<'_> {
     }
 }
 
-/// The state of a plant of up to four links. A step makes hundreds of states, which are faster without allocations.
+/// The state of a plant of up to four links, stored inline: a step creates hundreds of states, and allocating each
+/// would be slow.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Small {
     length: usize,
-    /// Those beyond the length stay 0.
+    /// Entries beyond `length` are 0.
     values: [f64; 10],
 }
 

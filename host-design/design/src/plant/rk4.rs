@@ -1,4 +1,4 @@
-//! Fixed-step integration of a chain.
+//! Fixed-step integration of a chain's equations of motion.
 
 use upright::plant::ChainState;
 use upright::table::Number;
@@ -17,7 +17,7 @@ pub(super) fn rk4<const N: usize, T: Number>(
     let k1 = rate(state);
     let mut at = state.plus(of(0.5 * dt), &k1);
     let mut sum = k1;
-    // In a loop, so that an inlined rate is there only twice.
+    // In a loop, so that an inlined `rate` is compiled only twice.
     for (step, weight) in [(0.5 * dt, 2.0), (dt, 2.0), (0.0, 1.0)] {
         let k = rate(&at);
         at = state.plus(of(step), &k);

@@ -11,7 +11,7 @@ pub trait Plant: Send {
     /// Number of links; 0 for a linear model.
     fn links(&self) -> usize;
 
-    /// Length of the state.
+    /// Number of states.
     fn states(&self) -> usize;
 
     /// Number of disturbance inputs: the n joint torques of a chain, the noise columns of a linear model.
@@ -34,7 +34,8 @@ pub trait Plant: Send {
     /// Mechanical energy (J); none for a linear model.
     fn energy(&self) -> Option<Energy>;
 
-    /// Speed of the motor, as speed of the cart (m/s), if a belt or backlash is between them.
+    /// Speed of the motor, converted to speed of the cart (m/s), if a belt or backlash between them makes the two
+    /// differ.
     fn motor_speed(&self) -> Option<f64> {
         None
     }
@@ -105,16 +106,16 @@ impl<const N: usize> Plant for ChainSimulation<N> {
     }
 }
 
-/// Something that is compiled for every number of links.
+/// An action that is compiled separately for each number of links.
 pub trait WithLinks {
-    /// What it gives.
+    /// Result of the action.
     type Output;
 
-    /// Does it for chains of N links.
+    /// Runs the action for chains of N links.
     fn run<const N: usize>(self) -> Self::Output;
 }
 
-/// Does `action` for chains of `links` links.
+/// Runs `action` with N = `links`.
 ///
 /// # Errors
 /// [`PlantError::UnsupportedLinks`] unless there are 1 to [`MAX_LINKS`](rig::MAX_LINKS) links.

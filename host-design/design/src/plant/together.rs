@@ -13,37 +13,37 @@ use super::rk4::rk4;
 use super::{ChainPlant, PlantError};
 use crate::rig;
 
-/// Chains that advance together. Vectors of today's processors hold 2 to 8 numbers.
+/// Number of chains that advance together. SIMD vectors of today's processors hold 2 to 8 `f64`.
 pub const LANES: usize = 8;
 
 /// One number for each chain.
 type Row = [f64; LANES];
 
-/// [`LANES`] chains with the same number of links. Each has the same bits as a
-/// [`ChainSimulation`](super::ChainSimulation) with the same inputs. Every method that takes a slice of the wrong
-/// length panics.
+/// [`LANES`] chains with the same number of links. Each gives the same bits as a
+/// [`ChainSimulation`](super::ChainSimulation) with the same inputs. Every method panics on a slice of the wrong
+/// length.
 pub trait ChainLanes: Send {
-    /// Puts `chain` in this state (`x, ẋ, θ_1, θ̇_1, …`) into a lane.
+    /// Puts `chain` into a lane, in the state `state` (`x, ẋ, θ_1, θ̇_1, …`).
     ///
     /// # Errors
     /// [`PlantError::WrongLinks`] for a chain with another number of links.
     fn place(&mut self, lane: usize, chain: &rig::Chain, state: &[f64]) -> Result<(), PlantError>;
 
-    /// Nothing is computed for this lane from now on, unless its vector has another one.
+    /// Empties a lane. It is no longer computed, unless another lane of the same vector is in use.
     fn clear(&mut self, lane: usize);
 
-    /// The force on the cart (N) and the joint torques (N·m) in this lane from now on.
+    /// Sets the force on the cart (N) and the joint torques (N·m) of a lane; they stay until the next call.
     fn push(&mut self, lane: usize, force: f64, torques: &[f64]);
 
     /// Advances all chains by `dt` (s) in `substeps` equal steps.
     fn advance(&mut self, dt: f64, substeps: usize);
 
-    /// Copies the state in a lane.
+    /// Copies the state of a lane into `state`.
     fn write_state(&self, lane: usize, state: &mut [f64]);
 }
 
-/// Empty lanes for chains of `links` links; none for a number of links that is not compiled for vectors: what is
-/// simulated in thousands of runs are three to five links.
+/// Empty lanes for chains of `links` links. `None` unless there are 3 to 5 links: only these are simulated in
+/// thousands of runs, so only these are compiled for vectors.
 pub fn chain_lanes(links: usize) -> Option<Box<dyn ChainLanes>> {
     match links {
         3 => Some(Box::new(Together::<3>::empty(Arch::new()))),
@@ -124,7 +124,7 @@ impl<const N: usize> ChainLanes for Together<N> {
     fn place(&mut self, lane: usize, chain: &rig::Chain, state: &[f64]) -> Result<(), PlantError> {
         assert_eq!(state.len(), 2 * N + 2, "a chain of {N} links has 2n + 2 states");
         let plant = ChainPlant::<N>::of(chain)?;
-        // An empty lane in the same vector must have a mass.
+        // Unoccupied lanes get the model, too: a lane is computed with its vector and must have a mass.
         for other in (0..LANES).filter(|&other| other == lane || !self.occupied[other]) {
             self.chains.set_model(other, plant.model());
         }
@@ -166,7 +166,7 @@ impl<const N: usize> ChainLanes for Together<N> {
     }
 }
 
-/// Steps of all chains, compiled for each kind of vector; the processor's own is chosen at run time.
+/// Steps of all chains, compiled for each vector width; the one for this processor is chosen at run time.
 struct Advance<'a, const N: usize> {
     chains: &'a mut Chains<N>,
     occupied: &'a [bool; LANES],

@@ -1,17 +1,17 @@
-//! Backlash and a belt that gives, between the motor and the cart.
+//! Backlash and an elastic belt between the motor and the cart.
 
 use crate::rig::{DriveTrain, Rig};
 
 /// Damping ratio of rotor and belt.
 const DAMPING_RATIO: f64 = 0.1;
-/// Share of the rotor in the cart's mass where the file does not say.
+/// The rotor's share of the cart's mass if the file does not give it.
 const ROTOR_SHARE: f64 = 0.1;
-/// Teeth without a given compliance give by this share of the backlash under the largest force.
+/// Without a given compliance, the teeth yield by this share of the backlash under the largest force.
 const TEETH_SHARE: f64 = 0.1;
-/// The largest force (N) for that where the file has none.
+/// Largest force (N) in that rule if the file gives no limit.
 const FORCE_N: f64 = 10.0;
 
-/// The rotor, as travel of the cart.
+/// State of the motor's rotor, converted to travel of the cart.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Rotor {
     /// Position (m).
@@ -28,7 +28,7 @@ impl Rotor {
     }
 }
 
-/// Two masses with a play and a spring between them (M. Nordin, P.-O. Gutman, "Controlling mechanical systems with
+/// Two masses with backlash and a spring between them (M. Nordin, P.-O. Gutman, "Controlling mechanical systems with
 /// backlash: a survey", Automatica 38, 2002). With the stretch `s` beyond the play, the belt pulls with `k s + c ṡ`,
 /// but never pushes when it is slack: the force has the sign of `s` or is zero.
 #[derive(Debug, Clone, PartialEq)]
@@ -37,14 +37,14 @@ pub struct Belt {
     pub rotor_kg: f64,
     /// Half of the play (m).
     half_play: f64,
-    /// k (N/m).
+    /// Stiffness k (N/m).
     pub stiffness: f64,
-    /// c (N·s/m).
+    /// Damping c (N·s/m).
     damping: f64,
 }
 
 impl Belt {
-    /// The belt of a rig; none if its `[reality]` has neither backlash nor a belt that gives.
+    /// The belt of a rig; none if its `[reality]` has neither backlash nor an elastic belt.
     pub fn of(rig: &Rig, cart_kg: f64) -> Option<Self> {
         let &DriveTrain { backlash_m, belt_compliance_m_per_n, rotor_mass_kg } = &rig.reality.drive_train;
         if backlash_m == 0.0 && belt_compliance_m_per_n == 0.0 {

@@ -1,9 +1,9 @@
-//! Dry friction that sticks: the elasto-plastic bristle.
+//! Dry friction with sticking: the elasto-plastic bristle.
 
-/// Share of the Coulomb friction up to which the contact gives elastically: 0.7169 in the example of Dupont et al.
+/// Share of the Coulomb friction up to which the contact deforms elastically: 0.7169 in the example of Dupont et al.
 const ELASTIC_SHARE: f64 = 0.7;
 
-/// Damping ratio of a stuck contact: a bristle that is let go swings out, as metal does.
+/// Damping ratio of a stuck contact: a bristle that is released rings down, as metal does.
 const DAMPING_RATIO: f64 = 0.1;
 
 /// Dry friction between two bodies as one bristle of deflection `z` (P. Dupont, V. Hayward, B. Armstrong, F. Altpeter,
@@ -36,7 +36,7 @@ pub struct Bristle {
     stribeck: f64,
 }
 
-/// What is said about a contact.
+/// The properties of a contact that define its bristle.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Contact {
     /// Coulomb friction (N or N·m), above 0.
@@ -51,7 +51,7 @@ pub struct Contact {
     pub mobility: f64,
 }
 
-/// What a bristle does at a stage of a step.
+/// A bristle after a travel.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Moved {
     deflection: f64,
@@ -60,9 +60,9 @@ struct Moved {
 }
 
 impl Bristle {
-    /// The bristle of a contact.
+    /// The bristle of a contact with these properties.
     pub fn new(contact: &Contact) -> Self {
-        // From z_e on the parabola needs twice the remaining deflection.
+        // From z_e on, the parabola needs a travel of twice the remaining deflection.
         let coulomb = contact.presliding / (2.0 - ELASTIC_SHARE);
         let stiffness = contact.coulomb / coulomb;
         Self {
@@ -89,7 +89,7 @@ impl Bristle {
         self.moved(deflection, travel, speed).deflection
     }
 
-    /// Energy that the bent bristle gives back (J).
+    /// Elastic energy of the bent bristle (J).
     pub fn energy(&self, deflection: f64) -> f64 {
         0.5 * self.stiffness * deflection * deflection
     }
@@ -106,7 +106,7 @@ impl Bristle {
         let bent = before + stuck;
         let length = sliding - self.elastic;
         let root = (((sliding - bent) / length).clamp(0.0, 1.0).sqrt() - plastic / (2.0 * length)).max(0.0);
-        // Without plastic travel the deflection is what it was, to the last bit.
+        // Without plastic travel the deflection is used as it is, so that the parabola does not round it.
         let after = if plastic > 0.0 { sliding - length * root * root } else { bent.min(sliding) };
         Moved { deflection: direction * after, sticking: root }
     }

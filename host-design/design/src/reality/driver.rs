@@ -5,19 +5,19 @@ use upright::control::actuator::Drive;
 use crate::plant::MotorPlant;
 use crate::rig::{DriverFaults, Rig};
 
-/// What is between a command and the force of the motor.
+/// Motor driver and supply, between a command and the force of the motor.
 ///
 /// - Lag: the voltage, or the commanded force without a motor, follows the command as `τ u̇ = command - u`.
 /// - Current limit: the force is at most that of the current.
 /// - Supply with internal resistance `R_s`: at the duty `d` the driver takes `d i` from it, so that
-///   `V = V_0 - R_s d i` with `R i = d V - E` (E: back-EMF). It takes nothing back: V is at most V_0.
+///   `V = V_0 - R_s d i` with `R i = d V - E` (E: back-EMF). The supply takes no current back: V is at most V_0.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Driver {
     lag_s: f64,
     force_factor: f64,
     current_limit_a: f64,
     supply_resistance_ohm: f64,
-    /// Duty, or force (N) without a motor.
+    /// The command after the lag: a duty, or a force (N) without a motor.
     lagged: f64,
     supply_share: f64,
 }
@@ -41,7 +41,7 @@ impl Driver {
         })
     }
 
-    /// The supply voltage, as a share of that without load.
+    /// The supply voltage, as a share of the voltage without load.
     pub fn supply_share(&self) -> f64 {
         self.supply_share
     }

@@ -6,9 +6,9 @@ use crate::rig::{Rig, SensorErrors};
 
 /// What the encoders measure instead of the joints' angles: `θ + e + a (sin(θ + p) - sin(h + p))` for each joint.
 ///
-/// The zero error `e` comes from homing, and so does `h`: the links are homed hanging, where the first joint's angle is
-/// π and the others are straight, and there the eccentricity makes no difference. (Amplitude and phase of an encoder on
-/// an eccentric disk: Heidenhain, *Rotary Encoders*, "Measuring accuracy".)
+/// `e` is the zero error from homing, and `h` is the joint's angle at homing. The links are homed hanging, so `h` is π
+/// for the first joint and 0 for the others, and there the eccentricity causes no error. (Amplitude and phase of an
+/// encoder on an eccentric disk: Heidenhain, *Rotary Encoders*, "Measuring accuracy".)
 #[derive(Debug, Clone, PartialEq)]
 pub struct Encoders {
     joints: Vec<Joint>,

@@ -15,12 +15,12 @@ use crate::plant::{
 use crate::rig::{Chain, Rig};
 
 /// Largest phase (rad) by which the fastest stuck contact may advance in a step. A Runge–Kutta step then has an error
-/// of about 1e-5 of its swing; at half of it, the runs differ by less than by another seed.
+/// of about 1e-5 of the contact's swing; half of this phase changes the runs less than another seed does.
 const LARGEST_PHASE: f64 = 0.25;
 
 /// A chain with dry friction, belt and tilted rail.
 ///
-/// Angles of its state are from the vertical, as in a plant without tilt; inside they are from the rail's normal.
+/// Angles of its state are from the vertical, as in a plant without tilt; internally they are from the rail's normal.
 #[derive(Debug, Clone, PartialEq)]
 pub struct RealChain<const N: usize> {
     plant: ChainPlant<N>,
@@ -34,7 +34,7 @@ pub struct RealChain<const N: usize> {
     longest_step_s: f64,
 }
 
-/// What moves.
+/// The moving parts: chain and rotor.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Motion<const N: usize> {
     chain: ChainState<N>,
@@ -114,13 +114,13 @@ impl<const N: usize> RealChain<N> {
         self.longest_step_s
     }
 
-    /// The same machine with another longest step (s), to see what it changes.
+    /// The same machine with another longest step (s), to study its effect.
     pub fn with_longest_step_s(mut self, longest_step_s: f64) -> Self {
         self.longest_step_s = longest_step_s;
         self
     }
 
-    /// Rate of change at `at`, when the bristles were bent as now at `from`.
+    /// Rate of change in `at`, reached from `from`, where the bristles were bent as they are stored now.
     #[inline]
     fn derivative(&self, from: &Motion<N>, at: &Motion<N>, force: f64, torques: &[f64; N]) -> Motion<N> {
         let (mut on_cart, mut torques) = (force, *torques);
@@ -177,7 +177,7 @@ impl<const N: usize> RealChain<N> {
     }
 }
 
-/// What each joint turns by when the links turn from `from` to `to`.
+/// Change of each joint's angle when the links turn from the absolute angles `from` to `to`.
 #[inline]
 fn relative<const N: usize>(to: &[f64; N], from: &[f64; N]) -> [f64; N] {
     core::array::from_fn(|j| {
@@ -247,7 +247,7 @@ impl<const N: usize> Plant for RealChain<N> {
         state[2] += self.slope.angle;
     }
 
-    /// The bristles relax, and the rotor is in the middle of its play.
+    /// Also relaxes the bristles and centres the rotor in its backlash.
     fn set_state(&mut self, state: &[f64]) {
         assert_eq!(state.len(), self.states(), "a chain of {N} links has 2n + 2 states");
         let mut chain = ChainState::from_relative(state);
@@ -258,7 +258,7 @@ impl<const N: usize> Plant for RealChain<N> {
         self.bent = ([0.0; N], 0.0);
     }
 
-    /// With the bristles as they are bent now.
+    /// Uses the bristles as they are bent now.
     fn rate(&self, state: &[f64], force: f64, disturbances: &[f64], rate: &mut [f64]) {
         let mut other = self.clone();
         other.set_state(state);
@@ -300,7 +300,8 @@ impl<const N: usize> Plant for RealChain<N> {
     }
 }
 
-/// The plant of a rig's chain as it really is; that of [`chain_plant`] if nothing in `[reality]` changes its motion.
+/// The plant of a rig's chain with its imperfections; that of [`chain_plant`] if none in `[reality]` changes its
+/// motion other than through masses, lengths and inertias.
 ///
 /// # Errors
 /// [`PlantError::UnsupportedLinks`] unless the chain has 1 to [`MAX_LINKS`](crate::rig::MAX_LINKS) links.

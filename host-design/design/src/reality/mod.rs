@@ -1,14 +1,14 @@
 //! The machine as it really is: what `[reality]` of a rig file adds to the model when a run is simulated.
 //!
-//! - [`Bristle`]: dry friction that sticks.
-//! - [`Belt`]: backlash and a belt that gives.
+//! - [`Bristle`]: dry friction with sticking.
+//! - [`Belt`]: backlash and an elastic belt.
 //! - [`real_plant`]: the chain with both, on a tilted rail, with its real masses and lengths.
 //! - [`Driver`]: motor driver and supply.
 //! - [`Timing`]: when the force of a tick begins and ends.
 //! - [`Encoders`]: errors of encoders and of their zeros.
 //!
-//! Equations, sources and the step size are in `docs/reality.md`. What a rig file leaves out is absent: the simulation
-//! then does the same operations as without `[reality]`, and gives the same bits.
+//! Equations, sources and the step size are in `docs/reality.md`. What a rig file leaves out is not simulated:
+//! the simulation then does the same operations as without `[reality]`, and has the same bits.
 
 mod belt;
 mod bristle;

@@ -5,7 +5,7 @@ use rand_pcg::Pcg64;
 
 use crate::rig::{Chain, ParameterErrors};
 
-/// `chain` with the errors of `[reality]`. A given centre of mass moves with the length, and a given inertia follows
+/// `chain` with the errors of `[reality]`. A given centre of mass moves with the length; the inertia scales with
 /// m l² and then has its own error.
 pub fn real_chain(chain: &Chain, errors: &ParameterErrors) -> Chain {
     if *errors == (crate::rig::Reality::default().parameters) {

@@ -5,8 +5,8 @@ use rand_pcg::Pcg64;
 
 use crate::rig::Rig;
 
-/// Latency of the force and jitter of the tick: tick k begins at `k T + j_k` with `j_k` drawn evenly from ± the jitter,
-/// and the force of tick k begins to act one latency later.
+/// Latency of the force and jitter of the tick: tick k begins at `k T + j_k` with `j_k` drawn uniformly from ± the
+/// jitter, and the force of tick k begins to act one latency later.
 #[derive(Debug, Clone)]
 pub struct Timing {
     period_s: f64,
@@ -19,7 +19,7 @@ pub struct Timing {
 impl Timing {
     /// The timing of a rig; `seed` is that of the run.
     pub fn of(rig: &Rig, seed: u64) -> Self {
-        // Another sequence than that of the disturbances.
+        // A different sequence from that of the disturbances.
         let random = Pcg64::seed_from_u64(!seed);
         let driver = &rig.reality.driver;
         let (latency_s, jitter_s) = (driver.latency_s, driver.jitter_s);

@@ -26,7 +26,7 @@ use super::{
 const DEFAULT: &str = "(default)";
 
 impl Rig {
-    /// The rig's values as plain text of less than 80 columns. Values that equal their default or were left out are
+    /// The rig's values as plain text, narrower than 80 columns. Values that equal their default or were left out are
     /// marked `(default)`.
     pub fn describe(&self) -> String {
         let mut page = Page::default();
@@ -91,7 +91,7 @@ impl Page {
         }
     }
 
-    /// A key with its numbers or, if it has none, with what applies instead.
+    /// A key with its numbers or, if it has none, with the default that applies.
     fn row(&mut self, section: &Section, key: &Key, numbers: &[f64]) {
         let label = match key.label() {
             label if label.is_empty() => section.name.to_owned(),

@@ -1,18 +1,18 @@
-//! Changes of single values in the text of a rig file. Everything else of the text stays, comments too.
+//! Changes single values in the text of a rig file. The rest of the text, comments included, stays as it is.
 
 use toml_edit::{Document, Item, TableLike};
 
-/// A text in which a value was changed.
+/// The text of a rig file after one value was changed.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Edited {
     /// The new text.
     pub text: String,
-    /// Whether the key was not there and was added.
+    /// Whether the key was missing and has been added.
     pub added: bool,
 }
 
-/// `text` with `value`, as it is written in TOML, for `key`: `tick.period_s`, `link[2].mass_kg`,
-/// `lqr.state_weights[1]`. A key that is not there is added; none if it has no place.
+/// Returns `text` with `value`, in TOML syntax, as the value of `key`: `tick.period_s`, `link[2].mass_kg`,
+/// `lqr.state_weights[1]`. A missing key is added. `None` if the text is not TOML or has no place for the key.
 pub fn with_value(text: &str, key: &str, value: &str) -> Option<Edited> {
     match place(text, key) {
         Place::At(span) => {
@@ -27,13 +27,13 @@ pub fn with_value(text: &str, key: &str, value: &str) -> Option<Edited> {
     }
 }
 
-/// Where the value of `key` stands in `text`.
+/// Finds the place of the value of `key` in `text`.
 fn place(text: &str, key: &str) -> Place {
     let Ok(document) = Document::parse(text) else { return Place::Nowhere };
     let mut steps = key.split('.').peekable();
     let mut table: &dyn TableLike = document.as_table();
     let mut header = String::new();
-    let mut number = 0; // which of several tables of that header
+    let mut number = 0; // which of the tables with that header, from 0
     while let Some(step) = steps.next() {
         let (name, index) = indexed(step);
         let item = table.get(name);
@@ -71,11 +71,11 @@ fn place(text: &str, key: &str) -> Place {
 }
 
 enum Place {
-    /// In these bytes.
+    /// The value takes these bytes.
     At(core::ops::Range<usize>),
-    /// Not there; it would go here, after this.
+    /// The key is missing: insert `prefix` and then the value at the byte `at`.
     New { at: usize, prefix: String },
-    /// Not known.
+    /// The text has no place for the key.
     Nowhere,
 }
 
@@ -88,7 +88,8 @@ fn indexed(step: &str) -> (&str, Option<usize>) {
     }
 }
 
-/// A new line `name = …` after the line with this header, the one with that number; at the top without header.
+/// The place of a new line `name = …`: below the occurrence `number` (from 0) of `header`, or at the top of the file
+/// if `header` is empty.
 fn new_line(text: &str, header: &str, number: usize, name: &str) -> Place {
     if header.is_empty() {
         return Place::New { at: 0, prefix: name.to_owned() };

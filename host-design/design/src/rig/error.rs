@@ -1,4 +1,4 @@
-//! Errors of a rig file. Each gives the place, the key, what was found and what to do about it.
+//! Errors in a rig file. Each names the place, the key, what was found and what to do about it.
 
 use std::fmt;
 use std::path::{Path, PathBuf};
@@ -16,9 +16,9 @@ pub const MAX_BYTES: u64 = 1 << 20;
 pub struct RigError {
     /// The file, as named by the caller.
     pub file: PathBuf,
-    /// Where in the file, if it could be read as text.
+    /// Position in the file; none for an error about the file as a whole.
     pub place: Option<Place>,
-    /// Which key, in full: `link[2].mass_kg`.
+    /// The key in full, such as `link[2].mass_kg`; none for an error that is about no key.
     pub key: Option<String>,
     /// What is wrong with it.
     pub kind: Box<RigErrorKind>,

@@ -177,7 +177,7 @@ impl Value for u8 {
     }
 }
 
-/// One number for every joint, or one per joint.
+/// A quantity of the joints: one number shared by all of them, or one number per joint.
 #[derive(Debug, Clone, PartialEq, serde::Serialize)]
 pub struct PerJoint(Vec<f64>);
 
@@ -187,7 +187,7 @@ impl PerJoint {
         Self(vec![number])
     }
 
-    /// One number per joint.
+    /// One number per joint, from the cart outwards.
     pub fn each(numbers: Vec<f64>) -> Self {
         Self(numbers)
     }
@@ -246,7 +246,7 @@ impl Value for [f64; 2] {
     }
 }
 
-/// A structure whose fields are the keys of a section, made by `keys!`.
+/// A structure whose fields are the keys of a section; `keys!` implements it.
 pub(super) trait Keys: Sized {
     /// A row per field.
     const KEYS: &'static [Key];
@@ -261,7 +261,7 @@ pub(super) trait Keys: Sized {
     fn values(&self) -> Vec<Vec<f64>>;
 }
 
-/// Declares a structure of scalar keys: a row gives field, type, unit, rule, meaning, and what holds without the key.
+/// Declares a structure of scalar keys. A row states field, type, unit, rule, meaning and the default.
 ///
 /// The row is all that reading, `upright check` and the documentation need. Fields serialise in the order of the rows,
 /// and the rig's hash depends on it.

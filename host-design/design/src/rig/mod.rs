@@ -65,7 +65,7 @@ pub struct Rig {
     /// Coulomb friction that the controller compensates, if any is known.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub friction: Option<KnownFriction>,
-    /// Limits the supervisor enforces.
+    /// Limits that the supervisor enforces.
     pub limits: Limits,
     /// What `upright verify` requires.
     #[serde(skip)]
@@ -76,13 +76,13 @@ pub struct Rig {
     /// The tolerances that `upright robust` chooses gains for, if stated.
     #[serde(skip)]
     pub robust: Option<Tolerances>,
-    /// What `upright swing-up` plans within, if the rig is to raise itself.
+    /// Limits of the motions that `upright swing-up` plans, if the rig is to swing itself up.
     #[serde(skip)]
     pub swing_up: Option<SwingUpRules>,
 }
 
 impl Rig {
-    /// The rig with `law` alone: whether the other one has a design does not matter to it.
+    /// The rig with `law` as its only control law, so that a design cannot fail because of the other one.
     pub fn with_law_alone(&self, law: Law) -> Self {
         let mut rig = self.clone();
         match law {
@@ -100,8 +100,8 @@ impl Rig {
         self.plant.states()
     }
 
-    /// Largest force on the cart (N): the smaller of the file's limit and the motor's stall force, as far as they
-    /// exist. None: no limit.
+    /// Largest force on the cart (N): the smaller of the file's limit and the motor's stall force, where given.
+    /// None: no limit.
     pub fn force_limit_n(&self) -> Option<f64> {
         let stall = self.actuator.motor.as_ref().map(Motor::stall_force_n);
         match (self.actuator.force_limit_n, stall) {

@@ -12,7 +12,7 @@ use super::rule::Rule;
 /// A rig file's text and name.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Source<'a> {
-    /// Name of the file.
+    /// Name of the file, as printed in errors.
     pub(super) file: &'a Path,
     /// Its text.
     pub(super) text: &'a str,
@@ -43,7 +43,7 @@ impl<'a> Source<'a> {
         })
     }
 
-    /// The key on the line of a byte offset, if one stands before it.
+    /// The key that precedes a byte offset on its line, if there is one.
     fn key_before(&self, offset: usize) -> Option<String> {
         let (key, _) = self.text.get(..offset)?.rsplit('\n').next()?.split_once('=')?;
         let key = key.trim();
@@ -148,7 +148,7 @@ impl<'a> Node<'a> {
             .ok_or_else(|| self.out_of_range(accepts, &remedy))
     }
 
-    /// A text.
+    /// A string.
     pub(super) fn text(&self, accepts: &str, meaning: &str) -> Result<&'a str, RigError> {
         match self.found {
             Found::Value(Value::String(text)) => Ok(text.value()),
@@ -232,7 +232,7 @@ pub(super) struct Table<'a> {
 }
 
 impl<'a> Table<'a> {
-    /// The document itself: the keys of `section`, and the sections of these names.
+    /// The document itself, with the keys of `section` and the sections of these names.
     pub(super) fn root(
         source: &'a Source<'a>,
         document: &'a Document<&'a str>,
@@ -279,7 +279,7 @@ impl<'a> Table<'a> {
         Some(Node { source: self.source, key: self.full_key(name), span, found })
     }
 
-    /// An error saying that a key is absent. `remedy` completes "add".
+    /// An error saying that a key is missing. `remedy` completes "add".
     pub(super) fn missing(&self, name: &str, remedy: &str) -> RigError {
         let remedy = remedy.to_owned();
         self.source.error(self.start, Some(self.full_key(name)), RigErrorKind::MissingKey { remedy })

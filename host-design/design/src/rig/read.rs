@@ -1,4 +1,4 @@
-//! Checks the text of a rig file and makes a [`Rig`] of it.
+//! Checks the text of a rig file and builds a [`Rig`] from it.
 
 use super::error::RigError;
 use super::key::{Keys, Section};

@@ -32,7 +32,7 @@ impl Rule {
         accepts: "a number from 1e-6 to 10 (s)",
         admits: |x| x.iter().all(|&x| (1e-6..=10.0).contains(&x)),
     };
-    /// A share of 1.
+    /// A share of a whole.
     pub(super) const SHARE: Rule =
         Rule { accepts: "a number from 0 to 1", admits: |x| x.iter().all(|&x| (0.0..=1.0).contains(&x)) };
     /// A share (%).
@@ -46,7 +46,7 @@ impl Rule {
         accepts: "a number from -pi to pi (rad)",
         admits: |x| x.iter().all(|&x| (-PI..=PI).contains(&x)),
     };
-    /// How much too large or too small something is (%).
+    /// A relative excess of either sign (%).
     pub(super) const SIGNED_PERCENT: Rule = Rule {
         accepts: "a number > -100 and <= 900 (%)",
         admits: |x| x.iter().all(|&x| x > -100.0 && x <= 900.0),
@@ -70,7 +70,7 @@ impl Rule {
     /// Encoder counts per revolution.
     pub(super) const COUNTS: Rule =
         Rule { accepts: "a number >= 2", admits: |x| x.iter().all(|&x| x >= 2.0) };
-    /// No tick of delay or one.
+    /// A delay of no tick or of one tick.
     pub(super) const ZERO_OR_ONE: Rule =
         Rule { accepts: "0 or 1", admits: |x| x.iter().all(|&x| x == 0.0 || x == 1.0) };
     /// Two ends with the origin between them.
@@ -84,7 +84,7 @@ impl Rule {
         Rule { accepts, admits: |_| true }
     }
 
-    /// The same condition in other words, for a key whose section checks more.
+    /// The same condition with another wording, for a key whose section checks more.
     pub(super) const fn worded(self, accepts: &'static str) -> Rule {
         Rule { accepts, ..self }
     }

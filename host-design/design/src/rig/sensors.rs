@@ -18,8 +18,8 @@ enum Resolution {
 }
 
 impl Sensor {
-    /// Travel per count (m, rad, or the unit of the state), in the precision asked for: 2π over the counts is not
-    /// exact in `f64`.
+    /// Travel per count (m, rad, or the unit of the state), in the precision of `R`: 2π over the counts is not exact
+    /// in `f64`.
     pub fn step<R: Real>(&self) -> R {
         match self.resolution {
             Resolution::Step(step) => R::from_f64(step),

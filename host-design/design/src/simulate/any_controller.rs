@@ -1,7 +1,7 @@
 //! The firmware's controller behind an interface without its numbers of states and sensors.
 //!
-//! These are parameters of the controller's type, so each pair is compiled separately. Only what is in this file is;
-//! the loop around it is compiled once.
+//! These are parameters of the controller's type, so each pair is compiled separately. This applies only to the code
+//! in this file; the loop around it is compiled once.
 
 use nalgebra::SVector;
 use upright::control::controller::{Controller, MotorCommand, Rejected};
@@ -78,11 +78,11 @@ fn array<const N: usize>(counters: &[u32]) -> &[u32; N] {
     counters.try_into().expect("one counter per sensor of the table")
 }
 
-/// What is done with controllers; it gives how each run ended.
+/// An action on controllers that returns how each run ended.
 pub(super) type Action<'a> =
     &'a mut dyn FnMut(Vec<Box<dyn AnyController + '_>>) -> Result<Vec<Option<Fall>>, SimulationError>;
 
-/// Makes `count` controllers of `table` and does `action` with them.
+/// Makes `count` controllers of `table` and runs `action` with them.
 ///
 /// # Errors
 /// [`SimulationError`] if the firmware refuses the table or is not compiled for its size; those of `action`.

@@ -33,7 +33,7 @@ pub struct Bench {
     substeps: usize,
     delay: bool,
     pending_drive: Drive,
-    /// What acts until the latency of the next tick is over.
+    /// The command that still acts during the latency of the next tick.
     acting_drive: Drive,
 }
 
@@ -87,7 +87,7 @@ impl Bench {
         self.period_s
     }
 
-    /// Sets the state (m, m/s, rad, rad/s …), as a hand does that holds the rig.
+    /// Sets the state (m, m/s, rad, rad/s …), as a hand that holds the rig does.
     pub fn hold(&mut self, state: &[f64]) {
         self.plant.set_state(state);
         self.state.copy_from_slice(state);
@@ -107,7 +107,7 @@ impl Bench {
         if sensor == 0 { CounterWidth::Bits32 } else { CounterWidth::Bits16 }
     }
 
-    /// Writes what the hardware counters show into `counters`; those without a sensor keep their value.
+    /// Writes the readings of the hardware counters into `counters`; entries without a sensor keep their value.
     pub fn read_counters(&self, counters: &mut [u32]) {
         for index in 0..counters.len().min(self.sensors.len()) {
             let (state, step) = self.sensors[index];
@@ -127,14 +127,14 @@ impl Bench {
         counters
     }
 
-    /// Writes what the counters show at position 0.
+    /// Writes the readings of the counters at position 0 into `counters`.
     pub fn read_counters_at_zero(&self, counters: &mut [u32]) {
         for (index, counter) in counters.iter_mut().enumerate() {
             *counter = Self::reading(index, self.counter_start);
         }
     }
 
-    /// What the counter of sensor number `sensor` shows after `counts`: their low bits.
+    /// Reading of the counter of sensor number `sensor` after `counts`: their low bits.
     pub const fn reading(sensor: usize, counts: u32) -> u32 {
         match Self::width(sensor) {
             CounterWidth::Bits16 => counts & 0xffff,
@@ -162,8 +162,8 @@ impl Bench {
         self.pull_n_m.iter_mut().zip(torques_n_m).for_each(|(pull, &torque)| *pull = torque);
     }
 
-    /// Simulates one tick with the command `drive` from its start; gives the motor's force on the cart at the start of
-    /// the tick (N), without the disturbance.
+    /// Simulates one tick with the command `drive`, issued at its start; returns the motor's force on the cart at the
+    /// start of the tick (N), without the disturbance.
     pub fn tick(&mut self, drive: Drive) -> f64 {
         let (now, disturbance) = self.begin(drive);
         let before = std::mem::replace(&mut self.acting_drive, now);
@@ -174,8 +174,8 @@ impl Bench {
         self.advance(now, disturbance, rest)
     }
 
-    /// Begins a tick with the command `drive`: gives the one that acts, and the disturbing force (N). The joint
-    /// torques are drawn, too.
+    /// Begins a tick with the command `drive`: returns the command that acts in it, which is that of the tick before
+    /// if there is a delay, and the disturbing force (N). Draws the joint torques, too.
     fn begin(&mut self, drive: Drive) -> (Drive, f64) {
         let now = if self.delay { std::mem::replace(&mut self.pending_drive, drive) } else { drive };
         let push = std::mem::take(&mut self.push_n);
@@ -193,8 +193,8 @@ impl Bench {
         StandardNormal.sample(&mut self.random)
     }
 
-    /// The chain, if it can be simulated in lockstep: nothing in `[reality]` changes its motion, and in a tick there
-    /// is one force for one length.
+    /// The chain, if it can be simulated in lockstep: nothing in `[reality]` changes its motion, and a tick has a
+    /// single force and always the same length.
     pub(super) fn lockstep_chain(rig: &Rig) -> Option<Chain> {
         let PlantDescription::Chain(chain) = &rig.plant else { return None };
         let driver = &rig.reality.driver;
@@ -205,7 +205,7 @@ impl Bench {
         ideal_chain(chain, rig).filter(|_| is_simple)
     }
 
-    /// Begins a tick in lockstep: puts force and torques into a lane, and gives the motor's force (N).
+    /// Begins a tick in lockstep: puts force and torques into a lane, and returns the motor's force (N).
     pub(super) fn push_lane(&mut self, drive: Drive, lanes: &mut dyn ChainLanes, lane: usize) -> f64 {
         let (now, disturbance) = self.begin(drive);
         let force = self.force(now, self.period_s);
@@ -213,21 +213,22 @@ impl Bench {
         force
     }
 
-    /// Ends a tick in lockstep.
+    /// Ends a tick in lockstep: reads the state from a lane.
     pub(super) fn read_lane(&mut self, lanes: &dyn ChainLanes, lane: usize) {
         lanes.write_state(lane, &mut self.state);
     }
 
-    /// The supply voltage, as a share of that without load.
+    /// The supply voltage, as a share of the voltage without load.
     pub fn supply_share(&self) -> f64 {
         self.driver.as_ref().map_or(1.0, Driver::supply_share)
     }
 
-    /// Simulates `length_s` of a tick, in which the command does not change; gives the motor's force at its start.
+    /// Simulates a part of a tick of `length_s` (s), in which the command does not change; returns the motor's force
+    /// at its start (N).
     fn advance(&mut self, drive: Drive, disturbance: f64, length_s: f64) -> f64 {
         let substeps = self.substeps_in(length_s);
         let step = length_s / substeps as f64;
-        // Within the tick, the back-EMF follows the speed, and the driver the command.
+        // Within the tick, the back-EMF follows the speed and the driver follows the command, so the force changes.
         let changes = self.driver.is_some() || matches!((&self.motor, drive), (Some(_), Drive::Duty(_)));
         let (pieces, piece, substeps) = if changes { (substeps, step, 1) } else { (1, length_s, substeps) };
         let mut at_start = None;
@@ -240,7 +241,7 @@ impl Bench {
         at_start.unwrap_or_default()
     }
 
-    /// As many substeps as the length has a share in a tick.
+    /// Number of integration steps in a part of a tick, in proportion to its length (s).
     fn substeps_in(&self, length_s: f64) -> usize {
         if length_s == self.period_s {
             return self.substeps;
@@ -260,10 +261,10 @@ impl Bench {
     }
 }
 
-/// The nearest integer, that away from 0 if there are two.
+/// The nearest integer; of two equally near ones, that away from 0.
 #[inline]
 fn nearest(value: f64) -> i64 {
-    // The largest number below a half: with a half, a value just below a half would be rounded up.
+    // Adds the largest number below a half: adding a half would round up a value just below a half.
     (value + 0.499_999_999_999_999_94_f64.copysign(value)) as i64
 }
 

@@ -1,4 +1,4 @@
-//! Ticks of the firmware's controller, and of the plant in between.
+//! Runs the firmware's controller tick by tick, and the plant between the ticks.
 
 use core::ops::ControlFlow;
 
@@ -50,7 +50,7 @@ pub fn run(
     Ok(falls.into_iter().next().flatten())
 }
 
-/// This run to its end.
+/// Runs `run` to its end by itself, not in lockstep.
 pub(super) fn alone(
     mut run: Run<'_>,
     observe: &mut dyn FnMut(&Sample<&[f64]>),
@@ -92,7 +92,7 @@ pub(super) struct Run<'a> {
 }
 
 impl<'a> Run<'a> {
-    /// The run through `scenario` with this controller, which has `sensors` counters.
+    /// A run through `scenario` with this controller, which reads `sensors` counters.
     pub(super) fn start(
         rig: &'a Rig,
         controller: &'a mut dyn AnyController,
@@ -121,7 +121,7 @@ impl<'a> Run<'a> {
         self.tick as f64 * self.rig.tick.period_s
     }
 
-    /// The command of this tick.
+    /// Runs the controller for this tick and returns its command.
     pub(super) fn control(&mut self) -> Result<MotorCommand, SimulationError> {
         self.controller.set_setpoint(self.scenario.target_m(self.time_s()) as f32)?;
         self.state.copy_from_slice(self.bench.state());
@@ -139,8 +139,8 @@ impl<'a> Run<'a> {
         Ok(command)
     }
 
-    /// Ends this tick, in which the bench was simulated with `force` (N) at its start. Breaks with the fall, if there
-    /// was one, when the run ends.
+    /// Ends this tick, in which the bench was simulated with `force` (N) at its start. When the run ends, breaks with
+    /// the fall, if there was one.
     pub(super) fn finish(
         &mut self,
         command: &MotorCommand,

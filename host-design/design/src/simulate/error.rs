@@ -5,7 +5,7 @@ use upright::table::TableError;
 
 use crate::plant::PlantError;
 
-/// Most ticks of a run: an hour at 1 ms, and a record of some 450 MB for a quadruple pendulum.
+/// Largest number of ticks of a run: over an hour at 1 ms, and a record of some 450 MB for a quadruple pendulum.
 pub(super) const MAX_TICKS: u32 = 4_000_000;
 
 /// A run that cannot be started.
@@ -29,7 +29,7 @@ pub enum SimulationError {
     /// A run whose record would not fit into memory.
     #[error("a run of {duration_s} s has more than {MAX_TICKS} ticks of {period_s} s: shorten it")]
     TooLong {
-        /// Length of the run (s).
+        /// Duration of the run (s).
         duration_s: f64,
         /// Control period (s).
         period_s: f64,

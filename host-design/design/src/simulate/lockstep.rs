@@ -1,4 +1,4 @@
-//! Many runs in lockstep: several plants in one vector of the processor.
+//! Many runs in lockstep, with several plants in one SIMD vector.
 
 use core::ops::ControlFlow;
 
@@ -17,20 +17,20 @@ use crate::table::TableValues;
 pub struct Job<'a> {
     /// Rig whose plant is simulated.
     pub rig: &'a Rig,
-    /// What happens.
+    /// Start, set-point, disturbances and sensors of the run.
     pub scenario: &'a Scenario,
     /// Called in every tick.
     pub observe: &'a mut dyn FnMut(&Sample<&[f64]>),
 }
 
-/// Runs all jobs, each as [`run`](super::run) does, bit for bit, and gives how each ended.
+/// Runs all jobs, each with the same bits as [`run`](super::run), and returns how each ended.
 ///
-/// [`LANES`] plants advance together; a run that ends makes room for the next one. Alone run rigs whose `[reality]`
-/// changes motion, driver or timing, those with a motor, those with fewer than 3 or more than 5 links, and jobs with
-/// different ticks or integration steps.
+/// [`LANES`] plants advance together; a run that ends makes room for the next one. The jobs run one after the other
+/// if there is only one, if a rig's `[reality]` changes motion, driver or timing, if a rig has a motor or does not
+/// have 3 to 5 links, or if the jobs differ in number of links, tick or integration steps.
 ///
 /// # Errors
-/// Those of the first job that has one.
+/// As for [`run`](super::run), if any of the jobs fails.
 pub fn run_all(table: &TableValues, jobs: &mut [Job<'_>]) -> Result<Vec<Option<Fall>>, SimulationError> {
     let chains: Option<Vec<Chain>> = jobs.iter().map(|job| Bench::lockstep_chain(job.rig)).collect();
     let lanes = chains.as_ref().filter(|_| are_alike(jobs)).and_then(|chains| {
@@ -51,7 +51,7 @@ pub fn run_all(table: &TableValues, jobs: &mut [Job<'_>]) -> Result<Vec<Option<F
     })
 }
 
-/// Whether all have the same tick and integration steps.
+/// Whether all jobs have the same tick and integration steps.
 fn are_alike(jobs: &[Job<'_>]) -> bool {
     let steps = |job: &Job<'_>| (job.rig.tick.period_s, job.scenario.substeps);
     jobs.windows(2).all(|pair| steps(&pair[0]) == steps(&pair[1]))
@@ -97,7 +97,7 @@ impl Lockstep<'_, '_> {
         Ok(falls)
     }
 
-    /// Begins the next job in this lane, which is cleared if there is none.
+    /// Starts the next job in this lane, or clears the lane if there is none.
     fn place_next(&mut self, lane: usize) -> Result<Option<usize>, SimulationError> {
         let job = self.next;
         let Some(chain) = self.chains.get(job) else {

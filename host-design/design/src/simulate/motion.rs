@@ -11,7 +11,7 @@ use super::scenario::Scenario;
 use crate::rig::Rig;
 use crate::table::{SwingUpValues, TableValues, WithSize, with_firmware_size};
 
-/// What a run reaches while it raises and lowers, by the controller's own estimate.
+/// Extreme values that a run reaches during its motions, by the controller's own estimate.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Extremes {
     /// Largest innovation of each sensor (m or rad).
@@ -29,7 +29,7 @@ pub(crate) struct Extremes {
 }
 
 impl Extremes {
-    /// Nothing reached yet.
+    /// The extremes before the first tick.
     pub(crate) fn none(sensors: usize) -> Self {
         Self {
             innovation: vec![0.0; sensors],
@@ -41,7 +41,7 @@ impl Extremes {
         }
     }
 
-    /// The largest of both.
+    /// Extends these extremes by those of another run.
     pub(crate) fn include(&mut self, other: &Self) {
         raise_to(&mut self.innovation, &other.innovation);
         raise_to(&mut self.moved, &other.moved);
@@ -51,7 +51,7 @@ impl Extremes {
         self.travel_m = [self.travel_m[0].min(other.travel_m[0]), self.travel_m[1].max(other.travel_m[1])];
     }
 
-    /// A tick with this estimate, `away` from the planned state.
+    /// Includes a tick with this estimate; `away` is the estimate minus the planned state.
     fn note(&mut self, estimate: &[f32], away: &[f32]) {
         self.deviation_m = self.deviation_m.max(f64::from(away[0].abs()));
         let mut lean = 0.0;
@@ -65,15 +65,15 @@ impl Extremes {
     }
 }
 
-/// Raises each of `largest` to its value.
+/// Raises each entry of `largest` to that of `values`, if that is larger.
 fn raise_to(largest: &mut [f64], values: &[f64]) {
     largest.iter_mut().zip(values).for_each(|(largest, value)| *largest = largest.max(*value));
 }
 
-/// Makes motions of `table` with `rig`, which may differ from the one that the table is for, from the state in which
-/// `scenario` begins and with its disturbances. With `other`, it is this one of the table's other motions, at whose end
-/// the links are held for `balance_ticks` if one of them is up. Without, the links are raised, balanced for these ticks
-/// and lowered. None if the table has no motions.
+/// Runs motions of `table` on `rig`, which may differ from the rig that the table is for, from the start of `scenario`
+/// and with its disturbances. Without `other`, the links are raised, balanced for `balance_ticks` and lowered. With
+/// `other`, only this one of the table's other motions is run; if a link is up at its end, the links are held there
+/// for `balance_ticks`. None if the table has no motions.
 ///
 /// # Errors
 /// [`SimulationError`] if the plant cannot be built or the firmware refuses the table.
@@ -96,7 +96,7 @@ struct Follow<'a> {
     table: &'a TableValues,
     swing_up: &'a SwingUpValues,
     bench: Bench,
-    /// A motion of the table's others, instead of raising and lowering.
+    /// Index of one of the table's other motions, to run instead of raising and lowering.
     other: Option<usize>,
     balance_ticks: usize,
 }
@@ -142,8 +142,8 @@ struct Run<'t, const NX: usize, const NY: usize, const N: usize> {
 }
 
 impl<'t, const NX: usize, const NY: usize, const N: usize> Run<'t, NX, NY, N> {
-    /// Follows `motion` from the set-point, with the tests of the supervisor but without its thresholds, and stays at
-    /// its end for some ticks; then hands over.
+    /// Follows `motion` from the set-point, with the tests of the supervisor but without its thresholds, stays at its
+    /// end for `hold_ticks`, and then hands over to the control law.
     fn follow(&mut self, motion: MotionTable<'t>, hold_ticks: usize) {
         let Self { controller, bench, reached, .. } = self;
         let mut player = Player::<NX, NY>::new(motion, controller.law_state().setpoint);
@@ -174,7 +174,7 @@ impl<'t, const NX: usize, const NY: usize, const N: usize> Run<'t, NX, NY, N> {
         controller.hand_over(player.now().x[0]);
     }
 
-    /// Balances where the motion has ended.
+    /// Balances for `ticks` at the position where the motion has ended.
     fn balance(&mut self, ticks: usize) -> Result<(), SimulationError> {
         let here = self.controller.law_state().setpoint;
         self.controller.set_setpoint(here)?;

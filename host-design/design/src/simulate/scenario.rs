@@ -11,7 +11,7 @@ pub struct Scenario {
     pub law: Law,
     /// What the controller measures.
     pub sensing: Sensing,
-    /// Length of the run (s).
+    /// Duration of the run (s).
     pub duration_s: f64,
     /// State at the start (m, m/s, rad, rad/s …).
     pub start: Vec<f64>,
@@ -33,22 +33,22 @@ pub struct Scenario {
     pub substeps: usize,
     /// Reading of the encoder counters at position 0.
     pub counter_start: u32,
-    /// How the run begins, with the whole firmware.
+    /// How a run with the whole firmware begins.
     pub begin: Begin,
-    /// What the whole firmware is told to do after that, in this order.
+    /// Equilibria to which the whole firmware is then told to go, in this order.
     pub goals: Vec<Goal>,
 }
 
-/// An equilibrium to which the firmware is told to bring the links.
+/// A command to the firmware to bring the links to an equilibrium.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Goal {
-    /// When it is told (s).
+    /// Time of the command (s).
     pub at_s: f64,
-    /// The equilibrium.
+    /// The equilibrium to go to.
     pub to: Equilibrium,
 }
 
-/// How a run begins, with the whole firmware.
+/// How a run with the whole firmware begins.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Begin {
     /// A hand holds the links upright in the state `start` until the firmware balances them.

@@ -1,4 +1,4 @@
-//! Figures of a run.
+//! Characteristic figures of a run.
 
 use core::fmt;
 
@@ -12,9 +12,9 @@ use crate::rig::{PlantDescription, Rig};
 /// Loss of balance, which ends a run.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Fall {
-    /// When (s).
+    /// Time of the fall (s).
     pub at_s: f64,
-    /// How.
+    /// Kind of the fall.
     pub kind: FallKind,
 }
 
@@ -33,8 +33,8 @@ pub enum FallKind {
 }
 
 impl Fall {
-    /// Whether `state` is beyond rescue: a link below the horizontal, the cart off its rail, a model's state out of
-    /// all proportion, or a value that is not finite.
+    /// The fall at the time `at_s`, if `state` is one: a link below the horizontal, the cart off its rail, a model's
+    /// state beyond a million, or a value that is not finite.
     pub fn of(rig: &Rig, at_s: f64, state: &[f64]) -> Option<Self> {
         let is_finite = state.iter().fold(true, |all, value| all & value.is_finite());
         let kind = match &rig.plant {
@@ -42,7 +42,7 @@ impl Fall {
             PlantDescription::Chain(chain) => {
                 let is_up = |angle: f64| angle.abs() <= core::f64::consts::FRAC_PI_2;
                 let [left, right] = chain.cart.travel_m;
-                // Without branches, because nearly always all are up.
+                // Without branches, because nearly always all links are up.
                 if !absolute_angles(state).fold(true, |all, angle| all & is_up(angle)) {
                     FallKind::Link(1 + absolute_angles(state).take_while(|&angle| is_up(angle)).count())
                 } else if state[0] < left || state[0] > right {
@@ -76,7 +76,7 @@ impl fmt::Display for Fall {
 pub struct Summary {
     /// The loss of balance, if there was one.
     pub fall: Option<Fall>,
-    /// Within the settling band when the run ends.
+    /// Whether the output is within the settling band when the run ends.
     pub settled: bool,
     /// Time after the step from which the run stays settled (s).
     pub settling_time_s: Option<f64>,
@@ -125,7 +125,7 @@ impl Summary {
                 beyond = beyond.max((y - step) * step.signum());
                 against = against.max(-y * step.signum());
             }
-            // NaN is outside, too.
+            // Written so that NaN counts as outside.
             if (y - step).abs().partial_cmp(&band) != Some(core::cmp::Ordering::Less) {
                 last_outside = Some(sample.t);
             }
@@ -148,7 +148,7 @@ impl Summary {
         }
     }
 
-    /// Still standing at the end of the run.
+    /// Whether the rig still stands at the end of the run.
     pub fn stands(&self) -> bool {
         self.fall.is_none()
     }
@@ -162,14 +162,14 @@ impl fmt::Display for Summary {
             (None, None) => writeln!(f, "stands, not settled when the run ends")?,
         }
         if let (Some(over), Some(under)) = (self.overshoot_percent, self.undershoot_percent) {
-            writeln!(f, "  overshoot      {over:.2} %   (first the other way: {under:.2} %)")?;
+            writeln!(f, "  overshoot      {over:.2} %   (undershoot: {under:.2} %)")?;
         }
         for (index, angle) in self.peak_angles_rad.iter().enumerate() {
             writeln!(f, "  peak theta{}    {:.4} rad ({:.2} deg)", index + 1, angle, angle.to_degrees())?;
         }
         writeln!(
             f,
-            "  peak force     {:.3} N (asked for: {:.3} N)",
+            "  peak force     {:.3} N (requested: {:.3} N)",
             self.peak_force_n, self.peak_requested_force_n
         )?;
         write!(f, "  final error    {:.2e} m", self.final_error_m)

@@ -12,7 +12,7 @@ pub struct Trace {
     states: usize,
 }
 
-/// One tick.
+/// Values of one tick; `S` holds a vector of states.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Sample<S> {
     /// Time at the start of the tick (s).
@@ -27,7 +27,7 @@ pub struct Sample<S> {
     pub force: f64,
     /// True state at the start of the tick.
     pub state: S,
-    /// The controller's estimate of it.
+    /// The controller's estimate of the state.
     pub estimate: S,
 }
 
@@ -49,7 +49,7 @@ impl Trace {
         let estimates = states.iter().map(|name| format!("{name}_estimated"));
         let columns: Vec<String> =
             leading.map(str::to_owned).into_iter().chain(states.clone()).chain(estimates).collect();
-        // A record of a very long run grows as it goes.
+        // The record of a very long run grows during the run.
         let rows = Vec::with_capacity((ticks + 1).min(200_000) * columns.len());
         Self { columns, rows, states: states.len() }
     }
@@ -59,7 +59,7 @@ impl Trace {
         &self.columns
     }
 
-    /// Appends a tick.
+    /// Appends one tick to the record.
     pub fn push(&mut self, sample: &Sample<&[f64]>) {
         self.rows.extend([sample.t, sample.target, sample.setpoint, sample.requested, sample.force]);
         self.rows.extend(sample.state);
@@ -83,7 +83,7 @@ impl Trace {
     /// Writes the record as CSV: one header line with units, then one line per tick, numbers as shortest decimals.
     ///
     /// # Errors
-    /// Those of `out`.
+    /// The errors of `out`.
     pub fn write_csv(&self, out: impl Write) -> std::io::Result<()> {
         let mut csv = csv::Writer::from_writer(out);
         csv.write_record(&self.columns)?;

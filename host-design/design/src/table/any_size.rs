@@ -1,4 +1,4 @@
-//! From numbers of states and sensors known at run time to the firmware's types, which take them as parameters.
+//! From numbers of states and sensors known at run time to the firmware's types, which take them as const parameters.
 //!
 //! Everything inside a [`WithSize`] is compiled once per size: only code that needs the numbers in a type belongs
 //! there.
@@ -7,7 +7,7 @@
 pub const MAX_STATES: usize = 30;
 /// The largest number of sensors a gain table can hold: cart and links of the longest chain.
 pub const MAX_SENSORS: usize = 15;
-/// The largest number of sensors for a `[model]` rig; a chain has one for the cart and one for each link.
+/// The largest number of sensors for a `[model]` rig. A chain has one for the cart and one for each link instead.
 pub const MAX_MODEL_SENSORS: usize = 2;
 
 /// An action that needs the numbers of states (NX) and sensors (NY) as parameters of a type, and of a chain's links

@@ -1,4 +1,4 @@
-//! A table's names and values as a tree, for all code that writes a table.
+//! A table's names and values as a tree: the common source of everything that writes a table.
 
 use serde::ser::{Serialize, SerializeMap, Serializer};
 use upright::table::{Part, Reader, Shape, Words};
@@ -51,8 +51,8 @@ struct Builder {
     open: Vec<(&'static str, Vec<Field>)>,
     /// Fields still without a value, each with whether it is optional; innermost last.
     waiting: Vec<(&'static str, Vec<&'static str>, bool)>,
-    /// Lists of structs: how many of them are not yet complete, and those that are; with the number of structs that
-    /// are open around the list.
+    /// Open lists of structs, innermost last: the number of structs that are open around the list, the number of its
+    /// structs that are still missing, and those that are complete.
     lists: Vec<(usize, usize, Vec<Node>)>,
     done: Option<Node>,
 }
@@ -85,7 +85,7 @@ impl Builder {
         fields.push(Field { name, documentation, value });
     }
 
-    /// Gives the innermost list to its field, if all of its structs are there.
+    /// Passes the innermost list on as the value of its field, once all of its structs are there.
     fn complete_list(&mut self) {
         if let Some((_, _, nodes)) = self.lists.pop_if(|(_, missing, _)| *missing == 0) {
             self.value(Node::Structs(nodes));

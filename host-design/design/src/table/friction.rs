@@ -8,13 +8,13 @@ use crate::design::{Design, continuous_plant, zero_order_hold};
 use crate::numerics::{Matrix, solve};
 use crate::rig::Rig;
 
-/// Share of the cart's friction that is compensated: with too much of it the cart wanders.
+/// Share of the cart's friction that is compensated: if too much is compensated, the cart wanders.
 const OF_CART: f64 = 0.9;
 
 /// The values for `[friction]` of the rig; none without.
 ///
-/// The force fed forward for a friction f is `share · (u_s + K x_s) f`, with the state x_s at rest and the force u_s
-/// that f = 1 leads to with the cart at 0: a loop that does not know f pulls the links back from x_s.
+/// The force fed forward for a friction f is `share · (u_s + K x_s) f`, where x_s and u_s are the state and the force
+/// at rest under f = 1 with the cart at 0. Without it, a loop that does not know f would pull the links back from x_s.
 ///
 /// # Errors
 /// [`NoTable::Range`] if a value does not fit.
@@ -58,8 +58,8 @@ pub(super) fn friction_map(
     Ok(Some(map))
 }
 
-/// The states but the cart's position, then the force, at rest under a torque of 1 in each joint: a column for each.
-/// None without gravity, where links rest anywhere.
+/// The rest position under a torque of 1 N·m in a joint, one column per joint: all states except the cart's position,
+/// then the force. None without gravity, where links rest anywhere.
 fn at_rest(a: &Matrix<f64>, b: &Matrix<f64>, torques: &Matrix<f64>) -> Option<Matrix<f64>> {
     let states = a.rows();
     // 0 = A x + B u + G, with the cart at 0.

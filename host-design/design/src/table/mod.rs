@@ -30,7 +30,7 @@ pub use write::{WriteError, write_atomically};
 pub enum Gains {
     /// Those designed for the tick.
     Sampled,
-    /// Those designed for continuous time: to see what the tick does to them.
+    /// Those designed for continuous time: to see the effect of the tick on them.
     Continuous,
 }
 
@@ -49,7 +49,7 @@ pub struct TableValues {
 /// Gains of one law in the largest size.
 pub type LawValues = LawGains<MAX_STATES>;
 
-/// All fields of the table can be read and changed.
+/// Gives access to all fields of the table, for reading and for changes.
 impl Deref for TableValues {
     type Target = GainTable<MAX_STATES, MAX_SENSORS>;
 
@@ -73,7 +73,7 @@ impl Serialize for TableValues {
     }
 }
 
-/// Why a design gives no table.
+/// Why no table can be made from a design.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum NoTable {
     /// The rig file asks for no control law.
@@ -112,7 +112,7 @@ impl TableValues {
         Self::of_rounded(rig, &design.single, &design.double, gains)
     }
 
-    /// The table of a design without proof, for the tick: for trials.
+    /// The table of an uncertified design, with the gains for the tick: for trials.
     pub(crate) fn of_uncertified(rig: &Rig, design: &Uncertified) -> Result<Self, NoTable> {
         Self::of_rounded(rig, &design.single, &design.double, Gains::Sampled)
     }
@@ -199,8 +199,8 @@ impl TableValues {
         self
     }
 
-    /// The same table with no thresholds and no limits, so that the supervisor detects nothing. It shows what happens
-    /// to a rig without a supervisor.
+    /// The same table with no thresholds and no limits, so that the supervisor detects nothing: for runs that
+    /// show what happens to a rig without a supervisor.
     pub fn without_detection(mut self) -> Self {
         self.thresholds = supervision::thresholds(None);
         let limits = &mut self.limits;

@@ -71,7 +71,7 @@ fn write_swing_up(out: &mut String, table: &TableValues, fields: &[Field], crc: 
 /// Writes fields with one column of a motion or matrix per line.
 struct Columns<'a> {
     out: &'a mut String,
-    /// Columns of `course` and of `filter`.
+    /// Number of columns of the field `course`, and of `filter`.
     course: usize,
     filter: usize,
     indent: usize,
@@ -172,7 +172,7 @@ fn write_imports(out: &mut String, table: &TableValues) -> core::fmt::Result {
     }
 }
 
-/// The names with as many in a line as fit.
+/// The names, as many per line as fit.
 fn filled(names: &[&str]) -> String {
     let mut lines = vec!["   ".to_owned()];
     for name in names {
@@ -312,7 +312,7 @@ impl Meanings {
         self.measured.get(index).map_or("", |&state| self.state(state))
     }
 
-    /// What an entry of the field is; none for a field whose documentation says it.
+    /// What an entry of the field means; none for a field whose documentation already says it.
     fn entry(&self, field: &str, index: usize) -> Option<String> {
         const ERROR: [&str; 4] =
             ["position from position", "position from speed", "speed from position", "speed from speed"];

@@ -6,7 +6,7 @@ use super::{MAX_SENSORS, NoTable, finite};
 use crate::design::DetectionDesign;
 use crate::rig::{Chain, PlantDescription, Rig, defaults};
 
-/// Motion by hand that the check of an encoder's sign requires of a link (rad) …
+/// Motion by hand that the sign check of an encoder requires: of a link (rad) …
 const SIGN_RAD: f64 = 0.2;
 /// … and of the cart (share of the rail).
 const SIGN_SHARE: f64 = 0.05;
@@ -90,7 +90,7 @@ pub(super) fn thresholds(design: Option<&DetectionDesign>) -> Thresholds<MAX_SEN
     thresholds
 }
 
-/// Without a force limit, only what the rig file gives.
+/// Largest force of the bench drive (N); without a force limit, only what the rig file gives.
 fn bench_force_n(rig: &Rig) -> Option<f64> {
     let (wanted, limit) = (rig.limits.bench_force_n, rig.force_limit_n());
     let derived = limit.map(|limit| defaults::BENCH_FORCE_SHARE * limit);

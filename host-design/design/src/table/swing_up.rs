@@ -10,7 +10,7 @@ use crate::plant::{ChainParameters, ChainPlant};
 use crate::rig::{PlantDescription, Rig};
 use crate::swing_up::{Motion, SwingUp, Way};
 
-/// Time between two knots of reference, force and gains (s) …
+/// Time between two knots of reference state, force and gains (s) …
 const COURSE_S: f64 = 0.01;
 /// … and of the filter.
 const FILTER_S: f64 = 0.05;
@@ -24,11 +24,11 @@ pub struct SwingUpValues {
     pub limits: MotionLimits,
     /// See [`SwingUpTable::thresholds`].
     pub thresholds: Thresholds<MAX_SENSORS>,
-    /// From hanging to upright.
+    /// The motion from hanging to upright.
     pub raise: MotionValues,
-    /// From upright to hanging.
+    /// The motion from upright to hanging.
     pub lower: MotionValues,
-    /// Between other equilibria.
+    /// The motions between other equilibria.
     pub others: Vec<(Way, MotionValues)>,
     rig_hash: u64,
     tick_s: f32,
@@ -56,8 +56,8 @@ pub struct MotionValues {
 }
 
 impl SwingUpValues {
-    /// The table of `motions` for `rig`, whose gain table is `table`. The supervisor detects nothing in its motions:
-    /// its limits are [`MotionLimits::none`], its thresholds [`Thresholds::none`].
+    /// The table of `motions` for `rig`, whose gain table is `table`. The supervisor detects nothing during its
+    /// motions: its limits are [`MotionLimits::none`], its thresholds [`Thresholds::none`].
     ///
     /// # Errors
     /// [`NoTable`] if the rig has no chain, a delay, or no observer, if the motions are those of another rig, or if a
@@ -105,7 +105,7 @@ impl SwingUpValues {
     /// The firmware's table, complete with its checksum.
     ///
     /// # Panics
-    /// If `N` is not the number of links, and `NY` not one more.
+    /// If `N` is not the number of links. `NY` must be `N + 1`.
     pub fn table<'a, const NY: usize, const N: usize>(
         &'a self,
         others: &'a [Transition<'a>],
@@ -127,7 +127,7 @@ impl SwingUpValues {
         table
     }
 
-    /// Bytes of the knots of all motions, with their units.
+    /// Size of the knots of all motions, and of their units (bytes).
     pub fn bytes(&self) -> usize {
         let bytes = |motion: &MotionValues| {
             size_of_val(&motion.course[..])
@@ -179,7 +179,7 @@ impl MotionValues {
         })
     }
 
-    /// The planned state in `tick`, from the nearest knots; after the end, the last one.
+    /// The planned state in `tick`, interpolated between its two neighbouring knots; after the end, the last one.
     pub fn planned(&self, states: usize, tick: usize) -> Vec<f64> {
         let (knots, every) = (self.course.len() / self.course_units.len(), self.course_ticks as usize);
         let share = (tick % every) as f64 / every as f64;
@@ -191,7 +191,7 @@ impl MotionValues {
         (0..states).map(between).collect()
     }
 
-    /// The firmware's part.
+    /// This motion as a part of the firmware's table.
     fn table(&self) -> MotionTable<'_> {
         MotionTable {
             ticks: self.ticks,
@@ -206,8 +206,8 @@ impl MotionValues {
     }
 }
 
-/// Rows of `width` values, column by column, as whole numbers of the column's unit; the largest value is `i16::MAX`
-/// units.
+/// Quantises rows of `width` values, column by column, to whole multiples of the column's unit. The largest magnitude
+/// in a column is `i16::MAX` units.
 fn in_units(rows: &[f64], width: usize) -> Result<(Vec<f32>, Vec<i16>), NoTable> {
     let (mut units, mut values) = (Vec::new(), Vec::new());
     for column in 0..width {

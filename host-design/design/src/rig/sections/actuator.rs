@@ -11,7 +11,7 @@ use super::super::rule::Rule;
 pub(in crate::rig) static ACTUATOR: Section = Section {
     name: "actuator",
     title: "[actuator]",
-    meaning: "force limit and DC motor; one key of the motor describes it, and then it needs all the required ones",
+    meaning: "force limit and DC motor; if any motor key is given, the required motor keys must be given",
     absent: Absent::Follows("no limit, no motor"),
     keys: &[FORCE_LIMIT, Motor::KEYS],
 };
@@ -24,7 +24,7 @@ const FORCE_LIMIT: &[Key] = &[Key {
     absent: Absent::Follows("no limit"),
 }];
 
-/// Accepted voltages of the dead zone; the section's own code compares it with the supply.
+/// Accepted voltages of the dead zone; the section's own code compares them with the supply.
 const DEAD_ZONE: Rule = Rule::NOT_NEGATIVE.worded("a number >= 0 and < supply_v (V)");
 const WITH_A_MOTOR: Absent = Absent::RequiredIf("with a motor");
 

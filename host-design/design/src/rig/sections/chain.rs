@@ -100,7 +100,7 @@ const LINK_KEYS: &[Key] = &[
 ];
 
 keys! {
-    /// `[cart]`
+    /// The cart and its rail, `[cart]`.
     pub struct Cart {
         mass_kg: f64, "kg", Rule::POSITIVE,
             "mass of the cart, with the equivalent mass of belt, gear and motor", Absent::Required;

@@ -10,7 +10,7 @@ use super::chain::PlantDescription;
 pub(in crate::rig) static FRICTION: Section = Section {
     name: "friction",
     title: "[friction]",
-    meaning: "Coulomb friction that is known and compensated, with [kalman], not with [model]",
+    meaning: "known Coulomb friction, which the controller compensates; needs [kalman], not possible with [model]",
     absent: Absent::Follows("nothing is compensated"),
     keys: &[KnownFriction::KEYS],
 };
@@ -18,17 +18,19 @@ pub(in crate::rig) static FRICTION: Section = Section {
 const NONE: Absent = Absent::Numbers(&[0.0]);
 
 keys! {
-    /// `[friction]`. The friction that the simulated machine has is in `[reality]`.
+    /// Known Coulomb friction, which the controller compensates, `[friction]`. The friction of the simulated machine
+    /// is in `[reality]`.
     pub struct KnownFriction {
         joint_n_m: PerJoint, "N·m", Rule::NOT_NEGATIVE.worded("a number >= 0, or one per joint"),
             "known Coulomb friction of each joint", NONE;
         cart_n: f64, "N", Rule::NOT_NEGATIVE, "known Coulomb friction of the cart; 90 % of it is compensated", NONE;
         joint_rate_rad_per_s: f64, "rad/s", Rule::POSITIVE,
-            "rate of a joint from which all of its friction is compensated", Absent::Numbers(&[0.07]);
+            "rate of a joint at which the compensation reaches its full value", Absent::Numbers(&[0.07]);
         cart_speed_m_per_s: f64, "m/s", Rule::POSITIVE,
-            "speed of the cart from which all of that is compensated", Absent::Numbers(&[0.01]);
+            "speed of the cart at which the compensation reaches its full value", Absent::Numbers(&[0.01]);
         fed_forward_percent: f64, "%", Rule::SPREAD,
-            "share of the joints' friction whose static effect the force works against", Absent::Numbers(&[30.0]);
+            "share of the joints' friction whose static effect is cancelled by a feedforward force",
+            Absent::Numbers(&[30.0]);
     }
 }
 

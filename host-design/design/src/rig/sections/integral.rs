@@ -13,11 +13,12 @@ pub(in crate::rig) static INTEGRAL: Section = Section {
 };
 
 keys! {
-    /// `[integral]`
+    /// Integral action on the controlled output, `[integral]`.
     pub struct Integral {
         position_weight: f64, "", Rule::POSITIVE,
             "weight of the integrated position error in the cost", Absent::Required;
         setpoint_weight: f64, "", Rule::SHARE,
-            "share of the precompensation gain that is used: less overshoots less", Absent::Numbers(&[1.0]);
+            "share of the precompensation gain that is used; a smaller share reduces the overshoot",
+            Absent::Numbers(&[1.0]);
     }
 }

@@ -12,14 +12,14 @@ use super::chain::PlantDescription;
 pub(in crate::rig) static KALMAN: Section = Section {
     name: "kalman",
     title: "[kalman]",
-    meaning: "the observer: noise intensities, that is the variance of a noise held for one tick, times the tick",
+    meaning: "the observer: noise intensities, each the variance of a noise held for one tick, times the tick",
     absent: Absent::Follows("no observer"),
     keys: &[&[
         Key {
             name: "force_noise_n2_s",
             unit: "N²·s",
             rule: Rule::NOT_NEGATIVE,
-            meaning: "intensity of the force noise, that is variance times hold time",
+            meaning: "intensity of the force noise: variance times hold time",
             absent: Absent::Required,
         },
         Key {

@@ -16,11 +16,11 @@ pub(in crate::rig) static LIMITS: Section = Section {
 };
 
 keys! {
-    /// Limits of the rig and times of the supervisor. What is not given follows from other values where the table is
-    /// made.
+    /// Limits of the rig and times of the supervisor, `[limits]`. A limit that is not given is derived from other
+    /// values when the gain table is made.
     pub struct Limits {
         angle_rad: Option<f64>, "rad", Rule::ANGLE,
-            "largest angle of a link from upright, of which the governor uses half",
+            "largest angle of a link from upright; the governor uses half of it",
             Absent::Numbers(&[super::super::defaults::ANGLE_RAD]);
         speed_m_per_s: Option<f64>, "m/s", Rule::POSITIVE,
             "largest speed of the cart", Absent::Follows("no limit");
@@ -29,19 +29,19 @@ keys! {
             "distance from an end of the rail at which the motor is turned off and beyond which no set-point is accepted",
             Absent::Follows("2.5 % of the rail");
         travel_tolerance_m: Option<f64>, "m", Rule::POSITIVE,
-            "difference allowed between travel_m and the distance of the limit switches",
+            "allowed difference between the length of travel_m and the distance between the limit switches",
             Absent::Follows("1 % of the rail");
-        // A rig without it keeps its hash, by which stored motions and gain tables know it.
+        // Skipped if absent: a rig without it keeps the hash by which stored motions and gain tables identify it.
         #[serde(skip_serializing_if = "Option::is_none")]
         bench_force_n: Option<f64>, "N", Rule::POSITIVE,
-            "largest force of the bench drive, of which no more than force_limit_n is used",
+            "largest force of the bench drive; at most force_limit_n is used",
             Absent::Follows("10 % of force_limit_n");
         supply_min_v: Option<f64>, "V", Rule::NOT_NEGATIVE,
-            "least supply voltage of the power stage", Absent::Follows("80 % of supply_v; 0 without a motor");
+            "lowest allowed supply voltage of the power stage", Absent::Follows("80 % of supply_v; 0 without a motor");
         supply_time_s: f64, "s", Rule::DURATION,
             "time for which the supply voltage may be too low", Absent::Numbers(&[0.005]);
         saturation_time_s: f64, "s", Rule::DURATION,
-            "time for which the law may ask for more than the largest force", Absent::Numbers(&[0.5]);
+            "time for which the law may request more than the largest force", Absent::Numbers(&[0.5]);
         link_timeout_s: f64, "s", Rule::DURATION,
             "time for which a host that commands the set-point may be silent", Absent::Numbers(&[0.1]);
         arm_angle_rad: Option<f64>, "rad", Rule::ANGLE,
@@ -56,7 +56,7 @@ keys! {
         still_time_s: f64, "s", Rule::DURATION,
             "time for which links and cart have to be still before they are homed", Absent::Numbers(&[0.5]);
         false_alarm_h: f64, "h", Rule::FALSE_ALARM,
-            "mean time between false alarms of the tests for encoders and motor while balancing",
+            "mean time between false alarms of the encoder and motor tests while balancing",
             Absent::Numbers(&[1000.0]);
     }
 }

@@ -25,7 +25,7 @@ pub(in crate::rig) static LQR: Section = Section {
             name: "force_weight",
             unit: "",
             rule: Rule::POSITIVE,
-            meaning: "weight r of the squared force; without a price for force there is no optimum",
+            meaning: "weight r of the squared force; with r = 0 there would be no optimum",
             absent: Absent::Required,
         },
     ]],

@@ -11,7 +11,7 @@ pub(in crate::rig) static REALITY: Section = Section {
     name: "reality",
     title: "[reality]",
     meaning: "imperfections of the simulated machine, not with [model]; they change no gain",
-    absent: Absent::Follows("the machine is as the model"),
+    absent: Absent::Follows("the machine matches the model"),
     keys: &[
         DryFriction::KEYS,
         DriveTrain::KEYS,
@@ -27,7 +27,7 @@ const EACH_ANGLE: Rule = Rule::SIGNED_ANGLE.worded("a number from -pi to pi (rad
 const EACH_PERCENT: Rule = Rule::SIGNED_PERCENT.worded("a number > -100 and <= 900 (%), or one per joint");
 
 keys! {
-    /// Dry friction: a bristle that gives a little and then slides.
+    /// Dry friction, simulated as a bristle that bends and then slides.
     pub struct DryFriction {
         joint_friction_n_m: PerJoint, "N·m", EACH_NOT_NEGATIVE, "Coulomb friction in each joint", NONE;
         cart_friction_n: f64, "N", Rule::NOT_NEGATIVE, "Coulomb friction of the cart on its rail", NONE;
@@ -45,7 +45,7 @@ keys! {
 }
 
 keys! {
-    /// Between motor and cart.
+    /// Backlash and elastic belt between motor and cart.
     pub struct DriveTrain {
         backlash_m: f64, "m", Rule::NOT_NEGATIVE, "play between motor and cart, as travel of the cart", NONE;
         belt_compliance_m_per_n: f64, "m/N", Rule::NOT_NEGATIVE, "stretch of belt or gear per force", NONE;
@@ -56,7 +56,7 @@ keys! {
 }
 
 keys! {
-    /// Motor driver, supply, and the instants at which a force begins.
+    /// Errors of motor driver and supply, and of the instants at which a force begins.
     pub struct DriverFaults {
         driver_lag_s: f64, "s", Rule::NOT_NEGATIVE, "time constant of the motor driver", NONE;
         current_limit_a: Option<f64>, "A", Rule::POSITIVE, "largest current of the motor driver",
@@ -65,22 +65,22 @@ keys! {
             "internal resistance of the supply, which sags under load", NONE;
         force_percent: f64, "%", Rule::SIGNED_PERCENT, "excess of the real force over the commanded one", NONE;
         latency_s: f64, "s", Rule::NOT_NEGATIVE,
-            "delay of the force besides delay_ticks", NONE;
+            "delay of the force in addition to delay_ticks", NONE;
         jitter_s: f64, "s",
             Rule::NOT_NEGATIVE.worded("a number >= 0; 2 jitter_s + latency_s < period_s"),
-            "each tick begins early or late by up to this", NONE;
+            "largest time by which a tick begins early or late", NONE;
     }
 }
 
 keys! {
-    /// Encoders, their zeros, and the rail.
+    /// Errors of the encoders and of their zeros, and the slope of the rail.
     pub struct SensorErrors {
         homing_error_rad: PerJoint, "rad", EACH_ANGLE, "measured minus true angle of each joint", NONE;
         eccentricity_rad: PerJoint, "rad", EACH_NOT_NEGATIVE,
-            "amplitude of the error of each joint's encoder over a turn", NONE;
+            "amplitude of each joint encoder's once-per-turn error", NONE;
         eccentricity_phase_rad: PerJoint, "rad", EACH_ANGLE,
             "phase of that error when the joint is straight", NONE;
-        rail_tilt_rad: f64, "rad", Rule::SIGNED_ANGLE, "slope of the rail, up towards +x", NONE;
+        rail_tilt_rad: f64, "rad", Rule::SIGNED_ANGLE, "slope of the rail, positive if it rises towards +x", NONE;
     }
 }
 
@@ -90,13 +90,13 @@ keys! {
         cart_mass_percent: f64, "%", Rule::SIGNED_PERCENT, "excess of the real mass of the cart", NONE;
         link_mass_percent: PerJoint, "%", EACH_PERCENT, "excess of the real mass of each link", NONE;
         link_length_percent: PerJoint, "%", EACH_PERCENT,
-            "excess of the real length of each link; its centre of mass moves along", NONE;
+            "excess of the real length of each link; its centre of mass moves in proportion", NONE;
         link_inertia_percent: PerJoint, "%", EACH_PERCENT,
-            "excess of the real inertia of each link, beyond what mass and length do", NONE;
+            "excess of the real inertia of each link, in addition to the effect of mass and length", NONE;
         parameter_spread_percent: f64, "%", Rule::SPREAD,
-            "spread (±) of all masses, lengths and inertias, drawn once, besides these", NONE;
+            "additional random spread (±) of all masses, lengths and inertias, drawn once", NONE;
         parameter_seed: u8, "", Rule::NOT_NEGATIVE.worded("a whole number from 0 to 255"),
-            "seed of that drawing", NONE;
+            "seed of that random spread", NONE;
     }
 }
 
@@ -110,14 +110,14 @@ pub struct Reality {
     pub drive_train: DriveTrain,
     /// Motor driver, supply and timing.
     pub driver: DriverFaults,
-    /// Encoders, zeros and rail.
+    /// Encoders, their zeros, and the slope of the rail.
     pub sensors: SensorErrors,
-    /// Masses, lengths and inertias.
+    /// Errors of masses, lengths and inertias.
     pub parameters: ParameterErrors,
 }
 
 impl Default for Reality {
-    /// The machine is as the model.
+    /// A machine that matches the model: no imperfections.
     fn default() -> Self {
         fn absent<T: Keys>() -> T {
             T::when_absent().expect("no key of [reality] is required")

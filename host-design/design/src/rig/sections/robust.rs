@@ -17,7 +17,8 @@ pub(in crate::rig) static ROBUST: Section = Section {
 };
 
 const NONE: Absent = Absent::Numbers(&[0.0]);
-/// Largest error of the masses (%) and largest latency (ticks): twice of them, for the front, is still possible.
+/// Largest accepted error of the masses (%) and latency (ticks): twice these values, which the front tries, can still
+/// be simulated.
 const MOST: [f64; 2] = [45.0, 0.3];
 
 keys! {
@@ -29,7 +30,7 @@ keys! {
         cart_friction_n: f64, "N", Rule::NOT_NEGATIVE, "largest Coulomb friction of the cart", NONE;
         homing_error_rad: f64, "rad", Rule::NOT_NEGATIVE, "largest error of each joint's zero", NONE;
         latency_s: f64, "s", Rule::NOT_NEGATIVE.worded("a number >= 0 and <= 0.3 period_s"),
-            "largest delay of the force besides delay_ticks", NONE;
+            "largest delay of the force in addition to delay_ticks", NONE;
     }
 }
 

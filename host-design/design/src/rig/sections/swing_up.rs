@@ -9,7 +9,8 @@ use super::super::rule::Rule;
 pub(in crate::rig) static SWING_UP: Section = Section {
     name: "swing_up",
     title: "[swing_up]",
-    meaning: "what `upright swing-up` plans within, and what its motions have to stand; changes no gain",
+    meaning: "limits of the motions that `upright swing-up` plans, and errors that they have to withstand; changes no \
+              gain",
     absent: Absent::Follows("as below"),
     keys: &[SwingUpRules::KEYS],
 };
@@ -17,11 +18,11 @@ pub(in crate::rig) static SWING_UP: Section = Section {
 const DURATION: Rule = Rule::DURATION.worded("a number > 0 and <= 60 (s), shortest_s at most longest_s");
 
 keys! {
-    /// Limits of the planned motions, and the errors that they have to stand. They change no gain, so they are not part
-    /// of the rig's hash.
+    /// Limits of the planned motions, and the errors that they have to withstand. They change no gain, so they are not
+    /// part of the rig's hash.
     pub struct SwingUpRules {
         shortest_s: Option<f64>, "s", DURATION,
-            "shortest duration of a motion that is tried", Absent::Follows("9 √(L/g) for links of length L in all");
+            "shortest duration of a motion that is tried", Absent::Follows("9 √(L/g) for links of total length L");
         longest_s: Option<f64>, "s", DURATION,
             "longest duration of a motion that is tried", Absent::Follows("20 √(L/g)");
         force_n: Option<f64>, "N", Rule::POSITIVE,

@@ -13,7 +13,7 @@ pub(in crate::rig) static TICK: Section = Section {
 };
 
 keys! {
-    /// `[tick]`
+    /// The control tick, `[tick]`.
     pub struct Tick {
         period_s: f64, "s", Rule::PERIOD, "control period", Absent::Numbers(&[0.001]);
         delay_ticks: u8, "ticks", Rule::ZERO_OR_ONE,

@@ -17,8 +17,8 @@ const NOT_REQUIRED: Absent = Absent::Follows("not required");
 keys! {
     /// Thresholds of the trust report. They change no gain, so they are not part of the rig's hash.
     ///
-    /// The disturbances of the simulated runs and the noise that `[kalman]` expects differ when the observer's noise
-    /// is raised on purpose, to make it robust.
+    /// The disturbances of the simulated runs can be set separately from the noise of `[kalman]`, because the
+    /// observer's noise may have been raised deliberately to make it robust.
     pub struct Requirements {
         gain_margin: f64, "", Rule::POSITIVE,
             "least factor by which the loop's gain may be too large, and too small", Absent::Numbers(&[1.2]);
@@ -31,7 +31,8 @@ keys! {
         spread_percent: f64, "%", Rule::PERCENT,
             "spread (±) of masses, lengths and inertias of the random plants", Absent::Numbers(&[2.0]);
         corner_percent: f64, "%", Rule::PERCENT,
-            "error (±) of the masses for which every combination has to stand", Absent::Numbers(&[2.0]);
+            "error (±) of the masses; the loop has to balance in every combination of errors",
+            Absent::Numbers(&[2.0]);
         success_percent: f64, "%", Rule::PERCENT,
             "least share of random plants that stand, as the lower end of its 95 % interval",
             Absent::Numbers(&[95.0]);
@@ -44,25 +45,28 @@ keys! {
             "rms of the disturbing torque at each joint in the runs, drawn again each tick",
             Absent::Follows("what [kalman] expects");
         joint_friction_n_m: Option<f64>, "N·m", Rule::POSITIVE,
-            "Coulomb friction in each joint that the loop has to stand alone", NOT_REQUIRED;
+            "Coulomb friction in each joint that the loop has to withstand as the only imperfection", NOT_REQUIRED;
         cart_friction_n: Option<f64>, "N", Rule::POSITIVE,
-            "Coulomb friction of the cart that the loop has to stand alone", NOT_REQUIRED;
+            "Coulomb friction of the cart that the loop has to withstand as the only imperfection", NOT_REQUIRED;
         homing_error_rad: Option<f64>, "rad", Rule::ANGLE,
-            "error of each joint's zero that the loop has to stand alone", NOT_REQUIRED;
+            "error of each joint's zero that the loop has to withstand as the only imperfection", NOT_REQUIRED;
         eccentricity_rad: Option<f64>, "rad", Rule::ANGLE,
-            "error of each joint's encoder over a turn that the loop has to stand alone", NOT_REQUIRED;
+            "amplitude of each joint encoder's once-per-turn error that the loop has to withstand as the only \
+             imperfection",
+            NOT_REQUIRED;
         rail_tilt_rad: Option<f64>, "rad", Rule::ANGLE,
-            "slope of the rail that the loop has to stand alone", NOT_REQUIRED;
+            "slope of the rail that the loop has to withstand as the only imperfection", NOT_REQUIRED;
         backlash_m: Option<f64>, "m", Rule::POSITIVE,
-            "play between motor and cart that the loop has to stand alone", NOT_REQUIRED;
+            "play between motor and cart that the loop has to withstand as the only imperfection", NOT_REQUIRED;
         belt_compliance_m_per_n: Option<f64>, "m/N", Rule::POSITIVE,
-            "stretch of belt or gear per force that the loop has to stand alone", NOT_REQUIRED;
+            "stretch of belt or gear per force that the loop has to withstand as the only imperfection", NOT_REQUIRED;
         driver_lag_s: Option<f64>, "s", Rule::POSITIVE,
-            "time constant of the motor driver that the loop has to stand alone", NOT_REQUIRED;
+            "time constant of the motor driver that the loop has to withstand as the only imperfection", NOT_REQUIRED;
         force_percent: Option<f64>, "%", Rule::POSITIVE,
-            "excess of the real force that the loop has to stand alone", NOT_REQUIRED;
+            "excess of the real force that the loop has to withstand as the only imperfection", NOT_REQUIRED;
         parameter_spread_percent: Option<f64>, "%", Rule::SPREAD,
-            "spread (±) of all masses, lengths and inertias that the loop has to stand alone", NOT_REQUIRED;
+            "spread (±) of all masses, lengths and inertias that the loop has to withstand as the only imperfection",
+            NOT_REQUIRED;
     }
 }
 
