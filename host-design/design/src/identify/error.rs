@@ -20,14 +20,12 @@ pub enum LogError {
     /// The file ends within its header or a frame.
     #[error("ends within the header or frame that begins at byte {at}; copy it again, or record it again")]
     Truncated {
-    /// Offset of the header or frame (bytes).
+        /// Offset of the header or frame (bytes).
         at: usize,
     },
     /// A checksum or a length is wrong.
-    #[error(
-        "is damaged in the header or frame that begins at byte {at}; copy it again, or record it again"
-        )]
-        Damaged {
+    #[error("is damaged in the header or frame that begins at byte {at}; copy it again, or record it again")]
+    Damaged {
         /// Offset of the header or frame (bytes).
         at: usize,
     },
@@ -38,8 +36,8 @@ pub enum LogError {
     Order {
         /// Offset of the frame (bytes).
         at: usize,
-        },
-        }
+    },
+}
 
 /// Why a machine cannot be identified.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -47,9 +45,9 @@ pub enum IdentifyError {
     /// A log cannot be read.
     #[error("{}: {source}", file.display())]
     Log {
-    /// Path of the log.
-    file: PathBuf,
-    /// Why it cannot be read.
+        /// Path of the log.
+        file: PathBuf,
+        /// Why it cannot be read.
         source: LogError,
     },
     /// The rig file has no chain with encoders.

@@ -19,8 +19,8 @@ const TOLERANCE: Tolerance = Tolerance { relative: 1e-11, absolute: 1e-11 };
 pub struct Peaks {
     /// Duration (s).
     pub duration_s: f64,
-    /// Largest difference between a state and the adaptive integrator's result from the state before, in the units of the
-    /// states.
+    /// Largest difference between a state and the adaptive integrator's result from the state before, in the units of
+    /// the states.
     pub drift: f64,
     /// Largest force (N).
     pub force_n: f64,
