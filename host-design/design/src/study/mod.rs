@@ -66,8 +66,8 @@ impl Study {
         Ok(Self(Source::Files(files::merged(files, about)?)))
     }
 
-    /// Outcomes of the runs 0 to `runs` - 1 of this part of the study, in order; for a shard, only those it makes. Runs
-    /// are made on all threads.
+    /// Outcomes of the runs 0 to `runs` - 1 of this part of the study, in order; for a shard, only those it makes.
+    /// Runs are made on all threads.
     ///
     /// # Errors
     /// The error of a run, or [`StudyError`] if the files do not have this part.
