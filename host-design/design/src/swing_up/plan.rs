@@ -22,7 +22,7 @@ use crate::rig::Rig;
 use crate::study::Study;
 use crate::table::TableValues;
 
-/// Number of candidates for the way up and for the way down; the second line is for chains of four and more links.
+/// Number of candidates for the way up and for the way down; the second constant is for chains of four and more links.
 const CANDIDATES: [u64; 2] = [100, 40];
 const CANDIDATES_OF_LONG_CHAINS: [u64; 2] = [40, 24];
 /// Two rounds of selection, each with the number of best candidates that it tests, and of random runs for each.
