@@ -1,4 +1,4 @@
-//! A log for other programs: as CSV, and as MCAP.
+//! Export of a log for other programs, as CSV and as MCAP.
 
 use std::io::{self, Write};
 
@@ -8,22 +8,22 @@ use super::log::{CONTACTS, DriveScale, Log};
 
 /// First and last bytes of an MCAP file; the format is described at <https://mcap.dev/spec>.
 const MCAP: &[u8; 8] = b"\x89MCAP0\r\n";
-/// Kinds of records of an MCAP file.
+/// Record types of an MCAP file (opcodes).
 const HEADER: u8 = 1;
 const FOOTER: u8 = 2;
 const SCHEMA: u8 = 3;
 const CHANNEL: u8 = 4;
 const MESSAGE: u8 = 5;
 const DATA_END: u8 = 15;
-/// Number of the only schema, and of the only channel.
+/// Id of the file's only schema, and of its only channel.
 const ONLY: [u8; 2] = 1u16.to_le_bytes();
 
 impl Log {
     /// Writes every tick as CSV: its number and time, each channel's deviation from hanging in counts and in its unit,
-    /// the drive as duty or force, supply and contacts. `steps` are the travels per count (m, rad).
+    /// the drive as duty or force, supply and contacts. `steps` holds the travel per count of each channel (m or rad).
     ///
     /// # Errors
-    /// Those of `out`.
+    /// Those of writing to `out`.
     pub fn write_csv(&self, steps: &[f64], out: &mut dyn Write) -> io::Result<()> {
         writeln!(out, "tick,time_s,{}", self.columns().join(","))?;
         self.rows(steps, |number, time_ns, values| {
@@ -35,7 +35,7 @@ impl Log {
     /// keys. Time is 0 at the first tick.
     ///
     /// # Errors
-    /// Those of `out`.
+    /// Those of writing to `out`.
     pub fn write_mcap(&self, steps: &[f64], out: &mut dyn Write) -> io::Result<()> {
         let columns = self.columns();
         let properties: Vec<String> =
@@ -48,7 +48,7 @@ impl Log {
         let mut bytes = MCAP.to_vec();
         record(&mut bytes, HEADER, &[&text(""), &text(library)]);
         record(&mut bytes, SCHEMA, &[&ONLY, &text("upright.Tick"), &text("jsonschema"), &text(&schema)]);
-        // The last field are metadata: none.
+        // The last field is the metadata map, which is empty.
         record(&mut bytes, CHANNEL, &[&ONLY, &ONLY, &text("tick"), &text("json"), &[0; 4]]);
         self.rows(steps, |number, time_ns, values| {
             let named: Vec<String> =
@@ -60,13 +60,13 @@ impl Log {
         })?;
         let crc = crc32(0, &bytes);
         record(&mut bytes, DATA_END, &[&crc.to_le_bytes()]);
-        // No summary: readers go through the messages.
+        // No summary section: readers scan the messages.
         record(&mut bytes, FOOTER, &[&[0; 20]]);
         bytes.extend(MCAP);
         out.write_all(&bytes)
     }
 
-    /// Names of what [`rows`](Self::rows) gives.
+    /// Names of the values that [`rows`](Self::rows) passes on.
     fn columns(&self) -> Vec<String> {
         let joints = 1..self.channels();
         let mut columns = vec!["x_counts".to_owned()];
@@ -79,7 +79,7 @@ impl Log {
         columns
     }
 
-    /// Calls `each` with number, time from the first tick on (ns), and all values of each tick.
+    /// Calls `each` for every tick, with its number, the time since the first tick (ns), and all its values.
     fn rows(
         &self,
         steps: &[f64],
@@ -100,7 +100,7 @@ impl Log {
     }
 }
 
-/// Appends a record of an MCAP file: its kind, the length of its fields, and these.
+/// Appends a record of an MCAP file: its type, the length of its fields in bytes, and the fields.
 fn record(bytes: &mut Vec<u8>, kind: u8, fields: &[&[u8]]) {
     let length: usize = fields.iter().map(|field| field.len()).sum();
     bytes.push(kind);
@@ -108,7 +108,7 @@ fn record(bytes: &mut Vec<u8>, kind: u8, fields: &[&[u8]]) {
     fields.iter().for_each(|field| bytes.extend(*field));
 }
 
-/// A text with its length.
+/// A string, preceded by its length in bytes.
 fn text(text: &str) -> Vec<u8> {
     [&(text.len() as u32).to_le_bytes(), text.as_bytes()].concat()
 }

@@ -1,22 +1,23 @@
-//! Deviations that hold: those of the prediction error, widened by what the choices of the model change.
+//! Standard deviations of the estimates: those of the prediction-error fit, widened by how much other modelling
+//! choices change the estimates.
 
 use super::parameters::{Kind, Prior};
 use super::prediction::Filter;
 use super::record::Record;
 
-/// Other smoothings of the dry friction, as factors.
+/// Factors on the smoothing of the dry friction, one for each refit.
 const SMOOTHINGS: [f64; 2] = [0.4, 2.5];
-/// Steps of each refit.
+/// Iterations of each refit.
 const ITERATIONS: usize = 2;
-/// How far a deviation is widened.
+/// Terms that are added in quadrature to a statistical deviation.
 struct Widening {
-    /// Share of what the other choices change.
+    /// Share of the largest change under the other modelling choices.
     of_change: f64,
     /// Least deviation, as a share of the value, or for zeros in counts, for the tilt in rad, for the delay in ticks.
     least: f64,
 }
 
-/// Chosen on machines of seeds 1 and 2 in `upright coverage`, so that 95 % of the intervals cover the truth.
+/// Tuned with `upright coverage` on the machines of seeds 1 and 2, so that 95 % of the intervals cover the truth.
 fn widening(kind: Kind) -> Widening {
     let [of_change, least] = match kind {
         Kind::TotalMass => [0.6, 4e-4],
@@ -35,7 +36,8 @@ fn widening(kind: Kind) -> Widening {
     Widening { of_change, least }
 }
 
-/// Largest change of each parameter under other smoothings of the friction, and under finer sampling if there is one.
+/// Largest change of each parameter under other smoothings of the friction and, if given, under the sampling of
+/// `finer`.
 pub(super) fn changes(filter: &Filter<'_>, finer: Option<&Record>, p: &[f64], noise: &[f64]) -> Vec<f64> {
     let mut largest = vec![0.0f64; p.len()];
     let mut widen = |other: Option<Vec<f64>>| {
@@ -56,7 +58,8 @@ pub(super) fn changes(filter: &Filter<'_>, finer: Option<&Record>, p: &[f64], no
     largest
 }
 
-/// Deviation of each parameter from the inverse `inverse` of the scaled normal matrix and the changes.
+/// Standard deviation of each parameter, from `inverse`, the inverse of the scaled normal matrix, and `changes`, the
+/// result of [`changes`]. `steps` holds the travel per count of each channel.
 pub(super) fn deviations(
     kinds: &[Kind],
     priors: &[Prior],

@@ -1,4 +1,4 @@
-//! How far deviations hold: many machines that differ from their file are shaken and identified.
+//! Coverage of the stated deviations: many simulated machines that differ from their file are shaken and identified.
 
 use std::path::PathBuf;
 
@@ -13,21 +13,21 @@ use super::parameters::Kind;
 use crate::rig::Rig;
 use crate::study::{Study, StudyError};
 
-/// Half width of an interval of 95 %, in deviations.
+/// Half-width of a 95 % interval, in standard deviations.
 const INTERVAL: f64 = 1.96;
 
-/// A study that was not made.
+/// Why a coverage study failed.
 #[derive(Debug, thiserror::Error)]
 pub enum CoverageError {
     /// The rig cannot be identified.
     #[error(transparent)]
     Identify(#[from] IdentifyError),
-    /// The runs were made elsewhere.
+    /// The runs that other processes made cannot be used.
     #[error(transparent)]
     Study(#[from] StudyError),
 }
 
-/// What is identified, over all links.
+/// Kind of an identified number; the numbers of all links count together.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 #[allow(missing_docs)] // `ALL` says what each is
@@ -48,7 +48,8 @@ pub enum Quantity {
 }
 
 impl Quantity {
-    /// Every quantity with its name, the unit of its error, and the factor from SI units, or from parts of the truth.
+    /// Every quantity with its name, the unit in which its error is shown, and the factor that converts
+    /// [`Missed::error`] to that unit.
     pub const ALL: [(Quantity, &str, &str, f64); 13] = {
         let degrees = 180.0 / core::f64::consts::PI;
         [
@@ -90,79 +91,79 @@ impl Quantity {
     }
 }
 
-/// How far one number is from the truth.
+/// Error of one identified number.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Missed {
-    /// What it is.
+    /// The quantity that the number belongs to.
     pub quantity: Quantity,
-    /// Identified minus true value: of a tilt or zero in rad, of the delay in ticks, otherwise as a part of the truth.
+    /// Identified minus true value: in rad for a tilt or zero, in ticks for the delay, else relative to the truth.
     pub error: f64,
-    /// Its deviation in the same unit; a shape and a scale have none.
+    /// Stated standard deviation in the same unit; a shape and a scale have none.
     pub deviation: Option<f64>,
 }
 
-/// One machine.
+/// Result for one machine.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Identified {
-    /// Number of the machine.
+    /// Number of the machine, from 0; together with the seed it determines what is drawn.
     pub number: u64,
-    /// Why no rig file would be written, if so.
+    /// Why no rig file would be written; none if one would be.
     pub refused: Option<String>,
-    /// How far each number is from the truth, also of what is not written.
+    /// Error of each number, even if no rig file would be written.
     pub missed: Vec<Missed>,
 }
 
-/// All machines, one quantity.
+/// Statistics of one quantity over all machines.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct CoverageRow {
-    /// What it is.
+    /// The quantity that is summarised.
     pub quantity: Quantity,
-    /// Its name.
+    /// Its name in a table.
     pub name: &'static str,
-    /// Unit of the errors.
+    /// Unit of `rms`, `worst` and `stated`.
     pub unit: &'static str,
-    /// Numbers that were identified and would be written.
+    /// How many numbers were identified and would be written.
     pub count: usize,
-    /// Those whose interval of 95 % covers the truth; none if they have no interval.
+    /// How many of them have a 95 % interval that covers the truth; none if the quantity has no intervals.
     pub covered: Option<usize>,
-    /// Error (rms).
+    /// Root mean square of the errors.
     pub rms: f64,
-    /// Largest error.
+    /// Largest absolute error.
     pub worst: f64,
-    /// Deviation (rms) that is stated.
+    /// Root mean square of the stated deviations; none if the quantity has no intervals.
     pub stated: Option<f64>,
 }
 
-/// All machines.
+/// Result of a coverage study.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Coverage {
     /// Number of machines.
     pub machines: usize,
-    /// Those of which no rig file would be written, and why.
+    /// Numbers of the machines for which no rig file would be written, and why.
     pub refused: Vec<(u64, String)>,
-    /// The quantities that the rig has.
+    /// One row for each quantity that the rig has.
     pub rows: Vec<CoverageRow>,
 }
 
-/// What is drawn and how long it is shaken.
+/// Settings of a coverage study: how machines are drawn, and how long each is shaken.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Drawn {
     /// Number of machines.
     pub runs: u64,
     /// Largest error of the file's masses, lengths and inertias (%).
     pub off_percent: f64,
-    /// Length of each log (s).
+    /// Duration of each log (s).
     pub seconds: f64,
     /// Seed of the machines.
     pub seed: u64,
-    /// Whether the wiring is taken as that of the file, which it is.
+    /// Whether to skip the check of the wiring; it is always that of the file.
     pub trust_wiring: bool,
 }
 
 /// Shakes and identifies machines that differ from `file`; `done` is called after each, from any thread.
 ///
 /// # Errors
-/// [`CoverageError`] if the rig cannot be identified, or what other processes made is not of this study.
+/// [`CoverageError`] if the rig cannot be identified, or the runs that other processes made are not of this study.
 pub fn coverage(
     file: &Rig,
     drawn: &Drawn,
@@ -205,7 +206,7 @@ pub fn coverage(
 /// Shakes and identifies one machine.
 ///
 /// # Errors
-/// [`IdentifyError`] if the rig has no chain with encoders; what goes wrong later is [`Identified::refused`].
+/// [`IdentifyError`] if the rig has no chain with encoders; later failures are in [`Identified::refused`].
 pub fn identified(file: &Rig, drawn: &Drawn, number: u64) -> Result<Identified, CoverageError> {
     let machine = Machine::draw(file, drawn.off_percent, drawn.seed, number)?;
     let settings = Settings { trust_wiring: drawn.trust_wiring, ..Settings::default() };

@@ -5,38 +5,36 @@ use std::path::PathBuf;
 /// Why a log cannot be read.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum LogError {
-    /// The file system refuses it.
+    /// The file cannot be opened or read; the text is that of the operating system.
     #[error("cannot be read ({0}); check path and permissions")]
     Unreadable(String),
-    /// More than is read.
+    /// The file is larger than the largest one that is read.
     #[error("more than 1 GiB; a minute of four links is 800 kB, check the path")]
     TooLarge,
-    /// It has no tick.
+    /// The file contains no tick.
     #[error("holds no tick; record it again")]
     Empty,
-    /// It does not begin as a log.
-    #[error("is no log of Upright: it does not begin with UPRTLOG1; check the path")]
+    /// The file does not begin with the signature of a log.
+    #[error("is not a log of Upright: it does not begin with UPRTLOG1; check the path")]
     Foreign,
-    /// It ends within a header or frame.
-    #[error("ends in the middle of what begins at byte {at}; copy it again, or record it again")]
+    /// The file ends within its header or a frame.
+    #[error("ends within the header or frame that begins at byte {at}; copy it again, or record it again")]
     Truncated {
-        /// Offset (bytes).
+        /// Offset of the header or frame (bytes).
         at: usize,
     },
     /// A checksum or a length is wrong.
-    #[error(
-        "is damaged in what begins at byte {at}: its checksum is wrong; copy it again, or record it again"
-    )]
+    #[error("is damaged in the header or frame that begins at byte {at}; copy it again, or record it again")]
     Damaged {
-        /// Offset (bytes).
+        /// Offset of the header or frame (bytes).
         at: usize,
     },
-    /// A tick does not follow the one before.
+    /// The number of a tick is not above that of the tick before.
     #[error(
         "the ticks of the frame at byte {at} do not follow those before; give each recording as a file of its own"
     )]
     Order {
-        /// Offset (bytes).
+        /// Offset of the frame (bytes).
         at: usize,
     },
 }
@@ -47,9 +45,9 @@ pub enum IdentifyError {
     /// A log cannot be read.
     #[error("{}: {source}", file.display())]
     Log {
-        /// The file.
+        /// Path of the log.
         file: PathBuf,
-        /// What is wrong with it.
+        /// Why it cannot be read.
         source: LogError,
     },
     /// The rig file has no chain with encoders.
@@ -57,27 +55,27 @@ pub enum IdentifyError {
         "{0}: only links on a cart with an encoder on the cart and on every link can be identified; add encoder_step_m to [cart] and encoder_counts_per_rev to each [[link]]"
     )]
     NoEncoders(String),
-    /// The log is of another rig.
+    /// The log was recorded on another rig.
     #[error("{}: is a log of {found}, the rig file is {wanted}; {remedy}", file.display())]
     OtherRig {
-        /// The file.
+        /// Path of the log.
         file: PathBuf,
-        /// What the log says.
+        /// What the log states.
         found: String,
-        /// What the rig file says.
+        /// What the rig file states.
         wanted: String,
         /// What to do.
         remedy: String,
     },
-    /// Too little is left after the gaps.
+    /// The pieces of the log without a gap are too short in total.
     #[error("{seconds:.1} s of log without a gap, at least {least} s are needed; record more")]
     TooShort {
-        /// What there is (s).
+        /// Duration of all pieces (s).
         seconds: f64,
-        /// What is needed (s).
+        /// Duration needed (s).
         least: f64,
     },
-    /// A channel does not move.
+    /// A channel, which is named, does not move.
     #[error(
         "{0} does not move in the log: it is blocked, or its encoder is not connected; nothing is identified"
     )]
@@ -90,19 +88,19 @@ pub enum IdentifyError {
         "nothing moves in the log; is the motor connected and its supply on, and were the links released?"
     )]
     NothingMoves,
-    /// No machine has the numbers that were found.
+    /// The identified numbers are not physical: no machine has them.
     #[error("{0}")]
     Physical(String),
-    /// The equations have no solution.
+    /// The equations of the identification have no solution.
     #[error("the log does not determine the parameters: {0}; record a longer log with larger motion")]
     Undetermined(&'static str),
-    /// The simulated machine cannot be shaken.
+    /// The machine cannot be shaken; the text says why.
     #[error("{0}")]
     Excitation(String),
 }
 
 impl IdentifyError {
-    /// Whether the input is readable, but has no solution.
+    /// Whether the files are in order, but the identification has no solution.
     pub fn is_without_solution(&self) -> bool {
         !matches!(
             self,

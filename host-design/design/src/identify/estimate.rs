@@ -18,51 +18,51 @@ use crate::rig::Rig;
 
 /// Shortest log (s).
 const LEAST_S: f64 = 5.0;
-/// Time at the end of a log that is kept for the comparison of old and new file (s), and the share of a short log.
+/// Time at the end of a log that is held out to compare the old and the new file (s), and largest share of the log.
 const HELD_OUT: (f64, f64) = (10.0, 0.25);
 /// Length of the windows in that comparison (s).
 const HELD_OUT_WINDOW_S: f64 = 0.5;
-/// Multiple shooting finds where the prediction error begins: this much of the log is enough (s).
+/// Time at the beginning of a log that multiple shooting uses (s): it only has to start the prediction-error fit.
 const SHOOTING_S: f64 = 20.0;
-/// Iterations and rounds of multiple shooting, and iterations of the prediction error.
+/// Iterations and rounds of multiple shooting, and iterations of the prediction-error fit.
 const ITERATIONS: (usize, usize, usize) = (10, 3, 6);
 
-/// What an identification is told.
+/// Options of an identification.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Settings {
-    /// Whether encoders may be eccentric.
+    /// Whether the eccentricity of the encoders is identified, too.
     pub eccentricity: bool,
-    /// First moment of the last link from a weighing (kg·m).
+    /// First moment of the last link (kg·m), if it was weighed: it fixes the scale of masses and forces.
     pub weighed_kg_m: Option<f64>,
-    /// Whether the wiring is taken as that of the file.
+    /// Whether to take the wiring of the file on trust instead of checking it.
     pub trust_wiring: bool,
 }
 
-/// A parameter.
+/// An identified parameter, in the unit of its [`Kind`].
 #[derive(Debug, Clone, PartialEq)]
 pub struct Estimate {
-    /// What it is.
+    /// Which parameter it is.
     pub kind: Kind,
-    /// Value of the rig file, or what is assumed where it has none.
+    /// Value of the rig file, or the start value that is assumed if the file has none.
     pub old: f64,
     /// Identified value.
     pub new: f64,
-    /// Standard deviation.
+    /// Standard deviation of the identified value.
     pub deviation: f64,
-    /// Whether the log says little: the deviation exceeds half of that before.
+    /// Whether the log says little about it: the deviation exceeds half of the prior one.
     pub held_by_prior: bool,
 }
 
-/// What was found.
+/// Result of an identification.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Identification {
-    /// Length of the logs (s).
+    /// Duration of the logs without their gaps (s).
     pub seconds: f64,
-    /// Ticks that are missing.
+    /// Number of ticks that are missing in the logs.
     pub lost_ticks: u64,
     /// Largest angle of a link from hanging (rad).
     pub largest_angle_rad: f64,
-    /// The wiring, unless it was taken on trust.
+    /// Result of the wiring check; none if the wiring was taken on trust.
     pub wiring: Option<WiringFound>,
     /// All parameters that are identified; none if the wiring is wrong.
     pub estimates: Vec<Estimate>,
@@ -70,23 +70,23 @@ pub struct Identification {
     pub sample_s: f64,
     /// Correlations of the estimates, row by row.
     pub correlations: Vec<f64>,
-    /// How well each channel is explained.
+    /// How well the model explains each channel.
     pub channels: Vec<ChannelFit>,
-    /// The numbers for the rig file.
+    /// The numbers for the rig file; none if the wiring is wrong or the numbers are not physical.
     pub realised: Option<Realised>,
-    /// Delay of the rig file (ticks).
+    /// Delay that the rig file states (ticks).
     pub delay_ticks: u8,
-    /// Why nothing may be written.
+    /// Why no rig file may be written; none if it may.
     pub refusal: Option<Refusal>,
 }
 
 impl Identification {
-    /// The estimate of a kind.
+    /// The estimate of a parameter, if it was identified.
     pub fn estimate(&self, kind: Kind) -> Option<&Estimate> {
         self.estimates.iter().find(|estimate| estimate.kind == kind)
     }
 
-    /// The delay that the rig file should have (ticks), if it is another than it has.
+    /// The delay that the rig file should state (ticks), if that differs from the one it states.
     pub fn other_delay(&self) -> Option<u8> {
         let delay = self.estimate(Kind::Delay)?;
         match self.delay_ticks {
@@ -97,7 +97,7 @@ impl Identification {
     }
 }
 
-/// Checks that a log is one of the rig.
+/// Checks that a log was recorded on the rig.
 fn is_of(rig: &Rig, log: &Log, file: &std::path::Path) -> Result<(), IdentifyError> {
     let other = |found: String, wanted: String, remedy: &str| {
         Err(IdentifyError::OtherRig { file: file.to_owned(), found, wanted, remedy: remedy.to_owned() })
@@ -139,11 +139,11 @@ fn is_of(rig: &Rig, log: &Log, file: &std::path::Path) -> Result<(), IdentifyErr
     Ok(())
 }
 
-/// Identifies the machine of `rig` from its logs, each with the name of its file.
+/// Identifies the machine of `rig` from its logs, each with the path of its file.
 ///
 /// # Errors
-/// [`IdentifyError`] if a log is not of the rig, too short, or nothing moves in it. What does not fit is no error: see
-/// [`Identification::refusal`].
+/// [`IdentifyError`] if a log is not of the rig, the logs are too short, or a channel does not move in them. A misfit
+/// is not an error: see [`Identification::refusal`].
 pub fn identify(
     rig: &Rig,
     logs: &[(PathBuf, Log)],
@@ -199,7 +199,7 @@ pub fn identify(
     Ok(found)
 }
 
-/// The parts of the record and what is known before.
+/// The parts of the record, and the priors.
 struct Fitted<'a> {
     rig: &'a Rig,
     priors: &'a [Prior],
@@ -209,7 +209,7 @@ struct Fitted<'a> {
 }
 
 impl Fitted<'_> {
-    /// All parameters in their order.
+    /// All parameters in the order of [`Layout`]: the estimates, and the prior values of those not identified.
     fn full(&self, found: &Identification) -> Vec<f64> {
         let kinds = Layout { links: self.used.channels - 1 }.kinds();
         let of =
@@ -217,7 +217,7 @@ impl Fitted<'_> {
         kinds.into_iter().zip(self.priors).map(of).collect()
     }
 
-    /// Multiple shooting, prediction error, deviations, and the comparison on what was held out.
+    /// Multiple shooting, prediction-error fit, deviations, and the comparison on the held-out part.
     fn run(
         &self,
         model: &super::model::Model,
@@ -234,7 +234,7 @@ impl Fitted<'_> {
         let noise = filter.tuned(&shot.p);
         let undetermined = || IdentifyError::Undetermined("the equations have no solution");
         let (p, _) = filter.fit(&shot.p, &noise, ITERATIONS.2).ok_or_else(undetermined)?;
-        // Noise and smoothing were those of other parameters.
+        // Noise and smoothing were tuned for the parameters before this fit.
         let mut model = model.clone();
         model.smoothing = filter.smoothing(&p, &noise);
         let filter = Filter { model: &model, ..filter };
@@ -275,7 +275,7 @@ impl Fitted<'_> {
         Ok(())
     }
 
-    /// The values of the file, but with the zeros and the tilt of this log: a file does not have them.
+    /// The values of the file, but with tilt, delay and zeros as identified from this log: a file does not have them.
     fn old_values(&self, start: &[f64], p: &[f64]) -> Vec<f64> {
         let layout = Layout { links: self.used.channels - 1 };
         let mut old = start.to_vec();
@@ -284,7 +284,7 @@ impl Fitted<'_> {
             old[i] = p[i];
         }
         for contact in 0..=layout.links {
-            // What the start assumes is not in the file.
+            // The start value of a dry friction may be an assumption that is not in the file.
             let friction = &self.rig.reality.friction;
             let given = match contact.checked_sub(1) {
                 None => friction.cart_friction_n,
@@ -295,7 +295,8 @@ impl Fitted<'_> {
         old
     }
 
-    /// Predictions over windows whose initial states are fitted, with the values of the old file and with the new ones.
+    /// Predictions over windows whose initial states are fitted, with both sets of `values`: those of the old file and
+    /// the new ones.
     fn held_out(&self, model: &super::model::Model, values: [&[f64]; 2]) -> HeldOut {
         let shooting = Shooting { model, record: self.held, priors: self.priors, free: false };
         let fits = values.map(|p| shooting.fit(p, HELD_OUT_WINDOW_S, ITERATIONS.0, ITERATIONS.1));

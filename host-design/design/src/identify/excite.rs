@@ -1,4 +1,4 @@
-//! What shakes the machine, and the log of a simulated machine that is shaken.
+//! The force that shakes the machine, and the log of a simulated machine that is shaken.
 
 use core::f64::consts::{PI, TAU};
 
@@ -20,24 +20,25 @@ use crate::reality::hanging_by_hand;
 use crate::rig::{Chain, Rig};
 use crate::simulate::{Bench, Scenario};
 
-/// Lines of the excitation, for one link and for more.
+/// Number of spectral lines of the excitation, for one link and for more.
 const LINES: [usize; 2] = [16, 24];
-/// Its band, in parts of the lowest and the highest hanging mode.
+/// Limits of its frequency band, as multiples of the lowest and of the highest hanging mode.
 const BAND: [f64; 2] = [0.25, 1.6];
-/// Largest angle of a link from hanging that is aimed at (rad), and share of the rail.
+/// Intended motion: largest angle of a link from hanging (rad), and share of the rail.
 pub(super) const AIM: (f64, f64) = (60.0 * PI / 180.0, 0.6);
-/// The motor goes off beyond this share of the rail.
+/// A run is abandoned when the cart goes beyond this share of the rail.
 const STOP: f64 = 0.85;
-/// Substeps of a tick with a motor. Its force is held for a substep, so the back-EMF comes half of one late. With the
-/// usual 4 the machine is identified with 0.15 to 0.4 % too little mass.
+/// Integration substeps per tick with a motor. Its force is held over a substep, so the back-EMF lags by half of one.
+/// With the usual 4 substeps, the identified masses are 0.15 to 0.4 % too small.
 const SUBSTEPS: usize = 32;
-/// Amplitudes that are tried, one after the other, if the machine moves more than the model.
+/// Factors on the amplitude that are tried one after the other, in case the machine moves more than the model.
 const RETRIES: [f64; 4] = [1.0, 0.7, 0.5, 0.35];
-/// The amplitude is raised if the machine moves less than this share of the aim, by at most this factor, so often.
+/// The amplitude is raised while the machine moves less than this share of the intended motion: the share, the largest
+/// factor at a time, and the number of trial runs.
 const RAISE: (f64, f64, usize) = (0.8, 1.6, 3);
-/// The force rises and falls over this time (s).
+/// Time over which the force is ramped up at the beginning and down at the end (s).
 const RAMP_S: f64 = 1.0;
-/// Length of the trial runs in which the amplitude is found (s).
+/// Longest trial run that is used to find the amplitude (s).
 const TRIAL_S: f64 = 20.0;
 /// Share of the force limit that the excitation may need.
 const FORCE_SHARE: f64 = 0.8;
@@ -54,12 +55,12 @@ pub struct Excitation {
     pub stiffness_n_per_m: f64,
     /// k_d (N·s/m).
     pub damping_n_s_per_m: f64,
-    /// Length (s).
+    /// Duration (s).
     pub duration_s: f64,
 }
 
 impl Excitation {
-    /// The excitation for a rig, with the amplitude that its file allows.
+    /// The excitation for a rig, with the largest amplitude that the model of its file allows.
     ///
     /// # Errors
     /// [`IdentifyError`] if the rig has no chain with encoders, or its hanging modes cannot be computed.
@@ -86,19 +87,19 @@ impl Excitation {
         Ok(excitation)
     }
 
-    /// Force at `time_s` with the cart at `x` (m) and `speed` (m/s).
+    /// Force (N) at `time_s` with the cart at `x` (m) and `speed` (m/s).
     pub fn force_n(&self, time_s: f64, x: f64, speed: f64) -> f64 {
         self.sines_n(time_s) - self.stiffness_n_per_m * x - self.damping_n_s_per_m * speed
     }
 
-    /// The same without spring and damper.
+    /// Force (N) at `time_s` without spring and damper.
     pub fn sines_n(&self, time_s: f64) -> f64 {
         let ramp = (time_s / RAMP_S).min((self.duration_s - time_s) / RAMP_S).clamp(0.0, 1.0);
         let sum: f64 = self.lines.iter().map(|[f, phase]| libm::cos(TAU * f * time_s + phase)).sum();
         self.amplitude_n * ramp * sum
     }
 
-    /// Bisects the largest amplitude for which the model stays within [`AIM`] and the force limit.
+    /// Finds by bisection the largest amplitude for which the model stays within [`AIM`] and the force limit.
     fn find_amplitude(&mut self, rig: &Rig, chain: &Chain) {
         let record = Record::of(rig, &[], 1);
         let model = record.model(chain.gravity_m_per_s2);
@@ -130,7 +131,7 @@ impl Excitation {
             step.take(model, p, &state, &Input { force, ..Input::default() }, dt_s);
             state.copy_from_slice(&step.end);
             let turned = state[1..m].iter().map(|phi| (phi - PI).abs()).fold(0.0, f64::max);
-            // NaN does not stay.
+            // Written so that NaN counts as leaving the limits.
             let stays = turned <= AIM.0 && state[0].abs() <= farthest && force.abs() <= FORCE_SHARE * limit_n;
             if !stays {
                 return false;
@@ -140,7 +141,7 @@ impl Excitation {
     }
 }
 
-/// Half of the shorter side of the rail (m).
+/// Distance from the middle (x = 0) to the nearer end of the rail (m).
 pub(super) fn half_rail(chain: &Chain) -> f64 {
     let [low, high] = chain.cart.travel_m;
     high.min(-low)
@@ -158,7 +159,7 @@ fn hanging_modes(chain: &Chain) -> Result<[f64; 2], IdentifyError> {
     let frequencies = values.iter().map(|Complex { im, .. }: &Complex<f64>| im.abs() / TAU);
     let all: Vec<f64> = frequencies.collect();
     let highest = all.iter().copied().fold(0.0, f64::max);
-    // The cart, which is free, has the frequency 0 but for rounding.
+    // The free cart has the frequency 0, up to rounding.
     let modes = all.iter().copied().filter(|&frequency| frequency > 1e-3 * highest);
     let lowest = modes.fold(f64::INFINITY, f64::min);
     if highest > 0.0 { Ok([lowest, highest]) } else { Err(failed()) }
@@ -172,7 +173,7 @@ pub fn shake(rig: &Rig, duration_s: f64, seed: u64) -> Result<Log, IdentifyError
     shake_machine(rig, rig, duration_s, seed)
 }
 
-/// The same for a machine that is another one than that of its `file`, which only the force is computed from.
+/// As [`shake`], for a `machine` that differs from its `file`: the shaking host knows only the file.
 pub(super) fn shake_machine(
     file: &Rig,
     machine: &Rig,
@@ -180,7 +181,7 @@ pub(super) fn shake_machine(
     seed: u64,
 ) -> Result<Log, IdentifyError> {
     let mut excitation = Excitation::of(file, duration_s, seed)?;
-    // Friction that the file does not have leaves the machine with less motion.
+    // Friction that the file does not have reduces the motion.
     for _ in 0..RAISE.2 {
         let trial = Excitation { duration_s: duration_s.min(TRIAL_S), ..excitation.clone() };
         let Some(log) = run(file, machine, &trial, seed)? else { break };
@@ -205,14 +206,14 @@ pub(super) fn shake_machine(
     )))
 }
 
-/// How far the machine moved in a log, as a share of the aim.
+/// How far the machine moved in a log, as a share of the intended motion.
 fn motion(rig: &Rig, log: &Log) -> Result<f64, IdentifyError> {
     let record = Record::of(rig, core::slice::from_ref(log), Record::usual_stride(rig.tick.period_s));
     let cart = record.extent(0)[0] / (AIM.1 * half_rail(chain_of(rig)?));
     Ok(cart.max(record.largest_angle() / AIM.0))
 }
 
-/// One run of the machine of the file `rig`; none if the cart goes too far.
+/// One run of `machine`, whose file is `rig`; none if the cart goes too far.
 fn run(rig: &Rig, machine: &Rig, excitation: &Excitation, seed: u64) -> Result<Option<Log>, IdentifyError> {
     let chain = chain_of(rig)?;
     let channels = chain.links.len() + 1;
@@ -256,14 +257,14 @@ fn run(rig: &Rig, machine: &Rig, excitation: &Excitation, seed: u64) -> Result<O
     Ok(Some(log))
 }
 
-/// What a force becomes: the command, and its 16 bits in the log.
+/// The drive command for a force at a speed of the cart, and its 16-bit value in the log.
 fn driven(rig: &Rig, scale: DriveScale, force_n: f64, speed: f64) -> (Drive, i16) {
     let of = |part: f64| (part.clamp(-1.0, 1.0) * f64::from(i16::MAX)).round() as i16;
     match (&rig.actuator.motor, scale) {
         (Some(motor), _) => {
             let per_speed = motor.volts_per_speed();
             let volts = force_n * motor.resistance_ohm / per_speed + per_speed * speed;
-            // The dead zone is made up for as in the firmware: without a jump.
+            // The dead zone is compensated as in the firmware: without a jump.
             let lift = (10.0 * volts).clamp(-motor.dead_zone_v, motor.dead_zone_v);
             let part = of((volts + lift) / motor.supply_v);
             (Drive::Duty((f64::from(part) / f64::from(i16::MAX)) as f32), part)
@@ -276,7 +277,7 @@ fn driven(rig: &Rig, scale: DriveScale, force_n: f64, speed: f64) -> (Drive, i16
     }
 }
 
-/// Speed of the cart from its positions, through a low-pass of 5 ms.
+/// Speed of the cart from its positions, through a low-pass filter with a time constant of 5 ms.
 struct Speed {
     period_s: f64,
     last: Option<f64>,

@@ -1,4 +1,4 @@
-//! What a host tells a firmware that shakes its rig, tick by tick.
+//! What a host sends to a firmware that shakes its rig: the forces of the coming ticks.
 
 use upright::protocol::message::Request;
 use upright::supervision::shaking::{AHEAD, FORCES, FULL, Shaking};
@@ -10,27 +10,28 @@ use super::log::Log;
 use crate::rig::Rig;
 use crate::table::TableValues;
 
-/// Begin and end of the low pulses along +x and against it (s).
+/// Begin and end of the weak pulses along +x and against it (s).
 const PULSES_S: [[f64; 2]; 2] = [[0.2, 0.32], [0.7, 0.82]];
 /// Time after which the excitation begins (s).
 const LEAD_S: f64 = 1.2;
-/// Time over which the speed before and after a pulse is taken (s).
+/// Time over which the speed of the cart is averaged before and after a pulse (s).
 const SPEED_S: f64 = 0.04;
-/// The force of a pulse has to change the speed by this part of what it does to the file's total mass alone.
+/// A pulse has to change the speed of the cart by at least this fraction of what it would do to the file's total mass
+/// as one rigid body.
 const FOLLOWS: f64 = 0.1;
-/// Time after which the amplitude is changed, if the rig moves too much or too little (s).
+/// Interval at which the motion is judged, and the amplitude changed if the rig moves too much or too little (s).
 const ADAPT_S: f64 = 4.0;
-/// The amplitude is raised if the rig moves less than this share of the aim, by at most this factor each time, and by
-/// at most this one altogether.
+/// The amplitude is raised if the rig moves less than this share of the intended motion: the share, the largest factor
+/// at a time, and the largest factor in total.
 const RAISE: (f64, f64, f64) = (0.8, 1.3, 3.0);
-/// It is lowered by this factor if the rig moves more.
+/// The amplitude is multiplied by this factor if the rig moves more than intended.
 const LOWER: f64 = 0.7;
-/// Forces are sent as many ticks ahead.
+/// Number of ticks by which forces are sent ahead.
 const SENT_AHEAD: u32 = 3 * AHEAD as u32 / 4;
-/// Room for spring and damper beside the largest force of the excitation.
+/// Largest force allowed, over the largest force of the excitation: leaves room for spring and damper.
 const ROOM: f64 = 1.5;
 
-/// The forces of one run: a short low pulse each way, then the excitation.
+/// The forces of one run: a short weak pulse each way, then the excitation.
 #[derive(Debug, Clone)]
 pub struct Feed {
     excitation: Excitation,
@@ -39,20 +40,22 @@ pub struct Feed {
     half_rail_m: f64,
     pulse_n: f64,
     most_n: f64,
-    /// Change of the speed by a pulse that the file expects (m/s).
+    /// Change of speed by a pulse according to the file, with cart and links as one rigid body (m/s).
     jolt_m_per_s: f64,
-    /// Tick in which the shaking has begun.
+    /// Tick from which the time of the forces is counted; none before the shaking has begun.
     begun: Option<u32>,
-    /// First tick whose force is not sent.
+    /// First tick whose force has not been sent yet.
     unsent: u32,
+    /// Number of pulses that have been checked.
     checked: usize,
-    /// Factor of the amplitude, and the tick from which on the motion is judged again.
+    /// Factor on the amplitude.
     gain: f64,
+    /// Tick at which the motion is judged next.
     judged: u32,
 }
 
 impl Feed {
-    /// The forces for a rig, as its file has it.
+    /// The forces for a rig, computed from its file and its gain table.
     ///
     /// # Errors
     /// [`IdentifyError`] if the rig has no chain with encoders.
@@ -83,7 +86,7 @@ impl Feed {
         })
     }
 
-    /// The request that begins it.
+    /// The request that makes the firmware begin to shake.
     pub fn begin(&self) -> Request {
         Request::Shake(Shaking {
             most_n: self.most_n as f32,
@@ -92,14 +95,14 @@ impl Feed {
         })
     }
 
-    /// The shaking has begun, and the log ends with tick `last`.
+    /// Tells that the shaking has begun, and that the log so far ends with tick `last`.
     pub fn begun(&mut self, last: u32) {
         self.begun = Some(last);
         self.unsent = last + 1;
         self.judged = last + self.ticks(LEAD_S + ADAPT_S);
     }
 
-    /// Forces that are due, with the log as far as it is known.
+    /// Requests with the forces that are due, given the log so far.
     ///
     /// # Errors
     /// [`IdentifyError::Excitation`] if the cart does not follow the pulses.
@@ -112,7 +115,7 @@ impl Feed {
             self.adapt(log, last);
         }
         let mut requests = Vec::new();
-        // The last ticks are left to spring and damper.
+        // No force is sent for later ticks: spring and damper bring the cart back.
         let end = begun + self.ticks(LEAD_S + self.excitation.duration_s);
         self.unsent = self.unsent.max(last + 1);
         while self.unsent < end.min(last + SENT_AHEAD) {
@@ -128,7 +131,7 @@ impl Feed {
         Ok(requests)
     }
 
-    /// Whether all forces are sent and the log has their ticks.
+    /// Whether all forces have been sent and the log contains their ticks.
     pub fn is_over(&self, log: &Log) -> bool {
         let last = log.ticks().last().map_or(0, |tick| tick.number);
         self.begun.is_some_and(|begun| last >= begun + self.ticks(LEAD_S + self.excitation.duration_s))
@@ -143,7 +146,7 @@ impl Feed {
         (seconds / self.period_s).ceil() as u32
     }
 
-    /// Force at this time from the beginning on, without spring and damper.
+    /// Force (N) at a time since the beginning, without spring and damper.
     fn force_n(&self, time_s: f64) -> f64 {
         let is_in = |pulse: &[f64; 2]| (pulse[0]..pulse[1]).contains(&time_s);
         match PULSES_S.iter().position(is_in) {
@@ -154,14 +157,14 @@ impl Feed {
         }
     }
 
-    /// The cart has to follow each pulse, once it is in the log.
+    /// Checks that the cart follows the next pulse, once that is in the log.
     fn check_pulses(&mut self, log: &Log, begun: u32) -> Result<(), IdentifyError> {
         let Some([from_s, to_s]) = PULSES_S.get(self.checked) else { return Ok(()) };
         let [from, to] = [*from_s, to_s + 2.0 * SPEED_S].map(|at_s| begun + self.ticks(at_s));
         let [Some(before), Some(_)] = [from, to].map(|at| self.speed(log, at)) else { return Ok(()) };
         let sign = if self.checked == 0 { 1.0 } else { -1.0 };
         self.checked += 1;
-        // At its end, light links may have swung back already and have stopped the cart.
+        // By the end of the interval, light links may have swung back and stopped the cart: the largest change counts.
         let change = (from..=to)
             .filter_map(|at| Some(sign * (self.speed(log, at)? - before)))
             .fold(f64::NEG_INFINITY, f64::max);
@@ -178,7 +181,7 @@ impl Feed {
         Ok(())
     }
 
-    /// Speed of the cart just before a tick (m/s).
+    /// Speed of the cart just before a tick (m/s), averaged over [`SPEED_S`]; none if the log lacks a tick for it.
     fn speed(&self, log: &Log, at: u32) -> Option<f64> {
         let since = at.checked_sub(self.ticks(SPEED_S))?;
         let [from, to] =
@@ -188,7 +191,7 @@ impl Feed {
         Some(f64::from(moved) * self.steps[0] / (f64::from(at - since) * self.period_s))
     }
 
-    /// Changes the amplitude after what moved since the last time.
+    /// Adapts the amplitude to the motion since the last call.
     fn adapt(&mut self, log: &Log, last: u32) {
         let from = self.judged.saturating_sub(self.ticks(ADAPT_S));
         self.judged = last + self.ticks(ADAPT_S);

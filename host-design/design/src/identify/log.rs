@@ -1,4 +1,4 @@
-//! The log of a machine that is shaken: every tick's counters, what drove the motor, supply and contacts.
+//! The log of a machine that is shaken: counters, motor drive, supply and contacts of every tick.
 //!
 //! A file is a header and frames; all numbers are little-endian. `docs/identify.md` describes it byte by byte.
 
@@ -12,14 +12,14 @@ use super::error::LogError;
 
 /// The first bytes of a log.
 const MAGIC: &[u8; 8] = b"UPRTLOG1";
-/// Ticks of a full frame.
+/// Number of ticks in a full frame.
 const FRAME_TICKS: usize = 10;
 /// Largest file that is read (bytes): a day of one link, or nine hours of four.
 const MOST_BYTES: u64 = 1 << 30;
-/// Contacts that a frame holds.
+/// Names of the contacts in a frame, from the lowest bit up.
 pub const CONTACTS: [&str; 4] = ["lower limit", "upper limit", "emergency stop", "driver fault"];
 
-/// What the drive of a tick is a part of.
+/// Meaning of the drive values in a log.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum DriveScale {
     /// A duty from -1 to 1.
@@ -28,7 +28,7 @@ pub enum DriveScale {
     Force(f64),
 }
 
-/// What a log says about itself.
+/// Header of a log: the rig, and how its ticks are to be read.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Header {
     /// Name of the rig.
@@ -37,18 +37,18 @@ pub struct Header {
     pub hash: u64,
     /// Control period (ns).
     pub period_ns: u32,
-    /// What the drive is a part of.
+    /// Meaning of the drive values.
     pub drive: DriveScale,
     /// Low bits of each counter (cart, then joints) with the cart at 0 and the links hanging, as homed.
     pub hanging: Vec<u16>,
 }
 
-/// One tick.
+/// One tick of a log, apart from its counters.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Tick {
     /// Number of the tick.
     pub number: u32,
-    /// Applied duty or force, 32767 at full scale; [`OFF`] while the motor is off, and turns freely.
+    /// Applied duty or force, 32767 at full scale; [`OFF`] while the motor is off and turns freely.
     pub drive: i16,
     /// Supply (mV); 0 if it is not measured.
     pub supply_mv: u16,
@@ -56,10 +56,10 @@ pub struct Tick {
     pub contacts: u8,
 }
 
-/// A log.
+/// A log: a header, and ticks in ascending order, with gaps where ticks were lost.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Log {
-    /// What it says about itself.
+    /// The rig, and how the ticks are to be read.
     pub header: Header,
     ticks: Vec<Tick>,
     /// Counters of all ticks, one row per tick.
@@ -87,12 +87,12 @@ impl Log {
         self.counts.extend_from_slice(counts);
     }
 
-    /// All ticks.
+    /// All ticks, in ascending order of their numbers.
     pub fn ticks(&self) -> &[Tick] {
         &self.ticks
     }
 
-    /// Counters of the tick at `index`.
+    /// Low bits of the counters of the tick at `index` in [`ticks`](Self::ticks), one per channel.
     pub fn counts(&self, index: usize) -> &[u16] {
         &self.counts[index * self.channels()..][..self.channels()]
     }
@@ -106,7 +106,7 @@ impl Log {
     }
 
     /// Deviation of each channel from hanging, in counts, with the wrap-around of 16 bits undone; one row per tick. The
-    /// first reading is within half of the range of hanging.
+    /// first reading is taken to be within half of the 16-bit range of hanging.
     pub fn deviations(&self) -> Vec<i64> {
         let channels = self.channels();
         let mut last: Vec<(u16, i64)> = self.header.hanging.iter().map(|&count| (count, 0)).collect();
@@ -119,10 +119,10 @@ impl Log {
         self.counts.iter().enumerate().map(unwrapped).collect()
     }
 
-    /// Reads a file.
+    /// Reads a log from a file.
     ///
     /// # Errors
-    /// [`LogError`] with the place in the file.
+    /// [`LogError`], with the offset of the damage if there is one.
     pub fn from_path(file: &Path) -> Result<Self, LogError> {
         let unreadable = |error: io::Error| LogError::Unreadable(error.to_string());
         let mut bytes = Vec::new();
@@ -135,10 +135,10 @@ impl Log {
         Self::from_bytes(&bytes)
     }
 
-    /// Reads the bytes of a file.
+    /// Reads a log from the bytes of a file.
     ///
     /// # Errors
-    /// [`LogError`] with the place.
+    /// [`LogError`], with the offset of the damage if there is one.
     pub fn from_bytes(bytes: &[u8]) -> Result<Self, LogError> {
         let (header, mut rest) = header(bytes)?;
         let channels = header.hanging.len();
@@ -179,7 +179,7 @@ impl Log {
         Ok(())
     }
 
-    /// The bytes of a file. A frame ends before a tick that is missing, and where supply or contacts change.
+    /// The log as the bytes of a file. A frame ends before a missing tick, and where supply or contacts change.
     pub fn to_bytes(&self) -> Vec<u8> {
         let mut bytes = self.header.to_bytes();
         let mut from = 0;
@@ -203,7 +203,7 @@ impl Log {
         bytes
     }
 
-    /// What drove the cart in a tick: a duty, or a force (N).
+    /// Drive of a tick: a duty from -1 to 1, or a force (N); 0 while the motor was off.
     pub fn drive(&self, tick: &Tick) -> f64 {
         let part = if tick.drive == OFF { 0.0 } else { f64::from(tick.drive) / f64::from(i16::MAX) };
         match self.header.drive {
@@ -232,7 +232,7 @@ impl Header {
     }
 }
 
-/// Reads the header; gives what follows it.
+/// Reads the header; returns it with the bytes that follow.
 fn header(bytes: &[u8]) -> Result<(Header, &[u8]), LogError> {
     if bytes.is_empty() {
         return Err(LogError::Empty);
@@ -273,7 +273,7 @@ fn with_checksum(mut body: Vec<u8>) -> Vec<u8> {
     body
 }
 
-/// What stands before a checksum, if that is right.
+/// The bytes before the checksum, if it is right.
 fn checked(bytes: &[u8]) -> Option<&[u8]> {
     let (body, crc) = bytes.split_last_chunk::<4>()?;
     (crc32(0, body) == u32::from_le_bytes(*crc)).then_some(body)

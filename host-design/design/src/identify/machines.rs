@@ -1,4 +1,4 @@
-//! Machines that differ from their rig file in everything that is identified.
+//! Simulated machines that differ from their rig file in everything that is identified.
 
 use core::f64::consts::PI;
 
@@ -12,34 +12,33 @@ use crate::plant::ChainParameters;
 use crate::reality::real_chain;
 use crate::rig::{PerJoint, PlantDescription, Rig};
 
-/// Friction is between the usual one divided by this and multiplied by it.
+/// Friction is drawn between the usual value divided by this factor and multiplied by it.
 const FRICTION_FACTOR: f64 = 3.0;
 /// Largest homing error of a joint (rad), and largest tilt of the rail.
 const HOMING_RAD: f64 = 0.5 * PI / 180.0;
 const TILT_RAD: f64 = 0.3 * PI / 180.0;
 /// Largest latency, in ticks: less than one.
 const LATENCY_TICKS: f64 = 0.95;
-/// The dead zone of the motor is off by at most this share.
+/// Largest relative error of the motor's dead zone.
 const DEAD_ZONE: f64 = 0.5;
 
-/// A machine, and the true value of each parameter that is identified.
+/// A simulated machine, and the true value of each parameter that is identified.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Machine {
-    /// Its rig.
+    /// The rig as it is simulated, with the drawn errors.
     pub rig: Rig,
     truth: Vec<(Kind, f64)>,
 }
 
 impl Machine {
-    /// The machine with this number, of those that differ from `file` by up to `off_percent` in masses, lengths and
-    /// inertias. Friction, homing, tilt, latency and dead zone are drawn, too; the motor's other constants are those of
-    /// the file.
+    /// Draws machine `number` of those that differ from `file` by up to `off_percent` in masses, lengths and inertias.
+    /// Friction, homing, tilt, latency and dead zone are drawn, too; the motor's other constants are the file's.
     ///
     /// # Errors
     /// [`IdentifyError`] if the rig has no chain with encoders.
     pub fn draw(file: &Rig, off_percent: f64, seed: u64, number: u64) -> Result<Self, IdentifyError> {
         let chain = chain_of(file)?;
-        // A generator for each machine, so that it does not depend on the others.
+        // Each machine has its own generator, so that it does not depend on the others.
         let mut random = Pcg64::seed_from_u64(seed.rotate_left(32) ^ number);
         let links = chain.links.len();
         let layout = Layout { links };
@@ -83,7 +82,7 @@ impl Machine {
     }
 }
 
-/// The parameters of the machine of `rig`, with its `[reality]`.
+/// The true parameters of the machine of `rig`, including its `[reality]`.
 fn truth(rig: &Rig) -> Result<Vec<(Kind, f64)>, IdentifyError> {
     let real = real_chain(chain_of(rig)?, &rig.reality.parameters);
     let constants = ChainParameters::<f64>::of(&real);

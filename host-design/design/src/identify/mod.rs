@@ -1,15 +1,15 @@
 //! Identification: the parameters of the real machine, from the log of a machine that hangs and is shaken.
 //!
 //! - [`Log`]: every tick's counters and drive, as a file.
-//! - [`Excitation`], [`shake`]: what shakes the machine, and the log of a simulated one.
+//! - [`Excitation`], [`shake`]: the force that shakes the machine, and the log of a simulated one.
 //! - [`shake_with`]: the log of a simulated machine that the whole firmware shakes; [`Feed`] and [`Recorder`] are the
 //!   host's part of it.
-//! - [`OverLine`]: the same for a machine behind a serial line.
-//! - [`identify`]: first the wiring, then multiple shooting, then prediction error, then deviations and a verdict.
-//! - [`coverage`]: how far the deviations hold, over many machines that differ from their file.
+//! - [`OverLine`]: the same for a machine at the other end of a serial line.
+//! - [`identify`]: the wiring, then multiple shooting, then a prediction-error fit, then deviations and a verdict.
+//! - [`coverage`]: how often the stated intervals cover the truth, over many machines that differ from their file.
 //! - [`Realised`]: the numbers of a rig file with the identified parameters.
 //!
-//! `docs/identify.md` has the experiment, the format of the file, what can be known, and the accuracy reached.
+//! `docs/identify.md` describes the experiment, the file format, what can be identified, and the accuracy reached.
 
 mod convert;
 mod covariance;

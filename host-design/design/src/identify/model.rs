@@ -1,4 +1,4 @@
-//! The equations of motion with friction that levels off, and their derivatives by the state and by every parameter.
+//! The equations of motion with smoothed dry friction, and their derivatives by the state and by every parameter.
 
 // The indices are those of the equations.
 #![allow(clippy::needless_range_loop)]
@@ -6,11 +6,12 @@
 use super::parameters::Layout;
 use super::rows::add_multiple;
 
-/// The chain with the letters of `ChainParameters`, for any number of links n, in the m = n + 1 coordinates x, φ_1 …
+/// The chain in the notation of `ChainParameters`, for any number of links n, in the m = n + 1 coordinates x, φ_1 …
 /// φ_n.
 ///
-/// The state has s = 2m + 1 entries: coordinates, their rates, and the bristle ζ of the cart. Angles are absolute and
-/// from the normal of the rail, which rises by α. With `b_jk = l_j a_k` for j < k and `b_jj = J_j` the equations are
+/// The state has s = 2m + 1 entries: coordinates, their rates, and the bristle deflection ζ of the cart's friction.
+/// Angles are absolute and measured from the normal of the rail, which rises at the angle α. With `b_jk = l_j a_k` for
+/// j < k and `b_jj = J_j` the equations are
 ///
 /// ```text
 /// M_t ẍ - Σ a_j cos φ_j φ̈_j + Σ a_j sin φ_j φ̇_j² = u - (d_0 + e) ẋ - c_0 ζ - g M_t sin α
@@ -19,9 +20,9 @@ use super::rows::add_multiple;
 /// dζ/dx = (1 - ζ sgn ẋ)/δ
 /// ```
 ///
-/// with e the damping of the motor's back-EMF. A cart that turns round is held by its friction until the bristle has
-/// turned, too (P. R. Dahl, "Solid friction damping of mechanical vibrations", AIAA Journal 14(12), 1976): a friction
-/// without memory lets it creep instead.
+/// where e is the damping by the motor's back-EMF. A cart that reverses is held by its friction until the bristle has
+/// reversed, too (P. R. Dahl, "Solid friction damping of mechanical vibrations", AIAA Journal 14(12), 1976); with a
+/// friction model without memory it would creep instead.
 #[derive(Debug, Clone)]
 pub(super) struct Model {
     pub(super) layout: Layout,
@@ -34,9 +35,9 @@ pub(super) struct Model {
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub(super) struct Input {
     pub(super) force: f64,
-    /// By the delay (N/tick).
+    /// Derivative by the delay (N/tick).
     pub(super) by_delay: f64,
-    /// By the dead zone (N/V).
+    /// Derivative by the dead zone (N/V).
     pub(super) by_dead_zone: f64,
     /// e: back-EMF as damping (N·s/m); 0 while the motor turns freely.
     pub(super) back_emf: f64,
@@ -68,7 +69,8 @@ impl Model {
         2 * self.coordinates() + 1
     }
 
-    /// The bristle of the cart after a travel from where it was `bristle`, and its derivatives by both.
+    /// Bristle deflection after a travel of the cart (m) from the deflection `bristle`, and its derivatives by the old
+    /// deflection and by the travel.
     pub(super) fn bristle(&self, bristle: f64, travel: f64) -> [f64; 3] {
         let direction = 1f64.copysign(travel);
         let left = libm::exp(-travel.abs() / self.smoothing[0]);
@@ -85,7 +87,7 @@ impl Model {
         p[self.layout.length(low)] * p[self.layout.first_moment(high)]
     }
 
-    /// Friction in a joint that moves at `rate`: torque, its slope, and tanh.
+    /// Friction in a joint that turns at `rate` (rad/s): torque (N·m), its derivative by the rate, and the tanh.
     fn friction(&self, p: &[f64], joint: usize, rate: f64) -> [f64; 3] {
         let smoothing = self.smoothing[1];
         let direction = libm::tanh(rate / smoothing);
@@ -96,7 +98,7 @@ impl Model {
 }
 
 impl Local {
-    /// For derivatives by the state, and by the parameters if `parameters`.
+    /// Storage for derivatives by the state, and by the parameters if `parameters`.
     pub(super) fn new(layout: Layout, parameters: bool) -> Self {
         let m = layout.links + 1;
         let columns = 2 * m + 1 + if parameters { layout.of_motion() } else { 0 };
@@ -242,8 +244,8 @@ impl Local {
         }
     }
 
-    /// Columns through which a force on the cart and a torque in each joint accelerate the coordinates, at the state
-    /// of the last call: m×m, row by row.
+    /// Accelerations of the coordinates per unit of force on the cart and of torque in each joint, at the state of the
+    /// last call: m×m, row by row.
     pub(super) fn inputs(&self) -> Vec<f64> {
         let m = self.acceleration.len();
         let mut columns = vec![0.0; m * m];
@@ -275,7 +277,7 @@ fn factorise(matrix: &mut [f64], m: usize) {
     }
 }
 
-/// Replaces the m rows of `columns` right-hand sides by the solution.
+/// Replaces `columns` right-hand sides, stored as the columns of m rows, by their solutions.
 fn solve(factors: &[f64], m: usize, columns: usize, rows: &mut [f64]) {
     let take = |rows: &mut [f64], to: usize, from: usize, factor: f64| {
         let (low, high) = (to.min(from), to.max(from));

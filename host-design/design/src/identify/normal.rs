@@ -9,15 +9,16 @@ pub(super) struct Normal {
     /// A, row by row; the lower triangle is kept.
     matrix: Vec<f64>,
     pub(super) gradient: Vec<f64>,
-    /// What is minimised.
+    /// Value of the cost function that is minimised.
     pub(super) cost: f64,
     /// Sum of the squared residuals of each channel.
     pub(super) squares: Vec<f64>,
-    /// Sum of the squared residuals of each channel over their predicted variances.
+    /// Sum of the squared residuals of each channel, each divided by its predicted variance.
     pub(super) normalised: Vec<f64>,
     /// Number of residuals of each channel.
     pub(super) count: usize,
-    /// Residuals over their predicted deviations, one row of channels per sample; only of a filter without parameters.
+    /// Residuals divided by their predicted deviations, one row of channels per sample; only from a filter that does
+    /// not fit parameters.
     pub(super) innovations: Vec<f64>,
 }
 
@@ -35,7 +36,8 @@ impl Normal {
         }
     }
 
-    /// Adds the residual `error` with its derivatives `jacobian` by the negative parameters, and the weight `weight`.
+    /// Adds the residual `error`, measurement minus prediction, with the weight `weight`; `jacobian` holds the
+    /// derivatives of the prediction by the parameters.
     pub(super) fn add(&mut self, jacobian: &[f64], error: f64, weight: f64) {
         for (i, &of_i) in jacobian.iter().enumerate() {
             let factor = weight * of_i;
@@ -61,7 +63,7 @@ impl Normal {
         self
     }
 
-    /// Adds the prior: each parameter is 0 with deviation 1, and is now `at`.
+    /// Adds the prior, mean 0 and deviation 1 for each scaled parameter; `at` holds their current values.
     pub(super) fn add_prior(&mut self, at: &[f64]) {
         for (i, at) in at.iter().enumerate() {
             self.matrix[i * self.size + i] += 1.0;
@@ -80,17 +82,17 @@ impl Normal {
         self.matrix[i.max(j) * self.size + i.min(j)]
     }
 
-    /// Changes an entry of the lower triangle of A.
+    /// Subtracts `value` from an entry of the lower triangle of A.
     pub(super) fn subtract(&mut self, i: usize, j: usize, value: f64) {
         self.matrix[i * self.size + j] -= value;
     }
 
-    /// Size of A.
+    /// Number of rows of A.
     pub(super) fn size(&self) -> usize {
         self.size
     }
 
-    /// Factor of A with its diagonal raised by the share `damping`; none if it is not positive definite.
+    /// Factor of A with its diagonal multiplied by 1 + `damping`; none if that is not positive definite.
     pub(super) fn factor(&self, damping: f64) -> Option<Cholesky> {
         let n = self.size;
         let mut l = self.matrix.clone();
@@ -113,7 +115,7 @@ impl Normal {
     }
 }
 
-/// `A = L Lᵀ`.
+/// The lower triangular factor L of `A = L Lᵀ`.
 #[derive(Debug, Clone)]
 pub(super) struct Cholesky {
     size: usize,

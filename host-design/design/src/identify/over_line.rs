@@ -1,6 +1,6 @@
-//! A machine behind a serial line that its firmware shakes, and its log.
+//! Shakes a machine at the other end of a serial line through its firmware, and records the log.
 //!
-//! Nothing here reads or writes the line: bytes come in, bytes go out, and the time is given.
+//! Nothing here reads or writes the line: the caller passes in received bytes and the time, and takes bytes to send.
 
 use std::collections::VecDeque;
 use std::time::Duration;
@@ -20,31 +20,31 @@ use crate::harness::HarnessError;
 use crate::rig::Rig;
 use crate::table::{MAX_SENSORS, MAX_STATES, TableValues};
 
-/// Time between two transmissions of a request that is not answered.
+/// Interval at which a request is repeated until it is answered.
 const REPEAT: Duration = Duration::from_millis(50);
-/// After so long without an answer, or without a message, the firmware is given up.
+/// Time without an answer, or without a message, after which the host gives up.
 const PATIENCE: Duration = Duration::from_secs(2);
 /// Time between two telemetry messages (s): the line has room for the log and a little telemetry.
 const TELEMETRY_S: f64 = 0.05;
 
-/// Why a machine behind a line is not shaken, or not any more.
+/// Why shaking a machine over a line failed.
 #[derive(Debug, thiserror::Error)]
 pub enum LineError {
-    /// The firmware is another one.
+    /// The firmware does not match the rig file or the protocol, or does not answer or rejects a request.
     #[error(transparent)]
     Harness(#[from] HarnessError),
     /// The cart does not follow, or the rig cannot be identified.
     #[error(transparent)]
     Identify(#[from] IdentifyError),
-    /// Nothing is heard.
+    /// No message arrives.
     #[error("nothing is heard from the firmware: check port, cable, and that no other program has the port")]
     Silent,
-    /// The firmware does not know how to log.
+    /// The firmware does not answer the request to log: its image is built without logging.
     #[error(
         "the firmware does not log its ticks: flash the image for identification, upright firmware flash RIG --identify"
     )]
     NoLog,
-    /// Something prevents it.
+    /// Something prevents shaking at present.
     #[error(
         "the firmware does not shake the rig: {0}; home it and check signs and motor with upright firmware monitor first"
     )]
@@ -52,19 +52,19 @@ pub enum LineError {
     /// The motor was turned off by a fault.
     #[error("the firmware has turned the motor off: {0}")]
     Fault(Fault),
-    /// It ended before all forces were there.
+    /// The shaking ended before all forces were applied.
     #[error("the shaking has ended too early: the forces came too late, or someone has turned the motor off")]
     Interrupted,
 }
 
-/// A request without an answer.
+/// A request that has not been answered yet.
 struct Waiting {
     command: Command,
     since: Duration,
     next: Duration,
 }
 
-/// The host's part while a firmware behind a line shakes its machine: questions, forces, and the log.
+/// The host's part while a firmware at the other end of a line shakes its machine: requests, forces, and the log.
 pub struct OverLine {
     rig_hash: u64,
     requests: VecDeque<Request>,
@@ -72,17 +72,18 @@ pub struct OverLine {
     receiver: Receiver<MAX_MESSAGE>,
     outgoing: Vec<u8>,
     last_id: u64,
-    /// When the last message came.
+    /// Time of the last message.
     heard: Duration,
     state: Option<State>,
-    /// The firmware has agreed to shake.
+    /// Whether the firmware has accepted the request to shake.
     is_shaken: bool,
     feed: Feed,
     recorder: Recorder,
 }
 
 impl OverLine {
-    /// For a machine whose file is `rig` with this table; `now` is the time since 1970.
+    /// Prepares to shake the machine of `rig`, whose gain table is `table`, for `duration_s`; `now` is the time since
+    /// 1970.
     ///
     /// # Errors
     /// [`IdentifyError`] if the rig has no chain with encoders.
@@ -112,7 +113,7 @@ impl OverLine {
         })
     }
 
-    /// Sends what is due.
+    /// Queues the requests and forces that are due, for [`take_outgoing`](Self::take_outgoing).
     ///
     /// # Errors
     /// [`LineError`] if the firmware is silent, does not answer, or the cart does not follow.
@@ -146,10 +147,10 @@ impl OverLine {
         Ok(())
     }
 
-    /// Takes what has come over the line.
+    /// Processes bytes received over the line.
     ///
     /// # Errors
-    /// [`LineError`] if the firmware is another one, refuses, or has turned the motor off.
+    /// [`LineError`] if the firmware does not match, refuses, or has turned the motor off.
     pub fn receive(&mut self, bytes: &[u8], now: Duration) -> Result<(), LineError> {
         for &byte in bytes {
             let Some(Ok(message)) = self.receiver.push::<Message<MAX_STATES, MAX_SENSORS>>(byte) else {
@@ -226,22 +227,22 @@ impl OverLine {
         }
     }
 
-    /// Bytes for the line.
+    /// Takes the bytes that are to be sent over the line.
     pub fn take_outgoing(&mut self) -> Vec<u8> {
         std::mem::take(&mut self.outgoing)
     }
 
-    /// Whether the firmware says that the motor is off.
+    /// Whether the motor is off according to the last telemetry; false before the first.
     pub fn is_off(&self) -> bool {
         self.state.is_some_and(|state| !state.drives())
     }
 
-    /// Whether everything is shaken and logged, and the motor is off.
+    /// Whether all forces have been applied and logged, and the motor is off.
     pub fn is_over(&self) -> bool {
         self.feed.is_over(self.recorder.log()) && self.is_off()
     }
 
-    /// The log.
+    /// Ends the recording and returns the log.
     ///
     /// # Errors
     /// [`IdentifyError::NothingRecorded`] if the firmware has sent none.

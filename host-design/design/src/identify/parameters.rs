@@ -1,18 +1,18 @@
-//! What is identified: the parameters of a chain, their start values from the rig file, and what is known beforehand.
+//! What is identified: the parameters of a chain, their start values from the rig file, and their prior deviations.
 
 use crate::plant::ChainParameters;
 use crate::rig::{Chain, Rig};
 
-/// Travel (m) over which the bristle of the cart turns, and rate (rad/s) below which the dry friction of a joint is
-/// taken as proportional: δ and ε of the model.
+/// Travel (m) over which the bristle of the cart reverses, and rate (rad/s) below which the dry friction of a joint is
+/// about proportional to the rate: δ and ε of the model.
 pub(super) const SMOOTHING: [f64; 2] = [3e-5, 0.02];
 
-/// What a parameter is.
+/// A parameter of a chain; links and joints are counted from 0.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Kind {
     /// M_t: mass of cart and links (kg).
     TotalMass,
-    /// a_j: mass times distance carried by link j (kg·m).
+    /// a_j: first moment at the joint of link j, of everything it carries (kg·m).
     FirstMoment(usize),
     /// l_j: distance of the joints at the ends of link j (m).
     Length(usize),
@@ -28,20 +28,20 @@ pub enum Kind {
     JointDry(usize),
     /// Slope of the rail (rad).
     Tilt,
-    /// Delay of the force (ticks).
+    /// Delay of the force beyond `delay_ticks` (ticks).
     Delay,
     /// Dead zone of the motor (V).
     DeadZone,
     /// Zero error of a joint's encoder (rad).
     Zero(usize),
-    /// Part of an eccentric encoder's error that goes with the sine of the angle (rad).
+    /// Amplitude of the part of an eccentric encoder's error that follows the sine of the angle (rad).
     EccentricSine(usize),
-    /// Part of it that goes with the cosine (rad).
+    /// Amplitude of the part that follows the cosine (rad).
     EccentricCosine(usize),
 }
 
 impl Kind {
-    /// Name with the number of the joint from 1, and unit.
+    /// Name, with links and joints counted from 1, and SI unit.
     pub fn name_and_unit(self) -> (String, &'static str) {
         let of = |what: &str, joint: usize| format!("{what} {}", joint + 1);
         match self {
@@ -63,7 +63,7 @@ impl Kind {
     }
 }
 
-/// Where each parameter stands in the vector of all, for n links.
+/// Index of each parameter in the parameter vector, for n links.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Layout {
     pub(super) links: usize,
@@ -132,12 +132,12 @@ impl Layout {
     }
 }
 
-/// What is known about a parameter before the log is read.
+/// Prior knowledge about a parameter.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Prior {
-    /// Value of the rig file.
+    /// Mean and start value: that of the rig file, or an assumed one if the file has none.
     pub(super) value: f64,
-    /// Standard deviation; 0: it is not identified.
+    /// Standard deviation; 0: the parameter is not identified.
     pub(super) deviation: f64,
 }
 
@@ -147,7 +147,7 @@ const SHAPE: f64 = 0.5;
 const ZERO_RAD: f64 = 0.03;
 /// Deviation of the eccentricity of an encoder (rad).
 const ECCENTRICITY_RAD: f64 = 0.002;
-/// Friction may be this many times what is expected.
+/// Prior deviation of a friction, as a multiple of its expected value.
 pub(super) const FRICTION: f64 = 10.0;
 
 /// Start values and deviations of all parameters, from a rig file.
@@ -158,7 +158,7 @@ pub(super) fn priors(rig: &Rig, chain: &Chain, eccentricity: bool) -> Vec<Prior>
     let weight = constants.total_mass * gravity;
     let shape = |value: f64| Prior { value, deviation: SHAPE * value };
     let motor = rig.actuator.motor.as_ref();
-    // One percent of critical damping, or what the file says.
+    // One percent of critical damping.
     let joint_viscous = |j: usize| 0.02 * (constants.b[(j, j)] * constants.a[j] * gravity).sqrt();
     let viscous =
         |given: f64, usual: f64| Prior { value: given, deviation: FRICTION * given.max(0.1 * usual) };

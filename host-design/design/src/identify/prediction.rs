@@ -1,4 +1,4 @@
-//! Prediction error: an extended Kalman filter predicts each measurement from those before it.
+//! Prediction-error method: an extended Kalman filter predicts each measurement from those before it.
 
 // The indices are those of the equations.
 #![allow(clippy::needless_range_loop)]
@@ -12,17 +12,17 @@ use super::shooting::scaled;
 use super::step::Step;
 use crate::parallel;
 
-/// Length of a run of the filter (s): they run in parallel.
+/// Longest segment of the record (s): segments are filtered in parallel.
 const SEGMENT_S: f64 = 10.0;
-/// After this time of a run the predictions count (s).
+/// Time from the start of a segment after which its predictions count (s).
 const SETTLING_S: f64 = 0.25;
-/// Time over which the process noise is tuned (s).
+/// Duration of the part of the record on which the process noise is tuned (s).
 const TUNING_S: f64 = 6.0;
 /// Factors by which an intensity is changed while it is tuned.
 const FACTORS: [f64; 3] = [10.0, 4.0, 2.0];
 /// A fit ends when no parameter moves by more than this many of its deviations.
 const SETTLED: f64 = 0.03;
-/// Intensity of the noise of the bristle (1/s): what a bristle of another kind does while the cart sticks.
+/// Noise intensity of the bristle (1/s): allows for real friction that differs from the model while the cart sticks.
 const BRISTLE_NOISE_PER_S: f64 = 0.3;
 
 /// The filter over a record.
@@ -32,10 +32,10 @@ pub(super) struct Filter<'a> {
     pub(super) priors: &'a [Prior],
 }
 
-/// A run: piece, first sample, number of samples.
+/// A segment: piece, first sample, number of samples.
 type Segment = (usize, usize, usize);
 
-/// Intensities of the noise on the cart (N²·s) and in each joint ((N·m)²·s) that the search begins with.
+/// Noise intensities on the cart (N²·s) and in each joint ((N·m)²·s) with which the search begins.
 pub(super) fn usual_noise(p: &[f64], layout: Layout, gravity: f64) -> Vec<f64> {
     let of = |weight: f64| 1e-9 * (gravity * weight).powi(2);
     let joints = (0..layout.links).map(|link| of(p[layout.first_moment(link)]));
@@ -57,7 +57,8 @@ impl Filter<'_> {
         segments
     }
 
-    /// Normal equations of all predictions with `p` and `noise`; with the parameters if `free`.
+    /// Normal equations of all predictions with `p` and `noise`; in the parameters if `free`, otherwise only costs and
+    /// residuals.
     pub(super) fn run(&self, p: &[f64], noise: &[f64], free: bool) -> Normal {
         let layout = self.model.layout;
         let inputs: Vec<Vec<Input>> =
@@ -72,7 +73,7 @@ impl Filter<'_> {
         sum
     }
 
-    /// Finds the noise under which the measurements are most likely.
+    /// Finds the noise intensities under which the measurements are most likely.
     pub(super) fn tuned(&self, p: &[f64]) -> Vec<f64> {
         let short = self.record.part(1.0, 1.0 + TUNING_S);
         let short = if short.pieces.is_empty() { self.record.clone() } else { short };
@@ -82,12 +83,11 @@ impl Filter<'_> {
         for factor in FACTORS {
             for channel in 0..noise.len() {
                 for factor in [factor, 1.0 / factor] {
-                    // On until it gets worse.
                     for _ in 0..6 {
                         let mut other = noise.clone();
                         other[channel] *= factor;
                         let cost = filter.run(p, &other, false).cost;
-                        // Not below what a longer log could tell.
+                        // A gain of less than 0.5 is not significant.
                         if cost.is_nan() || cost > least - 0.5 {
                             break;
                         }
@@ -119,7 +119,8 @@ impl Filter<'_> {
         best.1
     }
 
-    /// Gauss–Newton from `p` on, at most `iterations` steps; gives the parameters and the equations there.
+    /// Gauss–Newton from `p`, at most `iterations` steps; returns the parameters and the normal equations there, or
+    /// none if these are not positive definite.
     pub(super) fn fit(&self, p: &[f64], noise: &[f64], iterations: usize) -> Option<(Vec<f64>, Normal)> {
         let mut p = p.to_vec();
         let mut normal = self.run(&p, noise, true);
@@ -160,7 +161,7 @@ impl Filter<'_> {
         let mut filter = State::new(self.record.state_near(p, self.model.layout, piece, first), size);
         for channel in 0..m {
             let step = self.record.steps[channel];
-            // Angles are sums of measurements.
+            // Absolute angles are sums of measured joint angles.
             filter.covariance[channel * s + channel] = step * step * (channel as f64).max(1.0);
             filter.covariance[(m + channel) * s + m + channel] =
                 (step / 0.01).powi(2) * (channel as f64).max(1.0);
@@ -219,8 +220,8 @@ impl State {
         }
     }
 
-    /// Corrects by one measurement; gives the innovation and its variance, and writes the derivatives of the prediction
-    /// by the scaled parameters into `jacobian`.
+    /// Corrects by one measurement; returns the innovation and its variance, and writes the derivatives of the
+    /// prediction by the scaled parameters into `jacobian`.
     fn correct(
         &mut self,
         filter: &Filter<'_>,
@@ -264,7 +265,7 @@ impl State {
         (error, predicted)
     }
 
-    /// Predicts the next sample.
+    /// Predicts the state at the next sample, with its covariance and its derivatives.
     fn predict(&mut self, step: &Step, noise: &[f64], dt_s: f64) {
         let (s, size, m) = (self.at.len(), self.size, self.at.len() / 2);
         self.at.copy_from_slice(&step.end);

@@ -1,4 +1,4 @@
-//! From the identified numbers to those of a rig file.
+//! Converts identified parameters to the numbers of a rig file.
 
 use super::error::IdentifyError;
 use super::parameters::Layout;
@@ -13,17 +13,17 @@ pub struct Realised {
     pub cart_viscous: f64,
     /// Dry friction of the cart (N).
     pub cart_dry_n: f64,
-    /// The links.
+    /// The links, in their order from the cart.
     pub links: Vec<RealisedLink>,
     /// Slope of the rail (rad).
     pub tilt_rad: f64,
     /// Dead zone of the motor (V).
     pub dead_zone_v: f64,
-    /// What the winding resistance is multiplied by, if the scale of the force is known from a weighing.
+    /// Factor on the winding resistance: 1, unless a weighing has fixed the scale of the force.
     pub resistance_factor: f64,
 }
 
-/// The numbers of a link.
+/// The numbers of a link and of the joint at its lower end.
 #[derive(Debug, Clone, PartialEq)]
 pub struct RealisedLink {
     /// Mass (kg).
@@ -34,26 +34,27 @@ pub struct RealisedLink {
     pub centre_m: f64,
     /// Inertia about the centre of mass (kg·m²).
     pub inertia_kg_m2: f64,
-    /// Viscous friction (N·m·s/rad).
+    /// Viscous friction of the joint (N·m·s/rad).
     pub viscous: f64,
-    /// Dry friction (N·m).
+    /// Dry friction of the joint (N·m).
     pub dry_n_m: f64,
 }
 
-/// Share by which a mass is above the least that its moments allow.
+/// Relative margin of a mass above the least that its moments allow.
 const SPARE: f64 = 1e-6;
 
-/// The machine with the parameters `p` whose links have the masses nearest to those of the file: only M_t, a_j, l_j and
-/// J_j are known, so that each mass may be chosen, and centre and inertia follow,
+/// The machine with the parameters `p` whose link masses are nearest to those of the file. Only M_t, a_j, l_j and J_j
+/// are identified, so each mass can be chosen, and centre of mass and inertia follow:
 ///
 /// ```text
 /// c_j = (a_j - l_j S_j) / m_j,   I_j = J_j - l_j² S_j - m_j c_j²,   S_j = m_{j+1} + … + m_n
 /// ```
 ///
-/// With `weighed`, the first moment a_n of the last link is known (kg·m), and masses, frictions and forces are scaled.
+/// `weighed` is the first moment a_n of the last link (kg·m), if it was weighed: masses, friction and forces are then
+/// scaled to it.
 ///
 /// # Errors
-/// [`IdentifyError::Physical`] if no masses make the mass matrix positive definite.
+/// [`IdentifyError::Physical`] if a link or the cart would have no positive mass.
 pub(super) fn realise(chain: &Chain, p: &[f64], weighed: Option<f64>) -> Result<Realised, IdentifyError> {
     let n = chain.links.len();
     let layout = Layout { links: n };
@@ -64,7 +65,7 @@ pub(super) fn realise(chain: &Chain, p: &[f64], weighed: Option<f64>) -> Result<
         let carried = if j + 1 < n { outer } else { 0.0 };
         let moment = scale * p[layout.first_moment(j)] - length * carried;
         let second = scale * p[layout.second_moment(j)] - length * length * carried;
-        // NaN is no mass.
+        // Written so that NaN is refused, too.
         let is_physical = moment > 0.0 && second > 0.0;
         if !is_physical {
             return Err(IdentifyError::Physical(format!(
@@ -73,7 +74,7 @@ pub(super) fn realise(chain: &Chain, p: &[f64], weighed: Option<f64>) -> Result<
                 j + 1
             )));
         }
-        // I_j >= 0, and the centre within reach.
+        // I_j >= 0, and the centre of mass at most 9.9 lengths from the joint.
         let least = (moment * moment / second).max(moment / (9.9 * length));
         let mass_kg = chain.links[j].mass_kg.max(least * (1.0 + SPARE));
         let centre_m = moment / mass_kg;

@@ -1,4 +1,4 @@
-//! What was measured, in the units of the model, and what drove the cart.
+//! The samples of a log: measurements in the units of the model, and the drive of the cart.
 
 // The indices are those of the equations.
 #![allow(clippy::needless_range_loop)]
@@ -14,7 +14,7 @@ use super::parameters::Layout;
 use super::wiring::channel_name;
 use crate::rig::{Motor, Rig};
 
-/// Longest time from one sample to the next (s), and longest integration step.
+/// Longest time from one sample to the next (s), which is also the integration step.
 const LONGEST_S: f64 = 0.0021;
 /// Shortest piece without a lost tick that is used (s).
 const SHORTEST_PIECE_S: f64 = 1.0;
@@ -24,7 +24,7 @@ const SHORTEST_PIECE_S: f64 = 1.0;
 pub(super) struct Piece {
     /// Deviations from hanging (m, rad), one row of m channels per sample.
     pub(super) y: Vec<f64>,
-    /// Voltage, or force without a motor, of each tick; none while the motor is off.
+    /// Voltage (V), or force (N) of a rig without a motor, in each tick; none while the motor is off.
     drive: Vec<Option<f64>>,
 }
 
@@ -44,7 +44,7 @@ pub(super) struct Record {
 }
 
 impl Record {
-    /// The samples of `log`, every `stride` ticks.
+    /// The samples of `logs`, every `stride` ticks.
     pub(super) fn of(rig: &Rig, logs: &[Log], stride: usize) -> Self {
         let period_s = rig.tick.period_s;
         let steps: Vec<f64> = rig.sensors().iter().map(|sensor| sensor.step()).collect();
@@ -102,12 +102,12 @@ impl Record {
         self.pieces[piece].y.len() / self.channels
     }
 
-    /// Length of all pieces (s).
+    /// Total duration of all pieces (s).
     pub(super) fn seconds(&self) -> f64 {
         (0..self.pieces.len()).map(|piece| self.samples(piece) as f64 * self.dt_s).sum()
     }
 
-    /// The samples from `from_s` to `to_s` of all, counted over the pieces one after the other.
+    /// The samples from `from_s` to `to_s`, where time is counted across the pieces without the gaps.
     pub(super) fn part(&self, from_s: f64, to_s: f64) -> Self {
         let mut part =
             Self { pieces: Vec::new(), steps: self.steps.clone(), motor: self.motor.clone(), ..*self };
@@ -128,7 +128,7 @@ impl Record {
         part
     }
 
-    /// The same with each row of measurements changed by `change`, which gets the row as it was.
+    /// A copy with `change` applied to each row of measurements.
     pub(super) fn rewired(&self, change: impl Fn(&[f64]) -> Vec<f64>) -> Self {
         let mut record = self.clone();
         for piece in &mut record.pieces {
@@ -137,7 +137,7 @@ impl Record {
         record
     }
 
-    /// The same with the motor reversed.
+    /// A copy with the motor reversed.
     pub(super) fn reversed(&self) -> Self {
         let mut record = self.clone();
         record
@@ -206,12 +206,12 @@ impl Record {
             state[joint + 1] += state[joint];
             state[m + joint + 1] += state[m + joint];
         }
-        // A cart that moves bends its bristle.
+        // A moving cart deflects its bristle.
         state[2 * m] = libm::tanh(state[m] / (self.steps[0] / 0.016));
         state
     }
 
-    /// Largest deviation of each channel from hanging (m, rad), and its range.
+    /// Largest deviation of a channel from hanging, and its range from end to end (m, rad).
     pub(super) fn extent(&self, channel: usize) -> [f64; 2] {
         let values =
             || self.pieces.iter().flat_map(|piece| piece.y.iter().skip(channel).step_by(self.channels));
@@ -232,6 +232,8 @@ impl Record {
         .fold(0.0, f64::max)
     }
 
+    /// Checks that every channel moves.
+    ///
     /// # Errors
     /// [`IdentifyError::NothingMoves`], or [`IdentifyError::Still`] for the first channel that moves by less than ten
     /// counts.
@@ -244,6 +246,8 @@ impl Record {
         }
     }
 
+    /// Checks that the record is long enough.
+    ///
     /// # Errors
     /// [`IdentifyError::TooShort`] with less than `least` seconds.
     pub(super) fn at_least(&self, least: f64) -> Result<(), IdentifyError> {
@@ -259,7 +263,7 @@ impl Record {
         })
     }
 
-    /// The model of the record, with the parameters of a layout.
+    /// The model of the recorded chain with the usual smoothing of dry friction; `gravity` in m/s².
     pub(super) fn model(&self, gravity: f64) -> Model {
         Model {
             layout: Layout { links: self.channels - 1 },

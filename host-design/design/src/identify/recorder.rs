@@ -1,4 +1,4 @@
-//! The log of a firmware that sends every tick.
+//! Assembles the log of a firmware that sends every tick.
 
 use super::error::IdentifyError;
 use super::log::{DriveScale, Header, Log, Tick};
@@ -6,18 +6,18 @@ use crate::harness::AnyTickLog;
 use crate::rig::Rig;
 use crate::table::TableValues;
 
-/// Puts the messages of a firmware together to a log.
+/// Assembles the log messages of a firmware into a log.
 #[derive(Debug, Clone)]
 pub struct Recorder {
     log: Log,
     /// Counts of a whole turn of each sensor; 0 for the cart.
     turns: Vec<i32>,
-    /// Messages that did not follow the one before.
+    /// Number of messages that were rejected: they did not follow the one before, or had another number of channels.
     pub out_of_order: u32,
 }
 
 impl Recorder {
-    /// An empty log of the rig with this table.
+    /// A recorder with an empty log, for a rig and its gain table.
     pub fn new(rig: &Rig, table: &TableValues) -> Self {
         let sensors = table.sensors();
         let drive = match table.motor {
@@ -35,8 +35,8 @@ impl Recorder {
         Self { log, turns, out_of_order: 0 }
     }
 
-    /// Adds a message. The first one says how many whole turns the links have made since they were homed: the links
-    /// hang.
+    /// Adds a message. The links have to hang in the first one: it shows how many whole turns they have made since
+    /// they were homed.
     pub fn push(&mut self, message: &AnyTickLog) {
         if self.log.ticks().last().is_some_and(|last| message.first <= last.number) {
             self.out_of_order += 1;
@@ -57,7 +57,7 @@ impl Recorder {
         }
     }
 
-    /// Adds whole turns to what counts as hanging, so that the first tick is within half a turn of it.
+    /// Adds whole turns to the counts of hanging, so that the first tick is within half a turn of them.
     fn take_turns(&mut self, counts: &[u16]) {
         for ((hanging, &count), &turn) in self.log.header.hanging.iter_mut().zip(counts).zip(&self.turns) {
             if turn > 0 {
@@ -73,7 +73,7 @@ impl Recorder {
         &self.log
     }
 
-    /// The log.
+    /// Ends the recording and returns the log.
     ///
     /// # Errors
     /// [`IdentifyError::NothingRecorded`] if the firmware has sent none.

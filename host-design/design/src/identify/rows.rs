@@ -1,6 +1,6 @@
-//! Rows of numbers in the innermost loops of identification. By indices: iterators are not inlined everywhere.
+//! Row operations of the innermost loops of identification. They use indices, as iterators are not inlined everywhere.
 
-/// Adds a multiple of `from` to `row`, as far as both go.
+/// Adds a multiple of `from` to `row`, over the shorter of both lengths.
 #[inline]
 pub(super) fn add_multiple(row: &mut [f64], factor: f64, from: &[f64]) {
     let length = row.len().min(from.len());
@@ -8,7 +8,7 @@ pub(super) fn add_multiple(row: &mut [f64], factor: f64, from: &[f64]) {
     (0..length).for_each(|i| row[i] += factor * from[i]);
 }
 
-/// Makes `row` a multiple of `from`, as far as both go.
+/// Sets `row` to a multiple of `from`, over the shorter of both lengths.
 #[inline]
 pub(super) fn set_multiple(row: &mut [f64], factor: f64, from: &[f64]) {
     let length = row.len().min(from.len());

@@ -13,9 +13,9 @@ use crate::parallel;
 
 /// Length of a window (s).
 pub(super) const WINDOW_S: f64 = 0.25;
-/// Factor of the damping after a step that failed, and after one that helped.
+/// Factors on the damping: after a step that failed, and after one that lowered the cost.
 const DAMPING: [f64; 2] = [10.0, 0.2];
-/// Shares of a step that are tried on the initial state of a window alone.
+/// Fractions of a step that are tried one after the other when only the initial state of a window is fitted.
 const STEPS: [f64; 6] = [1.0, 0.5, 0.25, 0.1, 0.03, 0.01];
 /// A fit ends when a step lowers the cost by less than this share.
 const SETTLED: f64 = 1e-3;
@@ -27,11 +27,11 @@ pub(super) struct Window {
     first: usize,
     samples: usize,
     state: Vec<f64>,
-    /// The bristle that is expected at the start, with a deviation of 1.
+    /// Expected bristle deflection at the start; its prior deviation is 1.
     bristle: f64,
 }
 
-/// The fit of a record.
+/// Multiple shooting on a record.
 pub(super) struct Shooting<'a> {
     pub(super) model: &'a Model,
     pub(super) record: &'a Record,
@@ -40,7 +40,7 @@ pub(super) struct Shooting<'a> {
     pub(super) free: bool,
 }
 
-/// Where a fit is.
+/// Current values of a fit: parameters and initial states.
 #[derive(Debug, Clone)]
 pub(super) struct Fit {
     pub(super) p: Vec<f64>,
@@ -49,7 +49,7 @@ pub(super) struct Fit {
     pub(super) rms: Vec<f64>,
 }
 
-/// The equations of one window: `H_zz δz + H_zp δp = g_z` reduced to `δp`.
+/// Kept from the equations `H_zz δz + H_zp δp = g_z` of one window when δz is eliminated, to compute δz from δp.
 struct Reduced {
     states: Cholesky,
     /// H_zp, column by column, and g_z last.
@@ -74,13 +74,14 @@ impl Shooting<'_> {
         windows
     }
 
-    /// Fits from `p`, with windows of `seconds`: at most `iterations` after each of `rounds` estimates of the weights.
+    /// Fits from `p`, with windows of `seconds`: estimates the weights `rounds` times, with at most `iterations`
+    /// iterations after each.
     pub(super) fn fit(&self, p: &[f64], seconds: f64, iterations: usize, rounds: usize) -> Fit {
         self.fit_windows(p, self.windows(p, seconds), iterations, rounds)
     }
 
-    /// The same, with initial states that were fitted to `p` before: with few iterations, a bad one would spoil the
-    /// whole fit.
+    /// As [`fit`](Self::fit), but with initial states that are fitted with `p` first: with few iterations, a bad one
+    /// would spoil the whole fit.
     pub(super) fn fit_settled(&self, p: &[f64], seconds: f64, iterations: usize, rounds: usize) -> Fit {
         let weights: Vec<f64> = self.record.steps.iter().map(|step| step.powi(-2)).collect();
         let alone = Shooting { free: false, ..*self };
@@ -106,7 +107,7 @@ impl Shooting<'_> {
         fit
     }
 
-    /// What `fit` predicts in its windows: piece and sample, and the measurements of all channels there.
+    /// Predictions of `fit` in its windows: piece, sample, and the predicted measurements of all channels.
     pub(super) fn predictions(&self, fit: &Fit) -> Vec<(usize, usize, Vec<f64>)> {
         let (model, layout) = (self.model, self.model.layout);
         let mut rows = Vec::new();
@@ -124,7 +125,7 @@ impl Shooting<'_> {
         rows
     }
 
-    /// Levenberg–Marquardt from `fit` on.
+    /// Levenberg–Marquardt iterations from `fit`.
     fn descend(&self, fit: &mut Fit, weights: &[f64], iterations: usize) {
         let mut damping = 1e-3;
         let (mut normal, mut reduced) = self.linearise(fit, weights);
@@ -147,8 +148,8 @@ impl Shooting<'_> {
         }
     }
 
-    /// Gauss–Newton on the initial states alone. Each window has steps of its own: one that comes to no better state
-    /// holds up no other.
+    /// Gauss–Newton on the initial states alone. Each window takes its own steps, so one that cannot improve does not
+    /// hold up the others.
     fn settled(&self, p: &[f64], windows: &[Window], weights: &[f64], iterations: usize) -> Vec<Window> {
         let inputs = self.inputs(p);
         parallel::map(windows, |window| {
@@ -175,7 +176,7 @@ impl Shooting<'_> {
         fit
     }
 
-    /// One damped step of parameters, and `share` of that of the initial states.
+    /// One damped step of the parameters, and the fraction `share` of the step of the initial states.
     fn stepped(
         &self,
         fit: &Fit,
@@ -218,7 +219,7 @@ impl Shooting<'_> {
         pieces.map(|piece| self.record.inputs(self.model.layout, p, piece)).collect()
     }
 
-    /// [`Self::linearise`] with `inputs` that are known: with the same parameters they are the same.
+    /// [`Self::linearise`] with `inputs` computed before: they depend only on the parameters.
     fn linearise_with(&self, inputs: &[Vec<Input>], fit: &Fit, weights: &[f64]) -> (Normal, Vec<Reduced>) {
         let each = parallel::map(&fit.windows, |window| {
             let whole = self.window(&fit.p, &inputs[window.piece], window, weights);
@@ -289,7 +290,7 @@ impl Shooting<'_> {
         normal
     }
 
-    /// Eliminates the initial state.
+    /// Eliminates the initial state from the equations of a window.
     fn reduce(&self, whole: Normal) -> (Normal, Option<Reduced>) {
         let s = self.model.states();
         let size = whole.size() - s;
@@ -300,7 +301,7 @@ impl Shooting<'_> {
         for i in 0..s {
             (0..=i).for_each(|j| of_states.subtract(i, j, -whole.entry(i, j)));
         }
-        // A little more than nothing, where the window does not determine a rate.
+        // A little damping, in case the window does not determine a rate.
         let Some(states) = of_states.factor(1e-9) else { return (rest, None) };
         let mut right: Vec<Vec<f64>> =
             (0..size).map(|p| (0..s).map(|i| whole.entry(s + p, i)).collect()).collect();
@@ -371,7 +372,7 @@ mod tests {
         let sum = |windows: &[Window]| windows[3..].iter().map(cost).sum::<f64>();
         let alone = shooting.settled(&p, &windows, &weights, 10);
         assert!(sum(&alone) < 0.5 * sum(&windows), "{} {}", sum(&alone), sum(&windows));
-        // The negative control: a step of all of them at once.
+        // The negative control: steps of all windows together.
         let mut together = Fit { p: p.clone(), windows: windows.clone(), rms: Vec::new() };
         shooting.descend(&mut together, &weights, 10);
         assert!(sum(&together.windows) == sum(&windows));

@@ -1,4 +1,4 @@
-//! One step of integration with its derivatives, and what is measured.
+//! One integration step with its derivatives, and the measurement equations.
 
 use core::f64::consts::PI;
 
@@ -21,11 +21,11 @@ pub(super) struct Step {
     rate_by: Vec<f64>,
 }
 
-/// Each stage: how far into the step, and the weight of its rate.
+/// Each stage: its fraction of the step, and the weight of its rate.
 const STAGES: [(f64, f64); 4] = [(0.0, 1.0 / 6.0), (0.5, 1.0 / 3.0), (0.5, 1.0 / 3.0), (1.0, 1.0 / 6.0)];
 
 impl Step {
-    /// With derivatives by the state, and by the parameters if `parameters`.
+    /// Storage for a step with derivatives by the state, and by the parameters if `parameters`.
     pub(super) fn new(model: &Model, parameters: bool) -> Self {
         let s = model.states();
         let columns = s + if parameters { model.layout.of_motion() } else { 0 };
@@ -42,7 +42,7 @@ impl Step {
         }
     }
 
-    /// Goes from `start` on for `dt` (s) under `input`; the result is in `end` and `by`.
+    /// Integrates from `start` over `dt` (s) under `input`; the result is in `end` and `by`.
     pub(super) fn take(&mut self, model: &Model, p: &[f64], start: &[f64], input: &Input, dt: f64) {
         let (m, s, columns) = (model.coordinates(), model.states(), self.columns);
         self.end.copy_from_slice(start);
@@ -78,13 +78,13 @@ impl Step {
         bend(model, start, &mut self.end, &mut self.by);
     }
 
-    /// Columns through which force and torques accelerate, near the end of the step.
+    /// Accelerations per unit of force and torque at the last stage of the step; see [`Local::inputs`].
     pub(super) fn inputs(&self) -> Vec<f64> {
         self.local.inputs()
     }
 }
 
-/// Bends the bristle of the state `at`, with the derivatives `by`, by the travel since `start`.
+/// Sets the bristle deflection of the state `at`, and its derivatives in `by`, after the travel since `start`.
 fn bend(model: &Model, start: &[f64], at: &mut [f64], by: &mut [f64]) {
     let last = at.len() - 1;
     let [bent, by_start, by_travel] = model.bristle(start[last], at[0] - start[0]);
@@ -96,11 +96,12 @@ fn bend(model: &Model, start: &[f64], at: &mut [f64], by: &mut [f64]) {
     row[last] += by_start;
 }
 
-/// A measurement of one channel (0: cart, then the joints), as deviation from hanging, and what it depends on.
+/// Predicted measurement of one channel (0: cart, then the joints) as deviation from hanging, and terms of its
+/// derivatives.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Measured {
     pub(super) value: f64,
-    /// By the coordinate of this channel; that of the joint below has the opposite sign.
+    /// Derivative by the coordinate of this channel; that by the coordinate below has the opposite sign.
     pub(super) by_angle: f64,
     sine: f64,
     cosine: f64,
@@ -128,7 +129,7 @@ impl Model {
         }
     }
 
-    /// Derivatives of a measurement by the parameters that it depends on itself: each index with its derivative.
+    /// Derivatives of a measurement by the parameters that it depends on directly: index and derivative of each.
     pub(super) fn measured_by(&self, channel: usize, measured: &Measured) -> [(usize, f64); 4] {
         let layout = self.layout;
         match channel.checked_sub(1) {

@@ -1,52 +1,52 @@
-//! Whether an identification may be written.
+//! Whether an identification is good enough to be written to a rig file.
 
 use super::error::IdentifyError;
 use super::normal::Normal;
 use super::wiring::{WiringFound, channel_name};
 
-/// Largest variance of the innovations, as a multiple of what the filter expects.
+/// Largest accepted variance of the innovations, as a multiple of what the filter expects.
 const MOST_VARIANCE: f64 = 1.5;
-/// Largest error of a window's prediction, as a share of the channel's motion.
+/// Largest accepted prediction error (rms) over a window, as a share of the channel's range.
 const MOST_ERROR: f64 = 0.02;
 
-/// How well a channel is explained.
+/// How well the model explains a channel.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ChannelFit {
     /// The cart, or a joint from 1.
     pub name: String,
-    /// Variance of the innovations over what the filter expects: 1 if the model is right.
+    /// Variance of the innovations, divided by what the filter expects: 1 if the model is right.
     pub innovation_variance: f64,
-    /// Error (rms) over windows of 0.5 s that were not used, with the old file and with the new numbers (m, rad).
+    /// Prediction error (rms) over held-out windows of 0.5 s, with the old file and with the new numbers (m, rad).
     pub held_out: [f64; 2],
-    /// How far the channel moved from end to end (m, rad).
+    /// Range of the channel's motion from end to end (m, rad).
     pub range: f64,
-    /// What was held out and how it was predicted, sample by sample.
+    /// Held-out measurements and their predictions, sample by sample.
     pub predictions: Vec<Predicted>,
-    /// Innovations over their expected deviations, every [`sample_s`](super::Identification::sample_s).
+    /// Innovations divided by their expected deviations, every [`sample_s`](super::Identification::sample_s).
     pub innovations: Vec<f64>,
 }
 
-/// A sample that was not used, predicted from the beginning of a window of 0.5 s.
+/// A held-out sample, predicted from the beginning of a window of 0.5 s.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Predicted {
-    /// Time from the first of these samples on (s).
+    /// Time since the first held-out sample (s).
     pub time_s: f64,
-    /// What was measured (m, rad).
+    /// Measurement (m, rad).
     pub measured: f64,
-    /// What the old file predicts.
+    /// Prediction with the old file (m, rad).
     pub by_file: f64,
-    /// What the new numbers predict.
+    /// Prediction with the new numbers (m, rad).
     pub by_found: f64,
 }
 
-/// Why nothing is written.
+/// Why no rig file is written.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Refusal {
-    /// Another wiring than that of the file.
+    /// The wiring differs from that of the file.
     Wiring(WiringFound),
-    /// The log is not explained.
+    /// The model does not explain the log.
     Misfit(String),
-    /// The numbers belong to no machine.
+    /// The numbers are not physical: no machine has them.
     NotPhysical(String),
 }
 
@@ -64,11 +64,11 @@ impl core::fmt::Display for Refusal {
     }
 }
 
-/// Whether the fit of all channels is good enough.
+/// Checks that the fit of every channel is good enough.
 pub(super) fn judge(channels: &[ChannelFit]) -> Result<(), Refusal> {
     for fit in channels {
         let share = fit.held_out[1] / fit.range;
-        // NaN is no fit.
+        // Written so that NaN counts as a misfit.
         let [varies, errs] =
             [fit.innovation_variance <= MOST_VARIANCE, share <= MOST_ERROR].map(|fits| !fits);
         if varies {
@@ -93,9 +93,9 @@ pub(super) fn judge(channels: &[ChannelFit]) -> Result<(), Refusal> {
 
 /// The predictions of a record that was held out: of the old file and of the new numbers.
 pub(super) struct HeldOut {
-    /// Error (rms) of each channel, with each.
+    /// Error (rms) of each channel, with the old file and with the new numbers.
     pub(super) rms: [Vec<f64>; 2],
-    /// Of each channel.
+    /// Samples of each channel.
     pub(super) predictions: Vec<Vec<Predicted>>,
 }
 

@@ -6,7 +6,7 @@ use super::record::Record;
 use super::shooting::{Shooting, WINDOW_S};
 use crate::parallel;
 
-/// Time of the log that is used (s).
+/// Begin and end of the part of the log that is used (s).
 const TIME_S: [f64; 2] = [0.5, 5.0];
 /// Iterations for each wiring.
 const ITERATIONS: usize = 4;
@@ -26,23 +26,23 @@ pub enum Wiring {
     Reversed(usize),
     /// Two encoders of joints are exchanged.
     Swapped(usize, usize),
-    /// An encoder gives this many times the counts of the file.
+    /// An encoder gives this many times the counts that the file states.
     Counts(usize, f64),
 }
 
-/// What was found about the wiring.
+/// Result of the wiring check.
 #[derive(Debug, Clone, PartialEq)]
 pub struct WiringFound {
     /// The wiring that explains the log best.
     pub best: Wiring,
-    /// By what factor the residuals of the next one are larger (geometric mean over the channels).
+    /// Factor by which the residuals of the second-best wiring are larger (geometric mean over the channels).
     pub margin: f64,
-    /// By what factor those of the file's wiring are larger; 1 if it is the best.
+    /// Factor by which the residuals of the file's wiring are larger; 1 if it is the best.
     pub file_is_worse_by: f64,
 }
 
 impl WiringFound {
-    /// Whether the wiring is that of the file.
+    /// Whether the wiring is taken to be that of the file: no other explains the log clearly better.
     pub fn is_as_in_file(&self) -> bool {
         self.best == Wiring::AsInFile || self.file_is_worse_by < MARGIN
     }
@@ -72,7 +72,7 @@ impl core::fmt::Display for Wiring {
     }
 }
 
-/// A channel by its name: the cart, or a joint from 1.
+/// Name of a channel: the cart, or a joint counted from 1.
 pub(super) fn channel_name(channel: usize) -> String {
     if channel == 0 { "the cart".to_owned() } else { format!("joint {channel}") }
 }
@@ -142,7 +142,7 @@ pub(super) fn find(
     }
 }
 
-/// Number of wirings that are tried for so many channels.
+/// Number of wirings that are tried for this many channels.
 pub(super) fn count(channels: usize) -> u64 {
     wirings(channels).len() as u64
 }

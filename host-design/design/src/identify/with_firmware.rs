@@ -1,4 +1,4 @@
-//! The log of a simulated machine that the whole firmware shakes.
+//! The log of a simulated machine that is shaken by the whole firmware.
 
 use upright::board::Output;
 use upright::control::actuator::Drive;
@@ -19,20 +19,20 @@ use crate::table::TableValues;
 
 /// Longest time from power-up until the rig is ready (s).
 const READY_S: f64 = 60.0;
-/// The links hang still for so long before they are shaken (s).
+/// Time for which the links hang still before they are shaken (s).
 const STILL_S: f64 = 1.0;
 /// Time between two telemetry messages (s).
 const TELEMETRY_S: f64 = 0.05;
-/// Longest time in which the cart returns (s).
+/// Longest time for the cart to return to the middle (s).
 const RETURN_S: f64 = 6.0;
 
-/// A run that was not recorded.
+/// Why a run was not recorded.
 #[derive(Debug, thiserror::Error)]
 pub enum ShakeError {
     /// The firmware does not run, or refuses.
     #[error(transparent)]
     Harness(#[from] HarnessError),
-    /// The machine does not do what it should.
+    /// The rig cannot be identified, the motor was turned off by a fault, or the cart does not follow.
     #[error(transparent)]
     Identify(#[from] IdentifyError),
 }
@@ -45,8 +45,9 @@ pub struct Shaken<'t> {
     recorder: Recorder,
 }
 
-/// The log of the machine of `rig`, with its `[reality]`, which the firmware on `target` shakes for `duration_s`, from
-/// power-up on: homed, signs and motor checked, a pulse each way, the excitation, and back to the middle.
+/// The log of the simulated machine of `rig`, with its `[reality]`, which the firmware on `target` shakes for
+/// `duration_s`. The run starts at power-up: homing, checks of signs and motor, a pulse each way, the excitation, and
+/// back to the middle.
 ///
 /// # Errors
 /// [`ShakeError`] if the firmware does not run or turns the motor off, or the cart does not follow.
@@ -72,7 +73,7 @@ pub fn shake_with(
     Ok(shaken.recorder.finish()?)
 }
 
-/// The machine of `rig` from power-up on until signs and motor are checked and it hangs still.
+/// Runs the machine of `rig` from power-up until signs and motor are checked and it hangs still.
 ///
 /// # Errors
 /// [`HarnessError`] if the firmware does not run, or does not get there.
@@ -105,7 +106,7 @@ pub fn checked_and_hanging<'t>(
 }
 
 impl<'t> Shaken<'t> {
-    /// From power-up to the tick in which the firmware begins to shake the machine.
+    /// Runs from power-up to the tick in which the firmware begins to shake the machine.
     ///
     /// # Errors
     /// [`ShakeError`] if the firmware does not run, or refuses.
@@ -120,7 +121,7 @@ impl<'t> Shaken<'t> {
         Ok(Self::begin_with(feed, rig, table, target, seed)?)
     }
 
-    /// The same with forces that are there already.
+    /// As [`begin`](Self::begin), with forces that were computed before.
     ///
     /// # Errors
     /// [`HarnessError`] if the firmware does not run, or refuses.
@@ -157,7 +158,7 @@ impl<'t> Shaken<'t> {
         Ok(output)
     }
 
-    /// One tick without a host.
+    /// One tick without the host: the log is not read, and no forces are sent.
     ///
     /// # Errors
     /// [`HarnessError`] if the firmware does not answer.
@@ -170,7 +171,7 @@ impl<'t> Shaken<'t> {
         Ok(output)
     }
 
-    /// The host takes the log, and sends the forces that are due.
+    /// The host's part of a tick: takes the log and sends the forces that are due.
     ///
     /// # Errors
     /// [`IdentifyError`] if the cart does not follow the pulses.
@@ -187,7 +188,7 @@ impl<'t> Shaken<'t> {
         Ok(())
     }
 
-    /// Whether everything is shaken and logged, and the motor is off.
+    /// Whether all forces have been applied and logged, and the motor is off.
     pub fn is_over(&self) -> bool {
         self.feed.is_over(self.recorder.log()) && self.harness.session.status().state == State::Calibrated
     }

@@ -12,19 +12,19 @@ const FORCE: [f64; 4] = [1.0, 10.0, 100.0, 1000.0];
 const ANGLES: [f64; 4] = [1.0, 10.0, 100.0, 1000.0];
 const FAR: [f64; 9] = [1.0, 0.5, 0.6, 0.7, 0.8, 0.9, 1.1, 1.2, 1.4];
 const NOISE: [f64; 9] = [1.0, 1.0 / 30.0, 0.1, 1.0 / 3.0, 3.0, 10.0, 30.0, 100.0, 300.0];
-/// Digits of a chosen number: what is written into a file is what is designed for.
+/// Digits of a chosen number: the number written into a file is exactly the one that was designed for.
 const DIGITS: usize = 6;
 
-/// Numbers that one control law could have.
+/// Candidate numbers for one control law.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Candidate {
-    /// What differs from the rig file.
+    /// How the numbers differ from the rig file, in words.
     pub name: String,
     /// The numbers.
     pub numbers: LawNumbers,
 }
 
-/// What a rig file gives for a control law.
+/// The section of a rig file for a control law.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub enum LawNumbers {
     /// `[lqr]`
@@ -72,7 +72,7 @@ fn weighted(own: &Lqr) -> Vec<Candidate> {
     pairs.map(candidate).collect()
 }
 
-/// Poles given one by one stay as they are.
+/// Poles given one by one are not changed.
 fn placed(rig: &Rig, own: &PolePlacement) -> Result<Vec<Candidate>, DesignError> {
     let as_in_file = Candidate { name: "as in the file".to_owned(), numbers: LawNumbers::Poles(own.clone()) };
     let PolePlacement::Response { overshoot_percent, settling_time_s, far_poles } = own else {
@@ -95,7 +95,8 @@ fn placed(rig: &Rig, own: &PolePlacement) -> Result<Vec<Candidate>, DesignError>
     Ok(all)
 }
 
-/// The plant's own poles without the two of the cart, the unstable ones mirrored: the limit of an LQR that saves force.
+/// The plant's own poles without the two of the cart, the unstable ones mirrored: the limit of an LQR with a large
+/// force weight.
 fn mirrored(rig: &Rig) -> Result<Vec<f64>, DesignError> {
     let plant = continuous_plant::<f64>(rig)?;
     let poles = eigenvalues(&plant.a).map_err(|_| DesignError::Poles)?;
@@ -104,7 +105,7 @@ fn mirrored(rig: &Rig) -> Result<Vec<f64>, DesignError> {
     Ok(distances.into_iter().skip(2).map(|distance| -distance).collect())
 }
 
-/// Multiples of the joint noise, the rig's own first; only that if it is zero.
+/// Multiples of the joint noise, with their factors, the rig's own first; only that if it is zero.
 pub(super) fn joint_noises(own: &[f64]) -> Vec<(f64, Vec<f64>)> {
     let factors = if own.iter().all(|&noise| noise == 0.0) { &NOISE[..1] } else { &NOISE[..] };
     let scaled = |&factor: &f64| (factor, own.iter().map(|noise| rounded(factor * noise, DIGITS)).collect());

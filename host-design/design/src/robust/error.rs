@@ -13,7 +13,7 @@ pub enum RobustError {
         "no tolerance is stated: give [robust] in the rig file, or an option such as --joint-friction 1e-4"
     )]
     NoTolerance,
-    /// No candidate stands the tolerances.
+    /// No candidate withstands the tolerances.
     #[error("nothing helps: {0}")]
     Unhelped(String),
     /// The rig has no chain or no observer, or too many links.
@@ -22,7 +22,7 @@ pub enum RobustError {
     /// The rig file's own numbers have no design.
     #[error(transparent)]
     Design(#[from] DesignError),
-    /// A design makes no table.
+    /// No gain table can be made for a design.
     #[error(transparent)]
     NoTable(#[from] NoTable),
     /// A run cannot be started.

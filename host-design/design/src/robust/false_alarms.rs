@@ -1,4 +1,4 @@
-//! Hours of balancing with the whole firmware on machines without a defect: how often is one turned off?
+//! Rate of false alarms: hours of balancing with the whole firmware on machines without a defect.
 
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
@@ -13,38 +13,38 @@ use crate::study::Study;
 use crate::table::TableValues;
 use crate::verify::{Unverifiable, at_rest_disturbed, chain};
 
-/// The set-point changes sides this often (s).
+/// Time after which the set-point changes sides (s).
 const SIDE_S: f64 = 60.0;
-/// Its largest distance from the middle (m).
+/// Largest distance of the set-point from the middle (m).
 const SETPOINT_M: f64 = 0.1;
 
-/// How one machine balanced.
+/// Result of balancing one machine.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Healthy {
     /// Time for which it balanced (s).
     pub balanced_s: f64,
     /// Why it was turned off, if it was: the name of the fault.
     pub fault: Option<String>,
-    /// Measurements that the firmware rejected.
+    /// Number of measurements that the firmware rejected.
     pub rejected: u32,
     /// Largest innovation in the telemetry, as a share of its threshold.
     pub closest: f32,
 }
 
-/// How the machines of one law balanced.
+/// Results of balancing machines with one law.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct FalseAlarms {
-    /// The law.
+    /// The law in the loop.
     pub law: Law,
-    /// Machines.
+    /// Number of machines, each of which balanced once.
     pub runs: u64,
-    /// Time for which they balanced, all together (h).
+    /// Total time for which they balanced (h).
     pub hours: f64,
     /// Faults, with the number of each run that ended with one.
     pub alarms: Vec<(u64, String)>,
-    /// With a probability of 95 %, alarms are not more frequent than this (1/h).
+    /// Upper 95 % confidence limit of the rate of alarms (1/h).
     pub most_per_hour: f64,
-    /// Measurements that the firmware rejected.
+    /// Number of measurements that the firmware rejected.
     pub rejected: u64,
     /// Largest innovation in the telemetry, as a share of its threshold.
     pub closest: f32,
@@ -53,14 +53,14 @@ pub struct FalseAlarms {
 /// Which machines balance.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Machines {
-    /// So many, drawn within `[robust]`: [`healthy_machine`].
+    /// This many, drawn within `[robust]`: [`healthy_machine`].
     Drawn(u64),
     /// One at each combination of wrong masses: [`corner_machine`].
     Corners,
 }
 
 impl Machines {
-    /// How many there are of this rig.
+    /// Number of machines for this rig.
     pub fn count(self, rig: &Rig) -> u64 {
         match (self, &rig.plant) {
             (Self::Drawn(runs), _) => runs,
@@ -80,8 +80,8 @@ impl Machines {
 /// Machine of the run with this number: drawn within `[robust]`, or, if the rig file has none, the machine of
 /// `[reality]`.
 ///
-/// Friction, wrong zeros and latency have the same share of their tolerances, and each mass its own, all even from none
-/// to all.
+/// Friction, zero errors and latency are the same share of their tolerances, drawn uniformly from 0 to 1. The error of
+/// each mass is drawn uniformly within its tolerance.
 pub fn healthy_machine(rig: &Rig, number: u64) -> Rig {
     let (Some(tolerances), PlantDescription::Chain(chain)) = (&rig.robust, &rig.plant) else {
         return rig.clone();
@@ -96,8 +96,8 @@ pub fn healthy_machine(rig: &Rig, number: u64) -> Rig {
     machine
 }
 
-/// Machine at the combination of wrong masses with this number, with all of friction, wrong zeros and latency of
-/// `[robust]`.
+/// Machine at the combination of wrong masses with this number, with the full tolerances of `[robust]` for friction,
+/// zero errors and latency.
 ///
 /// The cart is too heavy if the lowest bit of the number is set, the first link if the next is, and so on.
 pub fn corner_machine(rig: &Rig, number: u64) -> Rig {
@@ -146,8 +146,8 @@ pub fn false_alarms(
     })
 }
 
-/// Balances one machine for `seconds` after it was raised by hand, with the disturbances that the rig file expects. The
-/// set-point changes sides every minute.
+/// Balances one machine for `seconds` after it has been raised by hand, with the disturbances that the rig file
+/// expects. The set-point changes sides every minute.
 ///
 /// # Errors
 /// [`HarnessError`] if the firmware does not run with this rig and table.
@@ -166,7 +166,7 @@ pub fn balance(
                 harness.bench.tick(output.drive);
                 balanced(machine, table, &mut harness, seconds)
             }
-            // Turned off before it balanced.
+            // The motor was turned off before the machine balanced.
             Err(error) => match harness.session.fault() {
                 Some(fault) => {
                     Ok(Healthy { balanced_s: 0.0, fault: Some(fault.to_string()), rejected: 0, closest: 0.0 })
@@ -220,7 +220,7 @@ fn tick(harness: &mut Harness<'_>) -> Result<(), HarnessError> {
     Ok(())
 }
 
-/// Measurements that the firmware has rejected so far; the rig goes on balancing until the answer is there.
+/// Number of measurements that the firmware has rejected so far; the rig goes on balancing until the answer arrives.
 fn rejected(harness: &mut Harness<'_>) -> Result<u32, HarnessError> {
     let id = harness.session.send(Request::Statistics);
     for _ in 0..harness.session.pace().answer_ticks {
@@ -234,8 +234,8 @@ fn rejected(harness: &mut Harness<'_>) -> Result<u32, HarnessError> {
     Err(HarnessError::NoAnswer(Request::Statistics))
 }
 
-/// The mean of a Poisson distribution of which `seen` or fewer are drawn with a probability of 5 %: the largest that is
-/// plausible (F. Garwood, "Fiducial limits for the Poisson distribution", Biometrika 28 (1936) 437-442).
+/// The mean of the Poisson distribution for which `seen` or fewer events have a probability of 5 %: the largest
+/// plausible mean (F. Garwood, "Fiducial limits for the Poisson distribution", Biometrika 28 (1936) 437-442).
 fn largest_mean(seen: usize) -> f64 {
     let probability = |mean: f64| {
         let mut term = (-mean).exp();

@@ -1,4 +1,4 @@
-//! The least ripple over multiples of the tolerances.
+//! The front: the least ripple as a function of multiples of the tolerances.
 
 use serde::Serialize;
 use upright::table::Law;
@@ -11,7 +11,7 @@ use crate::verify::PlantModel;
 
 /// Multiples of the tolerances for which the front is made.
 pub(super) const SCALES: [f64; 5] = [0.25, 0.5, 1.0, 1.5, 2.0];
-/// A place behind the end of every list: no loop.
+/// A place beyond the end of every list: no loop.
 const NONE: usize = usize::MAX;
 
 /// The least ripple at each multiple of the tolerances, with the same joint noise for both laws.
@@ -23,7 +23,7 @@ pub struct Front(pub Vec<FrontPoint>);
 pub struct FrontPoint {
     /// The multiple.
     pub scale: f64,
-    /// The loops with the least ripple; none if nothing stands.
+    /// The loops with the least ripple; none if no loop withstands this multiple.
     pub best: Option<LeastRipple>,
 }
 
@@ -41,13 +41,13 @@ pub struct LeastRipple {
 pub struct LawRipple {
     /// The law.
     pub law: Law,
-    /// What differs from the file.
+    /// How the numbers differ from the file, in words.
     pub name: String,
     /// Predicted rms of the force (N).
     pub ripple_n: f64,
 }
 
-/// The front over `scales`, which rise.
+/// The front over `scales`, which are in ascending order.
 pub(super) fn front(loops: &Loops<'_>, scales: &[f64], progress: Progress<'_>) -> Result<Front, RobustError> {
     let climbed = climbed(loops, scales, progress)?;
     let at = |(level, &scale): (usize, &f64)| {

@@ -1,4 +1,4 @@
-//! Whether a loop stands its tolerances, by simulation.
+//! Judges by simulation whether a loop withstands the tolerances.
 
 use serde::{Deserialize, Serialize};
 use upright::table::Law;
@@ -10,19 +10,19 @@ use crate::study::{Study, infinite_if_null};
 use crate::table::TableValues;
 use crate::verify::{CornerSettings, Disturbance, Unverifiable, corners, leaning, scenario};
 
-/// Shares of the tolerances that are tried. A loop with friction can stand much of it and fall with little.
+/// Shares of the tolerances that are tried. A loop may stand with much friction and fall with little.
 pub(super) const SHARES: [f64; 4] = [0.0, 0.5, 1.0, 1.25];
-/// Every link leans by this at the start (rad).
+/// Angle by which every link leans at the start (rad).
 const LEAN_RAD: f64 = 5e-4;
 
-/// How many runs a loop has to stand, and their disturbances.
+/// The runs in which a loop has to stand.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct JudgeSettings {
-    /// Runs of each share of the tolerances, with the seeds from 1.
+    /// Number of runs with each share of the tolerances, with the seeds from 1.
     pub runs: u64,
-    /// Length of each (s).
+    /// Duration of each run (s).
     pub duration_s: f64,
-    /// Their disturbances.
+    /// Disturbances of the runs.
     pub disturbance: Disturbance,
 }
 
@@ -33,12 +33,12 @@ impl JudgeSettings {
     }
 }
 
-/// Runs on one machine.
+/// Results of the runs on one machine.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Runs {
     /// Share of the tolerances that the machine has.
     pub share: f64,
-    /// Runs.
+    /// Number of runs.
     pub runs: u64,
     /// How many stood to the end within the supervisor's limits of angle and rail.
     pub stood: u64,
@@ -50,12 +50,12 @@ pub struct Runs {
     pub peak_position_m: f64,
 }
 
-/// What a loop stands.
+/// What a loop withstands.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Judgement {
-    /// The law.
+    /// The law in the loop.
     pub law: Law,
-    /// Friction, wrong zeros and latency together, none of them first.
+    /// Runs with friction, zero errors and latency together, beginning with none of them.
     pub machines: Vec<Runs>,
     /// Combinations of mass errors, without friction: how many there are and how many stand.
     pub corners: Option<[usize; 2]>,
@@ -105,7 +105,7 @@ pub fn judge(
     Ok(Judgement { law, machines, corners })
 }
 
-/// The rig with `share` of its tolerances, but with its own masses.
+/// The rig with `share` of the tolerances for friction, zeros and latency, and with its own masses.
 pub(super) fn machine(rig: &Rig, tolerances: &Tolerances, share: f64) -> Rig {
     let mut rig = rig.clone();
     let (real, tolerances) = (&mut rig.reality, tolerances.scaled(share));

@@ -1,4 +1,4 @@
-//! What the linear model says of a candidate, in f64: ripple, and stability at every combination of mass errors.
+//! The linear model of a candidate, in f64: ripple, and stability at every combination of mass errors.
 
 use crate::design::{Design, DesignError, Kalman, continuous_plant, integrated_quadratic, noise_columns};
 use crate::numerics::Matrix;
@@ -8,7 +8,7 @@ use crate::verify::{
     wrong_masses,
 };
 
-/// A loop this close to instability falls in a long run.
+/// Least distance of the spectral radius from 1: a loop closer to instability falls in a long run.
 const MARGIN: f64 = 2e-4;
 
 /// The linear plants of a rig: the nominal one, and one for each combination of mass errors.
@@ -22,7 +22,7 @@ pub(super) struct LinearPlants<'a> {
 }
 
 impl<'a> LinearPlants<'a> {
-    /// Of `rig`, whose own design is `design`.
+    /// The plants of `rig`, whose own design is `design`.
     pub(super) fn of(
         rig: &'a Rig,
         design: &Design<f64>,
@@ -76,7 +76,8 @@ impl<'a> LinearPlants<'a> {
         Some(variance.max(0.0).sqrt())
     }
 
-    /// The plants with every combination of masses wrong by `scale` times the tolerance, and that much latency.
+    /// The plants with every combination of masses wrong by `scale` times the tolerance, and with `scale` times the
+    /// tolerated latency.
     pub(super) fn corners(&self, scale: f64) -> Result<Vec<PlantModel<f64>>, DesignError> {
         let tolerances = self.tolerances.scaled(scale);
         let measured: Vec<usize> = self.rig.sensors().iter().map(|sensor| sensor.state).collect();
@@ -100,7 +101,7 @@ impl<'a> LinearPlants<'a> {
         corners: &[PlantModel<f64>],
     ) -> Result<bool, VerifyError> {
         let nominal = radius(&LoopModel::of(&self.nominal, controller))?;
-        // A loop with slow poles has less than that margin from the outset.
+        // A nominal loop with slow poles has less than this margin itself.
         let most = 1.0 - MARGIN.min(0.5 * (1.0 - nominal));
         for corner in corners {
             if radius(&LoopModel::of(corner, controller))? >= most {

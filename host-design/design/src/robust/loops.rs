@@ -1,4 +1,4 @@
-//! The loops of all candidates, sorted by predicted ripple, and what they stand.
+//! The loops of all candidates, sorted by predicted ripple, and what they withstand.
 
 use std::sync::OnceLock;
 
@@ -14,10 +14,10 @@ use crate::rig::{Rig, Tolerances};
 use crate::table::TableValues;
 use crate::verify::{ControllerModel, PlantModel};
 
-/// Length of the runs that sort out candidates (s).
+/// Duration of the short runs that eliminate candidates (s).
 const SHORT_RUN_S: f64 = 10.0;
 
-/// Where a loop is: number of its law, of its observer, and its place in their list.
+/// Position of a loop: index of its pool, index of its observer, and place in their list of ranked loops.
 pub(super) type At = [usize; 3];
 
 /// A law with its candidates.
@@ -39,18 +39,18 @@ pub(super) struct Ranked {
     pub(super) candidate: usize,
     pub(super) ripple_n: f64,
     controller: ControllerModel<f64>,
-    /// What it stands of the whole tolerances; empty until it is tried.
+    /// What it withstands of the full tolerances; empty until it is tried.
     trial: OnceLock<Trial>,
 }
 
-/// What a loop stands.
+/// What a loop withstands.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Trial {
     /// Whether its linear loop is stable, with a margin, at every combination of wrong masses.
     pub(super) is_stable: bool,
-    /// How long it stood in the short runs (s). No run is made of a loop that is not stable.
+    /// Total time for which it stood in the short runs (s). A loop that is not stable is not run.
     pub(super) stood_s: f64,
-    /// Whether it stands everything.
+    /// Whether it stood in all short runs.
     pub(super) holds: bool,
 }
 
@@ -66,7 +66,7 @@ pub(super) struct Loops<'a> {
 }
 
 impl<'a> Loops<'a> {
-    /// Designs every candidate, without proof, and sorts the loops.
+    /// Designs every candidate, without certification, and sorts the loops.
     pub(super) fn of(
         rig: &'a Rig,
         tolerances: &'a Tolerances,
@@ -82,7 +82,7 @@ impl<'a> Loops<'a> {
         let count = noises.len() + of_laws.iter().map(|(_, all)| all.len()).sum::<usize>();
         progress(Some(("designing the candidates", count as u64)));
         let designed = |rig: &Rig| {
-            // A candidate without a design is no candidate.
+            // A candidate without a design is left out.
             let design = Uncertified::sampled_alone(rig).ok();
             progress(None);
             design
@@ -134,7 +134,7 @@ impl<'a> Loops<'a> {
         own.map(|one| one.ripple_n)
     }
 
-    /// Where all loops of a law are.
+    /// Positions of all loops of a law.
     pub(super) fn of_pool(&self, pool: usize) -> impl Iterator<Item = At> {
         let ranked = self.ranked[pool].iter().enumerate();
         ranked.flat_map(move |(observer, all)| (0..all.len()).map(move |place| [pool, observer, place]))
@@ -148,18 +148,17 @@ impl<'a> Loops<'a> {
         with_noise(&alone, &self.observers[observer].joint_noise)
     }
 
-    /// The table for the trials of a loop; none if it has none.
+    /// The table for the trials of a loop; none if no table can be made.
     fn trial_table(&self, rig: &Rig, [pool, observer, place]: At) -> Option<TableValues> {
         let candidate = self.ranked[pool][observer][place].candidate;
         let (pool, observer) = (&self.pools[pool], &self.observers[observer]);
         let law = pool.designs[candidate].as_ref()?;
         let both = observer.design.clone().with_law_of(pool.law, law);
-        // A design without a table is no candidate.
         TableValues::of_uncertified(rig, &both).ok()
     }
 
-    /// What this loop stands of the whole tolerances, with `corners` their combinations of wrong masses. It is tried
-    /// once.
+    /// What this loop withstands of the full tolerances; `corners` are the plants with their combinations of wrong
+    /// masses. It is tried only once.
     pub(super) fn trial(&self, at: At, corners: &[PlantModel<f64>]) -> Result<Trial, RobustError> {
         let [pool, observer, place] = at;
         let one = &self.ranked[pool][observer][place];
@@ -173,7 +172,7 @@ impl<'a> Loops<'a> {
         Ok(*one.trial.get_or_init(|| trial))
     }
 
-    /// What [`trial`](Self::trial) found, if it was made.
+    /// The result of [`trial`](Self::trial), if it was made.
     pub(super) fn known(&self, [pool, observer, place]: At) -> Option<Trial> {
         self.ranked[pool][observer].get(place)?.trial.get().copied()
     }
@@ -187,7 +186,7 @@ impl<'a> Loops<'a> {
         Ok(self.plants.holds(&self.ranked[pool][observer][place].controller, corners)?)
     }
 
-    /// Short runs at each share of the tolerances times `scale`, up to the first that falls.
+    /// Short runs with each share of `scale` times the tolerances, up to the first that falls.
     pub(super) fn runs(&self, at: At, scale: f64) -> Result<Trial, RobustError> {
         let mut trial = Trial { is_stable: true, stood_s: 0.0, holds: false };
         let rig = self.rig_of(at);
@@ -206,9 +205,8 @@ impl<'a> Loops<'a> {
         Ok(Trial { holds: true, ..trial })
     }
 
-    /// The observer with which the ripple of all laws, each relative to that of the file, is least in sum; then the one
-    /// with the next larger sum, and so on. `heads` are the places of the loops; an observer whose list of a law is at
-    /// its end is left out.
+    /// The observers in ascending order of the total ripple of all laws, each relative to that of the file's own
+    /// numbers. `heads` are the places of the loops; an observer that has no loop left for a law is left out.
     pub(super) fn by_ripple(&self, heads: &[Vec<usize>]) -> Vec<usize> {
         let sum = |observer: usize| {
             let ripple = |(pool, heads): (usize, &Vec<usize>)| {

@@ -1,8 +1,9 @@
-//! Gains that stand a machine which is not as its file says: a choice among multiples of the file's own numbers.
+//! Gains that withstand a machine that differs from its file, chosen among multiples of the file's own numbers.
 //!
-//! [`choose`] sorts all candidates by predicted ripple, and simulates the cheapest whose linear loop stands all mass
-//! errors. The choice is designed again and certified. Friction is judged by simulation only: neither margins nor norms
-//! order designs as friction does. [`false_alarms`] balances machines within the tolerances with the whole firmware.
+//! [`choose`] sorts all candidates by predicted ripple, and simulates those with the least ripple whose linear loop is
+//! stable at all mass errors. The choice is designed again and certified. Friction is judged by simulation only:
+//! neither margins nor norms rank designs as friction does. [`false_alarms`] balances machines within the tolerances
+//! with the whole firmware.
 
 mod candidate;
 mod error;

@@ -1,4 +1,4 @@
-//! Why no candidate stands the tolerances, and how much of them is within reach.
+//! Why no candidate withstands the tolerances, and what share of them is within reach.
 
 use super::error::RobustError;
 use super::loops::{At, Loops};
@@ -8,10 +8,11 @@ use crate::verify::PlantModel;
 
 /// Shares of the tolerances that may be within reach.
 const SHARES: [f64; 4] = [0.125, 0.25, 0.5, 0.75];
-/// Loops of each law and observer that are tried at a share: half of them those that stood longest, half the cheapest.
+/// Number of loops of each law and observer that are tried at a share: half of them those that stood longest, half
+/// those with the least ripple.
 const TRIED: usize = 8;
 
-/// The reason, after the search has tried all that could have served.
+/// The reason in words, after the search has tried all loops that might have been chosen.
 pub(super) fn reason(
     loops: &Loops<'_>,
     tolerances: &Tolerances,
@@ -51,7 +52,7 @@ pub(super) fn reason(
     Ok(reasons.join("; "))
 }
 
-/// The largest share of the tolerances at which some of the loops that are tried stand, by bisection.
+/// The largest share of the tolerances that some of the loops tried withstand, by bisection.
 fn within_reach(loops: &Loops<'_>, progress: Progress<'_>) -> Result<Option<f64>, RobustError> {
     let [mut held, mut lost] = [0, SHARES.len() + 1];
     while lost - held > 1 {
@@ -61,7 +62,7 @@ fn within_reach(loops: &Loops<'_>, progress: Progress<'_>) -> Result<Option<f64>
     Ok(held.checked_sub(1).map(|index| SHARES[index]))
 }
 
-/// Whether one observer with a loop of each law stands this share of the tolerances.
+/// Whether there is an observer with which a loop of each law withstands this share of the tolerances.
 fn serves(loops: &Loops<'_>, share: f64, progress: Progress<'_>) -> Result<bool, RobustError> {
     let corners = loops.plants.corners(share)?;
     progress(Some(("what is within reach", loops.observers.len() as u64)));
@@ -82,7 +83,7 @@ fn serves(loops: &Loops<'_>, share: f64, progress: Progress<'_>) -> Result<bool,
         }
         Ok(true)
     };
-    // The first observer that serves ends the search.
+    // The first such observer ends the search.
     let found = parallel::try_map(0..loops.observers.len(), |observer| match of_observer(observer) {
         Ok(true) => Err(None),
         Ok(false) => Ok(()),
@@ -95,8 +96,8 @@ fn serves(loops: &Loops<'_>, share: f64, progress: Progress<'_>) -> Result<bool,
     }
 }
 
-/// The loops of a law and an observer that are stable with `corners` and are tried: those that stood longest, and those
-/// with the least ripple.
+/// The loops of a law and an observer that are tried: of those that are stable with `corners`, the ones that stood
+/// longest and the ones with the least ripple.
 fn tried(
     loops: &Loops<'_>,
     [pool, observer]: [usize; 2],

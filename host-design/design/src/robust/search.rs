@@ -1,4 +1,4 @@
-//! The choice among the candidates.
+//! The search for the best candidates.
 
 use serde::Serialize;
 use upright::table::Law;
@@ -16,8 +16,8 @@ use crate::study::Study;
 use crate::table::{Gains, TableValues};
 use crate::verify::{PlantModel, Unverifiable, chain};
 
-/// Loops that are tried at the same time. It is not the number of processors, so that the same loops are tried on each
-/// machine.
+/// Number of loops that are tried at the same time. It does not follow the number of processors, so that the same
+/// loops are tried on every computer.
 const TOGETHER: usize = 4;
 
 /// The gains chosen for a rig and its tolerances.
@@ -31,25 +31,27 @@ pub struct Choice {
     pub laws: Vec<Chosen>,
 }
 
-/// What is chosen for one law.
+/// The choice for one law.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Chosen {
     /// The law.
     pub law: Law,
-    /// Its numbers.
+    /// The chosen numbers.
     pub candidate: Candidate,
     /// Predicted rms of the force without imperfections (N).
     pub ripple_n: f64,
-    /// The same for the numbers of the file (N); none if that loop is not stable.
+    /// Predicted rms of the force with the numbers of the file (N); none if that loop is not stable.
     pub own_ripple_n: Option<f64>,
     /// The runs that it stood.
     pub judgement: Judgement,
 }
 
-/// Chooses gains with the least ripple that stand `tolerances`; a front over multiples of them if `with_front`.
+/// Chooses the gains with the least ripple that withstand `tolerances`; returns also a front over multiples of them if
+/// `with_front`.
 ///
 /// # Errors
-/// [`RobustError::Unhelped`] with the reason if no candidate stands them.
+/// [`RobustError::Unhelped`] with the reason if no candidate withstands them; other errors if the rig or the
+/// tolerances cannot be used.
 pub fn choose(
     rig: &Rig,
     tolerances: &Tolerances,
@@ -81,10 +83,10 @@ struct Search<'a> {
 }
 
 impl Search<'_> {
-    /// The loops with the least ripple that hold, one of each law with the same observer.
+    /// The loops with the least ripple that withstand the tolerances, one of each law, with the same observer.
     ///
     /// `heads` has, for each law and observer, the place of the first loop that is not known to fall. The observer
-    /// whose heads have the least ripple in sum comes first, so a loop is only tried if nothing with less ripple is left.
+    /// whose heads have the least total ripple comes first, so a loop is only tried if none with less ripple is left.
     fn choice(&self, progress: Progress<'_>) -> Result<Choice, RobustError> {
         let loops = self.loops;
         let corners = loops.plants.corners(1.0)?;
@@ -155,7 +157,8 @@ impl Search<'_> {
         }
     }
 
-    /// The loops at `heads` with this observer in full, or the number of the first law whose loop falls.
+    /// Judges the loops at `heads` with this observer in full runs; returns the choices, or the index of the first law
+    /// whose loop falls.
     fn judged(
         &self,
         observer: usize,

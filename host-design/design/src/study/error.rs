@@ -1,79 +1,79 @@
-//! Why shards are not merged.
+//! Why a study cannot be merged from its shards.
 
 use std::path::PathBuf;
 
-/// Why shards are not merged.
+/// Why a study cannot be merged from its shards.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum StudyError {
     /// A file cannot be read.
     #[error("{}: cannot be read ({reason})", file.display())]
     Unreadable {
-        /// The file.
+        /// Path of the file.
         file: PathBuf,
-        /// What the system says.
+        /// Message of the operating system.
         reason: String,
     },
-    /// A line is not what --shard writes.
+    /// A line was not written by --shard.
     #[error("{}: line {line}: not written by --shard ({reason}); make the shard again", file.display())]
     NotAShard {
-        /// The file.
+        /// Path of the file.
         file: PathBuf,
         /// Number of the line, from 1.
         line: usize,
-        /// Why.
+        /// Why it cannot be read.
         reason: String,
     },
-    /// A shard of other runs.
+    /// The shard belongs to another study.
     #[error(
         "{}: a shard of another study: {theirs}, not {ours}; give the same rig file and options to --shard and --merge",
         file.display()
     )]
     OtherStudy {
-        /// The file.
+        /// Path of the file.
         file: PathBuf,
-        /// What it is about.
+        /// The study that the shard belongs to.
         theirs: String,
-        /// What the merge is about.
+        /// The study that is merged.
         ours: String,
     },
-    /// A shard is not there.
+    /// No file holds a shard.
     #[error("shard {shard} of {of} is missing: make it with --shard {shard}/{of}")]
     Missing {
-        /// Its number.
+        /// Number of the shard, from 1.
         shard: u64,
-        /// How many there are.
+        /// Number of shards in the study.
         of: u64,
     },
-    /// A shard is there twice.
+    /// Two files hold the same shard.
     #[error("shard {shard} is there twice: {} and {}; leave one out", first.display(), second.display())]
     Twice {
-        /// Its number.
+        /// Number of the shard, from 1.
         shard: u64,
-        /// One file.
+        /// Path of one file.
         first: PathBuf,
-        /// The other.
+        /// Path of the other file.
         second: PathBuf,
     },
-    /// A shard does not have its runs.
+    /// A shard lacks a run, or has one that does not belong to it.
     #[error("{}: shard {shard}: run {run} of {part} {what}; make the shard again", file.display())]
     Runs {
-        /// The file.
+        /// Path of the file.
         file: PathBuf,
-        /// Number of the shard.
+        /// Number of the shard, from 1.
         shard: u64,
         /// Part of the study.
         part: String,
-        /// Number of the run.
+        /// Number of the run, from 0.
         run: u64,
-        /// What is wrong.
+        /// What is wrong with it.
         what: &'static str,
     },
-    /// The files have no such runs.
+    /// The files do not have the part that is read, or not as many runs of it.
     #[error("the shards do not have the {runs} runs of {part}; give the same options to --shard and --merge")]
     NoPart {
         /// Part of the study.
         part: String,
-        /// Its runs.
+        /// Number of runs that it should have.
         runs: u64,
     },
     /// The outcome of a run cannot be written or read.
@@ -81,9 +81,9 @@ pub enum StudyError {
     Outcome {
         /// Part of the study.
         part: String,
-        /// Number of the run.
+        /// Number of the run, from 0.
         run: u64,
-        /// Why.
+        /// Why it cannot be written or read.
         reason: String,
     },
 }

@@ -1,4 +1,4 @@
-//! The files of shards: a line about the study, then one line for each run.
+//! The files of shards: a line that describes the study, then one line for each run.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -10,16 +10,16 @@ use serde_json::Value;
 use super::error::StudyError;
 use super::shard::Shard;
 
-/// The first line.
+/// The first line of a file: the study, and the shard of it that follows.
 #[derive(Debug, Serialize, Deserialize)]
 pub(super) struct Header {
     pub(super) study: Value,
     pub(super) shard: Shard,
-    /// Number of runs of each part, those of the other shards included.
+    /// Number of runs of each part, including those of the other shards.
     pub(super) parts: BTreeMap<String, u64>,
 }
 
-/// Each other line.
+/// A line with the outcome of one run of a part.
 #[derive(Debug, Serialize, Deserialize)]
 pub(super) struct Line {
     pub(super) part: String,
@@ -76,7 +76,7 @@ fn every_shard_once(files: &[File], of: u64) -> Result<(), StudyError> {
     }
 }
 
-/// Puts the outcomes of a file into their places.
+/// Adds the outcomes of a file to those of the other shards.
 fn place(file: File, all: &mut Outcomes) -> Result<(), StudyError> {
     let File { path, header: Header { shard, parts, .. }, lines } = file;
     let wrong = |part: &str, run: u64, what: &'static str| {

@@ -2,7 +2,7 @@
 //!
 //! A run depends on nothing but its number, so it does not matter where it is made. A shard makes every N-th run and
 //! writes the outcomes, one JSON object per line. A merged study reads them from these files instead of making runs.
-//! All that follows is the code of a study that makes every run, so that it prints the same bytes.
+//! Everything after that is the same code as for a study that makes every run, so it prints the same bytes.
 
 mod error;
 mod files;
@@ -25,7 +25,7 @@ use crate::parallel;
 use crate::rig::Rig;
 use files::{Header, Line, Outcomes};
 
-/// Where the outcomes of numbered runs come from.
+/// Source of the outcomes of numbered runs: they are made here, in part or all, or read from files.
 #[derive(Debug)]
 pub struct Study(Source);
 
@@ -33,16 +33,16 @@ pub struct Study(Source);
 enum Source {
     /// All runs are made.
     All,
-    /// Those of the shard are made, and their outcomes kept.
+    /// The runs of the shard are made, and their outcomes kept.
     Shard(Shard, RefCell<Made>),
-    /// None is made.
+    /// No run is made: the outcomes of all shards are read.
     Files(Outcomes),
 }
 
 /// What a shard has made.
 #[derive(Debug, Default)]
 struct Made {
-    /// Number of runs of each part, those of the other shards included.
+    /// Number of runs of each part, including those of the other shards.
     parts: BTreeMap<String, u64>,
     lines: Vec<Line>,
 }
@@ -58,7 +58,7 @@ impl Study {
         Self(Source::Shard(shard, RefCell::default()))
     }
 
-    /// A study that takes the outcomes of all shards from files. `about` is what [`about`] gives for this study.
+    /// A study that takes the outcomes of all shards from files. `about` is the result of [`about`] for this study.
     ///
     /// # Errors
     /// [`StudyError`] if a file is not of this study, or a shard or a run is missing or comes twice.
@@ -66,7 +66,7 @@ impl Study {
         Ok(Self(Source::Files(files::merged(files, about)?)))
     }
 
-    /// Outcomes of the runs 0 to `runs` - 1 of this part of the study, in order; of a shard, only those that it makes.
+    /// Outcomes of the runs 0 to `runs` - 1 of this part of the study, in order; for a shard, only those it makes.
     /// Runs are made on all threads.
     ///
     /// # Errors
@@ -128,13 +128,13 @@ impl Study {
         }
     }
 
-    /// Whether this is a shard.
+    /// Whether this study makes the runs of one shard only.
     pub fn is_shard(&self) -> bool {
         matches!(self.0, Source::Shard(..))
     }
 
-    /// Writes what a shard has made: a line about the study, then one for each run. Nothing for a study that is no
-    /// shard.
+    /// Writes what a shard has made: a line that describes the study, then one for each run. Writes nothing if this is
+    /// not a shard.
     ///
     /// # Errors
     /// That of the writer.
@@ -150,16 +150,16 @@ impl Study {
     }
 }
 
-/// What a study is about: shards belong together if this is equal. `options` are those on which the outcomes depend.
+/// Identifies a study: shards belong together if this is equal. `options` are those on which the outcomes depend.
 pub fn about(command: &str, rig: &Rig, options: &Value) -> Value {
-    // All values of the file, also those that change no gain.
+    // All values of the file, including those that change no gain.
     let values = Sha256::digest(format!("{rig:?}"));
     let values: String = values.iter().take(8).map(|byte| format!("{byte:02x}")).collect();
     let version = env!("CARGO_PKG_VERSION");
     json!({ "command": command, "version": version, "rig": rig.name, "values": values, "options": options })
 }
 
-/// JSON has no infinite numbers; a number without bound is written as null.
+/// Reads a number that may be infinite: JSON has no infinite numbers, so they are written as null.
 pub(crate) fn infinite_if_null<'de, D: Deserializer<'de>>(from: D) -> Result<f64, D::Error> {
     Ok(Option::deserialize(from)?.unwrap_or(f64::INFINITY))
 }

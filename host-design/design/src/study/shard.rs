@@ -12,12 +12,12 @@ pub struct Shard {
 }
 
 impl Shard {
-    /// Which one, from 1.
+    /// Number of this shard, from 1.
     pub fn number(self) -> u64 {
         self.number
     }
 
-    /// How many there are.
+    /// Number of shards in the study.
     pub fn of(self) -> u64 {
         self.of
     }
@@ -27,7 +27,7 @@ impl Shard {
         (self.number.saturating_sub(1)..runs).step_by(self.of.max(1) as usize)
     }
 
-    /// Whether the numbers make sense.
+    /// Whether the number is from 1 to the number of shards.
     pub(super) fn is_valid(self) -> bool {
         (1..=self.of).contains(&self.number)
     }

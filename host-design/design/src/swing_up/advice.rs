@@ -1,4 +1,4 @@
-//! What would help when there is no motion: the search again with other values in the rig file.
+//! What would help when there is no motion: the search is repeated with other values in the rig file.
 
 use super::SwingUpError;
 use super::check::check;
@@ -10,7 +10,7 @@ use super::setting::Setting;
 use super::way::Way;
 use crate::rig::Rig;
 
-/// Candidates tried with each change, of which so many with the best scores go through the random runs.
+/// Candidates tried with each change, and how many of them, those with the best scores, go through the random runs.
 const TRIED: u64 = 12;
 const KEPT: usize = 3;
 /// Factors by which a limit is relaxed, one after the other, until there is a motion.
@@ -18,7 +18,7 @@ const FACTORS: [f64; 4] = [1.2, 1.5, 2.0, 3.0];
 /// Factors by which the errors that a motion has to stand are made smaller.
 const NARROWER: [f64; 4] = [0.8, 0.6, 0.4, 0.2];
 
-/// What came of a changed rig file.
+/// Result of the search with a changed rig file.
 #[derive(Debug)]
 struct Outcome {
     /// Candidates tried.
@@ -30,7 +30,7 @@ struct Outcome {
 }
 
 impl Outcome {
-    /// Of the first `tried` candidates of the search for the motion `way` of `rig`, run without a supervisor.
+    /// Searches for the motion `way` of `rig` among the first `tried` candidates; the random runs have no supervisor.
     fn of(rig: &Rig, way: Way, tried: u64) -> Result<Self, SwingUpError> {
         let setting = Setting::of(rig)?;
         let request = Request::of(&setting);
@@ -44,7 +44,7 @@ impl Outcome {
         Ok(Self { tried, solved, runs: all.into_iter().max_by_key(|runs| runs.stood) })
     }
 
-    /// Whether it is a motion that would be stored.
+    /// Whether the search found a motion that would be stored.
     fn is_good(&self, rig: &Rig) -> bool {
         self.runs.as_ref().is_some_and(|runs| is_enough(rig, runs))
     }
@@ -60,14 +60,14 @@ impl Outcome {
     }
 }
 
-/// Whether the lower end of the interval is as high as `[swing_up]` asks for.
+/// Whether the lower end of the confidence interval reaches `success_percent` of `[swing_up]`.
 pub(super) fn is_enough(rig: &Rig, runs: &Runs) -> bool {
     let needed = rig.swing_up.clone().unwrap_or_default().success_percent;
     100.0 * runs.interval[0] >= needed
 }
 
-/// The limit that binds: that of which the smallest factor helps; and what helps else. Each number was tried: with it
-/// in the rig file there is a motion `way`, or none.
+/// Names the binding limit, the one for which the smallest factor helps, and what else helps. Every number was tried:
+/// with it in the rig file there is a motion `way`, or none, as the text says.
 ///
 /// # Errors
 /// [`SwingUpError`] if the rig cannot be raised at all.
@@ -107,7 +107,7 @@ fn advice_from(rig: &Rig, way: Way, tried: u64, done: &dyn Fn()) -> Result<Strin
     Ok(advice)
 }
 
-/// What became of relaxing some limits.
+/// Result of relaxing some limits.
 enum Tried {
     Helps(Help),
     /// The last change, in words.
@@ -122,7 +122,7 @@ struct Help {
     text: String,
 }
 
-/// Relaxes all of `limits` by the same factor, more and more until it helps. None if the rig has none of them.
+/// Relaxes all of `limits` by the same factor, which is raised until it helps. None if the rig has none of them.
 fn relaxed(
     rig: &Rig,
     way: Way,
@@ -147,7 +147,8 @@ fn relaxed(
     Ok(last)
 }
 
-/// With which smaller errors of masses and friction enough runs would arrive; `runs` makes them for the changed rig.
+/// States with which smaller errors of masses and friction enough runs would arrive; `runs` makes the runs of a
+/// changed rig.
 ///
 /// # Errors
 /// Those of `runs`.
@@ -173,10 +174,10 @@ mod tests {
     use super::*;
     use crate::rig::with_value;
 
-    /// Candidates: enough to find a motion.
+    /// Number of candidates: enough to find a motion.
     const FEW: u64 = 3;
 
-    /// The file of the single, with more values.
+    /// The rig of the single's file, with further values.
     fn single(values: &str) -> Rig {
         let mut text = std::fs::read_to_string("../../rigs/single-quanser-ip02.toml").unwrap();
         for (key, value) in values.split(" and ").map(|value| value.split_once(" = ").unwrap()) {
@@ -185,7 +186,7 @@ mod tests {
         Rig::from_toml(&text, "single.toml".as_ref()).unwrap()
     }
 
-    /// Written into the file, the values that are advised give a motion, and those that are not do not.
+    /// Written into the file, the advised values lead to a motion, and those said not to help do not.
     #[test]
     fn every_advised_number_gives_a_motion() {
         let short = "swing_up.longest_s = 2.2";

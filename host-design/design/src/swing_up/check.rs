@@ -1,4 +1,4 @@
-//! An independent check of a motion: every tick integrated again by another method, every limit held.
+//! An independent check of a motion: every tick is integrated again by another method, and every limit has to hold.
 
 use serde::Serialize;
 
@@ -14,12 +14,13 @@ const DRIFT: f64 = 5e-8;
 /// Tolerance of the adaptive integrator.
 const TOLERANCE: Tolerance = Tolerance { relative: 1e-11, absolute: 1e-11 };
 
-/// What the check found.
+/// Peak values of a motion that has passed the check.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Peaks {
     /// Duration (s).
     pub duration_s: f64,
-    /// Largest difference between a state and where the adaptive integrator leads from the one before it.
+    /// Largest difference between a state and the adaptive integrator's result from the state before, in the units of
+    /// the states.
     pub drift: f64,
     /// Largest force (N).
     pub force_n: f64,
@@ -29,14 +30,14 @@ pub struct Peaks {
     pub speed_m_per_s: f64,
     /// Largest rate of a joint (rad/s).
     pub rate_rad_per_s: f64,
-    /// Share of the closest limit of the actuator and the rail that is used.
+    /// Largest used share of a limit of the actuator or the rail; 1: the limit is reached.
     pub used: f64,
 }
 
 /// Checks `motion`: its ends, the equations of motion, and the limits of the machine.
 ///
 /// # Errors
-/// [`SwingUpError::Broken`] with what does not hold.
+/// [`SwingUpError::Broken`] with the condition that does not hold.
 pub(super) fn check(setting: &Setting<'_>, motion: &Motion, way: Way) -> Result<Peaks, SwingUpError> {
     let broken = |what: String| SwingUpError::Broken { way, what };
     let ends = way.ends_near(&motion.x[motion.steps()]);

@@ -19,35 +19,35 @@ pub(super) const LOST_RAD: f64 = 0.35;
 /// Deviation at the end of a run below which it has arrived upright (rad).
 const ARRIVED_RAD: f64 = 0.1;
 
-/// One run.
+/// Conditions of one run.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Trial {
-    /// The chain that moves.
+    /// The chain that is simulated.
     pub(super) chain: Chain,
     /// Its state at the start.
     pub(super) start: Vec<f64>,
-    /// What each encoder shows too much (m, rad).
+    /// Zero error of each encoder: reading minus true position (m, rad).
     pub(super) zero_error: Vec<f64>,
-    /// Whether encoders count in steps.
+    /// Whether readings are rounded to whole counts.
     pub(super) counts: bool,
-    /// Disturbances are drawn with this seed; none without.
+    /// Seed of the disturbances; without one there are no disturbances.
     pub(super) seed: Option<u64>,
-    /// How long the balance after the motion lasts (s).
+    /// Duration of balancing, or hanging, after the motion (s).
     pub(super) after_s: f64,
 }
 
-/// What came of it.
+/// Result of a run.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Outcome {
     /// Whether it arrived and stayed.
     pub(super) stood: bool,
-    /// Largest deviation of a link from its reference while moving (rad).
+    /// Largest deviation of a link from its reference during the motion (rad).
     pub(super) deviation_rad: f64,
     /// Largest deviation of the cart (m).
     pub(super) deviation_m: f64,
 }
 
-/// A trial under way.
+/// A trial in progress.
 struct ClosedLoop<'a> {
     setting: &'a Setting<'a>,
     trial: &'a Trial,
@@ -61,7 +61,7 @@ struct ClosedLoop<'a> {
     predicted: Vec<f64>,
 }
 
-/// What the law does in a tick: `u = u_k - K (x̂ - x_k)` with the filter gain L; no K: no force.
+/// The law of a tick: `u = u_k - K (x̂ - x_k)`, with the filter gain L. Without K there is no force.
 struct Law<'a> {
     x: &'a [f64],
     u: f64,
@@ -70,7 +70,7 @@ struct Law<'a> {
 }
 
 impl<'a> ClosedLoop<'a> {
-    /// A trial whose filter begins at `predicted`.
+    /// A trial whose filter starts from the prediction `predicted`.
     ///
     /// # Errors
     /// [`SwingUpError`] if the chain cannot be simulated.
@@ -174,7 +174,7 @@ fn measured(setting: &Setting<'_>, trial: &Trial, state: &[f64], sensor: usize) 
     if trial.counts { libm::round(value / step) * step } else { value }
 }
 
-/// The force that the actuator gives.
+/// The force (N) that the actuator can deliver of a commanded one, at a speed of the cart.
 fn applied(setting: &Setting<'_>, force: f64, speed: f64) -> f64 {
     let limit = setting.actuator.force_n;
     let force = force.max(-limit).min(limit);

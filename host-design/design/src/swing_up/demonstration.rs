@@ -1,4 +1,4 @@
-//! One run of everything by the whole firmware: up, balance, a step of the set-point, back, and down.
+//! A demonstration by the whole firmware in one run: up, balance, a step of the set-point, back, and down.
 
 use upright::supervision::fault::Fault;
 use upright::supervision::supervisor::State;
@@ -14,26 +14,26 @@ use crate::simulate::{Scenario, Trace};
 use crate::table::TableValues;
 use crate::verify::Disturbance;
 
-/// How long it balances after it is raised, and hangs at the end (s).
+/// Duration of balancing after the links are raised, and of hanging at the end (s).
 const PAUSE_S: f64 = 1.5;
-/// How long it may settle after the governor has moved the set-point (s).
+/// Time to settle after the governor has moved the set-point (s).
 const SETTLE_S: f64 = 4.0;
-/// How long it hangs after it was only raised and lowered (s).
+/// Duration of hanging at the end of [`up_and_down`] (s).
 const HANG_S: f64 = 0.5;
-/// The move (m), and the share of the rail that it may take.
+/// Step of the set-point (m), and the largest share of the rail that it may take.
 const MOVE_M: f64 = 0.5;
 const RAIL_SHARE: f64 = 0.5;
-/// A link that hangs is as near to the vertical (rad): without friction it swings on.
+/// Largest angle from the vertical at which a link counts as hanging (rad): without friction it swings on.
 const HANGS_RAD: f64 = 0.35;
 
-/// What happens in a demonstration, before it has run.
+/// Script of a demonstration: what it does, before it has run.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Script {
-    /// The rig that moves. It differs from that of the table by the errors that are drawn.
+    /// The rig that is simulated. It differs from that of the table by the errors that are drawn.
     pub rig: Rig,
     /// Start, set-point and commands.
     pub scenario: Scenario,
-    /// Start of each part (s).
+    /// Start (s) and name of each part.
     pub parts: Vec<(f64, String)>,
     /// The supervisor's states, one after the other, if all goes well.
     states: Vec<State>,
@@ -115,7 +115,7 @@ impl Script {
         Ok(self.demonstration(recording))
     }
 
-    /// What came of it.
+    /// Evaluates a recording of this script.
     pub fn demonstration(&self, recording: Recording) -> Demonstration {
         Demonstration {
             parts: self.parts.clone(),
@@ -126,7 +126,8 @@ impl Script {
     }
 }
 
-/// A run that is raised, balances for `upright_s`, is lowered, and hangs for half a second, with the rig's noise.
+/// A run in which the links are raised, balance for `upright_s`, are lowered, and hang for half a second, with the
+/// rig's noise.
 ///
 /// # Errors
 /// [`SwingUpError::NoMotions`] if the table has none.
@@ -142,12 +143,12 @@ pub fn up_and_down(rig: &Rig, table: &TableValues, upright_s: f64) -> Result<Sce
     })
 }
 
-/// A demonstration, tick by tick.
+/// A demonstration that has run.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Demonstration {
-    /// The record.
+    /// The recorded samples, tick by tick.
     pub trace: Trace,
-    /// Start of each part (s).
+    /// Start (s) and name of each part.
     pub parts: Vec<(f64, String)>,
     /// Whether all of it was done without a fault, and the links hang in the end.
     pub arrived: bool,
@@ -174,6 +175,6 @@ fn hangs_after(recording: &Recording, wanted: &[State]) -> bool {
 
 /// Whether all links hang: within [`HANGS_RAD`] of the vertical.
 pub(super) fn hang(state: &[f64]) -> bool {
-    // Whatever whole turns they have made.
+    // The cosine ignores whole turns.
     absolute_angles(state).all(|angle| libm::acos(-libm::cos(angle)) < HANGS_RAD)
 }

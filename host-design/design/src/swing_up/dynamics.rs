@@ -1,4 +1,4 @@
-//! The chain over one step of time, with its derivatives.
+//! The dynamics of a chain over one time step, with their derivatives.
 
 use super::SwingUpError;
 use crate::numerics::Matrix;
@@ -9,9 +9,9 @@ use crate::rig;
 pub(super) struct Step {
     /// State at the end, s entries.
     pub(super) end: Vec<f64>,
-    /// By the state at the start, s×s.
+    /// Derivative by the state at the start, s×s.
     pub(super) a: Matrix<f64>,
-    /// By the force at the start and at the end of the step, s×2; for a held force add the two columns.
+    /// Derivative by the force at the start and at the end of the step, s×2; for a held force add the two columns.
     pub(super) b: Matrix<f64>,
 }
 
@@ -24,17 +24,17 @@ pub(super) trait Dynamics: Send + Sync {
     /// As [`step`](Self::step), with derivatives.
     fn step_with_derivatives(&self, state: &[f64], force: [f64; 2], dt: f64) -> Step;
 
-    /// Steps in which half a tick is integrated: the links of long chains are short and fast.
+    /// Number of integration steps in half a tick: the links of long chains are short and fast.
     fn steps_in_half_a_tick(&self) -> usize;
 
-    /// Columns through which a force on the cart and torques at the joints change the state: s×(n + 1).
+    /// Derivatives of the state's rate by a force on the cart and by torques at the joints: s×(n + 1).
     fn inputs(&self, state: &[f64]) -> Matrix<f64>;
 }
 
 /// The dynamics of `chain`.
 ///
 /// # Errors
-/// [`SwingUpError::Links`] for more links than are compiled.
+/// [`SwingUpError::Links`] for more links than are compiled in.
 pub(super) fn dynamics(chain: &rig::Chain) -> Result<Box<dyn Dynamics>, SwingUpError> {
     fn boxed<const N: usize>(chain: &rig::Chain) -> Result<Box<dyn Dynamics>, SwingUpError> {
         Ok(Box::new(ChainPlant::<N>::of(chain)?))
@@ -102,14 +102,14 @@ impl<const N: usize> Dynamics for ChainPlant<N> {
 
     fn step_with_derivatives(&self, state: &[f64], force: [f64; 2], dt: f64) -> Step {
         let s = 2 * N + 2;
-        // Each stage: how far into the step, and the weight of its rate in the sum.
+        // Each stage: its fraction of the step, and the weight of its rate in the sum.
         let stages = [(0.0, 1.0), (0.5, 2.0), (0.5, 2.0), (1.0, 1.0)];
         let (mut rate, mut by) = (vec![0.0; s], Matrix::<f64>::zeros(s, s + 2));
         let (mut sum, mut sum_by) = (vec![0.0; s], Matrix::<f64>::zeros(s, s + 2));
         for (part, weight) in stages {
             let at = plus(state, part * dt, &rate);
             let (stage, jacobian) = linearised(self, &at, force[0] + part * (force[1] - force[0]));
-            // How the stage's state depends on the start and the forces; positions' rates are rates.
+            // Derivatives of the stage's state by the start and the forces. The rate of a position is itself a state.
             let stage_by = Matrix::from_fn(s, s + 2, |i, j| {
                 let own = if i == j { 1.0 } else { 0.0 };
                 own + part * dt * by[(i, j)]

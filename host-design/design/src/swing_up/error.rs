@@ -20,13 +20,13 @@ pub enum SwingUpError {
     /// Something in the rig file is missing.
     #[error("swing-up needs {0}: add it to the rig file")]
     Needs(&'static str),
-    /// A delay is not part of the motion's law.
+    /// The rig has a delay, which the law along a motion does not allow for.
     #[error("swing-up is designed for delay_ticks = 0: set it to 0 for the rig that shall raise itself")]
     Delay,
     /// More links than the search is compiled for.
     #[error("swing-up is searched for 1 to 6 links, not for {0}")]
     Links(usize),
-    /// No candidate was solved.
+    /// The optimisation found a solution for none of the candidates.
     #[error("{way}: none of {tried} candidates is solved; {help}")]
     NoTrajectory {
         /// Which motion.
@@ -58,7 +58,7 @@ pub enum SwingUpError {
     Broken {
         /// Which motion.
         way: Way,
-        /// What does not hold.
+        /// The condition that does not hold.
         what: String,
     },
     /// There is no stored motion.
@@ -94,7 +94,7 @@ pub enum SwingUpError {
     /// The gain table has no motions.
     #[error("the table has no motions: make them with `upright swing-up`")]
     NoMotions,
-    /// Motions do not lead from one to the other.
+    /// No tour connects the motions.
     #[error("no tour leads from hanging through all of these motions and back to hanging")]
     NoTour,
     /// The chain cannot be simulated.
@@ -112,13 +112,13 @@ pub enum SwingUpError {
     /// The runs of another process cannot be used.
     #[error(transparent)]
     Study(#[from] StudyError),
-    /// The parts of a motion do not fit together.
+    /// The sizes of the parts of a motion do not agree.
     #[error(transparent)]
     Shape(#[from] Shape),
 }
 
 impl SwingUpError {
-    /// Whether the problem has no solution, rather than a file or a rig that does not describe one.
+    /// Whether file and rig describe a problem, but it has no solution.
     pub fn is_without_solution(&self) -> bool {
         matches!(self, Self::NoTrajectory { .. } | Self::NotRobust { .. } | Self::Broken { .. })
     }

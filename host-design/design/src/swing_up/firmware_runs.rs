@@ -23,16 +23,16 @@ const UPRIGHT_S: f64 = 1.0;
 /// Ticks between two telemetry messages of a run.
 const TELEMETRY_TICKS: u16 = 20;
 
-/// What is wrong in a set of runs.
+/// The errors in a set of runs.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Condition {
-    /// In words.
+    /// Description, which is also the name of the runs in a study.
     pub name: &'static str,
-    /// Masses, friction, start and zeros.
+    /// Ranges of the errors of masses, friction, start and encoder zeros.
     pub spread: Spread,
     /// Counts per turn of the joints' encoders, instead of the rig's; the table is designed with them.
     pub joint_counts: Option<f64>,
-    /// Whether the force comes a tick later than the firmware knows.
+    /// Whether the force is applied a tick later than the firmware assumes.
     pub is_late: bool,
 }
 
@@ -54,7 +54,7 @@ impl Condition {
         ]
     }
 
-    /// The errors that `[swing_up]` asks a motion to stand.
+    /// The errors that a motion has to withstand according to `[swing_up]`.
     pub fn asked(rig: &Rig) -> Self {
         let (spread, name) = (Spread::asked(rig), "errors of [swing_up]");
         Self { name, spread, joint_counts: None, is_late: false }
@@ -72,7 +72,7 @@ impl Condition {
     }
 }
 
-/// What came of a set of runs.
+/// Results of a set of runs.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct FirmwareRuns {
     /// Runs in which the firmware refused to raise the rig, because the links do not hang.
@@ -86,21 +86,21 @@ pub struct FirmwareRuns {
 }
 
 impl FirmwareRuns {
-    /// The raising in all runs: one that was refused has not arrived.
+    /// The raising, counted over all runs: a run that was refused has not arrived.
     pub fn raise_in_all(&self) -> Runs {
         let runs = self.refused + self.raise.runs;
         Runs { runs, interval: wilson(self.raise.stood, runs), ..self.raise.clone() }
     }
 }
 
-/// One run.
+/// Result of one run.
 #[derive(Debug, Default, Serialize, Deserialize)]
 struct Reached {
     refused: bool,
     stood: bool,
     hung: bool,
     fault: Option<String>,
-    /// Largest distance of a link from its planned angle, up and down (rad).
+    /// Largest distance of a link from its planned angle during the raising and the lowering (rad).
     deviation_rad: [Deviation; 2],
 }
 
@@ -108,7 +108,8 @@ struct Reached {
 struct Deviation(#[serde(deserialize_with = "infinite_if_null")] f64);
 
 /// `runs` runs of the firmware of `table`, which is designed for `rig`, with the seeds from `base_seed` on, on all
-/// threads; the outcome does not depend on their number. `motions` are those of the table. The condition is a part of `study`.
+/// threads; the outcome does not depend on their number. `motions` are those of the table. The condition is a part of
+/// `study`.
 ///
 /// # Errors
 /// [`SwingUpError`] if the table has no motions, or the firmware does not run.

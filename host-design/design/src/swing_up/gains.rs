@@ -8,12 +8,12 @@ use super::tracking::{Filter, feedback, ticks};
 use super::way::Way;
 use crate::numerics::Matrix;
 
-/// Along a motion, the positions of cart and links weigh so many times what they weigh in `[lqr]`: off its plan, a link
-/// is soon lost. With 10 times, more runs are lost where encoders are coarse.
+/// Factor on the weights of `[lqr]` for the positions of cart and links along a motion: a link that leaves its plan is
+/// soon lost. With a factor of 10, more runs are lost where encoders are coarse.
 pub(super) const POSITION_WEIGHT: f64 = 4.0;
 
-/// The motion that follows `path`, which ends at rest. The positions weigh `position_weight` times what they
-/// weigh in `[lqr]`.
+/// The motion that follows `path`, which ends at rest. The weights of `[lqr]` for positions are multiplied by
+/// `position_weight`.
 pub(super) fn motion(
     setting: &Setting<'_>,
     path: Path,

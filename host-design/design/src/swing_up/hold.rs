@@ -5,21 +5,21 @@ use crate::numerics::Matrix;
 
 /// A tick from one state under one held force.
 pub(super) struct Tick {
-    /// State at its end.
+    /// State at the end of the tick, s entries.
     pub(super) end: Vec<f64>,
-    /// The state in the middle of the tick by state and force at its start, s×(s + 1).
+    /// Derivatives of the state in the middle of the tick by the state at its start and the force, s×(s + 1).
     pub(super) middle: Matrix<f64>,
-    /// The state at the end by state and force at the start, s×(s + 1).
+    /// Derivatives of the state at the end by the state at the start and the force, s×(s + 1).
     pub(super) whole: Matrix<f64>,
 }
 
 impl Tick {
-    /// By the state at the start, s×s.
+    /// Derivatives of the end by the state at the start, s×s.
     pub(super) fn a(&self) -> Matrix<f64> {
         self.whole.block(0, 0, self.whole.rows(), self.whole.rows())
     }
 
-    /// By the force, s entries.
+    /// Derivatives of the end by the force, s entries.
     pub(super) fn b(&self) -> Vec<f64> {
         (0..self.whole.rows()).map(|i| self.whole[(i, self.whole.rows())]).collect()
     }
@@ -32,7 +32,7 @@ pub(super) fn after_tick(dynamics: &dyn Dynamics, state: &[f64], force: f64, tic
     (0..steps).fold(state.to_vec(), |state, _| dynamics.step(&state, [force; 2], dt))
 }
 
-/// The same with derivatives.
+/// As [`after_tick`], with derivatives.
 pub(super) fn tick(dynamics: &dyn Dynamics, state: &[f64], force: f64, tick_s: f64) -> Tick {
     let start = Matrix::identity(state.len()).beside(&Matrix::zeros(state.len(), 1));
     let (half, middle) = half_tick(dynamics, state, force, tick_s, start);

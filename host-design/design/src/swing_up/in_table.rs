@@ -1,4 +1,4 @@
-//! From motions to the table of the firmware.
+//! Puts motions into the gain table of the firmware.
 
 use super::SwingUpError;
 use super::motion::SwingUp;
@@ -8,7 +8,7 @@ use crate::design::design;
 use crate::rig::Rig;
 use crate::table::{Gains, SwingUpValues, TableValues};
 
-/// The table with raising and lowering in it, motions between other equilibria, if there are any, and the limits and
+/// Adds to `table` raising and lowering, motions between other equilibria if there are any, and the limits and
 /// thresholds with which the firmware supervises them.
 ///
 /// # Errors
@@ -37,7 +37,7 @@ pub fn designed_table(rig: &Rig, motions: &SwingUp) -> Result<TableValues, Swing
     designed_table_with(rig, motions, &[])
 }
 
-/// The same with motions between other equilibria.
+/// As [`designed_table`], also with motions between other equilibria.
 ///
 /// # Errors
 /// As for [`designed_table`].

@@ -1,4 +1,4 @@
-//! Linear limits in an interior-point method: slacks and multipliers of every limit at every knot.
+//! Linear limits in an interior-point method: a slack and a multiplier for every limit at every knot.
 
 use super::problem::{Knots, Limit};
 use super::riccati::Stage;
@@ -16,11 +16,12 @@ pub(super) struct SlackStep {
     nu: Vec<Vec<f64>>,
 }
 
-/// Share of the way to the boundary that a step may go.
+/// Largest share of the distance to the boundary that a step may cover.
 const TO_BOUNDARY: f64 = 0.99;
 
 impl Slacks {
-    /// Slacks near the room that the knots leave, multipliers for the barrier `mu`.
+    /// Slacks as large as the room that the knots leave, but at least a tenth of the bound; multipliers for the
+    /// barrier parameter `mu`.
     pub(super) fn new(limits: &[Limit], knots: &Knots, mu: f64) -> Self {
         let slack = |limit: &Limit, x: &[f64], u: f64| limit.room(x, u).max(0.1 * limit.bound);
         let s: Vec<Vec<f64>> = knots
@@ -33,7 +34,7 @@ impl Slacks {
         Self { s, nu }
     }
 
-    /// The same slacks with the multipliers of the barrier `mu`.
+    /// The same slacks with the multipliers for the barrier parameter `mu`.
     pub(super) fn centred(&self, mu: f64) -> Self {
         let nu = self.s.iter().map(|s| s.iter().map(|s| mu / s).collect()).collect();
         Self { s: self.s.clone(), nu }
@@ -46,7 +47,7 @@ impl Slacks {
         products.sum::<f64>() / count.max(1) as f64
     }
 
-    /// Largest distance of a slack from the room there is, relative to the bound.
+    /// Largest difference between a slack and the room that the knots leave, relative to the bound.
     pub(super) fn infeasibility(&self, limits: &[Limit], knots: &Knots) -> f64 {
         let mut largest: f64 = 0.0;
         for ((x, &u), s) in knots.x.iter().zip(&knots.u).zip(&self.s) {
@@ -62,7 +63,8 @@ impl Slacks {
         -self.s.iter().flatten().map(|&s| libm::log(s)).sum::<f64>()
     }
 
-    /// Adds the limits of knot `knot` to the cost of its stage, for the barrier `mu`. The force is the last entry of z.
+    /// Adds the limits of knot `knot` to the cost of its stage, for the barrier parameter `mu`. The force is the last
+    /// entry of z.
     pub(super) fn add_to(&self, limits: &[Limit], knots: &Knots, knot: usize, mu: f64, stage: &mut Stage) {
         let force = stage.q_linear.len() - 1;
         let (x, u) = (&knots.x[knot], knots.u[knot]);
@@ -79,8 +81,8 @@ impl Slacks {
         }
     }
 
-    /// The step that belongs to the change `z` of states and forces, and the largest share of it that keeps slacks
-    /// positive, and that keeps multipliers positive.
+    /// The step that belongs to the change `z` of states and forces, and the largest shares of it that keep the slacks
+    /// and the multipliers positive.
     pub(super) fn step(
         &self,
         limits: &[Limit],

@@ -15,18 +15,19 @@ use crate::rig::{PlantDescription, Rig};
 use crate::simulate::{Begin, Goal, Scenario};
 use crate::table::TableValues;
 
-/// How long a push lasts (s): a tap of a finger.
+/// Duration of a push (s): a tap of a finger.
 const PUSH_S: f64 = 0.05;
 /// The first push that is tried, and the largest and the smallest (N).
 const FIRST_N: f64 = 0.125;
 const LARGEST_N: f64 = 32.0;
 const SMALLEST_N: f64 = 1.0 / 4096.0;
-/// Halvings between a push that is stood and its double, which is not: to 1/16 of it.
+/// Halvings of the interval from a push that is withstood to its double, which is not: the edge is found to 1/16 of
+/// the push.
 const HALVINGS: u32 = 4;
-/// How long it balances before it is lowered, and is watched after a motion (s).
+/// Time to balance before a lowering, and to watch the rig after a motion (s).
 const UPRIGHT_S: f64 = 0.5;
 const AFTER_S: f64 = 1.0;
-/// Longest time until a lowering is begun (s).
+/// Longest time from the request until a lowering begins (s).
 const LONGEST_WAIT_S: f64 = 5.0;
 /// Ticks between two telemetry messages.
 const TELEMETRY_TICKS: u16 = 20;
@@ -34,32 +35,32 @@ const TELEMETRY_TICKS: u16 = 20;
 /// Margins at one moment of a motion.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Margin {
-    /// Time since the beginning (s).
+    /// Time since the beginning of the motion (s).
     pub at_s: f64,
     /// For each link: the largest push against its angle and along it after which the motion still arrives (N, both
-    /// positive). A push of 32 N is the largest that is tried; 0: not even one of 1/4096 N is stood.
+    /// positive). A push of 32 N is the largest that is tried; 0: not even one of 1/4096 N is withstood.
     pub links_n: Vec<[f64; 2]>,
 }
 
-/// A force at the end of one link, across it.
+/// A force at the end of one link, perpendicular to it.
 #[derive(Debug, Clone, Copy)]
 struct Push {
-    /// Its first tick.
+    /// First tick of the push; it lasts [`PUSH_S`].
     tick: usize,
     link: usize,
     /// Positive: it makes the link's angle larger (N).
     force_n: f64,
 }
 
-/// Margins of the raising or the lowering of `table`, which is designed for `rig`, at so many moments, evenly from its
-/// beginning on; `done` is called after each.
+/// Margins of the raising or the lowering of `table`, which is designed for `rig`, at `moments` equally spaced moments
+/// from its beginning on; `done` is called after each.
 ///
-/// A push is a force at the end of one link, across it, that begins at this moment and lasts 50 ms. The firmware knows
-/// of it from its encoders only, and its supervision is on. The machine is the rig of the file, without
-/// noise. A raised rig has to balance for a second; a lowered one to hang after as long, without a fault.
+/// A push is a force at the end of one link, perpendicular to it, that begins at this moment and lasts 50 ms. The
+/// firmware notices it through its encoders only, and its supervision is on. The machine is the rig of the file,
+/// without noise. A second after the motion, a raised rig has to balance and a lowered one to hang, without a fault.
 ///
-/// Pushes are doubled until one is not stood; then halving finds the edge. Larger ones may be stood again. All margins
-/// are 0 if the motion does not arrive without a push either.
+/// Pushes are doubled until one is not withstood; then bisection finds the edge. Larger ones may be withstood again.
+/// All margins are 0 if the motion does not even arrive without a push.
 ///
 /// # Errors
 /// [`SwingUpError`] if the table has no motions, or the firmware does not run.
@@ -111,7 +112,7 @@ fn motion_ticks(table: &TableValues, way: Way) -> usize {
         as usize
 }
 
-/// The largest size that is stood, below the first one that is not.
+/// The largest size that is withstood, below the first one that is not.
 fn largest(stands: impl Fn(f64) -> Result<bool, SwingUpError>) -> Result<f64, SwingUpError> {
     let mut good = FIRST_N;
     if stands(good)? {
@@ -190,8 +191,9 @@ fn arrival(
 impl Push {
     /// The generalised forces in `state`: on the cart (N), and at the joints (N·m).
     ///
-    /// With the end `p` of the link, that on a coordinate q is `F · ∂p/∂q`. Turning the angle φ_l of a link below moves
-    /// `p` across that link, and the torque at a joint is the sum over all links from it on.
+    /// With `p` the end of the pushed link, the force on a coordinate q is `F · ∂p/∂q`. A change of the angle φ_l of a
+    /// link below moves `p` perpendicular to that link, and the torque at a joint is the sum over the links from this
+    /// joint to the pushed one.
     fn on(&self, rig: &Rig, state: &[f64]) -> (f64, Vec<f64>) {
         let PlantDescription::Chain(chain) = &rig.plant else { return (0.0, Vec::new()) };
         let angles: Vec<f64> = absolute_angles(state).collect();
@@ -210,7 +212,7 @@ impl Push {
 mod tests {
     use super::*;
 
-    /// The work of the force on a small move of any coordinate is that of the generalised forces.
+    /// For a small change of any coordinate, the work of the force is that of the generalised forces.
     #[test]
     fn a_push_is_across_the_end_of_its_link() {
         let rig = Rig::from_path("../../rigs/quadruple-paper.toml".as_ref()).unwrap();

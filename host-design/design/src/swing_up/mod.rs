@@ -11,20 +11,20 @@
 //! | `problem` | ends, bounds and cost of a trajectory |
 //! | `dynamics`, `hold` | the chain over a step and over a tick with held force, with derivatives |
 //! | `riccati`, `interior_point`, `shooting` | multiple shooting with Gauss-Newton steps |
-//! | `refine` | from knots to ticks |
+//! | `refine` | turns knots into ticks |
 //! | `tracking`, `gains` | feedback and filter along a path |
 //! | `closed_loop`, `robustness` | runs with wrong masses, friction, start and encoders: to choose candidates |
 //! | `firmware_runs` | such runs of the whole firmware: to judge the chosen ones |
 //! | `search`, `plan` | candidates and selection |
 //! | `advice`, `remedy` | what would help if there is no motion |
-//! | `demonstration` | one run of everything |
-//! | `supervision` | what the supervisor allows in motion |
+//! | `demonstration` | all of it in one run of the firmware |
+//! | `supervision` | the supervisor's limits in motion |
 //! | `in_table` | the table of the firmware |
-//! | `margins`, `trade` | pushes that a motion stands; what candidates are like |
+//! | `margins`, `trade` | pushes that a motion withstands; duration, force and robustness of candidates |
 //! | `check`, `stored` | independent check; the file beside the rig file |
 //!
-//! Everything that is random has a fixed seed, and every sum is taken in a fixed order, so the result does not depend
-//! on the machine or on its threads.
+//! Everything random has a fixed seed, and every sum is taken in a fixed order, so the result does not depend on the
+//! machine or on its threads.
 
 mod advice;
 mod check;

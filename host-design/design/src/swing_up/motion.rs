@@ -1,4 +1,4 @@
-//! A planned motion with its gains, as the table of the firmware is made from it.
+//! A planned motion with its gains, from which the table of the firmware is made.
 
 use crate::numerics::Matrix;
 
@@ -11,7 +11,7 @@ use crate::numerics::Matrix;
 ///
 /// ```text
 /// x̂ = x̂⁻ + L_k (y - C x̂⁻)
-/// u = u_k - K_k (x̂ - x_k), limited as always, held over the tick
+/// u = u_k - K_k (x̂ - x_k), with the usual limits, held over the tick
 /// ```
 ///
 /// The first L applies to the first measurement: x̂⁻ of tick 0 is `x[0]`. From tick `steps` on, the rig balances about
@@ -20,7 +20,7 @@ use crate::numerics::Matrix;
 pub struct Motion {
     /// Time between two entries (s): the rig's tick.
     pub tick_s: f64,
-    /// Reference states, steps + 1. Under `u` held over the tick the model leads from each to the next.
+    /// Reference states, steps + 1. With `u` held over the tick, the model goes from each to the next.
     pub x: Vec<Vec<f64>>,
     /// Reference forces (N), steps.
     pub u: Vec<f64>,
@@ -34,14 +34,14 @@ pub struct Motion {
 #[derive(Debug, Clone, PartialEq)]
 pub struct SwingUp {
     /// From hanging at rest, cart at 0, to upright at rest, cart at 0. Its gains minimise the sampled cost of
-    /// `[lqr]` with the stationary solution at the end, so K runs into the gain that balances: the hand-over changes
+    /// `[lqr]` with the stationary solution at the end, so K approaches the gain that balances: the hand-over changes
     /// an index, not the law.
     pub raise: Motion,
     /// From upright at rest, cart at 0, to hanging at rest, cart at 0.
     pub lower: Motion,
 }
 
-/// The parts of a motion do not fit together.
+/// The sizes of the parts of a motion do not agree, or a value is not finite.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[error("{part} of the motion: found {found}, needed {needed}")]
 pub struct Shape {
@@ -54,7 +54,7 @@ pub struct Shape {
 }
 
 impl Motion {
-    /// Joins the parts of a motion.
+    /// Joins the parts of a motion and checks their sizes.
     ///
     /// # Errors
     /// [`Shape`] if there is no step, a number of entries or the size of an entry does not fit, or a value is not

@@ -1,4 +1,4 @@
-//! From a rig to its two motions: search, selection, independent check, random runs of the firmware.
+//! Plans the two motions of a rig: search, selection, independent check, random runs of the firmware.
 
 use core::ops::Range;
 
@@ -22,15 +22,15 @@ use crate::rig::Rig;
 use crate::study::Study;
 use crate::table::TableValues;
 
-/// Candidates of the way up and of the way down; of chains with four and more links.
+/// Number of candidates for the way up and for the way down; the second constant is for chains of four and more links.
 const CANDIDATES: [u64; 2] = [100, 40];
 const CANDIDATES_OF_LONG_CHAINS: [u64; 2] = [40, 24];
-/// So many candidates with the best scores go through so many random runs each, in two rounds.
+/// Two rounds of selection, each with the number of best candidates that it tests, and of random runs for each.
 const ROUNDS: [(usize, usize); 2] = [(30, 40), (4, 160)];
-/// Random runs of the judgement, with the seeds from 1 on. Those of the rounds come after them.
+/// Number of random runs that judge a motion, with the seeds from 1 on. The rounds use the seeds after them.
 pub(super) const RUNS: usize = 200;
 
-/// What is being tried.
+/// Progress of a search.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Trying {
     /// A stage of this many steps begins.
@@ -52,43 +52,44 @@ pub enum Trying {
 /// Called with what is being tried, from any thread.
 pub type Progress<'a> = &'a (dyn Fn(Trying) + Sync);
 
-/// Both motions of a rig, and how they were found to be.
+/// Both motions of a rig, and their judgements.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Plan {
     /// The motions with their gains.
     pub motions: SwingUp,
     /// The rig's gain table with the motions in it, with which they were judged.
     pub table: TableValues,
-    /// What is stored of them.
+    /// Knots of the motions, for the file beside the rig file.
     pub stored: Stored,
-    /// How the raising was found to be.
+    /// Judgement of the raising.
     pub raise: Judgement,
-    /// How the lowering was found to be.
+    /// Judgement of the lowering.
     pub lower: Judgement,
 }
 
-/// How a motion was found to be.
+/// How a motion was found, and how it passed its tests.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Judgement {
     /// Which motion.
     pub way: Way,
-    /// Candidates tried and solved; none for a stored motion.
+    /// Number of candidates tried and solved; none for a stored motion.
     pub search: Option<[usize; 2]>,
-    /// Fragility: the smaller, the more errors of masses and friction it stands.
+    /// Fragility: the smaller, the larger errors of masses and friction it withstands.
     pub score: f64,
-    /// What the independent check found.
+    /// Peak values from the independent check.
     pub peaks: Peaks,
-    /// Random runs of the whole firmware with the table of [`Plan`]; of a lowering, those that were raised.
+    /// Random runs of the whole firmware with the table of [`Plan`]; for a lowering, those that were raised.
     pub runs: Runs,
 }
 
-/// Searches both motions of `rig`.
+/// Searches for both motions of `rig`.
 ///
 /// The result depends on nothing but the rig file: seeds and numbers of steps are fixed, and threads change only the
 /// time it takes.
 ///
 /// # Errors
-/// [`SwingUpError`]: the rig cannot be raised at all, no candidate was solved, or none stands enough random runs.
+/// [`SwingUpError`]: the rig cannot be raised at all, no candidate was solved, or the best one fails its check or too
+/// many random runs.
 pub fn search(rig: &Rig, progress: Progress<'_>) -> Result<Plan, SwingUpError> {
     let setting = Setting::of(rig)?;
     let request = Request::of(&setting);
@@ -120,8 +121,8 @@ pub fn judge(rig: &Rig, stored: &Stored, progress: Progress<'_>) -> Result<Plan,
     judged(&setting, raise?, lower?, progress)
 }
 
-/// The motions that are stored for exactly this rig, with their gains, checked but for the random runs: those they have
-/// stood before they were stored.
+/// The motions that are stored for exactly this rig, with their gains. They are checked again, except for the random
+/// runs, which they passed before they were stored.
 ///
 /// # Errors
 /// [`SwingUpError::Outdated`] if the rig file has changed since.
@@ -166,14 +167,14 @@ pub(super) struct Found {
     pub(super) search: Option<[usize; 2]>,
 }
 
-/// The motion of these knots.
+/// The motion restored from these knots, with its score.
 fn found(setting: &Setting<'_>, way: Way, stored: StoredKnots) -> Result<Found, SwingUpError> {
     let motion = restored(setting, way, &stored)?;
     let score = score(setting, &motion, way, &Spread::asked(setting.rig))?;
     Ok(Found { motion, stored, score, search: None })
 }
 
-/// The most robust of the candidates of one way with these numbers, if any is solved.
+/// The most robust of the candidates `numbers` for one way, if any is solved.
 pub(super) fn best(
     setting: &Setting<'_>,
     request: &Request,
@@ -193,15 +194,15 @@ pub(super) fn best(
         solved.truncate(kept);
         solved = ranked(setting, request, way, solved, runs, progress)?;
     }
-    // The first that passes the check; else the best, whose judgement then says what does not hold.
+    // The first that passes the check; otherwise the best, whose judgement then says what does not hold.
     let passes = |candidate: &Candidate| check(setting, &candidate.motion, way).is_ok();
     let chosen = solved.swap_remove(solved.iter().position(passes).unwrap_or(0));
     let stored = StoredKnots::new(ticks_per_knot(setting), &chosen.knots);
     Ok(Some(Found { search: Some([tried as usize, count]), ..found(setting, way, stored)? }))
 }
 
-/// The candidates by the number of random runs that they stand; of equals, the one with the smallest largest deviation
-/// first.
+/// The candidates sorted by the number of random runs that they withstand; among equals, the one with the smallest
+/// peak deviation comes first.
 fn ranked(
     setting: &Setting<'_>,
     request: &Request,
@@ -260,8 +261,8 @@ fn judged(
     Ok(Plan { motions, table, stored, raise, lower })
 }
 
-/// How many runs of the whole firmware of `table` are raised, and of those lowered, with the errors of `[swing_up]`. A
-/// run that the supervisor ends or does not begin has not arrived.
+/// Runs of the whole firmware of `table` with the errors of `[swing_up]`: how many are raised, and how many of those
+/// are lowered. A run that the supervisor ends or does not begin has not arrived.
 fn arriving(rig: &Rig, table: &TableValues, motions: &SwingUp) -> Result<[Runs; 2], SwingUpError> {
     let found = firmware_runs(rig, table, motions, &Condition::asked(rig), 1, RUNS, &Study::whole())?;
     Ok([found.raise_in_all(), found.lower])

@@ -1,4 +1,4 @@
-//! What a trajectory has to do: ends, limits, cost.
+//! The problem that a trajectory solves: ends, limits, cost.
 
 use super::dynamics::Dynamics;
 use crate::number::rounded;
@@ -24,12 +24,12 @@ pub(super) struct Limit {
     pub(super) speed: f64,
     pub(super) force: f64,
     pub(super) bound: f64,
-    /// Which limit it is, as a user knows it.
+    /// Name of the limit for a user.
     pub(super) name: &'static str,
 }
 
 impl Limit {
-    /// How far within the limit a state and a force are; negative beyond it.
+    /// Distance of a state and a force from the limit; negative beyond it.
     pub(super) fn room(&self, x: &[f64], u: f64) -> f64 {
         self.bound - self.position * x[0] - self.speed * x[1] - self.force * u
     }
@@ -62,7 +62,7 @@ impl Bounds {
         limits
     }
 
-    /// The same bounds times a factor.
+    /// The bounds multiplied by a factor.
     #[must_use]
     pub(super) fn scaled(&self, factor: f64) -> Self {
         Self {
@@ -97,12 +97,12 @@ pub(super) struct Knots {
 }
 
 impl Knots {
-    /// Rounded as they are stored, so that what is read again gives the same motion to the last bit.
+    /// The knots rounded as they are stored, so that a stored file gives the same motion to the last bit.
     pub(super) fn rounded(&self) -> Self {
         let round = |values: &Vec<f64>| values.iter().map(|&value| rounded(value, DIGITS)).collect();
         Self { x: self.x.iter().map(round).collect(), u: round(&self.u) }
     }
 }
 
-/// Significant digits of stored numbers: they are only where the refinement starts.
+/// Significant digits of stored numbers: few are enough, as the refinement only starts from them.
 const DIGITS: usize = 9;

@@ -1,4 +1,4 @@
-//! A trajectory at knots becomes one at ticks, with the force held over each.
+//! Refines a trajectory at knots to one at ticks, with the force held over each tick.
 
 use super::dynamics::Dynamics;
 use super::hold::{after_tick, tick};
@@ -13,16 +13,17 @@ pub(super) struct Path {
     pub(super) u: Vec<f64>,
 }
 
-/// Newton steps.
+/// Largest number of Newton steps.
 const STEPS: usize = 12;
 /// Largest gap of a refined path, in the units of the states.
 pub(super) const GAP: f64 = 2e-8;
+/// Weight of the last state's distance from the end.
 const END_WEIGHT: f64 = 1e8;
 /// Largest change of a position by the refinement (m, rad).
 const MOVED: f64 = 0.05;
 
-/// The path at ticks with `ticks` in each step between knots: Newton steps, each the least change that closes the gaps
-/// to first order. None if they stay above [`GAP`].
+/// The path at ticks, with `ticks` of them between two knots. Each Newton step is the least change that closes the
+/// gaps to first order. None if the gaps stay above [`GAP`], or a position moves too far from its knot.
 pub(super) fn refine(
     dynamics: &dyn Dynamics,
     knots: &Knots,
@@ -47,8 +48,8 @@ pub(super) fn refine(
     is_near(knots, at_knots.map(Vec::as_slice)).then_some(path)
 }
 
-/// Whether the positions of a refined path are still those of its knots: from knots of another spacing or of another
-/// rig, Newton steps may lead to quite another motion.
+/// Whether the positions of a refined path are still near those of its knots: from knots of another spacing or of
+/// another rig, Newton steps may lead to quite another motion.
 fn is_near<'a>(knots: &Knots, path: impl Iterator<Item = &'a [f64]>) -> bool {
     let near = |(knot, x): (&Vec<f64>, &[f64])| {
         knot.iter().zip(x).step_by(2).all(|(knot, x)| (knot - x).abs() < MOVED)
@@ -56,7 +57,7 @@ fn is_near<'a>(knots: &Knots, path: impl Iterator<Item = &'a [f64]>) -> bool {
     knots.x.iter().zip(path).all(near)
 }
 
-/// Closes the gaps of a path whose first and last states stay.
+/// Closes the gaps of a path and keeps its first and last states. None if they stay above [`GAP`].
 pub(super) fn close(dynamics: &dyn Dynamics, mut path: Path, tick_s: f64) -> Option<Path> {
     let end = path.x[path.u.len()].clone();
     for _ in 0..STEPS {
@@ -78,7 +79,7 @@ pub(super) fn close(dynamics: &dyn Dynamics, mut path: Path, tick_s: f64) -> Opt
         };
         path = next;
     }
-    // What is left of the distance to the end is far below the gap.
+    // The remaining distance to the end is far below [`GAP`].
     let last = path.u.len();
     path.x[last] = end;
     (largest_gap(dynamics, &path, tick_s) < GAP).then_some(path)
@@ -120,7 +121,7 @@ fn moved(path: &Path, step: &super::riccati::Minimum, share: f64) -> Path {
     }
 }
 
-/// Largest difference between a state and where the tick before it leads.
+/// Largest gap: difference between a state and the end of the tick before it.
 pub(super) fn largest_gap(dynamics: &dyn Dynamics, path: &Path, tick_s: f64) -> f64 {
     let mut largest: f64 = 0.0;
     for ((x, &u), next) in path.x.iter().zip(&path.u).zip(&path.x[1..]) {

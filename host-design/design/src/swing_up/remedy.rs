@@ -6,7 +6,7 @@ use crate::rig::{PlantDescription, Rig};
 /// Significant digits of an advised number. It is tried as it is printed.
 const DIGITS: usize = 3;
 
-/// A limit of plans.
+/// A limit that planned motions have to keep.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Limit {
     Rail,
@@ -18,7 +18,7 @@ pub(super) enum Limit {
 impl Limit {
     pub(super) const ALL: [Self; 4] = [Self::Rail, Self::Force, Self::Speed, Self::Duration];
 
-    /// As a user knows it.
+    /// Name of the limit for a user.
     pub(super) fn name(self) -> &'static str {
         match self {
             Self::Rail => "rail",
@@ -28,8 +28,8 @@ impl Limit {
         }
     }
 
-    /// Changes the file of `remedy` to `factor` times as much of this; none if the rig has no such limit. `longest_s`
-    /// is the longest duration that is tried without a change.
+    /// Multiplies this limit by `factor` in the rig of `remedy`; none if the rig has no such limit. `longest_s` is the
+    /// longest duration that is tried without a change.
     pub(super) fn relax(self, remedy: &mut Remedy, longest_s: f64, factor: f64) -> Option<()> {
         match self {
             Self::Rail => remedy.lengthen_rail(factor),
@@ -49,7 +49,7 @@ pub(super) struct Remedy {
 }
 
 impl Remedy {
-    /// `rig` without a change.
+    /// A remedy that does not change `rig` yet.
     pub(super) fn of(rig: &Rig) -> Self {
         Self { rig: rig.clone(), keys: Vec::new() }
     }
@@ -59,7 +59,8 @@ impl Remedy {
         self.keys.join(" and ")
     }
 
-    /// With `factor` times as much rail in the plan: what `[swing_up]` allows as far as the rail goes, then the rail.
+    /// Allows `factor` times as much rail in a plan: raises what `[swing_up]` allows, and lengthens the rail if it is
+    /// too short for that.
     fn lengthen_rail(&mut self, factor: f64) -> Option<()> {
         let PlantDescription::Chain(chain) = &mut self.rig.plant else { return None };
         let travel_m = &mut chain.cart.travel_m;
@@ -77,8 +78,8 @@ impl Remedy {
         Some(())
     }
 
-    /// With `factor` times as much force in the plan: what `[swing_up]` allows as far as the actuator goes, then the
-    /// actuator.
+    /// Allows `factor` times as much force in a plan: raises what `[swing_up]` allows, and strengthens the actuator if
+    /// it is too weak for that.
     fn strengthen(&mut self, factor: f64) -> Option<()> {
         let full = self.rig.force_limit_n()?;
         let rules = self.rig.swing_up.get_or_insert_default();
@@ -117,7 +118,7 @@ impl Remedy {
         Some(())
     }
 
-    /// With `factor` times the errors that a motion has to stand.
+    /// Multiplies the errors of masses and friction that a motion has to withstand by `factor`.
     pub(super) fn narrow(&mut self, factor: f64) {
         let rules = self.rig.swing_up.get_or_insert_default();
         let spreads = [

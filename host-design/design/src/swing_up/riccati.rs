@@ -20,7 +20,8 @@ pub(super) struct Minimum {
     pub(super) w: Vec<f64>,
 }
 
-/// The minimum from z = 0, with the cost `½ zᵀ Q z + qᵀ z` of the last state. None if the numbers overflow.
+/// The minimum from z = 0, with the cost `½ zᵀ Q z + qᵀ z` of the last state. None if numbers overflow or the cost has
+/// no minimum.
 pub(super) fn minimise(stages: &[Stage], last_q: &Matrix<f64>, last_q_linear: &[f64]) -> Option<Minimum> {
     let m = last_q_linear.len();
     let (mut p, mut p_linear) = (last_q.clone(), last_q_linear.to_vec());
@@ -88,8 +89,8 @@ pub(super) fn dot(a: &[f64], b: &[f64]) -> f64 {
 mod tests {
     use super::*;
 
-    /// A double integrator from a gap of 1 in its first step, brought to 0: the last state costs, so that the
-    /// minimum is where no input lowers the cost.
+    /// A double integrator with a gap of 1 in its first step, brought back towards 0 by the cost of the last state: no
+    /// change of an input lowers the cost of the minimum.
     #[test]
     fn no_other_input_costs_less() {
         let stage = |gap: f64| Stage {

@@ -1,4 +1,4 @@
-//! How a motion stands wrong masses and friction: a score without chance, and random runs.
+//! Robustness of a motion against wrong masses and friction: a deterministic score, and random runs.
 
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
@@ -14,7 +14,7 @@ use crate::plant::absolute_angles;
 use crate::rig::{Chain, PerJoint, PlantDescription, Rig};
 use crate::verify::wilson;
 
-/// Error of one mass in a run of the score.
+/// Relative error of one mass in a run for the score.
 const MASS_STEP: f64 = 0.005;
 
 /// The ranges from which each random run is drawn, uniformly.
@@ -22,7 +22,7 @@ const MASS_STEP: f64 = 0.005;
 pub struct Spread {
     /// Range of the cart's and each link's mass: 0.05 is -5 % to +5 %.
     pub mass: f64,
-    /// Range of the cart's and each joint's friction.
+    /// Range of the friction of cart and joints, which are all wrong by the same factor.
     pub friction: f64,
     /// Range of each link's angle at the start (rad).
     pub tilt_rad: f64,
@@ -33,13 +33,13 @@ pub struct Spread {
 }
 
 impl Spread {
-    /// Wrong masses and friction as given, a start off by 1° and 1 mm, encoders off by 0.1°.
+    /// The given ranges of masses and friction, a start off by up to 1° and 1 mm, encoder zeros off by up to 0.1°.
     pub fn of(mass: f64, friction: f64) -> Self {
         let degree = core::f64::consts::PI / 180.0;
         Self { mass, friction, tilt_rad: degree, position_m: 1e-3, zero_rad: 0.1 * degree }
     }
 
-    /// Masses and friction wrong by the spreads of `[swing_up]`, the rest as in [`of`](Self::of).
+    /// Masses and friction wrong by up to the spreads of `[swing_up]`, the rest as in [`of`](Self::of).
     pub(super) fn asked(rig: &Rig) -> Self {
         let rules = rig.swing_up.clone().unwrap_or_default();
         Self::of(rules.mass_spread_percent / 100.0, rules.friction_spread_percent / 100.0)
@@ -61,9 +61,9 @@ pub struct Runs {
     pub deviation_rad: f64,
 }
 
-/// A deterministic measure of fragility, from one run for each mass, slightly wrong, and two with all friction wrong,
-/// without noise: the deviations to expect at the spreads of mass and friction, as shares of what may be lost, a link's
-/// angle and the rail that the plan leaves. Smaller is better.
+/// A deterministic measure of fragility from runs without noise: one for each mass, which is slightly wrong, and two
+/// with all friction wrong. It sums the deviations to expect at the spreads of mass and friction, as shares of what is
+/// available: the angle at which a link counts as lost, and the rail that the plan leaves. Smaller is better.
 pub(super) fn score(
     setting: &Setting<'_>,
     motion: &Motion,
@@ -89,7 +89,7 @@ pub(super) fn score(
     Ok(sum)
 }
 
-/// Body 0 is the cart. A given inertia follows the mass.
+/// Scales the mass of a body; body 0 is the cart. An inertia given in the file is scaled with the mass.
 fn scale_mass(chain: &mut Chain, body: usize, factor: f64) {
     match body.checked_sub(1) {
         None => chain.cart.mass_kg *= factor,
@@ -107,7 +107,7 @@ fn scale_friction(chain: &mut Chain, factor: f64) {
     }
 }
 
-/// The rig as it may be, and the state in which it starts (m, m/s, rad, rad/s …), drawn with `seed`.
+/// A real rig within the spread, and the state in which it starts (m, m/s, rad, rad/s …), drawn with `seed`.
 pub(super) fn drawn(rig: &Rig, way: Way, spread: &Spread, seed: u64) -> (Rig, Vec<f64>) {
     let mut random = Pcg64::seed_from_u64(seed);
     let mut between = |share: f64| share * random.random_range(-1.0..=1.0);
@@ -121,13 +121,13 @@ pub(super) fn drawn(rig: &Rig, way: Way, spread: &Spread, seed: u64) -> (Rig, Ve
     let factor = 1.0 + between(spread.friction);
     scale_friction(chain, factor);
     start[0] += between(spread.position_m);
-    // Any other motion begins in a loop that balances, whose links are as near to rest as its encoders' zeros.
+    // Any other motion begins while the loop balances, when the links are as near to rest as the encoder zeros.
     let tilt_rad = if way.begins_hanging() { spread.tilt_rad } else { spread.zero_rad };
     let mut below = 0.0;
     let zeros = &mut rig.reality.sensors.homing_error_rad;
     let mut wrong = Vec::new();
     for joint in 0..links {
-        // The angle of each link from the vertical is off; a joint's angle by the difference.
+        // What is drawn is the error of each link's angle from the vertical; a joint is off by the difference.
         let tilt = between(tilt_rad);
         start[2 + 2 * joint] += tilt - below;
         below = tilt;
@@ -137,7 +137,7 @@ pub(super) fn drawn(rig: &Rig, way: Way, spread: &Spread, seed: u64) -> (Rig, Ve
     (rig, start)
 }
 
-/// The run with this seed.
+/// Conditions of the random run with this seed.
 pub(super) fn sample(setting: &Setting<'_>, motion: &Motion, way: Way, spread: &Spread, seed: u64) -> Trial {
     let (rig, start) = drawn(setting.rig, way, spread, seed);
     let mut trial = Trial { counts: true, seed: Some(seed), start, ..Trial::ideal(setting, motion) };

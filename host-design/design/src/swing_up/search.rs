@@ -1,4 +1,4 @@
-//! The search for a way up: many candidates, of which the most robust is kept.
+//! The search for a motion: many candidates, of which the most robust is kept.
 
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
@@ -21,21 +21,21 @@ const FORCE_SHARE: [f64; 2] = [0.6, 0.9];
 const RAIL_SHARE: [f64; 2] = [0.6, 0.9];
 /// Durations in units of √(L/g).
 const DURATION: [f64; 2] = [9.0, 20.0];
-/// Between other equilibria, candidates from this number on may last so many times as long.
+/// Between other equilibria, candidates from number `LATE` on may last up to `STRETCH` times as long.
 const LATE: u64 = 100;
 const STRETCH: f64 = 2.0;
 /// Weight of the links' rates, in units of L/g: the range of its logarithm to base 10.
 const RATE_WEIGHT: [f64; 2] = [-2.0, 0.5];
-/// A change of the force by its limit in this time costs as much as the force itself (s).
+/// A force that changes by its limit within this time costs as much as a force at its limit (s).
 const RATE_TIME_S: f64 = 0.03;
 /// How far a refined path may exceed a bound of the plan, as a share of it.
 const EXCESS: f64 = 0.03;
 
 /// Candidates are ranked with the weights of `[lqr]`. With [`POSITION_WEIGHT`](super::gains::POSITION_WEIGHT), most of
-/// them stand all runs, and those that are chosen then stand coarse encoders and wrong zeros worse.
+/// them withstand all runs, and those that are then chosen are worse with coarse encoders and wrong zeros.
 const RANKING_WEIGHT: f64 = 1.0;
 
-/// What a candidate was drawn with.
+/// The random values of a candidate.
 struct Draw {
     /// Duration (s).
     duration_s: f64,
@@ -43,9 +43,9 @@ struct Draw {
     bounds: Bounds,
     /// Weight of the rates (s²/rad²).
     rate_weight: f64,
-    /// Amplitudes of the guess's force, as shares of the bound.
+    /// Amplitudes of the harmonics in the force of the initial guess, as shares of its bound.
     wobble: [f64; 3],
-    /// Links that turn the other way if they change: a bit for each.
+    /// Links that turn the other way round if the motion changes them: a bit for each.
     reversed: u32,
 }
 
@@ -57,7 +57,7 @@ pub(super) struct Candidate {
     pub(super) score: f64,
 }
 
-/// Limits that the rig file sets to a plan.
+/// Limits that the rig file sets for a plan.
 #[derive(Debug, Clone)]
 pub(super) struct Request {
     /// Ranges from which duration, largest force and largest distance from the middle of the rail are drawn.
@@ -99,7 +99,7 @@ fn time_unit(setting: &Setting<'_>) -> f64 {
     (length / setting.chain.gravity_m_per_s2).sqrt()
 }
 
-/// Candidate number `number`.
+/// Draws candidate `number`.
 fn draw(setting: &Setting<'_>, request: &Request, way: Way, number: u64) -> Draw {
     let mut random = Pcg64::seed_from_u64(number);
     let mut between = |[low, high]: [f64; 2]| low + (high - low) * random.random_range(0.0..=1.0);
@@ -112,7 +112,7 @@ fn draw(setting: &Setting<'_>, request: &Request, way: Way, number: u64) -> Draw
     let rate_weight = libm::exp10(between(RATE_WEIGHT)) * unit * unit;
     let wobble = core::array::from_fn(|_| if number == 0 { 0.0 } else { between([-0.05, 0.05]) });
     let bounds = Bounds { force_n, rail_m: Some([-rail_m, rail_m]), ..request.bounds.clone() };
-    // All links together first, as they are raised and lowered.
+    // The first candidate turns all links the same way, as in raising and lowering.
     let reversed =
         if is_between && number > 0 { random.random_range(0..1 << setting.chain.links.len()) } else { 0 };
     Draw { duration_s, bounds, rate_weight, wobble, reversed }
@@ -130,7 +130,7 @@ fn solve(setting: &Setting<'_>, request: &Request, way: Way, number: u64) -> Opt
     let ticks = ticks_per_knot(setting);
     let knot_s = ticks as f64 * setting.tick_s;
     let [_, end] = way.ends(setting.rig.states(), |link| draw.reversed >> link & 1 != 0);
-    // To the last bit those with which it will be restored.
+    // To the last bit the ends with which the motion will be restored.
     let ends = way.ends_near(&end);
     let [start, end] = ends.clone();
     let problem = Problem {
@@ -149,7 +149,7 @@ fn solve(setting: &Setting<'_>, request: &Request, way: Way, number: u64) -> Opt
     within(&path, &draw.bounds).then_some((knots, path))
 }
 
-/// All links turn evenly, at the force of the draw.
+/// Initial guess: all links turn at constant rates, and the force is the one drawn.
 fn guess(problem: &Problem<'_>, draw: &Draw) -> Knots {
     let (steps, turn) = (problem.steps, core::f64::consts::PI);
     let duration_s = steps as f64 * problem.knot_s;
@@ -179,7 +179,7 @@ fn rate_weights(setting: &Setting<'_>, weight: f64) -> Matrix<f64> {
     })
 }
 
-/// Whether the path keeps to the bounds, but for the excess that a refinement may bring.
+/// Whether the path keeps the bounds, except for the [`EXCESS`] that is allowed after a refinement.
 pub(super) fn within(path: &Path, bounds: &Bounds) -> bool {
     let limits = bounds.limits();
     path.x
@@ -188,8 +188,8 @@ pub(super) fn within(path: &Path, bounds: &Bounds) -> bool {
         .all(|(x, &u)| limits.iter().all(|limit| limit.room(x, u) >= -EXCESS * limit.bound))
 }
 
-/// The candidates with these numbers that were solved, on all threads, in the order of their numbers. `done` is called
-/// after each, from any thread, with its score.
+/// Solves the candidates `numbers` on all threads, and returns the solved ones in the order of their numbers. `done`
+/// is called after each, from any thread, with its score.
 pub(super) fn candidates(
     setting: &Setting<'_>,
     request: &Request,

@@ -15,11 +15,11 @@ use crate::numerics::Matrix;
 use crate::rig::{Chain, Motor, PlantDescription, Rig, Sensor, SwingUpRules};
 use crate::verify::Disturbance;
 
-/// Process noise that the filter expects in motion, as multiples of the rig's: in motion, wrong masses disturb more
+/// Process noise that the filter expects in motion, as multiples of the rig's: wrong masses disturb it more in motion
 /// than at rest.
 const JOINT_NOISE: f64 = 100.0;
 const FORCE_NOISE: f64 = 10.0;
-/// Time after which the filter at rest has settled.
+/// Time after which the filter at rest has settled (s).
 const SETTLE_S: f64 = 2.0;
 
 /// Everything that searching and judging needs to know about a rig.
@@ -29,36 +29,36 @@ pub(super) struct Setting<'a> {
     pub(super) chain: &'a Chain,
     pub(super) dynamics: Box<dyn Dynamics>,
     pub(super) tick_s: f64,
-    /// What the actuator can do; a plan keeps away from it.
+    /// Limits of the actuator and the rail; a plan keeps a distance from them.
     pub(super) actuator: Bounds,
     pub(super) disturbance: Disturbance,
     pub(super) noise: Noise,
-    /// Encoder step of each sensor.
+    /// Travel per count of each sensor (m, rad).
     pub(super) steps: Vec<f64>,
     pub(super) weights: Matrix<f64>,
     pub(super) force_weight: f64,
     rests: BTreeMap<Equilibrium, AtRest>,
 }
 
-/// Law and filter about a state of rest, all stationary.
+/// Stationary law and filter about a state of rest.
 pub(super) struct AtRest {
-    /// Cost-to-go.
+    /// Cost-to-go, s×s.
     pub(super) cost: Matrix<f64>,
-    /// Gain K.
+    /// Gain K, 1×s.
     pub(super) k: Matrix<f64>,
-    /// Gain of the filter.
+    /// Gain L of the filter, s×p.
     pub(super) l: Matrix<f64>,
     /// Covariance of the settled filter.
     pub(super) covariance: Matrix<f64>,
 }
 
 impl<'a> Setting<'a> {
-    /// For raising and lowering.
+    /// The setting for raising and lowering.
     pub(super) fn of(rig: &'a Rig) -> Result<Self, SwingUpError> {
         Self::with_ways(rig, &Way::BOTH)
     }
 
-    /// For these ways.
+    /// The setting for these ways.
     pub(super) fn with_ways(rig: &'a Rig, ways: &[Way]) -> Result<Self, SwingUpError> {
         let PlantDescription::Chain(chain) = &rig.plant else { return Err(SwingUpError::NotAChain) };
         let (Some(lqr), Some(kalman)) = (&rig.lqr, &rig.kalman) else {
@@ -124,18 +124,18 @@ impl<'a> Setting<'a> {
         })
     }
 
-    /// Law and filter where one of the ways begins.
+    /// Law and filter at the start of one of the ways.
     pub(super) fn at_start(&self, way: Way) -> &AtRest {
         &self.rests[&way.from(self.chain.links.len())]
     }
 
-    /// Law and filter where one of the ways ends.
+    /// Law and filter at the end of one of the ways.
     pub(super) fn at_end(&self, way: Way) -> &AtRest {
         &self.rests[&way.to(self.chain.links.len())]
     }
 }
 
-/// Force at standstill with the voltage beyond the dead zone, and its loss with speed by back-EMF.
+/// Force at standstill with the voltage beyond the dead zone (N), and its loss with speed by back-EMF (N·s/m).
 fn motor(motor: &Motor) -> [f64; 2] {
     let volts_per_speed = motor.volts_per_speed();
     let newtons_per_volt = volts_per_speed / motor.resistance_ohm;

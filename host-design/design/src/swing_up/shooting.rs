@@ -1,9 +1,9 @@
 //! Multiple shooting: Gauss-Newton steps on all knots at once, limits by an interior-point method.
 //!
-//! A step solves the linear-quadratic problem about the present knots, gaps between them included. It is accepted if
-//! it makes the gaps smaller or the cost lower than any earlier knots did (a filter: Fletcher & Leyffer, *Mathematical
-//! Programming* 91, 2002). Gauss-Newton steps stall near feasibility; then the cost is dropped and damped Newton steps
-//! close the gaps.
+//! A step solves the linear-quadratic problem about the current knots, including the gaps between them. It is accepted
+//! if, compared with each earlier iterate, it makes the gaps smaller or the cost lower (a filter: Fletcher & Leyffer,
+//! *Mathematical Programming* 91, 2002). Gauss-Newton steps stall near feasibility; then the cost is dropped, and
+//! damped Newton steps close the gaps.
 
 use super::interior_point::Slacks;
 use super::problem::{Knots, Problem};
@@ -12,20 +12,21 @@ use crate::numerics::Matrix;
 
 /// Gap at which a trajectory counts as solved, in the units of the states.
 const CLOSED: f64 = 1e-7;
-/// Steps with the cost, and without it.
+/// Largest number of steps with the cost, and without it.
 const WITH_COST: usize = 80;
 const FEASIBILITY_ONLY: usize = 60;
-/// Gauss-Newton steps that may gain little before the cost is dropped.
+/// Number of Gauss-Newton steps with little gain after which the cost is dropped.
 const SLOW: usize = 12;
 /// Weight of the last state's distance from the end.
 const END_WEIGHT: f64 = 1e8;
 
-/// What the steps of one solution know.
+/// The current iterate.
 struct Iterate {
     knots: Knots,
     slacks: Slacks,
-    /// Multipliers of the end.
+    /// Multipliers of the conditions at the end.
     end: Vec<f64>,
+    /// Barrier parameter.
     mu: f64,
 }
 
@@ -107,7 +108,7 @@ fn feasibility_only(problem: &Problem<'_>, at: &mut Iterate) {
     }
 }
 
-/// The first share of the step that is accepted, and the iterate there.
+/// The iterate after the first accepted share of the step, and that share.
 fn search(
     problem: &Problem<'_>,
     at: &Iterate,
@@ -131,7 +132,7 @@ fn search(
     None
 }
 
-/// The full step. With a damping: of the cost; without: of the least change.
+/// The full step: with a damping it lowers the cost, without one it is the least change that closes the gaps.
 fn newton(problem: &Problem<'_>, at: &Iterate, damping: Option<f64>) -> Option<Minimum> {
     let (knots, h, s) = (&at.knots, problem.knot_s, problem.end.len());
     let mut stages: Vec<Stage> = Vec::with_capacity(problem.steps + 1);
@@ -139,7 +140,7 @@ fn newton(problem: &Problem<'_>, at: &Iterate, damping: Option<f64>) -> Option<M
         let (x, u) = (&knots.x[knot], knots.u[knot]);
         let mut stage = stage_cost(problem, x, u, damping);
         if knot > 0 {
-            // The least change has no wish to leave the limits: they only make it costly to approach them.
+            // The least change needs no barrier that pushes away from the limits: approaching them only costs more.
             let mu = if damping.is_some() { at.mu } else { 0.0 };
             at.slacks.add_to(&problem.limits, knots, knot, mu, &mut stage);
         }
@@ -197,7 +198,7 @@ fn stage_cost(problem: &Problem<'_>, x: &[f64], u: f64, damping: Option<f64>) ->
     Stage { q, q_linear, r: 0.0, r_linear: 0.0, a, b, d }
 }
 
-/// Distance of the last state and force from the end at rest.
+/// Difference of the last state and force from the end at rest, s + 1 entries.
 fn end_distance(problem: &Problem<'_>, knots: &Knots) -> Vec<f64> {
     let last = knots.x[problem.steps].iter().zip(&problem.end).map(|(x, end)| x - end);
     last.chain([knots.u[problem.steps]]).collect()
@@ -225,7 +226,7 @@ fn gaps(problem: &Problem<'_>, at: &Iterate) -> Gaps {
     }
     end_distance(problem, &at.knots).into_iter().for_each(&mut take);
     take(at.slacks.infeasibility(&problem.limits, &at.knots));
-    // NaN is as bad as it gets.
+    // NaN counts as an infinite gap.
     if sum.is_nan() { Gaps { largest: f64::INFINITY, sum: f64::INFINITY } } else { Gaps { largest, sum } }
 }
 

@@ -12,7 +12,7 @@ use super::SwingUpError;
 use super::problem::Knots;
 use crate::rig::Rig;
 
-/// What is stored of both motions.
+/// Both motions as they are stored in the file beside the rig file.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Stored {
@@ -43,7 +43,7 @@ impl StoredKnots {
         }
     }
 
-    /// The knots, if they have `states` states.
+    /// The knots; none if they are invalid or do not have `states` states.
     pub(super) fn knots(&self, states: usize) -> Option<Knots> {
         let fits = self.knots.len() > 1 && self.knots.iter().all(|row| row.len() == states + 1);
         let finite = self.knots.iter().flatten().all(|value| value.is_finite());
@@ -53,7 +53,7 @@ impl StoredKnots {
         })
     }
 
-    /// As the next member of an object, one knot per line.
+    /// Writes the knots as the next member of a JSON object, one knot per line.
     pub(super) fn write(&self, text: &mut String, name: &str) {
         // Writing into a string cannot fail.
         let _ = write!(text, ",\n\"{name}\": {{ \"ticks\": {}, \"knots\": [", self.ticks);
@@ -72,7 +72,7 @@ pub(super) fn request_hash(rig: &Rig) -> String {
     Sha256::digest(values).iter().take(8).map(|byte| format!("{byte:02x}")).collect()
 }
 
-/// Reads a file of stored motions, which this command writes.
+/// Reads a file of stored motions; `command` is the one that writes it.
 pub(super) fn read<T: DeserializeOwned>(file: PathBuf, command: &'static str) -> Result<T, SwingUpError> {
     let bad = |file, reason| SwingUpError::BadFile { file, reason, command };
     match std::fs::read_to_string(&file) {
@@ -105,7 +105,7 @@ impl Stored {
         self.hash == request_hash(rig)
     }
 
-    /// As JSON, one knot per line.
+    /// The motions as JSON, one knot per line.
     pub fn to_json(&self) -> String {
         let mut text = format!("{{\n\"rig\": {:?},\n\"hash\": {:?}", self.rig, self.hash);
         for (name, motion) in [("raise", &self.raise), ("lower", &self.lower)] {

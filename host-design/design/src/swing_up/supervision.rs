@@ -1,4 +1,4 @@
-//! What the supervisor allows while the rig moves: more than healthy machines reach.
+//! The supervisor's limits while the rig moves: wider than what healthy machines reach.
 
 use upright::table::MotionLimits;
 
@@ -11,26 +11,25 @@ use crate::simulate::{Extremes, Scenario, SimulationError, follow};
 use crate::table::TableValues;
 use crate::verify::Disturbance;
 
-/// Healthy machines that make all motions; with the first one, nothing is wrong.
+/// Number of healthy machines that make all motions; the first one has no errors.
 const MACHINES: u64 = 12;
-/// Seed of the first one; apart from the seeds with which motions are chosen and judged.
+/// Seed of the first machine; not among the seeds with which motions are chosen and judged.
 const BASE_SEED: u64 = 20_000;
-/// How long they balance before they are lowered (s): wrong zeros of the encoders move the cart away from its
-/// set-point.
+/// Time to balance before the lowering (s): wrong zeros of the encoders move the cart away from its set-point.
 const BALANCE_S: f64 = 1.5;
-/// The largest that one of them reaches is allowed this many times.
+/// Factor on the largest values that the machines reach.
 const MARGIN: f64 = 2.0;
-/// Least distance of the cart from its planned position that is allowed (m).
+/// The allowed distance of the cart from its planned position is at least this (m).
 const LEAST_DEVIATION_M: f64 = 0.02;
-/// The cart may be this many times as fast as one of them.
+/// Factor on the largest speed of the cart that the machines reach.
 const SPEED_MARGIN: f64 = 1.2;
-/// Share of the rail's margin that stays free while the rig moves: its plan turns within the soft limits, but it may
-/// stand off its set-point.
+/// Share of the distance from a soft limit to the end of the rail that stays free while the rig moves: a plan turns
+/// within the soft limits, but the rig may start away from its set-point.
 const FREE_SHARE: f64 = 0.25;
 
-/// Sets limits and thresholds with which the firmware supervises the motions of `table`, from runs of machines with the
-/// spreads of `[swing_up]`: masses, friction, start, encoders' zeros, and the rig's noise. Does nothing without
-/// motions.
+/// Sets the limits and thresholds with which the firmware supervises the motions of `table`. They come from runs of
+/// machines with the rig's noise and with errors of masses, friction, start and encoder zeros within the spreads of
+/// `[swing_up]`. Does nothing without motions.
 ///
 /// # Errors
 /// [`SimulationError`] if the runs cannot be made.
@@ -53,7 +52,7 @@ pub(super) fn set_limits(rig: &Rig, table: &mut TableValues) -> Result<(), Simul
     let thresholds = &mut swing_up.thresholds;
     let of_cart = thresholds.innovation[0];
     for (sensor, (innovation, moved)) in reached.innovation.iter().zip(&reached.moved).enumerate() {
-        // What the rig's noise does at rest comes on top of what a wrong model does in motion.
+        // The innovation from the rig's noise at rest adds to that from a wrong model in motion.
         let wider = 1.0 + (MARGIN * innovation) as f32 / thresholds.innovation[sensor];
         thresholds.innovation[sensor] *= wider;
         thresholds.frozen[sensor] = (thresholds.frozen[sensor] * wider).max((MARGIN * moved) as f32);
@@ -62,7 +61,7 @@ pub(super) fn set_limits(rig: &Rig, table: &mut TableValues) -> Result<(), Simul
     Ok(())
 }
 
-/// The most that healthy machines reach; those that are lost do not count.
+/// The extremes that healthy machines reach; runs that are lost do not count.
 fn healthy(rig: &Rig, table: &TableValues) -> Result<Extremes, SimulationError> {
     let spread = Spread::asked(rig);
     let disturbance = Disturbance::of(rig);

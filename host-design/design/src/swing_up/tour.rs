@@ -16,11 +16,11 @@ use crate::study::Study;
 use crate::table::{MotionValues, SwingUpValues, TableValues};
 use crate::verify::{Disturbance, wilson};
 
-/// How long the links are balanced at each equilibrium (s) …
+/// Time to balance at each equilibrium (s).
 const BALANCE_S: f64 = 1.0;
-/// … and how long they hang with the motor off (s): they swing out, and a hand puts the rig back.
+/// Time to hang with the motor off (s): the swinging decays, and a hand puts the rig back.
 const HANG_S: f64 = 8.0;
-/// A link is at an equilibrium if it is as near to it (rad).
+/// Largest angle from an equilibrium at which a link counts as being there (rad).
 const NEAR_RAD: f64 = 0.35;
 /// Ticks between two telemetry messages of a random run.
 const TELEMETRY_TICKS: u16 = 20;
@@ -28,18 +28,18 @@ const TELEMETRY_TICKS: u16 = 20;
 /// All motions of a table, in an order in which each begins where the one before it has ended.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Tour {
-    /// From hanging to hanging, first the raising. A motion comes more than once if there is no other way.
+    /// The motions from hanging to hanging, beginning with the raising. A motion is repeated if there is no other way.
     pub ways: Vec<Way>,
-    /// When each of them is asked for (s).
+    /// Time at which each of them is requested (s).
     pub begin_s: Vec<f64>,
-    /// When the last one has ended (s).
+    /// Duration of the tour (s): it includes the pause after the last motion.
     pub duration_s: f64,
     links: usize,
 }
 
 impl Tour {
-    /// A tour of all motions of `table`; none if it has none, or not all of them can be reached from hanging and left
-    /// for there.
+    /// A tour of all motions of `table`; none if it has no motions, or if one of them cannot be reached from hanging
+    /// or does not lead back there.
     pub fn of(rig: &Rig, table: &TableValues) -> Option<Self> {
         let swing_up = table.swing_up.as_ref()?;
         let links = rig.states() / 2 - 1;
@@ -54,7 +54,7 @@ impl Tour {
         Some(Self { ways, begin_s, duration_s: now_s, links })
     }
 
-    /// The tour as a run of the firmware, from encoders and with the rig's noise, from rest.
+    /// The tour as a run of the firmware that starts from rest, with encoders and the rig's noise.
     pub fn scenario(&self, rig: &Rig, seed: u64) -> Scenario {
         let disturbance = Disturbance::of(rig);
         let goal = |(way, &at_s): (&Way, &f64)| Goal { at_s, to: way.to(self.links) };
@@ -77,7 +77,7 @@ pub(super) fn states(way: Way, links: usize) -> [State; 2] {
     }
 }
 
-/// The motion of this way.
+/// The motion for this way, if the table has it.
 fn motion(swing_up: &SwingUpValues, way: Way) -> Option<&MotionValues> {
     match way {
         Way::Up => Some(&swing_up.raise),
@@ -86,8 +86,8 @@ fn motion(swing_up: &SwingUpValues, way: Way) -> Option<&MotionValues> {
     }
 }
 
-/// A walk through all ways, from hanging to hanging, beginning with the first of them: as long as one begins here that
-/// was not yet gone, the one whose end has most of them left; else the shortest way to where one is left.
+/// A walk through all ways, from hanging to hanging, beginning with the first of them. If unused ways begin here, it
+/// takes the one at whose end most unused ways begin; otherwise the shortest path to where one is left.
 fn walk(ways: Vec<Way>, links: usize) -> Option<Vec<Way>> {
     let hanging = Equilibrium::hanging(links);
     let mut left = ways.clone();
@@ -112,7 +112,7 @@ fn walk(ways: Vec<Way>, links: usize) -> Option<Vec<Way>> {
     Some(walk)
 }
 
-/// Those of `ways` that a tour can hold: they can be reached from hanging, and hanging from where they end.
+/// Those of `ways` that a tour can contain: they can be reached from hanging, and hanging from where they end.
 pub fn on_tour(ways: &[Way], links: usize) -> Vec<Way> {
     let all: Vec<Way> = Way::BOTH.into_iter().chain(ways.iter().copied()).collect();
     let hanging = Equilibrium::hanging(links);
@@ -121,7 +121,7 @@ pub fn on_tour(ways: &[Way], links: usize) -> Vec<Way> {
     ways.iter().filter(is_held).copied().collect()
 }
 
-/// The fewest ways that lead from `here` to a goal.
+/// The path with the fewest ways from `here` to a goal, if there is one.
 fn shortest(
     ways: &[Way],
     here: Equilibrium,
@@ -151,38 +151,38 @@ fn shortest(
     None
 }
 
-/// What came of one motion in a set of tours.
+/// Results of one motion in a set of tours.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Leg {
     /// Which motion.
     pub way: Way,
-    /// Tours that came as far as this motion.
+    /// Number of tours that came as far as this motion.
     pub tried: usize,
-    /// Of those: where the links were in the end where they should be.
+    /// Number of those in which the links ended where they should.
     pub arrived: usize,
     /// 95 % confidence interval of their share (Wilson).
     pub interval: [f64; 2],
 }
 
-/// What came of a set of tours.
+/// Results of a set of tours.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Tours {
     /// The motions in the order of the tour.
     pub legs: Vec<Leg>,
-    /// Of each tour that did not come to its end: the motion that did not arrive, and the fault.
+    /// For each tour that ended early: the motion that did not arrive, and the fault.
     pub faults: Vec<(Way, String)>,
 }
 
-/// One tour: motions that have arrived, and the fault that ended it.
+/// Result of one tour: number of motions that arrived, and the fault that ended it.
 #[derive(Debug, Default, Serialize, Deserialize)]
 struct Gone {
     arrived: usize,
     fault: Option<String>,
 }
 
-/// `runs` tours with the firmware of `table`, each with another machine: masses, friction, start and encoders' zeros
-/// wrong by the spreads of `[swing_up]`, drawn with the seeds from `base_seed` on. A tour ends with the first motion
-/// that does not arrive.
+/// `runs` tours with the firmware of `table`, each with another machine: masses, friction, start and encoder zeros are
+/// wrong within the spreads of `[swing_up]`, drawn with the seeds from `base_seed` on. A tour ends with the first
+/// motion that does not arrive.
 ///
 /// # Errors
 /// [`SwingUpError`] if the firmware does not run.
@@ -263,7 +263,7 @@ fn has_arrived(harness: &Harness<'_>, tour: &Tour, index: usize) -> bool {
         && is_near(harness.bench.state(), way.to(tour.links))
 }
 
-/// Whether all links are near `at`, whole turns apart.
+/// Whether all links are near `at`, apart from whole turns.
 fn is_near(state: &[f64], at: Equilibrium) -> bool {
     let away: Vec<f64> = state.iter().zip(rest(at, state.len())).map(|(state, rest)| state - rest).collect();
     let away = without_turns(&away);

@@ -11,10 +11,10 @@ pub(super) fn ticks(dynamics: &dyn Dynamics, path: &Path, tick_s: f64) -> Vec<Ti
 }
 
 /// `[Q S; Sᵀ R]` of one tick in state and held force: the integral of the continuous cost over the tick, by Simpson's
-/// rule with the state's exact course to first order in the deviations.
+/// rule, with the trajectory of the state to first order in the deviations.
 fn tick_cost(tick: &Tick, weights: &Matrix<f64>, force_weight: f64, tick_s: f64) -> Matrix<f64> {
     let s = tick.whole.rows();
-    let over = |course: &Matrix<f64>| &(&course.transpose() * weights) * course;
+    let over = |by: &Matrix<f64>| &(&by.transpose() * weights) * by;
     let start = Matrix::identity(s).beside(&Matrix::zeros(s, 1));
     let sum = &(&over(&start) + &over(&tick.middle).scaled(&4.0)) + &over(&tick.whole);
     let mut cost = sum.scaled(&(tick_s / 6.0));
@@ -22,7 +22,7 @@ fn tick_cost(tick: &Tick, weights: &Matrix<f64>, force_weight: f64, tick_s: f64)
     cost
 }
 
-/// One step back of the Riccati recursion: the gain K (1×s), and the cost-to-go before the tick.
+/// One backward step of the Riccati recursion: the gain K (1×s), and the cost-to-go before the tick.
 fn step_back(tick: &Tick, cost: &Matrix<f64>, ahead: &Matrix<f64>) -> (Matrix<f64>, Matrix<f64>) {
     let s = tick.whole.rows();
     let all = cost + &(&tick.whole.transpose() * &(ahead * &tick.whole));
@@ -55,7 +55,7 @@ pub(super) fn feedback(
     gains
 }
 
-/// The stationary cost-to-go and gain about a state of rest: the recursion repeated until the gain stays.
+/// The stationary cost-to-go and gain about a state of rest: the recursion is repeated until the gain is constant.
 pub(super) fn stationary(
     tick: &Tick,
     weights: &Matrix<f64>,
@@ -77,21 +77,21 @@ pub(super) fn stationary(
     (ahead, gain)
 }
 
-/// How long the error of a friction force stays much the same in a motion (s).
+/// Time for which the error of a friction force stays about the same in a motion (s).
 const FRICTION_TIME_S: f64 = 0.03;
 
 /// Noise that a filter expects.
 pub(super) struct Noise {
     /// Intensities of force and joint torques (N²·s, (N·m)²·s).
     pub(super) intensities: Vec<f64>,
-    /// Error of the friction of cart and joints that it stands (N·s/m, N·m·s/rad).
+    /// Error of the viscous friction of cart and joints that it allows for (N·s/m, N·m·s/rad).
     pub(super) friction_errors: Vec<f64>,
     /// State that each sensor measures, and the variance of its rounding.
     pub(super) sensors: Vec<(usize, f64)>,
 }
 
 impl Noise {
-    /// Intensities at the rates of `x`: wrong friction acts like noise that stays for a while.
+    /// Intensities at the rates of `x`: wrong friction acts like noise that is constant for [`FRICTION_TIME_S`].
     fn at(&self, x: &[f64]) -> Vec<f64> {
         let friction = x.iter().skip(1).step_by(2).zip(&self.friction_errors);
         let friction = friction.map(|(rate, error)| rate * rate * error * error * FRICTION_TIME_S);
@@ -99,17 +99,17 @@ impl Noise {
     }
 }
 
-/// The covariance of a prediction, from tick to tick.
+/// The filter along a motion: its covariance from tick to tick.
 pub(super) struct Filter<'a> {
     dynamics: &'a dyn Dynamics,
     noise: &'a Noise,
     tick_s: f64,
-    /// Of the prediction, s×s.
+    /// Covariance of the prediction, s×s.
     pub(super) covariance: Matrix<f64>,
 }
 
 impl<'a> Filter<'a> {
-    /// A filter that knows each measured state to its encoder step and no rate.
+    /// A filter that initially knows each measured state to the rounding of its encoder, and no rate.
     pub(super) fn new(dynamics: &'a dyn Dynamics, noise: &'a Noise, states: usize, tick_s: f64) -> Self {
         let mut covariance = Matrix::identity(states).scaled(&1e-2);
         for &(state, variance) in &noise.sensors {
@@ -118,10 +118,10 @@ impl<'a> Filter<'a> {
         Self { dynamics, noise, tick_s, covariance }
     }
 
-    /// The gain L (filter form, s×p) of this tick; then the prediction over the tick from `x`.
+    /// Returns the gain L (filter form, s×p) of this tick, and predicts the covariance over the tick from `x`.
     ///
     /// # Errors
-    /// [`Singular`] if the innovation has no covariance.
+    /// [`Singular`] if the covariance of the innovation is singular.
     pub(super) fn gain(&mut self, x: &[f64], tick: &Tick) -> Result<Matrix<f64>, Singular> {
         let (p, sensors) = (&self.covariance, &self.noise.sensors);
         let (s, count) = (p.rows(), sensors.len());

@@ -1,4 +1,4 @@
-//! Duration against force and robustness: what the candidates of a search are like.
+//! Duration against force and robustness over the candidates of a search.
 
 use serde::Serialize;
 
@@ -22,15 +22,15 @@ pub struct Solved {
     pub force_n: f64,
     /// Largest distance of the cart from the middle (m).
     pub position_m: f64,
-    /// Fragility: the smaller, the more errors of masses and friction it stands.
+    /// Fragility: the smaller, the larger errors of masses and friction it withstands.
     pub score: f64,
     /// Random runs with the spreads of masses and friction of `[swing_up]`.
     pub runs: Runs,
-    /// The same with twice the spreads.
+    /// Random runs with twice these spreads.
     pub wider: Runs,
 }
 
-/// Of `tried` candidates of the search for a raising, those that are solved, in their order. Seed 1 stands for the
+/// Those of `tried` candidates of the search for a raising that are solved, in their order. Seed 1 stands for the
 /// first candidates of the search, 2 for those after them, and so on; it is also the seed of the first random run.
 ///
 /// # Errors

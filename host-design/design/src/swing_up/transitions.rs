@@ -1,5 +1,5 @@
-//! Motions between any two equilibria: search, check, storage. Runs of the firmware, in which one motion follows on the
-//! other, are in `tour`.
+//! Motions between any two equilibria: search, check, storage. Runs of the firmware, in which the motions follow one
+//! another, are in `tour`.
 
 use core::fmt::Write as _;
 use core::ops::Range;
@@ -26,23 +26,23 @@ const WORTH_A_TOUR: f64 = 0.8;
 /// A motion from one equilibrium to another.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Transition {
-    /// From where to where.
+    /// Equilibria at which it starts and ends.
     pub way: Way,
     /// The motion with its gains.
     pub motion: Motion,
 }
 
-/// How the search for a way has ended.
+/// Result of the search for a motion.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Searched {
-    /// From where to where.
+    /// Equilibria at which it starts and ends.
     pub way: Way,
-    /// Candidates solved.
+    /// Number of candidates solved.
     pub solved: usize,
     /// Random runs of the best of them with the law alone; none if none is solved or the best does not pass the
     /// independent check.
     pub runs: Option<Runs>,
-    /// Whether its knots are stored now: most runs arrive.
+    /// Whether its knots were stored: enough of the runs arrive.
     pub is_stored: bool,
 }
 
@@ -53,17 +53,17 @@ pub struct StoredTransitions {
     rig: String,
     /// Hash of the rig and its `[swing_up]`.
     hash: String,
-    /// By the name of the way: tours in which it arrived, and in which it was tried. One that is not here is not
-    /// judged.
+    /// Number of tours in which a motion arrived, and in which it was tried, by the name of its way. A motion without
+    /// an entry has not been judged.
     tours: BTreeMap<String, [usize; 2]>,
-    /// By the name of the way.
+    /// Knots of each motion, by the name of its way.
     #[serde(flatten)]
     ways: BTreeMap<String, StoredKnots>,
 }
 
 impl StoredTransitions {
-    /// Searches a motion of `rig` for `way` among the candidates with these numbers, and stores it if most random runs
-    /// with the law alone arrive; tours of the firmware then judge it. If not, what is stored for the way stays.
+    /// Searches for a motion of `rig` for `way` among the candidates `numbers`, and stores it if most random runs with
+    /// the law alone arrive; tours of the firmware then judge it. Otherwise, a motion stored before is kept.
     ///
     /// # Errors
     /// [`SwingUpError`] if the rig cannot be raised at all.
@@ -94,7 +94,7 @@ impl StoredTransitions {
         Ok(Searched { way, solved, runs: Some(runs), is_stored })
     }
 
-    /// Nothing stored yet.
+    /// An empty set of motions for `rig`.
     pub fn none(rig: &Rig) -> Self {
         Self { rig: rig.name.clone(), hash: request_hash(rig), tours: BTreeMap::new(), ways: BTreeMap::new() }
     }
@@ -110,7 +110,7 @@ impl StoredTransitions {
         self.ways.remove(&way.name(links));
     }
 
-    /// Notes in how many tours this motion arrived, and was tried: from now on it is one of
+    /// Records in how many tours this motion arrived, and in how many it was tried: from now on it is one of
     /// [`transitions`](Self::transitions).
     pub fn judge(&mut self, way: Way, links: usize, [arrived, tried]: [usize; 2]) {
         self.tours.insert(way.name(links), [arrived, tried]);
@@ -137,10 +137,10 @@ impl StoredTransitions {
         self.restored(rig, |name| self.tours.contains_key(name))
     }
 
-    /// As [`transitions`](Self::transitions), also those that are not judged yet.
+    /// As [`transitions`](Self::transitions), including those that have not been judged yet.
     ///
     /// # Errors
-    /// As there.
+    /// As for [`transitions`](Self::transitions).
     pub fn all(&self, rig: &Rig) -> Result<Vec<Transition>, SwingUpError> {
         self.restored(rig, |_| true)
     }
@@ -168,7 +168,7 @@ impl StoredTransitions {
         parallel::try_map(0..ways.len(), one)
     }
 
-    /// As JSON, one knot per line.
+    /// The motions as JSON, one knot per line.
     pub fn to_json(&self) -> String {
         let mut text = format!("{{\n\"rig\": {:?},\n\"hash\": {:?}", self.rig, self.hash);
         let tours =

@@ -1,4 +1,4 @@
-//! The ways from one state of rest to another.
+//! Ways: the starts and ends of motions from one state of rest to another.
 
 use core::f64::consts::PI;
 
@@ -7,14 +7,14 @@ use upright::table::Equilibrium;
 
 use crate::plant::whole_turns;
 
-/// From where to where a motion leads.
+/// Start and end of a motion.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Way {
     /// From hanging to upright; then it balances.
     Up,
     /// From upright to hanging; then the motor is off.
     Down,
-    /// Between two others.
+    /// Between any other two equilibria.
     Between {
         /// Where it begins.
         from: Equilibrium,
@@ -46,19 +46,19 @@ impl Way {
         equilibria().flat_map(|from| others(from).map(move |to| Self::between(from, to, links))).collect()
     }
 
-    /// The way of this name, as `uu-ud`; none if there is no such way.
+    /// The way with this name, for example `uu-ud`; none if there is no such way.
     pub fn named(name: &str, links: usize) -> Option<Self> {
         let (from, to) = name.split_once('-')?;
         let (from, to) = (equilibrium(from, links)?, equilibrium(to, links)?);
         (from != to).then(|| Self::between(from, to, links))
     }
 
-    /// The name as in [`named`](Self::named).
+    /// The name that [`named`](Self::named) accepts.
     pub fn name(self, links: usize) -> String {
         format!("{}-{}", letters(self.from(links), links), letters(self.to(links), links))
     }
 
-    /// Where it begins.
+    /// The equilibrium at which it begins.
     pub fn from(self, links: usize) -> Equilibrium {
         match self {
             Self::Up => Equilibrium::hanging(links),
@@ -67,7 +67,7 @@ impl Way {
         }
     }
 
-    /// Where it ends.
+    /// The equilibrium at which it ends.
     pub fn to(self, links: usize) -> Equilibrium {
         match self {
             Self::Up => Equilibrium::UPRIGHT,
@@ -94,8 +94,8 @@ impl Way {
         }
     }
 
-    /// States of rest at the start and the end of the motion. A link that changes turns the other way if it is among
-    /// `reversed`.
+    /// States of rest at the start and the end of the motion. A link that the motion changes turns the other way round
+    /// if `reversed` says so.
     pub(super) fn ends(self, states: usize, reversed: impl Fn(usize) -> bool) -> [Vec<f64>; 2] {
         let links = states / 2 - 1;
         let (from, to) = (self.from(links), self.to(links));
@@ -112,7 +112,7 @@ impl Way {
         [start, end]
     }
 
-    /// The ends of a motion whose last state is near `last`.
+    /// The ends of a motion whose last state is near `last`, with the same whole turns.
     pub(super) fn ends_near(self, last: &[f64]) -> [Vec<f64>; 2] {
         let [start, mut end] = self.ends(last.len(), |_| false);
         if let Self::Between { .. } = self {
@@ -138,7 +138,7 @@ pub fn letters(at: Equilibrium, links: usize) -> String {
     (0..links).map(|link| if at.is_down(link) { 'd' } else { 'u' }).collect()
 }
 
-/// The equilibrium with these [`letters`]; none if they are not one for each link.
+/// The equilibrium with these [`letters`]; none if there is not exactly one valid letter for each link.
 pub fn equilibrium(letters: &str, links: usize) -> Option<Equilibrium> {
     let bit = |(link, letter)| match letter {
         'u' => Some(0),

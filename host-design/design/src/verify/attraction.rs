@@ -14,7 +14,7 @@ use crate::table::TableValues;
 /// Settings of the search for the edges of the region.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct AttractionSettings {
-    /// Length of each run and what counts as back near rest, before it is [widened](Horizon::widened) for the law's
+    /// Duration of each run and what counts as back near rest, before it is [widened](Horizon::widened) for the law's
     /// limit cycle; the position's band is also at least a tenth of a step.
     pub horizon: Horizon,
     /// Relative precision of an edge.
@@ -34,7 +34,7 @@ impl Default for AttractionSettings {
 /// The largest initial deviation from which a run still recovers.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Edge {
-    /// Its size (rad or m); 0 if not even the smallest one tried (1/10000 of the largest) stands.
+    /// Its size (rad or m); 0 if the loop does not even recover from the smallest one tried (1/10000 of the largest).
     pub size: f64,
     /// Largest force in the run from there (N).
     pub peak_force_n: f64,
@@ -47,7 +47,7 @@ pub struct Edge {
 pub struct Tilt {
     /// The link, from 1.
     pub link: usize,
-    /// Its largest angle from the vertical (rad) to the side that is worse.
+    /// Its largest angle from the vertical (rad), to the worse side.
     pub edge: Edge,
 }
 
@@ -58,27 +58,27 @@ pub struct WorstTilt {
     pub signs: Vec<i8>,
     /// Largest angle of every link from the vertical (rad).
     pub edge: Edge,
-    /// How many combinations were tried.
+    /// Number of combinations tried.
     pub tried: usize,
 }
 
 /// Largest initial deviations from rest.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Attraction {
-    /// The law.
+    /// The law in the loop.
     pub law: Law,
-    /// What counted as back near rest.
+    /// Duration of the runs, and what counted as back near rest.
     pub horizon: Horizon,
-    /// For each link alone.
+    /// Edges for each link alone.
     pub tilts: Vec<Tilt>,
-    /// For all links together; none for a model.
+    /// Edge for all links together; none for a model.
     pub worst: Option<WorstTilt>,
     /// Largest jump of the set-point without the governor (m); none if the law cannot follow a set-point (N = 0).
     pub raw_step: Option<Edge>,
 }
 
-/// With more links than this not every combination of sides is tried, but those of two neighbours with unlike sides,
-/// and all to one side or alternating.
+/// With more links than this, not every combination of sides is tried: only those with at most one change of side
+/// along the chain, and the alternating one.
 const LINKS_FOR_ALL_SIDES: usize = 7;
 
 /// Finds the edges for `law` by doubling and bisection (see [`AttractionSettings`]): no fall within the horizon, and
@@ -95,7 +95,7 @@ pub fn attraction(
     settings: &AttractionSettings,
 ) -> Result<Attraction, Unverifiable> {
     let settings = &settings.widened(rig, table, law)?;
-    // All searches at once: none of them waits for the slowest of another kind.
+    // All searches run at once, so that none waits for the slowest of another kind.
     let ((tilts, worst), raw_step) = rayon::join(
         || rayon::join(|| single_tilts(rig, table, law, settings), || worst_tilt(rig, table, law, settings)),
         || raw_step(rig, table, law, settings),
@@ -238,14 +238,14 @@ fn sides(links: usize, mirrored: bool) -> Vec<Vec<i8>> {
     first.iter().cloned().chain(other).collect()
 }
 
-/// One axis of a map: a state and the values it starts with.
+/// One axis of a map: a state, and its values at the start.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Axis {
     /// Index of the state (relative angles, as everywhere).
     pub state: usize,
     /// First and last value (SI).
     pub range: [f64; 2],
-    /// How many values, at equal distances.
+    /// Number of values, equally spaced.
     pub points: usize,
 }
 
@@ -259,11 +259,11 @@ impl Axis {
 /// The region of attraction in the plane of two states, all others 0 at the start.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Map {
-    /// From left to right.
+    /// Horizontal axis, from left to right.
     pub across: Axis,
-    /// From the first row to the last.
+    /// Vertical axis, from the first row to the last.
     pub down: Axis,
-    /// For each row the time after which each start has come near rest (s); none where it falls or does not.
+    /// For each row, the time after which each start has come near rest (s); none if it falls or does not settle.
     pub settled_s: Vec<Vec<Option<f64>>>,
 }
 
@@ -304,7 +304,7 @@ pub fn attraction_map(
     let mirrored = is_rail_symmetric && [across, down].iter().all(|axis| axis.range[0] == -axis.range[1]);
     let run = if mirrored { all.div_ceil(2) } else { all };
     let indices: Vec<usize> = (0..run).collect();
-    // Many fall early, and make room for others.
+    // Many runs fall early and free their lanes, so a batch holds more runs than lanes.
     let mut cells = parallel::try_map_in_batches(&indices, 4 * LANES, batch)?;
     for image in (0..all - run).rev() {
         cells.push(cells[image]);

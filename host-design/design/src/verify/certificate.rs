@@ -96,7 +96,7 @@ impl Certificates {
         })
     }
 
-    /// Those of the gains used with `law`.
+    /// Certificates of the gains used with `law`.
     pub(super) fn of_law(&self, law: Law) -> Vec<Certificate> {
         self.laws[law].iter().chain(&self.observer).cloned().collect()
     }

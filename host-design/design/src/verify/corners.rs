@@ -13,10 +13,10 @@ use crate::rig::{PlantDescription, Rig};
 use crate::simulate::{Scenario, SimulationError};
 use crate::table::TableValues;
 
-/// The run in which every plant with mass errors has to stand.
+/// Conditions of the run in which every plant with mass errors has to stand.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct CornerSettings {
-    /// Length of the run (s).
+    /// Duration of the run (s).
     pub duration_s: f64,
     /// Its disturbances.
     pub disturbance: Disturbance,
@@ -33,7 +33,7 @@ impl CornerSettings {
     }
 }
 
-/// The mass of a part.
+/// A mass of the machine.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Mass {
@@ -66,13 +66,13 @@ pub struct Corner {
 pub struct Corners {
     /// Error of each mass (%).
     pub percent: f64,
-    /// 2^(n+1).
+    /// Number of corners: 2^(n+1) for n links.
     pub corners: usize,
-    /// Corners that stand.
+    /// Number of corners that stand.
     pub stand: usize,
     /// The corner that falls first; if none falls, that with the largest angle.
     pub weakest: Corner,
-    /// Those that do not stand.
+    /// The corners that do not stand.
     pub lost: Vec<Corner>,
 }
 
@@ -173,12 +173,12 @@ pub struct MassTolerance {
     pub mass: Mass,
     /// How much lighter than in the rig file it may be (%, at most 90).
     pub lighter_percent: f64,
-    /// How much heavier (%, at most 900).
+    /// How much heavier than in the rig file it may be (%, at most 900).
     pub heavier_percent: f64,
 }
 
 impl MassTolerance {
-    /// The smaller of the two.
+    /// The smaller of both tolerances (%).
     pub fn percent(&self) -> f64 {
         self.lighter_percent.min(self.heavier_percent)
     }

@@ -11,7 +11,7 @@ use crate::rig::Rig;
 /// Root mean squares caused by one source, or by all.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct NoiseShare {
-    /// Which: `encoder 1`, …, `force`, `joint 1`, …, or `total`.
+    /// The source: `encoder 1`, …, `force`, `joint 1`, …, or `total`.
     pub source: String,
     /// RMS of the requested force (N).
     pub force_n: f64,

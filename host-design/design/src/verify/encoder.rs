@@ -13,11 +13,11 @@ use crate::table::TableValues;
 /// Settings of the search for the coarsest encoders.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct EncoderSettings {
-    /// Length of each run (s).
+    /// Duration of each run (s).
     pub duration_s: f64,
     /// Disturbances of the runs.
     pub disturbance: Disturbance,
-    /// Runs that must all stand, with the seeds from 1.
+    /// Number of runs, with the seeds from 1; all of them have to stand.
     pub seeds: u64,
     /// Largest factor tried, at least 1.
     pub largest_factor: f64,
@@ -41,7 +41,7 @@ impl EncoderSettings {
 /// The coarsest encoders with which a law still stands.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct CoarsestEncoder {
-    /// The law.
+    /// The law in the loop.
     pub law: Law,
     /// How many times coarser than in the rig file, cart and links alike; none if not even
     /// the rig's own suffice.
@@ -76,8 +76,8 @@ pub fn coarser(rig: &Rig, factor: f64) -> Rig {
     coarse
 }
 
-/// `own`, with the observer for `rig`, which differs from the rig of `own` in its encoders alone. Without proof, unless
-/// the observer needs more bits than are tried first.
+/// `own` with the observer for `rig`, which differs from the rig of `own` in its encoders alone. The observer is not
+/// certified, unless it needs more bits than are tried first.
 fn with_observer_of(own: &Uncertified, rig: &Rig) -> Result<Uncertified, DesignError> {
     let alone = Rig { lqr: None, pole_placement: None, integral: None, ..rig.clone() };
     let observer = Uncertified::sampled_alone(&alone).or_else(|_| Ok(design(&alone)?.into()))?;

@@ -1,4 +1,4 @@
-//! Results from the linear model of the loop as it will run.
+//! Results from the linear model of the loop with the numbers of the table.
 
 use serde::Serialize;
 use upright::table::Law;
@@ -16,9 +16,9 @@ use super::{certificate, covariance, loop_model, margins, rounding, tick};
 /// `f32` values.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct LinearReport {
-    /// The law.
+    /// The law in the loop.
     pub law: Law,
-    /// Poles of the whole loop as [re, im], by real part.
+    /// Poles of the whole loop as [re, im], sorted by real part.
     pub poles: Vec<[f64; 2]>,
     /// Largest absolute value of a pole: stable below 1.
     pub spectral_radius: f64,
@@ -36,7 +36,7 @@ pub struct LinearReport {
     pub certificates: Vec<Certificate>,
 }
 
-/// A report that cannot be made.
+/// Why a report cannot be made.
 #[derive(Debug, thiserror::Error)]
 pub enum VerifyError {
     /// The eigenvalue iteration failed.
@@ -59,7 +59,7 @@ pub enum VerifyError {
 /// The linear half of the trust report, one for each law in the table.
 ///
 /// # Errors
-/// [`VerifyError`] if a figure cannot be computed; an unstable loop is no error.
+/// [`VerifyError`] if a figure cannot be computed; an unstable loop is not an error.
 pub fn linear(
     rig: &Rig,
     certified: &Certified,
@@ -118,7 +118,7 @@ pub fn margins_of(
     margins::margins(certified, &numbers, &grid, rig.tick.period_s).map(Some)
 }
 
-/// Poles of the loop as [re, im], by real part, and the largest absolute value of one.
+/// Poles of the loop as [re, im], sorted by real part, and the largest absolute value of one.
 fn poles(model: &LoopModel<f64>) -> Result<(Vec<[f64; 2]>, f64), VerifyError> {
     let poles = eigenvalues(&model.matrix).map_err(|_| VerifyError::Poles)?;
     let poles: Vec<[f64; 2]> = poles.iter().map(Complex::to_f64).collect();

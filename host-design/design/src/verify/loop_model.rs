@@ -1,4 +1,4 @@
-//! The loop as it will run, as matrices: sampled plant, delay, observer, control law.
+//! The loop with the numbers of the table, as matrices: sampled plant, delay, observer, control law.
 //!
 //! Poles, margins and covariances need the law as a matrix; this is the only place where it is written a second time.
 //! A simulation runs the firmware's own controller, and a test compares this model with it.
@@ -102,7 +102,7 @@ impl<R: Real> Numbers<R> {
         Self::of_design(rig, &certified.double, feedback, kalman)
     }
 
-    /// Those of `feedback`, with the observer `kalman` or from the whole state, for the plant of `design`.
+    /// The numbers of `feedback` for the plant of `design`, with the observer `kalman` or from the whole state.
     pub(crate) fn of_design(
         rig: &Rig,
         design: &Design<f64>,
@@ -143,7 +143,7 @@ impl<R: Real> Numbers<R> {
     }
 }
 
-/// The states that the controller measures: those of its encoders, or all.
+/// Indices of the states that the controller measures: those with encoders, or all.
 fn measured(table: &TableValues) -> Vec<usize> {
     if table.observer.is_some() { table.measured() } else { (0..table.states()).collect() }
 }

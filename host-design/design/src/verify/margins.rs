@@ -1,4 +1,4 @@
-//! How far the loop is from instability: margins of gain, phase and delay, sensitivity, disk margin.
+//! Distance of the loop from instability: margins of gain, phase and delay, sensitivity, disk margin.
 
 use core::f64::consts::PI;
 
@@ -18,29 +18,29 @@ use crate::parallel;
 #[doc(alias = "phase_margin")]
 #[doc(alias = "allmargin")]
 pub struct Margins {
-    /// Smallest factor on the force below 1 at which the loop is still stable: 0 if it is for any.
+    /// Smallest factor on the force below 1 at which the loop is still stable: 0 if every smaller one is stable.
     pub lowest_gain: f64,
     /// Largest factor on the force above 1; none: no limit.
     pub highest_gain: Option<f64>,
     /// Phase margin (rad), to either side; none if |L| is never 1.
     pub phase_margin_rad: Option<f64>,
-    /// Delay margin (s): the smallest further delay of the force that makes the loop unstable, of the sampled loop
-    /// with the delay as it is, fractions of a tick included; none if none was found.
+    /// Delay margin (s): the smallest further delay of the force that makes the sampled loop unstable, including
+    /// fractions of a tick; none if none was found.
     pub delay_margin_s: Option<f64>,
-    /// The same in ticks.
+    /// Delay margin in ticks.
     pub delay_margin_ticks: Option<f64>,
     /// Frequencies at which |L| = 1 (rad/s).
     pub crossovers_rad_per_s: Vec<f64>,
     /// Ms = max |S|.
     pub peak_sensitivity: f64,
-    /// Where it is (rad/s).
+    /// Frequency of this peak (rad/s).
     pub peak_sensitivity_rad_per_s: f64,
     /// Mt = max |T|.
     pub peak_complementary_sensitivity: f64,
     /// Balanced disk margin `α = 2 / max |S - T|`: stable for every factor `(1 + δ/2) / (1 - δ/2)` on the force with
     /// complex |δ| < α (Seiler, Packard, Gahinet, *IEEE Control Systems* 40, 2020, with σ = 0).
     pub disk_margin: f64,
-    /// Where it is smallest (rad/s).
+    /// Frequency that determines the disk margin (rad/s).
     pub disk_margin_rad_per_s: f64,
 }
 
@@ -55,7 +55,7 @@ impl<'m> Grid<'m> {
     pub(super) fn of(model: &'m LoopModel<f64>) -> Result<Self, VerifyError> {
         const POINTS: usize = 1500;
         let poles = eigenvalues(&model.matrix).map_err(|_| VerifyError::Poles)?;
-        // A pole p is at frequency arg p and as wide as its distance from the circle.
+        // The peak of a pole p is at the frequency arg p, and as wide as the distance of p from the unit circle.
         let shape = poles.iter().map(|pole| (pole.im.atan2(pole.re).abs(), (1.0 - pole.modulus()).abs()));
         let shape: Vec<(f64, f64)> = shape.collect();
         let slowest = shape.iter().map(|(angle, width)| angle.hypot(*width)).fold(PI, f64::min);
@@ -80,7 +80,8 @@ impl<'m> Grid<'m> {
         self.points.iter().map(at).collect()
     }
 
-    /// The largest value of `f` and where it is, every local maximum near the top refined by golden section.
+    /// Frequency (rad per tick) and value of the maximum of `f`; every local maximum near the top is refined by golden
+    /// section.
     pub(super) fn maximum(&self, f: impl Fn(f64, &Response) -> f64) -> (f64, f64) {
         let at = |omega: f64| self.model.response(omega).map_or(f64::NAN, |r| f(omega, &r));
         let values = self.values(&f);
@@ -100,7 +101,7 @@ impl<'m> Grid<'m> {
         best
     }
 
-    /// Where `f` changes its sign, by bisection.
+    /// Frequencies at which `f` changes its sign, by bisection.
     fn zeros(&self, f: impl Fn(&Response) -> f64) -> Vec<f64> {
         let at = |omega: f64| self.model.response(omega).map_or(f64::NAN, |r| f(&r));
         let values = self.values(|_, r| f(r));
@@ -148,13 +149,13 @@ pub(super) fn margins(
     tick_s: f64,
 ) -> Result<Margins, VerifyError> {
     let model = grid.model;
-    // 1 + g L = 0 with g real where 1/L = S/T is.
+    // 1 + g L = 0 has a real solution g where 1/L = S/T is real.
     let inverse = |r: &Response| r.s / r.t;
     let mut factors = Vec::new();
     for omega in grid.zeros(|r| inverse(r).im).into_iter().chain([0.0, PI]) {
         if let Some(response) = model.response(omega) {
             let q = inverse(&response);
-            // A sign change through a pole of 1/L is none through 0.
+            // A sign change at a pole of 1/L is not a zero.
             if q.im.abs() <= 1e-6 * q.re.abs() && -q.re > 1e-9 {
                 factors.push(-q.re);
             }

@@ -1,6 +1,6 @@
-//! The trust report: how far the loop, as it will run, can be trusted before a motor is connected.
+//! The trust report: how far the loop can be trusted before a motor is connected.
 //!
-//! [`linear`] looks at the linear model: margins, tick, noise, rounding, certificates. The rest runs the firmware's
+//! [`linear`] examines the linear model: margins, tick, noise, rounding, certificates. The rest runs the firmware's
 //! own controller against nonlinear plants: [`attraction`], [`corners`], [`monte_carlo`], [`noise_run`],
 //! [`coarsest_encoder`], [`imperfections()`].
 

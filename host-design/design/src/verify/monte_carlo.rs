@@ -17,7 +17,7 @@ use crate::table::TableValues;
 pub struct Spread {
     /// Range of the cart's and each link's mass.
     pub mass: f64,
-    /// Range of each link's length; its centre of mass moves along.
+    /// Range of each link's length; its centre of mass is scaled with it.
     pub length: f64,
     /// Range of each link's inertia, beyond what follows from mass and length (m l²).
     pub inertia: f64,
@@ -30,7 +30,7 @@ pub struct Spread {
     pub tilt_rad: f64,
     /// Disturbances in every run.
     pub disturbance: Disturbance,
-    /// Length of a run (s).
+    /// Duration of a run (s).
     pub duration_s: f64,
 }
 
@@ -65,11 +65,11 @@ pub struct WorstCase {
 pub struct MonteCarlo {
     /// Seed of the first run; each following run has the next one.
     pub base_seed: u64,
-    /// Runs made.
+    /// Number of runs made.
     pub runs: usize,
-    /// Runs without fall.
+    /// Number of runs without a fall.
     pub stood: usize,
-    /// Share of those.
+    /// Share of runs without a fall.
     pub success_rate: f64,
     /// 95 % confidence interval of the success rate (Wilson).
     pub interval: [f64; 2],
@@ -79,8 +79,8 @@ pub struct MonteCarlo {
 
 /// Plant and scenario of the run with this seed.
 ///
-/// Masses and lengths are drawn first; a given centre of mass keeps its share of the length and a given inertia
-/// follows m l², then gets its own factor.
+/// Masses and lengths are drawn first; a given centre of mass keeps its share of the length, and the inertia is scaled
+/// with m l² before it gets its own factor.
 pub fn sample(rig: &Rig, law: Law, spread: &Spread, seed: u64) -> (Rig, Scenario) {
     let mut random = Pcg64::seed_from_u64(seed);
     let mut between = |share: f64| share * random.random_range(-1.0..=1.0);
@@ -183,13 +183,13 @@ pub fn wilson(successes: usize, runs: usize) -> [f64; 2] {
     if runs == 0 {
         return [0.0, 1.0];
     }
-    // Of the normal distribution, 95 % lie within ± this.
+    // 95 % of the normal distribution lie within ± this many standard deviations.
     const Z: f64 = 1.959963984540054;
     let (n, share) = (runs as f64, successes as f64 / runs as f64);
     let z2 = Z * Z / n;
     let centre = (share + 0.5 * z2) / (1.0 + z2);
     let half = Z * (share * (1.0 - share) / n + 0.25 * z2 / n).sqrt() / (1.0 + z2);
-    // All or none seen: the bound there is exact, but for rounding.
+    // If all or none succeed, the bound is exactly 1 or 0, which rounding would miss.
     let low = if successes == 0 { 0.0 } else { centre - half };
     let high = if successes == runs { 1.0 } else { centre + half };
     [low, high]

@@ -13,13 +13,13 @@ use crate::table::TableValues;
 /// Root mean squares over several runs at rest, after the first tenth of each.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct NoiseRun {
-    /// Runs, each with its own seed from 1.
+    /// Number of runs, with the seeds from 1.
     pub seeds: u64,
-    /// How many of them stood to the end; the figures are those of all, up to the fall.
+    /// How many of them stood to the end; the figures cover all runs, up to their falls.
     pub stood: u64,
-    /// Length of each (s).
+    /// Duration of each run (s).
     pub duration_s: f64,
-    /// Force on the cart (N).
+    /// Force on the cart (N rms).
     pub force_rms_n: f64,
     /// Largest force on the cart (N).
     pub force_peak_n: f64,
@@ -83,7 +83,7 @@ pub fn noise_run(
         Ok(Sums { stands: fall.is_none(), ..sums })
     };
     let all: Vec<Sums> = parallel::try_map::<_, _, SimulationError>(1..=seeds, one)?;
-    // In the order of the seeds, whichever thread made them.
+    // Sums are taken in the order of the seeds, whichever thread made the runs.
     let ticks: f64 = all.iter().map(|sums| sums.ticks).sum();
     let rms = |part: &dyn Fn(&Sums) -> f64| (all.iter().map(part).sum::<f64>() / ticks.max(1.0)).sqrt();
     Ok(NoiseRun {
@@ -107,16 +107,16 @@ fn disturbed(rig: &Rig, law: Law, disturbance: &Disturbance, seed: u64, duration
     }
 }
 
-/// How many long runs stand.
+/// Results of long runs.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Endurance {
-    /// Runs, with the seeds from 1.
+    /// Number of runs, with the seeds from 1.
     pub seeds: u64,
     /// How many stood to the end.
     pub stood: u64,
-    /// Length of each (s).
+    /// Duration of each run (s).
     pub duration_s: f64,
-    /// The seeds that fell.
+    /// Seeds of the runs that fell.
     pub fallen: Vec<u64>,
     /// Largest angle of any link in any run (rad).
     pub peak_angle_rad: f64,

@@ -33,15 +33,15 @@ pub struct LawTrust {
     pub linear: LinearReport,
     /// Largest tilts and step.
     pub attraction: Option<Attraction>,
-    /// Noise in a simulated run.
+    /// Ripple in simulated runs with noise.
     pub noise_run: Option<NoiseRun>,
     /// The coarsest encoder.
     pub coarsest_encoder: Option<CoarsestEncoder>,
-    /// Mass errors, every combination.
+    /// Runs with every combination of mass errors.
     pub corners: Option<Corners>,
     /// Tolerated error of each single mass, the most critical first.
     pub mass_tolerances: Vec<MassTolerance>,
-    /// Random plants.
+    /// Runs with random plants.
     pub monte_carlo: Option<MonteCarlo>,
     /// Imperfections of the machine that `[verify]` requires the loop to stand.
     pub imperfections: Vec<RequiredStanding>,
@@ -58,7 +58,7 @@ impl TrustReport {
 /// One requirement.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Check {
-    /// The law it is about.
+    /// The law that was checked.
     pub law: Law,
     /// What is required, with its key in `[verify]`.
     pub requirement: &'static str,
@@ -79,7 +79,7 @@ pub struct Effort<'a> {
     pub seed: u64,
     /// Share of the runs with one tick more delay than designed for.
     pub late: f64,
-    /// Where they are made.
+    /// Whether the runs are made here, or split over processes.
     pub study: &'a Study,
 }
 
@@ -110,7 +110,7 @@ pub fn trust(
     Ok(TrustReport { laws, checks })
 }
 
-/// The part of the report that takes seconds: margins, and nominal runs with noise on the machine of `[reality]`.
+/// The part of the report that takes only seconds: margins, and nominal runs with noise on the machine of `[reality]`.
 ///
 /// # Errors
 /// [`VerifyError`] if a value cannot be computed.
@@ -133,7 +133,7 @@ fn noise(rig: &Rig, table: &TableValues, law: Law) -> Result<Option<NoiseRun>, V
 }
 
 impl LawTrust {
-    /// Only the linear part.
+    /// A report with the linear part only.
     fn of(linear: LinearReport) -> Self {
         Self {
             linear,
@@ -199,18 +199,18 @@ fn known<T>(part: Result<T, Unverifiable>) -> Result<Option<T>, VerifyError> {
 }
 
 impl Check {
-    /// What was found, for reading.
+    /// What was found, as text.
     pub fn found_text(&self) -> String {
         let without_number = if self.holds { "no limit" } else { "none" };
         self.found.map_or(without_number.to_owned(), |found| significant(found, 3))
     }
 
-    /// The threshold, for reading.
+    /// The threshold, as text.
     pub fn required_text(&self) -> String {
         significant(self.required, 3)
     }
 
-    /// A requirement that what was found is at least `required`; without a bound `unbounded` decides.
+    /// A requirement that `found` is at least `required`; if nothing was found, `unbounded` says whether it holds.
     fn at_least(
         law: Law,
         requirement: &'static str,
@@ -283,7 +283,7 @@ fn run_checks(required: &Requirements, trust: &LawTrust) -> Vec<Check> {
     [tilt, encoder, random].into_iter().flatten().collect()
 }
 
-/// Runs that all have to stand.
+/// Requirements that all of a number of runs stand.
 fn counted_checks(trust: &LawTrust) -> Vec<Check> {
     let law = trust.linear.law;
     let corners = trust.corners.as_ref().map(|corners| {

@@ -27,7 +27,7 @@ impl LoopModel<f64> {
     pub fn response(&self, omega: f64) -> Option<Response> {
         let z = Complex::new(omega.cos(), omega.sin());
         let n = self.matrix.rows();
-        // The matrix with its right side as last column, stored by rows.
+        // The matrix with the right-hand side as its last column, stored by rows.
         let mut rows: Vec<Vec<Complex<f64>>> = (0..n)
             .map(|i| {
                 let entry = |j: usize| {

@@ -32,7 +32,7 @@ pub struct Rounding {
     pub force_difference_relative: Option<f64>,
 }
 
-/// None if the table's gains are not those of the design.
+/// Compares the table with the exact numbers; none if the table's gains are not those of the design.
 pub(super) fn rounding(
     rig: &Rig,
     certified: &Certified,
@@ -127,8 +127,8 @@ fn force_difference(
 /// The widest table, so that the firmware's code in `f64` is compiled for one size only.
 type Double = GainTable<MAX_STATES, MAX_SENSORS, f64>;
 
-/// The table with exact gains. Force and set-point come from the firmware that runs beside it, which has already
-/// limited them.
+/// The table with exact gains and without limits: force and set-point come from the firmware that runs beside it,
+/// which has already limited them.
 fn in_double_precision(exact: &Numbers<f64>, table: &TableValues, law: Law) -> Double {
     let mut laws = PerLaw::default();
     laws[law] = Some(LawGains {
@@ -183,7 +183,7 @@ impl<'t> Shadow<'t> {
         Ok(Self { controller, double, table, last_volts: 0.0, is_started: false })
     }
 
-    /// The requested force (N); then prepares the next tick.
+    /// Returns the requested force (N), and prepares the next tick.
     fn tick(&mut self, sample: &Sample<&[f64]>) -> Result<f64, SimulationError> {
         let command = match &self.double.observer {
             None => {
@@ -215,7 +215,7 @@ impl<'t> Shadow<'t> {
         Ok(command.requested_n)
     }
 
-    /// The force that the firmware assumes to be applied (N): its own actuator map of its own requested force.
+    /// The force that the firmware assumes to be applied (N): its actuator map applied to its own requested force.
     fn applied(&mut self, sample: &Sample<&[f64]>) -> f64 {
         let limited = saturate(sample.requested as f32, self.table.force_limit_n);
         let Some(motor) = &self.table.motor else { return f64::from(limited) };

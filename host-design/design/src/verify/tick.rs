@@ -18,10 +18,10 @@ pub struct TickLimits {
     pub shortest_unstable_s: Option<f64>,
     /// Shortest period (s) down to which it stays stable when the table runs faster; none: down to a thirtieth.
     pub shortest_stable_s: Option<f64>,
-    /// Jitter (ticks) that is tolerated: each force may come late by any time up to this, differently in every tick.
+    /// Jitter (ticks) that is tolerated: each force may be late by any time up to this, differently in every tick.
     /// By the small-gain criterion of Kao and Lincoln: sufficient only.
     pub jitter_ticks: f64,
-    /// The same (s).
+    /// Tolerated jitter (s).
     pub jitter_s: f64,
     /// Delay in whole ticks that may vary freely between 0 and this many, by the criterion for sampled loops
     /// `N |T(z)| |z - 1| < 1`; sufficient only.
@@ -41,13 +41,13 @@ pub(super) fn loop_at(certified: &Certified, numbers: &Numbers<f64>, period: f64
 /// force late by δ < J ticks differs from the one in time by `u(k) - u(k-1)` for at most J h seconds, so
 /// `‖w‖₂ <= √(J h) ‖u(k) - u(k-1)‖₂`. With h(z) from impulses on the states to u and `W = ∫₀ʰ e^(Aτ) B Bᵀ e^(Aᵀτ) dτ`
 /// (their sum over aliases, in closed form) the loop from w to u(k) - u(k-1) has the gain
-/// `|z - 1| √(h(z) W h(z)*)`, and small gain asks for
+/// `|z - 1| √(h(z) W h(z)*)`, and the small-gain theorem requires
 ///
 /// ```text
 /// J h max |z - 1|² h(z) W h(z)* < 1,   J <= 1
 /// ```
 ///
-/// and for J = N + g beyond one tick for `(N² + 2 N g + g)` in place of J.
+/// and, for J = N + g beyond one tick, the same with `(N² + 2 N g + g)` in place of J.
 pub(super) fn limits(
     certified: &Certified,
     numbers: &Numbers<f64>,

@@ -1,4 +1,4 @@
-//! One run of the loop as it will run, reduced to what a verdict needs.
+//! One run of the firmware's controller against the plant, reduced to what a verdict needs.
 
 use serde::{Deserialize, Serialize};
 use upright::table::Law;
@@ -19,7 +19,7 @@ pub enum Unverifiable {
     /// A changed rig, for which the gains have to be redesigned, has no design.
     #[error(transparent)]
     Design(#[from] DesignError),
-    /// A changed rig makes no table.
+    /// No gain table can be made for a changed rig.
     #[error(transparent)]
     NoTable(#[from] NoTable),
     /// The firmware does not run.
@@ -37,7 +37,7 @@ pub enum Unverifiable {
     /// An invalid setting.
     #[error("{what} = {value}: give {accepts}")]
     Setting {
-        /// Which one.
+        /// Name of the setting.
         what: &'static str,
         /// Its value.
         value: f64,
@@ -59,8 +59,8 @@ impl Disturbance {
     /// No disturbances.
     pub const NONE: Self = Self { force_n: 0.0, torque_n_m: 0.0 };
 
-    /// What the rig file gives in `[verify]`, or else what its `[kalman]` expects: an intensity is variance times
-    /// tick. The joint with the most noise stands for all.
+    /// What the rig file gives in `[verify]`, or otherwise what its `[kalman]` expects: an intensity is variance times
+    /// tick. All joints get the torque of the one with the most noise.
     pub fn of(rig: &Rig) -> Self {
         let rms = |intensity: f64| (intensity / rig.tick.period_s).sqrt();
         let expected = rig.kalman.as_ref().map_or(Self::NONE, |kalman| Self {
@@ -74,10 +74,10 @@ impl Disturbance {
     }
 }
 
-/// How long a run without disturbances lasts and what counts as being back near rest at its end.
+/// Duration of a run without disturbances, and what counts as being back near rest at its end.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Horizon {
-    /// Length of the run (s).
+    /// Duration of the run (s).
     pub duration_s: f64,
     /// Largest angle of any link from the vertical (rad).
     pub angle_rad: f64,
@@ -93,9 +93,8 @@ impl Default for Horizon {
 }
 
 impl Horizon {
-    /// Wide enough for `law`'s limit cycle: encoder resolution keeps some loops moving by far more than one count, so
-    /// that near rest is at least twice the largest deviation of a run without disturbances that starts (all but) at
-    /// rest.
+    /// Widened for `law`'s limit cycle. Encoder resolution keeps some loops moving by far more than one count, so the
+    /// limits are at least twice the largest deviation of a run without disturbances that starts almost at rest.
     ///
     /// # Errors
     /// Those of [`run`].
@@ -135,7 +134,7 @@ pub struct Outcome {
 }
 
 impl Outcome {
-    /// No fall. For runs whose disturbances never let the rig come to rest.
+    /// Whether there was no fall: the criterion for runs whose disturbances never let the rig come to rest.
     pub fn stands(&self) -> bool {
         self.fall.is_none()
     }
@@ -158,7 +157,7 @@ impl Outcome {
         Self { at_rest_after_s: self.at_rest_after_s.filter(|_| fall.is_none()), fall, ..self }
     }
 
-    /// No fall, and near rest when the run ended.
+    /// Whether there was no fall, and the rig was near rest when the run ended.
     pub fn comes_to_rest(&self) -> bool {
         self.at_rest_after_s.is_some()
     }
@@ -179,7 +178,7 @@ pub fn trial(
     Ok(outcome.ended(fall))
 }
 
-/// [`trial`] of each of these rigs, several in lockstep.
+/// [`trial`] for each of these cases, several in lockstep.
 ///
 /// # Errors
 /// As for [`trial`].
@@ -210,16 +209,16 @@ fn largest_angle(rig: &Rig, state: &[f64]) -> f64 {
     absolute_angles(state).fold(0.0, |largest, angle| f64::max(largest, angle.abs()))
 }
 
-/// The rig's run at rest for `horizon`, with integration steps of at most 1 ms: on the fastest rig a run then differs
-/// from one with steps of 0.25 ms by less than 1e-6. Behind a motor the steps are finer, because the back-EMF is held
-/// in each.
+/// The rig's run at rest for `duration_s`, with integration steps of at most 1 ms: on the fastest rig a run then
+/// differs from one with steps of 0.25 ms by less than 1e-6. With a motor the steps are finer, because the back-EMF is
+/// held in each.
 pub(crate) fn scenario(rig: &Rig, law: Law, duration_s: f64) -> Scenario {
     let steps = (rig.tick.period_s / 1e-3 - 1e-9).ceil().clamp(1.0, 1e4) as usize;
     let finer = if rig.actuator.motor.is_some() { 2 } else { 1 };
     Scenario { duration_s, substeps: finer * steps, ..Scenario::at_rest(rig, law) }
 }
 
-/// The rig at rest with the disturbances that its file expects, as the whole firmware is run: with two integration
+/// The rig at rest with the disturbances that its file expects, for runs of the whole firmware: with two integration
 /// steps per tick.
 pub fn at_rest_disturbed(rig: &Rig, law: Law, seed: u64) -> Scenario {
     let disturbance = Disturbance::of(rig);
@@ -251,7 +250,7 @@ pub(crate) fn chain<'a>(rig: &'a Rig, what: &'static str) -> Result<&'a Chain, U
     }
 }
 
-/// An error for a setting outside its range.
+/// Checks that a setting is within its range.
 pub(super) fn within(
     what: &'static str,
     value: f64,

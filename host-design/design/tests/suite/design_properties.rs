@@ -1,4 +1,4 @@
-//! Properties of every design: on random chains, against closed forms, and where there is no solution.
+//! Properties of designs: on random chains, against closed forms, and where there is no solution.
 
 use crate::plant_rigs::any_chain;
 use crate::published::{rig, rig_of};

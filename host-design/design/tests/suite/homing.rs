@@ -1,4 +1,4 @@
-//! Homing of links that hang and of links that swing out, with joints that stick.
+//! Homing of links that hang still and of links whose swinging decays, with joints that stick.
 
 use core::f64::consts::{PI, TAU};
 
@@ -15,24 +15,24 @@ use upright_design::harness::{Harness, with_firmware};
 use upright_design::rig::{PerJoint, Rig};
 use upright_design::simulate::Scenario;
 
-/// A machine, and what a person does with it from hanging on.
+/// A machine, and what a person does with it, starting from hanging.
 struct Case {
     rig: Rig,
-    /// Angle of the whole chain from hanging when it is let go, and the largest of each joint to it (rad).
+    /// Angle of the whole chain from hanging when it is let go, and the largest angle of each joint added to it (rad).
     lift_rad: [f64; 2],
-    /// Torque of a hand that pulls the outermost link to one side during 5 s, then not during 5 s, and so on (N·m).
+    /// Torque of a hand that pulls the outermost link to one side for 5 s, lets go for 5 s, and so on (N·m).
     pull_n_m: f64,
     longest_s: f64,
 }
 
-/// What became of it.
+/// Result of a run.
 #[derive(Debug)]
 struct Homed {
-    /// When homing was done; none if never (s).
+    /// Time at which homing was done (s); none if it never was.
     at_s: Option<f64>,
     /// Largest error of a joint's zero (rad).
     error_rad: f64,
-    /// All reasons against homing before.
+    /// All reasons for which homing was refused before.
     refused: Inhibits,
 }
 
@@ -43,8 +43,8 @@ impl Case {
         Self { rig, lift_rad, pull_n_m: 0.0, longest_s: 60.0 }
     }
 
-    /// The links are let go; homing is asked for every 0.05 s until it is done. The counts of an encoder have any phase
-    /// to its zero.
+    /// Lets go of the links and requests homing every 0.05 s until it is done. The zero of each encoder is at a random
+    /// phase within a count.
     fn home(&self, seed: u64) -> Homed {
         let mut rig = self.rig.clone();
         let mut random = Pcg64::seed_from_u64(seed);
@@ -106,18 +106,18 @@ impl Case {
         let errors = (0..steps.len()).map(|joint| {
             let read = ((harness.bench.state()[2 + 2 * joint] + phases[joint]) / steps[joint]).round();
             let error = (f64::from(last.counts[joint + 1]) - read) * steps[joint] + phases[joint];
-            // A link may have turned over.
+            // A link may have made whole turns.
             error - (error / TAU).round() * TAU
         });
         errors.fold(0.0, |largest, error| f64::max(largest, error.abs()))
     }
 }
 
-/// Links that are let go near hanging, which stick at once, and links that swing out.
+/// Links that are let go near hanging and stick at once, and links that swing.
 const HANGS: [f64; 2] = [0.0, 0.01];
 const SWINGS: [f64; 2] = [0.5, 0.2];
 
-/// What became of runs that were homed.
+/// Errors of the runs that were homed.
 #[derive(Debug)]
 struct Errors {
     runs: usize,

@@ -12,7 +12,7 @@ use upright_design::rig::{PlantDescription, Rig};
 
 const FILE: &str = "../../rigs/double-quanser-dbpen.toml";
 
-/// The machine differs from the file in everything that is identified.
+/// A machine that differs from the file in everything that is identified.
 const REALITY: &str = "[reality]\njoint_friction_n_m = [1.5e-3, 1e-3]\ncart_friction_n = 0.2\n\
     homing_error_rad = [0.006, -0.004]\nrail_tilt_rad = 0.003\nlatency_s = 4e-4\ncart_mass_percent = 8\n\
     link_mass_percent = [-9, 7]\nlink_length_percent = [5, -8]\nlink_inertia_percent = [10, -10]\n";
@@ -65,7 +65,7 @@ fn the_parameters_of_a_double_pendulum_are_found_with_their_deviations() {
         assert!(error < most, "{kind:?}: {} instead of {wanted}", estimate.new);
         assert!(error < 4.0 * estimate.deviation, "{kind:?}: {error} with deviation {}", estimate.deviation);
     };
-    // Ratios of the shape are known much better than the common scale.
+    // The ratios that make up the shape are known much better than the common scale.
     let ratio = |one: Kind, other: Kind| of(one).new / of(other).new;
     let shape = ratio(Kind::FirstMoment(0), Kind::FirstMoment(1)) / (constants.a[0] / constants.a[1]);
     assert!((shape - 1.0).abs() < 1e-3, "{shape}");
@@ -78,11 +78,11 @@ fn the_parameters_of_a_double_pendulum_are_found_with_their_deviations() {
     }
     within(Kind::TotalMass, constants.total_mass, 0.02 * constants.total_mass);
     within(Kind::Tilt, 0.003, 0.001);
-    // The old file predicts what was held out ten times worse.
+    // The old file predicts the held-out samples at least five times worse.
     for channel in &found.channels {
         assert!(channel.held_out[0] > 5.0 * channel.held_out[1], "{channel:?}");
     }
-    // A mass of its own for each link, and the moments as found.
+    // The masses that were chosen add up to the total mass that was identified.
     let realised = found.realised.unwrap();
     let total: f64 = realised.cart_kg + realised.links.iter().map(|link| link.mass_kg).sum::<f64>();
     assert!((total - of_total(&found.estimates)).abs() < 1e-9);

@@ -1,4 +1,4 @@
-//! Machines that differ from their file, and how many intervals cover the truth.
+//! Machines that differ from their file, and how many of the stated intervals cover the truth.
 
 use std::path::Path;
 
@@ -29,7 +29,7 @@ fn a_machine_is_the_same_every_time_and_within_what_is_stated() {
     }
     assert_eq!(draw(10.0, 3), draw(10.0, 3));
     assert_ne!(draw(10.0, 3).rig, draw(10.0, 4).rig);
-    // With a file that has the masses right.
+    // The file has the right masses and lengths here.
     let exact = draw(0.0, 3);
     assert_eq!(exact.truth(Kind::Length(1)), Some(0.419));
     assert!((exact.truth(Kind::TotalMass).unwrap() - 6.367).abs() < 1e-9);
@@ -56,7 +56,7 @@ fn intervals_that_cover_the_truth_are_counted() {
     assert!(outside >= 7, "{outside} of {}: {one:?}", one.missed.len());
 }
 
-/// Numbers with an interval, and those that are covered.
+/// How many numbers have an interval, and how many of these intervals cover the truth.
 fn count(row: &upright_design::identify::CoverageRow) -> (usize, usize) {
     row.covered.map_or((0, 0), |covered| (row.count, covered))
 }

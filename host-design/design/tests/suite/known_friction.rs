@@ -1,4 +1,4 @@
-//! Known friction in `[friction]`: what it compensates, what it leaves as it was, and what is refused.
+//! Known friction in `[friction]`: what is compensated, what stays unchanged, and what is refused.
 
 use std::path::Path;
 

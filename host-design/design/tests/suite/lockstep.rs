@@ -1,4 +1,4 @@
-//! Runs in lockstep have the bits of runs alone.
+//! A run in lockstep with others gives the same bits as the run alone.
 
 use std::time::Instant;
 
@@ -67,7 +67,7 @@ fn every_lane_has_the_bits_of_the_run_alone_and_one_that_falls_makes_room() {
 
 #[test]
 fn another_disturbance_in_one_lane_changes_that_lane_only() {
-    // Negative control: a difference is seen, in its own lane.
+    // Negative control: a difference is noticed, in its own lane only.
     let rig = rig("quadruple-paper");
     let table = table(&rig);
     let mut cases = random_plants(&rig, LANES as u64, 0.05);
@@ -87,7 +87,7 @@ fn what_cannot_be_in_lockstep_runs_alone_with_the_same_bits() {
     cases[3].1.substeps = 3;
     cases[4].0.reality.driver.latency_s = 1e-4;
     assert!(in_lockstep(&table(&quadruple), &cases) == alone(&table(&quadruple), &cases));
-    // What only changes sensors and parameters is in lockstep.
+    // Imperfections of sensors and parameters alone run in lockstep.
     let mut cases = random_plants(&quadruple, 5, 0.1);
     cases[1].0.reality.sensors.homing_error_rad = PerJoint::all(1e-3);
     cases[2].0.reality.parameters.link_mass_percent = PerJoint::all(3.0);
@@ -134,7 +134,7 @@ fn lanes_have_the_bits_of_a_plant_beyond_the_range_of_the_fast_sine_and_with_nan
 fn how_fast_the_whole_loop_is_alone_and_in_lockstep() {
     let rig = rig("quadruple-paper");
     let table = table(&rig);
-    // Short runs, so that some are not interrupted by other programs.
+    // Short runs, so that some of them are not interrupted by other programs.
     let spread = Spread { duration_s: 0.5, ..Spread::of(&rig) };
     let cases: Vec<_> = (0..LANES as u64).map(|seed| sample(&rig, Law::Lqr, &spread, seed)).collect();
     let simulated_s: f64 = cases.iter().map(|(_, scenario)| scenario.duration_s).sum();

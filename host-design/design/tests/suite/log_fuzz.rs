@@ -1,4 +1,4 @@
-//! The inputs of the fuzzer of logs, run without it: see `.ci/fuzz`.
+//! The corpus of the log fuzzer, checked without the fuzzer: see `.ci/fuzz`.
 
 /// The same check that the fuzzer runs.
 #[path = "../../../../fuzz/checks/log.rs"]

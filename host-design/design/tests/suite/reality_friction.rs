@@ -1,4 +1,4 @@
-//! Dry friction against what is known of it.
+//! Dry friction, compared with known results.
 
 use crate::plant_rigs::{chain, rod, unequal_rods};
 use core::f64::consts::PI;
@@ -44,8 +44,8 @@ fn block_on_incline(friction_n: f64) -> Box<dyn Plant> {
 #[test]
 fn a_block_on_an_incline_sticks_for_minutes_or_slides_as_in_the_textbook() {
     let pull_n = 2.0 * 9.81 * 0.1f64.sin();
-    // The spring of the contact is loaded suddenly: it swings to twice its deflection, and with 1.01 the block slips
-    // before it sticks.
+    // The spring of the contact is loaded suddenly and overshoots to twice its deflection, so with a factor of 1.01
+    // the block slips before it sticks.
     for (factor, slip_m, creep_m) in [(3.0, 5e-5, 1e-20), (1.01, 5e-3, 1e-15)] {
         let mut stuck = block_on_incline(factor * pull_n);
         stuck.advance(0.0, &[0.0], 20.0, 20_000);
@@ -63,7 +63,7 @@ fn a_block_on_an_incline_sticks_for_minutes_or_slides_as_in_the_textbook() {
     assert!((acceleration + 0.25 * pull_n).abs() < 1e-9, "{acceleration}");
 }
 
-/// A pendulum whose cart is too heavy to move, hanging and let go at `angle`: its turning points (rad, from hanging).
+/// Turning points (rad, from hanging) of a pendulum that is let go at `angle`; its cart is too heavy to move.
 fn turning_points(friction_n_m: f64, angle: f64, count: usize) -> Vec<f64> {
     let mut reality = joint_friction(friction_n_m);
     reality.friction.presliding_rad = 1e-5;
@@ -135,8 +135,7 @@ fn any_reality() -> impl Strategy<Value = Reality> {
     })
 }
 
-/// Energy at the start, and the largest gain in 1 ms during 0.3 s, both as shares of the energy between upright and
-/// hanging.
+/// Largest gain of energy in 1 ms during 0.3 s, as a share of the energy between upright and hanging.
 fn largest_gain(chain: &Chain, reality: &Reality, start: &[f64]) -> f64 {
     let range = 2.0 * chain_plant(chain).unwrap().energy().unwrap().total();
     let mut plant = machine(chain, reality.clone());
@@ -154,7 +153,7 @@ fn largest_gain(chain: &Chain, reality: &Reality, start: &[f64]) -> f64 {
 
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(48))]
-    /// Up to the error of the integration, which the plant without friction has as well.
+    /// Energy is lost except for the error of the integration, which the plant without friction has as well.
     #[test]
     fn energy_is_only_ever_lost(
         reality in any_reality(), links in 1..5usize, start in prop::collection::vec(-2.0..2.0f64, 10),
@@ -165,7 +164,7 @@ proptest! {
     }
 }
 
-/// Where two links with dry friction are after 3 s, with steps shorter than derived by the factor `divisor`.
+/// State of two links with dry friction after 3 s, with steps shorter than the derived ones by the factor `divisor`.
 fn end_of_swing(reality: &Reality, divisor: f64) -> Vec<f64> {
     let chain = unequal_rods(2);
     let plant = RealChain::<2>::new(&chain, &rig_of(chain.clone(), reality.clone())).unwrap();

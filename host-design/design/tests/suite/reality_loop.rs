@@ -1,4 +1,4 @@
-//! The loop on a machine as it really is.
+//! The loop on a machine with imperfections.
 
 use std::path::Path;
 
@@ -20,7 +20,7 @@ fn load(name: &str) -> (Rig, TableValues) {
     (rig, table)
 }
 
-/// The first link leans by `angle` (rad).
+/// A start at which the first link leans by `angle` (rad).
 fn leaning(rig: &Rig, angle: f64) -> Vec<f64> {
     let mut start = vec![0.0; rig.states()];
     start[2] = angle;
@@ -94,8 +94,9 @@ fn response(a: &Matrix<f64>, torque: &Matrix<f64>, w: f64) -> [f64; 2] {
     [x[(3, 0)], x[(s + 3, 0)]]
 }
 
-/// Swing (rad, peak to peak) of the limit cycle that the describing function of Coulomb friction, 4 F / (π A), predicts
-/// (Gelb & Vander Velde, *Multiple-Input Describing Functions*, 1968, §2.3): where the response is real and negative.
+/// Swing (rad, peak to peak) of the limit cycle that the describing function of Coulomb friction, 4 F / (π A),
+/// predicts at the frequency at which the response is real and negative (Gelb & Vander Velde, *Multiple-Input
+/// Describing Functions*, 1968, §2.3).
 fn predicted_swing(rig: &Rig, law: Law, friction: f64) -> f64 {
     let PlantDescription::Chain(chain) = &rig.plant else { panic!("a chain") };
     let model = linearise(&ChainParameters::<f64>::of(chain), Equilibrium::UPRIGHT).unwrap();
@@ -115,7 +116,7 @@ fn predicted_swing(rig: &Rig, law: Law, friction: f64) -> f64 {
     2.0 * (4.0 * friction / core::f64::consts::PI) * at(w)[0].abs() / w
 }
 
-/// The single pendulum without motor and encoders: what is left is the law, the tick, and what a test adds.
+/// The single pendulum without motor and encoders: only the law, the tick, and what a test adds have an effect.
 fn bare_single() -> (Rig, TableValues) {
     let (mut rig, _) = load("single-quanser-ip02");
     rig.actuator.motor = None;
@@ -133,7 +134,7 @@ fn the_limit_cycle_of_the_single_pendulum_is_that_of_the_describing_function() {
             rig.reality.friction.presliding_rad = 1e-5;
             let found = swing(&rig, &table, law, 1, 60.0).unwrap();
             let predicted = predicted_swing(&rig, law, friction);
-            // The describing function leaves out the harmonics, which this loop hardly filters in pole placement.
+            // The describing function neglects the harmonics, which the loop with pole placement hardly filters.
             let error = (found / predicted - 1.0).abs();
             let tolerance = if law == Law::Lqr { 0.06 } else { 0.25 };
             assert!(error < tolerance, "{law} {friction}: {found} rad, predicted {predicted}");
@@ -154,9 +155,9 @@ fn resting_position(rig: &Rig, table: &TableValues) -> f64 {
     sum / ticks
 }
 
-/// Where the cart rests if the first joint is measured wrong by `error` (rad), with the LQR (m). The links are upright
-/// and the force is zero. The observer, which knows only the measurement y, settles at
-/// `x̂ = (I - (I - L C) Ad)⁻¹ L y`, and `K x̂ = 0` gives the position in y.
+/// Position (m) at which the cart rests with the LQR if the first joint is measured wrong by `error` (rad). The links
+/// are upright and the force is zero. The observer, which knows only the measurement y, settles at
+/// `x̂ = (I - (I - L C) Ad)⁻¹ L y`, and `K x̂ = 0` determines the position in y.
 fn rest_with_wrong_zero(rig: &Rig, error: f64) -> f64 {
     let design = &certified(rig).double;
     let (l, k) = (&design.kalman.as_ref().unwrap().l_filter, &design.sampled.lqr.as_ref().unwrap().k);
@@ -177,7 +178,7 @@ fn a_wrong_zero_moves_the_cart_by_what_the_gains_say() {
     for (zero, amplitude, phase) in [(0.005, 0.0, 0.0), (0.0, 0.0025, core::f64::consts::FRAC_PI_2)] {
         let mut real = rig.clone();
         real.reality.sensors.homing_error_rad = PerJoint::all(zero);
-        // Homed hanging, an eccentric disk is off by twice its amplitude when upright.
+        // If the link was homed hanging, an eccentric disk is off by twice its amplitude when upright.
         real.reality.sensors.eccentricity_rad = PerJoint::all(amplitude);
         real.reality.sensors.eccentricity_phase_rad = PerJoint::all(phase);
         let simulated = resting_position(&real, &table);
@@ -202,7 +203,7 @@ fn a_tilted_rail_moves_the_cart_by_what_the_gains_say() {
     assert!((tilted / downhill - 1.0).abs() < 1e-3, "{tilted} {downhill}");
 }
 
-/// Every state in every tick of 2 s from a lean of the first link.
+/// Every state in every tick of a run of 2 s, in which the first link leans at the start.
 fn path(rig: &Rig, table: &TableValues) -> Vec<f64> {
     let scenario =
         Scenario { duration_s: 2.0, start: leaning(rig, 0.05), ..Scenario::at_rest(rig, Law::Lqr) };
@@ -301,7 +302,7 @@ fn a_required_size_is_run_and_one_that_topples_the_loop_is_found() {
     rig.verify.driver_lag_s = Some(2e-4);
     rig.verify.joint_friction_n_m = Some(2e-5);
     assert_eq!(stood(&rig), [("joint_friction_n_m", 2e-5, 2), ("driver_lag_s", 2e-4, 2)]);
-    // Negative control: twice what the loop stands.
+    // Negative control: more friction than the loop withstands.
     rig.verify.joint_friction_n_m = Some(3e-4);
     assert_eq!(stood(&rig)[0], ("joint_friction_n_m", 3e-4, 0));
 }

@@ -265,7 +265,7 @@ fn the_table_has_every_key_of_every_rig_file() {
     assert!(TOP.keys().all(|key| key.name != "mass_kg"));
 }
 
-/// The shares stated in the table are those that the gain table is made with.
+/// The shares stated in the table of keys are those with which the gain table is made.
 #[test]
 fn shares_in_words_are_those_in_use() {
     let limits = SECTIONS.iter().find(|section| section.name == "limits").unwrap();

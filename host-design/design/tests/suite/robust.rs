@@ -1,4 +1,5 @@
-//! Gains for stated tolerances: what is chosen is what is written, and it stands what topples the file's own.
+//! Gains for stated tolerances: what is written is what was chosen, and it withstands what makes the file's own gains
+//! fall.
 
 use std::path::Path;
 
@@ -71,12 +72,12 @@ fn what_is_written_is_what_was_judged() {
     let chosen = rig(&written);
     assert_eq!((chosen.name.as_str(), chosen.robust.as_ref()), ("chosen", Some(&tolerances)));
     assert!(own.lines().filter(|line| line.starts_with('#')).all(|comment| written.contains(comment)));
-    // Designed anew from the text, the loops run as those that were judged, in every bit of every figure.
+    // Designed again from the text, the loops run as those that were judged, in every bit of every figure.
     let again = judged(&chosen, &tolerances, &settings);
     let before: Vec<Judgement> = choice.laws.iter().map(|chosen| chosen.judgement.clone()).collect();
     assert_eq!(again, before);
     assert!(before.iter().all(Judgement::stands));
-    // Negative control: another joint noise, other runs.
+    // Negative control: another joint noise leads to other runs.
     let mut other = chosen;
     other.kalman.as_mut().unwrap().joint_noise[0] *= 2.0;
     assert_ne!(judged(&other, &tolerances, &settings), before);

@@ -1,4 +1,5 @@
-//! `upright robust` on rigs that are not in the repository: it comes to an end, with a choice that stands or a reason.
+//! `upright robust` on rigs that are not in the repository: it ends with a choice that withstands the tolerances, or
+//! with a reason.
 
 use std::path::Path;
 use std::time::Instant;
@@ -10,7 +11,8 @@ use upright_design::numerics::{Complex, eigenvalues};
 use upright_design::rig::Rig;
 use upright_design::robust::{Choice, JudgeSettings, Judgement, RobustError, choose};
 
-/// Friction of a joint over the weight of a link times its length, for 1 to 5 links: about what such a chain stands.
+/// Friction of a joint over the weight of a link times its length, for 1 to 5 links: about what such a chain
+/// withstands.
 const FRICTION: [f64; 5] = [4e-3, 4e-4, 1e-4, 3e-5, 1e-5];
 
 struct Random(Pcg64);
@@ -80,7 +82,7 @@ fn rig(text: &str) -> Rig {
     Rig::from_toml(text, Path::new("generated.toml")).unwrap()
 }
 
-/// What comes of it, with the friction of the file times `friction`: a choice that stands, or the reason, which has a
+/// The outcome with the friction of the file times `friction`: a choice that stands, or the reason, which contains a
 /// number.
 fn outcome(text: &str, friction: f64) -> Result<Choice, String> {
     let rig = rig(text);
@@ -116,7 +118,8 @@ fn a_generated_rig_gets_a_choice_or_a_reason() {
     assert!(reason.contains("loops stands friction"), "{reason}");
 }
 
-/// All ten, and those with ten times the friction. Writes them beside the other files of the tests, for the command.
+/// All ten rigs, each also with ten times the friction. Writes their files to the folder for temporary files of tests,
+/// so that the command can be tried on them.
 #[test]
 #[ignore = "takes minutes"]
 fn every_generated_rig_gets_a_choice_or_a_reason() {

@@ -65,7 +65,7 @@ fn machines_of_a_study_are_within_the_tolerances_and_their_alarms_are_counted() 
     let found = count(&tolerating);
     assert_eq!((found.runs, found.alarms.len()), (2, 0), "{found:?}");
     assert!((found.hours * 3600.0 - 10.0).abs() < 0.1, "{found:?}");
-    // Negative control.
+    // Negative control: disturbances so large that every run ends with an alarm.
     let mut rough = tolerating;
     rough.verify.force_rms_n = Some(20.0);
     let found = count(&rough);
@@ -90,7 +90,8 @@ fn machines_at_the_corners_have_every_combination_of_wrong_masses_and_all_of_the
     }
 }
 
-/// The rig as machines of its tolerances: masses ±`percent` in every combination whose first bit is that of the cart.
+/// Machines at the corners of the tolerances: masses wrong by ±`percent` in every combination; the lowest bit of a
+/// machine's index is that of the cart.
 fn machines(name: &str, percent: f64, more: &str, tolerances: Option<Tolerances>) -> Vec<Rig> {
     let file = format!("{}/../../rigs/{name}.toml", env!("CARGO_MANIFEST_DIR"));
     let text = std::fs::read_to_string(&file).unwrap();
@@ -108,7 +109,7 @@ fn machines(name: &str, percent: f64, more: &str, tolerances: Option<Tolerances>
     (0..1u32 << parts).map(machine).collect()
 }
 
-/// Law, number of the machine, and what was found in `seconds` on each machine.
+/// Balances each machine with each law for `seconds`: law, index of the machine, and result.
 fn alarms(machines: &[Rig], seconds: f64) -> Vec<(Law, usize, Healthy)> {
     let all = Law::ALL.into_iter().flat_map(|law| (0..machines.len()).map(move |one| (law, one)));
     parallel::map(all, |(law, one)| (law, one, nominal(&machines[one], law, 1, seconds / 3600.0)))

@@ -1,4 +1,4 @@
-//! Every fault of encoders and motor turns the motor off before a link leaves its limit. Anything else does not.
+//! Every fault of encoders and motor turns the motor off before a link leaves its limit. Nothing else turns it off.
 
 use crate::published::table;
 use crate::supervised::{ALL_RIGS, balancing, cause, rejected, rig};
@@ -164,7 +164,7 @@ fn of_all(
     }
 }
 
-/// The motor went off in time, because of these tests and not because a link had left its limit.
+/// Checks that the motor went off in time, because the defect was detected and not because a link had left its limit.
 fn found_in_time(what: &str, rig: &Rig, _: Defect, outcome: &Outcome) {
     let (fault, _) = outcome.fault.unwrap_or_else(|| panic!("not found: {what}"));
     assert!(matches!(fault, Fault::Encoder | Fault::Frozen | Fault::Motor), "{what}");
@@ -173,7 +173,7 @@ fn found_in_time(what: &str, rig: &Rig, _: Defect, outcome: &Outcome) {
 
 #[test]
 fn a_frozen_encoder_is_found_long_before_a_link_leaves_its_limit() {
-    // The slightest motion may stay within a count for a while: then a frozen counter loses nothing yet.
+    // A very small motion may stay within a count for a while: until then a frozen counter makes no error.
     of_all(
         |sensors| (0..sensors).map(Defect::Frozen).collect(),
         3000,

@@ -1,4 +1,4 @@
-//! Swing-up: the stored motions of the rigs, in closed loop; and what must not pass.
+//! Swing-up: the stored motions of the rigs in closed loop, and what has to be refused.
 
 use crate::published::{designed, rig, rig_path, stored_motions, table};
 use upright_design::numerics::Matrix;
@@ -21,7 +21,7 @@ fn arrives(rig: &Rig, motions: &SwingUp, seed: u64, is_wrong: bool) -> bool {
     Script::of(rig, &table, seed, is_wrong).unwrap().run(&table).unwrap().arrived
 }
 
-/// `motions` holds each tick against the adaptive integrator, and each limit.
+/// `motions` checks each tick against the adaptive integrator, and each limit.
 #[test]
 fn every_stored_motion_obeys_the_equations_and_the_limits_and_arrives() {
     for name in RIGS {
@@ -43,7 +43,7 @@ fn stored_motions_give_the_same_bits_each_time_and_survive_their_file() {
     );
 }
 
-/// The end of the raising joins the gain that balances, so that the hand-over changes no law.
+/// The last gain of the raising is nearly the gain that balances, so that the hand-over does not change the law.
 #[test]
 fn the_last_gain_is_the_gain_that_balances() {
     for name in RIGS {
@@ -52,7 +52,7 @@ fn the_last_gain_is_the_gain_that_balances() {
         let last = &raise.k[raise.steps() - 1];
         let apart = (last - &balancing).largest_entry() / balancing.largest_entry();
         assert!(apart < 0.02, "{name}: {apart}");
-        // Not so on the way: the gain really changes along the motion.
+        // Negative control: along the motion the gain differs clearly.
         let farthest = raise.k.iter().map(|k| (k - &balancing).largest_entry()).fold(0.0, f64::max);
         assert!(farthest / balancing.largest_entry() > 0.2, "{name}: {farthest}");
     }
@@ -89,7 +89,7 @@ fn a_wrong_knot_spacing_is_refused_and_a_wrong_tick_falls() {
     assert_ne!(wrong, stored.to_json());
     let wrong: Stored = serde_json::from_str(&wrong).unwrap();
     assert!(motions(&rig, &wrong).is_err());
-    // Every second entry left out: the motion at twice its speed.
+    // Without every second entry, the motion runs at twice its speed.
     let good = stored_motions("single-quanser-ip02");
     let mut fast = good.clone();
     let raise = &mut fast.raise;
@@ -101,7 +101,8 @@ fn a_wrong_knot_spacing_is_refused_and_a_wrong_tick_falls() {
     assert!(!arrives(&rig, &fast, 1, false));
 }
 
-/// A motion that does not stand the errors asked for: the message says with which it would, and then it does.
+/// For a motion that does not withstand the required errors, the message says which smaller ones it would withstand,
+/// and with these it does.
 #[test]
 fn the_errors_that_a_fragile_motion_would_stand_are_told() {
     let (rig, stored) = rig_and_stored("single-quanser-ip02");
@@ -129,7 +130,7 @@ fn candidates_are_the_same_for_a_seed_and_fewer_runs_arrive_with_larger_errors()
     println!("{all:?}");
     assert!(!first.is_empty() && all.len() >= 2, "{}", all.len());
     assert_eq!(all[..first.len()], first);
-    // Seed 2 goes on where seed 1 has ended, with other runs.
+    // Seed 2 continues with the candidates after those of seed 1, and makes other runs.
     let durations = |some: &[Solved]| some.iter().map(|one| one.duration_s).collect::<Vec<_>>();
     assert_eq!(durations(&all[first.len()..]), durations(&second));
     let rules = rig.swing_up.as_mut().unwrap();

@@ -1,4 +1,4 @@
-//! The whole firmware raises and lowers the rigs, from encoders; and what it must not do.
+//! The whole firmware raises and lowers the rigs with encoders, and refuses what it must not do.
 
 use crate::published::{rig, stored_motions, table};
 use upright::control::actuator::Drive;
@@ -26,7 +26,7 @@ fn with_stored_motions(name: &'static str) -> (Rig, TableValues) {
     (rig, table)
 }
 
-/// Up, one second upright, down, and half a second after it, with the rig's disturbances.
+/// Up, one second upright, down, and half a second of hanging, with the rig's disturbances.
 fn scenario(rig: &Rig, table: &TableValues, seed: u64) -> Scenario {
     let mut scenario = up_and_down(rig, table, 1.0).unwrap();
     scenario.start[0] = 0.001;
@@ -55,7 +55,7 @@ fn reverse_gains(table: &mut TableValues) {
     raise.course[(states + 1) * knots..].iter_mut().for_each(|gain| *gain = -*gain);
 }
 
-/// The table of both motions fits into the flash that is left for it.
+/// The motions fit into the flash that is left for them.
 #[test]
 fn the_motions_of_four_links_take_at_most_45_kb() {
     let (_, table) = with_stored_motions("quadruple-paper");
@@ -90,7 +90,7 @@ fn a_motion_with_a_defect_is_refused_or_ends_with_the_motor_off() {
     assert!(matches!(swapped, Err(HarnessError::Table(TableError::RigHash))), "{swapped:?}");
 }
 
-/// What is wrong from the first tick of the motion on.
+/// A defect that is present from the first tick of the motion on.
 #[derive(Debug, Clone, Copy)]
 enum Wrong {
     Nothing,
@@ -101,7 +101,8 @@ enum Wrong {
     EncodersSwapped(usize),
 }
 
-/// Raises with `wrong`: the latched fault, and the largest angle of any link from hanging while the motor was on (rad).
+/// Raises the rig with the defect `wrong`; returns the latched fault, and the largest angle of any link from hanging
+/// while the motor was on (rad).
 fn raised_with(rig: &Rig, table: &TableValues, wrong: Wrong) -> (Option<Fault>, f64) {
     let mut scenario = scenario(rig, table, 3);
     scenario.counter_start = 0;
@@ -131,7 +132,7 @@ fn raised_with(rig: &Rig, table: &TableValues, wrong: Wrong) -> (Option<Fault>, 
             disturb(&mut inputs, &zero, wrong);
             output = harness.session.tick(&inputs).unwrap();
         }
-        // Until the fault is reported. The links must go on moving, or every encoder is frozen.
+        // Continue until the fault is reported. The links must keep moving, or every encoder would count as frozen.
         for _ in 0..2 {
             harness.bench.tick(output.drive);
             let inputs = harness.inputs();
@@ -142,7 +143,7 @@ fn raised_with(rig: &Rig, table: &TableValues, wrong: Wrong) -> (Option<Fault>, 
     .unwrap()
 }
 
-/// Makes the counters wrong, from their readings `zero` at the start on.
+/// Falsifies the counters relative to their readings `zero` at the start.
 fn disturb(inputs: &mut Pins, zero: &[u32], wrong: Wrong) {
     let width = |sensor: usize, raw: u32| if sensor == 0 { raw } else { raw & 0xffff };
     let moved = |inputs: &Pins, sensor: usize| inputs.raw_counts[sensor].wrapping_sub(zero[sensor]);
@@ -179,8 +180,8 @@ fn a_wrong_motor_or_encoder_is_found_before_the_links_have_left_the_lower_half()
     }
 }
 
-/// How many of three runs of the firmware of `table` stand and hang, with masses ±5 %, friction ±30 % and seeds from
-/// `base_seed` on.
+/// How many of three runs of the firmware of `table` are raised, and how many are lowered, with masses ±5 %, friction
+/// ±30 % and seeds from `base_seed` on.
 fn random_runs(name: &'static str, table: &TableValues, base_seed: u64) -> [usize; 2] {
     let condition = &Condition::all()[2];
     let found =
@@ -192,20 +193,20 @@ fn random_runs(name: &'static str, table: &TableValues, base_seed: u64) -> [usiz
 
 #[test]
 fn machines_that_the_law_brings_up_are_not_switched_off() {
-    // One of these leaves the usual limits of the rail while it is lowered (triple), or stands far from the set-point
-    // before that (quadruple).
+    // One of these machines leaves the usual limits of the rail while it is lowered (triple), or is far from its
+    // set-point before that (quadruple).
     let (triple, quadruple) = ("triple-glueck-eder-kugi", "quadruple-paper");
     assert_eq!(random_runs(quadruple, &with_stored_motions(quadruple).1, 4), [3, 3]);
     let mut table = with_stored_motions(triple).1;
     assert_eq!(random_runs(triple, &table, 10), [3, 3]);
-    // Negative control: with the limits of balancing it is switched off.
+    // Negative control: with the limits for balancing it is switched off.
     let usual = table.limits;
     let limits = &mut table.swing_up.as_mut().unwrap().limits;
     (limits.rail_m, limits.speed_m_per_s) = (usual.rail_m, usual.speed_m_per_s);
     assert_eq!(random_runs(triple, &table, 10), [3, 2]);
 }
 
-/// What the law brings up counts for nothing if the table's limits end it.
+/// A motion does not count as arrived if the law would bring it up but the table's limits end it.
 #[test]
 fn a_motion_that_the_supervisor_ends_has_not_arrived() {
     const RUNS: usize = 200;
@@ -223,7 +224,7 @@ fn a_motion_that_the_supervisor_ends_has_not_arrived() {
     limits.speed_m_per_s *= 0.5;
     let [raise, _] = arriving(&table);
     assert!(!is_enough(&raise), "{raise:?}");
-    // A rail on which the firmware does not begin.
+    // On this rail the firmware refuses to begin.
     table.limits.rail_m = [-0.2, 0.2];
     let [raise, _] = arriving(&table);
     assert_eq!((raise.stood, raise.runs), (0, RUNS));
@@ -276,7 +277,7 @@ fn a_hanging_link_may_be_pushed_hard_and_with_reversed_gains_not_at_all() {
     let (up, down) = (of(&table, Way::Up), of(&table, Way::Down));
     println!("{up:?}, {down:?}");
     assert!(up.iter().chain(&down).flatten().all(|&push| push > 0.1), "{up:?}, {down:?}");
-    // Hanging, it stands more than upright.
+    // A hanging link withstands a stronger push than an upright one.
     let is_less =
         |upright: [f64; 2], hanging: [f64; 2]| (0..2).all(|side| 1.5 * upright[side] < hanging[side]);
     assert!(is_less(up[2], up[0]) && is_less(down[0], down[2]), "{up:?}, {down:?}");

@@ -1,4 +1,4 @@
-//! The whole firmware brings double and triple from equilibrium to equilibrium; and what it must not do.
+//! The whole firmware brings double and triple from equilibrium to equilibrium, and refuses what it must not do.
 
 use std::sync::OnceLock;
 
@@ -42,7 +42,7 @@ fn way(name: &str) -> Way {
     Way::named(name, 2).unwrap()
 }
 
-/// The same table with these of its other motions only.
+/// `table` with only these of its motions between other equilibria.
 fn with_ways(table: &TableValues, ways: &[&str]) -> TableValues {
     let mut table = table.clone();
     let wanted: Vec<Way> = ways.iter().map(|name| way(name)).collect();
@@ -103,9 +103,9 @@ fn machines_with_wrong_masses_make_the_tour_and_with_reversed_gains_none_does() 
     assert_eq!(arrived(&table), [4, 4, 0, 0, 0]);
 }
 
-/// Raises the double, brings it to where its second link hangs, and holds it there until `then` ends the run, which is
-/// called after each tick with their number since then. `read` may change what the board reads, `then` what the motor
-/// is driven with.
+/// Raises the double, brings it to the equilibrium at which its second link hangs, and holds it there. `then` is
+/// called in each tick of holding with the number of ticks held, may change the drive of the motor, and ends the run
+/// by returning true. `read` may change what the board reads.
 fn hold(
     table: &TableValues,
     rig: &Rig,
@@ -135,16 +135,17 @@ fn hold(
     .unwrap();
 }
 
-/// Ticks of holding after which a defect begins, and for which somebody taps the cart then.
+/// Ticks of holding after which a defect begins, and ticks for which somebody then pushes the cart.
 const ONSET: usize = 500;
 const TAP: usize = 50;
 
-/// The table with few motions, to which the second link hangs and from there.
+/// The table with only the motions to and from the equilibrium at which the second link hangs.
 fn table_to_hold(table: &TableValues) -> TableValues {
     with_ways(table, &["uu-ud", "ud-uu", "ud-dd"])
 }
 
-/// The fault with which a defect ends the run, and ticks from the defect on; none if it does not within 3 s.
+/// The fault with which a defect ends the run, and the number of ticks since the defect began; none if there is no
+/// fault within 3000 ticks.
 fn ended(
     rig: &Rig,
     table: &TableValues,
@@ -196,7 +197,7 @@ fn where_a_link_hangs_a_defect_turns_the_motor_off() {
     let table = table_to_hold(&table);
     let as_asked = |_: &mut Drive| ();
     assert_eq!(ended(&rig, &table, |_, _| (), as_asked), None, "the negative control");
-    // The link that hangs hardly moves, so that its encoder may freeze unnoticed; but it may not jump.
+    // The hanging link hardly moves, so its encoder may freeze unnoticed; but a jump has to be noticed.
     for (sensor, most) in [(0, 3000), (1, 1000)] {
         let mut seen = 0;
         let frozen = |held: usize, pins: &mut Pins| {

@@ -1,4 +1,4 @@
-//! The linear half of the trust report, compared with the firmware and with its own claims.
+//! The linear half of the trust report: compared with the firmware, and checked for consistency.
 
 use std::path::Path;
 
@@ -12,7 +12,7 @@ use upright_design::simulate::{Scenario, simulate};
 use upright_design::table::{Gains, TableValues};
 use upright_design::verify::{LinearReport, LoopModel, linear};
 
-/// A pendulum of 0.3 m on a cart, as a `[model]`. Its encoder steps are so fine that only the law has an effect.
+/// A pendulum of 0.3 m on a cart, as a `[model]`. Its encoder steps are so fine that their rounding hardly matters.
 const MODEL: &str = r#"
 name = "pendulum-model"
 [model]
@@ -99,7 +99,7 @@ fn the_model_of_the_loop_moves_as_the_firmware_does() {
         for law in [Law::Lqr, Law::PolePlacement] {
             let model = LoopModel::<f64>::as_it_runs(certified, &table, law).unwrap();
             let mut scenario = Scenario::at_rest(&rig, law);
-            // The links' counters have 16 bits: with a lean at the start, they would wrap at once.
+            // The counters of the links have 16 bits: with a link that leans at the start, they would wrap at once.
             scenario.start = vec![0.004, 0.0, 0.0, 0.0];
             scenario.duration_s = 3.0;
             let (trace, _) = simulate(&rig, &table, &scenario).unwrap();

@@ -1,4 +1,4 @@
-//! The imperfections that a machine may have, what is typical of each, and what to do about it.
+//! The imperfections that a machine may have, their typical sizes, and what to do about them.
 
 use serde::Serialize;
 
@@ -12,15 +12,15 @@ pub struct Imperfection {
     pub key: &'static str,
     /// Its unit.
     pub unit: &'static str,
-    /// What is typical of a carefully built machine, from a good one to a poor one.
+    /// Typical size in a carefully built machine, from a good one to a poor one.
     pub typical: [f64; 2],
-    /// Where that comes from.
+    /// Where the typical sizes come from.
     pub source: &'static str,
-    /// What to do about it.
+    /// How to make the imperfection smaller or harmless.
     pub remedy: &'static str,
-    /// The requirement that it can be part of, with the same key in `[verify]`.
+    /// The requirement that can be made for it, which has the same key in `[verify]`.
     pub requirement: &'static str,
-    /// The size that `[verify]` requires the loop to stand.
+    /// The size that the loop has to withstand according to `[verify]`.
     #[serde(skip)]
     pub(super) required: fn(&Requirements) -> Option<f64>,
     #[serde(skip)]
@@ -28,7 +28,7 @@ pub struct Imperfection {
 }
 
 impl Imperfection {
-    /// What is typical, for reading: `1e-4 to 0.001`.
+    /// The typical sizes as text: `1e-4 to 0.001`.
     pub fn typical_text(&self) -> String {
         let [good, poor] = self.typical.map(|size| significant(size, 2));
         format!("{good} to {poor}")

@@ -1,4 +1,4 @@
-//! Which imperfection of the machine topples the loop, and at what size: each one alone, beside what is typical.
+//! The sizes at which the imperfections of a machine, each one alone, make the loop fall, beside their typical sizes.
 
 mod catalogue;
 
@@ -16,12 +16,12 @@ use crate::table::TableValues;
 
 pub use catalogue::{IMPERFECTIONS, Imperfection};
 
-/// How the sizes are searched for.
+/// Settings of the search for the sizes.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct ImperfectionSettings {
-    /// Length of each run (s).
+    /// Duration of each run (s).
     pub duration_s: f64,
-    /// Runs that must all stand, with the seeds from 1.
+    /// Number of runs of each size, with the seeds from 1; all of them have to stand.
     pub seeds: u64,
     /// Disturbances of the runs.
     pub disturbance: Disturbance,
@@ -36,12 +36,12 @@ impl ImperfectionSettings {
     }
 }
 
-/// How runs of one size end.
+/// Results of the runs with one size.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Verdict {
-    /// Runs that stand.
+    /// Number of runs that stand.
     pub stand: u64,
-    /// Runs that stay within the supervisor's limits of angle and rail, so that the motor stays on.
+    /// Number of runs that stand within the supervisor's limits of angle and rail, so that the motor stays on.
     pub within_limits: u64,
     /// Largest angle of any link from the vertical in any run (rad).
     pub peak_angle_rad: f64,
@@ -49,29 +49,29 @@ pub struct Verdict {
     pub peak_position_m: f64,
 }
 
-/// What a law stands of one imperfection alone.
+/// How much of one imperfection alone a law withstands.
 #[derive(Debug, Clone, Serialize)]
 pub struct Standing {
-    /// Which one.
+    /// The imperfection.
     pub imperfection: &'static Imperfection,
-    /// Size from which a run falls; none: it stands the largest one tried.
+    /// Size from which a run falls; none: the law withstands the largest one tried.
     pub falls_at: Option<f64>,
     /// Size from which a link or the cart leaves the supervisor's limits, so that the motor is turned off; none: the
     /// largest one tried stays within.
     pub leaves_limits_at: Option<f64>,
     /// Largest size tried.
     pub largest_tried: f64,
-    /// The poor machine's size over the first of these sizes: above 1 it is dangerous.
+    /// Typical size in a poor machine over the smaller of both sizes: above 1 the imperfection is dangerous.
     pub danger: f64,
 }
 
 impl Standing {
-    /// [`Self::falls_at`] for reading.
+    /// [`Self::falls_at`] as text.
     pub fn falls_text(&self) -> String {
         self.size_text(self.falls_at)
     }
 
-    /// [`Self::leaves_limits_at`] for reading.
+    /// [`Self::leaves_limits_at`] as text.
     pub fn leaves_limits_text(&self) -> String {
         self.size_text(self.leaves_limits_at)
     }
@@ -81,20 +81,20 @@ impl Standing {
     }
 }
 
-/// What a law stands: each imperfection alone, the most dangerous one first, and those of the rig file together.
+/// What a law withstands: each imperfection alone, the most dangerous one first, and those of the rig file together.
 #[derive(Debug, Clone, Serialize)]
 pub struct Imperfections {
-    /// The law.
+    /// The law in the loop.
     pub law: Law,
-    /// How the sizes were searched for.
+    /// Settings of the search.
     pub settings: ImperfectionSettings,
-    /// Each alone.
+    /// Each imperfection alone.
     pub alone: Vec<Standing>,
-    /// All of the rig file's `[reality]` together; none without.
+    /// All imperfections of the rig file's `[reality]` together; none if it has none.
     pub together: Option<Verdict>,
 }
 
-/// A size that `[verify]` requires the loop to stand, and how it did.
+/// A size that the loop has to withstand according to `[verify]`, and the results of its runs.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct RequiredStanding {
     /// The key of the imperfection.
@@ -103,9 +103,9 @@ pub struct RequiredStanding {
     pub requirement: &'static str,
     /// The required size.
     pub size: f64,
-    /// Runs of this size.
+    /// Number of runs with this size.
     pub runs: u64,
-    /// How they ended.
+    /// Results of these runs.
     pub verdict: Verdict,
 }
 
@@ -141,7 +141,7 @@ pub fn imperfections(
     Ok(Imperfections { law, settings: *settings, alone, together })
 }
 
-/// How `law` stands the sizes that `[verify]` requires; nothing if it requires none.
+/// Runs `law` with the imperfections that it has to withstand according to `[verify]`; empty if there are none.
 ///
 /// # Errors
 /// As [`imperfections()`].
@@ -162,8 +162,8 @@ pub fn required_imperfections(
     Ok(IMPERFECTIONS.iter().filter_map(required).collect::<Result<_, SimulationError>>()?)
 }
 
-/// The limit cycle over the size of an imperfection: sizes below the one at which the loop falls, or below the largest
-/// one tried, each with its runs.
+/// The limit cycle as a function of the size of an imperfection: sizes below the one at which the loop falls, or below
+/// the largest one tried, each with the results of its runs.
 ///
 /// # Errors
 /// As [`imperfections()`].
@@ -223,14 +223,14 @@ impl Search<'_> {
         })
     }
 
-    /// All seeds on a machine with this imperfection alone.
+    /// Runs of all seeds on a machine with this imperfection alone.
     fn alone(&self, imperfection: &Imperfection, size: f64) -> Result<Verdict, SimulationError> {
         let mut reality = Reality::default();
         (imperfection.set)(&mut reality, size);
         self.verdict(reality)
     }
 
-    /// All seeds on a machine like this.
+    /// Runs of all seeds on a machine with these imperfections.
     fn verdict(&self, reality: Reality) -> Result<Verdict, SimulationError> {
         let real = Rig { reality, ..self.rig.clone() };
         let one = |seed: u64| {
@@ -260,10 +260,10 @@ impl Search<'_> {
     }
 }
 
-/// The first size that is not held: from `start` by factors of 4, up if it is held and down if not, then by bisection
-/// of the logarithm to within `relative`. None if even the largest is held; the smallest if that is not.
+/// The first size that does not hold: searched from `start` by factors of 4, up if it holds and down if not, then by
+/// bisection of the logarithm to within `relative`. None if even the largest holds; the smallest if that does not.
 ///
-/// Small plays and stiff belts take long to simulate, so the search does not begin with them.
+/// Small backlash and stiff belts take long to simulate, so the search does not begin with them.
 fn first<E>(
     [smallest, largest]: [f64; 2],
     start: f64,

@@ -1,5 +1,5 @@
-//! The trust report of one law as rows for reading. Text and page both show these, and the documentation is held
-//! against their names and meanings.
+//! The trust report of one law as rows of text. Both the text report and the page show them, and a test compares the
+//! documentation with their names and meanings.
 
 mod linear;
 mod runs;
@@ -11,14 +11,14 @@ use crate::rig::Rig;
 /// One quantity of the trust report.
 #[derive(Debug, Clone, Copy)]
 pub struct Quantity {
-    /// What a row is called, or how the names of its rows begin.
+    /// Name of its row, or beginning of the names of its rows.
     pub name: &'static str,
     /// What the value means.
     pub meaning: &'static str,
     values: Values,
 }
 
-/// How the text of a value is made.
+/// Function that makes the text of the values.
 #[derive(Debug, Clone, Copy)]
 enum Values {
     /// One row; none where the report does not have it.
@@ -30,7 +30,7 @@ enum Values {
 /// One row of the trust report.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Row {
-    /// Which quantity, with its link or source.
+    /// Name of the quantity, with its link or source.
     pub name: String,
     /// What was found, with its unit.
     pub value: String,

@@ -42,7 +42,7 @@ pub(crate) fn unequal_rods(n: usize) -> Chain {
     chain(0.8, (0..n).map(|i| rod(0.3 - 0.03 * i as f64, 0.2 + 0.05 * ((7 * i) % 3) as f64)).collect())
 }
 
-/// The same chain with friction in every bearing; a negative factor accelerates instead of braking.
+/// `chain` with friction in every bearing; a negative factor accelerates instead of braking.
 pub(crate) fn with_friction(mut chain: Chain, factor: f64) -> Chain {
     chain.cart.friction_n_s_per_m = 0.5 * factor;
     for link in &mut chain.links {

@@ -1,4 +1,4 @@
-//! The rig files of the repository.
+//! The rig files of the repository, with their designs, tables and motions, each made once for all tests.
 
 // Each test program uses only some of these.
 #![allow(dead_code)]
@@ -28,10 +28,10 @@ pub(crate) fn designed(name: &str) -> &'static Certified {
     certified(&rig(name))
 }
 
-/// What is made once for all tests, by what it is made from.
+/// Values that are made once for all tests, by the key that determines them.
 type Once<K, T> = Mutex<BTreeMap<K, &'static OnceLock<T>>>;
 
-/// What is known for `key`, or what `make` gives now. Tests that want something else meanwhile do not wait.
+/// The value known for `key`, or the one that `make` returns now. Tests that need another key do not wait meanwhile.
 fn once<K: Ord, T>(known: &Once<K, T>, key: K, make: impl FnOnce() -> T) -> &'static T {
     let place = *known.lock().unwrap().entry(key).or_insert_with(|| Box::leak(Box::default()));
     place.get_or_init(make)
