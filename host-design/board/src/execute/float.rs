@@ -70,9 +70,7 @@ impl Machine {
 
     fn only_default_modes(&self) -> Done {
         if self.registers.fpscr & MODES != 0 {
-            return Err(
-                Violation::NotModelled("floating point with modes other than the default").into()
-            );
+            return Err(Violation::NotModelled("floating point with modes other than the default").into());
         }
         Ok(())
     }
