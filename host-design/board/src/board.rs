@@ -99,7 +99,7 @@ pub struct Board {
     scheduled: BTreeMap<(Time, u64), Input>,
     order: u64,
     line_free_at: Time,
-    /// The chip's supply has been below the power-down threshold since the last release from brown-out.
+    /// The chip's supply has fallen below the power-down threshold: its next release from reset sets the power flag.
     power_lost: bool,
 }
 
@@ -269,7 +269,7 @@ impl Board {
         self.machine.bus.usart.sent.drain(..).collect()
     }
 
-    /// Accumulated times of the motor's outputs since power-on.
+    /// Times for which the motor's outputs have been high since power-on.
     pub fn driven(&mut self) -> Driven {
         self.machine.bus.settle_output();
         self.machine.bus.driven

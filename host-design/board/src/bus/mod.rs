@@ -25,7 +25,7 @@ use crate::wiring::Wiring;
 /// Number of ports, A to I.
 pub(crate) const PORTS: usize = 9;
 
-/// Times for which the motor's outputs were on since power-on.
+/// Times for which the motor's outputs have been high since power-on.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Driven {
     /// Time with PWM high, enable high and direction high.

@@ -78,7 +78,7 @@ const ALL: [Row; 15] = [
         "cart-counts-wrong",
         What::CountsWrong,
         0,
-        "the cart's encoder counts twice as many as it should",
+        "the cart's encoder yields twice the expected counts",
         Step::Homing,
     ),
     (
@@ -113,7 +113,7 @@ const ALL: [Row; 15] = [
         "counts-wrong",
         What::CountsWrong,
         1,
-        "the encoder of link 1 counts twice as many as it should",
+        "the encoder of link 1 yields twice the expected counts",
         Step::Turns,
     ),
     (

@@ -40,7 +40,7 @@ impl Step {
             "signs",
             "every encoder counts in the right direction, and is plugged in at its own place",
         ),
-        (Step::Turns, "turns", "every link's encoder counts as many per turn as the file says"),
+        (Step::Turns, "turns", "the counts per turn of every link's encoder are those of the file"),
         (Step::Motor, "motor", "the motor moves the cart, and in the right direction"),
         (Step::Excitation, "excitation", "the log of the machine, shaken while its links hang"),
         (
