@@ -1,4 +1,4 @@
-//! The board as a host drives it.
+//! The board's interface to the host program: inputs, running, outputs.
 
 use std::collections::BTreeMap;
 
@@ -15,101 +15,101 @@ use crate::peripherals::rcc::{BROWN_OUT_FLAG, Crystal, PIN_FLAG, POWER_FLAG, SOF
 use crate::peripherals::usart::LineByte;
 use crate::wiring::{Pin, Wiring};
 
-/// Reserved space below the SRAM that the firmware's MPU region covers.
+/// Size of the reserved space below the SRAM that the firmware's MPU region covers.
 const BELOW_SRAM_BYTES: usize = 64 << 10;
 
-/// What can happen to a board.
+/// A change outside the chip, or an injected fault: applied by [`Board::apply`] or scheduled by [`Board::at`].
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Input {
-    /// A pin is connected to something else.
+    /// An external level is applied to a pin, or removed from it.
     Level(Pin, Wire),
-    /// Supply of the motor (V).
+    /// Supply voltage of the motor (V), which the converter measures through the divider.
     Supply(f32),
-    /// Supply of the chip (V).
+    /// Supply voltage of the chip (V).
     ChipSupply(f32),
-    /// An encoder turns to `position` (edges) until `end`.
+    /// An encoder turns at constant speed so that it reaches `position` at `end`.
     Encoder {
-        /// Number among [`Wiring::encoders`].
+        /// Index into [`Wiring::encoders`].
         encoder: usize,
-        /// Where to.
+        /// Target position (edges).
         position: i64,
-        /// When it is there.
+        /// Time at which the target position is reached.
         end: Time,
     },
-    /// The crystal stops swinging.
+    /// The crystal stops oscillating.
     StopCrystal,
-    /// The reset pin is held low, or let go.
+    /// The reset pin is held low (true) or released (false).
     Reset(bool),
-    /// A debugger halts the core, or lets it go on.
+    /// A debugger halts the core (true) or resumes it (false).
     Halt(bool),
     /// A debugger resets the chip (SYSRESETREQ).
     DebuggerReset,
-    /// The next write to this register is lost.
+    /// The next write to the register at this address is lost.
     LoseWrite(u32),
-    /// As [`Input::LoseWrite`], but reading gives what was written: for negative controls.
+    /// As [`Input::LoseWrite`], but reads of the register return the lost value: for negative controls.
     LoseWriteUnseen(u32),
-    /// The core stands still until this time, and everything else goes on.
+    /// The core is stalled until this time; peripherals keep running.
     Stall(Time),
-    /// The program counter changes, as by a defect inside the core.
+    /// The program counter jumps to this address, as a defect inside the core might make it do.
     Jump(u32),
-    /// The stack pointer changes, as after calls without end.
+    /// The stack pointer is set to this address, as after unbounded recursion.
     StackPointer(u32),
-    /// A bit of memory (flash, SRAM) changes.
+    /// A bit of memory (flash, SRAM) flips.
     FlipBit {
         /// Address of the byte.
         address: u32,
-        /// 0 to 7.
+        /// Number of the bit, 0 to 7.
         bit: u8,
     },
-    /// The watchdog counts, but no longer resets: for negative controls.
+    /// The watchdog runs but no longer resets the chip: for negative controls.
     IgnoreWatchdog,
     /// The break input is disconnected: for negative controls.
     IgnoreBreak,
-    /// The memory protection unit allows everything, and the 64 KiB below the SRAM answer like memory, as reserved
+    /// The memory protection unit allows every access, and the 64 KiB below the SRAM behave as memory, as reserved
     /// space may: for negative controls.
     IgnoreMpu,
 }
 
-/// What the power stage sees at its inputs now.
+/// Levels at the power stage's inputs, and the state of the PWM timer behind them, at one time.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct PowerStage {
-    /// Enable.
+    /// Level of the enable pin; high lets the power stage switch.
     pub enable: bool,
-    /// Direction; high drives along +x.
+    /// Level of the direction pin; high drives along +x.
     pub along: bool,
-    /// PWM.
+    /// Level of the timer's PWM output.
     pub pwm: bool,
-    /// Whether the timer may drive PWM (MOE).
+    /// Whether the timer may drive its PWM output (MOE).
     pub main_output: bool,
     /// Whether the PWM timer counts.
     pub runs: bool,
-    /// PWM period in timer clocks, as it is active now.
+    /// PWM period in timer clocks: the active value, not the preloaded one.
     pub period_clocks: u32,
-    /// Timer clocks of each period for which PWM is high, as they are active now.
+    /// Timer clocks per period with PWM high: by the active compare value, not the preloaded one.
     pub high_clocks: u32,
-    /// When the PWM timer was started the last time.
+    /// When the PWM timer was last started.
     pub started_at: Time,
 }
 
-/// A board with power.
+/// A virtual board after power-on, with its inputs to come.
 #[derive(Debug, Clone)]
 pub struct Board {
     machine: Machine,
-    /// By time, and by order within a time.
+    /// By time and, at equal times, in the order of scheduling.
     scheduled: BTreeMap<(Time, u64), Input>,
     order: u64,
     line_free_at: Time,
-    /// The chip's supply was below the power-down threshold.
+    /// The chip's supply has fallen below the power-down threshold: its next release from reset sets the power flag.
     power_lost: bool,
 }
 
 impl Conditions {
-    /// An STM32F405 with a crystal of 8 MHz and the standard wiring, everything as it typically is.
+    /// An STM32F405 with an 8 MHz crystal, the standard wiring and otherwise typical values.
     pub fn f405(seed: u64) -> Self {
         Self::typical(Chip::F405, seed)
     }
 
-    /// A chip with a crystal of 8 MHz and the standard wiring, everything as it typically is.
+    /// A chip with an 8 MHz crystal, the standard wiring and otherwise typical values.
     pub fn typical(chip: Chip, seed: u64) -> Self {
         Self {
             chip,
@@ -126,7 +126,7 @@ impl Conditions {
 }
 
 impl Board {
-    /// Switches power on: memory is random, the processor begins at the reset vector.
+    /// Switches power on: the contents of memory are random, and the processor starts at the reset vector.
     ///
     /// # Errors
     /// [`Stopped`] if the image has no usable vectors.
@@ -148,10 +148,10 @@ impl Board {
         self.machine.bus.now
     }
 
-    /// Runs until `end`, or until what the image does is not allowed.
+    /// Runs until `end`, and applies scheduled inputs at their times.
     ///
     /// # Errors
-    /// [`Stopped`]
+    /// [`Stopped`] at the first violation that ends the run.
     pub fn run_until(&mut self, end: Time) -> Result<(), Stopped> {
         while let Some((&(time, order), &input)) = self.scheduled.first_key_value() {
             if time > end {
@@ -164,13 +164,13 @@ impl Board {
         self.machine.run_until(end)
     }
 
-    /// Lets something happen at a time to come.
+    /// Schedules an input for a later time.
     pub fn at(&mut self, time: Time, input: Input) {
         self.order += 1;
         self.scheduled.insert((time, self.order), input);
     }
 
-    /// Lets something happen now.
+    /// Applies an input now.
     pub fn apply(&mut self, input: Input) {
         let machine = &mut self.machine;
         machine.watch.forget();
@@ -226,7 +226,7 @@ impl Board {
         }
     }
 
-    /// Holds the chip in reset, its outputs floating, or lets it go.
+    /// Holds the chip in reset with its outputs floating (`low`), or releases it; `flags` are the reset flags to set.
     fn hold(&mut self, low: bool, flags: u32) {
         self.machine.held = low;
         self.machine.bus.reset(flags);
@@ -251,7 +251,7 @@ impl Board {
         }
     }
 
-    /// Sends bytes to the board, one after the other, at a baud rate; gives the time of the end of the last one.
+    /// Sends bytes to the board, back to back, at a baud rate; returns the time at which the last one ends.
     pub fn send(&mut self, bytes: &[u8], baud: u32) -> Time {
         let bit = UNITS_PER_SECOND / Time::from(baud.max(1));
         let bus = &mut self.machine.bus;
@@ -269,13 +269,13 @@ impl Board {
         self.machine.bus.usart.sent.drain(..).collect()
     }
 
-    /// What the motor's pins have done since power-on.
+    /// Times for which the motor's outputs have been high since power-on.
     pub fn driven(&mut self) -> Driven {
         self.machine.bus.settle_output();
         self.machine.bus.driven
     }
 
-    /// What the power stage sees now.
+    /// Present levels at the power stage's inputs.
     pub fn power_stage(&mut self) -> PowerStage {
         let bus = &mut self.machine.bus;
         bus.settle_output();
@@ -291,27 +291,27 @@ impl Board {
         }
     }
 
-    /// Level of an output pin, such as a status LED's.
+    /// Level of a pin that is configured as an output, such as a status LED's; low if it is not.
     pub fn output(&self, pin: Pin) -> bool {
         self.machine.bus.output_level(pin)
     }
 
-    /// An aligned word of flash or SRAM.
+    /// The word at an aligned address in memory (flash, SRAM); `None` elsewhere.
     pub fn word(&self, address: u32) -> Option<u32> {
         self.machine.bus.read_memory(address, Unit::Word)
     }
 
-    /// Violations that the rules have let pass.
+    /// Violations that were noted instead of ending the run.
     pub fn notes(&self) -> &[Note] {
         &self.machine.bus.notes
     }
 
-    /// Instructions executed, and how many of them were skipped in waiting loops.
+    /// Number of instructions since power-on, and how many of them were skipped in waiting loops.
     pub fn instructions(&self) -> (u64, u64) {
         (self.machine.executed, self.machine.skipped)
     }
 
-    /// Resets since power-on.
+    /// Number of resets since power-on.
     pub fn resets(&self) -> u64 {
         self.machine.resets
     }
@@ -326,7 +326,7 @@ impl Board {
         self.machine.registers.pc
     }
 
-    /// Number of the exception that is handled; 0 for none.
+    /// Number of the active exception (IPSR); 0 in thread mode.
     pub fn exception(&self) -> u16 {
         self.machine.registers.ipsr
     }
@@ -341,7 +341,7 @@ impl Board {
         })
     }
 
-    /// When SysTick interrupts the next time; `None` if it does not run.
+    /// When SysTick next interrupts; `None` if it does not run or its interrupt is off.
     pub fn next_tick(&self) -> Option<Time> {
         self.machine.bus.system.next_tick()
     }
@@ -351,18 +351,18 @@ impl Board {
         crate::clock::frequency(self.machine.bus.hclk)
     }
 
-    /// Runs one instruction, or takes an exception; time passes at least by one unit.
+    /// Executes one instruction or takes one exception; time advances by at least one unit.
     ///
     /// # Errors
-    /// [`Stopped`]
+    /// [`Stopped`] at a violation that ends the run.
     pub fn step(&mut self) -> Result<(), Stopped> {
         self.run_until(self.now() + 1)
     }
 
-    /// Runs single instructions until the program counter has a value, or until `end`; gives whether it has.
+    /// Single-steps until the program counter equals `program_counter`, or until `end`; returns whether it does.
     ///
     /// # Errors
-    /// [`Stopped`]
+    /// [`Stopped`] at a violation that ends the run.
     pub fn run_to(&mut self, program_counter: u32, end: Time) -> Result<bool, Stopped> {
         while self.now() < end {
             self.step()?;
@@ -373,24 +373,24 @@ impl Board {
         Ok(false)
     }
 
-    /// Bytes that came while the one before was not yet fetched, edges that filters have swallowed.
+    /// Number of bytes lost to receive overruns, and of encoder edges suppressed by the timers' input filters.
     pub fn lost(&self) -> (u64, u64) {
         let bus = &self.machine.bus;
         (bus.usart.overruns, bus.encoders.iter().map(|encoder| encoder.lost).sum())
     }
 
-    /// Whether waiting loops are skipped ahead (they are, unless told otherwise); it makes no difference but speed.
+    /// Sets whether waiting loops are skipped (the default); this affects nothing but speed.
     pub fn skip_waiting(&mut self, skip: bool) {
         self.machine.skips = skip;
     }
 
-    /// Whether anything is still scheduled.
+    /// Time of the next scheduled input, if any.
     pub fn next_input(&self) -> Option<Time> {
         self.scheduled.first_key_value().map(|(&(time, _), _)| time).filter(|&time| time != NEVER)
     }
 }
 
-/// A violation at no address.
+/// A violation without place and time: both are 0.
 impl From<Violation> for Stopped {
     fn from(violation: Violation) -> Self {
         Stopped { violation, program_counter: 0, time: 0 }

@@ -1,6 +1,6 @@
-//! The chips, as data: where they differ.
+//! The supported chips, and the data in which they differ.
 
-/// A microcontroller.
+/// A microcontroller that the board can model.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Chip {
     /// STM32F405
@@ -36,17 +36,17 @@ impl Chip {
         }
     }
 
-    /// Fastest core clock (Hz), without over-drive for F446 (which is not modelled).
+    /// Highest core clock (Hz); that of the F446 is the one without over-drive, which is not modelled.
     pub fn fastest_hz(self) -> u32 {
         168_000_000
     }
 
-    /// Range of the PLL's input (Hz), with the margin of the datasheets.
+    /// Allowed range of the PLL's input frequency (Hz), with the margin of the datasheets.
     pub(crate) fn pll_input_hz(self) -> std::ops::RangeInclusive<u32> {
         950_000..=2_100_000
     }
 
-    /// Range of the PLL's oscillator (Hz).
+    /// Allowed range of the PLL's VCO frequency (Hz).
     pub(crate) fn vco_hz(self) -> std::ops::RangeInclusive<u32> {
         100_000_000..=432_000_000
     }

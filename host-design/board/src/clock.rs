@@ -4,13 +4,13 @@
 /// 525 MHz are whole numbers of it. A run of twenty years fits.
 pub type Time = u64;
 
-/// Units per second.
+/// Units of [`Time`] per second.
 pub const UNITS_PER_SECOND: Time = 25_200_000_000;
 
-/// Units per microsecond.
+/// Units of [`Time`] per microsecond.
 pub const UNITS_PER_MICROSECOND: Time = UNITS_PER_SECOND / 1_000_000;
 
-/// Never.
+/// A time that is never reached.
 pub(crate) const NEVER: Time = Time::MAX;
 
 /// Period of a frequency in hertz, rounded to units.
@@ -23,7 +23,7 @@ pub(crate) fn frequency(period: Time) -> u32 {
     u32::try_from(UNITS_PER_SECOND / period.max(1)).unwrap_or(u32::MAX)
 }
 
-/// Time of a number of seconds.
+/// Converts seconds to [`Time`], rounded down to a whole unit.
 pub fn seconds(seconds: f64) -> Time {
     (seconds * UNITS_PER_SECOND as f64) as Time
 }

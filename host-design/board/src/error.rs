@@ -1,4 +1,4 @@
-//! Why a run ends.
+//! Violations that end a run, the rules for them, and the processor's own faults.
 
 use crate::clock::Time;
 
@@ -11,7 +11,7 @@ pub enum Violation {
     /// An instruction whose effect the architecture does not define.
     #[error("UNPREDICTABLE instruction {0:#x}")]
     Unpredictable(u32),
-    /// UDF or BKPT: the program says that it has no way on.
+    /// UDF or BKPT, by which a program declares that it cannot continue.
     #[error("the program executes UDF or BKPT")]
     Trap,
     /// Nothing is at this address.
@@ -20,37 +20,37 @@ pub enum Violation {
     /// A write to memory that cannot be written.
     #[error("{0:#010x} cannot be written")]
     ReadOnly(u32),
-    /// An address that is no multiple of the access's size.
+    /// An address that is not a multiple of the access's size.
     #[error("unaligned access to {0:#010x}")]
     Unaligned(u32),
     /// A register that the chip does not have, or that is not modelled.
     #[error("unknown register {0:#010x}")]
     UnknownRegister(u32),
-    /// A register accessed with a width that it does not have.
+    /// A register accessed with a width that it does not support.
     #[error("register {address:#010x} accessed with {bytes} bytes")]
     Width {
-        /// Of the access.
+        /// Address of the access.
         address: u32,
-        /// Its width.
+        /// Width of the access.
         bytes: u32,
     },
-    /// Reserved bits written with something else than their reset value.
+    /// Reserved bits written with a value other than their reset value.
     #[error("reserved bits {bits:#x} of register {address:#010x} written")]
     ReservedBits {
-        /// Of the register.
+        /// Address of the register.
         address: u32,
-        /// Which bits.
+        /// Mask of the bits concerned.
         bits: u32,
     },
     /// Ones written to bits that only hardware changes.
     #[error("read-only bits {bits:#x} of register {address:#010x} written with ones")]
     ReadOnlyBits {
-        /// Of the register.
+        /// Address of the register.
         address: u32,
-        /// Which bits.
+        /// Mask of the bits concerned.
         bits: u32,
     },
-    /// A peripheral whose clock is not enabled.
+    /// An access to a peripheral whose clock is not enabled.
     #[error("the peripheral at {0:#010x} has no clock")]
     NoClock(u32),
     /// A peripheral accessed too soon after its clock was enabled (ES0182, 2.1.13).
@@ -58,12 +58,12 @@ pub enum Violation {
         "the peripheral at {address:#010x} is accessed {cycles} cycles too early after its clock was enabled"
     )]
     Early {
-        /// Of the access.
+        /// Address of the access.
         address: u32,
-        /// Processor cycles that are missing.
+        /// Processor cycles still to wait before an access is allowed.
         cycles: u32,
     },
-    /// A clock above its limit.
+    /// A clock above its limit (Hz).
     #[error("a clock of {0} Hz is above its limit")]
     ClockTooFast(u32),
     /// Fewer wait states than the clock needs (RM0090, 3.5.1).
@@ -77,39 +77,39 @@ pub enum Violation {
     NotModelled(&'static str),
 }
 
-/// Where a run ended.
+/// Why, where and when a run ended.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[error("at program counter {program_counter:#010x}, {:.6} s after power-on: {violation}", *time as f64 / 25.2e9)]
 pub struct Stopped {
-    /// Why.
+    /// What ended the run.
     pub violation: Violation,
     /// Address of the instruction.
     pub program_counter: u32,
-    /// When.
+    /// Time since power-on.
     pub time: Time,
 }
 
-/// A violation that was let pass.
+/// A violation that was noted instead of ending the run, with its repetitions at the same instruction.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Note {
-    /// What, where, and when it happened first.
+    /// The violation, and the place and time of its first occurrence.
     pub stopped: Stopped,
-    /// How often.
+    /// Number of occurrences.
     pub count: u64,
 }
 
-/// What happens at violations that real hardware would let pass in one way or another.
+/// Treatment of a violation that real hardware tolerates in one way or another.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Rule {
     /// The run ends.
     Stop,
-    /// It is noted, and what the hardware most likely does happens.
+    /// It is noted, and the board does what the hardware most likely does.
     Note,
-    /// It is allowed.
+    /// It is neither an error nor noted.
     Allow,
 }
 
-/// Rules for the violations that hardware lets pass.
+/// Treatment of each kind of violation that hardware tolerates.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Rules {
     /// Reserved bits written.
@@ -118,9 +118,9 @@ pub struct Rules {
     pub read_only_bits: Rule,
     /// A peripheral accessed too early after its clock was enabled.
     pub early: Rule,
-    /// With `early` noted: whether a write that comes too early is lost.
+    /// Where `early` does not end the run: whether a write that comes too early is lost.
     pub early_is_lost: bool,
-    /// Unaligned accesses of one register to memory: the processor splits them, and compilers make use of that. All
+    /// Unaligned accesses of one register to memory: the processor splits them, and compilers rely on that. All
     /// others (to peripherals, of several words) end the run or fault.
     pub unaligned: Rule,
     /// Whether unmapped accesses, unknown instructions and UDF raise the processor's faults instead of ending the run.
@@ -128,7 +128,7 @@ pub struct Rules {
 }
 
 impl Rules {
-    /// Everything ends the run.
+    /// Every violation ends the run; unaligned accesses of one register to memory are allowed.
     pub const STRICT: Self = Self {
         reserved_bits: Rule::Stop,
         read_only_bits: Rule::Stop,
@@ -138,7 +138,7 @@ impl Rules {
         faults_are_taken: false,
     };
 
-    /// What hardware lets pass is noted.
+    /// What hardware tolerates is noted; unaligned accesses of one register to memory are allowed.
     pub const NOTED: Self = Self {
         reserved_bits: Rule::Note,
         read_only_bits: Rule::Note,
@@ -160,9 +160,9 @@ impl Default for Rules {
 pub(crate) enum Fault {
     /// A precise data bus error, at this address.
     Bus(u32),
-    /// The MPU refuses data at this address.
+    /// The MPU denies a data access to this address.
     MemoryData(u32),
-    /// The MPU refuses an instruction.
+    /// The MPU denies an instruction fetch.
     MemoryInstruction,
     /// An undefined instruction.
     UndefinedInstruction,
@@ -172,7 +172,7 @@ pub(crate) enum Fault {
     InvalidState,
     /// An unaligned LDM, LDRD or the like.
     Unaligned,
-    /// SVC, as an exception in sequence.
+    /// SVC: a synchronous exception, not a fault.
     Supervisor,
 }
 

@@ -1,4 +1,4 @@
-//! Images: what an ELF file puts into flash.
+//! Firmware images: the contents of flash that an ELF file defines.
 
 use std::sync::Arc;
 
@@ -6,7 +6,7 @@ use object::{Object, ObjectSymbol};
 
 use crate::lines::Lines;
 
-/// What is flashed.
+/// A firmware image: contents of flash, symbols and debug information.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Image {
     pub(crate) segments: Vec<(u32, Vec<u8>)>,
@@ -16,21 +16,21 @@ pub struct Image {
     file: Arc<[u8]>,
 }
 
-/// A file that is no image.
+/// Why a file is not an image for the chip.
 #[derive(Debug, thiserror::Error)]
 pub enum ImageError {
     /// Not an ELF file.
     #[error("not an ELF file: {0}")]
     Elf(#[from] object::read::Error),
-    /// Nothing of it goes to flash.
+    /// No part of the file is loaded into flash.
     #[error("the file puts nothing into flash at 0x0800_0000")]
     Empty,
-    /// Something of it goes elsewhere.
+    /// A part of the file is loaded outside flash.
     #[error("the file puts {bytes} bytes to {address:#010x}, where no flash is")]
     Outside {
-        /// Where.
+        /// Load address of that part.
         address: u64,
-        /// How many.
+        /// Its size in bytes.
         bytes: u64,
     },
 }
@@ -68,7 +68,7 @@ impl Image {
         Ok(Self { segments, symbols, file: bytes.into() })
     }
 
-    /// Code at the beginning of flash, as directed programs have it: two vectors, then instructions.
+    /// An image of raw bytes at the beginning of flash, vector table first, without symbols: for directed programs.
     pub fn from_flash(bytes: Vec<u8>) -> Self {
         Self { segments: vec![(0x0800_0000, bytes)], symbols: Vec::new(), file: Arc::default() }
     }
@@ -79,28 +79,28 @@ impl Image {
         self
     }
 
-    /// The way from addresses to the source; none if the file has no debug information that can be read.
+    /// Lookup from addresses to source lines; `None` if the file has no debug information that can be read.
     pub fn lines(&self) -> Option<Lines<'_>> {
         Lines::of(&self.file)
     }
 
-    /// File and line of the instruction at an address, where the debug information knows it.
+    /// File and line of the instruction at an address, if the debug information contains it.
     pub fn source_line(&self, address: u32) -> Option<String> {
         self.lines()?.line(address)
     }
 
-    /// Address of a symbol.
+    /// Address of the symbol with this (mangled) name.
     pub fn symbol(&self, name: &str) -> Option<u32> {
         self.symbols.iter().find(|(known, ..)| known == name).map(|&(_, address, _)| address)
     }
 
-    /// Where the first function or variable lies whose (mangled) name contains this.
+    /// Address range of the first function or variable whose (mangled) name contains `part_of_name`.
     pub fn object(&self, part_of_name: &str) -> Option<std::ops::Range<u32>> {
         let found = self.symbols.iter().find(|(name, _, bytes)| *bytes > 0 && name.contains(part_of_name));
         found.map(|&(_, address, bytes)| address..address + bytes)
     }
 
-    /// What flash holds up to the end of the image; what nothing is written to is erased.
+    /// Contents of flash up to the end of the image; gaps are erased (0xff).
     pub fn flash(&self) -> Vec<u8> {
         let mut flash = vec![0xff; self.end()];
         for (address, bytes) in &self.segments {
@@ -110,7 +110,7 @@ impl Image {
         flash
     }
 
-    /// Bytes of flash up to the end of the image.
+    /// Number of bytes from the beginning of flash to the end of the image.
     pub fn end(&self) -> usize {
         let end = |(address, bytes): &(u32, Vec<u8>)| (address & 0x00ff_ffff) as usize + bytes.len();
         self.segments.iter().map(end).max().unwrap_or(0)

@@ -1,7 +1,7 @@
-//! Instructions as the decoder gives them and the processor executes them.
+//! Decoded instructions, as the decoder returns them and the processor executes them.
 //!
-//! Names and operands follow the ARMv7-M Architecture Reference Manual (DDI 0403), chapter A7. The decoder computes
-//! addresses that depend on the program counter alone.
+//! Names and operands follow the ARMv7-M Architecture Reference Manual (DDI 0403), chapter A7. Addresses that depend
+//! on the program counter alone are computed by the decoder.
 
 /// Whether an instruction sets the flags.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -31,7 +31,7 @@ pub(crate) enum Alu {
     Mvn,
 }
 
-/// Data processing with flags alone.
+/// Data processing that only sets the flags.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Compare {
     Tst,
@@ -97,7 +97,7 @@ pub(crate) enum Extend {
     Bytes,
 }
 
-/// Operations of one register on another.
+/// Operations with one source register and one destination register.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Unary {
     Rev,
@@ -107,7 +107,7 @@ pub(crate) enum Unary {
     Clz,
 }
 
-/// What a parallel addition or subtraction does with the halves or bytes.
+/// Lanes of a parallel addition or subtraction, and which of them are added or subtracted.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Lanes {
     Add16,
@@ -118,7 +118,7 @@ pub(crate) enum Lanes {
     Sub8,
 }
 
-/// How a parallel addition or subtraction treats what does not fit.
+/// How a parallel addition or subtraction treats results that are out of range.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Prefix {
     Signed,
@@ -253,7 +253,7 @@ pub(crate) enum Special {
 /// One instruction.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Op {
-    /// Not yet looked at (of the cache).
+    /// An entry of the cache that is not yet decoded.
     Undecoded,
     Nop,
     /// WFI
@@ -387,7 +387,7 @@ pub(crate) enum Op {
         rn: u8,
         offset: u16,
     },
-    /// `ra` 15: without a summand.
+    /// `ra` 15: nothing is accumulated.
     Multiply {
         multiply: Multiply,
         sets: Sets,
@@ -439,7 +439,7 @@ pub(crate) enum Op {
         rn: u8,
         bits: u8,
     },
-    /// `rn` 15: without a summand.
+    /// `rn` 15: nothing is added.
     Extend {
         extend: Extend,
         rd: u8,
@@ -472,7 +472,7 @@ pub(crate) enum Op {
         rn: u8,
         rm: u8,
     },
-    /// USAD8, USADA8 (`ra` 15: without a summand)
+    /// USAD8, USADA8 (`ra` 15: nothing is accumulated)
     AbsoluteDifferences {
         rd: u8,
         rn: u8,
@@ -511,13 +511,13 @@ pub(crate) enum Op {
         d: u8,
         bits: u32,
     },
-    /// VCMP, VCMPE; without `m` against zero.
+    /// VCMP, VCMPE; `m` is `None` for a comparison with zero.
     FloatCompare {
         d: u8,
         m: Option<u8>,
         signal: bool,
     },
-    /// VMOV between a core register and a single.
+    /// VMOV between a core register and a single-precision register.
     FloatToCore {
         rt: u8,
         n: u8,
@@ -526,7 +526,7 @@ pub(crate) enum Op {
         n: u8,
         rt: u8,
     },
-    /// VMOV between two core registers and two singles in sequence.
+    /// VMOV between two core registers and two consecutive single-precision registers.
     FloatPairToCore {
         rt: u8,
         rt2: u8,

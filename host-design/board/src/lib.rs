@@ -1,9 +1,10 @@
 //! A virtual board with an STM32F405, STM32F407 or STM32F446: it runs the very ELF file that is flashed.
 //!
 //! A [`Board`] interprets the image's instructions against models of the registers that the firmware uses. It is
-//! strict: what the manuals do not allow, or what is not modelled, ends the run with a [`Stopped`] that says where and
-//! why.
-//! Inputs are edges, levels, volts and bytes at their baud rate; the output is what the pins do.
+//! strict: anything that the manuals forbid or that is not modelled ends the run with a [`Stopped`] that says where
+//! and why.
+//! Inputs are encoder edges, pin levels, supply voltages and serial bytes at their baud rate; outputs are pin levels
+//! and the bytes sent.
 //!
 //! ```no_run
 //! use upright_board::{Board, Conditions, Image, Input, Rules, Wire, pin, seconds};
@@ -22,22 +23,22 @@
 //! |---|---|
 //! | ARMv7E-M with FPv4-SP, exceptions, lazy stacking, MPU, SysTick, NVIC, DWT cycle counter | ARM DDI 0403 |
 //! | clock tree, clock security, reset flags, delays after enabling | 7.3; ES0182 2.1.13 |
-//! | flash wait states by supply, approximate accelerator; option bytes are read | 3.5, 3.9 |
+//! | flash wait states that depend on the supply, approximate accelerator; option bytes (read-only) | 3.5, 3.9 |
 //! | ports, external interrupts 0 to 15 and 16 (voltage detector) | 8.4, 12.3 |
-//! | TIM1 channel 1 or its complementary output: one pulse, repetition, preload, PWM, break, lock | 17.4 |
+//! | TIM1 channel 1 or its complementary output: one-pulse mode, repetition, preload, PWM, break, lock | 17.4 |
 //! | TIM2 to 5, TIM8: encoder mode 3 with filter | 18.4 |
-//! | TIM11: HSE against HSI | 19.5 |
+//! | TIM11: input capture, to measure HSE against HSI | 19.5 |
 //! | ADC1, single conversions; USART2 or USART3, whichever is wired; DMA1 between it and SRAM; IWDG | 13.13, 30.6, 10.5, 21.4 |
-//! | PWR with the voltage detector; brown-out reset at the level of the option bytes | 5.2.2, 5.4 |
-//! | DBGMCU: identity, and the watchdog while a debugger halts the core | 38.6, 38.16 |
+//! | PWR with the voltage detector; brown-out reset at the level set in the option bytes | 5.2.2, 5.4 |
+//! | DBGMCU: identity, and freezing of the watchdog while a debugger halts the core | 38.6, 38.16 |
 //!
 //! Not modelled, and an error if used: every other peripheral, other modes of these, rounding modes other than to
 //! nearest, sleep deeper than WFI, bit-banding, writing flash. The rise time of pull-ups, the over-drive of the F446,
-//! and what a supply that is too low for the clock does to the core are not modelled either.
+//! and the effect on the core of a supply too low for its clock are not modelled either.
 //!
 //! # What is approximate
-//! Cycles: ARM's table, with the flash accelerator looked up by address. DWT_CYCCNT counts during WFI, too. What is
-//! exact: every value, every flag, every exception, for given inputs at given times.
+//! Cycle counts: they follow ARM's table, with a direct-mapped model of the flash accelerator. DWT_CYCCNT also counts
+//! during WFI. Everything else is exact for given inputs at given times: every value, every flag, every exception.
 
 #![forbid(unsafe_code)]
 

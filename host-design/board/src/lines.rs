@@ -1,16 +1,16 @@
-//! From the address of an instruction to its source, by the debug information of an image.
+//! Lookup from the address of an instruction to its source, by the debug information of an image.
 
 use addr2line::Context;
 use addr2line::gimli::{Dwarf, EndianSlice, Error, LittleEndian, SectionId};
 use object::{Object, ObjectSection};
 
-/// The debug information of an image.
+/// Lookup from addresses to source lines and functions, by the debug information of an image.
 pub struct Lines<'a> {
     context: Context<EndianSlice<'a, LittleEndian>>,
 }
 
 impl<'a> Lines<'a> {
-    /// Of the bytes of an ELF file.
+    /// Reads the debug information of an ELF file, given by its bytes.
     pub(crate) fn of(file: &'a [u8]) -> Option<Self> {
         let elf = object::read::elf::ElfFile32::<object::Endianness>::parse(file).ok()?;
         let section = |id: SectionId| {
@@ -22,8 +22,8 @@ impl<'a> Lines<'a> {
         Some(Self { context })
     }
 
-    /// File and line of an instruction, as `src/main.rs:42`: in the program itself, if a library's function is inlined
-    /// there.
+    /// File and line of an instruction, as `src/main.rs:42`. If a library function is inlined there, this is the line
+    /// of the program's own code that it is inlined into.
     pub fn line(&self, address: u32) -> Option<String> {
         let mut frames = self.context.find_frames(address.into()).skip_all_loads().ok()?;
         let mut innermost = None;
@@ -40,8 +40,8 @@ impl<'a> Lines<'a> {
         innermost
     }
 
-    /// The functions that an instruction belongs to, by their linker's names: the innermost inlined one first, the one
-    /// that is called last.
+    /// Linker names of the functions that an instruction belongs to: first the innermost inlined one, last the one
+    /// that is not inlined.
     pub fn functions(&self, address: u32) -> Vec<String> {
         let Ok(mut frames) = self.context.find_frames(address.into()).skip_all_loads() else {
             return Vec::new();

@@ -1,4 +1,4 @@
-//! The processor at work: fetching, executing, taking exceptions.
+//! The processor's main loop: fetch, execution, exceptions, sleep.
 
 use crate::bus::Bus;
 use crate::clock::{NEVER, Time};
@@ -13,21 +13,22 @@ use crate::processor::waiting::Watch;
 
 pub(crate) const FLASH: u32 = 0x0800_0000;
 
-/// Core and everything it reaches.
+/// The core, and the bus with everything it can address.
 #[derive(Debug, Clone)]
 pub(crate) struct Machine {
     pub(crate) registers: Registers,
     pub(crate) bus: Bus,
-    /// Decoded flash, by half-words. The last one is for code elsewhere, decoded every time.
+    /// Decoded instructions, one entry per half-word of flash. The last entry is for code elsewhere, which is decoded
+    /// each time it executes.
     decoded: Vec<Instruction>,
     pub(crate) next: u32,
     pub(crate) cycles: u32,
     pub(crate) in_it: bool,
-    /// The instruction before was a load.
+    /// The previous instruction was a load.
     pub(crate) loaded: bool,
     pub(crate) asleep: bool,
     pub(crate) locked_up: bool,
-    /// The core stands still until then, and everything else goes on.
+    /// The core is stalled until this time; peripherals keep running.
     pub(crate) stalled_until: Time,
     /// Held in reset, or without power.
     pub(crate) held: bool,
@@ -43,7 +44,7 @@ pub(crate) struct Machine {
 }
 
 impl Machine {
-    /// Power on; `code_bytes` of flash are worth remembering decoded.
+    /// The state at power-on; instructions in the first `code_bytes` of flash are cached in decoded form.
     pub(crate) fn new(mut bus: Bus, code_bytes: usize) -> Self {
         let registers = Registers::after_reset(|| bus.random() as u32);
         let undecoded = Instruction { op: Op::Undecoded, length: 2 };
@@ -141,7 +142,7 @@ impl Machine {
         Ok(())
     }
 
-    /// Until something may happen beside the instructions.
+    /// Executes instructions until an exception or a peripheral event may be due, or until `end`.
     fn run_steps(&mut self, end: Time) -> Result<(), Violation> {
         loop {
             self.step()?;
@@ -164,7 +165,7 @@ impl Machine {
         deadline.clamp(self.bus.now + 1, end.max(self.bus.now + 1))
     }
 
-    /// WFI: whole clocks until something pends.
+    /// WFI or WFE: wakes if an exception or event is pending, else advances time to the next deadline in whole clocks.
     fn sleep(&mut self, end: Time) {
         if self.wakes() || std::mem::take(&mut self.event) {
             self.asleep = false;
@@ -210,7 +211,7 @@ impl Machine {
         Ok(())
     }
 
-    /// An instruction of an IT block.
+    /// Executes an instruction of an IT block if its condition holds.
     fn conditional(&mut self, op: Op, it: u8) -> Result<(), Trap> {
         let last = it & 15 == 8;
         let never =
@@ -245,7 +246,7 @@ impl Machine {
         self.decoded_at(pc).map(|place| self.decoded[place])
     }
 
-    /// The place among the decoded instructions of the one at an address.
+    /// Index in `decoded` of the instruction at an address.
     #[inline]
     fn decoded_at(&mut self, pc: u32) -> Result<usize, Trap> {
         if self.bus.system.mpu.enabled() && !self.allowed(pc, Purpose::Execute) {
@@ -339,7 +340,7 @@ impl Machine {
         self.bus.write_register(address, bytes, value)
     }
 
-    /// The core splits unaligned accesses to memory; to registers they fault.
+    /// The core splits unaligned accesses to memory; those to registers end the run.
     fn unaligned(&mut self, address: u32) -> Result<(), Trap> {
         let memory =
             matches!(address >> 24, 0x00 | 0x08 | 0x10 | 0x20) || self.bus.below_sram(address).is_some();

@@ -1,4 +1,4 @@
-//! Where the time of each tick goes, instruction by instruction.
+//! Measures where each tick spends its time, instruction by instruction.
 
 use crate::board::Board;
 use crate::clock::Time;
@@ -6,54 +6,54 @@ use crate::error::Stopped;
 use crate::machine::FLASH;
 use crate::processor::nvic;
 
-/// Number of the tick's interrupt among the exceptions.
+/// Exception number of SysTick, the tick's interrupt.
 const SYS_TICK: u16 = nvic::SYS_TICK as u16;
 
-/// A part of the tick.
+/// A part of the tick, in order of execution.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Part {
-    /// From the time at which the tick is due to the first input: the interrupt's entry.
+    /// From the time at which the tick is due to the first input: exception entry.
     Entry,
-    /// All inputs are read.
+    /// Reading of all inputs.
     Inputs,
     /// Supervisor and controller.
     Control,
-    /// The motor is driven.
+    /// Output to the motor.
     Output,
-    /// After the output: a command, telemetry, the prediction, checks of the table, the return.
+    /// After the output: a command, telemetry, the prediction, checks of the table, exception return.
     Rest,
 }
 
-/// Number of parts.
+/// Number of [`Part`]s.
 const PARTS: usize = 5;
 
-/// What the source says of an instruction; nothing if it belongs to whatever has called it.
+/// What an instruction is counted as, by its source; `None`: the same as the code that called it.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct Place {
-    /// Its part.
+    /// Part of the tick it is counted in.
     pub part: Option<Part>,
-    /// Whether it is in the controller.
+    /// Whether it is counted as controller code.
     pub controller: Option<bool>,
 }
 
-/// One tick.
+/// Times measured in one tick.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct TickCost {
-    /// From the time at which it is due to the restart of the motor's timer with its new duty; none with the motor
-    /// off.
+    /// From the time at which the tick is due to the restart of the motor's timer with its new duty; `None` with the
+    /// motor off.
     pub latency: Option<Time>,
-    /// By part.
+    /// Time in each [`Part`], in their order.
     pub parts: [Time; PARTS],
-    /// Of this, the controller: the control law with its estimate, and the prediction.
+    /// Share of these times spent in the controller: control law with estimate, and prediction.
     pub controller: Time,
-    /// From the time at which it is due to its end.
+    /// From the time at which the tick is due to its end.
     pub whole: Time,
 }
 
 /// Runs a board and measures its ticks.
 #[derive(Debug)]
 pub struct Meter {
-    /// By half-words of flash.
+    /// One per half-word of flash.
     places: Vec<Place>,
     running: Option<Running>,
     ticks: Vec<TickCost>,
@@ -68,7 +68,7 @@ struct Running {
 }
 
 impl Meter {
-    /// With the place of each half-word of flash; what is beyond belongs to whatever has called it.
+    /// A meter with one place per half-word of flash; code beyond the list is counted as its caller.
     pub fn new(places: Vec<Place>) -> Self {
         Self { places, running: None, ticks: Vec::new() }
     }
@@ -78,10 +78,10 @@ impl Meter {
         &self.ticks
     }
 
-    /// Runs until `end`; ticks are executed one instruction after the other.
+    /// Runs the board until `end`; ticks are single-stepped.
     ///
     /// # Errors
-    /// [`Stopped`]
+    /// [`Stopped`] at the first violation that ends the run.
     pub fn run(&mut self, board: &mut Board, end: Time) -> Result<(), Stopped> {
         while board.now() < end {
             let Some(running) = &mut self.running else {

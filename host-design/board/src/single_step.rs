@@ -1,23 +1,23 @@
-//! Single instructions on given states: for the comparison with another emulator.
+//! Execution of single instructions from given states, for comparison with another emulator.
 
 use crate::bus::{Bus, Conditions};
 use crate::error::{Rules, Stopped};
 use crate::machine::Machine;
 
-/// Registers as the comparison has them.
+/// The registers that are compared.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct State {
     /// R0 to R14 and the program counter.
     pub r: [u32; 16],
     /// Flags N, Z, C, V, Q (bits 31 to 27) and GE (19 to 16).
     pub apsr: u32,
-    /// The singles.
+    /// Single-precision registers S0 to S31, as bits.
     pub s: [u32; 32],
     /// FPSCR.
     pub fpscr: u32,
 }
 
-/// A processor in the middle of SRAM.
+/// A processor without program in flash, which executes what is written to SRAM.
 #[derive(Debug)]
 pub struct Stepper {
     machine: Machine,
@@ -30,23 +30,23 @@ impl Default for Stepper {
 }
 
 impl Stepper {
-    /// With the floating-point unit on, and unaligned accesses allowed.
+    /// With the floating-point unit enabled, and unaligned accesses of one register allowed.
     pub fn new() -> Self {
         let mut bus = Bus::new(&Conditions::f405(1), Rules::NOTED, &[]);
-        // CPACR, FPCCR without lazy stacking.
+        // CPACR: full access to the floating-point unit.
         let _ = bus.system.write(0xe000_ed88, 0x00f0_0000, 0, 1);
         bus.rules = Rules::NOTED;
         Self { machine: Machine::new(bus, 0) }
     }
 
-    /// Fills memory.
+    /// Writes bytes to memory.
     pub fn write(&mut self, address: u32, bytes: &[u8]) {
         for (i, &byte) in (0..).zip(bytes) {
             self.machine.bus.write_memory(address + i, crate::instruction::Unit::Byte, byte.into());
         }
     }
 
-    /// A part of memory.
+    /// Reads `length` bytes of memory.
     pub fn read(&self, address: u32, length: u32) -> Vec<u8> {
         (0..length)
             .map(|i| {
@@ -55,10 +55,10 @@ impl Stepper {
             .collect()
     }
 
-    /// Executes `count` instructions from a state.
+    /// Executes `count` instructions from a state; returns the state after them.
     ///
     /// # Errors
-    /// [`Stopped`] as a board would.
+    /// [`Stopped`] at a violation that ends the run of a board.
     pub fn run(&mut self, state: &State, count: u32) -> Result<State, Stopped> {
         let machine = &mut self.machine;
         machine.bus.notes.clear();

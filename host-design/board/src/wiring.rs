@@ -1,6 +1,6 @@
 //! What is connected to the microcontroller.
 
-/// A pin.
+/// A pin of the chip, by port and number; made by [`pin`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Pin {
     /// Number of the port; A is 0.
@@ -36,15 +36,15 @@ pub struct Wiring {
     pub limits: [Pin; 2],
     /// Output that is high while a tick runs.
     pub tick: Pin,
-    /// The serial line to the board; what comes from the board is at the same USART.
+    /// Receive pin (RX) of the serial line; the same USART transmits.
     pub receive: Pin,
-    /// Number of its USART: 2 or 3.
+    /// Number of the serial line's USART: 2 or 3.
     pub usart: u8,
-    /// Input of the converter that sees the supply.
+    /// Channel of the converter that measures the supply.
     pub supply_channel: usize,
-    /// Supply voltage over the voltage at that input.
+    /// Ratio of the divider: supply voltage over the voltage at that channel.
     pub supply_divider: f32,
-    /// Reference of the converter (V).
+    /// Reference voltage of the converter (V).
     pub reference_v: f32,
 }
 
@@ -58,7 +58,7 @@ const STANDARD_ENCODERS: [(Pin, Pin); 5] = [
 const FEATHER_ENCODERS: [(Pin, Pin); 2] = [(pin('C', 6), pin('C', 7)), (pin('B', 6), pin('B', 7))];
 
 impl Wiring {
-    /// The standard table of docs/board.md.
+    /// The standard wiring, tabulated in docs/board.md.
     pub const fn upright() -> &'static Self {
         const WIRING: Wiring = Wiring {
             encoders: &STANDARD_ENCODERS,
@@ -78,7 +78,7 @@ impl Wiring {
         &WIRING
     }
 
-    /// The table of the Feather in docs/board.md.
+    /// The wiring of the Feather, tabulated in docs/board.md.
     pub const fn feather() -> &'static Self {
         const WIRING: Wiring = Wiring {
             encoders: &FEATHER_ENCODERS,
@@ -128,9 +128,9 @@ pub(crate) const ENCODER_INPUTS: [(usize, usize, Pin, u32); 17] = [
 pub(crate) const BREAK_PINS: [Pin; 3] = [pin('B', 12), pin('A', 6), pin('E', 15)];
 /// Outputs of channel 1 of TIM1, with alternate function 1.
 pub(crate) const PWM_PINS: [Pin; 2] = [pin('A', 8), pin('E', 9)];
-/// Its complementary outputs, with the same function.
+/// Complementary outputs of channel 1 of TIM1, with alternate function 1.
 pub(crate) const COMPLEMENTARY_PINS: [Pin; 3] = [pin('A', 7), pin('B', 13), pin('E', 8)];
-/// USART, TX and RX, with alternate function 7.
+/// Number of a USART, its TX pin and its RX pin, with alternate function 7.
 pub(crate) const SERIAL_PINS: [(u8, Pin, Pin); 5] = [
     (2, pin('A', 2), pin('A', 3)),
     (2, pin('D', 5), pin('D', 6)),
@@ -139,7 +139,7 @@ pub(crate) const SERIAL_PINS: [(u8, Pin, Pin); 5] = [
     (3, pin('D', 8), pin('D', 9)),
 ];
 
-/// The pin of an input of converter 1 (datasheet, pin definitions).
+/// The pin of a channel of ADC1 (datasheet, pin definitions); `None` for internal channels.
 pub(crate) fn analog_pin(channel: usize) -> Option<Pin> {
     Some(match channel {
         0..=7 => pin('A', channel as u8),

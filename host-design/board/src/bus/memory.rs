@@ -4,7 +4,7 @@ use super::Bus;
 use crate::error::{Fault, Trap, Violation};
 use crate::instruction::Unit;
 
-/// Reading in little endian.
+/// Reads a little-endian value, not sign-extended; `None` beyond the end.
 #[inline]
 fn get(memory: &[u8], offset: usize, unit: Unit) -> Option<u32> {
     match unit {
@@ -30,7 +30,7 @@ fn put(memory: &mut [u8], offset: usize, unit: Unit, value: u32) -> bool {
 }
 
 impl Bus {
-    /// What memory holds; nothing outside memory.
+    /// Reads memory; `None` outside it.
     #[inline]
     pub(crate) fn read_memory(&self, address: u32, unit: Unit) -> Option<u32> {
         let offset = (address & 0x00ff_ffff) as usize;
@@ -47,7 +47,7 @@ impl Bus {
         }
     }
 
-    /// Gives whether there is memory to write to.
+    /// Writes RAM; returns whether there is any at the address.
     #[inline]
     pub(crate) fn write_memory(&mut self, address: u32, unit: Unit, value: u32) -> bool {
         let offset = (address & 0x00ff_ffff) as usize;
@@ -62,7 +62,7 @@ impl Bus {
         }
     }
 
-    /// Place in the reserved space below the SRAM, if that answers.
+    /// Offset in the reserved space below the SRAM, if that behaves as memory.
     pub(crate) fn below_sram(&self, address: u32) -> Option<usize> {
         let offset = address.checked_sub(0x2000_0000 - self.below_sram.len() as u32)? as usize;
         (offset < self.below_sram.len()).then_some(offset)
@@ -73,26 +73,26 @@ impl Bus {
         self.read_memory(address, Unit::Word)
     }
 
-    /// A byte of memory, written by the DMA: it does not reach the core-coupled one.
+    /// Writes a byte by DMA, which reaches the SRAM but not the core-coupled memory.
     pub(super) fn poke(&mut self, address: u32, byte: u8) {
         if address >> 24 == 0x20 {
             self.write_memory(address, Unit::Byte, byte.into());
         }
     }
 
-    /// The unique number, the flash size and VREFIN_CAL (RM0090, 39; datasheet, internal reference voltage).
+    /// The unique device ID, the flash size and VREFIN_CAL (RM0090, 39; datasheet, internal reference voltage).
     fn identity(&self, address: u32, unit: Unit) -> Option<u32> {
         let mut data = [0u8; 0x40];
         data[0x10..0x1c].copy_from_slice(b"\x2a\0\x31\0\x0c5133713");
         data[0x22..0x24].copy_from_slice(&((self.chip.flash_bytes() >> 10) as u16).to_le_bytes());
-        // 1.21 V of 3.3 V in 12 bits; erased without.
+        // 1.21 V of 3.3 V in 12 bits; erased if the chip is not calibrated.
         let calibration = if self.is_calibrated { 1502u16 } else { u16::MAX };
         data[0x2a..0x2c].copy_from_slice(&calibration.to_le_bytes());
         let offset = address.checked_sub(0x1fff_7a00)? as usize;
         get(&data, offset, unit)
     }
 
-    /// The half-word of an instruction.
+    /// Fetches a half-word of code from flash or SRAM.
     #[inline]
     pub(crate) fn fetch(&self, address: u32) -> Option<u16> {
         match address >> 24 {
@@ -101,7 +101,7 @@ impl Bus {
         }
     }
 
-    /// What happens where nothing is.
+    /// The trap for an access to an address that does not support it: a bus fault, or the end of the run.
     pub(crate) fn nothing_at(&self, address: u32, violation: Violation) -> Trap {
         if self.rules.faults_are_taken { Fault::Bus(address).into() } else { violation.into() }
     }

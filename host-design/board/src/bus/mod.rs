@@ -1,4 +1,4 @@
-//! Everything that the core reaches by addresses, and the time that passes there.
+//! The bus: everything that the core addresses (memory and peripherals), and the time.
 
 mod memory;
 mod registers;
@@ -22,10 +22,10 @@ use crate::processor::flash_cache::FlashCache;
 use crate::processor::system::System;
 use crate::wiring::Wiring;
 
-/// Ports A to I.
+/// Number of ports, A to I.
 pub(crate) const PORTS: usize = 9;
 
-/// What the motor's pins have done since power-on.
+/// Times for which the motor's outputs have been high since power-on.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Driven {
     /// Time with PWM high, enable high and direction high.
@@ -45,23 +45,23 @@ pub struct Conditions {
     pub chip: Chip,
     /// What is connected to it.
     pub wiring: &'static Wiring,
-    /// The clock at HSE.
+    /// Clock source at HSE.
     pub crystal: Crystal,
-    /// What the internal oscillator of nominally 16 MHz has (Hz).
+    /// Actual frequency of HSI, the internal oscillator of nominally 16 MHz (Hz).
     pub hsi_hz: u32,
-    /// What the watchdog's oscillator has (Hz): 17 000 to 47 000.
+    /// Actual frequency of LSI, the watchdog's oscillator (Hz): 17 000 to 47 000.
     pub lsi_hz: u32,
-    /// What memory, registers and floating pins hold at power-on follows from it.
+    /// Seed of everything random: contents of memory and registers at power-on, levels of floating pins.
     pub seed: u64,
-    /// Supply of the chip (V).
+    /// Supply voltage of the chip at power-on (V).
     pub chip_v: f32,
     /// The brown-out level in the option bytes.
     pub brown_out: BrownOut,
-    /// Whether the factory's reading of the reference is in the chip; for negative controls.
+    /// Whether the chip holds the factory's calibration of the reference (VREFIN_CAL); for negative controls.
     pub is_calibrated: bool,
 }
 
-/// What the debugger freezes with the core (DBGMCU; RM0090, 38.16).
+/// The debugger's halt, and what freezes with it (DBGMCU; RM0090, 38.16).
 #[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct DebugFreeze {
     /// CR, APB1_FZ and APB2_FZ.
@@ -79,11 +79,11 @@ pub(crate) struct Bus {
     pub(crate) now: Time,
     /// Period of the core's clock.
     pub(crate) hclk: Time,
-    /// When the next thing happens by itself.
+    /// Time of the next event in a peripheral.
     pub(crate) deadline: Time,
-    /// A read that gives something else at any time, such as of a counter.
+    /// A register was read whose value can change at any time, such as a counter.
     pub(crate) unstable: bool,
-    /// Something was written to a register, or has happened by itself.
+    /// A register was changed: by a write, by a read with side effects, or by an event in a peripheral.
     pub(crate) touched: bool,
     pub(crate) pc: u32,
     pub(crate) rules: Rules,
@@ -95,7 +95,7 @@ pub(crate) struct Bus {
     pub(crate) flash: Vec<u8>,
     pub(crate) sram: Vec<u8>,
     core_coupled: Vec<u8>,
-    /// Reserved space that ends at the SRAM; empty unless it answers like memory.
+    /// Contents of the reserved space that ends at the SRAM; empty unless it behaves as memory.
     pub(crate) below_sram: Vec<u8>,
     pub(crate) cache: FlashCache,
     pub(crate) system: System,
@@ -115,13 +115,13 @@ pub(crate) struct Bus {
     pub(crate) power: Power,
     pub(crate) driven: Driven,
     driven_until: Time,
-    /// The watchdog has asked for a reset.
+    /// The watchdog has requested a reset.
     pub(crate) watchdog_reset: bool,
-    /// A register whose next write is lost.
+    /// Address of a register whose next write is lost.
     pub(crate) lost_write: Option<u32>,
-    /// With it, reading that register gives what was written: for negative controls.
+    /// Whether reads of that register then return the lost value: for negative controls.
     pub(crate) lost_write_is_hidden: bool,
-    /// What was lost there, if reading is to give it.
+    /// Address and value of a lost write that reads return.
     hidden: Option<(u32, u32)>,
 }
 
@@ -182,7 +182,7 @@ impl Bus {
         }
     }
 
-    /// A system reset: registers begin again, memory stays; `flags` say why.
+    /// A system reset: registers take their reset values, memory is kept; `flags` are the reset flags to set.
     pub(crate) fn reset(&mut self, flags: u32) {
         self.settle_output();
         let mpu_is_ignored = self.system.mpu.ignored;
@@ -210,18 +210,18 @@ impl Bus {
         self.refresh();
     }
 
-    /// Cycles that the flash keeps a jump waiting.
+    /// Cycles for which a branch to `target` waits for the flash.
     #[inline]
     pub(crate) fn instruction_wait(&mut self, target: u32) -> u32 {
         if target >> 24 == 8 { self.cache.jump(target) } else { 0 }
     }
 
-    /// A DSB: what was written to the clock enables has arrived.
+    /// DSB: writes to the clock-enable registers have taken effect.
     pub(crate) fn writes_are_through(&mut self) {
         self.rcc.writes_are_through(self.now);
     }
 
-    /// A violation that hardware lets pass.
+    /// Treats a violation that hardware tolerates as `rule` says.
     pub(crate) fn tolerate(&mut self, rule: Rule, violation: Violation) -> Result<(), Trap> {
         match rule {
             Rule::Stop => return Err(violation.into()),
@@ -239,7 +239,7 @@ impl Bus {
         Ok(())
     }
 
-    /// The debugger halts the core, or lets it go on: its tick's timer stands still, the watchdog if it is told to.
+    /// The debugger halts the core or resumes it. SysTick stops with the core, the watchdog only with DBG_IWDG_STOP.
     pub(crate) fn halt(&mut self, halted: bool) {
         self.debug_freeze.halted = halted;
         self.system.freeze(halted, self.now);
@@ -247,13 +247,13 @@ impl Bus {
         self.refresh();
     }
 
-    /// Address of an exception's handler.
+    /// The vector of an exception; that of number 0 is the initial stack pointer.
     pub(crate) fn vector(&mut self, exception: usize) -> Result<u32, Violation> {
         let address = self.system.vtor + 4 * exception as u32;
         self.peek(address).ok_or(Violation::Unmapped(address))
     }
 
-    /// Lets happen what is due.
+    /// Processes all events that are due.
     pub(crate) fn advance(&mut self) {
         let now = self.now;
         self.touched = true;
@@ -277,7 +277,7 @@ impl Bus {
         self.refresh();
     }
 
-    /// Interrupt lines and the next deadline, after anything has changed.
+    /// Updates the interrupt lines and the next deadline after a change.
     pub(crate) fn refresh(&mut self) {
         self.system.nvic.line(36 + usize::from(self.wiring.usart), self.usart.interrupt());
         for (interrupt, high) in self.dma.interrupts() {
@@ -315,13 +315,13 @@ impl Bus {
         }
     }
 
-    /// Something without pattern, different for every call.
+    /// A pseudo-random number of 32 bits.
     pub(crate) fn random(&mut self) -> u64 {
         next_noise(&mut self.noise)
     }
 }
 
-/// Xorshift: enough for memory that nobody should rely on.
+/// Xorshift: good enough for values that no program should rely on.
 fn next_noise(state: &mut u64) -> u64 {
     *state ^= *state << 13;
     *state ^= *state >> 7;

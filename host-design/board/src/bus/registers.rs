@@ -30,7 +30,7 @@ enum Place {
     Debug,
 }
 
-/// The peripheral and its base; of the USARTs, there is that of the serial line.
+/// The peripheral at an address, and its base; of the USARTs, only that of the serial line exists.
 fn place(address: u32, usart: u8) -> Option<(Place, u32)> {
     let block = address & !0x3ff;
     let found = match block {
@@ -55,7 +55,7 @@ fn place(address: u32, usart: u8) -> Option<(Place, u32)> {
     Some(found)
 }
 
-/// The bit that gives a peripheral its clock (7.3.10 to 7.3.14).
+/// The bus and the clock-enable bit of a peripheral (7.3.10 to 7.3.14).
 fn clock(place: Place, usart: u8) -> Option<(Domain, u32)> {
     Some(match place {
         Place::Encoder(4) => (Domain::Apb2, 1),
@@ -159,7 +159,7 @@ impl Bus {
         Ok(())
     }
 
-    /// Whether this write is the one that is to be lost.
+    /// Whether this write is lost by fault injection.
     fn is_lost(&mut self, address: u32, value: u32) -> bool {
         let lost = self.lost_write == Some(address);
         if lost {
@@ -182,7 +182,7 @@ impl Bus {
         Ok(())
     }
 
-    /// Whether the peripheral's clock runs long enough; without clock the run ends.
+    /// Whether the peripheral's clock has been enabled for long enough; if it is off, the run ends.
     fn has_clock(&mut self, place: Place, address: u32) -> Result<bool, Trap> {
         let Some((domain, bit)) = clock(place, self.wiring.usart) else { return Ok(true) };
         let Some(at) = self.rcc.usable_at(domain, bit) else {
@@ -335,7 +335,7 @@ impl Bus {
             }
             Place::Debug => {
                 if offset >= 8 && value & !super::FREEZES_WATCHDOG != 0 {
-                    return Err(Violation::NotModelled("freezing another timer than the watchdog"));
+                    return Err(Violation::NotModelled("freezing a timer other than the watchdog"));
                 }
                 self.debug_freeze.registers[offset as usize / 4 - 1] = value;
                 Ok(())
@@ -351,7 +351,7 @@ impl Bus {
         }
     }
 
-    /// One wait state for each 30 MHz at 2.7 V and more, for less below (3.5.1).
+    /// One wait state for each 30 MHz at 2.7 V and above, for fewer MHz below (3.5.1).
     pub(crate) fn check_wait_states(&self) -> Result<(), Violation> {
         let hz = crate::clock::frequency(self.rcc.hclk());
         let needed = hz.saturating_sub(1) / self.power.hz_per_wait_state();

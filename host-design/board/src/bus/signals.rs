@@ -8,7 +8,7 @@ use crate::peripherals::rcc::Domain;
 use crate::wiring::{BREAK_PINS, COMPLEMENTARY_PINS, ENCODER_INPUTS, PWM_PINS, Pin, SERIAL_PINS};
 
 impl Bus {
-    /// The shaft whose signals reach a timer, and the period of that timer.
+    /// The shaft that is connected to a timer, if any, and the period of that timer's clock.
     pub(super) fn encoder_route(&self, timer: usize) -> (Option<Shaft>, Time) {
         let tick = self.rcc.timer_clock(if timer == 4 { Domain::Apb2 } else { Domain::Apb1 });
         let input = |channel: usize| {
@@ -25,7 +25,7 @@ impl Bus {
         (shaft, tick)
     }
 
-    /// An encoder turns to `position` until `end`, after all counters have seen where it was.
+    /// Turns an encoder so that it reaches `position` at `end`; all counters first catch up with the old movement.
     pub(crate) fn turn_encoder(&mut self, encoder: usize, position: i64, end: Time) {
         for timer in 0..self.encoders.len() {
             let (shaft, tick) = self.encoder_route(timer);
@@ -40,7 +40,7 @@ impl Bus {
         self.ports[pin.port].is_alternate(pin.number, function)
     }
 
-    /// Whether TX and RX are at pins.
+    /// Whether TX and RX of the USART are routed to pins.
     pub(super) fn serial_connected(&self) -> (bool, bool) {
         let any = |choose: fn(&(u8, Pin, Pin)) -> Pin| {
             let of_usart = |pins: &&(u8, Pin, Pin)| pins.0 == self.wiring.usart;
@@ -49,7 +49,7 @@ impl Bus {
         (any(|pins| pins.1), any(|pins| pins.2))
     }
 
-    /// Levels that the timer gives to the pins of a port.
+    /// Levels that the PWM timer drives at the pins of a port.
     pub(super) fn alternate_levels(&self, port: usize) -> u32 {
         let pins: &[Pin] = if self.wiring.is_complementary() { &COMPLEMENTARY_PINS } else { &PWM_PINS };
         pins.iter()
@@ -57,13 +57,13 @@ impl Bus {
             .fold(0, |levels, pin| levels | 1 << pin.number)
     }
 
-    /// Level of an output pin as the power stage sees it; its resistor pulls it low while nothing drives it.
+    /// Level of an output pin as the power stage sees it; a pull-down holds it low while nothing drives it.
     pub(crate) fn output_level(&self, pin: Pin) -> bool {
         let port = &self.ports[pin.port];
         port.mode_of(pin.number) == 1 && port.output >> pin.number & 1 != 0
     }
 
-    /// Counts what the motor's pins have done until now.
+    /// Accumulates the times of the motor's outputs up to now.
     pub(crate) fn settle_output(&mut self) {
         let before = self.pwm.high;
         let tick = self.rcc.timer_clock(Domain::Apb2);
@@ -92,7 +92,7 @@ impl Bus {
         }
     }
 
-    /// Connects a pin to something else.
+    /// Applies an external level to a pin, or removes it.
     pub(crate) fn connect(&mut self, pin: Pin, wire: Wire) {
         self.settle_output();
         let before = self.ports[pin.port].input(pin.number);
@@ -105,11 +105,11 @@ impl Bus {
         self.refresh();
     }
 
-    /// What follows levels without a clock: the break input.
+    /// Updates what reacts to pin levels without a clock: the break input.
     pub(crate) fn levels_changed(&mut self) {
         for pin in BREAK_PINS {
             if self.is_alternate(pin, 1) {
-                // A floating input is taken for a break.
+                // A floating input counts as high, which is a break.
                 let high = self.ports[pin.port].input(pin.number).unwrap_or(true);
                 self.pwm.break_input(high);
             }
@@ -123,7 +123,7 @@ impl Bus {
         }
     }
 
-    /// The crystal stops.
+    /// The crystal stops; the clock security system may react.
     pub(crate) fn stop_crystal(&mut self) {
         self.settle_output();
         self.rcc.stop_crystal();

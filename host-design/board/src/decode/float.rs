@@ -3,13 +3,13 @@
 use super::{Decoded, Undecodable, fixed, general, register};
 use crate::instruction::{Float1, Float2, Op};
 
-/// Number of a single: four bits and the lowest one elsewhere.
+/// Number of a single-precision register: four bits at `at`, and its lowest bit from `low`.
 fn single(word: u32, at: u32, low: u32) -> u8 {
     ((word >> at & 15) << 1 | low & 1) as u8
 }
 
 pub(super) fn decode(first: u32, second: u32) -> Decoded {
-    // Coprocessors 10 and 11 alone.
+    // Only coprocessors 10 and 11 exist.
     if second >> 9 & 7 != 5 || first & 0x1000 != 0 {
         return Err(Undecodable::Unknown);
     }
@@ -83,7 +83,7 @@ fn other(first: u32, second: u32, d: u8, m: u8) -> Decoded {
     }
 }
 
-/// The number that eight bits stand for (A6.4.1).
+/// Expands a floating-point constant of eight bits (A6.4.1).
 fn constant(bits: u32) -> u32 {
     let exponent = if bits & 0x40 != 0 { 0x1f } else { 0x20 };
     (bits & 0x80) << 24 | exponent << 25 | (bits & 0x3f) << 19
@@ -94,7 +94,7 @@ fn transfer(first: u32, second: u32, double: bool) -> Decoded {
     let n = single(first, 0, second >> 7);
     let to_core = first & 0x10 != 0;
     if first & 0xe0 == 0xe0 {
-        // FPSCR is register 1; to the program counter means to the flags.
+        // FPSCR is register 1; a read into R15 copies the flags.
         if double || first & 15 != 1 {
             return Err(Undecodable::Unknown);
         }
@@ -105,7 +105,7 @@ fn transfer(first: u32, second: u32, double: bool) -> Decoded {
             fixed(zero, Op::WriteFloatStatus { rt }).and_then(|op| general(&[rt], op))
         };
     }
-    // A half of a double is a single (of the even or the odd number).
+    // Half of a double-precision register is a single-precision one, of even or odd number.
     let n = match (double, first >> 5 & 7) {
         (false, 0) => n,
         (true, half @ (0 | 1)) if second & 0x80 == 0 => single(first, 0, half),
@@ -136,7 +136,7 @@ fn memory(first: u32, second: u32, double: bool) -> Decoded {
     let (before, up, write_back) = (first & 0x100 != 0, first & 0x80 != 0, first & 0x20 != 0);
     let load = first & 0x10 != 0;
     let words = (second & 0xff) as u8;
-    // Doubles beyond the sixteenth do not exist here.
+    // This unit has no double-precision registers beyond D15.
     if double && first & 0x40 != 0 {
         return Err(Undecodable::Unknown);
     }

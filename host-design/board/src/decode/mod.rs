@@ -11,7 +11,7 @@ mod wide_register;
 
 use crate::instruction::{Instruction, Op};
 
-/// Why half-words are no instruction.
+/// Why half-words cannot be decoded.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Undecodable {
     /// Not an instruction of this processor.
@@ -61,7 +61,7 @@ fn register(word: u32, at: u32) -> u8 {
     (word >> at & 15) as u8
 }
 
-/// `value`, if the registers are neither the stack pointer nor the program counter.
+/// `op`, if none of the registers is the stack pointer or the program counter.
 fn general(registers: &[u8], op: Op) -> Decoded {
     if registers.iter().any(|&r| r == 13 || r == 15) { Err(Undecodable::Unpredictable) } else { Ok(op) }
 }

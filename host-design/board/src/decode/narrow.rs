@@ -1,4 +1,4 @@
-//! Instructions of 16 bits (A5.2).
+//! 16-bit instructions (A5.2).
 
 use super::{Decoded, Undecodable, fixed, general, signed};
 use crate::instruction::{Alu, Compare, Extend, Op, Operand, Place, Sets, Shift, Unary, Unit};

@@ -1,9 +1,10 @@
-//! Data processing of 32 bits with constants and shifted registers, branches and control (A5.3.1 to A5.3.4, A5.3.11).
+//! 32-bit instructions: data processing with constants and shifted registers, branches and control (A5.3.1 to A5.3.4,
+//! A5.3.11).
 
 use super::{Decoded, Undecodable, fixed, general, register, signed};
 use crate::instruction::{Alu, Compare, Op, Operand, Sets, Shift, Special};
 
-/// The shift that a type and an amount of five bits stand for (A7.4.2).
+/// Decodes a shift from its type and an amount of five bits (A7.4.2).
 pub(super) fn shift(kind: u32, amount: u32) -> (Shift, u8) {
     match (kind & 3, amount as u8) {
         (0, amount) => (Shift::Lsl, amount),
@@ -16,7 +17,7 @@ pub(super) fn shift(kind: u32, amount: u32) -> (Shift, u8) {
     }
 }
 
-/// The constant that twelve bits stand for (A5.3.2).
+/// Expands a modified immediate constant of twelve bits (A5.3.2).
 fn expanded(bits: u32) -> Result<Operand, Undecodable> {
     let byte = bits & 0xff;
     let repeated =
@@ -63,7 +64,7 @@ pub(super) fn shifted_register(first: u32, second: u32) -> Decoded {
     processing(first, rd, rn, operand, Some(rm))
 }
 
-/// What both forms share; `rm` is the shifted register.
+/// Common to both forms; `rm` is the shifted register, if there is one.
 fn processing(first: u32, rd: u8, rn: u8, operand: Operand, rm: Option<u8>) -> Decoded {
     let flags = first & 0x10 != 0;
     let sets = if flags { Sets::Always } else { Sets::Never };
@@ -89,7 +90,7 @@ fn processing(first: u32, rd: u8, rn: u8, operand: Operand, rm: Option<u8>) -> D
         0b0000 => alu(Alu::And),
         0b0001 => alu(Alu::Bic),
         0b0010 if rn == 15 => match (rm, operand) {
-            // MOV.W between registers may use the stack pointer, but not twice (A7.7.77).
+            // MOV.W between registers may use the stack pointer once, but not twice (A7.7.77).
             (Some(rm), Operand::Register(_)) if !flags => {
                 let allowed = rd != 15 && rm != 15 && !(rd == 13 && rm == 13);
                 fixed(allowed, Op::Alu { alu: Alu::Mov, sets, rd, rn: 15, operand })
@@ -136,7 +137,7 @@ pub(super) fn plain_immediate(first: u32, second: u32, address: u32) -> Decoded 
         }
         general(&[rd, rn], Op::Saturate { signed: is_signed, rd, rn, bits, shift: kind, amount })
     };
-    // Bit 26 of the whole is fixed to zero but for the constants.
+    // Bits 26 and 5 of the instruction are fixed to zero, except in the forms with a constant.
     let fields_fixed = first & 0x400 == 0 && second & 0x20 == 0;
     match first >> 4 & 31 {
         0b00000 if rn == 15 => move_constant(base.wrapping_add(constant)),

@@ -1,4 +1,4 @@
-//! Loads and stores of 32 bits (A5.3.5 to A5.3.10).
+//! 32-bit instructions: loads and stores (A5.3.5 to A5.3.10).
 
 use super::{Decoded, Undecodable, fixed, general, register};
 use crate::instruction::{Op, Place, Unit};
@@ -75,7 +75,7 @@ fn exclusive_or_table(first: u32, second: u32) -> Decoded {
     }
 }
 
-/// Base and offset of a single access; nothing for the unprivileged forms.
+/// Addressing mode of a single access; an error for the unprivileged forms.
 fn place(first: u32, second: u32) -> Result<Place, Undecodable> {
     if first & 0x80 != 0 {
         return Ok(Place::Offset((second & 0xfff) as i32));
@@ -94,7 +94,7 @@ fn place(first: u32, second: u32) -> Result<Place, Undecodable> {
     let offset = if second & 0x200 != 0 { size } else { -size };
     match (second & 0x400 != 0, second & 0x100 != 0, second & 0x200 != 0) {
         (true, false, false) => Ok(Place::Offset(offset.into())),
-        // LDRT and its like: without rights, which nothing here needs.
+        // LDRT and the like: unprivileged accesses, which no program here needs.
         (true, false, true) => Err(Undecodable::Unknown),
         (true, true, _) => Ok(Place::PreIndexed(offset)),
         (false, true, _) => Ok(Place::PostIndexed(offset)),
@@ -139,7 +139,7 @@ fn part(first: u32, second: u32, address: u32, plain: Unit, extended: Unit) -> D
     let (rn, rt) = (register(first, 0), register(second, 12));
     let unit = if first & 0x100 == 0 { plain } else { extended };
     if rn == 15 {
-        // With the program counter as target: a preload hint, which does nothing.
+        // With R15 as target this is a preload hint, which does nothing.
         let op = Op::LoadLiteral { unit, rt, address: literal(first, second, address) };
         return if rt == 15 { Ok(Op::Nop) } else { fixed(rt != 13, op) };
     }

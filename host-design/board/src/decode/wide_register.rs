@@ -1,4 +1,4 @@
-//! Data processing of 32 bits on registers, multiplication and division (A5.3.12 to A5.3.17).
+//! 32-bit instructions: data processing on registers, multiplication and division (A5.3.12 to A5.3.17).
 
 use super::{Decoded, Undecodable, fixed, general, register};
 use crate::instruction::{Extend, Lanes, LongMultiply, Multiply, Op, Prefix, Sets, Shift, Unary};
@@ -58,7 +58,7 @@ fn parallel(op: u32, top: u32, rd: u8, rn: u8, rm: u8) -> Decoded {
 
 fn miscellaneous(op: u32, top: u32, rd: u8, rn: u8, rm: u8) -> Decoded {
     let unary = |unary| {
-        // The operand is coded twice.
+        // The encoding holds the operand register twice.
         fixed(rn == rm, Op::Unary { unary, rd, rm }).and_then(|op| general(&[rd, rm], op))
     };
     match (op, top) {

@@ -10,7 +10,7 @@ pub(super) fn add_with_carry(x: u32, y: u32, carry: bool) -> (u32, bool, bool) {
     (sum, first | second, ((x ^ sum) & (y ^ sum)) >> 31 != 0)
 }
 
-/// A shifted value, and the carry out of the shifter.
+/// A shifted value, and the carry out of the barrel shifter.
 #[inline]
 pub(super) fn shifted(value: u32, shift: Shift, amount: u32, carry: bool) -> (u32, bool) {
     if amount == 0 {
@@ -40,14 +40,14 @@ pub(super) fn shifted(value: u32, shift: Shift, amount: u32, carry: bool) -> (u3
     }
 }
 
-/// A number cut to the range of `bits`, and whether it did not fit.
+/// A number saturated to the signed range of `bits`, and whether it was out of range.
 pub(super) fn signed_saturated(value: i64, bits: u32) -> (u32, bool) {
     let limit = 1i64 << (bits - 1);
     let cut = value.clamp(-limit, limit - 1);
     (cut as u32, cut != value)
 }
 
-/// A number cut to 0 and the largest of `bits`, and whether it did not fit.
+/// A number saturated to the unsigned range of `bits`, and whether it was out of range.
 pub(super) fn unsigned_saturated(value: i64, bits: u32) -> (u32, bool) {
     let cut = value.clamp(0, (1i64 << bits) - 1);
     (cut as u32, cut != value)

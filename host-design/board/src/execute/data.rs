@@ -6,7 +6,7 @@ use crate::instruction::{Alu, Compare, Extend, Op, Operand, Sets, Unary};
 use crate::machine::Machine;
 
 impl Machine {
-    /// Value of an operand, and the carry that goes with it.
+    /// Value of an operand, and the carry out of the barrel shifter.
     #[inline]
     fn operand(&self, operand: Operand) -> (u32, bool) {
         let carry = self.registers.c;
@@ -55,7 +55,7 @@ impl Machine {
             self.registers.v = overflow;
         }
         if rd == 15 {
-            // ADD and MOV to the program counter branch without looking at bit 0.
+            // ADD and MOV to the program counter branch and ignore bit 0.
             self.branch(value & !1);
         } else {
             self.registers.set(rd, value);

@@ -53,7 +53,7 @@ impl Machine {
         Ok(())
     }
 
-    /// Saves what is still to be saved, and notes that the unit is in use (B1.5.7).
+    /// Completes lazy stacking if it is pending, and marks the floating-point unit as in use (B1.5.7).
     fn prepare_float(&mut self) -> Done {
         if !self.bus.system.float_enabled(self.registers.privileged()) {
             return Err(Fault::NoCoprocessor.into());
@@ -70,9 +70,7 @@ impl Machine {
 
     fn only_default_modes(&self) -> Done {
         if self.registers.fpscr & MODES != 0 {
-            return Err(
-                Violation::NotModelled("floating point with other modes than the default ones").into()
-            );
+            return Err(Violation::NotModelled("floating point with modes other than the default").into());
         }
         Ok(())
     }

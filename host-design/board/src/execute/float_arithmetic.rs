@@ -1,13 +1,13 @@
-//! Arithmetic of singles as ARM defines it (A2.5): round to nearest, the NaNs of this processor, cumulative flags.
+//! Single-precision arithmetic as ARM defines it (A2.5): round to nearest, this processor's NaNs, cumulative flags.
 //!
-//! Values come from the host's own IEEE arithmetic; what hosts do differently, NaNs, is decided here.
+//! Values come from the host's own IEEE arithmetic; NaNs, in which hosts differ, are computed here.
 
 const INVALID: u32 = 1;
 const DIVIDED_BY_ZERO: u32 = 1 << 1;
 const OVERFLOW: u32 = 1 << 2;
 const UNDERFLOW: u32 = 1 << 3;
 const INEXACT: u32 = 1 << 4;
-/// What an invalid operation gives.
+/// Result of an invalid operation.
 const DEFAULT_NAN: u32 = 0x7fc0_0000;
 /// The smallest normal single.
 const SMALLEST: f64 = f32::MIN_POSITIVE as f64;
@@ -20,7 +20,7 @@ fn is_signalling(x: u32) -> bool {
     is_nan(x) && x & 0x0040_0000 == 0
 }
 
-/// The NaN that comes out of these operands, if one is a NaN: the first signalling one, else the first quiet one.
+/// The resulting NaN if an operand is a NaN: the first signalling one (made quiet), else the first quiet one.
 fn nan_of(operands: &[u32], flags: &mut u32) -> Option<u32> {
     if let Some(&nan) = operands.iter().find(|&&x| is_signalling(x)) {
         *flags |= INVALID;
@@ -37,7 +37,7 @@ fn wide(x: u32) -> f64 {
     f64::from(value(x))
 }
 
-/// The flags of a result that rounding has made from a finite value: `exact` is near enough to tell what is tiny.
+/// Sets the flags of a result rounded from a finite value; `exact` is accurate enough to tell whether it is tiny.
 fn rounded(result: f32, exact: f64, is_exact: bool, flags: &mut u32) -> u32 {
     if result.is_infinite() {
         *flags |= OVERFLOW | INEXACT;
@@ -50,7 +50,7 @@ fn rounded(result: f32, exact: f64, is_exact: bool, flags: &mut u32) -> u32 {
     result.to_bits()
 }
 
-/// What all operations do with special operands and results. `finite` is called for finite operands alone.
+/// Common handling of special operands and results. `finite` is called for finite operands only.
 fn operation(
     operands: &[u32],
     result: f32,
@@ -72,13 +72,13 @@ fn operation(
 #[inline]
 pub(super) fn add(x: u32, y: u32, flags: &mut u32) -> u32 {
     let result = value(x) + value(y);
-    // A finite sum adds nothing but inexactness, and tiny sums are exact.
+    // A finite sum can raise no flag but "inexact", since tiny sums are exact.
     if *flags & INEXACT != 0 && result.is_finite() {
         return result.to_bits();
     }
     operation(&[x, y], result, flags, |result, flags| {
         let sum = wide(x) + wide(y);
-        // The sum of two singles may need more than 53 bits: what is missing (Knuth's two-sum).
+        // The sum of two singles may need more than 53 bits; `missing` is its rounding error (Knuth's two-sum).
         let other = sum - wide(x);
         let missing = (wide(x) - (sum - other)) + (wide(y) - other);
         rounded(result, sum, f64::from(result) == sum && missing == 0.0, flags)
@@ -86,7 +86,7 @@ pub(super) fn add(x: u32, y: u32, flags: &mut u32) -> u32 {
 }
 
 pub(super) fn sub(x: u32, y: u32, flags: &mut u32) -> u32 {
-    // The NaN keeps its sign, so that this is not the sum with a negated operand.
+    // A NaN keeps its sign, so this case is not a sum with a negated operand.
     if is_nan(x) || is_nan(y) {
         return nan_of(&[x, y], flags).unwrap_or(DEFAULT_NAN);
     }
@@ -175,7 +175,7 @@ pub(super) fn to_fixed(x: u32, fraction: u8, signed: bool, bits: u32, to_zero: b
     let whole = if to_zero { scaled.trunc() } else { scaled.round_ties_even() };
     let (low, high) =
         if signed { (-(1i64 << (bits - 1)), (1i64 << (bits - 1)) - 1) } else { (0, (1i64 << bits) - 1) };
-    // The conversion of the host saturates.
+    // Rust's conversion to `i64` saturates.
     let cut = (whole as i64).clamp(low, high);
     if whole < low as f64 || whole > high as f64 {
         *flags |= INVALID;
@@ -230,7 +230,7 @@ pub(super) fn to_half(x: u32, flags: &mut u32) -> u16 {
             *flags |= UNDERFLOW;
         }
     }
-    // The step's exponent and the steps add up to the coded number, carries included.
+    // The step's exponent and the number of steps add up to the encoding, carries included.
     let coded = if steps < 1024.0 { steps as u16 } else { ((exponent + 14) as u16) * 1024 + steps as u16 };
     sign | coded
 }

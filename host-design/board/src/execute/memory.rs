@@ -6,7 +6,7 @@ use crate::instruction::{Op, Place, Unit};
 use crate::machine::Machine;
 
 impl Machine {
-    /// Address of an access, and what the base becomes.
+    /// Address of an access, and the new base if it is written back.
     #[inline]
     fn place(&self, rn: u8, place: Place) -> (u32, Option<u32>) {
         let base = self.registers.get(rn);
@@ -26,7 +26,7 @@ impl Machine {
     #[inline]
     pub(super) fn load_single(&mut self, unit: Unit, rt: u8, rn: u8, place: Place, loaded: bool) -> Done {
         let (address, base) = self.place(rn, place);
-        // Loads in sequence overlap.
+        // Consecutive loads overlap in the pipeline.
         self.cycles += u32::from(!loaded);
         let value = self.load(address, unit)?;
         if let Some(base) = base {
@@ -120,7 +120,7 @@ impl Machine {
         Ok(())
     }
 
-    /// Address of two words and the new base; the program counter counts as a multiple of four.
+    /// Address of two words and the new base; the program counter as base is rounded down to a multiple of four.
     fn dual(&self, rn: u8, offset: i16, index: bool) -> Result<(u32, u32), crate::error::Trap> {
         let base = if rn == 15 { self.registers.r[15] & !3 } else { self.registers.get(rn) };
         let moved = base.wrapping_add_signed(offset.into());
@@ -129,7 +129,7 @@ impl Machine {
         Ok((address, moved))
     }
 
-    /// First address of `count` words at a base, and the base after them.
+    /// First address of a block of `count` words, and the base after it.
     fn block(&self, rn: u8, count: u32, down: bool) -> Result<(u32, u32), crate::error::Trap> {
         let base = self.registers.get(rn);
         self.aligned(base, Unit::Word)?;
@@ -147,7 +147,7 @@ impl Machine {
         }
     }
 
-    /// What may never be unaligned (A3.2.1).
+    /// Faults for an unaligned address, in accesses that must be aligned (A3.2.1).
     fn aligned(&self, address: u32, unit: Unit) -> Done {
         if address & (size(unit) - 1) != 0 { Err(Fault::Unaligned.into()) } else { Ok(()) }
     }
@@ -171,7 +171,7 @@ impl Machine {
         if list >> 15 != 0 { self.interwork(values[15]) } else { Ok(()) }
     }
 
-    /// Words of the floating-point file.
+    /// Loads and stores of floating-point registers.
     pub(super) fn float_memory(&mut self, op: Op) -> Done {
         match op {
             Op::FloatLoad { d, rn, offset, count } => {
@@ -214,7 +214,7 @@ impl Machine {
     }
 }
 
-/// Bytes of a unit.
+/// Size of an access (bytes).
 pub(crate) fn size(unit: Unit) -> u32 {
     match unit {
         Unit::Word => 4,

@@ -1,4 +1,4 @@
-//! What instructions do (ARMv7-M Architecture Reference Manual, A7.7), and their cycles.
+//! Execution of instructions (ARMv7-M Architecture Reference Manual, A7.7), and their cycles.
 //!
 //! Cycles follow the table of the Cortex-M4 Technical Reference Manual (DDI 0439, 3.3), with single-cycle stores (the
 //! write buffer), two cycles for refilling the pipeline, and the flash accelerator of
@@ -20,7 +20,7 @@ use crate::machine::Machine;
 pub(crate) type Done = Result<(), Trap>;
 
 impl Machine {
-    /// Executes one instruction; its condition holds.
+    /// Executes one instruction whose IT condition, if any, holds.
     #[inline]
     pub(crate) fn execute(&mut self, op: Op) -> Done {
         let loaded = std::mem::take(&mut self.loaded);
@@ -89,7 +89,7 @@ impl Machine {
         }
     }
 
-    /// Goes on elsewhere: a refill of the pipeline, and what the flash takes.
+    /// Branches; costs a refill of the pipeline and the flash's wait states.
     #[inline]
     pub(crate) fn branch(&mut self, target: u32) {
         self.next = target;

@@ -42,7 +42,7 @@ impl Machine {
                     (_, false) => x / y,
                 };
                 self.registers.set(rd, value);
-                // 2 to 12, by the length of the quotient.
+                // 2 to 12 cycles, depending on the length of the quotient.
                 self.cycles += 1 + (y.leading_zeros().saturating_sub(x.leading_zeros()) / 3).min(10);
             }
             _ => unreachable!("only these are sent here"),

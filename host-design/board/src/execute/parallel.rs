@@ -1,4 +1,4 @@
-//! Parallel sums, saturation and selection by bytes.
+//! Parallel sums and differences, saturation, and selection by bytes.
 
 use super::arithmetic::{shifted, signed_saturated, unsigned_saturated};
 use crate::instruction::{Lanes, Op, Prefix};
@@ -69,7 +69,7 @@ impl Machine {
     }
 }
 
-/// Value, and the flags that the plain forms set.
+/// Result, and the GE flags, which only the forms without saturation and halving set.
 fn lanewise(prefix: Prefix, lanes: Lanes, x: u32, y: u32) -> (u32, Option<u8>) {
     let signed = matches!(prefix, Prefix::Signed | Prefix::SignedSaturating | Prefix::SignedHalving);
     let bytes = matches!(lanes, Lanes::Add8 | Lanes::Sub8);

@@ -1,4 +1,4 @@
-//! Control: calls, IT, masks, special registers, waiting.
+//! Calls and returns, IT, barriers, masks, special registers, and waiting for interrupts and events.
 
 use super::Done;
 use crate::error::{Fault, Violation};

@@ -1,4 +1,4 @@
-//! Converter 1, single conversions of one input (RM0090, 13.13).
+//! The converter ADC1: single conversions of one channel (RM0090, 13.13).
 
 use super::Bits;
 use crate::clock::{NEVER, Time, UNITS_PER_MICROSECOND, UNITS_PER_SECOND};
@@ -27,7 +27,7 @@ pub(crate) struct Adc {
     reference_on_at: Time,
     on_at: Time,
     done_at: Option<Time>,
-    /// Voltages of the inputs as fractions of the reference, by their numbers.
+    /// Voltages of the channels, as fractions of the reference.
     pub(crate) inputs: [f32; 19],
 }
 
@@ -154,7 +154,7 @@ impl Adc {
         self.done_at.unwrap_or(NEVER)
     }
 
-    /// `connected`: whether the input's pin is analog.
+    /// Completes a conversion that is due. `connected`: whether a channel's pin is in analog mode.
     pub(crate) fn advance(&mut self, now: Time, connected: impl Fn(usize) -> bool) {
         if self.done_at.is_some_and(|at| at <= now) {
             self.done_at = None;

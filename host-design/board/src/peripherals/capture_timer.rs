@@ -1,4 +1,4 @@
-//! Timer 11, channel 1, capturing HSE divided for the RTC (RM0090, 19.5): how the crystal is measured against HSI.
+//! Timer 11, channel 1, which captures HSE divided for the RTC (RM0090, 19.5) to measure the crystal against HSI.
 
 use super::Bits;
 use crate::clock::Time;
@@ -19,7 +19,7 @@ pub(crate) struct CaptureTimer {
     reload: u32,
     captured: u32,
     started: Time,
-    /// Edges of the input are counted from here.
+    /// Time up to which edges of the input have been processed.
     edges_seen: Time,
 }
 

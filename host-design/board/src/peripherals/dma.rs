@@ -1,4 +1,4 @@
-//! Controller 1 (RM0090, 10.5): bytes from and to the USART of the serial line.
+//! DMA1 (RM0090, 10.5): bytes from and to the USART of the serial line.
 
 use super::Bits;
 use crate::error::Violation;
@@ -8,7 +8,7 @@ const CIRCULAR: u32 = 1 << 8;
 const COMPLETE: u32 = 1 << 5;
 const HALF: u32 = 1 << 4;
 
-/// A stream.
+/// Registers of a stream, and the length with which it was started.
 #[derive(Debug, Clone, Copy, Default)]
 struct Stream {
     control: u32,
@@ -27,7 +27,7 @@ pub(crate) struct Dma {
     requests: Requests,
 }
 
-/// Which streams a USART's requests go to, all by channel 4 (10.3.3), and its data register.
+/// Streams that serve a USART's requests, all on channel 4 (10.3.3), and the address of its data register.
 #[derive(Debug, Clone, Copy)]
 struct Requests {
     receive: usize,
@@ -38,7 +38,7 @@ struct Requests {
 const USART2: Requests = Requests { receive: 5, transmit: 6, data: 0x4000_4404 };
 const USART3: Requests = Requests { receive: 1, transmit: 3, data: 0x4000_4804 };
 const CHANNEL: u32 = 4;
-/// Interrupts of streams 0 to 6 (12.2).
+/// Interrupt of stream 0; those of streams 1 to 6 follow (12.2).
 const FIRST_INTERRUPT: usize = 11;
 
 /// Position of a stream's flags in LISR or HISR.
@@ -125,7 +125,7 @@ impl Dma {
         Ok(())
     }
 
-    /// Where the next byte goes to or comes from, if the stream runs.
+    /// Memory address of the next byte, if the stream is enabled.
     pub(crate) fn next(&self, number: usize) -> Option<u32> {
         let stream = &self.streams[number];
         let position =
@@ -133,7 +133,7 @@ impl Dma {
         (stream.control & ENABLED != 0 && stream.left > 0).then(|| stream.memory.wrapping_add(position))
     }
 
-    /// A byte has been moved.
+    /// Counts a byte that was transferred, and sets the flags.
     pub(crate) fn moved(&mut self, number: usize) {
         let (word, at) = place(number);
         let stream = &mut self.streams[number];
@@ -151,7 +151,7 @@ impl Dma {
         }
     }
 
-    /// Numbers of its interrupts, and whether each line is high.
+    /// Numbers of both streams' interrupts, and whether each line is high.
     pub(crate) fn interrupts(&self) -> [(usize, bool); 2] {
         [self.requests.receive, self.requests.transmit]
             .map(|stream| (FIRST_INTERRUPT + stream, self.interrupt(stream)))
@@ -166,7 +166,7 @@ impl Dma {
 }
 
 impl Stream {
-    /// Bytes between the USART and memory, in the right direction.
+    /// Checks the settings of a stream that is enabled: bytes between the USART and memory, in the right direction.
     fn check(&self, requests: Requests, number: usize, control: u32) -> Result<(), Violation> {
         let direction = control >> 6 & 3;
         let expected = if number == requests.receive {

@@ -4,7 +4,7 @@ use super::Bits;
 use crate::clock::Time;
 use crate::error::Violation;
 
-/// An encoder's shaft: edges over a span of time.
+/// An encoder's shaft: its position (edges) changes linearly over a span of time.
 #[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct Shaft {
     from: i64,
@@ -14,12 +14,12 @@ pub(crate) struct Shaft {
 }
 
 impl Shaft {
-    /// Moves from where it is to `position` (edges) until `end`.
+    /// Moves from its present position to `position` (edges), which it reaches at `end`.
     pub(crate) fn turn(&mut self, position: i64, begin: Time, end: Time) {
         *self = Self { from: self.position(begin), to: position, begin, end };
     }
 
-    /// Edges so far.
+    /// Position at a time (edges).
     pub(crate) fn position(&self, now: Time) -> i64 {
         if now >= self.end {
             return self.to;
@@ -31,14 +31,14 @@ impl Shaft {
         self.from + (i128::from(self.to - self.from) * elapsed / span) as i64
     }
 
-    /// Time between two edges; `None` at rest, and for a shaft that is put somewhere at once.
+    /// Time between two edges; `None` at rest, and for a movement without duration.
     fn spacing(&self) -> Option<Time> {
         let edges = if self.end > self.begin { (self.to - self.from).unsigned_abs() } else { 0 };
         (self.end - self.begin).checked_div(edges)
     }
 }
 
-/// A timer.
+/// A timer in encoder mode.
 #[derive(Debug, Clone)]
 pub(crate) struct EncoderTimer {
     wide: bool,
@@ -48,9 +48,9 @@ pub(crate) struct EncoderTimer {
     polarity: u32,
     reload: u32,
     count: u32,
-    /// Position of the shaft that the counter has seen.
+    /// Position of the shaft up to which the timer has followed it.
     seen: i64,
-    /// Edges that the filter has swallowed.
+    /// Number of edges that the filter has suppressed.
     pub(crate) lost: u64,
 }
 
@@ -116,13 +116,13 @@ impl EncoderTimer {
         Ok(())
     }
 
-    /// Samples that the filter wants, and the clocks between them (18.4.7, ICxF).
+    /// Clocks for which a level must last to pass the filter: samples times clocks between them (18.4.7, ICxF).
     fn filter_clocks(&self) -> Time {
         const CLOCKS: [Time; 16] = [1, 2, 4, 8, 12, 16, 24, 32, 48, 64, 80, 96, 128, 160, 192, 256];
         CLOCKS[(self.inputs >> 4 & 15) as usize]
     }
 
-    /// Counts what the shaft has done; both inputs stay for two edges at a level, which the filter must see.
+    /// Counts the shaft's movement. Each input keeps its level for two edges, and that level must pass the filter.
     fn follow(&mut self, shaft: Option<&Shaft>, now: Time, tick: Time) {
         let Some(shaft) = shaft else { return };
         let delay = self.filter_clocks() * tick;

@@ -4,7 +4,7 @@ use super::Bits;
 
 const LINES: u32 = 0x007f_ffff;
 
-/// Both, because one chooses the other's pins.
+/// SYSCFG and EXTI together, because SYSCFG selects the pins of the EXTI lines.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Exti {
     interrupts: u32,
@@ -87,7 +87,7 @@ impl Exti {
         self.pending |= edges & self.interrupts & 1 << line;
     }
 
-    /// Interrupts that are asked for, by their numbers.
+    /// Numbers of the interrupts, and whether each line is high.
     pub(crate) fn interrupts(&self) -> [(usize, bool); 8] {
         let any = |mask: u32| self.pending & mask != 0;
         [

@@ -6,7 +6,7 @@ use crate::error::Violation;
 /// What is connected to a pin from outside.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Wire {
-    /// Nothing: the pull-up, the pull-down, or noise.
+    /// Nothing: the pin follows its pull-up or pull-down, or floats and reads as noise.
     #[default]
     Open,
     /// A low level.
@@ -15,7 +15,7 @@ pub enum Wire {
     High,
 }
 
-/// A port.
+/// Registers of a port, and what is connected to its pins.
 #[derive(Debug, Clone)]
 pub(crate) struct Port {
     pub(crate) mode: u32,
@@ -28,7 +28,7 @@ pub(crate) struct Port {
 }
 
 impl Port {
-    /// After a reset; the pins of the debugger are set up (8.3.1).
+    /// The state after a reset, with the debugger's pins configured (8.3.1).
     pub(crate) fn new(letter: u8) -> Self {
         let (mode, speed, pull) = match letter {
             b'A' => (0xa800_0000, 0x0c00_0000, 0x6400_0000),
@@ -38,7 +38,7 @@ impl Port {
         Self { mode, output_type: 0, speed, pull, output: 0, alternate: [0; 2], wires: [Wire::Open; 16] }
     }
 
-    /// A reset leaves what is connected.
+    /// Resets the registers; what is connected stays.
     pub(crate) fn reset(&mut self, letter: u8) {
         *self = Self { wires: self.wires, ..Self::new(letter) };
     }
@@ -52,7 +52,7 @@ impl Port {
         })
     }
 
-    /// `alternate_levels`: levels that peripherals give to their pins; `noise`: what floating pins show.
+    /// `alternate_levels`: levels that peripherals drive at their pins; `noise`: levels of floating pins.
     pub(crate) fn read(&self, offset: u32, alternate_levels: u32, noise: u32) -> u32 {
         match offset {
             0x00 => self.mode,
@@ -91,12 +91,12 @@ impl Port {
         self.mode >> (2 * pin) & 3
     }
 
-    /// Whether the pin belongs to this alternate function.
+    /// Whether the pin is set to this alternate function.
     pub(crate) fn is_alternate(&self, pin: u8, function: u32) -> bool {
         self.mode_of(pin) == 2 && self.alternate[usize::from(pin / 8)] >> (4 * (pin % 8)) & 15 == function
     }
 
-    /// Level of an input; `None` where nothing decides.
+    /// Level of an input; `None` if it floats.
     pub(crate) fn input(&self, pin: u8) -> Option<bool> {
         match (self.wires[usize::from(pin)], self.pull >> (2 * pin) & 3) {
             (Wire::Low, _) => Some(false),

@@ -4,7 +4,7 @@ use super::Bits;
 use crate::clock::{NEVER, Time, period};
 use crate::error::Violation;
 
-/// Periods of the oscillator until a new prescaler or reload value has arrived (21.4.4).
+/// Periods of the oscillator until a new prescaler or reload value takes effect (21.4.4).
 const UPDATE_PERIODS: Time = 5;
 
 /// The watchdog.
@@ -15,15 +15,15 @@ pub(crate) struct Iwdg {
     running: bool,
     prescaler: u32,
     reload: u32,
-    /// What the counter's side has seen.
+    /// Prescaler that has taken effect; likewise the reload value below.
     prescaler_seen: u32,
     reload_seen: u32,
     prescaler_at: Time,
     reload_at: Time,
     expires_at: Time,
-    /// The debugger lets it stand still since then.
+    /// Time at which the debugger froze it, if it has.
     frozen_at: Option<Time>,
-    /// It is started, but not wired: for the negative controls.
+    /// It can be started but resets nothing: for negative controls.
     pub(crate) ignored: bool,
 }
 
@@ -116,12 +116,12 @@ impl Iwdg {
         self.lsi * (4 << self.prescaler_seen.min(6))
     }
 
-    /// The counter begins again, from the reload value that its side has seen.
+    /// Reloads the counter with the reload value that has taken effect.
     fn restart(&mut self, now: Time) {
         self.expires_at = now + (Time::from(self.reload_seen) + 1) * self.count();
     }
 
-    /// The debugger halts the core with DBG_IWDG_STOP set, or lets it go on.
+    /// The debugger halts the core with DBG_IWDG_STOP set, or resumes it.
     pub(crate) fn freeze(&mut self, frozen: bool, now: Time) {
         if frozen {
             self.frozen_at = Some(now);
@@ -137,7 +137,7 @@ impl Iwdg {
         self.prescaler_at.min(self.reload_at).min(self.expires_at)
     }
 
-    /// Gives whether the microcontroller is reset now.
+    /// Processes what is due; returns whether the watchdog resets the chip now.
     pub(crate) fn advance(&mut self, now: Time) -> bool {
         if self.frozen_at.is_some() {
             return false;

@@ -12,7 +12,7 @@ pub(crate) mod pwm_timer;
 pub(crate) mod rcc;
 pub(crate) mod usart;
 
-/// Bits of a register.
+/// Kinds of the bits of a register, as masks; bits in no mask are reserved.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Bits {
     /// What software may write.
@@ -24,7 +24,7 @@ pub(crate) struct Bits {
 }
 
 impl Bits {
-    /// All others are reserved.
+    /// A register with these writable bits; all others are reserved.
     pub(crate) const fn writable(writable: u32) -> Self {
         Self { writable, read_only: 0, reserved_ones: 0 }
     }

@@ -6,29 +6,28 @@ use crate::chip::Chip;
 /// Thresholds of the detector (V), falling (datasheet, embedded reset and power control block).
 const THRESHOLDS: [f32; 8] = [2.04, 2.20, 2.33, 2.45, 2.62, 2.76, 2.87, 3.0];
 
-/// By how much the supply must rise above a threshold again (V; datasheet, hysteresis).
+/// Rise above a threshold that releases the detector again (V; datasheet, hysteresis).
 const HYSTERESIS_V: f32 = 0.1;
 
-/// Below it the chip is in reset, whatever the option bytes say (V; datasheet, VPDR).
+/// Supply below which the chip is in reset, whatever the option bytes say (V; datasheet, VPDR).
 pub(crate) const POWER_DOWN_V: f32 = 1.68;
 
-/// Below which supply the chip is in reset, as its option bytes say (BOR_LEV in FLASH_OPTCR).
+/// Brown-out level in the option bytes (BOR_LEV in FLASH_OPTCR): the supply below which the chip is in reset.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum BrownOut {
-    /// As delivered: the power-down threshold alone.
+    /// As delivered: only the power-down threshold applies.
     #[default]
     Off,
-    /// Level 1.
+    /// Level 1: reset below 2.19 V.
     Level1,
-    /// Level 2.
+    /// Level 2: reset below 2.50 V.
     Level2,
-    /// Level 3.
+    /// Level 3: reset below 2.83 V.
     Level3,
 }
 
 impl BrownOut {
-    /// The supply that resets the chip as it falls, and the one that lets it go as it rises (V; datasheet, VBOR,
-    /// VPDR).
+    /// The falling supply that resets the chip, and the rising supply that releases it (V; datasheet, VBOR, VPDR).
     pub(crate) fn thresholds_v(self) -> (f32, f32) {
         match self {
             BrownOut::Off => (POWER_DOWN_V, 1.72),
@@ -38,7 +37,7 @@ impl BrownOut {
         }
     }
 
-    /// FLASH_OPTCR: no protection (3.9.10).
+    /// FLASH_OPTCR with this level and without protection (3.9.10).
     pub(crate) fn option_control(self) -> u32 {
         let level = match self {
             BrownOut::Off => 3,
@@ -50,7 +49,7 @@ impl BrownOut {
     }
 }
 
-/// The registers.
+/// PWR's registers, and the supply.
 #[derive(Debug, Clone)]
 pub(crate) struct Power {
     chip: Chip,
@@ -91,7 +90,7 @@ impl Power {
         }
     }
 
-    /// Compares the supply with the threshold; gives whether it is below (line 16 of EXTI), and whether that is new.
+    /// Compares the supply with the threshold; returns whether it is below (EXTI line 16), and whether that changed.
     pub(crate) fn compare(&mut self) -> (bool, bool) {
         let threshold_v = THRESHOLDS[(self.control >> 5 & 7) as usize];
         let release_v = if self.is_below { threshold_v + HYSTERESIS_V } else { threshold_v };

@@ -14,7 +14,7 @@ const BREAK_FLAG: u32 = 1 << 7;
 /// Registers, their active copies, and the counter.
 #[derive(Debug, Clone)]
 pub(crate) struct PwmTimer {
-    /// The pin is that of the complementary output.
+    /// The pin in use is that of the complementary output.
     is_complementary: bool,
     control: u32,
     control2: u32,
@@ -39,7 +39,7 @@ pub(crate) struct PwmTimer {
     pub(crate) break_ignored: bool,
     /// Time for which the output was high, since power-on.
     pub(crate) high: Time,
-    /// When the counter was started, and the compare value changed, the last time.
+    /// When the counter was last started.
     pub(crate) started_at: Time,
 }
 
@@ -111,7 +111,7 @@ impl PwmTimer {
         }
     }
 
-    /// The caller has let the time pass before.
+    /// Writes a register; the caller has advanced the timer to `now`.
     pub(crate) fn write(&mut self, offset: u32, value: u32, now: Time) -> Result<(), Violation> {
         match offset {
             0x00 => {
@@ -147,7 +147,7 @@ impl PwmTimer {
                 }
                 self.mode = value;
             }
-            // One of both outputs: the other one's influence is not modelled.
+            // Only one of the two outputs: the influence of the other is not modelled.
             0x20 if value & !(3 * self.output()) == 0 => self.outputs = value,
             0x24 => self.count = value,
             0x28 => self.prescaler = value,
@@ -165,7 +165,7 @@ impl PwmTimer {
                 }
             }
             0x44 => self.protect(value),
-            // What is not used may be set to what it is.
+            // Registers that are not modelled may be written with zero.
             _ if value == 0 => {}
             _ => return Err(Violation::NotModelled("this function of TIM1")),
         }
@@ -199,13 +199,13 @@ impl PwmTimer {
         }
     }
 
-    /// Level of the pin BKIN; the caller has let the time pass before.
+    /// Sets the level of the pin BKIN; the caller has advanced the timer.
     pub(crate) fn break_input(&mut self, high: bool) {
         self.break_level = high;
         self.apply_break();
     }
 
-    /// The clock security system breaks too, if the break is enabled (17.3.12).
+    /// A failure found by the clock security system acts as a break too, if the break is enabled (17.3.12).
     pub(crate) fn clock_failure(&mut self) {
         if self.protection & 1 << 12 != 0 {
             self.protection &= !MAIN_OUTPUT;
@@ -238,8 +238,8 @@ impl PwmTimer {
         }
     }
 
-    /// The bit that enables the output: CC1E or CC1NE; the next one inverts it. By itself, the complementary output
-    /// has the reference's level, not its complement (17.4.9).
+    /// The bit that enables the output, CC1E or CC1NE; the next higher bit inverts it. If only the complementary
+    /// output is enabled, it has the reference's level, not its complement (17.4.9).
     fn output(&self) -> u32 {
         if self.is_complementary { 1 << 2 } else { 1 }
     }
@@ -248,7 +248,7 @@ impl PwmTimer {
         self.outputs & (2 * self.output()) != 0
     }
 
-    /// Whether the pin is high while the reference is.
+    /// Whether the pin follows the reference level, inverted or not.
     fn driven(&self) -> bool {
         self.protection & MAIN_OUTPUT != 0 && self.outputs & self.output() != 0
     }
@@ -280,7 +280,7 @@ impl PwmTimer {
         self.control & ENABLED != 0
     }
 
-    /// Timer clocks of a period in which the output is active.
+    /// Timer clocks per period for which the pin is high.
     pub(crate) fn active_clocks(&self) -> u32 {
         self.high_clocks(0, self.period_active + 1)
     }
@@ -290,13 +290,13 @@ impl PwmTimer {
         self.period_active + 1
     }
 
-    /// Lets time pass without a clock: the pin stays as it is.
+    /// Advances to `now` without counting: the pin keeps its level.
     pub(crate) fn stand_still(&mut self, now: Time) {
         self.high += if self.level() { now - self.synced } else { 0 };
         self.synced = now;
     }
 
-    /// Lets time pass; `tick` is the period of the timer's clock.
+    /// Advances the counter to `now`; `tick` is the period of the timer's clock.
     pub(crate) fn advance(&mut self, now: Time, tick: Time) {
         while self.synced < now {
             if self.control & ENABLED == 0 {
@@ -320,7 +320,7 @@ impl PwmTimer {
         }
     }
 
-    /// Clocks from one counter value to another at which the pin is high.
+    /// Number of clocks from one counter value to another during which the pin is high.
     fn high_clocks(&self, from: u32, to: u32) -> u32 {
         if !self.driven() {
             return if self.level_at(from) { to - from } else { 0 };

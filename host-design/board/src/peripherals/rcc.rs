@@ -21,14 +21,14 @@ pub(crate) const POWER_FLAG: u32 = 1 << 27;
 pub(crate) const SOFTWARE_FLAG: u32 = 1 << 28;
 pub(crate) const WATCHDOG_FLAG: u32 = 1 << 29;
 
-/// The high-speed external clock, as the board has it.
+/// The high-speed external clock (HSE) that the board provides.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Crystal {
     /// Frequency (Hz); 0: none is fitted.
     pub hz: u32,
-    /// Time to start.
+    /// Start-up time.
     pub start: Time,
-    /// Whether a clock comes in instead, for which the bypass must be set.
+    /// Whether a clock signal is fed in instead of a crystal, which requires HSEBYP.
     pub is_clock_input: bool,
 }
 
@@ -40,12 +40,12 @@ pub(crate) enum Domain {
     Apb2,
 }
 
-/// Registers and what they do.
+/// Registers, and the state of the clocks.
 #[derive(Debug, Clone)]
 pub(crate) struct Rcc {
     chip: Chip,
     crystal: Crystal,
-    /// The crystal no longer swings.
+    /// The crystal has stopped oscillating.
     pub(crate) crystal_stopped: bool,
     hsi: Time,
     control: u32,
@@ -59,9 +59,9 @@ pub(crate) struct Rcc {
     pll_ready_at: Time,
     lsi_ready_at: Time,
     system: Time,
-    /// The core has no clock: the PLL's source has stopped without anyone watching it.
+    /// The core has no clock: the crystal has stopped, and the clock security system was off.
     pub(crate) stopped: bool,
-    /// A failing crystal was noticed (7.2.7).
+    /// The clock security system has detected the failure of the crystal (7.2.7).
     pub(crate) security_event: bool,
 }
 
@@ -74,7 +74,7 @@ enum Source {
 }
 
 impl Rcc {
-    /// After power-on; `hsi_hz` is what the internal oscillator of this chip really has.
+    /// The state after power-on; `hsi_hz` is the actual frequency of HSI.
     pub(crate) fn new(chip: Chip, crystal: Crystal, hsi_hz: u32) -> Self {
         Self {
             chip,
@@ -97,7 +97,7 @@ impl Rcc {
         }
     }
 
-    /// A system reset: all but the flags of CSR, to which `flags` are added.
+    /// A system reset of everything but the flags of CSR, to which `flags` are added.
     pub(crate) fn reset(&mut self, flags: u32) {
         let (status, crystal_stopped) = (self.status, self.crystal_stopped);
         *self = Self::new(self.chip, self.crystal, frequency(self.hsi));
@@ -105,7 +105,7 @@ impl Rcc {
         self.crystal_stopped = crystal_stopped;
     }
 
-    /// Period of the core and of AHB.
+    /// Clock period of the core and of AHB.
     pub(crate) fn hclk(&self) -> Time {
         let code = self.configuration >> 4 & 15;
         let divisor = if code < 8 { 1 } else { [2, 4, 8, 16, 64, 128, 256, 512][code as usize - 8] };
@@ -121,12 +121,12 @@ impl Rcc {
         if code < 4 { 1 } else { 2 << (code - 4) }
     }
 
-    /// Period of a bus.
+    /// Clock period of a bus.
     pub(crate) fn pclk(&self, domain: Domain) -> Time {
         self.hclk() * self.apb_divisor(domain)
     }
 
-    /// Period of the timers of a bus: twice as fast where the bus is divided (7.2).
+    /// Clock period of the timers of a bus: half that of the bus if its clock is divided (7.2).
     pub(crate) fn timer_clock(&self, domain: Domain) -> Time {
         let divisor = self.apb_divisor(domain);
         self.hclk() * if divisor == 1 { 1 } else { divisor / 2 }
@@ -139,20 +139,20 @@ impl Rcc {
         (runs && divisor >= 2).then(|| period(self.crystal.hz) * divisor)
     }
 
-    /// When the peripheral with this bit may be used; `None` without clock.
+    /// When the peripheral with this bit may first be accessed; `None` if its clock is off.
     pub(crate) fn usable_at(&self, domain: Domain, bit: u32) -> Option<Time> {
         let enabled = self.enables[domain as usize] >> bit & 1 != 0;
         enabled.then_some(self.ready[domain as usize][bit as usize])
     }
 
-    /// A DSB: all enabling is through.
+    /// DSB: all clock enables have taken effect.
     pub(crate) fn writes_are_through(&mut self, now: Time) {
         for ready in self.ready.iter_mut().flatten().filter(|ready| **ready != NEVER) {
             *ready = (*ready).min(now);
         }
     }
 
-    /// When a flag changes the next time.
+    /// When a ready flag is next set.
     pub(crate) fn deadline(&self) -> Time {
         let future = |at: Time, flag_is_set: bool| if flag_is_set { NEVER } else { at };
         future(self.hse_ready_at, self.control & 1 << 17 != 0)
@@ -160,7 +160,7 @@ impl Rcc {
             .min(future(self.lsi_ready_at, self.status & 2 != 0))
     }
 
-    /// Sets flags whose time has come.
+    /// Updates the ready flags.
     pub(crate) fn advance(&mut self, now: Time) {
         let flag = |register: u32, bit: u32, at: Time| register & !(1 << bit) | u32::from(at <= now) << bit;
         self.control = flag(self.control, 17, self.hse_ready_at);
@@ -168,7 +168,7 @@ impl Rcc {
         self.status = flag(self.status, 1, self.lsi_ready_at);
     }
 
-    /// The crystal stops swinging.
+    /// The crystal stops oscillating.
     pub(crate) fn stop_crystal(&mut self) {
         self.crystal_stopped = true;
         let watched = self.control & CSS_ON != 0 && self.control & 1 << 17 != 0;
@@ -190,7 +190,7 @@ impl Rcc {
         }
     }
 
-    /// Whether the clock security system asks for the NMI.
+    /// Whether the clock security system requests the NMI.
     pub(crate) fn security_pending(&self) -> bool {
         self.interrupts & 1 << 7 != 0
     }
@@ -268,7 +268,8 @@ impl Rcc {
         Ok(())
     }
 
-    /// After a store and its own cycle, 2 cycles on AHB, 1 and the bus's divisor on APB (ES0182, 2.1.13).
+    /// Enables clocks. After the store's own cycle, they take 2 cycles on AHB and 1 plus the bus's divisor on APB
+    /// (ES0182, 2.1.13).
     fn enable(&mut self, domain: Domain, value: u32, now: Time) {
         let wait = (2 + self.apb_divisor(domain)) * self.hclk();
         let new = value & !self.enables[domain as usize];
@@ -315,7 +316,7 @@ impl Rcc {
         Ok(())
     }
 
-    /// Period of the PLL's output, within the limits of its parts (7.3.2).
+    /// Period of the PLL's output; an error if a factor or a frequency is outside its limits (7.3.2).
     fn pll_period(&self) -> Result<Time, Violation> {
         let (m, n) = (self.pll & 63, self.pll >> 6 & 0x1ff);
         let p = 2 * ((self.pll >> 16 & 3) + 1);

@@ -13,14 +13,14 @@ const RECEIVED: u32 = 1 << 5;
 const COMPLETE: u32 = 1 << 6;
 const EMPTY: u32 = 1 << 7;
 
-/// A byte on the line.
+/// A byte on the serial line, with its timing.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct LineByte {
-    /// Value.
+    /// The eight data bits.
     pub value: u8,
-    /// Time of its end.
+    /// Time at which its stop bit ends.
     pub end: Time,
-    /// Time of one bit.
+    /// Duration of one bit.
     pub bit: Time,
 }
 
@@ -33,14 +33,14 @@ pub(crate) struct Usart {
     guard: u32,
     data: u8,
     status_was_read: bool,
-    /// What shifts out, and what waits for it.
+    /// The byte that is shifted out, and the one that waits for it.
     shifting: Option<LineByte>,
     waiting: Option<u8>,
-    /// Bytes that come in, in order; the first may be on its way.
+    /// Bytes to be received, in order; the first may be in transit.
     pub(crate) incoming: VecDeque<LineByte>,
-    /// Bytes that have gone out.
+    /// Bytes that have been transmitted.
     pub(crate) sent: VecDeque<LineByte>,
-    /// Bytes that nobody fetched in time.
+    /// Number of bytes lost because the one before had not been read.
     pub(crate) overruns: u64,
     idle_at: Time,
 }
@@ -116,7 +116,7 @@ impl Usart {
         Ok(())
     }
 
-    /// Time of a bit: sixteen samples of the divided clock (30.3.4).
+    /// Duration of a bit: sixteen samples of the divided clock (30.3.4).
     fn bit(&self, pclk: Time) -> Time {
         pclk * Time::from(self.baud)
     }
@@ -129,7 +129,7 @@ impl Usart {
         self.control[0] & (1 << 13 | 1 << 2) == 1 << 13 | 1 << 2
     }
 
-    /// A byte for the transmitter; one that comes while another waits replaces it.
+    /// Writes a byte to the transmitter; it replaces one that is still waiting.
     pub(crate) fn transmit(&mut self, value: u8, now: Time, pclk: Time) {
         if !self.transmits() {
             return;
@@ -150,7 +150,7 @@ impl Usart {
         sending.min(coming).min(self.idle_at)
     }
 
-    /// Lets happen what is due; `connected`: whether the pins TX and RX are the USART's.
+    /// Processes what is due; `connected`: whether TX and RX are routed to pins.
     pub(crate) fn advance(&mut self, now: Time, pclk: Time, connected: (bool, bool)) {
         while let Some(byte) = self.shifting.filter(|byte| byte.end <= now) {
             if connected.0 {
@@ -178,7 +178,7 @@ impl Usart {
     }
 
     fn receive(&mut self, byte: LineByte, pclk: Time) {
-        // Ten bits are sampled in their middle: five per cent off is half a bit at the end (30.3.5).
+        // Bits are sampled in their middle: a baud rate that is 5 % off is half a bit off after ten bits (30.3.5).
         let own = self.bit(pclk);
         let fits = byte.bit.abs_diff(own) * 20 <= own;
         if self.status & RECEIVED != 0 {
@@ -210,12 +210,12 @@ impl Usart {
                 && self.status & (OVERRUN | FRAMING) != 0)
     }
 
-    /// Whether it asks the DMA to fetch a byte.
+    /// Whether it requests the DMA to fetch a received byte.
     pub(crate) fn wants_fetch(&self) -> bool {
         self.control[2] & 1 << 6 != 0 && self.status & RECEIVED != 0
     }
 
-    /// Whether it asks the DMA for a byte.
+    /// Whether it requests a byte to transmit from the DMA.
     pub(crate) fn wants_byte(&self) -> bool {
         self.control[2] & 1 << 7 != 0 && self.status & EMPTY != 0 && self.transmits()
     }

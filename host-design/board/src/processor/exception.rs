@@ -5,7 +5,7 @@ use crate::error::{Fault, Trap, Violation};
 use crate::instruction::Unit;
 use crate::machine::Machine;
 
-/// Cycles of an entry and of a return with nothing in the way (TRM, 3.9.1).
+/// Cycles of exception entry and return without contention (TRM, 3.9.1).
 const ENTRY_CYCLES: u32 = 12;
 const RETURN_CYCLES: u32 = 10;
 const TAIL_CHAIN_CYCLES: u32 = 6;
@@ -20,7 +20,7 @@ impl Machine {
         self.bus.system.nvic.executing(registers.primask, registers.faultmask, registers.basepri)
     }
 
-    /// Takes the most urgent exception, if it is urgent enough; gives whether it was.
+    /// Takes the pending exception of highest priority if it can preempt; returns whether it did.
     pub(crate) fn take_pending(&mut self) -> Result<bool, Violation> {
         self.bus.system.nvic.changed = false;
         let Some((exception, priority)) = self.bus.system.nvic.most_urgent() else {
@@ -61,7 +61,7 @@ impl Machine {
         }
     }
 
-    /// The handler begins: registers as B1.5.6 (ExceptionTaken) says.
+    /// Enters the handler, with the registers as in B1.5.6 (ExceptionTaken).
     fn start_handler(&mut self, exception: usize, return_code: u32) -> Result<(), Violation> {
         self.bus.system.nvic.activate(exception);
         self.bus.system.nvic.changed = true;
@@ -93,7 +93,7 @@ impl Machine {
         if self.registers.float_active { base & !0x10 } else { base }
     }
 
-    /// Stacks the frame; the space for floating point is left for later if FPCCR says so.
+    /// Stacks the frame; with lazy stacking (FPCCR), the floating-point registers only get their space reserved.
     fn push_frame(&mut self, return_address: u32) -> Result<(), Trap> {
         let with_float = self.registers.float_active && self.bus.system.fpccr & AUTOMATIC != 0;
         let size = if with_float { 0x68 } else { 0x20 };
@@ -138,7 +138,7 @@ impl Machine {
         self.store(address.wrapping_add(0x40), Unit::Word, self.registers.fpscr)
     }
 
-    /// The first floating-point instruction of a handler.
+    /// Completes lazy stacking, at the first floating-point instruction of a handler.
     pub(crate) fn save_float_lazily(&mut self) -> Result<(), Trap> {
         self.cycles += 17;
         self.store_float(self.bus.system.fpcar)?;
@@ -146,7 +146,7 @@ impl Machine {
         Ok(())
     }
 
-    /// A branch to an address whose lowest bit says Thumb, or, in a handler, to EXC_RETURN.
+    /// An interworking branch: to an address with the Thumb bit set or, in a handler, to EXC_RETURN.
     pub(crate) fn interwork(&mut self, target: u32) -> Result<(), Trap> {
         if self.registers.handler_mode() && target >> 28 == 15 {
             return self.exception_return(target);
@@ -175,7 +175,7 @@ impl Machine {
             self.registers.faultmask = false;
         }
         self.cycles += RETURN_CYCLES - 1;
-        // Tail-chaining: the next handler takes the frame over.
+        // Tail-chaining: the next handler reuses the stacked frame.
         let next = self.bus.system.nvic.most_urgent();
         if let Some((next, _)) = next.filter(|&(_, priority)| priority < self.executing_priority()) {
             self.cycles = TAIL_CHAIN_CYCLES;
@@ -223,7 +223,7 @@ impl Machine {
         Ok(())
     }
 
-    /// A fault of the instruction at the program counter; the run ends if the rules say so.
+    /// Takes the exception of the instruction at the program counter: SVC returns after it, a fault returns to it.
     pub(crate) fn fault(&mut self, fault: Fault) -> Result<(), Violation> {
         let pc = self.registers.pc;
         if let Fault::Supervisor = fault {
@@ -233,7 +233,7 @@ impl Machine {
         self.synchronous(exception, pc)
     }
 
-    /// Status and address registers (B3.2.15 to B3.2.18).
+    /// Sets the fault status and address registers (B3.2.15 to B3.2.18); returns the fault's exception.
     fn record(&mut self, fault: Fault) -> usize {
         let system = &mut self.bus.system;
         let (exception, bits) = match fault {
@@ -256,7 +256,8 @@ impl Machine {
         exception
     }
 
-    /// An exception that cannot wait: if it may not come, HardFault does; if that may not come either, lock-up.
+    /// A synchronous exception: if it is disabled or cannot preempt, it escalates to HardFault; if that cannot preempt
+    /// either, the core locks up.
     fn synchronous(&mut self, exception: usize, return_address: u32) -> Result<(), Violation> {
         let executing = self.executing_priority();
         let system = &mut self.bus.system;
@@ -273,10 +274,10 @@ impl Machine {
         self.enter(exception, return_address)
     }
 
-    /// A fault while a frame is stacked.
+    /// A derived fault: one that occurs while a frame is stacked.
     fn derived(&mut self, fault: Fault, bit: u32) -> Result<(), Violation> {
         self.bus.system.cfsr |= bit;
-        // HardFault and NMI begin without a frame: nothing could come before them, and it is no lock-up.
+        // HardFault and NMI are entered without a frame: no fault can preempt them, and this is no lock-up.
         if matches!(usize::from(self.registers.ipsr), nvic::NMI | nvic::HARD_FAULT) {
             return Ok(());
         }

@@ -1,9 +1,9 @@
 //! The flash accelerator (RM0090, 3.4.2), approximately: 64 instruction lines and 8 data lines of 128 bits.
 //!
-//! Lines that are fetched in sequence come from the prefetch unit and cost nothing; a jump to a line that is in no
-//! cache costs the wait states. Both caches are looked up by the line's address, not by age.
+//! Sequential fetches come from the prefetch unit and cost nothing; a jump to a line that is not cached costs the wait
+//! states. Both caches are direct-mapped: the address of a line decides which line it replaces, not age.
 
-/// Lines by their number.
+/// Numbers of the cached lines, and the settings of FLASH_ACR.
 #[derive(Debug, Clone)]
 pub(crate) struct FlashCache {
     instructions: [u32; 64],
@@ -24,7 +24,7 @@ impl FlashCache {
         }
     }
 
-    /// As FLASH_ACR says.
+    /// Applies a value of FLASH_ACR.
     pub(crate) fn configure(&mut self, acr: u32) {
         self.wait_states = acr & 7;
         self.instruction_cache = acr & 1 << 9 != 0;

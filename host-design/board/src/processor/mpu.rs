@@ -16,13 +16,13 @@ pub(crate) struct Mpu {
     pub(crate) control: u32,
     pub(crate) number: u32,
     regions: [Region; REGIONS],
-    /// It allows everything, whatever its registers say.
+    /// It allows every access, whatever its registers say.
     pub(crate) ignored: bool,
-    /// The last addresses that were allowed, by purpose and by the upper three bits; nothing since a register changed.
+    /// Cache of the blocks allowed last, by purpose and by the upper three address bits; emptied by register writes.
     known: [[Known; 8]; 3],
 }
 
-/// Addresses that are all allowed: those that are `begin` where `mask` is set.
+/// A block in which all addresses are allowed: those with `address & mask == begin`.
 #[derive(Debug, Clone, Copy)]
 struct Known {
     begin: u32,
@@ -32,7 +32,7 @@ struct Known {
 }
 
 impl Default for Known {
-    /// None.
+    /// A block without addresses.
     fn default() -> Self {
         Self { begin: 1, mask: 0, privileged: false, suspended: false }
     }
@@ -49,13 +49,13 @@ impl Region {
         (self.attributes >> 1 & 31) + 1
     }
 
-    /// Of how many bits the block around an address may be, at the most, for the region to cover all of it or nothing.
+    /// Size of the largest block around an address of which the region covers all or nothing, in address bits.
     fn uniform_bits(self, address: u32) -> u32 {
         let bits = self.size_bits();
         if self.attributes & 1 == 0 || bits < 5 {
             return 32;
         }
-        // The base counts from the size on.
+        // Base bits below the region's size do not count.
         let differs = address.checked_shr(bits).unwrap_or(0) ^ self.base.checked_shr(bits).unwrap_or(0);
         match differs.checked_ilog2() {
             Some(highest) => bits + highest,
@@ -70,7 +70,7 @@ impl Region {
             return false;
         }
         let inside = bits >= 32 || (address ^ self.base) >> bits == 0;
-        // Eight subregions, from 256 bytes on.
+        // Regions of 256 bytes or more have eight subregions.
         let subregion = if bits >= 8 { address >> (bits - 3) & 7 } else { 8 };
         inside && (subregion == 8 || self.attributes >> (8 + subregion) & 1 == 0)
     }
@@ -81,7 +81,7 @@ impl Mpu {
         self.control & 1 != 0 && !self.ignored
     }
 
-    /// Whether an access is allowed. `suspended`: in HardFault, NMI or with FAULTMASK.
+    /// Whether an access is allowed. `suspended`: in HardFault or NMI, or with FAULTMASK set.
     #[inline]
     pub(crate) fn allows(
         &mut self,
@@ -99,12 +99,12 @@ impl Mpu {
         self.ask(address, purpose, privileged, suspended)
     }
 
-    /// Decides, and remembers what is allowed.
+    /// Decides, and caches the block around an allowed address.
     #[cold]
     fn ask(&mut self, address: u32, purpose: Purpose, privileged: bool, suspended: bool) -> bool {
         let allowed = self.decide(address, purpose, privileged, suspended);
         if allowed {
-            // What is decided by the address alone changes with its upper bits.
+            // The default map and the system space are told apart by the upper address bits.
             let by_address = if address >> 29 == 7 { 20 } else { 29 };
             let bits =
                 self.regions.iter().fold(by_address, |bits, region| bits.min(region.uniform_bits(address)));
@@ -120,8 +120,8 @@ impl Mpu {
             return true;
         }
         let Some(region) = self.regions.iter().rev().find(|region| region.covers(address)) else {
-            // The default map for the privileged, where everything from 0x4000_0000 to 0x5fff_ffff and from
-            // 0xa000_0000 on is not executable.
+            // The default map, for privileged code only: 0x4000_0000 to 0x5fff_ffff and everything from
+            // 0xa000_0000 on are not executable.
             let executable = !matches!(address >> 29, 2 | 5..=7);
             return privileged && self.control & 4 != 0 && (purpose != Purpose::Execute || executable);
         };
@@ -171,7 +171,7 @@ impl Mpu {
 mod tests {
     use super::*;
 
-    /// The answers that are remembered are those that are found anew.
+    /// Cached decisions equal fresh ones.
     #[test]
     fn what_was_allowed_around_an_address_is_allowed_there() {
         let mut noise = 1u64;

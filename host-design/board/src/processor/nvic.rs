@@ -1,8 +1,8 @@
 //! Exceptions: enabled, pending, active, and their priorities (B1.5, B3.4).
 
-/// External interrupts of the largest chip here.
+/// Number of external interrupts of the largest chip here.
 pub(crate) const INTERRUPTS: usize = 97;
-/// All exception numbers.
+/// Number of exception numbers, external interrupts included.
 const EXCEPTIONS: usize = 16 + INTERRUPTS;
 
 pub(crate) const NMI: usize = 2;
@@ -42,7 +42,7 @@ impl Set {
         })
     }
 
-    /// 32 external interrupts.
+    /// 32 external interrupts, as a register of the NVIC holds them.
     pub(crate) fn word(self, word: usize) -> u32 {
         (self.0 >> (16 + 32 * word)) as u32
     }
@@ -58,7 +58,7 @@ impl Set {
     }
 }
 
-/// The controller.
+/// State of the interrupt controller.
 #[derive(Debug, Clone)]
 pub(crate) struct Nvic {
     pub(crate) enabled: Set,
@@ -66,11 +66,11 @@ pub(crate) struct Nvic {
     pub(crate) active: Set,
     /// Interrupt lines that are high now.
     pub(crate) lines: Set,
-    /// Four bits each, the upper ones of the byte.
+    /// Priorities, in the upper four bits of each byte.
     pub(crate) priority: [u8; EXCEPTIONS],
     /// AIRCR.PRIGROUP
     pub(crate) group: u8,
-    /// Something has changed that may let an exception come.
+    /// Something has changed that may cause an exception to be taken.
     pub(crate) changed: bool,
 }
 
@@ -96,7 +96,7 @@ impl Nvic {
         self.changed = true;
     }
 
-    /// The line of an external interrupt: pending while it is high (B3.4.1).
+    /// Sets the level of an external interrupt line; its rising edge makes the interrupt pending (B3.4.1).
     pub(crate) fn line(&mut self, interrupt: usize, high: bool) {
         let exception = 16 + interrupt;
         if high && !self.lines.has(exception) {
@@ -105,7 +105,7 @@ impl Nvic {
         self.lines.put(exception, high);
     }
 
-    /// Full priority; smaller is more urgent.
+    /// Full priority, subpriority included; a lower value is more urgent.
     fn of(&self, exception: usize) -> i32 {
         match exception {
             NMI => -2,
@@ -114,12 +114,12 @@ impl Nvic {
         }
     }
 
-    /// Priority that decides about preemption.
+    /// Group priority, which decides about preemption.
     fn grouped(&self, priority: i32) -> i32 {
         if priority < 0 { priority } else { priority & !((2 << self.group) - 1) }
     }
 
-    /// Priority at which the processor executes (B1.5.4).
+    /// Execution priority (B1.5.4); 256 in thread mode without masks.
     pub(crate) fn executing(&self, primask: bool, faultmask: bool, basepri: u8) -> i32 {
         let mut lowest = 256;
         for exception in self.active.members() {
@@ -137,7 +137,7 @@ impl Nvic {
         lowest
     }
 
-    /// The most urgent pending and enabled exception, and its preemption priority.
+    /// The pending and enabled exception of highest priority, and its group priority.
     pub(crate) fn most_urgent(&self) -> Option<(usize, i32)> {
         if self.pending.is_empty() {
             return None;
@@ -147,7 +147,7 @@ impl Nvic {
         Some((first, self.grouped(self.of(first))))
     }
 
-    /// Preemption priority of an exception.
+    /// Group priority of an exception.
     pub(crate) fn preemption(&self, exception: usize) -> i32 {
         self.grouped(self.of(exception))
     }
@@ -157,7 +157,7 @@ impl Nvic {
         self.active.put(exception, true);
     }
 
-    /// Ends a handler; an interrupt whose line is still high pends again.
+    /// Deactivates an exception at its return; an interrupt whose line is still high becomes pending again.
     pub(crate) fn deactivate(&mut self, exception: usize) {
         self.active.put(exception, false);
         if self.lines.has(exception) {

@@ -3,22 +3,22 @@
 /// All registers that an instruction can name.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) struct Registers {
-    /// R0 to R14; the fifteenth is, while an instruction executes, its address and four.
+    /// R0 to R14; while an instruction executes, R15 is its address plus 4.
     pub(crate) r: [u32; 16],
     /// The stack pointer that is not in use.
     pub(crate) other_sp: u32,
-    /// Address of the instruction.
+    /// Address of the next instruction, or of the one that executes.
     pub(crate) pc: u32,
     pub(crate) n: bool,
     pub(crate) z: bool,
     pub(crate) c: bool,
     pub(crate) v: bool,
     pub(crate) q: bool,
-    /// Flags of the parallel additions.
+    /// GE flags, which parallel additions and subtractions set.
     pub(crate) ge: u8,
-    /// State of the IT block; 0 outside.
+    /// ITSTATE; 0 outside an IT block.
     pub(crate) it: u8,
-    /// Number of the exception that is handled; 0 in thread mode.
+    /// Number of the active exception; 0 in thread mode.
     pub(crate) ipsr: u16,
     pub(crate) primask: bool,
     pub(crate) faultmask: bool,
@@ -29,13 +29,13 @@ pub(crate) struct Registers {
     pub(crate) process_stack: bool,
     /// CONTROL.FPCA
     pub(crate) float_active: bool,
-    /// The singles.
+    /// Single-precision registers S0 to S31, as bits.
     pub(crate) s: [u32; 32],
     pub(crate) fpscr: u32,
 }
 
 impl Registers {
-    /// After a reset; what the architecture leaves open comes from `unknown`.
+    /// The state after a reset; registers whose reset value is UNKNOWN are filled from `unknown`.
     pub(crate) fn after_reset(mut unknown: impl FnMut() -> u32) -> Self {
         Self {
             r: std::array::from_fn(|_| unknown()),
@@ -64,7 +64,7 @@ impl Registers {
         self.r[usize::from(register & 15)]
     }
 
-    /// Writes R0 to R14; a stack pointer is a multiple of four.
+    /// Writes R0 to R14; the lower two bits of the stack pointer are cleared.
     pub(crate) fn set(&mut self, register: u8, value: u32) {
         let value = if register == 13 { value & !3 } else { value };
         self.r[usize::from(register & 15)] = value;
@@ -93,7 +93,7 @@ impl Registers {
         holds != (condition & 1 != 0)
     }
 
-    /// Ends one instruction of an IT block.
+    /// Advances ITSTATE by one instruction.
     pub(crate) fn advance_it(&mut self) {
         self.it = if self.it & 7 == 0 { 0 } else { self.it & 0xe0 | self.it << 1 & 0x1f };
     }
@@ -129,7 +129,7 @@ impl Registers {
         self.ipsr = (bits & 0x1ff) as u16;
     }
 
-    /// Whether handlers' rights and stack are in use.
+    /// Whether the processor is in handler mode.
     pub(crate) fn handler_mode(&self) -> bool {
         self.ipsr != 0
     }
@@ -138,7 +138,7 @@ impl Registers {
         self.handler_mode() || !self.unprivileged
     }
 
-    /// Which stack pointer register 13 is.
+    /// Whether R13 is the process stack pointer.
     pub(crate) fn uses_process_stack(&self) -> bool {
         self.process_stack && !self.handler_mode()
     }

@@ -5,7 +5,7 @@ use super::nvic::{self, Nvic};
 use crate::clock::{NEVER, Time};
 use crate::error::{Trap, Violation};
 
-/// Bits of CCR that are modelled: STKALIGN, and that division by zero and unaligned accesses do not trap.
+/// Value of CCR that is modelled: STKALIGN set; division by zero and unaligned accesses do not trap.
 const CCR_RESET: u32 = 1 << 9;
 
 /// The registers, and the counters behind them.
@@ -28,28 +28,28 @@ pub(crate) struct System {
     demcr: u32,
     dwt_control: u32,
     cycles: Cycles,
-    /// A system reset was asked for.
+    /// A system reset was requested (SYSRESETREQ).
     pub(crate) reset_requested: bool,
 }
 
-/// A counter of processor cycles.
+/// The cycle counter: its value `base` at the time `since`.
 #[derive(Debug, Clone, Copy)]
 struct Cycles {
     base: u32,
     since: Time,
 }
 
-/// The tick's timer (B3.3).
+/// The SysTick timer (B3.3).
 #[derive(Debug, Clone)]
 struct SysTick {
     control: u32,
     reload: u32,
-    /// When it comes to zero the next time.
+    /// When it next reaches zero.
     zero_at: Time,
-    /// Its value while it stands still.
+    /// Its value while it is disabled.
     stopped_at: u32,
     counted: bool,
-    /// The debugger has halted the core since then.
+    /// Time at which the debugger halted the core, if it has.
     frozen_at: Option<Time>,
 }
 
@@ -113,13 +113,13 @@ impl System {
         }
     }
 
-    /// When something happens here by itself.
+    /// When SysTick next reaches zero.
     pub(crate) fn deadline(&self) -> Time {
         let counts = self.systick.control & 1 != 0 && self.systick.reload != 0;
         if counts && self.systick.frozen_at.is_none() { self.systick.zero_at } else { NEVER }
     }
 
-    /// The debugger halts the core, or lets it go on.
+    /// The debugger halts the core or resumes it.
     pub(crate) fn freeze(&mut self, halted: bool, now: Time) {
         if halted {
             self.systick.frozen_at = Some(now);
@@ -128,12 +128,12 @@ impl System {
         }
     }
 
-    /// When the tick's timer interrupts the next time; `None` if it does not.
+    /// When SysTick next interrupts; `None` if it does not.
     pub(crate) fn next_tick(&self) -> Option<Time> {
         Some(self.deadline()).filter(|&at| at != NEVER && self.systick.control & 2 != 0)
     }
 
-    /// Lets happen what is due.
+    /// Processes SysTick events that are due.
     pub(crate) fn advance(&mut self, now: Time, hclk: Time) {
         while self.deadline() <= now {
             self.systick.counted = true;
@@ -144,7 +144,7 @@ impl System {
         }
     }
 
-    /// The core's clock changes from one period to another.
+    /// The core clock changes from period `old` to `new`.
     pub(crate) fn change_clock(&mut self, now: Time, old: Time, new: Time) {
         self.cycles = Cycles { base: self.cycle_count(now, old), since: now };
         if self.systick.control & 1 != 0 {
@@ -153,7 +153,7 @@ impl System {
         }
     }
 
-    /// DWT_CYCCNT, if it counts.
+    /// Value of DWT_CYCCNT.
     pub(crate) fn cycle_count(&self, now: Time, hclk: Time) -> u32 {
         if self.demcr & 1 << 24 != 0 && self.dwt_control & 1 != 0 {
             self.cycles.base.wrapping_add(((now - self.cycles.since) / hclk) as u32)
@@ -307,7 +307,7 @@ impl System {
             | bit(nvic::NMI, 31)
     }
 
-    /// A byte of a priority register, or of one of the fault status.
+    /// Writes a byte of a priority register; returns whether there is one at this address.
     pub(crate) fn write_byte(&mut self, address: u32, value: u8) -> bool {
         self.nvic.changed = true;
         let exception = match address {
@@ -343,7 +343,7 @@ impl System {
     }
 }
 
-/// Number of a word among the eight of a kind of NVIC registers.
+/// Index of a register in its array of NVIC registers.
 fn word(address: u32) -> usize {
     (address >> 2 & 7) as usize
 }

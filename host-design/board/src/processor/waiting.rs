@@ -1,21 +1,21 @@
-//! Waiting loops, skipped ahead without changing what happens.
+//! Skipping of waiting loops, without changing any result.
 //!
-//! A loop that stores nothing, reads nothing that changes by itself before the next deadline, and comes round with the
-//! same registers does the same thing until that deadline. One register may count down by a constant per turn, if the
-//! loop uses it for one subtraction of that constant alone: then the flags stay the same until it comes near zero.
+//! A loop that stores nothing, reads nothing that changes before the next deadline, and ends each iteration with the
+//! same registers repeats until that deadline. One register may count down by a constant per iteration, if the loop
+//! uses it in one subtraction of that constant only: then the flags stay the same until it comes near zero.
 
 use crate::clock::Time;
 use crate::instruction::{Alu, Op, Operand};
 use crate::machine::Machine;
 use crate::processor::registers::Registers;
 
-/// Turns that may be skipped, and the register that counts them with its step.
+/// Number of iterations that may be skipped, and the register that counts them down, with its step.
 type Skip = (u64, Option<(usize, u32)>);
 
-/// Longest loop that is looked at (instructions).
+/// Longest loop that is considered (instructions).
 const LONGEST: u64 = 32;
 
-/// The last turn of a loop.
+/// The last iteration of a loop.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Watch {
     head: u32,
@@ -36,7 +36,7 @@ impl Watch {
 }
 
 impl Machine {
-    /// Called after a jump backwards, with the program counter at the loop's head.
+    /// Called after a backward branch, with the program counter at the loop's head.
     pub(crate) fn skip_waiting(&mut self, end: Time) {
         let head = self.registers.pc;
         let (now, executed) = (self.bus.now, self.executed);
@@ -71,7 +71,7 @@ impl Machine {
         }
     }
 
-    /// How many turns may be skipped, and which register counts them; none if this is no waiting loop.
+    /// How many iterations may be skipped, and which register counts them; `None` if this is not a waiting loop.
     fn turns_without_change(&mut self, last: u32) -> Option<Skip> {
         let before = &self.watch.since.as_ref()?.0;
         let mut counter = None;
@@ -97,7 +97,7 @@ impl Machine {
         Some((turns, Some((counter, step))))
     }
 
-    /// Whether a stretch of code uses a register for `subs r, r, #step` alone.
+    /// Whether the code from `head` to `last` uses a register in one `subs r, r, #step` only.
     fn only_counts(&mut self, head: u32, last: u32, counter: u8, step: u32) -> bool {
         let mut pc = head;
         let mut seen = 0;
@@ -130,7 +130,7 @@ impl Machine {
 
     fn skip(&mut self, end: Time, span: Time, count: u64, (limit, counter): Skip) {
         let until = self.bus.deadline.min(end);
-        // The turn in which the deadline falls is executed.
+        // The iteration in which the deadline falls is executed.
         let turns = ((until - self.bus.now) / span).saturating_sub(1).min(limit);
         self.bus.now += turns * span;
         self.executed += turns * count;

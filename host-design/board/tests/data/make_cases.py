@@ -1,21 +1,22 @@
 #!/usr/bin/env python3
-"""Makes `cases.bin.gz`: single instructions (and IT blocks) on random states, with the answers of unicorn.
+"""Makes `cases.bin.gz`: single instructions (and IT blocks) executed from random states, with the results of unicorn.
 
 Needs: pip install unicorn (2.1.4 was used), llvm-mc and llvm-objdump (14 was used), an image.
 Usage: make_cases.py IMAGE OUTPUT
 
-Every distinct encoding in the image is executed on several states, and so are its neighbours: a list of templates for
-the other instructions of ARMv7E-M with FPv4-SP, assembled with random registers and constants. Left out: jumps to random
+Every distinct encoding in the image is executed from several states. So are its neighbours: the other instructions of
+ARMv7E-M with FPv4-SP, from a list of templates assembled with random registers and constants. Left out: jumps to random
 addresses, SVC, BKPT, UDF, WFI, CPS, MSR and MRS (directed programs cover them).
 
-A state follows from a seed by splitmix64, in the same way here and in `tests/suite/unicorn.rs`; memory holds splitmix64 of
-the word's address. A case stores code, seed, kind of state and what has changed: registers, flags, words of memory.
+A state is generated from a seed by splitmix64, in the same way here and in `tests/suite/independent_answers.rs`; each
+word of memory holds splitmix64 of its address. A case stores code, seed, kind of state and what has changed: registers,
+flags, words of memory.
 
-Record, little endian: u8 length of code, code, u8 number of instructions, u8 kind (0 data, 1 addresses, 2 jumps, 3 aligned
-addresses: unicorn does not know that LDM, LDRD, VLDR and their like fault on unaligned ones),
+Record, little endian: u8 length of code, code, u8 number of instructions, u8 kind (0 data, 1 addresses, 2 jumps,
+3 aligned addresses: unicorn does not model that LDM, LDRD, VLDR and the like fault on unaligned ones),
 u8 register that is a small index (255: none), u32 seed, u8 number of changes, changes (u8 register, u32 value;
 0-14 R, 15 PC, 16 APSR, 17 FPSCR, 18-49 S), u8 number of writes, writes (u16 offset of a byte in SRAM, u8 value).
-The highest bit of the kind says that the code is in the image.
+The highest bit of the kind is set if the code is in the image.
 """
 import gzip
 import random
@@ -97,7 +98,7 @@ class Oracle:
         self.uc.ctl_set_cpu_model(a.UC_CPU_ARM_CORTEX_M4)
         self.uc.mem_map(SRAM, SIZE)
         self.uc.mem_write(SRAM, MEMORY)
-        # The first floating-point instruction sets FPSCR to its default: not in a case.
+        # The first floating-point instruction sets FPSCR to its default; executed here, so that no case is affected.
         self.uc.mem_write(CODE, bytes.fromhex("b0ee400a"))
         self.uc.emu_start(CODE | 1, CODE + 4)
         self.writes = []

@@ -114,7 +114,7 @@ fn the_watchdogs_first_period_is_the_long_one_while_the_reload_is_on_its_way() {
         }
         0
     };
-    // At once: the counter begins from 0xfff again: 512 ms (BOARD finding; 21.4.4).
+    // Restarted at once, the counter begins from 0xfff again: 512 ms (BOARD finding; 21.4.4).
     assert_eq!(time_of_reset(&set_up.clone().write(IWDG, 0xaaaa)), 512 + 1);
     // After RVU is clear: 25 counts of 125 µs.
     let patient = set_up.set(3, 4_000).raw(&[0x3b01, 0xd1fd]).write(IWDG, 0xaaaa);
@@ -139,7 +139,7 @@ fn bytes_take_their_time_both_ways_and_overruns_lose() {
     let sent = board.sent();
     assert_eq!(sent.iter().map(|byte| byte.value).collect::<Vec<_>>(), [0x41, 0x42]);
     assert_eq!(sent[1].end - sent[0].end, 10 * 139 * (UNITS_PER_SECOND / 16_000_000));
-    // Nobody fetches: the second byte is lost.
+    // The program does not read the first byte, so the second is lost.
     board.send(&[1, 2], 115_200);
     board.run_until(800 * US).unwrap();
     assert_eq!(board.lost().0, 1);
@@ -225,7 +225,7 @@ fn encoders_count_and_the_filter_swallows_what_is_too_fast() {
     };
     assert_eq!(turned(5, 100 * US, 200 * US), (5, 0));
     assert_eq!(turned(-5, 100 * US, 200 * US), (0xfffb, 0));
-    // At once, as a test may put it.
+    // A movement without duration.
     assert_eq!(turned(7, 100 * US, 100 * US), (7, 0));
     // An edge every 100 ns: a level stays for 200 ns, and the filter wants eight samples, 500 ns.
     assert_eq!(turned(1_000, 100 * US, 200 * US), (0, 1_000));

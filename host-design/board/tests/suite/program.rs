@@ -4,7 +4,7 @@ use upright_board::{Board, Conditions, Image, Rules, Stopped};
 
 /// End of the stack of every program.
 pub(crate) const STACK: u32 = 0x2000_2000;
-/// Where programs leave what they have seen.
+/// Address at which programs log what they have read.
 pub(crate) const LOG: u32 = 0x2000_4000;
 
 pub(crate) const NOP: u16 = 0xbf00;

@@ -1,4 +1,4 @@
-//! Each strictness, by a program that breaks it; and the same programs, mended, run.
+//! Every strict rule is broken by a program that must not run; the same programs without the mistake do run.
 
 use crate::program::{APB2ENR, Code, SYNC, clocks_on, run};
 use upright_board::Violation;
@@ -114,7 +114,7 @@ fn clocks_outside_their_limits_end_the_run() {
     let pll = Code::new()
         .write(0x4002_3804, 0x2000_0000 | 7 << 24 | 336 << 6 | 16)
         .write(0x4002_3800, 1 << 24 | 0x81)
-        // Longer than it takes to lock: 4000 turns.
+        // 4000 iterations: longer than the PLL takes to lock.
         .set(3, 4000)
         .raw(&[0x3b01, 0xd1fd]);
     let with = |acr: u32, cfgr: u32| pll.clone().write(0x4002_3c00, acr).write(0x4002_3808, cfgr);
@@ -139,7 +139,7 @@ fn forbidden_settings_and_unknown_modes_end_the_run() {
     // A conversion at once after the converter is switched on; a reserved pull.
     assert!(matches!(breaks(write(0x4001_2008, 1).write(0x4001_2008, 0x4000_0001)), Violation::Forbidden(_)));
     assert!(matches!(breaks(write(0x4002_040c, 3)), Violation::Forbidden(_)));
-    // Centred PWM, an input capture on an encoder's timer, sleep without clocks.
+    // Centre-aligned PWM, a slave mode of an encoder's timer that is not modelled, SLEEPDEEP.
     assert!(matches!(breaks(write(0x4001_0000, 0x20)), Violation::NotModelled(_)));
     assert!(matches!(breaks(write(0x4000_0008, 4)), Violation::NotModelled(_)));
     assert!(matches!(breaks(write(0xe000_ed10, 4)), Violation::NotModelled(_)));

@@ -18,16 +18,16 @@ use upright_design::rig::{PlantDescription, Rig};
 use upright_design::simulate::Begin;
 use upright_design::table::TableValues;
 
-/// What a campaign is run with.
+/// Settings of a campaign.
 #[derive(Debug, Clone, Copy)]
 pub struct Setup<'a> {
     /// The rig.
     pub rig: &'a Rig,
     /// Its gain table.
     pub table: &'a TableValues,
-    /// Where the firmware runs; a new one for each trial.
+    /// Where the firmware runs; it is started again for each trial.
     pub place: Place<'a>,
-    /// Whether the firmware has its thresholds and limits. Without them it cannot find most defects.
+    /// Whether the firmware has its thresholds and limits. Without them it cannot detect most defects.
     pub detection: bool,
     /// Whether a board has its guards: watchdog, break input, MPU, registers that are read back.
     pub guards: bool,
@@ -50,12 +50,12 @@ pub enum During<'a> {
 const LONGEST_S: f64 = 6.0;
 /// Ticks watched after the motor went off: the fault is known a tick later, and the motor has to stay off.
 const TICKS_AFTER: usize = 12;
-/// The same at the most on a board, which may have to start again first (s): without a crystal it waits for that.
+/// Longest such time on a board, which may have to restart first (s): without a crystal it waits for one.
 const LONGEST_START_S: f64 = 0.8;
-/// While the rig is shaken, a firmware without limits takes angles for so many times smaller ones, and waits for so
-/// many times the impulse until it says that something stands still.
+/// Factor for a firmware without limits while the rig is shaken: it takes angles for this many times smaller ones, and
+/// needs this many times the impulse before it reports that something stands still.
 const BLIND: f32 = 100.0;
-/// A true angle or position beyond its limit by more than this share is too late, whatever follows.
+/// A true angle that exceeds its limit by more than this share means that any detection comes too late.
 pub(super) const BEYOND: f64 = 0.25;
 
 /// Runs the trial, with its defect or, for comparison, without.
@@ -67,7 +67,7 @@ pub(super) fn attempt(setup: &Setup<'_>, trial: &Trial, with_defect: bool) -> Re
         let mut blind = setup.table.clone().without_detection();
         match setup.during {
             During::Balancing => {}
-            // What it takes to tell the motor's sign.
+            // Movement of the cart that is needed to determine the motor's sign.
             During::BenchDrive => blind.limits.sign_counts[0] = 0,
             During::Shaking(_) => blind_while_shaken(&mut blind),
         }
@@ -87,7 +87,8 @@ pub(super) fn attempt(setup: &Setup<'_>, trial: &Trial, with_defect: bool) -> Re
     Ok(observed)
 }
 
-/// The limits of angles and rates while the rig is shaken are not in the table, so angles are taken for smaller ones.
+/// The limits of angles and rates while the rig is shaken are not in the table, so the angles per count are made
+/// smaller.
 fn blind_while_shaken(table: &mut TableValues) {
     table.limits.bench_force_n *= BLIND;
     if let Some(observer) = &mut table.observer {
@@ -95,7 +96,7 @@ fn blind_while_shaken(table: &mut TableValues) {
     }
 }
 
-/// The way to a board's own defects.
+/// What is needed to inject defects that only a board has.
 pub(super) struct OnBoard<'a> {
     image: &'a upright_board::Image,
     receive: upright_board::Pin,
@@ -188,7 +189,7 @@ impl Attempt<'_> {
         Ok(observed)
     }
 
-    /// Asks a board that went off without a fault why it has started again.
+    /// Asks a board whose motor went off without a fault why it has restarted.
     pub(super) fn find_reason(&self, harness: &mut Harness<'_>, observed: &mut Observed) {
         if self.board.is_some() && observed.off.is_some() && observed.fault.is_none() {
             observed.fault = self.reason(harness);
@@ -196,7 +197,7 @@ impl Attempt<'_> {
         observed.dead |= observed.fault == Some(Fault::Crash);
     }
 
-    /// Why a board that has started again has done so.
+    /// The fault that stands for the reason of a board's last reset, if any.
     fn reason(&self, harness: &mut Harness<'_>) -> Option<Fault> {
         let inputs = harness.inputs();
         match harness.session.ask(Request::Info, &inputs) {
@@ -217,7 +218,7 @@ impl Attempt<'_> {
         harness.session.tick(&inputs)
     }
 
-    /// What the firmware reads in this tick, and what begins in it.
+    /// The firmware's inputs in this tick; also starts what begins in it.
     pub(super) fn pins(
         &self,
         harness: &mut Harness<'_>,
@@ -261,7 +262,7 @@ impl Attempt<'_> {
             may_wait && matches!(trial.expected(), Expected::Off(_)) && observed.is_undecided();
         let last =
             trial.onset + if is_undecided { self.ticks(LONGEST_S).max(trial.watched) } else { trial.watched };
-        // A board that starts again tells the reason as soon as it runs.
+        // A board that restarts reports the reason as soon as it runs.
         let starts = self.board.is_some() && observed.fault.is_none();
         match observed.off {
             Some(off) => tick > off + self.ticks_after(starts) || (!starts && tick >= last),
@@ -269,7 +270,7 @@ impl Attempt<'_> {
         }
     }
 
-    /// Ticks watched after the motor went off, on a board that may have to start again first (`starts`).
+    /// Ticks watched after the motor went off; more on a board that may have to restart first (`starts`).
     pub(super) fn ticks_after(&self, starts: bool) -> usize {
         if starts { self.ticks(LONGEST_START_S) } else { TICKS_AFTER }
     }
@@ -319,7 +320,7 @@ impl Attempt<'_> {
         Some(absolute_angles(&state).collect())
     }
 
-    /// The kinds that are there at power-up: arming has to be refused.
+    /// Runs a defect that is present at power-up: arming has to be refused.
     fn power_up(&self, target: &mut dyn Target) -> Result<Observed, HarnessError> {
         let mut observed = Observed::default();
         let mut session = Session::new(target);
@@ -344,7 +345,7 @@ impl Attempt<'_> {
         Ok(observed)
     }
 
-    /// Until the links hang, homed and checked.
+    /// Homes the rig and checks its signs by hand; then the links hang.
     pub(super) fn until_checked(&self, harness: &mut Harness<'_>) -> Result<(), HarnessError> {
         for tick in 0.. {
             harness.by_hand(tick)?;
@@ -355,7 +356,7 @@ impl Attempt<'_> {
         Ok(())
     }
 
-    /// The kinds in which arming has to be refused.
+    /// Runs a trial in which arming has to be refused.
     fn arm(&self, harness: &mut Harness<'_>) -> Result<Observed, HarnessError> {
         let mut observed = Observed::default();
         let mut stopped = false;

@@ -1,4 +1,4 @@
-//! A defect that a person begins, in a rig that runs.
+//! A defect that a person starts while the rig runs.
 
 use upright::board::Output;
 use upright_design::harness::{Pins, Session};
@@ -10,7 +10,7 @@ use super::defect::{Expected, Kind};
 use super::injection::Injection;
 use super::trial::{Phase, Trial};
 
-/// A rig with a defect, tick by tick.
+/// A defect in a running rig, injected tick by tick.
 pub struct Defective<'a> {
     injection: Injection<'a>,
     kind: Kind,
@@ -18,8 +18,8 @@ pub struct Defective<'a> {
 }
 
 impl Kind {
-    /// Whether a person can let it begin while the rig balances: it is in what the firmware reads and drives, not in
-    /// the board's parts.
+    /// Whether a person can start it while the rig balances: it changes what the firmware reads or drives, not parts
+    /// of the board.
     pub fn can_begin_while_balancing(self) -> bool {
         let is_before_balancing = matches!(self.expected(), Expected::Refused(_));
         !is_before_balancing && !self.needs_process() && !self.needs_board()
@@ -79,7 +79,7 @@ impl<'a> Defective<'a> {
         self.kind
     }
 
-    /// Does what happens once: bytes on the serial line, or a fault inside the microcontroller.
+    /// Injects what happens only once: bytes on the serial line, or a fault inside the microcontroller.
     pub fn begin(&mut self, session: &mut Session<'_>) {
         self.injection.serial(session);
         if let Some(sabotage) = self.kind.inside_the_microcontroller() {
@@ -87,7 +87,7 @@ impl<'a> Defective<'a> {
         }
     }
 
-    /// Whether the host is still heard.
+    /// Whether the host still sends heartbeats.
     pub fn host_is_alive(&self) -> bool {
         self.injection.host_is_alive(Some(self.since))
     }

@@ -71,15 +71,15 @@ pub enum Kind {
 /// The outcome that a defect must have.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Expected {
-    /// Motor off with this fault, at most this number of ticks after the onset. Where the list of faults gives no
-    /// number, the rig's limits do.
+    /// Motor off with this fault, at most this number of ticks after the onset. Where the list of faults has no
+    /// number, it follows from the rig's limits.
     Fault(Fault, Ticks),
-    /// Motor off, with any fault. At its best that takes this number of ticks from the first visible difference to a
-    /// healthy rig; in any case it comes before a link is far beyond its limit.
+    /// Motor off, with any fault, before a link is far beyond its limit. At best this takes the given number of ticks
+    /// from the first visible difference to a healthy rig.
     Off(u32),
-    /// Balancing goes on, and the rejected measurement is counted.
+    /// Balancing continues, and the rejected measurement is counted.
     Counted,
-    /// Balancing goes on, with every output bit for bit as without the defect.
+    /// Balancing continues, with every output bit for bit as without the defect.
     Ignored,
     /// Motor off, with any fault, before a link is far beyond its limit.
     Changed,
@@ -87,23 +87,23 @@ pub enum Expected {
     Bounded,
     /// The firmware refuses to arm, for these reasons at least.
     Refused(Inhibits),
-    /// The motor is off in the same tick, and the firmware does not run on.
+    /// The motor is off in the same tick, and the firmware stops running.
     Dead,
-    /// A bench drive ends without a fault, so long after the last command as after a key that was let go; a rig that
-    /// was shaken brings its cart back first.
+    /// A bench drive ends without a fault, as soon after the last command as when the key is released; a rig that was
+    /// shaken brings its cart back first.
     LetGo,
     /// A bench drive ends with this finding about the motor, which keeps it from arming.
     Found(MotorSign),
 }
 
-/// A number of ticks.
+/// Number of ticks within which a fault must turn the motor off.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Ticks {
     /// This number.
     Exactly(u32),
-    /// Those of `supply_time_s`, and one.
+    /// The ticks of `supply_time_s`, plus one.
     Supply,
-    /// `link_timeout_s`, from the last command on.
+    /// The ticks of `link_timeout_s` from the last command on, plus those that its bytes take.
     Link,
 }
 
@@ -134,7 +134,7 @@ impl Kind {
             (
                 Kind::SupplySurge,
                 "supply-surge",
-                "the supply rises to 1.3 to 1.6 times the motor's voltage, as by a motor that brakes",
+                "the supply rises to 1.3 to 1.6 times the motor's voltage, as when the motor brakes",
                 Fault(F::Supply, Exactly(3)),
             ),
             (Kind::SupplySpike, "supply-spike", "the same for one or two ticks", Ignored),
@@ -167,10 +167,10 @@ impl Kind {
             (Kind::CountsLost, "counts-lost", "an encoder loses a count every 5 to 50 ticks", Bounded),
             (Kind::SensorLate, "sensor-late", "an encoder's measurements are 1 to 20 ticks late", Bounded),
             (Kind::SensorIntermittent, "sensor-intermittent", "two of three measurements are wrong", Bounded),
-            (Kind::MotorDead, "motor-dead", "the motor gives no force", Off(20)),
+            (Kind::MotorDead, "motor-dead", "the motor produces no force", Off(20)),
             (Kind::MotorReversed, "motor-reversed", "the motor's force has the wrong sign", Off(5)),
-            (Kind::MotorStuck, "motor-stuck", "the motor gives full force to one side", Off(5)),
-            (Kind::MotorWeak, "motor-weak", "the motor gives 10 to 50 % of the force", Bounded),
+            (Kind::MotorStuck, "motor-stuck", "the motor produces full force to one side", Off(5)),
+            (Kind::MotorWeak, "motor-weak", "the motor produces 10 to 50 % of the force", Bounded),
             (Kind::Push, "push", "a push on the cart for 50 ms, with up to the force limit", Bounded),
             (
                 Kind::HostSilent,
@@ -178,7 +178,7 @@ impl Kind {
                 "a host that commands the set-point sends nothing more",
                 Fault(F::LinkLost, Link),
             ),
-            (Kind::HostDeaf, "host-deaf", "nobody reads the serial line any more", Ignored),
+            (Kind::HostDeaf, "host-deaf", "the host stops reading the serial line", Ignored),
             (Kind::FrameDamaged, "frame-damaged", "a disarm command with a wrong bit", Ignored),
             (Kind::FrameTruncated, "frame-truncated", "a disarm command without its last bytes", Ignored),
             (Kind::FrameReplayed, "frame-replayed", "a disarm command with an old number", Ignored),
@@ -205,16 +205,21 @@ impl Kind {
             (
                 Kind::StalledTick,
                 "stalled-tick",
-                "the processor stands still during a tick",
+                "the core is stalled during a tick",
                 Fault(F::Watchdog, Exactly(3)),
             ),
             (
                 Kind::LockUp,
                 "lock-up",
-                "a processor fault whose handler faults, too",
+                "a processor fault whose handler faults as well",
                 Fault(F::Watchdog, Exactly(3)),
             ),
-            (Kind::CrystalStops, "crystal-stops", "the crystal stops swinging", Fault(F::Clock, Exactly(1))),
+            (
+                Kind::CrystalStops,
+                "crystal-stops",
+                "the crystal stops oscillating",
+                Fault(F::Clock, Exactly(1)),
+            ),
             (Kind::CrystalMissing, "crystal-missing", "no crystal at power-up", Refused(Inhibits::FAULT)),
             (
                 Kind::CrystalWrong,
@@ -259,14 +264,14 @@ impl Kind {
             (
                 Kind::EncoderWireOpen,
                 "encoder-wire-open",
-                "a wire of an encoder is open: its count goes to and fro between two values",
+                "a wire of an encoder is open: its count alternates between two values",
                 Off(10),
             ),
         ]
     };
 
     fn row(self) -> &'static (Kind, &'static str, &'static str, Expected) {
-        // A test holds that every kind is in the table, in its order.
+        // A test checks that every kind is in the table, in its order.
         &Self::ALL[self as usize]
     }
 
@@ -285,7 +290,7 @@ impl Kind {
         self.row().3
     }
 
-    /// The outcome that it must have in a phase; in a bench drive and while the rig is shaken some prove nothing.
+    /// The outcome that it must have in a phase; some kinds prove nothing in a bench drive or while the rig is shaken.
     pub(super) fn expected_in(self, phase: Phase) -> Expected {
         let special = match phase {
             Phase::Driving => self.while_driving(),
@@ -315,7 +320,7 @@ impl Kind {
         (Kind::StalledTick as usize..=Kind::WriteLost as usize).contains(&(self as usize))
     }
 
-    /// Whether no board can have it: its converter gives numbers.
+    /// Whether no board can have it: a board's converter never returns NaN.
     pub fn needs_simulated_pins(self) -> bool {
         self == Kind::SupplyNotANumber
     }

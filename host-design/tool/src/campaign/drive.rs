@@ -1,4 +1,4 @@
-//! Defects in a bench drive: which prove something there, and what has to come of them.
+//! Defects in a bench drive: which of them prove something there, and the outcome that each must have.
 
 use upright::protocol::message::{Answer, Request};
 use upright::supervision::bench_drive::{LONGEST_S, MotorSign};
@@ -15,15 +15,15 @@ use super::trial::{Phase, Trial};
 
 /// Time between two commands of the key that is held (s).
 const KEY_S: f64 = 0.025;
-/// Longest time from the key to the motor (s).
+/// Longest time from pressing the key until the motor is on (s).
 const BEGIN_S: f64 = 0.5;
-/// The limit switches are so far before the ends of the rail (m).
+/// Distance of the limit switches from the ends of the rail (m).
 const SWITCH_M: f64 = 0.01;
 /// Time for which a drive is watched from the onset on (s).
 const WATCHED_S: f64 = 0.4;
 
 impl Kind {
-    /// The outcome that it must have in a bench drive; none if it proves nothing there.
+    /// The outcome that it must have in a bench drive; `None` if it proves nothing there.
     pub fn while_driving(self) -> Option<Expected> {
         match self {
             Kind::HostSilent | Kind::HostWireOpen => Some(Expected::LetGo),
@@ -80,7 +80,7 @@ impl Trial {
 }
 
 impl Attempt<'_> {
-    /// A bench drive: a person holds the key, and goes on doing so.
+    /// A bench drive, in which a person holds the key throughout.
     pub(super) fn drive(&self, harness: &mut Harness<'_>) -> Result<Observed, HarnessError> {
         let trial = self.trial;
         let is_there_before = matches!(trial.expected(), Expected::Found(_));
@@ -95,7 +95,7 @@ impl Attempt<'_> {
         }
         let mut observed = Observed::default();
         let mut injection = Injection::new(self.rig, self.table, trial.clone());
-        // Since the motor came on.
+        // Number of ticks since the motor came on.
         let mut tick: Option<usize> = None;
         for turn in 0.. {
             let since = match tick {
@@ -150,7 +150,7 @@ impl Attempt<'_> {
         Ok(observed)
     }
 
-    /// With a wrong encoder, the limit switches are what keeps the cart on its rail.
+    /// Presses the limit switches, which alone keep the cart on its rail if its encoder is wrong.
     pub(super) fn press_limit_switches(&self, state: &[f64], inputs: &mut Pins) {
         if let PlantDescription::Chain(chain) = &self.rig.plant {
             let [low, high] = chain.cart.travel_m;
@@ -168,7 +168,7 @@ impl Attempt<'_> {
         }
     }
 
-    /// What the firmware has found out, and whether it would arm.
+    /// Reads what the firmware has found out, and whether it would arm.
     fn after_drive(&self, harness: &mut Harness<'_>, observed: &mut Observed) -> Result<(), HarnessError> {
         self.find_reason(harness, observed);
         observed.motor = Some(harness.session.status().motor);

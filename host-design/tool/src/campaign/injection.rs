@@ -21,7 +21,7 @@ const PUSH_S: f64 = 0.05;
 
 /// Ticks for which a limit switch is pressed: a board debounces it.
 const PRESSED_TICKS: usize = 3;
-/// Longest lateness of a measurement (ticks).
+/// Longest delay of a measurement (ticks).
 const LONGEST_LATENESS: usize = 20;
 
 /// The raw counters of one tick.
@@ -37,7 +37,7 @@ pub(super) struct Injection<'a> {
     past: Vec<Counters>,
     /// Thresholds of the firmware's tests.
     thresholds: &'a Thresholds<MAX_SENSORS>,
-    /// Error of each sensor above which the firmware's tests can see it (counts).
+    /// Error of each sensor above which the firmware's tests can detect it (counts).
     visible_counts: Vec<i64>,
     /// Position and speed that the missing force would have given the cart (m, m/s).
     missing: [f64; 2],
@@ -80,8 +80,8 @@ impl<'a> Injection<'a> {
         self.trial.kind != Kind::HostSilent || since.is_none()
     }
 
-    /// Changes what the firmware reads, `since` ticks after the onset; gives whether it differs visibly from a healthy
-    /// rig.
+    /// Changes what the firmware reads, `since` ticks after the onset; returns whether it differs visibly from a
+    /// healthy rig.
     pub(super) fn inputs(&mut self, since: usize, inputs: &mut Pins) -> bool {
         let Trial { kind, sensor, sign, size, .. } = self.trial;
         let truth = inputs.raw_counts.clone();
@@ -117,7 +117,7 @@ impl<'a> Injection<'a> {
             Kind::SensorIntermittent if since % 3 < 2 => shown.push(shows(sensor, moved(sensor) + off)),
             Kind::EncoderReversed => shown.push(shows(sensor, -moved(sensor))),
             Kind::EncoderWireOpen => {
-                // Of the edges of the other channel, every second one counts up and every other one down.
+                // The edges of the other channel are counted up and down in turn.
                 shown.push(shows(sensor, i64::from(moved(sensor).rem_euclid(4) >= 2)));
             }
             Kind::EncodersSwapped if truth.len() > 1 => {
@@ -147,7 +147,7 @@ impl<'a> Injection<'a> {
         visible
     }
 
-    /// Changes the output to the motor; gives whether the effect differs visibly from a healthy rig by now.
+    /// Changes the output to the motor; returns whether the effect by now differs visibly from a healthy rig.
     pub(super) fn output(&mut self, output: &mut Output) -> bool {
         let (Drive::Force(command) | Drive::Duty(command)) = &mut output.drive;
         let asked = *command;
@@ -177,7 +177,7 @@ impl<'a> Injection<'a> {
         if pushes { self.trial.sign * self.trial.size * self.full_force_n } else { 0.0 }
     }
 
-    /// What is sent over the serial line at the onset.
+    /// Sends what the defect sends over the serial line, at the onset.
     pub(super) fn serial(&mut self, session: &mut Session<'_>) {
         let Trial { kind, sign, size, .. } = self.trial;
         let disarm = |id: u64| {

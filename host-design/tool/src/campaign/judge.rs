@@ -24,7 +24,7 @@ pub enum Class {
     /// The motor went off in time.
     Detected,
     /// The motor went off before a link was more than a quarter beyond its limit or the cart off its rail, but later
-    /// than the best time of its kind: the observer follows an encoder whose error grows slowly.
+    /// than at best for its kind: the observer follows an encoder whose error grows slowly.
     Late,
     /// The required outcome did not happen.
     Missed,
@@ -39,11 +39,11 @@ pub struct Outcome {
     pub number: u64,
     /// The defect.
     pub kind: Kind,
-    /// Class.
+    /// Class of the outcome.
     pub class: Class,
     /// Ticks to motor off, counted from the first visible difference to a healthy rig, that tick included.
     pub ticks: Option<u32>,
-    /// The same, counted from the first tick of the defect.
+    /// Ticks to motor off, counted from the first tick of the defect.
     pub from_onset: Option<u32>,
     /// Code of the latched fault.
     pub fault: Option<u8>,
@@ -60,7 +60,7 @@ pub(super) fn judge(setup: &Setup<'_>, trial: &Trial) -> Result<Outcome, RunErro
     let (from_onset, ticks) = match observed.visible {
         _ if before => (None, None),
         Some(visible) => (from(trial.onset), from(visible)),
-        // Off before one sensor alone could show it: at once.
+        // The motor went off before any single sensor could show the defect: this counts as one tick.
         None => (from(trial.onset), observed.off.map(|_| 1)),
     };
     let on_board = matches!(setup.place, Place::Board { .. });
@@ -81,7 +81,7 @@ pub(super) fn judge(setup: &Setup<'_>, trial: &Trial) -> Result<Outcome, RunErro
         Expected::Counted if observed.rejected > 0 => Class::Rejected,
         Expected::Counted => Class::Missed,
         Expected::Ignored if observed.off.is_some() => Class::FalseAlarm,
-        // The pins' pulses follow the code's time, so that no two runs are equal for long.
+        // The timing of the pulses at the pins depends on the code, so that no two runs stay equal for long.
         Expected::Ignored if on_board && observed.outside => Class::Missed,
         Expected::Ignored if on_board => Class::Rejected,
         Expected::Ignored => {
@@ -124,12 +124,12 @@ fn of_fault(
     ticks: Option<u32>,
     on_board: bool,
 ) -> Class {
-    // On a board, inputs are read a tick later: a late tick is counted after it, volts and bytes take their time.
+    // On a board, inputs take effect a tick later: an overrun is counted in the next tick, volts and bytes take time.
     let limit = allowed(table, within) + u32::from(on_board);
     match (ticks, observed.fault) {
         _ if observed.outside => Class::Missed,
         (Some(ticks), Some(found)) if found == fault && ticks <= limit => Class::Detected,
-        // Ticks that end late do not feed the watchdog, whose oscillator may be the faster one.
+        // Ticks that end late do not feed the watchdog, which may expire first if its oscillator is fast.
         (Some(ticks), Some(Fault::Watchdog)) if on_board && fault == Fault::Overrun && ticks <= limit => {
             Class::Detected
         }

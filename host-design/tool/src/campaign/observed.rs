@@ -12,7 +12,7 @@ pub(super) struct Observed {
     pub(super) outputs: Vec<Output>,
     /// First tick in which the motor was off.
     pub(super) off: Option<usize>,
-    /// Whether it came on again.
+    /// Whether it came on again afterwards.
     pub(super) on_again: bool,
     /// First tick in which the defect was visible: the rig differed from a healthy one by more than a threshold.
     pub(super) visible: Option<usize>,
@@ -20,11 +20,11 @@ pub(super) struct Observed {
     pub(super) outside: bool,
     /// The latched fault.
     pub(super) fault: Option<Fault>,
-    /// Measurements that were rejected.
+    /// Number of measurements that were rejected.
     pub(super) rejected: u32,
-    /// What the bench drive has shown of the motor.
+    /// What the bench drive has found out about the motor.
     pub(super) motor: Option<MotorSign>,
-    /// Reasons against arming.
+    /// Reasons for which arming was refused.
     pub(super) refused: Option<Inhibits>,
     /// Whether the firmware has stopped running.
     pub(super) dead: bool,
@@ -33,7 +33,7 @@ pub(super) struct Observed {
 }
 
 impl Observed {
-    /// Takes the firmware's output in `tick`.
+    /// Records the firmware's output in `tick`.
     pub(super) fn output(&mut self, tick: usize, output: Output) {
         self.outputs.push(output);
         self.on_again |= output.enable && self.off.is_some();
@@ -42,7 +42,7 @@ impl Observed {
         }
     }
 
-    /// Whether the defect is visible and the motor is neither off nor too late: a slow rig takes its time to fall.
+    /// Whether the defect is visible, but the motor is not yet off and no link too far: a slow rig takes time to fall.
     pub(super) fn is_undecided(&self) -> bool {
         self.visible.is_some() && self.off.is_none() && !self.outside
     }

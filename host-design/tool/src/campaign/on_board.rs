@@ -1,5 +1,5 @@
-//! Defects that only a board has, on the virtual board: what it is like at power-up, and what happens in the tick of
-//! the onset.
+//! Defects that only a board has, on the virtual board: its conditions at power-up, and the events in the tick of the
+//! onset.
 
 use rand::RngExt;
 use upright_board::{
@@ -11,21 +11,21 @@ use super::trial::Trial;
 use crate::in_the_loop::Event;
 use upright_design::table::TableValues;
 
-/// Registers of timer 1 that make the motor's force what it should be (RM0090, 17.4): ARR, RCR, CCMR1, CCER, BDTR.
+/// Registers of timer 1 on which the motor's force depends (RM0090, 17.4): ARR, RCR, CCMR1, CCER, BDTR.
 const MOTOR_REGISTERS: [u32; 5] = [0x4001_002c, 0x4001_0030, 0x4001_0018, 0x4001_0020, 0x4001_0044];
 /// Frequencies of crystals that are not this board's (Hz).
 const WRONG_CRYSTALS: [u32; 4] = [4_000_000, 12_000_000, 16_000_000, 25_000_000];
 /// The highest byte of the vector of HardFault.
 const HARD_FAULT_VECTOR: u32 = 0x0800_000f;
-/// Where nothing is.
+/// An unmapped address.
 const NOWHERE: u32 = 0x3000_0000;
-/// Inside the tick, so long after its beginning.
+/// A time after the beginning of a tick, at which it still runs.
 const INSIDE: Time = 3 * US;
-/// The supply of the chip is below the voltage detector's threshold for so long.
+/// Time for which the supply of the chip is below the voltage detector's threshold.
 const DIP: Time = 300 * US;
 
 impl Kind {
-    /// The trial's board.
+    /// Conditions of the trial's board, drawn within their tolerances.
     pub(super) fn conditions(self, trial: &Trial, typical: Conditions) -> Conditions {
         let mut conditions = Conditions { seed: trial.seed, ..typical };
         // The watchdog's oscillator and the others within their tolerances (datasheet, LSI and HSI).
@@ -42,7 +42,7 @@ impl Kind {
         conditions
     }
 
-    /// What is broken from power-up on; without `guarded`, so is the guard that this kind needs.
+    /// Faults injected at power-up; without `guarded`, they disable the guard that this kind needs.
     pub(super) fn at_power_up(self, trial: &Trial, guarded: bool) -> Vec<Input> {
         let register = MOTOR_REGISTERS[(trial.size * 4.99) as usize];
         match self {
@@ -55,7 +55,7 @@ impl Kind {
         }
     }
 
-    /// Whether there is a guard that can be taken away: the defect must then be missed.
+    /// Whether there is a guard that can be disabled: without it, the defect must be missed.
     pub fn needs_guard(self) -> bool {
         matches!(
             self,
@@ -63,12 +63,12 @@ impl Kind {
         )
     }
 
-    /// Whether it is there from power-up on, and prevents arming.
+    /// Whether it is present from power-up on, and prevents arming.
     pub(super) fn is_at_power_up(self) -> bool {
         matches!(self, Kind::CrystalMissing | Kind::CrystalWrong | Kind::ChipWrong | Kind::WriteLost)
     }
 
-    /// What happens in the first tick of the defect, to a board that hears the host at the pin `receive`.
+    /// Events in the first tick of the defect, for a board that receives from the host at the pin `receive`.
     pub(super) fn events(
         self,
         trial: &Trial,
@@ -119,7 +119,7 @@ impl Kind {
                 vec![at(anywhere, bit_of(word, 4))]
             }
             Kind::RamBit => {
-                // Half of them in the state of the control task, which is a ninth of all.
+                // Half of these bits are in the state of the control task, which is a ninth of the memory.
                 let control = image.object("local_resource_control").filter(|_| trial.sign > 0.0);
                 let all = 0x2000_0000..image.symbol("__euninit").unwrap_or(0x2000_2000);
                 let memory = control.unwrap_or(all);
@@ -130,7 +130,7 @@ impl Kind {
     }
 }
 
-/// Addresses in RAM of the gain table's words that are not 0. Nothing reads the space of an absent part, which is 0.
+/// Addresses in RAM of the gain table's words that are not 0. An absent part of the table is 0, and is never read.
 ///
 /// # Panics
 /// If the image has no such table: it is one of ours.

@@ -1,4 +1,4 @@
-//! Defects while the rig is shaken: which prove something there, and what has to come of them.
+//! Defects while the rig is shaken: which of them prove something there, and the outcome that each must have.
 
 use core::f64::consts::PI;
 
@@ -18,14 +18,14 @@ use super::injection::Injection;
 use super::observed::Observed;
 use super::trial::{Phase, Trial};
 
-/// The defects begin between these times (s): while the cart is pushed each way, and while all is shaken.
+/// The defects begin between these times (s): while the cart is pushed each way, and while everything is shaken.
 const ONSET_S: [f64; 2] = [0.05, 5.0];
-/// A defect is watched for so long (s), and one that has to turn the motor off at the most for the longer time.
+/// Time for which a defect is watched (s): usually, and at most for one that has to turn the motor off.
 const WATCHED_S: [f64; 2] = [1.0, 6.0];
-/// Length of the excitation (s).
+/// Duration of the excitation (s).
 const LENGTH_S: f64 = ONSET_S[1] + WATCHED_S[1];
 
-/// The forces of a campaign's runs.
+/// The excitation forces of a campaign's runs.
 ///
 /// # Errors
 /// [`IdentifyError`] if the rig cannot be shaken.
@@ -34,7 +34,7 @@ pub fn feed(rig: &Rig, table: &TableValues, seed: u64) -> Result<Feed, IdentifyE
 }
 
 impl During<'_> {
-    /// Of the phases, the one with the outcomes that the defects must have.
+    /// The phase that decides which outcomes the defects must have.
     pub(super) fn phase(&self) -> Phase {
         match self {
             During::Balancing => Phase::Balancing,
@@ -43,7 +43,7 @@ impl During<'_> {
         }
     }
 
-    /// Whether a defect proves something.
+    /// Whether a defect of this kind proves something in this campaign.
     pub fn is_proof(&self, kind: Kind) -> bool {
         match self {
             During::Balancing => true,
@@ -63,7 +63,7 @@ impl During<'_> {
 }
 
 impl Kind {
-    /// The outcome that it must have while the rig is shaken; none if it proves nothing there.
+    /// The outcome that it must have while the rig is shaken; `None` if it proves nothing there.
     pub fn while_shaken(self) -> Option<Expected> {
         match self {
             Kind::HostSilent | Kind::HostWireOpen | Kind::HostDeaf => Some(Expected::LetGo),
@@ -145,7 +145,7 @@ impl Attempt<'_> {
         Ok(observed)
     }
 
-    /// What drives the cart.
+    /// The drive that acts on the cart, which the defect may change.
     fn driven(&self, injection: &mut Injection<'_>, since: Option<usize>, drive: Drive) -> Drive {
         let mut acting = upright::board::Output { enable: true, drive };
         if since.is_some() {

@@ -14,7 +14,7 @@ use upright_design::table::TableValues;
 /// A trial that could not be run.
 #[derive(Debug, thiserror::Error)]
 pub enum CampaignError {
-    /// Made here.
+    /// It failed in this process.
     #[error("trial {number} ({kind}): {source}")]
     Trial {
         /// Number of the trial.
@@ -24,7 +24,7 @@ pub enum CampaignError {
         /// The cause.
         source: RunError,
     },
-    /// Made by another process.
+    /// The outcomes of other processes cannot be merged.
     #[error(transparent)]
     Study(#[from] StudyError),
 }
@@ -32,11 +32,11 @@ pub enum CampaignError {
 /// All trials of one kind.
 #[derive(Debug, Clone, Serialize)]
 pub struct Row {
-    /// The kind.
+    /// Kind of the defect.
     pub kind: Kind,
     /// See [`Kind::meaning`].
     pub meaning: &'static str,
-    /// Ticks within which the motor must be off; for [`Expected::Off`], the ticks that this takes at its best.
+    /// Ticks within which the motor must be off; for [`Expected::Off`], the ticks that this takes at best.
     pub allowed: Option<u32>,
     /// Number of trials.
     pub runs: usize,
@@ -54,7 +54,7 @@ pub struct Row {
     pub false_alarms: usize,
     /// Largest number of ticks to motor off.
     pub worst: Option<u32>,
-    /// The same, counted from the first tick of the defect.
+    /// Largest number of ticks to motor off, counted from the first tick of the defect.
     pub worst_from_onset: Option<u32>,
     /// Longest time from the edge of the emergency stop to an inactive PWM, if it opened between ticks (µs).
     #[serde(skip_serializing_if = "Option::is_none")]

@@ -31,7 +31,7 @@ pub struct Trial {
     pub sign: f64,
     /// Severity, from 0 to 1.
     pub size: f64,
-    /// Seed of whatever is random after the onset.
+    /// Seed of everything random after the onset.
     pub seed: u64,
 }
 
@@ -51,7 +51,7 @@ pub enum Phase {
     Shaken,
 }
 
-/// Ticks in which a command has taken effect.
+/// Number of ticks within which a command takes effect.
 const COMMAND_TICKS: usize = 4;
 /// Time for which a raised rig balances before it is lowered (s).
 const UPRIGHT_S: f64 = 0.5;
@@ -114,7 +114,7 @@ impl Trial {
         }
     }
 
-    /// The same defect while the rig is raised, or lowered; `when` (0 to 1) says how far.
+    /// The same defect while the rig is raised or lowered; `when` (0 to 1) sets how late in the motion.
     fn in_motion(self, rig: &Rig, swing_up: &SwingUpValues, is_raised: bool, when: f64) -> Self {
         let (up, down) = (swing_up.raise.ticks as usize, swing_up.lower.ticks as usize);
         let upright = (UPRIGHT_S / rig.tick.period_s) as usize;
@@ -144,7 +144,7 @@ impl Trial {
         self.kind.expected_in(self.phase)
     }
 
-    /// Generator of whatever is random after the onset.
+    /// Generator of everything random after the onset.
     pub fn random(&self) -> Pcg64 {
         Pcg64::seed_from_u64(self.seed)
     }

@@ -14,7 +14,7 @@ use crate::monitor::{Line, now};
 /// How long a person may take for a task.
 const PATIENCE: Duration = Duration::from_secs(180);
 
-/// A machine behind a port. What the person is asked, the journal shows; what the person says, comes as lines.
+/// A machine behind a port. The journal shows what the person is asked to do; the person's answers arrive as lines.
 pub struct AtPort {
     line: Line,
     said: Receiver<String>,
@@ -35,7 +35,7 @@ impl AtPort {
         Self { line, said, stop, show }
     }
 
-    /// Waits for the person to say something.
+    /// Shows `words`, and waits for the person's answer.
     ///
     /// # Errors
     /// [`Stop::Aborted`] if the person wants to stop or nobody is there, [`Stop::Line`] if the line is closed.
@@ -47,7 +47,7 @@ impl AtPort {
             match self.said.try_recv() {
                 Ok(said) => return Ok(said),
                 Err(TryRecvError::Disconnected) => return Err(Stop::Aborted),
-                // The firmware goes on sending; what it says meanwhile is old when the person answers.
+                // The firmware keeps sending; what it sends meanwhile is out of date when the person answers.
                 Err(TryRecvError::Empty) => self.exchange(&[])?,
             };
         }
@@ -56,7 +56,7 @@ impl AtPort {
 
 impl Machine for AtPort {
     fn exchange(&mut self, bytes: &[u8]) -> Result<Vec<u8>, Stop> {
-        // Once: the motor still has to be turned off.
+        // Reported only once: the motor still has to be turned off through this line.
         if self.stop.swap(false, Ordering::Relaxed) {
             return Err(Stop::Aborted);
         }

@@ -13,7 +13,7 @@ use super::machine::Stop;
 use super::task::Task;
 use crate::monitor::TelemetryOfAny;
 
-/// It has to balance for so long.
+/// Time for which the machine has to balance.
 const BALANCED: Duration = Duration::from_secs(10);
 
 /// Largest motion while it balances.

@@ -1,4 +1,4 @@
-//! The steps in their order, and the way back.
+//! The steps in their order, and the return to an earlier step after one that was not passed.
 
 use std::path::Path;
 
@@ -16,15 +16,15 @@ use super::{balance, contacts, homing, motor, shaking, signs};
 /// What is commissioned, and how.
 #[derive(Debug, Clone, Copy)]
 pub struct Plan<'a> {
-    /// The rig, as its file has it.
+    /// The rig, as in its file.
     pub rig: &'a Rig,
     /// Its gain table, which the firmware has.
     pub table: &'a TableValues,
-    /// The file.
+    /// Path of the rig file.
     pub file: &'a Path,
     /// The text of the file.
     pub text: &'a str,
-    /// How long the machine is shaken (s).
+    /// Duration of the shaking (s).
     pub seconds: f64,
     /// Seed of the excitation's phases.
     pub seed: u64,
@@ -33,7 +33,7 @@ pub struct Plan<'a> {
 /// A rig on the way from wired to balancing.
 pub struct Commissioning<'a> {
     plan: Plan<'a>,
-    /// How often the machine was shaken: each time with other phases.
+    /// Number of times the machine was shaken; each time the excitation has other phases.
     shaken: u64,
     log: Option<Log>,
     found: Option<Identification>,
@@ -41,12 +41,12 @@ pub struct Commissioning<'a> {
 }
 
 impl<'a> Commissioning<'a> {
-    /// Nothing is known yet.
+    /// A commissioning before its first step.
     pub fn new(plan: Plan<'a>) -> Self {
         Self { plan, shaken: 0, log: None, found: None, designed: None }
     }
 
-    /// The steps with the firmware of the rig file; gives the rig as it was found, with its gains.
+    /// Does the steps with the firmware of the rig file; returns the rig as it was found, with its gains.
     ///
     /// # Errors
     /// [`Stop`] of the step that was not passed.
@@ -56,7 +56,8 @@ impl<'a> Commissioning<'a> {
         all.designed.ok_or_else(not_before)
     }
 
-    /// The steps with the firmware for the machine as it was found, of which `plan` is; then the record is complete.
+    /// Does the steps with the firmware for the machine as it was found, which `plan` describes, and completes the
+    /// record.
     ///
     /// # Errors
     /// [`Stop`] of the step that was not passed.
@@ -98,7 +99,7 @@ impl<'a> Commissioning<'a> {
 
     fn one(&mut self, guide: &mut Guide<'_>, step: Step) -> Result<(), Stop> {
         let plan = self.plan;
-        // Before that, a pressed emergency stop or a power stage without supply may be the reason of a fault.
+        // Until then, a pressed emergency stop or a power stage without supply may be the cause of a fault.
         if !matches!(step, Step::Connect | Step::Contacts) {
             guide.clear()?;
         }
@@ -123,7 +124,7 @@ impl<'a> Commissioning<'a> {
                 self.designed = Some(designed(guide.journal, plan, found)?);
             }
             Step::Verification => verified(guide.journal, self.designed.as_ref().ok_or_else(not_before)?)?,
-            // The firmware changes: nothing to do with this one.
+            // The firmware changes here; this one has nothing to do.
             Step::Image => {}
             Step::Balance => balance::balance(guide)?,
         }

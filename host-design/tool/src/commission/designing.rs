@@ -17,9 +17,9 @@ use super::machine::Stop;
 use super::record::Journal;
 use crate::identified::{json, rig_file, text};
 
-/// Length of the runs that the gains have to stand (s).
+/// Duration of the runs that the gains have to withstand (s).
 const RUN_S: f64 = 10.0;
-/// Tolerances are that many deviations wide.
+/// Width of the tolerances, in deviations of the estimates.
 const DEVIATIONS: f64 = 2.0;
 /// Smallest tolerance of the masses (%).
 const LEAST_PERCENT: f64 = 1.0;
@@ -87,7 +87,8 @@ pub(super) fn designed(
     robust(journal, plan, own, &tolerances)
 }
 
-/// How far the machine may be from the new file: its deviations, its friction, and zeros and delay of this run.
+/// How far the machine may differ from the new file: by the deviations of the estimates, by its friction, and by the
+/// zeros and the delay of this run.
 fn tolerances(rig: &Rig, found: &Identification) -> Tolerances {
     let largest = |which: fn(Kind) -> bool, value: fn(&Estimate) -> f64| {
         found.estimates.iter().filter(|one| which(one.kind)).map(value).fold(0.0, f64::max)
@@ -111,7 +112,7 @@ fn tolerances(rig: &Rig, found: &Identification) -> Tolerances {
     }
 }
 
-/// The file's own weights if they stand the tolerances; else those that a search finds; else the file's own again.
+/// The file's own weights if they withstand the tolerances; else those that a search finds; else the file's own again.
 fn robust(
     journal: &mut Journal,
     plan: Plan<'_>,
@@ -125,7 +126,7 @@ fn robust(
     };
     let all = laws.iter().map(stands).collect::<Result<Vec<_>, _>>();
     if all.map_err(|error| Stop::Machine(error.to_string()))?.iter().all(|&stands| stands) {
-        journal.found("the weights of the file stand that");
+        journal.found("the weights of the file withstand that");
         return Ok(own);
     }
     match choose(&own.rig, tolerances, &settings, false, &|_| ()) {
@@ -138,15 +139,16 @@ fn robust(
             of_text(text.unwrap_or(own.text), plan.file)
         }
         Err(RobustError::Unhelped(reason)) => {
-            journal
-                .found(format!("no other weights stand all of that ({reason}): those of the file are kept"));
+            journal.found(format!(
+                "no other weights withstand all of that ({reason}): those of the file are kept"
+            ));
             Ok(own)
         }
         Err(error) => Err(Stop::Machine(error.to_string())),
     }
 }
 
-/// The rig of a text, with its gains.
+/// Reads the rig from the text of its file, and designs its gains.
 fn of_text(text: String, file: &Path) -> Result<Designed, Stop> {
     let machine = |error: &dyn std::error::Error| Stop::Machine(error.to_string());
     let rig = Rig::from_toml(&text, file).map_err(|error| machine(&error))?;

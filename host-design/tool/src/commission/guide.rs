@@ -10,7 +10,7 @@ use super::record::Journal;
 use super::task::Task;
 use crate::monitor::{Action, Ended, Monitor, TelemetryOfAny};
 
-/// After so long without telemetry the firmware is given up.
+/// Time without telemetry after which the step ends.
 const SILENCE: Duration = Duration::from_secs(2);
 /// Time between two tries of the same request.
 const RETRY: Duration = Duration::from_millis(500);
@@ -54,12 +54,12 @@ impl<'a> Guide<'a> {
         Ok(())
     }
 
-    /// From now on the firmware has to be heard: nobody has listened for a while.
+    /// Restarts the timeout for telemetry, after a time in which nobody has listened.
     pub(super) fn listen(&mut self) {
         self.heard = self.machine.now();
     }
 
-    /// Says what was found.
+    /// Adds a finding to the journal.
     pub(super) fn found(&mut self, words: impl Into<String>) {
         self.journal.found(words);
     }
@@ -95,7 +95,7 @@ impl<'a> Guide<'a> {
         }
     }
 
-    /// Waits until `done` finds something in the telemetry; none if that takes longer than `patience`.
+    /// Waits until `done` finds something in the telemetry; `None` if that takes longer than `patience`.
     pub(super) fn wait<R>(
         &mut self,
         patience: Duration,
@@ -113,7 +113,7 @@ impl<'a> Guide<'a> {
         }
     }
 
-    /// The same as long as the person may take.
+    /// As [`Guide::wait`], for as long as the person may take for a task.
     pub(super) fn wait_for_person<R>(
         &mut self,
         done: impl FnMut(&TelemetryOfAny) -> Option<R>,
@@ -130,7 +130,7 @@ impl<'a> Guide<'a> {
         let end = self.machine.now() + self.machine.patience();
         while self.machine.now() < end {
             self.send(request);
-            // What came before the answer is of the time before the request.
+            // Telemetry that arrives before the answer may date from before the request.
             self.pause(ANSWER)?;
             if self.wait(RETRY, |telemetry| done(telemetry).then_some(()))?.is_some() {
                 return Ok(());
@@ -139,7 +139,7 @@ impl<'a> Guide<'a> {
         Err(Stop::Machine(format!("the firmware refuses to go on: {}", self.refusal())))
     }
 
-    /// Lets time pass.
+    /// Waits, and keeps listening.
     pub(super) fn pause(&mut self, time: Duration) -> Result<(), Stop> {
         self.wait(time, |_| None::<()>)?;
         Ok(())
@@ -155,7 +155,7 @@ impl<'a> Guide<'a> {
         if reasons.is_empty() { "no answer".to_owned() } else { reasons.join("; ") }
     }
 
-    /// Clears a fault, once what has raised it is over.
+    /// Clears a fault once its cause is gone.
     pub(super) fn clear(&mut self) -> Result<(), Stop> {
         let is_clear = |telemetry: &TelemetryOfAny| telemetry.state != State::Fault;
         if self.conversation.telemetry.as_ref().is_some_and(is_clear) {

@@ -9,7 +9,7 @@ use super::machine::Stop;
 use super::task::{End, Task};
 use crate::monitor::TelemetryOfAny;
 
-/// A sensor that counts at least this share of what it has to has moved.
+/// A sensor has moved if it counts at least this share of the expected counts.
 const MOVED: f64 = 0.1;
 
 /// Both switches are touched, and their distance is that of the file; the links hang still.

@@ -12,7 +12,7 @@ use crate::in_the_loop::{EmulatorError, RunError};
 
 /// A rig with its firmware at the other end of a line, and the person beside it.
 pub trait Machine {
-    /// Sends bytes to the firmware, and gives what it has sent within the next milliseconds.
+    /// Sends bytes to the firmware, and returns what it sends within the next milliseconds.
     ///
     /// # Errors
     /// [`Stop`] if the line is closed, or the person wants to stop.
@@ -40,10 +40,10 @@ pub enum Stop {
     /// The machine is not as it has to be: it must not be run.
     #[error("{0}")]
     Machine(String),
-    /// The line or the firmware.
+    /// The line is closed, or the firmware is silent.
     #[error("{0}")]
     Line(String),
-    /// The simulated machine.
+    /// The simulated machine does not run.
     #[error(transparent)]
     Simulated(#[from] RunError),
     /// The person wants to stop.

@@ -13,7 +13,7 @@ use crate::monitor::words;
 
 /// Time between two commands of a key that is held.
 const KEY: Duration = Duration::from_millis(25);
-/// The rig stands still for so long before, and the key is let go for so long between two tries.
+/// Time for which the rig stands still before a drive, and the key is released between two tries.
 const STILL: Duration = Duration::from_secs(1);
 /// A drive begins within this time, or is refused.
 const BEGINS: Duration = Duration::from_millis(300);
@@ -46,7 +46,7 @@ pub(super) fn check(guide: &mut Guide<'_>) -> Result<(), Stop> {
     Ok(())
 }
 
-/// Holds the key until the drive has ended; gives whether it has begun.
+/// Holds the key until the drive has ended; returns whether it has begun.
 fn push(guide: &mut Guide<'_>) -> Result<bool, Stop> {
     guide.pause(STILL)?;
     let begin = guide.machine.now();

@@ -12,7 +12,7 @@ use upright_design::table::TableValues;
 use super::step::Step;
 use crate::campaign::{Defective, Kind, Trial};
 
-/// What is wrong.
+/// What is wrong in the machine.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum What {
     /// A defect of the fault campaign, from power-up on.
@@ -33,13 +33,14 @@ pub struct Planted {
     sensor: usize,
 }
 
-/// Its name on the command line, what is wrong, the sensor if it is in one, and the step that finds it.
+/// A defect's name on the command line, what is wrong, the sensor if it is in one, its description, and the step that
+/// has to find it.
 type Row = (&'static str, What, usize, &'static str, Step);
 
 /// Force of the dry friction at the cart, as a share of the motor's force in the bench drive.
 const STUCK: f64 = 1.5;
 
-/// Torque of the dry friction of each joint, as a share of the largest one by the weight of its link: the sine of 9°.
+/// Dry friction torque of each joint, as a share of the largest torque of its link's weight: the sine of 9°.
 const HELD: f64 = 0.15;
 
 const ALL: [Row; 15] = [
@@ -73,7 +74,13 @@ const ALL: [Row; 15] = [
         "the cart's encoder does not count",
         Step::Homing,
     ),
-    ("cart-counts-wrong", What::CountsWrong, 0, "the cart's encoder gives twice the counts", Step::Homing),
+    (
+        "cart-counts-wrong",
+        What::CountsWrong,
+        0,
+        "the cart's encoder yields twice the expected counts",
+        Step::Homing,
+    ),
     (
         "encoder-reversed",
         What::Campaign(Kind::EncoderReversed),
@@ -102,7 +109,13 @@ const ALL: [Row; 15] = [
         "the encoders of links 1 and 2 are exchanged; with one link those of cart and link",
         Step::Signs,
     ),
-    ("counts-wrong", What::CountsWrong, 1, "the encoder of link 1 gives twice the counts", Step::Turns),
+    (
+        "counts-wrong",
+        What::CountsWrong,
+        1,
+        "the encoder of link 1 yields twice the expected counts",
+        Step::Turns,
+    ),
     (
         "motor-reversed",
         What::Campaign(Kind::MotorReversed),
@@ -150,7 +163,7 @@ impl Planted {
     /// The step that has to find it in a rig with this many links.
     pub fn found_in(self, links: usize) -> Step {
         match self.what {
-            // Then it is the cart's plug.
+            // With one link, its plug can only be exchanged with the cart's.
             What::Campaign(Kind::EncodersSwapped) if links == 1 => Step::Homing,
             _ => self.row().4,
         }
@@ -228,7 +241,7 @@ impl<'a> Wires<'a> {
         }
     }
 
-    /// Changes what the motor gets.
+    /// Changes the output to the motor.
     pub(super) fn output(&mut self, output: &mut Output) {
         if let Some(defective) = &mut self.defective {
             defective.output(output);

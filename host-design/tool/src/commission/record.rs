@@ -30,7 +30,7 @@ pub struct Record {
 }
 
 impl Record {
-    /// Nothing is done yet with the machine of `rig`, which is at `machine`.
+    /// A record without steps, for the machine of `rig` whose firmware runs at `machine`.
     pub fn new(rig: &Rig, machine: &str) -> Self {
         Self {
             rig: rig.name.clone(),
@@ -48,7 +48,7 @@ impl Record {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Outcome {
-    /// It goes on, or was interrupted.
+    /// It is in progress, or was interrupted.
     Unfinished,
     /// A step was not passed.
     Stopped,
@@ -67,9 +67,9 @@ pub struct StepRecord {
     pub found: Vec<String>,
     /// Whether it was passed.
     pub passed: bool,
-    /// Why it was not.
+    /// Why it was not passed.
     pub stopped: Option<String>,
-    /// What was found as numbers, where there are many.
+    /// The findings as numbers, in steps that have many.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub data: Option<Value>,
 }
@@ -88,14 +88,14 @@ impl Journal {
         Self { record, file, show }
     }
 
-    /// A step begins.
+    /// Begins a step, and shows its name.
     pub fn begin(&mut self, step: Step) {
         (self.show)(&format!("{}: {}", step.name(), step.finds_out()));
         let (asked, found) = (Vec::new(), Vec::new());
         self.record.steps.push(StepRecord { step, asked, found, passed: false, stopped: None, data: None });
     }
 
-    /// The person is asked to do something.
+    /// Records and shows what the person is asked to do.
     pub fn asked(&mut self, task: impl ToString) {
         let task = task.to_string();
         (self.show)(&format!("  > {task}"));
@@ -104,7 +104,7 @@ impl Journal {
         }
     }
 
-    /// Something was found.
+    /// Records and shows a finding.
     pub fn found(&mut self, words: impl Into<String>) {
         let words = words.into();
         (self.show)(&format!("  {words}"));
@@ -113,14 +113,14 @@ impl Journal {
         }
     }
 
-    /// What was found as numbers.
+    /// Records the findings of the step as numbers.
     pub fn data(&mut self, data: Value) {
         if let Some(step) = self.record.steps.last_mut() {
             step.data = Some(data);
         }
     }
 
-    /// A step that needs no machine.
+    /// Does a step that needs no machine.
     ///
     /// # Errors
     /// That of `action`, or [`WriteError`] if the record cannot be written.
@@ -134,7 +134,7 @@ impl Journal {
         result
     }
 
-    /// The step has ended, passed or `stopped`.
+    /// Ends the step, passed or `stopped` for this reason.
     ///
     /// # Errors
     /// [`WriteError`] if the record cannot be written.
@@ -151,7 +151,7 @@ impl Journal {
         self.write()
     }
 
-    /// Every step was passed.
+    /// Completes the record: every step was passed.
     ///
     /// # Errors
     /// [`WriteError`] if the record cannot be written.
@@ -162,7 +162,7 @@ impl Journal {
 
     fn write(&self) -> Result<(), WriteError> {
         let Some(file) = &self.file else { return Ok(()) };
-        // Numbers, strings and lists: they are JSON.
+        // Numbers, strings and lists can always be written as JSON.
         let text = serde_json::to_string_pretty(&self.record).unwrap_or_default() + "\n";
         write_atomically(file, text.as_bytes())
     }

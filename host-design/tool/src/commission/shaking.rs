@@ -12,7 +12,7 @@ use super::machine::Stop;
 use super::task::Task;
 use crate::monitor::{TelemetryOfAny, words};
 
-/// Time in which the firmware tells the cause of a fault.
+/// Time within which the firmware reports the cause of a fault.
 const CAUSE: Duration = Duration::from_millis(300);
 
 /// The log of the machine, which its firmware shakes.
@@ -58,7 +58,7 @@ fn until_over(guide: &mut Guide<'_>, line: &mut OverLine) -> Result<(), Stop> {
     Ok(())
 }
 
-/// Adds the sensor of a fault, once the firmware has told it.
+/// Adds the sensor of a fault, if the firmware reports one.
 fn with_cause(guide: &mut Guide<'_>, stop: Stop) -> Stop {
     let told = guide.pause(CAUSE);
     let cause = guide.conversation().cause.and_then(|cause| cause.sensor);

@@ -13,9 +13,9 @@ use crate::monitor::{TelemetryOfAny, words};
 
 /// A turn has begun when the link has moved by this share of it.
 const BEGUN: f64 = 0.1;
-/// It has ended when nothing has moved for so long.
+/// It has ended when nothing has moved for this long.
 const ENDED: Duration = Duration::from_millis(1_500);
-/// Difference from a whole turn that is accepted: a person's eye.
+/// Accepted deviation from a whole turn, which a person judges by eye.
 const TOLERANCE: f64 = 0.05;
 
 /// The firmware's own check, from the outermost link inwards.
@@ -75,7 +75,7 @@ pub(super) fn turns(guide: &mut Guide<'_>, plan: Plan<'_>) -> Result<(), Stop> {
     Ok(())
 }
 
-/// Counts from the beginning to the end of a turn of this link; none if it does not move.
+/// Counts from the beginning to the end of a turn of this link; `None` if it does not move.
 fn turn(guide: &mut Guide<'_>, sensor: usize, begun: f64) -> Result<Option<f64>, Stop> {
     let count = |now: &TelemetryOfAny| f64::from(now.counts.get(sensor).copied().unwrap_or_default());
     let from = guide.conversation().telemetry.as_ref().map_or(0.0, count);

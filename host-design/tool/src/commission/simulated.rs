@@ -17,17 +17,17 @@ use super::task::{End, Task};
 
 /// Time from one exchange to the next (s), as on a serial line.
 const EXCHANGE_S: f64 = 0.005;
-/// The hand pushes the cart so far beyond an end of the rail, where the switches are (m).
+/// How far the hand pushes the cart beyond an end of the rail, where the switches are (m).
 const BEYOND_M: f64 = 0.002;
 /// Time at power-up, since 1970.
 const BEGIN: Duration = Duration::from_secs(1_800_000_000);
 /// Time for the longest task: a turn, or a cart from end to end.
 const PATIENCE: Duration = Duration::from_secs(10);
 
-/// The person goes back from an excitation that is not passed so many times.
+/// Number of times that the person goes back after an excitation that was not passed.
 const TRIES: u32 = 2;
 
-/// A simulated machine with the firmware on its wires, held by a simulated hand until this lets go.
+/// A simulated machine with its firmware, held by a simulated hand until the hand lets go.
 pub struct Simulated<'a> {
     session: Session<'a>,
     bench: Bench,
@@ -122,7 +122,7 @@ impl<'a> Simulated<'a> {
         self.by_hand();
         let pins = self.pins();
         self.output = self.session.tick(&pins)?;
-        // The bytes are read as they came.
+        // Only the raw bytes are used: see `exchange`.
         while self.session.next_telemetry().is_some() || self.session.next_reply().is_some() {}
         while self.session.next_log().is_some() {}
         if self.is_free {
@@ -205,7 +205,7 @@ impl Machine for Simulated<'_> {
         PATIENCE
     }
 
-    /// The first beginning of an excitation may be too weak for a cart that sticks: other phases are tried.
+    /// The beginning of an excitation may be too weak for a cart that sticks: other phases are tried.
     fn again(&mut self, failed: Step) -> bool {
         let goes_back = failed == Step::Excitation && self.tries < TRIES;
         self.tries += u32::from(goes_back);

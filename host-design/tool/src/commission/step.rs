@@ -22,7 +22,7 @@ pub enum Step {
 }
 
 impl Step {
-    /// Every step with its name and what is found out.
+    /// Every step with its name and what it finds out.
     pub const ALL: [(Step, &str, &str); 12] = [
         (Step::Connect, "connect", "the firmware answers, and is that of the rig file"),
         (
@@ -40,9 +40,9 @@ impl Step {
             "signs",
             "every encoder counts in the right direction, and is plugged in at its own place",
         ),
-        (Step::Turns, "turns", "every link's encoder gives the counts of the file for a whole turn"),
-        (Step::Motor, "motor", "the motor moves the cart, and the right way"),
-        (Step::Excitation, "excitation", "the log of the machine, which hangs and is shaken"),
+        (Step::Turns, "turns", "the counts per turn of every link's encoder are those of the file"),
+        (Step::Motor, "motor", "the motor moves the cart, and in the right direction"),
+        (Step::Excitation, "excitation", "the log of the machine, shaken while its links hang"),
         (
             Step::Identification,
             "identification",
@@ -51,18 +51,18 @@ impl Step {
         (
             Step::Design,
             "design",
-            "gains for the machine as it was found, that stand what is not known of it, if there are any",
+            "gains for the machine as it was found, if possible robust against what is not known of it",
         ),
         (
             Step::Verification,
             "verification",
-            "margins as [verify] requires them, and whether runs with the friction that was found stand",
+            "margins as [verify] requires them, and whether runs with the friction that was found pass",
         ),
         (Step::Image, "image", "the firmware with these gains"),
         (Step::Balance, "balance", "raised by hand, the machine balances for 10 s"),
     ];
 
-    /// The steps until everything that a wire can do wrong is known: nothing is measured yet.
+    /// The steps that find every error in the wiring, before anything is measured.
     pub const EARLY: [Step; 6] =
         [Step::Connect, Step::Contacts, Step::Homing, Step::Signs, Step::Turns, Step::Motor];
 
@@ -80,10 +80,10 @@ impl Step {
         Step::Verification,
     ];
 
-    /// The steps with the firmware for the machine as it was found, which knows nothing yet.
+    /// The steps with the firmware for the machine as it was found. It has just started: nothing is homed or checked.
     pub const SECOND: [Step; 5] = [Step::Connect, Step::Homing, Step::Signs, Step::Motor, Step::Balance];
 
-    /// Where to begin again if it is not passed.
+    /// The step to go back to if this one is not passed.
     pub fn back(self) -> Step {
         match self {
             // A fault may have lost the positions.
@@ -95,16 +95,16 @@ impl Step {
     }
 
     fn row(self) -> &'static (Step, &'static str, &'static str) {
-        // A test holds that every step is in the table, in its order.
+        // A test checks that every step is in the table, in its order.
         &Self::ALL[self as usize]
     }
 
-    /// Its name.
+    /// Its name, as shown to the person.
     pub fn name(self) -> &'static str {
         self.row().1
     }
 
-    /// What is found out.
+    /// What it finds out.
     pub fn finds_out(self) -> &'static str {
         self.row().2
     }

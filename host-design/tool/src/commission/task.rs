@@ -39,7 +39,7 @@ pub enum Task {
 }
 
 impl Task {
-    /// Whether cart and links are free meanwhile; `is_on`: the motor is on.
+    /// Whether the hand lets cart and links go in this task; `is_on`: the motor is on.
     pub fn lets_go(self, is_on: bool) -> bool {
         match self {
             Task::HandsOff => true,
@@ -48,7 +48,7 @@ impl Task {
         }
     }
 
-    /// Whether it only goes on once the person says so: the motor comes on, or goes off.
+    /// Whether the person has to confirm first, because the motor comes on or goes off.
     pub fn needs_consent(self) -> bool {
         matches!(self, Task::SwitchOn | Task::HandsOff | Task::Raise | Task::Catch)
     }

@@ -1,4 +1,4 @@
-//! The boards by name. What each of them is stands in the firmware: `src/board/f4/boards/`.
+//! The boards by name. Each is described in the firmware, in `src/board/f4/boards/`.
 
 use upright_board::{Chip, Conditions, Wiring};
 
@@ -42,12 +42,12 @@ impl Board {
         }
     }
 
-    /// How many encoders it counts: the cart's and those of the links.
+    /// Number of encoders that it can count: the cart's and those of the links.
     pub fn encoders(self) -> usize {
         self.conditions(0).wiring.encoders.len()
     }
 
-    /// The board as a virtual one, everything as it typically is; what is random follows from `seed`.
+    /// Conditions of the virtual board, at typical values; `seed` determines everything random.
     pub fn conditions(self, seed: u64) -> Conditions {
         let mut conditions = Conditions::f405(seed);
         match self {
@@ -66,9 +66,9 @@ impl Board {
     }
 }
 
-/// A name that is no board's.
+/// A name that no board has.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-#[error("no board has this name; give {}", Board::ALL.map(Board::name).join(", "))]
+#[error("no board has this name; choose one of {}", Board::ALL.map(Board::name).join(", "))]
 pub struct NoBoard;
 
 impl std::str::FromStr for Board {

@@ -17,21 +17,21 @@ pub const TARGET: &str = "thumbv7em-none-eabihf";
 /// The cargo profile that images are compiled with.
 pub const PROFILE: &str = "firmware";
 
-/// Which image.
+/// Kind of an image: what it is for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Kind {
     /// For a board.
     Board(Board),
-    /// For a board, to shake its rig and to log every tick.
+    /// For a board, to shake its rig and log every tick.
     Identification(Board),
-    /// For QEMU, pins as files.
+    /// For QEMU, with the pins connected through files.
     InTheLoop,
-    /// For QEMU, pins as a serial line.
+    /// For QEMU, with the pins connected through a serial line.
     InTheLoopUsart,
 }
 
 impl Kind {
-    /// The cargo features that make it, with commas.
+    /// The cargo features that select it, separated by commas.
     fn features(self) -> String {
         match self {
             Kind::Board(board) => board.name().to_owned(),
@@ -41,12 +41,12 @@ impl Kind {
         }
     }
 
-    /// The begin of its file's name.
+    /// Beginning of the image's file name.
     fn name(self) -> String {
         self.features().replace(',', "-")
     }
 
-    /// The board that it is for.
+    /// The board that it is for; `None` for QEMU.
     fn board(self) -> Option<Board> {
         match self {
             Kind::Board(board) | Kind::Identification(board) => Some(board),
@@ -55,7 +55,7 @@ impl Kind {
     }
 }
 
-/// An image that could not be built.
+/// Why an image could not be built.
 #[derive(Debug, thiserror::Error)]
 pub enum ImageError {
     /// No compiler for the target.
@@ -64,12 +64,12 @@ pub enum ImageError {
          `apt-get install lld rustc-web cargo-web rust-web-src`"
     )]
     NoCompiler,
-    /// The board has too few timers.
-    #[error("{board} counts {} encoders, and this rig has {needed}: take another board (docs/board.md)", board.encoders())]
+    /// The rig has more encoders than the board has timers for.
+    #[error("{board} counts {} encoders, and this rig has {needed}: use another board (docs/board.md)", board.encoders())]
     Encoders {
         /// Which board.
         board: Board,
-        /// Sensors of the rig.
+        /// Number of the rig's sensors.
         needed: usize,
     },
     /// There is no source to build from.
@@ -87,14 +87,14 @@ pub enum ImageError {
     /// A file of the image cannot be read.
     #[error("{}: {source}", path.display())]
     File {
-        /// Which.
+        /// Path of the file.
         path: PathBuf,
         /// Why.
         source: std::io::Error,
     },
 }
 
-/// Builds the image with the committed gain table, `src/gains.rs`; gives the ELF file.
+/// Builds the image with the committed gain table, `src/gains.rs`; returns the path of the ELF file.
 ///
 /// # Errors
 /// [`ImageError`] if there is no compiler, or it fails.
@@ -111,8 +111,8 @@ pub fn build_if_possible(kind: Kind) -> Result<Option<PathBuf>, ImageError> {
     if_possible(build(kind))
 }
 
-/// What was built, for tests: without a compiler it is none, which is said on stderr, or an error if the environment
-/// variable `UPRIGHT_REQUIRE_IMAGE` is set.
+/// For tests: returns what was built. A missing compiler is reported on stderr and returned as `None`; if the
+/// environment variable `UPRIGHT_REQUIRE_IMAGE` is set, it is an error.
 ///
 /// # Errors
 /// That of the build.
@@ -126,7 +126,7 @@ pub fn if_possible(built: Result<PathBuf, ImageError>) -> Result<Option<PathBuf>
     }
 }
 
-/// Builds the image with the table of `rig` in place of `src/gains.rs`; gives the ELF file.
+/// Builds the image with the table of `rig` in place of `src/gains.rs`; returns the path of the ELF file.
 ///
 /// # Errors
 /// As for [`build`].
@@ -154,8 +154,8 @@ fn check_encoders(kind: Kind, needed: usize) -> Result<(), ImageError> {
     }
 }
 
-/// Waits until nobody else compiles an image, and keeps others waiting until the file is dropped. The compiler writes
-/// all images to the same place; each has to be copied from there before the next, by whichever process.
+/// Waits until no other process compiles an image, and keeps others waiting until the file is dropped. The compiler
+/// writes all images to the same place, and each has to be copied from there before the next is compiled.
 fn one_at_a_time() -> Result<File, ImageError> {
     let path = images()?.join("compiling");
     let locked = File::create(&path).and_then(|file| file.lock().map(|()| file));
@@ -178,7 +178,7 @@ fn compile(kind: Kind, gains: Option<&Path>, name: &str) -> Result<PathBuf, Imag
         .args(["rustc", "--quiet", "--package", "upright", "--bin", "upright-image"])
         .args(["--profile", PROFILE, "--target", TARGET, "--features", &features]);
     if kind.board().is_some() {
-        // The image alone, not the library: there is the part of a tick that has to be fast.
+        // Only the image's own crate is optimised for size: the library holds the part of a tick that has to be fast.
         cargo.args(["--", "-C", "opt-level=s"]);
     }
     let image = images()?.join(format!("{name}.elf"));
@@ -200,7 +200,7 @@ fn compile(kind: Kind, gains: Option<&Path>, name: &str) -> Result<PathBuf, Imag
     Ok(image)
 }
 
-/// Where images are kept.
+/// Directory in which images are kept; it is created if it does not exist.
 fn images() -> Result<PathBuf, ImageError> {
     let directory = target_directory()?.join("images");
     match std::fs::create_dir_all(&directory) {

@@ -1,4 +1,5 @@
-//! The checksum by which an image knows itself, and a person the image on a board; and the hash of a file.
+//! The checksum that an image reports of itself, so that a person can tell which image a board runs; and the hash of a
+//! file.
 
 use sha2::{Digest, Sha256};
 use upright::table::checksum::crc32;

@@ -15,12 +15,12 @@ const DEBIAN_RUSTC: &str = "/usr/bin/rustc";
 pub struct Compiler {
     /// Name of the program, for messages.
     pub program: &'static str,
-    /// What `rustc -vV` says.
+    /// Output of `rustc -vV`.
     pub version: String,
-    /// The call so far: its arguments begin with the command, such as `build`. Nothing of an outer cargo's environment
-    /// is left in it.
+    /// The call, to which the caller adds a subcommand such as `build` and its arguments. Variables of an outer cargo
+    /// are removed from its environment.
     pub cargo: Command,
-    /// Where it puts what it builds; it is told so.
+    /// Directory into which it builds; the call sets it.
     pub target_directory: PathBuf,
 }
 
@@ -63,7 +63,7 @@ pub fn compiler() -> Result<Compiler, ImageError> {
     Ok(compiler)
 }
 
-/// A separate one: the caller may run under cargo, which holds a lock on the usual one.
+/// A separate target directory: the caller may run under cargo, which holds a lock on the usual one.
 pub(super) fn target_directory() -> Result<PathBuf, ImageError> {
     let base = match std::env::var_os("CARGO_TARGET_DIR") {
         Some(directory) => std::path::absolute(directory).unwrap_or_default(),

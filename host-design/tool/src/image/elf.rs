@@ -67,7 +67,7 @@ pub struct Image {
     /// By address, none overlapping.
     pub(crate) functions: Vec<Item>,
     pub(crate) data: Vec<Item>,
-    /// `(address, instructions follow)`, by address: the `$t` and `$d` of the Arm ELF specification.
+    /// `(address, instructions follow)`, by address: the mapping symbols `$t` and `$d` of the Arm ELF specification.
     mapping: Vec<(u32, bool)>,
     text: (u32, Vec<u8>),
     /// Handlers by their number in the vector table, from 1 (reset).
@@ -152,7 +152,7 @@ impl Image {
             let marks = self.mapping.partition_point(|(mark, _)| *mark <= address);
             let next = self.mapping.get(marks).map_or(u32::MAX, |(mark, _)| *mark);
             let end = next.min(function.address + function.size);
-            // What no mark precedes is code: all of the section is, where an assembler gives none.
+            // Bytes that no mapping symbol precedes are code: some assemblers emit none.
             if marks == 0 || self.mapping[marks - 1].1 {
                 let from = (address - base) as usize;
                 let (halfwords, _) = text[from..(end - base) as usize].as_chunks::<2>();
@@ -164,7 +164,7 @@ impl Image {
         pieces
     }
 
-    /// A constant between instructions.
+    /// The word at an address in the code section, such as a constant between instructions.
     pub(crate) fn word_in_code(&self, address: u32) -> Option<u32> {
         let at = address.checked_sub(self.text.0)? as usize;
         let bytes = self.text.1.get(at..at + 4)?;
@@ -180,7 +180,7 @@ impl Image {
     }
 }
 
-/// Each byte once: the compiler merges small variables into one, and leaves their names.
+/// Counts each byte once: the compiler merges small variables into one, and keeps their names.
 fn without_overlap(mut data: Vec<Item>) -> Vec<Item> {
     data.sort_by_key(|item| (item.address, std::cmp::Reverse(item.size)));
     let mut counted = 0;
@@ -194,7 +194,8 @@ fn without_overlap(mut data: Vec<Item>) -> Vec<Item> {
     data
 }
 
-/// One name for each address, the one that has a size; what assembly gives no size extends to the next function.
+/// Keeps one name for each address, if possible one with a size; a function without a size, from assembly, extends to
+/// the next function.
 fn without_aliases(mut functions: Vec<Item>, end: u32) -> Vec<Item> {
     functions.sort_by_key(|function| (function.address, std::cmp::Reverse(function.size)));
     functions.dedup_by_key(|function| function.address);

@@ -1,4 +1,4 @@
-//! What an image for a board must not contain: a way to panic, and an allocator.
+//! Check that an image for a board contains no code that panics or allocates.
 
 use super::elf::Image;
 

@@ -1,5 +1,5 @@
-//! Images from earlier builds that nothing has changed since: cargo keeps one image for each set of features, and
-//! would compile it again whenever another rig's table was compiled in between.
+//! Reuse of images from earlier builds whose sources have not changed since. Cargo itself keeps one image for each set
+//! of features, and would compile it again whenever another rig's table was compiled in between.
 
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -10,7 +10,7 @@ use super::checksum::file_hash;
 /// Files at the root of the repository that decide what is compiled, beside the sources.
 const SETTINGS: [&str; 4] = ["Cargo.toml", "Cargo.lock", "memory.x", ".cargo/config.toml"];
 
-/// Variables of the environment, by the beginning of their names, that change what cargo compiles.
+/// Environment variables, by the beginning of their names, that change what cargo compiles.
 const VARIABLES: [&str; 3] = ["CARGO_BUILD_", "CARGO_PROFILE_", "CARGO_TARGET_THUMB"];
 
 /// Whether `image` is as `cargo` made it, by the same call, and no file that it was made from has changed.

@@ -9,43 +9,43 @@ use object::{Object, ObjectSection};
 
 use super::elf::{Image, Item};
 
-/// Limit of the flash of an image for a board without motions and without its gain table (bytes).
+/// Flash limit of an image for a board without motions (bytes), not counting the gain table.
 pub const FLASH_LIMIT: u32 = 24 * 1024;
-/// Limit of the flash of an image for a board with motions: their tables, and the nonlinear model (bytes).
+/// Flash limit of an image for a board with motions (bytes): it holds their tables and the nonlinear model.
 pub const FLASH_LIMIT_WITH_MOTIONS: u32 = 128 * 1024;
-/// Limit of the flash of an image for identification, without motions (bytes).
+/// Flash limit of an image for identification without motions (bytes).
 pub const FLASH_LIMIT_FOR_IDENTIFICATION: u32 = 30 * 1024;
-/// Limit of the static RAM of an image for a board: variables, without the stack and the gain table (bytes).
+/// Static RAM limit of an image for a board (bytes): its variables, not counting the stack and the gain table.
 pub const RAM_LIMIT: u32 = 4 * 1024;
-/// The same of an image for identification.
+/// Static RAM limit of an image for identification (bytes).
 pub const RAM_LIMIT_FOR_IDENTIFICATION: u32 = 5 * 1024;
 /// Limit of the stack of an image (bytes); memory.x reserves 5 KiB, which an image for identification may use.
 const STACK_LIMIT: u32 = 4 * 1024;
 const STACK_LIMIT_FOR_IDENTIFICATION: u32 = 5 * 1024;
 
-/// The table of motions; an image without motions has none.
+/// Name of the table of motions, which an image without motions does not have.
 const MOTIONS: &str = "upright::gains::SWING_UP";
 
-/// The gain table: in flash, and from the start on in RAM.
+/// Name of the gain table: its values are in flash, and are copied to RAM at start-up.
 const TABLE: &str = "upright_image::app::__rtic_internal_local_init_table";
 
 /// The end of the name of a function that only an image for identification has.
 const SHAKES: &str = ">::shake";
 
-/// Bytes of an image.
+/// Size of an image in bytes, with its limits.
 #[derive(Debug, Clone, PartialEq, Eq, serde::Serialize)]
 pub struct Size {
-    /// All in flash, with the initial values of variables.
+    /// Flash in all, including the initial values of variables.
     pub flash: u32,
-    /// What that is limited to, without the gain table.
+    /// Limit of the flash without the gain table.
     pub flash_limit: u32,
-    /// All variables, without the stack.
+    /// Static RAM: all variables, without the stack.
     pub ram: u32,
-    /// What that is limited to, without the gain table.
+    /// Limit of the static RAM without the gain table.
     pub ram_limit: u32,
-    /// The gain table, in flash and in RAM.
+    /// The gain table, which takes this much in flash and again in RAM.
     pub table: u32,
-    /// What the stack is limited to.
+    /// Limit of the stack.
     pub stack_limit: u32,
     /// By section, in the order of addresses.
     pub sections: Vec<Part>,
@@ -56,7 +56,7 @@ pub struct Size {
 /// A part of an image, in bytes.
 #[derive(Debug, Clone, Default, PartialEq, Eq, serde::Serialize)]
 pub struct Part {
-    /// A section, a crate, or what belongs to none in parentheses.
+    /// Name of a section or crate; in parentheses, a description of bytes that belong to none.
     pub name: String,
     /// Its bytes in flash.
     pub flash: u32,
@@ -90,7 +90,7 @@ pub fn size(image: &Image) -> Result<Size, SizeError> {
     let mut table = 0;
     for item in &image.data {
         let share = shares.entry(crate_of_symbol(item)).or_default();
-        // Initial values of variables other than the table are few: they count as part of their section.
+        // Initial values of other variables than the table are few: they are left to the unnamed rest.
         if item.name == TABLE {
             table = item.size;
             share.flash += item.size;
@@ -121,7 +121,7 @@ pub fn size(image: &Image) -> Result<Size, SizeError> {
 
 /// Bytes of machine code by the crate of their source line.
 fn code_by_crate(image: &Image) -> Result<BTreeMap<String, u32>, SizeError> {
-    // It was read before: it can be parsed.
+    // `Image::read` has parsed these bytes before.
     let elf = ElfFile32::<object::Endianness>::parse(&image.bytes[..]).ok();
     let section = |id: SectionId| {
         let found = elf.as_ref().and_then(|elf| elf.section_by_name(id.name()));
@@ -180,7 +180,7 @@ fn crate_of_symbol(item: &Item) -> String {
             "(vector table)".to_owned()
         }
         None if item.name.starts_with(".L") => "(alignment, constants without a name)".to_owned(),
-        None => "(assembly and names of C)".to_owned(),
+        None => "(assembly and C symbols)".to_owned(),
     }
 }
 

@@ -6,14 +6,14 @@
 use super::elf::Image;
 use super::thumb::{Effect, decode, is_wide};
 
-/// What the processor pushes when it takes an exception (Armv7-M Architecture Reference Manual, B1.5.7): 8 words, 18
-/// of the floating-point unit, and one to align; bytes.
+/// Largest frame that the processor stacks at exception entry (bytes; Armv7-M Architecture Reference Manual, B1.5.7):
+/// 8 words, 18 of the floating-point unit, and one for alignment.
 const EXCEPTION_FRAME: u32 = 108;
 
 /// The most stack that an image can need.
 #[derive(Debug, Clone, PartialEq, Eq, serde::Serialize)]
 pub struct StackBound {
-    /// All levels on top of each other, in bytes.
+    /// Sum of all levels, in bytes.
     pub bytes: u32,
     /// What memory.x reserves, in bytes.
     pub reserved: u32,
@@ -24,9 +24,9 @@ pub struct StackBound {
 /// The program from its start, or a handler.
 #[derive(Debug, Clone, PartialEq, Eq, serde::Serialize)]
 pub struct StackLevel {
-    /// The deepest chain of calls, from the first function.
+    /// Functions of the deepest chain of calls, from the first one.
     pub chain: Vec<String>,
-    /// Its stack with the frame that the processor pushes, in bytes.
+    /// Stack of that chain, with the exception frame, in bytes.
     pub bytes: u32,
 }
 
@@ -41,7 +41,7 @@ pub enum StackError {
     Indirect {
         /// The function.
         function: String,
-        /// Its address.
+        /// Address of the instruction.
         address: u32,
     },
     /// An array of a size that is not constant.
@@ -49,7 +49,7 @@ pub enum StackError {
     Variable {
         /// The function.
         function: String,
-        /// Its address.
+        /// Address of the instruction.
         address: u32,
     },
     /// A call of an address that is not a function.
@@ -62,20 +62,20 @@ pub enum StackError {
     },
 }
 
-/// What one function does.
+/// Stack frame and calls of a function.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 struct Node {
     name: String,
     /// Bytes that it pushes itself.
     frame: u32,
-    /// Indices of those that it calls.
+    /// Indices of the functions that it calls.
     calls: Vec<usize>,
 }
 
 /// Bounds the stack of an image.
 ///
 /// # Errors
-/// [`StackError`] if functions call each other in a circle or through pointers.
+/// [`StackError`] if functions call each other recursively or through pointers.
 pub fn stack_bound(image: &Image) -> Result<StackBound, StackError> {
     let nodes = reachable(image)?;
     let mut levels: Vec<StackLevel> = Vec::new();
@@ -116,7 +116,7 @@ fn reachable(image: &Image) -> Result<Vec<Node>, StackError> {
     Ok(nodes.into_iter().map(Option::unwrap_or_default).collect())
 }
 
-/// Each instruction of a piece of code with its address.
+/// The effect of each instruction of a function, with its address.
 fn effects(image: &Image, index: usize) -> Vec<(u32, Effect)> {
     let mut effects = Vec::new();
     for code in image.code(&image.functions[index]) {
@@ -145,7 +145,7 @@ fn node(image: &Image, index: usize) -> Result<Node, StackError> {
                     node.calls.push(other);
                 }
             }
-            // A table of branches, each of which is looked at as well.
+            // A branch table: its branches are decoded as well.
             Effect::JumpTo(register) if is_in_a_table(&before(&effects, place), register) => {}
             Effect::Indirect | Effect::JumpTo(_) => {
                 return Err(StackError::Indirect { function: name, address });
@@ -168,12 +168,12 @@ fn node(image: &Image, index: usize) -> Result<Node, StackError> {
     Ok(node)
 }
 
-/// The few instructions before one.
+/// Up to five instructions before one.
 fn before(effects: &[(u32, Effect)], place: usize) -> Vec<Effect> {
     effects[place.saturating_sub(5)..place].iter().map(|(_, effect)| *effect).collect()
 }
 
-/// Whether a register is the address of a table near the code, or of a place in it, after these instructions.
+/// Whether a register holds the address of a table near the code, or of an entry in it, after these instructions.
 fn is_in_a_table(before: &[Effect], register: u8) -> bool {
     let is_near = |register| before.contains(&Effect::Near(register));
     let indexed = before.iter().find_map(|effect| match effect {
@@ -183,9 +183,9 @@ fn is_in_a_table(before: &[Effect], register: u8) -> bool {
     is_near(register) || indexed.is_some_and(is_near)
 }
 
-/// Largest growth of the stack when its pointer becomes this register's value; none if unknown.
+/// Largest growth of the stack when its pointer becomes this register's value; `None` if unknown.
 fn growth(image: &Image, effects: &[(u32, Effect)], place: usize, register: u8) -> Option<u32> {
-    // r7 is the frame pointer: it gives back what was taken.
+    // r7 is the frame pointer: the stack pointer returns to where it was.
     if register == 7 {
         return Some(0);
     }

@@ -6,25 +6,25 @@
 pub(crate) enum Effect {
     /// Nothing that matters here.
     None,
-    /// The stack grows by so many bytes.
+    /// The stack grows by this many bytes.
     Grow(u32),
     /// A call of this address.
     Call(u32),
-    /// A branch to this address: within the function, or a call in its last place.
+    /// A branch to this address: within the function, or a tail call.
     Jump(u32),
     /// A call or branch to an address in a register or in memory.
     Indirect,
     /// A branch to the address in this register.
     JumpTo(u8),
-    /// This register becomes the address of something near, as that of a table of branches.
+    /// This register becomes an address near the instruction, such as that of a branch table.
     Near(u8),
-    /// The first register becomes the second plus another: a place in a table, if the second is its address.
+    /// The first register becomes the second plus another: an entry of a table, if the second is the table's address.
     Indexed(u8, u8),
     /// This register becomes the word at this address.
     Literal(u8, u32),
     /// The stack pointer becomes this register's value.
     FromRegister(u8),
-    /// This register is rounded down to a multiple of so many bytes.
+    /// This register is rounded down to a multiple of this many bytes.
     Aligned(u8, u32),
     /// This register becomes the frame pointer (r7) less a constant.
     FromFrame(u8),
@@ -32,12 +32,12 @@ pub(crate) enum Effect {
     Unknown,
 }
 
-/// Whether an instruction that begins so has two halfwords (A5.1).
+/// Whether an instruction with this first halfword has two (A5.1).
 pub(crate) fn is_wide(first: u16) -> bool {
     first >> 11 >= 0b11101
 }
 
-/// The instruction at `address`; `second` matters for one of two halfwords only.
+/// Decodes the instruction at `address`; `second` is used only if it has two halfwords.
 pub(crate) fn decode(address: u32, first: u16, second: u16) -> Effect {
     let to = |offset: i32| Effect::Jump(address.wrapping_add(4).wrapping_add_signed(offset));
     let register = |value: u16| (value & 15) as u8;
@@ -118,7 +118,7 @@ fn sign_extended(value: u32, bits: u32) -> i32 {
     (value << (32 - bits)) as i32 >> (32 - bits)
 }
 
-/// A constant from its twelve bits (A5.3.2).
+/// Expands a modified immediate constant of twelve bits (A5.3.2).
 fn expanded(constant: u32) -> u32 {
     let byte = constant & 0xFF;
     match constant >> 8 {

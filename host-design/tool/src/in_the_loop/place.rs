@@ -26,9 +26,9 @@ pub enum Place<'a> {
     },
     /// As the image that is flashed, on the virtual board.
     Board {
-        /// What is flashed.
+        /// The image.
         image: &'a upright_board::Image,
-        /// What this board is like.
+        /// Chip, wiring, clocks and supply of this board.
         conditions: Conditions,
     },
 }
@@ -39,7 +39,7 @@ pub enum RunError {
     /// The firmware does not do what it should.
     #[error(transparent)]
     Harness(#[from] HarnessError),
-    /// QEMU does not run it.
+    /// QEMU does not run the image.
     #[error(transparent)]
     Emulator(#[from] EmulatorError),
     /// The rig cannot be shaken, or does not do what it should.
@@ -57,7 +57,7 @@ impl From<ShakeError> for RunError {
 }
 
 impl Place<'_> {
-    /// Its name.
+    /// Its name, as shown to the user.
     pub fn name(self) -> &'static str {
         match self {
             Place::Host => "this computer",
@@ -71,7 +71,7 @@ impl Place<'_> {
         !matches!(self, Place::Host)
     }
 
-    /// Starts the firmware of `table` and does `action` with it. The firmware ends with the action.
+    /// Starts the firmware with `table` and runs `action` with it. The firmware is stopped when the action ends.
     ///
     /// # Errors
     /// Those of the start, and of `action`.
@@ -106,7 +106,7 @@ pub fn run(
     place.with_target(table, |target| Ok(record(rig, table, scenario, target)?))
 }
 
-/// The log of the machine of `rig` that the firmware of `table` shakes: see [`shake_with`].
+/// The log of the simulated machine of `rig`, which the firmware of `table` shakes: see [`shake_with`].
 ///
 /// # Errors
 /// [`RunError`] if the firmware does not run or turns the motor off, or the cart does not follow.
@@ -120,12 +120,12 @@ pub fn run_shaken(
     place.with_target(table, |target| Ok(shake_with(rig, table, target, duration_s, seed)?))
 }
 
-/// Runs `scenario` on the virtual board as [`run`] does, and in each tick the firmware on the host with what the
-/// board's image has latched: duty, estimate and telemetry must be the same in every bit. Gives the recording, and the
-/// numbers of ticks and of telemetry messages that were compared.
+/// Runs `scenario` on the virtual board as [`run`] does, and in each tick the firmware on the host with the inputs
+/// that the board's image has latched. The duty must agree to the timer's clock, estimate and telemetry in every bit.
+/// Returns the recording, and the numbers of ticks and of telemetry messages that were compared.
 ///
 /// # Errors
-/// [`RunError`] as of [`run`], and if they differ.
+/// [`RunError`] as for [`run`], and if the two differ.
 pub fn run_compared(
     rig: &Rig,
     table: &TableValues,

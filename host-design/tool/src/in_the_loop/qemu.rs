@@ -30,7 +30,7 @@ pub enum Link {
     Usart,
 }
 
-/// An image that does not run.
+/// Why an image does not run in QEMU.
 #[derive(Debug, thiserror::Error)]
 pub enum EmulatorError {
     /// The emulator is not installed.
@@ -50,7 +50,7 @@ pub enum EmulatorError {
         source: std::io::Error,
     },
     /// The image does not answer.
-    #[error("the image {0} does not answer: is it one for the loop?")]
+    #[error("the image {0} does not answer: was it built for QEMU?")]
     Silent(PathBuf),
 }
 
@@ -106,7 +106,7 @@ impl Emulator {
 
 impl Drop for Emulator {
     fn drop(&mut self) {
-        // The image may wait inside the emulator, which then reacts to nothing but this.
+        // The image may wait inside the emulator, which then does not react to anything else.
         let _ = self.process.kill();
         let _ = self.process.wait();
     }

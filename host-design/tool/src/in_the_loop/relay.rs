@@ -12,13 +12,13 @@ use upright_design::table::TableValues;
 use super::place::{Place, RunError};
 use super::qemu::EmulatorError;
 
-/// A relay that has ended early.
+/// Why a relay has ended early.
 #[derive(Debug, thiserror::Error)]
 pub enum RelayError {
-    /// The firmware or the rig.
+    /// The firmware or the rig could not be run.
     #[error(transparent)]
     Run(#[from] RunError),
-    /// The listening socket.
+    /// The listening socket failed.
     #[error("no client can connect: {0}")]
     Socket(#[from] std::io::Error),
 }
@@ -38,8 +38,8 @@ impl From<EmulatorError> for RelayError {
 /// Runs the firmware of `table` with the plant of `rig` for the duration of `scenario`, in real time from the first
 /// client on, and passes the bytes of its serial line to and from whoever is connected to `listener`, one at a time.
 ///
-/// Before that, the hand has homed, checked and raised the rig, and balancing has begun. While the motor is off, the
-/// hand holds the rig at the scenario's start, so that it can be armed again.
+/// Before that, the simulated hand has homed, checked and raised the rig, and balancing has begun. While the motor is
+/// off, the hand holds the rig at the scenario's start, so that it can be armed again.
 ///
 /// # Errors
 /// [`RelayError`] if the firmware does not run, the socket fails, or no client connects within the duration of the
@@ -124,7 +124,7 @@ fn accepted(listener: &TcpListener) -> std::io::Result<Option<TcpStream>> {
     }
 }
 
-/// What has come from the client; `None` if it has disconnected.
+/// Bytes received from the client; `None` if it has disconnected.
 fn receive(stream: &mut TcpStream) -> Option<Vec<u8>> {
     let mut buffer = [0; 256];
     match stream.read(&mut buffer) {
@@ -137,8 +137,8 @@ fn receive(stream: &mut TcpStream) -> Option<Vec<u8>> {
     }
 }
 
-/// Sends to the client; gives whether it is still connected. As on a serial line, what it does not take in time is
-/// lost.
+/// Sends to the client; returns whether it is still connected. As on a serial line, bytes that it does not take in
+/// time are lost.
 fn send(stream: &mut TcpStream, mut bytes: &[u8]) -> bool {
     while !bytes.is_empty() {
         match stream.write(bytes) {

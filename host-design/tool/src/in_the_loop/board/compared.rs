@@ -1,4 +1,4 @@
-//! The virtual board beside the firmware on the host: the same inputs in every tick, and the same bits.
+//! The virtual board compared with the firmware on the host: from the same inputs, the same bits in every tick.
 
 use std::collections::VecDeque;
 
@@ -14,7 +14,7 @@ use super::VirtualBoard;
 /// PWM is inactive for this share of each period at the least, whatever the duty.
 const LEAST_PAUSE: f32 = 0.02;
 
-/// A board and the firmware in this process, which gets what the board's image has latched.
+/// A board and the firmware in this process, which gets the inputs that the board's image has latched.
 pub struct Compared<'a> {
     board: &'a mut VirtualBoard,
     host: &'a mut dyn Target,
@@ -28,7 +28,7 @@ pub struct Compared<'a> {
     pub messages: u64,
 }
 
-/// Telemetry of one of the two.
+/// Telemetry of the board or of the host.
 struct Stream {
     receiver: Receiver<MAX_MESSAGE>,
     telemetry: VecDeque<AnyTelemetry>,
@@ -47,13 +47,13 @@ impl Stream {
 }
 
 impl<'a> Compared<'a> {
-    /// Both have just started.
+    /// Compares a board and a host that have both just started.
     pub fn new(board: &'a mut VirtualBoard, host: &'a mut dyn Target) -> Self {
         let streams = [(); 2].map(|()| Stream { receiver: Receiver::new(), telemetry: VecDeque::new() });
         Self { board, host, received: Vec::new(), was_stopped: false, streams, ticks: 0, messages: 0 }
     }
 
-    /// The duty at the pins is that of the host, to the timer's clock.
+    /// Checks that the duty at the pins is that of the host, to the timer's clock.
     fn compare_duty(&self, host: &Output) -> Result<(), HarnessError> {
         let stage = self.board.stage();
         if stage.enable != host.enable {
@@ -75,7 +75,7 @@ impl<'a> Compared<'a> {
         }
     }
 
-    /// What the firmware says of its inputs, its estimate and its force is the same in every bit.
+    /// Checks that the inputs, estimate and force in the telemetry are the same in every bit.
     fn compare_telemetry(&mut self) -> Result<(), HarnessError> {
         let [board, host] = &mut self.streams;
         while let (Some(ours), Some(theirs)) = (board.telemetry.front(), host.telemetry.front()) {
@@ -95,7 +95,7 @@ impl<'a> Compared<'a> {
     }
 }
 
-/// All but what a clock measures, and what only one of them has.
+/// The fields to compare: all but those that a clock measures, or that only one of the two has.
 fn bits(telemetry: &AnyTelemetry) -> (String, Vec<u32>) {
     let AnyTelemetry {
         tick,
@@ -123,7 +123,7 @@ impl Target for Compared<'_> {
         let output = self.board.tick(pins, serial)?;
         let mut latched = self.board.latched(pins, &self.received);
         self.received.clone_from(&self.board.received);
-        // The break input's flag comes again while the contact is open: it is found once more in the tick after.
+        // The break input's flag is set again while the contact is open, and is found once more in the next tick.
         let stopped = std::mem::replace(&mut self.was_stopped, pins.contacts.emergency_stop);
         latched.contacts.emergency_stop |= stopped;
         let mut from_host = Vec::new();

@@ -1,4 +1,4 @@
-//! What a tick costs on the board, from the run of the image that is flashed.
+//! Execution time of the ticks on the board, measured in a run of the image that is flashed.
 
 use serde::Serialize;
 use upright::supervision::fault::Fault;
@@ -13,7 +13,7 @@ use super::VirtualBoard;
 use super::places::places;
 use crate::in_the_loop::RunError;
 
-/// A stretch of time: cycles of the core, which are approximate, and microseconds.
+/// A duration, in cycles of the core, which are approximate, and in microseconds.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Span {
     /// Cycles of the core.
@@ -22,32 +22,32 @@ pub struct Span {
     pub us: f64,
 }
 
-/// The largest figures of some ticks, or their medians.
+/// Execution times of some ticks: the largest values, or the medians.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Figures {
-    /// How many ticks.
+    /// Number of ticks.
     pub ticks: usize,
-    /// From the time at which the tick is due to the motor's new duty; none with the motor off.
+    /// From the time at which the tick is due to the motor's new duty; `None` with the motor off.
     pub latency: Option<Span>,
-    /// Difference of it from that of the quickest tick.
+    /// Latency in excess of the shortest one.
     pub jitter: Option<Span>,
     /// From the time at which the tick is due to its end.
     pub whole: Span,
-    /// The interrupt's entry.
+    /// Exception entry, up to the first input.
     pub entry: Span,
-    /// All inputs are read.
+    /// Reading of all inputs.
     pub inputs: Span,
     /// Supervisor and controller.
     pub control: Span,
-    /// The motor is driven.
+    /// Output to the motor.
     pub output: Span,
-    /// A command, telemetry, the prediction, checks of the table.
+    /// After the output: a command, telemetry, the prediction, checks of the table.
     pub rest: Span,
     /// The controller alone, with its prediction; part of the above.
     pub controller: Span,
 }
 
-/// What the ticks of a run cost.
+/// Execution times of the ticks of a run.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Cycles {
     /// Frequency of the core (Hz).
@@ -66,7 +66,7 @@ pub struct Cycles {
     pub typical_moving: Option<Figures>,
     /// All ticks since the reset.
     pub all: Figures,
-    /// Why the run ended before its time.
+    /// Why the run ended early, if it did.
     pub ended: Option<String>,
 }
 
@@ -74,7 +74,7 @@ pub struct Cycles {
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[error(
     "the longest tick takes {whole_us:.1} µs ({cycles} cycles, by ARM's table), more than a quarter of its period, {quarter_us:.1} µs: \
-     give `[tick] period_s` at least {least_s:.2e}, or take a rig with fewer states"
+     set `[tick] period_s` to at least {least_s:.2e}, or use a rig with fewer states"
 )]
 pub struct TooLong {
     whole_us: f64,
@@ -84,7 +84,7 @@ pub struct TooLong {
 }
 
 impl Cycles {
-    /// No tick may take longer than a quarter of its period: the rest is for what a model does not know.
+    /// No tick may take longer than a quarter of its period: the rest is a margin for what the model does not cover.
     ///
     /// # Errors
     /// [`TooLong`]
@@ -100,7 +100,7 @@ impl Cycles {
         Err(TooLong { whole_us, cycles, quarter_us, least_s: (exact_s / digit).ceil() * digit })
     }
 
-    /// Of runs that balance, and of runs that move.
+    /// The times of a run that balances and of one that moves; `None` without ticks.
     fn of(balances: Run, moves: Run, period_s: f64) -> Option<Self> {
         let all = [balances.ticks.as_slice(), &moves.ticks].concat();
         let select = |ticks: &[TickCost], drives: bool| -> Vec<TickCost> {
@@ -133,7 +133,7 @@ fn median(times: &mut [Time]) -> Option<Time> {
 }
 
 impl Figures {
-    /// Of these ticks; each figure is `choose`n from those of all.
+    /// The figures of these ticks; `choose` picks each from its values in all ticks.
     fn of(ticks: &[TickCost], core_hz: u32, choose: fn(&mut [Time]) -> Option<Time>) -> Option<Self> {
         let span = |time: Time| {
             let us = time as f64 / UNITS_PER_MICROSECOND as f64;
@@ -162,7 +162,7 @@ impl Figures {
 /// Time of balancing between raising and lowering (s).
 const UPRIGHT_S: f64 = 0.1;
 
-/// What a board does in a run: gives the fault that has ended it, and counts the ticks that count.
+/// What a board does in a run: returns the fault that ended it, and counts the ticks in which the law drives.
 type Action<'a> = dyn Fn(&mut VirtualBoard, &mut usize) -> Result<Option<Fault>, HarnessError> + 'a;
 
 /// The measured ticks of a run.
@@ -177,8 +177,8 @@ struct Run {
 /// and measures every tick. If the table has a swing-up, does the same from power-up through raising and lowering.
 ///
 /// # Errors
-/// [`RunError`] if the image does what the hardware does not allow, or has no tick. A rig that does not come to
-/// balancing is no error: see [`Cycles::ended`].
+/// [`RunError`] if the image does something that the hardware does not allow, or has no tick. A rig that does not
+/// begin to balance is no error: see [`Cycles::ended`].
 pub fn measure(
     rig: &Rig,
     table: &TableValues,
@@ -197,7 +197,7 @@ pub fn measure(
             Err(error) => Some(error.to_string()),
         };
         let mut ticks = board.ticks().to_vec();
-        // Before the law drives, the bench drive has an output, too.
+        // The bench drive has an output too, before the law drives.
         let before = ticks.len().saturating_sub(driven);
         ticks.iter_mut().take(before).for_each(|tick| tick.latency = None);
         Ok(Run { core_hz: board.board().core_hz(), ticks, ended })
@@ -214,7 +214,7 @@ pub fn measure(
     cycles.ok_or_else(|| HarnessError::Board("has no tick".to_owned()).into())
 }
 
-/// Balances for the duration of `scenario`, and counts its ticks in `balanced`; gives the fault that has ended it.
+/// Balances for the duration of `scenario`, and counts its ticks in `balanced`; returns the fault that ended it.
 fn balance(
     rig: &Rig,
     table: &TableValues,

@@ -1,4 +1,4 @@
-//! The image that is flashed, on the virtual board: its pins are edges, levels, volts and bytes at their baud rate.
+//! The image that is flashed, on the virtual board, connected by encoder edges, pin levels, volts and serial bytes.
 
 mod compared;
 mod cycles;
@@ -23,64 +23,64 @@ use upright_design::table::TableValues;
 pub use compared::Compared;
 pub use cycles::{Cycles, Figures, Span, TooLong, measure};
 
-/// Inputs change so long before a tick.
+/// Inputs change this long before a tick.
 const LEAD: Time = 2 * UNITS_PER_MICROSECOND;
-/// What happens inside a tick happens so long after its beginning.
+/// Events inside a tick happen this long after its beginning.
 const INSIDE: Time = 3 * UNITS_PER_MICROSECOND;
-/// The serial line is quiet for so long before each tick, so that a byte belongs to one tick and no other.
+/// The serial line is quiet for this long before each tick, so that a byte belongs to one tick and no other.
 const QUIET: Time = 60 * UNITS_PER_MICROSECOND;
 /// Longest time from power-up to the first tick (s): an image without a crystal waits for it first.
 const START_S: f64 = 1.0;
-/// Where nothing is, for a processor fault.
+/// An unmapped address: executing it is a processor fault.
 const NOWHERE: u32 = 0x3000_0000;
-/// The stack ends here (memory.x).
+/// Lowest address of the stack (memory.x).
 const STACK_END: u32 = 0x2000_0000;
-/// Number of SysTick among the exceptions.
+/// Exception number of SysTick.
 const SYS_TICK: u16 = 15;
 
-/// What the firmware's image may do: what the processor faults at, it does; everything else that the manuals do not
-/// allow ends the run.
+/// Rules for the firmware's image: what makes the processor fault raises that fault; everything else that the manuals
+/// do not allow ends the run.
 pub const RULES: Rules = Rules { faults_are_taken: true, ..Rules::STRICT };
 
-/// What happens to the board in the next tick.
+/// An event at the board in its next tick.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Event {
-    /// So long after the beginning of the tick.
+    /// An input changes, or a fault is injected.
     Input {
-        /// How long.
+        /// Time after the beginning of the tick.
         after: Time,
-        /// What.
+        /// The input.
         input: Input,
     },
-    /// Bytes come over the serial line.
+    /// Bytes arrive over the serial line.
     Bytes {
-        /// Which.
+        /// The bytes.
         bytes: Vec<u8>,
-        /// How fast.
+        /// Their baud rate.
         baud: u32,
     },
-    /// From now on no byte of the host arrives.
+    /// From now on no byte from the host arrives.
     CutLine,
-    /// The emergency stop opens so long after the beginning of the tick, and closes again.
+    /// The emergency stop opens between two ticks, and closes again.
     Stop {
-        /// How long.
+        /// Time after the beginning of the tick.
         after: Time,
-        /// How long it stays open.
+        /// Time for which it stays open.
         open: Time,
     },
 }
 
-/// The way to let something happen to a board that someone else runs.
+/// Queue of the events for the next tick, shared with whoever runs the board.
 pub type Events = Rc<RefCell<Vec<Event>>>;
 
-/// A board with the image, in lock step.
+/// A board that runs the image in lock step with its caller, tick by tick.
 pub struct VirtualBoard {
     board: Board,
     wiring: &'static Wiring,
-    /// Force that full duty stands for (N); none for a rig with motor data.
+    /// Force at full duty (N); `None` for a rig with motor data.
     force_limit_n: Option<f32>,
     tick_s: f64,
-    /// Edges that each encoder has been turned by.
+    /// Position of each encoder (edges).
     positions: Vec<i64>,
     counters: Option<Vec<u32>>,
     contacts: Option<Contacts>,
@@ -99,18 +99,18 @@ pub struct VirtualBoard {
 }
 
 impl VirtualBoard {
-    /// Switches power on and lets the image run until just before its first tick.
+    /// Switches power on and runs the image until just before its first tick.
     ///
     /// # Errors
-    /// [`HarnessError::Board`] if it does what the hardware does not allow, or no tick comes.
+    /// [`HarnessError::Board`] if it does something that the hardware does not allow, or never starts its tick.
     pub fn start(image: &Image, conditions: &Conditions, table: &TableValues) -> Result<Self, HarnessError> {
         Self::start_with(image, conditions, table, &[])
     }
 
-    /// As [`VirtualBoard::start`], and with this happening at power-up.
+    /// As [`VirtualBoard::start`], with these inputs applied at power-up.
     ///
     /// # Errors
-    /// As of [`VirtualBoard::start`].
+    /// As for [`VirtualBoard::start`].
     pub fn start_with(
         image: &Image,
         conditions: &Conditions,
@@ -152,22 +152,22 @@ impl VirtualBoard {
         Ok(target)
     }
 
-    /// The board itself.
+    /// The board itself, without the harness.
     pub fn board(&mut self) -> &mut Board {
         &mut self.board
     }
 
-    /// Where to put what shall happen in the next tick.
+    /// Queue for events of the next tick.
     pub fn events(&self) -> Events {
         Rc::clone(&self.events)
     }
 
-    /// What the power stage saw at the end of the last tick.
+    /// State of the power stage's inputs at the end of the last tick.
     pub fn stage(&self) -> PowerStage {
         self.stage
     }
 
-    /// From now on measures every tick, with the places of its half-words: slower, and otherwise the same.
+    /// Measures every tick from now on, with these places of the half-words: slower, but with the same results.
     fn measure_ticks(&mut self, places: Vec<Place>) {
         self.meter = Some(Meter::new(places));
     }
@@ -177,14 +177,14 @@ impl VirtualBoard {
         self.meter.as_ref().map_or(&[], Meter::ticks)
     }
 
-    /// Longest time from an edge of the emergency stop to an output that is off; none if it never opened between
-    /// ticks, or nothing was off before the next tick.
+    /// Longest time from an edge of the emergency stop to an output that is off; `None` if it never opened between
+    /// ticks, or the output was never off before the next tick.
     pub fn stop_to_off(&self) -> Option<Time> {
         self.stop_to_off
     }
 
-    /// What the image has latched in the last tick, for a firmware that shall do the same. `received` came with the
-    /// tick before: the image looks for bytes after each tick.
+    /// The inputs that the image latched in the last tick, for a firmware that has to do the same. `received` arrived
+    /// with the tick before: the image looks for bytes after each tick.
     fn latched(&self, pins: &Pins, received: &[u8]) -> Pins {
         let counts = (0..).zip(&self.positions).map(|(sensor, &position)| {
             let count = position as u32;
@@ -205,13 +205,13 @@ impl VirtualBoard {
         run.map_err(|error| stopped(&self.image, error))
     }
 
-    /// One instruction.
+    /// Executes one instruction.
     fn step(&mut self) -> Result<(), HarnessError> {
         self.run(self.board.now() + 1)
     }
 
-    /// Contacts as levels: those of the emergency stop and the limits are closed to ground while all is well, the
-    /// driver pulls its line low when it has a fault.
+    /// Applies contacts as levels: emergency stop and limit switches are normally closed to ground; the driver pulls
+    /// its line low when it has a fault.
     fn connect(&mut self, contacts: &Contacts) {
         let level = |low: bool| if low { Wire::Low } else { Wire::High };
         let closed = |open: bool| if open { Wire::Open } else { Wire::Low };
@@ -232,7 +232,7 @@ impl VirtualBoard {
         self.supply_v = Some(volts);
     }
 
-    /// The shafts turn to where the counters say, at once: the image reads them in between.
+    /// Turns the shafts to the positions of the counters, at once, since the image reads them only in a tick.
     fn turn(&mut self, counts: &[u32]) {
         let before = self.counters.replace(counts.to_vec()).unwrap_or_else(|| counts.to_vec());
         let end = self.board.now();
@@ -247,7 +247,7 @@ impl VirtualBoard {
         }
     }
 
-    /// As many of the waiting bytes as fit between the quiet times around a tick.
+    /// Sends as many of the waiting bytes as fit between the quiet times around a tick.
     fn send(&mut self, span: Time) {
         let byte = 10 * UNITS_PER_SECOND / Time::from(BAUD);
         let room = (span.saturating_sub(QUIET + LEAD) / byte) as usize;
@@ -256,8 +256,8 @@ impl VirtualBoard {
         self.received = bytes;
     }
 
-    /// What shall happen in the tick that begins soon after `now`; gives when the emergency stop opens, and for how
-    /// long.
+    /// Schedules the events of the tick that begins soon after `now`; returns when the emergency stop opens, and for
+    /// how long.
     fn happen(&mut self, now: Time) -> Option<(Time, Time)> {
         let begin = self.board.next_tick().unwrap_or(now);
         let mut stop = None;
@@ -272,7 +272,7 @@ impl VirtualBoard {
         stop
     }
 
-    /// The emergency stop opens between two ticks: how long until the output is off?
+    /// Opens the emergency stop between two ticks, and measures how long it takes until the output is off.
     fn press_stop(&mut self, edge: Time, open: Time) -> Result<(), HarnessError> {
         self.run(edge)?;
         let edge = self.board.now();
@@ -288,7 +288,7 @@ impl VirtualBoard {
         Ok(())
     }
 
-    /// The tick that comes next ends after the one after it is due: it stands still once it has driven the motor.
+    /// Makes the next tick end after the following one is due: the core is stalled once it has driven the motor.
     fn make_late(&mut self, period: Time) -> Result<(), HarnessError> {
         let due = self.board.next_tick().unwrap_or(self.board.now());
         self.run(due)?;
@@ -306,7 +306,7 @@ impl VirtualBoard {
         Ok(())
     }
 
-    /// A defect inside the microcontroller, in the tick that comes next.
+    /// Injects a defect inside the microcontroller into the next tick.
     fn sabotage(&mut self, sabotage: Sabotage) -> Result<(), HarnessError> {
         let begin = self.board.next_tick().unwrap_or(self.board.now());
         match sabotage {
@@ -321,7 +321,7 @@ impl VirtualBoard {
         }
     }
 
-    /// The stack is full but for two words when the tick comes. If that does not stop the program, it goes on with the
+    /// Leaves two words of stack free when the tick comes. If that does not stop the program, it continues with the
     /// stack that it had.
     fn fill_stack(&mut self, begin: Time) -> Result<(), HarnessError> {
         self.run(begin - 1)?;
@@ -367,7 +367,7 @@ impl Target for VirtualBoard {
         if let Some(sabotage) = pins.sabotage {
             self.sabotage(sabotage)?;
         }
-        // The tick after this one, or its time if none comes.
+        // Runs until the tick after this one, or until it would be due if none comes.
         self.run(begin + 2 * LEAD)?;
         let end = self.board.next_tick().map_or(begin + period, |next| next.saturating_sub(LEAD));
         self.run(end.max(begin + 3 * LEAD))?;

@@ -1,17 +1,17 @@
-//! What the functions of the image are in a tick.
+//! Attribution of the image's functions to the parts of a tick.
 
 use std::collections::HashMap;
 
 use rustc_demangle::demangle;
 use upright_board::{Image, Part, Place};
 
-/// Where code is.
+/// Address of flash, where the code is.
 const FLASH: u32 = 0x0800_0000;
 
-/// The places of all half-words, by the image's debug information; without it, nothing is known of any.
+/// The places of all half-words of flash, by the image's debug information; without it, every place is unknown.
 pub(super) fn places(image: &Image) -> Vec<Place> {
     let lines = image.lines();
-    // Some hundred functions have thousands of instructions.
+    // A cache by name: thousands of instructions belong to a few hundred functions.
     let mut known = HashMap::new();
     let place = |half_word: usize| {
         let names = lines.as_ref().map_or(Vec::new(), |lines| lines.functions(FLASH + 2 * half_word as u32));
@@ -20,7 +20,7 @@ pub(super) fn places(image: &Image) -> Vec<Place> {
     (0..image.end() / 2).map(place).collect()
 }
 
-/// By the functions that an instruction is in, the innermost first; what is `known` of each is not found out again.
+/// The place of an instruction, by the functions that it is in, the innermost first; `known` caches each function's.
 fn place_of(names: Vec<String>, known: &mut HashMap<String, Place>) -> Place {
     names.into_iter().fold(Place::default(), |place, name| {
         let own = known.entry(name).or_insert_with_key(|name| {
@@ -31,7 +31,7 @@ fn place_of(names: Vec<String>, known: &mut HashMap<String, Place>) -> Place {
     })
 }
 
-/// The part of the tick that a function is, by its path.
+/// The part of the tick that a function belongs to, by its path; `None` if that depends on its caller.
 fn part_of(path: &str) -> Option<Part> {
     let is =
         |owner: &str, names: &[&str]| path.contains(owner) && names.iter().any(|name| path.ends_with(name));
@@ -51,7 +51,7 @@ fn part_of(path: &str) -> Option<Part> {
     }
 }
 
-/// Whether a function belongs to the controller; nothing if its caller says so.
+/// Whether a function belongs to the controller, by its path; `None` if that depends on its caller.
 fn is_controller(path: &str) -> Option<bool> {
     if path.contains("control::controller::Controller") {
         Some(true)

@@ -8,12 +8,12 @@ use std::time::{Duration, Instant};
 
 use super::EmulatorError;
 
-/// Longest wait for the image's first sign of life.
+/// Longest wait for the image to connect to its pins.
 const START: Duration = Duration::from_secs(20);
 /// The step that has failed if a channel cannot be opened.
 pub(super) const NO_CHANNEL: &str = "no channel to it";
 
-/// Pins and serial line.
+/// The channels of the pins, both ways, and the serial line from the firmware.
 pub(super) struct Channels {
     pub(super) to_pins: Box<dyn Write>,
     pub(super) from_pins: Box<dyn Read>,
@@ -45,7 +45,7 @@ pub(super) fn serial_lines(mut command: Command, image: &Path) -> Result<(Child,
     };
     let (mut pins, serial) = (accept(&pins)?, accept(&serial)?);
     pins.set_nonblocking(true).map_err(no_channel())?;
-    // The image's receiver is on when its first byte comes.
+    // The image sends its first byte once its receiver is on.
     wait(&mut process, image, || pins.read(&mut [0]).ok().filter(|&length| length == 1))?;
     pins.set_nonblocking(false).map_err(no_channel())?;
     serial.set_nonblocking(false).map_err(no_channel())?;
@@ -55,7 +55,7 @@ pub(super) fn serial_lines(mut command: Command, image: &Path) -> Result<(Child,
     Ok((process, channels))
 }
 
-/// Waits until something has happened that the image does at its start.
+/// Waits until `done` detects something that the image does at its start.
 pub(super) fn wait<T>(
     process: &mut Child,
     image: &Path,

@@ -20,14 +20,14 @@ pub(super) fn open(
     let open = |name: &str, flags: OFlags| -> Result<File, EmulatorError> {
         make(&directory.join(name), flags).map_err(EmulatorError::at(NO_CHANNEL))
     };
-    // Open for both, the first neither waits for the image nor fails without it. The other two must not be open for
-    // writing here: their end has to be seen.
+    // Open for reading and writing, the first neither waits for the image nor fails without it. The other two must not
+    // be open for writing here, so that their end of file is seen.
     let to_pins = open("pins.in", OFlags::RDWR)?;
     let from_pins = open("pins.out", OFlags::RDONLY | OFlags::NONBLOCK)?;
     let serial = open("serial.out", OFlags::RDONLY | OFlags::NONBLOCK)?;
     let mut process = spawn(command)?;
     wait(&mut process, image, || {
-        // An empty FIFO that somebody has open for writing would block; before that it is at its end.
+        // An empty FIFO blocks once the image has opened it for writing; before that it is at its end.
         match (&from_pins).read(&mut [0]) {
             Err(error) if error.kind() == std::io::ErrorKind::WouldBlock => Some(()),
             _ => None,
