@@ -14,8 +14,8 @@ use crate::progress::with_bar;
 use crate::split::Split;
 use crate::variation::not_negative;
 
-/// Shakes and identifies simulated machines that differ from the rig file, and counts how many 95 % intervals cover the
-/// true values.
+/// Shakes and identifies simulated machines that differ from the rig file, and counts how many 95 % intervals cover
+/// the true values.
 ///
 /// Masses, lengths and inertias are drawn within --off of the file, friction within a factor of 3 of what is usual;
 /// zeros, tilt, latency and dead zone are drawn, too.

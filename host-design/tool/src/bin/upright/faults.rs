@@ -19,8 +19,8 @@ use crate::variation::{Variation, Wanted, with_stored_motions};
 /// Fault injection: runs the firmware with one defect at a time and checks that the motor is off in time; exit status
 /// 1 if it ever is not, or is turned off without a reason.
 ///
-/// As a negative control, part of the campaign is repeated with a firmware without thresholds and limits: that firmware
-/// must miss the defects, or the campaign proves nothing.
+/// As a negative control, part of the campaign is repeated with a firmware without thresholds and limits: that
+/// firmware must miss the defects, or the campaign proves nothing.
 #[derive(Args)]
 #[command(before_help = "\
 Examples:

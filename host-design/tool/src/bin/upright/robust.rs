@@ -25,8 +25,8 @@ mod text;
 /// Chooses weights, far poles and joint noise with which the loop withstands wrong masses, friction, wrong zeros and
 /// latency.
 ///
-/// The tolerances are those of [robust] in the rig file, or of the options. Exit status 3 if nothing helps; the message
-/// says why.
+/// The tolerances are those of [robust] in the rig file, or of the options. Exit status 3 if nothing helps; the
+/// message says why.
 #[derive(Args)]
 #[command(before_help = "\
 Examples:
@@ -170,7 +170,8 @@ impl Robust {
         )))
     }
 
-    /// Writes the rig file with the choice, unless --check is given. Returns whether it differs from the existing file.
+    /// Writes the rig file with the choice, unless --check is given. Returns whether it differs from the existing
+    /// file.
     fn write(
         &self,
         path: &Path,

@@ -24,9 +24,9 @@ use crate::variation::with_table;
 /// Without --port, the machine is the simulated one of the rig file with its [reality]; the force is computed from the
 /// file alone. With --target, the whole firmware shakes it, from power-up on, and sends the log over its serial line.
 ///
-/// With --port, the machine is real. Its board must run the image for identification and be homed, with signs and motor
-/// checked (`upright firmware monitor`); the links must hang still, and nobody may be within reach. Ctrl-C turns the
-/// motor off.
+/// With --port, the machine is real. Its board must run the image for identification and be homed, with signs and
+/// motor checked (`upright firmware monitor`); the links must hang still, and nobody may be within reach. Ctrl-C turns
+/// the motor off.
 #[derive(Args)]
 #[command(before_help = "\
 Examples:

@@ -24,9 +24,9 @@ use crate::failure::Failure;
 use crate::progress::with_spinner;
 use crate::variation::{Wanted, law_option, positive};
 
-/// Measures what the ticks of the flashed image cost, on the virtual board: latency from the tick to the output, jitter
-/// of the output, and the whole task by part. The run goes from power-up through arming to balancing, and through
-/// raising and lowering if the rig has stored motions.
+/// Measures what the ticks of the flashed image cost, on the virtual board: latency from the tick to the output,
+/// jitter of the output, and the whole task by part. The run goes from power-up through arming to balancing, and
+/// through raising and lowering if the rig has stored motions.
 ///
 /// Cycle counts follow ARM's instruction timings and the wait states of the flash; they are approximate. Exit status 1
 /// if a tick takes longer than a quarter of its period.

@@ -137,7 +137,8 @@ impl Conversation {
         Ok(())
     }
 
-    /// Sends pending bytes and receives, calling `each` with every telemetry; takes at most 5 ms if the line is silent.
+    /// Sends pending bytes and receives, calling `each` with every telemetry; takes at most 5 ms if the line is
+    /// silent.
     fn exchange(
         &mut self,
         mut each: impl FnMut(&serde_json::Value) -> std::io::Result<()>,

@@ -19,9 +19,9 @@ use crate::simulate::Simulate;
 /// Builds the image for the rig, runs it in lock step with the nonlinear plant, and compares every bit with the
 /// firmware on the host; exit status 1 if the pendulum falls or a bit differs.
 ///
-/// In QEMU, the pins are simulated, and the run is the same as on the host. On the virtual board, the image itself that
-/// is flashed runs, with its registers; its pins drive the plant, and in each tick the firmware on the host gets the
-/// inputs that the image has latched.
+/// In QEMU, the pins are simulated, and the run is the same as on the host. On the virtual board, the image itself
+/// that is flashed runs, with its registers; its pins drive the plant, and in each tick the firmware on the host gets
+/// the inputs that the image has latched.
 ///
 /// The rig is homed while it hangs, held by hand at the start of the scenario until the firmware begins to balance,
 /// and released at time 0. With --swing-up, the image raises the rig from hanging, balances, moves, and lowers it

@@ -43,8 +43,8 @@ impl Target {
         }
     }
 
-    /// Builds the image with the table of the rig and prints its path and hash; on the host, no image is needed. `link`
-    /// connects the pins of an image in QEMU.
+    /// Builds the image with the table of the rig and prints its path and hash; on the host, no image is needed.
+    /// `link` connects the pins of an image in QEMU.
     pub(crate) fn built(self, link: Link, rig: &Rig, table: &TableValues) -> Result<Built, Failure> {
         self.built_as(Kind::Board(BOARD), link, rig, table)
     }
