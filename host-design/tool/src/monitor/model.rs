@@ -64,7 +64,7 @@ pub struct Monitor {
     pub info: Option<Info>,
     /// The latest telemetry.
     pub telemetry: Option<TelemetryOfAny>,
-    /// Counters of overruns and of lost or unusable messages, as last received.
+    /// Counters of ticks, overruns, rejected measurements and lost messages, as last received.
     pub statistics: Option<Statistics>,
     /// The first cause of the fault or of the last reset.
     pub cause: Option<Cause>,

@@ -106,7 +106,7 @@ fn bode(points: &[Point], margins: &Margins, title: String) -> Figure {
         .high(230)
         .with(level("|L| = 1", 1.0))
         .with(Curve::line("|L|", 0, curve(&Point::gain)));
-    // Phase is known modulo 360°: the critical phase is marked at each turn that the curve passes.
+    // Phase is known modulo 360°: the critical phase of every turn near the curve is marked.
     let (low, high) = points
         .iter()
         .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), p| (low.min(p.phase), high.max(p.phase)));
