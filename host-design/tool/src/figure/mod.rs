@@ -99,7 +99,7 @@ pub struct Curve {
     pub name: String,
     /// `[x, y]` each. A point that is not finite interrupts the line.
     pub points: Vec<[f64; 2]>,
-    /// Line or markers, with colour and width.
+    /// Line or markers, with their colour.
     pub style: Style,
 }
 

@@ -11,7 +11,7 @@ const ENOUGH_PERCENT: f64 = 30.0;
 /// With more links there are too many combinations for each percentage.
 const MOST_LINKS: usize = 5;
 
-/// Imperfections, and the size of each that one law withstands.
+/// The size of each imperfection at which one law falls, and at which it leaves the limits.
 pub(super) struct StandingTable {
     pub(super) law: &'static str,
     pub(super) rows: Vec<StandingRow>,

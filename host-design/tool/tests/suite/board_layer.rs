@@ -408,7 +408,8 @@ fn monitored(run: &mut Powered, time_s: f64) -> Monitor {
     monitor
 }
 
-/// A bit flips in the pointers to the gain table that the firmware keeps in RAM: the next tick reads where nothing is.
+/// A bit flips in the pointers to the gain table that the firmware keeps in RAM: the next tick reads an address
+/// without memory.
 #[test]
 fn a_crash_is_recorded_over_the_reset_and_shown_by_the_monitor() {
     let Some(image) = image() else { return };

@@ -298,7 +298,7 @@ fn text(rig: &Rig, plan: &Plan) -> String {
                farthest from the middle  {:>10.3} m\n  \
                largest speed of the cart {:>10.2} m/s\n  \
                largest rate of a joint   {:>10.1} rad/s\n  \
-               used of nearest limit     {:>10.0} %\n  \
+               used of the nearest limit {:>10.0} %\n  \
                error of a tick           {:>10.1e} (adaptive integrator)\n  \
                fragility                 {score:>10.2}\n  \
                random runs that arrive   {:>10} of {} (95 % interval {:.1} to {:.1} %)\n  \

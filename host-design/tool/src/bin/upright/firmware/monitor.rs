@@ -167,7 +167,8 @@ impl Conversation {
         let said = lines_of_stdin();
         let mut out = std::io::stdout().lock();
         while self.goes_on() && self.model.ended.is_none() {
-            // Telemetry is only accepted once the firmware has named its version of the messages.
+            // No command before the first telemetry, which is only accepted once the firmware has named its version of
+            // the messages.
             while self.model.telemetry.is_some()
                 && let Ok(line) = said.try_recv()
             {
