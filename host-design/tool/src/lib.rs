@@ -12,7 +12,7 @@
 //! | [`monitor`] | telemetry and commands in a terminal |
 //! | [`compare`] | rigs and sweeps side by side |
 //! | [`reproduce`] | the paper's results beside ours |
-//! | [`identified`] | what was identified, as text, as JSON and as a rig file |
+//! | [`identified`] | results of an identification, as text, JSON, page and rig file |
 //! | [`twin`] | the live twin: a page on which the rig moves |
 //! | [`project`] | finds the checkout that images are built from |
 //!

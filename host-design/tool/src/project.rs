@@ -1,8 +1,8 @@
-//! Where the source of the firmware is.
+//! Finds the checkout of the project, which holds the source of the firmware.
 
 use std::path::{Path, PathBuf};
 
-/// There is no checkout of the project.
+/// No checkout of the project was found; holds the current folder.
 #[derive(Debug, thiserror::Error)]
 #[error("{} is in no checkout of Upright, which holds the firmware's source: change to one and run this again", .0.display())]
 pub struct NoCheckout(PathBuf);
@@ -18,7 +18,7 @@ pub fn checkout() -> Result<PathBuf, NoCheckout> {
     around.or_else(|| built_from().filter(|folder| is_checkout(folder))).ok_or(NoCheckout(current))
 }
 
-/// The manifest of the firmware beside the memory map of its boards.
+/// Whether the folder holds the manifest of the firmware and the memory map of its boards.
 fn is_checkout(folder: &Path) -> bool {
     let manifest = std::fs::read_to_string(folder.join("Cargo.toml")).unwrap_or_default();
     manifest.lines().any(|line| line.trim_end() == "name = \"upright\"") && folder.join("memory.x").is_file()

@@ -1,4 +1,4 @@
-//! From a rig to its row.
+//! Designs and simulates a rig for one row of the comparison.
 
 use serde::Serialize;
 use upright::table::Law;
@@ -14,26 +14,26 @@ use upright_design::verify::{AttractionSettings, Margins, largest_tilts, margins
 /// A rig to compare, and the value of the swept key in it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Candidate {
-    /// What it is called in the table: different for each rig file.
+    /// Name in the table; different for each rig file.
     pub label: String,
-    /// The rig.
+    /// The rig, with the value of the swept key.
     pub rig: Rig,
-    /// The value.
+    /// Value of the swept key; `None` without a sweep.
     pub value: Option<f64>,
 }
 
-/// What every candidate has to go through.
+/// Conditions under which every candidate is simulated.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Conditions {
     /// Step of the set-point (m, or the unit of a model's output).
     pub step_m: f64,
-    /// Length of the run (s).
+    /// Duration of the run (s).
     pub duration_s: f64,
     /// Give the controller the whole state, whether or not the rig asks for an observer.
     pub full_state: bool,
-    /// Let the set-point jump, without the governor.
+    /// Apply the set-point as a step, without the governor.
     pub raw_step: bool,
-    /// Use gains for continuous time instead of those for the tick.
+    /// Use the gains designed in continuous time instead of those designed for the tick.
     pub continuous_gains: bool,
     /// Only this law.
     #[serde(skip)]
@@ -41,7 +41,7 @@ pub struct Conditions {
 }
 
 impl Default for Conditions {
-    /// A step of 0.1 m in 10 s, as the rig file has it.
+    /// A step of 0.1 m in a run of 10 s; everything else is as in the rig file.
     fn default() -> Self {
         Self {
             step_m: 0.1,
@@ -54,7 +54,7 @@ impl Default for Conditions {
     }
 }
 
-/// Width to which the edge of the tilt is found: enough for a table.
+/// Relative precision of the largest tilt: enough for a table.
 const TILT_PRECISION: f64 = 0.02;
 
 /// Each law that a candidate asks for, in the order of the rows of [`compare`].
@@ -71,10 +71,10 @@ pub fn jobs<'a>(candidates: &'a [Candidate], conditions: &Conditions) -> Vec<(&'
         .collect()
 }
 
-/// Makes all rows, in parallel, ordered by law; `done` is called after each.
+/// Computes all rows, in parallel, ordered by law; `done` is called after each.
 ///
 /// # Errors
-/// [`SimulationError`] if a run is impossible for every candidate alike: too long, say.
+/// [`SimulationError`] if a run cannot be simulated, for example because it is too long.
 pub fn compare(
     candidates: &[Candidate],
     conditions: &Conditions,

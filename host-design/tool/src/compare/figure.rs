@@ -6,10 +6,10 @@ use super::sweep::Sweep;
 use crate::figure::{Axis, Curve, Figure, Panel};
 use upright_design::rig::{PlantDescription, Rig};
 
-/// One figure of a row.
+/// Reads one figure of a row.
 type Value = fn(&Figures) -> Option<f64>;
 
-/// Figures over the swept key, or, without a sweep, the runs one upon the other.
+/// The figures over the swept key; without a sweep, all runs over time in the same panels.
 pub fn figure(rows: &[Row], candidates: &[Candidate], sweep: Option<&Sweep>) -> Figure {
     match sweep {
         Some(sweep) => over_key(rows, sweep),
@@ -17,7 +17,7 @@ pub fn figure(rows: &[Row], candidates: &[Candidate], sweep: Option<&Sweep>) -> 
     }
 }
 
-/// Rows of one rig and law, in the order of the rows.
+/// Groups the rows by rig and law, in their order.
 fn groups(rows: &[Row]) -> Vec<(String, Vec<&Row>)> {
     let several = rows.iter().any(|row| row.rig != rows[0].rig);
     let mut groups: Vec<(String, Vec<&Row>)> = Vec::new();
@@ -72,7 +72,7 @@ fn over_key(rows: &[Row], sweep: &Sweep) -> Figure {
                 })
                 .collect();
             let name = if index == 0 { name.as_str() } else { "" };
-            // Number 0 is that of the crosses.
+            // Number 0 is for the crosses.
             panel = panel.with(Curve::line(name, 1 + number, points.clone()));
             panel = panel.with(Curve::markers("", 1 + number, points));
             let is_lost = |row: &&&Row| matches!(row.fate, Fate::Fallen(_) | Fate::NoDesign(_));

@@ -1,8 +1,8 @@
 //! Comparison of designs: several rigs, or one rig file with one of its numbers swept over a range.
 //!
-//! A [`Sweep`] changes the text of the rig file, so that every value is checked as if it stood there. For each
-//! [`Candidate`] and law [`compare`] makes the design, its margins, one run of the firmware's controller and the
-//! largest tilt. A candidate without design, or one that falls, has a row, too.
+//! A [`Sweep`] changes the text of the rig file, so that every value is checked as if it were written there. For each
+//! [`Candidate`] and law, [`compare`] computes the design, its margins, one run of the firmware's controller and the
+//! largest tilt. A candidate that has no design or falls gets a row, too.
 
 mod candidate;
 mod figure;

@@ -5,14 +5,14 @@ use upright::table::Law;
 
 use upright_design::simulate::{Fall, Trace};
 
-/// What was found for one law of one candidate.
+/// Results for one law of one candidate.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Row {
     /// Label of the rig.
     pub rig: String,
-    /// Value of the swept key.
+    /// Value of the swept key; `None` without a sweep.
     pub value: Option<f64>,
-    /// The law.
+    /// The control law that was run.
     pub law: Law,
     /// How the run ended.
     pub fate: Fate,
@@ -33,7 +33,7 @@ pub enum Fate {
     Standing,
     /// It falls.
     Fallen(Fall),
-    /// There is no such design, for this reason.
+    /// There is no design; holds the reason.
     NoDesign(String),
 }
 
@@ -58,6 +58,6 @@ pub struct Figures {
     pub delay_margin_s: Option<f64>,
     /// Largest tilt of the worst single link from which it recovers (rad); none for a model or an unstable loop.
     pub tilt_rad: Option<f64>,
-    /// Fastest pole of the continuous design (1/s): negative.
+    /// Real part of the fastest pole of the continuous design (1/s): negative.
     pub fastest_pole_per_s: f64,
 }

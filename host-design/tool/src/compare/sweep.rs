@@ -8,11 +8,11 @@ use upright_design::rig::{Edited, Rig, RigError, RigErrorKind, with_value};
 /// Values for one key of a rig file.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Sweep {
-    /// The key as it would stand in an error: `tick.period_s`, `link[2].mass_kg`, `lqr.state_weights[1]`.
+    /// The key as error messages write it: `tick.period_s`, `link[2].mass_kg`, `lqr.state_weights[1]`.
     pub key: String,
     /// The values, from the first to the last one named.
     pub values: Vec<f64>,
-    /// Whether they are spaced by equal factors.
+    /// Whether the values are spaced logarithmically, by equal factors.
     pub log: bool,
 }
 
@@ -27,7 +27,7 @@ pub enum SweepError {
     /// Too few or too many values.
     #[error("{0} points: give 2 to {MOST_POINTS}")]
     Points(usize),
-    /// Equal factors between values that are not positive.
+    /// Logarithmic spacing of values that are not positive.
     #[error("from {from} to {to} there are no equal factors: leave out `log`, or give two numbers above 0")]
     Log {
         /// First value.
@@ -87,11 +87,11 @@ impl core::str::FromStr for Sweep {
 }
 
 impl Sweep {
-    /// The rig of `text` with `value` for the key. A key that is not in the text, but could be, is added.
+    /// The rig of `text` with `value` for the key. A valid key that the text leaves out is added.
     ///
     /// # Errors
-    /// As for any rig file: unknown keys with a suggestion, bad values with the accepted range. An error has no line
-    /// where the key had to be added.
+    /// As for any rig file: unknown keys with a suggestion, bad values with the accepted range. If the key had to be
+    /// added, the error names no line.
     pub fn rig(&self, text: &str, file: &Path, value: f64) -> Result<Rig, RigError> {
         let number = if value.abs() < 1e15 { format!("{value}") } else { format!("{value:e}") };
         match with_value(text, &self.key, &number) {

@@ -3,8 +3,8 @@
 use super::row::{Fate, Figures, Row};
 use crate::reproduce::markdown_table;
 
-/// All rows as a table with aligned columns, which is Markdown as well; `key` is the swept one. A column of the same
-/// rig throughout is left out.
+/// All rows as a Markdown table with aligned columns; `key` is the swept key. The column of rigs is left out if all
+/// rows have the same rig.
 pub fn table(rows: &[Row], key: Option<&str>) -> String {
     let several = rows.iter().any(|row| row.rig != rows[0].rig);
     let mut header = if several { vec!["rig", "law", "run"] } else { vec!["law", "run"] };
@@ -49,7 +49,7 @@ fn figures(row: &Row) -> [String; 9] {
     let number = |value: Option<f64>, decimals: usize| {
         value.map_or("-".to_owned(), |value| format!("{value:.decimals$}"))
     };
-    // What a falling pendulum does to force and angle says nothing.
+    // Force and angle of a falling pendulum mean nothing.
     let of_run = |value: Option<f64>, decimals: usize| number(value.filter(|_| !fallen), decimals);
     [
         number(figures.settling_time_s, 3),
@@ -85,10 +85,10 @@ pub fn notes(rows: &[Row], key: Option<&str>) -> Vec<String> {
     rows.iter().filter_map(note).collect()
 }
 
-/// All rows as CSV, in SI units; what does not exist is left empty.
+/// All rows as CSV, in SI units; missing values are left empty.
 ///
 /// # Errors
-/// Those of the writer, which are none in memory.
+/// Errors of the CSV writer; writing to memory causes none.
 pub fn csv(rows: &[Row], key: Option<&str>) -> std::io::Result<Vec<u8>> {
     let mut csv = csv::Writer::from_writer(Vec::new());
     csv.write_record([

@@ -13,7 +13,7 @@ impl Figure {
     pub fn csv(&self) -> Result<String, FigureError> {
         let mut text = "panel,x_axis,curve,x,y,value\n".to_owned();
         for panel in &self.panels {
-            // The same in each line, and in numbers nothing needs quotes.
+            // Encoded once: the start is the same in each line, and numbers need no quotes.
             let start = |name: &str| record_start([&panel.y.label, &panel.x.label, name]);
             for curve in &panel.curves {
                 let start = start(&curve.name)?;
@@ -38,7 +38,7 @@ impl Figure {
     }
 }
 
-/// These fields of a line and the comma behind them.
+/// These fields as CSV, and a comma after them.
 fn record_start(fields: [&str; 3]) -> Result<String, FigureError> {
     let write = || -> Result<Vec<u8>, Box<dyn std::error::Error>> {
         let mut csv = ::csv::Writer::from_writer(Vec::new());

@@ -16,9 +16,9 @@ type Failure = Box<dyn std::error::Error>;
 /// A drawn figure.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Drawing {
-    /// The document.
+    /// The SVG document.
     pub svg: String,
-    /// Where the panels are, from top to bottom.
+    /// Position and range of each panel, from top to bottom.
     pub panels: Vec<PlotArea>,
 }
 
@@ -35,7 +35,7 @@ pub struct PlotArea {
     pub y: [f64; 2],
 }
 
-/// Where a panel is and what it shows (px).
+/// Position (px) and contents of a panel.
 struct Layout {
     top: f64,
     left: f64,
@@ -82,7 +82,7 @@ impl Figure {
             Ok(())
         }();
         drawn.map_err(|error| FigureError::Draw(error.to_string()))?;
-        // The same picture in pixels.
+        // The view box stays in units of the drawing; the size is in pixels.
         let view = size.map(|length| length * FINE);
         let (fine_size, real_size) = (
             format!("width=\"{}\" height=\"{}\"", view[0], view[1]),
@@ -202,12 +202,12 @@ impl Figure {
     }
 }
 
-/// Units of the drawing.
+/// Pixels as units of the drawing.
 fn fine(pixels: f64) -> i32 {
     (pixels * f64::from(FINE)).round() as i32
 }
 
-/// Text of this size (px). The library sets text smaller than it is told to by this factor.
+/// Text of this size (px). The library sets text smaller than requested, by the factor `LIBRARY`.
 fn text_style(size: f64, horizontal: HPos) -> TextStyle<'static> {
     const LIBRARY: f64 = 1.24;
     ("sans-serif", size * f64::from(FINE) * LIBRARY)
@@ -223,7 +223,7 @@ fn line_style(style: Style) -> ShapeStyle {
     }
 }
 
-/// A cross, a circle, a square, a triangle, and again.
+/// Draws a marker: a cross, a circle, a square or a triangle, in turn.
 fn marker(area: &Area<'_>, number: usize, (x, y): (i32, i32)) -> Result<(), Failure> {
     let style = COLOURS[number % COLOURS.len()].stroke_width(MARKER);
     let r = fine(4.5);

@@ -5,7 +5,7 @@ use upright_design::robust::{Front, FrontPoint};
 
 use super::{Axis, Curve, Figure, Panel};
 
-/// One curve for each law. A multiple that nothing stands interrupts the lines.
+/// One curve for each law. A multiple that no choice withstands interrupts the lines.
 pub fn front_figure(front: &Front, title: &str) -> Figure {
     let ends = front.0.iter().map(|point| point.scale);
     let largest = ends.fold(0.0, f64::max);
@@ -18,7 +18,7 @@ pub fn front_figure(front: &Front, title: &str) -> Figure {
         };
         let points: Vec<[f64; 2]> = front.0.iter().map(|point| [point.scale, ripple(point)]).collect();
         if points.iter().any(|point| point[1].is_finite()) {
-            // Number 0 is that of the crosses.
+            // Number 0 is for the crosses.
             panel = panel.with(Curve::line(law.to_string(), 1 + number, points.clone()));
             panel = panel.with(Curve::markers("", 1 + number, points));
         }

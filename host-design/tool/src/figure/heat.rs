@@ -7,11 +7,11 @@ use super::theme::HEAT;
 pub struct HeatMap {
     /// What the colours mean, such as "settles within".
     pub name: String,
-    /// Its unit.
+    /// Unit of the values.
     pub unit: String,
     /// Centres of the columns, evenly spaced, rising; at least two.
     pub columns: Vec<f64>,
-    /// Centres of the rows likewise.
+    /// Centres of the rows, evenly spaced, rising; at least two.
     pub rows: Vec<f64>,
     /// One row for each of `rows`; a cell without value is left blank.
     pub values: Vec<Vec<Option<f64>>>,
@@ -27,7 +27,7 @@ impl HeatMap {
         ends(&self.rows)
     }
 
-    /// Upper end of each colour.
+    /// Largest value of each colour.
     pub(super) fn classes(&self) -> [f64; HEAT.len()] {
         let largest = self.values.iter().flatten().flatten().copied().fold(0.0, f64::max);
         let step = round_up(largest / HEAT.len() as f64);
@@ -55,7 +55,7 @@ impl HeatMap {
     }
 }
 
-/// The next number of one digit, or 1.5 or 2.5, times a power of ten.
+/// Rounds up to one digit, or 1.5 or 2.5, times a power of ten.
 fn round_up(x: f64) -> f64 {
     if x <= 0.0 {
         return 1.0;

@@ -14,7 +14,7 @@ pub(super) struct Entry {
     pub(super) middle: f64,
 }
 
-/// What stands before the text.
+/// Sample before the text.
 pub(super) enum Key {
     Curve(Style),
     Fill(ShapeStyle),
@@ -32,7 +32,7 @@ pub(super) fn entries(figure: &Figure, panel: &Panel, from: f64) -> (Vec<Entry>,
     if let Some(heat) = &panel.heat {
         keys.push((Key::Nothing, heat.name.clone()));
         for (end, colour) in heat.classes().into_iter().zip(HEAT) {
-            // Without the digits that a sum of decimals leaves behind.
+            // Without the rounding error of a multiple of a decimal.
             let end = rounded(end, 4);
             keys.push((Key::Fill(colour.into()), format!("{end} {}", heat.unit)));
         }

@@ -42,11 +42,11 @@ pub enum FigureError {
     /// An empty range, or one that is impossible on a logarithmic axis.
     #[error("the axis \"{label}\" cannot go from {from} to {to}")]
     Range {
-        /// The axis.
+        /// Label of the axis.
         label: String,
-        /// Its lower end.
+        /// Lower end of the range.
         from: f64,
-        /// Its upper end.
+        /// Upper end of the range.
         to: f64,
     },
 }
@@ -54,9 +54,9 @@ pub enum FigureError {
 /// Panels one below the other under a title.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Figure {
-    /// Above the panels; may be empty.
+    /// Title above the panels; may be empty.
     pub title: String,
-    /// From top to bottom.
+    /// Panels from top to bottom.
     pub panels: Vec<Panel>,
     /// Width of the figure (px).
     pub width: u32,
@@ -67,28 +67,28 @@ pub struct Figure {
 /// One system of axes with its curves.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Panel {
-    /// To the right.
+    /// Horizontal axis.
     pub x: Axis,
-    /// Upwards.
+    /// Vertical axis.
     pub y: Axis,
     /// Height with labels and legend (px).
     pub height: u32,
-    /// Both axes have the same scale.
+    /// Whether both axes have the same scale.
     pub equal: bool,
-    /// Drawn below the curves.
+    /// Map drawn underneath the curves.
     pub heat: Option<HeatMap>,
-    /// In the order in which they are drawn.
+    /// Curves in the order in which they are drawn.
     pub curves: Vec<Curve>,
 }
 
-/// An axis.
+/// An axis of a panel.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Axis {
-    /// Quantity and unit.
+    /// Quantity and unit, as in `time (s)`.
     pub label: String,
-    /// Logarithmic instead of linear.
+    /// Whether the axis is logarithmic instead of linear.
     pub log: bool,
-    /// Both ends; none: fitted to the curves.
+    /// `[low, high]`; `None`: fitted to the curves.
     pub range: Option<[f64; 2]>,
 }
 
@@ -99,7 +99,7 @@ pub struct Curve {
     pub name: String,
     /// `[x, y]` each. A point that is not finite interrupts the line.
     pub points: Vec<[f64; 2]>,
-    /// How it looks.
+    /// Line or markers, with their colour.
     pub style: Style,
 }
 
@@ -127,7 +127,7 @@ impl Figure {
         Self { width: 480, text: 15.0, ..Self::new(title) }
     }
 
-    /// With one more panel at the bottom.
+    /// Adds a panel at the bottom.
     pub fn with(mut self, panel: Panel) -> Self {
         self.panels.push(panel);
         self
@@ -163,7 +163,7 @@ impl Panel {
         Self { x, y, height: 230, equal: false, heat: None, curves: Vec::new() }
     }
 
-    /// With one more curve.
+    /// Adds a curve on top of the others.
     pub fn with(mut self, curve: Curve) -> Self {
         self.curves.push(curve);
         self
@@ -188,17 +188,17 @@ impl Panel {
 }
 
 impl Axis {
-    /// A linear axis.
+    /// A linear axis, fitted to the curves.
     pub fn linear(label: impl Into<String>) -> Self {
         Self { label: label.into(), log: false, range: None }
     }
 
-    /// A logarithmic axis.
+    /// A logarithmic axis, fitted to the curves.
     pub fn log(label: impl Into<String>) -> Self {
         Self { log: true, ..Self::linear(label) }
     }
 
-    /// From `low` to `high`.
+    /// With a fixed range from `low` to `high`.
     pub fn range(self, low: f64, high: f64) -> Self {
         Self { range: Some([low, high]), ..self }
     }
@@ -215,12 +215,12 @@ impl Curve {
         Self { name: name.into(), points, style: Style::Markers(number) }
     }
 
-    /// A reference for another curve.
+    /// A wide grey reference line, drawn with [`Style::Reference`].
     pub fn reference(name: impl Into<String>, points: Vec<[f64; 2]>) -> Self {
         Self { name: name.into(), points, style: Style::Reference }
     }
 
-    /// A limit.
+    /// A thin line at a limit, drawn with [`Style::Limit`].
     pub fn limit(name: impl Into<String>, points: Vec<[f64; 2]>) -> Self {
         Self { name: name.into(), points, style: Style::Limit }
     }

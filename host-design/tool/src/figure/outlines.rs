@@ -1,7 +1,7 @@
 //! The text of an SVG document as outlines of a typeface that comes with the program, so that it looks the same
 //! everywhere.
 //!
-//! An SVG library could set the text itself, but reading and shaping all typefaces of the world is most of its build.
+//! An SVG library could set the text itself, but reading and shaping every kind of typeface is most of its build.
 
 use core::fmt::Write;
 
@@ -55,12 +55,12 @@ fn path(face: &Face, text: Node) -> String {
     format!("<path d=\"{}\"{}/>", outline.data, kept.concat())
 }
 
-/// The value of an attribute of the element, or of the nearest one around it.
+/// The value of an attribute of the element, or of its nearest ancestor that has it.
 fn inherited<'a>(element: Node<'a, '_>, name: &str) -> Option<&'a str> {
     element.ancestors().find_map(|element| element.attribute(name))
 }
 
-/// A length in `em` or `ex`, the latter taken for half of the former.
+/// A length in `em` or `ex`; an `ex` is taken as half an `em`.
 fn length(value: &str, size: f32) -> Option<f32> {
     let (digits, unit) = match value.strip_suffix("em") {
         Some(digits) => (digits, size),
@@ -69,7 +69,7 @@ fn length(value: &str, size: f32) -> Option<f32> {
     digits.parse::<f32>().ok().map(|number| number * unit)
 }
 
-/// Outlines as the data of a path: typefaces count upwards, documents downwards.
+/// Outlines as the data of a path. In typefaces, y points up; in documents, it points down.
 struct Outline {
     data: String,
     at: [f32; 2],
@@ -128,7 +128,7 @@ mod tests {
     fn text_is_where_its_anchor_says() {
         let [[left, right], [top, bottom]] = extent("x=\"100\" y=\"50\" font-size=\"20\"", "HIH");
         assert!(left > 100.0 && left < 103.0 && right > left + 20.0, "{left} to {right}");
-        // A capital stands on its line and is about 0.7 em high.
+        // A capital stands on the baseline and is about 0.7 em high.
         assert!(bottom == 50.0 && (34.0..38.0).contains(&top), "{top} to {bottom}");
         let [[left, right], _] = extent("x=\"100\" y=\"50\" font-size=\"20\" text-anchor=\"middle\"", "HIH");
         assert!((left + right - 200.0).abs() < 0.1, "{left} to {right}");

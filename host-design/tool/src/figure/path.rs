@@ -3,7 +3,7 @@
 use super::scale::Scale;
 use super::theme::FINE;
 
-/// From values to units of the drawing.
+/// Maps values to units of the drawing.
 pub(super) struct Map<'a> {
     pub(super) x: &'a Scale,
     pub(super) y: &'a Scale,
@@ -24,7 +24,7 @@ impl Map<'_> {
         (between(self.horizontal, share[0]), between(self.vertical, share[1]))
     }
 
-    /// The place of a point, none if it is not within the panel.
+    /// The place of a point in the drawing; `None` if it is outside the panel.
     pub(super) fn place(&self, point: [f64; 2]) -> Option<(i32, i32)> {
         let share = self.share(point);
         share.iter().all(|s| (-1e-9..=1.0 + 1e-9).contains(s)).then(|| self.units(share))
@@ -52,7 +52,7 @@ impl Map<'_> {
 fn clip(from: [f64; 2], to: [f64; 2]) -> Option<[[f64; 2]; 2]> {
     let is_inside = |[x, y]: [f64; 2]| (0.0..=1.0).contains(&x) && (0.0..=1.0).contains(&y);
     if is_inside(from) && is_inside(to) {
-        // Most segments, and all of their ends: the same sums as below.
+        // The common case, with the same arithmetic as below for both ends.
         return Some([from, [from[0] + (to[0] - from[0]), from[1] + (to[1] - from[1])]]);
     }
     if !from.iter().chain(&to).all(|value| value.is_finite()) {
@@ -75,7 +75,7 @@ fn clip(from: [f64; 2], to: [f64; 2]) -> Option<[[f64; 2]; 2]> {
     (enters <= leaves).then(|| [at(enters), at(leaves)])
 }
 
-/// Of successive points in the same column of pixels only the first, the lowest, the highest and the last.
+/// Of successive points in the same column of pixels, keeps only the first, the lowest, the highest and the last.
 fn thinned(line: &[(i32, i32)]) -> Vec<(i32, i32)> {
     let mut kept: Vec<(i32, i32)> = Vec::new();
     for column in line.chunk_by(|a, b| a.0.div_euclid(FINE as i32) == b.0.div_euclid(FINE as i32)) {

@@ -6,8 +6,8 @@ use super::outlines::outlined;
 use super::{Figure, FigureError};
 
 impl Figure {
-    /// The figure as a PNG file, `scale` pixels for each of its own. Text is set in a typeface that comes with the
-    /// program, so that the file is the same on every machine.
+    /// The figure as a PNG file, enlarged by `scale`. Text is set in a typeface that comes with the program, so that
+    /// the file is the same on every machine.
     ///
     /// # Errors
     /// [`FigureError`] if it cannot be drawn or is too large.
@@ -16,7 +16,7 @@ impl Figure {
     }
 }
 
-/// An SVG document as a PNG file.
+/// An SVG document as a PNG file, enlarged by `scale`.
 pub(crate) fn pixels(svg: &str, scale: f32) -> Result<Vec<u8>, FigureError> {
     let failed = |error: String| FigureError::Png(error);
     let svg = outlined(svg).map_err(failed)?;

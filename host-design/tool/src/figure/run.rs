@@ -43,7 +43,7 @@ impl Run<'_> {
         self.trace.samples().map(|sample| [sample.t, value(&sample)]).collect()
     }
 
-    /// Two lines across the panel.
+    /// Lower and upper limit, as lines across the panel.
     fn limits(&self, name: &str, limits: [f64; 2]) -> Curve {
         let [low, high] = limits.map(|limit| [[0.0, limit], [self.end_s, limit]]);
         Curve::limit(name, [low.as_slice(), &[[f64::NAN; 2]], &high].concat())
@@ -82,7 +82,7 @@ impl Run<'_> {
     }
 
     fn force(&self) -> Panel {
-        // The request of a falling pendulum can be a hundred times the limit and would flatten everything else.
+        // The force requested while a pendulum falls can be a hundred times the limit and would flatten all else.
         let largest = 2.0 * self.trace.samples().fold(0.0f64, |most, sample| most.max(sample.force.abs()));
         let is_cut_off = self.trace.samples().any(|sample| sample.requested.abs() > largest);
         let name = if is_cut_off { "requested (cut off)" } else { "requested" };

@@ -12,15 +12,15 @@ use super::{Axis, Curve, FigureError, Panel, Style};
 pub(super) struct Scale {
     pub(super) log: bool,
     pub(super) range: [f64; 2],
-    /// Ticks wanted.
+    /// Number of ticks wanted.
     pub(super) ticks: usize,
 }
 
-/// A limit further away than this many times the extent of the curves is not drawn.
+/// A limit is in view only up to this many times the extent of the curves, measured from their opposite end.
 const NEAR: f64 = 1.5;
 
 impl Panel {
-    /// The range of the axis to the right.
+    /// Range of the horizontal axis.
     pub(super) fn x_range(&self) -> [f64; 2] {
         let heat = self.heat.as_ref().map(|heat| heat.x_range());
         let has_markers = self.curves.iter().any(|curve| matches!(curve.style, Style::Markers(_)));
@@ -28,14 +28,14 @@ impl Panel {
         self.x.range.or(heat).unwrap_or_else(|| around(&self.x, &self.curves, 0, margin))
     }
 
-    /// The range of the axis upwards.
+    /// Range of the vertical axis.
     pub(super) fn y_range(&self) -> [f64; 2] {
         let heat = self.heat.as_ref().map(|heat| heat.y_range());
         self.y.range.or(heat).unwrap_or_else(|| around(&self.y, &self.curves, 1, 0.06))
     }
 }
 
-/// What the curves need, zero included on a linear axis, with a margin of a share of it.
+/// Range that the curves need, including zero on a linear axis, with `margin` times its width added at both ends.
 fn around(axis: &Axis, curves: &[Curve], which: usize, margin: f64) -> [f64; 2] {
     let scaled = |value: f64| if axis.log { value.log10() } else { value };
     let extent = |limits: bool, start: [f64; 2]| {
@@ -95,10 +95,10 @@ impl Ranged for Scale {
         let decades = high.log10() - low.log10();
         let factors: &[f64] = if decades < 2.5 { &[1.0, 2.0, 5.0] } else { &[1.0] };
         let every = (decades / self.ticks as f64).ceil().max(1.0) as usize;
-        // 1 is a tick wherever it is on the axis.
+        // 1 is always a tick if it is on the axis.
         let first = (low.log10().floor() as i32).div_euclid(every as i32) * every as i32;
         let powers = (first..=high.log10().ceil() as i32).step_by(every);
-        // The numbers nearest to these decimals: the product of 5 and a millionth is another one.
+        // Read from decimal text: the product of 5 and a millionth is not the number nearest to 5e-6.
         let nearest = |factor: &f64, power: i32| format!("{factor}e{power}").parse().unwrap_or(f64::NAN);
         let points = powers.flat_map(|power| factors.iter().map(move |factor| nearest(factor, power)));
         points.filter(|point| (low..=high).contains(point)).collect()
@@ -110,7 +110,7 @@ impl Ranged for Scale {
 }
 
 impl ValueFormatter<f64> for Scale {
-    /// As many decimals as ticks this far apart need.
+    /// With as many decimals as the spacing of the ticks needs.
     fn format_ext(&self, value: &f64) -> String {
         let [low, high] = self.range;
         if self.log {

@@ -1,16 +1,16 @@
-//! Margins along the motions of a swing-up, and what candidates of its search are like.
+//! Margins along the motions of a swing-up, and the candidates of its search.
 
 use upright_design::swing_up::{Margin, Runs, Solved, Way};
 
 use super::{Axis, Curve, Figure, Panel};
 
-/// For each motion a panel for each side of the pushes, with a curve for each link.
+/// Two panels for each motion, one for pushes against each link's angle and one along it, with a curve for each link.
 pub fn margins_figure(title: &str, motions: &[(Way, Vec<Margin>)]) -> Figure {
     let panel = |way: &Way, margins: &[Margin], side: usize| {
         let label = format!("{way}: push {} (N)", ["against", "along"][side]);
         let links = margins.first().map_or(0, |margin| margin.links_n.len());
         (0..links).fold(Panel::new(Axis::linear("time (s)"), Axis::log(label)), |panel, link| {
-            // A push that is not stood at all has no place on the axis.
+            // A margin of 0 cannot be shown on a logarithmic axis.
             let point = |margin: &Margin| {
                 let size = margin.links_n[link][side];
                 [margin.at_s, if size > 0.0 { size } else { f64::NAN }]
@@ -60,10 +60,10 @@ pub fn trade_figure(title: &str, solved: &[Solved]) -> Figure {
         .with(panel(Axis::log("fragility"), |one| one.score))
 }
 
-/// A candidate is robust if so many of the random runs with twice the errors arrive (%).
+/// A candidate is robust if at least this share of the random runs with twice the errors arrive (%).
 const ROBUST_PERCENT: f64 = 90.0;
 
-/// Random runs that arrive (%).
+/// Share of the random runs that arrive (%).
 fn percent(runs: &Runs) -> f64 {
     100.0 * runs.stood as f64 / runs.runs.max(1) as f64
 }

@@ -25,19 +25,19 @@ pub(super) const LIMIT_DASH: &[u32] = &[4, 4];
 pub(super) const HEAT: [RGBColor; 4] =
     [RGBColor(199, 233, 180), RGBColor(127, 205, 187), RGBColor(65, 182, 196), RGBColor(34, 94, 168)];
 
-/// Units of the drawing in one pixel: coordinates are whole numbers, and steps of a pixel would be seen in a curve.
+/// Units of the drawing per pixel: coordinates are integers, and steps of a whole pixel would be visible in a curve.
 pub(super) const FINE: u32 = 4;
 /// Width of a curve (units of the drawing).
 pub(super) const LINE: u32 = 2 * FINE;
 /// Width of a reference.
 pub(super) const WIDE: u32 = 5 * FINE;
-/// Width of a limit; of no other line, so that its dash can be told.
+/// Width of a limit. No other line has it: [`finished`] recognises limits by it, and dashes them.
 pub(super) const THIN: u32 = FINE + 1;
-/// Width of a cross; of no other line.
+/// Width of the lines of a marker. No other line has it, so that markers are not dashed.
 pub(super) const MARKER: u32 = 2 * FINE - 1;
 
 /// Adds to a document what the drawing library cannot express: dashed lines in one piece (every colour has its dash),
-/// and cells of a map without seams.
+/// and cells of a map without seams between them.
 pub(super) fn finished(svg: &str) -> String {
     let mut svg = svg.to_owned();
     let lines = COLOURS.iter().zip(DASHES).map(|(colour, dash)| (colour, LINE, dash));
@@ -79,7 +79,7 @@ pub(crate) fn reference_colour() -> String {
     hex(REFERENCE)
 }
 
-/// Style rules by which a page can exchange the colours of the figures: each is drawn in a custom property, `--c0` …,
+/// Style rules that let a page replace the colours of the figures: each colour becomes a custom property, `--c0` …,
 /// `--reference` or `--limit`, whose value here is that colour.
 pub(crate) fn style_sheet() -> String {
     let named =
@@ -95,7 +95,7 @@ pub(crate) fn style_sheet() -> String {
     format!(":root {{{properties} }}\n{rules}")
 }
 
-/// How many of the colours are not black; a page draws black in the colour of its text.
+/// Number of colours that are not black; a page draws black in the colour of its text.
 pub(crate) const CHROMATIC: usize = 6;
 
 fn hex(RGBColor(r, g, b): RGBColor) -> String {

@@ -1,4 +1,4 @@
-//! An identification as an HTML page: the numbers, how well they predict, and what is left.
+//! An identification as an HTML page: the numbers, how well they predict, and the residuals.
 
 use askama::Template;
 
@@ -9,7 +9,7 @@ use crate::reproduce::Spectrum;
 use upright_design::identify::{ChannelFit, Identification, Predicted, Settings};
 use upright_design::number::significant;
 
-/// Correlations from here on are marked.
+/// Correlations of at least this size are printed bold.
 const STRONG: f64 = 0.9;
 
 #[derive(Template)]
@@ -33,11 +33,11 @@ struct Page<'a> {
 /// A parameter with its correlations to those before it.
 struct CorrelationRow {
     name: String,
-    /// Number as text, and whether it is strong.
+    /// Each correlation as text, and whether it is at least [`STRONG`].
     cells: Vec<(String, bool)>,
 }
 
-/// The page of an identification of the rig `name`; `command` is how it was made.
+/// The page of an identification of the rig `name`; `command` is the command line that made it.
 ///
 /// # Errors
 /// [`ReportError`] if a figure cannot be drawn.
@@ -64,7 +64,7 @@ pub fn page(
             .transpose()?,
         spectra: spectra(found)
             .map(|figure| {
-                plot(figure, "Spectra of the innovations, over that of white ones as large as expected")
+                plot(figure, "Spectra of the innovations, relative to white noise of the expected size")
             })
             .transpose()?,
         correlations: correlations(found),
@@ -83,7 +83,7 @@ fn fit_texts((index, fit): (usize, &ChannelFit)) -> [String; 4] {
     [fit.name.clone(), format!("{:.2}", fit.innovation_variance), file, found]
 }
 
-/// From the unit of a channel to that in which it is drawn, and its name.
+/// Factor from the SI unit of a channel to the unit in which it is drawn, and the name of that unit.
 fn unit_of(channel: usize) -> (f64, &'static str) {
     if channel == 0 { (1e3, "mm") } else { (1f64.to_degrees(), "°") }
 }
@@ -122,7 +122,7 @@ fn residuals(channels: &[ChannelFit]) -> Figure {
     })
 }
 
-/// Densities of the innovations over that of white ones with the variance 1; none if the log is too short for one.
+/// Spectral densities of the innovations, relative to white noise of variance 1; `None` if the log is too short.
 fn spectra(found: &Identification) -> Option<Figure> {
     let mut panel = Panel::new(Axis::log("frequency (Hz)"), Axis::log("density / expected")).high(300);
     let white = 2.0 * found.sample_s;

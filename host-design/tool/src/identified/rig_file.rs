@@ -12,12 +12,12 @@ pub enum NotWritten {
     /// A key of the old file cannot be changed.
     #[error("{0}: write it on a line of its own, as `key = value`, then it can be changed")]
     Key(String),
-    /// The new text is no rig file.
+    /// The new text is not a valid rig file.
     #[error(transparent)]
     Rig(#[from] RigError),
 }
 
-/// Errors of masses and lengths in `[reality]`: they are in the identified numbers.
+/// Errors of masses and lengths in `[reality]`. The identified numbers include them, so they are set to 0.
 const WITHIN: [&str; 5] = [
     "cart_mass_percent",
     "link_mass_percent",
@@ -29,7 +29,7 @@ const WITHIN: [&str; 5] = [
 /// The text of `old` with the identified numbers, with comments and layout as they were, and `note` as first line.
 ///
 /// # Errors
-/// [`NotWritten`] if that would be no rig file.
+/// [`NotWritten`] if a key cannot be changed or the result would not be a valid rig file.
 pub fn rig_file(
     old: &str,
     rig: &Rig,
@@ -62,7 +62,7 @@ pub fn rig_file(
     Ok(text)
 }
 
-/// Keys and values. Six digits: more than is known.
+/// Keys and values, with six digits: more than the identification knows.
 fn values(realised: &Realised, actuator: &Actuator) -> Vec<(String, String)> {
     let number = |value: f64| rounded(value, 6).to_string();
     let mut values = vec![

@@ -8,7 +8,7 @@ use upright_design::number::significant;
 
 /// Below this angle the scale of the force is poorly known (rad).
 const LARGE_ENOUGH_RAD: f64 = 30.0 * std::f64::consts::PI / 180.0;
-/// Without a model of the encoders' eccentricity nothing is known better than this share.
+/// Share by which lengths and moments may be wrong without a model of the encoders' eccentricity.
 const WITHOUT_ECCENTRICITY: f64 = 0.003;
 
 /// The identification as text.
@@ -67,7 +67,8 @@ fn row(estimate: &Estimate) -> String {
     format!("  {name:<32}{file:>13}{found:>13}{deviation:>12}{change:>9}  {unit}{held}")
 }
 
-/// Name, value of the file, value found, its deviation, change over deviation, unit, and whether it was held.
+/// Name, value of the file, value found, its deviation, change over deviation, unit, and a remark if the prior
+/// dominates.
 pub(super) fn row_texts(estimate: &Estimate) -> [String; 7] {
     let (name, unit) = estimate.kind.name_and_unit();
     [
@@ -77,11 +78,11 @@ pub(super) fn row_texts(estimate: &Estimate) -> [String; 7] {
         significant(estimate.deviation, 2),
         format!("{:.1}", (estimate.new - estimate.old) / estimate.deviation),
         unit.to_owned(),
-        if estimate.held_by_prior { "held by what was assumed".to_owned() } else { String::new() },
+        if estimate.held_by_prior { "held by the prior".to_owned() } else { String::new() },
     ]
 }
 
-/// What a reader has to know besides the numbers.
+/// What a reader has to know to judge the numbers.
 pub(super) fn notes(found: &Identification, settings: &Settings) -> Vec<String> {
     let mut notes = Vec::new();
     match settings.weighed_kg_m {
@@ -102,7 +103,7 @@ pub(super) fn notes(found: &Identification, settings: &Settings) -> Vec<String> 
     );
     if !settings.eccentricity {
         notes.push(format!(
-            "Encoders are taken as centred: 0.1° of eccentricity alone falsifies lengths and moments by {:.1} %, whatever the \
+            "Encoders are assumed to be centred: 0.1° of eccentricity alone changes lengths and moments by {:.1} %, whatever the \
              deviations say. --eccentricity identifies it.",
             100.0 * WITHOUT_ECCENTRICITY
         ));
@@ -115,22 +116,22 @@ pub(super) fn notes(found: &Identification, settings: &Settings) -> Vec<String> 
     }
     match (found.other_delay(), found.estimate(Kind::Delay)) {
         (Some(delay), Some(estimate)) => notes.push(format!(
-            "The force comes {:.2} ticks late beyond delay_ticks: set delay_ticks = {delay}; the new file has it.",
+            "The force comes {:.2} ticks later than delay_ticks: set delay_ticks = {delay}; the new file has it.",
             estimate.new
         )),
         (None, Some(estimate)) => {
-            notes.push(format!("delay_ticks stays: the force comes {:.2} ticks late beyond it.", estimate.new));
+            notes.push(format!("delay_ticks stays: the force comes {:.2} ticks later than that.", estimate.new));
         }
         _ => (),
     }
     let zeros = found.estimates.iter().filter(|estimate| matches!(estimate.kind, Kind::Zero(_)));
     let worst = zeros.map(|zero| zero.new.abs()).fold(0.0, f64::max);
     notes.push(format!(
-        "The links were homed up to {:.2}° off. This is of this homing, and not in the file.",
+        "The zeros of the links are off by up to {:.2}°. This belongs to this homing and is not in the file.",
         worst.to_degrees()
     ));
     notes.push(format!(
-        "With four times the log, deviations halve, down to those of the friction's model; this log had {:.0} s.",
+        "A log four times as long halves the deviations, as far as the friction model allows; this log had {:.0} s.",
         found.seconds
     ));
     notes

@@ -5,27 +5,27 @@ use upright::protocol::message::Request;
 use upright::table::{Equilibrium, Law};
 use upright_design::swing_up::equilibrium;
 
-/// The action of a key.
+/// What a key of the monitor does.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Action {
     /// Send this command to the firmware.
     Send(Request),
     /// Move the set-point by this (m).
     Shift(f32),
-    /// Bring the links to the equilibrium at which the link of this number is the other way up; the first one has 0.
+    /// Go to the equilibrium in which the link of this index (0: the first one) is turned over and the others stay.
     Turn(usize),
     /// Switch to the other control law.
     OtherLaw,
     /// Start or stop a recording.
     Record,
-    /// Quit.
+    /// End the monitor.
     Quit,
 }
 
 /// Change of the set-point per press of an arrow key (m).
 const SHIFT_M: f32 = 0.01;
 
-/// The action of a key; none if it has none.
+/// The action of a key; `None` if the key does nothing.
 pub fn action(key: &KeyEvent) -> Option<Action> {
     if key.modifiers.contains(KeyModifiers::CONTROL) {
         return (key.code == KeyCode::Char('c')).then_some(Action::Quit);
@@ -59,7 +59,7 @@ pub fn action(key: &KeyEvent) -> Option<Action> {
 )]
 pub struct BadCommand(String);
 
-/// The meaning of a line of text, such as `arm` or `set-point 0.05` (m).
+/// The request of a line of text, such as `arm` or `set-point 0.05` (m).
 ///
 /// # Errors
 /// [`BadCommand`], which lists the commands.

@@ -16,7 +16,7 @@ const PORTS: &str = if cfg!(windows) {
     "/dev/ttyACM0 …; your user has to be in the group dialout"
 };
 
-/// Longest wait for bytes.
+/// Longest wait for received bytes.
 const PATIENCE: Duration = Duration::from_millis(5);
 /// Longest wait for a line that accepts no bytes.
 const STUCK: Duration = Duration::from_secs(1);
@@ -24,7 +24,7 @@ const STUCK: Duration = Duration::from_secs(1);
 /// A port that cannot be opened.
 #[derive(Debug, thiserror::Error)]
 pub enum OpenError {
-    /// A serial device.
+    /// A serial device cannot be opened.
     #[error("{port}: {source}; is the board connected? Ports: {PORTS}")]
     Serial {
         /// As given on the command line.
@@ -32,7 +32,7 @@ pub enum OpenError {
         /// Why it fails.
         source: serialport::Error,
     },
-    /// A TCP address.
+    /// A TCP address cannot be connected to.
     #[error("tcp:{address}: {source}; start `upright firmware run RIG --serve {address}` first")]
     Tcp {
         /// As given on the command line.
@@ -46,7 +46,7 @@ pub enum OpenError {
 pub enum Line {
     /// A serial device.
     Serial(Box<dyn SerialPort>),
-    /// A relay.
+    /// A connection to a relay, as `upright firmware run --serve` offers it.
     Tcp(TcpStream),
 }
 
@@ -73,7 +73,7 @@ impl Line {
         connect().map(Line::Tcp).map_err(|source| OpenError::Tcp { address: address.to_owned(), source })
     }
 
-    /// Bytes received within 5 ms. To receive none is not an error.
+    /// Waits for bytes, at most 5 ms, and returns them. Receiving none is not an error.
     ///
     /// # Errors
     /// If the line is closed.
@@ -97,7 +97,7 @@ impl Line {
         }
     }
 
-    /// Sends all of these.
+    /// Sends all `bytes`.
     ///
     /// # Errors
     /// If the line is closed, or accepts no bytes.
@@ -108,7 +108,7 @@ impl Line {
         }
     }
 
-    /// Sends all of these, and gives what is received then.
+    /// Sends all `bytes`, then returns what is received.
     ///
     /// # Errors
     /// As for [`send`](Self::send) and [`receive`](Self::receive).
@@ -118,7 +118,7 @@ impl Line {
     }
 }
 
-/// Time since 1970: commands are numbered by it.
+/// Time since 1970. Commands are numbered by it, so that numbers grow from one program run to the next.
 pub fn now() -> Duration {
     SystemTime::UNIX_EPOCH.elapsed().unwrap_or_default()
 }

@@ -19,7 +19,8 @@ use super::command::Action;
 use super::outgoing::{Outgoing, Unanswered};
 use super::words;
 
-/// Telemetry of a firmware of any size: a list is sent as its length and its items.
+/// Telemetry of a firmware with up to 30 states and 15 sensors: a list is sent as its length and its items, so that
+/// one type reads all sizes.
 pub type TelemetryOfAny = Telemetry<30, 15>;
 
 /// Time span of the plots (s).
@@ -63,11 +64,11 @@ pub struct Monitor {
     pub info: Option<Info>,
     /// The latest telemetry.
     pub telemetry: Option<TelemetryOfAny>,
-    /// The counters, as last received.
+    /// Counters of ticks, overruns, rejected measurements and lost messages, as last received.
     pub statistics: Option<Statistics>,
     /// The first cause of the fault or of the last reset.
     pub cause: Option<Cause>,
-    /// Where the program crashed the last time, if it did.
+    /// Record of the firmware's last crash, if there is one.
     pub crash: Option<CrashRecord>,
     /// Requests and replies, oldest first.
     pub log: VecDeque<String>,
@@ -79,7 +80,7 @@ pub struct Monitor {
     pub recording: Option<String>,
     /// Frames that could not be read.
     pub unreadable: u32,
-    /// Why it has ended.
+    /// Why the conversation has ended; `None` while it goes on.
     pub ended: Option<Ended>,
     receiver: Receiver<MAX_MESSAGE>,
     outgoing: Outgoing,
@@ -114,7 +115,7 @@ impl Monitor {
         }
     }
 
-    /// As [`Monitor::new`], with telemetry every `seconds`, as far as the ticks allow.
+    /// As [`Monitor::new`], with telemetry every `seconds` (s), rounded to whole ticks.
     pub fn with_telemetry_every(seconds: f32, connection: &str) -> Self {
         Self { telemetry_s: seconds, ..Self::new(connection) }
     }
@@ -195,7 +196,7 @@ impl Monitor {
                 Request::Beat | Request::Drive { .. } | Request::Telemetry(_) => (),
                 _ => self.note(format!("{}: done", name(request, self.links()))),
             },
-            // The reasons stood in the first answer to the key.
+            // The reasons were logged with the first answer to the held key.
             Answer::NotNow(reasons)
                 if matches!(request, Request::Drive { .. }) && reasons.contains(Inhibits::HELD) => {}
             Answer::NotNow(reasons) => {
@@ -210,7 +211,7 @@ impl Monitor {
         }
     }
 
-    /// A refused set-point is not shown as the target.
+    /// Forgets a set-point that was refused: it is not shown as the target.
     fn forget(&mut self, request: Request) {
         if matches!(request, Request::Setpoint(_)) {
             self.wanted = None;
@@ -295,7 +296,7 @@ impl Monitor {
         self.ended.get_or_insert(Ended::Closed(error.to_string()));
     }
 
-    /// Bytes for the line.
+    /// Takes the bytes to be sent over the line.
     pub fn take_outgoing(&mut self) -> Vec<u8> {
         self.outgoing.take()
     }

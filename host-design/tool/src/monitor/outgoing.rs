@@ -1,4 +1,4 @@
-//! Commands on their way to the firmware: one at a time, each repeated until it is answered.
+//! Commands to the firmware: sent one at a time, each repeated until it is answered.
 
 use std::collections::VecDeque;
 use std::time::Duration;
@@ -7,11 +7,11 @@ use upright::protocol::frame;
 use upright::protocol::message::{Command, Request};
 use upright::protocol::serial_link::MAX_COMMAND;
 
-/// Time between two transmissions of a request: that of the keep-alive, which stops meanwhile.
+/// Time between two transmissions of a request: the period of the keep-alive, which pauses meanwhile.
 const REPEAT: Duration = Duration::from_millis(25);
-/// After so long without an answer, a person is told.
+/// A request that has no answer after this time is reported.
 const PATIENCE: Duration = Duration::from_secs(1);
-/// Keep-alives whose answers may still come.
+/// Largest number of keep-alives whose answers are awaited.
 const MOST_BEATS: usize = 32;
 
 /// A request without an answer.
@@ -22,14 +22,14 @@ struct Waiting {
     is_told: bool,
 }
 
-/// What has been sent of a request.
+/// Transmissions of a request so far.
 #[derive(Clone, Copy)]
 struct Sent {
     /// Number of the first command with this request.
     first_id: u64,
-    /// The last one.
+    /// The last command with this request.
     command: Command,
-    /// When it is sent again.
+    /// Time of the next transmission.
     next: Duration,
 }
 
@@ -37,23 +37,23 @@ struct Sent {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Unanswered {
     pub(super) request: Request,
-    /// Whether it is not sent any more.
+    /// Whether it is no longer sent.
     pub(super) is_given_up: bool,
 }
 
-/// Commands and their bytes.
+/// Queue of requests, and the bytes to be sent.
 #[derive(Default)]
 pub(super) struct Outgoing {
     bytes: Vec<u8>,
     last_id: u64,
-    /// Only the first one is sent: the firmware takes a number that is smaller than the last one for a replay.
+    /// Only the first one is sent: the firmware treats a number that is smaller than the last one as a replay.
     waiting: VecDeque<Waiting>,
     beats: VecDeque<Command>,
 }
 
-/// Whether the firmware may carry it out late and more than once: questions, and motor off. All else keeps its number
-/// when it is repeated, so that it is carried out once, and is given up in the end: what a person wanted to happen
-/// long ago must not happen when the line is plugged in again.
+/// Whether the firmware may carry out a request late and more than once: questions, and motor off. Every other request
+/// keeps its number when it is repeated, so that it is carried out once, and is given up after a while: what a person
+/// wanted long ago must not happen when the line is plugged in again.
 fn may_come_late(request: Request) -> bool {
     use Request::{Cause, Crash, Disarm, Info, Statistics, Telemetry};
     matches!(request, Disarm | Info | Cause | Crash | Statistics | Telemetry(_))
@@ -61,7 +61,7 @@ fn may_come_late(request: Request) -> bool {
 
 impl Outgoing {
     /// Sends a request as soon as those before it are answered. Disarming is sent at once, and replaces what a person
-    /// has asked for before; gives what was given up for it.
+    /// has asked for before; returns what was given up for it.
     pub(super) fn send(&mut self, request: Request, now: Duration) -> Vec<Unanswered> {
         let new = Waiting { request, since: now, sent: None, is_told: false };
         let mut given_up = Vec::new();
@@ -70,12 +70,12 @@ impl Outgoing {
                 given_up = self
                     .give_up(|before| before.request == Request::Disarm || !may_come_late(before.request));
                 given_up.retain(|before| before.request != Request::Disarm);
-                // Its number is now too small.
+                // Their numbers are now too small: they are sent again with new ones.
                 self.waiting.iter_mut().for_each(|before| before.sent = None);
                 self.waiting.push_front(new);
             }
             Request::Setpoint(_) => {
-                // Only the last one counts.
+                // Replaces a set-point that has not been sent.
                 self.waiting.retain(|before| {
                     before.sent.is_some() || !matches!(before.request, Request::Setpoint(_))
                 });
@@ -87,8 +87,8 @@ impl Outgoing {
         given_up
     }
 
-    /// Sends a request of which the next one is as good: a keep-alive, or a held key. It is not repeated, and left out
-    /// while another command is.
+    /// Sends a request that the next one replaces: a keep-alive, or a held key. It is not repeated, and it is skipped
+    /// while another command waits for its answer.
     pub(super) fn beat(&mut self, request: Request, now: Duration) {
         if self.waiting.is_empty() {
             let command = self.number(request, now);
@@ -100,7 +100,7 @@ impl Outgoing {
         }
     }
 
-    /// Takes the number of an answer; gives its request, and sends the next one.
+    /// Takes the number of an answer; returns its request, and sends the next one.
     pub(super) fn answered(&mut self, id: u64, now: Duration) -> Option<Request> {
         if let Some(place) = self.beats.iter().position(|beat| beat.id == id) {
             return self.beats.remove(place).map(|beat| beat.request);
@@ -120,7 +120,7 @@ impl Outgoing {
         !self.waiting.is_empty()
     }
 
-    /// Repeats what is not answered; gives what has not been answered for too long, each once.
+    /// Repeats the request that waits for its answer; returns those that have waited too long, each once.
     pub(super) fn repeat(&mut self, now: Duration) -> Vec<Unanswered> {
         let late = |waiting: &Waiting| now >= waiting.since + PATIENCE;
         let mut unanswered = self.give_up(|waiting| late(waiting) && !may_come_late(waiting.request));
@@ -140,19 +140,19 @@ impl Outgoing {
         unanswered
     }
 
-    /// Nothing is sent or waited for any more.
+    /// Drops everything: nothing more is sent or awaited.
     pub(super) fn clear(&mut self) {
         self.bytes.clear();
         self.waiting.clear();
         self.beats.clear();
     }
 
-    /// Bytes for the line.
+    /// Takes the bytes to be sent over the line.
     pub(super) fn take(&mut self) -> Vec<u8> {
         std::mem::take(&mut self.bytes)
     }
 
-    /// Drops requests.
+    /// Drops the requests for which `which` holds; returns them as given up.
     fn give_up(&mut self, which: impl Fn(&Waiting) -> bool) -> Vec<Unanswered> {
         let (dropped, kept): (VecDeque<_>, VecDeque<_>) = self.waiting.drain(..).partition(which);
         self.waiting = kept;
@@ -183,7 +183,7 @@ impl Outgoing {
 
     fn encode(&mut self, command: &Command) {
         let (mut scratch, mut out) = ([0; MAX_COMMAND], [0; MAX_COMMAND]);
-        // Every command fits: a test of the messages says so.
+        // Every command fits: a test of the messages checks it.
         if let Ok(frame) = frame::encode(command, &mut scratch, &mut out) {
             self.bytes.extend_from_slice(frame);
         }

@@ -1,4 +1,4 @@
-//! Telemetry as data.
+//! Telemetry as JSON and as CSV.
 
 use std::io::Write;
 
@@ -29,7 +29,8 @@ pub fn json(telemetry: &TelemetryOfAny) -> Value {
     })
 }
 
-/// A CSV file with one row per telemetry message. It is readable whenever the recording ends.
+/// A CSV file with one row per telemetry message. Every row is flushed, so the file is complete whenever the recording
+/// ends.
 pub struct Recorder<W: Write> {
     csv: csv::Writer<W>,
     begun: bool,
@@ -41,7 +42,7 @@ impl<W: Write> Recorder<W> {
         Self { csv: csv::Writer::from_writer(out), begun: false }
     }
 
-    /// What has been written.
+    /// The output, with all rows so far.
     pub fn get_ref(&self) -> &W {
         self.csv.get_ref()
     }
@@ -81,7 +82,7 @@ impl<W: Write> Recorder<W> {
 }
 
 impl Recorder<Vec<u8>> {
-    /// Ends the recording; gives the file's bytes.
+    /// Ends the recording; returns the bytes of the file.
     pub fn into_bytes(self) -> Vec<u8> {
         // Every row has been flushed, so nothing is left to fail.
         self.csv.into_inner().unwrap_or_default()

@@ -16,7 +16,7 @@ const KEYS: &str = "h/H home (rail)  g check signs  m/M drive (held)  a arm  u u
 const COLOURS: [Color; 6] =
     [Color::Cyan, Color::Yellow, Color::Magenta, Color::Green, Color::Blue, Color::Red];
 
-/// Draws all of it.
+/// Draws state, inputs, numbers, charts, log and keys of a monitor.
 pub fn draw(monitor: &Monitor, frame: &mut Frame<'_>) {
     let head = header(monitor);
     let rows = monitor.telemetry.as_ref().map_or(0, |telemetry| telemetry.counts.len());
@@ -124,7 +124,7 @@ fn state_table(monitor: &Monitor) -> Vec<Line<'_>> {
     let Some(telemetry) = &monitor.telemetry else { return vec![Line::from("no telemetry yet")] };
     let mut lines =
         vec![Line::from(format!("{:<7}{:>11}{:>11}{:>8}{:>9}", "", "estimate", "per s", "counts", "innov."))];
-    // Without a joint per sensor (a model), there are positions and rates for as many as there are.
+    // The states of a model are not pairs for each sensor: entries that do not exist are shown as dashes.
     for (i, &counts) in telemetry.counts.iter().enumerate() {
         let (position, rate) = (telemetry.estimate.get(2 * i), telemetry.estimate.get(2 * i + 1));
         let unit = if i == 0 { "m" } else { "rad" };
@@ -160,7 +160,7 @@ fn force_and_timing(monitor: &Monitor) -> Vec<Line<'_>> {
     lines
 }
 
-/// From −1 to 1, with 0 in the middle.
+/// A bar for a value from −1 to 1, with 0 in the middle.
 fn bar(value: f32) -> String {
     const HALF: i32 = 6;
     let end = (value.clamp(-1.0, 1.0) * HALF as f32).round() as i32;

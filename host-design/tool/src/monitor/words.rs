@@ -9,7 +9,7 @@ use upright::supervision::supervisor::State;
 
 use super::model::TelemetryOfAny;
 
-/// A state of the supervisor.
+/// A state of the supervisor in words.
 pub fn state(state: State) -> &'static str {
     match state {
         State::Disarmed => "disarmed: positions are not known",
@@ -26,7 +26,7 @@ pub fn state(state: State) -> &'static str {
     }
 }
 
-/// A sensor by its number.
+/// Name of a sensor by its index: 0 is the cart's, then those of the links.
 pub fn joint(sensor: u8) -> String {
     if sensor == 0 { "cart".to_owned() } else { format!("link {sensor}") }
 }
@@ -55,7 +55,7 @@ pub fn inputs(telemetry: &TelemetryOfAny) -> String {
     format!("supply {:.1} V, active inputs: {active}", telemetry.supply_v)
 }
 
-/// The next thing to do by hand.
+/// The next step that homing, sign check or motor check asks of a person; `None` if there is none.
 pub fn instruction(telemetry: &TelemetryOfAny) -> Option<String> {
     let move_it = |sensor: u8| match sensor {
         0 => "push the cart along +x".to_owned(),
@@ -78,7 +78,7 @@ pub fn instruction(telemetry: &TelemetryOfAny) -> Option<String> {
             Some(format!("the encoder of the {} counts the wrong way: swap its channels", joint(sensor)))
         }
         (_, Signs::Swapped { asked, moved }) => Some(format!(
-            "the {} has answered for the {}: swap the encoders' plugs",
+            "the encoder of the {} has counted instead of that of the {}: swap their plugs",
             joint(moved),
             joint(asked)
         )),

@@ -27,7 +27,7 @@ struct SceneFrames {
     runs: Vec<Frames>,
 }
 
-/// A run at equal times.
+/// A run, sampled at equal intervals.
 #[derive(Serialize)]
 struct Frames {
     law: &'static str,
@@ -43,7 +43,7 @@ struct Frames {
     fall: Option<String>,
 }
 
-/// Least time between two frames (s).
+/// Shortest time between two frames (s).
 const FRAME: f64 = 0.02;
 
 impl Animation {
@@ -95,13 +95,13 @@ impl Animation {
         }
     }
 
-    /// As JSON that may stand in a `<script>`.
+    /// As JSON that is safe within a `<script>`.
     pub(super) fn json(&self) -> Result<String, serde_json::Error> {
         Ok(serde_json::to_string(self)?.replace('<', "\\u003c"))
     }
 }
 
-/// To a hundredth of a millimetre or a milliradian: no screen shows more.
+/// Rounds to a hundredth of a millimetre or of a milliradian: no screen shows more.
 fn rounded(x: f64) -> f64 {
     (x * 1e5).round() / 1e5
 }

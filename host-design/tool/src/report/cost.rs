@@ -35,7 +35,7 @@ impl Cost {
             multiplications: sensors + states * sensors + states + states * states,
             additions: sensors + states * sensors + states * states,
         };
-        // Volts from force and speed, the lift over the dead zone, the duty.
+        // Voltage from force and speed, compensation of the dead zone, duty.
         let motor = Operations { multiplications: 4, additions: 4 };
         let parts = [(&law, true), (&observer, table.observer.is_some()), (&motor, table.motor.is_some())];
         let used: Vec<&Operations> =
@@ -50,12 +50,12 @@ impl Cost {
         }
     }
 
-    /// Operations per second, for reading.
+    /// Operations per second, as text.
     pub(super) fn per_second(&self) -> String {
         format!("{} million", number(1e-6 * self.operations as f64 * self.rate_hz))
     }
 
-    /// Bytes of the table, for reading.
+    /// Bytes of the table, as text.
     pub(super) fn bytes(&self) -> String {
         self.table_bytes.map_or("no table of this size".to_owned(), |bytes| format!("{bytes} bytes"))
     }

@@ -110,7 +110,7 @@ fn dot(out: &mut String, at: [f64; 2], radius: f64, colour: &str) -> core::fmt::
     writeln!(out, "<circle cx=\"{:.1}\" cy=\"{:.1}\" r=\"{radius}\" fill=\"{colour}\"/>", at[0], at[1])
 }
 
-/// Numbers and fixed words only: nothing of it has to be escaped.
+/// `text` holds numbers and fixed words only, so nothing has to be escaped.
 fn text(out: &mut String, at: [f64; 2], text: &str) -> core::fmt::Result {
     writeln!(out, "<text x=\"{:.1}\" y=\"{:.1}\" fill=\"#000000\">{text}</text>", at[0], at[1])
 }

@@ -11,13 +11,13 @@ use upright_design::rig::Rig;
 use upright_design::table::TableValues;
 use upright_design::verify::{LinearReport, LoopModel, Margins};
 
-/// One frequency.
+/// The loop gain L at one frequency.
 struct Point {
-    /// rad/s.
+    /// Frequency (rad/s).
     omega: f64,
     /// Re L, Im L.
     l: [f64; 2],
-    /// Without jumps of 360° (°).
+    /// Phase, unwrapped: without jumps of 360° (°).
     phase: f64,
 }
 
@@ -46,7 +46,7 @@ pub(super) fn figures(
     [bodes, nyquists]
 }
 
-/// L(e^jωT) from a hundredth of the slowest pole to all but half the sampling rate, where |L| of many loops is 0.
+/// L(e^jωT) from a hundredth of the slowest pole to just below half the sampling rate, where |L| of many loops is 0.
 fn sweep(model: &LoopModel<f64>, report: &LinearReport, tick: f64) -> Vec<Point> {
     const POINTS: usize = 3000;
     let distance = |pole: &[f64; 2]| (pole[0].hypot(pole[1]).ln()).hypot(pole[1].atan2(pole[0]));
@@ -106,7 +106,7 @@ fn bode(points: &[Point], margins: &Margins, title: String) -> Figure {
         .high(230)
         .with(level("|L| = 1", 1.0))
         .with(Curve::line("|L|", 0, curve(&Point::gain)));
-    // Phase is known modulo 360°; the critical one nearest to the middle of the curve is marked.
+    // Phase is known modulo 360°: the critical phase of every turn near the curve is marked.
     let (low, high) = points
         .iter()
         .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), p| (low.min(p.phase), high.max(p.phase)));

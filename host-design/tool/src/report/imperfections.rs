@@ -1,4 +1,4 @@
-//! What each law stands of each imperfection of the machine, as tables and figures.
+//! How much of each imperfection of the machine each law withstands, as tables and figures.
 
 use super::Source;
 use crate::figure::{Axis, Curve, Figure, Panel};
@@ -6,12 +6,12 @@ use upright_design::verify::{CornerSettings, Imperfections, Standing, Unverifiab
 
 /// Errors of the masses for which every combination is run (%).
 const PERCENTS: [f64; 9] = [2.0, 5.0, 7.0, 10.0, 15.0, 20.0, 30.0, 50.0, 70.0];
-/// Larger ones only as long as all combinations stand (%).
+/// Errors beyond this one are run only as long as all combinations stand (%).
 const ENOUGH_PERCENT: f64 = 30.0;
 /// With more links there are too many combinations for each percentage.
 const MOST_LINKS: usize = 5;
 
-/// What one law stands.
+/// The size of each imperfection at which one law falls, and at which it leaves the limits.
 pub(super) struct StandingTable {
     pub(super) law: &'static str,
     pub(super) rows: Vec<StandingRow>,
@@ -102,7 +102,7 @@ pub(super) fn wrong_masses(source: &Source<'_>) -> Result<Option<Figure>, Unveri
 
 /// A line through markers.
 fn with_line(panel: Panel, name: &str, number: usize, points: Vec<[f64; 2]>) -> Panel {
-    // Number 0 is that of the crosses.
+    // Number 0 is for the crosses.
     let line = Curve::line(name, 1 + number, points.clone());
     panel.with(line).with(Curve::markers("", 1 + number, points))
 }

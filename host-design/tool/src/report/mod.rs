@@ -39,7 +39,7 @@ pub struct Source<'a> {
     pub table: &'a TableValues,
     /// The trust report of this table.
     pub trust: &'a TrustReport,
-    /// What each law stands of each imperfection; empty: the page has no such part.
+    /// How much of each imperfection each law withstands; empty: the page has no such part.
     pub imperfections: &'a [Imperfections],
     /// Seed of the disturbances in the runs.
     pub seed: u64,
@@ -47,30 +47,30 @@ pub struct Source<'a> {
     pub swing_up: Option<&'a Demonstration>,
     /// A run from equilibrium to equilibrium, if it is wanted.
     pub tour: Option<&'a Demonstration>,
-    /// How far its links may be pushed on the way; empty: the page has no such part.
+    /// How hard its links may be pushed during the stored motions; empty: the page has no such part.
     pub margins: &'a [(Way, Vec<Margin>)],
-    /// Starts along each axis of the map of the region of attraction, at least 2; usually [`REGION_POINTS`].
+    /// Initial states along each axis of the map of the region of attraction, at least 2; usually [`REGION_POINTS`].
     pub region_points: usize,
-    /// The command that made the report, to make it again.
+    /// The command line that makes this report, shown on the page.
     pub command: &'a str,
 }
 
-/// Starts along each axis of the map of the region of attraction.
+/// Usual number of initial states along each axis of the map of the region of attraction.
 pub const REGION_POINTS: usize = 31;
 
-/// A report.
+/// A finished report.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Report {
-    /// The page, a whole file.
+    /// The page, as one self-contained HTML file.
     pub html: String,
-    /// Its pictures, in its order.
+    /// The pictures of the page, in the order of the page.
     pub pictures: Vec<Picture>,
 }
 
 /// A picture of a report for use elsewhere.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Picture {
-    /// Name for a file, without its ending.
+    /// Name for a file, without its extension.
     pub name: String,
     /// As an SVG document.
     pub svg: String,

@@ -17,7 +17,7 @@ pub(super) fn poles(poles: &[[f64; 2]], digits: usize) -> Vec<String> {
     number::poles(poles, digits).iter().map(|pole| typeset(pole)).collect()
 }
 
-/// With minus signs and powers of ten as they are printed.
+/// Typesets minus signs and powers of ten.
 fn typeset(plain: &str) -> String {
     let (mut text, mut raised) = (String::new(), false);
     for symbol in plain.chars() {

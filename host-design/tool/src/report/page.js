@@ -60,7 +60,7 @@
     // Labels stay legible on a telephone.
     const room = (stages.clientWidth - 20 * (runs.length - 1)) / runs.length;
     const letter = Math.max(0.09 * total, 10 * Math.max(width / room, 1.6 * total / (0.24 * window.innerHeight)));
-    // As high as the links get, with the labels below, and with the links where they hang.
+    // High enough for the raised links, the labels below the rail, and links that hang below it.
     const depth = Math.max(...runs.flatMap((run) => run.angles.map(hangsBelow)));
     const below = Math.max(0.1 * total + 1.3 * letter, depth + 0.05 * total);
     const view = { width, height: 1.3 * total + below, top: 1.3 * total };

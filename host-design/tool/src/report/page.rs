@@ -97,7 +97,7 @@ struct CertificateRow {
 }
 
 impl<'a> Page<'a> {
-    /// All but the pictures.
+    /// The page without its pictures.
     pub(super) fn new(source: &Source<'a>, scenes: &[Scene]) -> Result<Self, ReportError> {
         let Source { rig, certified, table, trust, .. } = *source;
         let design = &certified.double;

@@ -45,7 +45,8 @@ fn reaches_edge(map: &Map) -> bool {
     sides.chain(ends).any(Option::is_some)
 }
 
-/// Approximate largest deviation in one state alone: at least a hundredth of `largest`.
+/// Approximate largest deviation in one state alone from which the loop recovers; the search starts at `largest` and
+/// ends below a hundredth of it.
 fn extent(rig: &Rig, table: &TableValues, law: Law, state: usize, largest: f64) -> Result<f64, Unverifiable> {
     const TRIED: usize = 13;
     let still = Axis { state: if state == ANGLE { RATE } else { ANGLE }, range: [0.0, 0.0], points: 1 };

@@ -65,7 +65,7 @@ pub(super) fn scenes(
     plans.into_iter().map(|plan| plan.run(rig, table)).collect()
 }
 
-/// The swing-up and all that follows it.
+/// The run that raises the rig, balances it and lowers it again.
 pub(super) fn swing_up(rig: &Rig, run: &Demonstration, seed: u64) -> Scene {
     let does = "The rig raises itself from hanging, and lowers itself again";
     demonstrated(rig, run, ["swing-up", "Swing-up", does], seed)
@@ -78,7 +78,7 @@ pub(super) fn tour(rig: &Rig, run: &Demonstration, seed: u64) -> Scene {
     demonstrated(rig, run, ["tour", "From equilibrium to equilibrium", does], seed)
 }
 
-/// A run of the whole firmware as a scene with this id and name that does this.
+/// A run of the whole firmware as a scene with this id and name; `does` says what the rig does.
 fn demonstrated(rig: &Rig, run: &Demonstration, [id, name, does]: [&'static str; 3], seed: u64) -> Scene {
     let part = |(at_s, part): &(f64, String)| format!("{part} from {} s", number(rounded(*at_s, 3)));
     let parts: Vec<String> = run.parts.iter().map(part).collect();
@@ -120,7 +120,7 @@ fn of_model(rig: &Rig) -> &'static str {
     if is_chain(rig) { "" } else { ", on the linear model" }
 }
 
-/// Unit of the set-point with its space.
+/// Unit of the set-point, with a space before it; empty for a model.
 fn unit(rig: &Rig) -> &'static str {
     if is_chain(rig) { " m" } else { "" }
 }
@@ -193,7 +193,8 @@ fn noise_text(rig: &Rig, seed: u64) -> String {
     )
 }
 
-/// Ten seconds for links on a cart; ten of the slowest time constants for a model, whose clock may be any.
+/// Duration of a run (s): 10 s for links on a cart; ten times the slowest time constant for a model, whose time scale
+/// may be any.
 fn duration(rig: &Rig, certified: &Certified) -> f64 {
     let slowest = Law::ALL
         .into_iter()
@@ -208,7 +209,7 @@ fn duration(rig: &Rig, certified: &Certified) -> f64 {
     wanted.clamp(20.0 * rig.tick.period_s, MOST_TICKS * rig.tick.period_s)
 }
 
-/// Half of the way to the nearer end of the rail; 1 for a model.
+/// Step of the set-point (m): half of the way to the nearer end of the rail; 1 for a model.
 fn step(rig: &Rig) -> f64 {
     match &rig.plant {
         PlantDescription::Chain(chain) => {
@@ -223,7 +224,7 @@ fn tilt(trust: &TrustReport) -> f64 {
     let edges = trust.laws.iter().filter_map(|law| law.attraction.as_ref()?.tilts.first());
     let weakest = edges.map(|tilt| tilt.edge.size).filter(|size| *size > 0.0).fold(f64::INFINITY, f64::min);
     let half = if weakest.is_finite() { 0.5 * weakest } else { 0.002 };
-    // Two digits are enough to be repeated by hand.
+    // Rounded, so that the run is easy to repeat from the command line.
     rounded(half, 2)
 }
 

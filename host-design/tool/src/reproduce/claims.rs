@@ -1,4 +1,4 @@
-//! The paper's claims about the two laws, in the words of what was measured.
+//! The paper's claims about the two laws, compared with what was measured.
 
 use upright::table::Law;
 
@@ -48,7 +48,7 @@ pub(super) fn claims(all: &[Robustness]) -> String {
         "mean u² (N²)",
     ];
     text += &markdown_table(&header, 2, &rows);
-    text += "\nBetter is: lower frequency, rms, force and effort; larger margins.\n\n";
+    text += "\nLower frequency, rms, force and effort are better, and larger margins.\n\n";
     for kind in Loop::ALL {
         let of = |law: Law| all.iter().find(|one| one.law == law && one.kind == kind);
         if let (Some(lqr), Some(placement)) = (of(Law::Lqr), of(Law::PolePlacement)) {
@@ -78,10 +78,10 @@ fn margin_row(one: &Robustness) -> Vec<String> {
     ]
 }
 
-/// Quantities that differ by less than this factor count as equal: a run of another seed gives as much.
+/// Quantities that differ by less than this factor count as equal: runs with different seeds differ as much.
 const ALIKE: f64 = 1.1;
 
-/// In what the LQR is better than pole placement in this loop, in what it is not, and in what they are alike.
+/// Lists where the LQR is better than pole placement in this loop, where it is worse, and where they are alike.
 fn comparison(lqr: &Robustness, placement: &Robustness) -> String {
     let mut groups: [Vec<String>; 3] = Default::default();
     // `gain`: how many times better the LQR is.

@@ -17,7 +17,7 @@ pub enum Digits {
 pub enum Verdict {
     /// Rounded to as many digits as printed, it is the same number.
     EveryDigit,
-    /// Rounded so, it is this many units of the last printed digit away.
+    /// Rounded to as many digits as printed, it differs by this many units of the last printed digit.
     UnitsOfLastDigit(u64),
     /// The paper does not print it.
     NotPrinted,
@@ -34,14 +34,14 @@ pub struct Row {
     pub printed: Option<&'static str>,
     /// Ours, in SI units.
     pub ours: f64,
-    /// Ours less the printed number.
+    /// Ours minus the printed number.
     pub deviation: Option<f64>,
     /// How they compare.
     pub verdict: Verdict,
 }
 
 impl Row {
-    /// Compares `ours` with a number that the paper prints to so many `digits`.
+    /// Compares `ours` with a number that the paper prints to this many `digits`.
     pub fn printed(
         quantity: impl Into<String>,
         from: &'static str,
@@ -76,7 +76,7 @@ impl Row {
     }
 }
 
-/// The number in a text of this crate; NaN if there is none.
+/// The value of a number printed as text; NaN if the text is not a number.
 pub(super) fn value_of(text: &str) -> f64 {
     text.parse().unwrap_or(f64::NAN)
 }

@@ -1,7 +1,7 @@
 //! The loop that the paper simulates: the nonlinear chain under `u = N r - K x` in continuous time, the whole state
 //! known, without tick, force limit or ends of the rail.
 //!
-//! The firmware's controller has no such mode: this law is the paper's object of study, not something that runs here.
+//! The firmware's controller has no such mode: this law is what the paper studies, not something that runs on a rig.
 
 use rand::SeedableRng;
 use rand_distr::{Distribution, Normal};
@@ -20,19 +20,19 @@ use upright_design::rig::Chain;
 pub struct ContinuousRun {
     /// Set-point from 0 s on (m).
     pub step_m: f64,
-    /// Length (s).
+    /// Duration (s).
     pub duration_s: f64,
     /// Time between samples (s).
     pub sample_s: f64,
     /// With the paper's disturbances, drawn from this seed at each sample and held until the next: the same numbers
     /// that a simulation of the firmware with this tick and seed draws.
     pub disturbances: Option<u64>,
-    /// Local error allowed.
+    /// Local error tolerance of the integrator.
     pub tolerance: Tolerance,
 }
 
 impl ContinuousRun {
-    /// The paper's step of 1 m, every millisecond of 10 s, to 1e-10.
+    /// The paper's step of 1 m: 10 s, sampled every millisecond, to a relative tolerance of 1e-10.
     pub const STEP: Self = Self {
         step_m: 1.0,
         duration_s: 10.0,
@@ -41,7 +41,7 @@ impl ContinuousRun {
         tolerance: Tolerance { relative: 1e-10, absolute: 1e-12 },
     };
 
-    /// The course from rest at 0.
+    /// Simulates the run from rest at 0, and returns its time history.
     ///
     /// # Errors
     /// [`ReproduceError`] if the integrator gives up or the plant cannot be built.
@@ -91,7 +91,7 @@ impl Disturbances {
         })
     }
 
-    /// Draws the next ones and gives the force (N).
+    /// Draws the next force and torques; returns the force (N).
     fn next_force(&mut self) -> f64 {
         let Some((random, force, torque)) = &mut self.source else { return 0.0 };
         let push = force.sample(random);

@@ -6,7 +6,7 @@ use nalgebra::Complex;
 
 use upright_design::verify::Margins;
 
-/// Frequencies looked at: this many per factor of ten from 1e-3 to 1e5 rad/s.
+/// Number of frequencies per decade, from 1e-3 to 1e5 rad/s.
 const PER_DECADE: i32 = 5000;
 
 /// Margins of the loop broken at the force, from the poles alone: with one input
@@ -36,7 +36,7 @@ pub fn continuous_margins(open: &[[f64; 2]], closed: &[[f64; 2]]) -> Margins {
     let (peak_complementary_sensitivity, _) = largest(&|s| (s - 1.0).norm_sqr().sqrt());
     let (disk, disk_at) = largest(&|s| (s * 2.0 - 1.0).norm_sqr().sqrt());
 
-    // Of 1 + g L = 0 with a real g.
+    // The real factors g with 1 + g L = 0 at some frequency.
     let factors: Vec<f64> = zeros(&omegas, |omega| l(omega).im)
         .into_iter()
         .chain([0.0])
@@ -64,7 +64,7 @@ pub fn continuous_margins(open: &[[f64; 2]], closed: &[[f64; 2]]) -> Margins {
     }
 }
 
-/// Where `f` changes its sign, by bisection between neighbouring frequencies.
+/// The frequencies where `f` changes sign, by bisection between neighbouring frequencies.
 fn zeros(omegas: &[f64], f: impl Fn(f64) -> f64) -> Vec<f64> {
     let brackets = omegas.windows(2).filter(|pair| f(pair[0]) * f(pair[1]) < 0.0);
     brackets

@@ -1,11 +1,11 @@
-//! The course of a run of any loop, and the figures of a step response.
+//! The time history of a run of any loop, and the figures of a step response.
 
 use serde::Serialize;
 
 use upright_design::plant::absolute_angles;
 use upright_design::simulate::{Fall, FallKind, Trace};
 
-/// States and force at equally spaced times.
+/// Time history of a run: states and force at equally spaced times.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Course {
     /// Time between samples (s); the first is at 0.
@@ -14,7 +14,7 @@ pub struct Course {
     pub states: Vec<Vec<f64>>,
     /// Force of the control law on the cart, without disturbance, from each sample on (N).
     pub forces_n: Vec<f64>,
-    /// How it falls, if it does: the course ends there.
+    /// How it falls, if it does: the record ends there.
     pub fall: Option<Fall>,
 }
 
@@ -27,7 +27,7 @@ pub struct StepFigures {
     pub settling_time_s: Option<f64>,
     /// Largest excursion beyond the set-point (% of the step).
     pub overshoot_percent: f64,
-    /// Largest excursion away from the set-point (% of the step).
+    /// Largest excursion in the opposite direction (% of the step).
     pub undershoot_percent: f64,
     /// Largest angle of each joint (°).
     pub peak_angles_deg: Vec<f64>,
@@ -41,7 +41,7 @@ pub struct StepFigures {
 pub const BAND: f64 = 0.02;
 
 impl Course {
-    /// What a simulation of the firmware's controller recorded every `sample_s` seconds.
+    /// From what a simulation of the firmware's controller recorded every `sample_s` (s).
     pub fn of_trace(trace: &Trace, sample_s: f64, fall: Option<Fall>) -> Self {
         Self {
             sample_s,
@@ -85,7 +85,8 @@ impl Course {
     }
 }
 
-/// The first link beyond the horizontal, as a fall at `at_s`; a NaN counts as a fall, too.
+/// A fall at `at_s`, if a link is beyond the horizontal: names the first one. A state that is not finite is a fall,
+/// too.
 pub(super) fn fall_of(state: &[f64], at_s: f64) -> Option<Fall> {
     if !state.iter().all(|entry| entry.is_finite()) {
         return Some(Fall { at_s, kind: FallKind::NotFinite });

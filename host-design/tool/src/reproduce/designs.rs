@@ -23,7 +23,7 @@ pub struct Designs {
 /// Poles of one loop.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct PoleSet {
-    /// Which loop.
+    /// Name of the loop.
     pub of: String,
     /// [re, im] (1/s), by real part.
     pub poles: Vec<[f64; 2]>,

@@ -1,4 +1,4 @@
-//! Gaps and misprints of the paper, each with the readings tried and how many printed numbers each of them gives.
+//! Gaps and misprints of the paper, each with the readings tried and how many printed numbers each reading reproduces.
 
 use serde::Serialize;
 
@@ -26,13 +26,13 @@ pub struct Erratum {
 pub struct Evidence {
     /// The reading.
     pub reading: String,
-    /// How many printed numbers it gives, or another finding.
+    /// How many printed numbers it reproduces, or another finding.
     pub outcome: String,
     /// Printed numbers that come out to the last digit, and how many there are; none where it is not about numbers.
     pub agree: Option<[usize; 2]>,
 }
 
-/// All of them.
+/// All errata and gaps, with the evidence for each.
 ///
 /// # Errors
 /// [`ReproduceError`] if a design fails that should exist.
@@ -180,7 +180,7 @@ fn rate_for_position(exact: &Rig) -> Result<Erratum, ReproduceError> {
             },
             Evidence {
                 reading: "either, at rest and upright".to_owned(),
-                outcome: "C is 0 there and D is 0 throughout: A, B, K and N are not touched by it".to_owned(),
+                outcome: "C is 0 there and D is 0 throughout: A, B, K and N are not affected".to_owned(),
                 agree: None,
             },
         ],
@@ -198,7 +198,7 @@ fn rounded_matrices(exact: Known<'_>, printed: Known<'_>) -> Result<Erratum, Rep
     }
     Ok(Erratum {
         what: "K and N follow from A and B as printed, rounded to six digits.",
-        instead: "From the exact model some of their last digits are others.",
+        instead: "From the exact model, some of their last digits differ.",
         evidence,
     })
 }

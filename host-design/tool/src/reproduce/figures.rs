@@ -53,7 +53,7 @@ fn over_time(course: &Course, value: impl Fn(usize) -> f64) -> Vec<[f64; 2]> {
     (0..course.states.len()).map(|index| [index as f64 * course.sample_s, value(index)]).collect()
 }
 
-/// One of the paper's figures: position of all loops; angles, rates and force of the paper's.
+/// One of the paper's figures: position in all loops; angles, rates and force in the paper's loop.
 fn response(responses: &[&Response]) -> Figure {
     let Some(first) = responses.first() else { return Figure::new("") };
     let time = || Axis::linear("time (s)");
@@ -119,7 +119,7 @@ impl Settling {
     }
 }
 
-/// Beyond lies hardly any motion (Hz).
+/// Highest frequency shown (Hz): there is hardly any motion above it.
 const HIGHEST_HZ: f64 = 200.0;
 
 /// Spectra of cart, first joint and force under the paper's disturbances.

@@ -75,7 +75,7 @@ pub enum ReproduceError {
     /// The plant cannot be simulated.
     #[error(transparent)]
     Plant(#[from] PlantError),
-    /// The continuous loop could not be followed.
+    /// The continuous loop could not be integrated.
     #[error(transparent)]
     Reference(#[from] ReferenceError),
     /// The firmware's loop could not be run.
@@ -153,14 +153,14 @@ impl PaperRigs {
 /// The designs of both rig files.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PaperDesigns {
-    /// That of [`PaperRigs::exact`].
+    /// Design of [`PaperRigs::exact`].
     pub exact: Certified,
-    /// That of [`PaperRigs::printed`].
+    /// Design of [`PaperRigs::printed`].
     pub printed: Certified,
 }
 
 impl PaperDesigns {
-    /// Designs both.
+    /// Designs both rigs.
     ///
     /// # Errors
     /// [`ReproduceError::Design`] if one has no solution.

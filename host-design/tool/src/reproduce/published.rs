@@ -1,5 +1,5 @@
 //! What the paper prints: F. J. Ticona Coaquira, "Design and comparison of two linear controllers with precompensation
-//! gain for the Quadruple inverted pendulum". These numbers stand nowhere else.
+//! gain for the Quadruple inverted pendulum". All code takes these numbers from here.
 
 use upright::table::Law;
 

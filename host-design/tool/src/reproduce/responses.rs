@@ -11,7 +11,7 @@ use upright_design::rig::Rig;
 use upright_design::simulate::{Scenario, Sensing, simulate};
 use upright_design::table::{Gains, TableValues};
 
-/// Which loop was run.
+/// Kind of loop that is run.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Loop {
@@ -24,10 +24,10 @@ pub enum Loop {
 }
 
 impl Loop {
-    /// All of them.
+    /// All kinds of loop, the paper's first.
     pub const ALL: [Loop; 3] = [Loop::Continuous, Loop::FullState, Loop::Encoders];
 
-    /// As printed.
+    /// Name in tables and figures.
     pub fn name(self) -> &'static str {
         match self {
             Loop::Continuous => "continuous",
@@ -37,14 +37,14 @@ impl Loop {
     }
 }
 
-/// Both laws for one rig, in every loop. The set-point jumps: there is no governor, as in the paper.
+/// Both laws for one rig, in every loop. The set-point is a step: there is no governor, as in the paper.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Loops {
     /// The rig.
     pub rig: Rig,
     /// Its design.
     pub certified: Certified,
-    /// Table with observer.
+    /// Table with the gains for the tick, without governor.
     pub table: TableValues,
 }
 
@@ -73,7 +73,7 @@ impl Loops {
         laws.each()[law].ok_or_else(|| ReproduceError::OneLaw(self.rig.name.clone()))
     }
 
-    /// The course of `law` in `kind` of loop, from rest; sampled loops at the tick, whatever `run` says.
+    /// Simulates `law` in this kind of loop, from rest. Sampled loops are recorded at the tick, whatever `run` says.
     pub(super) fn course(&self, law: Law, kind: Loop, run: &ContinuousRun) -> Result<Course, ReproduceError> {
         let sensing = match kind {
             Loop::Continuous => return run.course(chain(&self.rig)?, self.continuous(law)?),
@@ -104,9 +104,9 @@ pub struct Response {
     pub law: Law,
     /// Which loop.
     pub kind: Loop,
-    /// Its figures.
+    /// Figures of the step response.
     pub figures: StepFigures,
-    /// Its course.
+    /// Time history of the run.
     #[serde(skip)]
     pub course: Course,
 }

@@ -20,7 +20,7 @@ use upright_design::verify::{LinearReport, Margins, linear};
 /// Seed of all disturbances.
 pub const SEED: u64 = 1;
 
-/// Start of each run that is left out, until the initial state no longer matters (s).
+/// Time at the start of each run that is left out (s): the initial state no longer matters after it.
 const FORGOTTEN_S: f64 = 10.0;
 
 /// 30 segments that overlap by half, after the part left out.
@@ -45,7 +45,7 @@ pub struct Robustness {
     pub ripples: Vec<Ripple>,
     /// Largest force in this run (N).
     pub peak_force_n: f64,
-    /// Squared force, on average (N²): control energy per second.
+    /// Mean squared force (N²): control energy per second.
     pub effort_n2: f64,
 }
 
@@ -101,7 +101,7 @@ pub fn robustness(loops: &Loops) -> Result<Vec<Robustness>, ReproduceError> {
     })
 }
 
-/// Number of the first sample that counts.
+/// Index of the first sample that counts.
 fn after(course: &Course) -> usize {
     ((FORGOTTEN_S / course.sample_s).round() as usize).min(course.forces_n.len())
 }

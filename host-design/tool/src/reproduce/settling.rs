@@ -23,7 +23,7 @@ pub struct Settling {
     pub rows: Vec<SettlingRow>,
     /// Horizons (s) and our verdicts there.
     pub by_horizon: Vec<(f64, [bool; 7])>,
-    /// First and last horizon (s) at which all seven verdicts are the paper's, in steps of 10 ms, and nowhere else.
+    /// First and last horizon (s), in steps of 10 ms, with all seven verdicts of the paper; no other horizon has them.
     pub horizons_s: Option<[f64; 2]>,
     /// What else was tried.
     pub sensitivity: Vec<Sensitivity>,
@@ -44,7 +44,7 @@ pub struct SettlingRow {
     pub peak_angle_deg: f64,
     /// Largest force (N).
     pub peak_force_n: f64,
-    /// The course.
+    /// Time history of the run.
     #[serde(skip)]
     pub course: Course,
 }
@@ -58,13 +58,13 @@ pub struct Sensitivity {
     pub at_horizon: [bool; 7],
     /// Verdicts at [`LONGEST_S`]. `false`: it falls or never settles.
     pub in_the_end: [bool; 7],
-    /// Which fall.
+    /// Which of the runs fall.
     pub falls: [bool; 7],
     /// Horizons with all seven verdicts of the paper (s), as in [`Settling::horizons_s`].
     pub horizons_s: Option<[f64; 2]>,
 }
 
-/// Length of the runs (s).
+/// Duration of the runs (s).
 pub const LONGEST_S: f64 = 20.0;
 /// A horizon within those that give the paper's verdicts (s).
 pub const HORIZON_S: f64 = 6.5;
@@ -129,7 +129,8 @@ fn verdicts(courses: &[Course], step_m: f64, horizon_s: f64) -> [bool; 7] {
     core::array::from_fn(|i| courses.get(i).is_some_and(|course| course.stabilised(step_m, horizon_s)))
 }
 
-/// First and last horizon with the paper's verdicts, if there are any and all between have them, too.
+/// First and last horizon (s) with the paper's verdicts, if there are any and all between them have these verdicts,
+/// too.
 fn agreeing(courses: &[Course], step_m: f64) -> Option<[f64; 2]> {
     let steps = (LONGEST_S / STEP_S).round() as usize;
     let agrees = |step: &usize| verdicts(courses, step_m, *step as f64 * STEP_S) == printed();
@@ -138,7 +139,7 @@ fn agreeing(courses: &[Course], step_m: f64) -> Option<[f64; 2]> {
     (first..=last).all(|step| agrees(&step)).then_some([first as f64 * STEP_S, last as f64 * STEP_S])
 }
 
-/// The designs of the exact model for every settling time, at each tick once: several changes have the same one.
+/// The designs of the exact model for every settling time and tick, each made once: several changes share them.
 struct ExactDesigns(Vec<(Tick, f64, Certified)>);
 
 impl ExactDesigns {

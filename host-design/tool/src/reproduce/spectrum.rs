@@ -11,7 +11,7 @@ pub const SEGMENT: usize = 8192;
 /// One-sided power spectral density of a signal at equally spaced frequencies from 0 to half the sampling rate.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Spectrum {
-    /// Distance of the frequencies (Hz).
+    /// Spacing of the frequencies (Hz).
     pub spacing_hz: f64,
     /// Density at each frequency (unit² per Hz).
     pub density: Vec<f64>,
@@ -30,8 +30,8 @@ pub struct Bandwidth {
 
 impl Spectrum {
     /// Welch's estimate (P. D. Welch, *IEEE Trans. Audio Electroacoust.* 15, 1967): [`SEGMENT`] samples at a time,
-    /// each segment less its mean and under a Hann window, overlapping by half; the mean of their periodograms. None
-    /// if the signal is shorter than a segment.
+    /// each segment minus its mean and under a Hann window, overlapping by half; the mean of their periodograms.
+    /// `None` if the signal is shorter than a segment.
     pub fn welch(signal: &[f64], sample_s: f64) -> Option<Self> {
         let window: Vec<f64> =
             (0..SEGMENT).map(|i| (core::f64::consts::PI * i as f64 / SEGMENT as f64).sin().powi(2)).collect();
@@ -99,7 +99,7 @@ impl Spectrum {
 
 /// Fourier transform of [`SEGMENT`] real samples, from a complex one of half the length: its real inputs are the even
 /// samples, its imaginary ones the odd samples (W. H. Press et al., *Numerical Recipes*, §12.3). The algorithm is named
-/// here, because a planner would have all algorithms compiled.
+/// here, because a planner would compile all algorithms into the program.
 struct RealTransform {
     half: Radix4<f64>,
     /// `exp(-2πi k / SEGMENT) / 2` of `k` from 1 to `SEGMENT / 4 - 1`.

@@ -13,7 +13,7 @@ const HEAD: &str = "\
 # The paper's results beside ours
 
 The paper: Franklin Josue Ticona Coaquira, *Design and comparison of two linear controllers with precompensation gain for
-the Quadruple inverted pendulum*. \"Printed\" is what stands there, \"ours\" is computed anew by `upright reproduce`.
+the Quadruple inverted pendulum*. \"Printed\" is what the paper prints, \"ours\" is computed by `upright reproduce`.
 ";
 
 impl Reproduction {
@@ -109,7 +109,7 @@ fn errata(errata: &[Erratum]) -> String {
 fn responses(responses: &[Response]) -> String {
     let mut text = "## Figures 5 to 8: step of 1 m on the nonlinear plant\n\n\
         Continuous is the paper's loop. The other two are the firmware's controller at 1 ms with a limit of 20 N, set-point\n\
-        jumping. Figures 7 and 8 are with disturbances drawn anew each millisecond, the same for all: force of variance\n\
+        jumping. Figures 7 and 8 are with disturbances drawn again each millisecond, the same for all: force of variance\n\
         0.01 N², torque of variance 1e-9 (N·m)² at each joint. The paper's figures have no numbers; of pole placement it\n\
         says that the response is approximately the one asked for: 1 % and 6 s.\n\n"
         .to_owned();

@@ -15,7 +15,7 @@ pub(super) struct Asset {
 
 const SCRIPT: &str = "text/javascript";
 
-/// All of them.
+/// All files of the page.
 pub(super) const ASSETS: [Asset; 8] = [
     Asset { name: "", media_type: "text/html", content: include_str!("page/page.html") },
     Asset { name: "colours.css", media_type: "text/css", content: COLOURS_CSS },

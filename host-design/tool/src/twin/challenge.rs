@@ -11,16 +11,16 @@ const PUSH_S: f64 = 0.05;
 /// The first push and its growth from one to the next, as fractions of the force limit.
 const GROWTH: f64 = 0.1;
 
-/// A challenge.
+/// A challenge; the page shows its score.
 #[derive(Debug, Clone, Serialize)]
 pub(super) struct Challenge {
     /// Time that the rig has stood (s).
     stood_s: f64,
     /// Hardest push that it has survived (N).
     survived_n: f64,
-    /// The push of now, or the next one (N).
+    /// The latest push (N), positive along +x; before the first one, its size.
     push_n: f64,
-    /// Whether it is over.
+    /// Whether the motor has gone off, which ends the challenge.
     is_over: bool,
     #[serde(skip)]
     random: Pcg64,
@@ -44,7 +44,7 @@ impl Challenge {
         }
     }
 
-    /// The force on the cart in the next tick (N). `stands`: the motor is on.
+    /// Returns the force on the cart in the next tick (N). `stands`: the motor is on.
     pub(super) fn tick(&mut self, stands: bool, period_s: f64) -> f64 {
         self.is_over |= !stands;
         if self.is_over {

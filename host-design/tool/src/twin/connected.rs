@@ -8,16 +8,16 @@ use super::desk::Desk;
 use super::pace::PICTURE;
 use crate::monitor::{Line, now};
 
-/// At the end, the motor is turned off: longest wait for the answer.
+/// Longest wait at the end, when the motor is turned off, for the answer.
 const LAST_WAIT: Duration = Duration::from_millis(500);
 
-/// Passes bytes between the line and the viewers until `goes_on` says no. The firmware has to be that of the rig with
+/// Passes bytes between the line and the viewers while `goes_on` holds. The firmware has to be that of the rig with
 /// this hash; commands to another one are not sent.
 pub(super) fn run(mut line: Line, desk: &mut Desk, rig_hash: u64, goes_on: &dyn Fn() -> bool) {
     let mut buffer = [0; 4096];
     let mut next = Instant::now();
     while goes_on() {
-        // What only a simulation can do is not asked of a machine.
+        // What only a simulation can do is ignored.
         let _ = desk.requests(now());
         if desk.monitor.ended.is_none() {
             exchange(&mut line, desk, &mut buffer);
@@ -30,7 +30,7 @@ pub(super) fn run(mut line: Line, desk: &mut Desk, rig_hash: u64, goes_on: &dyn 
             next = Instant::now() + PICTURE;
         }
     }
-    // Whoever was in command is no longer heard.
+    // From here on, requests of the viewer in command are no longer read.
     desk.turn_off(now());
     let end = Instant::now() + LAST_WAIT;
     while desk.monitor.ended.is_none() && desk.monitor.is_waiting() && Instant::now() < end {
@@ -38,7 +38,7 @@ pub(super) fn run(mut line: Line, desk: &mut Desk, rig_hash: u64, goes_on: &dyn 
     }
 }
 
-/// Sends what is due, and receives.
+/// Sends pending bytes, and receives.
 fn exchange(line: &mut Line, desk: &mut Desk, buffer: &mut [u8]) {
     desk.monitor.poll(now());
     match line.exchange(&desk.monitor.take_outgoing(), buffer) {

@@ -20,13 +20,13 @@ use crate::monitor::{Action, Monitor, request as command, words};
 const SILENCE: Duration = Duration::from_secs(2);
 /// Longest recording (bytes).
 const MAX_RECORDING: usize = 256 << 20;
-/// Telemetry kept for a picture; older ones are dropped while nobody looks.
+/// Most telemetry messages kept for a picture; further ones are dropped.
 const MAX_FRESH: usize = 2000;
 
-/// A recording that is shared with the door.
+/// The last finished recording as CSV, shared with the server.
 pub(super) type Recording = Arc<Mutex<Vec<u8>>>;
 
-/// The desk.
+/// What stands between the viewers and the firmware.
 pub(super) struct Desk {
     /// The conversation with the firmware.
     pub(super) monitor: Monitor,
@@ -34,7 +34,7 @@ pub(super) struct Desk {
     inbox: Inbox,
     commander: Option<Id>,
     last_heard: Instant,
-    /// Whether anyone has ever looked.
+    /// Whether a viewer has ever connected.
     pub(super) was_seen: bool,
     fresh: Vec<Value>,
     recorder: Option<Recorder<Vec<u8>>>,
@@ -57,11 +57,11 @@ impl Desk {
         }
     }
 
-    /// Takes bytes of the firmware.
+    /// Takes bytes that the firmware has sent.
     pub(super) fn receive(&mut self, bytes: &[u8], now: Duration) {
         for telemetry in self.monitor.receive(bytes, now) {
             if let Some(recorder) = &mut self.recorder {
-                // Into memory, which does not fail.
+                // Writing to memory does not fail.
                 let _ = recorder.push(&telemetry);
                 if recorder.get_ref().len() > MAX_RECORDING {
                     self.stop_recording();
@@ -77,7 +77,7 @@ impl Desk {
         }
     }
 
-    /// Carries out what the viewers ask for; gives what the one in command asks of the machine.
+    /// Carries out what the viewers ask for; returns what the one in command asks of the simulated machine.
     pub(super) fn requests(&mut self, now: Duration) -> Vec<MachineRequest> {
         let mut machine = Vec::new();
         while let Some((viewer, event)) = self.inbox.next() {
@@ -106,7 +106,7 @@ impl Desk {
                 Event::Asks(Request::Machine { what }) if commands => machine.push(what),
                 Event::Asks(_) => self.viewers.tell(
                     viewer,
-                    &json!({ "notice": "another viewer is in command; only the stop works here" })
+                    &json!({ "notice": "another viewer is in command; only the stop button works here" })
                         .to_string(),
                 ),
             }
@@ -128,7 +128,8 @@ impl Desk {
         }
     }
 
-    /// Turns the motor off when the viewer in command is silent; while it is not, the firmware is told so.
+    /// Turns the motor off when the viewer in command is silent. Otherwise, while the rig balances, starts the
+    /// keep-alive of the firmware's own dead-man timer.
     fn watch(&mut self, now: Duration) {
         let state = self.monitor.telemetry.as_ref().map(|telemetry| telemetry.state);
         let is_on = state.is_some_and(|state| state == State::Armed || state.drives());
@@ -162,13 +163,12 @@ impl Desk {
         self.monitor.act(Action::Send(message::Request::Disarm), now);
     }
 
-    /// The firmware has stopped: says why, until the viewer in command asks for a restart. Gives whether upright; none
-    /// if
-    /// `goes_on` says no.
+    /// Shows why the firmware has stopped, until the viewer in command asks for a restart. Returns whether to restart
+    /// upright; `None` if `goes_on` no longer holds.
     pub(super) fn wait_for_restart(&mut self, why: &str, goes_on: &dyn Fn() -> bool) -> Option<bool> {
         self.monitor.note(format!("{why}; switch the power off and on"));
         while goes_on() {
-            // Of what is asked, only this can be done.
+            // Nothing else can be done while the firmware is stopped.
             for request in self.requests(Duration::ZERO) {
                 if let MachineRequest::Restart { upright } = request {
                     return Some(upright);
@@ -189,7 +189,7 @@ impl Desk {
         (self.last_heard, self.fresh) = (Instant::now(), Vec::new());
     }
 
-    /// Whether anyone looks.
+    /// Whether a viewer is connected.
     pub(super) fn has_viewers(&self) -> bool {
         !self.viewers.is_empty()
     }

@@ -15,7 +15,7 @@ use super::assets::{ASSETS, Asset};
 const MAX_REQUEST: usize = 8192;
 /// Most header lines of a request.
 const MAX_HEADERS: usize = 64;
-/// Longest time that a client may take for its request, and to take the answer.
+/// Longest wait for bytes of a request, and for a client to accept bytes of the answer.
 const PATIENCE: Duration = Duration::from_secs(2);
 /// Headers of every answer. Nothing is loaded from elsewhere, no page may embed this one, and the secret does not leave
 /// the address.
@@ -41,7 +41,7 @@ pub(super) enum Admitted {
     Socket(String),
 }
 
-/// A request that was not.
+/// Why a request was refused.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Refused {
     /// It cannot be read, or is too long.
@@ -91,7 +91,7 @@ impl Door {
         }
     }
 
-    /// Decides about a request: everything up to and including the empty line.
+    /// Decides about a request; `head` is everything up to and including the empty line.
     fn admit(&self, head: &[u8]) -> Result<Admitted, Refused> {
         let mut headers = [httparse::EMPTY_HEADER; MAX_HEADERS];
         let mut request = httparse::Request::new(&mut headers);
@@ -104,7 +104,7 @@ impl Door {
         }
         let header = |name: &str| {
             let mut all = request.headers.iter().filter(|header| header.name.eq_ignore_ascii_case(name));
-            // Two of a kind may mean different things to different readers.
+            // Different readers may pick different ones of two headers of the same name.
             let only = all.next().filter(|_| all.next().is_none());
             only.and_then(|header| std::str::from_utf8(header.value).ok())
         };
@@ -146,12 +146,12 @@ impl Door {
     }
 }
 
-/// Compares in a time that does not tell where the difference is.
+/// Compares in a time that does not reveal where the difference is.
 fn is_same(given: &[u8], secret: &[u8]) -> bool {
     given.len() == secret.len() && given.iter().zip(secret).fold(0, |all, (a, b)| all | (a ^ b)) == 0
 }
 
-/// Reads up to the empty line; none if that does not come within [`MAX_REQUEST`] bytes.
+/// Reads up to the empty line; `None` if that does not come within [`MAX_REQUEST`] bytes.
 fn read_head(stream: &mut TcpStream) -> std::io::Result<Option<Vec<u8>>> {
     let (mut head, mut buffer) = (Vec::new(), [0; 1024]);
     while !head.ends_with(b"\r\n\r\n") {

@@ -10,12 +10,12 @@ pub(super) struct Grip {
     pub(super) body: usize,
     /// Where on the link: 0 at its joint, 1 at its end.
     pub(super) along: f64,
-    /// Where to: along the rail and up from it (m).
+    /// Target position: along the rail and up from it (m).
     pub(super) to: [f64; 2],
 }
 
-/// The spring of a rig: a damped oscillation with the mass that it moves, for one link at 0.5 Hz: a gentle
-/// pull, because the detection takes a hard one for a broken encoder.
+/// The spring between the pointer and a rig. With the mass that it moves it forms a damped oscillator, of 0.5 Hz for
+/// one link: a gentle pull, because the fault detection would mistake a hard one for a broken encoder.
 #[derive(Debug, Clone)]
 pub(super) struct Spring {
     lengths_m: Vec<f64>,
@@ -37,15 +37,15 @@ pub(super) struct Pull {
 
 /// Angular frequency of the spring with the mass that it moves, for one link (rad/s).
 const OMEGA: f64 = 3.0;
-/// The more links, the less they stand, and the softer the spring: the frequency falls with this power of their number.
+/// More links withstand less, so the spring is softer: its frequency falls with this power of their number.
 const SOFTER: f64 = 1.2;
-/// Its damping ratio.
+/// Damping ratio of the spring.
 const ZETA: f64 = 0.35;
-/// Largest force, in weights of what it moves.
+/// Largest force, as a multiple of the weight that it moves.
 const STRONGEST: f64 = 4.0;
 /// Largest change of speed of the gripped body by the damper within a tick, as a fraction.
 const DAMPED_PER_TICK: f64 = 0.3;
-/// Acceleration of a weight (m/s²).
+/// Acceleration of gravity (m/s²).
 const GRAVITY: f64 = 9.81;
 
 impl Spring {
@@ -76,7 +76,7 @@ impl Spring {
                 rate
             })
             .collect();
-        // Of each link up to the gripped point: its arm as a vector.
+        // Length of each link up to the gripped point; 0 beyond it (m).
         let arm = |link: usize| match link + 1 {
             number if number < grip.body => self.lengths_m[link],
             number if number == grip.body => self.lengths_m[link] * grip.along.clamp(0.0, 1.0),
@@ -114,7 +114,7 @@ impl Spring {
         let size = raw[0].hypot(raw[1]);
         let strongest = STRONGEST * GRAVITY * moved_kg;
         let scale = if size > strongest { strongest / size } else { 1.0 };
-        // The rail takes what pulls the cart up.
+        // The rail takes the vertical force on the cart.
         if grip.body == 0 { [raw[0] * scale, 0.0] } else { raw.map(|component| component * scale) }
     }
 }

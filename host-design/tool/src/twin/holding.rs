@@ -10,10 +10,10 @@ use super::request::Holding;
 
 /// Speed of the hand: cart (m/s), joints (rad/s).
 const RATE: [f64; 2] = [0.5, 2.0];
-/// How far the hand moves on what the sign check asks for, before it waits for the answer: cart (m), joints (rad).
+/// Lead of the target over the held position while the sign check asks for a move: cart (m), joints (rad).
 const NUDGE: [f64; 2] = [0.3, 1.0];
 
-/// A rig in a hand.
+/// The hand, and the state in which it holds the rig.
 #[derive(Debug, Clone)]
 pub(super) struct Hand {
     how: Holding,
@@ -27,7 +27,7 @@ impl Hand {
         Self { how: Holding::Free, held: vec![0.0; states], period_s }
     }
 
-    /// What it does.
+    /// What the hand does.
     pub(super) fn how(&self) -> Holding {
         self.how
     }
@@ -41,8 +41,8 @@ impl Hand {
         self.how = how;
     }
 
-    /// Where the hand holds the rig, which is in `state`, in the next tick; none if it does not. While the motor pushes
-    /// the cart it does not, and takes hold again afterwards.
+    /// The state in which the hand holds the rig in the next tick; `None` if it does not hold it. `state` is that of
+    /// the rig now. While the motor pushes the cart, the hand lets go, and takes hold again afterwards.
     pub(super) fn tick(&mut self, status: &Status, state: &[f64]) -> Option<&[f64]> {
         if status.state == State::Driving {
             let how = std::mem::replace(&mut self.how, Holding::Free);

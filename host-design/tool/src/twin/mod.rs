@@ -1,8 +1,8 @@
 //! The live twin: a page on which the rig moves, run by the firmware itself, and on which a person can do what one
 //! would do at the bench.
 //!
-//! The firmware runs in this process, in an emulator, or on a board; the page sees the same conversation with it in
-//! frames. A simulated machine can be pulled, changed and broken as well.
+//! The firmware runs in this process, in an emulator, or on a board; the conversation with it is the same everywhere.
+//! A simulated machine can be pulled, changed and broken as well.
 //!
 //! | file | what is in it |
 //! |---|---|

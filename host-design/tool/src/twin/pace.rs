@@ -4,14 +4,15 @@ use std::time::{Duration, Instant};
 
 /// Time between two pictures.
 pub(super) const PICTURE: Duration = Duration::from_nanos(16_666_667);
-/// Longest time of simulation between two pictures; what is more is given up, and told.
+/// Longest real time for simulating between two pictures; time that is still due after it is skipped, and the page
+/// shows it.
 const BUDGET: Duration = Duration::from_millis(14);
-/// Slowest motion.
+/// Slowest speed (simulated seconds per second).
 const SLOWEST: f64 = 1.0 / 50.0;
-/// Fastest.
+/// Fastest speed (simulated seconds per second).
 const FASTEST: f64 = 10.0;
 
-/// How many ticks are due.
+/// Runs as many ticks as are due.
 #[derive(Debug)]
 pub(super) struct Pace {
     period_s: f64,
@@ -46,7 +47,7 @@ impl Pace {
         self.factor = factor.clamp(SLOWEST, FASTEST);
     }
 
-    /// Stops time, or lets it go on.
+    /// Stops simulated time, or resumes it.
     pub(super) fn pause(&mut self, is_paused: bool) {
         (self.is_paused, self.steps) = (is_paused, 0);
     }
@@ -91,7 +92,7 @@ impl Pace {
         Ok(())
     }
 
-    /// What is asked for.
+    /// The speed asked for; 1 is real time.
     pub(super) fn factor(&self) -> f64 {
         self.factor
     }

@@ -17,7 +17,7 @@ pub(super) struct Property {
     step: f64,
     /// Value of the machine as designed for.
     nominal: f64,
-    /// Whether the machine has to be built again for it.
+    /// Whether the simulated machine has to be built again after a change.
     #[serde(skip)]
     rebuilds: bool,
 }
@@ -53,7 +53,7 @@ const PROPERTIES: [Property; 12] = {
     ]
 };
 
-/// The properties of a machine, and their values of now.
+/// The properties of a machine, and their current values.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Properties {
     all: [Property; PROPERTIES.len()],
@@ -72,13 +72,13 @@ impl Properties {
         Self { values: all.map(|property| property.nominal), all }
     }
 
-    /// What there is to change.
+    /// All properties, as the page is told.
     pub(super) fn described(&self) -> &[Property] {
         &self.all
     }
 
-    /// Sets a property, within its range. Gives whether the machine has to be built again; none if there is no such
-    /// property.
+    /// Sets a property, within its range. Returns whether the machine has to be built again; `None` if there is no
+    /// such property.
     pub(super) fn set(&mut self, name: &str, value: f64) -> Option<bool> {
         let index = self.all.iter().position(|property| property.name == name)?;
         let Property { low, high, rebuilds, .. } = self.all[index];
@@ -86,7 +86,7 @@ impl Properties {
         Some(rebuilds)
     }
 
-    /// Value of a property.
+    /// Current value of a property, in its unit; 0 if there is no such property.
     pub(super) fn get(&self, name: &str) -> f64 {
         self.all.iter().position(|property| property.name == name).map_or(0.0, |index| self.values[index])
     }

@@ -6,7 +6,7 @@ use serde::Deserialize;
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 #[serde(tag = "ask", rename_all = "kebab-case", deny_unknown_fields)]
 pub(super) enum Request {
-    /// Nothing: the page is alive.
+    /// Nothing: shows that the page is alive.
     Alive,
     /// To be in command, if nobody else is.
     Command,
@@ -16,7 +16,7 @@ pub(super) enum Request {
     Say { line: String },
     /// To start or stop a recording.
     Record { on: bool },
-    /// Something with the simulated machine.
+    /// An action on the simulated machine.
     Machine { what: MachineRequest },
 }
 
@@ -36,7 +36,7 @@ pub(super) enum MachineRequest {
     Defect { name: Option<String>, sensor: usize },
     /// Speed of time: 1 is real time.
     Speed { factor: f64 },
-    /// Stops time, or lets it go on.
+    /// Stops simulated time, or resumes it.
     Pause { on: bool },
     /// Runs some ticks while time is stopped.
     Step { ticks: u32 },

@@ -20,18 +20,18 @@ use crate::campaign::{Kind, kinds};
 use crate::in_the_loop::{EmulatorError, Place, RunError};
 use crate::monitor::{Line, Monitor};
 
-/// Most connections at a time, those that still ask included.
+/// Most connections at a time, including those that have not been let in yet.
 const MAX_CONNECTIONS: usize = 32;
 /// Time between two telemetry messages if nothing limits them (s).
 const TELEMETRY_S: f32 = 0.005;
 
-/// A twin that has ended early.
+/// Why a twin has ended early.
 #[derive(Debug, thiserror::Error)]
 pub enum TwinError {
-    /// The firmware or the rig.
+    /// The firmware or the simulated rig has failed.
     #[error(transparent)]
     Run(#[from] RunError),
-    /// The listening socket.
+    /// The listening socket has failed.
     #[error("the page cannot be served: {0}")]
     Socket(#[from] std::io::Error),
 }
@@ -48,7 +48,7 @@ impl From<EmulatorError> for TwinError {
     }
 }
 
-/// A page at an address that only who started it knows.
+/// Serves a page at an address that only the person who started it knows.
 pub struct Server {
     listener: TcpListener,
     secret: String,
@@ -56,7 +56,7 @@ pub struct Server {
 }
 
 impl Server {
-    /// Listens at this address; port 0 takes a free one.
+    /// Listens at this address; port 0 picks a free one.
     ///
     /// # Errors
     /// If the address cannot be listened at.
@@ -72,15 +72,15 @@ impl Server {
     pub fn address(&self) -> std::io::Result<String> {
         let local = self.listener.local_addr()?;
         let host = match local.ip() {
-            // Every interface: the one of this machine is always among them.
+            // On every interface: the loopback interface is always among them.
             ip if ip.is_unspecified() => SocketAddr::new(IpAddr::from([127, 0, 0, 1]), local.port()),
             ip => SocketAddr::new(ip, local.port()),
         };
         Ok(format!("http://{host}/{}/", self.secret))
     }
 
-    /// Runs the firmware of `table` in `place` with the simulated rig, in real time from the first viewer on, until
-    /// `goes_on` says no. If `upright`, the rig has been raised before.
+    /// Runs the firmware of `table` in `place` with the simulated rig, in real time from the first viewer on, while
+    /// `goes_on` holds. If `upright`, the rig is raised at the start; otherwise it hangs.
     ///
     /// # Errors
     /// [`TwinError`] if the firmware cannot be started.
@@ -98,7 +98,7 @@ impl Server {
         let (viewers, inbox) = Viewers::new(greeting(rig, table, place.name(), Some(&defects)));
         let _accepting = accepting(self.listener, self.secret, viewers.clone(), Arc::clone(&self.recording))?;
         let monitor = || match place {
-            // As much as its serial line carries.
+            // Its serial line carries no more than the usual rate.
             Place::Board { .. } => Monitor::new(&rig.name),
             _ => Monitor::with_telemetry_every(TELEMETRY_S, &rig.name),
         };
@@ -124,7 +124,7 @@ impl Server {
         }
     }
 
-    /// Shows the machine behind `line`, which is that of `rig`, until `goes_on` says no.
+    /// Shows the machine behind `line`, which has to be that of `rig`, while `goes_on` holds.
     ///
     /// # Errors
     /// [`TwinError`] if the page cannot be served.
@@ -144,7 +144,7 @@ impl Server {
     }
 }
 
-/// Lets viewers in, in threads of their own, until it is dropped.
+/// Lets viewers in, each in its own thread, until it is dropped.
 struct Accepting {
     stop: Arc<AtomicBool>,
     address: SocketAddr,

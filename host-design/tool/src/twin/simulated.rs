@@ -33,7 +33,7 @@ pub(super) struct Machine<'a> {
 pub(super) enum Ended {
     /// The power is switched off and on.
     Restart {
-        /// Whether the hand raises the rig before it goes on.
+        /// Whether the rig starts raised instead of hanging.
         upright: bool,
     },
     /// The program ends.
@@ -64,7 +64,7 @@ struct World<'a, 't> {
 }
 
 impl<'a> Machine<'a> {
-    /// Runs the firmware `target` with the rig until `goes_on` says no, or the power is switched off.
+    /// Runs the firmware `target` with the rig while `goes_on` holds, or until the power is switched off.
     ///
     /// # Errors
     /// [`HarnessError`] if the firmware stops.
@@ -82,7 +82,7 @@ impl<'a> Machine<'a> {
             for request in desk.requests(world.now()) {
                 world.carry_out(request, &mut pace, desk)?;
             }
-            // Nothing happens before anyone looks.
+            // Time starts with the first viewer.
             if desk.was_seen {
                 pace.run(|| world.tick(desk))?;
             } else {
@@ -139,7 +139,7 @@ impl<'a, 't> World<'a, 't> {
             zero,
             total_kg,
             t_s: 0.0,
-            // Commands are numbered by it, and go on increasing after a restart.
+            // Commands are numbered by it, so that numbers keep growing after a restart.
             epoch: SystemTime::UNIX_EPOCH.elapsed().unwrap_or_default(),
             restart: None,
         };
@@ -152,7 +152,7 @@ impl<'a, 't> World<'a, 't> {
         self.epoch + Duration::from_secs_f64(self.t_s)
     }
 
-    /// Lets the conversation begin: a few ticks in which the rig stands still.
+    /// Begins the conversation: runs one tick per call until the first telemetry has come.
     fn greet(&mut self, desk: &mut Desk) -> Result<(), HarnessError> {
         if desk.monitor.telemetry.is_some() {
             return Ok(());
@@ -160,7 +160,7 @@ impl<'a, 't> World<'a, 't> {
         self.tick(desk)
     }
 
-    /// Builds the simulated rig again with the properties of now, in the same state.
+    /// Builds the simulated rig again with the current properties, in the same state.
     fn rebuild(&mut self) -> Result<(), HarnessError> {
         let rig = self.properties.applied_to(self.machine.rig);
         let scenario = Scenario {
@@ -221,7 +221,7 @@ impl<'a, 't> World<'a, 't> {
         self.defect = Some(defect);
     }
 
-    /// One tick of everything.
+    /// One tick of the rig, the conversation and the firmware.
     fn tick(&mut self, desk: &mut Desk) -> Result<(), HarnessError> {
         self.move_rig();
         let now = self.now();
@@ -321,7 +321,7 @@ impl<'a, 't> World<'a, 't> {
         }
     }
 
-    /// What only a simulation knows.
+    /// The part of a picture that only a simulation knows.
     fn picture(&self, pace: &Pace) -> Value {
         let is_pulled = self.pull.as_ref().zip(self.grip.as_ref());
         json!({

@@ -1,4 +1,4 @@
-//! The people who look: one connection each, one of them in command.
+//! The viewers: one connection each, one of them in command.
 
 use std::collections::BTreeMap;
 use std::io::ErrorKind;
@@ -17,7 +17,7 @@ use super::request::Request;
 pub(super) const MAX_VIEWERS: usize = 8;
 /// Longest message of a viewer (bytes).
 const MAX_MESSAGE: usize = 2048;
-/// Most messages of a viewer that wait to be looked at; who sends more is shut out.
+/// Most messages of a viewer that wait to be handled; a viewer that sends more is shut out.
 const MAX_WAITING: usize = 256;
 /// Pictures that a slow viewer may be behind; more are dropped.
 const PICTURES: usize = 8;
@@ -55,7 +55,7 @@ struct Connected {
 }
 
 impl Viewers {
-    /// Nobody, and what they will do. `greeting` is what every viewer is told first.
+    /// No viewers yet, and the inbox for their events. `greeting` is what every viewer is told first.
     pub(super) fn new(greeting: Value) -> (Self, Inbox) {
         let (events, receiver) = channel();
         let waiting = Arc::default();
@@ -66,7 +66,7 @@ impl Viewers {
     }
 
     fn locked(&self) -> std::sync::MutexGuard<'_, Connected> {
-        // What is inside is whole after every statement.
+        // The content is consistent after every statement, so a panic elsewhere does not matter.
         self.connected.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
@@ -75,7 +75,7 @@ impl Viewers {
         self.locked().outlets.len() < MAX_VIEWERS
     }
 
-    /// Whether nobody looks.
+    /// Whether no viewer is connected.
     pub(super) fn is_empty(&self) -> bool {
         self.locked().outlets.is_empty()
     }
@@ -83,7 +83,7 @@ impl Viewers {
     /// Sends to one viewer.
     pub(super) fn tell(&self, viewer: Id, text: &str) {
         if let Some(outlet) = self.locked().outlets.get(&viewer) {
-            // A viewer that is so far behind misses it.
+            // A viewer whose queue is full misses it.
             let _ = outlet.try_send(Utf8Bytes::from(text));
         }
     }
@@ -107,7 +107,7 @@ impl Viewers {
             let id = connected.next;
             connected.next += 1;
             let hello = json!({ "hello": *self.greeting, "you": id }).to_string();
-            // A page can make nothing of a picture that comes before it. There is room: nothing else is sent yet.
+            // It has to come before any picture. The queue has room: nothing else has been sent yet.
             let _ = outlet.try_send(Utf8Bytes::from(hello));
             connected.outlets.insert(id, outlet);
             (id, connected.events.clone(), Arc::clone(&connected.waiting))

@@ -106,7 +106,8 @@ impl Person<'_, '_> {
         }
     }
 
-    /// Holds the key for so long; gives the number of ticks with the motor on, and how far the cart has moved (m).
+    /// Holds the key for `held_ticks`; returns the number of ticks with the motor on, and how far the cart has moved
+    /// (m).
     fn push(&mut self, request: Request, held_ticks: u32) -> (u32, f64) {
         let from = self.harness.bench.state()[0];
         let (mut on, mut moved) = (0, 0.0);
@@ -120,7 +121,7 @@ impl Person<'_, '_> {
         (on, moved)
     }
 
-    /// Waits until the last telemetry is that of now, and the rig has been still for long enough.
+    /// Waits until the last telemetry is current, and the rig has been still for long enough.
     fn settle(&mut self) -> (State, MotorSign, Option<Fault>) {
         self.wait(150);
         let status = self.harness.session.status();
@@ -128,7 +129,7 @@ impl Person<'_, '_> {
     }
 }
 
-/// Homed and with checked signs, the links hanging: then `test`. Gives all telemetry.
+/// Runs `test` on a rig that is homed, with signs checked and links hanging. Returns all telemetry.
 fn at_the_bench(place: Place<'_>, test: impl FnOnce(&mut Person<'_, '_>)) -> Vec<AnyTelemetry> {
     let (rig, table) = rig_and_table("quadruple-paper");
     let scenario = Scenario::at_rest(rig, Law::Lqr);
@@ -155,11 +156,11 @@ fn at_the_bench(place: Place<'_>, test: impl FnOnce(&mut Person<'_, '_>)) -> Vec
     run.unwrap()
 }
 
-/// All that the drive has to show, one thing after the other.
+/// Every property of the bench drive, one after the other.
 fn whole_check(person: &mut Person<'_, '_>) {
     assert!(person.reasons(Request::Arm).contains(Inhibits::MOTOR.union(Inhibits::TILTED)));
 
-    // The key is pressed once: off after the silence.
+    // The key is pressed once: the motor goes off after the silence.
     let (on, _) = person.push(ALONG, 1);
     assert_eq!(on, SILENCE_TICKS - 1);
     assert_eq!(person.settle(), (State::Calibrated, MotorSign::Unchecked, None));
@@ -200,7 +201,7 @@ fn whole_check(person: &mut Person<'_, '_>) {
 fn on_the_host_the_motor_moves_the_cart_a_little_while_a_key_is_held() {
     let telemetry = at_the_bench(Place::Host, whole_check);
     let driving = telemetry.iter().filter(|telemetry| telemetry.state == State::Driving);
-    // Never with more than a tenth of the largest force of 20 N, and up to that.
+    // Never with more than a tenth of the force limit of 20 N, and up to it.
     let most = driving.map(|telemetry| telemetry.applied_n.abs()).fold(0.0, f32::max);
     assert_eq!(most, 2.0);
 }
@@ -254,7 +255,7 @@ fn every_contact_ends_it_at_once() {
             assert_eq!(person.ask(Request::Clear), Answer::Done);
             person.settle();
         }
-        // Disarming, too, and the host's silence is no fault.
+        // Disarming ends it, too, and silence of the host is no fault.
         person.tick(Some(ALONG));
         person.wait(30);
         assert_eq!(person.ask(Request::Disarm), Answer::Done);
@@ -279,7 +280,7 @@ fn it_is_refused_when_links_swing_and_at_an_end_of_the_rail() {
             person.wait(20);
         }
         assert_eq!(person.reasons(ALONG), Inhibits::MOVING);
-        // The key is still held, and does not begin it later.
+        // The key is still held, and does not start the drive later.
         person.wait(80);
         assert_eq!(person.reasons(ALONG), Inhibits::HELD);
         person.settle();
@@ -299,9 +300,9 @@ fn it_is_refused_when_links_swing_and_at_an_end_of_the_rail() {
         assert_eq!(person.reasons(ALONG), Inhibits::LIMIT_SWITCH);
         person.contacts.limit_low = false;
         person.settle();
-        // Negative control: nothing speaks against it.
+        // Negative control: no reason against it is left.
         assert_eq!(person.ask(ALONG), Answer::Done);
-        // The other key does not keep it going, and does not turn it round.
+        // The other key neither keeps it going nor reverses it.
         assert_eq!(person.reasons(AGAINST), Inhibits::RUNNING);
     });
 }

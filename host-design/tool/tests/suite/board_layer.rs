@@ -1,4 +1,4 @@
-//! What the flashed image does with hardware that is not as it has to be, on the virtual board.
+//! How the flashed image reacts to hardware that is not as it should be, on the virtual board.
 
 use std::ops::Range;
 
@@ -50,8 +50,8 @@ impl Powered {
         Self::with(image, conditions, Rules::STRICT)
     }
 
-    /// Runs to this time after power-on, and reads what the board sends at its baud rate: a byte with another length
-    /// of its bits cannot be read.
+    /// Runs to this time after power-on, and reads what the board sends. Checks the baud rate: a byte with another bit
+    /// time could not be read.
     fn run(&mut self, time_s: f64) {
         self.board.run_until(seconds(time_s)).unwrap();
         for byte in self.board.sent() {
@@ -100,7 +100,8 @@ fn nothing_in_the_image_breaks_a_rule_of_the_manuals() {
     }
 }
 
-/// A write that comes too early after the clock is lost; here every single one of the motor's timer.
+/// A register write that follows too soon on enabling the clock is lost; here, each write to the motor's timer in
+/// turn.
 #[test]
 fn a_lost_write_to_the_motors_timer_keeps_the_motor_off() {
     let Some(image) = image() else { return };
@@ -172,12 +173,12 @@ fn another_chip_is_noticed() {
     assert_eq!(run.last(), (State::Fault, Some(Fault::Board)));
 }
 
-/// Where the table's first gain is in flash, among the initial values of variables.
+/// Address of the table's first gain in flash, among the initial values of variables.
 fn first_gain(board: &VirtualBoard) -> u32 {
     gain_within(board, 0x0800_0000..0x0801_0000)
 }
 
-/// Where the first gain is that the image uses, in RAM.
+/// Address in RAM of the first gain that the image uses.
 fn first_gain_in_use(board: &VirtualBoard) -> u32 {
     gain_within(board, 0x2000_1400..0x2000_3000)
 }
@@ -205,7 +206,7 @@ fn a_damaged_table_is_told_and_cannot_be_cleared() {
     stop_the_crystal(&mut run);
 }
 
-/// The image uses a copy of the table in RAM, and checks that again and again; flash is read at the next start.
+/// The image uses a copy of the table in RAM, and checks it over and over; flash is only read at the next start.
 #[test]
 fn a_flipped_bit_of_the_table_is_found_in_ram_within_two_passes_and_in_flash_at_the_next_start() {
     let Some(image) = image() else { return };
@@ -236,7 +237,7 @@ fn stop_the_crystal(run: &mut Powered) {
     assert_eq!(run.board.resets(), 1);
 }
 
-/// At the earliest moment: the values of the watchdog must have arrived before its first tick.
+/// The crystal stops at the earliest moment: the watchdog's settings must be in effect before the first tick.
 #[test]
 fn the_watchdog_resets_in_time_from_the_first_tick_on() {
     let Some(image) = image() else { return };
@@ -262,7 +263,7 @@ fn a_low_supply_of_the_chip_is_noticed_however_short_it_is() {
     assert_eq!(run.last(), (State::Fault, Some(Fault::Board)));
 }
 
-/// A debugger resets the chip, after power-on and after a crash that was reported: only a new crash is one.
+/// A debugger resets the chip twice: neither reset is reported as a crash.
 #[test]
 fn a_debuggers_reset_is_no_crash() {
     let Some(image) = image() else { return };
@@ -285,7 +286,7 @@ fn a_debuggers_reset_is_no_crash() {
     assert_eq!(info.reset, Reset::Power);
 }
 
-/// What the motor's supply of 24 V is read as (V), by a chip that runs from this voltage.
+/// The board's reading of the motor's supply of 24 V (V), under these conditions.
 fn supply_read(image: &Image, conditions: &Conditions) -> f32 {
     let mut run = Powered::strict(image, conditions);
     run.run(0.05);
@@ -300,7 +301,7 @@ fn the_reading_of_the_supply_does_not_depend_on_the_chips_own() {
         let read = supply_read(&image, &Conditions { chip_v, ..Conditions::f405(1) });
         assert!((read - 24.0).abs() < 0.15, "{read} V from {chip_v} V");
     }
-    // Negative control: a chip without the factory's reading is taken for one that runs from the board's 3.3 V.
+    // Negative control: a chip without the factory's calibration is taken for one that runs from the board's 3.3 V.
     let uncalibrated = Conditions { is_calibrated: false, chip_v: 3.0, ..Conditions::f405(1) };
     let read = supply_read(&image, &uncalibrated);
     assert!((read - 24.0 * 1.1).abs() < 0.15, "{read} V");
@@ -321,7 +322,7 @@ fn a_pin_shows_the_tick() {
     assert!((0.005..0.05).contains(&share), "{share}");
 }
 
-/// Those with as many encoders as the rig of src/gains.rs has; for the others see `virtual_board.rs`.
+/// The boards that count as many encoders as the rig of src/gains.rs has; for the others see `virtual_board.rs`.
 #[test]
 fn every_board_starts_with_its_own_chip_clock_and_led_and_with_no_other() {
     for (board, led, is_low) in [
@@ -369,7 +370,7 @@ fn contacts_supply_and_the_longest_tick_are_told_with_the_motor_off() {
         (pin('C', 1), Contacts { limit_high: true, ..Contacts::default() }),
         (pin('B', 12), Contacts { emergency_stop: true, ..Contacts::default() }),
     ] {
-        // An open wire: the pull-up inside pulls it high.
+        // An open wire: the internal pull-up pulls it high.
         run.board.apply(Input::Level(wire, Wire::Open));
         run.run(run.seconds() + 0.05);
         assert_eq!(run.telemetry.last().unwrap().contacts, expected);
@@ -388,7 +389,7 @@ fn contacts_supply_and_the_longest_tick_are_told_with_the_motor_off() {
     assert!(run.telemetry.last().unwrap().worst_cycles >= worst);
 }
 
-/// What the monitor says of a board from now on, for so long (s).
+/// A monitor that has watched the board for `time_s` (s) from now on.
 fn monitored(run: &mut Powered, time_s: f64) -> Monitor {
     let mut monitor = Monitor::new("the virtual board");
     let end = run.seconds() + time_s;
@@ -407,7 +408,8 @@ fn monitored(run: &mut Powered, time_s: f64) -> Monitor {
     monitor
 }
 
-/// The pointers to the gain table that the firmware keeps in RAM lose a bit: the next tick reads where nothing is.
+/// A bit flips in the pointers to the gain table that the firmware keeps in RAM: the next tick reads an address
+/// without memory.
 #[test]
 fn a_crash_is_recorded_over_the_reset_and_shown_by_the_monitor() {
     let Some(image) = image() else { return };

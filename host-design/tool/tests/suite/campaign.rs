@@ -43,7 +43,7 @@ fn without_detection_every_defect_that_needs_it_is_missed() {
     }
 }
 
-/// The kinds that prove something in a bench drive.
+/// The kinds of defects that prove something during a bench drive.
 fn while_driving(table: &TableValues, place: Place<'_>) -> Vec<Kind> {
     kinds(table, place).into_iter().filter(|kind| kind.while_driving().is_some()).collect()
 }

@@ -16,8 +16,8 @@ fn plan<'a>(rig: &'a Rig, table: &'a TableValues, text: &'a str) -> Plan<'a> {
     Plan { rig, table, file: Path::new("rig.toml"), text, seconds: 8.0, seed: 1 }
 }
 
-/// Does these steps with the machine of a rig, whose firmware has `table`; gives the step that was not passed, and
-/// why.
+/// Does these steps with the simulated machine of a rig, whose firmware has `table`; returns the step that was not
+/// passed, and why.
 fn stopped(
     name: &'static str,
     table: &TableValues,
@@ -60,7 +60,7 @@ fn every_planted_defect_is_found_in_its_step() {
     }
 }
 
-/// The table without the firmware's own check of a step.
+/// The table with limits that disable the firmware's own check of a step.
 fn blind(table: &TableValues, step: Step) -> TableValues {
     let mut table = table.clone();
     let limits = &mut table.limits;

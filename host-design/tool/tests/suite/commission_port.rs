@@ -1,4 +1,4 @@
-//! The first steps with a machine behind a port: its firmware answers over TCP, and lines that a person types.
+//! The first steps with a machine behind a port: its firmware answers over TCP, and a person types lines.
 
 use std::io::{Read, Write};
 use std::net::TcpListener;
@@ -19,10 +19,11 @@ use upright_tool::monitor::Line;
 
 use crate::command::{SINGLE, path_of};
 
-/// Real time for each of its ticks of 2 ms.
+/// Real time for each of the machine's ticks of 2 ms.
 const TICK: Duration = Duration::from_micros(200);
 
-/// The machine of the file behind a TCP port, whose hand does what comes through `tasks`; some times as fast as real.
+/// Serves the simulated machine of the file at a TCP port, faster than real time; its hand does what comes through
+/// `tasks`.
 fn serve(
     listener: &TcpListener,
     rig: &Rig,
@@ -58,7 +59,7 @@ fn serve(
     .unwrap();
 }
 
-/// The port, and the hand at the machine behind it, which hears what the person is asked.
+/// The port, and the simulated hand at the machine behind it, which gets every task that the person is asked to do.
 struct Heard {
     port: AtPort,
     hand: Sender<Task>,
@@ -87,7 +88,7 @@ impl Machine for Heard {
     }
 }
 
-/// Does the first steps with a person who types `answers`, one each time when asked; gives how it ended, and the
+/// Does the first steps with a person who types `answers`, one each time when asked; returns how it ended, and the
 /// steps.
 fn commissioned(
     planted: Option<Planted>,

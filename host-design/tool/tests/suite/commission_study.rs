@@ -39,7 +39,7 @@ fn machine(rig: &Rig, number: u8) -> Rig {
     machine
 }
 
-/// Whether the machine balances for 10 s, from the whole firmware with the gains of `file`.
+/// Whether the machine balances for 10 s with the whole firmware and the gains of `file`.
 fn stands(machine: &Rig, file: &Rig) -> bool {
     let Ok(certified) = design(file) else { return false };
     let table = TableValues::of(file, &certified, Gains::Sampled).unwrap();
@@ -64,7 +64,7 @@ fn with_weights_of(file: &Rig, chosen: &Rig) -> Rig {
     }
 }
 
-/// Commissions machine number `number`; gives whether it balances with the identified file, with the true parameters
+/// Commissions machine number `number`; returns whether it balances with the identified file, with the true parameters
 /// and with the original ones, all with the weights that were chosen for it, and with the original file as it was.
 fn one(name: &str, number: u8) -> [bool; 4] {
     let path = path_of(name);

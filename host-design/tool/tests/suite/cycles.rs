@@ -18,8 +18,8 @@ const GOAL_JITTER_US: f64 = 1.0;
 /// The goal for the controller alone.
 const GOAL_CONTROLLER_CYCLES: u32 = 900;
 
-/// The largest values, 10 % above those with Rust 1.96: from the tick to the output, the whole task in any state, the
-/// difference of the latency between any two ticks (µs), and the controller alone.
+/// Limits of the largest values, 10 % above those measured with Rust 1.96: from the tick to the output, the whole task
+/// in any state, the difference of the latency between any two ticks (µs), and the controller alone.
 const LATENCY_US: f64 = 24.6;
 const TASK_US: f64 = 31.5;
 const JITTER_US: f64 = 15.8;
@@ -51,8 +51,8 @@ fn beyond(cycles: &Cycles) -> Vec<&'static str> {
     all.into_iter().filter(|(_, is_beyond)| *is_beyond).map(|(name, _)| name).collect()
 }
 
-/// The image with a wait before each tick, about 400 cycles for each of `turns`: SysTick's vector leads to a loop
-/// behind the image. It divides, which takes many cycles and the host little time.
+/// The image with a delay before each tick, about 400 cycles for each of `turns`: SysTick's vector points to a loop
+/// placed after the image. The loop divides, which takes many cycles but costs the host little time.
 fn slower(image: &Image, turns: u8) -> Image {
     const SYS_TICK: u32 = 0x0800_0000 + 4 * 15;
     const DIVIDE: [u16; 2] = [0xfbb1, 0xf3f2]; // udiv r3, r1, r2

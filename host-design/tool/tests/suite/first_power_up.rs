@@ -21,7 +21,7 @@ use upright_tool::monitor::{Monitor, action, view};
 
 use crate::published::rig_and_table;
 
-/// What the motor's force is multiplied with: 0 without the motor, -1 with its wires swapped.
+/// Factor on the motor's force: 0 without the motor, -1 with its wires swapped.
 type Motor = f32;
 
 /// A person with the monitor, at a rig that is held by hand while the motor is off.
@@ -80,7 +80,7 @@ impl Person<'_> {
         self.monitor.act(action(&key).unwrap(), self.now());
     }
 
-    /// Holds a key, which the terminal repeats every 30 ms; gives the number of ticks with the motor on.
+    /// Holds a key, which the terminal repeats every 30 ms; returns the number of ticks with the motor on.
     fn hold(&mut self, key: char, seconds: f64) -> u32 {
         let mut on = 0;
         for tick in 0..(seconds * 1e3) as u32 {

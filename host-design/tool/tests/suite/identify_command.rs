@@ -38,7 +38,7 @@ fn a_shaken_machine_gives_a_rig_file() {
         panic!("a chain")
     };
     assert_eq!(rig.name, SINGLE);
-    // The pendulum's own length, J/a, is 8 % longer; it does not depend on the scale of the force.
+    // The length of the equivalent simple pendulum, J/a, is 8 % longer; it does not depend on the scale of the force.
     let length = |link: &upright_design::rig::Link| {
         let (mass, centre) = (link.mass_kg, link.centre_of_mass_m.unwrap_or(link.length_m / 2.0));
         let inertia = link.inertia_kg_m2.unwrap_or(mass * link.length_m * link.length_m / 12.0);
@@ -62,7 +62,8 @@ fn a_shaken_machine_gives_a_rig_file() {
     assert!(bytes.starts_with(b"\x89MCAP0\r\n") && bytes.ends_with(b"\x89MCAP0\r\n"));
 }
 
-/// Identifies the bytes of `log`: the exit status is `wanted`, stderr says `words`, and no rig file is written.
+/// Asserts that, for a log of these bytes, the exit status is `wanted`, stderr says `words`, and no rig file is
+/// written.
 fn refused(rig: &str, log: &[u8], wanted: i32, words: &str) {
     let folder = tempfile::tempdir().unwrap();
     let [file, new] = ["run.log", "new.toml"].map(|name| folder.path().join(name));

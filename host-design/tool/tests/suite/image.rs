@@ -33,7 +33,7 @@ fn upright_alone(arguments: &[&str]) -> Output {
 #[test]
 fn an_image_waits_for_the_one_that_is_being_compiled() {
     let Some(path) = path_in_the_loop() else { return };
-    // Several times as long as for an image that does not wait, which has been compiled before.
+    // Several times as long as for an image that does not wait and has been compiled before.
     let begin = Instant::now();
     build_if_possible(Kind::InTheLoop).unwrap();
     let patience = (4 * begin.elapsed()).min(Duration::from_secs(3));

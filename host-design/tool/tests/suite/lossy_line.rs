@@ -41,7 +41,7 @@ impl Direction {
     }
 }
 
-/// Runs the firmware with its links hanging and a monitor for so long (ms); `each` is called before each tick.
+/// Runs the firmware, with its links hanging, and a monitor for `duration_ms`; `each` is called before each tick.
 fn talk(
     percent_lost: u64,
     duration_ms: u64,
@@ -89,7 +89,7 @@ fn every_command_is_answered_over_a_line_that_loses_a_third_of_the_frames() {
     let laws = |number: u64| if number.is_multiple_of(2) { Law::PolePlacement } else { Law::Lqr };
     for percent_lost in [0, 33] {
         let monitor = talk(percent_lost, 10_500, |ms, now, monitor, _| {
-            // 20 commands, 500 ms apart; each has done what it says before the next.
+            // 20 commands, 500 ms apart; each has taken effect before the next.
             if ms % 500 == 0 && ms > 0 {
                 let number = ms / 500;
                 if number > 1 {
@@ -133,7 +133,7 @@ fn a_line_that_is_cut_is_told_and_only_disarming_waits_for_it() {
             _ => {}
         }
     });
-    // Nothing that was asked for before comes after it.
+    // Nothing that was asked for earlier takes effect after the disarming.
     assert_eq!(monitor.telemetry.as_ref().map(|told| told.state), Some(State::Disarmed));
     assert_eq!(lines(&monitor, "home").filter(|line| line.ends_with("done")).count(), 1);
 }

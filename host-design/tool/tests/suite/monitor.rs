@@ -107,7 +107,7 @@ fn screen(monitor: &Monitor) -> String {
     rows.map(|row| row.iter().map(|cell| cell.symbol()).collect::<String>() + "\n").collect()
 }
 
-/// Answers whatever is asked, until nothing more is.
+/// Answers every request, until none is left.
 fn answer_all(monitor: &mut Monitor) {
     loop {
         let all = asked(monitor);
@@ -194,7 +194,7 @@ fn active_contacts_and_the_last_crash_are_shown() {
     let contacts = Contacts { limit_low: true, driver_fault: true, ..Contacts::default() };
     told(&mut monitor, Telemetry { contacts, ..telemetry(1, State::Disarmed, None) });
     assert!(screen(&monitor).contains("active inputs: limit switch low, driver fault"));
-    // Negative control: nothing is said of a crash before the firmware has.
+    // Negative control: no crash is shown before the firmware has reported one.
     assert!(!screen(&monitor).contains("PC"));
     let question = loop {
         let [command] = asked(&mut monitor)[..] else { panic!("one at a time") };
@@ -210,7 +210,7 @@ fn active_contacts_and_the_last_crash_are_shown() {
     assert!(screen(&monitor).contains(line) && monitor.log.iter().any(|said| said == line));
 }
 
-/// A crash resets the firmware while the monitor looks on: it asks again.
+/// A crash resets the firmware while the monitor is connected: the monitor asks again.
 #[test]
 fn a_firmware_that_starts_again_is_asked_for_its_crash() {
     let mut monitor = met(PROTOCOL);
@@ -241,7 +241,7 @@ fn every_key_gives_its_command() {
     ] {
         assert_eq!(press(&mut monitor, key), [request], "{key:?}");
     }
-    // The links hang: the second one shall stand, and the others hang on.
+    // The links hang: the second one is to stand, and the others keep hanging.
     assert_eq!(press(&mut monitor, KeyCode::Char('2')), [Request::Goto(Equilibrium::of_bits(0b1101))]);
     assert!(press(&mut monitor, KeyCode::Char('6')).is_empty(), "there is no sixth link");
     assert!(press(&mut monitor, KeyCode::Char('q')).is_empty());
@@ -314,7 +314,7 @@ fn a_closed_connection_is_shown() {
 fn monitored(said: &str) -> Vec<Value> {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../rigs/single-quanser-ip02.toml");
     let mut rig = Rig::from_path(&path).unwrap();
-    // In real time, beside other tests: the monitor may be late by more than the rig's own 0.1 s.
+    // The test runs in real time, beside other tests: the monitor may be late by more than the rig's own 0.1 s.
     rig.limits.link_timeout_s = 2.0;
     let table = TableValues::of(&rig, &design(&rig).unwrap(), Gains::Sampled).unwrap();
     let listener = TcpListener::bind("127.0.0.1:0").unwrap();
@@ -343,7 +343,7 @@ fn monitored(said: &str) -> Vec<Value> {
 
 #[test]
 fn a_set_point_from_the_monitor_moves_the_firmware_and_holds_it() {
-    // Negative control: without a request, nobody moves it. Both in real time, so at the same time.
+    // Negative control: without a request, nothing moves it. Both take real time, so they run at the same time.
     let control = std::thread::spawn(|| monitored(""));
     let moved = monitored("set-point 0.05\n");
     let still = control.join().unwrap();

@@ -177,7 +177,7 @@ fn integral_action_of_a_scalar_plant_is_the_closed_form_correctly_rounded() {
     }
 }
 
-/// The LQR alone, with integral action and without observer: neither of the others depends on it.
+/// The LQR with integral action, without pole placement and observer, which do not depend on it.
 fn with_weight(name: &str, position_weight: f64, delay_ticks: u8) -> Rig {
     let integral = Some(Integral { position_weight, setpoint_weight: 1.0 });
     let mut rig = Rig { integral, pole_placement: None, kalman: None, ..rig(name) };

@@ -15,7 +15,7 @@ const TELEPHONE: u32 = 390;
 const GEOMETRY: &str =
     "[...document.querySelectorAll('.stage line, .stage circle')].map((e) => e.outerHTML).join()";
 const CURSORS: &str = "[...document.querySelectorAll('.cursor')].map((line) => line.getAttribute('x1'))";
-/// Frames in which an animation that runs has moved on.
+/// Waits for some frames, in which a running animation moves on.
 const WAIT: &str = "new Promise((done) => { let frames = 12; \
                     const next = () => { frames -= 1; frames ? requestAnimationFrame(next) : done(); }; next(); })";
 
@@ -26,7 +26,7 @@ fn require(faults: &mut Vec<String>, holds: bool, fault: &str) {
     }
 }
 
-/// What a page is looked at on.
+/// Medium on which a page is shown.
 #[derive(Debug, Clone, Copy)]
 enum Medium {
     Screen,

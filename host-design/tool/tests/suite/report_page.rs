@@ -23,7 +23,8 @@ fn chain(links: usize, name: &str) -> Rig {
     Rig::from_toml(&text, Path::new("test.toml")).unwrap()
 }
 
-/// The most that a page with coarse maps would have with fine ones: a rectangle of 200 bytes for each start.
+/// Largest size (bytes) that a page with coarse maps would have with fine ones: a rectangle of 200 bytes for each
+/// initial state.
 fn with_fine_maps(report: &Report) -> usize {
     let maps = report.pictures.iter().filter(|picture| picture.name.starts_with("region-")).count();
     report.html.len() + maps * REGION_POINTS * REGION_POINTS * 200
@@ -138,7 +139,7 @@ fn margins_have_a_figure_where_they_are_asked_for() {
     let csv = picture.csv.as_ref().unwrap();
     println!("{csv}");
     assert!(csv.contains("raising: push against") && csv.contains("raising: push along"), "{csv}");
-    // A push that is not stood at all has no place on a logarithmic axis.
+    // A margin of 0 cannot be shown on a logarithmic axis.
     assert!(csv.lines().filter(|line| line.contains(",link 1,")).count() >= 3, "{csv}");
 }
 
@@ -165,7 +166,7 @@ fn imperfections_have_a_table_and_two_figures_where_they_are_asked_for() {
                 rows.map(|line| line.split(',').skip(3).take(2).map(|x| x.parse().unwrap()).collect());
             numbers.collect::<Vec<Vec<f64>>>()
         };
-        // More friction makes a larger limit cycle; no mass error at all is stood.
+        // More friction makes a larger limit cycle; without mass errors, every combination stands.
         let cycle = csv("limit-cycle");
         assert!(cycle.len() >= 5 && cycle[cycle.len() - 1][1] > 2.0 * cycle[0][1], "{name} {cycle:?}");
         assert_eq!(csv("wrong-masses")[0], [0.0, 100.0], "{name}");

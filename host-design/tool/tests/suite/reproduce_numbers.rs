@@ -410,7 +410,7 @@ fn the_committed_summary_is_what_comes_out() {
     let file = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs/reproduction.md");
     let (committed, found) = (std::fs::read_to_string(file).unwrap(), ALL.summary());
     for (line, (committed, found)) in committed.lines().zip(found.lines()).enumerate() {
-        assert_eq!(committed, found, "docs/reproduction.md:{}: made anew by `upright reproduce`?", line + 1);
+        assert_eq!(committed, found, "docs/reproduction.md:{}: run `upright reproduce` again?", line + 1);
     }
     assert_eq!(committed.lines().count(), found.lines().count());
 }

@@ -81,7 +81,7 @@ fn the_log_of_the_firmware_gives_the_parameters_of_the_machine() {
 
 #[test]
 fn the_image_in_qemu_logs_the_ticks_of_the_host() {
-    // With its motions, as raised and lowered in QEMU: one image for both.
+    // With its motions, so that this test and the swing-up in QEMU share one image.
     let (machine, table) = rig_and_table("single-quanser-ip02").clone();
     let table = with_motions(&machine, table, stored_motions("single-quanser-ip02"), &[]).unwrap();
     let Some(image) = if_possible(build_for(Kind::InTheLoop, &machine, &table)).unwrap() else { return };
@@ -96,16 +96,17 @@ fn the_image_in_qemu_logs_the_ticks_of_the_host() {
     assert!(qemu != log(2, Place::Host));
 }
 
-/// What goes wrong: in what the firmware reads, with what it read before the defect and the ticks since then; and in
-/// what drives the cart.
+/// A defect of the inputs: changes what the firmware reads, given its inputs before the defect and the ticks since
+/// then.
 type Pinned = fn(&mut Pins, &Pins, u32);
+/// A defect of the motor: what drives the cart instead of the firmware's command.
 type Driven = fn(Drive) -> Drive;
 
 const AS_IT_IS: Driven = |drive| drive;
 const STUCK: Driven = |_| Drive::Duty(1.0);
 
-/// Shakes the double pendulum for 2.5 s, then with a defect. Gives the fault, the ticks from the defect to
-/// motor off, how far the cart was out then (m), and whether the motor came on again.
+/// Shakes the double pendulum for 2.5 s, then with a defect. Returns the fault, the ticks from the defect to motor
+/// off, the position of the cart then (m), and whether the motor came on again.
 fn defective(pins: Pinned, motor: Driven) -> (Option<Fault>, u32, f64, bool) {
     let run = with_firmware(&double().1, |target| {
         let mut shaken = shaken(target);
@@ -199,7 +200,7 @@ fn a_silent_host_and_the_stop_key_end_it() {
             }
             let mut on = 0;
             for _ in 0..6_000 {
-                // Nothing more is fed.
+                // No more forces are sent.
                 let inputs = shaken.harness.inputs();
                 let output = shaken.harness.session.tick(&inputs).unwrap();
                 shaken.harness.bench.tick(if output.enable { output.drive } else { Drive::Force(0.0) });
@@ -242,7 +243,7 @@ fn the_log_of_four_links_fits_the_line() {
 }
 
 /// The double pendulum, ready to be shaken, and a host at the other end of its line, which loses the bytes of the ticks
-/// for which `is_lost` holds. Gives the log, and the ticks with the motor on after the host has ended.
+/// for which `is_lost` holds. Returns the log, and the ticks with the motor on after the host has ended.
 fn over_line(host: &(Rig, TableValues), is_lost: fn(u32) -> bool) -> (Result<Log, LineError>, u32) {
     let (machine, table) = double();
     with_firmware(table, |target| {

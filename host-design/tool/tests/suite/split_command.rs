@@ -23,7 +23,7 @@ impl Split {
         upright(&arguments)
     }
 
-    /// Makes shard `number` of `of`; gives its file.
+    /// Runs shard `number` of `of`; returns its file.
     fn shard(&self, number: usize, of: usize) -> PathBuf {
         let output = self.with(&["--shard", &format!("{number}/{of}")]);
         assert_eq!(status(&output), 0, "{}", stderr(&output));

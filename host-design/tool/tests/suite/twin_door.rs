@@ -55,7 +55,7 @@ fn ask(socket: &mut Socket, request: &Value) {
     socket.send(Message::text(request.to_string())).unwrap();
 }
 
-/// Reads until `holds` for a message, and stays alive meanwhile; panics after ten seconds.
+/// Reads until `holds` for a message; if `alive`, tells the server so at each message. Panics after 20 seconds.
 fn read_until(socket: &mut Socket, alive: bool, holds: impl Fn(&Value) -> bool) -> Value {
     let begin = Instant::now();
     loop {
@@ -151,7 +151,7 @@ fn garbage_and_floods_end_the_connection_and_nothing_else() {
     read_until(&mut first, true, balancing);
 }
 
-/// Time until the motor is off, as a second page sees it, when `leave` has done with the first page what it does.
+/// Time from `leave`, which takes the page in command away or silences it, until a second page sees the motor off.
 fn time_to_off(leave: impl FnOnce(Socket) -> Option<Socket>) -> Duration {
     let twin = Twin::start("single-quanser-ip02", &[]);
     let mut commands = page(&twin);
@@ -171,7 +171,7 @@ fn the_motor_is_turned_off_when_the_page_in_command_is_closed_or_sleeps() {
         let closed = scope.spawn(|| time_to_off(|_| None));
         // A computer that sleeps keeps its connection and says nothing.
         let sleeping = scope.spawn(|| time_to_off(Some));
-        // The check can fail: with a page that is alive, the motor stays on for longer than that.
+        // Negative control: with a page that is alive, the motor stays on for longer than that.
         let twin = Twin::start("single-quanser-ip02", &[]);
         let mut alive = page(&twin);
         read_until(&mut alive, true, balancing);

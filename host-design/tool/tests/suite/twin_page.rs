@@ -18,7 +18,7 @@ use crate::report_devtools::Browser;
 
 const TELEPHONE: u32 = 390;
 const STATE: &str = "document.getElementById('state').dataset.state ?? ''";
-/// The fastest that the page offers.
+/// Fastest speed that the page offers (simulated seconds per second).
 const FASTEST: f64 = 10.0;
 const MACHINE: &str = "upright.seen.picture.machine";
 
@@ -52,7 +52,7 @@ impl Drop for Twin {
     }
 }
 
-/// A browser; none if there is none and none is required.
+/// A browser; `None` if this machine has none and none is required.
 fn browser() -> Option<Browser> {
     let browser = Browser::start();
     if browser.is_none() {
@@ -72,7 +72,7 @@ fn wait(seconds: f64) {
     std::thread::sleep(Duration::from_secs_f64(seconds));
 }
 
-/// Waits for so long at the most (s) until an expression is true; gives whether it is.
+/// Waits for at most `seconds` until an expression is true; returns whether it is.
 fn comes_within(browser: &mut Browser, seconds: f64, expression: &str) -> bool {
     let begin = Instant::now();
     while browser.value(&format!("Boolean({expression})")) != true {
@@ -90,7 +90,7 @@ fn until(browser: &mut Browser, expression: &str) {
     assert!(is_there, "never: {expression}; state {}", browser.value(STATE));
 }
 
-/// From now on, time of the rig goes so many times as fast as real time.
+/// From now on, simulated time runs `factor` times as fast as real time.
 fn set_speed(browser: &mut Browser, factor: f64) {
     browser.value(&format!(
         "{{ const speed = document.getElementById('speed'); speed.value = '{factor}'; \
@@ -99,7 +99,7 @@ fn set_speed(browser: &mut Browser, factor: f64) {
     until(browser, &format!("{MACHINE}.factor === {factor}"));
 }
 
-/// Waits until so much time of the rig has passed.
+/// Waits until `seconds` of simulated time have passed.
 fn let_pass(browser: &mut Browser, seconds: f64) {
     let begin = browser.value(&format!("{MACHINE}.t_s")).as_f64().unwrap();
     until(browser, &format!("{MACHINE}.t_s > {}", begin + seconds));
@@ -298,7 +298,7 @@ fn a_minute_of_running_needs_no_more_memory() {
     let (rate, work_ms) = (frames / seconds, 1e3 * (browser.worked_s() - worked_s) / frames);
     let (after, grown) = (browser.heap(), resident_kib(&twin) as f64 / resident as f64);
     assert_eq!(browser.value(STATE), "Balancing");
-    // So fast, the page gets a tenth of the pictures that it gets in a minute of real time, with as much telemetry.
+    // At this speed, the page gets a tenth of the pictures of a minute of real time, with as much telemetry.
     assert!(after < 1.02 * before + 1e5, "the page grows from {before} to {after} bytes");
     assert!(grown < 1.02, "the server grows {grown} times");
     eprintln!(
@@ -309,7 +309,7 @@ fn a_minute_of_running_needs_no_more_memory() {
     assert!(work_ms < 1e3 / 60.0, "scripts and layout take {work_ms} ms for each frame");
 }
 
-/// Memory of the server (KiB); 0 where the system does not tell.
+/// Memory of the server (KiB); 1 where the system does not tell.
 fn resident_kib(twin: &Twin) -> u64 {
     let status = std::fs::read_to_string(format!("/proc/{}/status", twin.process.id())).unwrap_or_default();
     let line = status.lines().find(|line| line.starts_with("VmRSS"));

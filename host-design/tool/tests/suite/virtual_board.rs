@@ -1,5 +1,5 @@
-//! The image that is flashed, on the virtual board: from power-up to balancing with no one's help but the simulated
-//! hand, with the bits of the firmware on the host.
+//! The image that is flashed, on the virtual board: from power-up to balancing, helped only by the simulated hand, bit
+//! for bit like the firmware on the host.
 
 use std::path::Path;
 use std::sync::OnceLock;
@@ -165,7 +165,7 @@ fn the_feather_balances_a_link_with_the_bits_of_the_host_and_refuses_another_chi
     );
 }
 
-/// On the board's own measurement of the supply, through the divider.
+/// With the board's own measurement of the supply, through the divider.
 #[test]
 fn a_supply_that_a_braking_motor_pumps_up_turns_the_motor_off_and_a_spike_does_not() {
     let Some((rig, table, image)) = feather() else { return };
@@ -179,7 +179,7 @@ fn a_supply_that_a_braking_motor_pumps_up_turns_the_motor_off_and_a_spike_does_n
     assert_eq!((spike.class, spike.fault), (Class::Rejected, None), "{spike:?}");
 }
 
-/// Raising and lowering included; the negative control of the quarter is in `cycles.rs`.
+/// Raising and lowering included; the negative control of this limit is in `cycles.rs`.
 #[test]
 fn no_tick_of_raising_and_lowering_takes_longer_than_a_quarter_of_its_period() {
     let Some((rig, table, image)) = feather() else { return };

@@ -10,7 +10,7 @@ use crate::failure::Failure;
 
 /// Reads a rig file and prints all its values, with defaults filled in.
 ///
-/// Exit status 2 if the file cannot be used; the message names line, key and remedy.
+/// Exit status 2 if the file is invalid; the message names line, key and remedy.
 #[derive(Args)]
 #[command(before_help = "\
 Examples:

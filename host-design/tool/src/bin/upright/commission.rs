@@ -20,11 +20,11 @@ use crate::failure::Failure;
 use crate::firmware::{Built, Target, lines_of_stdin};
 use crate::variation::with_table;
 
-/// Leads from a wired rig to a balancing one, step by step: what to do, what was found, and whether it is right.
+/// Guides you from a wired rig to a balancing one, step by step: what to do, what was found, and whether it is right.
 ///
-/// With --target, the machine is a simulated one, and so is the person beside it. With --port it is the real one: its
-/// board runs the image for identification of the rig file (upright firmware flash RIG --identify); Ctrl-C turns the
-/// motor off. A machine that must not be run is stopped at the step that finds out: exit status 3.
+/// With --target, the machine and the person beside it are simulated. With --port, the machine is real: its board runs
+/// the image for identification of the rig file (upright firmware flash RIG --identify), and Ctrl-C turns the motor
+/// off. The command stops at the first step that shows that the machine must not be run: exit status 3.
 #[derive(Args)]
 #[command(before_help = "\
 Examples:
@@ -42,22 +42,22 @@ pub(crate) struct Commission {
     /// The real machine: serial port of its board (/dev/ttyACM0, COM3 …), or tcp:HOST:PORT
     #[arg(long, conflicts_with_all = ["target", "machine", "defect"], requires = "write")]
     port: Option<String>,
-    /// Rig file that tells what the simulated machine really is, with its [reality] [default: RIG]
+    /// Rig file of the simulated machine as it really is, with its [reality] [default: RIG]
     #[arg(long, value_name = "TRUE.toml")]
     machine: Option<PathBuf>,
-    /// A defect in the simulated machine
+    /// Defect of the simulated machine
     #[arg(long, value_name = "NAME")]
     defect: Option<Planted>,
-    /// Seed of whatever is random in the simulated machine
+    /// Seed of everything random in the simulated machine
     #[arg(long, default_value_t = 1)]
     seed: u64,
-    /// How long the machine is shaken (s)
+    /// Time for which the machine is shaken (s)
     #[arg(long, default_value_t = 20, value_name = "S", value_parser = clap::value_parser!(u16).range(5..=3600))]
     seconds: u16,
-    /// Write the rig file of the machine as it was found, once its design is verified
+    /// Write the rig file of the machine as identified, once its design is verified
     #[arg(long, value_name = "NEW.toml")]
     write: Option<PathBuf>,
-    /// Write what was asked, found and decided into this file, after each step
+    /// Write a record of what was asked, found and decided to this file, after each step
     #[arg(long, value_name = "FILE")]
     record: Option<PathBuf>,
     /// Print the record as one JSON object
@@ -98,7 +98,7 @@ impl Commission {
         result
     }
 
-    /// All steps with the real machine.
+    /// Runs all steps with the real machine.
     fn at_port(&self, plan: Plan<'_>, port: &str, journal: &mut Journal) -> Result<(), Failure> {
         let stop = Arc::new(AtomicBool::new(false));
         for signal in [SIGINT, SIGTERM] {
@@ -115,7 +115,7 @@ impl Commission {
         Ok(Commissioning::second(designed.plan(plan), &mut machine, journal)?)
     }
 
-    /// All steps with the simulated machine.
+    /// Runs all steps with the simulated machine.
     fn simulated(
         &self,
         plan: Plan<'_>,
@@ -135,7 +135,7 @@ impl Commission {
             journal.found(format!("rig {:016x}, table {:08x}", table.rig_hash, table.crc()));
             Ok::<_, Failure>(built)
         })?;
-        // Another day: what is random is different.
+        // As on another day: everything random is drawn again.
         let seed = self.seed.wrapping_add(1);
         Ok(built.place(seed).with_target(table, |target| {
             let mut machine = Simulated::new(machine, table, self.defect, target, seed)?;
@@ -143,7 +143,7 @@ impl Commission {
         })?)
     }
 
-    /// Writes the rig file of the machine as it was found.
+    /// Writes the rig file of the machine as identified, if --write is given.
     fn write(&self, designed: &Designed) -> Result<(), Failure> {
         let Some(path) = &self.write else { return Ok(()) };
         write_atomically(path, designed.text.as_bytes())?;
@@ -151,9 +151,9 @@ impl Commission {
         Ok(())
     }
 
-    /// Where the lines go.
+    /// Prints progress lines: to stderr with --json, otherwise to stdout.
     fn show(&self) -> Box<dyn FnMut(&str)> {
-        // A reader of a pipe that has closed it is no reason to stop.
+        // A closed pipe must not abort the procedure.
         match self.json {
             true => Box::new(|line| {
                 let _ = writeln!(std::io::stderr(), "{line}");
@@ -164,7 +164,7 @@ impl Commission {
         }
     }
 
-    /// The simulated machine, as it really is.
+    /// The simulated machine as it really is: the rig of --machine, otherwise RIG.
     fn true_machine(&self, rig: &Rig) -> Result<Rig, Failure> {
         let Some(path) = &self.machine else { return Ok(rig.clone()) };
         let machine = Rig::from_path(path)?;
@@ -188,7 +188,7 @@ impl Commission {
     }
 }
 
-/// Whether every part of the rig has an encoder.
+/// Refuses a rig whose cart or joints lack an encoder.
 fn commissionable(rig: &Rig) -> Result<(), IdentifyError> {
     let is_chain = matches!(rig.plant, PlantDescription::Chain(_));
     if is_chain && rig.sensors().len() == rig.states() / 2 {

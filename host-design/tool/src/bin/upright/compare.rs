@@ -16,7 +16,7 @@ use crate::variation::{finite, law_option, positive};
 
 /// Compares designs: several rigs, or one key of a rig file swept over a range.
 ///
-/// A design that falls, or does not exist, has a row, too; the exit status is 0.
+/// A design that falls or does not exist gets a row, too; the exit status is 0.
 #[derive(Args)]
 #[command(before_help = "\
 Examples:
@@ -30,7 +30,7 @@ pub(crate) struct Compare {
     /// Rig files (TOML)
     #[arg(required = true, value_name = "RIG")]
     rigs: Vec<PathBuf>,
-    /// Key of the rig files and its values; 7 of them if POINTS is left out
+    /// Key of the rig files and its range of values; 7 values if POINTS is left out
     #[arg(long, value_name = "KEY=FROM..TO[:POINTS][:log]")]
     sweep: Option<Sweep>,
     /// Only this law
@@ -39,16 +39,16 @@ pub(crate) struct Compare {
     /// Step of the set-point (m)
     #[arg(long, default_value_t = 0.1, value_name = "M", allow_negative_numbers = true, value_parser = finite)]
     step: f64,
-    /// Length of each run (s)
+    /// Duration of each run (s)
     #[arg(long, default_value_t = 10.0, value_name = "S", allow_negative_numbers = true, value_parser = positive)]
     duration: f64,
     /// Give the controller the whole state instead of encoder counts
     #[arg(long)]
     full_state: bool,
-    /// Let the set-point jump, without the governor
+    /// Apply the set-point as a step, without the governor
     #[arg(long)]
     raw_step: bool,
-    /// Use the gains for continuous time instead of those for the tick
+    /// Use the gains designed in continuous time instead of those designed for the tick
     #[arg(long)]
     continuous_gains: bool,
     /// Print everything as one JSON object
@@ -117,7 +117,7 @@ impl Compare {
         Ok(())
     }
 
-    /// The rig of a file, or one for each value of the sweep.
+    /// The rig of a file, or one rig for each value of the sweep.
     fn candidates(&self, path: &Path, rig: &Rig, label: &str) -> Result<Vec<Candidate>, Failure> {
         let named = |rig, value| Candidate { label: label.to_owned(), rig, value };
         let Some(sweep) = &self.sweep else { return Ok(vec![named(rig.clone(), None)]) };

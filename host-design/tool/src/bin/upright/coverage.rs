@@ -14,10 +14,11 @@ use crate::progress::with_bar;
 use crate::split::Split;
 use crate::variation::not_negative;
 
-/// Shakes and identifies machines unlike the rig file, and counts how many intervals of 95 % cover the truth.
+/// Shakes and identifies simulated machines that differ from the rig file, and counts how many 95 % intervals cover
+/// the true values.
 ///
-/// Masses, lengths and inertias are drawn within --off of the file; friction within a factor of 3 of what is usual;
-/// zeros, tilt, latency and dead zone, too.
+/// Masses, lengths and inertias are drawn within --off of the file, friction within a factor of 3 of what is usual;
+/// zeros, tilt, latency and dead zone are drawn, too.
 #[derive(Args)]
 #[command(before_help = "\
 Examples:
@@ -29,19 +30,19 @@ pub(crate) struct IdentifiedMachines {
     /// Rig file
     #[arg(value_name = "RIG")]
     rig: PathBuf,
-    /// Machines
+    /// Number of machines
     #[arg(long, default_value_t = 40, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
     runs: u32,
     /// Largest error of the file's masses, lengths and inertias (%)
     #[arg(long, default_value_t = 10.0, value_name = "PERCENT", value_parser = below_90)]
     off: f64,
-    /// Length of each log (s)
+    /// Duration of each log (s)
     #[arg(long, default_value_t = 20, value_name = "S", value_parser = clap::value_parser!(u16).range(5..=3600))]
     seconds: u16,
     /// Seed of the machines
     #[arg(long, default_value_t = 1)]
     seed: u64,
-    /// Take the wiring as in the file: faster
+    /// Take the wiring from the file instead of identifying it; faster
     #[arg(long)]
     trust_wiring: bool,
     #[command(flatten)]

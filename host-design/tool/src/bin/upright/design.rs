@@ -46,7 +46,7 @@ pub(crate) struct Design {
     /// Write the motions that are stored beside the rig file into the table, too
     #[arg(long)]
     swing_up: bool,
-    /// Put them and the stored motions between other equilibria into the table
+    /// Write these and the stored motions between other equilibria into the table
     #[arg(long)]
     transitions: bool,
     /// Print the whole design as one JSON object
@@ -136,14 +136,14 @@ fn report(
     Ok(reports)
 }
 
-/// Of the continuous loop (s).
+/// Slowest time constant of the continuous closed loop (s).
 fn slowest_time_constant(rig: &Rig, certified: &Certified, law: Law) -> f64 {
     let poles = certified.poles.in_table(law)[0].map(Vec::as_slice).unwrap_or_default();
     let slowest = poles.iter().map(|pole| -pole[0]).fold(f64::INFINITY, f64::min);
     if slowest > 0.0 && slowest.is_finite() { 1.0 / slowest } else { rig.tick.period_s }
 }
 
-/// A table that cannot hold its own plant is not written.
+/// Refuses a table whose gains, rounded to f32, do not stabilise the plant, or whose acceptance run falls.
 fn refuse_failing_table(rig: &Rig, reports: &[LawReport]) -> Result<(), Failure> {
     for LawReport { law, assessment, run } in reports {
         if assessment.rounded >= 1.0 {
@@ -171,7 +171,7 @@ fn default_table() -> Result<PathBuf, Failure> {
     Ok(checkout.join("src").join("gains.rs"))
 }
 
-/// Whatever ends the lines of the file, as a checkout on Windows may have changed that.
+/// Compares line by line: a checkout on Windows may have changed the line endings.
 fn check(path: &Path, source: &str) -> Result<(), Failure> {
     let found = std::fs::read_to_string(path)
         .map_err(|error| Failure::CheckFailed(format!("{}: cannot be read: {error}", path.display())))?;

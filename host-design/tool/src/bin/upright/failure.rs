@@ -22,7 +22,7 @@ use upright_tool::report::ReportError;
 use upright_tool::reproduce::ReproduceError;
 use upright_tool::twin::TwinError;
 
-/// Why a command ends without success.
+/// Why a command fails; each kind has an exit status.
 #[derive(Debug, thiserror::Error)]
 pub(crate) enum Failure {
     #[error(transparent)]
@@ -176,7 +176,7 @@ impl Failure {
     }
 }
 
-/// Whether the firmware would run, but not this scenario.
+/// Whether the scenario is at fault, not the firmware.
 fn is_bad_scenario(error: &HarnessError) -> bool {
     matches!(
         error,

@@ -14,10 +14,10 @@ use crate::progress::with_bar;
 use crate::split::Split;
 use crate::variation::{Variation, law_option, positive};
 
-/// Balances machines without a defect with the whole firmware, and counts how many are turned off; exit status 1 if any
-/// is.
+/// Balances machines without a defect with the whole firmware, and counts false alarms: how many are turned off. Exit
+/// status 1 if any is.
 ///
-/// The machines are drawn within [robust] of the rig file; without it, all are the machine of [reality].
+/// The machines are drawn within the tolerances of [robust]; without [robust], each is the machine of [reality].
 #[derive(Args)]
 #[command(
     name = "false-alarms",
@@ -32,13 +32,13 @@ Examples:
 pub(crate) struct HealthyHours {
     #[command(flatten)]
     variation: Variation,
-    /// Machines of each law
+    /// Number of machines for each law
     #[arg(long, default_value_t = 20, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
     runs: u32,
-    /// One machine at each combination of wrong masses, with all of the friction, wrong zeros and latency of [robust]
+    /// One machine for each combination of wrong masses, with the full friction, wrong zeros and latency of [robust]
     #[arg(long, conflicts_with = "runs")]
     corners: bool,
-    /// Time for which each balances (s)
+    /// Time for which each machine balances (s)
     #[arg(long, default_value_t = 360.0, value_name = "S", value_parser = positive)]
     duration: f64,
     /// Only this law

@@ -19,8 +19,8 @@ use crate::variation::{Variation, Wanted, with_stored_motions};
 /// Fault injection: runs the firmware with one defect at a time and checks that the motor is off in time; exit status
 /// 1 if it ever is not, or is turned off without a reason.
 ///
-/// Part of the campaign is run again with a firmware without thresholds and limits: there the defects must be missed,
-/// or the campaign proves nothing.
+/// As a negative control, part of the campaign is repeated with a firmware without thresholds and limits: that
+/// firmware must miss the defects, or the campaign proves nothing.
 #[derive(Args)]
 #[command(before_help = "\
 Examples:
@@ -31,7 +31,7 @@ Examples:
   upright faults rigs/quadruple-paper.toml --swing-up                while it is raised and lowered
   upright faults rigs/quadruple-paper.toml --bench-drive             while the motor pushes the cart a little
   upright faults rigs/quadruple-paper.toml --shake                   while the motor shakes the links
-  upright faults rigs/quadruple-paper.toml --only 1234               one run again, bit for bit
+  upright faults rigs/quadruple-paper.toml --only 1234               repeats one run, bit for bit
   upright faults rigs/quadruple-paper.toml --shard 2/3 > 2.jsonl     the second third of the runs
   upright faults rigs/quadruple-paper.toml --merge 1.jsonl 2.jsonl 3.jsonl
   upright faults rigs/quadruple-paper.toml --kind motor-dead --json")]
@@ -69,7 +69,7 @@ pub(crate) struct Faults {
     json: bool,
 }
 
-/// Runs of each kind without detection.
+/// Runs of each kind in the negative control without detection.
 const CONTROL_RUNS: u64 = 12;
 
 fn kind(name: &str) -> Result<Kind, String> {
@@ -159,7 +159,7 @@ impl Faults {
         Ok(Some(result))
     }
 
-    /// The other negative control, on the board: without watchdog, break input, MPU, registers read back.
+    /// The other negative control, on the board: without watchdog, break input, MPU and register read-back.
     fn unguarded(
         &self,
         setup: &Setup<'_>,
@@ -178,7 +178,7 @@ impl Faults {
         Ok(Some(result))
     }
 
-    /// Each defect must be missed at least once.
+    /// Prints how many runs without guards miss the defect; each kind must be missed at least once.
     fn say_unguarded(&self, unguarded: &Campaign) -> Result<(), Failure> {
         let missed: usize = unguarded.rows.iter().map(|row| row.missed).sum();
         let text = format!("without guards, {missed} of {} runs miss the defect", unguarded.runs);
@@ -254,7 +254,7 @@ impl Faults {
         if let Some(control) = control {
             let missed: usize = control.rows.iter().map(|row| row.missed).sum();
             let runs: usize = control.rows.iter().map(|row| row.runs).sum();
-            writeln!(out, "without detection {missed} of {runs} runs are missed, as they must be")?;
+            writeln!(out, "without detection, {missed} of {runs} runs miss the defect, as they must")?;
         }
         Ok(())
     }

@@ -62,7 +62,7 @@ fn built(kind: Kind, rig: Option<&Path>, wanted: Wanted) -> Result<PathBuf, Fail
     Ok(with_spinner("building the image", || image::build_for(kind, &rig, &table))?)
 }
 
-/// The rig of this file, and its table with the stored motions.
+/// Reads this rig file and designs its table, with the stored motions.
 fn designed(path: &Path, wanted: Wanted) -> Result<(Rig, TableValues), Failure> {
     let rig = Rig::from_path(path)?;
     let (_, table) = with_table(&rig, path, Gains::Sampled)?;

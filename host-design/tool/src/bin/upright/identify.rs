@@ -13,10 +13,11 @@ use crate::failure::Failure;
 use crate::progress::with_steps;
 use crate::variation::positive;
 
-/// Finds the parameters of the real machine from the log of a machine that hangs and is shaken.
+/// Identifies the parameters of the real machine from logs of the hanging machine being shaken.
 ///
-/// First the wiring, then masses, lengths, moments, frictions, delay, dead zone and zeros, each with its deviation.
-/// Exit status 2 if a log cannot be read or is of another rig; 3 if it does not fit, and then nothing is written.
+/// First the wiring, then masses, lengths, moments, frictions, delay, dead zone and zeros, each with its standard
+/// deviation. Exit status 2 if a log cannot be read or is of another rig; 3 if the model does not fit, and then no rig
+/// file is written.
 #[derive(Args)]
 #[command(before_help = "\
 Examples:
@@ -31,7 +32,7 @@ pub(crate) struct Identify {
     /// Rig file that the firmware was designed for
     #[arg(value_name = "RIG")]
     rig: PathBuf,
-    /// Logs of this machine, all since the same homing
+    /// Logs of this machine, all recorded after the same homing
     #[arg(value_name = "LOG", required = true)]
     logs: Vec<PathBuf>,
     /// Write the rig file with the identified numbers, if they fit
@@ -40,13 +41,13 @@ pub(crate) struct Identify {
     /// Also identify the eccentricity of the joints' encoders
     #[arg(long)]
     eccentricity: bool,
-    /// Weighed first moment of the last link: held level by its tip on a scale, reading times distance (kg·m)
+    /// Weighed first moment of the last link (kg·m): its tip on a scale, the link level, reading times distance
     #[arg(long, value_name = "KG_M", value_parser = positive)]
     weigh: Option<f64>,
-    /// Take the wiring as in the file
+    /// Take the wiring from the file instead of identifying it
     #[arg(long)]
     trust_wiring: bool,
-    /// Write a page with the fits, residuals, spectra and correlations, also if the numbers do not fit
+    /// Write a page with the fits, residuals, spectra and correlations, even if the numbers do not fit
     #[arg(long, value_name = "PAGE.html")]
     report: Option<PathBuf>,
     /// Only write the log as CSV, to a file, or to stdout with `-`
@@ -100,7 +101,7 @@ impl Identify {
         }
     }
 
-    /// The command that makes the same page.
+    /// The command line that makes the same page.
     fn as_typed(&self) -> String {
         let logs: Vec<String> = self.logs.iter().map(|log| log.display().to_string()).collect();
         let mut typed = format!("upright identify {} {}", self.rig.display(), logs.join(" "));

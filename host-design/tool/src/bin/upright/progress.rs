@@ -98,7 +98,7 @@ pub(crate) fn with_steps<T>(work: impl FnOnce(upright_design::parallel::Progress
 }
 
 fn style(bar: &ProgressBar, template: &str) {
-    // A template that does not parse leaves the usual bar.
+    // If the template does not parse, the default bar stays.
     if let Ok(style) = ProgressStyle::with_template(template) {
         bar.set_style(style);
     }

@@ -21,16 +21,16 @@ use crate::variation::{Variation, Wanted, with_stored_motions};
 
 /// Writes one HTML page about a rig and its loop: animated runs, model, gains, margins, trust report.
 ///
-/// Exit status 0 also if requirements are not met: the page lists them.
+/// Exit status 0 even if requirements are not met: the page lists them.
 #[derive(Args)]
 #[command(before_help = "\
 Examples:
   upright report rigs/quadruple-paper.toml                      writes quadruple-paper.html
   upright report rigs/quadruple-paper.toml --out report.html --svg figures --csv data
   upright report rigs/single-quanser-ip02.toml --runs 1000 --png figures
-  upright report rigs/single-quanser-ip02.toml --imperfections  with what topples it
-  upright report rigs/single-quanser-ip02.toml --margins        with how far it may be pushed while it is raised
-  upright report rigs/double-quanser-dbpen.toml --transitions   with a run from equilibrium to equilibrium
+  upright report rigs/single-quanser-ip02.toml --imperfections  adds which imperfections topple it
+  upright report rigs/single-quanser-ip02.toml --margins        adds how hard it may be pushed while it is raised
+  upright report rigs/double-quanser-dbpen.toml --transitions   adds a run from equilibrium to equilibrium
   upright report rigs/quadruple-paper.toml --gains continuous --tick 0.005     effect of a wrong tick")]
 pub(crate) struct Report {
     #[command(flatten)]
@@ -53,13 +53,13 @@ pub(crate) struct Report {
     /// Seed of the disturbances and of the first random plant
     #[arg(long, default_value_t = 1)]
     seed: u64,
-    /// With the size of each imperfection at which the loop falls, and two figures about it; slower
+    /// Add the size of each imperfection at which the loop falls, and two figures about it; slower
     #[arg(long)]
     imperfections: bool,
-    /// With how far each link may be pushed while the stored motions raise and lower the rig; slower
+    /// Add how hard each link may be pushed while the stored motions raise and lower the rig; slower
     #[arg(long)]
     margins: bool,
-    /// With a run through all stored motions between equilibria
+    /// Add a run through all stored motions between equilibria
     #[arg(long)]
     transitions: bool,
     /// Print the names of the files and the trust report as one JSON object
@@ -128,7 +128,7 @@ impl Report {
         Ok(())
     }
 
-    /// Creates the folders, so that an unwritable place is found before the work is done.
+    /// Creates the folders first, so that an unwritable path is reported before the long computation.
     fn prepare(&self) -> Result<(), Failure> {
         for folder in [&self.svg, &self.png, &self.csv].into_iter().flatten() {
             std::fs::create_dir_all(folder).map_err(|error| {
@@ -146,7 +146,7 @@ impl Report {
         }
     }
 
-    /// Pictures first, so that a page that exists is complete.
+    /// Writes the pictures first and the page last, so that a page that exists is complete.
     fn write(&self, page: &Page) -> Result<Vec<PathBuf>, Failure> {
         let mut files = Vec::new();
         for picture in &page.pictures {
@@ -167,7 +167,7 @@ impl Report {
         Ok(files)
     }
 
-    /// The command that makes the same page; its output paths do not matter.
+    /// The command line that makes the same page, without its output paths, which do not matter.
     fn as_typed(&self) -> String {
         let mut typed = format!("upright report {}", self.variation.as_typed());
         if self.runs != 200 {
@@ -189,18 +189,18 @@ impl Report {
     }
 }
 
-/// The table with the stored motions; none if there are none, or if they belong to other values of the rig.
+/// The table with the stored motions; `None` if there are none, or if they were made for other values of the rig.
 fn with_swing_up(file: &Path, rig: &Rig, table: &TableValues) -> Option<TableValues> {
     let stored = Stored::beside(file).ok()?;
     with_motions(rig, table.clone(), &motions(rig, &stored).ok()?, &[]).ok()
 }
 
-/// A run of the motions of `table`.
+/// A simulated run of the motions of `table`; `None` if it has none or the run fails.
 fn demonstration(rig: &Rig, table: &TableValues, seed: u64) -> Option<Demonstration> {
     Script::of(rig, table, seed, false).ok()?.run(table).ok()
 }
 
-/// A run through all motions that are stored beside the rig file.
+/// A simulated run through all motions that are stored beside the rig file.
 fn tour(file: &Path, rig: &Rig, table: &TableValues, seed: u64) -> Result<Demonstration, Failure> {
     let table = with_stored_motions(file, rig, table.clone(), Wanted::Transitions)?;
     let failed = |source| Failure::SwingUp { rig: rig.name.clone(), source };

@@ -22,10 +22,11 @@ use crate::variation::{not_negative, positive};
 
 mod text;
 
-/// Chooses weights, far poles and joint noise that stand wrong masses, friction, wrong zeros and latency.
+/// Chooses weights, far poles and joint noise with which the loop withstands wrong masses, friction, wrong zeros and
+/// latency.
 ///
-/// The tolerances are those of [robust] in the rig file, or of the options. Exit status 3 if nothing helps, with the
-/// reason.
+/// The tolerances are those of [robust] in the rig file, or of the options. Exit status 3 if nothing helps; the
+/// message says why.
 #[derive(Args)]
 #[command(before_help = "\
 Examples:
@@ -54,19 +55,19 @@ pub(crate) struct Robust {
     /// Choose nothing: judge the numbers of the file; exit status 1 if a run falls
     #[arg(long, conflicts_with_all = ["out", "front", "svg"])]
     as_it_is: bool,
-    /// Runs at each share of the tolerances that a choice has to stand
+    /// Number of runs that a choice has to stand at each share of the tolerances
     #[arg(long, default_value_t = 4, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=100_000))]
     runs: u32,
-    /// Length of each run (s)
+    /// Duration of each run (s)
     #[arg(long, default_value_t = 60.0, value_name = "S", value_parser = positive)]
     duration: f64,
     /// Also look for the least ripple at multiples of the tolerances
     #[arg(long)]
     front: bool,
-    /// Draw that as SVG
+    /// Draw these as SVG
     #[arg(long, value_name = "FILE", requires = "front")]
     svg: Option<PathBuf>,
-    /// Write the rig file with the choice; its name is that of the rig
+    /// Write the rig file with the choice; the rig is named after this file
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
     /// Write nothing; exit status 1 if the file of --out differs
@@ -112,7 +113,7 @@ impl Robust {
         }
     }
 
-    /// Those of the rig file, where no option gives another.
+    /// The tolerances of the rig file, overridden by the options.
     fn tolerances(&self, rig: &Rig) -> Tolerances {
         let stated = rig.robust.clone().unwrap_or_default();
         Tolerances {
@@ -124,7 +125,7 @@ impl Robust {
         }
     }
 
-    /// The file's own numbers.
+    /// Judges the numbers of the file as they are.
     fn judge(&self, rig: &Rig, tolerances: &Tolerances, settings: &JudgeSettings) -> Result<(), Failure> {
         let name = || self.rig.display().to_string();
         let certified = design(rig).map_err(|source| Failure::Design { rig: name(), source })?;
@@ -169,7 +170,8 @@ impl Robust {
         )))
     }
 
-    /// Writes the rig file with the choice, unless with --check; whether it differs from what was there.
+    /// Writes the rig file with the choice, unless --check is given. Returns whether it differs from the existing
+    /// file.
     fn write(
         &self,
         path: &Path,
@@ -185,7 +187,7 @@ impl Robust {
         let text = rewritten(&text, &file, &name, rig, tolerances, choice).ok_or_else(|| {
             bad("write its sections with headers and one key per line: only then can they change")
         })?;
-        // What is written is a rig file.
+        // Nothing but a valid rig file is written.
         Rig::from_toml(&text, path)?;
         let differs = std::fs::read_to_string(path).map_or(true, |old| old != text);
         if differs && !self.check {

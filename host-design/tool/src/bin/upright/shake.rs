@@ -24,9 +24,9 @@ use crate::variation::with_table;
 /// Without --port, the machine is the simulated one of the rig file with its [reality]; the force is computed from the
 /// file alone. With --target, the whole firmware shakes it, from power-up on, and sends the log over its serial line.
 ///
-/// With --port, the machine is the real one. Its board runs the image for identification, and is homed, with signs and
-/// motor checked (`upright firmware monitor`). The links hang still, and nobody is within reach. Ctrl-C turns the motor
-/// off.
+/// With --port, the machine is real. Its board must run the image for identification and be homed, with signs and
+/// motor checked (`upright firmware monitor`); the links must hang still, and nobody may be within reach. Ctrl-C turns
+/// the motor off.
 #[derive(Args)]
 #[command(before_help = "\
 Examples:
@@ -38,16 +38,16 @@ pub(crate) struct Shake {
     /// Rig file
     #[arg(value_name = "RIG")]
     rig: PathBuf,
-    /// Where the log goes
+    /// File to write the log to
     #[arg(long, value_name = "FILE")]
     log: PathBuf,
-    /// Length (s)
+    /// Duration (s)
     #[arg(long, default_value_t = 60, value_name = "S", value_parser = clap::value_parser!(u16).range(5..=3600))]
     seconds: u16,
     /// Seed of the excitation's phases
     #[arg(long, default_value_t = 1)]
     seed: u64,
-    /// Where the firmware runs that shakes it [default: no firmware]
+    /// Where the firmware that shakes it runs [default: no firmware]
     #[arg(long, value_enum)]
     target: Option<Target>,
     /// Serial port of a board (/dev/ttyACM0, COM3 …), or tcp:HOST:PORT
@@ -55,7 +55,7 @@ pub(crate) struct Shake {
     port: Option<String>,
 }
 
-/// Longest wait for the motor to be off, after the shaking was stopped.
+/// Longest wait for the motor to go off after the shaking is stopped.
 const LAST_WAIT: Duration = Duration::from_millis(500);
 
 impl Shake {
@@ -93,7 +93,7 @@ impl Shake {
         let built = target.built_for_identification(rig, &table)?;
         Ok(with_spinner("shaking", || run_shaken(rig, &table, seconds, self.seed, built.place(self.seed)))?)
     }
-    /// The log of the machine behind a port.
+    /// Shakes the machine behind a port and returns its log.
     fn over_line(&self, rig: &Rig, seconds: f64, port: &str) -> Result<Log, Failure> {
         let (_, table) = with_table(rig, &self.rig, Gains::Sampled)?;
         let stop = Arc::new(AtomicBool::new(false));
@@ -113,7 +113,7 @@ impl Shake {
             }
             Ok(())
         });
-        // Whatever has ended it: the motor has to be off.
+        // However the shaking ended, the motor has to be off.
         shaking.stop(now());
         let end = Instant::now() + LAST_WAIT;
         while Instant::now() < end && exchange(&mut line, &mut shaking).is_ok() && !shaking.is_off() {}
@@ -122,7 +122,7 @@ impl Shake {
     }
 }
 
-/// Sends what is due, and receives.
+/// Sends pending bytes, and receives.
 fn exchange(line: &mut Line, shaking: &mut OverLine) -> Result<Result<(), LineError>, std::io::Error> {
     let mut buffer = [0; 4096];
     let bytes = line.exchange(&shaking.take_outgoing(), &mut buffer)?;

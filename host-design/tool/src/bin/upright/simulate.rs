@@ -37,7 +37,7 @@ pub(crate) struct Simulate {
     /// Control law
     #[arg(long, value_parser = law_option(), default_value = Law::Lqr.option())]
     law: Law,
-    /// Length of the run (s)
+    /// Duration of the run (s)
     #[arg(long, default_value_t = 10.0, value_name = "S", allow_negative_numbers = true, value_parser = positive)]
     duration: f64,
     /// Step of the set-point (m)
@@ -46,7 +46,7 @@ pub(crate) struct Simulate {
     /// When the set-point steps (s)
     #[arg(long, default_value_t = 0.0, value_name = "S", value_parser = not_negative)]
     step_at: f64,
-    /// Let the set-point jump, without the governor
+    /// Apply the set-point as a step, without the governor
     #[arg(long)]
     raw_step: bool,
     /// What the controller measures [default: encoders if the rig file has [kalman]]
@@ -77,7 +77,7 @@ pub(crate) struct Simulate {
     #[arg(long, default_value_t = 4, value_parser = clap::value_parser!(u16).range(1..=1000))]
     substeps: u16,
 
-    /// Raise the rig with its stored motion, balance, step, and lower it again, from encoders with the rig's noise
+    /// Raise the rig with its stored motion, balance, step, and lower it again, with encoders and the rig's noise
     #[arg(long, conflicts_with_all = ["law", "duration", "step", "step_at", "raw_step", "sensing", "tilt", "start",
           "disturbances", "force_noise", "torque_noise", "force_offset", "substeps"])]
     swing_up: bool,
@@ -138,7 +138,7 @@ impl Simulate {
         }
     }
 
-    /// Whether the rig is to raise itself.
+    /// Whether stored motions are run: with --swing-up or --transitions.
     pub(crate) fn is_swing_up(&self) -> bool {
         self.swing_up || self.transitions
     }
@@ -150,7 +150,7 @@ impl Simulate {
         Ok((rig, table))
     }
 
-    /// Runs the stored motions, and what lies between them, with `run`, and writes and prints the result.
+    /// Runs the stored motions, and the phases between them, with `run`, and writes and prints the result.
     pub(crate) fn swing_up_with(
         &self,
         run: impl FnOnce(&Rig, &TableValues, &Script) -> Result<Demonstration, Failure>,
@@ -220,7 +220,7 @@ impl Simulate {
         })
     }
 
-    /// The initial state that the options give. Without any motion to start with it is a small tilt.
+    /// The initial state that the options give; a small tilt if they give no step, tilt or disturbance.
     fn initial_state(&self, rig: &Rig, law: Law) -> Result<Vec<f64>, Failure> {
         let states = rig.states();
         let links = match &rig.plant {

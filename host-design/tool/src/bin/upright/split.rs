@@ -11,21 +11,21 @@ use crate::failure::Failure;
 
 #[derive(Args)]
 pub(crate) struct Split {
-    /// Make only every N-th run, from the K-th on, and print the outcomes as lines of JSON for --merge
+    /// Do only every N-th run, starting with the K-th, and print the outcomes as lines of JSON for --merge
     #[arg(long, value_name = "K/N", conflicts_with = "merge")]
     shard: Option<Shard>,
-    /// Make no run, but take the outcomes from the files of all shards; the other options have to be the same
+    /// Do no run, but read the outcomes from the files of all shards; the other options must be the same
     #[arg(long, value_name = "FILE", num_args = 1..)]
     merge: Vec<PathBuf>,
 }
 
 impl Split {
-    /// Whether runs are made elsewhere or for elsewhere.
+    /// Whether --shard or --merge is given.
     pub(crate) fn is_used(&self) -> bool {
         self.shard.is_some() || !self.merge.is_empty()
     }
 
-    /// Does `work` with the study that the options ask for, then `print` with what it gives; a shard prints the
+    /// Does `work` with the study that the options ask for, then passes its result to `print`; a shard prints the
     /// outcomes of its runs instead. `options` are those on which the outcomes depend.
     pub(crate) fn study<T>(
         &self,

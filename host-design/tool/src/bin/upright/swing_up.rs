@@ -22,9 +22,9 @@ use crate::split::Split;
 
 /// Plans the motions with which the rig raises itself from hanging to upright, and lowers itself again.
 ///
-/// They are written beside the rig file, as RIG.swing-up.json. Nothing is written when the motions do not stand the
-/// random runs that [swing_up] asks for. Exit status 3 if there is no motion, with the limit that binds and what would
-/// help.
+/// They are written beside the rig file, as RIG.swing-up.json. Nothing is written if the motions fail the random runs
+/// that [swing_up] asks for. Exit status 3 if there is no motion; the message names the limit that binds and what
+/// would help.
 #[derive(Args)]
 #[command(before_help = "\
 Examples:
@@ -32,7 +32,7 @@ Examples:
   upright swing-up rigs/quadruple-paper.toml --stored         judge the stored motions again, in seconds
   upright swing-up rigs/quadruple-paper.toml --check          search again; exit status 1 if the file differs
   upright swing-up rigs/quadruple-paper.toml --table          200 runs of the firmware with each of eight errors
-  upright swing-up rigs/quadruple-paper.toml --margins        how far each link may be pushed on the way
+  upright swing-up rigs/quadruple-paper.toml --margins        how hard each link may be pushed on the way
   upright swing-up rigs/quadruple-paper.toml --trade --svg trade.svg
   upright swing-up rigs/single-quanser-ip02.toml --no-write --json
   upright swing-up rigs/quadruple-paper.toml --stored --svg run.svg --csv run.csv")]
@@ -49,13 +49,13 @@ pub(crate) struct SwingUp {
     /// Write no file beside the rig
     #[arg(long, conflicts_with = "check")]
     no_write: bool,
-    /// Write a run of everything (up, balance, step, down) as CSV; with --margins and --trade, what is drawn there
+    /// Write a complete run (up, balance, step, down) as CSV; with --margins or --trade, the data of the figure
     #[arg(long, value_name = "FILE")]
     csv: Option<PathBuf>,
-    /// Draw it into an SVG file
+    /// Draw it as SVG
     #[arg(long, value_name = "FILE")]
     svg: Option<PathBuf>,
-    /// Draw the raising as a stroboscopic picture into an SVG file
+    /// Draw the raising as a stroboscopic picture (SVG)
     #[arg(long, value_name = "FILE")]
     picture: Option<PathBuf>,
     /// Run the firmware with the stored motions under each of several conditions, and print the table
@@ -66,13 +66,13 @@ pub(crate) struct SwingUp {
     runs: u32,
     #[command(flatten)]
     split: Split,
-    /// How far each link may be pushed at each moment of the stored motions
+    /// How hard each link may be pushed at each moment of the stored motions
     #[arg(long, conflicts_with_all = ["table", "stored", "check", "no_write", "picture", "seed"])]
     margins: bool,
-    /// Duration against force and robustness: what the candidates of a search are like
+    /// Duration against force and robustness of the candidates of a search
     #[arg(long, conflicts_with_all = ["margins", "table", "stored", "check", "no_write", "picture"])]
     trade: bool,
-    /// Seed of the run of everything; with --trade, of candidates and random runs
+    /// Seed of the complete run; with --trade, of candidates and random runs
     #[arg(long, default_value_t = 1)]
     seed: u64,
     /// Print the result as one JSON object
@@ -80,9 +80,9 @@ pub(crate) struct SwingUp {
     json: bool,
 }
 
-/// Moments of a motion for which margins are found.
+/// Number of moments of a motion at which margins are computed.
 const MOMENTS: usize = 40;
-/// Candidates of --trade.
+/// Number of candidates of --trade.
 const TRADED: u64 = 40;
 
 impl SwingUp {
@@ -103,7 +103,7 @@ impl SwingUp {
         Condition::all().into_iter().map(row).collect()
     }
 
-    /// Margins of both stored motions.
+    /// Prints and draws the margins of both stored motions.
     fn margins(&self, rig: &Rig) -> Result<(), Failure> {
         let failed = |source: SwingUpError| Failure::SwingUp { rig: rig.name.clone(), source };
         let stored = Stored::beside(&self.rig).map_err(failed)?;
@@ -123,7 +123,7 @@ impl SwingUp {
         Ok(())
     }
 
-    /// What the candidates of a search are like.
+    /// Prints and draws duration, force and robustness of the candidates of a search.
     fn trade(&self, rig: &Rig) -> Result<(), Failure> {
         let failed = |source: SwingUpError| Failure::SwingUp { rig: rig.name.clone(), source };
         let solved = with_search(|progress| solved(rig, TRADED, self.seed, progress)).map_err(failed)?;
@@ -157,7 +157,7 @@ impl SwingUp {
         let rig = Rig::from_path(&self.rig)?;
         let failed = |source: SwingUpError| Failure::SwingUp { rig: rig.name.clone(), source };
         if self.table {
-            // The motions decide the outcome, besides the rig file.
+            // The outcome depends on the motions as well as on the rig file.
             let stored = Stored::beside(&self.rig).map_err(failed)?.to_json();
             let options = json!({ "runs": self.runs, "motions": stored });
             let work = |study: &Study| with_spinner("random runs", || self.rows(&rig, study)).map_err(failed);
@@ -216,7 +216,7 @@ impl SwingUp {
     }
 }
 
-/// Margins of both motions of `table`, with a bar.
+/// Margins of both motions of `table`, with a progress bar.
 pub(crate) fn with_margins(rig: &Rig, table: &TableValues) -> Result<Vec<(Way, Vec<Margin>)>, Failure> {
     let of = |way, done: &(dyn Fn() + Sync)| Ok((way, margins(rig, table, way, MOMENTS, done)?));
     let both: Result<_, SwingUpError> = with_bar("margins", (Way::BOTH.len() * MOMENTS) as u64, |done| {
@@ -253,7 +253,7 @@ struct Row {
     runs: FirmwareRuns,
 }
 
-/// As Markdown, or one JSON object.
+/// Prints the rows as Markdown, or as one JSON object.
 fn print_rows(rig: &Rig, rows: &[Row], is_json: bool) -> Result<(), Failure> {
     let mut out = std::io::stdout().lock();
     if is_json {
@@ -298,7 +298,7 @@ fn text(rig: &Rig, plan: &Plan) -> String {
                farthest from the middle  {:>10.3} m\n  \
                largest speed of the cart {:>10.2} m/s\n  \
                largest rate of a joint   {:>10.1} rad/s\n  \
-               of the nearest limit      {:>10.0} %\n  \
+               used of the nearest limit {:>10.0} %\n  \
                error of a tick           {:>10.1e} (adaptive integrator)\n  \
                fragility                 {score:>10.2}\n  \
                random runs that arrive   {:>10} of {} (95 % interval {:.1} to {:.1} %)\n  \

@@ -17,12 +17,12 @@ use upright_design::table::write_atomically;
 use crate::failure::Failure;
 use crate::progress::{with_search, with_spinner};
 
-/// Plans motions between any two equilibria, at which each link is up or down, and tries them one after the other.
+/// Plans motions between any two equilibria, in which each link is up or down, and tries them one after the other.
 ///
 /// An equilibrium is written with a letter for each link, from the cart outwards: u if it is up, d if it is down. The
-/// motions between hanging and upright are those of `upright swing-up`, and have to be there. What is found is written
-/// beside the rig file, as RIG.transitions.json; a motion that does not arrive in as many tours of the firmware as
-/// success_percent in [swing_up] asks for is dropped.
+/// motions between hanging and upright are those of `upright swing-up`, and must be stored. The motions found are
+/// written beside the rig file, as RIG.transitions.json. A motion that arrives in too few tours of the firmware is
+/// dropped: success_percent in [swing_up] says how many it has to be.
 #[derive(Args)]
 #[command(before_help = "\
 Examples:
@@ -37,13 +37,13 @@ pub(crate) struct Transitions {
     /// Search only these ways; the stored motions of others stay
     #[arg(long, value_name = "FROM-TO,…", value_delimiter = ',', conflicts_with = "stored")]
     ways: Vec<String>,
-    /// Numbers of the candidates that are tried for each way
+    /// Numbers of the candidates to try for each way
     #[arg(long, value_name = "FIRST..END", default_value = "0..100", value_parser = numbers, conflicts_with = "stored")]
     candidates: (u64, u64),
-    /// Do not search, try the stored motions
+    /// Do not search; try the stored motions
     #[arg(long)]
     stored: bool,
-    /// With --stored: tours of the firmware, each with another machine, with the seeds from 1 on
+    /// With --stored: number of tours of the firmware, each with another machine, with the seeds from 1 on
     #[arg(long, value_name = "N", default_value_t = 200, requires = "stored", value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
     runs: u32,
     /// Write no file beside the rig
@@ -85,7 +85,7 @@ impl Transitions {
                 let found =
                     with_search(|progress| stored.search(&rig, way, first..end, progress)).map_err(failed)?;
                 eprintln!("{}", searched_line(&found, end - first, links));
-                // Whoever stops the search keeps what is found.
+                // Written after each way, so that an interrupted search keeps what it has found.
                 write(&stored)?;
                 searched.push(found);
             }
@@ -113,7 +113,7 @@ impl Transitions {
                 all.retain(|transition| transition.way != leg.way);
                 continue;
             }
-            // A motion that comes more than once counts as it came first.
+            // Of a motion that occurs more than once in the tour, the first leg counts: it is stored last.
             others().rev().for_each(|leg| stored.judge(leg.way, links, [leg.arrived, leg.tried]));
             for Transition { way, .. } in lost {
                 let name = way.name(links);

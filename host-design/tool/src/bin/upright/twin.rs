@@ -21,17 +21,17 @@ use crate::variation::{Variation, Wanted, law_option, positive, with_stored_moti
 
 /// Serves a page on which the rig moves, run by the firmware itself: pull it, change it, break it, watch it.
 ///
-/// Open the address that is printed; it holds a secret, so nobody else can move the motor. The page needs no network.
-/// It ends with Ctrl-C. If the page in command is closed or falls silent for two seconds, the motor is turned off.
+/// Open the address that is printed; it contains a secret, so nobody else can move the motor. The page needs no
+/// network. Ctrl-C ends it. If the page in command is closed or falls silent for two seconds, the motor is turned off.
 #[derive(Args)]
 #[command(before_help = "\
 Examples:
   upright twin rigs/quadruple-paper.toml                      the firmware on this computer, the rig simulated
   upright twin rigs/quadruple-paper.toml --target qemu        the image in QEMU
   upright twin rigs/quadruple-paper.toml --target board       the image that is flashed, on the virtual board
-  upright twin rigs/single-quanser-ip02.toml --hanging        from power-up on, with everything to do by hand
-  upright twin rigs/quadruple-paper.toml --port /dev/ttyACM0  a real board, without what only a simulation has
-  upright twin rigs/quadruple-paper.toml --listen 0.0.0.0:8080   for a phone in the same network: mind who hears")]
+  upright twin rigs/single-quanser-ip02.toml --hanging        from power-up on, with every step left to you
+  upright twin rigs/quadruple-paper.toml --port /dev/ttyACM0  a real board, without what only a simulation can do
+  upright twin rigs/quadruple-paper.toml --listen 0.0.0.0:8080   for a phone on the same network: others can listen")]
 pub(crate) struct Twin {
     #[command(flatten)]
     variation: Variation,
@@ -41,7 +41,7 @@ pub(crate) struct Twin {
     /// A board instead of a simulation: its serial port (/dev/ttyACM0, COM3 …), or tcp:HOST:PORT
     #[arg(long, conflicts_with_all = ["target", "hanging"])]
     port: Option<String>,
-    /// With the stored motions between other equilibria, too
+    /// Include the stored motions between other equilibria
     #[arg(long)]
     transitions: bool,
     /// Begin with the links hanging, not homed
@@ -50,7 +50,7 @@ pub(crate) struct Twin {
     /// Control law at the start
     #[arg(long, value_parser = law_option(), default_value = Law::Lqr.option())]
     law: Law,
-    /// Address of the page; port 0 takes a free one
+    /// Address of the page; port 0 picks a free one
     #[arg(long, value_name = "ADDRESS:PORT", default_value = "127.0.0.1:0")]
     listen: SocketAddr,
     /// End after this time (s)
@@ -81,7 +81,7 @@ impl Twin {
     }
 }
 
-/// Shows the machine behind a serial port, which is that of `rig`, on a page at `address` until `goes_on` says no.
+/// Shows the machine behind a serial port, which must be that of `rig`, on a page at `address` while `goes_on` holds.
 pub(crate) fn show(
     port: &str,
     rig: &Rig,
@@ -93,7 +93,7 @@ pub(crate) fn show(
     Ok(listening(address)?.connect(rig, table, line, port, goes_on)?)
 }
 
-/// A server that has said where its page is.
+/// Starts the server and prints the address of its page.
 fn listening(address: SocketAddr) -> Result<Server, Failure> {
     let server = Server::listen(address).map_err(|error| {
         Failure::BadArgument(format!("{address}: {error}; the page needs another port, or 0 for a free one"))

@@ -37,9 +37,9 @@ enum GainsName {
     Continuous,
 }
 
-/// A control law by its name on the command line.
+/// Parses a control law by its name on the command line.
 pub(crate) fn law_option() -> impl TypedValueParser<Value = Law> {
-    // Only these names reach the second step.
+    // All other names have been rejected by now.
     PossibleValuesParser::new(Law::ALL.map(Law::option))
         .map(|name| Law::from_option(&name).unwrap_or(Law::Lqr))
 }
@@ -82,7 +82,7 @@ impl Variation {
     }
 }
 
-/// The design of the rig of this file, and the table with these gains.
+/// Designs the rig of this file, and makes the table with these gains.
 pub(crate) fn with_table(rig: &Rig, file: &Path, gains: Gains) -> Result<(Certified, TableValues), Failure> {
     let name = || file.display().to_string();
     let certified = with_spinner("designing", || design(rig))
@@ -92,17 +92,17 @@ pub(crate) fn with_table(rig: &Rig, file: &Path, gains: Gains) -> Result<(Certif
     Ok((certified, table))
 }
 
-/// Which of the motions beside a rig file are wanted.
+/// Which of the motions stored beside a rig file are wanted.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) enum Wanted {
-    /// Raising and lowering, if they are stored and for these values of the rig file.
+    /// Raising and lowering, if they are stored and were made for these values of the rig file.
     SwingUp,
-    /// Also those between other equilibria, which have to be there.
+    /// Also those between other equilibria, which must be stored.
     Transitions,
 }
 
 impl Wanted {
-    /// As the option `--transitions` says.
+    /// What the option `--transitions` asks for.
     pub(crate) fn of(transitions: bool) -> Self {
         if transitions { Self::Transitions } else { Self::SwingUp }
     }

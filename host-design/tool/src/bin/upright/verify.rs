@@ -56,7 +56,7 @@ pub(crate) struct Verify {
     /// Instead of the report, write a map of the initial states from which the loop recovers, as CSV
     #[arg(long, value_name = "FILE", conflicts_with_all = ["replay", "shard", "merge"])]
     map: Option<PathBuf>,
-    /// Instead of the report, the size of each imperfection of the machine at which the loop falls
+    /// Instead of the report, find the size of each imperfection of the machine at which the loop falls
     #[arg(long, conflicts_with_all = ["replay", "map", "shard", "merge"])]
     imperfections: bool,
     /// With --map: two states and their ranges, as index:from:to (SI; state order x, xdot, theta1, theta1dot …)
@@ -96,7 +96,7 @@ fn share(text: &str) -> Result<f64, String> {
     }
 }
 
-/// What each law stands of each imperfection, with a bar.
+/// Finds the size of each imperfection at which each law falls, with a progress bar.
 pub(crate) fn search(rig: &Rig, table: &TableValues) -> Result<Vec<Imperfections>, Failure> {
     let laws: Vec<Law> = table.laws.present().map(|(law, _)| law).collect();
     let settings = ImperfectionSettings::of(rig);
@@ -106,7 +106,7 @@ pub(crate) fn search(rig: &Rig, table: &TableValues) -> Result<Vec<Imperfections
     })?)
 }
 
-/// The random plants of each law alone: the part of the report that is split.
+/// Runs only the random plants of each law: the part of the report that --shard splits.
 fn random_plants(
     rig: &Rig,
     table: &TableValues,
@@ -146,7 +146,7 @@ impl Verify {
         let work = |study: &Study| -> Result<_, Failure> {
             let effort = Effort { runs: self.runs as usize, seed: self.seed, late: self.late, study };
             let runs = table.laws.present().count() as u64 * u64::from(self.runs);
-            // A shard makes the random plants only.
+            // A shard runs the random plants only.
             if study.is_shard() {
                 with_random_plants(runs, |stage, done| {
                     stage("random plants");
@@ -218,7 +218,7 @@ impl Verify {
         }
     }
 
-    /// One CSV row per initial state: both states and the settling time, empty if it does not recover.
+    /// Writes one CSV row per initial state: both states and the settling time, empty if it does not recover.
     fn map(&self, rig: &Rig, table: &TableValues, path: &std::path::Path) -> Result<(), Failure> {
         let law = table.laws.present().next().map_or(Law::Lqr, |(law, _)| law);
         let &[across, down] = self.axes.as_slice() else {

@@ -2,13 +2,13 @@
 
 const byId = (id) => document.getElementById(id);
 
-// Keys of the whole page; those of the firmware are the monitor's.
+// Keys of the whole page that send a command to the firmware.
 const KEYS = {
   h: 'home', H: 'home-rail', g: 'check-signs', a: 'arm', d: 'disarm', c: 'clear', w: 'up', s: 'down',
 };
 // Keys that work while they are held.
 const HELD = { m: 'drive +x', M: 'drive -x' };
-// Time between two commands of a held key (ms): the firmware takes the key for let go after 100 ms.
+// Time between two commands of a held key (ms): after 100 ms without one, the firmware takes the key as released.
 const REPEAT_MS = 25;
 const HOLDS = { f: 'free', j: 'hanging', k: 'guided', u: 'upright' };
 const KEPT_LINES = 200;

@@ -1,11 +1,11 @@
 // The connection to the server: requests out, pictures in.
 
-// Pictures between two signs of life. They answer pictures, so that they come from a tab in the background, too, and
-// stop with the computer.
+// Pictures between two keep-alives. They answer pictures, so that a tab in the background sends them, too, and they
+// stop when the computer sleeps.
 const ALIVE_EVERY = 6;
 const RETRY_MS = 1000;
 
-// Calls `on.hello`, `on.picture`, `on.notice` and `on.lost`; gives a function that sends a request.
+// Calls `on.hello`, `on.picture`, `on.notice` and `on.lost`; returns a function that sends a request.
 export function connect(on) {
   let socket = null;
   let pictures = 0;

@@ -9,7 +9,7 @@ const byId = (id) => document.getElementById(id);
 const colours = new Map();
 let hello = null;
 
-// A colour of the style sheet; of the curves in the light scheme, the one of the tool's figures.
+// A colour of the style sheet; where it has none, as for curves in the light scheme, that of the tool's figures.
 export function colour(name) {
   if (!colours.has(name)) {
     const given = getComputedStyle(document.documentElement).getPropertyValue(name).trim();

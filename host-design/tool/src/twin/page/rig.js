@@ -18,7 +18,7 @@ export function joints(lengths, state) {
   return points;
 }
 
-// The canvas as wide as it is shown, in device pixels; gives its context, scaled to CSS pixels.
+// Sizes the canvas as it is shown, in device pixels; returns its context, scaled to CSS pixels.
 export function context(canvas) {
   const { clientWidth: width, clientHeight: height } = canvas;
   const ratio = window.devicePixelRatio || 1;
@@ -136,7 +136,7 @@ export class RigView {
     return [low ?? -1, high ?? 1];
   }
 
-  // Once per frame: sends the pull of now.
+  // Once per frame: sends the current pull.
   pull() {
     if (this.state === null) return;
     if (this.grip !== null) {

@@ -3,13 +3,13 @@
 import { colour } from './main.js';
 import { context } from './rig.js';
 
-const CAPACITY = 1 << 14; // telemetry that is kept
+const CAPACITY = 1 << 14; // telemetry messages that are kept
 const LONGEST_S = 60;
 const SHORTEST_S = 0.2;
 const DEGREES = 180 / Math.PI;
 const MARGIN = { left: 58, right: 6, top: 6, bottom: 18 };
 
-// The scopes: curves, each with name and value of a telemetry, and the least range that is shown.
+// The scopes: curves, each with its name and its value in a telemetry message, and the smallest range that is shown.
 function panels(hello) {
   const joints = hello.sensors.map((name, sensor) => ({ name, sensor })).slice(1);
   const each = (value) => joints.map(({ name, sensor }) => ({ name, value: (t) => value(t, sensor) }));
@@ -19,7 +19,7 @@ function panels(hello) {
     { title: 'angles (°)', least: 0.5, curves: each((t, sensor) => t.estimate[2 * sensor] * DEGREES) },
     { title: 'rates (°/s)', least: 10, curves: each((t, sensor) => t.estimate[2 * sensor + 1] * DEGREES) },
     { title: 'force (N)', least: 0.2, curves: [
-      { name: 'asked for', value: (t) => t.requested_n }, { name: 'applied', value: (t) => t.applied_n }] },
+      { name: 'requested', value: (t) => t.requested_n }, { name: 'applied', value: (t) => t.applied_n }] },
     { title: 'innovation (mm, mrad)', least: 0.1, curves: hello.sensors.map((name, sensor) => (
       { name, value: (t) => t.innovation[sensor] * 1e3 })) },
     { title: 'tick (processor cycles)', least: 10, curves: [
@@ -49,7 +49,7 @@ class History {
 
   get last() { return this.length > 0 ? this.time(this.length - 1) : 0; }
 
-  // Index of the first telemetry at or after a time.
+  // Index of the first telemetry message at or after a time.
   after(t) {
     let [low, high] = [this.first, this.length];
     while (low < high) {
@@ -140,7 +140,7 @@ export class Scopes {
     this.back = 0;
   }
 
-  // Draws one panel, the next time the next one: so every frame takes equally long.
+  // Draws one panel per call, in turn, so that every frame takes equally long.
   drawNext() {
     this.end = (this.isHeld ? this.heldAt : this.history.last) + this.back;
     this.drawn = (this.drawn + 1) % this.panels.length;
@@ -210,7 +210,7 @@ export class Scopes {
     }
   }
 
-  // All scopes below each other, as the address of a PNG.
+  // All scopes, one below the other, as the data URL of a PNG.
   picture() {
     const sizes = this.panels.map(({ canvas }) => [canvas.width, canvas.height]);
     const sheet = document.createElement('canvas');

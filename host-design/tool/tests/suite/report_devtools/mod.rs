@@ -106,7 +106,7 @@ impl Browser {
         }
     }
 
-    /// Memory of the page (bytes), without what it no longer uses.
+    /// Memory that the page uses (bytes), after garbage collection.
     pub(crate) fn heap(&mut self) -> f64 {
         // In one expression: the page does nothing in between.
         self.value("(gc(), gc(), performance.memory.usedJSHeapSize)").as_f64().unwrap()

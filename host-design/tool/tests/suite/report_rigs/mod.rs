@@ -22,7 +22,7 @@ pub(crate) fn quick_report(rig: &Rig) -> Report {
     made(rig, None, &[], REGION_POINTS)
 }
 
-/// Starts along each axis of a coarse map of the region of attraction.
+/// Initial states along each axis of a coarse map of the region of attraction.
 const COARSE: usize = 7;
 
 /// [`quick_report`] with a coarse map, for what does not depend on it.
@@ -36,7 +36,7 @@ pub(crate) static SINGLE: LazyLock<Report> = LazyLock::new(|| coarse_report(&rig
 /// [`quick_report`] on a linear model, `quadruple-paper-printed`.
 pub(crate) static LINEAR: LazyLock<Report> = LazyLock::new(|| quick_report(&rig("quadruple-paper-printed")));
 
-/// [`coarse_report`] with what the LQR stands of each imperfection, from short runs.
+/// [`coarse_report`] with how much of each imperfection the LQR withstands, from short runs.
 pub(crate) fn report_with_imperfections(rig: &Rig) -> Report {
     let settings =
         ImperfectionSettings { duration_s: 2.0, seeds: 1, relative: 0.5, ..ImperfectionSettings::of(rig) };

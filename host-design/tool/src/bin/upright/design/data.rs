@@ -19,7 +19,7 @@ pub(super) struct DesignData<'a> {
     continuous: LawsData<'a>,
     sampled: SampledData<'a>,
     table: Option<&'a TableValues>,
-    /// The two precisions (bits) at which every value came out the same.
+    /// The two precisions (bits) at which all values agreed.
     certified_bits: [usize; 2],
 }
 

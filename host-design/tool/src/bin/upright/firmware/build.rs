@@ -15,8 +15,8 @@ use crate::variation::Wanted;
 /// Builds the image of a board, runs it on the virtual board, and prints the path of its ELF file; exit status 1 if a
 /// tick takes longer than a quarter of its period.
 ///
-/// The compiler is that of rustup, if its target thumbv7em-none-eabihf is installed, otherwise that of Debian; exit
-/// status 4, with what to install, if there is neither.
+/// Uses the compiler of rustup if its target thumbv7em-none-eabihf is installed, otherwise that of Debian. If there is
+/// neither, the exit status is 4, and the message says what to install.
 #[derive(Args)]
 #[command(before_help = "\
 Examples:
@@ -25,14 +25,14 @@ Examples:
   upright firmware build --board nucleo-f446
   upright firmware build rigs/single-quanser-ip02.toml --identify")]
 pub(crate) struct Build {
-    /// Rig file (TOML), to be designed [default: the table in src/gains.rs]
+    /// Rig file (TOML) to design the table from [default: the table in src/gains.rs]
     rig: Option<PathBuf>,
     #[command(flatten)]
     on: BoardOption,
     /// The image for identification: it shakes the hanging rig and logs every tick, for `upright identify`
     #[arg(long)]
     identify: bool,
-    /// With the stored motions between other equilibria, too
+    /// Include the stored motions between other equilibria
     #[arg(long, requires = "rig")]
     transitions: bool,
 }

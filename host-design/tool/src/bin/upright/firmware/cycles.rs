@@ -24,12 +24,12 @@ use crate::failure::Failure;
 use crate::progress::with_spinner;
 use crate::variation::{Wanted, law_option, positive};
 
-/// Measures what the ticks of the flashed image cost, on the virtual board: from the tick to the output, jitter of the
-/// output, and the whole task by part, from power-up through arming to balancing, and through raising and lowering if
-/// the rig has stored motions.
+/// Measures what the ticks of the flashed image cost, on the virtual board: latency from the tick to the output,
+/// jitter of the output, and the whole task by part. The run goes from power-up through arming to balancing, and
+/// through raising and lowering if the rig has stored motions.
 ///
-/// Cycles follow ARM's table and the flash's wait states; they are approximate. Exit status 1 if a tick takes longer
-/// than a quarter of its period.
+/// Cycle counts follow ARM's instruction timings and the wait states of the flash; they are approximate. Exit status 1
+/// if a tick takes longer than a quarter of its period.
 #[derive(Args)]
 #[command(before_help = "\
 Examples:
@@ -44,7 +44,7 @@ pub(crate) struct Cycles {
     /// Control law
     #[arg(long, value_parser = law_option(), default_value = Law::Lqr.option())]
     law: Law,
-    /// Time of balancing (s)
+    /// Time for which it balances (s)
     #[arg(long, default_value_t = 2.0, value_name = "S", value_parser = positive)]
     duration: f64,
     /// Print the figures as one JSON object
@@ -74,7 +74,7 @@ impl Cycles {
     }
 }
 
-/// The ticks of the image, with the disturbances that the rig file expects.
+/// Measures the ticks of the image, with the disturbances that the rig file expects.
 pub(super) fn measured(
     rig: &Rig,
     table: &TableValues,
@@ -89,11 +89,11 @@ pub(super) fn measured(
     })?)
 }
 
-/// Time of balancing in the check of an image (s).
+/// Time for which an image balances when it is checked (s).
 const CHECKED_S: f64 = 0.5;
 
-/// Refuses an image with a tick that the board cannot keep, or one that could balance but does not, so that its ticks
-/// cannot be measured. Without a rig, that of src/gains.rs is looked for in `rigs/`.
+/// Refuses an image with a tick that is too long for the board, and one that has an observer but does not balance, so
+/// that its ticks cannot be measured. Without `rig`, the rig of src/gains.rs is looked up in `rigs/`.
 pub(super) fn check_ticks(
     board: Board,
     rig: Option<&Path>,
@@ -126,7 +126,7 @@ pub(super) fn check_ticks(
             "the ticks of this image cannot be measured on the virtual board: {ended}"
         ))),
         Some(_) => {
-            eprintln!("these are ticks with the motor off alone: without [kalman], it never balances");
+            eprintln!("only ticks with the motor off were measured: without [kalman], it never balances");
             Ok(())
         }
         None => Ok(()),

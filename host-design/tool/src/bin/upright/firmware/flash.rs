@@ -25,21 +25,21 @@ Examples:
   upright firmware flash rigs/single-quanser-ip02.toml --board nucleo-f446
   upright firmware flash rigs/single-quanser-ip02.toml --identify")]
 pub(crate) struct Flash {
-    /// Rig file (TOML), to be designed [default: the table in src/gains.rs]
+    /// Rig file (TOML) to design the table from [default: the table in src/gains.rs]
     rig: Option<PathBuf>,
     #[command(flatten)]
     on: BoardOption,
     /// The image for identification: it shakes the hanging rig and logs every tick, for `upright identify`
     #[arg(long)]
     identify: bool,
-    /// With the stored motions between other equilibria, too
+    /// Include the stored motions between other equilibria
     #[arg(long, requires = "rig")]
     transitions: bool,
 }
 
 impl Flash {
     pub(crate) fn run(self) -> Result<(), Failure> {
-        // First, because building the image takes longer.
+        // Checked first, because building the image takes longer.
         if Command::new(PROBE_RS).arg("--version").output().is_err() {
             return Err(Failure::NoProgram(
                 "probe-rs is missing: install it (https://probe.rs, or `cargo install probe-rs-tools --locked`)",

@@ -23,12 +23,13 @@ use crate::failure::Failure;
 use crate::twin;
 use crate::variation::{Wanted, positive};
 
-/// Shows a firmware's telemetry, live, and sends commands to it; exit status 1 if the connection is lost or the
+/// Shows the telemetry of a firmware live and sends commands to it; exit status 1 if the connection is lost or the
 /// firmware uses another version of the messages.
 ///
-/// If it ends while the cart's set-point is commanded, the firmware turns the motor off: link lost. Without a
-/// terminal, or with --json, it prints one JSON object per telemetry, answers on stderr, and takes commands as lines
-/// of stdin: home, home-rail, check-signs, arm, disarm, clear, set-point METRES, law lqr, law pole-placement.
+/// If the monitor ends after it has commanded a set-point, the firmware turns the motor off: link lost. Without a
+/// terminal, or with --json, it prints one JSON object per telemetry message, prints answers to stderr, and reads
+/// commands as lines of stdin: home, home-rail, check-signs, arm, disarm, clear, set-point METRES, law lqr, law
+/// pole-placement.
 #[derive(Args)]
 #[command(before_help = "\
 Examples:
@@ -40,13 +41,13 @@ Examples:
 pub(crate) struct Monitor {
     /// Serial port (/dev/ttyACM0, COM3 …), or tcp:HOST:PORT
     port: String,
-    /// Record telemetry into this file from the start
+    /// Record telemetry to this CSV file from the start
     #[arg(long, value_name = "FILE")]
     csv: Option<PathBuf>,
-    /// Print one JSON object per telemetry
+    /// Print one JSON object per telemetry message
     #[arg(long)]
     json: bool,
-    /// Show it on the page of `upright twin` instead, served at this port of this computer; 0 takes a free one
+    /// Show it on the page of `upright twin` instead, served on this port of this computer; 0 picks a free one
     #[arg(long, value_name = "PORT", requires = "rig", conflicts_with_all = ["csv", "json"])]
     web: Option<u16>,
     /// Rig file of the machine, for the page
@@ -136,7 +137,8 @@ impl Conversation {
         Ok(())
     }
 
-    /// Sends whatever is due, and receives; takes at most 5 ms if the line is silent.
+    /// Sends pending bytes and receives, calling `each` with every telemetry; takes at most 5 ms if the line is
+    /// silent.
     fn exchange(
         &mut self,
         mut each: impl FnMut(&serde_json::Value) -> std::io::Result<()>,
@@ -165,7 +167,8 @@ impl Conversation {
         let said = lines_of_stdin();
         let mut out = std::io::stdout().lock();
         while self.goes_on() && self.model.ended.is_none() {
-            // No command before the firmware has told its version of the messages.
+            // No command before the first telemetry, which is only accepted once the firmware has named its version of
+            // the messages.
             while self.model.telemetry.is_some()
                 && let Ok(line) = said.try_recv()
             {
@@ -214,12 +217,12 @@ impl Conversation {
     }
 }
 
-/// Whether nobody has asked it to end, and its time is not over.
+/// Whether to keep running: no signal has come, and the time is not over.
 fn goes_on(stop: &AtomicBool, until: Option<Instant>) -> bool {
     !stop.load(Ordering::Relaxed) && until.is_none_or(|until| Instant::now() < until)
 }
 
-/// Lines of stdin as they come. A thread of its own, because stdin may stay open for ever.
+/// Lines of stdin as they arrive. A separate thread reads them, because reading may block for ever.
 pub(crate) fn lines_of_stdin() -> Receiver<String> {
     let (sender, lines) = channel();
     std::thread::spawn(move || {

@@ -19,8 +19,9 @@ use crate::simulate::Simulate;
 /// Builds the image for the rig, runs it in lock step with the nonlinear plant, and compares every bit with the
 /// firmware on the host; exit status 1 if the pendulum falls or a bit differs.
 ///
-/// In QEMU, pins are simulated, and the run is that on the host. On the virtual board, the very image that is flashed
-/// runs with its registers; its pins drive the plant, and the host gets in each tick what the image has latched.
+/// In QEMU, the pins are simulated, and the run is the same as on the host. On the virtual board, the image itself
+/// that is flashed runs, with its registers; its pins drive the plant, and in each tick the firmware on the host gets
+/// the inputs that the image has latched.
 ///
 /// The rig is homed while it hangs, held by hand at the start of the scenario until the firmware begins to balance,
 /// and released at time 0. With --swing-up, the image raises the rig from hanging, balances, moves, and lowers it
@@ -56,7 +57,7 @@ enum LinkName {
     Usart,
 }
 
-/// Length of a served run with --swing-up (s).
+/// Duration of a served run with --swing-up (s).
 const SERVED_S: f64 = 600.0;
 
 impl Run {
@@ -119,7 +120,7 @@ impl Run {
     }
 }
 
-/// The image on the virtual board, beside the firmware on the host.
+/// Runs the image on the virtual board and the firmware on the host in step, and compares every bit.
 fn on_the_board(
     rig: &Rig,
     table: &TableValues,
@@ -144,7 +145,7 @@ fn on_the_board(
     Ok(recording)
 }
 
-/// The same run on the host, bit by bit.
+/// Repeats the run on the host and compares the ticks bit by bit.
 fn compare(rig: &Rig, table: &TableValues, scenario: &Scenario, qemu: &Recording) -> Result<(), Failure> {
     let host = run(rig, table, scenario, Place::Host)?;
     let difference = host.ticks.iter().zip(&qemu.ticks).position(|(host, qemu)| host != qemu);

@@ -24,7 +24,7 @@ Examples:
   upright firmware size rigs/single-quanser-ip02.toml --board nucleo-f446
   upright firmware size --elf target/image.elf --json | jq .stack.bytes")]
 pub(crate) struct Size {
-    /// Rig file (TOML), to be designed [default: the table in src/gains.rs]
+    /// Rig file (TOML) to design the table from [default: the table in src/gains.rs]
     rig: Option<PathBuf>,
     #[command(flatten)]
     on: BoardOption,
@@ -70,7 +70,7 @@ impl Size {
     }
 }
 
-/// Violated limits, as text.
+/// The violated limits, as text.
 fn wrong(
     size: &upright_tool::image::Size,
     stack: &Result<StackBound, StackError>,

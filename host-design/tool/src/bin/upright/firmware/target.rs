@@ -1,4 +1,4 @@
-//! Where the firmware runs, by the names of the command line, with the image that is needed there.
+//! Where the firmware runs (option `--target`), and the image that is needed there.
 
 use std::path::{Path, PathBuf};
 
@@ -12,7 +12,7 @@ use upright_tool::in_the_loop::{Link, Place};
 use crate::failure::Failure;
 use crate::progress::with_spinner;
 
-/// The board that is a virtual one.
+/// The board that the virtual board simulates.
 const BOARD: Board = Board::WeactF405;
 
 /// Where the firmware runs.
@@ -26,7 +26,7 @@ pub(crate) enum Target {
     Board,
 }
 
-/// What runs there.
+/// A firmware, built for its target.
 pub(crate) enum Built {
     Host,
     Qemu { image: PathBuf, link: Link },
@@ -43,13 +43,13 @@ impl Target {
         }
     }
 
-    /// Builds the image with the table of the rig, and says which one it is; on the host there is none. `link`
-    /// connects the pins of an image in QEMU.
+    /// Builds the image with the table of the rig and prints its path and hash; on the host, no image is needed.
+    /// `link` connects the pins of an image in QEMU.
     pub(crate) fn built(self, link: Link, rig: &Rig, table: &TableValues) -> Result<Built, Failure> {
         self.built_as(Kind::Board(BOARD), link, rig, table)
     }
 
-    /// The same with the image for identification.
+    /// As [`built`](Self::built), with the image for identification.
     pub(crate) fn built_for_identification(self, rig: &Rig, table: &TableValues) -> Result<Built, Failure> {
         self.built_as(Kind::Identification(BOARD), Link::Files, rig, table)
     }
@@ -71,7 +71,7 @@ impl Target {
 }
 
 impl Built {
-    /// The place to run it; what is random of the virtual board follows from `seed`.
+    /// The place to run it; `seed` determines everything random about the virtual board.
     pub(crate) fn place(&self, seed: u64) -> Place<'_> {
         match self {
             Built::Host => Place::Host,
@@ -81,7 +81,7 @@ impl Built {
     }
 }
 
-/// The image that is flashed; says which one it is, and what it says of itself.
+/// Reads the image that is flashed; prints its path and hash, and the checksum that the monitor shows.
 pub(super) fn read(path: &Path) -> Result<Image, Failure> {
     let image = Image::from_elf(&announced(path)?)
         .map_err(|error| Failure::BadArgument(format!("{}: {error}", path.display())))?;
@@ -89,7 +89,7 @@ pub(super) fn read(path: &Path) -> Result<Image, Failure> {
     Ok(image)
 }
 
-/// The bytes of an ELF file that will run; says its path and its hash.
+/// Reads an ELF file and prints its path and hash.
 fn announced(path: &Path) -> Result<Vec<u8>, Failure> {
     let bytes = std::fs::read(path)?;
     eprintln!("{} ({:.16})", path.display(), image::file_hash(&bytes));

@@ -1,4 +1,4 @@
-//! What was chosen and what it stands, as text.
+//! What was chosen and what it withstands, as text.
 
 use core::fmt::Write;
 
@@ -17,7 +17,7 @@ pub(super) fn chosen(rig: &Rig, tolerances: &Tolerances, choice: &Choice, front:
     out
 }
 
-/// What the numbers of the file stand.
+/// What the numbers of the file withstand.
 pub(super) fn judged(
     rig: &Rig,
     tolerances: &Tolerances,
@@ -77,7 +77,7 @@ fn write_judgement(out: &mut String, judgement: &Judgement) -> core::fmt::Result
         let share = runs.share.to_string();
         let stand = format!("{} of {}", runs.stood, runs.runs);
         let figures = [runs.force_rms_n, 1e3 * runs.peak_angle_rad, 1e3 * runs.peak_position_m];
-        // Those of the runs that stood.
+        // They are of the runs that stood: blank if none did.
         let [force, angle, cart] =
             figures.map(|figure| if runs.stood == 0 { String::new() } else { significant(figure, 3) });
         writeln!(out, "{}", row([&share, &stand, &force, &angle, &cart]).trim_end())?;

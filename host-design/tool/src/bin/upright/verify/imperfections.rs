@@ -1,4 +1,4 @@
-//! What the loop stands of each imperfection, as text.
+//! How much of each imperfection the loop withstands, as text.
 
 use core::fmt::Write;
 
