@@ -2,7 +2,7 @@
 //!
 //! | task | started by | priority | does |
 //! |---|---|---|---|
-//! | `tick` | the SysTick timer, at the table's period | highest | inputs → supervisor → controller → motor, then the prediction |
+//! | `tick` | SysTick, at the table's period | highest | inputs → supervisor → controller → motor, then the prediction |
 //! | `idle` | every interrupt | lowest | bytes → commands, telemetry → bytes |
 //!
 //! The tasks share no locked resource, only single-producer, single-consumer queues. So no task below `tick` can delay
@@ -28,7 +28,6 @@ const CYCLES_PER_TICK: u32 = {
 
 #[rtic::app(device = stm32f4xx_hal::pac, peripherals = true)]
 mod app {
-    use cortex_m::peripheral::syst::SystClkSource;
     use heapless::spsc::Queue;
     use upright::board::Board;
     use upright::firmware::control_task::{COMMANDS, ControlTask, MESSAGES};
@@ -38,7 +37,7 @@ mod app {
     use upright::protocol::serial_link::SerialLink;
     use upright::table::{Build, GainTable};
 
-    use crate::board::{Buffer, Hardware, SerialLine, set_up};
+    use crate::board::{Buffer, Hardware, SerialLine, set_up, start_ticks};
 
     #[shared]
     struct Shared {}
@@ -66,12 +65,7 @@ mod app {
         let firmware = Firmware::of_any_table(table, &SWING_UP, &build, Hardware::WIDTHS, start);
         let mut control = ControlTask::new(firmware, hardware, commands, messages);
         control.board().start_watchdog();
-        let mut systick = cx.core.SYST;
-        systick.set_clock_source(SystClkSource::Core);
-        systick.set_reload(crate::CYCLES_PER_TICK - 1);
-        systick.clear_current();
-        systick.enable_interrupt();
-        systick.enable_counter();
+        start_ticks(cx.core.SYST, crate::CYCLES_PER_TICK);
         (Shared {}, Local { control, link: SerialLink::new(to_control, to_link), line })
     }
 

@@ -2,7 +2,8 @@
 //!
 //! A cargo feature selects the board. A new board is a folder beside `f4` that provides the same names: `set_up` makes
 //! a [`Hardware`] for the control task and a [`SerialLine`] for the background task, with a [`Buffer`] for its bytes;
-//! `stop` turns the motor off for good; `CLOCK_HZ` is the core clock.
+//! `start_ticks` starts the interrupt of the control task, and `sleep` waits for an interrupt; `stop` turns the motor off
+//! for good; `CLOCK_HZ` is the core clock.
 
 #![allow(unsafe_code)]
 
@@ -40,9 +41,13 @@ mod handlers;
 mod in_the_loop;
 
 #[cfg(not(any(feature = "in-the-loop", feature = "in-the-loop-usart")))]
-pub(crate) use f4::{Buffer, CLOCK_HZ, Hardware, SerialLine, set_up, stop};
+use f4::sleep;
+#[cfg(not(any(feature = "in-the-loop", feature = "in-the-loop-usart")))]
+pub(crate) use f4::{Buffer, CLOCK_HZ, Hardware, SerialLine, set_up, start_ticks, stop};
 #[cfg(any(feature = "in-the-loop", feature = "in-the-loop-usart"))]
-pub(crate) use in_the_loop::{Buffer, CLOCK_HZ, Hardware, SerialLine, set_up, stop};
+use in_the_loop::sleep;
+#[cfg(any(feature = "in-the-loop", feature = "in-the-loop-usart"))]
+pub(crate) use in_the_loop::{Buffer, CLOCK_HZ, Hardware, SerialLine, set_up, start_ticks, stop};
 
 /// Waits for the next interrupt.
 ///
@@ -55,5 +60,5 @@ pub(crate) fn wait_for_interrupt() {
     control.set_fpca(Fpca::NotActive);
     // SAFETY: only the bit that says whether floating-point registers are in use is changed.
     unsafe { control::write(control) };
-    cortex_m::asm::wfi();
+    sleep();
 }

@@ -12,6 +12,7 @@ mod supply;
 mod watchdog;
 mod wiring;
 
+use cortex_m::peripheral::syst::SystClkSource;
 use cortex_m::peripheral::{DWT, SYST};
 use stm32f4xx_hal::pac::{EXTI, PWR, Peripherals};
 use upright::board::{Board, Contacts, Inputs, Output};
@@ -135,6 +136,20 @@ impl Board<SENSORS> for Hardware {
     fn cycles(&self) -> u32 {
         DWT::cycle_count()
     }
+}
+
+/// Starts the tick: an interrupt every `cycles` of the core clock.
+pub(crate) fn start_ticks(mut timer: SYST, cycles: u32) {
+    timer.set_clock_source(SystClkSource::Core);
+    timer.set_reload(cycles - 1);
+    timer.clear_current();
+    timer.enable_interrupt();
+    timer.enable_counter();
+}
+
+/// Waits for an interrupt.
+pub(crate) fn sleep() {
+    cortex_m::asm::wfi();
 }
 
 /// Whether the tick timer has wrapped since the last call.

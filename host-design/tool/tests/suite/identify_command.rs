@@ -106,7 +106,7 @@ fn an_empty_log_ends_with_status_2() {
 
 #[test]
 fn a_foreign_file_ends_with_status_2() {
-    refused(&path_of(SINGLE), b"tick,time_s\n0,0\n", 2, "no log of Upright");
+    refused(&path_of(SINGLE), b"tick,time_s\n0,0\n", 2, "not a log of Upright");
 }
 
 #[test]
@@ -120,7 +120,7 @@ fn a_damaged_log_ends_with_status_2() {
 #[test]
 fn a_truncated_log_ends_with_status_2() {
     let whole = shaken().to_bytes();
-    refused(&path_of(SINGLE), &whole[..whole.len() - 7], 2, "ends in the middle");
+    refused(&path_of(SINGLE), &whole[..whole.len() - 7], 2, "ends within the header or frame");
 }
 
 #[test]
