@@ -17,10 +17,21 @@ pub struct Certified {
     pub double: Design<f64>,
     /// Every value rounded once to `f32` (not by way of `f64`): what goes into the table.
     pub single: Design<f32>,
-    /// Poles of the closed loops.
-    pub poles: DesignPoles,
     /// The two precisions that agreed (bits).
     pub bits: [usize; 2],
+    /// The design at the higher of them.
+    exact: Design<Wide>,
+}
+
+impl Certified {
+    /// Poles of the closed loops of this design for `rig`. They take as long as the design, so they are computed only
+    /// for whoever looks at them.
+    ///
+    /// # Errors
+    /// [`DesignError::Poles`] if the eigenvalue iteration fails.
+    pub fn poles(&self, rig: &Rig) -> Result<DesignPoles, DesignError> {
+        with_precision(self.bits[1], || self.exact.poles(rig))
+    }
 }
 
 /// A design at one precision, rounded like a certified one but not certified: for ranking designs and for trials.
@@ -71,18 +82,18 @@ impl<T: Clone> Laws<T> {
 /// The first precision that is tried (bits).
 const FIRST_BITS: usize = 256;
 
-/// A design at one precision and its poles.
-type Attempt = Result<(Uncertified, DesignPoles), DesignError>;
+/// A design at one precision, rounded and as it is.
+type Attempt = Result<(Uncertified, Design<Wide>), DesignError>;
 
 fn attempt(rig: &Rig, bits: usize) -> Attempt {
     with_precision(bits, || {
         let design = Design::<Wide>::of(rig)?;
-        Ok((Uncertified::rounded(&design), design.poles(rig)?))
+        Ok((Uncertified::rounded(&design), design))
     })
 }
 
-fn certified((design, poles): (Uncertified, DesignPoles), bits: usize) -> Certified {
-    Certified { double: design.double, single: design.single, poles, bits: [bits / 2, bits] }
+fn certified((rounded, exact): (Uncertified, Design<Wide>), bits: usize) -> Certified {
+    Certified { double: rounded.double, single: rounded.single, bits: [bits / 2, bits], exact }
 }
 
 /// Designs what `rig` asks for and certifies it.
@@ -96,8 +107,7 @@ fn certified((design, poles): (Uncertified, DesignPoles), bits: usize) -> Certif
 #[doc(alias = "kalman")]
 pub fn design(rig: &Rig) -> Result<Certified, DesignError> {
     let (first, second) = std::thread::scope(|scope| {
-        let first = scope
-            .spawn(|| with_precision(FIRST_BITS, || Ok(Uncertified::rounded(&Design::<Wide>::of(rig)?))));
+        let first = scope.spawn(|| attempt(rig, FIRST_BITS).map(|(design, _)| design));
         let second = attempt(rig, 2 * FIRST_BITS);
         (first.join(), second)
     });

@@ -4,7 +4,7 @@ use serde::Serialize;
 use upright::table::Law;
 
 use super::row::{Fate, Figures, Row};
-use upright_design::design::{Certified, design};
+use upright_design::design::{Certified, DesignPoles, Poles, design};
 use upright_design::parallel;
 use upright_design::rig::Rig;
 use upright_design::simulate::{Scenario, SimulationError, Summary, simulate};
@@ -100,7 +100,7 @@ fn row(candidate: &Candidate, law: Law, conditions: &Conditions) -> Result<Row, 
         figures: None,
         trace: None,
     };
-    let (certified, table) = match designed(&rig, conditions) {
+    let (certified, poles, table) = match designed(&rig, conditions) {
         Ok(designed) => designed,
         Err(reason) => return Ok(Row { fate: Fate::NoDesign(reason), ..row }),
     };
@@ -110,7 +110,7 @@ fn row(candidate: &Candidate, law: Law, conditions: &Conditions) -> Result<Row, 
         ..Scenario::at_rest(&rig, law)
     };
     let (trace, summary) = simulate(&rig, &table, &scenario)?;
-    let figures = figures(&rig, law, &certified, &table, &summary);
+    let figures = figures(&rig, law, &certified, &table, &summary, poles.in_table(law)[0]);
     let fate = match summary.fall {
         Some(fall) => Fate::Fallen(fall),
         None if summary.settled => Fate::Settled,
@@ -119,21 +119,28 @@ fn row(candidate: &Candidate, law: Law, conditions: &Conditions) -> Result<Row, 
     Ok(Row { fate, figures: Some(figures), trace: Some(trace), ..row })
 }
 
-/// Design and table, or the reason why there is none.
-fn designed(rig: &Rig, conditions: &Conditions) -> Result<(Certified, TableValues), String> {
+/// Design, its poles, and table, or the reason why there is none.
+fn designed(rig: &Rig, conditions: &Conditions) -> Result<(Certified, DesignPoles, TableValues), String> {
     let gains = if conditions.continuous_gains { Gains::Continuous } else { Gains::Sampled };
     let certified = design(rig).map_err(|reason| reason.to_string())?;
     let table = TableValues::of(rig, &certified, gains).map_err(|reason| reason.to_string())?;
-    Ok((certified, if conditions.raw_step { table.without_governor() } else { table }))
+    let poles = certified.poles(rig).map_err(|reason| reason.to_string())?;
+    Ok((certified, poles, if conditions.raw_step { table.without_governor() } else { table }))
 }
 
-fn figures(rig: &Rig, law: Law, certified: &Certified, table: &TableValues, summary: &Summary) -> Figures {
+fn figures(
+    rig: &Rig,
+    law: Law,
+    certified: &Certified,
+    table: &TableValues,
+    summary: &Summary,
+    poles: Option<&Poles>,
+) -> Figures {
     // An unstable loop and one whose margins cannot be computed both have none.
     let margins = margins_of(rig, certified, table, law).ok().flatten();
     let settings = AttractionSettings { relative: TILT_PRECISION, ..AttractionSettings::default() };
     let tilts = margins.as_ref().and_then(|_| largest_tilts(rig, table, law, &settings).ok());
     let tilts = tilts.into_iter().flatten().map(|tilt| tilt.edge.size);
-    let poles = certified.poles.in_table(law)[0];
     let margin = |of: fn(&Margins) -> Option<f64>| margins.as_ref().and_then(of);
     Figures {
         settling_time_s: summary.settling_time_s,

@@ -1,6 +1,7 @@
 //! Errors of a report.
 
 use crate::figure::FigureError;
+use upright_design::design::DesignError;
 use upright_design::simulate::SimulationError;
 use upright_design::verify::{Unverifiable, VerifyError};
 
@@ -13,6 +14,9 @@ pub enum ReportError {
     /// A run cannot be started.
     #[error(transparent)]
     Simulation(#[from] SimulationError),
+    /// The poles of the design cannot be computed.
+    #[error(transparent)]
+    Design(#[from] DesignError),
     /// The trust report cannot be computed.
     #[error(transparent)]
     Verify(#[from] VerifyError),

@@ -99,12 +99,13 @@ impl Picture {
 pub fn report(source: &Source<'_>, stage: &dyn Fn(&str)) -> Result<Report, ReportError> {
     let Source { rig, certified, table, trust, .. } = *source;
     stage("runs");
-    let mut scenes = runs::scenes(rig, certified, table, trust, source.seed)?;
+    let designed_poles = certified.poles(rig)?;
+    let mut scenes = runs::scenes(rig, &designed_poles, table, trust, source.seed)?;
     scenes.extend(source.swing_up.map(|run| runs::swing_up(rig, run, source.seed)));
     scenes.extend(source.tour.map(|run| runs::tour(rig, run, source.seed)));
     let laws = runs::laws(table);
     let mut pictures = Vec::new();
-    let mut page = Page::new(source, &scenes)?;
+    let mut page = Page::new(source, &designed_poles, &scenes)?;
     if let PlantDescription::Chain(chain) = &rig.plant {
         let svg = drawing::svg(chain);
         page.drawing = Some(svg.clone());
@@ -125,7 +126,7 @@ pub fn report(source: &Source<'_>, stage: &dyn Fn(&str)) -> Result<Report, Repor
     stage("poles and frequency");
     let parts: Vec<_> = laws.iter().copied().zip(trust.laws.iter().map(|part| &part.linear)).collect();
     let mut poles: Vec<Figure> =
-        parts.iter().map(|(law, part)| poles::figure(rig, certified, *law, part)).collect();
+        parts.iter().map(|(law, part)| poles::figure(rig, &designed_poles, *law, part)).collect();
     Figure::same_scale(&mut poles);
     for (figure, &(law, _)) in poles.iter().zip(&parts) {
         keep("poles", law, figure)?;

@@ -12,7 +12,7 @@ use super::runs::{LawRun, Scene, laws};
 use super::trust::{CheckRow, TrustRow, check_rows, trust_rows};
 use super::{ReportError, Source};
 use crate::figure::{COLOURS_CSS, style_sheet};
-use upright_design::design::Feedback;
+use upright_design::design::{DesignPoles, Feedback};
 use upright_design::rig::{PlantDescription, Rig};
 use upright_design::verify::{Certificate, Disturbance};
 
@@ -98,7 +98,11 @@ struct CertificateRow {
 
 impl<'a> Page<'a> {
     /// The page without its pictures.
-    pub(super) fn new(source: &Source<'a>, scenes: &[Scene]) -> Result<Self, ReportError> {
+    pub(super) fn new(
+        source: &Source<'a>,
+        designed_poles: &DesignPoles,
+        scenes: &[Scene],
+    ) -> Result<Self, ReportError> {
         let Source { rig, certified, table, trust, .. } = *source;
         let design = &certified.double;
         let short = |entry: &f64| significant(*entry, DIGITS);
@@ -121,7 +125,10 @@ impl<'a> Page<'a> {
             a: design.a.row_slices().map(|row| row.iter().map(short).collect()).collect(),
             b: design.b.entries().iter().map(short).collect(),
             poles: Vec::new(),
-            laws: laws(table).into_iter().filter_map(|law| LawEntry::of(source, &names, law)).collect(),
+            laws: laws(table)
+                .into_iter()
+                .filter_map(|law| LawEntry::of(source, designed_poles, &names, law))
+                .collect(),
             observer: observer.map(|kalman| {
                 kalman.l_filter.row_slices().map(|row| row.iter().map(short).collect()).collect()
             }),
@@ -179,7 +186,7 @@ impl Outcome {
 }
 
 impl LawEntry {
-    fn of(source: &Source<'_>, names: &[String], law: Law) -> Option<Self> {
+    fn of(source: &Source<'_>, designed_poles: &DesignPoles, names: &[String], law: Law) -> Option<Self> {
         let Source { rig, certified, table, trust, .. } = *source;
         let design = &certified.double;
         let (continuous, sampled) = (design.continuous.in_table()[law]?, design.sampled.in_table()[law]?);
@@ -209,7 +216,7 @@ impl LawEntry {
         Some(Self {
             name: law.title(),
             gains,
-            poles: certified.poles.in_table(law).map(listed),
+            poles: designed_poles.in_table(law).map(listed),
             certificates: part.linear.certificates.iter().map(CertificateRow::of).collect(),
             cost: Cost::of(table, values),
         })

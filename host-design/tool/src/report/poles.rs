@@ -3,13 +3,13 @@
 use upright::table::Law;
 
 use crate::figure::{Axis, Curve, Figure, Panel};
-use upright_design::design::Certified;
+use upright_design::design::DesignPoles;
 use upright_design::rig::Rig;
 use upright_design::verify::LinearReport;
 
 /// The poles in the z-plane with the unit circle, and in the s-plane.
-pub(super) fn figure(rig: &Rig, certified: &Certified, law: Law, report: &LinearReport) -> Figure {
-    let [continuous, sampled] = certified.poles.in_table(law);
+pub(super) fn figure(rig: &Rig, designed: &DesignPoles, law: Law, report: &LinearReport) -> Figure {
+    let [continuous, sampled] = designed.in_table(law);
     let points = |poles: Option<&Vec<[f64; 2]>>| poles.cloned().unwrap_or_default();
     let tick = rig.tick.period_s;
     // s = ln z / T; a pole at z = 0 has no place in the s-plane.

@@ -3,7 +3,7 @@
 use upright::table::Law;
 
 use super::number::number;
-use upright_design::design::Certified;
+use upright_design::design::DesignPoles;
 use upright_design::number::rounded;
 use upright_design::rig::{PlantDescription, Rig};
 use upright_design::simulate::{Scenario, Sensing, SimulationError, Summary, Trace, simulate};
@@ -39,14 +39,14 @@ const MOST_TICKS: f64 = 200_000.0;
 /// encoders alone.
 pub(super) fn scenes(
     rig: &Rig,
-    certified: &Certified,
+    poles: &DesignPoles,
     table: &TableValues,
     trust: &TrustReport,
     seed: u64,
 ) -> Result<Vec<Scene>, SimulationError> {
     let base = Scenario {
         sensing: Sensing::FullState,
-        duration_s: duration(rig, certified),
+        duration_s: duration(rig, poles),
         seed,
         substeps: 4,
         ..Scenario::at_rest(rig, Law::Lqr)
@@ -195,12 +195,9 @@ fn noise_text(rig: &Rig, seed: u64) -> String {
 
 /// Duration of a run (s): 10 s for links on a cart; ten times the slowest time constant for a model, whose time scale
 /// may be any.
-fn duration(rig: &Rig, certified: &Certified) -> f64 {
-    let slowest = Law::ALL
-        .into_iter()
-        .filter_map(|law| certified.poles.in_table(law)[0])
-        .flatten()
-        .map(|pole| -pole[0]);
+fn duration(rig: &Rig, poles: &DesignPoles) -> f64 {
+    let slowest =
+        Law::ALL.into_iter().filter_map(|law| poles.in_table(law)[0]).flatten().map(|pole| -pole[0]);
     let slowest = slowest.filter(|rate| *rate > 0.0).fold(f64::INFINITY, f64::min);
     let wanted = match &rig.plant {
         PlantDescription::Model(_) if slowest.is_finite() => 10.0 / slowest,

@@ -51,7 +51,7 @@ pub fn designs(
     }
 
     let mut poles = vec![PoleSet { of: "open loop".to_owned(), poles: open_loop_poles(&rigs.exact)? }];
-    for (law, found) in exact.poles.continuous.present() {
+    for (law, found) in exact.poles(&rigs.exact)?.continuous.present() {
         poles.push(PoleSet { of: format!("{law}, exact gains"), poles: found.clone() });
     }
     for law in Law::ALL {

@@ -78,10 +78,9 @@ pub fn robustness(loops: &Loops) -> Result<Vec<Robustness>, ReproduceError> {
     let of_law = |reports: &[LinearReport], law: Law| {
         reports.iter().find(|report| report.law == law).and_then(|report| report.margins.clone())
     };
+    let poles = loops.certified.poles(&loops.rig)?;
     let margins = |law: Law, kind: Loop| match kind {
-        Loop::Continuous => {
-            loops.certified.poles.continuous[law].as_ref().map(|closed| continuous_margins(&open, closed))
-        }
+        Loop::Continuous => poles.continuous[law].as_ref().map(|closed| continuous_margins(&open, closed)),
         Loop::FullState => of_law(&full_state, law),
         Loop::Encoders => of_law(&encoders, law),
     };

@@ -112,7 +112,7 @@ fn open_loop_poles_are_two_integrators_and_four_pairs() {
 
 #[test]
 fn closed_loop_poles_are_those_of_the_paper() {
-    let poles = &designed("quadruple-paper").poles;
+    let poles = designed("quadruple-paper").poles(&rig("quadruple-paper")).unwrap();
     let fastest = poles.continuous.lqr.as_ref().unwrap().iter().map(|pole| pole[0]).fold(0.0, f64::min);
     assert_eq!(format!("{fastest:.1}"), "-527.6");
     let placed: Vec<[String; 2]> = poles

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 use upright::table::{Law, PerLaw};
-use upright_design::design::{Assessment, Certified, design};
+use upright_design::design::{Assessment, DesignPoles, design};
 use upright_design::rig::Rig;
 use upright_design::simulate::{Scenario, Summary, simulate};
 use upright_design::swing_up::{Stored, SwingUpError};
@@ -66,22 +66,26 @@ impl Design {
     pub(crate) fn run(self) -> Result<(), Failure> {
         let rig = Rig::from_path(&self.rig)?;
         let name = || self.rig.display().to_string();
-        let (certified, reports, table) = with_spinner("designing", || -> Result<_, Failure> {
+        let (certified, poles, reports, table) = with_spinner("designing", || -> Result<_, Failure> {
             let failed = |source| Failure::Design { rig: name(), source };
             let certified = design(&rig).map_err(failed)?;
+            let poles = certified.poles(&rig).map_err(failed)?;
             let assessments = certified.assess(&rig).map_err(failed)?;
             let table = TableValues::of(&rig, &certified, Gains::Sampled);
-            let reports = report(&rig, &certified, assessments, table.as_ref().ok())?;
-            Ok((certified, reports, table))
+            let reports = report(&rig, &poles, assessments, table.as_ref().ok())?;
+            Ok((certified, poles, reports, table))
         })?;
 
         let mut out = std::io::stdout().lock();
         if self.json {
-            serde_json::to_writer(&mut out, &data::DesignData::of(&rig, &certified, table.as_ref().ok()))
-                .map_err(std::io::Error::from)?;
+            serde_json::to_writer(
+                &mut out,
+                &data::DesignData::of(&rig, &certified, &poles, table.as_ref().ok()),
+            )
+            .map_err(std::io::Error::from)?;
             writeln!(out)?;
         } else {
-            write!(out, "{}", text::design(&rig, &certified, &reports))?;
+            write!(out, "{}", text::design(&rig, &certified, &poles, &reports))?;
         }
         for warning in text::warnings(&rig, &certified, &reports, table.as_ref().ok()) {
             eprintln!("warning: {warning}");
@@ -118,7 +122,7 @@ impl Design {
 
 fn report(
     rig: &Rig,
-    certified: &Certified,
+    poles: &DesignPoles,
     assessments: PerLaw<Option<Assessment>>,
     table: Option<&TableValues>,
 ) -> Result<Vec<LawReport>, Failure> {
@@ -126,7 +130,7 @@ fn report(
     for (law, &assessment) in assessments.present() {
         let run = match table {
             Some(table) => {
-                let scenario = Scenario::acceptance(rig, law, slowest_time_constant(rig, certified, law));
+                let scenario = Scenario::acceptance(rig, law, slowest_time_constant(rig, poles, law));
                 Some(simulate(rig, table, &scenario)?.1)
             }
             None => None,
@@ -137,8 +141,8 @@ fn report(
 }
 
 /// Slowest time constant of the continuous closed loop (s).
-fn slowest_time_constant(rig: &Rig, certified: &Certified, law: Law) -> f64 {
-    let poles = certified.poles.in_table(law)[0].map(Vec::as_slice).unwrap_or_default();
+fn slowest_time_constant(rig: &Rig, poles: &DesignPoles, law: Law) -> f64 {
+    let poles = poles.in_table(law)[0].map(Vec::as_slice).unwrap_or_default();
     let slowest = poles.iter().map(|pole| -pole[0]).fold(f64::INFINITY, f64::min);
     if slowest > 0.0 && slowest.is_finite() { 1.0 / slowest } else { rig.tick.period_s }
 }

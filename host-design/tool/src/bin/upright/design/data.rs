@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 use upright::table::{Law, PerLaw};
-use upright_design::design::{Certified, Laws, Poles};
+use upright_design::design::{Certified, DesignPoles, Laws, Poles};
 use upright_design::numerics::Matrix;
 use upright_design::rig::Rig;
 use upright_design::table::TableValues;
@@ -80,8 +80,13 @@ struct KalmanData<'a> {
 type Rows<'a> = Vec<&'a [f64]>;
 
 impl<'a> DesignData<'a> {
-    pub(super) fn of(rig: &'a Rig, certified: &'a Certified, table: Option<&'a TableValues>) -> Self {
-        let (design, poles, states) = (&certified.double, &certified.poles, rig.states());
+    pub(super) fn of(
+        rig: &'a Rig,
+        certified: &'a Certified,
+        poles: &'a DesignPoles,
+        table: Option<&'a TableValues>,
+    ) -> Self {
+        let (design, states) = (&certified.double, rig.states());
         Self {
             rig: &rig.name,
             hash: format!("{:016x}", rig.hash()),

@@ -2,17 +2,17 @@
 
 use core::fmt::Write;
 
-use upright_design::design::{Certified, Feedback};
+use upright_design::design::{Certified, DesignPoles, Feedback};
 use upright_design::number::{self, significant};
 use upright_design::rig::{PlantDescription, Rig};
 use upright_design::table::{LawValues, TableValues};
 
 use super::LawReport;
 
-pub(super) fn design(rig: &Rig, certified: &Certified, reports: &[LawReport]) -> String {
+pub(super) fn design(rig: &Rig, certified: &Certified, poles: &DesignPoles, reports: &[LawReport]) -> String {
     let mut out = String::new();
     // Writing into a String cannot fail.
-    let _ = write_design(&mut out, rig, certified, reports);
+    let _ = write_design(&mut out, rig, certified, poles, reports);
     out
 }
 
@@ -20,6 +20,7 @@ fn write_design(
     out: &mut String,
     rig: &Rig,
     certified: &Certified,
+    poles: &DesignPoles,
     reports: &[LawReport],
 ) -> core::fmt::Result {
     let [low, high] = certified.bits;
@@ -34,9 +35,9 @@ fn write_design(
     for report in reports {
         let law = report.law;
         writeln!(out, "\n{law}")?;
-        let [poles, sampled_poles] = certified.poles.in_table(law);
+        let [continuous_poles, sampled_poles] = poles.in_table(law);
         if let Some(gains) = certified.double.continuous.in_table()[law] {
-            write_law(out, "continuous", "s", gains, poles)?;
+            write_law(out, "continuous", "s", gains, continuous_poles)?;
         }
         if let Some(gains) = certified.double.sampled.in_table()[law] {
             write_law(out, "sampled", "z", gains, sampled_poles)?;
