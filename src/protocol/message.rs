@@ -254,7 +254,7 @@ pub struct Telemetry<const NX: usize, const NY: usize> {
     pub arming_inhibits: Inhibits,
     /// Inhibits of the next motion that hold now: of lowering while the rig balances, otherwise of raising.
     pub swing_up_inhibits: Inhibits,
-    /// Ticks since the beginning of the motion; 0 if there is none.
+    /// Ticks since the beginning of the motion; 0 if there is none. After a motion that was cut short, where it ended.
     pub motion_tick: u32,
     /// Contacts and flags of this tick, as read.
     pub contacts: Contacts,

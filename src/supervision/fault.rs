@@ -208,14 +208,14 @@ impl Fault {
             name: "watchdog",
             condition: "ticks stopped: the independent watchdog resets the microcontroller, which starts disarmed and \
                         keeps this as the reason",
-            reaction: Reaction::Hardware("3 periods, by the watchdog"),
+            reaction: Reaction::Hardware("2 to 6 periods, by the watchdog"),
             remedy: "report it with the firmware's version; home and check the signs again",
         },
         Entry {
             fault: Fault::Crash,
             name: "crash",
-            condition: "panic, processor fault or stack overflow: the handler turns the motor off and resets; the \
-                        firmware starts disarmed and keeps this as the reason",
+            condition: "panic, processor fault or stack overflow: the handler turns the motor off, the watchdog resets; \
+                        the firmware starts disarmed and keeps this as the reason",
             reaction: Reaction::Hardware("at once, in the handler"),
             remedy: "report it with the firmware's version; home and check the signs again",
         },

@@ -159,8 +159,8 @@ impl Adc {
         if self.done_at.is_some_and(|at| at <= now) {
             self.done_at = None;
             let channel = self.channel();
-            let internal = channel < 16 || self.common & REFERENCE_ON != 0;
-            let fraction = self.inputs.get(channel).copied().filter(|_| connected(channel) && internal);
+            let enabled = channel < 16 || self.common & REFERENCE_ON != 0;
+            let fraction = self.inputs.get(channel).copied().filter(|_| connected(channel) && enabled);
             self.data = (fraction.unwrap_or(0.0) * 4096.0).clamp(0.0, 4095.0) as u32;
             self.status |= END_OF_CONVERSION | 1 << 4;
         }

@@ -216,8 +216,7 @@ impl Rcc {
             0x04 => Bits::writable(0x0f43_7fff).with_reserved_ones(0x2000_0000),
             0x08 => Bits::writable(0xfffd_fcf3 | 1 << 17).with_read_only(0xc),
             0x0c => Bits::writable(0x00bf_3f00).with_read_only(0xbf),
-            0x30 => Bits::writable(if f446 { 0x6060_1000 | 0x0030_00ff } else { 0x7e74_11ff })
-                .with_reserved_ones(0),
+            0x30 => Bits::writable(if f446 { 0x6060_1000 | 0x0030_00ff } else { 0x7e74_11ff }),
             0x40 => Bits::writable(if f446 { 0x3fff_c9ff } else { 0x36fe_c9ff }),
             0x44 => Bits::writable(if f446 { 0x00c7_7f33 } else { 0x0007_5f33 }),
             0x74 => Bits::writable(1 | 1 << 24).with_read_only(0xfe00_0002),

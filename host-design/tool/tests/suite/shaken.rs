@@ -248,8 +248,10 @@ fn over_line(host: &(Rig, TableValues), is_lost: fn(u32) -> bool) -> (Result<Log
     let (machine, table) = double();
     with_firmware(table, |target| {
         let mut harness = checked_and_hanging(machine, table, target, 1).unwrap();
-        let since_1970 =
-            |tick: u32| Duration::from_secs(1_800_000_000) + Duration::from_millis(2 * u64::from(tick));
+        let since_1970 = |tick: u32| {
+            Duration::from_secs(1_800_000_000)
+                + Duration::from_secs_f64(f64::from(tick) * machine.tick.period_s)
+        };
         let mut line = OverLine::new(&host.0, &host.1, 5.0, 1, since_1970(0)).unwrap();
         let (mut ended, mut on) = (None, 0);
         for tick in 0..20_000 {

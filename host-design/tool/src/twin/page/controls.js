@@ -224,7 +224,7 @@ export class Controls {
     const { challenge } = machine;
     byId('challenge').setAttribute('aria-pressed', challenge !== null);
     byId('score').textContent = challenge === null ? '' : `stood ${challenge.stood_s.toFixed(0)} s, hardest push survived ${challenge.survived_n.toFixed(1)} N${
-      challenge.is_over ? '; it fell' : `, next ${Math.abs(challenge.push_n).toFixed(1)} N`}`;
+      challenge.is_over ? '; it fell' : `, push of ${Math.abs(challenge.push_n).toFixed(1)} N`}`;
     for (const [name, { element, value, input, unit, nominal }] of this.sliders) {
       const now = machine.properties[name];
       value.textContent = `${Number(now.toPrecision(4))} ${unit}`;
