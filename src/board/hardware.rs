@@ -2,8 +2,8 @@
 //!
 //! A cargo feature selects the board. A new board is a folder beside `f4` that provides the same names: `set_up` makes
 //! a [`Hardware`] for the control task and a [`SerialLine`] for the background task, with a [`Buffer`] for its bytes;
-//! `start_ticks` starts the interrupt of the control task, and `sleep` waits for an interrupt; `stop` turns the motor off
-//! for good; `CLOCK_HZ` is the core clock.
+//! `start_ticks` starts the interrupt of the control task, and `sleep` waits for an interrupt; `stop` turns the motor
+//! off for good; `CLOCK_HZ` is the core clock.
 
 #![allow(unsafe_code)]
 

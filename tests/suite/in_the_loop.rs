@@ -6,8 +6,8 @@
 
 use std::fmt::Write;
 use std::path::PathBuf;
-use std::process::{Command, Stdio};
 
+use crate::equipment::{built, built_for, in_qemu};
 use crate::published::{rig, rig_and_table, rig_path, stored_motions, table};
 use upright::protocol::message::Request;
 use upright::supervision::supervisor::State;
@@ -18,7 +18,7 @@ use upright_design::rig::Rig;
 use upright_design::simulate::{Scenario, simulate};
 use upright_design::swing_up::{StoredTransitions, Tour, hangs, up_and_down, with_motions};
 use upright_design::table::TableValues;
-use upright_tool::image::{Kind, build_for, build_if_possible, if_possible};
+use upright_tool::image::Kind;
 use upright_tool::in_the_loop::{Link, Place, RunError, run};
 
 /// Upper bound on the instructions in a tick of the image, with telemetry in every tick: 10 % above the count with
@@ -60,20 +60,7 @@ fn scenarios(rig: &Rig, disturbed: bool) -> Vec<(String, Scenario)> {
 
 /// The image, if its compiler and QEMU are both installed.
 fn image(kind: Kind) -> Option<PathBuf> {
-    in_qemu(build_if_possible(kind).unwrap())
-}
-
-/// The image, if there is one and QEMU is installed.
-fn in_qemu(image: Option<PathBuf>) -> Option<PathBuf> {
-    let image = image?;
-    match Command::new("qemu-system-arm").arg("--version").stdout(Stdio::null()).status() {
-        Ok(_) => Some(image),
-        Err(error) if std::env::var_os("UPRIGHT_REQUIRE_IMAGE").is_some() => panic!("no QEMU: {error}"),
-        Err(_) => {
-            eprintln!("not exercised: the image in QEMU: install qemu-system-arm");
-            None
-        }
-    }
+    in_qemu(built(kind))
 }
 
 fn forces_and_estimates(recording: &Recording) -> Vec<(f64, f64, Vec<f64>)> {
@@ -113,8 +100,7 @@ fn the_image_in_qemu_gives_the_bits_of_the_host_and_of_its_last_run() {
 #[test]
 fn the_image_in_qemu_raises_and_lowers_the_links_with_the_bits_of_the_host() {
     let (rig, table) = with_stored_motions("single-quanser-ip02", &[]);
-    let built = if_possible(build_for(Kind::InTheLoop, &rig, &table)).unwrap();
-    let Some(image) = in_qemu(built) else { return };
+    let Some(image) = in_qemu(built_for(Kind::InTheLoop, &rig, &table)) else { return };
     let scenario = up_and_down(&rig, &table, 0.5).unwrap();
     let qemu = run(&rig, &table, &scenario, Place::Qemu { image: &image, link: Link::Files }).unwrap();
     println!("{} instructions in the longest tick", qemu.worst_cycles);
@@ -128,8 +114,7 @@ fn the_image_in_qemu_raises_and_lowers_the_links_with_the_bits_of_the_host() {
 #[test]
 fn the_image_in_qemu_goes_from_equilibrium_to_equilibrium_with_the_bits_of_the_host() {
     let (rig, table) = with_stored_motions("double-quanser-dbpen", &["uu-ud", "ud-dd"]);
-    let built = if_possible(build_for(Kind::InTheLoop, &rig, &table)).unwrap();
-    let Some(image) = in_qemu(built) else { return };
+    let Some(image) = in_qemu(built_for(Kind::InTheLoop, &rig, &table)) else { return };
     // Up, on to the equilibrium at which the second link hangs, and down.
     let tour = Tour::of(&rig, &table).unwrap();
     let mut scenario = tour.scenario(&rig, 7);
@@ -193,8 +178,7 @@ fn swinging_links_are_homed_in_qemu_with_the_bits_of_the_host() {
 #[test]
 fn the_image_runs_with_serial_lines_too() {
     let (rig, table) = rig_and_table("single-quanser-ip02").clone();
-    let built = if_possible(build_for(Kind::InTheLoopUsart, &rig, &table)).unwrap();
-    let Some(image) = in_qemu(built) else { return };
+    let Some(image) = in_qemu(built_for(Kind::InTheLoopUsart, &rig, &table)) else { return };
     let (_, scenario) = scenarios(&rig, true).remove(0);
     let scenario = Scenario { duration_s: 0.3, ..scenario };
     let qemu = run(&rig, &table, &scenario, Place::Qemu { image: &image, link: Link::Usart }).unwrap();

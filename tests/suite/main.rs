@@ -4,6 +4,8 @@
 mod bench;
 mod closed_loop;
 mod encoders_only;
+#[path = "../../host-design/tool/tests/suite/equipment.rs"]
+mod equipment;
 mod fuzz_corpus;
 mod gains_table;
 mod governor;

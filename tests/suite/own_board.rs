@@ -6,10 +6,11 @@ use std::hash::{DefaultHasher, Hash, Hasher};
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
+use crate::equipment::if_possible;
 use crate::published::table;
 use upright_design::rig::Rig;
 use upright_design::table::gains_source;
-use upright_tool::image::{Compiler, ImageError, PROFILE, TARGET, compiler};
+use upright_tool::image::{Compiler, PROFILE, TARGET, compiler};
 
 const DOCUMENT: &str = include_str!("../../docs/own-board.md");
 
@@ -115,13 +116,8 @@ fn run(command: &mut Command) -> String {
 
 #[test]
 fn a_crate_made_from_the_document_builds_for_the_target() {
-    let Compiler { mut cargo, target_directory, .. } = match compiler() {
-        Err(error @ ImageError::NoCompiler) if std::env::var_os("UPRIGHT_REQUIRE_IMAGE").is_none() => {
-            eprintln!("not exercised: the crate of docs/own-board.md on the target: {error}");
-            return;
-        }
-        compiler => compiler.unwrap(),
-    };
+    let what = "the crate of docs/own-board.md on the target";
+    let Some(Compiler { mut cargo, target_directory, .. }) = if_possible(compiler(), what) else { return };
     let build = ["build", "--quiet", "--bin", "image", "--features", "image"];
     run(cargo.current_dir(foreign_crate()).args(build).args(["--profile", PROFILE, "--target", TARGET]));
     let image = std::fs::read(target_directory.join(TARGET).join(PROFILE).join("image")).unwrap();

@@ -103,29 +103,6 @@ pub fn build(kind: Kind) -> Result<PathBuf, ImageError> {
     compile(kind, None, &kind.name())
 }
 
-/// [`build`] for tests: see [`if_possible`].
-///
-/// # Errors
-/// As for [`build`].
-pub fn build_if_possible(kind: Kind) -> Result<Option<PathBuf>, ImageError> {
-    if_possible(build(kind))
-}
-
-/// For tests: returns what was built. A missing compiler is reported on stderr and returned as `None`; if the
-/// environment variable `UPRIGHT_REQUIRE_IMAGE` is set, it is an error.
-///
-/// # Errors
-/// That of the build.
-pub fn if_possible(built: Result<PathBuf, ImageError>) -> Result<Option<PathBuf>, ImageError> {
-    match built {
-        Err(error @ ImageError::NoCompiler) if std::env::var_os("UPRIGHT_REQUIRE_IMAGE").is_none() => {
-            eprintln!("not exercised: an image: {error}");
-            Ok(None)
-        }
-        built => built.map(Some),
-    }
-}
-
 /// Builds the image with the table of `rig` in place of `src/gains.rs`; returns the path of the ELF file.
 ///
 /// # Errors

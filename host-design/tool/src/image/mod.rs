@@ -12,7 +12,7 @@ mod stack;
 mod thumb;
 
 pub use board::{Board, NoBoard};
-pub use build::{ImageError, Kind, PROFILE, TARGET, build, build_for, build_if_possible, if_possible};
+pub use build::{ImageError, Kind, PROFILE, TARGET, build, build_for};
 pub use checksum::{file_hash, flash_checksum};
 pub use compiler::{Compiler, compiler};
 pub use elf::{ElfError, Image};

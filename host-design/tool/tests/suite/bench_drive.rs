@@ -2,7 +2,6 @@
 //! on the virtual board.
 
 use std::path::Path;
-use std::process::{Command, Stdio};
 
 use upright::board::{Contacts, Output};
 use upright::control::actuator::Drive;
@@ -16,9 +15,10 @@ use upright::table::Law;
 use upright_board::{Conditions, Image};
 use upright_design::harness::{AnyTelemetry, Harness};
 use upright_design::simulate::Scenario;
-use upright_tool::image::{Board, Kind, build_if_possible};
+use upright_tool::image::{Board, Kind};
 use upright_tool::in_the_loop::{Link, Place, RunError};
 
+use crate::equipment::{built, in_qemu};
 use crate::published::rig_and_table;
 
 const ALONG: Request = Request::Drive { along: true };
@@ -208,11 +208,7 @@ fn on_the_host_the_motor_moves_the_cart_a_little_while_a_key_is_held() {
 
 #[test]
 fn the_image_in_qemu_does_it_with_the_bits_of_the_host() {
-    let Some(image) = build_if_possible(Kind::InTheLoop).unwrap() else { return };
-    if let Err(error) = Command::new("qemu-system-arm").arg("--version").stdout(Stdio::null()).status() {
-        assert!(std::env::var_os("UPRIGHT_REQUIRE_IMAGE").is_none(), "no QEMU: {error}");
-        return eprintln!("not exercised: the image in QEMU: install qemu-system-arm");
-    }
+    let Some(image) = in_qemu(built(Kind::InTheLoop)) else { return };
     let host = at_the_bench(Place::Host, whole_check);
     let qemu = at_the_bench(Place::Qemu { image: &image, link: Link::Files }, whole_check);
     assert!(host == qemu);
@@ -226,7 +222,7 @@ fn the_image_in_qemu_does_it_with_the_bits_of_the_host() {
 
 #[test]
 fn the_flashed_image_does_it_on_the_virtual_board() {
-    let Some(elf) = build_if_possible(Kind::Board(Board::WeactF405)).unwrap() else { return };
+    let Some(elf) = built(Kind::Board(Board::WeactF405)) else { return };
     let image = Image::from_elf(&std::fs::read(Path::new(&elf)).unwrap()).unwrap();
     at_the_bench(Place::Board { image: &image, conditions: Conditions::f405(1) }, whole_check);
 }

@@ -14,8 +14,10 @@ use upright::supervision::supervisor::State;
 use upright_board::{
     Board as VirtualBoard, Chip, Conditions, Crystal, Image, Input, Rules, Wire, pin, seconds,
 };
-use upright_tool::image::{Board, Kind, build_if_possible, flash_checksum};
+use upright_tool::image::{Board, Kind, flash_checksum};
 use upright_tool::monitor::Monitor;
+
+use crate::equipment::built;
 
 const BAUD: u32 = 460_800;
 const TIM1: u32 = 0x4001_0000;
@@ -23,7 +25,7 @@ const RCC_CR: u32 = 0x4002_3800;
 
 /// The image; none without a compiler.
 fn image() -> Option<Image> {
-    let elf = build_if_possible(Kind::Board(Board::WeactF405)).unwrap()?;
+    let elf = built(Kind::Board(Board::WeactF405))?;
     Some(Image::from_elf(&std::fs::read(elf).unwrap()).unwrap())
 }
 
@@ -331,7 +333,7 @@ fn every_board_starts_with_its_own_chip_clock_and_led_and_with_no_other() {
         (Board::DiscoveryF407, pin('D', 12), false),
         (Board::NucleoF446, pin('A', 5), false),
     ] {
-        let Some(elf) = build_if_possible(Kind::Board(board)).unwrap() else { return };
+        let Some(elf) = built(Kind::Board(board)) else { return };
         let image = Image::from_elf(&std::fs::read(elf).unwrap()).unwrap();
         let started = |conditions: &Conditions| {
             let mut run = Powered::strict(&image, conditions);

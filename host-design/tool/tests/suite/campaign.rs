@@ -6,9 +6,10 @@ use upright_design::rig::Rig;
 use upright_design::study::Study;
 use upright_design::table::TableValues;
 use upright_tool::campaign::{Campaign, During, Kind, Setup, Trial, campaign, feed, kinds, one};
-use upright_tool::image::{self, Board, build_if_possible};
+use upright_tool::image::{self, Board};
 use upright_tool::in_the_loop::Place;
 
+use crate::equipment::built;
 use crate::published::rig_and_table;
 
 fn on_host<'a>(rig: &'a Rig, table: &'a TableValues) -> Setup<'a> {
@@ -71,7 +72,7 @@ fn every_defect_of_a_bench_drive_is_found_and_nothing_else() {
 #[test]
 fn on_the_virtual_board_a_bench_drive_ends_with_its_defects_and_does_not_without_the_guards() {
     let (rig, table) = rig_and_table("quadruple-paper");
-    let Some(elf) = build_if_possible(image::Kind::Board(Board::WeactF405)).unwrap() else { return };
+    let Some(elf) = built(image::Kind::Board(Board::WeactF405)) else { return };
     let image = Image::from_elf(&std::fs::read(elf).unwrap()).unwrap();
     let place = Place::Board { image: &image, conditions: Conditions::f405(1) };
     let setup = Setup { place, during: During::BenchDrive, ..on_host(rig, table) };

@@ -6,9 +6,10 @@ use upright_design::design::design;
 use upright_design::rig::Rig;
 use upright_design::simulate::Scenario;
 use upright_design::table::{Gains, TableValues};
-use upright_tool::image::{Board, Kind, build_for, build_if_possible, if_possible};
+use upright_tool::image::{Board, Kind};
 use upright_tool::in_the_loop::{Cycles, Span, measure};
 
+use crate::equipment::{built, built_for};
 use crate::published::rig_and_table;
 
 /// Goals for the median of balancing: from the tick to the output, the whole task and the jitter of the output (µs).
@@ -80,7 +81,7 @@ fn slower(image: &Image, turns: u8) -> Image {
 
 #[test]
 fn the_ticks_of_the_image_stay_within_their_limits_and_those_of_a_slower_one_do_not() {
-    let Some(elf) = build_if_possible(Kind::Board(Board::WeactF405)).unwrap() else { return };
+    let Some(elf) = built(Kind::Board(Board::WeactF405)) else { return };
     let image = Image::from_elf(&std::fs::read(elf).unwrap()).unwrap();
     let (rig, table) = rig_and_table("quadruple-paper").clone();
     let measured = |image: &Image| measured(&rig, &table, image);
@@ -130,7 +131,7 @@ fn a_tick_with_thirty_states_takes_less_than_a_quarter_of_its_period() {
     let rig = thirty_states();
     let table = TableValues::of(&rig, &design(&rig).unwrap(), Gains::Sampled).unwrap();
     assert_eq!(table.states(), 30);
-    let Some(elf) = if_possible(build_for(Kind::Board(Board::WeactF405), &rig, &table)).unwrap() else {
+    let Some(elf) = built_for(Kind::Board(Board::WeactF405), &rig, &table) else {
         return;
     };
     let image = Image::from_elf(&std::fs::read(elf).unwrap()).unwrap();

@@ -15,10 +15,11 @@ use upright::table::Law;
 use upright_board::{Conditions, Image};
 use upright_design::harness::{Pins, Session};
 use upright_design::simulate::{Bench, Scenario};
-use upright_tool::image::{Board, Kind, build_if_possible, flash_checksum};
+use upright_tool::image::{Board, Kind, flash_checksum};
 use upright_tool::in_the_loop::VirtualBoard;
 use upright_tool::monitor::{Monitor, action, view};
 
+use crate::equipment::built;
 use crate::published::rig_and_table;
 
 /// Factor on the motor's force: 0 without the motor, -1 with its wires swapped.
@@ -246,7 +247,7 @@ fn first_balance(person: &mut Person<'_>) {
 
 #[test]
 fn the_guide_can_be_followed_step_by_step() {
-    let Some(elf) = build_if_possible(Kind::Board(Board::WeactF405)).unwrap() else { return };
+    let Some(elf) = built(Kind::Board(Board::WeactF405)) else { return };
     let image = Image::from_elf(&std::fs::read(elf).unwrap()).unwrap();
     let (rig, table) = rig_and_table("quadruple-paper").clone();
     let mut board = VirtualBoard::start(&image, &Conditions::f405(1), &table).unwrap();

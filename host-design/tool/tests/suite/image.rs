@@ -9,14 +9,14 @@ use std::sync::mpsc::{self, RecvTimeoutError};
 use std::time::{Duration, Instant};
 
 use serde_json::Value;
-use upright_tool::image::{
-    Image, Kind, StackError, build_if_possible, forbidden_functions, size, stack_bound,
-};
+use upright_tool::image::{Image, Kind, StackError, forbidden_functions, size, stack_bound};
+
+use crate::equipment::built;
 
 /// Path of the image for the emulator; `None` without a compiler for it.
 fn path_in_the_loop() -> Option<&'static Path> {
     static PATH: OnceLock<Option<PathBuf>> = OnceLock::new();
-    PATH.get_or_init(|| build_if_possible(Kind::InTheLoop).unwrap()).as_deref()
+    PATH.get_or_init(|| built(Kind::InTheLoop)).as_deref()
 }
 
 fn upright(arguments: &[&str]) -> Output {
@@ -35,12 +35,12 @@ fn an_image_waits_for_the_one_that_is_being_compiled() {
     let Some(path) = path_in_the_loop() else { return };
     // Several times as long as for an image that does not wait and has been compiled before.
     let begin = Instant::now();
-    build_if_possible(Kind::InTheLoop).unwrap();
+    built(Kind::InTheLoop);
     let patience = (4 * begin.elapsed()).min(Duration::from_secs(3));
     let other = File::create(path.with_file_name("compiling")).unwrap();
     other.lock().unwrap();
     let (done, is_done) = mpsc::channel();
-    let builder = std::thread::spawn(move || done.send(build_if_possible(Kind::InTheLoop).unwrap()).unwrap());
+    let builder = std::thread::spawn(move || done.send(built(Kind::InTheLoop)).unwrap());
     assert_eq!(is_done.recv_timeout(patience), Err(RecvTimeoutError::Timeout));
     other.unlock().unwrap();
     assert_eq!(is_done.recv().unwrap().as_deref(), Some(path));

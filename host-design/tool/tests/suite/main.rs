@@ -13,6 +13,7 @@ mod compare_sweep;
 mod cycles;
 mod documented_tables;
 mod documents;
+mod equipment;
 mod first_power_up;
 mod identify_command;
 mod image;

@@ -3,6 +3,7 @@
 //! Needs Chromium or Chrome. Without one the test says so and passes, unless `UPRIGHT_REQUIRE_BROWSER=1` is set.
 
 use std::path::Path;
+use std::process::Command;
 
 use serde_json::Value;
 
@@ -125,18 +126,28 @@ fn on_paper(browser: &mut Browser, page: &Path, light: &Value) -> Vec<String> {
 }
 
 #[test]
-fn the_page_works_in_a_browser_and_each_of_its_faults_is_found() {
-    let Some(mut browser) = Browser::start() else {
-        let required = std::env::var("UPRIGHT_REQUIRE_BROWSER").is_ok_and(|value| value == "1");
-        assert!(
-            !required,
-            "UPRIGHT_REQUIRE_BROWSER=1, but there is no chromium or google-chrome in the PATH"
-        );
-        eprintln!(
-            "not exercised, for want of a chromium or google-chrome in the PATH: the report in a browser"
-        );
-        return;
+fn a_test_without_its_browser_passes_says_so_and_fails_where_one_is_required() {
+    let nowhere = tempfile::tempdir().unwrap();
+    let tested = |is_required: bool| {
+        let mut tests = Command::new(std::env::current_exe().unwrap());
+        tests
+            .args(["--exact", "report_browser::the_page_works_in_a_browser_and_each_of_its_faults_is_found"]);
+        tests.env("PATH", nowhere.path()).env_remove("UPRIGHT_REQUIRE_BROWSER");
+        if is_required {
+            tests.env("UPRIGHT_REQUIRE_BROWSER", "1");
+        }
+        tests.output().unwrap()
     };
+    let left_out = tested(false);
+    assert!(left_out.status.success(), "{left_out:?}");
+    let said = String::from_utf8(left_out.stderr).unwrap();
+    assert_eq!(said, "not exercised: the report in a browser: no chromium or google-chrome in the PATH\n");
+    assert!(!tested(true).status.success());
+}
+
+#[test]
+fn the_page_works_in_a_browser_and_each_of_its_faults_is_found() {
+    let Some(mut browser) = Browser::for_test_of("the report") else { return };
     let folder = tempfile::tempdir().unwrap();
     let page = folder.path().join("report.html");
     let html = &SINGLE.html;

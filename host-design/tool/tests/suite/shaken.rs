@@ -1,7 +1,6 @@
 //! The firmware shakes the simulated machine, and its log is identified: on the host, and as the image in QEMU.
 
 use std::path::{Path, PathBuf};
-use std::process::{Command, Stdio};
 use std::sync::OnceLock;
 use std::time::Duration;
 
@@ -23,9 +22,10 @@ use upright_design::rig::{PlantDescription, Rig};
 use upright_design::simulate::Scenario;
 use upright_design::swing_up::with_motions;
 use upright_design::table::{Gains, TableValues};
-use upright_tool::image::{Kind, build_for, if_possible};
+use upright_tool::image::Kind;
 use upright_tool::in_the_loop::{Link, Place, run_shaken};
 
+use crate::equipment::{built_for, in_qemu};
 use crate::published::{rig_and_table, stored_motions};
 
 const REALITY: &str = "[reality]\njoint_friction_n_m = [1.5e-3, 1e-3]\ncart_friction_n = 0.2\n\
@@ -84,11 +84,7 @@ fn the_image_in_qemu_logs_the_ticks_of_the_host() {
     // With its motions, so that this test and the swing-up in QEMU share one image.
     let (machine, table) = rig_and_table("single-quanser-ip02").clone();
     let table = with_motions(&machine, table, stored_motions("single-quanser-ip02"), &[]).unwrap();
-    let Some(image) = if_possible(build_for(Kind::InTheLoop, &machine, &table)).unwrap() else { return };
-    if let Err(error) = Command::new("qemu-system-arm").arg("--version").stdout(Stdio::null()).status() {
-        assert!(std::env::var_os("UPRIGHT_REQUIRE_IMAGE").is_none(), "no QEMU: {error}");
-        return eprintln!("not exercised: the image in QEMU: install qemu-system-arm");
-    }
+    let Some(image) = in_qemu(built_for(Kind::InTheLoop, &machine, &table)) else { return };
     let log = |seed: u64, place: Place<'_>| run_shaken(&machine, &table, 3.0, seed, place).unwrap();
     let qemu = log(1, Place::Qemu { image: Path::new(&image), link: Link::Files });
     assert!(qemu.ticks().len() > 2_000 && qemu == log(1, Place::Host));

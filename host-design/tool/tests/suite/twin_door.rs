@@ -12,10 +12,11 @@ use tungstenite::{Message, WebSocket, client};
 use upright::table::Law;
 use upright_board::{Conditions, Image};
 use upright_design::simulate::{Scenario, Sensing};
-use upright_tool::image::{Board, Kind, build_if_possible};
+use upright_tool::image::{Board, Kind};
 use upright_tool::in_the_loop::Place;
 use upright_tool::twin::Server;
 
+use crate::equipment::built;
 use crate::published::rig_and_table;
 use crate::twin_page::Twin;
 
@@ -192,7 +193,7 @@ fn the_motor_is_turned_off_when_the_page_in_command_is_closed_or_sleeps() {
 
 #[test]
 fn the_flashed_image_balances_behind_the_page_and_obeys_it() {
-    let Some(elf) = build_if_possible(Kind::Board(Board::WeactF405)).unwrap() else { return };
+    let Some(elf) = built(Kind::Board(Board::WeactF405)) else { return };
     let image = Image::from_elf(&std::fs::read(elf).unwrap()).unwrap();
     let (rig, table) = rig_and_table("quadruple-paper").clone();
     let scenario = Scenario { sensing: Sensing::Encoders, ..Scenario::at_rest(&rig, Law::Lqr) };

@@ -52,20 +52,8 @@ impl Drop for Twin {
     }
 }
 
-/// A browser; `None` if this machine has none and none is required.
 fn browser() -> Option<Browser> {
-    let browser = Browser::start();
-    if browser.is_none() {
-        let required = std::env::var("UPRIGHT_REQUIRE_BROWSER").is_ok_and(|value| value == "1");
-        assert!(
-            !required,
-            "UPRIGHT_REQUIRE_BROWSER=1, but there is no chromium or google-chrome in the PATH"
-        );
-        eprintln!(
-            "not exercised, for want of a chromium or google-chrome in the PATH: the twin in a browser"
-        );
-    }
-    browser
+    Browser::for_test_of("the twin")
 }
 
 fn wait(seconds: f64) {

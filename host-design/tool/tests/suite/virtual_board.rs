@@ -16,14 +16,15 @@ use upright_design::simulate::Scenario;
 use upright_design::swing_up::{Stored, hangs, motions, up_and_down, with_motions};
 use upright_design::table::{Gains, TableValues};
 use upright_tool::campaign::{Class, During, Kind as Defect, Setup, one};
-use upright_tool::image::{Board, Kind, build_for, build_if_possible, if_possible};
+use upright_tool::image::{Board, Kind, build};
 use upright_tool::in_the_loop::{Place, VirtualBoard, measure, run_compared};
 
+use crate::equipment::{built, built_for};
 use crate::published::rig_and_table;
 
 #[test]
 fn the_flashed_image_balances_from_power_up_with_the_bits_of_the_host() {
-    let Some(elf) = build_if_possible(Kind::Board(Board::WeactF405)).unwrap() else { return };
+    let Some(elf) = built(Kind::Board(Board::WeactF405)) else { return };
     let image = Image::from_elf(&std::fs::read(elf).unwrap()).unwrap();
     let (rig, table) = rig_and_table("quadruple-paper").clone();
     assert_eq!(rig.hash(), RIG_HASH);
@@ -58,8 +59,7 @@ fn the_flashed_image_raises_and_lowers_the_links_with_the_bits_of_the_host() {
     let (rig, table) = rig_and_table("quadruple-paper").clone();
     let motions = motions(&rig, &Stored::beside(file).unwrap()).unwrap();
     let table = with_motions(&rig, table, &motions, &[]).unwrap();
-    let built = build_for(Kind::Board(Board::WeactF405), &rig, &table);
-    let Some(elf) = if_possible(built).unwrap() else { return };
+    let Some(elf) = built_for(Kind::Board(Board::WeactF405), &rig, &table) else { return };
     let image = Image::from_elf(&std::fs::read(elf).unwrap()).unwrap();
     let scenario = up_and_down(&rig, &table, 0.5).unwrap();
     let mut board = VirtualBoard::start(&image, &Conditions::f405(1), &table).unwrap();
@@ -78,7 +78,7 @@ fn the_flashed_image_raises_and_lowers_the_links_with_the_bits_of_the_host() {
 /// The supply of the chip is too low for the wait states that the image sets.
 #[test]
 fn a_stopped_run_names_address_and_source_line() {
-    let Some(elf) = build_if_possible(Kind::Board(Board::WeactF405)).unwrap() else { return };
+    let Some(elf) = built(Kind::Board(Board::WeactF405)) else { return };
     let image = Image::from_elf(&std::fs::read(elf).unwrap()).unwrap();
     let (_, table) = rig_and_table("quadruple-paper");
     let conditions = Conditions { chip_v: 2.5, ..Conditions::f405(1) };
@@ -99,8 +99,7 @@ fn motor_delay_and_integral_action_give_the_bits_of_the_host() {
     rig.integral = Some(Integral { position_weight: 100.0, setpoint_weight: 1.0 });
     let table = TableValues::of(&rig, &design(&rig).unwrap(), Gains::Sampled).unwrap();
     assert!(table.motor.is_some() && table.sensors() == 2);
-    let built = build_for(Kind::Board(Board::WeactF405), &rig, &table);
-    let Some(elf) = if_possible(built).unwrap() else { return };
+    let Some(elf) = built_for(Kind::Board(Board::WeactF405), &rig, &table) else { return };
     let image = Image::from_elf(&std::fs::read(elf).unwrap()).unwrap();
     for law in Law::ALL {
         let scenario =
@@ -123,7 +122,7 @@ fn built_for_the_feather() -> Option<(Rig, TableValues, Image)> {
     let (rig, table) = rig_and_table("single-quanser-ip02").clone();
     let motions = motions(&rig, &Stored::beside(file).unwrap()).unwrap();
     let table = with_motions(&rig, table, &motions, &[]).unwrap();
-    let elf = if_possible(build_for(Kind::Board(Board::FeatherF405), &rig, &table)).unwrap()?;
+    let elf = built_for(Kind::Board(Board::FeatherF405), &rig, &table)?;
     Some((rig, table, Image::from_elf(&std::fs::read(elf).unwrap()).unwrap()))
 }
 
@@ -158,7 +157,7 @@ fn the_feather_balances_a_link_with_the_bits_of_the_host_and_refuses_another_chi
     assert_eq!(fault_of(&Conditions { crystal, ..own }), Some(Fault::Clock));
 
     // A rig with more encoders than the board counts.
-    let error = build_if_possible(Kind::Board(Board::FeatherF405)).unwrap_err().to_string();
+    let error = build(Kind::Board(Board::FeatherF405)).unwrap_err().to_string();
     assert_eq!(
         error,
         "feather-f405 counts 2 encoders, and this rig has 5: use another board (docs/board.md)"

@@ -8,6 +8,8 @@ use std::time::Duration;
 
 use serde_json::{Value, json};
 
+use crate::equipment::{is_required, not_exercised};
+
 const PATIENCE: Duration = Duration::from_secs(60);
 
 pub(crate) struct Browser {
@@ -21,8 +23,20 @@ pub(crate) struct Browser {
 }
 
 impl Browser {
+    /// Starts the browser for a test of `what`; `None` if there is no Chromium or Chrome on this machine, and none is
+    /// required.
+    pub(crate) fn for_test_of(what: &str) -> Option<Self> {
+        let browser = Self::start();
+        if browser.is_none() {
+            let missing = "no chromium or google-chrome in the PATH";
+            assert!(!is_required("UPRIGHT_REQUIRE_BROWSER"), "{missing}");
+            not_exercised(&format!("{what} in a browser: {missing}"));
+        }
+        browser
+    }
+
     /// Starts the browser; `None` if there is no Chromium or Chrome on this machine.
-    pub(crate) fn start() -> Option<Self> {
+    fn start() -> Option<Self> {
         let names = ["chromium", "chromium-browser", "google-chrome", "google-chrome-stable"];
         let folders = std::env::var_os("PATH")?;
         let program = std::env::split_paths(&folders)
