@@ -14,6 +14,12 @@
 #[path = "board/hardware.rs"]
 mod board;
 
+// The registers of the board's chip.
+#[cfg(not(feature = "nucleo-f446"))]
+use stm32f4::stm32f405 as pac;
+#[cfg(feature = "nucleo-f446")]
+use stm32f4::stm32f446 as pac;
+
 use upright::gains;
 
 /// Processor cycles per tick, at the period for which the gains were designed.
@@ -26,7 +32,7 @@ const CYCLES_PER_TICK: u32 = {
     cycles as u32
 };
 
-#[rtic::app(device = stm32f4xx_hal::pac, peripherals = true)]
+#[rtic::app(device = crate::pac, peripherals = true)]
 mod app {
     use heapless::spsc::Queue;
     use upright::board::Board;

@@ -10,7 +10,7 @@
 //! anything does not start, the core stays on the internal 16 MHz oscillator with all buses undivided: slow, but able
 //! to report the fault. The voltage scaling for 168 MHz is the default after a reset (RM0090, 5.4.1; RM0390, 5.4.1).
 
-use stm32f4xx_hal::pac::{FLASH, RCC, TIM11};
+use crate::pac::{FLASH, RCC, TIM11};
 use upright::protocol::message::Reset;
 
 use super::boards::{BOARD, Source};

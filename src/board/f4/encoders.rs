@@ -1,6 +1,6 @@
 //! Incremental encoders, counted by timers.
 
-use stm32f4xx_hal::pac::{TIM2, TIM3, TIM4, TIM5, TIM8};
+use crate::pac::{TIM2, TIM3, TIM4, TIM5, TIM8};
 use upright::control::encoder::CounterWidth::{self, Bits16, Bits32};
 use upright::gains::SENSORS;
 

@@ -1,7 +1,7 @@
 //! Guards against a stack overflow, a low supply of the microcontroller, and an image on the wrong chip.
 
+use crate::pac::{DBGMCU, EXTI, PWR};
 use cortex_m::peripheral::MPU;
-use stm32f4xx_hal::pac::{DBGMCU, EXTI, PWR};
 
 use super::boards::BOARD;
 

@@ -12,9 +12,9 @@ mod supply;
 mod watchdog;
 mod wiring;
 
+use crate::pac::{EXTI, PWR, Peripherals};
 use cortex_m::peripheral::syst::SystClkSource;
 use cortex_m::peripheral::{DWT, SYST};
-use stm32f4xx_hal::pac::{EXTI, PWR, Peripherals};
 use upright::board::{Board, Contacts, Inputs, Output};
 use upright::control::encoder::CounterWidth;
 use upright::gains::SENSORS;

@@ -12,7 +12,7 @@
 //! The emergency stop is the timer's break input: it switches the output off in hardware (17.3.12). Only code can
 //! switch the output on again, once the contact is closed.
 
-use stm32f4xx_hal::pac::TIM1;
+use crate::pac::TIM1;
 use upright::board::Output;
 use upright::gains::TABLE;
 

@@ -1,6 +1,6 @@
 //! The pins: set up from the wiring, read and written by name.
 
-use stm32f4xx_hal::pac::{EXTI, SYSCFG};
+use crate::pac::{EXTI, SYSCFG};
 
 use super::boards::BOARD;
 use super::wiring::{Mode, Signal, Wire, wire_of};

@@ -3,7 +3,7 @@
 
 use core::cell::UnsafeCell;
 
-use stm32f4xx_hal::pac::{DMA1, USART2, USART3, usart1};
+use crate::pac::{DMA1, USART2, USART3, usart1};
 use upright::protocol::BAUD;
 use upright::protocol::serial_link::MAX_MESSAGE;
 

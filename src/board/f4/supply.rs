@@ -1,6 +1,6 @@
 //! The supply voltage of the power stage.
 
-use stm32f4xx_hal::pac::{ADC_COMMON, ADC1};
+use crate::pac::{ADC_COMMON, ADC1};
 
 use super::boards::BOARD;
 

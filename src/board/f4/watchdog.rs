@@ -1,6 +1,6 @@
 //! The independent watchdog: resets the microcontroller, which turns the motor off, when ticks stop.
 
-use stm32f4xx_hal::pac::IWDG;
+use crate::pac::IWDG;
 use upright::gains::TICK_S;
 
 use super::clock::Clock;

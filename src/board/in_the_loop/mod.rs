@@ -13,9 +13,9 @@ mod usart;
 
 use core::sync::atomic::{AtomicU32, Ordering};
 
+use crate::pac::{Peripherals, TIM5};
 use cortex_m::peripheral::{SCB, SYST};
 use heapless::spsc::{Consumer, Producer, Queue};
-use stm32f4xx_hal::pac::{Peripherals, TIM5};
 use upright::board::{Board, Inputs, Output};
 use upright::control::encoder::CounterWidth;
 use upright::gains::SENSORS;

@@ -2,8 +2,8 @@
 
 use core::sync::atomic::{AtomicUsize, Ordering};
 
+use crate::pac::{USART1, USART2};
 use cortex_m_semihosting::{debug, syscall};
-use stm32f4xx_hal::pac::{USART1, USART2};
 
 const READ_BINARY: usize = 1;
 const WRITE_BINARY: usize = 5;

@@ -1,7 +1,7 @@
 //! Channels to the host as serial lines: USART1 for the pins, USART2 for the serial line. Slow, but real boards have
 //! them, too.
 
-use stm32f4xx_hal::pac::{USART1, USART2};
+use crate::pac::{USART1, USART2};
 
 /// The channel that carries the simulated pins.
 pub(super) struct Channel {
@@ -30,7 +30,7 @@ impl Channel {
     /// The owner of the channel must no longer run.
     pub(super) unsafe fn steal() -> Self {
         // SAFETY: as above.
-        Channel { usart: unsafe { stm32f4xx_hal::pac::Peripherals::steal() }.USART1 }
+        Channel { usart: unsafe { crate::pac::Peripherals::steal() }.USART1 }
     }
 
     /// Waits for the next byte.
