@@ -151,21 +151,30 @@ pub fn report(source: &Source<'_>, stage: &dyn Fn(&str)) -> Result<Report, Repor
         }
     }
     if !source.margins.is_empty() {
-        let figure = margins_figure("How far a link may be pushed", source.margins);
+        let figure = margins_figure("How hard a link may be pushed", source.margins);
         pictures.push(Picture::of("margins".to_owned(), &figure)?);
         page.pushes.push(Plot::of(&figure, figure.title.clone())?);
     }
     if !source.imperfections.is_empty() {
-        stage("imperfections");
-        let limit_cycles = imperfections::limit_cycles(source)?;
-        pictures.push(Picture::of("limit-cycle".to_owned(), &limit_cycles)?);
-        page.imperfect
-            .push(Plot::of(&limit_cycles, "Limit cycle over the friction of the joints".to_owned())?);
-        stage("wrong masses");
-        if let Some(masses) = imperfections::wrong_masses(source)? {
-            pictures.push(Picture::of("wrong-masses".to_owned(), &masses)?);
-            page.imperfect.push(Plot::of(&masses, "Every combination of wrong masses".to_owned())?);
-        }
+        show_imperfections(source, stage, &mut page, &mut pictures)?;
     }
     Ok(Report { html: page.html()?, pictures })
+}
+
+fn show_imperfections(
+    source: &Source<'_>,
+    stage: &dyn Fn(&str),
+    page: &mut Page<'_>,
+    pictures: &mut Vec<Picture>,
+) -> Result<(), ReportError> {
+    stage("imperfections");
+    let limit_cycles = imperfections::limit_cycles(source)?;
+    pictures.push(Picture::of("limit-cycle".to_owned(), &limit_cycles)?);
+    page.imperfect.push(Plot::of(&limit_cycles, "Limit cycle over the friction of the joints".to_owned())?);
+    stage("wrong masses");
+    if let Some(masses) = imperfections::wrong_masses(source)? {
+        pictures.push(Picture::of("wrong-masses".to_owned(), &masses)?);
+        page.imperfect.push(Plot::of(&masses, "Every combination of wrong masses".to_owned())?);
+    }
+    Ok(())
 }

@@ -110,7 +110,7 @@ impl SwingUp {
         let table =
             motions(rig, &stored).and_then(|motions| designed_table(rig, &motions)).map_err(failed)?;
         let both = with_margins(rig, &table)?;
-        let title = format!("{}: how far a link may be pushed", rig.name);
+        let title = format!("{}: how hard a link may be pushed", rig.name);
         self.draw(&margins_figure(&title, &both))?;
         let mut out = std::io::stdout().lock();
         if self.json {

@@ -62,51 +62,96 @@ fn numbers(text: &str) -> Result<(u64, u64), String> {
 impl Transitions {
     pub(crate) fn run(self) -> Result<(), Failure> {
         let rig = Rig::from_path(&self.rig)?;
-        let failed = |source: SwingUpError| Failure::SwingUp { rig: rig.name.clone(), source };
         let links = rig.states() / 2 - 1;
-        let swing_up = Stored::beside(&self.rig).and_then(|stored| motions(&rig, &stored)).map_err(failed)?;
-        let old = StoredTransitions::beside(&self.rig);
-        let mut stored = match &old {
-            Ok(stored) if stored.is_of(&rig) => stored.clone(),
-            Err(SwingUpError::NoFile { .. }) | Ok(_) if !self.stored => StoredTransitions::none(&rig),
-            Ok(_) => return Err(failed(SwingUpError::Outdated)),
-            Err(error) => return Err(failed(error.clone())),
-        };
-        let write = |stored: &StoredTransitions| -> Result<(), Failure> {
-            if !self.stored && !self.no_write {
-                write_atomically(&StoredTransitions::path_beside(&self.rig), stored.to_json().as_bytes())?;
-            }
-            Ok(())
-        };
+        let swing_up = Stored::beside(&self.rig)
+            .and_then(|stored| motions(&rig, &stored))
+            .map_err(|source| failed(&rig, source))?;
+        let mut stored = self.old(&rig)?;
         let mut searched = Vec::new();
-        if !self.stored {
-            for way in self.ways(links)? {
-                let (first, end) = self.candidates;
-                let found =
-                    with_search(|progress| stored.search(&rig, way, first..end, progress)).map_err(failed)?;
-                eprintln!("{}", searched_line(&found, end - first, links));
-                // Written after each way, so that an interrupted search keeps what it has found.
-                write(&stored)?;
-                searched.push(found);
-            }
+        let Toured { transitions, tours, .. } = if self.stored {
+            let all = stored.transitions(&rig).map_err(|source| failed(&rig, source))?;
+            self.toured(&rig, &swing_up, all)?
+        } else {
+            searched = self.search(&rig, &mut stored)?;
+            self.judge(&rig, &swing_up, &mut stored)?
+        };
+        let mut out = std::io::stdout().lock();
+        if self.json {
+            let faults: Vec<_> =
+                tours.faults.iter().map(|(way, fault)| json!([way.name(links), fault])).collect();
+            let object =
+                json!({ "rig": rig.name, "searched": searched, "tour": tours.legs, "faults": faults });
+            return Ok(writeln!(out, "{object}")?);
         }
-        let mut all =
-            if self.stored { stored.transitions(&rig) } else { stored.all(&rig) }.map_err(failed)?;
-        let (transitions, legs, faults) = loop {
-            let held = on_tour(&all.iter().map(|transition| transition.way).collect::<Vec<_>>(), links);
-            let (transitions, lost): (Vec<_>, Vec<_>) =
-                all.iter().cloned().partition(|transition| held.contains(&transition.way));
-            let table = with_spinner("the table", || designed_table_with(&rig, &swing_up, &transitions))
+        write!(out, "{}", text(&rig, &swing_up, &transitions, &tours.legs))?;
+        for (way, fault) in tours.faults {
+            writeln!(out, "a tour ended at {}: {fault}", way.name(links))?;
+        }
+        Ok(())
+    }
+
+    /// The motions beside the rig file; none if there are none yet, and those of another rig do not count.
+    fn old(&self, rig: &Rig) -> Result<StoredTransitions, Failure> {
+        match StoredTransitions::beside(&self.rig) {
+            Ok(stored) if stored.is_of(rig) => Ok(stored),
+            Err(SwingUpError::NoFile { .. }) | Ok(_) if !self.stored => Ok(StoredTransitions::none(rig)),
+            Ok(_) => Err(failed(rig, SwingUpError::Outdated)),
+            Err(error) => Err(failed(rig, error)),
+        }
+    }
+
+    fn write(&self, stored: &StoredTransitions) -> Result<(), Failure> {
+        if !self.no_write {
+            write_atomically(&StoredTransitions::path_beside(&self.rig), stored.to_json().as_bytes())?;
+        }
+        Ok(())
+    }
+
+    /// Searches a motion for each way. The file is written after each, so that an interrupted search keeps what it has
+    /// found.
+    fn search(&self, rig: &Rig, stored: &mut StoredTransitions) -> Result<Vec<Searched>, Failure> {
+        let links = rig.states() / 2 - 1;
+        let (first, end) = self.candidates;
+        let mut searched = Vec::new();
+        for way in self.ways(links)? {
+            let found = with_search(|progress| stored.search(rig, way, first..end, progress))
+                .map_err(|source| failed(rig, source))?;
+            eprintln!("{}", searched_line(&found, end - first, links));
+            self.write(stored)?;
+            searched.push(found);
+        }
+        Ok(searched)
+    }
+
+    /// Makes all motions that a tour from hanging can reach, one after the other, with the whole firmware.
+    fn toured(&self, rig: &Rig, swing_up: &SwingUp, all: Vec<Transition>) -> Result<Toured, Failure> {
+        let failed = |source| failed(rig, source);
+        let links = rig.states() / 2 - 1;
+        let held = on_tour(&all.iter().map(|transition| transition.way).collect::<Vec<_>>(), links);
+        let (transitions, lost): (Vec<_>, Vec<_>) =
+            all.into_iter().partition(|transition| held.contains(&transition.way));
+        let table =
+            with_spinner("the table", || designed_table_with(rig, swing_up, &transitions)).map_err(failed)?;
+        let tour = Tour::of(rig, &table).ok_or_else(|| failed(SwingUpError::NoTour))?;
+        let tours =
+            with_spinner("tours", || tours(rig, &table, &tour, 1, self.runs as usize, &Study::whole()))
                 .map_err(failed)?;
-            let tour = Tour::of(&rig, &table).ok_or_else(|| failed(SwingUpError::NoTour))?;
-            let Tours { legs, faults } =
-                with_spinner("tours", || tours(&rig, &table, &tour, 1, self.runs as usize, &Study::whole()))
-                    .map_err(failed)?;
-            if self.stored {
-                break (transitions, legs, faults);
-            }
-            let needed = rig.swing_up.clone().unwrap_or_default().success_percent;
-            let others = || legs.iter().filter(|leg| !Way::BOTH.contains(&leg.way));
+        Ok(Toured { transitions, lost, tours })
+    }
+
+    /// Judges the motions on tours. One that arrives too rarely is dropped, and the others are judged again without it.
+    fn judge(
+        &self,
+        rig: &Rig,
+        swing_up: &SwingUp,
+        stored: &mut StoredTransitions,
+    ) -> Result<Toured, Failure> {
+        let links = rig.states() / 2 - 1;
+        let needed = rig.swing_up.clone().unwrap_or_default().success_percent;
+        let mut all = stored.all(rig).map_err(|source| failed(rig, source))?;
+        loop {
+            let toured = self.toured(rig, swing_up, all.clone())?;
+            let others = || toured.tours.legs.iter().filter(|leg| !Way::BOTH.contains(&leg.way));
             if let Some(leg) = others().find(|leg| 100.0 * leg.interval[0] < needed) {
                 eprintln!("{} is dropped: {} of {} arrive", leg.way.name(links), leg.arrived, leg.tried);
                 stored.drop(leg.way, links);
@@ -115,24 +160,13 @@ impl Transitions {
             }
             // Of a motion that occurs more than once in the tour, the first leg counts: it is stored last.
             others().rev().for_each(|leg| stored.judge(leg.way, links, [leg.arrived, leg.tried]));
-            for Transition { way, .. } in lost {
+            for Transition { way, .. } in &toured.lost {
                 let name = way.name(links);
                 eprintln!("{name} is not judged: the other motions do not lead there from hanging, and back");
             }
-            write(&stored)?;
-            break (transitions, legs, faults);
-        };
-        let mut out = std::io::stdout().lock();
-        if self.json {
-            let faults: Vec<_> = faults.iter().map(|(way, fault)| json!([way.name(links), fault])).collect();
-            let object = json!({ "rig": rig.name, "searched": searched, "tour": legs, "faults": faults });
-            return Ok(writeln!(out, "{object}")?);
+            self.write(stored)?;
+            return Ok(toured);
         }
-        write!(out, "{}", text(&rig, &swing_up, &transitions, &legs))?;
-        for (way, fault) in faults {
-            writeln!(out, "a tour ended at {}: {fault}", way.name(links))?;
-        }
-        Ok(())
     }
 
     /// The ways to search.
@@ -150,6 +184,19 @@ impl Transitions {
         };
         self.ways.iter().map(named).collect()
     }
+}
+
+/// Tours by the motions between equilibria.
+struct Toured {
+    /// The motions on the tour.
+    transitions: Vec<Transition>,
+    /// Those that no tour can reach.
+    lost: Vec<Transition>,
+    tours: Tours,
+}
+
+fn failed(rig: &Rig, source: SwingUpError) -> Failure {
+    Failure::SwingUp { rig: rig.name.clone(), source }
 }
 
 fn searched_line(searched: &Searched, tried: u64, links: usize) -> String {
