@@ -1,7 +1,12 @@
 //! Channels to the host as serial lines: USART1 for the pins, USART2 for the serial line. Slow, but real boards have
 //! them, too.
+//!
+//! For the emulator, each read of a status register is a reason to look for new bytes from the host, with several
+//! system calls. So it is read once per byte that arrives and never for a byte that is sent, which is gone at once.
 
-use crate::pac::{USART1, USART2};
+use cortex_m::peripheral::NVIC;
+
+use crate::pac::{Interrupt, USART1, USART2};
 
 /// The channel that carries the simulated pins.
 pub(super) struct Channel {
@@ -15,7 +20,7 @@ pub(super) struct Serial {
 
 /// Enables both lines. The emulator has no baud rate.
 pub(super) fn open(pins: USART1, serial: USART2) -> (Channel, Serial) {
-    pins.cr1().write(|w| w.ue().enabled().te().enabled().re().enabled());
+    pins.cr1().write(|w| w.ue().enabled().te().enabled().re().enabled().rxneie().enabled());
     serial.cr1().write(|w| w.ue().enabled().te().enabled());
     let mut pins = Channel { usart: pins };
     // Bytes that the host sends before the receiver is on are lost, so the host waits for this empty frame.
@@ -35,7 +40,12 @@ impl Channel {
 
     /// Waits for the next byte.
     pub(super) fn read(&mut self) -> u8 {
-        while self.usart.sr().read().rxne().bit_is_clear() {}
+        NVIC::unpend(Interrupt::USART1);
+        while self.usart.sr().read().rxne().bit_is_clear() {
+            // The interrupt is not enabled: it becomes pending, and nothing else happens.
+            while !NVIC::is_pending(Interrupt::USART1) {}
+            NVIC::unpend(Interrupt::USART1);
+        }
         // 8 data bits.
         self.usart.dr().read().dr().bits() as u8
     }
@@ -43,7 +53,6 @@ impl Channel {
     /// Sends bytes to the host.
     pub(super) fn write(&mut self, bytes: &[u8]) {
         for &byte in bytes {
-            while self.usart.sr().read().txe().bit_is_clear() {}
             self.usart.dr().write(|w| w.dr().set(byte.into()));
         }
     }
@@ -53,7 +62,6 @@ impl Serial {
     /// Sends bytes to the host.
     pub(super) fn write(&mut self, bytes: &[u8]) {
         for &byte in bytes {
-            while self.usart.sr().read().txe().bit_is_clear() {}
             self.usart.dr().write(|w| w.dr().set(byte.into()));
         }
     }
