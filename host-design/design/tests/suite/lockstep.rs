@@ -36,9 +36,9 @@ fn in_lockstep(table: &TableValues, cases: &[(Rig, Scenario)]) -> Vec<Seen> {
     let mut jobs: Vec<Job<'_>> = observers
         .iter_mut()
         .zip(cases)
-        .map(|(observe, (rig, scenario))| Job { rig, scenario, observe })
+        .map(|(observe, (rig, scenario))| Job { table, rig, scenario, observe })
         .collect();
-    let falls = run_all(table, &mut jobs).unwrap();
+    let falls = run_all(&mut jobs).unwrap();
     bits.into_iter().zip(falls).collect()
 }
 
@@ -148,9 +148,9 @@ fn how_fast_the_whole_loop_is_alone_and_in_lockstep() {
         let mut observers = vec![|_: &Sample<&[f64]>| (); cases.len()];
         let jobs = observers.iter_mut().zip(&cases);
         let mut jobs: Vec<Job<'_>> =
-            jobs.map(|(observe, (rig, scenario))| Job { rig, scenario, observe }).collect();
+            jobs.map(|(observe, (rig, scenario))| Job { table: &table, rig, scenario, observe }).collect();
         let start = Instant::now();
-        run_all(&table, &mut jobs).unwrap();
+        run_all(&mut jobs).unwrap();
         in_lockstep = in_lockstep.max(simulated_s / start.elapsed().as_secs_f64());
     }
     println!(

@@ -14,6 +14,7 @@ mod course;
 mod designs;
 mod errata;
 mod figures;
+mod firmware_loop;
 mod markdown;
 pub mod published;
 mod responses;
