@@ -46,7 +46,9 @@ pub fn run_all(jobs: &mut [Job<'_>]) -> Result<Vec<Option<Fall>>, SimulationErro
     with_controllers_of(&tables, Vec::new(), &mut |mut controllers| {
         let runs = jobs.iter().zip(&mut controllers);
         let runs: Vec<Run<'_>> = runs
-            .map(|(job, controller)| Run::start(job.rig, controller.as_mut(), job.table.sensors(), job.scenario))
+            .map(|(job, controller)| {
+                Run::start(job.rig, controller.as_mut(), job.table.sensors(), job.scenario)
+            })
             .collect::<Result<_, _>>()?;
         match &mut lanes {
             Some(lanes) => Lockstep { lanes: lanes.as_mut(), chains: &chains, runs, jobs, next: 0 }.run(),

@@ -105,25 +105,28 @@ pub struct Reproduction {
     pub robustness: Vec<Robustness>,
 }
 
-/// Number of stages that [`reproduce`] names.
-pub const STAGES: u64 = 5;
+/// The stages of [`reproduce`], in their order.
+pub const STAGES: [&str; 5] =
+    ["matrices, gains and poles", "errata", "step responses", "Table 2", "spectra and margins"];
 
 /// Computes everything; `stage` is called with the name of each of the [`STAGES`] before it starts.
 ///
 /// # Errors
 /// [`ReproduceError`] if a result cannot be computed.
 pub fn reproduce(rigs: &PaperRigs, stage: &dyn Fn(&'static str)) -> Result<Reproduction, ReproduceError> {
-    stage("matrices, gains and poles");
+    // Each name is used once, or the compiler complains.
+    let [of_designs, of_errata, of_responses, of_settling, of_robustness] = STAGES;
+    stage(of_designs);
     let designed = PaperDesigns::of(rigs)?;
     let designs = designs(rigs, &designed)?;
-    stage("errata");
+    stage(of_errata);
     let errata = errata(rigs, &designed)?;
-    stage("step responses");
+    stage(of_responses);
     let loops = Loops::with(&rigs.exact, designed.exact)?;
     let responses = responses(&loops)?;
-    stage("Table 2");
+    stage(of_settling);
     let settling = settling(rigs)?;
-    stage("spectra and margins");
+    stage(of_robustness);
     let robustness = robustness(&loops)?;
     Ok(Reproduction { designs, errata, responses, settling, robustness })
 }

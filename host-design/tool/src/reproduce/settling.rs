@@ -90,7 +90,9 @@ pub fn settling(rigs: &PaperRigs) -> Result<Settling, ReproduceError> {
     let jobs: Vec<(usize, &[f64])> = changes
         .iter()
         .enumerate()
-        .flat_map(|(index, (_, change))| times_s.chunks(change.together()).map(move |times_s| (index, times_s)))
+        .flat_map(|(index, (_, change))| {
+            times_s.chunks(change.together()).map(move |times_s| (index, times_s))
+        })
         .collect();
     let courses: Vec<Course> =
         parallel::try_map(jobs, |(change, times_s)| changes[change].1.courses(rigs, times_s, &exact))?
