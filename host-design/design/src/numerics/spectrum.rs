@@ -1,8 +1,6 @@
 //! Power spectra of recorded runs.
 
-use rustfft::algorithm::Radix4;
-use rustfft::num_complex::Complex;
-use rustfft::{Fft, FftDirection};
+use nalgebra::Complex;
 use serde::Serialize;
 
 /// Samples in a segment: 8.192 s at 1 kHz.
@@ -98,35 +96,56 @@ impl Spectrum {
 }
 
 /// Fourier transform of [`SEGMENT`] real samples, from a complex one of half the length: its real inputs are the even
-/// samples, its imaginary ones the odd samples (W. H. Press et al., *Numerical Recipes*, §12.3). The algorithm is named
-/// here, because a planner would compile all algorithms into the program.
+/// samples, its imaginary ones the odd samples (W. H. Press et al., *Numerical Recipes*, §12.3).
 struct RealTransform {
-    half: Radix4<f64>,
-    /// `exp(-2πi k / SEGMENT) / 2` of `k` from 1 to `SEGMENT / 4 - 1`.
-    twiddles: Vec<Complex<f64>>,
+    /// `exp(-2πi k / SEGMENT)` of `k` below `SEGMENT / 2`.
+    turns: Vec<Complex<f64>>,
 }
 
 impl RealTransform {
     fn new() -> Self {
-        let twiddle = |k: usize| {
+        let turn = |k: usize| {
             let angle = -2.0 * core::f64::consts::PI / SEGMENT as f64 * k as f64;
-            Complex::new(angle.cos(), angle.sin()) * 0.5
+            Complex::new(angle.cos(), angle.sin())
         };
-        Self {
-            half: Radix4::new(SEGMENT / 2, FftDirection::Forward),
-            twiddles: (1..SEGMENT / 4).map(twiddle).collect(),
+        Self { turns: (0..SEGMENT / 2).map(turn).collect() }
+    }
+
+    /// The complex transform of `SEGMENT / 2` samples, in place: radix 2, decimation in time (*Numerical Recipes*,
+    /// §12.2).
+    fn half(&self, samples: &mut [Complex<f64>]) {
+        let shift = usize::BITS - samples.len().trailing_zeros();
+        for index in 0..samples.len() {
+            let reversed = index.reverse_bits() >> shift;
+            if index < reversed {
+                samples.swap(index, reversed);
+            }
+        }
+        let mut length = 1;
+        while length < samples.len() {
+            let stride = self.turns.len() / length;
+            for block in samples.chunks_exact_mut(2 * length) {
+                let (even, odd) = block.split_at_mut(length);
+                for k in 0..length {
+                    let turned = odd[k] * self.turns[k * stride];
+                    odd[k] = even[k] - turned;
+                    even[k] += turned;
+                }
+            }
+            length *= 2;
         }
     }
 
     /// The transform at the frequencies from 0 to half the sampling rate.
     fn of(&self, samples: &[f64]) -> Vec<Complex<f64>> {
         let mut bins: Vec<_> = samples.as_chunks().0.iter().map(|&[re, im]| Complex::new(re, im)).collect();
-        self.half.process(&mut bins);
+        self.half(&mut bins);
         let first = bins[0];
         bins[0] = Complex::new(first.re + first.im, 0.0);
         bins.push(Complex::new(first.re - first.im, 0.0));
         let last = bins.len() - 1;
-        for (twiddle, k) in self.twiddles.iter().zip(1..) {
+        for k in 1..last / 2 {
+            let twiddle = self.turns[k] * 0.5;
             let (sum, difference) = (bins[k] + bins[last - k], bins[k] - bins[last - k]);
             let re = sum.im * twiddle.re + difference.re * twiddle.im;
             let im = sum.im * twiddle.im - difference.re * twiddle.re;
@@ -152,7 +171,7 @@ mod tests {
             let terms =
                 samples.iter().enumerate().map(|(i, x)| Complex::new(turn(i).cos(), turn(i).sin()) * x);
             let wanted: Complex<f64> = terms.sum();
-            assert!((found[k] - wanted).norm() < 1e-9, "{k}: {} {wanted}", found[k]);
+            assert!((found[k] - wanted).norm_sqr().sqrt() < 1e-9, "{k}: {} {wanted}", found[k]);
         }
     }
 

@@ -79,6 +79,32 @@ fn another_disturbance_in_one_lane_changes_that_lane_only() {
 }
 
 #[test]
+fn runs_with_different_tables_are_in_one_lockstep() {
+    let rig = rig("quadruple-paper");
+    let table = table(&rig);
+    let mut weaker = table.clone();
+    weaker.force_limit_n = 0.1;
+    let cases = random_plants(&rig, 4, 0.1);
+    let tables = [&table, &weaker, &weaker, &table];
+    let expected: Vec<Seen> = cases
+        .iter()
+        .zip(tables)
+        .map(|(case, table)| alone(table, core::slice::from_ref(case)).remove(0))
+        .collect();
+    assert!(expected[1] != alone(&table, &cases[1..2])[0], "the tables differ");
+    let mut bits = vec![Vec::new(); cases.len()];
+    let mut observers: Vec<_> =
+        bits.iter_mut().map(|bits| move |seen: &Sample<&[f64]>| record(bits, seen)).collect();
+    let mut jobs: Vec<Job<'_>> = observers
+        .iter_mut()
+        .zip(cases.iter().zip(tables))
+        .map(|(observe, ((rig, scenario), table))| Job { table, rig, scenario, observe })
+        .collect();
+    let falls = run_all(&mut jobs).unwrap();
+    assert!(bits.into_iter().zip(falls).collect::<Vec<Seen>>() == expected);
+}
+
+#[test]
 fn what_cannot_be_in_lockstep_runs_alone_with_the_same_bits() {
     let quadruple = rig("quadruple-paper");
     let mut cases = random_plants(&quadruple, 5, 0.1);

@@ -9,7 +9,6 @@
 mod claims;
 mod comparison;
 mod continuous_loop;
-mod continuous_margins;
 mod course;
 mod designs;
 mod errata;
@@ -20,7 +19,6 @@ pub mod published;
 mod responses;
 mod robustness;
 mod settling;
-mod spectrum;
 mod summary;
 
 use std::path::{Path, PathBuf};
@@ -29,7 +27,6 @@ use serde::Serialize;
 
 pub use comparison::{Digits, Row, Verdict};
 pub use continuous_loop::ContinuousRun;
-pub use continuous_margins::continuous_margins;
 pub use course::{BAND, Course, StepFigures};
 pub use designs::{Designs, PoleSet, designs};
 pub use errata::{Erratum, Evidence, errata};
@@ -37,7 +34,6 @@ pub use markdown::markdown_table;
 pub use responses::{Loop, Loops, Response, responses};
 pub use robustness::{Ripple, Robustness, SEED, robustness};
 pub use settling::{HORIZON_S, LONGEST_S, Sensitivity, Settling, SettlingRow, printed, settling};
-pub use spectrum::{Bandwidth, SEGMENT, Spectrum};
 
 use upright_design::design::{Certified, DesignError, design};
 use upright_design::plant::PlantError;

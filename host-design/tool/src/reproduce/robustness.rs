@@ -6,16 +6,15 @@ use upright::table::Law;
 
 use super::ReproduceError;
 use super::continuous_loop::ContinuousRun;
-use super::continuous_margins::continuous_margins;
 use super::course::Course;
 use super::designs::open_loop_poles;
 use super::responses::{Loop, Loops, Wanted};
-use super::spectrum::{Bandwidth, SEGMENT, Spectrum};
+use upright_design::numerics::{Bandwidth, SEGMENT, Spectrum};
 use upright_design::parallel;
 use upright_design::plant::reference::Tolerance;
 use upright_design::rig::Rig;
 use upright_design::table::{Gains, TableValues};
-use upright_design::verify::{LinearReport, Margins, linear};
+use upright_design::verify::{LinearReport, Margins, continuous_margins, linear};
 
 /// Seed of all disturbances.
 pub const SEED: u64 = 1;

@@ -9,9 +9,8 @@ use upright_design::design::{Feedback, design};
 use upright_design::plant::reference::Tolerance;
 use upright_design::rig::{Chain, PlantDescription, PolePlacement, Rig};
 use upright_design::simulate::FallKind;
-use upright_tool::reproduce::{
-    ContinuousRun, Loop, Loops, PaperRigs, continuous_margins, printed, published,
-};
+use upright_design::verify::continuous_margins;
+use upright_tool::reproduce::{ContinuousRun, Loop, Loops, PaperRigs, printed, published};
 
 use crate::reproduced::REPRODUCED;
 
