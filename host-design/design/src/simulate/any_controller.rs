@@ -96,6 +96,24 @@ pub(super) fn with_controllers(
         .ok_or(SimulationError::Size { states, sensors })?
 }
 
+/// As [`with_controllers`], for several tables, with so many controllers of each. `made` are those made already.
+///
+/// # Errors
+/// As for [`with_controllers`].
+pub(super) fn with_controllers_of(
+    tables: &[(&TableValues, usize)],
+    made: Vec<Box<dyn AnyController + '_>>,
+    action: Action<'_>,
+) -> Result<Vec<Option<Fall>>, SimulationError> {
+    let Some((&(table, count), others)) = tables.split_first() else { return action(made) };
+    let mut made = Some(made);
+    with_controllers(table, count, &mut |more| {
+        let mut all = made.take().unwrap_or_default();
+        all.extend(more);
+        with_controllers_of(others, all, action)
+    })
+}
+
 struct WithControllers<'a> {
     table: &'a TableValues,
     count: usize,

@@ -2,7 +2,7 @@
 
 use core::ops::ControlFlow;
 
-use super::any_controller::with_controllers;
+use super::any_controller::with_controllers_of;
 use super::bench::Bench;
 use super::closed_loop::{Run, alone};
 use super::error::SimulationError;
@@ -15,6 +15,8 @@ use crate::table::TableValues;
 
 /// One of many runs.
 pub struct Job<'a> {
+    /// Table of the controller.
+    pub table: &'a TableValues,
     /// Rig whose plant is simulated.
     pub rig: &'a Rig,
     /// Start, set-point, disturbances and sensors of the run.
@@ -31,18 +33,22 @@ pub struct Job<'a> {
 ///
 /// # Errors
 /// As for [`run`](super::run), if any of the jobs fails.
-pub fn run_all(table: &TableValues, jobs: &mut [Job<'_>]) -> Result<Vec<Option<Fall>>, SimulationError> {
+pub fn run_all(jobs: &mut [Job<'_>]) -> Result<Vec<Option<Fall>>, SimulationError> {
     let chains: Option<Vec<Chain>> = jobs.iter().map(|job| Bench::lockstep_chain(job.rig)).collect();
     let lanes = chains.as_ref().filter(|_| are_alike(jobs)).and_then(|chains| {
         let links = chains.first()?.links.len();
         chain_lanes(links).filter(|_| chains.len() > 1 && chains.iter().all(|one| one.links.len() == links))
     });
-    let (count, sensors) = (jobs.len(), table.sensors());
     let (mut lanes, chains) = (lanes, chains.unwrap_or_default());
-    with_controllers(table, count, &mut |mut controllers| {
+    // Each table is checked once for all of its consecutive jobs.
+    let same_table = jobs.chunk_by(|a, b| core::ptr::eq(a.table, b.table));
+    let tables: Vec<(&TableValues, usize)> = same_table.map(|of| (of[0].table, of.len())).collect();
+    with_controllers_of(&tables, Vec::new(), &mut |mut controllers| {
         let runs = jobs.iter().zip(&mut controllers);
         let runs: Vec<Run<'_>> = runs
-            .map(|(job, controller)| Run::start(job.rig, controller.as_mut(), sensors, job.scenario))
+            .map(|(job, controller)| {
+                Run::start(job.rig, controller.as_mut(), job.table.sensors(), job.scenario)
+            })
             .collect::<Result<_, _>>()?;
         match &mut lanes {
             Some(lanes) => Lockstep { lanes: lanes.as_mut(), chains: &chains, runs, jobs, next: 0 }.run(),

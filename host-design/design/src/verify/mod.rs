@@ -6,6 +6,7 @@
 
 mod attraction;
 mod certificate;
+mod continuous_margins;
 mod corners;
 mod covariance;
 mod encoder;
@@ -32,6 +33,7 @@ pub use attraction::{
     largest_tilts,
 };
 pub use certificate::Certificate;
+pub use continuous_margins::continuous_margins;
 pub use corners::{
     Corner, CornerSettings, Corners, Mass, MassTolerance, corners, largest_percent, mass_tolerances,
     wrong_masses,

@@ -196,9 +196,9 @@ pub fn trials(
     let mut jobs: Vec<Job<'_>> = observers
         .iter_mut()
         .zip(cases)
-        .map(|(observe, (rig, scenario))| Job { rig, scenario, observe })
+        .map(|(observe, (rig, scenario))| Job { table, rig, scenario, observe })
         .collect();
-    let falls = run_all(table, &mut jobs)?;
+    let falls = run_all(&mut jobs)?;
     Ok(outcomes.into_iter().zip(falls).map(|(outcome, fall)| outcome.ended(fall)).collect())
 }
 

@@ -36,9 +36,9 @@ fn in_lockstep(table: &TableValues, cases: &[(Rig, Scenario)]) -> Vec<Seen> {
     let mut jobs: Vec<Job<'_>> = observers
         .iter_mut()
         .zip(cases)
-        .map(|(observe, (rig, scenario))| Job { rig, scenario, observe })
+        .map(|(observe, (rig, scenario))| Job { table, rig, scenario, observe })
         .collect();
-    let falls = run_all(table, &mut jobs).unwrap();
+    let falls = run_all(&mut jobs).unwrap();
     bits.into_iter().zip(falls).collect()
 }
 
@@ -76,6 +76,32 @@ fn another_disturbance_in_one_lane_changes_that_lane_only() {
     let after = in_lockstep(&table, &cases);
     let differ: Vec<usize> = (0..LANES).filter(|&lane| before[lane] != after[lane]).collect();
     assert_eq!(differ, [5]);
+}
+
+#[test]
+fn runs_with_different_tables_are_in_one_lockstep() {
+    let rig = rig("quadruple-paper");
+    let table = table(&rig);
+    let mut weaker = table.clone();
+    weaker.force_limit_n = 0.1;
+    let cases = random_plants(&rig, 4, 0.1);
+    let tables = [&table, &weaker, &weaker, &table];
+    let expected: Vec<Seen> = cases
+        .iter()
+        .zip(tables)
+        .map(|(case, table)| alone(table, core::slice::from_ref(case)).remove(0))
+        .collect();
+    assert!(expected[1] != alone(&table, &cases[1..2])[0], "the tables differ");
+    let mut bits = vec![Vec::new(); cases.len()];
+    let mut observers: Vec<_> =
+        bits.iter_mut().map(|bits| move |seen: &Sample<&[f64]>| record(bits, seen)).collect();
+    let mut jobs: Vec<Job<'_>> = observers
+        .iter_mut()
+        .zip(cases.iter().zip(tables))
+        .map(|(observe, ((rig, scenario), table))| Job { table, rig, scenario, observe })
+        .collect();
+    let falls = run_all(&mut jobs).unwrap();
+    assert!(bits.into_iter().zip(falls).collect::<Vec<Seen>>() == expected);
 }
 
 #[test]
@@ -148,9 +174,9 @@ fn how_fast_the_whole_loop_is_alone_and_in_lockstep() {
         let mut observers = vec![|_: &Sample<&[f64]>| (); cases.len()];
         let jobs = observers.iter_mut().zip(&cases);
         let mut jobs: Vec<Job<'_>> =
-            jobs.map(|(observe, (rig, scenario))| Job { rig, scenario, observe }).collect();
+            jobs.map(|(observe, (rig, scenario))| Job { table: &table, rig, scenario, observe }).collect();
         let start = Instant::now();
-        run_all(&table, &mut jobs).unwrap();
+        run_all(&mut jobs).unwrap();
         in_lockstep = in_lockstep.max(simulated_s / start.elapsed().as_secs_f64());
     }
     println!(

@@ -5,9 +5,9 @@ use askama::Template;
 use super::text::{notes, row_texts};
 use crate::figure::{Axis, COLOURS_CSS, Curve, Figure, Panel, style_sheet};
 use crate::report::{Plot, ReportError};
-use crate::reproduce::Spectrum;
 use upright_design::identify::{ChannelFit, Identification, Predicted, Settings};
 use upright_design::number::significant;
+use upright_design::numerics::Spectrum;
 
 /// Correlations of at least this size are printed bold.
 const STRONG: f64 = 0.9;

@@ -51,15 +51,9 @@ impl ContinuousRun {
         let mut disturbances = Disturbances::of(self.disturbances, plant.disturbances())?;
         let samples = (self.duration_s / self.sample_s).round() as usize;
         let mut state = vec![0.0; plant.states()];
-        let mut course = Course {
-            sample_s: self.sample_s,
-            states: Vec::with_capacity(samples + 1),
-            forces_n: Vec::with_capacity(samples + 1),
-            fall: None,
-        };
+        let mut course = Course::with_room(self.sample_s, samples + 1);
         for sample in 0..=samples {
-            course.states.push(state.clone());
-            course.forces_n.push(force_n(&state));
+            course.push(&state, force_n(&state));
             course.fall = fall_of(&state, sample as f64 * self.sample_s);
             if course.fall.is_some() {
                 break;

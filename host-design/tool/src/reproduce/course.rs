@@ -3,7 +3,7 @@
 use serde::Serialize;
 
 use upright_design::plant::absolute_angles;
-use upright_design::simulate::{Fall, FallKind, Trace};
+use upright_design::simulate::{Fall, FallKind};
 
 /// Time history of a run: states and force at equally spaced times.
 #[derive(Debug, Clone, PartialEq)]
@@ -41,14 +41,16 @@ pub struct StepFigures {
 pub const BAND: f64 = 0.02;
 
 impl Course {
-    /// From what a simulation of the firmware's controller recorded every `sample_s` (s).
-    pub fn of_trace(trace: &Trace, sample_s: f64, fall: Option<Fall>) -> Self {
-        Self {
-            sample_s,
-            states: trace.samples().map(|sample| sample.state.to_vec()).collect(),
-            forces_n: trace.samples().map(|sample| sample.force).collect(),
-            fall,
-        }
+    /// An empty record with room for so many samples, `sample_s` (s) apart.
+    pub(super) fn with_room(sample_s: f64, samples: usize) -> Self {
+        let (states, forces_n) = (Vec::with_capacity(samples), Vec::with_capacity(samples));
+        Self { sample_s, states, forces_n, fall: None }
+    }
+
+    /// Appends a sample.
+    pub(super) fn push(&mut self, state: &[f64], force_n: f64) {
+        self.states.push(state.to_vec());
+        self.forces_n.push(force_n);
     }
 
     /// One state over time.

@@ -9,17 +9,16 @@
 mod claims;
 mod comparison;
 mod continuous_loop;
-mod continuous_margins;
 mod course;
 mod designs;
 mod errata;
 mod figures;
+mod firmware_loop;
 mod markdown;
 pub mod published;
 mod responses;
 mod robustness;
 mod settling;
-mod spectrum;
 mod summary;
 
 use std::path::{Path, PathBuf};
@@ -28,7 +27,6 @@ use serde::Serialize;
 
 pub use comparison::{Digits, Row, Verdict};
 pub use continuous_loop::ContinuousRun;
-pub use continuous_margins::continuous_margins;
 pub use course::{BAND, Course, StepFigures};
 pub use designs::{Designs, PoleSet, designs};
 pub use errata::{Erratum, Evidence, errata};
@@ -36,7 +34,6 @@ pub use markdown::markdown_table;
 pub use responses::{Loop, Loops, Response, responses};
 pub use robustness::{Ripple, Robustness, SEED, robustness};
 pub use settling::{HORIZON_S, LONGEST_S, Sensitivity, Settling, SettlingRow, printed, settling};
-pub use spectrum::{Bandwidth, SEGMENT, Spectrum};
 
 use upright_design::design::{Certified, DesignError, design};
 use upright_design::plant::PlantError;
@@ -104,25 +101,28 @@ pub struct Reproduction {
     pub robustness: Vec<Robustness>,
 }
 
-/// Number of stages that [`reproduce`] names.
-pub const STAGES: u64 = 5;
+/// The stages of [`reproduce`], in their order.
+pub const STAGES: [&str; 5] =
+    ["matrices, gains and poles", "errata", "step responses", "Table 2", "spectra and margins"];
 
 /// Computes everything; `stage` is called with the name of each of the [`STAGES`] before it starts.
 ///
 /// # Errors
 /// [`ReproduceError`] if a result cannot be computed.
 pub fn reproduce(rigs: &PaperRigs, stage: &dyn Fn(&'static str)) -> Result<Reproduction, ReproduceError> {
-    stage("matrices, gains and poles");
+    // Each name is used once, or the compiler complains.
+    let [of_designs, of_errata, of_responses, of_settling, of_robustness] = STAGES;
+    stage(of_designs);
     let designed = PaperDesigns::of(rigs)?;
     let designs = designs(rigs, &designed)?;
-    stage("errata");
+    stage(of_errata);
     let errata = errata(rigs, &designed)?;
-    stage("step responses");
+    stage(of_responses);
     let loops = Loops::with(&rigs.exact, designed.exact)?;
     let responses = responses(&loops)?;
-    stage("Table 2");
+    stage(of_settling);
     let settling = settling(rigs)?;
-    stage("spectra and margins");
+    stage(of_robustness);
     let robustness = robustness(&loops)?;
     Ok(Reproduction { designs, errata, responses, settling, robustness })
 }

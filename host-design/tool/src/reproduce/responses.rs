@@ -5,10 +5,12 @@ use upright::table::Law;
 
 use super::continuous_loop::ContinuousRun;
 use super::course::{Course, StepFigures};
+use super::firmware_loop::{FirmwareRun, courses};
 use super::{ReproduceError, SEED, chain, published};
 use upright_design::design::{Certified, Feedback, design};
+use upright_design::parallel;
 use upright_design::rig::Rig;
-use upright_design::simulate::{Scenario, Sensing, simulate};
+use upright_design::simulate::{Scenario, Sensing};
 use upright_design::table::{Gains, TableValues};
 
 /// Kind of loop that is run.
@@ -48,6 +50,9 @@ pub struct Loops {
     pub table: TableValues,
 }
 
+/// A law in a kind of loop, and what happens in the run.
+pub(super) type Wanted = (Law, Loop, ContinuousRun);
+
 impl Loops {
     /// Designs `rig`.
     ///
@@ -73,16 +78,31 @@ impl Loops {
         laws.each()[law].ok_or_else(|| ReproduceError::OneLaw(self.rig.name.clone()))
     }
 
-    /// Simulates `law` in this kind of loop, from rest. Sampled loops are recorded at the tick, whatever `run` says.
-    pub(super) fn course(&self, law: Law, kind: Loop, run: &ContinuousRun) -> Result<Course, ReproduceError> {
-        let sensing = match kind {
-            Loop::Continuous => return run.course(chain(&self.rig)?, self.continuous(law)?),
-            Loop::FullState => Sensing::FullState,
-            Loop::Encoders => Sensing::Encoders,
-        };
+    /// Simulates each law in its kind of loop, from rest. Sampled loops are recorded at the tick, whatever the run says.
+    pub(super) fn courses(&self, wanted: &[Wanted]) -> Result<Vec<Course>, ReproduceError> {
+        // The runs of the firmware advance together, the others by themselves.
+        let (alone, together): (Vec<usize>, Vec<usize>) =
+            (0..wanted.len()).partition(|&index| wanted[index].1 == Loop::Continuous);
+        let groups: Vec<&[usize]> = [together.as_slice()].into_iter().chain(alone.chunks(1)).collect();
+        let courses = parallel::try_map(groups.iter().copied(), |group| {
+            let of_group: Vec<Wanted> = group.iter().map(|&index| wanted[index]).collect();
+            match of_group[..] {
+                [(law, Loop::Continuous, run)] => {
+                    Ok(vec![run.course(chain(&self.rig)?, self.continuous(law)?)?])
+                }
+                _ => courses(&of_group.iter().map(|one| self.firmware_run(one)).collect::<Vec<_>>()),
+            }
+        })?;
+        let mut numbered: Vec<(usize, Course)> =
+            groups.concat().into_iter().zip(courses.into_iter().flatten()).collect();
+        numbered.sort_by_key(|(index, _)| *index);
+        Ok(numbered.into_iter().map(|(_, course)| course).collect())
+    }
+
+    fn firmware_run(&self, &(law, kind, run): &Wanted) -> FirmwareRun {
         let noise = |variance: f64| run.disturbances.map_or(0.0, |_| variance.sqrt());
         let scenario = Scenario {
-            sensing,
+            sensing: if kind == Loop::Encoders { Sensing::Encoders } else { Sensing::FullState },
             step_m: run.step_m,
             duration_s: run.duration_s,
             force_noise_n: noise(published::FORCE_VARIANCE_N2),
@@ -90,8 +110,7 @@ impl Loops {
             seed: run.disturbances.unwrap_or(SEED),
             ..Scenario::at_rest(&self.rig, law)
         };
-        let (trace, summary) = simulate(&self.rig, &self.table, &scenario)?;
-        Ok(Course::of_trace(&trace, self.rig.tick.period_s, summary.fall))
+        FirmwareRun { rig: self.rig.clone(), table: self.table.clone(), scenario }
     }
 }
 
@@ -116,16 +135,16 @@ pub struct Response {
 /// # Errors
 /// [`ReproduceError`] if a run cannot be made.
 pub fn responses(loops: &Loops) -> Result<Vec<Response>, ReproduceError> {
-    let mut responses = Vec::new();
-    for (offset, disturbances) in [(5, None), (7, Some(SEED))] {
-        for (figure, law) in (offset..).zip(Law::ALL) {
-            for kind in Loop::ALL {
-                let course =
-                    loops.course(law, kind, &ContinuousRun { disturbances, ..ContinuousRun::STEP })?;
-                let figures = course.step_figures(ContinuousRun::STEP.step_m);
-                responses.push(Response { figure, law, kind, figures, course });
-            }
-        }
+    let mut wanted = Vec::new();
+    for disturbances in [None, Some(SEED)] {
+        let run = ContinuousRun { disturbances, ..ContinuousRun::STEP };
+        wanted.extend(Law::ALL.into_iter().flat_map(|law| Loop::ALL.map(|kind| (law, kind, run))));
     }
-    Ok(responses)
+    let courses = loops.courses(&wanted)?;
+    let responses = courses.into_iter().zip(wanted).enumerate().map(|(index, (course, (law, kind, run)))| {
+        // Figures 5 and 7 are of the first law, 6 and 8 of the second one.
+        let figure = 5 + (index / Loop::ALL.len()) as u8;
+        Response { figure, law, kind, figures: course.step_figures(run.step_m), course }
+    });
+    Ok(responses.collect())
 }

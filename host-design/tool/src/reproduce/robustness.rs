@@ -6,16 +6,15 @@ use upright::table::Law;
 
 use super::ReproduceError;
 use super::continuous_loop::ContinuousRun;
-use super::continuous_margins::continuous_margins;
 use super::course::Course;
 use super::designs::open_loop_poles;
-use super::responses::{Loop, Loops};
-use super::spectrum::{Bandwidth, SEGMENT, Spectrum};
+use super::responses::{Loop, Loops, Wanted};
+use upright_design::numerics::{Bandwidth, SEGMENT, Spectrum};
 use upright_design::parallel;
 use upright_design::plant::reference::Tolerance;
 use upright_design::rig::Rig;
 use upright_design::table::{Gains, TableValues};
-use upright_design::verify::{LinearReport, Margins, linear};
+use upright_design::verify::{LinearReport, Margins, continuous_margins, linear};
 
 /// Seed of all disturbances.
 pub const SEED: u64 = 1;
@@ -84,16 +83,16 @@ pub fn robustness(loops: &Loops) -> Result<Vec<Robustness>, ReproduceError> {
         Loop::FullState => of_law(&full_state, law),
         Loop::Encoders => of_law(&encoders, law),
     };
-    let jobs: Vec<(Law, Loop)> =
-        Law::ALL.into_iter().flat_map(|law| Loop::ALL.map(|kind| (law, kind))).collect();
-    parallel::try_map(jobs, |(law, kind)| {
-        let course = loops.course(law, kind, &RUN)?;
-        let forces = &course.forces_n[after(&course)..];
+    let wanted: Vec<Wanted> =
+        Law::ALL.into_iter().flat_map(|law| Loop::ALL.map(|kind| (law, kind, RUN))).collect();
+    let courses = loops.courses(&wanted)?;
+    parallel::try_map(wanted.iter().zip(&courses), |(&(law, kind, _), course)| {
+        let forces = &course.forces_n[after(course)..];
         Ok(Robustness {
             law,
             kind,
             margins: margins(law, kind),
-            ripples: ripples(&course),
+            ripples: ripples(course),
             peak_force_n: forces.iter().map(|force| force.abs()).fold(0.0, f64::max),
             effort_n2: forces.iter().map(|force| force * force).sum::<f64>() / forces.len() as f64,
         })

@@ -8,12 +8,13 @@ use upright::table::Law;
 
 use super::continuous_loop::ContinuousRun;
 use super::course::Course;
+use super::firmware_loop::{FirmwareRun, courses};
 use super::{PaperRigs, ReproduceError, SEED, chain, published};
 use upright_design::design::{Certified, DesignError, Feedback, design};
 use upright_design::parallel;
 use upright_design::plant::reference::Tolerance;
 use upright_design::rig::{PolePlacement, Rig, Tick};
-use upright_design::simulate::{Fall, Scenario, Sensing, simulate};
+use upright_design::simulate::{Fall, Scenario, Sensing};
 use upright_design::table::{Gains, TableValues};
 
 /// Table 2, what decides it, and what does not.
@@ -85,12 +86,19 @@ pub fn printed() -> [bool; 7] {
 pub fn settling(rigs: &PaperRigs) -> Result<Settling, ReproduceError> {
     let changes = Change::all();
     let exact = ExactDesigns::of(&rigs.exact, &changes)?;
-    let jobs: Vec<(usize, f64)> = (0..changes.len())
-        .flat_map(|change| published::TABLE_2.iter().map(move |row| (change, row.0)))
+    let times_s = published::TABLE_2.map(|row| row.0);
+    let jobs: Vec<(usize, &[f64])> = changes
+        .iter()
+        .enumerate()
+        .flat_map(|(index, (_, change))| {
+            times_s.chunks(change.together()).map(move |times_s| (index, times_s))
+        })
         .collect();
-    let courses = parallel::try_map(jobs, |(change, settling_time_s)| {
-        changes[change].1.course(rigs, settling_time_s, &exact)
-    })?;
+    let courses: Vec<Course> =
+        parallel::try_map(jobs, |(change, times_s)| changes[change].1.courses(rigs, times_s, &exact))?
+            .into_iter()
+            .flatten()
+            .collect();
     let mut groups = courses.chunks_exact(published::TABLE_2.len()).zip(&changes);
     let sensitivity = groups
         .clone()
@@ -228,33 +236,43 @@ impl Change {
         }
     }
 
-    fn course(
+    /// How many runs are made together.
+    fn together(&self) -> usize {
+        match self {
+            Change::Continuous { .. } => 1,
+            Change::Firmware { .. } => published::TABLE_2.len(),
+        }
+    }
+
+    /// The runs for these settling times.
+    fn courses(
         &self,
         rigs: &PaperRigs,
-        settling_time_s: f64,
+        settling_times_s: &[f64],
         exact: &ExactDesigns,
-    ) -> Result<Course, ReproduceError> {
-        let mut rig = asking_for(&rigs.exact, settling_time_s);
+    ) -> Result<Vec<Course>, ReproduceError> {
+        let times_s = settling_times_s.iter();
         match self {
-            Change::Continuous { gains, run } => {
-                run.course(chain(&rig)?, &gains.law(rigs, settling_time_s, exact)?)
-            }
+            Change::Continuous { gains, run } => times_s
+                .map(|&time_s| run.course(chain(&rigs.exact)?, &gains.law(rigs, time_s, exact)?))
+                .collect(),
             Change::Firmware { tick, gains, force_limit_n } => {
-                rig.tick = tick.clone();
-                rig.actuator.force_limit_n = *force_limit_n;
-                if let upright_design::rig::PlantDescription::Chain(chain) = &mut rig.plant {
-                    chain.cart.travel_m = [-1e3, 1e3]; // the paper has no rail
-                }
-                let table =
-                    TableValues::of(&rig, &exact.at(&rig, settling_time_s)?, *gains)?.without_governor();
-                let scenario = Scenario {
-                    sensing: Sensing::FullState,
-                    step_m: RUN.step_m,
-                    duration_s: RUN.duration_s,
-                    ..Scenario::at_rest(&rig, Law::PolePlacement)
+                let run = |&time_s| {
+                    let mut rig = Rig { tick: tick.clone(), ..asking_for(&rigs.exact, time_s) };
+                    rig.actuator.force_limit_n = *force_limit_n;
+                    if let upright_design::rig::PlantDescription::Chain(chain) = &mut rig.plant {
+                        chain.cart.travel_m = [-1e3, 1e3]; // the paper has no rail
+                    }
+                    let table = TableValues::of(&rig, &exact.at(&rig, time_s)?, *gains)?.without_governor();
+                    let scenario = Scenario {
+                        sensing: Sensing::FullState,
+                        step_m: RUN.step_m,
+                        duration_s: RUN.duration_s,
+                        ..Scenario::at_rest(&rig, Law::PolePlacement)
+                    };
+                    Ok::<_, ReproduceError>(FirmwareRun { rig, table, scenario })
                 };
-                let (trace, summary) = simulate(&rig, &table, &scenario)?;
-                Ok(Course::of_trace(&trace, rig.tick.period_s, summary.fall))
+                courses(&times_s.map(run).collect::<Result<Vec<_>, _>>()?)
             }
         }
     }

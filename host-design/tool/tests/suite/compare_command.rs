@@ -1,9 +1,8 @@
 //! `upright compare` and `upright reproduce` as a user or a script sees them.
 
-use std::process::Command;
-
 use crate::command::{SINGLE, path_of, status, stderr, stdout, upright};
 use crate::published::rig_path;
+use crate::reproduced::{REPRODUCED, Reproduced};
 use serde_json::Value;
 
 #[test]
@@ -100,17 +99,10 @@ fn bad_input_ends_with_status_2_and_writes_nothing() {
 
 #[test]
 fn the_paper_is_reproduced_from_any_folder() {
-    let folder = tempfile::tempdir().unwrap();
-    let output = Command::new(env!("CARGO_BIN_EXE_upright"))
-        .args(["reproduce", "--out", "new/folder"])
-        .current_dir(folder.path())
-        .output()
-        .unwrap();
-    assert_eq!(status(&output), 0, "{}", stderr(&output));
-    let written = folder.path().join("new/folder");
-    assert_eq!(std::fs::read_dir(&written).unwrap().count(), 21);
-    let summary = std::fs::read(written.join("summary.md")).unwrap();
-    assert!(summary == output.stdout, "the summary is what is printed");
+    let Reproduced { output, files, .. } = &*REPRODUCED;
+    assert_eq!(status(output), 0, "{}", stderr(output));
+    assert_eq!(files.len(), 22);
+    assert!(files["summary.md"] == output.stdout, "the summary is what is printed");
 }
 
 #[test]

@@ -30,6 +30,7 @@ mod report_figures;
 mod report_page;
 mod report_rigs;
 mod reproduce_numbers;
+mod reproduced;
 mod robust_command;
 mod shaken;
 mod split_command;

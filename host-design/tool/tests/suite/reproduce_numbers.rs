@@ -1,30 +1,41 @@
 //! Pins every number of `upright reproduce`: what the paper prints, what was found about it, and figures of the runs
 //! that other programs computed before.
 
-use std::cell::Cell;
 use std::sync::LazyLock;
 
+use serde_json::{Value, json};
 use upright::table::Law;
 use upright_design::design::{Feedback, design};
 use upright_design::plant::reference::Tolerance;
 use upright_design::rig::{Chain, PlantDescription, PolePlacement, Rig};
 use upright_design::simulate::FallKind;
-use upright_tool::reproduce::{
-    ContinuousRun, Course, Loop, Loops, PaperRigs, Reproduction, Robustness, STAGES, Verdict,
-    continuous_margins, printed, published, reproduce,
-};
+use upright_design::verify::continuous_margins;
+use upright_tool::reproduce::{ContinuousRun, Loop, Loops, PaperRigs, printed, published};
+
+use crate::reproduced::REPRODUCED;
 
 static RIGS: LazyLock<PaperRigs> = LazyLock::new(|| {
     let folder = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../../rigs");
     PaperRigs::from_folder(&folder).unwrap()
 });
 
-static ALL: LazyLock<Reproduction> = LazyLock::new(|| {
-    let stages = Cell::new(0);
-    let all = reproduce(&RIGS, &|_| stages.set(stages.get() + 1)).unwrap();
-    assert_eq!(stages.get(), STAGES);
-    all
-});
+/// The entries of an array.
+fn all(array: &Value) -> &[Value] {
+    array.as_array().unwrap()
+}
+
+fn number(value: &Value) -> f64 {
+    value.as_f64().unwrap()
+}
+
+fn text(value: &Value) -> &str {
+    value.as_str().unwrap()
+}
+
+/// Poles as [re, im].
+fn poles(set: &Value) -> Vec<[f64; 2]> {
+    all(&set["poles"]).iter().map(|pole| [number(&pole[0]), number(&pole[1])]).collect()
+}
 
 fn chain(rig: &Rig) -> &Chain {
     match &rig.plant {
@@ -39,10 +50,12 @@ fn close(found: f64, wanted: f64, tolerance: f64) {
 
 #[test]
 fn every_printed_digit_comes_out_of_what_it_was_computed_from() {
-    let rows = &ALL.designs.rows;
+    let rows = all(&REPRODUCED.numbers["designs"]["rows"]);
+    let is_exact = |row: &Value| row["verdict"] == "every_digit";
     let exact = |from: &str, start: &str| {
-        let chosen = || rows.iter().filter(|row| row.from == from && row.quantity.starts_with(start));
-        (chosen().filter(|row| row.is_exact()).count(), chosen().count())
+        let is_chosen = |row: &&Value| row["from"] == from && text(&row["quantity"]).starts_with(start);
+        let chosen = || rows.iter().filter(is_chosen);
+        (chosen().filter(|row| is_exact(row)).count(), chosen().count())
     };
     assert_eq!(exact("exact model", "A["), (20, 20));
     assert_eq!(exact("exact model", "B["), (5, 5));
@@ -50,12 +63,12 @@ fn every_printed_digit_comes_out_of_what_it_was_computed_from() {
     assert_eq!(exact("printed A and B", "pole placement"), (11, 11));
     assert_eq!(exact("exact model", "LQR"), (10, 11));
     assert_eq!(exact("exact model", "pole placement"), (6, 11));
-    let off: Vec<(&str, Verdict)> = rows
+    let off: Vec<(&str, Value)> = rows
         .iter()
-        .filter(|row| row.printed.is_some() && !row.is_exact())
-        .map(|row| (row.quantity.as_str(), row.verdict))
+        .filter(|row| !row["printed"].is_null() && !is_exact(row))
+        .map(|row| (text(&row["quantity"]), row["verdict"].clone()))
         .collect();
-    let by = Verdict::UnitsOfLastDigit;
+    let by = |units: u64| json!({ "units_of_last_digit": units });
     let wanted = [
         ("LQR K[9]", by(1)),
         ("pole placement K[2]", by(1)),
@@ -69,24 +82,20 @@ fn every_printed_digit_comes_out_of_what_it_was_computed_from() {
 
 #[test]
 fn the_dominant_pair_follows_from_the_formulas() {
-    let found: Vec<String> = ALL
-        .designs
-        .rows
+    let found: Vec<String> = all(&REPRODUCED.numbers["designs"]["rows"])
         .iter()
-        .filter(|row| row.verdict == Verdict::NotPrinted)
-        .map(|row| format!("{:.6}", row.ours))
+        .filter(|row| row["verdict"] == "not_printed")
+        .map(|row| format!("{:.6}", number(&row["ours"])))
         .collect();
     assert_eq!(found, ["0.826085", "0.807019", "-0.666667", "0.454792"]);
 }
 
 #[test]
 fn poles_are_those_of_the_paper_s_loops() {
-    let found: Vec<String> = ALL
-        .designs
-        .poles
+    let found: Vec<String> = all(&REPRODUCED.numbers["designs"]["poles"])
         .iter()
         .map(|set| {
-            let upper = set.poles.iter().filter(|pole| pole[1] >= 0.0);
+            let upper = poles(set).into_iter().filter(|pole| pole[1] >= 0.0);
             upper.map(|[re, im]| format!("{re:.1}{im:+.1}")).collect::<Vec<_>>().join(" ")
         })
         .collect();
@@ -104,17 +113,17 @@ fn poles_are_those_of_the_paper_s_loops() {
 
 #[test]
 fn each_erratum_has_one_reading_that_agrees_and_others_that_do_not() {
-    let counts: Vec<Vec<[usize; 2]>> = ALL
-        .errata
-        .iter()
-        .map(|erratum| erratum.evidence.iter().filter_map(|evidence| evidence.agree).collect())
-        .collect();
-    let wanted: [&[[usize; 2]]; 5] = [
-        &[[11, 11], [2, 11], [2, 11]],
-        &[[25, 25], [2, 25], [1, 25], [0, 25]],
-        &[[11, 11], [0, 11], [0, 11], [0, 11]],
+    let counts = |erratum: &Value| {
+        let agree = all(&erratum["evidence"]).iter().map(|evidence| &evidence["agree"]);
+        agree.filter(|agree| !agree.is_null()).map(|agree| [&agree[0], &agree[1]].map(number)).collect()
+    };
+    let counts: Vec<Vec<[f64; 2]>> = all(&REPRODUCED.numbers["errata"]).iter().map(counts).collect();
+    let wanted: [&[[f64; 2]]; 5] = [
+        &[[11.0, 11.0], [2.0, 11.0], [2.0, 11.0]],
+        &[[25.0, 25.0], [2.0, 25.0], [1.0, 25.0], [0.0, 25.0]],
+        &[[11.0, 11.0], [0.0, 11.0], [0.0, 11.0], [0.0, 11.0]],
         &[],
-        &[[22, 22], [16, 22]],
+        &[[22.0, 22.0], [16.0, 22.0]],
     ];
     assert_eq!(counts, wanted);
 }
@@ -152,79 +161,81 @@ fn a_step_of_one_metre_with_the_printed_gains_is_the_one_other_programs_find() {
 
 #[test]
 fn figures_5_to_8_are_pinned() {
-    let found: Vec<String> = ALL
-        .responses
+    let found: Vec<String> = all(&REPRODUCED.numbers["responses"])
         .iter()
         .map(|response| {
-            let figures = &response.figures;
-            assert_eq!(figures.fall, None);
-            let settled = figures.settling_time_s.map_or("-".to_owned(), |time| format!("{time:.2}"));
+            let figures = &response["figures"];
+            assert_eq!(figures["fall"], Value::Null);
+            let settled = figures["settling_time_s"].as_f64();
             format!(
-                "{} {:?} {settled} {:.1} {:.1} {:.1} {:.2}",
-                response.figure,
-                response.kind,
-                figures.overshoot_percent,
-                figures.undershoot_percent,
-                figures.peak_angles_deg[0],
-                figures.peak_force_n
+                "{} {} {} {:.1} {:.1} {:.1} {:.2}",
+                response["figure"],
+                text(&response["kind"]),
+                settled.map_or("-".to_owned(), |time| format!("{time:.2}")),
+                number(&figures["overshoot_percent"]),
+                number(&figures["undershoot_percent"]),
+                number(&figures["peak_angles_deg"][0]),
+                number(&figures["peak_force_n"])
             )
         })
         .collect();
     assert_eq!(
         found,
         [
-            "5 Continuous 2.10 1.6 1.8 12.3 3.16",
-            "5 FullState 2.11 1.6 1.8 12.3 2.28",
-            "5 Encoders 4.45 4.6 1.8 12.5 2.28",
-            "6 Continuous 5.09 1.0 1.1 8.4 11.01",
-            "6 FullState 5.09 1.0 1.1 8.4 9.24",
-            "6 Encoders 5.17 0.6 1.0 9.6 9.24",
-            "7 Continuous 2.11 1.2 1.7 12.2 3.16",
-            "7 FullState 2.11 1.2 1.7 12.2 2.28",
-            "7 Encoders - 2.5 1.8 12.9 2.28",
-            "8 Continuous 5.11 1.1 1.1 8.2 11.01",
-            "8 FullState 5.11 1.1 1.1 8.1 9.24",
-            "8 Encoders 5.16 0.9 1.1 9.1 9.24",
+            "5 continuous 2.10 1.6 1.8 12.3 3.16",
+            "5 full_state 2.11 1.6 1.8 12.3 2.28",
+            "5 encoders 4.45 4.6 1.8 12.5 2.28",
+            "6 continuous 5.09 1.0 1.1 8.4 11.01",
+            "6 full_state 5.09 1.0 1.1 8.4 9.24",
+            "6 encoders 5.17 0.6 1.0 9.6 9.24",
+            "7 continuous 2.11 1.2 1.7 12.2 3.16",
+            "7 full_state 2.11 1.2 1.7 12.2 2.28",
+            "7 encoders - 2.5 1.8 12.9 2.28",
+            "8 continuous 5.11 1.1 1.1 8.2 11.01",
+            "8 full_state 5.11 1.1 1.1 8.1 9.24",
+            "8 encoders 5.16 0.9 1.1 9.1 9.24",
         ]
     );
 }
 
 #[test]
 fn the_same_seed_disturbs_the_continuous_loop_and_the_firmware_alike() {
-    let difference = |one: &Course, other: &Course| {
-        let pairs = one.states.iter().zip(&other.states).skip(3000);
-        pairs.map(|(a, b)| (a[0] - b[0]).abs()).fold(0.0, f64::max)
+    let difference = |one: Vec<f64>, other: Vec<f64>| {
+        assert!(one.len() == 10_001 && other.len() == one.len());
+        let pairs = one.iter().zip(&other).skip(3000);
+        pairs.map(|(a, b)| (a - b).abs()).fold(0.0, f64::max)
     };
-    let of = |figure: u8, kind: Loop| {
-        let found = ALL.responses.iter().find(|one| one.figure == figure && one.kind == kind);
-        &found.unwrap().course
+    // The position of the cart, from the data of a figure.
+    let of = |figure: &str| {
+        let lines: Vec<&str> = REPRODUCED.text(&format!("figure-{figure}.csv")).lines().collect();
+        let column = lines[0].split(',').position(|name| name == "x_m").unwrap();
+        let position = |line: &&str| line.split(',').nth(column).unwrap().parse().unwrap();
+        lines[1..].iter().map(position).collect::<Vec<f64>>()
     };
     // The tick of 1 ms moves the cart by less than a millimetre, the disturbances by many millimetres.
-    let alike = difference(of(7, Loop::Continuous), of(7, Loop::FullState));
-    let disturbed = difference(of(7, Loop::Continuous), of(5, Loop::Continuous));
+    let alike = difference(of("7-continuous"), of("7-full-state"));
+    let disturbed = difference(of("7-continuous"), of("5-continuous"));
     assert!(alike < 2e-3 && disturbed > 5.0 * alike, "{alike} {disturbed}");
 }
 
 #[test]
 fn table_2_comes_out_for_runs_of_about_six_and_a_half_seconds() {
-    let settling = &ALL.settling;
-    let fates: Vec<String> = settling
-        .rows
+    let settling = &REPRODUCED.numbers["settling"];
+    let fates: Vec<String> = all(&settling["rows"])
         .iter()
-        .map(|row| match (&row.fall, row.settled_after_s) {
-            (Some(fall), _) => format!("falls {:.2}", fall.at_s),
-            (None, after) => format!("{:.2}", after.unwrap()),
+        .map(|row| match &row["fall"] {
+            Value::Null => format!("{:.2}", number(&row["settled_after_s"])),
+            fall => format!("falls {:.2}", number(&fall["at_s"])),
         })
         .collect();
     assert_eq!(fates, ["falls 0.04", "falls 0.07", "4.27", "5.09", "5.92", "6.74", "7.56"]);
-    let [first, last] = settling.horizons_s.unwrap();
-    close(first, 5.92, 1e-9);
-    close(last, 6.73, 1e-9);
-    let agree: Vec<(f64, usize)> = settling
-        .by_horizon
+    close(number(&settling["horizons_s"][0]), 5.92, 1e-9);
+    close(number(&settling["horizons_s"][1]), 6.73, 1e-9);
+    let agree: Vec<(f64, usize)> = all(&settling["by_horizon"])
         .iter()
-        .map(|(horizon, verdicts)| {
-            (*horizon, verdicts.iter().zip(printed()).filter(|(a, b)| **a == *b).count())
+        .map(|entry| {
+            let verdicts = all(&entry[1]).iter().zip(printed());
+            (number(&entry[0]), verdicts.filter(|(a, b)| **a == *b).count())
         })
         .collect();
     let wanted = [
@@ -244,20 +255,22 @@ fn table_2_comes_out_for_runs_of_about_six_and_a_half_seconds() {
 
 #[test]
 fn what_else_was_tried_on_table_2_is_pinned() {
-    let found: Vec<String> = ALL
-        .settling
-        .sensitivity
+    let found: Vec<String> = all(&REPRODUCED.numbers["settling"]["sensitivity"])
         .iter()
         .map(|tried| {
+            let is = |what: &str, i: usize| tried[what][i].as_bool().unwrap();
             let letters: String = (0..7)
-                .map(|i| match (tried.falls[i], tried.at_horizon[i]) {
+                .map(|i| match (is("falls", i), is("at_horizon", i)) {
                     (true, _) => 'f',
                     (false, true) => 'y',
                     (false, false) => 'n',
                 })
                 .collect();
-            let horizons = tried.horizons_s.map_or("none".to_owned(), |[a, b]| format!("{a:.2}-{b:.2}"));
-            format!("{}: {letters} {horizons}", tried.changed)
+            let horizons = match &tried["horizons_s"] {
+                Value::Null => "none".to_owned(),
+                both => format!("{:.2}-{:.2}", number(&both[0]), number(&both[1])),
+            };
+            format!("{}: {letters} {horizons}", text(&tried["changed"]))
         })
         .collect();
     assert_eq!(
@@ -296,8 +309,10 @@ fn a_run_that_falls_falls_at_any_tolerance() {
     }
 }
 
-fn robustness(law: Law, kind: Loop) -> &'static Robustness {
-    ALL.robustness.iter().find(|one| one.law == law && one.kind == kind).unwrap()
+fn robustness(law: Law, kind: Loop) -> &'static Value {
+    let (law, kind) = (json!(law), json!(kind));
+    let mut found = all(&REPRODUCED.numbers["robustness"]).iter();
+    found.find(|one| one["law"] == law && one["kind"] == kind).unwrap()
 }
 
 #[test]
@@ -311,14 +326,14 @@ fn margins_of_every_loop_are_pinned() {
         (Law::PolePlacement, Loop::FullState, [0.525, 6.243, 49.9, 2.870, 1.191, 0.619]),
         (Law::PolePlacement, Loop::Encoders, [0.518, 2.490, 22.7, 1.450, 2.601, 0.399]),
     ] {
-        let margins = robustness(law, kind).margins.as_ref().unwrap();
+        let margins = &robustness(law, kind)["margins"];
         let found = [
-            margins.lowest_gain,
-            margins.highest_gain.unwrap_or(f64::INFINITY),
-            margins.phase_margin_rad.unwrap().to_degrees(),
-            margins.delay_margin_s.unwrap() * 1e3,
-            margins.peak_sensitivity,
-            margins.disk_margin,
+            number(&margins["lowest_gain"]),
+            margins["highest_gain"].as_f64().unwrap_or(f64::INFINITY),
+            number(&margins["phase_margin_rad"]).to_degrees(),
+            number(&margins["delay_margin_s"]) * 1e3,
+            number(&margins["peak_sensitivity"]),
+            number(&margins["disk_margin"]),
         ];
         for ((found, wanted), tolerance) in
             found.into_iter().zip(wanted).zip([6e-4, 6e-4, 0.06, 6e-4, 6e-4, 6e-4])
@@ -334,16 +349,17 @@ fn margins_of_every_loop_are_pinned() {
 /// R. E. Kalman: `|1 + L| >= 1` for every LQR with R = 1. Other laws need not satisfy it.
 #[test]
 fn the_continuous_lqr_has_the_margins_that_theory_promises() {
-    let margins = robustness(Law::Lqr, Loop::Continuous).margins.as_ref().unwrap();
-    assert!(margins.peak_sensitivity <= 1.0 + 1e-9 && margins.lowest_gain <= 0.5);
-    assert!(margins.highest_gain.is_none() && margins.phase_margin_rad.unwrap().to_degrees() >= 60.0);
+    let margins = &robustness(Law::Lqr, Loop::Continuous)["margins"];
+    assert!(number(&margins["peak_sensitivity"]) <= 1.0 + 1e-9 && number(&margins["lowest_gain"]) <= 0.5);
+    assert!(margins["highest_gain"] == Value::Null);
+    assert!(number(&margins["phase_margin_rad"]).to_degrees() >= 60.0);
     // Negative control: far poles at half the distance violate it.
-    let open = &ALL.designs.poles[0].poles;
-    let mut closed = ALL.designs.poles[2].poles.clone();
+    let sets = &REPRODUCED.numbers["designs"]["poles"];
+    let (open, mut closed) = (poles(&sets[0]), poles(&sets[2]));
     for pole in closed.iter_mut().filter(|pole| pole[0] < -1.0) {
         pole[0] *= 0.5;
     }
-    assert!(continuous_margins(open, &closed).peak_sensitivity > 1.01);
+    assert!(continuous_margins(&open, &closed).peak_sensitivity > 1.01);
 }
 
 #[test]
@@ -358,16 +374,17 @@ fn spectra_and_ripple_are_pinned() {
         (Law::PolePlacement, Loop::Encoders, [4.80, 24.6, 0.991, 0.779, 11.1, 40.5, 0.982]),
     ] {
         let one = robustness(law, kind);
-        let signal = |name: &str| one.ripples.iter().find(|ripple| ripple.signal == name).unwrap();
+        let signal =
+            |name: &str| all(&one["ripples"]).iter().find(|ripple| ripple["signal"] == name).unwrap();
         let [x, theta, u] = ["x", "theta1", "u"].map(signal);
         let found = [
-            1e3 * x.rms,
-            1e3 * theta.rms,
-            u.rms,
-            x.bandwidth.mean_hz,
-            theta.bandwidth.mean_hz,
-            u.bandwidth.mean_hz,
-            one.effort_n2,
+            1e3 * number(&x["rms"]),
+            1e3 * number(&theta["rms"]),
+            number(&u["rms"]),
+            number(&x["bandwidth"]["mean_hz"]),
+            number(&theta["bandwidth"]["mean_hz"]),
+            number(&u["bandwidth"]["mean_hz"]),
+            number(&one["effort_n2"]),
         ];
         for (found, wanted) in found.into_iter().zip(wanted) {
             // Encoder steps make the run chaotic: a different rounding anywhere changes the run.
@@ -380,7 +397,8 @@ fn spectra_and_ripple_are_pinned() {
 #[test]
 fn every_joint_swings_slower_under_the_lqr_and_the_force_does_not() {
     for kind in Loop::ALL {
-        let frequency = |law: Law, index: usize| robustness(law, kind).ripples[index].bandwidth.mean_hz;
+        let frequency =
+            |law: Law, index: usize| number(&robustness(law, kind)["ripples"][index]["bandwidth"]["mean_hz"]);
         for joint in 1..=4 {
             let slower = frequency(Law::Lqr, joint) < frequency(Law::PolePlacement, joint);
             assert!(slower, "{kind:?}, joint {joint}");
@@ -408,7 +426,7 @@ fn a_folder_without_the_rig_files_is_refused_with_a_remedy() {
 #[test]
 fn the_committed_summary_is_what_comes_out() {
     let file = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs/reproduction.md");
-    let (committed, found) = (std::fs::read_to_string(file).unwrap(), ALL.summary());
+    let (committed, found) = (std::fs::read_to_string(file).unwrap(), REPRODUCED.text("summary.md"));
     for (line, (committed, found)) in committed.lines().zip(found.lines()).enumerate() {
         assert_eq!(committed, found, "docs/reproduction.md:{}: run `upright reproduce` again?", line + 1);
     }
@@ -417,13 +435,13 @@ fn the_committed_summary_is_what_comes_out() {
 
 #[test]
 fn the_summary_and_the_files_hold_every_part() {
-    let summary = ALL.summary();
+    let summary = REPRODUCED.text("summary.md");
     for part in ["Matrices and gains", "Poles", "Errata", "Figures 5 to 8", "Table 2", "Less frequency"] {
         assert!(summary.contains(part), "{part}");
     }
-    let names: Vec<String> = ALL.files().unwrap().into_iter().map(|(name, _)| name).collect();
-    assert_eq!(names.len(), 1 + 4 * 4 + 2 * 2);
+    let names: Vec<&String> = REPRODUCED.files.keys().collect();
+    assert_eq!(names.len(), 2 + 4 * 4 + 2 * 2);
     for name in ["summary.md", "figure-5.svg", "figure-8-encoders.csv", "table-2.svg", "spectra.csv"] {
-        assert!(names.iter().any(|found| found == name), "{name}");
+        assert!(names.iter().any(|found| *found == name), "{name}");
     }
 }

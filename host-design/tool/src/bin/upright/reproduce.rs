@@ -23,7 +23,7 @@ pub(crate) struct Reproduce {
     /// Folder of quadruple-paper.toml and quadruple-paper-printed.toml [default: rigs of the checkout]
     #[arg(long, value_name = "DIR")]
     rigs: Option<PathBuf>,
-    /// Folder for summary.md and all figures (SVG) and their data (CSV)
+    /// Folder for summary.md, all numbers (numbers.json), and all figures (SVG) and their data (CSV)
     #[arg(long, value_name = "DIR", default_value = "reproduced")]
     out: PathBuf,
     /// Write nothing
@@ -42,17 +42,23 @@ impl Reproduce {
                 Failure::BadArgument(format!("--out {}: cannot be created: {error}", self.out.display()))
             })?;
         }
-        let found = with_stages(STAGES, |stage| reproduce(&rigs, stage))?;
+        let found = with_stages(STAGES.len() as u64, |stage| reproduce(&rigs, stage))?;
+        let numbers = serde_json::to_vec(&found).map_err(std::io::Error::from)?;
         if !self.no_write {
-            let files = found.files()?;
+            let mut files = found.files()?;
+            files.push(("numbers.json".to_owned(), numbers.clone()));
             for (name, contents) in &files {
                 write_atomically(&self.out.join(name), contents)?;
             }
-            eprintln!("wrote summary.md, figures and data ({} files) to {}", files.len(), self.out.display());
+            eprintln!(
+                "wrote summary.md, numbers.json, figures and data ({} files) to {}",
+                files.len(),
+                self.out.display()
+            );
         }
         let mut out = std::io::stdout().lock();
         if self.json {
-            serde_json::to_writer(&mut out, &found).map_err(std::io::Error::from)?;
+            out.write_all(&numbers)?;
             writeln!(out)?;
         } else {
             write!(out, "{}", found.summary())?;

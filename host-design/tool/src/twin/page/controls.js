@@ -29,6 +29,11 @@ function option(value, text) {
   return element;
 }
 
+// Writes a text, if it is not there already: the browser lays out again what is written.
+function write(element, text) {
+  if (element.textContent !== text) element.textContent = text;
+}
+
 export class Controls {
   constructor(ask) {
     this.ask = ask;
@@ -165,7 +170,7 @@ export class Controls {
     this.isRecording = picture.recording;
     byId('record').setAttribute('aria-pressed', picture.recording);
     if (picture.recording) byId('csv').hidden = false;
-    byId('span').textContent = `${Number(this.scopes.span.toPrecision(3))} s`;
+    write(byId('span'), `${Number(this.scopes.span.toPrecision(3))} s`);
     const log = byId('log');
     for (const line of picture.log) {
       const entry = document.createElement('li');
@@ -175,17 +180,17 @@ export class Controls {
     while (log.childElementCount > KEPT_LINES) log.lastElementChild.remove();
     this.fault(picture.fault);
     if (latest !== null) this.telemetry(latest, picture.wanted_m);
-    if (machine?.stopped !== undefined) byId('state').textContent = machine.stopped;
+    if (machine?.stopped !== undefined) write(byId('state'), machine.stopped);
     else if (machine !== null) this.simulation(machine);
-    if (picture.ended !== null) byId('state').textContent = picture.ended;
+    if (picture.ended !== null) write(byId('state'), picture.ended);
   }
 
   telemetry(latest, wanted) {
     const state = byId('state');
-    state.textContent = this.states.get(latest.state) ?? latest.state;
+    write(state, this.states.get(latest.state) ?? latest.state);
     state.dataset.state = latest.state;
-    byId('now').textContent = latest.now === null ? '' : `now: ${latest.now}`;
-    byId('inputs').textContent = latest.inputs;
+    write(byId('now'), latest.now === null ? '' : `now: ${latest.now}`);
+    write(byId('inputs'), latest.inputs);
     const isOn = ['Driving', 'Identifying', 'Armed', 'Raising', 'Balancing', 'Lowering'].includes(latest.state);
     const against = isOn ? [] : latest.against_arming;
     const shown = [...byId('against').children].map((element) => element.textContent);
@@ -195,7 +200,7 @@ export class Controls {
     const law = this.laws.find(({ value }) => value === latest.law);
     if (law !== undefined && document.activeElement !== byId('law')) byId('law').value = law.name;
     const setpoint = wanted ?? latest.setpoint_m;
-    byId('setpoint-value').textContent = `${setpoint.toFixed(3)} m`;
+    write(byId('setpoint-value'), `${setpoint.toFixed(3)} m`);
     if (document.activeElement !== byId('setpoint')) byId('setpoint').value = setpoint;
   }
 
@@ -215,19 +220,19 @@ export class Controls {
     this.isPaused = machine.paused;
     byId('pause').setAttribute('aria-pressed', machine.paused);
     const isBehind = !machine.paused && machine.speed < 0.95 * machine.factor;
-    byId('measured-speed').textContent = machine.paused ? `stopped at ${machine.t_s.toFixed(3)} s`
-      : `${machine.speed.toFixed(2)} × real time${isBehind ? ': this computer is too slow' : ''}`;
+    write(byId('measured-speed'), machine.paused ? `stopped at ${machine.t_s.toFixed(3)} s`
+      : `${machine.speed.toFixed(2)} × real time${isBehind ? ': this computer is too slow' : ''}`);
     for (const element of document.querySelectorAll('[data-hold]')) {
       element.setAttribute('aria-pressed', element.dataset.hold === machine.holding);
     }
-    byId('defect').textContent = machine.defect === null ? '' : machine.defect.replaceAll('-', ' ');
+    write(byId('defect'), machine.defect === null ? '' : machine.defect.replaceAll('-', ' '));
     const { challenge } = machine;
     byId('challenge').setAttribute('aria-pressed', challenge !== null);
-    byId('score').textContent = challenge === null ? '' : `stood ${challenge.stood_s.toFixed(0)} s, hardest push survived ${challenge.survived_n.toFixed(1)} N${
-      challenge.is_over ? '; it fell' : `, push of ${Math.abs(challenge.push_n).toFixed(1)} N`}`;
+    write(byId('score'), challenge === null ? '' : `stood ${challenge.stood_s.toFixed(0)} s, hardest push survived ${challenge.survived_n.toFixed(1)} N${
+      challenge.is_over ? '; it fell' : `, push of ${Math.abs(challenge.push_n).toFixed(1)} N`}`);
     for (const [name, { element, value, input, unit, nominal }] of this.sliders) {
       const now = machine.properties[name];
-      value.textContent = `${Number(now.toPrecision(4))} ${unit}`;
+      write(value, `${Number(now.toPrecision(4))} ${unit}`);
       element.classList.toggle('changed', now !== nominal);
       if (document.activeElement !== input) input.value = now;
     }

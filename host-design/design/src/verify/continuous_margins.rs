@@ -4,7 +4,7 @@ use core::f64::consts::PI;
 
 use nalgebra::Complex;
 
-use upright_design::verify::Margins;
+use super::Margins;
 
 /// Number of frequencies per decade, from 1e-3 to 1e5 rad/s.
 const PER_DECADE: i32 = 5000;
