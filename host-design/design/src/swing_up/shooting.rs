@@ -149,12 +149,12 @@ fn newton(problem: &Problem<'_>, at: &Iterate, damping: Option<f64>) -> Option<M
             let step = problem.dynamics.step_with_derivatives(x, [u, u_next], h);
             // z = [x; u], w = u̇: the force at the end of the step is u + h w.
             stage.a = Matrix::from_fn(s + 1, s + 1, |i, j| match (i == s, j == s) {
-                (false, false) => step.a[(i, j)],
-                (false, true) => step.b[(i, 0)] + step.b[(i, 1)],
+                (false, false) => step.by[(i, j)],
+                (false, true) => step.by[(i, s)] + step.by[(i, s + 1)],
                 (true, false) => 0.0,
                 (true, true) => 1.0,
             });
-            stage.b = (0..=s).map(|i| if i == s { h } else { h * step.b[(i, 1)] }).collect();
+            stage.b = (0..=s).map(|i| if i == s { h } else { h * step.by[(i, s + 1)] }).collect();
             let gap = step.end.iter().zip(&knots.x[knot + 1]).map(|(end, next)| end - next);
             stage.d = gap.chain([0.0]).collect();
             let rate = (u_next - u) / h;
@@ -219,9 +219,10 @@ fn gaps(problem: &Problem<'_>, at: &Iterate) -> Gaps {
         largest = largest.max(gap.abs());
         sum += gap.abs();
     };
+    let mut end = problem.end.clone();
     for knot in 0..problem.steps {
-        let (x, u) = (&at.knots.x[knot], [at.knots.u[knot], at.knots.u[knot + 1]]);
-        let end = problem.dynamics.step(x, u, problem.knot_s);
+        end.copy_from_slice(&at.knots.x[knot]);
+        problem.dynamics.step(&mut end, [at.knots.u[knot], at.knots.u[knot + 1]], problem.knot_s);
         end.iter().zip(&at.knots.x[knot + 1]).for_each(|(end, next)| take(end - next));
     }
     end_distance(problem, &at.knots).into_iter().for_each(&mut take);
