@@ -28,9 +28,21 @@ impl<R> Matrix<R> {
         &self.data
     }
 
+    /// Row `i`.
+    #[inline]
+    pub fn row(&self, i: usize) -> &[R] {
+        &self.data[i * self.cols..][..self.cols]
+    }
+
+    /// Row `i`, to be changed.
+    #[inline]
+    pub fn row_mut(&mut self, i: usize) -> &mut [R] {
+        &mut self.data[i * self.cols..][..self.cols]
+    }
+
     /// The rows as slices.
     pub fn row_slices(&self) -> impl Iterator<Item = &[R]> {
-        (0..self.rows).map(|i| &self.data[i * self.cols..(i + 1) * self.cols])
+        (0..self.rows).map(|i| self.row(i))
     }
 
     /// Applies `f` to every entry.
@@ -93,6 +105,12 @@ impl<R: Real> Matrix<R> {
         Self::from_fn(self.cols, self.rows, |i, j| self[(j, i)].clone())
     }
 
+    /// `f` of each entry and the one of `right` at the same place.
+    fn with(&self, right: &Self, f: impl Fn(&R, &R) -> R) -> Self {
+        let data = self.data.iter().zip(&right.data).map(|(left, right)| f(left, right)).collect();
+        Self { rows: self.rows, cols: self.cols, data }
+    }
+
     /// Every entry times `factor`.
     pub fn scaled(&self, factor: &R) -> Self {
         self.map(|entry| entry.times(factor))
@@ -103,6 +121,18 @@ impl<R: Real> Matrix<R> {
         Self::from_fn(self.rows, self.cols, |i, j| {
             (self[(i, j)].clone() + &self[(j, i)]).scale_by_power_of_two(-1)
         })
+    }
+
+    /// `selfᵀ · right`.
+    pub fn transposed_times(&self, right: &Self) -> Self {
+        assert_eq!(self.rows, right.rows, "inner dimensions of a product");
+        let mut product = Self::zeros(self.cols, right.cols);
+        for i in 0..self.cols {
+            for k in 0..self.rows {
+                add_row(product.row_mut(i), &self[(k, i)], right.row(k));
+            }
+        }
+        product
     }
 
     /// `self · right` for a product that is known to be symmetric: one triangle is computed and mirrored.
@@ -127,9 +157,7 @@ impl<R: Real> Matrix<R> {
     /// The matrix with `block` written over the entries from (`top`, `left`) on.
     pub fn with_block(mut self, top: usize, left: usize, block: &Self) -> Self {
         for i in 0..block.rows {
-            for j in 0..block.cols {
-                self[(top + i, left + j)] = block[(i, j)].clone();
-            }
+            self.row_mut(top + i)[left..][..block.cols].clone_from_slice(block.row(i));
         }
         self
     }
@@ -187,23 +215,26 @@ impl<R> IndexMut<(usize, usize)> for Matrix<R> {
     }
 }
 
+/// Adds `factor · row` to `entries`.
+#[inline]
+fn add_row<R: Real>(entries: &mut [R], factor: &R, row: &[R]) {
+    if factor.is_zero() {
+        return; // models are sparse, and products of wide numbers are slow
+    }
+    let row = &row[..entries.len()];
+    for j in 0..entries.len() {
+        entries[j] = row[j].times(factor) + &entries[j];
+    }
+}
+
 impl<R: Real> Mul for &Matrix<R> {
     type Output = Matrix<R>;
     fn mul(self, right: &Matrix<R>) -> Matrix<R> {
         assert_eq!(self.cols, right.rows, "inner dimensions of a product");
         let mut product = Matrix::zeros(self.rows, right.cols);
-        let columns = right.cols;
         for i in 0..self.rows {
-            let entries = &mut product.data[i * columns..][..columns];
             for k in 0..self.cols {
-                let factor = &self[(i, k)];
-                if factor.is_zero() {
-                    continue; // models are sparse, and products of wide numbers are slow
-                }
-                let row = &right.data[k * columns..][..columns];
-                for j in 0..columns {
-                    entries[j] = row[j].times(factor) + &entries[j];
-                }
+                add_row(product.row_mut(i), &self[(i, k)], right.row(k));
             }
         }
         product
@@ -214,7 +245,7 @@ impl<R: Real> Add for &Matrix<R> {
     type Output = Matrix<R>;
     fn add(self, right: &Matrix<R>) -> Matrix<R> {
         assert_eq!((self.rows, self.cols), (right.rows, right.cols), "dimensions of a sum");
-        Matrix::from_fn(self.rows, self.cols, |i, j| self[(i, j)].clone() + &right[(i, j)])
+        self.with(right, |left, right| left.clone() + right)
     }
 }
 
@@ -222,7 +253,7 @@ impl<R: Real> Sub for &Matrix<R> {
     type Output = Matrix<R>;
     fn sub(self, right: &Matrix<R>) -> Matrix<R> {
         assert_eq!((self.rows, self.cols), (right.rows, right.cols), "dimensions of a difference");
-        Matrix::from_fn(self.rows, self.cols, |i, j| self[(i, j)].minus(&right[(i, j)]))
+        self.with(right, R::minus)
     }
 }
 

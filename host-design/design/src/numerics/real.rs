@@ -115,7 +115,12 @@ impl Real for f64 {
     fn is_finite(&self) -> bool {
         f64::is_finite(*self)
     }
+    #[inline]
     fn scale_by_power_of_two(&self, power: i32) -> Self {
-        libm::scalbn(*self, power)
+        match power {
+            // The usual case without a call.
+            -1 => 0.5 * self,
+            power => libm::scalbn(*self, power),
+        }
     }
 }

@@ -107,7 +107,9 @@ impl WithSize for Follow<'_> {
     fn run<const NX: usize, const NY: usize, const N: usize>(self) -> Self::Output {
         let table = self.table.table::<NX, NY>();
         let others = self.swing_up.transitions();
-        let swing_up = self.swing_up.table::<NY, N>(&others);
+        // Of the other motions only the one that is run: the firmware checks every word of its table.
+        let other = self.other.and_then(|other| others.get(other));
+        let swing_up = self.swing_up.table::<NY, N>(other.map_or(&[], core::slice::from_ref));
         let build = self.table.build();
         swing_up.check(&build, NX)?;
         let mut controller = Controller::new(&table, &build, Bench::widths())?;
@@ -118,7 +120,7 @@ impl WithSize for Follow<'_> {
         let tick_s = table.tick_s;
         let mut run =
             Run { controller, swing_up: &swing_up, bench: self.bench, tick_s, reached: Extremes::none(NY) };
-        match self.other.and_then(|other| others.get(other)) {
+        match other {
             None => {
                 run.follow(swing_up.raise, 0);
                 run.balance(self.balance_ticks)?;

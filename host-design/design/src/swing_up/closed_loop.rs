@@ -112,7 +112,8 @@ impl<'a> ClosedLoop<'a> {
         }
         self.plant.advance(force + push, &self.torques, self.setting.tick_s, 2);
         self.plant.write_state(&mut self.state);
-        self.predicted = self.setting.dynamics.step(&self.estimate, [force; 2], self.setting.tick_s);
+        self.predicted.copy_from_slice(&self.estimate);
+        self.setting.dynamics.step(&mut self.predicted, [force; 2], self.setting.tick_s);
     }
 
     /// Whether the cart has reached an end of the rail.

@@ -1,6 +1,7 @@
 //! One tick of the plant under a held force, integrated in two or more steps.
 
 use super::dynamics::Dynamics;
+use super::riccati::add;
 use crate::numerics::Matrix;
 
 /// A tick from one state under one held force.
@@ -25,34 +26,54 @@ impl Tick {
     }
 }
 
-/// The state after a tick of `tick_s`.
-pub(super) fn after_tick(dynamics: &dyn Dynamics, state: &[f64], force: f64, tick_s: f64) -> Vec<f64> {
+/// Replaces the state by the one after a tick of `tick_s`.
+pub(super) fn after_tick(dynamics: &dyn Dynamics, state: &mut [f64], force: f64, tick_s: f64) {
     let steps = 2 * dynamics.steps_in_half_a_tick();
     let dt = tick_s / steps as f64;
-    (0..steps).fold(state.to_vec(), |state, _| dynamics.step(&state, [force; 2], dt))
+    (0..steps).for_each(|_| dynamics.step(state, [force; 2], dt));
 }
 
-/// As [`after_tick`], with derivatives.
+/// As [`after_tick`] from `state`, with derivatives.
 pub(super) fn tick(dynamics: &dyn Dynamics, state: &[f64], force: f64, tick_s: f64) -> Tick {
-    let start = Matrix::identity(state.len()).beside(&Matrix::zeros(state.len(), 1));
-    let (half, middle) = half_tick(dynamics, state, force, tick_s, start);
-    let (end, whole) = half_tick(dynamics, &half, force, tick_s, middle.clone());
+    let (half, middle) = half_tick(dynamics, state, force, tick_s, None);
+    let (end, whole) = half_tick(dynamics, &half, force, tick_s, Some(&middle));
     Tick { end, middle, whole }
 }
 
-/// The state after half a tick from `state`, and its derivatives if those of `state` are `by`.
+/// The state after half a tick from `state`, and its derivatives if those of `state` are `by`, by default those at the
+/// start of the tick.
 fn half_tick(
     dynamics: &dyn Dynamics,
     state: &[f64],
     force: f64,
     tick_s: f64,
-    by: Matrix<f64>,
+    by: Option<&Matrix<f64>>,
 ) -> (Vec<f64>, Matrix<f64>) {
-    let (steps, s) = (dynamics.steps_in_half_a_tick(), state.len());
+    let steps = dynamics.steps_in_half_a_tick();
     let dt = 0.5 * tick_s / steps as f64;
-    (0..steps).fold((state.to_vec(), by), |(state, by), _| {
-        let step = dynamics.step_with_derivatives(&state, [force; 2], dt);
-        let held = Matrix::from_fn(s, 1, |i, _| step.b[(i, 0)] + step.b[(i, 1)]);
-        (step.end, &(&step.a * &by) + &Matrix::zeros(s, s).beside(&held))
-    })
+    let one = |state: &[f64], by: Option<&Matrix<f64>>| {
+        let step = dynamics.step_with_derivatives(state, [force; 2], dt);
+        let through = through(&step.by, by);
+        (step.end, through)
+    };
+    (1..steps).fold(one(state, by), |(state, by), _| one(&state, Some(&by)))
+}
+
+/// Derivatives of the end of a step by the state at the start of the tick and the held force, s×(s + 1). `start` are
+/// those of the start of the step, by default the identity, and `step` those of its end by its start and both forces.
+fn through(step: &Matrix<f64>, start: Option<&Matrix<f64>>) -> Matrix<f64> {
+    let s = step.rows();
+    let Some(start) = start else {
+        let held = |i: usize| step[(i, s)] + step[(i, s + 1)];
+        return Matrix::from_fn(s, s + 1, |i, j| if j < s { step[(i, j)] } else { held(i) });
+    };
+    let mut end = Matrix::zeros(s, s + 1);
+    for i in 0..s {
+        let (of, row) = (step.row(i), end.row_mut(i));
+        for (k, &factor) in of[..s].iter().enumerate() {
+            add(row, factor, start.row(k));
+        }
+        row[s] += of[s] + of[s + 1];
+    }
+    end
 }

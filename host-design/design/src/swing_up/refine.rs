@@ -38,7 +38,7 @@ pub(super) fn refine(
             let force = ends[0] + (ends[1] - ends[0]) * (i as f64 + 0.5) / ticks as f64;
             path.u.push(force);
             path.x.push(state.clone());
-            state = after_tick(dynamics, &state, force, tick_s);
+            after_tick(dynamics, &mut state, force, tick_s);
         }
     }
     path.x.push(end.clone());
@@ -60,24 +60,24 @@ fn is_near<'a>(knots: &Knots, path: impl Iterator<Item = &'a [f64]>) -> bool {
 /// Closes the gaps of a path and keeps its first and last states. None if they stay above [`GAP`].
 pub(super) fn close(dynamics: &dyn Dynamics, mut path: Path, tick_s: f64) -> Option<Path> {
     let end = path.x[path.u.len()].clone();
+    let mut gap = largest_gap(dynamics, &path, tick_s);
     for _ in 0..STEPS {
-        let before = largest_gap(dynamics, &path, tick_s);
-        if before < 0.1 * GAP {
+        if gap < 0.1 * GAP {
             break;
         }
         let step = newton(dynamics, &path, tick_s)?;
         let mut share = 1.0;
-        let next = loop {
+        (path, gap) = loop {
             let next = moved(&path, &step, share);
-            if largest_gap(dynamics, &next, tick_s) < before {
-                break next;
+            let after = largest_gap(dynamics, &next, tick_s);
+            if after < gap {
+                break (next, after);
             }
             share *= 0.5;
             if share < 1e-3 {
-                return (before < GAP).then_some(path);
+                return (gap < GAP).then_some(path);
             }
         };
-        path = next;
     }
     // The remaining distance to the end is far below [`GAP`].
     let last = path.u.len();
@@ -124,8 +124,11 @@ fn moved(path: &Path, step: &super::riccati::Minimum, share: f64) -> Path {
 /// Largest gap: difference between a state and the end of the tick before it.
 pub(super) fn largest_gap(dynamics: &dyn Dynamics, path: &Path, tick_s: f64) -> f64 {
     let mut largest: f64 = 0.0;
+    let mut end = vec![0.0; path.x[0].len()];
     for ((x, &u), next) in path.x.iter().zip(&path.u).zip(&path.x[1..]) {
-        for (end, next) in after_tick(dynamics, x, u, tick_s).iter().zip(next) {
+        end.copy_from_slice(x);
+        after_tick(dynamics, &mut end, u, tick_s);
+        for (end, next) in end.iter().zip(next) {
             let gap = (end - next).abs();
             largest = if gap.is_nan() { f64::INFINITY } else { largest.max(gap) };
         }

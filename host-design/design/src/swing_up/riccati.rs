@@ -25,6 +25,7 @@ pub(super) struct Minimum {
 pub(super) fn minimise(stages: &[Stage], last_q: &Matrix<f64>, last_q_linear: &[f64]) -> Option<Minimum> {
     let m = last_q_linear.len();
     let (mut p, mut p_linear) = (last_q.clone(), last_q_linear.to_vec());
+    let mut next = Matrix::zeros(m, m);
     let mut feedback: Vec<(Vec<f64>, f64)> = Vec::with_capacity(stages.len());
     for stage in stages.iter().rev() {
         let pa = &p * &stage.a;
@@ -32,31 +33,33 @@ pub(super) fn minimise(stages: &[Stage], last_q: &Matrix<f64>, last_q_linear: &[
         let h = stage.r + dot(&stage.b, &pb);
         // p + P d
         let ahead: Vec<f64> = times(&p, &stage.d).iter().zip(&p_linear).map(|(pd, p)| pd + p).collect();
-        let k: Vec<f64> = (0..m).map(|j| (0..m).map(|i| stage.b[i] * pa[(i, j)]).sum::<f64>() / h).collect();
+        let mut k = times_transposed(&pa, &stage.b);
+        k.iter_mut().for_each(|k| *k /= h);
         let k_0 = (stage.r_linear + dot(&stage.b, &ahead)) / h;
-        let mut next = stage.q.clone();
-        for l in 0..m {
-            for i in 0..m {
+        // Q + Aᵀ P A - h Kᵀ K, of which the upper triangle is computed.
+        for i in 0..m {
+            let row = &mut next.row_mut(i)[i..];
+            row.copy_from_slice(&stage.q.row(i)[i..]);
+            for l in 0..m {
                 let factor = stage.a[(l, i)];
                 if factor != 0.0 {
-                    for j in i..m {
-                        next[(i, j)] += factor * pa[(l, j)];
-                    }
+                    add(row, factor, &pa.row(l)[i..]);
                 }
+            }
+            for j in i..m {
+                row[j - i] -= h * k[i] * k[j];
             }
         }
         for i in 0..m {
-            for j in i..m {
-                next[(i, j)] -= h * k[i] * k[j];
+            for j in i + 1..m {
                 next[(j, i)] = next[(i, j)];
             }
         }
-        p_linear = (0..m)
-            .map(|j| {
-                stage.q_linear[j] + (0..m).map(|i| stage.a[(i, j)] * ahead[i]).sum::<f64>() - h * k[j] * k_0
-            })
-            .collect();
-        p = next;
+        let through = times_transposed(&stage.a, &ahead);
+        for j in 0..m {
+            p_linear[j] = stage.q_linear[j] + through[j] - h * k[j] * k_0;
+        }
+        core::mem::swap(&mut p, &mut next);
         if !h.is_finite() || h <= 0.0 {
             return None;
         }
@@ -78,6 +81,23 @@ pub(super) fn minimise(stages: &[Stage], last_q: &Matrix<f64>, last_q_linear: &[
 /// M v.
 pub(super) fn times(m: &Matrix<f64>, v: &[f64]) -> Vec<f64> {
     m.row_slices().map(|row| dot(row, v)).collect()
+}
+
+/// Mᵀ v.
+fn times_transposed(m: &Matrix<f64>, v: &[f64]) -> Vec<f64> {
+    // As for any sum of f64, the neutral element is -0.
+    let mut product = vec![-0.0; m.cols()];
+    m.row_slices().zip(v).for_each(|(row, &v)| add(&mut product, v, row));
+    product
+}
+
+/// `to + factor · from`, entry by entry.
+#[inline]
+pub(super) fn add(to: &mut [f64], factor: f64, from: &[f64]) {
+    let from = &from[..to.len()];
+    for j in 0..to.len() {
+        to[j] += factor * from[j];
+    }
 }
 
 /// aᵀ b.

@@ -37,6 +37,15 @@ struct Gaps {
     sum: f64,
 }
 
+/// An accepted iterate.
+struct Accepted {
+    next: Iterate,
+    /// Its share of the full step.
+    share: f64,
+    gaps: Gaps,
+    cost: f64,
+}
+
 /// Solves `problem` from a guess. None if the gaps do not close.
 pub(super) fn solve(problem: &Problem<'_>, guess: Knots) -> Option<Knots> {
     let mu = 1e-2 * problem.knot_s;
@@ -52,8 +61,8 @@ pub(super) fn solve(problem: &Problem<'_>, guess: Knots) -> Option<Knots> {
 fn with_cost(problem: &Problem<'_>, at: &mut Iterate) {
     let mut filter: Vec<(f64, f64)> = Vec::new();
     let (mut damping, mut slow) = (1e-4, 0);
+    let mut before = gaps(problem, at);
     for _ in 0..WITH_COST {
-        let before = gaps(problem, at);
         let cost_before = cost(problem, at);
         if slow >= SLOW {
             return;
@@ -64,9 +73,8 @@ fn with_cost(problem: &Problem<'_>, at: &mut Iterate) {
             filter.iter().all(|&(gap, earlier)| gaps.sum < 0.999 * gap || cost < earlier - 1e-3 * gap)
         };
         match search(problem, at, &step, &accepts) {
-            Some((next, share)) => {
-                let after = gaps(problem, &next);
-                let gain = (cost_before - cost(problem, &next)) / cost_before.abs().max(1e-9);
+            Some(Accepted { next, share, gaps: after, cost }) => {
+                let gain = (cost_before - cost) / cost_before.abs().max(1e-9);
                 slow = if share < 0.1 || (gain.abs() < 1e-3 && after.sum > 0.9 * before.sum) {
                     slow + 1
                 } else {
@@ -81,6 +89,7 @@ fn with_cost(problem: &Problem<'_>, at: &mut Iterate) {
                 if after.largest < CLOSED && gain.abs() < 1e-4 {
                     return;
                 }
+                before = after;
             }
             None => {
                 filter.pop();
@@ -94,27 +103,27 @@ fn with_cost(problem: &Problem<'_>, at: &mut Iterate) {
 /// Damped Newton on the gaps alone: each step is the least change that closes them to first order.
 fn feasibility_only(problem: &Problem<'_>, at: &mut Iterate) {
     at.mu = 1e-3 * problem.knot_s;
+    let mut before = gaps(problem, at);
     for _ in 0..FEASIBILITY_ONLY {
         at.slacks = at.slacks.centred(at.mu);
-        let before = gaps(problem, at);
         if before.largest < 0.1 * CLOSED {
             return;
         }
         let Some(step) = newton(problem, at, None) else { return };
         match search(problem, at, &step, &|gaps, _| gaps.sum < (1.0 - 1e-4) * before.sum) {
-            Some((next, _)) => *at = next,
+            Some(Accepted { next, gaps, .. }) => (*at, before) = (next, gaps),
             None => return,
         }
     }
 }
 
-/// The iterate after the first accepted share of the step, and that share.
+/// The iterate after the first accepted share of the step.
 fn search(
     problem: &Problem<'_>,
     at: &Iterate,
     step: &Minimum,
     accepts: &dyn Fn(Gaps, f64) -> bool,
-) -> Option<(Iterate, f64)> {
+) -> Option<Accepted> {
     let (slack_step, most_s, most_nu) = at.slacks.step(&problem.limits, &at.knots, &step.z, at.mu);
     let mut share = most_s;
     for _ in 0..10 {
@@ -124,8 +133,9 @@ fn search(
             end: at.end.clone(),
             mu: at.mu,
         };
-        if accepts(gaps(problem, &next), cost(problem, &next)) {
-            return Some((next, share));
+        let (gaps, cost) = (gaps(problem, &next), cost(problem, &next));
+        if accepts(gaps, cost) {
+            return Some(Accepted { next, share, gaps, cost });
         }
         share *= 0.5;
     }
@@ -135,10 +145,11 @@ fn search(
 /// The full step: with a damping it lowers the cost, without one it is the least change that closes the gaps.
 fn newton(problem: &Problem<'_>, at: &Iterate, damping: Option<f64>) -> Option<Minimum> {
     let (knots, h, s) = (&at.knots, problem.knot_s, problem.end.len());
+    let weights = problem.state_weights.scaled(&(2.0 * h));
     let mut stages: Vec<Stage> = Vec::with_capacity(problem.steps + 1);
     for knot in 0..=problem.steps {
         let (x, u) = (&knots.x[knot], knots.u[knot]);
-        let mut stage = stage_cost(problem, x, u, damping);
+        let mut stage = stage_cost(problem, &weights, x, u, damping);
         if knot > 0 {
             // The least change needs no barrier that pushes away from the limits: approaching them only costs more.
             let mu = if damping.is_some() { at.mu } else { 0.0 };
@@ -149,12 +160,12 @@ fn newton(problem: &Problem<'_>, at: &Iterate, damping: Option<f64>) -> Option<M
             let step = problem.dynamics.step_with_derivatives(x, [u, u_next], h);
             // z = [x; u], w = u̇: the force at the end of the step is u + h w.
             stage.a = Matrix::from_fn(s + 1, s + 1, |i, j| match (i == s, j == s) {
-                (false, false) => step.a[(i, j)],
-                (false, true) => step.b[(i, 0)] + step.b[(i, 1)],
+                (false, false) => step.by[(i, j)],
+                (false, true) => step.by[(i, s)] + step.by[(i, s + 1)],
                 (true, false) => 0.0,
                 (true, true) => 1.0,
             });
-            stage.b = (0..=s).map(|i| if i == s { h } else { h * step.b[(i, 1)] }).collect();
+            stage.b = (0..=s).map(|i| if i == s { h } else { h * step.by[(i, s + 1)] }).collect();
             let gap = step.end.iter().zip(&knots.x[knot + 1]).map(|(end, next)| end - next);
             stage.d = gap.chain([0.0]).collect();
             let rate = (u_next - u) / h;
@@ -171,16 +182,21 @@ fn newton(problem: &Problem<'_>, at: &Iterate, damping: Option<f64>) -> Option<M
     minimise(&stages, &last.q, &last.q_linear)
 }
 
-/// Cost of one knot to second order, without the limits.
-fn stage_cost(problem: &Problem<'_>, x: &[f64], u: f64, damping: Option<f64>) -> Stage {
+/// Cost of one knot to second order, without the limits. `weights` are the second derivatives by the states.
+fn stage_cost(
+    problem: &Problem<'_>,
+    weights: &Matrix<f64>,
+    x: &[f64],
+    u: f64,
+    damping: Option<f64>,
+) -> Stage {
     let (s, h) = (x.len(), problem.knot_s);
     let mut q = Matrix::zeros(s + 1, s + 1);
     let mut q_linear = vec![0.0; s + 1];
     match damping {
         Some(damping) => {
-            let weights = problem.state_weights.scaled(&(2.0 * h));
-            q_linear[..s].copy_from_slice(&times(&weights, x));
-            q = q.with_block(0, 0, &weights);
+            q_linear[..s].copy_from_slice(&times(weights, x));
+            q = q.with_block(0, 0, weights);
             q[(s, s)] = 2.0 * h * problem.force_weight;
             q_linear[s] = q[(s, s)] * u;
             for i in 0..s {
@@ -219,9 +235,10 @@ fn gaps(problem: &Problem<'_>, at: &Iterate) -> Gaps {
         largest = largest.max(gap.abs());
         sum += gap.abs();
     };
+    let mut end = problem.end.clone();
     for knot in 0..problem.steps {
-        let (x, u) = (&at.knots.x[knot], [at.knots.u[knot], at.knots.u[knot + 1]]);
-        let end = problem.dynamics.step(x, u, problem.knot_s);
+        end.copy_from_slice(&at.knots.x[knot]);
+        problem.dynamics.step(&mut end, [at.knots.u[knot], at.knots.u[knot + 1]], problem.knot_s);
         end.iter().zip(&at.knots.x[knot + 1]).for_each(|(end, next)| take(end - next));
     }
     end_distance(problem, &at.knots).into_iter().for_each(&mut take);
@@ -234,7 +251,9 @@ fn cost(problem: &Problem<'_>, at: &Iterate) -> f64 {
     let (knots, h) = (&at.knots, problem.knot_s);
     let mut sum = at.mu * at.slacks.barrier();
     for (knot, (x, &u)) in knots.x.iter().zip(&knots.u).enumerate() {
-        sum += h * (dot(x, &times(&problem.state_weights, x)) + problem.force_weight * u * u);
+        let of_states: f64 =
+            x.iter().zip(problem.state_weights.row_slices()).map(|(x_i, row)| x_i * dot(row, x)).sum();
+        sum += h * (of_states + problem.force_weight * u * u);
         if let Some(next) = knots.u.get(knot + 1) {
             let rate = (next - u) / h;
             sum += h * problem.rate_weight * rate * rate;

@@ -11,13 +11,17 @@ pub(super) fn ticks(dynamics: &dyn Dynamics, path: &Path, tick_s: f64) -> Vec<Ti
 }
 
 /// `[Q S; Sᵀ R]` of one tick in state and held force: the integral of the continuous cost over the tick, by Simpson's
-/// rule, with the trajectory of the state to first order in the deviations.
+/// rule, with the trajectory of the state to first order in the deviations. `weights` is diagonal.
 fn tick_cost(tick: &Tick, weights: &Matrix<f64>, force_weight: f64, tick_s: f64) -> Matrix<f64> {
     let s = tick.whole.rows();
-    let over = |by: &Matrix<f64>| &(&by.transpose() * weights) * by;
-    let start = Matrix::identity(s).beside(&Matrix::zeros(s, 1));
-    let sum = &(&over(&start) + &over(&tick.middle).scaled(&4.0)) + &over(&tick.whole);
-    let mut cost = sum.scaled(&(tick_s / 6.0));
+    let over = |by: &Matrix<f64>| {
+        Matrix::from_fn(s, s + 1, |k, i| weights[(k, k)] * by[(k, i)]).transposed_times(by)
+    };
+    let start = |i: usize, j: usize| if i < s && j < s { weights[(i, j)] } else { 0.0 };
+    let (middle, end) = (over(&tick.middle), over(&tick.whole));
+    let mut cost = Matrix::from_fn(s + 1, s + 1, |i, j| {
+        (start(i, j) + 4.0 * middle[(i, j)] + end[(i, j)]) * (tick_s / 6.0)
+    });
     cost[(s, s)] += tick_s * force_weight;
     cost
 }
@@ -25,7 +29,7 @@ fn tick_cost(tick: &Tick, weights: &Matrix<f64>, force_weight: f64, tick_s: f64)
 /// One backward step of the Riccati recursion: the gain K (1×s), and the cost-to-go before the tick.
 fn step_back(tick: &Tick, cost: &Matrix<f64>, ahead: &Matrix<f64>) -> (Matrix<f64>, Matrix<f64>) {
     let s = tick.whole.rows();
-    let all = cost + &(&tick.whole.transpose() * &(ahead * &tick.whole));
+    let all = cost + &tick.whole.transposed_times(&(ahead * &tick.whole));
     let h = all[(s, s)];
     let k = Matrix::from_fn(1, s, |_, j| 0.5 * (all[(s, j)] + all[(j, s)]) / h);
     let before = Matrix::from_fn(s, s, |i, j| all[(i, j)] - h * k[(0, i)] * k[(0, j)]).symmetric_part();
@@ -123,6 +127,31 @@ impl<'a> Filter<'a> {
     /// # Errors
     /// [`Singular`] if the covariance of the innovation is singular.
     pub(super) fn gain(&mut self, x: &[f64], tick: &Tick) -> Result<Matrix<f64>, Singular> {
+        self.gain_over(&self.spread(x), &tick.a())
+    }
+
+    /// Repeats the tick at a state of rest until the filter has settled.
+    ///
+    /// # Errors
+    /// As for [`gain`](Self::gain).
+    pub(super) fn settle(&mut self, x: &[f64], tick: &Tick, ticks: usize) -> Result<Matrix<f64>, Singular> {
+        let (spread, a) = (self.spread(x), tick.a());
+        let mut l = self.gain_over(&spread, &a)?;
+        for _ in 1..ticks {
+            l = self.gain_over(&spread, &a)?;
+        }
+        Ok(l)
+    }
+
+    /// Covariance that noise in half a tick adds near `x`.
+    fn spread(&self, x: &[f64]) -> Matrix<f64> {
+        let b = self.dynamics.inputs(x);
+        let spread = &(&b * &Matrix::from_diagonal(&self.noise.at(x))) * &b.transpose();
+        spread.scaled(&(0.5 * self.tick_s))
+    }
+
+    /// As [`gain`](Self::gain), for a tick with these noise and derivatives.
+    fn gain_over(&mut self, spread: &Matrix<f64>, a: &Matrix<f64>) -> Result<Matrix<f64>, Singular> {
         let (p, sensors) = (&self.covariance, &self.noise.sensors);
         let (s, count) = (p.rows(), sensors.len());
         let to_sensors = Matrix::from_fn(s, count, |i, j| p[(i, sensors[j].0)]);
@@ -131,24 +160,9 @@ impl<'a> Filter<'a> {
         });
         let l = solve_right(&to_sensors, &innovation)?;
         let corrected = (p - &(&l * &to_sensors.transpose())).symmetric_part();
-        let (a, b) = (tick.a(), self.dynamics.inputs(x));
-        let spread = &(&b * &Matrix::from_diagonal(&self.noise.at(x))) * &b.transpose();
         // Trapezoidal rule: noise from the start of the tick goes through it, noise from its end does not.
-        let spread = spread.scaled(&(0.5 * self.tick_s));
-        let through = &(&a * &(&corrected + &spread)) * &a.transpose();
-        self.covariance = (&through + &spread).symmetric_part();
-        Ok(l)
-    }
-
-    /// Repeats the tick at a state of rest until the filter has settled.
-    ///
-    /// # Errors
-    /// As for [`gain`](Self::gain).
-    pub(super) fn settle(&mut self, x: &[f64], tick: &Tick, ticks: usize) -> Result<Matrix<f64>, Singular> {
-        let mut l = self.gain(x, tick)?;
-        for _ in 1..ticks {
-            l = self.gain(x, tick)?;
-        }
+        let through = &(a * &(&corrected + spread)) * &a.transpose();
+        self.covariance = (&through + spread).symmetric_part();
         Ok(l)
     }
 }

@@ -1,6 +1,6 @@
 //! The whole firmware raises and lowers the rigs with encoders, and refuses what it must not do.
 
-use crate::published::{rig, stored_motions, table};
+use crate::published::{rig, rig_and_table_with_motions, stored_motions};
 use upright::control::actuator::Drive;
 use upright::protocol::message::{Answer, Request};
 use upright::supervision::fault::Fault;
@@ -11,9 +11,7 @@ use upright_design::plant::absolute_angles;
 use upright_design::rig::Rig;
 use upright_design::simulate::Scenario;
 use upright_design::study::Study;
-use upright_design::swing_up::{
-    Condition, Runs, Way, firmware_runs, hangs, margins, up_and_down, with_motions,
-};
+use upright_design::swing_up::{Condition, Runs, Way, firmware_runs, hangs, margins, up_and_down};
 use upright_design::table::TableValues;
 
 const RIGS: [&str; 4] =
@@ -21,9 +19,7 @@ const RIGS: [&str; 4] =
 
 /// The rig and its table with the stored motions.
 fn with_stored_motions(name: &'static str) -> (Rig, TableValues) {
-    let rig = rig(name);
-    let table = with_motions(&rig, table(&rig), stored_motions(name), &[]).unwrap();
-    (rig, table)
+    rig_and_table_with_motions(name).clone()
 }
 
 /// Up, one second upright, down, and half a second of hanging, with the rig's disturbances.

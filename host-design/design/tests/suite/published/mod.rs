@@ -9,7 +9,7 @@ use std::sync::{Mutex, OnceLock};
 
 use upright_design::design::{Certified, design};
 use upright_design::rig::Rig;
-use upright_design::swing_up::{Stored, SwingUp, motions};
+use upright_design::swing_up::{Stored, SwingUp, motions, with_motions};
 use upright_design::table::{Gains, TableValues};
 
 /// Path of the rig file `name`.
@@ -57,6 +57,16 @@ pub(crate) fn rig_and_table(name: &'static str) -> &'static (Rig, TableValues) {
         let rig = rig(name);
         let table = table(&rig);
         (rig, table)
+    })
+}
+
+/// As [`rig_and_table`], with the stored motions in the table.
+pub(crate) fn rig_and_table_with_motions(name: &'static str) -> &'static (Rig, TableValues) {
+    static ALL: Once<&str, (Rig, TableValues)> = Mutex::new(BTreeMap::new());
+    once(&ALL, name, || {
+        let (rig, table) = rig_and_table(name).clone();
+        let table = with_motions(&rig, table, stored_motions(name), &[]);
+        (rig, table.unwrap_or_else(|error| panic!("{name}: {error}")))
     })
 }
 
