@@ -44,10 +44,12 @@ impl Invariants {
         answered: Option<&(Request, Answer)>,
     ) {
         self.tick += 1;
+        // In the tick of a disarm command, the motor was still on when the counts were read.
         if self.state == State::Balancing {
             self.counts.clear();
+        } else {
+            self.counts.push_back(*firmware.controller().encoders().counts());
         }
-        self.counts.push_back(*firmware.controller().encoders().counts());
         if self.counts.len() > SLOW_TICKS {
             self.counts.pop_front();
         }
