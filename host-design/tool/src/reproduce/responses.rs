@@ -51,7 +51,7 @@ pub struct Loops {
 }
 
 /// A law in a kind of loop, and what happens in the run.
-pub(super) type Wanted = (Law, Loop, ContinuousRun);
+pub(super) type LoopRun = (Law, Loop, ContinuousRun);
 
 impl Loops {
     /// Designs `rig`.
@@ -79,13 +79,13 @@ impl Loops {
     }
 
     /// Simulates each law in its kind of loop, from rest. Sampled loops are recorded at the tick, whatever the run says.
-    pub(super) fn courses(&self, wanted: &[Wanted]) -> Result<Vec<Course>, ReproduceError> {
+    pub(super) fn courses(&self, wanted: &[LoopRun]) -> Result<Vec<Course>, ReproduceError> {
         // The runs of the firmware advance together, the others by themselves.
         let (alone, together): (Vec<usize>, Vec<usize>) =
             (0..wanted.len()).partition(|&index| wanted[index].1 == Loop::Continuous);
         let groups: Vec<&[usize]> = [together.as_slice()].into_iter().chain(alone.chunks(1)).collect();
         let courses = parallel::try_map(groups.iter().copied(), |group| {
-            let of_group: Vec<Wanted> = group.iter().map(|&index| wanted[index]).collect();
+            let of_group: Vec<LoopRun> = group.iter().map(|&index| wanted[index]).collect();
             match of_group[..] {
                 [(law, Loop::Continuous, run)] => {
                     Ok(vec![run.course(chain(&self.rig)?, self.continuous(law)?)?])
@@ -99,7 +99,7 @@ impl Loops {
         Ok(numbered.into_iter().map(|(_, course)| course).collect())
     }
 
-    fn firmware_run(&self, &(law, kind, run): &Wanted) -> FirmwareRun {
+    fn firmware_run(&self, &(law, kind, run): &LoopRun) -> FirmwareRun {
         let noise = |variance: f64| run.disturbances.map_or(0.0, |_| variance.sqrt());
         let scenario = Scenario {
             sensing: if kind == Loop::Encoders { Sensing::Encoders } else { Sensing::FullState },

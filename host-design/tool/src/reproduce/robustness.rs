@@ -8,7 +8,7 @@ use super::ReproduceError;
 use super::continuous_loop::ContinuousRun;
 use super::course::Course;
 use super::designs::open_loop_poles;
-use super::responses::{Loop, Loops, Wanted};
+use super::responses::{Loop, LoopRun, Loops};
 use upright_design::numerics::{Bandwidth, SEGMENT, Spectrum};
 use upright_design::parallel;
 use upright_design::plant::reference::Tolerance;
@@ -83,7 +83,7 @@ pub fn robustness(loops: &Loops) -> Result<Vec<Robustness>, ReproduceError> {
         Loop::FullState => of_law(&full_state, law),
         Loop::Encoders => of_law(&encoders, law),
     };
-    let wanted: Vec<Wanted> =
+    let wanted: Vec<LoopRun> =
         Law::ALL.into_iter().flat_map(|law| Loop::ALL.map(|kind| (law, kind, RUN))).collect();
     let courses = loops.courses(&wanted)?;
     parallel::try_map(wanted.iter().zip(&courses), |(&(law, kind, _), course)| {

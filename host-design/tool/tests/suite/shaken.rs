@@ -20,13 +20,12 @@ use upright_design::plant::ChainParameters;
 use upright_design::reality::real_chain;
 use upright_design::rig::{PlantDescription, Rig};
 use upright_design::simulate::Scenario;
-use upright_design::swing_up::with_motions;
 use upright_design::table::{Gains, TableValues};
 use upright_tool::image::Kind;
 use upright_tool::in_the_loop::{Link, Place, run_shaken};
 
 use crate::equipment::{built_for, in_qemu};
-use crate::published::{rig_and_table, stored_motions};
+use crate::published::{rig_and_table, rig_and_table_with_motions};
 
 const REALITY: &str = "[reality]\njoint_friction_n_m = [1.5e-3, 1e-3]\ncart_friction_n = 0.2\n\
     homing_error_rad = [0.006, -0.004]\nrail_tilt_rad = 0.003\nlatency_s = 4e-4\ncart_mass_percent = 8\n\
@@ -82,8 +81,7 @@ fn the_log_of_the_firmware_gives_the_parameters_of_the_machine() {
 #[test]
 fn the_image_in_qemu_logs_the_ticks_of_the_host() {
     // With its motions, so that this test and the swing-up in QEMU share one image.
-    let (machine, table) = rig_and_table("single-quanser-ip02").clone();
-    let table = with_motions(&machine, table, stored_motions("single-quanser-ip02"), &[]).unwrap();
+    let (machine, table) = rig_and_table_with_motions("single-quanser-ip02").clone();
     let Some(image) = in_qemu(built_for(Kind::InTheLoop, &machine, &table)) else { return };
     let log = |seed: u64, place: Place<'_>| run_shaken(&machine, &table, 3.0, seed, place).unwrap();
     let qemu = log(1, Place::Qemu { image: Path::new(&image), link: Link::Files });

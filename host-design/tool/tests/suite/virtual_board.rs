@@ -1,7 +1,6 @@
 //! The image that is flashed, on the virtual board: from power-up to balancing, helped only by the simulated hand, bit
 //! for bit like the firmware on the host.
 
-use std::path::Path;
 use std::sync::OnceLock;
 
 use upright::gains::RIG_HASH;
@@ -13,14 +12,14 @@ use upright_design::design::design;
 use upright_design::harness::{Pins, Session};
 use upright_design::rig::{Integral, Rig};
 use upright_design::simulate::Scenario;
-use upright_design::swing_up::{Stored, hangs, motions, up_and_down, with_motions};
+use upright_design::swing_up::{hangs, up_and_down};
 use upright_design::table::{Gains, TableValues};
 use upright_tool::campaign::{Class, During, Kind as Defect, Setup, one};
 use upright_tool::image::{Board, Kind, build};
 use upright_tool::in_the_loop::{Place, VirtualBoard, measure, run_compared};
 
 use crate::equipment::{built, built_for};
-use crate::published::rig_and_table;
+use crate::published::{rig_and_table, rig_and_table_with_motions};
 
 #[test]
 fn the_flashed_image_balances_from_power_up_with_the_bits_of_the_host() {
@@ -55,10 +54,7 @@ fn the_flashed_image_balances_from_power_up_with_the_bits_of_the_host() {
 
 #[test]
 fn the_flashed_image_raises_and_lowers_the_links_with_the_bits_of_the_host() {
-    let file = Path::new("../../rigs/quadruple-paper.toml");
-    let (rig, table) = rig_and_table("quadruple-paper").clone();
-    let motions = motions(&rig, &Stored::beside(file).unwrap()).unwrap();
-    let table = with_motions(&rig, table, &motions, &[]).unwrap();
+    let (rig, table) = rig_and_table_with_motions("quadruple-paper").clone();
     let Some(elf) = built_for(Kind::Board(Board::WeactF405), &rig, &table) else { return };
     let image = Image::from_elf(&std::fs::read(elf).unwrap()).unwrap();
     let scenario = up_and_down(&rig, &table, 0.5).unwrap();
@@ -118,10 +114,7 @@ fn feather() -> Option<(Rig, TableValues, Image)> {
 }
 
 fn built_for_the_feather() -> Option<(Rig, TableValues, Image)> {
-    let file = Path::new("../../rigs/single-quanser-ip02.toml");
-    let (rig, table) = rig_and_table("single-quanser-ip02").clone();
-    let motions = motions(&rig, &Stored::beside(file).unwrap()).unwrap();
-    let table = with_motions(&rig, table, &motions, &[]).unwrap();
+    let (rig, table) = rig_and_table_with_motions("single-quanser-ip02").clone();
     let elf = built_for(Kind::Board(Board::FeatherF405), &rig, &table)?;
     Some((rig, table, Image::from_elf(&std::fs::read(elf).unwrap()).unwrap()))
 }
