@@ -518,8 +518,8 @@ pub static TABLE: GainTable<STATES, SENSORS> = GainTable {
         angle_rad: 0.35,
         // Largest speed of the cart (m/s).
         speed_m_per_s: 2.0,
-        // Largest force of the bench drive (N).
-        bench_force_n: 2.0,
+        // Largest force of the jog (N).
+        jog_force_n: 2.0,
         // Least supply voltage of the power stage (V).
         supply_min_v: 0.0,
         // Longest time for which the supply may be too low (ticks).

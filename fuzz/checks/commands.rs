@@ -85,7 +85,7 @@ impl Run<'_> {
     fn step(&mut self, what: u8, bytes: &mut impl Iterator<Item = u8>) {
         let mut next = || bytes.next().unwrap_or_default();
         match what >> 3 {
-            0 => self.send(Request::Beat),
+            0 => self.send(Request::KeepAlive),
             1 => self.send(Request::Home),
             2 => self.send(Request::HomeRail),
             3 => self.send(Request::CheckSigns),
@@ -140,7 +140,7 @@ impl Run<'_> {
                 let forces = core::array::from_fn(|_| next() as i8);
                 self.send(Request::Forces { first: first.wrapping_add(u16::from(next())), forces });
             }
-            26 | 27 => self.send(Request::Drive { along: next() % 2 == 0 }),
+            26 | 27 => self.send(Request::Jog { along: next() % 2 == 0 }),
             _ => {}
         }
         const TICKS: [u8; 8] = [1, 0, 1, 2, 1, 3, 0, 4];

@@ -7,8 +7,8 @@ use upright::board::Output;
 use upright::control::actuator::Drive;
 use upright::gains::{SENSORS, STATES, TABLE};
 use upright::protocol::message::{Answer, Request, Telemetry};
-use upright::supervision::bench_drive::MotorSign;
 use upright::supervision::fault::{Cause, Fault};
+use upright::supervision::jog::MotorSign;
 use upright::supervision::sign_check::Signs;
 use upright::supervision::supervisor::State;
 
@@ -72,8 +72,8 @@ impl Invariants {
             Drive::Duty(duty) => assert!(duty.is_finite() && duty.abs() <= 1.0, "{duty}"),
         }
         let disarmed = matches!(answered, Some((Request::Disarm, Answer::Done)));
-        if enable && before == State::Driving {
-            let most = TABLE.limits.bench_force_n;
+        if enable && before == State::Jogging {
+            let most = TABLE.limits.jog_force_n;
             assert!(matches!(drive, Drive::Force(force) if force.abs() <= most), "{drive:?}");
         }
         if enable && before == State::Identifying {
@@ -84,12 +84,12 @@ impl Invariants {
             );
         }
         if enable {
-            let may = [State::Driving, State::Identifying, State::Armed, State::Balancing];
+            let may = [State::Jogging, State::Identifying, State::Armed, State::Balancing];
             assert!(may.contains(&before), "motor on after {before:?}");
             // Found in the second half of the tick; the motor is off from the next one.
             let late =
                 firmware.cause().is_some_and(|cause| matches!(cause.fault, Fault::LinkLost | Fault::Table));
-            let goes_on = matches!(after, State::Driving | State::Identifying | State::Balancing);
+            let goes_on = matches!(after, State::Jogging | State::Identifying | State::Balancing);
             assert!(goes_on || disarmed || late, "motor on in {after:?}");
             let contacts = rig.contacts;
             assert!(!contacts.emergency_stop && !contacts.driver_fault);
@@ -99,7 +99,7 @@ impl Invariants {
             assert_eq!(drive, Drive::OFF);
             assert_ne!(after, State::Balancing, "balancing with the motor off");
         }
-        let on = [State::Driving, State::Identifying, State::Armed, State::Balancing, State::Homing];
+        let on = [State::Jogging, State::Identifying, State::Armed, State::Balancing, State::Homing];
         let is_off = !on.contains(&after);
         assert!(!disarmed || is_off, "{after:?}");
     }
@@ -123,13 +123,13 @@ impl Invariants {
                     self.arm_held_at = Some(self.tick);
                 }
             }
-            Some((Request::Drive { .. }, Answer::Done)) if self.state != State::Driving => {
+            Some((Request::Jog { .. }, Answer::Done)) if self.state != State::Jogging => {
                 assert!(
                     matches!(self.state, State::Calibrated | State::Homing),
                     "driven in {:?}",
                     self.state
                 );
-                self.nothing_against_driving(firmware, rig);
+                self.nothing_against_jogging(firmware, rig);
             }
             Some((Request::Shake(shaking), Answer::Done)) => {
                 self.most_n = shaking.most_n;
@@ -139,7 +139,7 @@ impl Invariants {
                     self.state
                 );
                 assert_eq!(firmware.motor_sign(), MotorSign::Checked);
-                self.nothing_against_driving(firmware, rig);
+                self.nothing_against_jogging(firmware, rig);
             }
             _ => assert!(firmware.state() != State::Armed || self.state == State::Armed, "armed unasked"),
         }
@@ -150,7 +150,7 @@ impl Invariants {
     }
 
     /// The links hang, the cart is on its rail, and all contacts are closed.
-    fn nothing_against_driving(&self, firmware: &Tested, rig: &SimulatedRig) {
+    fn nothing_against_jogging(&self, firmware: &Tested, rig: &SimulatedRig) {
         let limits = &TABLE.limits;
         assert_eq!(firmware.calibration().signs(), Signs::Checked);
         let contacts = rig.contacts;

@@ -7,7 +7,7 @@ use upright::control::encoder::CounterWidth;
 use upright::firmware::Firmware;
 use upright::gains::{RIG_HASH, SENSORS, STATES, TABLE, TICK_S};
 use upright::protocol::message::{Answer, Command, Request, Reset};
-use upright::supervision::bench_drive::MotorSign;
+use upright::supervision::jog::MotorSign;
 use upright::supervision::shaking::{FORCES, Shaking};
 use upright::supervision::sign_check::Signs;
 use upright::supervision::supervisor::State;
@@ -142,9 +142,9 @@ pub(crate) fn starts() -> [Start; 6] {
     // The motor pushes the cart; the links hang all the time.
     start.rig.offset = limits.rest_counts;
     start.wait(limits.arm_ticks);
-    start.ask(Request::Drive { along: true });
-    while start.firmware.state() == State::Driving {
-        start.tick(Some(Request::Drive { along: true }));
+    start.ask(Request::Jog { along: true });
+    while start.firmware.state() == State::Jogging {
+        start.tick(Some(Request::Jog { along: true }));
         start.rig.state = [0.0; STATES];
         start.rig.offset[0] += limits.sign_counts[0] / 20;
     }

@@ -7,7 +7,7 @@ use crate::table::MotionTable;
 
 /// What the controller follows in one tick of a planned motion: reference and gains.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Course<const NX: usize, const NY: usize> {
+pub struct Reference<const NX: usize, const NY: usize> {
     /// Reference state (m, m/s, rad, rad/s …).
     pub x: SVector<f32, NX>,
     /// Reference force (N).
@@ -20,30 +20,30 @@ pub struct Course<const NX: usize, const NY: usize> {
 
 /// Steps through a planned motion, tick by tick.
 #[derive(Debug, Clone)]
-pub struct Player<'t, const NX: usize, const NY: usize> {
+pub struct Playback<'t, const NX: usize, const NY: usize> {
     motion: MotionTable<'t>,
     tick: u32,
     /// Offset added to the planned positions of the cart (m), so that a motion can begin anywhere: the equations of
     /// motion are the same everywhere on the rail.
     shift_m: f32,
-    now: Course<NX, NY>,
+    now: Reference<NX, NY>,
 }
 
-impl<'t, const NX: usize, const NY: usize> Player<'t, NX, NY> {
+impl<'t, const NX: usize, const NY: usize> Playback<'t, NX, NY> {
     /// Starts at the beginning of `motion`, shifted along the rail so that its first cart position is `position_m`
     /// (m).
     pub fn new(motion: MotionTable<'t>, position_m: f32) -> Self {
-        let now = Course { x: SVector::zeros(), u: 0.0, k: SVector::zeros(), l: SMatrix::zeros() };
-        let mut player = Self { motion, tick: 0, shift_m: 0.0, now };
-        player.interpolate_course();
-        player.shift_m = position_m - player.now.x.as_slice().first().copied().unwrap_or_default();
-        player.interpolate_course();
-        (0..NY).for_each(|sensor| player.interpolate_filter(sensor));
-        player
+        let now = Reference { x: SVector::zeros(), u: 0.0, k: SVector::zeros(), l: SMatrix::zeros() };
+        let mut playback = Self { motion, tick: 0, shift_m: 0.0, now };
+        playback.interpolate_reference();
+        playback.shift_m = position_m - playback.now.x.as_slice().first().copied().unwrap_or_default();
+        playback.interpolate_reference();
+        (0..NY).for_each(|sensor| playback.interpolate_filter(sensor));
+        playback
     }
 
     /// Reference and gains of the current tick.
-    pub fn now(&self) -> &Course<NX, NY> {
+    pub fn now(&self) -> &Reference<NX, NY> {
         &self.now
     }
 
@@ -55,7 +55,7 @@ impl<'t, const NX: usize, const NY: usize> Player<'t, NX, NY> {
     /// Goes to the next tick. Returns `true` once the motion has ended; [`now`](Self::now) then stays at its end.
     pub fn advance(&mut self) -> bool {
         self.tick = self.tick.saturating_add(1).min(self.motion.ticks);
-        self.interpolate_course();
+        self.interpolate_reference();
         // The filter gains change slowly: updating those of one sensor per tick is enough.
         if let Some(sensor) = (self.tick as usize).checked_rem(NY) {
             self.interpolate_filter(sensor);
@@ -71,10 +71,10 @@ impl<'t, const NX: usize, const NY: usize> Player<'t, NX, NY> {
         }
     }
 
-    fn interpolate_course(&mut self) {
-        let MotionTable { course, course_units, course_ticks, .. } = self.motion;
-        let columns = Columns { values: course, units: course_units };
-        let window = columns.window(self.tick, course_ticks);
+    fn interpolate_reference(&mut self) {
+        let MotionTable { reference, reference_units, reference_ticks, .. } = self.motion;
+        let columns = Columns { values: reference, units: reference_units };
+        let window = columns.window(self.tick, reference_ticks);
         columns.blend(&window, 0, self.now.x.as_mut_slice());
         columns.blend(&window, NX, core::slice::from_mut(&mut self.now.u));
         columns.blend(&window, NX + 1, self.now.k.as_mut_slice());
@@ -157,14 +157,14 @@ mod tests {
     /// Unit of an entry in each column; all knots below are whole multiples of it.
     const UNITS: [f32; 5] = [0.0625, 0.125, 0.03125, 0.0625, 0.125];
 
-    fn motion<'t>(course: &'t [i16], filter: &'t [i16]) -> MotionTable<'t> {
+    fn motion<'t>(reference: &'t [i16], filter: &'t [i16]) -> MotionTable<'t> {
         MotionTable {
             ticks: 20,
-            course_ticks: 4,
+            reference_ticks: 4,
             filter_ticks: 5,
             travel_m: [0.0; 2],
-            course_units: &UNITS,
-            course,
+            reference_units: &UNITS,
+            reference,
             filter_units: &UNITS[..2],
             filter,
         }
@@ -180,43 +180,43 @@ mod tests {
 
     #[test]
     fn a_cubic_is_followed_between_its_knots_and_ends_in_the_last_one() {
-        let (course, filter) = (columns(4, 5), columns(5, 2));
-        let mut player = Player::<2, 1>::new(motion(&course, &filter), 7.0);
+        let (reference, filter) = (columns(4, 5), columns(5, 2));
+        let mut playback = Playback::<2, 1>::new(motion(&reference, &filter), 7.0);
         for tick in 0..20 {
-            let (now, wanted) = (player.now(), cubic(tick as f32));
-            assert_eq!(player.tick(), tick);
+            let (now, wanted) = (playback.now(), cubic(tick as f32));
+            assert_eq!(playback.tick(), tick);
             // Three weights are rounded by 2^-14 each; knots are up to 580 apart.
             let near = |found: f32, wanted: f32| (found - wanted).abs() < 0.05;
             assert!(near(now.x[0], wanted - cubic(0.0) + 7.0), "the cart starts where it is");
             assert!(near(now.x[1], wanted + 1.0) && near(now.u, wanted + 2.0));
             assert!(near(now.k[0], wanted + 3.0) && near(now.k[1], wanted + 4.0));
             assert!(near(now.l[0], wanted) && near(now.l[1], wanted + 1.0));
-            assert_eq!(player.advance(), tick == 19);
+            assert_eq!(playback.advance(), tick == 19);
         }
-        assert_eq!(player.now().x[1], cubic(20.0) + 1.0);
+        assert_eq!(playback.now().x[1], cubic(20.0) + 1.0);
     }
 
     #[test]
     fn what_is_constant_stays_constant_to_the_last_bit() {
-        let (course, filter) = ([-1234; 6 * 5], [32_767; 5 * 2]);
-        let mut player = Player::<2, 1>::new(motion(&course, &filter), -1234.0 * UNITS[0]);
-        let first = player.now().clone();
+        let (reference, filter) = ([-1234; 6 * 5], [32_767; 5 * 2]);
+        let mut playback = Playback::<2, 1>::new(motion(&reference, &filter), -1234.0 * UNITS[0]);
+        let first = playback.now().clone();
         assert_eq!((first.u, first.l[1]), (-1234.0 * UNITS[2], 32_767.0 * UNITS[1]));
-        while !player.advance() {
-            assert_eq!(player.now(), &first);
+        while !playback.advance() {
+            assert_eq!(playback.now(), &first);
         }
     }
 
     #[test]
     fn the_gains_from_each_sensor_are_renewed_in_turn() {
         // Two states, two sensors: knots 5 ticks apart that rise by 10 each.
-        let course = [0; 6 * 5];
+        let reference = [0; 6 * 5];
         let filter: Vec<i16> = (0..4).flat_map(|_| (0..5).map(|knot| 10 * knot)).collect();
-        let table = MotionTable { filter_units: &[1.0; 4], ..motion(&course, &filter) };
-        let mut player = Player::<2, 2>::new(table, 0.0);
+        let table = MotionTable { filter_units: &[1.0; 4], ..motion(&reference, &filter) };
+        let mut playback = Playback::<2, 2>::new(table, 0.0);
         for tick in 1..=20 {
-            player.advance();
-            let columns = player.now().l;
+            playback.advance();
+            let columns = playback.now().l;
             let renewed = |sensor: i32| tick - (tick - sensor).rem_euclid(2);
             let wanted = [renewed(0), renewed(1)].map(|tick| 2.0 * tick as f32);
             for (sensor, wanted) in wanted.into_iter().enumerate() {
@@ -227,12 +227,12 @@ mod tests {
 
     #[test]
     fn a_wrong_spacing_of_the_knots_is_another_motion() {
-        let (course, filter) = (columns(4, 5), columns(5, 2));
-        let wrong = MotionTable { course_ticks: 5, ..motion(&course, &filter) };
-        let mut player = Player::<2, 1>::new(wrong, 2.0);
+        let (reference, filter) = (columns(4, 5), columns(5, 2));
+        let wrong = MotionTable { reference_ticks: 5, ..motion(&reference, &filter) };
+        let mut playback = Playback::<2, 1>::new(wrong, 2.0);
         (0..10).for_each(|_| {
-            player.advance();
+            playback.advance();
         });
-        assert!((player.now().x[0] - cubic(10.0)).abs() > 1.0);
+        assert!((playback.now().x[0] - cubic(10.0)).abs() > 1.0);
     }
 }

@@ -31,11 +31,11 @@ impl<const NX: usize, const NY: usize, S: SwingUp<NX, NY>> Firmware<'_, NX, NY, 
         let done = |result: Result<(), _>| result.map_or_else(Answer::NotNow, |()| Answer::Done);
         let taken = |result: Result<(), _>| result.map_or_else(Answer::Rejected, |()| Answer::Done);
         match command.request {
-            Request::Beat => Answer::Done,
+            Request::KeepAlive => Answer::Done,
             Request::Home => done(self.home_here()),
             Request::HomeRail => done(self.home_rail()),
             Request::CheckSigns => done(self.check_signs()),
-            Request::Drive { along } => done(self.hold_drive(along)),
+            Request::Jog { along } => done(self.hold_jog(along)),
             Request::Arm => done(self.arm(command.id)),
             Request::Goto(to) => done(self.go_to(to, command.id)),
             Request::Disarm => {

@@ -4,11 +4,11 @@
 //! to a board and to the serial link. The answer to a new request goes into `commands.rs`, a new condition on arming
 //! into `posture.rs`, a new field of telemetry into `telemetry.rs`.
 
-mod bench_drive;
 mod commands;
 pub mod control_task;
 #[cfg(feature = "image")]
 pub mod hot_path;
+mod jog;
 mod posture;
 #[cfg(feature = "identify")]
 mod shake;
@@ -20,17 +20,17 @@ mod tick_log;
 use crate::board::{Contacts, Inputs, Output};
 use crate::control::controller::{Controller, MotorCommand};
 use crate::control::encoder::CounterWidth;
-use crate::control::motion::Player;
+use crate::control::motion::Playback;
 use crate::protocol::message::{Command, Reply, Start, Statistics, Telemetry};
 use crate::protocol::telemetry_ticks;
 #[cfg(feature = "identify")]
 use crate::protocol::tick_log::TickLog;
-use crate::supervision::bench_drive::{BenchDrive, MotorSign};
 use crate::supervision::calibration::Calibration;
 use crate::supervision::debounce::Debounce;
 use crate::supervision::detection::{Detection, Finding};
 use crate::supervision::envelope;
 use crate::supervision::fault::{Cause, Fault};
+use crate::supervision::jog::{Jog, MotorSign};
 #[cfg(feature = "identify")]
 use crate::supervision::shaking::Shaker;
 use crate::supervision::supervisor::{State, Supervisor};
@@ -45,7 +45,7 @@ pub struct Firmware<'t, const NX: usize, const NY: usize, S = NoSwingUp> {
     controller: Controller<'t, NX, NY>,
     supervisor: Supervisor,
     calibration: Calibration<NY>,
-    bench_drive: BenchDrive,
+    jog: Jog,
     detection: Detection<NY>,
     debounce: Debounce,
     checksum_scan: ChecksumScan<'t>,
@@ -57,7 +57,7 @@ pub struct Firmware<'t, const NX: usize, const NY: usize, S = NoSwingUp> {
     table: &'t GainTable<NX, NY>,
     swing_up: &'t S,
     /// The motion that is being followed; while the rig holds, the last one.
-    moving: Option<Player<'t, NX, NY>>,
+    moving: Option<Playback<'t, NX, NY>>,
     /// The equilibrium at which that motion ends, or has ended.
     goal: Equilibrium,
     raw_counts: [u32; NY],
@@ -174,7 +174,7 @@ impl<'t, const NX: usize, const NY: usize, S: SwingUp<NX, NY>> Firmware<'t, NX, 
             controller,
             supervisor,
             calibration: Calibration::new(&table.limits),
-            bench_drive: BenchDrive::new(bench_drive::cart(&table.limits.sign_counts)),
+            jog: Jog::new(jog::cart(&table.limits.sign_counts)),
             detection: Detection::default(),
             debounce: Debounce::default(),
             checksum_scan: ChecksumScan::default(),
@@ -232,7 +232,7 @@ impl<'t, const NX: usize, const NY: usize, S: SwingUp<NX, NY>> Firmware<'t, NX, 
 
     /// What is known about the motor's sign.
     pub fn motor_sign(&self) -> MotorSign {
-        self.bench_drive.sign()
+        self.jog.sign()
     }
 
     /// The counters of events; those of the serial link are 0 here.
@@ -263,7 +263,7 @@ impl<'t, const NX: usize, const NY: usize, S: SwingUp<NX, NY>> Firmware<'t, NX, 
             self.trip(Fault::Driver, None);
         }
         match self.supervisor.state() {
-            State::Driving => self.push_cart(inputs),
+            State::Jogging => self.push_cart(inputs),
             #[cfg(feature = "identify")]
             State::Identifying => self.shake(inputs),
             state if !state.drives() => self.tick_motor_off(),
@@ -276,7 +276,7 @@ impl<'t, const NX: usize, const NY: usize, S: SwingUp<NX, NY>> Firmware<'t, NX, 
     pub fn drive(&mut self, inputs: &Inputs<NY>) -> &Output {
         self.output = match self.supervisor.state() {
             State::Balancing => self.balance(inputs),
-            State::Driving => self.output,
+            State::Jogging => self.output,
             #[cfg(feature = "identify")]
             State::Identifying => self.output,
             State::Raising | State::Holding | State::Lowering if S::IS_POSSIBLE => self.move_links(inputs),
@@ -346,7 +346,7 @@ impl<'t, const NX: usize, const NY: usize, S: SwingUp<NX, NY>> Firmware<'t, NX, 
         {
             self.calibration.update_swinging(&counts, &observer.step.data.0[0], limits, self.table.tick_s);
         }
-        self.bench_drive.wait();
+        self.jog.wait();
         self.rearm_lockout_ticks = self.rearm_lockout_ticks.saturating_sub(1);
         match self.supervisor.state() {
             State::Homing => match self.calibration.update_rail_homing(&counts, &self.contacts, limits) {
@@ -357,7 +357,7 @@ impl<'t, const NX: usize, const NY: usize, S: SwingUp<NX, NY>> Firmware<'t, NX, 
             State::Calibrated => self.calibration.update_sign_check(&counts, limits),
             State::Armed => self.tick_armed(&counts),
             State::Disarmed
-            | State::Driving
+            | State::Jogging
             | State::Raising
             | State::Balancing
             | State::Holding
@@ -481,7 +481,7 @@ impl<'t, const NX: usize, const NY: usize, S: SwingUp<NX, NY>> Firmware<'t, NX, 
                 self.calibration.invalidate(&self.table.limits);
             }
             if fault.doubts_motor() {
-                self.bench_drive.forget(self.cart_sign_counts());
+                self.jog.forget(self.cart_sign_counts());
             }
         }
         self.calibration.cancel();

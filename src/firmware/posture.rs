@@ -2,8 +2,8 @@
 
 use super::Firmware;
 use crate::board::Contacts;
-use crate::supervision::bench_drive::MotorSign;
 use crate::supervision::inhibits::Inhibits;
+use crate::supervision::jog::MotorSign;
 use crate::supervision::sign_check::Signs;
 use crate::table::SwingUp;
 
@@ -72,11 +72,11 @@ impl<const NX: usize, const NY: usize, S: SwingUp<NX, NY>> Firmware<'_, NX, NY, 
 
     /// Inhibits of turning the motor on, whatever the posture of the links.
     pub(super) fn inhibits_with_motor_off(&self) -> Inhibits {
-        let is_unchecked = self.bench_drive.sign() != MotorSign::Checked;
+        let is_unchecked = self.jog.sign() != MotorSign::Checked;
         self.inhibits_before_motor_check().union(Inhibits::MOTOR.when(is_unchecked))
     }
 
-    /// The same, but without the check of the motor's sign: for the bench drive, which makes that check.
+    /// The same, but without the check of the motor's sign: for the jog, which makes that check.
     pub(super) fn inhibits_before_motor_check(&self) -> Inhibits {
         let state = self.supervisor.arming_inhibits();
         if self.supervisor.state().drives() {

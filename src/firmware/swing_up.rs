@@ -2,7 +2,7 @@
 
 use super::Firmware;
 use crate::board::{Inputs, Output};
-use crate::control::motion::Player;
+use crate::control::motion::Playback;
 use crate::supervision::calibration::links_hang;
 use crate::supervision::envelope;
 use crate::supervision::inhibits::Inhibits;
@@ -96,7 +96,7 @@ impl<'t, const NX: usize, const NY: usize, S: SwingUp<NX, NY>> Firmware<'t, NX, 
             }
         }
         self.goal = to;
-        self.moving = Some(Player::new(motion, self.controller.law_state().setpoint));
+        self.moving = Some(Playback::new(motion, self.controller.law_state().setpoint));
         Ok(())
     }
 
@@ -104,18 +104,18 @@ impl<'t, const NX: usize, const NY: usize, S: SwingUp<NX, NY>> Firmware<'t, NX, 
     ///
     /// [`Fault::PRECEDENCE`]: crate::supervision::fault::Fault::PRECEDENCE
     pub(super) fn move_links(&mut self, inputs: &Inputs<NY>) -> Output {
-        let (Some(motions), Some(player)) = (self.swing_up.motions(), &self.moving) else {
+        let (Some(motions), Some(playback)) = (self.swing_up.motions(), &self.moving) else {
             return Output::OFF;
         };
-        let (detection, course) = (&mut self.detection, player.now());
+        let (detection, reference) = (&mut self.detection, playback.now());
         let mut finding = None;
-        let command = self.controller.control_on_course(&inputs.raw_counts, course, |counts, y, e| {
+        let command = self.controller.control_on_reference(&inputs.raw_counts, reference, |counts, y, e| {
             finding = detection.test(motions.thresholds, counts, y, e);
         });
         let exceeded = envelope::exceeded_in_motion(
             motions.limits,
             self.controller.estimate().as_slice(),
-            course.x.as_slice(),
+            reference.x.as_slice(),
             command.requested_n,
         );
         self.drive_or_trip(inputs, &command, exceeded, finding)
@@ -123,17 +123,17 @@ impl<'t, const NX: usize, const NY: usize, S: SwingUp<NX, NY>> Firmware<'t, NX, 
 
     /// Predicts the next tick of a motion; at its end, hands over to the control law, holds, or turns the motor off.
     pub(super) fn predict_motion(&mut self) {
-        let (Some(motions), Some(player)) = (self.swing_up.motions(), &mut self.moving) else { return };
+        let (Some(motions), Some(playback)) = (self.swing_up.motions(), &mut self.moving) else { return };
         let (swing_up, tick_s) = (self.swing_up, self.table.tick_s);
-        let has_ended = player.advance();
-        let end = player.now().x.as_slice().first().copied().unwrap_or_default();
+        let has_ended = playback.advance();
+        let end = playback.now().x.as_slice().first().copied().unwrap_or_default();
         let (detection, test) = (&mut self.detection, &motions.thresholds.motor);
-        self.controller.predict_on_course(
+        self.controller.predict_on_reference(
             |corrected, force| detection.finish_tick(test, corrected, force),
             |state, force| swing_up.predict(state, force, tick_s),
         );
         if self.supervisor.state() == State::Holding {
-            player.stay_at(self.controller.govern());
+            playback.stay_at(self.controller.govern());
         } else if has_ended {
             let is_upright = self.goal == Equilibrium::UPRIGHT;
             self.supervisor.finish_motion(is_upright);

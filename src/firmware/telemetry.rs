@@ -4,7 +4,7 @@ use heapless::Vec;
 
 use super::Firmware;
 use crate::control::actuator::Drive;
-use crate::control::motion::Player;
+use crate::control::motion::Playback;
 use crate::protocol::message::Telemetry;
 use crate::table::SwingUp;
 
@@ -37,10 +37,10 @@ impl<const NX: usize, const NY: usize, S: SwingUp<NX, NY>> Firmware<'_, NX, NY, 
             cause_tick: self.supervisor.cause().map_or(0, |cause| cause.tick),
             homing: self.calibration.homing(),
             signs: self.calibration.signs(),
-            motor: self.bench_drive.sign(),
+            motor: self.jog.sign(),
             arming_inhibits: self.arming_inhibits(),
             swing_up_inhibits: self.swing_up_inhibits(),
-            motion_tick: self.moving.as_ref().map_or(0, Player::tick),
+            motion_tick: self.moving.as_ref().map_or(0, Playback::tick),
             contacts: self.contacts,
             supply_v: self.supply_v,
             counts: Vec::from_slice(self.controller.encoders().counts()).unwrap_or_default(),

@@ -74,9 +74,9 @@ fn a_fault_of_motor_or_encoder_puts_the_motors_sign_in_doubt_and_no_other_does()
     for entry in Fault::ALL {
         let mut firmware = firmware(&TABLE, Reset::Power).unwrap();
         let sign_counts = TABLE.limits.sign_counts[0];
-        firmware.bench_drive.hold();
-        firmware.bench_drive.begin(true, 0);
-        assert_eq!(firmware.bench_drive.update(sign_counts, sign_counts, TICK_S), None);
+        firmware.jog.hold();
+        firmware.jog.begin(true, 0);
+        assert_eq!(firmware.jog.update(sign_counts, sign_counts, TICK_S), None);
         assert_eq!(firmware.motor_sign(), MotorSign::Checked);
         firmware.trip(entry.fault, None);
         let doubted = [Fault::Encoder, Fault::Frozen, Fault::Motor, Fault::Watchdog, Fault::Crash];
@@ -206,7 +206,7 @@ fn of_several_faults_in_one_tick_the_first_of_the_precedence_is_latched() {
     let (ticks_of_a_pass, _) = ticks_to_fault(&mut other).unwrap();
     // A balancing rig follows no motion.
     let all: std::vec::Vec<Fault> =
-        Fault::PRECEDENCE.into_iter().filter(|fault| *fault != Fault::OffCourse).collect();
+        Fault::PRECEDENCE.into_iter().filter(|fault| *fault != Fault::TrackingError).collect();
     for (index, &first) in all.iter().enumerate() {
         let cause = cause_of(&all[index..], ticks_of_a_pass);
         assert_eq!(cause.map(|cause| (cause.fault, cause.tick)), Some((first, ticks_of_a_pass - 1)));

@@ -10,10 +10,10 @@ use crate::board::Contacts;
 use crate::control::controller::Rejected;
 #[cfg(feature = "identify")]
 use crate::protocol::tick_log::TickLog;
-use crate::supervision::bench_drive::MotorSign;
 use crate::supervision::fault::{Cause, Fault};
 use crate::supervision::homing::Homing;
 use crate::supervision::inhibits::Inhibits;
+use crate::supervision::jog::MotorSign;
 #[cfg(feature = "identify")]
 use crate::supervision::shaking::{FORCES, Shaking};
 use crate::supervision::sign_check::Signs;
@@ -38,7 +38,7 @@ pub struct Command {
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub enum Request {
     /// Heartbeat: shows that the host is alive, and does nothing else.
-    Beat,
+    KeepAlive,
     /// Home here: the cart is at its zero, and the links hang still or [swing](crate::supervision::swinging).
     Home,
     /// Home by the limit switches: a person pushes the cart to both and then lets the links hang still or swing.
@@ -71,8 +71,8 @@ pub enum Request {
     /// all of them hang at the end, the motor is turned off; otherwise they are balanced there.
     Goto(Equilibrium),
     /// A key is held: push the cart a little with the motor, for as long as this is repeated. See
-    /// [bench drive](crate::supervision::bench_drive).
-    Drive {
+    /// [jog](crate::supervision::jog).
+    Jog {
         /// Whether to push along +x, or against it.
         along: bool,
     },

@@ -96,10 +96,10 @@ mod tests {
     use super::*;
     use crate::board::Contacts;
     use crate::protocol::message::Telemetry;
-    use crate::supervision::bench_drive::MotorSign;
     use crate::supervision::fault::Fault;
     use crate::supervision::homing::Homing;
     use crate::supervision::inhibits::Inhibits;
+    use crate::supervision::jog::MotorSign;
     use crate::supervision::sign_check::Signs;
     use crate::supervision::supervisor::State;
     use crate::table::Law;

@@ -24,12 +24,12 @@ pub struct PinsIn<const NY: usize> {
     /// Bytes that arrive on the serial line during this tick.
     pub received: Vec<u8, BYTES_PER_TICK>,
     /// Fault injected in this tick.
-    pub sabotage: Option<Sabotage>,
+    pub injected_fault: Option<InjectedFault>,
 }
 
 /// A fault injected inside the microcontroller, which no input could cause.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-pub enum Sabotage {
+pub enum InjectedFault {
     /// A panic.
     Panic,
     /// A processor fault: access to an address that does not exist.
@@ -56,7 +56,7 @@ impl<const NY: usize> PinsIn<NY> {
             supply_v: inputs.supply_v,
             contacts: inputs.contacts,
             received: Vec::new(),
-            sabotage: None,
+            injected_fault: None,
         }
     }
 

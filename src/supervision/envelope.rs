@@ -32,7 +32,7 @@ pub fn exceeded<const NY: usize>(limits: &Limits<NY>, x: &[f32], requested_n: f3
     leans.then_some(Fault::Angle).or(is_fast.then_some(Fault::Speed))
 }
 
-/// The same for a rig that follows a planned motion, in this order: request not finite, rail, off course, speed.
+/// The same for a rig that follows a planned motion, in this order: request not finite, rail, tracking error, speed.
 /// Instead of the angles from the vertical, the distances of cart and links from the `planned` state are limited.
 #[inline]
 pub fn exceeded_in_motion(
@@ -59,7 +59,7 @@ pub fn exceeded_in_motion(
         is_off |= f32::abs(angle) > limits.deviation_rad;
     }
     let is_fast = speed.abs() > limits.speed_m_per_s;
-    is_off.then_some(Fault::OffCourse).or(is_fast.then_some(Fault::Speed))
+    is_off.then_some(Fault::TrackingError).or(is_fast.then_some(Fault::Speed))
 }
 
 #[cfg(test)]
@@ -111,10 +111,10 @@ mod tests {
         let found = |x: [f32; 6]| exceeded_in_motion(&limits, &x, &planned, 0.0);
         assert_eq!(found(planned), None);
         assert_eq!(found([0.57, 1.4, 3.3, 0.0, -2.0, 0.0]), None);
-        assert_eq!(found([0.39, 1.0, 3.0, 9.0, -2.0, 5.0]), Some(Fault::OffCourse));
-        assert_eq!(found([0.5, 1.0, 2.64, 9.0, -2.0, 5.0]), Some(Fault::OffCourse));
+        assert_eq!(found([0.39, 1.0, 3.0, 9.0, -2.0, 5.0]), Some(Fault::TrackingError));
+        assert_eq!(found([0.5, 1.0, 2.64, 9.0, -2.0, 5.0]), Some(Fault::TrackingError));
         // Each joint is near its own plan, the second link is not near its angle from the vertical.
-        assert_eq!(found([0.5, 1.0, 3.2, 9.0, -1.8, 5.0]), Some(Fault::OffCourse));
+        assert_eq!(found([0.5, 1.0, 3.2, 9.0, -1.8, 5.0]), Some(Fault::TrackingError));
         assert_eq!(found([0.59, 1.0, 3.0, 9.0, -2.0, 5.0]), Some(Fault::Rail));
         assert_eq!(found([-1.1, 1.0, 3.0, 9.0, -2.0, 5.0]), Some(Fault::Rail));
         assert_eq!(found([0.5, 1.6, 3.0, 9.0, -2.0, 5.0]), Some(Fault::Speed));

@@ -49,7 +49,7 @@ pub enum Fault {
     /// supply is low.
     Board = 19,
     /// The cart or a link is too far from the planned motion.
-    OffCourse = 20,
+    TrackingError = 20,
 }
 
 /// Longest time from a fault's first effect on the firmware's inputs to motor off.
@@ -236,8 +236,8 @@ impl Fault {
             remedy: "flash the image for this board, check its 3.3 V; then reset",
         },
         Entry {
-            fault: Fault::OffCourse,
-            name: "off course",
+            fault: Fault::TrackingError,
+            name: "tracking error",
             condition: "while raising or lowering, cart or link are further from the planned motion than the swing-up's \
                         `deviation_m` or `deviation_rad`",
             reaction: Reaction::Ticks(1),
@@ -263,7 +263,7 @@ impl Fault {
         Fault::Overrun,
         Fault::Rail,
         Fault::Angle,
-        Fault::OffCourse,
+        Fault::TrackingError,
         Fault::Speed,
         Fault::Encoder,
         Fault::Frozen,

@@ -39,10 +39,10 @@ pub const ANGLE_RAD: f32 = 2.1;
 pub const RATE_RAD_PER_S: f32 = 90.0;
 /// The same for the cart, as a multiple of its speed limit.
 const RATE_OF_SPEED: f32 = 4.0;
-/// Time within which the force of the bench drive has to move everything by more than a count: cart, links (s). Other
+/// Time within which the force of the jog has to move everything by more than a count: cart, links (s). Other
 /// forces have to do so within the same impulse.
 pub const STILL_S: [f32; 2] = [0.25, 0.5];
-/// Unit in which impulses are counted: this fraction of the bench drive's force, for one tick.
+/// Unit in which impulses are counted: this fraction of the jog force, for one tick.
 const IMPULSE: f32 = 1.0 / 32.0;
 
 /// How the rig is shaken, as commanded by the host.
@@ -146,7 +146,7 @@ impl<const NY: usize> Shaker<NY> {
         tick_s: f32,
     ) -> Result<Option<f32>, Found> {
         let position_m = self.measure(counts, step, limits, tick_s)?;
-        self.moves(counts, limits.bench_force_n, tick_s)?;
+        self.moves(counts, limits.jog_force_n, tick_s)?;
         self.ticks = self.ticks.saturating_add(1);
         self.silent_ticks = self.silent_ticks.saturating_add(1);
         let mut pushed = 0;
@@ -211,8 +211,8 @@ impl<const NY: usize> Shaker<NY> {
     }
 
     /// Checks that every sensor moves that the force has to move.
-    fn moves(&mut self, counts: &[i32; NY], bench_force_n: f32, tick_s: f32) -> Result<(), Found> {
-        let impulse = (f32::abs(self.force_n) / (IMPULSE * bench_force_n)) as u16;
+    fn moves(&mut self, counts: &[i32; NY], jog_force_n: f32, tick_s: f32) -> Result<(), Found> {
+        let impulse = (f32::abs(self.force_n) / (IMPULSE * jog_force_n)) as u16;
         let sensors = counts.iter().zip(self.seen.iter_mut().zip(&mut self.idle));
         for (sensor, (&count, (seen, idle))) in (0..).zip(sensors) {
             if count.wrapping_sub(*seen).unsigned_abs() > 1 {
@@ -249,7 +249,7 @@ mod tests {
     /// Result of such a run: the ticks with the motor on, the largest force, and how it ended.
     fn run(run: &Run) -> (u32, f32, Outcome) {
         let limits =
-            Limits::<3> { rail_m: [-1.0, 1.0], speed_m_per_s: 2.0, bench_force_n: 1.0, ..Limits::none() };
+            Limits::<3> { rail_m: [-1.0, 1.0], speed_m_per_s: 2.0, jog_force_n: 1.0, ..Limits::none() };
         let mut shaker = Shaker::default();
         shaker.begin(SHAKING, &(run.counts)(0));
         let mut most = 0.0f32;
@@ -274,7 +274,7 @@ mod tests {
     #[test]
     fn the_force_is_bounded_and_rises_slowly() {
         let limits =
-            Limits::<3> { rail_m: [-1.0, 1.0], speed_m_per_s: 2.0, bench_force_n: 1.0, ..Limits::none() };
+            Limits::<3> { rail_m: [-1.0, 1.0], speed_m_per_s: 2.0, jog_force_n: 1.0, ..Limits::none() };
         let mut shaker = Shaker::default();
         shaker.begin(SHAKING, &[0; 3]);
         shaker.take(0, 0, &[FULL; FORCES]);

@@ -16,7 +16,7 @@ pub enum State {
     /// Positions are known.
     Calibrated,
     /// The motor pushes the cart a little, while a person holds a key.
-    Driving,
+    Jogging,
     /// Waiting until all links have been upright and slow for `arm_time_s`.
     Armed,
     /// The motor brings the links to an equilibrium by a planned motion: to upright, or to one at which some hang.
@@ -41,7 +41,7 @@ impl State {
         if matches!(self, State::Identifying) {
             return true;
         }
-        self.controls() || matches!(self, State::Driving)
+        self.controls() || matches!(self, State::Jogging)
     }
 
     /// Whether the controller commands the motor.
@@ -61,7 +61,7 @@ impl State {
 ///                                                             │  Raising ── finish_motion ─► Holding ─ lower ─► Lowering
 ///                                                             │  Balancing, Holding ─ move_on ─► Raising        │
 ///                                                             │◄──────── disarm while the motor is on ──────────┘
-///                                                             ├◄─ disarm ── Driving ◄─ start_driving ── Calibrated
+///                                                             ├◄─ disarm ── Jogging ◄─ start_jogging ── Calibrated
 ///                                                             └◄─ disarm ── Identifying ◄─ start_identifying ── Calibrated
 /// any state ─ trip ─► Fault ─ clear ─► Calibrated, or Disarmed if positions are not known
 /// ```
@@ -107,7 +107,7 @@ impl Supervisor {
     /// Turns the motor off; ends homing.
     pub fn disarm(&mut self) {
         match self.state {
-            State::Driving
+            State::Jogging
             | State::Armed
             | State::Raising
             | State::Balancing
@@ -145,7 +145,7 @@ impl Supervisor {
     fn check_homing_allowed(&self) -> Result<(), Inhibits> {
         match self.state {
             State::Disarmed | State::Homing | State::Calibrated => Ok(()),
-            State::Driving
+            State::Jogging
             | State::Armed
             | State::Raising
             | State::Balancing
@@ -172,7 +172,7 @@ impl Supervisor {
         let unknown = Inhibits::NOT_HOMED.when(!self.positions_known);
         unknown.union(match self.state {
             State::Disarmed | State::Homing | State::Calibrated => Inhibits::NONE,
-            State::Driving
+            State::Jogging
             | State::Armed
             | State::Raising
             | State::Balancing
@@ -188,9 +188,9 @@ impl Supervisor {
     ///
     /// # Errors
     /// All inhibits that hold.
-    pub fn start_driving(&mut self, other: Inhibits) -> Result<(), Inhibits> {
+    pub fn start_jogging(&mut self, other: Inhibits) -> Result<(), Inhibits> {
         self.arming_inhibits().union(other).err_if_any()?;
-        self.state = State::Driving;
+        self.state = State::Jogging;
         Ok(())
     }
 
@@ -286,7 +286,7 @@ mod tests {
         Disarmed,
         Homing,
         Calibrated,
-        Driving,
+        Jogging,
         Identifying,
         Armed,
         Raising,
@@ -303,8 +303,8 @@ mod tests {
         Disarm,
         StartHoming,
         CompleteHoming,
-        StartDriving,
-        StartDrivingInhibited,
+        StartJogging,
+        StartJoggingInhibited,
         StartIdentifying,
         StartIdentifyingInhibited,
         Arm,
@@ -340,8 +340,8 @@ mod tests {
             Event::Disarm => supervisor.disarm(),
             Event::StartHoming => return supervisor.start_homing(),
             Event::CompleteHoming => return supervisor.complete_homing(),
-            Event::StartDriving => return supervisor.start_driving(Inhibits::NONE),
-            Event::StartDrivingInhibited => return supervisor.start_driving(Inhibits::MOVING),
+            Event::StartJogging => return supervisor.start_jogging(Inhibits::NONE),
+            Event::StartJoggingInhibited => return supervisor.start_jogging(Inhibits::MOVING),
             Event::StartIdentifying => return supervisor.start_identifying(Inhibits::NONE),
             Event::StartIdentifyingInhibited => return supervisor.start_identifying(Inhibits::MOTOR),
             Event::Arm => return supervisor.arm(Inhibits::NONE),
@@ -365,12 +365,12 @@ mod tests {
     #[test]
     fn every_event_in_every_state_leads_where_the_table_says() {
         use Event::*;
-        let known = [Calibrated, Driving, Identifying, Armed, Raising, Balancing, Holding, Lowering];
-        let running = [Driving, Identifying, Armed, Raising, Balancing, Holding, Lowering, Fault];
+        let known = [Calibrated, Jogging, Identifying, Armed, Raising, Balancing, Holding, Lowering];
+        let running = [Jogging, Identifying, Armed, Raising, Balancing, Holding, Lowering, Fault];
         let not_calibrated =
-            [Disarmed, Homing, Driving, Identifying, Armed, Raising, Balancing, Holding, Lowering, Fault];
+            [Disarmed, Homing, Jogging, Identifying, Armed, Raising, Balancing, Holding, Lowering, Fault];
         let not_balancing =
-            [Disarmed, Homing, Calibrated, Driving, Identifying, Armed, Raising, Lowering, Fault];
+            [Disarmed, Homing, Calibrated, Jogging, Identifying, Armed, Raising, Lowering, Fault];
         // Where an event leads to from each of STATES, if not to the same state.
         let but = |changes: &[(State, State)]| {
             STATES.map(|from| changes.iter().find(|(state, _)| *state == from).map_or(from, |(_, to)| *to))
@@ -383,7 +383,7 @@ mod tests {
                 Disarm,
                 but(&[
                     (Homing, Disarmed),
-                    (Driving, Calibrated),
+                    (Jogging, Calibrated),
                     (Identifying, Calibrated),
                     (Armed, Calibrated),
                     (Raising, Calibrated),
@@ -395,8 +395,8 @@ mod tests {
             ),
             (StartHoming, but(&[(Disarmed, Homing), (Calibrated, Homing)]), &running),
             (CompleteHoming, but(&[(Disarmed, Calibrated), (Homing, Calibrated)]), &running),
-            (StartDriving, but(&[(Calibrated, Driving)]), &not_calibrated),
-            (StartDrivingInhibited, STATES, &STATES),
+            (StartJogging, but(&[(Calibrated, Jogging)]), &not_calibrated),
+            (StartJoggingInhibited, STATES, &STATES),
             (StartIdentifying, but(&[(Calibrated, Identifying)]), &not_calibrated),
             (StartIdentifyingInhibited, STATES, &STATES),
             (Arm, but(&[(Calibrated, Armed)]), &not_calibrated),

@@ -15,8 +15,8 @@ part! {
         pub angle_rad: f32,
         /// Largest speed of the cart (m/s).
         pub speed_m_per_s: f32,
-        /// Largest force of the bench drive (N).
-        pub bench_force_n: f32,
+        /// Largest force of the jog (N).
+        pub jog_force_n: f32,
         /// Least supply voltage of the power stage (V).
         pub supply_min_v: f32,
         /// Longest time for which the supply may be too low (ticks).
@@ -53,7 +53,7 @@ impl<const NY: usize> Limits<NY> {
             rail_m: [-f32::MAX, f32::MAX],
             angle_rad: f32::MAX,
             speed_m_per_s: f32::MAX,
-            bench_force_n: 0.0,
+            jog_force_n: 0.0,
             supply_min_v: 0.0,
             supply_ticks: 1,
             saturated_ticks: u32::MAX,
@@ -79,7 +79,7 @@ impl<const NY: usize> Limits<NY> {
         low < high
             && [self.angle_rad, self.speed_m_per_s, self.arm_angle_rad].iter().all(|limit| *limit > 0.0)
             && self.supply_min_v >= 0.0
-            && self.bench_force_n >= 0.0
+            && self.jog_force_n >= 0.0
             && ticks.iter().all(|&ticks| ticks > 0)
             && counts.into_iter().flatten().chain(&self.travel_counts).all(|&counts| counts >= 0)
     }
@@ -146,7 +146,7 @@ mod tests {
             rail_m: [-1.0, 1.0],
             angle_rad: 0.35,
             speed_m_per_s: 2.0,
-            bench_force_n: 1.0,
+            jog_force_n: 1.0,
             supply_min_v: 0.0,
             supply_ticks: 1,
             saturated_ticks: 10,
@@ -185,7 +185,7 @@ mod tests {
         assert!(unsound(&|l| l.angle_rad = f32::NAN));
         assert!(unsound(&|l| l.rail_m[0] = f32::NAN));
         assert!(unsound(&|l| l.supply_min_v = f32::NAN));
-        assert!(unsound(&|l| l.bench_force_n = -1.0));
+        assert!(unsound(&|l| l.jog_force_n = -1.0));
         assert!(unsound(&|l| l.travel_counts[1] = -1));
         assert!(unsound(&|l| l.speed_m_per_s = 0.0));
         assert!(unsound(&|l| l.arm_ticks = 0));

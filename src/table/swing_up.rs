@@ -14,16 +14,16 @@ part! {
     pub struct MotionTable<'t,;> {
         /// Duration (ticks).
         pub ticks: u32,
-        /// Ticks from one knot of `course` to the next.
-        pub course_ticks: u32,
+        /// Ticks from one knot of `reference` to the next.
+        pub reference_ticks: u32,
         /// Ticks from one knot of `filter` to the next.
         pub filter_ticks: u32,
         /// Lowest and highest planned position of the cart, from its first one (m).
         pub travel_m: [f32; 2],
-        /// For each column of `course`: what a value of 1 is.
-        pub course_units: &'t [f32],
+        /// For each column of `reference`: what a value of 1 is.
+        pub reference_units: &'t [f32],
         /// Columns of the reference state, the reference force (N) and the gains K, each with its values at all knots.
-        pub course: &'t [i16],
+        pub reference: &'t [i16],
         /// For each column of `filter`: what a value of 1 is.
         pub filter_units: &'t [f32],
         /// Columns of L, sensor by sensor, each with its values at all knots of the filter.
@@ -126,8 +126,8 @@ part! {
 }
 
 impl MotionTable<'_> {
-    /// Columns of `course`: a state, the force, a gain for each state.
-    pub const fn course_columns(states: usize) -> usize {
+    /// Columns of `reference`: a state, the force, a gain for each state.
+    pub const fn reference_columns(states: usize) -> usize {
         2 * states + 1
     }
 
@@ -139,7 +139,12 @@ impl MotionTable<'_> {
             units.len() == columns && values.len() == knots * columns && knots >= 4 && reach >= self.ticks
         };
         self.ticks > 0
-            && has(self.course, self.course_units, Self::course_columns(states), self.course_ticks)
+            && has(
+                self.reference,
+                self.reference_units,
+                Self::reference_columns(states),
+                self.reference_ticks,
+            )
             && has(self.filter, self.filter_units, states * sensors, self.filter_ticks)
     }
 }

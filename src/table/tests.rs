@@ -58,7 +58,7 @@ fn full() -> GainTable<4, 2> {
             rail_m: [-1.0, 1.0],
             angle_rad: 0.35,
             speed_m_per_s: 2.0,
-            bench_force_n: 1.5,
+            jog_force_n: 1.5,
             supply_min_v: 9.0,
             supply_ticks: 2,
             saturated_ticks: 3,
@@ -261,22 +261,22 @@ fn a_reader_hears_every_name_in_the_order_of_declaration() {
 const COURSE: [i16; 4 * 9] = [5; 4 * 9];
 const FILTER: [i16; 4 * 8] = [-25; 4 * 8];
 
-fn motion<'t>(course: &'t [i16], filter: &'t [i16]) -> MotionTable<'t> {
-    let (course_units, filter_units) = (&[0.5; 9], &[0.25; 8]);
+fn motion<'t>(reference: &'t [i16], filter: &'t [i16]) -> MotionTable<'t> {
+    let (reference_units, filter_units) = (&[0.5; 9], &[0.25; 8]);
     MotionTable {
         ticks: 6,
-        course_ticks: 2,
+        reference_ticks: 2,
         filter_ticks: 2,
         travel_m: [-0.5, 0.5],
-        course_units,
-        course,
+        reference_units,
+        reference,
         filter_units,
         filter,
     }
 }
 
 /// The table of a swing-up of one link.
-fn swing_up<'t>(course: &'t [i16], filter: &'t [i16]) -> SwingUpTable<'t, 2, 1> {
+fn swing_up<'t>(reference: &'t [i16], filter: &'t [i16]) -> SwingUpTable<'t, 2, 1> {
     let mut table = SwingUpTable {
         format: TABLE_FORMAT,
         rig_hash: BUILD.rig_hash,
@@ -297,8 +297,8 @@ fn swing_up<'t>(course: &'t [i16], filter: &'t [i16]) -> SwingUpTable<'t, 2, 1> 
             rail_m: [-0.4, 0.4],
         },
         thresholds: full().thresholds,
-        raise: motion(course, filter),
-        lower: motion(course, filter),
+        raise: motion(reference, filter),
+        lower: motion(reference, filter),
         others: &[],
         crc: 0,
     };
@@ -311,9 +311,9 @@ fn every_flipped_bit_of_a_motion_is_refused() {
     let good = swing_up(&COURSE, &FILTER);
     assert_eq!(good.check(&BUILD, 4), Ok(()));
     for (word, bit) in (0..COURSE.len()).flat_map(|word| (0..16).map(move |bit| (word, bit))) {
-        let mut course = COURSE;
-        course[word] ^= 1 << bit;
-        let damaged = SwingUpTable { lower: motion(&course, &FILTER), ..good.clone() };
+        let mut reference = COURSE;
+        reference[word] ^= 1 << bit;
+        let damaged = SwingUpTable { lower: motion(&reference, &FILTER), ..good.clone() };
         assert_eq!(damaged.check(&BUILD, 4), Err(TableError::Crc), "word {word}, bit {bit}");
     }
     for (leaf, size) in sizes(&mut good.clone()).into_iter().enumerate().skip(1) {
@@ -327,8 +327,8 @@ fn every_flipped_bit_of_a_motion_is_refused() {
     assert_eq!((0..1000).find_map(|_| scan.next(&good)), Some(good.crc));
 }
 
-fn transition(from: u32, to: u32, course: &[i16]) -> Transition<'_> {
-    Transition { from, to, motion: motion(course, &FILTER) }
+fn transition(from: u32, to: u32, reference: &[i16]) -> Transition<'_> {
+    Transition { from, to, motion: motion(reference, &FILTER) }
 }
 
 /// The table with these transitions and its checksum.
@@ -344,9 +344,9 @@ fn every_flipped_bit_of_a_transition_is_refused() {
     let table = with_others(&good);
     assert_eq!(table.check(&BUILD, 4), Ok(()));
     for (word, bit) in (0..COURSE.len()).flat_map(|word| (0..16).map(move |bit| (word, bit))) {
-        let mut course = COURSE;
-        course[word] ^= 1 << bit;
-        let damaged = [good[0], transition(1, 0, &course)];
+        let mut reference = COURSE;
+        reference[word] ^= 1 << bit;
+        let damaged = [good[0], transition(1, 0, &reference)];
         let damaged = SwingUpTable { others: &damaged, ..table.clone() };
         assert_eq!(damaged.check(&BUILD, 4), Err(TableError::Crc), "word {word}, bit {bit}");
     }
@@ -380,10 +380,10 @@ fn a_motion_that_does_not_fit_is_refused_even_with_the_right_checksum() {
     assert_eq!(refused(&|t| t.rig_hash ^= 1), Err(TableError::RigHash));
     assert_eq!(refused(&|t| t.tick_s *= 2.0), Err(TableError::Tick));
     let dimensions = Err(TableError::Dimensions);
-    assert_eq!(refused(&|t| t.raise.course = &COURSE[9..]), dimensions, "too few values");
-    assert_eq!(refused(&|t| t.raise.course = &COURSE[4..]), dimensions, "a column less");
+    assert_eq!(refused(&|t| t.raise.reference = &COURSE[9..]), dimensions, "too few values");
+    assert_eq!(refused(&|t| t.raise.reference = &COURSE[4..]), dimensions, "a column less");
     assert_eq!(refused(&|t| t.lower.filter_ticks = 1), dimensions, "knots that end too early");
-    assert_eq!(refused(&|t| t.lower.course_ticks = 0), dimensions);
+    assert_eq!(refused(&|t| t.lower.reference_ticks = 0), dimensions);
     assert_eq!(refused(&|t| t.raise.ticks = 0), dimensions);
     assert_eq!(refused(&|t| t.limits.deviation_rad = f32::NAN), Err(TableError::Value));
     assert_eq!(refused(&|t| t.limits.speed_m_per_s = 0.0), Err(TableError::Value));

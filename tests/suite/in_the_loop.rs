@@ -148,7 +148,7 @@ fn homed_swinging(table: &TableValues, off: f64, place: Place<'_>) -> Vec<(State
             if tick.is_multiple_of(500) {
                 session.send(Request::Home);
             }
-            session.tick(&Pins { raw_counts, supply_v: 12.0, contacts, received, sabotage: None })?;
+            session.tick(&Pins { raw_counts, supply_v: 12.0, contacts, received, injected_fault: None })?;
             seen.extend(
                 std::iter::from_fn(|| session.next_telemetry()).map(|at| (at.state, at.counts.to_vec())),
             );

@@ -21,7 +21,7 @@ use upright::control::encoder::CounterWidth;
 use upright::gains::SENSORS;
 use upright::protocol::frame::{self, Receiver as Frames};
 use upright::protocol::message::Start;
-use upright::protocol::simulated_pins::{MAX_PINS_IN, MAX_PINS_OUT, PinsIn, PinsOut, Sabotage};
+use upright::protocol::simulated_pins::{InjectedFault, MAX_PINS_IN, MAX_PINS_OUT, PinsIn, PinsOut};
 
 #[cfg(feature = "in-the-loop")]
 use semihosting::{Channel, Serial, exit, open};
@@ -150,8 +150,8 @@ impl Hardware {
                 // As on a board, a byte that does not fit is lost.
                 let _ = self.received.enqueue(byte);
             }
-            if let Some(sabotage) = pins.sabotage {
-                inject(sabotage);
+            if let Some(injected_fault) = pins.injected_fault {
+                inject(injected_fault);
             }
             if let Some(inputs) = pins.inputs() {
                 return inputs;
@@ -168,12 +168,12 @@ fn send(pins: &mut Channel, output: &Output) {
     }
 }
 
-fn inject(sabotage: Sabotage) {
-    match sabotage {
-        Sabotage::Panic => panic!(),
+fn inject(injected_fault: InjectedFault) {
+    match injected_fault {
+        InjectedFault::Panic => panic!(),
         // SAFETY: deliberately unsound: nothing is mapped at this address, so the access faults.
-        Sabotage::HardFault => unsafe { core::ptr::write_volatile(0x4fff_fffc as *mut u32, 0) },
-        Sabotage::StackOverflow => {
+        InjectedFault::HardFault => unsafe { core::ptr::write_volatile(0x4fff_fffc as *mut u32, 0) },
+        InjectedFault::StackOverflow => {
             dig(1);
         }
     }

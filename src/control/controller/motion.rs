@@ -1,19 +1,19 @@
 //! A tick of the controller that follows a planned motion.
 
 use super::{Controller, LawState, Mode, MotorCommand};
-use crate::control::motion::Course;
+use crate::control::motion::Reference;
 
 impl<const NX: usize, const NY: usize> Controller<'_, NX, NY> {
     /// First half of a tick of a started controller that follows a planned motion: as
-    /// [`control_with`](Self::control_with), but with the reference and the gains of `course`:
+    /// [`control_with`](Self::control_with), but with the reference and the gains of `reference`:
     ///
     /// ```text
     /// e = y - C x̂⁻,   x̂ = x̂⁻ + L_k e,   u = sat(u_k - K_k (x̂ - x_k))
     /// ```
-    pub fn control_on_course(
+    pub fn control_on_reference(
         &mut self,
         raw: &[u32; NY],
-        course: &Course<NX, NY>,
+        reference: &Reference<NX, NY>,
         judge: impl FnOnce(&[i32; NY], &[f32; NY], &mut [f32; NY]),
     ) -> MotorCommand {
         let Mode::Running(observer) = self.mode else {
@@ -24,13 +24,13 @@ impl<const NX: usize, const NY: usize> Controller<'_, NX, NY> {
         let e = &mut self.innovation.data.0[0];
         *e = observer.innovation(&y, &self.estimate.data.0[0]);
         judge(self.encoders.counts(), &y, e);
-        for (column, e) in course.l.data.0.iter().zip(*e) {
+        for (column, e) in reference.l.data.0.iter().zip(*e) {
             for (x, l) in self.estimate.iter_mut().zip(column) {
                 *x += l * e;
             }
         }
-        let mut requested = course.u;
-        for ((k, x), planned) in course.k.iter().zip(&self.estimate).zip(&course.x) {
+        let mut requested = reference.u;
+        for ((k, x), planned) in reference.k.iter().zip(&self.estimate).zip(&reference.x) {
             requested -= k * (x - planned);
         }
         self.drive(requested)
@@ -39,7 +39,7 @@ impl<const NX: usize, const NY: usize> Controller<'_, NX, NY> {
     /// Second half of such a tick: calls `finish` as [`predict_with`](Self::predict_with) does; then `predict`
     /// replaces the estimate by the one a tick later, with the given force (N) held.
     #[inline(always)]
-    pub fn predict_on_course(
+    pub fn predict_on_reference(
         &mut self,
         finish: impl FnOnce([f32; NY], f32),
         predict: impl FnOnce(&mut [f32; NX], f32),

@@ -4,7 +4,7 @@
 use upright::board::Output;
 use upright::control::actuator::Drive;
 use upright::protocol::message::Request;
-use upright::supervision::bench_drive::MotorSign;
+use upright::supervision::jog::MotorSign;
 use upright::supervision::sign_check::Signs;
 use upright::supervision::supervisor::State;
 use upright::table::Equilibrium;
@@ -176,7 +176,7 @@ impl Hand {
         self.grasp.take(self.pushed.state());
         match status.motor {
             MotorSign::Unchecked if tick.is_multiple_of(self.key_ticks) => {
-                Some(Request::Drive { along: false })
+                Some(Request::Jog { along: false })
             }
             MotorSign::Checked if status.state == State::Calibrated => {
                 self.grasp.stop();

@@ -79,7 +79,7 @@ pub fn record(
             harness.session.send(Request::Setpoint(ahead as f32));
             commanded = ahead;
         } else if tick.is_multiple_of(heartbeat) {
-            harness.session.send(Request::Beat);
+            harness.session.send(Request::KeepAlive);
         }
         let t = tick as f64 * period_s;
         // In a run that begins hanging, a link below the horizontal has fallen only while the firmware balances.

@@ -6,10 +6,10 @@ use upright::board::Output;
 use upright::protocol::frame::{self, Receiver};
 use upright::protocol::message::{Answer, Command, Info, Message, PROTOCOL, Reply, Request, Telemetry};
 use upright::protocol::serial_link::{MAX_COMMAND, MAX_MESSAGE};
-use upright::protocol::simulated_pins::Sabotage;
+use upright::protocol::simulated_pins::InjectedFault;
 use upright::protocol::tick_log::TickLog;
-use upright::supervision::bench_drive::MotorSign;
 use upright::supervision::fault::Fault;
+use upright::supervision::jog::MotorSign;
 use upright::supervision::sign_check::Signs;
 use upright::supervision::supervisor::State;
 
@@ -34,7 +34,7 @@ pub struct Session<'a> {
     serial: Vec<u8>,
     to_send: VecDeque<u8>,
     last_id: u64,
-    sabotage: Option<Sabotage>,
+    injected_fault: Option<InjectedFault>,
     telemetry: VecDeque<AnyTelemetry>,
     replies: VecDeque<(u64, Answer)>,
     logs: VecDeque<AnyTickLog>,
@@ -54,7 +54,7 @@ impl<'a> Session<'a> {
             serial: Vec::new(),
             to_send: VecDeque::new(),
             last_id: 0,
-            sabotage: None,
+            injected_fault: None,
             telemetry: VecDeque::new(),
             replies: VecDeque::new(),
             logs: VecDeque::new(),
@@ -103,8 +103,8 @@ impl<'a> Session<'a> {
     }
 
     /// Injects a fault inside the microcontroller in the next tick.
-    pub fn sabotage(&mut self, sabotage: Sabotage) {
-        self.sabotage = Some(sabotage);
+    pub fn injected_fault(&mut self, injected_fault: InjectedFault) {
+        self.injected_fault = Some(injected_fault);
     }
 
     /// Runs one tick with these inputs and collects what the firmware has sent.
@@ -118,7 +118,7 @@ impl<'a> Session<'a> {
             // Cannot fail: the loop has checked that there is room.
             let _ = pins.received.push(byte);
         }
-        pins.sabotage = self.sabotage.take();
+        pins.injected_fault = self.injected_fault.take();
         self.serial.clear();
         let output = self.target.tick(&pins, &mut self.serial)?;
         self.ticks = self.ticks.wrapping_add(1);

@@ -58,6 +58,6 @@ pub(super) fn healthy(counts: &[u32], supply_v: f32) -> Pins {
         supply_v,
         contacts: Contacts::default(),
         received: heapless::Vec::new(),
-        sabotage: None,
+        injected_fault: None,
     }
 }

@@ -64,7 +64,7 @@ impl Feed {
         let excitation = Excitation::of(rig, duration_s, seed)?;
         let period_s = rig.tick.period_s;
         let limit_n = f64::from(table.force_limit_n);
-        let pulse_n = f64::from(table.limits.bench_force_n).min(limit_n);
+        let pulse_n = f64::from(table.limits.jog_force_n).min(limit_n);
         let ticks = (duration_s / period_s) as u32;
         let peak_n =
             (0..ticks).map(|tick| excitation.sines_n(f64::from(tick) * period_s).abs()).fold(0.0, f64::max);

@@ -3,7 +3,7 @@
 use upright::board::Output;
 use upright::control::actuator::Drive;
 use upright::protocol::message::Request;
-use upright::supervision::bench_drive::MotorSign;
+use upright::supervision::jog::MotorSign;
 use upright::supervision::supervisor::State;
 use upright::table::Law;
 

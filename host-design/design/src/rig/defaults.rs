@@ -8,7 +8,7 @@ pub const ARM_ANGLE_SHARE: f64 = 0.1;
 pub const RAIL_MARGIN_SHARE: f64 = 0.025;
 /// Largest difference between the rail's length and the distance of the limit switches, as a share of the length.
 pub const TRAVEL_TOLERANCE_SHARE: f64 = 0.01;
-/// Largest force of the bench drive, as a share of the force limit.
-pub const BENCH_FORCE_SHARE: f64 = 0.1;
+/// Largest force of the jog, as a share of the force limit.
+pub const JOG_FORCE_SHARE: f64 = 0.1;
 /// Lowest supply voltage, as a share of the motor's supply voltage.
 pub const SUPPLY_SHARE: f64 = 0.8;

@@ -193,7 +193,7 @@ fn balanced(
             let sign = if (number / side).is_multiple_of(2) { 1.0 } else { -1.0 };
             harness.session.send(Request::Setpoint(sign * setpoint_m));
         } else if number % heartbeat == 0 {
-            harness.session.send(Request::Beat);
+            harness.session.send(Request::KeepAlive);
         }
         tick(harness)?;
         while harness.session.next_reply().is_some() {}

@@ -1,7 +1,7 @@
 //! Raising, balancing and lowering by the firmware's controller against the nonlinear plant, without a supervisor.
 
 use upright::control::controller::Controller;
-use upright::control::motion::Player;
+use upright::control::motion::Playback;
 use upright::supervision::detection::Detection;
 use upright::table::{Equilibrium, MotionTable, SwingUp, SwingUpTable, Thresholds};
 
@@ -148,32 +148,32 @@ impl<'t, const NX: usize, const NY: usize, const N: usize> Run<'t, NX, NY, N> {
     /// end for `hold_ticks`, and then hands over to the control law.
     fn follow(&mut self, motion: MotionTable<'t>, hold_ticks: usize) {
         let Self { controller, bench, reached, .. } = self;
-        let mut player = Player::<NX, NY>::new(motion, controller.law_state().setpoint);
+        let mut playback = Playback::<NX, NY>::new(motion, controller.law_state().setpoint);
         let (mut detection, nothing) = (Detection::<NY>::default(), Thresholds::none());
         detection.start(controller.encoders().counts(), &controller.positions().data.0[0]);
         let mut held = 0;
         loop {
             let counters = bench.counters();
-            let command = controller.control_on_course(&counters, player.now(), |counts, y, e| {
+            let command = controller.control_on_reference(&counters, playback.now(), |counts, y, e| {
                 raise_to(&mut reached.innovation, &e.map(|e| f64::from(e.abs())));
                 detection.test(&nothing, counts, y, e);
                 raise_to(&mut reached.moved, &detection.moved().map(|moved| f64::from(moved.abs())));
             });
             let estimate = controller.estimate();
-            reached.note(estimate.as_slice(), (estimate - player.now().x).as_slice());
+            reached.note(estimate.as_slice(), (estimate - playback.now().x).as_slice());
             bench.tick(command.drive);
-            controller.predict_on_course(
+            controller.predict_on_reference(
                 |corrected, force| detection.finish_tick(&nothing.motor, corrected, force),
                 |state, force| SwingUp::<NX, NY>::predict(self.swing_up, state, force, self.tick_s),
             );
-            if player.advance() {
+            if playback.advance() {
                 if held == hold_ticks {
                     break;
                 }
                 held += 1;
             }
         }
-        controller.hand_over(player.now().x[0]);
+        controller.hand_over(playback.now().x[0]);
     }
 
     /// Balances for `ticks` at the position where the motion has ended.

@@ -59,8 +59,8 @@ fn write_swing_up(out: &mut String, table: &TableValues, fields: &[Field], crc: 
     writeln!(out, "/// The swing-up's table has knots for as long as each motion lasts.")?;
     writeln!(out, "pub type SwingUp = SwingUpTable<'static, SENSORS, {links}>;\n")?;
     writeln!(out, "/// The swing-up.\n#[rustfmt::skip]\npub static SWING_UP: SwingUp = SwingUpTable {{")?;
-    let course = MotionTable::course_columns(table.states());
-    let mut writer = Columns { out, course, filter: table.states() * table.sensors(), indent: 4 };
+    let reference = MotionTable::reference_columns(table.states());
+    let mut writer = Columns { out, reference, filter: table.states() * table.sensors(), indent: 4 };
     for field in fields {
         writer.field(field)?;
     }
@@ -71,8 +71,8 @@ fn write_swing_up(out: &mut String, table: &TableValues, fields: &[Field], crc: 
 /// Writes fields with one column of a motion or matrix per line.
 struct Columns<'a> {
     out: &'a mut String,
-    /// Number of columns of the field `course`, and of `filter`.
-    course: usize,
+    /// Number of columns of the field `reference`, and of `filter`.
+    reference: usize,
     filter: usize,
     indent: usize,
 }
@@ -113,7 +113,7 @@ impl Columns<'_> {
             }
             Node::Slice(numbers) => {
                 let columns = match *name {
-                    "course" => self.course,
+                    "reference" => self.reference,
                     "filter" => self.filter,
                     _ => 1,
                 };

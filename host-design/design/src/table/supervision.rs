@@ -18,7 +18,7 @@ pub(super) fn limits(rig: &Rig, steps: &[f64]) -> Result<Limits<MAX_SENSORS>, No
     let none = Limits::none();
     let mut limits = Limits {
         speed_m_per_s: narrow("limits.speed_m_per_s", wanted.speed_m_per_s)?.unwrap_or(none.speed_m_per_s),
-        bench_force_n: narrow("limits.bench_force_n", bench_force_n(rig))?.unwrap_or(none.bench_force_n),
+        jog_force_n: narrow("limits.jog_force_n", jog_force_n(rig))?.unwrap_or(none.jog_force_n),
         supply_min_v: narrow("limits.supply_min_v", supply_min_v(rig))?.unwrap_or(none.supply_min_v),
         supply_ticks: ticks(wanted.supply_time_s),
         saturated_ticks: ticks(wanted.saturation_time_s),
@@ -90,10 +90,10 @@ pub(super) fn thresholds(design: Option<&DetectionDesign>) -> Thresholds<MAX_SEN
     thresholds
 }
 
-/// Largest force of the bench drive (N); without a force limit, only what the rig file gives.
-fn bench_force_n(rig: &Rig) -> Option<f64> {
-    let (wanted, limit) = (rig.limits.bench_force_n, rig.force_limit_n());
-    let derived = limit.map(|limit| defaults::BENCH_FORCE_SHARE * limit);
+/// Largest force of the jog (N); without a force limit, only what the rig file gives.
+fn jog_force_n(rig: &Rig) -> Option<f64> {
+    let (wanted, limit) = (rig.limits.jog_force_n, rig.force_limit_n());
+    let derived = limit.map(|limit| defaults::JOG_FORCE_SHARE * limit);
     wanted.or(derived).map(|force| force.min(limit.unwrap_or(f64::INFINITY)))
 }
 

@@ -11,7 +11,7 @@ use crate::rig::{PlantDescription, Rig};
 use crate::swing_up::{Motion, SwingUp, Way};
 
 /// Time between two knots of reference state, force and gains (s) …
-const COURSE_S: f64 = 0.01;
+const REFERENCE_S: f64 = 0.01;
 /// … and of the filter.
 const FILTER_S: f64 = 0.05;
 
@@ -39,16 +39,16 @@ pub struct SwingUpValues {
 pub struct MotionValues {
     /// See [`MotionTable::ticks`].
     pub ticks: u32,
-    /// See [`MotionTable::course_ticks`].
-    pub course_ticks: u32,
+    /// See [`MotionTable::reference_ticks`].
+    pub reference_ticks: u32,
     /// See [`MotionTable::filter_ticks`].
     pub filter_ticks: u32,
     /// See [`MotionTable::travel_m`].
     pub travel_m: [f32; 2],
-    /// See [`MotionTable::course_units`].
-    pub course_units: Vec<f32>,
-    /// See [`MotionTable::course`].
-    pub course: Vec<i16>,
+    /// See [`MotionTable::reference_units`].
+    pub reference_units: Vec<f32>,
+    /// See [`MotionTable::reference`].
+    pub reference: Vec<i16>,
     /// See [`MotionTable::filter_units`].
     pub filter_units: Vec<f32>,
     /// See [`MotionTable::filter`].
@@ -130,9 +130,9 @@ impl SwingUpValues {
     /// Size of the knots of all motions, and of their units (bytes).
     pub fn bytes(&self) -> usize {
         let bytes = |motion: &MotionValues| {
-            size_of_val(&motion.course[..])
+            size_of_val(&motion.reference[..])
                 + size_of_val(&motion.filter[..])
-                + size_of_val(&motion.course_units[..])
+                + size_of_val(&motion.reference_units[..])
                 + size_of_val(&motion.filter_units[..])
         };
         let others: usize = self.others.iter().map(|(_, motion)| bytes(motion)).sum();
@@ -149,31 +149,31 @@ impl MotionValues {
             return Err(NoTable::SwingUp("the motion was planned for another rig or tick"));
         }
         let per_knot = |seconds: f64| (seconds / motion.tick_s).round().max(1.0) as usize;
-        let (course_ticks, filter_ticks) = (per_knot(COURSE_S), per_knot(FILTER_S));
+        let (reference_ticks, filter_ticks) = (per_knot(REFERENCE_S), per_knot(FILTER_S));
         let knots = |every: usize| (0..=ticks.div_ceil(every).max(3)).map(move |knot| knot * every);
-        let (mut course, mut filter) = (Vec::new(), Vec::new());
-        for tick in knots(course_ticks) {
+        let (mut reference, mut filter) = (Vec::new(), Vec::new());
+        for tick in knots(reference_ticks) {
             // After the end: at rest where the motion ends, with its last gains.
             let last = tick.min(ticks - 1);
-            course.extend(motion.x[tick.min(ticks)].iter().copied());
-            course.push(if tick < ticks { motion.u[tick] } else { 0.0 });
-            course.extend(motion.k[last].entries());
+            reference.extend(motion.x[tick.min(ticks)].iter().copied());
+            reference.push(if tick < ticks { motion.u[tick] } else { 0.0 });
+            reference.extend(motion.k[last].entries());
         }
         for tick in knots(filter_ticks) {
             let l = &motion.l[tick.min(ticks - 1)];
             filter.extend((0..sensors).flat_map(|column| (0..states).map(move |row| l[(row, column)])));
         }
-        let (course_units, course) = in_units(&course, MotionTable::course_columns(states))?;
+        let (reference_units, reference) = in_units(&reference, MotionTable::reference_columns(states))?;
         let (filter_units, filter) = in_units(&filter, states * sensors)?;
         let first = motion.x[0][0];
         let travelled = || motion.x.iter().map(|x| x[0] - first);
         Ok(Self {
             ticks: ticks as u32,
-            course_ticks: course_ticks as u32,
+            reference_ticks: reference_ticks as u32,
             filter_ticks: filter_ticks as u32,
             travel_m: [travelled().fold(0.0, f64::min) as f32, travelled().fold(0.0, f64::max) as f32],
-            course_units,
-            course,
+            reference_units,
+            reference,
             filter_units,
             filter,
         })
@@ -181,12 +181,13 @@ impl MotionValues {
 
     /// The planned state in `tick`, interpolated between its two neighbouring knots; after the end, the last one.
     pub fn planned(&self, states: usize, tick: usize) -> Vec<f64> {
-        let (knots, every) = (self.course.len() / self.course_units.len(), self.course_ticks as usize);
+        let (knots, every) =
+            (self.reference.len() / self.reference_units.len(), self.reference_ticks as usize);
         let share = (tick % every) as f64 / every as f64;
         let between = |state: usize| {
-            let at = |knot: usize| f64::from(self.course[state * knots + knot.min(knots - 1)]);
+            let at = |knot: usize| f64::from(self.reference[state * knots + knot.min(knots - 1)]);
             let (before, after) = (at(tick / every), at(tick / every + 1));
-            f64::from(self.course_units[state]) * (before + share * (after - before))
+            f64::from(self.reference_units[state]) * (before + share * (after - before))
         };
         (0..states).map(between).collect()
     }
@@ -195,11 +196,11 @@ impl MotionValues {
     fn table(&self) -> MotionTable<'_> {
         MotionTable {
             ticks: self.ticks,
-            course_ticks: self.course_ticks,
+            reference_ticks: self.reference_ticks,
             filter_ticks: self.filter_ticks,
             travel_m: self.travel_m,
-            course_units: &self.course_units,
-            course: &self.course,
+            reference_units: &self.reference_units,
+            reference: &self.reference,
             filter_units: &self.filter_units,
             filter: &self.filter,
         }

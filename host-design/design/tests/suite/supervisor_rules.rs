@@ -149,7 +149,7 @@ fn a_host_that_commands_the_set_point_must_not_fall_silent_and_one_that_does_not
         rig.ask(Request::Setpoint(0.0));
         for _ in 0..10 {
             rig.wait(47);
-            rig.ask(Request::Beat);
+            rig.ask(Request::KeepAlive);
         }
         assert_eq!(rig.state(), State::Balancing);
         // 100 ms at ticks of 2 ms, plus one tick; the answer has taken one of them.
@@ -267,7 +267,7 @@ fn event() -> impl Strategy<Value = Event> {
         Just(Request::Home),
         Just(Request::HomeRail),
         Just(Request::CheckSigns),
-        Just(Request::Beat),
+        Just(Request::KeepAlive),
         any::<f32>().prop_map(Request::Setpoint),
     ];
     let contacts = any::<[bool; 5]>().prop_map(|[a, b, c, d, e]| Contacts {

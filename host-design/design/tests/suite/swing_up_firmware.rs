@@ -47,8 +47,8 @@ fn every_rig_is_raised_balanced_and_lowered_from_encoders() {
 fn reverse_gains(table: &mut TableValues) {
     let states = table.states();
     let raise = &mut table.swing_up.as_mut().unwrap().raise;
-    let knots = raise.course.len() / raise.course_units.len();
-    raise.course[(states + 1) * knots..].iter_mut().for_each(|gain| *gain = -*gain);
+    let knots = raise.reference.len() / raise.reference_units.len();
+    raise.reference[(states + 1) * knots..].iter_mut().for_each(|gain| *gain = -*gain);
 }
 
 /// The motions fit into the flash that is left for them.
@@ -74,9 +74,9 @@ fn a_motion_with_a_defect_is_refused_or_ends_with_the_motor_off() {
     };
     let reversed = with(&reverse_gains);
     assert!(reversed.unwrap().fault.is_some(), "gains of the wrong sign");
-    let spacing = with(&|table| table.swing_up.as_mut().unwrap().raise.course_ticks /= 2);
+    let spacing = with(&|table| table.swing_up.as_mut().unwrap().raise.reference_ticks /= 2);
     assert!(matches!(spacing, Err(HarnessError::Table(TableError::Dimensions))), "{spacing:?}");
-    let spacing = with(&|table| table.swing_up.as_mut().unwrap().raise.course_ticks *= 2);
+    let spacing = with(&|table| table.swing_up.as_mut().unwrap().raise.reference_ticks *= 2);
     assert!(spacing.unwrap().fault.is_some(), "knots twice as far apart");
     let (_, other) = with_stored_motions("double-quanser-dbpen");
     let swapped = with(&|table| {

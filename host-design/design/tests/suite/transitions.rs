@@ -98,8 +98,8 @@ fn machines_with_wrong_masses_make_the_tour_and_with_reversed_gains_none_does() 
     assert_eq!(arrived(&table), [4; 5]);
     let motion =
         &mut table.swing_up.as_mut().unwrap().others.iter_mut().find(|(w, _)| *w == way("ud-du")).unwrap().1;
-    let knots = motion.course.len() / motion.course_units.len();
-    motion.course[5 * knots..].iter_mut().for_each(|gain| *gain = -*gain);
+    let knots = motion.reference.len() / motion.reference_units.len();
+    motion.reference[5 * knots..].iter_mut().for_each(|gain| *gain = -*gain);
     assert_eq!(arrived(&table), [4, 4, 0, 0, 0]);
 }
 
@@ -178,7 +178,7 @@ fn where_a_link_hangs_the_cart_follows_its_setpoint() {
             assert_eq!(harness.session.fault(), None);
             match held {
                 500 => _ = harness.session.send(Request::Setpoint(0.05)),
-                501.. if held % 25 == 0 => _ = harness.session.send(Request::Beat),
+                501.. if held % 25 == 0 => _ = harness.session.send(Request::KeepAlive),
                 _ => {}
             }
             if held == 8000 {
@@ -256,7 +256,7 @@ fn goals_and_set_points_at_any_moment_never_end_in_a_fault() {
                         _ => Request::Goto(Equilibrium::of_bits(random.random_range(0..256))),
                     });
                 } else if held % 25 == 0 {
-                    harness.session.send(Request::Beat);
+                    harness.session.send(Request::KeepAlive);
                 }
                 while harness.session.next_reply().is_some() || harness.session.next_telemetry().is_some() {}
                 held == 11_000

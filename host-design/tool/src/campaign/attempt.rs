@@ -40,8 +40,8 @@ pub struct Setup<'a> {
 pub enum During<'a> {
     /// It balances; if the table has motions, it is raised or lowered.
     Balancing,
-    /// A bench drive.
-    BenchDrive,
+    /// A jog.
+    Jog,
     /// It is shaken by these forces.
     Shaking(&'a Feed),
 }
@@ -68,7 +68,7 @@ pub(super) fn attempt(setup: &Setup<'_>, trial: &Trial, with_defect: bool) -> Re
         match setup.during {
             During::Balancing => {}
             // Movement of the cart that is needed to determine the motor's sign.
-            During::BenchDrive => blind.limits.sign_counts[0] = 0,
+            During::Jog => blind.limits.sign_counts[0] = 0,
             During::Shaking(_) => blind_while_shaken(&mut blind),
         }
         without_detection = blind;
@@ -90,7 +90,7 @@ pub(super) fn attempt(setup: &Setup<'_>, trial: &Trial, with_defect: bool) -> Re
 /// The limits of angles and rates while the rig is shaken are not in the table, so the angles per count are made
 /// smaller.
 fn blind_while_shaken(table: &mut TableValues) {
-    table.limits.bench_force_n *= BLIND;
+    table.limits.jog_force_n *= BLIND;
     if let Some(observer) = &mut table.observer {
         observer.step.iter_mut().skip(1).for_each(|step| *step /= BLIND);
     }
@@ -122,7 +122,7 @@ impl Attempt<'_> {
         }
         let mut harness = Harness::new(self.rig, self.table, &self.trial.scenario, target)?;
         match self.trial.kind {
-            _ if self.trial.phase == Phase::Driving => self.drive(&mut harness),
+            _ if self.trial.phase == Phase::Jogging => self.drive(&mut harness),
             Kind::ArmUnhomed | Kind::ArmHanging | Kind::ArmStopped | Kind::ArmHeld => self.arm(&mut harness),
             _ => self.balance(&mut harness),
         }
@@ -155,7 +155,7 @@ impl Attempt<'_> {
             } else if tick == 1 {
                 harness.session.send(Request::Setpoint(trial.scenario.step_m as f32));
             } else if tick.is_multiple_of(heartbeat) && injection.host_is_alive(since) {
-                harness.session.send(Request::Beat);
+                harness.session.send(Request::KeepAlive);
             }
             if since == Some(0) {
                 injection.serial(&mut harness.session);
@@ -228,7 +228,7 @@ impl Attempt<'_> {
     ) -> Result<Pins, HarnessError> {
         let mut inputs = harness.inputs();
         let has_switches = match self.trial.phase {
-            Phase::Driving => true,
+            Phase::Jogging => true,
             Phase::Shaken => self.setup.detection,
             Phase::Balancing | Phase::Raising | Phase::Lowering => false,
         };
@@ -240,7 +240,7 @@ impl Attempt<'_> {
         }
         if since == Some(0) {
             if let Some(fault) = self.trial.kind.inside_the_microcontroller() {
-                harness.session.sabotage(fault);
+                harness.session.injected_fault(fault);
             }
             if let Some(board) = &self.board {
                 let events = self.trial.kind.events(self.trial, self.table, board.image, board.receive);
@@ -329,7 +329,7 @@ impl Attempt<'_> {
             supply_v: self.table.motor.map_or(24.0, |motor| motor.supply_v),
             contacts: Default::default(),
             received: heapless::Vec::new(),
-            sabotage: None,
+            injected_fault: None,
         };
         match session.ask(Request::Arm, &pins) {
             Err(HarnessError::Refused { answer: Answer::NotNow(reasons), .. }) => {

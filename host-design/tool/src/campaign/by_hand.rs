@@ -82,8 +82,8 @@ impl<'a> Defective<'a> {
     /// Injects what happens only once: bytes on the serial line, or a fault inside the microcontroller.
     pub fn begin(&mut self, session: &mut Session<'_>) {
         self.injection.serial(session);
-        if let Some(sabotage) = self.kind.inside_the_microcontroller() {
-            session.sabotage(sabotage);
+        if let Some(injected_fault) = self.kind.inside_the_microcontroller() {
+            session.injected_fault(injected_fault);
         }
     }
 

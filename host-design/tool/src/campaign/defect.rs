@@ -1,9 +1,9 @@
 //! The kinds of defects, and the outcome that each must have.
 
-use upright::protocol::simulated_pins::Sabotage;
-use upright::supervision::bench_drive::MotorSign;
+use upright::protocol::simulated_pins::InjectedFault;
 use upright::supervision::fault::Fault;
 use upright::supervision::inhibits::Inhibits;
+use upright::supervision::jog::MotorSign;
 
 use super::trial::Phase;
 
@@ -89,10 +89,10 @@ pub enum Expected {
     Refused(Inhibits),
     /// The motor is off in the same tick, and the firmware stops running.
     Dead,
-    /// A bench drive ends without a fault, as soon after the last command as when the key is released; a rig that was
+    /// A jog ends without a fault, as soon after the last command as when the key is released; a rig that was
     /// shaken brings its cart back first.
     LetGo,
-    /// A bench drive ends with this finding about the motor, which keeps it from arming.
+    /// A jog ends with this finding about the motor, which keeps it from arming.
     Found(MotorSign),
 }
 
@@ -290,10 +290,10 @@ impl Kind {
         self.row().3
     }
 
-    /// The outcome that it must have in a phase; some kinds prove nothing in a bench drive or while the rig is shaken.
+    /// The outcome that it must have in a phase; some kinds prove nothing in a jog or while the rig is shaken.
     pub(super) fn expected_in(self, phase: Phase) -> Expected {
         let special = match phase {
-            Phase::Driving => self.while_driving(),
+            Phase::Jogging => self.while_jogging(),
             Phase::Shaken => self.while_shaken(),
             Phase::Balancing | Phase::Raising | Phase::Lowering => None,
         };
@@ -301,11 +301,11 @@ impl Kind {
     }
 
     /// The fault inside the microcontroller, if it is one.
-    pub(super) fn inside_the_microcontroller(self) -> Option<Sabotage> {
+    pub(super) fn inside_the_microcontroller(self) -> Option<InjectedFault> {
         match self {
-            Kind::Panic => Some(Sabotage::Panic),
-            Kind::HardFault => Some(Sabotage::HardFault),
-            Kind::StackOverflow => Some(Sabotage::StackOverflow),
+            Kind::Panic => Some(InjectedFault::Panic),
+            Kind::HardFault => Some(InjectedFault::HardFault),
+            Kind::StackOverflow => Some(InjectedFault::StackOverflow),
             _ => None,
         }
     }

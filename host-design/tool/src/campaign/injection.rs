@@ -50,7 +50,7 @@ impl<'a> Injection<'a> {
     pub(super) fn new(rig: &Rig, table: &'a TableValues, trial: Trial) -> Self {
         let ticks = |seconds: f64| (seconds / rig.tick.period_s).ceil() as usize;
         let thresholds = match (&table.swing_up, trial.phase) {
-            (None, _) | (_, Phase::Balancing | Phase::Driving | Phase::Shaken) => &table.thresholds,
+            (None, _) | (_, Phase::Balancing | Phase::Jogging | Phase::Shaken) => &table.thresholds,
             (Some(swing_up), Phase::Raising | Phase::Lowering) => &swing_up.thresholds,
         };
         let visible = |sensor: usize| match &table.observer {

@@ -1,9 +1,9 @@
 //! The verdict on a trial: its outcome compared with the one that its kind must have.
 
 use serde::{Deserialize, Serialize};
-use upright::supervision::bench_drive::{MotorSign, SILENCE_S};
 use upright::supervision::fault::Fault;
 use upright::supervision::inhibits::Inhibits;
+use upright::supervision::jog::{MotorSign, SILENCE_S};
 use upright::supervision::shaking;
 
 use super::attempt::{Setup, attempt};
@@ -137,7 +137,7 @@ fn of_fault(
     }
 }
 
-/// Whether a bench drive has shown this of the motor, or was ended by a limit switch before it could show that nothing
+/// Whether a jog has shown this of the motor, or was ended by a limit switch before it could show that nothing
 /// moves.
 fn has_found(observed: &Observed, sign: MotorSign) -> bool {
     let is_at_the_end = sign == MotorSign::Still && observed.fault == Some(Fault::LimitSwitch);

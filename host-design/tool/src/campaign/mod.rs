@@ -6,8 +6,8 @@
 mod attempt;
 mod by_hand;
 mod defect;
-mod drive;
 mod injection;
+mod jogged;
 mod judge;
 mod observed;
 mod on_board;

@@ -1,9 +1,9 @@
 //! What is observed in a trial.
 
 use upright::board::Output;
-use upright::supervision::bench_drive::MotorSign;
 use upright::supervision::fault::Fault;
 use upright::supervision::inhibits::Inhibits;
+use upright::supervision::jog::MotorSign;
 
 /// What was observed in a trial. Ticks count from the release of the rig.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -22,7 +22,7 @@ pub(super) struct Observed {
     pub(super) fault: Option<Fault>,
     /// Number of measurements that were rejected.
     pub(super) rejected: u32,
-    /// What the bench drive has found out about the motor.
+    /// What the jog has found out about the motor.
     pub(super) motor: Option<MotorSign>,
     /// Reasons for which arming was refused.
     pub(super) refused: Option<Inhibits>,

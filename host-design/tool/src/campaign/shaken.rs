@@ -38,7 +38,7 @@ impl During<'_> {
     pub(super) fn phase(&self) -> Phase {
         match self {
             During::Balancing => Phase::Balancing,
-            During::BenchDrive => Phase::Driving,
+            During::Jog => Phase::Jogging,
             During::Shaking(_) => Phase::Shaken,
         }
     }
@@ -47,7 +47,7 @@ impl During<'_> {
     pub fn is_proof(&self, kind: Kind) -> bool {
         match self {
             During::Balancing => true,
-            During::BenchDrive => kind.while_driving().is_some(),
+            During::Jog => kind.while_jogging().is_some(),
             During::Shaking(_) => kind.while_shaken().is_some(),
         }
     }
@@ -56,7 +56,7 @@ impl During<'_> {
     pub fn needs_detection(&self, kind: Kind) -> bool {
         let must_end = match self {
             During::Shaking(_) => kind.while_shaken() == Some(Expected::Changed),
-            During::Balancing | During::BenchDrive => true,
+            During::Balancing | During::Jog => true,
         };
         must_end && kind.needs_detection()
     }

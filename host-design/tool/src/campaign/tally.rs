@@ -105,7 +105,7 @@ pub fn one(setup: &Setup<'_>, kinds: &[Kind], seed: u64, number: u64) -> Result<
     let trial = Trial::draw(setup.rig, setup.table, kinds, seed, number);
     let trial = match setup.during {
         During::Balancing => trial,
-        During::BenchDrive => trial.in_bench_drive(setup.rig),
+        During::Jog => trial.in_jog(setup.rig),
         During::Shaking(_) => trial.in_shaking(setup.rig),
     };
     judge(setup, &trial).map_err(|source| CampaignError::Trial { number, kind: trial.kind.name(), source })

@@ -46,7 +46,7 @@ pub enum Phase {
     /// It is lowered by the motor.
     Lowering,
     /// Its links hang, and the motor pushes the cart while a key is held.
-    Driving,
+    Jogging,
     /// Its links hang, and the motor shakes them.
     Shaken,
 }

@@ -1,9 +1,9 @@
-//! The bench drive: the sign of the motor.
+//! The jog: the sign of the motor.
 
 use std::time::Duration;
 
 use upright::protocol::message::Request;
-use upright::supervision::bench_drive::MotorSign;
+use upright::supervision::jog::MotorSign;
 use upright::supervision::supervisor::State;
 
 use super::guide::Guide;
@@ -52,15 +52,15 @@ fn push(guide: &mut Guide<'_>) -> Result<bool, Stop> {
     let begin = guide.machine.now();
     let mut has_begun = false;
     loop {
-        guide.send(Request::Drive { along: true });
+        guide.send(Request::Jog { along: true });
         guide.pause(KEY)?;
-        let is_driving =
-            guide.conversation().telemetry.as_ref().is_some_and(|now| now.state == State::Driving);
+        let is_jogging =
+            guide.conversation().telemetry.as_ref().is_some_and(|now| now.state == State::Jogging);
         let since = guide.machine.now().saturating_sub(begin);
-        if (has_begun && !is_driving) || since > LONGEST {
+        if (has_begun && !is_jogging) || since > LONGEST {
             return Ok(has_begun);
         }
-        has_begun |= is_driving;
+        has_begun |= is_jogging;
         if !has_begun && since > BEGINS {
             return Ok(false);
         }

@@ -37,7 +37,7 @@ pub struct Planted {
 /// has to find it.
 type Row = (&'static str, What, usize, &'static str, Step);
 
-/// Force of the dry friction at the cart, as a share of the motor's force in the bench drive.
+/// Force of the dry friction at the cart, as a share of the motor's force in the jog.
 const STUCK: f64 = 1.5;
 
 /// Dry friction torque of each joint, as a share of the largest torque of its link's weight: the sine of 9°.
@@ -127,7 +127,7 @@ const ALL: [Row; 15] = [
         "cart-stuck",
         What::CartFriction,
         0,
-        "the cart's friction is more than the motor's force in the bench drive",
+        "the cart's friction is more than the motor's force in the jog",
         Step::Motor,
     ),
     (
@@ -174,7 +174,7 @@ impl Planted {
         let PlantDescription::Chain(chain) = &machine.plant else { return };
         let friction = &mut machine.reality.friction;
         match self.what {
-            What::CartFriction => friction.cart_friction_n = STUCK * f64::from(table.limits.bench_force_n),
+            What::CartFriction => friction.cart_friction_n = STUCK * f64::from(table.limits.jog_force_n),
             What::JointFriction => {
                 let torque = |link: &Link| {
                     let centre_m = link.centre_of_mass_m.unwrap_or(0.5 * link.length_m);

@@ -108,7 +108,7 @@ impl<'a> Simulated<'a> {
                 ..Contacts::default()
             },
             received: heapless::Vec::new(),
-            sabotage: None,
+            injected_fault: None,
         };
         if let Some(wires) = &mut self.wires {
             wires.inputs(&mut pins);

@@ -193,12 +193,12 @@ impl Monitor {
             Answer::Cause(cause) => self.cause = cause,
             Answer::Statistics(statistics) => self.statistics = Some(statistics),
             Answer::Done => match request {
-                Request::Beat | Request::Drive { .. } | Request::Telemetry(_) => (),
+                Request::KeepAlive | Request::Jog { .. } | Request::Telemetry(_) => (),
                 _ => self.note(format!("{}: done", name(request, self.links()))),
             },
             // The reasons were logged with the first answer to the held key.
             Answer::NotNow(reasons)
-                if matches!(request, Request::Drive { .. }) && reasons.contains(Inhibits::HELD) => {}
+                if matches!(request, Request::Jog { .. }) && reasons.contains(Inhibits::HELD) => {}
             Answer::NotNow(reasons) => {
                 self.note(format!("{}: refused", name(request, self.links())));
                 reasons.texts().for_each(|text| self.note(format!("  because {text}")));
@@ -244,7 +244,7 @@ impl Monitor {
             }
             Action::Record | Action::Quit => return,
         };
-        if matches!(request, Request::Drive { .. }) {
+        if matches!(request, Request::Jog { .. }) {
             return self.outgoing.beat(request, now);
         }
         if let Request::Setpoint(wanted) = request {
@@ -286,7 +286,7 @@ impl Monitor {
             self.next_ask = now + STATISTICS;
         }
         if self.beating && now >= self.next_beat {
-            self.outgoing.beat(Request::Beat, now);
+            self.outgoing.beat(Request::KeepAlive, now);
             self.next_beat = now + BEAT;
         }
     }
@@ -338,8 +338,8 @@ fn name(request: Request, links: usize) -> String {
         Request::Home => "home".to_owned(),
         Request::HomeRail => "home on the rail's switches".to_owned(),
         Request::CheckSigns => "check signs".to_owned(),
-        Request::Drive { along: true } => "drive along +x".to_owned(),
-        Request::Drive { along: false } => "drive against +x".to_owned(),
+        Request::Jog { along: true } => "drive along +x".to_owned(),
+        Request::Jog { along: false } => "drive against +x".to_owned(),
         Request::Arm => "arm".to_owned(),
         Request::Goto(Equilibrium::UPRIGHT) => "up".to_owned(),
         Request::Goto(Equilibrium::HANGING) => "down".to_owned(),

@@ -257,22 +257,22 @@ mod tests {
     #[test]
     fn beats_make_way_for_commands_and_set_points_for_the_last_one() {
         let mut outgoing = Outgoing::default();
-        outgoing.beat(Request::Beat, ms(0));
+        outgoing.beat(Request::KeepAlive, ms(0));
         assert!(!outgoing.take().is_empty());
         for tenths in 0..4_u8 {
             outgoing.send(Request::Setpoint(f32::from(tenths) / 10.0), ms(1));
         }
         outgoing.take();
-        outgoing.beat(Request::Drive { along: true }, ms(2));
+        outgoing.beat(Request::Jog { along: true }, ms(2));
         assert!(outgoing.take().is_empty());
         assert_eq!(outgoing.answered(id(1), ms(3)), Some(Request::Setpoint(0.0)));
         assert_eq!(outgoing.answered(id(3), ms(4)), Some(Request::Setpoint(0.3)));
         assert!(!outgoing.is_waiting());
         outgoing.take();
-        outgoing.beat(Request::Drive { along: true }, ms(5));
+        outgoing.beat(Request::Jog { along: true }, ms(5));
         assert!(!outgoing.take().is_empty());
         outgoing.repeat(ms(1_000));
         assert!(outgoing.take().is_empty(), "a key that is let go sends nothing");
-        assert_eq!(outgoing.answered(id(5), ms(1_001)), Some(Request::Drive { along: true }));
+        assert_eq!(outgoing.answered(id(5), ms(1_001)), Some(Request::Jog { along: true }));
     }
 }

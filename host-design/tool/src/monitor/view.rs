@@ -85,7 +85,7 @@ fn header(monitor: &Monitor) -> Vec<Line<'_>> {
     let colour = match telemetry.state {
         State::Disarmed | State::Calibrated => Color::White,
         State::Homing | State::Armed => Color::Yellow,
-        State::Driving | State::Identifying | State::Raising | State::Lowering => Color::Magenta,
+        State::Jogging | State::Identifying | State::Raising | State::Lowering => Color::Magenta,
         State::Balancing | State::Holding => Color::Green,
         State::Fault => Color::Red,
     };

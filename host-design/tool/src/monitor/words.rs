@@ -2,8 +2,8 @@
 
 use upright::board::Contacts;
 use upright::protocol::message::CrashRecord;
-use upright::supervision::bench_drive::MotorSign;
 use upright::supervision::homing::Homing;
+use upright::supervision::jog::MotorSign;
 use upright::supervision::sign_check::Signs;
 use upright::supervision::supervisor::State;
 
@@ -15,7 +15,7 @@ pub fn state(state: State) -> &'static str {
         State::Disarmed => "disarmed: positions are not known",
         State::Homing => "homing",
         State::Calibrated => "calibrated: motor off",
-        State::Driving => "driving: the motor pushes the cart while the key is held",
+        State::Jogging => "jogging: the motor pushes the cart while the key is held",
         State::Identifying => "identifying: the motor shakes the links",
         State::Armed => "armed: waits until all links are upright and still",
         State::Raising => "raising: the motor is on",
@@ -94,7 +94,7 @@ fn motor(sign: MotorSign) -> Option<String> {
                 .to_owned(),
         ),
         MotorSign::Still => Some(
-            "the motor has not moved the cart: check its supply, its wires, the cart, and `bench_force_n` of the rig file"
+            "the motor has not moved the cart: check its supply, its wires, the cart, and `jog_force_n` of the rig file"
                 .to_owned(),
         ),
         MotorSign::Unchecked | MotorSign::Checked => None,

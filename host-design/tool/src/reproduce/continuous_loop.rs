@@ -8,8 +8,8 @@ use rand_distr::{Distribution, Normal};
 use rand_pcg::Pcg64;
 
 use super::ReproduceError;
-use super::course::{Course, fall_of};
 use super::published;
+use super::trajectory::{Trajectory, fall_of};
 use upright_design::design::Feedback;
 use upright_design::plant::chain_plant;
 use upright_design::plant::reference::{Tolerance, integrate};
@@ -45,17 +45,17 @@ impl ContinuousRun {
     ///
     /// # Errors
     /// [`ReproduceError`] if the integrator gives up or the plant cannot be built.
-    pub fn course(&self, chain: &Chain, law: &Feedback<f64>) -> Result<Course, ReproduceError> {
+    pub fn trajectory(&self, chain: &Chain, law: &Feedback<f64>) -> Result<Trajectory, ReproduceError> {
         let plant = chain_plant(chain)?;
         let force_n = |state: &[f64]| law.force_n(self.step_m, state);
         let mut disturbances = Disturbances::of(self.disturbances, plant.disturbances())?;
         let samples = (self.duration_s / self.sample_s).round() as usize;
         let mut state = vec![0.0; plant.states()];
-        let mut course = Course::with_room(self.sample_s, samples + 1);
+        let mut trajectory = Trajectory::with_room(self.sample_s, samples + 1);
         for sample in 0..=samples {
-            course.push(&state, force_n(&state));
-            course.fall = fall_of(&state, sample as f64 * self.sample_s);
-            if course.fall.is_some() {
+            trajectory.push(&state, force_n(&state));
+            trajectory.fall = fall_of(&state, sample as f64 * self.sample_s);
+            if trajectory.fall.is_some() {
                 break;
             }
             let push = disturbances.next_force();
@@ -63,7 +63,7 @@ impl ContinuousRun {
             let torques = &disturbances.torques;
             state = integrate(&*plant, &state, pushed, torques, self.sample_s, self.tolerance)?;
         }
-        Ok(course)
+        Ok(trajectory)
     }
 }
 

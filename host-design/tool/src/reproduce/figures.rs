@@ -1,6 +1,6 @@
 //! The comparison as files: the paper's figures 5 to 8, Table 2 over the length of its runs, spectra; and their data.
 
-use super::{BAND, Course, Loop, Reproduction, Response, Robustness, Settling, printed};
+use super::{BAND, Loop, Reproduction, Response, Robustness, Settling, Trajectory, printed};
 use crate::figure::{Axis, Curve, Figure, FigureError, Panel};
 
 impl Reproduction {
@@ -20,7 +20,7 @@ impl Reproduction {
                     Loop::FullState => "full-state",
                     Loop::Encoders => "encoders",
                 };
-                files.push((format!("figure-{figure}-{kind}.csv"), course_csv(&one.course)));
+                files.push((format!("figure-{figure}-{kind}.csv"), trajectory_csv(&one.trajectory)));
             }
         }
         for (name, figure) in [("table-2", self.settling.figure()), ("spectra", spectra(&self.robustness))] {
@@ -32,15 +32,15 @@ impl Reproduction {
 }
 
 /// States and force at all samples, seven digits.
-fn course_csv(course: &Course) -> Vec<u8> {
-    let joints = course.states.first().map_or(0, |state| state.len() / 2 - 1);
+fn trajectory_csv(trajectory: &Trajectory) -> Vec<u8> {
+    let joints = trajectory.states.first().map_or(0, |state| state.len() / 2 - 1);
     let mut text = "t_s,force_n,x_m,xdot_m_per_s".to_owned();
     for joint in 1..=joints {
         text += &format!(",theta{joint}_rad,theta{joint}dot_rad_per_s");
     }
     text.push('\n');
-    for (index, (state, force)) in course.states.iter().zip(&course.forces_n).enumerate() {
-        text += &format!("{:.6}", index as f64 * course.sample_s);
+    for (index, (state, force)) in trajectory.states.iter().zip(&trajectory.forces_n).enumerate() {
+        text += &format!("{:.6}", index as f64 * trajectory.sample_s);
         for value in [force].into_iter().chain(state) {
             text += &format!(",{value:.6e}");
         }
@@ -49,8 +49,8 @@ fn course_csv(course: &Course) -> Vec<u8> {
     text.into_bytes()
 }
 
-fn over_time(course: &Course, value: impl Fn(usize) -> f64) -> Vec<[f64; 2]> {
-    (0..course.states.len()).map(|index| [index as f64 * course.sample_s, value(index)]).collect()
+fn over_time(trajectory: &Trajectory, value: impl Fn(usize) -> f64) -> Vec<[f64; 2]> {
+    (0..trajectory.states.len()).map(|index| [index as f64 * trajectory.sample_s, value(index)]).collect()
 }
 
 /// One of the paper's figures: position in all loops; angles, rates and force in the paper's loop.
@@ -60,23 +60,24 @@ fn response(responses: &[&Response]) -> Figure {
     let disturbed = if first.figure >= 7 { ", with disturbances" } else { "" };
     let title = format!("Figure {} of the paper: {}{disturbed}", first.figure, first.law);
 
-    let set_point = over_time(&first.course, |_| 1.0);
+    let set_point = over_time(&first.trajectory, |_| 1.0);
     let mut position =
         Panel::new(time(), Axis::linear("position (m)")).with(Curve::reference("set-point", set_point));
     for (number, one) in responses.iter().enumerate() {
-        let course = over_time(&one.course, |index| one.course.states[index][0]);
-        position = position.with(Curve::line(one.kind.name(), number, course));
+        let trajectory = over_time(&one.trajectory, |index| one.trajectory.states[index][0]);
+        position = position.with(Curve::line(one.kind.name(), number, trajectory));
     }
     let joints = first.figures.peak_angles_deg.len();
     let mut angles = Panel::new(time(), Axis::linear("angles (°)"));
     let mut rates = Panel::new(time(), Axis::linear("rates (°/s)"));
-    let degrees =
-        |state: usize| over_time(&first.course, |index| first.course.states[index][state].to_degrees());
+    let degrees = |state: usize| {
+        over_time(&first.trajectory, |index| first.trajectory.states[index][state].to_degrees())
+    };
     for joint in 0..joints {
         angles = angles.with(Curve::line(format!("θ{}", joint + 1), joint, degrees(2 + 2 * joint)));
         rates = rates.with(Curve::line(format!("rate of θ{}", joint + 1), joint, degrees(3 + 2 * joint)));
     }
-    let force = over_time(&first.course, |index| first.course.forces_n[index]);
+    let force = over_time(&first.trajectory, |index| first.trajectory.forces_n[index]);
     let force = Panel::new(time(), Axis::linear("force (N)")).with(Curve::line("", 0, force));
     Figure::new(title).with(position).with(angles).with(rates).with(force)
 }
@@ -89,21 +90,22 @@ impl Settling {
         let mut distance =
             Panel::new(time(), Axis::log("distance from the set-point (%)").range(0.1, 200.0)).high(360);
         for (number, row) in self.rows.iter().enumerate() {
-            let course = &row.course;
+            let trajectory = &row.trajectory;
             let name = match &row.fall {
                 Some(_) => format!("ts = {} s, falls", row.settling_time_s),
                 None => format!("ts = {} s", row.settling_time_s),
             };
-            let points = over_time(course, |index| 100.0 * (course.states[index][0] - 1.0).abs());
+            let points = over_time(trajectory, |index| 100.0 * (trajectory.states[index][0] - 1.0).abs());
             distance = distance.with(Curve::line(name, number, points));
         }
         let band = 100.0 * BAND;
         distance = distance.with(Curve::limit("2 %", vec![[0.0, band], [12.0, band]]));
-        let steps = self.rows.first().map_or(0.0, |row| row.course.sample_s);
+        let steps = self.rows.first().map_or(0.0, |row| row.trajectory.sample_s);
         let agreeing = (0..=1200).map(|index| {
             let horizon = f64::from(index) * steps;
-            let same =
-                |(row, printed): (&super::SettlingRow, bool)| row.course.stabilised(1.0, horizon) == printed;
+            let same = |(row, printed): (&super::SettlingRow, bool)| {
+                row.trajectory.stabilised(1.0, horizon) == printed
+            };
             [horizon, self.rows.iter().zip(printed()).map(same).filter(|&same| same).count() as f64]
         });
         let mut count = Panel::new(time(), Axis::linear("verdicts as printed, of 7").range(0.0, 7.5))

@@ -1,7 +1,7 @@
 //! The loop with the firmware's own controller: several runs advance together.
 
 use super::ReproduceError;
-use super::course::Course;
+use super::trajectory::Trajectory;
 use upright_design::rig::Rig;
 use upright_design::simulate::{Job, Sample, Scenario, run_all, ticks};
 use upright_design::table::TableValues;
@@ -20,14 +20,14 @@ pub(super) struct FirmwareRun {
 ///
 /// # Errors
 /// [`ReproduceError::Simulation`] if a run cannot be made.
-pub(super) fn courses(runs: &[FirmwareRun]) -> Result<Vec<Course>, ReproduceError> {
-    let mut courses = Vec::with_capacity(runs.len());
+pub(super) fn trajectories(runs: &[FirmwareRun]) -> Result<Vec<Trajectory>, ReproduceError> {
+    let mut trajectories = Vec::with_capacity(runs.len());
     for FirmwareRun { rig, scenario, .. } in runs {
-        courses.push(Course::with_room(rig.tick.period_s, ticks(rig, scenario)? + 1));
+        trajectories.push(Trajectory::with_room(rig.tick.period_s, ticks(rig, scenario)? + 1));
     }
-    let mut observers: Vec<_> = courses
+    let mut observers: Vec<_> = trajectories
         .iter_mut()
-        .map(|course| move |sample: &Sample<&[f64]>| course.push(sample.state, sample.force))
+        .map(|trajectory| move |sample: &Sample<&[f64]>| trajectory.push(sample.state, sample.force))
         .collect();
     let mut jobs: Vec<Job<'_>> = observers
         .iter_mut()
@@ -35,8 +35,8 @@ pub(super) fn courses(runs: &[FirmwareRun]) -> Result<Vec<Course>, ReproduceErro
         .map(|(observe, FirmwareRun { rig, table, scenario })| Job { table, rig, scenario, observe })
         .collect();
     let falls = run_all(&mut jobs)?;
-    for (course, fall) in courses.iter_mut().zip(falls) {
-        course.fall = fall;
+    for (trajectory, fall) in trajectories.iter_mut().zip(falls) {
+        trajectory.fall = fall;
     }
-    Ok(courses)
+    Ok(trajectories)
 }

@@ -9,7 +9,6 @@
 mod claims;
 mod comparison;
 mod continuous_loop;
-mod course;
 mod designs;
 mod errata;
 mod figures;
@@ -20,6 +19,7 @@ mod responses;
 mod robustness;
 mod settling;
 mod summary;
+mod trajectory;
 
 use std::path::{Path, PathBuf};
 
@@ -27,13 +27,13 @@ use serde::Serialize;
 
 pub use comparison::{Digits, Row, Verdict};
 pub use continuous_loop::ContinuousRun;
-pub use course::{BAND, Course, StepFigures};
 pub use designs::{Designs, PoleSet, designs};
 pub use errata::{Erratum, Evidence, errata};
 pub use markdown::markdown_table;
 pub use responses::{Loop, Loops, Response, responses};
 pub use robustness::{Ripple, Robustness, SEED, robustness};
 pub use settling::{HORIZON_S, LONGEST_S, Sensitivity, Settling, SettlingRow, printed, settling};
+pub use trajectory::{BAND, StepFigures, Trajectory};
 
 use upright_design::design::{Certified, DesignError, design};
 use upright_design::plant::PlantError;

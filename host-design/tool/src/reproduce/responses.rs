@@ -4,8 +4,8 @@ use serde::Serialize;
 use upright::table::Law;
 
 use super::continuous_loop::ContinuousRun;
-use super::course::{Course, StepFigures};
-use super::firmware_loop::{FirmwareRun, courses};
+use super::firmware_loop::{FirmwareRun, trajectories};
+use super::trajectory::{StepFigures, Trajectory};
 use super::{ReproduceError, SEED, chain, published};
 use upright_design::design::{Certified, Feedback, design};
 use upright_design::parallel;
@@ -79,24 +79,24 @@ impl Loops {
     }
 
     /// Simulates each law in its kind of loop, from rest. Sampled loops are recorded at the tick, whatever the run says.
-    pub(super) fn courses(&self, wanted: &[LoopRun]) -> Result<Vec<Course>, ReproduceError> {
+    pub(super) fn trajectories(&self, wanted: &[LoopRun]) -> Result<Vec<Trajectory>, ReproduceError> {
         // The runs of the firmware advance together, the others by themselves.
         let (alone, together): (Vec<usize>, Vec<usize>) =
             (0..wanted.len()).partition(|&index| wanted[index].1 == Loop::Continuous);
         let groups: Vec<&[usize]> = [together.as_slice()].into_iter().chain(alone.chunks(1)).collect();
-        let courses = parallel::try_map(groups.iter().copied(), |group| {
+        let trajectories = parallel::try_map(groups.iter().copied(), |group| {
             let of_group: Vec<LoopRun> = group.iter().map(|&index| wanted[index]).collect();
             match of_group[..] {
                 [(law, Loop::Continuous, run)] => {
-                    Ok(vec![run.course(chain(&self.rig)?, self.continuous(law)?)?])
+                    Ok(vec![run.trajectory(chain(&self.rig)?, self.continuous(law)?)?])
                 }
-                _ => courses(&of_group.iter().map(|one| self.firmware_run(one)).collect::<Vec<_>>()),
+                _ => trajectories(&of_group.iter().map(|one| self.firmware_run(one)).collect::<Vec<_>>()),
             }
         })?;
-        let mut numbered: Vec<(usize, Course)> =
-            groups.concat().into_iter().zip(courses.into_iter().flatten()).collect();
+        let mut numbered: Vec<(usize, Trajectory)> =
+            groups.concat().into_iter().zip(trajectories.into_iter().flatten()).collect();
         numbered.sort_by_key(|(index, _)| *index);
-        Ok(numbered.into_iter().map(|(_, course)| course).collect())
+        Ok(numbered.into_iter().map(|(_, trajectory)| trajectory).collect())
     }
 
     fn firmware_run(&self, &(law, kind, run): &LoopRun) -> FirmwareRun {
@@ -127,7 +127,7 @@ pub struct Response {
     pub figures: StepFigures,
     /// Time history of the run.
     #[serde(skip)]
-    pub course: Course,
+    pub trajectory: Trajectory,
 }
 
 /// All responses, in the order of the paper's figures.
@@ -140,11 +140,12 @@ pub fn responses(loops: &Loops) -> Result<Vec<Response>, ReproduceError> {
         let run = ContinuousRun { disturbances, ..ContinuousRun::STEP };
         wanted.extend(Law::ALL.into_iter().flat_map(|law| Loop::ALL.map(|kind| (law, kind, run))));
     }
-    let courses = loops.courses(&wanted)?;
-    let responses = courses.into_iter().zip(wanted).enumerate().map(|(index, (course, (law, kind, run)))| {
-        // Figures 5 and 7 are of the first law, 6 and 8 of the second one.
-        let figure = 5 + (index / Loop::ALL.len()) as u8;
-        Response { figure, law, kind, figures: course.step_figures(run.step_m), course }
-    });
+    let trajectories = loops.trajectories(&wanted)?;
+    let responses =
+        trajectories.into_iter().zip(wanted).enumerate().map(|(index, (trajectory, (law, kind, run)))| {
+            // Figures 5 and 7 are of the first law, 6 and 8 of the second one.
+            let figure = 5 + (index / Loop::ALL.len()) as u8;
+            Response { figure, law, kind, figures: trajectory.step_figures(run.step_m), trajectory }
+        });
     Ok(responses.collect())
 }

@@ -6,9 +6,9 @@ use upright::table::Law;
 
 use super::ReproduceError;
 use super::continuous_loop::ContinuousRun;
-use super::course::Course;
 use super::designs::open_loop_poles;
 use super::responses::{Loop, LoopRun, Loops};
+use super::trajectory::Trajectory;
 use upright_design::numerics::{Bandwidth, SEGMENT, Spectrum};
 use upright_design::parallel;
 use upright_design::plant::reference::Tolerance;
@@ -85,14 +85,14 @@ pub fn robustness(loops: &Loops) -> Result<Vec<Robustness>, ReproduceError> {
     };
     let wanted: Vec<LoopRun> =
         Law::ALL.into_iter().flat_map(|law| Loop::ALL.map(|kind| (law, kind, RUN))).collect();
-    let courses = loops.courses(&wanted)?;
-    parallel::try_map(wanted.iter().zip(&courses), |(&(law, kind, _), course)| {
-        let forces = &course.forces_n[after(course)..];
+    let trajectories = loops.trajectories(&wanted)?;
+    parallel::try_map(wanted.iter().zip(&trajectories), |(&(law, kind, _), trajectory)| {
+        let forces = &trajectory.forces_n[after(trajectory)..];
         Ok(Robustness {
             law,
             kind,
             margins: margins(law, kind),
-            ripples: ripples(course),
+            ripples: ripples(trajectory),
             peak_force_n: forces.iter().map(|force| force.abs()).fold(0.0, f64::max),
             effort_n2: forces.iter().map(|force| force * force).sum::<f64>() / forces.len() as f64,
         })
@@ -100,18 +100,18 @@ pub fn robustness(loops: &Loops) -> Result<Vec<Robustness>, ReproduceError> {
 }
 
 /// Index of the first sample that counts.
-fn after(course: &Course) -> usize {
-    ((FORGOTTEN_S / course.sample_s).round() as usize).min(course.forces_n.len())
+fn after(trajectory: &Trajectory) -> usize {
+    ((FORGOTTEN_S / trajectory.sample_s).round() as usize).min(trajectory.forces_n.len())
 }
 
-fn ripples(course: &Course) -> Vec<Ripple> {
-    let joints = course.states.first().map_or(0, |state| state.len() / 2 - 1);
-    let angles = (1..=joints).map(|joint| (format!("theta{joint}"), course.state(2 * joint)));
-    let signals = [("x".to_owned(), course.state(0))].into_iter().chain(angles);
-    let force = ("u".to_owned(), course.forces_n.clone());
+fn ripples(trajectory: &Trajectory) -> Vec<Ripple> {
+    let joints = trajectory.states.first().map_or(0, |state| state.len() / 2 - 1);
+    let angles = (1..=joints).map(|joint| (format!("theta{joint}"), trajectory.state(2 * joint)));
+    let signals = [("x".to_owned(), trajectory.state(0))].into_iter().chain(angles);
+    let force = ("u".to_owned(), trajectory.forces_n.clone());
     let ripple = |(signal, values): (String, Vec<f64>)| {
-        let values = &values[after(course)..];
-        let spectrum = Spectrum::welch(values, course.sample_s)?;
+        let values = &values[after(trajectory)..];
+        let spectrum = Spectrum::welch(values, trajectory.sample_s)?;
         let rms = (values.iter().map(|value| value * value).sum::<f64>() / values.len() as f64).sqrt();
         Some(Ripple { signal, rms, bandwidth: spectrum.bandwidth(), spectrum })
     };

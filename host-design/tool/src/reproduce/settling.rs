@@ -7,8 +7,8 @@ use serde::Serialize;
 use upright::table::Law;
 
 use super::continuous_loop::ContinuousRun;
-use super::course::Course;
-use super::firmware_loop::{FirmwareRun, courses};
+use super::firmware_loop::{FirmwareRun, trajectories};
+use super::trajectory::Trajectory;
 use super::{PaperRigs, ReproduceError, SEED, chain, published};
 use upright_design::design::{Certified, DesignError, Feedback, design};
 use upright_design::parallel;
@@ -47,7 +47,7 @@ pub struct SettlingRow {
     pub peak_force_n: f64,
     /// Time history of the run.
     #[serde(skip)]
-    pub course: Course,
+    pub trajectory: Trajectory,
 }
 
 /// One change of the runs and what it does to the verdicts.
@@ -94,26 +94,26 @@ pub fn settling(rigs: &PaperRigs) -> Result<Settling, ReproduceError> {
             times_s.chunks(change.together()).map(move |times_s| (index, times_s))
         })
         .collect();
-    let courses: Vec<Course> =
-        parallel::try_map(jobs, |(change, times_s)| changes[change].1.courses(rigs, times_s, &exact))?
+    let trajectories: Vec<Trajectory> =
+        parallel::try_map(jobs, |(change, times_s)| changes[change].1.trajectories(rigs, times_s, &exact))?
             .into_iter()
             .flatten()
             .collect();
-    let mut groups = courses.chunks_exact(published::TABLE_2.len()).zip(&changes);
+    let mut groups = trajectories.chunks_exact(published::TABLE_2.len()).zip(&changes);
     let sensitivity = groups
         .clone()
         .skip(1)
-        .map(|(courses, (changed, change))| Sensitivity {
+        .map(|(trajectories, (changed, change))| Sensitivity {
             changed,
-            at_horizon: verdicts(courses, change.step_m(), HORIZON_S),
-            in_the_end: verdicts(courses, change.step_m(), LONGEST_S),
-            falls: core::array::from_fn(|i| courses[i].fall.is_some()),
-            horizons_s: agreeing(courses, change.step_m()),
+            at_horizon: verdicts(trajectories, change.step_m(), HORIZON_S),
+            in_the_end: verdicts(trajectories, change.step_m(), LONGEST_S),
+            falls: core::array::from_fn(|i| trajectories[i].fall.is_some()),
+            horizons_s: agreeing(trajectories, change.step_m()),
         })
         .collect();
-    let as_stated = groups.next().map_or(&[][..], |(courses, _)| courses);
-    let rows = published::TABLE_2.iter().zip(as_stated).map(|(&(settling_time_s, printed), course)| {
-        let figures = course.step_figures(RUN.step_m);
+    let as_stated = groups.next().map_or(&[][..], |(trajectories, _)| trajectories);
+    let rows = published::TABLE_2.iter().zip(as_stated).map(|(&(settling_time_s, printed), trajectory)| {
+        let figures = trajectory.step_figures(RUN.step_m);
         SettlingRow {
             settling_time_s,
             printed,
@@ -121,7 +121,7 @@ pub fn settling(rigs: &PaperRigs) -> Result<Settling, ReproduceError> {
             settled_after_s: figures.settling_time_s,
             peak_angle_deg: figures.peak_angles_deg.iter().copied().fold(0.0, f64::max),
             peak_force_n: figures.peak_force_n,
-            course: course.clone(),
+            trajectory: trajectory.clone(),
         }
     });
     let horizons = [4.0, 5.0, 5.5, 6.0, HORIZON_S, 7.0, 7.5, 8.0, 10.0, LONGEST_S];
@@ -133,15 +133,17 @@ pub fn settling(rigs: &PaperRigs) -> Result<Settling, ReproduceError> {
     })
 }
 
-fn verdicts(courses: &[Course], step_m: f64, horizon_s: f64) -> [bool; 7] {
-    core::array::from_fn(|i| courses.get(i).is_some_and(|course| course.stabilised(step_m, horizon_s)))
+fn verdicts(trajectories: &[Trajectory], step_m: f64, horizon_s: f64) -> [bool; 7] {
+    core::array::from_fn(|i| {
+        trajectories.get(i).is_some_and(|trajectory| trajectory.stabilised(step_m, horizon_s))
+    })
 }
 
 /// First and last horizon (s) with the paper's verdicts, if there are any and all between them have these verdicts,
 /// too.
-fn agreeing(courses: &[Course], step_m: f64) -> Option<[f64; 2]> {
+fn agreeing(trajectories: &[Trajectory], step_m: f64) -> Option<[f64; 2]> {
     let steps = (LONGEST_S / STEP_S).round() as usize;
-    let agrees = |step: &usize| verdicts(courses, step_m, *step as f64 * STEP_S) == printed();
+    let agrees = |step: &usize| verdicts(trajectories, step_m, *step as f64 * STEP_S) == printed();
     let first = (0..=steps).find(agrees)?;
     let last = (first..=steps).rev().find(agrees)?;
     (first..=last).all(|step| agrees(&step)).then_some([first as f64 * STEP_S, last as f64 * STEP_S])
@@ -245,16 +247,16 @@ impl Change {
     }
 
     /// The runs for these settling times.
-    fn courses(
+    fn trajectories(
         &self,
         rigs: &PaperRigs,
         settling_times_s: &[f64],
         exact: &ExactDesigns,
-    ) -> Result<Vec<Course>, ReproduceError> {
+    ) -> Result<Vec<Trajectory>, ReproduceError> {
         let times_s = settling_times_s.iter();
         match self {
             Change::Continuous { gains, run } => times_s
-                .map(|&time_s| run.course(chain(&rigs.exact)?, &gains.law(rigs, time_s, exact)?))
+                .map(|&time_s| run.trajectory(chain(&rigs.exact)?, &gains.law(rigs, time_s, exact)?))
                 .collect(),
             Change::Firmware { tick, gains, force_limit_n } => {
                 let run = |&time_s| {
@@ -272,7 +274,7 @@ impl Change {
                     };
                     Ok::<_, ReproduceError>(FirmwareRun { rig, table, scenario })
                 };
-                courses(&times_s.map(run).collect::<Result<Vec<_>, _>>()?)
+                trajectories(&times_s.map(run).collect::<Result<Vec<_>, _>>()?)
             }
         }
     }

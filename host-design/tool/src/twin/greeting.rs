@@ -23,7 +23,7 @@ pub(super) fn greeting(rig: &Rig, table: &TableValues, place: &str, defects: Opt
         State::Disarmed,
         State::Homing,
         State::Calibrated,
-        State::Driving,
+        State::Jogging,
         State::Identifying,
         State::Armed,
         State::Raising,

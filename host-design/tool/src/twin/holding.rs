@@ -44,7 +44,7 @@ impl Hand {
     /// The state in which the hand holds the rig in the next tick; `None` if it does not hold it. `state` is that of
     /// the rig now. While the motor pushes the cart, the hand lets go, and takes hold again afterwards.
     pub(super) fn tick(&mut self, status: &Status, state: &[f64]) -> Option<&[f64]> {
-        if status.state == State::Driving {
+        if status.state == State::Jogging {
             let how = std::mem::replace(&mut self.how, Holding::Free);
             self.take(how, state);
             return None;
@@ -102,7 +102,7 @@ fn hanging(states: usize, x_m: f64) -> Vec<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use upright::supervision::bench_drive::MotorSign;
+    use upright::supervision::jog::MotorSign;
 
     const CALIBRATED: Status =
         Status { state: State::Calibrated, signs: Signs::Checked, motor: MotorSign::Unchecked };
@@ -111,7 +111,7 @@ mod tests {
     fn a_cart_that_the_motor_pushes_is_held_again_where_it_is() {
         let mut hand = Hand::new(4, 0.01);
         hand.take(Holding::Upright, &[0.2, 0.0, 0.0, 0.0]);
-        let driving = Status { state: State::Driving, ..CALIBRATED };
+        let driving = Status { state: State::Jogging, ..CALIBRATED };
         assert_eq!(hand.tick(&driving, &[0.25, 0.3, 0.0, 0.1]), None);
         assert_eq!(hand.tick(&CALIBRATED, &[0.3; 4]), Some([0.25, 0.0, 0.0, 0.0].as_slice()));
     }

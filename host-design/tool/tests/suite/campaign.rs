@@ -44,17 +44,17 @@ fn without_detection_every_defect_that_needs_it_is_missed() {
     }
 }
 
-/// The kinds of defects that prove something during a bench drive.
-fn while_driving(table: &TableValues, place: Place<'_>) -> Vec<Kind> {
-    kinds(table, place).into_iter().filter(|kind| kind.while_driving().is_some()).collect()
+/// The kinds of defects that prove something during a jog.
+fn while_jogging(table: &TableValues, place: Place<'_>) -> Vec<Kind> {
+    kinds(table, place).into_iter().filter(|kind| kind.while_jogging().is_some()).collect()
 }
 
 #[test]
 fn every_defect_of_a_bench_drive_is_found_and_nothing_else() {
     for name in ["quadruple-paper", "single-quanser-ip02"] {
         let (rig, table) = rig_and_table(name);
-        let kinds = while_driving(table, Place::Host);
-        let setup = Setup { during: During::BenchDrive, ..on_host(rig, table) };
+        let kinds = while_jogging(table, Place::Host);
+        let setup = Setup { during: During::Jog, ..on_host(rig, table) };
         let result = run(&setup, &kinds, 3 * kinds.len() as u64);
         for row in &result.rows {
             assert!(row.wrong.is_empty() && row.runs == 3, "{name}: {row:?}");
@@ -75,8 +75,8 @@ fn on_the_virtual_board_a_bench_drive_ends_with_its_defects_and_does_not_without
     let Some(elf) = built(image::Kind::Board(Board::WeactF405)) else { return };
     let image = Image::from_elf(&std::fs::read(elf).unwrap()).unwrap();
     let place = Place::Board { image: &image, conditions: Conditions::f405(1) };
-    let setup = Setup { place, during: During::BenchDrive, ..on_host(rig, table) };
-    let kinds = while_driving(table, place);
+    let setup = Setup { place, during: During::Jog, ..on_host(rig, table) };
+    let kinds = while_jogging(table, place);
     for row in run(&setup, &kinds, kinds.len() as u64).rows {
         assert!(row.wrong.is_empty() && row.runs == 1, "{row:?}");
     }

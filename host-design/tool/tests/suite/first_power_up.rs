@@ -8,7 +8,7 @@ use ratatui::backend::TestBackend;
 use ratatui::crossterm::event::{KeyCode, KeyEvent, KeyModifiers};
 use upright::board::{Contacts, Output};
 use upright::control::actuator::Drive;
-use upright::supervision::bench_drive::MotorSign;
+use upright::supervision::jog::MotorSign;
 use upright::supervision::sign_check::Signs;
 use upright::supervision::supervisor::State;
 use upright::table::Law;
@@ -55,7 +55,7 @@ impl Person<'_> {
             supply_v: self.supply_v,
             contacts: self.contacts,
             received: heapless::Vec::new(),
-            sabotage: None,
+            injected_fault: None,
         };
         let output = self.session.tick(&pins).unwrap();
         self.monitor.receive(self.session.last_bytes(), now);
@@ -203,7 +203,7 @@ fn without_motor(person: &mut Person<'_>) {
     assert!(person.hold('M', 0.3) > 290);
     person.wait(0.2);
     person.hold('m', 0.3);
-    person.sees("driving");
+    person.sees("jogging");
     person.contacts.emergency_stop = true;
     assert!(!person.tick().enable, "in hardware, and in the same tick");
     person.contacts.emergency_stop = false;

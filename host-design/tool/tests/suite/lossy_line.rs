@@ -54,7 +54,7 @@ fn talk(
         supply_v: 24.0,
         contacts: Contacts::default(),
         received: heapless::Vec::new(),
-        sabotage: None,
+        injected_fault: None,
     };
     let mut line = [Direction::new(percent_lost, 1), Direction::new(percent_lost, 2)];
     let mut monitor = Monitor::new("a line");

@@ -1,6 +1,5 @@
 //! Tests of the command line and of the modules behind it. One program, so that linking happens once.
 
-mod bench_drive;
 mod board_layer;
 mod campaign;
 mod command;
@@ -17,6 +16,7 @@ mod equipment;
 mod first_power_up;
 mod identify_command;
 mod image;
+mod jog;
 mod lossy_line;
 mod monitor;
 mod observer_design;

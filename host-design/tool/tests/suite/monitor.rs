@@ -18,10 +18,10 @@ use upright::protocol::message::{
     Answer, Command as Asked, CrashRecord, Info, Message, PROTOCOL, Reply, Request, Reset, Telemetry,
 };
 use upright::protocol::serial_link::{MAX_COMMAND, MAX_MESSAGE};
-use upright::supervision::bench_drive::MotorSign;
 use upright::supervision::fault::Fault;
 use upright::supervision::homing::Homing;
 use upright::supervision::inhibits::Inhibits;
+use upright::supervision::jog::MotorSign;
 use upright::supervision::sign_check::Signs;
 use upright::supervision::supervisor::State;
 use upright::table::{Equilibrium, Law};
@@ -133,12 +133,12 @@ fn a_held_key_sends_the_drive_again_and_tells_a_refusal_once() {
     told(&mut monitor, telemetry(1, State::Calibrated, None));
     answer_all(&mut monitor);
     let before = monitor.log.len();
-    assert_eq!(press(&mut monitor, KeyCode::Char('m')), [Request::Drive { along: true }]);
-    assert_eq!(press(&mut monitor, KeyCode::Char('M')), [Request::Drive { along: false }]);
+    assert_eq!(press(&mut monitor, KeyCode::Char('m')), [Request::Jog { along: true }]);
+    assert_eq!(press(&mut monitor, KeyCode::Char('M')), [Request::Jog { along: false }]);
     assert_eq!(monitor.log.len(), before, "{:?}", monitor.log);
     // It is not repeated by itself: a key that is let go sends nothing.
     monitor.poll(NOW + Duration::from_millis(100));
-    assert!(asked(&mut monitor).iter().all(|command| !matches!(command.request, Request::Drive { .. })));
+    assert!(asked(&mut monitor).iter().all(|command| !matches!(command.request, Request::Jog { .. })));
     answer_all(&mut monitor);
     for reasons in [Inhibits::SIGNS, Inhibits::SIGNS.union(Inhibits::HELD), Inhibits::HELD] {
         answer_all(&mut monitor);
@@ -260,7 +260,7 @@ fn beats_begin_with_the_first_setpoint_and_numbers_always_grow() {
             })
             .collect();
         assert!(said.windows(2).all(|pair| pair[0].id < pair[1].id));
-        said.iter().filter(|command| command.request == Request::Beat).count()
+        said.iter().filter(|command| command.request == Request::KeepAlive).count()
     };
     let mut monitor = met(PROTOCOL);
     assert_eq!(beats(&mut monitor), 0);

@@ -48,7 +48,7 @@ fn on_a_screen(browser: &mut Browser, page: &Path, is_drawn: bool) -> (Vec<Strin
     let mut faults = Vec::new();
     let mut check = |holds: bool, fault: &str| require(&mut faults, holds, fault);
     browser.open(page, 1200, "light", "screen");
-    check(browser.value("!document.getElementById('player').hidden") == true, "no player");
+    check(browser.value("!document.getElementById('playback').hidden") == true, "no playback");
     if is_drawn {
         let still = browser.value(GEOMETRY);
         check(still.as_str().is_some_and(|geometry| !geometry.is_empty()), "nothing is drawn");

@@ -145,7 +145,7 @@ fn a_step_of_one_metre_with_the_printed_gains_is_the_one_other_programs_find() {
         (printed_law(published::PLACEMENT_K), (1.02, 1.05, 5.09, [8.48, 6.71, 2.30, 0.87], 11.01)),
     ] {
         let found = ContinuousRun { sample_s: 0.01, ..ContinuousRun::STEP }
-            .course(chain(&rig), &law)
+            .trajectory(chain(&rig), &law)
             .unwrap()
             .step_figures(1.0);
         let (over, under, settled, angles, force) = wanted;
@@ -303,7 +303,7 @@ fn a_run_that_falls_falls_at_any_tolerance() {
     for relative in [1e-6, 1e-8, 1e-12] {
         let tolerance = Tolerance { relative, absolute: 1e-2 * relative };
         let run = ContinuousRun { tolerance, duration_s: 1.0, ..ContinuousRun::STEP };
-        let fall = run.course(chain(&rig), &law).unwrap().fall.unwrap();
+        let fall = run.trajectory(chain(&rig), &law).unwrap().fall.unwrap();
         // Which link is the first one below the horizontal depends on the sampling.
         assert!(matches!(fall.kind, FallKind::Link(_)) && (0.06..=0.07).contains(&fall.at_s), "{fall:?}");
     }

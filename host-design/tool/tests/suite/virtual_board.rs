@@ -65,7 +65,7 @@ fn the_flashed_image_raises_and_lowers_the_links_with_the_bits_of_the_host() {
 
     // The negative control: a host with another last gain on the way up.
     let mut other = table.clone();
-    *other.swing_up.as_mut().unwrap().raise.course.last_mut().unwrap() /= 2;
+    *other.swing_up.as_mut().unwrap().raise.reference.last_mut().unwrap() /= 2;
     let mut board = VirtualBoard::start(&image, &Conditions::f405(1), &table).unwrap();
     let error = run_compared(&rig, &other, &scenario, &mut board).unwrap_err().to_string();
     assert!(error.contains("differ"), "{error}");
@@ -139,7 +139,7 @@ fn the_feather_balances_a_link_with_the_bits_of_the_host_and_refuses_another_chi
             supply_v: table.motor.unwrap().supply_v,
             contacts: Default::default(),
             received: heapless::Vec::new(),
-            sabotage: None,
+            injected_fault: None,
         };
         assert!(session.ask(Request::Arm, &pins).is_err());
         session.fault()

@@ -33,8 +33,8 @@ keys! {
             Absent::Follows("1 % of the rail");
         // Skipped if absent: a rig without it keeps the hash by which stored motions and gain tables identify it.
         #[serde(skip_serializing_if = "Option::is_none")]
-        bench_force_n: Option<f64>, "N", Rule::POSITIVE,
-            "largest force of the bench drive; at most force_limit_n is used",
+        jog_force_n: Option<f64>, "N", Rule::POSITIVE,
+            "largest force of the jog; at most force_limit_n is used",
             Absent::Follows("10 % of force_limit_n");
         supply_min_v: Option<f64>, "V", Rule::NOT_NEGATIVE,
             "lowest allowed supply voltage of the power stage", Absent::Follows("80 % of supply_v; 0 without a motor");

@@ -29,7 +29,7 @@ Examples:
   upright faults rigs/quadruple-paper.toml --target qemu --runs 300
   upright faults rigs/quadruple-paper.toml --target board --runs 300
   upright faults rigs/quadruple-paper.toml --swing-up                while it is raised and lowered
-  upright faults rigs/quadruple-paper.toml --bench-drive             while the motor pushes the cart a little
+  upright faults rigs/quadruple-paper.toml --jog             while the motor pushes the cart a little
   upright faults rigs/quadruple-paper.toml --shake                   while the motor shakes the links
   upright faults rigs/quadruple-paper.toml --only 1234               repeats one run, bit for bit
   upright faults rigs/quadruple-paper.toml --shard 2/3 > 2.jsonl     the second third of the runs
@@ -43,9 +43,9 @@ pub(crate) struct Faults {
     swing_up: bool,
     /// Begin the defects while the motor pushes the cart a little, with the links hanging
     #[arg(long, conflicts_with = "swing_up")]
-    bench_drive: bool,
+    jog: bool,
     /// Begin the defects while the motor shakes the hanging links, as for `upright identify`
-    #[arg(long, conflicts_with_all = ["swing_up", "bench_drive"])]
+    #[arg(long, conflicts_with_all = ["swing_up", "jog"])]
     shake: bool,
     /// Where the firmware runs
     #[arg(long, value_enum, default_value_t = Target::Host)]
@@ -101,7 +101,7 @@ impl Faults {
         let forces = if self.shake { Some(feed(&rig, &table, self.seed)?) } else { None };
         let during = match &forces {
             Some(forces) => During::Shaking(forces),
-            None if self.bench_drive => During::BenchDrive,
+            None if self.jog => During::Jog,
             None => During::Balancing,
         };
         possible.retain(|&kind| during.is_proof(kind));
@@ -120,7 +120,7 @@ impl Faults {
             return self.replay(&setup, &chosen, number);
         }
         let options = json!({
-            "gains": self.variation.changes(), "swing_up": self.swing_up, "bench_drive": self.bench_drive,
+            "gains": self.variation.changes(), "swing_up": self.swing_up, "jog": self.jog,
             "shake": self.shake, "target": self.target.name(), "seed": self.seed, "runs": self.runs, "kind": self.kind,
         });
         let work = |study: &Study| -> Result<_, Failure> {
@@ -279,9 +279,9 @@ impl Faults {
         };
         // A campaign of one kind numbers its runs differently.
         let kind = self.kind.map_or(String::new(), |kind| format!(" --kind {}", kind.name()));
-        let phase = match (self.swing_up, self.bench_drive, self.shake) {
+        let phase = match (self.swing_up, self.jog, self.shake) {
             (true, ..) => " --swing-up",
-            (_, true, _) => " --bench-drive",
+            (_, true, _) => " --jog",
             (.., true) => " --shake",
             _ => "",
         };

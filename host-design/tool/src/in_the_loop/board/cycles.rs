@@ -54,7 +54,7 @@ pub struct Cycles {
     pub core_hz: u32,
     /// The tick's period.
     pub period: Span,
-    /// Ticks without the control law: with the motor off (disarmed, homing, armed), and those of the bench drive.
+    /// Ticks without the control law: with the motor off (disarmed, homing, armed), and those of the jog.
     pub off: Option<Figures>,
     /// Ticks of balancing.
     pub balancing: Option<Figures>,
@@ -197,7 +197,7 @@ pub fn measure(
             Err(error) => Some(error.to_string()),
         };
         let mut ticks = board.ticks().to_vec();
-        // The bench drive has an output too, before the law drives.
+        // The jog has an output too, before the law drives.
         let before = ticks.len().saturating_sub(driven);
         ticks.iter_mut().take(before).for_each(|tick| tick.latency = None);
         Ok(Run { core_hz: board.board().core_hz(), ticks, ended })

@@ -10,7 +10,7 @@ use std::rc::Rc;
 
 use upright::board::{Contacts, Output};
 use upright::control::actuator::Drive;
-use upright::protocol::simulated_pins::Sabotage;
+use upright::protocol::simulated_pins::InjectedFault;
 use upright::protocol::{BAUD, telemetry_ticks};
 use upright_board::{
     Board, Conditions, Image, Input, Meter, Place, PowerStage, Rules, Stopped, TickCost, Time,
@@ -307,17 +307,17 @@ impl VirtualBoard {
     }
 
     /// Injects a defect inside the microcontroller into the next tick.
-    fn sabotage(&mut self, sabotage: Sabotage) -> Result<(), HarnessError> {
+    fn injected_fault(&mut self, injected_fault: InjectedFault) -> Result<(), HarnessError> {
         let begin = self.board.next_tick().unwrap_or(self.board.now());
-        match sabotage {
+        match injected_fault {
             // A panic that cannot be reported is an undefined instruction, which is a processor fault.
-            Sabotage::Panic | Sabotage::HardFault => {
+            InjectedFault::Panic | InjectedFault::HardFault => {
                 self.run(begin + INSIDE)?;
                 debug_assert!(self.board.exception() == SYS_TICK || self.board.resets() > 0);
                 self.board.apply(Input::Jump(NOWHERE));
                 Ok(())
             }
-            Sabotage::StackOverflow => self.fill_stack(begin),
+            InjectedFault::StackOverflow => self.fill_stack(begin),
         }
     }
 
@@ -364,8 +364,8 @@ impl Target for VirtualBoard {
         if let Some((edge, open)) = stop {
             self.press_stop(edge, open)?;
         }
-        if let Some(sabotage) = pins.sabotage {
-            self.sabotage(sabotage)?;
+        if let Some(injected_fault) = pins.injected_fault {
+            self.injected_fault(injected_fault)?;
         }
         // Runs until the tick after this one, or until it would be due if none comes.
         self.run(begin + 2 * LEAD)?;

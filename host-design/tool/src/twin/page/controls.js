@@ -191,7 +191,7 @@ export class Controls {
     state.dataset.state = latest.state;
     write(byId('now'), latest.now === null ? '' : `now: ${latest.now}`);
     write(byId('inputs'), latest.inputs);
-    const isOn = ['Driving', 'Identifying', 'Armed', 'Raising', 'Balancing', 'Lowering'].includes(latest.state);
+    const isOn = ['Jogging', 'Identifying', 'Armed', 'Raising', 'Balancing', 'Lowering'].includes(latest.state);
     const against = isOn ? [] : latest.against_arming;
     const shown = [...byId('against').children].map((element) => element.textContent);
     if (shown.join() !== against.join()) {

@@ -1,8 +1,8 @@
-//! Defects in a bench drive: which of them prove something there, and the outcome that each must have.
+//! Defects in a jog: which of them prove something there, and the outcome that each must have.
 
 use upright::protocol::message::{Answer, Request};
-use upright::supervision::bench_drive::{LONGEST_S, MotorSign};
 use upright::supervision::inhibits::Inhibits;
+use upright::supervision::jog::{LONGEST_S, MotorSign};
 use upright_design::harness::{Harness, HarnessError, Pins};
 use upright_design::rig::{PlantDescription, Rig};
 use upright_design::simulate::{Scenario, Sensing};
@@ -23,8 +23,8 @@ const SWITCH_M: f64 = 0.01;
 const WATCHED_S: f64 = 0.4;
 
 impl Kind {
-    /// The outcome that it must have in a bench drive; `None` if it proves nothing there.
-    pub fn while_driving(self) -> Option<Expected> {
+    /// The outcome that it must have in a jog; `None` if it proves nothing there.
+    pub fn while_jogging(self) -> Option<Expected> {
         match self {
             Kind::HostSilent | Kind::HostWireOpen => Some(Expected::LetGo),
             Kind::MotorDead | Kind::CartEncoderFrozen | Kind::EncoderWireOpen => {
@@ -59,10 +59,10 @@ impl Kind {
 }
 
 impl Trial {
-    /// The same defect in a bench drive. Ticks count from the first one with the motor on.
-    pub(super) fn in_bench_drive(self, rig: &Rig) -> Self {
+    /// The same defect in a jog. Ticks count from the first one with the motor on.
+    pub(super) fn in_jog(self, rig: &Rig) -> Self {
         let ticks = |seconds: f64| (seconds / rig.tick.period_s) as usize;
-        let is_there_before = matches!(self.kind.while_driving(), Some(Expected::Found(_)));
+        let is_there_before = matches!(self.kind.while_jogging(), Some(Expected::Found(_)));
         let (onset, watched) = match is_there_before {
             true => (0, ticks(f64::from(LONGEST_S)) + 2),
             // In a drive with the cart held, which lasts for 1 s.
@@ -75,12 +75,12 @@ impl Trial {
             counter_start: self.scenario.counter_start,
             ..Scenario::at_rest(rig, self.scenario.law)
         };
-        Self { phase: Phase::Driving, scenario, onset, watched, sensor: 0, ..self }
+        Self { phase: Phase::Jogging, scenario, onset, watched, sensor: 0, ..self }
     }
 }
 
 impl Attempt<'_> {
-    /// A bench drive, in which a person holds the key throughout.
+    /// A jog, in which a person holds the key throughout.
     pub(super) fn drive(&self, harness: &mut Harness<'_>) -> Result<Observed, HarnessError> {
         let trial = self.trial;
         let is_there_before = matches!(trial.expected(), Expected::Found(_));
@@ -105,7 +105,7 @@ impl Attempt<'_> {
                 None => None,
             };
             if turn % self.ticks(KEY_S) == 0 && injection.host_is_alive(since) {
-                harness.session.send(Request::Drive { along: trial.sign > 0.0 });
+                harness.session.send(Request::Jog { along: trial.sign > 0.0 });
             }
             let output = match self.control(harness, &mut injection, since, &mut false) {
                 Err(HarnessError::Stopped { .. }) if observed.off.is_some() => {

@@ -1,4 +1,4 @@
-//! The bench drive in closed loop with the simulated rig: on the host, as the image in QEMU, and as the flashed image
+//! The jog in closed loop with the simulated rig: on the host, as the image in QEMU, and as the flashed image
 //! on the virtual board.
 
 use std::path::Path;
@@ -6,9 +6,9 @@ use std::path::Path;
 use upright::board::{Contacts, Output};
 use upright::control::actuator::Drive;
 use upright::protocol::message::{Answer, Request};
-use upright::supervision::bench_drive::MotorSign;
 use upright::supervision::fault::Fault;
 use upright::supervision::inhibits::Inhibits;
+use upright::supervision::jog::MotorSign;
 use upright::supervision::sign_check::Signs;
 use upright::supervision::supervisor::State;
 use upright::table::Law;
@@ -21,8 +21,8 @@ use upright_tool::in_the_loop::{Link, Place, RunError};
 use crate::equipment::{built, in_qemu};
 use crate::published::rig_and_table;
 
-const ALONG: Request = Request::Drive { along: true };
-const AGAINST: Request = Request::Drive { along: false };
+const ALONG: Request = Request::Jog { along: true };
+const AGAINST: Request = Request::Jog { along: false };
 /// Ticks between two commands of a key that is held.
 const KEY_TICKS: u32 = 25;
 /// Longest time from the last command to motor off (ticks of 1 ms).
@@ -156,7 +156,7 @@ fn at_the_bench(place: Place<'_>, test: impl FnOnce(&mut Person<'_, '_>)) -> Vec
     run.unwrap()
 }
 
-/// Every property of the bench drive, one after the other.
+/// Every property of the jog, one after the other.
 fn whole_check(person: &mut Person<'_, '_>) {
     assert!(person.reasons(Request::Arm).contains(Inhibits::MOTOR.union(Inhibits::TILTED)));
 
@@ -200,7 +200,7 @@ fn whole_check(person: &mut Person<'_, '_>) {
 #[test]
 fn on_the_host_the_motor_moves_the_cart_a_little_while_a_key_is_held() {
     let telemetry = at_the_bench(Place::Host, whole_check);
-    let driving = telemetry.iter().filter(|telemetry| telemetry.state == State::Driving);
+    let driving = telemetry.iter().filter(|telemetry| telemetry.state == State::Jogging);
     // Never with more than a tenth of the force limit of 20 N, and up to it.
     let most = driving.map(|telemetry| telemetry.applied_n.abs()).fold(0.0, f32::max);
     assert_eq!(most, 2.0);

@@ -1,8 +1,8 @@
-//! The bench drive: while a person holds a key, the motor pushes the cart a little, with the links hanging.
+//! The jog: while a person holds a key, the motor pushes the cart a little, with the links hanging.
 //!
 //! Before anything is balanced, it shows whether the motor pushes in the direction in which the cart's encoder counts.
 //! It also allows PWM, break input and dead-man time to be measured. The force rises slowly to
-//! [`bench_force_n`](crate::table::Limits::bench_force_n). The drive ends when the key is released, when the cart has
+//! [`jog_force_n`](crate::table::Limits::jog_force_n). The drive ends when the key is released, when the cart has
 //! moved far enough to tell the sign, or after [`LONGEST_S`]. A key that stays held after that does not begin another
 //! drive.
 
@@ -33,7 +33,7 @@ pub enum MotorSign {
 
 /// State of a drive, and the result of the last one.
 #[derive(Debug, Clone)]
-pub struct BenchDrive {
+pub struct Jog {
     sign: MotorSign,
     /// Whether it pushes along +x.
     along: bool,
@@ -44,7 +44,7 @@ pub struct BenchDrive {
     silent_ticks: u32,
 }
 
-impl BenchDrive {
+impl Jog {
     /// No drive, and nothing known about the motor; `sign_counts` is how far the cart has to move in the sign check.
     /// Without a cart (0), there is nothing to check.
     pub fn new(sign_counts: i32) -> Self {
@@ -128,7 +128,7 @@ mod tests {
     /// Number of ticks with the motor on, and the sign found, for a key that is repeated every `repeat` ticks and a
     /// cart that moves by `speed` counts per tick.
     fn drive(along: bool, repeat: u32, speed: i32) -> (u32, MotorSign) {
-        let mut drive = BenchDrive::new(SIGN_COUNTS);
+        let mut drive = Jog::new(SIGN_COUNTS);
         assert!(drive.is_released(TICK_S));
         drive.hold();
         drive.begin(along, 7);
@@ -166,7 +166,7 @@ mod tests {
 
     #[test]
     fn a_key_that_stays_held_is_not_released() {
-        let mut drive = BenchDrive::new(SIGN_COUNTS);
+        let mut drive = Jog::new(SIGN_COUNTS);
         drive.hold();
         for _ in 0..5 {
             (0..99).for_each(|_| drive.wait());
@@ -179,7 +179,7 @@ mod tests {
 
     #[test]
     fn without_a_cart_there_is_nothing_to_check() {
-        let mut drive = BenchDrive::new(0);
+        let mut drive = Jog::new(0);
         assert_eq!(drive.sign(), MotorSign::Checked);
         drive.hold();
         drive.begin(true, 0);

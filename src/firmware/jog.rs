@@ -1,4 +1,4 @@
-//! The bench drive: the conditions for its start, and one tick of it.
+//! The jog: the conditions for its start, and one tick of it.
 
 use super::Firmware;
 use crate::board::{Inputs, Output};
@@ -10,14 +10,14 @@ use crate::table::SwingUp;
 
 impl<const NX: usize, const NY: usize, S: SwingUp<NX, NY>> Firmware<'_, NX, NY, S> {
     /// A command to drive: continues the drive in progress, or starts one, along +x or against it.
-    pub(super) fn hold_drive(&mut self, along: bool) -> Result<(), Inhibits> {
-        let is_driving = self.supervisor.state() == State::Driving;
-        if is_driving && along != self.bench_drive.is_along() {
+    pub(super) fn hold_jog(&mut self, along: bool) -> Result<(), Inhibits> {
+        let is_jogging = self.supervisor.state() == State::Jogging;
+        if is_jogging && along != self.jog.is_along() {
             return Err(Inhibits::RUNNING);
         }
-        let is_released = self.bench_drive.is_released(self.table.tick_s);
-        self.bench_drive.hold();
-        if is_driving {
+        let is_released = self.jog.is_released(self.table.tick_s);
+        self.jog.hold();
+        if is_jogging {
             return Ok(());
         }
         let counts = self.controller.encoders().counts();
@@ -27,9 +27,9 @@ impl<const NX: usize, const NY: usize, S: SwingUp<NX, NY>> Firmware<'_, NX, NY, 
             .union(Inhibits::NOT_HANGING.when(!links_hang(counts, &self.table.limits)))
             .union(self.off_centre_inhibit(counts));
         let cart_counts = cart(counts);
-        self.supervisor.start_driving(inhibits)?;
+        self.supervisor.start_jogging(inhibits)?;
         self.debounce.start();
-        self.bench_drive.begin(along, cart_counts);
+        self.jog.begin(along, cart_counts);
         Ok(())
     }
 
@@ -47,9 +47,9 @@ impl<const NX: usize, const NY: usize, S: SwingUp<NX, NY>> Firmware<'_, NX, NY, 
         if let Some(fault) = self.debounce.check_inputs(&table.limits, table.supply_max_v(), inputs) {
             return self.trip(fault, None);
         }
-        match self.bench_drive.update(cart(&counts), self.cart_sign_counts(), table.tick_s) {
+        match self.jog.update(cart(&counts), self.cart_sign_counts(), table.tick_s) {
             Some(share) => {
-                let force_n = share * table.limits.bench_force_n;
+                let force_n = share * table.limits.jog_force_n;
                 (self.requested_n, self.applied_n) = (force_n, force_n);
                 let drive = Drive::at_rest(force_n, table.motor.as_ref());
                 self.output = Output { enable: true, drive };

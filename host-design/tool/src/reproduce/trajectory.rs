@@ -7,7 +7,7 @@ use upright_design::simulate::{Fall, FallKind};
 
 /// Time history of a run: states and force at equally spaced times.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Course {
+pub struct Trajectory {
     /// Time between samples (s); the first is at 0.
     pub sample_s: f64,
     /// State at each sample: `x, ẋ, θ1, θ̇1, …` (m, m/s, rad, rad/s).
@@ -40,7 +40,7 @@ pub struct StepFigures {
 /// Band around the set-point that counts as settled, relative to the step.
 pub const BAND: f64 = 0.02;
 
-impl Course {
+impl Trajectory {
     /// An empty record with room for so many samples, `sample_s` (s) apart.
     pub(super) fn with_room(sample_s: f64, samples: usize) -> Self {
         let (states, forces_n) = (Vec::with_capacity(samples), Vec::with_capacity(samples));
@@ -101,28 +101,28 @@ pub(super) fn fall_of(state: &[f64], at_s: f64) -> Option<Fall> {
 mod tests {
     use super::*;
 
-    fn course(positions: &[f64], fall: Option<Fall>) -> Course {
+    fn trajectory(positions: &[f64], fall: Option<Fall>) -> Trajectory {
         let states = positions.iter().map(|&x| vec![x, 0.0, -x, 0.0]).collect();
-        Course { sample_s: 0.5, states, forces_n: vec![2.0; positions.len()], fall }
+        Trajectory { sample_s: 0.5, states, forces_n: vec![2.0; positions.len()], fall }
     }
 
     #[test]
     fn figures_of_a_step_are_read_off_the_course() {
-        let figures = course(&[0.0, -0.1, 2.2, 1.9, 1.97, 2.0], None).step_figures(2.0);
+        let figures = trajectory(&[0.0, -0.1, 2.2, 1.9, 1.97, 2.0], None).step_figures(2.0);
         assert_eq!(figures.settling_time_s, Some(2.0));
         assert!((figures.overshoot_percent - 10.0).abs() < 1e-9);
         assert!((figures.undershoot_percent - 5.0).abs() < 1e-9);
         assert!((figures.peak_angles_deg[0] - 2.2f64.to_degrees()).abs() < 1e-9);
         assert_eq!((figures.peak_force_n, figures.effort_n2_s), (2.0, 12.0));
-        assert_eq!(course(&[0.0, 1.0, 0.97], None).step_figures(1.0).settling_time_s, None);
+        assert_eq!(trajectory(&[0.0, 1.0, 0.97], None).step_figures(1.0).settling_time_s, None);
     }
 
     #[test]
     fn stabilised_means_standing_near_the_set_point_at_the_horizon() {
-        let run = course(&[0.0, 0.99, 0.9, 1.01], None);
-        let at = |run: &Course| [0.5, 1.0, 1.5, 2.0].map(|horizon| run.stabilised(1.0, horizon));
+        let run = trajectory(&[0.0, 0.99, 0.9, 1.01], None);
+        let at = |run: &Trajectory| [0.5, 1.0, 1.5, 2.0].map(|horizon| run.stabilised(1.0, horizon));
         assert_eq!(at(&run), [true, false, true, false], "the run does not reach 2 s");
-        let fallen = Course { fall: fall_of(&[0.0, 0.0, 2.0, 0.0], 1.0), ..run };
+        let fallen = Trajectory { fall: fall_of(&[0.0, 0.0, 2.0, 0.0], 1.0), ..run };
         assert_eq!(at(&fallen), [true, false, false, false]);
         assert_eq!(fall_of(&[0.0, 0.0, 1.5, 0.0], 1.0), None);
     }
