@@ -242,7 +242,7 @@ mod tests {
     }
 
     #[test]
-    fn a_counter_that_stands_still_while_the_model_moves_is_found() {
+    fn a_counter_that_survives_still_while_the_model_moves_is_found() {
         assert_eq!(frozen(0.4), Some((10, finding(Fault::Frozen, 1))));
         assert_eq!(frozen(-0.4), Some((10, finding(Fault::Frozen, 1))));
         // A small steady error of the model is no alarm, however long it lasts.

@@ -36,7 +36,7 @@ fn the_firmwares_table_holds_its_rig_bit_for_bit_as_simulated() {
         let scenario = Scenario { duration_s: 10.0, ..Scenario::acceptance(&rig, law, 1.0) };
         let states = firmware_alone(&scenario);
         let (trace, summary) = simulate(&rig, &table, &scenario).unwrap();
-        assert!(summary.stands(), "{law:?}: {summary}");
+        assert!(summary.survives(), "{law:?}: {summary}");
         assert_eq!(states.len(), trace.samples().len());
         for (tick, (alone, sample)) in states.iter().zip(trace.samples()).enumerate() {
             let same = alone.iter().zip(sample.state).all(|(a, b)| a.to_bits() == b.to_bits());
@@ -131,7 +131,7 @@ fn single_double_and_triple_rigs_stand_under_both_laws_with_and_without_delay() 
 }
 
 #[test]
-fn the_quadruple_stands_from_any_side_and_mirrors_its_mirror_image() {
+fn the_quadruple_survives_from_any_side_and_mirrors_its_mirror_image() {
     let rig = rig("quadruple-paper");
     let table = raw_table(&rig);
     for law in LAWS {
@@ -139,14 +139,14 @@ fn the_quadruple_stands_from_any_side_and_mirrors_its_mirror_image() {
         let towards = Scenario { start: start.to_vec(), ..at_rest(&rig, law) };
         let away = Scenario { start: start.map(|entry| -entry).to_vec(), ..towards.clone() };
         let (towards, away) = (run(&rig, &table, &towards), run(&rig, &table, &away));
-        assert!(towards.stands(), "{law:?}: {towards}");
+        assert!(towards.survives(), "{law:?}: {towards}");
         assert_eq!(towards.final_error_m, -away.final_error_m);
         assert_eq!(towards.peak_angles_rad, away.peak_angles_rad);
     }
 }
 
 #[test]
-fn it_stands_under_the_papers_disturbances() {
+fn it_survives_under_the_papers_disturbances() {
     let rig = rig("quadruple-paper");
     let table = raw_table(&rig);
     for law in LAWS {

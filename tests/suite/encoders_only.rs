@@ -19,16 +19,16 @@ fn paper_with_limit(limit_n: f64) -> Rig {
     rig
 }
 
-fn stood(rig: &Rig, law: Law, seeds: u64, duration_s: f64) -> u64 {
-    endurance(rig, &table(rig), law, &FORCE_NOISE, seeds, duration_s, &|| ()).unwrap().stood
+fn survived(rig: &Rig, law: Law, seeds: u64, duration_s: f64) -> u64 {
+    endurance(rig, &table(rig), law, &FORCE_NOISE, seeds, duration_s, &|| ()).unwrap().survived
 }
 
 #[test]
-fn the_quadruple_stands_a_minute_of_force_noise_with_a_hundred_seeds() {
+fn the_quadruple_survives_a_minute_of_force_noise_with_a_hundred_seeds() {
     let rig = paper_with_limit(5.0);
     for law in LAWS {
         let found = endurance(&rig, &table(&rig), law, &FORCE_NOISE, 100, 60.0, &|| ()).unwrap();
-        assert_eq!((found.stood, found.duration_s), (100, 60.0), "{law:?}: seeds {:?} fell", found.fallen);
+        assert_eq!((found.survived, found.duration_s), (100, 60.0), "{law:?}: seeds {:?} fell", found.fallen);
         assert!(found.peak_force_n > 0.3 && found.peak_force_n <= 5.0, "the noise did push: {found:?}");
     }
 }
@@ -37,11 +37,11 @@ fn the_quadruple_stands_a_minute_of_force_noise_with_a_hundred_seeds() {
 fn too_coarse_an_encoder_and_too_small_a_force_fall() {
     for law in LAWS {
         let fine = paper_with_limit(5.0);
-        assert_eq!(stood(&fine, law, 3, 5.0), 3);
+        assert_eq!(survived(&fine, law, 3, 5.0), 3);
         // 64 counts per revolution.
-        assert_eq!(stood(&coarser(&fine, 64.0), law, 3, 5.0), 0, "{law:?}: coarse");
+        assert_eq!(survived(&coarser(&fine, 64.0), law, 3, 5.0), 0, "{law:?}: coarse");
         // A force limit of half the noise (rms) is too small to compensate it.
-        assert_eq!(stood(&paper_with_limit(0.05), law, 3, 5.0), 0, "{law:?}: weak");
+        assert_eq!(survived(&paper_with_limit(0.05), law, 3, 5.0), 0, "{law:?}: weak");
     }
 }
 
@@ -54,7 +54,7 @@ fn the_quadruple_takes_half_a_metre_through_the_governor_in_noise() {
         assert_eq!(scenario.sensing, Sensing::Encoders);
         let summary = run(&rig, &table(&rig), &scenario);
         // The force noise keeps moving the cart by some millimetres.
-        assert!(summary.stands() && summary.final_error_m.abs() < 0.05, "{law:?}: {summary}");
+        assert!(summary.survives() && summary.final_error_m.abs() < 0.05, "{law:?}: {summary}");
         assert!(summary.peak_force_n < 5.0, "{law:?}: {summary}");
     }
 }
@@ -71,14 +71,14 @@ fn single_double_and_triple_with_motor_dead_zone_and_friction_take_a_step_throug
             assert_eq!(step.sensing, Sensing::Encoders);
             let summary = run(&rig, &table, &step);
             // What is left of the dead zone, and the encoder's steps, let the cart creep off the set-point.
-            assert!(summary.stands() && summary.final_error_m.abs() < 5e-3, "{name} {law:?}: {summary}");
+            assert!(summary.survives() && summary.final_error_m.abs() < 5e-3, "{name} {law:?}: {summary}");
             // Negative control: a hundredth of the supply cannot recover from a lean from which the full supply does.
             let mut tired = rig.clone();
             tired.actuator.motor.as_mut().unwrap().supply_v /= 100.0;
             let mut push = step.clone();
             push.start[2] = 0.02;
-            assert!(run(&rig, &table, &push).stands(), "{name} {law:?}");
-            assert!(!run(&tired, &table, &push).stands(), "{name} {law:?}");
+            assert!(run(&rig, &table, &push).survives(), "{name} {law:?}");
+            assert!(!run(&tired, &table, &push).survives(), "{name} {law:?}");
         }
     }
 }
@@ -87,7 +87,7 @@ fn single_double_and_triple_with_motor_dead_zone_and_friction_take_a_step_throug
 fn bits(rig: &Rig, table: &TableValues, scenario: &Scenario, counter_start: u32) -> Vec<Vec<u64>> {
     let scenario = Scenario { counter_start, ..scenario.clone() };
     let (trace, summary) = simulate(rig, table, &scenario).unwrap();
-    assert!(summary.stands(), "{summary}");
+    assert!(summary.survives(), "{summary}");
     let row = |sample: Sample<&[f64]>| {
         let numbers = [sample.requested, sample.force, sample.setpoint].into_iter();
         numbers.chain(sample.state.iter().chain(sample.estimate).copied()).map(f64::to_bits).collect()
@@ -202,12 +202,12 @@ fn wrong_by(rig: &Rig, law: Law, percent: f64) -> Corners {
 }
 
 #[test]
-fn every_corner_of_wrong_masses_stands_at_two_and_at_five_percent() {
+fn every_corner_of_wrong_masses_survives_at_two_and_at_five_percent() {
     let rig = paper_with_limit(5.0);
     for law in LAWS {
         for percent in [2.0, 5.0] {
             let found = wrong_by(&rig, law, percent);
-            assert_eq!((found.stand, found.corners), (32, 32), "{law:?} {percent} %: {:?}", found.lost);
+            assert_eq!((found.survived, found.corners), (32, 32), "{law:?} {percent} %: {:?}", found.lost);
         }
     }
 }
@@ -218,8 +218,13 @@ fn an_observer_that_trusts_the_papers_joint_noise_loses_corners_at_five_percent(
     // The variance of the paper's torques, (1e-9) (N·m)², held for 1 ms.
     rig.kalman.as_mut().unwrap().joint_noise = vec![1e-12; 4];
     let found = wrong_by(&rig, Law::PolePlacement, 5.0);
-    assert!((1..32).contains(&(found.corners - found.stand)), "{} of {} stand", found.stand, found.corners);
-    assert_eq!(found.lost.len(), found.corners - found.stand);
+    assert!(
+        (1..32).contains(&(found.corners - found.survived)),
+        "{} of {} survive",
+        found.survived,
+        found.corners
+    );
+    assert_eq!(found.lost.len(), found.corners - found.survived);
     // Negative control: the wrong masses are what makes it fall.
-    assert_eq!(wrong_by(&rig, Law::PolePlacement, 2.0).stand, 32);
+    assert_eq!(wrong_by(&rig, Law::PolePlacement, 2.0).survived, 32);
 }

@@ -68,7 +68,7 @@ fn the_metre_step_that_falls_without_governor_is_reached_through_it_within_half_
     let (rig, table) = &*FAST;
     let raw = table.clone().without_governor();
     let lost = run(rig, &raw, &step(rig, Law::PolePlacement, 1.0, 20.0));
-    assert!(!lost.stands(), "{lost}");
+    assert!(!lost.survives(), "{lost}");
     for law in LAWS {
         for step_m in [1.0, -1.0, 0.1, -0.5, 1.9] {
             let (trace, summary) = simulate(rig, table, &step(rig, law, step_m, 40.0)).unwrap();
@@ -96,7 +96,7 @@ fn the_metre_step_is_reached_from_encoders_and_with_delay() {
                 Scenario { sensing: Sensing::Encoders, force_noise_n: 0.1, ..step(&rig, law, 1.0, 40.0) };
             let summary = run(&rig, &table, &scenario);
             assert!(
-                summary.stands() && summary.final_error_m.abs() < 0.05,
+                summary.survives() && summary.final_error_m.abs() < 0.05,
                 "{law:?} {delay_ticks}: {summary}"
             );
         }

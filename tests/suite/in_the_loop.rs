@@ -88,7 +88,7 @@ fn the_image_in_qemu_gives_the_bits_of_the_host_and_of_its_last_run() {
         let qemu = run(&rig, &table, &scenario, place).unwrap();
         let host = run(&rig, &table, &scenario, Place::Host).unwrap();
         assert!(qemu.ticks == host.ticks, "{name}");
-        assert!(qemu.summary.stands(), "{name}: {:?}", qemu.fault);
+        assert!(qemu.summary.survives(), "{name}: {:?}", qemu.fault);
         let again = run(&rig, &table, &scenario, place).unwrap();
         assert_eq!((&qemu.ticks, qemu.worst_cycles), (&again.ticks, again.worst_cycles), "{name}");
         // Negative control: the comparison sees another seed.

@@ -18,7 +18,7 @@ fn with_integral(name: &str, position_weight: f64) -> Rig {
 /// forth.
 fn offset(rig: &Rig, scenario: &Scenario) -> f64 {
     let (trace, summary) = simulate(rig, &table(rig), scenario).unwrap();
-    assert!(summary.stands(), "{}: {summary}", rig.name);
+    assert!(summary.survives(), "{}: {summary}", rig.name);
     let last: Vec<f64> = trace
         .samples()
         .filter(|sample| sample.t >= 0.5 * scenario.duration_s)
@@ -61,7 +61,7 @@ fn overshoot(rig: &Rig, step_m: f64) -> f64 {
     let scenario =
         Scenario { step_m, duration_s: 60.0, substeps: 2, sensing, ..Scenario::at_rest(rig, Law::Lqr) };
     let (trace, summary) = simulate(rig, &table(rig), &scenario).unwrap();
-    assert!(summary.stands() && summary.final_error_m.abs() < 1e-3, "{}: {summary}", rig.name);
+    assert!(summary.survives() && summary.final_error_m.abs() < 1e-3, "{}: {summary}", rig.name);
     trace.samples().map(|sample| sample.state[0]).fold(0.0, f64::max) / step_m - 1.0
 }
 
@@ -109,7 +109,7 @@ fn a_rig_that_is_not_as_described_arrives_all_the_same() {
     let scenario = pulled(&with, Sensing::Encoders, 0.5);
     let summary = run(&heavier, &table, &scenario);
     // What is left of the dead zone lets the cart move by a millimetre or two.
-    assert!(summary.stands() && summary.final_error_m.abs() < 3e-3, "{summary}");
+    assert!(summary.survives() && summary.final_error_m.abs() < 3e-3, "{summary}");
 }
 
 /// A cart of 1 kg without pendulum, so that nothing falls while the force stays at its limit.

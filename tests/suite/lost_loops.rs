@@ -8,7 +8,7 @@ use upright_design::table::TableValues;
 const LEAN: f64 = 0.001;
 
 #[test]
-fn continuous_gains_fall_at_five_milliseconds_where_sampled_ones_stand() {
+fn continuous_gains_fall_at_five_milliseconds_where_sampled_ones_survive() {
     let rig = paper_at(0.005, 0);
     let scenario = Scenario { step_m: 0.05, ..lean(&rig, Law::Lqr, LEAN) };
     let held = run(&rig, &continuous_table(&rig), &scenario);
@@ -29,11 +29,11 @@ fn sampled_gains_hold_even_at_ten_milliseconds() {
 }
 
 #[test]
-fn a_delay_that_was_designed_for_stands_and_one_that_was_ignored_falls() {
+fn a_delay_that_was_designed_for_survives_and_one_that_was_ignored_falls() {
     let rig = paper_at(0.002, 1);
     let scenario = lean(&rig, Law::Lqr, LEAN);
     let ignored = run(&rig, &continuous_table(&rig), &scenario);
-    assert!(!ignored.stands(), "{ignored}");
+    assert!(!ignored.survives(), "{ignored}");
     let designed = table(&rig);
     for law in LAWS {
         let summary = run(&rig, &designed, &lean(&rig, law, LEAN));
@@ -41,7 +41,7 @@ fn a_delay_that_was_designed_for_stands_and_one_that_was_ignored_falls() {
     }
     // The same continuous gains balance without the delay.
     let prompt = paper_at(0.002, 0);
-    assert!(run(&prompt, &continuous_table(&prompt), &scenario).stands());
+    assert!(run(&prompt, &continuous_table(&prompt), &scenario).survives());
 }
 
 fn with_gain(table: &TableValues, law: Law, entry: usize, factor: f32) -> TableValues {
@@ -65,7 +65,7 @@ fn a_gain_that_is_wrong_by_a_fifth_or_in_sign_falls() {
         // A loop that diverges by 0.1 % per tick needs time to fall.
         let scenario = Scenario { duration_s: 30.0, ..lean(&rig, law, LEAN) };
         let broken = run(&rig, &with_gain(&table, law, entry, factor), &scenario);
-        assert!(!broken.stands(), "{law:?} K[{entry}] times {factor}: {broken}");
+        assert!(!broken.survives(), "{law:?} K[{entry}] times {factor}: {broken}");
         assert!(run(&rig, &with_gain(&table, law, entry, 1.0), &scenario).settled);
     }
 }
@@ -86,7 +86,7 @@ fn no_run_exceeds_the_force_limit() {
 fn a_lean_that_the_force_cannot_catch_falls() {
     let mut rig = rig("quadruple-paper");
     let scenario = lean(&rig, Law::Lqr, 0.02);
-    assert!(run(&rig, &table(&rig), &scenario).stands());
+    assert!(run(&rig, &table(&rig), &scenario).survives());
     rig.actuator.force_limit_n = Some(0.05);
     let weak = run(&rig, &table(&rig), &scenario);
     assert!(matches!(weak.fall.as_ref().map(|fall| fall.kind), Some(FallKind::Link(_))), "{weak}");
@@ -125,8 +125,8 @@ fn the_same_seed_gives_the_same_run_bit_for_bit_and_another_seed_another_run() {
 fn balance_is_only_proved_by_a_push() {
     let rig = paper_at(0.005, 0);
     let table = continuous_table(&rig);
-    assert!(run(&rig, &table, &at_rest(&rig, Law::Lqr)).stands());
-    assert!(!run(&rig, &table, &Scenario::acceptance(&rig, Law::Lqr, 1.0)).stands());
+    assert!(run(&rig, &table, &at_rest(&rig, Law::Lqr)).survives());
+    assert!(!run(&rig, &table, &Scenario::acceptance(&rig, Law::Lqr, 1.0)).survives());
 }
 
 #[test]

@@ -16,7 +16,7 @@
 //! | [`identify`] | logs of a machine under excitation | its parameters, with standard deviations |
 //! | [`swing_up`] | rig file | motions from hanging to upright and back, with their gains |
 //! | [`verify`] | table and requirements | the trust report |
-//! | [`robust`] | rig file and tolerances | weights, poles and noise that withstand them |
+//! | [`robust`] | rig file and tolerances | weights, poles and noise that survive them |
 //! | [`study`] | a function of a run's number | outcomes of all runs, computed here or split over several machines |
 //!
 //! The control law itself is not here: a simulation runs the firmware's own controller from the crate `upright`.

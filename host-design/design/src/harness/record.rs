@@ -83,8 +83,8 @@ pub fn record(
         }
         let t = tick as f64 * period_s;
         // In a run that begins hanging, a link below the horizontal has fallen only while the firmware balances.
-        let stands = scenario.begin == Begin::ByHand || harness.session.status().state == State::Balancing;
-        let fall = if stands { Fall::of(rig, t, &without_turns(harness.bench.state())) } else { None };
+        let balances = scenario.begin == Begin::ByHand || harness.session.status().state == State::Balancing;
+        let fall = if balances { Fall::of(rig, t, &without_turns(harness.bench.state())) } else { None };
         let state = harness.bench.state().to_vec();
         let force = harness.bench.tick(output.drive);
         let number = harness.session.tick_number();

@@ -13,7 +13,7 @@ pub enum RobustError {
         "no tolerance is stated: give [robust] in the rig file, or an option such as --joint-friction 1e-4"
     )]
     NoTolerance,
-    /// No candidate withstands the tolerances.
+    /// No candidate survives the tolerances.
     #[error("nothing helps: {0}")]
     Unhelped(String),
     /// The rig has no chain or no observer, or too many links.

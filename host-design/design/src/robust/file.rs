@@ -62,8 +62,8 @@ pub fn with_tolerances(text: &str, tolerances: &Tolerances) -> Option<String> {
 
 fn head(file: &str, choice: &Choice) -> String {
     let mut head = format!(
-        "# Written by `upright robust {file}`: that file with the weights, far poles and joint noise that stand its\n\
-         # [robust] with the least ripple. The comments below are those of that file.\n\
+        "# Written by `upright robust {file}`: that file with the weights, far poles and joint noise that survive\n\
+         # its [robust] with the least ripple. The comments below are those of that file.\n\
          #   joint noise × {}\n",
         significant(choice.joint_noise_factor, 3)
     );

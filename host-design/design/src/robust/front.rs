@@ -23,7 +23,7 @@ pub struct Front(pub Vec<FrontPoint>);
 pub struct FrontPoint {
     /// The multiple.
     pub scale: f64,
-    /// The loops with the least ripple; none if no loop withstands this multiple.
+    /// The loops with the least ripple; none if no loop survives this multiple.
     pub best: Option<LeastRipple>,
 }
 

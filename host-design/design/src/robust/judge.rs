@@ -1,4 +1,4 @@
-//! Judges by simulation whether a loop withstands the tolerances.
+//! Judges by simulation whether a loop survives the tolerances.
 
 use serde::{Deserialize, Serialize};
 use upright::table::Law;
@@ -10,12 +10,12 @@ use crate::study::{Study, infinite_if_null};
 use crate::table::TableValues;
 use crate::verify::{CornerSettings, Disturbance, Unverifiable, corners, leaning, scenario};
 
-/// Shares of the tolerances that are tried. A loop may stand with much friction and fall with little.
+/// Shares of the tolerances that are tried. A loop may survive with much friction and fall with little.
 pub(super) const SHARES: [f64; 4] = [0.0, 0.5, 1.0, 1.25];
 /// Angle by which every link leans at the start (rad).
 const LEAN_RAD: f64 = 5e-4;
 
-/// The runs in which a loop has to stand.
+/// The runs in which a loop has to survive.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct JudgeSettings {
     /// Number of runs with each share of the tolerances, with the seeds from 1.
@@ -40,32 +40,32 @@ pub struct Runs {
     pub share: f64,
     /// Number of runs.
     pub runs: u64,
-    /// How many stood to the end within the supervisor's limits of angle and rail.
-    pub stood: u64,
-    /// Force on the cart (N rms), over the runs that stood, after the first tenth.
+    /// How many survived to the end within the supervisor's limits of angle and rail.
+    pub survived: u64,
+    /// Force on the cart (N rms), over the runs that survived, after the first tenth.
     pub force_rms_n: f64,
-    /// Largest angle of a link from the vertical in the runs that stood (rad).
+    /// Largest angle of a link from the vertical in the runs that survived (rad).
     pub peak_angle_rad: f64,
-    /// Largest distance of the cart from its set-point in the runs that stood (m).
+    /// Largest distance of the cart from its set-point in the runs that survived (m).
     pub peak_position_m: f64,
 }
 
-/// What a loop withstands.
+/// What a loop survives.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Judgement {
     /// The law in the loop.
     pub law: Law,
     /// Runs with friction, zero errors and latency together, beginning with none of them.
     pub machines: Vec<Runs>,
-    /// Combinations of mass errors, without friction: how many there are and how many stand.
+    /// Combinations of mass errors, without friction: how many there are and how many survive.
     pub corners: Option<[usize; 2]>,
 }
 
 impl Judgement {
-    /// Whether all runs stood.
-    pub fn stands(&self) -> bool {
-        self.machines.iter().all(|machine| machine.stood == machine.runs)
-            && self.corners.is_none_or(|[all, stand]| stand == all)
+    /// Whether all runs survived.
+    pub fn survives(&self) -> bool {
+        self.machines.iter().all(|machine| machine.survived == machine.runs)
+            && self.corners.is_none_or(|[all, survived]| survived == all)
     }
 }
 
@@ -98,7 +98,7 @@ pub fn judge(
         let settings = CornerSettings { disturbance: settings.disturbance, ..CornerSettings::of(rig) };
         let ideal = machine(rig, tolerances, 0.0);
         let found = corners(&ideal, table, law, tolerances.mass_percent, &settings)?;
-        Some([found.corners, found.stand])
+        Some([found.corners, found.survived])
     } else {
         None
     };
@@ -119,10 +119,10 @@ pub(super) fn machine(rig: &Rig, tolerances: &Tolerances, share: f64) -> Rig {
 /// Outcome of one run.
 #[derive(Serialize, Deserialize)]
 pub(super) struct Outcome {
-    pub(super) stands: bool,
+    pub(super) survives: bool,
     /// Time of the last tick (s): that of a fall.
     #[serde(skip)]
-    pub(super) stood_s: f64,
+    pub(super) survived_s: f64,
     ticks: f64,
     #[serde(deserialize_with = "infinite_if_null")]
     force: f64,
@@ -148,9 +148,9 @@ pub(super) fn one(
         ..scenario(machine, law, settings.duration_s)
     };
     let mut outcome =
-        Outcome { stands: false, stood_s: 0.0, ticks: 0.0, force: 0.0, angle_rad: 0.0, position_m: 0.0 };
+        Outcome { survives: false, survived_s: 0.0, ticks: 0.0, force: 0.0, angle_rad: 0.0, position_m: 0.0 };
     let fall = run(machine, table, &scenario, &mut |sample| {
-        outcome.stood_s = sample.t;
+        outcome.survived_s = sample.t;
         let angles = absolute_angles(sample.state);
         outcome.angle_rad = angles.fold(outcome.angle_rad, |largest, angle| largest.max(angle.abs()));
         outcome.position_m = outcome.position_m.max(sample.state[0].abs());
@@ -161,21 +161,21 @@ pub(super) fn one(
     })?;
     let limits = &table.limits;
     let [low, high] = limits.rail_m.map(f64::from);
-    outcome.stands = fall.is_none()
+    outcome.survives = fall.is_none()
         && outcome.angle_rad <= f64::from(limits.angle_rad)
         && outcome.position_m <= high.min(-low);
     Ok(outcome)
 }
 
 fn summary(share: f64, all: &[Outcome]) -> Runs {
-    let stood = || all.iter().filter(|outcome| outcome.stands);
-    let ticks: f64 = stood().map(|outcome| outcome.ticks).sum();
+    let survived = || all.iter().filter(|outcome| outcome.survives);
+    let ticks: f64 = survived().map(|outcome| outcome.ticks).sum();
     Runs {
         share,
         runs: all.len() as u64,
-        stood: stood().count() as u64,
-        force_rms_n: (stood().map(|outcome| outcome.force).sum::<f64>() / ticks.max(1.0)).sqrt(),
-        peak_angle_rad: stood().map(|outcome| outcome.angle_rad).fold(0.0, f64::max),
-        peak_position_m: stood().map(|outcome| outcome.position_m).fold(0.0, f64::max),
+        survived: survived().count() as u64,
+        force_rms_n: (survived().map(|outcome| outcome.force).sum::<f64>() / ticks.max(1.0)).sqrt(),
+        peak_angle_rad: survived().map(|outcome| outcome.angle_rad).fold(0.0, f64::max),
+        peak_position_m: survived().map(|outcome| outcome.position_m).fold(0.0, f64::max),
     }
 }

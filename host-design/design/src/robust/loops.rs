@@ -1,4 +1,4 @@
-//! The loops of all candidates, sorted by predicted ripple, and what they withstand.
+//! The loops of all candidates, sorted by predicted ripple, and what they survive.
 
 use std::sync::OnceLock;
 
@@ -39,18 +39,18 @@ pub(super) struct Ranked {
     pub(super) candidate: usize,
     pub(super) ripple_n: f64,
     controller: ControllerModel<f64>,
-    /// What it withstands of the full tolerances; empty until it is tried.
+    /// What it survives of the full tolerances; empty until it is tried.
     trial: OnceLock<Trial>,
 }
 
-/// What a loop withstands.
+/// What a loop survives.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Trial {
     /// Whether its linear loop is stable, with a margin, at every combination of wrong masses.
     pub(super) is_stable: bool,
-    /// Total time for which it stood in the short runs (s). A loop that is not stable is not run.
-    pub(super) stood_s: f64,
-    /// Whether it stood in all short runs.
+    /// Total time for which it survived in the short runs (s). A loop that is not stable is not run.
+    pub(super) survived_s: f64,
+    /// Whether it survived in all short runs.
     pub(super) holds: bool,
 }
 
@@ -157,7 +157,7 @@ impl<'a> Loops<'a> {
         TableValues::of_uncertified(rig, &both).ok()
     }
 
-    /// What this loop withstands of the full tolerances; `corners` are the plants with their combinations of wrong
+    /// What this loop survives of the full tolerances; `corners` are the plants with their combinations of wrong
     /// masses. It is tried only once.
     pub(super) fn trial(&self, at: At, corners: &[PlantModel<f64>]) -> Result<Trial, RobustError> {
         let [pool, observer, place] = at;
@@ -167,7 +167,7 @@ impl<'a> Loops<'a> {
         }
         let trial = match self.is_stable(at, corners)? {
             true => self.runs(at, 1.0)?,
-            false => Trial { is_stable: false, stood_s: 0.0, holds: false },
+            false => Trial { is_stable: false, survived_s: 0.0, holds: false },
         };
         Ok(*one.trial.get_or_init(|| trial))
     }
@@ -188,7 +188,7 @@ impl<'a> Loops<'a> {
 
     /// Short runs with each share of `scale` times the tolerances, up to the first that falls.
     pub(super) fn runs(&self, at: At, scale: f64) -> Result<Trial, RobustError> {
-        let mut trial = Trial { is_stable: true, stood_s: 0.0, holds: false };
+        let mut trial = Trial { is_stable: true, survived_s: 0.0, holds: false };
         let rig = self.rig_of(at);
         let Some(table) = self.trial_table(&rig, at) else { return Ok(trial) };
         let settings = JudgeSettings { duration_s: SHORT_RUN_S, ..*self.settings };
@@ -197,8 +197,8 @@ impl<'a> Loops<'a> {
         for share in SHARES.into_iter().rev() {
             let real = machine(&rig, &tolerances, share);
             let outcome = one(&real, &table, self.pools[at[0]].law, &settings, 1)?;
-            trial.stood_s += outcome.stood_s;
-            if !outcome.stands {
+            trial.survived_s += outcome.survived_s;
+            if !outcome.survives {
                 return Ok(trial);
             }
         }

@@ -1,4 +1,4 @@
-//! Gains that withstand a machine that differs from its file, chosen among multiples of the file's own numbers.
+//! Gains that survive a machine that differs from its file, chosen among multiples of the file's own numbers.
 //!
 //! [`choose`] sorts all candidates by predicted ripple, and simulates those with the least ripple whose linear loop is
 //! stable at all mass errors. The choice is designed again and certified. Friction is judged by simulation only:

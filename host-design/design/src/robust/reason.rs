@@ -1,4 +1,4 @@
-//! Why no candidate withstands the tolerances, and what share of them is within reach.
+//! Why no candidate survives the tolerances, and what share of them is within reach.
 
 use super::error::RobustError;
 use super::loops::{At, Loops};
@@ -8,7 +8,7 @@ use crate::verify::PlantModel;
 
 /// Shares of the tolerances that may be within reach.
 const SHARES: [f64; 4] = [0.125, 0.25, 0.5, 0.75];
-/// Number of loops of each law and observer that are tried at a share: half of them those that stood longest, half
+/// Number of loops of each law and observer that are tried at a share: half of them those that survived longest, half
 /// those with the least ripple.
 const TRIED: usize = 8;
 
@@ -34,7 +34,7 @@ pub(super) fn reason(
                 tolerances.mass_percent
             ),
             _ => format!(
-                "{law}: none of {count} loops stands friction, zeros and latency within the limits; \
+                "{law}: none of {count} loops survives friction, zeros and latency within the limits; \
                  smaller bearings, better zeros or a longer rail"
             ),
         });
@@ -45,14 +45,14 @@ pub(super) fn reason(
     reasons.push(match within_reach(loops, progress)? {
         Some(share) => format!("{share} times the tolerances is within reach"),
         None => format!(
-            "not even an eighth of the tolerances is within reach of the loops that stood longest and those with the \
-             least ripple, {TRIED} of each law and joint noise"
+            "not even an eighth of the tolerances is within reach of the loops that survived longest and those with \
+             the least ripple, {TRIED} of each law and joint noise"
         ),
     });
     Ok(reasons.join("; "))
 }
 
-/// The largest share of the tolerances that some of the loops tried withstand, by bisection.
+/// The largest share of the tolerances that some of the loops tried survive, by bisection.
 fn within_reach(loops: &Loops<'_>, progress: Progress<'_>) -> Result<Option<f64>, RobustError> {
     let [mut held, mut lost] = [0, SHARES.len() + 1];
     while lost - held > 1 {
@@ -62,11 +62,11 @@ fn within_reach(loops: &Loops<'_>, progress: Progress<'_>) -> Result<Option<f64>
     Ok(held.checked_sub(1).map(|index| SHARES[index]))
 }
 
-/// Whether there is an observer with which a loop of each law withstands this share of the tolerances.
+/// Whether there is an observer with which a loop of each law survives this share of the tolerances.
 fn serves(loops: &Loops<'_>, share: f64, progress: Progress<'_>) -> Result<bool, RobustError> {
     let corners = loops.plants.corners(share)?;
     progress(Some(("what is within reach", loops.observers.len() as u64)));
-    let stands = |pool: usize, observer: usize| -> Result<bool, RobustError> {
+    let survives = |pool: usize, observer: usize| -> Result<bool, RobustError> {
         for at in tried(loops, [pool, observer], &corners)? {
             if loops.runs(at, share)?.holds {
                 return Ok(true);
@@ -76,7 +76,7 @@ fn serves(loops: &Loops<'_>, share: f64, progress: Progress<'_>) -> Result<bool,
     };
     let of_observer = |observer: usize| -> Result<bool, RobustError> {
         for pool in 0..loops.pools.len() {
-            if !stands(pool, observer)? {
+            if !survives(pool, observer)? {
                 progress(None);
                 return Ok(false);
             }
@@ -96,7 +96,7 @@ fn serves(loops: &Loops<'_>, share: f64, progress: Progress<'_>) -> Result<bool,
     }
 }
 
-/// The loops of a law and an observer that are tried: of those that are stable with `corners`, the ones that stood
+/// The loops of a law and an observer that are tried: of those that are stable with `corners`, the ones that survived
 /// longest and the ones with the least ripple.
 fn tried(
     loops: &Loops<'_>,
@@ -106,8 +106,8 @@ fn tried(
     let cheapest: Vec<At> =
         (0..loops.ranked[pool][observer].len()).map(|place| [pool, observer, place]).collect();
     let mut longest = cheapest.clone();
-    let stood_s = |&at: &At| loops.known(at).map_or(0.0, |trial| trial.stood_s);
-    longest.sort_by(|a, b| stood_s(b).total_cmp(&stood_s(a)));
+    let survived_s = |&at: &At| loops.known(at).map_or(0.0, |trial| trial.survived_s);
+    longest.sort_by(|a, b| survived_s(b).total_cmp(&survived_s(a)));
     let mut found = Vec::new();
     for (all, count) in [(longest, TRIED / 2), (cheapest, TRIED)] {
         for at in all {

@@ -42,15 +42,15 @@ pub struct Chosen {
     pub ripple_n: f64,
     /// Predicted rms of the force with the numbers of the file (N); none if that loop is not stable.
     pub own_ripple_n: Option<f64>,
-    /// The runs that it stood.
+    /// The runs that it survived.
     pub judgement: Judgement,
 }
 
-/// Chooses the gains with the least ripple that withstand `tolerances`; returns also a front over multiples of them if
+/// Chooses the gains with the least ripple that survive `tolerances`; returns also a front over multiples of them if
 /// `with_front`.
 ///
 /// # Errors
-/// [`RobustError::Unhelped`] with the reason if no candidate withstands them; other errors if the rig or the
+/// [`RobustError::Unhelped`] with the reason if no candidate survives them; other errors if the rig or the
 /// tolerances cannot be used.
 pub fn choose(
     rig: &Rig,
@@ -83,7 +83,7 @@ struct Search<'a> {
 }
 
 impl Search<'_> {
-    /// The loops with the least ripple that withstand the tolerances, one of each law, with the same observer.
+    /// The loops with the least ripple that survive the tolerances, one of each law, with the same observer.
     ///
     /// `heads` has, for each law and observer, the place of the first loop that is not known to fall. The observer
     /// whose heads have the least total ripple comes first, so a loop is only tried if none with less ripple is left.
@@ -176,7 +176,7 @@ impl Search<'_> {
             let law = self.loops.pools[pool].law;
             let judgement = judge(&rig, &table, law, self.tolerances, self.settings, &Study::whole())?;
             progress(None);
-            if !judgement.stands() {
+            if !judgement.survives() {
                 return Ok(Err(pool));
             }
             laws.push(Chosen {

@@ -148,8 +148,8 @@ impl Summary {
         }
     }
 
-    /// Whether the rig still stands at the end of the run.
-    pub fn stands(&self) -> bool {
+    /// Whether the rig is still up at the end of the run.
+    pub fn survives(&self) -> bool {
         self.fall.is_none()
     }
 }
@@ -158,8 +158,8 @@ impl fmt::Display for Summary {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match (&self.fall, self.settling_time_s) {
             (Some(fall), _) => writeln!(f, "FALLS: {fall}")?,
-            (None, Some(time)) => writeln!(f, "stands, settled after {time:.3} s")?,
-            (None, None) => writeln!(f, "stands, not settled when the run ends")?,
+            (None, Some(time)) => writeln!(f, "survives, settled after {time:.3} s")?,
+            (None, None) => writeln!(f, "survives, not settled when the run ends")?,
         }
         if let (Some(over), Some(under)) = (self.overshoot_percent, self.undershoot_percent) {
             writeln!(f, "  overshoot      {over:.2} %   (undershoot: {under:.2} %)")?;

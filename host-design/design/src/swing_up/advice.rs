@@ -15,7 +15,7 @@ const TRIED: u64 = 12;
 const KEPT: usize = 3;
 /// Factors by which a limit is relaxed, one after the other, until there is a motion.
 const FACTORS: [f64; 4] = [1.2, 1.5, 2.0, 3.0];
-/// Factors by which the errors that a motion has to stand are made smaller.
+/// Factors by which the errors that a motion has to survive are made smaller.
 const NARROWER: [f64; 4] = [0.8, 0.6, 0.4, 0.2];
 
 /// Result of the search with a changed rig file.
@@ -41,7 +41,7 @@ impl Outcome {
         let runs = |motion| random_runs(&setting, motion, way, &request.spread, 1, RUNS);
         let all = found.iter().take(KEPT).map(|candidate| runs(&candidate.motion));
         let all: Vec<Runs> = all.collect::<Result<_, _>>()?;
-        Ok(Self { tried, solved, runs: all.into_iter().max_by_key(|runs| runs.stood) })
+        Ok(Self { tried, solved, runs: all.into_iter().max_by_key(|runs| runs.arrived) })
     }
 
     /// Whether the search found a motion that would be stored.
@@ -52,8 +52,8 @@ impl Outcome {
     fn text(&self) -> String {
         let Self { tried, solved, runs } = self;
         match runs {
-            Some(Runs { stood, runs, .. }) => {
-                format!("{solved} of {tried} candidates solved, {stood} of {runs} random runs arrive")
+            Some(Runs { arrived, runs, .. }) => {
+                format!("{solved} of {tried} candidates solved, {arrived} of {runs} random runs arrive")
             }
             None => format!("none of {tried} candidates solved"),
         }
@@ -161,7 +161,7 @@ pub(super) fn narrower(
         let mut remedy = Remedy::of(rig);
         remedy.narrow(factor);
         let found = runs(&remedy.rig)?;
-        last = format!("{} of {} arrive with {}", found.stood, found.runs, remedy.text());
+        last = format!("{} of {} arrive with {}", found.arrived, found.runs, remedy.text());
         if is_enough(&remedy.rig, &found) {
             break;
         }

@@ -40,7 +40,7 @@ pub(super) struct Trial {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Outcome {
     /// Whether it arrived and stayed.
-    pub(super) stood: bool,
+    pub(super) arrived: bool,
     /// Largest deviation of a link from its reference during the motion (rad).
     pub(super) deviation_rad: f64,
     /// Largest deviation of the cart (m).
@@ -148,7 +148,7 @@ pub(super) fn run(
 ) -> Result<Outcome, SwingUpError> {
     let mut rig = ClosedLoop::new(setting, trial, &motion.x[0])?;
     let steps = motion.steps();
-    let mut outcome = Outcome { stood: false, deviation_rad: 0.0, deviation_m: 0.0 };
+    let mut outcome = Outcome { arrived: false, deviation_rad: 0.0, deviation_m: 0.0 };
     for k in 0..steps + (trial.after_s / motion.tick_s) as usize {
         rig.tick(&law_at(setting, motion, way, k));
         let reference = motion.x.get(k + 1).unwrap_or(&motion.x[steps]);
@@ -165,7 +165,7 @@ pub(super) fn run(
     }
     // After lowering, the motor is off, and links without friction swing on.
     let near = if way.ends_hanging() { LOST_RAD } else { ARRIVED_RAD };
-    outcome.stood = deviation(&rig.state, &motion.x[steps]) < near;
+    outcome.arrived = deviation(&rig.state, &motion.x[steps]) < near;
     Ok(outcome)
 }
 

@@ -38,14 +38,14 @@ pub enum SwingUpError {
     },
     /// Not enough random runs arrive.
     #[error(
-        "{way}: {stood} of {runs} random runs arrive, and the lower end of the 95 % interval has to be {needed} % \
+        "{way}: {arrived} of {runs} random runs arrive, and the lower end of the 95 % interval has to be {needed} % \
          (success_percent in [swing_up]); {help}"
     )]
     NotRobust {
         /// Which motion.
         way: Way,
         /// Runs that arrived.
-        stood: usize,
+        arrived: usize,
         /// Runs made.
         runs: usize,
         /// Lower end needed (%).

@@ -54,7 +54,7 @@ impl Condition {
         ]
     }
 
-    /// The errors that a motion has to withstand according to `[swing_up]`.
+    /// The errors that a motion has to survive according to `[swing_up]`.
     pub fn asked(rig: &Rig) -> Self {
         let (spread, name) = (Spread::asked(rig), "errors of [swing_up]");
         Self { name, spread, joint_counts: None, is_late: false }
@@ -89,7 +89,7 @@ impl FirmwareRuns {
     /// The raising, counted over all runs: a run that was refused has not arrived.
     pub fn raise_in_all(&self) -> Runs {
         let runs = self.refused + self.raise.runs;
-        Runs { runs, interval: wilson(self.raise.stood, runs), ..self.raise.clone() }
+        Runs { runs, interval: wilson(self.raise.arrived, runs), ..self.raise.clone() }
     }
 }
 
@@ -97,7 +97,7 @@ impl FirmwareRuns {
 #[derive(Debug, Default, Serialize, Deserialize)]
 struct Reached {
     refused: bool,
-    stood: bool,
+    arrived: bool,
     hung: bool,
     fault: Option<String>,
     /// Largest distance of a link from its planned angle during the raising and the lowering (rad).
@@ -137,17 +137,18 @@ pub fn firmware_runs(
     for fault in all.iter().filter_map(|run| run.fault.clone()) {
         *faults.entry(fault).or_default() += 1;
     }
-    let counted = |begun: &dyn Fn(&Reached) -> bool, arrived: &dyn Fn(&Reached) -> bool, way: usize| {
-        let (tried, stood) =
-            (all.iter().filter(|run| begun(run)).count(), all.iter().filter(|run| arrived(run)).count());
-        let arrived = all.iter().filter(|run| arrived(run));
-        let deviation_rad = arrived.fold(0.0, |largest, run| f64::max(largest, run.deviation_rad[way].0));
-        Runs { base_seed, runs: tried, stood, interval: wilson(stood, tried), deviation_rad }
+    let counted = |begun: &dyn Fn(&Reached) -> bool, arrived: &dyn Fn(&Reached) -> bool, motion: usize| {
+        let tried = all.iter().filter(|run| begun(run)).count();
+        let arrived = || all.iter().filter(|run| arrived(run));
+        let deviation_rad =
+            arrived().fold(0.0, |largest, run| f64::max(largest, run.deviation_rad[motion].0));
+        let arrived = arrived().count();
+        Runs { base_seed, runs: tried, arrived, interval: wilson(arrived, tried), deviation_rad }
     };
     Ok(FirmwareRuns {
         refused: all.iter().filter(|run| run.refused).count(),
-        raise: counted(&|run| !run.refused, &|run| run.stood, 0),
-        lower: counted(&|run| run.stood, &|run| run.hung, 1),
+        raise: counted(&|run| !run.refused, &|run| run.arrived, 0),
+        lower: counted(&|run| run.arrived, &|run| run.hung, 1),
         faults,
     })
 }
@@ -178,7 +179,7 @@ fn raised_and_lowered(
             output = harness.session.tick(&inputs)?;
         }
         if tick == lower_at {
-            reached.stood = harness.session.status().state == State::Balancing;
+            reached.arrived = harness.session.status().state == State::Balancing;
         }
         harness.ask_for(tick, &goals);
         let moves = [(&motions.raise, Some(0)), (&motions.lower, harness.begun().first().copied())];
@@ -193,7 +194,7 @@ fn raised_and_lowered(
         tick += 1;
     }
     reached.fault = harness.session.fault().map(|fault| fault.to_string());
-    reached.hung = reached.stood
+    reached.hung = reached.arrived
         && reached.fault.is_none()
         && harness.session.status().state == State::Calibrated
         && hang(harness.bench.state());

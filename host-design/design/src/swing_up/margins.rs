@@ -21,7 +21,7 @@ const PUSH_S: f64 = 0.05;
 const FIRST_N: f64 = 0.125;
 const LARGEST_N: f64 = 32.0;
 const SMALLEST_N: f64 = 1.0 / 4096.0;
-/// Halvings of the interval from a push that is withstood to its double, which is not: the edge is found to 1/16 of
+/// Halvings of the interval from a push that is survived to its double, which is not: the edge is found to 1/16 of
 /// the push.
 const HALVINGS: u32 = 4;
 /// Time to balance before a lowering, and to watch the rig after a motion (s).
@@ -38,7 +38,7 @@ pub struct Margin {
     /// Time since the beginning of the motion (s).
     pub at_s: f64,
     /// For each link: the largest push against its angle and along it after which the motion still arrives (N, both
-    /// positive). A push of 32 N is the largest that is tried; 0: not even one of 1/4096 N is withstood.
+    /// positive). A push of 32 N is the largest that is tried; 0: not even one of 1/4096 N is survived.
     pub links_n: Vec<[f64; 2]>,
 }
 
@@ -59,7 +59,7 @@ struct Push {
 /// firmware notices it through its encoders only, and its supervision is on. The machine is the rig of the file,
 /// without noise. A second after the motion, a raised rig has to balance and a lowered one to hang, without a fault.
 ///
-/// Pushes are doubled until one is not withstood; then bisection finds the edge. Larger ones may be withstood again.
+/// Pushes are doubled until one is not survived; then bisection finds the edge. Larger ones may be survived again.
 /// All margins are 0 if the motion does not even arrive without a push.
 ///
 /// # Errors
@@ -91,9 +91,9 @@ pub fn margins(
     let (ticks, begin) = (motion_ticks(table, way), pushed(None)?);
     let edge = |tick: usize, link: usize, side: f64| -> Result<f64, SwingUpError> {
         let Some(begin) = begin else { return Ok(0.0) };
-        let stands =
+        let survives =
             |size: f64| Ok(pushed(Some(Push { tick: begin + tick, link, force_n: side * size }))?.is_some());
-        largest(stands)
+        largest(survives)
     };
     let links = rig.states() / 2 - 1;
     let at = |moment: usize| -> Result<Margin, SwingUpError> {
@@ -112,11 +112,11 @@ fn motion_ticks(table: &TableValues, way: Way) -> usize {
         as usize
 }
 
-/// The largest size that is withstood, below the first one that is not.
-fn largest(stands: impl Fn(f64) -> Result<bool, SwingUpError>) -> Result<f64, SwingUpError> {
+/// The largest size that is survived, below the first one that is not.
+fn largest(survives: impl Fn(f64) -> Result<bool, SwingUpError>) -> Result<f64, SwingUpError> {
     let mut good = FIRST_N;
-    if stands(good)? {
-        while good < LARGEST_N && stands(2.0 * good)? {
+    if survives(good)? {
+        while good < LARGEST_N && survives(2.0 * good)? {
             good *= 2.0;
         }
         if good >= LARGEST_N {
@@ -124,7 +124,7 @@ fn largest(stands: impl Fn(f64) -> Result<bool, SwingUpError>) -> Result<f64, Sw
         }
     } else {
         good *= 0.5;
-        while !stands(good)? {
+        while !survives(good)? {
             good *= 0.5;
             if good < SMALLEST_N {
                 return Ok(0.0);
@@ -134,7 +134,7 @@ fn largest(stands: impl Fn(f64) -> Result<bool, SwingUpError>) -> Result<f64, Sw
     let mut bad = 2.0 * good;
     for _ in 0..HALVINGS {
         let middle = 0.5 * (good + bad);
-        if stands(middle)? { good = middle } else { bad = middle }
+        if survives(middle)? { good = middle } else { bad = middle }
     }
     Ok(good)
 }

@@ -20,7 +20,7 @@
 //! | `demonstration` | all of it in one run of the firmware |
 //! | `supervision` | the supervisor's limits in motion |
 //! | `in_table` | the table of the firmware |
-//! | `margins`, `trade` | pushes that a motion withstands; duration, force and robustness of candidates |
+//! | `margins`, `trade` | pushes that a motion survives; duration, force and robustness of candidates |
 //! | `check`, `stored` | independent check; the file beside the rig file |
 //!
 //! Everything random has a fixed seed, and every sum is taken in a fixed order, so the result does not depend on the

@@ -74,7 +74,7 @@ pub struct Judgement {
     pub way: Way,
     /// Number of candidates tried and solved; none for a stored motion.
     pub search: Option<[usize; 2]>,
-    /// Fragility: the smaller, the larger errors of masses and friction it withstands.
+    /// Fragility: the smaller, the larger errors of masses and friction it survives.
     pub score: f64,
     /// Peak values from the independent check.
     pub peaks: Peaks,
@@ -201,7 +201,7 @@ pub(super) fn best(
     Ok(Some(Found { search: Some([tried as usize, count]), ..found(setting, way, stored)? }))
 }
 
-/// The candidates sorted by the number of random runs that they withstand; among equals, the one with the smallest
+/// The candidates sorted by the number of random runs that they survive; among equals, the one with the smallest
 /// peak deviation comes first.
 fn ranked(
     setting: &Setting<'_>,
@@ -219,7 +219,7 @@ fn ranked(
         progress(Trying::Step { score: Some(candidate.score) });
         all.push((found, candidate));
     }
-    all.sort_by(|(a, _), (b, _)| b.stood.cmp(&a.stood).then(a.deviation_rad.total_cmp(&b.deviation_rad)));
+    all.sort_by(|(a, _), (b, _)| b.arrived.cmp(&a.arrived).then(a.deviation_rad.total_cmp(&b.deviation_rad)));
     Ok(all.into_iter().map(|(_, candidate)| candidate).collect())
 }
 
@@ -252,7 +252,7 @@ fn judged(
             help = format!("{help}; {}", advice(rig, way, progress)?);
         }
         let needed = setting.rules.success_percent;
-        return Err(SwingUpError::NotRobust { way, stood: runs.stood, runs: runs.runs, needed, help });
+        return Err(SwingUpError::NotRobust { way, arrived: runs.arrived, runs: runs.runs, needed, help });
     }
     let ([up, down], [raised, lowered]) = (peaks, runs);
     let raise = Judgement { way: Way::Up, search: raise.search, score: raise.score, peaks: up, runs: raised };

@@ -118,7 +118,7 @@ impl Remedy {
         Some(())
     }
 
-    /// Multiplies the errors of masses and friction that a motion has to withstand by `factor`.
+    /// Multiplies the errors of masses and friction that a motion has to survive by `factor`.
     pub(super) fn narrow(&mut self, factor: f64) {
         let rules = self.rig.swing_up.get_or_insert_default();
         let spreads = [

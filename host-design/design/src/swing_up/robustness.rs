@@ -54,7 +54,7 @@ pub struct Runs {
     /// Runs made.
     pub runs: usize,
     /// Runs that arrived and stayed.
-    pub stood: usize,
+    pub arrived: usize,
     /// 95 % confidence interval of their share (Wilson).
     pub interval: [f64; 2],
     /// Largest deviation of a link from its reference in the runs that arrived (rad).
@@ -164,14 +164,13 @@ pub(super) fn random_runs(
         run(setting, motion, way, &trial)
     };
     let all: Vec<_> = parallel::try_map(0..runs, one)?;
-    let stood = all.iter().filter(|outcome| outcome.stood).count();
-    let standing = all.iter().filter(|outcome| outcome.stood);
+    let arrived = || all.iter().filter(|outcome| outcome.arrived);
     Ok(Runs {
         base_seed,
         runs,
-        stood,
-        interval: wilson(stood, runs),
-        deviation_rad: standing.fold(0.0, |largest, outcome| f64::max(largest, outcome.deviation_rad)),
+        arrived: arrived().count(),
+        interval: wilson(arrived().count(), runs),
+        deviation_rad: arrived().fold(0.0, |largest, outcome| f64::max(largest, outcome.deviation_rad)),
     })
 }
 

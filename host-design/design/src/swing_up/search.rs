@@ -32,7 +32,7 @@ const RATE_TIME_S: f64 = 0.03;
 const EXCESS: f64 = 0.03;
 
 /// Candidates are ranked with the weights of `[lqr]`. With [`POSITION_WEIGHT`](super::gains::POSITION_WEIGHT), most of
-/// them withstand all runs, and those that are then chosen are worse with coarse encoders and wrong zeros.
+/// them survive all runs, and those that are then chosen are worse with coarse encoders and wrong zeros.
 const RANKING_WEIGHT: f64 = 1.0;
 
 /// The random values of a candidate.

@@ -22,7 +22,7 @@ pub struct Solved {
     pub force_n: f64,
     /// Largest distance of the cart from the middle (m).
     pub position_m: f64,
-    /// Fragility: the smaller, the larger errors of masses and friction it withstands.
+    /// Fragility: the smaller, the larger errors of masses and friction it survives.
     pub score: f64,
     /// Random runs with the spreads of masses and friction of `[swing_up]`.
     pub runs: Runs,

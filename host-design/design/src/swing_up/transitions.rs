@@ -85,7 +85,7 @@ impl StoredTransitions {
             return Ok(Searched { solved, ..none });
         }
         let runs = random_runs(&setting, &motion, way, &Spread::asked(rig), 1, RUNS)?;
-        let is_stored = runs.stood as f64 >= WORTH_A_TOUR * runs.runs as f64;
+        let is_stored = runs.arrived as f64 >= WORTH_A_TOUR * runs.runs as f64;
         if is_stored {
             let name = way.name(setting.chain.links.len());
             self.tours.remove(&name);

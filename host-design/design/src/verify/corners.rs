@@ -13,7 +13,7 @@ use crate::rig::{PlantDescription, Rig};
 use crate::simulate::{Scenario, SimulationError};
 use crate::table::TableValues;
 
-/// Conditions of the run in which every plant with mass errors has to stand.
+/// Conditions of the run in which every plant with mass errors has to survive.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct CornerSettings {
     /// Duration of the run (s).
@@ -68,11 +68,11 @@ pub struct Corners {
     pub percent: f64,
     /// Number of corners: 2^(n+1) for n links.
     pub corners: usize,
-    /// Number of corners that stand.
-    pub stand: usize,
+    /// Number of corners that survive.
+    pub survived: usize,
     /// The corner that falls first; if none falls, that with the largest angle.
     pub weakest: Corner,
-    /// The corners that do not stand.
+    /// The corners that do not survive.
     pub lost: Vec<Corner>,
 }
 
@@ -138,11 +138,17 @@ pub fn corners(
             weakest = corner;
         }
     }
-    let lost: Vec<Corner> = all.iter().filter(|corner| !corner.outcome.stands()).cloned().collect();
-    Ok(Corners { percent, corners: all.len(), stand: all.len() - lost.len(), weakest: weakest.clone(), lost })
+    let lost: Vec<Corner> = all.iter().filter(|corner| !corner.outcome.survives()).cloned().collect();
+    Ok(Corners {
+        percent,
+        corners: all.len(),
+        survived: all.len() - lost.len(),
+        weakest: weakest.clone(),
+        lost,
+    })
 }
 
-/// The largest percentage, a multiple of `step` up to `largest` (%), at which all corners stand, by bisection over
+/// The largest percentage, a multiple of `step` up to `largest` (%), at which all corners survive, by bisection over
 /// those multiples; 0 if not even the first does.
 ///
 /// # Errors
@@ -202,7 +208,7 @@ pub fn mass_tolerances(
             let factors: Vec<f64> = (0..parts).map(|other| if other == part { side } else { 0.0 }).collect();
             let outcome =
                 trial(&wrong_masses(rig, percent, &factors), table, &scenario, &Horizon::default())?;
-            Ok::<_, SimulationError>(outcome.stands().then_some(()))
+            Ok::<_, SimulationError>(outcome.survives().then_some(()))
         })?;
         Ok(found.map_or(0.0, |(percent, ())| percent))
     };

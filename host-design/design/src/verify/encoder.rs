@@ -1,4 +1,4 @@
-//! The coarsest encoders with which a law still stands.
+//! The coarsest encoders with which a law still survives.
 
 use serde::Serialize;
 use upright::table::Law;
@@ -17,7 +17,7 @@ pub struct EncoderSettings {
     pub duration_s: f64,
     /// Disturbances of the runs.
     pub disturbance: Disturbance,
-    /// Number of runs, with the seeds from 1; all of them have to stand.
+    /// Number of runs, with the seeds from 1; all of them have to survive.
     pub seeds: u64,
     /// Largest factor tried, at least 1.
     pub largest_factor: f64,
@@ -38,7 +38,7 @@ impl EncoderSettings {
     }
 }
 
-/// The coarsest encoders with which a law still stands.
+/// The coarsest encoders with which a law still survives.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct CoarsestEncoder {
     /// The law in the loop.
@@ -109,17 +109,17 @@ pub fn coarsest_encoder(
         if table.observer.is_none() {
             return Err(Unverifiable::NoObserver);
         }
-        let stands = |seed: u64| {
+        let survives = |seed: u64| {
             let scenario = Scenario {
                 force_noise_n: settings.disturbance.force_n,
                 torque_noise_n_m: settings.disturbance.torque_n_m,
                 seed,
                 ..scenario(&coarse, law, settings.duration_s)
             };
-            Ok(trial(&coarse, &table, &scenario, &Horizon::default())?.stands())
+            Ok(trial(&coarse, &table, &scenario, &Horizon::default())?.survives())
         };
-        let all: Vec<bool> = parallel::try_map::<_, _, SimulationError>(1..=settings.seeds, stands)?;
-        Ok(all.iter().all(|&stands| stands).then_some(()))
+        let all: Vec<bool> = parallel::try_map::<_, _, SimulationError>(1..=settings.seeds, survives)?;
+        Ok(all.iter().all(|&survives| survives).then_some(()))
     })?;
     let factor = found.map(|(factor, ())| factor);
     let at_edge = coarser(rig, factor.unwrap_or(1.0));

@@ -41,7 +41,7 @@ pub use corners::{
 pub use covariance::NoiseShare;
 pub use encoder::{CoarsestEncoder, EncoderSettings, coarser, coarsest_encoder};
 pub use imperfections::{
-    IMPERFECTIONS, Imperfection, ImperfectionSettings, Imperfections, RequiredStanding, Standing, Verdict,
+    IMPERFECTIONS, Imperfection, ImperfectionSettings, Imperfections, RequiredSurvival, Survival, Verdict,
     imperfections, limit_cycle, required_imperfections,
 };
 pub use linear::{LinearReport, VerifyError, linear, margins_of};

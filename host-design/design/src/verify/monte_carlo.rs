@@ -68,7 +68,7 @@ pub struct MonteCarlo {
     /// Number of runs made.
     pub runs: usize,
     /// Number of runs without a fall.
-    pub stood: usize,
+    pub survived: usize,
     /// Share of runs without a fall.
     pub success_rate: f64,
     /// 95 % confidence interval of the success rate (Wilson).
@@ -153,20 +153,20 @@ pub fn monte_carlo(
     };
     let all = study.outcomes_in_batches(law.key(), runs as u64, LANES, batch)?;
     let runs = all.len();
-    let stood = all.iter().filter(|case| case.outcome.stands()).count();
+    let survived = all.iter().filter(|case| case.outcome.survives()).count();
     Ok(MonteCarlo {
         base_seed,
         runs,
-        stood,
-        success_rate: stood as f64 / runs.max(1) as f64,
-        interval: wilson(stood, runs),
+        survived,
+        success_rate: survived as f64 / runs.max(1) as f64,
+        interval: wilson(survived, runs),
         worst: all
             .into_iter()
             .reduce(|worst, case| if is_worse(&case.outcome, &worst.outcome) { case } else { worst }),
     })
 }
 
-/// Whether `a` is worse than `b`: fell earlier, or fell where `b` stood, or, both standing, leaned further.
+/// Whether `a` is worse than `b`: fell earlier, or fell where `b` survived, or, both upright, leaned further.
 pub(super) fn is_worse(a: &Outcome, b: &Outcome) -> bool {
     match (&a.fall, &b.fall) {
         (Some(a), Some(b)) => a.at_s < b.at_s,

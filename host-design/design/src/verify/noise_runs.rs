@@ -15,8 +15,8 @@ use crate::table::TableValues;
 pub struct NoiseRun {
     /// Number of runs, with the seeds from 1.
     pub seeds: u64,
-    /// How many of them stood to the end; the figures cover all runs, up to their falls.
-    pub stood: u64,
+    /// How many of them survived to the end; the figures cover all runs, up to their falls.
+    pub survived: u64,
     /// Duration of each run (s).
     pub duration_s: f64,
     /// Force on the cart (N rms).
@@ -39,7 +39,7 @@ struct Sums {
     state: Vec<f64>,
     angle: Vec<f64>,
     error: Vec<f64>,
-    stands: bool,
+    survives: bool,
 }
 
 /// Measures the root mean squares over runs of `duration_s` with the seeds 1 to `seeds`: nominal plant, set-point 0.
@@ -80,7 +80,7 @@ pub fn noise_run(
                 *sum += angle * angle;
             }
         })?;
-        Ok(Sums { stands: fall.is_none(), ..sums })
+        Ok(Sums { survives: fall.is_none(), ..sums })
     };
     let all: Vec<Sums> = parallel::try_map::<_, _, SimulationError>(1..=seeds, one)?;
     // Sums are taken in the order of the seeds, whichever thread made the runs.
@@ -88,7 +88,7 @@ pub fn noise_run(
     let rms = |part: &dyn Fn(&Sums) -> f64| (all.iter().map(part).sum::<f64>() / ticks.max(1.0)).sqrt();
     Ok(NoiseRun {
         seeds,
-        stood: all.iter().filter(|sums| sums.stands).count() as u64,
+        survived: all.iter().filter(|sums| sums.survives).count() as u64,
         duration_s,
         force_rms_n: rms(&|sums| sums.force),
         force_peak_n: all.iter().map(|sums| sums.peak).fold(0.0, f64::max),
@@ -112,8 +112,8 @@ fn disturbed(rig: &Rig, law: Law, disturbance: &Disturbance, seed: u64, duration
 pub struct Endurance {
     /// Number of runs, with the seeds from 1.
     pub seeds: u64,
-    /// How many stood to the end.
-    pub stood: u64,
+    /// How many survived to the end.
+    pub survived: u64,
     /// Duration of each run (s).
     pub duration_s: f64,
     /// Seeds of the runs that fell.
@@ -149,7 +149,7 @@ pub fn endurance(
         all.iter().filter(|(_, outcome)| outcome.fall.is_some()).map(|&(seed, _)| seed).collect();
     Ok(Endurance {
         seeds,
-        stood: seeds - fallen.len() as u64,
+        survived: seeds - fallen.len() as u64,
         duration_s,
         fallen,
         peak_angle_rad: all.iter().map(|(_, outcome)| outcome.peak_angle_rad).fold(0.0, f64::max),

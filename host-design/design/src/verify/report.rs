@@ -6,7 +6,7 @@ use upright::table::Law;
 use super::corners::MOST_LINKS;
 use super::{
     Attraction, AttractionSettings, CoarsestEncoder, CornerSettings, Corners, Disturbance, EncoderSettings,
-    ImperfectionSettings, LinearReport, Margins, MassTolerance, MonteCarlo, NoiseRun, RequiredStanding,
+    ImperfectionSettings, LinearReport, Margins, MassTolerance, MonteCarlo, NoiseRun, RequiredSurvival,
     Spread, Unverifiable, VerifyError, attraction, coarsest_encoder, corners, linear, mass_tolerances,
     monte_carlo, noise_run, required_imperfections,
 };
@@ -43,8 +43,8 @@ pub struct LawTrust {
     pub mass_tolerances: Vec<MassTolerance>,
     /// Runs with random plants.
     pub monte_carlo: Option<MonteCarlo>,
-    /// Imperfections of the machine that `[verify]` requires the loop to stand.
-    pub imperfections: Vec<RequiredStanding>,
+    /// Imperfections of the machine that `[verify]` requires the loop to survive.
+    pub imperfections: Vec<RequiredSurvival>,
 }
 
 impl TrustReport {
@@ -222,9 +222,9 @@ impl Check {
         Check { law, requirement, required, found, holds }
     }
 
-    /// A requirement that all of a number of runs stand.
-    fn all_stand(law: Law, requirement: &'static str, runs: f64, stood: f64) -> Self {
-        Check { law, requirement, required: runs, found: Some(stood), holds: stood >= runs }
+    /// A requirement that all of a number of runs survive.
+    fn all_survive(law: Law, requirement: &'static str, runs: f64, survived: f64) -> Self {
+        Check { law, requirement, required: runs, found: Some(survived), holds: survived >= runs }
     }
 }
 
@@ -277,25 +277,25 @@ fn run_checks(required: &Requirements, trust: &LawTrust) -> Vec<Check> {
     });
     let random = trust.monte_carlo.as_ref().map(|runs| {
         let lowest = Some(100.0 * runs.interval[0]);
-        let requirement = "random plants that stand in %, lower bound (success_percent)";
+        let requirement = "random plants that survive in %, lower bound (success_percent)";
         at_least(requirement, required.success_percent, lowest)
     });
     [tilt, encoder, random].into_iter().flatten().collect()
 }
 
-/// Requirements that all of a number of runs stand.
+/// Requirements that all of a number of runs survive.
 fn counted_checks(trust: &LawTrust) -> Vec<Check> {
     let law = trust.linear.law;
     let corners = trust.corners.as_ref().map(|corners| {
-        let (all, stand) = (corners.corners as f64, corners.stand as f64);
-        Check::all_stand(law, "combinations of mass errors that stand (corner_percent)", all, stand)
+        let (all, survived) = (corners.corners as f64, corners.survived as f64);
+        Check::all_survive(law, "combinations of mass errors that survive (corner_percent)", all, survived)
     });
     let nominal = trust.noise_run.as_ref().map(|noise| {
-        Check::all_stand(law, "nominal runs that stand", noise.seeds as f64, noise.stood as f64)
+        Check::all_survive(law, "nominal runs that survive", noise.seeds as f64, noise.survived as f64)
     });
     let imperfections = trust.imperfections.iter().map(|required| {
         let (runs, within) = (required.runs as f64, required.verdict.within_limits as f64);
-        Check::all_stand(law, required.requirement, runs, within)
+        Check::all_survive(law, required.requirement, runs, within)
     });
     corners.into_iter().chain(nominal).chain(imperfections).collect()
 }

@@ -135,7 +135,7 @@ pub struct Outcome {
 
 impl Outcome {
     /// Whether there was no fall: the criterion for runs whose disturbances never let the rig come to rest.
-    pub fn stands(&self) -> bool {
+    pub fn survives(&self) -> bool {
         self.fall.is_none()
     }
 
@@ -260,18 +260,18 @@ pub(super) fn within(
     if range.contains(&value) { Ok(()) } else { Err(Unverifiable::Setting { what, value, accepts }) }
 }
 
-/// The largest size that stands below the first one found to fall: from `smallest` up by doubling to at most
+/// The largest size that survives below the first one found to fall: from `smallest` up by doubling to at most
 /// `largest`, then by bisection to within `relative` of the edge.
 ///
-/// Sizes that stand beyond the first that falls are not searched for: nobody should rely on them.
+/// Sizes that survive beyond the first that falls are not searched for: nobody should rely on them.
 pub(super) fn edge<T, E>(
     [smallest, largest]: [f64; 2],
     relative: f64,
-    mut stands: impl FnMut(f64) -> Result<Option<T>, E>,
+    mut survives: impl FnMut(f64) -> Result<Option<T>, E>,
 ) -> Result<Option<(f64, T)>, E> {
     let (mut held, mut size) = (None, smallest.min(largest));
     let mut lost = loop {
-        match stands(size)? {
+        match survives(size)? {
             Some(outcome) => held = Some((size, outcome)),
             None => break size,
         }
@@ -280,11 +280,11 @@ pub(super) fn edge<T, E>(
         }
         size = (2.0 * size).min(largest);
     };
-    while let Some(&(standing, _)) = held.as_ref()
-        && lost - standing > relative * standing
+    while let Some(&(good, _)) = held.as_ref()
+        && lost - good > relative * good
     {
-        let middle = 0.5 * (standing + lost);
-        match stands(middle)? {
+        let middle = 0.5 * (good + lost);
+        match survives(middle)? {
             Some(outcome) => held = Some((middle, outcome)),
             None => lost = middle,
         }

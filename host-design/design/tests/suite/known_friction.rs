@@ -22,23 +22,23 @@ fn table(rig: &Rig) -> TableValues {
     TableValues::of(rig, &design(rig).unwrap(), Gains::Sampled).unwrap()
 }
 
-/// How many of 2 runs of 10 s stand with none, half, all and 125 % of this joint friction.
-fn stood(rig: &Rig, law: Law, joint_friction_n_m: f64) -> Vec<u64> {
+/// How many of 2 runs of 10 s survive with none, half, all and 125 % of this joint friction.
+fn survived(rig: &Rig, law: Law, joint_friction_n_m: f64) -> Vec<u64> {
     let tolerances = Tolerances { joint_friction_n_m, ..Tolerances::default() };
     let settings = JudgeSettings { runs: 2, duration_s: 10.0, ..JudgeSettings::of(rig) };
     let found = judge(rig, &table(rig), law, &tolerances, &settings, &Study::whole()).unwrap();
-    found.machines.iter().map(|machine| machine.stood).collect()
+    found.machines.iter().map(|machine| machine.survived).collect()
 }
 
 #[test]
-fn the_quadruple_stands_a_known_friction_that_topples_it_without_compensation() {
+fn the_quadruple_survives_a_known_friction_that_makes_it_fall_without_compensation() {
     let known = with("quadruple-robust", "joint_n_m = 3e-4").unwrap();
-    assert_eq!(stood(&known, Law::Lqr, 3e-4)[..3], [2, 2, 2]);
+    assert_eq!(survived(&known, Law::Lqr, 3e-4)[..3], [2, 2, 2]);
     let unknown = Rig { friction: None, ..known.clone() };
-    assert_eq!(stood(&unknown, Law::Lqr, 3e-4)[2..], [0, 0]);
-    // Negative control: twice the static effect fed forward topples it.
+    assert_eq!(survived(&unknown, Law::Lqr, 3e-4)[2..], [0, 0]);
+    // Negative control: twice the static effect fed forward makes it fall.
     let too_much = with("quadruple-robust", "joint_n_m = 3e-4\nfed_forward_percent = 60").unwrap();
-    assert_eq!(stood(&too_much, Law::Lqr, 3e-4)[2..], [0, 0]);
+    assert_eq!(survived(&too_much, Law::Lqr, 3e-4)[2..], [0, 0]);
 }
 
 #[test]

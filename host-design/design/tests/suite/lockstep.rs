@@ -59,7 +59,7 @@ fn every_lane_has_the_bits_of_the_run_alone_and_one_that_falls_makes_room() {
             let cases = random_plants(&rig, count, 0.5);
             let expected = alone(&table, &cases);
             assert!(expected.iter().any(|(_, fall)| fall.is_some()), "{name}: some fall");
-            assert!(expected.iter().any(|(_, fall)| fall.is_none()), "{name}: some stand");
+            assert!(expected.iter().any(|(_, fall)| fall.is_none()), "{name}: some survive");
             assert!(in_lockstep(&table, &cases) == expected, "{name}, {count} runs");
         }
     }

@@ -60,7 +60,7 @@ fn the_quadruple_swings_and_falls_as_in_another_simulator() {
     let within = |low: f64, high: f64, swing: Option<f64>| {
         assert!(swing.is_some_and(|swing| (low..high).contains(&swing)), "{low} to {high}: {swing:?}");
     };
-    // Measured with an independent program: 293 and 192 mrad at 5e-5 N·m; at 2e-4 N·m none stands.
+    // Measured with an independent program: 293 and 192 mrad at 5e-5 N·m; at 2e-4 N·m none survives.
     within(0.02, 0.13, swing(Law::Lqr, 0.0));
     within(0.22, 0.38, swing(Law::Lqr, 5e-5));
     within(0.15, 0.25, swing(Law::PolePlacement, 5e-5));
@@ -259,7 +259,7 @@ fn a_latency_of_a_tick_is_a_delay_of_a_tick() {
 }
 
 #[test]
-fn the_size_at_which_each_imperfection_topples_the_loop_is_found() {
+fn the_size_of_each_imperfection_that_makes_the_loop_fall_is_found() {
     let (mut rig, table) = load("quadruple-paper");
     rig.reality.friction.joint_friction_n_m = PerJoint::all(2e-5);
     let settings =
@@ -272,7 +272,7 @@ fn the_size_at_which_each_imperfection_topples_the_loop_is_found() {
     assert!((0.8e-4..3e-4).contains(&falls_at) && friction.danger > 1.0, "{friction:?}");
     assert!(friction.leaves_limits_at.unwrap() <= falls_at);
     assert!(found.alone.windows(2).all(|pair| pair[0].danger >= pair[1].danger));
-    assert_eq!(found.together.map(|verdict| verdict.stand), Some(1));
+    assert_eq!(found.together.map(|verdict| verdict.survived), Some(1));
 }
 
 /// Keys and units of the search are those of the rig file.
@@ -291,18 +291,18 @@ fn every_imperfection_is_a_key_of_reality() {
 }
 
 #[test]
-fn a_required_size_is_run_and_one_that_topples_the_loop_is_found() {
+fn a_required_size_is_run_and_one_that_makes_the_loop_fall_is_found() {
     let (mut rig, table) = load("quadruple-paper");
     let settings = ImperfectionSettings { duration_s: 4.0, seeds: 2, ..ImperfectionSettings::of(&rig) };
-    let stood = |rig: &Rig| {
+    let survived = |rig: &Rig| {
         let found = required_imperfections(rig, &table, Law::Lqr, &settings).unwrap();
         found.iter().map(|one| (one.key, one.size, one.verdict.within_limits)).collect::<Vec<_>>()
     };
-    assert_eq!(stood(&rig), []);
+    assert_eq!(survived(&rig), []);
     rig.verify.driver_lag_s = Some(2e-4);
     rig.verify.joint_friction_n_m = Some(2e-5);
-    assert_eq!(stood(&rig), [("joint_friction_n_m", 2e-5, 2), ("driver_lag_s", 2e-4, 2)]);
-    // Negative control: more friction than the loop withstands.
+    assert_eq!(survived(&rig), [("joint_friction_n_m", 2e-5, 2), ("driver_lag_s", 2e-4, 2)]);
+    // Negative control: more friction than the loop survives.
     rig.verify.joint_friction_n_m = Some(3e-4);
-    assert_eq!(stood(&rig)[0], ("joint_friction_n_m", 3e-4, 0));
+    assert_eq!(survived(&rig)[0], ("joint_friction_n_m", 3e-4, 0));
 }

@@ -1,4 +1,4 @@
-//! Gains for stated tolerances: what is written is what was chosen, and it withstands what makes the file's own gains
+//! Gains for stated tolerances: what is written is what was chosen, and it survives what makes the file's own gains
 //! fall.
 
 use std::path::Path;
@@ -30,18 +30,18 @@ fn judged(rig: &Rig, tolerances: &Tolerances, settings: &JudgeSettings) -> Vec<J
 }
 
 #[test]
-fn the_robust_quadruple_stands_what_topples_the_papers() {
+fn the_robust_quadruple_survives_what_makes_the_papers_fall() {
     let (robust, paper) = (rig(&text("quadruple-robust")), rig(&text("quadruple-paper")));
     // The largest share that is tried is 1.5e-4 N·m.
     let stated = robust.robust.clone().unwrap();
     assert_eq!((stated.mass_percent, stated.joint_friction_n_m), (10.0, 1.2e-4));
     for judgement in judged(&robust, &stated, &short(&robust)) {
-        assert!(judgement.stands() && judgement.corners == Some([32, 32]), "{judgement:?}");
+        assert!(judgement.survives() && judgement.corners == Some([32, 32]), "{judgement:?}");
     }
     // Negative control: the paper's weights.
     for judgement in judged(&paper, &stated, &short(&paper)) {
-        assert!(judgement.machines[0].stood == 2 && judgement.machines[3].stood == 0, "{judgement:?}");
-        assert!(judgement.corners.is_some_and(|[_, stand]| stand < 32), "{judgement:?}");
+        assert!(judgement.machines[0].survived == 2 && judgement.machines[3].survived == 0, "{judgement:?}");
+        assert!(judgement.corners.is_some_and(|[_, survived]| survived < 32), "{judgement:?}");
     }
 }
 
@@ -76,7 +76,7 @@ fn what_is_written_is_what_was_judged() {
     let again = judged(&chosen, &tolerances, &settings);
     let before: Vec<Judgement> = choice.laws.iter().map(|chosen| chosen.judgement.clone()).collect();
     assert_eq!(again, before);
-    assert!(before.iter().all(Judgement::stands));
+    assert!(before.iter().all(Judgement::survives));
     // Negative control: another joint noise leads to other runs.
     let mut other = chosen;
     other.kalman.as_mut().unwrap().joint_noise[0] *= 2.0;
@@ -93,7 +93,7 @@ fn where_nothing_helps_the_reason_is_told() {
     };
     let friction = reason(Tolerances { joint_friction_n_m: 10.0, ..Tolerances::default() });
     assert!(
-        friction.contains("loops stands friction") && friction.contains("smaller bearings"),
+        friction.contains("loops survives friction") && friction.contains("smaller bearings"),
         "{friction}"
     );
     assert!(friction.contains("not even an eighth"), "{friction}");

@@ -1,4 +1,4 @@
-//! `upright robust` on rigs that are not in the repository: it ends with a choice that withstands the tolerances, or
+//! `upright robust` on rigs that are not in the repository: it ends with a choice that survives the tolerances, or
 //! with a reason.
 
 use std::path::Path;
@@ -12,7 +12,7 @@ use upright_design::rig::Rig;
 use upright_design::robust::{Choice, JudgeSettings, Judgement, RobustError, choose};
 
 /// Friction of a joint over the weight of a link times its length, for 1 to 5 links: about what such a chain
-/// withstands.
+/// survives.
 const FRICTION: [f64; 5] = [4e-3, 4e-4, 1e-4, 3e-5, 1e-5];
 
 struct Random(Pcg64);
@@ -82,7 +82,7 @@ fn rig(text: &str) -> Rig {
     Rig::from_toml(text, Path::new("generated.toml")).unwrap()
 }
 
-/// The outcome with the friction of the file times `friction`: a choice that stands, or the reason, which contains a
+/// The outcome with the friction of the file times `friction`: a choice that survives, or the reason, which contains a
 /// number.
 fn outcome(text: &str, friction: f64) -> Result<Choice, String> {
     let rig = rig(text);
@@ -91,7 +91,7 @@ fn outcome(text: &str, friction: f64) -> Result<Choice, String> {
     let settings = JudgeSettings { runs: 1, duration_s: 10.0, ..JudgeSettings::of(&rig) };
     match choose(&rig, &tolerances, &settings, false, &|_| ()) {
         Ok((choice, _)) => {
-            assert!(choice.laws.len() == 2 && choice.laws.iter().all(|law| law.judgement.stands()));
+            assert!(choice.laws.len() == 2 && choice.laws.iter().all(|law| law.judgement.survives()));
             Ok(choice)
         }
         Err(RobustError::Unhelped(reason)) => {
@@ -110,12 +110,12 @@ fn a_generated_rig_gets_a_choice_or_a_reason() {
     let (one, two) = (generated(1, false), generated(2, false));
     for (links, text) in [(1, &one), (2, &two)] {
         let chosen = outcome(text, 1.0).unwrap_or_else(|reason| panic!("{links} links: {reason}"));
-        let stood = |law: &Judgement| law.corners == Some([2 << links, 2 << links]);
-        assert!(chosen.laws.iter().all(|law| stood(&law.judgement)));
+        let survived = |law: &Judgement| law.corners == Some([2 << links, 2 << links]);
+        assert!(chosen.laws.iter().all(|law| survived(&law.judgement)));
     }
     // Ten times the friction.
     let reason = outcome(&one, 10.0).unwrap_err();
-    assert!(reason.contains("loops stands friction"), "{reason}");
+    assert!(reason.contains("loops survives friction"), "{reason}");
 }
 
 /// All ten rigs, each also with ten times the friction. Writes their files to the folder for temporary files of tests,

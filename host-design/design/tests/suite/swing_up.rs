@@ -106,7 +106,7 @@ fn a_wrong_knot_spacing_is_refused_and_a_wrong_tick_falls() {
     assert!(!arrives_with(&rig, &fast));
 }
 
-/// For a motion that does not withstand the required errors, the message says which smaller ones it would withstand,
+/// For a motion that does not survive the required errors, the message says which smaller ones it would survive,
 /// and with these it does.
 #[test]
 fn the_errors_that_a_fragile_motion_would_stand_are_told() {
@@ -115,16 +115,16 @@ fn the_errors_that_a_fragile_motion_would_stand_are_told() {
         let mut rig = rig.clone();
         let rules = rig.swing_up.as_mut().unwrap();
         (rules.mass_spread_percent, rules.friction_spread_percent) = (mass, friction);
-        judge(&rig, &stored, &|_| ()).map(|plan| plan.raise.runs.stood)
+        judge(&rig, &stored, &|_| ()).map(|plan| plan.raise.runs.arrived)
     };
-    let Err(SwingUpError::NotRobust { stood, help, .. }) = with(60.0, 60.0) else { panic!("60 % is stood") };
-    println!("{stood}: {help}");
+    let Err(SwingUpError::NotRobust { arrived, help, .. }) = with(60.0, 60.0) else { panic!("60 % arrives") };
+    println!("{arrived}: {help}");
     let number = |key: &str| -> f64 {
         let (_, rest) = help.split_once(&format!("swing_up.{key}_spread_percent = ")).unwrap();
         rest.split_whitespace().next().unwrap().parse().unwrap()
     };
     let found = with(number("mass"), number("friction")).unwrap();
-    assert!(found > stood && help.starts_with(&format!("{found} of 200 arrive with ")), "{found}: {help}");
+    assert!(found > arrived && help.starts_with(&format!("{found} of 200 arrive with ")), "{found}: {help}");
 }
 
 #[test]
@@ -141,8 +141,8 @@ fn candidates_are_the_same_for_a_seed_and_fewer_runs_arrive_with_larger_errors()
     let rules = rig.swing_up.as_mut().unwrap();
     (rules.mass_spread_percent, rules.friction_spread_percent) = (60.0, 60.0);
     let wrong = solved(&rig, 8, 1, &|_| ()).unwrap();
-    let stood = |some: &[Solved]| some.iter().map(|one| one.runs.stood).sum::<usize>();
-    assert!(stood(&wrong) < stood(&first), "{wrong:?}");
+    let arrived = |some: &[Solved]| some.iter().map(|one| one.runs.arrived).sum::<usize>();
+    assert!(arrived(&wrong) < arrived(&first), "{wrong:?}");
 }
 
 #[test]

@@ -184,7 +184,7 @@ fn random_runs(name: &'static str, table: &TableValues, base_seed: u64) -> [usiz
         firmware_runs(&rig(name), table, stored_motions(name), condition, base_seed, 3, &Study::whole())
             .unwrap();
     println!("{name}, {}: {found:?}", condition.name);
-    [found.raise.stood, found.lower.stood]
+    [found.raise.arrived, found.lower.arrived]
 }
 
 #[test]
@@ -223,7 +223,7 @@ fn a_motion_that_the_supervisor_ends_has_not_arrived() {
     // On this rail the firmware refuses to begin.
     table.limits.rail_m = [-0.2, 0.2];
     let [raise, _] = arriving(&table);
-    assert_eq!((raise.stood, raise.runs), (0, RUNS));
+    assert_eq!((raise.arrived, raise.runs), (0, RUNS));
 }
 
 #[test]
@@ -273,7 +273,7 @@ fn a_hanging_link_may_be_pushed_hard_and_with_reversed_gains_not_at_all() {
     let (up, down) = (of(&table, Way::Up), of(&table, Way::Down));
     println!("{up:?}, {down:?}");
     assert!(up.iter().chain(&down).flatten().all(|&push| push > 0.1), "{up:?}, {down:?}");
-    // A hanging link withstands a stronger push than an upright one.
+    // A hanging link survives a stronger push than an upright one.
     let is_less =
         |upright: [f64; 2], hanging: [f64; 2]| (0..2).all(|side| 1.5 * upright[side] < hanging[side]);
     assert!(is_less(up[2], up[0]) && is_less(down[0], down[2]), "{up:?}, {down:?}");

@@ -110,18 +110,18 @@ fn too_weak_a_motor_holds_less_and_finally_nothing() {
 
     let (paper, _) = &*PAPER;
     let feeble = with_force_limit(paper.clone(), 0.05);
-    let stood = endurance(&feeble, &table(&feeble), Law::Lqr, &PAPERS, 2, 5.0, &|| ()).unwrap();
-    assert_eq!(stood.stood, 0, "0.05 N against noise of 0.1 N");
+    let found = endurance(&feeble, &table(&feeble), Law::Lqr, &PAPERS, 2, 5.0, &|| ()).unwrap();
+    assert_eq!(found.survived, 0, "0.05 N against noise of 0.1 N");
 }
 
 #[test]
-fn the_papers_rig_stands_for_long_in_noise() {
+fn the_papers_rig_survives_for_long_in_noise() {
     let (rig, table) = &*PAPER;
     for law in LAWS {
         let found = endurance(rig, table, law, &PAPERS, 4, 20.0, &|| ()).unwrap();
-        assert_eq!((found.stood, found.fallen.len()), (4, 0), "{law:?}");
+        assert_eq!((found.survived, found.fallen.len()), (4, 0), "{law:?}");
         let noise = noise_run(rig, table, law, &PAPERS, 4, 5.0).unwrap();
-        assert_eq!(noise.stood, 4);
+        assert_eq!(noise.survived, 4);
         // The force has to compensate the disturbances of the cart.
         assert!(noise.force_rms_n > 0.1 && noise.force_peak_n <= 5.0, "{noise:?}");
         assert!(noise.angle_rms_rad.iter().all(|&rms| rms > 1e-5 && rms < 0.05), "{noise:?}");
@@ -129,12 +129,12 @@ fn the_papers_rig_stands_for_long_in_noise() {
 }
 
 #[test]
-fn every_corner_of_two_percent_wrong_masses_stands() {
+fn every_corner_of_two_percent_wrong_masses_survives() {
     let (rig, table) = &*PAPER;
     for law in LAWS {
         let settings = CornerSettings { disturbance: PAPERS, ..CornerSettings::of(rig) };
         let found = corners(rig, table, law, 2.0, &settings).unwrap();
-        assert_eq!((found.stand, found.corners), (32, 32), "{law:?}: {:?}", found.lost);
+        assert_eq!((found.survived, found.corners), (32, 32), "{law:?}: {:?}", found.lost);
     }
 }
 
@@ -143,7 +143,7 @@ fn masses_wrong_by_a_third_do_not_stand_and_the_weakest_is_named() {
     let (rig, table) = &*PAPER;
     let settings = CornerSettings { disturbance: PAPERS, ..CornerSettings::of(rig) };
     let found = corners(rig, table, Law::Lqr, 30.0, &settings).unwrap();
-    assert!(found.stand < 24, "{}", found.stand);
+    assert!(found.survived < 24, "{}", found.survived);
     let first = |fall: &Option<upright_design::simulate::Fall>| fall.as_ref().unwrap().at_s;
     let at_s = first(&found.weakest.outcome.fall);
     let fallen = found.lost.iter().filter(|corner| corner.outcome.fall.is_some());
@@ -183,7 +183,7 @@ fn monte_carlo_does_not_depend_on_the_threads_and_its_worst_case_can_be_replayed
     };
     let found = with_threads(1);
     assert_eq!(found, with_threads(3));
-    assert!(found.stood > 0 && found.stood < 60, "{found:?}");
+    assert!(found.survived > 0 && found.survived < 60, "{found:?}");
     let [low, high] = found.interval;
     assert!(0.0 < low && low < found.success_rate && found.success_rate < high && high < 1.0);
 
@@ -229,8 +229,8 @@ fn too_coarse_an_encoder_falls_and_the_coarsest_is_found() {
     let factor = found.factor.unwrap();
     assert!((1.0..64.0).contains(&factor) && !found.at_largest_tried, "{found:?}");
     let coarse = coarser(rig, 64.0);
-    let stood = endurance(&coarse, &table(&coarse), Law::Lqr, &PAPERS, 2, 5.0, &|| ()).unwrap();
-    assert_eq!(stood.stood, 0, "64 counts per revolution");
+    let found = endurance(&coarse, &table(&coarse), Law::Lqr, &PAPERS, 2, 5.0, &|| ()).unwrap();
+    assert_eq!(found.survived, 0, "64 counts per revolution");
 }
 
 #[test]

@@ -17,7 +17,7 @@ use super::machine::Stop;
 use super::record::Journal;
 use crate::identified::{json, rig_file, text};
 
-/// Duration of the runs that the gains have to withstand (s).
+/// Duration of the runs that the gains have to survive (s).
 const RUN_S: f64 = 10.0;
 /// Width of the tolerances, in deviations of the estimates.
 const DEVIATIONS: f64 = 2.0;
@@ -112,7 +112,7 @@ fn tolerances(rig: &Rig, found: &Identification) -> Tolerances {
     }
 }
 
-/// The file's own weights if they withstand the tolerances; else those that a search finds; else the file's own again.
+/// The file's own weights if they survive the tolerances; else those that a search finds; else the file's own again.
 fn robust(
     journal: &mut Journal,
     plan: Plan<'_>,
@@ -121,12 +121,12 @@ fn robust(
 ) -> Result<Designed, Stop> {
     let settings = JudgeSettings { runs: 1, duration_s: RUN_S, ..JudgeSettings::of(&own.rig) };
     let laws: Vec<Law> = own.table.laws.present().map(|(law, _)| law).collect();
-    let stands = |law: &Law| -> Result<bool, Unverifiable> {
-        Ok(judge(&own.rig, &own.table, *law, tolerances, &settings, &Study::whole())?.stands())
+    let survives = |law: &Law| -> Result<bool, Unverifiable> {
+        Ok(judge(&own.rig, &own.table, *law, tolerances, &settings, &Study::whole())?.survives())
     };
-    let all = laws.iter().map(stands).collect::<Result<Vec<_>, _>>();
-    if all.map_err(|error| Stop::Machine(error.to_string()))?.iter().all(|&stands| stands) {
-        journal.found("the weights of the file withstand that");
+    let all = laws.iter().map(survives).collect::<Result<Vec<_>, _>>();
+    if all.map_err(|error| Stop::Machine(error.to_string()))?.iter().all(|&survives| survives) {
+        journal.found("the weights of the file survive that");
         return Ok(own);
     }
     match choose(&own.rig, tolerances, &settings, false, &|_| ()) {
@@ -140,7 +140,7 @@ fn robust(
         }
         Err(RobustError::Unhelped(reason)) => {
             journal.found(format!(
-                "no other weights withstand all of that ({reason}): those of the file are kept"
+                "no other weights survive all of that ({reason}): those of the file are kept"
             ));
             Ok(own)
         }

@@ -96,7 +96,7 @@ fn row(candidate: &Candidate, law: Law, conditions: &Conditions) -> Result<Row, 
         rig: candidate.label.clone(),
         value: candidate.value,
         law,
-        fate: Fate::Standing,
+        fate: Fate::Survived,
         figures: None,
         trace: None,
     };
@@ -114,7 +114,7 @@ fn row(candidate: &Candidate, law: Law, conditions: &Conditions) -> Result<Row, 
     let fate = match summary.fall {
         Some(fall) => Fate::Fallen(fall),
         None if summary.settled => Fate::Settled,
-        None => Fate::Standing,
+        None => Fate::Survived,
     };
     Ok(Row { fate, figures: Some(figures), trace: Some(trace), ..row })
 }

@@ -27,10 +27,10 @@ pub struct Row {
 #[derive(Debug, Clone, PartialEq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Fate {
-    /// It stands, and is within the settling band when the run ends.
+    /// It is up, and within the settling band, when the run ends.
     Settled,
-    /// It stands, but is not within the band.
-    Standing,
+    /// It is up, but not within the band.
+    Survived,
     /// It falls.
     Fallen(Fall),
     /// There is no design; holds the reason.

@@ -37,7 +37,7 @@ pub fn table(rows: &[Row], key: Option<&str>) -> String {
 fn fate(fate: &Fate) -> String {
     match fate {
         Fate::Settled => "settles".to_owned(),
-        Fate::Standing => "stands".to_owned(),
+        Fate::Survived => "survives".to_owned(),
         Fate::Fallen(fall) => format!("{fall}"),
         Fate::NoDesign(_) => "no design".to_owned(),
     }
@@ -80,7 +80,7 @@ pub fn notes(rows: &[Row], key: Option<&str>) -> Vec<String> {
                 row.value.map_or(String::new(), |value| format!(", {} = {value}", key.unwrap_or("value")));
             Some(format!("{}{value}: {reason}", row.rig))
         }
-        Fate::Settled | Fate::Standing | Fate::Fallen(_) => None,
+        Fate::Settled | Fate::Survived | Fate::Fallen(_) => None,
     };
     rows.iter().filter_map(note).collect()
 }
@@ -112,7 +112,7 @@ pub fn csv(rows: &[Row], key: Option<&str>) -> std::io::Result<Vec<u8>> {
     for row in rows {
         let reason = match &row.fate {
             Fate::NoDesign(reason) => reason.as_str(),
-            Fate::Settled | Fate::Standing | Fate::Fallen(_) => "",
+            Fate::Settled | Fate::Survived | Fate::Fallen(_) => "",
         };
         let of = |value: fn(&Figures) -> Option<f64>| number(row.figures.as_ref().and_then(value));
         csv.write_record([

@@ -5,7 +5,7 @@ use upright_design::robust::{Front, FrontPoint};
 
 use super::{Axis, Curve, Figure, Panel};
 
-/// One curve for each law. A multiple that no choice withstands interrupts the lines.
+/// One curve for each law. A multiple that no choice survives interrupts the lines.
 pub fn front_figure(front: &Front, title: &str) -> Figure {
     let ends = front.0.iter().map(|point| point.scale);
     let largest = ends.fold(0.0, f64::max);

@@ -65,5 +65,5 @@ const ROBUST_PERCENT: f64 = 90.0;
 
 /// Share of the random runs that arrive (%).
 fn percent(runs: &Runs) -> f64 {
-    100.0 * runs.stood as f64 / runs.runs.max(1) as f64
+    100.0 * runs.arrived as f64 / runs.runs.max(1) as f64
 }

@@ -1,25 +1,25 @@
-//! How much of each imperfection of the machine each law withstands, as tables and figures.
+//! How much of each imperfection of the machine each law survives, as tables and figures.
 
 use super::Source;
 use crate::figure::{Axis, Curve, Figure, Panel};
-use upright_design::verify::{CornerSettings, Imperfections, Standing, Unverifiable, corners, limit_cycle};
+use upright_design::verify::{CornerSettings, Imperfections, Survival, Unverifiable, corners, limit_cycle};
 
 /// Errors of the masses for which every combination is run (%).
 const PERCENTS: [f64; 9] = [2.0, 5.0, 7.0, 10.0, 15.0, 20.0, 30.0, 50.0, 70.0];
-/// Errors beyond this one are run only as long as all combinations stand (%).
+/// Errors beyond this one are run only as long as all combinations survive (%).
 const ENOUGH_PERCENT: f64 = 30.0;
 /// With more links there are too many combinations for each percentage.
 const MOST_LINKS: usize = 5;
 
 /// The size of each imperfection at which one law falls, and at which it leaves the limits.
-pub(super) struct StandingTable {
+pub(super) struct SurvivalTable {
     pub(super) law: &'static str,
-    pub(super) rows: Vec<StandingRow>,
+    pub(super) rows: Vec<SurvivalRow>,
     pub(super) together: Option<String>,
 }
 
 /// One imperfection alone.
-pub(super) struct StandingRow {
+pub(super) struct SurvivalRow {
     pub(super) is_dangerous: bool,
     pub(super) key: &'static str,
     pub(super) falls_at: String,
@@ -29,28 +29,28 @@ pub(super) struct StandingRow {
     pub(super) remedy: &'static str,
 }
 
-impl StandingTable {
+impl SurvivalTable {
     pub(super) fn of(found: &Imperfections) -> Self {
         let together = found.together.map(|all| {
             let (angle_rad, position_m) = (all.peak_angle_rad, all.peak_position_m);
             format!(
-                "{} of {} stand, up to {angle_rad:.3} rad and {position_m:.3} m",
-                all.stand, found.settings.seeds
+                "{} of {} survive, up to {angle_rad:.3} rad and {position_m:.3} m",
+                all.survived, found.settings.seeds
             )
         });
-        Self { law: found.law.title(), rows: found.alone.iter().map(StandingRow::of).collect(), together }
+        Self { law: found.law.title(), rows: found.alone.iter().map(SurvivalRow::of).collect(), together }
     }
 }
 
-impl StandingRow {
-    fn of(standing: &Standing) -> Self {
-        let one = standing.imperfection;
+impl SurvivalRow {
+    fn of(survival: &Survival) -> Self {
+        let one = survival.imperfection;
         let unit = one.unit;
         Self {
-            is_dangerous: standing.danger > 1.0,
+            is_dangerous: survival.danger > 1.0,
             key: one.key,
-            falls_at: format!("{} {unit}", standing.falls_text()),
-            leaves_limits_at: format!("{} {unit}", standing.leaves_limits_text()),
+            falls_at: format!("{} {unit}", survival.falls_text()),
+            leaves_limits_at: format!("{} {unit}", survival.leaves_limits_text()),
             typical: format!("{} {unit}", one.typical_text()),
             source: one.source,
             remedy: one.remedy,
@@ -67,15 +67,15 @@ pub(super) fn limit_cycles(source: &Source<'_>) -> Result<Figure, Unverifiable> 
         let friction = found.alone.iter().find(|one| one.imperfection.key == "joint_friction_n_m");
         let Some(friction) = friction else { continue };
         let cycle = limit_cycle(rig, table, found.law, &found.settings, friction)?;
-        let standing = cycle.iter().filter(|(_, verdict)| verdict.stand == found.settings.seeds);
+        let survival = cycle.iter().filter(|(_, verdict)| verdict.survived == found.settings.seeds);
         let points: Vec<[f64; 2]> =
-            standing.map(|(size, verdict)| [*size, 1e3 * verdict.peak_angle_rad]).collect();
+            survival.map(|(size, verdict)| [*size, 1e3 * verdict.peak_angle_rad]).collect();
         panel = with_line(panel, found.law.title(), number, points);
     }
     Ok(Figure::narrow(format!("{}: limit cycle over friction", rig.name)).with(panel))
 }
 
-/// Share of the combinations of wrong masses that stand, over the percentage, a curve for each law; none for a chain
+/// Share of the combinations of wrong masses that survive, over the percentage, a curve for each law; none for a chain
 /// with too many combinations.
 pub(super) fn wrong_masses(source: &Source<'_>) -> Result<Option<Figure>, Unverifiable> {
     let Source { rig, table, imperfections, .. } = *source;
@@ -83,15 +83,15 @@ pub(super) fn wrong_masses(source: &Source<'_>) -> Result<Option<Figure>, Unveri
         return Ok(None);
     }
     let x = Axis::linear("error of the masses (±%)");
-    let y = Axis::linear("combinations that stand (%)").range(0.0, 105.0);
+    let y = Axis::linear("combinations that survive (%)").range(0.0, 105.0);
     let mut panel = Panel::new(x, y).high(360);
     for (number, found) in imperfections.iter().enumerate() {
         let settings = CornerSettings { duration_s: found.settings.duration_s, ..CornerSettings::of(rig) };
         let mut points = vec![[0.0, 100.0]];
         for percent in PERCENTS {
             let tried = corners(rig, table, found.law, percent, &settings)?;
-            points.push([percent, 100.0 * tried.stand as f64 / tried.corners as f64]);
-            if tried.stand == 0 || (percent >= ENOUGH_PERCENT && tried.stand < tried.corners) {
+            points.push([percent, 100.0 * tried.survived as f64 / tried.corners as f64]);
+            if tried.survived == 0 || (percent >= ENOUGH_PERCENT && tried.survived < tried.corners) {
                 break;
             }
         }

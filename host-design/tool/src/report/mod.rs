@@ -39,7 +39,7 @@ pub struct Source<'a> {
     pub table: &'a TableValues,
     /// The trust report of this table.
     pub trust: &'a TrustReport,
-    /// How much of each imperfection each law withstands; empty: the page has no such part.
+    /// How much of each imperfection each law survives; empty: the page has no such part.
     pub imperfections: &'a [Imperfections],
     /// Seed of the disturbances in the runs.
     pub seed: u64,

@@ -5,7 +5,7 @@ use upright::table::{Law, TABLE_FORMAT};
 
 use super::animation::Animation;
 use super::cost::Cost;
-use super::imperfections::StandingTable;
+use super::imperfections::SurvivalTable;
 use super::number::{number, poles, significant};
 use super::plot::Plot;
 use super::runs::{LawRun, Scene, laws};
@@ -46,7 +46,7 @@ pub(super) struct Page<'a> {
     pub(super) nyquist: Vec<Plot>,
     pub(super) regions: Vec<Plot>,
     pub(super) pushes: Vec<Plot>,
-    standings: Vec<StandingTable>,
+    survivals: Vec<SurvivalTable>,
     pub(super) imperfect: Vec<Plot>,
     trust: Vec<TrustRow>,
     seed: u64,
@@ -70,7 +70,7 @@ pub(super) struct SceneEntry {
 
 struct Outcome {
     law: &'static str,
-    stands: bool,
+    survives: bool,
     text: String,
 }
 
@@ -139,7 +139,7 @@ impl<'a> Page<'a> {
             nyquist: Vec::new(),
             regions: Vec::new(),
             pushes: Vec::new(),
-            standings: source.imperfections.iter().map(StandingTable::of).collect(),
+            survivals: source.imperfections.iter().map(SurvivalTable::of).collect(),
             imperfect: Vec::new(),
             trust: trust_rows(rig, trust),
             seed: source.seed,
@@ -171,8 +171,8 @@ impl Outcome {
         let summary = &run.summary;
         let mut parts = vec![match (&summary.fall, summary.settling_time_s) {
             (Some(fall), _) => format!("falls: {fall}"),
-            (None, Some(time)) => format!("stands, settled after {} s", number(time)),
-            (None, None) => "stands, not settled to within 2 % (at least 1 mm) at the end".to_owned(),
+            (None, Some(time)) => format!("survives, settled after {} s", number(time)),
+            (None, None) => "survives, not settled to within 2 % (at least 1 mm) at the end".to_owned(),
         }];
         parts.extend(summary.overshoot_percent.map(|over| format!("overshoot {} %", number(over))));
         let degrees = summary.peak_angles_rad.iter().copied().fold(0.0, f64::max).to_degrees();
@@ -181,7 +181,7 @@ impl Outcome {
         }
         let (what, unit) = if summary.peak_angles_rad.is_empty() { ("input", "") } else { ("force", " N") };
         parts.push(format!("largest {what} {}{unit}", number(summary.peak_force_n)));
-        Self { law: run.law.title(), stands: summary.stands(), text: parts.join(", ") }
+        Self { law: run.law.title(), survives: summary.survives(), text: parts.join(", ") }
     }
 }
 

@@ -163,8 +163,8 @@ fn settling(settling: &Settling) -> String {
             yes(row.printed).to_owned(),
             match (&row.fall, row.settled_after_s) {
                 (Some(fall), _) => format!("has fallen by {:.2} s", fall.at_s),
-                (None, Some(time)) => format!("stands, within 2 % from {time:.2} s on"),
-                (None, None) => "stands, not settled".to_owned(),
+                (None, Some(time)) => format!("survives, within 2 % from {time:.2} s on"),
+                (None, None) => "survives, not settled".to_owned(),
             },
             unless_fallen(row.peak_angle_deg),
             unless_fallen(row.peak_force_n),
@@ -216,7 +216,7 @@ fn sensitivity(settling: &Settling) -> String {
     let settled = format!("settled at {LONGEST_S} s");
     let header = ["changed", "ts = 3 … 9 s", settled.as_str(), "runs that give the paper's verdicts"];
     format!(
-        "\nWhat else was tried, one change at a time (f: falls, n: stands, not within 2 % at {HORIZON_S} s, y: stabilised):\n\n{}",
+        "\nWhat else was tried, one change at a time (f: falls, n: survives, not within 2 % at {HORIZON_S} s, y: stabilised):\n\n{}",
         markdown_table(&header, 4, &rows)
     )
 }

@@ -58,7 +58,7 @@ impl Trajectory {
         self.states.iter().map(|state| state[index]).collect()
     }
 
-    /// Whether it stands `horizon_s` after the start, the cart within [`BAND`] of a step of `step_m`.
+    /// Whether it survives `horizon_s` after the start, the cart within [`BAND`] of a step of `step_m`.
     pub fn stabilised(&self, step_m: f64, horizon_s: f64) -> bool {
         let index = (horizon_s / self.sample_s).round() as usize;
         self.states.get(index).is_some_and(|state| (state[0] - step_m).abs() <= BAND * step_m.abs())
@@ -118,7 +118,7 @@ mod tests {
     }
 
     #[test]
-    fn stabilised_means_standing_near_the_set_point_at_the_horizon() {
+    fn stabilised_means_upright_near_the_set_point_at_the_horizon() {
         let run = trajectory(&[0.0, 0.99, 0.9, 1.01], None);
         let at = |run: &Trajectory| [0.5, 1.0, 1.5, 2.0].map(|horizon| run.stabilised(1.0, horizon));
         assert_eq!(at(&run), [true, false, true, false], "the run does not reach 2 s");

@@ -14,8 +14,8 @@ const GROWTH: f64 = 0.1;
 /// A challenge; the page shows its score.
 #[derive(Debug, Clone, Serialize)]
 pub(super) struct Challenge {
-    /// Time that the rig has stood (s).
-    stood_s: f64,
+    /// Time that the rig has been upright (s).
+    upright_s: f64,
     /// Hardest push that it has survived (N).
     survived_n: f64,
     /// The latest push (N), positive along +x; before the first one, its size.
@@ -34,7 +34,7 @@ impl Challenge {
     /// A challenge for a rig with this force limit (N).
     pub(super) fn new(force_limit_n: f64, seed: u64) -> Self {
         Self {
-            stood_s: 0.0,
+            upright_s: 0.0,
             survived_n: 0.0,
             push_n: GROWTH * force_limit_n,
             is_over: false,
@@ -44,16 +44,16 @@ impl Challenge {
         }
     }
 
-    /// Returns the force on the cart in the next tick (N). `stands`: the motor is on.
-    pub(super) fn tick(&mut self, stands: bool, period_s: f64) -> f64 {
-        self.is_over |= !stands;
+    /// Returns the force on the cart in the next tick (N). `survives`: the motor is on.
+    pub(super) fn tick(&mut self, survives: bool, period_s: f64) -> f64 {
+        self.is_over |= !survives;
         if self.is_over {
             return 0.0;
         }
-        self.stood_s += period_s;
+        self.upright_s += period_s;
         self.since_push_s += period_s;
         if self.since_push_s >= PAUSE_S {
-            if self.stood_s > PAUSE_S + PUSH_S {
+            if self.upright_s > PAUSE_S + PUSH_S {
                 self.survived_n = self.push_n.abs();
             }
             let side = if self.random.random() { 1.0 } else { -1.0 };
@@ -78,8 +78,8 @@ mod tests {
         // Pushes at 3.95 and 7.95 s; the one of 7.95 s has not been survived for long enough.
         assert!((hardest - 2.0).abs() < 1e-9 && (challenge.survived_n - 1.0).abs() < 1e-9, "{challenge:?}");
         assert_eq!(challenge.tick(false, 1e-3), 0.0);
-        let stood = challenge.stood_s;
+        let upright_s = challenge.upright_s;
         challenge.tick(true, 1e-3);
-        assert!(challenge.is_over && challenge.stood_s == stood);
+        assert!(challenge.is_over && challenge.upright_s == upright_s);
     }
 }

@@ -37,7 +37,7 @@ pub(super) struct Pull {
 
 /// Angular frequency of the spring with the mass that it moves, for one link (rad/s).
 const OMEGA: f64 = 3.0;
-/// More links withstand less, so the spring is softer: its frequency falls with this power of their number.
+/// More links survive less, so the spring is softer: its frequency falls with this power of their number.
 const SOFTER: f64 = 1.2;
 /// Damping ratio of the spring.
 const ZETA: f64 = 0.35;

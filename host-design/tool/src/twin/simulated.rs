@@ -278,10 +278,10 @@ impl<'a, 't> World<'a, 't> {
 
     /// Pushes of the defect and of the challenge on the cart (N).
     fn pushes(&mut self) -> f64 {
-        let stands = self.output.enable;
+        let survives = self.output.enable;
         let challenge = self.challenge.as_mut();
         let defect = self.defect.as_ref().map_or(0.0, Defective::push_n);
-        defect + challenge.map_or(0.0, |challenge| challenge.tick(stands, self.machine.rig.tick.period_s))
+        defect + challenge.map_or(0.0, |challenge| challenge.tick(survives, self.machine.rig.tick.period_s))
     }
 
     /// Force of the end stops on the cart (N): a spring and a damper at either end of the rail.

@@ -234,7 +234,7 @@ fn a_fall_ends_with_status_1_and_says_what_fell() {
     ];
     let output = upright(&arguments);
     let summary = object(&output);
-    assert_eq!((status(&output), &summary["stands"]), (1, &false.into()));
+    assert_eq!((status(&output), &summary["survives"]), (1, &false.into()));
     let link = summary["fall"]["kind"]["link"].as_u64().unwrap();
     assert!(stderr(&output).contains(&format!("link {link} fell")));
     // With gains designed for the tick, the same run balances.

@@ -40,7 +40,7 @@ fn machine(rig: &Rig, number: u8) -> Rig {
 }
 
 /// Whether the machine balances for 10 s with the whole firmware and the gains of `file`.
-fn stands(machine: &Rig, file: &Rig) -> bool {
+fn survives(machine: &Rig, file: &Rig) -> bool {
     let Ok(certified) = design(file) else { return false };
     let table = TableValues::of(file, &certified, Gains::Sampled).unwrap();
     let disturbance = Disturbance::of(machine);
@@ -96,10 +96,10 @@ fn one(name: &str, number: u8) -> [bool; 4] {
         ..with_weights_of(&rig, chosen)
     };
     [
-        designed.as_ref().is_some_and(|found| stands(&machine, found)),
-        stands(&machine, &truth),
-        stands(&machine, &with_weights_of(&rig, chosen)),
-        stands(&machine, &rig),
+        designed.as_ref().is_some_and(|found| survives(&machine, found)),
+        survives(&machine, &truth),
+        survives(&machine, &with_weights_of(&rig, chosen)),
+        survives(&machine, &rig),
     ]
 }
 
@@ -110,9 +110,9 @@ fn machines_balance_with_the_identified_file() {
     let machines = std::env::var("UPRIGHT_MACHINES").map_or(12, |number| number.parse().unwrap());
     let mut count = [0; 4];
     for number in 1..=machines {
-        let stood = one(&name, number);
-        count.iter_mut().zip(stood).for_each(|(count, stood)| *count += u32::from(stood));
-        println!("{name}, machine {number}: identified, true, original, unchanged: {stood:?}");
+        let survived = one(&name, number);
+        count.iter_mut().zip(survived).for_each(|(count, survived)| *count += u32::from(survived));
+        println!("{name}, machine {number}: identified, true, original, unchanged: {survived:?}");
     }
     println!("{name}: {machines} machines: identified, true, original, unchanged: {count:?}");
     assert!(count[0] + 1 >= count[1], "{count:?}");

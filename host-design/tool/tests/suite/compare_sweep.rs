@@ -90,7 +90,7 @@ fn sweep_of(name: &str, sweep: &str) -> (Vec<Candidate>, Sweep) {
 fn fates(rows: &[Row]) -> String {
     let letter = |row: &Row| match row.fate {
         Fate::Settled => 'y',
-        Fate::Standing => 'n',
+        Fate::Survived => 'n',
         Fate::Fallen(_) => 'f',
         Fate::NoDesign(_) => '-',
     };

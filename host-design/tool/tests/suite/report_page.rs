@@ -166,7 +166,7 @@ fn imperfections_have_a_table_and_two_figures_where_they_are_asked_for() {
                 rows.map(|line| line.split(',').skip(3).take(2).map(|x| x.parse().unwrap()).collect());
             numbers.collect::<Vec<Vec<f64>>>()
         };
-        // More friction makes a larger limit cycle; without mass errors, every combination stands.
+        // More friction makes a larger limit cycle; without mass errors, every combination survives.
         let cycle = csv("limit-cycle");
         assert!(cycle.len() >= 5 && cycle[cycle.len() - 1][1] > 2.0 * cycle[0][1], "{name} {cycle:?}");
         assert_eq!(csv("wrong-masses")[0], [0.0, 100.0], "{name}");

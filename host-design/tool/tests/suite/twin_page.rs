@@ -219,7 +219,7 @@ fn until_done(browser: &mut Browser, key: &str, expression: &str) {
 }
 
 #[test]
-fn a_weaker_motor_topples_the_rig_at_the_gain_margin_that_verify_gives() {
+fn a_weaker_motor_makes_the_rig_fall_at_the_gain_margin_that_verify_gives() {
     let Some(mut browser) = browser() else { return };
     let file = format!("{}/../../rigs/quadruple-paper.toml", env!("CARGO_MANIFEST_DIR"));
     let rig = Rig::from_path(Path::new(&file)).unwrap().with_law_alone(Law::Lqr);
@@ -229,7 +229,7 @@ fn a_weaker_motor_topples_the_rig_at_the_gain_margin_that_verify_gives() {
     let twin = Twin::start("quadruple-paper", &[]);
     browser.open_address(&twin.address, 1280, "light", "screen");
     until_state(&mut browser, "Balancing");
-    // So near to the margin, the rig's usual force noise topples it in 1 of 100 runs.
+    // So near to the margin, the rig's usual force noise makes it fall in 1 of 100 runs.
     set(&mut browser, "force-noise", 0.0);
     set_speed(&mut browser, FASTEST);
     set(&mut browser, "force", (120.0 * margin).ceil() - 100.0);

@@ -100,7 +100,7 @@ fn too_coarse_an_encoder_fails_where_it_is_about_encoders_or_runs() {
     assert_eq!(status(&output), 1, "{}", stderr(&output));
     let failed = failed(&object(&output));
     assert!(
-        failed.iter().any(|line| line.contains("encoder_factor") || line.contains("runs that stand")),
+        failed.iter().any(|line| line.contains("encoder_factor") || line.contains("runs that survive")),
         "{failed:?}"
     );
     assert!(failed.iter().all(|line| stderr(&output).contains(line)), "{failed:?}: {}", stderr(&output));
@@ -117,7 +117,7 @@ fn too_small_a_force_fails_where_it_is_about_tilt_or_runs() {
     );
     assert_eq!(status(&output), 1, "{}", stderr(&output));
     let failed = failed(&object(&output));
-    for line in ["tilt_rad", "nominal runs that stand"] {
+    for line in ["tilt_rad", "nominal runs that survive"] {
         assert!(failed.iter().any(|failed| failed.contains(line)), "{line}: {failed:?}");
     }
     assert!(failed.iter().all(|line| !line.contains("spectral radius")), "{failed:?}");
@@ -211,5 +211,5 @@ fn an_imperfection_that_the_file_requires_to_be_stood_is_a_requirement() {
         (check.unwrap()["holds"].as_bool().unwrap(), check.unwrap()["required"].as_f64().unwrap())
     };
     assert_eq!(required("1e-3"), (true, 4.0));
-    assert_eq!(required("1.0"), (false, 4.0), "a driver that topples it");
+    assert_eq!(required("1.0"), (false, 4.0), "a driver that makes it fall");
 }

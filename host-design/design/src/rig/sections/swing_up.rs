@@ -9,7 +9,7 @@ use super::super::rule::Rule;
 pub(in crate::rig) static SWING_UP: Section = Section {
     name: "swing_up",
     title: "[swing_up]",
-    meaning: "limits of the motions that `upright swing-up` plans, and errors that they have to withstand; changes no \
+    meaning: "limits of the motions that `upright swing-up` plans, and errors that they have to survive; changes no \
               gain",
     absent: Absent::Follows("as below"),
     keys: &[SwingUpRules::KEYS],
@@ -18,7 +18,7 @@ pub(in crate::rig) static SWING_UP: Section = Section {
 const DURATION: Rule = Rule::DURATION.worded("a number > 0 and <= 60 (s), shortest_s at most longest_s");
 
 keys! {
-    /// Limits of the planned motions, and the errors that they have to withstand. They change no gain, so they are not
+    /// Limits of the planned motions, and the errors that they have to survive. They change no gain, so they are not
     /// part of the rig's hash.
     pub struct SwingUpRules {
         shortest_s: Option<f64>, "s", DURATION,

@@ -34,7 +34,7 @@ keys! {
             "error (±) of the masses; the loop has to balance in every combination of errors",
             Absent::Numbers(&[2.0]);
         success_percent: f64, "%", Rule::PERCENT,
-            "least share of random plants that stand, as the lower end of its 95 % interval",
+            "least share of random plants that survive, as the lower end of its 95 % interval",
             Absent::Numbers(&[95.0]);
         encoder_factor: f64, "", Rule::POSITIVE,
             "least factor by which all encoders may be coarser", Absent::Numbers(&[1.5]);
@@ -45,33 +45,33 @@ keys! {
             "rms of the disturbing torque at each joint in the runs, drawn again each tick",
             Absent::Follows("what [kalman] expects");
         joint_friction_n_m: Option<f64>, "N·m", Rule::POSITIVE,
-            "Coulomb friction in each joint that the loop has to withstand as the only imperfection", NOT_REQUIRED;
+            "Coulomb friction in each joint that the loop has to survive as the only imperfection", NOT_REQUIRED;
         cart_friction_n: Option<f64>, "N", Rule::POSITIVE,
-            "Coulomb friction of the cart that the loop has to withstand as the only imperfection", NOT_REQUIRED;
+            "Coulomb friction of the cart that the loop has to survive as the only imperfection", NOT_REQUIRED;
         homing_error_rad: Option<f64>, "rad", Rule::ANGLE,
-            "error of each joint's zero that the loop has to withstand as the only imperfection", NOT_REQUIRED;
+            "error of each joint's zero that the loop has to survive as the only imperfection", NOT_REQUIRED;
         eccentricity_rad: Option<f64>, "rad", Rule::ANGLE,
-            "amplitude of each joint encoder's once-per-turn error that the loop has to withstand as the only \
+            "amplitude of each joint encoder's once-per-turn error that the loop has to survive as the only \
              imperfection",
             NOT_REQUIRED;
         rail_tilt_rad: Option<f64>, "rad", Rule::ANGLE,
-            "slope of the rail that the loop has to withstand as the only imperfection", NOT_REQUIRED;
+            "slope of the rail that the loop has to survive as the only imperfection", NOT_REQUIRED;
         backlash_m: Option<f64>, "m", Rule::POSITIVE,
-            "play between motor and cart that the loop has to withstand as the only imperfection", NOT_REQUIRED;
+            "play between motor and cart that the loop has to survive as the only imperfection", NOT_REQUIRED;
         belt_compliance_m_per_n: Option<f64>, "m/N", Rule::POSITIVE,
-            "stretch of belt or gear per force that the loop has to withstand as the only imperfection", NOT_REQUIRED;
+            "stretch of belt or gear per force that the loop has to survive as the only imperfection", NOT_REQUIRED;
         driver_lag_s: Option<f64>, "s", Rule::POSITIVE,
-            "time constant of the motor driver that the loop has to withstand as the only imperfection", NOT_REQUIRED;
+            "time constant of the motor driver that the loop has to survive as the only imperfection", NOT_REQUIRED;
         force_percent: Option<f64>, "%", Rule::POSITIVE,
-            "excess of the real force that the loop has to withstand as the only imperfection", NOT_REQUIRED;
+            "excess of the real force that the loop has to survive as the only imperfection", NOT_REQUIRED;
         parameter_spread_percent: Option<f64>, "%", Rule::SPREAD,
-            "spread (±) of all masses, lengths and inertias that the loop has to withstand as the only imperfection",
+            "spread (±) of all masses, lengths and inertias that the loop has to survive as the only imperfection",
             NOT_REQUIRED;
     }
 }
 
 impl Default for Requirements {
-    /// Values for a rig on a bench: a hand on the table topples a loop with smaller margins.
+    /// Values for a rig on a bench: a hand on the table makes a loop with smaller margins fall.
     fn default() -> Self {
         Requirements::when_absent().expect("no key of [verify] is required")
     }

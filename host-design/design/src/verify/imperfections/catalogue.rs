@@ -20,7 +20,7 @@ pub struct Imperfection {
     pub remedy: &'static str,
     /// The requirement that can be made for it, which has the same key in `[verify]`.
     pub requirement: &'static str,
-    /// The size that the loop has to withstand according to `[verify]`.
+    /// The size that the loop has to survive according to `[verify]`.
     #[serde(skip)]
     pub(super) required: fn(&Requirements) -> Option<f64>,
     #[serde(skip)]

@@ -21,7 +21,7 @@ pub use catalogue::{IMPERFECTIONS, Imperfection};
 pub struct ImperfectionSettings {
     /// Duration of each run (s).
     pub duration_s: f64,
-    /// Number of runs of each size, with the seeds from 1; all of them have to stand.
+    /// Number of runs of each size, with the seeds from 1; all of them have to survive.
     pub seeds: u64,
     /// Disturbances of the runs.
     pub disturbance: Disturbance,
@@ -39,9 +39,9 @@ impl ImperfectionSettings {
 /// Results of the runs with one size.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Verdict {
-    /// Number of runs that stand.
-    pub stand: u64,
-    /// Number of runs that stand within the supervisor's limits of angle and rail, so that the motor stays on.
+    /// Number of runs that survive.
+    pub survived: u64,
+    /// Number of runs that survive within the supervisor's limits of angle and rail, so that the motor stays on.
     pub within_limits: u64,
     /// Largest angle of any link from the vertical in any run (rad).
     pub peak_angle_rad: f64,
@@ -49,12 +49,12 @@ pub struct Verdict {
     pub peak_position_m: f64,
 }
 
-/// How much of one imperfection alone a law withstands.
+/// How much of one imperfection alone a law survives.
 #[derive(Debug, Clone, Serialize)]
-pub struct Standing {
+pub struct Survival {
     /// The imperfection.
     pub imperfection: &'static Imperfection,
-    /// Size from which a run falls; none: the law withstands the largest one tried.
+    /// Size from which a run falls; none: the law survives the largest one tried.
     pub falls_at: Option<f64>,
     /// Size from which a link or the cart leaves the supervisor's limits, so that the motor is turned off; none: the
     /// largest one tried stays within.
@@ -65,7 +65,7 @@ pub struct Standing {
     pub danger: f64,
 }
 
-impl Standing {
+impl Survival {
     /// [`Self::falls_at`] as text.
     pub fn falls_text(&self) -> String {
         self.size_text(self.falls_at)
@@ -81,7 +81,7 @@ impl Standing {
     }
 }
 
-/// What a law withstands: each imperfection alone, the most dangerous one first, and those of the rig file together.
+/// What a law survives: each imperfection alone, the most dangerous one first, and those of the rig file together.
 #[derive(Debug, Clone, Serialize)]
 pub struct Imperfections {
     /// The law in the loop.
@@ -89,14 +89,14 @@ pub struct Imperfections {
     /// Settings of the search.
     pub settings: ImperfectionSettings,
     /// Each imperfection alone.
-    pub alone: Vec<Standing>,
+    pub alone: Vec<Survival>,
     /// All imperfections of the rig file's `[reality]` together; none if it has none.
     pub together: Option<Verdict>,
 }
 
-/// A size that the loop has to withstand according to `[verify]`, and the results of its runs.
+/// A size that the loop has to survive according to `[verify]`, and the results of its runs.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct RequiredStanding {
+pub struct RequiredSurvival {
     /// The key of the imperfection.
     pub key: &'static str,
     /// The requirement, with this key.
@@ -130,18 +130,18 @@ pub fn imperfections(
     within("relative", settings.relative, 1e-3..=1.0, "a width from 0.001 to 1")?;
     let search = Search { rig, table, law, settings };
     let one = |imperfection: &'static Imperfection| {
-        let standing = search.standing(imperfection);
+        let survival = search.survival(imperfection);
         done();
-        standing
+        survival
     };
-    let mut alone: Vec<Standing> = parallel::try_map(&IMPERFECTIONS, one)?;
+    let mut alone: Vec<Survival> = parallel::try_map(&IMPERFECTIONS, one)?;
     alone.sort_by(|a, b| b.danger.total_cmp(&a.danger));
     let together =
         (rig.reality != Reality::default()).then(|| search.verdict(rig.reality.clone())).transpose()?;
     Ok(Imperfections { law, settings: *settings, alone, together })
 }
 
-/// Runs `law` with the imperfections that it has to withstand according to `[verify]`; empty if there are none.
+/// Runs `law` with the imperfections that it has to survive according to `[verify]`; empty if there are none.
 ///
 /// # Errors
 /// As [`imperfections()`].
@@ -150,14 +150,14 @@ pub fn required_imperfections(
     table: &TableValues,
     law: Law,
     settings: &ImperfectionSettings,
-) -> Result<Vec<RequiredStanding>, Unverifiable> {
+) -> Result<Vec<RequiredSurvival>, Unverifiable> {
     chain(rig, "imperfections")?;
     let search = Search { rig, table, law, settings };
     let required = |imperfection: &'static Imperfection| {
         let size = (imperfection.required)(&rig.verify)?;
         let Imperfection { key, requirement, .. } = *imperfection;
-        let standing = |verdict| RequiredStanding { key, requirement, size, runs: settings.seeds, verdict };
-        Some(search.alone(imperfection, size).map(standing))
+        let survival = |verdict| RequiredSurvival { key, requirement, size, runs: settings.seeds, verdict };
+        Some(search.alone(imperfection, size).map(survival))
     };
     Ok(IMPERFECTIONS.iter().filter_map(required).collect::<Result<_, SimulationError>>()?)
 }
@@ -172,14 +172,14 @@ pub fn limit_cycle(
     table: &TableValues,
     law: Law,
     settings: &ImperfectionSettings,
-    standing: &Standing,
+    survival: &Survival,
 ) -> Result<Vec<(f64, Verdict)>, Unverifiable> {
     chain(rig, "imperfections")?;
     let search = Search { rig, table, law, settings };
-    let end = standing.falls_at.unwrap_or(standing.largest_tried);
+    let end = survival.falls_at.unwrap_or(survival.largest_tried);
     let at = |share: f64| {
         let size = share * end;
-        search.alone(standing.imperfection, size).map(|verdict| (size, verdict))
+        search.alone(survival.imperfection, size).map(|verdict| (size, verdict))
     };
     Ok(SHARES.into_iter().map(at).collect::<Result<_, SimulationError>>()?)
 }
@@ -192,7 +192,7 @@ struct Search<'a> {
 }
 
 impl Search<'_> {
-    fn standing(&self, imperfection: &'static Imperfection) -> Result<Standing, SimulationError> {
+    fn survival(&self, imperfection: &'static Imperfection) -> Result<Survival, SimulationError> {
         let [good, poor] = imperfection.typical;
         // Masses and lengths cannot be wrong by more than nine tenths.
         let most = if imperfection.key == "parameter_spread_percent" { 80.0 } else { f64::INFINITY };
@@ -208,13 +208,14 @@ impl Search<'_> {
             Ok(verdict)
         };
         let all = self.settings.seeds;
-        let falls_at =
-            first(sizes, poor, self.settings.relative, |size| at(size).map(|verdict| verdict.stand == all))?;
+        let falls_at = first(sizes, poor, self.settings.relative, |size| {
+            at(size).map(|verdict| verdict.survived == all)
+        })?;
         let leaves_limits_at = first(sizes, poor, self.settings.relative, |size| {
             at(size).map(|verdict| verdict.within_limits == all)
         })?;
         let least = falls_at.unwrap_or(sizes[1]).min(leaves_limits_at.unwrap_or(sizes[1]));
-        Ok(Standing {
+        Ok(Survival {
             imperfection,
             falls_at,
             leaves_limits_at,
@@ -244,7 +245,7 @@ impl Search<'_> {
         };
         let all: Vec<_> = parallel::try_map(1..=self.settings.seeds, one)?;
         Ok(Verdict {
-            stand: all.iter().filter(|outcome| outcome.stands()).count() as u64,
+            survived: all.iter().filter(|outcome| outcome.survives()).count() as u64,
             within_limits: all.iter().filter(|outcome| self.is_within_limits(outcome)).count() as u64,
             peak_angle_rad: all.iter().map(|outcome| outcome.peak_angle_rad).fold(0.0, f64::max),
             peak_position_m: all.iter().map(|outcome| outcome.peak_error_m).fold(0.0, f64::max),
@@ -254,7 +255,7 @@ impl Search<'_> {
     fn is_within_limits(&self, outcome: &Outcome) -> bool {
         let limits = &self.table.limits;
         let [low, high] = limits.rail_m.map(f64::from);
-        outcome.stands()
+        outcome.survives()
             && outcome.peak_angle_rad <= f64::from(limits.angle_rad)
             && outcome.peak_error_m <= high.min(-low)
     }

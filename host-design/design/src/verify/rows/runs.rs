@@ -47,7 +47,7 @@ pub(super) const QUANTITIES: &[Quantity] = &[
         values: One(|_, law| {
             let corners = law.corners.as_ref()?;
             let percent = number(corners.percent);
-            Some(format!("±{percent} %: {} of {} combinations stand", corners.stand, corners.corners))
+            Some(format!("±{percent} %: {} of {} combinations survive", corners.survived, corners.corners))
         }),
     },
     Quantity {
@@ -70,15 +70,15 @@ pub(super) const QUANTITIES: &[Quantity] = &[
     Quantity {
         name: "random plants",
         meaning: "Monte Carlo: masses, lengths and inertias (by spread_percent) and friction (±20 %) drawn at random, with \
-                  the 95 % interval of the share that stands (Wilson): 200 of 200 is not 100 %",
+                  the 95 % interval of the share that survives (Wilson): 200 of 200 is not 100 %",
         values: One(|rig, law| {
             let runs = law.monte_carlo.as_ref()?;
             let [low, high] = runs.interval.map(|share| 100.0 * share);
             let spread = number(rig.verify.spread_percent);
             let share = 100.0 * runs.success_rate;
-            let (stood, made) = (runs.stood, runs.runs);
+            let (survived, made) = (runs.survived, runs.runs);
             Some(format!(
-                "±{spread} %: {stood} of {made} stand ({share:.1} %, 95 % interval {low:.1} to {high:.1} %)"
+                "±{spread} %: {survived} of {made} survive ({share:.1} %, 95 % interval {low:.1} to {high:.1} %)"
             ))
         }),
     },

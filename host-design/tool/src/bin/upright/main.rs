@@ -36,7 +36,7 @@ Examples:
   upright twin rigs/quadruple-paper.toml        a page on which the rig moves: pull it, break it, watch it
   upright verify rigs/quadruple-paper.toml      margins, region of attraction, noise, model errors
   upright swing-up rigs/quadruple-paper.toml    plan how the rig raises itself, and lowers itself again
-  upright robust rigs/quadruple-robust.toml     gains that withstand wrong masses, friction, wrong zeros
+  upright robust rigs/quadruple-robust.toml     gains that survive wrong masses, friction, wrong zeros
   upright identify my.toml run.log --write new.toml   the real machine's parameters, from a log
   upright report rigs/quadruple-paper.toml      all of it on one page, with an animation
   upright compare rigs/quadruple-paper.toml --sweep tick.period_s=0.0005..0.01

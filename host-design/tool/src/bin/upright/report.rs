@@ -28,7 +28,7 @@ Examples:
   upright report rigs/quadruple-paper.toml                      writes quadruple-paper.html
   upright report rigs/quadruple-paper.toml --out report.html --svg figures --csv data
   upright report rigs/single-quanser-ip02.toml --runs 1000 --png figures
-  upright report rigs/single-quanser-ip02.toml --imperfections  adds which imperfections topple it
+  upright report rigs/single-quanser-ip02.toml --imperfections  adds which imperfections make it fall
   upright report rigs/single-quanser-ip02.toml --margins        adds how hard it may be pushed while it is raised
   upright report rigs/double-quanser-dbpen.toml --transitions   adds a run from equilibrium to equilibrium
   upright report rigs/quadruple-paper.toml --gains continuous --tick 0.005     effect of a wrong tick")]

@@ -22,7 +22,7 @@ use crate::variation::{not_negative, positive};
 
 mod text;
 
-/// Chooses weights, far poles and joint noise with which the loop withstands wrong masses, friction, wrong zeros and
+/// Chooses weights, far poles and joint noise with which the loop survives wrong masses, friction, wrong zeros and
 /// latency.
 ///
 /// The tolerances are those of [robust] in the rig file, or of the options. Exit status 3 if nothing helps; the
@@ -31,7 +31,7 @@ mod text;
 #[command(before_help = "\
 Examples:
   upright robust rigs/quadruple-paper.toml --mass 10 --joint-friction 1.5e-4 --out rigs/quadruple-robust.toml
-  upright robust rigs/quadruple-robust.toml --as-it-is --runs 104      how many runs stand with the file's own numbers
+  upright robust rigs/quadruple-robust.toml --as-it-is --runs 104      how many runs survive with the file's own numbers
   upright robust my.toml --mass 5 --front --svg front.svg              least ripple over multiples of the tolerances
   upright robust my.toml --joint-friction 1e-3 --json")]
 pub(crate) struct Robust {
@@ -55,7 +55,7 @@ pub(crate) struct Robust {
     /// Choose nothing: judge the numbers of the file; exit status 1 if a run falls
     #[arg(long, conflicts_with_all = ["out", "front", "svg"])]
     as_it_is: bool,
-    /// Number of runs that a choice has to stand at each share of the tolerances
+    /// Number of runs that a choice has to survive at each share of the tolerances
     #[arg(long, default_value_t = 4, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=100_000))]
     runs: u32,
     /// Duration of each run (s)
@@ -97,7 +97,7 @@ impl Robust {
             with_steps(|progress| choose(&rig, &tolerances, &settings, self.front, progress))
                 .map_err(failed)?;
         if let (Some(path), Some(front)) = (&self.svg, &front) {
-            let figure = front_figure(front, &format!("{}: least ripple that stands", rig.name));
+            let figure = front_figure(front, &format!("{}: least ripple that survives", rig.name));
             write_atomically(path, figure.svg()?.as_bytes())?;
         }
         let differs = match &self.out {
@@ -159,7 +159,7 @@ impl Robust {
             write!(out, "{}", text::judged(rig, tolerances, settings, judgements))?;
         }
         let fallen: Vec<&str> =
-            judgements.iter().filter(|one| !one.stands()).map(|one| one.law.key()).collect();
+            judgements.iter().filter(|one| !one.survives()).map(|one| one.law.key()).collect();
         if fallen.is_empty() {
             return Ok(());
         }

@@ -248,7 +248,7 @@ impl Simulate {
             || self.torque_noise.is_some()
             || self.force_offset != 0.0;
         if !moves {
-            // At exact rest even an unstable loop stands.
+            // At exact rest even an unstable loop survives.
             eprintln!("no step, tilt or disturbance given: starting with a small tilt");
             return Ok(Scenario::acceptance(rig, law, 1.0).start);
         }
@@ -267,7 +267,7 @@ impl Simulate {
             format!("{:.4}", rig.tick.period_s * 1e3).trim_end_matches('0').trim_end_matches('.')
         );
         let text = if self.json {
-            let mut object = json!({ "rig": rig.name, "hash": format!("{:016x}", rig.hash()), "stands": summary.stands() });
+            let mut object = json!({ "rig": rig.name, "hash": format!("{:016x}", rig.hash()), "survives": summary.survives() });
             if let (Some(object), Ok(serde_json::Value::Object(figures))) =
                 (object.as_object_mut(), serde_json::to_value(summary))
             {

@@ -135,7 +135,7 @@ impl SwingUp {
         writeln!(out, "{} of {TRADED} candidates are solved", solved.len())?;
         writeln!(out, "duration (s)  force (N)  farthest (m)  fragility     arrive  with twice the errors")?;
         for Solved { duration_s, force_n, position_m, score, runs, wider } in &solved {
-            let [arrive, twice] = [runs, wider].map(|runs| format!("{} of {}", runs.stood, runs.runs));
+            let [arrive, twice] = [runs, wider].map(|runs| format!("{} of {}", runs.arrived, runs.runs));
             write!(out, "{duration_s:>12.2} {force_n:>10.2} {position_m:>13.3} {score:>10.2} ")?;
             writeln!(out, "{arrive:>10} {twice:>22}")?;
         }
@@ -272,9 +272,9 @@ fn print_rows(rig: &Rig, rows: &[Row], is_json: bool) -> Result<(), Failure> {
             "| {} | {} | {} of {} | {} of {} | {} |",
             rig.name,
             condition.name,
-            raise.stood,
+            raise.arrived,
             raise.runs,
-            lower.stood,
+            lower.arrived,
             lower.runs,
             ended.join(", ")
         )?;
@@ -310,7 +310,7 @@ fn text(rig: &Rig, plan: &Plan) -> String {
             peaks.rate_rad_per_s,
             100.0 * peaks.used,
             peaks.drift,
-            runs.stood,
+            runs.arrived,
             runs.runs,
             percent[0],
             percent[1],

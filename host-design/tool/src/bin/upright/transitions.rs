@@ -202,7 +202,7 @@ fn failed(rig: &Rig, source: SwingUpError) -> Failure {
 fn searched_line(searched: &Searched, tried: u64, links: usize) -> String {
     let Searched { way, solved, runs, is_stored } = searched;
     let runs = runs.as_ref().map_or_else(String::new, |runs| {
-        format!(", {} of {} random runs of the law arrive", runs.stood, runs.runs)
+        format!(", {} of {} random runs of the law arrive", runs.arrived, runs.runs)
     });
     let kept = if *is_stored { "" } else { ": not stored" };
     format!("{}: {solved} of {tried} candidates solved{runs}{kept}", way.name(links))

@@ -33,12 +33,12 @@ Examples:
   upright verify rigs/quadruple-paper.toml --runs 1000 --seed 1 --json
   upright verify rigs/quadruple-paper.toml --replay 17 --law lqr --csv worst.csv   the random plant of seed 17
   upright verify rigs/single-quanser-ip02.toml --map tilt.csv       from which angle and rate of link 1 it recovers
-  upright verify rigs/quadruple-paper.toml --imperfections          which friction, play or wrong zero topples it
+  upright verify rigs/quadruple-paper.toml --imperfections          which friction, play or wrong zero makes it fall
   upright verify rigs/quadruple-paper.toml --gains continuous --tick 0.003         unstable: exit status 1")]
 pub(crate) struct Verify {
     #[command(flatten)]
     variation: Variation,
-    /// Monte Carlo runs for each law; fewer than 73 cannot show 95 % even if all stand
+    /// Monte Carlo runs for each law; fewer than 73 cannot show 95 % even if all survive
     #[arg(long, default_value_t = 200, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
     runs: u32,
     /// Seed of the first run; each following run has the next one

@@ -228,7 +228,7 @@ export class Controls {
     write(byId('defect'), machine.defect === null ? '' : machine.defect.replaceAll('-', ' '));
     const { challenge } = machine;
     byId('challenge').setAttribute('aria-pressed', challenge !== null);
-    write(byId('score'), challenge === null ? '' : `stood ${challenge.stood_s.toFixed(0)} s, hardest push survived ${challenge.survived_n.toFixed(1)} N${
+    write(byId('score'), challenge === null ? '' : `upright for ${challenge.upright_s.toFixed(0)} s, hardest push survived ${challenge.survived_n.toFixed(1)} N${
       challenge.is_over ? '; it fell' : `, push of ${Math.abs(challenge.push_n).toFixed(1)} N`}`);
     for (const [name, { element, value, input, unit, nominal }] of this.sliders) {
       const now = machine.properties[name];

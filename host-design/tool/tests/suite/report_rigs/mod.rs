@@ -36,7 +36,7 @@ pub(crate) static SINGLE: LazyLock<Report> = LazyLock::new(|| coarse_report(&rig
 /// [`quick_report`] on a linear model, `quadruple-paper-printed`.
 pub(crate) static LINEAR: LazyLock<Report> = LazyLock::new(|| quick_report(&rig("quadruple-paper-printed")));
 
-/// [`coarse_report`] with how much of each imperfection the LQR withstands, from short runs.
+/// [`coarse_report`] with how much of each imperfection the LQR survives, from short runs.
 pub(crate) fn report_with_imperfections(rig: &Rig) -> Report {
     let settings =
         ImperfectionSettings { duration_s: 2.0, seeds: 1, relative: 0.5, ..ImperfectionSettings::of(rig) };

@@ -1,4 +1,4 @@
-//! What was chosen and what it withstands, as text.
+//! What was chosen and what it survives, as text.
 
 use core::fmt::Write;
 
@@ -17,7 +17,7 @@ pub(super) fn chosen(rig: &Rig, tolerances: &Tolerances, choice: &Choice, front:
     out
 }
 
-/// What the numbers of the file withstand.
+/// What the numbers of the file survive.
 pub(super) fn judged(
     rig: &Rig,
     tolerances: &Tolerances,
@@ -68,22 +68,22 @@ fn write_choice(out: &mut String, choice: &Choice) -> core::fmt::Result {
 }
 
 fn write_judgement(out: &mut String, judgement: &Judgement) -> core::fmt::Result {
-    let head = ["share", "stand", "force, N rms", "angle, mrad", "cart, mm"];
-    let row = |[share, stand, force, angle, cart]: [&str; 5]| {
-        format!("  {share:<8}{stand:>12}{force:>15}{angle:>14}{cart:>11}")
+    let head = ["share", "survive", "force, N rms", "angle, mrad", "cart, mm"];
+    let row = |[share, survived, force, angle, cart]: [&str; 5]| {
+        format!("  {share:<8}{survived:>12}{force:>15}{angle:>14}{cart:>11}")
     };
     writeln!(out, "{}", row(head))?;
     for runs in &judgement.machines {
         let share = runs.share.to_string();
-        let stand = format!("{} of {}", runs.stood, runs.runs);
+        let survived = format!("{} of {}", runs.survived, runs.runs);
         let figures = [runs.force_rms_n, 1e3 * runs.peak_angle_rad, 1e3 * runs.peak_position_m];
-        // They are of the runs that stood: blank if none did.
+        // They are of the runs that survived: blank if none did.
         let [force, angle, cart] =
-            figures.map(|figure| if runs.stood == 0 { String::new() } else { significant(figure, 3) });
-        writeln!(out, "{}", row([&share, &stand, &force, &angle, &cart]).trim_end())?;
+            figures.map(|figure| if runs.survived == 0 { String::new() } else { significant(figure, 3) });
+        writeln!(out, "{}", row([&share, &survived, &force, &angle, &cart]).trim_end())?;
     }
     match judgement.corners {
-        Some([all, stand]) => writeln!(out, "  wrong masses: {stand} of {all} combinations stand"),
+        Some([all, survived]) => writeln!(out, "  wrong masses: {survived} of {all} combinations survive"),
         None => Ok(()),
     }
 }
@@ -93,7 +93,7 @@ fn write_front(out: &mut String, front: &Front) -> core::fmt::Result {
     for point in &front.0 {
         let scale = significant(point.scale, 3);
         match &point.best {
-            None => writeln!(out, "  × {scale:<5} nothing stands")?,
+            None => writeln!(out, "  × {scale:<5} nothing survives")?,
             Some(best) => {
                 writeln!(out, "  × {scale:<5} joint noise × {}", significant(best.joint_noise_factor, 3))?;
                 for LawRipple { law, name, ripple_n } in &best.laws {

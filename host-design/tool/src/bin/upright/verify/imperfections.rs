@@ -1,8 +1,8 @@
-//! How much of each imperfection the loop withstands, as text.
+//! How much of each imperfection the loop survives, as text.
 
 use core::fmt::Write;
 
-use upright_design::verify::{Imperfections, Standing};
+use upright_design::verify::{Imperfections, Survival};
 
 /// The table of one law: the most dangerous imperfection first.
 pub(super) fn table(found: &Imperfections) -> String {
@@ -20,23 +20,23 @@ fn write_table(out: &mut String, found: &Imperfections) -> core::fmt::Result {
         found.settings.seeds
     )?;
     writeln!(out, "  {:<26}{:<6}{:>12}{:>12}   typical", "", "", "falls at", "motor off")?;
-    for standing in &found.alone {
-        write_standing(out, standing)?;
+    for survival in &found.alone {
+        write_survival(out, survival)?;
     }
     match &found.together {
         None => writeln!(out, "  the rig file has no [reality]"),
         Some(all) => writeln!(
             out,
-            "  [reality] of the rig file: {} of {} stand, up to {:.3} rad and {:.3} m",
-            all.stand, found.settings.seeds, all.peak_angle_rad, all.peak_position_m
+            "  [reality] of the rig file: {} of {} survive, up to {:.3} rad and {:.3} m",
+            all.survived, found.settings.seeds, all.peak_angle_rad, all.peak_position_m
         ),
     }
 }
 
-fn write_standing(out: &mut String, standing: &Standing) -> core::fmt::Result {
-    let one = standing.imperfection;
-    let (falls, off) = (standing.falls_text(), standing.leaves_limits_text());
+fn write_survival(out: &mut String, survival: &Survival) -> core::fmt::Result {
+    let one = survival.imperfection;
+    let (falls, off) = (survival.falls_text(), survival.leaves_limits_text());
     let (key, unit, typical, source) = (one.key, one.unit, one.typical_text(), one.source);
     writeln!(out, "  {key:<26}{unit:<6}{falls:>12}{off:>12}   {typical} ({source})")?;
-    if standing.danger > 1.0 { writeln!(out, "      do: {}", one.remedy) } else { Ok(()) }
+    if survival.danger > 1.0 { writeln!(out, "      do: {}", one.remedy) } else { Ok(()) }
 }
