@@ -17,11 +17,11 @@ impl<'t, const NX: usize, const NY: usize, S: SwingUp<NX, NY>> Firmware<'t, NX, 
             State::Balancing => Equilibrium::HANGING,
             _ => Equilibrium::UPRIGHT,
         };
-        self.way(to).map_or_else(|inhibits| inhibits, |motion| self.motion_inhibits(&motion))
+        self.transition(to).map_or_else(|inhibits| inhibits, |motion| self.motion_inhibits(&motion))
     }
 
     /// The motion from the present equilibrium to the equilibrium `to`.
-    fn way(&self, to: Equilibrium) -> Result<MotionTable<'t>, Inhibits> {
+    fn transition(&self, to: Equilibrium) -> Result<MotionTable<'t>, Inhibits> {
         let swing_up = self.swing_up;
         let Some(motions) = swing_up.motions() else { return Err(Inhibits::NO_SWING_UP) };
         let (from, to) = (self.equilibrium(), to.of_links(NY - 1));
@@ -29,7 +29,7 @@ impl<'t, const NX: usize, const NY: usize, S: SwingUp<NX, NY>> Firmware<'t, NX, 
             let is_balanced = self.supervisor.state().controls();
             return Err(if is_balanced { Inhibits::RUNNING } else { Inhibits::NOT_BALANCING });
         }
-        motions.between(from, to).copied().ok_or(Inhibits::NO_WAY)
+        motions.between(from, to).copied().ok_or(Inhibits::NO_TRANSITION)
     }
 
     /// The present equilibrium: the one at which the links are balanced; hanging, if they are not balanced.
@@ -76,7 +76,7 @@ impl<'t, const NX: usize, const NY: usize, S: SwingUp<NX, NY>> Firmware<'t, NX, 
 
     /// Begins the motion to the equilibrium `to`. `id` is that of the command.
     pub(super) fn go_to(&mut self, to: Equilibrium, id: u64) -> Result<(), Inhibits> {
-        let motion = self.way(to)?;
+        let motion = self.transition(to)?;
         let (from, to) = (self.equilibrium(), to.of_links(NY - 1));
         let inhibits = self.motion_inhibits(&motion);
         let counts = self.table.limits.unwound(self.controller.encoders().counts(), from);

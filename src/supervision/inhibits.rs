@@ -45,7 +45,7 @@ inhibits! {
     21 MOTOR "the motor's sign is not checked since power-up: drive the cart a little";
     22 NOT_SHAKEN "the rig is not being shaken: begin again";
     23 ZEROS "the links swing about different zeros every 5 s: let go of them, hold the cart";
-    24 NO_WAY "the gain table holds no motion from this equilibrium to that one";
+    24 NO_TRANSITION "the gain table holds no motion from this equilibrium to that one";
 }
 
 impl Inhibits {

@@ -30,7 +30,7 @@ pub use motor::MotorMap;
 pub use observer::ObserverGains;
 pub use part::{Part, Reader, Resize, Shape, Words, WordsMut};
 pub use scalar::{Number, Scalar};
-pub use swing_up::{MotionLimits, MotionTable, Motions, NoSwingUp, SwingUp, SwingUpTable, Transition};
+pub use swing_up::{MotionLimits, MotionTable, Motions, NoSwingUp, SwingUp, SwingUpTable, TransitionTable};
 pub use thresholds::{MotorTest, Thresholds};
 
 /// Version of the layout of [`GainTable`]; a table with another version is refused.

@@ -34,7 +34,7 @@ part! {
 part! {
     /// A motion between two equilibria, at least one of which is neither upright nor hanging.
     #[derive(Copy)]
-    pub struct Transition<'t,;> {
+    pub struct TransitionTable<'t,;> {
         /// [`Equilibrium::bits`] of where it begins.
         pub from: u32,
         /// [`Equilibrium::bits`] of where it ends.
@@ -44,7 +44,7 @@ part! {
     }
 }
 
-impl Part for &[Transition<'_>] {
+impl Part for &[TransitionTable<'_>] {
     fn part(&self, at: &mut usize) -> Option<Words<'_>> {
         self.iter().find_map(|transition| transition.part(at))
     }
@@ -59,8 +59,8 @@ impl Part for &[Transition<'_>] {
     }
 }
 
-impl<'t> Resize<&'t [Transition<'t>]> for &'t [Transition<'t>] {
-    fn resized(&self) -> &'t [Transition<'t>] {
+impl<'t> Resize<&'t [TransitionTable<'t>]> for &'t [TransitionTable<'t>] {
+    fn resized(&self) -> &'t [TransitionTable<'t>] {
         self
     }
 }
@@ -118,7 +118,7 @@ part! {
         /// From upright at rest to hanging at rest.
         pub lower: MotionTable<'t>,
         /// Between other equilibria.
-        pub others: &'t [Transition<'t>],
+        pub others: &'t [TransitionTable<'t>],
         sealed by
         /// CRC-32 (ISO-HDLC) of all fields above.
         pub crc,
@@ -176,7 +176,7 @@ impl<const NY: usize, const N: usize> SwingUpTable<'_, NY, N> {
         if states != 2 * N + 2 || NY != N + 1 || !complete(&self.raise) || !complete(&self.lower) {
             return Err(TableError::Dimensions);
         }
-        let fits = |Transition { from, to, motion }: &Transition<'_>| {
+        let fits = |TransitionTable { from, to, motion }: &TransitionTable<'_>| {
             from != to && *from < 1 << N && *to < 1 << N && complete(motion)
         };
         if !self.others.iter().all(fits) {
@@ -216,7 +216,7 @@ pub struct Motions<'t, const NY: usize> {
     /// From upright to hanging.
     pub lower: MotionTable<'t>,
     /// Between other equilibria.
-    pub others: &'t [Transition<'t>],
+    pub others: &'t [TransitionTable<'t>],
     /// See [`SwingUpTable::limits`].
     pub limits: &'t MotionLimits,
     /// See [`SwingUpTable::thresholds`].
@@ -233,7 +233,7 @@ impl<'t, const NY: usize> Motions<'t, NY> {
         if (from, to) == (Equilibrium::UPRIGHT, hanging) {
             return Some(&self.lower);
         }
-        let leads = |other: &&Transition<'_>| (other.from, other.to) == (from.bits(), to.bits());
+        let leads = |other: &&TransitionTable<'_>| (other.from, other.to) == (from.bits(), to.bits());
         self.others.iter().find(leads).map(|other| &other.motion)
     }
 }

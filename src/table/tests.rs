@@ -327,12 +327,12 @@ fn every_flipped_bit_of_a_motion_is_refused() {
     assert_eq!((0..1000).find_map(|_| scan.next(&good)), Some(good.crc));
 }
 
-fn transition(from: u32, to: u32, reference: &[i16]) -> Transition<'_> {
-    Transition { from, to, motion: motion(reference, &FILTER) }
+fn transition(from: u32, to: u32, reference: &[i16]) -> TransitionTable<'_> {
+    TransitionTable { from, to, motion: motion(reference, &FILTER) }
 }
 
 /// The table with these transitions and its checksum.
-fn with_others<'t>(others: &'t [Transition<'t>]) -> SwingUpTable<'t, 2, 1> {
+fn with_others<'t>(others: &'t [TransitionTable<'t>]) -> SwingUpTable<'t, 2, 1> {
     let mut table = SwingUpTable { others, ..swing_up(&COURSE, &FILTER) };
     table.crc = table.checksum();
     table
@@ -361,7 +361,7 @@ fn every_flipped_bit_of_a_transition_is_refused() {
     let dimensions = Err(TableError::Dimensions);
     assert_eq!(with_others(&[transition(0, 2, &COURSE)]).check(&BUILD, 4), dimensions);
     assert_eq!(with_others(&[transition(1, 1, &COURSE)]).check(&BUILD, 4), dimensions);
-    let cut = [Transition { motion: motion(&COURSE[9..], &FILTER), ..good[0] }];
+    let cut = [TransitionTable { motion: motion(&COURSE[9..], &FILTER), ..good[0] }];
     assert_eq!(with_others(&cut).check(&BUILD, 4), dimensions);
     let mut scan = ChecksumScan::default();
     assert_eq!((0..1000).find_map(|_| scan.next(&table)), Some(table.crc));

@@ -16,7 +16,7 @@ use upright::table::checksum::crc32;
 use upright_design::harness::{Pins, Recording, Session, Target};
 use upright_design::rig::Rig;
 use upright_design::simulate::{Scenario, simulate};
-use upright_design::swing_up::{StoredTransitions, Tour, hangs, up_and_down, with_motions};
+use upright_design::swing_up::{Route, StoredTransitions, hangs, up_and_down, with_motions};
 use upright_design::table::TableValues;
 use upright_tool::image::Kind;
 use upright_tool::in_the_loop::{Link, Place, RunError, run};
@@ -37,7 +37,7 @@ fn with_stored_motions(name: &'static str, others: &[&str]) -> (Rig, TableValues
     } else {
         StoredTransitions::beside(&rig_path(name)).unwrap().transitions(&rig).unwrap()
     };
-    transitions.retain(|transition| others.contains(&transition.way.name(rig.states() / 2 - 1).as_str()));
+    transitions.retain(|planned| others.contains(&planned.transition.name(rig.states() / 2 - 1).as_str()));
     let table = with_motions(&rig, table(&rig), stored_motions(name), &transitions).unwrap();
     (rig, table)
 }
@@ -116,10 +116,10 @@ fn the_image_in_qemu_goes_from_equilibrium_to_equilibrium_with_the_bits_of_the_h
     let (rig, table) = with_stored_motions("double-quanser-dbpen", &["uu-ud", "ud-dd"]);
     let Some(image) = in_qemu(built_for(Kind::InTheLoop, &rig, &table)) else { return };
     // Up, on to the equilibrium at which the second link hangs, and down.
-    let tour = Tour::of(&rig, &table).unwrap();
-    let mut scenario = tour.scenario(&rig, 7);
+    let route = Route::of(&rig, &table).unwrap();
+    let mut scenario = route.scenario(&rig, 7);
     scenario.goals.truncate(2);
-    scenario.duration_s = tour.begin_s[3] - 7.0;
+    scenario.duration_s = route.begin_s[3] - 7.0;
     let qemu = run(&rig, &table, &scenario, Place::Qemu { image: &image, link: Link::Files }).unwrap();
     let mut states: Vec<State> = qemu.ticks.iter().map(|tick| tick.state).collect();
     states.dedup();

@@ -7,7 +7,7 @@ use super::remedy::{Limit, Remedy};
 use super::robustness::{Runs, random_runs};
 use super::search::{Request, candidates};
 use super::setting::Setting;
-use super::way::Way;
+use super::transition::Transition;
 use crate::rig::Rig;
 
 /// Candidates tried with each change, and how many of them, those with the best scores, go through the random runs.
@@ -30,15 +30,15 @@ struct Outcome {
 }
 
 impl Outcome {
-    /// Searches for the motion `way` of `rig` among the first `tried` candidates; the random runs have no supervisor.
-    fn of(rig: &Rig, way: Way, tried: u64) -> Result<Self, SwingUpError> {
+    /// Searches for a motion of `rig` among the first `tried` candidates; the random runs have no supervisor.
+    fn of(rig: &Rig, transition: Transition, tried: u64) -> Result<Self, SwingUpError> {
         let setting = Setting::of(rig)?;
         let request = Request::of(&setting);
-        let mut found = candidates(&setting, &request, way, 0..tried, &|_| ())?;
+        let mut found = candidates(&setting, &request, transition, 0..tried, &|_| ())?;
         let solved = found.len();
-        found.retain(|candidate| check(&setting, &candidate.motion, way).is_ok());
+        found.retain(|candidate| check(&setting, &candidate.motion, transition).is_ok());
         found.sort_by(|a, b| a.score.total_cmp(&b.score));
-        let runs = |motion| random_runs(&setting, motion, way, &request.spread, 1, RUNS);
+        let runs = |motion| random_runs(&setting, motion, transition, &request.spread, 1, RUNS);
         let all = found.iter().take(KEPT).map(|candidate| runs(&candidate.motion));
         let all: Vec<Runs> = all.collect::<Result<_, _>>()?;
         Ok(Self { tried, solved, runs: all.into_iter().max_by_key(|runs| runs.arrived) })
@@ -67,24 +67,33 @@ pub(super) fn is_enough(rig: &Rig, runs: &Runs) -> bool {
 }
 
 /// Names the binding limit, the one for which the smallest factor helps, and what else helps. Every number was tried:
-/// with it in the rig file there is a motion `way`, or none, as the text says.
+/// with it in the rig file there is a motion for `transition`, or none, as the text says.
 ///
 /// # Errors
 /// [`SwingUpError`] if the rig cannot be raised at all.
-pub(super) fn advice(rig: &Rig, way: Way, progress: Progress<'_>) -> Result<String, SwingUpError> {
+pub(super) fn advice(
+    rig: &Rig,
+    transition: Transition,
+    progress: Progress<'_>,
+) -> Result<String, SwingUpError> {
     progress(Trying::Stage {
-        way,
+        transition,
         what: "what would help",
         steps: (Limit::ALL.len() * FACTORS.len()) as u64,
     });
-    advice_from(rig, way, TRIED, &|| progress(Trying::Step { score: None }))
+    advice_from(rig, transition, TRIED, &|| progress(Trying::Step { score: None }))
 }
 
-fn advice_from(rig: &Rig, way: Way, tried: u64, done: &dyn Fn()) -> Result<String, SwingUpError> {
+fn advice_from(
+    rig: &Rig,
+    transition: Transition,
+    tried: u64,
+    done: &dyn Fn(),
+) -> Result<String, SwingUpError> {
     let longest_s = Request::of(&Setting::of(rig)?).duration_s[1];
     let (mut helps, mut no_help): (Vec<Help>, Vec<String>) = Default::default();
     for limit in Limit::ALL {
-        match relaxed(rig, way, tried, &[limit], longest_s, done)? {
+        match relaxed(rig, transition, tried, &[limit], longest_s, done)? {
             Some(Tried::Helps(help)) => helps.push(help),
             Some(Tried::NoHelp(text)) => no_help.push(text),
             None => {}
@@ -96,7 +105,7 @@ fn advice_from(rig: &Rig, way: Way, tried: u64, done: &dyn Fn()) -> Result<Strin
         Some(Help { name, .. }) => {
             format!("what binds is the {name}; there is a motion with {}", texts.join(", or with "))
         }
-        None => match relaxed(rig, way, tried, &Limit::ALL, longest_s, done)? {
+        None => match relaxed(rig, transition, tried, &Limit::ALL, longest_s, done)? {
             Some(Tried::Helps(help)) => format!("no limit binds alone; there is a motion with {}", help.text),
             _ => "no limit binds alone, and more of everything does not help".to_owned(),
         },
@@ -125,7 +134,7 @@ struct Help {
 /// Relaxes all of `limits` by the same factor, which is raised until it helps. None if the rig has none of them.
 fn relaxed(
     rig: &Rig,
-    way: Way,
+    transition: Transition,
     tried: u64,
     limits: &[Limit],
     longest_s: f64,
@@ -136,7 +145,7 @@ fn relaxed(
         let mut remedy = Remedy::of(rig);
         let changed = limits.iter().filter(|limit| limit.relax(&mut remedy, longest_s, factor).is_some());
         let Some(name) = changed.map(|limit| limit.name()).reduce(|first, _| first) else { return Ok(None) };
-        let outcome = Outcome::of(&remedy.rig, way, tried)?;
+        let outcome = Outcome::of(&remedy.rig, transition, tried)?;
         done();
         let text = format!("{} ({})", remedy.text(), outcome.text());
         if outcome.is_good(&remedy.rig) {
@@ -190,8 +199,8 @@ mod tests {
     #[test]
     fn every_advised_number_gives_a_motion() {
         let short = "swing_up.longest_s = 2.2";
-        assert_eq!(Outcome::of(&single(short), Way::Up, FEW).unwrap().solved, 0);
-        let text = advice_from(&single(short), Way::Up, FEW, &|| ()).unwrap();
+        assert_eq!(Outcome::of(&single(short), Transition::Up, FEW).unwrap().solved, 0);
+        let text = advice_from(&single(short), Transition::Up, FEW, &|| ()).unwrap();
         println!("{text}");
         let (helps, no_help) = text.split_once("; there is none with ").unwrap();
         let (binds, helps) = helps.split_once("; there is a motion with ").unwrap();
@@ -203,7 +212,7 @@ mod tests {
             for change in advised.split(", or with ") {
                 let (values, found) = change.split_once(" (").unwrap();
                 let rig = single(&format!("{short} and {values}"));
-                let outcome = Outcome::of(&rig, Way::Up, FEW).unwrap();
+                let outcome = Outcome::of(&rig, Transition::Up, FEW).unwrap();
                 assert_eq!(outcome.text(), found.trim_end_matches(')'), "{change}");
                 assert_eq!(outcome.is_good(&rig), is_good, "{change}");
             }

@@ -5,7 +5,7 @@ use serde::Serialize;
 use super::SwingUpError;
 use super::motion::Motion;
 use super::setting::Setting;
-use super::way::Way;
+use super::transition::Transition;
 use crate::plant::chain_plant;
 use crate::plant::reference::{Tolerance, integrate};
 
@@ -38,9 +38,13 @@ pub struct Peaks {
 ///
 /// # Errors
 /// [`SwingUpError::Broken`] with the condition that does not hold.
-pub(super) fn check(setting: &Setting<'_>, motion: &Motion, way: Way) -> Result<Peaks, SwingUpError> {
-    let broken = |what: String| SwingUpError::Broken { way, what };
-    let ends = way.ends_near(&motion.x[motion.steps()]);
+pub(super) fn check(
+    setting: &Setting<'_>,
+    motion: &Motion,
+    transition: Transition,
+) -> Result<Peaks, SwingUpError> {
+    let broken = |what: String| SwingUpError::Broken { transition, what };
+    let ends = transition.ends_near(&motion.x[motion.steps()]);
     if [&motion.x[0], &motion.x[motion.steps()]] != [&ends[0], &ends[1]] {
         return Err(broken("it does not begin and end at rest".to_owned()));
     }

@@ -9,7 +9,7 @@ use super::SwingUpError;
 use super::motion::Motion;
 use super::robustness::deviation;
 use super::setting::Setting;
-use super::way::Way;
+use super::transition::Transition;
 use crate::numerics::Matrix;
 use crate::plant::{Plant, chain_plant};
 use crate::rig::Chain;
@@ -124,13 +124,15 @@ impl<'a> ClosedLoop<'a> {
 }
 
 /// The law in tick k of a motion and after it.
-fn law_at<'a>(setting: &'a Setting<'_>, motion: &'a Motion, way: Way, k: usize) -> Law<'a> {
+fn law_at<'a>(setting: &'a Setting<'_>, motion: &'a Motion, transition: Transition, k: usize) -> Law<'a> {
     let steps = motion.steps();
-    match way {
+    match transition {
         _ if k < steps => Law { x: &motion.x[k], u: motion.u[k], k: Some(&motion.k[k]), l: &motion.l[k] },
-        way if way.ends_hanging() => Law { x: &motion.x[steps], u: 0.0, k: None, l: &motion.l[steps - 1] },
-        way => {
-            let at_end = setting.at_end(way);
+        transition if transition.ends_hanging() => {
+            Law { x: &motion.x[steps], u: 0.0, k: None, l: &motion.l[steps - 1] }
+        }
+        transition => {
+            let at_end = setting.at_end(transition);
             Law { x: &motion.x[steps], u: 0.0, k: Some(&at_end.k), l: &at_end.l }
         }
     }
@@ -143,28 +145,28 @@ fn law_at<'a>(setting: &'a Setting<'_>, motion: &'a Motion, way: Way, k: usize) 
 pub(super) fn run(
     setting: &Setting<'_>,
     motion: &Motion,
-    way: Way,
+    transition: Transition,
     trial: &Trial,
 ) -> Result<Outcome, SwingUpError> {
     let mut rig = ClosedLoop::new(setting, trial, &motion.x[0])?;
     let steps = motion.steps();
     let mut outcome = Outcome { arrived: false, deviation_rad: 0.0, deviation_m: 0.0 };
     for k in 0..steps + (trial.after_s / motion.tick_s) as usize {
-        rig.tick(&law_at(setting, motion, way, k));
+        rig.tick(&law_at(setting, motion, transition, k));
         let reference = motion.x.get(k + 1).unwrap_or(&motion.x[steps]);
         let deviation = deviation(&rig.state, reference);
         outcome.deviation_m = outcome.deviation_m.max((rig.state[0] - reference[0]).abs());
         if k < steps {
             outcome.deviation_rad = outcome.deviation_rad.max(deviation);
         }
-        let watched = k < steps || !way.ends_hanging();
+        let watched = k < steps || !transition.ends_hanging();
         if (watched && deviation > LOST_RAD) || rig.is_at_the_end() {
             outcome.deviation_rad = outcome.deviation_rad.max(LOST_RAD);
             return Ok(outcome);
         }
     }
     // After lowering, the motor is off, and links without friction swing on.
-    let near = if way.ends_hanging() { LOST_RAD } else { ARRIVED_RAD };
+    let near = if transition.ends_hanging() { LOST_RAD } else { ARRIVED_RAD };
     outcome.arrived = deviation(&rig.state, &motion.x[steps]) < near;
     Ok(outcome)
 }

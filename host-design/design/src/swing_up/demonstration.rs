@@ -5,8 +5,8 @@ use upright::supervision::supervisor::State;
 
 use super::SwingUpError;
 use super::robustness::{Spread, drawn};
-use super::tour::{Tour, states};
-use super::way::Way;
+use super::route::{Route, states};
+use super::transition::Transition;
 use crate::harness::{HarnessError, Recording, record, with_firmware};
 use crate::plant::absolute_angles;
 use crate::rig::{PlantDescription, Rig};
@@ -52,7 +52,7 @@ impl Script {
         let rules = rig.swing_up.clone().unwrap_or_default();
         let share = |percent: f64| if is_wrong { percent / 100.0 } else { 0.0 };
         let spread = Spread::of(share(rules.mass_spread_percent), share(rules.friction_spread_percent));
-        let (real, start) = drawn(rig, Way::Up, &spread, seed);
+        let (real, start) = drawn(rig, Transition::Up, &spread, seed);
         let duration_s = |ticks: u32| f64::from(ticks) * rig.tick.period_s;
         let [low, high] = chain.cart.travel_m;
         let far = MOVE_M.min(RAIL_SHARE * high.min(-low));
@@ -88,20 +88,20 @@ impl Script {
         Ok(Self { rig: real, scenario, parts, states: UP_AND_DOWN.to_vec() })
     }
 
-    /// A tour through all motions of `table`, under the same conditions; the parts have the names of the motions.
+    /// A run through all motions of `table`, under the same conditions; the parts have the names of the motions.
     ///
     /// # Errors
-    /// [`SwingUpError::NoTour`] if no tour leads through all of them.
-    pub fn tour(rig: &Rig, table: &TableValues, seed: u64) -> Result<Self, SwingUpError> {
-        let tour = Tour::of(rig, table).ok_or(SwingUpError::NoTour)?;
+    /// [`SwingUpError::NoRoute`] if no route leads through all of them.
+    pub fn route(rig: &Rig, table: &TableValues, seed: u64) -> Result<Self, SwingUpError> {
+        let route = Route::of(rig, table).ok_or(SwingUpError::NoRoute)?;
         let links = rig.states() / 2 - 1;
-        let (real, start) = drawn(rig, Way::Up, &Spread::of(0.0, 0.0), seed);
-        let names = tour.ways.iter().map(|way| way.name(links));
-        let states = tour.ways.iter().flat_map(|way| states(*way, links));
+        let (real, start) = drawn(rig, Transition::Up, &Spread::of(0.0, 0.0), seed);
+        let names = route.transitions.iter().map(|transition| transition.name(links));
+        let states = route.transitions.iter().flat_map(|transition| states(*transition, links));
         Ok(Self {
-            parts: tour.begin_s.iter().copied().zip(names).collect(),
+            parts: route.begin_s.iter().copied().zip(names).collect(),
             states: states.collect(),
-            scenario: Scenario { start, ..tour.scenario(rig, seed) },
+            scenario: Scenario { start, ..route.scenario(rig, seed) },
             rig: real,
         })
     }

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use super::motion::Shape;
-use super::way::Way;
+use super::transition::Transition;
 use crate::design::DesignError;
 use crate::numerics::Singular;
 use crate::plant::PlantError;
@@ -27,10 +27,10 @@ pub enum SwingUpError {
     #[error("swing-up is searched for 1 to 6 links, not for {0}")]
     Links(usize),
     /// The optimisation found a solution for none of the candidates.
-    #[error("{way}: none of {tried} candidates is solved; {help}")]
+    #[error("{transition}: none of {tried} candidates is solved; {help}")]
     NoTrajectory {
         /// Which motion.
-        way: Way,
+        transition: Transition,
         /// Candidates tried.
         tried: u64,
         /// What would help.
@@ -38,12 +38,12 @@ pub enum SwingUpError {
     },
     /// Not enough random runs arrive.
     #[error(
-        "{way}: {arrived} of {runs} random runs arrive, and the lower end of the 95 % interval has to be {needed} % \
-         (success_percent in [swing_up]); {help}"
+        "{transition}: {arrived} of {runs} random runs arrive, and the lower end of the 95 % interval has to be {needed} \
+         % (success_percent in [swing_up]); {help}"
     )]
     NotRobust {
         /// Which motion.
-        way: Way,
+        transition: Transition,
         /// Runs that arrived.
         arrived: usize,
         /// Runs made.
@@ -54,10 +54,10 @@ pub enum SwingUpError {
         help: String,
     },
     /// A motion does not pass the independent check.
-    #[error("{way}: {what}")]
+    #[error("{transition}: {what}")]
     Broken {
         /// Which motion.
-        way: Way,
+        transition: Transition,
         /// The condition that does not hold.
         what: String,
     },
@@ -94,9 +94,9 @@ pub enum SwingUpError {
     /// The gain table has no motions.
     #[error("the table has no motions: make them with `upright swing-up`")]
     NoMotions,
-    /// No tour connects the motions.
-    #[error("no tour leads from hanging through all of these motions and back to hanging")]
-    NoTour,
+    /// No route connects the motions.
+    #[error("no route leads from hanging through all of these motions and back to hanging")]
+    NoRoute,
     /// The chain cannot be simulated.
     #[error(transparent)]
     Plant(#[from] PlantError),

@@ -10,7 +10,7 @@ use super::SwingUpError;
 use super::demonstration::{hang, up_and_down};
 use super::motion::SwingUp;
 use super::robustness::{Runs, Spread, deviation, drawn};
-use super::way::Way;
+use super::transition::Transition;
 use crate::harness::{Harness, HarnessError, Target, goals, with_firmware};
 use crate::rig::{LinkEncoder, PlantDescription, Rig};
 use crate::simulate::Scenario;
@@ -125,7 +125,7 @@ pub fn firmware_runs(
     let scenario = Scenario { substeps: 2, ..up_and_down(rig, table, UPRIGHT_S)? };
     let one = |number: u64| {
         let seed = base_seed + number;
-        let (mut real, start) = drawn(rig, Way::Up, &condition.spread, seed);
+        let (mut real, start) = drawn(rig, Transition::Up, &condition.spread, seed);
         real.tick.delay_ticks = u8::from(condition.is_late);
         let scenario = Scenario { start, seed, ..scenario.clone() };
         with_firmware(table, |target| raised_and_lowered(&real, table, motions, &scenario, target))

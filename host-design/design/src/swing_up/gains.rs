@@ -5,7 +5,7 @@ use super::motion::Motion;
 use super::refine::Path;
 use super::setting::Setting;
 use super::tracking::{Filter, feedback, ticks};
-use super::way::Way;
+use super::transition::Transition;
 use crate::numerics::Matrix;
 
 /// Factor on the weights of `[lqr]` for the positions of cart and links along a motion: a link that leaves its plan is
@@ -17,7 +17,7 @@ pub(super) const POSITION_WEIGHT: f64 = 4.0;
 pub(super) fn motion(
     setting: &Setting<'_>,
     path: Path,
-    way: Way,
+    transition: Transition,
     position_weight: f64,
 ) -> Result<Motion, SwingUpError> {
     let ticks = ticks(&*setting.dynamics, &path, setting.tick_s);
@@ -26,9 +26,10 @@ pub(super) fn motion(
         let factor = if i % 2 == 0 && j % 2 == 0 { position_weight } else { 1.0 };
         factor * setting.weights[(i, j)]
     });
-    let k = feedback(&ticks, &weights, setting.force_weight, &setting.at_end(way).cost, setting.tick_s);
+    let k =
+        feedback(&ticks, &weights, setting.force_weight, &setting.at_end(transition).cost, setting.tick_s);
     let mut filter = Filter::new(&*setting.dynamics, &setting.noise, states, setting.tick_s);
-    filter.covariance = setting.at_start(way).covariance.clone();
+    filter.covariance = setting.at_start(transition).covariance.clone();
     let l: Result<Vec<Matrix<f64>>, _> =
         path.x.iter().zip(&ticks).map(|(x, tick)| filter.gain(x, tick)).collect();
     Ok(Motion::new(setting.tick_s, path.x, path.u, k, l?)?)

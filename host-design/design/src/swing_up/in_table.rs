@@ -3,7 +3,7 @@
 use super::SwingUpError;
 use super::motion::SwingUp;
 use super::supervision::set_limits;
-use super::transitions::Transition;
+use super::transitions::PlannedTransition;
 use crate::design::design;
 use crate::rig::Rig;
 use crate::table::{Gains, SwingUpValues, TableValues};
@@ -18,11 +18,11 @@ pub fn with_motions(
     rig: &Rig,
     mut table: TableValues,
     motions: &SwingUp,
-    transitions: &[Transition],
+    transitions: &[PlannedTransition],
 ) -> Result<TableValues, SwingUpError> {
     let mut swing_up = SwingUpValues::of(rig, &table, motions)?;
-    for Transition { way, motion, .. } in transitions {
-        swing_up.add(&table, *way, motion)?;
+    for PlannedTransition { transition, motion, .. } in transitions {
+        swing_up.add(&table, *transition, motion)?;
     }
     table.swing_up = Some(swing_up);
     set_limits(rig, &mut table)?;
@@ -44,7 +44,7 @@ pub fn designed_table(rig: &Rig, motions: &SwingUp) -> Result<TableValues, Swing
 pub fn designed_table_with(
     rig: &Rig,
     motions: &SwingUp,
-    transitions: &[Transition],
+    transitions: &[PlannedTransition],
 ) -> Result<TableValues, SwingUpError> {
     with_motions(rig, TableValues::of(rig, &design(rig)?, Gains::Sampled)?, motions, transitions)
 }

@@ -7,7 +7,7 @@ use upright::table::Equilibrium;
 
 use super::SwingUpError;
 use super::demonstration::{hang, up_and_down};
-use super::way::Way;
+use super::transition::Transition;
 use crate::harness::{Harness, HarnessError, Target, goals, with_firmware};
 use crate::parallel;
 use crate::plant::absolute_angles;
@@ -67,28 +67,28 @@ struct Push {
 pub fn margins(
     rig: &Rig,
     table: &TableValues,
-    way: Way,
+    transition: Transition,
     moments: usize,
     done: &(dyn Fn() + Sync),
 ) -> Result<Vec<Margin>, SwingUpError> {
     let scenario =
         Scenario { force_noise_n: 0.0, torque_noise_n_m: 0.0, ..up_and_down(rig, table, UPRIGHT_S)? };
-    let scenario = match way {
-        Way::Up => scenario,
-        Way::Down => Scenario {
+    let scenario = match transition {
+        Transition::Up => scenario,
+        Transition::Down => Scenario {
             begin: Begin::ByHand,
             start: vec![0.0; rig.states()],
             goals: vec![Goal { at_s: UPRIGHT_S, to: Equilibrium::HANGING }],
             ..scenario
         },
-        Way::Between { .. } => return Err(SwingUpError::NoMotions),
+        Transition::Between { .. } => return Err(SwingUpError::NoMotions),
     };
     let pushed = |push: Option<Push>| -> Result<Option<usize>, SwingUpError> {
         with_firmware(table, |target| arrival(rig, table, &scenario, push, target))
             .flatten()
             .map_err(|error| SwingUpError::Firmware(error.to_string()))
     };
-    let (ticks, begin) = (motion_ticks(table, way), pushed(None)?);
+    let (ticks, begin) = (motion_ticks(table, transition), pushed(None)?);
     let edge = |tick: usize, link: usize, side: f64| -> Result<f64, SwingUpError> {
         let Some(begin) = begin else { return Ok(0.0) };
         let survives =
@@ -106,10 +106,12 @@ pub fn margins(
     parallel::try_map(0..moments, at)
 }
 
-fn motion_ticks(table: &TableValues, way: Way) -> usize {
+fn motion_ticks(table: &TableValues, transition: Transition) -> usize {
     let motions = table.swing_up.as_ref();
-    motions.map_or(0, |motions| if way == Way::Up { motions.raise.ticks } else { motions.lower.ticks })
-        as usize
+    motions.map_or(
+        0,
+        |motions| if transition == Transition::Up { motions.raise.ticks } else { motions.lower.ticks },
+    ) as usize
 }
 
 /// The largest size that is survived, below the first one that is not.
@@ -153,24 +155,24 @@ fn arrival(
     let inputs = harness.inputs();
     harness.session.ask(Request::Telemetry(TELEMETRY_TICKS), &inputs)?;
     let mut output = harness.raise(None)?;
-    let (way, goals) = match scenario.begin {
-        Begin::Hanging => (Way::Up, Vec::new()),
-        Begin::ByHand => (Way::Down, goals(scenario, rig.tick.period_s)),
+    let (transition, goals) = match scenario.begin {
+        Begin::Hanging => (Transition::Up, Vec::new()),
+        Begin::ByHand => (Transition::Down, goals(scenario, rig.tick.period_s)),
     };
-    let ticks = motion_ticks(table, way);
+    let ticks = motion_ticks(table, transition);
     let mut tick = 0;
     loop {
-        let begin = if way == Way::Up { Some(0) } else { harness.begun().first().copied() };
+        let begin = if transition == Transition::Up { Some(0) } else { harness.begun().first().copied() };
         let latest = goals.first().map(|(at, _)| at + in_ticks(LONGEST_WAIT_S));
         let Some(end) = begin.map(|begin| begin + ticks).or(latest) else {
             return Ok(None);
         };
-        if !output.enable && (way == Way::Up || tick < end) {
+        if !output.enable && (transition == Transition::Up || tick < end) {
             return Ok(None);
         }
         if tick == end + in_ticks(AFTER_S) {
-            let is_well = match way {
-                Way::Up => harness.session.status().state == State::Balancing,
+            let is_well = match transition {
+                Transition::Up => harness.session.status().state == State::Balancing,
                 _ => harness.session.status().state == State::Calibrated && hang(harness.bench.state()),
             };
             return Ok(begin.filter(|_| is_well && harness.session.fault().is_none()));

@@ -16,7 +16,7 @@ use super::robustness::{Runs, Spread, random_runs, score};
 use super::search::{Candidate, Request, candidates, ticks_per_knot};
 use super::setting::Setting;
 use super::stored::{Stored, StoredKnots};
-use super::way::Way;
+use super::transition::Transition;
 use crate::parallel;
 use crate::rig::Rig;
 use crate::study::Study;
@@ -36,7 +36,7 @@ pub enum Trying {
     /// A stage of this many steps begins.
     Stage {
         /// Which motion.
-        way: Way,
+        transition: Transition,
         /// What each step does.
         what: &'static str,
         /// Number of steps.
@@ -71,7 +71,7 @@ pub struct Plan {
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Judgement {
     /// Which motion.
-    pub way: Way,
+    pub transition: Transition,
     /// Number of candidates tried and solved; none for a stored motion.
     pub search: Option<[usize; 2]>,
     /// Fragility: the smaller, the larger errors of masses and friction it survives.
@@ -93,15 +93,19 @@ pub struct Judgement {
 pub fn search(rig: &Rig, progress: Progress<'_>) -> Result<Plan, SwingUpError> {
     let setting = Setting::of(rig)?;
     let request = Request::of(&setting);
-    let found = |way| -> Result<Found, SwingUpError> {
+    let found = |transition| -> Result<Found, SwingUpError> {
         let counts = if setting.chain.links.len() >= 4 { CANDIDATES_OF_LONG_CHAINS } else { CANDIDATES };
-        let tried = counts[usize::from(way == Way::Down)];
-        match best(&setting, &request, way, 0..tried, progress)? {
+        let tried = counts[usize::from(transition == Transition::Down)];
+        match best(&setting, &request, transition, 0..tried, progress)? {
             Some(found) => Ok(found),
-            None => Err(SwingUpError::NoTrajectory { way, tried, help: advice(rig, way, progress)? }),
+            None => Err(SwingUpError::NoTrajectory {
+                transition,
+                tried,
+                help: advice(rig, transition, progress)?,
+            }),
         }
     };
-    let (raise, lower) = (found(Way::Up)?, found(Way::Down)?);
+    let (raise, lower) = (found(Transition::Up)?, found(Transition::Down)?);
     judged(&setting, raise, lower, progress)
 }
 
@@ -112,12 +116,13 @@ pub fn search(rig: &Rig, progress: Progress<'_>) -> Result<Plan, SwingUpError> {
 pub fn judge(rig: &Rig, stored: &Stored, progress: Progress<'_>) -> Result<Plan, SwingUpError> {
     let setting = Setting::of(rig)?;
     let spread = Spread::asked(rig);
-    let found = |way, stored: &StoredKnots| -> Result<Found, SwingUpError> {
-        let motion = restored(&setting, way, stored)?;
-        let score = score(&setting, &motion, way, &spread)?;
+    let found = |transition, stored: &StoredKnots| -> Result<Found, SwingUpError> {
+        let motion = restored(&setting, transition, stored)?;
+        let score = score(&setting, &motion, transition, &spread)?;
         Ok(Found { motion, stored: stored.clone(), score, search: None })
     };
-    let (raise, lower) = parallel::both(|| found(Way::Up, &stored.raise), || found(Way::Down, &stored.lower));
+    let (raise, lower) =
+        parallel::both(|| found(Transition::Up, &stored.raise), || found(Transition::Down, &stored.lower));
     judged(&setting, raise?, lower?, progress)
 }
 
@@ -136,26 +141,28 @@ pub fn motions(rig: &Rig, stored: &Stored) -> Result<SwingUp, SwingUpError> {
 /// [`SwingUpError::Outdated`] if they do not fit the rig any more.
 pub fn refined(rig: &Rig, stored: &Stored) -> Result<SwingUp, SwingUpError> {
     let setting = Setting::of(rig)?;
-    let checked = |way, knots| -> Result<Motion, SwingUpError> {
-        let motion = restored(&setting, way, knots)?;
-        check(&setting, &motion, way)?;
+    let checked = |transition, knots| -> Result<Motion, SwingUpError> {
+        let motion = restored(&setting, transition, knots)?;
+        check(&setting, &motion, transition)?;
         Ok(motion)
     };
-    let (raise, lower) =
-        parallel::both(|| checked(Way::Up, &stored.raise), || checked(Way::Down, &stored.lower));
+    let (raise, lower) = parallel::both(
+        || checked(Transition::Up, &stored.raise),
+        || checked(Transition::Down, &stored.lower),
+    );
     Ok(SwingUp { raise: raise?, lower: lower? })
 }
 
 pub(super) fn restored(
     setting: &Setting<'_>,
-    way: Way,
+    transition: Transition,
     stored: &StoredKnots,
 ) -> Result<Motion, SwingUpError> {
     let states = setting.rig.states();
     let knots = stored.knots(states).ok_or(SwingUpError::Outdated)?;
-    let ends = way.ends_near(knots.x.last().ok_or(SwingUpError::Outdated)?);
+    let ends = transition.ends_near(knots.x.last().ok_or(SwingUpError::Outdated)?);
     let path = refine(&*setting.dynamics, &knots, stored.ticks, setting.tick_s, &ends);
-    motion(setting, path.ok_or(SwingUpError::Outdated)?, way, POSITION_WEIGHT)
+    motion(setting, path.ok_or(SwingUpError::Outdated)?, transition, POSITION_WEIGHT)
 }
 
 /// A motion that is to be judged.
@@ -168,23 +175,24 @@ pub(super) struct Found {
 }
 
 /// The motion restored from these knots, with its score.
-fn found(setting: &Setting<'_>, way: Way, stored: StoredKnots) -> Result<Found, SwingUpError> {
-    let motion = restored(setting, way, &stored)?;
-    let score = score(setting, &motion, way, &Spread::asked(setting.rig))?;
+fn found(setting: &Setting<'_>, transition: Transition, stored: StoredKnots) -> Result<Found, SwingUpError> {
+    let motion = restored(setting, transition, &stored)?;
+    let score = score(setting, &motion, transition, &Spread::asked(setting.rig))?;
     Ok(Found { motion, stored, score, search: None })
 }
 
-/// The most robust of the candidates `numbers` for one way, if any is solved.
+/// The most robust of the candidates `numbers` for one transition, if any is solved.
 pub(super) fn best(
     setting: &Setting<'_>,
     request: &Request,
-    way: Way,
+    transition: Transition,
     numbers: Range<u64>,
     progress: Progress<'_>,
 ) -> Result<Option<Found>, SwingUpError> {
     let tried = numbers.end.saturating_sub(numbers.start);
-    progress(Trying::Stage { way, what: "trajectories", steps: tried });
-    let mut solved = candidates(setting, request, way, numbers, &|score| progress(Trying::Step { score }))?;
+    progress(Trying::Stage { transition, what: "trajectories", steps: tried });
+    let mut solved =
+        candidates(setting, request, transition, numbers, &|score| progress(Trying::Step { score }))?;
     if solved.is_empty() {
         return Ok(None);
     }
@@ -192,13 +200,13 @@ pub(super) fn best(
     solved.sort_by(|a, b| a.score.total_cmp(&b.score));
     for (kept, runs) in ROUNDS {
         solved.truncate(kept);
-        solved = ranked(setting, request, way, solved, runs, progress)?;
+        solved = ranked(setting, request, transition, solved, runs, progress)?;
     }
     // The first that passes the check; otherwise the best, whose judgement then says what does not hold.
-    let passes = |candidate: &Candidate| check(setting, &candidate.motion, way).is_ok();
+    let passes = |candidate: &Candidate| check(setting, &candidate.motion, transition).is_ok();
     let chosen = solved.swap_remove(solved.iter().position(passes).unwrap_or(0));
     let stored = StoredKnots::new(ticks_per_knot(setting), &chosen.knots);
-    Ok(Some(Found { search: Some([tried as usize, count]), ..found(setting, way, stored)? }))
+    Ok(Some(Found { search: Some([tried as usize, count]), ..found(setting, transition, stored)? }))
 }
 
 /// The candidates sorted by the number of random runs that they survive; among equals, the one with the smallest
@@ -206,16 +214,16 @@ pub(super) fn best(
 fn ranked(
     setting: &Setting<'_>,
     request: &Request,
-    way: Way,
+    transition: Transition,
     candidates: Vec<Candidate>,
     runs: usize,
     progress: Progress<'_>,
 ) -> Result<Vec<Candidate>, SwingUpError> {
-    progress(Trying::Stage { way, what: "random runs of the best", steps: candidates.len() as u64 });
+    progress(Trying::Stage { transition, what: "random runs of the best", steps: candidates.len() as u64 });
     let mut all: Vec<(Runs, Candidate)> = Vec::new();
     for candidate in candidates {
         let seed = RUNS as u64 + 1;
-        let found = random_runs(setting, &candidate.motion, way, &request.spread, seed, runs)?;
+        let found = random_runs(setting, &candidate.motion, transition, &request.spread, seed, runs)?;
         progress(Trying::Step { score: Some(candidate.score) });
         all.push((found, candidate));
     }
@@ -231,33 +239,51 @@ fn judged(
     progress: Progress<'_>,
 ) -> Result<Plan, SwingUpError> {
     let rig = setting.rig;
-    let peaks = [check(setting, &raise.motion, Way::Up)?, check(setting, &lower.motion, Way::Down)?];
+    let peaks =
+        [check(setting, &raise.motion, Transition::Up)?, check(setting, &lower.motion, Transition::Down)?];
     let stored = Stored::new(rig, raise.stored, lower.stored);
     let motions = SwingUp { raise: raise.motion, lower: lower.motion };
     let table = designed_table(rig, &motions)?;
-    progress(Trying::Stage { way: Way::Up, what: "random runs of the firmware", steps: 1 });
+    progress(Trying::Stage { transition: Transition::Up, what: "random runs of the firmware", steps: 1 });
     let runs = arriving(rig, &table, &motions)?;
     progress(Trying::Step { score: None });
     let is_searched = raise.search.is_some();
-    for (way, runs) in Way::BOTH.into_iter().zip(&runs) {
+    for (transition, runs) in Transition::BOTH.into_iter().zip(&runs) {
         if is_enough(rig, runs) {
             continue;
         }
         let mut help = narrower(rig, |rig| {
             let motions = refined(rig, &stored)?;
             let [raise, lower] = arriving(rig, &designed_table(rig, &motions)?, &motions)?;
-            Ok(if way == Way::Up { raise } else { lower })
+            Ok(if transition == Transition::Up { raise } else { lower })
         })?;
         if is_searched {
-            help = format!("{help}; {}", advice(rig, way, progress)?);
+            help = format!("{help}; {}", advice(rig, transition, progress)?);
         }
         let needed = setting.rules.success_percent;
-        return Err(SwingUpError::NotRobust { way, arrived: runs.arrived, runs: runs.runs, needed, help });
+        return Err(SwingUpError::NotRobust {
+            transition,
+            arrived: runs.arrived,
+            runs: runs.runs,
+            needed,
+            help,
+        });
     }
     let ([up, down], [raised, lowered]) = (peaks, runs);
-    let raise = Judgement { way: Way::Up, search: raise.search, score: raise.score, peaks: up, runs: raised };
-    let lower =
-        Judgement { way: Way::Down, search: lower.search, score: lower.score, peaks: down, runs: lowered };
+    let raise = Judgement {
+        transition: Transition::Up,
+        search: raise.search,
+        score: raise.score,
+        peaks: up,
+        runs: raised,
+    };
+    let lower = Judgement {
+        transition: Transition::Down,
+        search: lower.search,
+        score: lower.score,
+        peaks: down,
+        runs: lowered,
+    };
     Ok(Plan { motions, table, stored, raise, lower })
 }
 
@@ -278,7 +304,8 @@ mod tests {
         let rig = Rig::from_path(file.as_ref()).unwrap();
         let motions = motions(&rig, &Stored::beside(file.as_ref()).unwrap()).unwrap();
         let setting = Setting::of(&rig).unwrap();
-        let law = random_runs(&setting, &motions.raise, Way::Up, &Spread::asked(&rig), 1, RUNS).unwrap();
+        let law =
+            random_runs(&setting, &motions.raise, Transition::Up, &Spread::asked(&rig), 1, RUNS).unwrap();
         assert!(is_enough(&rig, &law), "{law:?}");
     }
 }

@@ -8,7 +8,7 @@ use super::SwingUpError;
 use super::closed_loop::{LOST_RAD, Trial, run};
 use super::motion::Motion;
 use super::setting::Setting;
-use super::way::Way;
+use super::transition::Transition;
 use crate::parallel;
 use crate::plant::absolute_angles;
 use crate::rig::{Chain, PerJoint, PlantDescription, Rig};
@@ -67,7 +67,7 @@ pub struct Runs {
 pub(super) fn score(
     setting: &Setting<'_>,
     motion: &Motion,
-    way: Way,
+    transition: Transition,
     spread: &Spread,
 ) -> Result<f64, SwingUpError> {
     let ideal = Trial::ideal(setting, motion);
@@ -76,7 +76,7 @@ pub(super) fn score(
     let share = |change: &dyn Fn(&mut Chain)| -> Result<f64, SwingUpError> {
         let mut trial = ideal.clone();
         change(&mut trial.chain);
-        let outcome = run(setting, motion, way, &trial)?;
+        let outcome = run(setting, motion, transition, &trial)?;
         Ok(outcome.deviation_rad / LOST_RAD + outcome.deviation_m / room)
     };
     let mut sum = 0.0;
@@ -108,11 +108,11 @@ fn scale_friction(chain: &mut Chain, factor: f64) {
 }
 
 /// A real rig within the spread, and the state in which it starts (m, m/s, rad, rad/s …), drawn with `seed`.
-pub(super) fn drawn(rig: &Rig, way: Way, spread: &Spread, seed: u64) -> (Rig, Vec<f64>) {
+pub(super) fn drawn(rig: &Rig, transition: Transition, spread: &Spread, seed: u64) -> (Rig, Vec<f64>) {
     let mut random = Pcg64::seed_from_u64(seed);
     let mut between = |share: f64| share * random.random_range(-1.0..=1.0);
     let mut rig = rig.clone();
-    let [mut start, _] = way.ends(rig.states(), |_| false);
+    let [mut start, _] = transition.ends(rig.states(), |_| false);
     let PlantDescription::Chain(chain) = &mut rig.plant else { return (rig, start) };
     let links = chain.links.len();
     for body in 0..=links {
@@ -122,7 +122,7 @@ pub(super) fn drawn(rig: &Rig, way: Way, spread: &Spread, seed: u64) -> (Rig, Ve
     scale_friction(chain, factor);
     start[0] += between(spread.position_m);
     // Any other motion begins while the loop balances, when the links are as near to rest as the encoder zeros.
-    let tilt_rad = if way.begins_hanging() { spread.tilt_rad } else { spread.zero_rad };
+    let tilt_rad = if transition.begins_hanging() { spread.tilt_rad } else { spread.zero_rad };
     let mut below = 0.0;
     let zeros = &mut rig.reality.sensors.homing_error_rad;
     let mut wrong = Vec::new();
@@ -138,8 +138,14 @@ pub(super) fn drawn(rig: &Rig, way: Way, spread: &Spread, seed: u64) -> (Rig, Ve
 }
 
 /// Conditions of the random run with this seed.
-pub(super) fn sample(setting: &Setting<'_>, motion: &Motion, way: Way, spread: &Spread, seed: u64) -> Trial {
-    let (rig, start) = drawn(setting.rig, way, spread, seed);
+pub(super) fn sample(
+    setting: &Setting<'_>,
+    motion: &Motion,
+    transition: Transition,
+    spread: &Spread,
+    seed: u64,
+) -> Trial {
+    let (rig, start) = drawn(setting.rig, transition, spread, seed);
     let mut trial = Trial { counts: true, seed: Some(seed), start, ..Trial::ideal(setting, motion) };
     for (joint, error) in trial.zero_error.iter_mut().skip(1).enumerate() {
         *error = rig.reality.sensors.homing_error_rad.of(joint);
@@ -154,14 +160,14 @@ pub(super) fn sample(setting: &Setting<'_>, motion: &Motion, way: Way, spread: &
 pub(super) fn random_runs(
     setting: &Setting<'_>,
     motion: &Motion,
-    way: Way,
+    transition: Transition,
     spread: &Spread,
     base_seed: u64,
     runs: usize,
 ) -> Result<Runs, SwingUpError> {
     let one = |index: usize| {
-        let trial = sample(setting, motion, way, spread, base_seed + index as u64);
-        run(setting, motion, way, &trial)
+        let trial = sample(setting, motion, transition, spread, base_seed + index as u64);
+        run(setting, motion, transition, &trial)
     };
     let all: Vec<_> = parallel::try_map(0..runs, one)?;
     let arrived = || all.iter().filter(|outcome| outcome.arrived);

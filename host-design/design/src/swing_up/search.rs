@@ -11,7 +11,7 @@ use super::refine::{Path, refine};
 use super::robustness::{Spread, score};
 use super::setting::Setting;
 use super::shooting;
-use super::way::Way;
+use super::transition::Transition;
 use crate::numerics::Matrix;
 use crate::parallel;
 
@@ -100,11 +100,11 @@ fn time_unit(setting: &Setting<'_>) -> f64 {
 }
 
 /// Draws candidate `number`.
-fn draw(setting: &Setting<'_>, request: &Request, way: Way, number: u64) -> Draw {
+fn draw(setting: &Setting<'_>, request: &Request, transition: Transition, number: u64) -> Draw {
     let mut random = Pcg64::seed_from_u64(number);
     let mut between = |[low, high]: [f64; 2]| low + (high - low) * random.random_range(0.0..=1.0);
     let unit = time_unit(setting);
-    let is_between = matches!(way, Way::Between { .. });
+    let is_between = matches!(transition, Transition::Between { .. });
     let [shortest, longest] = request.duration_s;
     let duration_s =
         between([shortest, if is_between && number >= LATE { STRETCH * longest } else { longest }]);
@@ -125,13 +125,18 @@ pub(super) fn ticks_per_knot(setting: &Setting<'_>) -> usize {
 }
 
 /// Solves candidate `number`. None if its gaps do not close, or a bound does not hold.
-fn solve(setting: &Setting<'_>, request: &Request, way: Way, number: u64) -> Option<(Knots, Path)> {
-    let draw = draw(setting, request, way, number);
+fn solve(
+    setting: &Setting<'_>,
+    request: &Request,
+    transition: Transition,
+    number: u64,
+) -> Option<(Knots, Path)> {
+    let draw = draw(setting, request, transition, number);
     let ticks = ticks_per_knot(setting);
     let knot_s = ticks as f64 * setting.tick_s;
-    let [_, end] = way.ends(setting.rig.states(), |link| draw.reversed >> link & 1 != 0);
+    let [_, end] = transition.ends(setting.rig.states(), |link| draw.reversed >> link & 1 != 0);
     // To the last bit the ends with which the motion will be restored.
-    let ends = way.ends_near(&end);
+    let ends = transition.ends_near(&end);
     let [start, end] = ends.clone();
     let problem = Problem {
         dynamics: &*setting.dynamics,
@@ -193,17 +198,17 @@ pub(super) fn within(path: &Path, bounds: &Bounds) -> bool {
 pub(super) fn candidates(
     setting: &Setting<'_>,
     request: &Request,
-    way: Way,
+    transition: Transition,
     numbers: core::ops::Range<u64>,
     done: &(dyn Fn(Option<f64>) + Sync),
 ) -> Result<Vec<Candidate>, SwingUpError> {
     let one = |number: u64| -> Result<Option<Candidate>, SwingUpError> {
-        let Some((knots, path)) = solve(setting, request, way, number) else {
+        let Some((knots, path)) = solve(setting, request, transition, number) else {
             done(None);
             return Ok(None);
         };
-        let motion = motion(setting, path, way, RANKING_WEIGHT)?;
-        let score = score(setting, &motion, way, &request.spread)?;
+        let motion = motion(setting, path, transition, RANKING_WEIGHT)?;
+        let score = score(setting, &motion, transition, &request.spread)?;
         done(Some(score));
         Ok(Some(Candidate { knots, motion, score }))
     };

@@ -10,7 +10,7 @@ use super::dynamics::{Dynamics, dynamics};
 use super::hold::tick;
 use super::problem::Bounds;
 use super::tracking::{Filter, Noise, stationary};
-use super::way::{Way, rest};
+use super::transition::{Transition, rest};
 use crate::numerics::Matrix;
 use crate::rig::{Chain, Motor, PlantDescription, Rig, Sensor, SwingUpRules};
 use crate::verify::Disturbance;
@@ -55,11 +55,11 @@ pub(super) struct AtRest {
 impl<'a> Setting<'a> {
     /// The setting for raising and lowering.
     pub(super) fn of(rig: &'a Rig) -> Result<Self, SwingUpError> {
-        Self::with_ways(rig, &Way::BOTH)
+        Self::with_transitions(rig, &Transition::BOTH)
     }
 
-    /// The setting for these ways.
-    pub(super) fn with_ways(rig: &'a Rig, ways: &[Way]) -> Result<Self, SwingUpError> {
+    /// The setting for these transitions.
+    pub(super) fn with_transitions(rig: &'a Rig, transitions: &[Transition]) -> Result<Self, SwingUpError> {
         let PlantDescription::Chain(chain) = &rig.plant else { return Err(SwingUpError::NotAChain) };
         let (Some(lqr), Some(kalman)) = (&rig.lqr, &rig.kalman) else {
             return Err(SwingUpError::Needs("[lqr] and [kalman]"));
@@ -98,7 +98,7 @@ impl<'a> Setting<'a> {
         };
         let links = chain.links.len();
         let mut rests = BTreeMap::new();
-        for at in ways.iter().flat_map(|way| [way.from(links), way.to(links)]) {
+        for at in transitions.iter().flat_map(|transition| [transition.from(links), transition.to(links)]) {
             if let Entry::Vacant(vacant) = rests.entry(at) {
                 vacant.insert(at_rest(at)?);
             }
@@ -124,14 +124,14 @@ impl<'a> Setting<'a> {
         })
     }
 
-    /// Law and filter at the start of one of the ways.
-    pub(super) fn at_start(&self, way: Way) -> &AtRest {
-        &self.rests[&way.from(self.chain.links.len())]
+    /// Law and filter at the start of one of the transitions.
+    pub(super) fn at_start(&self, transition: Transition) -> &AtRest {
+        &self.rests[&transition.from(self.chain.links.len())]
     }
 
-    /// Law and filter at the end of one of the ways.
-    pub(super) fn at_end(&self, way: Way) -> &AtRest {
-        &self.rests[&way.to(self.chain.links.len())]
+    /// Law and filter at the end of one of the transitions.
+    pub(super) fn at_end(&self, transition: Transition) -> &AtRest {
+        &self.rests[&transition.to(self.chain.links.len())]
     }
 }
 

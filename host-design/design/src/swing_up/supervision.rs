@@ -4,7 +4,7 @@ use upright::table::MotionLimits;
 
 use super::closed_loop::LOST_RAD;
 use super::robustness::{Spread, drawn};
-use super::way::Way;
+use super::transition::Transition;
 use crate::parallel;
 use crate::rig::{PlantDescription, Rig};
 use crate::simulate::{Extremes, Scenario, SimulationError, follow};
@@ -67,19 +67,22 @@ fn healthy(rig: &Rig, table: &TableValues) -> Result<Extremes, SimulationError> 
     let disturbance = Disturbance::of(rig);
     let balance_ticks = (BALANCE_S / rig.tick.period_s) as usize;
     let quiet = Scenario { substeps: 2, ..Scenario::swing_up(rig, 0.0, None) };
-    let others: Vec<Way> =
-        table.swing_up.iter().flat_map(|swing_up| swing_up.others.iter().map(|(way, _)| *way)).collect();
+    let others: Vec<Transition> = table
+        .swing_up
+        .iter()
+        .flat_map(|swing_up| swing_up.others.iter().map(|(transition, _)| *transition))
+        .collect();
     // Each machine is raised and lowered, and then makes each of the other motions from rest.
     let one = |number: u64| {
         let (number, motion) = (number % MACHINES, (number / MACHINES) as usize);
         let other = motion.checked_sub(1);
-        let way = other.map_or(Way::Up, |other| others[other]);
+        let transition = other.map_or(Transition::Up, |other| others[other]);
         if number == 0 {
-            let [start, _] = way.ends(rig.states(), |_| false);
+            let [start, _] = transition.ends(rig.states(), |_| false);
             return follow(rig, table, &Scenario { start, ..quiet.clone() }, other, balance_ticks);
         }
         let seed = BASE_SEED + number;
-        let (machine, start) = drawn(rig, way, &spread, seed);
+        let (machine, start) = drawn(rig, transition, &spread, seed);
         let scenario = Scenario {
             start,
             seed,

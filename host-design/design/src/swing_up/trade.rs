@@ -7,7 +7,7 @@ use super::plan::{Progress, Trying};
 use super::robustness::{Runs, Spread, random_runs};
 use super::search::{Candidate, Request, candidates};
 use super::setting::Setting;
-use super::way::Way;
+use super::transition::Transition;
 use crate::rig::Rig;
 
 /// Random runs of each candidate.
@@ -37,18 +37,18 @@ pub struct Solved {
 /// [`SwingUpError`] if the rig cannot be raised at all.
 pub fn solved(rig: &Rig, tried: u64, seed: u64, progress: Progress<'_>) -> Result<Vec<Solved>, SwingUpError> {
     let setting = Setting::of(rig)?;
-    let (request, way) = (Request::of(&setting), Way::Up);
+    let (request, transition) = (Request::of(&setting), Transition::Up);
     let first = seed.saturating_sub(1).saturating_mul(tried);
-    progress(Trying::Stage { way, what: "trajectories", steps: tried });
+    progress(Trying::Stage { transition, what: "trajectories", steps: tried });
     let step = |score| progress(Trying::Step { score });
-    let found = candidates(&setting, &request, way, first..first.saturating_add(tried), &step)?;
-    progress(Trying::Stage { way, what: "random runs", steps: found.len() as u64 });
+    let found = candidates(&setting, &request, transition, first..first.saturating_add(tried), &step)?;
+    progress(Trying::Stage { transition, what: "random runs", steps: found.len() as u64 });
     let Spread { mass, friction, .. } = request.spread;
     let twice = Spread { mass: 2.0 * mass, friction: 2.0 * friction, ..request.spread };
     let largest = |most: f64, value: f64| most.max(value.abs());
     let judged = |candidate: &Candidate| {
         let (motion, score) = (&candidate.motion, candidate.score);
-        let runs = |spread: &Spread| random_runs(&setting, motion, way, spread, seed, RUNS);
+        let runs = |spread: &Spread| random_runs(&setting, motion, transition, spread, seed, RUNS);
         let (runs, wider) = (runs(&request.spread)?, runs(&twice)?);
         step(Some(score));
         Ok(Solved {

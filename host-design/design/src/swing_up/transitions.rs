@@ -1,5 +1,5 @@
 //! Motions between any two equilibria: search, check, storage. Runs of the firmware, in which the motions follow one
-//! another, are in `tour`.
+//! another, are in `route`.
 
 use core::fmt::Write as _;
 use core::ops::Range;
@@ -16,18 +16,18 @@ use super::robustness::{Runs, Spread, random_runs};
 use super::search::Request;
 use super::setting::Setting;
 use super::stored::{StoredKnots, read, request_hash};
-use super::way::Way;
+use super::transition::Transition;
 use crate::parallel;
 use crate::rig::Rig;
 
 /// Share of random runs with the law alone that have to arrive before the firmware tries a motion.
-const WORTH_A_TOUR: f64 = 0.8;
+const WORTH_A_RUN: f64 = 0.8;
 
 /// A motion from one equilibrium to another.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Transition {
+pub struct PlannedTransition {
     /// Equilibria at which it starts and ends.
-    pub way: Way,
+    pub transition: Transition,
     /// The motion with its gains.
     pub motion: Motion,
 }
@@ -36,7 +36,7 @@ pub struct Transition {
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Searched {
     /// Equilibria at which it starts and ends.
-    pub way: Way,
+    pub transition: Transition,
     /// Number of candidates solved.
     pub solved: usize,
     /// Random runs of the best of them with the law alone; none if none is solved or the best does not pass the
@@ -53,50 +53,56 @@ pub struct StoredTransitions {
     rig: String,
     /// Hash of the rig and its `[swing_up]`.
     hash: String,
-    /// Number of tours in which a motion arrived, and in which it was tried, by the name of its way. A motion without
-    /// an entry has not been judged.
-    tours: BTreeMap<String, [usize; 2]>,
-    /// Knots of each motion, by the name of its way.
+    /// Number of runs in which a motion arrived, and in which it was tried, by the name of its transition. A motion
+    /// without an entry has not been judged.
+    #[serde(rename = "tours")]
+    judged: BTreeMap<String, [usize; 2]>,
+    /// Knots of each motion, by the name of its transition.
     #[serde(flatten)]
-    ways: BTreeMap<String, StoredKnots>,
+    knots: BTreeMap<String, StoredKnots>,
 }
 
 impl StoredTransitions {
-    /// Searches for a motion of `rig` for `way` among the candidates `numbers`, and stores it if most random runs with
-    /// the law alone arrive; tours of the firmware then judge it. Otherwise, a motion stored before is kept.
+    /// Searches for a motion of `rig` for `transition` among the candidates `numbers`, and stores it if most random
+    /// runs with the law alone arrive; runs of the firmware then judge it. Otherwise, a motion stored before is kept.
     ///
     /// # Errors
     /// [`SwingUpError`] if the rig cannot be raised at all.
     pub fn search(
         &mut self,
         rig: &Rig,
-        way: Way,
+        transition: Transition,
         numbers: Range<u64>,
         progress: Progress<'_>,
     ) -> Result<Searched, SwingUpError> {
-        let setting = Setting::with_ways(rig, &[way])?;
-        let none = Searched { way, solved: 0, runs: None, is_stored: false };
-        let Some(found) = best(&setting, &Request::of(&setting), way, numbers, progress)? else {
+        let setting = Setting::with_transitions(rig, &[transition])?;
+        let none = Searched { transition, solved: 0, runs: None, is_stored: false };
+        let Some(found) = best(&setting, &Request::of(&setting), transition, numbers, progress)? else {
             return Ok(none);
         };
         let Found { motion, stored, search, .. } = found;
         let solved = search.map_or(0, |[_, solved]| solved);
-        if check(&setting, &motion, way).is_err() {
+        if check(&setting, &motion, transition).is_err() {
             return Ok(Searched { solved, ..none });
         }
-        let runs = random_runs(&setting, &motion, way, &Spread::asked(rig), 1, RUNS)?;
-        let is_stored = runs.arrived as f64 >= WORTH_A_TOUR * runs.runs as f64;
+        let runs = random_runs(&setting, &motion, transition, &Spread::asked(rig), 1, RUNS)?;
+        let is_stored = runs.arrived as f64 >= WORTH_A_RUN * runs.runs as f64;
         if is_stored {
-            let name = way.name(setting.chain.links.len());
-            self.tours.remove(&name);
-            self.ways.insert(name, stored);
+            let name = transition.name(setting.chain.links.len());
+            self.judged.remove(&name);
+            self.knots.insert(name, stored);
         }
-        Ok(Searched { way, solved, runs: Some(runs), is_stored })
+        Ok(Searched { transition, solved, runs: Some(runs), is_stored })
     }
 
     /// An empty set of motions for `rig`.
     pub fn none(rig: &Rig) -> Self {
-        Self { rig: rig.name.clone(), hash: request_hash(rig), tours: BTreeMap::new(), ways: BTreeMap::new() }
+        Self {
+            rig: rig.name.clone(),
+            hash: request_hash(rig),
+            judged: BTreeMap::new(),
+            knots: BTreeMap::new(),
+        }
     }
 
     /// Whether these motions were planned for exactly these values of the rig file.
@@ -104,16 +110,16 @@ impl StoredTransitions {
         self.hash == request_hash(rig)
     }
 
-    /// Drops the motion of this way.
-    pub fn drop(&mut self, way: Way, links: usize) {
-        self.tours.remove(&way.name(links));
-        self.ways.remove(&way.name(links));
+    /// Drops the motion of this transition.
+    pub fn drop(&mut self, transition: Transition, links: usize) {
+        self.judged.remove(&transition.name(links));
+        self.knots.remove(&transition.name(links));
     }
 
-    /// Records in how many tours this motion arrived, and in how many it was tried: from now on it is one of
+    /// Records in how many runs this motion arrived, and in how many it was tried: from now on it is one of
     /// [`transitions`](Self::transitions).
-    pub fn judge(&mut self, way: Way, links: usize, [arrived, tried]: [usize; 2]) {
-        self.tours.insert(way.name(links), [arrived, tried]);
+    pub fn judge(&mut self, transition: Transition, links: usize, [arrived, tried]: [usize; 2]) {
+        self.judged.insert(transition.name(links), [arrived, tried]);
     }
 
     /// The file beside a rig file: `rigs/my-rig.transitions.json` for `rigs/my-rig.toml`.
@@ -129,19 +135,19 @@ impl StoredTransitions {
         read(Self::path_beside(rig_file), "transitions")
     }
 
-    /// The motions that tours have judged, refined for `rig`, with their gains.
+    /// The motions that runs of the firmware have judged, refined for `rig`, with their gains.
     ///
     /// # Errors
     /// [`SwingUpError::Outdated`] if the rig file has changed since.
-    pub fn transitions(&self, rig: &Rig) -> Result<Vec<Transition>, SwingUpError> {
-        self.restored(rig, |name| self.tours.contains_key(name))
+    pub fn transitions(&self, rig: &Rig) -> Result<Vec<PlannedTransition>, SwingUpError> {
+        self.restored(rig, |name| self.judged.contains_key(name))
     }
 
     /// As [`transitions`](Self::transitions), including those that have not been judged yet.
     ///
     /// # Errors
     /// As for [`transitions`](Self::transitions).
-    pub fn all(&self, rig: &Rig) -> Result<Vec<Transition>, SwingUpError> {
+    pub fn all(&self, rig: &Rig) -> Result<Vec<PlannedTransition>, SwingUpError> {
         self.restored(rig, |_| true)
     }
 
@@ -149,34 +155,38 @@ impl StoredTransitions {
         &self,
         rig: &Rig,
         is_wanted: impl Fn(&String) -> bool,
-    ) -> Result<Vec<Transition>, SwingUpError> {
+    ) -> Result<Vec<PlannedTransition>, SwingUpError> {
         let links = rig.states() / 2 - 1;
         if !self.is_of(rig) {
             return Err(SwingUpError::Outdated);
         }
-        let named = |name| Way::named(name, links).filter(|way| !Way::BOTH.contains(way));
-        let wanted = self.ways.iter().filter(|(name, _)| is_wanted(name));
-        let ways: Option<Vec<_>> = wanted.map(|(name, knots)| Some((named(name)?, knots))).collect();
-        let ways = ways.ok_or(SwingUpError::Outdated)?;
-        let setting = Setting::with_ways(rig, &ways.iter().map(|(way, _)| *way).collect::<Vec<_>>())?;
-        let one = |index: usize| -> Result<Transition, SwingUpError> {
-            let (way, knots) = ways[index];
-            let motion = restored(&setting, way, knots)?;
-            check(&setting, &motion, way)?;
-            Ok(Transition { way, motion })
+        let named =
+            |name| Transition::named(name, links).filter(|transition| !Transition::BOTH.contains(transition));
+        let wanted = self.knots.iter().filter(|(name, _)| is_wanted(name));
+        let transitions: Option<Vec<_>> = wanted.map(|(name, knots)| Some((named(name)?, knots))).collect();
+        let transitions = transitions.ok_or(SwingUpError::Outdated)?;
+        let setting = Setting::with_transitions(
+            rig,
+            &transitions.iter().map(|(transition, _)| *transition).collect::<Vec<_>>(),
+        )?;
+        let one = |index: usize| -> Result<PlannedTransition, SwingUpError> {
+            let (transition, knots) = transitions[index];
+            let motion = restored(&setting, transition, knots)?;
+            check(&setting, &motion, transition)?;
+            Ok(PlannedTransition { transition, motion })
         };
-        parallel::try_map(0..ways.len(), one)
+        parallel::try_map(0..transitions.len(), one)
     }
 
     /// The motions as JSON, one knot per line.
     pub fn to_json(&self) -> String {
         let mut text = format!("{{\n\"rig\": {:?},\n\"hash\": {:?}", self.rig, self.hash);
-        let tours =
+        let entry =
             |(name, [arrived, tried]): (&String, &[usize; 2])| format!("\n\"{name}\": [{arrived}, {tried}]");
-        let tours: Vec<String> = self.tours.iter().map(tours).collect();
+        let judged: Vec<String> = self.judged.iter().map(entry).collect();
         // Writing into a string cannot fail.
-        let _ = write!(text, ",\n\"tours\": {{{}\n}}", tours.join(","));
-        self.ways.iter().for_each(|(name, motion)| motion.write(&mut text, name));
+        let _ = write!(text, ",\n\"tours\": {{{}\n}}", judged.join(","));
+        self.knots.iter().for_each(|(name, motion)| motion.write(&mut text, name));
         text.push_str("\n}\n");
         text
     }

@@ -159,7 +159,7 @@ fn write_imports(out: &mut String, table: &TableValues) -> core::fmt::Result {
         ("SwingUpTable", table.swing_up.is_some()),
         ("TABLE_FORMAT", true),
         ("Thresholds", true),
-        ("Transition", table.swing_up.as_ref().is_some_and(|swing_up| !swing_up.others.is_empty())),
+        ("TransitionTable", table.swing_up.as_ref().is_some_and(|swing_up| !swing_up.others.is_empty())),
         ("columns", table.observer.is_some() || table.laws.present().next().is_some()),
     ];
     let used: Vec<&str> = names.into_iter().filter(|(_, used)| *used).map(|(name, _)| name).collect();

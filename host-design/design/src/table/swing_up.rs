@@ -2,13 +2,13 @@
 
 use nalgebra::{SMatrix, SVector};
 use upright::table::{
-    ChainModel, MotionLimits, MotionTable, SwingUpTable, TABLE_FORMAT, Thresholds, Transition,
+    ChainModel, MotionLimits, MotionTable, SwingUpTable, TABLE_FORMAT, Thresholds, TransitionTable,
 };
 
 use super::{MAX_SENSORS, NoTable, TableValues, finite};
 use crate::plant::{ChainParameters, ChainPlant};
 use crate::rig::{PlantDescription, Rig};
-use crate::swing_up::{Motion, SwingUp, Way};
+use crate::swing_up::{Motion, SwingUp, Transition};
 
 /// Time between two knots of reference state, force and gains (s) …
 const REFERENCE_S: f64 = 0.01;
@@ -29,7 +29,7 @@ pub struct SwingUpValues {
     /// The motion from upright to hanging.
     pub lower: MotionValues,
     /// The motions between other equilibria.
-    pub others: Vec<(Way, MotionValues)>,
+    pub others: Vec<(Transition, MotionValues)>,
     rig_hash: u64,
     tick_s: f32,
 }
@@ -89,17 +89,22 @@ impl SwingUpValues {
     ///
     /// # Errors
     /// As for [`of`](Self::of).
-    pub(crate) fn add(&mut self, table: &TableValues, way: Way, motion: &Motion) -> Result<(), NoTable> {
-        self.others.push((way, MotionValues::of(table, motion)?));
+    pub(crate) fn add(
+        &mut self,
+        table: &TableValues,
+        transition: Transition,
+        motion: &Motion,
+    ) -> Result<(), NoTable> {
+        self.others.push((transition, MotionValues::of(table, motion)?));
         Ok(())
     }
 
     /// The firmware's motions between other equilibria, a part of its [`table`](Self::table).
-    pub fn transitions(&self) -> Vec<Transition<'_>> {
+    pub fn transitions(&self) -> Vec<TransitionTable<'_>> {
         let links = self.chain.a.len();
-        let ends = |way: &Way| [way.from(links).bits(), way.to(links).bits()];
-        let others = self.others.iter().map(|(way, motion)| (ends(way), motion.table()));
-        others.map(|([from, to], motion)| Transition { from, to, motion }).collect()
+        let ends = |transition: &Transition| [transition.from(links).bits(), transition.to(links).bits()];
+        let others = self.others.iter().map(|(transition, motion)| (ends(transition), motion.table()));
+        others.map(|([from, to], motion)| TransitionTable { from, to, motion }).collect()
     }
 
     /// The firmware's table, complete with its checksum.
@@ -108,7 +113,7 @@ impl SwingUpValues {
     /// If `N` is not the number of links. `NY` must be `N + 1`.
     pub fn table<'a, const NY: usize, const N: usize>(
         &'a self,
-        others: &'a [Transition<'a>],
+        others: &'a [TransitionTable<'a>],
     ) -> SwingUpTable<'a, NY, N> {
         let plant = ChainPlant::<N>::new(&self.chain).expect("a swing-up for this number of links");
         let mut table = SwingUpTable {

@@ -11,7 +11,7 @@ use upright_design::plant::absolute_angles;
 use upright_design::rig::Rig;
 use upright_design::simulate::Scenario;
 use upright_design::study::Study;
-use upright_design::swing_up::{Condition, Runs, Way, firmware_runs, hangs, margins, up_and_down};
+use upright_design::swing_up::{Condition, Runs, Transition, firmware_runs, hangs, margins, up_and_down};
 use upright_design::table::TableValues;
 
 const RIGS: [&str; 4] =
@@ -266,11 +266,11 @@ fn up_and_down_are_refused_with_their_reasons() {
 #[test]
 fn a_hanging_link_may_be_pushed_hard_and_with_reversed_gains_not_at_all() {
     let (rig, mut table) = with_stored_motions("single-quanser-ip02");
-    let of = |table: &TableValues, way: Way| -> Vec<[f64; 2]> {
-        let all = margins(&rig, table, way, 3, &|| ()).unwrap();
+    let of = |table: &TableValues, transition: Transition| -> Vec<[f64; 2]> {
+        let all = margins(&rig, table, transition, 3, &|| ()).unwrap();
         all.iter().map(|margin| margin.links_n[0]).collect()
     };
-    let (up, down) = (of(&table, Way::Up), of(&table, Way::Down));
+    let (up, down) = (of(&table, Transition::Up), of(&table, Transition::Down));
     println!("{up:?}, {down:?}");
     assert!(up.iter().chain(&down).flatten().all(|&push| push > 0.1), "{up:?}, {down:?}");
     // A hanging link survives a stronger push than an upright one.
@@ -278,5 +278,5 @@ fn a_hanging_link_may_be_pushed_hard_and_with_reversed_gains_not_at_all() {
         |upright: [f64; 2], hanging: [f64; 2]| (0..2).all(|side| 1.5 * upright[side] < hanging[side]);
     assert!(is_less(up[2], up[0]) && is_less(down[0], down[2]), "{up:?}, {down:?}");
     reverse_gains(&mut table);
-    assert_eq!(of(&table, Way::Up), [[0.0; 2]; 3]);
+    assert_eq!(of(&table, Transition::Up), [[0.0; 2]; 3]);
 }

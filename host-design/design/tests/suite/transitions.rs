@@ -18,7 +18,8 @@ use upright_design::rig::Rig;
 use upright_design::simulate::Scenario;
 use upright_design::study::Study;
 use upright_design::swing_up::{
-    Script, StoredTransitions, Tour, Transition, Way, equilibrium, tours, with_motions,
+    PlannedTransition, Route, Script, StoredTransitions, Transition, equilibrium_named, route_runs,
+    with_motions,
 };
 use upright_design::table::TableValues;
 
@@ -38,25 +39,26 @@ fn double() -> (Rig, TableValues) {
     MADE.get_or_init(|| with_all_motions(DOUBLE)).clone()
 }
 
-fn way(name: &str) -> Way {
-    Way::named(name, 2).unwrap()
+fn transition(name: &str) -> Transition {
+    Transition::named(name, 2).unwrap()
 }
 
 /// `table` with only these of its motions between other equilibria.
-fn with_ways(table: &TableValues, ways: &[&str]) -> TableValues {
+fn with_transitions(table: &TableValues, transitions: &[&str]) -> TableValues {
     let mut table = table.clone();
-    let wanted: Vec<Way> = ways.iter().map(|name| way(name)).collect();
-    table.swing_up.as_mut().unwrap().others.retain(|(way, _)| wanted.contains(way));
+    let wanted: Vec<Transition> = transitions.iter().map(|name| transition(name)).collect();
+    table.swing_up.as_mut().unwrap().others.retain(|(transition, _)| wanted.contains(transition));
     table
 }
 
 #[test]
 fn the_double_goes_every_way_between_its_equilibria_one_after_the_other() {
     let (rig, table) = double();
-    let tour = Tour::of(&rig, &table).unwrap();
-    let missing: Vec<Way> = Way::all(2).into_iter().filter(|way| !tour.ways.contains(way)).collect();
+    let route = Route::of(&rig, &table).unwrap();
+    let missing: Vec<Transition> =
+        Transition::all(2).into_iter().filter(|transition| !route.transitions.contains(transition)).collect();
     assert_eq!(missing, []);
-    let script = Script::tour(&rig, &table, 3).unwrap();
+    let script = Script::route(&rig, &table, 3).unwrap();
     let demonstration = script.run(&table).unwrap();
     assert!(demonstration.arrived, "{:?}", demonstration.fault);
 }
@@ -64,12 +66,12 @@ fn the_double_goes_every_way_between_its_equilibria_one_after_the_other() {
 #[test]
 fn the_triple_goes_every_stored_way_one_after_the_other() {
     let (rig, table) = with_all_motions("triple-glueck-eder-kugi");
-    let demonstration = Script::tour(&rig, &table, 3).unwrap().run(&table).unwrap();
+    let demonstration = Script::route(&rig, &table, 3).unwrap().run(&table).unwrap();
     assert!(demonstration.arrived, "{:?}", demonstration.fault);
 }
 
 #[test]
-fn a_motion_that_no_tour_has_judged_does_not_get_into_a_table() {
+fn a_motion_that_no_run_has_judged_does_not_get_into_a_table() {
     let mut object: Value = serde_json::from_str(
         &std::fs::read_to_string(StoredTransitions::path_beside(&rig_path(DOUBLE))).unwrap(),
     )
@@ -77,27 +79,36 @@ fn a_motion_that_no_tour_has_judged_does_not_get_into_a_table() {
     object["tours"].as_object_mut().unwrap().remove("uu-ud").unwrap();
     let stored: StoredTransitions = serde_json::from_value(object).unwrap();
     let rig = rig(DOUBLE);
-    let ways = |transitions: Vec<Transition>| -> Vec<Way> {
-        transitions.iter().map(|transition| transition.way).collect()
+    let transitions = |transitions: Vec<PlannedTransition>| -> Vec<Transition> {
+        transitions.iter().map(|planned| planned.transition).collect()
     };
-    let (judged, all) = (ways(stored.transitions(&rig).unwrap()), ways(stored.all(&rig).unwrap()));
-    let missing: Vec<Way> = all.into_iter().filter(|way| !judged.contains(way)).collect();
-    assert_eq!(missing, [way("uu-ud")]);
+    let (judged, all) =
+        (transitions(stored.transitions(&rig).unwrap()), transitions(stored.all(&rig).unwrap()));
+    let missing: Vec<Transition> =
+        all.into_iter().filter(|transition| !judged.contains(transition)).collect();
+    assert_eq!(missing, [transition("uu-ud")]);
 }
 
 #[test]
-fn machines_with_wrong_masses_make_the_tour_and_with_reversed_gains_none_does() {
+fn machines_with_wrong_masses_make_the_route_and_with_reversed_gains_none_does() {
     let (rig, table) = double();
-    let mut table = with_ways(&table, &["uu-ud", "ud-du", "du-uu"]);
-    let tour = Tour::of(&rig, &table).unwrap();
+    let mut table = with_transitions(&table, &["uu-ud", "ud-du", "du-uu"]);
+    let route = Route::of(&rig, &table).unwrap();
     let arrived = |table: &TableValues| {
-        let legs = tours(&rig, table, &tour, 1, 4, &Study::whole()).unwrap().legs;
-        legs.iter().map(|leg| leg.arrived).collect::<Vec<_>>()
+        let transitions = route_runs(&rig, table, &route, 1, 4, &Study::whole()).unwrap().transitions;
+        transitions.iter().map(|one| one.arrived).collect::<Vec<_>>()
     };
-    assert_eq!(tour.ways, ["dd-uu", "uu-ud", "ud-du", "du-uu", "uu-dd"].map(way));
+    assert_eq!(route.transitions, ["dd-uu", "uu-ud", "ud-du", "du-uu", "uu-dd"].map(transition));
     assert_eq!(arrived(&table), [4; 5]);
-    let motion =
-        &mut table.swing_up.as_mut().unwrap().others.iter_mut().find(|(w, _)| *w == way("ud-du")).unwrap().1;
+    let motion = &mut table
+        .swing_up
+        .as_mut()
+        .unwrap()
+        .others
+        .iter_mut()
+        .find(|(w, _)| *w == transition("ud-du"))
+        .unwrap()
+        .1;
     let knots = motion.reference.len() / motion.reference_units.len();
     motion.reference[5 * knots..].iter_mut().for_each(|gain| *gain = -*gain);
     assert_eq!(arrived(&table), [4, 4, 0, 0, 0]);
@@ -114,7 +125,7 @@ fn hold(
 ) {
     let scenario =
         Scenario { force_noise_n: 0.0, torque_noise_n_m: 0.0, ..Scenario::swing_up(rig, 0.0, None) };
-    let goals = [(5400, way("uu-ud").to(2))];
+    let goals = [(5400, transition("uu-ud").to(2))];
     with_firmware(table, |target| {
         let mut harness = Harness::new(rig, table, &scenario, target).unwrap();
         let mut output = harness.raise(None).unwrap();
@@ -141,7 +152,7 @@ const TAP: usize = 50;
 
 /// The table with only the motions to and from the equilibrium at which the second link hangs.
 fn table_to_hold(table: &TableValues) -> TableValues {
-    with_ways(table, &["uu-ud", "ud-uu", "ud-dd"])
+    with_transitions(table, &["uu-ud", "ud-uu", "ud-dd"])
 }
 
 /// The fault with which a defect ends the run, and the number of ticks since the defect began; none if there is no
@@ -271,7 +282,7 @@ fn goals_and_set_points_at_any_moment_never_end_in_a_fault() {
 #[test]
 fn a_goal_is_refused_with_its_reasons() {
     let (rig, table) = double();
-    let table = with_ways(&table, &["uu-ud", "ud-dd"]);
+    let table = with_transitions(&table, &["uu-ud", "ud-dd"]);
     let mut answers = Vec::new();
     hold(
         &table,
@@ -279,7 +290,7 @@ fn a_goal_is_refused_with_its_reasons() {
         |_, _| (),
         |held, harness, _| {
             let mut ask = |to: &str| {
-                let id = harness.session.send(Request::Goto(equilibrium(to, 2).unwrap()));
+                let id = harness.session.send(Request::Goto(equilibrium_named(to, 2).unwrap()));
                 for _ in 0..5 {
                     let inputs = harness.inputs();
                     harness.session.tick(&inputs).unwrap();
@@ -297,6 +308,6 @@ fn a_goal_is_refused_with_its_reasons() {
             held == ONSET
         },
     );
-    let no_way = Answer::NotNow(Inhibits::NO_WAY);
-    assert_eq!(answers, [Answer::NotNow(Inhibits::RUNNING), no_way, no_way, Answer::Done]);
+    let no_transition = Answer::NotNow(Inhibits::NO_TRANSITION);
+    assert_eq!(answers, [Answer::NotNow(Inhibits::RUNNING), no_transition, no_transition, Answer::Done]);
 }

@@ -1,13 +1,13 @@
 //! Margins along the motions of a swing-up, and the candidates of its search.
 
-use upright_design::swing_up::{Margin, Runs, Solved, Way};
+use upright_design::swing_up::{Margin, Runs, Solved, Transition};
 
 use super::{Axis, Curve, Figure, Panel};
 
 /// Two panels for each motion, one for pushes against each link's angle and one along it, with a curve for each link.
-pub fn margins_figure(title: &str, motions: &[(Way, Vec<Margin>)]) -> Figure {
-    let panel = |way: &Way, margins: &[Margin], side: usize| {
-        let label = format!("{way}: push {} (N)", ["against", "along"][side]);
+pub fn margins_figure(title: &str, motions: &[(Transition, Vec<Margin>)]) -> Figure {
+    let panel = |transition: &Transition, margins: &[Margin], side: usize| {
+        let label = format!("{transition}: push {} (N)", ["against", "along"][side]);
         let links = margins.first().map_or(0, |margin| margin.links_n.len());
         (0..links).fold(Panel::new(Axis::linear("time (s)"), Axis::log(label)), |panel, link| {
             // A margin of 0 cannot be shown on a logarithmic axis.
@@ -19,7 +19,8 @@ pub fn margins_figure(title: &str, motions: &[(Way, Vec<Margin>)]) -> Figure {
             panel.with(Curve::line(format!("link {}", link + 1), link, points))
         })
     };
-    let panels = motions.iter().flat_map(|(way, margins)| [0, 1].map(|side| panel(way, margins, side)));
+    let panels =
+        motions.iter().flat_map(|(transition, margins)| [0, 1].map(|side| panel(transition, margins, side)));
     panels.fold(Figure::new(title), Figure::with)
 }
 

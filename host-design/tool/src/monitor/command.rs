@@ -3,7 +3,7 @@
 use ratatui::crossterm::event::{KeyCode, KeyEvent, KeyModifiers};
 use upright::protocol::message::Request;
 use upright::table::{Equilibrium, Law};
-use upright_design::swing_up::equilibrium;
+use upright_design::swing_up::equilibrium_named;
 
 /// What a key of the monitor does.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -75,7 +75,7 @@ pub fn request(line: &str) -> Result<Request, BadCommand> {
         ["arm"] => Request::Arm,
         ["up"] => Request::Goto(Equilibrium::UPRIGHT),
         ["down"] => Request::Goto(Equilibrium::HANGING),
-        ["goto", links] => Request::Goto(equilibrium(links, links.len()).ok_or_else(bad)?),
+        ["goto", links] => Request::Goto(equilibrium_named(links, links.len()).ok_or_else(bad)?),
         ["disarm"] => Request::Disarm,
         ["clear"] => Request::Clear,
         ["set-point", metres] => Request::Setpoint(metres.parse().map_err(|_| bad())?),

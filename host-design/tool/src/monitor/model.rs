@@ -13,7 +13,7 @@ use upright::supervision::inhibits::Inhibits;
 use upright::supervision::supervisor::State;
 use upright::table::{Equilibrium, Law};
 use upright_design::plant::absolute_angles;
-use upright_design::swing_up::letters;
+use upright_design::swing_up::posture_name;
 
 use super::command::Action;
 use super::outgoing::{Outgoing, Unanswered};
@@ -343,7 +343,7 @@ fn name(request: Request, links: usize) -> String {
         Request::Arm => "arm".to_owned(),
         Request::Goto(Equilibrium::UPRIGHT) => "up".to_owned(),
         Request::Goto(Equilibrium::HANGING) => "down".to_owned(),
-        Request::Goto(to) => format!("go to {}", letters(to, links)),
+        Request::Goto(to) => format!("go to {}", posture_name(to, links)),
         Request::Disarm => "disarm".to_owned(),
         Request::Clear => "clear".to_owned(),
         Request::Setpoint(metres) => format!("set-point {metres:.3} m"),

@@ -24,7 +24,7 @@ pub(crate) use self::plot::Plot;
 use crate::figure::{Figure, FigureError, margins_figure, pixels};
 use upright_design::design::Certified;
 use upright_design::rig::{PlantDescription, Rig};
-use upright_design::swing_up::{Demonstration, Margin, Way};
+use upright_design::swing_up::{Demonstration, Margin, Transition};
 use upright_design::table::TableValues;
 use upright_design::verify::{Imperfections, TrustReport};
 
@@ -46,9 +46,9 @@ pub struct Source<'a> {
     /// A run of the swing-up, if the rig has stored motions.
     pub swing_up: Option<&'a Demonstration>,
     /// A run from equilibrium to equilibrium, if it is wanted.
-    pub tour: Option<&'a Demonstration>,
+    pub route: Option<&'a Demonstration>,
     /// How hard its links may be pushed during the stored motions; empty: the page has no such part.
-    pub margins: &'a [(Way, Vec<Margin>)],
+    pub margins: &'a [(Transition, Vec<Margin>)],
     /// Initial states along each axis of the map of the region of attraction, at least 2; usually [`REGION_POINTS`].
     pub region_points: usize,
     /// The command line that makes this report, shown on the page.
@@ -102,7 +102,7 @@ pub fn report(source: &Source<'_>, stage: &dyn Fn(&str)) -> Result<Report, Repor
     let designed_poles = certified.poles(rig)?;
     let mut scenes = runs::scenes(rig, &designed_poles, table, trust, source.seed)?;
     scenes.extend(source.swing_up.map(|run| runs::swing_up(rig, run, source.seed)));
-    scenes.extend(source.tour.map(|run| runs::tour(rig, run, source.seed)));
+    scenes.extend(source.route.map(|run| runs::route(rig, run, source.seed)));
     let laws = runs::laws(table);
     let mut pictures = Vec::new();
     let mut page = Page::new(source, &designed_poles, &scenes)?;

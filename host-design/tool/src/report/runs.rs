@@ -72,10 +72,10 @@ pub(super) fn swing_up(rig: &Rig, run: &Demonstration, seed: u64) -> Scene {
 }
 
 /// The run from equilibrium to equilibrium.
-pub(super) fn tour(rig: &Rig, run: &Demonstration, seed: u64) -> Scene {
+pub(super) fn route(rig: &Rig, run: &Demonstration, seed: u64) -> Scene {
     let does = "The rig goes from equilibrium to equilibrium, each link up (u) or down (d), by all of its stored motions. \
                 Where all links hang, the motor is off, and a hand puts the rig back into the middle";
-    demonstrated(rig, run, ["tour", "From equilibrium to equilibrium", does], seed)
+    demonstrated(rig, run, ["route", "From equilibrium to equilibrium", does], seed)
 }
 
 /// A run of the whole firmware as a scene with this id and name; `does` says what the rig does.

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use upright_design::swing_up::{Margin, Way};
+use upright_design::swing_up::{Margin, Transition};
 
 use crate::report_rigs::{
     LINEAR, SINGLE, coarse_report, quick_report, report_with_imperfections, report_with_margins,
@@ -133,7 +133,7 @@ fn margins_have_a_figure_where_they_are_asked_for() {
     assert!(!plain.html.contains("id=\"pushes\""));
     let margins = [0.5, 0.0].map(|along| Margin { at_s: 1.0 - along, links_n: vec![[0.25, along]] });
     let rig = crate::report_rigs::rig("single-quanser-ip02");
-    let report = report_with_margins(&rig, &[(Way::Up, margins.to_vec())]);
+    let report = report_with_margins(&rig, &[(Transition::Up, margins.to_vec())]);
     assert!(report.html.contains("id=\"pushes\"") && report.html.contains("href=\"#pushes\""));
     let [picture] = &report.pictures[plain.pictures.len()..] else { panic!("one more picture") };
     let csv = picture.csv.as_ref().unwrap();

@@ -7,19 +7,19 @@ use crate::command::{path_of, status, stderr, stdout, upright};
 const DOUBLE: &str = "double-quanser-dbpen.toml";
 
 #[test]
-fn a_tour_tells_of_every_motion() {
+fn a_run_reports_every_motion() {
     let output = upright(&["transitions", &path_of(DOUBLE), "--stored", "--runs", "1", "--json"]);
     assert_eq!(status(&output), 0, "{}", stderr(&output));
     let report: Value = serde_json::from_str(stdout(&output)).unwrap();
-    let legs = report["tour"].as_array().unwrap();
-    assert_eq!(legs.len(), 12);
-    assert!(legs.iter().all(|leg| leg["tried"] == 1 && leg["arrived"] == 1), "{legs:?}");
+    let all = report["transitions"].as_array().unwrap();
+    assert_eq!(all.len(), 12);
+    assert!(all.iter().all(|one| one["tried"] == 1 && one["arrived"] == 1), "{all:?}");
 }
 
 #[test]
-fn a_way_that_is_none_or_belongs_to_the_swing_up_is_refused() {
-    let refusal = |way: &str| {
-        let output = upright(&["transitions", &path_of(DOUBLE), "--ways", way]);
+fn a_transition_that_is_none_or_belongs_to_the_swing_up_is_refused() {
+    let refusal = |transition: &str| {
+        let output = upright(&["transitions", &path_of(DOUBLE), "--only", transition]);
         assert_eq!(status(&output), 2);
         stderr(&output).to_owned()
     };

@@ -60,8 +60,8 @@ pub(crate) fn with_search<T>(work: impl FnOnce(Progress<'_>) -> T) -> T {
     style(&bar, "{spinner} {prefix} {bar:30} {pos}/{len} {msg} {elapsed}");
     let best = std::sync::Mutex::new((0u32, f64::INFINITY));
     let result = work(&|trying| match trying {
-        Trying::Stage { way, what, steps } => {
-            bar.set_prefix(format!("{way}: {what}"));
+        Trying::Stage { transition, what, steps } => {
+            bar.set_prefix(format!("{transition}: {what}"));
             bar.set_length(steps);
             bar.set_position(0);
             if let Ok(mut best) = best.lock() {

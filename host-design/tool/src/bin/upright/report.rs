@@ -83,8 +83,8 @@ impl Report {
             }
             _ => Vec::new(),
         };
-        let tour =
-            if self.transitions { Some(tour(&self.variation.rig, &rig, &table, self.seed)?) } else { None };
+        let route =
+            if self.transitions { Some(route(&self.variation.rig, &rig, &table, self.seed)?) } else { None };
         let study = Study::whole();
         let effort = Effort { runs: self.runs as usize, seed: self.seed, late: 0.0, study: &study };
         let (trust, files) =
@@ -99,7 +99,7 @@ impl Report {
                     imperfections: &imperfections,
                     seed: self.seed,
                     swing_up: run.as_ref(),
-                    tour: tour.as_ref(),
+                    route: route.as_ref(),
                     margins: &pushes,
                     region_points: REGION_POINTS,
                     command: &self.as_typed(),
@@ -201,11 +201,11 @@ fn demonstration(rig: &Rig, table: &TableValues, seed: u64) -> Option<Demonstrat
 }
 
 /// A simulated run through all motions that are stored beside the rig file.
-fn tour(file: &Path, rig: &Rig, table: &TableValues, seed: u64) -> Result<Demonstration, Failure> {
+fn route(file: &Path, rig: &Rig, table: &TableValues, seed: u64) -> Result<Demonstration, Failure> {
     let table = with_stored_motions(file, rig, table.clone(), Wanted::Transitions)?;
     let failed = |source| Failure::SwingUp { rig: rig.name.clone(), source };
-    let script = Script::tour(rig, &table, seed).map_err(failed)?;
-    Ok(with_spinner("the tour", || script.run(&table)).map_err(RunError::from)?)
+    let script = Script::route(rig, &table, seed).map_err(failed)?;
+    Ok(with_spinner("the route", || script.run(&table)).map_err(RunError::from)?)
 }
 
 fn write_into(folder: &Path, name: &str, contents: &[u8]) -> Result<PathBuf, Failure> {

@@ -28,7 +28,7 @@ Examples:
   upright simulate rigs/quadruple-paper.toml --disturbances paper --seed 7 --csv run.csv
   upright simulate rigs/quadruple-paper.toml --tick 0.005 --gains continuous --tilt 0.001   falls
   upright simulate rigs/quadruple-paper.toml --swing-up --svg swing-up.svg
-  upright simulate rigs/double-quanser-dbpen.toml --transitions --svg tour.svg
+  upright simulate rigs/double-quanser-dbpen.toml --transitions --svg route.svg
   upright simulate rigs/quadruple-paper.toml --csv - | head")]
 pub(crate) struct Simulate {
     #[command(flatten)]
@@ -81,7 +81,7 @@ pub(crate) struct Simulate {
     #[arg(long, conflicts_with_all = ["law", "duration", "step", "step_at", "raw_step", "sensing", "tilt", "start",
           "disturbances", "force_noise", "torque_noise", "force_offset", "substeps"])]
     swing_up: bool,
-    /// A tour through all stored motions between equilibria, one after the other
+    /// A run through all stored motions between equilibria, one after the other
     #[arg(long, conflicts_with_all = ["swing_up", "law", "duration", "step", "step_at", "raw_step", "sensing", "tilt",
           "start", "disturbances", "force_noise", "torque_noise", "force_offset", "substeps"])]
     transitions: bool,
@@ -158,7 +158,7 @@ impl Simulate {
         let (rig, table) = self.with_motions()?;
         let failed = |source| Failure::SwingUp { rig: rig.name.clone(), source };
         let script = match self.transitions {
-            true => Script::tour(&rig, &table, self.seed),
+            true => Script::route(&rig, &table, self.seed),
             false => Script::of(&rig, &table, self.seed, self.wrong),
         };
         let script = script.map_err(failed)?;

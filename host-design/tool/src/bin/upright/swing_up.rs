@@ -9,7 +9,7 @@ use serde_json::json;
 use upright_design::rig::{PlantDescription, Rig};
 use upright_design::study::Study;
 use upright_design::swing_up::{
-    Condition, FirmwareRuns, Judgement, Margin, Plan, Script, Solved, Stored, SwingUpError, Way,
+    Condition, FirmwareRuns, Judgement, Margin, Plan, Script, Solved, Stored, SwingUpError, Transition,
     designed_table, firmware_runs, judge, margins, motions, refined, search, solved,
 };
 use upright_design::table::{TableValues, write_atomically};
@@ -114,11 +114,17 @@ impl SwingUp {
         self.draw(&margins_figure(&title, &both))?;
         let mut out = std::io::stdout().lock();
         if self.json {
-            let ways = both.iter().map(|(way, margins)| json!({ "way": way, "margins": margins }));
-            return Ok(writeln!(out, "{}", json!({ "rig": rig.name, "ways": ways.collect::<Vec<_>>() }))?);
+            let transitions = both
+                .iter()
+                .map(|(transition, margins)| json!({ "transition": transition, "margins": margins }));
+            return Ok(writeln!(
+                out,
+                "{}",
+                json!({ "rig": rig.name, "transitions": transitions.collect::<Vec<_>>() })
+            )?);
         }
-        for (way, margins) in &both {
-            write!(out, "{}", margins_text(*way, margins))?;
+        for (transition, margins) in &both {
+            write!(out, "{}", margins_text(*transition, margins))?;
         }
         Ok(())
     }
@@ -217,22 +223,29 @@ impl SwingUp {
 }
 
 /// Margins of both motions of `table`, with a progress bar.
-pub(crate) fn with_margins(rig: &Rig, table: &TableValues) -> Result<Vec<(Way, Vec<Margin>)>, Failure> {
-    let of = |way, done: &(dyn Fn() + Sync)| Ok((way, margins(rig, table, way, MOMENTS, done)?));
-    let both: Result<_, SwingUpError> = with_bar("margins", (Way::BOTH.len() * MOMENTS) as u64, |done| {
-        Way::BOTH.into_iter().map(|way| of(way, done)).collect()
-    });
+pub(crate) fn with_margins(
+    rig: &Rig,
+    table: &TableValues,
+) -> Result<Vec<(Transition, Vec<Margin>)>, Failure> {
+    let of = |transition, done: &(dyn Fn() + Sync)| {
+        Ok((transition, margins(rig, table, transition, MOMENTS, done)?))
+    };
+    let both: Result<_, SwingUpError> =
+        with_bar("margins", (Transition::BOTH.len() * MOMENTS) as u64, |done| {
+            Transition::BOTH.into_iter().map(|transition| of(transition, done)).collect()
+        });
     both.map_err(|source| Failure::SwingUp { rig: rig.name.clone(), source })
 }
 
 /// Both margins of each link at each moment, and the least of each link.
-fn margins_text(way: Way, margins: &[Margin]) -> String {
+fn margins_text(transition: Transition, margins: &[Margin]) -> String {
     let links = margins.first().map_or(0, |margin| margin.links_n.len());
     let least = |link: usize| {
         let of_link = |margin: &Margin| margin.links_n[link].into_iter().fold(f64::INFINITY, f64::min);
         margins.iter().map(|margin| (of_link(margin), margin.at_s)).min_by(|(a, _), (b, _)| a.total_cmp(b))
     };
-    let mut text = format!("{way}: largest push against each link's angle and along it (N)\n  time (s)");
+    let mut text =
+        format!("{transition}: largest push against each link's angle and along it (N)\n  time (s)");
     // Writing into a string cannot fail.
     (1..=links).for_each(|link| _ = write!(text, "{:>16}", format!("link {link}")));
     text.push('\n');
@@ -284,10 +297,10 @@ fn print_rows(rig: &Rig, rows: &[Row], is_json: bool) -> Result<(), Failure> {
 
 fn text(rig: &Rig, plan: &Plan) -> String {
     let mut text = format!("{}\n", rig.name);
-    for Judgement { way, search, score, peaks, runs } in [&plan.raise, &plan.lower] {
+    for Judgement { transition, search, score, peaks, runs } in [&plan.raise, &plan.lower] {
         let percent = runs.interval.map(|end| 100.0 * end);
         // Writing into a string cannot fail.
-        let _ = writeln!(text, "\n{way}");
+        let _ = writeln!(text, "\n{transition}");
         if let Some([tried, solved]) = search {
             let _ = writeln!(text, "  trajectories solved       {solved:>10} of {tried}");
         }

@@ -9,8 +9,8 @@ use serde_json::json;
 use upright_design::rig::Rig;
 use upright_design::study::Study;
 use upright_design::swing_up::{
-    Leg, Searched, Stored, StoredTransitions, SwingUp, SwingUpError, Tour, Tours, Transition, Way,
-    designed_table_with, motions, on_tour, tours,
+    PlannedTransition, Route, RouteRuns, Searched, Stored, StoredTransitions, SwingUp, SwingUpError,
+    Transition, TransitionRuns, designed_table_with, motions, on_route, route_runs,
 };
 use upright_design::table::write_atomically;
 
@@ -21,29 +21,29 @@ use crate::progress::{with_search, with_spinner};
 ///
 /// An equilibrium is written with a letter for each link, from the cart outwards: u if it is up, d if it is down. The
 /// motions between hanging and upright are those of `upright swing-up`, and must be stored. The motions found are
-/// written beside the rig file, as RIG.transitions.json. A motion that arrives in too few tours of the firmware is
+/// written beside the rig file, as RIG.transitions.json. A motion that arrives in too few runs of the firmware is
 /// dropped: success_percent in [swing_up] says how many it has to be.
 #[derive(Args)]
 #[command(before_help = "\
 Examples:
   upright transitions rigs/double-quanser-dbpen.toml --stored            try the stored motions, print the table
-  upright transitions rigs/double-quanser-dbpen.toml                     search all ways first, which takes minutes
-  upright transitions rigs/double-quanser-dbpen.toml --ways ud-uu --candidates 100..400
+  upright transitions rigs/double-quanser-dbpen.toml                     search all of them first, which takes minutes
+  upright transitions rigs/double-quanser-dbpen.toml --only ud-uu --candidates 100..400
   upright firmware run rigs/double-quanser-dbpen.toml --transitions      all of them in QEMU, bit for bit")]
 pub(crate) struct Transitions {
     /// Rig file
     #[arg(value_name = "RIG")]
     rig: PathBuf,
-    /// Search only these ways; the stored motions of others stay
+    /// Search only these transitions; the stored motions of others stay
     #[arg(long, value_name = "FROM-TO,…", value_delimiter = ',', conflicts_with = "stored")]
-    ways: Vec<String>,
-    /// Numbers of the candidates to try for each way
+    only: Vec<String>,
+    /// Numbers of the candidates to try for each transition
     #[arg(long, value_name = "FIRST..END", default_value = "0..100", value_parser = numbers, conflicts_with = "stored")]
     candidates: (u64, u64),
     /// Do not search; try the stored motions
     #[arg(long)]
     stored: bool,
-    /// With --stored: number of tours of the firmware, each with another machine, with the seeds from 1 on
+    /// With --stored: number of runs of the firmware, each with another machine, with the seeds from 1 on
     #[arg(long, value_name = "N", default_value_t = 200, requires = "stored", value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
     runs: u32,
     /// Write no file beside the rig
@@ -68,24 +68,24 @@ impl Transitions {
             .map_err(|source| failed(&rig, source))?;
         let mut stored = self.old(&rig)?;
         let mut searched = Vec::new();
-        let Toured { transitions, tours, .. } = if self.stored {
+        let Judged { transitions, runs, .. } = if self.stored {
             let all = stored.transitions(&rig).map_err(|source| failed(&rig, source))?;
-            self.toured(&rig, &swing_up, all)?
+            self.route_runs(&rig, &swing_up, all)?
         } else {
             searched = self.search(&rig, &mut stored)?;
             self.judge(&rig, &swing_up, &mut stored)?
         };
         let mut out = std::io::stdout().lock();
         if self.json {
-            let faults: Vec<_> =
-                tours.faults.iter().map(|(way, fault)| json!([way.name(links), fault])).collect();
-            let object =
-                json!({ "rig": rig.name, "searched": searched, "tour": tours.legs, "faults": faults });
+            let fault = |(transition, fault): &(Transition, String)| json!([transition.name(links), fault]);
+            let faults: Vec<_> = runs.faults.iter().map(fault).collect();
+            let transitions = runs.transitions;
+            let object = json!({ "rig": rig.name, "searched": searched, "transitions": transitions, "faults": faults });
             return Ok(writeln!(out, "{object}")?);
         }
-        write!(out, "{}", text(&rig, &swing_up, &transitions, &tours.legs))?;
-        for (way, fault) in tours.faults {
-            writeln!(out, "a tour ended at {}: {fault}", way.name(links))?;
+        write!(out, "{}", text(&rig, &swing_up, &transitions, &runs.transitions))?;
+        for (transition, fault) in runs.faults {
+            writeln!(out, "a run ended at {}: {fault}", transition.name(links))?;
         }
         Ok(())
     }
@@ -107,14 +107,14 @@ impl Transitions {
         Ok(())
     }
 
-    /// Searches a motion for each way. The file is written after each, so that an interrupted search keeps what it has
-    /// found.
+    /// Searches a motion for each transition. The file is written after each, so that an interrupted search keeps what
+    /// it has found.
     fn search(&self, rig: &Rig, stored: &mut StoredTransitions) -> Result<Vec<Searched>, Failure> {
         let links = rig.states() / 2 - 1;
         let (first, end) = self.candidates;
         let mut searched = Vec::new();
-        for way in self.ways(links)? {
-            let found = with_search(|progress| stored.search(rig, way, first..end, progress))
+        for transition in self.wanted(links)? {
+            let found = with_search(|progress| stored.search(rig, transition, first..end, progress))
                 .map_err(|source| failed(rig, source))?;
             eprintln!("{}", searched_line(&found, end - first, links));
             self.write(stored)?;
@@ -123,76 +123,92 @@ impl Transitions {
         Ok(searched)
     }
 
-    /// Makes all motions that a tour from hanging can reach, one after the other, with the whole firmware.
-    fn toured(&self, rig: &Rig, swing_up: &SwingUp, all: Vec<Transition>) -> Result<Toured, Failure> {
+    /// Makes all motions that a route from hanging can reach, one after the other, with the whole firmware.
+    fn route_runs(
+        &self,
+        rig: &Rig,
+        swing_up: &SwingUp,
+        all: Vec<PlannedTransition>,
+    ) -> Result<Judged, Failure> {
         let failed = |source| failed(rig, source);
         let links = rig.states() / 2 - 1;
-        let held = on_tour(&all.iter().map(|transition| transition.way).collect::<Vec<_>>(), links);
+        let held = on_route(&all.iter().map(|planned| planned.transition).collect::<Vec<_>>(), links);
         let (transitions, lost): (Vec<_>, Vec<_>) =
-            all.into_iter().partition(|transition| held.contains(&transition.way));
+            all.into_iter().partition(|planned| held.contains(&planned.transition));
         let table =
             with_spinner("the table", || designed_table_with(rig, swing_up, &transitions)).map_err(failed)?;
-        let tour = Tour::of(rig, &table).ok_or_else(|| failed(SwingUpError::NoTour))?;
-        let tours =
-            with_spinner("tours", || tours(rig, &table, &tour, 1, self.runs as usize, &Study::whole()))
-                .map_err(failed)?;
-        Ok(Toured { transitions, lost, tours })
+        let route = Route::of(rig, &table).ok_or_else(|| failed(SwingUpError::NoRoute))?;
+        let runs = with_spinner("runs of the firmware", || {
+            route_runs(rig, &table, &route, 1, self.runs as usize, &Study::whole())
+        })
+        .map_err(failed)?;
+        Ok(Judged { transitions, lost, runs })
     }
 
-    /// Judges the motions on tours. One that arrives too rarely is dropped, and the others are judged again without it.
+    /// Judges the motions in runs of the firmware. One that arrives too rarely is dropped, and the others are judged
+    /// again without it.
     fn judge(
         &self,
         rig: &Rig,
         swing_up: &SwingUp,
         stored: &mut StoredTransitions,
-    ) -> Result<Toured, Failure> {
+    ) -> Result<Judged, Failure> {
         let links = rig.states() / 2 - 1;
         let needed = rig.swing_up.clone().unwrap_or_default().success_percent;
         let mut all = stored.all(rig).map_err(|source| failed(rig, source))?;
         loop {
-            let toured = self.toured(rig, swing_up, all.clone())?;
-            let others = || toured.tours.legs.iter().filter(|leg| !Way::BOTH.contains(&leg.way));
-            if let Some(leg) = others().find(|leg| 100.0 * leg.interval[0] < needed) {
-                eprintln!("{} is dropped: {} of {} arrive", leg.way.name(links), leg.arrived, leg.tried);
-                stored.drop(leg.way, links);
-                all.retain(|transition| transition.way != leg.way);
+            let judged = self.route_runs(rig, swing_up, all.clone())?;
+            let others =
+                || judged.runs.transitions.iter().filter(|one| !Transition::BOTH.contains(&one.transition));
+            if let Some(one) = others().find(|one| 100.0 * one.interval[0] < needed) {
+                eprintln!(
+                    "{} is dropped: {} of {} arrive",
+                    one.transition.name(links),
+                    one.arrived,
+                    one.tried
+                );
+                stored.drop(one.transition, links);
+                all.retain(|planned| planned.transition != one.transition);
                 continue;
             }
-            // Of a motion that occurs more than once in the tour, the first leg counts: it is stored last.
-            others().rev().for_each(|leg| stored.judge(leg.way, links, [leg.arrived, leg.tried]));
-            for Transition { way, .. } in &toured.lost {
-                let name = way.name(links);
+            // Of a motion that occurs more than once on the route, the first time counts: it is stored last.
+            others().rev().for_each(|one| stored.judge(one.transition, links, [one.arrived, one.tried]));
+            for PlannedTransition { transition, .. } in &judged.lost {
+                let name = transition.name(links);
                 eprintln!("{name} is not judged: the other motions do not lead there from hanging, and back");
             }
             self.write(stored)?;
-            return Ok(toured);
+            return Ok(judged);
         }
     }
 
-    /// The ways to search.
-    fn ways(&self, links: usize) -> Result<Vec<Way>, Failure> {
-        if self.ways.is_empty() {
-            return Ok(Way::all(links).into_iter().filter(|way| !Way::BOTH.contains(way)).collect());
+    /// The transitions to search.
+    fn wanted(&self, links: usize) -> Result<Vec<Transition>, Failure> {
+        if self.only.is_empty() {
+            return Ok(Transition::all(links)
+                .into_iter()
+                .filter(|transition| !Transition::BOTH.contains(transition))
+                .collect());
         }
-        let named = |name: &String| match Way::named(name, links) {
-            Some(way) if !Way::BOTH.contains(&way) => Ok(way),
+        let named = |name: &String| match Transition::named(name, links) {
+            Some(transition) if !Transition::BOTH.contains(&transition) => Ok(transition),
             Some(_) => Err(Failure::BadArgument(format!("{name} belongs to `upright swing-up`"))),
             None => {
                 let example = format!("{}-{}", "u".repeat(links), "d".repeat(links));
                 Err(Failure::BadArgument(format!("{name}: give a letter for each link, as in {example}")))
             }
         };
-        self.ways.iter().map(named).collect()
+        self.only.iter().map(named).collect()
     }
 }
 
-/// Tours by the motions between equilibria.
-struct Toured {
-    /// The motions on the tour.
-    transitions: Vec<Transition>,
-    /// Those that no tour can reach.
-    lost: Vec<Transition>,
-    tours: Tours,
+/// Runs with the motions between equilibria.
+struct Judged {
+    /// The motions on the route.
+    transitions: Vec<PlannedTransition>,
+    /// Those that no route can reach.
+    lost: Vec<PlannedTransition>,
+    runs: RouteRuns,
 }
 
 fn failed(rig: &Rig, source: SwingUpError) -> Failure {
@@ -200,25 +216,28 @@ fn failed(rig: &Rig, source: SwingUpError) -> Failure {
 }
 
 fn searched_line(searched: &Searched, tried: u64, links: usize) -> String {
-    let Searched { way, solved, runs, is_stored } = searched;
+    let Searched { transition, solved, runs, is_stored } = searched;
     let runs = runs.as_ref().map_or_else(String::new, |runs| {
         format!(", {} of {} random runs of the law arrive", runs.arrived, runs.runs)
     });
     let kept = if *is_stored { "" } else { ": not stored" };
-    format!("{}: {solved} of {tried} candidates solved{runs}{kept}", way.name(links))
+    format!("{}: {solved} of {tried} candidates solved{runs}{kept}", transition.name(links))
 }
 
-/// The legs of the tour as a table.
-fn text(rig: &Rig, swing_up: &SwingUp, transitions: &[Transition], legs: &[Leg]) -> String {
+/// The motions of the route as a table.
+fn text(rig: &Rig, swing_up: &SwingUp, transitions: &[PlannedTransition], runs: &[TransitionRuns]) -> String {
     let links = rig.states() / 2 - 1;
     let mut text = format!("{}, one motion after the other\n", rig.name);
     // Writing into a string cannot fail.
     let _ = writeln!(text, "motion      duration (s)  force (N)  farthest (m)     arrive  95 % interval (%)");
-    for Leg { way, tried, arrived, interval } in legs {
-        let motion = match way {
-            Way::Up => Some(&swing_up.raise),
-            Way::Down => Some(&swing_up.lower),
-            way => transitions.iter().find(|transition| transition.way == *way).map(|found| &found.motion),
+    for TransitionRuns { transition, tried, arrived, interval } in runs {
+        let motion = match transition {
+            Transition::Up => Some(&swing_up.raise),
+            Transition::Down => Some(&swing_up.lower),
+            transition => transitions
+                .iter()
+                .find(|planned| planned.transition == *transition)
+                .map(|found| &found.motion),
         };
         let [duration_s, force_n, position_m] =
             motion.map_or([0.0; 3], |motion| [motion.duration_s(), motion.force_n(), motion.position_m()]);
@@ -227,7 +246,7 @@ fn text(rig: &Rig, swing_up: &SwingUp, transitions: &[Transition], legs: &[Leg])
         let _ = writeln!(
             text,
             "{:<11} {duration_s:>12.2} {force_n:>10.1} {position_m:>13.3} {arrive:>10}  {low:.1} to {high:.1}",
-            way.name(links)
+            transition.name(links)
         );
     }
     text

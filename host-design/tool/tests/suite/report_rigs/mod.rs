@@ -6,7 +6,7 @@ use std::sync::LazyLock;
 use upright::table::Law;
 use upright_design::design::design;
 use upright_design::rig::Rig;
-use upright_design::swing_up::{Margin, Way};
+use upright_design::swing_up::{Margin, Transition};
 use upright_design::table::{Gains, TableValues};
 use upright_design::verify::{ImperfectionSettings, LawTrust, TrustReport, imperfections, linear};
 use upright_tool::report::{REGION_POINTS, Report, Source, report};
@@ -44,14 +44,14 @@ pub(crate) fn report_with_imperfections(rig: &Rig) -> Report {
 }
 
 /// [`coarse_report`] with these margins.
-pub(crate) fn report_with_margins(rig: &Rig, margins: &[(Way, Vec<Margin>)]) -> Report {
+pub(crate) fn report_with_margins(rig: &Rig, margins: &[(Transition, Vec<Margin>)]) -> Report {
     made(rig, None, margins, COARSE)
 }
 
 fn made(
     rig: &Rig,
     settings: Option<ImperfectionSettings>,
-    margins: &[(Way, Vec<Margin>)],
+    margins: &[(Transition, Vec<Margin>)],
     region_points: usize,
 ) -> Report {
     let certified = design(rig).unwrap();
@@ -76,7 +76,7 @@ fn made(
         imperfections: found.as_slice(),
         seed: 1,
         swing_up: None,
-        tour: None,
+        route: None,
         margins,
         region_points,
         command: "upright report test",

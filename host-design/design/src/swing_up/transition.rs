@@ -1,4 +1,4 @@
-//! Ways: the starts and ends of motions from one state of rest to another.
+//! Transitions: from one state of rest to another.
 
 use core::f64::consts::PI;
 
@@ -9,7 +9,7 @@ use crate::plant::whole_turns;
 
 /// Start and end of a motion.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Way {
+pub enum Transition {
     /// From hanging to upright; then it balances.
     Up,
     /// From upright to hanging; then the motor is off.
@@ -25,11 +25,11 @@ pub enum Way {
     },
 }
 
-impl Way {
-    /// Both ways between hanging and upright, in the order of a session.
+impl Transition {
+    /// Both transitions between hanging and upright, in the order of a session.
     pub const BOTH: [Self; 2] = [Self::Up, Self::Down];
 
-    /// The way of a chain of `links` links from one equilibrium to another.
+    /// The transition of a chain of `links` links from one equilibrium to another.
     pub fn between(from: Equilibrium, to: Equilibrium, links: usize) -> Self {
         let hanging = Equilibrium::hanging(links);
         match (from, to) {
@@ -39,23 +39,23 @@ impl Way {
         }
     }
 
-    /// All ways between two equilibria of a chain of `links` links.
+    /// All transitions between two equilibria of a chain of `links` links.
     pub fn all(links: usize) -> Vec<Self> {
         let equilibria = || (0..1 << links).map(Equilibrium::of_bits);
         let others = |from| equilibria().filter(move |&to| to != from);
         equilibria().flat_map(|from| others(from).map(move |to| Self::between(from, to, links))).collect()
     }
 
-    /// The way with this name, for example `uu-ud`; none if there is no such way.
+    /// The transition with this name, for example `uu-ud`; none if there is no such transition.
     pub fn named(name: &str, links: usize) -> Option<Self> {
         let (from, to) = name.split_once('-')?;
-        let (from, to) = (equilibrium(from, links)?, equilibrium(to, links)?);
+        let (from, to) = (equilibrium_named(from, links)?, equilibrium_named(to, links)?);
         (from != to).then(|| Self::between(from, to, links))
     }
 
     /// The name that [`named`](Self::named) accepts.
     pub fn name(self, links: usize) -> String {
-        format!("{}-{}", letters(self.from(links), links), letters(self.to(links), links))
+        format!("{}-{}", posture_name(self.from(links), links), posture_name(self.to(links), links))
     }
 
     /// The equilibrium at which it begins.
@@ -133,23 +133,23 @@ pub(super) fn rest(at: Equilibrium, states: usize) -> Vec<f64> {
     state
 }
 
-/// A letter for each link, `u` if it is up and `d` if it is down.
-pub fn letters(at: Equilibrium, links: usize) -> String {
+/// The posture of a chain at rest: a letter for each link, `u` if it is up and `d` if it is down.
+pub fn posture_name(at: Equilibrium, links: usize) -> String {
     (0..links).map(|link| if at.is_down(link) { 'd' } else { 'u' }).collect()
 }
 
-/// The equilibrium with these [`letters`]; none if there is not exactly one valid letter for each link.
-pub fn equilibrium(letters: &str, links: usize) -> Option<Equilibrium> {
+/// The equilibrium with this [`posture_name`]; none if there is not exactly one valid letter for each link.
+pub fn equilibrium_named(name: &str, links: usize) -> Option<Equilibrium> {
     let bit = |(link, letter)| match letter {
         'u' => Some(0),
         'd' => Some(1u32 << link),
         _ => None,
     };
-    let bits = letters.chars().enumerate().take(u32::BITS as usize).map(bit).sum::<Option<u32>>()?;
-    (letters.chars().count() == links).then(|| Equilibrium::of_bits(bits))
+    let bits = name.chars().enumerate().take(u32::BITS as usize).map(bit).sum::<Option<u32>>()?;
+    (name.chars().count() == links).then(|| Equilibrium::of_bits(bits))
 }
 
-impl core::fmt::Display for Way {
+impl core::fmt::Display for Transition {
     fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
         match *self {
             Self::Up => f.write_str("raising"),
@@ -159,7 +159,7 @@ impl core::fmt::Display for Way {
     }
 }
 
-impl Serialize for Way {
+impl Serialize for Transition {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         match *self {
             Self::Up => serializer.serialize_str("up"),
@@ -174,29 +174,29 @@ mod tests {
     use super::*;
 
     #[test]
-    fn every_way_has_a_name_of_its_own() {
-        let ways = Way::all(2);
-        assert_eq!(ways.len(), 12);
-        assert_eq!(Way::all(3).len(), 56);
-        for way in &ways {
-            assert_eq!(Way::named(&way.name(2), 2), Some(*way));
+    fn every_transition_has_a_name_of_its_own() {
+        let transitions = Transition::all(2);
+        assert_eq!(transitions.len(), 12);
+        assert_eq!(Transition::all(3).len(), 56);
+        for transition in &transitions {
+            assert_eq!(Transition::named(&transition.name(2), 2), Some(*transition));
         }
-        assert_eq!(Way::named("dd-uu", 2), Some(Way::Up));
-        assert_eq!(Way::named("uuu-ddd", 3), Some(Way::Down));
+        assert_eq!(Transition::named("dd-uu", 2), Some(Transition::Up));
+        assert_eq!(Transition::named("uuu-ddd", 3), Some(Transition::Down));
         for name in ["uu", "uu-uu", "uu-u", "uu-uuu", "uu-ux", ""] {
-            assert_eq!(Way::named(name, 2), None, "{name}");
+            assert_eq!(Transition::named(name, 2), None, "{name}");
         }
     }
 
     #[test]
-    fn a_way_ends_at_rest_however_its_links_turn() {
-        let way = Way::named("udu-ddu", 3).unwrap();
-        let [start, end] = way.ends(8, |_| false);
+    fn a_transition_ends_at_rest_however_its_links_turn() {
+        let transition = Transition::named("udu-ddu", 3).unwrap();
+        let [start, end] = transition.ends(8, |_| false);
         assert_eq!(start, [0.0, 0.0, 0.0, 0.0, PI, 0.0, -PI, 0.0]);
         assert_eq!(end, [0.0, 0.0, PI, 0.0, 0.0, 0.0, -PI, 0.0]);
-        let [_, end] = way.ends(8, |_| true);
+        let [_, end] = transition.ends(8, |_| true);
         assert_eq!(end, [0.0, 0.0, -PI, 0.0, 2.0 * PI, 0.0, -PI, 0.0]);
-        assert_eq!(way.ends_near(&end)[1], end);
-        assert_eq!(Way::Up.ends(4, |_| false), [vec![0.0, 0.0, PI, 0.0], vec![0.0; 4]]);
+        assert_eq!(transition.ends_near(&end)[1], end);
+        assert_eq!(Transition::Up.ends(4, |_| false), [vec![0.0, 0.0, PI, 0.0], vec![0.0; 4]]);
     }
 }
