@@ -9,8 +9,8 @@
     if (parent) parent.append(element);
     return element;
   };
-  const [player, stages, play, speed, scrub, output, choice] =
-    ["player", "stages", "play", "speed", "scrub", "time", "scene"].map((id) => document.getElementById(id));
+  const [playback, stages, play, speed, scrub, output, choice] =
+    ["playback", "stages", "play", "speed", "scrub", "time", "scene"].map((id) => document.getElementById(id));
 
   // A line in every panel of every plot over time.
   const plots = [...document.querySelectorAll("figure[data-areas]")].map((figure) => {
@@ -175,7 +175,7 @@
     drawing.addEventListener("pointerdown", point);
     drawing.addEventListener("pointermove", (event) => { if (event.buttons === 1) point(event); });
   }
-  player.hidden = false;
+  playback.hidden = false;
   setStage();
   show();
 })();
