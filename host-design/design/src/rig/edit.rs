@@ -1,82 +1,107 @@
 //! Changes single values in the text of a rig file. The rest of the text, comments included, stays as it is.
 
-use toml_edit::{Document, Item, TableLike};
+use std::fmt;
+use std::path::{Path, PathBuf};
 
-/// The text of a rig file after one value was changed.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Edited {
-    /// The new text.
-    pub text: String,
-    /// Whether the key was missing and has been added.
-    pub added: bool,
+use toml_edit::{DocumentMut, Item, Table, Value};
+
+use super::error::{RigError, RigErrorKind};
+use super::node::Source;
+
+/// The text of a rig file, in which values can be changed. Displayed, it is the new text.
+///
+/// ```
+/// use upright_design::rig::RigText;
+///
+/// let mut text = RigText::parse("[tick] # fast\nperiod_s = 0.001\n", "rig.toml".as_ref())?;
+/// text.set("tick.period_s", "0.002")?;
+/// text.set("tick.delay_ticks", "1")?;
+/// assert_eq!(text.to_string(), "[tick] # fast\nperiod_s = 0.002\ndelay_ticks = 1\n");
+/// # Ok::<(), upright_design::rig::RigError>(())
+/// ```
+#[derive(Debug, Clone)]
+pub struct RigText {
+    document: DocumentMut,
+    file: PathBuf,
+    /// Whether lines end with a carriage return and a line feed.
+    has_crlf: bool,
 }
 
-/// Returns `text` with `value`, in TOML syntax, as the value of `key`: `tick.period_s`, `link[2].mass_kg`,
-/// `lqr.state_weights[1]`. A missing key is added. `None` if the text is not TOML or has no place for the key.
-pub fn with_value(text: &str, key: &str, value: &str) -> Option<Edited> {
-    match place(text, key) {
-        Place::At(span) => {
-            let text = format!("{}{value}{}", &text[..span.start], &text[span.end..]);
-            Some(Edited { text, added: false })
+impl RigText {
+    /// The text of a rig file; `file` is the name that errors show.
+    ///
+    /// # Errors
+    /// [`RigError`] if the text is not TOML.
+    pub fn parse(text: &str, file: &Path) -> Result<Self, RigError> {
+        let document = Source { file, text }.document()?.into_mut();
+        Ok(Self { document, file: file.to_owned(), has_crlf: text.contains("\r\n") })
+    }
+
+    /// Whether the text gives `key`: `tick.period_s`, `link[2].mass_kg`, `lqr.state_weights[1]`.
+    pub fn has(&self, key: &str) -> bool {
+        let found = key.split('.').try_fold(self.document.as_item(), |item, step| {
+            let (name, index) = indexed(step);
+            let item = item.get(name)?;
+            index.map_or(Some(item), |index| item.get(index))
+        });
+        found.is_some()
+    }
+
+    /// Gives `key` this value, in TOML syntax. A key that is missing is added, with its section.
+    ///
+    /// # Errors
+    /// [`RigError`] if there is no such entry of a list, or if `value` is not TOML.
+    pub fn set(&mut self, key: &str, value: &str) -> Result<(), RigError> {
+        let file = self.file.clone();
+        let refused = |kind| RigError { key: Some(key.to_owned()), ..RigError::of_file(&file, kind) };
+        let mut value: Value = value.parse().map_err(|error: toml_edit::TomlError| {
+            refused(RigErrorKind::NotToml { message: error.message().to_owned() })
+        })?;
+        if let Some((section, _)) = key.split_once('.')
+            && !section.contains('[')
+            && !self.document.contains_key(section)
+        {
+            self.add(section);
         }
-        Place::New { at, prefix } => {
-            let text = format!("{}{prefix} = {value}\n{}", &text[..at], &text[at..]);
-            Some(Edited { text, added: true })
+        let remedy = "it to the rig file: then it can be changed".to_owned();
+        let item = place(self.document.as_item_mut(), key)
+            .ok_or_else(|| refused(RigErrorKind::MissingKey { remedy }))?;
+        if let Some(old) = item.as_value() {
+            *value.decor_mut() = old.decor().clone();
         }
-        Place::Nowhere => None,
+        *item = Item::Value(value);
+        Ok(())
+    }
+
+    /// Adds an empty section below all of the text.
+    fn add(&mut self, section: &str) {
+        let comments = self.document.trailing().as_str().unwrap_or_default().to_owned();
+        let mut table = Table::new();
+        table.decor_mut().set_prefix(format!("{comments}\n"));
+        self.document.set_trailing("");
+        self.document.insert(section, Item::Table(table));
     }
 }
 
-/// Finds the place of the value of `key` in `text`.
-fn place(text: &str, key: &str) -> Place {
-    let Ok(document) = Document::parse(text) else { return Place::Nowhere };
-    let mut steps = key.split('.').peekable();
-    let mut table: &dyn TableLike = document.as_table();
-    let mut header = String::new();
-    let mut number = 0; // which of the tables with that header, from 0
-    while let Some(step) = steps.next() {
-        let (name, index) = indexed(step);
-        let item = table.get(name);
-        match (item, steps.peek(), index) {
-            (Some(item), None, None) => return item.span().map_or(Place::Nowhere, Place::At),
-            (Some(item), None, Some(index)) => {
-                let entry = item.as_array().and_then(|array| array.get(index));
-                return entry.and_then(|entry| entry.span()).map_or(Place::Nowhere, Place::At);
-            }
-            (Some(item), Some(_), index) => {
-                let inner = match (item, index) {
-                    (Item::ArrayOfTables(tables), Some(index)) => {
-                        (header, number) = (format!("[[{name}]]"), index);
-                        tables.get(index).map(|table| table as &dyn TableLike)
-                    }
-                    (item, None) => {
-                        (header, number) = (format!("[{name}]"), 0);
-                        item.as_table_like()
-                    }
-                    _ => None,
-                };
-                match inner {
-                    Some(inner) => table = inner,
-                    None => return Place::Nowhere,
-                }
-            }
-            (None, None, None) => return new_line(text, &header, number, name),
-            (None, Some(key), None) => {
-                return Place::New { at: text.len(), prefix: format!("\n[{name}]\n{key}") };
-            }
-            (None, _, Some(_)) => return Place::Nowhere,
+impl fmt::Display for RigText {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let text = self.document.to_string();
+        match self.has_crlf {
+            true => f.write_str(&text.replace("\r\n", "\n").replace('\n', "\r\n")),
+            false => f.write_str(&text),
         }
     }
-    Place::Nowhere
 }
 
-enum Place {
-    /// The value takes these bytes.
-    At(core::ops::Range<usize>),
-    /// The key is missing: insert `prefix` and then the value at the byte `at`.
-    New { at: usize, prefix: String },
-    /// The text has no place for the key.
-    Nowhere,
+/// The place of the value of `key`; it holds none if the key is new. None if a list has no such entry.
+fn place<'a>(document: &'a mut Item, key: &str) -> Option<&'a mut Item> {
+    key.split('.').try_fold(document, |item, step| {
+        let table = item.as_table_like_mut()?;
+        match indexed(step) {
+            (name, Some(index)) => table.get_mut(name)?.get_mut(index),
+            (name, None) => Some(table.entry(name).or_insert(Item::None)),
+        }
+    })
 }
 
 /// Splits `name[2]` into the name and the index 1.
@@ -88,56 +113,65 @@ fn indexed(step: &str) -> (&str, Option<usize>) {
     }
 }
 
-/// The place of a new line `name = …`: below the occurrence `number` (from 0) of `header`, or at the top of the file
-/// if `header` is empty.
-fn new_line(text: &str, header: &str, number: usize, name: &str) -> Place {
-    if header.is_empty() {
-        return Place::New { at: 0, prefix: name.to_owned() };
-    }
-    let mut at = 0;
-    let mut found = 0;
-    for line in text.split_inclusive('\n') {
-        at += line.len();
-        let bare = line.split('#').next().unwrap_or_default().trim();
-        if bare == header {
-            if found == number {
-                let prefix = if line.ends_with('\n') { name.to_owned() } else { format!("\n{name}") };
-                return Place::New { at, prefix };
-            }
-            found += 1;
-        }
-    }
-    Place::Nowhere
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    #[test]
-    fn a_value_changes_and_all_else_stays() {
-        let text = "name = \"a\" # mine\n[[link]]\nmass_kg = 1\n[[link]]\nmass_kg = 2 # second\n[tick]\nperiod_s = 0.001\n";
-        let edited = |key: &str, value: &str| with_value(text, key, value).unwrap();
-        assert_eq!(edited("link[2].mass_kg", "3").text, text.replace("2 # second", "3 # second"));
-        assert_eq!(edited("name", "\"b\"").text, text.replace("\"a\"", "\"b\""));
-        let added = edited("tick.delay_ticks", "1");
-        assert!(added.added && added.text.contains("[tick]\ndelay_ticks = 1\nperiod_s"));
-        assert!(edited("verify.tilt_rad", "0.1").text.ends_with("\n[verify]\ntilt_rad = 0.1\n"));
-        assert_eq!(with_value(text, "link[3].mass_kg", "1"), None);
+    const TEXT: &str = "# head\nname = \"a\" # mine\n\n[[link]]\nmass_kg = 1\n[[link]]\nmass_kg = 2 # second\n\
+        \n# about time\n[tick]\nperiod_s = 0.001\n# last\n";
+
+    /// `text` with `value` for `key`.
+    fn changed(text: &str, key: &str, value: &str) -> Result<String, RigError> {
+        let mut text = RigText::parse(text, "rig.toml".as_ref()).unwrap();
+        text.set(key, value)?;
+        assert!(text.has(key));
+        Ok(text.to_string())
     }
 
     #[test]
-    fn values_are_replaced_and_added() {
-        const TEXT: &str =
-            "name = \"a\"\n[cart]\nmass_kg = 1 # one\n[[link]]\nmass_kg = 2\n[[link]]\nmass_kg = 3\n";
-        let changed = |key: &str| with_value(TEXT, key, "7").map(|edited| edited.text);
-        assert_eq!(changed("cart.mass_kg").unwrap(), TEXT.replace("= 1 #", "= 7 #"));
-        assert_eq!(changed("link[2].mass_kg").unwrap(), TEXT.replace('3', "7"));
+    fn a_value_changes_and_all_else_stays() {
+        let edited = |key: &str, value: &str| changed(TEXT, key, value).unwrap();
+        assert_eq!(RigText::parse(TEXT, "rig.toml".as_ref()).unwrap().to_string(), TEXT);
+        assert_eq!(edited("link[2].mass_kg", "3e-7"), TEXT.replace("2 # second", "3e-7 # second"));
+        assert_eq!(edited("name", "\"b\""), TEXT.replace("\"a\"", "\"b\""));
+        let lists = "[lqr]\nstate_weights = [ 1, 2, # two\n  3 ]\n";
+        assert_eq!(changed(lists, "lqr.state_weights[2]", "7").unwrap(), lists.replace("2,", "7,"));
+        let windows = TEXT.replace('\n', "\r\n");
+        assert_eq!(changed(&windows, "tick.period_s", "2").unwrap(), windows.replace("0.001", "2"));
+    }
+
+    #[test]
+    fn a_missing_key_comes_last_in_its_section_and_a_missing_section_last_in_the_file() {
+        let edited = |key: &str| changed(TEXT, key, "7").unwrap();
+        assert_eq!(edited("link[1].length_m"), TEXT.replace("mass_kg = 1\n", "mass_kg = 1\nlength_m = 7\n"));
+        assert_eq!(edited("tick.delay_ticks"), TEXT.replace("0.001\n", "0.001\ndelay_ticks = 7\n"));
+        assert_eq!(edited("verify.tilt_rad"), format!("{TEXT}\n[verify]\ntilt_rad = 7\n"));
+        assert_eq!(edited("gravity"), TEXT.replace("# mine\n", "# mine\ngravity = 7\n"));
+    }
+
+    #[test]
+    fn keys_with_dots_and_tables_on_one_line_change_where_they_stand() {
+        let dotted = "tick.period_s = 1\n[cart]\nmass_kg = 2\n";
+        assert_eq!(changed(dotted, "tick.period_s", "7").unwrap(), dotted.replace('1', "7"));
         assert_eq!(
-            changed("link[1].length_m").unwrap(),
-            TEXT.replacen("[[link]]", "[[link]]\nlength_m = 7", 1)
+            changed(dotted, "tick.delay_ticks", "7").unwrap(),
+            dotted.replace("1\n", "1\ntick.delay_ticks = 7\n")
         );
-        assert!(changed("reality.rail_tilt_rad").unwrap().ends_with("[reality]\nrail_tilt_rad = 7\n"));
-        assert_eq!(changed("link[3].mass_kg"), None);
+        let inline = "link = [ { mass_kg = 1 }, { mass_kg = 2 } ] # two\ntick = { period_s = 3 }\n";
+        assert_eq!(changed(inline, "link[2].mass_kg", "7").unwrap(), inline.replace('2', "7"));
+        assert_eq!(
+            changed(inline, "tick.delay_ticks", "7").unwrap(),
+            inline.replace("{ period_s = 3 }", "{ period_s = 3 , delay_ticks = 7 }")
+        );
+    }
+
+    #[test]
+    fn an_entry_that_a_list_does_not_have_is_refused() {
+        for key in ["link[3].mass_kg", "link[0].mass_kg", "joint[1].mass_kg", "name.first"] {
+            let error = changed(TEXT, key, "1").unwrap_err().to_string();
+            assert!(error.starts_with(&format!("rig.toml: {key}: missing; add it")), "{error}");
+        }
+        assert!(changed(TEXT, "name", "[1").is_err());
+        assert!(!RigText::parse(TEXT, "rig.toml".as_ref()).unwrap().has("tick.delay_ticks"));
     }
 }

@@ -18,7 +18,7 @@ mod sections;
 mod sensors;
 
 pub use document::key_table;
-pub use edit::{Edited, with_value};
+pub use edit::RigText;
 pub use error::{MAX_BYTES, Place, RigError, RigErrorKind};
 pub use key::{Absent, Key, PerJoint, Section, unit_in_names};
 pub use rule::Rule;

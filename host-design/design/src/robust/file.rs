@@ -3,14 +3,17 @@
 use super::candidate::LawNumbers;
 use super::search::Choice;
 use crate::number::significant;
-use crate::rig::{PolePlacement, Rig, Tolerances, with_value};
+use crate::rig::{PolePlacement, Rig, RigError, RigText, Tolerances};
 use crate::verify::Disturbance;
 
 /// Digits of a number in the file.
 const DIGITS: usize = 6;
 
-/// The text of a rig file with the choice in it, and with `name`; everything else stays, comments too. None if a key of
-/// `text` has no place of its own, as in an inline table.
+/// The text of a rig file with the choice in it, and with `name`; everything else stays, comments too. `file` is the
+/// name of the old file.
+///
+/// # Errors
+/// [`RigError`] if the text is not TOML.
 pub fn rewritten(
     text: &str,
     file: &str,
@@ -18,22 +21,18 @@ pub fn rewritten(
     rig: &Rig,
     tolerances: &Tolerances,
     choice: &Choice,
-) -> Option<String> {
-    let mut text = text.to_owned();
-    let mut set = |key: &str, value: String| {
-        text = with_value(&text, key, &value)?.text;
-        Some(())
-    };
-    set("name", format!("{name:?}"))?;
-    set("kalman.joint_noise", list(&choice.joint_noise))?;
+) -> Result<String, RigError> {
+    let mut text = RigText::parse(text, file.as_ref())?;
+    text.set("name", &format!("{name:?}"))?;
+    text.set("kalman.joint_noise", &list(&choice.joint_noise))?;
     for chosen in &choice.laws {
         match &chosen.candidate.numbers {
             LawNumbers::Weights(weights) => {
-                set("lqr.state_weights", list(&weights.state_weights))?;
-                set("lqr.force_weight", significant(weights.force_weight, DIGITS))?;
+                text.set("lqr.state_weights", &list(&weights.state_weights))?;
+                text.set("lqr.force_weight", &significant(weights.force_weight, DIGITS))?;
             }
             LawNumbers::Poles(PolePlacement::Response { far_poles, .. }) => {
-                set("pole_placement.far_poles", list(far_poles))?;
+                text.set("pole_placement.far_poles", &list(far_poles))?;
             }
             // Poles given one by one are never changed.
             LawNumbers::Poles(PolePlacement::Poles(_)) => {}
@@ -42,22 +41,22 @@ pub fn rewritten(
     // Without these, the runs of `verify` would follow the new joint noise.
     let disturbance = Disturbance::of(rig);
     if rig.verify.torque_rms_n_m.is_none() {
-        set("verify.torque_rms_n_m", significant(disturbance.torque_n_m, DIGITS))?;
+        text.set("verify.torque_rms_n_m", &significant(disturbance.torque_n_m, DIGITS))?;
     }
     if rig.verify.force_rms_n.is_none() {
-        set("verify.force_rms_n", significant(disturbance.force_n, DIGITS))?;
+        text.set("verify.force_rms_n", &significant(disturbance.force_n, DIGITS))?;
     }
-    Some(format!("{}{}", head(file, choice), with_tolerances(&text, tolerances)?))
+    set_tolerances(&mut text, tolerances)?;
+    Ok(format!("{}{text}", head(file, choice)))
 }
 
-/// The text of a rig file with these tolerances as its `[robust]`; those that are 0 are left out. None if a key of
-/// `text` has no place of its own.
-pub fn with_tolerances(text: &str, tolerances: &Tolerances) -> Option<String> {
-    // A new key comes first in its section.
-    let stated: Vec<_> = tolerances.each().filter(|(_, _, value)| *value != 0.0).collect();
-    stated.into_iter().rev().try_fold(text.to_owned(), |text, (key, _, value)| {
-        Some(with_value(&text, &format!("robust.{key}"), &significant(value, DIGITS))?.text)
-    })
+/// Gives a rig file these tolerances as its `[robust]`; those that are 0 are left out.
+///
+/// # Errors
+/// [`RigError`] if the file has something else of that name.
+pub fn set_tolerances(text: &mut RigText, tolerances: &Tolerances) -> Result<(), RigError> {
+    let mut stated = tolerances.each().filter(|(_, _, value)| *value != 0.0);
+    stated.try_for_each(|(key, _, value)| text.set(&format!("robust.{key}"), &significant(value, DIGITS)))
 }
 
 fn head(file: &str, choice: &Choice) -> String {

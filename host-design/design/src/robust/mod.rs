@@ -21,7 +21,7 @@ pub use error::RobustError;
 pub use false_alarms::{
     FalseAlarms, Healthy, Machines, balance, corner_machine, false_alarms, healthy_machine,
 };
-pub use file::{rewritten, with_tolerances};
+pub use file::{rewritten, set_tolerances};
 pub use front::{Front, FrontPoint, LawRipple, LeastRipple};
 pub use judge::{JudgeSettings, Judgement, Runs, judge};
 pub use search::{Choice, Chosen, choose};

@@ -181,18 +181,19 @@ pub(super) fn narrower(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::rig::with_value;
+    use crate::rig::RigText;
 
     /// Number of candidates: enough to find a motion.
     const FEW: u64 = 3;
 
     /// The rig of the single's file, with further values.
     fn single(values: &str) -> Rig {
-        let mut text = std::fs::read_to_string("../../rigs/single-quanser-ip02.toml").unwrap();
+        let text = std::fs::read_to_string("../../rigs/single-quanser-ip02.toml").unwrap();
+        let mut text = RigText::parse(&text, "single.toml".as_ref()).unwrap();
         for (key, value) in values.split(" and ").map(|value| value.split_once(" = ").unwrap()) {
-            text = with_value(&text, key, value).unwrap().text;
+            text.set(key, value).unwrap();
         }
-        Rig::from_toml(&text, "single.toml".as_ref()).unwrap()
+        Rig::from_toml(&text.to_string(), "single.toml".as_ref()).unwrap()
     }
 
     /// Written into the file, the advised values lead to a motion, and those said not to help do not.

@@ -6,8 +6,8 @@ use upright::table::Law;
 use upright_design::design::{Certified, design};
 use upright_design::identify::{Estimate, Identification, Kind, Log, Settings, identify};
 use upright_design::number::significant;
-use upright_design::rig::{Rig, Tolerances};
-use upright_design::robust::{JudgeSettings, RobustError, choose, judge, rewritten, with_tolerances};
+use upright_design::rig::{Rig, RigText, Tolerances};
+use upright_design::robust::{JudgeSettings, RobustError, choose, judge, rewritten, set_tolerances};
 use upright_design::study::Study;
 use upright_design::table::{Gains, TableValues};
 use upright_design::verify::{Unverifiable, brief};
@@ -81,9 +81,9 @@ pub(super) fn designed(
         .map(|(key, unit, value)| format!("{key} {} {unit}", significant(value, 2)))
         .collect();
     journal.found(format!("the machine may differ from the new file by: {}", words.join(", ")));
-    let text = with_tolerances(&text, &tolerances)
-        .ok_or_else(|| machine("[robust] has no place in the rig file: write one key per line".to_owned()))?;
-    let own = of_text(text, plan.file)?;
+    let mut text = RigText::parse(&text, plan.file).map_err(|error| machine(error.to_string()))?;
+    set_tolerances(&mut text, &tolerances).map_err(|error| machine(error.to_string()))?;
+    let own = of_text(text.to_string(), plan.file)?;
     robust(journal, plan, own, &tolerances)
 }
 
@@ -136,7 +136,7 @@ fn robust(
             }
             let file = plan.file.display().to_string();
             let text = rewritten(&own.text, &file, &own.rig.name, &own.rig, tolerances, &choice);
-            of_text(text.unwrap_or(own.text), plan.file)
+            of_text(text.map_err(|error| Stop::Machine(error.to_string()))?, plan.file)
         }
         Err(RobustError::Unhelped(reason)) => {
             journal.found(format!(

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use upright_design::number::rounded;
-use upright_design::rig::{Edited, Rig, RigError, RigErrorKind, with_value};
+use upright_design::rig::{Rig, RigError, RigText};
 
 /// Values for one key of a rig file.
 #[derive(Debug, Clone, PartialEq)]
@@ -94,20 +94,13 @@ impl Sweep {
     /// added, the error names no line.
     pub fn rig(&self, text: &str, file: &Path, value: f64) -> Result<Rig, RigError> {
         let number = if value.abs() < 1e15 { format!("{value}") } else { format!("{value:e}") };
-        match with_value(text, &self.key, &number) {
-            Some(Edited { text, added: false }) => Rig::from_toml(&text, file),
-            Some(Edited { text, added: true }) => {
-                Rig::from_toml(&text, file).map_err(|error| RigError { place: None, ..error })
-            }
-            None => Err(RigError {
-                file: file.to_owned(),
-                place: None,
-                key: Some(self.key.clone()),
-                kind: Box::new(RigErrorKind::MissingKey {
-                    remedy: "it to the rig file, on a line of its own: only then can it be swept".to_owned(),
-                }),
-            }),
-        }
+        let mut text = RigText::parse(text, file)?;
+        let is_added = !text.has(&self.key);
+        text.set(&self.key, &number)?;
+        Rig::from_toml(&text.to_string(), file).map_err(|error| match is_added {
+            true => RigError { place: None, ..error },
+            false => error,
+        })
     }
 }
 

@@ -5,5 +5,5 @@ mod rig_file;
 mod text;
 
 pub use page::page;
-pub use rig_file::{NotWritten, rig_file};
+pub use rig_file::rig_file;
 pub use text::{json, text};

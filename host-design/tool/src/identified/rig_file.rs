@@ -4,18 +4,7 @@ use std::path::Path;
 
 use upright_design::identify::{Identification, Realised};
 use upright_design::number::rounded;
-use upright_design::rig::{Actuator, Rig, RigError, with_value};
-
-/// Why there is no rig file.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
-pub enum NotWritten {
-    /// A key of the old file cannot be changed.
-    #[error("{0}: write it on a line of its own, as `key = value`, then it can be changed")]
-    Key(String),
-    /// The new text is not a valid rig file.
-    #[error(transparent)]
-    Rig(#[from] RigError),
-}
+use upright_design::rig::{Actuator, Rig, RigError, RigText};
 
 /// Errors of masses and lengths in `[reality]`. The identified numbers include them, so they are set to 0.
 const WITHIN: [&str; 5] = [
@@ -29,32 +18,26 @@ const WITHIN: [&str; 5] = [
 /// The text of `old` with the identified numbers, with comments and layout as they were, and `note` as first line.
 ///
 /// # Errors
-/// [`NotWritten`] if a key cannot be changed or the result would not be a valid rig file.
+/// [`RigError`] if the result would not be a valid rig file.
 pub fn rig_file(
     old: &str,
     rig: &Rig,
     found: &Identification,
     note: &str,
     file: &Path,
-) -> Result<String, NotWritten> {
-    let mut text = old.to_owned();
-    let mut set = |key: &str, value: String| {
-        let changed = with_value(&text, key, &value).ok_or_else(|| NotWritten::Key(key.to_owned()))?;
-        text = changed.text;
-        Ok::<(), NotWritten>(())
-    };
+) -> Result<String, RigError> {
+    let mut text = RigText::parse(old, file)?;
     if let Some(realised) = &found.realised {
         for (key, value) in values(realised, &rig.actuator) {
-            set(&key, value)?;
+            text.set(&key, &value)?;
         }
     }
     if let Some(delay) = found.other_delay() {
-        set("tick.delay_ticks", delay.to_string())?;
+        text.set("tick.delay_ticks", &delay.to_string())?;
     }
-    for key in WITHIN {
-        let is_given = old.lines().any(|line| line.trim_start().starts_with(key));
-        if is_given {
-            set(&format!("reality.{key}"), "0".to_owned())?;
+    for key in WITHIN.map(|key| format!("reality.{key}")) {
+        if text.has(&key) {
+            text.set(&key, "0")?;
         }
     }
     let text = format!("# {note}\n{text}");
@@ -91,4 +74,56 @@ fn values(realised: &Realised, actuator: &Actuator) -> Vec<(String, String)> {
         }
     }
     values
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// An identification that found nothing new.
+    const NOTHING: Identification = Identification {
+        seconds: 60.0,
+        lost_ticks: 0,
+        largest_angle_rad: 0.3,
+        wiring: None,
+        estimates: Vec::new(),
+        sample_s: 0.001,
+        correlations: Vec::new(),
+        channels: Vec::new(),
+        realised: None,
+        delay_ticks: 0,
+        refusal: None,
+    };
+
+    /// The rig file with the identified numbers, for a rig whose file gives this `[reality]`.
+    fn written(reality: &str, before_all: bool) -> String {
+        let file: &Path = "../../rigs/single-quanser-ip02.toml".as_ref();
+        let text = std::fs::read_to_string(file).unwrap();
+        let old = if before_all { reality.to_owned() + &text } else { text + reality };
+        let rig = Rig::from_toml(&old, file).unwrap();
+        rig_file(&old, &rig, &NOTHING, "identified", file).unwrap()
+    }
+
+    /// The identified masses include the stated error, so it must not be applied once more.
+    #[test]
+    fn an_error_that_the_numbers_include_is_taken_out_however_it_is_written() {
+        for (reality, before_all) in [
+            ("\n[reality]\ncart_mass_percent = 5\n", false),
+            ("\n[reality]\n\"cart_mass_percent\" = 5\n", false),
+            ("reality.cart_mass_percent = 5\n", true),
+            ("reality = { cart_mass_percent = 5, homing_error_rad = 0.01 } # mine\n", true),
+        ] {
+            let text = written(reality, before_all);
+            let rig = Rig::from_toml(&text, "new.toml".as_ref()).unwrap();
+            assert_eq!(rig.reality.parameters.cart_mass_percent, 0.0, "{text}");
+            assert_eq!(
+                text,
+                format!(
+                    "# identified\n{}",
+                    written(&reality.replace('5', "0"), before_all).split_once('\n').unwrap().1
+                )
+            );
+        }
+        assert!(!written("", false).contains("cart_mass_percent"), "what the file leaves out stays out");
+    }
 }

@@ -184,9 +184,7 @@ impl Robust {
         let part = |name: Option<&std::ffi::OsStr>| name.and_then(|name| name.to_str()).map(str::to_owned);
         let name = part(path.file_stem()).ok_or_else(|| bad("--out needs a file name"))?;
         let file = part(self.rig.file_name()).unwrap_or_default();
-        let text = rewritten(&text, &file, &name, rig, tolerances, choice).ok_or_else(|| {
-            bad("write its sections with headers and one key per line: only then can they change")
-        })?;
+        let text = rewritten(&text, &file, &name, rig, tolerances, choice)?;
         // Nothing but a valid rig file is written.
         Rig::from_toml(&text, path)?;
         let differs = std::fs::read_to_string(path).map_or(true, |old| old != text);
