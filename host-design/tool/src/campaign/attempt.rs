@@ -122,7 +122,7 @@ impl Attempt<'_> {
         }
         let mut harness = Harness::new(self.rig, self.table, &self.trial.scenario, target)?;
         match self.trial.kind {
-            _ if self.trial.phase == Phase::Jogging => self.drive(&mut harness),
+            _ if self.trial.phase == Phase::Jogging => self.jog(&mut harness),
             Kind::ArmUnhomed | Kind::ArmHanging | Kind::ArmStopped | Kind::ArmHeld => self.arm(&mut harness),
             _ => self.balance(&mut harness),
         }
