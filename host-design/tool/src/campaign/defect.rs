@@ -174,7 +174,7 @@ mod tests {
     #[test]
     fn a_defect_that_the_simulated_pins_can_have_needs_no_board() {
         let needs_board = Defect::ALL.iter().filter(|defect| defect.needs() == Needs::Board);
-        assert_eq!(needs_board.count(), 15);
+        assert_eq!(needs_board.count(), 14);
         assert_eq!(Defect::EncoderWireOpen.needs(), Needs::Nothing);
     }
 }
