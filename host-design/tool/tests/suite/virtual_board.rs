@@ -14,7 +14,7 @@ use upright_design::rig::{Integral, Rig};
 use upright_design::simulate::Scenario;
 use upright_design::swing_up::{hangs, up_and_down};
 use upright_design::table::{Gains, TableValues};
-use upright_tool::campaign::{Class, During, Kind as Defect, Setup, one};
+use upright_tool::campaign::{Class, Defect, During, Setup, one};
 use upright_tool::image::{Board, Kind, build};
 use upright_tool::in_the_loop::{Place, VirtualBoard, measure, run_compared};
 
