@@ -7,7 +7,7 @@ use nalgebra::SVector;
 use upright::control::controller::Controller;
 use upright::control::encoder::CounterWidth;
 use upright::table::Law;
-use upright_design::rig::{Integral, PerJoint, PlantDescription, Rig};
+use upright_design::rig::{Integral, PerJoint, Rig};
 use upright_design::simulate::{Bench, Scenario, Sensing, simulate};
 
 fn with_integral(name: &str, position_weight: f64) -> Rig {
@@ -102,7 +102,7 @@ fn a_rig_that_is_not_as_described_arrives_all_the_same() {
     let with = with_integral("single-quanser-ip02", 100.0);
     let table = table(&with);
     let mut heavier = with.clone();
-    let PlantDescription::Chain(chain) = &mut heavier.plant else { panic!() };
+    let chain = heavier.chain_mut().unwrap();
     chain.cart.mass_kg *= 1.3;
     chain.cart.friction_n_s_per_m *= 1.5;
     chain.links[0].mass_kg *= 0.8;

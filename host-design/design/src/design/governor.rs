@@ -2,7 +2,7 @@
 
 use super::synthesis::{Design, Feedback};
 use crate::numerics::Matrix;
-use crate::rig::{PlantDescription, Rig, defaults};
+use crate::rig::{Rig, defaults};
 
 /// Share of the angle and force limits that a motion of the set-point may use; the rest is left for disturbances.
 const SHARE: f64 = 0.5;
@@ -17,7 +17,7 @@ const SHARE: f64 = 0.5;
 #[doc(alias = "reference_governor")]
 #[doc(alias = "command_governor")]
 pub fn setpoint_step(rig: &Rig, design: &Design<f64>, law: &Feedback<f64>) -> Option<f64> {
-    let PlantDescription::Chain(chain) = &rig.plant else { return None };
+    let chain = rig.chain()?;
     let (matrix, input) = (design.sampled_loop(rig, law), design.setpoint_input(rig, law)?);
     let (links, n) = (chain.links.len(), law.n?);
 

@@ -5,7 +5,7 @@ use super::error::DesignError;
 use super::riccati::{Cost, dare};
 use super::zero_order_hold::integrated_quadratic;
 use crate::numerics::{Complex, Matrix, Real, solve_right};
-use crate::rig::{self, PlantDescription, Rig, Sensor};
+use crate::rig::{self, Rig, Sensor};
 
 /// Steady-state gains of the observer.
 #[doc(alias = "lqe")]
@@ -78,7 +78,7 @@ const WHITE_S: f64 = 1e-3;
 /// encoders is multiplied by 1 ms over the tick, which keeps the product of variance and tick constant.
 pub(super) fn rounding_variances<R: Real>(rig: &Rig, steps: &[R]) -> Vec<R> {
     let twelve = R::from_f64(12.0);
-    let is_correlated = matches!(rig.plant, PlantDescription::Chain(_)) && rig.tick.period_s < WHITE_S;
+    let is_correlated = rig.chain().is_some() && rig.tick.period_s < WHITE_S;
     let variance = |step: &R| {
         let white = step.clone() * step / &twelve;
         if is_correlated { white * &R::from_f64(WHITE_S) / &R::from_f64(rig.tick.period_s) } else { white }

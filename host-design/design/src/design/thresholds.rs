@@ -3,7 +3,7 @@
 use super::Design;
 use super::kalman::rounding_variances;
 use super::tolerated::Tolerated;
-use crate::rig::{PlantDescription, Rig};
+use crate::rig::Rig;
 
 /// Share of the motor's force that may be missing.
 const MISSING_SHARE: f64 = 0.5;
@@ -74,7 +74,7 @@ pub fn detection_thresholds(rig: &Rig, design: &Design<f64>) -> Option<Detection
         },
     );
     let wrong = f64::from(upright::supervision::detection::MEMORY).sqrt() * tolerated.innovation[0];
-    let motor = matches!(rig.plant, PlantDescription::Chain(_)).then(|| {
+    let motor = rig.chain().is_some().then(|| {
         let (ad, bd, l) = (&design.ad, &design.bd, &kalman.l_filter);
         let corrected = |row: usize| ad[(row, 0)] * (1.0 - l[(0, 0)]) - ad[(row, 1)] * l[(1, 0)];
         MotorDesign {

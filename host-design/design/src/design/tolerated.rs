@@ -3,7 +3,7 @@
 use super::zero_order_hold::zero_order_hold;
 use super::{Design, Kalman, continuous_plant};
 use crate::numerics::Matrix;
-use crate::rig::{PlantDescription, Rig};
+use crate::rig::Rig;
 
 /// Growth of the innovation per relative error of the masses. Measured, not derived: on the robust quadruple with all
 /// masses 5 % off and all friction, the innovation reaches 1.11 times the bounds for friction and wrong zeros in 5 h
@@ -43,9 +43,8 @@ impl Tolerated {
             lighter: 1.0,
             mismatch: 1.0,
         };
-        let tolerances = match (&rig.robust, &rig.plant) {
-            (Some(tolerances), PlantDescription::Chain(_)) => tolerances,
-            _ => return Some(bounds),
+        let Some(tolerances) = rig.robust.as_ref().filter(|_| rig.chain().is_some()) else {
+            return Some(bounds);
         };
         let wrong = 0.01 * tolerances.mass_percent;
         (bounds.lighter, bounds.mismatch) = (1.0 / (1.0 - wrong), 1.0 + MISMATCH * wrong);

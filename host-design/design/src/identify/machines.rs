@@ -10,7 +10,7 @@ use super::error::IdentifyError;
 use super::parameters::{FRICTION, Kind, Layout, priors};
 use crate::plant::ChainParameters;
 use crate::reality::real_chain;
-use crate::rig::{PerJoint, PlantDescription, Rig};
+use crate::rig::{PerJoint, Rig};
 
 /// Friction is drawn between the usual value divided by this factor and multiplied by it.
 const FRICTION_FACTOR: f64 = 3.0;
@@ -54,7 +54,7 @@ impl Machine {
             let usual = priors[index].deviation / FRICTION;
             usual * libm::pow(FRICTION_FACTOR, random.random_range(-1.0..=1.0))
         };
-        if let PlantDescription::Chain(chain) = &mut rig.plant {
+        if let Some(chain) = rig.chain_mut() {
             chain.cart.friction_n_s_per_m = friction(layout.viscous(0));
             for (joint, link) in chain.links.iter_mut().enumerate() {
                 link.friction_n_m_s_per_rad = friction(layout.viscous(joint + 1));

@@ -52,16 +52,12 @@ pub use verdict::{ChannelFit, Predicted, Refusal};
 pub use wiring::{Wiring, WiringFound};
 pub use with_firmware::{ShakeError, Shaken, checked_and_hanging, shake_with};
 
-use crate::rig::{Chain, PlantDescription, Rig};
+use crate::rig::{Chain, Rig};
 use model::Input;
 
 /// The chain of a rig whose cart and links all have an encoder.
 fn chain_of(rig: &Rig) -> Result<&Chain, IdentifyError> {
-    let PlantDescription::Chain(chain) = &rig.plant else {
-        return Err(IdentifyError::NoEncoders(rig.name.clone()));
-    };
-    if rig.sensors().len() != chain.links.len() + 1 {
-        return Err(IdentifyError::NoEncoders(rig.name.clone()));
-    }
-    Ok(chain)
+    rig.chain()
+        .filter(|chain| rig.sensors().len() == chain.links.len() + 1)
+        .ok_or_else(|| IdentifyError::NoEncoders(rig.name.clone()))
 }

@@ -306,12 +306,12 @@ pub(super) mod tests {
     use super::super::parameters::{SMOOTHING, priors};
     use super::*;
     use crate::plant::{ChainPlant, ChainState};
-    use crate::rig::{PlantDescription, Rig};
+    use crate::rig::Rig;
     use std::path::Path;
 
     pub(in crate::identify) fn triple() -> (Model, Vec<f64>, ChainPlant<3>) {
         let rig = Rig::from_path(Path::new("../../rigs/triple-glueck-eder-kugi.toml")).unwrap();
-        let PlantDescription::Chain(chain) = &rig.plant else { panic!("a chain") };
+        let chain = rig.chain().unwrap();
         let model =
             Model { layout: Layout { links: 3 }, gravity: chain.gravity_m_per_s2, smoothing: SMOOTHING };
         let p = priors(&rig, chain, true).iter().map(|prior| prior.value).collect();

@@ -112,12 +112,12 @@ mod tests {
     use super::super::parameters::priors;
     use super::*;
     use crate::plant::ChainParameters;
-    use crate::rig::{PlantDescription, Rig};
+    use crate::rig::Rig;
     use std::path::Path;
 
     fn chain_and_values(name: &str) -> (Chain, Vec<f64>) {
         let rig = Rig::from_path(&Path::new("../../rigs").join(name)).unwrap();
-        let PlantDescription::Chain(chain) = &rig.plant else { panic!("a chain") };
+        let chain = rig.chain().unwrap();
         (chain.clone(), priors(&rig, chain, false).iter().map(|prior| prior.value).collect())
     }
 

@@ -130,13 +130,13 @@ fn solve<const N: usize>(mut s: [[f64; N]; N], rows: &mut [Partials<N>; N]) {
 mod tests {
     use super::*;
     use crate::plant::ChainParameters;
-    use crate::rig::{PlantDescription, Rig};
+    use crate::rig::Rig;
     use std::path::Path;
 
     #[test]
     fn partial_derivatives_agree_with_differences() {
         let rig = Rig::from_path(Path::new("../../rigs/triple-glueck-eder-kugi.toml")).unwrap();
-        let PlantDescription::Chain(chain) = &rig.plant else { panic!("a chain") };
+        let chain = rig.chain().unwrap();
         let plant = ChainPlant::<3>::new(&ChainParameters::of(chain)).unwrap();
         let state = ChainState { x: 0.1, xdot: -0.7, phi: [2.0, -1.1, 0.4], phidot: [3.0, -5.0, 1.5] };
         let (force, torques) = (17.0, [0.3, -0.2, 0.1]);

@@ -250,12 +250,12 @@ mod tests {
 
     use super::*;
     use crate::plant::chain_plant;
-    use crate::rig::{PlantDescription, Rig};
+    use crate::rig::Rig;
 
     #[test]
     fn every_kind_of_vector_that_this_processor_has_gives_the_bits_of_the_plant() {
         let rig = Rig::from_path(Path::new("../../rigs/quadruple-paper.toml")).unwrap();
-        let PlantDescription::Chain(chain) = &rig.plant else { panic!() };
+        let chain = rig.chain().unwrap();
         let start = |lane: usize| [0.1, -0.2, 0.3 * lane as f64, 3.0, -0.3, 1e-3, 2.0, -9.0, 0.0, 0.5];
         let wide = [V3::try_new().map(Arch::V3), V4::try_new().map(Arch::V4)];
         for processor in [Arch::Scalar].into_iter().chain(wide.into_iter().flatten()) {

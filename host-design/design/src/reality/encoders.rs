@@ -26,9 +26,8 @@ impl Encoders {
     /// The encoders of a rig; none if they have no error.
     pub fn of(rig: &Rig) -> Option<Self> {
         let errors = &rig.reality.sensors;
-        (errors.homing_error_rad.is_any() || errors.eccentricity_rad.is_any()).then(|| Self {
-            joints: (0..rig.states() / 2 - 1).map(|joint| Joint::of(errors, joint)).collect(),
-        })
+        (errors.homing_error_rad.is_any() || errors.eccentricity_rad.is_any())
+            .then(|| Self { joints: (0..rig.links()).map(|joint| Joint::of(errors, joint)).collect() })
     }
 
     /// Measured value of the state with this index, whose true value is `value`. Only angles have errors.

@@ -100,6 +100,27 @@ impl Rig {
         self.plant.states()
     }
 
+    /// The chain of links; none if the plant is a linear model.
+    pub fn chain(&self) -> Option<&Chain> {
+        match &self.plant {
+            PlantDescription::Chain(chain) => Some(chain),
+            PlantDescription::Model(_) => None,
+        }
+    }
+
+    /// The chain of links, to be changed; none if the plant is a linear model.
+    pub fn chain_mut(&mut self) -> Option<&mut Chain> {
+        match &mut self.plant {
+            PlantDescription::Chain(chain) => Some(chain),
+            PlantDescription::Model(_) => None,
+        }
+    }
+
+    /// Number of links; 0 if the plant is a linear model.
+    pub fn links(&self) -> usize {
+        self.chain().map_or(0, |chain| chain.links.len())
+    }
+
     /// Largest force on the cart (N): the smaller of the file's limit and the motor's stall force, where given.
     /// None: no limit.
     pub fn force_limit_n(&self) -> Option<f64> {

@@ -8,7 +8,7 @@ use upright::table::Law;
 
 use super::judge::machine;
 use crate::harness::{HEARTBEAT_S, Harness, HarnessError, with_firmware};
-use crate::rig::{PerJoint, PlantDescription, Rig};
+use crate::rig::{PerJoint, Rig};
 use crate::study::Study;
 use crate::table::TableValues;
 use crate::verify::{Unverifiable, at_rest_disturbed, chain};
@@ -62,10 +62,9 @@ pub enum Machines {
 impl Machines {
     /// Number of machines for this rig.
     pub fn count(self, rig: &Rig) -> u64 {
-        match (self, &rig.plant) {
-            (Self::Drawn(runs), _) => runs,
-            (Self::Corners, PlantDescription::Chain(chain)) => 2 << chain.links.len(),
-            (Self::Corners, PlantDescription::Model(_)) => 0,
+        match self {
+            Self::Drawn(runs) => runs,
+            Self::Corners => rig.chain().map_or(0, |chain| 2 << chain.links.len()),
         }
     }
 
@@ -83,7 +82,7 @@ impl Machines {
 /// Friction, zero errors and latency are the same share of their tolerances, drawn uniformly from 0 to 1. The error of
 /// each mass is drawn uniformly within its tolerance.
 pub fn healthy_machine(rig: &Rig, number: u64) -> Rig {
-    let (Some(tolerances), PlantDescription::Chain(chain)) = (&rig.robust, &rig.plant) else {
+    let (Some(tolerances), Some(chain)) = (&rig.robust, rig.chain()) else {
         return rig.clone();
     };
     let mut random = Pcg64::seed_from_u64(number);
@@ -101,7 +100,7 @@ pub fn healthy_machine(rig: &Rig, number: u64) -> Rig {
 ///
 /// The cart is too heavy if the lowest bit of the number is set, the first link if the next is, and so on.
 pub fn corner_machine(rig: &Rig, number: u64) -> Rig {
-    let (Some(tolerances), PlantDescription::Chain(chain)) = (&rig.robust, &rig.plant) else {
+    let (Some(tolerances), Some(chain)) = (&rig.robust, rig.chain()) else {
         return rig.clone();
     };
     let mut machine = machine(rig, tolerances, 1.0);

@@ -141,7 +141,7 @@ pub(super) fn one(
     seed: u64,
 ) -> Result<Outcome, SimulationError> {
     let scenario = Scenario {
-        start: leaning(machine, &vec![LEAN_RAD; machine.states() / 2 - 1]),
+        start: leaning(machine, &vec![LEAN_RAD; machine.links()]),
         force_noise_n: settings.disturbance.force_n,
         torque_noise_n_m: settings.disturbance.torque_n_m,
         seed,

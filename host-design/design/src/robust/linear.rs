@@ -83,7 +83,7 @@ impl<'a> LinearPlants<'a> {
         let measured: Vec<usize> = self.rig.sensors().iter().map(|sensor| sensor.state).collect();
         let period_s = self.rig.tick.period_s;
         let delay_ticks = f64::from(self.rig.tick.delay_ticks) + tolerances.latency_s / period_s;
-        let parts = self.rig.states() / 2;
+        let parts = self.rig.links() + 1;
         let corners = if tolerances.mass_percent > 0.0 { 1u32 << parts } else { 1 };
         let corner = |mask: u32| {
             let factors: Vec<f64> =

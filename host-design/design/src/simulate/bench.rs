@@ -196,7 +196,7 @@ impl Bench {
     /// The chain, if it can be simulated in lockstep: nothing in `[reality]` changes its motion, and a tick has a
     /// single force and always the same length.
     pub(super) fn lockstep_chain(rig: &Rig) -> Option<Chain> {
-        let PlantDescription::Chain(chain) = &rig.plant else { return None };
+        let chain = rig.chain()?;
         let driver = &rig.reality.driver;
         let is_simple = rig.actuator.motor.is_none()
             && Driver::of(rig).is_none()

@@ -100,7 +100,7 @@ impl Summary {
         let output = rig.output();
         let step = scenario.step_m;
         let band = (0.02 * step.abs()).max(1e-3);
-        let is_chain = matches!(rig.plant, PlantDescription::Chain(_));
+        let is_chain = rig.chain().is_some();
         let angles = |state: &[f64]| -> Vec<f64> {
             if is_chain {
                 state.iter().skip(2).step_by(2).map(|angle| angle.abs()).collect()

@@ -9,7 +9,7 @@ use super::route::{Route, states};
 use super::transition::Transition;
 use crate::harness::{HarnessError, Recording, record, with_firmware};
 use crate::plant::absolute_angles;
-use crate::rig::{PlantDescription, Rig};
+use crate::rig::Rig;
 use crate::simulate::{Scenario, Trace};
 use crate::table::TableValues;
 use crate::verify::Disturbance;
@@ -48,7 +48,7 @@ impl Script {
     /// [`SwingUpError::NoMotions`] if the table has none.
     pub fn of(rig: &Rig, table: &TableValues, seed: u64, is_wrong: bool) -> Result<Self, SwingUpError> {
         let motions = table.swing_up.as_ref().ok_or(SwingUpError::NoMotions)?;
-        let PlantDescription::Chain(chain) = &rig.plant else { return Err(SwingUpError::NotAChain) };
+        let Some(chain) = rig.chain() else { return Err(SwingUpError::NotAChain) };
         let rules = rig.swing_up.clone().unwrap_or_default();
         let share = |percent: f64| if is_wrong { percent / 100.0 } else { 0.0 };
         let spread = Spread::of(share(rules.mass_spread_percent), share(rules.friction_spread_percent));
@@ -94,7 +94,7 @@ impl Script {
     /// [`SwingUpError::NoRoute`] if no route leads through all of them.
     pub fn route(rig: &Rig, table: &TableValues, seed: u64) -> Result<Self, SwingUpError> {
         let route = Route::of(rig, table).ok_or(SwingUpError::NoRoute)?;
-        let links = rig.states() / 2 - 1;
+        let links = rig.links();
         let (real, start) = drawn(rig, Transition::Up, &Spread::of(0.0, 0.0), seed);
         let names = route.transitions.iter().map(|transition| transition.name(links));
         let states = route.transitions.iter().flat_map(|transition| states(*transition, links));

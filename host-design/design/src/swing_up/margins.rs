@@ -11,7 +11,7 @@ use super::transition::Transition;
 use crate::harness::{Harness, HarnessError, Target, goals, with_firmware};
 use crate::parallel;
 use crate::plant::absolute_angles;
-use crate::rig::{PlantDescription, Rig};
+use crate::rig::Rig;
 use crate::simulate::{Begin, Goal, Scenario};
 use crate::table::TableValues;
 
@@ -95,7 +95,7 @@ pub fn margins(
             |size: f64| Ok(pushed(Some(Push { tick: begin + tick, link, force_n: side * size }))?.is_some());
         largest(survives)
     };
-    let links = rig.states() / 2 - 1;
+    let links = rig.links();
     let at = |moment: usize| -> Result<Margin, SwingUpError> {
         let tick = moment * ticks / moments;
         let both = |link| Ok([edge(tick, link, -1.0)?, edge(tick, link, 1.0)?]);
@@ -197,7 +197,7 @@ impl Push {
     /// link below moves `p` perpendicular to that link, and the torque at a joint is the sum over the links from this
     /// joint to the pushed one.
     fn on(&self, rig: &Rig, state: &[f64]) -> (f64, Vec<f64>) {
-        let PlantDescription::Chain(chain) = &rig.plant else { return (0.0, Vec::new()) };
+        let Some(chain) = rig.chain() else { return (0.0, Vec::new()) };
         let angles: Vec<f64> = absolute_angles(state).collect();
         let across = angles[self.link];
         let mut torques_n_m = vec![0.0; angles.len()];
@@ -218,7 +218,7 @@ mod tests {
     #[test]
     fn a_push_is_across_the_end_of_its_link() {
         let rig = Rig::from_path("../../rigs/quadruple-paper.toml".as_ref()).unwrap();
-        let PlantDescription::Chain(chain) = &rig.plant else { panic!() };
+        let chain = rig.chain().unwrap();
         let state = [0.1, 0.2, 0.7, 0.3, -1.9, 0.4, 2.2, 0.5, 0.6, 0.7];
         for link in 0..4 {
             let end = |state: &[f64]| {

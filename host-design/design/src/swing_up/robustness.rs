@@ -113,7 +113,7 @@ pub(super) fn drawn(rig: &Rig, transition: Transition, spread: &Spread, seed: u6
     let mut between = |share: f64| share * random.random_range(-1.0..=1.0);
     let mut rig = rig.clone();
     let [mut start, _] = transition.ends(rig.states(), |_| false);
-    let PlantDescription::Chain(chain) = &mut rig.plant else { return (rig, start) };
+    let Some(chain) = rig.chain_mut() else { return (rig, start) };
     let links = chain.links.len();
     for body in 0..=links {
         scale_mass(chain, body, 1.0 + between(spread.mass));

@@ -42,7 +42,7 @@ impl Route {
     /// hanging or does not lead back there.
     pub fn of(rig: &Rig, table: &TableValues) -> Option<Self> {
         let swing_up = table.swing_up.as_ref()?;
-        let links = rig.states() / 2 - 1;
+        let links = rig.links();
         let others = swing_up.others.iter().map(|(transition, _)| *transition);
         let transitions = route_through(Transition::BOTH.into_iter().chain(others).collect(), links)?;
         let (mut begin_s, mut now_s) = (Vec::new(), 0.0);

@@ -12,7 +12,7 @@ use super::problem::Bounds;
 use super::tracking::{Filter, Noise, stationary};
 use super::transition::{Transition, rest};
 use crate::numerics::Matrix;
-use crate::rig::{Chain, Motor, PlantDescription, Rig, Sensor, SwingUpRules};
+use crate::rig::{Chain, Motor, Rig, Sensor, SwingUpRules};
 use crate::verify::Disturbance;
 
 /// Process noise that the filter expects in motion, as multiples of the rig's: wrong masses disturb it more in motion
@@ -60,7 +60,7 @@ impl<'a> Setting<'a> {
 
     /// The setting for these transitions.
     pub(super) fn with_transitions(rig: &'a Rig, transitions: &[Transition]) -> Result<Self, SwingUpError> {
-        let PlantDescription::Chain(chain) = &rig.plant else { return Err(SwingUpError::NotAChain) };
+        let Some(chain) = rig.chain() else { return Err(SwingUpError::NotAChain) };
         let (Some(lqr), Some(kalman)) = (&rig.lqr, &rig.kalman) else {
             return Err(SwingUpError::Needs("[lqr] and [kalman]"));
         };

@@ -6,7 +6,7 @@ use super::closed_loop::LOST_RAD;
 use super::robustness::{Spread, drawn};
 use super::transition::Transition;
 use crate::parallel;
-use crate::rig::{PlantDescription, Rig};
+use crate::rig::Rig;
 use crate::simulate::{Extremes, Scenario, SimulationError, follow};
 use crate::table::TableValues;
 use crate::verify::Disturbance;
@@ -34,7 +34,7 @@ const FREE_SHARE: f64 = 0.25;
 /// # Errors
 /// [`SimulationError`] if the runs cannot be made.
 pub(super) fn set_limits(rig: &Rig, table: &mut TableValues) -> Result<(), SimulationError> {
-    let PlantDescription::Chain(chain) = &rig.plant else { return Ok(()) };
+    let Some(chain) = rig.chain() else { return Ok(()) };
     let reached = healthy(rig, table)?;
     let (usual, balancing) = (table.limits, table.thresholds);
     let Some(swing_up) = &mut table.swing_up else { return Ok(()) };
@@ -101,7 +101,7 @@ fn healthy(rig: &Rig, table: &TableValues) -> Result<Extremes, SimulationError> 
 
 /// Whether a run has kept to its plan and to the rail.
 fn has_arrived(rig: &Rig, reached: &Extremes) -> bool {
-    let PlantDescription::Chain(chain) = &rig.plant else { return false };
+    let Some(chain) = rig.chain() else { return false };
     let [low, high] = chain.cart.travel_m;
     reached.deviation_rad <= LOST_RAD && low < reached.travel_m[0] && reached.travel_m[1] < high
 }

@@ -156,7 +156,7 @@ impl StoredTransitions {
         rig: &Rig,
         is_wanted: impl Fn(&String) -> bool,
     ) -> Result<Vec<PlannedTransition>, SwingUpError> {
-        let links = rig.states() / 2 - 1;
+        let links = rig.links();
         if !self.is_of(rig) {
             return Err(SwingUpError::Outdated);
         }

@@ -182,7 +182,7 @@ impl TableValues {
             crc: 0,
         };
         let values = Self { rig: rig.name.clone(), swing_up: None, widest };
-        if let PlantDescription::Chain(chain) = &rig.plant
+        if let Some(chain) = rig.chain()
             && sensors != chain.links.len() + 1
         {
             return Err(NoTable::Size { states, sensors });

@@ -4,7 +4,7 @@ use upright::table::{Limits, MotorTest, Thresholds};
 
 use super::{MAX_SENSORS, NoTable, finite};
 use crate::design::DetectionDesign;
-use crate::rig::{Chain, PlantDescription, Rig, defaults};
+use crate::rig::{Chain, Rig, defaults};
 
 /// Motion by hand that the sign check of an encoder requires: of a link (rad) …
 const SIGN_RAD: f64 = 0.2;
@@ -27,7 +27,7 @@ pub(super) fn limits(rig: &Rig, steps: &[f64]) -> Result<Limits<MAX_SENSORS>, No
         still_ticks: ticks(wanted.still_time_s),
         ..none
     };
-    if let PlantDescription::Chain(chain) = &rig.plant {
+    if let Some(chain) = rig.chain() {
         set_limits_of_chain(&mut limits, rig, chain, steps)?;
     }
     Ok(limits)

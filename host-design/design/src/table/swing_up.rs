@@ -7,7 +7,7 @@ use upright::table::{
 
 use super::{MAX_SENSORS, NoTable, TableValues, finite};
 use crate::plant::{ChainParameters, ChainPlant};
-use crate::rig::{PlantDescription, Rig};
+use crate::rig::Rig;
 use crate::swing_up::{Motion, SwingUp, Transition};
 
 /// Time between two knots of reference state, force and gains (s) …
@@ -63,7 +63,7 @@ impl SwingUpValues {
     /// [`NoTable`] if the rig has no chain, a delay, or no observer, if the motions are those of another rig, or if a
     /// value does not fit into single precision.
     pub fn of(rig: &Rig, table: &TableValues, motions: &SwingUp) -> Result<Self, NoTable> {
-        let PlantDescription::Chain(chain) = &rig.plant else {
+        let Some(chain) = rig.chain() else {
             return Err(NoTable::SwingUp("a [model] has no nonlinear equations of motion"));
         };
         if table.observer.is_none() || table.laws.lqr.is_none() {

@@ -9,7 +9,7 @@ use super::trial::{
 };
 use crate::parallel;
 use crate::plant::LANES;
-use crate::rig::{PlantDescription, Rig};
+use crate::rig::Rig;
 use crate::simulate::{Scenario, SimulationError};
 use crate::table::TableValues;
 
@@ -83,7 +83,7 @@ pub(super) const MOST_LINKS: usize = 9;
 /// a default one follows the mass.
 pub fn wrong_masses(rig: &Rig, percent: f64, factors: &[f64]) -> Rig {
     let mut wrong = rig.clone();
-    if let PlantDescription::Chain(chain) = &mut wrong.plant {
+    if let Some(chain) = wrong.chain_mut() {
         let masses = core::iter::once(&mut chain.cart.mass_kg)
             .chain(chain.links.iter_mut().map(|link| &mut link.mass_kg));
         for (mass, factor) in masses.zip(factors) {
@@ -95,7 +95,7 @@ pub fn wrong_masses(rig: &Rig, percent: f64, factors: &[f64]) -> Rig {
 
 fn run_of(rig: &Rig, law: Law, settings: &CornerSettings) -> Scenario {
     Scenario {
-        start: leaning(rig, &vec![settings.tilt_rad; rig.states() / 2 - 1]),
+        start: leaning(rig, &vec![settings.tilt_rad; rig.links()]),
         force_noise_n: settings.disturbance.force_n,
         torque_noise_n_m: settings.disturbance.torque_n_m,
         seed: settings.seed,

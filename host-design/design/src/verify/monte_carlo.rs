@@ -8,7 +8,7 @@ use upright::table::Law;
 use super::report::Effort;
 use super::trial::{Disturbance, Horizon, Outcome, Unverifiable, leaning, scenario, trials, within};
 use crate::plant::LANES;
-use crate::rig::{Chain, Link, PlantDescription, Rig};
+use crate::rig::{Chain, Link, Rig};
 use crate::simulate::Scenario;
 use crate::table::TableValues;
 
@@ -85,11 +85,10 @@ pub fn sample(rig: &Rig, law: Law, spread: &Spread, seed: u64) -> (Rig, Scenario
     let mut random = Pcg64::seed_from_u64(seed);
     let mut between = |share: f64| share * random.random_range(-1.0..=1.0);
     let mut drawn = rig.clone();
-    if let PlantDescription::Chain(chain) = &mut drawn.plant {
+    if let Some(chain) = drawn.chain_mut() {
         draw_chain(chain, spread, &mut between);
     }
-    let links = if matches!(rig.plant, PlantDescription::Chain(_)) { rig.states() / 2 - 1 } else { 0 };
-    let angles: Vec<f64> = (0..links).map(|_| between(spread.tilt_rad)).collect();
+    let angles: Vec<f64> = (0..rig.links()).map(|_| between(spread.tilt_rad)).collect();
     if 0.5 * (1.0 + between(1.0)) < spread.other_delay {
         drawn.tick.delay_ticks = 1 - drawn.tick.delay_ticks.min(1);
     }
@@ -99,7 +98,7 @@ pub fn sample(rig: &Rig, law: Law, spread: &Spread, seed: u64) -> (Rig, Scenario
         seed,
         ..scenario(rig, law, spread.duration_s)
     };
-    if links > 0 {
+    if rig.links() > 0 {
         scenario.start = leaning(rig, &angles);
     }
     (drawn, scenario)

@@ -3,7 +3,7 @@
 use serde::Serialize;
 use upright::table::Law;
 
-use super::trial::{Disturbance, Horizon, Unverifiable, chain, scenario, trial};
+use super::trial::{Disturbance, Horizon, Unverifiable, scenario, trial};
 use crate::parallel;
 use crate::plant::absolute_angles;
 use crate::rig::Rig;
@@ -55,7 +55,7 @@ pub fn noise_run(
     duration_s: f64,
 ) -> Result<NoiseRun, Unverifiable> {
     let states = rig.states();
-    let links = if chain(rig, "links").is_ok() { states / 2 - 1 } else { 0 };
+    let links = rig.links();
     let one = |seed: u64| -> Result<Sums, SimulationError> {
         let mut sums = Sums {
             state: vec![0.0; states],

@@ -12,7 +12,7 @@ use super::{
 };
 use crate::design::Certified;
 use crate::number::significant;
-use crate::rig::{PlantDescription, Requirements, Rig};
+use crate::rig::{Requirements, Rig};
 use crate::study::Study;
 use crate::table::TableValues;
 
@@ -157,7 +157,7 @@ fn law_trust(
     done: &(dyn Fn() + Sync),
 ) -> Result<LawTrust, VerifyError> {
     let law = linear.law;
-    let is_chain = matches!(rig.plant, PlantDescription::Chain(_));
+    let is_chain = rig.chain().is_some();
     let mut trust = LawTrust::of(linear);
     if !trust.linear.stable {
         return Ok(trust);
@@ -171,7 +171,7 @@ fn law_trust(
         trust.coarsest_encoder = known(coarsest_encoder(rig, law, &EncoderSettings::of(rig)))?;
     }
     // With more links there are too many combinations to try.
-    if is_chain && rig.states() / 2 - 1 <= MOST_LINKS {
+    if is_chain && rig.links() <= MOST_LINKS {
         stage("mass errors");
         let settings = CornerSettings::of(rig);
         trust.corners = known(corners(rig, table, law, rig.verify.corner_percent, &settings))?;

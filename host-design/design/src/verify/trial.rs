@@ -5,7 +5,7 @@ use upright::table::Law;
 
 use crate::design::DesignError;
 use crate::plant::absolute_angles;
-use crate::rig::{Chain, PlantDescription, Rig};
+use crate::rig::{Chain, Rig};
 use crate::simulate::{Fall, Job, Sample, Scenario, SimulationError, run, run_all};
 use crate::study::{StudyError, infinite_if_null};
 use crate::table::{NoTable, TableValues};
@@ -101,7 +101,7 @@ impl Horizon {
     pub fn widened(self, rig: &Rig, table: &TableValues, law: Law) -> Result<Self, SimulationError> {
         // Less than an encoder count, but not the equilibrium, where nothing would ever move.
         let mut nudged = scenario(rig, law, 2.0 * self.duration_s);
-        let first = if matches!(rig.plant, PlantDescription::Chain(_)) { 2 } else { rig.output() };
+        let first = if rig.chain().is_some() { 2 } else { rig.output() };
         nudged.start[first] = 1e-6;
         let rest = trial(rig, table, &nudged, &self)?;
         if rest.fall.is_some() {
@@ -203,7 +203,7 @@ pub fn trials(
 }
 
 fn largest_angle(rig: &Rig, state: &[f64]) -> f64 {
-    if !matches!(rig.plant, PlantDescription::Chain(_)) {
+    if rig.chain().is_none() {
         return 0.0;
     }
     absolute_angles(state).fold(0.0, |largest, angle| f64::max(largest, angle.abs()))
@@ -244,10 +244,7 @@ pub(crate) fn leaning(rig: &Rig, angles: &[f64]) -> Vec<f64> {
 
 /// The chain of a rig that has one.
 pub(crate) fn chain<'a>(rig: &'a Rig, what: &'static str) -> Result<&'a Chain, Unverifiable> {
-    match &rig.plant {
-        PlantDescription::Chain(chain) => Ok(chain),
-        PlantDescription::Model(_) => Err(Unverifiable::NotAChain(what)),
-    }
+    rig.chain().ok_or(Unverifiable::NotAChain(what))
 }
 
 /// Checks that a setting is within its range.

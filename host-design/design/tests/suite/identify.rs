@@ -8,7 +8,7 @@ use upright_design::identify::{
 };
 use upright_design::plant::ChainParameters;
 use upright_design::reality::real_chain;
-use upright_design::rig::{PlantDescription, Rig};
+use upright_design::rig::Rig;
 
 const FILE: &str = "../../rigs/double-quanser-dbpen.toml";
 
@@ -55,7 +55,7 @@ fn the_parameters_of_a_double_pendulum_are_found_with_their_deviations() {
     let (truth, file) = (rig(REALITY), rig(""));
     let found = run(&file, log(), &TRUSTED).unwrap();
     assert_eq!(found.refusal, None, "{found:?}");
-    let PlantDescription::Chain(chain) = &truth.plant else { panic!("a chain") };
+    let chain = truth.chain().unwrap();
     let real = real_chain(chain, &truth.reality.parameters);
     let constants = ChainParameters::<f64>::of(&real);
     let of = |kind: Kind| found.estimate(kind).unwrap();

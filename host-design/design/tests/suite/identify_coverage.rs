@@ -64,7 +64,7 @@ fn count(row: &upright_design::identify::CoverageRow) -> (usize, usize) {
 #[test]
 fn a_rig_without_encoders_has_no_coverage() {
     let mut file = rig("single-quanser-ip02");
-    if let upright_design::rig::PlantDescription::Chain(chain) = &mut file.plant {
+    if let Some(chain) = file.chain_mut() {
         chain.links[0].encoder = None;
     }
     let found = coverage(&file, &DRAWN, &Study::whole(), &|| ());

@@ -4,7 +4,7 @@ use std::time::Instant;
 
 use upright::table::Law;
 use upright_design::plant::{LANES, Plant, chain_lanes, chain_plant};
-use upright_design::rig::{PerJoint, PlantDescription, Rig};
+use upright_design::rig::{PerJoint, Rig};
 use upright_design::simulate::{Fall, Job, Sample, Scenario, run, run_all};
 use upright_design::table::TableValues;
 use upright_design::verify::{Spread, sample};
@@ -127,7 +127,7 @@ fn what_cannot_be_in_lockstep_runs_alone_with_the_same_bits() {
 #[test]
 fn lanes_have_the_bits_of_a_plant_beyond_the_range_of_the_fast_sine_and_with_nan() {
     let rig = rig("quadruple-paper");
-    let PlantDescription::Chain(chain) = &rig.plant else { panic!() };
+    let chain = rig.chain().unwrap();
     let mut lanes = chain_lanes(4).unwrap();
     let mut plants: Vec<Box<dyn Plant>> = Vec::new();
     let angles = [0.0, 1.0, -2.5, 999_999.0, 1_000_001.0, -3e7, f64::NAN, 1e300];

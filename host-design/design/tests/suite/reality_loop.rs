@@ -8,7 +8,7 @@ use upright::table::Law;
 use upright_design::harness::{record, with_firmware};
 use upright_design::numerics::{Matrix, solve};
 use upright_design::plant::{ChainParameters, absolute_angles, linearise};
-use upright_design::rig::{PerJoint, PlantDescription, Reality, Rig, SECTIONS};
+use upright_design::rig::{PerJoint, Reality, Rig, SECTIONS};
 use upright_design::simulate::{Scenario, run};
 use upright_design::table::TableValues;
 use upright_design::verify::{IMPERFECTIONS, ImperfectionSettings, imperfections, required_imperfections};
@@ -37,7 +37,7 @@ fn swing(rig: &Rig, table: &TableValues, law: Law, seed: u64, duration_s: f64) -
         start: leaning(rig, 1e-3),
         ..Scenario::at_rest(rig, law)
     };
-    let links = rig.states() / 2 - 1;
+    let links = rig.links();
     let mut ends = vec![[f64::INFINITY, f64::NEG_INFINITY]; links];
     let fall = run(rig, table, &scenario, &mut |sample| {
         if sample.t > 0.5 * duration_s {
@@ -98,7 +98,7 @@ fn response(a: &Matrix<f64>, torque: &Matrix<f64>, w: f64) -> [f64; 2] {
 /// predicts at the frequency at which the response is real and negative (Gelb & Vander Velde, *Multiple-Input
 /// Describing Functions*, 1968, §2.3).
 fn predicted_swing(rig: &Rig, law: Law, friction: f64) -> f64 {
-    let PlantDescription::Chain(chain) = &rig.plant else { panic!("a chain") };
+    let chain = rig.chain().unwrap();
     let model = linearise(&ChainParameters::<f64>::of(chain), Equilibrium::UPRIGHT).unwrap();
     let gains = &certified(rig).double.sampled;
     let k = match law {

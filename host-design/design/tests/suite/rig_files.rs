@@ -47,7 +47,7 @@ fn every_rig_file_is_good_and_named_after_its_rig() {
 fn the_paper_rig_has_the_papers_values() {
     let rig = Rig::from_path(&Path::new(env!("CARGO_MANIFEST_DIR")).join("../../rigs/quadruple-paper.toml"))
         .unwrap();
-    let PlantDescription::Chain(chain) = &rig.plant else { panic!("not a chain") };
+    let chain = rig.chain().unwrap();
     assert_eq!(chain.cart.mass_kg, 0.1);
     assert_eq!(chain.links.iter().map(|link| link.length_m).collect::<Vec<_>>(), [0.03, 0.04, 0.07, 0.10]);
     assert!(chain.links.iter().all(|link| link.mass_kg == 0.1 && link.inertia_kg_m2.is_none()));

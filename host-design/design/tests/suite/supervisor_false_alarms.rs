@@ -95,7 +95,7 @@ fn machines_at_the_corners_have_every_combination_of_wrong_masses_and_all_of_the
 fn machines(name: &str, percent: f64, more: &str, tolerances: Option<Tolerances>) -> Vec<Rig> {
     let file = format!("{}/../../rigs/{name}.toml", env!("CARGO_MANIFEST_DIR"));
     let text = std::fs::read_to_string(&file).unwrap();
-    let parts = rig(name).states() / 2;
+    let parts = rig(name).links() + 1;
     let machine = |mask: u32| {
         let sign = |part: usize| if mask >> part & 1 == 1 { percent } else { -percent };
         let links: Vec<String> = (1..parts).map(|part| sign(part).to_string()).collect();

@@ -16,7 +16,7 @@ use crate::in_the_loop::{Events, Place, RunError, VirtualBoard};
 use upright_design::harness::{HEARTBEAT_S, Harness, HarnessError, Pins, Session, Target, goals};
 use upright_design::identify::Feed;
 use upright_design::plant::absolute_angles;
-use upright_design::rig::{PlantDescription, Rig};
+use upright_design::rig::Rig;
 use upright_design::simulate::Begin;
 use upright_design::table::TableValues;
 
@@ -286,7 +286,7 @@ impl Attempt<'_> {
     /// Whether a link is far beyond its limit in `tick`: from the vertical, or in a motion from its planned angle; or
     /// the cart is off its rail. The rig is lowered from the tick `lowered_from` on.
     fn is_outside(&self, tick: usize, lowered_from: Option<usize>, state: &[f64]) -> bool {
-        if !matches!(self.rig.plant, PlantDescription::Chain(_)) {
+        if self.rig.chain().is_none() {
             return false;
         }
         if self.is_off_rail(state) {
@@ -305,7 +305,7 @@ impl Attempt<'_> {
 
     /// Whether the cart is off its rail.
     pub(super) fn is_off_rail(&self, state: &[f64]) -> bool {
-        let PlantDescription::Chain(chain) = &self.rig.plant else { return false };
+        let Some(chain) = self.rig.chain() else { return false };
         let [low, high] = chain.cart.travel_m;
         !(low..=high).contains(&state[0])
     }

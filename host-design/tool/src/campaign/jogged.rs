@@ -4,7 +4,7 @@ use upright::protocol::message::{Answer, Request};
 use upright::supervision::inhibits::Inhibits;
 use upright::supervision::jog::{LONGEST_S, MotorSign};
 use upright_design::harness::{Harness, HarnessError, Pins};
-use upright_design::rig::{PlantDescription, Rig};
+use upright_design::rig::Rig;
 use upright_design::simulate::{Scenario, Sensing};
 
 use super::attempt::Attempt;
@@ -154,7 +154,7 @@ impl Attempt<'_> {
 
     /// Presses the limit switches, which alone keep the cart on its rail if its encoder is wrong.
     pub(super) fn press_limit_switches(&self, state: &[f64], inputs: &mut Pins) {
-        if let PlantDescription::Chain(chain) = &self.rig.plant {
+        if let Some(chain) = self.rig.chain() {
             let [low, high] = chain.cart.travel_m;
             inputs.contacts.limit_low |= state[0] < low + SWITCH_M;
             inputs.contacts.limit_high |= state[0] > high - SWITCH_M;

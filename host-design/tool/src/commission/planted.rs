@@ -5,7 +5,7 @@ use core::str::FromStr;
 
 use upright::board::Output;
 use upright_design::harness::Pins;
-use upright_design::rig::{Link, PerJoint, PlantDescription, Rig};
+use upright_design::rig::{Link, PerJoint, Rig};
 use upright_design::simulate::{Bench, Scenario};
 use upright_design::table::TableValues;
 
@@ -171,7 +171,7 @@ impl Planted {
 
     /// Changes the machine itself.
     pub(super) fn change(self, machine: &mut Rig, table: &TableValues) {
-        let PlantDescription::Chain(chain) = &machine.plant else { return };
+        let Some(chain) = machine.chain().cloned() else { return };
         let friction = &mut machine.reality.friction;
         match self.what {
             What::CartFriction => friction.cart_friction_n = STUCK * f64::from(table.limits.jog_force_n),

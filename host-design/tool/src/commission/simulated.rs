@@ -6,7 +6,7 @@ use upright::board::{Contacts, Output};
 use upright::control::actuator::Drive;
 use upright::table::Law;
 use upright_design::harness::{Grasp, Pins, Session, Target};
-use upright_design::rig::{PlantDescription, Rig};
+use upright_design::rig::Rig;
 use upright_design::simulate::{Bench, Scenario, SimulationError};
 use upright_design::table::TableValues;
 
@@ -65,10 +65,8 @@ impl<'a> Simulated<'a> {
         let grasp = Grasp::hanging(&machine);
         let scenario =
             Scenario { start: grasp.held().to_vec(), seed, ..Scenario::at_rest(&machine, Law::Lqr) };
-        let travel_m = match &machine.plant {
-            PlantDescription::Chain(chain) => chain.cart.travel_m,
-            PlantDescription::Model(_) => [f64::NEG_INFINITY, f64::INFINITY],
-        };
+        let travel_m =
+            machine.chain().map_or([f64::NEG_INFINITY, f64::INFINITY], |chain| chain.cart.travel_m);
         Ok(Self {
             session: Session::new(target),
             bench: Bench::new(&machine, &scenario)?,

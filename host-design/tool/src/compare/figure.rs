@@ -4,7 +4,7 @@ use super::candidate::Candidate;
 use super::row::{Fate, Figures, Row};
 use super::sweep::Sweep;
 use crate::figure::{Axis, Curve, Figure, Panel};
-use upright_design::rig::{PlantDescription, Rig};
+use upright_design::rig::Rig;
 
 /// Reads one figure of a row.
 type Value = fn(&Figures) -> Option<f64>;
@@ -90,7 +90,7 @@ fn over_key(rows: &[Row], sweep: &Sweep) -> Figure {
 
 fn over_time(rows: &[Row], candidates: &[Candidate]) -> Figure {
     let time = || Axis::linear("time (s)");
-    let is_chain = |rig: &Rig| matches!(rig.plant, PlantDescription::Chain(_));
+    let is_chain = |rig: &Rig| rig.chain().is_some();
     let all_chains = candidates.iter().all(|candidate| is_chain(&candidate.rig));
     let label = if all_chains { "position (m)" } else { "position (m), or output" };
     let mut position = Panel::new(time(), Axis::linear(label));

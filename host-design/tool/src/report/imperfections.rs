@@ -79,7 +79,7 @@ pub(super) fn limit_cycles(source: &Source<'_>) -> Result<Figure, Unverifiable> 
 /// with too many combinations.
 pub(super) fn wrong_masses(source: &Source<'_>) -> Result<Option<Figure>, Unverifiable> {
     let Source { rig, table, imperfections, .. } = *source;
-    if rig.states() / 2 - 1 > MOST_LINKS {
+    if rig.links() > MOST_LINKS {
         return Ok(None);
     }
     let x = Axis::linear("error of the masses (±%)");

@@ -23,7 +23,7 @@ use self::page::Page;
 pub(crate) use self::plot::Plot;
 use crate::figure::{Figure, FigureError, margins_figure, pixels};
 use upright_design::design::Certified;
-use upright_design::rig::{PlantDescription, Rig};
+use upright_design::rig::Rig;
 use upright_design::swing_up::{Demonstration, Margin, Transition};
 use upright_design::table::TableValues;
 use upright_design::verify::{Imperfections, TrustReport};
@@ -106,7 +106,7 @@ pub fn report(source: &Source<'_>, stage: &dyn Fn(&str)) -> Result<Report, Repor
     let laws = runs::laws(table);
     let mut pictures = Vec::new();
     let mut page = Page::new(source, &designed_poles, &scenes)?;
-    if let PlantDescription::Chain(chain) = &rig.plant {
+    if let Some(chain) = rig.chain() {
         let svg = drawing::svg(chain);
         page.drawing = Some(svg.clone());
         pictures.push(Picture { name: "rig".to_owned(), svg, csv: None });

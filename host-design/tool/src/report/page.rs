@@ -115,7 +115,7 @@ impl<'a> Page<'a> {
             states: rig.states(),
             tick_ms: significant(1e3 * rig.tick.period_s, DIGITS),
             delay_ticks: rig.tick.delay_ticks,
-            is_chain: matches!(rig.plant, PlantDescription::Chain(_)),
+            is_chain: rig.chain().is_some(),
             is_disturbed: Disturbance::of(rig) != Disturbance::NONE,
             failed: checks.iter().filter(|check| !check.holds).count(),
             checks,

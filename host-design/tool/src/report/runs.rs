@@ -112,7 +112,7 @@ impl Plan {
 }
 
 fn is_chain(rig: &Rig) -> bool {
-    matches!(rig.plant, PlantDescription::Chain(_))
+    rig.chain().is_some()
 }
 
 /// How a description ends where the plant is a linear model.

@@ -8,7 +8,7 @@ use upright_design::design::{Certified, Feedback, Laws, continuous_plant, design
 use upright_design::numerics::Wide;
 use upright_design::plant::chain_plant;
 use upright_design::plant::reference::{Tolerance, integrate};
-use upright_design::rig::{PlantDescription, PolePlacement, Rig};
+use upright_design::rig::{PolePlacement, Rig};
 
 /// One erratum or gap.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -89,7 +89,7 @@ fn cart_mass(exact: &Rig) -> Result<Erratum, ReproduceError> {
         ("cart of 0.1 kg, each mass in the middle of its rod", 0.1, false),
     ] {
         let mut rig = exact.clone();
-        if let PlantDescription::Chain(chain) = &mut rig.plant {
+        if let Some(chain) = rig.chain_mut() {
             chain.cart.mass_kg = mass_kg;
             for link in &mut chain.links {
                 link.inertia_kg_m2 = if rods { None } else { Some(0.0) };

@@ -38,7 +38,7 @@ pub use trajectory::{BAND, StepFigures, Trajectory};
 use upright_design::design::{Certified, DesignError, design};
 use upright_design::plant::PlantError;
 use upright_design::plant::reference::ReferenceError;
-use upright_design::rig::{Chain, PlantDescription, Rig, RigError};
+use upright_design::rig::{Chain, Rig, RigError};
 use upright_design::simulate::SimulationError;
 use upright_design::table::NoTable;
 use upright_design::verify::VerifyError;
@@ -170,8 +170,5 @@ impl PaperDesigns {
 }
 
 fn chain(rig: &Rig) -> Result<&Chain, ReproduceError> {
-    match &rig.plant {
-        PlantDescription::Chain(chain) => Ok(chain),
-        PlantDescription::Model(_) => Err(ReproduceError::NotAChain(rig.name.clone())),
-    }
+    rig.chain().ok_or_else(|| ReproduceError::NotAChain(rig.name.clone()))
 }

@@ -262,7 +262,7 @@ impl Change {
                 let run = |&time_s| {
                     let mut rig = Rig { tick: tick.clone(), ..asking_for(&rigs.exact, time_s) };
                     rig.actuator.force_limit_n = *force_limit_n;
-                    if let upright_design::rig::PlantDescription::Chain(chain) = &mut rig.plant {
+                    if let Some(chain) = rig.chain_mut() {
                         chain.cart.travel_m = [-1e3, 1e3]; // the paper has no rail
                     }
                     let table = TableValues::of(&rig, &exact.at(&rig, time_s)?, *gains)?.without_governor();

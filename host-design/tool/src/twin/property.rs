@@ -1,7 +1,7 @@
 //! What is true of the simulated machine but not known to the controller.
 
 use serde::Serialize;
-use upright_design::rig::{PlantDescription, Rig};
+use upright_design::rig::Rig;
 use upright_design::verify::Disturbance;
 
 /// A property that can be changed while the rig runs.
@@ -99,7 +99,7 @@ impl Properties {
     /// The rig as it truly is: its file with these values in `[reality]`, and more viscous friction.
     pub(super) fn applied_to(&self, rig: &Rig) -> Rig {
         let mut rig = rig.clone();
-        let PlantDescription::Chain(chain) = &mut rig.plant else { return rig };
+        let Some(chain) = rig.chain_mut() else { return rig };
         chain.cart.friction_n_s_per_m += self.get("cart-viscous");
         for link in &mut chain.links {
             link.friction_n_m_s_per_rad += 1e-3 * self.get("joint-viscous");

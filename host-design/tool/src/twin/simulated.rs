@@ -286,7 +286,7 @@ impl<'a, 't> World<'a, 't> {
 
     /// Force of the end stops on the cart (N): a spring and a damper at either end of the rail.
     fn end_stop_n(&self, state: &[f64]) -> f64 {
-        let PlantDescription::Chain(chain) = &self.machine.rig.plant else { return 0.0 };
+        let Some(chain) = self.machine.rig.chain() else { return 0.0 };
         let [low, high] = chain.cart.travel_m;
         let beyond = if state[0] < low { state[0] - low } else { (state[0] - high).max(0.0) };
         if beyond == 0.0 {
@@ -313,7 +313,7 @@ impl<'a, 't> World<'a, 't> {
 
     /// The limit switches are at the ends of the rail.
     fn press_limit_switches(&self, inputs: &mut Pins) {
-        if let PlantDescription::Chain(chain) = &self.machine.rig.plant {
+        if let Some(chain) = self.machine.rig.chain() {
             let [low, high] = chain.cart.travel_m;
             let x = self.harness.bench.state()[0];
             inputs.contacts.limit_low |= x <= low;

@@ -21,7 +21,7 @@ use crate::command::path_of;
 fn machine(rig: &Rig, number: u8) -> Rig {
     let mut random = Pcg64::seed_from_u64(number.into());
     let mut machine = rig.clone();
-    let PlantDescription::Chain(chain) = &rig.plant else { panic!("a chain") };
+    let chain = rig.chain().unwrap();
     let reality = &mut machine.reality;
     reality.parameters.parameter_spread_percent = 10.0;
     reality.parameters.parameter_seed = number;
@@ -90,7 +90,7 @@ fn one(name: &str, number: u8) -> [bool; 4] {
         }
     };
     let chosen = designed.as_ref().unwrap_or(&rig);
-    let PlantDescription::Chain(chain) = &rig.plant else { panic!("a chain") };
+    let chain = rig.chain().unwrap();
     let truth = Rig {
         plant: PlantDescription::Chain(real_chain(chain, &machine.reality.parameters)),
         ..with_weights_of(&rig, chosen)

@@ -32,7 +32,7 @@ fn a_swept_value_is_the_only_thing_that_changes() {
     assert_eq!(changed(&text, "lqr.state_weights[3]", 17.0).unwrap(), wanted);
 
     let wanted_mass = changed(&text, "link[3].mass_kg", 0.125).unwrap();
-    let upright_design::rig::PlantDescription::Chain(chain) = &wanted_mass.plant else { panic!("a chain") };
+    let chain = wanted_mass.chain().unwrap();
     let masses: Vec<f64> = chain.links.iter().map(|link| link.mass_kg).collect();
     assert_eq!(masses, [0.1, 0.1, 0.125, 0.1]);
 }
@@ -41,7 +41,7 @@ fn a_swept_value_is_the_only_thing_that_changes() {
 fn a_key_that_the_file_leaves_out_is_added_where_it_belongs() {
     let text = text_of(PAPER);
     let with_friction = changed(&text, "link[2].friction_n_m_s_per_rad", 1e-7).unwrap();
-    let upright_design::rig::PlantDescription::Chain(chain) = &with_friction.plant else { panic!("a chain") };
+    let chain = with_friction.chain().unwrap();
     let frictions: Vec<f64> = chain.links.iter().map(|link| link.friction_n_m_s_per_rad).collect();
     assert_eq!(frictions, [0.0, 1e-7, 0.0, 0.0]);
     // A table that does not exist in the file, and integers.

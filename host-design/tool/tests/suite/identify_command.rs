@@ -33,7 +33,7 @@ fn a_shaken_machine_gives_a_rig_file() {
     assert_eq!(found["wiring"]["as_in_file"], true);
     assert!(found["refused"].is_null());
     let rig = Rig::from_path(&new).unwrap();
-    let PlantDescription::Chain(chain) = &rig.plant else { panic!("a chain") };
+    let chain = rig.chain().unwrap();
     let PlantDescription::Chain(old) = Rig::from_path(Path::new(&file)).unwrap().plant else {
         panic!("a chain")
     };

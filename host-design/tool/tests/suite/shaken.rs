@@ -18,7 +18,7 @@ use upright_design::identify::{
 };
 use upright_design::plant::ChainParameters;
 use upright_design::reality::real_chain;
-use upright_design::rig::{PlantDescription, Rig};
+use upright_design::rig::Rig;
 use upright_design::simulate::Scenario;
 use upright_design::table::{Gains, TableValues};
 use upright_tool::image::Kind;
@@ -56,7 +56,7 @@ fn the_log_of_the_firmware_gives_the_parameters_of_the_machine() {
     let settings = Settings { trust_wiring: true, ..Settings::default() };
     let found = identify(file, &[(PathBuf::from("run.log"), log)], &settings, &|_| ()).unwrap();
     assert_eq!(found.refusal, None);
-    let PlantDescription::Chain(chain) = &machine.plant else { panic!("a chain") };
+    let chain = machine.chain().unwrap();
     let real = real_chain(chain, &machine.reality.parameters);
     let constants = ChainParameters::<f64>::of(&real);
     let close = |kind: Parameter, wanted: f64| {

@@ -6,7 +6,7 @@ mod runs;
 
 use super::LawTrust;
 use crate::number::significant;
-use crate::rig::{PlantDescription, Rig};
+use crate::rig::Rig;
 
 /// One quantity of the trust report.
 #[derive(Debug, Clone, Copy)]
@@ -67,7 +67,7 @@ fn number(x: f64) -> String {
 
 /// Whether lengths, angles and forces have the units of a chain; a model has units of its own.
 fn is_chain(rig: &Rig) -> bool {
-    matches!(rig.plant, PlantDescription::Chain(_))
+    rig.chain().is_some()
 }
 
 /// A force, or the input of a model, with its unit.

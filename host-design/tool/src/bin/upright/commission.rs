@@ -8,7 +8,7 @@ use std::sync::atomic::AtomicBool;
 use clap::Args;
 use signal_hook::consts::{SIGINT, SIGTERM};
 use upright_design::identify::IdentifyError;
-use upright_design::rig::{PlantDescription, Rig};
+use upright_design::rig::Rig;
 use upright_design::table::{Gains, write_atomically};
 use upright_tool::commission::{
     AtPort, Commissioning, Designed, Journal, Plan, Planted, Record, Simulated, Step,
@@ -190,8 +190,7 @@ impl Commission {
 
 /// Refuses a rig whose cart or joints lack an encoder.
 fn commissionable(rig: &Rig) -> Result<(), IdentifyError> {
-    let is_chain = matches!(rig.plant, PlantDescription::Chain(_));
-    if is_chain && rig.sensors().len() == rig.states() / 2 {
+    if rig.chain().is_some() && rig.sensors().len() == rig.links() + 1 {
         Ok(())
     } else {
         Err(IdentifyError::NoEncoders(rig.name.clone()))

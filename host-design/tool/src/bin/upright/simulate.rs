@@ -6,7 +6,7 @@ use std::path::PathBuf;
 use clap::{Args, ValueEnum};
 use serde_json::json;
 use upright::table::Law;
-use upright_design::rig::{PlantDescription, Rig};
+use upright_design::rig::Rig;
 use upright_design::simulate::{Scenario, Sensing, Summary, Trace, simulate};
 use upright_design::swing_up::{Demonstration, Script};
 use upright_design::table::{TableValues, write_atomically};
@@ -223,10 +223,7 @@ impl Simulate {
     /// The initial state that the options give; a small tilt if they give no step, tilt or disturbance.
     fn initial_state(&self, rig: &Rig, law: Law) -> Result<Vec<f64>, Failure> {
         let states = rig.states();
-        let links = match &rig.plant {
-            PlantDescription::Chain(chain) => chain.links.len(),
-            PlantDescription::Model(_) => 0,
-        };
+        let links = rig.links();
         let [values, angles] = [self.start.len(), self.tilt.len()];
         if values != 0 && values != states {
             return Err(Failure::BadArgument(format!(

@@ -6,7 +6,7 @@ use std::path::PathBuf;
 
 use clap::Args;
 use serde_json::json;
-use upright_design::rig::{PlantDescription, Rig};
+use upright_design::rig::Rig;
 use upright_design::study::Study;
 use upright_design::swing_up::{
     Condition, FirmwareRuns, Judgement, Margin, Plan, Script, Solved, Stored, SwingUpError, Transition,
@@ -198,7 +198,7 @@ impl SwingUp {
             let title = format!("{}: up, balance, step, down", rig.name);
             write_atomically(path, run_svg(&rig, &demonstration.trace, &title)?.as_bytes())?;
         }
-        if let (Some(path), PlantDescription::Chain(chain)) = (&self.picture, &rig.plant) {
+        if let (Some(path), Some(chain)) = (&self.picture, rig.chain()) {
             let to_s = plan.raise.peaks.duration_s;
             let picture = stroboscope_svg(chain, &demonstration.trace, 0.0, to_s);
             write_atomically(path, picture.as_bytes())?;

@@ -62,7 +62,7 @@ fn numbers(text: &str) -> Result<(u64, u64), String> {
 impl Transitions {
     pub(crate) fn run(self) -> Result<(), Failure> {
         let rig = Rig::from_path(&self.rig)?;
-        let links = rig.states() / 2 - 1;
+        let links = rig.links();
         let swing_up = Stored::beside(&self.rig)
             .and_then(|stored| motions(&rig, &stored))
             .map_err(|source| failed(&rig, source))?;
@@ -110,7 +110,7 @@ impl Transitions {
     /// Searches a motion for each transition. The file is written after each, so that an interrupted search keeps what
     /// it has found.
     fn search(&self, rig: &Rig, stored: &mut StoredTransitions) -> Result<Vec<Searched>, Failure> {
-        let links = rig.states() / 2 - 1;
+        let links = rig.links();
         let (first, end) = self.candidates;
         let mut searched = Vec::new();
         for transition in self.wanted(links)? {
@@ -131,7 +131,7 @@ impl Transitions {
         all: Vec<PlannedTransition>,
     ) -> Result<Judged, Failure> {
         let failed = |source| failed(rig, source);
-        let links = rig.states() / 2 - 1;
+        let links = rig.links();
         let held = on_route(&all.iter().map(|planned| planned.transition).collect::<Vec<_>>(), links);
         let (transitions, lost): (Vec<_>, Vec<_>) =
             all.into_iter().partition(|planned| held.contains(&planned.transition));
@@ -153,7 +153,7 @@ impl Transitions {
         swing_up: &SwingUp,
         stored: &mut StoredTransitions,
     ) -> Result<Judged, Failure> {
-        let links = rig.states() / 2 - 1;
+        let links = rig.links();
         let needed = rig.swing_up.clone().unwrap_or_default().success_percent;
         let mut all = stored.all(rig).map_err(|source| failed(rig, source))?;
         loop {
@@ -226,7 +226,7 @@ fn searched_line(searched: &Searched, tried: u64, links: usize) -> String {
 
 /// The motions of the route as a table.
 fn text(rig: &Rig, swing_up: &SwingUp, transitions: &[PlannedTransition], runs: &[TransitionRuns]) -> String {
-    let links = rig.states() / 2 - 1;
+    let links = rig.links();
     let mut text = format!("{}, one motion after the other\n", rig.name);
     // Writing into a string cannot fail.
     let _ = writeln!(text, "motion      duration (s)  force (N)  farthest (m)     arrive  95 % interval (%)");

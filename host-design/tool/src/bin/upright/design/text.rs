@@ -121,7 +121,7 @@ pub(super) fn warnings(
         );
     }
     let ungoverned = |law: &LawValues| law.setpoint_step == f32::MAX && law.n != 0.0;
-    if let Some(table) = table.filter(|_| matches!(rig.plant, PlantDescription::Chain(_)))
+    if let Some(table) = table.filter(|_| rig.chain().is_some())
         && table.laws.present().any(|(_, law)| ungoverned(law))
     {
         warnings.push(
