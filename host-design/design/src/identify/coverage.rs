@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use serde::{Deserialize, Serialize};
 
-use super::chain_of;
+use super::channel::chain_of;
 use super::error::IdentifyError;
 use super::estimate::{Identification, Settings, identify};
 use super::excite::shake_machine;

@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use super::chain_of;
+use super::channel::chain_of;
 use super::covariance::{changes, deviations};
 use super::error::IdentifyError;
 use super::log::{DriveScale, Log};

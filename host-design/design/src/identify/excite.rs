@@ -7,13 +7,14 @@ use rand_pcg::Pcg64;
 use upright::control::actuator::Drive;
 use upright::table::{Equilibrium, Law};
 
+use super::channel::chain_of;
 use super::error::IdentifyError;
 use super::log::{DriveScale, Header, Log, Tick};
+use super::model::Input;
 use super::model::Model;
 use super::parameters::{Layout, priors};
 use super::record::Record;
 use super::step::Step;
-use super::{Input, chain_of};
 use crate::numerics::{Complex, eigenvalues};
 use crate::plant::{ChainParameters, linearise};
 use crate::reality::hanging_by_hand;

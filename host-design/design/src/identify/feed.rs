@@ -3,7 +3,7 @@
 use upright::protocol::message::Request;
 use upright::supervision::shaking::{AHEAD, FORCES, FULL, Shaking};
 
-use super::chain_of;
+use super::channel::chain_of;
 use super::error::IdentifyError;
 use super::excite::{AIM, Excitation, half_rail};
 use super::log::Log;

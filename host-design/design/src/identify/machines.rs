@@ -5,7 +5,7 @@ use core::f64::consts::PI;
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
 
-use super::chain_of;
+use super::channel::chain_of;
 use super::error::IdentifyError;
 use super::parameters::{FRICTION, Kind, Layout, priors};
 use crate::plant::ChainParameters;

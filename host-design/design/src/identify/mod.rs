@@ -11,6 +11,7 @@
 //!
 //! `docs/identify.md` describes the experiment, the file format, what can be identified, and the accuracy reached.
 
+mod channel;
 mod convert;
 mod covariance;
 mod coverage;
@@ -51,13 +52,3 @@ pub use recorder::Recorder;
 pub use verdict::{ChannelFit, Predicted, Refusal};
 pub use wiring::{Wiring, WiringFound};
 pub use with_firmware::{ShakeError, Shaken, checked_and_hanging, shake_with};
-
-use crate::rig::{Chain, Rig};
-use model::Input;
-
-/// The chain of a rig whose cart and links all have an encoder.
-fn chain_of(rig: &Rig) -> Result<&Chain, IdentifyError> {
-    rig.chain()
-        .filter(|chain| rig.sensors().len() == chain.links.len() + 1)
-        .ok_or_else(|| IdentifyError::NoEncoders(rig.name.clone()))
-}

@@ -7,11 +7,11 @@ use core::f64::consts::PI;
 
 use upright::protocol::tick_log::OFF;
 
+use super::channel::channel_name;
 use super::error::IdentifyError;
 use super::log::{DriveScale, Log};
 use super::model::{Input, Model};
 use super::parameters::Layout;
-use super::wiring::channel_name;
 use crate::rig::{Motor, Rig};
 
 /// Longest time from one sample to the next (s), which is also the integration step.

@@ -348,7 +348,7 @@ fn propagate(step: &Step, by: &[f64], next: &mut [f64], s: usize, columns: usize
 mod tests {
     use std::path::Path;
 
-    use super::super::chain_of;
+    use super::super::channel::chain_of;
     use super::super::excite::shake;
     use super::super::parameters::priors;
     use super::*;

@@ -1,8 +1,9 @@
 //! Whether an identification is good enough to be written to a rig file.
 
+use super::channel::channel_name;
 use super::error::IdentifyError;
 use super::normal::Normal;
-use super::wiring::{WiringFound, channel_name};
+use super::wiring::WiringFound;
 
 /// Largest accepted variance of the innovations, as a multiple of what the filter expects.
 const MOST_VARIANCE: f64 = 1.5;

@@ -1,5 +1,6 @@
 //! Signs, swapped encoders, counts per turn and the sign of the motor: which wiring explains the log best.
 
+use super::channel::channel_name;
 use super::model::Model;
 use super::parameters::Prior;
 use super::record::Record;
@@ -70,11 +71,6 @@ impl core::fmt::Display for Wiring {
             ),
         }
     }
-}
-
-/// Name of a channel: the cart, or a joint counted from 1.
-pub(super) fn channel_name(channel: usize) -> String {
-    if channel == 0 { "the cart".to_owned() } else { format!("joint {channel}") }
 }
 
 /// The record as it would have been with the wiring of the file, if it was recorded with `wiring`.

@@ -23,6 +23,7 @@
 
 mod angles;
 mod chain;
+mod error;
 mod jacobian;
 mod lanes;
 mod linear;
@@ -36,6 +37,7 @@ mod together;
 
 pub use angles::{absolute_angles, whole_turns, without_turns};
 pub use chain::{ChainPlant, ChainState, Energy};
+pub use error::PlantError;
 pub use jacobian::Partials;
 pub use linear::{LinearModel, linearise};
 pub use linear_simulation::LinearSimulation;
@@ -43,22 +45,3 @@ pub use motor::MotorPlant;
 pub use parameters::ChainParameters;
 pub use simulation::{ChainSimulation, Plant, WithLinks, chain_plant, with_links};
 pub use together::{ChainLanes, LANES, chain_lanes};
-
-/// Why the plant of a chain cannot be built.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
-pub enum PlantError {
-    /// The number of links in the type is not that of the chain.
-    #[error("the chain has {links} links, but this plant was compiled for {compiled}")]
-    WrongLinks {
-        /// Links of the chain.
-        links: usize,
-        /// Links in the type.
-        compiled: usize,
-    },
-    /// No plant is compiled for this many links.
-    #[error("a chain of {links} links cannot be simulated: give 1 to {} links", crate::rig::MAX_LINKS)]
-    UnsupportedLinks {
-        /// Links of the chain.
-        links: usize,
-    },
-}

@@ -7,7 +7,7 @@ use std::fmt::Display;
 
 use crate::number::significant;
 
-use super::key::{Absent, Key, Keys, Section};
+use super::key::{Absent, Key, Section};
 use super::sections::actuator::ACTUATOR;
 use super::sections::chain::{CART, GRAVITY, LINK};
 use super::sections::friction::FRICTION;
@@ -18,6 +18,7 @@ use super::sections::robust::ROBUST;
 use super::sections::swing_up::SWING_UP;
 use super::sections::tick::TICK;
 use super::sections::verify::VERIFY;
+use super::value::Keys;
 use super::{
     Actuator, Chain, Kalman, LinearPlant, Link, LinkEncoder, Lqr, Motor, PlantDescription, PolePlacement,
     Reality, Rig,

@@ -6,7 +6,7 @@ use std::path::Path;
 use toml_edit::{ArrayOfTables, Document, Item, TableLike, Value};
 
 use super::error::{Place, RigError, RigErrorKind};
-use super::key::{self, Section};
+use super::key::Section;
 use super::rule::Rule;
 
 /// A rig file's text and name.
@@ -225,7 +225,7 @@ fn of_value(value: &Value) -> Found<'_> {
 /// A table of the file with its key and place.
 pub(super) struct Table<'a> {
     source: &'a Source<'a>,
-    section: &'static Section,
+    pub(super) section: &'static Section,
     key: String,
     start: usize,
     table: &'a dyn TableLike,
@@ -303,15 +303,6 @@ impl<'a> Table<'a> {
     /// A list of exactly `length` numbers that must be given.
     pub(super) fn numbers(&self, name: &str, length: usize, entries: Rule) -> Result<Vec<f64>, RigError> {
         self.required(name)?.numbers(length, entries, &self.asks_for(name))
-    }
-
-    /// The value of a key, read according to its row.
-    pub(super) fn value<V: key::Value>(&self, name: &str) -> Result<V, RigError> {
-        let key = self.section.key(name);
-        match self.get(name) {
-            Some(node) => V::read(&node, key.rule, &self.section.asks_for(key)),
-            None => V::when_absent(key.absent).ok_or_else(|| self.missing(name, &self.section.asks_for(key))),
-        }
     }
 
     /// Rejects two keys that exclude each other; the error points to the second.

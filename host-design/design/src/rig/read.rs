@@ -1,12 +1,13 @@
 //! Checks the text of a rig file and builds a [`Rig`] from it.
 
 use super::error::RigError;
-use super::key::{Keys, Section};
+use super::key::Section;
 use super::node::{Node, Source, Table};
 use super::sections::{
     SECTIONS, TOP, actuator, chain, friction, integral, kalman, limits, lqr, model, pole_placement, reality,
     robust, swing_up, tick, verify,
 };
+use super::value::Keys;
 use super::{Actuator, Integral, Limits, PlantDescription, Reality, Requirements, Rig, Tick};
 
 /// Checks a whole rig file.

@@ -1,6 +1,7 @@
 //! The sensors of a rig.
 
-use super::{LinkEncoder, PlantDescription, Rig};
+use super::description::Rig;
+use super::sections::chain::{LinkEncoder, PlantDescription};
 use crate::numerics::Real;
 
 /// A sensor that measures one state in discrete steps.

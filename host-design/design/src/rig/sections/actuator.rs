@@ -3,12 +3,13 @@
 use serde::Serialize;
 
 use super::super::error::RigError;
-use super::super::key::{Absent, Key, Keys, Section, keys};
+use super::super::key::{Absent, Key, Section};
 use super::super::node::{Node, Table};
 use super::super::rule::Rule;
+use super::super::value::{Keys, keys};
 
 /// `[actuator]`
-pub(in crate::rig) static ACTUATOR: Section = Section {
+pub(crate) static ACTUATOR: Section = Section {
     name: "actuator",
     title: "[actuator]",
     meaning: "force limit and DC motor; if any motor key is given, the required motor keys must be given",
@@ -67,7 +68,7 @@ impl Motor {
 }
 
 /// Reads `[actuator]`; a motor is described as soon as one of its keys is given.
-pub(in crate::rig) fn actuator(node: &Node<'_>) -> Result<Actuator, RigError> {
+pub(crate) fn actuator(node: &Node<'_>) -> Result<Actuator, RigError> {
     let table = node.table(&ACTUATOR)?;
     let force_limit_n = table.value("force_limit_n")?;
     let described = Motor::KEYS.iter().any(|key| table.get(key.name).is_some());

@@ -3,16 +3,17 @@
 use serde::Serialize;
 
 use super::super::error::RigError;
-use super::super::key::{Absent, Key, Keys, Section, keys};
+use super::super::key::{Absent, Key, Section};
 use super::super::node::{Node, Table};
 use super::super::rule::Rule;
+use super::super::value::{Keys, keys};
 use super::model::{self, LinearPlant};
 
 /// Largest number of links of a chain; plants with more are not compiled.
 pub const MAX_LINKS: usize = 14;
 
 /// `[cart]`
-pub(in crate::rig) static CART: Section = Section {
+pub(crate) static CART: Section = Section {
     name: "cart",
     title: "[cart]",
     meaning: "the cart and its rail",
@@ -21,7 +22,7 @@ pub(in crate::rig) static CART: Section = Section {
 };
 
 /// `[[link]]`
-pub(in crate::rig) static LINK: Section = Section {
+pub(crate) static LINK: Section = Section {
     name: "link",
     title: "[[link]]",
     meaning: "one table per link, from the cart outwards, 1 to 14 of them",
@@ -30,7 +31,7 @@ pub(in crate::rig) static LINK: Section = Section {
 };
 
 /// `[gravity]`
-pub(in crate::rig) static GRAVITY: Section = Section {
+pub(crate) static GRAVITY: Section = Section {
     name: "gravity",
     title: "[gravity]",
     meaning: "gravity",
@@ -170,7 +171,7 @@ impl PlantDescription {
 }
 
 /// Reads the plant, which the file gives either as a chain or as a linear model.
-pub(in crate::rig) fn plant(root: &Table<'_>) -> Result<PlantDescription, RigError> {
+pub(crate) fn plant(root: &Table<'_>) -> Result<PlantDescription, RigError> {
     const ONE: &str = "keep [model], or [cart] with its [[link]]s and [gravity], not both";
     for part in ["cart", "link", "gravity"] {
         root.not_both("model", part, ONE)?;

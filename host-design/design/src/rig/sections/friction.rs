@@ -1,13 +1,14 @@
 //! `[friction]`: Coulomb friction that is known, and that the controller compensates.
 
 use super::super::error::RigError;
-use super::super::key::{Absent, Keys, PerJoint, Section, keys};
+use super::super::key::{Absent, Section};
 use super::super::node::{Node, Table};
 use super::super::rule::Rule;
+use super::super::value::{Keys, PerJoint, keys};
 use super::chain::PlantDescription;
 
 /// `[friction]`
-pub(in crate::rig) static FRICTION: Section = Section {
+pub(crate) static FRICTION: Section = Section {
     name: "friction",
     title: "[friction]",
     meaning: "known Coulomb friction, which the controller compensates; needs [kalman], not possible with [model]",
@@ -35,7 +36,7 @@ keys! {
 }
 
 /// Reads `[friction]`, which needs a chain and an observer.
-pub(in crate::rig) fn friction(
+pub(crate) fn friction(
     node: &Node<'_>,
     plant: &PlantDescription,
     has_observer: bool,

@@ -1,10 +1,11 @@
 //! `[integral]`: integral action on the controlled output, for the LQR.
 
-use super::super::key::{Absent, Keys, Section, keys};
+use super::super::key::{Absent, Section};
 use super::super::rule::Rule;
+use super::super::value::{Keys, keys};
 
 /// `[integral]`
-pub(in crate::rig) static INTEGRAL: Section = Section {
+pub(crate) static INTEGRAL: Section = Section {
     name: "integral",
     title: "[integral]",
     meaning: "integral action on the cart position, for the LQR",

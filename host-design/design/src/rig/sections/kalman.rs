@@ -9,7 +9,7 @@ use super::super::rule::Rule;
 use super::chain::PlantDescription;
 
 /// `[kalman]`
-pub(in crate::rig) static KALMAN: Section = Section {
+pub(crate) static KALMAN: Section = Section {
     name: "kalman",
     title: "[kalman]",
     meaning: "the observer: noise intensities, each the variance of a noise held for one tick, times the tick",
@@ -43,7 +43,7 @@ pub struct Kalman {
 }
 
 /// Reads `[kalman]`, with one intensity per noise input.
-pub(in crate::rig) fn kalman(node: &Node<'_>, plant: &PlantDescription) -> Result<Kalman, RigError> {
+pub(crate) fn kalman(node: &Node<'_>, plant: &PlantDescription) -> Result<Kalman, RigError> {
     let table = node.table(&KALMAN)?;
     let further = match plant {
         PlantDescription::Chain(chain) => chain.links.len(),

@@ -1,13 +1,14 @@
 //! `[limits]`: what the supervisor enforces.
 
 use super::super::error::RigError;
-use super::super::key::{Absent, Keys, Section, keys};
+use super::super::key::{Absent, Section};
 use super::super::node::Node;
 use super::super::rule::Rule;
+use super::super::value::{Keys, keys};
 use super::chain::PlantDescription;
 
 /// `[limits]`
-pub(in crate::rig) static LIMITS: Section = Section {
+pub(crate) static LIMITS: Section = Section {
     name: "limits",
     title: "[limits]",
     meaning: "what the supervisor enforces",
@@ -68,7 +69,7 @@ impl Default for Limits {
 }
 
 /// Reads `[limits]`; the margin at the rail's ends has to leave the start position free.
-pub(in crate::rig) fn limits(node: &Node<'_>, plant: &PlantDescription) -> Result<Limits, RigError> {
+pub(crate) fn limits(node: &Node<'_>, plant: &PlantDescription) -> Result<Limits, RigError> {
     let table = node.table(&LIMITS)?;
     let limits = Limits::read(&table)?;
     let PlantDescription::Chain(chain) = plant else { return Ok(limits) };

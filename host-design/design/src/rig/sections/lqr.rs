@@ -8,7 +8,7 @@ use super::super::node::Node;
 use super::super::rule::Rule;
 
 /// `[lqr]`
-pub(in crate::rig) static LQR: Section = Section {
+pub(crate) static LQR: Section = Section {
     name: "lqr",
     title: "[lqr]",
     meaning: "minimises the integral of `Σ q x² + r u²`",
@@ -41,7 +41,7 @@ pub struct Lqr {
 }
 
 /// Reads `[lqr]`, with one weight per state.
-pub(in crate::rig) fn lqr(node: &Node<'_>, states: usize) -> Result<Lqr, RigError> {
+pub(crate) fn lqr(node: &Node<'_>, states: usize) -> Result<Lqr, RigError> {
     let table = node.table(&LQR)?;
     Ok(Lqr {
         state_weights: table.numbers("state_weights", states, Rule::NOT_NEGATIVE)?,

@@ -11,7 +11,7 @@ use super::super::rule::Rule;
 const MAX_STATES: usize = 60;
 
 /// `[model]`
-pub(in crate::rig) static MODEL: Section = Section {
+pub(crate) static MODEL: Section = Section {
     name: "model",
     title: "[model]",
     meaning: "`x' = a x + b u`, instead of `[cart]`, `[[link]]` and `[gravity]`",

@@ -11,7 +11,7 @@ const UNLESS_POLES: Absent =
     Absent::RequiredIf("unless poles are given one by one, as poles = [[re, im], ...]");
 
 /// `[pole_placement]`
-pub(in crate::rig) static POLE_PLACEMENT: Section = Section {
+pub(crate) static POLE_PLACEMENT: Section = Section {
     name: "pole_placement",
     title: "[pole_placement]",
     meaning: "poles of the continuous closed loop",
@@ -65,7 +65,7 @@ pub enum PolePlacement {
 }
 
 /// Reads `[pole_placement]`, with one pole per state.
-pub(in crate::rig) fn pole_placement(node: &Node<'_>, states: usize) -> Result<PolePlacement, RigError> {
+pub(crate) fn pole_placement(node: &Node<'_>, states: usize) -> Result<PolePlacement, RigError> {
     let table = node.table(&POLE_PLACEMENT)?;
     for key in ["overshoot_percent", "settling_time_s", "far_poles"] {
         table.not_both(

@@ -1,13 +1,14 @@
 //! `[reality]`: how the machine on the bench differs from the model.
 
 use super::super::error::RigError;
-use super::super::key::{Absent, Keys, PerJoint, Section, keys};
+use super::super::key::{Absent, Section};
 use super::super::node::{Node, Table};
 use super::super::rule::Rule;
+use super::super::value::{Keys, PerJoint, keys};
 use super::chain::{Chain, PlantDescription};
 
 /// `[reality]`
-pub(in crate::rig) static REALITY: Section = Section {
+pub(crate) static REALITY: Section = Section {
     name: "reality",
     title: "[reality]",
     meaning: "imperfections of the simulated machine, not with [model]; they change no gain",
@@ -133,7 +134,7 @@ impl Default for Reality {
 }
 
 /// Reads `[reality]`, which needs a chain.
-pub(in crate::rig) fn reality(
+pub(crate) fn reality(
     node: &Node<'_>,
     plant: &PlantDescription,
     period_s: f64,

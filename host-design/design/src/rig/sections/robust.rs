@@ -1,13 +1,14 @@
 //! `[robust]`: how far the machine may be from the file.
 
 use super::super::error::RigError;
-use super::super::key::{Absent, Keys, Section, keys};
+use super::super::key::{Absent, Section};
 use super::super::node::Node;
 use super::super::rule::Rule;
+use super::super::value::{Keys, keys};
 use super::chain::PlantDescription;
 
 /// `[robust]`
-pub(in crate::rig) static ROBUST: Section = Section {
+pub(crate) static ROBUST: Section = Section {
     name: "robust",
     title: "[robust]",
     meaning: "tolerances that `upright robust` chooses weights, far poles and joint noise for, not with [model]; changes \
@@ -69,7 +70,7 @@ impl Tolerances {
 }
 
 /// Reads `[robust]`, which needs a chain.
-pub(in crate::rig) fn robust(
+pub(crate) fn robust(
     node: &Node<'_>,
     plant: &PlantDescription,
     period_s: f64,

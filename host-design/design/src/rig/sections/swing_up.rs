@@ -1,12 +1,13 @@
 //! `[swing_up]`: the motions from hanging to upright and back.
 
 use super::super::error::RigError;
-use super::super::key::{Absent, Keys, Section, keys};
+use super::super::key::{Absent, Section};
 use super::super::node::Node;
 use super::super::rule::Rule;
+use super::super::value::{Keys, keys};
 
 /// `[swing_up]`
-pub(in crate::rig) static SWING_UP: Section = Section {
+pub(crate) static SWING_UP: Section = Section {
     name: "swing_up",
     title: "[swing_up]",
     meaning: "limits of the motions that `upright swing-up` plans, and errors that they have to survive; changes no \
@@ -48,7 +49,7 @@ impl Default for SwingUpRules {
 }
 
 /// Reads `[swing_up]`.
-pub(in crate::rig) fn swing_up(node: &Node<'_>) -> Result<SwingUpRules, RigError> {
+pub(crate) fn swing_up(node: &Node<'_>) -> Result<SwingUpRules, RigError> {
     let table = node.table(&SWING_UP)?;
     let rules = SwingUpRules::read(&table)?;
     match (rules.shortest_s, rules.longest_s, table.get("longest_s")) {

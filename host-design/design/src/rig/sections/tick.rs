@@ -1,10 +1,11 @@
 //! `[tick]`: control period and delay.
 
-use super::super::key::{Absent, Keys, Section, keys};
+use super::super::key::{Absent, Section};
 use super::super::rule::Rule;
+use super::super::value::{Keys, keys};
 
 /// `[tick]`
-pub(in crate::rig) static TICK: Section = Section {
+pub(crate) static TICK: Section = Section {
     name: "tick",
     title: "[tick]",
     meaning: "the control tick",

@@ -1,10 +1,11 @@
 //! `[verify]`: what `upright verify` requires of the loop.
 
-use super::super::key::{Absent, Keys, Section, keys};
+use super::super::key::{Absent, Section};
 use super::super::rule::Rule;
+use super::super::value::{Keys, keys};
 
 /// `[verify]`
-pub(in crate::rig) static VERIFY: Section = Section {
+pub(crate) static VERIFY: Section = Section {
     name: "verify",
     title: "[verify]",
     meaning: "what `upright verify` requires of each law; changes no gain",
