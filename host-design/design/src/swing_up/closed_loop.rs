@@ -13,9 +13,10 @@ use super::transition::Transition;
 use crate::numerics::Matrix;
 use crate::plant::{Plant, chain_plant};
 use crate::rig::Chain;
+use crate::rig::defaults::ANGLE_RAD;
 
 /// Deviation of a link from its reference beyond which the motion counts as lost (rad).
-pub(super) const LOST_RAD: f64 = 0.35;
+pub(super) const LOST_RAD: f64 = ANGLE_RAD;
 /// Deviation at the end of a run below which it has arrived upright (rad).
 const ARRIVED_RAD: f64 = 0.1;
 

@@ -11,6 +11,7 @@ use super::transition::{Transition, rest};
 use crate::harness::{Harness, HarnessError, Target, goals, with_firmware};
 use crate::plant::{absolute_angles, without_turns};
 use crate::rig::Rig;
+use crate::rig::defaults::ANGLE_RAD;
 use crate::simulate::{Goal, Scenario};
 use crate::study::Study;
 use crate::table::{MotionValues, SwingUpValues, TableValues};
@@ -21,7 +22,7 @@ const BALANCE_S: f64 = 1.0;
 /// Time to hang with the motor off (s): the swinging decays, and a hand puts the rig back.
 const HANG_S: f64 = 8.0;
 /// Largest angle from an equilibrium at which a link counts as being there (rad).
-const NEAR_RAD: f64 = 0.35;
+const NEAR_RAD: f64 = ANGLE_RAD;
 /// Ticks between two telemetry messages of a random run.
 const TELEMETRY_TICKS: u16 = 20;
 
