@@ -2,14 +2,13 @@
 
 mod motion;
 
-use nalgebra::SVector;
-use serde::{Deserialize, Serialize};
-
 use crate::control::actuator::Drive;
 use crate::control::encoder::{CounterWidth, Encoders};
 use crate::control::observer::Observer;
 use crate::control::state_feedback::{FeedbackSum, LawState, saturate, state_feedback};
 use crate::table::{GainTable, Law, LawGains, Scalar, TableError};
+use nalgebra::SVector;
+use serde::{Deserialize, Serialize};
 
 /// Observer, control law and actuator map of one gain table.
 ///
@@ -244,11 +243,18 @@ impl<'t, const NX: usize, const NY: usize, T: Scalar> Controller<'t, NX, NY, T> 
     /// # Errors
     /// [`Rejected::NoObserver`] if the table holds no observer.
     pub fn start(&mut self, raw: &[u32; NY]) -> Result<(), Rejected> {
-        let observer = self.table.observer.as_ref().ok_or(Rejected::NoObserver)?;
         self.encoders.update(raw);
-        let y = self.encoders.positions(&observer.step);
+        self.start_at(&self.positions().data.0[0])
+    }
+
+    /// Starts from rest at these positions (m, rad), for sensors that are no incremental encoders.
+    ///
+    /// # Errors
+    /// [`Rejected::NoObserver`] if the table holds no observer.
+    pub fn start_at(&mut self, y: &[T; NY]) -> Result<(), Rejected> {
+        let observer = self.table.observer.as_ref().ok_or(Rejected::NoObserver)?;
         let mut x = SVector::<T, NX>::repeat(T::default());
-        for (&state, &position) in observer.measured.iter().zip(y.iter()) {
+        for (&state, &position) in observer.measured.iter().zip(y) {
             if let Some(entry) = x.get_mut(state as usize) {
                 *entry = position;
             }
@@ -303,7 +309,16 @@ impl<'t, const NX: usize, const NY: usize, T: Scalar> Controller<'t, NX, NY, T> 
             self.encoders.update(raw);
             return Self::off();
         };
-        let requested = self.observe(&observer, raw, judge);
+        let y = self.encoders.measure(raw, &observer.gains.step).data.0[0];
+        let requested = self.observe(&observer, &y, judge);
+        self.actuate(requested)
+    }
+
+    /// The same as [`control`](Self::control) with the positions themselves (m, rad) instead of counts: from absolute
+    /// sensors, or from somebody else's driver. The same positions give the same bits.
+    pub fn control_at(&mut self, y: &[T; NY]) -> MotorCommand<T> {
+        let Mode::Running(observer) = self.mode else { return Self::off() };
+        let requested = self.observe(&observer, y, |_, _, _| ());
         self.actuate(requested)
     }
 
@@ -323,16 +338,15 @@ impl<'t, const NX: usize, const NY: usize, T: Scalar> Controller<'t, NX, NY, T> 
     fn observe(
         &mut self,
         observer: &Observer<'t, NX, NY, T>,
-        raw: &[u32; NY],
+        y: &[T; NY],
         judge: impl FnOnce(&[i32; NY], &[T; NY], &mut [T; NY]),
     ) -> T {
         self.state.govern(self.target, self.active.gains.setpoint_step);
-        let y = self.encoders.measure(raw, &observer.gains.step).data.0[0];
         let estimate = &mut self.estimate.data.0[0];
         let mut sum = FeedbackSum::new(self.active.gains.n, self.state.setpoint);
         let e = &mut self.innovation.data.0[0];
-        *e = observer.innovation(&y, estimate);
-        judge(self.encoders.counts(), &y, e);
+        *e = observer.innovation(y, estimate);
+        judge(self.encoders.counts(), y, e);
         observer.correct(e, estimate, |joint, x| {
             if let Some(k) = self.active.gains.k.as_slice().chunks(2).nth(joint) {
                 sum.feed_back(k, x);
@@ -513,6 +527,25 @@ mod tests {
         controller.control(&[4]);
         controller.predict();
         assert_eq!(controller.estimate(), &vector![1.5 - 0.0625 * 2.5, 1.0 - 0.25 * 2.5]);
+    }
+
+    #[test]
+    fn positions_give_the_same_bits_as_the_counts_of_them() {
+        let table = table();
+        let (mut by_counts, mut by_positions) = (controller(&table), controller(&table));
+        by_counts.start(&[3]).unwrap();
+        by_positions.start_at(&[3.0 * 0.25]).unwrap();
+        let bits = |command: MotorCommand| [command.requested_n, command.applied_n].map(f32::to_bits);
+        for tick in 0..50u32 {
+            let count = 3 + tick * tick % 7;
+            let wanted = bits(by_counts.control(&[count]));
+            assert_eq!(bits(by_positions.control_at(&[count as f32 * 0.25])), wanted, "{tick}");
+            assert_eq!(by_positions.estimate(), by_counts.estimate());
+            by_counts.predict();
+            by_positions.predict();
+        }
+        // Negative control: another position gives another force.
+        assert_ne!(bits(by_positions.control_at(&[0.26])), bits(by_counts.control(&[1])));
     }
 
     #[test]
