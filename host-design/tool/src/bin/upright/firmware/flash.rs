@@ -7,7 +7,7 @@ use clap::Args;
 
 use super::board::BoardOption;
 use super::build::kind;
-use super::built;
+use super::built::built;
 use super::cycles::check_ticks;
 use crate::failure::Failure;
 use crate::variation::Wanted;

@@ -10,7 +10,7 @@ use upright_tool::image::{Image, Part, StackBound, StackError, forbidden_functio
 
 use super::board::BoardOption;
 use super::build::kind;
-use super::built;
+use super::built::built;
 use crate::failure::Failure;
 use crate::variation::Wanted;
 
