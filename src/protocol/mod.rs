@@ -23,7 +23,6 @@ pub mod message;
 pub mod queue;
 pub mod serial_link;
 pub mod simulated_pins;
-#[cfg(feature = "identify")]
 pub mod tick_log;
 
 #[cfg(test)]
