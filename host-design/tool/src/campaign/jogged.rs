@@ -21,7 +21,7 @@ const KEY_S: f64 = 0.025;
 const BEGIN_S: f64 = 0.5;
 /// Distance of the limit switches from the ends of the rail (m).
 const SWITCH_M: f64 = 0.01;
-/// Time for which a drive is watched from the onset on (s).
+/// Time for which a jog is watched from the onset on (s).
 const WATCHED_S: f64 = 0.4;
 
 impl Defect {
@@ -67,7 +67,7 @@ impl Trial {
         let is_there_before = matches!(self.kind.while_jogging(), Some(Expected::Found(_)));
         let (onset, watched) = match is_there_before {
             true => (0, ticks(f64::from(LONGEST_S)) + 2),
-            // In a drive with the cart held, which lasts for 1 s.
+            // In a jog with the cart held, which lasts for 1 s.
             false => (self.onset / 2, ticks(WATCHED_S)),
         };
         let scenario = Scenario {
@@ -83,7 +83,7 @@ impl Trial {
 
 impl Attempt<'_> {
     /// A jog, in which a person holds the key throughout.
-    pub(super) fn drive(&self, harness: &mut Harness<'_>) -> Result<Observed, HarnessError> {
+    pub(super) fn jog(&self, harness: &mut Harness<'_>) -> Result<Observed, HarnessError> {
         let trial = self.trial;
         let is_there_before = matches!(trial.expected(), Expected::Found(_));
         let mut held = harness.bench.state().to_vec();
@@ -148,7 +148,7 @@ impl Attempt<'_> {
                 break;
             }
         }
-        self.after_drive(harness, &mut observed)?;
+        self.after_jog(harness, &mut observed)?;
         Ok(observed)
     }
 
@@ -171,7 +171,7 @@ impl Attempt<'_> {
     }
 
     /// Reads what the firmware has found out, and whether it would arm.
-    fn after_drive(&self, harness: &mut Harness<'_>, observed: &mut Observed) -> Result<(), HarnessError> {
+    fn after_jog(&self, harness: &mut Harness<'_>, observed: &mut Observed) -> Result<(), HarnessError> {
         self.find_reason(harness, observed);
         observed.motor = Some(harness.session.status().motor);
         let inputs = harness.inputs();
