@@ -145,7 +145,7 @@ mod tests {
             crates: Vec::new(),
         };
         let wrong = |code, variables, stack| {
-            let stack = Ok(StackBound { bytes: stack, levels: Vec::new() });
+            let stack = Ok(StackBound { bytes: stack, reserved: STACK_LIMIT, levels: Vec::new() });
             wrong(&size(code, variables), &stack, &[]).len()
         };
         assert_eq!(wrong(CODE_LIMIT, RAM_LIMIT, STACK_LIMIT), 0);
