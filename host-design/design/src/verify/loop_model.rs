@@ -5,8 +5,9 @@
 
 use upright::table::Law;
 
+use super::error::VerifyError;
 use crate::design::{Certified, Design, Feedback, Kalman, zero_order_hold};
-use crate::numerics::{Matrix, Real};
+use crate::numerics::{Matrix, Real, spectral_radius};
 use crate::rig::Rig;
 use crate::table::{MAX_STATES, TableValues};
 
@@ -286,6 +287,11 @@ impl<R: Real> LoopModel<R> {
     /// The loop of the rig as it will run with the table's `law`; none if the table does not hold it.
     pub fn as_it_runs(certified: &Certified, table: &TableValues, law: Law) -> Option<Self> {
         Some(Self::with_numbers(certified, &Numbers::of_table(table, law)?))
+    }
+
+    /// Largest absolute value of a pole.
+    pub(crate) fn spectral_radius(&self) -> Result<f64, VerifyError> {
+        spectral_radius(&self.matrix).map(|radius| radius.to_f64()).map_err(|_| VerifyError::Poles)
     }
 
     pub(super) fn with_numbers(certified: &Certified, numbers: &Numbers<R>) -> Self {

@@ -3,7 +3,8 @@
 use serde::Serialize;
 use upright::table::Law;
 
-use super::trial::{Disturbance, Horizon, Unverifiable, chain, scenario, trial};
+use super::error::Unverifiable;
+use super::trial::{Disturbance, Horizon, chain, scenario, trial};
 use crate::parallel;
 use crate::plant::absolute_angles;
 use crate::rig::Rig;

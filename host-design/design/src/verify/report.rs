@@ -4,6 +4,7 @@ use serde::Serialize;
 use upright::table::Law;
 
 use super::corners::MOST_LINKS;
+use super::monte_carlo::Effort;
 use super::{
     Attraction, AttractionSettings, CoarsestEncoder, CornerSettings, Corners, Disturbance, EncoderSettings,
     ImperfectionSettings, LinearReport, Margins, MassTolerance, MonteCarlo, NoiseRun, RequiredSurvival,
@@ -13,7 +14,6 @@ use super::{
 use crate::design::Certified;
 use crate::number::significant;
 use crate::rig::{PlantDescription, Requirements, Rig};
-use crate::study::Study;
 use crate::table::TableValues;
 
 /// The trust report of a rig.
@@ -68,19 +68,6 @@ pub struct Check {
     pub found: Option<f64>,
     /// Whether it holds.
     pub holds: bool,
-}
-
-/// Size of the Monte Carlo part.
-#[derive(Debug, Clone, Copy)]
-pub struct Effort<'a> {
-    /// Monte Carlo runs for each law.
-    pub runs: usize,
-    /// Seed of the first of them.
-    pub seed: u64,
-    /// Share of the runs with one tick more delay than designed for.
-    pub late: f64,
-    /// Whether the runs are made here, or split over processes.
-    pub study: &'a Study,
 }
 
 /// How random plants are drawn for `rig`: by its `[verify]`, a share `late` of them with one more tick of delay.
