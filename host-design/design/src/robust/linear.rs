@@ -4,7 +4,8 @@ use crate::design::{Design, DesignError, Kalman, continuous_plant, integrated_qu
 use crate::numerics::Matrix;
 use crate::rig::{Rig, Tolerances};
 use crate::verify::{
-    ControllerModel, Disturbance, LoopModel, Numbers, PlantModel, VerifyError, stationary, wrong_masses,
+    ControllerModel, Disturbance, LoopModel, Numbers, PlantModel, VerifyError, radius, stationary,
+    wrong_masses,
 };
 
 /// Least distance of the spectral radius from 1: a loop closer to instability falls in a long run.
@@ -62,7 +63,7 @@ impl<'a> LinearPlants<'a> {
     /// Predicted rms of the force (N) from encoders and disturbances; none for a loop that is not stable.
     pub(super) fn ripple_n(&self, controller: &ControllerModel<f64>) -> Option<f64> {
         let model = LoopModel::of(&self.nominal, controller);
-        if model.spectral_radius().ok()? >= 1.0 {
+        if radius(&model).ok()? >= 1.0 {
             return None;
         }
         let size = model.matrix.rows();
@@ -99,11 +100,11 @@ impl<'a> LinearPlants<'a> {
         controller: &ControllerModel<f64>,
         corners: &[PlantModel<f64>],
     ) -> Result<bool, VerifyError> {
-        let nominal = LoopModel::of(&self.nominal, controller).spectral_radius()?;
+        let nominal = radius(&LoopModel::of(&self.nominal, controller))?;
         // A nominal loop with slow poles has less than this margin itself.
         let most = 1.0 - MARGIN.min(0.5 * (1.0 - nominal));
         for corner in corners {
-            if LoopModel::of(corner, controller).spectral_radius()? >= most {
+            if radius(&LoopModel::of(corner, controller))? >= most {
                 return Ok(false);
             }
         }

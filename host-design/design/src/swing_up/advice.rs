@@ -106,7 +106,9 @@ fn advice_from(
             format!("the binding limit is the {name}; there is a motion with {}", texts.join(", or with "))
         }
         None => match relaxed(rig, transition, tried, &Limit::ALL, longest_s, done)? {
-            Some(Tried::Helps(help)) => format!("no limit alone is binding; there is a motion with {}", help.text),
+            Some(Tried::Helps(help)) => {
+                format!("no limit alone is binding; there is a motion with {}", help.text)
+            }
             _ => "no limit alone is binding, and more of everything does not help".to_owned(),
         },
     };

@@ -3,8 +3,8 @@
 use serde::Serialize;
 use upright::table::Law;
 
-use super::error::{Unverifiable, within};
-use super::trial::{Disturbance, Horizon, Outcome, chain, edge, leaning, scenario, trial, trials};
+use super::error::{Unverifiable, chain, within};
+use super::trial::{Disturbance, Horizon, Outcome, edge, leaning, scenario, trial, trials};
 use crate::parallel;
 use crate::plant::LANES;
 use crate::rig::{PlantDescription, Rig};

@@ -3,8 +3,8 @@
 use serde::Serialize;
 use upright::table::Law;
 
-use super::error::{Unverifiable, within};
-use super::trial::{Disturbance, Horizon, chain, edge, scenario, trial};
+use super::error::{Unverifiable, chain, within};
+use super::trial::{Disturbance, Horizon, edge, scenario, trial};
 use crate::design::{DesignError, Uncertified, design};
 use crate::parallel;
 use crate::rig::{LinkEncoder, PlantDescription, Rig};

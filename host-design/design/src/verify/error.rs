@@ -1,6 +1,7 @@
-//! Why a report, or a part of it, cannot be made.
+//! What a trust report cannot say, and why.
 
 use crate::design::DesignError;
+use crate::rig::{Chain, PlantDescription, Rig};
 use crate::simulate::SimulationError;
 use crate::study::StudyError;
 use crate::table::NoTable;
@@ -59,6 +60,14 @@ pub enum Unverifiable {
         /// The accepted values.
         accepts: &'static str,
     },
+}
+
+/// The chain of a rig that has one.
+pub(crate) fn chain<'a>(rig: &'a Rig, what: &'static str) -> Result<&'a Chain, Unverifiable> {
+    match &rig.plant {
+        PlantDescription::Chain(chain) => Ok(chain),
+        PlantDescription::Model(_) => Err(Unverifiable::NotAChain(what)),
+    }
 }
 
 /// Checks that a setting is within its range.

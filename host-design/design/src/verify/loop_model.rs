@@ -5,7 +5,7 @@
 
 use upright::table::Law;
 
-use super::error::VerifyError;
+use super::VerifyError;
 use crate::design::{Certified, Design, Feedback, Kalman, zero_order_hold};
 use crate::numerics::{Matrix, Real, spectral_radius};
 use crate::rig::Rig;
@@ -289,15 +289,15 @@ impl<R: Real> LoopModel<R> {
         Some(Self::with_numbers(certified, &Numbers::of_table(table, law)?))
     }
 
-    /// Largest absolute value of a pole.
-    pub(crate) fn spectral_radius(&self) -> Result<f64, VerifyError> {
-        spectral_radius(&self.matrix).map(|radius| radius.to_f64()).map_err(|_| VerifyError::Poles)
-    }
-
     pub(super) fn with_numbers(certified: &Certified, numbers: &Numbers<R>) -> Self {
         let exact = |m: &Matrix<f64>| m.map(|&entry| R::from_f64(entry));
         let (ad, bd) = (exact(&certified.double.ad), exact(&certified.double.bd));
         let plant = PlantModel::held(&ad, &bd, numbers.delay_ticks, &numbers.measured);
         Self::of(&plant, &ControllerModel::of(numbers))
     }
+}
+
+/// Largest absolute value of a pole of the loop.
+pub(crate) fn radius<R: Real>(model: &LoopModel<R>) -> Result<f64, VerifyError> {
+    spectral_radius(&model.matrix).map(|radius| radius.to_f64()).map_err(|_| VerifyError::Poles)
 }

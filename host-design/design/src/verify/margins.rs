@@ -4,9 +4,9 @@ use core::f64::consts::PI;
 
 use serde::Serialize;
 
-use super::VerifyError;
 use super::loop_model::{ControllerModel, LoopModel, Numbers, PlantModel};
 use super::response::Response;
+use super::{VerifyError, radius};
 use crate::design::Certified;
 use crate::numerics::eigenvalues;
 use crate::parallel;
@@ -204,8 +204,7 @@ fn delay_margin(
     if !guess.is_finite() {
         return Ok(None);
     }
-    let unstable =
-        |further: f64| Ok(delayed_loop(certified, numbers, tick_s, further).spectral_radius()? >= 1.0);
+    let unstable = |further: f64| Ok(radius(&delayed_loop(certified, numbers, tick_s, further))? >= 1.0);
     let step = (guess / 24.0).max(1e-3);
     first_failure(unstable, |i| step * f64::from(i), 72, 1e-9).map(|found| found.map(|bracket| bracket.1))
 }

@@ -13,6 +13,25 @@ use crate::simulate::Scenario;
 use crate::study::Study;
 use crate::table::TableValues;
 
+/// Size of the Monte Carlo part.
+#[derive(Debug, Clone, Copy)]
+pub struct Effort<'a> {
+    /// Monte Carlo runs for each law.
+    pub runs: usize,
+    /// Seed of the first of them.
+    pub seed: u64,
+    /// Share of the runs with one tick more delay than designed for.
+    pub late: f64,
+    /// Whether the runs are made here, or split over processes.
+    pub study: &'a Study,
+}
+
+/// How random plants are drawn for `rig`: by its `[verify]`, a share `late` of them with one more tick of delay.
+pub fn spread(rig: &Rig, late: f64) -> Spread {
+    let share = rig.verify.spread_percent / 100.0;
+    Spread { mass: share, length: share, inertia: share, other_delay: late, ..Spread::of(rig) }
+}
+
 /// The ranges from which each run's plant and start are drawn, uniformly. A share of 0.02 means from -2 % to +2 %.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Spread {
@@ -50,19 +69,6 @@ impl Spread {
             duration_s: 10.0,
         }
     }
-}
-
-/// Size of the Monte Carlo part.
-#[derive(Debug, Clone, Copy)]
-pub struct Effort<'a> {
-    /// Monte Carlo runs for each law.
-    pub runs: usize,
-    /// Seed of the first of them.
-    pub seed: u64,
-    /// Share of the runs with one tick more delay than designed for.
-    pub late: f64,
-    /// Whether the runs are made here, or split over processes.
-    pub study: &'a Study,
 }
 
 /// The worst run: the first to fall, or, if none falls, that with the largest angle.

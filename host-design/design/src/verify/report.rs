@@ -4,12 +4,11 @@ use serde::Serialize;
 use upright::table::Law;
 
 use super::corners::MOST_LINKS;
-use super::monte_carlo::Effort;
 use super::{
-    Attraction, AttractionSettings, CoarsestEncoder, CornerSettings, Corners, Disturbance, EncoderSettings,
-    ImperfectionSettings, LinearReport, Margins, MassTolerance, MonteCarlo, NoiseRun, RequiredSurvival,
-    Spread, Unverifiable, VerifyError, attraction, coarsest_encoder, corners, linear, mass_tolerances,
-    monte_carlo, noise_run, required_imperfections,
+    Attraction, AttractionSettings, CoarsestEncoder, CornerSettings, Corners, Disturbance, Effort,
+    EncoderSettings, ImperfectionSettings, LinearReport, Margins, MassTolerance, MonteCarlo, NoiseRun,
+    RequiredSurvival, Unverifiable, VerifyError, attraction, coarsest_encoder, corners, linear,
+    mass_tolerances, monte_carlo, noise_run, required_imperfections, spread,
 };
 use crate::design::Certified;
 use crate::number::significant;
@@ -68,12 +67,6 @@ pub struct Check {
     pub found: Option<f64>,
     /// Whether it holds.
     pub holds: bool,
-}
-
-/// How random plants are drawn for `rig`: by its `[verify]`, a share `late` of them with one more tick of delay.
-pub fn spread(rig: &Rig, late: f64) -> Spread {
-    let share = rig.verify.spread_percent / 100.0;
-    Spread { mass: share, length: share, inertia: share, other_delay: late, ..Spread::of(rig) }
 }
 
 /// Makes the report. `done` is called after each Monte Carlo run, `stage` before each part.

@@ -7,8 +7,8 @@ use upright::control::encoder::CounterWidth;
 use upright::control::state_feedback::saturate;
 use upright::table::{FrictionMap, GainTable, Law, LawGains, Limits, ObserverGains, PerLaw, Thresholds};
 
-use super::VerifyError;
 use super::loop_model::{LoopModel, Numbers};
+use super::{VerifyError, radius};
 use crate::design::Certified;
 use crate::numerics::{Matrix, Wide, with_precision};
 use crate::rig::Rig;
@@ -55,7 +55,7 @@ pub(super) fn rounding(
     // In `f64` the eigenvalues of a loop this stiff are not accurate enough to show the change.
     let (single_radius, exact_radius) = with_precision(128, || {
         let radius = |numbers: Option<Numbers<Wide>>| {
-            numbers.map(|numbers| LoopModel::with_numbers(certified, &numbers).spectral_radius()).transpose()
+            numbers.map(|numbers| radius(&LoopModel::with_numbers(certified, &numbers))).transpose()
         };
         let of_table = radius(Numbers::of_table(table, law))?;
         Ok::<_, VerifyError>((of_table, radius(Numbers::exact(rig, certified, table, law))?))

@@ -2,9 +2,9 @@
 
 use serde::Serialize;
 
-use super::VerifyError;
 use super::loop_model::{ControllerModel, LoopModel, Numbers, PlantModel};
 use super::margins::{Grid, first_failure};
+use super::{VerifyError, radius};
 use crate::design::{Certified, integrated_quadratic};
 use crate::numerics::Matrix;
 
@@ -54,7 +54,7 @@ pub(super) fn limits(
     grid: &Grid<'_>,
     tick_s: f64,
 ) -> Result<TickLimits, VerifyError> {
-    let unstable = |period: f64| Ok(loop_at(certified, numbers, period).spectral_radius()? >= 1.0);
+    let unstable = |period: f64| Ok(radius(&loop_at(certified, numbers, period))? >= 1.0);
     let longer = first_failure(unstable, |i| tick_s * 1.02f64.powi(i as i32), 172, 1e-9)?;
     let shorter = first_failure(unstable, |i| tick_s * 0.96f64.powi(i as i32), 84, 1e-9)?;
 

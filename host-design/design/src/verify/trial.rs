@@ -3,9 +3,8 @@
 use serde::{Deserialize, Serialize};
 use upright::table::Law;
 
-use super::error::Unverifiable;
 use crate::plant::absolute_angles;
-use crate::rig::{Chain, PlantDescription, Rig};
+use crate::rig::{PlantDescription, Rig};
 use crate::simulate::{Fall, Job, Sample, Scenario, SimulationError, run, run_all};
 use crate::study::infinite_if_null;
 use crate::table::TableValues;
@@ -103,17 +102,6 @@ impl Outcome {
         self.fall.is_none()
     }
 
-    /// Whether this run is worse than `other`: it fell earlier, or fell where the other survived, or, both upright,
-    /// leaned further.
-    pub(super) fn is_worse_than(&self, other: &Self) -> bool {
-        match (&self.fall, &other.fall) {
-            (Some(fall), Some(other)) => fall.at_s < other.at_s,
-            (Some(_), None) => true,
-            (None, Some(_)) => false,
-            (None, None) => self.peak_angle_rad > other.peak_angle_rad,
-        }
-    }
-
     const NOTHING_SEEN: Self =
         Self { fall: None, at_rest_after_s: None, peak_angle_rad: 0.0, peak_error_m: 0.0, peak_force_n: 0.0 };
 
@@ -130,6 +118,16 @@ impl Outcome {
 
     fn ended(self, fall: Option<Fall>) -> Self {
         Self { at_rest_after_s: self.at_rest_after_s.filter(|_| fall.is_none()), fall, ..self }
+    }
+
+    /// Whether this run fell earlier, or fell where `other` survived, or, both upright, leaned further.
+    pub(super) fn is_worse_than(&self, other: &Self) -> bool {
+        match (&self.fall, &other.fall) {
+            (Some(own), Some(other)) => own.at_s < other.at_s,
+            (Some(_), None) => true,
+            (None, Some(_)) => false,
+            (None, None) => self.peak_angle_rad > other.peak_angle_rad,
+        }
     }
 
     /// Whether there was no fall, and the rig was near rest when the run ended.
@@ -215,14 +213,6 @@ pub(crate) fn leaning(rig: &Rig, angles: &[f64]) -> Vec<f64> {
         below = angle;
     }
     start
-}
-
-/// The chain of a rig that has one.
-pub(crate) fn chain<'a>(rig: &'a Rig, what: &'static str) -> Result<&'a Chain, Unverifiable> {
-    match &rig.plant {
-        PlantDescription::Chain(chain) => Ok(chain),
-        PlantDescription::Model(_) => Err(Unverifiable::NotAChain(what)),
-    }
 }
 
 /// The largest size that survives below the first one found to fall: from `smallest` up by doubling to at most

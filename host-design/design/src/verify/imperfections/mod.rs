@@ -7,8 +7,8 @@ use std::collections::BTreeMap;
 use serde::Serialize;
 use upright::table::Law;
 
-use super::error::{Unverifiable, within};
-use super::trial::{Disturbance, Horizon, Outcome, chain, scenario, trial};
+use super::error::{Unverifiable, chain, within};
+use super::trial::{Disturbance, Horizon, Outcome, scenario, trial};
 use crate::number::significant;
 use crate::parallel;
 use crate::rig::{Reality, Rig};

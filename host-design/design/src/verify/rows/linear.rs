@@ -1,12 +1,12 @@
 //! Rows from the linear model of the loop.
 
 use super::quantity::Values::{Each, One};
-use super::quantity::{TrustQuantity, force, is_chain, number};
+use super::quantity::{Quantity, force, is_chain, number};
 use crate::rig::Rig;
 use crate::verify::{LawTrust, Margins, NoiseShare};
 
-pub(super) const QUANTITIES: &[TrustQuantity] = &[
-    TrustQuantity {
+pub(super) const QUANTITIES: &[Quantity] = &[
+    Quantity {
         name: "spectral radius",
         meaning: "largest absolute value of a pole of the sampled loop: stable below 1",
         values: One(|_, law| {
@@ -14,7 +14,7 @@ pub(super) const QUANTITIES: &[TrustQuantity] = &[
             Some(format!("{:.6}{suffix}", law.linear.spectral_radius))
         }),
     },
-    TrustQuantity {
+    Quantity {
         name: "gain margin",
         meaning: "factors by which the real force may constantly differ from the commanded force before the loop is \
                   unstable",
@@ -24,7 +24,7 @@ pub(super) const QUANTITIES: &[TrustQuantity] = &[
             Some(format!("factor {} to {highest}", number(margins.lowest_gain)))
         }),
     },
-    TrustQuantity {
+    Quantity {
         name: "phase margin",
         meaning: "phase that the loop may lose or gain",
         values: One(|_, law| {
@@ -32,7 +32,7 @@ pub(super) const QUANTITIES: &[TrustQuantity] = &[
             Some(phase.map_or("no limit".to_owned(), |phase| format!("{:.1}°", phase.to_degrees())))
         }),
     },
-    TrustQuantity {
+    Quantity {
         name: "delay margin",
         meaning: "additional delay of the force, including fractions of a tick, at which the loop becomes unstable",
         values: One(|_, law| {
@@ -43,7 +43,7 @@ pub(super) const QUANTITIES: &[TrustQuantity] = &[
             })
         }),
     },
-    TrustQuantity {
+    Quantity {
         name: "peak sensitivity",
         meaning: "largest amplification of a disturbance over all frequencies (Ms), and where it occurs",
         values: One(|_, law| {
@@ -52,12 +52,12 @@ pub(super) const QUANTITIES: &[TrustQuantity] = &[
             Some(format!("{} at {frequency} rad/s", number(margins.peak_sensitivity)))
         }),
     },
-    TrustQuantity {
+    Quantity {
         name: "disk margin",
         meaning: "size of the disk in which gain and phase may change together; 0: no margin",
         values: One(|_, law| Some(number(margins(law)?.disk_margin))),
     },
-    TrustQuantity {
+    Quantity {
         name: "longest stable tick",
         meaning: "longest period at which the same table still gives a stable loop",
         values: One(|_, law| {
@@ -65,13 +65,13 @@ pub(super) const QUANTITIES: &[TrustQuantity] = &[
             Some(longest.map_or("30 ticks or more".to_owned(), |s| format!("{} ms", number(1e3 * s))))
         }),
     },
-    TrustQuantity {
+    Quantity {
         name: "jitter margin",
         meaning: "each force may be late by any time up to this, differently in every tick (C.-Y. Kao and B. Lincoln, \
                   Automatica 40, 2004); sufficient, not necessary",
         values: One(|_, law| Some(format!("{} ms", number(1e3 * law.linear.tick.as_ref()?.jitter_s)))),
     },
-    TrustQuantity {
+    Quantity {
         name: "f32 gains",
         meaning: "largest rounding error of a gain in units in the last place (at most 0.5: all are correctly rounded), and \
                   the change of the spectral radius",
@@ -81,7 +81,7 @@ pub(super) const QUANTITIES: &[TrustQuantity] = &[
             Some(format!("{} ULP, spectral radius {change:+.1e}", number(rounding.gain_ulp)))
         }),
     },
-    TrustQuantity {
+    Quantity {
         name: "f32 against f64",
         meaning: "largest difference of the force, tick by tick, from the same controller in f64 with exact gains, and \
                   relative to the peak force of that run",
@@ -91,7 +91,7 @@ pub(super) const QUANTITIES: &[TrustQuantity] = &[
             Some(format!("{}, {relative:.1e} of the peak", force(rig, force_n)))
         }),
     },
-    TrustQuantity {
+    Quantity {
         name: "RMS, ",
         meaning: "ripple at rest from this source, and from all, as the linear model predicts it; encoder resolution \
                   counts as white noise",
@@ -101,13 +101,21 @@ pub(super) const QUANTITIES: &[TrustQuantity] = &[
             shares.map(|share| (share.source.clone(), row(share))).collect()
         }),
     },
-    TrustQuantity {
+    Quantity {
         name: "simulated RMS",
         meaning: "the same in four runs of 20 s against the nonlinear plant, with real encoder steps and the dead zone of \
                   the motor: trust this row more",
         values: One(|rig, law| {
             let run = law.noise_run.as_ref()?;
-            Some(ripple(rig, run.force_rms_n, &run.state_rms))
+            let fallen = run.seeds - run.survived;
+            Some(match &run.ripple {
+                None => format!("all {fallen} runs fall"),
+                Some(found) => {
+                    let others =
+                        if fallen > 0 { format!("; {fallen} further runs fall") } else { String::new() };
+                    format!("{}{others}", ripple(rig, found.force_rms_n, &found.state_rms))
+                }
+            })
         }),
     },
 ];

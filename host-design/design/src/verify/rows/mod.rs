@@ -5,16 +5,15 @@ mod linear;
 mod quantity;
 mod runs;
 
+pub use quantity::Quantity;
 use quantity::Values;
 
 use super::LawTrust;
 use crate::rig::Rig;
 
-pub use quantity::TrustQuantity;
-
 /// One row of the trust report.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct QuantityRow {
+pub struct Row {
     /// Name of the quantity, with its link or source.
     pub name: String,
     /// What was found, with its unit.
@@ -24,19 +23,19 @@ pub struct QuantityRow {
 }
 
 /// Every quantity, in the order in which they are shown.
-pub fn quantities() -> impl Iterator<Item = &'static TrustQuantity> {
+pub fn quantities() -> impl Iterator<Item = &'static Quantity> {
     linear::QUANTITIES.iter().chain(runs::QUANTITIES)
 }
 
 /// The rows of one law. Those that the report does not have, because the rig has no such part or the loop is unstable,
 /// are left out.
-pub fn rows(rig: &Rig, law: &LawTrust) -> Vec<QuantityRow> {
-    let rows_of = |quantity: &'static TrustQuantity| {
+pub fn rows(rig: &Rig, law: &LawTrust) -> Vec<Row> {
+    let rows_of = |quantity: &'static Quantity| {
         let values = match quantity.values {
             Values::One(value) => value(rig, law).map(|value| (String::new(), value)).into_iter().collect(),
             Values::Each(values) => values(rig, law),
         };
-        values.into_iter().map(|(part, value)| QuantityRow {
+        values.into_iter().map(|(part, value)| Row {
             name: format!("{}{part}", quantity.name),
             value,
             meaning: quantity.meaning,

@@ -1,4 +1,4 @@
-//! A quantity of the trust report.
+//! What a row of the trust report is made from.
 
 use crate::number::significant;
 use crate::rig::{PlantDescription, Rig};
@@ -6,7 +6,7 @@ use crate::verify::LawTrust;
 
 /// One quantity of the trust report.
 #[derive(Debug, Clone, Copy)]
-pub struct TrustQuantity {
+pub struct Quantity {
     /// Name of its row, or beginning of the names of its rows.
     pub name: &'static str,
     /// What the value means.

@@ -240,10 +240,9 @@ fn text(
         let motion = match transition {
             Transition::Up => Some(&swing_up.raise),
             Transition::Down => Some(&swing_up.lower),
-            transition => transitions
-                .iter()
-                .find(|(planned, _)| planned == transition)
-                .map(|(_, motion)| motion),
+            transition => {
+                transitions.iter().find(|(planned, _)| planned == transition).map(|(_, motion)| motion)
+            }
         };
         let [duration_s, force_n, position_m] =
             motion.map_or([0.0; 3], |motion| [motion.duration_s(), motion.force_n(), motion.position_m()]);
