@@ -145,7 +145,7 @@ pub struct Info {
     pub version: [u8; 3],
     /// Hash of the rig file's values.
     pub rig_hash: u64,
-    /// Control period (s).
+    /// Control period (s): the gain table's, or, if the board's timer is set to another one, the timer's.
     pub tick_s: f32,
     /// Number of states.
     pub states: u8,

@@ -6,5 +6,5 @@ mod transition;
 
 pub(crate) use transition::rest;
 
-pub use planned::{MotionError, MotionPair, PlannedMotion};
+pub use planned::{MotionError, PlannedMotion, RaiseAndLower};
 pub use transition::{Transition, equilibrium_named, posture_name};

@@ -3,7 +3,7 @@
 use super::SwingUpError;
 use super::supervision::set_limits;
 use crate::design::design;
-use crate::motion::{MotionPair, PlannedMotion, Transition};
+use crate::motion::{PlannedMotion, RaiseAndLower, Transition};
 use crate::rig::Rig;
 use crate::table::{Gains, SwingUpValues, TableValues};
 
@@ -16,7 +16,7 @@ use crate::table::{Gains, SwingUpValues, TableValues};
 pub fn with_motions(
     rig: &Rig,
     mut table: TableValues,
-    motions: &MotionPair,
+    motions: &RaiseAndLower,
     transitions: &[(Transition, PlannedMotion)],
 ) -> Result<TableValues, SwingUpError> {
     let mut swing_up = SwingUpValues::of(rig, &table, motions)?;
@@ -32,7 +32,7 @@ pub fn with_motions(
 ///
 /// # Errors
 /// As for [`with_motions`]; [`SwingUpError::Design`] if the rig has no gains.
-pub fn designed_table(rig: &Rig, motions: &MotionPair) -> Result<TableValues, SwingUpError> {
+pub fn designed_table(rig: &Rig, motions: &RaiseAndLower) -> Result<TableValues, SwingUpError> {
     designed_table_with(rig, motions, &[])
 }
 
@@ -42,7 +42,7 @@ pub fn designed_table(rig: &Rig, motions: &MotionPair) -> Result<TableValues, Sw
 /// As for [`designed_table`].
 pub fn designed_table_with(
     rig: &Rig,
-    motions: &MotionPair,
+    motions: &RaiseAndLower,
     transitions: &[(Transition, PlannedMotion)],
 ) -> Result<TableValues, SwingUpError> {
     with_motions(rig, TableValues::of(rig, &design(rig)?, Gains::Sampled)?, motions, transitions)

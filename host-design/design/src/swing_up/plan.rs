@@ -16,7 +16,7 @@ use super::robustness::{JUDGING_RUNS, Runs, Spread, random_runs, score};
 use super::search::{Candidate, Request, candidates, ticks_per_knot};
 use super::setting::Setting;
 use super::stored::{Stored, StoredKnots};
-use crate::motion::{MotionPair, PlannedMotion, Transition};
+use crate::motion::{PlannedMotion, RaiseAndLower, Transition};
 use crate::parallel;
 use crate::rig::Rig;
 use crate::study::Study;
@@ -32,7 +32,7 @@ const ROUNDS: [(usize, usize); 2] = [(30, 40), (4, 160)];
 #[derive(Debug, Clone, PartialEq)]
 pub struct Plan {
     /// The motions with their gains.
-    pub motions: MotionPair,
+    pub motions: RaiseAndLower,
     /// The rig's gain table with the motions in it, with which they were judged.
     pub table: TableValues,
     /// Knots of the motions, for the file beside the rig file.
@@ -107,7 +107,7 @@ pub fn judge(rig: &Rig, stored: &Stored, progress: SearchProgress<'_>) -> Result
 ///
 /// # Errors
 /// [`SwingUpError::Outdated`] if the rig file has changed since.
-pub fn motions(rig: &Rig, stored: &Stored) -> Result<MotionPair, SwingUpError> {
+pub fn motions(rig: &Rig, stored: &Stored) -> Result<RaiseAndLower, SwingUpError> {
     if stored.is_of(rig) { refined(rig, stored) } else { Err(SwingUpError::Outdated) }
 }
 
@@ -115,7 +115,7 @@ pub fn motions(rig: &Rig, stored: &Stored) -> Result<MotionPair, SwingUpError> {
 ///
 /// # Errors
 /// [`SwingUpError::Outdated`] if they do not fit the rig any more.
-pub fn refined(rig: &Rig, stored: &Stored) -> Result<MotionPair, SwingUpError> {
+pub fn refined(rig: &Rig, stored: &Stored) -> Result<RaiseAndLower, SwingUpError> {
     let setting = Setting::of(rig)?;
     let checked = |transition, knots| -> Result<PlannedMotion, SwingUpError> {
         let motion = restored(&setting, transition, knots)?;
@@ -126,7 +126,7 @@ pub fn refined(rig: &Rig, stored: &Stored) -> Result<MotionPair, SwingUpError> {
         || checked(Transition::Up, &stored.raise),
         || checked(Transition::Down, &stored.lower),
     );
-    Ok(MotionPair { raise: raise?, lower: lower? })
+    Ok(RaiseAndLower { raise: raise?, lower: lower? })
 }
 
 pub(super) fn restored(
@@ -222,7 +222,7 @@ fn judged(
     let peaks =
         [check(setting, &raise.motion, Transition::Up)?, check(setting, &lower.motion, Transition::Down)?];
     let stored = Stored::new(rig, raise.stored, lower.stored);
-    let motions = MotionPair { raise: raise.motion, lower: lower.motion };
+    let motions = RaiseAndLower { raise: raise.motion, lower: lower.motion };
     let table = designed_table(rig, &motions)?;
     progress(SearchStep::Stage { transition: Transition::Up, what: "random runs of the firmware", steps: 1 });
     let runs = arriving(rig, &table, &motions)?;
@@ -269,7 +269,7 @@ fn judged(
 
 /// Runs of the whole firmware of `table` with the errors of `[swing_up]`: how many are raised, and how many of those
 /// are lowered. A run that the supervisor ends or does not begin has not arrived.
-fn arriving(rig: &Rig, table: &TableValues, motions: &MotionPair) -> Result<[Runs; 2], SwingUpError> {
+fn arriving(rig: &Rig, table: &TableValues, motions: &RaiseAndLower) -> Result<[Runs; 2], SwingUpError> {
     let found = firmware_runs(rig, table, motions, &Condition::asked(rig), 1, JUDGING_RUNS, &Study::whole())?;
     Ok([found.raise_in_all(), found.lower])
 }

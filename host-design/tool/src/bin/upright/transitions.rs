@@ -6,7 +6,7 @@ use std::path::PathBuf;
 
 use clap::Args;
 use serde_json::json;
-use upright_design::motion::{MotionPair, PlannedMotion, Transition};
+use upright_design::motion::{PlannedMotion, RaiseAndLower, Transition};
 use upright_design::rig::Rig;
 use upright_design::study::Study;
 use upright_design::swing_up::{
@@ -128,7 +128,7 @@ impl Transitions {
     fn route_runs(
         &self,
         rig: &Rig,
-        swing_up: &MotionPair,
+        swing_up: &RaiseAndLower,
         all: Vec<(Transition, PlannedMotion)>,
     ) -> Result<Judged, Failure> {
         let failed = |source| failed(rig, source);
@@ -151,7 +151,7 @@ impl Transitions {
     fn judge(
         &self,
         rig: &Rig,
-        swing_up: &MotionPair,
+        swing_up: &RaiseAndLower,
         stored: &mut StoredTransitions,
     ) -> Result<Judged, Failure> {
         let links = rig.states() / 2 - 1;
@@ -228,7 +228,7 @@ fn searched_line(searched: &Searched, tried: u64, links: usize) -> String {
 /// The motions of the route as a table.
 fn text(
     rig: &Rig,
-    swing_up: &MotionPair,
+    swing_up: &RaiseAndLower,
     transitions: &[(Transition, PlannedMotion)],
     runs: &[TransitionRuns],
 ) -> String {
