@@ -121,6 +121,10 @@ impl Spring {
 
 #[cfg(test)]
 mod tests {
+    use std::path::Path;
+
+    use upright_design::rig::{PlantDescription, Rig};
+
     use super::*;
 
     fn spring(links: usize) -> Spring {
@@ -162,9 +166,16 @@ mod tests {
     }
 
     #[test]
-    fn a_far_pointer_does_not_tear_the_rig_apart() {
+    fn a_far_pointer_pulls_with_a_multiple_of_the_weight_where_the_rig_stands() {
+        let Ok(rig) = Rig::from_path(Path::new("../../rigs/single-quanser-ip02.toml")) else { panic!("no such rig") };
+        let PlantDescription::Chain(mut chain) = rig.plant else { panic!("not a chain") };
         let grip = Grip { body: 1, along: 1.0, to: [1e9, -1e9] };
-        let pull = spring(1).pull(&grip, &[0.0; 4]);
-        assert!(pull.force_n[0].hypot(pull.force_n[1]) < STRONGEST * GRAVITY * 0.2 + 1e-9);
+        for gravity_m_per_s2 in [9.81, 1.62] {
+            chain.gravity_m_per_s2 = gravity_m_per_s2;
+            let pull = Spring::of(&chain, 1e-3).pull(&grip, &[0.0; 4]);
+            let strongest = STRONGEST * gravity_m_per_s2 * chain.links[0].mass_kg;
+            let size = pull.force_n[0].hypot(pull.force_n[1]);
+            assert!((size - strongest).abs() < 1e-9, "{gravity_m_per_s2}: {size}");
+        }
     }
 }
