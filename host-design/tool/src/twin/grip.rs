@@ -21,6 +21,7 @@ pub(super) struct Spring {
     lengths_m: Vec<f64>,
     masses_kg: Vec<f64>,
     total_kg: f64,
+    gravity_m_per_s2: f64,
     period_s: f64,
 }
 
@@ -45,8 +46,6 @@ const ZETA: f64 = 0.35;
 const STRONGEST: f64 = 4.0;
 /// Largest change of speed of the gripped body by the damper within a tick, as a fraction.
 const DAMPED_PER_TICK: f64 = 0.3;
-/// Acceleration of gravity (m/s²).
-const GRAVITY: f64 = 9.81;
 
 impl Spring {
     /// The spring for the links of `chain`, recomputed every `period_s`.
@@ -56,6 +55,7 @@ impl Spring {
             lengths_m: chain.links.iter().map(|link| link.length_m).collect(),
             total_kg: chain.cart.mass_kg + masses_kg.iter().sum::<f64>(),
             masses_kg,
+            gravity_m_per_s2: chain.gravity_m_per_s2,
             period_s,
         }
     }
@@ -112,7 +112,7 @@ impl Spring {
         let damping = (2.0 * ZETA * omega * moved_kg).min(DAMPED_PER_TICK * body_kg / self.period_s);
         let raw = [0, 1].map(|axis| stiffness * (grip.to[axis] - point[axis]) - damping * speed[axis]);
         let size = raw[0].hypot(raw[1]);
-        let strongest = STRONGEST * GRAVITY * moved_kg;
+        let strongest = STRONGEST * self.gravity_m_per_s2 * moved_kg;
         let scale = if size > strongest { strongest / size } else { 1.0 };
         // The rail takes the vertical force on the cart.
         if grip.body == 0 { [raw[0] * scale, 0.0] } else { raw.map(|component| component * scale) }
@@ -128,7 +128,13 @@ mod tests {
     use super::*;
 
     fn spring(links: usize) -> Spring {
-        Spring { lengths_m: vec![0.5; links], masses_kg: vec![0.2; links], total_kg: 1.0, period_s: 1e-3 }
+        Spring {
+            lengths_m: vec![0.5; links],
+            masses_kg: vec![0.2; links],
+            total_kg: 1.0,
+            gravity_m_per_s2: 9.81,
+            period_s: 1e-3,
+        }
     }
 
     #[test]
@@ -167,7 +173,9 @@ mod tests {
 
     #[test]
     fn a_far_pointer_pulls_with_a_multiple_of_the_weight_where_the_rig_stands() {
-        let Ok(rig) = Rig::from_path(Path::new("../../rigs/single-quanser-ip02.toml")) else { panic!("no such rig") };
+        let Ok(rig) = Rig::from_path(Path::new("../../rigs/single-quanser-ip02.toml")) else {
+            panic!("no such rig")
+        };
         let PlantDescription::Chain(mut chain) = rig.plant else { panic!("not a chain") };
         let grip = Grip { body: 1, along: 1.0, to: [1e9, -1e9] };
         for gravity_m_per_s2 in [9.81, 1.62] {
