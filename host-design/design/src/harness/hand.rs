@@ -3,6 +3,7 @@
 
 use upright::board::Output;
 use upright::control::actuator::Drive;
+use upright::protocol::KEEP_ALIVE;
 use upright::protocol::message::Request;
 use upright::supervision::jog::MotorSign;
 use upright::supervision::sign_check::Signs;
@@ -67,8 +68,6 @@ enum Doing {
 
 /// Time between two tries of the same request (s).
 pub(super) const RETRY_S: f64 = 0.05;
-/// Time between two commands of a key that is held (s).
-const KEY_S: f64 = 0.025;
 
 impl Hand {
     /// A hand that moves `rig` from hanging to the start of `scenario`, and lets go there: when the firmware balances,
@@ -90,7 +89,7 @@ impl Hand {
             start: scenario.start.clone(),
             pushed: Bench::new(rig, &undisturbed)?,
             retry_ticks: ticks(RETRY_S),
-            key_ticks: ticks(KEY_S),
+            key_ticks: ticks(KEEP_ALIVE.as_secs_f64()),
             // The firmware asks for a quarter of arm_time_s.
             settle_ticks: ticks(0.5 * rig.limits.arm_time_s),
         })

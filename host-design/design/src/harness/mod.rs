@@ -22,6 +22,6 @@ pub use grasp::Grasp;
 pub use hand::{Hand, HandTick, Status};
 pub use in_process::{with_firmware, with_table};
 pub use record::{Recording, Tick, goals, record};
-pub use session::{AnyTelemetry, AnyTickLog, HEARTBEAT_S, Session};
+pub use session::Session;
 pub use start_up::Harness;
 pub use target::{Pace, Pins, Target};

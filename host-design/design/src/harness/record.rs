@@ -3,15 +3,17 @@
 use std::collections::VecDeque;
 
 use upright::board::Output;
+use upright::protocol::KEEP_ALIVE;
 use upright::protocol::message::Request;
 use upright::supervision::fault::Fault;
 use upright::supervision::supervisor::State;
 use upright::table::Equilibrium;
 
 use super::error::HarnessError;
-use super::session::{AnyTelemetry, HEARTBEAT_S, Session};
+use super::session::Session;
 use super::start_up::Harness;
 use super::target::{Pace, Target};
+use crate::client::AnyTelemetry;
 use crate::plant::without_turns;
 use crate::rig::Rig;
 use crate::simulate::{Begin, Fall, Sample, Scenario, Sensing, Summary, Trace, ticks};
@@ -66,7 +68,7 @@ pub fn record(
     let last = ticks(rig, scenario)?;
     let mut record = Record::new(rig, last, pace.telemetry_ticks.into());
     let goals = goals(scenario, period_s);
-    let heartbeat = (HEARTBEAT_S / period_s).max(1.0) as usize;
+    let keep_alive = (KEEP_ALIVE.as_secs_f64() / period_s).max(1.0) as usize;
     for tick in 0..=last {
         if tick > 0 {
             let inputs = harness.inputs();
@@ -78,7 +80,7 @@ pub fn record(
         } else if commanded != ahead {
             harness.session.send(Request::Setpoint(ahead as f32));
             commanded = ahead;
-        } else if tick.is_multiple_of(heartbeat) {
+        } else if tick.is_multiple_of(keep_alive) {
             harness.session.send(Request::KeepAlive);
         }
         let t = tick as f64 * period_s;

@@ -104,7 +104,7 @@ impl<'t> Harness<'t> {
     /// output.
     ///
     /// `setpoint_m` is commanded as soon as the firmware is armed; from then on it needs a command every
-    /// [`HEARTBEAT_S`](super::HEARTBEAT_S). Without a set-point it holds the position in which it begins.
+    /// [`KEEP_ALIVE`](upright::protocol::KEEP_ALIVE). Without a set-point it holds the position in which it begins.
     ///
     /// # Errors
     /// [`HarnessError::NotBalancing`] if that takes longer than a minute.

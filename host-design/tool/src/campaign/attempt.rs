@@ -1,6 +1,7 @@
 //! One trial with a firmware: what is done, and what is observed.
 
 use upright::board::Output;
+use upright::protocol::KEEP_ALIVE;
 use upright::protocol::message::{Answer, Request};
 use upright::supervision::fault::Fault;
 use upright::supervision::sign_check::Signs;
@@ -11,7 +12,7 @@ use super::injection::Injection;
 use super::observed::Observed;
 use super::trial::{Phase, Trial};
 use crate::in_the_loop::{Events, Place, RunError, VirtualBoard};
-use upright_design::harness::{HEARTBEAT_S, Harness, HarnessError, Pins, Session, Target, goals};
+use upright_design::harness::{Harness, HarnessError, Pins, Session, Target, goals};
 use upright_design::identify::Feed;
 use upright_design::plant::absolute_angles;
 use upright_design::rig::{PlantDescription, Rig};
@@ -133,7 +134,7 @@ impl Attempt<'_> {
         let mut observed = Observed::default();
         let mut injection = Injection::new(self.rig, self.table, trial.clone());
         let mut output = harness.raise(Some(0.0))?;
-        let heartbeat = self.ticks(HEARTBEAT_S);
+        let keep_alive = self.ticks(KEEP_ALIVE.as_secs_f64());
         let goals = goals(&self.trial.scenario, self.rig.tick.period_s);
         for tick in 0.. {
             if self.is_over(tick, &observed) {
@@ -154,7 +155,7 @@ impl Attempt<'_> {
                 // One command in a tick.
             } else if tick == 1 {
                 harness.session.send(Request::Setpoint(trial.scenario.step_m as f32));
-            } else if tick.is_multiple_of(heartbeat) && injection.host_is_alive(since) {
+            } else if tick.is_multiple_of(keep_alive) && injection.host_is_alive(since) {
                 harness.session.send(Request::KeepAlive);
             }
             if since == Some(0) {

@@ -1,5 +1,6 @@
 //! Defects in a jog: which of them prove something there, and the outcome that each must have.
 
+use upright::protocol::KEEP_ALIVE;
 use upright::protocol::message::{Answer, Request};
 use upright::supervision::inhibits::Inhibits;
 use upright::supervision::jog::{LONGEST_S, MotorSign};
@@ -13,8 +14,6 @@ use super::injection::Injection;
 use super::observed::Observed;
 use super::trial::{Phase, Trial};
 
-/// Time between two commands of the key that is held (s).
-const KEY_S: f64 = 0.025;
 /// Longest time from pressing the key until the motor is on (s).
 const BEGIN_S: f64 = 0.5;
 /// Distance of the limit switches from the ends of the rail (m).
@@ -104,7 +103,7 @@ impl Attempt<'_> {
                 Some(tick) => (tick + 1).checked_sub(trial.onset),
                 None => None,
             };
-            if turn % self.ticks(KEY_S) == 0 && injection.host_is_alive(since) {
+            if turn % self.ticks(KEEP_ALIVE.as_secs_f64()) == 0 && injection.host_is_alive(since) {
                 harness.session.send(Request::Jog { along: trial.sign > 0.0 });
             }
             let output = match self.control(harness, &mut injection, since, &mut false) {

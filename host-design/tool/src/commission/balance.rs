@@ -6,12 +6,12 @@ use upright::protocol::message::Request;
 use upright::supervision::fault::Fault;
 use upright::supervision::inhibits::Inhibits;
 use upright::supervision::supervisor::State;
+use upright_design::client::AnyTelemetry;
 use upright_design::plant::absolute_angles;
 
 use super::guide::Guide;
 use super::machine::Stop;
 use super::task::Task;
-use crate::monitor::TelemetryOfAny;
 
 /// Time for which the machine has to balance.
 const BALANCED: Duration = Duration::from_secs(10);
@@ -26,7 +26,7 @@ struct Motion {
 }
 
 impl Motion {
-    fn take(&mut self, now: &TelemetryOfAny) {
+    fn take(&mut self, now: &AnyTelemetry) {
         let estimate: Vec<f64> = now.estimate.iter().map(|&value| f64::from(value)).collect();
         self.messages += 1.0;
         self.force_squared += f64::from(now.applied_n).powi(2);
@@ -40,13 +40,13 @@ pub(super) fn balance(guide: &mut Guide<'_>) -> Result<(), Stop> {
     guide.ask(Task::Centre)?;
     guide.pause(Duration::from_secs(1))?;
     guide.ask(Task::Raise)?;
-    let is_up = |now: &TelemetryOfAny| {
+    let is_up = |now: &AnyTelemetry| {
         let mut both = [Inhibits::TILTED, Inhibits::MOVING].into_iter();
         (!both.any(|one| now.arming_inhibits.contains(one))).then_some(())
     };
     guide.wait_for_person(is_up)?;
     guide.request_until(Request::Arm, |now| matches!(now.state, State::Armed | State::Balancing))?;
-    let has_begun = |now: &TelemetryOfAny| matches!(now.state, State::Balancing | State::Fault).then_some(());
+    let has_begun = |now: &AnyTelemetry| matches!(now.state, State::Balancing | State::Fault).then_some(());
     if guide.wait_for_person(has_begun)?.is_none() {
         return Err(Stop::Machine(format!("the motor does not come on: {}", guide.refusal())));
     }

@@ -2,12 +2,13 @@
 
 use upright::supervision::fault::Fault;
 use upright::supervision::inhibits::Inhibits;
+use upright_design::client::AnyTelemetry;
 
 use super::commissioning::Plan;
 use super::guide::Guide;
 use super::machine::Stop;
 use super::task::{End, Task};
-use crate::monitor::{TelemetryOfAny, words};
+use crate::monitor::words;
 
 /// The firmware answers, and is that of the rig file.
 pub(super) fn connect(guide: &mut Guide<'_>, plan: Plan<'_>) -> Result<(), Stop> {
@@ -60,7 +61,7 @@ pub(super) fn check(guide: &mut Guide<'_>, plan: Plan<'_>) -> Result<(), Stop> {
 
 /// The switch at this end opens, and not the other one; away from the ends both are closed.
 fn switch(guide: &mut Guide<'_>, end: End) -> Result<(), Stop> {
-    let both = |now: &TelemetryOfAny| [now.contacts.limit_low, now.contacts.limit_high];
+    let both = |now: &AnyTelemetry| [now.contacts.limit_low, now.contacts.limit_high];
     guide.ask(Task::Centre)?;
     if guide.wait_for_person(|now| (both(now) == [false; 2]).then_some(()))?.is_none() {
         let words = "a limit switch is open in the middle of the rail: it is a normally closed contact to ground; check its wire";
@@ -86,7 +87,7 @@ fn switch(guide: &mut Guide<'_>, end: End) -> Result<(), Stop> {
 /// The supply is within its limits, and the power stage reports no fault.
 fn supply(guide: &mut Guide<'_>) -> Result<(), Stop> {
     guide.ask(Task::SwitchOn)?;
-    let is_good = |now: &TelemetryOfAny| wrong_inputs(now).is_empty().then_some(());
+    let is_good = |now: &AnyTelemetry| wrong_inputs(now).is_empty().then_some(());
     if guide.wait_for_person(is_good)?.is_none() {
         let now = guide.conversation().telemetry.as_ref();
         let words = now.map(|now| format!("{}; {}", wrong_inputs(now).join("; "), words::inputs(now)));
@@ -100,7 +101,7 @@ fn supply(guide: &mut Guide<'_>) -> Result<(), Stop> {
 }
 
 /// What is wrong with supply and power stage.
-fn wrong_inputs(now: &TelemetryOfAny) -> Vec<&'static str> {
+fn wrong_inputs(now: &AnyTelemetry) -> Vec<&'static str> {
     let both = [Inhibits::SUPPLY, Inhibits::DRIVER].into_iter();
     both.filter(|&one| now.arming_inhibits.contains(one)).flat_map(Inhibits::texts).collect()
 }

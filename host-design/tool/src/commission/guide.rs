@@ -2,13 +2,14 @@
 
 use std::time::Duration;
 
-use upright::protocol::message::Request;
+use upright::protocol::message::{Answer, Request};
 use upright::supervision::supervisor::State;
+use upright_design::client::AnyTelemetry;
 
 use super::machine::{Machine, Stop};
 use super::record::Journal;
 use super::task::Task;
-use crate::monitor::{Action, Ended, Monitor, TelemetryOfAny};
+use crate::monitor::{Action, Ended, Monitor};
 
 /// Time without telemetry after which the step ends.
 const SILENCE: Duration = Duration::from_secs(2);
@@ -99,7 +100,7 @@ impl<'a> Guide<'a> {
     pub(super) fn wait<R>(
         &mut self,
         patience: Duration,
-        mut done: impl FnMut(&TelemetryOfAny) -> Option<R>,
+        mut done: impl FnMut(&AnyTelemetry) -> Option<R>,
     ) -> Result<Option<R>, Stop> {
         let end = self.machine.now() + patience;
         loop {
@@ -116,7 +117,7 @@ impl<'a> Guide<'a> {
     /// As [`Guide::wait`], for as long as the person may take for a task.
     pub(super) fn wait_for_person<R>(
         &mut self,
-        done: impl FnMut(&TelemetryOfAny) -> Option<R>,
+        done: impl FnMut(&AnyTelemetry) -> Option<R>,
     ) -> Result<Option<R>, Stop> {
         self.wait(self.machine.patience(), done)
     }
@@ -125,7 +126,7 @@ impl<'a> Guide<'a> {
     pub(super) fn request_until(
         &mut self,
         request: Request,
-        done: impl Fn(&TelemetryOfAny) -> bool,
+        done: impl Fn(&AnyTelemetry) -> bool,
     ) -> Result<(), Stop> {
         let end = self.machine.now() + self.machine.patience();
         while self.machine.now() < end {
@@ -150,14 +151,16 @@ impl<'a> Guide<'a> {
         if let Some(fault) = self.conversation.telemetry.as_ref().and_then(|telemetry| telemetry.fault) {
             return format!("fault {fault}");
         }
-        let lines = self.conversation.log.iter().rev();
-        let reasons: Vec<&str> = lines.map_while(|line| line.strip_prefix("  because ")).collect();
-        if reasons.is_empty() { "no answer".to_owned() } else { reasons.join("; ") }
+        match self.conversation.refusal {
+            Some(Answer::NotNow(reasons)) => reasons.texts().collect::<Vec<_>>().join("; "),
+            Some(Answer::Rejected(rejected)) => rejected.to_string(),
+            _ => "no answer".to_owned(),
+        }
     }
 
     /// Clears a fault once its cause is gone.
     pub(super) fn clear(&mut self) -> Result<(), Stop> {
-        let is_clear = |telemetry: &TelemetryOfAny| telemetry.state != State::Fault;
+        let is_clear = |telemetry: &AnyTelemetry| telemetry.state != State::Fault;
         if self.conversation.telemetry.as_ref().is_some_and(is_clear) {
             return Ok(());
         }

@@ -2,12 +2,12 @@
 
 use upright::protocol::message::Request;
 use upright::supervision::homing::Homing;
+use upright_design::client::AnyTelemetry;
 
 use super::commissioning::Plan;
 use super::guide::Guide;
 use super::machine::Stop;
 use super::task::{End, Task};
-use crate::monitor::TelemetryOfAny;
 
 /// A sensor has moved if it counts at least this share of the expected counts.
 const MOVED: f64 = 0.1;
@@ -19,16 +19,16 @@ pub(super) fn home(guide: &mut Guide<'_>, plan: Plan<'_>) -> Result<(), Stop> {
         return guide.request_until(Request::Home, |now| now.homing == Homing::Homed);
     }
     guide.ask(Task::Centre)?;
-    let is_free = |now: &TelemetryOfAny| !now.contacts.limit_low && !now.contacts.limit_high;
+    let is_free = |now: &AnyTelemetry| !now.contacts.limit_low && !now.contacts.limit_high;
     if guide.wait_for_person(|now| is_free(now).then_some(()))?.is_none() {
         return Err(Stop::Machine("a limit switch stays open, or the cart is still at an end".to_owned()));
     }
-    let is_begun = |now: &TelemetryOfAny| matches!(now.homing, Homing::Touch { .. });
+    let is_begun = |now: &AnyTelemetry| matches!(now.homing, Homing::Touch { .. });
     guide.request_until(Request::HomeRail, is_begun)?;
     let mut ends = Vec::new();
     for end in [End::Low, End::High] {
         guide.ask(Task::PushTo(end))?;
-        let touched = move |now: &TelemetryOfAny| {
+        let touched = move |now: &AnyTelemetry| {
             let is_there = match (now.homing, end) {
                 (Homing::Touch { low, .. }, End::Low) => low,
                 (Homing::Touch { high, .. }, End::High) => high,

@@ -2,6 +2,7 @@
 
 use std::time::Duration;
 
+use upright::protocol::KEEP_ALIVE;
 use upright::protocol::message::Request;
 use upright::supervision::jog::MotorSign;
 use upright::supervision::supervisor::State;
@@ -11,8 +12,6 @@ use super::machine::Stop;
 use super::task::Task;
 use crate::monitor::words;
 
-/// Time between two commands of a key that is held.
-const KEY: Duration = Duration::from_millis(25);
 /// Time for which the rig stands still before a drive, and the key is released between two tries.
 const STILL: Duration = Duration::from_secs(1);
 /// A drive begins within this time, or is refused.
@@ -53,7 +52,7 @@ fn push(guide: &mut Guide<'_>) -> Result<bool, Stop> {
     let mut has_begun = false;
     loop {
         guide.send(Request::Jog { along: true });
-        guide.pause(KEY)?;
+        guide.pause(KEEP_ALIVE)?;
         let is_jogging =
             guide.conversation().telemetry.as_ref().is_some_and(|now| now.state == State::Jogging);
         let since = guide.machine.now().saturating_sub(begin);

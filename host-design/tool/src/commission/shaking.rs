@@ -4,13 +4,14 @@ use std::time::Duration;
 
 use upright::supervision::fault::Fault;
 use upright::supervision::inhibits::Inhibits;
+use upright_design::client::AnyTelemetry;
 use upright_design::identify::{LineError, Log, OverLine};
 
 use super::commissioning::Plan;
 use super::guide::Guide;
 use super::machine::Stop;
 use super::task::Task;
-use crate::monitor::{TelemetryOfAny, words};
+use crate::monitor::words;
 
 /// Time within which the firmware reports the cause of a fault.
 const CAUSE: Duration = Duration::from_millis(300);
@@ -18,7 +19,7 @@ const CAUSE: Duration = Duration::from_millis(300);
 /// The log of the machine, which its firmware shakes.
 pub(super) fn shake(guide: &mut Guide<'_>, plan: Plan<'_>) -> Result<Log, Stop> {
     guide.ask(Task::Centre)?;
-    let is_still = |now: &TelemetryOfAny| (!now.arming_inhibits.contains(Inhibits::MOVING)).then_some(());
+    let is_still = |now: &AnyTelemetry| (!now.arming_inhibits.contains(Inhibits::MOVING)).then_some(());
     guide.wait_for_person(is_still)?;
     guide.ask(Task::HandsOff)?;
     if guide.wait_for_person(is_still)?.is_none() {

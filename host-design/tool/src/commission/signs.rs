@@ -4,12 +4,13 @@ use std::time::Duration;
 
 use upright::protocol::message::Request;
 use upright::supervision::sign_check::Signs;
+use upright_design::client::AnyTelemetry;
 
 use super::commissioning::Plan;
 use super::guide::Guide;
 use super::machine::Stop;
 use super::task::Task;
-use crate::monitor::{TelemetryOfAny, words};
+use crate::monitor::words;
 
 /// A turn has begun when the link has moved by this share of it.
 const BEGUN: f64 = 0.1;
@@ -24,7 +25,7 @@ pub(super) fn check(guide: &mut Guide<'_>) -> Result<(), Stop> {
     guide.request_until(Request::CheckSigns, |now| now.signs != Signs::Unchecked)?;
     let mut asked = None;
     loop {
-        let changed = |now: &TelemetryOfAny| (Some(now.signs) != asked).then_some(now.signs);
+        let changed = |now: &AnyTelemetry| (Some(now.signs) != asked).then_some(now.signs);
         let Some(signs) = guide.wait_for_person(changed)? else {
             return Err(Stop::Machine(match asked {
                 Some(Signs::Move(sensor)) => format!(
@@ -77,16 +78,16 @@ pub(super) fn turns(guide: &mut Guide<'_>, plan: Plan<'_>) -> Result<(), Stop> {
 
 /// Counts from the beginning to the end of a turn of this link; `None` if it does not move.
 fn turn(guide: &mut Guide<'_>, sensor: usize, begun: f64) -> Result<Option<f64>, Stop> {
-    let count = |now: &TelemetryOfAny| f64::from(now.counts.get(sensor).copied().unwrap_or_default());
+    let count = |now: &AnyTelemetry| f64::from(now.counts.get(sensor).copied().unwrap_or_default());
     let from = guide.conversation().telemetry.as_ref().map_or(0.0, count);
     guide.ask(Task::TurnAround(sensor as u8))?;
-    let begins = |now: &TelemetryOfAny| ((count(now) - from).abs() > begun).then(|| count(now));
+    let begins = |now: &AnyTelemetry| ((count(now) - from).abs() > begun).then(|| count(now));
     let Some(mut last) = guide.wait_for_person(begins)? else { return Ok(None) };
     // A hand that holds a link still trembles by less.
     let near = 0.02 * begun / BEGUN;
     let end = guide.machine.now() + guide.machine.patience();
     while guide.machine.now() < end {
-        let on = |now: &TelemetryOfAny| ((count(now) - last).abs() > near).then(|| count(now));
+        let on = |now: &AnyTelemetry| ((count(now) - last).abs() > near).then(|| count(now));
         match guide.wait(ENDED, on)? {
             Some(now) => last = now,
             None => break,

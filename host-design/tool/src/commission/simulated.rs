@@ -123,8 +123,7 @@ impl<'a> Simulated<'a> {
         let pins = self.pins();
         self.output = self.session.tick(&pins)?;
         // Only the raw bytes are used: see `exchange`.
-        while self.session.next_telemetry().is_some() || self.session.next_reply().is_some() {}
-        while self.session.next_log().is_some() {}
+        self.session.forget_received();
         if self.is_free {
             let mut output = self.output;
             if let Some(wires) = &mut self.wires {

@@ -84,7 +84,7 @@ impl Relay<'_> {
             harness.session.send_bytes(received.as_deref().unwrap_or(&[]));
             let inputs = harness.inputs();
             output = harness.session.tick(&inputs)?;
-            while harness.session.next_telemetry().is_some() || harness.session.next_reply().is_some() {}
+            harness.session.forget_received();
             let is_connected =
                 client.as_mut().is_none_or(|stream| send(stream, harness.session.last_bytes()));
             if received.is_none() || !is_connected {

@@ -3,11 +3,10 @@
 use std::io::Write;
 
 use serde_json::{Value, json};
-
-use super::model::TelemetryOfAny;
+use upright_design::client::AnyTelemetry;
 
 /// One object with SI units; fault and arming inhibits by name.
-pub fn json(telemetry: &TelemetryOfAny) -> Value {
+pub fn json(telemetry: &AnyTelemetry) -> Value {
     json!({
         "tick": telemetry.tick,
         "state": telemetry.state,
@@ -51,7 +50,7 @@ impl<W: Write> Recorder<W> {
     ///
     /// # Errors
     /// If it cannot be written.
-    pub fn push(&mut self, telemetry: &TelemetryOfAny) -> std::io::Result<()> {
+    pub fn push(&mut self, telemetry: &AnyTelemetry) -> std::io::Result<()> {
         if !self.begun {
             let fixed =
                 ["tick", "state", "fault", "setpoint_m", "requested_n", "applied_n", "drive", "cycles"];

@@ -8,8 +8,9 @@ use ratatui::text::Line;
 use ratatui::widgets::{Axis, Block, Chart, Dataset, GraphType, Paragraph, Wrap};
 use upright::supervision::inhibits::Inhibits;
 use upright::supervision::supervisor::State;
+use upright_design::client::AnyTelemetry;
 
-use super::model::{Monitor, TelemetryOfAny};
+use super::model::Monitor;
 use super::words;
 
 const KEYS: &str = "h/H home (rail)  g check signs  m/M drive (held)  a arm  u up  n down  1…6 turn a link over  d/space disarm  c clear  ←→ 1 cm  0 zero  l law  r record  q quit";
@@ -174,8 +175,8 @@ fn bar(value: f32) -> String {
 
 fn draw_charts(monitor: &Monitor, frame: &mut Frame<'_>, area: Rect) {
     let (Some(info), Some(last)) = (monitor.info, monitor.history.back()) else { return };
-    let series = |value: &dyn Fn(&TelemetryOfAny) -> Option<f32>| -> Vec<(f64, f64)> {
-        let age = |telemetry: &TelemetryOfAny| {
+    let series = |value: &dyn Fn(&AnyTelemetry) -> Option<f32>| -> Vec<(f64, f64)> {
+        let age = |telemetry: &AnyTelemetry| {
             -f64::from(last.tick.wrapping_sub(telemetry.tick)) * f64::from(info.tick_s)
         };
         let finite = |value: &f32| value.is_finite();

@@ -239,7 +239,7 @@ impl<'a, 't> World<'a, 't> {
         self.output = self.harness.session.tick(&inputs)?;
         let session = &mut self.harness.session;
         desk.receive(session.last_bytes(), now);
-        while session.next_telemetry().is_some() || session.next_reply().is_some() {}
+        session.forget_received();
         self.t_s += self.machine.rig.tick.period_s;
         Ok(())
     }
