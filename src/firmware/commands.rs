@@ -31,6 +31,12 @@ impl<const NX: usize, const NY: usize, S: SwingUp<NX, NY>> Firmware<'_, NX, NY, 
         let done = |result: Result<(), _>| result.map_or_else(Answer::NotNow, |()| Answer::Done);
         let taken = |result: Result<(), _>| result.map_or_else(Answer::Rejected, |()| Answer::Done);
         match command.request {
+            Request::Arm | Request::Goto(_) => self.restart_lockout(),
+            #[cfg(feature = "identify")]
+            Request::Shake(_) => self.restart_lockout(),
+            _ => {}
+        }
+        match command.request {
             Request::KeepAlive => Answer::Done,
             Request::Home => done(self.home_here()),
             Request::HomeRail => done(self.home_rail()),
@@ -118,18 +124,20 @@ impl<const NX: usize, const NY: usize, S: SwingUp<NX, NY>> Firmware<'_, NX, NY, 
         Ok(())
     }
 
-    /// [`Inhibits::HELD`] if the command `id`, which would turn the motor on, comes from a key held since a fault.
-    pub(super) fn held_inhibit(&mut self, id: u64) -> Inhibits {
-        // A key held down since the fault sends one command after the other. None of them may turn the motor on: each
-        // one restarts the lockout, which ends only when the key has been released for `still_ticks`. The time for
-        // which homing wants everything still also serves for this; there is no need for another setting in the rig
-        // file.
+    /// A command that would turn the motor on has come. A key held down since a fault sends one after the other, and
+    /// none of them may turn the motor on: each one restarts the lockout, which ends only when the key has been
+    /// released for `still_ticks`. The time for which homing wants everything still also serves for this; there is no
+    /// need for another setting in the rig file.
+    fn restart_lockout(&mut self) {
         if self.supervisor.state() == State::Fault || self.rearm_lockout_ticks > 0 {
             self.rearm_lockout_ticks = self.table.limits.still_ticks;
         }
-        let held = self.supervisor.state() != State::Fault
-            && (self.rearm_lockout_ticks > 0 || id <= self.last_clear_id);
-        Inhibits::HELD.when(held)
+    }
+
+    /// [`Inhibits::HELD`] if the command `id`, which would turn the motor on, comes from a key held since a fault.
+    pub(super) fn held_inhibit(&self, id: u64) -> Inhibits {
+        let is_held = self.rearm_lockout_ticks > 0 || id <= self.last_clear_id;
+        Inhibits::HELD.when(is_held && self.supervisor.state() != State::Fault)
     }
 
     /// Inhibits of clearing: conditions that would trip the fault again at once.

@@ -433,7 +433,9 @@ impl<'t, const NX: usize, const NY: usize, S: SwingUp<NX, NY>> Firmware<'t, NX, 
         self.cycles = cycles;
         self.statistics.ticks = self.statistics.ticks.wrapping_add(1);
         self.worst_cycles = self.worst_cycles.max(cycles);
-        self.telemetry_is_due().then(|| self.telemetry())
+        let telemetry = self.telemetry_is_due().then(|| self.telemetry());
+        self.count_to_telemetry();
+        telemetry
     }
 
     /// The second part of [`finish`](Self::finish): the prediction, while the controller commands the motor.

@@ -14,14 +14,15 @@ impl<const NX: usize, const NY: usize, S: SwingUp<NX, NY>> Firmware<'_, NX, NY, 
         self.statistics.dropped = self.statistics.dropped.saturating_add(1);
     }
 
-    /// Whether telemetry is sent in this tick. Has to be called once per tick, because it counts the ticks.
-    pub(super) fn telemetry_is_due(&mut self) -> bool {
-        if self.ticks_to_telemetry > 0 {
-            self.ticks_to_telemetry -= 1;
-            return false;
-        }
-        self.ticks_to_telemetry = self.telemetry_period_ticks.saturating_sub(1);
-        self.telemetry_period_ticks > 0
+    /// Whether telemetry is sent in this tick.
+    pub(super) fn telemetry_is_due(&self) -> bool {
+        self.ticks_to_telemetry == 0 && self.telemetry_period_ticks > 0
+    }
+
+    /// Counts a tick towards the next telemetry.
+    pub(super) fn count_to_telemetry(&mut self) {
+        let next = self.telemetry_period_ticks.saturating_sub(1);
+        self.ticks_to_telemetry = self.ticks_to_telemetry.checked_sub(1).unwrap_or(next);
     }
 
     /// The telemetry of this tick.

@@ -215,3 +215,33 @@ fn of_several_faults_in_one_tick_the_first_of_the_precedence_is_latched() {
     }
     assert_eq!(cause_of(&[], ticks_of_a_pass), None, "nothing is due, nothing is found");
 }
+
+/// Whether arming is refused as a held key's command, when `request` has been repeated in every tick since a fault was
+/// cleared.
+fn is_held_after_repeating(request: Request) -> bool {
+    let mut firmware = firmware(&TABLE, Reset::Power).unwrap();
+    let mut id = 0;
+    let mut inhibits = |firmware: &mut Firmware<'_, STATES, SENSORS>, request| {
+        id += 1;
+        firmware.control(&INPUTS);
+        let (_, reply) = firmware.finish(Some(&Command { id, request }), 0);
+        match reply.map(|reply| reply.answer) {
+            Some(Answer::NotNow(inhibits)) => inhibits,
+            _ => Inhibits::NONE,
+        }
+    };
+    firmware.trip(Fault::Angle, None);
+    inhibits(&mut firmware, request);
+    inhibits(&mut firmware, Request::Clear);
+    for _ in 0..TABLE.limits.still_ticks + 10 {
+        inhibits(&mut firmware, request);
+    }
+    inhibits(&mut firmware, Request::Arm).contains(Inhibits::HELD)
+}
+
+#[test]
+fn a_held_key_keeps_the_motor_off_whatever_else_refuses_its_command() {
+    assert!(is_held_after_repeating(Request::Arm));
+    assert!(is_held_after_repeating(Request::Goto(Equilibrium::UPRIGHT)), "there is no swing-up");
+    assert!(!is_held_after_repeating(Request::KeepAlive), "which turns no motor on");
+}

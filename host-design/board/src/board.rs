@@ -48,6 +48,10 @@ pub enum Input {
     LoseWrite(u32),
     /// As [`Input::LoseWrite`], but reads of the register return the lost value: for negative controls.
     LoseWriteUnseen(u32),
+    /// A received byte is not fetched before the next one ends, as after contention on the bus.
+    Overrun,
+    /// The DMA stream that receives ends with a transfer error.
+    ReceiveError,
     /// The core is stalled until this time; peripherals keep running.
     Stall(Time),
     /// The program counter jumps to this address, as a defect inside the core might make it do.
@@ -193,6 +197,8 @@ impl Board {
                 bus.lost_write = Some(register);
                 bus.lost_write_is_hidden = matches!(input, Input::LoseWriteUnseen(_));
             }
+            Input::Overrun => bus.usart.overrun(),
+            Input::ReceiveError => bus.dma.fail(bus.dma.serial().0),
             Input::Stall(until) => machine.stalled_until = until,
             Input::Jump(address) => {
                 machine.registers.pc = address & !1;

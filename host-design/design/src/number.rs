@@ -18,20 +18,19 @@ pub fn significant(x: f64, digits: usize) -> String {
 }
 
 /// Poles `[re, im]` as text, each conjugate pair once, as `re±imi`. A pole of magnitude below 1e-60 is a pole at the
-/// origin plus rounding error and is shown as 0.
+/// origin plus rounding error and is shown as 0. An imaginary part below 1e-30 of the pole is the rounding error of
+/// equal real poles, and is left out.
 pub fn poles(poles: &[[f64; 2]], digits: usize) -> Vec<String> {
-    let upper = poles.iter().filter(|pole| pole[1] >= 0.0);
-    upper
-        .map(|&[re, im]| {
-            if re.hypot(im) < 1e-60 {
-                "0".to_owned()
-            } else if im == 0.0 {
-                significant(re, digits)
-            } else {
-                format!("{}±{}i", significant(re, digits), significant(im, digits))
-            }
-        })
-        .collect()
+    let text = |&[re, im]: &[f64; 2]| {
+        if re.hypot(im) < 1e-60 {
+            Some("0".to_owned())
+        } else if im.abs() < 1e-30 * re.abs() {
+            Some(significant(re, digits))
+        } else {
+            (im > 0.0).then(|| format!("{}±{}i", significant(re, digits), significant(im, digits)))
+        }
+    };
+    poles.iter().filter_map(text).collect()
 }
 
 #[cfg(test)]
@@ -54,5 +53,11 @@ mod tests {
             poles(&[[0.5, 0.25], [0.5, -0.25], [-5e-154, 0.0], [0.9, 0.0]], 3),
             ["0.5±0.25i", "0", "0.9"]
         );
+    }
+
+    #[test]
+    fn equal_real_poles_have_no_imaginary_part() {
+        let equal = [[-4.0, 2.0914e-38], [-4.0, -2.0914e-38], [-4.0, 0.0], [-4.0, 1e-7], [-4.0, -1e-7]];
+        assert_eq!(poles(&equal, 3), ["-4", "-4", "-4", "-4±1e-7i"]);
     }
 }

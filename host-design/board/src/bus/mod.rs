@@ -110,7 +110,7 @@ pub(crate) struct Bus {
     capture: CaptureTimer,
     pub(crate) adc: Adc,
     pub(crate) usart: Usart,
-    dma: Dma,
+    pub(crate) dma: Dma,
     pub(crate) iwdg: Iwdg,
     pub(crate) power: Power,
     pub(crate) driven: Driven,

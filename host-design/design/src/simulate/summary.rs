@@ -167,11 +167,11 @@ impl fmt::Display for Summary {
         for (index, angle) in self.peak_angles_rad.iter().enumerate() {
             writeln!(f, "  peak theta{}    {:.4} rad ({:.2} deg)", index + 1, angle, angle.to_degrees())?;
         }
-        writeln!(
-            f,
-            "  peak force     {:.3} N (requested: {:.3} N)",
-            self.peak_force_n, self.peak_requested_force_n
-        )?;
-        write!(f, "  final error    {:.2e} m", self.final_error_m)
+        // A model has no angles, and units of its own.
+        let [input, n, m] =
+            if self.peak_angles_rad.is_empty() { ["input", "", ""] } else { ["force", " N", " m"] };
+        let (peak, requested) = (self.peak_force_n, self.peak_requested_force_n);
+        writeln!(f, "  peak {input}     {peak:.3}{n} (requested: {requested:.3}{n})")?;
+        write!(f, "  final error    {:.2e}{m}", self.final_error_m)
     }
 }

@@ -9,10 +9,12 @@ use upright_design::rig::{PlantDescription, Rig};
 use upright_design::simulate::{Scenario, Sensing};
 
 use super::attempt::Attempt;
-use super::defect::{Expected, Kind};
+use super::defect::Defect;
+use super::expected::Expected;
+use super::expected::Phase;
 use super::injection::Injection;
 use super::observed::Observed;
-use super::trial::{Phase, Trial};
+use super::trial::Trial;
 
 /// Longest time from pressing the key until the motor is on (s).
 const BEGIN_S: f64 = 0.5;
@@ -21,37 +23,37 @@ const SWITCH_M: f64 = 0.01;
 /// Time for which a drive is watched from the onset on (s).
 const WATCHED_S: f64 = 0.4;
 
-impl Kind {
+impl Defect {
     /// The outcome that it must have in a jog; `None` if it proves nothing there.
     pub fn while_jogging(self) -> Option<Expected> {
         match self {
-            Kind::HostSilent | Kind::HostWireOpen => Some(Expected::LetGo),
-            Kind::MotorDead | Kind::CartEncoderFrozen | Kind::EncoderWireOpen => {
+            Defect::HostSilent | Defect::HostWireOpen => Some(Expected::LetGo),
+            Defect::MotorDead | Defect::CartEncoderFrozen | Defect::EncoderWireOpen => {
                 Some(Expected::Found(MotorSign::Still))
             }
-            Kind::MotorReversed | Kind::EncoderReversed => Some(Expected::Found(MotorSign::Reversed)),
-            Kind::SupplyNotANumber
-            | Kind::SupplySag
-            | Kind::SupplyDip
-            | Kind::SupplySurge
-            | Kind::SupplySpike
-            | Kind::EmergencyStop
-            | Kind::DriverFault
-            | Kind::LimitSwitch
-            | Kind::OneOverrun
-            | Kind::Overruns
-            | Kind::FrameDamaged
-            | Kind::FrameTruncated
-            | Kind::FrameReplayed
-            | Kind::Rubbish
-            | Kind::Panic
-            | Kind::HardFault
-            | Kind::StackOverflow
-            | Kind::StalledTick
-            | Kind::LockUp
-            | Kind::CrystalStops
-            | Kind::BrownOut
-            | Kind::StopBetweenTicks => Some(self.expected()),
+            Defect::MotorReversed | Defect::EncoderReversed => Some(Expected::Found(MotorSign::Reversed)),
+            Defect::SupplyNotANumber
+            | Defect::SupplySag
+            | Defect::SupplyDip
+            | Defect::SupplySurge
+            | Defect::SupplySpike
+            | Defect::EmergencyStop
+            | Defect::DriverFault
+            | Defect::LimitSwitch
+            | Defect::OneOverrun
+            | Defect::Overruns
+            | Defect::FrameDamaged
+            | Defect::FrameTruncated
+            | Defect::FrameReplayed
+            | Defect::Rubbish
+            | Defect::Panic
+            | Defect::HardFault
+            | Defect::StackOverflow
+            | Defect::StalledTick
+            | Defect::LockUp
+            | Defect::CrystalStops
+            | Defect::BrownOut
+            | Defect::StopBetweenTicks => Some(self.expected()),
             _ => None,
         }
     }

@@ -14,10 +14,12 @@ use upright_design::rig::Rig;
 use upright_design::table::TableValues;
 
 use super::attempt::{Attempt, BEYOND, During};
-use super::defect::{Expected, Kind};
+use super::defect::Defect;
+use super::expected::Expected;
+use super::expected::Phase;
 use super::injection::Injection;
 use super::observed::Observed;
-use super::trial::{Phase, Trial};
+use super::trial::Trial;
 
 /// The defects begin between these times (s): while the cart is pushed each way, and while everything is shaken.
 const ONSET_S: [f64; 2] = [0.05, 5.0];
@@ -45,7 +47,7 @@ impl During<'_> {
     }
 
     /// Whether a defect of this kind proves something in this campaign.
-    pub fn is_proof(&self, kind: Kind) -> bool {
+    pub fn is_proof(&self, kind: Defect) -> bool {
         match self {
             During::Balancing => true,
             During::Jog => kind.while_jogging().is_some(),
@@ -54,7 +56,7 @@ impl During<'_> {
     }
 
     /// Whether a defect must be missed without thresholds and limits.
-    pub fn needs_detection(&self, kind: Kind) -> bool {
+    pub fn needs_detection(&self, kind: Defect) -> bool {
         let must_end = match self {
             During::Shaking(_) => kind.while_shaken() == Some(Expected::Changed),
             During::Balancing | During::Jog => true,
@@ -63,30 +65,31 @@ impl During<'_> {
     }
 }
 
-impl Kind {
+impl Defect {
     /// The outcome that it must have while the rig is shaken; `None` if it proves nothing there.
     pub fn while_shaken(self) -> Option<Expected> {
         match self {
-            Kind::HostSilent | Kind::HostWireOpen | Kind::HostDeaf => Some(Expected::LetGo),
+            Defect::HostSilent | Defect::HostWireOpen | Defect::HostDeaf => Some(Expected::LetGo),
             // What stands still while the motor pushes, and a cart that runs away.
-            Kind::LinkEncoderFrozen | Kind::CartEncoderFrozen | Kind::EncoderWireOpen | Kind::MotorStuck => {
-                Some(Expected::Changed)
-            }
+            Defect::LinkEncoderFrozen
+            | Defect::CartEncoderFrozen
+            | Defect::EncoderWireOpen
+            | Defect::MotorStuck => Some(Expected::Changed),
             // There is no observer: only what leads beyond a limit is found. The log shows the rest to the host.
-            Kind::BadSample
-            | Kind::EncoderJump
-            | Kind::EncoderReversed
-            | Kind::EncodersSwapped
-            | Kind::MotorDead
-            | Kind::MotorReversed => Some(Expected::Bounded),
-            Kind::ArmUnhomed
-            | Kind::ArmHanging
-            | Kind::ArmStopped
-            | Kind::ArmHeld
-            | Kind::CrystalMissing
-            | Kind::CrystalWrong
-            | Kind::ChipWrong
-            | Kind::WriteLost => None,
+            Defect::BadSample
+            | Defect::EncoderJump
+            | Defect::EncoderReversed
+            | Defect::EncodersSwapped
+            | Defect::MotorDead
+            | Defect::MotorReversed => Some(Expected::Bounded),
+            Defect::ArmUnhomed
+            | Defect::ArmHanging
+            | Defect::ArmStopped
+            | Defect::ArmHeld
+            | Defect::CrystalMissing
+            | Defect::CrystalWrong
+            | Defect::ChipWrong
+            | Defect::WriteLost => None,
             _ => Some(self.expected()),
         }
     }

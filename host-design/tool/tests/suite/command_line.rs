@@ -207,6 +207,37 @@ fn numbers_are_shortest_decimals_and_an_absent_design_is_null() {
 }
 
 #[test]
+fn a_design_that_falls_ends_with_status_1_whether_it_would_be_written_or_not() {
+    let text = std::fs::read_to_string(rig_path(SINGLE)).unwrap();
+    let weak = Bench::new(&text.replace("force_limit_n = 13.0", "force_limit_n = 1e-9"));
+    let sound = Bench::new(&text);
+    for arguments in [&[][..], &["--no-write"], &["--no-write", "--json"], &["--check"]] {
+        let output = weak.design(arguments);
+        assert_eq!(status(&output), 1, "{arguments:?}: {}", stderr(&output));
+        assert!(stderr(&output).contains("fell at"), "{arguments:?}: {}", stderr(&output));
+        assert!(!stdout(&output).is_empty() && weak.is_untouched());
+    }
+    assert_eq!(status(&sound.design(&["--no-write"])), 0);
+}
+
+#[test]
+fn a_model_has_no_newtons_metres_or_nonlinear_plant() {
+    let bench = Bench::new(&model("[[0, 1], [0, 0]]", "[0, 1]", LQR));
+    let rig = bench.path("rig.toml");
+    let rig = rig.to_str().unwrap();
+    let is_of_a_chain = |text: &str| {
+        let words = ["nonlinear", "force ", " N (", " N,", " N)", " m\n", " mm", "mrad"];
+        words.iter().any(|word| text.contains(word))
+    };
+    for arguments in [&["design", rig, "--no-write"][..], &["simulate", rig], &["verify", rig]] {
+        let output = upright(arguments);
+        assert_eq!(status(&output), 0, "{arguments:?}: {}", stderr(&output));
+        assert!(!is_of_a_chain(stdout(&output)), "{arguments:?}:\n{}", stdout(&output));
+    }
+    assert!(is_of_a_chain(stdout(&upright(&["design", &path_of(SINGLE), "--no-write"]))));
+}
+
+#[test]
 fn json_stays_alone_on_stdout_when_the_table_is_written_or_differs() {
     let bench = Bench::new(&model("[[0, 1], [0, 0]]", "[0, 1]", LQR));
     let output = bench.design(&["--json", "--check"]);

@@ -32,6 +32,7 @@ mod report_rigs;
 mod reproduce_numbers;
 mod reproduced;
 mod robust_command;
+mod serial_errors;
 mod shaken;
 mod split_command;
 mod transitions_command;

@@ -1,8 +1,8 @@
 //! Rows from the linear model of the loop.
 
 use super::Values::{Each, One};
-use super::{Quantity, number};
-use crate::rig::{PlantDescription, Rig};
+use super::{Quantity, force, is_chain, number};
+use crate::rig::Rig;
 use crate::verify::{LawTrust, Margins, NoiseShare};
 
 pub(super) const QUANTITIES: &[Quantity] = &[
@@ -85,10 +85,10 @@ pub(super) const QUANTITIES: &[Quantity] = &[
         name: "f32 against f64",
         meaning: "largest difference of the force, tick by tick, from the same controller in f64 with exact gains, and \
                   relative to the peak force of that run",
-        values: One(|_, law| {
+        values: One(|rig, law| {
             let rounding = law.linear.rounding.as_ref()?;
             let (force_n, relative) = (rounding.force_difference_n?, rounding.force_difference_relative?);
-            Some(format!("{} N, {relative:.1e} of the peak", number(force_n)))
+            Some(format!("{}, {relative:.1e} of the peak", force(rig, force_n)))
         }),
     },
     Quantity {
@@ -96,8 +96,7 @@ pub(super) const QUANTITIES: &[Quantity] = &[
         meaning: "ripple at rest from this source, and from all, as the linear model predicts it; encoder resolution \
                   counts as white noise",
         values: Each(|rig, law| {
-            let is_chain = matches!(rig.plant, PlantDescription::Chain(_));
-            let shares = law.linear.noise.iter().flatten().filter(|_| is_chain);
+            let shares = law.linear.noise.iter().flatten().filter(|_| is_chain(rig));
             let row = |share: &NoiseShare| ripple(rig, share.force_n, &share.states);
             shares.map(|share| (share.source.clone(), row(share))).collect()
         }),
@@ -117,8 +116,11 @@ fn margins(law: &LawTrust) -> Option<&Margins> {
     law.linear.margins.as_ref()
 }
 
-/// Root mean squares of force, cart and joint angles.
+/// Root mean squares of force, cart and joint angles; of input and output for a model.
 fn ripple(rig: &Rig, force_n: f64, states: &[f64]) -> String {
+    if !is_chain(rig) {
+        return format!("input {}, output {}", number(force_n), number(states[rig.output()]));
+    }
     let angles: Vec<String> = states.iter().skip(2).step_by(2).map(|&angle| number(1e3 * angle)).collect();
     let cart_mm = number(1e3 * states[rig.output()]);
     format!("force {} N, cart {cart_mm} mm, angles {} mrad", number(force_n), angles.join(" "))

@@ -6,7 +6,7 @@ mod runs;
 
 use super::LawTrust;
 use crate::number::significant;
-use crate::rig::Rig;
+use crate::rig::{PlantDescription, Rig};
 
 /// One quantity of the trust report.
 #[derive(Debug, Clone, Copy)]
@@ -63,6 +63,17 @@ pub fn rows(rig: &Rig, law: &LawTrust) -> Vec<Row> {
 /// Three significant digits.
 fn number(x: f64) -> String {
     significant(x, 3)
+}
+
+/// Whether lengths, angles and forces have the units of a chain; a model has units of its own.
+fn is_chain(rig: &Rig) -> bool {
+    matches!(rig.plant, PlantDescription::Chain(_))
+}
+
+/// A force, or the input of a model, with its unit.
+fn force(rig: &Rig, force_n: f64) -> String {
+    let unit = if is_chain(rig) { " N" } else { "" };
+    format!("{}{unit}", number(force_n))
 }
 
 /// Signs of a combination, such as `+-+-`.

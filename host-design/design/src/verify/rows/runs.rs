@@ -1,7 +1,7 @@
 //! Rows from runs against the nonlinear plant.
 
 use super::Values::{Each, One};
-use super::{Quantity, number, signs};
+use super::{Quantity, force, is_chain, number, signs};
 use crate::verify::LawTrust;
 
 pub(super) const QUANTITIES: &[Quantity] = &[
@@ -23,10 +23,11 @@ pub(super) const QUANTITIES: &[Quantity] = &[
     Quantity {
         name: "largest ungoverned step",
         meaning: "largest step of the set-point without the governor; 2 m is the largest tried",
-        values: One(|_, law| {
+        values: One(|rig, law| {
             let step = law.attraction.as_ref()?.raw_step.as_ref()?;
             let largest = if step.at_largest_tried { " (largest tried)" } else { "" };
-            Some(format!("{} m{largest}, peak force {} N", number(step.size), number(step.peak_force_n)))
+            let [m, peak] = if is_chain(rig) { [" m", "peak force"] } else { ["", "peak input"] };
+            Some(format!("{}{m}{largest}, {peak} {}", number(step.size), force(rig, step.peak_force_n)))
         }),
     },
     Quantity {

@@ -90,11 +90,11 @@ impl Design {
         for warning in text::warnings(&rig, &certified, &reports, table.as_ref().ok()) {
             eprintln!("warning: {warning}");
         }
+        refuse_failing_table(&rig, &reports)?;
         if self.no_write {
             return Ok(());
         }
         let table = table.map_err(|source| Failure::NoTable { rig: name(), source })?;
-        refuse_failing_table(&rig, &reports)?;
         let table = match (self.swing_up, self.transitions) {
             (_, true) => with_stored_motions(&self.rig, &rig, table, Wanted::Transitions)?,
             (true, false) => with_stored_motions(&self.rig, &rig, table, Wanted::SwingUp)?,

@@ -24,6 +24,10 @@ fn write_design(
     reports: &[LawReport],
 ) -> core::fmt::Result {
     let [low, high] = certified.bits;
+    let plant = match rig.plant {
+        PlantDescription::Chain(_) => "nonlinear plant",
+        PlantDescription::Model(_) => "the linear model",
+    };
     writeln!(out, "{} (hash {:016x})", rig.name, rig.hash())?;
     writeln!(
         out,
@@ -50,7 +54,7 @@ fn write_design(
             assessment.exact, assessment.rounded, assessment.continuous_at_tick, assessment.largest_rounding
         )?;
         match &report.run {
-            Some(run) => writeln!(out, "  closed loop, firmware against nonlinear plant: {run}")?,
+            Some(run) => writeln!(out, "  closed loop, firmware against {plant}: {run}")?,
             None => writeln!(out, "  no closed loop: this design makes no table")?,
         }
     }

@@ -11,7 +11,6 @@
 #![no_std]
 #![no_main]
 
-#[path = "board/hardware.rs"]
 mod board;
 
 // The registers of the board's chip.
