@@ -8,7 +8,7 @@ use upright::protocol::message::{Answer, Info, Message, PROTOCOL, Reply, Request
 use upright::protocol::serial_link::MAX_MESSAGE;
 use upright::protocol::tick_log::TickLog;
 
-use super::requests::{Requests, Unanswered};
+use super::request_queue::{RequestQueue, Unanswered};
 use crate::table::{MAX_SENSORS, MAX_STATES};
 
 /// Telemetry of a firmware of any size: its frames are the same bytes whatever the capacity of the lists.
@@ -84,7 +84,7 @@ pub enum Received {
 /// it stays 0, they are numbered from 1.
 #[derive(Default)]
 pub struct Client {
-    requests: Requests,
+    requests: RequestQueue,
     receiver: Receiver<MAX_MESSAGE>,
     keeps_alive: bool,
     next_keep_alive: Duration,

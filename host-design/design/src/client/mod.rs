@@ -6,7 +6,7 @@
 
 #[allow(clippy::module_inception)] // the file of the type
 mod client;
-mod requests;
+mod request_queue;
 
 pub use client::{AnyTelemetry, AnyTickLog, Client, Mismatch, Received};
-pub use requests::{PATIENCE, Unanswered, command_frame};
+pub use request_queue::{PATIENCE, Unanswered, command_frame};

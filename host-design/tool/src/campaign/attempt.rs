@@ -8,13 +8,12 @@ use upright::supervision::sign_check::Signs;
 use upright_board::UNITS_PER_MICROSECOND;
 
 use super::defect::Defect;
-use super::expected::Expected;
-use super::expected::Phase;
+use super::expected::{Expected, Phase};
 use super::injection::Injection;
 use super::observed::Observed;
 use super::trial::Trial;
 use crate::in_the_loop::{Events, Place, RunError, VirtualBoard};
-use upright_design::harness::{Harness, HarnessError, Pins, Session, Target, goals};
+use upright_design::harness::{Harness, HarnessError, Pins, RailEnds, Session, Target, goals, healthy};
 use upright_design::identify::Feed;
 use upright_design::plant::absolute_angles;
 use upright_design::rig::{PlantDescription, Rig};
@@ -238,7 +237,8 @@ impl Attempt<'_> {
             Phase::Balancing | Phase::Raising | Phase::Lowering => false,
         };
         if has_switches {
-            self.press_limit_switches(harness.bench.state(), &mut inputs);
+            // They alone keep the cart on its rail if its encoder is wrong.
+            RailEnds::of(self.rig).press(harness.bench.state()[0], &mut inputs.contacts);
         }
         if let Some(since) = since {
             *is_visible |= injection.inputs(since, &mut inputs);
@@ -306,9 +306,7 @@ impl Attempt<'_> {
 
     /// Whether the cart is off its rail.
     pub(super) fn is_off_rail(&self, state: &[f64]) -> bool {
-        let PlantDescription::Chain(chain) = &self.rig.plant else { return false };
-        let [low, high] = chain.cart.travel_m;
-        !(low..=high).contains(&state[0])
+        !RailEnds::of(self.rig).holds(state[0])
     }
 
     /// Planned angles of the links from the vertical in `tick` of a run with a motion (rad).
@@ -329,13 +327,8 @@ impl Attempt<'_> {
     fn power_up(&self, target: &mut dyn Target) -> Result<Observed, HarnessError> {
         let mut observed = Observed::default();
         let mut session = Session::new(target);
-        let pins = Pins {
-            raw_counts: (0..self.table.sensors()).map(|_| 0).collect(),
-            supply_v: self.table.motor.map_or(24.0, |motor| motor.supply_v),
-            contacts: Default::default(),
-            received: heapless::Vec::new(),
-            injected_fault: None,
-        };
+        let supply_v = self.table.motor.map_or(24.0, |motor| motor.supply_v);
+        let pins = healthy(&vec![0; self.table.sensors()], supply_v);
         match session.ask(Request::Arm, &pins) {
             Err(HarnessError::Refused { answer: Answer::NotNow(reasons), .. }) => {
                 observed.refused = Some(reasons)

@@ -4,22 +4,19 @@ use upright::protocol::KEEP_ALIVE;
 use upright::protocol::message::{Answer, Request};
 use upright::supervision::inhibits::Inhibits;
 use upright::supervision::jog::{LONGEST_S, MotorSign};
-use upright_design::harness::{Harness, HarnessError, Pins};
-use upright_design::rig::{PlantDescription, Rig};
+use upright_design::harness::{Harness, HarnessError};
+use upright_design::rig::Rig;
 use upright_design::simulate::{Scenario, Sensing};
 
 use super::attempt::Attempt;
 use super::defect::Defect;
-use super::expected::Expected;
-use super::expected::Phase;
+use super::expected::{Expected, Phase};
 use super::injection::Injection;
 use super::observed::Observed;
 use super::trial::Trial;
 
 /// Longest time from pressing the key until the motor is on (s).
 const BEGIN_S: f64 = 0.5;
-/// Distance of the limit switches from the ends of the rail (m).
-const SWITCH_M: f64 = 0.01;
 /// Time for which a drive is watched from the onset on (s).
 const WATCHED_S: f64 = 0.4;
 
@@ -149,15 +146,6 @@ impl Attempt<'_> {
         }
         self.after_drive(harness, &mut observed)?;
         Ok(observed)
-    }
-
-    /// Presses the limit switches, which alone keep the cart on its rail if its encoder is wrong.
-    pub(super) fn press_limit_switches(&self, state: &[f64], inputs: &mut Pins) {
-        if let PlantDescription::Chain(chain) = &self.rig.plant {
-            let [low, high] = chain.cart.travel_m;
-            inputs.contacts.limit_low |= state[0] < low + SWITCH_M;
-            inputs.contacts.limit_high |= state[0] > high - SWITCH_M;
-        }
     }
 
     /// Whether nothing is left to be observed after `tick` of a rig that hangs.

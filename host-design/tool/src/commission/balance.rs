@@ -18,14 +18,14 @@ const BALANCED: Duration = Duration::from_secs(10);
 
 /// Largest motion while it balances.
 #[derive(Default)]
-struct Motion {
+struct LargestMotion {
     messages: f64,
     force_squared: f64,
     lean_rad: f64,
     cart_m: f64,
 }
 
-impl Motion {
+impl LargestMotion {
     fn take(&mut self, now: &AnyTelemetry) {
         let estimate: Vec<f64> = now.estimate.iter().map(|&value| f64::from(value)).collect();
         self.messages += 1.0;
@@ -37,9 +37,9 @@ impl Motion {
 
 /// The links are raised by hand, the motor comes on, the hand lets go, and the rig balances.
 pub(super) fn balance(guide: &mut Guide<'_>) -> Result<(), Stop> {
-    guide.ask(Task::Centre)?;
+    guide.ask(PersonTask::Centre)?;
     guide.pause(Duration::from_secs(1))?;
-    guide.ask(Task::Raise)?;
+    guide.ask(PersonTask::Raise)?;
     let is_up = |now: &AnyTelemetry| {
         let mut both = [Inhibits::TILTED, Inhibits::MOVING].into_iter();
         (!both.any(|one| now.arming_inhibits.contains(one))).then_some(())
@@ -50,7 +50,7 @@ pub(super) fn balance(guide: &mut Guide<'_>) -> Result<(), Stop> {
     if guide.wait_for_person(has_begun)?.is_none() {
         return Err(Stop::Machine(format!("the motor does not come on: {}", guide.refusal())));
     }
-    let (begin, mut motion, mut last) = (guide.machine.now(), Motion::default(), 0);
+    let (begin, mut motion, mut last) = (guide.machine.now(), LargestMotion::default(), 0);
     let ended = guide.wait(BALANCED, |now| {
         if now.tick != last {
             last = now.tick;
@@ -72,7 +72,7 @@ pub(super) fn balance(guide: &mut Guide<'_>) -> Result<(), Stop> {
         motion.lean_rad.to_degrees(),
         1e3 * motion.cart_m
     ));
-    guide.ask(Task::Catch)?;
+    guide.ask(PersonTask::Catch)?;
     guide.turn_off();
-    guide.ask(Task::Rest)
+    guide.ask(PersonTask::Rest)
 }

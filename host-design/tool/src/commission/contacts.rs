@@ -7,11 +7,11 @@ use upright_design::client::AnyTelemetry;
 use super::commissioning::Plan;
 use super::guide::Guide;
 use super::machine::Stop;
-use super::task::{End, Task};
+use super::task::{End, PersonTask};
 use crate::monitor::words;
 
 /// The firmware answers, and is that of the rig file.
-pub(super) fn connect(guide: &mut Guide<'_>, plan: Plan<'_>) -> Result<(), Stop> {
+pub(super) fn connect(guide: &mut Guide<'_>, plan: CommissionPlan<'_>) -> Result<(), Stop> {
     while guide.conversation().telemetry.is_none() {
         guide.turn()?;
     }
@@ -36,8 +36,8 @@ pub(super) fn connect(guide: &mut Guide<'_>, plan: Plan<'_>) -> Result<(), Stop>
 }
 
 /// Emergency stop and limit switches open when they are pressed, and no other; then the supply.
-pub(super) fn check(guide: &mut Guide<'_>, plan: Plan<'_>) -> Result<(), Stop> {
-    guide.ask(Task::PressStop)?;
+pub(super) fn check(guide: &mut Guide<'_>, plan: CommissionPlan<'_>) -> Result<(), Stop> {
+    guide.ask(PersonTask::PressStop)?;
     if guide.wait_for_person(|now| now.contacts.emergency_stop.then_some(()))?.is_none() {
         return Err(Stop::Machine(
             "the emergency stop is not seen when it is pressed: it has to be a normally closed contact to ground; do not \
@@ -45,7 +45,7 @@ pub(super) fn check(guide: &mut Guide<'_>, plan: Plan<'_>) -> Result<(), Stop> {
                 .to_owned(),
         ));
     }
-    guide.ask(Task::ReleaseStop)?;
+    guide.ask(PersonTask::ReleaseStop)?;
     if guide.wait_for_person(|now| (!now.contacts.emergency_stop).then_some(()))?.is_none() {
         return Err(Stop::Machine("the emergency stop stays pressed, or its wire is open".to_owned()));
     }
@@ -62,12 +62,12 @@ pub(super) fn check(guide: &mut Guide<'_>, plan: Plan<'_>) -> Result<(), Stop> {
 /// The switch at this end opens, and not the other one; away from the ends both are closed.
 fn switch(guide: &mut Guide<'_>, end: End) -> Result<(), Stop> {
     let both = |now: &AnyTelemetry| [now.contacts.limit_low, now.contacts.limit_high];
-    guide.ask(Task::Centre)?;
+    guide.ask(PersonTask::Centre)?;
     if guide.wait_for_person(|now| (both(now) == [false; 2]).then_some(()))?.is_none() {
         let words = "a limit switch is open in the middle of the rail: it is a normally closed contact to ground; check its wire";
         return Err(Stop::Machine(words.to_owned()));
     }
-    guide.ask(Task::PushTo(end))?;
+    guide.ask(PersonTask::PushTo(end))?;
     let (own, name) = match end {
         End::Low => ([true, false], "low"),
         End::High => ([false, true], "high"),
@@ -86,7 +86,7 @@ fn switch(guide: &mut Guide<'_>, end: End) -> Result<(), Stop> {
 
 /// The supply is within its limits, and the power stage reports no fault.
 fn supply(guide: &mut Guide<'_>) -> Result<(), Stop> {
-    guide.ask(Task::SwitchOn)?;
+    guide.ask(PersonTask::SwitchOn)?;
     let is_good = |now: &AnyTelemetry| wrong_inputs(now).is_empty().then_some(());
     if guide.wait_for_person(is_good)?.is_none() {
         let now = guide.conversation().telemetry.as_ref();

@@ -6,10 +6,10 @@ use upright::protocol::message::{Answer, Request};
 use upright::supervision::supervisor::State;
 use upright_design::client::AnyTelemetry;
 
-use super::machine::{Machine, Stop};
+use super::machine::{MachineAtHand, Stop};
 use super::record::Journal;
 use super::task::Task;
-use crate::monitor::{Action, Ended, Monitor};
+use crate::monitor::{Ended, Monitor, MonitorAction};
 
 /// Time without telemetry after which the step ends.
 const SILENCE: Duration = Duration::from_secs(2);
@@ -22,7 +22,7 @@ const OFF: Duration = Duration::from_secs(1);
 
 /// Leads the person through a step, and watches the telemetry.
 pub(super) struct Guide<'a> {
-    pub(super) machine: &'a mut dyn Machine,
+    pub(super) machine: &'a mut dyn MachineAtHand,
     pub(super) journal: &'a mut Journal,
     conversation: Monitor,
     heard: Duration,
@@ -30,7 +30,7 @@ pub(super) struct Guide<'a> {
 }
 
 impl<'a> Guide<'a> {
-    pub(super) fn new(machine: &'a mut dyn Machine, journal: &'a mut Journal) -> Self {
+    pub(super) fn new(machine: &'a mut dyn MachineAtHand, journal: &'a mut Journal) -> Self {
         let heard = machine.now();
         Self { machine, journal, conversation: Monitor::new(""), heard, last_tick: None }
     }
@@ -47,7 +47,7 @@ impl<'a> Guide<'a> {
     }
 
     /// Asks the person to do something.
-    pub(super) fn ask(&mut self, task: Task) -> Result<(), Stop> {
+    pub(super) fn ask(&mut self, task: PersonTask) -> Result<(), Stop> {
         self.journal.asked(task);
         self.machine.ask(task)?;
         // Consent may have taken long.
@@ -68,7 +68,7 @@ impl<'a> Guide<'a> {
     /// Sends a request.
     pub(super) fn send(&mut self, request: Request) {
         let now = self.machine.now();
-        self.conversation.act(Action::Send(request), now);
+        self.conversation.act(MonitorAction::Send(request), now);
     }
 
     /// Sends what is due and receives: some milliseconds pass.

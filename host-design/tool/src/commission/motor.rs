@@ -21,7 +21,7 @@ const LONGEST: Duration = Duration::from_millis(1_500);
 
 /// The motor pushes the cart along +x until it has moved a little.
 pub(super) fn check(guide: &mut Guide<'_>) -> Result<(), Stop> {
-    guide.ask(Task::HandsOff)?;
+    guide.ask(PersonTask::HandsOff)?;
     let end = guide.machine.now() + guide.machine.patience();
     while !push(guide)? {
         if guide.machine.now() > end {
@@ -31,7 +31,7 @@ pub(super) fn check(guide: &mut Guide<'_>) -> Result<(), Stop> {
     let now = guide.conversation().telemetry.as_ref();
     let (motor, fault) = now.map_or((MotorSign::Unchecked, None), |now| (now.motor, now.fault));
     let words = now.and_then(words::instruction);
-    guide.ask(Task::Centre)?;
+    guide.ask(PersonTask::Centre)?;
     match (motor, fault) {
         (MotorSign::Checked, None) => guide.found("the motor moves the cart along +x"),
         (_, Some(fault)) => {

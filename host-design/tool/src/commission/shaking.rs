@@ -17,11 +17,11 @@ use crate::monitor::words;
 const CAUSE: Duration = Duration::from_millis(300);
 
 /// The log of the machine, which its firmware shakes.
-pub(super) fn shake(guide: &mut Guide<'_>, plan: Plan<'_>) -> Result<Log, Stop> {
-    guide.ask(Task::Centre)?;
+pub(super) fn shake(guide: &mut Guide<'_>, plan: CommissionPlan<'_>) -> Result<Log, Stop> {
+    guide.ask(PersonTask::Centre)?;
     let is_still = |now: &AnyTelemetry| (!now.arming_inhibits.contains(Inhibits::MOVING)).then_some(());
     guide.wait_for_person(is_still)?;
-    guide.ask(Task::HandsOff)?;
+    guide.ask(PersonTask::HandsOff)?;
     if guide.wait_for_person(is_still)?.is_none() {
         return Err(Stop::Machine("the links do not come to rest".to_owned()));
     }
@@ -37,7 +37,7 @@ pub(super) fn shake(guide: &mut Guide<'_>, plan: Plan<'_>) -> Result<Log, Stop> 
         return Err(with_cause(guide, stop));
     }
     ended?;
-    guide.ask(Task::Centre)?;
+    guide.ask(PersonTask::Centre)?;
     let log = line.finish().map_err(|error| Stop::Machine(error.to_string()))?;
     guide.found(format!("{} ticks, {} of them lost", log.ticks().len() as u64 + log.lost(), log.lost()));
     Ok(log)

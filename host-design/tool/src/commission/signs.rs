@@ -21,7 +21,7 @@ const TOLERANCE: f64 = 0.05;
 
 /// The firmware's own check, from the outermost link inwards.
 pub(super) fn check(guide: &mut Guide<'_>) -> Result<(), Stop> {
-    guide.ask(Task::Rest)?;
+    guide.ask(PersonTask::Rest)?;
     guide.request_until(Request::CheckSigns, |now| now.signs != Signs::Unchecked)?;
     let mut asked = None;
     loop {
@@ -37,11 +37,11 @@ pub(super) fn check(guide: &mut Guide<'_>) -> Result<(), Stop> {
         };
         asked = Some(signs);
         match signs {
-            Signs::Rest(_) => guide.ask(Task::Rest)?,
-            Signs::Move(sensor) => guide.ask(Task::Move(sensor))?,
+            Signs::Rest(_) => guide.ask(PersonTask::Rest)?,
+            Signs::Move(sensor) => guide.ask(PersonTask::Move(sensor))?,
             Signs::Checked => {
                 guide.found("every encoder counts the right way, at its own place");
-                return guide.ask(Task::Centre);
+                return guide.ask(PersonTask::Centre);
             }
             Signs::Reversed(_) | Signs::Swapped { .. } | Signs::Unchecked => {
                 let instruction = guide.conversation().telemetry.as_ref().and_then(words::instruction);
@@ -54,9 +54,9 @@ pub(super) fn check(guide: &mut Guide<'_>) -> Result<(), Stop> {
 }
 
 /// Every link is turned once around.
-pub(super) fn turns(guide: &mut Guide<'_>, plan: Plan<'_>) -> Result<(), Stop> {
+pub(super) fn turns(guide: &mut Guide<'_>, plan: CommissionPlan<'_>) -> Result<(), Stop> {
     for sensor in (1..plan.table.sensors()).rev() {
-        guide.ask(Task::Rest)?;
+        guide.ask(PersonTask::Rest)?;
         guide.pause(ENDED)?;
         let wanted = f64::from(plan.table.limits.turn_counts[sensor]);
         let Some(moved) = turn(guide, sensor, BEGUN * wanted)? else {
@@ -80,7 +80,7 @@ pub(super) fn turns(guide: &mut Guide<'_>, plan: Plan<'_>) -> Result<(), Stop> {
 fn turn(guide: &mut Guide<'_>, sensor: usize, begun: f64) -> Result<Option<f64>, Stop> {
     let count = |now: &AnyTelemetry| f64::from(now.counts.get(sensor).copied().unwrap_or_default());
     let from = guide.conversation().telemetry.as_ref().map_or(0.0, count);
-    guide.ask(Task::TurnAround(sensor as u8))?;
+    guide.ask(PersonTask::TurnAround(sensor as u8))?;
     let begins = |now: &AnyTelemetry| ((count(now) - from).abs() > begun).then(|| count(now));
     let Some(mut last) = guide.wait_for_person(begins)? else { return Ok(None) };
     // A hand that holds a link still trembles by less.

@@ -12,7 +12,7 @@ use upright_design::client::{AnyTelemetry, Client, Mismatch, Received, Unanswere
 use upright_design::plant::absolute_angles;
 use upright_design::swing_up::posture_name;
 
-use super::command::Action;
+use super::command::MonitorAction;
 use super::words;
 
 /// Time span of the plots (s).
@@ -199,30 +199,30 @@ impl Monitor {
     }
 
     /// Sends the request of an action. Recording and quitting are up to the caller.
-    pub fn act(&mut self, action: Action, now: Duration) {
+    pub fn act(&mut self, action: MonitorAction, now: Duration) {
         if self.info.is_none() {
             return self.note("the firmware has not answered yet".to_owned());
         }
         let request = match action {
-            Action::Send(request) => request,
-            Action::Shift(by) => {
+            MonitorAction::Send(request) => request,
+            MonitorAction::Shift(by) => {
                 let governed = self.telemetry.as_ref().map_or(0.0, |telemetry| telemetry.setpoint_m);
                 Request::Setpoint(self.wanted.unwrap_or(governed) + by)
             }
-            Action::Turn(link) if link >= self.links() => {
+            MonitorAction::Turn(link) if link >= self.links() => {
                 return self.note(format!("there is no link {}", link + 1));
             }
-            Action::Turn(link) => match self.equilibrium() {
+            MonitorAction::Turn(link) => match self.equilibrium() {
                 Some(at) => Request::Goto(Equilibrium::of_bits(at.bits() ^ 1 << link)),
                 None => return self.note("the links are at no equilibrium".to_owned()),
             },
-            Action::OtherLaw => {
+            MonitorAction::OtherLaw => {
                 Request::Select(match self.telemetry.as_ref().map(|telemetry| telemetry.law) {
                     None | Some(Law::Lqr) => Law::PolePlacement,
                     Some(Law::PolePlacement) => Law::Lqr,
                 })
             }
-            Action::Record | Action::Quit => return,
+            MonitorAction::Record | MonitorAction::Quit => return,
         };
         if matches!(request, Request::Jog { .. }) {
             return self.client.hold(request, now);

@@ -30,12 +30,12 @@ pub fn json(telemetry: &AnyTelemetry) -> Value {
 
 /// A CSV file with one row per telemetry message. Every row is flushed, so the file is complete whenever the recording
 /// ends.
-pub struct Recorder<W: Write> {
+pub struct TelemetryCsv<W: Write> {
     csv: csv::Writer<W>,
     begun: bool,
 }
 
-impl<W: Write> Recorder<W> {
+impl<W: Write> TelemetryCsv<W> {
     /// An empty recording.
     pub fn new(out: W) -> Self {
         Self { csv: csv::Writer::from_writer(out), begun: false }
@@ -80,7 +80,7 @@ impl<W: Write> Recorder<W> {
     }
 }
 
-impl Recorder<Vec<u8>> {
+impl TelemetryCsv<Vec<u8>> {
     /// Ends the recording; returns the bytes of the file.
     pub fn into_bytes(self) -> Vec<u8> {
         // Every row has been flushed, so nothing is left to fail.

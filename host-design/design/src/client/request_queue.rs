@@ -49,7 +49,7 @@ pub struct Unanswered {
 
 /// Queue of requests, and the bytes to be sent.
 #[derive(Default)]
-pub(super) struct Requests {
+pub(super) struct RequestQueue {
     bytes: Vec<u8>,
     /// Number of the last command.
     pub(super) last_id: u64,
@@ -66,7 +66,7 @@ fn may_come_late(request: Request) -> bool {
     matches!(request, Disarm | Info | Cause | Crash | Statistics | Telemetry(_))
 }
 
-impl Requests {
+impl RequestQueue {
     /// Sends a request as soon as those before it are answered. Disarming is sent at once, and replaces what a person
     /// has asked for before; returns what was given up for it.
     pub(super) fn send(&mut self, request: Request, now: Duration) -> Vec<Unanswered> {
@@ -201,7 +201,7 @@ mod tests {
 
     #[test]
     fn a_command_is_repeated_until_it_is_answered() {
-        let mut requests = Requests::default();
+        let mut requests = RequestQueue::default();
         requests.send(Request::Home, ms(0));
         let first = requests.take();
         assert!(!first.is_empty());
@@ -218,7 +218,7 @@ mod tests {
 
     #[test]
     fn what_is_not_answered_is_told_once_and_not_done_later() {
-        let mut requests = Requests::default();
+        let mut requests = RequestQueue::default();
         requests.send(Request::Arm, ms(0));
         requests.send(Request::Statistics, ms(0));
         assert_eq!(requests.repeat(ms(999)), []);
@@ -234,7 +234,7 @@ mod tests {
 
     #[test]
     fn disarming_waits_for_nothing() {
-        let mut requests = Requests::default();
+        let mut requests = RequestQueue::default();
         for request in [Request::Info, Request::Home, Request::Arm] {
             requests.send(request, ms(0));
         }
@@ -253,7 +253,7 @@ mod tests {
 
     #[test]
     fn a_set_point_replaces_one_that_was_not_sent_and_what_is_sent_once_is_not_repeated() {
-        let mut requests = Requests::default();
+        let mut requests = RequestQueue::default();
         for tenths in 0..4_u8 {
             requests.send(Request::Setpoint(f32::from(tenths) / 10.0), ms(1));
         }
