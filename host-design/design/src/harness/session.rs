@@ -12,7 +12,7 @@ use upright::supervision::sign_check::Signs;
 use upright::supervision::supervisor::State;
 
 use super::error::HarnessError;
-use super::hand::Status;
+use super::operator::Status;
 use super::target::{Pace, Pins, Target};
 use crate::client::{AnyTelemetry, AnyTickLog, Client, Mismatch, Received};
 

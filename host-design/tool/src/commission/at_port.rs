@@ -7,8 +7,8 @@ use std::sync::mpsc::{Receiver, TryRecvError};
 use std::time::Duration;
 
 use super::machine::{MachineAtHand, Stop};
-use super::step::Step;
-use super::task::Task;
+use super::step::CommissionStep;
+use super::task::PersonTask;
 use crate::monitor::{SerialLine, now};
 
 /// How long a person may take for a task.

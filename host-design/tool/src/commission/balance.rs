@@ -11,7 +11,7 @@ use upright_design::plant::absolute_angles;
 
 use super::guide::Guide;
 use super::machine::Stop;
-use super::task::Task;
+use super::task::PersonTask;
 
 /// Time for which the machine has to balance.
 const BALANCED: Duration = Duration::from_secs(10);

@@ -7,7 +7,7 @@ use super::guide::Guide;
 use super::machine::{MachineAtHand, Stop};
 use super::plan::CommissionPlan;
 use super::record::Journal;
-use super::step::Step;
+use super::step::CommissionStep;
 use super::{balance, contacts, homing, motor, shaking, signs};
 
 /// A rig on the way from wired to balancing.

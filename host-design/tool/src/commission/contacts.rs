@@ -4,9 +4,9 @@ use upright::supervision::fault::Fault;
 use upright::supervision::inhibits::Inhibits;
 use upright_design::client::AnyTelemetry;
 
-use super::commissioning::Plan;
 use super::guide::Guide;
 use super::machine::Stop;
+use super::plan::CommissionPlan;
 use super::task::{End, PersonTask};
 use crate::monitor::words;
 

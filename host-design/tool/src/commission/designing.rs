@@ -12,8 +12,8 @@ use upright_design::study::Study;
 use upright_design::table::{Gains, TableValues};
 use upright_design::verify::{Unverifiable, brief};
 
-use super::commissioning::Plan;
 use super::machine::Stop;
+use super::plan::CommissionPlan;
 use super::record::Journal;
 use crate::identified::{json, rig_file, text};
 

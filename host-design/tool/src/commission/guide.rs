@@ -8,7 +8,7 @@ use upright_design::client::AnyTelemetry;
 
 use super::machine::{MachineAtHand, Stop};
 use super::record::Journal;
-use super::task::Task;
+use super::task::PersonTask;
 use crate::monitor::{Ended, Monitor, MonitorAction};
 
 /// Time without telemetry after which the step ends.

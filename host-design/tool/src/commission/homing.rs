@@ -4,9 +4,9 @@ use upright::protocol::message::Request;
 use upright::supervision::homing::Homing;
 use upright_design::client::AnyTelemetry;
 
-use super::commissioning::Plan;
 use super::guide::Guide;
 use super::machine::Stop;
+use super::plan::CommissionPlan;
 use super::task::{End, PersonTask};
 
 /// A sensor has moved if it counts at least this share of the expected counts.

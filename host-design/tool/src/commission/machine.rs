@@ -6,8 +6,8 @@ use upright_design::harness::HarnessError;
 use upright_design::simulate::SimulationError;
 use upright_design::table::WriteError;
 
-use super::step::Step;
-use super::task::Task;
+use super::step::CommissionStep;
+use super::task::PersonTask;
 use crate::in_the_loop::{EmulatorError, RunError};
 
 /// A rig with its firmware at the other end of a line, and the person beside it.

@@ -34,5 +34,5 @@ pub use plan::CommissionPlan;
 pub use planted::{NoSuchDefect, Planted};
 pub use record::{CommissionOutcome, CommissionRecord, Journal, StepRecord};
 pub use simulated::Simulated;
-pub use step::Step;
+pub use step::CommissionStep;
 pub use task::{End, PersonTask};

@@ -9,7 +9,7 @@ use upright::supervision::supervisor::State;
 
 use super::guide::Guide;
 use super::machine::Stop;
-use super::task::Task;
+use super::task::PersonTask;
 use crate::monitor::words;
 
 /// Time for which the rig stands still before a drive, and the key is released between two tries.

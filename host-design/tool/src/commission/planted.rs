@@ -9,7 +9,7 @@ use upright_design::rig::{Link, PerJoint, PlantDescription, Rig};
 use upright_design::simulate::{Bench, Scenario};
 use upright_design::table::TableValues;
 
-use super::step::Step;
+use super::step::CommissionStep;
 use crate::campaign::{Defect, Defective, Trial};
 
 /// What is wrong in the machine.

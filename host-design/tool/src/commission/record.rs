@@ -7,7 +7,7 @@ use serde_json::Value;
 use upright_design::rig::Rig;
 use upright_design::table::{WriteError, write_atomically};
 
-use super::step::Step;
+use super::step::CommissionStep;
 use crate::monitor::now;
 
 /// The record of a commissioning.

@@ -7,10 +7,10 @@ use upright::supervision::inhibits::Inhibits;
 use upright_design::client::AnyTelemetry;
 use upright_design::identify::{LineError, Log, OverLine};
 
-use super::commissioning::Plan;
 use super::guide::Guide;
 use super::machine::Stop;
-use super::task::Task;
+use super::plan::CommissionPlan;
+use super::task::PersonTask;
 use crate::monitor::words;
 
 /// Time within which the firmware reports the cause of a fault.

@@ -6,10 +6,10 @@ use upright::protocol::message::Request;
 use upright::supervision::sign_check::Signs;
 use upright_design::client::AnyTelemetry;
 
-use super::commissioning::Plan;
 use super::guide::Guide;
 use super::machine::Stop;
-use super::task::Task;
+use super::plan::CommissionPlan;
+use super::task::PersonTask;
 use crate::monitor::words;
 
 /// A turn has begun when the link has moved by this share of it.

@@ -12,7 +12,7 @@ use upright_design::table::TableValues;
 
 use super::machine::{MachineAtHand, Stop};
 use super::planted::{DefectWires, Planted};
-use super::step::Step;
+use super::step::CommissionStep;
 use super::task::{End, PersonTask};
 
 /// Time from one exchange to the next (s), as on a serial line.

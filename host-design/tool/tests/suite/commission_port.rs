@@ -16,7 +16,7 @@ use upright_tool::commission::{
     AtPort, CommissionPlan, CommissionRecord, CommissionStep, Commissioning, Journal, MachineAtHand,
     PersonTask, Planted, Simulated, Stop,
 };
-use upright_tool::monitor::Line;
+use upright_tool::monitor::SerialLine;
 
 use crate::command::{SINGLE, path_of};
 

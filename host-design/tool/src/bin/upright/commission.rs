@@ -15,7 +15,7 @@ use upright_tool::commission::{
     Simulated,
 };
 use upright_tool::in_the_loop::Link;
-use upright_tool::monitor::Line;
+use upright_tool::monitor::SerialLine;
 
 use crate::failure::Failure;
 use crate::firmware::{Built, Target, lines_of_stdin};

@@ -12,7 +12,7 @@ use upright_design::rig::Rig;
 use upright_design::simulate::{Scenario, Sensing};
 use upright_design::table::TableValues;
 use upright_tool::in_the_loop::{Link, Place};
-use upright_tool::monitor::Line;
+use upright_tool::monitor::SerialLine;
 use upright_tool::twin::{Server, SimulatedMachine};
 
 use crate::failure::Failure;
