@@ -1,7 +1,7 @@
 //! The wiring and the boards in docs/board.md are those of the image, and the tool knows them by the same names.
 
 /// The image's own files, which need no hardware.
-#[allow(dead_code, unreachable_pub)]
+#[allow(dead_code, unreachable_pub, unexpected_cfgs)]
 #[path = "../../src/image/board/f4"]
 mod f4 {
     pub mod boards;

@@ -124,7 +124,7 @@ impl Attempt<'_> {
         }
         let mut harness = Harness::new(self.rig, self.table, &self.trial.scenario, target)?;
         match self.trial.kind {
-            _ if self.trial.phase == Phase::Jogging => self.drive(&mut harness),
+            _ if self.trial.phase == Phase::Jogging => self.jog(&mut harness),
             Defect::ArmUnhomed | Defect::ArmHanging | Defect::ArmStopped | Defect::ArmHeld => {
                 self.arm(&mut harness)
             }

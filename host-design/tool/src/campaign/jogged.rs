@@ -17,7 +17,7 @@ use super::trial::Trial;
 
 /// Longest time from pressing the key until the motor is on (s).
 const BEGIN_S: f64 = 0.5;
-/// Time for which a drive is watched from the onset on (s).
+/// Time for which a jog is watched from the onset on (s).
 const WATCHED_S: f64 = 0.4;
 
 impl Defect {
@@ -63,7 +63,7 @@ impl Trial {
         let is_there_before = matches!(self.kind.while_jogging(), Some(Expected::Found(_)));
         let (onset, watched) = match is_there_before {
             true => (0, ticks(f64::from(LONGEST_S)) + 2),
-            // In a drive with the cart held, which lasts for 1 s.
+            // In a jog with the cart held, which lasts for 1 s.
             false => (self.onset / 2, ticks(WATCHED_S)),
         };
         let scenario = Scenario {
@@ -79,18 +79,10 @@ impl Trial {
 
 impl Attempt<'_> {
     /// A jog, in which a person holds the key throughout.
-    pub(super) fn drive(&self, harness: &mut Harness<'_>) -> Result<Observed, HarnessError> {
+    pub(super) fn jog(&self, harness: &mut Harness<'_>) -> Result<Observed, HarnessError> {
         let trial = self.trial;
         let is_there_before = matches!(trial.expected(), Expected::Found(_));
-        let mut held = harness.bench.state().to_vec();
-        self.until_checked(harness)?;
-        // The links hang again, wherever the cart is.
-        held[0] = harness.bench.state()[0];
-        for _ in 0..self.ticks(self.rig.limits.arm_time_s) {
-            harness.bench.hold(&held);
-            let inputs = harness.inputs();
-            harness.session.tick(&inputs)?;
-        }
+        let mut held = self.checked_and_hanging(harness)?;
         let mut observed = Observed::default();
         let mut injection = Injection::new(self.rig, self.table, trial.clone());
         // Number of ticks since the motor came on.
@@ -119,11 +111,11 @@ impl Attempt<'_> {
                 Some(tick) => Some(tick + 1),
                 None => output.enable.then_some(0),
             };
-            let mut acting = output;
-            if since.is_some() {
-                injection.output(&mut acting);
-            }
             if is_there_before && output.enable {
+                let mut acting = output;
+                if since.is_some() {
+                    injection.output(&mut acting);
+                }
                 harness.bench.tick(acting.drive);
                 held[0] = harness.bench.state()[0];
             } else {
@@ -144,8 +136,21 @@ impl Attempt<'_> {
                 break;
             }
         }
-        self.after_drive(harness, &mut observed)?;
+        self.after_jog(harness, &mut observed)?;
         Ok(observed)
+    }
+
+    /// Checks the signs by hand, and lets the links hang still, wherever the cart is; returns that state.
+    fn checked_and_hanging(&self, harness: &mut Harness<'_>) -> Result<Vec<f64>, HarnessError> {
+        let mut held = harness.bench.state().to_vec();
+        self.until_checked(harness)?;
+        held[0] = harness.bench.state()[0];
+        for _ in 0..self.ticks(self.rig.limits.arm_time_s) {
+            harness.bench.hold(&held);
+            let inputs = harness.inputs();
+            harness.session.tick(&inputs)?;
+        }
+        Ok(held)
     }
 
     /// Whether nothing is left to be observed after `tick` of a rig that hangs.
@@ -158,7 +163,7 @@ impl Attempt<'_> {
     }
 
     /// Reads what the firmware has found out, and whether it would arm.
-    fn after_drive(&self, harness: &mut Harness<'_>, observed: &mut Observed) -> Result<(), HarnessError> {
+    fn after_jog(&self, harness: &mut Harness<'_>, observed: &mut Observed) -> Result<(), HarnessError> {
         self.find_reason(harness, observed);
         observed.motor = Some(harness.session.status().motor);
         let inputs = harness.inputs();

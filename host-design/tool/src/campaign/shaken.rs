@@ -121,7 +121,7 @@ impl Attempt<'_> {
             let since = tick.checked_sub(trial.onset).filter(|_| self.with_defect);
             let inputs = self.pins(&mut shaken.harness, &mut injection, since, &mut false)?;
             shaken.harness.bench.push(since.map_or(0.0, |since| injection.push_n(since)));
-            let acted = shaken.act(&inputs, |drive| self.driven(&mut injection, since, drive));
+            let acted = shaken.act(&inputs, |drive| self.acting(&mut injection, since, drive));
             let output = match acted {
                 Err(HarnessError::Stopped { .. }) if observed.off.is_some() => {
                     observed.dead = true;
@@ -150,7 +150,7 @@ impl Attempt<'_> {
     }
 
     /// The drive that acts on the cart, which the defect may change.
-    fn driven(&self, injection: &mut Injection<'_>, since: Option<usize>, drive: Drive) -> Drive {
+    fn acting(&self, injection: &mut Injection<'_>, since: Option<usize>, drive: Drive) -> Drive {
         let mut acting = upright::board::Output { enable: true, drive };
         if since.is_some() {
             injection.output(&mut acting);

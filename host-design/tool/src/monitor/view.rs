@@ -13,7 +13,7 @@ use upright_design::client::AnyTelemetry;
 use super::model::Monitor;
 use super::words;
 
-const KEYS: &str = "h/H home (rail)  g check signs  m/M drive (held)  a arm  u up  n down  1…6 turn a link over  d/space disarm  c clear  ←→ 1 cm  0 zero  l law  r record  q quit";
+const KEYS: &str = "h/H home (rail)  g check signs  m/M jog (held)  a arm  u up  n down  1…6 turn a link over  d/space disarm  c clear  ←→ 1 cm  0 zero  l law  r record  q quit";
 const COLOURS: [Color; 6] =
     [Color::Cyan, Color::Yellow, Color::Magenta, Color::Green, Color::Blue, Color::Red];
 
@@ -59,6 +59,16 @@ pub fn draw(monitor: &Monitor, frame: &mut Frame<'_>) {
     frame.render_widget(keys, bottom);
 }
 
+fn colour(state: State) -> Color {
+    match state {
+        State::Disarmed | State::Calibrated => Color::White,
+        State::Homing | State::Armed => Color::Yellow,
+        State::Jogging | State::Identifying | State::Raising | State::Lowering => Color::Magenta,
+        State::Balancing | State::Holding => Color::Green,
+        State::Fault => Color::Red,
+    }
+}
+
 fn header(monitor: &Monitor) -> Vec<Line<'_>> {
     let mut lines = Vec::new();
     if let Some(ended) = &monitor.ended {
@@ -83,14 +93,8 @@ fn header(monitor: &Monitor) -> Vec<Line<'_>> {
         info.tick_s * 1e3,
     )));
     let Some(telemetry) = &monitor.telemetry else { return lines };
-    let colour = match telemetry.state {
-        State::Disarmed | State::Calibrated => Color::White,
-        State::Homing | State::Armed => Color::Yellow,
-        State::Jogging | State::Identifying | State::Raising | State::Lowering => Color::Magenta,
-        State::Balancing | State::Holding => Color::Green,
-        State::Fault => Color::Red,
-    };
-    lines.push(Line::from(words::state(telemetry.state)).style(Style::new().fg(colour).bold()));
+    let style = Style::new().fg(colour(telemetry.state)).bold();
+    lines.push(Line::from(words::state(telemetry.state)).style(style));
     if let Some(fault) = telemetry.fault {
         let entry = fault.entry();
         let sensor = monitor.cause.filter(|cause| cause.fault == fault).and_then(|cause| cause.sensor);
@@ -109,7 +113,7 @@ fn header(monitor: &Monitor) -> Vec<Line<'_>> {
     lines.extend(monitor.crash.iter().map(|record| Line::from(words::crash(record))));
     lines.push(Line::from(words::inputs(telemetry)));
     lines.extend(words::instruction(telemetry).map(|what| Line::from(format!("now: {what}")).yellow()));
-    if !telemetry.state.drives() && !telemetry.arming_inhibits.is_empty() {
+    if !telemetry.state.motor_is_on() && !telemetry.arming_inhibits.is_empty() {
         lines.push(Line::from(format!("against arming: {}", telemetry.arming_inhibits)));
     }
     let against = telemetry.swing_up_inhibits;

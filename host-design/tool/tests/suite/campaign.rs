@@ -50,7 +50,7 @@ fn while_jogging(table: &TableValues, place: Place<'_>) -> Vec<Defect> {
 }
 
 #[test]
-fn every_defect_of_a_bench_drive_is_found_and_nothing_else() {
+fn every_defect_of_a_jog_is_found_and_nothing_else() {
     for name in ["quadruple-paper", "single-quanser-ip02"] {
         let (rig, table) = rig_and_table(name);
         let kinds = while_jogging(table, Place::Host);
@@ -70,7 +70,7 @@ fn every_defect_of_a_bench_drive_is_found_and_nothing_else() {
 }
 
 #[test]
-fn on_the_virtual_board_a_bench_drive_ends_with_its_defects_and_does_not_without_the_guards() {
+fn on_the_virtual_board_a_jog_ends_with_its_defects_and_does_not_without_the_guards() {
     let (rig, table) = rig_and_table("quadruple-paper");
     let Some(elf) = built(image::Kind::Board(Board::WeactF405)) else { return };
     let image = Image::from_elf(&std::fs::read(elf).unwrap()).unwrap();
