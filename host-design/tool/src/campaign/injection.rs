@@ -76,7 +76,7 @@ impl<'a> Injection<'a> {
         }
     }
 
-    /// Whether the host still sends heartbeats, `since` ticks after the onset.
+    /// Whether the host still sends keep-alives, `since` ticks after the onset.
     pub(super) fn host_is_alive(&self, since: Option<usize>) -> bool {
         self.trial.kind != Defect::HostSilent || since.is_none()
     }

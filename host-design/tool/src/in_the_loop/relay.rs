@@ -65,7 +65,7 @@ impl Relay<'_> {
     fn run(self, target: &mut dyn Target) -> Result<(), RelayError> {
         let period_s = self.rig.tick.period_s;
         let mut harness = Harness::new(self.rig, self.table, self.scenario, target)?;
-        // No set-point is commanded, so the firmware needs no heartbeats.
+        // No set-point is commanded, so the firmware needs no keep-alives.
         let mut output = harness.raise(None)?;
         self.listener.set_nonblocking(true)?;
         let mut client = Some(self.first_client()?);
