@@ -29,13 +29,11 @@ pub fn telemetry_ticks(tick_s: f32) -> u16 {
     ((TELEMETRY_S / tick_s + 0.999) as u16).max(1)
 }
 
-mod encoder;
 pub mod frame;
 pub mod message;
 pub mod queue;
 pub mod serial_link;
 pub mod simulated_pins;
-#[cfg(feature = "identify")]
 pub mod tick_log;
 
 #[cfg(test)]

@@ -20,14 +20,14 @@ fn paper_with_limit(limit_n: f64) -> Rig {
 }
 
 fn survived(rig: &Rig, law: Law, seeds: u64, duration_s: f64) -> u64 {
-    endurance(rig, &table(rig), law, &FORCE_NOISE, seeds, duration_s, &|| ()).unwrap().survived
+    endurance(rig, &table(rig), law, &FORCE_NOISE, seeds, duration_s).unwrap().survived
 }
 
 #[test]
 fn the_quadruple_survives_a_minute_of_force_noise_with_a_hundred_seeds() {
     let rig = paper_with_limit(5.0);
     for law in LAWS {
-        let found = endurance(&rig, &table(&rig), law, &FORCE_NOISE, 100, 60.0, &|| ()).unwrap();
+        let found = endurance(&rig, &table(&rig), law, &FORCE_NOISE, 100, 60.0).unwrap();
         assert_eq!((found.survived, found.duration_s), (100, 60.0), "{law:?}: seeds {:?} fell", found.fallen);
         assert!(found.peak_force_n > 0.3 && found.peak_force_n <= 5.0, "the noise did push: {found:?}");
     }
@@ -158,7 +158,7 @@ fn with_widths<const NX: usize, const NY: usize>(
     let rig = rig(name);
     let values = table(&rig);
     let table = values.table::<NX, NY>();
-    let mut controller = Controller::new(&table, &values.build(), assumed).unwrap();
+    let mut controller = Controller::new(&table, assumed).unwrap();
     controller.select(law).unwrap();
     let mut scenario = Scenario { counter_start, force_noise_n: 0.1, ..Scenario::at_rest(&rig, law) };
     scenario.start[2] = 0.005;

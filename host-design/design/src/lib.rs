@@ -10,6 +10,7 @@
 //! | [`plant`] | masses, lengths, friction | equations of motion, linear model |
 //! | [`reality`] | plant, `[reality]` of the rig | the plant with friction, backlash, sensor and driver errors |
 //! | [`design`] | linear model, weights, poles, noise | certified gains and observer |
+//! | [`motion`] | | planned motions between equilibria, as the search for a swing-up makes them |
 //! | [`table`] | gains and limits | the gain table of the firmware, as values and as Rust source |
 //! | [`simulate`] | table and scenario | a run of the firmware's controller against the nonlinear plant |
 //! | [`client`] | bytes of a serial line | commands with their answers, telemetry, logs |
@@ -28,6 +29,7 @@ pub mod client;
 pub mod design;
 pub mod harness;
 pub mod identify;
+pub mod motion;
 pub mod number;
 pub mod numerics;
 pub mod parallel;

@@ -5,8 +5,9 @@ use std::path::{Path, PathBuf};
 use std::sync::{Mutex, OnceLock};
 
 use upright_design::design::{Certified, design};
+use upright_design::motion::RaiseAndLower;
 use upright_design::rig::Rig;
-use upright_design::swing_up::{Stored, SwingUp, motions, with_motions};
+use upright_design::swing_up::{Stored, motions, with_motions};
 use upright_design::table::{Gains, TableValues};
 
 /// Path of the rig file `name`.
@@ -40,8 +41,8 @@ pub fn certified(rig: &Rig) -> &'static Certified {
 }
 
 /// The stored motions of the rig in file `name`, restored once for all tests.
-pub fn stored_motions(name: &'static str) -> &'static SwingUp {
-    static RESTORED: Once<&str, SwingUp> = Mutex::new(BTreeMap::new());
+pub fn stored_motions(name: &'static str) -> &'static RaiseAndLower {
+    static RESTORED: Once<&str, RaiseAndLower> = Mutex::new(BTreeMap::new());
     let restore = || motions(&rig(name), &Stored::beside(&rig_path(name)).unwrap());
     once(&RESTORED, name, || restore().unwrap_or_else(|error| panic!("{name}: {error}")))
 }

@@ -24,7 +24,7 @@ struct Waiting {
     request: Request,
     since: Duration,
     sent: Option<Sent>,
-    is_told: bool,
+    is_reported: bool,
 }
 
 /// Transmissions of a request so far.
@@ -70,7 +70,7 @@ impl RequestQueue {
     /// Sends a request as soon as those before it are answered. Disarming is sent at once, and replaces what a person
     /// has asked for before; returns what was given up for it.
     pub(super) fn send(&mut self, request: Request, now: Duration) -> Vec<Unanswered> {
-        let new = Waiting { request, since: now, sent: None, is_told: false };
+        let new = Waiting { request, since: now, sent: None, is_reported: false };
         let mut given_up = Vec::new();
         match request {
             Request::Disarm => {
@@ -131,7 +131,7 @@ impl RequestQueue {
         let mut unanswered = self.give_up(|waiting| late(waiting) && !may_come_late(waiting.request));
         if let Some(first) = self.waiting.front_mut()
             && late(first)
-            && !std::mem::replace(&mut first.is_told, true)
+            && !std::mem::replace(&mut first.is_reported, true)
         {
             unanswered.push(Unanswered { request: first.request, is_given_up: false });
         }
@@ -217,7 +217,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_not_answered_is_told_once_and_not_done_later() {
+    fn what_is_not_answered_is_reported_once_and_not_done_later() {
         let mut requests = RequestQueue::default();
         requests.send(Request::Arm, ms(0));
         requests.send(Request::Statistics, ms(0));

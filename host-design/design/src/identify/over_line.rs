@@ -36,9 +36,9 @@ pub enum LineError {
     /// No message arrives.
     #[error("nothing is heard from the firmware: check port, cable, and that no other program has the port")]
     Silent,
-    /// The firmware does not answer the request to log: its image is built without logging.
+    /// The firmware does not answer the request to log: its image is of an older version.
     #[error(
-        "the firmware does not log its ticks: flash the image for identification, upright firmware flash RIG --identify"
+        "the firmware does not log its ticks: flash the image of this version, upright firmware flash RIG"
     )]
     NoLog,
     /// Something prevents shaking at present.

@@ -3,9 +3,8 @@
 use serde::Serialize;
 
 use super::SwingUpError;
-use super::motion::Motion;
 use super::setting::Setting;
-use super::transition::Transition;
+use crate::motion::{PlannedMotion, Transition};
 use crate::plant::chain_plant;
 use crate::plant::reference::{Tolerance, integrate};
 
@@ -40,7 +39,7 @@ pub struct Peaks {
 /// [`SwingUpError::Broken`] with the condition that does not hold.
 pub(super) fn check(
     setting: &Setting<'_>,
-    motion: &Motion,
+    motion: &PlannedMotion,
     transition: Transition,
 ) -> Result<Peaks, SwingUpError> {
     let broken = |what: String| SwingUpError::Broken { transition, what };

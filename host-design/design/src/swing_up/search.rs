@@ -5,13 +5,12 @@ use rand_pcg::Pcg64;
 
 use super::SwingUpError;
 use super::gains::motion;
-use super::motion::Motion;
 use super::problem::{Bounds, Knots, Problem};
 use super::refine::{Path, refine};
 use super::robustness::{Spread, score};
 use super::setting::Setting;
 use super::shooting;
-use super::transition::Transition;
+use crate::motion::{PlannedMotion, Transition};
 use crate::numerics::Matrix;
 use crate::parallel;
 
@@ -52,7 +51,7 @@ struct Draw {
 /// A candidate that was solved.
 pub(super) struct Candidate {
     pub(super) knots: Knots,
-    pub(super) motion: Motion,
+    pub(super) motion: PlannedMotion,
     /// Smaller is more robust.
     pub(super) score: f64,
 }

@@ -151,7 +151,7 @@ impl Attempt<'_> {
 
     /// The drive that acts on the cart, which the defect may change.
     fn acting(&self, injection: &mut Injection<'_>, since: Option<usize>, drive: Drive) -> Drive {
-        let mut acting = upright::board::Output { enable: true, drive };
+        let mut acting = upright::board::Output::on(drive, self.table.force_limit_n);
         if since.is_some() {
             injection.output(&mut acting);
         }

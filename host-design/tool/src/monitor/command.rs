@@ -3,7 +3,7 @@
 use ratatui::crossterm::event::{KeyCode, KeyEvent, KeyModifiers};
 use upright::protocol::message::Request;
 use upright::table::{Equilibrium, Law};
-use upright_design::swing_up::equilibrium_named;
+use upright_design::motion::equilibrium_named;
 
 /// What a key of the monitor does.
 #[derive(Debug, Clone, Copy, PartialEq)]

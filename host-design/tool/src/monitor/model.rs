@@ -9,8 +9,8 @@ use upright::supervision::inhibits::Inhibits;
 use upright::supervision::supervisor::State;
 use upright::table::{Equilibrium, Law};
 use upright_design::client::{AnyTelemetry, Client, Mismatch, Received, Unanswered};
+use upright_design::motion::posture_name;
 use upright_design::plant::absolute_angles;
-use upright_design::swing_up::posture_name;
 
 use super::command::MonitorAction;
 use super::words;

@@ -8,10 +8,7 @@ use upright::supervision::fault::Fault;
 use upright::supervision::inhibits::Inhibits;
 use upright_tool::campaign::Defect;
 use upright_tool::commission::{CommissionStep, Planted};
-use upright_tool::image::{
-    FLASH_LIMIT, FLASH_LIMIT_FOR_IDENTIFICATION, FLASH_LIMIT_WITH_MOTIONS, RAM_LIMIT,
-    RAM_LIMIT_FOR_IDENTIFICATION,
-};
+use upright_tool::image::{CODE_LIMIT, RAM_LIMIT};
 use upright_tool::monitor::{MonitorAction, action, request};
 
 use crate::documents::{read, root};
@@ -275,12 +272,10 @@ fn the_readme_shows_what_design_prints() {
 
 #[test]
 fn the_page_about_the_board_names_the_limits_of_the_image() {
-    let limits = |flash: u32, ram: u32| {
-        format!("more than {} KiB of flash or {} KiB of static RAM", flash / 1024, ram / 1024)
+    let limits = |code: u32, ram: u32| {
+        format!("more than {} KiB of code or {} KiB of static RAM", code / 1024, ram / 1024)
     };
     let page = read("docs/board.md");
-    assert!(page.contains(&limits(FLASH_LIMIT, RAM_LIMIT)));
-    assert!(page.contains(&limits(FLASH_LIMIT_FOR_IDENTIFICATION, RAM_LIMIT_FOR_IDENTIFICATION)));
-    assert!(page.contains(&format!("more than {} KiB of flash;", FLASH_LIMIT_WITH_MOTIONS / 1024)));
-    assert!(!page.contains(&limits(2 * FLASH_LIMIT, RAM_LIMIT)));
+    assert!(page.contains(&limits(CODE_LIMIT, RAM_LIMIT)));
+    assert!(!page.contains(&limits(2 * CODE_LIMIT, RAM_LIMIT)));
 }

@@ -108,7 +108,7 @@ fn every_command_is_answered_over_a_line_that_loses_a_third_of_the_frames() {
 }
 
 #[test]
-fn a_line_that_is_cut_is_told_and_only_disarming_waits_for_it() {
+fn a_line_that_is_cut_is_reported_and_only_disarming_waits_for_it() {
     let monitor = talk(0, 8_000, |ms, now, monitor, line| {
         let cut = (1_000..5_000).contains(&ms);
         line.iter_mut().for_each(|direction| direction.percent_lost = if cut { 100 } else { 0 });

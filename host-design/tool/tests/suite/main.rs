@@ -6,7 +6,6 @@ mod command;
 mod command_line;
 mod commission;
 mod commission_port;
-mod commission_study;
 mod compare_command;
 mod compare_sweep;
 mod cycles;

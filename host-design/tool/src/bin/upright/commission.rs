@@ -24,8 +24,7 @@ use crate::variation::with_table;
 /// Guides you from a wired rig to a balancing one, step by step: what to do, what was found, and whether it is right.
 ///
 /// With --target, the machine and the person beside it are simulated. With --port, the machine is real: its board runs
-/// the image for identification of the rig file (upright firmware flash RIG --identify), and Ctrl-C turns the motor
-/// off. The command stops at the first step that shows that the machine must not be run: exit status 3.
+/// the image of the rig file (upright firmware flash RIG), and Ctrl-C turns the motor off. The command stops at the first step that shows that the machine must not be run: exit status 3.
 #[derive(Args)]
 #[command(before_help = "\
 Examples:
@@ -93,7 +92,7 @@ impl Commission {
             (None, target) => {
                 let target = target.unwrap_or(Target::Host);
                 let machine = self.true_machine(&rig)?;
-                let built = target.built_for_identification(&rig, &table)?;
+                let built = target.built(Link::Files, &rig, &table)?;
                 let mut journal = journal(built.place(self.seed).name());
                 let result = self.simulated(plan, &machine, target, &built, &mut journal);
                 (journal, result)

@@ -6,11 +6,12 @@ use std::path::PathBuf;
 
 use clap::Args;
 use serde_json::json;
+use upright_design::motion::Transition;
 use upright_design::rig::{PlantDescription, Rig};
 use upright_design::study::Study;
 use upright_design::swing_up::{
-    Condition, FirmwareRuns, Judgement, Margin, Plan, Script, Solved, Stored, SwingUpError, Transition,
-    designed_table, firmware_runs, judge, margins, motions, refined, search, solved,
+    Condition, FirmwareRuns, Judgement, Margin, Plan, Script, Solved, Stored, SwingUpError, designed_table,
+    firmware_runs, judge, margins, motions, refined, search, solved,
 };
 use upright_design::table::{TableValues, write_atomically};
 use upright_tool::figure::{Figure, margins_figure, run_svg, stroboscope_svg, trade_figure};
@@ -23,7 +24,7 @@ use crate::split::Split;
 /// Plans the motions with which the rig raises itself from hanging to upright, and lowers itself again.
 ///
 /// They are written beside the rig file, as RIG.swing-up.json. Nothing is written if the motions fail the random runs
-/// that [swing_up] asks for. Exit status 3 if there is no motion; the message names the limit that binds and what
+/// that [swing_up] asks for. Exit status 3 if there is no motion; the message names the binding limit and what
 /// would help.
 #[derive(Args)]
 #[command(before_help = "\

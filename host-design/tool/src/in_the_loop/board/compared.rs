@@ -59,7 +59,7 @@ impl<'a> Compared<'a> {
         if !host.enable {
             return Ok(());
         }
-        let duty = host.drive.duty(self.board.force_limit_n.unwrap_or(1.0));
+        let duty = host.duty;
         let period = stage.period_clocks as f32;
         let wanted = ((duty.abs() * period + 0.5) as u32).min((period * (1.0 - LEAST_PAUSE)) as u32 + 1);
         let same = stage.high_clocks.abs_diff(wanted) <= u32::from(duty.abs() >= 1.0 - LEAST_PAUSE);

@@ -381,6 +381,7 @@ impl Target for VirtualBoard {
         let net = (after.along - before.along) as f64 - (after.against - before.against) as f64;
         let share = (net / (self.board.now() - begin) as f64) as f32;
         Ok(Output {
+            duty: share,
             drive: match self.force_limit_n {
                 Some(limit_n) => Drive::Force(share * limit_n),
                 None => Drive::Duty(share),
