@@ -89,10 +89,7 @@ impl Faults {
         if self.swing_up && table.swing_up.is_none() {
             return Err(Failure::SwingUp { rig: rig.name, source: SwingUpError::NoMotions });
         }
-        let built = match self.shake {
-            true => self.target.built_for_identification(&rig, &table)?,
-            false => self.target.built(Link::Files, &rig, &table)?,
-        };
+        let built = self.target.built(Link::Files, &rig, &table)?;
         let place = built.place(self.seed);
         let mut possible = kinds(&table, place);
         let forces = if self.shake { Some(feed(&rig, &table, self.seed)?) } else { None };
