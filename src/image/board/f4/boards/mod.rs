@@ -1,6 +1,6 @@
 //! The boards, one file each. The cargo feature with the name of a board selects it.
 
-mod data;
+pub(crate) mod data;
 #[allow(dead_code, reason = "only one board is selected")]
 mod discovery_f407;
 #[allow(dead_code, reason = "only one board is selected")]
@@ -11,6 +11,8 @@ mod nucleo_f446;
 mod olimex_h405;
 #[allow(dead_code, reason = "only one board is selected")]
 mod weact_f405;
+
+use data::BoardData;
 
 /// All boards.
 #[cfg_attr(target_os = "none", allow(dead_code, reason = "for the table of the documentation"))]
