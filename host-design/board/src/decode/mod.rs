@@ -16,7 +16,7 @@ pub(crate) use field::Undecodable;
 use crate::instruction::Instruction;
 
 /// Whether the instruction that begins with `first` has 32 bits.
-pub(crate) fn is_wide(first: u16) -> bool {
+pub fn is_wide(first: u16) -> bool {
     first >= 0xe800
 }
 

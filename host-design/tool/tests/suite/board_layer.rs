@@ -134,7 +134,7 @@ fn the_image_for_the_board_ends_a_wait_for_the_clock_with_its_fault() {
 }
 
 #[test]
-fn another_crystal_is_noticed_and_told_at_the_right_baud_rate() {
+fn another_crystal_is_noticed_and_reported_at_the_right_baud_rate() {
     let Some(image) = image() else { return };
     let fault = (State::Fault, Some(Fault::Clock));
     for (hz, hsi_hz, expected) in [
@@ -157,7 +157,7 @@ fn another_crystal_is_noticed_and_told_at_the_right_baud_rate() {
 
 /// The write that switches the PLL on is lost: the next one to this register after the crystal has been measured.
 #[test]
-fn a_pll_that_does_not_start_is_told_at_the_right_baud_rate() {
+fn a_pll_that_does_not_start_is_reported_at_the_right_baud_rate() {
     let Some(image) = image() else { return };
     let mut run = Powered::strict(&image, &Conditions::f405(1));
     run.board.at(seconds(0.002_2), Input::LoseWrite(RCC_CR));
@@ -194,7 +194,7 @@ fn gain_within(board: &VirtualBoard, addresses: Range<u32>) -> u32 {
 
 /// A bit of the first gain flips in flash before power comes.
 #[test]
-fn a_damaged_table_is_told_and_cannot_be_cleared() {
+fn a_damaged_table_is_reported_and_cannot_be_cleared() {
     let Some(image) = image() else { return };
     let mut run = Powered::strict(&image, &Conditions::f405(1));
     let address = first_gain(&run.board);
@@ -367,7 +367,7 @@ fn every_board_starts_with_its_own_chip_clock_and_led_and_with_no_other() {
 }
 
 #[test]
-fn contacts_supply_and_the_longest_tick_are_told_with_the_motor_off() {
+fn contacts_supply_and_the_longest_tick_are_reported_with_the_motor_off() {
     let Some(image) = image() else { return };
     let mut run = Powered::strict(&image, &Conditions::f405(1));
     run.run(0.05);
