@@ -6,8 +6,7 @@ use upright::supervision::homing::Homing;
 use upright::supervision::jog::MotorSign;
 use upright::supervision::sign_check::Signs;
 use upright::supervision::supervisor::State;
-
-use super::model::TelemetryOfAny;
+use upright_design::client::AnyTelemetry;
 
 /// A state of the supervisor in words.
 pub fn state(state: State) -> &'static str {
@@ -40,7 +39,7 @@ pub fn crash(record: &CrashRecord) -> String {
 }
 
 /// Supply of the power stage, and the contacts and flags that are active in this tick.
-pub fn inputs(telemetry: &TelemetryOfAny) -> String {
+pub fn inputs(telemetry: &AnyTelemetry) -> String {
     let Contacts { limit_low, limit_high, emergency_stop, driver_fault, overrun, clock_fault, board_fault } =
         telemetry.contacts;
     let all = [
@@ -58,7 +57,7 @@ pub fn inputs(telemetry: &TelemetryOfAny) -> String {
 }
 
 /// The next step that homing, sign check or motor check asks of a person; `None` if there is none.
-pub fn instruction(telemetry: &TelemetryOfAny) -> Option<String> {
+pub fn instruction(telemetry: &AnyTelemetry) -> Option<String> {
     let move_it = |sensor: u8| match sensor {
         0 => "push the cart along +x".to_owned(),
         link => format!("turn link {link} counter-clockwise"),

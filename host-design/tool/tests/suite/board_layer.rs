@@ -350,6 +350,13 @@ fn every_board_starts_with_its_own_chip_clock_and_led_and_with_no_other() {
             let bare = Conditions { crystal: Crystal { hz: 0, ..crystal }, ..own };
             assert_eq!(started(&bare), ((State::Fault, Some(Fault::Clock)), false, 16_000_000));
         }
+        if board == Board::DiscoveryF407 {
+            // It runs from 3.0 V at most; the first revision of its chip has another identity.
+            for other in [Conditions { chip_v: 2.8, ..own }, Conditions { chip: Chip::F407RevisionA, ..own }]
+            {
+                assert_eq!(started(&other).0, (State::Disarmed, None), "{other:?}");
+            }
+        }
         let other = if own.chip == Chip::F446 { Chip::F405 } else { Chip::F446 };
         let on_other = started(&Conditions { chip: other, ..own });
         assert_eq!((on_other.0, on_other.1), ((State::Fault, Some(Fault::Board)), false), "{board}");

@@ -11,7 +11,7 @@ use upright_tool::image::{
 };
 
 use super::board::BoardOption;
-use super::built;
+use super::built::built;
 use crate::failure::Failure;
 use crate::variation::Wanted;
 
