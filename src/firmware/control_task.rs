@@ -55,7 +55,6 @@ impl<'q, 't, B: Board<NY>, const NX: usize, const NY: usize, S: SwingUp<NX, NY>>
         self.firmware.accept(&inputs);
         let output = act(&mut self.firmware, &inputs);
         self.board.drive(output);
-        #[cfg(feature = "identify")]
         let log = self.firmware.log_tick();
         let command = queue::take(&mut self.commands);
         let telemetry = self.firmware.report(self.cycles);
@@ -68,7 +67,6 @@ impl<'q, 't, B: Board<NY>, const NX: usize, const NY: usize, S: SwingUp<NX, NY>>
         if let Some(telemetry) = telemetry {
             self.send(Message::Telemetry(telemetry));
         }
-        #[cfg(feature = "identify")]
         if let Some(log) = log {
             self.send(Message::Log(log));
         }

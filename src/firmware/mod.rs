@@ -10,11 +10,9 @@ pub mod control_task;
 pub mod hot_path;
 mod jog;
 mod posture;
-#[cfg(feature = "identify")]
 mod shake;
 mod swing_up;
 mod telemetry;
-#[cfg(feature = "identify")]
 mod tick_log;
 
 use crate::board::{Contacts, Inputs, Output};
@@ -23,7 +21,6 @@ use crate::control::encoder::CounterWidth;
 use crate::control::motion::Playback;
 use crate::protocol::message::{Command, Reply, Start, Statistics, Telemetry};
 use crate::protocol::telemetry_ticks;
-#[cfg(feature = "identify")]
 use crate::protocol::tick_log::TickLog;
 use crate::supervision::calibration::Calibration;
 use crate::supervision::debounce::Debounce;
@@ -31,7 +28,6 @@ use crate::supervision::detection::{Detection, Finding};
 use crate::supervision::envelope;
 use crate::supervision::fault::{Cause, Fault};
 use crate::supervision::jog::{Jog, MotorSign};
-#[cfg(feature = "identify")]
 use crate::supervision::shaking::Shaker;
 use crate::supervision::supervisor::{State, Supervisor};
 use crate::table::{ChecksumScan, Equilibrium, GainTable, NoSwingUp, SwingUp};
@@ -84,13 +80,10 @@ pub struct Firmware<'t, const NX: usize, const NY: usize, S = NoSwingUp> {
     ticks_to_telemetry: u16,
     /// The tick of the board's timer (s).
     timer_tick_s: f32,
-    #[cfg(feature = "identify")]
     shaker: Shaker<NY>,
     /// Motor voltage of the previous tick, while the rig is shaken (V).
-    #[cfg(feature = "identify")]
     last_volts: f32,
     /// Logged ticks that are not yet sent; `None` while no log is kept.
-    #[cfg(feature = "identify")]
     log: Option<TickLog<NY>>,
 }
 
@@ -160,11 +153,8 @@ impl<'t, const NX: usize, const NY: usize, S: SwingUp<NX, NY>> Firmware<'t, NX, 
             telemetry_period_ticks: telemetry_ticks(table.tick_s),
             ticks_to_telemetry: 0,
             timer_tick_s: table.tick_s,
-            #[cfg(feature = "identify")]
             shaker: Shaker::default(),
-            #[cfg(feature = "identify")]
             last_volts: 0.0,
-            #[cfg(feature = "identify")]
             log: None,
         }
     }
@@ -234,7 +224,6 @@ impl<'t, const NX: usize, const NY: usize, S: SwingUp<NX, NY>> Firmware<'t, NX, 
         }
         match self.supervisor.state() {
             State::Jogging => self.push_cart(inputs),
-            #[cfg(feature = "identify")]
             State::Identifying => self.shake(inputs),
             state if !state.motor_is_on() => self.tick_motor_off(),
             _ => {}
@@ -247,7 +236,6 @@ impl<'t, const NX: usize, const NY: usize, S: SwingUp<NX, NY>> Firmware<'t, NX, 
         self.output = match self.supervisor.state() {
             State::Balancing => self.balance(inputs),
             State::Jogging => self.output,
-            #[cfg(feature = "identify")]
             State::Identifying => self.output,
             State::Raising | State::Holding | State::Lowering if S::IS_POSSIBLE => self.move_links(inputs),
             _ => Output::OFF,
@@ -333,7 +321,6 @@ impl<'t, const NX: usize, const NY: usize, S: SwingUp<NX, NY>> Firmware<'t, NX, 
             | State::Holding
             | State::Lowering
             | State::Fault => {}
-            #[cfg(feature = "identify")]
             State::Identifying => {}
         }
     }
