@@ -90,9 +90,7 @@ impl CommissionStep {
             // A fault may have lost the positions.
             Self::Excitation | Self::Balance => Self::Homing,
             // Another log may be better.
-            Self::Identification | Self::Design | Self::Verification => {
-                Self::Excitation
-            }
+            Self::Identification | Self::Design | Self::Verification => Self::Excitation,
             step => step,
         }
     }
