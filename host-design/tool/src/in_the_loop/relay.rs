@@ -9,7 +9,8 @@ use upright_design::rig::Rig;
 use upright_design::simulate::Scenario;
 use upright_design::table::TableValues;
 
-use super::place::{Place, RunError};
+use super::error::RunError;
+use super::place::Place;
 use super::qemu::EmulatorError;
 
 /// Why a relay has ended early.

@@ -18,7 +18,8 @@ use upright_tool::in_the_loop::Link;
 use upright_tool::monitor::SerialLine;
 
 use crate::failure::Failure;
-use crate::firmware::{Built, Target, lines_of_stdin};
+use crate::firmware::lines_of_stdin;
+use crate::target::{Built, Target};
 use crate::variation::with_table;
 
 /// Guides you from a wired rig to a balancing one, step by step: what to do, what was found, and whether it is right.

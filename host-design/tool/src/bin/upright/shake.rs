@@ -16,8 +16,8 @@ use upright_tool::in_the_loop::run_shaken;
 use upright_tool::monitor::{SerialLine, now};
 
 use crate::failure::Failure;
-use crate::firmware::Target;
 use crate::progress::with_spinner;
+use crate::target::Target;
 use crate::variation::with_table;
 
 /// Shakes the hanging machine, and writes its log for `upright identify`.

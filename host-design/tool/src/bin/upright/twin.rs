@@ -16,7 +16,7 @@ use upright_tool::monitor::SerialLine;
 use upright_tool::twin::{Server, SimulatedMachine};
 
 use crate::failure::Failure;
-use crate::firmware::Target;
+use crate::target::Target;
 use crate::variation::{Variation, Wanted, law_option, positive, with_stored_motions};
 
 /// Serves a page on which the rig moves, run by the firmware itself: pull it, change it, break it, watch it.

@@ -18,7 +18,7 @@ use signal_hook::consts::{SIGINT, SIGTERM};
 use upright_tool::monitor::record::{TelemetryCsv, json};
 use upright_tool::monitor::{MonitorAction, SerialLine, action, now, request, view};
 
-use super::designed;
+use super::built::designed;
 use crate::failure::Failure;
 use crate::twin;
 use crate::variation::{Wanted, positive};
