@@ -8,6 +8,7 @@ use crate::control::observer::Observer;
 use crate::control::state_feedback::{FeedbackSum, LawState, saturate, state_feedback};
 use crate::table::{GainTable, Law, LawGains, Scalar, TableError};
 use nalgebra::SVector;
+#[cfg(feature = "firmware")]
 use serde::{Deserialize, Serialize};
 
 /// Observer, control law and actuator map of one gain table.
@@ -75,7 +76,8 @@ pub struct MotorCommand<T = f32> {
 }
 
 /// Reason for rejecting a request; the previous setting is kept.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "firmware", derive(Serialize, Deserialize))]
 pub enum Rejected {
     /// The table holds no gains for this law.
     NoSuchLaw,
@@ -118,6 +120,7 @@ impl<'t, const NX: usize, const NY: usize> Controller<'t, NX, NY> {
     }
 
     /// A controller that must never be started, for a table that cannot be used.
+    #[cfg(feature = "firmware")]
     pub(crate) fn unusable(table: &'t GainTable<NX, NY>, widths: [CounterWidth; NY]) -> Self {
         Self::stopped(table, ActiveLaw::new(table, Law::Lqr, const { &LawGains::NONE }), widths)
     }

@@ -30,9 +30,11 @@ pub fn joint(sensor: u8) -> String {
     if sensor == 0 { "cart".to_owned() } else { format!("link {sensor}") }
 }
 
-/// Where the program has crashed, with the processor's registers as its manual names them.
+/// Where the program has crashed: the words that the board records, with the registers of a Cortex-M as its manual
+/// names them (ARM DDI 0403, B3.2). Program counter (PC) and link register (LR) are 0 after a panic, and after a stack
+/// overflow, which leaves no room for them; BFAR is valid if bit 15 of CFSR is set.
 pub fn crash(record: &CrashRecord) -> String {
-    let CrashRecord { pc, lr, cfsr, hfsr, bfar } = record;
+    let CrashRecord([pc, lr, cfsr, hfsr, bfar]) = record;
     format!("crash at PC {pc:#010x}, LR {lr:#010x}, CFSR {cfsr:#010x}, HFSR {hfsr:#010x}, BFAR {bfar:#010x}")
 }
 

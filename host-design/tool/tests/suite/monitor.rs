@@ -204,8 +204,7 @@ fn active_contacts_and_the_last_crash_are_shown() {
         }
         answer(&mut monitor, command.id, Answer::Done);
     };
-    let record =
-        CrashRecord { pc: 0x0800_1234, lr: 0x0800_0101, cfsr: 0x8200, hfsr: 1 << 30, bfar: 0x6000_0004 };
+    let record = CrashRecord([0x0800_1234, 0x0800_0101, 0x8200, 1 << 30, 0x6000_0004]);
     answer(&mut monitor, question.id, Answer::Crash(Some(record)));
     let line = "crash at PC 0x08001234, LR 0x08000101, CFSR 0x00008200, HFSR 0x40000000, BFAR 0x60000004";
     assert!(screen(&monitor).contains(line) && monitor.log.iter().any(|said| said == line));

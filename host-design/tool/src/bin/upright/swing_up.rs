@@ -8,6 +8,7 @@ use clap::Args;
 use serde_json::json;
 use upright_design::motion::Transition;
 use upright_design::rig::{PlantDescription, Rig};
+use upright_design::simulate::Trace;
 use upright_design::study::Study;
 use upright_design::swing_up::{
     Condition, FirmwareRuns, Judgement, Margin, Plan, Script, Solved, Stored, SwingUpError, designed_table,
@@ -190,20 +191,7 @@ impl SwingUp {
         };
         let script = Script::of(&rig, &plan.table, self.seed, false).map_err(failed)?;
         let demonstration = script.run(&plan.table).map_err(RunError::from)?;
-        if let Some(path) = &self.csv {
-            let mut bytes = Vec::new();
-            demonstration.trace.write_csv(&mut bytes)?;
-            write_atomically(path, &bytes)?;
-        }
-        if let Some(path) = &self.svg {
-            let title = format!("{}: up, balance, step, down", rig.name);
-            write_atomically(path, run_svg(&rig, &demonstration.trace, &title)?.as_bytes())?;
-        }
-        if let (Some(path), PlantDescription::Chain(chain)) = (&self.picture, &rig.plant) {
-            let to_s = plan.raise.peaks.duration_s;
-            let picture = stroboscope_svg(chain, &demonstration.trace, 0.0, to_s);
-            write_atomically(path, picture.as_bytes())?;
-        }
+        self.write_files(&rig, &demonstration.trace, plan.raise.peaks.duration_s)?;
         let file = Stored::path_beside(&self.rig);
         let differs = old.map_or(true, |old| old.to_json() != plan.stored.to_json());
         if !self.check && !self.no_write && differs {
@@ -218,6 +206,24 @@ impl SwingUp {
         }
         if self.check && differs {
             return Err(Failure::CheckFailed(format!("{} differs from these motions", file.display())));
+        }
+        Ok(())
+    }
+
+    /// Writes the files that are wanted of a run, in which the rig is raised for `raised_s`.
+    fn write_files(&self, rig: &Rig, trace: &Trace, raised_s: f64) -> Result<(), Failure> {
+        if let Some(path) = &self.csv {
+            let mut bytes = Vec::new();
+            trace.write_csv(&mut bytes)?;
+            write_atomically(path, &bytes)?;
+        }
+        if let Some(path) = &self.svg {
+            let title = format!("{}: up, balance, step, down", rig.name);
+            write_atomically(path, run_svg(rig, trace, &title)?.as_bytes())?;
+        }
+        if let (Some(path), PlantDescription::Chain(chain)) = (&self.picture, &rig.plant) {
+            let picture = stroboscope_svg(chain, trace, 0.0, raised_s);
+            write_atomically(path, picture.as_bytes())?;
         }
         Ok(())
     }
