@@ -82,7 +82,7 @@ impl Quantity {
             Kind::Tilt => Self::Tilt,
             Kind::Delay => Self::Delay,
             Kind::Zero(_) => Self::Zero,
-            Kind::EccentricSine(_) | Kind::EccentricCosine(_) => return None,
+            Kind::AirDrag(_) | Kind::EccentricSine(_) | Kind::EccentricCosine(_) => return None,
         })
     }
 

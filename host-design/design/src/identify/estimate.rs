@@ -5,11 +5,13 @@ use std::path::PathBuf;
 use super::chain_of;
 use super::covariance::{changes, deviations};
 use super::error::IdentifyError;
-use super::log::{DriveScale, Log};
+use super::free;
+use super::log::Log;
 use super::parameters::{Kind, Layout, Prior, priors};
 use super::prediction::Filter;
 use super::realise::{Realised, realise};
 use super::record::Record;
+use super::recordings::{Recorded, Recordings};
 use super::shooting::{Shooting, WINDOW_S};
 use super::verdict::{ChannelFit, HeldOut, Predicted, Refusal, channels, judge};
 use super::wiring::{self, WiringFound};
@@ -97,48 +99,6 @@ impl Identification {
     }
 }
 
-/// Checks that a log was recorded on the rig.
-fn is_of(rig: &Rig, log: &Log, file: &std::path::Path) -> Result<(), IdentifyError> {
-    let other = |found: String, wanted: String, remedy: &str| {
-        Err(IdentifyError::OtherRig { file: file.to_owned(), found, wanted, remedy: remedy.to_owned() })
-    };
-    let (header, channels) = (&log.header, rig.sensors().len());
-    if header.rig != rig.name {
-        return other(
-            format!("{:?}", header.rig),
-            format!("that of {:?}", rig.name),
-            "name the rig file of this machine",
-        );
-    }
-    if log.channels() != channels {
-        return other(
-            format!("{} encoders", log.channels()),
-            format!("for {channels}"),
-            "name the rig file that the firmware was built from",
-        );
-    }
-    let period_ns = (rig.tick.period_s * 1e9).round();
-    if f64::from(header.period_ns) != period_ns {
-        return other(
-            format!("a machine with a tick of {} ns", header.period_ns),
-            format!("for {period_ns} ns"),
-            "correct period_s in [tick], or record again",
-        );
-    }
-    let has_motor = rig.actuator.motor.is_some();
-    if has_motor != (header.drive == DriveScale::Duty) {
-        let names = ["a machine that commands forces", "a machine that commands duties"];
-        let (found, wanted) =
-            (names[usize::from(!has_motor)], ["without a motor", "with a motor"][usize::from(has_motor)]);
-        return other(
-            found.to_owned(),
-            wanted.to_owned(),
-            "describe the motor in [actuator] as when it was recorded",
-        );
-    }
-    Ok(())
-}
-
 /// Identifies the machine of `rig` from its logs, each with the path of its file.
 ///
 /// # Errors
@@ -150,16 +110,27 @@ pub fn identify(
     settings: &Settings,
     progress: Progress<'_>,
 ) -> Result<Identification, IdentifyError> {
+    identify_recordings(rig, &Recordings::Logs(logs.to_vec()), settings, progress)
+}
+
+/// Identifies the machine of `rig` from its recordings. Without a drive in them, the scale of masses and frictions stays
+/// that of the file.
+///
+/// # Errors
+/// [`IdentifyError`] if a recording is not of the rig, they are too short, or a channel does not move in them. A misfit
+/// is not an error: see [`Identification::refusal`].
+pub fn identify_recordings(
+    rig: &Rig,
+    recordings: &Recordings,
+    settings: &Settings,
+    progress: Progress<'_>,
+) -> Result<Identification, IdentifyError> {
     let chain = chain_of(rig)?;
-    logs.iter().try_for_each(|(file, log)| is_of(rig, log, file))?;
-    let lost_ticks = logs.iter().map(|(_, log)| log.lost()).sum();
-    let logs: Vec<Log> = logs.iter().map(|(_, log)| log.clone()).collect();
-    let stride = Record::usual_stride(rig.tick.period_s);
-    let record = Record::of(rig, &logs, stride);
+    let Recorded { record, finer, lost_ticks, is_driven } = recordings.recorded(rig)?;
     record.at_least(LEAST_S)?;
     record.moves()?;
     let model = record.model(chain.gravity_m_per_s2);
-    let priors = priors(rig, chain, settings.eccentricity);
+    let mut priors = priors(rig, chain, settings.eccentricity);
     let mut found = Identification {
         seconds: record.seconds(),
         lost_ticks,
@@ -173,7 +144,10 @@ pub fn identify(
         delay_ticks: rig.tick.delay_ticks,
         refusal: None,
     };
-    if !settings.trust_wiring {
+    if !is_driven {
+        free::known(model.layout, &mut priors, record.is_clamped);
+    }
+    if is_driven && !settings.trust_wiring {
         progress(Some(("wiring", wiring::count(record.channels))));
         let wiring = wiring::find(&model, &record, &priors, &|| progress(None));
         found.wiring = Some(wiring.clone());
@@ -182,9 +156,27 @@ pub fn identify(
             return Ok(found);
         }
     }
+    if !is_driven {
+        let free = free::fit(&model, &record, &priors, &|| progress(None));
+        for (i, kind) in model.layout.kinds().into_iter().enumerate() {
+            if priors[i].deviation > 0.0 {
+                eprintln!(
+                    "{:?} {:.6e} -> {:.6e} +- {:.2e}  halves {:.6e} {:.6e}",
+                    kind,
+                    priors[i].value,
+                    free.p[i],
+                    free.deviations[i],
+                    free.halves[0][i],
+                    free.halves[1][i]
+                );
+            }
+        }
+        eprintln!("res {:?}", free.residuals);
+        return Ok(found);
+    }
     let held_s = HELD_OUT.0.min(HELD_OUT.1 * record.seconds());
     let used_s = record.seconds() - held_s;
-    let finer = (stride > 1).then(|| Record::of(rig, &logs, (stride / 2).max(1)).part(0.0, used_s));
+    let finer = finer.map(|finer| finer.part(0.0, used_s));
     let (used, held) = (record.part(0.0, used_s), record.part(used_s, used_s + held_s + 1.0));
     let fitted = Fitted { rig, priors: &priors, used: &used, held: &held, finer: finer.as_ref() };
     fitted.run(&model, &mut found, progress)?;

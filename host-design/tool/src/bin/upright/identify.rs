@@ -4,13 +4,14 @@ use std::io::Write;
 use std::path::{Path, PathBuf};
 
 use clap::Args;
-use upright_design::identify::{Identification, IdentifyError, Log, Settings, identify};
+use upright_design::identify::{Identification, Log, Recordings, Settings, identify_recordings};
 use upright_design::rig::Rig;
 use upright_design::table::write_atomically;
 use upright_tool::identified::{json, page, rig_file, text};
 
 use crate::failure::Failure;
 use crate::progress::with_steps;
+use crate::reading::ReadingArgs;
 use crate::variation::positive;
 
 /// Identifies the parameters of the real machine from logs of the hanging machine being shaken.
@@ -32,9 +33,11 @@ pub(crate) struct Identify {
     /// Rig file that the firmware was designed for
     #[arg(value_name = "RIG")]
     rig: PathBuf,
-    /// Logs of this machine, all recorded after the same homing
-    #[arg(value_name = "LOG", required = true)]
+    /// Logs or tables of this machine, all recorded after the same homing
+    #[arg(value_name = "FILE", required = true)]
     logs: Vec<PathBuf>,
+    #[command(flatten)]
+    reading: ReadingArgs,
     /// Write the rig file with the identified numbers, if they fit
     #[arg(long, value_name = "NEW.toml")]
     write: Option<PathBuf>,
@@ -64,23 +67,19 @@ pub(crate) struct Identify {
 impl Identify {
     pub(crate) fn run(self) -> Result<(), Failure> {
         let rig = Rig::from_path(&self.rig)?;
-        let read = |file: &PathBuf| match Log::from_path(file) {
-            Ok(log) => Ok((file.clone(), log)),
-            Err(source) => Err(IdentifyError::Log { file: file.clone(), source }),
-        };
-        let logs = self.logs.iter().map(read).collect::<Result<Vec<_>, _>>()?;
+        let recordings = Recordings::from_paths(&rig, &self.logs, &self.reading.reading())?;
         if let Some(path) = &self.csv {
-            return convert(&rig, &logs, path, |log, steps, out| log.write_csv(steps, out));
+            return convert(&rig, &recordings, path, |log, steps, out| log.write_csv(steps, out));
         }
         if let Some(path) = &self.mcap {
-            return convert(&rig, &logs, path, |log, steps, out| log.write_mcap(steps, out));
+            return convert(&rig, &recordings, path, |log, steps, out| log.write_mcap(steps, out));
         }
         let settings = Settings {
             eccentricity: self.eccentricity,
             weighed_kg_m: self.weigh,
             trust_wiring: self.trust_wiring,
         };
-        let found = with_steps(|progress| identify(&rig, &logs, &settings, progress))?;
+        let found = with_steps(|progress| identify_recordings(&rig, &recordings, &settings, progress))?;
         let mut out = std::io::stdout().lock();
         if self.json {
             writeln!(out, "{}", json(&rig.name, &found))?;
@@ -137,11 +136,14 @@ impl Identify {
 /// Writes one log in another format.
 fn convert(
     rig: &Rig,
-    logs: &[(PathBuf, Log)],
+    recordings: &Recordings,
     path: &Path,
     write: impl Fn(&Log, &[f64], &mut dyn Write) -> std::io::Result<()>,
 ) -> Result<(), Failure> {
-    let [(file, log)] = logs else {
+    let Recordings::Logs(logs) = recordings else {
+        return Err(Failure::BadArgument("--csv and --mcap convert logs of Upright".to_owned()));
+    };
+    let [(file, log)] = logs.as_slice() else {
         return Err(Failure::BadArgument("--csv and --mcap convert one log; name one".to_owned()));
     };
     let steps: Vec<f64> = rig.sensors().iter().map(|sensor| sensor.step()).collect();

@@ -1,0 +1,66 @@
+//! Options that say how a table of measurements is to be read.
+
+use clap::{Args, ValueEnum};
+use upright_design::identify::{AngleReference, AngleZero, Reading};
+
+use crate::variation::positive;
+
+/// How tables are read that are not logs of Upright.
+#[derive(Args)]
+#[command(next_help_heading = "Tables of other programs")]
+pub(crate) struct ReadingArgs {
+    /// Names of the columns, instead of those in the file: time_s, x_m, angle_1_rad …, force_n, voltage_v, duty, -
+    #[arg(long, value_name = "NAMES", value_delimiter = ',')]
+    columns: Vec<String>,
+    /// Time from one row to the next (s), if no column has the time
+    #[arg(long, value_name = "S", value_parser = positive)]
+    period: Option<f64>,
+    /// Whether angles are measured against the vertical, or against the link below
+    #[arg(long, value_name = "AGAINST")]
+    angles: Option<Against>,
+    /// Where all angles are 0
+    #[arg(long, value_name = "WHERE")]
+    zero: Option<Zero>,
+    /// Columns that count in the other sense
+    #[arg(long, value_name = "NAMES", value_delimiter = ',')]
+    reversed: Vec<String>,
+    /// Counts per turn of the angles in counts, instead of those in the rig file
+    #[arg(long, value_name = "N", value_parser = positive)]
+    counts_per_turn: Option<f64>,
+    /// The cart cannot move: nothing is identified of it
+    #[arg(long)]
+    clamped: bool,
+}
+
+#[derive(Clone, Copy, ValueEnum)]
+enum Against {
+    Absolute,
+    Relative,
+}
+
+#[derive(Clone, Copy, ValueEnum)]
+enum Zero {
+    Upright,
+    Hanging,
+}
+
+impl ReadingArgs {
+    /// As the library wants it.
+    pub(crate) fn reading(&self) -> Reading {
+        Reading {
+            columns: self.columns.clone(),
+            period_s: self.period,
+            angles: self.angles.map(|against| match against {
+                Against::Absolute => AngleReference::Absolute,
+                Against::Relative => AngleReference::Relative,
+            }),
+            zero: self.zero.map(|zero| match zero {
+                Zero::Upright => AngleZero::Upright,
+                Zero::Hanging => AngleZero::Hanging,
+            }),
+            reversed: self.reversed.clone(),
+            counts_per_turn: self.counts_per_turn,
+            is_clamped: self.clamped,
+        }
+    }
+}
