@@ -16,11 +16,8 @@ use upright::protocol::serial_link::{MAX_COMMAND, MAX_MESSAGE, SerialLink};
 use upright::supervision::shaking::Shaking;
 use upright::table::Law;
 
-use invariants::Invariants;
-use simulated_rig::{SimulatedRig, Start, starts};
-
-mod invariants;
-mod simulated_rig;
+use crate::invariants::{self, Invariants};
+use crate::simulated_rig::{SimulatedRig, Start, starts};
 
 /// A run ends after this many ticks at the latest.
 const MOST_TICKS: u32 = 32;
@@ -29,7 +26,7 @@ const MOST_TICKS: u32 = 32;
 ///
 /// # Panics
 /// If the firmware panics or an [invariant](invariants) does not hold.
-pub(crate) fn check(bytes: &[u8]) {
+pub fn check(bytes: &[u8]) {
     static STARTS: OnceLock<[Start; 6]> = OnceLock::new();
     let Some((&first, bytes)) = bytes.split_first() else { return };
     let [hanging, shaken, raised, armed, balancing, stopped] = STARTS.get_or_init(starts);

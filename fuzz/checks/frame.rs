@@ -11,7 +11,7 @@ use upright::protocol::serial_link::{MAX_COMMAND, MAX_MESSAGE};
 ///
 /// # Panics
 /// If a message changes on its way through a frame.
-pub(crate) fn check(bytes: &[u8]) {
+pub fn check(bytes: &[u8]) {
     both::<Command, MAX_COMMAND>(bytes);
     both::<Message<STATES, SENSORS>, MAX_MESSAGE>(bytes);
 }

@@ -12,7 +12,7 @@ use upright::supervision::jog::MotorSign;
 use upright::supervision::sign_check::Signs;
 use upright::supervision::supervisor::State;
 
-use super::simulated_rig::{SHAKING, SimulatedRig, Tested};
+use crate::simulated_rig::{SHAKING, SimulatedRig, Tested};
 
 /// What was known before a tick.
 pub(crate) struct Invariants {

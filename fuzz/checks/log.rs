@@ -10,7 +10,7 @@ const MAGIC: &[u8] = b"UPRTLOG1";
 ///
 /// # Panics
 /// If a log is not the same when it is read again, or an error is not one line.
-pub(crate) fn check(bytes: &[u8]) {
+pub fn check(bytes: &[u8]) {
     read(bytes);
     read(&sealed(bytes));
 }

@@ -8,7 +8,7 @@ use upright_design::rig::Rig;
 ///
 /// # Panics
 /// If an error is not one line that begins with the file's name, or has an exit code other than 2 or 3.
-pub(crate) fn check(bytes: &[u8]) {
+pub fn check(bytes: &[u8]) {
     let Ok(text) = std::str::from_utf8(bytes) else { return };
     match Rig::from_toml(text, Path::new("fuzz.toml")) {
         Ok(rig) => {

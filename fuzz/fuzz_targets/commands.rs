@@ -1,6 +1,3 @@
 #![no_main]
 
-#[path = "../checks/commands.rs"]
-mod check;
-
-libfuzzer_sys::fuzz_target!(|bytes: &[u8]| check::check(bytes));
+libfuzzer_sys::fuzz_target!(|bytes: &[u8]| upright_fuzz_checks::commands::check(bytes));

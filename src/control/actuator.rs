@@ -43,7 +43,7 @@ impl<T: Scalar> MotorMap<T> {
     /// ```text
     /// V = (R r / (gear Kt)) F + (gear Kt / r) ẋ
     /// ```
-    pub fn drive(&self, force: T, speed: T, last_v: T) -> (T, T) {
+    pub fn volts_and_force(&self, force: T, speed: T, last_v: T) -> (T, T) {
         let back_emf = self.volts_per_speed * speed;
         let wanted = self.volts_per_newton * force + back_emf;
         // The duty cycle adds the dead zone on top of this voltage, so the limit leaves room for it.
@@ -76,13 +76,13 @@ mod tests {
 
     #[test]
     fn back_emf_is_made_up_for() {
-        assert_eq!(MOTOR.drive(1.5, 0.5, 0.0), (5.0, 1.5));
+        assert_eq!(MOTOR.volts_and_force(1.5, 0.5, 0.0), (5.0, 1.5));
     }
 
     #[test]
     fn the_force_that_is_left_at_the_supply_limit_is_reported() {
         // The dead zone leaves 11 V of 12 V; 4 V of them are back-EMF.
-        assert_eq!(MOTOR.drive(10.0, 1.0, 0.0), (11.0, 3.5));
+        assert_eq!(MOTOR.volts_and_force(10.0, 1.0, 0.0), (11.0, 3.5));
         assert_eq!(MOTOR.duty(11.0), 1.0);
         assert_eq!(MOTOR.duty(-11.0), -1.0);
     }
@@ -90,8 +90,8 @@ mod tests {
     #[test]
     fn the_voltage_changes_no_faster_than_the_slew_limit() {
         let slow = MotorMap { slew_v_per_tick: 0.5, ..MOTOR };
-        assert_eq!(slow.drive(2.0, 0.0, 1.0), (1.5, 0.75));
-        assert_eq!(slow.drive(-2.0, 0.0, 1.0), (0.5, 0.25));
+        assert_eq!(slow.volts_and_force(2.0, 0.0, 1.0), (1.5, 0.75));
+        assert_eq!(slow.volts_and_force(-2.0, 0.0, 1.0), (0.5, 0.25));
     }
 
     #[test]
@@ -116,6 +116,6 @@ mod tests {
     #[test]
     fn nan_turns_the_motor_off() {
         assert_eq!(MOTOR.duty(f32::NAN), 0.0);
-        assert_eq!(MOTOR.drive(f32::NAN, 0.0, 0.0).0, 0.0);
+        assert_eq!(MOTOR.volts_and_force(f32::NAN, 0.0, 0.0).0, 0.0);
     }
 }

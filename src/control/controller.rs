@@ -300,7 +300,7 @@ impl<'t, const NX: usize, const NY: usize, T: Scalar> Controller<'t, NX, NY, T> 
             return Self::off();
         };
         let requested = self.observe(&observer, raw, judge);
-        self.drive(requested)
+        self.actuate(requested)
     }
 
     /// First half of a tick with the whole state measured, as the paper simulates it.
@@ -311,7 +311,7 @@ impl<'t, const NX: usize, const NY: usize, T: Scalar> Controller<'t, NX, NY, T> 
         }
         self.state.govern(self.target, self.gains.setpoint_step);
         let requested = self.request(state_feedback(self.gains.n, self.state.setpoint, &self.gains.k, x));
-        self.drive(requested)
+        self.actuate(requested)
     }
 
     #[inline(always)]
@@ -358,14 +358,14 @@ impl<'t, const NX: usize, const NY: usize, T: Scalar> Controller<'t, NX, NY, T> 
 
     /// Limits the force and converts it for the power stage.
     #[inline]
-    fn drive(&mut self, requested: T) -> MotorCommand<T> {
+    fn actuate(&mut self, requested: T) -> MotorCommand<T> {
         let limited = saturate(requested, self.table.force_limit_n);
         let (applied, drive) = match &self.table.motor {
             None => (limited, Drive::Force(limited.to_f32())),
             Some(motor) => {
                 // The cart's speed is the state after its position.
                 let speed = self.estimate.get(1).copied().unwrap_or_default();
-                let (volts, force) = motor.drive(limited, speed, self.last_volts);
+                let (volts, force) = motor.volts_and_force(limited, speed, self.last_volts);
                 self.last_volts = volts;
                 (force, Drive::Duty(motor.duty(volts).to_f32()))
             }

@@ -38,20 +38,20 @@ impl<'q, 't, B: Board<NY>, const NX: usize, const NY: usize, S: SwingUp<NX, NY>>
 
     /// One tick.
     pub fn tick(&mut self) {
-        self.tick_with(Firmware::drive, Firmware::predict);
+        self.tick_with(Firmware::act, Firmware::predict);
     }
 
-    /// One tick, with the caller's own compiled versions of [`Firmware::drive`] and [`Firmware::predict`].
+    /// One tick, with the caller's own compiled versions of [`Firmware::act`] and [`Firmware::predict`].
     #[inline(always)]
     pub fn tick_with(
         &mut self,
-        drive: impl for<'f> FnOnce(&'f mut Firmware<'t, NX, NY, S>, &Inputs<NY>) -> &'f Output,
+        act: impl for<'f> FnOnce(&'f mut Firmware<'t, NX, NY, S>, &Inputs<NY>) -> &'f Output,
         predict: impl FnOnce(&mut Firmware<'t, NX, NY, S>),
     ) {
         let begin = self.board.cycles();
         let inputs = self.board.inputs();
         self.firmware.accept(&inputs);
-        let output = drive(&mut self.firmware, &inputs);
+        let output = act(&mut self.firmware, &inputs);
         self.board.drive(output);
         #[cfg(feature = "identify")]
         let log = self.firmware.log_tick();

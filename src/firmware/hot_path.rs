@@ -10,10 +10,10 @@ use crate::gains::{SENSORS, STATES, SwingUp};
 /// The firmware for the rig of the gain table.
 pub type RigFirmware = Firmware<'static, STATES, SENSORS, SwingUp>;
 
-/// [`Firmware::drive`], compiled for speed.
+/// [`Firmware::act`], compiled for speed.
 #[inline(never)]
-pub fn drive<'f>(firmware: &'f mut RigFirmware, inputs: &Inputs<SENSORS>) -> &'f Output {
-    firmware.drive(inputs)
+pub fn act<'f>(firmware: &'f mut RigFirmware, inputs: &Inputs<SENSORS>) -> &'f Output {
+    firmware.act(inputs)
 }
 
 /// [`Firmware::predict`], compiled for speed.

@@ -9,7 +9,7 @@ use crate::supervision::supervisor::State;
 use crate::table::SwingUp;
 
 impl<const NX: usize, const NY: usize, S: SwingUp<NX, NY>> Firmware<'_, NX, NY, S> {
-    /// A command to drive: continues the drive in progress, or starts one, along +x or against it.
+    /// A command to jog: continues the jog in progress, or starts one, along +x or against it.
     pub(super) fn hold_jog(&mut self, along: bool) -> Result<(), Inhibits> {
         let is_jogging = self.supervisor.state() == State::Jogging;
         if is_jogging && along != self.jog.is_along() {
@@ -38,7 +38,7 @@ impl<const NX: usize, const NY: usize, S: SwingUp<NX, NY>> Firmware<'_, NX, NY, 
         cart(&self.table.limits.sign_counts)
     }
 
-    /// A tick of the drive.
+    /// A tick of the jog.
     // Not inlined into the tick: the tool that computes the bound on the stack has to follow every jump there.
     #[inline(never)]
     pub(super) fn push_cart(&mut self, inputs: &Inputs<NY>) {

@@ -243,7 +243,7 @@ impl<'t, const NX: usize, const NY: usize, S: SwingUp<NX, NY>> Firmware<'t, NX, 
     /// First half of a tick: from inputs to output.
     pub fn control(&mut self, inputs: &Inputs<NY>) -> Output {
         self.accept(inputs);
-        *self.drive(inputs)
+        *self.act(inputs)
     }
 
     /// The first part of [`control`](Self::control): checks the contacts that turn the motor off, and does all of a
@@ -266,14 +266,14 @@ impl<'t, const NX: usize, const NY: usize, S: SwingUp<NX, NY>> Firmware<'t, NX, 
             State::Jogging => self.push_cart(inputs),
             #[cfg(feature = "identify")]
             State::Identifying => self.shake(inputs),
-            state if !state.drives() => self.tick_motor_off(),
+            state if !state.motor_is_on() => self.tick_motor_off(),
             _ => {}
         }
     }
 
     /// The second part of [`control`](Self::control): the output, from the control law or a planned motion while one
     /// of them commands the motor.
-    pub fn drive(&mut self, inputs: &Inputs<NY>) -> &Output {
+    pub fn act(&mut self, inputs: &Inputs<NY>) -> &Output {
         self.output = match self.supervisor.state() {
             State::Balancing => self.balance(inputs),
             State::Jogging => self.output,
@@ -299,13 +299,13 @@ impl<'t, const NX: usize, const NY: usize, S: SwingUp<NX, NY>> Firmware<'t, NX, 
         });
         let exceeded =
             envelope::exceeded(&table.limits, self.controller.estimate().as_slice(), command.requested_n);
-        self.drive_or_trip(inputs, &command, exceeded, finding)
+        self.act_or_trip(inputs, &command, exceeded, finding)
     }
 
     /// The output for `command`, unless there is a fault: of the inputs, of the limits on the state (`exceeded`), of
     /// the tests of the innovation (`finding`) or of the force.
     #[inline(always)]
-    fn drive_or_trip(
+    fn act_or_trip(
         &mut self,
         inputs: &Inputs<NY>,
         command: &MotorCommand,

@@ -59,7 +59,7 @@ impl<const NX: usize, const NY: usize, S: SwingUp<NX, NY>> Firmware<'_, NX, NY, 
     /// All inhibits of arming that hold now, except [`Inhibits::HELD`], which is only known once a command to arm
     /// arrives.
     pub fn arming_inhibits(&self) -> Inhibits {
-        if self.supervisor.state().drives() {
+        if self.supervisor.state().motor_is_on() {
             return self.supervisor.arming_inhibits();
         }
         let limits = &self.table.limits;
@@ -79,7 +79,7 @@ impl<const NX: usize, const NY: usize, S: SwingUp<NX, NY>> Firmware<'_, NX, NY, 
     /// The same, but without the check of the motor's sign: for the jog, which makes that check.
     pub(super) fn inhibits_before_motor_check(&self) -> Inhibits {
         let state = self.supervisor.arming_inhibits();
-        if self.supervisor.state().drives() {
+        if self.supervisor.state().motor_is_on() {
             return state;
         }
         let moves = self.calibration.slow_ticks() < self.table.limits.arm_ticks / MOVING_PART_OF_ARM_TICKS;

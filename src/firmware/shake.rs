@@ -61,7 +61,7 @@ impl<const NX: usize, const NY: usize, S: SwingUp<NX, NY>> Firmware<'_, NX, NY, 
         let Some(observer) = &table.observer else { return self.supervisor.disarm() };
         match self.shaker.update(self.tick, &counts, &observer.step, &table.limits, table.tick_s) {
             Ok(Some(force_n)) => {
-                let (drive, applied_n) = self.driven(force_n);
+                let (drive, applied_n) = self.actuate(force_n);
                 (self.requested_n, self.applied_n) = (force_n, applied_n);
                 self.output = Output { enable: true, drive };
             }
@@ -71,9 +71,9 @@ impl<const NX: usize, const NY: usize, S: SwingUp<NX, NY>> Firmware<'_, NX, NY, 
     }
 
     /// The motor command for this force (N) on the moving cart, and the force that it produces (N).
-    fn driven(&mut self, force_n: f32) -> (Drive, f32) {
+    fn actuate(&mut self, force_n: f32) -> (Drive, f32) {
         let Some(motor) = &self.table.motor else { return (Drive::Force(force_n), force_n) };
-        let (volts, applied_n) = motor.drive(force_n, self.shaker.speed_m_per_s(), self.last_volts);
+        let (volts, applied_n) = motor.volts_and_force(force_n, self.shaker.speed_m_per_s(), self.last_volts);
         self.last_volts = volts;
         (Drive::Duty(motor.duty(volts)), applied_n)
     }

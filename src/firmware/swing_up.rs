@@ -118,7 +118,7 @@ impl<'t, const NX: usize, const NY: usize, S: SwingUp<NX, NY>> Firmware<'t, NX, 
             reference.x.as_slice(),
             command.requested_n,
         );
-        self.drive_or_trip(inputs, &command, exceeded, finding)
+        self.act_or_trip(inputs, &command, exceeded, finding)
     }
 
     /// Predicts the next tick of a motion; at its end, hands over to the control law, holds, or turns the motor off.

@@ -42,7 +42,7 @@ inhibits! {
     18 UNSETTLED "the cart is on its way to the set-point, or a link leans: wait until it stands";
     19 NO_ROOM "the motion does not fit on the rail from here: move the cart";
     20 OTHER_LAW "the swing-up ends in another control law: select LQR";
-    21 MOTOR "the motor's sign is not checked since power-up: drive the cart a little";
+    21 MOTOR "the motor's sign is not checked since power-up: jog the cart";
     22 NOT_SHAKEN "the rig is not being shaken: begin again";
     23 ZEROS "the links swing about different zeros every 5 s: let go of them, hold the cart";
     24 NO_TRANSITION "the gain table holds no motion from this equilibrium to that one";

@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 use crate::supervision::fault::{Cause, Fault};
 use crate::supervision::inhibits::Inhibits;
 
-/// State of the supervisor. The motor is on while [`drives`](State::drives).
+/// State of the supervisor. The motor is on where [`motor_is_on`](State::motor_is_on) says so.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default, Serialize, Deserialize)]
 pub enum State {
     /// Positions are not known.
@@ -36,7 +36,7 @@ pub enum State {
 
 impl State {
     /// Whether the motor is on.
-    pub const fn drives(self) -> bool {
+    pub const fn motor_is_on(self) -> bool {
         #[cfg(feature = "identify")]
         if matches!(self, State::Identifying) {
             return true;

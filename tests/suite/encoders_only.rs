@@ -20,14 +20,14 @@ fn paper_with_limit(limit_n: f64) -> Rig {
 }
 
 fn survived(rig: &Rig, law: Law, seeds: u64, duration_s: f64) -> u64 {
-    endurance(rig, &table(rig), law, &FORCE_NOISE, seeds, duration_s, &|| ()).unwrap().survived
+    endurance(rig, &table(rig), law, &FORCE_NOISE, seeds, duration_s).unwrap().survived
 }
 
 #[test]
 fn the_quadruple_survives_a_minute_of_force_noise_with_a_hundred_seeds() {
     let rig = paper_with_limit(5.0);
     for law in LAWS {
-        let found = endurance(&rig, &table(&rig), law, &FORCE_NOISE, 100, 60.0, &|| ()).unwrap();
+        let found = endurance(&rig, &table(&rig), law, &FORCE_NOISE, 100, 60.0).unwrap();
         assert_eq!((found.survived, found.duration_s), (100, 60.0), "{law:?}: seeds {:?} fell", found.fallen);
         assert!(found.peak_force_n > 0.3 && found.peak_force_n <= 5.0, "the noise did push: {found:?}");
     }

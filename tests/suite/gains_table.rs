@@ -23,7 +23,7 @@ fn difference(found: &str, wanted: &str) -> Option<String> {
 }
 
 fn committed() -> String {
-    std::fs::read_to_string(concat!(env!("CARGO_MANIFEST_DIR"), "/src/gains.rs")).unwrap()
+    std::fs::read_to_string(upright_test_support::repository().join("src/gains.rs")).unwrap()
 }
 
 fn written(rig: &Rig) -> String {

@@ -214,7 +214,7 @@ fn the_runs_are_those_of_the_committed_traces() {
     let image = image(Kind::InTheLoop);
     for (name, scenario) in scenarios(&rig, false) {
         let scenario = Scenario { duration_s: 0.5, ..scenario };
-        let path = PathBuf::from(format!("tests/golden/{name}.csv"));
+        let path = upright_test_support::repository().join(format!("tests/golden/{name}.csv"));
         let host = golden(&run(&rig, &table, &scenario, Place::Host).unwrap());
         if std::env::var_os("UPRIGHT_BLESS").is_some() {
             std::fs::write(&path, &host).unwrap();

@@ -4,7 +4,6 @@
 mod bench;
 mod closed_loop;
 mod encoders_only;
-#[path = "../../host-design/tool/tests/suite/equipment.rs"]
 mod equipment;
 mod fuzz_corpus;
 mod gains_table;
@@ -14,6 +13,7 @@ mod integral;
 mod lost_loops;
 mod own_board;
 mod plain_equations;
-#[path = "../../host-design/design/tests/suite/published/mod.rs"]
-mod published;
+mod rig_fuzz;
 mod wiring;
+
+use upright_test_support::published;

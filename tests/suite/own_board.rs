@@ -10,6 +10,7 @@ use crate::equipment::if_possible;
 use crate::published::table;
 use upright_design::rig::Rig;
 use upright_design::table::gains_source;
+use upright_test_support::repository;
 use upright_tool::image::{Compiler, PROFILE, TARGET, compiler};
 
 const DOCUMENT: &str = include_str!("../../docs/own-board.md");
@@ -34,13 +35,9 @@ fn files(document: &str) -> BTreeMap<&str, String> {
     files
 }
 
-fn root() -> &'static Path {
-    Path::new(env!("CARGO_MANIFEST_DIR"))
-}
-
 /// Names of the files that differ between document and example.
 fn differing(document: &str) -> Vec<String> {
-    let example = |name: &str| std::fs::read_to_string(root().join("examples/own-board").join(name));
+    let example = |name: &str| std::fs::read_to_string(repository().join("examples/own-board").join(name));
     let of_the_example = files(document).into_iter().filter(|(name, _)| *name != ".cargo/config.toml");
     let differ = of_the_example.filter(|(name, text)| {
         example(name).map(|found| found.replace("\r\n", "\n")).ok().as_ref() != Some(text)
@@ -77,7 +74,7 @@ fn a_changed_line_in_the_document_is_noticed() {
 /// The document's crate with the table of its rig, in a folder outside the repository that is named after its content:
 /// it stays, so that cargo compiles the crate again only when a file of it has changed.
 fn foreign_crate() -> PathBuf {
-    let root = root().to_str().unwrap().replace('\\', "/");
+    let root = repository().to_str().unwrap().replace('\\', "/");
     // Published crates would be found by version. These are not published yet, so their paths become absolute.
     let absolute = |text: String| {
         let text = text.replace("\"../../host-design", &format!("\"{root}/host-design"));

@@ -1,8 +1,8 @@
 //! The wiring and the boards in docs/board.md are those of the image, and the tool knows them by the same names.
 
 /// The image's own files, which need no hardware.
-#[allow(dead_code, unreachable_pub)]
-#[path = "../../src/board/f4"]
+#[allow(dead_code, unreachable_pub, unexpected_cfgs)]
+#[path = "../../src/image/board/f4"]
 mod f4 {
     pub mod boards;
     pub mod wiring;
@@ -93,7 +93,7 @@ fn a_wrong_pin_on_the_page_is_noticed() {
 #[test]
 fn the_page_shows_the_boards_of_the_image_and_the_tool_names_them() {
     let boards: Vec<_> = ALL.into_iter().map(board_row).collect();
-    assert_eq!(documented(PAGE, "boards"), boards, "write src/board/f4/boards/ into docs/board.md");
+    assert_eq!(documented(PAGE, "boards"), boards, "write src/image/board/f4/boards/ into docs/board.md");
     assert_ne!(documented(&PAGE.replace("| 3 V |", "| 3.3 V |"), "boards"), boards);
     assert_eq!(ALL.map(|board| board.name), Board::ALL.map(Board::name));
     assert_eq!(ALL.map(|board| encoders(board.wiring)), Board::ALL.map(Board::encoders));

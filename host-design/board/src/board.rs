@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use crate::bus::{Bus, Conditions, Driven};
 use crate::chip::Chip;
-use crate::clock::{NEVER, Time, UNITS_PER_MICROSECOND, UNITS_PER_SECOND};
+use crate::clock::{Time, UNITS_PER_MICROSECOND, UNITS_PER_SECOND};
 use crate::error::{Note, Rules, Stopped, Violation};
 use crate::image::Image;
 use crate::instruction::Unit;
@@ -48,6 +48,10 @@ pub enum Input {
     LoseWrite(u32),
     /// As [`Input::LoseWrite`], but reads of the register return the lost value: for negative controls.
     LoseWriteUnseen(u32),
+    /// A received byte is not fetched before the next one ends, as after contention on the bus.
+    Overrun,
+    /// The DMA stream that receives ends with a transfer error.
+    ReceiveError,
     /// The core is stalled until this time; peripherals keep running.
     Stall(Time),
     /// The program counter jumps to this address, as a defect inside the core might make it do.
@@ -92,6 +96,19 @@ pub struct PowerStage {
 }
 
 /// A virtual board after power-on, with its inputs to come.
+///
+/// ```
+/// use upright_board::{Board, Conditions, Image, Rules, seconds};
+///
+/// // The vectors (stack pointer, first instruction), then a program: `movs r0, #42`, and a branch to itself.
+/// let mut flash = [0x2000_1000_u32, 0x0800_0009].map(u32::to_le_bytes).concat();
+/// flash.extend([0x202a_u16, 0xe7fe].map(u16::to_le_bytes).concat());
+/// let mut board = Board::power_on(&Image::from_flash(flash), &Conditions::f405(1), Rules::STRICT)?;
+/// board.run_until(seconds(0.001))?;
+/// assert_eq!(board.registers()[0], 42);
+/// assert_eq!(board.program_counter(), 0x0800_000a);
+/// # Ok::<(), upright_board::Stopped>(())
+/// ```
 #[derive(Debug, Clone)]
 pub struct Board {
     machine: Machine,
@@ -193,6 +210,8 @@ impl Board {
                 bus.lost_write = Some(register);
                 bus.lost_write_is_hidden = matches!(input, Input::LoseWriteUnseen(_));
             }
+            Input::Overrun => bus.usart.overrun(),
+            Input::ReceiveError => bus.dma.fail(bus.dma.serial().0),
             Input::Stall(until) => machine.stalled_until = until,
             Input::Jump(address) => {
                 machine.registers.pc = address & !1;
@@ -343,7 +362,7 @@ impl Board {
 
     /// When SysTick next interrupts; `None` if it does not run or its interrupt is off.
     pub fn next_tick(&self) -> Option<Time> {
-        self.machine.bus.system.next_tick()
+        self.machine.bus.system.systick.next_tick()
     }
 
     /// Frequency of the core (Hz).
@@ -359,20 +378,6 @@ impl Board {
         self.run_until(self.now() + 1)
     }
 
-    /// Single-steps until the program counter equals `program_counter`, or until `end`; returns whether it does.
-    ///
-    /// # Errors
-    /// [`Stopped`] at a violation that ends the run.
-    pub fn run_to(&mut self, program_counter: u32, end: Time) -> Result<bool, Stopped> {
-        while self.now() < end {
-            self.step()?;
-            if self.machine.registers.pc == program_counter & !1 {
-                return Ok(true);
-            }
-        }
-        Ok(false)
-    }
-
     /// Number of bytes lost to receive overruns, and of encoder edges suppressed by the timers' input filters.
     pub fn lost(&self) -> (u64, u64) {
         let bus = &self.machine.bus;
@@ -382,11 +387,6 @@ impl Board {
     /// Sets whether waiting loops are skipped (the default); this affects nothing but speed.
     pub fn skip_waiting(&mut self, skip: bool) {
         self.machine.skips = skip;
-    }
-
-    /// Time of the next scheduled input, if any.
-    pub fn next_input(&self) -> Option<Time> {
-        self.scheduled.first_key_value().map(|(&(time, _), _)| time).filter(|&time| time != NEVER)
     }
 }
 

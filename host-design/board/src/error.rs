@@ -185,6 +185,9 @@ pub(crate) enum Trap {
     Stop(Violation),
 }
 
+/// Whether an instruction completed.
+pub(crate) type Done = Result<(), Trap>;
+
 impl From<Violation> for Trap {
     fn from(violation: Violation) -> Self {
         Trap::Stop(violation)

@@ -1,15 +1,13 @@
-//! The processor's main loop: fetch, execution, exceptions, sleep.
+//! The state of core and board, and what every instruction needs of it: fetch, loads and stores.
 
 use crate::bus::Bus;
-use crate::clock::{NEVER, Time};
+use crate::clock::Time;
 use crate::decode::{Undecodable, decode, is_wide};
-use crate::error::{Fault, Stopped, Trap, Violation};
-use crate::execute::memory::size;
+use crate::error::{Fault, Trap, Violation};
 use crate::instruction::{Instruction, Op, Unit};
-use crate::peripherals::rcc::{SOFTWARE_FLAG, WATCHDOG_FLAG};
 use crate::processor::mpu::Purpose;
 use crate::processor::registers::Registers;
-use crate::processor::waiting::Watch;
+use crate::processor::watch::Watch;
 
 pub(crate) const FLASH: u32 = 0x0800_0000;
 
@@ -20,7 +18,7 @@ pub(crate) struct Machine {
     pub(crate) bus: Bus,
     /// Decoded instructions, one entry per half-word of flash. The last entry is for code elsewhere, which is decoded
     /// each time it executes.
-    decoded: Vec<Instruction>,
+    pub(crate) decoded: Vec<Instruction>,
     pub(crate) next: u32,
     pub(crate) cycles: u32,
     pub(crate) in_it: bool,
@@ -101,138 +99,7 @@ impl Machine {
         }
     }
 
-    /// Runs until a time.
-    pub(crate) fn run_until(&mut self, end: Time) -> Result<(), Stopped> {
-        self.run(end).map_err(|violation| Stopped {
-            violation,
-            program_counter: self.registers.pc,
-            time: self.bus.now,
-        })
-    }
-
-    fn run(&mut self, end: Time) -> Result<(), Violation> {
-        while self.bus.now < end {
-            if self.bus.now >= self.bus.deadline {
-                self.bus.advance();
-            }
-            if self.bus.watchdog_reset || self.bus.system.reset_requested {
-                let flag = if self.bus.watchdog_reset { WATCHDOG_FLAG } else { SOFTWARE_FLAG };
-                self.bus.reset(flag);
-                self.reset()?;
-            }
-            if self.held || self.locked_up || self.bus.rcc.stopped || self.bus.debug_freeze.halted {
-                self.bus.now = self.idle_until(end);
-                continue;
-            }
-            if self.bus.now < self.stalled_until {
-                self.bus.now = self.idle_until(end.min(self.stalled_until));
-                continue;
-            }
-            if self.bus.system.nvic.changed && self.take_pending()? {
-                self.bus.now += Time::from(self.cycles) * self.bus.hclk;
-                self.watch.forget();
-                continue;
-            }
-            if self.asleep {
-                self.sleep(end);
-                continue;
-            }
-            self.run_steps(end)?;
-        }
-        Ok(())
-    }
-
-    /// Executes instructions until an exception or a peripheral event may be due, or until `end`.
-    fn run_steps(&mut self, end: Time) -> Result<(), Violation> {
-        loop {
-            self.step()?;
-            let bus = &self.bus;
-            if bus.system.nvic.changed || self.asleep || bus.now >= bus.deadline.min(end) || self.locked_up {
-                return Ok(());
-            }
-            if bus.system.reset_requested {
-                return Ok(());
-            }
-            if self.next < self.bus.pc && self.skips {
-                self.skip_waiting(end);
-            }
-        }
-    }
-
-    /// The next deadline, but not beyond the end of the run.
-    fn idle_until(&self, end: Time) -> Time {
-        let deadline = if self.held { NEVER } else { self.bus.deadline };
-        deadline.clamp(self.bus.now + 1, end.max(self.bus.now + 1))
-    }
-
-    /// WFI or WFE: wakes if an exception or event is pending, else advances time to the next deadline in whole clocks.
-    fn sleep(&mut self, end: Time) {
-        if self.wakes() || std::mem::take(&mut self.event) {
-            self.asleep = false;
-            self.bus.system.nvic.changed = true;
-            return;
-        }
-        let until = self.idle_until(end);
-        let clocks = (until - self.bus.now).div_ceil(self.bus.hclk);
-        self.bus.now += clocks * self.bus.hclk;
-    }
-
-    /// Executes one instruction.
-    #[inline]
-    fn step(&mut self) -> Result<(), Violation> {
-        let pc = self.registers.pc;
-        self.bus.pc = pc;
-        self.executed += 1;
-        self.cycles = 1;
-        let it = self.registers.it;
-        let done = match self.decoded_at(pc) {
-            Ok(place) => {
-                let instruction = self.decoded[place];
-                self.next = pc.wrapping_add(instruction.length.into());
-                self.registers.r[15] = pc.wrapping_add(4);
-                if it == 0 {
-                    self.in_it = false;
-                    self.execute(instruction.op)
-                } else {
-                    self.conditional(instruction.op, it)
-                }
-            }
-            Err(trap) => Err(trap),
-        };
-        match done {
-            Ok(()) => self.registers.pc = self.next,
-            Err(Trap::Stop(violation)) => return Err(violation),
-            Err(Trap::Fault(fault)) => {
-                self.registers.it = it;
-                self.fault(fault)?;
-            }
-        }
-        self.bus.now += Time::from(self.cycles) * self.bus.hclk;
-        Ok(())
-    }
-
-    /// Executes an instruction of an IT block if its condition holds.
-    fn conditional(&mut self, op: Op, it: u8) -> Result<(), Trap> {
-        let last = it & 15 == 8;
-        let never =
-            matches!(op, Op::It(_) | Op::BranchIf { .. } | Op::BranchZero { .. } | Op::ChangeMasks { .. });
-        if never {
-            return Err(Violation::Unpredictable(self.code_at(self.registers.pc)).into());
-        }
-        self.registers.advance_it();
-        if !self.registers.holds(it >> 4) {
-            return Ok(());
-        }
-        self.in_it = true;
-        let straight = self.next;
-        self.execute(op)?;
-        if self.next != straight && !last {
-            return Err(Violation::Unpredictable(self.code_at(self.registers.pc)).into());
-        }
-        Ok(())
-    }
-
-    fn code_at(&self, address: u32) -> u32 {
+    pub(crate) fn code_at(&self, address: u32) -> u32 {
         let first = self.bus.fetch(address).unwrap_or(0);
         if is_wide(first) {
             u32::from(first) << 16 | u32::from(self.bus.fetch(address.wrapping_add(2)).unwrap_or(0))
@@ -248,7 +115,7 @@ impl Machine {
 
     /// Index in `decoded` of the instruction at an address.
     #[inline]
-    fn decoded_at(&mut self, pc: u32) -> Result<usize, Trap> {
+    pub(crate) fn decoded_at(&mut self, pc: u32) -> Result<usize, Trap> {
         if self.bus.system.mpu.enabled() && !self.allowed(pc, Purpose::Execute) {
             return Err(Fault::MemoryInstruction.into());
         }
@@ -296,7 +163,7 @@ impl Machine {
     /// Loads from memory or a register, extended to 32 bits.
     #[inline]
     pub(crate) fn load(&mut self, address: u32, unit: Unit) -> Result<u32, Trap> {
-        let bytes = size(unit);
+        let bytes = unit.bytes();
         if self.bus.system.mpu.enabled() && !self.allowed(address, Purpose::Read) {
             return Err(Fault::MemoryData(address).into());
         }
@@ -310,7 +177,7 @@ impl Machine {
                 }
                 value
             }
-            None if address == 0xe000_ed04 => self.bus.system.interrupt_state(self.registers.ipsr),
+            None if address == 0xe000_ed04 => self.bus.system.nvic.interrupt_state(self.registers.ipsr),
             None => self.bus.read_register(address, bytes)?,
         };
         Ok(match unit {
@@ -323,7 +190,7 @@ impl Machine {
     /// Stores to memory or a register.
     #[inline]
     pub(crate) fn store(&mut self, address: u32, unit: Unit, value: u32) -> Result<(), Trap> {
-        let bytes = size(unit);
+        let bytes = unit.bytes();
         if self.bus.system.mpu.enabled() && !self.allowed(address, Purpose::Write) {
             return Err(Fault::MemoryData(address).into());
         }

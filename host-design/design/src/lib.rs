@@ -26,6 +26,7 @@
 pub mod design;
 pub mod harness;
 pub mod identify;
+pub mod motion;
 pub mod number;
 pub mod numerics;
 pub mod parallel;

@@ -33,7 +33,7 @@ impl<const NX: usize, const NY: usize> Controller<'_, NX, NY> {
         for ((k, x), planned) in reference.k.iter().zip(&self.estimate).zip(&reference.x) {
             requested -= k * (x - planned);
         }
-        self.drive(requested)
+        self.actuate(requested)
     }
 
     /// Second half of such a tick: calls `finish` as [`predict_with`](Self::predict_with) does; then `predict`

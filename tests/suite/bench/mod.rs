@@ -3,8 +3,6 @@
 // Each test program uses only some of these.
 #![allow(dead_code)]
 
-use std::path::Path;
-
 use upright::table::Law;
 use upright_design::rig::{Rig, Tick};
 use upright_design::simulate::{Scenario, Sensing, Summary, simulate};
@@ -17,7 +15,7 @@ pub(crate) const LAWS: [Law; 2] = Law::ALL;
 /// The rig whose gains are in `src/gains.rs`: the one with that name in `rigs/`, whatever its file is called.
 pub(crate) fn rig_of_the_firmware() -> Rig {
     let wanted = upright::gains::RIG;
-    std::fs::read_dir(Path::new(env!("CARGO_MANIFEST_DIR")).join("rigs"))
+    std::fs::read_dir(upright_test_support::repository().join("rigs"))
         .unwrap()
         .map(|entry| entry.unwrap().path())
         .filter(|path| path.extension().is_some_and(|extension| extension == "toml"))

@@ -110,7 +110,7 @@ pub(crate) struct Bus {
     capture: CaptureTimer,
     pub(crate) adc: Adc,
     pub(crate) usart: Usart,
-    dma: Dma,
+    pub(crate) dma: Dma,
     pub(crate) iwdg: Iwdg,
     pub(crate) power: Power,
     pub(crate) driven: Driven,
@@ -242,7 +242,7 @@ impl Bus {
     /// The debugger halts the core or resumes it. SysTick stops with the core, the watchdog only with DBG_IWDG_STOP.
     pub(crate) fn halt(&mut self, halted: bool) {
         self.debug_freeze.halted = halted;
-        self.system.freeze(halted, self.now);
+        self.system.systick.freeze(halted, self.now);
         self.iwdg.freeze(halted && self.debug_freeze.registers[1] & FREEZES_WATCHDOG != 0, self.now);
         self.refresh();
     }
@@ -291,6 +291,7 @@ impl Bus {
         }
         self.deadline = self
             .system
+            .systick
             .deadline()
             .min(self.rcc.deadline())
             .min(self.usart.deadline())

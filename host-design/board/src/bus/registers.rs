@@ -364,7 +364,7 @@ impl Bus {
         match bytes {
             4 => self.system.read(address, self.now, self.hclk),
             1 => {
-                let byte = self.system.read_byte(address);
+                let byte = self.system.nvic.read_byte(address);
                 byte.map(u32::from).ok_or(Violation::Width { address, bytes }.into())
             }
             _ => Err(Violation::Width { address, bytes }.into()),
@@ -374,7 +374,7 @@ impl Bus {
     fn write_system(&mut self, address: u32, bytes: u32, value: u32) -> Result<(), Trap> {
         match bytes {
             4 => self.system.write(address, value, self.now, self.hclk)?,
-            1 if self.system.write_byte(address, value as u8) => {}
+            1 if self.system.nvic.write_byte(address, value as u8) => {}
             _ => return Err(Violation::Width { address, bytes }.into()),
         }
         self.refresh();

@@ -1,6 +1,6 @@
 //! Floating-point instructions of FPv4-SP (A6.3 to A6.7).
 
-use super::{Decoded, Undecodable, fixed, general, register};
+use super::field::{Decoded, Undecodable, fixed, general, register};
 use crate::instruction::{Float1, Float2, Op};
 
 /// Number of a single-precision register: four bits at `at`, and its lowest bit from `low`.

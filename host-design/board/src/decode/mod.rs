@@ -3,27 +3,20 @@
 //! Strict: what the manual does not define is [`Undecodable::Unknown`], what it calls UNPREDICTABLE is
 //! [`Undecodable::Unpredictable`].
 
+mod field;
 mod float;
 mod narrow;
 mod wide_data;
 mod wide_memory;
 mod wide_register;
 
-use crate::instruction::{Instruction, Op};
+use field::Decoded;
+pub(crate) use field::Undecodable;
 
-/// Why half-words cannot be decoded.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Undecodable {
-    /// Not an instruction of this processor.
-    Unknown,
-    /// An instruction whose effect the architecture does not define.
-    Unpredictable,
-}
-
-type Decoded = Result<Op, Undecodable>;
+use crate::instruction::Instruction;
 
 /// Whether the instruction that begins with `first` has 32 bits.
-pub(crate) fn is_wide(first: u16) -> bool {
+pub fn is_wide(first: u16) -> bool {
     first >= 0xe800
 }
 
@@ -54,24 +47,4 @@ fn wide(first: u32, second: u32, address: u32) -> Decoded {
         (0b11, op) if op & 0x78 == 0x38 => wide_register::long_multiply(first, second),
         _ => Err(Undecodable::Unknown),
     }
-}
-
-/// Register number in four bits of a half-word.
-fn register(word: u32, at: u32) -> u8 {
-    (word >> at & 15) as u8
-}
-
-/// `op`, if none of the registers is the stack pointer or the program counter.
-fn general(registers: &[u8], op: Op) -> Decoded {
-    if registers.iter().any(|&r| r == 13 || r == 15) { Err(Undecodable::Unpredictable) } else { Ok(op) }
-}
-
-/// `op`, if bits that should be zero or one are.
-fn fixed(right: bool, op: Op) -> Decoded {
-    if right { Ok(op) } else { Err(Undecodable::Unpredictable) }
-}
-
-/// Sign-extends the lower `bits`.
-fn signed(value: u32, bits: u32) -> i32 {
-    (value << (32 - bits)) as i32 >> (32 - bits)
 }

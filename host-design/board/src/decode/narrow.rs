@@ -1,6 +1,6 @@
 //! 16-bit instructions (A5.2).
 
-use super::{Decoded, Undecodable, fixed, general, signed};
+use super::field::{Decoded, Undecodable, fixed, general, signed};
 use crate::instruction::{Alu, Compare, Extend, Op, Operand, Place, Sets, Shift, Unary, Unit};
 
 fn low(code: u32, at: u32) -> u8 {

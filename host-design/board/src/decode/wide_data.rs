@@ -1,7 +1,7 @@
 //! 32-bit instructions: data processing with constants and shifted registers, branches and control (A5.3.1 to A5.3.4,
 //! A5.3.11).
 
-use super::{Decoded, Undecodable, fixed, general, register, signed};
+use super::field::{Decoded, Undecodable, fixed, general, register, signed};
 use crate::instruction::{Alu, Compare, Op, Operand, Sets, Shift, Special};
 
 /// Decodes a shift from its type and an amount of five bits (A7.4.2).

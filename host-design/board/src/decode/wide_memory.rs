@@ -1,6 +1,6 @@
 //! 32-bit instructions: loads and stores (A5.3.5 to A5.3.10).
 
-use super::{Decoded, Undecodable, fixed, general, register};
+use super::field::{Decoded, Undecodable, fixed, general, register};
 use crate::instruction::{Op, Place, Unit};
 
 pub(super) fn multiple(first: u32, second: u32) -> Decoded {

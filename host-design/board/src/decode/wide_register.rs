@@ -1,6 +1,6 @@
 //! 32-bit instructions: data processing on registers, multiplication and division (A5.3.12 to A5.3.17).
 
-use super::{Decoded, Undecodable, fixed, general, register};
+use super::field::{Decoded, Undecodable, fixed, general, register};
 use crate::instruction::{Extend, Lanes, LongMultiply, Multiply, Op, Prefix, Sets, Shift, Unary};
 
 pub(super) fn decode(first: u32, second: u32) -> Decoded {

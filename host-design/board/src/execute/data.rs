@@ -1,7 +1,7 @@
 //! Data processing.
 
-use super::Done;
 use super::arithmetic::{add_with_carry, shifted};
+use crate::error::Done;
 use crate::instruction::{Alu, Compare, Extend, Op, Operand, Sets, Unary};
 use crate::machine::Machine;
 

@@ -1,8 +1,7 @@
 //! Floating-point instructions.
 
-use super::Done;
 use super::float_arithmetic as number;
-use crate::error::{Fault, Violation};
+use crate::error::{Done, Fault, Violation};
 use crate::instruction::{Float1, Float2, Op};
 use crate::machine::Machine;
 

@@ -1,7 +1,6 @@
 //! Loads and stores of more than one register, exclusive accesses and table branches.
 
-use super::Done;
-use crate::error::Fault;
+use crate::error::{Done, Fault};
 use crate::instruction::{Op, Place, Unit};
 use crate::machine::Machine;
 
@@ -149,7 +148,7 @@ impl Machine {
 
     /// Faults for an unaligned address, in accesses that must be aligned (A3.2.1).
     fn aligned(&self, address: u32, unit: Unit) -> Done {
-        if address & (size(unit) - 1) != 0 { Err(Fault::Unaligned.into()) } else { Ok(()) }
+        if address & (unit.bytes() - 1) != 0 { Err(Fault::Unaligned.into()) } else { Ok(()) }
     }
 
     fn load_multiple(&mut self, rn: u8, list: u16, down: bool, write_back: bool) -> Done {
@@ -211,14 +210,5 @@ impl Machine {
             _ => unreachable!("only these are sent here"),
         }
         Ok(())
-    }
-}
-
-/// Size of an access (bytes).
-pub(crate) fn size(unit: Unit) -> u32 {
-    match unit {
-        Unit::Word => 4,
-        Unit::Half | Unit::SignedHalf => 2,
-        Unit::Byte | Unit::SignedByte => 1,
     }
 }

@@ -6,18 +6,19 @@
 
 mod arithmetic;
 mod data;
+mod exception;
 mod float;
 mod float_arithmetic;
-pub(crate) mod memory;
+mod memory;
 mod multiply;
 mod parallel;
+mod run;
 mod system;
+mod waiting;
 
-use crate::error::Trap;
+use crate::error::Done;
 use crate::instruction::Op;
 use crate::machine::Machine;
-
-pub(crate) type Done = Result<(), Trap>;
 
 impl Machine {
     /// Executes one instruction whose IT condition, if any, holds.

@@ -1,7 +1,6 @@
 //! Calls and returns, IT, barriers, masks, special registers, and waiting for interrupts and events.
 
-use super::Done;
-use crate::error::{Fault, Violation};
+use crate::error::{Done, Fault, Violation};
 use crate::instruction::{Op, Special};
 use crate::machine::Machine;
 

@@ -6,6 +6,7 @@ use crate::error::Violation;
 const ENABLED: u32 = 1;
 const CIRCULAR: u32 = 1 << 8;
 const COMPLETE: u32 = 1 << 5;
+const TRANSFER_ERROR: u32 = 1 << 3;
 const HALF: u32 = 1 << 4;
 
 /// Registers of a stream, and the length with which it was started.
@@ -149,6 +150,13 @@ impl Dma {
                 stream.control &= !ENABLED;
             }
         }
+    }
+
+    /// Ends a stream with a transfer error (10.3.18).
+    pub(crate) fn fail(&mut self, number: usize) {
+        let (word, at) = place(number);
+        self.flags[word] |= TRANSFER_ERROR << at;
+        self.streams[number].control &= !ENABLED;
     }
 
     /// Numbers of both streams' interrupts, and whether each line is high.

@@ -181,9 +181,10 @@ impl Usart {
         // Bits are sampled in their middle: a baud rate that is 5 % off is half a bit off after ten bits (30.3.5).
         let own = self.bit(pclk);
         let fits = byte.bit.abs_diff(own) * 20 <= own;
-        if self.status & RECEIVED != 0 {
-            self.status |= OVERRUN;
-            self.overruns += 1;
+        // While the overrun is not cleared, by reading the status and then the data register, nothing is received; the
+        // DMA reads the data register only.
+        if self.status & (RECEIVED | OVERRUN) != 0 {
+            self.overrun();
             return;
         }
         self.status |= RECEIVED;
@@ -195,6 +196,12 @@ impl Usart {
         if self.incoming.front().is_some_and(|next| next.end <= self.idle_at + own) {
             self.idle_at = NEVER;
         }
+    }
+
+    /// A received byte is lost because the one before has not been fetched.
+    pub(crate) fn overrun(&mut self) {
+        self.status |= OVERRUN;
+        self.overruns += 1;
     }
 
     /// Whether the interrupt's line is high.

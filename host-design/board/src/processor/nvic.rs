@@ -165,4 +165,101 @@ impl Nvic {
         }
         self.changed = true;
     }
+
+    /// Enables the faults whose bits are set in SHCSR.
+    pub(super) fn enable_faults(&mut self, shcsr: u32) {
+        for (bit, exception) in [(16, MEM_MANAGE), (17, BUS_FAULT), (18, USAGE_FAULT)] {
+            self.enabled.put(exception, shcsr >> bit & 1 != 0);
+        }
+    }
+
+    pub(super) fn read(&self, address: u32) -> Option<u32> {
+        Some(match address {
+            0xe000_e100..0xe000_e110 | 0xe000_e180..0xe000_e190 => self.enabled.word(word(address)),
+            0xe000_e200..0xe000_e210 | 0xe000_e280..0xe000_e290 => self.pending.word(word(address)),
+            0xe000_e300..0xe000_e310 => self.active.word(word(address)),
+            0xe000_e400..0xe000_e464 => self.priorities(16 + (address - 0xe000_e400) as usize),
+            _ => return None,
+        })
+    }
+
+    /// Writes a register; returns whether there is one at this address.
+    pub(super) fn write(&mut self, address: u32, value: u32) -> bool {
+        let word = word(address);
+        match address {
+            0xe000_e100..0xe000_e110 => self.enabled.put_word(word, value, true),
+            0xe000_e180..0xe000_e190 => self.enabled.put_word(word, value, false),
+            0xe000_e200..0xe000_e210 => self.pending.put_word(word, value, true),
+            0xe000_e280..0xe000_e290 => {
+                self.pending.put_word(word, value, false);
+                let high = self.lines.word(word) & value & !self.active.word(word);
+                self.pending.put_word(word, high, true);
+            }
+            0xe000_e400..0xe000_e464 => self.set_priorities(16 + (address - 0xe000_e400) as usize, value),
+            _ => return false,
+        }
+        true
+    }
+
+    /// ICSR: pending bits (B3.2.4).
+    pub(super) fn pend_system(&mut self, value: u32) {
+        for (bit, exception, pend) in [
+            (31, NMI, true),
+            (28, PEND_SV, true),
+            (27, PEND_SV, false),
+            (26, SYS_TICK, true),
+            (25, SYS_TICK, false),
+        ] {
+            if value >> bit & 1 != 0 {
+                self.pending.put(exception, pend);
+            }
+        }
+    }
+
+    /// ICSR as it is read; `current` is the number of the running handler.
+    pub(crate) fn interrupt_state(&self, current: u16) -> u32 {
+        let pending = self.most_urgent().map_or(0, |(exception, _)| exception as u32);
+        let bit = |exception, bit: u32| u32::from(self.pending.has(exception)) << bit;
+        u32::from(current) | pending << 12 | bit(SYS_TICK, 26) | bit(PEND_SV, 28) | bit(NMI, 31)
+    }
+
+    /// Writes a byte of a priority register; returns whether there is one at this address.
+    pub(crate) fn write_byte(&mut self, address: u32, value: u8) -> bool {
+        self.changed = true;
+        let Some(exception) = exception_of(address) else { return false };
+        self.priority[exception] = value & 0xf0;
+        true
+    }
+
+    pub(crate) fn read_byte(&self, address: u32) -> Option<u8> {
+        exception_of(address).map(|exception| self.priority[exception])
+    }
+
+    pub(super) fn priorities(&self, first: usize) -> u32 {
+        (0..4).fold(0, |word, i| {
+            word | u32::from(self.priority.get(first + i).copied().unwrap_or(0)) << (8 * i)
+        })
+    }
+
+    pub(super) fn set_priorities(&mut self, first: usize, value: u32) {
+        for i in 0..4 {
+            if let Some(priority) = self.priority.get_mut(first + i) {
+                *priority = (value >> (8 * i)) as u8 & 0xf0;
+            }
+        }
+    }
+}
+
+/// The exception whose priority is the byte at an address.
+fn exception_of(address: u32) -> Option<usize> {
+    match address {
+        0xe000_e400..0xe000_e461 => Some(16 + (address - 0xe000_e400) as usize),
+        0xe000_ed18..0xe000_ed24 => Some(4 + (address - 0xe000_ed18) as usize),
+        _ => None,
+    }
+}
+
+/// Index of a register in its array of NVIC registers.
+fn word(address: u32) -> usize {
+    (address >> 2 & 7) as usize
 }

@@ -234,7 +234,7 @@ impl OverLine {
 
     /// Whether the motor is off according to the last telemetry; false before the first.
     pub fn is_off(&self) -> bool {
-        self.state.is_some_and(|state| !state.drives())
+        self.state.is_some_and(|state| !state.motor_is_on())
     }
 
     /// Whether all forces have been applied and logged, and the motor is off.

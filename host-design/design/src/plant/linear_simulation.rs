@@ -40,7 +40,7 @@ impl LinearSimulation {
     }
 
     /// `B u + G w`, s×1.
-    fn drive(&self, force: f64, disturbances: &[f64]) -> Matrix<f64> {
+    fn input_rate(&self, force: f64, disturbances: &[f64]) -> Matrix<f64> {
         assert_eq!(disturbances.len(), self.disturbances(), "one disturbance per noise column");
         &self.inputs
             * &Matrix::from_fn(self.inputs.cols(), 1, |i, _| match i {
@@ -87,14 +87,14 @@ impl Plant for LinearSimulation {
     fn rate(&self, state: &[f64], force: f64, disturbances: &[f64], rate: &mut [f64]) {
         assert_eq!(state.len(), self.states(), "length of the state");
         times(&self.a_transposed, state, rate);
-        let drive = self.drive(force, disturbances);
-        rate.iter_mut().zip(drive.entries()).for_each(|(rate, drive)| *rate += drive);
+        let inputs = self.input_rate(force, disturbances);
+        rate.iter_mut().zip(inputs.entries()).for_each(|(rate, input)| *rate += input);
     }
 
     /// Exact to rounding without substeps: with the input held,
     /// `x(t + h) = x + Σ_{i>=1} h^i / i! A^(i-1) (A x + B u)`, summed over pieces with `‖A‖ h <= 1`.
     fn advance(&mut self, force: f64, disturbances: &[f64], dt: f64, _substeps: usize) {
-        let drive = self.drive(force, disturbances);
+        let inputs = self.input_rate(force, disturbances);
         let pieces = (self.norm * dt.abs()).ceil().max(1.0);
         let h = dt / pieces;
         let mut term = vec![0.0; self.state.len()];
@@ -102,7 +102,7 @@ impl Plant for LinearSimulation {
         for _ in 0..pieces as u64 {
             times(&self.a_transposed, &self.state, &mut product);
             for i in 0..term.len() {
-                term[i] = (product[i] + drive.entries()[i]) * h;
+                term[i] = (product[i] + inputs.entries()[i]) * h;
                 self.state[i] += term[i];
             }
             for order in 2..=TERMS {

@@ -7,7 +7,7 @@ use super::remedy::{Limit, Remedy};
 use super::robustness::{Runs, random_runs};
 use super::search::{Request, candidates};
 use super::setting::Setting;
-use super::transition::Transition;
+use crate::motion::Transition;
 use crate::rig::Rig;
 
 /// Candidates tried with each change, and how many of them, those with the best scores, go through the random runs.

@@ -3,9 +3,9 @@
 use serde::Serialize;
 
 use super::SwingUpError;
-use super::motion::Motion;
 use super::setting::Setting;
-use super::transition::Transition;
+use crate::motion::Motion;
+use crate::motion::Transition;
 use crate::plant::chain_plant;
 use crate::plant::reference::{Tolerance, integrate};
 

@@ -6,10 +6,10 @@ use rand_distr::{Distribution, StandardNormal};
 use rand_pcg::Pcg64;
 
 use super::SwingUpError;
-use super::motion::Motion;
 use super::robustness::deviation;
 use super::setting::Setting;
-use super::transition::Transition;
+use crate::motion::Motion;
+use crate::motion::Transition;
 use crate::numerics::Matrix;
 use crate::plant::{Plant, chain_plant};
 use crate::rig::Chain;

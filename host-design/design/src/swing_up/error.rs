@@ -2,9 +2,9 @@
 
 use std::path::PathBuf;
 
-use super::motion::Shape;
-use super::transition::Transition;
 use crate::design::DesignError;
+use crate::motion::Shape;
+use crate::motion::Transition;
 use crate::numerics::Singular;
 use crate::plant::PlantError;
 use crate::simulate::SimulationError;

@@ -8,10 +8,10 @@ use upright::supervision::supervisor::State;
 
 use super::SwingUpError;
 use super::demonstration::{hang, up_and_down};
-use super::motion::SwingUp;
 use super::robustness::{Runs, Spread, deviation, drawn};
-use super::transition::Transition;
 use crate::harness::{Harness, HarnessError, Target, goals, with_firmware};
+use crate::motion::RaiseAndLower;
+use crate::motion::Transition;
 use crate::rig::{LinkEncoder, PlantDescription, Rig};
 use crate::simulate::Scenario;
 use crate::study::{Study, infinite_if_null};
@@ -116,7 +116,7 @@ struct Deviation(#[serde(deserialize_with = "infinite_if_null")] f64);
 pub fn firmware_runs(
     rig: &Rig,
     table: &TableValues,
-    motions: &SwingUp,
+    motions: &RaiseAndLower,
     condition: &Condition,
     base_seed: u64,
     runs: usize,
@@ -156,7 +156,7 @@ pub fn firmware_runs(
 fn raised_and_lowered(
     rig: &Rig,
     table: &TableValues,
-    motions: &SwingUp,
+    motions: &RaiseAndLower,
     scenario: &Scenario,
     target: &mut dyn Target,
 ) -> Result<Reached, HarnessError> {

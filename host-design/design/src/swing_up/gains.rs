@@ -1,11 +1,11 @@
 //! The motion along a path, with its gains.
 
 use super::SwingUpError;
-use super::motion::Motion;
 use super::refine::Path;
 use super::setting::Setting;
 use super::tracking::{Filter, feedback, ticks};
-use super::transition::Transition;
+use crate::motion::Motion;
+use crate::motion::Transition;
 use crate::numerics::Matrix;
 
 /// Factor on the weights of `[lqr]` for the positions of cart and links along a motion: a link that leaves its plan is

@@ -1,10 +1,10 @@
 //! Puts motions into the gain table of the firmware.
 
 use super::SwingUpError;
-use super::motion::SwingUp;
 use super::supervision::set_limits;
 use super::transitions::PlannedTransition;
 use crate::design::design;
+use crate::motion::RaiseAndLower;
 use crate::rig::Rig;
 use crate::table::{Gains, SwingUpValues, TableValues};
 
@@ -17,7 +17,7 @@ use crate::table::{Gains, SwingUpValues, TableValues};
 pub fn with_motions(
     rig: &Rig,
     mut table: TableValues,
-    motions: &SwingUp,
+    motions: &RaiseAndLower,
     transitions: &[PlannedTransition],
 ) -> Result<TableValues, SwingUpError> {
     let mut swing_up = SwingUpValues::of(rig, &table, motions)?;
@@ -33,7 +33,7 @@ pub fn with_motions(
 ///
 /// # Errors
 /// As for [`with_motions`]; [`SwingUpError::Design`] if the rig has no gains.
-pub fn designed_table(rig: &Rig, motions: &SwingUp) -> Result<TableValues, SwingUpError> {
+pub fn designed_table(rig: &Rig, motions: &RaiseAndLower) -> Result<TableValues, SwingUpError> {
     designed_table_with(rig, motions, &[])
 }
 
@@ -43,7 +43,7 @@ pub fn designed_table(rig: &Rig, motions: &SwingUp) -> Result<TableValues, Swing
 /// As for [`designed_table`].
 pub fn designed_table_with(
     rig: &Rig,
-    motions: &SwingUp,
+    motions: &RaiseAndLower,
     transitions: &[PlannedTransition],
 ) -> Result<TableValues, SwingUpError> {
     with_motions(rig, TableValues::of(rig, &design(rig)?, Gains::Sampled)?, motions, transitions)

@@ -7,8 +7,8 @@ use upright::table::Equilibrium;
 
 use super::SwingUpError;
 use super::demonstration::{hang, up_and_down};
-use super::transition::Transition;
 use crate::harness::{Harness, HarnessError, Target, goals, with_firmware};
+use crate::motion::Transition;
 use crate::parallel;
 use crate::plant::absolute_angles;
 use crate::rig::{PlantDescription, Rig};

@@ -10,13 +10,13 @@ use super::check::{Peaks, check};
 use super::firmware_runs::{Condition, firmware_runs};
 use super::gains::{POSITION_WEIGHT, motion};
 use super::in_table::designed_table;
-use super::motion::{Motion, SwingUp};
 use super::refine::refine;
 use super::robustness::{Runs, Spread, random_runs, score};
 use super::search::{Candidate, Request, candidates, ticks_per_knot};
 use super::setting::Setting;
 use super::stored::{Stored, StoredKnots};
-use super::transition::Transition;
+use crate::motion::Transition;
+use crate::motion::{Motion, RaiseAndLower};
 use crate::parallel;
 use crate::rig::Rig;
 use crate::study::Study;
@@ -56,7 +56,7 @@ pub type Progress<'a> = &'a (dyn Fn(Trying) + Sync);
 #[derive(Debug, Clone, PartialEq)]
 pub struct Plan {
     /// The motions with their gains.
-    pub motions: SwingUp,
+    pub motions: RaiseAndLower,
     /// The rig's gain table with the motions in it, with which they were judged.
     pub table: TableValues,
     /// Knots of the motions, for the file beside the rig file.
@@ -131,7 +131,7 @@ pub fn judge(rig: &Rig, stored: &Stored, progress: Progress<'_>) -> Result<Plan,
 ///
 /// # Errors
 /// [`SwingUpError::Outdated`] if the rig file has changed since.
-pub fn motions(rig: &Rig, stored: &Stored) -> Result<SwingUp, SwingUpError> {
+pub fn motions(rig: &Rig, stored: &Stored) -> Result<RaiseAndLower, SwingUpError> {
     if stored.is_of(rig) { refined(rig, stored) } else { Err(SwingUpError::Outdated) }
 }
 
@@ -139,7 +139,7 @@ pub fn motions(rig: &Rig, stored: &Stored) -> Result<SwingUp, SwingUpError> {
 ///
 /// # Errors
 /// [`SwingUpError::Outdated`] if they do not fit the rig any more.
-pub fn refined(rig: &Rig, stored: &Stored) -> Result<SwingUp, SwingUpError> {
+pub fn refined(rig: &Rig, stored: &Stored) -> Result<RaiseAndLower, SwingUpError> {
     let setting = Setting::of(rig)?;
     let checked = |transition, knots| -> Result<Motion, SwingUpError> {
         let motion = restored(&setting, transition, knots)?;
@@ -150,7 +150,7 @@ pub fn refined(rig: &Rig, stored: &Stored) -> Result<SwingUp, SwingUpError> {
         || checked(Transition::Up, &stored.raise),
         || checked(Transition::Down, &stored.lower),
     );
-    Ok(SwingUp { raise: raise?, lower: lower? })
+    Ok(RaiseAndLower { raise: raise?, lower: lower? })
 }
 
 pub(super) fn restored(
@@ -242,7 +242,7 @@ fn judged(
     let peaks =
         [check(setting, &raise.motion, Transition::Up)?, check(setting, &lower.motion, Transition::Down)?];
     let stored = Stored::new(rig, raise.stored, lower.stored);
-    let motions = SwingUp { raise: raise.motion, lower: lower.motion };
+    let motions = RaiseAndLower { raise: raise.motion, lower: lower.motion };
     let table = designed_table(rig, &motions)?;
     progress(Trying::Stage { transition: Transition::Up, what: "random runs of the firmware", steps: 1 });
     let runs = arriving(rig, &table, &motions)?;
@@ -289,7 +289,7 @@ fn judged(
 
 /// Runs of the whole firmware of `table` with the errors of `[swing_up]`: how many are raised, and how many of those
 /// are lowered. A run that the supervisor ends or does not begin has not arrived.
-fn arriving(rig: &Rig, table: &TableValues, motions: &SwingUp) -> Result<[Runs; 2], SwingUpError> {
+fn arriving(rig: &Rig, table: &TableValues, motions: &RaiseAndLower) -> Result<[Runs; 2], SwingUpError> {
     let found = firmware_runs(rig, table, motions, &Condition::asked(rig), 1, RUNS, &Study::whole())?;
     Ok([found.raise_in_all(), found.lower])
 }

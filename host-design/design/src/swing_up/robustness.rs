@@ -6,9 +6,9 @@ use serde::Serialize;
 
 use super::SwingUpError;
 use super::closed_loop::{LOST_RAD, Trial, run};
-use super::motion::Motion;
 use super::setting::Setting;
-use super::transition::Transition;
+use crate::motion::Motion;
+use crate::motion::Transition;
 use crate::parallel;
 use crate::plant::absolute_angles;
 use crate::rig::{Chain, PerJoint, PlantDescription, Rig};

@@ -7,8 +7,8 @@ use upright::table::Equilibrium;
 
 use super::SwingUpError;
 use super::robustness::{Spread, drawn};
-use super::transition::{Transition, rest};
 use crate::harness::{Harness, HarnessError, Target, goals, with_firmware};
+use crate::motion::{Transition, rest};
 use crate::plant::{absolute_angles, without_turns};
 use crate::rig::Rig;
 use crate::simulate::{Goal, Scenario};

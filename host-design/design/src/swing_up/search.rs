@@ -5,13 +5,13 @@ use rand_pcg::Pcg64;
 
 use super::SwingUpError;
 use super::gains::motion;
-use super::motion::Motion;
 use super::problem::{Bounds, Knots, Problem};
 use super::refine::{Path, refine};
 use super::robustness::{Spread, score};
 use super::setting::Setting;
 use super::shooting;
-use super::transition::Transition;
+use crate::motion::Motion;
+use crate::motion::Transition;
 use crate::numerics::Matrix;
 use crate::parallel;
 

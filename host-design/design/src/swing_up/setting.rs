@@ -10,7 +10,7 @@ use super::dynamics::{Dynamics, dynamics};
 use super::hold::tick;
 use super::problem::Bounds;
 use super::tracking::{Filter, Noise, stationary};
-use super::transition::{Transition, rest};
+use crate::motion::{Transition, rest};
 use crate::numerics::Matrix;
 use crate::rig::{Chain, Motor, PlantDescription, Rig, Sensor, SwingUpRules};
 use crate::verify::Disturbance;

@@ -4,7 +4,7 @@ use upright::table::MotionLimits;
 
 use super::closed_loop::LOST_RAD;
 use super::robustness::{Spread, drawn};
-use super::transition::Transition;
+use crate::motion::Transition;
 use crate::parallel;
 use crate::rig::{PlantDescription, Rig};
 use crate::simulate::{Extremes, Scenario, SimulationError, follow};

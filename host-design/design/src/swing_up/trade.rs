@@ -7,7 +7,7 @@ use super::plan::{Progress, Trying};
 use super::robustness::{Runs, Spread, random_runs};
 use super::search::{Candidate, Request, candidates};
 use super::setting::Setting;
-use super::transition::Transition;
+use crate::motion::Transition;
 use crate::rig::Rig;
 
 /// Random runs of each candidate.

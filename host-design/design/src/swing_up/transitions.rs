@@ -10,13 +10,13 @@ use serde::{Deserialize, Serialize};
 
 use super::SwingUpError;
 use super::check::check;
-use super::motion::Motion;
 use super::plan::{Found, Progress, RUNS, best, restored};
 use super::robustness::{Runs, Spread, random_runs};
 use super::search::Request;
 use super::setting::Setting;
 use super::stored::{StoredKnots, read, request_hash};
-use super::transition::Transition;
+use crate::motion::Motion;
+use crate::motion::Transition;
 use crate::parallel;
 use crate::rig::Rig;
 

@@ -6,9 +6,9 @@ use upright::table::{
 };
 
 use super::{MAX_SENSORS, NoTable, TableValues, finite};
+use crate::motion::{Motion, RaiseAndLower, Transition};
 use crate::plant::{ChainParameters, ChainPlant};
 use crate::rig::{PlantDescription, Rig};
-use crate::swing_up::{Motion, SwingUp, Transition};
 
 /// Time between two knots of reference state, force and gains (s) …
 const REFERENCE_S: f64 = 0.01;
@@ -62,7 +62,7 @@ impl SwingUpValues {
     /// # Errors
     /// [`NoTable`] if the rig has no chain, a delay, or no observer, if the motions are those of another rig, or if a
     /// value does not fit into single precision.
-    pub fn of(rig: &Rig, table: &TableValues, motions: &SwingUp) -> Result<Self, NoTable> {
+    pub fn of(rig: &Rig, table: &TableValues, motions: &RaiseAndLower) -> Result<Self, NoTable> {
         let PlantDescription::Chain(chain) = &rig.plant else {
             return Err(NoTable::SwingUp("a [model] has no nonlinear equations of motion"));
         };

@@ -4,7 +4,8 @@
 use serde::Serialize;
 use upright::table::Law;
 
-use super::trial::{Horizon, Unverifiable, chain, edge, leaning, scenario, trial, trials, within};
+use super::error::{Unverifiable, chain, within};
+use super::trial::{Horizon, edge, leaning, scenario, trial, trials};
 use crate::parallel;
 use crate::plant::LANES;
 use crate::rig::Rig;

@@ -3,10 +3,8 @@
 use serde::Serialize;
 use upright::table::Law;
 
-use super::monte_carlo::is_worse;
-use super::trial::{
-    Disturbance, Horizon, Outcome, Unverifiable, chain, edge, leaning, scenario, trial, trials, within,
-};
+use super::error::{Unverifiable, chain, within};
+use super::trial::{Disturbance, Horizon, Outcome, edge, leaning, scenario, trial, trials};
 use crate::parallel;
 use crate::plant::LANES;
 use crate::rig::{PlantDescription, Rig};
@@ -134,7 +132,7 @@ pub fn corners(
     let all = parallel::try_map_in_batches(&masks, LANES, batch)?;
     let mut weakest = &all[0];
     for corner in &all {
-        if is_worse(&corner.outcome, &weakest.outcome) {
+        if corner.outcome.is_worse_than(&weakest.outcome) {
             weakest = corner;
         }
     }

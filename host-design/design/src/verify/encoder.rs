@@ -3,7 +3,8 @@
 use serde::Serialize;
 use upright::table::Law;
 
-use super::trial::{Disturbance, Horizon, Unverifiable, chain, edge, scenario, trial, within};
+use super::error::{Unverifiable, chain, within};
+use super::trial::{Disturbance, Horizon, edge, scenario, trial};
 use crate::design::{DesignError, Uncertified, design};
 use crate::parallel;
 use crate::rig::{LinkEncoder, PlantDescription, Rig};

@@ -3,13 +3,12 @@
 use serde::Serialize;
 use upright::table::Law;
 
-use crate::design::{Certified, DesignError};
-use crate::numerics::{Complex, Real, eigenvalues, spectral_radius};
+use crate::design::Certified;
+use crate::numerics::{Complex, eigenvalues};
 use crate::rig::Rig;
-use crate::simulate::SimulationError;
 use crate::table::TableValues;
 
-use super::{Certificate, LoopModel, Margins, NoiseShare, Rounding, TickLimits, Unverifiable};
+use super::{Certificate, LoopModel, Margins, NoiseShare, Rounding, TickLimits, VerifyError};
 use super::{certificate, covariance, loop_model, margins, rounding, tick};
 
 /// Results from the linear model of the loop for one law: sampled, delayed, with observer, with the table's
@@ -34,26 +33,6 @@ pub struct LinearReport {
     pub rounding: Option<Rounding>,
     /// Evidence for each gain; empty if the table's gains are not those designed for the tick.
     pub certificates: Vec<Certificate>,
-}
-
-/// Why a report cannot be made.
-#[derive(Debug, thiserror::Error)]
-pub enum VerifyError {
-    /// The eigenvalue iteration failed.
-    #[error("the poles of the loop could not be computed")]
-    Poles,
-    /// The noise grows without bound.
-    #[error("the loop is so close to instability that its noise has no computable steady state")]
-    NoStationaryState,
-    /// The design could not be repeated.
-    #[error(transparent)]
-    Design(#[from] DesignError),
-    /// The standard run could not be made.
-    #[error(transparent)]
-    Simulation(#[from] SimulationError),
-    /// Some runs could not be made.
-    #[error(transparent)]
-    Runs(#[from] Unverifiable),
 }
 
 /// The linear half of the trust report, one for each law in the table.
@@ -124,8 +103,4 @@ fn poles(model: &LoopModel<f64>) -> Result<(Vec<[f64; 2]>, f64), VerifyError> {
     let poles: Vec<[f64; 2]> = poles.iter().map(Complex::to_f64).collect();
     let spectral_radius = poles.iter().map(|pole| pole[0].hypot(pole[1])).fold(0.0, f64::max);
     Ok((poles, spectral_radius))
-}
-
-pub(crate) fn radius<R: Real>(model: &LoopModel<R>) -> Result<f64, VerifyError> {
-    spectral_radius(&model.matrix).map(|radius| radius.to_f64()).map_err(|_| VerifyError::Poles)
 }

@@ -5,8 +5,9 @@
 
 use upright::table::Law;
 
+use super::VerifyError;
 use crate::design::{Certified, Design, Feedback, Kalman, zero_order_hold};
-use crate::numerics::{Matrix, Real};
+use crate::numerics::{Matrix, Real, spectral_radius};
 use crate::rig::Rig;
 use crate::table::{MAX_STATES, TableValues};
 
@@ -294,4 +295,9 @@ impl<R: Real> LoopModel<R> {
         let plant = PlantModel::held(&ad, &bd, numbers.delay_ticks, &numbers.measured);
         Self::of(&plant, &ControllerModel::of(numbers))
     }
+}
+
+/// Largest absolute value of a pole of the loop.
+pub(crate) fn radius<R: Real>(model: &LoopModel<R>) -> Result<f64, VerifyError> {
+    spectral_radius(&model.matrix).map(|radius| radius.to_f64()).map_err(|_| VerifyError::Poles)
 }

@@ -10,6 +10,7 @@ mod continuous_margins;
 mod corners;
 mod covariance;
 mod encoder;
+mod error;
 mod imperfections;
 mod linear;
 mod loop_model;
@@ -24,9 +25,9 @@ mod tick;
 mod trial;
 
 pub(crate) use covariance::stationary;
-pub(crate) use linear::radius;
-pub(crate) use loop_model::Numbers;
-pub(crate) use trial::{chain, leaning, scenario};
+pub(crate) use error::chain;
+pub(crate) use loop_model::{Numbers, radius};
+pub(crate) use trial::{leaning, scenario};
 
 pub use attraction::{
     Attraction, AttractionSettings, Axis, Edge, Map, Tilt, WorstTilt, attraction, attraction_map,
@@ -40,18 +41,19 @@ pub use corners::{
 };
 pub use covariance::NoiseShare;
 pub use encoder::{CoarsestEncoder, EncoderSettings, coarser, coarsest_encoder};
+pub use error::{Unverifiable, VerifyError};
 pub use imperfections::{
     IMPERFECTIONS, Imperfection, ImperfectionSettings, Imperfections, RequiredSurvival, Survival, Verdict,
     imperfections, limit_cycle, required_imperfections,
 };
-pub use linear::{LinearReport, VerifyError, linear, margins_of};
+pub use linear::{LinearReport, linear, margins_of};
 pub use loop_model::{ControllerModel, LoopModel, PlantModel};
 pub use margins::Margins;
-pub use monte_carlo::{MonteCarlo, Spread, WorstCase, monte_carlo, sample, wilson};
-pub use noise_runs::{Endurance, NoiseRun, endurance, noise_run};
-pub use report::{Check, Effort, LawTrust, TrustReport, brief, spread, trust};
+pub use monte_carlo::{Effort, MonteCarlo, Spread, WorstCase, monte_carlo, sample, spread, wilson};
+pub use noise_runs::{Endurance, NoiseRun, Ripple, endurance, noise_run};
+pub use report::{Check, LawTrust, TrustReport, brief, trust};
 pub use response::Response;
 pub use rounding::Rounding;
 pub use rows::{Quantity, Row, quantities, rows};
 pub use tick::TickLimits;
-pub use trial::{Disturbance, Horizon, Outcome, Unverifiable, at_rest_disturbed, trial, trials};
+pub use trial::{Disturbance, Horizon, Outcome, at_rest_disturbed, trial, trials};

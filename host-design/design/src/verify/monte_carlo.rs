@@ -5,12 +5,32 @@ use rand_pcg::Pcg64;
 use serde::{Deserialize, Serialize};
 use upright::table::Law;
 
-use super::report::Effort;
-use super::trial::{Disturbance, Horizon, Outcome, Unverifiable, leaning, scenario, trials, within};
+use super::error::{Unverifiable, within};
+use super::trial::{Disturbance, Horizon, Outcome, leaning, scenario, trials};
 use crate::plant::LANES;
 use crate::rig::{Chain, Link, PlantDescription, Rig};
 use crate::simulate::Scenario;
+use crate::study::Study;
 use crate::table::TableValues;
+
+/// Size of the Monte Carlo part.
+#[derive(Debug, Clone, Copy)]
+pub struct Effort<'a> {
+    /// Monte Carlo runs for each law.
+    pub runs: usize,
+    /// Seed of the first of them.
+    pub seed: u64,
+    /// Share of the runs with one tick more delay than designed for.
+    pub late: f64,
+    /// Whether the runs are made here, or split over processes.
+    pub study: &'a Study,
+}
+
+/// How random plants are drawn for `rig`: by its `[verify]`, a share `late` of them with one more tick of delay.
+pub fn spread(rig: &Rig, late: f64) -> Spread {
+    let share = rig.verify.spread_percent / 100.0;
+    Spread { mass: share, length: share, inertia: share, other_delay: late, ..Spread::of(rig) }
+}
 
 /// The ranges from which each run's plant and start are drawn, uniformly. A share of 0.02 means from -2 % to +2 %.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
@@ -162,18 +182,8 @@ pub fn monte_carlo(
         interval: wilson(survived, runs),
         worst: all
             .into_iter()
-            .reduce(|worst, case| if is_worse(&case.outcome, &worst.outcome) { case } else { worst }),
+            .reduce(|worst, case| if case.outcome.is_worse_than(&worst.outcome) { case } else { worst }),
     })
-}
-
-/// Whether `a` is worse than `b`: fell earlier, or fell where `b` survived, or, both upright, leaned further.
-pub(super) fn is_worse(a: &Outcome, b: &Outcome) -> bool {
-    match (&a.fall, &b.fall) {
-        (Some(a), Some(b)) => a.at_s < b.at_s,
-        (Some(_), None) => true,
-        (None, Some(_)) => false,
-        (None, None) => a.peak_angle_rad > b.peak_angle_rad,
-    }
 }
 
 /// The 95 % confidence interval of a share of which `successes` of `runs` were seen, after E. B. Wilson, "Probable

@@ -3,22 +3,31 @@
 use serde::Serialize;
 use upright::table::Law;
 
-use super::trial::{Disturbance, Horizon, Unverifiable, chain, scenario, trial};
+use super::error::{Unverifiable, chain};
+use super::trial::{Disturbance, Horizon, scenario, trial};
 use crate::parallel;
 use crate::plant::absolute_angles;
 use crate::rig::Rig;
 use crate::simulate::{Scenario, SimulationError, run};
 use crate::table::TableValues;
 
-/// Root mean squares over several runs at rest, after the first tenth of each.
+/// Several runs at rest.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct NoiseRun {
     /// Number of runs, with the seeds from 1.
     pub seeds: u64,
-    /// How many of them survived to the end; the figures cover all runs, up to their falls.
+    /// How many of them survived to the end.
     pub survived: u64,
     /// Duration of each run (s).
     pub duration_s: f64,
+    /// What was measured in the runs that survived; none if all fell.
+    #[serde(flatten)]
+    pub ripple: Option<Ripple>,
+}
+
+/// Root mean squares over the runs that survived, after the first tenth of each.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Ripple {
     /// Force on the cart (N rms).
     pub force_rms_n: f64,
     /// Largest force on the cart (N).
@@ -84,18 +93,17 @@ pub fn noise_run(
     };
     let all: Vec<Sums> = parallel::try_map::<_, _, SimulationError>(1..=seeds, one)?;
     // Sums are taken in the order of the seeds, whichever thread made the runs.
-    let ticks: f64 = all.iter().map(|sums| sums.ticks).sum();
-    let rms = |part: &dyn Fn(&Sums) -> f64| (all.iter().map(part).sum::<f64>() / ticks.max(1.0)).sqrt();
-    Ok(NoiseRun {
-        seeds,
-        survived: all.iter().filter(|sums| sums.survives).count() as u64,
-        duration_s,
+    let survived: Vec<Sums> = all.into_iter().filter(|sums| sums.survives).collect();
+    let ticks: f64 = survived.iter().map(|sums| sums.ticks).sum();
+    let rms = |part: &dyn Fn(&Sums) -> f64| (survived.iter().map(part).sum::<f64>() / ticks.max(1.0)).sqrt();
+    let ripple = (!survived.is_empty()).then(|| Ripple {
         force_rms_n: rms(&|sums| sums.force),
-        force_peak_n: all.iter().map(|sums| sums.peak).fold(0.0, f64::max),
+        force_peak_n: survived.iter().map(|sums| sums.peak).fold(0.0, f64::max),
         state_rms: (0..states).map(|i| rms(&|sums| sums.state[i])).collect(),
         angle_rms_rad: (0..links).map(|i| rms(&|sums| sums.angle[i])).collect(),
         estimate_error_rms: (0..states).map(|i| rms(&|sums| sums.error[i])).collect(),
-    })
+    });
+    Ok(NoiseRun { seeds, survived: survived.len() as u64, duration_s, ripple })
 }
 
 fn disturbed(rig: &Rig, law: Law, disturbance: &Disturbance, seed: u64, duration_s: f64) -> Scenario {
@@ -124,8 +132,7 @@ pub struct Endurance {
     pub peak_force_n: f64,
 }
 
-/// Runs the nominal plant from rest for `duration_s` with each of the seeds 1 to `seeds`. `done` is called after each
-/// run, from any thread.
+/// Runs the nominal plant from rest for `duration_s` with each of the seeds 1 to `seeds`.
 ///
 /// # Errors
 /// [`Unverifiable`] if the runs cannot be started.
@@ -136,13 +143,10 @@ pub fn endurance(
     disturbance: &Disturbance,
     seeds: u64,
     duration_s: f64,
-    done: &(dyn Fn() + Sync),
 ) -> Result<Endurance, Unverifiable> {
     let one = |seed: u64| {
         let scenario = disturbed(rig, law, disturbance, seed, duration_s);
-        let outcome = trial(rig, table, &scenario, &Horizon::default())?;
-        done();
-        Ok((seed, outcome))
+        Ok((seed, trial(rig, table, &scenario, &Horizon::default())?))
     };
     let all: Vec<_> = parallel::try_map::<_, _, SimulationError>(1..=seeds, one)?;
     let fallen: Vec<u64> =

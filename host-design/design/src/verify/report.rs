@@ -5,15 +5,14 @@ use upright::table::Law;
 
 use super::corners::MOST_LINKS;
 use super::{
-    Attraction, AttractionSettings, CoarsestEncoder, CornerSettings, Corners, Disturbance, EncoderSettings,
-    ImperfectionSettings, LinearReport, Margins, MassTolerance, MonteCarlo, NoiseRun, RequiredSurvival,
-    Spread, Unverifiable, VerifyError, attraction, coarsest_encoder, corners, linear, mass_tolerances,
-    monte_carlo, noise_run, required_imperfections,
+    Attraction, AttractionSettings, CoarsestEncoder, CornerSettings, Corners, Disturbance, Effort,
+    EncoderSettings, ImperfectionSettings, LinearReport, Margins, MassTolerance, MonteCarlo, NoiseRun,
+    RequiredSurvival, Unverifiable, VerifyError, attraction, coarsest_encoder, corners, linear,
+    mass_tolerances, monte_carlo, noise_run, required_imperfections, spread,
 };
 use crate::design::Certified;
 use crate::number::significant;
 use crate::rig::{PlantDescription, Requirements, Rig};
-use crate::study::Study;
 use crate::table::TableValues;
 
 /// The trust report of a rig.
@@ -68,25 +67,6 @@ pub struct Check {
     pub found: Option<f64>,
     /// Whether it holds.
     pub holds: bool,
-}
-
-/// Size of the Monte Carlo part.
-#[derive(Debug, Clone, Copy)]
-pub struct Effort<'a> {
-    /// Monte Carlo runs for each law.
-    pub runs: usize,
-    /// Seed of the first of them.
-    pub seed: u64,
-    /// Share of the runs with one tick more delay than designed for.
-    pub late: f64,
-    /// Whether the runs are made here, or split over processes.
-    pub study: &'a Study,
-}
-
-/// How random plants are drawn for `rig`: by its `[verify]`, a share `late` of them with one more tick of delay.
-pub fn spread(rig: &Rig, late: f64) -> Spread {
-    let share = rig.verify.spread_percent / 100.0;
-    Spread { mass: share, length: share, inertia: share, other_delay: late, ..Spread::of(rig) }
 }
 
 /// Makes the report. `done` is called after each Monte Carlo run, `stage` before each part.

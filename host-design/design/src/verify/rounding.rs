@@ -220,7 +220,7 @@ impl<'t> Shadow<'t> {
         let limited = saturate(sample.requested as f32, self.table.force_limit_n);
         let Some(motor) = &self.table.motor else { return f64::from(limited) };
         let speed = sample.estimate.get(1).copied().unwrap_or_default() as f32;
-        let (volts, force) = motor.drive(limited, speed, self.last_volts);
+        let (volts, force) = motor.volts_and_force(limited, speed, self.last_volts);
         self.last_volts = volts;
         f64::from(force)
     }

@@ -3,48 +3,11 @@
 use serde::{Deserialize, Serialize};
 use upright::table::Law;
 
-use crate::design::DesignError;
 use crate::plant::absolute_angles;
-use crate::rig::{Chain, PlantDescription, Rig};
+use crate::rig::{PlantDescription, Rig};
 use crate::simulate::{Fall, Job, Sample, Scenario, SimulationError, run, run_all};
-use crate::study::{StudyError, infinite_if_null};
-use crate::table::{NoTable, TableValues};
-
-/// A quantity that cannot be computed for this rig.
-#[derive(Debug, thiserror::Error)]
-pub enum Unverifiable {
-    /// The runs cannot be started.
-    #[error(transparent)]
-    Simulation(#[from] SimulationError),
-    /// A changed rig, for which the gains have to be redesigned, has no design.
-    #[error(transparent)]
-    Design(#[from] DesignError),
-    /// No gain table can be made for a changed rig.
-    #[error(transparent)]
-    NoTable(#[from] NoTable),
-    /// The firmware does not run.
-    #[error("the firmware does not run: {0}")]
-    Firmware(String),
-    /// The runs of another process cannot be used.
-    #[error(transparent)]
-    Study(#[from] StudyError),
-    /// Masses, angles and encoders of a `[model]` are not known.
-    #[error("a rig given by [model] has no {0}: describe it by [cart] and [[link]]")]
-    NotAChain(&'static str),
-    /// The controller does not run from encoders.
-    #[error("the rig has no observer: give it its encoders and [kalman]")]
-    NoObserver,
-    /// An invalid setting.
-    #[error("{what} = {value}: give {accepts}")]
-    Setting {
-        /// Name of the setting.
-        what: &'static str,
-        /// Its value.
-        value: f64,
-        /// The accepted values.
-        accepts: &'static str,
-    },
-}
+use crate::study::infinite_if_null;
+use crate::table::TableValues;
 
 /// Disturbances, drawn again in every tick and held for the tick.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
@@ -157,6 +120,16 @@ impl Outcome {
         Self { at_rest_after_s: self.at_rest_after_s.filter(|_| fall.is_none()), fall, ..self }
     }
 
+    /// Whether this run fell earlier, or fell where `other` survived, or, both upright, leaned further.
+    pub(super) fn is_worse_than(&self, other: &Self) -> bool {
+        match (&self.fall, &other.fall) {
+            (Some(own), Some(other)) => own.at_s < other.at_s,
+            (Some(_), None) => true,
+            (None, Some(_)) => false,
+            (None, None) => self.peak_angle_rad > other.peak_angle_rad,
+        }
+    }
+
     /// Whether there was no fall, and the rig was near rest when the run ended.
     pub fn comes_to_rest(&self) -> bool {
         self.at_rest_after_s.is_some()
@@ -240,24 +213,6 @@ pub(crate) fn leaning(rig: &Rig, angles: &[f64]) -> Vec<f64> {
         below = angle;
     }
     start
-}
-
-/// The chain of a rig that has one.
-pub(crate) fn chain<'a>(rig: &'a Rig, what: &'static str) -> Result<&'a Chain, Unverifiable> {
-    match &rig.plant {
-        PlantDescription::Chain(chain) => Ok(chain),
-        PlantDescription::Model(_) => Err(Unverifiable::NotAChain(what)),
-    }
-}
-
-/// Checks that a setting is within its range.
-pub(super) fn within(
-    what: &'static str,
-    value: f64,
-    range: core::ops::RangeInclusive<f64>,
-    accepts: &'static str,
-) -> Result<(), Unverifiable> {
-    if range.contains(&value) { Ok(()) } else { Err(Unverifiable::Setting { what, value, accepts }) }
 }
 
 /// The largest size that survives below the first one found to fall: from `smallest` up by doubling to at most

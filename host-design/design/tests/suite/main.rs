@@ -6,23 +6,16 @@ mod identify;
 mod identify_coverage;
 mod known_friction;
 mod lockstep;
-mod log_fuzz;
-// The paper's printed values are defined once, in the tool.
-#[allow(dead_code, unreachable_pub)]
-#[path = "../../../tool/src/reproduce/published.rs"]
-mod paper_numbers;
 mod plant_equations;
 mod plant_linear_model;
 mod plant_linearisation;
 mod plant_motion;
 mod plant_rigs;
 mod plant_sines;
-mod published;
 mod reality_friction;
 mod reality_loop;
 mod rig_errors;
 mod rig_files;
-mod rig_fuzz;
 mod robust;
 mod robust_generated;
 mod supervised;
@@ -35,3 +28,5 @@ mod swing_up_firmware;
 mod transitions;
 mod verify_linear;
 mod verify_nonlinear;
+
+use upright_test_support::published;

@@ -1,11 +1,10 @@
 //! Swing-up: the stored motions of the rigs in closed loop, and what has to be refused.
 
 use crate::published::{designed, rig, rig_and_table_with_motions, rig_path, stored_motions, table};
+use upright_design::motion::RaiseAndLower;
 use upright_design::numerics::Matrix;
 use upright_design::rig::{PlantDescription, Rig};
-use upright_design::swing_up::{
-    Script, Solved, Stored, SwingUp, SwingUpError, judge, motions, solved, with_motions,
-};
+use upright_design::swing_up::{Script, Solved, Stored, SwingUpError, judge, motions, solved, with_motions};
 use upright_design::table::TableValues;
 
 const RIGS: [&str; 4] =
@@ -21,7 +20,7 @@ fn arrives(rig: &Rig, table: &TableValues, seed: u64, is_wrong: bool) -> bool {
 }
 
 /// The same with these motions, which are not the stored ones.
-fn arrives_with(rig: &Rig, motions: &SwingUp) -> bool {
+fn arrives_with(rig: &Rig, motions: &RaiseAndLower) -> bool {
     let table = with_motions(rig, table(rig), motions, &[]).unwrap();
     arrives(rig, &table, 1, false)
 }

@@ -7,11 +7,12 @@ use upright::supervision::fault::Fault;
 use upright::supervision::inhibits::Inhibits;
 use upright::table::{Equilibrium, TableError};
 use upright_design::harness::{Harness, HarnessError, Pins, Recording, record, with_firmware};
+use upright_design::motion::Transition;
 use upright_design::plant::absolute_angles;
 use upright_design::rig::Rig;
 use upright_design::simulate::Scenario;
 use upright_design::study::Study;
-use upright_design::swing_up::{Condition, Runs, Transition, firmware_runs, hangs, margins, up_and_down};
+use upright_design::swing_up::{Condition, Runs, firmware_runs, hangs, margins, up_and_down};
 use upright_design::table::TableValues;
 
 const RIGS: [&str; 4] =

@@ -14,12 +14,12 @@ use upright::supervision::inhibits::Inhibits;
 use upright::supervision::supervisor::State;
 use upright::table::Equilibrium;
 use upright_design::harness::{Harness, Pins, with_firmware};
+use upright_design::motion::{Transition, equilibrium_named};
 use upright_design::rig::Rig;
 use upright_design::simulate::Scenario;
 use upright_design::study::Study;
 use upright_design::swing_up::{
-    PlannedTransition, Route, Script, StoredTransitions, Transition, equilibrium_named, route_runs,
-    with_motions,
+    PlannedTransition, Route, Script, StoredTransitions, route_runs, with_motions,
 };
 use upright_design::table::TableValues;
 

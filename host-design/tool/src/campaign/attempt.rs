@@ -6,10 +6,12 @@ use upright::supervision::fault::Fault;
 use upright::supervision::sign_check::Signs;
 use upright_board::UNITS_PER_MICROSECOND;
 
-use super::defect::{Expected, Kind};
+use super::defect::Defect;
+use super::expected::Expected;
+use super::expected::Phase;
 use super::injection::Injection;
 use super::observed::Observed;
-use super::trial::{Phase, Trial};
+use super::trial::Trial;
 use crate::in_the_loop::{Events, Place, RunError, VirtualBoard};
 use upright_design::harness::{HEARTBEAT_S, Harness, HarnessError, Pins, Session, Target, goals};
 use upright_design::identify::Feed;
@@ -122,8 +124,10 @@ impl Attempt<'_> {
         }
         let mut harness = Harness::new(self.rig, self.table, &self.trial.scenario, target)?;
         match self.trial.kind {
-            _ if self.trial.phase == Phase::Jogging => self.drive(&mut harness),
-            Kind::ArmUnhomed | Kind::ArmHanging | Kind::ArmStopped | Kind::ArmHeld => self.arm(&mut harness),
+            _ if self.trial.phase == Phase::Jogging => self.jog(&mut harness),
+            Defect::ArmUnhomed | Defect::ArmHanging | Defect::ArmStopped | Defect::ArmHeld => {
+                self.arm(&mut harness)
+            }
             _ => self.balance(&mut harness),
         }
     }
@@ -159,7 +163,7 @@ impl Attempt<'_> {
             }
             if since == Some(0) {
                 injection.serial(&mut harness.session);
-                is_visible |= trial.kind == Kind::TableBit;
+                is_visible |= trial.kind == Defect::TableBit;
             }
             observed.output(tick, output);
             if observed.off.is_some_and(|off| tick > off + TICKS_AFTER) {
@@ -180,7 +184,7 @@ impl Attempt<'_> {
         }
         observed.fault = harness.session.fault();
         self.find_reason(harness, &mut observed);
-        if trial.kind != Kind::HostDeaf && observed.off.is_none() {
+        if trial.kind != Defect::HostDeaf && observed.off.is_none() {
             let inputs = harness.inputs();
             if let Ok(Answer::Statistics(statistics)) = harness.session.ask(Request::Statistics, &inputs) {
                 observed.rejected = statistics.rejected_samples;
@@ -246,7 +250,7 @@ impl Attempt<'_> {
                 let events = self.trial.kind.events(self.trial, self.table, board.image, board.receive);
                 board.events.borrow_mut().extend(events);
             }
-            if self.trial.kind == Kind::HostDeaf {
+            if self.trial.kind == Defect::HostDeaf {
                 harness.session.stop_reading()?;
             }
         }
@@ -360,19 +364,19 @@ impl Attempt<'_> {
     fn arm(&self, harness: &mut Harness<'_>) -> Result<Observed, HarnessError> {
         let mut observed = Observed::default();
         let mut stopped = false;
-        if self.trial.kind != Kind::ArmUnhomed {
+        if self.trial.kind != Defect::ArmUnhomed {
             self.until_checked(harness)?;
         }
-        if matches!(self.trial.kind, Kind::ArmStopped | Kind::ArmHeld) {
+        if matches!(self.trial.kind, Defect::ArmStopped | Defect::ArmHeld) {
             let mut inputs = harness.inputs();
             inputs.contacts.emergency_stop = true;
             observed.on_again |= harness.session.tick(&inputs)?.enable;
-            stopped = self.trial.kind == Kind::ArmStopped;
+            stopped = self.trial.kind == Defect::ArmStopped;
         }
         let mut inputs = harness.inputs();
         inputs.contacts.emergency_stop = stopped;
         let mut refusal = harness.session.ask(Request::Arm, &inputs);
-        if self.trial.kind == Kind::ArmHeld {
+        if self.trial.kind == Defect::ArmHeld {
             harness.session.ask(Request::Clear, &inputs)?;
             refusal = harness.session.ask(Request::Arm, &inputs);
         }

@@ -6,49 +6,51 @@ use upright_design::rig::Rig;
 use upright_design::simulate::Scenario;
 use upright_design::table::TableValues;
 
-use super::defect::{Expected, Kind};
+use super::defect::{Defect, Needs};
+use super::expected::Expected;
+use super::expected::Phase;
 use super::injection::Injection;
-use super::trial::{Phase, Trial};
+use super::trial::Trial;
 
 /// A defect in a running rig, injected tick by tick.
 pub struct Defective<'a> {
     injection: Injection<'a>,
-    kind: Kind,
+    kind: Defect,
     since: usize,
 }
 
-impl Kind {
+impl Defect {
     /// Whether a person can start it while the rig balances: it changes what the firmware reads or drives, not parts
     /// of the board.
     pub fn can_begin_while_balancing(self) -> bool {
         let is_before_balancing = matches!(self.expected(), Expected::Refused(_));
-        !is_before_balancing && !self.needs_process() && !self.needs_board()
+        !is_before_balancing && !matches!(self.needs(), Needs::Process | Needs::Board)
     }
 
     /// Whether it is in one of the sensors.
     pub fn has_sensor(self) -> bool {
         matches!(
             self,
-            Kind::LinkEncoderFrozen
-                | Kind::BadSample
-                | Kind::EncoderJump
-                | Kind::EncoderReversed
-                | Kind::EncodersSwapped
-                | Kind::CountsLost
-                | Kind::SensorLate
-                | Kind::SensorIntermittent
-                | Kind::EncoderWireOpen
+            Defect::LinkEncoderFrozen
+                | Defect::BadSample
+                | Defect::EncoderJump
+                | Defect::EncoderReversed
+                | Defect::EncodersSwapped
+                | Defect::CountsLost
+                | Defect::SensorLate
+                | Defect::SensorIntermittent
+                | Defect::EncoderWireOpen
         )
     }
 }
 
 impl Trial {
     /// A defect of medium severity that begins now.
-    pub fn by_hand(kind: Kind, scenario: &Scenario, sensors: usize, sensor: usize, seed: u64) -> Self {
+    pub fn by_hand(kind: Defect, scenario: &Scenario, sensors: usize, sensor: usize, seed: u64) -> Self {
         let sensor = match kind {
-            Kind::CartEncoderFrozen => 0,
-            Kind::LinkEncoderFrozen => sensor.clamp(1, sensors.max(2) - 1),
-            Kind::EncodersSwapped => sensor.min(sensors.saturating_sub(2)),
+            Defect::CartEncoderFrozen => 0,
+            Defect::LinkEncoderFrozen => sensor.clamp(1, sensors.max(2) - 1),
+            Defect::EncodersSwapped => sensor.min(sensors.saturating_sub(2)),
             _ => sensor.min(sensors.saturating_sub(1)),
         };
         let sign = if seed.is_multiple_of(2) { 1.0 } else { -1.0 };
@@ -75,7 +77,7 @@ impl<'a> Defective<'a> {
     }
 
     /// The kind of the defect.
-    pub fn kind(&self) -> Kind {
+    pub fn kind(&self) -> Defect {
         self.kind
     }
 

@@ -9,8 +9,9 @@ use upright::protocol::message::{Command, Request};
 use upright::protocol::serial_link::MAX_COMMAND;
 use upright::table::Thresholds;
 
-use super::defect::Kind;
-use super::trial::{Phase, Trial};
+use super::defect::Defect;
+use super::expected::Phase;
+use super::trial::Trial;
 use upright_design::harness::{Pins, Session};
 use upright_design::rig::Rig;
 use upright_design::simulate::Bench;
@@ -77,7 +78,7 @@ impl<'a> Injection<'a> {
 
     /// Whether the host still sends heartbeats, `since` ticks after the onset.
     pub(super) fn host_is_alive(&self, since: Option<usize>) -> bool {
-        self.trial.kind != Kind::HostSilent || since.is_none()
+        self.trial.kind != Defect::HostSilent || since.is_none()
     }
 
     /// Changes what the firmware reads, `since` ticks after the onset; returns whether it differs visibly from a
@@ -96,39 +97,39 @@ impl<'a> Injection<'a> {
         let shows = |sensor: usize, counts: i64| (sensor, began[sensor].wrapping_add(counts as u32));
         let mut shown = Vec::new();
         match kind {
-            Kind::SupplyNotANumber if since == 0 => inputs.supply_v = f32::NAN,
-            Kind::SupplySag => inputs.supply_v = self.table.limits.supply_min_v * (0.2 + 0.7 * size as f32),
-            Kind::SupplyDip if since < self.supply_ticks => {
+            Defect::SupplyNotANumber if since == 0 => inputs.supply_v = f32::NAN,
+            Defect::SupplySag => inputs.supply_v = self.table.limits.supply_min_v * (0.2 + 0.7 * size as f32),
+            Defect::SupplyDip if since < self.supply_ticks => {
                 inputs.supply_v = self.table.limits.supply_min_v * (0.2 + 0.7 * size as f32);
             }
-            Kind::SupplySurge => inputs.supply_v *= 1.3 + 0.3 * size as f32,
-            Kind::SupplySpike if since < 1 + usize::from(size > 0.5) => {
+            Defect::SupplySurge => inputs.supply_v *= 1.3 + 0.3 * size as f32,
+            Defect::SupplySpike if since < 1 + usize::from(size > 0.5) => {
                 inputs.supply_v *= 1.3 + 0.3 * size as f32;
             }
-            Kind::EmergencyStop if since == 0 => contacts.emergency_stop = true,
-            Kind::DriverFault if since == 0 => contacts.driver_fault = true,
-            Kind::LimitSwitch if since < PRESSED_TICKS && sign > 0.0 => contacts.limit_high = true,
-            Kind::LimitSwitch if since < PRESSED_TICKS => contacts.limit_low = true,
-            Kind::OneOverrun => contacts.overrun = since < 1 + usize::from(size > 0.5),
-            Kind::Overruns => contacts.overrun = since < 3,
-            Kind::LinkEncoderFrozen | Kind::CartEncoderFrozen => shown.push(shows(sensor, 0)),
-            Kind::BadSample if since == 0 => shown.push(shows(sensor, moved(sensor) + off)),
-            Kind::EncoderJump => shown.push(shows(sensor, moved(sensor) + off)),
-            Kind::SensorIntermittent if since % 3 < 2 => shown.push(shows(sensor, moved(sensor) + off)),
-            Kind::EncoderReversed => shown.push(shows(sensor, -moved(sensor))),
-            Kind::EncoderWireOpen => {
+            Defect::EmergencyStop if since == 0 => contacts.emergency_stop = true,
+            Defect::DriverFault if since == 0 => contacts.driver_fault = true,
+            Defect::LimitSwitch if since < PRESSED_TICKS && sign > 0.0 => contacts.limit_high = true,
+            Defect::LimitSwitch if since < PRESSED_TICKS => contacts.limit_low = true,
+            Defect::OneOverrun => contacts.overrun = since < 1 + usize::from(size > 0.5),
+            Defect::Overruns => contacts.overrun = since < 3,
+            Defect::LinkEncoderFrozen | Defect::CartEncoderFrozen => shown.push(shows(sensor, 0)),
+            Defect::BadSample if since == 0 => shown.push(shows(sensor, moved(sensor) + off)),
+            Defect::EncoderJump => shown.push(shows(sensor, moved(sensor) + off)),
+            Defect::SensorIntermittent if since % 3 < 2 => shown.push(shows(sensor, moved(sensor) + off)),
+            Defect::EncoderReversed => shown.push(shows(sensor, -moved(sensor))),
+            Defect::EncoderWireOpen => {
                 // The edges of the other channel are counted up and down in turn.
                 shown.push(shows(sensor, i64::from(moved(sensor).rem_euclid(4) >= 2)));
             }
-            Kind::EncodersSwapped if truth.len() > 1 => {
+            Defect::EncodersSwapped if truth.len() > 1 => {
                 shown.push(shows(sensor, moved(sensor + 1)));
                 shown.push(shows(sensor + 1, moved(sensor)));
             }
-            Kind::CountsLost => {
+            Defect::CountsLost => {
                 let every = 5 + (45.0 * size) as usize;
                 shown.push(shows(sensor, moved(sensor) - (sign * (since / every) as f64) as i64));
             }
-            Kind::SensorLate => {
+            Defect::SensorLate => {
                 let late = 1 + ((LONGEST_LATENESS - 1) as f64 * size) as usize;
                 let then = self.past[self.past.len().saturating_sub(1 + late)][sensor];
                 inputs.raw_counts[sensor] = then;
@@ -153,10 +154,10 @@ impl<'a> Injection<'a> {
         let asked = *command;
         let full = if self.table.motor.is_some() { 1.0 } else { self.full_force_n as f32 };
         *command = match self.trial.kind {
-            Kind::MotorDead => 0.0,
-            Kind::MotorReversed => -asked,
-            Kind::MotorStuck => full * self.trial.sign as f32,
-            Kind::MotorWeak => asked * (0.1 + 0.4 * self.trial.size as f32),
+            Defect::MotorDead => 0.0,
+            Defect::MotorReversed => -asked,
+            Defect::MotorStuck => full * self.trial.sign as f32,
+            Defect::MotorWeak => asked * (0.1 + 0.4 * self.trial.size as f32),
             _ => return false,
         };
         let force_per_command = match &self.table.motor {
@@ -173,7 +174,7 @@ impl<'a> Injection<'a> {
 
     /// External force on the cart (N).
     pub(super) fn push_n(&self, since: usize) -> f64 {
-        let pushes = self.trial.kind == Kind::Push && since < self.push_ticks;
+        let pushes = self.trial.kind == Defect::Push && since < self.push_ticks;
         if pushes { self.trial.sign * self.trial.size * self.full_force_n } else { 0.0 }
     }
 
@@ -187,32 +188,32 @@ impl<'a> Injection<'a> {
         };
         let mut next = disarm(session.last_id() + 1);
         match kind {
-            Kind::FrameDamaged => {
+            Defect::FrameDamaged => {
                 let bit = self.random.random_range(0..8 * (next.len() - 1));
                 next[bit / 8] ^= 1 << (bit % 8);
                 session.send_bytes(&next);
             }
-            Kind::FrameTruncated => {
+            Defect::FrameTruncated => {
                 let left = self.random.random_range(1..next.len() - 1);
                 next.truncate(left);
                 next.push(frame::DELIMITER);
                 session.send_bytes(&next);
             }
-            Kind::FrameReplayed => {
+            Defect::FrameReplayed => {
                 session.send_bytes(&disarm(1 + self.trial.seed % session.last_id().max(1)))
             }
-            Kind::Rubbish => {
+            Defect::Rubbish => {
                 let mut rubbish: Vec<u8> =
                     (0..self.random.random_range(1..60)).map(|_| self.random.random()).collect();
                 // The frames after it have to be readable again.
                 rubbish.push(frame::DELIMITER);
                 session.send_bytes(&rubbish);
             }
-            Kind::SetpointNotANumber => {
+            Defect::SetpointNotANumber => {
                 let values = [f32::NAN, f32::INFINITY, f32::NEG_INFINITY];
                 let _ = session.send(Request::Setpoint(values[(size * 2.99) as usize]));
             }
-            Kind::SetpointOutOfRange => {
+            Defect::SetpointOutOfRange => {
                 let [low, high] = self.table.limits.rail_m;
                 let beyond = if sign > 0.0 { high } else { low } * (1.01 + 100.0 * size as f32);
                 let _ = session.send(Request::Setpoint(beyond));

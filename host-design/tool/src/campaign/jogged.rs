@@ -8,10 +8,12 @@ use upright_design::rig::{PlantDescription, Rig};
 use upright_design::simulate::{Scenario, Sensing};
 
 use super::attempt::Attempt;
-use super::defect::{Expected, Kind};
+use super::defect::Defect;
+use super::expected::Expected;
+use super::expected::Phase;
 use super::injection::Injection;
 use super::observed::Observed;
-use super::trial::{Phase, Trial};
+use super::trial::Trial;
 
 /// Time between two commands of the key that is held (s).
 const KEY_S: f64 = 0.025;
@@ -19,40 +21,40 @@ const KEY_S: f64 = 0.025;
 const BEGIN_S: f64 = 0.5;
 /// Distance of the limit switches from the ends of the rail (m).
 const SWITCH_M: f64 = 0.01;
-/// Time for which a drive is watched from the onset on (s).
+/// Time for which a jog is watched from the onset on (s).
 const WATCHED_S: f64 = 0.4;
 
-impl Kind {
+impl Defect {
     /// The outcome that it must have in a jog; `None` if it proves nothing there.
     pub fn while_jogging(self) -> Option<Expected> {
         match self {
-            Kind::HostSilent | Kind::HostWireOpen => Some(Expected::LetGo),
-            Kind::MotorDead | Kind::CartEncoderFrozen | Kind::EncoderWireOpen => {
+            Defect::HostSilent | Defect::HostWireOpen => Some(Expected::LetGo),
+            Defect::MotorDead | Defect::CartEncoderFrozen | Defect::EncoderWireOpen => {
                 Some(Expected::Found(MotorSign::Still))
             }
-            Kind::MotorReversed | Kind::EncoderReversed => Some(Expected::Found(MotorSign::Reversed)),
-            Kind::SupplyNotANumber
-            | Kind::SupplySag
-            | Kind::SupplyDip
-            | Kind::SupplySurge
-            | Kind::SupplySpike
-            | Kind::EmergencyStop
-            | Kind::DriverFault
-            | Kind::LimitSwitch
-            | Kind::OneOverrun
-            | Kind::Overruns
-            | Kind::FrameDamaged
-            | Kind::FrameTruncated
-            | Kind::FrameReplayed
-            | Kind::Rubbish
-            | Kind::Panic
-            | Kind::HardFault
-            | Kind::StackOverflow
-            | Kind::StalledTick
-            | Kind::LockUp
-            | Kind::CrystalStops
-            | Kind::BrownOut
-            | Kind::StopBetweenTicks => Some(self.expected()),
+            Defect::MotorReversed | Defect::EncoderReversed => Some(Expected::Found(MotorSign::Reversed)),
+            Defect::SupplyNotANumber
+            | Defect::SupplySag
+            | Defect::SupplyDip
+            | Defect::SupplySurge
+            | Defect::SupplySpike
+            | Defect::EmergencyStop
+            | Defect::DriverFault
+            | Defect::LimitSwitch
+            | Defect::OneOverrun
+            | Defect::Overruns
+            | Defect::FrameDamaged
+            | Defect::FrameTruncated
+            | Defect::FrameReplayed
+            | Defect::Rubbish
+            | Defect::Panic
+            | Defect::HardFault
+            | Defect::StackOverflow
+            | Defect::StalledTick
+            | Defect::LockUp
+            | Defect::CrystalStops
+            | Defect::BrownOut
+            | Defect::StopBetweenTicks => Some(self.expected()),
             _ => None,
         }
     }
@@ -65,7 +67,7 @@ impl Trial {
         let is_there_before = matches!(self.kind.while_jogging(), Some(Expected::Found(_)));
         let (onset, watched) = match is_there_before {
             true => (0, ticks(f64::from(LONGEST_S)) + 2),
-            // In a drive with the cart held, which lasts for 1 s.
+            // In a jog with the cart held, which lasts for 1 s.
             false => (self.onset / 2, ticks(WATCHED_S)),
         };
         let scenario = Scenario {
@@ -81,7 +83,7 @@ impl Trial {
 
 impl Attempt<'_> {
     /// A jog, in which a person holds the key throughout.
-    pub(super) fn drive(&self, harness: &mut Harness<'_>) -> Result<Observed, HarnessError> {
+    pub(super) fn jog(&self, harness: &mut Harness<'_>) -> Result<Observed, HarnessError> {
         let trial = self.trial;
         let is_there_before = matches!(trial.expected(), Expected::Found(_));
         let mut held = harness.bench.state().to_vec();
@@ -146,7 +148,7 @@ impl Attempt<'_> {
                 break;
             }
         }
-        self.after_drive(harness, &mut observed)?;
+        self.after_jog(harness, &mut observed)?;
         Ok(observed)
     }
 
@@ -169,7 +171,7 @@ impl Attempt<'_> {
     }
 
     /// Reads what the firmware has found out, and whether it would arm.
-    fn after_drive(&self, harness: &mut Harness<'_>, observed: &mut Observed) -> Result<(), HarnessError> {
+    fn after_jog(&self, harness: &mut Harness<'_>, observed: &mut Observed) -> Result<(), HarnessError> {
         self.find_reason(harness, observed);
         observed.motor = Some(harness.session.status().motor);
         let inputs = harness.inputs();

@@ -7,9 +7,11 @@ use upright::supervision::jog::{MotorSign, SILENCE_S};
 use upright::supervision::shaking;
 
 use super::attempt::{Setup, attempt};
-use super::defect::{Expected, Kind, Ticks};
+use super::defect::Defect;
+use super::expected::Phase;
+use super::expected::{Expected, Ticks};
 use super::observed::Observed;
-use super::trial::{Phase, Trial};
+use super::trial::Trial;
 use crate::in_the_loop::{Place, RunError};
 use upright_design::table::TableValues;
 
@@ -38,7 +40,7 @@ pub struct Outcome {
     /// Number of the trial.
     pub number: u64,
     /// The defect.
-    pub kind: Kind,
+    pub kind: Defect,
     /// Class of the outcome.
     pub class: Class,
     /// Ticks to motor off, counted from the first visible difference to a healthy rig, that tick included.

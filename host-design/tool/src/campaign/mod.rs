@@ -1,11 +1,12 @@
 //! Fault injection: the whole firmware in the loop, one defect per run, and the outcome.
 //!
-//! A [`Kind`] of defect has an [`Expected`] outcome. A [`Trial`] is a run with one defect, drawn from the campaign's
+//! A [`Defect`] of defect has an [`Expected`] outcome. A [`Trial`] is a run with one defect, drawn from the campaign's
 //! seed and its number, so that any of them can be run again alone. [`campaign`] runs many and counts the outcomes.
 
 mod attempt;
 mod by_hand;
 mod defect;
+mod expected;
 mod injection;
 mod jogged;
 mod judge;
@@ -17,8 +18,9 @@ mod trial;
 
 pub use attempt::{During, Setup};
 pub use by_hand::Defective;
-pub use defect::{Expected, Kind, Ticks};
+pub use defect::{Defect, Needs};
+pub use expected::{Expected, Phase, Ticks};
 pub use judge::{Class, Outcome};
 pub use shaken::feed;
 pub use tally::{Campaign, CampaignError, Row, campaign, kinds, one};
-pub use trial::{Phase, Trial};
+pub use trial::Trial;

@@ -6,7 +6,7 @@ use upright_board::{
     Chip, Conditions, Image, Input, Pin, Time, UNITS_PER_MICROSECOND as US, UNITS_PER_SECOND, Wire,
 };
 
-use super::defect::Kind;
+use super::defect::Defect;
 use super::trial::Trial;
 use crate::in_the_loop::Event;
 use upright_design::table::TableValues;
@@ -24,7 +24,7 @@ const INSIDE: Time = 3 * US;
 /// Time for which the supply of the chip is below the voltage detector's threshold.
 const DIP: Time = 300 * US;
 
-impl Kind {
+impl Defect {
     /// Conditions of the trial's board, drawn within their tolerances.
     pub(super) fn conditions(self, trial: &Trial, typical: Conditions) -> Conditions {
         let mut conditions = Conditions { seed: trial.seed, ..typical };
@@ -32,11 +32,11 @@ impl Kind {
         conditions.lsi_hz = (17_000.0 + 30_000.0 * trial.size) as u32;
         conditions.hsi_hz = (16_000_000.0 * (1.0 + 0.01 * trial.sign * trial.size)) as u32;
         match self {
-            Kind::CrystalMissing => conditions.crystal.hz = 0,
-            Kind::CrystalWrong => {
+            Defect::CrystalMissing => conditions.crystal.hz = 0,
+            Defect::CrystalWrong => {
                 conditions.crystal.hz = WRONG_CRYSTALS[(trial.size * 3.99) as usize];
             }
-            Kind::ChipWrong => conditions.chip = Chip::F446,
+            Defect::ChipWrong => conditions.chip = Chip::F446,
             _ => {}
         }
         conditions
@@ -46,11 +46,11 @@ impl Kind {
     pub(super) fn at_power_up(self, trial: &Trial, guarded: bool) -> Vec<Input> {
         let register = MOTOR_REGISTERS[(trial.size * 4.99) as usize];
         match self {
-            Kind::WriteLost if guarded => vec![Input::LoseWrite(register)],
-            Kind::WriteLost => vec![Input::LoseWriteUnseen(register)],
-            Kind::StalledTick | Kind::LockUp if !guarded => vec![Input::IgnoreWatchdog],
-            Kind::StopBetweenTicks if !guarded => vec![Input::IgnoreBreak],
-            Kind::StackOverflow if !guarded => vec![Input::IgnoreMpu],
+            Defect::WriteLost if guarded => vec![Input::LoseWrite(register)],
+            Defect::WriteLost => vec![Input::LoseWriteUnseen(register)],
+            Defect::StalledTick | Defect::LockUp if !guarded => vec![Input::IgnoreWatchdog],
+            Defect::StopBetweenTicks if !guarded => vec![Input::IgnoreBreak],
+            Defect::StackOverflow if !guarded => vec![Input::IgnoreMpu],
             _ => Vec::new(),
         }
     }
@@ -59,13 +59,17 @@ impl Kind {
     pub fn needs_guard(self) -> bool {
         matches!(
             self,
-            Kind::WriteLost | Kind::StalledTick | Kind::LockUp | Kind::StopBetweenTicks | Kind::StackOverflow
+            Defect::WriteLost
+                | Defect::StalledTick
+                | Defect::LockUp
+                | Defect::StopBetweenTicks
+                | Defect::StackOverflow
         )
     }
 
     /// Whether it is present from power-up on, and prevents arming.
     pub(super) fn is_at_power_up(self) -> bool {
-        matches!(self, Kind::CrystalMissing | Kind::CrystalWrong | Kind::ChipWrong | Kind::WriteLost)
+        matches!(self, Defect::CrystalMissing | Defect::CrystalWrong | Defect::ChipWrong | Defect::WriteLost)
     }
 
     /// Events in the first tick of the defect, for a board that receives from the host at the pin `receive`.
@@ -85,40 +89,40 @@ impl Kind {
             bit: random.random_range(0..8),
         };
         match self {
-            Kind::StalledTick => vec![at(INSIDE, Input::Stall(Time::MAX / 2))],
-            Kind::LockUp => vec![
+            Defect::StalledTick => vec![at(INSIDE, Input::Stall(Time::MAX / 2))],
+            Defect::LockUp => vec![
                 at(INSIDE, Input::FlipBit { address: HARD_FAULT_VECTOR, bit: 6 }),
                 at(INSIDE, Input::Jump(NOWHERE)),
             ],
-            Kind::CrystalStops => vec![at(anywhere, Input::StopCrystal)],
-            Kind::StopBetweenTicks => {
+            Defect::CrystalStops => vec![at(anywhere, Input::StopCrystal)],
+            Defect::StopBetweenTicks => {
                 // At least the time of a tick's code away from both ticks.
                 let when = tick / 10 + (trial.size * 0.7 * tick as f64) as Time;
                 vec![Event::Stop { after: when, open: tick / 20 }]
             }
-            Kind::BrownOut => {
+            Defect::BrownOut => {
                 let volts = 2.0 + 0.6 * trial.size as f32;
                 vec![at(anywhere, Input::ChipSupply(volts)), at(anywhere + DIP, Input::ChipSupply(3.3))]
             }
-            Kind::HostWireOpen => vec![at(0, Input::Level(receive, Wire::Open)), Event::CutLine],
-            Kind::LineNoise => {
+            Defect::HostWireOpen => vec![at(0, Input::Level(receive, Wire::Open)), Event::CutLine],
+            Defect::LineNoise => {
                 let bauds = [9_600, 57_600, 115_200, 460_800, 500_000, 1_000_000];
                 let mut bytes = |count: usize| (0..count).map(|_| random.random()).collect::<Vec<u8>>();
                 bauds.iter().map(|&baud| Event::Bytes { bytes: bytes(20), baud }).collect()
             }
-            Kind::LineFlood => {
+            Defect::LineFlood => {
                 // Without a pause, for a third of the time after which a silent host is a fault.
                 let ticks = if table.limits.link_ticks > 0 { table.limits.link_ticks / 3 } else { 50 };
                 let bytes = (u64::from(ticks) * tick / (10 * UNITS_PER_SECOND / 460_800)) as usize;
                 let bytes = (0..bytes).map(|i| if i % 7 == 0 { 0 } else { random.random() }).collect();
                 vec![Event::Bytes { bytes, baud: 460_800 }]
             }
-            Kind::TableBit => {
+            Defect::TableBit => {
                 let words = table_words(image);
                 let word = words[(trial.size * words.len() as f64) as usize % words.len()];
                 vec![at(anywhere, bit_of(word, 4))]
             }
-            Kind::RamBit => {
+            Defect::RamBit => {
                 // Half of these bits are in the state of the control task, which is a ninth of the memory.
                 let control = image.object("local_resource_control").filter(|_| trial.sign > 0.0);
                 let all = 0x2000_0000..image.symbol("__euninit").unwrap_or(0x2000_2000);

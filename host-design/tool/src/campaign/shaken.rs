@@ -13,10 +13,12 @@ use upright_design::rig::Rig;
 use upright_design::table::TableValues;
 
 use super::attempt::{Attempt, BEYOND, During};
-use super::defect::{Expected, Kind};
+use super::defect::Defect;
+use super::expected::Expected;
+use super::expected::Phase;
 use super::injection::Injection;
 use super::observed::Observed;
-use super::trial::{Phase, Trial};
+use super::trial::Trial;
 
 /// The defects begin between these times (s): while the cart is pushed each way, and while everything is shaken.
 const ONSET_S: [f64; 2] = [0.05, 5.0];
@@ -44,7 +46,7 @@ impl During<'_> {
     }
 
     /// Whether a defect of this kind proves something in this campaign.
-    pub fn is_proof(&self, kind: Kind) -> bool {
+    pub fn is_proof(&self, kind: Defect) -> bool {
         match self {
             During::Balancing => true,
             During::Jog => kind.while_jogging().is_some(),
@@ -53,7 +55,7 @@ impl During<'_> {
     }
 
     /// Whether a defect must be missed without thresholds and limits.
-    pub fn needs_detection(&self, kind: Kind) -> bool {
+    pub fn needs_detection(&self, kind: Defect) -> bool {
         let must_end = match self {
             During::Shaking(_) => kind.while_shaken() == Some(Expected::Changed),
             During::Balancing | During::Jog => true,
@@ -62,30 +64,31 @@ impl During<'_> {
     }
 }
 
-impl Kind {
+impl Defect {
     /// The outcome that it must have while the rig is shaken; `None` if it proves nothing there.
     pub fn while_shaken(self) -> Option<Expected> {
         match self {
-            Kind::HostSilent | Kind::HostWireOpen | Kind::HostDeaf => Some(Expected::LetGo),
+            Defect::HostSilent | Defect::HostWireOpen | Defect::HostDeaf => Some(Expected::LetGo),
             // What stands still while the motor pushes, and a cart that runs away.
-            Kind::LinkEncoderFrozen | Kind::CartEncoderFrozen | Kind::EncoderWireOpen | Kind::MotorStuck => {
-                Some(Expected::Changed)
-            }
+            Defect::LinkEncoderFrozen
+            | Defect::CartEncoderFrozen
+            | Defect::EncoderWireOpen
+            | Defect::MotorStuck => Some(Expected::Changed),
             // There is no observer: only what leads beyond a limit is found. The log shows the rest to the host.
-            Kind::BadSample
-            | Kind::EncoderJump
-            | Kind::EncoderReversed
-            | Kind::EncodersSwapped
-            | Kind::MotorDead
-            | Kind::MotorReversed => Some(Expected::Bounded),
-            Kind::ArmUnhomed
-            | Kind::ArmHanging
-            | Kind::ArmStopped
-            | Kind::ArmHeld
-            | Kind::CrystalMissing
-            | Kind::CrystalWrong
-            | Kind::ChipWrong
-            | Kind::WriteLost => None,
+            Defect::BadSample
+            | Defect::EncoderJump
+            | Defect::EncoderReversed
+            | Defect::EncodersSwapped
+            | Defect::MotorDead
+            | Defect::MotorReversed => Some(Expected::Bounded),
+            Defect::ArmUnhomed
+            | Defect::ArmHanging
+            | Defect::ArmStopped
+            | Defect::ArmHeld
+            | Defect::CrystalMissing
+            | Defect::CrystalWrong
+            | Defect::ChipWrong
+            | Defect::WriteLost => None,
             _ => Some(self.expected()),
         }
     }
@@ -117,7 +120,7 @@ impl Attempt<'_> {
             let since = tick.checked_sub(trial.onset).filter(|_| self.with_defect);
             let inputs = self.pins(&mut shaken.harness, &mut injection, since, &mut false)?;
             shaken.harness.bench.push(since.map_or(0.0, |since| injection.push_n(since)));
-            let acted = shaken.act(&inputs, |drive| self.driven(&mut injection, since, drive));
+            let acted = shaken.act(&inputs, |drive| self.acting(&mut injection, since, drive));
             let output = match acted {
                 Err(HarnessError::Stopped { .. }) if observed.off.is_some() => {
                     observed.dead = true;
@@ -146,7 +149,7 @@ impl Attempt<'_> {
     }
 
     /// The drive that acts on the cart, which the defect may change.
-    fn driven(&self, injection: &mut Injection<'_>, since: Option<usize>, drive: Drive) -> Drive {
+    fn acting(&self, injection: &mut Injection<'_>, since: Option<usize>, drive: Drive) -> Drive {
         let mut acting = upright::board::Output { enable: true, drive };
         if since.is_some() {
             injection.output(&mut acting);

@@ -4,7 +4,8 @@ use serde::Serialize;
 use upright::supervision::fault::Fault;
 
 use super::attempt::{During, Setup};
-use super::defect::{Expected, Kind};
+use super::defect::{Defect, Needs};
+use super::expected::Expected;
 use super::judge::{Class, Outcome, allowed, judge, silence_ticks};
 use super::trial::Trial;
 use crate::in_the_loop::{Place, RunError};
@@ -32,9 +33,9 @@ pub enum CampaignError {
 /// All trials of one kind.
 #[derive(Debug, Clone, Serialize)]
 pub struct Row {
-    /// Kind of the defect.
-    pub kind: Kind,
-    /// See [`Kind::meaning`].
+    /// Defect of the defect.
+    pub kind: Defect,
+    /// See [`Defect::meaning`].
     pub meaning: &'static str,
     /// Ticks within which the motor must be off; for [`Expected::Off`], the ticks that this takes at best.
     pub allowed: Option<u32>,
@@ -77,22 +78,22 @@ pub struct Campaign {
 }
 
 /// The kinds of defects that are possible with this rig and this place.
-pub fn kinds(table: &TableValues, place: Place<'_>) -> Vec<Kind> {
+pub fn kinds(table: &TableValues, place: Place<'_>) -> Vec<Defect> {
     let has_supply = table.limits.supply_min_v > 0.0;
     let has_links = table.sensors() > 1;
-    Kind::ALL
+    Defect::ALL
         .iter()
-        .map(|(kind, ..)| *kind)
+        .copied()
         .filter(|kind| match kind {
-            Kind::SupplySag | Kind::SupplyDip => has_supply,
-            Kind::SupplySurge | Kind::SupplySpike => table.motor.is_some(),
-            Kind::LinkEncoderFrozen | Kind::EncodersSwapped => has_links,
+            Defect::SupplySag | Defect::SupplyDip => has_supply,
+            Defect::SupplySurge | Defect::SupplySpike => table.motor.is_some(),
+            Defect::LinkEncoderFrozen | Defect::EncodersSwapped => has_links,
             _ => true,
         })
         .filter(|kind| match place {
-            Place::Host => !kind.needs_image() && !kind.needs_board(),
-            Place::Qemu { .. } => !kind.needs_process() && !kind.needs_board(),
-            Place::Board { .. } => !kind.needs_simulated_pins(),
+            Place::Host => !matches!(kind.needs(), Needs::Image | Needs::Board),
+            Place::Qemu { .. } => !matches!(kind.needs(), Needs::Process | Needs::Board),
+            Place::Board { .. } => kind.needs() != Needs::SimulatedPins,
         })
         .collect()
 }
@@ -101,7 +102,7 @@ pub fn kinds(table: &TableValues, place: Place<'_>) -> Vec<Kind> {
 ///
 /// # Errors
 /// [`CampaignError`] if it cannot be run.
-pub fn one(setup: &Setup<'_>, kinds: &[Kind], seed: u64, number: u64) -> Result<Outcome, CampaignError> {
+pub fn one(setup: &Setup<'_>, kinds: &[Defect], seed: u64, number: u64) -> Result<Outcome, CampaignError> {
     let trial = Trial::draw(setup.rig, setup.table, kinds, seed, number);
     let trial = match setup.during {
         During::Balancing => trial,
@@ -117,7 +118,7 @@ pub fn one(setup: &Setup<'_>, kinds: &[Kind], seed: u64, number: u64) -> Result<
 /// The first [`CampaignError`].
 pub fn campaign(
     setup: &Setup<'_>,
-    kinds: &[Kind],
+    kinds: &[Defect],
     seed: u64,
     runs: u64,
     (study, part): (&Study, &str),
@@ -134,7 +135,7 @@ pub fn campaign(
 }
 
 impl Row {
-    fn of(kind: Kind, setup: &Setup<'_>, outcomes: &[Outcome]) -> Self {
+    fn of(kind: Defect, setup: &Setup<'_>, outcomes: &[Outcome]) -> Self {
         let of_kind = || outcomes.iter().filter(move |outcome| outcome.kind == kind);
         let count = |class: Class| of_kind().filter(|outcome| outcome.class == class).count();
         let phase = setup.during.phase();

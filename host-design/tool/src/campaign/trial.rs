@@ -4,7 +4,8 @@ use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
 use upright::table::Law;
 
-use super::defect::{Expected, Kind};
+use super::defect::Defect;
+use super::expected::{Expected, Phase};
 use upright_design::rig::Rig;
 use upright_design::simulate::{Scenario, Sensing};
 use upright_design::table::{SwingUpValues, TableValues};
@@ -15,8 +16,8 @@ use upright_design::verify::Disturbance;
 pub struct Trial {
     /// Number of the trial in its campaign.
     pub number: u64,
-    /// Kind of the defect.
-    pub kind: Kind,
+    /// Defect of the defect.
+    pub kind: Defect,
     /// What the rig does when the defect begins.
     pub phase: Phase,
     /// Set-point and disturbances of the run.
@@ -35,22 +36,6 @@ pub struct Trial {
     pub seed: u64,
 }
 
-/// What the rig does when a defect begins.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum Phase {
-    /// It balances, raised by hand.
-    Balancing,
-    /// It is raised by the motor.
-    Raising,
-    /// It is lowered by the motor.
-    Lowering,
-    /// Its links hang, and the motor pushes the cart while a key is held.
-    Jogging,
-    /// Its links hang, and the motor shakes them.
-    Shaken,
-}
-
 /// Number of ticks within which a command takes effect.
 const COMMAND_TICKS: usize = 4;
 /// Time for which a raised rig balances before it is lowered (s).
@@ -59,7 +44,7 @@ const UPRIGHT_S: f64 = 0.5;
 impl Trial {
     /// The trial `number` of a campaign: its kind is one of `kinds`, in turn. With a table that has a swing-up, the
     /// defects of the motion are tried while raising and lowering, in turn.
-    pub fn draw(rig: &Rig, table: &TableValues, kinds: &[Kind], seed: u64, number: u64) -> Self {
+    pub fn draw(rig: &Rig, table: &TableValues, kinds: &[Defect], seed: u64, number: u64) -> Self {
         let kind = kinds[(number % kinds.len() as u64) as usize];
         // A generator for each trial, so that it does not depend on the others.
         let mut random = Pcg64::new(u128::from(seed) << 64 | u128::from(number), 0xcafe_f00d);
@@ -87,9 +72,9 @@ impl Trial {
         };
         let sensors = table.sensors();
         let sensor = match kind {
-            Kind::CartEncoderFrozen => 0,
-            Kind::LinkEncoderFrozen => random.random_range(1..sensors.max(2)),
-            Kind::EncodersSwapped => random.random_range(0..sensors.saturating_sub(1).max(1)),
+            Defect::CartEncoderFrozen => 0,
+            Defect::LinkEncoderFrozen => random.random_range(1..sensors.max(2)),
+            Defect::EncodersSwapped => random.random_range(0..sensors.saturating_sub(1).max(1)),
             _ => random.random_range(0..sensors),
         };
         let trial = Self {
@@ -104,7 +89,8 @@ impl Trial {
             size: random.random(),
             seed: random.random(),
         };
-        let moves = !matches!(kind, Kind::ArmUnhomed | Kind::ArmHanging | Kind::ArmStopped | Kind::ArmHeld);
+        let moves =
+            !matches!(kind, Defect::ArmUnhomed | Defect::ArmHanging | Defect::ArmStopped | Defect::ArmHeld);
         match &table.swing_up {
             Some(swing_up) if moves => {
                 let is_raised = (number / kinds.len() as u64).is_multiple_of(2);

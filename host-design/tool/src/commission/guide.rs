@@ -168,6 +168,6 @@ impl<'a> Guide<'a> {
     pub(super) fn turn_off(&mut self) {
         self.send(Request::Disarm);
         // The line may be closed: then the firmware turns the motor off by itself.
-        let _ = self.wait(OFF, |telemetry| (!telemetry.state.drives()).then_some(()));
+        let _ = self.wait(OFF, |telemetry| (!telemetry.state.motor_is_on()).then_some(()));
     }
 }

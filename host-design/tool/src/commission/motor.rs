@@ -13,11 +13,11 @@ use crate::monitor::words;
 
 /// Time between two commands of a key that is held.
 const KEY: Duration = Duration::from_millis(25);
-/// Time for which the rig stands still before a drive, and the key is released between two tries.
+/// Time for which the rig stands still before a jog, and the key is released between two tries.
 const STILL: Duration = Duration::from_secs(1);
-/// A drive begins within this time, or is refused.
+/// A jog begins within this time, or is refused.
 const BEGINS: Duration = Duration::from_millis(300);
-/// Longest drive, and some time for the telemetry.
+/// Longest jog, and some time for the telemetry.
 const LONGEST: Duration = Duration::from_millis(1_500);
 
 /// The motor pushes the cart along +x until it has moved a little.
@@ -26,7 +26,7 @@ pub(super) fn check(guide: &mut Guide<'_>) -> Result<(), Stop> {
     let end = guide.machine.now() + guide.machine.patience();
     while !push(guide)? {
         if guide.machine.now() > end {
-            return Err(Stop::Machine(format!("the motor is not driven: {}", guide.refusal())));
+            return Err(Stop::Machine(format!("the cart is not jogged: {}", guide.refusal())));
         }
     }
     let now = guide.conversation().telemetry.as_ref();
@@ -39,14 +39,14 @@ pub(super) fn check(guide: &mut Guide<'_>) -> Result<(), Stop> {
             return Err(Stop::Machine(format!("fault {fault} while the motor pushed the cart")));
         }
         _ => {
-            let words = words.unwrap_or_else(|| "the drive has ended too early: do it again".to_owned());
+            let words = words.unwrap_or_else(|| "the jog has ended too early: do it again".to_owned());
             return Err(Stop::Machine(words));
         }
     }
     Ok(())
 }
 
-/// Holds the key until the drive has ended; returns whether it has begun.
+/// Holds the key until the jog has ended; returns whether it has begun.
 fn push(guide: &mut Guide<'_>) -> Result<bool, Stop> {
     guide.pause(STILL)?;
     let begin = guide.machine.now();

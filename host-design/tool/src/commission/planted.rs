@@ -10,13 +10,13 @@ use upright_design::simulate::{Bench, Scenario};
 use upright_design::table::TableValues;
 
 use super::step::Step;
-use crate::campaign::{Defective, Kind, Trial};
+use crate::campaign::{Defect, Defective, Trial};
 
 /// What is wrong in the machine.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum What {
     /// A defect of the fault campaign, from power-up on.
-    Campaign(Kind),
+    Campaign(Defect),
     StopMissing,
     SwitchMissing,
     SwitchesExchanged,
@@ -59,17 +59,17 @@ const ALL: [Row; 15] = [
         "the two limit switches are exchanged",
         Step::Contacts,
     ),
-    ("supply-sag", What::Campaign(Kind::SupplySag), 0, "the supply is too low", Step::Contacts),
+    ("supply-sag", What::Campaign(Defect::SupplySag), 0, "the supply is too low", Step::Contacts),
     (
         "cart-encoder-reversed",
-        What::Campaign(Kind::EncoderReversed),
+        What::Campaign(Defect::EncoderReversed),
         0,
         "the cart's encoder counts backwards",
         Step::Homing,
     ),
     (
         "cart-encoder-frozen",
-        What::Campaign(Kind::CartEncoderFrozen),
+        What::Campaign(Defect::CartEncoderFrozen),
         0,
         "the cart's encoder does not count",
         Step::Homing,
@@ -83,28 +83,28 @@ const ALL: [Row; 15] = [
     ),
     (
         "encoder-reversed",
-        What::Campaign(Kind::EncoderReversed),
+        What::Campaign(Defect::EncoderReversed),
         1,
         "the encoder of link 1 counts backwards",
         Step::Signs,
     ),
     (
         "encoder-frozen",
-        What::Campaign(Kind::LinkEncoderFrozen),
+        What::Campaign(Defect::LinkEncoderFrozen),
         1,
         "the encoder of link 1 does not count",
         Step::Signs,
     ),
     (
         "encoder-wire-open",
-        What::Campaign(Kind::EncoderWireOpen),
+        What::Campaign(Defect::EncoderWireOpen),
         1,
         "a wire of the encoder of link 1 is open",
         Step::Signs,
     ),
     (
         "encoders-swapped",
-        What::Campaign(Kind::EncodersSwapped),
+        What::Campaign(Defect::EncodersSwapped),
         1,
         "the encoders of links 1 and 2 are exchanged; with one link those of cart and link",
         Step::Signs,
@@ -118,7 +118,7 @@ const ALL: [Row; 15] = [
     ),
     (
         "motor-reversed",
-        What::Campaign(Kind::MotorReversed),
+        What::Campaign(Defect::MotorReversed),
         0,
         "the motor's wires are exchanged",
         Step::Motor,
@@ -164,7 +164,7 @@ impl Planted {
     pub fn found_in(self, links: usize) -> Step {
         match self.what {
             // With one link, its plug can only be exchanged with the cart's.
-            What::Campaign(Kind::EncodersSwapped) if links == 1 => Step::Homing,
+            What::Campaign(Defect::EncodersSwapped) if links == 1 => Step::Homing,
             _ => self.row().4,
         }
     }
@@ -211,7 +211,7 @@ pub(super) struct Wires<'a> {
 
 impl<'a> Wires<'a> {
     pub(super) fn new(rig: &Rig, table: &'a TableValues, scenario: &Scenario, planted: Planted) -> Self {
-        let of_kind = |kind: Kind| {
+        let of_kind = |kind: Defect| {
             let trial = Trial::by_hand(kind, scenario, table.sensors(), planted.sensor, scenario.seed);
             Defective::new(rig, table, trial)
         };

@@ -1,6 +1,7 @@
 //! Margins along the motions of a swing-up, and the candidates of its search.
 
-use upright_design::swing_up::{Margin, Runs, Solved, Transition};
+use upright_design::motion::Transition;
+use upright_design::swing_up::{Margin, Runs, Solved};
 
 use super::{Axis, Curve, Figure, Panel};
 

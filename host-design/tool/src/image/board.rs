@@ -1,4 +1,4 @@
-//! The boards by name. Each is described in the firmware, in `src/board/f4/boards/`.
+//! The boards by name. Each is described in the firmware, in `src/image/board/f4/boards/`.
 
 use upright_board::{Chip, Conditions, Wiring};
 

@@ -9,7 +9,6 @@ mod forbidden;
 mod kept;
 mod size;
 mod stack;
-mod thumb;
 
 pub use board::{Board, NoBoard};
 pub use build::{ImageError, Kind, PROFILE, TARGET, build, build_for};

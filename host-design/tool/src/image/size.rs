@@ -2,10 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use addr2line::Context;
-use addr2line::gimli::{Dwarf, EndianSlice, LittleEndian, SectionId};
-use object::read::elf::ElfFile32;
-use object::{Object, ObjectSection};
+use upright_board::{Lines, LinesError};
 
 use super::elf::{Image, Item};
 
@@ -67,7 +64,7 @@ pub struct Part {
 /// Debug information that cannot be read.
 #[derive(Debug, thiserror::Error)]
 #[error("the image's debug information cannot be read: {0}")]
-pub struct SizeError(#[from] addr2line::gimli::Error);
+pub struct SizeError(#[from] LinesError);
 
 /// Measures an image.
 ///
@@ -121,23 +118,13 @@ pub fn size(image: &Image) -> Result<Size, SizeError> {
 
 /// Bytes of machine code by the crate of their source line.
 fn code_by_crate(image: &Image) -> Result<BTreeMap<String, u32>, SizeError> {
-    // `Image::read` has parsed these bytes before.
-    let elf = ElfFile32::<object::Endianness>::parse(&image.bytes[..]).ok();
-    let section = |id: SectionId| {
-        let found = elf.as_ref().and_then(|elf| elf.section_by_name(id.name()));
-        let data = found.and_then(|section| section.data().ok()).unwrap_or_default();
-        Ok::<_, addr2line::gimli::Error>(EndianSlice::new(data, LittleEndian))
-    };
-    let context = Context::from_dwarf(Dwarf::load(section)?)?;
+    let lines = Lines::of(&image.bytes)?;
     let mut crates = BTreeMap::new();
     for function in &image.functions {
-        let (begin, end) = (u64::from(function.address), u64::from(function.address + function.size));
         let mut located = 0;
-        for (address, length, location) in context.find_location_range(begin, end)? {
-            let (from, to) = (address.max(begin), (address + length).min(end));
-            let bytes = to.saturating_sub(from) as u32;
+        for (bytes, file) in lines.files(function.address..function.address + function.size)? {
             located += bytes;
-            *crates.entry(crate_of_file(location.file.unwrap_or_default())).or_default() += bytes;
+            *crates.entry(crate_of_file(file)).or_default() += bytes;
         }
         // Assembly, which has no lines.
         *crates.entry(crate_of_symbol(function)).or_default() += function.size.saturating_sub(located);

@@ -3,8 +3,9 @@
 //! It holds for every compiler and every input, because it takes every branch: a function costs the sum of everything
 //! it ever pushes, and every handler of the vector table is assumed to interrupt all others at their deepest point.
 
+use upright_board::{Effect, effect, is_wide};
+
 use super::elf::Image;
-use super::thumb::{Effect, decode, is_wide};
 
 /// Largest frame that the processor stacks at exception entry (bytes; Armv7-M Architecture Reference Manual, B1.5.7):
 /// 8 words, 18 of the floating-point unit, and one for alignment.
@@ -124,7 +125,7 @@ fn effects(image: &Image, index: usize) -> Vec<(u32, Effect)> {
         while let Some(&first) = code.halfwords.get(place) {
             let address = code.address + 2 * place as u32;
             let second = code.halfwords.get(place + 1).copied().unwrap_or_default();
-            effects.push((address, decode(address, first, second)));
+            effects.push((address, effect(address, first, second)));
             place += 1 + usize::from(is_wide(first));
         }
     }

@@ -3,7 +3,7 @@
 use ratatui::crossterm::event::{KeyCode, KeyEvent, KeyModifiers};
 use upright::protocol::message::Request;
 use upright::table::{Equilibrium, Law};
-use upright_design::swing_up::equilibrium_named;
+use upright_design::motion::equilibrium_named;
 
 /// What a key of the monitor does.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -55,7 +55,7 @@ pub fn action(key: &KeyEvent) -> Option<Action> {
 /// A line that is not a command.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error(
-    "`{0}` is no command; give home, home-rail, check-signs, drive +x|-x, arm, up, down, goto LINKS (as ud), disarm, clear, set-point METRES, or law lqr|pole-placement"
+    "`{0}` is no command; give home, home-rail, check-signs, jog +x|-x, arm, up, down, goto LINKS (as ud), disarm, clear, set-point METRES, or law lqr|pole-placement"
 )]
 pub struct BadCommand(String);
 
@@ -70,8 +70,8 @@ pub fn request(line: &str) -> Result<Request, BadCommand> {
         ["home"] => Request::Home,
         ["home-rail"] => Request::HomeRail,
         ["check-signs"] => Request::CheckSigns,
-        ["drive", "+x"] => Request::Jog { along: true },
-        ["drive", "-x"] => Request::Jog { along: false },
+        ["jog", "+x"] => Request::Jog { along: true },
+        ["jog", "-x"] => Request::Jog { along: false },
         ["arm"] => Request::Arm,
         ["up"] => Request::Goto(Equilibrium::UPRIGHT),
         ["down"] => Request::Goto(Equilibrium::HANGING),

@@ -12,8 +12,8 @@ use upright::supervision::fault::Cause;
 use upright::supervision::inhibits::Inhibits;
 use upright::supervision::supervisor::State;
 use upright::table::{Equilibrium, Law};
+use upright_design::motion::posture_name;
 use upright_design::plant::absolute_angles;
-use upright_design::swing_up::posture_name;
 
 use super::command::Action;
 use super::outgoing::{Outgoing, Unanswered};
@@ -338,8 +338,8 @@ fn name(request: Request, links: usize) -> String {
         Request::Home => "home".to_owned(),
         Request::HomeRail => "home on the rail's switches".to_owned(),
         Request::CheckSigns => "check signs".to_owned(),
-        Request::Jog { along: true } => "drive along +x".to_owned(),
-        Request::Jog { along: false } => "drive against +x".to_owned(),
+        Request::Jog { along: true } => "jog along +x".to_owned(),
+        Request::Jog { along: false } => "jog against +x".to_owned(),
         Request::Arm => "arm".to_owned(),
         Request::Goto(Equilibrium::UPRIGHT) => "up".to_owned(),
         Request::Goto(Equilibrium::HANGING) => "down".to_owned(),

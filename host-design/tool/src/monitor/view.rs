@@ -12,7 +12,7 @@ use upright::supervision::supervisor::State;
 use super::model::{Monitor, TelemetryOfAny};
 use super::words;
 
-const KEYS: &str = "h/H home (rail)  g check signs  m/M drive (held)  a arm  u up  n down  1…6 turn a link over  d/space disarm  c clear  ←→ 1 cm  0 zero  l law  r record  q quit";
+const KEYS: &str = "h/H home (rail)  g check signs  m/M jog (held)  a arm  u up  n down  1…6 turn a link over  d/space disarm  c clear  ←→ 1 cm  0 zero  l law  r record  q quit";
 const COLOURS: [Color; 6] =
     [Color::Cyan, Color::Yellow, Color::Magenta, Color::Green, Color::Blue, Color::Red];
 
@@ -108,7 +108,7 @@ fn header(monitor: &Monitor) -> Vec<Line<'_>> {
     lines.extend(monitor.crash.iter().map(|record| Line::from(words::crash(record))));
     lines.push(Line::from(words::inputs(telemetry)));
     lines.extend(words::instruction(telemetry).map(|what| Line::from(format!("now: {what}")).yellow()));
-    if !telemetry.state.drives() && !telemetry.arming_inhibits.is_empty() {
+    if !telemetry.state.motor_is_on() && !telemetry.arming_inhibits.is_empty() {
         lines.push(Line::from(format!("against arming: {}", telemetry.arming_inhibits)));
     }
     let against = telemetry.swing_up_inhibits;

@@ -23,8 +23,9 @@ use self::page::Page;
 pub(crate) use self::plot::Plot;
 use crate::figure::{Figure, FigureError, margins_figure, pixels};
 use upright_design::design::Certified;
+use upright_design::motion::Transition;
 use upright_design::rig::{PlantDescription, Rig};
-use upright_design::swing_up::{Demonstration, Margin, Transition};
+use upright_design::swing_up::{Demonstration, Margin};
 use upright_design::table::TableValues;
 use upright_design::verify::{Imperfections, TrustReport};
 

@@ -132,7 +132,7 @@ impl Desk {
     /// keep-alive of the firmware's own dead-man timer.
     fn watch(&mut self, now: Duration) {
         let state = self.monitor.telemetry.as_ref().map(|telemetry| telemetry.state);
-        let is_on = state.is_some_and(|state| state == State::Armed || state.drives());
+        let is_on = state.is_some_and(|state| state == State::Armed || state.motor_is_on());
         if !self.was_seen || !is_on {
             return;
         }

@@ -6,12 +6,12 @@ use upright_design::rig::{PlantDescription, Rig};
 use upright_design::table::TableValues;
 
 use super::property::Properties;
-use crate::campaign::Kind;
+use crate::campaign::Defect;
 use crate::figure::{CHROMATIC, curve_colour, curve_dash, limit_colour, reference_colour};
 use crate::monitor::words;
 
 /// The rig, its limits, and what can be done with it. `defects` are those that can begin; none if it is a real machine.
-pub(super) fn greeting(rig: &Rig, table: &TableValues, place: &str, defects: Option<&[Kind]>) -> Value {
+pub(super) fn greeting(rig: &Rig, table: &TableValues, place: &str, defects: Option<&[Defect]>) -> Value {
     let is_simulated = defects.is_some();
     let (lengths, travel) = match &rig.plant {
         PlantDescription::Chain(chain) => {
@@ -32,7 +32,7 @@ pub(super) fn greeting(rig: &Rig, table: &TableValues, place: &str, defects: Opt
         State::Lowering,
         State::Fault,
     ];
-    let defects = Kind::ALL.iter().filter(|row| defects.is_some_and(|defects| defects.contains(&row.0)));
+    let defects = Defect::ALL.iter().filter(|defect| defects.is_some_and(|defects| defects.contains(defect)));
     json!({
         "rig": rig.name,
         "place": place,
@@ -50,7 +50,7 @@ pub(super) fn greeting(rig: &Rig, table: &TableValues, place: &str, defects: Opt
         "states": states.map(|state| json!({ "state": state, "text": words::state(state) })),
         "properties": if is_simulated { json!(Properties::of(rig).described()) } else { json!([]) },
         "defects": defects
-            .map(|(kind, name, meaning, _)| json!({ "name": name, "meaning": meaning, "has_sensor": kind.has_sensor() }))
+            .map(|kind| json!({ "name": kind.name(), "meaning": kind.meaning(), "has_sensor": kind.has_sensor() }))
             .collect::<Vec<_>>(),
         "colours": (0..CHROMATIC).map(curve_colour).collect::<Vec<_>>(),
         "dashes": (0..CHROMATIC).map(curve_dash).collect::<Vec<_>>(),

@@ -111,8 +111,8 @@ mod tests {
     fn a_cart_that_the_motor_pushes_is_held_again_where_it_is() {
         let mut hand = Hand::new(4, 0.01);
         hand.take(Holding::Upright, &[0.2, 0.0, 0.0, 0.0]);
-        let driving = Status { state: State::Jogging, ..CALIBRATED };
-        assert_eq!(hand.tick(&driving, &[0.25, 0.3, 0.0, 0.1]), None);
+        let jogging = Status { state: State::Jogging, ..CALIBRATED };
+        assert_eq!(hand.tick(&jogging, &[0.25, 0.3, 0.0, 0.1]), None);
         assert_eq!(hand.tick(&CALIBRATED, &[0.3; 4]), Some([0.25, 0.0, 0.0, 0.0].as_slice()));
     }
 

@@ -16,7 +16,7 @@ use super::greeting::greeting;
 use super::property::Properties;
 use super::simulated::{Ended, Machine};
 use super::viewers::Viewers;
-use crate::campaign::{Kind, kinds};
+use crate::campaign::{Defect, kinds};
 use crate::in_the_loop::{EmulatorError, Place, RunError};
 use crate::monitor::{Line, Monitor};
 
@@ -93,7 +93,7 @@ impl Server {
         upright: bool,
         goes_on: &dyn Fn() -> bool,
     ) -> Result<(), TwinError> {
-        let defects: Vec<Kind> =
+        let defects: Vec<Defect> =
             kinds(table, place).into_iter().filter(|kind| kind.can_begin_while_balancing()).collect();
         let (viewers, inbox) = Viewers::new(greeting(rig, table, place.name(), Some(&defects)));
         let _accepting = accepting(self.listener, self.secret, viewers.clone(), Arc::clone(&self.recording))?;

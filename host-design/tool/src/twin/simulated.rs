@@ -19,7 +19,7 @@ use super::holding::Hand;
 use super::pace::Pace;
 use super::property::Properties;
 use super::request::{Holding, MachineRequest};
-use crate::campaign::{Defective, Kind, Trial};
+use crate::campaign::{Defect, Defective, Trial};
 
 /// A rig, its table, and how it is simulated.
 #[derive(Clone, Copy)]
@@ -209,7 +209,7 @@ impl<'a, 't> World<'a, 't> {
             self.defect = None;
             return;
         };
-        let Some(kind) = Kind::ALL.iter().map(|row| row.0).find(|kind| kind.name() == name) else {
+        let Some(&kind) = Defect::ALL.iter().find(|kind| kind.name() == name) else {
             return desk.monitor.note(format!("`{name}` is no defect"));
         };
         let Machine { rig, table, scenario } = self.machine;

@@ -5,7 +5,7 @@ use upright_board::{Conditions, Image};
 use upright_design::rig::Rig;
 use upright_design::study::Study;
 use upright_design::table::TableValues;
-use upright_tool::campaign::{Campaign, During, Kind, Setup, Trial, campaign, feed, kinds, one};
+use upright_tool::campaign::{Campaign, Defect, During, Setup, Trial, campaign, feed, kinds, one};
 use upright_tool::image::{self, Board};
 use upright_tool::in_the_loop::Place;
 
@@ -16,7 +16,7 @@ fn on_host<'a>(rig: &'a Rig, table: &'a TableValues) -> Setup<'a> {
     Setup { rig, table, place: Place::Host, detection: true, guards: true, during: During::Balancing }
 }
 
-fn run(setup: &Setup<'_>, kinds: &[Kind], runs: u64) -> Campaign {
+fn run(setup: &Setup<'_>, kinds: &[Defect], runs: u64) -> Campaign {
     campaign(setup, kinds, 3, runs, (&Study::whole(), ""), &|| ()).unwrap()
 }
 
@@ -35,7 +35,7 @@ fn every_defect_is_found_and_nothing_else() {
 #[test]
 fn without_detection_every_defect_that_needs_it_is_missed() {
     let (rig, table) = rig_and_table("quadruple-paper");
-    let kinds: Vec<Kind> =
+    let kinds: Vec<Defect> =
         kinds(table, Place::Host).into_iter().filter(|kind| kind.needs_detection()).collect();
     let blind = Setup { detection: false, ..on_host(rig, table) };
     let result = run(&blind, &kinds, 4 * kinds.len() as u64);
@@ -45,12 +45,12 @@ fn without_detection_every_defect_that_needs_it_is_missed() {
 }
 
 /// The kinds of defects that prove something during a jog.
-fn while_jogging(table: &TableValues, place: Place<'_>) -> Vec<Kind> {
+fn while_jogging(table: &TableValues, place: Place<'_>) -> Vec<Defect> {
     kinds(table, place).into_iter().filter(|kind| kind.while_jogging().is_some()).collect()
 }
 
 #[test]
-fn every_defect_of_a_bench_drive_is_found_and_nothing_else() {
+fn every_defect_of_a_jog_is_found_and_nothing_else() {
     for name in ["quadruple-paper", "single-quanser-ip02"] {
         let (rig, table) = rig_and_table(name);
         let kinds = while_jogging(table, Place::Host);
@@ -60,7 +60,7 @@ fn every_defect_of_a_bench_drive_is_found_and_nothing_else() {
             assert!(row.wrong.is_empty() && row.runs == 3, "{name}: {row:?}");
         }
         // Negative control: a firmware that does not check the motor's sign misses what is wrong with it.
-        let found: Vec<Kind> = kinds.into_iter().filter(|kind| kind.needs_detection()).collect();
+        let found: Vec<Defect> = kinds.into_iter().filter(|kind| kind.needs_detection()).collect();
         assert!(found.len() >= 4, "{found:?}");
         let blind = Setup { detection: false, ..setup };
         for row in run(&blind, &found, 2 * found.len() as u64).rows {
@@ -70,7 +70,7 @@ fn every_defect_of_a_bench_drive_is_found_and_nothing_else() {
 }
 
 #[test]
-fn on_the_virtual_board_a_bench_drive_ends_with_its_defects_and_does_not_without_the_guards() {
+fn on_the_virtual_board_a_jog_ends_with_its_defects_and_does_not_without_the_guards() {
     let (rig, table) = rig_and_table("quadruple-paper");
     let Some(elf) = built(image::Kind::Board(Board::WeactF405)) else { return };
     let image = Image::from_elf(&std::fs::read(elf).unwrap()).unwrap();
@@ -80,7 +80,7 @@ fn on_the_virtual_board_a_bench_drive_ends_with_its_defects_and_does_not_without
     for row in run(&setup, &kinds, kinds.len() as u64).rows {
         assert!(row.wrong.is_empty() && row.runs == 1, "{row:?}");
     }
-    let guarded: Vec<Kind> = kinds.into_iter().filter(|kind| kind.needs_guard()).collect();
+    let guarded: Vec<Defect> = kinds.into_iter().filter(|kind| kind.needs_guard()).collect();
     assert!(guarded.len() >= 4, "{guarded:?}");
     let unguarded = Setup { guards: false, ..setup };
     for row in run(&unguarded, &guarded, guarded.len() as u64).rows {
@@ -95,13 +95,13 @@ fn every_defect_of_a_rig_that_is_shaken_is_found_and_nothing_else() {
         let forces = feed(rig, table, 3).unwrap();
         let during = During::Shaking(&forces);
         let setup = Setup { during, ..on_host(rig, table) };
-        let kinds: Vec<Kind> =
+        let kinds: Vec<Defect> =
             kinds(table, Place::Host).into_iter().filter(|&kind| during.is_proof(kind)).collect();
         for row in &run(&setup, &kinds, 2 * kinds.len() as u64).rows {
             assert!(row.wrong.is_empty() && row.runs == 2, "{name}: {row:?}");
         }
         // Negative control: a firmware without limits misses what runs away and what stands still.
-        let found: Vec<Kind> = kinds.into_iter().filter(|&kind| during.needs_detection(kind)).collect();
+        let found: Vec<Defect> = kinds.into_iter().filter(|&kind| during.needs_detection(kind)).collect();
         assert!(found.len() >= 4, "{found:?}");
         let blind = Setup { detection: false, ..setup };
         for row in run(&blind, &found, 2 * found.len() as u64).rows {
@@ -114,7 +114,7 @@ fn every_defect_of_a_rig_that_is_shaken_is_found_and_nothing_else() {
 fn a_trial_is_the_same_every_time_and_does_not_depend_on_the_others() {
     let (rig, table) = rig_and_table("quadruple-paper");
     let setup = on_host(rig, table);
-    let kinds = [Kind::Overruns, Kind::MotorReversed, Kind::EncoderJump];
+    let kinds = [Defect::Overruns, Defect::MotorReversed, Defect::EncoderJump];
     let alone = |number| one(&setup, &kinds, 5, number).unwrap();
     // Alone, in any order, and as part of a campaign, whose rows summarise its trials.
     let backwards: Vec<_> = (0..6).rev().map(alone).collect();

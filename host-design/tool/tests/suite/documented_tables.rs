@@ -6,7 +6,7 @@ use std::process::Command;
 use ratatui::crossterm::event::{KeyCode, KeyEvent, KeyModifiers};
 use upright::supervision::fault::Fault;
 use upright::supervision::inhibits::Inhibits;
-use upright_tool::campaign::Kind;
+use upright_tool::campaign::Defect;
 use upright_tool::commission::{Planted, Step};
 use upright_tool::image::{
     FLASH_LIMIT, FLASH_LIMIT_FOR_IDENTIFICATION, FLASH_LIMIT_WITH_MOTIONS, RAM_LIMIT,
@@ -73,7 +73,7 @@ fn inhibits() -> String {
 }
 
 fn defects() -> String {
-    let rows = Kind::ALL.iter().map(|(_, name, what, _)| format!("| `{name}` | {what} |\n"));
+    let rows = Defect::ALL.iter().map(|defect| format!("| `{}` | {} |\n", defect.name(), defect.meaning()));
     "| kind | defect |\n|---|---|\n".to_owned() + &rows.collect::<String>()
 }
 

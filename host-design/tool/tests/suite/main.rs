@@ -21,8 +21,7 @@ mod lossy_line;
 mod monitor;
 mod observer_design;
 mod paper;
-#[path = "../../../design/tests/suite/published/mod.rs"]
-mod published;
+mod paper_matrices;
 mod report_browser;
 mod report_command;
 mod report_devtools;
@@ -32,6 +31,7 @@ mod report_rigs;
 mod reproduce_numbers;
 mod reproduced;
 mod robust_command;
+mod serial_errors;
 mod shaken;
 mod split_command;
 mod transitions_command;
@@ -39,3 +39,5 @@ mod twin_door;
 mod twin_page;
 mod verify_command;
 mod virtual_board;
+
+use upright_test_support::published;

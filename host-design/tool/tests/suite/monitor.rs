@@ -128,7 +128,7 @@ fn press(monitor: &mut Monitor, code: KeyCode) -> Vec<Request> {
 }
 
 #[test]
-fn a_held_key_sends_the_drive_again_and_tells_a_refusal_once() {
+fn a_held_key_sends_the_jog_again_and_tells_a_refusal_once() {
     let mut monitor = met(PROTOCOL);
     told(&mut monitor, telemetry(1, State::Calibrated, None));
     answer_all(&mut monitor);
@@ -146,7 +146,7 @@ fn a_held_key_sends_the_drive_again_and_tells_a_refusal_once() {
         let id = asked(&mut monitor).last().unwrap().id;
         answer(&mut monitor, id, Answer::NotNow(reasons));
     }
-    let refused = monitor.log.iter().filter(|line| line.contains("drive along +x: refused")).count();
+    let refused = monitor.log.iter().filter(|line| line.contains("jog along +x: refused")).count();
     assert_eq!(refused, 1, "{:?}", monitor.log);
     for (motor, what) in [(MotorSign::Reversed, "wrong way"), (MotorSign::Still, "not moved the cart")] {
         told(&mut monitor, Telemetry { motor, ..telemetry(2, State::Calibrated, None) });

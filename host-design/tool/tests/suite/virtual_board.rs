@@ -14,7 +14,7 @@ use upright_design::rig::{Integral, Rig};
 use upright_design::simulate::Scenario;
 use upright_design::swing_up::{hangs, up_and_down};
 use upright_design::table::{Gains, TableValues};
-use upright_tool::campaign::{Class, During, Kind as Defect, Setup, one};
+use upright_tool::campaign::{Class, Defect, During, Setup, one};
 use upright_tool::image::{Board, Kind, build};
 use upright_tool::in_the_loop::{Place, VirtualBoard, measure, run_compared};
 
@@ -79,7 +79,7 @@ fn a_stopped_run_names_address_and_source_line() {
     let (_, table) = rig_and_table("quadruple-paper");
     let conditions = Conditions { chip_v: 2.5, ..Conditions::f405(1) };
     let error = VirtualBoard::start(&image, &conditions, table).err().unwrap().to_string();
-    for part in ["at program counter 0x0800", "wait states", "src/board/f4/clock.rs:"] {
+    for part in ["at program counter 0x0800", "wait states", "src/image/board/f4/clock.rs:"] {
         assert!(error.contains(part), "{part}: {error}");
     }
     // Negative control: without debug information there is no line.

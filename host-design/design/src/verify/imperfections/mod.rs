@@ -7,7 +7,8 @@ use std::collections::BTreeMap;
 use serde::Serialize;
 use upright::table::Law;
 
-use super::trial::{Disturbance, Horizon, Outcome, Unverifiable, chain, scenario, trial, within};
+use super::error::{Unverifiable, chain, within};
+use super::trial::{Disturbance, Horizon, Outcome, scenario, trial};
 use crate::number::significant;
 use crate::parallel;
 use crate::rig::{Reality, Rig};

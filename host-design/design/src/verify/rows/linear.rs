@@ -1,7 +1,7 @@
 //! Rows from the linear model of the loop.
 
-use super::Values::{Each, One};
-use super::{Quantity, force, is_chain, number};
+use super::quantity::Values::{Each, One};
+use super::quantity::{Quantity, force, is_chain, number};
 use crate::rig::Rig;
 use crate::verify::{LawTrust, Margins, NoiseShare};
 
@@ -107,7 +107,15 @@ pub(super) const QUANTITIES: &[Quantity] = &[
                   the motor: trust this row more",
         values: One(|rig, law| {
             let run = law.noise_run.as_ref()?;
-            Some(ripple(rig, run.force_rms_n, &run.state_rms))
+            let fallen = run.seeds - run.survived;
+            Some(match &run.ripple {
+                None => format!("all {fallen} runs fall"),
+                Some(found) => {
+                    let others =
+                        if fallen > 0 { format!("; {fallen} further runs fall") } else { String::new() };
+                    format!("{}{others}", ripple(rig, found.force_rms_n, &found.state_rms))
+                }
+            })
         }),
     },
 ];

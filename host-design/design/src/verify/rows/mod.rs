@@ -2,30 +2,14 @@
 //! documentation with their names and meanings.
 
 mod linear;
+mod quantity;
 mod runs;
 
+pub use quantity::Quantity;
+use quantity::Values;
+
 use super::LawTrust;
-use crate::number::significant;
-use crate::rig::{PlantDescription, Rig};
-
-/// One quantity of the trust report.
-#[derive(Debug, Clone, Copy)]
-pub struct Quantity {
-    /// Name of its row, or beginning of the names of its rows.
-    pub name: &'static str,
-    /// What the value means.
-    pub meaning: &'static str,
-    values: Values,
-}
-
-/// Function that makes the text of the values.
-#[derive(Debug, Clone, Copy)]
-enum Values {
-    /// One row; none where the report does not have it.
-    One(fn(&Rig, &LawTrust) -> Option<String>),
-    /// A row for each link or source, whose name follows that of the quantity.
-    Each(fn(&Rig, &LawTrust) -> Vec<(String, String)>),
-}
+use crate::rig::Rig;
 
 /// One row of the trust report.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -58,25 +42,4 @@ pub fn rows(rig: &Rig, law: &LawTrust) -> Vec<Row> {
         })
     };
     quantities().flat_map(rows_of).collect()
-}
-
-/// Three significant digits.
-fn number(x: f64) -> String {
-    significant(x, 3)
-}
-
-/// Whether lengths, angles and forces have the units of a chain; a model has units of its own.
-fn is_chain(rig: &Rig) -> bool {
-    matches!(rig.plant, PlantDescription::Chain(_))
-}
-
-/// A force, or the input of a model, with its unit.
-fn force(rig: &Rig, force_n: f64) -> String {
-    let unit = if is_chain(rig) { " N" } else { "" };
-    format!("{}{unit}", number(force_n))
-}
-
-/// Signs of a combination, such as `+-+-`.
-fn signs(signs: &[i8]) -> String {
-    signs.iter().map(|&sign| if sign > 0 { '+' } else { '-' }).collect()
 }

@@ -1,7 +1,7 @@
 //! Rows from runs against the nonlinear plant.
 
-use super::Values::{Each, One};
-use super::{Quantity, force, is_chain, number, signs};
+use super::quantity::Values::{Each, One};
+use super::quantity::{Quantity, force, is_chain, number, signs};
 use crate::verify::LawTrust;
 
 pub(super) const QUANTITIES: &[Quantity] = &[

@@ -7,7 +7,7 @@ use serde_json::json;
 use upright_design::rig::Rig;
 use upright_design::study::Study;
 use upright_design::swing_up::SwingUpError;
-use upright_tool::campaign::{Campaign, During, Kind, Row, Setup, campaign, feed, kinds, one};
+use upright_tool::campaign::{Campaign, Defect, During, Row, Setup, campaign, feed, kinds, one};
 use upright_tool::in_the_loop::{Link, Place};
 
 use crate::failure::Failure;
@@ -58,7 +58,7 @@ pub(crate) struct Faults {
     runs: u64,
     /// Only defects of this kind
     #[arg(long, value_parser = kind)]
-    kind: Option<Kind>,
+    kind: Option<Defect>,
     /// Only the run with this number
     #[arg(long, value_name = "NUMBER", conflicts_with_all = ["shard", "merge"])]
     only: Option<u64>,
@@ -72,13 +72,10 @@ pub(crate) struct Faults {
 /// Runs of each kind in the negative control without detection.
 const CONTROL_RUNS: u64 = 12;
 
-fn kind(name: &str) -> Result<Kind, String> {
-    let known = || Kind::ALL.map(|(_, name, ..)| name).join(", ");
-    Kind::ALL
-        .iter()
-        .find(|(_, known, ..)| *known == name)
-        .map(|(kind, ..)| *kind)
-        .ok_or_else(|| format!("known kinds: {}", known()))
+fn kind(name: &str) -> Result<Defect, String> {
+    let known = || Defect::ALL.iter().map(|kind| kind.name()).collect::<Vec<_>>().join(", ");
+    let found = Defect::ALL.iter().find(|kind| kind.name() == name);
+    found.copied().ok_or_else(|| format!("known kinds: {}", known()))
 }
 
 impl Faults {
@@ -105,7 +102,7 @@ impl Faults {
             None => During::Balancing,
         };
         possible.retain(|&kind| during.is_proof(kind));
-        let chosen: Vec<Kind> = match self.kind {
+        let chosen: Vec<Defect> = match self.kind {
             Some(kind) if possible.contains(&kind) => vec![kind],
             Some(kind) => {
                 return Err(Failure::BadArgument(format!(
@@ -143,10 +140,10 @@ impl Faults {
     fn control(
         &self,
         setup: &Setup<'_>,
-        chosen: &[Kind],
+        chosen: &[Defect],
         study: &Study,
     ) -> Result<Option<Campaign>, Failure> {
-        let chosen: Vec<Kind> =
+        let chosen: Vec<Defect> =
             chosen.iter().copied().filter(|&kind| setup.during.needs_detection(kind)).collect();
         if chosen.is_empty() {
             return Ok(None);
@@ -163,10 +160,10 @@ impl Faults {
     fn unguarded(
         &self,
         setup: &Setup<'_>,
-        chosen: &[Kind],
+        chosen: &[Defect],
         study: &Study,
     ) -> Result<Option<Campaign>, Failure> {
-        let chosen: Vec<Kind> = chosen.iter().copied().filter(|kind| kind.needs_guard()).collect();
+        let chosen: Vec<Defect> = chosen.iter().copied().filter(|kind| kind.needs_guard()).collect();
         if self.target != Target::Board || chosen.is_empty() {
             return Ok(None);
         }
@@ -197,7 +194,7 @@ impl Faults {
         }
     }
 
-    fn replay(&self, setup: &Setup<'_>, kinds: &[Kind], number: u64) -> Result<(), Failure> {
+    fn replay(&self, setup: &Setup<'_>, kinds: &[Defect], number: u64) -> Result<(), Failure> {
         let outcome = one(setup, kinds, self.seed, number)?;
         writeln!(std::io::stdout(), "{}", serde_json::to_string(&outcome).map_err(std::io::Error::from)?)?;
         Ok(())

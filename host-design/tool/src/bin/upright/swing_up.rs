@@ -6,11 +6,12 @@ use std::path::PathBuf;
 
 use clap::Args;
 use serde_json::json;
+use upright_design::motion::Transition;
 use upright_design::rig::{PlantDescription, Rig};
 use upright_design::study::Study;
 use upright_design::swing_up::{
-    Condition, FirmwareRuns, Judgement, Margin, Plan, Script, Solved, Stored, SwingUpError, Transition,
-    designed_table, firmware_runs, judge, margins, motions, refined, search, solved,
+    Condition, FirmwareRuns, Judgement, Margin, Plan, Script, Solved, Stored, SwingUpError, designed_table,
+    firmware_runs, judge, margins, motions, refined, search, solved,
 };
 use upright_design::table::{TableValues, write_atomically};
 use upright_tool::figure::{Figure, margins_figure, run_svg, stroboscope_svg, trade_figure};

@@ -6,11 +6,12 @@ use std::path::PathBuf;
 
 use clap::Args;
 use serde_json::json;
+use upright_design::motion::{RaiseAndLower, Transition};
 use upright_design::rig::Rig;
 use upright_design::study::Study;
 use upright_design::swing_up::{
-    PlannedTransition, Route, RouteRuns, Searched, Stored, StoredTransitions, SwingUp, SwingUpError,
-    Transition, TransitionRuns, designed_table_with, motions, on_route, route_runs,
+    PlannedTransition, Route, RouteRuns, Searched, Stored, StoredTransitions, SwingUpError, TransitionRuns,
+    designed_table_with, motions, on_route, route_runs,
 };
 use upright_design::table::write_atomically;
 
@@ -127,7 +128,7 @@ impl Transitions {
     fn route_runs(
         &self,
         rig: &Rig,
-        swing_up: &SwingUp,
+        swing_up: &RaiseAndLower,
         all: Vec<PlannedTransition>,
     ) -> Result<Judged, Failure> {
         let failed = |source| failed(rig, source);
@@ -150,7 +151,7 @@ impl Transitions {
     fn judge(
         &self,
         rig: &Rig,
-        swing_up: &SwingUp,
+        swing_up: &RaiseAndLower,
         stored: &mut StoredTransitions,
     ) -> Result<Judged, Failure> {
         let links = rig.states() / 2 - 1;
@@ -225,7 +226,12 @@ fn searched_line(searched: &Searched, tried: u64, links: usize) -> String {
 }
 
 /// The motions of the route as a table.
-fn text(rig: &Rig, swing_up: &SwingUp, transitions: &[PlannedTransition], runs: &[TransitionRuns]) -> String {
+fn text(
+    rig: &Rig,
+    swing_up: &RaiseAndLower,
+    transitions: &[PlannedTransition],
+    runs: &[TransitionRuns],
+) -> String {
     let links = rig.states() / 2 - 1;
     let mut text = format!("{}, one motion after the other\n", rig.name);
     // Writing into a string cannot fail.

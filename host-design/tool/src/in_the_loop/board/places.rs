@@ -39,7 +39,7 @@ fn part_of(path: &str) -> Option<Part> {
         Some(Part::Inputs)
     } else if is("Hardware", &["::drive"]) {
         Some(Part::Output)
-    } else if is("firmware::Firmware", &["::accept", "::drive"]) {
+    } else if is("firmware::Firmware", &["::accept", "::act"]) {
         Some(Part::Control)
     } else if is("firmware::Firmware", &["::report", "::predict", "::complete"])
         || path.contains("protocol::queue")

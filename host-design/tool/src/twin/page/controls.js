@@ -7,7 +7,7 @@ const KEYS = {
   h: 'home', H: 'home-rail', g: 'check-signs', a: 'arm', d: 'disarm', c: 'clear', w: 'up', s: 'down',
 };
 // Keys that work while they are held.
-const HELD = { m: 'drive +x', M: 'drive -x' };
+const HELD = { m: 'jog +x', M: 'jog -x' };
 // Time between two commands of a held key (ms): after 100 ms without one, the firmware takes the key as released.
 const REPEAT_MS = 25;
 const HOLDS = { f: 'free', j: 'hanging', k: 'guided', u: 'upright' };

@@ -5,8 +5,9 @@ use std::sync::LazyLock;
 
 use upright::table::Law;
 use upright_design::design::design;
+use upright_design::motion::Transition;
 use upright_design::rig::Rig;
-use upright_design::swing_up::{Margin, Transition};
+use upright_design::swing_up::Margin;
 use upright_design::table::{Gains, TableValues};
 use upright_design::verify::{ImperfectionSettings, LawTrust, TrustReport, imperfections, linear};
 use upright_tool::report::{REGION_POINTS, Report, Source, report};

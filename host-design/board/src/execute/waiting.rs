@@ -15,26 +15,6 @@ type Skip = (u64, Option<(usize, u32)>);
 /// Longest loop that is considered (instructions).
 const LONGEST: u64 = 32;
 
-/// The last iteration of a loop.
-#[derive(Debug, Clone, Default)]
-pub(crate) struct Watch {
-    head: u32,
-    since: Option<(Box<Registers>, Time, u64)>,
-    turn: Option<(Time, u64)>,
-    stored: bool,
-}
-
-impl Watch {
-    pub(crate) fn forget(&mut self) {
-        self.head = 0;
-    }
-
-    #[inline]
-    pub(crate) fn stored(&mut self) {
-        self.stored = true;
-    }
-}
-
 impl Machine {
     /// Called after a backward branch, with the program counter at the loop's head.
     pub(crate) fn skip_waiting(&mut self, end: Time) {

@@ -32,7 +32,7 @@ pub struct Motion {
 
 /// Both motions of a rig.
 #[derive(Debug, Clone, PartialEq)]
-pub struct SwingUp {
+pub struct RaiseAndLower {
     /// From hanging at rest, cart at 0, to upright at rest, cart at 0. Its gains minimise the sampled cost of
     /// `[lqr]` with the stationary solution at the end, so K approaches the gain that balances: the hand-over changes
     /// an index, not the law.

@@ -1,9 +1,9 @@
 //! Entry to and return from exceptions, faults and their escalation (ARMv7-M Architecture Reference Manual, B1.5).
 
-use super::nvic;
 use crate::error::{Fault, Trap, Violation};
 use crate::instruction::Unit;
 use crate::machine::Machine;
+use crate::processor::nvic;
 
 /// Cycles of exception entry and return without contention (TRM, 3.9.1).
 const ENTRY_CYCLES: u32 = 12;

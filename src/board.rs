@@ -1,8 +1,8 @@
 //! The board, as the firmware sees it: inputs, output and the trait [`Board`], the boundary between firmware and
 //! hardware.
 //!
-//! To use your own board, implement [`Board`] in your own crate. The boards of this project are not in this library
-//! but in the image: `hardware.rs` beside this file selects one of the folders `f4` and `in_the_loop`.
+//! To use your own board, implement [`Board`] in your own crate. The boards of this project are part of the image
+//! (`src/image/board/`), not of this library.
 
 use serde::{Deserialize, Serialize};
 

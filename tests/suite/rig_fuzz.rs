@@ -2,18 +2,14 @@
 
 use std::path::Path;
 
-use check::check;
 use proptest::prelude::*;
 use upright_design::rig::Rig;
-
-/// The same check that the fuzzer runs.
-#[path = "../../../../fuzz/checks/rig.rs"]
-mod check;
+use upright_fuzz_checks::rig::check;
 
 const SEEDS: [&str; 4] = [
-    include_str!("../../../../rigs/quadruple-paper.toml"),
-    include_str!("../../../../rigs/single-quanser-ip02.toml"),
-    include_str!("../../../../rigs/double-quanser-dbpen.toml"),
+    include_str!("../../rigs/quadruple-paper.toml"),
+    include_str!("../../rigs/single-quanser-ip02.toml"),
+    include_str!("../../rigs/double-quanser-dbpen.toml"),
     "name = \"m\"\n[model]\na = [[0, 1], [2, 0]]\nb = [0, 1]\nmeasured = [0]\nmeasured_steps = [1e-3]\n\
      [pole_placement]\npoles = [[-1, 2], [-1, -2]]\n[kalman]\nforce_noise_n2_s = 1\n",
 ];

@@ -1,30 +1,27 @@
 //! The rig files of the repository, with their designs, tables and motions, each made once for all tests.
 
-// Each test program uses only some of these.
-#![allow(dead_code)]
-
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, OnceLock};
 
 use upright_design::design::{Certified, design};
+use upright_design::motion::RaiseAndLower;
 use upright_design::rig::Rig;
-use upright_design::swing_up::{Stored, SwingUp, motions, with_motions};
+use upright_design::swing_up::{Stored, motions, with_motions};
 use upright_design::table::{Gains, TableValues};
 
 /// Path of the rig file `name`.
-pub(crate) fn rig_path(name: &str) -> PathBuf {
-    let mut folders = Path::new(env!("CARGO_MANIFEST_DIR")).ancestors().map(|folder| folder.join("rigs"));
-    folders.find(|rigs| rigs.is_dir()).unwrap().join(name).with_extension("toml")
+pub fn rig_path(name: &str) -> PathBuf {
+    crate::repository().join("rigs").join(name).with_extension("toml")
 }
 
 /// The rig in file `name`.
-pub(crate) fn rig(name: &str) -> Rig {
+pub fn rig(name: &str) -> Rig {
     Rig::from_path(&rig_path(name)).unwrap()
 }
 
 /// The design of the rig in file `name`.
-pub(crate) fn designed(name: &str) -> &'static Certified {
+pub fn designed(name: &str) -> &'static Certified {
     certified(&rig(name))
 }
 
@@ -38,20 +35,20 @@ fn once<K: Ord, T>(known: &Once<K, T>, key: K, make: impl FnOnce() -> T) -> &'st
 }
 
 /// The design of `rig`, made once for all tests. Every value of a rig is in its hash.
-pub(crate) fn certified(rig: &Rig) -> &'static Certified {
+pub fn certified(rig: &Rig) -> &'static Certified {
     static DESIGNS: Once<u64, Certified> = Mutex::new(BTreeMap::new());
     once(&DESIGNS, rig.hash(), || design(rig).unwrap_or_else(|error| panic!("{}: {error}", rig.name)))
 }
 
 /// The stored motions of the rig in file `name`, restored once for all tests.
-pub(crate) fn stored_motions(name: &'static str) -> &'static SwingUp {
-    static RESTORED: Once<&str, SwingUp> = Mutex::new(BTreeMap::new());
+pub fn stored_motions(name: &'static str) -> &'static RaiseAndLower {
+    static RESTORED: Once<&str, RaiseAndLower> = Mutex::new(BTreeMap::new());
     let restore = || motions(&rig(name), &Stored::beside(&rig_path(name)).unwrap());
     once(&RESTORED, name, || restore().unwrap_or_else(|error| panic!("{name}: {error}")))
 }
 
 /// The rig in file `name` with its gain table, made once for all tests.
-pub(crate) fn rig_and_table(name: &'static str) -> &'static (Rig, TableValues) {
+pub fn rig_and_table(name: &'static str) -> &'static (Rig, TableValues) {
     static ALL: Once<&str, (Rig, TableValues)> = Mutex::new(BTreeMap::new());
     once(&ALL, name, || {
         let rig = rig(name);
@@ -61,7 +58,7 @@ pub(crate) fn rig_and_table(name: &'static str) -> &'static (Rig, TableValues) {
 }
 
 /// As [`rig_and_table`], with the stored motions in the table.
-pub(crate) fn rig_and_table_with_motions(name: &'static str) -> &'static (Rig, TableValues) {
+pub fn rig_and_table_with_motions(name: &'static str) -> &'static (Rig, TableValues) {
     static ALL: Once<&str, (Rig, TableValues)> = Mutex::new(BTreeMap::new());
     once(&ALL, name, || {
         let (rig, table) = rig_and_table(name).clone();
@@ -71,11 +68,11 @@ pub(crate) fn rig_and_table_with_motions(name: &'static str) -> &'static (Rig, T
 }
 
 /// The gain table of `rig`.
-pub(crate) fn table(rig: &Rig) -> TableValues {
+pub fn table(rig: &Rig) -> TableValues {
     TableValues::of(rig, certified(rig), Gains::Sampled).unwrap()
 }
 
 /// A rig from text.
-pub(crate) fn rig_of(text: &str) -> Rig {
+pub fn rig_of(text: &str) -> Rig {
     Rig::from_toml(text, Path::new("rig.toml")).unwrap_or_else(|error| panic!("{error}"))
 }

@@ -11,7 +11,6 @@
 #![no_std]
 #![no_main]
 
-#[path = "board/hardware.rs"]
 mod board;
 
 // The registers of the board's chip.
@@ -77,7 +76,7 @@ mod app {
 
     #[task(binds = SysTick, priority = 3, local = [control])]
     fn tick(cx: tick::Context) {
-        cx.local.control.tick_with(hot_path::drive, hot_path::predict);
+        cx.local.control.tick_with(hot_path::act, hot_path::predict);
     }
 
     #[idle(local = [link, line])]

@@ -37,11 +37,14 @@ const RECEIVE: usize = if NUMBER == 2 { 5 } else { 1 };
 const SEND: usize = if NUMBER == 2 { 6 } else { 3 };
 /// Channel 4, with the memory address incremented.
 const BYTES_OF_USART: u32 = 4 << 25 | 1 << 10;
+/// The flags of stream 5 in HIFCR, or of stream 1 in LIFCR (10.5.3, 10.5.4).
+const RECEIVE_FLAGS: u32 = 0x3d << 6;
 /// The flags of stream 6 in HIFCR, or of stream 3 in LIFCR (10.5.3, 10.5.4).
 const SEND_FLAGS: u32 = if NUMBER == 2 { 0x3d << 16 } else { 0x3d << 22 };
 
 /// Both directions of the line.
 pub(crate) struct SerialLine {
+    usart: &'static usart1::RegisterBlock,
     dma: DMA1,
     buffer: &'static mut Buffer,
     /// The next received byte to read.
@@ -54,14 +57,11 @@ pub(super) fn set_up(dma: DMA1, clock: u32, buffer: &'static mut Buffer) -> Seri
     // SAFETY: the registers of this USART, which nothing else uses.
     let usart = unsafe { &*registers };
     let data = registers as u32 + 4;
-    let receive = dma.st(RECEIVE);
     // SAFETY, here and below: values of the fields of RM0090, 10.5, and addresses of memory that is only the DMA
     // controller's and this module's.
+    let receive = dma.st(RECEIVE);
     receive.par().write(|w| unsafe { w.bits(data) });
     receive.m0ar().write(|w| unsafe { w.bits(buffer.received.get() as u32) });
-    receive.ndtr().write(|w| unsafe { w.bits(RECEIVED as u32) });
-    // Circular, from the peripheral.
-    receive.cr().write(|w| unsafe { w.bits(BYTES_OF_USART | 1 << 8 | 1) });
     let send = dma.st(SEND);
     send.par().write(|w| unsafe { w.bits(data) });
     send.m0ar().write(|w| unsafe { w.bits(buffer.sent.get() as u32) });
@@ -70,14 +70,42 @@ pub(super) fn set_up(dma: DMA1, clock: u32, buffer: &'static mut Buffer) -> Seri
     usart.brr().write(|w| unsafe { w.bits(((clock + BAUD / 2) / BAUD) as u16) });
     usart.cr3().write(|w| w.dmar().set_bit().dmat().set_bit());
     usart.cr1().write(|w| w.ue().set_bit().te().set_bit().re().set_bit());
-    SerialLine { dma, buffer, next: 0 }
+    let mut line = SerialLine { usart, dma, buffer, next: 0 };
+    line.start_receiving();
+    line
 }
 
 impl SerialLine {
+    /// Starts the stream that receives, at the beginning of the buffer.
+    fn start_receiving(&mut self) {
+        self.next = 0;
+        clear(&self.dma, RECEIVE, RECEIVE_FLAGS);
+        let receive = self.dma.st(RECEIVE);
+        // SAFETY: values of the fields of RM0090, 10.5; circular, from the peripheral.
+        unsafe {
+            receive.ndtr().write(|w| w.bits(RECEIVED as u32));
+            receive.cr().write(|w| w.bits(BYTES_OF_USART | 1 << 8 | 1));
+        }
+    }
+
+    /// Receives again after an overrun or a transfer error, each of which ends reception. A frame that was on its way
+    /// is lost; the host repeats it.
+    fn recover(&mut self) {
+        if self.usart.sr().read().ore().bit_is_set() {
+            // The status and then the data register read: that clears the overrun (30.6.1).
+            let _ = self.usart.dr().read().bits();
+        }
+        // An error turns the stream off (10.3.18).
+        if self.dma.st(RECEIVE).cr().read().bits() & 1 == 0 {
+            self.start_receiving();
+        }
+    }
+
     /// The next byte from the host, if any.
     pub(crate) fn read(&mut self) -> Option<u8> {
         let left = self.dma.st(RECEIVE).ndtr().read().bits() as usize;
         if self.next == RECEIVED.wrapping_sub(left) % RECEIVED {
+            self.recover();
             return None;
         }
         // SAFETY: within the buffer; the DMA controller writes whole bytes.
@@ -100,17 +128,25 @@ impl SerialLine {
         }
         // The DMA controller must not read before the bytes are in memory.
         cortex_m::asm::dmb();
+        clear(&self.dma, SEND, SEND_FLAGS);
         let send = self.dma.st(SEND);
         // SAFETY: values of the fields of RM0090, 10.5; the stream is off.
         unsafe {
-            if NUMBER == 2 {
-                self.dma.hifcr().write(|w| w.bits(SEND_FLAGS));
-            } else {
-                self.dma.lifcr().write(|w| w.bits(SEND_FLAGS));
-            }
             send.ndtr().write(|w| w.bits(length as u32));
             // To the peripheral.
             send.cr().write(|w| w.bits(BYTES_OF_USART | 1 << 6 | 1));
+        }
+    }
+}
+
+/// Clears these flags of a stream.
+fn clear(dma: &DMA1, stream: usize, flags: u32) {
+    // SAFETY: any combination of flags may be cleared (RM0090, 10.5.3, 10.5.4).
+    unsafe {
+        if stream >= 4 {
+            dma.hifcr().write(|w| w.bits(flags));
+        } else {
+            dma.lifcr().write(|w| w.bits(flags));
         }
     }
 }

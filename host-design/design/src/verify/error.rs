@@ -1,0 +1,81 @@
+//! What a trust report cannot say, and why.
+
+use crate::design::DesignError;
+use crate::rig::{Chain, PlantDescription, Rig};
+use crate::simulate::SimulationError;
+use crate::study::StudyError;
+use crate::table::NoTable;
+
+/// Why a report cannot be made.
+#[derive(Debug, thiserror::Error)]
+pub enum VerifyError {
+    /// The eigenvalue iteration failed.
+    #[error("the poles of the loop could not be computed")]
+    Poles,
+    /// The noise grows without bound.
+    #[error("the loop is so close to instability that its noise has no computable steady state")]
+    NoStationaryState,
+    /// The design could not be repeated.
+    #[error(transparent)]
+    Design(#[from] DesignError),
+    /// The standard run could not be made.
+    #[error(transparent)]
+    Simulation(#[from] SimulationError),
+    /// Some runs could not be made.
+    #[error(transparent)]
+    Runs(#[from] Unverifiable),
+}
+
+/// A quantity that cannot be computed for this rig.
+#[derive(Debug, thiserror::Error)]
+pub enum Unverifiable {
+    /// The runs cannot be started.
+    #[error(transparent)]
+    Simulation(#[from] SimulationError),
+    /// A changed rig, for which the gains have to be redesigned, has no design.
+    #[error(transparent)]
+    Design(#[from] DesignError),
+    /// No gain table can be made for a changed rig.
+    #[error(transparent)]
+    NoTable(#[from] NoTable),
+    /// The firmware does not run.
+    #[error("the firmware does not run: {0}")]
+    Firmware(String),
+    /// The runs of another process cannot be used.
+    #[error(transparent)]
+    Study(#[from] StudyError),
+    /// Masses, angles and encoders of a `[model]` are not known.
+    #[error("a rig given by [model] has no {0}: describe it by [cart] and [[link]]")]
+    NotAChain(&'static str),
+    /// The controller does not run from encoders.
+    #[error("the rig has no observer: give it its encoders and [kalman]")]
+    NoObserver,
+    /// An invalid setting.
+    #[error("{what} = {value}: give {accepts}")]
+    Setting {
+        /// Name of the setting.
+        what: &'static str,
+        /// Its value.
+        value: f64,
+        /// The accepted values.
+        accepts: &'static str,
+    },
+}
+
+/// The chain of a rig that has one.
+pub(crate) fn chain<'a>(rig: &'a Rig, what: &'static str) -> Result<&'a Chain, Unverifiable> {
+    match &rig.plant {
+        PlantDescription::Chain(chain) => Ok(chain),
+        PlantDescription::Model(_) => Err(Unverifiable::NotAChain(what)),
+    }
+}
+
+/// Checks that a setting is within its range.
+pub(super) fn within(
+    what: &'static str,
+    value: f64,
+    range: core::ops::RangeInclusive<f64>,
+    accepts: &'static str,
+) -> Result<(), Unverifiable> {
+    if range.contains(&value) { Ok(()) } else { Err(Unverifiable::Setting { what, value, accepts }) }
+}
