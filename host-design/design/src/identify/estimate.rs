@@ -5,16 +5,19 @@ use std::path::PathBuf;
 use super::chain_of;
 use super::covariance::{changes, deviations};
 use super::error::IdentifyError;
+use super::estimated::{Estimate, Identification};
 use super::free;
 use super::log::Log;
+use super::old_values::old_values;
 use super::parameters::{Kind, Layout, Prior, priors};
 use super::prediction::Filter;
-use super::realise::{Realised, realise};
+use super::realise::realise;
 use super::record::Record;
 use super::recordings::{Recorded, Recordings};
 use super::shooting::{Shooting, WINDOW_S};
-use super::verdict::{ChannelFit, HeldOut, Predicted, Refusal, channels, judge};
-use super::wiring::{self, WiringFound};
+use super::verdict::{HeldOut, Predicted, Refusal, channels, judge, judge_windows};
+use super::window_errors::window_errors;
+use super::wiring;
 use crate::parallel::Progress;
 use crate::rig::Rig;
 
@@ -40,65 +43,6 @@ pub struct Settings {
     pub trust_wiring: bool,
 }
 
-/// An identified parameter, in the unit of its [`Kind`].
-#[derive(Debug, Clone, PartialEq)]
-pub struct Estimate {
-    /// Which parameter it is.
-    pub kind: Kind,
-    /// Value of the rig file, or the start value that is assumed if the file has none.
-    pub old: f64,
-    /// Identified value.
-    pub new: f64,
-    /// Standard deviation of the identified value.
-    pub deviation: f64,
-    /// Whether the log says little about it: the deviation exceeds half of the prior one.
-    pub held_by_prior: bool,
-}
-
-/// Result of an identification.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Identification {
-    /// Duration of the logs without their gaps (s).
-    pub seconds: f64,
-    /// Number of ticks that are missing in the logs.
-    pub lost_ticks: u64,
-    /// Largest angle of a link from hanging (rad).
-    pub largest_angle_rad: f64,
-    /// Result of the wiring check; none if the wiring was taken on trust.
-    pub wiring: Option<WiringFound>,
-    /// All parameters that are identified; none if the wiring is wrong.
-    pub estimates: Vec<Estimate>,
-    /// Time from one sample to the next (s).
-    pub sample_s: f64,
-    /// Correlations of the estimates, row by row.
-    pub correlations: Vec<f64>,
-    /// How well the model explains each channel.
-    pub channels: Vec<ChannelFit>,
-    /// The numbers for the rig file; none if the wiring is wrong or the numbers are not physical.
-    pub realised: Option<Realised>,
-    /// Delay that the rig file states (ticks).
-    pub delay_ticks: u8,
-    /// Why no rig file may be written; none if it may.
-    pub refusal: Option<Refusal>,
-}
-
-impl Identification {
-    /// The estimate of a parameter, if it was identified.
-    pub fn estimate(&self, kind: Kind) -> Option<&Estimate> {
-        self.estimates.iter().find(|estimate| estimate.kind == kind)
-    }
-
-    /// The delay that the rig file should state (ticks), if that differs from the one it states.
-    pub fn other_delay(&self) -> Option<u8> {
-        let delay = self.estimate(Kind::Delay)?;
-        match self.delay_ticks {
-            0 if delay.new > 0.5 + 2.0 * delay.deviation => Some(1),
-            1 if delay.new < -0.5 - 2.0 * delay.deviation => Some(0),
-            _ => None,
-        }
-    }
-}
-
 /// Identifies the machine of `rig` from its logs, each with the path of its file.
 ///
 /// # Errors
@@ -110,11 +54,11 @@ pub fn identify(
     settings: &Settings,
     progress: Progress<'_>,
 ) -> Result<Identification, IdentifyError> {
-    identify_recordings(rig, &Recordings::Logs(logs.to_vec()), settings, progress)
+    identify_recordings(rig, &Recordings::Logs(logs.to_vec()), None, settings, progress)
 }
 
 /// Identifies the machine of `rig` from its recordings. Without a drive in them, the scale of masses and frictions stays
-/// that of the file.
+/// that of the file. The recordings `predict` are not used, but predicted with the old and the new numbers.
 ///
 /// # Errors
 /// [`IdentifyError`] if a recording is not of the rig, they are too short, or a channel does not move in them. A misfit
@@ -122,6 +66,7 @@ pub fn identify(
 pub fn identify_recordings(
     rig: &Rig,
     recordings: &Recordings,
+    predict: Option<&Recordings>,
     settings: &Settings,
     progress: Progress<'_>,
 ) -> Result<Identification, IdentifyError> {
@@ -140,12 +85,15 @@ pub fn identify_recordings(
         sample_s: record.dt_s,
         correlations: Vec::new(),
         channels: Vec::new(),
+        is_driven,
+        left_out: Vec::new(),
+        predicted: Vec::new(),
         realised: None,
         delay_ticks: rig.tick.delay_ticks,
         refusal: None,
     };
     if !is_driven {
-        free::known(model.layout, &mut priors, record.is_clamped);
+        free::known(rig, model.layout, &mut priors, record.is_clamped);
     }
     if is_driven && !settings.trust_wiring {
         progress(Some(("wiring", wiring::count(record.channels))));
@@ -156,36 +104,34 @@ pub fn identify_recordings(
             return Ok(found);
         }
     }
-    if !is_driven {
-        let free = free::fit(&model, &record, &priors, &|| progress(None));
-        for (i, kind) in model.layout.kinds().into_iter().enumerate() {
-            if priors[i].deviation > 0.0 {
-                eprintln!(
-                    "{:?} {:.6e} -> {:.6e} +- {:.2e}  halves {:.6e} {:.6e}",
-                    kind,
-                    priors[i].value,
-                    free.p[i],
-                    free.deviations[i],
-                    free.halves[0][i],
-                    free.halves[1][i]
-                );
-            }
-        }
-        eprintln!("res {:?}", free.residuals);
-        return Ok(found);
+    let p = if is_driven {
+        let held_s = HELD_OUT.0.min(HELD_OUT.1 * record.seconds());
+        let used_s = record.seconds() - held_s;
+        let finer = finer.map(|finer| finer.part(0.0, used_s));
+        let (used, held) = (record.part(0.0, used_s), record.part(used_s, used_s + held_s + 1.0));
+        let fitted = Fitted { rig, priors: &priors, used: &used, held: &held, finer: finer.as_ref() };
+        fitted.run(&model, &mut found, progress)?;
+        fitted.full(&found)
+    } else {
+        progress(Some(("free swings", free::FITS)));
+        let free = free::fit(&model, &record, &priors, &|| progress(None))?;
+        free.write(rig, &model, &priors, &mut found);
+        free.p
+    };
+    if let Some(recordings) = predict {
+        let other = recordings.recorded(rig)?.record;
+        let start: Vec<f64> = priors.iter().map(|prior| prior.value).collect();
+        let old = old_values(rig, model.layout, &start, &p);
+        found.predicted = window_errors(&model, &priors, &[(&other, [&old, &p])]);
     }
-    let held_s = HELD_OUT.0.min(HELD_OUT.1 * record.seconds());
-    let used_s = record.seconds() - held_s;
-    let finer = finer.map(|finer| finer.part(0.0, used_s));
-    let (used, held) = (record.part(0.0, used_s), record.part(used_s, used_s + held_s + 1.0));
-    let fitted = Fitted { rig, priors: &priors, used: &used, held: &held, finer: finer.as_ref() };
-    fitted.run(&model, &mut found, progress)?;
-    let p: Vec<f64> = fitted.full(&found);
     match realise(chain, &p, settings.weighed_kg_m) {
         Ok(realised) => found.realised = Some(realised),
         Err(error) => found.refusal = Some(error.into()),
     }
-    if let Err(refusal) = judge(&found.channels) {
+    if is_driven && let Err(refusal) = judge(&found.channels) {
+        found.refusal = Some(refusal);
+    }
+    if let Err(refusal) = judge_windows(&found.left_out) {
         found.refusal = Some(refusal);
     }
     Ok(found)
@@ -245,6 +191,7 @@ impl Fitted<'_> {
                 old: self.priors[i].value,
                 new: p[i],
                 deviation: deviations[i],
+                halves: None,
                 held_by_prior: deviations[i] > 0.5 * self.priors[i].deviation,
             })
             .collect();
@@ -260,31 +207,11 @@ impl Fitted<'_> {
             &noise,
             false,
         ));
-        let old = self.old_values(&start, &p);
+        let old = old_values(self.rig, model.layout, &start, &p);
         let held = self.held_out(&model, [&old, &p]);
         let ranges: Vec<f64> = (0..self.used.channels).map(|channel| self.used.extent(channel)[1]).collect();
         found.channels = channels(&over, held, &ranges);
         Ok(())
-    }
-
-    /// The values of the file, but with tilt, delay and zeros as identified from this log: a file does not have them.
-    fn old_values(&self, start: &[f64], p: &[f64]) -> Vec<f64> {
-        let layout = Layout { links: self.used.channels - 1 };
-        let mut old = start.to_vec();
-        let of_log = [layout.tilt(), layout.delay()];
-        for i in of_log.into_iter().chain((0..layout.links).map(|joint| layout.zero(joint))) {
-            old[i] = p[i];
-        }
-        for contact in 0..=layout.links {
-            // The start value of a dry friction may be an assumption that is not in the file.
-            let friction = &self.rig.reality.friction;
-            let given = match contact.checked_sub(1) {
-                None => friction.cart_friction_n,
-                Some(joint) => friction.joint_friction_n_m.of(joint),
-            };
-            old[layout.dry(contact)] = given;
-        }
-        old
     }
 
     /// Predictions over windows whose initial states are fitted, with both sets of `values`: those of the old file and

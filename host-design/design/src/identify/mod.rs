@@ -16,6 +16,7 @@ mod covariance;
 mod coverage;
 mod error;
 mod estimate;
+mod estimated;
 mod excite;
 mod feed;
 mod free;
@@ -24,6 +25,7 @@ mod machines;
 mod model;
 mod normal;
 mod of_rig;
+mod old_values;
 mod over_line;
 mod parameters;
 mod prediction;
@@ -36,6 +38,7 @@ mod shooting;
 mod step;
 mod table;
 mod verdict;
+mod window_errors;
 mod wiring;
 mod with_firmware;
 
@@ -43,7 +46,8 @@ pub use coverage::{
     Coverage, CoverageError, CoverageRow, Drawn, Identified, Missed, Quantity, coverage, identified,
 };
 pub use error::{IdentifyError, LogError};
-pub use estimate::{Estimate, Identification, Settings, identify, identify_recordings};
+pub use estimate::{Settings, identify, identify_recordings};
+pub use estimated::{Estimate, Identification};
 pub use excite::{Excitation, shake};
 pub use feed::Feed;
 pub use log::{CONTACTS, DriveScale, Header, Log, Tick};
@@ -55,6 +59,7 @@ pub use recorder::Recorder;
 pub use recordings::Recordings;
 pub use table::{AngleReference, AngleZero, Reading, Table, TableError};
 pub use verdict::{ChannelFit, Predicted, Refusal};
+pub use window_errors::{ChannelError, WindowErrors};
 pub use wiring::{Wiring, WiringFound};
 pub use with_firmware::{ShakeError, Shaken, checked_and_hanging, shake_with};
 

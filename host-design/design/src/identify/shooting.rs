@@ -109,7 +109,8 @@ impl Shooting<'_> {
 
     /// Inverse of the normal matrix of the scaled parameters, with the initial states eliminated; none if there is none.
     pub(super) fn inverse(&self, fit: &Fit) -> Option<Vec<f64>> {
-        let weights: Vec<f64> = fit.rms.iter().map(|rms| rms.max(f64::MIN_POSITIVE).powi(-2)).collect();
+        let weights: Vec<f64> =
+            fit.rms.iter().zip(&self.record.steps).map(|(rms, step)| rms.max(0.2 * step).powi(-2)).collect();
         Some(self.linearise(fit, &weights).0.factor(0.0)?.inverse())
     }
 

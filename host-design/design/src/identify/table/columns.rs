@@ -349,3 +349,96 @@ fn median(values: impl Iterator<Item = f64>) -> f64 {
     values.sort_by(f64::total_cmp);
     values.get(values.len() / 2).copied().unwrap_or_default()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::path::Path;
+
+    const HEADER: &str = "# measured\ntime_s,angle_1_rad,angle_2_rad\n";
+
+    fn rig() -> Rig {
+        Rig::from_path(Path::new("../../rigs/double-quanser-dbpen.toml")).unwrap()
+    }
+
+    fn reading() -> Reading {
+        Reading {
+            angles: Some(AngleReference::Absolute),
+            zero: Some(AngleZero::Upright),
+            is_clamped: true,
+            ..Reading::default()
+        }
+    }
+
+    fn pieces(text: &str, reading: &Reading) -> Result<Vec<Rows>, TableError> {
+        let table = Table::from_text(text, reading, 2)?;
+        Columns::of(&rig(), reading, &table)?.pieces(&table)
+    }
+
+    #[test]
+    fn every_convention_gives_the_same_deviations_from_hanging() {
+        let wanted = pieces(&format!("{HEADER}0,3.0,3.2\n0.002,3.1,3.1\n"), &reading()).unwrap();
+        let near = |rows: &[Rows]| {
+            let angles = [0.0, 3.0 - PI, 0.2, 0.0, 3.1 - PI, 0.0];
+            assert!(
+                rows[0].y.iter().zip(angles).all(|(found, wanted)| (found - wanted).abs() < 1e-9),
+                "{rows:?}"
+            );
+        };
+        near(&wanted);
+        let relative = Reading { angles: Some(AngleReference::Relative), ..reading() };
+        near(&pieces(&format!("{HEADER}0,3.0,0.2\n0.002,3.1,0\n"), &relative).unwrap());
+        let hanging = Reading { zero: Some(AngleZero::Hanging), period_s: Some(0.002), ..reading() };
+        let [first, second, third] = [3.0 - PI, 3.2 - PI, 3.1 - PI].map(f64::to_degrees);
+        let text = format!("th1_deg;th2_deg\n{first};{second}\n{third};{third}\n");
+        near(&pieces(&text, &hanging).unwrap());
+        let reversed = Reading { reversed: vec!["angle_2_rad".to_owned()], ..relative };
+        near(&pieces(&format!("{HEADER}0,3.0,-0.2\n0.002,3.1,0\n"), &reversed).unwrap());
+    }
+
+    #[test]
+    fn a_pause_begins_a_new_piece_and_uneven_times_are_made_even() {
+        let text = format!("{HEADER}0,3,3\n0.002,3,3\n0.004,3,3\n1.0,3,3\n1.002,3,3\n");
+        let found = pieces(&text, &reading()).unwrap();
+        assert_eq!(found.iter().map(|rows| rows.drive.len()).collect::<Vec<_>>(), [3, 2]);
+        let text =
+            format!("{HEADER}0,3.0,3.0\n0.002,3.2,3.2\n0.0045,3.45,3.45\n0.006,3.6,3.6\n0.008,3.8,3.8\n");
+        let found = pieces(&text, &reading()).unwrap();
+        assert!((found[0].y[7] - (3.4 - PI)).abs() < 1e-9, "{found:?}");
+    }
+
+    #[test]
+    fn what_is_open_or_contradicts_is_named_with_its_place() {
+        let row = "0,3.0,3.2\n0.002,3.1,3.1\n";
+        let refused = |text: &str, reading: &Reading, words: &[&str]| {
+            let error = pieces(text, reading).unwrap_err().to_string();
+            words.iter().for_each(|word| assert!(error.contains(word), "{error}"));
+        };
+        let all = format!("{HEADER}{row}");
+        refused(&all, &Reading { angles: None, ..reading() }, &["--angles", "angle_1_rad"]);
+        refused(&all, &Reading { zero: None, ..reading() }, &["--zero"]);
+        refused(&all, &Reading { is_clamped: false, ..reading() }, &["--clamped"]);
+        refused(&all, &Reading { period_s: Some(0.002), ..reading() }, &["--period"]);
+        refused(
+            &all,
+            &Reading { zero: Some(AngleZero::Hanging), ..reading() },
+            &["line 3", "angle_1_rad", "--zero upright"],
+        );
+        refused(&all, &Reading { reversed: vec!["angle_3".to_owned()], ..reading() }, &["angle_3"]);
+        refused(row, &reading(), &["line 1", "--columns time_s,angle_1_rad,angle_2_rad"]);
+        refused(&format!("{HEADER}0,3,x\n"), &reading(), &["line 3", "angle_2_rad", "\"x\""]);
+        refused(&format!("{HEADER}0,3\n"), &reading(), &["line 3", "2 fields instead of 3"]);
+        refused(&format!("{HEADER}0.002,3,3\n0,3,3\n"), &reading(), &["line 4", "does not increase"]);
+        refused(
+            &all.replace("angle_2_rad", "current_a"),
+            &reading(),
+            &["column 3", "current_a", "time_s,angle_1_rad,-"],
+        );
+        refused(&all.replace("angle_2_rad", "angle_3_rad"), &reading(), &["column 3", "only 2 links"]);
+        refused(&all.replace("angle_2_rad", "theta2"), &reading(), &["column 3", "unit"]);
+        let cart = "time_s,angle_1_rad,angle_2_rad,x_mm\n0,3,3,0\n0.002,3,3,5\n";
+        refused(cart, &reading(), &["line 2", "x_mm", "5.00 mm"]);
+        // The negative control: all is said, and nothing is refused.
+        assert!(pieces(&all, &reading()).is_ok());
+    }
+}

@@ -45,6 +45,38 @@ enum Zero {
 }
 
 impl ReadingArgs {
+    /// The options as they were typed.
+    pub(crate) fn as_typed(&self) -> String {
+        let mut typed = String::new();
+        let mut add = |option: &str, value: String| typed.push_str(&format!(" --{option}{value}"));
+        let list = |names: &[String]| format!(" {}", names.join(","));
+        if !self.columns.is_empty() {
+            add("columns", list(&self.columns));
+        }
+        if let Some(period) = self.period {
+            add("period", format!(" {period}"));
+        }
+        if let Some(angles) = self.angles {
+            add(
+                "angles",
+                format!(" {}", if matches!(angles, Against::Absolute) { "absolute" } else { "relative" }),
+            );
+        }
+        if let Some(zero) = self.zero {
+            add("zero", format!(" {}", if matches!(zero, Zero::Upright) { "upright" } else { "hanging" }));
+        }
+        if !self.reversed.is_empty() {
+            add("reversed", list(&self.reversed));
+        }
+        if let Some(counts) = self.counts_per_turn {
+            add("counts-per-turn", format!(" {counts}"));
+        }
+        if self.clamped {
+            add("clamped", String::new());
+        }
+        typed
+    }
+
     /// As the library wants it.
     pub(crate) fn reading(&self) -> Reading {
         Reading {
