@@ -192,7 +192,7 @@ mod tests {
         assert!(free[0] < -9.0 && free[1] > 9.0);
         let step = normal.bounded_step(0.0, &[-0.5, f64::NEG_INFINITY]).unwrap();
         // Least squares of -1 + 0.45 - 0.9 x and 1 + 0.45 - x.
-        assert!(step[0] == -0.5 && (step[1] - (1.45 - 0.9 * 0.55) / 1.81).abs() < 1e-12, "{step:?}");
+        assert!(step[0] == -0.5 && (step[1] - (1.45 - 0.9 * 0.5) / 1.81).abs() < 1e-12, "{step:?}");
     }
 
     #[test]
