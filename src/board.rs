@@ -45,13 +45,21 @@ pub struct Contacts {
 pub struct Output {
     /// Whether the power stage is enabled; false lets the motor coast.
     pub enable: bool,
-    /// Force or duty cycle; [`Drive::OFF`] whenever `enable` is false.
+    /// Duty cycle from -1 to 1, positive along +x; 0 whenever `enable` is false. It is all that a board needs.
+    pub duty: f32,
+    /// The same as the control law has computed it, for simulations; [`Drive::OFF`] whenever `enable` is false.
     pub drive: Drive,
 }
 
 impl Output {
     /// Motor off.
-    pub const OFF: Self = Self { enable: false, drive: Drive::OFF };
+    pub const OFF: Self = Self { enable: false, duty: 0.0, drive: Drive::OFF };
+
+    /// Motor on. `force_limit_n` is the largest force of the gain table (N): see [`Drive::duty`].
+    #[inline(always)]
+    pub fn on(drive: Drive, force_limit_n: f32) -> Self {
+        Self { enable: true, duty: drive.duty(force_limit_n), drive }
+    }
 }
 
 /// The hardware. Each board implements this trait; so do the image in the loop with a simulated rig and the
@@ -60,10 +68,14 @@ pub trait Board<const NY: usize> {
     /// Widths of the encoder counters.
     const WIDTHS: [CounterWidth; NY];
 
+    /// The tick to which the timer is set that starts the control task (s). If the gain table is for another one,
+    /// the motor stays off.
+    fn tick_s(&self) -> f32;
+
     /// Reads all inputs without waiting.
     fn inputs(&mut self) -> Inputs<NY>;
 
-    /// Drives the motor until the next call.
+    /// Drives the motor with the duty of `output` until the next call.
     fn drive(&mut self, output: &Output);
 
     /// Called at the end of a tick. Restarts the independent watchdog, but not if this is the third tick in a row that

@@ -21,13 +21,11 @@
 //! use upright::board::{Contacts, Inputs};
 //! use upright::control::encoder::CounterWidth;
 //! use upright::firmware::Firmware;
-//! use upright::gains::{RIG_HASH, SENSORS, TABLE, TICK_S};
+//! use upright::gains::{SENSORS, SWING_UP, TABLE};
 //! use upright::protocol::message::{Answer, Command, Request, Reset};
 //! use upright::supervision::inhibits::Inhibits;
-//! use upright::table::Build;
 //!
-//! let build = Build { rig_hash: RIG_HASH, tick_s: TICK_S };
-//! let mut firmware = Firmware::new(&TABLE, &build, [CounterWidth::Bits32; SENSORS], Reset::Power)?;
+//! let mut firmware = Firmware::new(&TABLE, &SWING_UP, [CounterWidth::Bits32; SENSORS], Reset::Power);
 //! let inputs = Inputs { raw_counts: [0; SENSORS], supply_v: 24.0, contacts: Contacts::default() };
 //! let output = firmware.control(&inputs); // at the start of a tick; then drive the motor with it
 //! assert!(!output.enable);
@@ -35,7 +33,6 @@
 //! let (_telemetry, reply) = firmware.finish(Some(&arm), 0); // any time before the next tick
 //! let Some(Answer::NotNow(inhibits)) = reply.map(|reply| reply.answer) else { panic!() };
 //! assert!(inhibits.contains(Inhibits::NOT_HOMED));
-//! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!
 //! The controller alone:
@@ -43,11 +40,9 @@
 //! ```
 //! use upright::control::controller::Controller;
 //! use upright::control::encoder::CounterWidth;
-//! use upright::gains::{RIG_HASH, SENSORS, TABLE, TICK_S};
-//! use upright::table::Build;
+//! use upright::gains::{SENSORS, TABLE};
 //!
-//! let build = Build { rig_hash: RIG_HASH, tick_s: TICK_S };
-//! let mut controller = Controller::new(&TABLE, &build, [CounterWidth::Bits32; SENSORS])?;
+//! let mut controller = Controller::new(&TABLE, [CounterWidth::Bits32; SENSORS])?;
 //! controller.start(&[0; SENSORS])?; // upright and at rest, all counters at 0
 //! controller.set_setpoint(0.1)?; // metres
 //! let mut counts = [0; SENSORS];
@@ -69,8 +64,10 @@ extern crate self as upright;
 #[cfg(test)]
 extern crate std;
 
+#[cfg(feature = "firmware")]
 pub mod board;
 pub mod control;
+#[cfg(feature = "firmware")]
 pub mod firmware;
 #[cfg(not(feature = "gains-from-env"))]
 pub mod gains;
@@ -80,6 +77,8 @@ pub mod gains {
     include!(env!("UPRIGHT_GAINS"));
 }
 pub mod plant;
+#[cfg(feature = "firmware")]
 pub mod protocol;
+#[cfg(feature = "firmware")]
 pub mod supervision;
 pub mod table;

@@ -64,7 +64,8 @@ impl Invariants {
     /// after a disarm.
     fn motor(&self, firmware: &Tested, rig: &SimulatedRig, answered: Option<&(Request, Answer)>) {
         let (before, after) = (self.state, firmware.state());
-        let Output { enable, drive } = rig.output;
+        let Output { enable, duty, drive } = rig.output;
+        assert!(duty.abs() <= 1.0 && (enable || duty == 0.0), "{duty}");
         match drive {
             Drive::Force(force) => {
                 assert!(force.is_finite() && force.abs() <= TABLE.force_limit_n, "{force}")

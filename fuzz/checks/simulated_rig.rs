@@ -5,13 +5,13 @@ use upright::board::{Board, Contacts, Inputs, Output};
 use upright::control::actuator::Drive;
 use upright::control::encoder::CounterWidth;
 use upright::firmware::Firmware;
-use upright::gains::{RIG_HASH, SENSORS, STATES, TABLE, TICK_S};
+use upright::gains::{SENSORS, STATES, TABLE, TICK_S};
 use upright::protocol::message::{Answer, Command, Request, Reset};
 use upright::supervision::jog::MotorSign;
 use upright::supervision::shaking::{FORCES, Shaking};
 use upright::supervision::sign_check::Signs;
 use upright::supervision::supervisor::State;
-use upright::table::Build;
+use upright::table::NoSwingUp;
 
 /// How the rig is shaken in the starting state `shaken`.
 pub(crate) const SHAKING: Shaking = Shaking { most_n: 2.0, stiffness_n_per_m: 5.0, damping_n_s_per_m: 2.0 };
@@ -69,6 +69,10 @@ impl Board<SENSORS> for SimulatedRig {
         Inputs { raw_counts, supply_v: self.supply_v, contacts: self.contacts }
     }
 
+    fn tick_s(&self) -> f32 {
+        TICK_S
+    }
+
     fn drive(&mut self, output: &Output) {
         self.output = *output;
         self.advance();
@@ -121,8 +125,7 @@ impl Start {
 /// which is released again: the fault is latched.
 pub(crate) fn starts() -> [Start; 6] {
     let limits = &TABLE.limits;
-    let build = Build { rig_hash: RIG_HASH, tick_s: TICK_S };
-    let firmware = Firmware::new(&TABLE, &build, SimulatedRig::WIDTHS, Reset::Power).expect("a sound table");
+    let firmware = Firmware::new(&TABLE, &NoSwingUp, SimulatedRig::WIDTHS, Reset::Power);
     let mut start = Start { firmware, rig: SimulatedRig::new(), id: 0 };
     start.wait(limits.still_ticks + 1);
     let hanging = start.clone();

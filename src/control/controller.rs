@@ -2,14 +2,14 @@
 
 mod motion;
 
-use nalgebra::SVector;
-use serde::{Deserialize, Serialize};
-
 use crate::control::actuator::Drive;
 use crate::control::encoder::{CounterWidth, Encoders};
 use crate::control::observer::Observer;
 use crate::control::state_feedback::{FeedbackSum, LawState, saturate, state_feedback};
-use crate::table::{Build, GainTable, Law, LawGains, Scalar, TableError};
+use crate::table::{GainTable, Law, LawGains, Scalar, TableError};
+use nalgebra::SVector;
+#[cfg(feature = "firmware")]
+use serde::{Deserialize, Serialize};
 
 /// Observer, control law and actuator map of one gain table.
 ///
@@ -19,12 +19,7 @@ use crate::table::{Build, GainTable, Law, LawGains, Scalar, TableError};
 #[derive(Debug, Clone)]
 pub struct Controller<'t, const NX: usize, const NY: usize, T: Scalar = f32> {
     table: &'t GainTable<NX, NY, T>,
-    law: Law,
-    gains: &'t LawGains<NX, T>,
-    /// Whether the force depends on earlier ticks, through a pending force or an integral.
-    has_memory: bool,
-    /// Whether the law has no such memory and the table no known friction, so that a tick can skip both.
-    is_plain: bool,
+    active: ActiveLaw<'t, NX, T>,
     mode: Mode<'t, NX, NY, T>,
     /// The mode to start in, prepared in advance: analysing the structure of the gains takes too long for a tick.
     started: Mode<'t, NX, NY, T>,
@@ -39,6 +34,25 @@ pub struct Controller<'t, const NX: usize, const NY: usize, T: Scalar = f32> {
     friction: [T; NY],
     requested: T,
     applied: T,
+}
+
+/// The law in use.
+#[derive(Debug, Clone, Copy)]
+struct ActiveLaw<'t, const NX: usize, T: Scalar> {
+    law: Law,
+    gains: &'t LawGains<NX, T>,
+    /// Whether the force depends on earlier ticks by more than the estimate: through a pending force or an integral.
+    has_memory: bool,
+    /// Whether the law has no such memory and the table no known friction, so that a tick can skip both.
+    is_plain: bool,
+}
+
+impl<'t, const NX: usize, T: Scalar> ActiveLaw<'t, NX, T> {
+    fn new<const NY: usize>(table: &GainTable<NX, NY, T>, law: Law, gains: &'t LawGains<NX, T>) -> Self {
+        let zero = T::default();
+        let has_memory = table.delay_ticks == 1 || gains.k_pending != zero || gains.k_integral != zero;
+        Self { law, gains, has_memory, is_plain: !has_memory && table.friction.is_none() }
+    }
 }
 
 #[derive(Debug, Clone, Copy)]
@@ -62,7 +76,8 @@ pub struct MotorCommand<T = f32> {
 }
 
 /// Reason for rejecting a request; the previous setting is kept.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "firmware", derive(Serialize, Deserialize))]
 pub enum Rejected {
     /// The table holds no gains for this law.
     NoSuchLaw,
@@ -98,19 +113,16 @@ impl<'t, const NX: usize, const NY: usize> Controller<'t, NX, NY> {
     /// holds (LQR before pole placement).
     ///
     /// # Errors
-    /// [`TableError`] if the table is damaged or was made for another build.
-    pub fn new(
-        table: &'t GainTable<NX, NY>,
-        build: &Build,
-        widths: [CounterWidth; NY],
-    ) -> Result<Self, TableError> {
-        table.check(build)?;
+    /// [`TableError`] if the table is damaged.
+    pub fn new(table: &'t GainTable<NX, NY>, widths: [CounterWidth; NY]) -> Result<Self, TableError> {
+        table.check()?;
         Self::with_checked(table, widths)
     }
 
     /// A controller that must never be started, for a table that cannot be used.
-    pub fn unusable(table: &'t GainTable<NX, NY>, widths: [CounterWidth; NY]) -> Self {
-        Self::stopped(table, Law::Lqr, const { &LawGains::NONE }, widths)
+    #[cfg(feature = "firmware")]
+    pub(crate) fn unusable(table: &'t GainTable<NX, NY>, widths: [CounterWidth; NY]) -> Self {
+        Self::stopped(table, ActiveLaw::new(table, Law::Lqr, const { &LawGains::NONE }), widths)
     }
 }
 
@@ -125,22 +137,18 @@ impl<'t, const NX: usize, const NY: usize, T: Scalar> Controller<'t, NX, NY, T> 
         widths: [CounterWidth; NY],
     ) -> Result<Self, TableError> {
         let (law, gains) = table.laws.present().next().ok_or(TableError::NoLaw)?;
-        Ok(Self::stopped(table, law, gains, widths))
+        Ok(Self::stopped(table, ActiveLaw::new(table, law, gains), widths))
     }
 
     fn stopped(
         table: &'t GainTable<NX, NY, T>,
-        law: Law,
-        gains: &'t LawGains<NX, T>,
+        active: ActiveLaw<'t, NX, T>,
         widths: [CounterWidth; NY],
     ) -> Self {
         let zero = T::default();
         Self {
             table,
-            law,
-            gains,
-            has_memory: table.has_memory(gains),
-            is_plain: !table.has_memory(gains) && table.friction.is_none(),
+            active,
             mode: Mode::Stopped,
             started: table
                 .observer
@@ -165,7 +173,7 @@ impl<'t, const NX: usize, const NY: usize, T: Scalar> Controller<'t, NX, NY, T> 
 
     /// The law in use.
     pub fn law(&self) -> Law {
-        self.law
+        self.active.law
     }
 
     /// Selects another law of the table.
@@ -177,10 +185,8 @@ impl<'t, const NX: usize, const NY: usize, T: Scalar> Controller<'t, NX, NY, T> 
         if !matches!(self.mode, Mode::Stopped) {
             return Err(Rejected::Running);
         }
-        self.gains = self.table.law(law).ok_or(Rejected::NoSuchLaw)?;
-        self.has_memory = self.table.has_memory(self.gains);
-        self.is_plain = !self.has_memory && self.table.friction.is_none();
-        self.law = law;
+        let gains = self.table.law(law).ok_or(Rejected::NoSuchLaw)?;
+        self.active = ActiveLaw::new(self.table, law, gains);
         Ok(())
     }
 
@@ -240,11 +246,18 @@ impl<'t, const NX: usize, const NY: usize, T: Scalar> Controller<'t, NX, NY, T> 
     /// # Errors
     /// [`Rejected::NoObserver`] if the table holds no observer.
     pub fn start(&mut self, raw: &[u32; NY]) -> Result<(), Rejected> {
-        let observer = self.table.observer.as_ref().ok_or(Rejected::NoObserver)?;
         self.encoders.update(raw);
-        let y = self.encoders.positions(&observer.step);
+        self.start_at(&self.positions().data.0[0])
+    }
+
+    /// Starts from rest at these positions (m, rad), for sensors that are no incremental encoders.
+    ///
+    /// # Errors
+    /// [`Rejected::NoObserver`] if the table holds no observer.
+    pub fn start_at(&mut self, y: &[T; NY]) -> Result<(), Rejected> {
+        let observer = self.table.observer.as_ref().ok_or(Rejected::NoObserver)?;
         let mut x = SVector::<T, NX>::repeat(T::default());
-        for (&state, &position) in observer.measured.iter().zip(y.iter()) {
+        for (&state, &position) in observer.measured.iter().zip(y) {
             if let Some(entry) = x.get_mut(state as usize) {
                 *entry = position;
             }
@@ -299,7 +312,16 @@ impl<'t, const NX: usize, const NY: usize, T: Scalar> Controller<'t, NX, NY, T> 
             self.encoders.update(raw);
             return Self::off();
         };
-        let requested = self.observe(&observer, raw, judge);
+        let y = self.encoders.measure(raw, &observer.gains.step).data.0[0];
+        let requested = self.observe(&observer, &y, judge);
+        self.actuate(requested)
+    }
+
+    /// The same as [`control`](Self::control) with the positions themselves (m, rad) instead of counts: from absolute
+    /// sensors, or from somebody else's driver. The same positions give the same bits.
+    pub fn control_at(&mut self, y: &[T; NY]) -> MotorCommand<T> {
+        let Mode::Running(observer) = self.mode else { return Self::off() };
+        let requested = self.observe(&observer, y, |_, _, _| ());
         self.actuate(requested)
     }
 
@@ -309,8 +331,9 @@ impl<'t, const NX: usize, const NY: usize, T: Scalar> Controller<'t, NX, NY, T> 
         if let Mode::Stopped = self.mode {
             return Self::off();
         }
-        self.state.govern(self.target, self.gains.setpoint_step);
-        let requested = self.request(state_feedback(self.gains.n, self.state.setpoint, &self.gains.k, x));
+        self.state.govern(self.target, self.active.gains.setpoint_step);
+        let requested =
+            self.request(state_feedback(self.active.gains.n, self.state.setpoint, &self.active.gains.k, x));
         self.actuate(requested)
     }
 
@@ -318,28 +341,27 @@ impl<'t, const NX: usize, const NY: usize, T: Scalar> Controller<'t, NX, NY, T> 
     fn observe(
         &mut self,
         observer: &Observer<'t, NX, NY, T>,
-        raw: &[u32; NY],
+        y: &[T; NY],
         judge: impl FnOnce(&[i32; NY], &[T; NY], &mut [T; NY]),
     ) -> T {
-        self.state.govern(self.target, self.gains.setpoint_step);
-        let y = self.encoders.measure(raw, &observer.gains.step).data.0[0];
+        self.state.govern(self.target, self.active.gains.setpoint_step);
         let estimate = &mut self.estimate.data.0[0];
-        let mut sum = FeedbackSum::new(self.gains.n, self.state.setpoint);
+        let mut sum = FeedbackSum::new(self.active.gains.n, self.state.setpoint);
         let e = &mut self.innovation.data.0[0];
-        *e = observer.innovation(&y, estimate);
-        judge(self.encoders.counts(), &y, e);
+        *e = observer.innovation(y, estimate);
+        judge(self.encoders.counts(), y, e);
         observer.correct(e, estimate, |joint, x| {
-            if let Some(k) = self.gains.k.as_slice().chunks(2).nth(joint) {
+            if let Some(k) = self.active.gains.k.as_slice().chunks(2).nth(joint) {
                 sum.feed_back(k, x);
             }
         });
         let estimate = &self.estimate.data.0[0];
         let mut force = sum.force();
-        if self.is_plain {
+        if self.active.is_plain {
             return force;
         }
         if let Some(map) = &self.table.friction {
-            force += map.force(self.law, estimate, &mut self.friction);
+            force += map.force(self.active.law, estimate, &mut self.friction);
         }
         self.request(force)
     }
@@ -348,9 +370,9 @@ impl<'t, const NX: usize, const NY: usize, T: Scalar> Controller<'t, NX, NY, T> 
     #[inline(always)]
     fn request(&mut self, feedback: T) -> T {
         let mut requested = feedback;
-        if self.has_memory {
-            requested -= self.gains.k_pending * self.state.pending;
-            requested -= self.gains.k_integral * self.state.integral;
+        if self.active.has_memory {
+            requested -= self.active.gains.k_pending * self.state.pending;
+            requested -= self.active.gains.k_integral * self.state.integral;
             self.requested = requested;
         }
         requested
@@ -391,12 +413,12 @@ impl<'t, const NX: usize, const NY: usize, T: Scalar> Controller<'t, NX, NY, T> 
     /// current estimates of the measured positions (m or rad) and the force during this tick (N).
     #[inline(always)]
     pub fn predict_with(&mut self, finish: impl FnOnce([T; NY], T)) {
-        let during_this_tick = if self.is_plain { self.applied } else { self.advance() };
+        let during_this_tick = if self.active.is_plain { self.applied } else { self.advance() };
         if let Mode::Running(observer) = &self.mode {
             let estimate = &mut self.estimate.data.0[0];
             finish(observer.measured(estimate), during_this_tick);
             observer.predict(estimate, during_this_tick);
-            if !self.is_plain
+            if !self.active.is_plain
                 && let Some(map) = &self.table.friction
             {
                 map.add_to(estimate, &self.friction);
@@ -409,9 +431,9 @@ impl<'t, const NX: usize, const NY: usize, T: Scalar> Controller<'t, NX, NY, T> 
     #[inline]
     fn advance(&mut self) -> T {
         let during_this_tick = self.acting();
-        if self.has_memory {
+        if self.active.has_memory {
             let (position, tick_s) = (self.output(), self.table.tick_s);
-            self.state.advance(self.gains.k_integral, position, tick_s, self.requested, self.applied);
+            self.state.advance(self.active.gains.k_integral, position, tick_s, self.requested, self.applied);
         }
         during_this_tick
     }
@@ -419,7 +441,7 @@ impl<'t, const NX: usize, const NY: usize, T: Scalar> Controller<'t, NX, NY, T> 
     /// Force on the cart during this tick (N); valid between [`control`](Self::control) and
     /// [`predict`](Self::predict).
     fn acting(&self) -> T {
-        if self.has_memory && self.table.delay_ticks == 1 { self.state.pending } else { self.applied }
+        if self.active.has_memory && self.table.delay_ticks == 1 { self.state.pending } else { self.applied }
     }
 
     fn output(&self) -> T {
@@ -432,8 +454,6 @@ mod tests {
     use super::*;
     use crate::table::{Limits, ObserverGains, PerLaw, TABLE_FORMAT, Thresholds, columns};
     use nalgebra::{matrix, vector};
-
-    const BUILD: Build = Build { rig_hash: 7, tick_s: 0.5 };
 
     /// A cart of 2 kg without friction, held for half a second.
     fn table() -> GainTable<2, 1> {
@@ -472,7 +492,7 @@ mod tests {
     }
 
     fn controller(table: &GainTable<2, 1>) -> Controller<'_, 2, 1> {
-        let mut controller = Controller::new(table, &BUILD, [CounterWidth::Bits16]).unwrap();
+        let mut controller = Controller::new(table, [CounterWidth::Bits16]).unwrap();
         controller.start_in_state(&vector![0.0, 0.0]);
         controller
     }
@@ -513,6 +533,25 @@ mod tests {
     }
 
     #[test]
+    fn positions_give_the_same_bits_as_the_counts_of_them() {
+        let table = table();
+        let (mut by_counts, mut by_positions) = (controller(&table), controller(&table));
+        by_counts.start(&[3]).unwrap();
+        by_positions.start_at(&[3.0 * 0.25]).unwrap();
+        let bits = |command: MotorCommand| [command.requested_n, command.applied_n].map(f32::to_bits);
+        for tick in 0..50u32 {
+            let count = 3 + tick * tick % 7;
+            let wanted = bits(by_counts.control(&[count]));
+            assert_eq!(bits(by_positions.control_at(&[count as f32 * 0.25])), wanted, "{tick}");
+            assert_eq!(by_positions.estimate(), by_counts.estimate());
+            by_counts.predict();
+            by_positions.predict();
+        }
+        // Negative control: another position gives another force.
+        assert_ne!(bits(by_positions.control_at(&[0.26])), bits(by_counts.control(&[1])));
+    }
+
+    #[test]
     fn a_stopped_controller_gives_no_force() {
         let table = table();
         let mut controller = controller(&table);
@@ -541,15 +580,13 @@ mod tests {
             if sealed {
                 table.crc = table.checksum();
             }
-            Controller::new(&table, &BUILD, [CounterWidth::Bits16]).err()
+            Controller::new(&table, [CounterWidth::Bits16]).err()
         };
         assert_eq!(refused(&|_| (), true), None);
         assert_eq!(refused(&|t| t.format += 1, true), Some(TableError::Format));
         assert_eq!(refused(&|t| t.states = 3, true), Some(TableError::Dimensions));
         assert_eq!(refused(&|t| t.sensors = 2, true), Some(TableError::Dimensions));
         assert_eq!(refused(&|t| t.output = 2, true), Some(TableError::Dimensions));
-        assert_eq!(refused(&|t| t.rig_hash ^= 1, true), Some(TableError::RigHash));
-        assert_eq!(refused(&|t| t.tick_s = 0.002, true), Some(TableError::Tick));
         assert_eq!(refused(&|t| t.delay_ticks = 2, true), Some(TableError::Delay));
         assert_eq!(refused(&|t| t.force_limit_n = f32::NAN, true), Some(TableError::Value));
         assert_eq!(refused(&|t| t.laws.lqr = None, true), Some(TableError::NoLaw));

@@ -32,7 +32,6 @@ impl<const NX: usize, const NY: usize, S: SwingUp<NX, NY>> Firmware<'_, NX, NY, 
         let taken = |result: Result<(), _>| result.map_or_else(Answer::Rejected, |()| Answer::Done);
         match command.request {
             Request::Arm | Request::Goto(_) => self.restart_lockout(),
-            #[cfg(feature = "identify")]
             Request::Shake(_) => self.restart_lockout(),
             _ => {}
         }
@@ -71,11 +70,8 @@ impl<const NX: usize, const NY: usize, S: SwingUp<NX, NY>> Firmware<'_, NX, NY, 
                 (self.telemetry_period_ticks, self.ticks_to_telemetry) = (period_ticks, 0);
                 Answer::Done
             }
-            #[cfg(feature = "identify")]
             Request::Shake(shaking) => self.begin_shaking(shaking, command.id),
-            #[cfg(feature = "identify")]
             Request::Forces { first, forces } => self.take_forces(first, &forces),
-            #[cfg(feature = "identify")]
             Request::Log(is_kept) => {
                 self.keep_log(is_kept);
                 Answer::Done
@@ -166,7 +162,7 @@ impl<const NX: usize, const NY: usize, S: SwingUp<NX, NY>> Firmware<'_, NX, NY, 
             protocol: PROTOCOL,
             version: VERSION,
             rig_hash: self.table.rig_hash,
-            tick_s: self.table.tick_s,
+            tick_s: self.timer_tick_s,
             states: NX as u8,
             sensors: NY as u8,
             reset: self.start.reset,

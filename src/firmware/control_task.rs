@@ -26,13 +26,15 @@ pub struct ControlTask<'q, 't, B, const NX: usize, const NY: usize, S = NoSwingU
 impl<'q, 't, B: Board<NY>, const NX: usize, const NY: usize, S: SwingUp<NX, NY>>
     ControlTask<'q, 't, B, NX, NY, S>
 {
-    /// The task before its first tick; `commands` and `messages` lead from and to the serial link.
+    /// The task before its first tick. If the board's timer is set to another tick than the gain table is for, the
+    /// motor stays off: [`Fault::Table`](crate::supervision::fault::Fault::Table). `commands` and `messages` lead from and to the serial link.
     pub fn new(
-        firmware: Firmware<'t, NX, NY, S>,
+        mut firmware: Firmware<'t, NX, NY, S>,
         board: B,
         commands: Consumer<'q, Command>,
         messages: Producer<'q, Message<NX, NY>>,
     ) -> Self {
+        firmware.compare_tick(board.tick_s());
         Self { firmware, board, commands, messages, cycles: 0 }
     }
 
@@ -53,7 +55,6 @@ impl<'q, 't, B: Board<NY>, const NX: usize, const NY: usize, S: SwingUp<NX, NY>>
         self.firmware.accept(&inputs);
         let output = act(&mut self.firmware, &inputs);
         self.board.drive(output);
-        #[cfg(feature = "identify")]
         let log = self.firmware.log_tick();
         let command = queue::take(&mut self.commands);
         let telemetry = self.firmware.report(self.cycles);
@@ -66,7 +67,6 @@ impl<'q, 't, B: Board<NY>, const NX: usize, const NY: usize, S: SwingUp<NX, NY>>
         if let Some(telemetry) = telemetry {
             self.send(Message::Telemetry(telemetry));
         }
-        #[cfg(feature = "identify")]
         if let Some(log) = log {
             self.send(Message::Log(log));
         }

@@ -52,7 +52,7 @@ impl<const NX: usize, const NY: usize, S: SwingUp<NX, NY>> Firmware<'_, NX, NY, 
                 let force_n = share * table.limits.jog_force_n;
                 (self.requested_n, self.applied_n) = (force_n, force_n);
                 let drive = Drive::at_rest(force_n, table.motor.as_ref());
-                self.output = Output { enable: true, drive };
+                self.output = Output::on(drive, table.force_limit_n);
             }
             None => self.supervisor.disarm(),
         }

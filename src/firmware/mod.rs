@@ -10,11 +10,9 @@ pub mod control_task;
 pub mod hot_path;
 mod jog;
 mod posture;
-#[cfg(feature = "identify")]
 mod shake;
 mod swing_up;
 mod telemetry;
-#[cfg(feature = "identify")]
 mod tick_log;
 
 use crate::board::{Contacts, Inputs, Output};
@@ -23,7 +21,6 @@ use crate::control::encoder::CounterWidth;
 use crate::control::motion::Playback;
 use crate::protocol::message::{Command, Reply, Start, Statistics, Telemetry};
 use crate::protocol::telemetry_ticks;
-#[cfg(feature = "identify")]
 use crate::protocol::tick_log::TickLog;
 use crate::supervision::calibration::Calibration;
 use crate::supervision::debounce::Debounce;
@@ -31,10 +28,9 @@ use crate::supervision::detection::{Detection, Finding};
 use crate::supervision::envelope;
 use crate::supervision::fault::{Cause, Fault};
 use crate::supervision::jog::{Jog, MotorSign};
-#[cfg(feature = "identify")]
 use crate::supervision::shaking::Shaker;
 use crate::supervision::supervisor::{State, Supervisor};
-use crate::table::{Build, ChecksumScan, Equilibrium, GainTable, NoSwingUp, SwingUp, TableError};
+use crate::table::{ChecksumScan, Equilibrium, GainTable, NoSwingUp, SwingUp};
 
 /// Controller and supervisor of one rig, with its swing-up, if it has one.
 ///
@@ -82,13 +78,12 @@ pub struct Firmware<'t, const NX: usize, const NY: usize, S = NoSwingUp> {
     /// Telemetry is sent every n ticks; 0: never.
     telemetry_period_ticks: u16,
     ticks_to_telemetry: u16,
-    #[cfg(feature = "identify")]
+    /// The tick of the board's timer (s).
+    timer_tick_s: f32,
     shaker: Shaker<NY>,
     /// Motor voltage of the previous tick, while the rig is shaken (V).
-    #[cfg(feature = "identify")]
     last_volts: f32,
     /// Logged ticks that are not yet sent; `None` while no log is kept.
-    #[cfg(feature = "identify")]
     log: Option<TickLog<NY>>,
 }
 
@@ -96,73 +91,29 @@ pub struct Firmware<'t, const NX: usize, const NY: usize, S = NoSwingUp> {
 /// motor comes on. In other states it is one.
 const WORDS_PER_ARMED_TICK: u32 = 8;
 
-impl<'t, const NX: usize, const NY: usize> Firmware<'t, NX, NY> {
-    /// The firmware without swing-up, motor off. `start` is what the board knows about its start: a [`Start`], or just
-    /// a [`Reset`](crate::protocol::message::Reset).
-    ///
-    /// # Errors
-    /// [`TableError`] if the table is damaged or was made for another build.
-    pub fn new(
-        table: &'t GainTable<NX, NY>,
-        build: &Build,
-        widths: [CounterWidth; NY],
-        start: impl Into<Start>,
-    ) -> Result<Self, TableError> {
-        Self::with_swing_up(table, &NoSwingUp, build, widths, start)
-    }
-}
+/// A timer counts whole cycles, so its tick may differ from the table's by this share.
+const TICK_TOLERANCE: f32 = 1e-3;
 
 impl<'t, const NX: usize, const NY: usize, S: SwingUp<NX, NY>> Firmware<'t, NX, NY, S> {
-    /// The firmware, motor off; `start` as for [`new`](Self::new).
+    /// The firmware, motor off. `start` is what the board knows about its start: a [`Start`], or just a
+    /// [`Reset`](crate::protocol::message::Reset). Without swing-up, `swing_up` is [`NoSwingUp`].
     ///
-    /// # Errors
-    /// [`TableError`] if a table is damaged or was made for another build.
-    pub fn with_swing_up(
+    /// There is a firmware for every table: if one is damaged, [`Fault::Table`] is latched, cannot be cleared, and is
+    /// reported to the host. To know before, call [`GainTable::check`] and [`SwingUp::check`].
+    // Returns no `Result`, which would put a copy of the firmware on the stack.
+    #[inline(never)]
+    pub fn new(
         table: &'t GainTable<NX, NY>,
         swing_up: &'t S,
-        build: &Build,
         widths: [CounterWidth; NY],
         start: impl Into<Start>,
-    ) -> Result<Self, TableError> {
-        swing_up.check(build)?;
-        Ok(Self::with_controller(table, swing_up, Controller::new(table, build, widths)?, start.into(), true))
-    }
-
-    /// [`with_swing_up`](Self::with_swing_up) if the tables are sound, otherwise [`unusable`](Self::unusable). Returns
-    /// no `Result`, which would put a copy of the firmware on the stack.
-    #[inline(never)]
-    pub fn of_any_table(
-        table: &'t GainTable<NX, NY>,
-        swing_up: &'t S,
-        build: &Build,
-        widths: [CounterWidth; NY],
-        start: Start,
     ) -> Self {
-        let are_sound = swing_up.check(build).is_ok() && table.check(build).is_ok();
-        match Controller::with_checked(table, widths) {
-            Ok(controller) if are_sound => Self::with_controller(table, swing_up, controller, start, true),
-            _ => Self::unusable(table, swing_up, widths, start),
-        }
-    }
-
-    /// The firmware with a table that cannot be used: it has latched [`Fault::Table`], which cannot be cleared, and
-    /// reports it.
-    pub fn unusable(
-        table: &'t GainTable<NX, NY>,
-        swing_up: &'t S,
-        widths: [CounterWidth; NY],
-        start: Start,
-    ) -> Self {
-        Self::with_controller(table, swing_up, Controller::unusable(table, widths), start, false)
-    }
-
-    fn with_controller(
-        table: &'t GainTable<NX, NY>,
-        swing_up: &'t S,
-        controller: Controller<'t, NX, NY>,
-        start: Start,
-        is_usable: bool,
-    ) -> Self {
+        let start = start.into();
+        let are_sound = swing_up.check(table).is_ok() && table.check().is_ok();
+        let (controller, is_usable) = match Controller::with_checked(table, widths) {
+            Ok(controller) if are_sound => (controller, true),
+            _ => (Controller::unusable(table, widths), false),
+        };
         let at_start = |fault| Cause { fault, tick: 0, sensor: None };
         let mut supervisor = Supervisor::new(start.reset.fault().map(at_start));
         if !is_usable {
@@ -201,12 +152,21 @@ impl<'t, const NX: usize, const NY: usize, S: SwingUp<NX, NY>> Firmware<'t, NX, 
             start,
             telemetry_period_ticks: telemetry_ticks(table.tick_s),
             ticks_to_telemetry: 0,
-            #[cfg(feature = "identify")]
+            timer_tick_s: table.tick_s,
             shaker: Shaker::default(),
-            #[cfg(feature = "identify")]
             last_volts: 0.0,
-            #[cfg(feature = "identify")]
             log: None,
+        }
+    }
+
+    /// Takes the tick of the board's timer (s). If it is not the table's, [`Fault::Table`] is latched, cannot be
+    /// cleared, and [`Info::tick_s`](crate::protocol::message::Info::tick_s) is that of the timer.
+    pub(crate) fn compare_tick(&mut self, timer_tick_s: f32) {
+        let difference = f32::abs(timer_tick_s - self.table.tick_s);
+        // Also if it is NaN.
+        if !(difference <= TICK_TOLERANCE * self.table.tick_s) {
+            (self.timer_tick_s, self.is_usable) = (timer_tick_s, false);
+            self.trip(Fault::Table, None);
         }
     }
 
@@ -264,7 +224,6 @@ impl<'t, const NX: usize, const NY: usize, S: SwingUp<NX, NY>> Firmware<'t, NX, 
         }
         match self.supervisor.state() {
             State::Jogging => self.push_cart(inputs),
-            #[cfg(feature = "identify")]
             State::Identifying => self.shake(inputs),
             state if !state.motor_is_on() => self.tick_motor_off(),
             _ => {}
@@ -277,7 +236,6 @@ impl<'t, const NX: usize, const NY: usize, S: SwingUp<NX, NY>> Firmware<'t, NX, 
         self.output = match self.supervisor.state() {
             State::Balancing => self.balance(inputs),
             State::Jogging => self.output,
-            #[cfg(feature = "identify")]
             State::Identifying => self.output,
             State::Raising | State::Holding | State::Lowering if S::IS_POSSIBLE => self.move_links(inputs),
             _ => Output::OFF,
@@ -323,7 +281,7 @@ impl<'t, const NX: usize, const NY: usize, S: SwingUp<NX, NY>> Firmware<'t, NX, 
         } else if let Some(fault) = of_force {
             self.trip(fault, None);
         } else {
-            return Output { enable: true, drive: command.drive };
+            return Output::on(command.drive, table.force_limit_n);
         }
         Output::OFF
     }
@@ -363,7 +321,6 @@ impl<'t, const NX: usize, const NY: usize, S: SwingUp<NX, NY>> Firmware<'t, NX, 
             | State::Holding
             | State::Lowering
             | State::Fault => {}
-            #[cfg(feature = "identify")]
             State::Identifying => {}
         }
     }

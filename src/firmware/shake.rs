@@ -63,7 +63,7 @@ impl<const NX: usize, const NY: usize, S: SwingUp<NX, NY>> Firmware<'_, NX, NY, 
             Ok(Some(force_n)) => {
                 let (drive, applied_n) = self.actuate(force_n);
                 (self.requested_n, self.applied_n) = (force_n, applied_n);
-                self.output = Output { enable: true, drive };
+                self.output = Output::on(drive, self.table.force_limit_n);
             }
             Ok(None) => self.supervisor.disarm(),
             Err((fault, sensor)) => self.trip(fault, sensor),

@@ -1,17 +1,17 @@
 //! Tests of whole ticks of the firmware.
 
+use heapless::spsc::Queue;
+
+use super::control_task::{COMMANDS, ControlTask, MESSAGES};
 use super::*;
-use crate::gains::{RIG_HASH, SENSORS, STATES, TABLE, TICK_S};
-use crate::protocol::message::{Answer, Request, Reset};
+use crate::board::Board;
+use crate::control::actuator::Drive;
+use crate::gains::{SENSORS, STATES, TABLE, TICK_S};
+use crate::protocol::message::{Answer, Message, Request, Reset};
 use crate::supervision::inhibits::Inhibits;
 
-const BUILD: Build = Build { rig_hash: RIG_HASH, tick_s: TICK_S };
-
-fn firmware<'t>(
-    table: &'t GainTable<STATES, SENSORS>,
-    reset: Reset,
-) -> Result<Firmware<'t, STATES, SENSORS>, TableError> {
-    Firmware::new(table, &BUILD, [CounterWidth::Bits32; SENSORS], reset)
+fn firmware<'t>(table: &'t GainTable<STATES, SENSORS>, reset: Reset) -> Firmware<'t, STATES, SENSORS> {
+    Firmware::new(table, &NoSwingUp, [CounterWidth::Bits32; SENSORS], reset)
 }
 
 const INPUTS: Inputs<SENSORS> = Inputs {
@@ -42,8 +42,8 @@ fn a_table_that_changes_in_memory_is_found_within_one_pass() {
     let sound = TABLE;
     let mut damaged = TABLE;
     damaged.limits.sign_counts[2] ^= 1 << 20;
-    assert_eq!(firmware(&damaged, Reset::Power).err(), Some(TableError::Crc));
-    let mut firmware = firmware(&sound, Reset::Power).unwrap();
+    assert_eq!(firmware(&damaged, Reset::Power).supervisor.fault(), Some(Fault::Table));
+    let mut firmware = firmware(&sound, Reset::Power);
     assert_eq!(ticks_to_fault(&mut firmware), None);
     firmware.table = &damaged;
     let (tick, fault) = ticks_to_fault(&mut firmware).unwrap();
@@ -55,7 +55,7 @@ fn a_table_that_changes_in_memory_is_found_within_one_pass() {
 #[test]
 fn a_reset_by_the_watchdog_starts_disarmed_and_tells_why() {
     for (reset, fault) in [(Reset::Watchdog, Fault::Watchdog), (Reset::Software, Fault::Crash)] {
-        let mut firmware = firmware(&TABLE, reset).unwrap();
+        let mut firmware = firmware(&TABLE, reset);
         assert_eq!(firmware.control(&INPUTS), Output::OFF);
         assert_eq!(
             (firmware.state(), firmware.cause().map(|cause| cause.fault)),
@@ -72,7 +72,7 @@ fn a_reset_by_the_watchdog_starts_disarmed_and_tells_why() {
 #[test]
 fn a_fault_of_motor_or_encoder_puts_the_motors_sign_in_doubt_and_no_other_does() {
     for entry in Fault::ALL {
-        let mut firmware = firmware(&TABLE, Reset::Power).unwrap();
+        let mut firmware = firmware(&TABLE, Reset::Power);
         let sign_counts = TABLE.limits.sign_counts[0];
         firmware.jog.hold();
         firmware.jog.begin(true, 0);
@@ -86,7 +86,7 @@ fn a_fault_of_motor_or_encoder_puts_the_motors_sign_in_doubt_and_no_other_does()
 
 #[test]
 fn the_cart_is_homed_between_its_switches() {
-    let mut firmware = firmware(&TABLE, Reset::Power).unwrap();
+    let mut firmware = firmware(&TABLE, Reset::Power);
     let mut step = |cart: i32, request: Option<Request>| {
         let contacts =
             Contacts { limit_low: cart <= -90_000, limit_high: cart >= 110_000, ..INPUTS.contacts };
@@ -111,7 +111,7 @@ fn the_cart_is_homed_between_its_switches() {
 
 #[test]
 fn a_rail_of_another_length_is_not_homed() {
-    let mut firmware = firmware(&TABLE, Reset::Power).unwrap();
+    let mut firmware = firmware(&TABLE, Reset::Power);
     let command = Command { id: 1, request: Request::HomeRail };
     firmware.control(&INPUTS);
     firmware.finish(Some(&command), 0);
@@ -157,7 +157,7 @@ fn cause_of(faults: &[Fault], ticks_of_a_pass: u32) -> Option<Cause> {
     }
     strict.crc ^= u32::from(due(Fault::Table));
 
-    let mut firmware = firmware(&TABLE, Reset::Power).unwrap();
+    let mut firmware = firmware(&TABLE, Reset::Power);
     // If a table fault is due, the pass ends in the last tick. Otherwise it ends later: it would find that the tables
     // differ.
     let sooner = if due(Fault::Table) { 0 } else { 10 };
@@ -201,7 +201,7 @@ fn cause_of(faults: &[Fault], ticks_of_a_pass: u32) -> Option<Cause> {
 fn of_several_faults_in_one_tick_the_first_of_the_precedence_is_latched() {
     let mut damaged = TABLE;
     damaged.crc ^= 1;
-    let mut other = firmware(&TABLE, Reset::Power).unwrap();
+    let mut other = firmware(&TABLE, Reset::Power);
     other.table = &damaged;
     let (ticks_of_a_pass, _) = ticks_to_fault(&mut other).unwrap();
     // A balancing rig follows no motion.
@@ -219,7 +219,7 @@ fn of_several_faults_in_one_tick_the_first_of_the_precedence_is_latched() {
 /// Whether arming is refused as a held key's command, when `request` has been repeated in every tick since a fault was
 /// cleared.
 fn is_held_after_repeating(request: Request) -> bool {
-    let mut firmware = firmware(&TABLE, Reset::Power).unwrap();
+    let mut firmware = firmware(&TABLE, Reset::Power);
     let mut id = 0;
     let mut inhibits = |firmware: &mut Firmware<'_, STATES, SENSORS>, request| {
         id += 1;
@@ -244,4 +244,65 @@ fn a_held_key_keeps_the_motor_off_whatever_else_refuses_its_command() {
     assert!(is_held_after_repeating(Request::Arm));
     assert!(is_held_after_repeating(Request::Goto(Equilibrium::UPRIGHT)), "there is no swing-up");
     assert!(!is_held_after_repeating(Request::KeepAlive), "which turns no motor on");
+}
+
+/// A board whose timer is set to `tick_s`.
+struct Timed {
+    tick_s: f32,
+    output: Output,
+}
+
+impl Board<SENSORS> for Timed {
+    const WIDTHS: [CounterWidth; SENSORS] = [CounterWidth::Bits32; SENSORS];
+
+    fn tick_s(&self) -> f32 {
+        self.tick_s
+    }
+
+    fn inputs(&mut self) -> Inputs<SENSORS> {
+        INPUTS
+    }
+
+    fn drive(&mut self, output: &Output) {
+        self.output = *output;
+    }
+
+    fn feed_watchdog(&mut self) {}
+
+    fn cycles(&self) -> u32 {
+        0
+    }
+}
+
+/// The latched fault after Clear, and the tick that the firmware reports, on a board with this tick.
+fn on_a_board_with(tick_s: f32) -> (Option<Fault>, f32) {
+    let (mut commands, mut messages) = (Queue::<_, COMMANDS>::new(), Queue::<_, MESSAGES>::new());
+    let ((mut to_task, commands), (messages, mut from_task)) = (commands.split(), messages.split());
+    let board = Timed { tick_s, output: Output::OFF };
+    let mut task = ControlTask::new(firmware(&TABLE, Reset::Power), board, commands, messages);
+    for (id, request) in [(1, Request::Clear), (2, Request::Info)] {
+        to_task.enqueue(Command { id, request }).unwrap();
+        task.tick();
+    }
+    let tick_s = core::iter::from_fn(|| from_task.dequeue()).find_map(|message| match message {
+        Message::Reply(Reply { answer: Answer::Info(info), .. }) => Some(info.tick_s),
+        _ => None,
+    });
+    (task.firmware().supervisor.fault(), tick_s.unwrap())
+}
+
+#[test]
+fn a_timer_with_another_tick_than_the_tables_keeps_the_motor_off_and_is_reported() {
+    assert_eq!(on_a_board_with(TICK_S), (None, TICK_S));
+    assert_eq!(on_a_board_with(TICK_S * 1.0005), (None, TICK_S), "whole cycles");
+    assert_eq!(on_a_board_with(2.0 * TICK_S), (Some(Fault::Table), 2.0 * TICK_S));
+    assert_eq!(on_a_board_with(f32::NAN).0, Some(Fault::Table));
+}
+
+#[test]
+fn the_output_carries_the_duty_that_a_board_sets() {
+    assert_eq!((Output::OFF.enable, Output::OFF.duty), (false, 0.0));
+    let output = Output::on(Drive::Force(-5.0), 20.0);
+    assert_eq!((output.enable, output.duty), (true, -0.25));
+    assert_eq!(Output::on(Drive::Duty(0.5), 20.0).duty, 0.5);
 }

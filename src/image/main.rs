@@ -37,10 +37,10 @@ mod app {
     use upright::board::Board;
     use upright::firmware::control_task::{COMMANDS, ControlTask, MESSAGES};
     use upright::firmware::{Firmware, hot_path};
-    use upright::gains::{RIG_HASH, SENSORS, STATES, SWING_UP, SwingUp, TABLE, TICK_S};
+    use upright::gains::{SENSORS, STATES, SWING_UP, SwingUp, TABLE};
     use upright::protocol::message::{Command, Message};
     use upright::protocol::serial_link::SerialLink;
-    use upright::table::{Build, GainTable};
+    use upright::table::GainTable;
 
     use crate::board::{Buffer, Hardware, SerialLine, set_up, start_ticks};
 
@@ -62,12 +62,11 @@ mod app {
         table: GainTable<STATES, SENSORS> = TABLE,
     ])]
     fn init(cx: init::Context) -> (Shared, Local) {
-        let build = Build { rig_hash: RIG_HASH, tick_s: TICK_S };
         let table = &*cx.local.table;
         let (hardware, line, start) = set_up(cx.device, cx.local.buffer);
         let (to_control, commands) = cx.local.commands.split();
         let (messages, to_link) = cx.local.messages.split();
-        let firmware = Firmware::of_any_table(table, &SWING_UP, &build, Hardware::WIDTHS, start);
+        let firmware = Firmware::new(table, &SWING_UP, Hardware::WIDTHS, start);
         let mut control = ControlTask::new(firmware, hardware, commands, messages);
         control.board().start_watchdog();
         start_ticks(cx.core.SYST, crate::CYCLES_PER_TICK);

@@ -6,7 +6,6 @@
 use cobs::{DecodeResult, DecoderState};
 use serde::{Deserialize, Serialize};
 
-use crate::protocol::encoder;
 use crate::table::checksum::crc32;
 
 const CRC_BYTES: usize = 4;
@@ -43,13 +42,17 @@ impl core::error::Error for FrameError {}
 /// `scratch` holds the message before COBS.
 ///
 /// # Errors
-/// [`FrameError::Long`] if either buffer is too small.
+/// [`FrameError::Long`] if either buffer is too small, [`FrameError::Message`] if the message cannot be encoded.
 pub fn encode<'a, T: Serialize>(
     message: &T,
     scratch: &mut [u8],
     out: &'a mut [u8],
 ) -> Result<&'a [u8], FrameError> {
-    let length = encoder::encode(message, scratch)?;
+    let length = match postcard::to_slice(message, scratch) {
+        Ok(body) => body.len(),
+        Err(postcard::Error::SerializeBufferFull) => return Err(FrameError::Long),
+        Err(_) => return Err(FrameError::Message),
+    };
     let (body, rest) = scratch.split_at_mut_checked(length).ok_or(FrameError::Long)?;
     let crc = crc32(0, body).to_le_bytes();
     rest.get_mut(..CRC_BYTES).ok_or(FrameError::Long)?.copy_from_slice(&crc);

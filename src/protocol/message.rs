@@ -8,13 +8,11 @@ use serde::{Deserialize, Serialize};
 
 use crate::board::Contacts;
 use crate::control::controller::Rejected;
-#[cfg(feature = "identify")]
 use crate::protocol::tick_log::TickLog;
 use crate::supervision::fault::{Cause, Fault};
 use crate::supervision::homing::Homing;
 use crate::supervision::inhibits::Inhibits;
 use crate::supervision::jog::MotorSign;
-#[cfg(feature = "identify")]
 use crate::supervision::shaking::{FORCES, Shaking};
 use crate::supervision::sign_check::Signs;
 use crate::supervision::supervisor::State;
@@ -76,13 +74,10 @@ pub enum Request {
         /// Whether to push along +x, or against it.
         along: bool,
     },
-    /// Shake the hanging rig with the forces that follow. Only an image for identification knows this request and
-    /// those below.
-    #[cfg(feature = "identify")]
+    /// Shake the hanging rig with the forces that follow.
     Shake(Shaking),
     /// Forces for coming ticks, relative to the largest one: [`FULL`](crate::supervision::shaking::FULL) stands for
     /// all of it.
-    #[cfg(feature = "identify")]
     Forces {
         /// Low 16 bits of the number of the tick that the first force is for.
         first: u16,
@@ -90,7 +85,6 @@ pub enum Request {
         forces: [i8; FORCES],
     },
     /// Start sending a log of every tick (`true`), or stop (`false`).
-    #[cfg(feature = "identify")]
     Log(bool),
 }
 
@@ -103,8 +97,7 @@ pub enum Message<const NX: usize, const NY: usize> {
     Telemetry(Telemetry<NX, NY>),
     /// The answer to a command.
     Reply(Reply),
-    /// Consecutive ticks of the log, from an image for identification.
-    #[cfg(feature = "identify")]
+    /// Consecutive ticks of the log.
     Log(TickLog<NY>),
 }
 
@@ -145,7 +138,7 @@ pub struct Info {
     pub version: [u8; 3],
     /// Hash of the rig file's values.
     pub rig_hash: u64,
-    /// Control period (s).
+    /// Control period (s): the gain table's, or, if the board's timer is set to another one, the timer's.
     pub tick_s: f32,
     /// Number of states.
     pub states: u8,
@@ -175,21 +168,9 @@ impl From<Reset> for Start {
     }
 }
 
-/// Where the program crashed, and the processor's fault registers (ARM DDI 0403, B3.2). Program counter and link
-/// register are 0 after a panic, and after a stack overflow, which leaves no room for them.
+/// What the board recorded of a crash, in words that only those who know its processor can read.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
-pub struct CrashRecord {
-    /// Program counter (PC).
-    pub pc: u32,
-    /// Link register (LR): where the function returns to, unless it has used the register for something else.
-    pub lr: u32,
-    /// Configurable fault status (CFSR).
-    pub cfsr: u32,
-    /// HardFault status (HFSR).
-    pub hfsr: u32,
-    /// Address of a bus fault (BFAR); valid if bit 15 of CFSR is set.
-    pub bfar: u32,
-}
+pub struct CrashRecord(pub [u32; 5]);
 
 /// Why the microcontroller started.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]

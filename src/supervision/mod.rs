@@ -13,7 +13,6 @@ pub mod fault;
 pub mod homing;
 pub mod inhibits;
 pub mod jog;
-#[cfg(feature = "identify")]
 pub mod shaking;
 pub mod sign_check;
 pub mod stillness;

@@ -29,19 +29,14 @@ pub enum State {
     Lowering,
     /// A fault is latched.
     Fault,
-    /// The motor shakes the hanging links, for an identification. Only an image for identification has it.
-    #[cfg(feature = "identify")]
+    /// The motor shakes the hanging links, for an identification.
     Identifying,
 }
 
 impl State {
     /// Whether the motor is on.
     pub const fn motor_is_on(self) -> bool {
-        #[cfg(feature = "identify")]
-        if matches!(self, State::Identifying) {
-            return true;
-        }
-        self.controls() || matches!(self, State::Jogging)
+        self.controls() || matches!(self, State::Jogging | State::Identifying)
     }
 
     /// Whether the controller commands the motor.
@@ -113,7 +108,6 @@ impl Supervisor {
             | State::Balancing
             | State::Holding
             | State::Lowering => self.state = State::Calibrated,
-            #[cfg(feature = "identify")]
             State::Identifying => self.state = State::Calibrated,
             State::Homing => self.state = State::Disarmed,
             State::Disarmed | State::Calibrated | State::Fault => {}
@@ -151,7 +145,6 @@ impl Supervisor {
             | State::Balancing
             | State::Holding
             | State::Lowering => Err(Inhibits::RUNNING),
-            #[cfg(feature = "identify")]
             State::Identifying => Err(Inhibits::RUNNING),
             State::Fault => Err(Inhibits::FAULT),
         }
@@ -178,7 +171,6 @@ impl Supervisor {
             | State::Balancing
             | State::Holding
             | State::Lowering => Inhibits::RUNNING,
-            #[cfg(feature = "identify")]
             State::Identifying => Inhibits::RUNNING,
             State::Fault => Inhibits::FAULT,
         })
@@ -198,7 +190,6 @@ impl Supervisor {
     ///
     /// # Errors
     /// All inhibits that hold.
-    #[cfg(feature = "identify")]
     pub fn start_identifying(&mut self, other: Inhibits) -> Result<(), Inhibits> {
         self.arming_inhibits().union(other).err_if_any()?;
         self.state = State::Identifying;

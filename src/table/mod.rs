@@ -80,15 +80,6 @@ pub const fn columns<const R: usize, const C: usize>(entries: [[f32; R]; C]) -> 
     SMatrix::from_array_storage(ArrayStorage(entries))
 }
 
-/// The rig and tick for which the firmware was built; a table must match both.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Build {
-    /// Hash of the values in the rig file.
-    pub rig_hash: u64,
-    /// Control period of the hardware timer (s).
-    pub tick_s: f32,
-}
-
 /// Reason for refusing a table.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum TableError {
@@ -98,9 +89,9 @@ pub enum TableError {
     Dimensions,
     /// The checksum does not match the contents.
     Crc,
-    /// Designed for another rig.
+    /// The swing-up is that of another rig than the gains.
     RigHash,
-    /// Designed for another control period.
+    /// The swing-up is for another control period than the gains.
     Tick,
     /// A delay other than 0 or 1 tick.
     Delay,
@@ -118,8 +109,8 @@ impl core::fmt::Display for TableError {
             TableError::Crc => {
                 "the table's checksum is wrong: it was changed or damaged, run `upright design` again"
             }
-            TableError::RigHash => "the table was designed for another rig",
-            TableError::Tick => "the table was designed for another control period",
+            TableError::RigHash => "the swing-up was designed for another rig than the gains",
+            TableError::Tick => "the swing-up was designed for another control period than the gains",
             TableError::Delay => "the table's delay is neither 0 nor 1 tick",
             TableError::Value => {
                 "the table holds a value that is not finite, or a limit that is not positive"
@@ -143,11 +134,11 @@ impl<const NX: usize, const NY: usize> GainTable<NX, NY> {
         self.motor.as_ref().map_or(f32::INFINITY, MotorMap::supply_max_v)
     }
 
-    /// Checks that the table is intact, plausible and made for this build.
+    /// Checks that the table is intact, plausible and of this version.
     ///
     /// # Errors
     /// The first [`TableError`] found.
-    pub fn check(&self, build: &Build) -> Result<(), TableError> {
+    pub fn check(&self) -> Result<(), TableError> {
         if self.format != TABLE_FORMAT {
             return Err(TableError::Format);
         }
@@ -156,12 +147,6 @@ impl<const NX: usize, const NY: usize> GainTable<NX, NY> {
         }
         if self.crc != self.checksum() {
             return Err(TableError::Crc);
-        }
-        if self.rig_hash != build.rig_hash {
-            return Err(TableError::RigHash);
-        }
-        if self.tick_s.to_bits() != build.tick_s.to_bits() {
-            return Err(TableError::Tick);
         }
         if self.delay_ticks > 1 {
             return Err(TableError::Delay);
@@ -186,12 +171,6 @@ impl<const NX: usize, const NY: usize, T: Scalar> GainTable<NX, NY, T> {
     /// The gains of a law, if they are in the table.
     pub fn law(&self, law: Law) -> Option<&LawGains<NX, T>> {
         self.laws[law].as_ref()
-    }
-
-    /// Whether the force depends on earlier ticks by more than the estimate: through a pending force or an integral.
-    pub(crate) fn has_memory(&self, gains: &LawGains<NX, T>) -> bool {
-        let zero = T::default();
-        self.delay_ticks == 1 || gains.k_pending != zero || gains.k_integral != zero
     }
 }
 

@@ -6,7 +6,7 @@
 
 use crate::table::checksum::{ChecksumScan, checksum};
 use crate::table::part::{Part, Reader, Resize, Words, WordsMut, is_finite, part};
-use crate::table::{Build, ChainModel, Equilibrium, TABLE_FORMAT, TableError, Thresholds};
+use crate::table::{ChainModel, Equilibrium, GainTable, TABLE_FORMAT, TableError, Thresholds};
 
 part! {
     /// A planned motion with its gains.
@@ -155,25 +155,25 @@ impl<const NY: usize, const N: usize> SwingUpTable<'_, NY, N> {
         checksum(self)
     }
 
-    /// Checks that the table is intact, plausible and made for this build with `states` states.
+    /// Checks that the table is intact, plausible and made for the same rig and tick as the gain table `gains`.
     ///
     /// # Errors
     /// The first [`TableError`] found.
-    pub fn check(&self, build: &Build, states: usize) -> Result<(), TableError> {
+    pub fn check<const NX: usize>(&self, gains: &GainTable<NX, NY>) -> Result<(), TableError> {
         if self.format != TABLE_FORMAT {
             return Err(TableError::Format);
         }
         if self.crc != self.checksum() {
             return Err(TableError::Crc);
         }
-        if self.rig_hash != build.rig_hash {
+        if self.rig_hash != gains.rig_hash {
             return Err(TableError::RigHash);
         }
-        if self.tick_s.to_bits() != build.tick_s.to_bits() {
+        if self.tick_s.to_bits() != gains.tick_s.to_bits() {
             return Err(TableError::Tick);
         }
-        let complete = |motion: &MotionTable<'_>| motion.has_all_knots(states, NY);
-        if states != 2 * N + 2 || NY != N + 1 || !complete(&self.raise) || !complete(&self.lower) {
+        let complete = |motion: &MotionTable<'_>| motion.has_all_knots(NX, NY);
+        if NX != 2 * N + 2 || NY != N + 1 || !complete(&self.raise) || !complete(&self.lower) {
             return Err(TableError::Dimensions);
         }
         let fits = |TransitionTable { from, to, motion }: &TransitionTable<'_>| {
@@ -202,7 +202,7 @@ pub trait SwingUp<const NX: usize, const NY: usize> {
     ///
     /// # Errors
     /// The first [`TableError`] found.
-    fn check(&self, build: &Build) -> Result<(), TableError>;
+    fn check(&self, gains: &GainTable<NX, NY>) -> Result<(), TableError>;
 
     /// Adds a word to the scan of the table; after the last word, returns whether the table is intact.
     fn scan<'a>(&'a self, scan: &mut ChecksumScan<'a>) -> Option<bool>;
@@ -252,7 +252,7 @@ impl<const NX: usize, const NY: usize> SwingUp<NX, NY> for NoSwingUp {
 
     fn predict(&self, _: &mut [f32; NX], _: f32, _: f32) {}
 
-    fn check(&self, _: &Build) -> Result<(), TableError> {
+    fn check(&self, _: &GainTable<NX, NY>) -> Result<(), TableError> {
         Ok(())
     }
 
@@ -274,8 +274,8 @@ impl<const NX: usize, const NY: usize, const N: usize> SwingUp<NX, NY> for Swing
         self.model.predict(state, force, dt);
     }
 
-    fn check(&self, build: &Build) -> Result<(), TableError> {
-        SwingUpTable::check(self, build, NX)
+    fn check(&self, gains: &GainTable<NX, NY>) -> Result<(), TableError> {
+        SwingUpTable::check(self, gains)
     }
 
     fn scan<'a>(&'a self, scan: &mut ChecksumScan<'a>) -> Option<bool> {
@@ -297,8 +297,8 @@ impl<const NX: usize, const NY: usize, S: SwingUp<NX, NY>> SwingUp<NX, NY> for O
         }
     }
 
-    fn check(&self, build: &Build) -> Result<(), TableError> {
-        self.as_ref().map_or(Ok(()), |table| table.check(build))
+    fn check(&self, gains: &GainTable<NX, NY>) -> Result<(), TableError> {
+        self.as_ref().map_or(Ok(()), |table| table.check(gains))
     }
 
     fn scan<'a>(&'a self, scan: &mut ChecksumScan<'a>) -> Option<bool> {

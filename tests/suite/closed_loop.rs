@@ -2,16 +2,15 @@
 
 use crate::bench::*;
 use upright::control::controller::Controller;
-use upright::gains::{RIG_HASH, STATES, TABLE, TICK_S};
-use upright::table::{Build, Law};
+use upright::gains::{STATES, TABLE};
+use upright::table::Law;
 use upright_design::simulate::{Bench, Scenario, Summary, simulate};
 
 /// Runs `gains::TABLE` in the firmware's own controller, in the simplest possible loop. Returns the whole state at
 /// every tick.
 fn firmware_alone(scenario: &Scenario) -> Vec<[f64; STATES]> {
     let rig = rig_of_the_firmware();
-    let build = Build { rig_hash: RIG_HASH, tick_s: TICK_S };
-    let mut controller = Controller::new(&TABLE, &build, Bench::widths()).unwrap();
+    let mut controller = Controller::new(&TABLE, Bench::widths()).unwrap();
     let mut bench = Bench::new(&rig, scenario).unwrap();
     controller.select(scenario.law).unwrap();
     controller.set_setpoint(scenario.step_m as f32).unwrap();

@@ -158,7 +158,7 @@ fn with_widths<const NX: usize, const NY: usize>(
     let rig = rig(name);
     let values = table(&rig);
     let table = values.table::<NX, NY>();
-    let mut controller = Controller::new(&table, &values.build(), assumed).unwrap();
+    let mut controller = Controller::new(&table, assumed).unwrap();
     controller.select(law).unwrap();
     let mut scenario = Scenario { counter_start, force_noise_n: 0.1, ..Scenario::at_rest(&rig, law) };
     scenario.start[2] = 0.005;

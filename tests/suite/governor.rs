@@ -126,7 +126,7 @@ fn the_governed_set_point_is_monotone_and_arrives_exactly() {
 /// Runs a list of requests, each held for its number of ticks; `None` if a link fell.
 fn requests(rig: &Rig, values: &TableValues, law: Law, requests: &[(f32, u32)]) -> Option<Peaks> {
     let table = values.table::<10, 5>();
-    let mut controller = Controller::new(&table, &values.build(), [CounterWidth::Bits32; 5]).unwrap();
+    let mut controller = Controller::new(&table, [CounterWidth::Bits32; 5]).unwrap();
     controller.select(law).unwrap();
     let scenario = Scenario { substeps: 1, ..at_rest(rig, law) };
     let mut bench = Bench::new(rig, &scenario).unwrap();

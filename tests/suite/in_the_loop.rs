@@ -37,7 +37,7 @@ fn with_stored_motions(name: &'static str, others: &[&str]) -> (Rig, TableValues
     } else {
         StoredTransitions::beside(&rig_path(name)).unwrap().transitions(&rig).unwrap()
     };
-    transitions.retain(|planned| others.contains(&planned.transition.name(rig.states() / 2 - 1).as_str()));
+    transitions.retain(|(transition, _)| others.contains(&transition.name(rig.states() / 2 - 1).as_str()));
     let table = with_motions(&rig, table(&rig), stored_motions(name), &transitions).unwrap();
     (rig, table)
 }

@@ -128,7 +128,7 @@ fn law_alone(rig: &Rig, conditional: bool) -> Vec<f64> {
     let values = raw_table(rig);
     let table = values.table::<2, 1>();
     let mut bench = Bench::new(rig, &at_rest(rig, Law::Lqr)).unwrap();
-    let mut controller = Controller::new(&table, &values.build(), [CounterWidth::Bits32]).unwrap();
+    let mut controller = Controller::new(&table, [CounterWidth::Bits32]).unwrap();
     controller.start_in_state(&SVector::zeros());
     controller.set_setpoint(FAR_M as f32).unwrap();
     let mut positions = Vec::new();

@@ -9,10 +9,8 @@ use upright::control::controller::Controller;
 use upright::control::encoder::CounterWidth;
 use upright::control::state_feedback::saturate;
 use upright::table::{
-    Build, FrictionMap, GainTable, LawGains, Limits, ObserverGains, PerLaw, TABLE_FORMAT, Thresholds,
+    FrictionMap, GainTable, LawGains, Limits, ObserverGains, PerLaw, TABLE_FORMAT, Thresholds,
 };
-
-const BUILD: Build = Build { rig_hash: 1, tick_s: 0.01 };
 
 /// Structure of Ad, which decides the code path of the prediction.
 #[derive(Debug, Clone, Copy)]
@@ -49,8 +47,8 @@ fn table<const NX: usize, const NY: usize>(
         states: NX as u32,
         sensors: NY as u32,
         output: 0,
-        rig_hash: BUILD.rig_hash,
-        tick_s: BUILD.tick_s,
+        rig_hash: 1,
+        tick_s: 0.01,
         delay_ticks,
         force_limit_n: 3.0,
         laws: PerLaw {
@@ -147,7 +145,7 @@ fn difference<const NX: usize, const NY: usize>(
     plain: &GainTable<NX, NY>,
     ticks: &Ticks<NY>,
 ) -> Option<String> {
-    let mut controller = Controller::new(table, &BUILD, [CounterWidth::Bits32; NY]).unwrap();
+    let mut controller = Controller::new(table, [CounterWidth::Bits32; NY]).unwrap();
     controller.start(&[0; NY]).unwrap();
     let mut plain = Plain::started(plain);
     ticks.iter().enumerate().find_map(|(tick, (target, counts))| {

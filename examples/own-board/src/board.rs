@@ -1,5 +1,6 @@
 //! A board of your own: the black STM32F407VET6 board with the encoders of a cart and one link.
 
+use cortex_m::peripheral::SYST;
 use stm32f4xx_hal::adc::{Adc, config::SampleTime};
 use stm32f4xx_hal::gpio::{Analog, Input, Output as OutputPin, PA4, PB0, PB1, PB2, PB10, PB12, PB13};
 use stm32f4xx_hal::pac::{ADC1, TIM1, TIM2, TIM3};
@@ -10,7 +11,9 @@ use stm32f4xx_hal::watchdog::IndependentWatchdog;
 use upright::board::{Board, Contacts, Inputs, Output};
 use upright::control::encoder::CounterWidth;
 
-use own_board::gains::{SENSORS, TABLE};
+use own_board::gains::SENSORS;
+
+use crate::CLOCK_HZ;
 
 /// What the control task reads and drives.
 pub struct OwnBoard {
@@ -54,11 +57,14 @@ impl Board<SENSORS> for OwnBoard {
         }
     }
 
+    fn tick_s(&self) -> f32 {
+        (SYST::get_reload() + 1) as f32 / CLOCK_HZ as f32
+    }
+
     fn drive(&mut self, output: &Output) {
-        let duty = if output.enable { output.drive.duty(TABLE.force_limit_n) } else { 0.0 };
         self.enable.set_state(output.enable.into());
-        self.direction.set_state((duty > 0.0).into());
-        self.pwm.set_duty((duty.abs() * f32::from(self.pwm.get_max_duty())) as u16);
+        self.direction.set_state((output.duty > 0.0).into());
+        self.pwm.set_duty((output.duty.abs() * f32::from(self.pwm.get_max_duty())) as u16);
     }
 
     fn feed_watchdog(&mut self) {

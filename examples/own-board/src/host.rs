@@ -3,8 +3,8 @@
 use std::error::Error;
 use std::path::Path;
 
-use own_board::gains::{RIG_HASH, SWING_UP, TABLE, TICK_S};
-use upright::table::{Build, Law};
+use own_board::gains::{SWING_UP, TABLE};
+use upright::table::Law;
 use upright_design::design::design;
 use upright_design::harness::{record, with_table};
 use upright_design::rig::Rig;
@@ -15,9 +15,8 @@ fn main() -> Result<(), Box<dyn Error>> {
     let rig = Rig::from_path(Path::new("rig.toml"))?;
     let values = TableValues::of(&rig, &design(&rig)?, Gains::Sampled)?;
     let scenario = Scenario { step_m: 0.1, duration_s: 5.0, ..Scenario::at_rest(&rig, Law::Lqr) };
-    let build = Build { rig_hash: RIG_HASH, tick_s: TICK_S };
     // From power-up: homing, sign check, raising the link, arming, and then the step.
-    let run = with_table(&TABLE, &SWING_UP, &build, |firmware| record(&rig, &values, &scenario, firmware))??;
+    let run = with_table(&TABLE, &SWING_UP, |firmware| record(&rig, &values, &scenario, firmware))??;
     println!("{} ticks, fault: {:?}", run.ticks.len(), run.fault);
     println!("cart {:.4} m from the set-point at the end", run.summary.final_error_m);
     match run.summary.fall {

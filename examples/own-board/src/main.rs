@@ -7,7 +7,7 @@ mod board;
 
 use cortex_m::peripheral::syst::SystClkSource;
 use heapless::spsc::Queue;
-use own_board::gains::{RIG_HASH, TABLE, TICK_S};
+use own_board::gains::{SWING_UP, TABLE, TICK_S};
 use panic_halt as _;
 use stm32f4xx_hal::adc::{Adc, config::AdcConfig};
 use stm32f4xx_hal::rcc::Config;
@@ -18,17 +18,19 @@ use upright::firmware::Firmware;
 use upright::firmware::control_task::{COMMANDS, ControlTask, MESSAGES};
 use upright::protocol::message::Reset;
 use upright::protocol::serial_link::SerialLink;
-use upright::table::Build;
 
 use crate::board::OwnBoard;
 
-const CLOCK_HZ: u32 = 168_000_000;
+pub const CLOCK_HZ: u32 = 168_000_000;
 
 #[cortex_m_rt::entry]
 fn main() -> ! {
     let (Some(chip), Some(core)) = (pac::Peripherals::take(), cortex_m::Peripherals::take()) else {
         loop {}
     };
+    let mut timer = core.SYST;
+    timer.set_clock_source(SystClkSource::Core);
+    timer.set_reload((TICK_S * CLOCK_HZ as f32) as u32 - 1);
     let mut rcc = chip.RCC.freeze(Config::hse(8.MHz()).sysclk(CLOCK_HZ.Hz()));
     let (a, b) = (chip.GPIOA.split(&mut rcc), chip.GPIOB.split(&mut rcc));
     let (_, (pwm, ..)) = chip.TIM1.pwm_hz(20.kHz(), &mut rcc);
@@ -55,14 +57,10 @@ fn main() -> ! {
     let (mut commands, mut messages) = (Queue::<_, COMMANDS>::new(), Queue::<_, MESSAGES>::new());
     let (to_control, from_link) = commands.split();
     let (from_control, to_link) = messages.split();
-    let build = Build { rig_hash: RIG_HASH, tick_s: TICK_S };
-    let Ok(firmware) = Firmware::new(&TABLE, &build, OwnBoard::WIDTHS, Reset::Power) else { loop {} };
+    let firmware = Firmware::new(&TABLE, &SWING_UP, OwnBoard::WIDTHS, Reset::Power);
     let mut control = ControlTask::new(firmware, board, from_link, from_control);
     let mut link = SerialLink::new(to_control, to_link);
 
-    let mut timer = core.SYST;
-    timer.set_clock_source(SystClkSource::Core);
-    timer.set_reload((TICK_S * CLOCK_HZ as f32) as u32 - 1);
     timer.clear_current();
     timer.enable_counter();
     let mut frame = heapless::Deque::<u8, 512>::new();

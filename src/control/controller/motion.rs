@@ -69,7 +69,7 @@ impl<const NX: usize, const NY: usize> Controller<'_, NX, NY> {
 
     /// Moves the governed set-point by one tick towards the requested one, and returns it (m).
     pub fn govern(&mut self) -> f32 {
-        self.state.govern(self.target, self.gains.setpoint_step);
+        self.state.govern(self.target, self.active.gains.setpoint_step);
         self.state.setpoint
     }
 

@@ -11,7 +11,7 @@ use upright::firmware::control_task::{COMMANDS, ControlTask, MESSAGES};
 use upright::protocol::frame::FrameError;
 use upright::protocol::message::{Command, Reset};
 use upright::protocol::serial_link::SerialLink;
-use upright::table::{Build, GainTable, SwingUp};
+use upright::table::{GainTable, SwingUp};
 
 use super::error::HarnessError;
 use super::target::{Pins, Target};
@@ -47,15 +47,16 @@ fn start(table: &TableValues, run: &mut dyn FnMut(&mut dyn Target)) -> Result<()
 pub fn with_table<R, S: SwingUp<NX, NY>, const NX: usize, const NY: usize>(
     table: &GainTable<NX, NY>,
     swing_up: &S,
-    build: &Build,
     action: impl FnOnce(&mut dyn Target) -> R,
 ) -> Result<R, HarnessError> {
-    let firmware = Firmware::with_swing_up(table, swing_up, build, Wires::<NY>::WIDTHS, Reset::Power)?;
+    table.check()?;
+    swing_up.check(table)?;
+    let firmware = Firmware::new(table, swing_up, Wires::<NY>::WIDTHS, Reset::Power);
     let (mut commands, mut messages) = (Queue::<Command, COMMANDS>::new(), Queue::<_, MESSAGES>::new());
     let (to_control, commands) = commands.split();
     let (messages, to_link) = messages.split();
     let inputs = Inputs { raw_counts: [0; NY], supply_v: 0.0, contacts: Default::default() };
-    let wires = Wires { inputs, output: Output::OFF };
+    let wires = Wires { inputs, output: Output::OFF, tick_s: table.tick_s };
     Ok(action(&mut InProcess {
         control: ControlTask::new(firmware, wires, commands, messages),
         link: SerialLink::new(to_control, to_link),
@@ -76,7 +77,7 @@ impl WithSize for WithFirmware<'_> {
         let table = self.table.table::<NX, NY>();
         let others = self.table.swing_up.as_ref().map(SwingUpValues::transitions).unwrap_or_default();
         let swing_up = self.table.swing_up.as_ref().map(|values| values.table::<NY, N>(&others));
-        with_table(&table, &swing_up, &self.table.build(), self.run)
+        with_table(&table, &swing_up, self.run)
     }
 }
 
@@ -94,6 +95,7 @@ struct InProcess<'q, 't, S, const NX: usize, const NY: usize> {
 struct Wires<const NY: usize> {
     inputs: Inputs<NY>,
     output: Output,
+    tick_s: f32,
 }
 
 impl<const NY: usize> Board<NY> for Wires<NY> {
@@ -101,6 +103,10 @@ impl<const NY: usize> Board<NY> for Wires<NY> {
 
     fn inputs(&mut self) -> Inputs<NY> {
         self.inputs
+    }
+
+    fn tick_s(&self) -> f32 {
+        self.tick_s
     }
 
     fn drive(&mut self, output: &Output) {

@@ -91,7 +91,7 @@ pub enum IdentifyError {
     )]
     Still(String),
     /// The firmware sends no log.
-    #[error("the firmware has sent no log of its ticks: build its image with --identify")]
+    #[error("the firmware has sent no log of its ticks: flash the image of this version")]
     NothingRecorded,
     /// No channel moves.
     #[error(

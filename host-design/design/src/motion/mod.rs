@@ -1,9 +1,10 @@
-//! Planned motions and the equilibria that they connect: what the search finds, the table stores, and the firmware
-//! follows.
+//! Planned motions and the equilibria between which they lead: what the search for a swing-up makes, and the gain table
+//! takes.
 
 mod planned;
 mod transition;
 
-pub use planned::{Motion, RaiseAndLower, Shape};
 pub(crate) use transition::rest;
+
+pub use planned::{MotionError, PlannedMotion, RaiseAndLower};
 pub use transition::{Transition, equilibrium_named, posture_name};

@@ -17,7 +17,7 @@ use crate::numerics::Matrix;
 /// The first L applies to the first measurement: x̂⁻ of tick 0 is `x[0]`. From tick `steps` on, the rig balances about
 /// the last state or hangs in it.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Motion {
+pub struct PlannedMotion {
     /// Time between two entries (s): the rig's tick.
     pub tick_s: f64,
     /// Reference states, steps + 1. With `u` held over the tick, the model goes from each to the next.
@@ -36,15 +36,15 @@ pub struct RaiseAndLower {
     /// From hanging at rest, cart at 0, to upright at rest, cart at 0. Its gains minimise the sampled cost of
     /// `[lqr]` with the stationary solution at the end, so K approaches the gain that balances: the hand-over changes
     /// an index, not the law.
-    pub raise: Motion,
+    pub raise: PlannedMotion,
     /// From upright at rest, cart at 0, to hanging at rest, cart at 0.
-    pub lower: Motion,
+    pub lower: PlannedMotion,
 }
 
 /// The sizes of the parts of a motion do not agree, or a value is not finite.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[error("{part} of the motion: found {found}, needed {needed}")]
-pub struct Shape {
+pub struct MotionError {
     /// Which part.
     pub part: &'static str,
     /// Entries, or size of an entry, found.
@@ -53,11 +53,11 @@ pub struct Shape {
     pub needed: String,
 }
 
-impl Motion {
+impl PlannedMotion {
     /// Joins the parts of a motion and checks their sizes.
     ///
     /// # Errors
-    /// [`Shape`] if there is no step, a number of entries or the size of an entry does not fit, or a value is not
+    /// [`MotionError`] if there is no step, a number of entries or the size of an entry does not fit, or a value is not
     /// finite.
     pub fn new(
         tick_s: f64,
@@ -65,16 +65,16 @@ impl Motion {
         u: Vec<f64>,
         k: Vec<Matrix<f64>>,
         l: Vec<Matrix<f64>>,
-    ) -> Result<Self, Shape> {
+    ) -> Result<Self, MotionError> {
         let (steps, states) = (u.len(), x.first().map_or(0, Vec::len));
         let sensors = l.first().map_or(0, Matrix::cols);
         let fits = |part, found: String, needed: String| {
-            if found == needed { Ok(()) } else { Err(Shape { part, found, needed }) }
+            if found == needed { Ok(()) } else { Err(MotionError { part, found, needed }) }
         };
         let size = |m: &Matrix<f64>| format!("{}×{}", m.rows(), m.cols());
         if steps == 0 || !(tick_s.is_finite() && tick_s > 0.0) {
             let found = format!("{steps} steps of {tick_s} s");
-            return Err(Shape { part: "the duration", found, needed: "at least one tick".to_owned() });
+            return Err(MotionError { part: "the duration", found, needed: "at least one tick".to_owned() });
         }
         fits("the states", x.len().to_string(), (steps + 1).to_string())?;
         fits("the gains", k.len().to_string(), steps.to_string())?;
@@ -88,9 +88,11 @@ impl Motion {
         }
         let gains = k.iter().chain(&l).flat_map(|m| m.entries());
         match x.iter().flatten().chain(&u).chain(gains).find(|value| !value.is_finite()) {
-            Some(value) => {
-                Err(Shape { part: "a value", found: value.to_string(), needed: "a finite number".to_owned() })
-            }
+            Some(value) => Err(MotionError {
+                part: "a value",
+                found: value.to_string(),
+                needed: "a finite number".to_owned(),
+            }),
             None => Ok(Self { tick_s, x, u, k, l }),
         }
     }
@@ -130,7 +132,7 @@ mod tests {
     #[test]
     fn a_motion_has_one_more_state_than_forces_and_gains() {
         let (x, u, k, l) = parts();
-        let motion = Motion::new(0.001, x, u, k, l).unwrap();
+        let motion = PlannedMotion::new(0.001, x, u, k, l).unwrap();
         assert_eq!((motion.steps(), motion.duration_s()), (2, 0.002));
     }
 
@@ -140,7 +142,7 @@ mod tests {
             let mut all = parts();
             change(&mut all);
             let (x, u, k, l) = all;
-            Motion::new(0.001, x, u, k, l).unwrap_err().part
+            PlannedMotion::new(0.001, x, u, k, l).unwrap_err().part
         };
         assert_eq!(refused(&|all| all.0.truncate(2)), "the states");
         assert_eq!(refused(&|all| all.0[1].truncate(3)), "a state");

@@ -125,7 +125,7 @@ impl WithSize for WithControllers<'_> {
 
     fn run<const NX: usize, const NY: usize, const N: usize>(self) -> Self::Output {
         let table = self.table.table::<NX, NY>();
-        let controller = Controller::new(&table, &self.table.build(), Bench::widths())?;
+        let controller = Controller::new(&table, Bench::widths())?;
         let mut controllers: Vec<Box<dyn AnyController>> = Vec::with_capacity(self.count);
         for _ in 0..self.count {
             controllers.push(Box::new(controller.clone()));

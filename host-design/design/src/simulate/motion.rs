@@ -110,9 +110,8 @@ impl WithSize for Follow<'_> {
         // Of the other motions only the one that is run: the firmware checks every word of its table.
         let other = self.other.and_then(|other| others.get(other));
         let swing_up = self.swing_up.table::<NY, N>(other.map_or(&[], core::slice::from_ref));
-        let build = self.table.build();
-        swing_up.check(&build, NX)?;
-        let mut controller = Controller::new(&table, &build, Bench::widths())?;
+        swing_up.check(&table)?;
+        let mut controller = Controller::new(&table, Bench::widths())?;
         let mut at_zero = [0; NY];
         self.bench.read_counters_at_zero(&mut at_zero);
         controller.encoders_mut().home(&at_zero, &[0; NY]);

@@ -2,9 +2,9 @@
 
 use super::SwingUpError;
 use super::check::check;
-use super::plan::{Progress, RUNS, Trying};
+use super::progress::{SearchProgress, SearchStep};
 use super::remedy::{Limit, Remedy};
-use super::robustness::{Runs, random_runs};
+use super::robustness::{JUDGING_RUNS, Runs, random_runs};
 use super::search::{Request, candidates};
 use super::setting::Setting;
 use crate::motion::Transition;
@@ -38,7 +38,7 @@ impl Outcome {
         let solved = found.len();
         found.retain(|candidate| check(&setting, &candidate.motion, transition).is_ok());
         found.sort_by(|a, b| a.score.total_cmp(&b.score));
-        let runs = |motion| random_runs(&setting, motion, transition, &request.spread, 1, RUNS);
+        let runs = |motion| random_runs(&setting, motion, transition, &request.spread, 1, JUDGING_RUNS);
         let all = found.iter().take(KEPT).map(|candidate| runs(&candidate.motion));
         let all: Vec<Runs> = all.collect::<Result<_, _>>()?;
         Ok(Self { tried, solved, runs: all.into_iter().max_by_key(|runs| runs.arrived) })
@@ -74,14 +74,14 @@ pub(super) fn is_enough(rig: &Rig, runs: &Runs) -> bool {
 pub(super) fn advice(
     rig: &Rig,
     transition: Transition,
-    progress: Progress<'_>,
+    progress: SearchProgress<'_>,
 ) -> Result<String, SwingUpError> {
-    progress(Trying::Stage {
+    progress(SearchStep::Stage {
         transition,
         what: "what would help",
         steps: (Limit::ALL.len() * FACTORS.len()) as u64,
     });
-    advice_from(rig, transition, TRIED, &|| progress(Trying::Step { score: None }))
+    advice_from(rig, transition, TRIED, &|| progress(SearchStep::Step { score: None }))
 }
 
 fn advice_from(
@@ -103,11 +103,13 @@ fn advice_from(
     let texts: Vec<String> = helps.iter().map(|help| help.text.clone()).collect();
     let mut advice = match helps.first() {
         Some(Help { name, .. }) => {
-            format!("what binds is the {name}; there is a motion with {}", texts.join(", or with "))
+            format!("the binding limit is the {name}; there is a motion with {}", texts.join(", or with "))
         }
         None => match relaxed(rig, transition, tried, &Limit::ALL, longest_s, done)? {
-            Some(Tried::Helps(help)) => format!("no limit binds alone; there is a motion with {}", help.text),
-            _ => "no limit binds alone, and more of everything does not help".to_owned(),
+            Some(Tried::Helps(help)) => {
+                format!("no limit alone is binding; there is a motion with {}", help.text)
+            }
+            _ => "no limit alone is binding, and more of everything does not help".to_owned(),
         },
     };
     if !no_help.is_empty() {
@@ -203,8 +205,8 @@ mod tests {
         let text = advice_from(&single(short), Transition::Up, FEW, &|| ()).unwrap();
         println!("{text}");
         let (helps, no_help) = text.split_once("; there is none with ").unwrap();
-        let (binds, helps) = helps.split_once("; there is a motion with ").unwrap();
-        assert_eq!(binds, "what binds is the duration");
+        let (binding, helps) = helps.split_once("; there is a motion with ").unwrap();
+        assert_eq!(binding, "the binding limit is the duration");
         assert!(
             no_help.contains("cart.travel_m = [-1.2, 1.2]") && no_help.contains("actuator.supply_v = 30")
         );

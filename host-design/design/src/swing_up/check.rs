@@ -4,8 +4,7 @@ use serde::Serialize;
 
 use super::SwingUpError;
 use super::setting::Setting;
-use crate::motion::Motion;
-use crate::motion::Transition;
+use crate::motion::{PlannedMotion, Transition};
 use crate::plant::chain_plant;
 use crate::plant::reference::{Tolerance, integrate};
 
@@ -40,7 +39,7 @@ pub struct Peaks {
 /// [`SwingUpError::Broken`] with the condition that does not hold.
 pub(super) fn check(
     setting: &Setting<'_>,
-    motion: &Motion,
+    motion: &PlannedMotion,
     transition: Transition,
 ) -> Result<Peaks, SwingUpError> {
     let broken = |what: String| SwingUpError::Broken { transition, what };

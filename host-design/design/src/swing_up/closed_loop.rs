@@ -6,12 +6,10 @@ use rand_distr::{Distribution, StandardNormal};
 use rand_pcg::Pcg64;
 
 use super::SwingUpError;
-use super::robustness::deviation;
 use super::setting::Setting;
-use crate::motion::Motion;
-use crate::motion::Transition;
+use crate::motion::{PlannedMotion, Transition};
 use crate::numerics::Matrix;
-use crate::plant::{Plant, chain_plant};
+use crate::plant::{Plant, absolute_angles, chain_plant};
 use crate::rig::Chain;
 
 /// Deviation of a link from its reference beyond which the motion counts as lost (rad).
@@ -124,7 +122,12 @@ impl<'a> ClosedLoop<'a> {
 }
 
 /// The law in tick k of a motion and after it.
-fn law_at<'a>(setting: &'a Setting<'_>, motion: &'a Motion, transition: Transition, k: usize) -> Law<'a> {
+fn law_at<'a>(
+    setting: &'a Setting<'_>,
+    motion: &'a PlannedMotion,
+    transition: Transition,
+    k: usize,
+) -> Law<'a> {
     let steps = motion.steps();
     match transition {
         _ if k < steps => Law { x: &motion.x[k], u: motion.u[k], k: Some(&motion.k[k]), l: &motion.l[k] },
@@ -144,7 +147,7 @@ fn law_at<'a>(setting: &'a Setting<'_>, motion: &'a Motion, transition: Transiti
 /// [`SwingUpError`] if the chain cannot be simulated.
 pub(super) fn run(
     setting: &Setting<'_>,
-    motion: &Motion,
+    motion: &PlannedMotion,
     transition: Transition,
     trial: &Trial,
 ) -> Result<Outcome, SwingUpError> {
@@ -189,7 +192,7 @@ fn applied(setting: &Setting<'_>, force: f64, speed: f64) -> f64 {
 
 impl Trial {
     /// The model itself, exactly at the start of `motion`, without counts or disturbances.
-    pub(super) fn ideal(setting: &Setting<'_>, motion: &Motion) -> Self {
+    pub(super) fn ideal(setting: &Setting<'_>, motion: &PlannedMotion) -> Self {
         Self {
             chain: setting.chain.clone(),
             start: motion.x[0].clone(),
@@ -199,4 +202,12 @@ impl Trial {
             after_s: 1.0,
         }
     }
+}
+
+/// Largest difference of a link's angle from the vertical to that of the reference (rad).
+pub(super) fn deviation(state: &[f64], reference: &[f64]) -> f64 {
+    absolute_angles(state).zip(absolute_angles(reference)).fold(0.0, |largest, (a, b)| {
+        let difference = (a - b).abs();
+        if difference.is_nan() { f64::INFINITY } else { f64::max(largest, difference) }
+    })
 }

@@ -3,8 +3,7 @@
 use std::path::PathBuf;
 
 use crate::design::DesignError;
-use crate::motion::Shape;
-use crate::motion::Transition;
+use crate::motion::{MotionError, Transition};
 use crate::numerics::Singular;
 use crate::plant::PlantError;
 use crate::simulate::SimulationError;
@@ -114,7 +113,7 @@ pub enum SwingUpError {
     Study(#[from] StudyError),
     /// The sizes of the parts of a motion do not agree.
     #[error(transparent)]
-    Shape(#[from] Shape),
+    Motion(#[from] MotionError),
 }
 
 impl SwingUpError {

@@ -7,11 +7,11 @@ use upright::protocol::message::Request;
 use upright::supervision::supervisor::State;
 
 use super::SwingUpError;
+use super::closed_loop::deviation;
 use super::demonstration::{hang, up_and_down};
-use super::robustness::{Runs, Spread, deviation, drawn};
+use super::robustness::{Runs, Spread, drawn};
 use crate::harness::{Harness, HarnessError, Target, goals, with_firmware};
-use crate::motion::RaiseAndLower;
-use crate::motion::Transition;
+use crate::motion::{RaiseAndLower, Transition};
 use crate::rig::{LinkEncoder, PlantDescription, Rig};
 use crate::simulate::Scenario;
 use crate::study::{Study, infinite_if_null};

@@ -4,8 +4,7 @@ use super::SwingUpError;
 use super::refine::Path;
 use super::setting::Setting;
 use super::tracking::{Filter, feedback, ticks};
-use crate::motion::Motion;
-use crate::motion::Transition;
+use crate::motion::{PlannedMotion, Transition};
 use crate::numerics::Matrix;
 
 /// Factor on the weights of `[lqr]` for the positions of cart and links along a motion: a link that leaves its plan is
@@ -19,7 +18,7 @@ pub(super) fn motion(
     path: Path,
     transition: Transition,
     position_weight: f64,
-) -> Result<Motion, SwingUpError> {
+) -> Result<PlannedMotion, SwingUpError> {
     let ticks = ticks(&*setting.dynamics, &path, setting.tick_s);
     let states = path.x[0].len();
     let weights = Matrix::from_fn(states, states, |i, j| {
@@ -32,5 +31,5 @@ pub(super) fn motion(
     filter.covariance = setting.at_start(transition).covariance.clone();
     let l: Result<Vec<Matrix<f64>>, _> =
         path.x.iter().zip(&ticks).map(|(x, tick)| filter.gain(x, tick)).collect();
-    Ok(Motion::new(setting.tick_s, path.x, path.u, k, l?)?)
+    Ok(PlannedMotion::new(setting.tick_s, path.x, path.u, k, l?)?)
 }

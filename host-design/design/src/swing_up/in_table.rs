@@ -2,9 +2,8 @@
 
 use super::SwingUpError;
 use super::supervision::set_limits;
-use super::transitions::PlannedTransition;
 use crate::design::design;
-use crate::motion::RaiseAndLower;
+use crate::motion::{PlannedMotion, RaiseAndLower, Transition};
 use crate::rig::Rig;
 use crate::table::{Gains, SwingUpValues, TableValues};
 
@@ -18,10 +17,10 @@ pub fn with_motions(
     rig: &Rig,
     mut table: TableValues,
     motions: &RaiseAndLower,
-    transitions: &[PlannedTransition],
+    transitions: &[(Transition, PlannedMotion)],
 ) -> Result<TableValues, SwingUpError> {
     let mut swing_up = SwingUpValues::of(rig, &table, motions)?;
-    for PlannedTransition { transition, motion, .. } in transitions {
+    for (transition, motion) in transitions {
         swing_up.add(&table, *transition, motion)?;
     }
     table.swing_up = Some(swing_up);
@@ -44,7 +43,7 @@ pub fn designed_table(rig: &Rig, motions: &RaiseAndLower) -> Result<TableValues,
 pub fn designed_table_with(
     rig: &Rig,
     motions: &RaiseAndLower,
-    transitions: &[PlannedTransition],
+    transitions: &[(Transition, PlannedMotion)],
 ) -> Result<TableValues, SwingUpError> {
     with_motions(rig, TableValues::of(rig, &design(rig)?, Gains::Sampled)?, motions, transitions)
 }

@@ -10,13 +10,13 @@ use super::check::{Peaks, check};
 use super::firmware_runs::{Condition, firmware_runs};
 use super::gains::{POSITION_WEIGHT, motion};
 use super::in_table::designed_table;
+use super::progress::{SearchProgress, SearchStep};
 use super::refine::refine;
-use super::robustness::{Runs, Spread, random_runs, score};
+use super::robustness::{JUDGING_RUNS, Runs, Spread, random_runs, score};
 use super::search::{Candidate, Request, candidates, ticks_per_knot};
 use super::setting::Setting;
 use super::stored::{Stored, StoredKnots};
-use crate::motion::Transition;
-use crate::motion::{Motion, RaiseAndLower};
+use crate::motion::{PlannedMotion, RaiseAndLower, Transition};
 use crate::parallel;
 use crate::rig::Rig;
 use crate::study::Study;
@@ -27,30 +27,6 @@ const CANDIDATES: [u64; 2] = [100, 40];
 const CANDIDATES_OF_LONG_CHAINS: [u64; 2] = [40, 24];
 /// Two rounds of selection, each with the number of best candidates that it tests, and of random runs for each.
 const ROUNDS: [(usize, usize); 2] = [(30, 40), (4, 160)];
-/// Number of random runs that judge a motion, with the seeds from 1 on. The rounds use the seeds after them.
-pub(super) const RUNS: usize = 200;
-
-/// Progress of a search.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Trying {
-    /// A stage of this many steps begins.
-    Stage {
-        /// Which motion.
-        transition: Transition,
-        /// What each step does.
-        what: &'static str,
-        /// Number of steps.
-        steps: u64,
-    },
-    /// A step is done.
-    Step {
-        /// Fragility of the candidate; none if it was not solved.
-        score: Option<f64>,
-    },
-}
-
-/// Called with what is being tried, from any thread.
-pub type Progress<'a> = &'a (dyn Fn(Trying) + Sync);
 
 /// Both motions of a rig, and their judgements.
 #[derive(Debug, Clone, PartialEq)]
@@ -90,7 +66,7 @@ pub struct Judgement {
 /// # Errors
 /// [`SwingUpError`]: the rig cannot be raised at all, no candidate was solved, or the best one fails its check or too
 /// many random runs.
-pub fn search(rig: &Rig, progress: Progress<'_>) -> Result<Plan, SwingUpError> {
+pub fn search(rig: &Rig, progress: SearchProgress<'_>) -> Result<Plan, SwingUpError> {
     let setting = Setting::of(rig)?;
     let request = Request::of(&setting);
     let found = |transition| -> Result<Found, SwingUpError> {
@@ -113,7 +89,7 @@ pub fn search(rig: &Rig, progress: Progress<'_>) -> Result<Plan, SwingUpError> {
 ///
 /// # Errors
 /// As for [`search`]; [`SwingUpError::Outdated`] if a stored motion does not fit the rig any more.
-pub fn judge(rig: &Rig, stored: &Stored, progress: Progress<'_>) -> Result<Plan, SwingUpError> {
+pub fn judge(rig: &Rig, stored: &Stored, progress: SearchProgress<'_>) -> Result<Plan, SwingUpError> {
     let setting = Setting::of(rig)?;
     let spread = Spread::asked(rig);
     let found = |transition, stored: &StoredKnots| -> Result<Found, SwingUpError> {
@@ -141,7 +117,7 @@ pub fn motions(rig: &Rig, stored: &Stored) -> Result<RaiseAndLower, SwingUpError
 /// [`SwingUpError::Outdated`] if they do not fit the rig any more.
 pub fn refined(rig: &Rig, stored: &Stored) -> Result<RaiseAndLower, SwingUpError> {
     let setting = Setting::of(rig)?;
-    let checked = |transition, knots| -> Result<Motion, SwingUpError> {
+    let checked = |transition, knots| -> Result<PlannedMotion, SwingUpError> {
         let motion = restored(&setting, transition, knots)?;
         check(&setting, &motion, transition)?;
         Ok(motion)
@@ -157,7 +133,7 @@ pub(super) fn restored(
     setting: &Setting<'_>,
     transition: Transition,
     stored: &StoredKnots,
-) -> Result<Motion, SwingUpError> {
+) -> Result<PlannedMotion, SwingUpError> {
     let states = setting.rig.states();
     let knots = stored.knots(states).ok_or(SwingUpError::Outdated)?;
     let ends = transition.ends_near(knots.x.last().ok_or(SwingUpError::Outdated)?);
@@ -167,7 +143,7 @@ pub(super) fn restored(
 
 /// A motion that is to be judged.
 pub(super) struct Found {
-    pub(super) motion: Motion,
+    pub(super) motion: PlannedMotion,
     pub(super) stored: StoredKnots,
     /// See [`Judgement::score`] and [`Judgement::search`].
     score: f64,
@@ -187,12 +163,12 @@ pub(super) fn best(
     request: &Request,
     transition: Transition,
     numbers: Range<u64>,
-    progress: Progress<'_>,
+    progress: SearchProgress<'_>,
 ) -> Result<Option<Found>, SwingUpError> {
     let tried = numbers.end.saturating_sub(numbers.start);
-    progress(Trying::Stage { transition, what: "trajectories", steps: tried });
+    progress(SearchStep::Stage { transition, what: "trajectories", steps: tried });
     let mut solved =
-        candidates(setting, request, transition, numbers, &|score| progress(Trying::Step { score }))?;
+        candidates(setting, request, transition, numbers, &|score| progress(SearchStep::Step { score }))?;
     if solved.is_empty() {
         return Ok(None);
     }
@@ -217,14 +193,18 @@ fn ranked(
     transition: Transition,
     candidates: Vec<Candidate>,
     runs: usize,
-    progress: Progress<'_>,
+    progress: SearchProgress<'_>,
 ) -> Result<Vec<Candidate>, SwingUpError> {
-    progress(Trying::Stage { transition, what: "random runs of the best", steps: candidates.len() as u64 });
+    progress(SearchStep::Stage {
+        transition,
+        what: "random runs of the best",
+        steps: candidates.len() as u64,
+    });
     let mut all: Vec<(Runs, Candidate)> = Vec::new();
     for candidate in candidates {
-        let seed = RUNS as u64 + 1;
+        let seed = JUDGING_RUNS as u64 + 1;
         let found = random_runs(setting, &candidate.motion, transition, &request.spread, seed, runs)?;
-        progress(Trying::Step { score: Some(candidate.score) });
+        progress(SearchStep::Step { score: Some(candidate.score) });
         all.push((found, candidate));
     }
     all.sort_by(|(a, _), (b, _)| b.arrived.cmp(&a.arrived).then(a.deviation_rad.total_cmp(&b.deviation_rad)));
@@ -236,7 +216,7 @@ fn judged(
     setting: &Setting<'_>,
     raise: Found,
     lower: Found,
-    progress: Progress<'_>,
+    progress: SearchProgress<'_>,
 ) -> Result<Plan, SwingUpError> {
     let rig = setting.rig;
     let peaks =
@@ -244,9 +224,9 @@ fn judged(
     let stored = Stored::new(rig, raise.stored, lower.stored);
     let motions = RaiseAndLower { raise: raise.motion, lower: lower.motion };
     let table = designed_table(rig, &motions)?;
-    progress(Trying::Stage { transition: Transition::Up, what: "random runs of the firmware", steps: 1 });
+    progress(SearchStep::Stage { transition: Transition::Up, what: "random runs of the firmware", steps: 1 });
     let runs = arriving(rig, &table, &motions)?;
-    progress(Trying::Step { score: None });
+    progress(SearchStep::Step { score: None });
     let is_searched = raise.search.is_some();
     for (transition, runs) in Transition::BOTH.into_iter().zip(&runs) {
         if is_enough(rig, runs) {
@@ -290,7 +270,7 @@ fn judged(
 /// Runs of the whole firmware of `table` with the errors of `[swing_up]`: how many are raised, and how many of those
 /// are lowered. A run that the supervisor ends or does not begin has not arrived.
 fn arriving(rig: &Rig, table: &TableValues, motions: &RaiseAndLower) -> Result<[Runs; 2], SwingUpError> {
-    let found = firmware_runs(rig, table, motions, &Condition::asked(rig), 1, RUNS, &Study::whole())?;
+    let found = firmware_runs(rig, table, motions, &Condition::asked(rig), 1, JUDGING_RUNS, &Study::whole())?;
     Ok([found.raise_in_all(), found.lower])
 }
 
@@ -305,7 +285,8 @@ mod tests {
         let motions = motions(&rig, &Stored::beside(file.as_ref()).unwrap()).unwrap();
         let setting = Setting::of(&rig).unwrap();
         let law =
-            random_runs(&setting, &motions.raise, Transition::Up, &Spread::asked(&rig), 1, RUNS).unwrap();
+            random_runs(&setting, &motions.raise, Transition::Up, &Spread::asked(&rig), 1, JUDGING_RUNS)
+                .unwrap();
         assert!(is_enough(&rig, &law), "{law:?}");
     }
 }

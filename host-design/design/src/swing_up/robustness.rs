@@ -7,10 +7,8 @@ use serde::Serialize;
 use super::SwingUpError;
 use super::closed_loop::{LOST_RAD, Trial, run};
 use super::setting::Setting;
-use crate::motion::Motion;
-use crate::motion::Transition;
+use crate::motion::{PlannedMotion, Transition};
 use crate::parallel;
-use crate::plant::absolute_angles;
 use crate::rig::{Chain, PerJoint, PlantDescription, Rig};
 use crate::verify::wilson;
 
@@ -46,6 +44,9 @@ impl Spread {
     }
 }
 
+/// Number of random runs that judge a motion, with the seeds from 1 on. The rounds use the seeds after them.
+pub(super) const JUDGING_RUNS: usize = 200;
+
 /// Outcome of random runs.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Runs {
@@ -66,7 +67,7 @@ pub struct Runs {
 /// available: the angle at which a link counts as lost, and the rail that the plan leaves. Smaller is better.
 pub(super) fn score(
     setting: &Setting<'_>,
-    motion: &Motion,
+    motion: &PlannedMotion,
     transition: Transition,
     spread: &Spread,
 ) -> Result<f64, SwingUpError> {
@@ -140,7 +141,7 @@ pub(super) fn drawn(rig: &Rig, transition: Transition, spread: &Spread, seed: u6
 /// Conditions of the random run with this seed.
 pub(super) fn sample(
     setting: &Setting<'_>,
-    motion: &Motion,
+    motion: &PlannedMotion,
     transition: Transition,
     spread: &Spread,
     seed: u64,
@@ -159,7 +160,7 @@ pub(super) fn sample(
 /// `runs` random runs with the seeds from `base_seed` on, on all threads; the outcome does not depend on their number.
 pub(super) fn random_runs(
     setting: &Setting<'_>,
-    motion: &Motion,
+    motion: &PlannedMotion,
     transition: Transition,
     spread: &Spread,
     base_seed: u64,
@@ -177,13 +178,5 @@ pub(super) fn random_runs(
         arrived: arrived().count(),
         interval: wilson(arrived().count(), runs),
         deviation_rad: arrived().fold(0.0, |largest, outcome| f64::max(largest, outcome.deviation_rad)),
-    })
-}
-
-/// Largest difference of a link's angle from the vertical to that of the reference (rad).
-pub(super) fn deviation(state: &[f64], reference: &[f64]) -> f64 {
-    absolute_angles(state).zip(absolute_angles(reference)).fold(0.0, |largest, (a, b)| {
-        let difference = (a - b).abs();
-        if difference.is_nan() { f64::INFINITY } else { f64::max(largest, difference) }
     })
 }

@@ -210,7 +210,7 @@ pub fn route_runs(
             .map_err(|error| SwingUpError::Firmware(error.to_string()))
     };
     let all: Vec<RouteRun> = study.outcomes("routes", runs as u64, one)?;
-    let leg = |index: usize| {
+    let of_motion = |index: usize| {
         let tried = all.iter().filter(|run| run.arrived >= index).count();
         let arrived = all.iter().filter(|run| run.arrived > index).count();
         TransitionRuns {
@@ -225,7 +225,7 @@ pub fn route_runs(
         Some((transition, run.fault.clone().unwrap_or_else(|| "no fault".to_owned())))
     };
     Ok(RouteRuns {
-        transitions: (0..route.transitions.len()).map(leg).collect(),
+        transitions: (0..route.transitions.len()).map(of_motion).collect(),
         faults: all.iter().filter_map(fault).collect(),
     })
 }

@@ -10,8 +10,7 @@ use super::refine::{Path, refine};
 use super::robustness::{Spread, score};
 use super::setting::Setting;
 use super::shooting;
-use crate::motion::Motion;
-use crate::motion::Transition;
+use crate::motion::{PlannedMotion, Transition};
 use crate::numerics::Matrix;
 use crate::parallel;
 
@@ -52,7 +51,7 @@ struct Draw {
 /// A candidate that was solved.
 pub(super) struct Candidate {
     pub(super) knots: Knots,
-    pub(super) motion: Motion,
+    pub(super) motion: PlannedMotion,
     /// Smaller is more robust.
     pub(super) score: f64,
 }

@@ -3,7 +3,7 @@
 use serde::Serialize;
 
 use super::SwingUpError;
-use super::plan::{Progress, Trying};
+use super::progress::{SearchProgress, SearchStep};
 use super::robustness::{Runs, Spread, random_runs};
 use super::search::{Candidate, Request, candidates};
 use super::setting::Setting;
@@ -35,14 +35,19 @@ pub struct Solved {
 ///
 /// # Errors
 /// [`SwingUpError`] if the rig cannot be raised at all.
-pub fn solved(rig: &Rig, tried: u64, seed: u64, progress: Progress<'_>) -> Result<Vec<Solved>, SwingUpError> {
+pub fn solved(
+    rig: &Rig,
+    tried: u64,
+    seed: u64,
+    progress: SearchProgress<'_>,
+) -> Result<Vec<Solved>, SwingUpError> {
     let setting = Setting::of(rig)?;
     let (request, transition) = (Request::of(&setting), Transition::Up);
     let first = seed.saturating_sub(1).saturating_mul(tried);
-    progress(Trying::Stage { transition, what: "trajectories", steps: tried });
-    let step = |score| progress(Trying::Step { score });
+    progress(SearchStep::Stage { transition, what: "trajectories", steps: tried });
+    let step = |score| progress(SearchStep::Step { score });
     let found = candidates(&setting, &request, transition, first..first.saturating_add(tried), &step)?;
-    progress(Trying::Stage { transition, what: "random runs", steps: found.len() as u64 });
+    progress(SearchStep::Stage { transition, what: "random runs", steps: found.len() as u64 });
     let Spread { mass, friction, .. } = request.spread;
     let twice = Spread { mass: 2.0 * mass, friction: 2.0 * friction, ..request.spread };
     let largest = |most: f64, value: f64| most.max(value.abs());

@@ -10,27 +10,18 @@ use serde::{Deserialize, Serialize};
 
 use super::SwingUpError;
 use super::check::check;
-use super::plan::{Found, Progress, RUNS, best, restored};
-use super::robustness::{Runs, Spread, random_runs};
+use super::plan::{Found, best, restored};
+use super::progress::SearchProgress;
+use super::robustness::{JUDGING_RUNS, Runs, Spread, random_runs};
 use super::search::Request;
 use super::setting::Setting;
 use super::stored::{StoredKnots, read, request_hash};
-use crate::motion::Motion;
-use crate::motion::Transition;
+use crate::motion::{PlannedMotion, Transition};
 use crate::parallel;
 use crate::rig::Rig;
 
 /// Share of random runs with the law alone that have to arrive before the firmware tries a motion.
 const WORTH_A_RUN: f64 = 0.8;
-
-/// A motion from one equilibrium to another.
-#[derive(Debug, Clone, PartialEq)]
-pub struct PlannedTransition {
-    /// Equilibria at which it starts and ends.
-    pub transition: Transition,
-    /// The motion with its gains.
-    pub motion: Motion,
-}
 
 /// Result of the search for a motion.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -73,7 +64,7 @@ impl StoredTransitions {
         rig: &Rig,
         transition: Transition,
         numbers: Range<u64>,
-        progress: Progress<'_>,
+        progress: SearchProgress<'_>,
     ) -> Result<Searched, SwingUpError> {
         let setting = Setting::with_transitions(rig, &[transition])?;
         let none = Searched { transition, solved: 0, runs: None, is_stored: false };
@@ -85,7 +76,7 @@ impl StoredTransitions {
         if check(&setting, &motion, transition).is_err() {
             return Ok(Searched { solved, ..none });
         }
-        let runs = random_runs(&setting, &motion, transition, &Spread::asked(rig), 1, RUNS)?;
+        let runs = random_runs(&setting, &motion, transition, &Spread::asked(rig), 1, JUDGING_RUNS)?;
         let is_stored = runs.arrived as f64 >= WORTH_A_RUN * runs.runs as f64;
         if is_stored {
             let name = transition.name(setting.chain.links.len());
@@ -139,7 +130,7 @@ impl StoredTransitions {
     ///
     /// # Errors
     /// [`SwingUpError::Outdated`] if the rig file has changed since.
-    pub fn transitions(&self, rig: &Rig) -> Result<Vec<PlannedTransition>, SwingUpError> {
+    pub fn transitions(&self, rig: &Rig) -> Result<Vec<(Transition, PlannedMotion)>, SwingUpError> {
         self.restored(rig, |name| self.judged.contains_key(name))
     }
 
@@ -147,7 +138,7 @@ impl StoredTransitions {
     ///
     /// # Errors
     /// As for [`transitions`](Self::transitions).
-    pub fn all(&self, rig: &Rig) -> Result<Vec<PlannedTransition>, SwingUpError> {
+    pub fn all(&self, rig: &Rig) -> Result<Vec<(Transition, PlannedMotion)>, SwingUpError> {
         self.restored(rig, |_| true)
     }
 
@@ -155,7 +146,7 @@ impl StoredTransitions {
         &self,
         rig: &Rig,
         is_wanted: impl Fn(&String) -> bool,
-    ) -> Result<Vec<PlannedTransition>, SwingUpError> {
+    ) -> Result<Vec<(Transition, PlannedMotion)>, SwingUpError> {
         let links = rig.states() / 2 - 1;
         if !self.is_of(rig) {
             return Err(SwingUpError::Outdated);
@@ -169,11 +160,11 @@ impl StoredTransitions {
             rig,
             &transitions.iter().map(|(transition, _)| *transition).collect::<Vec<_>>(),
         )?;
-        let one = |index: usize| -> Result<PlannedTransition, SwingUpError> {
+        let one = |index: usize| -> Result<(Transition, PlannedMotion), SwingUpError> {
             let (transition, knots) = transitions[index];
             let motion = restored(&setting, transition, knots)?;
             check(&setting, &motion, transition)?;
-            Ok(PlannedTransition { transition, motion })
+            Ok((transition, motion))
         };
         parallel::try_map(0..transitions.len(), one)
     }

@@ -13,7 +13,7 @@ use core::ops::{Deref, DerefMut};
 use nalgebra::{SMatrix, SVector};
 use serde::{Serialize, Serializer};
 use upright::table::{
-    Build, GainTable, LawGains, MotionLimits, MotorMap, ObserverGains, PerLaw, Resize, TABLE_FORMAT,
+    GainTable, LawGains, MotionLimits, MotorMap, ObserverGains, PerLaw, Resize, TABLE_FORMAT,
 };
 
 use crate::design::{Certified, Design, Feedback, Uncertified, detection_thresholds, setpoint_step};
@@ -264,11 +264,6 @@ impl TableValues {
     /// The checksum the firmware expects of its swing-up, if there is one.
     pub fn swing_up_crc(&self) -> Option<u32> {
         self.swing_up_fields().map(|(_, crc)| crc)
-    }
-
-    /// Rig and tick that a firmware image for this table is built for.
-    pub fn build(&self) -> Build {
-        Build { rig_hash: self.rig_hash, tick_s: self.tick_s }
     }
 }
 

@@ -6,7 +6,7 @@ use upright::table::{
 };
 
 use super::{MAX_SENSORS, NoTable, TableValues, finite};
-use crate::motion::{Motion, RaiseAndLower, Transition};
+use crate::motion::{PlannedMotion, RaiseAndLower, Transition};
 use crate::plant::{ChainParameters, ChainPlant};
 use crate::rig::{PlantDescription, Rig};
 
@@ -72,7 +72,7 @@ impl SwingUpValues {
         if rig.tick.delay_ticks != 0 {
             return Err(NoTable::SwingUp("its control law is without delay: set delay_ticks = 0"));
         }
-        let values = |motion: &Motion| MotionValues::of(table, motion);
+        let values = |motion: &PlannedMotion| MotionValues::of(table, motion);
         Ok(Self {
             chain: ChainParameters::of(chain),
             limits: MotionLimits::none(),
@@ -93,7 +93,7 @@ impl SwingUpValues {
         &mut self,
         table: &TableValues,
         transition: Transition,
-        motion: &Motion,
+        motion: &PlannedMotion,
     ) -> Result<(), NoTable> {
         self.others.push((transition, MotionValues::of(table, motion)?));
         Ok(())
@@ -146,7 +146,7 @@ impl SwingUpValues {
 }
 
 impl MotionValues {
-    fn of(table: &TableValues, motion: &Motion) -> Result<Self, NoTable> {
+    fn of(table: &TableValues, motion: &PlannedMotion) -> Result<Self, NoTable> {
         let (states, sensors, ticks) = (table.states(), table.sensors(), motion.steps());
         let sizes = motion.x.first().map(Vec::len) == Some(states)
             && motion.l.first().map(|l| (l.rows(), l.cols())) == Some((states, sensors));

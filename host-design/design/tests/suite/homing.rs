@@ -160,22 +160,3 @@ fn zeros_that_contradict_each_other_are_refused() {
         assert!(pulled.at_s.is_none() && pulled.refused.contains(Inhibits::ZEROS), "{seed}: {pulled:?}");
     }
 }
-
-/// The table "Zeros of joints that stick" of docs/faults.md.
-#[test]
-#[ignore = "a measurement of some minutes"]
-fn how_exact_zeros_are() {
-    for (name, frictions) in [
-        ("quadruple-paper", [1e-4, 3e-4]),
-        ("triple-glueck-eder-kugi", [1e-3, 8e-3]),
-        ("double-quanser-dbpen", [5e-4, 4e-3]),
-        ("single-quanser-ip02", [5e-4, 1e-2]),
-    ] {
-        for friction_n_m in frictions {
-            for lift_rad in [HANGS, SWINGS] {
-                let errors = Errors::of(&Case::new(name, friction_n_m, lift_rad), 12);
-                println!("{name}, {friction_n_m:e} N·m, {lift_rad:?}: {errors:?}");
-            }
-        }
-    }
-}

@@ -70,17 +70,3 @@ fn a_rig_without_encoders_has_no_coverage() {
     let found = coverage(&file, &DRAWN, &Study::whole(), &|| ());
     assert!(matches!(found, Err(CoverageError::Identify(_))), "{found:?}");
 }
-
-#[test]
-#[ignore = "minutes: cargo test -p upright-design --test suite identify_coverage -- --ignored --nocapture"]
-fn nine_of_ten_intervals_cover_the_truth_of_forty_machines() {
-    for name in ["single-quanser-ip02", "double-quanser-dbpen"] {
-        let drawn = Drawn { runs: 40, seconds: 20.0, seed: 2, ..DRAWN };
-        let found = coverage(&rig(name), &drawn, &Study::whole(), &|| ()).unwrap();
-        for row in &found.rows {
-            println!("{name}: {row:?}");
-            let (numbers, covered) = count(row);
-            assert!(covered * 10 >= numbers * 9, "{name}: {row:?}");
-        }
-    }
-}

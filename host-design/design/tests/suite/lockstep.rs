@@ -1,7 +1,5 @@
 //! A run in lockstep with others gives the same bits as the run alone.
 
-use std::time::Instant;
-
 use upright::table::Law;
 use upright_design::plant::{LANES, Plant, chain_lanes, chain_plant};
 use upright_design::rig::{PerJoint, PlantDescription, Rig};
@@ -153,34 +151,4 @@ fn lanes_have_the_bits_of_a_plant_beyond_the_range_of_the_fast_sine_and_with_nan
         let same = |(a, b): (&f64, &f64)| a.to_bits() == b.to_bits() || (a.is_nan() && b.is_nan());
         assert!(expected.iter().zip(&found).all(same), "lane {lane}: {expected:?} {found:?}");
     }
-}
-
-#[test]
-#[ignore = "prints a measurement: cargo test -p upright-design --test suite how_fast -- --ignored --nocapture"]
-fn how_fast_the_whole_loop_is_alone_and_in_lockstep() {
-    let rig = rig("quadruple-paper");
-    let table = table(&rig);
-    // Short runs, so that some of them are not interrupted by other programs.
-    let spread = Spread { duration_s: 0.5, ..Spread::of(&rig) };
-    let cases: Vec<_> = (0..LANES as u64).map(|seed| sample(&rig, Law::Lqr, &spread, seed)).collect();
-    let simulated_s: f64 = cases.iter().map(|(_, scenario)| scenario.duration_s).sum();
-    let (mut alone, mut in_lockstep) = (0.0f64, 0.0f64);
-    for _ in 0..300 {
-        let start = Instant::now();
-        for (rig, scenario) in &cases {
-            run(rig, &table, scenario, &mut |_| ()).unwrap();
-        }
-        alone = alone.max(simulated_s / start.elapsed().as_secs_f64());
-        let mut observers = vec![|_: &Sample<&[f64]>| (); cases.len()];
-        let jobs = observers.iter_mut().zip(&cases);
-        let mut jobs: Vec<Job<'_>> =
-            jobs.map(|(observe, (rig, scenario))| Job { table: &table, rig, scenario, observe }).collect();
-        let start = Instant::now();
-        run_all(&mut jobs).unwrap();
-        in_lockstep = in_lockstep.max(simulated_s / start.elapsed().as_secs_f64());
-    }
-    println!(
-        "simulated seconds per second and core: alone {alone:.0}, in lockstep {in_lockstep:.0}, {:.2} times",
-        in_lockstep / alone
-    );
 }

@@ -84,7 +84,7 @@ fn what_is_written_is_what_was_judged() {
 }
 
 #[test]
-fn where_nothing_helps_the_reason_is_told() {
+fn where_nothing_helps_the_reason_is_reported() {
     let single = rig(&text("single-quanser-ip02"));
     let reason = |tolerances: Tolerances| match choose(&single, &tolerances, &short(&single), false, &|_| ())
     {

@@ -2,7 +2,6 @@
 //! with a reason.
 
 use std::path::Path;
-use std::time::Instant;
 
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
@@ -116,28 +115,4 @@ fn a_generated_rig_gets_a_choice_or_a_reason() {
     // Ten times the friction.
     let reason = outcome(&one, 10.0).unwrap_err();
     assert!(reason.contains("loops survives friction"), "{reason}");
-}
-
-/// All ten rigs, each also with ten times the friction. Writes their files to the folder for temporary files of tests,
-/// so that the command can be tried on them.
-#[test]
-#[ignore = "takes minutes"]
-fn every_generated_rig_gets_a_choice_or_a_reason() {
-    let folder = Path::new(env!("CARGO_TARGET_TMPDIR"));
-    let texts = (1..=5).flat_map(|links| [false, true].map(|is_short| generated(links, is_short)));
-    let texts: Vec<String> = texts.collect();
-    for text in &texts {
-        std::fs::write(folder.join(format!("{}.toml", rig(text).name)), text).unwrap();
-    }
-    println!("the rig files are in {}", folder.display());
-    for (text, friction) in texts.iter().flat_map(|text| [(text, 1.0), (text, 10.0)]) {
-        let rig = rig(text);
-        let (start, found) = (Instant::now(), outcome(text, friction));
-        let found = match &found {
-            Ok(choice) => format!("chosen, joint noise × {:.3}", choice.joint_noise_factor),
-            Err(reason) => reason.clone(),
-        };
-        let n_m = friction * rig.robust.as_ref().unwrap().joint_friction_n_m;
-        println!("{}, {n_m:.2e} N·m: {:.0} s: {found}", rig.name, start.elapsed().as_secs_f64());
-    }
 }

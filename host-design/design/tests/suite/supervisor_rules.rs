@@ -186,7 +186,7 @@ fn clear_and_arm_are_two_acts_and_a_held_arm_is_none() {
 }
 
 #[test]
-fn a_tilted_a_moving_and_a_displaced_rig_are_not_armed_and_all_reasons_are_told() {
+fn a_tilted_a_moving_and_a_displaced_rig_are_not_armed_and_all_reasons_are_reported() {
     balancing(|rig| {
         rig.ask(Request::Disarm);
         rig.inputs().counts = 40; // 0.06 rad

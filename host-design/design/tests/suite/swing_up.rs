@@ -108,7 +108,7 @@ fn a_wrong_knot_spacing_is_refused_and_a_wrong_tick_falls() {
 /// For a motion that does not survive the required errors, the message says which smaller ones it would survive,
 /// and with these it does.
 #[test]
-fn the_errors_that_a_fragile_motion_would_stand_are_told() {
+fn the_errors_that_a_fragile_motion_would_stand_are_reported() {
     let (rig, stored) = rig_and_stored("single-quanser-ip02");
     let with = |mass: f64, friction: f64| {
         let mut rig = rig.clone();

@@ -14,13 +14,11 @@ use upright::supervision::inhibits::Inhibits;
 use upright::supervision::supervisor::State;
 use upright::table::Equilibrium;
 use upright_design::harness::{Harness, Pins, with_firmware};
-use upright_design::motion::{Transition, equilibrium_named};
+use upright_design::motion::{PlannedMotion, Transition, equilibrium_named};
 use upright_design::rig::Rig;
 use upright_design::simulate::Scenario;
 use upright_design::study::Study;
-use upright_design::swing_up::{
-    PlannedTransition, Route, Script, StoredTransitions, route_runs, with_motions,
-};
+use upright_design::swing_up::{Route, Script, StoredTransitions, route_runs, with_motions};
 use upright_design::table::TableValues;
 
 const DOUBLE: &str = "double-quanser-dbpen";
@@ -79,8 +77,8 @@ fn a_motion_that_no_run_has_judged_does_not_get_into_a_table() {
     object["tours"].as_object_mut().unwrap().remove("uu-ud").unwrap();
     let stored: StoredTransitions = serde_json::from_value(object).unwrap();
     let rig = rig(DOUBLE);
-    let transitions = |transitions: Vec<PlannedTransition>| -> Vec<Transition> {
-        transitions.iter().map(|planned| planned.transition).collect()
+    let transitions = |transitions: Vec<(Transition, PlannedMotion)>| -> Vec<Transition> {
+        transitions.iter().map(|(transition, _)| *transition).collect()
     };
     let (judged, all) =
         (transitions(stored.transitions(&rig).unwrap()), transitions(stored.all(&rig).unwrap()));

@@ -22,8 +22,6 @@ pub const PROFILE: &str = "firmware";
 pub enum Kind {
     /// For a board.
     Board(Board),
-    /// For a board, to shake its rig and log every tick.
-    Identification(Board),
     /// For QEMU, with the pins connected through files.
     InTheLoop,
     /// For QEMU, with the pins connected through a serial line.
@@ -31,25 +29,19 @@ pub enum Kind {
 }
 
 impl Kind {
-    /// The cargo features that select it, separated by commas.
-    fn features(self) -> String {
+    /// The cargo feature that selects it, and the beginning of the image's file name.
+    fn name(self) -> &'static str {
         match self {
-            Kind::Board(board) => board.name().to_owned(),
-            Kind::Identification(board) => format!("{},identify", board.name()),
-            Kind::InTheLoop => "in-the-loop".to_owned(),
-            Kind::InTheLoopUsart => "in-the-loop-usart".to_owned(),
+            Kind::Board(board) => board.name(),
+            Kind::InTheLoop => "in-the-loop",
+            Kind::InTheLoopUsart => "in-the-loop-usart",
         }
-    }
-
-    /// Beginning of the image's file name.
-    fn name(self) -> String {
-        self.features().replace(',', "-")
     }
 
     /// The board that it is for; `None` for QEMU.
     fn board(self) -> Option<Board> {
         match self {
-            Kind::Board(board) | Kind::Identification(board) => Some(board),
+            Kind::Board(board) => Some(board),
             Kind::InTheLoop | Kind::InTheLoopUsart => None,
         }
     }
@@ -100,7 +92,7 @@ pub enum ImageError {
 /// [`ImageError`] if there is no compiler, or it fails.
 pub fn build(kind: Kind) -> Result<PathBuf, ImageError> {
     check_encoders(kind, SENSORS)?;
-    compile(kind, None, &kind.name())
+    compile(kind, None, kind.name())
 }
 
 /// Builds the image with the table of `rig` in place of `src/gains.rs`; returns the path of the ELF file.
@@ -146,9 +138,9 @@ fn compile(kind: Kind, gains: Option<&Path>, name: &str) -> Result<PathBuf, Imag
     let features = match gains {
         Some(gains) => {
             cargo.env("UPRIGHT_GAINS", gains);
-            format!("{},gains-from-env", kind.features())
+            format!("{},gains-from-env", kind.name())
         }
-        None => kind.features(),
+        None => kind.name().to_owned(),
     };
     cargo
         .current_dir(&root)

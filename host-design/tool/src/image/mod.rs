@@ -16,8 +16,5 @@ pub use checksum::{file_hash, flash_checksum};
 pub use compiler::{Compiler, compiler};
 pub use elf::{ElfError, Image};
 pub use forbidden::forbidden_functions;
-pub use size::{
-    FLASH_LIMIT, FLASH_LIMIT_FOR_IDENTIFICATION, FLASH_LIMIT_WITH_MOTIONS, Part, RAM_LIMIT,
-    RAM_LIMIT_FOR_IDENTIFICATION, Size, SizeError, size,
-};
+pub use size::{CODE_LIMIT, Part, RAM_LIMIT, Size, SizeError, size};
 pub use stack::{StackBound, StackError, StackLevel, stack_bound};

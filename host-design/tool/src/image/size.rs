@@ -6,48 +6,44 @@ use upright_board::{Lines, LinesError};
 
 use super::elf::{Image, Item};
 
-/// Flash limit of an image for a board without motions (bytes), not counting the gain table.
-pub const FLASH_LIMIT: u32 = 24 * 1024;
-/// Flash limit of an image for a board with motions (bytes): it holds their tables and the nonlinear model.
-pub const FLASH_LIMIT_WITH_MOTIONS: u32 = 128 * 1024;
-/// Flash limit of an image for identification without motions (bytes).
-pub const FLASH_LIMIT_FOR_IDENTIFICATION: u32 = 30 * 1024;
-/// Static RAM limit of an image for a board (bytes): its variables, not counting the stack and the gain table.
-pub const RAM_LIMIT: u32 = 4 * 1024;
-/// Static RAM limit of an image for identification (bytes).
-pub const RAM_LIMIT_FOR_IDENTIFICATION: u32 = 5 * 1024;
-/// Limit of the stack of an image (bytes); memory.x reserves 5 KiB, which an image for identification may use.
-const STACK_LIMIT: u32 = 4 * 1024;
-const STACK_LIMIT_FOR_IDENTIFICATION: u32 = 5 * 1024;
-
-/// Name of the table of motions, which an image without motions does not have.
-const MOTIONS: &str = "upright::gains::SWING_UP";
+/// Limit of an image's code (bytes): its flash without constants, among them the motions, and without the gain table.
+pub const CODE_LIMIT: u32 = 48 * 1024;
+/// Limit of its static RAM (bytes): its variables, not counting the stack and the gain table.
+pub const RAM_LIMIT: u32 = 8 * 1024;
 
 /// Name of the gain table: its values are in flash, and are copied to RAM at start-up.
 const TABLE: &str = "upright_image::app::__rtic_internal_local_init_table";
 
-/// The end of the name of a function that only an image for identification has.
-const SHAKES: &str = ">::shake";
+/// The section of constants.
+const CONSTANTS: &str = ".rodata";
 
-/// Size of an image in bytes, with its limits.
+/// Size of an image in bytes.
 #[derive(Debug, Clone, PartialEq, Eq, serde::Serialize)]
 pub struct Size {
     /// Flash in all, including the initial values of variables.
     pub flash: u32,
-    /// Limit of the flash without the gain table.
-    pub flash_limit: u32,
+    /// Constants in flash, among them the motions.
+    pub constants: u32,
     /// Static RAM: all variables, without the stack.
     pub ram: u32,
-    /// Limit of the static RAM without the gain table.
-    pub ram_limit: u32,
     /// The gain table, which takes this much in flash and again in RAM.
     pub table: u32,
-    /// Limit of the stack.
-    pub stack_limit: u32,
     /// By section, in the order of addresses.
     pub sections: Vec<Part>,
     /// By crate, the largest first. Code belongs to the crate of its source line, also where it is inlined.
     pub crates: Vec<Part>,
+}
+
+impl Size {
+    /// Flash without the gain table and without constants; the limit is [`CODE_LIMIT`].
+    pub fn code(&self) -> u32 {
+        self.flash - self.table - self.constants
+    }
+
+    /// Static RAM without the gain table; the limit is [`RAM_LIMIT`].
+    pub fn variables(&self) -> u32 {
+        self.ram - self.table
+    }
 }
 
 /// A part of an image, in bytes.
@@ -102,18 +98,8 @@ pub fn size(image: &Image) -> Result<Size, SizeError> {
     rest.ram += ram.saturating_sub(counted_ram);
     let mut crates: Vec<Part> = shares.into_iter().map(|(name, part)| Part { name, ..part }).collect();
     crates.sort_by_key(|part| std::cmp::Reverse((part.flash, part.ram)));
-    let has_motions = image.data.iter().any(|item| item.name == MOTIONS && item.size > 0);
-    let shakes = image.functions.iter().any(|item| item.name.ends_with(SHAKES));
-    let flash_limit = match (has_motions, shakes) {
-        (true, _) => FLASH_LIMIT_WITH_MOTIONS,
-        (false, true) => FLASH_LIMIT_FOR_IDENTIFICATION,
-        (false, false) => FLASH_LIMIT,
-    };
-    let (ram_limit, stack_limit) = match shakes {
-        true => (RAM_LIMIT_FOR_IDENTIFICATION, STACK_LIMIT_FOR_IDENTIFICATION),
-        false => (RAM_LIMIT, STACK_LIMIT),
-    };
-    Ok(Size { flash, flash_limit, ram, ram_limit, table, stack_limit, sections, crates })
+    let constants = sections.iter().filter(|part| part.name == CONSTANTS).map(|part| part.flash).sum();
+    Ok(Size { flash, constants, ram, table, sections, crates })
 }
 
 /// Bytes of machine code by the crate of their source line.

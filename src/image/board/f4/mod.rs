@@ -117,6 +117,10 @@ impl Board<SENSORS> for Hardware {
         }
     }
 
+    fn tick_s(&self) -> f32 {
+        crate::CYCLES_PER_TICK as f32 / CLOCK_HZ as f32
+    }
+
     fn drive(&mut self, output: &Output) {
         self.motor.drive(output);
     }

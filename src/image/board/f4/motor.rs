@@ -14,7 +14,6 @@
 
 use crate::pac::TIM1;
 use upright::board::Output;
-use upright::gains::TABLE;
 
 use super::boards::BOARD;
 use super::pins;
@@ -99,14 +98,13 @@ impl Motor {
             self.on = false;
             return;
         }
-        let duty = output.drive.duty(TABLE.force_limit_n);
-        let active = (duty.abs() * PERIOD as f32 + 0.5) as u32;
+        let active = (output.duty.abs() * PERIOD as f32 + 0.5) as u32;
         self.timer.ccr1().write(|w| unsafe { w.bits(PERIOD - active.min(PERIOD - LEAST_PAUSE)) });
         let phase = if self.on { self.timer.cnt().read().bits() } else { FIRST_PHASE };
         // The update loads the compare value and the repetition counter and sets the counter to 0 (17.4.6: UG), where
         // the output is inactive: a safe moment to change the direction.
         self.timer.egr().write(|w| w.ug().set_bit());
-        pins::push_along_x(duty > 0.0);
+        pins::push_along_x(output.duty > 0.0);
         // Never beyond the period: the counter would run on to the end of its range, with the output active.
         let phase = phase + RESTART;
         let phase = if phase < PERIOD { phase } else { 0 };

@@ -121,6 +121,11 @@ impl Board<SENSORS> for Hardware {
         inputs
     }
 
+    /// The simulation's tick.
+    fn tick_s(&self) -> f32 {
+        upright::gains::TICK_S
+    }
+
     fn drive(&mut self, output: &Output) {
         let begin = self.instructions();
         send(&mut self.pins, output);

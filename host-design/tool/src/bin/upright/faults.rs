@@ -11,9 +11,9 @@ use upright_tool::campaign::{Campaign, Defect, During, Row, Setup, campaign, fee
 use upright_tool::in_the_loop::{Link, Place};
 
 use crate::failure::Failure;
-use crate::firmware::Target;
 use crate::progress::with_bar;
 use crate::split::Split;
+use crate::target::Target;
 use crate::variation::{Variation, Wanted, with_stored_motions};
 
 /// Fault injection: runs the firmware with one defect at a time and checks that the motor is off in time; exit status
@@ -89,10 +89,7 @@ impl Faults {
         if self.swing_up && table.swing_up.is_none() {
             return Err(Failure::SwingUp { rig: rig.name, source: SwingUpError::NoMotions });
         }
-        let built = match self.shake {
-            true => self.target.built_for_identification(&rig, &table)?,
-            false => self.target.built(Link::Files, &rig, &table)?,
-        };
+        let built = self.target.built(Link::Files, &rig, &table)?;
         let place = built.place(self.seed);
         let mut possible = kinds(&table, place);
         let forces = if self.shake { Some(feed(&rig, &table, self.seed)?) } else { None };

@@ -19,6 +19,7 @@ mod shake;
 mod simulate;
 mod split;
 mod swing_up;
+mod target;
 mod transitions;
 mod twin;
 mod variation;

@@ -3,7 +3,7 @@
 use std::time::Duration;
 
 use indicatif::{ProgressBar, ProgressStyle};
-use upright_design::swing_up::{Progress, Trying};
+use upright_design::swing_up::{SearchProgress, SearchStep};
 
 const SPINNER_STEP: Duration = Duration::from_millis(120);
 
@@ -55,12 +55,12 @@ pub(crate) fn with_stages<T>(stages: u64, work: impl FnOnce(&dyn Fn(&'static str
 }
 
 /// Runs the search for a swing-up with a bar that says what is being tried, if stderr is a terminal.
-pub(crate) fn with_search<T>(work: impl FnOnce(Progress<'_>) -> T) -> T {
+pub(crate) fn with_search<T>(work: impl FnOnce(SearchProgress<'_>) -> T) -> T {
     let bar = ProgressBar::new(1);
     style(&bar, "{spinner} {prefix} {bar:30} {pos}/{len} {msg} {elapsed}");
     let best = std::sync::Mutex::new((0u32, f64::INFINITY));
     let result = work(&|trying| match trying {
-        Trying::Stage { transition, what, steps } => {
+        SearchStep::Stage { transition, what, steps } => {
             bar.set_prefix(format!("{transition}: {what}"));
             bar.set_length(steps);
             bar.set_position(0);
@@ -69,7 +69,7 @@ pub(crate) fn with_search<T>(work: impl FnOnce(Progress<'_>) -> T) -> T {
             }
             bar.set_message("");
         }
-        Trying::Step { score } => {
+        SearchStep::Step { score } => {
             bar.inc(1);
             if let (Some(score), Ok(mut best)) = (score, best.lock()) {
                 *best = (best.0 + 1, best.1.min(score));

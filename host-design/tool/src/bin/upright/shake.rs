@@ -11,12 +11,13 @@ use signal_hook::consts::{SIGINT, SIGTERM};
 use upright_design::identify::{LineError, Log, OverLine, shake};
 use upright_design::rig::Rig;
 use upright_design::table::{Gains, write_atomically};
+use upright_tool::in_the_loop::Link;
 use upright_tool::in_the_loop::run_shaken;
-use upright_tool::monitor::{Line, now};
+use upright_tool::monitor::{SerialLine, now};
 
 use crate::failure::Failure;
-use crate::firmware::Target;
 use crate::progress::with_spinner;
+use crate::target::Target;
 use crate::variation::with_table;
 
 /// Shakes the hanging machine, and writes its log for `upright identify`.
@@ -24,7 +25,7 @@ use crate::variation::with_table;
 /// Without --port, the machine is the simulated one of the rig file with its [reality]; the force is computed from the
 /// file alone. With --target, the whole firmware shakes it, from power-up on, and sends the log over its serial line.
 ///
-/// With --port, the machine is real. Its board must run the image for identification and be homed, with signs and
+/// With --port, the machine is real. Its board must run the image of the rig file and be homed, with signs and
 /// motor checked (`upright firmware monitor`); the links must hang still, and nobody may be within reach. Ctrl-C turns
 /// the motor off.
 #[derive(Args)]
@@ -90,7 +91,7 @@ impl Shake {
             return Ok(with_spinner("shaking", || shake(rig, seconds, self.seed))?);
         };
         let (_, table) = with_table(rig, &self.rig, Gains::Sampled)?;
-        let built = target.built_for_identification(rig, &table)?;
+        let built = target.built(Link::Files, rig, &table)?;
         Ok(with_spinner("shaking", || run_shaken(rig, &table, seconds, self.seed, built.place(self.seed)))?)
     }
     /// Shakes the machine behind a port and returns its log.
@@ -100,7 +101,7 @@ impl Shake {
         for signal in [SIGINT, SIGTERM] {
             signal_hook::flag::register(signal, Arc::clone(&stop))?;
         }
-        let mut line = Line::open(port)?;
+        let mut line = SerialLine::open(port)?;
         let mut shaking = OverLine::new(rig, &table, seconds, self.seed, now())?;
         let failed = |error: LineError| Failure::CheckFailed(format!("{port}: {error}"));
         let ended = with_spinner("shaking; Ctrl-C turns the motor off", || {
@@ -123,7 +124,7 @@ impl Shake {
 }
 
 /// Sends pending bytes, and receives.
-fn exchange(line: &mut Line, shaking: &mut OverLine) -> Result<Result<(), LineError>, std::io::Error> {
+fn exchange(line: &mut SerialLine, shaking: &mut OverLine) -> Result<Result<(), LineError>, std::io::Error> {
     let mut buffer = [0; 4096];
     let bytes = line.exchange(&shaking.take_outgoing(), &mut buffer)?;
     Ok(shaking.receive(bytes, now()))

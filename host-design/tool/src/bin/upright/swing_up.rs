@@ -24,7 +24,7 @@ use crate::split::Split;
 /// Plans the motions with which the rig raises itself from hanging to upright, and lowers itself again.
 ///
 /// They are written beside the rig file, as RIG.swing-up.json. Nothing is written if the motions fail the random runs
-/// that [swing_up] asks for. Exit status 3 if there is no motion; the message names the limit that binds and what
+/// that [swing_up] asks for. Exit status 3 if there is no motion; the message names the binding limit and what
 /// would help.
 #[derive(Args)]
 #[command(before_help = "\

@@ -6,12 +6,12 @@ use std::path::PathBuf;
 
 use clap::Args;
 use serde_json::json;
-use upright_design::motion::{RaiseAndLower, Transition};
+use upright_design::motion::{PlannedMotion, RaiseAndLower, Transition};
 use upright_design::rig::Rig;
 use upright_design::study::Study;
 use upright_design::swing_up::{
-    PlannedTransition, Route, RouteRuns, Searched, Stored, StoredTransitions, SwingUpError, TransitionRuns,
-    designed_table_with, motions, on_route, route_runs,
+    Route, RouteRuns, Searched, Stored, StoredTransitions, SwingUpError, TransitionRuns, designed_table_with,
+    motions, on_route, route_runs,
 };
 use upright_design::table::write_atomically;
 
@@ -129,13 +129,13 @@ impl Transitions {
         &self,
         rig: &Rig,
         swing_up: &RaiseAndLower,
-        all: Vec<PlannedTransition>,
+        all: Vec<(Transition, PlannedMotion)>,
     ) -> Result<Judged, Failure> {
         let failed = |source| failed(rig, source);
         let links = rig.states() / 2 - 1;
-        let held = on_route(&all.iter().map(|planned| planned.transition).collect::<Vec<_>>(), links);
+        let held = on_route(&all.iter().map(|(transition, _)| *transition).collect::<Vec<_>>(), links);
         let (transitions, lost): (Vec<_>, Vec<_>) =
-            all.into_iter().partition(|planned| held.contains(&planned.transition));
+            all.into_iter().partition(|(transition, _)| held.contains(transition));
         let table =
             with_spinner("the table", || designed_table_with(rig, swing_up, &transitions)).map_err(failed)?;
         let route = Route::of(rig, &table).ok_or_else(|| failed(SwingUpError::NoRoute))?;
@@ -169,12 +169,12 @@ impl Transitions {
                     one.tried
                 );
                 stored.drop(one.transition, links);
-                all.retain(|planned| planned.transition != one.transition);
+                all.retain(|(transition, _)| *transition != one.transition);
                 continue;
             }
             // Of a motion that occurs more than once on the route, the first time counts: it is stored last.
             others().rev().for_each(|one| stored.judge(one.transition, links, [one.arrived, one.tried]));
-            for PlannedTransition { transition, .. } in &judged.lost {
+            for (transition, _) in &judged.lost {
                 let name = transition.name(links);
                 eprintln!("{name} is not judged: the other motions do not lead there from hanging, and back");
             }
@@ -206,9 +206,9 @@ impl Transitions {
 /// Runs with the motions between equilibria.
 struct Judged {
     /// The motions on the route.
-    transitions: Vec<PlannedTransition>,
+    transitions: Vec<(Transition, PlannedMotion)>,
     /// Those that no route can reach.
-    lost: Vec<PlannedTransition>,
+    lost: Vec<(Transition, PlannedMotion)>,
     runs: RouteRuns,
 }
 
@@ -229,7 +229,7 @@ fn searched_line(searched: &Searched, tried: u64, links: usize) -> String {
 fn text(
     rig: &Rig,
     swing_up: &RaiseAndLower,
-    transitions: &[PlannedTransition],
+    transitions: &[(Transition, PlannedMotion)],
     runs: &[TransitionRuns],
 ) -> String {
     let links = rig.states() / 2 - 1;
@@ -240,10 +240,9 @@ fn text(
         let motion = match transition {
             Transition::Up => Some(&swing_up.raise),
             Transition::Down => Some(&swing_up.lower),
-            transition => transitions
-                .iter()
-                .find(|planned| planned.transition == *transition)
-                .map(|found| &found.motion),
+            transition => {
+                transitions.iter().find(|(planned, _)| planned == transition).map(|(_, motion)| motion)
+            }
         };
         let [duration_s, force_n, position_m] =
             motion.map_or([0.0; 3], |motion| [motion.duration_s(), motion.force_n(), motion.position_m()]);

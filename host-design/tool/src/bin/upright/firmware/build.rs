@@ -4,10 +4,10 @@ use std::io::Write;
 use std::path::PathBuf;
 
 use clap::Args;
-use upright_tool::image::{Board, Kind};
+use upright_tool::image::Kind;
 
 use super::board::BoardOption;
-use super::built;
+use super::built::built;
 use super::cycles::check_ticks;
 use crate::failure::Failure;
 use crate::variation::Wanted;
@@ -22,30 +22,20 @@ use crate::variation::Wanted;
 Examples:
   upright firmware build                                      with src/gains.rs as it is
   upright firmware build rigs/single-quanser-ip02.toml        with the gains and stored motions of a rig
-  upright firmware build --board nucleo-f446
-  upright firmware build rigs/single-quanser-ip02.toml --identify")]
+  upright firmware build --board nucleo-f446")]
 pub(crate) struct Build {
     /// Rig file (TOML) to design the table from [default: the table in src/gains.rs]
     rig: Option<PathBuf>,
     #[command(flatten)]
     on: BoardOption,
-    /// The image for identification: it shakes the hanging rig and logs every tick, for `upright identify`
-    #[arg(long)]
-    identify: bool,
     /// Include the stored motions between other equilibria
     #[arg(long, requires = "rig")]
     transitions: bool,
 }
 
-/// The usual image of a board, or that for identification.
-pub(super) fn kind(board: Board, identify: bool) -> Kind {
-    if identify { Kind::Identification(board) } else { Kind::Board(board) }
-}
-
 impl Build {
     pub(crate) fn run(self) -> Result<(), Failure> {
-        let image =
-            built(kind(self.on.board, self.identify), self.rig.as_deref(), Wanted::of(self.transitions))?;
+        let image = built(Kind::Board(self.on.board), self.rig.as_deref(), Wanted::of(self.transitions))?;
         check_ticks(self.on.board, self.rig.as_deref(), Wanted::of(self.transitions), &image)?;
         writeln!(std::io::stdout(), "{}", image.display())?;
         Ok(())

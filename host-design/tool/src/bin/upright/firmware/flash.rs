@@ -4,10 +4,10 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 
 use clap::Args;
+use upright_tool::image::Kind;
 
 use super::board::BoardOption;
-use super::build::kind;
-use super::built;
+use super::built::built;
 use super::cycles::check_ticks;
 use crate::failure::Failure;
 use crate::variation::Wanted;
@@ -22,16 +22,12 @@ const PROBE_RS: &str = "probe-rs";
 #[command(before_help = "\
 Examples:
   upright firmware flash                                      with src/gains.rs as it is
-  upright firmware flash rigs/single-quanser-ip02.toml --board nucleo-f446
-  upright firmware flash rigs/single-quanser-ip02.toml --identify")]
+  upright firmware flash rigs/single-quanser-ip02.toml --board nucleo-f446")]
 pub(crate) struct Flash {
     /// Rig file (TOML) to design the table from [default: the table in src/gains.rs]
     rig: Option<PathBuf>,
     #[command(flatten)]
     on: BoardOption,
-    /// The image for identification: it shakes the hanging rig and logs every tick, for `upright identify`
-    #[arg(long)]
-    identify: bool,
     /// Include the stored motions between other equilibria
     #[arg(long, requires = "rig")]
     transitions: bool,
@@ -45,8 +41,7 @@ impl Flash {
                 "probe-rs is missing: install it (https://probe.rs, or `cargo install probe-rs-tools --locked`)",
             ));
         }
-        let image =
-            built(kind(self.on.board, self.identify), self.rig.as_deref(), Wanted::of(self.transitions))?;
+        let image = built(Kind::Board(self.on.board), self.rig.as_deref(), Wanted::of(self.transitions))?;
         check_ticks(self.on.board, self.rig.as_deref(), Wanted::of(self.transitions), &image)?;
         probe_rs(&["download", "--verify", "--chip", self.on.board.chip()], Some(&image))?;
         probe_rs(&["reset", "--chip", self.on.board.chip()], None)

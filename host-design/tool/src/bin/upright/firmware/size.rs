@@ -6,17 +6,18 @@ use std::path::PathBuf;
 
 use clap::Args;
 use serde_json::json;
-use upright_tool::image::{Image, Part, StackBound, StackError, forbidden_functions, size, stack_bound};
+use upright_tool::image::{
+    CODE_LIMIT, Image, Kind, Part, RAM_LIMIT, StackBound, StackError, forbidden_functions, size, stack_bound,
+};
 
 use super::board::BoardOption;
-use super::build::kind;
-use super::built;
+use super::built::built;
 use crate::failure::Failure;
 use crate::variation::Wanted;
 
 /// Measures the image of a board: flash and RAM by section and by crate, a bound on its stack, and whether it can
-/// panic; exit status 1 if, without its gain table, it takes more than 24 KiB of flash (128 KiB with motions) or 4 KiB
-/// of static RAM, if it takes more than 4 KiB of stack, or if it can panic or allocate.
+/// panic; exit status 1 if, without its tables, it takes more than 48 KiB of code or 8 KiB of static RAM, if it takes
+/// more than 5 KiB of stack, or if it can panic or allocate.
 #[derive(Args)]
 #[command(before_help = "\
 Examples:
@@ -28,9 +29,6 @@ pub(crate) struct Size {
     rig: Option<PathBuf>,
     #[command(flatten)]
     on: BoardOption,
-    /// The image for identification, which may take 30 KiB of flash and 5 KiB of RAM
-    #[arg(long, conflicts_with = "elf")]
-    identify: bool,
     /// Measure this image instead of building one
     #[arg(long, value_name = "FILE", conflicts_with_all = ["rig", "board"])]
     elf: Option<PathBuf>,
@@ -43,7 +41,7 @@ impl Size {
     pub(crate) fn run(self) -> Result<(), Failure> {
         let path = match self.elf {
             Some(path) => path,
-            None => built(kind(self.on.board, self.identify), self.rig.as_deref(), Wanted::SwingUp)?,
+            None => built(Kind::Board(self.on.board), self.rig.as_deref(), Wanted::SwingUp)?,
         };
         let image = Image::read(&path)?;
         let (size, stack, forbidden) = (size(&image)?, stack_bound(&image), forbidden_functions(&image));
@@ -54,7 +52,8 @@ impl Size {
                 "flash": size.flash,
                 "ram": size.ram,
                 "table": size.table,
-                "limits": { "flash": size.flash_limit, "ram": size.ram_limit },
+                "constants": size.constants,
+                "limits": { "code": CODE_LIMIT, "ram": RAM_LIMIT },
                 "sections": size.sections,
                 "crates": size.crates,
                 "stack": stack.as_ref().ok(),
@@ -82,10 +81,10 @@ fn wrong(
             wrong.push(format!("{what}: {bytes} bytes, {} above the limit of {limit}", bytes - limit));
         }
     };
-    limit("flash without the gain table", size.flash - size.table, size.flash_limit);
-    limit("static RAM without the gain table", size.ram - size.table, size.ram_limit);
+    limit("code", size.code(), CODE_LIMIT);
+    limit("static RAM without the gain table", size.variables(), RAM_LIMIT);
     match stack {
-        Ok(stack) => limit("stack", stack.bytes, size.stack_limit),
+        Ok(stack) => limit("stack", stack.bytes, stack.reserved),
         Err(error) => wrong.push(error.to_string()),
     }
     if !forbidden.is_empty() {
@@ -108,12 +107,8 @@ fn table(size: &upright_tool::image::Size, stack: &Result<StackBound, StackError
     rows("crate (bytes)", &size.crates);
     let all = [
         Part { name: "sum".to_owned(), flash: size.flash, ram: size.ram },
-        Part {
-            name: "without the gain table".to_owned(),
-            flash: size.flash - size.table,
-            ram: size.ram - size.table,
-        },
-        Part { name: "limit of that".to_owned(), flash: size.flash_limit, ram: size.ram_limit },
+        Part { name: "without tables".to_owned(), flash: size.code(), ram: size.variables() },
+        Part { name: "limit of that".to_owned(), flash: CODE_LIMIT, ram: RAM_LIMIT },
     ];
     rows("image (bytes)", &all);
     if let Ok(stack) = stack {
@@ -123,7 +118,7 @@ fn table(size: &upright_tool::image::Size, stack: &Result<StackBound, StackError
             _ = writeln!(text, "  {:<47} {:>8}", deepest.join(" → "), level.bytes);
         }
         _ = writeln!(text, "  {:<47} {:>8}", "sum, each interrupting the one above", stack.bytes);
-        _ = writeln!(text, "  {:<47} {:>8}", "limit", size.stack_limit);
+        _ = writeln!(text, "  {:<47} {:>8}", "limit", stack.reserved);
     }
     text
 }
@@ -132,4 +127,29 @@ fn table(size: &upright_tool::image::Size, stack: &Result<StackBound, StackError
 fn short(name: &str) -> &str {
     let plain = name.split("::<").next().unwrap_or(name);
     plain.rsplit("::").next().unwrap_or(plain).trim_end_matches('>')
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_byte_above_a_limit_is_reported_and_one_below_is_not() {
+        let size = |code: u32, variables: u32| upright_tool::image::Size {
+            flash: code + 1368 + 100_000,
+            constants: 100_000,
+            ram: variables + 1368,
+            table: 1368,
+            sections: Vec::new(),
+            crates: Vec::new(),
+        };
+        let wrong = |code, variables, stack| {
+            let stack = Ok(StackBound { bytes: stack, reserved: 5120, levels: Vec::new() });
+            wrong(&size(code, variables), &stack, &[]).len()
+        };
+        assert_eq!(wrong(CODE_LIMIT, RAM_LIMIT, 5120), 0);
+        assert_eq!(wrong(CODE_LIMIT + 1, RAM_LIMIT, 5120), 1);
+        assert_eq!(wrong(CODE_LIMIT, RAM_LIMIT + 1, 5120), 1);
+        assert_eq!(wrong(CODE_LIMIT, RAM_LIMIT, 5121), 1);
+    }
 }

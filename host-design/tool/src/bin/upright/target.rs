@@ -46,20 +46,11 @@ impl Target {
     /// Builds the image with the table of the rig and prints its path and hash; on the host, no image is needed.
     /// `link` connects the pins of an image in QEMU.
     pub(crate) fn built(self, link: Link, rig: &Rig, table: &TableValues) -> Result<Built, Failure> {
-        self.built_as(Kind::Board(BOARD), link, rig, table)
-    }
-
-    /// As [`built`](Self::built), with the image for identification.
-    pub(crate) fn built_for_identification(self, rig: &Rig, table: &TableValues) -> Result<Built, Failure> {
-        self.built_as(Kind::Identification(BOARD), Link::Files, rig, table)
-    }
-
-    fn built_as(self, board: Kind, link: Link, rig: &Rig, table: &TableValues) -> Result<Built, Failure> {
         let kind = match (self, link) {
             (Target::Host, _) => return Ok(Built::Host),
             (Target::Qemu, Link::Files) => Kind::InTheLoop,
             (Target::Qemu, Link::Usart) => Kind::InTheLoopUsart,
-            (Target::Board, _) => board,
+            (Target::Board, _) => Kind::Board(BOARD),
         };
         let image = with_spinner("building the image", || image::build_for(kind, rig, table))?;
         if self == Target::Board {
@@ -82,7 +73,7 @@ impl Built {
 }
 
 /// Reads the image that is flashed; prints its path and hash, and the checksum that the monitor shows.
-pub(super) fn read(path: &Path) -> Result<Image, Failure> {
+pub(crate) fn read(path: &Path) -> Result<Image, Failure> {
     let image = Image::from_elf(&announced(path)?)
         .map_err(|error| Failure::BadArgument(format!("{}: {error}", path.display())))?;
     eprintln!("the monitor shows it as image {:08x}", image::flash_checksum(&image));

@@ -1,6 +1,6 @@
-//! How many random machines balance with the identified file, with their true parameters, and with the original ones.
-
-use std::path::Path;
+//! How many random machines balance with the identified file, with their true parameters, and with the original ones:
+//! `cargo bench -p upright-tool --bench commissioned_machines`. Fails if the identified file does clearly worse than the
+//! true parameters. `UPRIGHT_MACHINES` says how many, `UPRIGHT_RIG` which rig; it takes minutes.
 
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
@@ -12,9 +12,9 @@ use upright_design::rig::{PerJoint, PlantDescription, Rig};
 use upright_design::simulate::Scenario;
 use upright_design::table::{Gains, TableValues};
 use upright_design::verify::Disturbance;
-use upright_tool::commission::{Commissioning, Journal, Plan, Record, Simulated};
+use upright_tool::commission::{CommissionPlan, CommissionRecord, Commissioning, Journal, Simulated};
 
-use crate::command::path_of;
+use upright_test_support::published::rig_path;
 
 /// The machine number `number`: masses, lengths and inertias off by up to 10 %, dry friction up to 0.8 % of the weight
 /// at the cart and 0.2 % of each link's largest moment, zeros off by up to 0.3°, latency up to 0.3 ticks.
@@ -67,14 +67,14 @@ fn with_weights_of(file: &Rig, chosen: &Rig) -> Rig {
 /// Commissions machine number `number`; returns whether it balances with the identified file, with the true parameters
 /// and with the original ones, all with the weights that were chosen for it, and with the original file as it was.
 fn one(name: &str, number: u8) -> [bool; 4] {
-    let path = path_of(name);
+    let path = rig_path(name);
     let text = std::fs::read_to_string(&path).unwrap();
-    let rig = Rig::from_path(Path::new(&path)).unwrap();
+    let rig = Rig::from_path(&path).unwrap();
     let table = TableValues::of(&rig, &design(&rig).unwrap(), Gains::Sampled).unwrap();
     let machine = machine(&rig, number);
-    let mut journal = Journal::new(Record::new(&rig, "this computer"), None, Box::new(|_| ()));
+    let mut journal = Journal::new(CommissionRecord::new(&rig, "this computer"), None, Box::new(|_| ()));
     let seed = number.into();
-    let plan = Plan { rig: &rig, table: &table, file: Path::new(&path), text: &text, seconds: 20.0, seed };
+    let plan = CommissionPlan { rig: &rig, table: &table, file: &path, text: &text, seconds: 20.0, seed };
     let designed = with_firmware(&table, |target| {
         let mut simulated = Simulated::new(&machine, &table, None, target, seed).unwrap();
         Commissioning::first(plan, &mut simulated, &mut journal)
@@ -103,9 +103,7 @@ fn one(name: &str, number: u8) -> [bool; 4] {
     ]
 }
 
-#[test]
-#[ignore = "takes minutes; UPRIGHT_MACHINES says how many, UPRIGHT_RIG which rig"]
-fn machines_balance_with_the_identified_file() {
+fn main() {
     let name = std::env::var("UPRIGHT_RIG").unwrap_or_else(|_| "single-quanser-ip02".to_owned());
     let machines = std::env::var("UPRIGHT_MACHINES").map_or(12, |number| number.parse().unwrap());
     let mut count = [0; 4];
