@@ -6,7 +6,7 @@ use core::ops::{Index, IndexMut};
 use nalgebra::SVector;
 use serde::{Deserialize, Serialize};
 
-use crate::table::columns;
+use crate::table::columns::columns;
 use crate::table::part::{Part, Reader, Resize, Words, WordsMut, part};
 
 /// A control law.
