@@ -64,8 +64,10 @@ extern crate self as upright;
 #[cfg(test)]
 extern crate std;
 
+#[cfg(feature = "firmware")]
 pub mod board;
 pub mod control;
+#[cfg(feature = "firmware")]
 pub mod firmware;
 #[cfg(not(feature = "gains-from-env"))]
 pub mod gains;
@@ -76,6 +78,8 @@ pub mod gains {
 }
 mod numbers;
 pub mod plant;
+#[cfg(feature = "firmware")]
 pub mod protocol;
+#[cfg(feature = "firmware")]
 pub mod supervision;
 pub mod table;

@@ -1,12 +1,14 @@
 //! From force to motor duty cycle, and back to the force actually applied.
 
+#[cfg(feature = "firmware")]
 use serde::{Deserialize, Serialize};
 
 use crate::control::state_feedback::saturate;
 use crate::table::{MotorMap, Scalar};
 
 /// Command to the power stage.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "firmware", derive(Serialize, Deserialize))]
 pub enum Drive {
     /// A force (N), for rigs without motor data.
     Force(f32),

@@ -86,6 +86,7 @@ impl<'t, const NX: usize, const NY: usize> Controller<'t, NX, NY> {
     }
 
     /// A controller that must never be started, for a table that cannot be used.
+    #[cfg(feature = "firmware")]
     pub(crate) fn unusable(table: &'t GainTable<NX, NY>, widths: [CounterWidth; NY]) -> Self {
         Self::stopped(table, ActiveLaw::new(table, Law::Lqr, const { &LawGains::NONE }), widths)
     }

@@ -1,9 +1,11 @@
 //! Why a request is rejected.
 
+#[cfg(feature = "firmware")]
 use serde::{Deserialize, Serialize};
 
 /// Reason for rejecting a request; the previous setting is kept.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "firmware", derive(Serialize, Deserialize))]
 pub enum Rejected {
     /// The table holds no gains for this law.
     NoSuchLaw,

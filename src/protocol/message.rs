@@ -168,21 +168,9 @@ impl From<Reset> for Start {
     }
 }
 
-/// Where the program crashed, and the processor's fault registers (ARM DDI 0403, B3.2). Program counter and link
-/// register are 0 after a panic, and after a stack overflow, which leaves no room for them.
+/// What the board recorded of a crash, in words that only those who know its processor can read.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
-pub struct CrashRecord {
-    /// Program counter (PC).
-    pub pc: u32,
-    /// Link register (LR): where the function returns to, unless it has used the register for something else.
-    pub lr: u32,
-    /// Configurable fault status (CFSR).
-    pub cfsr: u32,
-    /// HardFault status (HFSR).
-    pub hfsr: u32,
-    /// Address of a bus fault (BFAR); valid if bit 15 of CFSR is set.
-    pub bfar: u32,
-}
+pub struct CrashRecord(pub [u32; 5]);
 
 /// Why the microcontroller started.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]

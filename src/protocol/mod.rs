@@ -4,8 +4,20 @@
 //! for all of them, [`serial_link`] sends and receives them beside the control task, [`queue`] connects the two, and
 //! [`simulated_pins`] replaces the wires when an image runs in the loop with a simulation.
 
+use core::time::Duration;
+
 /// Speed of the serial line (Bd).
 pub const BAUD: u32 = 460_800;
+
+/// Time between two keep-alives of a host, and between two commands of a key that is held.
+pub const KEEP_ALIVE: Duration = Duration::from_millis(25);
+
+/// The firmware lets go of a jog, and ends a shaking, when the host has been silent for this time (s). The limit for a
+/// commanded set-point is `link_timeout_s` of the rig file.
+pub use crate::supervision::jog::SILENCE_S as HOST_SILENCE_S;
+
+// A host may lose two keep-alives in a row.
+const _: () = assert!(3.0 * KEEP_ALIVE.as_secs_f32() < HOST_SILENCE_S);
 
 /// Period of telemetry until the host sets another (s). Telemetry of a quadruple rig then takes a third of the
 /// capacity of the line, the longest telemetry three quarters.

@@ -8,7 +8,7 @@
 
 use serde::{Deserialize, Serialize};
 
-/// The key counts as released when the host has been silent for this time (s).
+/// The key counts as released, and shaking ends, when the host has been silent for this time (s).
 pub const SILENCE_S: f32 = 0.1;
 /// Longest jog (s). A cart that has not moved by then is not moved by the motor.
 pub const LONGEST_S: f32 = 1.0;

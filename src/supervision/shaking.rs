@@ -10,6 +10,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::control::state_feedback::saturate;
 use crate::supervision::fault::Fault;
+use crate::supervision::jog::SILENCE_S;
 use crate::table::Limits;
 
 /// Number of forces in a command.
@@ -19,8 +20,6 @@ pub const AHEAD: usize = 64;
 /// Value in a command that stands for the largest force.
 pub const FULL: i8 = i8::MAX;
 
-/// The cart returns when the host has been silent for this time (s).
-pub const SILENCE_S: f32 = 0.1;
 /// The cart returns after this time (s).
 pub const LONGEST_S: f32 = 120.0;
 /// The motor goes off when the cart has not come back within this time (s).

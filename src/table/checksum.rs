@@ -63,16 +63,17 @@ pub(crate) fn checksum(table: &impl Part) -> u32 {
 pub(crate) fn checksum(table: &impl Part) -> u32 {
     let leaves = (0..).map_while(|mut leaf| table.part(&mut leaf));
     leaves.fold(0, |crc, leaf| {
-        let (mut crc, mut bytes) = (crc, heapless::Vec::<u8, 1024>::new());
+        let (mut crc, mut bytes, mut length) = (crc, [0; 1024], 0);
         for word in (0..).map_while(|word| leaf.get(word)) {
-            if bytes.is_full() {
+            if length == bytes.len() {
                 crc = crc32(crc, &bytes);
-                bytes.clear();
+                length = 0;
             }
             // There is room: the length is a multiple of 4.
-            let _ = bytes.extend_from_slice(&word.to_le_bytes());
+            bytes[length..length + 4].copy_from_slice(&word.to_le_bytes());
+            length += 4;
         }
-        crc32(crc, &bytes)
+        crc32(crc, &bytes[..length])
     })
 }
 

@@ -1,10 +1,12 @@
 //! The states of rest of a chain: each link stands up or hangs down.
 
+#[cfg(feature = "firmware")]
 use serde::{Deserialize, Serialize};
 
 /// Which links are up and which are down, all at rest: each of the first eight, and all further ones together (up
 /// to 31).
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Default, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Default)]
+#[cfg_attr(feature = "firmware", derive(Serialize, Deserialize))]
 pub struct Equilibrium(u8);
 
 impl Equilibrium {

@@ -4,14 +4,17 @@ use core::fmt;
 use core::ops::{Index, IndexMut};
 
 use nalgebra::SVector;
+#[cfg(feature = "firmware")]
 use serde::{Deserialize, Serialize};
 
+#[cfg(feature = "firmware")]
 use crate::table::columns::columns;
 use crate::table::part::{Part, Reader, Resize, Words, WordsMut, part};
 
 /// A control law.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "firmware", derive(Serialize, Deserialize))]
+#[cfg_attr(feature = "firmware", serde(rename_all = "snake_case"))]
 pub enum Law {
     /// Linear quadratic regulator.
     Lqr,
@@ -195,6 +198,7 @@ part! {
 
 impl<const NX: usize> LawGains<NX> {
     /// No gains, no force.
+    #[cfg(feature = "firmware")]
     pub(crate) const NONE: Self =
         Self { k: columns([[0.0; NX]]), k_pending: 0.0, k_integral: 0.0, n: 0.0, setpoint_step: 0.0 };
 

@@ -8,7 +8,8 @@ mod f4 {
     pub mod wiring;
 }
 
-use f4::boards::{ALL, BoardData, Chip, Source};
+use f4::boards::ALL;
+use f4::boards::data::{BoardData, Chip, Source};
 use f4::wiring::{STANDARD, Signal, Wire, encoders};
 use upright_tool::image::Board;
 

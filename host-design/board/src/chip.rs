@@ -7,6 +7,8 @@ pub enum Chip {
     F405,
     /// STM32F407
     F407,
+    /// STM32F407 of the first revision, on old Discovery boards: it has the identity of an STM32F2 (ES0182, 2.1.1).
+    F407RevisionA,
     /// STM32F446
     F446,
 }
@@ -16,6 +18,7 @@ impl Chip {
     pub fn identity(self) -> u32 {
         match self {
             Chip::F405 | Chip::F407 => 0x1007_6413,
+            Chip::F407RevisionA => 0x2000_6411,
             Chip::F446 => 0x1000_6421,
         }
     }
@@ -23,7 +26,7 @@ impl Chip {
     /// Bytes of flash memory.
     pub fn flash_bytes(self) -> usize {
         match self {
-            Chip::F405 | Chip::F407 => 1 << 20,
+            Chip::F405 | Chip::F407 | Chip::F407RevisionA => 1 << 20,
             Chip::F446 => 512 << 10,
         }
     }
@@ -31,7 +34,7 @@ impl Chip {
     /// Bytes of core-coupled memory at 0x1000_0000.
     pub fn core_coupled_bytes(self) -> usize {
         match self {
-            Chip::F405 | Chip::F407 => 64 << 10,
+            Chip::F405 | Chip::F407 | Chip::F407RevisionA => 64 << 10,
             Chip::F446 => 0,
         }
     }

@@ -13,6 +13,7 @@
 //! | [`motion`] | | planned motions between equilibria, as the search for a swing-up makes them |
 //! | [`table`] | gains and limits | the gain table of the firmware, as values and as Rust source |
 //! | [`simulate`] | table and scenario | a run of the firmware's controller against the nonlinear plant |
+//! | [`client`] | bytes of a serial line | commands with their answers, telemetry, logs |
 //! | [`harness`] | a target and a scenario | a run of the whole firmware, from power-up on |
 //! | [`identify`] | logs of a machine under excitation | its parameters, with standard deviations |
 //! | [`swing_up`] | rig file | motions from hanging to upright and back, with their gains |
@@ -24,6 +25,7 @@
 
 #![forbid(unsafe_code)]
 
+pub mod client;
 pub mod design;
 pub mod harness;
 pub mod identify;

@@ -12,7 +12,7 @@ use upright_design::rig::{PerJoint, PlantDescription, Rig};
 use upright_design::simulate::Scenario;
 use upright_design::table::{Gains, TableValues};
 use upright_design::verify::Disturbance;
-use upright_tool::commission::{Commissioning, Journal, Plan, Record, Simulated};
+use upright_tool::commission::{CommissionPlan, CommissionRecord, Commissioning, Journal, Simulated};
 
 use upright_test_support::published::rig_path;
 
@@ -72,9 +72,9 @@ fn one(name: &str, number: u8) -> [bool; 4] {
     let rig = Rig::from_path(&path).unwrap();
     let table = TableValues::of(&rig, &design(&rig).unwrap(), Gains::Sampled).unwrap();
     let machine = machine(&rig, number);
-    let mut journal = Journal::new(Record::new(&rig, "this computer"), None, Box::new(|_| ()));
+    let mut journal = Journal::new(CommissionRecord::new(&rig, "this computer"), None, Box::new(|_| ()));
     let seed = number.into();
-    let plan = Plan { rig: &rig, table: &table, file: &path, text: &text, seconds: 20.0, seed };
+    let plan = CommissionPlan { rig: &rig, table: &table, file: &path, text: &text, seconds: 20.0, seed };
     let designed = with_firmware(&table, |target| {
         let mut simulated = Simulated::new(&machine, &table, None, target, seed).unwrap();
         Commissioning::first(plan, &mut simulated, &mut journal)

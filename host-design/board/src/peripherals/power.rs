@@ -3,11 +3,18 @@
 use super::Bits;
 use crate::chip::Chip;
 
-/// Thresholds of the detector (V), falling (datasheet, embedded reset and power control block).
-const THRESHOLDS: [f32; 8] = [2.04, 2.20, 2.33, 2.45, 2.62, 2.76, 2.87, 3.0];
-
-/// Rise above a threshold that releases the detector again (V; datasheet, hysteresis).
-const HYSTERESIS_V: f32 = 0.1;
+/// Typical thresholds of the detector's levels (V): the falling supply that it reports, and the rising one that
+/// releases it again (datasheet DS8626, embedded reset and power control block).
+const THRESHOLDS_V: [(f32, f32); 8] = [
+    (2.04, 2.14),
+    (2.19, 2.30),
+    (2.35, 2.45),
+    (2.51, 2.60),
+    (2.66, 2.76),
+    (2.84, 2.93),
+    (2.93, 3.03),
+    (3.03, 3.14),
+];
 
 /// Supply below which the chip is in reset, whatever the option bytes say (V; datasheet, VPDR).
 pub(crate) const POWER_DOWN_V: f32 = 1.68;
@@ -92,9 +99,9 @@ impl Power {
 
     /// Compares the supply with the threshold; returns whether it is below (EXTI line 16), and whether that changed.
     pub(crate) fn compare(&mut self) -> (bool, bool) {
-        let threshold_v = THRESHOLDS[(self.control >> 5 & 7) as usize];
-        let release_v = if self.is_below { threshold_v + HYSTERESIS_V } else { threshold_v };
-        let is_below = self.control & 1 << 4 != 0 && self.volts < release_v;
+        let (falling_v, rising_v) = THRESHOLDS_V[(self.control >> 5 & 7) as usize];
+        let threshold_v = if self.is_below { rising_v } else { falling_v };
+        let is_below = self.control & 1 << 4 != 0 && self.volts < threshold_v;
         let changed = is_below != self.is_below;
         self.is_below = is_below;
         (is_below, changed)

@@ -39,7 +39,7 @@ fn ends(main: &Code) -> Violation {
     ended.expect_err("the program must break something").violation
 }
 
-/// Threshold 7 (3.0 V), line 16 rising, interrupt 1.
+/// Threshold 7 (3.03 V), line 16 rising, interrupt 1.
 fn detector() -> Code {
     clocks_on()
         .write(EXTI + 8, 1 << 16)
@@ -73,6 +73,36 @@ fn the_voltage_detector_interrupts_as_the_supply_falls() {
     let mut board = power_on(&Conditions { chip_v: 2.9, ..Conditions::f405(7) }, &off, &[]);
     board.run_until(100 * US).unwrap();
     assert_eq!(logged(&board, 4) & 4, 0);
+}
+
+/// The typical values of datasheet DS8626.
+#[test]
+fn every_level_of_the_voltage_detector_has_its_own_thresholds() {
+    let levels =
+        [(2.04, 2.14), (2.19, 2.30), (2.35, 2.45), (2.51, 2.60), (2.66, 2.76), (2.84, 2.93), (2.93, 3.03)];
+    for (level, (falling_v, rising_v)) in levels.into_iter().enumerate() {
+        let handler = Code::new().append(1).write(EXTI + 0x14, 1 << 16).raw(&[RETURN]);
+        let main = clocks_on()
+            .write(EXTI + 8, 1 << 16)
+            .write(EXTI, 1 << 16)
+            .write(0xe000_e100, 1 << 1)
+            .write(PWR, 1 << 14 | (level as u32) << 5 | 1 << 4)
+            .raw(&[FOREVER]);
+        let mut board = power_on(&Conditions::f405(7), &main, &[(17, handler)]);
+        let just = 0.005;
+        for (volts, count) in [
+            (falling_v + just, 0),
+            (falling_v - just, 1),
+            (rising_v - just, 1),
+            (falling_v - just, 1),
+            (rising_v + just, 1),
+            (falling_v - just, 2),
+        ] {
+            board.apply(Input::ChipSupply(volts));
+            board.run_until(board.now() + 100 * US).unwrap();
+            assert_eq!(appended(&board).len(), count, "level {level}: {volts} V");
+        }
+    }
 }
 
 #[test]

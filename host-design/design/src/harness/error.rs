@@ -1,10 +1,11 @@
 //! Why a firmware does not run, or does not do what it is told.
 
 use upright::protocol::frame::FrameError;
-use upright::protocol::message::{Answer, PROTOCOL, Request};
+use upright::protocol::message::{Answer, Request};
 use upright::supervision::supervisor::State;
 use upright::table::TableError;
 
+use crate::client::Mismatch;
 use crate::simulate::SimulationError;
 
 /// A run with the whole firmware that could not be started or finished.
@@ -47,19 +48,9 @@ pub enum HarnessError {
     /// The firmware never began to balance.
     #[error("the firmware does not begin to balance; its state is {0:?}")]
     NotBalancing(State),
-    /// The firmware uses another version of the messages.
-    #[error("the firmware speaks version {0} of the messages, this tool version {PROTOCOL}: build it again")]
-    Protocol(u8),
-    /// The firmware was built for another rig.
-    #[error(
-        "the firmware was built for a rig with hash {found:016x}, this one has {wanted:016x}: build it again"
-    )]
-    Rig {
-        /// Hash in the firmware.
-        found: u64,
-        /// Hash of the rig file.
-        wanted: u64,
-    },
+    /// The firmware is not the one that the host believes to talk to.
+    #[error(transparent)]
+    Mismatch(#[from] Mismatch),
     /// The scenario measures the whole state; the firmware has encoders only.
     #[error("the firmware runs from encoders: give the rig file its encoders and [kalman]")]
     FullState,

@@ -9,19 +9,21 @@
 //! No type here depends on the numbers of states and sensors, except the firmware itself.
 
 mod error;
-mod grasp;
-mod hand;
+mod held_rig;
 mod in_process;
+mod operator;
+mod rail_ends;
 mod record;
 mod session;
 mod start_up;
 mod target;
 
 pub use error::HarnessError;
-pub use grasp::Grasp;
-pub use hand::{Hand, HandTick, Status};
+pub use held_rig::HeldRig;
 pub use in_process::{with_firmware, with_table};
-pub use record::{Recording, Tick, goals, record};
-pub use session::{AnyTelemetry, AnyTickLog, HEARTBEAT_S, Session};
+pub use operator::{Operator, OperatorTick, Status};
+pub use rail_ends::RailEnds;
+pub use record::{FirmwareTick, Recording, goals, record};
+pub use session::Session;
 pub use start_up::Harness;
-pub use target::{Pace, Pins, Target};
+pub use target::{Pace, Pins, Target, healthy};

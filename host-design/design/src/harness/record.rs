@@ -3,15 +3,17 @@
 use std::collections::VecDeque;
 
 use upright::board::Output;
+use upright::protocol::KEEP_ALIVE;
 use upright::protocol::message::Request;
 use upright::supervision::fault::Fault;
 use upright::supervision::supervisor::State;
 use upright::table::Equilibrium;
 
 use super::error::HarnessError;
-use super::session::{AnyTelemetry, HEARTBEAT_S, Session};
+use super::session::Session;
 use super::start_up::Harness;
 use super::target::{Pace, Target};
+use crate::client::AnyTelemetry;
 use crate::plant::without_turns;
 use crate::rig::Rig;
 use crate::simulate::{Begin, Fall, Sample, Scenario, Sensing, Summary, Trace, ticks};
@@ -19,7 +21,7 @@ use crate::table::TableValues;
 
 /// One tick of a run, bit by bit: two runs are equal if all of their ticks are.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Tick {
+pub struct FirmwareTick {
     /// Output to the power stage.
     pub output: Output,
     /// State of the supervisor.
@@ -36,7 +38,7 @@ pub struct Recording {
     /// Figures of the run, in the form of a simulation's.
     pub summary: Summary,
     /// The firmware's own bits, tick by tick.
-    pub ticks: Vec<Tick>,
+    pub ticks: Vec<FirmwareTick>,
     /// The fault that turned the motor off, if there was one.
     pub fault: Option<Fault>,
     /// Longest execution of a tick: instructions of the image in QEMU; 0 on the host.
@@ -64,9 +66,9 @@ pub fn record(
     let mut output = harness.raise(Some(target_at(0) as f32))?;
     let mut commanded = target_at(0);
     let last = ticks(rig, scenario)?;
-    let mut record = Record::new(rig, last, pace.telemetry_ticks.into());
+    let mut record = RunRecord::new(rig, last, pace.telemetry_ticks.into());
     let goals = goals(scenario, period_s);
-    let heartbeat = (HEARTBEAT_S / period_s).max(1.0) as usize;
+    let keep_alive = (KEEP_ALIVE.as_secs_f64() / period_s).max(1.0) as usize;
     for tick in 0..=last {
         if tick > 0 {
             let inputs = harness.inputs();
@@ -78,7 +80,7 @@ pub fn record(
         } else if commanded != ahead {
             harness.session.send(Request::Setpoint(ahead as f32));
             commanded = ahead;
-        } else if tick.is_multiple_of(heartbeat) {
+        } else if tick.is_multiple_of(keep_alive) {
             harness.session.send(Request::KeepAlive);
         }
         let t = tick as f64 * period_s;
@@ -132,9 +134,9 @@ struct Pending {
     output: Output,
 }
 
-struct Record {
+struct RunRecord {
     trace: Trace,
-    ticks: Vec<Tick>,
+    ticks: Vec<FirmwareTick>,
     pending: VecDeque<Pending>,
     next_tick: Option<u32>,
     telemetry_ticks: u32,
@@ -143,7 +145,7 @@ struct Record {
     worst_cycles: u32,
 }
 
-impl Record {
+impl RunRecord {
     fn new(rig: &Rig, ticks: usize, telemetry_ticks: u32) -> Self {
         Self {
             trace: Trace::new(rig, ticks),
@@ -188,7 +190,7 @@ impl Record {
                 state: &state,
                 estimate: &estimate,
             });
-            self.ticks.push(Tick::of(&telemetry, &output));
+            self.ticks.push(FirmwareTick::of(&telemetry, &output));
         }
         Ok(())
     }
@@ -204,7 +206,7 @@ impl Record {
     }
 }
 
-impl Tick {
+impl FirmwareTick {
     fn of(telemetry: &AnyTelemetry, output: &Output) -> Self {
         let values = telemetry.estimate.iter().chain(&telemetry.innovation);
         let bits = values.chain([&telemetry.setpoint_m, &telemetry.requested_n, &telemetry.applied_n]);

@@ -1,39 +1,30 @@
 //! A conversation with the firmware: commands with their answers, telemetry.
 
 use std::collections::VecDeque;
+use std::time::Duration;
 
 use upright::board::Output;
-use upright::protocol::frame::{self, Receiver};
-use upright::protocol::message::{Answer, Command, Info, Message, PROTOCOL, Reply, Request, Telemetry};
-use upright::protocol::serial_link::{MAX_COMMAND, MAX_MESSAGE};
+use upright::protocol::message::{Answer, Info, Request};
 use upright::protocol::simulated_pins::InjectedFault;
-use upright::protocol::tick_log::TickLog;
 use upright::supervision::fault::Fault;
 use upright::supervision::jog::MotorSign;
 use upright::supervision::sign_check::Signs;
 use upright::supervision::supervisor::State;
 
 use super::error::HarnessError;
-use super::hand::Status;
+use super::operator::Status;
 use super::target::{Pace, Pins, Target};
-use crate::table::{MAX_SENSORS, MAX_STATES};
+use crate::client::{AnyTelemetry, AnyTickLog, Client, Mismatch, Received};
 
-/// Telemetry of a firmware of any size: its frames are the same bytes whatever the capacity of the lists.
-pub type AnyTelemetry = Telemetry<MAX_STATES, MAX_SENSORS>;
-
-/// A part of the tick log (a record of every tick), of a firmware of any size.
-pub type AnyTickLog = TickLog<MAX_SENSORS>;
-
-/// Time between two heartbeats of a host that commands the set-point (s).
-pub const HEARTBEAT_S: f64 = 0.025;
+/// Commands are numbered from 1, not by the time.
+const NOW: Duration = Duration::ZERO;
 
 /// A firmware in lock step, and what it has sent.
 pub struct Session<'a> {
     target: &'a mut dyn Target,
-    receiver: Receiver<MAX_MESSAGE>,
+    client: Client,
     serial: Vec<u8>,
     to_send: VecDeque<u8>,
-    last_id: u64,
     injected_fault: Option<InjectedFault>,
     telemetry: VecDeque<AnyTelemetry>,
     replies: VecDeque<(u64, Answer)>,
@@ -41,8 +32,6 @@ pub struct Session<'a> {
     status: Status,
     fault: Option<Fault>,
     ticks: u32,
-    /// Frames from the firmware that could not be read.
-    pub damaged: usize,
 }
 
 impl<'a> Session<'a> {
@@ -50,10 +39,9 @@ impl<'a> Session<'a> {
     pub fn new(target: &'a mut dyn Target) -> Self {
         Self {
             target,
-            receiver: Receiver::new(),
+            client: Client::default(),
             serial: Vec::new(),
             to_send: VecDeque::new(),
-            last_id: 0,
             injected_fault: None,
             telemetry: VecDeque::new(),
             replies: VecDeque::new(),
@@ -61,25 +49,19 @@ impl<'a> Session<'a> {
             status: Status { state: State::Disarmed, signs: Signs::Unchecked, motor: MotorSign::Unchecked },
             fault: None,
             ticks: 0,
-            damaged: 0,
         }
     }
 
     /// Queues a command for the next tick and returns its number.
     pub fn send(&mut self, request: Request) -> u64 {
-        self.last_id += 1;
-        let command = Command { id: self.last_id, request };
-        let (mut scratch, mut out) = ([0; MAX_COMMAND], [0; MAX_COMMAND]);
-        // Every command fits, as a test of the messages checks.
-        if let Ok(frame) = frame::encode(&command, &mut scratch, &mut out) {
-            self.to_send.extend(frame);
-        }
-        self.last_id
+        let id = self.client.send_once(request, NOW);
+        self.to_send.extend(self.client.take_outgoing());
+        id
     }
 
     /// Numbers the next commands from above `id`, because somebody else has sent commands with numbers up to it.
     pub fn count_from(&mut self, id: u64) {
-        self.last_id = self.last_id.max(id);
+        self.client.count_from(id);
     }
 
     /// Delays of the firmware's serial line.
@@ -94,7 +76,7 @@ impl<'a> Session<'a> {
 
     /// Number of the last command.
     pub fn last_id(&self) -> u64 {
-        self.last_id
+        self.client.last_id()
     }
 
     /// Queues bytes for the next tick; they need not be a command.
@@ -123,20 +105,26 @@ impl<'a> Session<'a> {
         let output = self.target.tick(&pins, &mut self.serial)?;
         self.ticks = self.ticks.wrapping_add(1);
         for &byte in &self.serial {
-            match self.receiver.push::<Message<MAX_STATES, MAX_SENSORS>>(byte) {
-                Some(Ok(Message::Telemetry(telemetry))) => {
+            match self.client.receive(byte, NOW) {
+                Some(Received::Telemetry(telemetry)) => {
                     self.fault = telemetry.fault;
                     let AnyTelemetry { state, signs, motor, .. } = telemetry;
                     self.status = Status { state, signs, motor };
                     self.telemetry.push_back(telemetry);
                 }
-                Some(Ok(Message::Reply(Reply { id, answer }))) => self.replies.push_back((id, answer)),
-                Some(Ok(Message::Log(log))) => self.logs.push_back(log),
-                Some(Err(_)) => self.damaged += 1,
+                Some(Received::Answer { id, answer, .. }) => self.replies.push_back((id, answer)),
+                Some(Received::Log(log)) => self.logs.push_back(log),
                 None => (),
             }
         }
         Ok(output)
+    }
+
+    /// Forgets what was received: somebody else reads the bytes.
+    pub fn forget_received(&mut self) {
+        self.telemetry.clear();
+        self.replies.clear();
+        self.logs.clear();
     }
 
     /// Bytes on the serial line that came with the last tick.
@@ -211,11 +199,7 @@ impl<'a> Session<'a> {
     /// [`HarnessError`] if it is for another rig, or does not answer.
     pub fn check_info(&mut self, rig_hash: u64, inputs: &Pins) -> Result<Info, HarnessError> {
         match self.ask(Request::Info, inputs)? {
-            Answer::Info(info) if info.protocol != PROTOCOL => Err(HarnessError::Protocol(info.protocol)),
-            Answer::Info(info) if info.rig_hash != rig_hash => {
-                Err(HarnessError::Rig { found: info.rig_hash, wanted: rig_hash })
-            }
-            Answer::Info(info) => Ok(info),
+            Answer::Info(info) => Ok(Mismatch::check(&info, rig_hash).map(|()| info)?),
             answer => Err(HarnessError::Refused { request: Request::Info, answer }),
         }
     }

@@ -6,8 +6,8 @@ use upright::supervision::supervisor::State;
 use upright::table::Equilibrium;
 
 use super::error::HarnessError;
-use super::grasp::Grasp;
-use super::hand::{Hand, HandTick, RETRY_S};
+use super::held_rig::HeldRig;
+use super::operator::{Operator, OperatorTick, RETRY_S};
 use super::session::Session;
 use super::target::{Pins, Target, healthy};
 use crate::rig::Rig;
@@ -23,7 +23,7 @@ pub struct Harness<'t> {
     pub session: Session<'t>,
     /// The simulated rig.
     pub bench: Bench,
-    hand: Hand,
+    operator: Operator,
     /// The firmware's output in the last tick.
     output: Output,
     counters: Vec<u32>,
@@ -33,8 +33,8 @@ pub struct Harness<'t> {
     asked: Option<usize>,
     begun: Vec<usize>,
     /// Puts the rig back after it has been lowered.
-    grasp: Grasp,
-    is_grasped: bool,
+    held: HeldRig,
+    is_held: bool,
 }
 
 /// Time before the links are raised again at which a hand takes hold of the rig (s): enough to come from either end of
@@ -53,21 +53,21 @@ impl<'t> Harness<'t> {
         scenario: &Scenario,
         target: &'t mut dyn Target,
     ) -> Result<Self, HarnessError> {
-        let hand = Hand::new(rig, scenario)?;
+        let operator = Operator::new(rig, scenario)?;
         let mut bench = Bench::new(rig, scenario)?;
-        bench.hold(hand.held());
+        bench.hold(operator.held());
         let mut harness = Self {
             session: Session::new(target),
             bench,
-            hand,
+            operator,
             output: Output::OFF,
             counters: vec![0; table.sensors()],
             supply_v: table.motor.map_or(0.0, |motor| motor.supply_v),
             period_s: rig.tick.period_s,
             asked: None,
             begun: Vec::new(),
-            grasp: Grasp::hanging(rig),
-            is_grasped: false,
+            held: HeldRig::hanging(rig),
+            is_held: false,
         };
         let hanging = harness.inputs();
         harness.session.check_info(table.rig_hash, &hanging)?;
@@ -88,7 +88,9 @@ impl<'t> Harness<'t> {
     /// # Errors
     /// [`HarnessError`] if the firmware does not answer.
     pub fn by_hand(&mut self, tick: u32) -> Result<Output, HarnessError> {
-        if let Some(HandTick { held, request }) = self.hand.act(tick, &self.session.status(), &self.output) {
+        if let Some(OperatorTick { held, request }) =
+            self.operator.act(tick, &self.session.status(), &self.output)
+        {
             self.bench.hold(&held);
             if let Some(request) = request {
                 self.session.send(request);
@@ -104,7 +106,7 @@ impl<'t> Harness<'t> {
     /// output.
     ///
     /// `setpoint_m` is commanded as soon as the firmware is armed; from then on it needs a command every
-    /// [`HEARTBEAT_S`](super::HEARTBEAT_S). Without a set-point it holds the position in which it begins.
+    /// [`KEEP_ALIVE`](upright::protocol::KEEP_ALIVE). Without a set-point it holds the position in which it begins.
     ///
     /// # Errors
     /// [`HarnessError::NotBalancing`] if that takes longer than a minute.
@@ -117,7 +119,7 @@ impl<'t> Harness<'t> {
                 self.session.send(Request::Setpoint(position_m));
             }
             let output = self.by_hand(tick)?;
-            if output.enable && !self.hand.lets_the_motor_push() {
+            if output.enable && !self.operator.lets_the_motor_push() {
                 return Ok(output);
             }
         }
@@ -140,7 +142,7 @@ impl<'t> Harness<'t> {
         if state == State::Calibrated && to != Equilibrium::HANGING && ahead > 0.0 && ahead <= PUT_BACK_S {
             self.put_back();
         } else {
-            self.is_grasped = false;
+            self.is_held = false;
         }
         let rests = match state {
             State::Balancing | State::Holding => true,
@@ -158,13 +160,13 @@ impl<'t> Harness<'t> {
 
     /// The hand moves the hanging rig by one tick's step towards rest with the cart at 0, and lets go of it there.
     fn put_back(&mut self) {
-        if !self.is_grasped {
-            self.grasp.take(self.bench.state());
-            self.grasp.stop();
-            self.is_grasped = true;
+        if !self.is_held {
+            self.held.take(self.bench.state());
+            self.held.stop();
+            self.is_held = true;
         }
-        if !self.grasp.put_back() {
-            self.bench.hold(self.grasp.held());
+        if !self.held.push_to(0.0) {
+            self.bench.hold(self.held.held());
         }
     }
 

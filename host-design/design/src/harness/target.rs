@@ -51,7 +51,7 @@ pub trait Target {
 }
 
 /// The input pins of a healthy board.
-pub(super) fn healthy(counts: &[u32], supply_v: f32) -> Pins {
+pub fn healthy(counts: &[u32], supply_v: f32) -> Pins {
     Pins {
         // At most MAX_SENSORS, as a table has.
         raw_counts: heapless::Vec::from_slice(counts).unwrap_or_default(),

@@ -5,9 +5,7 @@
 use std::collections::VecDeque;
 use std::time::Duration;
 
-use upright::protocol::frame::{self, Receiver};
-use upright::protocol::message::{Answer, Command, Message, PROTOCOL, Reply, Request};
-use upright::protocol::serial_link::{MAX_COMMAND, MAX_MESSAGE};
+use upright::protocol::message::{Answer, Request};
 use upright::supervision::fault::Fault;
 use upright::supervision::inhibits::Inhibits;
 use upright::supervision::supervisor::State;
@@ -16,14 +14,13 @@ use super::error::IdentifyError;
 use super::feed::Feed;
 use super::log::Log;
 use super::recorder::Recorder;
+use crate::client::{Client, Mismatch, PATIENCE, Received};
 use crate::harness::HarnessError;
 use crate::rig::Rig;
-use crate::table::{MAX_SENSORS, MAX_STATES, TableValues};
+use crate::table::TableValues;
 
-/// Interval at which a request is repeated until it is answered.
-const REPEAT: Duration = Duration::from_millis(50);
-/// Time without an answer, or without a message, after which the host gives up.
-const PATIENCE: Duration = Duration::from_secs(2);
+/// Time without a message after which the host gives up.
+const SILENCE: Duration = Duration::from_secs(2);
 /// Time between two telemetry messages (s): the line has room for the log and a little telemetry.
 const TELEMETRY_S: f64 = 0.05;
 
@@ -57,21 +54,11 @@ pub enum LineError {
     Interrupted,
 }
 
-/// A request that has not been answered yet.
-struct Waiting {
-    command: Command,
-    since: Duration,
-    next: Duration,
-}
-
 /// The host's part while a firmware at the other end of a line shakes its machine: requests, forces, and the log.
 pub struct OverLine {
     rig_hash: u64,
     requests: VecDeque<Request>,
-    waiting: Option<Waiting>,
-    receiver: Receiver<MAX_MESSAGE>,
-    outgoing: Vec<u8>,
-    last_id: u64,
+    client: Client,
     /// Time of the last message.
     heard: Duration,
     state: Option<State>,
@@ -101,10 +88,7 @@ impl OverLine {
         Ok(Self {
             rig_hash: rig.hash(),
             requests,
-            waiting: None,
-            receiver: Receiver::new(),
-            outgoing: Vec::new(),
-            last_id: 0,
+            client: Client::default(),
             heard: now,
             state: None,
             is_shaken: false,
@@ -118,31 +102,24 @@ impl OverLine {
     /// # Errors
     /// [`LineError`] if the firmware is silent, does not answer, or the cart does not follow.
     pub fn poll(&mut self, now: Duration) -> Result<(), LineError> {
-        if now.saturating_sub(self.heard) > PATIENCE {
+        let silence = now.saturating_sub(self.heard);
+        if silence > SILENCE {
             return Err(LineError::Silent);
         }
-        match &mut self.waiting {
-            Some(waiting) if now.saturating_sub(waiting.since) > PATIENCE => {
-                return Err(match waiting.command.request {
-                    Request::Log(_) => LineError::NoLog,
-                    request => HarnessError::NoAnswer(request).into(),
-                });
-            }
-            Some(waiting) if now >= waiting.next => {
-                waiting.next = now + REPEAT;
-                let command = waiting.command;
-                self.write(&command);
-            }
-            Some(_) => {}
-            None => {
-                if let Some(request) = self.requests.pop_front() {
-                    let command = self.send(request, now);
-                    self.waiting = Some(Waiting { command, since: now, next: now + REPEAT });
-                }
-            }
+        if let Some(unanswered) = self.client.poll(now).first() {
+            return Err(match unanswered.request {
+                _ if silence >= PATIENCE => LineError::Silent,
+                Request::Log(_) => LineError::NoLog,
+                request => HarnessError::NoAnswer(request).into(),
+            });
+        }
+        if !self.client.is_waiting()
+            && let Some(request) = self.requests.pop_front()
+        {
+            self.client.send(request, now);
         }
         for request in self.feed.due(self.recorder.log())? {
-            self.send(request, now);
+            self.client.send_once(request, now);
         }
         Ok(())
     }
@@ -153,14 +130,13 @@ impl OverLine {
     /// [`LineError`] if the firmware does not match, refuses, or has turned the motor off.
     pub fn receive(&mut self, bytes: &[u8], now: Duration) -> Result<(), LineError> {
         for &byte in bytes {
-            let Some(Ok(message)) = self.receiver.push::<Message<MAX_STATES, MAX_SENSORS>>(byte) else {
-                continue;
-            };
+            let Some(message) = self.client.receive(byte, now) else { continue };
             self.heard = now;
             match message {
-                Message::Telemetry(telemetry) => self.follow(telemetry.state, telemetry.fault)?,
-                Message::Reply(Reply { id, answer }) => self.answered(id, answer)?,
-                Message::Log(log) => {
+                Received::Telemetry(telemetry) => self.follow(telemetry.state, telemetry.fault)?,
+                Received::Answer { request: Some(request), answer, .. } => self.answered(request, answer)?,
+                Received::Answer { .. } => {}
+                Received::Log(log) => {
                     self.recorder.push(&log);
                     if let Some(last) = self.recorder.log().ticks().last()
                         && self.is_shaken
@@ -187,18 +163,11 @@ impl OverLine {
         }
     }
 
-    fn answered(&mut self, id: u64, answer: Answer) -> Result<(), LineError> {
-        let Some(waiting) = self.waiting.take_if(|waiting| waiting.command.id == id) else { return Ok(()) };
-        let request = waiting.command.request;
+    fn answered(&mut self, request: Request, answer: Answer) -> Result<(), LineError> {
         match answer {
             Answer::NotNow(inhibits) => return Err(LineError::NotNow(inhibits)),
             Answer::Rejected(_) => return Err(HarnessError::Refused { request, answer }.into()),
-            Answer::Info(info) if info.protocol != PROTOCOL => {
-                return Err(HarnessError::Protocol(info.protocol).into());
-            }
-            Answer::Info(info) if info.rig_hash != self.rig_hash => {
-                return Err(HarnessError::Rig { found: info.rig_hash, wanted: self.rig_hash }.into());
-            }
+            Answer::Info(info) => Mismatch::check(&info, self.rig_hash).map_err(HarnessError::from)?,
             _ => self.is_shaken |= matches!(request, Request::Shake(_)),
         }
         Ok(())
@@ -207,29 +176,14 @@ impl OverLine {
     /// Turns motor and log off, whatever is going on.
     pub fn stop(&mut self, now: Duration) {
         self.requests.clear();
-        self.waiting = None;
-        self.send(Request::Disarm, now);
-        self.send(Request::Log(false), now);
-    }
-
-    fn send(&mut self, request: Request, now: Duration) -> Command {
-        self.last_id = (now.as_micros() as u64).max(self.last_id + 1);
-        let command = Command { id: self.last_id, request };
-        self.write(&command);
-        command
-    }
-
-    fn write(&mut self, command: &Command) {
-        let (mut scratch, mut out) = ([0; MAX_COMMAND], [0; MAX_COMMAND]);
-        // Every command fits, as a test of the messages checks.
-        if let Ok(frame) = frame::encode(command, &mut scratch, &mut out) {
-            self.outgoing.extend(frame);
-        }
+        self.client.clear();
+        self.client.send_once(Request::Disarm, now);
+        self.client.send_once(Request::Log(false), now);
     }
 
     /// Takes the bytes that are to be sent over the line.
     pub fn take_outgoing(&mut self) -> Vec<u8> {
-        std::mem::take(&mut self.outgoing)
+        self.client.take_outgoing()
     }
 
     /// Whether the motor is off according to the last telemetry; false before the first.

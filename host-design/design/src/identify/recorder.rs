@@ -2,7 +2,7 @@
 
 use super::error::IdentifyError;
 use super::log::{DriveScale, Header, Log, Tick};
-use crate::harness::AnyTickLog;
+use crate::client::AnyTickLog;
 use crate::rig::Rig;
 use crate::table::TableValues;
 

@@ -3,11 +3,12 @@
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
 use serde::{Deserialize, Serialize};
+use upright::protocol::KEEP_ALIVE;
 use upright::protocol::message::{Answer, Request};
 use upright::table::Law;
 
 use super::judge::machine;
-use crate::harness::{HEARTBEAT_S, Harness, HarnessError, with_firmware};
+use crate::harness::{Harness, HarnessError, with_firmware};
 use crate::rig::{PerJoint, PlantDescription, Rig};
 use crate::study::Study;
 use crate::table::TableValues;
@@ -184,7 +185,7 @@ fn balanced(
     seconds: f64,
 ) -> Result<Healthy, HarnessError> {
     let ticks = |seconds: f64| (seconds / rig.tick.period_s) as u64;
-    let (side, heartbeat) = (ticks(SIDE_S).max(1), ticks(HEARTBEAT_S).max(1));
+    let (side, keep_alive) = (ticks(SIDE_S).max(1), ticks(KEEP_ALIVE.as_secs_f64()).max(1));
     let [low, high] = table.limits.rail_m.map(f64::from);
     let setpoint_m = SETPOINT_M.min(0.5 * high.min(-low)) as f32;
     let mut found = Healthy { balanced_s: 0.0, fault: None, rejected: 0, closest: 0.0 };
@@ -192,7 +193,7 @@ fn balanced(
         if number % side == 0 {
             let sign = if (number / side).is_multiple_of(2) { 1.0 } else { -1.0 };
             harness.session.send(Request::Setpoint(sign * setpoint_m));
-        } else if number % heartbeat == 0 {
+        } else if number % keep_alive == 0 {
             harness.session.send(Request::KeepAlive);
         }
         tick(harness)?;

@@ -4,7 +4,7 @@ use crate::published::table;
 use crate::supervised::{ALL_RIGS, balancing, cause, rejected, rig, tick};
 use upright::supervision::supervisor::State;
 use upright::table::Law;
-use upright_design::harness::{Tick, record, with_firmware};
+use upright_design::harness::{FirmwareTick, record, with_firmware};
 use upright_design::simulate::Scenario;
 
 #[test]
@@ -30,7 +30,7 @@ fn counters_that_wrap_on_the_way_change_no_bit() {
     let rig = rig("double-quanser-dbpen");
     let values = table(&rig);
     // What the firmware decided in every tick from the first tick of balancing on, as bits.
-    let bits = |counter_start: u32, tilt: f64| -> Vec<Tick> {
+    let bits = |counter_start: u32, tilt: f64| -> Vec<FirmwareTick> {
         let mut scenario =
             Scenario { counter_start, force_noise_n: 0.3, ..Scenario::at_rest(&rig, Law::Lqr) };
         scenario.start[2] = tilt;

@@ -1,19 +1,19 @@
 //! One trial with a firmware: what is done, and what is observed.
 
 use upright::board::Output;
+use upright::protocol::KEEP_ALIVE;
 use upright::protocol::message::{Answer, Request};
 use upright::supervision::fault::Fault;
 use upright::supervision::sign_check::Signs;
 use upright_board::UNITS_PER_MICROSECOND;
 
 use super::defect::Defect;
-use super::expected::Expected;
-use super::expected::Phase;
+use super::expected::{Expected, Phase};
 use super::injection::Injection;
 use super::observed::Observed;
 use super::trial::Trial;
 use crate::in_the_loop::{Events, Place, RunError, VirtualBoard};
-use upright_design::harness::{HEARTBEAT_S, Harness, HarnessError, Pins, Session, Target, goals};
+use upright_design::harness::{Harness, HarnessError, Pins, RailEnds, Session, Target, goals, healthy};
 use upright_design::identify::Feed;
 use upright_design::plant::absolute_angles;
 use upright_design::rig::{PlantDescription, Rig};
@@ -137,7 +137,7 @@ impl Attempt<'_> {
         let mut observed = Observed::default();
         let mut injection = Injection::new(self.rig, self.table, trial.clone());
         let mut output = harness.raise(Some(0.0))?;
-        let heartbeat = self.ticks(HEARTBEAT_S);
+        let keep_alive = self.ticks(KEEP_ALIVE.as_secs_f64());
         let goals = goals(&self.trial.scenario, self.rig.tick.period_s);
         for tick in 0.. {
             if self.is_over(tick, &observed) {
@@ -158,7 +158,7 @@ impl Attempt<'_> {
                 // One command in a tick.
             } else if tick == 1 {
                 harness.session.send(Request::Setpoint(trial.scenario.step_m as f32));
-            } else if tick.is_multiple_of(heartbeat) && injection.host_is_alive(since) {
+            } else if tick.is_multiple_of(keep_alive) && injection.host_is_alive(since) {
                 harness.session.send(Request::KeepAlive);
             }
             if since == Some(0) {
@@ -237,7 +237,8 @@ impl Attempt<'_> {
             Phase::Balancing | Phase::Raising | Phase::Lowering => false,
         };
         if has_switches {
-            self.press_limit_switches(harness.bench.state(), &mut inputs);
+            // They alone keep the cart on its rail if its encoder is wrong.
+            RailEnds::of(self.rig).press(harness.bench.state()[0], &mut inputs.contacts);
         }
         if let Some(since) = since {
             *is_visible |= injection.inputs(since, &mut inputs);
@@ -305,9 +306,7 @@ impl Attempt<'_> {
 
     /// Whether the cart is off its rail.
     pub(super) fn is_off_rail(&self, state: &[f64]) -> bool {
-        let PlantDescription::Chain(chain) = &self.rig.plant else { return false };
-        let [low, high] = chain.cart.travel_m;
-        !(low..=high).contains(&state[0])
+        !RailEnds::of(self.rig).holds(state[0])
     }
 
     /// Planned angles of the links from the vertical in `tick` of a run with a motion (rad).
@@ -328,13 +327,8 @@ impl Attempt<'_> {
     fn power_up(&self, target: &mut dyn Target) -> Result<Observed, HarnessError> {
         let mut observed = Observed::default();
         let mut session = Session::new(target);
-        let pins = Pins {
-            raw_counts: (0..self.table.sensors()).map(|_| 0).collect(),
-            supply_v: self.table.motor.map_or(24.0, |motor| motor.supply_v),
-            contacts: Default::default(),
-            received: heapless::Vec::new(),
-            injected_fault: None,
-        };
+        let supply_v = self.table.motor.map_or(24.0, |motor| motor.supply_v);
+        let pins = healthy(&vec![0; self.table.sensors()], supply_v);
         match session.ask(Request::Arm, &pins) {
             Err(HarnessError::Refused { answer: Answer::NotNow(reasons), .. }) => {
                 observed.refused = Some(reasons)

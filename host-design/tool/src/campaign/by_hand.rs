@@ -89,7 +89,7 @@ impl<'a> Defective<'a> {
         }
     }
 
-    /// Whether the host still sends heartbeats.
+    /// Whether the host still sends keep-alives.
     pub fn host_is_alive(&self) -> bool {
         self.injection.host_is_alive(Some(self.since))
     }

@@ -4,14 +4,14 @@ use rand::RngExt;
 use rand_pcg::Pcg64;
 use upright::board::Output;
 use upright::control::actuator::Drive;
-use upright::protocol::frame;
+use upright::protocol::frame::DELIMITER;
 use upright::protocol::message::{Command, Request};
-use upright::protocol::serial_link::MAX_COMMAND;
 use upright::table::Thresholds;
 
 use super::defect::Defect;
 use super::expected::Phase;
 use super::trial::Trial;
+use upright_design::client::command_frame;
 use upright_design::harness::{Pins, Session};
 use upright_design::rig::Rig;
 use upright_design::simulate::Bench;
@@ -76,7 +76,7 @@ impl<'a> Injection<'a> {
         }
     }
 
-    /// Whether the host still sends heartbeats, `since` ticks after the onset.
+    /// Whether the host still sends keep-alives, `since` ticks after the onset.
     pub(super) fn host_is_alive(&self, since: Option<usize>) -> bool {
         self.trial.kind != Defect::HostSilent || since.is_none()
     }
@@ -181,11 +181,7 @@ impl<'a> Injection<'a> {
     /// Sends what the defect sends over the serial line, at the onset.
     pub(super) fn serial(&mut self, session: &mut Session<'_>) {
         let Trial { kind, sign, size, .. } = self.trial;
-        let disarm = |id: u64| {
-            let (mut scratch, mut out) = ([0; MAX_COMMAND], [0; MAX_COMMAND]);
-            let command = Command { id, request: Request::Disarm };
-            frame::encode(&command, &mut scratch, &mut out).unwrap_or_default().to_vec()
-        };
+        let disarm = |id: u64| command_frame(&Command { id, request: Request::Disarm });
         let mut next = disarm(session.last_id() + 1);
         match kind {
             Defect::FrameDamaged => {
@@ -196,7 +192,7 @@ impl<'a> Injection<'a> {
             Defect::FrameTruncated => {
                 let left = self.random.random_range(1..next.len() - 1);
                 next.truncate(left);
-                next.push(frame::DELIMITER);
+                next.push(DELIMITER);
                 session.send_bytes(&next);
             }
             Defect::FrameReplayed => {
@@ -206,7 +202,7 @@ impl<'a> Injection<'a> {
                 let mut rubbish: Vec<u8> =
                     (0..self.random.random_range(1..60)).map(|_| self.random.random()).collect();
                 // The frames after it have to be readable again.
-                rubbish.push(frame::DELIMITER);
+                rubbish.push(DELIMITER);
                 session.send_bytes(&rubbish);
             }
             Defect::SetpointNotANumber => {

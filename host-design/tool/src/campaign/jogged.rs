@@ -1,26 +1,22 @@
 //! Defects in a jog: which of them prove something there, and the outcome that each must have.
 
+use upright::protocol::KEEP_ALIVE;
 use upright::protocol::message::{Answer, Request};
 use upright::supervision::inhibits::Inhibits;
 use upright::supervision::jog::{LONGEST_S, MotorSign};
-use upright_design::harness::{Harness, HarnessError, Pins};
-use upright_design::rig::{PlantDescription, Rig};
+use upright_design::harness::{Harness, HarnessError};
+use upright_design::rig::Rig;
 use upright_design::simulate::{Scenario, Sensing};
 
 use super::attempt::Attempt;
 use super::defect::Defect;
-use super::expected::Expected;
-use super::expected::Phase;
+use super::expected::{Expected, Phase};
 use super::injection::Injection;
 use super::observed::Observed;
 use super::trial::Trial;
 
-/// Time between two commands of the key that is held (s).
-const KEY_S: f64 = 0.025;
 /// Longest time from pressing the key until the motor is on (s).
 const BEGIN_S: f64 = 0.5;
-/// Distance of the limit switches from the ends of the rail (m).
-const SWITCH_M: f64 = 0.01;
 /// Time for which a jog is watched from the onset on (s).
 const WATCHED_S: f64 = 0.4;
 
@@ -86,15 +82,7 @@ impl Attempt<'_> {
     pub(super) fn jog(&self, harness: &mut Harness<'_>) -> Result<Observed, HarnessError> {
         let trial = self.trial;
         let is_there_before = matches!(trial.expected(), Expected::Found(_));
-        let mut held = harness.bench.state().to_vec();
-        self.until_checked(harness)?;
-        // The links hang again, wherever the cart is.
-        held[0] = harness.bench.state()[0];
-        for _ in 0..self.ticks(self.rig.limits.arm_time_s) {
-            harness.bench.hold(&held);
-            let inputs = harness.inputs();
-            harness.session.tick(&inputs)?;
-        }
+        let mut held = self.checked_and_hanging(harness)?;
         let mut observed = Observed::default();
         let mut injection = Injection::new(self.rig, self.table, trial.clone());
         // Number of ticks since the motor came on.
@@ -106,7 +94,7 @@ impl Attempt<'_> {
                 Some(tick) => (tick + 1).checked_sub(trial.onset),
                 None => None,
             };
-            if turn % self.ticks(KEY_S) == 0 && injection.host_is_alive(since) {
+            if turn % self.ticks(KEEP_ALIVE.as_secs_f64()) == 0 && injection.host_is_alive(since) {
                 harness.session.send(Request::Jog { along: trial.sign > 0.0 });
             }
             let output = match self.control(harness, &mut injection, since, &mut false) {
@@ -123,11 +111,11 @@ impl Attempt<'_> {
                 Some(tick) => Some(tick + 1),
                 None => output.enable.then_some(0),
             };
-            let mut acting = output;
-            if since.is_some() {
-                injection.output(&mut acting);
-            }
             if is_there_before && output.enable {
+                let mut acting = output;
+                if since.is_some() {
+                    injection.output(&mut acting);
+                }
                 harness.bench.tick(acting.drive);
                 held[0] = harness.bench.state()[0];
             } else {
@@ -152,13 +140,17 @@ impl Attempt<'_> {
         Ok(observed)
     }
 
-    /// Presses the limit switches, which alone keep the cart on its rail if its encoder is wrong.
-    pub(super) fn press_limit_switches(&self, state: &[f64], inputs: &mut Pins) {
-        if let PlantDescription::Chain(chain) = &self.rig.plant {
-            let [low, high] = chain.cart.travel_m;
-            inputs.contacts.limit_low |= state[0] < low + SWITCH_M;
-            inputs.contacts.limit_high |= state[0] > high - SWITCH_M;
+    /// Checks the signs by hand, and lets the links hang still, wherever the cart is; returns that state.
+    fn checked_and_hanging(&self, harness: &mut Harness<'_>) -> Result<Vec<f64>, HarnessError> {
+        let mut held = harness.bench.state().to_vec();
+        self.until_checked(harness)?;
+        held[0] = harness.bench.state()[0];
+        for _ in 0..self.ticks(self.rig.limits.arm_time_s) {
+            harness.bench.hold(&held);
+            let inputs = harness.inputs();
+            harness.session.tick(&inputs)?;
         }
+        Ok(held)
     }
 
     /// Whether nothing is left to be observed after `tick` of a rig that hangs.

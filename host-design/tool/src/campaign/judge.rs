@@ -1,9 +1,10 @@
 //! The verdict on a trial: its outcome compared with the one that its kind must have.
 
 use serde::{Deserialize, Serialize};
+use upright::protocol::HOST_SILENCE_S;
 use upright::supervision::fault::Fault;
 use upright::supervision::inhibits::Inhibits;
-use upright::supervision::jog::{MotorSign, SILENCE_S};
+use upright::supervision::jog::MotorSign;
 use upright::supervision::shaking;
 
 use super::attempt::{Setup, attempt};
@@ -150,8 +151,8 @@ fn has_found(observed: &Observed, sign: MotorSign) -> bool {
 /// a board some more. A rig that was shaken first brings its cart back.
 pub(super) fn silence_ticks(table: &TableValues, phase: Phase) -> u32 {
     let longest_s = match phase {
-        Phase::Shaken => shaking::SILENCE_S + shaking::RETURN_S,
-        _ => SILENCE_S,
+        Phase::Shaken => HOST_SILENCE_S + shaking::RETURN_S,
+        _ => HOST_SILENCE_S,
     };
     (longest_s / table.tick_s) as u32 + 5
 }

@@ -4,8 +4,9 @@ use core::f64::consts::PI;
 
 use rand::RngExt;
 use upright::control::actuator::Drive;
+use upright::protocol::HOST_SILENCE_S;
 use upright::protocol::message::Request;
-use upright::supervision::shaking::{ANGLE_RAD, RETURN_S, SILENCE_S};
+use upright::supervision::shaking::{ANGLE_RAD, RETURN_S};
 use upright_design::harness::{HarnessError, Target};
 use upright_design::identify::{Feed, IdentifyError, Shaken};
 use upright_design::plant::absolute_angles;
@@ -99,7 +100,7 @@ impl Trial {
     pub(super) fn in_shaking(self, rig: &Rig) -> Self {
         let ticks = |seconds: f64| (seconds / rig.tick.period_s) as usize;
         let watched_s = match self.kind.while_shaken() {
-            Some(Expected::LetGo) => f64::from(SILENCE_S + RETURN_S) + WATCHED_S[0],
+            Some(Expected::LetGo) => f64::from(HOST_SILENCE_S + RETURN_S) + WATCHED_S[0],
             Some(Expected::Changed) => WATCHED_S[1],
             _ => WATCHED_S[0],
         };

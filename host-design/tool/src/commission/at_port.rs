@@ -6,17 +6,17 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, TryRecvError};
 use std::time::Duration;
 
-use super::machine::{Machine, Stop};
-use super::step::Step;
-use super::task::Task;
-use crate::monitor::{Line, now};
+use super::machine::{MachineAtHand, Stop};
+use super::step::CommissionStep;
+use super::task::PersonTask;
+use crate::monitor::{SerialLine, now};
 
 /// How long a person may take for a task.
 const PATIENCE: Duration = Duration::from_secs(180);
 
 /// A machine behind a port. The journal shows what the person is asked to do; the person's answers arrive as lines.
 pub struct AtPort {
-    line: Line,
+    line: SerialLine,
     said: Receiver<String>,
     /// Whether the person has asked to stop.
     stop: Arc<AtomicBool>,
@@ -27,7 +27,7 @@ impl AtPort {
     /// The machine behind `line`, with the lines that the person types. `stop` is set when everything has to end,
     /// `show` is for what the person has to read.
     pub fn new(
-        line: Line,
+        line: SerialLine,
         said: Receiver<String>,
         stop: Arc<AtomicBool>,
         show: Box<dyn FnMut(&str)>,
@@ -54,7 +54,7 @@ impl AtPort {
     }
 }
 
-impl Machine for AtPort {
+impl MachineAtHand for AtPort {
     fn exchange(&mut self, bytes: &[u8]) -> Result<Vec<u8>, Stop> {
         // Reported only once: the motor still has to be turned off through this line.
         if self.stop.swap(false, Ordering::Relaxed) {
@@ -71,7 +71,7 @@ impl Machine for AtPort {
         now()
     }
 
-    fn ask(&mut self, task: Task) -> Result<(), Stop> {
+    fn ask(&mut self, task: PersonTask) -> Result<(), Stop> {
         if task.needs_consent() {
             self.consent("    Enter when you are ready; Ctrl-C stops")?;
         }
@@ -82,7 +82,7 @@ impl Machine for AtPort {
         PATIENCE
     }
 
-    fn again(&mut self, failed: Step) -> bool {
+    fn again(&mut self, failed: CommissionStep) -> bool {
         let words = format!("    r and Enter: back to {}; only Enter: stop", failed.back().name());
         self.consent(&words).is_ok_and(|said| said.trim() == "r")
     }

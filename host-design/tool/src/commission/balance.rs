@@ -6,27 +6,27 @@ use upright::protocol::message::Request;
 use upright::supervision::fault::Fault;
 use upright::supervision::inhibits::Inhibits;
 use upright::supervision::supervisor::State;
+use upright_design::client::AnyTelemetry;
 use upright_design::plant::absolute_angles;
 
 use super::guide::Guide;
 use super::machine::Stop;
-use super::task::Task;
-use crate::monitor::TelemetryOfAny;
+use super::task::PersonTask;
 
 /// Time for which the machine has to balance.
 const BALANCED: Duration = Duration::from_secs(10);
 
 /// Largest motion while it balances.
 #[derive(Default)]
-struct Motion {
+struct LargestMotion {
     messages: f64,
     force_squared: f64,
     lean_rad: f64,
     cart_m: f64,
 }
 
-impl Motion {
-    fn take(&mut self, now: &TelemetryOfAny) {
+impl LargestMotion {
+    fn take(&mut self, now: &AnyTelemetry) {
         let estimate: Vec<f64> = now.estimate.iter().map(|&value| f64::from(value)).collect();
         self.messages += 1.0;
         self.force_squared += f64::from(now.applied_n).powi(2);
@@ -37,20 +37,20 @@ impl Motion {
 
 /// The links are raised by hand, the motor comes on, the hand lets go, and the rig balances.
 pub(super) fn balance(guide: &mut Guide<'_>) -> Result<(), Stop> {
-    guide.ask(Task::Centre)?;
+    guide.ask(PersonTask::Centre)?;
     guide.pause(Duration::from_secs(1))?;
-    guide.ask(Task::Raise)?;
-    let is_up = |now: &TelemetryOfAny| {
+    guide.ask(PersonTask::Raise)?;
+    let is_up = |now: &AnyTelemetry| {
         let mut both = [Inhibits::TILTED, Inhibits::MOVING].into_iter();
         (!both.any(|one| now.arming_inhibits.contains(one))).then_some(())
     };
     guide.wait_for_person(is_up)?;
     guide.request_until(Request::Arm, |now| matches!(now.state, State::Armed | State::Balancing))?;
-    let has_begun = |now: &TelemetryOfAny| matches!(now.state, State::Balancing | State::Fault).then_some(());
+    let has_begun = |now: &AnyTelemetry| matches!(now.state, State::Balancing | State::Fault).then_some(());
     if guide.wait_for_person(has_begun)?.is_none() {
         return Err(Stop::Machine(format!("the motor does not come on: {}", guide.refusal())));
     }
-    let (begin, mut motion, mut last) = (guide.machine.now(), Motion::default(), 0);
+    let (begin, mut motion, mut last) = (guide.machine.now(), LargestMotion::default(), 0);
     let ended = guide.wait(BALANCED, |now| {
         if now.tick != last {
             last = now.tick;
@@ -72,7 +72,7 @@ pub(super) fn balance(guide: &mut Guide<'_>) -> Result<(), Stop> {
         motion.lean_rad.to_degrees(),
         1e3 * motion.cart_m
     ));
-    guide.ask(Task::Catch)?;
+    guide.ask(PersonTask::Catch)?;
     guide.turn_off();
-    guide.ask(Task::Rest)
+    guide.ask(PersonTask::Rest)
 }

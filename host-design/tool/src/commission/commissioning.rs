@@ -1,38 +1,18 @@
 //! The steps in their order, and the return to an earlier step after one that was not passed.
 
-use std::path::Path;
-
 use upright_design::identify::{Identification, Log};
-use upright_design::rig::Rig;
-use upright_design::table::TableValues;
 
 use super::designing::{Designed, designed, identified, verified};
 use super::guide::Guide;
-use super::machine::{Machine, Stop};
+use super::machine::{MachineAtHand, Stop};
+use super::plan::CommissionPlan;
 use super::record::Journal;
-use super::step::Step;
+use super::step::CommissionStep;
 use super::{balance, contacts, homing, motor, shaking, signs};
-
-/// What is commissioned, and how.
-#[derive(Debug, Clone, Copy)]
-pub struct Plan<'a> {
-    /// The rig, as in its file.
-    pub rig: &'a Rig,
-    /// Its gain table, which the firmware has.
-    pub table: &'a TableValues,
-    /// Path of the rig file.
-    pub file: &'a Path,
-    /// The text of the file.
-    pub text: &'a str,
-    /// Duration of the shaking (s).
-    pub seconds: f64,
-    /// Seed of the excitation's phases.
-    pub seed: u64,
-}
 
 /// A rig on the way from wired to balancing.
 pub struct Commissioning<'a> {
-    plan: Plan<'a>,
+    plan: CommissionPlan<'a>,
     /// Number of times the machine was shaken; each time the excitation has other phases.
     shaken: u64,
     log: Option<Log>,
@@ -42,7 +22,7 @@ pub struct Commissioning<'a> {
 
 impl<'a> Commissioning<'a> {
     /// A commissioning before its first step.
-    pub fn new(plan: Plan<'a>) -> Self {
+    pub fn new(plan: CommissionPlan<'a>) -> Self {
         Self { plan, shaken: 0, log: None, found: None, designed: None }
     }
 
@@ -50,9 +30,13 @@ impl<'a> Commissioning<'a> {
     ///
     /// # Errors
     /// [`Stop`] of the step that was not passed.
-    pub fn first(plan: Plan<'a>, machine: &mut dyn Machine, journal: &mut Journal) -> Result<Designed, Stop> {
+    pub fn first(
+        plan: CommissionPlan<'a>,
+        machine: &mut dyn MachineAtHand,
+        journal: &mut Journal,
+    ) -> Result<Designed, Stop> {
         let mut all = Self::new(plan);
-        all.run(machine, journal, &Step::FIRST)?;
+        all.run(machine, journal, &CommissionStep::FIRST)?;
         all.designed.ok_or_else(not_before)
     }
 
@@ -61,8 +45,12 @@ impl<'a> Commissioning<'a> {
     ///
     /// # Errors
     /// [`Stop`] of the step that was not passed.
-    pub fn second(plan: Plan<'a>, machine: &mut dyn Machine, journal: &mut Journal) -> Result<(), Stop> {
-        Self::new(plan).run(machine, journal, &Step::SECOND)?;
+    pub fn second(
+        plan: CommissionPlan<'a>,
+        machine: &mut dyn MachineAtHand,
+        journal: &mut Journal,
+    ) -> Result<(), Stop> {
+        Self::new(plan).run(machine, journal, &CommissionStep::SECOND)?;
         Ok(journal.done()?)
     }
 
@@ -73,9 +61,9 @@ impl<'a> Commissioning<'a> {
     /// [`Stop`] of the step that was not passed.
     pub fn run(
         &mut self,
-        machine: &mut dyn Machine,
+        machine: &mut dyn MachineAtHand,
         journal: &mut Journal,
-        steps: &[Step],
+        steps: &[CommissionStep],
     ) -> Result<(), Stop> {
         let mut guide = Guide::new(machine, journal);
         let mut next = 0;
@@ -97,36 +85,38 @@ impl<'a> Commissioning<'a> {
         Ok(())
     }
 
-    fn one(&mut self, guide: &mut Guide<'_>, step: Step) -> Result<(), Stop> {
+    fn one(&mut self, guide: &mut Guide<'_>, step: CommissionStep) -> Result<(), Stop> {
         let plan = self.plan;
         // Until then, a pressed emergency stop or a power stage without supply may be the cause of a fault.
-        if !matches!(step, Step::Connect | Step::Contacts) {
+        if !matches!(step, CommissionStep::Connect | CommissionStep::Contacts) {
             guide.clear()?;
         }
         match step {
-            Step::Connect => contacts::connect(guide, plan)?,
-            Step::Contacts => contacts::check(guide, plan)?,
-            Step::Homing => homing::home(guide, plan)?,
-            Step::Signs => signs::check(guide)?,
-            Step::Turns => signs::turns(guide, plan)?,
-            Step::Motor => motor::check(guide)?,
-            Step::Excitation => {
+            CommissionStep::Connect => contacts::connect(guide, plan)?,
+            CommissionStep::Contacts => contacts::check(guide, plan)?,
+            CommissionStep::Homing => homing::home(guide, plan)?,
+            CommissionStep::Signs => signs::check(guide)?,
+            CommissionStep::Turns => signs::turns(guide, plan)?,
+            CommissionStep::Motor => motor::check(guide)?,
+            CommissionStep::Excitation => {
                 let seed = plan.seed.wrapping_add(self.shaken);
                 self.shaken += 1;
-                self.log = Some(shaking::shake(guide, Plan { seed, ..plan })?);
+                self.log = Some(shaking::shake(guide, CommissionPlan { seed, ..plan })?);
             }
-            Step::Identification => {
+            CommissionStep::Identification => {
                 let log = self.log.as_ref().ok_or_else(not_before)?;
                 self.found = Some(identified(guide.journal, plan, log)?);
             }
-            Step::Design => {
+            CommissionStep::Design => {
                 let found = self.found.as_ref().ok_or_else(not_before)?;
                 self.designed = Some(designed(guide.journal, plan, found)?);
             }
-            Step::Verification => verified(guide.journal, self.designed.as_ref().ok_or_else(not_before)?)?,
+            CommissionStep::Verification => {
+                verified(guide.journal, self.designed.as_ref().ok_or_else(not_before)?)?
+            }
             // The firmware changes here; this one has nothing to do.
-            Step::Image => {}
-            Step::Balance => balance::balance(guide)?,
+            CommissionStep::Image => {}
+            CommissionStep::Balance => balance::balance(guide)?,
         }
         Ok(())
     }

@@ -2,15 +2,16 @@
 
 use upright::supervision::fault::Fault;
 use upright::supervision::inhibits::Inhibits;
+use upright_design::client::AnyTelemetry;
 
-use super::commissioning::Plan;
 use super::guide::Guide;
 use super::machine::Stop;
-use super::task::{End, Task};
-use crate::monitor::{TelemetryOfAny, words};
+use super::plan::CommissionPlan;
+use super::task::{End, PersonTask};
+use crate::monitor::words;
 
 /// The firmware answers, and is that of the rig file.
-pub(super) fn connect(guide: &mut Guide<'_>, plan: Plan<'_>) -> Result<(), Stop> {
+pub(super) fn connect(guide: &mut Guide<'_>, plan: CommissionPlan<'_>) -> Result<(), Stop> {
     while guide.conversation().telemetry.is_none() {
         guide.turn()?;
     }
@@ -35,8 +36,8 @@ pub(super) fn connect(guide: &mut Guide<'_>, plan: Plan<'_>) -> Result<(), Stop>
 }
 
 /// Emergency stop and limit switches open when they are pressed, and no other; then the supply.
-pub(super) fn check(guide: &mut Guide<'_>, plan: Plan<'_>) -> Result<(), Stop> {
-    guide.ask(Task::PressStop)?;
+pub(super) fn check(guide: &mut Guide<'_>, plan: CommissionPlan<'_>) -> Result<(), Stop> {
+    guide.ask(PersonTask::PressStop)?;
     if guide.wait_for_person(|now| now.contacts.emergency_stop.then_some(()))?.is_none() {
         return Err(Stop::Machine(
             "the emergency stop is not seen when it is pressed: it has to be a normally closed contact to ground; do not \
@@ -44,7 +45,7 @@ pub(super) fn check(guide: &mut Guide<'_>, plan: Plan<'_>) -> Result<(), Stop> {
                 .to_owned(),
         ));
     }
-    guide.ask(Task::ReleaseStop)?;
+    guide.ask(PersonTask::ReleaseStop)?;
     if guide.wait_for_person(|now| (!now.contacts.emergency_stop).then_some(()))?.is_none() {
         return Err(Stop::Machine("the emergency stop stays pressed, or its wire is open".to_owned()));
     }
@@ -60,13 +61,13 @@ pub(super) fn check(guide: &mut Guide<'_>, plan: Plan<'_>) -> Result<(), Stop> {
 
 /// The switch at this end opens, and not the other one; away from the ends both are closed.
 fn switch(guide: &mut Guide<'_>, end: End) -> Result<(), Stop> {
-    let both = |now: &TelemetryOfAny| [now.contacts.limit_low, now.contacts.limit_high];
-    guide.ask(Task::Centre)?;
+    let both = |now: &AnyTelemetry| [now.contacts.limit_low, now.contacts.limit_high];
+    guide.ask(PersonTask::Centre)?;
     if guide.wait_for_person(|now| (both(now) == [false; 2]).then_some(()))?.is_none() {
         let words = "a limit switch is open in the middle of the rail: it is a normally closed contact to ground; check its wire";
         return Err(Stop::Machine(words.to_owned()));
     }
-    guide.ask(Task::PushTo(end))?;
+    guide.ask(PersonTask::PushTo(end))?;
     let (own, name) = match end {
         End::Low => ([true, false], "low"),
         End::High => ([false, true], "high"),
@@ -85,8 +86,8 @@ fn switch(guide: &mut Guide<'_>, end: End) -> Result<(), Stop> {
 
 /// The supply is within its limits, and the power stage reports no fault.
 fn supply(guide: &mut Guide<'_>) -> Result<(), Stop> {
-    guide.ask(Task::SwitchOn)?;
-    let is_good = |now: &TelemetryOfAny| wrong_inputs(now).is_empty().then_some(());
+    guide.ask(PersonTask::SwitchOn)?;
+    let is_good = |now: &AnyTelemetry| wrong_inputs(now).is_empty().then_some(());
     if guide.wait_for_person(is_good)?.is_none() {
         let now = guide.conversation().telemetry.as_ref();
         let words = now.map(|now| format!("{}; {}", wrong_inputs(now).join("; "), words::inputs(now)));
@@ -100,7 +101,7 @@ fn supply(guide: &mut Guide<'_>) -> Result<(), Stop> {
 }
 
 /// What is wrong with supply and power stage.
-fn wrong_inputs(now: &TelemetryOfAny) -> Vec<&'static str> {
+fn wrong_inputs(now: &AnyTelemetry) -> Vec<&'static str> {
     let both = [Inhibits::SUPPLY, Inhibits::DRIVER].into_iter();
     both.filter(|&one| now.arming_inhibits.contains(one)).flat_map(Inhibits::texts).collect()
 }

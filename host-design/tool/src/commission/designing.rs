@@ -12,8 +12,8 @@ use upright_design::study::Study;
 use upright_design::table::{Gains, TableValues};
 use upright_design::verify::{Unverifiable, brief};
 
-use super::commissioning::Plan;
 use super::machine::Stop;
+use super::plan::CommissionPlan;
 use super::record::Journal;
 use crate::identified::{json, rig_file, text};
 
@@ -42,13 +42,17 @@ pub struct Designed {
 
 impl Designed {
     /// The `plan` with this rig in place of that of the file.
-    pub fn plan<'a>(&'a self, plan: Plan<'a>) -> Plan<'a> {
-        Plan { rig: &self.rig, table: &self.table, text: &self.text, ..plan }
+    pub fn plan<'a>(&'a self, plan: CommissionPlan<'a>) -> CommissionPlan<'a> {
+        CommissionPlan { rig: &self.rig, table: &self.table, text: &self.text, ..plan }
     }
 }
 
 /// The parameters of the machine, from its log.
-pub(super) fn identified(journal: &mut Journal, plan: Plan<'_>, log: &Log) -> Result<Identification, Stop> {
+pub(super) fn identified(
+    journal: &mut Journal,
+    plan: CommissionPlan<'_>,
+    log: &Log,
+) -> Result<Identification, Stop> {
     let settings = Settings::default();
     let logs = [(PathBuf::from("the log"), log.clone())];
     let found =
@@ -64,7 +68,7 @@ pub(super) fn identified(journal: &mut Journal, plan: Plan<'_>, log: &Log) -> Re
 /// The rig file with the numbers that were found, and gains for them.
 pub(super) fn designed(
     journal: &mut Journal,
-    plan: Plan<'_>,
+    plan: CommissionPlan<'_>,
     found: &Identification,
 ) -> Result<Designed, Stop> {
     let machine = |words: String| Stop::Machine(words);
@@ -115,7 +119,7 @@ fn tolerances(rig: &Rig, found: &Identification) -> Tolerances {
 /// The file's own weights if they survive the tolerances; else those that a search finds; else the file's own again.
 fn robust(
     journal: &mut Journal,
-    plan: Plan<'_>,
+    plan: CommissionPlan<'_>,
     own: Designed,
     tolerances: &Tolerances,
 ) -> Result<Designed, Stop> {

@@ -2,13 +2,14 @@
 
 use std::time::Duration;
 
-use upright::protocol::message::Request;
+use upright::protocol::message::{Answer, Request};
 use upright::supervision::supervisor::State;
+use upright_design::client::AnyTelemetry;
 
-use super::machine::{Machine, Stop};
+use super::machine::{MachineAtHand, Stop};
 use super::record::Journal;
-use super::task::Task;
-use crate::monitor::{Action, Ended, Monitor, TelemetryOfAny};
+use super::task::PersonTask;
+use crate::monitor::{Ended, Monitor, MonitorAction};
 
 /// Time without telemetry after which the step ends.
 const SILENCE: Duration = Duration::from_secs(2);
@@ -21,7 +22,7 @@ const OFF: Duration = Duration::from_secs(1);
 
 /// Leads the person through a step, and watches the telemetry.
 pub(super) struct Guide<'a> {
-    pub(super) machine: &'a mut dyn Machine,
+    pub(super) machine: &'a mut dyn MachineAtHand,
     pub(super) journal: &'a mut Journal,
     conversation: Monitor,
     heard: Duration,
@@ -29,7 +30,7 @@ pub(super) struct Guide<'a> {
 }
 
 impl<'a> Guide<'a> {
-    pub(super) fn new(machine: &'a mut dyn Machine, journal: &'a mut Journal) -> Self {
+    pub(super) fn new(machine: &'a mut dyn MachineAtHand, journal: &'a mut Journal) -> Self {
         let heard = machine.now();
         Self { machine, journal, conversation: Monitor::new(""), heard, last_tick: None }
     }
@@ -46,7 +47,7 @@ impl<'a> Guide<'a> {
     }
 
     /// Asks the person to do something.
-    pub(super) fn ask(&mut self, task: Task) -> Result<(), Stop> {
+    pub(super) fn ask(&mut self, task: PersonTask) -> Result<(), Stop> {
         self.journal.asked(task);
         self.machine.ask(task)?;
         // Consent may have taken long.
@@ -67,7 +68,7 @@ impl<'a> Guide<'a> {
     /// Sends a request.
     pub(super) fn send(&mut self, request: Request) {
         let now = self.machine.now();
-        self.conversation.act(Action::Send(request), now);
+        self.conversation.act(MonitorAction::Send(request), now);
     }
 
     /// Sends what is due and receives: some milliseconds pass.
@@ -99,7 +100,7 @@ impl<'a> Guide<'a> {
     pub(super) fn wait<R>(
         &mut self,
         patience: Duration,
-        mut done: impl FnMut(&TelemetryOfAny) -> Option<R>,
+        mut done: impl FnMut(&AnyTelemetry) -> Option<R>,
     ) -> Result<Option<R>, Stop> {
         let end = self.machine.now() + patience;
         loop {
@@ -116,7 +117,7 @@ impl<'a> Guide<'a> {
     /// As [`Guide::wait`], for as long as the person may take for a task.
     pub(super) fn wait_for_person<R>(
         &mut self,
-        done: impl FnMut(&TelemetryOfAny) -> Option<R>,
+        done: impl FnMut(&AnyTelemetry) -> Option<R>,
     ) -> Result<Option<R>, Stop> {
         self.wait(self.machine.patience(), done)
     }
@@ -125,7 +126,7 @@ impl<'a> Guide<'a> {
     pub(super) fn request_until(
         &mut self,
         request: Request,
-        done: impl Fn(&TelemetryOfAny) -> bool,
+        done: impl Fn(&AnyTelemetry) -> bool,
     ) -> Result<(), Stop> {
         let end = self.machine.now() + self.machine.patience();
         while self.machine.now() < end {
@@ -150,14 +151,16 @@ impl<'a> Guide<'a> {
         if let Some(fault) = self.conversation.telemetry.as_ref().and_then(|telemetry| telemetry.fault) {
             return format!("fault {fault}");
         }
-        let lines = self.conversation.log.iter().rev();
-        let reasons: Vec<&str> = lines.map_while(|line| line.strip_prefix("  because ")).collect();
-        if reasons.is_empty() { "no answer".to_owned() } else { reasons.join("; ") }
+        match self.conversation.refusal {
+            Some(Answer::NotNow(reasons)) => reasons.texts().collect::<Vec<_>>().join("; "),
+            Some(Answer::Rejected(rejected)) => rejected.to_string(),
+            _ => "no answer".to_owned(),
+        }
     }
 
     /// Clears a fault once its cause is gone.
     pub(super) fn clear(&mut self) -> Result<(), Stop> {
-        let is_clear = |telemetry: &TelemetryOfAny| telemetry.state != State::Fault;
+        let is_clear = |telemetry: &AnyTelemetry| telemetry.state != State::Fault;
         if self.conversation.telemetry.as_ref().is_some_and(is_clear) {
             return Ok(());
         }

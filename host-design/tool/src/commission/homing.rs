@@ -2,33 +2,33 @@
 
 use upright::protocol::message::Request;
 use upright::supervision::homing::Homing;
+use upright_design::client::AnyTelemetry;
 
-use super::commissioning::Plan;
 use super::guide::Guide;
 use super::machine::Stop;
-use super::task::{End, Task};
-use crate::monitor::TelemetryOfAny;
+use super::plan::CommissionPlan;
+use super::task::{End, PersonTask};
 
 /// A sensor has moved if it counts at least this share of the expected counts.
 const MOVED: f64 = 0.1;
 
 /// Both switches are touched, and their distance is that of the file; the links hang still.
-pub(super) fn home(guide: &mut Guide<'_>, plan: Plan<'_>) -> Result<(), Stop> {
+pub(super) fn home(guide: &mut Guide<'_>, plan: CommissionPlan<'_>) -> Result<(), Stop> {
     if plan.table.limits.travel_counts[0] == 0 {
-        guide.ask(Task::Centre)?;
+        guide.ask(PersonTask::Centre)?;
         return guide.request_until(Request::Home, |now| now.homing == Homing::Homed);
     }
-    guide.ask(Task::Centre)?;
-    let is_free = |now: &TelemetryOfAny| !now.contacts.limit_low && !now.contacts.limit_high;
+    guide.ask(PersonTask::Centre)?;
+    let is_free = |now: &AnyTelemetry| !now.contacts.limit_low && !now.contacts.limit_high;
     if guide.wait_for_person(|now| is_free(now).then_some(()))?.is_none() {
         return Err(Stop::Machine("a limit switch stays open, or the cart is still at an end".to_owned()));
     }
-    let is_begun = |now: &TelemetryOfAny| matches!(now.homing, Homing::Touch { .. });
+    let is_begun = |now: &AnyTelemetry| matches!(now.homing, Homing::Touch { .. });
     guide.request_until(Request::HomeRail, is_begun)?;
     let mut ends = Vec::new();
     for end in [End::Low, End::High] {
-        guide.ask(Task::PushTo(end))?;
-        let touched = move |now: &TelemetryOfAny| {
+        guide.ask(PersonTask::PushTo(end))?;
+        let touched = move |now: &AnyTelemetry| {
             let is_there = match (now.homing, end) {
                 (Homing::Touch { low, .. }, End::Low) => low,
                 (Homing::Touch { high, .. }, End::High) => high,
@@ -54,7 +54,7 @@ pub(super) fn home(guide: &mut Guide<'_>, plan: Plan<'_>) -> Result<(), Stop> {
         moved[0] * step(plan, 0),
         wanted_m(plan)
     ));
-    guide.ask(Task::Centre)?;
+    guide.ask(PersonTask::Centre)?;
     if guide.wait_for_person(|now| (now.homing == Homing::Homed).then_some(()))?.is_none() {
         return Err(Stop::Machine("cart and links do not come to rest between the switches".to_owned()));
     }
@@ -63,7 +63,7 @@ pub(super) fn home(guide: &mut Guide<'_>, plan: Plan<'_>) -> Result<(), Stop> {
 
 /// What is wrong if the switches are not as far apart as the file says; `moved` are all sensors' counts from one to
 /// the other.
-fn wrong_travel(plan: Plan<'_>, moved: &[f64]) -> String {
+fn wrong_travel(plan: CommissionPlan<'_>, moved: &[f64]) -> String {
     let wanted = f64::from(plan.table.limits.travel_counts[0]);
     let tolerance = f64::from(plan.table.limits.travel_counts[1]);
     let other = moved.iter().skip(1).position(|counts| counts.abs() > MOVED * wanted);
@@ -90,11 +90,11 @@ fn wrong_travel(plan: Plan<'_>, moved: &[f64]) -> String {
 }
 
 /// Distance between the switches by the file (m).
-fn wanted_m(plan: Plan<'_>) -> f64 {
+fn wanted_m(plan: CommissionPlan<'_>) -> f64 {
     f64::from(plan.table.limits.travel_counts[0]) * step(plan, 0)
 }
 
 /// Travel per count (m, rad).
-pub(super) fn step(plan: Plan<'_>, sensor: usize) -> f64 {
+pub(super) fn step(plan: CommissionPlan<'_>, sensor: usize) -> f64 {
     plan.rig.sensors().get(sensor).map_or(0.0, |sensor| sensor.step())
 }

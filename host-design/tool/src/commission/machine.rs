@@ -6,12 +6,12 @@ use upright_design::harness::HarnessError;
 use upright_design::simulate::SimulationError;
 use upright_design::table::WriteError;
 
-use super::step::Step;
-use super::task::Task;
+use super::step::CommissionStep;
+use super::task::PersonTask;
 use crate::in_the_loop::{EmulatorError, RunError};
 
 /// A rig with its firmware at the other end of a line, and the person beside it.
-pub trait Machine {
+pub trait MachineAtHand {
     /// Sends bytes to the firmware, and returns what it sends within the next milliseconds.
     ///
     /// # Errors
@@ -25,13 +25,13 @@ pub trait Machine {
     ///
     /// # Errors
     /// [`Stop::Aborted`] if the person does not want to.
-    fn ask(&mut self, task: Task) -> Result<(), Stop>;
+    fn ask(&mut self, task: PersonTask) -> Result<(), Stop>;
 
     /// How long the person may take for a task.
     fn patience(&self) -> Duration;
 
-    /// Whether the person wants to go [back](Step::back) from a step that was not passed.
-    fn again(&mut self, failed: Step) -> bool;
+    /// Whether the person wants to go [back](CommissionStep::back) from a step that was not passed.
+    fn again(&mut self, failed: CommissionStep) -> bool;
 }
 
 /// Why a rig is not commissioned.

@@ -1,8 +1,8 @@
 //! From a wired rig to a balancing one, step by step.
 //!
-//! A [`Machine`] is a rig with its firmware and the person beside it: the real ones, or simulated ones. The guide
-//! tells the person what to do ([`Task`]), watches the telemetry, and stops at the first [`Step`] in which the machine
-//! is not as it has to be. Everything goes into a [`Record`].
+//! A [`MachineAtHand`] is a rig with its firmware and the person beside it: the real ones, or simulated ones. The guide
+//! tells the person what to do ([`PersonTask`]), watches the telemetry, and stops at the first [`CommissionStep`] in which the machine
+//! is not as it has to be. Everything goes into a [`CommissionRecord`].
 //!
 //! - [`AtPort`]: the real machine behind a port, and the person at the terminal.
 //! - [`Simulated`]: a machine that differs from its file, with a person who does what is asked; [`Planted`] defects.
@@ -17,6 +17,7 @@ mod guide;
 mod homing;
 mod machine;
 mod motor;
+mod plan;
 mod planted;
 mod record;
 mod shaking;
@@ -26,11 +27,12 @@ mod step;
 mod task;
 
 pub use at_port::AtPort;
-pub use commissioning::{Commissioning, Plan};
+pub use commissioning::Commissioning;
 pub use designing::Designed;
-pub use machine::{Machine, Stop};
+pub use machine::{MachineAtHand, Stop};
+pub use plan::CommissionPlan;
 pub use planted::{NoSuchDefect, Planted};
-pub use record::{Journal, Outcome, Record, StepRecord};
+pub use record::{CommissionOutcome, CommissionRecord, Journal, StepRecord};
 pub use simulated::Simulated;
-pub use step::Step;
-pub use task::{End, Task};
+pub use step::CommissionStep;
+pub use task::{End, PersonTask};

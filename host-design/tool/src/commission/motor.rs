@@ -2,17 +2,16 @@
 
 use std::time::Duration;
 
+use upright::protocol::KEEP_ALIVE;
 use upright::protocol::message::Request;
 use upright::supervision::jog::MotorSign;
 use upright::supervision::supervisor::State;
 
 use super::guide::Guide;
 use super::machine::Stop;
-use super::task::Task;
+use super::task::PersonTask;
 use crate::monitor::words;
 
-/// Time between two commands of a key that is held.
-const KEY: Duration = Duration::from_millis(25);
 /// Time for which the rig stands still before a jog, and the key is released between two tries.
 const STILL: Duration = Duration::from_secs(1);
 /// A jog begins within this time, or is refused.
@@ -22,7 +21,7 @@ const LONGEST: Duration = Duration::from_millis(1_500);
 
 /// The motor pushes the cart along +x until it has moved a little.
 pub(super) fn check(guide: &mut Guide<'_>) -> Result<(), Stop> {
-    guide.ask(Task::HandsOff)?;
+    guide.ask(PersonTask::HandsOff)?;
     let end = guide.machine.now() + guide.machine.patience();
     while !push(guide)? {
         if guide.machine.now() > end {
@@ -32,7 +31,7 @@ pub(super) fn check(guide: &mut Guide<'_>) -> Result<(), Stop> {
     let now = guide.conversation().telemetry.as_ref();
     let (motor, fault) = now.map_or((MotorSign::Unchecked, None), |now| (now.motor, now.fault));
     let words = now.and_then(words::instruction);
-    guide.ask(Task::Centre)?;
+    guide.ask(PersonTask::Centre)?;
     match (motor, fault) {
         (MotorSign::Checked, None) => guide.found("the motor moves the cart along +x"),
         (_, Some(fault)) => {
@@ -53,7 +52,7 @@ fn push(guide: &mut Guide<'_>) -> Result<bool, Stop> {
     let mut has_begun = false;
     loop {
         guide.send(Request::Jog { along: true });
-        guide.pause(KEY)?;
+        guide.pause(KEEP_ALIVE)?;
         let is_jogging =
             guide.conversation().telemetry.as_ref().is_some_and(|now| now.state == State::Jogging);
         let since = guide.machine.now().saturating_sub(begin);

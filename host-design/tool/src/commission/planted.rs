@@ -9,7 +9,7 @@ use upright_design::rig::{Link, PerJoint, PlantDescription, Rig};
 use upright_design::simulate::{Bench, Scenario};
 use upright_design::table::TableValues;
 
-use super::step::Step;
+use super::step::CommissionStep;
 use crate::campaign::{Defect, Defective, Trial};
 
 /// What is wrong in the machine.
@@ -35,7 +35,7 @@ pub struct Planted {
 
 /// A defect's name on the command line, what is wrong, the sensor if it is in one, its description, and the step that
 /// has to find it.
-type Row = (&'static str, What, usize, &'static str, Step);
+type PlantedRow = (&'static str, What, usize, &'static str, CommissionStep);
 
 /// Force of the dry friction at the cart, as a share of the motor's force in the jog.
 const STUCK: f64 = 1.5;
@@ -43,99 +43,105 @@ const STUCK: f64 = 1.5;
 /// Dry friction torque of each joint, as a share of the largest torque of its link's weight: the sine of 9°.
 const HELD: f64 = 0.15;
 
-const ALL: [Row; 15] = [
-    ("emergency-stop-missing", What::StopMissing, 0, "the emergency stop never opens", Step::Contacts),
+const ALL: [PlantedRow; 15] = [
+    (
+        "emergency-stop-missing",
+        What::StopMissing,
+        0,
+        "the emergency stop never opens",
+        CommissionStep::Contacts,
+    ),
     (
         "limit-switch-missing",
         What::SwitchMissing,
         0,
         "the limit switch at the high end never opens",
-        Step::Contacts,
+        CommissionStep::Contacts,
     ),
     (
         "limit-switches-exchanged",
         What::SwitchesExchanged,
         0,
         "the two limit switches are exchanged",
-        Step::Contacts,
+        CommissionStep::Contacts,
     ),
-    ("supply-sag", What::Campaign(Defect::SupplySag), 0, "the supply is too low", Step::Contacts),
+    ("supply-sag", What::Campaign(Defect::SupplySag), 0, "the supply is too low", CommissionStep::Contacts),
     (
         "cart-encoder-reversed",
         What::Campaign(Defect::EncoderReversed),
         0,
         "the cart's encoder counts backwards",
-        Step::Homing,
+        CommissionStep::Homing,
     ),
     (
         "cart-encoder-frozen",
         What::Campaign(Defect::CartEncoderFrozen),
         0,
         "the cart's encoder does not count",
-        Step::Homing,
+        CommissionStep::Homing,
     ),
     (
         "cart-counts-wrong",
         What::CountsWrong,
         0,
         "the cart's encoder yields twice the expected counts",
-        Step::Homing,
+        CommissionStep::Homing,
     ),
     (
         "encoder-reversed",
         What::Campaign(Defect::EncoderReversed),
         1,
         "the encoder of link 1 counts backwards",
-        Step::Signs,
+        CommissionStep::Signs,
     ),
     (
         "encoder-frozen",
         What::Campaign(Defect::LinkEncoderFrozen),
         1,
         "the encoder of link 1 does not count",
-        Step::Signs,
+        CommissionStep::Signs,
     ),
     (
         "encoder-wire-open",
         What::Campaign(Defect::EncoderWireOpen),
         1,
         "a wire of the encoder of link 1 is open",
-        Step::Signs,
+        CommissionStep::Signs,
     ),
     (
         "encoders-swapped",
         What::Campaign(Defect::EncodersSwapped),
         1,
         "the encoders of links 1 and 2 are exchanged; with one link those of cart and link",
-        Step::Signs,
+        CommissionStep::Signs,
     ),
     (
         "counts-wrong",
         What::CountsWrong,
         1,
         "the encoder of link 1 yields twice the expected counts",
-        Step::Turns,
+        CommissionStep::Turns,
     ),
     (
         "motor-reversed",
         What::Campaign(Defect::MotorReversed),
         0,
         "the motor's wires are exchanged",
-        Step::Motor,
+        CommissionStep::Motor,
     ),
     (
         "cart-stuck",
         What::CartFriction,
         0,
         "the cart's friction is more than the motor's force in the jog",
-        Step::Motor,
+        CommissionStep::Motor,
     ),
     (
         "joints-stick",
         What::JointFriction,
         0,
         "the dry friction of each joint holds its link up to 9° from hanging",
-        Step::Excitation,
+        CommissionStep::Excitation,
     ),
 ];
 
@@ -150,7 +156,7 @@ impl Planted {
         ALL.iter().map(|&(_, what, sensor, ..)| Self { what, sensor })
     }
 
-    fn row(self) -> &'static Row {
+    fn row(self) -> &'static PlantedRow {
         // Every defect is made from a row.
         ALL.iter().find(|row| (row.1, row.2) == (self.what, self.sensor)).unwrap_or(&ALL[0])
     }
@@ -161,10 +167,10 @@ impl Planted {
     }
 
     /// The step that has to find it in a rig with this many links.
-    pub fn found_in(self, links: usize) -> Step {
+    pub fn found_in(self, links: usize) -> CommissionStep {
         match self.what {
             // With one link, its plug can only be exchanged with the cart's.
-            What::Campaign(Defect::EncodersSwapped) if links == 1 => Step::Homing,
+            What::Campaign(Defect::EncodersSwapped) if links == 1 => CommissionStep::Homing,
             _ => self.row().4,
         }
     }
@@ -203,13 +209,13 @@ impl FromStr for Planted {
 }
 
 /// A defect between machine and firmware, tick by tick.
-pub(super) struct Wires<'a> {
+pub(super) struct DefectWires<'a> {
     planted: Planted,
     defective: Option<Defective<'a>>,
     at_power_up: Option<u32>,
 }
 
-impl<'a> Wires<'a> {
+impl<'a> DefectWires<'a> {
     pub(super) fn new(rig: &Rig, table: &'a TableValues, scenario: &Scenario, planted: Planted) -> Self {
         let of_kind = |kind: Defect| {
             let trial = Trial::by_hand(kind, scenario, table.sensors(), planted.sensor, scenario.seed);

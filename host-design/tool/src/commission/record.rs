@@ -7,12 +7,12 @@ use serde_json::Value;
 use upright_design::rig::Rig;
 use upright_design::table::{WriteError, write_atomically};
 
-use super::step::Step;
+use super::step::CommissionStep;
 use crate::monitor::now;
 
 /// The record of a commissioning.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Record {
+pub struct CommissionRecord {
     /// The rig.
     pub rig: String,
     /// Hash of its file.
@@ -26,10 +26,10 @@ pub struct Record {
     /// Each step, in the order in which it was done; one that was repeated is there twice.
     pub steps: Vec<StepRecord>,
     /// How it has ended.
-    pub outcome: Outcome,
+    pub outcome: CommissionOutcome,
 }
 
-impl Record {
+impl CommissionRecord {
     /// A record without steps, for the machine of `rig` whose firmware runs at `machine`.
     pub fn new(rig: &Rig, machine: &str) -> Self {
         Self {
@@ -39,7 +39,7 @@ impl Record {
             version: env!("CARGO_PKG_VERSION"),
             begun_s: now().as_secs(),
             steps: Vec::new(),
-            outcome: Outcome::Unfinished,
+            outcome: CommissionOutcome::Unfinished,
         }
     }
 }
@@ -47,7 +47,7 @@ impl Record {
 /// How a commissioning has ended.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
-pub enum Outcome {
+pub enum CommissionOutcome {
     /// It is in progress, or was interrupted.
     Unfinished,
     /// A step was not passed.
@@ -60,7 +60,7 @@ pub enum Outcome {
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct StepRecord {
     /// The step.
-    pub step: Step,
+    pub step: CommissionStep,
     /// What the person was asked to do.
     pub asked: Vec<String>,
     /// What was found.
@@ -77,19 +77,19 @@ pub struct StepRecord {
 /// Writes the record while the steps are done, and shows it line by line.
 pub struct Journal {
     /// The record so far.
-    pub record: Record,
+    pub record: CommissionRecord,
     file: Option<PathBuf>,
     show: Box<dyn FnMut(&str)>,
 }
 
 impl Journal {
     /// A record that is written to `file` after each step, and shown line by line.
-    pub fn new(record: Record, file: Option<PathBuf>, show: Box<dyn FnMut(&str)>) -> Self {
+    pub fn new(record: CommissionRecord, file: Option<PathBuf>, show: Box<dyn FnMut(&str)>) -> Self {
         Self { record, file, show }
     }
 
     /// Begins a step, and shows its name.
-    pub fn begin(&mut self, step: Step) {
+    pub fn begin(&mut self, step: CommissionStep) {
         (self.show)(&format!("{}: {}", step.name(), step.finds_out()));
         let (asked, found) = (Vec::new(), Vec::new());
         self.record.steps.push(StepRecord { step, asked, found, passed: false, stopped: None, data: None });
@@ -124,7 +124,11 @@ impl Journal {
     ///
     /// # Errors
     /// That of `action`, or [`WriteError`] if the record cannot be written.
-    pub fn step<R, E>(&mut self, step: Step, action: impl FnOnce(&mut Self) -> Result<R, E>) -> Result<R, E>
+    pub fn step<R, E>(
+        &mut self,
+        step: CommissionStep,
+        action: impl FnOnce(&mut Self) -> Result<R, E>,
+    ) -> Result<R, E>
     where
         E: From<WriteError> + ToString,
     {
@@ -143,7 +147,8 @@ impl Journal {
             None => "  passed".to_owned(),
             Some(why) => format!("  NOT PASSED: {why}"),
         });
-        self.record.outcome = if stopped.is_none() { Outcome::Unfinished } else { Outcome::Stopped };
+        self.record.outcome =
+            if stopped.is_none() { CommissionOutcome::Unfinished } else { CommissionOutcome::Stopped };
         if let Some(step) = self.record.steps.last_mut() {
             step.passed = stopped.is_none();
             step.stopped = stopped;
@@ -156,7 +161,7 @@ impl Journal {
     /// # Errors
     /// [`WriteError`] if the record cannot be written.
     pub fn done(&mut self) -> Result<(), WriteError> {
-        self.record.outcome = Outcome::Done;
+        self.record.outcome = CommissionOutcome::Done;
         self.write()
     }
 

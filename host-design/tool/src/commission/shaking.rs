@@ -4,23 +4,24 @@ use std::time::Duration;
 
 use upright::supervision::fault::Fault;
 use upright::supervision::inhibits::Inhibits;
+use upright_design::client::AnyTelemetry;
 use upright_design::identify::{LineError, Log, OverLine};
 
-use super::commissioning::Plan;
 use super::guide::Guide;
 use super::machine::Stop;
-use super::task::Task;
-use crate::monitor::{TelemetryOfAny, words};
+use super::plan::CommissionPlan;
+use super::task::PersonTask;
+use crate::monitor::words;
 
 /// Time within which the firmware reports the cause of a fault.
 const CAUSE: Duration = Duration::from_millis(300);
 
 /// The log of the machine, which its firmware shakes.
-pub(super) fn shake(guide: &mut Guide<'_>, plan: Plan<'_>) -> Result<Log, Stop> {
-    guide.ask(Task::Centre)?;
-    let is_still = |now: &TelemetryOfAny| (!now.arming_inhibits.contains(Inhibits::MOVING)).then_some(());
+pub(super) fn shake(guide: &mut Guide<'_>, plan: CommissionPlan<'_>) -> Result<Log, Stop> {
+    guide.ask(PersonTask::Centre)?;
+    let is_still = |now: &AnyTelemetry| (!now.arming_inhibits.contains(Inhibits::MOVING)).then_some(());
     guide.wait_for_person(is_still)?;
-    guide.ask(Task::HandsOff)?;
+    guide.ask(PersonTask::HandsOff)?;
     if guide.wait_for_person(is_still)?.is_none() {
         return Err(Stop::Machine("the links do not come to rest".to_owned()));
     }
@@ -36,7 +37,7 @@ pub(super) fn shake(guide: &mut Guide<'_>, plan: Plan<'_>) -> Result<Log, Stop> 
         return Err(with_cause(guide, stop));
     }
     ended?;
-    guide.ask(Task::Centre)?;
+    guide.ask(PersonTask::Centre)?;
     let log = line.finish().map_err(|error| Stop::Machine(error.to_string()))?;
     guide.found(format!("{} ticks, {} of them lost", log.ticks().len() as u64 + log.lost(), log.lost()));
     Ok(log)

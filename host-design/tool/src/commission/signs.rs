@@ -4,12 +4,13 @@ use std::time::Duration;
 
 use upright::protocol::message::Request;
 use upright::supervision::sign_check::Signs;
+use upright_design::client::AnyTelemetry;
 
-use super::commissioning::Plan;
 use super::guide::Guide;
 use super::machine::Stop;
-use super::task::Task;
-use crate::monitor::{TelemetryOfAny, words};
+use super::plan::CommissionPlan;
+use super::task::PersonTask;
+use crate::monitor::words;
 
 /// A turn has begun when the link has moved by this share of it.
 const BEGUN: f64 = 0.1;
@@ -20,11 +21,11 @@ const TOLERANCE: f64 = 0.05;
 
 /// The firmware's own check, from the outermost link inwards.
 pub(super) fn check(guide: &mut Guide<'_>) -> Result<(), Stop> {
-    guide.ask(Task::Rest)?;
+    guide.ask(PersonTask::Rest)?;
     guide.request_until(Request::CheckSigns, |now| now.signs != Signs::Unchecked)?;
     let mut asked = None;
     loop {
-        let changed = |now: &TelemetryOfAny| (Some(now.signs) != asked).then_some(now.signs);
+        let changed = |now: &AnyTelemetry| (Some(now.signs) != asked).then_some(now.signs);
         let Some(signs) = guide.wait_for_person(changed)? else {
             return Err(Stop::Machine(match asked {
                 Some(Signs::Move(sensor)) => format!(
@@ -36,11 +37,11 @@ pub(super) fn check(guide: &mut Guide<'_>) -> Result<(), Stop> {
         };
         asked = Some(signs);
         match signs {
-            Signs::Rest(_) => guide.ask(Task::Rest)?,
-            Signs::Move(sensor) => guide.ask(Task::Move(sensor))?,
+            Signs::Rest(_) => guide.ask(PersonTask::Rest)?,
+            Signs::Move(sensor) => guide.ask(PersonTask::Move(sensor))?,
             Signs::Checked => {
                 guide.found("every encoder counts the right way, at its own place");
-                return guide.ask(Task::Centre);
+                return guide.ask(PersonTask::Centre);
             }
             Signs::Reversed(_) | Signs::Swapped { .. } | Signs::Unchecked => {
                 let instruction = guide.conversation().telemetry.as_ref().and_then(words::instruction);
@@ -53,9 +54,9 @@ pub(super) fn check(guide: &mut Guide<'_>) -> Result<(), Stop> {
 }
 
 /// Every link is turned once around.
-pub(super) fn turns(guide: &mut Guide<'_>, plan: Plan<'_>) -> Result<(), Stop> {
+pub(super) fn turns(guide: &mut Guide<'_>, plan: CommissionPlan<'_>) -> Result<(), Stop> {
     for sensor in (1..plan.table.sensors()).rev() {
-        guide.ask(Task::Rest)?;
+        guide.ask(PersonTask::Rest)?;
         guide.pause(ENDED)?;
         let wanted = f64::from(plan.table.limits.turn_counts[sensor]);
         let Some(moved) = turn(guide, sensor, BEGUN * wanted)? else {
@@ -77,16 +78,16 @@ pub(super) fn turns(guide: &mut Guide<'_>, plan: Plan<'_>) -> Result<(), Stop> {
 
 /// Counts from the beginning to the end of a turn of this link; `None` if it does not move.
 fn turn(guide: &mut Guide<'_>, sensor: usize, begun: f64) -> Result<Option<f64>, Stop> {
-    let count = |now: &TelemetryOfAny| f64::from(now.counts.get(sensor).copied().unwrap_or_default());
+    let count = |now: &AnyTelemetry| f64::from(now.counts.get(sensor).copied().unwrap_or_default());
     let from = guide.conversation().telemetry.as_ref().map_or(0.0, count);
-    guide.ask(Task::TurnAround(sensor as u8))?;
-    let begins = |now: &TelemetryOfAny| ((count(now) - from).abs() > begun).then(|| count(now));
+    guide.ask(PersonTask::TurnAround(sensor as u8))?;
+    let begins = |now: &AnyTelemetry| ((count(now) - from).abs() > begun).then(|| count(now));
     let Some(mut last) = guide.wait_for_person(begins)? else { return Ok(None) };
     // A hand that holds a link still trembles by less.
     let near = 0.02 * begun / BEGUN;
     let end = guide.machine.now() + guide.machine.patience();
     while guide.machine.now() < end {
-        let on = |now: &TelemetryOfAny| ((count(now) - last).abs() > near).then(|| count(now));
+        let on = |now: &AnyTelemetry| ((count(now) - last).abs() > near).then(|| count(now));
         match guide.wait(ENDED, on)? {
             Some(now) => last = now,
             None => break,

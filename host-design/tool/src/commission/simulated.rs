@@ -2,23 +2,21 @@
 
 use std::time::Duration;
 
-use upright::board::{Contacts, Output};
+use upright::board::Output;
 use upright::control::actuator::Drive;
 use upright::table::Law;
-use upright_design::harness::{Grasp, Pins, Session, Target};
-use upright_design::rig::{PlantDescription, Rig};
+use upright_design::harness::{HeldRig, Pins, RailEnds, Session, Target, healthy};
+use upright_design::rig::Rig;
 use upright_design::simulate::{Bench, Scenario, SimulationError};
 use upright_design::table::TableValues;
 
-use super::machine::{Machine, Stop};
-use super::planted::{Planted, Wires};
-use super::step::Step;
-use super::task::{End, Task};
+use super::machine::{MachineAtHand, Stop};
+use super::planted::{DefectWires, Planted};
+use super::step::CommissionStep;
+use super::task::{End, PersonTask};
 
 /// Time from one exchange to the next (s), as on a serial line.
 const EXCHANGE_S: f64 = 0.005;
-/// How far the hand pushes the cart beyond an end of the rail, where the switches are (m).
-const BEYOND_M: f64 = 0.002;
 /// Time at power-up, since 1970.
 const BEGIN: Duration = Duration::from_secs(1_800_000_000);
 /// Time for the longest task: a turn, or a cart from end to end.
@@ -31,16 +29,16 @@ const TRIES: u32 = 2;
 pub struct Simulated<'a> {
     session: Session<'a>,
     bench: Bench,
-    grasp: Grasp,
-    task: Task,
+    held: HeldRig,
+    task: PersonTask,
     is_free: bool,
     tries: u32,
     is_pressed: bool,
-    wires: Option<Wires<'a>>,
+    wires: Option<DefectWires<'a>>,
     output: Output,
     counters: Vec<u32>,
     supply_v: f32,
-    travel_m: [f64; 2],
+    rail: RailEnds,
     period_s: f64,
     ticks: u64,
 }
@@ -62,26 +60,22 @@ impl<'a> Simulated<'a> {
         if let Some(planted) = planted {
             planted.change(&mut machine, table);
         }
-        let grasp = Grasp::hanging(&machine);
+        let held = HeldRig::hanging(&machine);
         let scenario =
-            Scenario { start: grasp.held().to_vec(), seed, ..Scenario::at_rest(&machine, Law::Lqr) };
-        let travel_m = match &machine.plant {
-            PlantDescription::Chain(chain) => chain.cart.travel_m,
-            PlantDescription::Model(_) => [f64::NEG_INFINITY, f64::INFINITY],
-        };
+            Scenario { start: held.held().to_vec(), seed, ..Scenario::at_rest(&machine, Law::Lqr) };
         Ok(Self {
             session: Session::new(target),
             bench: Bench::new(&machine, &scenario)?,
-            grasp,
-            task: Task::Rest,
+            held,
+            task: PersonTask::Rest,
             is_free: false,
             tries: 0,
             is_pressed: false,
-            wires: planted.map(|planted| Wires::new(&machine, table, &scenario, planted)),
+            wires: planted.map(|planted| DefectWires::new(&machine, table, &scenario, planted)),
             output: Output::OFF,
             counters: vec![0; table.sensors()],
             supply_v: table.motor.map_or(0.0, |motor| motor.supply_v),
-            travel_m,
+            rail: RailEnds::of(&machine),
             period_s: machine.tick.period_s,
             ticks: 0,
         })
@@ -95,21 +89,9 @@ impl<'a> Simulated<'a> {
     /// What the board reads now.
     fn pins(&mut self) -> Pins {
         self.bench.read_counters(&mut self.counters);
-        let [low, high] = self.travel_m;
-        let position_m = self.bench.state()[0];
-        let mut pins = Pins {
-            // At most as many as a table has.
-            raw_counts: heapless::Vec::from_slice(&self.counters).unwrap_or_default(),
-            supply_v: self.supply_v * self.bench.supply_share() as f32,
-            contacts: Contacts {
-                limit_low: position_m <= low,
-                limit_high: position_m >= high,
-                emergency_stop: self.is_pressed,
-                ..Contacts::default()
-            },
-            received: heapless::Vec::new(),
-            injected_fault: None,
-        };
+        let mut pins = healthy(&self.counters, self.supply_v * self.bench.supply_share() as f32);
+        self.rail.press(self.bench.state()[0], &mut pins.contacts);
+        pins.contacts.emergency_stop = self.is_pressed;
         if let Some(wires) = &mut self.wires {
             wires.inputs(&mut pins);
         }
@@ -123,8 +105,7 @@ impl<'a> Simulated<'a> {
         let pins = self.pins();
         self.output = self.session.tick(&pins)?;
         // Only the raw bytes are used: see `exchange`.
-        while self.session.next_telemetry().is_some() || self.session.next_reply().is_some() {}
-        while self.session.next_log().is_some() {}
+        self.session.forget_received();
         if self.is_free {
             let mut output = self.output;
             if let Some(wires) = &mut self.wires {
@@ -143,39 +124,30 @@ impl<'a> Simulated<'a> {
             return;
         }
         if was_free {
-            self.grasp.take(self.bench.state());
-            self.grasp.stop();
+            self.held.take(self.bench.state());
+            self.held.stop();
         }
         match self.task {
-            Task::Move(sensor) => self.grasp.turn(sensor),
-            Task::PushTo(end) => {
-                let [low, high] = self.travel_m;
-                let end_m = if end == End::Low { low - BEYOND_M } else { high + BEYOND_M };
-                self.push_to(end_m);
+            PersonTask::Move(sensor) => self.held.turn(sensor),
+            PersonTask::PushTo(end) => {
+                self.held.push_to(self.rail.pressed_m()[usize::from(end == End::High)]);
             }
-            Task::Centre => self.push_to(0.0),
-            Task::Raise => {
-                let mut upright = vec![0.0; self.grasp.held().len()];
-                upright[0] = self.grasp.held()[0];
-                self.grasp.move_to(&upright);
+            PersonTask::Centre => {
+                self.held.push_to(0.0);
             }
-            Task::Catch => {}
+            PersonTask::Raise => {
+                self.held.raise();
+            }
+            PersonTask::Catch => {}
             _ => {
-                self.grasp.rest();
+                self.held.rest();
             }
         }
-        self.bench.hold(self.grasp.held());
-    }
-
-    /// Pushes the cart; the links hang.
-    fn push_to(&mut self, position_m: f64) {
-        let mut to = self.grasp.at_rest();
-        to[0] = position_m;
-        self.grasp.move_to(&to);
+        self.bench.hold(self.held.held());
     }
 }
 
-impl Machine for Simulated<'_> {
+impl MachineAtHand for Simulated<'_> {
     fn exchange(&mut self, bytes: &[u8]) -> Result<Vec<u8>, Stop> {
         self.session.send_bytes(bytes);
         let mut received = Vec::new();
@@ -190,11 +162,11 @@ impl Machine for Simulated<'_> {
         BEGIN + Duration::from_secs_f64(self.ticks as f64 * self.period_s)
     }
 
-    fn ask(&mut self, task: Task) -> Result<(), Stop> {
+    fn ask(&mut self, task: PersonTask) -> Result<(), Stop> {
         match task {
-            Task::PressStop => self.is_pressed = true,
-            Task::ReleaseStop => self.is_pressed = false,
-            Task::TurnAround(sensor) => self.grasp.wind(sensor),
+            PersonTask::PressStop => self.is_pressed = true,
+            PersonTask::ReleaseStop => self.is_pressed = false,
+            PersonTask::TurnAround(sensor) => self.held.wind(sensor),
             _ => {}
         }
         self.task = task;
@@ -206,8 +178,8 @@ impl Machine for Simulated<'_> {
     }
 
     /// The beginning of an excitation may be too weak for a cart that sticks: other phases are tried.
-    fn again(&mut self, failed: Step) -> bool {
-        let goes_back = failed == Step::Excitation && self.tries < TRIES;
+    fn again(&mut self, failed: CommissionStep) -> bool {
+        let goes_back = failed == CommissionStep::Excitation && self.tries < TRIES;
         self.tries += u32::from(goes_back);
         goes_back
     }

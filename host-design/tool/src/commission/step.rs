@@ -6,7 +6,7 @@ use serde::Serialize;
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 #[allow(missing_docs)] // the table below says what each is
-pub enum Step {
+pub enum CommissionStep {
     Connect,
     Contacts,
     Homing,
@@ -21,80 +21,94 @@ pub enum Step {
     Balance,
 }
 
-impl Step {
+impl CommissionStep {
     /// Every step with its name and what it finds out.
-    pub const ALL: [(Step, &str, &str); 12] = [
-        (Step::Connect, "connect", "the firmware answers, and is that of the rig file"),
+    pub const ALL: [(CommissionStep, &str, &str); 12] = [
+        (CommissionStep::Connect, "connect", "the firmware answers, and is that of the rig file"),
         (
-            Step::Contacts,
+            CommissionStep::Contacts,
             "contacts",
             "emergency stop and limit switches open when they are pressed, each at its own end; then supply and power stage",
         ),
         (
-            Step::Homing,
+            CommissionStep::Homing,
             "homing",
             "the limit switches are as far apart as the file says; zeros of cart and links",
         ),
         (
-            Step::Signs,
+            CommissionStep::Signs,
             "signs",
             "every encoder counts in the right direction, and is plugged in at its own place",
         ),
-        (Step::Turns, "turns", "the counts per turn of every link's encoder are those of the file"),
-        (Step::Motor, "motor", "the motor moves the cart, and in the right direction"),
-        (Step::Excitation, "excitation", "the log of the machine, shaken while its links hang"),
+        (CommissionStep::Turns, "turns", "the counts per turn of every link's encoder are those of the file"),
+        (CommissionStep::Motor, "motor", "the motor moves the cart, and in the right direction"),
+        (CommissionStep::Excitation, "excitation", "the log of the machine, shaken while its links hang"),
         (
-            Step::Identification,
+            CommissionStep::Identification,
             "identification",
             "wiring, masses, lengths, frictions, delay and zeros, each with its deviation; whether they explain the log",
         ),
         (
-            Step::Design,
+            CommissionStep::Design,
             "design",
             "gains for the machine as it was found, if possible robust against what is not known of it",
         ),
         (
-            Step::Verification,
+            CommissionStep::Verification,
             "verification",
             "margins as [verify] requires them, and whether runs with the friction that was found pass",
         ),
-        (Step::Image, "image", "the firmware with these gains"),
-        (Step::Balance, "balance", "raised by hand, the machine balances for 10 s"),
+        (CommissionStep::Image, "image", "the firmware with these gains"),
+        (CommissionStep::Balance, "balance", "raised by hand, the machine balances for 10 s"),
     ];
 
     /// The steps that find every error in the wiring, before anything is measured.
-    pub const EARLY: [Step; 6] =
-        [Step::Connect, Step::Contacts, Step::Homing, Step::Signs, Step::Turns, Step::Motor];
+    pub const EARLY: [CommissionStep; 6] = [
+        CommissionStep::Connect,
+        CommissionStep::Contacts,
+        CommissionStep::Homing,
+        CommissionStep::Signs,
+        CommissionStep::Turns,
+        CommissionStep::Motor,
+    ];
 
     /// The steps with the firmware of the rig file.
-    pub const FIRST: [Step; 10] = [
-        Step::Connect,
-        Step::Contacts,
-        Step::Homing,
-        Step::Signs,
-        Step::Turns,
-        Step::Motor,
-        Step::Excitation,
-        Step::Identification,
-        Step::Design,
-        Step::Verification,
+    pub const FIRST: [CommissionStep; 10] = [
+        CommissionStep::Connect,
+        CommissionStep::Contacts,
+        CommissionStep::Homing,
+        CommissionStep::Signs,
+        CommissionStep::Turns,
+        CommissionStep::Motor,
+        CommissionStep::Excitation,
+        CommissionStep::Identification,
+        CommissionStep::Design,
+        CommissionStep::Verification,
     ];
 
     /// The steps with the firmware for the machine as it was found. It has just started: nothing is homed or checked.
-    pub const SECOND: [Step; 5] = [Step::Connect, Step::Homing, Step::Signs, Step::Motor, Step::Balance];
+    pub const SECOND: [CommissionStep; 5] = [
+        CommissionStep::Connect,
+        CommissionStep::Homing,
+        CommissionStep::Signs,
+        CommissionStep::Motor,
+        CommissionStep::Balance,
+    ];
 
     /// The step to go back to if this one is not passed.
-    pub fn back(self) -> Step {
+    pub fn back(self) -> CommissionStep {
         match self {
             // A fault may have lost the positions.
-            Step::Excitation | Step::Balance => Step::Homing,
+            CommissionStep::Excitation | CommissionStep::Balance => CommissionStep::Homing,
             // Another log may be better.
-            Step::Identification | Step::Design | Step::Verification => Step::Excitation,
+            CommissionStep::Identification | CommissionStep::Design | CommissionStep::Verification => {
+                CommissionStep::Excitation
+            }
             step => step,
         }
     }
 
-    fn row(self) -> &'static (Step, &'static str, &'static str) {
+    fn row(self) -> &'static (CommissionStep, &'static str, &'static str) {
         // A test checks that every step is in the table, in its order.
         &Self::ALL[self as usize]
     }
@@ -116,7 +130,7 @@ mod tests {
 
     #[test]
     fn the_table_has_every_step_in_order() {
-        for (index, (step, name, finds_out)) in Step::ALL.iter().enumerate() {
+        for (index, (step, name, finds_out)) in CommissionStep::ALL.iter().enumerate() {
             assert_eq!(*step as usize, index);
             assert!(!name.is_empty() && !finds_out.is_empty());
         }

@@ -13,7 +13,7 @@ pub enum End {
 
 /// Something to do by hand. Its text is what the person is told.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Task {
+pub enum PersonTask {
     /// Press the emergency stop.
     PressStop,
     /// Release it.
@@ -38,53 +38,53 @@ pub enum Task {
     Catch,
 }
 
-impl Task {
+impl PersonTask {
     /// Whether the hand lets cart and links go in this task; `is_on`: the motor is on.
     pub fn lets_go(self, is_on: bool) -> bool {
         match self {
-            Task::HandsOff => true,
-            Task::Raise | Task::Catch => is_on,
+            PersonTask::HandsOff => true,
+            PersonTask::Raise | PersonTask::Catch => is_on,
             _ => false,
         }
     }
 
     /// Whether the person has to confirm first, because the motor comes on or goes off.
     pub fn needs_consent(self) -> bool {
-        matches!(self, Task::SwitchOn | Task::HandsOff | Task::Raise | Task::Catch)
+        matches!(self, PersonTask::SwitchOn | PersonTask::HandsOff | PersonTask::Raise | PersonTask::Catch)
     }
 }
 
-impl fmt::Display for Task {
+impl fmt::Display for PersonTask {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Task::PressStop => f.write_str("press the emergency stop, and keep it pressed"),
-            Task::ReleaseStop => f.write_str("release the emergency stop"),
-            Task::PushTo(End::Low) => {
+            PersonTask::PressStop => f.write_str("press the emergency stop, and keep it pressed"),
+            PersonTask::ReleaseStop => f.write_str("release the emergency stop"),
+            PersonTask::PushTo(End::Low) => {
                 f.write_str("push the cart to the low end of the rail until it presses the switch")
             }
-            Task::PushTo(End::High) => {
+            PersonTask::PushTo(End::High) => {
                 f.write_str("push the cart to the high end of the rail, along +x, until it presses the switch")
             }
-            Task::Centre => {
+            PersonTask::Centre => {
                 f.write_str("push the cart to the middle of the rail, and let the links hang still")
             }
-            Task::SwitchOn => f.write_str("switch the motor's supply on, with the emergency stop in your hand"),
-            Task::Rest => f.write_str("let the links hang still"),
-            Task::Move(0) => f.write_str("push the cart along +x"),
-            Task::Move(link) => write!(f, "turn link {link} counter-clockwise; let the links beyond it hang"),
-            Task::TurnAround(link) => write!(
+            PersonTask::SwitchOn => f.write_str("switch the motor's supply on, with the emergency stop in your hand"),
+            PersonTask::Rest => f.write_str("let the links hang still"),
+            PersonTask::Move(0) => f.write_str("push the cart along +x"),
+            PersonTask::Move(link) => write!(f, "turn link {link} counter-clockwise; let the links beyond it hang"),
+            PersonTask::TurnAround(link) => write!(
                 f,
                 "turn link {link} once around, counter-clockwise, until it hangs again; do not stop on the way, then keep it \
                  still"
             ),
-            Task::HandsOff => f.write_str(
+            PersonTask::HandsOff => f.write_str(
                 "take your hands off the rig, with the emergency stop in one of them: the motor is going to move the cart",
             ),
-            Task::Raise => f.write_str(
+            PersonTask::Raise => f.write_str(
                 "raise the links and hold them upright and still; when the motor comes on, let go, with the emergency stop in \
                  your hand",
             ),
-            Task::Catch => f.write_str("take hold of the links: the motor is going to be turned off"),
+            PersonTask::Catch => f.write_str("take hold of the links: the motor is going to be turned off"),
         }
     }
 }

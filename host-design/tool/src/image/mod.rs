@@ -16,5 +16,5 @@ pub use checksum::{file_hash, flash_checksum};
 pub use compiler::{Compiler, compiler};
 pub use elf::{ElfError, Image};
 pub use forbidden::forbidden_functions;
-pub use size::{CODE_LIMIT, Part, RAM_LIMIT, STACK_LIMIT, Size, SizeError, size};
+pub use size::{CODE_LIMIT, Part, RAM_LIMIT, Size, SizeError, size};
 pub use stack::{StackBound, StackError, StackLevel, stack_bound};

@@ -10,8 +10,6 @@ use super::elf::{Image, Item};
 pub const CODE_LIMIT: u32 = 48 * 1024;
 /// Limit of its static RAM (bytes): its variables, not counting the stack and the gain table.
 pub const RAM_LIMIT: u32 = 8 * 1024;
-/// Limit of its stack (bytes), which `memory.x` reserves.
-pub const STACK_LIMIT: u32 = 5 * 1024;
 
 /// Name of the gain table: its values are in flash, and are copied to RAM at start-up.
 const TABLE: &str = "upright_image::app::__rtic_internal_local_init_table";

@@ -2,11 +2,13 @@
 //! QEMU, or as the image that is flashed, on the virtual board. The loop itself is [`upright_design::harness`].
 
 mod board;
+mod error;
 mod place;
 mod qemu;
 mod relay;
 
 pub use board::{Compared, Cycles, Event, Events, Figures, RULES, Span, TooLong, VirtualBoard, measure};
-pub use place::{Place, RunError, run, run_compared, run_shaken};
+pub use error::RunError;
+pub use place::{Place, run, run_compared, run_shaken};
 pub use qemu::{Emulator, EmulatorError, Link};
 pub use relay::{RelayError, serve};

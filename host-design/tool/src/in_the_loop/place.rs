@@ -4,12 +4,13 @@ use std::path::Path;
 
 use upright_board::Conditions;
 use upright_design::harness::{HarnessError, Recording, Target, record, with_firmware};
-use upright_design::identify::{IdentifyError, Log, ShakeError, shake_with};
+use upright_design::identify::{Log, shake_with};
 use upright_design::rig::Rig;
 use upright_design::simulate::Scenario;
 use upright_design::table::TableValues;
 
 use super::board::{Compared, VirtualBoard};
+use super::error::RunError;
 use super::qemu::{Emulator, EmulatorError, Link};
 
 /// Where the firmware runs.
@@ -33,29 +34,6 @@ pub enum Place<'a> {
     },
 }
 
-/// A run that could not be started or finished.
-#[derive(Debug, thiserror::Error)]
-pub enum RunError {
-    /// The firmware does not do what it should.
-    #[error(transparent)]
-    Harness(#[from] HarnessError),
-    /// QEMU does not run the image.
-    #[error(transparent)]
-    Emulator(#[from] EmulatorError),
-    /// The rig cannot be shaken, or does not do what it should.
-    #[error(transparent)]
-    Shaken(#[from] IdentifyError),
-}
-
-impl From<ShakeError> for RunError {
-    fn from(error: ShakeError) -> Self {
-        match error {
-            ShakeError::Harness(error) => error.into(),
-            ShakeError::Identify(error) => error.into(),
-        }
-    }
-}
-
 impl Place<'_> {
     /// Its name, as shown to the user.
     pub fn name(self) -> &'static str {
@@ -64,11 +42,6 @@ impl Place<'_> {
             Place::Qemu { .. } => "QEMU",
             Place::Board { .. } => "the virtual board",
         }
-    }
-
-    /// Whether it runs an image, which can crash.
-    pub fn has_image(self) -> bool {
-        !matches!(self, Place::Host)
     }
 
     /// Starts the firmware with `table` and runs `action` with it. The firmware is stopped when the action ends.

@@ -1,11 +1,12 @@
 //! The image in QEMU: pins and serial line as files of the emulator, or as serial lines.
 
 mod channels;
+mod error;
 #[cfg(unix)]
 mod fifos;
 
 use std::io::Read;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::process::{Child, Command, Stdio};
 
 use tempfile::TempDir;
@@ -15,6 +16,7 @@ use upright::protocol::simulated_pins::{MAX_PINS_IN, MAX_PINS_OUT, PinsOut};
 use upright_design::harness::{HarnessError, Pins, Target};
 
 use channels::{Channels, serial_lines};
+pub use error::EmulatorError;
 
 /// The emulated board: an STM32F405.
 const MACHINE: &str = "netduinoplus2";
@@ -28,30 +30,6 @@ pub enum Link {
     Files,
     /// Serial lines: the image with the feature `in-the-loop-usart`.
     Usart,
-}
-
-/// Why an image does not run in QEMU.
-#[derive(Debug, thiserror::Error)]
-pub enum EmulatorError {
-    /// The emulator is not installed.
-    #[error("qemu-system-arm is missing: install it (Debian: apt-get install qemu-system-arm)")]
-    Missing,
-    /// This system has no FIFOs.
-    #[error(
-        "QEMU with the link `files` needs Unix (Linux or macOS): use one, or run with --link usart where it is offered"
-    )]
-    NeedsUnix,
-    /// The emulator cannot be started or connected to.
-    #[error("QEMU: {what}: {source}")]
-    Failed {
-        /// The step that failed.
-        what: &'static str,
-        /// Why.
-        source: std::io::Error,
-    },
-    /// The image does not answer.
-    #[error("the image {0} does not answer: was it built for QEMU?")]
-    Silent(PathBuf),
 }
 
 /// An image that runs in QEMU. Dropping it ends the emulator.
@@ -138,12 +116,5 @@ impl Target for Emulator {
             return Err(self.stopped());
         }
         Ok(output)
-    }
-}
-
-impl EmulatorError {
-    /// An error of the system in the step `what`.
-    fn at(what: &'static str) -> impl FnOnce(std::io::Error) -> Self {
-        move |source| EmulatorError::Failed { what, source }
     }
 }

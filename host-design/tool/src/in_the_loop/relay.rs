@@ -9,7 +9,8 @@ use upright_design::rig::Rig;
 use upright_design::simulate::Scenario;
 use upright_design::table::TableValues;
 
-use super::place::{Place, RunError};
+use super::error::RunError;
+use super::place::Place;
 use super::qemu::EmulatorError;
 
 /// Why a relay has ended early.
@@ -65,7 +66,7 @@ impl Relay<'_> {
     fn run(self, target: &mut dyn Target) -> Result<(), RelayError> {
         let period_s = self.rig.tick.period_s;
         let mut harness = Harness::new(self.rig, self.table, self.scenario, target)?;
-        // No set-point is commanded, so the firmware needs no heartbeats.
+        // No set-point is commanded, so the firmware needs no keep-alives.
         let mut output = harness.raise(None)?;
         self.listener.set_nonblocking(true)?;
         let mut client = Some(self.first_client()?);
@@ -84,7 +85,7 @@ impl Relay<'_> {
             harness.session.send_bytes(received.as_deref().unwrap_or(&[]));
             let inputs = harness.inputs();
             output = harness.session.tick(&inputs)?;
-            while harness.session.next_telemetry().is_some() || harness.session.next_reply().is_some() {}
+            harness.session.forget_received();
             let is_connected =
                 client.as_mut().is_none_or(|stream| send(stream, harness.session.last_bytes()));
             if received.is_none() || !is_connected {

@@ -7,7 +7,7 @@ use upright_design::motion::equilibrium_named;
 
 /// What a key of the monitor does.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Action {
+pub enum MonitorAction {
     /// Send this command to the firmware.
     Send(Request),
     /// Move the set-point by this (m).
@@ -26,28 +26,28 @@ pub enum Action {
 const SHIFT_M: f32 = 0.01;
 
 /// The action of a key; `None` if the key does nothing.
-pub fn action(key: &KeyEvent) -> Option<Action> {
+pub fn action(key: &KeyEvent) -> Option<MonitorAction> {
     if key.modifiers.contains(KeyModifiers::CONTROL) {
-        return (key.code == KeyCode::Char('c')).then_some(Action::Quit);
+        return (key.code == KeyCode::Char('c')).then_some(MonitorAction::Quit);
     }
     Some(match key.code {
-        KeyCode::Char('h') => Action::Send(Request::Home),
-        KeyCode::Char('H') => Action::Send(Request::HomeRail),
-        KeyCode::Char('g') => Action::Send(Request::CheckSigns),
-        KeyCode::Char('m') => Action::Send(Request::Jog { along: true }),
-        KeyCode::Char('M') => Action::Send(Request::Jog { along: false }),
-        KeyCode::Char('a') => Action::Send(Request::Arm),
-        KeyCode::Char('u') => Action::Send(Request::Goto(Equilibrium::UPRIGHT)),
-        KeyCode::Char('n') => Action::Send(Request::Goto(Equilibrium::HANGING)),
-        KeyCode::Char('d' | ' ') => Action::Send(Request::Disarm),
-        KeyCode::Char('c') => Action::Send(Request::Clear),
-        KeyCode::Char('0') => Action::Send(Request::Setpoint(0.0)),
-        KeyCode::Char(link @ '1'..='6') => Action::Turn(usize::from(link as u8 - b'1')),
-        KeyCode::Left => Action::Shift(-SHIFT_M),
-        KeyCode::Right => Action::Shift(SHIFT_M),
-        KeyCode::Char('l') => Action::OtherLaw,
-        KeyCode::Char('r') => Action::Record,
-        KeyCode::Char('q') => Action::Quit,
+        KeyCode::Char('h') => MonitorAction::Send(Request::Home),
+        KeyCode::Char('H') => MonitorAction::Send(Request::HomeRail),
+        KeyCode::Char('g') => MonitorAction::Send(Request::CheckSigns),
+        KeyCode::Char('m') => MonitorAction::Send(Request::Jog { along: true }),
+        KeyCode::Char('M') => MonitorAction::Send(Request::Jog { along: false }),
+        KeyCode::Char('a') => MonitorAction::Send(Request::Arm),
+        KeyCode::Char('u') => MonitorAction::Send(Request::Goto(Equilibrium::UPRIGHT)),
+        KeyCode::Char('n') => MonitorAction::Send(Request::Goto(Equilibrium::HANGING)),
+        KeyCode::Char('d' | ' ') => MonitorAction::Send(Request::Disarm),
+        KeyCode::Char('c') => MonitorAction::Send(Request::Clear),
+        KeyCode::Char('0') => MonitorAction::Send(Request::Setpoint(0.0)),
+        KeyCode::Char(link @ '1'..='6') => MonitorAction::Turn(usize::from(link as u8 - b'1')),
+        KeyCode::Left => MonitorAction::Shift(-SHIFT_M),
+        KeyCode::Right => MonitorAction::Shift(SHIFT_M),
+        KeyCode::Char('l') => MonitorAction::OtherLaw,
+        KeyCode::Char('r') => MonitorAction::Record,
+        KeyCode::Char('q') => MonitorAction::Quit,
         _ => return None,
     })
 }

@@ -43,14 +43,14 @@ pub enum OpenError {
 }
 
 /// A serial device or a TCP connection.
-pub enum Line {
+pub enum SerialLine {
     /// A serial device.
     Serial(Box<dyn SerialPort>),
     /// A connection to a relay, as `upright firmware run --serve` offers it.
     Tcp(TcpStream),
 }
 
-impl Line {
+impl SerialLine {
     /// Opens a serial port at [`BAUD`], such as `/dev/ttyACM0` (Linux), `/dev/cu.usbmodem1101` (macOS) or `COM3`
     /// (Windows), or a relay (`tcp:HOST:PORT`).
     ///
@@ -60,7 +60,7 @@ impl Line {
         let Some(address) = port.strip_prefix("tcp:") else {
             let serial = serialport::new(port, BAUD).timeout(PATIENCE).open();
             return serial
-                .map(Line::Serial)
+                .map(SerialLine::Serial)
                 .map_err(|source| OpenError::Serial { port: port.to_owned(), source });
         };
         let connect = || {
@@ -70,7 +70,9 @@ impl Line {
             stream.set_write_timeout(Some(STUCK))?;
             Ok(stream)
         };
-        connect().map(Line::Tcp).map_err(|source| OpenError::Tcp { address: address.to_owned(), source })
+        connect()
+            .map(SerialLine::Tcp)
+            .map_err(|source| OpenError::Tcp { address: address.to_owned(), source })
     }
 
     /// Waits for bytes, at most 5 ms, and returns them. Receiving none is not an error.
@@ -79,8 +81,8 @@ impl Line {
     /// If the line is closed.
     pub fn receive<'a>(&mut self, buffer: &'a mut [u8]) -> std::io::Result<&'a [u8]> {
         let (read, serial) = match self {
-            Line::Serial(port) => (port.read(buffer), true),
-            Line::Tcp(stream) => (stream.read(buffer), false),
+            SerialLine::Serial(port) => (port.read(buffer), true),
+            SerialLine::Tcp(stream) => (stream.read(buffer), false),
         };
         match read {
             Ok(0) if !serial => Err(ErrorKind::UnexpectedEof.into()),
@@ -103,8 +105,8 @@ impl Line {
     /// If the line is closed, or accepts no bytes.
     pub fn send(&mut self, bytes: &[u8]) -> std::io::Result<()> {
         match self {
-            Line::Serial(port) => port.write_all(bytes),
-            Line::Tcp(stream) => stream.write_all(bytes),
+            SerialLine::Serial(port) => port.write_all(bytes),
+            SerialLine::Tcp(stream) => stream.write_all(bytes),
         }
     }
 

@@ -1,16 +1,16 @@
-//! The conversation of a person at the keyboard with a running firmware.
+//! The conversation of a person at the keyboard with a running firmware, through the host's
+//! [client](upright_design::client).
 //!
 //! [`Monitor`] holds the state and knows neither terminal nor line: bytes and keys go in, bytes come out. [`view`]
-//! draws it, [`Line`] is a serial device or a TCP connection, [`record`] writes telemetry.
+//! draws it, [`SerialLine`] is a serial device or a TCP connection, [`record`] writes telemetry.
 
 mod command;
 mod line;
 mod model;
-mod outgoing;
 pub mod record;
 pub mod view;
 pub mod words;
 
-pub use command::{Action, BadCommand, action, request};
-pub use line::{Line, OpenError, now};
-pub use model::{Ended, Monitor, TelemetryOfAny};
+pub use command::{BadCommand, MonitorAction, action, request};
+pub use line::{OpenError, SerialLine, now};
+pub use model::{Ended, Monitor};

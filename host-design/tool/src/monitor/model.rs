@@ -3,54 +3,31 @@
 use std::collections::VecDeque;
 use std::time::Duration;
 
-use upright::protocol::frame::Receiver;
-use upright::protocol::message::{
-    Answer, CrashRecord, Info, Message, PROTOCOL, Reply, Request, Statistics, Telemetry,
-};
-use upright::protocol::serial_link::MAX_MESSAGE;
+use upright::protocol::message::{Answer, CrashRecord, Info, Request, Statistics};
 use upright::supervision::fault::Cause;
 use upright::supervision::inhibits::Inhibits;
 use upright::supervision::supervisor::State;
 use upright::table::{Equilibrium, Law};
+use upright_design::client::{AnyTelemetry, Client, Mismatch, Received, Unanswered};
 use upright_design::motion::posture_name;
 use upright_design::plant::absolute_angles;
 
-use super::command::Action;
-use super::outgoing::{Outgoing, Unanswered};
+use super::command::MonitorAction;
 use super::words;
-
-/// Telemetry of a firmware with up to 30 states and 15 sensors: a list is sent as its length and its items, so that
-/// one type reads all sizes.
-pub type TelemetryOfAny = Telemetry<30, 15>;
 
 /// Time span of the plots (s).
 const HISTORY_S: f32 = 10.0;
 /// Time between two telemetry messages (s).
 const TELEMETRY_S: f32 = 0.02;
-const BEAT: Duration = Duration::from_millis(25);
 const STATISTICS: Duration = Duration::from_secs(1);
 const LOG_LINES: usize = 100;
 
 /// Why a conversation has ended.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum Ended {
-    /// The firmware uses another version of the messages; only the request for its identity was sent.
-    #[error(
-        "the firmware speaks version {0} of the messages, this tool version {PROTOCOL}: flash the firmware again, \
-         or use its own tool"
-    )]
-    Protocol(u8),
-    /// The firmware is that of another rig.
-    #[error(
-        "the firmware was built for a rig with hash {found:016x}, the rig file has {wanted:016x}: flash the firmware again, \
-         or give its own rig file"
-    )]
-    Rig {
-        /// Hash in the firmware.
-        found: u64,
-        /// Hash of the rig file.
-        wanted: u64,
-    },
+    /// The firmware is another one; only the request for its identity was sent.
+    #[error(transparent)]
+    Mismatch(#[from] Mismatch),
     /// The line is closed.
     #[error("the connection is closed: {0}; start `upright firmware monitor` again")]
     Closed(String),
@@ -63,7 +40,7 @@ pub struct Monitor {
     /// Identity of the firmware, once received.
     pub info: Option<Info>,
     /// The latest telemetry.
-    pub telemetry: Option<TelemetryOfAny>,
+    pub telemetry: Option<AnyTelemetry>,
     /// Counters of ticks, overruns, rejected measurements and lost messages, as last received.
     pub statistics: Option<Statistics>,
     /// The first cause of the fault or of the last reset.
@@ -73,20 +50,17 @@ pub struct Monitor {
     /// Requests and replies, oldest first.
     pub log: VecDeque<String>,
     /// Telemetry of the last 10 s.
-    pub history: VecDeque<TelemetryOfAny>,
+    pub history: VecDeque<AnyTelemetry>,
     /// The set-point commanded here (m), if any.
     pub wanted: Option<f32>,
     /// The file of the recording, if one is written.
     pub recording: Option<String>,
-    /// Frames that could not be read.
-    pub unreadable: u32,
+    /// Why the last command that was answered was refused, if it was.
+    pub refusal: Option<Answer>,
     /// Why the conversation has ended; `None` while it goes on.
     pub ended: Option<Ended>,
-    receiver: Receiver<MAX_MESSAGE>,
-    outgoing: Outgoing,
+    client: Client,
     telemetry_s: f32,
-    beating: bool,
-    next_beat: Duration,
     next_ask: Duration,
 }
 
@@ -104,13 +78,10 @@ impl Monitor {
             history: VecDeque::new(),
             wanted: None,
             recording: None,
-            unreadable: 0,
+            refusal: None,
             ended: None,
-            receiver: Receiver::new(),
-            outgoing: Outgoing::default(),
+            client: Client::default(),
             telemetry_s: TELEMETRY_S,
-            beating: false,
-            next_beat: Duration::ZERO,
             next_ask: Duration::ZERO,
         }
     }
@@ -122,33 +93,36 @@ impl Monitor {
 
     /// Ends the conversation if the firmware is not that of the rig with this hash.
     pub fn expect_rig(&mut self, wanted: u64) {
-        if let Some(Info { rig_hash: found, .. }) = self.info
-            && found != wanted
-        {
-            self.outgoing.clear();
-            self.ended.get_or_insert(Ended::Rig { found, wanted });
+        if let Some(Err(mismatch)) = self.info.map(|info| Mismatch::check(&info, wanted)) {
+            self.end(mismatch);
         }
     }
 
+    fn end(&mut self, mismatch: Mismatch) {
+        self.client.clear();
+        self.ended.get_or_insert(mismatch.into());
+    }
+
     /// Takes received bytes; returns the telemetry in them.
-    pub fn receive(&mut self, bytes: &[u8], now: Duration) -> Vec<TelemetryOfAny> {
+    pub fn receive(&mut self, bytes: &[u8], now: Duration) -> Vec<AnyTelemetry> {
         let mut all = Vec::new();
         for &byte in bytes {
-            match self.receiver.push::<Message<30, 15>>(byte) {
-                Some(Ok(Message::Telemetry(telemetry))) if self.info.is_some() => {
+            match self.client.receive(byte, now) {
+                Some(Received::Telemetry(telemetry)) if self.info.is_some() => {
                     self.take(telemetry.clone(), now);
                     all.push(telemetry);
                 }
-                Some(Ok(Message::Reply(Reply { id, answer }))) => self.answered(id, answer, now),
-                Some(Err(_)) => self.unreadable = self.unreadable.saturating_add(1),
+                Some(Received::Answer { request: Some(request), answer, .. }) => {
+                    self.answered(request, answer, now);
+                }
                 // Until the firmware has named its version of the messages, telemetry may mean anything.
-                Some(Ok(Message::Telemetry(_) | Message::Log(_))) | None => (),
+                _ => (),
             }
         }
         all
     }
 
-    fn take(&mut self, telemetry: TelemetryOfAny, now: Duration) {
+    fn take(&mut self, telemetry: AnyTelemetry, now: Duration) {
         let fault = self.telemetry.as_ref().and_then(|before| before.fault);
         if telemetry.fault != fault {
             if let Some(fault) = telemetry.fault {
@@ -172,14 +146,12 @@ impl Monitor {
         self.telemetry = Some(telemetry);
     }
 
-    fn answered(&mut self, id: u64, answer: Answer, now: Duration) {
-        let Some(request) = self.outgoing.answered(id, now) else { return };
+    fn answered(&mut self, request: Request, answer: Answer, now: Duration) {
         match answer {
-            Answer::Info(info) if info.protocol != PROTOCOL => {
-                self.outgoing.clear();
-                self.ended = Some(Ended::Protocol(info.protocol));
-            }
             Answer::Info(info) => {
+                if let Err(mismatch) = Mismatch::check_protocol(&info) {
+                    return self.end(mismatch);
+                }
                 self.info = Some(info);
                 let ticks = (self.telemetry_s / info.tick_s).round().clamp(1.0, f32::from(u16::MAX));
                 self.send(Request::Telemetry(ticks as u16), now);
@@ -194,7 +166,10 @@ impl Monitor {
             Answer::Statistics(statistics) => self.statistics = Some(statistics),
             Answer::Done => match request {
                 Request::KeepAlive | Request::Jog { .. } | Request::Telemetry(_) => (),
-                _ => self.note(format!("{}: done", name(request, self.links()))),
+                _ => {
+                    self.refusal = None;
+                    self.note(format!("{}: done", name(request, self.links())));
+                }
             },
             // The reasons were logged with the first answer to the held key.
             Answer::NotNow(reasons)
@@ -202,13 +177,18 @@ impl Monitor {
             Answer::NotNow(reasons) => {
                 self.note(format!("{}: refused", name(request, self.links())));
                 reasons.texts().for_each(|text| self.note(format!("  because {text}")));
-                self.forget(request);
+                self.refuse(request, answer);
             }
             Answer::Rejected(rejected) => {
                 self.note(format!("{}: {rejected}", name(request, self.links())));
-                self.forget(request);
+                self.refuse(request, answer);
             }
         }
+    }
+
+    fn refuse(&mut self, request: Request, answer: Answer) {
+        self.refusal = Some(answer);
+        self.forget(request);
     }
 
     /// Forgets a set-point that was refused: it is not shown as the target.
@@ -219,36 +199,37 @@ impl Monitor {
     }
 
     /// Sends the request of an action. Recording and quitting are up to the caller.
-    pub fn act(&mut self, action: Action, now: Duration) {
+    pub fn act(&mut self, action: MonitorAction, now: Duration) {
         if self.info.is_none() {
             return self.note("the firmware has not answered yet".to_owned());
         }
         let request = match action {
-            Action::Send(request) => request,
-            Action::Shift(by) => {
+            MonitorAction::Send(request) => request,
+            MonitorAction::Shift(by) => {
                 let governed = self.telemetry.as_ref().map_or(0.0, |telemetry| telemetry.setpoint_m);
                 Request::Setpoint(self.wanted.unwrap_or(governed) + by)
             }
-            Action::Turn(link) if link >= self.links() => {
+            MonitorAction::Turn(link) if link >= self.links() => {
                 return self.note(format!("there is no link {}", link + 1));
             }
-            Action::Turn(link) => match self.equilibrium() {
+            MonitorAction::Turn(link) => match self.equilibrium() {
                 Some(at) => Request::Goto(Equilibrium::of_bits(at.bits() ^ 1 << link)),
                 None => return self.note("the links are at no equilibrium".to_owned()),
             },
-            Action::OtherLaw => {
+            MonitorAction::OtherLaw => {
                 Request::Select(match self.telemetry.as_ref().map(|telemetry| telemetry.law) {
                     None | Some(Law::Lqr) => Law::PolePlacement,
                     Some(Law::PolePlacement) => Law::Lqr,
                 })
             }
-            Action::Record | Action::Quit => return,
+            MonitorAction::Record | MonitorAction::Quit => return,
         };
         if matches!(request, Request::Jog { .. }) {
-            return self.outgoing.beat(request, now);
+            return self.client.hold(request, now);
         }
         if let Request::Setpoint(wanted) = request {
-            (self.wanted, self.beating) = (Some(wanted), true);
+            self.wanted = Some(wanted);
+            self.client.keep_alive();
         }
         self.send(request, now);
     }
@@ -278,16 +259,12 @@ impl Monitor {
         if self.ended.is_some() {
             return;
         }
-        for unanswered in self.outgoing.repeat(now) {
+        for unanswered in self.client.poll(now) {
             self.tell(unanswered);
         }
-        if now >= self.next_ask && !self.outgoing.is_waiting() {
+        if now >= self.next_ask && !self.client.is_waiting() {
             self.send(if self.info.is_none() { Request::Info } else { Request::Statistics }, now);
             self.next_ask = now + STATISTICS;
-        }
-        if self.beating && now >= self.next_beat {
-            self.outgoing.beat(Request::KeepAlive, now);
-            self.next_beat = now + BEAT;
         }
     }
 
@@ -298,12 +275,17 @@ impl Monitor {
 
     /// Takes the bytes to be sent over the line.
     pub fn take_outgoing(&mut self) -> Vec<u8> {
-        self.outgoing.take()
+        self.client.take_outgoing()
+    }
+
+    /// Frames that could not be read.
+    pub fn unreadable(&self) -> u32 {
+        self.client.damaged
     }
 
     /// Whether a request has no answer yet.
     pub fn is_waiting(&self) -> bool {
-        self.outgoing.is_waiting()
+        self.client.is_waiting()
     }
 
     /// Adds a line to the log.
@@ -318,7 +300,7 @@ impl Monitor {
         if self.ended.is_some() {
             return;
         }
-        for unanswered in self.outgoing.send(request, now) {
+        for unanswered in self.client.send(request, now) {
             self.tell(unanswered);
         }
     }
@@ -327,6 +309,7 @@ impl Monitor {
         let then = if is_given_up { "given up; it may have been carried out" } else { "it is repeated" };
         self.note(format!("{}: not answered, {then}", name(request, self.links())));
         if is_given_up {
+            self.refusal = None;
             self.forget(request);
         }
     }

@@ -3,11 +3,10 @@
 use std::io::Write;
 
 use serde_json::{Value, json};
-
-use super::model::TelemetryOfAny;
+use upright_design::client::AnyTelemetry;
 
 /// One object with SI units; fault and arming inhibits by name.
-pub fn json(telemetry: &TelemetryOfAny) -> Value {
+pub fn json(telemetry: &AnyTelemetry) -> Value {
     json!({
         "tick": telemetry.tick,
         "state": telemetry.state,
@@ -31,12 +30,12 @@ pub fn json(telemetry: &TelemetryOfAny) -> Value {
 
 /// A CSV file with one row per telemetry message. Every row is flushed, so the file is complete whenever the recording
 /// ends.
-pub struct Recorder<W: Write> {
+pub struct TelemetryCsv<W: Write> {
     csv: csv::Writer<W>,
     begun: bool,
 }
 
-impl<W: Write> Recorder<W> {
+impl<W: Write> TelemetryCsv<W> {
     /// An empty recording.
     pub fn new(out: W) -> Self {
         Self { csv: csv::Writer::from_writer(out), begun: false }
@@ -51,7 +50,7 @@ impl<W: Write> Recorder<W> {
     ///
     /// # Errors
     /// If it cannot be written.
-    pub fn push(&mut self, telemetry: &TelemetryOfAny) -> std::io::Result<()> {
+    pub fn push(&mut self, telemetry: &AnyTelemetry) -> std::io::Result<()> {
         if !self.begun {
             let fixed =
                 ["tick", "state", "fault", "setpoint_m", "requested_n", "applied_n", "drive", "cycles"];
@@ -81,7 +80,7 @@ impl<W: Write> Recorder<W> {
     }
 }
 
-impl Recorder<Vec<u8>> {
+impl TelemetryCsv<Vec<u8>> {
     /// Ends the recording; returns the bytes of the file.
     pub fn into_bytes(self) -> Vec<u8> {
         // Every row has been flushed, so nothing is left to fail.

@@ -8,8 +8,9 @@ use ratatui::text::Line;
 use ratatui::widgets::{Axis, Block, Chart, Dataset, GraphType, Paragraph, Wrap};
 use upright::supervision::inhibits::Inhibits;
 use upright::supervision::supervisor::State;
+use upright_design::client::AnyTelemetry;
 
-use super::model::{Monitor, TelemetryOfAny};
+use super::model::Monitor;
 use super::words;
 
 const KEYS: &str = "h/H home (rail)  g check signs  m/M jog (held)  a arm  u up  n down  1…6 turn a link over  d/space disarm  c clear  ←→ 1 cm  0 zero  l law  r record  q quit";
@@ -58,6 +59,16 @@ pub fn draw(monitor: &Monitor, frame: &mut Frame<'_>) {
     frame.render_widget(keys, bottom);
 }
 
+fn colour(state: State) -> Color {
+    match state {
+        State::Disarmed | State::Calibrated => Color::White,
+        State::Homing | State::Armed => Color::Yellow,
+        State::Jogging | State::Identifying | State::Raising | State::Lowering => Color::Magenta,
+        State::Balancing | State::Holding => Color::Green,
+        State::Fault => Color::Red,
+    }
+}
+
 fn header(monitor: &Monitor) -> Vec<Line<'_>> {
     let mut lines = Vec::new();
     if let Some(ended) = &monitor.ended {
@@ -82,14 +93,8 @@ fn header(monitor: &Monitor) -> Vec<Line<'_>> {
         info.tick_s * 1e3,
     )));
     let Some(telemetry) = &monitor.telemetry else { return lines };
-    let colour = match telemetry.state {
-        State::Disarmed | State::Calibrated => Color::White,
-        State::Homing | State::Armed => Color::Yellow,
-        State::Jogging | State::Identifying | State::Raising | State::Lowering => Color::Magenta,
-        State::Balancing | State::Holding => Color::Green,
-        State::Fault => Color::Red,
-    };
-    lines.push(Line::from(words::state(telemetry.state)).style(Style::new().fg(colour).bold()));
+    let style = Style::new().fg(colour(telemetry.state)).bold();
+    lines.push(Line::from(words::state(telemetry.state)).style(style));
     if let Some(fault) = telemetry.fault {
         let entry = fault.entry();
         let sensor = monitor.cause.filter(|cause| cause.fault == fault).and_then(|cause| cause.sensor);
@@ -174,8 +179,8 @@ fn bar(value: f32) -> String {
 
 fn draw_charts(monitor: &Monitor, frame: &mut Frame<'_>, area: Rect) {
     let (Some(info), Some(last)) = (monitor.info, monitor.history.back()) else { return };
-    let series = |value: &dyn Fn(&TelemetryOfAny) -> Option<f32>| -> Vec<(f64, f64)> {
-        let age = |telemetry: &TelemetryOfAny| {
+    let series = |value: &dyn Fn(&AnyTelemetry) -> Option<f32>| -> Vec<(f64, f64)> {
+        let age = |telemetry: &AnyTelemetry| {
             -f64::from(last.tick.wrapping_sub(telemetry.tick)) * f64::from(info.tick_s)
         };
         let finite = |value: &f32| value.is_finite();

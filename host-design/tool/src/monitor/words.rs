@@ -6,8 +6,7 @@ use upright::supervision::homing::Homing;
 use upright::supervision::jog::MotorSign;
 use upright::supervision::sign_check::Signs;
 use upright::supervision::supervisor::State;
-
-use super::model::TelemetryOfAny;
+use upright_design::client::AnyTelemetry;
 
 /// A state of the supervisor in words.
 pub fn state(state: State) -> &'static str {
@@ -31,14 +30,16 @@ pub fn joint(sensor: u8) -> String {
     if sensor == 0 { "cart".to_owned() } else { format!("link {sensor}") }
 }
 
-/// Where the program has crashed, with the processor's registers as its manual names them.
+/// Where the program has crashed: the words that the board records, with the registers of a Cortex-M as its manual
+/// names them (ARM DDI 0403, B3.2). Program counter (PC) and link register (LR) are 0 after a panic, and after a stack
+/// overflow, which leaves no room for them; BFAR is valid if bit 15 of CFSR is set.
 pub fn crash(record: &CrashRecord) -> String {
-    let CrashRecord { pc, lr, cfsr, hfsr, bfar } = record;
+    let CrashRecord([pc, lr, cfsr, hfsr, bfar]) = record;
     format!("crash at PC {pc:#010x}, LR {lr:#010x}, CFSR {cfsr:#010x}, HFSR {hfsr:#010x}, BFAR {bfar:#010x}")
 }
 
 /// Supply of the power stage, and the contacts and flags that are active in this tick.
-pub fn inputs(telemetry: &TelemetryOfAny) -> String {
+pub fn inputs(telemetry: &AnyTelemetry) -> String {
     let Contacts { limit_low, limit_high, emergency_stop, driver_fault, overrun, clock_fault, board_fault } =
         telemetry.contacts;
     let all = [
@@ -56,7 +57,7 @@ pub fn inputs(telemetry: &TelemetryOfAny) -> String {
 }
 
 /// The next step that homing, sign check or motor check asks of a person; `None` if there is none.
-pub fn instruction(telemetry: &TelemetryOfAny) -> Option<String> {
+pub fn instruction(telemetry: &AnyTelemetry) -> Option<String> {
     let move_it = |sensor: u8| match sensor {
         0 => "push the cart along +x".to_owned(),
         link => format!("turn link {link} counter-clockwise"),

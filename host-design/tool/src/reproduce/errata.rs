@@ -3,7 +3,8 @@
 use serde::Serialize;
 
 use super::designs::{gain_rows, plant_rows};
-use super::{PaperDesigns, PaperRigs, ReproduceError, Row, chain, published};
+use super::rigs::chain;
+use super::{PaperDesigns, PaperRigs, ReproduceError, Row, published};
 use upright_design::design::{Certified, Feedback, Laws, continuous_plant, design};
 use upright_design::numerics::Wide;
 use upright_design::plant::chain_plant;

@@ -5,8 +5,9 @@ use upright::table::Law;
 
 use super::continuous_loop::ContinuousRun;
 use super::firmware_loop::{FirmwareRun, trajectories};
+use super::rigs::chain;
 use super::trajectory::{StepFigures, Trajectory};
-use super::{ReproduceError, SEED, chain, published};
+use super::{ReproduceError, SEED, published};
 use upright_design::design::{Certified, Feedback, design};
 use upright_design::parallel;
 use upright_design::rig::Rig;

@@ -4,20 +4,17 @@
 use serde::Serialize;
 use upright::table::Law;
 
-use super::ReproduceError;
 use super::continuous_loop::ContinuousRun;
 use super::designs::open_loop_poles;
 use super::responses::{Loop, LoopRun, Loops};
 use super::trajectory::Trajectory;
+use super::{ReproduceError, SEED};
 use upright_design::numerics::{Bandwidth, SEGMENT, Spectrum};
 use upright_design::parallel;
 use upright_design::plant::reference::Tolerance;
 use upright_design::rig::Rig;
 use upright_design::table::{Gains, TableValues};
 use upright_design::verify::{LinearReport, Margins, continuous_margins, linear};
-
-/// Seed of all disturbances.
-pub const SEED: u64 = 1;
 
 /// Time at the start of each run that is left out (s): the initial state no longer matters after it.
 const FORGOTTEN_S: f64 = 10.0;

@@ -8,8 +8,9 @@ use upright::table::Law;
 
 use super::continuous_loop::ContinuousRun;
 use super::firmware_loop::{FirmwareRun, trajectories};
+use super::rigs::chain;
 use super::trajectory::Trajectory;
-use super::{PaperRigs, ReproduceError, SEED, chain, published};
+use super::{PaperRigs, ReproduceError, SEED, published};
 use upright_design::design::{Certified, DesignError, Feedback, design};
 use upright_design::parallel;
 use upright_design::plant::reference::Tolerance;

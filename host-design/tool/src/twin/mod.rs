@@ -6,27 +6,28 @@
 //!
 //! | file | what is in it |
 //! |---|---|
-//! | `door.rs` | which requests are let in |
-//! | `viewers.rs` | connections of pages |
+//! | `access.rs` | which requests are let in |
+//! | `connections.rs` | connections of pages |
 //! | `request.rs` | what a page asks for |
-//! | `desk.rs` | conversation with the firmware, command, recording |
-//! | `simulated.rs` | the simulated machine, with `grip.rs`, `holding.rs`, `property.rs`, `challenge.rs`, `pace.rs` |
+//! | `dispatcher.rs` | conversation with the firmware, command, recording |
+//! | `simulated.rs` | the simulated machine, with `pull.rs`, `holding.rs`, `property.rs`, `challenge.rs`, `pace.rs` |
 //! | `connected.rs` | a machine behind a serial line |
 //! | `page/` | the page |
 
+mod access;
 mod assets;
 mod challenge;
 mod connected;
-mod desk;
-mod door;
+mod connections;
+mod dispatcher;
 mod greeting;
-mod grip;
 mod holding;
 mod pace;
 mod property;
+mod pull;
 mod request;
 mod server;
 mod simulated;
-mod viewers;
 
 pub use server::{Server, TwinError};
+pub use simulated::SimulatedMachine;

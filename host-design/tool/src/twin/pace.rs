@@ -14,7 +14,7 @@ const FASTEST: f64 = 10.0;
 
 /// Runs as many ticks as are due.
 #[derive(Debug)]
-pub(super) struct Pace {
+pub(super) struct SimulationPace {
     period_s: f64,
     factor: f64,
     is_paused: bool,
@@ -27,7 +27,7 @@ pub(super) struct Pace {
     speed: f64,
 }
 
-impl Pace {
+impl SimulationPace {
     /// Real time, from now on.
     pub(super) fn new(period_s: f64) -> Self {
         Self {

@@ -5,7 +5,7 @@ use serde::Deserialize;
 /// A message of the page.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 #[serde(tag = "ask", rename_all = "kebab-case", deny_unknown_fields)]
-pub(super) enum Request {
+pub(super) enum PageRequest {
     /// Nothing: shows that the page is alive.
     Alive,
     /// To be in command, if nobody else is.

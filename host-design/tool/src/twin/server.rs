@@ -6,19 +6,18 @@ use std::sync::{Arc, PoisonError};
 
 use upright_design::harness::HarnessError;
 use upright_design::rig::Rig;
-use upright_design::simulate::Scenario;
 use upright_design::table::TableValues;
 
+use super::access::{Access, Admitted, accept, send};
 use super::connected;
-use super::desk::{Desk, Recording};
-use super::door::{Admitted, Door, accept, send};
+use super::connections::Connections;
+use super::dispatcher::{Dispatcher, SharedCsv};
 use super::greeting::greeting;
 use super::property::Properties;
-use super::simulated::{Ended, Machine};
-use super::viewers::Viewers;
+use super::simulated::{RunEnd, SimulatedMachine};
 use crate::campaign::{Defect, kinds};
 use crate::in_the_loop::{EmulatorError, Place, RunError};
-use crate::monitor::{Line, Monitor};
+use crate::monitor::{Monitor, SerialLine};
 
 /// Most connections at a time, including those that have not been let in yet.
 const MAX_CONNECTIONS: usize = 32;
@@ -52,7 +51,7 @@ impl From<EmulatorError> for TwinError {
 pub struct Server {
     listener: TcpListener,
     secret: String,
-    recording: Recording,
+    recording: SharedCsv,
 }
 
 impl Server {
@@ -62,7 +61,7 @@ impl Server {
     /// If the address cannot be listened at.
     pub fn listen(address: SocketAddr) -> std::io::Result<Self> {
         let secret = format!("{:032x}", rand::random::<u128>());
-        Ok(Self { listener: TcpListener::bind(address)?, secret, recording: Recording::default() })
+        Ok(Self { listener: TcpListener::bind(address)?, secret, recording: SharedCsv::default() })
     }
 
     /// The address of the page, with its secret.
@@ -79,48 +78,50 @@ impl Server {
         Ok(format!("http://{host}/{}/", self.secret))
     }
 
-    /// Runs the firmware of `table` in `place` with the simulated rig, in real time from the first viewer on, while
+    /// Runs the firmware of `machine` in `place` with the simulated rig, in real time from the first viewer on, while
     /// `goes_on` holds. If `upright`, the rig is raised at the start; otherwise it hangs.
     ///
     /// # Errors
     /// [`TwinError`] if the firmware cannot be started.
     pub fn simulate(
         self,
-        rig: &Rig,
-        table: &TableValues,
-        scenario: &Scenario,
+        machine: SimulatedMachine<'_>,
         place: Place<'_>,
         upright: bool,
         goes_on: &dyn Fn() -> bool,
     ) -> Result<(), TwinError> {
+        let SimulatedMachine { rig, table, .. } = machine;
         let defects: Vec<Defect> =
             kinds(table, place).into_iter().filter(|kind| kind.can_begin_while_balancing()).collect();
-        let (viewers, inbox) = Viewers::new(greeting(rig, table, place.name(), Some(&defects)));
+        let (viewers, events) = Connections::new(greeting(rig, table, place.name(), Some(&defects)));
         let _accepting = accepting(self.listener, self.secret, viewers.clone(), Arc::clone(&self.recording))?;
         let monitor = || match place {
             // Its serial line carries no more than the usual rate.
             Place::Board { .. } => Monitor::new(&rig.name),
             _ => Monitor::with_telemetry_every(TELEMETRY_S, &rig.name),
         };
-        let mut desk = Desk::new(monitor(), (viewers, inbox), self.recording);
-        let machine = Machine { rig, table, scenario };
+        let mut dispatcher = Dispatcher::new(monitor(), (viewers, events), self.recording);
         let mut properties = Properties::of(rig);
         let mut upright = upright;
         loop {
             let ended = place.with_target(table, |target| {
-                machine.run(target, &mut desk, &mut properties, upright, goes_on).map_err(TwinError::from)
+                machine
+                    .run(target, &mut dispatcher, &mut properties, upright, goes_on)
+                    .map_err(TwinError::from)
             });
             upright = match ended {
-                Ok(Ended::Stopped) => return Ok(()),
-                Ok(Ended::Restart { upright }) => upright,
+                Ok(RunEnd::Stopped) => return Ok(()),
+                Ok(RunEnd::Restart { upright }) => upright,
                 // It has stopped after it was running: say so, and wait for the power to be switched off and on.
-                Err(error) if desk.was_seen => match desk.wait_for_restart(&error.to_string(), goes_on) {
-                    Some(upright) => upright,
-                    None => return Ok(()),
-                },
+                Err(error) if dispatcher.was_seen => {
+                    match dispatcher.wait_for_restart(&error.to_string(), goes_on) {
+                        Some(upright) => upright,
+                        None => return Ok(()),
+                    }
+                }
                 Err(error) => return Err(error),
             };
-            desk.begin_again(monitor());
+            dispatcher.begin_again(monitor());
         }
     }
 
@@ -132,14 +133,14 @@ impl Server {
         self,
         rig: &Rig,
         table: &TableValues,
-        line: Line,
+        line: SerialLine,
         name: &str,
         goes_on: &dyn Fn() -> bool,
     ) -> Result<(), TwinError> {
-        let (viewers, inbox) = Viewers::new(greeting(rig, table, name, None));
+        let (viewers, events) = Connections::new(greeting(rig, table, name, None));
         let _accepting = accepting(self.listener, self.secret, viewers.clone(), Arc::clone(&self.recording))?;
-        let mut desk = Desk::new(Monitor::new(name), (viewers, inbox), self.recording);
-        connected::run(line, &mut desk, rig.hash(), goes_on);
+        let mut dispatcher = Dispatcher::new(Monitor::new(name), (viewers, events), self.recording);
+        connected::run(line, &mut dispatcher, rig.hash(), goes_on);
         Ok(())
     }
 }
@@ -161,11 +162,11 @@ impl Drop for Accepting {
 fn accepting(
     listener: TcpListener,
     secret: String,
-    viewers: Viewers,
-    recording: Recording,
+    viewers: Connections,
+    recording: SharedCsv,
 ) -> std::io::Result<Accepting> {
     let address = listener.local_addr()?;
-    let door = Arc::new(Door::new(secret, address.ip(), address.port()));
+    let access = Arc::new(Access::new(secret, address.ip(), address.port()));
     let stop = Arc::new(AtomicBool::new(false));
     let stopped = Arc::clone(&stop);
     let connections = Arc::new(AtomicUsize::new(0));
@@ -179,11 +180,11 @@ fn accepting(
                 connections.fetch_sub(1, Ordering::Relaxed);
                 continue;
             }
-            let (door, viewers, recording) = (Arc::clone(&door), viewers.clone(), Arc::clone(&recording));
+            let (access, viewers, recording) = (Arc::clone(&access), viewers.clone(), Arc::clone(&recording));
             let connections = Arc::clone(&connections);
             std::thread::spawn(move || {
                 // A client that goes away in the middle is no error of the server.
-                let _ = let_in(stream, &door, &viewers, &recording);
+                let _ = let_in(stream, &access, &viewers, &recording);
                 connections.fetch_sub(1, Ordering::Relaxed);
             });
         }
@@ -193,11 +194,11 @@ fn accepting(
 
 fn let_in(
     mut stream: TcpStream,
-    door: &Door,
-    viewers: &Viewers,
-    recording: &Recording,
+    access: &Access,
+    viewers: &Connections,
+    recording: &SharedCsv,
 ) -> std::io::Result<()> {
-    match door.answer(&mut stream)? {
+    match access.answer(&mut stream)? {
         Some(Admitted::File(asset)) => {
             send(&mut stream, "200 OK", asset.media_type, asset.content.as_bytes())
         }

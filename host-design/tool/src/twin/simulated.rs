@@ -6,31 +6,34 @@ use std::time::{Duration, SystemTime};
 use serde_json::{Value, json};
 use upright::board::Output;
 use upright::control::actuator::Drive;
-use upright_design::harness::{Harness, HarnessError, Pins, Target};
+use upright_design::harness::{Harness, HarnessError, Pins, RailEnds, Target};
 use upright_design::rig::{PlantDescription, Rig};
 use upright_design::simulate::{Bench, Scenario};
 use upright_design::table::TableValues;
 use upright_design::verify::Disturbance;
 
 use super::challenge::Challenge;
-use super::desk::Desk;
-use super::grip::{Grip, Pull, Spring};
-use super::holding::Hand;
-use super::pace::Pace;
+use super::dispatcher::Dispatcher;
+use super::holding::ManualHold;
+use super::pace::SimulationPace;
 use super::property::Properties;
+use super::pull::{Pull, PulledPoint, Spring};
 use super::request::{Holding, MachineRequest};
 use crate::campaign::{Defect, Defective, Trial};
 
 /// A rig, its table, and how it is simulated.
 #[derive(Clone, Copy)]
-pub(super) struct Machine<'a> {
-    pub(super) rig: &'a Rig,
-    pub(super) table: &'a TableValues,
-    pub(super) scenario: &'a Scenario,
+pub struct SimulatedMachine<'a> {
+    /// The rig.
+    pub rig: &'a Rig,
+    /// Its gain table.
+    pub table: &'a TableValues,
+    /// How it is simulated.
+    pub scenario: &'a Scenario,
 }
 
 /// Why a run has ended.
-pub(super) enum Ended {
+pub(super) enum RunEnd {
     /// The power is switched off and on.
     Restart {
         /// Whether the rig starts raised instead of hanging.
@@ -44,18 +47,19 @@ pub(super) enum Ended {
 const STOP: [f64; 2] = [0.05, 0.3];
 
 struct World<'a, 't> {
-    machine: Machine<'a>,
+    machine: SimulatedMachine<'a>,
     harness: Harness<'t>,
     spring: Option<Spring>,
-    grip: Option<Grip>,
+    pulled: Option<PulledPoint>,
     pull: Option<Pull>,
-    hand: Hand,
+    hold: ManualHold,
     properties: Properties,
     defect: Option<Defective<'a>>,
     challenge: Option<Challenge>,
     delayed: VecDeque<Output>,
     output: Output,
     zero: Vec<u32>,
+    rail: RailEnds,
     total_kg: f64,
     /// Simulated time since the start (s).
     t_s: f64,
@@ -63,7 +67,7 @@ struct World<'a, 't> {
     restart: Option<bool>,
 }
 
-impl<'a> Machine<'a> {
+impl<'a> SimulatedMachine<'a> {
     /// Runs the firmware `target` with the rig while `goes_on` holds, or until the power is switched off.
     ///
     /// # Errors
@@ -71,43 +75,43 @@ impl<'a> Machine<'a> {
     pub(super) fn run(
         self,
         target: &mut dyn Target,
-        desk: &mut Desk,
+        dispatcher: &mut Dispatcher,
         properties: &mut Properties,
         upright: bool,
         goes_on: &dyn Fn() -> bool,
-    ) -> Result<Ended, HarnessError> {
+    ) -> Result<RunEnd, HarnessError> {
         let mut world = World::new(self, target, properties.clone(), upright)?;
-        let mut pace = Pace::new(self.rig.tick.period_s);
+        let mut pace = SimulationPace::new(self.rig.tick.period_s);
         while goes_on() {
-            for request in desk.requests(world.now()) {
-                world.carry_out(request, &mut pace, desk)?;
+            for request in dispatcher.requests(world.now()) {
+                world.carry_out(request, &mut pace, dispatcher)?;
             }
             // Time starts with the first viewer.
-            if desk.was_seen {
-                pace.run(|| world.tick(desk))?;
+            if dispatcher.was_seen {
+                pace.run(|| world.tick(dispatcher))?;
             } else {
-                pace = Pace::new(self.rig.tick.period_s);
-                world.greet(desk)?;
+                pace = SimulationPace::new(self.rig.tick.period_s);
+                world.greet(dispatcher)?;
             }
-            desk.show(&world.picture(&pace));
+            dispatcher.show(&world.picture(&pace));
             if let Some(upright) = world.restart {
                 *properties = world.properties;
-                return Ok(Ended::Restart { upright });
+                return Ok(RunEnd::Restart { upright });
             }
             pace.wait();
         }
-        Ok(Ended::Stopped)
+        Ok(RunEnd::Stopped)
     }
 }
 
 impl<'a, 't> World<'a, 't> {
     fn new(
-        machine: Machine<'a>,
+        machine: SimulatedMachine<'a>,
         target: &'t mut dyn Target,
         properties: Properties,
         upright: bool,
     ) -> Result<Self, HarnessError> {
-        let Machine { rig, table, scenario } = machine;
+        let SimulatedMachine { rig, table, scenario } = machine;
         let mut harness = Harness::new(rig, table, scenario, target)?;
         let output = if upright { harness.raise(None)? } else { Output::OFF };
         let period_s = rig.tick.period_s;
@@ -118,9 +122,9 @@ impl<'a, 't> World<'a, 't> {
             }
             PlantDescription::Model(_) => (None, 1.0),
         };
-        let mut hand = Hand::new(rig.states(), period_s);
+        let mut hold = ManualHold::new(rig);
         if !upright {
-            hand.take(Holding::Hanging, harness.bench.state());
+            hold.take(Holding::Hanging, harness.bench.state());
         }
         let mut zero = vec![0; table.sensors()];
         harness.bench.read_counters_at_zero(&mut zero);
@@ -128,15 +132,16 @@ impl<'a, 't> World<'a, 't> {
             machine,
             harness,
             spring,
-            grip: None,
+            pulled: None,
             pull: None,
-            hand,
+            hold,
             properties,
             defect: None,
             challenge: None,
             delayed: VecDeque::new(),
             output,
             zero,
+            rail: RailEnds::of(rig),
             total_kg,
             t_s: 0.0,
             // Commands are numbered by it, so that numbers keep growing after a restart.
@@ -153,11 +158,11 @@ impl<'a, 't> World<'a, 't> {
     }
 
     /// Begins the conversation: runs one tick per call until the first telemetry has come.
-    fn greet(&mut self, desk: &mut Desk) -> Result<(), HarnessError> {
-        if desk.monitor.telemetry.is_some() {
+    fn greet(&mut self, dispatcher: &mut Dispatcher) -> Result<(), HarnessError> {
+        if dispatcher.monitor.telemetry.is_some() {
             return Ok(());
         }
-        self.tick(desk)
+        self.tick(dispatcher)
     }
 
     /// Builds the simulated rig again with the current properties, in the same state.
@@ -177,21 +182,21 @@ impl<'a, 't> World<'a, 't> {
     fn carry_out(
         &mut self,
         request: MachineRequest,
-        pace: &mut Pace,
-        desk: &mut Desk,
+        pace: &mut SimulationPace,
+        dispatcher: &mut Dispatcher,
     ) -> Result<(), HarnessError> {
         match request {
             MachineRequest::Pull { body, along, x, y } => {
-                self.grip = Some(Grip { body, along, to: [x, y] });
+                self.pulled = Some(PulledPoint { body, along, to: [x, y] });
             }
-            MachineRequest::LetGo => self.grip = None,
-            MachineRequest::Hold { how } => self.hand.take(how, self.harness.bench.state()),
+            MachineRequest::LetGo => self.pulled = None,
+            MachineRequest::Hold { how } => self.hold.take(how, self.harness.bench.state()),
             MachineRequest::Set { name, value } => match self.properties.set(&name, value) {
                 Some(true) => self.rebuild()?,
                 Some(false) => {}
-                None => desk.monitor.note(format!("`{name}` is no property of the machine")),
+                None => dispatcher.monitor.note(format!("`{name}` is no property of the machine")),
             },
-            MachineRequest::Defect { name, sensor } => self.begin_defect(name.as_deref(), sensor, desk),
+            MachineRequest::Defect { name, sensor } => self.begin_defect(name.as_deref(), sensor, dispatcher),
             MachineRequest::Speed { factor } => pace.set(factor),
             MachineRequest::Pause { on } => pace.pause(on),
             MachineRequest::Step { ticks } => pace.step(ticks),
@@ -204,15 +209,15 @@ impl<'a, 't> World<'a, 't> {
         Ok(())
     }
 
-    fn begin_defect(&mut self, name: Option<&str>, sensor: usize, desk: &mut Desk) {
+    fn begin_defect(&mut self, name: Option<&str>, sensor: usize, dispatcher: &mut Dispatcher) {
         let Some(name) = name else {
             self.defect = None;
             return;
         };
         let Some(&kind) = Defect::ALL.iter().find(|kind| kind.name() == name) else {
-            return desk.monitor.note(format!("`{name}` is no defect"));
+            return dispatcher.monitor.note(format!("`{name}` is no defect"));
         };
-        let Machine { rig, table, scenario } = self.machine;
+        let SimulatedMachine { rig, table, scenario } = self.machine;
         let trial = Trial::by_hand(kind, scenario, table.sensors(), sensor, self.t_s.to_bits());
         let mut defect = Defective::new(rig, table, trial);
         // The conversation numbers its commands by the time.
@@ -222,24 +227,24 @@ impl<'a, 't> World<'a, 't> {
     }
 
     /// One tick of the rig, the conversation and the firmware.
-    fn tick(&mut self, desk: &mut Desk) -> Result<(), HarnessError> {
+    fn tick(&mut self, dispatcher: &mut Dispatcher) -> Result<(), HarnessError> {
         self.move_rig();
         let now = self.now();
-        desk.monitor.poll(now);
-        let outgoing = desk.monitor.take_outgoing();
+        dispatcher.monitor.poll(now);
+        let outgoing = dispatcher.monitor.take_outgoing();
         if self.defect.as_ref().is_none_or(Defective::host_is_alive) {
             self.harness.session.send_bytes(&outgoing);
         }
         let mut inputs = self.harness.inputs();
         self.coarsen(&mut inputs);
-        self.press_limit_switches(&mut inputs);
+        self.rail.press(self.harness.bench.state()[0], &mut inputs.contacts);
         if let Some(defect) = &mut self.defect {
             defect.inputs(&mut inputs);
         }
         self.output = self.harness.session.tick(&inputs)?;
         let session = &mut self.harness.session;
-        desk.receive(session.last_bytes(), now);
-        while session.next_telemetry().is_some() || session.next_reply().is_some() {}
+        dispatcher.receive(session.last_bytes(), now);
+        session.forget_received();
         self.t_s += self.machine.rig.tick.period_s;
         Ok(())
     }
@@ -257,14 +262,14 @@ impl<'a, 't> World<'a, 't> {
         let output = self.delayed.front().copied().unwrap_or(Output::OFF);
         let push_n = self.pushes();
         let status = self.harness.session.status();
-        if let Some(held) = self.hand.tick(&status, self.harness.bench.state()) {
+        if let Some(held) = self.hold.tick(&status, self.harness.bench.state()) {
             let held = held.to_vec();
             self.pull = None;
             return self.harness.bench.hold(&held);
         }
         let state = self.harness.bench.state();
         self.pull =
-            self.grip.as_ref().zip(self.spring.as_ref()).map(|(grip, spring)| spring.pull(grip, state));
+            self.pulled.as_ref().zip(self.spring.as_ref()).map(|(pulled, spring)| spring.pull(pulled, state));
         let stop_n = self.end_stop_n(state);
         let (cart_n, torques) = match &self.pull {
             Some(pull) => (pull.cart_n, pull.torques_n_m.as_slice()),
@@ -284,10 +289,9 @@ impl<'a, 't> World<'a, 't> {
         defect + challenge.map_or(0.0, |challenge| challenge.tick(survives, self.machine.rig.tick.period_s))
     }
 
-    /// Force of the end stops on the cart (N): a spring and a damper at either end of the rail.
+    /// Force of the end stops on the cart (N): a spring and a damper each.
     fn end_stop_n(&self, state: &[f64]) -> f64 {
-        let PlantDescription::Chain(chain) = &self.machine.rig.plant else { return 0.0 };
-        let [low, high] = chain.cart.travel_m;
+        let [low, high] = self.rail.stops_m();
         let beyond = if state[0] < low { state[0] - low } else { (state[0] - high).max(0.0) };
         if beyond == 0.0 {
             return 0.0;
@@ -311,26 +315,16 @@ impl<'a, 't> World<'a, 't> {
         }
     }
 
-    /// The limit switches are at the ends of the rail.
-    fn press_limit_switches(&self, inputs: &mut Pins) {
-        if let PlantDescription::Chain(chain) = &self.machine.rig.plant {
-            let [low, high] = chain.cart.travel_m;
-            let x = self.harness.bench.state()[0];
-            inputs.contacts.limit_low |= x <= low;
-            inputs.contacts.limit_high |= x >= high;
-        }
-    }
-
     /// The part of a picture that only a simulation knows.
-    fn picture(&self, pace: &Pace) -> Value {
-        let is_pulled = self.pull.as_ref().zip(self.grip.as_ref());
+    fn picture(&self, pace: &SimulationPace) -> Value {
+        let is_pulled = self.pull.as_ref().zip(self.pulled.as_ref());
         json!({
             "t_s": self.t_s,
             "state": self.harness.bench.state(),
-            "pull": is_pulled.map(|(pull, grip)| json!({
-                "body": grip.body, "along": grip.along, "to": grip.to, "force_n": pull.force_n,
+            "pull": is_pulled.map(|(pull, pulled)| json!({
+                "body": pulled.body, "along": pulled.along, "to": pulled.to, "force_n": pull.force_n,
             })),
-            "holding": self.hand.how(),
+            "holding": self.hold.how(),
             "properties": self.properties.all().collect::<std::collections::BTreeMap<_, _>>(),
             "defect": self.defect.as_ref().map(|defect| defect.kind().name()),
             "challenge": self.challenge,

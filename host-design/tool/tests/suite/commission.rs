@@ -5,15 +5,17 @@ use std::path::Path;
 use upright_design::harness::with_firmware;
 use upright_design::rig::{PlantDescription, Rig};
 use upright_design::table::TableValues;
-use upright_tool::commission::{Commissioning, Journal, Plan, Planted, Record, Simulated, Step, Stop};
+use upright_tool::commission::{
+    CommissionPlan, CommissionRecord, CommissionStep, Commissioning, Journal, Planted, Simulated, Stop,
+};
 
 use crate::command::{SINGLE, path_of, status, stderr, stdout, upright};
 use crate::published::rig_and_table;
 
 const DOUBLE: &str = "double-quanser-dbpen";
 
-fn plan<'a>(rig: &'a Rig, table: &'a TableValues, text: &'a str) -> Plan<'a> {
-    Plan { rig, table, file: Path::new("rig.toml"), text, seconds: 8.0, seed: 1 }
+fn plan<'a>(rig: &'a Rig, table: &'a TableValues, text: &'a str) -> CommissionPlan<'a> {
+    CommissionPlan { rig, table, file: Path::new("rig.toml"), text, seconds: 8.0, seed: 1 }
 }
 
 /// Does these steps with the simulated machine of a rig, whose firmware has `table`; returns the step that was not
@@ -22,10 +24,10 @@ fn stopped(
     name: &'static str,
     table: &TableValues,
     planted: Option<Planted>,
-    steps: &[Step],
-) -> Option<(Step, String)> {
+    steps: &[CommissionStep],
+) -> Option<(CommissionStep, String)> {
     let (rig, own) = rig_and_table(name);
-    let mut journal = Journal::new(Record::new(rig, "this computer"), None, Box::new(|_| ()));
+    let mut journal = Journal::new(CommissionRecord::new(rig, "this computer"), None, Box::new(|_| ()));
     let result = with_firmware(table, |target| {
         let mut machine = Simulated::new(rig, table, planted, target, 1).unwrap();
         Commissioning::new(plan(rig, own, "")).run(&mut machine, &mut journal, steps)
@@ -45,7 +47,7 @@ fn stopped(
 fn a_sound_machine_passes_every_early_step() {
     for name in [SINGLE, DOUBLE] {
         let (_, table) = rig_and_table(name);
-        assert_eq!(stopped(name, table, None, &Step::EARLY), None);
+        assert_eq!(stopped(name, table, None, &CommissionStep::EARLY), None);
     }
 }
 
@@ -54,20 +56,21 @@ fn every_planted_defect_is_found_in_its_step() {
     for (name, links) in [(SINGLE, 1), (DOUBLE, 2)] {
         let (_, table) = rig_and_table(name);
         for planted in Planted::all() {
-            let (step, words) = stopped(name, table, Some(planted), &Step::FIRST).expect("it is found");
+            let (step, words) =
+                stopped(name, table, Some(planted), &CommissionStep::FIRST).expect("it is found");
             assert_eq!(step, planted.found_in(links), "{planted}: {words}");
         }
     }
 }
 
 /// The table with limits that disable the firmware's own check of a step.
-fn blind(table: &TableValues, step: Step) -> TableValues {
+fn blind(table: &TableValues, step: CommissionStep) -> TableValues {
     let mut table = table.clone();
     let limits = &mut table.limits;
     match step {
-        Step::Homing => limits.travel_counts[1] = i32::MAX,
-        Step::Signs => limits.sign_counts = [0; 15],
-        Step::Motor => limits.sign_counts[0] = 0,
+        CommissionStep::Homing => limits.travel_counts[1] = i32::MAX,
+        CommissionStep::Signs => limits.sign_counts = [0; 15],
+        CommissionStep::Motor => limits.sign_counts[0] = 0,
         _ => {}
     }
     table
@@ -77,13 +80,13 @@ fn blind(table: &TableValues, step: Step) -> TableValues {
 fn without_the_check_of_its_step_no_defect_is_found_there() {
     for (name, links) in [(SINGLE, 1), (DOUBLE, 2)] {
         let (_, table) = rig_and_table(name);
-        let early = |planted: &Planted| Step::EARLY.contains(&planted.found_in(links));
+        let early = |planted: &Planted| CommissionStep::EARLY.contains(&planted.found_in(links));
         for planted in Planted::all().filter(early) {
             let step = planted.found_in(links);
-            let mut steps = Step::EARLY.to_vec();
+            let mut steps = CommissionStep::EARLY.to_vec();
             steps.truncate(steps.iter().position(|&one| one == step).unwrap() + 1);
             // These checks are the tool's own.
-            if matches!(step, Step::Contacts | Step::Turns) {
+            if matches!(step, CommissionStep::Contacts | CommissionStep::Turns) {
                 steps.pop();
             }
             assert_eq!(stopped(name, &blind(table, step), Some(planted), &steps), None, "{planted}");
@@ -96,8 +99,8 @@ fn the_firmware_of_another_rig_is_refused_at_once() {
     let (rig, table) = rig_and_table(DOUBLE);
     let mut other = table.clone();
     other.rig_hash ^= 1;
-    let (step, words) = stopped(DOUBLE, &other, None, &Step::EARLY).unwrap();
-    assert!(step == Step::Connect && words.contains("flash the firmware again"), "{words}");
+    let (step, words) = stopped(DOUBLE, &other, None, &CommissionStep::EARLY).unwrap();
+    assert!(step == CommissionStep::Connect && words.contains("flash the firmware again"), "{words}");
     assert_eq!(rig.hash(), table.rig_hash);
 }
 
@@ -121,7 +124,7 @@ fn a_machine_that_differs_from_its_file_is_commissioned_and_balances() {
     let written: serde_json::Value = serde_json::from_slice(&std::fs::read(&file).unwrap()).unwrap();
     assert_eq!((&printed, &printed["outcome"]), (&written, &"done".into()));
     let steps = printed["steps"].as_array().unwrap();
-    assert_eq!(steps.len(), Step::FIRST.len() + 1 + Step::SECOND.len());
+    assert_eq!(steps.len(), CommissionStep::FIRST.len() + 1 + CommissionStep::SECOND.len());
     assert!(steps.iter().all(|step| step["passed"] == true));
     assert!(steps.last().unwrap()["found"][0].as_str().unwrap().starts_with("balanced for 10 s"));
     assert_eq!(steps[7]["data"]["wiring"]["as_in_file"], true);
@@ -143,13 +146,13 @@ fn a_machine_that_does_not_meet_its_requirements_is_not_balanced() {
     // Without this line, such a machine is commissioned: see above.
     let text = std::fs::read_to_string(path_of(SINGLE)).unwrap() + "\n[verify]\ngain_margin = 30\n";
     let (rig, table) = rig_and_table(SINGLE);
-    let mut journal = Journal::new(Record::new(rig, "this computer"), None, Box::new(|_| ()));
+    let mut journal = Journal::new(CommissionRecord::new(rig, "this computer"), None, Box::new(|_| ()));
     let result = with_firmware(table, |target| {
         let mut machine = Simulated::new(rig, table, None, target, 1).unwrap();
         Commissioning::first(plan(rig, table, &text), &mut machine, &mut journal).map(drop)
     });
     assert!(matches!(result.unwrap(), Err(Stop::Machine(words)) if words.contains("gain_margin")));
-    assert_eq!(journal.record.steps.last().unwrap().step, Step::Verification);
+    assert_eq!(journal.record.steps.last().unwrap().step, CommissionStep::Verification);
 }
 
 #[test]
@@ -167,7 +170,7 @@ fn the_command_ends_with_status_3_if_the_machine_must_not_be_run() {
     let output = run(&["--defect", "motor-reversed"]);
     assert_eq!(status(&output), 3, "{}", stderr(&output));
     assert!(stderr(&output).contains("swap its wires") && stdout(&output).contains("NOT PASSED"));
-    let (record, last) = (record(), Step::EARLY.len() - 1);
+    let (record, last) = (record(), CommissionStep::EARLY.len() - 1);
     assert_eq!((&record["outcome"], &record["steps"][last]["passed"]), (&"stopped".into(), &false.into()));
 
     let other = path_of(DOUBLE);

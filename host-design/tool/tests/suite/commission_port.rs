@@ -13,9 +13,10 @@ use upright_design::harness::with_firmware;
 use upright_design::rig::Rig;
 use upright_design::table::{Gains, TableValues};
 use upright_tool::commission::{
-    AtPort, Commissioning, Journal, Machine, Plan, Planted, Record, Simulated, Step, Stop, Task,
+    AtPort, CommissionPlan, CommissionRecord, CommissionStep, Commissioning, Journal, MachineAtHand,
+    PersonTask, Planted, Simulated, Stop,
 };
-use upright_tool::monitor::Line;
+use upright_tool::monitor::SerialLine;
 
 use crate::command::{SINGLE, path_of};
 
@@ -29,7 +30,7 @@ fn serve(
     rig: &Rig,
     table: &TableValues,
     planted: Option<Planted>,
-    tasks: &Receiver<Task>,
+    tasks: &Receiver<PersonTask>,
 ) {
     let (mut stream, _) = listener.accept().unwrap();
     let (reader, received) = channel();
@@ -62,10 +63,10 @@ fn serve(
 /// The port, and the simulated hand at the machine behind it, which gets every task that the person is asked to do.
 struct Heard {
     port: AtPort,
-    hand: Sender<Task>,
+    hand: Sender<PersonTask>,
 }
 
-impl Machine for Heard {
+impl MachineAtHand for Heard {
     fn exchange(&mut self, bytes: &[u8]) -> Result<Vec<u8>, Stop> {
         self.port.exchange(bytes)
     }
@@ -74,7 +75,7 @@ impl Machine for Heard {
         self.port.now()
     }
 
-    fn ask(&mut self, task: Task) -> Result<(), Stop> {
+    fn ask(&mut self, task: PersonTask) -> Result<(), Stop> {
         self.hand.send(task).unwrap();
         self.port.ask(task)
     }
@@ -83,7 +84,7 @@ impl Machine for Heard {
         Duration::from_secs(4)
     }
 
-    fn again(&mut self, failed: Step) -> bool {
+    fn again(&mut self, failed: CommissionStep) -> bool {
         self.port.again(failed)
     }
 }
@@ -94,7 +95,7 @@ fn commissioned(
     planted: Option<Planted>,
     answers: &'static [&'static str],
     is_stopped: bool,
-) -> (Result<(), Stop>, Vec<(Step, bool)>) {
+) -> (Result<(), Stop>, Vec<(CommissionStep, bool)>) {
     let rig = Rig::from_path(Path::new(&path_of(SINGLE))).unwrap();
     let table = TableValues::of(&rig, &design(&rig).unwrap(), Gains::Sampled).unwrap();
     let listener = TcpListener::bind("127.0.0.1:0").unwrap();
@@ -113,11 +114,12 @@ fn commissioned(
         };
         let stop = Arc::new(AtomicBool::new(false));
         stop.store(is_stopped, Ordering::Relaxed);
-        let port = AtPort::new(Line::open(&address).unwrap(), said, stop, Box::new(show));
+        let port = AtPort::new(SerialLine::open(&address).unwrap(), said, stop, Box::new(show));
         let mut machine = Heard { port, hand };
-        let mut journal = Journal::new(Record::new(rig, &address), None, Box::new(|_| ()));
-        let plan = Plan { rig, table, file: Path::new("rig.toml"), text: "", seconds: 10.0, seed: 1 };
-        let steps = [Step::Connect, Step::Contacts];
+        let mut journal = Journal::new(CommissionRecord::new(rig, &address), None, Box::new(|_| ()));
+        let plan =
+            CommissionPlan { rig, table, file: Path::new("rig.toml"), text: "", seconds: 10.0, seed: 1 };
+        let steps = [CommissionStep::Connect, CommissionStep::Contacts];
         let result = Commissioning::new(plan).run(&mut machine, &mut journal, &steps);
         (result, journal.record.steps.iter().map(|step| (step.step, step.passed)).collect())
     })
@@ -127,7 +129,7 @@ fn commissioned(
 fn a_person_at_a_port_is_led_through_the_contacts() {
     let (result, steps) = commissioned(None, &[""], false);
     assert!(result.is_ok(), "{result:?}");
-    assert_eq!(steps, [(Step::Connect, true), (Step::Contacts, true)]);
+    assert_eq!(steps, [(CommissionStep::Connect, true), (CommissionStep::Contacts, true)]);
 }
 
 #[test]
@@ -138,16 +140,26 @@ fn a_person_at_a_port_may_go_back_to_a_step_and_give_up() {
         matches!(&result, Err(Stop::Machine(words)) if words.contains("exchange the wires")),
         "{result:?}"
     );
-    assert_eq!(steps, [(Step::Connect, true), (Step::Contacts, false), (Step::Contacts, false)]);
+    assert_eq!(
+        steps,
+        [
+            (CommissionStep::Connect, true),
+            (CommissionStep::Contacts, false),
+            (CommissionStep::Contacts, false)
+        ]
+    );
 }
 
 #[test]
 fn nobody_at_the_terminal_and_ctrl_c_end_it() {
     let (result, steps) = commissioned(None, &[], false);
     assert!(
-        matches!(result, Err(Stop::Aborted)) && steps.last() == Some(&(Step::Contacts, false)),
+        matches!(result, Err(Stop::Aborted)) && steps.last() == Some(&(CommissionStep::Contacts, false)),
         "{result:?}"
     );
     let (result, steps) = commissioned(None, &[""], true);
-    assert!(matches!(result, Err(Stop::Aborted)) && steps == [(Step::Connect, false)], "{result:?}");
+    assert!(
+        matches!(result, Err(Stop::Aborted)) && steps == [(CommissionStep::Connect, false)],
+        "{result:?}"
+    );
 }

@@ -7,9 +7,9 @@ use ratatui::crossterm::event::{KeyCode, KeyEvent, KeyModifiers};
 use upright::supervision::fault::Fault;
 use upright::supervision::inhibits::Inhibits;
 use upright_tool::campaign::Defect;
-use upright_tool::commission::{Planted, Step};
+use upright_tool::commission::{CommissionStep, Planted};
 use upright_tool::image::{CODE_LIMIT, RAM_LIMIT};
-use upright_tool::monitor::{Action, action, request};
+use upright_tool::monitor::{MonitorAction, action, request};
 
 use crate::documents::{read, root};
 use crate::published::rig_path;
@@ -75,7 +75,7 @@ fn defects() -> String {
 }
 
 fn steps() -> String {
-    let rows = Step::ALL.iter().map(|(_, name, finds_out)| format!("| {name} | {finds_out} |\n"));
+    let rows = CommissionStep::ALL.iter().map(|(_, name, finds_out)| format!("| {name} | {finds_out} |\n"));
     "| step | what is found out |\n|---|---|\n".to_owned() + &rows.collect::<String>()
 }
 
@@ -184,7 +184,7 @@ fn keys(cell: &str) -> Vec<KeyCode> {
     cell.split(" or ").map(key).collect()
 }
 
-fn meaning(code: KeyCode) -> Option<Action> {
+fn meaning(code: KeyCode) -> Option<MonitorAction> {
     action(&KeyEvent::new(code, KeyModifiers::NONE))
 }
 
@@ -197,7 +197,7 @@ fn every_key_of_the_monitor_is_listed_with_the_line_that_does_the_same() {
             let meaning = meaning(code).unwrap_or_else(|| panic!("{row:?}: this key does nothing"));
             let line = row[2].trim_matches('`');
             if !line.is_empty() && !line.contains(' ') || line == "set-point 0" {
-                assert_eq!(meaning, Action::Send(request(line).unwrap()), "{row:?}");
+                assert_eq!(meaning, MonitorAction::Send(request(line).unwrap()), "{row:?}");
             }
             listed.push(code);
         }
@@ -207,7 +207,7 @@ fn every_key_of_the_monitor_is_listed_with_the_line_that_does_the_same() {
         assert_eq!(meaning(code).is_some(), listed.contains(&code), "{code:?}");
     }
     // Negative control: a key whose meaning differs from that of a line.
-    assert_ne!(meaning(KeyCode::Char('a')), Some(Action::Send(request("disarm").unwrap())));
+    assert_ne!(meaning(KeyCode::Char('a')), Some(MonitorAction::Send(request("disarm").unwrap())));
 }
 
 /// Names and meanings in the trust report; a name that ends in a space is followed by a link or a source.

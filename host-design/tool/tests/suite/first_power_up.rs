@@ -59,7 +59,7 @@ impl Person<'_> {
         };
         let output = self.session.tick(&pins).unwrap();
         self.monitor.receive(self.session.last_bytes(), now);
-        while self.session.next_telemetry().is_some() || self.session.next_reply().is_some() {}
+        self.session.forget_received();
         if output.enable {
             let (Drive::Force(drive) | Drive::Duty(drive)) = output.drive;
             self.bench.tick(Drive::Force(self.motor * drive));

@@ -8,7 +8,7 @@ use upright::protocol::message::Request;
 use upright::supervision::supervisor::State;
 use upright::table::Law;
 use upright_design::harness::{Pins, with_firmware};
-use upright_tool::monitor::{Action, Monitor};
+use upright_tool::monitor::{Monitor, MonitorAction};
 
 use crate::published::rig_and_table;
 
@@ -96,7 +96,7 @@ fn every_command_is_answered_over_a_line_that_loses_a_third_of_the_frames() {
                     let law = monitor.telemetry.as_ref().map(|telemetry| telemetry.law);
                     assert_eq!(law, Some(laws(number - 1)), "{percent_lost} %, command {}", number - 1);
                 }
-                monitor.act(Action::Send(Request::Select(laws(number))), now);
+                monitor.act(MonitorAction::Send(Request::Select(laws(number))), now);
             }
         });
         assert_eq!(lines(&monitor, "law").filter(|line| line.ends_with("done")).count(), 20);
@@ -113,14 +113,14 @@ fn a_line_that_is_cut_is_reported_and_only_disarming_waits_for_it() {
         let cut = (1_000..5_000).contains(&ms);
         line.iter_mut().for_each(|direction| direction.percent_lost = if cut { 100 } else { 0 });
         match ms {
-            900 | 1_100 => monitor.act(Action::Send(Request::HomeRail), now),
+            900 | 1_100 => monitor.act(MonitorAction::Send(Request::HomeRail), now),
             // Homing began before the cut. What was asked for during the cut is given up.
             2_500 => {
                 assert_eq!(lines(monitor, "done").count(), 1);
                 assert_eq!(lines(monitor, "not answered, given up").count(), 1, "{:?}", monitor.log);
-                monitor.act(Action::Send(Request::HomeRail), now);
+                monitor.act(MonitorAction::Send(Request::HomeRail), now);
             }
-            2_600 => monitor.act(Action::Send(Request::Disarm), now),
+            2_600 => monitor.act(MonitorAction::Send(Request::Disarm), now),
             4_998 => {
                 let told = lines(monitor, "disarm: not answered, it is repeated").count();
                 assert_eq!(told, 1, "{:?}", monitor.log);

@@ -34,7 +34,7 @@ mod serial_errors;
 mod shaken;
 mod split_command;
 mod transitions_command;
-mod twin_door;
+mod twin_access;
 mod twin_page;
 mod verify_command;
 mod virtual_board;

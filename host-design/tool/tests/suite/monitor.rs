@@ -25,6 +25,7 @@ use upright::supervision::jog::MotorSign;
 use upright::supervision::sign_check::Signs;
 use upright::supervision::supervisor::State;
 use upright::table::{Equilibrium, Law};
+use upright_design::client::Mismatch;
 use upright_design::design::design;
 use upright_design::rig::Rig;
 use upright_design::simulate::Scenario;
@@ -203,8 +204,7 @@ fn active_contacts_and_the_last_crash_are_shown() {
         }
         answer(&mut monitor, command.id, Answer::Done);
     };
-    let record =
-        CrashRecord { pc: 0x0800_1234, lr: 0x0800_0101, cfsr: 0x8200, hfsr: 1 << 30, bfar: 0x6000_0004 };
+    let record = CrashRecord([0x0800_1234, 0x0800_0101, 0x8200, 1 << 30, 0x6000_0004]);
     answer(&mut monitor, question.id, Answer::Crash(Some(record)));
     let line = "crash at PC 0x08001234, LR 0x08000101, CFSR 0x00008200, HFSR 0x40000000, BFAR 0x60000004";
     assert!(screen(&monitor).contains(line) && monitor.log.iter().any(|said| said == line));
@@ -284,7 +284,7 @@ fn a_refusal_is_shown_with_all_reasons() {
 #[test]
 fn another_version_of_the_messages_is_refused_and_nothing_more_is_sent() {
     let mut monitor = met(PROTOCOL + 1);
-    assert_eq!(monitor.ended, Some(Ended::Protocol(PROTOCOL + 1)));
+    assert_eq!(monitor.ended, Some(Ended::Mismatch(Mismatch::Protocol(PROTOCOL + 1))));
     assert_eq!(told(&mut monitor, telemetry(1, State::Balancing, None)), 0);
     assert!(press(&mut monitor, KeyCode::Char('a')).is_empty());
     assert!(screen(&monitor).contains("speaks version"));
@@ -296,8 +296,8 @@ fn garbage_is_counted_and_what_follows_is_read() {
     let mut damaged = framed(&Message::Telemetry(telemetry(1, State::Armed, None)));
     damaged[9] ^= 0x10;
     let noise: Vec<u8> = (0..5000u32).map(|i| (i.wrapping_mul(2_654_435_761) >> 24) as u8).collect();
-    assert!(monitor.receive(&damaged, NOW).is_empty() && monitor.unreadable == 1);
-    assert!(monitor.receive(&noise, NOW).is_empty() && monitor.unreadable > 1);
+    assert!(monitor.receive(&damaged, NOW).is_empty() && monitor.unreadable() == 1);
+    assert!(monitor.receive(&noise, NOW).is_empty() && monitor.unreadable() > 1);
     monitor.receive(&[0], NOW);
     assert_eq!(told(&mut monitor, telemetry(2, State::Armed, None)), 1);
 }

@@ -13,7 +13,8 @@
 use crate::pac::{FLASH, RCC, TIM11};
 use upright::protocol::message::Reset;
 
-use super::boards::{BOARD, Source};
+use super::boards::BOARD;
+use super::boards::data::Source;
 use super::serial;
 
 /// Core clock (Hz).

@@ -34,7 +34,7 @@ pub(super) fn take() -> (bool, Option<CrashRecord>) {
     }
 }
 
-/// Records a crash. At `frame` the processor has saved R0 to R3, R12, LR, PC and XPSR (ARM DDI 0403, B1.5.6), unless
+/// Records a crash: PC, LR, CFSR, HFSR, BFAR (ARM DDI 0403, B3.2), PC and LR 0 if they are not saved. At `frame` the processor has saved R0 to R3, R12, LR, PC and XPSR (ARM DDI 0403, B1.5.6), unless
 /// `frame` is outside the memory: null after a panic, below the memory after a stack overflow.
 pub(super) fn record(frame: *const u32) {
     let is_saved = (0x2000_0000..=0x2001_ffe0).contains(&(frame as u32)) && frame.is_aligned();
@@ -42,13 +42,7 @@ pub(super) fn record(frame: *const u32) {
     unsafe {
         let saved = |word: usize| if is_saved { frame.add(word).read_volatile() } else { 0 };
         let scb = &*SCB::PTR;
-        let record = CrashRecord {
-            pc: saved(6),
-            lr: saved(5),
-            cfsr: scb.cfsr.read(),
-            hfsr: scb.hfsr.read(),
-            bfar: scb.bfar.read(),
-        };
+        let record = CrashRecord([saved(6), saved(5), scb.cfsr.read(), scb.hfsr.read(), scb.bfar.read()]);
         (&raw mut CRASH).cast::<Crash>().write_volatile(Crash { mark: NEW, record });
     }
 }

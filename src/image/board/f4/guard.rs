@@ -3,16 +3,21 @@
 use crate::pac::{DBGMCU, EXTI, PWR};
 use cortex_m::peripheral::MPU;
 
-use super::boards::BOARD;
+use super::boards::{BOARD, Chip};
 
 /// Bit of the EXTI line to which the voltage detector is connected (RM0090, 12.2.5).
 const DETECTOR: u32 = 1 << 16;
+
+/// Identity of an STM32F2, which an STM32F405 or STM32F407 of revision A has, too (ES0182). No image gets as far as this
+/// on an STM32F2: it has no floating-point unit.
+const F2_OR_REVISION_A: u32 = 0x411;
 
 /// Whether this is the chip that the image is for (RM0090, 38.6.1; RM0390, 33.6.1). Also makes the watchdog wait while
 /// a debugger halts the processor.
 pub(super) fn chip_is_right(debug: &DBGMCU) -> bool {
     debug.apb1_fz().modify(|_, w| w.dbg_iwdg_stop().set_bit());
-    debug.idcode().read().bits() & 0xfff == BOARD.chip as u32
+    let identity = debug.idcode().read().bits() & 0xfff;
+    identity == BOARD.chip as u32 || matches!(BOARD.chip, Chip::F405OrF407) && identity == F2_OR_REVISION_A
 }
 
 /// Makes every access to the 64 KiB below the stack a fault: the stack is at the start of the SRAM, and without this,
@@ -29,11 +34,16 @@ pub(super) fn protect_stack(mpu: &MPU) {
     cortex_m::asm::isb();
 }
 
-/// Starts the voltage detector with a threshold of about 2.76 V: 168 MHz needs 2.7 V (RM0090, 5.4.1).
+/// Level of the voltage detector (RM0090, 5.4.1): 168 MHz needs 2.7 V. Level 5 reports a supply that falls below 2.84 V
+/// (2.65 to 2.92 V), and on until it rises above 2.99 V at most, so a board that runs from 3.0 V has level 4: 2.66 V
+/// (2.59 to 2.71 V; datasheet DS8626, embedded reset and power control block).
+const LEVEL: u8 = if BOARD.reference_v < 3.2 { 4 } else { 5 };
+
+/// Starts the voltage detector.
 pub(super) fn watch_supply(power: &PWR, exti: &EXTI) {
-    // Full voltage scaling, as after a reset; level 5; on.
+    // Full voltage scaling, as after a reset; on.
     // SAFETY: values of the fields described there.
-    power.cr().modify(|_, w| unsafe { w.pls().bits(5).pvde().set_bit() });
+    power.cr().modify(|_, w| unsafe { w.pls().bits(LEVEL).pvde().set_bit() });
     exti.rtsr().modify(|_, w| w.tr16().set_bit());
     exti.imr().modify(|_, w| w.mr16().set_bit());
 }

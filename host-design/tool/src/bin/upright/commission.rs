@@ -11,13 +11,15 @@ use upright_design::identify::IdentifyError;
 use upright_design::rig::{PlantDescription, Rig};
 use upright_design::table::{Gains, write_atomically};
 use upright_tool::commission::{
-    AtPort, Commissioning, Designed, Journal, Plan, Planted, Record, Simulated, Step,
+    AtPort, CommissionPlan, CommissionRecord, CommissionStep, Commissioning, Designed, Journal, Planted,
+    Simulated,
 };
 use upright_tool::in_the_loop::Link;
-use upright_tool::monitor::Line;
+use upright_tool::monitor::SerialLine;
 
 use crate::failure::Failure;
-use crate::firmware::{Built, Target, lines_of_stdin};
+use crate::firmware::lines_of_stdin;
+use crate::target::{Built, Target};
 use crate::variation::with_table;
 
 /// Guides you from a wired rig to a balancing one, step by step: what to do, what was found, and whether it is right.
@@ -71,9 +73,17 @@ impl Commission {
         let text = std::fs::read_to_string(&self.rig)?;
         let (_, table) = with_table(&rig, &self.rig, Gains::Sampled)?;
         let seconds = f64::from(self.seconds);
-        let plan = Plan { rig: &rig, table: &table, file: &self.rig, text: &text, seconds, seed: self.seed };
-        let journal =
-            |machine: &str| Journal::new(Record::new(&rig, machine), self.record.clone(), self.show());
+        let plan = CommissionPlan {
+            rig: &rig,
+            table: &table,
+            file: &self.rig,
+            text: &text,
+            seconds,
+            seed: self.seed,
+        };
+        let journal = |machine: &str| {
+            Journal::new(CommissionRecord::new(&rig, machine), self.record.clone(), self.show())
+        };
         let (journal, result) = match (&self.port, self.target) {
             (Some(port), _) => {
                 let mut journal = journal(port);
@@ -98,16 +108,16 @@ impl Commission {
     }
 
     /// Runs all steps with the real machine.
-    fn at_port(&self, plan: Plan<'_>, port: &str, journal: &mut Journal) -> Result<(), Failure> {
+    fn at_port(&self, plan: CommissionPlan<'_>, port: &str, journal: &mut Journal) -> Result<(), Failure> {
         let stop = Arc::new(AtomicBool::new(false));
         for signal in [SIGINT, SIGTERM] {
             signal_hook::flag::register(signal, Arc::clone(&stop))?;
         }
-        let mut machine = AtPort::new(Line::open(port)?, lines_of_stdin(), stop, self.show());
+        let mut machine = AtPort::new(SerialLine::open(port)?, lines_of_stdin(), stop, self.show());
         let designed = Commissioning::first(plan, &mut machine, journal)?;
         self.write(&designed)?;
         let new = self.write.as_deref().unwrap_or(&self.rig).display();
-        journal.step(Step::Image, |journal| {
+        journal.step(CommissionStep::Image, |journal| {
             journal.asked(format!("flash it: upright firmware flash {new}, with --board as before"));
             machine.consent("    Enter when it is flashed; Ctrl-C stops").map(drop)
         })?;
@@ -117,7 +127,7 @@ impl Commission {
     /// Runs all steps with the simulated machine.
     fn simulated(
         &self,
-        plan: Plan<'_>,
+        plan: CommissionPlan<'_>,
         machine: &Rig,
         target: Target,
         built: &Built,
@@ -129,7 +139,7 @@ impl Commission {
         })?;
         self.write(&designed)?;
         let (rig, table) = (&designed.rig, &designed.table);
-        let built = journal.step(Step::Image, |journal| {
+        let built = journal.step(CommissionStep::Image, |journal| {
             let built = target.built(Link::Files, rig, table)?;
             journal.found(format!("rig {:016x}, table {:08x}", table.rig_hash, table.crc()));
             Ok::<_, Failure>(built)

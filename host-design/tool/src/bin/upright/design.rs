@@ -7,7 +7,7 @@ use clap::Args;
 use upright::table::{Law, PerLaw};
 use upright_design::design::{Assessment, DesignPoles, design};
 use upright_design::rig::Rig;
-use upright_design::simulate::{Scenario, Summary, simulate};
+use upright_design::simulate::{Scenario, simulate};
 use upright_design::swing_up::{Stored, SwingUpError};
 use upright_design::table::{Gains, TableValues, gains_source, write_atomically};
 use upright_tool::project::checkout;
@@ -15,8 +15,10 @@ use upright_tool::project::checkout;
 use crate::failure::Failure;
 use crate::progress::with_spinner;
 use crate::variation::{Wanted, with_stored_motions};
+use law_report::LawReport;
 
 mod data;
+mod law_report;
 mod text;
 
 /// Designs and certifies the gains of a rig and writes the gain table of the firmware.
@@ -52,14 +54,6 @@ pub(crate) struct Design {
     /// Print the whole design as one JSON object
     #[arg(long)]
     json: bool,
-}
-
-/// A control law of a design with its assessment.
-struct LawReport {
-    law: Law,
-    assessment: Assessment,
-    /// The acceptance run, if there is a table.
-    run: Option<Summary>,
 }
 
 impl Design {

@@ -11,9 +11,9 @@ use upright_tool::campaign::{Campaign, Defect, During, Row, Setup, campaign, fee
 use upright_tool::in_the_loop::{Link, Place};
 
 use crate::failure::Failure;
-use crate::firmware::Target;
 use crate::progress::with_bar;
 use crate::split::Split;
+use crate::target::Target;
 use crate::variation::{Variation, Wanted, with_stored_motions};
 
 /// Fault injection: runs the firmware with one defect at a time and checks that the motor is off in time; exit status

@@ -18,6 +18,7 @@ mod shake;
 mod simulate;
 mod split;
 mod swing_up;
+mod target;
 mod transitions;
 mod twin;
 mod variation;

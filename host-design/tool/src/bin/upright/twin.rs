@@ -12,11 +12,11 @@ use upright_design::rig::Rig;
 use upright_design::simulate::{Scenario, Sensing};
 use upright_design::table::TableValues;
 use upright_tool::in_the_loop::{Link, Place};
-use upright_tool::monitor::Line;
-use upright_tool::twin::Server;
+use upright_tool::monitor::SerialLine;
+use upright_tool::twin::{Server, SimulatedMachine};
 
 use crate::failure::Failure;
-use crate::firmware::Target;
+use crate::target::Target;
 use crate::variation::{Variation, Wanted, law_option, positive, with_stored_motions};
 
 /// Serves a page on which the rig moves, run by the firmware itself: pull it, change it, break it, watch it.
@@ -77,7 +77,8 @@ impl Twin {
         }
         let place = built.as_ref().map_or(Place::Host, |built| built.place(1));
         let scenario = Scenario { sensing: Sensing::Encoders, ..Scenario::at_rest(&rig, self.law) };
-        Ok(listening(self.listen)?.simulate(&rig, &table, &scenario, place, !self.hanging, &goes_on)?)
+        let machine = SimulatedMachine { rig: &rig, table: &table, scenario: &scenario };
+        Ok(listening(self.listen)?.simulate(machine, place, !self.hanging, &goes_on)?)
     }
 }
 
@@ -89,7 +90,7 @@ pub(crate) fn show(
     address: SocketAddr,
     goes_on: &dyn Fn() -> bool,
 ) -> Result<(), Failure> {
-    let line = Line::open(port)?;
+    let line = SerialLine::open(port)?;
     Ok(listening(address)?.connect(rig, table, line, port, goes_on)?)
 }
 

@@ -1,13 +1,11 @@
 //! The virtual board compared with the firmware on the host: from the same inputs, the same bits in every tick.
 
 use std::collections::VecDeque;
+use std::time::Duration;
 
 use upright::board::Output;
-use upright::protocol::frame::Receiver;
-use upright::protocol::message::Message;
-use upright::protocol::serial_link::MAX_MESSAGE;
-use upright_design::harness::{AnyTelemetry, HarnessError, Pace, Pins, Target};
-use upright_design::table::{MAX_SENSORS, MAX_STATES};
+use upright_design::client::{AnyTelemetry, Client, Received};
+use upright_design::harness::{HarnessError, Pace, Pins, Target};
 
 use super::VirtualBoard;
 
@@ -30,16 +28,14 @@ pub struct Compared<'a> {
 
 /// Telemetry of the board or of the host.
 struct Stream {
-    receiver: Receiver<MAX_MESSAGE>,
+    client: Client,
     telemetry: VecDeque<AnyTelemetry>,
 }
 
 impl Stream {
     fn take(&mut self, bytes: &[u8]) {
         for &byte in bytes {
-            if let Some(Ok(Message::Telemetry(telemetry))) =
-                self.receiver.push::<Message<MAX_STATES, MAX_SENSORS>>(byte)
-            {
+            if let Some(Received::Telemetry(telemetry)) = self.client.receive(byte, Duration::ZERO) {
                 self.telemetry.push_back(telemetry);
             }
         }
@@ -49,7 +45,7 @@ impl Stream {
 impl<'a> Compared<'a> {
     /// Compares a board and a host that have both just started.
     pub fn new(board: &'a mut VirtualBoard, host: &'a mut dyn Target) -> Self {
-        let streams = [(); 2].map(|()| Stream { receiver: Receiver::new(), telemetry: VecDeque::new() });
+        let streams = [(); 2].map(|()| Stream { client: Client::default(), telemetry: VecDeque::new() });
         Self { board, host, received: Vec::new(), was_stopped: false, streams, ticks: 0, messages: 0 }
     }
 

@@ -1,7 +1,7 @@
 //! ST STM32F407G-DISC1 and its predecessor STM32F4DISCOVERY.
 
 use super::super::wiring::{STANDARD, Signal, output};
-use super::{BoardData, Chip, Source};
+use super::data::{BoardData, Chip, Source};
 
 pub(crate) const BOARD: BoardData = BoardData {
     name: "discovery-f407",

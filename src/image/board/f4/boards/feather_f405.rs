@@ -1,7 +1,7 @@
 //! Adafruit Feather STM32F405 Express.
 
 use super::super::wiring::{Mode, Signal, Wire, encoder, output, wire};
-use super::{BoardData, Chip, Source};
+use super::data::{BoardData, Chip, Source};
 
 /// All pins are at the edge of the board, under the names printed there. Besides the break input, only two timers have
 /// both encoder inputs there, so this board counts the cart and one link.

@@ -1,7 +1,7 @@
 //! ST NUCLEO-F446RE, all revisions.
 
 use super::super::wiring::{STANDARD, Signal, output};
-use super::{BoardData, Chip, Source};
+use super::data::{BoardData, Chip, Source};
 
 pub(crate) const BOARD: BoardData = BoardData {
     name: "nucleo-f446",

@@ -1,7 +1,7 @@
 //! Olimex STM32-H405.
 
 use super::super::wiring::{STANDARD, Signal, output};
-use super::{BoardData, Chip, Source};
+use super::data::{BoardData, Chip, Source};
 
 pub(crate) const BOARD: BoardData = BoardData {
     name: "olimex-h405",

@@ -1,7 +1,7 @@
 //! WeAct Studio STM32F405 core board.
 
 use super::super::wiring::{STANDARD, Signal, output};
-use super::{BoardData, Chip, Source};
+use super::data::{BoardData, Chip, Source};
 
 pub(crate) const BOARD: BoardData = BoardData {
     name: "weact-f405",

@@ -7,7 +7,7 @@ use upright_design::number::{self, significant};
 use upright_design::rig::{PlantDescription, Rig};
 use upright_design::table::{LawValues, TableValues};
 
-use super::LawReport;
+use super::law_report::LawReport;
 
 pub(super) fn design(rig: &Rig, certified: &Certified, poles: &DesignPoles, reports: &[LawReport]) -> String {
     let mut out = String::new();

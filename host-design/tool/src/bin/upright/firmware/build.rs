@@ -7,7 +7,7 @@ use clap::Args;
 use upright_tool::image::Kind;
 
 use super::board::BoardOption;
-use super::built;
+use super::built::built;
 use super::cycles::check_ticks;
 use crate::failure::Failure;
 use crate::variation::Wanted;

@@ -18,10 +18,10 @@ use upright_tool::in_the_loop::{self, Figures, Span};
 use upright_tool::project::checkout;
 
 use super::board::BoardOption;
-use super::designed;
-use super::target::read;
+use super::built::designed;
 use crate::failure::Failure;
 use crate::progress::with_spinner;
+use crate::target::read;
 use crate::variation::{Wanted, law_option, positive};
 
 /// Measures what the ticks of the flashed image cost, on the virtual board: latency from the tick to the output,

@@ -15,10 +15,10 @@ use ratatui::crossterm::event::{self, Event, KeyEventKind};
 #[cfg(unix)]
 use signal_hook::consts::SIGHUP;
 use signal_hook::consts::{SIGINT, SIGTERM};
-use upright_tool::monitor::record::{Recorder, json};
-use upright_tool::monitor::{Action, Line, action, now, request, view};
+use upright_tool::monitor::record::{TelemetryCsv, json};
+use upright_tool::monitor::{MonitorAction, SerialLine, action, now, request, view};
 
-use super::designed;
+use super::built::designed;
 use crate::failure::Failure;
 use crate::twin;
 use crate::variation::{Wanted, positive};
@@ -80,7 +80,7 @@ impl Monitor {
         }
         let mut conversation = Conversation {
             model: upright_tool::monitor::Monitor::new(&self.port),
-            line: Line::open(&self.port)?,
+            line: SerialLine::open(&self.port)?,
             recorder: None,
             stop,
             until,
@@ -117,8 +117,8 @@ impl Drop for Screen {
 
 struct Conversation {
     model: upright_tool::monitor::Monitor,
-    line: Line,
-    recorder: Option<Recorder<File>>,
+    line: SerialLine,
+    recorder: Option<TelemetryCsv<File>>,
     stop: Arc<AtomicBool>,
     until: Option<Instant>,
 }
@@ -132,7 +132,7 @@ impl Conversation {
         let file = File::create_new(path).map_err(|error| {
             Failure::BadArgument(format!("{}: {error}; give the name of a new file", path.display()))
         })?;
-        self.recorder = Some(Recorder::new(file));
+        self.recorder = Some(TelemetryCsv::new(file));
         self.model.recording = Some(path.display().to_string());
         Ok(())
     }
@@ -173,7 +173,7 @@ impl Conversation {
                 && let Ok(line) = said.try_recv()
             {
                 match request(&line) {
-                    Ok(request) => self.model.act(Action::Send(request), now()),
+                    Ok(request) => self.model.act(MonitorAction::Send(request), now()),
                     Err(bad) => eprintln!("{bad}"),
                 }
             }
@@ -191,8 +191,8 @@ impl Conversation {
             while event::poll(Duration::ZERO)? {
                 let Event::Key(key) = event::read()? else { continue };
                 match action(&key).filter(|_| key.kind != KeyEventKind::Release) {
-                    Some(Action::Quit) => return Ok(()),
-                    Some(Action::Record) => self.switch_recording(),
+                    Some(MonitorAction::Quit) => return Ok(()),
+                    Some(MonitorAction::Record) => self.switch_recording(),
                     Some(action) => self.model.act(action, now()),
                     None => (),
                 }

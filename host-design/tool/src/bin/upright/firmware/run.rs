@@ -11,10 +11,10 @@ use upright_design::simulate::Scenario;
 use upright_design::table::TableValues;
 use upright_tool::in_the_loop::{Link, Place, RunError, VirtualBoard, run, run_compared, serve};
 
-use super::Target;
 use crate::failure::Failure;
 use crate::progress::with_spinner;
 use crate::simulate::Simulate;
+use crate::target::Target;
 
 /// Builds the image for the rig, runs it in lock step with the nonlinear plant, and compares every bit with the
 /// firmware on the host; exit status 1 if the pendulum falls or a bit differs.

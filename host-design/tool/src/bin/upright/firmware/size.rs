@@ -7,12 +7,11 @@ use std::path::PathBuf;
 use clap::Args;
 use serde_json::json;
 use upright_tool::image::{
-    CODE_LIMIT, Image, Kind, Part, RAM_LIMIT, STACK_LIMIT, StackBound, StackError, forbidden_functions, size,
-    stack_bound,
+    CODE_LIMIT, Image, Kind, Part, RAM_LIMIT, StackBound, StackError, forbidden_functions, size, stack_bound,
 };
 
 use super::board::BoardOption;
-use super::built;
+use super::built::built;
 use crate::failure::Failure;
 use crate::variation::Wanted;
 
@@ -85,7 +84,7 @@ fn wrong(
     limit("code", size.code(), CODE_LIMIT);
     limit("static RAM without the gain table", size.variables(), RAM_LIMIT);
     match stack {
-        Ok(stack) => limit("stack", stack.bytes, STACK_LIMIT),
+        Ok(stack) => limit("stack", stack.bytes, stack.reserved),
         Err(error) => wrong.push(error.to_string()),
     }
     if !forbidden.is_empty() {
@@ -119,7 +118,7 @@ fn table(size: &upright_tool::image::Size, stack: &Result<StackBound, StackError
             _ = writeln!(text, "  {:<47} {:>8}", deepest.join(" → "), level.bytes);
         }
         _ = writeln!(text, "  {:<47} {:>8}", "sum, each interrupting the one above", stack.bytes);
-        _ = writeln!(text, "  {:<47} {:>8}", "limit", STACK_LIMIT);
+        _ = writeln!(text, "  {:<47} {:>8}", "limit", stack.reserved);
     }
     text
 }
@@ -145,12 +144,12 @@ mod tests {
             crates: Vec::new(),
         };
         let wrong = |code, variables, stack| {
-            let stack = Ok(StackBound { bytes: stack, reserved: STACK_LIMIT, levels: Vec::new() });
+            let stack = Ok(StackBound { bytes: stack, reserved: 5120, levels: Vec::new() });
             wrong(&size(code, variables), &stack, &[]).len()
         };
-        assert_eq!(wrong(CODE_LIMIT, RAM_LIMIT, STACK_LIMIT), 0);
-        assert_eq!(wrong(CODE_LIMIT + 1, RAM_LIMIT, STACK_LIMIT), 1);
-        assert_eq!(wrong(CODE_LIMIT, RAM_LIMIT + 1, STACK_LIMIT), 1);
-        assert_eq!(wrong(CODE_LIMIT, RAM_LIMIT, STACK_LIMIT + 1), 1);
+        assert_eq!(wrong(CODE_LIMIT, RAM_LIMIT, 5120), 0);
+        assert_eq!(wrong(CODE_LIMIT + 1, RAM_LIMIT, 5120), 1);
+        assert_eq!(wrong(CODE_LIMIT, RAM_LIMIT + 1, 5120), 1);
+        assert_eq!(wrong(CODE_LIMIT, RAM_LIMIT, 5121), 1);
     }
 }

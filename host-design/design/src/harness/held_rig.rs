@@ -1,4 +1,4 @@
-//! How a hand moves the rig that it holds.
+//! How a person moves the rig by hand.
 
 use std::f64::consts::TAU;
 
@@ -11,14 +11,14 @@ const RATE: [f64; 2] = [2.0, 0.5];
 
 /// A rig that is held and moved by hand, tick by tick.
 #[derive(Debug, Clone)]
-pub struct Grasp {
+pub struct HeldRig {
     hanging: Vec<f64>,
     held: Vec<f64>,
     /// Largest movement per tick of a joint (rad) and of the cart (m).
     step: [f64; 2],
 }
 
-impl Grasp {
+impl HeldRig {
     /// The rig hanging, with the cart at 0.
     pub fn hanging(rig: &Rig) -> Self {
         let hanging = match &rig.plant {
@@ -45,24 +45,32 @@ impl Grasp {
 
     /// Moves the links by one tick's step towards hanging; the cart stays where it is. Returns whether they hang.
     pub fn rest(&mut self) -> bool {
-        self.move_to(&self.at_rest())
-    }
-
-    /// The state in which the links hang and the cart stays where it is.
-    pub fn at_rest(&self) -> Vec<f64> {
         let mut rest = self.hanging.clone();
         rest[0] = self.held[0];
-        rest
+        self.move_to(&rest)
     }
 
-    /// Moves the rig by one tick's step towards the cart at 0 and the links hanging, whatever whole turns they have
-    /// made; returns whether it is there.
-    pub fn put_back(&mut self) -> bool {
-        let nearest = |(hanging, held): (&f64, &f64)| hanging + whole_turns(held - hanging);
-        let mut middle = self.hanging.clone();
-        let joints = self.hanging.iter().zip(&self.held).skip(2).step_by(2).map(nearest);
-        middle.iter_mut().skip(2).step_by(2).zip(joints).for_each(|(to, nearest)| *to = nearest);
-        self.move_to(&middle)
+    /// Moves the cart by one tick's step towards this position (m) and the links towards hanging, whatever whole turns
+    /// they have made; returns whether the rig is there.
+    pub fn push_to(&mut self, cart_m: f64) -> bool {
+        let mut to = self.hanging.clone();
+        to[0] = cart_m;
+        self.move_nearest(to)
+    }
+
+    /// Moves the links by one tick's step towards upright, whatever whole turns they have made; the cart stays where it
+    /// is. Returns whether they are upright.
+    pub fn raise(&mut self) -> bool {
+        let mut upright = vec![0.0; self.held.len()];
+        upright[0] = self.held[0];
+        self.move_nearest(upright)
+    }
+
+    fn move_nearest(&mut self, mut to: Vec<f64>) -> bool {
+        for (to, held) in to.iter_mut().zip(&self.held).skip(2).step_by(2) {
+            *to += whole_turns(held - *to);
+        }
+        self.move_to(&to)
     }
 
     /// Moves the hanging position of the link of this sensor by one turn counter-clockwise; the next link hangs as
@@ -98,5 +106,26 @@ impl Grasp {
             there &= *held == to;
         }
         there
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use super::*;
+
+    #[test]
+    fn a_rig_that_has_turned_over_is_raised_on_the_shorter_way() {
+        let Ok(rig) = Rig::from_path(Path::new("../../rigs/single-quanser-ip02.toml")) else {
+            panic!("no such rig")
+        };
+        let mut held = HeldRig::hanging(&rig);
+        held.take(&[0.2, 0.0, 4.0 * TAU + 0.5, 0.0]);
+        let needed = (0.5 / RATE[0] / rig.tick.period_s).ceil() as usize;
+        for tick in 1..=needed {
+            assert_eq!(held.raise(), tick == needed, "{tick}");
+        }
+        assert!((held.held()[2] - 4.0 * TAU).abs() < 1e-9 && held.held()[0] == 0.2, "{:?}", held.held());
     }
 }

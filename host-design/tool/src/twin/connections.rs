@@ -11,7 +11,7 @@ use serde_json::{Value, json};
 use tungstenite::protocol::{Role, WebSocketConfig};
 use tungstenite::{Error, Message, Utf8Bytes, WebSocket};
 
-use super::request::Request;
+use super::request::PageRequest;
 
 /// Most viewers at a time.
 pub(super) const MAX_VIEWERS: usize = 8;
@@ -27,45 +27,45 @@ const LOOK: Duration = Duration::from_millis(4);
 const STUCK: Duration = Duration::from_secs(1);
 
 /// Number of a viewer.
-pub(super) type Id = u64;
+pub(super) type ViewerId = u64;
 
 /// What a viewer does.
 #[derive(Debug)]
-pub(super) enum Event {
+pub(super) enum ViewerEvent {
     /// Has connected.
     Came,
     /// Asks for something.
-    Asks(Request),
+    Asks(PageRequest),
     /// Is gone, or was shut out.
     Went,
 }
 
 /// All connections.
 #[derive(Clone)]
-pub(super) struct Viewers {
+pub(super) struct Connections {
     greeting: Arc<Value>,
-    connected: Arc<Mutex<Connected>>,
+    connected: Arc<Mutex<ConnectionTable>>,
 }
 
-struct Connected {
-    outlets: BTreeMap<Id, SyncSender<Utf8Bytes>>,
-    next: Id,
-    events: Sender<(Id, Event)>,
-    waiting: Arc<Mutex<BTreeMap<Id, usize>>>,
+struct ConnectionTable {
+    outlets: BTreeMap<ViewerId, SyncSender<Utf8Bytes>>,
+    next: ViewerId,
+    events: Sender<(ViewerId, ViewerEvent)>,
+    waiting: Arc<Mutex<BTreeMap<ViewerId, usize>>>,
 }
 
-impl Viewers {
-    /// No viewers yet, and the inbox for their events. `greeting` is what every viewer is told first.
-    pub(super) fn new(greeting: Value) -> (Self, Inbox) {
+impl Connections {
+    /// No viewers yet, and the queue of their events. `greeting` is what every viewer is told first.
+    pub(super) fn new(greeting: Value) -> (Self, EventQueue) {
         let (events, receiver) = channel();
         let waiting = Arc::default();
         let connected =
-            Connected { outlets: BTreeMap::new(), next: 1, events, waiting: Arc::clone(&waiting) };
+            ConnectionTable { outlets: BTreeMap::new(), next: 1, events, waiting: Arc::clone(&waiting) };
         let viewers = Self { greeting: Arc::new(greeting), connected: Arc::new(Mutex::new(connected)) };
-        (viewers, Inbox { events: receiver, waiting })
+        (viewers, EventQueue { events: receiver, waiting })
     }
 
-    fn locked(&self) -> std::sync::MutexGuard<'_, Connected> {
+    fn locked(&self) -> std::sync::MutexGuard<'_, ConnectionTable> {
         // The content is consistent after every statement, so a panic elsewhere does not matter.
         self.connected.lock().unwrap_or_else(PoisonError::into_inner)
     }
@@ -81,7 +81,7 @@ impl Viewers {
     }
 
     /// Sends to one viewer.
-    pub(super) fn tell(&self, viewer: Id, text: &str) {
+    pub(super) fn tell(&self, viewer: ViewerId, text: &str) {
         if let Some(outlet) = self.locked().outlets.get(&viewer) {
             // A viewer whose queue is full misses it.
             let _ = outlet.try_send(Utf8Bytes::from(text));
@@ -112,33 +112,33 @@ impl Viewers {
             connected.outlets.insert(id, outlet);
             (id, connected.events.clone(), Arc::clone(&connected.waiting))
         };
-        let _ = events.send((id, Event::Came));
+        let _ = events.send((id, ViewerEvent::Came));
         // However it ends, the viewer is gone.
         let _ = converse(stream, &pictures, |request| {
             let mut waiting = waiting.lock().unwrap_or_else(PoisonError::into_inner);
             let count = waiting.entry(id).or_default();
             *count += 1;
-            *count <= MAX_WAITING && events.send((id, Event::Asks(request))).is_ok()
+            *count <= MAX_WAITING && events.send((id, ViewerEvent::Asks(request))).is_ok()
         });
         self.locked().outlets.remove(&id);
-        let _ = events.send((id, Event::Went));
+        let _ = events.send((id, ViewerEvent::Went));
     }
 }
 
 /// What the viewers do, in order.
-pub(super) struct Inbox {
-    events: Receiver<(Id, Event)>,
-    waiting: Arc<Mutex<BTreeMap<Id, usize>>>,
+pub(super) struct EventQueue {
+    events: Receiver<(ViewerId, ViewerEvent)>,
+    waiting: Arc<Mutex<BTreeMap<ViewerId, usize>>>,
 }
 
-impl Inbox {
+impl EventQueue {
     /// The next event, if there is one.
-    pub(super) fn next(&self) -> Option<(Id, Event)> {
+    pub(super) fn next(&self) -> Option<(ViewerId, ViewerEvent)> {
         let (id, event) = self.events.try_recv().ok()?;
         let mut waiting = self.waiting.lock().unwrap_or_else(PoisonError::into_inner);
         match &event {
-            Event::Asks(_) => waiting.entry(id).and_modify(|count| *count = count.saturating_sub(1)),
-            Event::Came | Event::Went => {
+            ViewerEvent::Asks(_) => waiting.entry(id).and_modify(|count| *count = count.saturating_sub(1)),
+            ViewerEvent::Came | ViewerEvent::Went => {
                 waiting.remove(&id);
                 return Some((id, event));
             }
@@ -151,7 +151,7 @@ impl Inbox {
 fn converse(
     stream: TcpStream,
     pictures: &Receiver<Utf8Bytes>,
-    mut asks: impl FnMut(Request) -> bool,
+    mut asks: impl FnMut(PageRequest) -> bool,
 ) -> Result<(), Error> {
     stream.set_nodelay(true)?;
     stream.set_read_timeout(Some(LOOK))?;
@@ -189,7 +189,7 @@ mod tests {
 
     #[test]
     fn no_picture_comes_before_the_greeting() {
-        let (viewers, inbox) = Viewers::new(json!("greeting"));
+        let (viewers, events_in) = Connections::new(json!("greeting"));
         let listener = TcpListener::bind("127.0.0.1:0").unwrap();
         let page = TcpStream::connect(listener.local_addr().unwrap()).unwrap();
         let serving = viewers.clone();
@@ -202,6 +202,6 @@ mod tests {
         let mut read = || page.read().unwrap().into_text().unwrap().to_string();
         let hello = json!({ "hello": "greeting", "you": 1 }).to_string();
         assert_eq!([read(), read()], [hello.as_str(), "picture"]);
-        assert!(matches!(inbox.next(), Some((1, Event::Came))));
+        assert!(matches!(events_in.next(), Some((1, ViewerEvent::Came))));
     }
 }

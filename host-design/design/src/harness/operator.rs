@@ -1,28 +1,29 @@
-//! The person at the rig: homes, checks the signs and the motor, then raises the links and holds them upright until the
+//! The simulated person at the rig: homes, checks the signs and the motor, then raises the links and holds them upright until the
 //! motor is on, or lets them hang for the swing-up.
 
 use upright::board::Output;
 use upright::control::actuator::Drive;
+use upright::protocol::KEEP_ALIVE;
 use upright::protocol::message::Request;
 use upright::supervision::jog::MotorSign;
 use upright::supervision::sign_check::Signs;
 use upright::supervision::supervisor::State;
 use upright::table::Equilibrium;
 
-use super::grasp::Grasp;
+use super::held_rig::HeldRig;
 use crate::rig::Rig;
 use crate::simulate::{Begin, Bench, Scenario, SimulationError};
 
-/// What the hand does in one tick.
+/// What the operator does in one tick.
 #[derive(Debug, Clone, PartialEq)]
-pub struct HandTick {
+pub struct OperatorTick {
     /// The state in which the rig is held (m, m/s, rad, rad/s …).
     pub held: Vec<f64>,
     /// The request sent at the end of the tick.
     pub request: Option<Request>,
 }
 
-/// What the hand knows of the firmware, from its telemetry.
+/// What the operator knows of the firmware, from its telemetry.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Status {
     /// State of the supervisor.
@@ -33,12 +34,12 @@ pub struct Status {
     pub motor: MotorSign,
 }
 
-/// The hand, tick by tick. It follows the firmware's instructions, as a person would.
-pub struct Hand {
+/// The operator, tick by tick, who follows the firmware's instructions.
+pub struct Operator {
     doing: Doing,
     /// The request that turns the motor on.
     turn_on: Request,
-    grasp: Grasp,
+    rig: HeldRig,
     start: Vec<f64>,
     /// A second rig, simulated while the motor pushes the cart: the random numbers and the state of the run's own rig
     /// must not depend on how it was started.
@@ -67,11 +68,9 @@ enum Doing {
 
 /// Time between two tries of the same request (s).
 pub(super) const RETRY_S: f64 = 0.05;
-/// Time between two commands of a key that is held (s).
-const KEY_S: f64 = 0.025;
 
-impl Hand {
-    /// A hand that moves `rig` from hanging to the start of `scenario`, and lets go there: when the firmware balances,
+impl Operator {
+    /// An operator who moves `rig` from hanging to the start of `scenario`, and lets go there: when the firmware balances,
     /// or for a swing-up when it begins to raise the links.
     ///
     /// # Errors
@@ -86,11 +85,11 @@ impl Hand {
                 Begin::ByHand => Request::Arm,
                 Begin::Hanging => Request::Goto(Equilibrium::UPRIGHT),
             },
-            grasp: Grasp::hanging(rig),
+            rig: HeldRig::hanging(rig),
             start: scenario.start.clone(),
             pushed: Bench::new(rig, &undisturbed)?,
             retry_ticks: ticks(RETRY_S),
-            key_ticks: ticks(KEY_S),
+            key_ticks: ticks(KEEP_ALIVE.as_secs_f64()),
             // The firmware asks for a quarter of arm_time_s.
             settle_ticks: ticks(0.5 * rig.limits.arm_time_s),
         })
@@ -98,17 +97,17 @@ impl Hand {
 
     /// The state in which the rig is held now.
     pub fn held(&self) -> &[f64] {
-        self.grasp.held()
+        self.rig.held()
     }
 
-    /// Whether the motor pushes the cart while the hand waits.
+    /// Whether the motor pushes the cart while the operator waits.
     pub fn lets_the_motor_push(&self) -> bool {
         self.doing == Doing::Push
     }
 
-    /// What the hand does in tick number `tick`, when `output` was the firmware's last output; `None` once the
+    /// What the operator does in tick number `tick`, when `output` was the firmware's last output; `None` once the
     /// controller commands the motor and the hand has let go.
-    pub fn act(&mut self, tick: u32, status: &Status, output: &Output) -> Option<HandTick> {
+    pub fn act(&mut self, tick: u32, status: &Status, output: &Output) -> Option<OperatorTick> {
         if status.state.controls() {
             return None;
         }
@@ -126,7 +125,7 @@ impl Hand {
             }
             Doing::Settle(0) => {
                 self.doing = Doing::Push;
-                self.pushed.hold(self.grasp.held());
+                self.pushed.hold(self.rig.held());
                 None
             }
             Doing::Settle(ticks) => {
@@ -135,7 +134,7 @@ impl Hand {
             }
             Doing::Push => self.push(tick, status, output),
             Doing::Raise => {
-                if self.grasp.move_to(&self.start) {
+                if self.rig.move_to(&self.start) {
                     self.doing = Doing::TurnOn;
                 }
                 None
@@ -143,7 +142,7 @@ impl Hand {
             Doing::TurnOn => self.until(status.state == State::Armed, Doing::Hold, tick, self.turn_on),
             Doing::Hold => None,
         };
-        Some(HandTick { held: self.grasp.held().to_vec(), request })
+        Some(OperatorTick { held: self.rig.held().to_vec(), request })
     }
 
     /// Repeats a request until it is `done`, then continues with `then`.
@@ -159,9 +158,9 @@ impl Hand {
     fn follow(&mut self, status: &Status) {
         match status.signs {
             Signs::Rest(_) => {
-                self.grasp.rest();
+                self.rig.rest();
             }
-            Signs::Move(sensor) => self.grasp.turn(sensor),
+            Signs::Move(sensor) => self.rig.turn(sensor),
             Signs::Checked if status.motor == MotorSign::Checked => self.doing = Doing::Raise,
             Signs::Checked => self.doing = Doing::Settle(self.settle_ticks),
             Signs::Unchecked | Signs::Reversed(_) | Signs::Swapped { .. } => {}
@@ -173,13 +172,13 @@ impl Hand {
         // A motor that is off turns freely.
         let drive = if output.enable { output.drive } else { Drive::Force(0.0) };
         self.pushed.tick(drive);
-        self.grasp.take(self.pushed.state());
+        self.rig.take(self.pushed.state());
         match status.motor {
             MotorSign::Unchecked if tick.is_multiple_of(self.key_ticks) => {
                 Some(Request::Jog { along: false })
             }
             MotorSign::Checked if status.state == State::Calibrated => {
-                self.grasp.stop();
+                self.rig.stop();
                 self.doing = Doing::Raise;
                 None
             }

@@ -1,4 +1,4 @@
-//! The desk between viewers and firmware: the conversation with the firmware, who is in command, and the recording.
+//! Between viewers and firmware: the conversation with the firmware, who is in command, and the recording.
 //!
 //! It is the same for a simulated rig and for a real one.
 
@@ -6,14 +6,14 @@ use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
 use serde_json::{Value, json};
-use upright::protocol::message;
+use upright::protocol::message::Request;
 use upright::supervision::supervisor::State;
 
+use super::connections::{Connections, EventQueue, ViewerEvent, ViewerId};
 use super::pace::PICTURE;
-use super::request::{MachineRequest, Request};
-use super::viewers::{Event, Id, Inbox, Viewers};
-use crate::monitor::record::{Recorder, json as telemetry_json};
-use crate::monitor::{Action, Monitor, request as command, words};
+use super::request::{MachineRequest, PageRequest};
+use crate::monitor::record::{TelemetryCsv, json as telemetry_json};
+use crate::monitor::{Monitor, MonitorAction, request as command, words};
 
 /// Longest silence of the viewer in command while the motor may move. A page answers every few pictures, in a
 /// background tab as well; a sleeping computer does not.
@@ -24,30 +24,34 @@ const MAX_RECORDING: usize = 256 << 20;
 const MAX_FRESH: usize = 2000;
 
 /// The last finished recording as CSV, shared with the server.
-pub(super) type Recording = Arc<Mutex<Vec<u8>>>;
+pub(super) type SharedCsv = Arc<Mutex<Vec<u8>>>;
 
 /// What stands between the viewers and the firmware.
-pub(super) struct Desk {
+pub(super) struct Dispatcher {
     /// The conversation with the firmware.
     pub(super) monitor: Monitor,
-    viewers: Viewers,
-    inbox: Inbox,
-    commander: Option<Id>,
+    viewers: Connections,
+    events: EventQueue,
+    commander: Option<ViewerId>,
     last_heard: Instant,
     /// Whether a viewer has ever connected.
     pub(super) was_seen: bool,
     fresh: Vec<Value>,
-    recorder: Option<Recorder<Vec<u8>>>,
-    recording: Recording,
+    recorder: Option<TelemetryCsv<Vec<u8>>>,
+    recording: SharedCsv,
 }
 
-impl Desk {
-    /// A desk with a new conversation.
-    pub(super) fn new(monitor: Monitor, (viewers, inbox): (Viewers, Inbox), recording: Recording) -> Self {
+impl Dispatcher {
+    /// A dispatcher with a new conversation.
+    pub(super) fn new(
+        monitor: Monitor,
+        (viewers, events): (Connections, EventQueue),
+        recording: SharedCsv,
+    ) -> Self {
         Self {
             monitor,
             viewers,
-            inbox,
+            events,
             commander: None,
             last_heard: Instant::now(),
             was_seen: false,
@@ -80,31 +84,33 @@ impl Desk {
     /// Carries out what the viewers ask for; returns what the one in command asks of the simulated machine.
     pub(super) fn requests(&mut self, now: Duration) -> Vec<MachineRequest> {
         let mut machine = Vec::new();
-        while let Some((viewer, event)) = self.inbox.next() {
+        while let Some((viewer, event)) = self.events.next() {
             let commands = self.commander == Some(viewer);
             if commands {
                 self.last_heard = Instant::now();
             }
             match event {
-                Event::Came => {
+                ViewerEvent::Came => {
                     self.was_seen = true;
                     self.take_command(viewer);
                 }
-                Event::Went if commands => self.commander = None,
-                Event::Went | Event::Asks(Request::Alive) => {}
-                Event::Asks(Request::Command) => self.take_command(viewer),
-                Event::Asks(Request::Release) if commands => self.commander = None,
+                ViewerEvent::Went if commands => self.commander = None,
+                ViewerEvent::Went | ViewerEvent::Asks(PageRequest::Alive) => {}
+                ViewerEvent::Asks(PageRequest::Command) => self.take_command(viewer),
+                ViewerEvent::Asks(PageRequest::Release) if commands => self.commander = None,
                 // Anyone who sees danger may turn the motor off.
-                Event::Asks(Request::Say { line }) if commands || line == "disarm" => self.say(&line, now),
-                Event::Asks(Request::Record { on }) if commands => {
+                ViewerEvent::Asks(PageRequest::Say { line }) if commands || line == "disarm" => {
+                    self.say(&line, now)
+                }
+                ViewerEvent::Asks(PageRequest::Record { on }) if commands => {
                     if on {
                         self.start_recording()
                     } else {
                         self.stop_recording()
                     }
                 }
-                Event::Asks(Request::Machine { what }) if commands => machine.push(what),
-                Event::Asks(_) => self.viewers.tell(
+                ViewerEvent::Asks(PageRequest::Machine { what }) if commands => machine.push(what),
+                ViewerEvent::Asks(_) => self.viewers.tell(
                     viewer,
                     &json!({ "notice": "another viewer is in command; only the stop button works here" })
                         .to_string(),
@@ -115,7 +121,7 @@ impl Desk {
         machine
     }
 
-    fn take_command(&mut self, viewer: Id) {
+    fn take_command(&mut self, viewer: ViewerId) {
         if self.commander.is_none() {
             (self.commander, self.last_heard) = (Some(viewer), Instant::now());
         }
@@ -123,7 +129,7 @@ impl Desk {
 
     fn say(&mut self, line: &str, now: Duration) {
         match command(line) {
-            Ok(request) => self.monitor.act(Action::Send(request), now),
+            Ok(request) => self.monitor.act(MonitorAction::Send(request), now),
             Err(bad) => self.monitor.note(bad.to_string()),
         }
     }
@@ -142,12 +148,12 @@ impl Desk {
             self.commander = None;
         } else if state == Some(State::Balancing) && self.monitor.wanted.is_none() {
             // From the first set-point on, the firmware turns the motor off by itself when this program is silent.
-            self.monitor.act(Action::Shift(0.0), now);
+            self.monitor.act(MonitorAction::Shift(0.0), now);
         }
     }
 
     fn start_recording(&mut self) {
-        self.recorder = Some(Recorder::new(Vec::new()));
+        self.recorder = Some(TelemetryCsv::new(Vec::new()));
         self.monitor.recording = Some("recording.csv".to_owned());
     }
 
@@ -160,7 +166,7 @@ impl Desk {
 
     /// Turns the motor off.
     pub(super) fn turn_off(&mut self, now: Duration) {
-        self.monitor.act(Action::Send(message::Request::Disarm), now);
+        self.monitor.act(MonitorAction::Send(Request::Disarm), now);
     }
 
     /// Shows why the firmware has stopped, until the viewer in command asks for a restart. Returns whether to restart

@@ -14,7 +14,7 @@ use upright_board::{Conditions, Image};
 use upright_design::simulate::{Scenario, Sensing};
 use upright_tool::image::{Board, Kind};
 use upright_tool::in_the_loop::Place;
-use upright_tool::twin::Server;
+use upright_tool::twin::{Server, SimulatedMachine};
 
 use crate::equipment::built;
 use crate::published::rig_and_table;
@@ -203,7 +203,8 @@ fn the_flashed_image_balances_behind_the_page_and_obeys_it() {
     let stop = AtomicBool::new(false);
     let goes_on = || !stop.load(Ordering::Relaxed);
     std::thread::scope(|scope| {
-        let twin = scope.spawn(|| server.simulate(&rig, &table, &scenario, place, true, &goes_on));
+        let machine = SimulatedMachine { rig: &rig, table: &table, scenario: &scenario };
+        let twin = scope.spawn(move || server.simulate(machine, place, true, &goes_on));
         let mut socket = page_at(&address);
         let greeting = read_until(&mut socket, true, |message| message["hello"].is_object());
         let defects = greeting["hello"]["defects"].to_string();

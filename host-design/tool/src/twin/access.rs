@@ -1,4 +1,4 @@
-//! The door: reads a request, lets it in or refuses it.
+//! Access: reads a request, lets it in or refuses it.
 //!
 //! The page can move a motor, so a request has to name this server in `Host` (a foreign name that resolves to this
 //! machine does not), has to know the secret in the address, and for the WebSocket has to come from this very page.
@@ -24,7 +24,7 @@ connect-src 'self'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'\
 Referrer-Policy: no-referrer\r\nX-Content-Type-Options: nosniff\r\nCache-Control: no-store\r\nConnection: close\r\n";
 
 /// Decides who is let in.
-pub(super) struct Door {
+pub(super) struct Access {
     secret: String,
     port: u16,
     is_loopback: bool,
@@ -68,8 +68,8 @@ impl Refused {
     }
 }
 
-impl Door {
-    /// A door for the server at this address and port.
+impl Access {
+    /// Access to the server at this address and port.
     pub(super) fn new(secret: String, address: IpAddr, port: u16) -> Self {
         Self { secret, port, is_loopback: address.is_loopback() }
     }
@@ -194,12 +194,12 @@ mod tests {
     const SOCKET: &str = "Upgrade: websocket\r\nConnection: Upgrade\r\nSec-WebSocket-Version: 13\r\n\
                           Sec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\n";
 
-    fn door() -> Door {
-        Door::new("s3cret".to_owned(), IpAddr::from([127, 0, 0, 1]), 8080)
+    fn access() -> Access {
+        Access::new("s3cret".to_owned(), IpAddr::from([127, 0, 0, 1]), 8080)
     }
 
     fn asked(line: &str, headers: &str) -> Result<Admitted, Refused> {
-        door().admit(format!("{line} HTTP/1.1\r\n{headers}\r\n").as_bytes())
+        access().admit(format!("{line} HTTP/1.1\r\n{headers}\r\n").as_bytes())
     }
 
     #[test]
@@ -245,7 +245,7 @@ mod tests {
     #[test]
     fn other_methods_and_garbage_are_refused() {
         assert_eq!(asked("POST /s3cret/", "Host: 127.0.0.1:8080\r\n"), Err(Refused::Method));
-        assert_eq!(door().admit(b"\x00\x01\r\n\r\n"), Err(Refused::Malformed));
+        assert_eq!(access().admit(b"\x00\x01\r\n\r\n"), Err(Refused::Malformed));
         assert_eq!(
             asked("GET /s3cret/socket", "Host: localhost:8080\r\nOrigin: http://localhost:8080\r\n"),
             Err(Refused::Malformed)

@@ -1,18 +1,23 @@
-//! Commands to the firmware: sent one at a time, each repeated until it is answered.
+//! Commands to the firmware: numbered, and those that need an answer sent one at a time and repeated until it comes.
 
 use std::collections::VecDeque;
 use std::time::Duration;
 
+use upright::protocol::KEEP_ALIVE;
 use upright::protocol::frame;
 use upright::protocol::message::{Command, Request};
 use upright::protocol::serial_link::MAX_COMMAND;
 
-/// Time between two transmissions of a request: the period of the keep-alive, which pauses meanwhile.
-const REPEAT: Duration = Duration::from_millis(25);
 /// A request that has no answer after this time is reported.
-const PATIENCE: Duration = Duration::from_secs(1);
-/// Largest number of keep-alives whose answers are awaited.
-const MOST_BEATS: usize = 32;
+pub const PATIENCE: Duration = Duration::from_secs(1);
+/// Largest number of commands sent only once whose answers are awaited.
+const MOST_ONCE: usize = 32;
+
+/// The bytes of a command on the serial line.
+pub fn command_frame(command: &Command) -> Vec<u8> {
+    // Every command fits, as a test of the messages checks.
+    frame::encode(command, &mut [0; MAX_COMMAND], &mut [0; MAX_COMMAND]).unwrap_or_default().to_vec()
+}
 
 /// A request without an answer.
 struct Waiting {
@@ -35,20 +40,22 @@ struct Sent {
 
 /// A request that is not answered in time.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Unanswered {
-    pub(super) request: Request,
+pub struct Unanswered {
+    /// The request.
+    pub request: Request,
     /// Whether it is no longer sent.
-    pub(super) is_given_up: bool,
+    pub is_given_up: bool,
 }
 
 /// Queue of requests, and the bytes to be sent.
 #[derive(Default)]
-pub(super) struct Outgoing {
+pub(super) struct RequestQueue {
     bytes: Vec<u8>,
-    last_id: u64,
+    /// Number of the last command.
+    pub(super) last_id: u64,
     /// Only the first one is sent: the firmware treats a number that is smaller than the last one as a replay.
     waiting: VecDeque<Waiting>,
-    beats: VecDeque<Command>,
+    once: VecDeque<Command>,
 }
 
 /// Whether the firmware may carry out a request late and more than once: questions, and motor off. Every other request
@@ -59,7 +66,7 @@ fn may_come_late(request: Request) -> bool {
     matches!(request, Disarm | Info | Cause | Crash | Statistics | Telemetry(_))
 }
 
-impl Outgoing {
+impl RequestQueue {
     /// Sends a request as soon as those before it are answered. Disarming is sent at once, and replaces what a person
     /// has asked for before; returns what was given up for it.
     pub(super) fn send(&mut self, request: Request, now: Duration) -> Vec<Unanswered> {
@@ -87,23 +94,21 @@ impl Outgoing {
         given_up
     }
 
-    /// Sends a request that the next one replaces: a keep-alive, or a held key. It is not repeated, and it is skipped
-    /// while another command waits for its answer.
-    pub(super) fn beat(&mut self, request: Request, now: Duration) {
-        if self.waiting.is_empty() {
-            let command = self.number(request, now);
-            self.encode(&command);
-            self.beats.push_back(command);
-            if self.beats.len() > MOST_BEATS {
-                self.beats.pop_front();
-            }
+    /// Sends a request at once, whatever waits for its answer. It is not repeated. Returns its number.
+    pub(super) fn send_once(&mut self, request: Request, now: Duration) -> u64 {
+        let command = self.number(request, now);
+        self.bytes.extend(command_frame(&command));
+        self.once.push_back(command);
+        if self.once.len() > MOST_ONCE {
+            self.once.pop_front();
         }
+        command.id
     }
 
     /// Takes the number of an answer; returns its request, and sends the next one.
     pub(super) fn answered(&mut self, id: u64, now: Duration) -> Option<Request> {
-        if let Some(place) = self.beats.iter().position(|beat| beat.id == id) {
-            return self.beats.remove(place).map(|beat| beat.request);
+        if let Some(place) = self.once.iter().position(|command| command.id == id) {
+            return self.once.remove(place).map(|command| command.request);
         }
         let Waiting { request, sent: Some(sent), .. } = self.waiting.front()? else { return None };
         let request = *request;
@@ -144,7 +149,7 @@ impl Outgoing {
     pub(super) fn clear(&mut self) {
         self.bytes.clear();
         self.waiting.clear();
-        self.beats.clear();
+        self.once.clear();
     }
 
     /// Takes the bytes to be sent over the line.
@@ -167,11 +172,11 @@ impl Outgoing {
         }
     }
 
-    /// Transmits the first request.
+    /// Transmits the first request. A keep-alive pauses meanwhile, so this comes as often.
     fn transmit(&mut self, sent: Sent, now: Duration) {
-        self.encode(&sent.command);
+        self.bytes.extend(command_frame(&sent.command));
         if let Some(first) = self.waiting.front_mut() {
-            first.sent = Some(Sent { next: now + REPEAT, ..sent });
+            first.sent = Some(Sent { next: now + KEEP_ALIVE, ..sent });
         }
     }
 
@@ -179,14 +184,6 @@ impl Outgoing {
     fn number(&mut self, request: Request, now: Duration) -> Command {
         self.last_id = (now.as_micros() as u64).max(self.last_id + 1);
         Command { id: self.last_id, request }
-    }
-
-    fn encode(&mut self, command: &Command) {
-        let (mut scratch, mut out) = ([0; MAX_COMMAND], [0; MAX_COMMAND]);
-        // Every command fits: a test of the messages checks it.
-        if let Ok(frame) = frame::encode(command, &mut scratch, &mut out) {
-            self.bytes.extend_from_slice(frame);
-        }
     }
 }
 
@@ -204,75 +201,70 @@ mod tests {
 
     #[test]
     fn a_command_is_repeated_until_it_is_answered() {
-        let mut outgoing = Outgoing::default();
-        outgoing.send(Request::Home, ms(0));
-        let first = outgoing.take();
+        let mut requests = RequestQueue::default();
+        requests.send(Request::Home, ms(0));
+        let first = requests.take();
         assert!(!first.is_empty());
-        outgoing.repeat(ms(24));
-        assert!(outgoing.take().is_empty());
-        outgoing.repeat(ms(25));
-        assert_eq!(outgoing.take(), first, "the same frame, with the same number");
-        assert_eq!(outgoing.answered(id(1), ms(30)), None, "that answers another command");
-        assert_eq!(outgoing.answered(id(0), ms(30)), Some(Request::Home));
-        assert_eq!(outgoing.answered(id(0), ms(31)), None, "the answer to its second transmission");
-        outgoing.repeat(ms(2_000));
-        assert!(outgoing.take().is_empty());
+        requests.repeat(ms(24));
+        assert!(requests.take().is_empty());
+        requests.repeat(ms(25));
+        assert_eq!(requests.take(), first, "the same frame, with the same number");
+        assert_eq!(requests.answered(id(1), ms(30)), None, "that answers another command");
+        assert_eq!(requests.answered(id(0), ms(30)), Some(Request::Home));
+        assert_eq!(requests.answered(id(0), ms(31)), None, "the answer to its second transmission");
+        requests.repeat(ms(2_000));
+        assert!(requests.take().is_empty());
     }
 
     #[test]
     fn what_is_not_answered_is_reported_once_and_not_done_later() {
-        let mut outgoing = Outgoing::default();
-        outgoing.send(Request::Arm, ms(0));
-        outgoing.send(Request::Statistics, ms(0));
-        assert_eq!(outgoing.repeat(ms(999)), []);
-        outgoing.take();
+        let mut requests = RequestQueue::default();
+        requests.send(Request::Arm, ms(0));
+        requests.send(Request::Statistics, ms(0));
+        assert_eq!(requests.repeat(ms(999)), []);
+        requests.take();
         let told = |request, is_given_up| Unanswered { request, is_given_up };
-        assert_eq!(outgoing.repeat(ms(1_000)), [told(Request::Arm, true), told(Request::Statistics, false)]);
-        assert!(!outgoing.take().is_empty());
-        assert_eq!(outgoing.repeat(ms(10_000)), []);
-        assert!(!outgoing.take().is_empty(), "a question is repeated for ever");
-        assert_eq!(outgoing.answered(id(0), ms(10_001)), None, "an answer that comes too late");
-        assert_eq!(outgoing.answered(id(10_000), ms(10_001)), Some(Request::Statistics));
+        assert_eq!(requests.repeat(ms(1_000)), [told(Request::Arm, true), told(Request::Statistics, false)]);
+        assert!(!requests.take().is_empty());
+        assert_eq!(requests.repeat(ms(10_000)), []);
+        assert!(!requests.take().is_empty(), "a question is repeated for ever");
+        assert_eq!(requests.answered(id(0), ms(10_001)), None, "an answer that comes too late");
+        assert_eq!(requests.answered(id(10_000), ms(10_001)), Some(Request::Statistics));
     }
 
     #[test]
     fn disarming_waits_for_nothing() {
-        let mut outgoing = Outgoing::default();
+        let mut requests = RequestQueue::default();
         for request in [Request::Info, Request::Home, Request::Arm] {
-            outgoing.send(request, ms(0));
+            requests.send(request, ms(0));
         }
-        outgoing.take();
-        let given_up = outgoing.send(Request::Disarm, ms(2));
+        requests.take();
+        let given_up = requests.send(Request::Disarm, ms(2));
         assert_eq!(
             given_up.iter().map(|given_up| given_up.request).collect::<Vec<_>>(),
             [Request::Home, Request::Arm]
         );
-        assert!(!outgoing.take().is_empty());
-        assert_eq!(outgoing.answered(id(2), ms(3)), Some(Request::Disarm));
-        assert!(!outgoing.take().is_empty(), "the question is asked again, with a new number");
-        assert_eq!(outgoing.answered(id(3), ms(4)), Some(Request::Info));
-        assert!(!outgoing.is_waiting() && outgoing.take().is_empty(), "arming is dropped");
+        assert!(!requests.take().is_empty());
+        assert_eq!(requests.answered(id(2), ms(3)), Some(Request::Disarm));
+        assert!(!requests.take().is_empty(), "the question is asked again, with a new number");
+        assert_eq!(requests.answered(id(3), ms(4)), Some(Request::Info));
+        assert!(!requests.is_waiting() && requests.take().is_empty(), "arming is dropped");
     }
 
     #[test]
-    fn beats_make_way_for_commands_and_set_points_for_the_last_one() {
-        let mut outgoing = Outgoing::default();
-        outgoing.beat(Request::KeepAlive, ms(0));
-        assert!(!outgoing.take().is_empty());
+    fn a_set_point_replaces_one_that_was_not_sent_and_what_is_sent_once_is_not_repeated() {
+        let mut requests = RequestQueue::default();
         for tenths in 0..4_u8 {
-            outgoing.send(Request::Setpoint(f32::from(tenths) / 10.0), ms(1));
+            requests.send(Request::Setpoint(f32::from(tenths) / 10.0), ms(1));
         }
-        outgoing.take();
-        outgoing.beat(Request::Jog { along: true }, ms(2));
-        assert!(outgoing.take().is_empty());
-        assert_eq!(outgoing.answered(id(1), ms(3)), Some(Request::Setpoint(0.0)));
-        assert_eq!(outgoing.answered(id(3), ms(4)), Some(Request::Setpoint(0.3)));
-        assert!(!outgoing.is_waiting());
-        outgoing.take();
-        outgoing.beat(Request::Jog { along: true }, ms(5));
-        assert!(!outgoing.take().is_empty());
-        outgoing.repeat(ms(1_000));
-        assert!(outgoing.take().is_empty(), "a key that is let go sends nothing");
-        assert_eq!(outgoing.answered(id(5), ms(1_001)), Some(Request::Jog { along: true }));
+        assert_eq!(requests.answered(id(1), ms(3)), Some(Request::Setpoint(0.0)));
+        assert_eq!(requests.answered(id(3), ms(4)), Some(Request::Setpoint(0.3)));
+        assert!(!requests.is_waiting());
+        requests.take();
+        assert_eq!(requests.send_once(Request::Jog { along: true }, ms(5)), id(5));
+        assert!(!requests.take().is_empty());
+        requests.repeat(ms(1_000));
+        assert!(requests.take().is_empty());
+        assert_eq!(requests.answered(id(5), ms(1_001)), Some(Request::Jog { along: true }));
     }
 }

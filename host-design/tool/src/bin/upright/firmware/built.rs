@@ -1,0 +1,28 @@
+//! The image of a rig, and the design that it is built from.
+
+use std::path::{Path, PathBuf};
+
+use upright_design::rig::Rig;
+use upright_design::table::{Gains, TableValues};
+use upright_tool::image::{self, Kind};
+
+use crate::failure::Failure;
+use crate::progress::with_spinner;
+use crate::variation::{Wanted, with_stored_motions, with_table};
+
+/// Builds the image with the table of the rig and its stored motions, or with src/gains.rs as it is.
+pub(super) fn built(kind: Kind, rig: Option<&Path>, wanted: Wanted) -> Result<PathBuf, Failure> {
+    let Some(path) = rig else {
+        return Ok(with_spinner("building the image", || image::build(kind))?);
+    };
+    let (rig, table) = designed(path, wanted)?;
+    Ok(with_spinner("building the image", || image::build_for(kind, &rig, &table))?)
+}
+
+/// Reads this rig file and designs its table, with the stored motions.
+pub(super) fn designed(path: &Path, wanted: Wanted) -> Result<(Rig, TableValues), Failure> {
+    let rig = Rig::from_path(path)?;
+    let (_, table) = with_table(&rig, path, Gains::Sampled)?;
+    let table = with_stored_motions(path, &rig, table, wanted)?;
+    Ok((rig, table))
+}

@@ -1,0 +1,29 @@
+//! Why a run of the whole firmware fails.
+
+use upright_design::harness::HarnessError;
+use upright_design::identify::{IdentifyError, ShakeError};
+
+use super::qemu::EmulatorError;
+
+/// A run that could not be started or finished.
+#[derive(Debug, thiserror::Error)]
+pub enum RunError {
+    /// The firmware does not do what it should.
+    #[error(transparent)]
+    Harness(#[from] HarnessError),
+    /// QEMU does not run the image.
+    #[error(transparent)]
+    Emulator(#[from] EmulatorError),
+    /// The rig cannot be shaken, or does not do what it should.
+    #[error(transparent)]
+    Shaken(#[from] IdentifyError),
+}
+
+impl From<ShakeError> for RunError {
+    fn from(error: ShakeError) -> Self {
+        match error {
+            ShakeError::Harness(error) => error.into(),
+            ShakeError::Identify(error) => error.into(),
+        }
+    }
+}
