@@ -282,65 +282,55 @@ impl Bus {
         match place {
             Place::Encoder(i) => {
                 let (shaft, tick) = self.encoder_route(i);
-                self.encoders[i].write(offset, value, shaft.as_ref(), now, tick)
+                self.encoders[i].write(offset, value, shaft.as_ref(), now, tick)?;
             }
-            Place::Iwdg => self.iwdg.write(offset, value, now),
+            Place::Iwdg => self.iwdg.write(offset, value, now)?,
             Place::Usart => {
                 let apb1 = self.rcc.pclk(Domain::Apb1);
                 self.usart.write(offset, value, now, apb1)?;
                 self.move_by_dma();
-                Ok(())
             }
             Place::Power => {
                 self.power.write(offset, value);
                 self.supply_changed();
-                Ok(())
             }
             Place::Pwm => {
                 self.settle_output();
-                self.pwm.write(offset, value, now)
+                self.pwm.write(offset, value, now)?;
             }
             Place::Adc => {
                 let apb2 = self.rcc.pclk(Domain::Apb2);
-                self.adc.write(offset, value, now, apb2)
+                self.adc.write(offset, value, now, apb2)?;
             }
-            Place::Syscfg => {
-                self.exti.write_configuration(offset, value);
-                Ok(())
-            }
-            Place::Exti => {
-                self.exti.write(offset, value);
-                Ok(())
-            }
-            Place::Capture => self.capture.write(offset, value, now),
+            Place::Syscfg => self.exti.write_configuration(offset, value),
+            Place::Exti => self.exti.write(offset, value),
+            Place::Capture => self.capture.write(offset, value, now)?,
             Place::Port(i) => {
                 self.settle_output();
                 self.ports[i].write(offset, value)?;
                 self.levels_changed();
-                Ok(())
             }
             Place::Rcc => {
                 self.settle_output();
-                self.rcc.write(offset, value, now)
+                self.rcc.write(offset, value, now)?;
             }
             Place::Flash => {
                 self.flash_control = value;
                 self.cache.configure(value);
-                self.check_wait_states()
+                self.check_wait_states()?;
             }
             Place::Dma => {
                 self.dma.write(offset, value)?;
                 self.move_by_dma();
-                Ok(())
             }
             Place::Debug => {
                 if offset >= 8 && value & !super::FREEZES_WATCHDOG != 0 {
                     return Err(Violation::NotModelled("freezing a timer other than the watchdog"));
                 }
                 self.debug_freeze.registers[offset as usize / 4 - 1] = value;
-                Ok(())
             }
         }
+        Ok(())
     }
 
     fn hclk_may_have_changed(&mut self) {

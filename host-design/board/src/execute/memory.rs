@@ -76,15 +76,7 @@ impl Machine {
                 return self.load_multiple(rn, list, down, write_back);
             }
             Op::StoreMultiple { rn, list, down, write_back } => {
-                let (mut address, base) = self.block(rn, list.count_ones(), down)?;
-                for register in 0..15 {
-                    if list >> register & 1 != 0 {
-                        self.store(address, Unit::Word, self.registers.get(register))?;
-                        address = address.wrapping_add(4);
-                    }
-                }
-                self.write_back(rn, base, write_back);
-                self.cycles += list.count_ones();
+                return self.store_multiple(rn, list, down, write_back);
             }
             Op::LoadExclusive { unit, rt, rn, offset } => {
                 let address = self.registers.get(rn).wrapping_add(offset.into());
@@ -149,6 +141,19 @@ impl Machine {
     /// Faults for an unaligned address, in accesses that must be aligned (A3.2.1).
     fn aligned(&self, address: u32, unit: Unit) -> Done {
         if address & (unit.bytes() - 1) != 0 { Err(Fault::Unaligned.into()) } else { Ok(()) }
+    }
+
+    fn store_multiple(&mut self, rn: u8, list: u16, down: bool, write_back: bool) -> Done {
+        let (mut address, base) = self.block(rn, list.count_ones(), down)?;
+        for register in 0..15 {
+            if list >> register & 1 != 0 {
+                self.store(address, Unit::Word, self.registers.get(register))?;
+                address = address.wrapping_add(4);
+            }
+        }
+        self.write_back(rn, base, write_back);
+        self.cycles += list.count_ones();
+        Ok(())
     }
 
     fn load_multiple(&mut self, rn: u8, list: u16, down: bool, write_back: bool) -> Done {

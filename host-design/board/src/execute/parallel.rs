@@ -1,11 +1,12 @@
 //! Parallel sums and differences, saturation, and selection by bytes.
 
 use super::arithmetic::{shifted, signed_saturated, unsigned_saturated};
+use crate::error::Done;
 use crate::instruction::{Lanes, Op, Prefix};
 use crate::machine::Machine;
 
 impl Machine {
-    pub(super) fn parallel(&mut self, op: Op) {
+    pub(super) fn parallel(&mut self, op: Op) -> Done {
         match op {
             Op::Parallel { prefix, lanes, rd, rn, rm } => {
                 let (x, y) = (self.registers.get(rn), self.registers.get(rm));
@@ -40,24 +41,14 @@ impl Machine {
             }
             Op::Saturate { signed, rd, rn, bits, shift, amount } => {
                 let (value, _) = shifted(self.registers.get(rn), shift, amount.into(), false);
-                let value = i64::from(value as i32);
-                let (value, cut) = if signed {
-                    signed_saturated(value, bits.into())
-                } else {
-                    unsigned_saturated(value, bits.into())
-                };
+                let (value, cut) = saturated(signed, i64::from(value as i32), bits);
                 self.registers.q |= cut;
                 self.registers.set(rd, value);
             }
             Op::SaturateHalves { signed, rd, rn, bits } => {
                 let x = self.registers.get(rn);
                 let mut saturate = |value: u32| {
-                    let value = i64::from(value as i16);
-                    let (value, cut) = if signed {
-                        signed_saturated(value, bits.into())
-                    } else {
-                        unsigned_saturated(value, bits.into())
-                    };
+                    let (value, cut) = saturated(signed, i64::from(value as i16), bits);
                     self.registers.q |= cut;
                     value & 0xffff
                 };
@@ -66,7 +57,13 @@ impl Machine {
             }
             _ => unreachable!("only these are sent here"),
         }
+        Ok(())
     }
+}
+
+/// The nearest number of so many bits, and whether it differs.
+fn saturated(signed: bool, value: i64, bits: u8) -> (u32, bool) {
+    if signed { signed_saturated(value, bits.into()) } else { unsigned_saturated(value, bits.into()) }
 }
 
 /// Result, and the GE flags, which only the forms without saturation and halving set.

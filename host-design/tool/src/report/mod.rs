@@ -122,14 +122,23 @@ pub fn report(source: &Source<'_>, stage: &dyn Fn(&str)) -> Result<Report, Repor
         }
     }
     if !source.margins.is_empty() {
-        let figure = margins_figure("How hard a link may be pushed", source.margins);
-        pictures.push(Picture::of("margins".to_owned(), &figure)?);
-        page.pushes.push(Plot::of(&figure, figure.title.clone())?);
+        show_margins(source, &mut page, &mut pictures)?;
     }
     if !source.imperfections.is_empty() {
         show_imperfections(source, stage, &mut page, &mut pictures)?;
     }
     Ok(Report { html: page.html()?, pictures })
+}
+
+fn show_margins(
+    source: &Source<'_>,
+    page: &mut Page<'_>,
+    pictures: &mut Vec<Picture>,
+) -> Result<(), ReportError> {
+    let figure = margins_figure("How hard a link may be pushed", source.margins);
+    pictures.push(Picture::of("margins".to_owned(), &figure)?);
+    page.pushes.push(Plot::of(&figure, figure.title.clone())?);
+    Ok(())
 }
 
 fn show_imperfections(

@@ -8,10 +8,11 @@ use clap::Args;
 use serde_json::json;
 use upright_design::motion::Transition;
 use upright_design::rig::{PlantDescription, Rig};
+use upright_design::simulate::Trace;
 use upright_design::study::Study;
 use upright_design::swing_up::{
-    Condition, FirmwareRuns, Judgement, Margin, Plan, Script, Solved, Stored, SwingUpError, designed_table,
-    firmware_runs, judge, margins, motions, refined, search, solved,
+    Condition, FirmwareRuns, Margin, MotionJudgement, Script, SolvedCandidate, Stored, SwingUpError,
+    SwingUpPlan, designed_table, firmware_runs, judge, margins, motions, refined, search, solved,
 };
 use upright_design::table::{TableValues, write_atomically};
 use upright_tool::figure::{Figure, margins_figure, run_svg, stroboscope_svg, trade_figure};
@@ -98,7 +99,7 @@ impl SwingUp {
         let row = |condition: Condition| {
             let rig = condition.designed(rig);
             let (table, motions) = if condition.joint_counts.is_some() { &designed(&rig)? } else { &usual };
-            let runs = firmware_runs(&rig, table, motions, &condition, 1, self.runs as usize, study)?;
+            let runs = firmware_runs(&rig, table, motions, &condition, 1..1 + u64::from(self.runs), study)?;
             Ok(Row { condition, runs })
         };
         Condition::all().into_iter().map(row).collect()
@@ -141,7 +142,7 @@ impl SwingUp {
         }
         writeln!(out, "{} of {TRADED} candidates are solved", solved.len())?;
         writeln!(out, "duration (s)  force (N)  farthest (m)  fragility     arrive  with twice the errors")?;
-        for Solved { duration_s, force_n, position_m, score, runs, wider } in &solved {
+        for SolvedCandidate { duration_s, force_n, position_m, score, runs, wider } in &solved {
             let [arrive, twice] = [runs, wider].map(|runs| format!("{} of {}", runs.arrived, runs.runs));
             write!(out, "{duration_s:>12.2} {force_n:>10.2} {position_m:>13.3} {score:>10.2} ")?;
             writeln!(out, "{arrive:>10} {twice:>22}")?;
@@ -190,20 +191,7 @@ impl SwingUp {
         };
         let script = Script::of(&rig, &plan.table, self.seed, false).map_err(failed)?;
         let demonstration = script.run(&plan.table).map_err(RunError::from)?;
-        if let Some(path) = &self.csv {
-            let mut bytes = Vec::new();
-            demonstration.trace.write_csv(&mut bytes)?;
-            write_atomically(path, &bytes)?;
-        }
-        if let Some(path) = &self.svg {
-            let title = format!("{}: up, balance, step, down", rig.name);
-            write_atomically(path, run_svg(&rig, &demonstration.trace, &title)?.as_bytes())?;
-        }
-        if let (Some(path), PlantDescription::Chain(chain)) = (&self.picture, &rig.plant) {
-            let to_s = plan.raise.peaks.duration_s;
-            let picture = stroboscope_svg(chain, &demonstration.trace, 0.0, to_s);
-            write_atomically(path, picture.as_bytes())?;
-        }
+        self.write_files(&rig, &demonstration.trace, plan.raise.peaks.duration_s)?;
         let file = Stored::path_beside(&self.rig);
         let differs = old.map_or(true, |old| old.to_json() != plan.stored.to_json());
         if !self.check && !self.no_write && differs {
@@ -218,6 +206,24 @@ impl SwingUp {
         }
         if self.check && differs {
             return Err(Failure::CheckFailed(format!("{} differs from these motions", file.display())));
+        }
+        Ok(())
+    }
+
+    /// Writes the files that are wanted of a run, in which the rig is raised for `raised_s`.
+    fn write_files(&self, rig: &Rig, trace: &Trace, raised_s: f64) -> Result<(), Failure> {
+        if let Some(path) = &self.csv {
+            let mut bytes = Vec::new();
+            trace.write_csv(&mut bytes)?;
+            write_atomically(path, &bytes)?;
+        }
+        if let Some(path) = &self.svg {
+            let title = format!("{}: up, balance, step, down", rig.name);
+            write_atomically(path, run_svg(rig, trace, &title)?.as_bytes())?;
+        }
+        if let (Some(path), PlantDescription::Chain(chain)) = (&self.picture, &rig.plant) {
+            let picture = stroboscope_svg(chain, trace, 0.0, raised_s);
+            write_atomically(path, picture.as_bytes())?;
         }
         Ok(())
     }
@@ -296,9 +302,9 @@ fn print_rows(rig: &Rig, rows: &[Row], is_json: bool) -> Result<(), Failure> {
     Ok(())
 }
 
-fn text(rig: &Rig, plan: &Plan) -> String {
+fn text(rig: &Rig, plan: &SwingUpPlan) -> String {
     let mut text = format!("{}\n", rig.name);
-    for Judgement { transition, search, score, peaks, runs } in [&plan.raise, &plan.lower] {
+    for MotionJudgement { transition, search, score, peaks, runs } in [&plan.raise, &plan.lower] {
         let percent = runs.interval.map(|end| 100.0 * end);
         // Writing into a string cannot fail.
         let _ = writeln!(text, "\n{transition}");
