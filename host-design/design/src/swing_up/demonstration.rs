@@ -24,7 +24,7 @@ const HANG_S: f64 = 0.5;
 const MOVE_M: f64 = 0.5;
 const RAIL_SHARE: f64 = 0.5;
 /// Largest angle from the vertical at which a link counts as hanging (rad): without friction it swings on.
-const HANGS_RAD: f64 = 0.35;
+const HANGS_RAD: f64 = crate::rig::defaults::ANGLE_RAD;
 
 /// Script of a demonstration: what it does, before it has run.
 #[derive(Debug, Clone, PartialEq)]
