@@ -28,7 +28,7 @@ Examples:
   upright identify rigs/quadruple-paper.toml run.log --json | jq .estimates
   upright identify rigs/quadruple-paper.toml run.log --csv run.csv      only converts
   upright identify rigs/quadruple-paper.toml run.log --mcap run.mcap    for Foxglove and PlotJuggler")]
-pub(crate) struct Identify {
+pub(crate) struct IdentifyCommand {
     /// Rig file that the firmware was designed for
     #[arg(value_name = "RIG")]
     rig: PathBuf,
@@ -61,7 +61,7 @@ pub(crate) struct Identify {
     json: bool,
 }
 
-impl Identify {
+impl IdentifyCommand {
     pub(crate) fn run(self) -> Result<(), Failure> {
         let rig = Rig::from_path(&self.rig)?;
         let read = |file: &PathBuf| match Log::from_path(file) {
