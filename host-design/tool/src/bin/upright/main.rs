@@ -11,6 +11,7 @@ mod faults;
 mod firmware;
 mod identify;
 mod progress;
+mod reading;
 mod report;
 mod reproduce;
 mod robust;

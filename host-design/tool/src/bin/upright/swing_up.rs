@@ -11,8 +11,8 @@ use upright_design::rig::{PlantDescription, Rig};
 use upright_design::simulate::Trace;
 use upright_design::study::Study;
 use upright_design::swing_up::{
-    Condition, FirmwareRuns, Judgement, Margin, Plan, Script, Solved, Stored, SwingUpError, designed_table,
-    firmware_runs, judge, margins, motions, refined, search, solved,
+    Condition, FirmwareRuns, Margin, MotionJudgement, Script, SolvedCandidate, Stored, SwingUpError,
+    SwingUpPlan, designed_table, firmware_runs, judge, margins, motions, refined, search, solved,
 };
 use upright_design::table::{TableValues, write_atomically};
 use upright_tool::figure::{Figure, margins_figure, run_svg, stroboscope_svg, trade_figure};
@@ -99,7 +99,7 @@ impl SwingUpCommand {
         let row = |condition: Condition| {
             let rig = condition.designed(rig);
             let (table, motions) = if condition.joint_counts.is_some() { &designed(&rig)? } else { &usual };
-            let runs = firmware_runs(&rig, table, motions, &condition, 1, self.runs as usize, study)?;
+            let runs = firmware_runs(&rig, table, motions, &condition, 1..1 + u64::from(self.runs), study)?;
             Ok(SwingUpRow { condition, runs })
         };
         Condition::all().into_iter().map(row).collect()
@@ -142,7 +142,7 @@ impl SwingUpCommand {
         }
         writeln!(out, "{} of {TRADED} candidates are solved", solved.len())?;
         writeln!(out, "duration (s)  force (N)  farthest (m)  fragility     arrive  with twice the errors")?;
-        for Solved { duration_s, force_n, position_m, score, runs, wider } in &solved {
+        for SolvedCandidate { duration_s, force_n, position_m, score, runs, wider } in &solved {
             let [arrive, twice] = [runs, wider].map(|runs| format!("{} of {}", runs.arrived, runs.runs));
             write!(out, "{duration_s:>12.2} {force_n:>10.2} {position_m:>13.3} {score:>10.2} ")?;
             writeln!(out, "{arrive:>10} {twice:>22}")?;
@@ -302,9 +302,9 @@ fn print_rows(rig: &Rig, rows: &[SwingUpRow], is_json: bool) -> Result<(), Failu
     Ok(())
 }
 
-fn text(rig: &Rig, plan: &Plan) -> String {
+fn text(rig: &Rig, plan: &SwingUpPlan) -> String {
     let mut text = format!("{}\n", rig.name);
-    for Judgement { transition, search, score, peaks, runs } in [&plan.raise, &plan.lower] {
+    for MotionJudgement { transition, search, score, peaks, runs } in [&plan.raise, &plan.lower] {
         let percent = runs.interval.map(|end| 100.0 * end);
         // Writing into a string cannot fail.
         let _ = writeln!(text, "\n{transition}");
