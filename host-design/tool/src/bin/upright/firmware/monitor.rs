@@ -147,18 +147,11 @@ impl Conversation {
             std::thread::sleep(PICTURE);
             return Ok(());
         }
-        self.model.poll(now());
-        let mut buffer = [0; 4096];
-        match self.line.exchange(&self.model.take_outgoing(), &mut buffer) {
-            Ok(bytes) => {
-                for telemetry in self.model.receive(bytes, now()) {
-                    each(&json(&telemetry))?;
-                    if let Some(recorder) = &mut self.recorder {
-                        recorder.push(&telemetry)?;
-                    }
-                }
+        for telemetry in self.model.exchange(&mut self.line) {
+            each(&json(&telemetry))?;
+            if let Some(recorder) = &mut self.recorder {
+                recorder.push(&telemetry)?;
             }
-            Err(error) => self.model.close(&error),
         }
         Ok(())
     }
