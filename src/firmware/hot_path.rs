@@ -10,13 +10,13 @@ use crate::gains::{SENSORS, STATES, SwingUp};
 /// The firmware for the rig of the gain table.
 pub type RigFirmware = Firmware<'static, STATES, SENSORS, SwingUp>;
 
-/// [`Firmware::act`], compiled for speed.
+/// The output of a tick, compiled for speed.
 #[inline(never)]
 pub fn act<'f>(firmware: &'f mut RigFirmware, inputs: &Inputs<SENSORS>) -> &'f Output {
     firmware.act(inputs)
 }
 
-/// [`Firmware::predict`], compiled for speed.
+/// The prediction, compiled for speed.
 #[inline(never)]
 pub fn predict(firmware: &mut RigFirmware) {
     firmware.predict();
