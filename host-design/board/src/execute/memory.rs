@@ -1,29 +1,36 @@
 //! Loads and stores of more than one register, exclusive accesses and table branches.
 
 use crate::error::{Done, Fault};
-use crate::instruction::{Op, Place, Unit};
+use crate::instruction::{Addressing, Op, Unit};
 use crate::machine::Machine;
 
 impl Machine {
     /// Address of an access, and the new base if it is written back.
     #[inline]
-    fn place(&self, rn: u8, place: Place) -> (u32, Option<u32>) {
+    fn place(&self, rn: u8, place: Addressing) -> (u32, Option<u32>) {
         let base = self.registers.get(rn);
         match place {
-            Place::Offset(offset) => (base.wrapping_add_signed(offset), None),
-            Place::Indexed { register, shift } => {
+            Addressing::Offset(offset) => (base.wrapping_add_signed(offset), None),
+            Addressing::Indexed { register, shift } => {
                 (base.wrapping_add(self.registers.get(register) << shift), None)
             }
-            Place::PreIndexed(offset) => {
+            Addressing::PreIndexed(offset) => {
                 let address = base.wrapping_add_signed(offset.into());
                 (address, Some(address))
             }
-            Place::PostIndexed(offset) => (base, Some(base.wrapping_add_signed(offset.into()))),
+            Addressing::PostIndexed(offset) => (base, Some(base.wrapping_add_signed(offset.into()))),
         }
     }
 
     #[inline]
-    pub(super) fn load_single(&mut self, unit: Unit, rt: u8, rn: u8, place: Place, loaded: bool) -> Done {
+    pub(super) fn load_single(
+        &mut self,
+        unit: Unit,
+        rt: u8,
+        rn: u8,
+        place: Addressing,
+        loaded: bool,
+    ) -> Done {
         let (address, base) = self.place(rn, place);
         // Consecutive loads overlap in the pipeline.
         self.cycles += u32::from(!loaded);
@@ -45,7 +52,7 @@ impl Machine {
     }
 
     #[inline]
-    pub(super) fn store_single(&mut self, unit: Unit, rt: u8, rn: u8, place: Place) -> Done {
+    pub(super) fn store_single(&mut self, unit: Unit, rt: u8, rn: u8, place: Addressing) -> Done {
         let (address, base) = self.place(rn, place);
         self.store(address, unit, self.registers.get(rt))?;
         if let Some(base) = base {

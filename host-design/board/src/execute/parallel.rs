@@ -2,7 +2,7 @@
 
 use super::arithmetic::{shifted, signed_saturated, unsigned_saturated};
 use crate::error::Done;
-use crate::instruction::{Lanes, Op, Prefix};
+use crate::instruction::{Op, ParallelLanes, Prefix};
 use crate::machine::Machine;
 
 impl Machine {
@@ -67,22 +67,22 @@ fn saturated(signed: bool, value: i64, bits: u8) -> (u32, bool) {
 }
 
 /// Result, and the GE flags, which only the forms without saturation and halving set.
-fn lanewise(prefix: Prefix, lanes: Lanes, x: u32, y: u32) -> (u32, Option<u8>) {
+fn lanewise(prefix: Prefix, lanes: ParallelLanes, x: u32, y: u32) -> (u32, Option<u8>) {
     let signed = matches!(prefix, Prefix::Signed | Prefix::SignedSaturating | Prefix::SignedHalving);
-    let bytes = matches!(lanes, Lanes::Add8 | Lanes::Sub8);
+    let bytes = matches!(lanes, ParallelLanes::Add8 | ParallelLanes::Sub8);
     let width = if bytes { 8 } else { 16 };
     let lane = |value: u32, number: u32| {
         let value = value >> (number * width) << (32 - width);
         if signed { i64::from(value as i32 >> (32 - width)) } else { i64::from(value >> (32 - width)) }
     };
-    let exchanged = matches!(lanes, Lanes::AddSubExchanged | Lanes::SubAddExchanged);
+    let exchanged = matches!(lanes, ParallelLanes::AddSubExchanged | ParallelLanes::SubAddExchanged);
     let (mut result, mut flags) = (0, 0);
     for number in 0..32 / width {
         let adds = match lanes {
-            Lanes::Add16 | Lanes::Add8 => true,
-            Lanes::Sub16 | Lanes::Sub8 => false,
-            Lanes::AddSubExchanged => number == 1,
-            Lanes::SubAddExchanged => number == 0,
+            ParallelLanes::Add16 | ParallelLanes::Add8 => true,
+            ParallelLanes::Sub16 | ParallelLanes::Sub8 => false,
+            ParallelLanes::AddSubExchanged => number == 1,
+            ParallelLanes::SubAddExchanged => number == 0,
         };
         let other = lane(y, if exchanged { 1 - number } else { number });
         let sum = if adds { lane(x, number) + other } else { lane(x, number) - other };

@@ -37,7 +37,7 @@ pub enum Class {
 
 /// The outcome of a trial.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct Outcome {
+pub struct TrialOutcome {
     /// Number of the trial.
     pub number: u64,
     /// The defect.
@@ -56,7 +56,7 @@ pub struct Outcome {
 }
 
 /// Runs and judges a trial.
-pub(super) fn judge(setup: &Setup<'_>, trial: &Trial) -> Result<Outcome, RunError> {
+pub(super) fn judge(setup: &Setup<'_>, trial: &Trial) -> Result<TrialOutcome, RunError> {
     let observed = attempt(setup, trial, true)?;
     let before = observed.off.is_some_and(|off| off < trial.onset);
     let from = |tick: usize| observed.off.map(|off| off.saturating_sub(tick) as u32 + 1);
@@ -70,7 +70,15 @@ pub(super) fn judge(setup: &Setup<'_>, trial: &Trial) -> Result<Outcome, RunErro
     let class = if before { Class::FalseAlarm } else { class(setup, trial, &observed, ticks, from_onset)? };
     let fault = observed.fault.map(Fault::code);
     let stop_to_off_us = observed.stop_to_off_us;
-    Ok(Outcome { number: trial.number, kind: trial.kind, class, ticks, from_onset, fault, stop_to_off_us })
+    Ok(TrialOutcome {
+        number: trial.number,
+        kind: trial.kind,
+        class,
+        ticks,
+        from_onset,
+        fault,
+        stop_to_off_us,
+    })
 }
 
 /// The class of a run that did not turn its motor off before the defect; `ticks` and `from_onset` count the ticks to

@@ -93,6 +93,9 @@ mod tests {
         realised: None,
         delay_ticks: 0,
         refusal: None,
+        is_driven: true,
+        left_out: Vec::new(),
+        predicted: Vec::new(),
     };
 
     /// The rig file with the identified numbers, for a rig whose file gives this `[reality]`.

@@ -17,11 +17,11 @@ mod source;
 mod trust;
 
 pub use error::ReportError;
-pub use source::Source;
+pub use source::ReportSource;
 
 use upright::table::Law;
 
-use self::page::Page;
+use self::page::ReportPage;
 pub(crate) use self::plot::Plot;
 use crate::figure::{Figure, FigureError, margins_figure, pixels};
 
@@ -66,8 +66,8 @@ impl Picture {
 ///
 /// # Errors
 /// [`ReportError`] if a run cannot be started or a figure cannot be drawn; a rig that falls is not an error.
-pub fn report(source: &Source<'_>, stage: &dyn Fn(&str)) -> Result<Report, ReportError> {
-    let Source { rig, certified, table, trust, .. } = *source;
+pub fn report(source: &ReportSource<'_>, stage: &dyn Fn(&str)) -> Result<Report, ReportError> {
+    let ReportSource { rig, certified, table, trust, .. } = *source;
     stage("runs");
     let designed_poles = certified.poles(rig)?;
     let mut scenes = runs::scenes(rig, &designed_poles, table, trust, source.seed)?;
@@ -75,7 +75,7 @@ pub fn report(source: &Source<'_>, stage: &dyn Fn(&str)) -> Result<Report, Repor
     scenes.extend(source.route.map(|run| runs::route(rig, run, source.seed)));
     let laws = runs::laws(table);
     let mut pictures = Vec::new();
-    let mut page = Page::new(source, &designed_poles, &scenes)?;
+    let mut page = ReportPage::new(source, &designed_poles, &scenes)?;
     if let Some(chain) = rig.chain() {
         let svg = drawing::svg(chain);
         page.drawing = Some(svg.clone());
@@ -130,8 +130,8 @@ pub fn report(source: &Source<'_>, stage: &dyn Fn(&str)) -> Result<Report, Repor
 }
 
 fn show_margins(
-    source: &Source<'_>,
-    page: &mut Page<'_>,
+    source: &ReportSource<'_>,
+    page: &mut ReportPage<'_>,
     pictures: &mut Vec<Picture>,
 ) -> Result<(), ReportError> {
     let figure = margins_figure("How hard a link may be pushed", source.margins);
@@ -141,9 +141,9 @@ fn show_margins(
 }
 
 fn show_imperfections(
-    source: &Source<'_>,
+    source: &ReportSource<'_>,
     stage: &dyn Fn(&str),
-    page: &mut Page<'_>,
+    page: &mut ReportPage<'_>,
     pictures: &mut Vec<Picture>,
 ) -> Result<(), ReportError> {
     stage("imperfections");

@@ -29,7 +29,7 @@ Examples:
   upright false-alarms rigs/quadruple-robust.toml --shard 2/3 > 2.jsonl
   upright false-alarms rigs/quadruple-robust.toml --merge 1.jsonl 2.jsonl 3.jsonl"
 )]
-pub(crate) struct HealthyHours {
+pub(crate) struct HealthyHoursCommand {
     #[command(flatten)]
     variation: Variation,
     /// Number of machines for each law
@@ -51,7 +51,7 @@ pub(crate) struct HealthyHours {
     json: bool,
 }
 
-impl HealthyHours {
+impl HealthyHoursCommand {
     pub(crate) fn run(self) -> Result<(), Failure> {
         let (rig, _, table) = self.variation.designed()?;
         let laws: Vec<Law> = table
@@ -147,7 +147,7 @@ mod tests {
         let text = text(&[one]);
         let words: Vec<&str> = text.lines().nth(1).unwrap_or_default().split_whitespace().collect();
         let wanted = [
-            "pole-placement",
+            "pole_placement",
             "123456789012",
             "1000000000.00",
             "0",

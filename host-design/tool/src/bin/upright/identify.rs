@@ -34,7 +34,7 @@ Examples:
   upright identify my-rig.toml swing-*.csv --clamped --angles absolute --zero upright --predict other-*.csv
   upright identify rigs/quadruple-paper.toml run.log --csv run.csv      only converts
   upright identify rigs/quadruple-paper.toml run.log --mcap run.mcap    for Foxglove and PlotJuggler")]
-pub(crate) struct Identify {
+pub(crate) struct IdentifyCommand {
     /// Rig file that the firmware was designed for
     #[arg(value_name = "RIG")]
     rig: PathBuf,
@@ -72,7 +72,7 @@ pub(crate) struct Identify {
     json: bool,
 }
 
-impl Identify {
+impl IdentifyCommand {
     pub(crate) fn run(self) -> Result<(), Failure> {
         let rig = Rig::from_path(&self.rig)?;
         let recordings = Recordings::from_paths(&rig, &self.logs, &self.reading.reading())?;

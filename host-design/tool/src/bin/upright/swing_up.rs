@@ -38,7 +38,7 @@ Examples:
   upright swing-up rigs/quadruple-paper.toml --trade --svg trade.svg
   upright swing-up rigs/single-quanser-ip02.toml --no-write --json
   upright swing-up rigs/quadruple-paper.toml --stored --svg run.svg --csv run.csv")]
-pub(crate) struct SwingUp {
+pub(crate) struct SwingUpCommand {
     /// Rig file
     #[arg(value_name = "RIG")]
     rig: PathBuf,
@@ -87,9 +87,9 @@ const MOMENTS: usize = 40;
 /// Number of candidates of --trade.
 const TRADED: u64 = 40;
 
-impl SwingUp {
+impl SwingUpCommand {
     /// Runs of the stored motions under all conditions.
-    fn rows(&self, rig: &Rig, study: &Study) -> Result<Vec<Row>, SwingUpError> {
+    fn rows(&self, rig: &Rig, study: &Study) -> Result<Vec<SwingUpRow>, SwingUpError> {
         let stored = Stored::beside(&self.rig)?;
         let designed = |rig: &Rig| -> Result<_, SwingUpError> {
             let motions = refined(rig, &stored)?;
@@ -100,7 +100,7 @@ impl SwingUp {
             let rig = condition.designed(rig);
             let (table, motions) = if condition.joint_counts.is_some() { &designed(&rig)? } else { &usual };
             let runs = firmware_runs(&rig, table, motions, &condition, 1..1 + u64::from(self.runs), study)?;
-            Ok(Row { condition, runs })
+            Ok(SwingUpRow { condition, runs })
         };
         Condition::all().into_iter().map(row).collect()
     }
@@ -268,22 +268,22 @@ fn margins_text(transition: Transition, margins: &[Margin]) -> String {
 }
 
 /// Runs under a condition.
-struct Row {
+struct SwingUpRow {
     condition: Condition,
     runs: FirmwareRuns,
 }
 
 /// Prints the rows as Markdown, or as one JSON object.
-fn print_rows(rig: &Rig, rows: &[Row], is_json: bool) -> Result<(), Failure> {
+fn print_rows(rig: &Rig, rows: &[SwingUpRow], is_json: bool) -> Result<(), Failure> {
     let mut out = std::io::stdout().lock();
     if is_json {
         let rows: Vec<_> = rows
             .iter()
-            .map(|Row { condition, runs }| json!({ "condition": condition, "runs": runs }))
+            .map(|SwingUpRow { condition, runs }| json!({ "condition": condition, "runs": runs }))
             .collect();
         return Ok(writeln!(out, "{}", json!({ "rig": rig.name, "rows": rows }))?);
     }
-    for Row { condition, runs: FirmwareRuns { refused, raise, lower, faults } } in rows {
+    for SwingUpRow { condition, runs: FirmwareRuns { refused, raise, lower, faults } } in rows {
         let refused = (*refused > 0).then(|| format!("not hanging: {refused}"));
         let faults = faults.iter().map(|(fault, count)| format!("{fault}: {count}"));
         let ended: Vec<String> = refused.into_iter().chain(faults).collect();
