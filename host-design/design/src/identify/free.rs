@@ -143,7 +143,6 @@ mod tests {
     use super::super::step::Step;
     use super::super::table::Rows;
     use super::*;
-    use crate::rig::PlantDescription;
 
     /// 24 s of a clamped double pendulum that swings down from 100°, in counts, and its true parameters. Its lengths and
     /// moments are not those of the file.
