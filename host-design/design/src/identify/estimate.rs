@@ -77,20 +77,10 @@ pub fn identify_recordings(
     let model = record.model(chain.gravity_m_per_s2);
     let mut priors = priors(rig, chain, settings.eccentricity);
     let mut found = Identification {
-        seconds: record.seconds(),
         lost_ticks,
-        largest_angle_rad: record.largest_angle(),
-        wiring: None,
-        estimates: Vec::new(),
-        sample_s: record.dt_s,
-        correlations: Vec::new(),
-        channels: Vec::new(),
         is_driven,
-        left_out: Vec::new(),
-        predicted: Vec::new(),
-        realised: None,
         delay_ticks: rig.tick.delay_ticks,
-        refusal: None,
+        ..Identification::of_record(&record)
     };
     if !is_driven {
         free::known(rig, model.layout, &mut priors, record.is_clamped);
