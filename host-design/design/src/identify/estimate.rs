@@ -16,7 +16,7 @@ use super::record::Record;
 use super::recordings::{Recorded, Recordings};
 use super::shooting::{Shooting, WINDOW_S};
 use super::verdict::{HeldOut, Predicted, Refusal, channels, judge, judge_windows};
-use super::window_errors::window_errors;
+use super::window_errors::{WindowErrors, window_errors};
 use super::wiring;
 use crate::parallel::Progress;
 use crate::rig::Rig;
@@ -77,20 +77,10 @@ pub fn identify_recordings(
     let model = record.model(chain.gravity_m_per_s2);
     let mut priors = priors(rig, chain, settings.eccentricity);
     let mut found = Identification {
-        seconds: record.seconds(),
         lost_ticks,
-        largest_angle_rad: record.largest_angle(),
-        wiring: None,
-        estimates: Vec::new(),
-        sample_s: record.dt_s,
-        correlations: Vec::new(),
-        channels: Vec::new(),
         is_driven,
-        left_out: Vec::new(),
-        predicted: Vec::new(),
-        realised: None,
         delay_ticks: rig.tick.delay_ticks,
-        refusal: None,
+        ..Identification::of_record(&record)
     };
     if !is_driven {
         free::known(rig, model.layout, &mut priors, record.is_clamped);
@@ -119,10 +109,7 @@ pub fn identify_recordings(
         free.p
     };
     if let Some(recordings) = predict {
-        let other = recordings.recorded(rig)?.record;
-        let start: Vec<f64> = priors.iter().map(|prior| prior.value).collect();
-        let old = old_values(rig, model.layout, &start, &p);
-        found.predicted = window_errors(&model, &priors, &[(&other, [&old, &p])]);
+        found.predicted = predicted(rig, &model, &priors, &p, recordings)?;
     }
     match realise(chain, &p, settings.weighed_kg_m) {
         Ok(realised) => found.realised = Some(realised),
@@ -135,6 +122,20 @@ pub fn identify_recordings(
         found.refusal = Some(refusal);
     }
     Ok(found)
+}
+
+/// Errors of predictions of `recordings`, with the old file and with the parameters `p`.
+fn predicted(
+    rig: &Rig,
+    model: &super::model::Model,
+    priors: &[Prior],
+    p: &[f64],
+    recordings: &Recordings,
+) -> Result<Vec<WindowErrors>, IdentifyError> {
+    let record = recordings.recorded(rig)?.record;
+    let start: Vec<f64> = priors.iter().map(|prior| prior.value).collect();
+    let old = old_values(rig, model.layout, &start, p);
+    Ok(window_errors(model, priors, &[(&record, [&old, p])]))
 }
 
 /// The parts of the record, and the priors.

@@ -2,6 +2,7 @@
 
 use super::parameters::Kind;
 use super::realise::Realised;
+use super::record::Record;
 use super::verdict::{ChannelFit, Refusal};
 use super::window_errors::WindowErrors;
 use super::wiring::WiringFound;
@@ -57,6 +58,26 @@ pub struct Identification {
 }
 
 impl Identification {
+    /// What a record says of itself, with nothing identified yet.
+    pub(super) fn of_record(record: &Record) -> Self {
+        Self {
+            seconds: record.seconds(),
+            lost_ticks: 0,
+            largest_angle_rad: record.largest_angle(),
+            wiring: None,
+            estimates: Vec::new(),
+            sample_s: record.dt_s,
+            correlations: Vec::new(),
+            channels: Vec::new(),
+            is_driven: true,
+            left_out: Vec::new(),
+            predicted: Vec::new(),
+            realised: None,
+            delay_ticks: 0,
+            refusal: None,
+        }
+    }
+
     /// The estimate of a parameter, if it was identified.
     pub fn estimate(&self, kind: Kind) -> Option<&Estimate> {
         self.estimates.iter().find(|estimate| estimate.kind == kind)

@@ -126,36 +126,38 @@ fn halves_differ(estimate: &Estimate) -> bool {
     is_shape && estimate.halves.is_some_and(differs)
 }
 
-/// What a reader has to know to judge the numbers.
-pub(super) fn notes(found: &Identification, settings: &Settings) -> Vec<String> {
-    let mut notes = Vec::new();
+/// What fixes the scale of masses and frictions.
+fn scale_note(found: &Identification, settings: &Settings) -> String {
     match settings.weighed_kg_m {
-        Some(moment) => notes.push(format!(
+        Some(moment) => format!(
             "Masses and frictions in the new file are scaled to the weighed {} kg·m of the last link, and resistance_ohm with them.",
             significant(moment, 4)
-        )),
-        None if !found.is_driven => notes.push(
+        ),
+        None if !found.is_driven => {
             "Without a drive, a common factor of all masses, moments and frictions changes no motion: the first moment of the last \
              link is that of the file, and the deviations are those of ratios to it. One weighing of the last link gives true \
              kilograms (--weigh)."
-                .to_owned(),
-        ),
-        None => notes.push(
+                .to_owned()
+        }
+        None => {
             "The scale of the force is taken from the file: masses, moments and frictions are in its newtons, and a common factor \
              of all of them changes no motion. One weighing of the last link gives true kilograms (--weigh)."
-                .to_owned(),
-        ),
+                .to_owned()
+        }
     }
-    if found.estimates.iter().any(|estimate| matches!(estimate.kind, Kind::AirDrag(_)) && estimate.new > 0.0)
-    {
-        notes.push("The rig file has no air drag: large motion of the new file decays more slowly than the machine's.".to_owned());
+}
+
+/// Where the model or the rig file falls short of the machine.
+fn model_notes(found: &Identification) -> Vec<String> {
+    let mut notes = Vec::new();
+    let is_drag = |estimate: &Estimate| matches!(estimate.kind, Kind::AirDrag(_)) && estimate.new > 0.0;
+    if found.estimates.iter().any(is_drag) {
+        notes.push(
+            "The rig file has no air drag: large motion of the new file decays more slowly than the machine's.".to_owned(),
+        );
     }
-    let moved: Vec<String> = found
-        .estimates
-        .iter()
-        .filter(|one| halves_differ(one))
-        .map(|one| one.kind.name_and_unit().0)
-        .collect();
+    let moved = found.estimates.iter().filter(|one| halves_differ(one));
+    let moved: Vec<String> = moved.map(|one| one.kind.name_and_unit().0).collect();
     if !moved.is_empty() {
         notes.push(format!(
             "From the first and from the second half of the recordings these differ by more than {HALVES_PERCENT} %, so the model \
@@ -163,6 +165,13 @@ pub(super) fn notes(found: &Identification, settings: &Settings) -> Vec<String> 
             moved.join(", ")
         ));
     }
+    notes
+}
+
+/// What a reader has to know to judge the numbers.
+pub(super) fn notes(found: &Identification, settings: &Settings) -> Vec<String> {
+    let mut notes = vec![scale_note(found, settings)];
+    notes.extend(model_notes(found));
     notes.push(
         "Single masses cannot be seen from outside: the new file keeps those of the old one where it can, and centres and \
          inertias follow."
