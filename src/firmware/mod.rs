@@ -6,8 +6,6 @@
 
 mod commands;
 pub mod control_task;
-#[cfg(feature = "image")]
-pub mod hot_path;
 mod jog;
 mod posture;
 mod shake;
@@ -208,7 +206,7 @@ impl<'t, const NX: usize, const NY: usize, S: SwingUp<NX, NY>> Firmware<'t, NX, 
 
     /// The first part of [`control`](Self::control): checks the contacts that turn the motor off, and does all of a
     /// tick in states without the control law.
-    pub fn accept(&mut self, inputs: &Inputs<NY>) {
+    pub(crate) fn accept(&mut self, inputs: &Inputs<NY>) {
         (self.raw_counts, self.contacts, self.supply_v) =
             (inputs.raw_counts, inputs.contacts, inputs.supply_v);
         self.statistics.overruns =
@@ -232,7 +230,7 @@ impl<'t, const NX: usize, const NY: usize, S: SwingUp<NX, NY>> Firmware<'t, NX, 
 
     /// The second part of [`control`](Self::control): the output, from the control law or a planned motion while one
     /// of them commands the motor.
-    pub fn act(&mut self, inputs: &Inputs<NY>) -> &Output {
+    pub(crate) fn act(&mut self, inputs: &Inputs<NY>) -> &Output {
         self.output = match self.supervisor.state() {
             State::Balancing => self.balance(inputs),
             State::Jogging => self.output,
@@ -386,7 +384,7 @@ impl<'t, const NX: usize, const NY: usize, S: SwingUp<NX, NY>> Firmware<'t, NX, 
     }
 
     /// The first part of [`finish`](Self::finish): telemetry, if it is due.
-    pub fn report(&mut self, cycles: u32) -> Option<Telemetry<NX, NY>> {
+    pub(crate) fn report(&mut self, cycles: u32) -> Option<Telemetry<NX, NY>> {
         self.cycles = cycles;
         self.statistics.ticks = self.statistics.ticks.wrapping_add(1);
         self.worst_cycles = self.worst_cycles.max(cycles);
@@ -396,7 +394,7 @@ impl<'t, const NX: usize, const NY: usize, S: SwingUp<NX, NY>> Firmware<'t, NX, 
     }
 
     /// The second part of [`finish`](Self::finish): the prediction, while the controller commands the motor.
-    pub fn predict(&mut self) {
+    pub(crate) fn predict(&mut self) {
         match self.supervisor.state() {
             State::Raising | State::Holding | State::Lowering if S::IS_POSSIBLE => self.predict_motion(),
             state if state.controls() => self.predict_balancing(),
@@ -405,7 +403,7 @@ impl<'t, const NX: usize, const NY: usize, S: SwingUp<NX, NY>> Firmware<'t, NX, 
     }
 
     /// The last part of [`finish`](Self::finish): checks of link and table, and the reply.
-    pub fn complete(&mut self, command: Option<&Command>) -> Option<Reply> {
+    pub(crate) fn complete(&mut self, command: Option<&Command>) -> Option<Reply> {
         if self.supervisor.state().controls()
             && let Some(fault) =
                 self.debounce.check_link(&self.table.limits, command.is_some(), self.setpoint_commanded)
