@@ -3,7 +3,8 @@
 use crate::pac::{DBGMCU, EXTI, PWR};
 use cortex_m::peripheral::MPU;
 
-use super::boards::{BOARD, Chip};
+use super::boards::BOARD;
+use super::boards::data::Chip;
 
 /// Bit of the EXTI line to which the voltage detector is connected (RM0090, 12.2.5).
 const DETECTOR: u32 = 1 << 16;
