@@ -35,7 +35,7 @@
 //! assert!(inhibits.contains(Inhibits::NOT_HOMED));
 //! ```
 //!
-//! The controller alone:
+//! The controller alone, from encoder counts; [`control`] shows it with positions in SI units:
 //!
 //! ```
 //! use upright::control::controller::Controller;
@@ -76,6 +76,7 @@ pub mod gains;
 pub mod gains {
     include!(env!("UPRIGHT_GAINS"));
 }
+mod numbers;
 pub mod plant;
 #[cfg(feature = "firmware")]
 pub mod protocol;

@@ -1,4 +1,22 @@
 //! From encoder counts to motor duty cycle, once per tick.
+//!
+//! A [`Controller`](controller::Controller) also takes positions in SI units, from absolute sensors or from somebody
+//! else's driver. The same positions give the same bits:
+//!
+//! ```
+//! use upright::control::controller::Controller;
+//! use upright::control::encoder::CounterWidth;
+//! use upright::gains::{SENSORS, TABLE};
+//!
+//! let mut controller = Controller::new(&TABLE, [CounterWidth::Bits32; SENSORS])?;
+//! let mut positions = [0.0; SENSORS]; // metres, radians
+//! controller.start_at(&positions)?;
+//! positions[1] = 0.002; // the first link leans
+//! let command = controller.control_at(&positions);
+//! controller.predict();
+//! assert!(command.applied_n != 0.0);
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
 
 pub mod actuator;
 pub mod controller;
@@ -6,4 +24,5 @@ pub mod encoder;
 pub mod friction;
 pub mod motion;
 pub mod observer;
+mod rejected;
 pub mod state_feedback;

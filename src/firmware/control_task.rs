@@ -27,7 +27,8 @@ impl<'q, 't, B: Board<NY>, const NX: usize, const NY: usize, S: SwingUp<NX, NY>>
     ControlTask<'q, 't, B, NX, NY, S>
 {
     /// The task before its first tick. If the board's timer is set to another tick than the gain table is for, the
-    /// motor stays off: [`Fault::Table`](crate::supervision::fault::Fault::Table). `commands` and `messages` lead from and to the serial link.
+    /// motor stays off: [`Fault::Table`](crate::supervision::fault::Fault::Table). `commands` and `messages` lead from
+    /// and to the serial link.
     pub fn new(
         mut firmware: Firmware<'t, NX, NY, S>,
         board: B,

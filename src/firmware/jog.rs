@@ -5,6 +5,7 @@ use crate::board::{Inputs, Output};
 use crate::control::actuator::Drive;
 use crate::supervision::calibration::links_hang;
 use crate::supervision::inhibits::Inhibits;
+use crate::supervision::jog::cart;
 use crate::supervision::supervisor::State;
 use crate::table::SwingUp;
 
@@ -57,9 +58,4 @@ impl<const NX: usize, const NY: usize, S: SwingUp<NX, NY>> Firmware<'_, NX, NY, 
             None => self.supervisor.disarm(),
         }
     }
-}
-
-/// The cart's entry among the sensors' counts; 0 without sensors.
-pub(super) fn cart<const NY: usize>(counts: &[i32; NY]) -> i32 {
-    counts.first().copied().unwrap_or_default()
 }

@@ -1,9 +1,28 @@
 //! The whole firmware, tick by tick: inputs → supervisor → controller → output, then commands and telemetry.
 //!
 //! This module combines all the others. [`Firmware`] knows neither registers nor frames; [`control_task`] connects it
-//! to a board and to the serial link. The answer to a new request goes into `commands.rs`, a new condition on arming
+//! to a board and to the serial link.
+//!
+//! ```
+//! use upright::board::{Contacts, Inputs};
+//! use upright::control::encoder::CounterWidth;
+//! use upright::firmware::Firmware;
+//! use upright::gains::{SENSORS, SWING_UP, TABLE};
+//! use upright::protocol::message::Reset;
+//! use upright::supervision::fault::Fault;
+//! use upright::supervision::supervisor::State;
+//!
+//! let mut firmware = Firmware::new(&TABLE, &SWING_UP, [CounterWidth::Bits32; SENSORS], Reset::Power);
+//! let contacts = Contacts { emergency_stop: true, ..Contacts::default() };
+//! let output = firmware.control(&Inputs { raw_counts: [0; SENSORS], supply_v: 24.0, contacts });
+//! assert_eq!((output.enable, firmware.state()), (false, State::Fault));
+//! assert_eq!(firmware.cause().map(|cause| cause.fault), Some(Fault::EmergencyStop));
+//! ```
+//!
+//! The answer to a new request goes into `commands.rs`, a new condition on arming
 //! into `posture.rs`, a new field of telemetry into `telemetry.rs`.
 
+mod balancing;
 mod commands;
 pub mod control_task;
 mod jog;
@@ -14,7 +33,7 @@ mod telemetry;
 mod tick_log;
 
 use crate::board::{Contacts, Inputs, Output};
-use crate::control::controller::{Controller, MotorCommand};
+use crate::control::controller::Controller;
 use crate::control::encoder::CounterWidth;
 use crate::control::motion::Playback;
 use crate::protocol::message::{Command, Reply, Start, Statistics, Telemetry};
@@ -22,10 +41,9 @@ use crate::protocol::telemetry_ticks;
 use crate::protocol::tick_log::TickLog;
 use crate::supervision::calibration::Calibration;
 use crate::supervision::debounce::Debounce;
-use crate::supervision::detection::{Detection, Finding};
-use crate::supervision::envelope;
+use crate::supervision::detection::Detection;
 use crate::supervision::fault::{Cause, Fault};
-use crate::supervision::jog::{Jog, MotorSign};
+use crate::supervision::jog::{Jog, MotorSign, cart};
 use crate::supervision::shaking::Shaker;
 use crate::supervision::supervisor::{State, Supervisor};
 use crate::table::{ChecksumScan, Equilibrium, GainTable, NoSwingUp, SwingUp};
@@ -123,7 +141,7 @@ impl<'t, const NX: usize, const NY: usize, S: SwingUp<NX, NY>> Firmware<'t, NX, 
             controller,
             supervisor,
             calibration: Calibration::new(&table.limits),
-            jog: Jog::new(jog::cart(&table.limits.sign_counts)),
+            jog: Jog::new(cart(&table.limits.sign_counts)),
             detection: Detection::default(),
             debounce: Debounce::default(),
             checksum_scan: ChecksumScan::default(),
@@ -245,45 +263,6 @@ impl<'t, const NX: usize, const NY: usize, S: SwingUp<NX, NY>> Firmware<'t, NX, 
         &self.output
     }
 
-    /// A tick of balancing. Faults are checked in the order of [`Fault::PRECEDENCE`].
-    fn balance(&mut self, inputs: &Inputs<NY>) -> Output {
-        let table = self.table;
-        let (detection, thresholds) = (&mut self.detection, &table.thresholds);
-        let mut finding = None;
-        let command = self.controller.control_with(&inputs.raw_counts, |counts, y, e| {
-            finding = detection.test(thresholds, counts, y, e);
-        });
-        let exceeded =
-            envelope::exceeded(&table.limits, self.controller.estimate().as_slice(), command.requested_n);
-        self.act_or_trip(inputs, &command, exceeded, finding)
-    }
-
-    /// The output for `command`, unless there is a fault: of the inputs, of the limits on the state (`exceeded`), of
-    /// the tests of the innovation (`finding`) or of the force.
-    #[inline(always)]
-    fn act_or_trip(
-        &mut self,
-        inputs: &Inputs<NY>,
-        command: &MotorCommand,
-        exceeded: Option<Fault>,
-        finding: Option<Finding>,
-    ) -> Output {
-        let table = self.table;
-        (self.requested_n, self.applied_n) = (command.requested_n, command.applied_n);
-        let of_inputs = self.debounce.check_inputs(&table.limits, table.supply_max_v(), inputs);
-        let of_force = self.debounce.check_force(&table.limits, command.requested_n != command.applied_n);
-        if let Some(fault) = of_inputs.or(exceeded) {
-            self.trip(fault, None);
-        } else if let Some(Finding { fault, sensor }) = finding {
-            self.trip(fault, Some(sensor));
-        } else if let Some(fault) = of_force {
-            self.trip(fault, None);
-        } else {
-            return Output::on(command.drive, table.force_limit_n);
-        }
-        Output::OFF
-    }
-
     /// Takes and returns the counts of a tick without the control law.
     fn follow(&mut self) -> [i32; NY] {
         self.controller.follow(&self.raw_counts);
@@ -320,54 +299,6 @@ impl<'t, const NX: usize, const NY: usize, S: SwingUp<NX, NY>> Firmware<'t, NX, 
             | State::Lowering
             | State::Fault => {}
             State::Identifying => {}
-        }
-    }
-
-    /// A tick while armed: balancing starts when all links have been upright and slow for long enough.
-    fn tick_armed(&mut self, counts: &[i32; NY]) {
-        let limits = &self.table.limits;
-        let upright = limits.within_half_a_turn(counts);
-        let lean = self.largest_lean(&upright);
-        if lean > limits.angle_rad || !self.input_inhibits().union(self.off_centre_inhibit(counts)).is_empty()
-        {
-            self.supervisor.cancel_arming();
-        } else if lean > limits.arm_angle_rad {
-            self.calibration.restart_slow(counts);
-        } else if self.calibration.slow_ticks() >= limits.arm_ticks && self.is_checked {
-            self.start_balancing(&upright);
-        }
-    }
-
-    /// Starts balancing at these counts, which are within half a turn.
-    fn start_balancing(&mut self, counts: &[i32; NY]) {
-        if self.start_controller(counts) {
-            self.hold_setpoint();
-            self.supervisor.start_balancing();
-        }
-    }
-
-    /// Starts the controller at rest at these counts, and restarts the tests and counters that supervise it. Returns
-    /// whether the controller has started.
-    fn start_controller(&mut self, counts: &[i32; NY]) -> bool {
-        self.controller.encoders_mut().home(&self.raw_counts, counts);
-        let started = self.controller.start(&self.raw_counts).is_ok();
-        self.restart_supervision();
-        started
-    }
-
-    /// Restarts the tests of encoders and motor, and the counters of ticks towards a fault.
-    fn restart_supervision(&mut self) {
-        let counts = *self.controller.encoders().counts();
-        self.detection.start(&counts, &self.controller.positions().data.0[0]);
-        self.debounce.start();
-    }
-
-    /// Requests the position of the governed set-point, unless the host has commanded another.
-    fn hold_setpoint(&mut self) {
-        if !self.setpoint_commanded {
-            let here = self.controller.law_state().setpoint;
-            // Never refused: a position from the encoders is finite.
-            let _ = self.controller.set_setpoint(here);
         }
     }
 
@@ -422,12 +353,6 @@ impl<'t, const NX: usize, const NY: usize, S: SwingUp<NX, NY>> Firmware<'t, NX, 
         let reply = command.map(|command| Reply { id: command.id, answer: self.answer(command) });
         self.tick = self.tick.wrapping_add(1);
         reply
-    }
-
-    /// Predicts the next tick of balancing.
-    fn predict_balancing(&mut self) {
-        let (detection, test) = (&mut self.detection, &self.table.thresholds.motor);
-        self.controller.predict_with(|corrected, force| detection.finish_tick(test, corrected, force));
     }
 
     #[cold]

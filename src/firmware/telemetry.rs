@@ -10,7 +10,7 @@ use crate::table::SwingUp;
 
 impl<const NX: usize, const NY: usize, S: SwingUp<NX, NY>> Firmware<'_, NX, NY, S> {
     /// Counts a message that was dropped because its queue was full.
-    pub fn message_dropped(&mut self) {
+    pub(crate) fn message_dropped(&mut self) {
         self.statistics.dropped = self.statistics.dropped.saturating_add(1);
     }
 

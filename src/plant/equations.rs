@@ -3,8 +3,9 @@
 // The indices are those of the equations, and all are below N.
 #![allow(clippy::needless_range_loop)]
 
-use super::ChainState;
-use crate::table::{ChainModel, Number, Scalar};
+use crate::numbers::{Number, Scalar};
+use crate::plant::chain_state::ChainState;
+use crate::table::ChainModel;
 
 impl<const N: usize, T: Number> ChainModel<N, T> {
     /// Rate of change of `state` under a force on the cart (N, along +x) and torques at the joints (N·m).

@@ -118,6 +118,11 @@ impl Jog {
     }
 }
 
+/// The cart's entry among the sensors' counts; 0 without sensors.
+pub(crate) fn cart<const NY: usize>(counts: &[i32; NY]) -> i32 {
+    counts.first().copied().unwrap_or_default()
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

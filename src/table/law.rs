@@ -8,7 +8,7 @@ use nalgebra::SVector;
 use serde::{Deserialize, Serialize};
 
 #[cfg(feature = "firmware")]
-use crate::table::columns;
+use crate::table::columns::columns;
 use crate::table::part::{Part, Reader, Resize, Words, WordsMut, part};
 
 /// A control law.

@@ -1,6 +1,6 @@
 //! The limits that the supervisor enforces, as part of the gain table.
 
-use crate::table::Equilibrium;
+use crate::table::equilibrium::Equilibrium;
 use crate::table::part::part;
 
 part! {

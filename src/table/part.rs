@@ -6,7 +6,7 @@
 
 use nalgebra::SMatrix;
 
-use super::columns;
+use crate::table::columns::columns;
 
 /// Consecutive words of a table, all of one type.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -4,9 +4,14 @@
 //! knots, lie one after the other in a slice, because the number of knots differs from rig to rig. Values have 16
 //! bits, with a unit for each column: that is finer than encoders resolve, and takes half the flash of `f32`.
 
+use crate::table::chain_model::ChainModel;
 use crate::table::checksum::{ChecksumScan, checksum};
+use crate::table::equilibrium::Equilibrium;
+use crate::table::error::TableError;
+use crate::table::format::TABLE_FORMAT;
+use crate::table::gain_table::GainTable;
 use crate::table::part::{Part, Reader, Resize, Words, WordsMut, is_finite, part};
-use crate::table::{ChainModel, Equilibrium, GainTable, TABLE_FORMAT, TableError, Thresholds};
+use crate::table::thresholds::Thresholds;
 
 part! {
     /// A planned motion with its gains.

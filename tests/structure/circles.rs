@@ -129,7 +129,7 @@ pub(crate) fn circles(files: &Files) -> Vec<String> {
         .filter(|(file, _)| !matches!(**file, "lib" | "main")) // They only list the modules.
         .map(|(file, source)| (*file, modules.used_by(file, source)))
         .collect();
-    let mut found: Vec<_> = rings(&uses).iter().map(|ring| format!("files {}", ring.join(", "))).collect();
+    let mut found: Vec<_> = rings(&uses).iter().map(|ring| format!("files: {}", ring.join(", "))).collect();
     let folders: BTreeSet<&str> = files
         .keys()
         .flat_map(|file| file.match_indices('/').map(|(at, _)| &file[..=at]))

@@ -20,16 +20,8 @@ enum Pattern {
     ChainWithoutFriction,
 }
 
-/// A table from a stream of numbers; only the entries that the pattern requires are 0.
-fn table<const NX: usize, const NY: usize>(
-    pattern: Pattern,
-    in_order: bool,
-    delay_ticks: u32,
-    [integral, friction]: [bool; 2],
-    numbers: &[f32],
-) -> GainTable<NX, NY> {
-    let mut numbers = numbers.iter().copied().cycle();
-    let mut number = || numbers.next().unwrap();
+/// The matrix of an observer's model with this pattern.
+fn model<const NX: usize>(pattern: Pattern, number: &mut impl FnMut() -> f32) -> SMatrix<f32, NX, NX> {
     let mut ad = SMatrix::<f32, NX, NX>::from_fn(|_, _| 0.3 * number());
     if !matches!(pattern, Pattern::Any) {
         ad.set_column(0, &SVector::from_fn(|row, _| if row == 0 { 1.0 } else { 0.0 }));
@@ -42,6 +34,20 @@ fn table<const NX: usize, const NY: usize>(
             ad[(row + 1, column + 1)] = ad[(row, column)];
         }
     }
+    ad
+}
+
+/// A table from a stream of numbers; only the entries that the pattern requires are 0.
+fn table<const NX: usize, const NY: usize>(
+    pattern: Pattern,
+    in_order: bool,
+    delay_ticks: u32,
+    [integral, friction]: [bool; 2],
+    numbers: &[f32],
+) -> GainTable<NX, NY> {
+    let mut numbers = numbers.iter().copied().cycle();
+    let mut number = || numbers.next().unwrap();
+    let ad = model(pattern, &mut number);
     let mut table = GainTable {
         format: TABLE_FORMAT,
         states: NX as u32,

@@ -1,7 +1,7 @@
 //! What an instruction does to the stack pointer and the control flow, for a bound on the stack.
 
 use crate::decode::decode;
-use crate::instruction::{Alu, Op, Operand, Place};
+use crate::instruction::{Addressing, Alu, Op, Operand};
 
 /// Effect of an instruction on the stack pointer or the control flow.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -51,7 +51,7 @@ pub fn effect(address: u32, first: u16, second: u16) -> Effect {
         Op::Alu { alu, rd, rn, operand, .. } => of_result(address, alu, rd, rn, operand),
         Op::StoreMultiple { rn: SP, list, down: true, .. } => words(list.count_ones()),
         Op::FloatStoreMultiple { rn: SP, count, down: true, .. } => words(count.into()),
-        Op::Store { rn: SP, place: Place::PreIndexed(offset), .. }
+        Op::Store { rn: SP, place: Addressing::PreIndexed(offset), .. }
         | Op::StoreDual { rn: SP, offset, write_back: true, index: true, .. } => {
             Effect::Grow(u32::from(offset.min(0).unsigned_abs()))
         }

@@ -13,7 +13,7 @@ use crate::peripherals::usart::Usart;
 
 /// A peripheral that is modelled.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Place {
+enum Block {
     Encoder(usize),
     Iwdg,
     Usart,
@@ -31,52 +31,52 @@ enum Place {
 }
 
 /// The peripheral at an address, and its base; of the USARTs, only that of the serial line exists.
-fn place(address: u32, usart: u8) -> Option<(Place, u32)> {
+fn place(address: u32, usart: u8) -> Option<(Block, u32)> {
     let block = address & !0x3ff;
     let found = match block {
-        0x4000_0000..=0x4000_0c00 => (Place::Encoder((block as usize >> 10) & 3), block),
-        0x4000_3000 => (Place::Iwdg, block),
-        0x4000_4400 if usart == 2 => (Place::Usart, block),
-        0x4000_4800 if usart == 3 => (Place::Usart, block),
-        0x4000_7000 => (Place::Power, block),
-        0x4001_0000 => (Place::Pwm, block),
-        0x4001_0400 => (Place::Encoder(4), block),
-        0x4001_2000 => (Place::Adc, block),
-        0x4001_3800 => (Place::Syscfg, block),
-        0x4001_3c00 => (Place::Exti, block),
-        0x4001_4800 => (Place::Capture, block),
-        0x4002_0000..=0x4002_2000 => (Place::Port((block as usize >> 10) & 15), block),
-        0x4002_3800 => (Place::Rcc, block),
-        0x4002_3c00 => (Place::Flash, block),
-        0x4002_6000 => (Place::Dma, block),
-        0xe004_2000 => (Place::Debug, block),
+        0x4000_0000..=0x4000_0c00 => (Block::Encoder((block as usize >> 10) & 3), block),
+        0x4000_3000 => (Block::Iwdg, block),
+        0x4000_4400 if usart == 2 => (Block::Usart, block),
+        0x4000_4800 if usart == 3 => (Block::Usart, block),
+        0x4000_7000 => (Block::Power, block),
+        0x4001_0000 => (Block::Pwm, block),
+        0x4001_0400 => (Block::Encoder(4), block),
+        0x4001_2000 => (Block::Adc, block),
+        0x4001_3800 => (Block::Syscfg, block),
+        0x4001_3c00 => (Block::Exti, block),
+        0x4001_4800 => (Block::Capture, block),
+        0x4002_0000..=0x4002_2000 => (Block::Port((block as usize >> 10) & 15), block),
+        0x4002_3800 => (Block::Rcc, block),
+        0x4002_3c00 => (Block::Flash, block),
+        0x4002_6000 => (Block::Dma, block),
+        0xe004_2000 => (Block::Debug, block),
         _ => return None,
     };
     Some(found)
 }
 
 /// The bus and the clock-enable bit of a peripheral (7.3.10 to 7.3.14).
-fn clock(place: Place, usart: u8) -> Option<(Domain, u32)> {
+fn clock(place: Block, usart: u8) -> Option<(Domain, u32)> {
     Some(match place {
-        Place::Encoder(4) => (Domain::Apb2, 1),
-        Place::Encoder(i) => (Domain::Apb1, i as u32),
-        Place::Usart => (Domain::Apb1, 15 + u32::from(usart)),
-        Place::Power => (Domain::Apb1, 28),
-        Place::Pwm => (Domain::Apb2, 0),
-        Place::Adc => (Domain::Apb2, 8),
-        Place::Syscfg => (Domain::Apb2, 14),
-        Place::Capture => (Domain::Apb2, 18),
-        Place::Port(i) => (Domain::Ahb1, i as u32),
-        Place::Dma => (Domain::Ahb1, 21),
-        Place::Iwdg | Place::Exti | Place::Rcc | Place::Flash | Place::Debug => return None,
+        Block::Encoder(4) => (Domain::Apb2, 1),
+        Block::Encoder(i) => (Domain::Apb1, i as u32),
+        Block::Usart => (Domain::Apb1, 15 + u32::from(usart)),
+        Block::Power => (Domain::Apb1, 28),
+        Block::Pwm => (Domain::Apb2, 0),
+        Block::Adc => (Domain::Apb2, 8),
+        Block::Syscfg => (Domain::Apb2, 14),
+        Block::Capture => (Domain::Apb2, 18),
+        Block::Port(i) => (Domain::Ahb1, i as u32),
+        Block::Dma => (Domain::Ahb1, 21),
+        Block::Iwdg | Block::Exti | Block::Rcc | Block::Flash | Block::Debug => return None,
     })
 }
 
 /// Whether an access of this width is allowed (2.3, and each chapter's opening).
-fn width_allowed(place: Place, bytes: u32) -> bool {
+fn width_allowed(place: Block, bytes: u32) -> bool {
     match place {
-        Place::Port(_) | Place::Rcc => true,
-        Place::Encoder(_) | Place::Pwm | Place::Capture | Place::Usart | Place::Iwdg | Place::Power => {
+        Block::Port(_) | Block::Rcc => true,
+        Block::Encoder(_) | Block::Pwm | Block::Capture | Block::Usart | Block::Iwdg | Block::Power => {
             bytes >= 2
         }
         _ => bytes == 4,
@@ -126,7 +126,7 @@ impl Bus {
         if self.now >= self.deadline {
             self.advance();
         }
-        if !width_allowed(place, bytes) || (bytes < 4 && !matches!(place, Place::Port(_)) && address & 3 != 0)
+        if !width_allowed(place, bytes) || (bytes < 4 && !matches!(place, Block::Port(_)) && address & 3 != 0)
         {
             return Err(Violation::Width { address, bytes }.into());
         }
@@ -135,7 +135,7 @@ impl Bus {
         let bits = self.bits(place, offset).ok_or(Violation::UnknownRegister(address))?;
         let value = if bytes == 4 {
             value
-        } else if let Place::Port(i) = place {
+        } else if let Block::Port(i) = place {
             // The other bytes keep what they have; those of BSRR are not kept, but zero.
             let mask = ((1u32 << (8 * bytes)) - 1) << shift;
             let old = if offset == 0x18 { 0 } else { self.ports[i].read(offset, 0, 0) };
@@ -151,7 +151,7 @@ impl Bus {
         }
         self.check_bits(address, bits, value)?;
         self.write_place(place, offset, value & bits.writable)?;
-        if place == Place::Rcc {
+        if place == Block::Rcc {
             self.hclk_may_have_changed();
             self.check_wait_states()?;
         }
@@ -183,7 +183,7 @@ impl Bus {
     }
 
     /// Whether the peripheral's clock has been enabled for long enough; if it is off, the run ends.
-    fn has_clock(&mut self, place: Place, address: u32) -> Result<bool, Trap> {
+    fn has_clock(&mut self, place: Block, address: u32) -> Result<bool, Trap> {
         let Some((domain, bit)) = clock(place, self.wiring.usart) else { return Ok(true) };
         let Some(at) = self.rcc.usable_at(domain, bit) else {
             return Err(Violation::NoClock(address).into());
@@ -196,28 +196,28 @@ impl Bus {
         Ok(false)
     }
 
-    fn bits(&self, place: Place, offset: u32) -> Option<Bits> {
+    fn bits(&self, place: Block, offset: u32) -> Option<Bits> {
         match place {
-            Place::Encoder(i) => self.encoders[i].bits(offset),
-            Place::Iwdg => Iwdg::bits(offset),
-            Place::Usart => Usart::bits(offset),
-            Place::Power => self.power.bits(offset),
-            Place::Pwm => self.pwm.bits(offset),
-            Place::Adc => Adc::bits(offset),
-            Place::Syscfg => Exti::configuration_bits(offset),
-            Place::Exti => Exti::bits(offset),
-            Place::Capture => CaptureTimer::bits(offset),
-            Place::Port(i) => self.ports.get(i)?.bits(offset),
-            Place::Rcc => self.rcc.bits(offset),
+            Block::Encoder(i) => self.encoders[i].bits(offset),
+            Block::Iwdg => Iwdg::bits(offset),
+            Block::Usart => Usart::bits(offset),
+            Block::Power => self.power.bits(offset),
+            Block::Pwm => self.pwm.bits(offset),
+            Block::Adc => Adc::bits(offset),
+            Block::Syscfg => Exti::configuration_bits(offset),
+            Block::Exti => Exti::bits(offset),
+            Block::Capture => CaptureTimer::bits(offset),
+            Block::Port(i) => self.ports.get(i)?.bits(offset),
+            Block::Rcc => self.rcc.bits(offset),
             // FLASH_ACR (3.9.1), FLASH_OPTCR (3.9.10).
-            Place::Flash => match offset {
+            Block::Flash => match offset {
                 0x00 => Some(Bits::writable(0x1f07)),
                 0x14 => Some(Bits::writable(0).with_read_only(u32::MAX)),
                 _ => None,
             },
-            Place::Dma => Dma::bits(offset),
+            Block::Dma => Dma::bits(offset),
             // DBGMCU (38.16).
-            Place::Debug => match offset {
+            Block::Debug => match offset {
                 0x00 => Some(Bits::writable(0).with_read_only(u32::MAX)),
                 0x04 => Some(Bits::writable(0xe7)),
                 0x08 => Some(Bits::writable(0x06e0_1dff)),
@@ -227,16 +227,16 @@ impl Bus {
         }
     }
 
-    fn read_place(&mut self, place: Place, offset: u32) -> u32 {
+    fn read_place(&mut self, place: Block, offset: u32) -> u32 {
         let now = self.now;
         match place {
-            Place::Encoder(i) => {
+            Block::Encoder(i) => {
                 self.unstable |= offset == 0x24;
                 let (shaft, tick) = self.encoder_route(i);
                 self.encoders[i].read(offset, shaft.as_ref(), now, tick)
             }
-            Place::Iwdg => self.iwdg.read(offset),
-            Place::Usart => {
+            Block::Iwdg => self.iwdg.read(offset),
+            Block::Usart => {
                 let value = self.usart.read(offset);
                 if offset == 4 {
                     self.touched = true;
@@ -244,103 +244,93 @@ impl Bus {
                 }
                 value
             }
-            Place::Power => self.power.read(offset),
-            Place::Pwm => {
+            Block::Power => self.power.read(offset),
+            Block::Pwm => {
                 self.unstable = true;
                 self.settle_output();
                 self.pwm.read(offset)
             }
-            Place::Adc => {
+            Block::Adc => {
                 self.touched |= offset == 0x4c;
                 self.adc.read(offset)
             }
-            Place::Syscfg => self.exti.read_configuration(offset),
-            Place::Exti => self.exti.read(offset),
-            Place::Capture => {
+            Block::Syscfg => self.exti.read_configuration(offset),
+            Block::Exti => self.exti.read(offset),
+            Block::Capture => {
                 self.unstable |= offset == 0x24;
                 self.touched |= offset == 0x34;
                 let tick = self.rcc.timer_clock(Domain::Apb2);
                 self.capture.read(offset, now, tick)
             }
-            Place::Port(i) => {
+            Block::Port(i) => {
                 self.unstable |= offset == 0x10;
                 let noise = self.random() as u32;
                 let levels = self.alternate_levels(i);
                 self.ports[i].read(offset, levels, noise)
             }
-            Place::Rcc => self.rcc.read(offset),
-            Place::Flash if offset == 0 => self.flash_control,
-            Place::Flash => self.power.brown_out.option_control(),
-            Place::Dma => self.dma.read(offset),
-            Place::Debug if offset == 0 => self.chip.identity(),
-            Place::Debug => self.debug_freeze.registers[offset as usize / 4 - 1],
+            Block::Rcc => self.rcc.read(offset),
+            Block::Flash if offset == 0 => self.flash_control,
+            Block::Flash => self.power.brown_out.option_control(),
+            Block::Dma => self.dma.read(offset),
+            Block::Debug if offset == 0 => self.chip.identity(),
+            Block::Debug => self.debug_freeze.registers[offset as usize / 4 - 1],
         }
     }
 
-    fn write_place(&mut self, place: Place, offset: u32, value: u32) -> Result<(), Violation> {
+    fn write_place(&mut self, place: Block, offset: u32, value: u32) -> Result<(), Violation> {
         let now = self.now;
         match place {
-            Place::Encoder(i) => {
+            Block::Encoder(i) => {
                 let (shaft, tick) = self.encoder_route(i);
-                self.encoders[i].write(offset, value, shaft.as_ref(), now, tick)
+                self.encoders[i].write(offset, value, shaft.as_ref(), now, tick)?;
             }
-            Place::Iwdg => self.iwdg.write(offset, value, now),
-            Place::Usart => {
+            Block::Iwdg => self.iwdg.write(offset, value, now)?,
+            Block::Usart => {
                 let apb1 = self.rcc.pclk(Domain::Apb1);
                 self.usart.write(offset, value, now, apb1)?;
                 self.move_by_dma();
-                Ok(())
             }
-            Place::Power => {
+            Block::Power => {
                 self.power.write(offset, value);
                 self.supply_changed();
-                Ok(())
             }
-            Place::Pwm => {
+            Block::Pwm => {
                 self.settle_output();
-                self.pwm.write(offset, value, now)
+                self.pwm.write(offset, value, now)?;
             }
-            Place::Adc => {
+            Block::Adc => {
                 let apb2 = self.rcc.pclk(Domain::Apb2);
-                self.adc.write(offset, value, now, apb2)
+                self.adc.write(offset, value, now, apb2)?;
             }
-            Place::Syscfg => {
-                self.exti.write_configuration(offset, value);
-                Ok(())
-            }
-            Place::Exti => {
-                self.exti.write(offset, value);
-                Ok(())
-            }
-            Place::Capture => self.capture.write(offset, value, now),
-            Place::Port(i) => {
+            Block::Syscfg => self.exti.write_configuration(offset, value),
+            Block::Exti => self.exti.write(offset, value),
+            Block::Capture => self.capture.write(offset, value, now)?,
+            Block::Port(i) => {
                 self.settle_output();
                 self.ports[i].write(offset, value)?;
                 self.levels_changed();
-                Ok(())
             }
-            Place::Rcc => {
+            Block::Rcc => {
                 self.settle_output();
-                self.rcc.write(offset, value, now)
+                self.rcc.write(offset, value, now)?;
             }
-            Place::Flash => {
+            Block::Flash => {
                 self.flash_control = value;
                 self.cache.configure(value);
-                self.check_wait_states()
+                self.check_wait_states()?;
             }
-            Place::Dma => {
+            Block::Dma => {
                 self.dma.write(offset, value)?;
                 self.move_by_dma();
-                Ok(())
             }
-            Place::Debug => {
+            Block::Debug => {
                 if offset >= 8 && value & !super::FREEZES_WATCHDOG != 0 {
                     return Err(Violation::NotModelled("freezing a timer other than the watchdog"));
                 }
                 self.debug_freeze.registers[offset as usize / 4 - 1] = value;
-                Ok(())
             }
         }
+        Ok(())
     }
 
     fn hclk_may_have_changed(&mut self) {

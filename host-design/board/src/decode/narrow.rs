@@ -1,7 +1,7 @@
 //! 16-bit instructions (A5.2).
 
 use super::field::{Decoded, Undecodable, fixed, general, signed};
-use crate::instruction::{Alu, Compare, Extend, Op, Operand, Place, Sets, Shift, Unary, Unit};
+use crate::instruction::{Addressing, Alu, Compare, Extend, Op, Operand, Sets, Shift, Unary, Unit};
 
 fn low(code: u32, at: u32) -> u8 {
     (code >> at & 7) as u8
@@ -110,7 +110,7 @@ fn special(code: u32) -> Decoded {
 
 fn by_register(code: u32) -> Op {
     let (rt, rn) = (low(code, 0), low(code, 3));
-    let place = Place::Indexed { register: low(code, 6), shift: 0 };
+    let place = Addressing::Indexed { register: low(code, 6), shift: 0 };
     match code >> 9 & 7 {
         0 => Op::Store { unit: Unit::Word, rt, rn, place },
         1 => Op::Store { unit: Unit::Half, rt, rn, place },
@@ -126,12 +126,12 @@ fn by_register(code: u32) -> Op {
 fn by_offset(code: u32) -> Op {
     let (rt, rn) = (low(code, 0), low(code, 3));
     let offset = (code >> 6 & 31) as i32;
-    let single = |unit, scale| (unit, rt, rn, Place::Offset(offset * scale));
+    let single = |unit, scale| (unit, rt, rn, Addressing::Offset(offset * scale));
     let (unit, rt, rn, place) = match code >> 12 {
         6 => single(Unit::Word, 4),
         7 => single(Unit::Byte, 1),
         8 => single(Unit::Half, 2),
-        _ => (Unit::Word, low(code, 8), 13, Place::Offset((code & 0xff) as i32 * 4)),
+        _ => (Unit::Word, low(code, 8), 13, Addressing::Offset((code & 0xff) as i32 * 4)),
     };
     if code & 0x800 == 0 { Op::Store { unit, rt, rn, place } } else { Op::Load { unit, rt, rn, place } }
 }

@@ -1,7 +1,7 @@
 //! 32-bit instructions: loads and stores (A5.3.5 to A5.3.10).
 
 use super::field::{Decoded, Undecodable, fixed, general, register};
-use crate::instruction::{Op, Place, Unit};
+use crate::instruction::{Addressing, Op, Unit};
 
 pub(super) fn multiple(first: u32, second: u32) -> Decoded {
     let (rn, list) = (register(first, 0), second as u16);
@@ -76,9 +76,9 @@ fn exclusive_or_table(first: u32, second: u32) -> Decoded {
 }
 
 /// Addressing mode of a single access; an error for the unprivileged forms.
-fn place(first: u32, second: u32) -> Result<Place, Undecodable> {
+fn place(first: u32, second: u32) -> Result<Addressing, Undecodable> {
     if first & 0x80 != 0 {
-        return Ok(Place::Offset((second & 0xfff) as i32));
+        return Ok(Addressing::Offset((second & 0xfff) as i32));
     }
     if second & 0x800 == 0 {
         let register = register(second, 0);
@@ -88,22 +88,22 @@ fn place(first: u32, second: u32) -> Result<Place, Undecodable> {
         if register == 13 || register == 15 {
             return Err(Undecodable::Unpredictable);
         }
-        return Ok(Place::Indexed { register, shift: (second >> 4 & 3) as u8 });
+        return Ok(Addressing::Indexed { register, shift: (second >> 4 & 3) as u8 });
     }
     let size = (second & 0xff) as i16;
     let offset = if second & 0x200 != 0 { size } else { -size };
     match (second & 0x400 != 0, second & 0x100 != 0, second & 0x200 != 0) {
-        (true, false, false) => Ok(Place::Offset(offset.into())),
+        (true, false, false) => Ok(Addressing::Offset(offset.into())),
         // LDRT and the like: unprivileged accesses, which no program here needs.
         (true, false, true) => Err(Undecodable::Unknown),
-        (true, true, _) => Ok(Place::PreIndexed(offset)),
-        (false, true, _) => Ok(Place::PostIndexed(offset)),
+        (true, true, _) => Ok(Addressing::PreIndexed(offset)),
+        (false, true, _) => Ok(Addressing::PostIndexed(offset)),
         (false, false, _) => Err(Undecodable::Unknown),
     }
 }
 
-fn writes_back(place: Place) -> bool {
-    matches!(place, Place::PreIndexed(_) | Place::PostIndexed(_))
+fn writes_back(place: Addressing) -> bool {
+    matches!(place, Addressing::PreIndexed(_) | Addressing::PostIndexed(_))
 }
 
 pub(super) fn store(first: u32, second: u32) -> Decoded {

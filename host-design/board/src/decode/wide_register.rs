@@ -1,7 +1,7 @@
 //! 32-bit instructions: data processing on registers, multiplication and division (A5.3.12 to A5.3.17).
 
 use super::field::{Decoded, Undecodable, fixed, general, register};
-use crate::instruction::{Extend, Lanes, LongMultiply, Multiply, Op, Prefix, Sets, Shift, Unary};
+use crate::instruction::{Extend, LongMultiply, Multiply, Op, ParallelLanes, Prefix, Sets, Shift, Unary};
 
 pub(super) fn decode(first: u32, second: u32) -> Decoded {
     let (rd, rn, rm) = (register(second, 8), register(first, 0), register(second, 0));
@@ -45,12 +45,12 @@ fn parallel(op: u32, top: u32, rd: u8, rn: u8, rm: u8) -> Decoded {
         _ => return Err(Undecodable::Unknown),
     };
     let lanes = match op {
-        0 => Lanes::Add8,
-        1 => Lanes::Add16,
-        2 => Lanes::AddSubExchanged,
-        4 => Lanes::Sub8,
-        5 => Lanes::Sub16,
-        6 => Lanes::SubAddExchanged,
+        0 => ParallelLanes::Add8,
+        1 => ParallelLanes::Add16,
+        2 => ParallelLanes::AddSubExchanged,
+        4 => ParallelLanes::Sub8,
+        5 => ParallelLanes::Sub16,
+        6 => ParallelLanes::SubAddExchanged,
         _ => return Err(Undecodable::Unknown),
     };
     general(&[rd, rn, rm], Op::Parallel { prefix, lanes, rd, rn, rm })

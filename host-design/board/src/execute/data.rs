@@ -79,7 +79,7 @@ impl Machine {
         self.registers.v = overflow;
     }
 
-    pub(super) fn data(&mut self, op: Op) {
+    pub(super) fn data(&mut self, op: Op) -> Done {
         let registers = &mut self.registers;
         match op {
             Op::ShiftBy { shift, sets, rd, rn, rm } => {
@@ -134,6 +134,7 @@ impl Machine {
             }
             _ => unreachable!("only these are sent here"),
         }
+        Ok(())
     }
 }
 

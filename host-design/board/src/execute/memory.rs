@@ -1,29 +1,36 @@
 //! Loads and stores of more than one register, exclusive accesses and table branches.
 
 use crate::error::{Done, Fault};
-use crate::instruction::{Op, Place, Unit};
+use crate::instruction::{Addressing, Op, Unit};
 use crate::machine::Machine;
 
 impl Machine {
     /// Address of an access, and the new base if it is written back.
     #[inline]
-    fn place(&self, rn: u8, place: Place) -> (u32, Option<u32>) {
+    fn place(&self, rn: u8, place: Addressing) -> (u32, Option<u32>) {
         let base = self.registers.get(rn);
         match place {
-            Place::Offset(offset) => (base.wrapping_add_signed(offset), None),
-            Place::Indexed { register, shift } => {
+            Addressing::Offset(offset) => (base.wrapping_add_signed(offset), None),
+            Addressing::Indexed { register, shift } => {
                 (base.wrapping_add(self.registers.get(register) << shift), None)
             }
-            Place::PreIndexed(offset) => {
+            Addressing::PreIndexed(offset) => {
                 let address = base.wrapping_add_signed(offset.into());
                 (address, Some(address))
             }
-            Place::PostIndexed(offset) => (base, Some(base.wrapping_add_signed(offset.into()))),
+            Addressing::PostIndexed(offset) => (base, Some(base.wrapping_add_signed(offset.into()))),
         }
     }
 
     #[inline]
-    pub(super) fn load_single(&mut self, unit: Unit, rt: u8, rn: u8, place: Place, loaded: bool) -> Done {
+    pub(super) fn load_single(
+        &mut self,
+        unit: Unit,
+        rt: u8,
+        rn: u8,
+        place: Addressing,
+        loaded: bool,
+    ) -> Done {
         let (address, base) = self.place(rn, place);
         // Consecutive loads overlap in the pipeline.
         self.cycles += u32::from(!loaded);
@@ -45,7 +52,7 @@ impl Machine {
     }
 
     #[inline]
-    pub(super) fn store_single(&mut self, unit: Unit, rt: u8, rn: u8, place: Place) -> Done {
+    pub(super) fn store_single(&mut self, unit: Unit, rt: u8, rn: u8, place: Addressing) -> Done {
         let (address, base) = self.place(rn, place);
         self.store(address, unit, self.registers.get(rt))?;
         if let Some(base) = base {
@@ -76,15 +83,7 @@ impl Machine {
                 return self.load_multiple(rn, list, down, write_back);
             }
             Op::StoreMultiple { rn, list, down, write_back } => {
-                let (mut address, base) = self.block(rn, list.count_ones(), down)?;
-                for register in 0..15 {
-                    if list >> register & 1 != 0 {
-                        self.store(address, Unit::Word, self.registers.get(register))?;
-                        address = address.wrapping_add(4);
-                    }
-                }
-                self.write_back(rn, base, write_back);
-                self.cycles += list.count_ones();
+                return self.store_multiple(rn, list, down, write_back);
             }
             Op::LoadExclusive { unit, rt, rn, offset } => {
                 let address = self.registers.get(rn).wrapping_add(offset.into());
@@ -149,6 +148,19 @@ impl Machine {
     /// Faults for an unaligned address, in accesses that must be aligned (A3.2.1).
     fn aligned(&self, address: u32, unit: Unit) -> Done {
         if address & (unit.bytes() - 1) != 0 { Err(Fault::Unaligned.into()) } else { Ok(()) }
+    }
+
+    fn store_multiple(&mut self, rn: u8, list: u16, down: bool, write_back: bool) -> Done {
+        let (mut address, base) = self.block(rn, list.count_ones(), down)?;
+        for register in 0..15 {
+            if list >> register & 1 != 0 {
+                self.store(address, Unit::Word, self.registers.get(register))?;
+                address = address.wrapping_add(4);
+            }
+        }
+        self.write_back(rn, base, write_back);
+        self.cycles += list.count_ones();
+        Ok(())
     }
 
     fn load_multiple(&mut self, rn: u8, list: u16, down: bool, write_back: bool) -> Done {

@@ -63,29 +63,20 @@ impl Machine {
             | Op::LoadExclusive { .. }
             | Op::StoreExclusive { .. }
             | Op::TableBranch { .. } => self.memory(op),
-            Op::Multiply { .. } | Op::LongMultiply { .. } | Op::Divide { .. } => {
-                self.multiply(op);
-                Ok(())
-            }
+            Op::Multiply { .. } | Op::LongMultiply { .. } | Op::Divide { .. } => self.multiply(op),
             Op::Parallel { .. }
             | Op::SaturatingSum { .. }
             | Op::Select { .. }
             | Op::AbsoluteDifferences { .. }
             | Op::Saturate { .. }
-            | Op::SaturateHalves { .. } => {
-                self.parallel(op);
-                Ok(())
-            }
+            | Op::SaturateHalves { .. } => self.parallel(op),
             Op::ShiftBy { .. }
             | Op::MoveTop { .. }
             | Op::InsertField { .. }
             | Op::ExtractField { .. }
             | Op::Extend { .. }
             | Op::PackHalves { .. }
-            | Op::Unary { .. } => {
-                self.data(op);
-                Ok(())
-            }
+            | Op::Unary { .. } => self.data(op),
             _ => self.system(op),
         }
     }

@@ -1,5 +1,6 @@
 //! Multiplication and division.
 
+use crate::error::Done;
 use crate::instruction::{LongMultiply, Multiply, Op};
 use crate::machine::Machine;
 
@@ -13,7 +14,7 @@ fn products(x: u32, y: u32, exchange: bool) -> (i64, i64) {
 }
 
 impl Machine {
-    pub(super) fn multiply(&mut self, op: Op) {
+    pub(super) fn multiply(&mut self, op: Op) -> Done {
         match op {
             Op::Multiply { multiply, sets, rd, rn, rm, ra } => {
                 let (x, y) = (self.registers.get(rn), self.registers.get(rm));
@@ -47,6 +48,7 @@ impl Machine {
             }
             _ => unreachable!("only these are sent here"),
         }
+        Ok(())
     }
 
     fn product(&mut self, multiply: Multiply, x: u32, y: u32, a: u32) -> u32 {

@@ -1,11 +1,12 @@
 //! Parallel sums and differences, saturation, and selection by bytes.
 
 use super::arithmetic::{shifted, signed_saturated, unsigned_saturated};
-use crate::instruction::{Lanes, Op, Prefix};
+use crate::error::Done;
+use crate::instruction::{Op, ParallelLanes, Prefix};
 use crate::machine::Machine;
 
 impl Machine {
-    pub(super) fn parallel(&mut self, op: Op) {
+    pub(super) fn parallel(&mut self, op: Op) -> Done {
         match op {
             Op::Parallel { prefix, lanes, rd, rn, rm } => {
                 let (x, y) = (self.registers.get(rn), self.registers.get(rm));
@@ -40,24 +41,14 @@ impl Machine {
             }
             Op::Saturate { signed, rd, rn, bits, shift, amount } => {
                 let (value, _) = shifted(self.registers.get(rn), shift, amount.into(), false);
-                let value = i64::from(value as i32);
-                let (value, cut) = if signed {
-                    signed_saturated(value, bits.into())
-                } else {
-                    unsigned_saturated(value, bits.into())
-                };
+                let (value, cut) = saturated(signed, i64::from(value as i32), bits);
                 self.registers.q |= cut;
                 self.registers.set(rd, value);
             }
             Op::SaturateHalves { signed, rd, rn, bits } => {
                 let x = self.registers.get(rn);
                 let mut saturate = |value: u32| {
-                    let value = i64::from(value as i16);
-                    let (value, cut) = if signed {
-                        signed_saturated(value, bits.into())
-                    } else {
-                        unsigned_saturated(value, bits.into())
-                    };
+                    let (value, cut) = saturated(signed, i64::from(value as i16), bits);
                     self.registers.q |= cut;
                     value & 0xffff
                 };
@@ -66,26 +57,32 @@ impl Machine {
             }
             _ => unreachable!("only these are sent here"),
         }
+        Ok(())
     }
 }
 
+/// The nearest number of so many bits, and whether it differs.
+fn saturated(signed: bool, value: i64, bits: u8) -> (u32, bool) {
+    if signed { signed_saturated(value, bits.into()) } else { unsigned_saturated(value, bits.into()) }
+}
+
 /// Result, and the GE flags, which only the forms without saturation and halving set.
-fn lanewise(prefix: Prefix, lanes: Lanes, x: u32, y: u32) -> (u32, Option<u8>) {
+fn lanewise(prefix: Prefix, lanes: ParallelLanes, x: u32, y: u32) -> (u32, Option<u8>) {
     let signed = matches!(prefix, Prefix::Signed | Prefix::SignedSaturating | Prefix::SignedHalving);
-    let bytes = matches!(lanes, Lanes::Add8 | Lanes::Sub8);
+    let bytes = matches!(lanes, ParallelLanes::Add8 | ParallelLanes::Sub8);
     let width = if bytes { 8 } else { 16 };
     let lane = |value: u32, number: u32| {
         let value = value >> (number * width) << (32 - width);
         if signed { i64::from(value as i32 >> (32 - width)) } else { i64::from(value >> (32 - width)) }
     };
-    let exchanged = matches!(lanes, Lanes::AddSubExchanged | Lanes::SubAddExchanged);
+    let exchanged = matches!(lanes, ParallelLanes::AddSubExchanged | ParallelLanes::SubAddExchanged);
     let (mut result, mut flags) = (0, 0);
     for number in 0..32 / width {
         let adds = match lanes {
-            Lanes::Add16 | Lanes::Add8 => true,
-            Lanes::Sub16 | Lanes::Sub8 => false,
-            Lanes::AddSubExchanged => number == 1,
-            Lanes::SubAddExchanged => number == 0,
+            ParallelLanes::Add16 | ParallelLanes::Add8 => true,
+            ParallelLanes::Sub16 | ParallelLanes::Sub8 => false,
+            ParallelLanes::AddSubExchanged => number == 1,
+            ParallelLanes::SubAddExchanged => number == 0,
         };
         let other = lane(y, if exchanged { 1 - number } else { number });
         let sum = if adds { lane(x, number) + other } else { lane(x, number) - other };

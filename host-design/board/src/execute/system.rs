@@ -32,9 +32,7 @@ impl Machine {
             Op::Barrier => self.cycles += 1,
             Op::ClearExclusive => self.exclusive = false,
             Op::WaitForInterrupt => self.asleep = true,
-            Op::WaitForEvent => {
-                self.asleep = !std::mem::take(&mut self.event);
-            }
+            Op::WaitForEvent => self.asleep = !std::mem::take(&mut self.event),
             Op::SendEvent => self.event = true,
             Op::Svc => return Err(Fault::Supervisor.into()),
             Op::Breakpoint | Op::Undefined => {
@@ -44,15 +42,14 @@ impl Machine {
                     Err(Violation::Trap.into())
                 };
             }
-            Op::ChangeMasks { disable, primask, faultmask } => {
-                if self.registers.privileged() {
-                    self.registers.primask = if primask { disable } else { self.registers.primask };
-                    if faultmask && (!disable || self.executing_priority() > -1) {
-                        self.registers.faultmask = disable;
-                    }
-                    self.bus.system.nvic.changed = true;
+            Op::ChangeMasks { disable, primask, faultmask } if self.registers.privileged() => {
+                self.registers.primask = if primask { disable } else { self.registers.primask };
+                if faultmask && (!disable || self.executing_priority() > -1) {
+                    self.registers.faultmask = disable;
                 }
+                self.bus.system.nvic.changed = true;
             }
+            Op::ChangeMasks { .. } => {}
             Op::ReadSpecial { rd, special } => {
                 self.cycles += 1;
                 let value = self.read_special(special);

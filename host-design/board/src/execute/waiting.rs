@@ -91,7 +91,7 @@ impl Machine {
                     seen += 1;
                     true
                 }
-                Op::Load { rt, rn, place: crate::instruction::Place::Offset(_), .. } => {
+                Op::Load { rt, rn, place: crate::instruction::Addressing::Offset(_), .. } => {
                     rt != counter && rn != counter
                 }
                 Op::Alu { rd, rn, operand, .. } => rd != counter && rn != counter && !uses(operand, counter),

@@ -83,7 +83,7 @@ pub(crate) enum Unary {
 
 /// Lanes of a parallel addition or subtraction, and which of them are added or subtracted.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Lanes {
+pub(crate) enum ParallelLanes {
     Add16,
     AddSubExchanged,
     SubAddExchanged,

@@ -12,7 +12,7 @@ pub(crate) enum Unit {
 
 /// Where a single access goes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Place {
+pub(crate) enum Addressing {
     /// Base and offset.
     Offset(i32),
     /// Base and offset; the base becomes the address.

@@ -9,9 +9,9 @@ mod memory;
 mod multiply;
 mod special;
 
-pub(crate) use data::{Alu, Compare, Extend, Lanes, Operand, Prefix, Sets, Shift, Unary};
+pub(crate) use data::{Alu, Compare, Extend, Operand, ParallelLanes, Prefix, Sets, Shift, Unary};
 pub(crate) use float::{Float1, Float2};
-pub(crate) use memory::{Place, Unit};
+pub(crate) use memory::{Addressing, Unit};
 pub(crate) use multiply::{LongMultiply, Multiply};
 pub(crate) use special::Special;
 
@@ -98,13 +98,13 @@ pub(crate) enum Op {
         unit: Unit,
         rt: u8,
         rn: u8,
-        place: Place,
+        place: Addressing,
     },
     Store {
         unit: Unit,
         rt: u8,
         rn: u8,
-        place: Place,
+        place: Addressing,
     },
     LoadLiteral {
         unit: Unit,
@@ -219,7 +219,7 @@ pub(crate) enum Op {
     },
     Parallel {
         prefix: Prefix,
-        lanes: Lanes,
+        lanes: ParallelLanes,
         rd: u8,
         rn: u8,
         rm: u8,

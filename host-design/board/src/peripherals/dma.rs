@@ -11,7 +11,7 @@ const HALF: u32 = 1 << 4;
 
 /// Registers of a stream, and the length with which it was started.
 #[derive(Debug, Clone, Copy, Default)]
-struct Stream {
+struct DmaStream {
     control: u32,
     left: u32,
     length: u32,
@@ -23,7 +23,7 @@ struct Stream {
 /// Streams 0 to 7 and their flags.
 #[derive(Debug, Clone)]
 pub(crate) struct Dma {
-    streams: [Stream; 8],
+    streams: [DmaStream; 8],
     flags: [u32; 2],
     requests: Requests,
 }
@@ -173,7 +173,7 @@ impl Dma {
     }
 }
 
-impl Stream {
+impl DmaStream {
     /// Checks the settings of a stream that is enabled: bytes between the USART and memory, in the right direction.
     fn check(&self, requests: Requests, number: usize, control: u32) -> Result<(), Violation> {
         let direction = control >> 6 & 3;

@@ -67,7 +67,7 @@ pub(crate) struct Rcc {
 
 /// A source of the system clock.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Source {
+enum ClockSource {
     Hsi,
     Hse,
     Pll,
@@ -172,7 +172,8 @@ impl Rcc {
     pub(crate) fn stop_crystal(&mut self) {
         self.crystal_stopped = true;
         let watched = self.control & CSS_ON != 0 && self.control & 1 << 17 != 0;
-        let uses_it = self.source() == Source::Hse || (self.source() == Source::Pll && self.pll_from_hse());
+        let uses_it =
+            self.source() == ClockSource::Hse || (self.source() == ClockSource::Pll && self.pll_from_hse());
         self.hse_ready_at = NEVER;
         self.control &= !(1 << 17);
         if watched {
@@ -199,11 +200,11 @@ impl Rcc {
         self.pll & 1 << 22 != 0
     }
 
-    fn source(&self) -> Source {
+    fn source(&self) -> ClockSource {
         match self.configuration >> 2 & 3 {
-            1 => Source::Hse,
-            2 => Source::Pll,
-            _ => Source::Hsi,
+            1 => ClockSource::Hse,
+            2 => ClockSource::Pll,
+            _ => ClockSource::Hsi,
         }
     }
 
@@ -285,7 +286,7 @@ impl Rcc {
 
     fn write_control(&mut self, value: u32, now: Time) -> Result<(), Violation> {
         let changed = value ^ self.control;
-        if self.source() == Source::Pll && changed & PLL_ON != 0 {
+        if self.source() == ClockSource::Pll && changed & PLL_ON != 0 {
             return Err(Violation::Forbidden("the PLL is switched off while it is the system clock (7.3.1)"));
         }
         if value & 1 == 0 {

@@ -19,19 +19,19 @@ pub(crate) struct Mpu {
     /// It allows every access, whatever its registers say.
     pub(crate) ignored: bool,
     /// Cache of the blocks allowed last, by purpose and by the upper three address bits; emptied by register writes.
-    known: [[Known; 8]; 3],
+    known: [[KnownBlock; 8]; 3],
 }
 
 /// A block in which all addresses are allowed: those with `address & mask == begin`.
 #[derive(Debug, Clone, Copy)]
-struct Known {
+struct KnownBlock {
     begin: u32,
     mask: u32,
     privileged: bool,
     suspended: bool,
 }
 
-impl Default for Known {
+impl Default for KnownBlock {
     /// A block without addresses.
     fn default() -> Self {
         Self { begin: 1, mask: 0, privileged: false, suspended: false }
@@ -110,7 +110,7 @@ impl Mpu {
                 self.regions.iter().fold(by_address, |bits, region| bits.min(region.uniform_bits(address)));
             let mask = u32::MAX << bits;
             self.known[purpose as usize][(address >> 29) as usize] =
-                Known { begin: address & mask, mask, privileged, suspended };
+                KnownBlock { begin: address & mask, mask, privileged, suspended };
         }
         allowed
     }

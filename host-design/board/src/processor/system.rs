@@ -28,14 +28,14 @@ pub(crate) struct System {
     pub(crate) fpdscr: u32,
     demcr: u32,
     dwt_control: u32,
-    cycles: Cycles,
+    cycles: CycleCounter,
     /// A system reset was requested (SYSRESETREQ).
     pub(crate) reset_requested: bool,
 }
 
 /// The cycle counter: its value `base` at the time `since`.
 #[derive(Debug, Clone, Copy)]
-struct Cycles {
+struct CycleCounter {
     base: u32,
     since: Time,
 }
@@ -60,7 +60,7 @@ impl System {
             fpdscr: 0,
             demcr: 0,
             dwt_control: 0x4000_0000,
-            cycles: Cycles { base: 0, since: 0 },
+            cycles: CycleCounter { base: 0, since: 0 },
             reset_requested: false,
         }
     }
@@ -83,7 +83,7 @@ impl System {
 
     /// The core clock changes from period `old` to `new`.
     pub(crate) fn change_clock(&mut self, now: Time, old: Time, new: Time) {
-        self.cycles = Cycles { base: self.cycle_count(now, old), since: now };
+        self.cycles = CycleCounter { base: self.cycle_count(now, old), since: now };
         self.systick.change_clock(now, old, new);
     }
 
@@ -143,9 +143,9 @@ impl System {
                 } else {
                     self.demcr = value
                 }
-                self.cycles = Cycles { base, since: now };
+                self.cycles = CycleCounter { base, since: now };
             }
-            0xe000_1004 => self.cycles = Cycles { base: value, since: now },
+            0xe000_1004 => self.cycles = CycleCounter { base: value, since: now },
             // The lock access register of the DWT, which is not locked for the processor.
             0xe000_1fb0 => {}
             0xe000_e010..0xe000_e020 if self.systick.write(address, value, now, hclk) => {}

@@ -31,7 +31,7 @@ fn widening(kind: Kind) -> Widening {
         Kind::Delay => [0.5, 8e-3],
         Kind::DeadZone => [0.65, 0.0],
         Kind::Zero(_) => [0.35, 7e-3],
-        Kind::EccentricSine(_) | Kind::EccentricCosine(_) => [1.0, 0.0],
+        Kind::AirDrag(_) | Kind::EccentricSine(_) | Kind::EccentricCosine(_) => [1.0, 0.0],
     };
     Widening { of_change, least }
 }

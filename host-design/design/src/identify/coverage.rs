@@ -6,7 +6,8 @@ use serde::{Deserialize, Serialize};
 
 use super::chain_of;
 use super::error::IdentifyError;
-use super::estimate::{Identification, Settings, identify};
+use super::estimate::{Settings, identify};
+use super::estimated::Identification;
 use super::excite::shake_machine;
 use super::machines::Machine;
 use super::parameters::Kind;
@@ -82,7 +83,7 @@ impl Quantity {
             Kind::Tilt => Self::Tilt,
             Kind::Delay => Self::Delay,
             Kind::Zero(_) => Self::Zero,
-            Kind::EccentricSine(_) | Kind::EccentricCosine(_) => return None,
+            Kind::AirDrag(_) | Kind::EccentricSine(_) | Kind::EccentricCosine(_) => return None,
         })
     }
 

@@ -2,6 +2,8 @@
 
 use std::path::PathBuf;
 
+use super::table::TableError;
+
 /// Why a log cannot be read.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum LogError {
@@ -49,6 +51,14 @@ pub enum IdentifyError {
         file: PathBuf,
         /// Why it cannot be read.
         source: LogError,
+    },
+    /// A table of measurements cannot be used.
+    #[error("{}: {source}", file.display())]
+    Table {
+        /// Path of the table.
+        file: PathBuf,
+        /// Why it cannot be used.
+        source: TableError,
     },
     /// The rig file has no chain with encoders.
     #[error(
@@ -104,7 +114,10 @@ impl IdentifyError {
     pub fn is_without_solution(&self) -> bool {
         !matches!(
             self,
-            IdentifyError::Log { .. } | IdentifyError::NoEncoders(_) | IdentifyError::OtherRig { .. }
+            IdentifyError::Log { .. }
+                | IdentifyError::Table { .. }
+                | IdentifyError::NoEncoders(_)
+                | IdentifyError::OtherRig { .. }
         )
     }
 }

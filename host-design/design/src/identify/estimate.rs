@@ -5,14 +5,19 @@ use std::path::PathBuf;
 use super::chain_of;
 use super::covariance::{changes, deviations};
 use super::error::IdentifyError;
-use super::log::{DriveScale, Log};
+use super::estimated::{Estimate, Identification};
+use super::free;
+use super::log::Log;
+use super::old_values::old_values;
 use super::parameters::{Kind, Layout, Prior, priors};
 use super::prediction::Filter;
-use super::realise::{Realised, realise};
+use super::realise::realise;
 use super::record::Record;
+use super::recordings::{Recorded, Recordings};
 use super::shooting::{Shooting, WINDOW_S};
-use super::verdict::{ChannelFit, HeldOut, Predicted, Refusal, channels, judge};
-use super::wiring::{self, WiringFound};
+use super::verdict::{HeldOut, Predicted, Refusal, channels, judge, judge_windows};
+use super::window_errors::window_errors;
+use super::wiring;
 use crate::parallel::Progress;
 use crate::rig::Rig;
 
@@ -38,107 +43,6 @@ pub struct Settings {
     pub trust_wiring: bool,
 }
 
-/// An identified parameter, in the unit of its [`Kind`].
-#[derive(Debug, Clone, PartialEq)]
-pub struct Estimate {
-    /// Which parameter it is.
-    pub kind: Kind,
-    /// Value of the rig file, or the start value that is assumed if the file has none.
-    pub old: f64,
-    /// Identified value.
-    pub new: f64,
-    /// Standard deviation of the identified value.
-    pub deviation: f64,
-    /// Whether the log says little about it: the deviation exceeds half of the prior one.
-    pub held_by_prior: bool,
-}
-
-/// Result of an identification.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Identification {
-    /// Duration of the logs without their gaps (s).
-    pub seconds: f64,
-    /// Number of ticks that are missing in the logs.
-    pub lost_ticks: u64,
-    /// Largest angle of a link from hanging (rad).
-    pub largest_angle_rad: f64,
-    /// Result of the wiring check; none if the wiring was taken on trust.
-    pub wiring: Option<WiringFound>,
-    /// All parameters that are identified; none if the wiring is wrong.
-    pub estimates: Vec<Estimate>,
-    /// Time from one sample to the next (s).
-    pub sample_s: f64,
-    /// Correlations of the estimates, row by row.
-    pub correlations: Vec<f64>,
-    /// How well the model explains each channel.
-    pub channels: Vec<ChannelFit>,
-    /// The numbers for the rig file; none if the wiring is wrong or the numbers are not physical.
-    pub realised: Option<Realised>,
-    /// Delay that the rig file states (ticks).
-    pub delay_ticks: u8,
-    /// Why no rig file may be written; none if it may.
-    pub refusal: Option<Refusal>,
-}
-
-impl Identification {
-    /// The estimate of a parameter, if it was identified.
-    pub fn estimate(&self, kind: Kind) -> Option<&Estimate> {
-        self.estimates.iter().find(|estimate| estimate.kind == kind)
-    }
-
-    /// The delay that the rig file should state (ticks), if that differs from the one it states.
-    pub fn other_delay(&self) -> Option<u8> {
-        let delay = self.estimate(Kind::Delay)?;
-        match self.delay_ticks {
-            0 if delay.new > 0.5 + 2.0 * delay.deviation => Some(1),
-            1 if delay.new < -0.5 - 2.0 * delay.deviation => Some(0),
-            _ => None,
-        }
-    }
-}
-
-/// Checks that a log was recorded on the rig.
-fn is_of(rig: &Rig, log: &Log, file: &std::path::Path) -> Result<(), IdentifyError> {
-    let other = |found: String, wanted: String, remedy: &str| {
-        Err(IdentifyError::OtherRig { file: file.to_owned(), found, wanted, remedy: remedy.to_owned() })
-    };
-    let (header, channels) = (&log.header, rig.sensors().len());
-    if header.rig != rig.name {
-        return other(
-            format!("{:?}", header.rig),
-            format!("that of {:?}", rig.name),
-            "name the rig file of this machine",
-        );
-    }
-    if log.channels() != channels {
-        return other(
-            format!("{} encoders", log.channels()),
-            format!("for {channels}"),
-            "name the rig file that the firmware was built from",
-        );
-    }
-    let period_ns = (rig.tick.period_s * 1e9).round();
-    if f64::from(header.period_ns) != period_ns {
-        return other(
-            format!("a machine with a tick of {} ns", header.period_ns),
-            format!("for {period_ns} ns"),
-            "correct period_s in [tick], or record again",
-        );
-    }
-    let has_motor = rig.actuator.motor.is_some();
-    if has_motor != (header.drive == DriveScale::Duty) {
-        let names = ["a machine that commands forces", "a machine that commands duties"];
-        let (found, wanted) =
-            (names[usize::from(!has_motor)], ["without a motor", "with a motor"][usize::from(has_motor)]);
-        return other(
-            found.to_owned(),
-            wanted.to_owned(),
-            "describe the motor in [actuator] as when it was recorded",
-        );
-    }
-    Ok(())
-}
-
 /// Identifies the machine of `rig` from its logs, each with the path of its file.
 ///
 /// # Errors
@@ -150,16 +54,28 @@ pub fn identify(
     settings: &Settings,
     progress: Progress<'_>,
 ) -> Result<Identification, IdentifyError> {
+    identify_recordings(rig, &Recordings::Logs(logs.to_vec()), None, settings, progress)
+}
+
+/// Identifies the machine of `rig` from its recordings. Without a drive in them, the scale of masses and frictions stays
+/// that of the file. The recordings `predict` are not used, but predicted with the old and the new numbers.
+///
+/// # Errors
+/// [`IdentifyError`] if a recording is not of the rig, they are too short, or a channel does not move in them. A misfit
+/// is not an error: see [`Identification::refusal`].
+pub fn identify_recordings(
+    rig: &Rig,
+    recordings: &Recordings,
+    predict: Option<&Recordings>,
+    settings: &Settings,
+    progress: Progress<'_>,
+) -> Result<Identification, IdentifyError> {
     let chain = chain_of(rig)?;
-    logs.iter().try_for_each(|(file, log)| is_of(rig, log, file))?;
-    let lost_ticks = logs.iter().map(|(_, log)| log.lost()).sum();
-    let logs: Vec<Log> = logs.iter().map(|(_, log)| log.clone()).collect();
-    let stride = Record::usual_stride(rig.tick.period_s);
-    let record = Record::of(rig, &logs, stride);
+    let Recorded { record, finer, lost_ticks, is_driven } = recordings.recorded(rig)?;
     record.at_least(LEAST_S)?;
     record.moves()?;
     let model = record.model(chain.gravity_m_per_s2);
-    let priors = priors(rig, chain, settings.eccentricity);
+    let mut priors = priors(rig, chain, settings.eccentricity);
     let mut found = Identification {
         seconds: record.seconds(),
         lost_ticks,
@@ -169,11 +85,17 @@ pub fn identify(
         sample_s: record.dt_s,
         correlations: Vec::new(),
         channels: Vec::new(),
+        is_driven,
+        left_out: Vec::new(),
+        predicted: Vec::new(),
         realised: None,
         delay_ticks: rig.tick.delay_ticks,
         refusal: None,
     };
-    if !settings.trust_wiring {
+    if !is_driven {
+        free::known(rig, model.layout, &mut priors, record.is_clamped);
+    }
+    if is_driven && !settings.trust_wiring {
         progress(Some(("wiring", wiring::count(record.channels))));
         let wiring = wiring::find(&model, &record, &priors, &|| progress(None));
         found.wiring = Some(wiring.clone());
@@ -182,18 +104,34 @@ pub fn identify(
             return Ok(found);
         }
     }
-    let held_s = HELD_OUT.0.min(HELD_OUT.1 * record.seconds());
-    let used_s = record.seconds() - held_s;
-    let finer = (stride > 1).then(|| Record::of(rig, &logs, (stride / 2).max(1)).part(0.0, used_s));
-    let (used, held) = (record.part(0.0, used_s), record.part(used_s, used_s + held_s + 1.0));
-    let fitted = Fitted { rig, priors: &priors, used: &used, held: &held, finer: finer.as_ref() };
-    fitted.run(&model, &mut found, progress)?;
-    let p: Vec<f64> = fitted.full(&found);
+    let p = if is_driven {
+        let held_s = HELD_OUT.0.min(HELD_OUT.1 * record.seconds());
+        let used_s = record.seconds() - held_s;
+        let finer = finer.map(|finer| finer.part(0.0, used_s));
+        let (used, held) = (record.part(0.0, used_s), record.part(used_s, used_s + held_s + 1.0));
+        let fitted = Fitted { rig, priors: &priors, used: &used, held: &held, finer: finer.as_ref() };
+        fitted.run(&model, &mut found, progress)?;
+        fitted.full(&found)
+    } else {
+        progress(Some(("free swings", free::FITS)));
+        let free = free::fit(&model, &record, &priors, &|| progress(None))?;
+        free.write(rig, &model, &priors, &mut found);
+        free.p
+    };
+    if let Some(recordings) = predict {
+        let other = recordings.recorded(rig)?.record;
+        let start: Vec<f64> = priors.iter().map(|prior| prior.value).collect();
+        let old = old_values(rig, model.layout, &start, &p);
+        found.predicted = window_errors(&model, &priors, &[(&other, [&old, &p])]);
+    }
     match realise(chain, &p, settings.weighed_kg_m) {
         Ok(realised) => found.realised = Some(realised),
         Err(error) => found.refusal = Some(error.into()),
     }
-    if let Err(refusal) = judge(&found.channels) {
+    if is_driven && let Err(refusal) = judge(&found.channels) {
+        found.refusal = Some(refusal);
+    }
+    if let Err(refusal) = judge_windows(&found.left_out) {
         found.refusal = Some(refusal);
     }
     Ok(found)
@@ -253,6 +191,7 @@ impl Fitted<'_> {
                 old: self.priors[i].value,
                 new: p[i],
                 deviation: deviations[i],
+                halves: None,
                 held_by_prior: deviations[i] > 0.5 * self.priors[i].deviation,
             })
             .collect();
@@ -268,31 +207,11 @@ impl Fitted<'_> {
             &noise,
             false,
         ));
-        let old = self.old_values(&start, &p);
+        let old = old_values(self.rig, model.layout, &start, &p);
         let held = self.held_out(&model, [&old, &p]);
         let ranges: Vec<f64> = (0..self.used.channels).map(|channel| self.used.extent(channel)[1]).collect();
         found.channels = channels(&over, held, &ranges);
         Ok(())
-    }
-
-    /// The values of the file, but with tilt, delay and zeros as identified from this log: a file does not have them.
-    fn old_values(&self, start: &[f64], p: &[f64]) -> Vec<f64> {
-        let layout = Layout { links: self.used.channels - 1 };
-        let mut old = start.to_vec();
-        let of_log = [layout.tilt(), layout.delay()];
-        for i in of_log.into_iter().chain((0..layout.links).map(|joint| layout.zero(joint))) {
-            old[i] = p[i];
-        }
-        for contact in 0..=layout.links {
-            // The start value of a dry friction may be an assumption that is not in the file.
-            let friction = &self.rig.reality.friction;
-            let given = match contact.checked_sub(1) {
-                None => friction.cart_friction_n,
-                Some(joint) => friction.joint_friction_n_m.of(joint),
-            };
-            old[layout.dry(contact)] = given;
-        }
-        old
     }
 
     /// Predictions over windows whose initial states are fitted, with both sets of `values`: those of the old file and

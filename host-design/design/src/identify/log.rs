@@ -10,8 +10,6 @@ use upright::table::checksum::crc32;
 
 use super::error::LogError;
 
-/// The first bytes of a log.
-const MAGIC: &[u8; 8] = b"UPRTLOG1";
 /// Number of ticks in a full frame.
 const FRAME_TICKS: usize = 10;
 /// Largest file that is read (bytes): a day of one link, or nine hours of four.
@@ -67,6 +65,9 @@ pub struct Log {
 }
 
 impl Log {
+    /// The first bytes of the file of a log.
+    pub const MARK: &'static [u8; 8] = b"UPRTLOG1";
+
     /// An empty log.
     pub fn new(header: Header) -> Self {
         Self { header, ticks: Vec::new(), counts: Vec::new() }
@@ -226,7 +227,7 @@ impl Header {
         body.extend(self.period_ns.to_le_bytes());
         body.extend(full.to_le_bytes());
         body.extend(self.hanging.iter().flat_map(|count| count.to_le_bytes()));
-        let mut bytes = MAGIC.to_vec();
+        let mut bytes = Log::MARK.to_vec();
         bytes.extend(with_checksum(body));
         bytes
     }
@@ -237,11 +238,11 @@ fn header(bytes: &[u8]) -> Result<(Header, &[u8]), LogError> {
     if bytes.is_empty() {
         return Err(LogError::Empty);
     }
-    let Some(body) = bytes.strip_prefix(MAGIC) else {
-        let foreign = !MAGIC.starts_with(bytes);
+    let Some(body) = bytes.strip_prefix(Log::MARK) else {
+        let foreign = !Log::MARK.starts_with(bytes);
         return Err(if foreign { LogError::Foreign } else { LogError::Truncated { at: 0 } });
     };
-    let at = MAGIC.len();
+    let at = Log::MARK.len();
     let [channels, kind, name_length] = *body.first_chunk::<3>().ok_or(LogError::Truncated { at })?;
     let (channels, name_length) = (usize::from(channels), usize::from(name_length));
     let length = 3 + name_length + 8 + 4 + 8 + 2 * channels + 4;

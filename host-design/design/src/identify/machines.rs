@@ -100,7 +100,7 @@ fn truth(rig: &Rig) -> Result<Vec<(Kind, f64)>, IdentifyError> {
         Kind::Delay => Some(rig.reality.driver.latency_s / rig.tick.period_s),
         Kind::DeadZone => rig.actuator.motor.as_ref().map(|motor| motor.dead_zone_v),
         Kind::Zero(j) => Some(sensors.homing_error_rad.of(j)),
-        Kind::EccentricSine(_) | Kind::EccentricCosine(_) => None,
+        Kind::AirDrag(_) | Kind::EccentricSine(_) | Kind::EccentricCosine(_) => None,
     };
     let kinds = Layout { links: real.links.len() }.kinds();
     Ok(kinds.into_iter().filter_map(|kind| Some((kind, value(kind)?))).collect())

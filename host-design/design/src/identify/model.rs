@@ -15,12 +15,14 @@ use super::rows::add_multiple;
 ///
 /// ```text
 /// M_t ẍ - Σ a_j cos φ_j φ̈_j + Σ a_j sin φ_j φ̇_j² = u - (d_0 + e) ẋ - c_0 ζ - g M_t sin α
-/// -a_j cos φ_j ẍ + Σ_k b_jk (cos(φ_j - φ_k) φ̈_k + sin(φ_j - φ_k) φ̇_k²) - g a_j sin(φ_j + α) = τ_j - τ_{j+1}
+/// -a_j cos φ_j ẍ + Σ_k b_jk (cos(φ_j - φ_k) φ̈_k + sin(φ_j - φ_k) φ̇_k²) - g a_j sin(φ_j + α)
+///     = τ_j - τ_{j+1} - q_j |φ̇_j| φ̇_j
 /// τ_i = -d_i θ̇_i - c_i tanh(θ̇_i/ε),   θ̇_i = φ̇_i - φ̇_{i-1}
 /// dζ/dx = (1 - ζ sgn ẋ)/δ
 /// ```
 ///
-/// where e is the damping by the motor's back-EMF. A cart that reverses is held by its friction until the bristle has
+/// where e is the damping by the motor's back-EMF, and q_j the air drag of link j. A cart that is clamped has ẍ = 0
+/// instead of the first equation. A cart that reverses is held by its friction until the bristle has
 /// reversed, too (P. R. Dahl, "Solid friction damping of mechanical vibrations", AIAA Journal 14(12), 1976); with a
 /// friction model without memory it would creep instead.
 #[derive(Debug, Clone)]
@@ -29,6 +31,8 @@ pub(super) struct Model {
     pub(super) gravity: f64,
     /// δ of the cart (m) and ε of the joints (rad/s).
     pub(super) smoothing: [f64; 2],
+    /// Whether the cart cannot move.
+    pub(super) is_clamped: bool,
 }
 
 /// Force on the cart in a step (N), and its derivatives.
@@ -142,10 +146,14 @@ impl Local {
             }
             let friction = model.friction(p, j, w[j] - below)[0];
             below = w[j];
-            right[j + 1] = torque - friction;
+            right[j + 1] = torque - friction - p[layout.drag(j)] * w[j].abs() * w[j];
             if j > 0 {
                 right[j] += friction;
             }
+        }
+        if model.is_clamped {
+            (self.factors[0], right[0]) = (1.0, 0.0);
+            (1..m).for_each(|row| self.factors[row * m] = 0.0);
         }
         factorise(&mut self.factors, m);
         solve(&self.factors, m, 1, &mut self.acceleration);
@@ -158,6 +166,9 @@ impl Local {
         self.by_state(model, p, at, input);
         if self.columns > model.states() {
             self.by_parameters(model, p, at, input);
+        }
+        if model.is_clamped {
+            self.jacobian[..self.columns].fill(0.0);
         }
         solve(&self.factors, model.coordinates(), self.columns, &mut self.jacobian);
     }
@@ -189,7 +200,7 @@ impl Local {
             }
             let slope = model.friction(p, j, w[j] - below)[1];
             below = w[j];
-            by[row + m + 1 + j] -= slope;
+            by[row + m + 1 + j] -= slope + 2.0 * p[layout.drag(j)] * w[j].abs();
             if j > 0 {
                 by[row + m + j] += slope;
                 by[row - columns + m + 1 + j] += slope;
@@ -235,6 +246,7 @@ impl Local {
             let rate = w[j] - below;
             below = w[j];
             let direction = model.friction(p, j, rate)[2];
+            by[row + layout.drag(j)] -= w[j].abs() * w[j];
             by[row + layout.viscous(j + 1)] -= rate;
             by[row + layout.dry(j + 1)] -= direction;
             if j > 0 {
@@ -312,9 +324,14 @@ pub(super) mod tests {
     pub(in crate::identify) fn triple() -> (Model, Vec<f64>, ChainPlant<3>) {
         let rig = Rig::from_path(Path::new("../../rigs/triple-glueck-eder-kugi.toml")).unwrap();
         let PlantDescription::Chain(chain) = &rig.plant else { panic!("a chain") };
-        let model =
-            Model { layout: Layout { links: 3 }, gravity: chain.gravity_m_per_s2, smoothing: SMOOTHING };
-        let p = priors(&rig, chain, true).iter().map(|prior| prior.value).collect();
+        let model = Model {
+            layout: Layout { links: 3 },
+            gravity: chain.gravity_m_per_s2,
+            smoothing: SMOOTHING,
+            is_clamped: false,
+        };
+        let mut p: Vec<f64> = priors(&rig, chain, true).iter().map(|prior| prior.value).collect();
+        (0..3).for_each(|link| p[Layout { links: 3 }.drag(link)] = 0.02);
         (model, p, ChainPlant::of(chain).unwrap())
     }
 
@@ -324,6 +341,7 @@ pub(super) mod tests {
     fn without_dry_friction_and_tilt_it_is_the_plant() {
         let (model, mut p, plant) = triple();
         (0..=3).for_each(|contact| p[model.layout.dry(contact)] = 0.0);
+        (0..3).for_each(|link| p[model.layout.drag(link)] = 0.0);
         let mut local = Local::new(model.layout, false);
         local.accelerate(&model, &p, &AT, &Input { force: 17.0, ..Input::default() });
         let state = ChainState { x: 0.1, xdot: -0.7, phi: [2.0, -1.1, 0.4], phidot: [3.0, -5.0, 1.5] };

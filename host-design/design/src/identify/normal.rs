@@ -92,6 +92,36 @@ impl Normal {
         self.size
     }
 
+    /// The solution δ with the diagonal of A multiplied by 1 + `damping` and each `δ_i >= low_i`: an entry that would fall
+    /// below is held there, and the others are solved again (active set). None if A is not positive definite.
+    pub(super) fn bounded_step(&self, damping: f64, low: &[f64]) -> Option<Vec<f64>> {
+        let is_held = |(&low, &gradient): (&f64, &f64)| low >= 0.0 && gradient <= 0.0;
+        let mut held: Vec<bool> = low.iter().zip(&self.gradient).map(is_held).collect();
+        loop {
+            let mut rest = self.clone();
+            (0..self.size).filter(|&i| held[i]).for_each(|i| rest.hold(i, low[i]));
+            let mut step = rest.gradient.clone();
+            rest.factor(damping)?.solve(&mut step);
+            (0..self.size).filter(|&i| held[i]).for_each(|i| step[i] = low[i]);
+            let below: Vec<usize> = (0..self.size).filter(|&i| step[i] < low[i]).collect();
+            if below.is_empty() {
+                return Some(step);
+            }
+            below.into_iter().for_each(|i| held[i] = true);
+        }
+    }
+
+    /// Replaces the equation of one unknown by `δ_index = value`.
+    fn hold(&mut self, index: usize, value: f64) {
+        for other in 0..self.size {
+            let entry = self.entry(index, other);
+            self.gradient[other] -= entry * value;
+            self.matrix[index.max(other) * self.size + index.min(other)] = 0.0;
+        }
+        self.matrix[index * self.size + index] = 1.0;
+        self.gradient[index] = value;
+    }
+
     /// Factor of A with its diagonal multiplied by 1 + `damping`; none if that is not positive definite.
     pub(super) fn factor(&self, damping: f64) -> Option<Cholesky> {
         let n = self.size;
@@ -151,6 +181,19 @@ impl Cholesky {
 #[cfg(test)]
 mod tests {
     use super::Normal;
+
+    #[test]
+    fn an_unknown_at_its_bound_is_held_and_the_others_are_solved_with_it() {
+        let mut normal = Normal::new(2, 1);
+        normal.add(&[1.0, 0.9], -1.0, 1.0);
+        normal.add(&[0.9, 1.0], 1.0, 1.0);
+        // Without bounds the first is about -10, the second 10.
+        let free = normal.bounded_step(0.0, &[f64::NEG_INFINITY; 2]).unwrap();
+        assert!(free[0] < -9.0 && free[1] > 9.0);
+        let step = normal.bounded_step(0.0, &[-0.5, f64::NEG_INFINITY]).unwrap();
+        // Least squares of -1 + 0.45 - 0.9 x and 1 + 0.45 - x.
+        assert!(step[0] == -0.5 && (step[1] - (1.45 - 0.9 * 0.5) / 1.81).abs() < 1e-12, "{step:?}");
+    }
 
     #[test]
     fn a_line_through_points_is_found() {

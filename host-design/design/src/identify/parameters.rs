@@ -26,6 +26,8 @@ pub enum Kind {
     CartDry,
     /// c_j: dry friction of a joint (N·m).
     JointDry(usize),
+    /// q_j: air drag of a link, by the square of its rate (N·m·s²/rad²).
+    AirDrag(usize),
     /// Slope of the rail (rad).
     Tilt,
     /// Delay of the force beyond `delay_ticks` (ticks).
@@ -53,6 +55,7 @@ impl Kind {
             Kind::JointViscous(j) => (of("viscous friction, joint", j), "N·m·s/rad"),
             Kind::CartDry => ("dry friction, cart".to_owned(), "N"),
             Kind::JointDry(j) => (of("dry friction, joint", j), "N·m"),
+            Kind::AirDrag(j) => (of("air drag, link", j), "N·m·s²/rad²"),
             Kind::Tilt => ("tilt of the rail".to_owned(), "rad"),
             Kind::Delay => ("delay".to_owned(), "ticks"),
             Kind::DeadZone => ("dead zone".to_owned(), "V"),
@@ -87,30 +90,37 @@ impl Layout {
     pub(super) fn dry(self, contact: usize) -> usize {
         4 * self.links + 1 + contact
     }
+    pub(super) fn drag(self, link: usize) -> usize {
+        5 * self.links + 2 + link
+    }
     pub(super) fn tilt(self) -> usize {
-        5 * self.links + 2
+        6 * self.links + 2
     }
     pub(super) fn delay(self) -> usize {
-        5 * self.links + 3
+        6 * self.links + 3
     }
     pub(super) fn dead_zone(self) -> usize {
-        5 * self.links + 4
+        6 * self.links + 4
     }
     pub(super) fn zero(self, joint: usize) -> usize {
-        5 * self.links + 5 + joint
-    }
-    pub(super) fn sine(self, joint: usize) -> usize {
         6 * self.links + 5 + joint
     }
-    pub(super) fn cosine(self, joint: usize) -> usize {
+    pub(super) fn sine(self, joint: usize) -> usize {
         7 * self.links + 5 + joint
+    }
+    pub(super) fn cosine(self, joint: usize) -> usize {
+        8 * self.links + 5 + joint
+    }
+    /// Whether a parameter is the friction of a joint or the drag of a link.
+    pub(super) fn is_dissipative(self, index: usize) -> bool {
+        (self.viscous(1)..self.tilt()).contains(&index) && index != self.dry(0)
     }
     /// Number of parameters on which the motion depends: they come first; the others belong to the encoders.
     pub(super) fn of_motion(self) -> usize {
-        5 * self.links + 5
+        6 * self.links + 5
     }
     pub(super) fn count(self) -> usize {
-        8 * self.links + 5
+        9 * self.links + 5
     }
 
     /// What each parameter is, in order.
@@ -124,6 +134,7 @@ impl Layout {
         kinds.extend((0..n).map(Kind::JointViscous));
         kinds.push(Kind::CartDry);
         kinds.extend((0..n).map(Kind::JointDry));
+        kinds.extend((0..n).map(Kind::AirDrag));
         kinds.extend([Kind::Tilt, Kind::Delay, Kind::DeadZone]);
         kinds.extend((0..n).map(Kind::Zero));
         kinds.extend((0..n).map(Kind::EccentricSine));
@@ -139,6 +150,15 @@ pub(super) struct Prior {
     pub(super) value: f64,
     /// Standard deviation; 0: the parameter is not identified.
     pub(super) deviation: f64,
+}
+
+/// How far each parameter may fall, in its prior deviations: frictions of joints and drags of links are at least 0.
+pub(super) fn room_below(layout: Layout, priors: &[Prior], p: &[f64]) -> Vec<f64> {
+    let of = |(index, (prior, p)): (usize, (&Prior, &f64))| {
+        let is_bounded = layout.is_dissipative(index) && prior.deviation > 0.0;
+        if is_bounded { -p / prior.deviation } else { f64::NEG_INFINITY }
+    };
+    priors.iter().zip(p).enumerate().map(of).collect()
 }
 
 /// Relative deviation of masses, lengths and moments.
@@ -176,6 +196,7 @@ pub(super) fn priors(rig: &Rig, chain: &Chain, eccentricity: bool) -> Vec<Prior>
         Kind::JointViscous(j) => viscous(constants.joint_frictions[j], joint_viscous(j)),
         Kind::CartDry => dry(friction.cart_friction_n, 0.01 * weight),
         Kind::JointDry(j) => dry(friction.joint_friction_n_m.of(j), 0.001 * gravity * constants.a[j]),
+        Kind::AirDrag(_) => Prior { value: 0.0, deviation: 0.0 },
         Kind::Tilt => Prior { value: 0.0, deviation: ZERO_RAD },
         Kind::Delay => Prior { value: 0.5, deviation: 0.5 },
         Kind::DeadZone => motor.map_or(Prior { value: 0.0, deviation: 0.0 }, |motor| Prior {

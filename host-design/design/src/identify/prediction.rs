@@ -5,7 +5,7 @@
 
 use super::model::{Input, Model};
 use super::normal::Normal;
-use super::parameters::{Layout, Prior};
+use super::parameters::{Layout, Prior, room_below};
 use super::record::Record;
 use super::rows::add_multiple;
 use super::shooting::scaled;
@@ -125,10 +125,8 @@ impl Filter<'_> {
         let mut p = p.to_vec();
         let mut normal = self.run(&p, noise, true);
         for _ in 0..iterations {
-            let mut step = normal.gradient.clone();
-            let factor = normal.factor(0.0)?;
-            factor.solve(&mut step);
-            let inverse = factor.inverse();
+            let step = normal.bounded_step(0.0, &room_below(self.model.layout, self.priors, &p))?;
+            let inverse = normal.factor(0.0)?.inverse();
             let deviations = (0..step.len()).map(|i| inverse[i * step.len() + i].sqrt());
             let furthest = step
                 .iter()

@@ -11,6 +11,7 @@ use super::error::IdentifyError;
 use super::log::{DriveScale, Log};
 use super::model::{Input, Model};
 use super::parameters::Layout;
+use super::table::Rows;
 use super::wiring::channel_name;
 use crate::rig::{Motor, Rig};
 
@@ -41,27 +42,56 @@ pub(super) struct Record {
     pub(super) steps: Vec<f64>,
     motor: Option<Motor>,
     delay_ticks: usize,
+    /// Whether the cart cannot move; its channel is then 0.
+    pub(super) is_clamped: bool,
 }
 
 impl Record {
     /// The samples of `logs`, every `stride` ticks.
     pub(super) fn of(rig: &Rig, logs: &[Log], stride: usize) -> Self {
-        let period_s = rig.tick.period_s;
+        let mut record = Self::empty(rig, rig.tick.period_s, stride);
+        for log in logs {
+            record.add(rig, log);
+        }
+        record
+    }
+
+    /// No samples, of recordings with a row every `period_s`.
+    pub(super) fn empty(rig: &Rig, period_s: f64, stride: usize) -> Self {
         let steps: Vec<f64> = rig.sensors().iter().map(|sensor| sensor.step()).collect();
         let channels = steps.len();
-        let mut record = Self {
+        Self {
             pieces: Vec::new(),
             channels,
             stride,
             dt_s: stride as f64 * period_s,
             motor: rig.actuator.motor.clone(),
             delay_ticks: usize::from(rig.tick.delay_ticks),
+            is_clamped: false,
             steps,
-        };
-        for log in logs {
-            record.add(rig, log);
+        }
+    }
+
+    /// A record of measurements of other programs: the drive is a force if `is_force`.
+    pub(super) fn of_rows(rig: &Rig, pieces: Vec<Rows>, is_force: bool, is_clamped: bool) -> Self {
+        let period_s = pieces.first().map_or(rig.tick.period_s, |rows| rows.period_s);
+        let mut record = Self::empty(rig, period_s, Self::usual_stride(period_s));
+        record.is_clamped = is_clamped;
+        if is_force {
+            record.motor = None;
+        }
+        let (stride, channels) = (record.stride, record.channels);
+        for rows in pieces.into_iter().filter(|rows| rows.drive.len() as f64 * period_s >= SHORTEST_PIECE_S) {
+            let y = rows.y.chunks(channels).step_by(stride).flatten().copied().collect();
+            record.pieces.push(Piece { y, drive: rows.drive });
         }
         record
+    }
+
+    /// The pieces of both.
+    pub(super) fn with(mut self, other: Self) -> Self {
+        self.pieces.extend(other.pieces);
+        self
     }
 
     /// The usual stride for a control period (s).
@@ -239,8 +269,9 @@ impl Record {
     /// counts.
     pub(super) fn moves(&self) -> Result<(), IdentifyError> {
         let is_still = |channel: usize| self.extent(channel)[1] < 10.0 * self.steps[channel];
-        match (0..self.channels).find(|&channel| is_still(channel)) {
-            Some(_) if (0..self.channels).all(is_still) => Err(IdentifyError::NothingMoves),
+        let first = usize::from(self.is_clamped);
+        match (first..self.channels).find(|&channel| is_still(channel)) {
+            Some(_) if (first..self.channels).all(is_still) => Err(IdentifyError::NothingMoves),
             Some(channel) => Err(IdentifyError::Still(channel_name(channel))),
             None => Ok(()),
         }
@@ -269,6 +300,7 @@ impl Record {
             layout: Layout { links: self.channels - 1 },
             gravity,
             smoothing: super::parameters::SMOOTHING,
+            is_clamped: self.is_clamped,
         }
     }
 }

@@ -5,7 +5,7 @@
 
 use super::model::{Input, Model};
 use super::normal::{Cholesky, Normal};
-use super::parameters::Prior;
+use super::parameters::{Prior, room_below};
 use super::record::Record;
 use super::rows::{add_multiple, set_multiple};
 use super::step::Step;
@@ -107,6 +107,13 @@ impl Shooting<'_> {
         fit
     }
 
+    /// Inverse of the normal matrix of the scaled parameters, with the initial states eliminated; none if there is none.
+    pub(super) fn inverse(&self, fit: &Fit) -> Option<Vec<f64>> {
+        let weights: Vec<f64> =
+            fit.rms.iter().zip(&self.record.steps).map(|(rms, step)| rms.max(0.2 * step).powi(-2)).collect();
+        Some(self.linearise(fit, &weights).0.factor(0.0)?.inverse())
+    }
+
     /// Predictions of `fit` in its windows: piece, sample, and the predicted measurements of all channels.
     pub(super) fn predictions(&self, fit: &Fit) -> Vec<(usize, usize, Vec<f64>)> {
         let (model, layout) = (self.model, self.model.layout);
@@ -185,10 +192,10 @@ impl Shooting<'_> {
         damping: f64,
         share: f64,
     ) -> Option<Fit> {
-        let mut step = normal.gradient.clone();
-        normal.factor(damping)?.solve(&mut step);
         let mut trial = fit.clone();
+        let mut step = Vec::new();
         if self.free {
+            step = normal.bounded_step(damping, &room_below(self.model.layout, self.priors, &fit.p))?;
             for ((p, prior), step) in trial.p.iter_mut().zip(self.priors).zip(&step) {
                 *p += prior.deviation * step;
             }

@@ -2,6 +2,7 @@
 
 use super::error::IdentifyError;
 use super::normal::Normal;
+use super::window_errors::WindowErrors;
 use super::wiring::{WiringFound, channel_name};
 
 /// Largest accepted variance of the innovations, as a multiple of what the filter expects.
@@ -84,6 +85,26 @@ pub(super) fn judge(channels: &[ChannelFit]) -> Result<(), Refusal> {
                  this the log of this machine, and does nothing touch the links?",
                 fit.name,
                 100.0 * share,
+                100.0 * MOST_ERROR
+            )));
+        }
+    }
+    Ok(())
+}
+
+/// Checks that parts of a recording are predicted with numbers from its other parts.
+pub(super) fn judge_windows(left_out: &[WindowErrors]) -> Result<(), Refusal> {
+    let Some(shortest) = left_out.first() else { return Ok(()) };
+    for channel in &shortest.channels {
+        let percent = channel.percent()[1];
+        // Written so that NaN counts as a misfit.
+        let fits = percent <= 100.0 * MOST_ERROR;
+        if !fits {
+            return Err(Refusal::Misfit(format!(
+                "{} does not fit: predictions over {} s are off by {percent:.1} % of its motion, at most {:.0} % are accepted; \
+                 is this the recording of this machine, and are --angles, --zero, --reversed and the counts right?",
+                channel.name,
+                shortest.window_s,
                 100.0 * MOST_ERROR
             )));
         }

@@ -79,7 +79,7 @@ fn array<const N: usize>(counters: &[u32]) -> &[u32; N] {
 }
 
 /// An action on controllers that returns how each run ended.
-pub(super) type Action<'a> =
+pub(super) type ControllerAction<'a> =
     &'a mut dyn FnMut(Vec<Box<dyn AnyController + '_>>) -> Result<Vec<Option<Fall>>, SimulationError>;
 
 /// Makes `count` controllers of `table` and runs `action` with them.
@@ -89,7 +89,7 @@ pub(super) type Action<'a> =
 pub(super) fn with_controllers(
     table: &TableValues,
     count: usize,
-    action: Action<'_>,
+    action: ControllerAction<'_>,
 ) -> Result<Vec<Option<Fall>>, SimulationError> {
     let (states, sensors) = (table.states(), table.sensors());
     with_size(states, sensors, WithControllers { table, count, action })
@@ -103,7 +103,7 @@ pub(super) fn with_controllers(
 pub(super) fn with_controllers_of(
     tables: &[(&TableValues, usize)],
     made: Vec<Box<dyn AnyController + '_>>,
-    action: Action<'_>,
+    action: ControllerAction<'_>,
 ) -> Result<Vec<Option<Fall>>, SimulationError> {
     let Some((&(table, count), others)) = tables.split_first() else { return action(made) };
     let mut made = Some(made);
@@ -117,7 +117,7 @@ pub(super) fn with_controllers_of(
 struct WithControllers<'a> {
     table: &'a TableValues,
     count: usize,
-    action: Action<'a>,
+    action: ControllerAction<'a>,
 }
 
 impl WithSize for WithControllers<'_> {

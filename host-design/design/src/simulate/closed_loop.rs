@@ -43,7 +43,10 @@ pub fn run(
     let falls = with_controllers(table, 1, &mut |controllers| {
         let mut falls = Vec::new();
         for mut controller in controllers {
-            falls.push(alone(Run::start(rig, controller.as_mut(), table.sensors(), scenario)?, observe)?);
+            falls.push(alone(
+                ClosedLoopRun::start(rig, controller.as_mut(), table.sensors(), scenario)?,
+                observe,
+            )?);
         }
         Ok(falls)
     })?;
@@ -52,7 +55,7 @@ pub fn run(
 
 /// Runs `run` to its end by itself, not in lockstep.
 pub(super) fn alone(
-    mut run: Run<'_>,
+    mut run: ClosedLoopRun<'_>,
     observe: &mut dyn FnMut(&Sample<&[f64]>),
 ) -> Result<Option<Fall>, SimulationError> {
     loop {
@@ -78,7 +81,7 @@ pub fn ticks(rig: &Rig, scenario: &Scenario) -> Result<usize, SimulationError> {
 }
 
 /// A run with its controller, tick by tick.
-pub(super) struct Run<'a> {
+pub(super) struct ClosedLoopRun<'a> {
     rig: &'a Rig,
     scenario: &'a Scenario,
     controller: &'a mut dyn AnyController,
@@ -91,7 +94,7 @@ pub(super) struct Run<'a> {
     last_tick: usize,
 }
 
-impl<'a> Run<'a> {
+impl<'a> ClosedLoopRun<'a> {
     /// A run through `scenario` with this controller, which reads `sensors` counters.
     pub(super) fn start(
         rig: &'a Rig,

@@ -4,7 +4,7 @@ use core::ops::ControlFlow;
 
 use super::any_controller::with_controllers_of;
 use super::bench::Bench;
-use super::closed_loop::{Run, alone};
+use super::closed_loop::{ClosedLoopRun, alone};
 use super::error::SimulationError;
 use super::scenario::Scenario;
 use super::summary::Fall;
@@ -45,9 +45,9 @@ pub fn run_all(jobs: &mut [Job<'_>]) -> Result<Vec<Option<Fall>>, SimulationErro
     let tables: Vec<(&TableValues, usize)> = same_table.map(|of| (of[0].table, of.len())).collect();
     with_controllers_of(&tables, Vec::new(), &mut |mut controllers| {
         let runs = jobs.iter().zip(&mut controllers);
-        let runs: Vec<Run<'_>> = runs
+        let runs: Vec<ClosedLoopRun<'_>> = runs
             .map(|(job, controller)| {
-                Run::start(job.rig, controller.as_mut(), job.table.sensors(), job.scenario)
+                ClosedLoopRun::start(job.rig, controller.as_mut(), job.table.sensors(), job.scenario)
             })
             .collect::<Result<_, _>>()?;
         match &mut lanes {
@@ -66,7 +66,7 @@ fn are_alike(jobs: &[Job<'_>]) -> bool {
 struct Lockstep<'a, 'j> {
     lanes: &'a mut dyn ChainLanes,
     chains: &'a [Chain],
-    runs: Vec<Run<'a>>,
+    runs: Vec<ClosedLoopRun<'a>>,
     jobs: &'a mut [Job<'j>],
     /// The first job that has not begun.
     next: usize,

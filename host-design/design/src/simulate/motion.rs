@@ -117,8 +117,13 @@ impl WithSize for Follow<'_> {
         controller.encoders_mut().home(&at_zero, &[0; NY]);
         controller.start(&self.bench.counters())?;
         let tick_s = table.tick_s;
-        let mut run =
-            Run { controller, swing_up: &swing_up, bench: self.bench, tick_s, reached: Extremes::none(NY) };
+        let mut run = MotionRun {
+            controller,
+            swing_up: &swing_up,
+            bench: self.bench,
+            tick_s,
+            reached: Extremes::none(NY),
+        };
         match other {
             None => {
                 run.follow(swing_up.raise, 0);
@@ -134,7 +139,7 @@ impl WithSize for Follow<'_> {
     }
 }
 
-struct Run<'t, const NX: usize, const NY: usize, const N: usize> {
+struct MotionRun<'t, const NX: usize, const NY: usize, const N: usize> {
     controller: Controller<'t, NX, NY>,
     swing_up: &'t SwingUpTable<'t, NY, N>,
     bench: Bench,
@@ -142,7 +147,7 @@ struct Run<'t, const NX: usize, const NY: usize, const N: usize> {
     reached: Extremes,
 }
 
-impl<'t, const NX: usize, const NY: usize, const N: usize> Run<'t, NX, NY, N> {
+impl<'t, const NX: usize, const NY: usize, const N: usize> MotionRun<'t, NX, NY, N> {
     /// Follows `motion` from the set-point, with the tests of the supervisor but without its thresholds, stays at its
     /// end for `hold_ticks`, and then hands over to the control law.
     fn follow(&mut self, motion: MotionTable<'t>, hold_ticks: usize) {

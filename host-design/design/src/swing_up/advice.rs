@@ -3,9 +3,9 @@
 use super::SwingUpError;
 use super::check::check;
 use super::progress::{SearchProgress, SearchStep};
-use super::remedy::{Limit, Remedy};
-use super::robustness::{JUDGING_RUNS, Runs, random_runs};
-use super::search::{Request, candidates};
+use super::remedy::{Remedy, RigLimit};
+use super::robustness::{JUDGING_RUNS, RandomRuns, random_runs};
+use super::search::{SearchRanges, candidates};
 use super::setting::Setting;
 use crate::motion::Transition;
 use crate::rig::Rig;
@@ -20,27 +20,27 @@ const NARROWER: [f64; 4] = [0.8, 0.6, 0.4, 0.2];
 
 /// Result of the search with a changed rig file.
 #[derive(Debug)]
-struct Outcome {
+struct RelaxedSearch {
     /// Candidates tried.
     tried: u64,
     /// Candidates that were solved.
     solved: usize,
     /// Random runs of the best one.
-    runs: Option<Runs>,
+    runs: Option<RandomRuns>,
 }
 
-impl Outcome {
+impl RelaxedSearch {
     /// Searches for a motion of `rig` among the first `tried` candidates; the random runs have no supervisor.
     fn of(rig: &Rig, transition: Transition, tried: u64) -> Result<Self, SwingUpError> {
         let setting = Setting::of(rig)?;
-        let request = Request::of(&setting);
+        let request = SearchRanges::of(&setting);
         let mut found = candidates(&setting, &request, transition, 0..tried, &|_| ())?;
         let solved = found.len();
         found.retain(|candidate| check(&setting, &candidate.motion, transition).is_ok());
         found.sort_by(|a, b| a.score.total_cmp(&b.score));
         let runs = |motion| random_runs(&setting, motion, transition, &request.spread, 1, JUDGING_RUNS);
         let all = found.iter().take(KEPT).map(|candidate| runs(&candidate.motion));
-        let all: Vec<Runs> = all.collect::<Result<_, _>>()?;
+        let all: Vec<RandomRuns> = all.collect::<Result<_, _>>()?;
         Ok(Self { tried, solved, runs: all.into_iter().max_by_key(|runs| runs.arrived) })
     }
 
@@ -52,7 +52,7 @@ impl Outcome {
     fn text(&self) -> String {
         let Self { tried, solved, runs } = self;
         match runs {
-            Some(Runs { arrived, runs, .. }) => {
+            Some(RandomRuns { arrived, runs, .. }) => {
                 format!("{solved} of {tried} candidates solved, {arrived} of {runs} random runs arrive")
             }
             None => format!("none of {tried} candidates solved"),
@@ -61,7 +61,7 @@ impl Outcome {
 }
 
 /// Whether the lower end of the confidence interval reaches `success_percent` of `[swing_up]`.
-pub(super) fn is_enough(rig: &Rig, runs: &Runs) -> bool {
+pub(super) fn is_enough(rig: &Rig, runs: &RandomRuns) -> bool {
     let needed = rig.swing_up.clone().unwrap_or_default().success_percent;
     100.0 * runs.interval[0] >= needed
 }
@@ -79,7 +79,7 @@ pub(super) fn advice(
     progress(SearchStep::Stage {
         transition,
         what: "what would help",
-        steps: (Limit::ALL.len() * FACTORS.len()) as u64,
+        steps: (RigLimit::ALL.len() * FACTORS.len()) as u64,
     });
     advice_from(rig, transition, TRIED, &|| progress(SearchStep::Step { score: None }))
 }
@@ -90,9 +90,9 @@ fn advice_from(
     tried: u64,
     done: &dyn Fn(),
 ) -> Result<String, SwingUpError> {
-    let longest_s = Request::of(&Setting::of(rig)?).duration_s[1];
+    let longest_s = SearchRanges::of(&Setting::of(rig)?).duration_s[1];
     let (mut helps, mut no_help): (Vec<Help>, Vec<String>) = Default::default();
-    for limit in Limit::ALL {
+    for limit in RigLimit::ALL {
         match relaxed(rig, transition, tried, &[limit], longest_s, done)? {
             Some(Tried::Helps(help)) => helps.push(help),
             Some(Tried::NoHelp(text)) => no_help.push(text),
@@ -105,7 +105,7 @@ fn advice_from(
         Some(Help { name, .. }) => {
             format!("the binding limit is the {name}; there is a motion with {}", texts.join(", or with "))
         }
-        None => match relaxed(rig, transition, tried, &Limit::ALL, longest_s, done)? {
+        None => match relaxed(rig, transition, tried, &RigLimit::ALL, longest_s, done)? {
             Some(Tried::Helps(help)) => {
                 format!("no limit alone is binding; there is a motion with {}", help.text)
             }
@@ -138,7 +138,7 @@ fn relaxed(
     rig: &Rig,
     transition: Transition,
     tried: u64,
-    limits: &[Limit],
+    limits: &[RigLimit],
     longest_s: f64,
     done: &dyn Fn(),
 ) -> Result<Option<Tried>, SwingUpError> {
@@ -147,7 +147,7 @@ fn relaxed(
         let mut remedy = Remedy::of(rig);
         let changed = limits.iter().filter(|limit| limit.relax(&mut remedy, longest_s, factor).is_some());
         let Some(name) = changed.map(|limit| limit.name()).reduce(|first, _| first) else { return Ok(None) };
-        let outcome = Outcome::of(&remedy.rig, transition, tried)?;
+        let outcome = RelaxedSearch::of(&remedy.rig, transition, tried)?;
         done();
         let text = format!("{} ({})", remedy.text(), outcome.text());
         if outcome.is_good(&remedy.rig) {
@@ -165,7 +165,7 @@ fn relaxed(
 /// Those of `runs`.
 pub(super) fn narrower(
     rig: &Rig,
-    runs: impl Fn(&Rig) -> Result<Runs, SwingUpError>,
+    runs: impl Fn(&Rig) -> Result<RandomRuns, SwingUpError>,
 ) -> Result<String, SwingUpError> {
     let mut last = String::new();
     for factor in NARROWER {
@@ -201,7 +201,7 @@ mod tests {
     #[test]
     fn every_advised_number_gives_a_motion() {
         let short = "swing_up.longest_s = 2.2";
-        assert_eq!(Outcome::of(&single(short), Transition::Up, FEW).unwrap().solved, 0);
+        assert_eq!(RelaxedSearch::of(&single(short), Transition::Up, FEW).unwrap().solved, 0);
         let text = advice_from(&single(short), Transition::Up, FEW, &|| ()).unwrap();
         println!("{text}");
         let (helps, no_help) = text.split_once("; there is none with ").unwrap();
@@ -214,7 +214,7 @@ mod tests {
             for change in advised.split(", or with ") {
                 let (values, found) = change.split_once(" (").unwrap();
                 let rig = single(&format!("{short} and {values}"));
-                let outcome = Outcome::of(&rig, Transition::Up, FEW).unwrap();
+                let outcome = RelaxedSearch::of(&rig, Transition::Up, FEW).unwrap();
                 assert_eq!(outcome.text(), found.trim_end_matches(')'), "{change}");
                 assert_eq!(outcome.is_good(&rig), is_good, "{change}");
             }
@@ -223,7 +223,7 @@ mod tests {
 
     #[test]
     fn a_key_is_raised_as_far_as_the_machine_goes_and_then_the_machine() {
-        let relaxed = |limit: Limit, values: &str, factor: f64| {
+        let relaxed = |limit: RigLimit, values: &str, factor: f64| {
             let mut remedy = Remedy::of(&single(values));
             limit.relax(&mut remedy, 5.0, factor).unwrap();
             // As if the values were written into the file.
@@ -231,16 +231,19 @@ mod tests {
             remedy.text()
         };
         let rail = "swing_up.rail_m = 0.25";
-        assert_eq!(relaxed(Limit::Rail, rail, 1.2), "swing_up.rail_m = 0.3");
-        assert_eq!(relaxed(Limit::Rail, rail, 2.0), "swing_up.rail_m = 0.5 and cart.travel_m = [-0.5, 0.5]");
-        let force = "swing_up.force_n = 10";
-        assert_eq!(relaxed(Limit::Force, force, 1.2), "swing_up.force_n = 12");
+        assert_eq!(relaxed(RigLimit::Rail, rail, 1.2), "swing_up.rail_m = 0.3");
         assert_eq!(
-            relaxed(Limit::Force, force, 2.0),
+            relaxed(RigLimit::Rail, rail, 2.0),
+            "swing_up.rail_m = 0.5 and cart.travel_m = [-0.5, 0.5]"
+        );
+        let force = "swing_up.force_n = 10";
+        assert_eq!(relaxed(RigLimit::Force, force, 1.2), "swing_up.force_n = 12");
+        assert_eq!(
+            relaxed(RigLimit::Force, force, 2.0),
             "swing_up.force_n = 20 and actuator.force_limit_n = 20 and actuator.supply_v = 15.4"
         );
-        assert_eq!(relaxed(Limit::Speed, rail, 2.0), "limits.speed_m_per_s = 3");
-        assert_eq!(relaxed(Limit::Speed, "swing_up.speed_m_per_s = 1", 2.0), "swing_up.speed_m_per_s = 2");
-        assert_eq!(relaxed(Limit::Duration, rail, 1.5), "swing_up.longest_s = 7.5");
+        assert_eq!(relaxed(RigLimit::Speed, rail, 2.0), "limits.speed_m_per_s = 3");
+        assert_eq!(relaxed(RigLimit::Speed, "swing_up.speed_m_per_s = 1", 2.0), "swing_up.speed_m_per_s = 2");
+        assert_eq!(relaxed(RigLimit::Duration, rail, 1.5), "swing_up.longest_s = 7.5");
     }
 }

@@ -19,7 +19,7 @@ const ARRIVED_RAD: f64 = 0.1;
 
 /// Conditions of one run.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) struct Trial {
+pub(super) struct TrackingTrial {
     /// The chain that is simulated.
     pub(super) chain: Chain,
     /// Its state at the start.
@@ -36,7 +36,7 @@ pub(super) struct Trial {
 
 /// Result of a run.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Outcome {
+pub(super) struct TrackingResult {
     /// Whether it arrived and stayed.
     pub(super) arrived: bool,
     /// Largest deviation of a link from its reference during the motion (rad).
@@ -48,7 +48,7 @@ pub(super) struct Outcome {
 /// A trial in progress.
 struct ClosedLoop<'a> {
     setting: &'a Setting<'a>,
-    trial: &'a Trial,
+    trial: &'a TrackingTrial,
     plant: Box<dyn Plant>,
     random: Option<Pcg64>,
     torques: Vec<f64>,
@@ -60,7 +60,7 @@ struct ClosedLoop<'a> {
 }
 
 /// The law of a tick: `u = u_k - K (x̂ - x_k)`, with the filter gain L. Without K there is no force.
-struct Law<'a> {
+struct TickLaw<'a> {
     x: &'a [f64],
     u: f64,
     k: Option<&'a Matrix<f64>>,
@@ -72,7 +72,11 @@ impl<'a> ClosedLoop<'a> {
     ///
     /// # Errors
     /// [`SwingUpError`] if the chain cannot be simulated.
-    fn new(setting: &'a Setting<'a>, trial: &'a Trial, predicted: &[f64]) -> Result<Self, SwingUpError> {
+    fn new(
+        setting: &'a Setting<'a>,
+        trial: &'a TrackingTrial,
+        predicted: &[f64],
+    ) -> Result<Self, SwingUpError> {
         let mut plant = chain_plant(&trial.chain)?;
         plant.set_state(&trial.start);
         Ok(Self {
@@ -88,7 +92,7 @@ impl<'a> ClosedLoop<'a> {
     }
 
     /// One tick: measures, corrects, applies the law; then moves the plant.
-    fn tick(&mut self, law: &Law<'_>) {
+    fn tick(&mut self, law: &TickLaw<'_>) {
         let sensors = &self.setting.noise.sensors;
         let innovation: Vec<f64> = (0..sensors.len())
             .map(|i| measured(self.setting, self.trial, &self.state, i) - self.predicted[sensors[i].0])
@@ -127,16 +131,16 @@ fn law_at<'a>(
     motion: &'a PlannedMotion,
     transition: Transition,
     k: usize,
-) -> Law<'a> {
+) -> TickLaw<'a> {
     let steps = motion.steps();
     match transition {
-        _ if k < steps => Law { x: &motion.x[k], u: motion.u[k], k: Some(&motion.k[k]), l: &motion.l[k] },
+        _ if k < steps => TickLaw { x: &motion.x[k], u: motion.u[k], k: Some(&motion.k[k]), l: &motion.l[k] },
         transition if transition.ends_hanging() => {
-            Law { x: &motion.x[steps], u: 0.0, k: None, l: &motion.l[steps - 1] }
+            TickLaw { x: &motion.x[steps], u: 0.0, k: None, l: &motion.l[steps - 1] }
         }
         transition => {
             let at_end = setting.at_end(transition);
-            Law { x: &motion.x[steps], u: 0.0, k: Some(&at_end.k), l: &at_end.l }
+            TickLaw { x: &motion.x[steps], u: 0.0, k: Some(&at_end.k), l: &at_end.l }
         }
     }
 }
@@ -149,11 +153,11 @@ pub(super) fn run(
     setting: &Setting<'_>,
     motion: &PlannedMotion,
     transition: Transition,
-    trial: &Trial,
-) -> Result<Outcome, SwingUpError> {
+    trial: &TrackingTrial,
+) -> Result<TrackingResult, SwingUpError> {
     let mut rig = ClosedLoop::new(setting, trial, &motion.x[0])?;
     let steps = motion.steps();
-    let mut outcome = Outcome { arrived: false, deviation_rad: 0.0, deviation_m: 0.0 };
+    let mut outcome = TrackingResult { arrived: false, deviation_rad: 0.0, deviation_m: 0.0 };
     for k in 0..steps + (trial.after_s / motion.tick_s) as usize {
         rig.tick(&law_at(setting, motion, transition, k));
         let reference = motion.x.get(k + 1).unwrap_or(&motion.x[steps]);
@@ -174,7 +178,7 @@ pub(super) fn run(
     Ok(outcome)
 }
 
-fn measured(setting: &Setting<'_>, trial: &Trial, state: &[f64], sensor: usize) -> f64 {
+fn measured(setting: &Setting<'_>, trial: &TrackingTrial, state: &[f64], sensor: usize) -> f64 {
     let value = state[setting.noise.sensors[sensor].0] + trial.zero_error[sensor];
     let step = setting.steps[sensor];
     if trial.counts { libm::round(value / step) * step } else { value }
@@ -190,7 +194,7 @@ fn applied(setting: &Setting<'_>, force: f64, speed: f64) -> f64 {
     }
 }
 
-impl Trial {
+impl TrackingTrial {
     /// The model itself, exactly at the start of `motion`, without counts or disturbances.
     pub(super) fn ideal(setting: &Setting<'_>, motion: &PlannedMotion) -> Self {
         Self {

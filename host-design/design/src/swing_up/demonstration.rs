@@ -4,7 +4,7 @@ use upright::supervision::fault::Fault;
 use upright::supervision::supervisor::State;
 
 use super::SwingUpError;
-use super::robustness::{Spread, drawn};
+use super::robustness::{MotionSpread, drawn};
 use super::route::{Route, states};
 use crate::harness::{HarnessError, Recording, record, with_firmware};
 use crate::motion::Transition;
@@ -51,7 +51,7 @@ impl Script {
         let PlantDescription::Chain(chain) = &rig.plant else { return Err(SwingUpError::NotAChain) };
         let rules = rig.swing_up.clone().unwrap_or_default();
         let share = |percent: f64| if is_wrong { percent / 100.0 } else { 0.0 };
-        let spread = Spread::of(share(rules.mass_spread_percent), share(rules.friction_spread_percent));
+        let spread = MotionSpread::of(share(rules.mass_spread_percent), share(rules.friction_spread_percent));
         let (real, start) = drawn(rig, Transition::Up, &spread, seed);
         let duration_s = |ticks: u32| f64::from(ticks) * rig.tick.period_s;
         let [low, high] = chain.cart.travel_m;
@@ -95,7 +95,7 @@ impl Script {
     pub fn route(rig: &Rig, table: &TableValues, seed: u64) -> Result<Self, SwingUpError> {
         let route = Route::of(rig, table).ok_or(SwingUpError::NoRoute)?;
         let links = rig.states() / 2 - 1;
-        let (real, start) = drawn(rig, Transition::Up, &Spread::of(0.0, 0.0), seed);
+        let (real, start) = drawn(rig, Transition::Up, &MotionSpread::of(0.0, 0.0), seed);
         let names = route.transitions.iter().map(|transition| transition.name(links));
         let states = route.transitions.iter().flat_map(|transition| states(*transition, links));
         Ok(Self {

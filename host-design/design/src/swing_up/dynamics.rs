@@ -11,7 +11,7 @@ use crate::plant::{ChainPlant, ChainState, Partials};
 use crate::rig;
 
 /// The state at the end of a step, and its derivatives.
-pub(super) struct Step {
+pub(super) struct IntegrationStep {
     /// State at the end, s entries.
     pub(super) end: Vec<f64>,
     /// Derivatives by the state at the start (s columns), and by the force at the start and at the end of the step,
@@ -26,7 +26,7 @@ pub(super) trait Dynamics: Send + Sync {
     fn step(&self, state: &mut [f64], force: [f64; 2], dt: f64);
 
     /// As [`step`](Self::step) from `state`, with derivatives.
-    fn step_with_derivatives(&self, state: &[f64], force: [f64; 2], dt: f64) -> Step;
+    fn step_with_derivatives(&self, state: &[f64], force: [f64; 2], dt: f64) -> IntegrationStep;
 
     /// Number of integration steps in half a tick: the links of long chains are short and fast.
     fn steps_in_half_a_tick(&self) -> usize;
@@ -134,7 +134,7 @@ impl<const N: usize, const S: usize, const C: usize> Dynamics for Relative<N, S,
         at.plus(dt / 6.0, &sum).write_relative(state);
     }
 
-    fn step_with_derivatives(&self, state: &[f64], force: [f64; 2], dt: f64) -> Step {
+    fn step_with_derivatives(&self, state: &[f64], force: [f64; 2], dt: f64) -> IntegrationStep {
         let mut start = [0.0; S];
         start.copy_from_slice(state);
         let own: [[f64; C]; S] = from_fn(|i| from_fn(|j| if i == j { 1.0 } else { 0.0 }));
@@ -162,7 +162,7 @@ impl<const N: usize, const S: usize, const C: usize> Dynamics for Relative<N, S,
         for i in 0..S {
             add(&mut end_by[i], dt / 6.0, &sum_by[i]);
         }
-        Step { end: end.to_vec(), by: Matrix::from_fn(S, C, |i, j| end_by[i][j]) }
+        IntegrationStep { end: end.to_vec(), by: Matrix::from_fn(S, C, |i, j| end_by[i][j]) }
     }
 
     fn steps_in_half_a_tick(&self) -> usize {

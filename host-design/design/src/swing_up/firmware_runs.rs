@@ -1,5 +1,6 @@
 //! Random runs of the whole firmware: the rig is raised from hanging, balances, is lowered, and hangs.
 
+use core::ops::Range;
 use std::collections::BTreeMap;
 
 use serde::{Deserialize, Serialize};
@@ -9,7 +10,7 @@ use upright::supervision::supervisor::State;
 use super::SwingUpError;
 use super::closed_loop::deviation;
 use super::demonstration::{hang, up_and_down};
-use super::robustness::{Runs, Spread, drawn};
+use super::robustness::{MotionSpread, RandomRuns, drawn};
 use crate::harness::{Harness, HarnessError, Target, goals, with_firmware};
 use crate::motion::{RaiseAndLower, Transition};
 use crate::rig::{LinkEncoder, PlantDescription, Rig};
@@ -29,7 +30,7 @@ pub struct Condition {
     /// Description, which is also the name of the runs in a study.
     pub name: &'static str,
     /// Ranges of the errors of masses, friction, start and encoder zeros.
-    pub spread: Spread,
+    pub spread: MotionSpread,
     /// Counts per turn of the joints' encoders, instead of the rig's; the table is designed with them.
     pub joint_counts: Option<f64>,
     /// Whether the force is applied a tick later than the firmware assumes.
@@ -40,15 +41,15 @@ impl Condition {
     /// The rows of the table in the documentation.
     pub fn all() -> [Self; 8] {
         let degree = core::f64::consts::PI / 180.0;
-        let usual = Spread::of(0.0, 0.0);
+        let usual = MotionSpread::of(0.0, 0.0);
         let named = |name, spread| Self { name, spread, joint_counts: None, is_late: false };
         [
             named("masses and friction as in the file", usual),
-            named("masses ±2 %, friction ±30 %", Spread::of(0.02, 0.3)),
-            named("masses ±5 %, friction ±30 %", Spread::of(0.05, 0.3)),
-            named("start off by 10°", Spread { tilt_rad: 10.0 * degree, ..usual }),
-            named("start off by 20 mm", Spread { position_m: 0.02, ..usual }),
-            named("zeros off by 0.3°", Spread { zero_rad: 0.3 * degree, ..usual }),
+            named("masses ±2 %, friction ±30 %", MotionSpread::of(0.02, 0.3)),
+            named("masses ±5 %, friction ±30 %", MotionSpread::of(0.05, 0.3)),
+            named("start off by 10°", MotionSpread { tilt_rad: 10.0 * degree, ..usual }),
+            named("start off by 20 mm", MotionSpread { position_m: 0.02, ..usual }),
+            named("zeros off by 0.3°", MotionSpread { zero_rad: 0.3 * degree, ..usual }),
             Self { joint_counts: Some(1024.0), ..named("1024 counts per turn", usual) },
             Self { is_late: true, ..named("force a tick late", usual) },
         ]
@@ -56,7 +57,7 @@ impl Condition {
 
     /// The errors that a motion has to survive according to `[swing_up]`.
     pub fn asked(rig: &Rig) -> Self {
-        let (spread, name) = (Spread::asked(rig), "errors of [swing_up]");
+        let (spread, name) = (MotionSpread::asked(rig), "errors of [swing_up]");
         Self { name, spread, joint_counts: None, is_late: false }
     }
 
@@ -78,18 +79,18 @@ pub struct FirmwareRuns {
     /// Runs in which the firmware refused to raise the rig, because the links do not hang.
     pub refused: usize,
     /// Of the runs that were not refused: those that are upright until they are lowered.
-    pub raise: Runs,
+    pub raise: RandomRuns,
     /// Of those that are upright: those that hang in the end, the motor off, without a fault.
-    pub lower: Runs,
+    pub lower: RandomRuns,
     /// Faults that ended a run, and how often.
     pub faults: BTreeMap<String, usize>,
 }
 
 impl FirmwareRuns {
     /// The raising, counted over all runs: a run that was refused has not arrived.
-    pub fn raise_in_all(&self) -> Runs {
+    pub fn raise_in_all(&self) -> RandomRuns {
         let runs = self.refused + self.raise.runs;
-        Runs { runs, interval: wilson(self.raise.arrived, runs), ..self.raise.clone() }
+        RandomRuns { runs, interval: wilson(self.raise.arrived, runs), ..self.raise.clone() }
     }
 }
 
@@ -107,8 +108,7 @@ struct Reached {
 #[derive(Debug, Clone, Copy, Default, Serialize, Deserialize)]
 struct Deviation(#[serde(deserialize_with = "infinite_if_null")] f64);
 
-/// `runs` runs of the firmware of `table`, which is designed for `rig`, with the seeds from `base_seed` on, on all
-/// threads; the outcome does not depend on their number. `motions` are those of the table. The condition is a part of
+/// Runs of the firmware of `table`, which is designed for `rig`, one with each of the `seeds`, on all threads; the outcome does not depend on their number. `motions` are those of the table. The condition is a part of
 /// `study`.
 ///
 /// # Errors
@@ -118,13 +118,12 @@ pub fn firmware_runs(
     table: &TableValues,
     motions: &RaiseAndLower,
     condition: &Condition,
-    base_seed: u64,
-    runs: usize,
+    seeds: Range<u64>,
     study: &Study,
 ) -> Result<FirmwareRuns, SwingUpError> {
     let scenario = Scenario { substeps: 2, ..up_and_down(rig, table, UPRIGHT_S)? };
     let one = |number: u64| {
-        let seed = base_seed + number;
+        let seed = seeds.start + number;
         let (mut real, start) = drawn(rig, Transition::Up, &condition.spread, seed);
         real.tick.delay_ticks = u8::from(condition.is_late);
         let scenario = Scenario { start, seed, ..scenario.clone() };
@@ -132,7 +131,7 @@ pub fn firmware_runs(
             .flatten()
             .map_err(|error| SwingUpError::Firmware(error.to_string()))
     };
-    let all: Vec<Reached> = study.outcomes(condition.name, runs as u64, one)?;
+    let all: Vec<Reached> = study.outcomes(condition.name, seeds.end - seeds.start, one)?;
     let mut faults = BTreeMap::new();
     for fault in all.iter().filter_map(|run| run.fault.clone()) {
         *faults.entry(fault).or_default() += 1;
@@ -143,7 +142,13 @@ pub fn firmware_runs(
         let deviation_rad =
             arrived().fold(0.0, |largest, run| f64::max(largest, run.deviation_rad[motion].0));
         let arrived = arrived().count();
-        Runs { base_seed, runs: tried, arrived, interval: wilson(arrived, tried), deviation_rad }
+        RandomRuns {
+            base_seed: seeds.start,
+            runs: tried,
+            arrived,
+            interval: wilson(arrived, tried),
+            deviation_rad,
+        }
     };
     Ok(FirmwareRuns {
         refused: all.iter().filter(|run| run.refused).count(),

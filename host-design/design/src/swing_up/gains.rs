@@ -3,7 +3,7 @@
 use super::SwingUpError;
 use super::refine::Path;
 use super::setting::Setting;
-use super::tracking::{Filter, feedback, ticks};
+use super::tracking::{PathFilter, feedback, ticks};
 use crate::motion::{PlannedMotion, Transition};
 use crate::numerics::Matrix;
 
@@ -27,7 +27,7 @@ pub(super) fn motion(
     });
     let k =
         feedback(&ticks, &weights, setting.force_weight, &setting.at_end(transition).cost, setting.tick_s);
-    let mut filter = Filter::new(&*setting.dynamics, &setting.noise, states, setting.tick_s);
+    let mut filter = PathFilter::new(&*setting.dynamics, &setting.noise, states, setting.tick_s);
     filter.covariance = setting.at_start(transition).covariance.clone();
     let l: Result<Vec<Matrix<f64>>, _> =
         path.x.iter().zip(&ticks).map(|(x, tick)| filter.gain(x, tick)).collect();

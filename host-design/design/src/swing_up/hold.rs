@@ -5,7 +5,7 @@ use super::riccati::add;
 use crate::numerics::Matrix;
 
 /// A tick from one state under one held force.
-pub(super) struct Tick {
+pub(super) struct HeldTick {
     /// State at the end of the tick, s entries.
     pub(super) end: Vec<f64>,
     /// Derivatives of the state in the middle of the tick by the state at its start and the force, s×(s + 1).
@@ -14,7 +14,7 @@ pub(super) struct Tick {
     pub(super) whole: Matrix<f64>,
 }
 
-impl Tick {
+impl HeldTick {
     /// Derivatives of the end by the state at the start, s×s.
     pub(super) fn a(&self) -> Matrix<f64> {
         self.whole.block(0, 0, self.whole.rows(), self.whole.rows())
@@ -34,10 +34,10 @@ pub(super) fn after_tick(dynamics: &dyn Dynamics, state: &mut [f64], force: f64,
 }
 
 /// As [`after_tick`] from `state`, with derivatives.
-pub(super) fn tick(dynamics: &dyn Dynamics, state: &[f64], force: f64, tick_s: f64) -> Tick {
+pub(super) fn tick(dynamics: &dyn Dynamics, state: &[f64], force: f64, tick_s: f64) -> HeldTick {
     let (half, middle) = half_tick(dynamics, state, force, tick_s, None);
     let (end, whole) = half_tick(dynamics, &half, force, tick_s, Some(&middle));
-    Tick { end, middle, whole }
+    HeldTick { end, middle, whole }
 }
 
 /// The state after half a tick from `state`, and its derivatives if those of `state` are `by`, by default those at the

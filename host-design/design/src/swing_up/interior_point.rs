@@ -1,6 +1,6 @@
 //! Linear limits in an interior-point method: a slack and a multiplier for every limit at every knot.
 
-use super::problem::{Knots, Limit};
+use super::problem::{Knots, PlanLimit};
 use super::riccati::Stage;
 
 /// Slack s > 0 and multiplier ν > 0 of each limit, knot by knot.
@@ -22,8 +22,8 @@ const TO_BOUNDARY: f64 = 0.99;
 impl Slacks {
     /// Slacks as large as the room that the knots leave, but at least a tenth of the bound; multipliers for the
     /// barrier parameter `mu`.
-    pub(super) fn new(limits: &[Limit], knots: &Knots, mu: f64) -> Self {
-        let slack = |limit: &Limit, x: &[f64], u: f64| limit.room(x, u).max(0.1 * limit.bound);
+    pub(super) fn new(limits: &[PlanLimit], knots: &Knots, mu: f64) -> Self {
+        let slack = |limit: &PlanLimit, x: &[f64], u: f64| limit.room(x, u).max(0.1 * limit.bound);
         let s: Vec<Vec<f64>> = knots
             .x
             .iter()
@@ -48,7 +48,7 @@ impl Slacks {
     }
 
     /// Largest difference between a slack and the room that the knots leave, relative to the bound.
-    pub(super) fn infeasibility(&self, limits: &[Limit], knots: &Knots) -> f64 {
+    pub(super) fn infeasibility(&self, limits: &[PlanLimit], knots: &Knots) -> f64 {
         let mut largest: f64 = 0.0;
         for ((x, &u), s) in knots.x.iter().zip(&knots.u).zip(&self.s) {
             for (limit, s) in limits.iter().zip(s) {
@@ -65,7 +65,14 @@ impl Slacks {
 
     /// Adds the limits of knot `knot` to the cost of its stage, for the barrier parameter `mu`. The force is the last
     /// entry of z.
-    pub(super) fn add_to(&self, limits: &[Limit], knots: &Knots, knot: usize, mu: f64, stage: &mut Stage) {
+    pub(super) fn add_to(
+        &self,
+        limits: &[PlanLimit],
+        knots: &Knots,
+        knot: usize,
+        mu: f64,
+        stage: &mut Stage,
+    ) {
         let force = stage.q_linear.len() - 1;
         let (x, u) = (&knots.x[knot], knots.u[knot]);
         for ((limit, s), nu) in limits.iter().zip(&self.s[knot]).zip(&self.nu[knot]) {
@@ -85,7 +92,7 @@ impl Slacks {
     /// and the multipliers positive.
     pub(super) fn step(
         &self,
-        limits: &[Limit],
+        limits: &[PlanLimit],
         knots: &Knots,
         z: &[Vec<f64>],
         mu: f64,

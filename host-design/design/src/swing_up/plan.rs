@@ -12,8 +12,8 @@ use super::gains::{POSITION_WEIGHT, motion};
 use super::in_table::designed_table;
 use super::progress::{SearchProgress, SearchStep};
 use super::refine::refine;
-use super::robustness::{JUDGING_RUNS, Runs, Spread, random_runs, score};
-use super::search::{Candidate, Request, candidates, ticks_per_knot};
+use super::robustness::{JUDGING_RUNS, MotionSpread, RandomRuns, random_runs, score};
+use super::search::{MotionCandidate, SearchRanges, candidates, ticks_per_knot};
 use super::setting::Setting;
 use super::stored::{Stored, StoredKnots};
 use crate::motion::{PlannedMotion, RaiseAndLower, Transition};
@@ -30,7 +30,7 @@ const ROUNDS: [(usize, usize); 2] = [(30, 40), (4, 160)];
 
 /// Both motions of a rig, and their judgements.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Plan {
+pub struct SwingUpPlan {
     /// The motions with their gains.
     pub motions: RaiseAndLower,
     /// The rig's gain table with the motions in it, with which they were judged.
@@ -38,14 +38,14 @@ pub struct Plan {
     /// Knots of the motions, for the file beside the rig file.
     pub stored: Stored,
     /// Judgement of the raising.
-    pub raise: Judgement,
+    pub raise: MotionJudgement,
     /// Judgement of the lowering.
-    pub lower: Judgement,
+    pub lower: MotionJudgement,
 }
 
 /// How a motion was found, and how it passed its tests.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Judgement {
+pub struct MotionJudgement {
     /// Which motion.
     pub transition: Transition,
     /// Number of candidates tried and solved; none for a stored motion.
@@ -54,8 +54,8 @@ pub struct Judgement {
     pub score: f64,
     /// Peak values from the independent check.
     pub peaks: Peaks,
-    /// Random runs of the whole firmware with the table of [`Plan`]; for a lowering, those that were raised.
-    pub runs: Runs,
+    /// Random runs of the whole firmware with the table of [`SwingUpPlan`]; for a lowering, those that were raised.
+    pub runs: RandomRuns,
 }
 
 /// Searches for both motions of `rig`.
@@ -66,10 +66,10 @@ pub struct Judgement {
 /// # Errors
 /// [`SwingUpError`]: the rig cannot be raised at all, no candidate was solved, or the best one fails its check or too
 /// many random runs.
-pub fn search(rig: &Rig, progress: SearchProgress<'_>) -> Result<Plan, SwingUpError> {
+pub fn search(rig: &Rig, progress: SearchProgress<'_>) -> Result<SwingUpPlan, SwingUpError> {
     let setting = Setting::of(rig)?;
-    let request = Request::of(&setting);
-    let found = |transition| -> Result<Found, SwingUpError> {
+    let request = SearchRanges::of(&setting);
+    let found = |transition| -> Result<FoundMotion, SwingUpError> {
         let counts = if setting.chain.links.len() >= 4 { CANDIDATES_OF_LONG_CHAINS } else { CANDIDATES };
         let tried = counts[usize::from(transition == Transition::Down)];
         match best(&setting, &request, transition, 0..tried, progress)? {
@@ -89,16 +89,12 @@ pub fn search(rig: &Rig, progress: SearchProgress<'_>) -> Result<Plan, SwingUpEr
 ///
 /// # Errors
 /// As for [`search`]; [`SwingUpError::Outdated`] if a stored motion does not fit the rig any more.
-pub fn judge(rig: &Rig, stored: &Stored, progress: SearchProgress<'_>) -> Result<Plan, SwingUpError> {
+pub fn judge(rig: &Rig, stored: &Stored, progress: SearchProgress<'_>) -> Result<SwingUpPlan, SwingUpError> {
     let setting = Setting::of(rig)?;
-    let spread = Spread::asked(rig);
-    let found = |transition, stored: &StoredKnots| -> Result<Found, SwingUpError> {
-        let motion = restored(&setting, transition, stored)?;
-        let score = score(&setting, &motion, transition, &spread)?;
-        Ok(Found { motion, stored: stored.clone(), score, search: None })
-    };
-    let (raise, lower) =
-        parallel::both(|| found(Transition::Up, &stored.raise), || found(Transition::Down, &stored.lower));
+    let (raise, lower) = parallel::both(
+        || found(&setting, Transition::Up, stored.raise.clone()),
+        || found(&setting, Transition::Down, stored.lower.clone()),
+    );
     judged(&setting, raise?, lower?, progress)
 }
 
@@ -142,29 +138,33 @@ pub(super) fn restored(
 }
 
 /// A motion that is to be judged.
-pub(super) struct Found {
+pub(super) struct FoundMotion {
     pub(super) motion: PlannedMotion,
     pub(super) stored: StoredKnots,
-    /// See [`Judgement::score`] and [`Judgement::search`].
+    /// See [`MotionJudgement::score`] and [`MotionJudgement::search`].
     score: f64,
     pub(super) search: Option<[usize; 2]>,
 }
 
 /// The motion restored from these knots, with its score.
-fn found(setting: &Setting<'_>, transition: Transition, stored: StoredKnots) -> Result<Found, SwingUpError> {
+fn found(
+    setting: &Setting<'_>,
+    transition: Transition,
+    stored: StoredKnots,
+) -> Result<FoundMotion, SwingUpError> {
     let motion = restored(setting, transition, &stored)?;
-    let score = score(setting, &motion, transition, &Spread::asked(setting.rig))?;
-    Ok(Found { motion, stored, score, search: None })
+    let score = score(setting, &motion, transition, &MotionSpread::asked(setting.rig))?;
+    Ok(FoundMotion { motion, stored, score, search: None })
 }
 
 /// The most robust of the candidates `numbers` for one transition, if any is solved.
 pub(super) fn best(
     setting: &Setting<'_>,
-    request: &Request,
+    request: &SearchRanges,
     transition: Transition,
     numbers: Range<u64>,
     progress: SearchProgress<'_>,
-) -> Result<Option<Found>, SwingUpError> {
+) -> Result<Option<FoundMotion>, SwingUpError> {
     let tried = numbers.end.saturating_sub(numbers.start);
     progress(SearchStep::Stage { transition, what: "trajectories", steps: tried });
     let mut solved =
@@ -179,28 +179,28 @@ pub(super) fn best(
         solved = ranked(setting, request, transition, solved, runs, progress)?;
     }
     // The first that passes the check; otherwise the best, whose judgement then says what does not hold.
-    let passes = |candidate: &Candidate| check(setting, &candidate.motion, transition).is_ok();
+    let passes = |candidate: &MotionCandidate| check(setting, &candidate.motion, transition).is_ok();
     let chosen = solved.swap_remove(solved.iter().position(passes).unwrap_or(0));
     let stored = StoredKnots::new(ticks_per_knot(setting), &chosen.knots);
-    Ok(Some(Found { search: Some([tried as usize, count]), ..found(setting, transition, stored)? }))
+    Ok(Some(FoundMotion { search: Some([tried as usize, count]), ..found(setting, transition, stored)? }))
 }
 
 /// The candidates sorted by the number of random runs that they survive; among equals, the one with the smallest
 /// peak deviation comes first.
 fn ranked(
     setting: &Setting<'_>,
-    request: &Request,
+    request: &SearchRanges,
     transition: Transition,
-    candidates: Vec<Candidate>,
+    candidates: Vec<MotionCandidate>,
     runs: usize,
     progress: SearchProgress<'_>,
-) -> Result<Vec<Candidate>, SwingUpError> {
+) -> Result<Vec<MotionCandidate>, SwingUpError> {
     progress(SearchStep::Stage {
         transition,
         what: "random runs of the best",
         steps: candidates.len() as u64,
     });
-    let mut all: Vec<(Runs, Candidate)> = Vec::new();
+    let mut all: Vec<(RandomRuns, MotionCandidate)> = Vec::new();
     for candidate in candidates {
         let seed = JUDGING_RUNS as u64 + 1;
         let found = random_runs(setting, &candidate.motion, transition, &request.spread, seed, runs)?;
@@ -214,13 +214,14 @@ fn ranked(
 /// Checks both motions, and runs the whole firmware with the table that has them.
 fn judged(
     setting: &Setting<'_>,
-    raise: Found,
-    lower: Found,
+    raise: FoundMotion,
+    lower: FoundMotion,
     progress: SearchProgress<'_>,
-) -> Result<Plan, SwingUpError> {
+) -> Result<SwingUpPlan, SwingUpError> {
     let rig = setting.rig;
     let peaks =
         [check(setting, &raise.motion, Transition::Up)?, check(setting, &lower.motion, Transition::Down)?];
+    let [raising, lowering] = [&raise, &lower].map(|found| (found.search, found.score));
     let stored = Stored::new(rig, raise.stored, lower.stored);
     let motions = RaiseAndLower { raise: raise.motion, lower: lower.motion };
     let table = designed_table(rig, &motions)?;
@@ -250,27 +251,32 @@ fn judged(
         });
     }
     let ([up, down], [raised, lowered]) = (peaks, runs);
-    let raise = Judgement {
-        transition: Transition::Up,
-        search: raise.search,
-        score: raise.score,
-        peaks: up,
-        runs: raised,
-    };
-    let lower = Judgement {
-        transition: Transition::Down,
-        search: lower.search,
-        score: lower.score,
-        peaks: down,
-        runs: lowered,
-    };
-    Ok(Plan { motions, table, stored, raise, lower })
+    let judgement =
+        |transition, (search, score), peaks, runs| MotionJudgement { transition, search, score, peaks, runs };
+    Ok(SwingUpPlan {
+        raise: judgement(Transition::Up, raising, up, raised),
+        lower: judgement(Transition::Down, lowering, down, lowered),
+        motions,
+        table,
+        stored,
+    })
 }
 
 /// Runs of the whole firmware of `table` with the errors of `[swing_up]`: how many are raised, and how many of those
 /// are lowered. A run that the supervisor ends or does not begin has not arrived.
-fn arriving(rig: &Rig, table: &TableValues, motions: &RaiseAndLower) -> Result<[Runs; 2], SwingUpError> {
-    let found = firmware_runs(rig, table, motions, &Condition::asked(rig), 1, JUDGING_RUNS, &Study::whole())?;
+fn arriving(
+    rig: &Rig,
+    table: &TableValues,
+    motions: &RaiseAndLower,
+) -> Result<[RandomRuns; 2], SwingUpError> {
+    let found = firmware_runs(
+        rig,
+        table,
+        motions,
+        &Condition::asked(rig),
+        1..1 + JUDGING_RUNS as u64,
+        &Study::whole(),
+    )?;
     Ok([found.raise_in_all(), found.lower])
 }
 
@@ -284,9 +290,15 @@ mod tests {
         let rig = Rig::from_path(file.as_ref()).unwrap();
         let motions = motions(&rig, &Stored::beside(file.as_ref()).unwrap()).unwrap();
         let setting = Setting::of(&rig).unwrap();
-        let law =
-            random_runs(&setting, &motions.raise, Transition::Up, &Spread::asked(&rig), 1, JUDGING_RUNS)
-                .unwrap();
+        let law = random_runs(
+            &setting,
+            &motions.raise,
+            Transition::Up,
+            &MotionSpread::asked(&rig),
+            1,
+            JUDGING_RUNS,
+        )
+        .unwrap();
         assert!(is_enough(&rig, &law), "{law:?}");
     }
 }

@@ -19,7 +19,7 @@ pub(super) struct Bounds {
 
 /// One linear limit: `position x + speed ẋ + force u <= bound`.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Limit {
+pub(super) struct PlanLimit {
     pub(super) position: f64,
     pub(super) speed: f64,
     pub(super) force: f64,
@@ -28,7 +28,7 @@ pub(super) struct Limit {
     pub(super) name: &'static str,
 }
 
-impl Limit {
+impl PlanLimit {
     /// Distance of a state and a force from the limit; negative beyond it.
     pub(super) fn room(&self, x: &[f64], u: f64) -> f64 {
         self.bound - self.position * x[0] - self.speed * x[1] - self.force * u
@@ -37,13 +37,13 @@ impl Limit {
 
 impl Bounds {
     /// All bounds, each as one-sided limits.
-    pub(super) fn limits(&self) -> Vec<Limit> {
-        let free = Limit { position: 0.0, speed: 0.0, force: 0.0, bound: 0.0, name: "" };
+    pub(super) fn limits(&self) -> Vec<PlanLimit> {
+        let free = PlanLimit { position: 0.0, speed: 0.0, force: 0.0, bound: 0.0, name: "" };
         let mut limits = Vec::new();
         for sign in [1.0, -1.0] {
-            limits.push(Limit { force: sign, bound: self.force_n, name: "force", ..free });
+            limits.push(PlanLimit { force: sign, bound: self.force_n, name: "force", ..free });
             if let Some([stall, loss]) = self.motor {
-                limits.push(Limit {
+                limits.push(PlanLimit {
                     force: sign,
                     speed: sign * loss,
                     bound: stall,
@@ -52,11 +52,11 @@ impl Bounds {
                 });
             }
             if let Some(speed) = self.speed_m_per_s {
-                limits.push(Limit { speed: sign, bound: speed, name: "cart speed", ..free });
+                limits.push(PlanLimit { speed: sign, bound: speed, name: "cart speed", ..free });
             }
             if let Some([low, high]) = self.rail_m {
                 let bound = if sign > 0.0 { high } else { -low };
-                limits.push(Limit { position: sign, bound, name: "rail", ..free });
+                limits.push(PlanLimit { position: sign, bound, name: "rail", ..free });
             }
         }
         limits
@@ -75,14 +75,14 @@ impl Bounds {
 }
 
 /// A trajectory from one state of rest to another.
-pub(super) struct Problem<'a> {
+pub(super) struct TrajectoryProblem<'a> {
     pub(super) dynamics: &'a dyn Dynamics,
     /// Time between knots (s) and number of steps.
     pub(super) knot_s: f64,
     pub(super) steps: usize,
     pub(super) start: Vec<f64>,
     pub(super) end: Vec<f64>,
-    pub(super) limits: Vec<Limit>,
+    pub(super) limits: Vec<PlanLimit>,
     /// Cost per second: `xᵀ Q x + r_u u² + r_du u̇²`.
     pub(super) state_weights: Matrix<f64>,
     pub(super) force_weight: f64,

@@ -8,14 +8,14 @@ const DIGITS: usize = 3;
 
 /// A limit that planned motions have to keep.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Limit {
+pub(super) enum RigLimit {
     Rail,
     Force,
     Speed,
     Duration,
 }
 
-impl Limit {
+impl RigLimit {
     pub(super) const ALL: [Self; 4] = [Self::Rail, Self::Force, Self::Speed, Self::Duration];
 
     /// Name of the limit for a user.

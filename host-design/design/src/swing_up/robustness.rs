@@ -5,7 +5,7 @@ use rand_pcg::Pcg64;
 use serde::Serialize;
 
 use super::SwingUpError;
-use super::closed_loop::{LOST_RAD, Trial, run};
+use super::closed_loop::{LOST_RAD, TrackingTrial, run};
 use super::setting::Setting;
 use crate::motion::{PlannedMotion, Transition};
 use crate::parallel;
@@ -17,7 +17,7 @@ const MASS_STEP: f64 = 0.005;
 
 /// The ranges from which each random run is drawn, uniformly.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct Spread {
+pub struct MotionSpread {
     /// Range of the cart's and each link's mass: 0.05 is -5 % to +5 %.
     pub mass: f64,
     /// Range of the friction of cart and joints, which are all wrong by the same factor.
@@ -30,7 +30,7 @@ pub struct Spread {
     pub zero_rad: f64,
 }
 
-impl Spread {
+impl MotionSpread {
     /// The given ranges of masses and friction, a start off by up to 1° and 1 mm, encoder zeros off by up to 0.1°.
     pub fn of(mass: f64, friction: f64) -> Self {
         let degree = core::f64::consts::PI / 180.0;
@@ -49,7 +49,7 @@ pub(super) const JUDGING_RUNS: usize = 200;
 
 /// Outcome of random runs.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Runs {
+pub struct RandomRuns {
     /// Seed of the first run; each following run has the next one.
     pub base_seed: u64,
     /// Runs made.
@@ -69,9 +69,9 @@ pub(super) fn score(
     setting: &Setting<'_>,
     motion: &PlannedMotion,
     transition: Transition,
-    spread: &Spread,
+    spread: &MotionSpread,
 ) -> Result<f64, SwingUpError> {
-    let ideal = Trial::ideal(setting, motion);
+    let ideal = TrackingTrial::ideal(setting, motion);
     let [low, high] = setting.chain.cart.travel_m;
     let room = motion.x.iter().fold(f64::INFINITY, |room, x| room.min(high - x[0]).min(x[0] - low));
     let share = |change: &dyn Fn(&mut Chain)| -> Result<f64, SwingUpError> {
@@ -109,7 +109,7 @@ fn scale_friction(chain: &mut Chain, factor: f64) {
 }
 
 /// A real rig within the spread, and the state in which it starts (m, m/s, rad, rad/s …), drawn with `seed`.
-pub(super) fn drawn(rig: &Rig, transition: Transition, spread: &Spread, seed: u64) -> (Rig, Vec<f64>) {
+pub(super) fn drawn(rig: &Rig, transition: Transition, spread: &MotionSpread, seed: u64) -> (Rig, Vec<f64>) {
     let mut random = Pcg64::seed_from_u64(seed);
     let mut between = |share: f64| share * random.random_range(-1.0..=1.0);
     let mut rig = rig.clone();
@@ -143,11 +143,12 @@ pub(super) fn sample(
     setting: &Setting<'_>,
     motion: &PlannedMotion,
     transition: Transition,
-    spread: &Spread,
+    spread: &MotionSpread,
     seed: u64,
-) -> Trial {
+) -> TrackingTrial {
     let (rig, start) = drawn(setting.rig, transition, spread, seed);
-    let mut trial = Trial { counts: true, seed: Some(seed), start, ..Trial::ideal(setting, motion) };
+    let mut trial =
+        TrackingTrial { counts: true, seed: Some(seed), start, ..TrackingTrial::ideal(setting, motion) };
     for (joint, error) in trial.zero_error.iter_mut().skip(1).enumerate() {
         *error = rig.reality.sensors.homing_error_rad.of(joint);
     }
@@ -162,17 +163,17 @@ pub(super) fn random_runs(
     setting: &Setting<'_>,
     motion: &PlannedMotion,
     transition: Transition,
-    spread: &Spread,
+    spread: &MotionSpread,
     base_seed: u64,
     runs: usize,
-) -> Result<Runs, SwingUpError> {
+) -> Result<RandomRuns, SwingUpError> {
     let one = |index: usize| {
         let trial = sample(setting, motion, transition, spread, base_seed + index as u64);
         run(setting, motion, transition, &trial)
     };
     let all: Vec<_> = parallel::try_map(0..runs, one)?;
     let arrived = || all.iter().filter(|outcome| outcome.arrived);
-    Ok(Runs {
+    Ok(RandomRuns {
         base_seed,
         runs,
         arrived: arrived().count(),

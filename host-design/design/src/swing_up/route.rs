@@ -6,7 +6,7 @@ use upright::supervision::supervisor::State;
 use upright::table::Equilibrium;
 
 use super::SwingUpError;
-use super::robustness::{Spread, drawn};
+use super::robustness::{MotionSpread, drawn};
 use crate::harness::{Harness, HarnessError, Target, goals, with_firmware};
 use crate::motion::{Transition, rest};
 use crate::plant::{absolute_angles, without_turns};
@@ -200,7 +200,7 @@ pub fn route_runs(
     study: &Study,
 ) -> Result<RouteRuns, SwingUpError> {
     let scenario = Scenario { substeps: 2, ..route.scenario(rig, base_seed) };
-    let spread = Spread::asked(rig);
+    let spread = MotionSpread::asked(rig);
     let one = |number: u64| {
         let seed = base_seed + number;
         let (real, start) = drawn(rig, Transition::Up, &spread, seed);

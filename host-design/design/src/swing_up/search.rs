@@ -5,9 +5,9 @@ use rand_pcg::Pcg64;
 
 use super::SwingUpError;
 use super::gains::motion;
-use super::problem::{Bounds, Knots, Problem};
+use super::problem::{Bounds, Knots, TrajectoryProblem};
 use super::refine::{Path, refine};
-use super::robustness::{Spread, score};
+use super::robustness::{MotionSpread, score};
 use super::setting::Setting;
 use super::shooting;
 use crate::motion::{PlannedMotion, Transition};
@@ -49,7 +49,7 @@ struct Draw {
 }
 
 /// A candidate that was solved.
-pub(super) struct Candidate {
+pub(super) struct MotionCandidate {
     pub(super) knots: Knots,
     pub(super) motion: PlannedMotion,
     /// Smaller is more robust.
@@ -58,17 +58,17 @@ pub(super) struct Candidate {
 
 /// Limits that the rig file sets for a plan.
 #[derive(Debug, Clone)]
-pub(super) struct Request {
+pub(super) struct SearchRanges {
     /// Ranges from which duration, largest force and largest distance from the middle of the rail are drawn.
     pub(super) duration_s: [f64; 2],
     pub(super) force_n: [f64; 2],
     pub(super) rail_m: [f64; 2],
     /// The bounds that are not drawn.
     pub(super) bounds: Bounds,
-    pub(super) spread: Spread,
+    pub(super) spread: MotionSpread,
 }
 
-impl Request {
+impl SearchRanges {
     pub(super) fn of(setting: &Setting<'_>) -> Self {
         let (unit, rules) = (time_unit(setting), &setting.rules);
         let mut bounds = setting.actuator.scaled(SHARE);
@@ -88,7 +88,7 @@ impl Request {
         let [shortest, longest] = DURATION.map(|units| units * unit);
         let shortest = rules.shortest_s.unwrap_or_else(|| shortest.min(rules.longest_s.unwrap_or(shortest)));
         let duration_s = [shortest, rules.longest_s.unwrap_or(longest).max(shortest)];
-        Self { duration_s, force_n, rail_m, bounds, spread: Spread::asked(setting.rig) }
+        Self { duration_s, force_n, rail_m, bounds, spread: MotionSpread::asked(setting.rig) }
     }
 }
 
@@ -99,7 +99,7 @@ fn time_unit(setting: &Setting<'_>) -> f64 {
 }
 
 /// Draws candidate `number`.
-fn draw(setting: &Setting<'_>, request: &Request, transition: Transition, number: u64) -> Draw {
+fn draw(setting: &Setting<'_>, request: &SearchRanges, transition: Transition, number: u64) -> Draw {
     let mut random = Pcg64::seed_from_u64(number);
     let mut between = |[low, high]: [f64; 2]| low + (high - low) * random.random_range(0.0..=1.0);
     let unit = time_unit(setting);
@@ -126,7 +126,7 @@ pub(super) fn ticks_per_knot(setting: &Setting<'_>) -> usize {
 /// Solves candidate `number`. None if its gaps do not close, or a bound does not hold.
 fn solve(
     setting: &Setting<'_>,
-    request: &Request,
+    request: &SearchRanges,
     transition: Transition,
     number: u64,
 ) -> Option<(Knots, Path)> {
@@ -137,7 +137,7 @@ fn solve(
     // To the last bit the ends with which the motion will be restored.
     let ends = transition.ends_near(&end);
     let [start, end] = ends.clone();
-    let problem = Problem {
+    let problem = TrajectoryProblem {
         dynamics: &*setting.dynamics,
         knot_s,
         steps: (draw.duration_s / knot_s).round().max(2.0) as usize,
@@ -154,7 +154,7 @@ fn solve(
 }
 
 /// Initial guess: all links turn at constant rates, and the force is the one drawn.
-fn guess(problem: &Problem<'_>, draw: &Draw) -> Knots {
+fn guess(problem: &TrajectoryProblem<'_>, draw: &Draw) -> Knots {
     let (steps, turn) = (problem.steps, core::f64::consts::PI);
     let duration_s = steps as f64 * problem.knot_s;
     let mut knots = Knots { x: Vec::new(), u: Vec::new() };
@@ -196,12 +196,12 @@ pub(super) fn within(path: &Path, bounds: &Bounds) -> bool {
 /// is called after each, from any thread, with its score.
 pub(super) fn candidates(
     setting: &Setting<'_>,
-    request: &Request,
+    request: &SearchRanges,
     transition: Transition,
     numbers: core::ops::Range<u64>,
     done: &(dyn Fn(Option<f64>) + Sync),
-) -> Result<Vec<Candidate>, SwingUpError> {
-    let one = |number: u64| -> Result<Option<Candidate>, SwingUpError> {
+) -> Result<Vec<MotionCandidate>, SwingUpError> {
+    let one = |number: u64| -> Result<Option<MotionCandidate>, SwingUpError> {
         let Some((knots, path)) = solve(setting, request, transition, number) else {
             done(None);
             return Ok(None);
@@ -209,7 +209,7 @@ pub(super) fn candidates(
         let motion = motion(setting, path, transition, RANKING_WEIGHT)?;
         let score = score(setting, &motion, transition, &request.spread)?;
         done(Some(score));
-        Ok(Some(Candidate { knots, motion, score }))
+        Ok(Some(MotionCandidate { knots, motion, score }))
     };
     let all: Vec<_> = parallel::try_map(numbers, one)?;
     Ok(all.into_iter().flatten().collect())

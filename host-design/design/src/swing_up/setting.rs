@@ -9,10 +9,10 @@ use super::SwingUpError;
 use super::dynamics::{Dynamics, dynamics};
 use super::hold::tick;
 use super::problem::Bounds;
-use super::tracking::{Filter, Noise, stationary};
+use super::tracking::{Noise, PathFilter, stationary};
 use crate::motion::{Transition, rest};
 use crate::numerics::Matrix;
-use crate::rig::{Chain, Motor, PlantDescription, Rig, Sensor, SwingUpRules};
+use crate::rig::{Chain, Kalman, Motor, PlantDescription, Rig, Sensor, SwingUpRules};
 use crate::verify::Disturbance;
 
 /// Process noise that the filter expects in motion, as multiples of the rig's: wrong masses disturb it more in motion
@@ -75,24 +75,16 @@ impl<'a> Setting<'a> {
         }
         let (dynamics, tick_s) = (dynamics(chain)?, rig.tick.period_s);
         let steps: Vec<f64> = sensors.iter().map(|sensor| sensor.step()).collect();
-        let rounding = |(sensor, step): (&Sensor, &f64)| (sensor.state, step * step / 12.0);
-        let joints = kalman.joint_noise.iter().map(|intensity| JOINT_NOISE * intensity);
         let rules = rig.swing_up.clone().unwrap_or_default();
-        let wrong = rules.friction_spread_percent / 100.0;
-        let of_links = chain.links.iter().map(|link| link.friction_n_m_s_per_rad);
-        let frictions = [chain.cart.friction_n_s_per_m].into_iter().chain(of_links);
-        let noise = Noise {
-            friction_errors: frictions.map(|friction| wrong * friction).collect(),
-            intensities: [FORCE_NOISE * kalman.force_noise_n2_s].into_iter().chain(joints).collect(),
-            sensors: sensors.iter().zip(&steps).map(rounding).collect(),
-        };
+        let rounding = |(sensor, step): (&Sensor, &f64)| (sensor.state, step * step / 12.0);
+        let noise = noise(chain, kalman, &rules, sensors.iter().zip(&steps).map(rounding).collect());
         let weights = Matrix::from_diagonal(&lqr.state_weights);
         let (states, force_weight) = (rig.states(), lqr.force_weight);
         let at_rest = |at: Equilibrium| -> Result<AtRest, SwingUpError> {
             let state = rest(at, states);
             let tick = tick(&*dynamics, &state, 0.0, tick_s);
             let (cost, k) = stationary(&tick, &weights, force_weight, tick_s);
-            let mut filter = Filter::new(&*dynamics, &noise, states, tick_s);
+            let mut filter = PathFilter::new(&*dynamics, &noise, states, tick_s);
             let l = filter.settle(&state, &tick, (SETTLE_S / tick_s) as usize)?;
             Ok(AtRest { cost, k, l, covariance: filter.covariance })
         };
@@ -132,6 +124,20 @@ impl<'a> Setting<'a> {
     /// Law and filter at the end of one of the transitions.
     pub(super) fn at_end(&self, transition: Transition) -> &AtRest {
         &self.rests[&transition.to(self.chain.links.len())]
+    }
+}
+
+/// The noise that the filter expects in motion; `sensors` are the states that are measured, and the variances of their
+/// rounding errors.
+fn noise(chain: &Chain, kalman: &Kalman, rules: &SwingUpRules, sensors: Vec<(usize, f64)>) -> Noise {
+    let wrong = rules.friction_spread_percent / 100.0;
+    let of_links = chain.links.iter().map(|link| link.friction_n_m_s_per_rad);
+    let frictions = [chain.cart.friction_n_s_per_m].into_iter().chain(of_links);
+    let joints = kalman.joint_noise.iter().map(|intensity| JOINT_NOISE * intensity);
+    Noise {
+        friction_errors: frictions.map(|friction| wrong * friction).collect(),
+        intensities: [FORCE_NOISE * kalman.force_noise_n2_s].into_iter().chain(joints).collect(),
+        sensors,
     }
 }
 

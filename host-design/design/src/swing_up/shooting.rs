@@ -6,7 +6,7 @@
 //! damped Newton steps close the gaps.
 
 use super::interior_point::Slacks;
-use super::problem::{Knots, Problem};
+use super::problem::{Knots, TrajectoryProblem};
 use super::riccati::{Minimum, Stage, dot, minimise, times};
 use crate::numerics::Matrix;
 
@@ -47,7 +47,7 @@ struct Accepted {
 }
 
 /// Solves `problem` from a guess. None if the gaps do not close.
-pub(super) fn solve(problem: &Problem<'_>, guess: Knots) -> Option<Knots> {
+pub(super) fn solve(problem: &TrajectoryProblem<'_>, guess: Knots) -> Option<Knots> {
     let mu = 1e-2 * problem.knot_s;
     let slacks = Slacks::new(&problem.limits, &guess, mu);
     let mut at = Iterate { knots: guess, slacks, end: vec![0.0; problem.end.len() + 1], mu };
@@ -58,7 +58,7 @@ pub(super) fn solve(problem: &Problem<'_>, guess: Knots) -> Option<Knots> {
 }
 
 /// Gauss-Newton with the cost, until it converges or stalls.
-fn with_cost(problem: &Problem<'_>, at: &mut Iterate) {
+fn with_cost(problem: &TrajectoryProblem<'_>, at: &mut Iterate) {
     let mut filter: Vec<(f64, f64)> = Vec::new();
     let (mut damping, mut slow) = (1e-4, 0);
     let mut before = gaps(problem, at);
@@ -101,7 +101,7 @@ fn with_cost(problem: &Problem<'_>, at: &mut Iterate) {
 }
 
 /// Damped Newton on the gaps alone: each step is the least change that closes them to first order.
-fn feasibility_only(problem: &Problem<'_>, at: &mut Iterate) {
+fn feasibility_only(problem: &TrajectoryProblem<'_>, at: &mut Iterate) {
     at.mu = 1e-3 * problem.knot_s;
     let mut before = gaps(problem, at);
     for _ in 0..FEASIBILITY_ONLY {
@@ -119,7 +119,7 @@ fn feasibility_only(problem: &Problem<'_>, at: &mut Iterate) {
 
 /// The iterate after the first accepted share of the step.
 fn search(
-    problem: &Problem<'_>,
+    problem: &TrajectoryProblem<'_>,
     at: &Iterate,
     step: &Minimum,
     accepts: &dyn Fn(Gaps, f64) -> bool,
@@ -143,7 +143,7 @@ fn search(
 }
 
 /// The full step: with a damping it lowers the cost, without one it is the least change that closes the gaps.
-fn newton(problem: &Problem<'_>, at: &Iterate, damping: Option<f64>) -> Option<Minimum> {
+fn newton(problem: &TrajectoryProblem<'_>, at: &Iterate, damping: Option<f64>) -> Option<Minimum> {
     let (knots, h, s) = (&at.knots, problem.knot_s, problem.end.len());
     let weights = problem.state_weights.scaled(&(2.0 * h));
     let mut stages: Vec<Stage> = Vec::with_capacity(problem.steps + 1);
@@ -184,7 +184,7 @@ fn newton(problem: &Problem<'_>, at: &Iterate, damping: Option<f64>) -> Option<M
 
 /// Cost of one knot to second order, without the limits. `weights` are the second derivatives by the states.
 fn stage_cost(
-    problem: &Problem<'_>,
+    problem: &TrajectoryProblem<'_>,
     weights: &Matrix<f64>,
     x: &[f64],
     u: f64,
@@ -215,7 +215,7 @@ fn stage_cost(
 }
 
 /// Difference of the last state and force from the end at rest, s + 1 entries.
-fn end_distance(problem: &Problem<'_>, knots: &Knots) -> Vec<f64> {
+fn end_distance(problem: &TrajectoryProblem<'_>, knots: &Knots) -> Vec<f64> {
     let last = knots.x[problem.steps].iter().zip(&problem.end).map(|(x, end)| x - end);
     last.chain([knots.u[problem.steps]]).collect()
 }
@@ -229,7 +229,7 @@ fn moved(knots: &Knots, step: &Minimum, share: f64) -> Knots {
     }
 }
 
-fn gaps(problem: &Problem<'_>, at: &Iterate) -> Gaps {
+fn gaps(problem: &TrajectoryProblem<'_>, at: &Iterate) -> Gaps {
     let (mut largest, mut sum) = (0.0f64, 0.0f64);
     let mut take = |gap: f64| {
         largest = largest.max(gap.abs());
@@ -247,7 +247,7 @@ fn gaps(problem: &Problem<'_>, at: &Iterate) -> Gaps {
     if sum.is_nan() { Gaps { largest: f64::INFINITY, sum: f64::INFINITY } } else { Gaps { largest, sum } }
 }
 
-fn cost(problem: &Problem<'_>, at: &Iterate) -> f64 {
+fn cost(problem: &TrajectoryProblem<'_>, at: &Iterate) -> f64 {
     let (knots, h) = (&at.knots, problem.knot_s);
     let mut sum = at.mu * at.slacks.barrier();
     for (knot, (x, &u)) in knots.x.iter().zip(&knots.u).enumerate() {

@@ -6,6 +6,7 @@ use std::path::{Path as FilePath, PathBuf};
 
 use serde::Deserialize;
 use serde::de::DeserializeOwned;
+use serde_json::json;
 use sha2::{Digest, Sha256};
 
 use super::SwingUpError;
@@ -65,6 +66,11 @@ impl StoredKnots {
     }
 }
 
+/// The beginning of a file of stored motions: a JSON object that is not closed yet.
+pub(super) fn header(rig: &str, hash: &str) -> String {
+    format!("{{\n\"rig\": {},\n\"hash\": {}", json!(rig), json!(hash))
+}
+
 /// Hash of everything that a search depends on: the values of the rig file, `[swing_up]` included.
 pub(super) fn request_hash(rig: &Rig) -> String {
     // Serialising plain structs of numbers and strings into memory cannot fail.
@@ -107,7 +113,7 @@ impl Stored {
 
     /// The motions as JSON, one knot per line.
     pub fn to_json(&self) -> String {
-        let mut text = format!("{{\n\"rig\": {:?},\n\"hash\": {:?}", self.rig, self.hash);
+        let mut text = header(&self.rig, &self.hash);
         for (name, motion) in [("raise", &self.raise), ("lower", &self.lower)] {
             motion.write(&mut text, name);
         }

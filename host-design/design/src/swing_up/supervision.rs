@@ -3,7 +3,7 @@
 use upright::table::MotionLimits;
 
 use super::closed_loop::LOST_RAD;
-use super::robustness::{Spread, drawn};
+use super::robustness::{MotionSpread, drawn};
 use crate::motion::Transition;
 use crate::parallel;
 use crate::rig::{PlantDescription, Rig};
@@ -63,7 +63,7 @@ pub(super) fn set_limits(rig: &Rig, table: &mut TableValues) -> Result<(), Simul
 
 /// The extremes that healthy machines reach; runs that are lost do not count.
 fn healthy(rig: &Rig, table: &TableValues) -> Result<Extremes, SimulationError> {
-    let spread = Spread::asked(rig);
+    let spread = MotionSpread::asked(rig);
     let disturbance = Disturbance::of(rig);
     let balance_ticks = (BALANCE_S / rig.tick.period_s) as usize;
     let quiet = Scenario { substeps: 2, ..Scenario::swing_up(rig, 0.0, None) };

@@ -1,18 +1,18 @@
 //! Feedback and filter along a path.
 
 use super::dynamics::Dynamics;
-use super::hold::{Tick, tick};
+use super::hold::{HeldTick, tick};
 use super::refine::Path;
 use crate::numerics::{Matrix, Singular, solve_right};
 
 /// The ticks of a path with their derivatives.
-pub(super) fn ticks(dynamics: &dyn Dynamics, path: &Path, tick_s: f64) -> Vec<Tick> {
+pub(super) fn ticks(dynamics: &dyn Dynamics, path: &Path, tick_s: f64) -> Vec<HeldTick> {
     path.x.iter().zip(&path.u).map(|(x, &u)| tick(dynamics, x, u, tick_s)).collect()
 }
 
 /// `[Q S; Sᵀ R]` of one tick in state and held force: the integral of the continuous cost over the tick, by Simpson's
 /// rule, with the trajectory of the state to first order in the deviations. `weights` is diagonal.
-fn tick_cost(tick: &Tick, weights: &Matrix<f64>, force_weight: f64, tick_s: f64) -> Matrix<f64> {
+fn tick_cost(tick: &HeldTick, weights: &Matrix<f64>, force_weight: f64, tick_s: f64) -> Matrix<f64> {
     let s = tick.whole.rows();
     let over = |by: &Matrix<f64>| {
         Matrix::from_fn(s, s + 1, |k, i| weights[(k, k)] * by[(k, i)]).transposed_times(by)
@@ -27,7 +27,7 @@ fn tick_cost(tick: &Tick, weights: &Matrix<f64>, force_weight: f64, tick_s: f64)
 }
 
 /// One backward step of the Riccati recursion: the gain K (1×s), and the cost-to-go before the tick.
-fn step_back(tick: &Tick, cost: &Matrix<f64>, ahead: &Matrix<f64>) -> (Matrix<f64>, Matrix<f64>) {
+fn step_back(tick: &HeldTick, cost: &Matrix<f64>, ahead: &Matrix<f64>) -> (Matrix<f64>, Matrix<f64>) {
     let s = tick.whole.rows();
     let all = cost + &tick.whole.transposed_times(&(ahead * &tick.whole));
     let h = all[(s, s)];
@@ -39,7 +39,7 @@ fn step_back(tick: &Tick, cost: &Matrix<f64>, ahead: &Matrix<f64>) -> (Matrix<f6
 /// Gains K of each tick that minimise the sampled cost with `at_end` as the cost-to-go of the last state. Weights are
 /// those of `[lqr]`, per second.
 pub(super) fn feedback(
-    ticks: &[Tick],
+    ticks: &[HeldTick],
     weights: &Matrix<f64>,
     force_weight: f64,
     at_end: &Matrix<f64>,
@@ -61,7 +61,7 @@ pub(super) fn feedback(
 
 /// The stationary cost-to-go and gain about a state of rest: the recursion is repeated until the gain is constant.
 pub(super) fn stationary(
-    tick: &Tick,
+    tick: &HeldTick,
     weights: &Matrix<f64>,
     force_weight: f64,
     tick_s: f64,
@@ -104,7 +104,7 @@ impl Noise {
 }
 
 /// The filter along a motion: its covariance from tick to tick.
-pub(super) struct Filter<'a> {
+pub(super) struct PathFilter<'a> {
     dynamics: &'a dyn Dynamics,
     noise: &'a Noise,
     tick_s: f64,
@@ -112,7 +112,7 @@ pub(super) struct Filter<'a> {
     pub(super) covariance: Matrix<f64>,
 }
 
-impl<'a> Filter<'a> {
+impl<'a> PathFilter<'a> {
     /// A filter that initially knows each measured state to the rounding of its encoder, and no rate.
     pub(super) fn new(dynamics: &'a dyn Dynamics, noise: &'a Noise, states: usize, tick_s: f64) -> Self {
         let mut covariance = Matrix::identity(states).scaled(&1e-2);
@@ -126,7 +126,7 @@ impl<'a> Filter<'a> {
     ///
     /// # Errors
     /// [`Singular`] if the covariance of the innovation is singular.
-    pub(super) fn gain(&mut self, x: &[f64], tick: &Tick) -> Result<Matrix<f64>, Singular> {
+    pub(super) fn gain(&mut self, x: &[f64], tick: &HeldTick) -> Result<Matrix<f64>, Singular> {
         self.gain_over(&self.spread(x), &tick.a())
     }
 
@@ -134,7 +134,12 @@ impl<'a> Filter<'a> {
     ///
     /// # Errors
     /// As for [`gain`](Self::gain).
-    pub(super) fn settle(&mut self, x: &[f64], tick: &Tick, ticks: usize) -> Result<Matrix<f64>, Singular> {
+    pub(super) fn settle(
+        &mut self,
+        x: &[f64],
+        tick: &HeldTick,
+        ticks: usize,
+    ) -> Result<Matrix<f64>, Singular> {
         let (spread, a) = (self.spread(x), tick.a());
         let mut l = self.gain_over(&spread, &a)?;
         for _ in 1..ticks {

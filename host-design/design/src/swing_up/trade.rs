@@ -4,8 +4,8 @@ use serde::Serialize;
 
 use super::SwingUpError;
 use super::progress::{SearchProgress, SearchStep};
-use super::robustness::{Runs, Spread, random_runs};
-use super::search::{Candidate, Request, candidates};
+use super::robustness::{MotionSpread, RandomRuns, random_runs};
+use super::search::{MotionCandidate, SearchRanges, candidates};
 use super::setting::Setting;
 use crate::motion::Transition;
 use crate::rig::Rig;
@@ -15,7 +15,7 @@ const RUNS: usize = 100;
 
 /// A candidate that was solved.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Solved {
+pub struct SolvedCandidate {
     /// Duration (s).
     pub duration_s: f64,
     /// Largest force (N).
@@ -25,9 +25,9 @@ pub struct Solved {
     /// Fragility: the smaller, the larger errors of masses and friction it survives.
     pub score: f64,
     /// Random runs with the spreads of masses and friction of `[swing_up]`.
-    pub runs: Runs,
+    pub runs: RandomRuns,
     /// Random runs with twice these spreads.
-    pub wider: Runs,
+    pub wider: RandomRuns,
 }
 
 /// Those of `tried` candidates of the search for a raising that are solved, in their order. Seed 1 stands for the
@@ -40,23 +40,23 @@ pub fn solved(
     tried: u64,
     seed: u64,
     progress: SearchProgress<'_>,
-) -> Result<Vec<Solved>, SwingUpError> {
+) -> Result<Vec<SolvedCandidate>, SwingUpError> {
     let setting = Setting::of(rig)?;
-    let (request, transition) = (Request::of(&setting), Transition::Up);
+    let (request, transition) = (SearchRanges::of(&setting), Transition::Up);
     let first = seed.saturating_sub(1).saturating_mul(tried);
     progress(SearchStep::Stage { transition, what: "trajectories", steps: tried });
     let step = |score| progress(SearchStep::Step { score });
     let found = candidates(&setting, &request, transition, first..first.saturating_add(tried), &step)?;
     progress(SearchStep::Stage { transition, what: "random runs", steps: found.len() as u64 });
-    let Spread { mass, friction, .. } = request.spread;
-    let twice = Spread { mass: 2.0 * mass, friction: 2.0 * friction, ..request.spread };
+    let MotionSpread { mass, friction, .. } = request.spread;
+    let twice = MotionSpread { mass: 2.0 * mass, friction: 2.0 * friction, ..request.spread };
     let largest = |most: f64, value: f64| most.max(value.abs());
-    let judged = |candidate: &Candidate| {
+    let judged = |candidate: &MotionCandidate| {
         let (motion, score) = (&candidate.motion, candidate.score);
-        let runs = |spread: &Spread| random_runs(&setting, motion, transition, spread, seed, RUNS);
+        let runs = |spread: &MotionSpread| random_runs(&setting, motion, transition, spread, seed, RUNS);
         let (runs, wider) = (runs(&request.spread)?, runs(&twice)?);
         step(Some(score));
-        Ok(Solved {
+        Ok(SolvedCandidate {
             duration_s: motion.duration_s(),
             force_n: motion.u.iter().copied().fold(0.0, largest),
             position_m: motion.x.iter().map(|x| x[0]).fold(0.0, largest),

@@ -10,12 +10,12 @@ use serde::{Deserialize, Serialize};
 
 use super::SwingUpError;
 use super::check::check;
-use super::plan::{Found, best, restored};
+use super::plan::{FoundMotion, best, restored};
 use super::progress::SearchProgress;
-use super::robustness::{JUDGING_RUNS, Runs, Spread, random_runs};
-use super::search::Request;
+use super::robustness::{JUDGING_RUNS, MotionSpread, RandomRuns, random_runs};
+use super::search::SearchRanges;
 use super::setting::Setting;
-use super::stored::{StoredKnots, read, request_hash};
+use super::stored::{StoredKnots, header, read, request_hash};
 use crate::motion::{PlannedMotion, Transition};
 use crate::parallel;
 use crate::rig::Rig;
@@ -32,7 +32,7 @@ pub struct Searched {
     pub solved: usize,
     /// Random runs of the best of them with the law alone; none if none is solved or the best does not pass the
     /// independent check.
-    pub runs: Option<Runs>,
+    pub runs: Option<RandomRuns>,
     /// Whether its knots were stored: enough of the runs arrive.
     pub is_stored: bool,
 }
@@ -68,15 +68,15 @@ impl StoredTransitions {
     ) -> Result<Searched, SwingUpError> {
         let setting = Setting::with_transitions(rig, &[transition])?;
         let none = Searched { transition, solved: 0, runs: None, is_stored: false };
-        let Some(found) = best(&setting, &Request::of(&setting), transition, numbers, progress)? else {
+        let Some(found) = best(&setting, &SearchRanges::of(&setting), transition, numbers, progress)? else {
             return Ok(none);
         };
-        let Found { motion, stored, search, .. } = found;
+        let FoundMotion { motion, stored, search, .. } = found;
         let solved = search.map_or(0, |[_, solved]| solved);
         if check(&setting, &motion, transition).is_err() {
             return Ok(Searched { solved, ..none });
         }
-        let runs = random_runs(&setting, &motion, transition, &Spread::asked(rig), 1, JUDGING_RUNS)?;
+        let runs = random_runs(&setting, &motion, transition, &MotionSpread::asked(rig), 1, JUDGING_RUNS)?;
         let is_stored = runs.arrived as f64 >= WORTH_A_RUN * runs.runs as f64;
         if is_stored {
             let name = transition.name(setting.chain.links.len());
@@ -171,7 +171,7 @@ impl StoredTransitions {
 
     /// The motions as JSON, one knot per line.
     pub fn to_json(&self) -> String {
-        let mut text = format!("{{\n\"rig\": {:?},\n\"hash\": {:?}", self.rig, self.hash);
+        let mut text = header(&self.rig, &self.hash);
         let entry =
             |(name, [arrived, tried]): (&String, &[usize; 2])| format!("\n\"{name}\": [{arrived}, {tried}]");
         let judged: Vec<String> = self.judged.iter().map(entry).collect();

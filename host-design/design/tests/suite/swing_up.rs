@@ -4,7 +4,9 @@ use crate::published::{designed, rig, rig_and_table_with_motions, rig_path, stor
 use upright_design::motion::RaiseAndLower;
 use upright_design::numerics::Matrix;
 use upright_design::rig::{PlantDescription, Rig};
-use upright_design::swing_up::{Script, Solved, Stored, SwingUpError, judge, motions, solved, with_motions};
+use upright_design::swing_up::{
+    Script, SolvedCandidate, Stored, SwingUpError, judge, motions, solved, with_motions,
+};
 use upright_design::table::TableValues;
 
 const RIGS: [&str; 4] =
@@ -135,12 +137,12 @@ fn candidates_are_the_same_for_a_seed_and_fewer_runs_arrive_with_larger_errors()
     assert!(!first.is_empty() && all.len() >= 2, "{}", all.len());
     assert_eq!(all[..first.len()], first);
     // Seed 2 continues with the candidates after those of seed 1, and makes other runs.
-    let durations = |some: &[Solved]| some.iter().map(|one| one.duration_s).collect::<Vec<_>>();
+    let durations = |some: &[SolvedCandidate]| some.iter().map(|one| one.duration_s).collect::<Vec<_>>();
     assert_eq!(durations(&all[first.len()..]), durations(&second));
     let rules = rig.swing_up.as_mut().unwrap();
     (rules.mass_spread_percent, rules.friction_spread_percent) = (60.0, 60.0);
     let wrong = solved(&rig, 8, 1, &|_| ()).unwrap();
-    let arrived = |some: &[Solved]| some.iter().map(|one| one.runs.arrived).sum::<usize>();
+    let arrived = |some: &[SolvedCandidate]| some.iter().map(|one| one.runs.arrived).sum::<usize>();
     assert!(arrived(&wrong) < arrived(&first), "{wrong:?}");
 }
 

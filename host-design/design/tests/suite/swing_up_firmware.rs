@@ -12,7 +12,7 @@ use upright_design::plant::absolute_angles;
 use upright_design::rig::Rig;
 use upright_design::simulate::Scenario;
 use upright_design::study::Study;
-use upright_design::swing_up::{Condition, Runs, firmware_runs, hangs, margins, up_and_down};
+use upright_design::swing_up::{Condition, RandomRuns, firmware_runs, hangs, margins, up_and_down};
 use upright_design::table::TableValues;
 
 const RIGS: [&str; 4] =
@@ -181,9 +181,15 @@ fn a_wrong_motor_or_encoder_is_found_before_the_links_have_left_the_lower_half()
 /// ±30 % and seeds from `base_seed` on.
 fn random_runs(name: &'static str, table: &TableValues, base_seed: u64) -> [usize; 2] {
     let condition = &Condition::all()[2];
-    let found =
-        firmware_runs(&rig(name), table, stored_motions(name), condition, base_seed, 3, &Study::whole())
-            .unwrap();
+    let found = firmware_runs(
+        &rig(name),
+        table,
+        stored_motions(name),
+        condition,
+        base_seed..base_seed + 3,
+        &Study::whole(),
+    )
+    .unwrap();
     println!("{name}, {}: {found:?}", condition.name);
     [found.raise.arrived, found.lower.arrived]
 }
@@ -211,10 +217,12 @@ fn a_motion_that_the_supervisor_ends_has_not_arrived() {
     let (rig, mut table) = with_stored_motions(name);
     let arriving = |table: &TableValues| {
         let (motions, condition) = (stored_motions(name), Condition::asked(&rig));
-        let found = firmware_runs(&rig, table, motions, &condition, 1, RUNS, &Study::whole()).unwrap();
+        let found =
+            firmware_runs(&rig, table, motions, &condition, 1..1 + RUNS as u64, &Study::whole()).unwrap();
         [found.raise_in_all(), found.lower]
     };
-    let is_enough = |runs: &Runs| 100.0 * runs.interval[0] >= rig.swing_up.as_ref().unwrap().success_percent;
+    let is_enough =
+        |runs: &RandomRuns| 100.0 * runs.interval[0] >= rig.swing_up.as_ref().unwrap().success_percent;
     let [raise, lower] = arriving(&table);
     assert!(is_enough(&raise) && is_enough(&lower), "{raise:?}, {lower:?}");
     let limits = &mut table.swing_up.as_mut().unwrap().limits;

@@ -76,7 +76,8 @@ pub(super) fn attempt(setup: &Setup<'_>, trial: &Trial, with_defect: bool) -> Re
         without_detection = blind;
         &without_detection
     };
-    let mut attempt = Attempt { setup, rig: setup.rig, table: setup.table, trial, with_defect, board: None };
+    let mut attempt =
+        DefectRun { setup, rig: setup.rig, table: setup.table, trial, with_defect, board: None };
     let Place::Board { image, conditions } = setup.place else {
         return setup.place.with_target(table, |target| Ok(attempt.run(target)?));
     };
@@ -105,7 +106,7 @@ pub(super) struct OnBoard<'a> {
     events: Events,
 }
 
-pub(super) struct Attempt<'a> {
+pub(super) struct DefectRun<'a> {
     pub(super) setup: &'a Setup<'a>,
     pub(super) rig: &'a Rig,
     pub(super) table: &'a TableValues,
@@ -114,7 +115,7 @@ pub(super) struct Attempt<'a> {
     pub(super) board: Option<OnBoard<'a>>,
 }
 
-impl Attempt<'_> {
+impl DefectRun<'_> {
     fn run(&self, target: &mut dyn Target) -> Result<Observed, HarnessError> {
         if self.trial.kind.is_at_power_up() {
             return self.power_up(target);

@@ -138,8 +138,13 @@ impl<'a> Injection<'a> {
             }
             _ => {}
         }
+        self.show(&shown, &truth, inputs)
+    }
+
+    /// Sets encoders to wrong counters; returns whether one is visibly wrong.
+    fn show(&self, shown: &[(usize, u32)], truth: &[u32], inputs: &mut Pins) -> bool {
         let mut visible = false;
-        for (sensor, counter) in shown {
+        for (sensor, counter) in shown.iter().copied() {
             let counter = Bench::reading(sensor, counter);
             let wrong = Bench::signed(sensor, counter.wrapping_sub(truth[sensor]));
             visible |= wrong.abs() > self.visible_counts[sensor];

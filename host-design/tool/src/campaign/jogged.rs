@@ -8,7 +8,7 @@ use upright_design::harness::{Harness, HarnessError};
 use upright_design::rig::Rig;
 use upright_design::simulate::{Scenario, Sensing};
 
-use super::attempt::Attempt;
+use super::attempt::DefectRun;
 use super::defect::Defect;
 use super::expected::{Expected, Phase};
 use super::injection::Injection;
@@ -77,7 +77,7 @@ impl Trial {
     }
 }
 
-impl Attempt<'_> {
+impl DefectRun<'_> {
     /// A jog, in which a person holds the key throughout.
     pub(super) fn jog(&self, harness: &mut Harness<'_>) -> Result<Observed, HarnessError> {
         let trial = self.trial;

@@ -37,7 +37,7 @@ pub enum Class {
 
 /// The outcome of a trial.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct Outcome {
+pub struct TrialOutcome {
     /// Number of the trial.
     pub number: u64,
     /// The defect.
@@ -56,7 +56,7 @@ pub struct Outcome {
 }
 
 /// Runs and judges a trial.
-pub(super) fn judge(setup: &Setup<'_>, trial: &Trial) -> Result<Outcome, RunError> {
+pub(super) fn judge(setup: &Setup<'_>, trial: &Trial) -> Result<TrialOutcome, RunError> {
     let observed = attempt(setup, trial, true)?;
     let before = observed.off.is_some_and(|off| off < trial.onset);
     let from = |tick: usize| observed.off.map(|off| off.saturating_sub(tick) as u32 + 1);
@@ -66,13 +66,34 @@ pub(super) fn judge(setup: &Setup<'_>, trial: &Trial) -> Result<Outcome, RunErro
         // The motor went off before any single sensor could show the defect: this counts as one tick.
         None => (from(trial.onset), observed.off.map(|_| 1)),
     };
+    let ticks = if let Expected::Fault(..) | Expected::Dead = trial.expected() { from_onset } else { ticks };
+    let class = if before { Class::FalseAlarm } else { class(setup, trial, &observed, ticks, from_onset)? };
+    let fault = observed.fault.map(Fault::code);
+    let stop_to_off_us = observed.stop_to_off_us;
+    Ok(TrialOutcome {
+        number: trial.number,
+        kind: trial.kind,
+        class,
+        ticks,
+        from_onset,
+        fault,
+        stop_to_off_us,
+    })
+}
+
+/// The class of a run that did not turn its motor off before the defect; `ticks` and `from_onset` count the ticks to
+/// motor off from the first visible difference and from the first tick of the defect.
+fn class(
+    setup: &Setup<'_>,
+    trial: &Trial,
+    observed: &Observed,
+    ticks: Option<u32>,
+    from_onset: Option<u32>,
+) -> Result<Class, RunError> {
     let on_board = matches!(setup.place, Place::Board { .. });
-    let expected = trial.expected();
-    let ticks = if let Expected::Fault(..) | Expected::Dead = expected { from_onset } else { ticks };
-    let class = match expected {
-        _ if before => Class::FalseAlarm,
+    Ok(match trial.expected() {
         _ if observed.on_again => Class::Missed,
-        Expected::Fault(fault, within) => of_fault(setup.table, &observed, fault, within, ticks, on_board),
+        Expected::Fault(fault, within) => of_fault(setup.table, observed, fault, within, ticks, on_board),
         Expected::Off(within) => match ticks {
             _ if observed.outside => Class::Missed,
             Some(ticks) if ticks <= within => Class::Detected,
@@ -106,17 +127,14 @@ pub(super) fn judge(setup: &Setup<'_>, trial: &Trial) -> Result<Outcome, RunErro
         },
         Expected::Found(_) if observed.outside || observed.off.is_none() => Class::Missed,
         Expected::Found(sign) => match observed.refused {
-            Some(refused) if refused.contains(Inhibits::MOTOR) && has_found(&observed, sign) => {
+            Some(refused) if refused.contains(Inhibits::MOTOR) && has_found(observed, sign) => {
                 Class::Detected
             }
             _ => Class::Missed,
         },
         Expected::Dead if observed.dead && ticks == Some(1) => Class::Detected,
         Expected::Dead => Class::Missed,
-    };
-    let fault = observed.fault.map(Fault::code);
-    let stop_to_off_us = observed.stop_to_off_us;
-    Ok(Outcome { number: trial.number, kind: trial.kind, class, ticks, from_onset, fault, stop_to_off_us })
+    })
 }
 
 fn of_fault(

@@ -13,7 +13,7 @@ use upright_design::plant::absolute_angles;
 use upright_design::rig::Rig;
 use upright_design::table::TableValues;
 
-use super::attempt::{Attempt, BEYOND, During};
+use super::attempt::{BEYOND, DefectRun, During};
 use super::defect::Defect;
 use super::expected::Expected;
 use super::expected::Phase;
@@ -109,7 +109,7 @@ impl Trial {
     }
 }
 
-impl Attempt<'_> {
+impl DefectRun<'_> {
     /// The rig is shaken by a host that turns the motor off if the cart does not follow.
     pub(super) fn shake(&self, feed: &Feed, target: &mut dyn Target) -> Result<Observed, HarnessError> {
         let trial = self.trial;

@@ -6,7 +6,7 @@ use upright::supervision::fault::Fault;
 use super::attempt::{During, Setup};
 use super::defect::{Defect, Needs};
 use super::expected::Expected;
-use super::judge::{Class, Outcome, allowed, judge, silence_ticks};
+use super::judge::{Class, TrialOutcome, allowed, judge, silence_ticks};
 use super::trial::Trial;
 use crate::in_the_loop::{Place, RunError};
 use upright_design::study::{Study, StudyError};
@@ -32,7 +32,7 @@ pub enum CampaignError {
 
 /// All trials of one kind.
 #[derive(Debug, Clone, Serialize)]
-pub struct Row {
+pub struct DefectRow {
     /// Defect of the defect.
     pub kind: Defect,
     /// See [`Defect::meaning`].
@@ -74,7 +74,7 @@ pub struct Campaign {
     /// Number of trials.
     pub runs: u64,
     /// One row per kind.
-    pub rows: Vec<Row>,
+    pub rows: Vec<DefectRow>,
 }
 
 /// The kinds of defects that are possible with this rig and this place.
@@ -102,7 +102,12 @@ pub fn kinds(table: &TableValues, place: Place<'_>) -> Vec<Defect> {
 ///
 /// # Errors
 /// [`CampaignError`] if it cannot be run.
-pub fn one(setup: &Setup<'_>, kinds: &[Defect], seed: u64, number: u64) -> Result<Outcome, CampaignError> {
+pub fn one(
+    setup: &Setup<'_>,
+    kinds: &[Defect],
+    seed: u64,
+    number: u64,
+) -> Result<TrialOutcome, CampaignError> {
     let trial = Trial::draw(setup.rig, setup.table, kinds, seed, number);
     let trial = match setup.during {
         During::Balancing => trial,
@@ -129,13 +134,13 @@ pub fn campaign(
         done();
         outcome
     };
-    let outcomes: Vec<Outcome> = study.outcomes(part, runs, of_number)?;
-    let rows = kinds.iter().map(|&kind| Row::of(kind, setup, &outcomes)).collect();
+    let outcomes: Vec<TrialOutcome> = study.outcomes(part, runs, of_number)?;
+    let rows = kinds.iter().map(|&kind| DefectRow::of(kind, setup, &outcomes)).collect();
     Ok(Campaign { seed, runs, rows })
 }
 
-impl Row {
-    fn of(kind: Defect, setup: &Setup<'_>, outcomes: &[Outcome]) -> Self {
+impl DefectRow {
+    fn of(kind: Defect, setup: &Setup<'_>, outcomes: &[TrialOutcome]) -> Self {
         let of_kind = || outcomes.iter().filter(move |outcome| outcome.kind == kind);
         let count = |class: Class| of_kind().filter(|outcome| outcome.class == class).count();
         let phase = setup.during.phase();

@@ -38,17 +38,14 @@ pub(super) fn connect(guide: &mut Guide<'_>, plan: CommissionPlan<'_>) -> Result
 /// Emergency stop and limit switches open when they are pressed, and no other; then the supply.
 pub(super) fn check(guide: &mut Guide<'_>, plan: CommissionPlan<'_>) -> Result<(), Stop> {
     guide.ask(PersonTask::PressStop)?;
-    if guide.wait_for_person(|now| now.contacts.emergency_stop.then_some(()))?.is_none() {
-        return Err(Stop::Machine(
-            "the emergency stop is not seen when it is pressed: it has to be a normally closed contact to ground; do not \
-             switch the motor's supply on"
-                .to_owned(),
-        ));
-    }
+    guide.need(
+        |now| now.contacts.emergency_stop,
+        "the emergency stop is not seen when it is pressed: it has to be a normally closed contact to ground; do not \
+         switch the motor's supply on",
+    )?;
     guide.ask(PersonTask::ReleaseStop)?;
-    if guide.wait_for_person(|now| (!now.contacts.emergency_stop).then_some(()))?.is_none() {
-        return Err(Stop::Machine("the emergency stop stays pressed, or its wire is open".to_owned()));
-    }
+    let is_released = |now: &AnyTelemetry| !now.contacts.emergency_stop;
+    guide.need(is_released, "the emergency stop stays pressed, or its wire is open")?;
     guide.found("the emergency stop opens and closes");
     if plan.table.limits.travel_counts[0] != 0 {
         for end in [End::Low, End::High] {
@@ -63,10 +60,10 @@ pub(super) fn check(guide: &mut Guide<'_>, plan: CommissionPlan<'_>) -> Result<(
 fn switch(guide: &mut Guide<'_>, end: End) -> Result<(), Stop> {
     let both = |now: &AnyTelemetry| [now.contacts.limit_low, now.contacts.limit_high];
     guide.ask(PersonTask::Centre)?;
-    if guide.wait_for_person(|now| (both(now) == [false; 2]).then_some(()))?.is_none() {
-        let words = "a limit switch is open in the middle of the rail: it is a normally closed contact to ground; check its wire";
-        return Err(Stop::Machine(words.to_owned()));
-    }
+    guide.need(
+        |now| both(now) == [false; 2],
+        "a limit switch is open in the middle of the rail: it is a normally closed contact to ground; check its wire",
+    )?;
     guide.ask(PersonTask::PushTo(end))?;
     let (own, name) = match end {
         End::Low => ([true, false], "low"),

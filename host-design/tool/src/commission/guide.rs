@@ -122,6 +122,16 @@ impl<'a> Guide<'a> {
         self.wait(self.machine.patience(), done)
     }
 
+    /// Waits until `holds`, for as long as the person may take; after that, the step is not passed for this reason.
+    pub(super) fn need(
+        &mut self,
+        holds: impl Fn(&AnyTelemetry) -> bool,
+        otherwise: &str,
+    ) -> Result<(), Stop> {
+        let held = self.wait_for_person(|now| holds(now).then_some(()))?;
+        held.ok_or_else(|| Stop::Machine(otherwise.to_owned()))
+    }
+
     /// Sends a request again and again until `done` holds.
     pub(super) fn request_until(
         &mut self,

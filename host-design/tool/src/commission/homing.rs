@@ -20,9 +20,7 @@ pub(super) fn home(guide: &mut Guide<'_>, plan: CommissionPlan<'_>) -> Result<()
     }
     guide.ask(PersonTask::Centre)?;
     let is_free = |now: &AnyTelemetry| !now.contacts.limit_low && !now.contacts.limit_high;
-    if guide.wait_for_person(|now| is_free(now).then_some(()))?.is_none() {
-        return Err(Stop::Machine("a limit switch stays open, or the cart is still at an end".to_owned()));
-    }
+    guide.need(is_free, "a limit switch stays open, or the cart is still at an end")?;
     let is_begun = |now: &AnyTelemetry| matches!(now.homing, Homing::Touch { .. });
     guide.request_until(Request::HomeRail, is_begun)?;
     let mut ends = Vec::new();
@@ -37,12 +35,8 @@ pub(super) fn home(guide: &mut Guide<'_>, plan: CommissionPlan<'_>) -> Result<()
             };
             is_there.then(|| now.counts.iter().map(|&count| f64::from(count)).collect::<Vec<_>>())
         };
-        match guide.wait_for_person(touched)? {
-            Some(counts) => ends.push(counts),
-            None => {
-                return Err(Stop::Machine("the cart has not touched both limit switches".to_owned()));
-            }
-        }
+        let not_touched = || Stop::Machine("the cart has not touched both limit switches".to_owned());
+        ends.push(guide.wait_for_person(touched)?.ok_or_else(not_touched)?);
     }
     let moved: Vec<f64> = ends[1].iter().zip(&ends[0]).map(|(high, low)| high - low).collect();
     let homing = guide.conversation().telemetry.as_ref().map(|now| now.homing);
@@ -55,10 +49,8 @@ pub(super) fn home(guide: &mut Guide<'_>, plan: CommissionPlan<'_>) -> Result<()
         wanted_m(plan)
     ));
     guide.ask(PersonTask::Centre)?;
-    if guide.wait_for_person(|now| (now.homing == Homing::Homed).then_some(()))?.is_none() {
-        return Err(Stop::Machine("cart and links do not come to rest between the switches".to_owned()));
-    }
-    Ok(())
+    let is_homed = |now: &AnyTelemetry| now.homing == Homing::Homed;
+    guide.need(is_homed, "cart and links do not come to rest between the switches")
 }
 
 /// What is wrong if the switches are not as far apart as the file says; `moved` are all sensors' counts from one to

@@ -43,107 +43,57 @@ const STUCK: f64 = 1.5;
 /// Dry friction torque of each joint, as a share of the largest torque of its link's weight: the sine of 9°.
 const HELD: f64 = 0.15;
 
-const ALL: [PlantedRow; 15] = [
-    (
-        "emergency-stop-missing",
-        What::StopMissing,
-        0,
-        "the emergency stop never opens",
-        CommissionStep::Contacts,
-    ),
-    (
-        "limit-switch-missing",
-        What::SwitchMissing,
-        0,
-        "the limit switch at the high end never opens",
-        CommissionStep::Contacts,
-    ),
-    (
-        "limit-switches-exchanged",
-        What::SwitchesExchanged,
-        0,
-        "the two limit switches are exchanged",
-        CommissionStep::Contacts,
-    ),
-    ("supply-sag", What::Campaign(Defect::SupplySag), 0, "the supply is too low", CommissionStep::Contacts),
-    (
-        "cart-encoder-reversed",
-        What::Campaign(Defect::EncoderReversed),
-        0,
-        "the cart's encoder counts backwards",
-        CommissionStep::Homing,
-    ),
-    (
-        "cart-encoder-frozen",
-        What::Campaign(Defect::CartEncoderFrozen),
-        0,
-        "the cart's encoder does not count",
-        CommissionStep::Homing,
-    ),
-    (
-        "cart-counts-wrong",
-        What::CountsWrong,
-        0,
-        "the cart's encoder yields twice the expected counts",
-        CommissionStep::Homing,
-    ),
-    (
-        "encoder-reversed",
-        What::Campaign(Defect::EncoderReversed),
-        1,
-        "the encoder of link 1 counts backwards",
-        CommissionStep::Signs,
-    ),
-    (
-        "encoder-frozen",
-        What::Campaign(Defect::LinkEncoderFrozen),
-        1,
-        "the encoder of link 1 does not count",
-        CommissionStep::Signs,
-    ),
-    (
-        "encoder-wire-open",
-        What::Campaign(Defect::EncoderWireOpen),
-        1,
-        "a wire of the encoder of link 1 is open",
-        CommissionStep::Signs,
-    ),
-    (
-        "encoders-swapped",
-        What::Campaign(Defect::EncodersSwapped),
-        1,
-        "the encoders of links 1 and 2 are exchanged; with one link those of cart and link",
-        CommissionStep::Signs,
-    ),
-    (
-        "counts-wrong",
-        What::CountsWrong,
-        1,
-        "the encoder of link 1 yields twice the expected counts",
-        CommissionStep::Turns,
-    ),
-    (
-        "motor-reversed",
-        What::Campaign(Defect::MotorReversed),
-        0,
-        "the motor's wires are exchanged",
-        CommissionStep::Motor,
-    ),
-    (
-        "cart-stuck",
-        What::CartFriction,
-        0,
-        "the cart's friction is more than the motor's force in the jog",
-        CommissionStep::Motor,
-    ),
-    (
-        "joints-stick",
-        What::JointFriction,
-        0,
-        "the dry friction of each joint holds its link up to 9° from hanging",
-        CommissionStep::Excitation,
-    ),
-];
+const ALL: [PlantedRow; 15] = {
+    use CommissionStep::{Contacts, Excitation, Homing, Motor, Signs, Turns};
+    use Defect::{
+        CartEncoderFrozen, EncoderReversed, EncoderWireOpen, EncodersSwapped, LinkEncoderFrozen,
+        MotorReversed, SupplySag,
+    };
+    use What::{
+        Campaign, CartFriction, CountsWrong, JointFriction, StopMissing, SwitchMissing, SwitchesExchanged,
+    };
+    [
+        ("emergency-stop-missing", StopMissing, 0, "the emergency stop never opens", Contacts),
+        ("limit-switch-missing", SwitchMissing, 0, "the limit switch at the high end never opens", Contacts),
+        ("limit-switches-exchanged", SwitchesExchanged, 0, "the two limit switches are exchanged", Contacts),
+        ("supply-sag", Campaign(SupplySag), 0, "the supply is too low", Contacts),
+        (
+            "cart-encoder-reversed",
+            Campaign(EncoderReversed),
+            0,
+            "the cart's encoder counts backwards",
+            Homing,
+        ),
+        ("cart-encoder-frozen", Campaign(CartEncoderFrozen), 0, "the cart's encoder does not count", Homing),
+        ("cart-counts-wrong", CountsWrong, 0, "the cart's encoder yields twice the expected counts", Homing),
+        ("encoder-reversed", Campaign(EncoderReversed), 1, "the encoder of link 1 counts backwards", Signs),
+        ("encoder-frozen", Campaign(LinkEncoderFrozen), 1, "the encoder of link 1 does not count", Signs),
+        ("encoder-wire-open", Campaign(EncoderWireOpen), 1, "a wire of the encoder of link 1 is open", Signs),
+        (
+            "encoders-swapped",
+            Campaign(EncodersSwapped),
+            1,
+            "the encoders of links 1 and 2 are exchanged; with one link those of cart and link",
+            Signs,
+        ),
+        ("counts-wrong", CountsWrong, 1, "the encoder of link 1 yields twice the expected counts", Turns),
+        ("motor-reversed", Campaign(MotorReversed), 0, "the motor's wires are exchanged", Motor),
+        (
+            "cart-stuck",
+            CartFriction,
+            0,
+            "the cart's friction is more than the motor's force in the jog",
+            Motor,
+        ),
+        (
+            "joints-stick",
+            JointFriction,
+            0,
+            "the dry friction of each joint holds its link up to 9° from hanging",
+            Excitation,
+        ),
+    ]
+};
 
 /// A name that no defect has.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]

@@ -19,12 +19,10 @@ const CAUSE: Duration = Duration::from_millis(300);
 /// The log of the machine, which its firmware shakes.
 pub(super) fn shake(guide: &mut Guide<'_>, plan: CommissionPlan<'_>) -> Result<Log, Stop> {
     guide.ask(PersonTask::Centre)?;
-    let is_still = |now: &AnyTelemetry| (!now.arming_inhibits.contains(Inhibits::MOVING)).then_some(());
-    guide.wait_for_person(is_still)?;
+    let is_still = |now: &AnyTelemetry| !now.arming_inhibits.contains(Inhibits::MOVING);
+    guide.wait_for_person(|now| is_still(now).then_some(()))?;
     guide.ask(PersonTask::HandsOff)?;
-    if guide.wait_for_person(is_still)?.is_none() {
-        return Err(Stop::Machine("the links do not come to rest".to_owned()));
-    }
+    guide.need(is_still, "the links do not come to rest")?;
     let begin = guide.machine.now();
     let mut line = OverLine::new(plan.rig, plan.table, plan.seconds, plan.seed, begin)
         .map_err(|error| Stop::Machine(error.to_string()))?;

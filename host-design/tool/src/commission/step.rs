@@ -24,7 +24,7 @@ pub enum CommissionStep {
 impl CommissionStep {
     /// Every step with its name and what it finds out.
     pub const ALL: [(CommissionStep, &str, &str); 12] = [
-        (CommissionStep::Connect, "connect", "the firmware answers, and is that of the rig file"),
+        (Self::Connect, "connect", "the firmware answers, and is that of the rig file"),
         (
             CommissionStep::Contacts,
             "contacts",
@@ -40,9 +40,9 @@ impl CommissionStep {
             "signs",
             "every encoder counts in the right direction, and is plugged in at its own place",
         ),
-        (CommissionStep::Turns, "turns", "the counts per turn of every link's encoder are those of the file"),
-        (CommissionStep::Motor, "motor", "the motor moves the cart, and in the right direction"),
-        (CommissionStep::Excitation, "excitation", "the log of the machine, shaken while its links hang"),
+        (Self::Turns, "turns", "the counts per turn of every link's encoder are those of the file"),
+        (Self::Motor, "motor", "the motor moves the cart, and in the right direction"),
+        (Self::Excitation, "excitation", "the log of the machine, shaken while its links hang"),
         (
             CommissionStep::Identification,
             "identification",
@@ -58,52 +58,39 @@ impl CommissionStep {
             "verification",
             "margins as [verify] requires them, and whether runs with the friction that was found pass",
         ),
-        (CommissionStep::Image, "image", "the firmware with these gains"),
-        (CommissionStep::Balance, "balance", "raised by hand, the machine balances for 10 s"),
+        (Self::Image, "image", "the firmware with these gains"),
+        (Self::Balance, "balance", "raised by hand, the machine balances for 10 s"),
     ];
 
     /// The steps that find every error in the wiring, before anything is measured.
-    pub const EARLY: [CommissionStep; 6] = [
-        CommissionStep::Connect,
-        CommissionStep::Contacts,
-        CommissionStep::Homing,
-        CommissionStep::Signs,
-        CommissionStep::Turns,
-        CommissionStep::Motor,
-    ];
+    pub const EARLY: [CommissionStep; 6] =
+        [Self::Connect, Self::Contacts, Self::Homing, Self::Signs, Self::Turns, Self::Motor];
 
     /// The steps with the firmware of the rig file.
     pub const FIRST: [CommissionStep; 10] = [
-        CommissionStep::Connect,
-        CommissionStep::Contacts,
-        CommissionStep::Homing,
-        CommissionStep::Signs,
-        CommissionStep::Turns,
-        CommissionStep::Motor,
-        CommissionStep::Excitation,
-        CommissionStep::Identification,
-        CommissionStep::Design,
-        CommissionStep::Verification,
+        Self::Connect,
+        Self::Contacts,
+        Self::Homing,
+        Self::Signs,
+        Self::Turns,
+        Self::Motor,
+        Self::Excitation,
+        Self::Identification,
+        Self::Design,
+        Self::Verification,
     ];
 
     /// The steps with the firmware for the machine as it was found. It has just started: nothing is homed or checked.
-    pub const SECOND: [CommissionStep; 5] = [
-        CommissionStep::Connect,
-        CommissionStep::Homing,
-        CommissionStep::Signs,
-        CommissionStep::Motor,
-        CommissionStep::Balance,
-    ];
+    pub const SECOND: [CommissionStep; 5] =
+        [Self::Connect, Self::Homing, Self::Signs, Self::Motor, Self::Balance];
 
     /// The step to go back to if this one is not passed.
-    pub fn back(self) -> CommissionStep {
+    pub fn back(self) -> Self {
         match self {
             // A fault may have lost the positions.
-            CommissionStep::Excitation | CommissionStep::Balance => CommissionStep::Homing,
+            Self::Excitation | Self::Balance => Self::Homing,
             // Another log may be better.
-            CommissionStep::Identification | CommissionStep::Design | CommissionStep::Verification => {
-                CommissionStep::Excitation
-            }
+            Self::Identification | Self::Design | Self::Verification => Self::Excitation,
             step => step,
         }
     }

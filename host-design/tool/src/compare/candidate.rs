@@ -3,7 +3,7 @@
 use serde::Serialize;
 use upright::table::Law;
 
-use super::row::{Fate, Figures, Row};
+use super::row::{ComparedRow, Fate, LawFigures};
 use upright_design::design::{Certified, DesignPoles, Poles, design};
 use upright_design::parallel;
 use upright_design::rig::Rig;
@@ -13,7 +13,7 @@ use upright_design::verify::{AttractionSettings, Margins, largest_tilts, margins
 
 /// A rig to compare, and the value of the swept key in it.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Candidate {
+pub struct ComparedRig {
     /// Name in the table; different for each rig file.
     pub label: String,
     /// The rig, with the value of the swept key.
@@ -24,7 +24,7 @@ pub struct Candidate {
 
 /// Conditions under which every candidate is simulated.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct Conditions {
+pub struct ComparedConditions {
     /// Step of the set-point (m, or the unit of a model's output).
     pub step_m: f64,
     /// Duration of the run (s).
@@ -40,7 +40,7 @@ pub struct Conditions {
     pub law: Option<Law>,
 }
 
-impl Default for Conditions {
+impl Default for ComparedConditions {
     /// A step of 0.1 m in a run of 10 s; everything else is as in the rig file.
     fn default() -> Self {
         Self {
@@ -58,8 +58,11 @@ impl Default for Conditions {
 const TILT_PRECISION: f64 = 0.02;
 
 /// Each law that a candidate asks for, in the order of the rows of [`compare`].
-pub fn jobs<'a>(candidates: &'a [Candidate], conditions: &Conditions) -> Vec<(&'a Candidate, Law)> {
-    let asked = |candidate: &Candidate, law: Law| match law {
+pub fn jobs<'a>(
+    candidates: &'a [ComparedRig],
+    conditions: &ComparedConditions,
+) -> Vec<(&'a ComparedRig, Law)> {
+    let asked = |candidate: &ComparedRig, law: Law| match law {
         Law::Lqr => candidate.rig.lqr.is_some(),
         Law::PolePlacement => candidate.rig.pole_placement.is_some(),
     };
@@ -76,10 +79,10 @@ pub fn jobs<'a>(candidates: &'a [Candidate], conditions: &Conditions) -> Vec<(&'
 /// # Errors
 /// [`SimulationError`] if a run cannot be simulated, for example because it is too long.
 pub fn compare(
-    candidates: &[Candidate],
-    conditions: &Conditions,
+    candidates: &[ComparedRig],
+    conditions: &ComparedConditions,
     done: &(dyn Fn() + Sync),
-) -> Result<Vec<Row>, SimulationError> {
+) -> Result<Vec<ComparedRow>, SimulationError> {
     parallel::try_map(jobs(candidates, conditions), |(candidate, law)| {
         let row = row(candidate, law, conditions);
         done();
@@ -87,12 +90,16 @@ pub fn compare(
     })
 }
 
-fn row(candidate: &Candidate, law: Law, conditions: &Conditions) -> Result<Row, SimulationError> {
+fn row(
+    candidate: &ComparedRig,
+    law: Law,
+    conditions: &ComparedConditions,
+) -> Result<ComparedRow, SimulationError> {
     let mut rig = candidate.rig.with_law_alone(law);
     if conditions.full_state {
         rig.kalman = None;
     }
-    let row = Row {
+    let row = ComparedRow {
         rig: candidate.label.clone(),
         value: candidate.value,
         law,
@@ -102,7 +109,7 @@ fn row(candidate: &Candidate, law: Law, conditions: &Conditions) -> Result<Row, 
     };
     let (certified, poles, table) = match designed(&rig, conditions) {
         Ok(designed) => designed,
-        Err(reason) => return Ok(Row { fate: Fate::NoDesign(reason), ..row }),
+        Err(reason) => return Ok(ComparedRow { fate: Fate::NoDesign(reason), ..row }),
     };
     let scenario = Scenario {
         step_m: conditions.step_m,
@@ -116,11 +123,14 @@ fn row(candidate: &Candidate, law: Law, conditions: &Conditions) -> Result<Row, 
         None if summary.settled => Fate::Settled,
         None => Fate::Survived,
     };
-    Ok(Row { fate, figures: Some(figures), trace: Some(trace), ..row })
+    Ok(ComparedRow { fate, figures: Some(figures), trace: Some(trace), ..row })
 }
 
 /// Design, its poles, and table, or the reason why there is none.
-fn designed(rig: &Rig, conditions: &Conditions) -> Result<(Certified, DesignPoles, TableValues), String> {
+fn designed(
+    rig: &Rig,
+    conditions: &ComparedConditions,
+) -> Result<(Certified, DesignPoles, TableValues), String> {
     let gains = if conditions.continuous_gains { Gains::Continuous } else { Gains::Sampled };
     let certified = design(rig).map_err(|reason| reason.to_string())?;
     let table = TableValues::of(rig, &certified, gains).map_err(|reason| reason.to_string())?;
@@ -135,14 +145,14 @@ fn figures(
     table: &TableValues,
     summary: &Summary,
     poles: Option<&Poles>,
-) -> Figures {
+) -> LawFigures {
     // An unstable loop and one whose margins cannot be computed both have none.
     let margins = margins_of(rig, certified, table, law).ok().flatten();
     let settings = AttractionSettings { relative: TILT_PRECISION, ..AttractionSettings::default() };
     let tilts = margins.as_ref().and_then(|_| largest_tilts(rig, table, law, &settings).ok());
     let tilts = tilts.into_iter().flatten().map(|tilt| tilt.edge.size);
     let margin = |of: fn(&Margins) -> Option<f64>| margins.as_ref().and_then(of);
-    Figures {
+    LawFigures {
         settling_time_s: summary.settling_time_s,
         overshoot_percent: summary.overshoot_percent,
         peak_angle_rad: summary.peak_angles_rad.iter().copied().max_by(f64::total_cmp),

@@ -1,16 +1,16 @@
 //! A comparison as a picture.
 
-use super::candidate::Candidate;
-use super::row::{Fate, Figures, Row};
+use super::candidate::ComparedRig;
+use super::row::{ComparedRow, Fate, LawFigures};
 use super::sweep::Sweep;
 use crate::figure::{Axis, Curve, Figure, Panel};
 use upright_design::rig::{PlantDescription, Rig};
 
 /// Reads one figure of a row.
-type Value = fn(&Figures) -> Option<f64>;
+type FigureOf = fn(&LawFigures) -> Option<f64>;
 
 /// The figures over the swept key; without a sweep, all runs over time in the same panels.
-pub fn figure(rows: &[Row], candidates: &[Candidate], sweep: Option<&Sweep>) -> Figure {
+pub fn figure(rows: &[ComparedRow], candidates: &[ComparedRig], sweep: Option<&Sweep>) -> Figure {
     match sweep {
         Some(sweep) => over_key(rows, sweep),
         None => over_time(rows, candidates),
@@ -18,9 +18,9 @@ pub fn figure(rows: &[Row], candidates: &[Candidate], sweep: Option<&Sweep>) -> 
 }
 
 /// Groups the rows by rig and law, in their order.
-fn groups(rows: &[Row]) -> Vec<(String, Vec<&Row>)> {
+fn groups(rows: &[ComparedRow]) -> Vec<(String, Vec<&ComparedRow>)> {
     let several = rows.iter().any(|row| row.rig != rows[0].rig);
-    let mut groups: Vec<(String, Vec<&Row>)> = Vec::new();
+    let mut groups: Vec<(String, Vec<&ComparedRow>)> = Vec::new();
     for row in rows {
         let law = row.law;
         let name = if several { format!("{}, {law}", row.rig) } else { law.to_string() };
@@ -32,7 +32,7 @@ fn groups(rows: &[Row]) -> Vec<(String, Vec<&Row>)> {
     groups
 }
 
-fn over_key(rows: &[Row], sweep: &Sweep) -> Figure {
+fn over_key(rows: &[ComparedRow], sweep: &Sweep) -> Figure {
     let ends = sweep
         .values
         .iter()
@@ -50,7 +50,7 @@ fn over_key(rows: &[Row], sweep: &Sweep) -> Figure {
         ""
     };
     let mut figure = Figure::new(title);
-    let panels: [(&str, Value); 6] = [
+    let panels: [(&str, FigureOf); 6] = [
         ("settled (s)", |figures| figures.settling_time_s),
         ("overshoot (%)", |figures| figures.overshoot_percent),
         ("peak angle (°)", |figures| figures.peak_angle_rad.map(f64::to_degrees)),
@@ -75,7 +75,7 @@ fn over_key(rows: &[Row], sweep: &Sweep) -> Figure {
             // Number 0 is for the crosses.
             panel = panel.with(Curve::line(name, 1 + number, points.clone()));
             panel = panel.with(Curve::markers("", 1 + number, points));
-            let is_lost = |row: &&&Row| matches!(row.fate, Fate::Fallen(_) | Fate::NoDesign(_));
+            let is_lost = |row: &&&ComparedRow| matches!(row.fate, Fate::Fallen(_) | Fate::NoDesign(_));
             lost.extend(group.iter().filter(is_lost).map(|row| [row.value.unwrap_or(f64::NAN), 0.0]));
         }
         if index == 0 && !lost.is_empty() {
@@ -88,7 +88,7 @@ fn over_key(rows: &[Row], sweep: &Sweep) -> Figure {
     figure
 }
 
-fn over_time(rows: &[Row], candidates: &[Candidate]) -> Figure {
+fn over_time(rows: &[ComparedRow], candidates: &[ComparedRig]) -> Figure {
     let time = || Axis::linear("time (s)");
     let is_chain = |rig: &Rig| matches!(rig.plant, PlantDescription::Chain(_));
     let all_chains = candidates.iter().all(|candidate| is_chain(&candidate.rig));

@@ -1,7 +1,7 @@
 //! Comparison of designs: several rigs, or one rig file with one of its numbers swept over a range.
 //!
 //! A [`Sweep`] changes the text of the rig file, so that every value is checked as if it were written there. For each
-//! [`Candidate`] and law, [`compare`] computes the design, its margins, one run of the firmware's controller and the
+//! [`ComparedRig`] and law, [`compare`] computes the design, its margins, one run of the firmware's controller and the
 //! largest tilt. A candidate that has no design or falls gets a row, too.
 
 mod candidate;
@@ -10,8 +10,8 @@ mod row;
 mod sweep;
 mod table;
 
-pub use candidate::{Candidate, Conditions, compare, jobs};
+pub use candidate::{ComparedConditions, ComparedRig, compare, jobs};
 pub use figure::figure;
-pub use row::{Fate, Figures, Row};
+pub use row::{ComparedRow, Fate, LawFigures};
 pub use sweep::{Sweep, SweepError};
 pub use table::{csv, notes, table};

@@ -7,7 +7,7 @@ use upright_design::simulate::{Fall, Trace};
 
 /// Results for one law of one candidate.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Row {
+pub struct ComparedRow {
     /// Label of the rig.
     pub rig: String,
     /// Value of the swept key; `None` without a sweep.
@@ -17,7 +17,7 @@ pub struct Row {
     /// How the run ended.
     pub fate: Fate,
     /// All figures; none without a design.
-    pub figures: Option<Figures>,
+    pub figures: Option<LawFigures>,
     /// The run; none without a design.
     #[serde(skip)]
     pub trace: Option<Trace>,
@@ -39,7 +39,7 @@ pub enum Fate {
 
 /// Figures of one law of one candidate.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Figures {
+pub struct LawFigures {
     /// Time from which the output stays within 2 % of the step, at least 1 mm (s).
     pub settling_time_s: Option<f64>,
     /// Largest excursion beyond the set-point (% of the step).

@@ -1,11 +1,11 @@
 //! A comparison as text and as CSV.
 
-use super::row::{Fate, Figures, Row};
+use super::row::{ComparedRow, Fate, LawFigures};
 use crate::reproduce::markdown_table;
 
 /// All rows as a Markdown table with aligned columns; `key` is the swept key. The column of rigs is left out if all
 /// rows have the same rig.
-pub fn table(rows: &[Row], key: Option<&str>) -> String {
+pub fn table(rows: &[ComparedRow], key: Option<&str>) -> String {
     let several = rows.iter().any(|row| row.rig != rows[0].rig);
     let mut header = if several { vec!["rig", "law", "run"] } else { vec!["law", "run"] };
     let left = header.len();
@@ -43,7 +43,7 @@ fn fate(fate: &Fate) -> String {
     }
 }
 
-fn figures(row: &Row) -> [String; 9] {
+fn figures(row: &ComparedRow) -> [String; 9] {
     let Some(figures) = &row.figures else { return core::array::from_fn(|_| "-".to_owned()) };
     let fallen = matches!(row.fate, Fate::Fallen(_));
     let number = |value: Option<f64>, decimals: usize| {
@@ -64,7 +64,7 @@ fn figures(row: &Row) -> [String; 9] {
     ]
 }
 
-fn gain_margin(figures: &Figures) -> String {
+fn gain_margin(figures: &LawFigures) -> String {
     match (figures.lowest_gain, figures.highest_gain) {
         (None, _) => "unstable".to_owned(),
         (Some(lowest), None) => format!("{lowest:.2} to ∞"),
@@ -73,8 +73,8 @@ fn gain_margin(figures: &Figures) -> String {
 }
 
 /// Why some rows have no design, one line each.
-pub fn notes(rows: &[Row], key: Option<&str>) -> Vec<String> {
-    let note = |row: &Row| match &row.fate {
+pub fn notes(rows: &[ComparedRow], key: Option<&str>) -> Vec<String> {
+    let note = |row: &ComparedRow| match &row.fate {
         Fate::NoDesign(reason) => {
             let value =
                 row.value.map_or(String::new(), |value| format!(", {} = {value}", key.unwrap_or("value")));
@@ -89,7 +89,7 @@ pub fn notes(rows: &[Row], key: Option<&str>) -> Vec<String> {
 ///
 /// # Errors
 /// Errors of the CSV writer; writing to memory causes none.
-pub fn csv(rows: &[Row], key: Option<&str>) -> std::io::Result<Vec<u8>> {
+pub fn csv(rows: &[ComparedRow], key: Option<&str>) -> std::io::Result<Vec<u8>> {
     let mut csv = csv::Writer::from_writer(Vec::new());
     csv.write_record([
         "rig",
@@ -114,7 +114,7 @@ pub fn csv(rows: &[Row], key: Option<&str>) -> std::io::Result<Vec<u8>> {
             Fate::NoDesign(reason) => reason.as_str(),
             Fate::Settled | Fate::Survived | Fate::Fallen(_) => "",
         };
-        let of = |value: fn(&Figures) -> Option<f64>| number(row.figures.as_ref().and_then(value));
+        let of = |value: fn(&LawFigures) -> Option<f64>| number(row.figures.as_ref().and_then(value));
         csv.write_record([
             row.rig.as_str(),
             row.law.key(),

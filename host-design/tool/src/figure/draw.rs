@@ -4,14 +4,14 @@ use plotters::coord::Shift;
 use plotters::prelude::*;
 use plotters::style::text_anchor::{HPos, Pos, VPos};
 
-use super::legend::{Entry, Key, SAMPLE, entries};
-use super::path::Map;
+use super::legend::{LegendEntry, LegendKey, SAMPLE, entries};
+use super::path::PixelMap;
 use super::scale::Scale;
 use super::theme::{COLOURS, FINE, HEAT, LIMIT, LINE, MARKER, REFERENCE, THIN, WIDE, finished};
 use super::{Figure, FigureError, Panel, Style};
 
 type Area<'a> = DrawingArea<SVGBackend<'a>, Shift>;
-type Failure = Box<dyn std::error::Error>;
+type DrawError = Box<dyn std::error::Error>;
 
 /// A drawn figure.
 #[derive(Debug, Clone, PartialEq)]
@@ -36,13 +36,13 @@ pub struct PlotArea {
 }
 
 /// Position (px) and contents of a panel.
-struct Layout {
+struct PanelLayout {
     top: f64,
     left: f64,
     right: f64,
     above: f64,
     below: f64,
-    entries: Vec<Entry>,
+    entries: Vec<LegendEntry>,
     describes_x: bool,
     x: Scale,
     y: Scale,
@@ -66,7 +66,7 @@ impl Figure {
         let size = [self.width, top.ceil() as u32];
         let mut svg = String::new();
         let mut panels = Vec::new();
-        let drawn = || -> Result<(), Failure> {
+        let drawn = || -> Result<(), DrawError> {
             let root = SVGBackend::with_string(&mut svg, (fine(self.width.into()) as u32, size[1] * FINE))
                 .into_drawing_area();
             root.fill(&WHITE)?;
@@ -91,7 +91,7 @@ impl Figure {
         Ok(Drawing { svg: finished(&svg.replacen(&fine_size, &real_size, 1)), panels })
     }
 
-    fn layout(&self, panel: &Panel, top: f64, describes_x: bool) -> Result<Layout, FigureError> {
+    fn layout(&self, panel: &Panel, top: f64, describes_x: bool) -> Result<PanelLayout, FigureError> {
         let left = 5.6 * self.text;
         let right = 1.4 * self.text;
         let (entries, above) = entries(self, panel, left);
@@ -108,7 +108,7 @@ impl Figure {
         }
         let ticks =
             |size: f64, spacing: f64| (size / (spacing * self.text)).round().clamp(4.0, 10.0) as usize;
-        Ok(Layout {
+        Ok(PanelLayout {
             top,
             left,
             right,
@@ -121,7 +121,7 @@ impl Figure {
         })
     }
 
-    fn panel(&self, root: &Area<'_>, panel: &Panel, layout: &Layout) -> Result<PlotArea, Failure> {
+    fn panel(&self, root: &Area<'_>, panel: &Panel, layout: &PanelLayout) -> Result<PlotArea, DrawError> {
         let area =
             root.clone().shrink((0, fine(layout.top)), (fine(self.width.into()), fine(panel.height.into())));
         for entry in &layout.entries {
@@ -137,7 +137,7 @@ impl Figure {
         let (columns, rows) = chart.plotting_area().get_pixel_range();
         let above = fine(layout.top);
         let (horizontal, vertical) = ([columns.start, columns.end], [rows.end - above, rows.start - above]);
-        let map = Map { x: &layout.x, y: &layout.y, horizontal, vertical };
+        let map = PixelMap { x: &layout.x, y: &layout.y, horizontal, vertical };
         for (class, x, y) in panel.heat.iter().flat_map(|heat| heat.rectangles()) {
             let corners = [[x[0], y[0]], [x[1], y[1]]].map(|corner| map.place(corner));
             if let [Some(from), Some(to)] = corners {
@@ -173,11 +173,11 @@ impl Figure {
         Ok(PlotArea { horizontal, vertical: [rows.end, rows.start], x: layout.x.range, y: layout.y.range })
     }
 
-    fn legend_entry(&self, area: &Area<'_>, entry: &Entry) -> Result<(), Failure> {
+    fn legend_entry(&self, area: &Area<'_>, entry: &LegendEntry) -> Result<(), DrawError> {
         let (left, middle) = (fine(entry.left), fine(entry.middle));
         let text_left = match entry.key {
-            Key::Nothing => left,
-            Key::Fill(fill) => {
+            LegendKey::Nothing => left,
+            LegendKey::Fill(fill) => {
                 let half = fine(0.42 * self.text);
                 area.draw(&Rectangle::new(
                     [(left, middle - half), (left + 2 * half, middle + half)],
@@ -185,11 +185,11 @@ impl Figure {
                 ))?;
                 left + 2 * half + fine(5.0)
             }
-            Key::Curve(Style::Markers(number)) => {
+            LegendKey::Curve(Style::Markers(number)) => {
                 marker(area, number, (left + fine(0.5 * SAMPLE), middle))?;
                 left + fine(SAMPLE + 7.0)
             }
-            Key::Curve(style) => {
+            LegendKey::Curve(style) => {
                 area.draw(&PathElement::new(
                     [(left, middle), (left + fine(SAMPLE), middle)],
                     line_style(style),
@@ -224,7 +224,7 @@ fn line_style(style: Style) -> ShapeStyle {
 }
 
 /// Draws a marker: a cross, a circle, a square or a triangle, in turn.
-fn marker(area: &Area<'_>, number: usize, (x, y): (i32, i32)) -> Result<(), Failure> {
+fn marker(area: &Area<'_>, number: usize, (x, y): (i32, i32)) -> Result<(), DrawError> {
     let style = COLOURS[number % COLOURS.len()].stroke_width(MARKER);
     let r = fine(4.5);
     match number % 4 {

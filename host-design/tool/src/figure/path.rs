@@ -4,7 +4,7 @@ use super::scale::Scale;
 use super::theme::FINE;
 
 /// Maps values to units of the drawing.
-pub(super) struct Map<'a> {
+pub(super) struct PixelMap<'a> {
     pub(super) x: &'a Scale,
     pub(super) y: &'a Scale,
     /// Left, right.
@@ -13,7 +13,7 @@ pub(super) struct Map<'a> {
     pub(super) vertical: [i32; 2],
 }
 
-impl Map<'_> {
+impl PixelMap<'_> {
     /// Where `point` is, from `[0, 0]` bottom left to `[1, 1]` top right.
     fn share(&self, point: [f64; 2]) -> [f64; 2] {
         [self.x.share(point[0]), self.y.share(point[1])]

@@ -18,7 +18,7 @@ pub fn run_svg(rig: &Rig, trace: &Trace, title: &str) -> Result<String, FigureEr
 /// Adds the panels of a run to `figure`: position, angles, rates and force with their limits, or the states and the
 /// input of a `[model]`. The time axis ends at `end_s`.
 pub(crate) fn run_figure(figure: Figure, rig: &Rig, trace: &Trace, end_s: f64) -> Figure {
-    let run = Run { rig, trace, end_s };
+    let run = DrawnRun { rig, trace, end_s };
     let panels = match &rig.plant {
         PlantDescription::Chain(chain) => {
             vec![run.position(chain), run.angles(chain), run.rates(chain), run.force()]
@@ -28,13 +28,13 @@ pub(crate) fn run_figure(figure: Figure, rig: &Rig, trace: &Trace, end_s: f64) -
     panels.into_iter().fold(figure, Figure::with)
 }
 
-struct Run<'a> {
+struct DrawnRun<'a> {
     rig: &'a Rig,
     trace: &'a Trace,
     end_s: f64,
 }
 
-impl Run<'_> {
+impl DrawnRun<'_> {
     fn panel(&self, label: &str) -> Panel {
         Panel::new(Axis::linear("time (s)").range(0.0, self.end_s), Axis::linear(label)).high(178)
     }

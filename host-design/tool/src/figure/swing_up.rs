@@ -1,7 +1,7 @@
 //! Margins along the motions of a swing-up, and the candidates of its search.
 
 use upright_design::motion::Transition;
-use upright_design::swing_up::{Margin, Runs, Solved};
+use upright_design::swing_up::{Margin, RandomRuns, SolvedCandidate};
 
 use super::{Axis, Curve, Figure, Panel};
 
@@ -27,7 +27,7 @@ pub fn margins_figure(title: &str, motions: &[(Transition, Vec<Margin>)]) -> Fig
 
 /// Largest force, use of the rail, random runs that arrive, and fragility over the duration, a point for each
 /// candidate.
-pub fn trade_figure(title: &str, solved: &[Solved]) -> Figure {
+pub fn trade_figure(title: &str, solved: &[SolvedCandidate]) -> Figure {
     let durations = solved.iter().map(|one| one.duration_s);
     let (shortest, longest) =
         (durations.clone().fold(f64::INFINITY, f64::min), durations.fold(0.0, f64::max));
@@ -35,10 +35,10 @@ pub fn trade_figure(title: &str, solved: &[Solved]) -> Figure {
         let x = Axis::linear("duration (s)");
         if shortest <= longest { x.range(0.98 * shortest, 1.02 * longest) } else { x }
     };
-    let arrive = |runs: fn(&Solved) -> &Runs| {
+    let arrive = |runs: fn(&SolvedCandidate) -> &RandomRuns| {
         solved.iter().map(|one| [one.duration_s, percent(runs(one))]).collect::<Vec<_>>()
     };
-    let panel = |y: Axis, value: fn(&Solved) -> f64| {
+    let panel = |y: Axis, value: fn(&SolvedCandidate) -> f64| {
         let points = |is_robust: bool| -> Vec<[f64; 2]> {
             let of_group = solved.iter().filter(|one| (percent(&one.wider) >= ROBUST_PERCENT) == is_robust);
             of_group.map(|one| [one.duration_s, value(one)]).collect()
@@ -66,6 +66,6 @@ pub fn trade_figure(title: &str, solved: &[Solved]) -> Figure {
 const ROBUST_PERCENT: f64 = 90.0;
 
 /// Share of the random runs that arrive (%).
-fn percent(runs: &Runs) -> f64 {
+fn percent(runs: &RandomRuns) -> f64 {
     100.0 * runs.arrived as f64 / runs.runs.max(1) as f64
 }

@@ -2,7 +2,7 @@
 
 use askama::Template;
 
-use super::text::{notes, row_texts};
+use super::text::{notes, row_texts, window_rows, windows};
 use crate::figure::{Axis, COLOURS_CSS, Curve, Figure, Panel, style_sheet};
 use crate::report::{Plot, ReportError};
 use upright_design::identify::{ChannelFit, Identification, Predicted, Settings};
@@ -21,6 +21,7 @@ struct Page<'a> {
     refusal: Option<String>,
     estimates: Vec<[String; 7]>,
     fits: Vec<[String; 4]>,
+    windows: Vec<(&'static str, Vec<[String; 4]>)>,
     held_out: Option<Plot>,
     residuals: Option<Plot>,
     spectra: Option<Plot>,
@@ -56,6 +57,10 @@ pub fn page(
         refusal: found.refusal.as_ref().map(ToString::to_string),
         estimates: found.estimates.iter().map(row_texts).collect(),
         fits: found.channels.iter().enumerate().map(fit_texts).collect(),
+        windows: windows(found)
+            .into_iter()
+            .map(|(what, errors)| (what, errors.iter().flat_map(window_rows).collect()))
+            .collect(),
         held_out: has_fit
             .then(|| plot(held_out(&found.channels), "Held-out log, measured and predicted"))
             .transpose()?,
@@ -68,7 +73,7 @@ pub fn page(
             })
             .transpose()?,
         correlations: correlations(found),
-        notes: if has_fit { notes(found, settings) } else { Vec::new() },
+        notes: if has_fit || !found.is_driven { notes(found, settings) } else { Vec::new() },
         version: env!("CARGO_PKG_VERSION"),
         style: format!("{}{COLOURS_CSS}{}", style_sheet(), include_str!("../report/page.css")),
     };

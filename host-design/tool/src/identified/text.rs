@@ -3,11 +3,13 @@
 use std::fmt::Write as _;
 
 use serde_json::{Value, json};
-use upright_design::identify::{Estimate, Identification, Kind, Settings};
+use upright_design::identify::{ChannelError, Estimate, Identification, Kind, Settings, WindowErrors};
 use upright_design::number::significant;
 
 /// Below this angle the scale of the force is poorly known (rad).
 const LARGE_ENOUGH_RAD: f64 = 30.0 * std::f64::consts::PI / 180.0;
+/// Lengths and moments from the halves of a recording that differ by more than this (%) are named.
+const HALVES_PERCENT: f64 = 0.5;
 /// Share by which lengths and moments may be wrong without a model of the encoders' eccentricity.
 const WITHOUT_ECCENTRICITY: f64 = 0.003;
 
@@ -37,6 +39,45 @@ pub fn text(rig: &str, found: &Identification, settings: &Settings) -> String {
     for estimate in &found.estimates {
         let _ = writeln!(text, "{}", row(estimate));
     }
+    if !found.channels.is_empty() {
+        fits(&mut text, found);
+    }
+    for (what, errors) in windows(found) {
+        let _ = writeln!(
+            text,
+            "\n{what}, error (rms) in % of the range\n  {:<10}{:>10}{:>12}{:>12}",
+            "channel", "window", "file", "found"
+        );
+        for row in errors.iter().flat_map(window_rows) {
+            let _ = writeln!(text, "  {:<10}{:>10}{:>12}{:>12}", row[0], row[1], row[2], row[3]);
+        }
+    }
+    text.push('\n');
+    for note in notes(found, settings) {
+        let _ = writeln!(text, "- {note}");
+    }
+    text
+}
+
+/// What was predicted over windows, with its title.
+pub(super) fn windows(found: &Identification) -> Vec<(&'static str, &[WindowErrors])> {
+    let both = [
+        ("Parts of the recordings, predicted with numbers from the other parts", found.left_out.as_slice()),
+        ("Recordings that were not used", found.predicted.as_slice()),
+    ];
+    both.into_iter().filter(|(_, errors)| !errors.is_empty()).collect()
+}
+
+/// Channel, window, and errors in percent with the old file and the new numbers.
+pub(super) fn window_rows(errors: &WindowErrors) -> Vec<[String; 4]> {
+    let row = |channel: &ChannelError| {
+        let [file, found] = channel.percent().map(|percent| significant(percent, 3));
+        [channel.name.clone(), format!("{} s", errors.window_s), file, found]
+    };
+    errors.channels.iter().map(row).collect()
+}
+
+fn fits(text: &mut String, found: &Identification) {
     let _ = writeln!(
         text,
         "\n  {:<10}{:>22}{:>26}{:>14}",
@@ -47,11 +88,6 @@ pub fn text(rig: &str, found: &Identification, settings: &Settings) -> String {
         let _ =
             writeln!(text, "  {:<10}{:>22.2}{old:>26}{new:>14}", channel.name, channel.innovation_variance);
     }
-    text.push('\n');
-    for note in notes(found, settings) {
-        let _ = writeln!(text, "- {note}");
-    }
-    text
 }
 
 fn error_text(channel: usize, error: f64) -> String {
@@ -82,6 +118,14 @@ pub(super) fn row_texts(estimate: &Estimate) -> [String; 7] {
     ]
 }
 
+/// Whether a length or a moment from one half of the recordings contradicts that from the other.
+fn halves_differ(estimate: &Estimate) -> bool {
+    let is_shape = matches!(estimate.kind, Kind::FirstMoment(_) | Kind::Length(_) | Kind::SecondMoment(_));
+    let differs =
+        |[first, second]: [f64; 2]| (first - second).abs() > 0.01 * HALVES_PERCENT * estimate.new.abs();
+    is_shape && estimate.halves.is_some_and(differs)
+}
+
 /// What a reader has to know to judge the numbers.
 pub(super) fn notes(found: &Identification, settings: &Settings) -> Vec<String> {
     let mut notes = Vec::new();
@@ -90,11 +134,34 @@ pub(super) fn notes(found: &Identification, settings: &Settings) -> Vec<String> 
             "Masses and frictions in the new file are scaled to the weighed {} kg·m of the last link, and resistance_ohm with them.",
             significant(moment, 4)
         )),
+        None if !found.is_driven => notes.push(
+            "Without a drive, a common factor of all masses, moments and frictions changes no motion: the first moment of the last \
+             link is that of the file, and the deviations are those of ratios to it. One weighing of the last link gives true \
+             kilograms (--weigh)."
+                .to_owned(),
+        ),
         None => notes.push(
             "The scale of the force is taken from the file: masses, moments and frictions are in its newtons, and a common factor \
              of all of them changes no motion. One weighing of the last link gives true kilograms (--weigh)."
                 .to_owned(),
         ),
+    }
+    if found.estimates.iter().any(|estimate| matches!(estimate.kind, Kind::AirDrag(_)) && estimate.new > 0.0)
+    {
+        notes.push("The rig file has no air drag: large motion of the new file decays more slowly than the machine's.".to_owned());
+    }
+    let moved: Vec<String> = found
+        .estimates
+        .iter()
+        .filter(|one| halves_differ(one))
+        .map(|one| one.kind.name_and_unit().0)
+        .collect();
+    if !moved.is_empty() {
+        notes.push(format!(
+            "From the first and from the second half of the recordings these differ by more than {HALVES_PERCENT} %, so the model \
+             lacks something, such as play, an eccentric encoder or another law of friction: {}.",
+            moved.join(", ")
+        ));
     }
     notes.push(
         "Single masses cannot be seen from outside: the new file keeps those of the old one where it can, and centres and \
@@ -146,7 +213,7 @@ pub fn json(rig: &str, found: &Identification) -> Value {
             let (name, unit) = estimate.kind.name_and_unit();
             json!({
                 "name": name, "unit": unit, "file": estimate.old, "found": estimate.new,
-                "deviation": estimate.deviation, "held_by_prior": estimate.held_by_prior,
+                "deviation": estimate.deviation, "halves": estimate.halves, "held_by_prior": estimate.held_by_prior,
             })
         })
         .collect();
@@ -169,7 +236,22 @@ pub fn json(rig: &str, found: &Identification) -> Value {
     json!({
         "rig": rig, "seconds": found.seconds, "lost_ticks": found.lost_ticks,
         "largest_angle_rad": found.largest_angle_rad, "wiring": wiring, "estimates": estimates,
+        "is_driven": found.is_driven, "left_out": windows_json(&found.left_out), "predicted": windows_json(&found.predicted),
         "channels": channels, "delay_ticks": found.other_delay().unwrap_or(found.delay_ticks),
         "refused": found.refusal.as_ref().map(ToString::to_string),
     })
+}
+
+fn windows_json(errors: &[WindowErrors]) -> Vec<Value> {
+    let one = |errors: &WindowErrors| {
+        let channel = |channel: &ChannelError| {
+            let [file, found] = channel.percent();
+            json!({
+                "name": channel.name, "range": channel.range, "error_file": channel.errors[0], "error_found": channel.errors[1],
+                "percent_file": file, "percent_found": found,
+            })
+        };
+        json!({ "window_s": errors.window_s, "channels": errors.channels.iter().map(channel).collect::<Vec<_>>() })
+    };
+    errors.iter().map(one).collect()
 }

@@ -7,7 +7,9 @@ mod place;
 mod qemu;
 mod relay;
 
-pub use board::{Compared, Cycles, Event, Events, Figures, RULES, Span, TooLong, VirtualBoard, measure};
+pub use board::{
+    Compared, Event, Events, RULES, Span, TickCycles, TickFigures, TooLong, VirtualBoard, measure,
+};
 pub use error::RunError;
 pub use place::{Place, run, run_compared, run_shaken};
 pub use qemu::{Emulator, EmulatorError, Link};

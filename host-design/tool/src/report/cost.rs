@@ -6,7 +6,7 @@ use super::number::number;
 use upright_design::table::{LawValues, TableValues, WithSize, with_size};
 
 /// Counts, not measurements: operations of the firmware's equations on `f32`, and bytes of constants.
-pub(super) struct Cost {
+pub(super) struct LawCost {
     /// Multiplications, all but a few with an addition, per tick.
     pub(super) multiply_adds: usize,
     /// Of these, in the observer.
@@ -19,7 +19,7 @@ pub(super) struct Cost {
     rate_hz: f64,
 }
 
-impl Cost {
+impl LawCost {
     /// Cost of one law of the table.
     pub(super) fn of(table: &TableValues, law: &LawValues) -> Self {
         let (states, sensors) = (table.states(), table.sensors());

@@ -1,6 +1,6 @@
 //! How much of each imperfection of the machine each law survives, as tables and figures.
 
-use super::Source;
+use super::ReportSource;
 use crate::figure::{Axis, Curve, Figure, Panel};
 use upright_design::verify::{CornerSettings, Imperfections, Survival, Unverifiable, corners, limit_cycle};
 
@@ -59,8 +59,8 @@ impl SurvivalRow {
 }
 
 /// Amplitude of the limit cycle over the friction of the joints, a curve for each law.
-pub(super) fn limit_cycles(source: &Source<'_>) -> Result<Figure, Unverifiable> {
-    let Source { rig, table, imperfections, .. } = *source;
+pub(super) fn limit_cycles(source: &ReportSource<'_>) -> Result<Figure, Unverifiable> {
+    let ReportSource { rig, table, imperfections, .. } = *source;
     let x = Axis::log("Coulomb friction of each joint (N·m)");
     let mut panel = Panel::new(x, Axis::linear("largest angle of a link (mrad)")).high(360);
     for (number, found) in imperfections.iter().enumerate() {
@@ -77,8 +77,8 @@ pub(super) fn limit_cycles(source: &Source<'_>) -> Result<Figure, Unverifiable> 
 
 /// Share of the combinations of wrong masses that survive, over the percentage, a curve for each law; none for a chain
 /// with too many combinations.
-pub(super) fn wrong_masses(source: &Source<'_>) -> Result<Option<Figure>, Unverifiable> {
-    let Source { rig, table, imperfections, .. } = *source;
+pub(super) fn wrong_masses(source: &ReportSource<'_>) -> Result<Option<Figure>, Unverifiable> {
+    let ReportSource { rig, table, imperfections, .. } = *source;
     if rig.states() / 2 - 1 > MOST_LINKS {
         return Ok(None);
     }

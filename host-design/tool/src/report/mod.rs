@@ -17,11 +17,11 @@ mod source;
 mod trust;
 
 pub use error::ReportError;
-pub use source::Source;
+pub use source::ReportSource;
 
 use upright::table::Law;
 
-use self::page::Page;
+use self::page::ReportPage;
 pub(crate) use self::plot::Plot;
 use crate::figure::{Figure, FigureError, margins_figure, pixels};
 use upright_design::rig::PlantDescription;
@@ -67,8 +67,8 @@ impl Picture {
 ///
 /// # Errors
 /// [`ReportError`] if a run cannot be started or a figure cannot be drawn; a rig that falls is not an error.
-pub fn report(source: &Source<'_>, stage: &dyn Fn(&str)) -> Result<Report, ReportError> {
-    let Source { rig, certified, table, trust, .. } = *source;
+pub fn report(source: &ReportSource<'_>, stage: &dyn Fn(&str)) -> Result<Report, ReportError> {
+    let ReportSource { rig, certified, table, trust, .. } = *source;
     stage("runs");
     let designed_poles = certified.poles(rig)?;
     let mut scenes = runs::scenes(rig, &designed_poles, table, trust, source.seed)?;
@@ -76,7 +76,7 @@ pub fn report(source: &Source<'_>, stage: &dyn Fn(&str)) -> Result<Report, Repor
     scenes.extend(source.route.map(|run| runs::route(rig, run, source.seed)));
     let laws = runs::laws(table);
     let mut pictures = Vec::new();
-    let mut page = Page::new(source, &designed_poles, &scenes)?;
+    let mut page = ReportPage::new(source, &designed_poles, &scenes)?;
     if let PlantDescription::Chain(chain) = &rig.plant {
         let svg = drawing::svg(chain);
         page.drawing = Some(svg.clone());
@@ -122,9 +122,7 @@ pub fn report(source: &Source<'_>, stage: &dyn Fn(&str)) -> Result<Report, Repor
         }
     }
     if !source.margins.is_empty() {
-        let figure = margins_figure("How hard a link may be pushed", source.margins);
-        pictures.push(Picture::of("margins".to_owned(), &figure)?);
-        page.pushes.push(Plot::of(&figure, figure.title.clone())?);
+        show_margins(source, &mut page, &mut pictures)?;
     }
     if !source.imperfections.is_empty() {
         show_imperfections(source, stage, &mut page, &mut pictures)?;
@@ -132,10 +130,21 @@ pub fn report(source: &Source<'_>, stage: &dyn Fn(&str)) -> Result<Report, Repor
     Ok(Report { html: page.html()?, pictures })
 }
 
+fn show_margins(
+    source: &ReportSource<'_>,
+    page: &mut ReportPage<'_>,
+    pictures: &mut Vec<Picture>,
+) -> Result<(), ReportError> {
+    let figure = margins_figure("How hard a link may be pushed", source.margins);
+    pictures.push(Picture::of("margins".to_owned(), &figure)?);
+    page.pushes.push(Plot::of(&figure, figure.title.clone())?);
+    Ok(())
+}
+
 fn show_imperfections(
-    source: &Source<'_>,
+    source: &ReportSource<'_>,
     stage: &dyn Fn(&str),
-    page: &mut Page<'_>,
+    page: &mut ReportPage<'_>,
     pictures: &mut Vec<Picture>,
 ) -> Result<(), ReportError> {
     stage("imperfections");

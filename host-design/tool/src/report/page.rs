@@ -4,13 +4,13 @@ use askama::Template;
 use upright::table::{Law, TABLE_FORMAT};
 
 use super::animation::Animation;
-use super::cost::Cost;
+use super::cost::LawCost;
 use super::imperfections::SurvivalTable;
 use super::number::{number, poles, significant};
 use super::plot::Plot;
 use super::runs::{LawRun, Scene, laws};
 use super::trust::{CheckRow, TrustRow, check_rows, trust_rows};
-use super::{ReportError, Source};
+use super::{ReportError, ReportSource};
 use crate::figure::{COLOURS_CSS, style_sheet};
 use upright_design::design::{DesignPoles, Feedback};
 use upright_design::rig::{PlantDescription, Rig};
@@ -21,7 +21,7 @@ const DIGITS: usize = 6;
 
 #[derive(Template)]
 #[template(path = "page.html")]
-pub(super) struct Page<'a> {
+pub(super) struct ReportPage<'a> {
     name: &'a str,
     hash: String,
     states: usize,
@@ -64,11 +64,11 @@ pub(super) struct SceneEntry {
     id: &'static str,
     name: &'static str,
     text: String,
-    outcomes: Vec<Outcome>,
+    outcomes: Vec<RunOutcome>,
     pub(super) plots: Vec<Plot>,
 }
 
-struct Outcome {
+struct RunOutcome {
     law: &'static str,
     survives: bool,
     text: String,
@@ -80,7 +80,7 @@ struct LawEntry {
     gains: Vec<GainRow>,
     poles: [String; 2],
     certificates: Vec<CertificateRow>,
-    cost: Cost,
+    cost: LawCost,
 }
 
 struct GainRow {
@@ -96,14 +96,14 @@ struct CertificateRow {
     condition: String,
 }
 
-impl<'a> Page<'a> {
+impl<'a> ReportPage<'a> {
     /// The page without its pictures.
     pub(super) fn new(
-        source: &Source<'a>,
+        source: &ReportSource<'a>,
         designed_poles: &DesignPoles,
         scenes: &[Scene],
     ) -> Result<Self, ReportError> {
-        let Source { rig, certified, table, trust, .. } = *source;
+        let ReportSource { rig, certified, table, trust, .. } = *source;
         let design = &certified.double;
         let short = |entry: &f64| significant(*entry, DIGITS);
         let names = state_names(rig);
@@ -161,12 +161,12 @@ impl<'a> Page<'a> {
 
 impl SceneEntry {
     fn of(scene: &Scene) -> Self {
-        let outcomes = scene.runs.iter().map(Outcome::of).collect();
+        let outcomes = scene.runs.iter().map(RunOutcome::of).collect();
         Self { id: scene.id, name: scene.name, text: scene.text.clone(), outcomes, plots: Vec::new() }
     }
 }
 
-impl Outcome {
+impl RunOutcome {
     fn of(run: &LawRun) -> Self {
         let summary = &run.summary;
         let mut parts = vec![match (&summary.fall, summary.settling_time_s) {
@@ -186,8 +186,13 @@ impl Outcome {
 }
 
 impl LawEntry {
-    fn of(source: &Source<'_>, designed_poles: &DesignPoles, names: &[String], law: Law) -> Option<Self> {
-        let Source { rig, certified, table, trust, .. } = *source;
+    fn of(
+        source: &ReportSource<'_>,
+        designed_poles: &DesignPoles,
+        names: &[String],
+        law: Law,
+    ) -> Option<Self> {
+        let ReportSource { rig, certified, table, trust, .. } = *source;
         let design = &certified.double;
         let (continuous, sampled) = (design.continuous.in_table()[law]?, design.sampled.in_table()[law]?);
         let values = table.law(law)?;
@@ -218,7 +223,7 @@ impl LawEntry {
             gains,
             poles: designed_poles.in_table(law).map(listed),
             certificates: part.linear.certificates.iter().map(CertificateRow::of).collect(),
-            cost: Cost::of(table, values),
+            cost: LawCost::of(table, values),
         })
     }
 }

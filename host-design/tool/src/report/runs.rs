@@ -93,14 +93,14 @@ fn demonstrated(rig: &Rig, run: &Demonstration, [id, name, does]: [&'static str;
 }
 
 /// A scene before it has run.
-struct Plan {
+struct ScenePlan {
     id: &'static str,
     name: &'static str,
     text: String,
     scenario: Scenario,
 }
 
-impl Plan {
+impl ScenePlan {
     fn run(self, rig: &Rig, table: &TableValues) -> Result<Scene, SimulationError> {
         let run = |law| {
             let (trace, summary) = simulate(rig, table, &Scenario { law, ..self.scenario.clone() })?;
@@ -125,7 +125,7 @@ fn unit(rig: &Rig) -> &'static str {
     if is_chain(rig) { " m" } else { "" }
 }
 
-fn step_plan(rig: &Rig, scenario: Scenario) -> Plan {
+fn step_plan(rig: &Rig, scenario: Scenario) -> ScenePlan {
     let text = format!(
         "Set-point moved by {}{} at 0 s{}; the whole state is measured{}.",
         number(scenario.step_m),
@@ -133,16 +133,16 @@ fn step_plan(rig: &Rig, scenario: Scenario) -> Plan {
         if is_chain(rig) { ", made into a ramp by the governor" } else { "" },
         of_model(rig)
     );
-    Plan { id: "step", name: "Step", text, scenario }
+    ScenePlan { id: "step", name: "Step", text, scenario }
 }
 
-fn tilt_plan(rig: &Rig, trust: &TrustReport, mut scenario: Scenario) -> Plan {
+fn tilt_plan(rig: &Rig, trust: &TrustReport, mut scenario: Scenario) -> ScenePlan {
     if !is_chain(rig) {
         scenario.start[rig.output()] = 0.05;
         let (state, model) = (rig.output(), of_model(rig));
         let text =
             format!("State {state} starts at 0.05, all others at 0; the whole state is measured{model}.");
-        return Plan { id: "tilt", name: "Offset", text, scenario };
+        return ScenePlan { id: "tilt", name: "Offset", text, scenario };
     }
     let angle = tilt(trust);
     // Angles are relative: with the opposite one at the second joint all other links are vertical.
@@ -156,23 +156,23 @@ fn tilt_plan(rig: &Rig, trust: &TrustReport, mut scenario: Scenario) -> Plan {
         number(angle),
         number(angle.to_degrees())
     );
-    Plan { id: "tilt", name: "Tilt", text, scenario }
+    ScenePlan { id: "tilt", name: "Tilt", text, scenario }
 }
 
-fn disturbed_plan(rig: &Rig, scenario: &Scenario) -> Plan {
+fn disturbed_plan(rig: &Rig, scenario: &Scenario) -> ScenePlan {
     let (noise, model) = (noise_text(rig, scenario.seed), of_model(rig));
     let text = format!("At rest, disturbed by {noise}; the whole state is measured{model}.");
-    Plan { id: "disturbances", name: "Disturbances", text, scenario: disturbed(rig, scenario) }
+    ScenePlan { id: "disturbances", name: "Disturbances", text, scenario: disturbed(rig, scenario) }
 }
 
-fn encoder_plan(rig: &Rig, scenario: &Scenario) -> Plan {
+fn encoder_plan(rig: &Rig, scenario: &Scenario) -> ScenePlan {
     let (step, unit, noise) = (number(scenario.step_m), unit(rig), noise_text(rig, scenario.seed));
     let text = format!(
         "As on the bench: the controller measures encoder counts only and estimates the state. Set-point moved by {step}{unit}; \
          {noise}."
     );
     let scenario = Scenario { sensing: Sensing::Encoders, ..disturbed(rig, scenario) };
-    Plan { id: "encoders", name: "Encoders only", text, scenario }
+    ScenePlan { id: "encoders", name: "Encoders only", text, scenario }
 }
 
 fn disturbed(rig: &Rig, scenario: &Scenario) -> Scenario {

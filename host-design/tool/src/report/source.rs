@@ -9,7 +9,7 @@ use upright_design::verify::{Imperfections, TrustReport};
 
 /// Input of a report.
 #[derive(Debug, Clone, Copy)]
-pub struct Source<'a> {
+pub struct ReportSource<'a> {
     /// The rig.
     pub rig: &'a Rig,
     /// Its design.

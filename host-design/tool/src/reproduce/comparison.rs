@@ -14,7 +14,7 @@ pub enum Digits {
 /// How ours compares with what is printed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
-pub enum Verdict {
+pub enum Agreement {
     /// Rounded to as many digits as printed, it is the same number.
     EveryDigit,
     /// Rounded to as many digits as printed, it differs by this many units of the last printed digit.
@@ -25,7 +25,7 @@ pub enum Verdict {
 
 /// One line of the comparison.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Row {
+pub struct ComparedValue {
     /// What it is, as in `A[2,3]` (counted from 1) or `K[9] of the LQR`, with its unit if it has a simple one.
     pub quantity: String,
     /// What ours was computed from.
@@ -37,10 +37,10 @@ pub struct Row {
     /// Ours minus the printed number.
     pub deviation: Option<f64>,
     /// How they compare.
-    pub verdict: Verdict,
+    pub verdict: Agreement,
 }
 
-impl Row {
+impl ComparedValue {
     /// Compares `ours` with a number that the paper prints to this many `digits`.
     pub fn printed(
         quantity: impl Into<String>,
@@ -53,7 +53,7 @@ impl Row {
         let unit = digits.unit(value);
         let units = ((digits.round(ours) - value) / unit).abs().round();
         let verdict =
-            if units == 0.0 { Verdict::EveryDigit } else { Verdict::UnitsOfLastDigit(units as u64) };
+            if units == 0.0 { Agreement::EveryDigit } else { Agreement::UnitsOfLastDigit(units as u64) };
         Self {
             quantity: quantity.into(),
             from,
@@ -67,12 +67,12 @@ impl Row {
     /// A number that follows from the paper's formulas but is not printed in it.
     pub fn not_printed(quantity: impl Into<String>, from: &'static str, ours: f64) -> Self {
         let quantity = quantity.into();
-        Self { quantity, from, printed: None, ours, deviation: None, verdict: Verdict::NotPrinted }
+        Self { quantity, from, printed: None, ours, deviation: None, verdict: Agreement::NotPrinted }
     }
 
     /// Whether every printed digit came out.
     pub fn is_exact(&self) -> bool {
-        self.verdict == Verdict::EveryDigit
+        self.verdict == Agreement::EveryDigit
     }
 }
 
@@ -108,12 +108,13 @@ mod tests {
 
     #[test]
     fn a_number_agrees_up_to_half_a_unit_of_its_last_printed_digit() {
-        let verdict = |ours| Row::printed("K", "", "-578.51", Digits::Decimals(2), ours).verdict;
-        assert_eq!(verdict(-578.5051), Verdict::EveryDigit);
-        assert_eq!(verdict(-578.5049), Verdict::UnitsOfLastDigit(1));
-        assert_eq!(verdict(578.51), Verdict::UnitsOfLastDigit(115_702));
-        let verdict = |ours| Row::printed("A", "", "-1659.85", Digits::Significant(6), ours).verdict;
-        assert_eq!(verdict(-1659.852), Verdict::EveryDigit);
-        assert_eq!(verdict(-1659.862), Verdict::UnitsOfLastDigit(1));
+        let verdict = |ours| ComparedValue::printed("K", "", "-578.51", Digits::Decimals(2), ours).verdict;
+        assert_eq!(verdict(-578.5051), Agreement::EveryDigit);
+        assert_eq!(verdict(-578.5049), Agreement::UnitsOfLastDigit(1));
+        assert_eq!(verdict(578.51), Agreement::UnitsOfLastDigit(115_702));
+        let verdict =
+            |ours| ComparedValue::printed("A", "", "-1659.85", Digits::Significant(6), ours).verdict;
+        assert_eq!(verdict(-1659.852), Agreement::EveryDigit);
+        assert_eq!(verdict(-1659.862), Agreement::UnitsOfLastDigit(1));
     }
 }

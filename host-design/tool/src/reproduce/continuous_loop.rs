@@ -48,7 +48,7 @@ impl ContinuousRun {
     pub fn trajectory(&self, chain: &Chain, law: &Feedback<f64>) -> Result<Trajectory, ReproduceError> {
         let plant = chain_plant(chain)?;
         let force_n = |state: &[f64]| law.force_n(self.step_m, state);
-        let mut disturbances = Disturbances::of(self.disturbances, plant.disturbances())?;
+        let mut disturbances = LoopDisturbances::of(self.disturbances, plant.disturbances())?;
         let samples = (self.duration_s / self.sample_s).round() as usize;
         let mut state = vec![0.0; plant.states()];
         let mut trajectory = Trajectory::with_room(self.sample_s, samples + 1);
@@ -68,12 +68,12 @@ impl ContinuousRun {
 }
 
 /// Held disturbances, in the order in which the simulated bench draws them.
-struct Disturbances {
+struct LoopDisturbances {
     source: Option<(Pcg64, Normal<f64>, Normal<f64>)>,
     torques: Vec<f64>,
 }
 
-impl Disturbances {
+impl LoopDisturbances {
     fn of(seed: Option<u64>, joints: usize) -> Result<Self, ReproduceError> {
         let normal =
             |variance: f64| Normal::new(0.0, variance.sqrt()).map_err(|_| ReproduceError::Variance(variance));

@@ -4,7 +4,7 @@ use serde::Serialize;
 
 use upright::table::Law;
 
-use super::comparison::{Digits, Row};
+use super::comparison::{ComparedValue, Digits};
 use super::{PaperDesigns, PaperRigs, ReproduceError, published};
 use upright_design::design::{Feedback, continuous_plant, dominant_pair};
 use upright_design::numerics::{Complex, Matrix, Wide, eigenvalues};
@@ -15,7 +15,7 @@ use upright_design::rig::Rig;
 pub struct Designs {
     /// Every number that the paper prints (entries of A that are 0 or 1 by definition are left out), and those that
     /// its formulas for the dominant poles give.
-    pub rows: Vec<Row>,
+    pub rows: Vec<ComparedValue>,
     /// Poles. The paper prints none.
     pub poles: Vec<PoleSet>,
 }
@@ -74,7 +74,7 @@ pub(super) fn open_loop_poles(rig: &Rig) -> Result<Vec<[f64; 2]>, ReproduceError
     Ok(poles.iter().map(|pole| pole.to_f64().map(clean)).collect())
 }
 
-pub(super) fn plant_rows(a: &Matrix<f64>, b: &Matrix<f64>) -> Vec<Row> {
+pub(super) fn plant_rows(a: &Matrix<f64>, b: &Matrix<f64>) -> Vec<ComparedValue> {
     let six = Digits::Significant(6);
     let mut rows = Vec::new();
     for (i, entries) in published::A.iter().enumerate() {
@@ -82,12 +82,12 @@ pub(super) fn plant_rows(a: &Matrix<f64>, b: &Matrix<f64>) -> Vec<Row> {
             // Positions are integrals of rates: 0 and 1 by the order of the states.
             if i % 2 == 1 && (*printed != "0" || a[(i, j)] != 0.0) {
                 let name = format!("A[{},{}]", i + 1, j + 1);
-                rows.push(Row::printed(name, EXACT, printed, six, a[(i, j)]));
+                rows.push(ComparedValue::printed(name, EXACT, printed, six, a[(i, j)]));
             }
         }
     }
     for (i, printed) in published::B.iter().enumerate().filter(|(i, _)| i % 2 == 1) {
-        rows.push(Row::printed(format!("B[{}]", i + 1), EXACT, printed, six, b[(i, 0)]));
+        rows.push(ComparedValue::printed(format!("B[{}]", i + 1), EXACT, printed, six, b[(i, 0)]));
     }
     rows
 }
@@ -98,25 +98,25 @@ pub(super) fn gain_rows(
     ours: &Feedback<f64>,
     k: &[&'static str; 10],
     n: &'static str,
-) -> Vec<Row> {
+) -> Vec<ComparedValue> {
     let gains = k.iter().zip(ours.k.entries()).enumerate().map(|(i, (printed, &ours))| {
-        Row::printed(format!("{law} K[{}]", i + 1), from, printed, Digits::Decimals(2), ours)
+        ComparedValue::printed(format!("{law} K[{}]", i + 1), from, printed, Digits::Decimals(2), ours)
     });
-    let mut rows: Vec<Row> = gains.collect();
+    let mut rows: Vec<ComparedValue> = gains.collect();
     let ours = ours.n.unwrap_or(f64::NAN);
-    rows.push(Row::printed(format!("{law} N"), from, n, Digits::Decimals(4), ours));
+    rows.push(ComparedValue::printed(format!("{law} N"), from, n, Digits::Decimals(4), ours));
     rows
 }
 
 /// The paper's formulas for the dominant pair, with its 1 % and 6 s: it prints no result.
-fn dominant_rows() -> Vec<Row> {
+fn dominant_rows() -> Vec<ComparedValue> {
     let pair = dominant_pair::<Wide>(published::OVERSHOOT_PERCENT, published::SETTLING_TIME_S);
     let [natural, re, im] = [pair.modulus(), pair.re, pair.im].map(|part| part.round_to_f64());
     let from = "formulas";
     vec![
-        Row::not_printed("damping ε of the dominant pair", from, -re / natural),
-        Row::not_printed("natural frequency ωn (rad/s)", from, natural),
-        Row::not_printed("real part of s1 and s2 (1/s)", from, re),
-        Row::not_printed("imaginary part of s1, minus that of s2 (1/s)", from, im),
+        ComparedValue::not_printed("damping ε of the dominant pair", from, -re / natural),
+        ComparedValue::not_printed("natural frequency ωn (rad/s)", from, natural),
+        ComparedValue::not_printed("real part of s1 and s2 (1/s)", from, re),
+        ComparedValue::not_printed("imaginary part of s1, minus that of s2 (1/s)", from, im),
     ]
 }

@@ -1,6 +1,6 @@
 //! The comparison as files: the paper's figures 5 to 8, Table 2 over the length of its runs, spectra; and their data.
 
-use super::{BAND, Loop, Reproduction, Response, Robustness, Settling, Trajectory, printed};
+use super::{BAND, Loop, Reproduction, Robustness, Settling, StepResponse, Trajectory, printed};
 use crate::figure::{Axis, Curve, Figure, FigureError, Panel};
 
 impl Reproduction {
@@ -11,7 +11,7 @@ impl Reproduction {
     pub fn files(&self) -> Result<Vec<(String, Vec<u8>)>, FigureError> {
         let mut files = vec![("summary.md".to_owned(), self.summary().into_bytes())];
         for figure in 5..=8 {
-            let of_figure: Vec<&Response> =
+            let of_figure: Vec<&StepResponse> =
                 self.responses.iter().filter(|response| response.figure == figure).collect();
             files.push((format!("figure-{figure}.svg"), response(&of_figure).svg()?.into_bytes()));
             for one in of_figure {
@@ -54,7 +54,7 @@ fn over_time(trajectory: &Trajectory, value: impl Fn(usize) -> f64) -> Vec<[f64;
 }
 
 /// One of the paper's figures: position in all loops; angles, rates and force in the paper's loop.
-fn response(responses: &[&Response]) -> Figure {
+fn response(responses: &[&StepResponse]) -> Figure {
     let Some(first) = responses.first() else { return Figure::new("") };
     let time = || Axis::linear("time (s)");
     let disturbed = if first.figure >= 7 { ", with disturbances" } else { "" };

@@ -24,14 +24,14 @@ mod settling;
 mod summary;
 mod trajectory;
 
-pub use comparison::{Digits, Row, Verdict};
+pub use comparison::{Agreement, ComparedValue, Digits};
 pub use continuous_loop::ContinuousRun;
 pub use designs::{Designs, PoleSet, designs};
 pub use errata::{Erratum, Evidence, errata};
 pub use error::ReproduceError;
 pub use markdown::markdown_table;
 pub use reproduction::{Reproduction, STAGES, reproduce};
-pub use responses::{Loop, Loops, Response, responses};
+pub use responses::{Loop, Loops, StepResponse, responses};
 pub use rigs::{PaperDesigns, PaperRigs, SEED};
 pub use robustness::{Ripple, Robustness, robustness};
 pub use settling::{HORIZON_S, LONGEST_S, Sensitivity, Settling, SettlingRow, printed, settling};

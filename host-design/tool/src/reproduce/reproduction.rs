@@ -5,7 +5,7 @@ use serde::Serialize;
 use super::designs::{Designs, designs};
 use super::errata::{Erratum, errata};
 use super::error::ReproduceError;
-use super::responses::{Loops, Response, responses};
+use super::responses::{Loops, StepResponse, responses};
 use super::rigs::{PaperDesigns, PaperRigs};
 use super::robustness::{Robustness, robustness};
 use super::settling::{Settling, settling};
@@ -18,7 +18,7 @@ pub struct Reproduction {
     /// What the paper leaves open or misprints.
     pub errata: Vec<Erratum>,
     /// Figures 5 to 8.
-    pub responses: Vec<Response>,
+    pub responses: Vec<StepResponse>,
     /// Table 2.
     pub settling: Settling,
     /// The paper's claims about the two laws.

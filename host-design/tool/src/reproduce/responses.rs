@@ -117,7 +117,7 @@ impl Loops {
 
 /// One response.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Response {
+pub struct StepResponse {
     /// Number of the paper's figure.
     pub figure: u8,
     /// LQR or pole placement.
@@ -135,7 +135,7 @@ pub struct Response {
 ///
 /// # Errors
 /// [`ReproduceError`] if a run cannot be made.
-pub fn responses(loops: &Loops) -> Result<Vec<Response>, ReproduceError> {
+pub fn responses(loops: &Loops) -> Result<Vec<StepResponse>, ReproduceError> {
     let mut wanted = Vec::new();
     for disturbances in [None, Some(SEED)] {
         let run = ContinuousRun { disturbances, ..ContinuousRun::STEP };
@@ -146,7 +146,7 @@ pub fn responses(loops: &Loops) -> Result<Vec<Response>, ReproduceError> {
         trajectories.into_iter().zip(wanted).enumerate().map(|(index, (trajectory, (law, kind, run)))| {
             // Figures 5 and 7 are of the first law, 6 and 8 of the second one.
             let figure = 5 + (index / Loop::ALL.len()) as u8;
-            Response { figure, law, kind, figures: trajectory.step_figures(run.step_m), trajectory }
+            StepResponse { figure, law, kind, figures: trajectory.step_figures(run.step_m), trajectory }
         });
     Ok(responses.collect())
 }

@@ -5,8 +5,8 @@ use std::fmt::Write as _;
 use super::claims::claims;
 use super::markdown::markdown_table;
 use super::{
-    Designs, Erratum, HORIZON_S, LONGEST_S, PoleSet, Reproduction, Response, Row, Sensitivity, Settling,
-    SettlingRow, Verdict, printed, published,
+    Agreement, ComparedValue, Designs, Erratum, HORIZON_S, LONGEST_S, PoleSet, Reproduction, Sensitivity,
+    Settling, SettlingRow, StepResponse, printed, published,
 };
 
 const HEAD: &str = "\
@@ -34,11 +34,11 @@ impl Reproduction {
 
 fn gains(designs: &Designs) -> String {
     let mut text = "## Matrices and gains\n\n".to_owned();
-    let exact = |from: &dyn Fn(&Row) -> bool| {
+    let exact = |from: &dyn Fn(&ComparedValue) -> bool| {
         let chosen = || designs.rows.iter().filter(|row| row.printed.is_some() && from(row));
         format!("{} of {}", chosen().filter(|row| row.is_exact()).count(), chosen().count())
     };
-    let plant = |row: &Row| row.quantity.starts_with(['A', 'B']);
+    let plant = |row: &ComparedValue| row.quantity.starts_with(['A', 'B']);
     let _ = writeln!(
         text,
         "To the last printed digit: {} entries of A and B; {} entries of K and N from A and B as printed, {} from the exact\n\
@@ -64,11 +64,11 @@ fn gains(designs: &Designs) -> String {
     text + &markdown_table(&["quantity", "from", "verdict", "printed", "ours", "deviation"], 3, &rows)
 }
 
-fn verdict(verdict: Verdict) -> String {
+fn verdict(verdict: Agreement) -> String {
     match verdict {
-        Verdict::EveryDigit => "every digit".to_owned(),
-        Verdict::UnitsOfLastDigit(units) => format!("last digit off by {units}"),
-        Verdict::NotPrinted => "not printed".to_owned(),
+        Agreement::EveryDigit => "every digit".to_owned(),
+        Agreement::UnitsOfLastDigit(units) => format!("last digit off by {units}"),
+        Agreement::NotPrinted => "not printed".to_owned(),
     }
 }
 
@@ -106,7 +106,7 @@ fn errata(errata: &[Erratum]) -> String {
     text
 }
 
-fn responses(responses: &[Response]) -> String {
+fn responses(responses: &[StepResponse]) -> String {
     let mut text = "## Figures 5 to 8: step of 1 m on the nonlinear plant\n\n\
         Continuous is the paper's loop. The other two are the firmware's controller at 1 ms with a limit of 20 N, set-point\n\
         jumping. Figures 7 and 8 are with disturbances drawn again each millisecond, the same for all: force of variance\n\

@@ -19,13 +19,12 @@ pub(super) fn run(
     rig_hash: u64,
     goes_on: &dyn Fn() -> bool,
 ) {
-    let mut buffer = [0; 4096];
     let mut next = Instant::now();
     while goes_on() {
         // What only a simulation can do is ignored.
         let _ = dispatcher.requests(now());
         if dispatcher.monitor.ended.is_none() {
-            exchange(&mut line, dispatcher, &mut buffer);
+            exchange(&mut line, dispatcher);
             dispatcher.monitor.expect_rig(rig_hash);
         } else {
             std::thread::sleep(PICTURE);
@@ -39,15 +38,12 @@ pub(super) fn run(
     dispatcher.turn_off(now());
     let end = Instant::now() + LAST_WAIT;
     while dispatcher.monitor.ended.is_none() && dispatcher.monitor.is_waiting() && Instant::now() < end {
-        exchange(&mut line, dispatcher, &mut buffer);
+        exchange(&mut line, dispatcher);
     }
 }
 
 /// Sends pending bytes, and receives.
-fn exchange(line: &mut SerialLine, dispatcher: &mut Dispatcher, buffer: &mut [u8]) {
-    dispatcher.monitor.poll(now());
-    match line.exchange(&dispatcher.monitor.take_outgoing(), buffer) {
-        Ok(bytes) => dispatcher.receive(bytes, now()),
-        Err(error) => dispatcher.monitor.close(&error),
-    }
+fn exchange(line: &mut SerialLine, dispatcher: &mut Dispatcher) {
+    let telemetry = dispatcher.monitor.exchange(line);
+    dispatcher.take(telemetry);
 }

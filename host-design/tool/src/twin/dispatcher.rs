@@ -8,6 +8,7 @@ use std::time::{Duration, Instant};
 use serde_json::{Value, json};
 use upright::protocol::message::Request;
 use upright::supervision::supervisor::State;
+use upright_design::client::AnyTelemetry;
 
 use super::connections::{Connections, EventQueue, ViewerEvent, ViewerId};
 use super::pace::PICTURE;
@@ -61,9 +62,9 @@ impl Dispatcher {
         }
     }
 
-    /// Takes bytes that the firmware has sent.
-    pub(super) fn receive(&mut self, bytes: &[u8], now: Duration) {
-        for telemetry in self.monitor.receive(bytes, now) {
+    /// Takes telemetry that the firmware has sent: for the next picture, and for the recording.
+    pub(super) fn take(&mut self, all: Vec<AnyTelemetry>) {
+        for telemetry in all {
             if let Some(recorder) = &mut self.recorder {
                 // Writing to memory does not fail.
                 let _ = recorder.push(&telemetry);

@@ -243,7 +243,8 @@ impl<'a, 't> World<'a, 't> {
         }
         self.output = self.harness.session.tick(&inputs)?;
         let session = &mut self.harness.session;
-        dispatcher.receive(session.last_bytes(), now);
+        let telemetry = dispatcher.monitor.receive(session.last_bytes(), now);
+        dispatcher.take(telemetry);
         session.forget_received();
         self.t_s += self.machine.rig.tick.period_s;
         Ok(())

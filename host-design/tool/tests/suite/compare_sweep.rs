@@ -6,7 +6,7 @@ use crate::published::{rig, rig_path};
 use upright::table::Law;
 use upright_design::rig::{PolePlacement, Rig, RigError};
 use upright_tool::compare::{
-    Candidate, Conditions, Fate, Row, Sweep, compare, csv, figure, jobs, notes, table,
+    ComparedConditions, ComparedRig, ComparedRow, Fate, Sweep, compare, csv, figure, jobs, notes, table,
 };
 
 const PAPER: &str = "quadruple-paper";
@@ -77,9 +77,9 @@ fn what_the_file_could_not_say_is_refused_as_in_a_file() {
     }
 }
 
-fn sweep_of(name: &str, sweep: &str) -> (Vec<Candidate>, Sweep) {
+fn sweep_of(name: &str, sweep: &str) -> (Vec<ComparedRig>, Sweep) {
     let (text, sweep): (String, Sweep) = (text_of(name), sweep.parse().unwrap());
-    let candidate = |&value: &f64| Candidate {
+    let candidate = |&value: &f64| ComparedRig {
         label: name.to_owned(),
         rig: sweep.rig(&text, Path::new("rig.toml"), value).unwrap(),
         value: Some(value),
@@ -87,8 +87,8 @@ fn sweep_of(name: &str, sweep: &str) -> (Vec<Candidate>, Sweep) {
     (sweep.values.iter().map(candidate).collect(), sweep)
 }
 
-fn fates(rows: &[Row]) -> String {
-    let letter = |row: &Row| match row.fate {
+fn fates(rows: &[ComparedRow]) -> String {
+    let letter = |row: &ComparedRow| match row.fate {
         Fate::Settled => 'y',
         Fate::Survived => 'n',
         Fate::Fallen(_) => 'f',
@@ -100,13 +100,13 @@ fn fates(rows: &[Row]) -> String {
 #[test]
 fn table_2_of_the_paper_is_a_sweep() {
     let (candidates, sweep) = sweep_of(PAPER, "pole_placement.settling_time_s=3..9");
-    let conditions = Conditions {
+    let conditions = ComparedConditions {
         step_m: 1.0,
         duration_s: 6.5,
         full_state: true,
         raw_step: true,
         law: Some(Law::PolePlacement),
-        ..Conditions::default()
+        ..ComparedConditions::default()
     };
     let rows = compare(&candidates, &conditions, &|| ()).unwrap();
     assert_eq!(fates(&rows), "ffyyynn");
@@ -124,19 +124,19 @@ fn table_2_of_the_paper_is_a_sweep() {
 fn continuous_gains_end_where_the_tick_gets_long_and_sampled_ones_do_not() {
     let (candidates, _) = sweep_of(PAPER, "tick.period_s=0.001..0.005:3");
     let run = |continuous_gains: bool| {
-        let conditions = Conditions {
+        let conditions = ComparedConditions {
             full_state: true,
             continuous_gains,
             duration_s: 5.0,
             law: Some(Law::Lqr),
-            ..Conditions::default()
+            ..ComparedConditions::default()
         };
         compare(&candidates, &conditions, &|| ()).unwrap()
     };
     // At 3 ms the loop is unstable, but the force limit keeps it swinging.
     let (held, redesigned) = (run(true), run(false));
     assert_eq!((fates(&held).as_str(), fates(&redesigned).as_str()), ("ynf", "yyy"));
-    let phase = |row: &Row| row.figures.as_ref().unwrap().phase_margin_rad;
+    let phase = |row: &ComparedRow| row.figures.as_ref().unwrap().phase_margin_rad;
     assert!(phase(&held[0]).is_some() && phase(&held[1]).is_none() && phase(&held[2]).is_none());
     assert!(redesigned.iter().all(|row| phase(row).is_some()));
     assert!(table(&held, Some("tick.period_s")).lines().last().unwrap().contains("unstable"));
@@ -152,8 +152,8 @@ fn what_has_no_design_is_a_row_with_its_reason() {
         rig
     };
     let candidates = [("good", rig("single-quanser-ip02")), ("slow", hopeless), ("weightless", bad_weight)]
-        .map(|(label, rig)| Candidate { label: label.to_owned(), rig, value: None });
-    let rows = compare(&candidates, &Conditions::default(), &|| ()).unwrap();
+        .map(|(label, rig)| ComparedRig { label: label.to_owned(), rig, value: None });
+    let rows = compare(&candidates, &ComparedConditions::default(), &|| ()).unwrap();
     // The pole placement of the third candidate does not depend on its weights.
     assert_eq!(fates(&rows), "y--y-y");
     let notes = notes(&rows, None);
@@ -174,7 +174,7 @@ fn what_has_no_design_is_a_row_with_its_reason() {
 fn every_row_says_when_it_is_done() {
     let (candidates, _) = sweep_of("single-quanser-ip02", "lqr.force_weight=0.01..1:3:log");
     let done = std::sync::atomic::AtomicUsize::new(0);
-    let conditions = Conditions { duration_s: 3.0, ..Conditions::default() };
+    let conditions = ComparedConditions { duration_s: 3.0, ..ComparedConditions::default() };
     let count = || {
         done.fetch_add(1, std::sync::atomic::Ordering::Relaxed);
     };
@@ -189,7 +189,7 @@ fn every_row_says_when_it_is_done() {
 #[test]
 fn a_sweep_of_one_law_leaves_the_other_as_it_is() {
     let (candidates, _) = sweep_of(PAPER, "pole_placement.overshoot_percent=1..5:2");
-    let of = |candidate: &Candidate| match candidate.rig.pole_placement.clone().unwrap() {
+    let of = |candidate: &ComparedRig| match candidate.rig.pole_placement.clone().unwrap() {
         PolePlacement::Response { overshoot_percent, .. } => overshoot_percent,
         PolePlacement::Poles(_) => panic!("a response"),
     };

@@ -6,7 +6,7 @@ use upright_design::rig::Rig;
 use upright_design::simulate::Scenario;
 use upright_design::table::TableValues;
 use upright_tool::image::{Board, Kind};
-use upright_tool::in_the_loop::{Cycles, Span, measure};
+use upright_tool::in_the_loop::{Span, TickCycles, measure};
 
 use crate::equipment::built;
 use crate::published::rig_and_table;
@@ -25,7 +25,7 @@ const TASK_US: f64 = 31.5;
 const JITTER_US: f64 = 15.8;
 const CONTROLLER_CYCLES: u32 = 2_230;
 
-fn measured(rig: &Rig, table: &TableValues, image: &Image) -> Cycles {
+fn measured(rig: &Rig, table: &TableValues, image: &Image) -> TickCycles {
     let scenario =
         Scenario { duration_s: 0.5, force_noise_n: 0.1, substeps: 2, ..Scenario::at_rest(rig, Law::Lqr) };
     let cycles = measure(rig, table, &scenario, image, &Conditions::f405(1)).unwrap();
@@ -34,7 +34,7 @@ fn measured(rig: &Rig, table: &TableValues, image: &Image) -> Cycles {
 }
 
 /// What is above its goal or its limit.
-fn beyond(cycles: &Cycles) -> Vec<&'static str> {
+fn beyond(cycles: &TickCycles) -> Vec<&'static str> {
     let (typical, balancing) = (cycles.typical.unwrap(), cycles.balancing.unwrap());
     let us = |span: Option<Span>| span.unwrap().us;
     let all = [
@@ -90,7 +90,7 @@ fn the_ticks_of_the_image_stay_within_their_limits_and_those_of_a_slower_one_do_
     let (off, balancing) = (cycles.off.unwrap(), cycles.balancing.unwrap());
     assert!(off.ticks > 1000 && balancing.ticks >= 500 && cycles.all.ticks == off.ticks + balancing.ticks);
     // All parts are found in the code, and make up the whole.
-    let parts = |worst: upright_tool::in_the_loop::Figures| {
+    let parts = |worst: upright_tool::in_the_loop::TickFigures| {
         [worst.entry, worst.inputs, worst.control, worst.output, worst.rest].map(|part| part.cycles)
     };
     assert!(parts(balancing).into_iter().all(|cycles| cycles > 10), "{balancing:?}");

@@ -17,7 +17,7 @@ Examples:
   upright check rigs/quadruple-paper.toml
   upright check my.toml --json | jq .plant
   upright check --keys")]
-pub(crate) struct Check {
+pub(crate) struct CheckCommand {
     /// Rig file (TOML)
     #[arg(required_unless_present = "keys")]
     rig: Option<PathBuf>,
@@ -29,7 +29,7 @@ pub(crate) struct Check {
     keys: bool,
 }
 
-impl Check {
+impl CheckCommand {
     pub(crate) fn run(self) -> Result<(), Failure> {
         let mut out = std::io::stdout().lock();
         let Some(file) = self.rig else {

@@ -19,7 +19,7 @@ use upright_tool::monitor::SerialLine;
 
 use crate::failure::Failure;
 use crate::firmware::lines_of_stdin;
-use crate::target::{Built, Target};
+use crate::target::{Built, TargetOption};
 use crate::variation::with_table;
 
 /// Guides you from a wired rig to a balancing one, step by step: what to do, what was found, and whether it is right.
@@ -33,13 +33,13 @@ Examples:
   upright commission rigs/double-quanser-dbpen.toml --target host --defect encoders-swapped    exit status 3
   upright commission my.toml --target qemu --machine as-it-is.toml --record record.json
   upright commission my.toml --port /dev/ttyACM0 --write as-it-is.toml --record record.json    the real machine")]
-pub(crate) struct Commission {
+pub(crate) struct CommissionCommand {
     /// Rig file
     #[arg(value_name = "RIG")]
     rig: PathBuf,
     /// Where the firmware runs, with a simulated machine
     #[arg(long, value_enum, required_unless_present = "port")]
-    target: Option<Target>,
+    target: Option<TargetOption>,
     /// The real machine: serial port of its board (/dev/ttyACM0, COM3 …), or tcp:HOST:PORT
     #[arg(long, conflicts_with_all = ["target", "machine", "defect"], requires = "write")]
     port: Option<String>,
@@ -66,7 +66,7 @@ pub(crate) struct Commission {
     json: bool,
 }
 
-impl Commission {
+impl CommissionCommand {
     pub(crate) fn run(self) -> Result<(), Failure> {
         let rig = Rig::from_path(&self.rig)?;
         commissionable(&rig)?;
@@ -91,7 +91,7 @@ impl Commission {
                 (journal, result)
             }
             (None, target) => {
-                let target = target.unwrap_or(Target::Host);
+                let target = target.unwrap_or(TargetOption::Host);
                 let machine = self.true_machine(&rig)?;
                 let built = target.built(Link::Files, &rig, &table)?;
                 let mut journal = journal(built.place(self.seed).name());
@@ -129,7 +129,7 @@ impl Commission {
         &self,
         plan: CommissionPlan<'_>,
         machine: &Rig,
-        target: Target,
+        target: TargetOption,
         built: &Built,
         journal: &mut Journal,
     ) -> Result<(), Failure> {

@@ -8,7 +8,9 @@ use serde_json::json;
 use upright::table::Law;
 use upright_design::rig::Rig;
 use upright_design::table::write_atomically;
-use upright_tool::compare::{Candidate, Conditions, Sweep, compare, csv, figure, jobs, notes, table};
+use upright_tool::compare::{
+    ComparedConditions, ComparedRig, Sweep, compare, csv, figure, jobs, notes, table,
+};
 
 use crate::failure::Failure;
 use crate::progress::with_bar;
@@ -26,7 +28,7 @@ Examples:
       --law pole-placement --full-state --step 1 --raw-step --duration 6.5     (Table 2 of the paper)
   upright compare my.toml --sweep lqr.force_weight=0.01..10:13:log --svg weight.svg --csv weight.csv
   upright compare my.toml --sweep 'link[1].mass_kg=0.1..0.3' --json")]
-pub(crate) struct Compare {
+pub(crate) struct CompareCommand {
     /// Rig files (TOML)
     #[arg(required = true, value_name = "RIG")]
     rigs: Vec<PathBuf>,
@@ -65,7 +67,7 @@ pub(crate) struct Compare {
     png: Option<PathBuf>,
 }
 
-impl Compare {
+impl CompareCommand {
     pub(crate) fn run(self) -> Result<(), Failure> {
         let rigs: Vec<Rig> = self.rigs.iter().map(|path| Rig::from_path(path)).collect::<Result<_, _>>()?;
         let mut candidates = Vec::new();
@@ -74,7 +76,7 @@ impl Compare {
             let label = if is_copy { path.display().to_string() } else { rig.name.clone() };
             candidates.extend(self.candidates(path, rig, &label)?);
         }
-        let conditions = Conditions {
+        let conditions = ComparedConditions {
             step_m: self.step,
             duration_s: self.duration,
             full_state: self.full_state,
@@ -118,8 +120,8 @@ impl Compare {
     }
 
     /// The rig of a file, or one rig for each value of the sweep.
-    fn candidates(&self, path: &Path, rig: &Rig, label: &str) -> Result<Vec<Candidate>, Failure> {
-        let named = |rig, value| Candidate { label: label.to_owned(), rig, value };
+    fn candidates(&self, path: &Path, rig: &Rig, label: &str) -> Result<Vec<ComparedRig>, Failure> {
+        let named = |rig, value| ComparedRig { label: label.to_owned(), rig, value };
         let Some(sweep) = &self.sweep else { return Ok(vec![named(rig.clone(), None)]) };
         let text = std::fs::read_to_string(path).map_err(|error| {
             Failure::BadArgument(format!("{}: cannot be read again for --sweep: {error}", path.display()))

@@ -26,7 +26,7 @@ Examples:
   upright coverage rigs/quadruple-paper.toml --off 30 --seed 7
   upright coverage rigs/quadruple-paper.toml --shard 2/3 > 2.jsonl
   upright coverage rigs/quadruple-paper.toml --merge 1.jsonl 2.jsonl 3.jsonl")]
-pub(crate) struct IdentifiedMachines {
+pub(crate) struct IdentifiedMachinesCommand {
     /// Rig file
     #[arg(value_name = "RIG")]
     rig: PathBuf,
@@ -58,7 +58,7 @@ fn below_90(text: &str) -> Result<f64, String> {
     })
 }
 
-impl IdentifiedMachines {
+impl IdentifiedMachinesCommand {
     pub(crate) fn run(self) -> Result<(), Failure> {
         let rig = Rig::from_path(&self.rig)?;
         let drawn = Drawn {

@@ -33,7 +33,7 @@ Examples:
   upright design my.toml --swing-up                       with the motions of `upright swing-up my.toml`
   upright design rigs/quadruple-paper.toml --check        exit status 1 if src/gains.rs differs
   upright design my.toml --json --no-write | jq .sampled.lqr.K")]
-pub(crate) struct Design {
+pub(crate) struct DesignCommand {
     /// Rig file (TOML)
     rig: PathBuf,
     /// Write the table here [default: src/gains.rs of the checkout]
@@ -56,7 +56,7 @@ pub(crate) struct Design {
     json: bool,
 }
 
-impl Design {
+impl DesignCommand {
     pub(crate) fn run(self) -> Result<(), Failure> {
         let rig = Rig::from_path(&self.rig)?;
         let name = || self.rig.display().to_string();

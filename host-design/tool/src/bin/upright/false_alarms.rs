@@ -29,7 +29,7 @@ Examples:
   upright false-alarms rigs/quadruple-robust.toml --shard 2/3 > 2.jsonl
   upright false-alarms rigs/quadruple-robust.toml --merge 1.jsonl 2.jsonl 3.jsonl"
 )]
-pub(crate) struct HealthyHours {
+pub(crate) struct HealthyHoursCommand {
     #[command(flatten)]
     variation: Variation,
     /// Number of machines for each law
@@ -51,7 +51,7 @@ pub(crate) struct HealthyHours {
     json: bool,
 }
 
-impl HealthyHours {
+impl HealthyHoursCommand {
     pub(crate) fn run(self) -> Result<(), Failure> {
         let (rig, _, table) = self.variation.designed()?;
         let laws: Vec<Law> = table
@@ -94,21 +94,7 @@ impl HealthyHours {
             let duration_s = self.duration;
             writeln!(out, "{}", json!({ "rig": rig.name, "duration_s": duration_s, "laws": found }))?;
         } else {
-            writeln!(
-                out,
-                "{:16}{:>10}{:>9}{:>9}{:>12}{:>11}{:>12}",
-                "law", "machines", "hours", "alarms", "at most", "rejected", "innovation"
-            )?;
-            for one in found {
-                let most = format!("{:.2} /h", one.most_per_hour);
-                let FalseAlarms { law, runs, hours, alarms, rejected, closest, .. } = one;
-                writeln!(
-                    out,
-                    "{:16}{runs:>10}{hours:>9.2}{:>9}{most:>12}{rejected:>11}{closest:>12.2}",
-                    law.key(),
-                    alarms.len()
-                )?;
-            }
+            write!(out, "{}", text(found))?;
         }
         let alarms: Vec<String> = found
             .iter()
@@ -120,5 +106,56 @@ impl HealthyHours {
             return Ok(());
         }
         Err(Failure::CheckFailed(format!("{}: turned off: {}", rig.name, alarms.join("; "))))
+    }
+}
+
+/// The results as a table, a line for each law.
+fn text(found: &[FalseAlarms]) -> String {
+    let head = ["law", "machines", "hours", "alarms", "at most", "rejected", "innovation"].map(str::to_owned);
+    let row = |one: &FalseAlarms| {
+        [
+            one.law.key().to_owned(),
+            one.runs.to_string(),
+            format!("{:.2}", one.hours),
+            one.alarms.len().to_string(),
+            format!("{:.2} /h", one.most_per_hour),
+            one.rejected.to_string(),
+            format!("{:.2}", one.closest),
+        ]
+    };
+    let line = |[law, runs, hours, alarms, most, rejected, closest]: [String; 7]| {
+        format!("{law:16} {runs:>9} {hours:>8} {alarms:>8} {most:>11} {rejected:>10} {closest:>11}\n")
+    };
+    [head].into_iter().chain(found.iter().map(row)).map(line).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn columns_stay_apart_however_large_their_numbers_are() {
+        let one = FalseAlarms {
+            law: Law::PolePlacement,
+            runs: 123_456_789_012,
+            hours: 1e9,
+            alarms: Vec::new(),
+            most_per_hour: 4_123_418.23,
+            rejected: 98_765_432_109_876,
+            closest: 123_456_790.0,
+        };
+        let text = text(&[one]);
+        let words: Vec<&str> = text.lines().nth(1).unwrap_or_default().split_whitespace().collect();
+        let wanted = [
+            "pole-placement",
+            "123456789012",
+            "1000000000.00",
+            "0",
+            "4123418.23",
+            "/h",
+            "98765432109876",
+            "123456792.00",
+        ];
+        assert_eq!(words, wanted);
     }
 }

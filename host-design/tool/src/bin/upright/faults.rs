@@ -7,13 +7,13 @@ use serde_json::json;
 use upright_design::rig::Rig;
 use upright_design::study::Study;
 use upright_design::swing_up::SwingUpError;
-use upright_tool::campaign::{Campaign, Defect, During, Row, Setup, campaign, feed, kinds, one};
+use upright_tool::campaign::{Campaign, Defect, DefectRow, During, Setup, campaign, feed, kinds, one};
 use upright_tool::in_the_loop::{Link, Place};
 
 use crate::failure::Failure;
 use crate::progress::with_bar;
 use crate::split::Split;
-use crate::target::Target;
+use crate::target::TargetOption;
 use crate::variation::{Variation, Wanted, with_stored_motions};
 
 /// Fault injection: runs the firmware with one defect at a time and checks that the motor is off in time; exit status
@@ -35,7 +35,7 @@ Examples:
   upright faults rigs/quadruple-paper.toml --shard 2/3 > 2.jsonl     the second third of the runs
   upright faults rigs/quadruple-paper.toml --merge 1.jsonl 2.jsonl 3.jsonl
   upright faults rigs/quadruple-paper.toml --kind motor-dead --json")]
-pub(crate) struct Faults {
+pub(crate) struct FaultsCommand {
     #[command(flatten)]
     variation: Variation,
     /// Begin the defects while the rig is raised and lowered by the stored motions
@@ -48,8 +48,8 @@ pub(crate) struct Faults {
     #[arg(long, conflicts_with_all = ["swing_up", "jog"])]
     shake: bool,
     /// Where the firmware runs
-    #[arg(long, value_enum, default_value_t = Target::Host)]
-    target: Target,
+    #[arg(long, value_enum, default_value_t = TargetOption::Host)]
+    target: TargetOption,
     /// Seed of the campaign
     #[arg(long, default_value_t = 1)]
     seed: u64,
@@ -78,7 +78,7 @@ fn kind(name: &str) -> Result<Defect, String> {
     found.copied().ok_or_else(|| format!("known kinds: {}", known()))
 }
 
-impl Faults {
+impl FaultsCommand {
     pub(crate) fn run(self) -> Result<(), Failure> {
         let (rig, _, table) = self.variation.designed()?;
         let table = if self.swing_up {
@@ -161,7 +161,7 @@ impl Faults {
         study: &Study,
     ) -> Result<Option<Campaign>, Failure> {
         let chosen: Vec<Defect> = chosen.iter().copied().filter(|kind| kind.needs_guard()).collect();
-        if self.target != Target::Board || chosen.is_empty() {
+        if self.target != TargetOption::Board || chosen.is_empty() {
             return Ok(None);
         }
         let setup = Setup { guards: false, ..*setup };
@@ -254,7 +254,7 @@ impl Faults {
     }
 
     fn verdict(&self, result: &Campaign, control: Option<&Campaign>) -> Result<(), Failure> {
-        let seen = |row: &&Row| row.missed == 0;
+        let seen = |row: &&DefectRow| row.missed == 0;
         if let Some(row) = control.and_then(|control| control.rows.iter().find(seen)) {
             return Err(Failure::CheckFailed(format!(
                 "without detection, `{}` is never missed: the campaign proves nothing",
@@ -268,7 +268,7 @@ impl Faults {
         };
         let wrong: usize = result.rows.iter().map(|row| row.wrong.len()).sum();
         let target = match self.target {
-            Target::Host => String::new(),
+            TargetOption::Host => String::new(),
             other => format!(" --target {}", other.name()),
         };
         // A campaign of one kind numbers its runs differently.

@@ -17,30 +17,30 @@ use crate::failure::Failure;
 
 /// Builds, measures, runs, flashes and monitors the firmware image.
 #[derive(Args)]
-pub(crate) struct Firmware {
+pub(crate) struct FirmwareCommand {
     #[command(subcommand)]
-    command: Command,
+    command: FirmwareSubcommand,
 }
 
 #[derive(Subcommand)]
-enum Command {
-    Build(build::Build),
-    Cycles(Box<cycles::Cycles>),
-    Size(size::Size),
-    Flash(flash::Flash),
-    Run(Box<run::Run>),
-    Monitor(monitor::Monitor),
+enum FirmwareSubcommand {
+    Build(build::BuildCommand),
+    Cycles(Box<cycles::CyclesCommand>),
+    Size(size::SizeCommand),
+    Flash(flash::FlashCommand),
+    Run(Box<run::RunCommand>),
+    Monitor(monitor::MonitorCommand),
 }
 
-impl Firmware {
+impl FirmwareCommand {
     pub(crate) fn run(self) -> Result<(), Failure> {
         match self.command {
-            Command::Build(command) => command.run(),
-            Command::Cycles(command) => command.run(),
-            Command::Size(command) => command.run(),
-            Command::Flash(command) => command.run(),
-            Command::Run(command) => command.run(),
-            Command::Monitor(command) => command.run(),
+            FirmwareSubcommand::Build(command) => command.run(),
+            FirmwareSubcommand::Cycles(command) => command.run(),
+            FirmwareSubcommand::Size(command) => command.run(),
+            FirmwareSubcommand::Flash(command) => command.run(),
+            FirmwareSubcommand::Run(command) => command.run(),
+            FirmwareSubcommand::Monitor(command) => command.run(),
         }
     }
 }

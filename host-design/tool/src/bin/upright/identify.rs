@@ -4,16 +4,21 @@ use std::io::Write;
 use std::path::{Path, PathBuf};
 
 use clap::Args;
-use upright_design::identify::{Identification, IdentifyError, Log, Settings, identify};
+use upright_design::identify::{Identification, Log, Recordings, Settings, identify_recordings};
 use upright_design::rig::Rig;
 use upright_design::table::write_atomically;
 use upright_tool::identified::{json, page, rig_file, text};
 
 use crate::failure::Failure;
 use crate::progress::with_steps;
+use crate::reading::ReadingArgs;
 use crate::variation::positive;
 
-/// Identifies the parameters of the real machine from logs of the hanging machine being shaken.
+/// Identifies the parameters of the real machine from logs of the hanging machine being shaken, or from tables of its motion.
+///
+/// Files that are no logs of Upright are read as tables (CSV): a row of names such as time_s,angle_1_rad, and rows of
+/// numbers. Several files are pieces of one machine, each with an unknown start. Without a drive, the links swing
+/// freely; --clamped says that the cart cannot move.
 ///
 /// First the wiring, then masses, lengths, moments, frictions, delay, dead zone and zeros, each with its standard
 /// deviation. Exit status 2 if a log cannot be read or is of another rig; 3 if the model does not fit, and then no rig
@@ -26,15 +31,21 @@ Examples:
   upright identify rigs/quadruple-paper.toml run.log --write new.toml
   upright identify rigs/quadruple-paper.toml run.log --report run.html     fits, residuals, spectra, correlations
   upright identify rigs/quadruple-paper.toml run.log --json | jq .estimates
+  upright identify my-rig.toml swing-*.csv --clamped --angles absolute --zero upright --predict other-*.csv
   upright identify rigs/quadruple-paper.toml run.log --csv run.csv      only converts
   upright identify rigs/quadruple-paper.toml run.log --mcap run.mcap    for Foxglove and PlotJuggler")]
-pub(crate) struct Identify {
+pub(crate) struct IdentifyCommand {
     /// Rig file that the firmware was designed for
     #[arg(value_name = "RIG")]
     rig: PathBuf,
-    /// Logs of this machine, all recorded after the same homing
-    #[arg(value_name = "LOG", required = true)]
+    /// Logs or tables of this machine, all recorded after the same homing
+    #[arg(value_name = "FILE", required = true)]
     logs: Vec<PathBuf>,
+    /// Other recordings, which are only predicted, with the old and the new numbers, over 0.5, 1 and 2 s
+    #[arg(long, value_name = "FILE", num_args = 1..)]
+    predict: Vec<PathBuf>,
+    #[command(flatten)]
+    reading: ReadingArgs,
     /// Write the rig file with the identified numbers, if they fit
     #[arg(long, value_name = "NEW.toml")]
     write: Option<PathBuf>,
@@ -61,26 +72,27 @@ pub(crate) struct Identify {
     json: bool,
 }
 
-impl Identify {
+impl IdentifyCommand {
     pub(crate) fn run(self) -> Result<(), Failure> {
         let rig = Rig::from_path(&self.rig)?;
-        let read = |file: &PathBuf| match Log::from_path(file) {
-            Ok(log) => Ok((file.clone(), log)),
-            Err(source) => Err(IdentifyError::Log { file: file.clone(), source }),
-        };
-        let logs = self.logs.iter().map(read).collect::<Result<Vec<_>, _>>()?;
+        let recordings = Recordings::from_paths(&rig, &self.logs, &self.reading.reading())?;
         if let Some(path) = &self.csv {
-            return convert(&rig, &logs, path, |log, steps, out| log.write_csv(steps, out));
+            return convert(&rig, &recordings, path, |log, steps, out| log.write_csv(steps, out));
         }
         if let Some(path) = &self.mcap {
-            return convert(&rig, &logs, path, |log, steps, out| log.write_mcap(steps, out));
+            return convert(&rig, &recordings, path, |log, steps, out| log.write_mcap(steps, out));
         }
+        let unused = (!self.predict.is_empty())
+            .then(|| Recordings::from_paths(&rig, &self.predict, &self.reading.reading()))
+            .transpose()?;
         let settings = Settings {
             eccentricity: self.eccentricity,
             weighed_kg_m: self.weigh,
             trust_wiring: self.trust_wiring,
         };
-        let found = with_steps(|progress| identify(&rig, &logs, &settings, progress))?;
+        let found = with_steps(|progress| {
+            identify_recordings(&rig, &recordings, unused.as_ref(), &settings, progress)
+        })?;
         let mut out = std::io::stdout().lock();
         if self.json {
             writeln!(out, "{}", json(&rig.name, &found))?;
@@ -105,6 +117,11 @@ impl Identify {
     fn as_typed(&self) -> String {
         let logs: Vec<String> = self.logs.iter().map(|log| log.display().to_string()).collect();
         let mut typed = format!("upright identify {} {}", self.rig.display(), logs.join(" "));
+        if !self.predict.is_empty() {
+            let unused: Vec<String> = self.predict.iter().map(|file| file.display().to_string()).collect();
+            typed.push_str(&format!(" --predict {}", unused.join(" ")));
+        }
+        typed.push_str(&self.reading.as_typed());
         if self.eccentricity {
             typed.push_str(" --eccentricity");
         }
@@ -137,11 +154,14 @@ impl Identify {
 /// Writes one log in another format.
 fn convert(
     rig: &Rig,
-    logs: &[(PathBuf, Log)],
+    recordings: &Recordings,
     path: &Path,
     write: impl Fn(&Log, &[f64], &mut dyn Write) -> std::io::Result<()>,
 ) -> Result<(), Failure> {
-    let [(file, log)] = logs else {
+    let Recordings::Logs(logs) = recordings else {
+        return Err(Failure::BadArgument("--csv and --mcap convert logs of Upright".to_owned()));
+    };
+    let [(file, log)] = logs.as_slice() else {
         return Err(Failure::BadArgument("--csv and --mcap convert one log; name one".to_owned()));
     };
     let steps: Vec<f64> = rig.sensors().iter().map(|sensor| sensor.step()).collect();

@@ -11,6 +11,7 @@ mod faults;
 mod firmware;
 mod identify;
 mod progress;
+mod reading;
 mod report;
 mod reproduce;
 mod robust;
@@ -60,24 +61,24 @@ struct Arguments {
 
 #[derive(Subcommand)]
 enum Command {
-    Check(check::Check),
-    Commission(commission::Commission),
-    Design(design::Design),
-    FalseAlarms(false_alarms::HealthyHours),
-    Faults(faults::Faults),
-    Firmware(firmware::Firmware),
-    Report(report::Report),
-    Compare(compare::Compare),
-    Coverage(coverage::IdentifiedMachines),
-    Reproduce(reproduce::Reproduce),
-    Robust(robust::Robust),
-    Shake(shake::Shake),
-    Identify(identify::Identify),
-    Simulate(simulate::Simulate),
-    Twin(twin::Twin),
-    SwingUp(swing_up::SwingUp),
-    Transitions(transitions::Transitions),
-    Verify(verify::Verify),
+    Check(check::CheckCommand),
+    Commission(commission::CommissionCommand),
+    Design(design::DesignCommand),
+    FalseAlarms(false_alarms::HealthyHoursCommand),
+    Faults(faults::FaultsCommand),
+    Firmware(firmware::FirmwareCommand),
+    Report(report::ReportCommand),
+    Compare(compare::CompareCommand),
+    Coverage(coverage::IdentifiedMachinesCommand),
+    Reproduce(reproduce::ReproduceCommand),
+    Robust(robust::RobustCommand),
+    Shake(shake::ShakeCommand),
+    Identify(identify::IdentifyCommand),
+    Simulate(simulate::SimulateCommand),
+    Twin(twin::TwinCommand),
+    SwingUp(swing_up::SwingUpCommand),
+    Transitions(transitions::TransitionsCommand),
+    Verify(verify::VerifyCommand),
 }
 
 fn main() -> ExitCode {

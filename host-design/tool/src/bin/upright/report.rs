@@ -11,7 +11,7 @@ use upright_design::swing_up::{Demonstration, Script, Stored, motions, with_moti
 use upright_design::table::{TableValues, write_atomically};
 use upright_design::verify::{Effort, trust};
 use upright_tool::in_the_loop::RunError;
-use upright_tool::report::{REGION_POINTS, Report as Page, Source, report};
+use upright_tool::report::{REGION_POINTS, Report as Page, ReportSource, report};
 
 use super::swing_up::with_margins;
 use super::verify::search;
@@ -32,7 +32,7 @@ Examples:
   upright report rigs/single-quanser-ip02.toml --margins        adds how hard it may be pushed while it is raised
   upright report rigs/double-quanser-dbpen.toml --transitions   adds a run from equilibrium to equilibrium
   upright report rigs/quadruple-paper.toml --gains continuous --tick 0.005     effect of a wrong tick")]
-pub(crate) struct Report {
+pub(crate) struct ReportCommand {
     #[command(flatten)]
     variation: Variation,
     /// Write the page here [default: the rig file's name with .html, in the current folder]
@@ -67,7 +67,7 @@ pub(crate) struct Report {
     json: bool,
 }
 
-impl Report {
+impl ReportCommand {
     pub(crate) fn run(self) -> Result<(), Failure> {
         self.prepare()?;
         let (rig, certified, table) = self.variation.designed()?;
@@ -91,7 +91,7 @@ impl Report {
             with_random_plants(laws * u64::from(self.runs), |stage, done| -> Result<_, Failure> {
                 let trust = trust(&rig, &certified, &table, effort, stage, done)?;
                 let run = motions.as_ref().and_then(|table| demonstration(&rig, table, self.seed));
-                let source = Source {
+                let source = ReportSource {
                     rig: &rig,
                     certified: &certified,
                     table: &table,

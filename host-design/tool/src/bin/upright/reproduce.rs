@@ -19,7 +19,7 @@ Examples:
   upright reproduce                          prints the comparison; figures, data and summary go to reproduced/
   upright reproduce --rigs ../upright/rigs --out paper      from another folder
   upright reproduce --no-write --json | jq '.designs.rows[] | select(.verdict != \"every_digit\")'")]
-pub(crate) struct Reproduce {
+pub(crate) struct ReproduceCommand {
     /// Folder of quadruple-paper.toml and quadruple-paper-printed.toml [default: rigs of the checkout]
     #[arg(long, value_name = "DIR")]
     rigs: Option<PathBuf>,
@@ -34,7 +34,7 @@ pub(crate) struct Reproduce {
     json: bool,
 }
 
-impl Reproduce {
+impl ReproduceCommand {
     pub(crate) fn run(self) -> Result<(), Failure> {
         let rigs = PaperRigs::from_folder(&self.rigs.map_or_else(default_rigs, Ok)?)?;
         if !self.no_write {

@@ -34,7 +34,7 @@ Examples:
   upright robust rigs/quadruple-robust.toml --as-it-is --runs 104      how many runs survive with the file's own numbers
   upright robust my.toml --mass 5 --front --svg front.svg              least ripple over multiples of the tolerances
   upright robust my.toml --joint-friction 1e-3 --json")]
-pub(crate) struct Robust {
+pub(crate) struct RobustCommand {
     /// Rig file (TOML)
     rig: PathBuf,
     /// Error (±) of the masses instead of mass_percent (%)
@@ -80,7 +80,7 @@ pub(crate) struct Robust {
     json: bool,
 }
 
-impl Robust {
+impl RobustCommand {
     pub(crate) fn run(self) -> Result<(), Failure> {
         let rig = Rig::from_path(&self.rig)?;
         let tolerances = self.tolerances(&rig);

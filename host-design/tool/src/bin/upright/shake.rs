@@ -17,7 +17,7 @@ use upright_tool::monitor::{SerialLine, now};
 
 use crate::failure::Failure;
 use crate::progress::with_spinner;
-use crate::target::Target;
+use crate::target::TargetOption;
 use crate::variation::with_table;
 
 /// Shakes the hanging machine, and writes its log for `upright identify`.
@@ -35,7 +35,7 @@ Examples:
   upright shake rigs/single-quanser-ip02.toml --log run.log --target qemu
   upright shake my-rig-as-it-is.toml --log run.log --seconds 20 --seed 7
   upright shake my-rig.toml --log run.log --port /dev/ttyACM0       the real machine")]
-pub(crate) struct Shake {
+pub(crate) struct ShakeCommand {
     /// Rig file
     #[arg(value_name = "RIG")]
     rig: PathBuf,
@@ -50,7 +50,7 @@ pub(crate) struct Shake {
     seed: u64,
     /// Where the firmware that shakes it runs [default: no firmware]
     #[arg(long, value_enum)]
-    target: Option<Target>,
+    target: Option<TargetOption>,
     /// Serial port of a board (/dev/ttyACM0, COM3 …), or tcp:HOST:PORT
     #[arg(long, conflicts_with = "target")]
     port: Option<String>,
@@ -59,7 +59,7 @@ pub(crate) struct Shake {
 /// Longest wait for the motor to go off after the shaking is stopped.
 const LAST_WAIT: Duration = Duration::from_millis(500);
 
-impl Shake {
+impl ShakeCommand {
     pub(crate) fn run(self) -> Result<(), Failure> {
         let rig = Rig::from_path(&self.rig)?;
         let log = self.shaken(&rig)?;

@@ -30,7 +30,7 @@ Examples:
   upright simulate rigs/quadruple-paper.toml --swing-up --svg swing-up.svg
   upright simulate rigs/double-quanser-dbpen.toml --transitions --svg route.svg
   upright simulate rigs/quadruple-paper.toml --csv - | head")]
-pub(crate) struct Simulate {
+pub(crate) struct SimulateCommand {
     #[command(flatten)]
     variation: Variation,
 
@@ -59,8 +59,8 @@ pub(crate) struct Simulate {
     #[arg(long, value_delimiter = ',', value_name = "X,…", allow_negative_numbers = true, value_parser = finite, conflicts_with = "tilt")]
     start: Vec<f64>,
     /// Disturbances: none, or the paper's force of 0.1 N rms and joint torques of 3.16e-5 N·m rms
-    #[arg(long, value_enum, default_value_t = Disturbances::None)]
-    disturbances: Disturbances,
+    #[arg(long, value_enum, default_value_t = DisturbanceOptions::None)]
+    disturbances: DisturbanceOptions,
     /// Disturbing force, drawn again in each tick (N rms)
     #[arg(long, value_name = "N", value_parser = not_negative)]
     force_noise: Option<f64>,
@@ -107,12 +107,12 @@ enum SensingName {
 }
 
 #[derive(Clone, Copy, ValueEnum)]
-enum Disturbances {
+enum DisturbanceOptions {
     None,
     Paper,
 }
 
-impl Simulate {
+impl SimulateCommand {
     pub(crate) fn run(self) -> Result<(), Failure> {
         if self.is_swing_up() {
             return self.swing_up_with(|_, table, script| {
@@ -204,8 +204,8 @@ impl Simulate {
         scenario.start = self.initial_state(rig, law)?;
         // The paper's disturbances: F_d ~ N(0, 0.01), joint torques ~ N(0, 1e-9), given there as variances.
         let (force, torque) = match self.disturbances {
-            Disturbances::None => (0.0, 0.0),
-            Disturbances::Paper => (0.01f64.sqrt(), 1e-9f64.sqrt()),
+            DisturbanceOptions::None => (0.0, 0.0),
+            DisturbanceOptions::Paper => (0.01f64.sqrt(), 1e-9f64.sqrt()),
         };
         Ok(Scenario {
             duration_s: self.duration,
@@ -243,7 +243,7 @@ impl Simulate {
         }
         let moves = self.step != 0.0
             || angles != 0
-            || !matches!(self.disturbances, Disturbances::None)
+            || !matches!(self.disturbances, DisturbanceOptions::None)
             || self.force_noise.is_some()
             || self.torque_noise.is_some()
             || self.force_offset != 0.0;

@@ -8,10 +8,11 @@ use clap::Args;
 use serde_json::json;
 use upright_design::motion::Transition;
 use upright_design::rig::{PlantDescription, Rig};
+use upright_design::simulate::Trace;
 use upright_design::study::Study;
 use upright_design::swing_up::{
-    Condition, FirmwareRuns, Judgement, Margin, Plan, Script, Solved, Stored, SwingUpError, designed_table,
-    firmware_runs, judge, margins, motions, refined, search, solved,
+    Condition, FirmwareRuns, Margin, MotionJudgement, Script, SolvedCandidate, Stored, SwingUpError,
+    SwingUpPlan, designed_table, firmware_runs, judge, margins, motions, refined, search, solved,
 };
 use upright_design::table::{TableValues, write_atomically};
 use upright_tool::figure::{Figure, margins_figure, run_svg, stroboscope_svg, trade_figure};
@@ -37,7 +38,7 @@ Examples:
   upright swing-up rigs/quadruple-paper.toml --trade --svg trade.svg
   upright swing-up rigs/single-quanser-ip02.toml --no-write --json
   upright swing-up rigs/quadruple-paper.toml --stored --svg run.svg --csv run.csv")]
-pub(crate) struct SwingUp {
+pub(crate) struct SwingUpCommand {
     /// Rig file
     #[arg(value_name = "RIG")]
     rig: PathBuf,
@@ -86,9 +87,9 @@ const MOMENTS: usize = 40;
 /// Number of candidates of --trade.
 const TRADED: u64 = 40;
 
-impl SwingUp {
+impl SwingUpCommand {
     /// Runs of the stored motions under all conditions.
-    fn rows(&self, rig: &Rig, study: &Study) -> Result<Vec<Row>, SwingUpError> {
+    fn rows(&self, rig: &Rig, study: &Study) -> Result<Vec<SwingUpRow>, SwingUpError> {
         let stored = Stored::beside(&self.rig)?;
         let designed = |rig: &Rig| -> Result<_, SwingUpError> {
             let motions = refined(rig, &stored)?;
@@ -98,8 +99,8 @@ impl SwingUp {
         let row = |condition: Condition| {
             let rig = condition.designed(rig);
             let (table, motions) = if condition.joint_counts.is_some() { &designed(&rig)? } else { &usual };
-            let runs = firmware_runs(&rig, table, motions, &condition, 1, self.runs as usize, study)?;
-            Ok(Row { condition, runs })
+            let runs = firmware_runs(&rig, table, motions, &condition, 1..1 + u64::from(self.runs), study)?;
+            Ok(SwingUpRow { condition, runs })
         };
         Condition::all().into_iter().map(row).collect()
     }
@@ -141,7 +142,7 @@ impl SwingUp {
         }
         writeln!(out, "{} of {TRADED} candidates are solved", solved.len())?;
         writeln!(out, "duration (s)  force (N)  farthest (m)  fragility     arrive  with twice the errors")?;
-        for Solved { duration_s, force_n, position_m, score, runs, wider } in &solved {
+        for SolvedCandidate { duration_s, force_n, position_m, score, runs, wider } in &solved {
             let [arrive, twice] = [runs, wider].map(|runs| format!("{} of {}", runs.arrived, runs.runs));
             write!(out, "{duration_s:>12.2} {force_n:>10.2} {position_m:>13.3} {score:>10.2} ")?;
             writeln!(out, "{arrive:>10} {twice:>22}")?;
@@ -190,20 +191,7 @@ impl SwingUp {
         };
         let script = Script::of(&rig, &plan.table, self.seed, false).map_err(failed)?;
         let demonstration = script.run(&plan.table).map_err(RunError::from)?;
-        if let Some(path) = &self.csv {
-            let mut bytes = Vec::new();
-            demonstration.trace.write_csv(&mut bytes)?;
-            write_atomically(path, &bytes)?;
-        }
-        if let Some(path) = &self.svg {
-            let title = format!("{}: up, balance, step, down", rig.name);
-            write_atomically(path, run_svg(&rig, &demonstration.trace, &title)?.as_bytes())?;
-        }
-        if let (Some(path), PlantDescription::Chain(chain)) = (&self.picture, &rig.plant) {
-            let to_s = plan.raise.peaks.duration_s;
-            let picture = stroboscope_svg(chain, &demonstration.trace, 0.0, to_s);
-            write_atomically(path, picture.as_bytes())?;
-        }
+        self.write_files(&rig, &demonstration.trace, plan.raise.peaks.duration_s)?;
         let file = Stored::path_beside(&self.rig);
         let differs = old.map_or(true, |old| old.to_json() != plan.stored.to_json());
         if !self.check && !self.no_write && differs {
@@ -218,6 +206,24 @@ impl SwingUp {
         }
         if self.check && differs {
             return Err(Failure::CheckFailed(format!("{} differs from these motions", file.display())));
+        }
+        Ok(())
+    }
+
+    /// Writes the files that are wanted of a run, in which the rig is raised for `raised_s`.
+    fn write_files(&self, rig: &Rig, trace: &Trace, raised_s: f64) -> Result<(), Failure> {
+        if let Some(path) = &self.csv {
+            let mut bytes = Vec::new();
+            trace.write_csv(&mut bytes)?;
+            write_atomically(path, &bytes)?;
+        }
+        if let Some(path) = &self.svg {
+            let title = format!("{}: up, balance, step, down", rig.name);
+            write_atomically(path, run_svg(rig, trace, &title)?.as_bytes())?;
+        }
+        if let (Some(path), PlantDescription::Chain(chain)) = (&self.picture, &rig.plant) {
+            let picture = stroboscope_svg(chain, trace, 0.0, raised_s);
+            write_atomically(path, picture.as_bytes())?;
         }
         Ok(())
     }
@@ -262,22 +268,22 @@ fn margins_text(transition: Transition, margins: &[Margin]) -> String {
 }
 
 /// Runs under a condition.
-struct Row {
+struct SwingUpRow {
     condition: Condition,
     runs: FirmwareRuns,
 }
 
 /// Prints the rows as Markdown, or as one JSON object.
-fn print_rows(rig: &Rig, rows: &[Row], is_json: bool) -> Result<(), Failure> {
+fn print_rows(rig: &Rig, rows: &[SwingUpRow], is_json: bool) -> Result<(), Failure> {
     let mut out = std::io::stdout().lock();
     if is_json {
         let rows: Vec<_> = rows
             .iter()
-            .map(|Row { condition, runs }| json!({ "condition": condition, "runs": runs }))
+            .map(|SwingUpRow { condition, runs }| json!({ "condition": condition, "runs": runs }))
             .collect();
         return Ok(writeln!(out, "{}", json!({ "rig": rig.name, "rows": rows }))?);
     }
-    for Row { condition, runs: FirmwareRuns { refused, raise, lower, faults } } in rows {
+    for SwingUpRow { condition, runs: FirmwareRuns { refused, raise, lower, faults } } in rows {
         let refused = (*refused > 0).then(|| format!("not hanging: {refused}"));
         let faults = faults.iter().map(|(fault, count)| format!("{fault}: {count}"));
         let ended: Vec<String> = refused.into_iter().chain(faults).collect();
@@ -296,9 +302,9 @@ fn print_rows(rig: &Rig, rows: &[Row], is_json: bool) -> Result<(), Failure> {
     Ok(())
 }
 
-fn text(rig: &Rig, plan: &Plan) -> String {
+fn text(rig: &Rig, plan: &SwingUpPlan) -> String {
     let mut text = format!("{}\n", rig.name);
-    for Judgement { transition, search, score, peaks, runs } in [&plan.raise, &plan.lower] {
+    for MotionJudgement { transition, search, score, peaks, runs } in [&plan.raise, &plan.lower] {
         let percent = runs.interval.map(|end| 100.0 * end);
         // Writing into a string cannot fail.
         let _ = writeln!(text, "\n{transition}");

@@ -17,7 +17,7 @@ const BOARD: Board = Board::WeactF405;
 
 /// Where the firmware runs.
 #[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
-pub(crate) enum Target {
+pub(crate) enum TargetOption {
     /// In this process
     Host,
     /// As an image in QEMU
@@ -33,13 +33,13 @@ pub(crate) enum Built {
     Board(Image),
 }
 
-impl Target {
+impl TargetOption {
     /// Its name on the command line.
     pub(crate) fn name(self) -> &'static str {
         match self {
-            Target::Host => "host",
-            Target::Qemu => "qemu",
-            Target::Board => "board",
+            TargetOption::Host => "host",
+            TargetOption::Qemu => "qemu",
+            TargetOption::Board => "board",
         }
     }
 
@@ -47,13 +47,13 @@ impl Target {
     /// `link` connects the pins of an image in QEMU.
     pub(crate) fn built(self, link: Link, rig: &Rig, table: &TableValues) -> Result<Built, Failure> {
         let kind = match (self, link) {
-            (Target::Host, _) => return Ok(Built::Host),
-            (Target::Qemu, Link::Files) => Kind::InTheLoop,
-            (Target::Qemu, Link::Usart) => Kind::InTheLoopUsart,
-            (Target::Board, _) => Kind::Board(BOARD),
+            (TargetOption::Host, _) => return Ok(Built::Host),
+            (TargetOption::Qemu, Link::Files) => Kind::InTheLoop,
+            (TargetOption::Qemu, Link::Usart) => Kind::InTheLoopUsart,
+            (TargetOption::Board, _) => Kind::Board(BOARD),
         };
         let image = with_spinner("building the image", || image::build_for(kind, rig, table))?;
-        if self == Target::Board {
+        if self == TargetOption::Board {
             return Ok(Built::Board(read(&image)?));
         }
         announced(&image)?;

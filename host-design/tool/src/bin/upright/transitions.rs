@@ -31,7 +31,7 @@ Examples:
   upright transitions rigs/double-quanser-dbpen.toml                     search all of them first, which takes minutes
   upright transitions rigs/double-quanser-dbpen.toml --only ud-uu --candidates 100..400
   upright firmware run rigs/double-quanser-dbpen.toml --transitions      all of them in QEMU, bit for bit")]
-pub(crate) struct Transitions {
+pub(crate) struct TransitionsCommand {
     /// Rig file
     #[arg(value_name = "RIG")]
     rig: PathBuf,
@@ -60,7 +60,7 @@ fn numbers(text: &str) -> Result<(u64, u64), String> {
     ends.filter(|(first, end)| first < end).ok_or_else(|| "give two numbers as 0..100".to_owned())
 }
 
-impl Transitions {
+impl TransitionsCommand {
     pub(crate) fn run(self) -> Result<(), Failure> {
         let rig = Rig::from_path(&self.rig)?;
         let links = rig.states() / 2 - 1;

@@ -16,7 +16,7 @@ use upright_tool::monitor::SerialLine;
 use upright_tool::twin::{Server, SimulatedMachine};
 
 use crate::failure::Failure;
-use crate::target::Target;
+use crate::target::TargetOption;
 use crate::variation::{Variation, Wanted, law_option, positive, with_stored_motions};
 
 /// Serves a page on which the rig moves, run by the firmware itself: pull it, change it, break it, watch it.
@@ -32,12 +32,12 @@ Examples:
   upright twin rigs/single-quanser-ip02.toml --hanging        from power-up on, with every step left to you
   upright twin rigs/quadruple-paper.toml --port /dev/ttyACM0  a real board, without what only a simulation can do
   upright twin rigs/quadruple-paper.toml --listen 0.0.0.0:8080   for a phone on the same network: others can listen")]
-pub(crate) struct Twin {
+pub(crate) struct TwinCommand {
     #[command(flatten)]
     variation: Variation,
     /// Where the firmware runs
-    #[arg(long, value_enum, default_value_t = Target::Host)]
-    target: Target,
+    #[arg(long, value_enum, default_value_t = TargetOption::Host)]
+    target: TargetOption,
     /// A board instead of a simulation: its serial port (/dev/ttyACM0, COM3 …), or tcp:HOST:PORT
     #[arg(long, conflicts_with_all = ["target", "hanging"])]
     port: Option<String>,
@@ -58,7 +58,7 @@ pub(crate) struct Twin {
     duration: Option<f64>,
 }
 
-impl Twin {
+impl TwinCommand {
     pub(crate) fn run(self) -> Result<(), Failure> {
         let (rig, _, table) = self.variation.designed()?;
         let table = with_stored_motions(&self.variation.rig, &rig, table, Wanted::of(self.transitions))?;

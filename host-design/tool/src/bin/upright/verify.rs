@@ -35,7 +35,7 @@ Examples:
   upright verify rigs/single-quanser-ip02.toml --map tilt.csv       from which angle and rate of link 1 it recovers
   upright verify rigs/quadruple-paper.toml --imperfections          which friction, play or wrong zero makes it fall
   upright verify rigs/quadruple-paper.toml --gains continuous --tick 0.003         unstable: exit status 1")]
-pub(crate) struct Verify {
+pub(crate) struct VerifyCommand {
     #[command(flatten)]
     variation: Variation,
     /// Monte Carlo runs for each law; fewer than 73 cannot show 95 % even if all survive
@@ -119,7 +119,7 @@ fn random_plants(
     Ok(())
 }
 
-impl Verify {
+impl VerifyCommand {
     pub(crate) fn run(self) -> Result<(), Failure> {
         let (rig, certified, mut table) = self.variation.designed()?;
         for other in Law::ALL.into_iter().filter(|law| self.law.is_some_and(|only| only != *law)) {

@@ -19,7 +19,7 @@ pub struct Compared<'a> {
     /// Bytes that came with the tick before.
     received: Vec<u8>,
     was_stopped: bool,
-    streams: [Stream; 2],
+    streams: [TelemetryStream; 2],
     /// Ticks that were compared.
     pub ticks: u64,
     /// Telemetry messages that were compared.
@@ -27,12 +27,12 @@ pub struct Compared<'a> {
 }
 
 /// Telemetry of the board or of the host.
-struct Stream {
+struct TelemetryStream {
     client: Client,
     telemetry: VecDeque<AnyTelemetry>,
 }
 
-impl Stream {
+impl TelemetryStream {
     fn take(&mut self, bytes: &[u8]) {
         for &byte in bytes {
             if let Some(Received::Telemetry(telemetry)) = self.client.receive(byte, Duration::ZERO) {
@@ -45,7 +45,8 @@ impl Stream {
 impl<'a> Compared<'a> {
     /// Compares a board and a host that have both just started.
     pub fn new(board: &'a mut VirtualBoard, host: &'a mut dyn Target) -> Self {
-        let streams = [(); 2].map(|()| Stream { client: Client::default(), telemetry: VecDeque::new() });
+        let streams =
+            [(); 2].map(|()| TelemetryStream { client: Client::default(), telemetry: VecDeque::new() });
         Self { board, host, received: Vec::new(), was_stopped: false, streams, ticks: 0, messages: 0 }
     }
 

@@ -24,7 +24,7 @@ pub struct Span {
 
 /// Execution times of some ticks: the largest values, or the medians.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct Figures {
+pub struct TickFigures {
     /// Number of ticks.
     pub ticks: usize,
     /// From the time at which the tick is due to the motor's new duty; `None` with the motor off.
@@ -49,23 +49,23 @@ pub struct Figures {
 
 /// Execution times of the ticks of a run.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Cycles {
+pub struct TickCycles {
     /// Frequency of the core (Hz).
     pub core_hz: u32,
     /// The tick's period.
     pub period: Span,
     /// Ticks without the control law: with the motor off (disarmed, homing, armed), and those of the jog.
-    pub off: Option<Figures>,
+    pub off: Option<TickFigures>,
     /// Ticks of balancing.
-    pub balancing: Option<Figures>,
+    pub balancing: Option<TickFigures>,
     /// The medians of balancing.
-    pub typical: Option<Figures>,
+    pub typical: Option<TickFigures>,
     /// Ticks of raising and lowering, and of balancing in between.
-    pub moving: Option<Figures>,
+    pub moving: Option<TickFigures>,
     /// The medians of these.
-    pub typical_moving: Option<Figures>,
+    pub typical_moving: Option<TickFigures>,
     /// All ticks since the reset.
-    pub all: Figures,
+    pub all: TickFigures,
     /// Why the run ended early, if it did.
     pub ended: Option<String>,
 }
@@ -83,7 +83,7 @@ pub struct TooLong {
     least_s: f64,
 }
 
-impl Cycles {
+impl TickCycles {
     /// No tick may take longer than a quarter of its period: the rest is a margin for what the model does not cover.
     ///
     /// # Errors
@@ -101,7 +101,7 @@ impl Cycles {
     }
 
     /// The times of a run that balances and of one that moves; `None` without ticks.
-    fn of(balances: Run, moves: Run, period_s: f64) -> Option<Self> {
+    fn of(balances: MeasuredRun, moves: MeasuredRun, period_s: f64) -> Option<Self> {
         let all = [balances.ticks.as_slice(), &moves.ticks].concat();
         let select = |ticks: &[TickCost], drives: bool| -> Vec<TickCost> {
             ticks.iter().copied().filter(|tick| tick.latency.is_some() == drives).collect()
@@ -112,12 +112,12 @@ impl Cycles {
         Some(Self {
             core_hz,
             period,
-            off: Figures::of(&off, core_hz, largest),
-            balancing: Figures::of(&balancing, core_hz, largest),
-            typical: Figures::of(&balancing, core_hz, median),
-            moving: Figures::of(&moving, core_hz, largest),
-            typical_moving: Figures::of(&moving, core_hz, median),
-            all: Figures::of(&all, core_hz, largest)?,
+            off: TickFigures::of(&off, core_hz, largest),
+            balancing: TickFigures::of(&balancing, core_hz, largest),
+            typical: TickFigures::of(&balancing, core_hz, median),
+            moving: TickFigures::of(&moving, core_hz, largest),
+            typical_moving: TickFigures::of(&moving, core_hz, median),
+            all: TickFigures::of(&all, core_hz, largest)?,
             ended: balances.ended.or(moves.ended),
         })
     }
@@ -132,7 +132,7 @@ fn median(times: &mut [Time]) -> Option<Time> {
     times.get(times.len() / 2).copied()
 }
 
-impl Figures {
+impl TickFigures {
     /// The figures of these ticks; `choose` picks each from its values in all ticks.
     fn of(ticks: &[TickCost], core_hz: u32, choose: fn(&mut [Time]) -> Option<Time>) -> Option<Self> {
         let span = |time: Time| {
@@ -163,11 +163,11 @@ impl Figures {
 const UPRIGHT_S: f64 = 0.1;
 
 /// What a board does in a run: returns the fault that ended it, and counts the ticks in which the law drives.
-type Action<'a> = dyn Fn(&mut VirtualBoard, &mut usize) -> Result<Option<Fault>, HarnessError> + 'a;
+type TickAction<'a> = dyn Fn(&mut VirtualBoard, &mut usize) -> Result<Option<Fault>, HarnessError> + 'a;
 
 /// The measured ticks of a run.
 #[derive(Default)]
-struct Run {
+struct MeasuredRun {
     ticks: Vec<TickCost>,
     core_hz: u32,
     ended: Option<String>,
@@ -178,16 +178,16 @@ struct Run {
 ///
 /// # Errors
 /// [`RunError`] if the image does something that the hardware does not allow, or has no tick. A rig that does not
-/// begin to balance is no error: see [`Cycles::ended`].
+/// begin to balance is no error: see [`TickCycles::ended`].
 pub fn measure(
     rig: &Rig,
     table: &TableValues,
     scenario: &Scenario,
     image: &Image,
     conditions: &Conditions,
-) -> Result<Cycles, RunError> {
+) -> Result<TickCycles, RunError> {
     let places = places(image);
-    let run = |action: &Action<'_>| {
+    let run = |action: &TickAction<'_>| {
         let mut board = VirtualBoard::start(image, conditions, table)?;
         board.measure_ticks(places.clone());
         let mut driven = 0;
@@ -200,7 +200,7 @@ pub fn measure(
         // The jog has an output too, before the law drives.
         let before = ticks.len().saturating_sub(driven);
         ticks.iter_mut().take(before).for_each(|tick| tick.latency = None);
-        Ok(Run { core_hz: board.board().core_hz(), ticks, ended })
+        Ok(MeasuredRun { core_hz: board.board().core_hz(), ticks, ended })
     };
     let balances = run(&|board, driven| balance(rig, table, scenario, board, driven))?;
     let moves = match up_and_down(rig, table, UPRIGHT_S) {
@@ -208,9 +208,9 @@ pub fn measure(
             *driven = (motion.duration_s / rig.tick.period_s) as usize;
             Ok(record(rig, table, &motion, board)?.fault)
         })?,
-        Err(_) => Run::default(),
+        Err(_) => MeasuredRun::default(),
     };
-    let cycles = Cycles::of(balances, moves, rig.tick.period_s);
+    let cycles = TickCycles::of(balances, moves, rig.tick.period_s);
     cycles.ok_or_else(|| HarnessError::Board("has no tick".to_owned()).into())
 }
 

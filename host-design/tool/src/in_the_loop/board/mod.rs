@@ -6,5 +6,5 @@ mod places;
 mod virtual_board;
 
 pub use compared::Compared;
-pub use cycles::{Cycles, Figures, Span, TooLong, measure};
+pub use cycles::{Span, TickCycles, TickFigures, TooLong, measure};
 pub use virtual_board::{Event, Events, RULES, VirtualBoard};

@@ -10,7 +10,7 @@ use upright_design::rig::Rig;
 use upright_design::swing_up::Margin;
 use upright_design::table::{Gains, TableValues};
 use upright_design::verify::{ImperfectionSettings, LawTrust, TrustReport, imperfections, linear};
-use upright_tool::report::{REGION_POINTS, Report, Source, report};
+use upright_tool::report::{REGION_POINTS, Report, ReportSource, report};
 
 /// A rig from this repository.
 pub(crate) fn rig(name: &str) -> Rig {
@@ -69,7 +69,7 @@ fn made(
     });
     let trust = TrustReport { laws: laws.collect(), checks: Vec::new() };
     let found = settings.map(|settings| imperfections(rig, &table, Law::Lqr, &settings, &|| ()).unwrap());
-    let source = Source {
+    let source = ReportSource {
         rig,
         certified: &certified,
         table: &table,

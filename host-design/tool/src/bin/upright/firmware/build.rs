@@ -23,7 +23,7 @@ Examples:
   upright firmware build                                      with src/gains.rs as it is
   upright firmware build rigs/single-quanser-ip02.toml        with the gains and stored motions of a rig
   upright firmware build --board nucleo-f446")]
-pub(crate) struct Build {
+pub(crate) struct BuildCommand {
     /// Rig file (TOML) to design the table from [default: the table in src/gains.rs]
     rig: Option<PathBuf>,
     #[command(flatten)]
@@ -33,7 +33,7 @@ pub(crate) struct Build {
     transitions: bool,
 }
 
-impl Build {
+impl BuildCommand {
     pub(crate) fn run(self) -> Result<(), Failure> {
         let image = built(Kind::Board(self.on.board), self.rig.as_deref(), Wanted::of(self.transitions))?;
         check_ticks(self.on.board, self.rig.as_deref(), Wanted::of(self.transitions), &image)?;

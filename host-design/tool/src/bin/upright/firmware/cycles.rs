@@ -14,7 +14,7 @@ use upright_design::simulate::{Scenario, Sensing};
 use upright_design::table::TableValues;
 use upright_design::verify::at_rest_disturbed;
 use upright_tool::image::{self, Board, Kind};
-use upright_tool::in_the_loop::{self, Figures, Span};
+use upright_tool::in_the_loop::{self, Span, TickFigures};
 use upright_tool::project::checkout;
 
 use super::board::BoardOption;
@@ -36,7 +36,7 @@ Examples:
   upright firmware cycles rigs/quadruple-paper.toml
   upright firmware cycles rigs/single-quanser-ip02.toml --law pole-placement --board nucleo-f446
   upright firmware cycles rigs/quadruple-paper.toml --json | jq .cycles.balancing.latency.us")]
-pub(crate) struct Cycles {
+pub(crate) struct CyclesCommand {
     /// Rig file (TOML)
     rig: PathBuf,
     #[command(flatten)]
@@ -52,7 +52,7 @@ pub(crate) struct Cycles {
     json: bool,
 }
 
-impl Cycles {
+impl CyclesCommand {
     pub(crate) fn run(self) -> Result<(), Failure> {
         let (rig, table) = designed(&self.rig, Wanted::SwingUp)?;
         let image = with_spinner("building the image", || {
@@ -82,7 +82,7 @@ pub(super) fn measured(
     board: Board,
     law: Law,
     duration_s: f64,
-) -> Result<in_the_loop::Cycles, Failure> {
+) -> Result<in_the_loop::TickCycles, Failure> {
     let scenario = Scenario { sensing: Sensing::Encoders, duration_s, ..at_rest_disturbed(rig, law, 1) };
     Ok(with_spinner("measuring its ticks", || {
         in_the_loop::measure(rig, table, &scenario, image, &board.conditions(1))
@@ -140,7 +140,7 @@ fn rig_of_the_gains() -> Option<PathBuf> {
     rigs.find(|path| Rig::from_path(path).is_ok_and(|rig| rig.hash() == RIG_HASH))
 }
 
-fn table_of(cycles: &in_the_loop::Cycles) -> String {
+fn table_of(cycles: &in_the_loop::TickCycles) -> String {
     let columns = [
         ("motor off, most", cycles.off),
         ("balancing, median", cycles.typical),
@@ -158,7 +158,7 @@ fn table_of(cycles: &in_the_loop::Cycles) -> String {
     for _ in columns {
         _ = write!(text, "{:>10}{:>10}", "cycles", "µs");
     }
-    let mut row = |name: &str, of: &dyn Fn(&Figures) -> Option<Span>| {
+    let mut row = |name: &str, of: &dyn Fn(&TickFigures) -> Option<Span>| {
         _ = write!(text, "\n{name:28}");
         for (_, worst) in &columns {
             match worst.as_ref().and_then(of) {

@@ -23,7 +23,7 @@ const PROBE_RS: &str = "probe-rs";
 Examples:
   upright firmware flash                                      with src/gains.rs as it is
   upright firmware flash rigs/single-quanser-ip02.toml --board nucleo-f446")]
-pub(crate) struct Flash {
+pub(crate) struct FlashCommand {
     /// Rig file (TOML) to design the table from [default: the table in src/gains.rs]
     rig: Option<PathBuf>,
     #[command(flatten)]
@@ -33,7 +33,7 @@ pub(crate) struct Flash {
     transitions: bool,
 }
 
-impl Flash {
+impl FlashCommand {
     pub(crate) fn run(self) -> Result<(), Failure> {
         // Checked first, because building the image takes longer.
         if Command::new(PROBE_RS).arg("--version").output().is_err() {

@@ -38,7 +38,7 @@ Examples:
   upright firmware monitor /dev/ttyACM0 --csv run.csv
   upright firmware monitor /dev/ttyACM0 --web 8080 --rig rigs/single-quanser-ip02.toml   as a page in the browser
   echo set-point 0.05 | upright firmware monitor tcp:127.0.0.1:7777 --json --duration 5")]
-pub(crate) struct Monitor {
+pub(crate) struct MonitorCommand {
     /// Serial port (/dev/ttyACM0, COM3 …), or tcp:HOST:PORT
     port: String,
     /// Record telemetry to this CSV file from the start
@@ -61,7 +61,7 @@ pub(crate) struct Monitor {
 /// Time between two frames on the screen.
 const PICTURE: Duration = Duration::from_millis(50);
 
-impl Monitor {
+impl MonitorCommand {
     pub(crate) fn run(self) -> Result<(), Failure> {
         let stop = Arc::new(AtomicBool::new(false));
         for signal in [
@@ -147,18 +147,11 @@ impl Conversation {
             std::thread::sleep(PICTURE);
             return Ok(());
         }
-        self.model.poll(now());
-        let mut buffer = [0; 4096];
-        match self.line.exchange(&self.model.take_outgoing(), &mut buffer) {
-            Ok(bytes) => {
-                for telemetry in self.model.receive(bytes, now()) {
-                    each(&json(&telemetry))?;
-                    if let Some(recorder) = &mut self.recorder {
-                        recorder.push(&telemetry)?;
-                    }
-                }
+        for telemetry in self.model.exchange(&mut self.line) {
+            each(&json(&telemetry))?;
+            if let Some(recorder) = &mut self.recorder {
+                recorder.push(&telemetry)?;
             }
-            Err(error) => self.model.close(&error),
         }
         Ok(())
     }

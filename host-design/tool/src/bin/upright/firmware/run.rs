@@ -13,8 +13,8 @@ use upright_tool::in_the_loop::{Link, Place, RunError, VirtualBoard, run, run_co
 
 use crate::failure::Failure;
 use crate::progress::with_spinner;
-use crate::simulate::Simulate;
-use crate::target::Target;
+use crate::simulate::SimulateCommand;
+use crate::target::TargetOption;
 
 /// Builds the image for the rig, runs it in lock step with the nonlinear plant, and compares every bit with the
 /// firmware on the host; exit status 1 if the pendulum falls or a bit differs.
@@ -36,12 +36,12 @@ Examples:
   upright firmware run rigs/single-quanser-ip02.toml --swing-up
   upright firmware run rigs/double-quanser-dbpen.toml --transitions
   upright firmware run rigs/single-quanser-ip02.toml --serve 127.0.0.1:7777 --duration 600")]
-pub(crate) struct Run {
+pub(crate) struct RunCommand {
     #[command(flatten)]
-    simulate: Simulate,
+    simulate: SimulateCommand,
     /// Where the image runs
-    #[arg(long, value_enum, default_value_t = Target::Qemu)]
-    target: Target,
+    #[arg(long, value_enum, default_value_t = TargetOption::Qemu)]
+    target: TargetOption,
     /// How the pins of the image in QEMU are connected: files of the emulator (fast; Unix only), or serial lines
     #[arg(long, value_enum, default_value_t = LinkName::Files)]
     link: LinkName,
@@ -60,7 +60,7 @@ enum LinkName {
 /// Duration of a served run with --swing-up (s).
 const SERVED_S: f64 = 600.0;
 
-impl Run {
+impl RunCommand {
     pub(crate) fn run(self) -> Result<(), Failure> {
         if let Some(address) = &self.serve {
             return self.serve(address);

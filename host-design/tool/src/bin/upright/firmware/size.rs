@@ -24,7 +24,7 @@ Examples:
   upright firmware size                                       builds it with src/gains.rs as it is
   upright firmware size rigs/single-quanser-ip02.toml --board nucleo-f446
   upright firmware size --elf target/image.elf --json | jq .stack.bytes")]
-pub(crate) struct Size {
+pub(crate) struct SizeCommand {
     /// Rig file (TOML) to design the table from [default: the table in src/gains.rs]
     rig: Option<PathBuf>,
     #[command(flatten)]
@@ -37,7 +37,7 @@ pub(crate) struct Size {
     json: bool,
 }
 
-impl Size {
+impl SizeCommand {
     pub(crate) fn run(self) -> Result<(), Failure> {
         let path = match self.elf {
             Some(path) => path,

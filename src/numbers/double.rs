@@ -1,6 +1,6 @@
 //! Sines and cosines in `f64`, within 1 ulp.
 
-use crate::table::Number;
+use crate::numbers::number::Number;
 
 // 2/π, and π/2 as a sum of three parts. The first two have 33 bits, so an integer below 2^20 times such a part is
 // exact (W. J. Cody and W. Waite, Software Manual for the Elementary Functions, 1980). The values and the minimax

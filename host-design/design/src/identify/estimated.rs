@@ -1,0 +1,74 @@
+//! What an identification finds.
+
+use super::parameters::Kind;
+use super::realise::Realised;
+use super::verdict::{ChannelFit, Refusal};
+use super::window_errors::WindowErrors;
+use super::wiring::WiringFound;
+
+/// An identified parameter, in the unit of its [`Kind`].
+#[derive(Debug, Clone, PartialEq)]
+pub struct Estimate {
+    /// Which parameter it is.
+    pub kind: Kind,
+    /// Value of the rig file, or the start value that is assumed if the file has none.
+    pub old: f64,
+    /// Identified value.
+    pub new: f64,
+    /// Standard deviation of the identified value.
+    pub deviation: f64,
+    /// Values from the first and the second half of the recordings; only without a drive.
+    pub halves: Option<[f64; 2]>,
+    /// Whether the log says little about it: the deviation exceeds half of the prior one.
+    pub held_by_prior: bool,
+}
+
+/// Result of an identification.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Identification {
+    /// Duration of the logs without their gaps (s).
+    pub seconds: f64,
+    /// Number of ticks that are missing in the logs.
+    pub lost_ticks: u64,
+    /// Largest angle of a link from hanging (rad).
+    pub largest_angle_rad: f64,
+    /// Result of the wiring check; none if the wiring was taken on trust.
+    pub wiring: Option<WiringFound>,
+    /// All parameters that are identified; none if the wiring is wrong.
+    pub estimates: Vec<Estimate>,
+    /// Time from one sample to the next (s).
+    pub sample_s: f64,
+    /// Correlations of the estimates, row by row.
+    pub correlations: Vec<f64>,
+    /// How well the model explains each channel.
+    pub channels: Vec<ChannelFit>,
+    /// Whether the drive is known, and with it the scale of masses and frictions.
+    pub is_driven: bool,
+    /// Errors of predictions of parts of the recordings, each with numbers from the other parts; only without a drive.
+    pub left_out: Vec<WindowErrors>,
+    /// Errors of predictions of other recordings.
+    pub predicted: Vec<WindowErrors>,
+    /// The numbers for the rig file; none if the wiring is wrong or the numbers are not physical.
+    pub realised: Option<Realised>,
+    /// Delay that the rig file states (ticks).
+    pub delay_ticks: u8,
+    /// Why no rig file may be written; none if it may.
+    pub refusal: Option<Refusal>,
+}
+
+impl Identification {
+    /// The estimate of a parameter, if it was identified.
+    pub fn estimate(&self, kind: Kind) -> Option<&Estimate> {
+        self.estimates.iter().find(|estimate| estimate.kind == kind)
+    }
+
+    /// The delay that the rig file should state (ticks), if that differs from the one it states.
+    pub fn other_delay(&self) -> Option<u8> {
+        let delay = self.estimate(Kind::Delay)?;
+        match self.delay_ticks {
+            0 if delay.new > 0.5 + 2.0 * delay.deviation => Some(1),
+            1 if delay.new < -0.5 - 2.0 * delay.deviation => Some(0),
+            _ => None,
+        }
+    }
+}

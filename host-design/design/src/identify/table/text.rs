@@ -1,0 +1,109 @@
+//! A table of numbers as text.
+
+use std::io::Read;
+use std::path::Path;
+
+use super::error::TableError;
+use super::reading::Reading;
+
+/// Largest file that is read (bytes).
+const MOST_BYTES: u64 = 1 << 30;
+
+/// The rows of a table of numbers. Lines that begin with `#` and empty lines are skipped.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Table {
+    /// Names of the columns.
+    pub(super) names: Vec<String>,
+    /// All numbers, row by row.
+    pub(super) values: Vec<f64>,
+    /// Line of each row.
+    pub(super) lines: Vec<usize>,
+}
+
+impl Table {
+    /// Reads a table from a file; `links` is the number of links of the rig.
+    ///
+    /// # Errors
+    /// [`TableError`], with line and column.
+    pub fn from_path(file: &Path, reading: &Reading, links: usize) -> Result<Self, TableError> {
+        let mut bytes = Vec::new();
+        std::fs::File::open(file)
+            .and_then(|open| open.take(MOST_BYTES).read_to_end(&mut bytes))
+            .map_err(|error| TableError::Unreadable(error.to_string()))?;
+        let text = String::from_utf8(bytes).map_err(|_| TableError::NotText)?;
+        Self::from_text(&text, reading, links)
+    }
+
+    /// Reads a table whose fields are separated by commas, semicolons, tabs or spaces.
+    ///
+    /// # Errors
+    /// [`TableError`], with line and column.
+    pub fn from_text(text: &str, reading: &Reading, links: usize) -> Result<Self, TableError> {
+        let text = text.trim_start_matches('\u{feff}');
+        let numbered = text.lines().enumerate().map(|(index, line)| (index + 1, line.trim()));
+        let mut lines = numbered.filter(|(_, line)| !line.is_empty() && !line.starts_with('#')).peekable();
+        let &(line, first) = lines.peek().ok_or(TableError::Empty)?;
+        let split = split_at(first);
+        let has_names = split(first).iter().any(|field| field.parse::<f64>().is_err());
+        if has_names {
+            lines.next();
+        }
+        let names = match (reading.columns.is_empty(), has_names) {
+            (false, _) => reading.columns.clone(),
+            (true, true) => split(first).into_iter().map(str::to_owned).collect(),
+            (true, false) => {
+                let (fields, example) = (split(first).len(), example(links));
+                return Err(TableError::NoHeader { line, fields, example });
+            }
+        };
+        let mut table = Self { names, values: Vec::new(), lines: Vec::new() };
+        for (line, text) in lines {
+            table.add(line, &split(text))?;
+        }
+        if table.lines.is_empty() { Err(TableError::Empty) } else { Ok(table) }
+    }
+
+    fn add(&mut self, line: usize, fields: &[&str]) -> Result<(), TableError> {
+        let (found, wanted) = (fields.len(), self.names.len());
+        if found != wanted {
+            return Err(TableError::Fields { line, found, wanted });
+        }
+        for (name, field) in self.names.iter().zip(fields) {
+            let number = field.parse().ok().filter(|number: &f64| number.is_finite());
+            // A column that is not used may hold anything.
+            let number = if name == "-" { Some(0.0) } else { number };
+            self.values.push(number.ok_or_else(|| TableError::Number {
+                line,
+                column: name.clone(),
+                text: (*field).to_owned(),
+            })?);
+        }
+        self.lines.push(line);
+        Ok(())
+    }
+
+    /// The numbers of a row.
+    pub(super) fn row(&self, row: usize) -> &[f64] {
+        &self.values[row * self.names.len()..][..self.names.len()]
+    }
+}
+
+/// Splits lines as `first` is split: at its commas, semicolons, tabs or spaces.
+fn split_at(first: &str) -> impl Fn(&str) -> Vec<&str> {
+    let separator = [',', ';', '\t'].into_iter().find(|&separator| first.contains(separator));
+    move |line| match separator {
+        Some(separator) => line.split(separator).map(bare).collect(),
+        None => line.split_whitespace().map(bare).collect(),
+    }
+}
+
+/// A field without the spaces and quotes around it.
+fn bare(field: &str) -> &str {
+    field.trim().trim_matches('"')
+}
+
+/// Names of the columns of a table for so many links.
+fn example(links: usize) -> String {
+    let angles = (1..=links).map(|link| format!(",angle_{link}_rad"));
+    format!("time_s{}", angles.collect::<String>())
+}

@@ -1,0 +1,138 @@
+//! Tests of whole ticks of the controller.
+
+use super::*;
+use crate::table::{Limits, ObserverGains, PerLaw, TABLE_FORMAT, Thresholds, columns};
+use nalgebra::{matrix, vector};
+
+/// A cart of 2 kg without friction, held for half a second.
+fn table() -> GainTable<2, 1> {
+    let law =
+        LawGains { k: columns([[1.0, 2.0]]), k_pending: 0.5, k_integral: 0.0, n: 1.0, setpoint_step: 10.0 };
+    let mut table = GainTable {
+        format: TABLE_FORMAT,
+        states: 2,
+        sensors: 1,
+        output: 0,
+        rig_hash: 7,
+        tick_s: 0.5,
+        delay_ticks: 1,
+        force_limit_n: 5.0,
+        laws: PerLaw { lqr: Some(law), pole_placement: None },
+        observer: Some(ObserverGains {
+            ad: matrix![1.0, 0.5; 0.0, 1.0],
+            bd: vector![0.0625, 0.25],
+            l: matrix![0.5; 1.0],
+            measured: [0],
+            step: vector![0.25],
+        }),
+        friction: None,
+        motor: None,
+        limits: Limits::none(),
+        thresholds: Thresholds::none(),
+        crc: 0,
+    };
+    table.crc = table.checksum();
+    table
+}
+
+fn controller(table: &GainTable<2, 1>) -> Controller<'_, 2, 1> {
+    let mut controller = Controller::new(table, [CounterWidth::Bits16]).unwrap();
+    controller.start_in_state(&vector![0.0, 0.0]);
+    controller
+}
+
+#[test]
+fn the_pending_force_is_fed_back() {
+    let table = table();
+    let mut controller = controller(&table);
+    let x = vector![-1.0, -1.0];
+    assert_eq!(controller.control_from_state(&x).applied_n, 3.0);
+    controller.predict();
+    assert_eq!(controller.control_from_state(&x).applied_n, 1.5);
+}
+
+#[test]
+fn the_pending_force_is_the_limited_one() {
+    let table = table();
+    let mut controller = controller(&table);
+    let command = controller.control_from_state(&vector![-100.0, 0.0]);
+    assert_eq!((command.requested_n, command.applied_n), (100.0, 5.0));
+    controller.predict();
+    assert_eq!(controller.control_from_state(&vector![0.0, 0.0]).requested_n, -2.5);
+}
+
+#[test]
+fn the_estimate_uses_the_force_that_is_applied_in_the_tick() {
+    let table = table();
+    let mut controller = controller(&table);
+    // 4 counts of 0.25 m: innovation 1, estimate (0.5, 1), request -(0.5 + 2).
+    let command = controller.control(&[4]);
+    assert_eq!(command.applied_n, -2.5);
+    controller.predict();
+    // With a delay of one tick, that force is still pending: the prediction is Ad x̂ alone.
+    assert_eq!(controller.estimate(), &vector![1.0, 1.0]);
+    controller.control(&[4]);
+    controller.predict();
+    assert_eq!(controller.estimate(), &vector![1.5 - 0.0625 * 2.5, 1.0 - 0.25 * 2.5]);
+}
+
+#[test]
+fn positions_give_the_same_bits_as_the_counts_of_them() {
+    let table = table();
+    let (mut by_counts, mut by_positions) = (controller(&table), controller(&table));
+    by_counts.start(&[3]).unwrap();
+    by_positions.start_at(&[3.0 * 0.25]).unwrap();
+    let bits = |command: MotorCommand| [command.requested_n, command.applied_n].map(f32::to_bits);
+    for tick in 0..50u32 {
+        let count = 3 + tick * tick % 7;
+        let wanted = bits(by_counts.control(&[count]));
+        assert_eq!(bits(by_positions.control_at(&[count as f32 * 0.25])), wanted, "{tick}");
+        assert_eq!(by_positions.estimate(), by_counts.estimate());
+        by_counts.predict();
+        by_positions.predict();
+    }
+    // Negative control: another position gives another force.
+    assert_ne!(bits(by_positions.control_at(&[0.26])), bits(by_counts.control(&[1])));
+}
+
+#[test]
+fn a_stopped_controller_gives_no_force() {
+    let table = table();
+    let mut controller = controller(&table);
+    controller.stop();
+    assert_eq!(controller.control(&[400]), Controller::<2, 1>::off());
+    assert_eq!(controller.control_from_state(&vector![9.0, 9.0]).drive, Drive::OFF);
+}
+
+#[test]
+fn an_invalid_request_changes_nothing() {
+    let table = table();
+    let mut controller = controller(&table);
+    controller.set_setpoint(0.25).unwrap();
+    assert_eq!(controller.set_setpoint(f32::NAN), Err(Rejected::Setpoint));
+    assert_eq!(controller.select(Law::Lqr), Err(Rejected::Running));
+    controller.stop();
+    assert_eq!(controller.select(Law::PolePlacement), Err(Rejected::NoSuchLaw));
+    assert_eq!((controller.setpoint(), controller.law()), (0.25, Law::Lqr));
+}
+
+#[test]
+fn a_table_that_does_not_fit_is_refused() {
+    let refused = |change: &dyn Fn(&mut GainTable<2, 1>), sealed: bool| {
+        let mut table = table();
+        change(&mut table);
+        if sealed {
+            table.crc = table.checksum();
+        }
+        Controller::new(&table, [CounterWidth::Bits16]).err()
+    };
+    assert_eq!(refused(&|_| (), true), None);
+    assert_eq!(refused(&|t| t.format += 1, true), Some(TableError::Format));
+    assert_eq!(refused(&|t| t.states = 3, true), Some(TableError::Dimensions));
+    assert_eq!(refused(&|t| t.sensors = 2, true), Some(TableError::Dimensions));
+    assert_eq!(refused(&|t| t.output = 2, true), Some(TableError::Dimensions));
+    assert_eq!(refused(&|t| t.delay_ticks = 2, true), Some(TableError::Delay));
+    assert_eq!(refused(&|t| t.force_limit_n = f32::NAN, true), Some(TableError::Value));
+    assert_eq!(refused(&|t| t.laws.lqr = None, true), Some(TableError::NoLaw));
+    assert_eq!(refused(&|t| t.force_limit_n = 6.0, false), Some(TableError::Crc));
+}
