@@ -1,5 +1,15 @@
 //! Planned motions and the equilibria between which they lead: what the search for a swing-up makes, and the gain table
 //! takes.
+//!
+//! ```
+//! use upright_design::motion::Transition;
+//!
+//! // From both links up to the upper one down.
+//! let transition = Transition::named("uu-ud", 2).ok_or("no such transition")?;
+//! assert_eq!(transition.name(2), "uu-ud");
+//! assert_eq!(Transition::named("dd-uu", 2), Some(Transition::Up));
+//! # Ok::<(), &str>(())
+//! ```
 
 mod planned;
 mod transition;

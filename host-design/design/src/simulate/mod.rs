@@ -1,4 +1,20 @@
 //! The closed loop on the host: the firmware's own controller against the nonlinear plant.
+//!
+//! ```
+//! use upright::table::Law;
+//! use upright_design::design::design;
+//! use upright_design::rig::Rig;
+//! use upright_design::simulate::{Scenario, simulate};
+//! use upright_design::table::{Gains, TableValues};
+//!
+//! let rig = Rig::from_path("../../rigs/single-quanser-ip02.toml".as_ref())?;
+//! let table = TableValues::of(&rig, &design(&rig)?, Gains::Sampled)?;
+//! let mut scenario = Scenario::at_rest(&rig, Law::Lqr);
+//! scenario.start[2] = 0.02;
+//! let (_, summary) = simulate(&rig, &table, &scenario)?;
+//! assert!(summary.survives());
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
 
 mod any_controller;
 mod bench;

@@ -25,6 +25,16 @@
 //!
 //! Everything random has a fixed seed, and every sum is taken in a fixed order, so the result does not depend on the
 //! machine or on its threads.
+//!
+//! ```
+//! use upright_design::rig::Rig;
+//! use upright_design::swing_up::{Stored, motions};
+//!
+//! let file = "../../rigs/single-quanser-ip02.toml".as_ref();
+//! let motions = motions(&Rig::from_path(file)?, &Stored::beside(file)?)?;
+//! assert!(motions.raise.duration_s() < 10.0);
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
 
 mod advice;
 mod check;

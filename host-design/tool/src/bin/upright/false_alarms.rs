@@ -147,7 +147,7 @@ mod tests {
         let text = text(&[one]);
         let words: Vec<&str> = text.lines().nth(1).unwrap_or_default().split_whitespace().collect();
         let wanted = [
-            "pole-placement",
+            "pole_placement",
             "123456789012",
             "1000000000.00",
             "0",
