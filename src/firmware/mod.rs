@@ -25,8 +25,6 @@
 mod balancing;
 mod commands;
 pub mod control_task;
-#[cfg(feature = "image")]
-pub mod hot_path;
 mod jog;
 mod posture;
 mod shake;
