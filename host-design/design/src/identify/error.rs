@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use super::table::TableError;
+use super::table::RecordingError;
 
 /// Why a log cannot be read.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -58,7 +58,7 @@ pub enum IdentifyError {
         /// Path of the table.
         file: PathBuf,
         /// Why it cannot be used.
-        source: TableError,
+        source: RecordingError,
     },
     /// The rig file has no chain with encoders.
     #[error(

@@ -25,7 +25,7 @@ const USUAL_DRAG: f64 = 0.005;
 const DRAG: f64 = 10.0;
 
 /// The result of a fit of free swings.
-pub(super) struct Found {
+pub(super) struct FreeFit {
     pub(super) p: Vec<f64>,
     /// Standard deviation of each parameter.
     deviations: Vec<f64>,
@@ -40,7 +40,7 @@ pub(super) struct Found {
 /// Number of fits: the whole, without each part, and each half.
 pub(super) const FITS: u64 = 3 + PARTS as u64;
 
-impl Found {
+impl FreeFit {
     /// Writes estimates, correlations and errors of predictions into `found`.
     pub(super) fn write(&self, rig: &Rig, model: &Model, priors: &[Prior], found: &mut Identification) {
         let (size, kinds) = (self.p.len(), model.layout.kinds());
@@ -92,7 +92,7 @@ pub(super) fn fit(
     record: &Record,
     priors: &[Prior],
     step: &dyn Fn(),
-) -> Result<Found, IdentifyError> {
+) -> Result<FreeFit, IdentifyError> {
     let start: Vec<f64> = priors.iter().map(|prior| prior.value).collect();
     let shoot = |model: &Model, record: &Record, from: &[f64]| {
         let shooting = Shooting { model, record, priors, free: true };
@@ -122,7 +122,7 @@ pub(super) fn fit(
         let half = 0.5 * (halves[0][i] - halves[1][i]).abs();
         statistical.hypot(jackknife(&parts)).max(half)
     };
-    Ok(Found { deviations: (0..size).map(deviation).collect(), inverse, halves, left_out, p: whole.p })
+    Ok(FreeFit { deviations: (0..size).map(deviation).collect(), inverse, halves, left_out, p: whole.p })
 }
 
 /// Standard deviation of an estimate, from its values without one part of the data each (B. Efron, C. Stein, "The
@@ -141,7 +141,7 @@ mod tests {
     use super::super::model::Input;
     use super::super::parameters::priors;
     use super::super::step::Step;
-    use super::super::table::Rows;
+    use super::super::table::RecordingRows;
     use super::*;
 
     /// 24 s of a clamped double pendulum that swings down from 100°, in counts, and its true parameters. Its lengths and
@@ -159,7 +159,7 @@ mod tests {
         let mut step = Step::new(&model, false);
         let mut state = vec![0.0, 1.4, 2.6, 0.0, 0.0, 0.0, 0.0];
         let counts: Vec<f64> = rig.sensors().iter().map(|sensor| sensor.step()).collect();
-        let mut rows = Rows { period_s: 0.002, y: Vec::new(), drive: vec![None; 12_000] };
+        let mut rows = RecordingRows { period_s: 0.002, y: Vec::new(), drive: vec![None; 12_000] };
         for _ in 0..rows.drive.len() {
             rows.y.extend((0..3).map(|channel| {
                 let value = model.measure(&p, &state, channel).value;

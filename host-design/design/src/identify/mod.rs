@@ -58,7 +58,7 @@ pub use parameters::Kind;
 pub use realise::{Realised, RealisedLink};
 pub use recorder::Recorder;
 pub use recordings::Recordings;
-pub use table::{AngleReference, AngleZero, Reading, Table, TableError};
+pub use table::{AngleReference, AngleZero, Reading, RecordingError, RecordingTable};
 pub use verdict::{ChannelFit, Predicted, Refusal};
 pub use window_errors::{ChannelError, WindowErrors};
 pub use wiring::{Wiring, WiringFound};

@@ -12,7 +12,7 @@ use super::error::IdentifyError;
 use super::log::{DriveScale, Log};
 use super::model::{Input, Model};
 use super::parameters::Layout;
-use super::table::Rows;
+use super::table::RecordingRows;
 use crate::rig::{Motor, Rig};
 
 /// Longest time from one sample to the next (s), which is also the integration step.
@@ -73,7 +73,7 @@ impl Record {
     }
 
     /// A record of measurements of other programs: the drive is a force if `is_force`.
-    pub(super) fn of_rows(rig: &Rig, pieces: Vec<Rows>, is_force: bool, is_clamped: bool) -> Self {
+    pub(super) fn of_rows(rig: &Rig, pieces: Vec<RecordingRows>, is_force: bool, is_clamped: bool) -> Self {
         let period_s = pieces.first().map_or(rig.tick.period_s, |rows| rows.period_s);
         let mut record = Self::empty(rig, period_s, Self::usual_stride(period_s));
         record.is_clamped = is_clamped;

@@ -8,7 +8,7 @@ use super::error::IdentifyError;
 use super::log::Log;
 use super::of_rig::is_of;
 use super::record::Record;
-use super::table::{Columns, Reading, Rows, Table, TableError};
+use super::table::{Reading, RecordingColumns, RecordingError, RecordingRows, RecordingTable};
 use crate::rig::Rig;
 
 /// Periods of the tables of one machine agree to this share.
@@ -20,7 +20,7 @@ pub enum Recordings {
     /// Logs of Upright.
     Logs(Vec<(PathBuf, Log)>),
     /// Tables of other programs, and how they are to be read.
-    Tables(Vec<(PathBuf, Table)>, Reading),
+    Tables(Vec<(PathBuf, RecordingTable)>, Reading),
 }
 
 /// The samples of recordings.
@@ -47,7 +47,7 @@ impl Recordings {
             };
             return Ok(Recordings::Logs(files.iter().map(read).collect::<Result<_, _>>()?));
         }
-        let read = |file: &PathBuf| match Table::from_path(file, reading, links) {
+        let read = |file: &PathBuf| match RecordingTable::from_path(file, reading, links) {
             Ok(table) => Ok((file.clone(), table)),
             Err(source) => Err(IdentifyError::Table { file: file.clone(), source }),
         };
@@ -83,17 +83,21 @@ fn is_log(file: &PathBuf) -> bool {
     read.is_err() || first == Log::MARK
 }
 
-fn of_tables(rig: &Rig, tables: &[(PathBuf, Table)], reading: &Reading) -> Result<Recorded, IdentifyError> {
-    let (mut rows, mut is_driven, mut is_force) = (Vec::<Rows>::new(), false, false);
+fn of_tables(
+    rig: &Rig,
+    tables: &[(PathBuf, RecordingTable)],
+    reading: &Reading,
+) -> Result<Recorded, IdentifyError> {
+    let (mut rows, mut is_driven, mut is_force) = (Vec::<RecordingRows>::new(), false, false);
     for (file, table) in tables {
-        let at_file = |source: TableError| IdentifyError::Table { file: file.clone(), source };
-        let columns = Columns::of(rig, reading, table).map_err(at_file)?;
+        let at_file = |source: RecordingError| IdentifyError::Table { file: file.clone(), source };
+        let columns = RecordingColumns::of(rig, reading, table).map_err(at_file)?;
         let pieces = columns.pieces(table).map_err(at_file)?;
         let period_s = pieces.first().map_or(0.0, |piece| piece.period_s);
         if let Some(first) = rows.first()
             && (period_s / first.period_s - 1.0).abs() > SAME_PERIOD
         {
-            return Err(at_file(TableError::Open {
+            return Err(at_file(RecordingError::Open {
                 what: format!(
                     "a row every {:.4} ms, the files before every {:.4} ms",
                     1e3 * period_s,

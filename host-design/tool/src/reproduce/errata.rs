@@ -55,9 +55,9 @@ fn counted(reading: impl Into<String>, rows: &[ComparedValue], of: &str) -> Evid
 }
 
 /// A rig file and its design.
-type Designed<'a> = (&'a Rig, &'a Certified);
+type DesignOfPaper<'a> = (&'a Rig, &'a Certified);
 
-fn weights(printed: Designed<'_>) -> Result<Erratum, ReproduceError> {
+fn weights(printed: DesignOfPaper<'_>) -> Result<Erratum, ReproduceError> {
     let mut evidence = Vec::new();
     let pattern: Vec<f64> = [10.0, 1.0].repeat(5);
     let q = published::Q_DIAGONAL;
@@ -107,7 +107,7 @@ fn cart_mass(exact: &Rig) -> Result<Erratum, ReproduceError> {
     })
 }
 
-fn far_poles(printed: Designed<'_>) -> Result<Erratum, ReproduceError> {
+fn far_poles(printed: DesignOfPaper<'_>) -> Result<Erratum, ReproduceError> {
     let mut evidence = Vec::new();
     let real = -4.0 / published::SETTLING_TIME_S;
     let imaginary = upright_design::design::dominant_pair::<f64>(
@@ -188,7 +188,7 @@ fn rate_for_position(exact: &Rig) -> Result<Erratum, ReproduceError> {
     })
 }
 
-fn rounded_matrices(exact: Designed<'_>, printed: Designed<'_>) -> Result<Erratum, ReproduceError> {
+fn rounded_matrices(exact: DesignOfPaper<'_>, printed: DesignOfPaper<'_>) -> Result<Erratum, ReproduceError> {
     let mut evidence = Vec::new();
     for (reading, known) in [("the printed, rounded matrices", printed), ("the exact model", exact)] {
         let lqr = lqr_of(known.0, known)?;
@@ -205,19 +205,19 @@ fn rounded_matrices(exact: Designed<'_>, printed: Designed<'_>) -> Result<Erratu
 }
 
 /// The LQR of `rig`.
-fn lqr_of(rig: &Rig, known: Designed<'_>) -> Result<Feedback<f64>, ReproduceError> {
+fn lqr_of(rig: &Rig, known: DesignOfPaper<'_>) -> Result<Feedback<f64>, ReproduceError> {
     let alone = Rig { pole_placement: None, kalman: None, ..rig.clone() };
     laws(rig, &alone, known)?.lqr.ok_or(ReproduceError::OneLaw(alone.name))
 }
 
 /// The pole placement of `rig`.
-fn placement_of(rig: &Rig, known: Designed<'_>) -> Result<Feedback<f64>, ReproduceError> {
+fn placement_of(rig: &Rig, known: DesignOfPaper<'_>) -> Result<Feedback<f64>, ReproduceError> {
     let alone = Rig { lqr: None, kalman: None, ..rig.clone() };
     laws(rig, &alone, known)?.pole_placement.ok_or(ReproduceError::OneLaw(alone.name))
 }
 
 /// The continuous gains of the known design, if it is that of `rig`; otherwise those of a rig with one law alone.
-fn laws(rig: &Rig, alone: &Rig, (known, designed): Designed<'_>) -> Result<Laws<f64>, ReproduceError> {
+fn laws(rig: &Rig, alone: &Rig, (known, designed): DesignOfPaper<'_>) -> Result<Laws<f64>, ReproduceError> {
     if rig == known {
         return Ok(designed.double.continuous.clone());
     }

@@ -10,9 +10,9 @@ pub(super) enum Column {
     /// Time (s).
     Time(f64),
     /// Position of the cart (m).
-    Cart(Scale),
+    Cart(ColumnScale),
     /// Angle of a link, from 0 (rad); whether the name says that it is the angle of a joint.
-    Angle { link: usize, scale: Scale, is_of_joint: bool },
+    Angle { link: usize, scale: ColumnScale, is_of_joint: bool },
     /// Force on the cart (N).
     Force,
     /// Voltage of the motor (V).
@@ -23,7 +23,7 @@ pub(super) enum Column {
 
 /// Factor to SI units.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) enum Scale {
+pub(super) enum ColumnScale {
     Factor(f64),
     /// Counts of the encoder.
     Counts,
@@ -95,21 +95,21 @@ fn time(unit: &str) -> Result<Column, String> {
     }
 }
 
-fn length(unit: &str) -> Result<Scale, String> {
+fn length(unit: &str) -> Result<ColumnScale, String> {
     match unit {
-        "m" => Ok(Scale::Factor(1.0)),
-        "cm" => Ok(Scale::Factor(1e-2)),
-        "mm" => Ok(Scale::Factor(1e-3)),
-        "counts" => Ok(Scale::Counts),
+        "m" => Ok(ColumnScale::Factor(1.0)),
+        "cm" => Ok(ColumnScale::Factor(1e-2)),
+        "mm" => Ok(ColumnScale::Factor(1e-3)),
+        "counts" => Ok(ColumnScale::Counts),
         _ => Err("its unit is open: call it x_m, x_cm, x_mm or x_counts".to_owned()),
     }
 }
 
-fn angle(unit: &str) -> Result<Scale, String> {
+fn angle(unit: &str) -> Result<ColumnScale, String> {
     match unit {
-        "rad" => Ok(Scale::Factor(1.0)),
-        "deg" | "degrees" => Ok(Scale::Factor(PI / 180.0)),
-        "counts" => Ok(Scale::Counts),
+        "rad" => Ok(ColumnScale::Factor(1.0)),
+        "deg" | "degrees" => Ok(ColumnScale::Factor(PI / 180.0)),
+        "counts" => Ok(ColumnScale::Counts),
         "" => Err("its unit is open: call it angle_1_rad, angle_1_deg or angle_1_counts".to_owned()),
         _ => Err("has no known meaning".to_owned()),
     }
@@ -122,11 +122,11 @@ mod tests {
     #[test]
     fn a_name_says_what_a_column_measures_or_is_refused() {
         let angle = |link, scale, is_of_joint| Ok(Column::Angle { link, scale, is_of_joint });
-        assert_eq!(Column::of("angle_2_rad"), angle(1, Scale::Factor(1.0), false));
-        assert_eq!(Column::of("Theta1 [deg]"), angle(0, Scale::Factor(PI / 180.0), false));
-        assert_eq!(Column::of("joint1_counts"), angle(0, Scale::Counts, true));
+        assert_eq!(Column::of("angle_2_rad"), angle(1, ColumnScale::Factor(1.0), false));
+        assert_eq!(Column::of("Theta1 [deg]"), angle(0, ColumnScale::Factor(PI / 180.0), false));
+        assert_eq!(Column::of("joint1_counts"), angle(0, ColumnScale::Counts, true));
         assert_eq!(Column::of("t_ms"), Ok(Column::Time(1e-3)));
-        assert_eq!(Column::of("x_mm"), Ok(Column::Cart(Scale::Factor(1e-3))));
+        assert_eq!(Column::of("x_mm"), Ok(Column::Cart(ColumnScale::Factor(1e-3))));
         assert_eq!(Column::of("u_v"), Ok(Column::Voltage));
         for name in ["theta1", "time", "x", "angle_0_rad", "angle_1_rad_per_s", "current_a"] {
             assert!(Column::of(name).is_err(), "{name}");

@@ -2,10 +2,10 @@
 
 use core::f64::consts::{PI, TAU};
 
-use super::column::{Column, Scale};
-use super::error::TableError;
+use super::column::{Column, ColumnScale};
+use super::error::RecordingError;
 use super::reading::{AngleReference, AngleZero, Reading};
-use super::text::Table;
+use super::text::RecordingTable;
 use crate::rig::Rig;
 
 /// A pause of more than this many periods begins a new piece.
@@ -22,7 +22,7 @@ type Scaled = (usize, f64);
 
 /// The columns of a table by their meaning.
 #[derive(Debug, Clone)]
-pub(in crate::identify) struct Columns {
+pub(in crate::identify) struct RecordingColumns {
     time: Option<Scaled>,
     period_s: Option<f64>,
     cart: Option<Scaled>,
@@ -39,7 +39,7 @@ pub(in crate::identify) struct Columns {
 
 /// Consecutive rows at equal intervals.
 #[derive(Debug, Clone, PartialEq)]
-pub(in crate::identify) struct Rows {
+pub(in crate::identify) struct RecordingRows {
     /// Time from one row to the next (s).
     pub(in crate::identify) period_s: f64,
     /// Deviations from hanging (m, rad), one row of cart and joints per sample; 0 for a clamped cart.
@@ -48,12 +48,16 @@ pub(in crate::identify) struct Rows {
     pub(in crate::identify) drive: Vec<Option<f64>>,
 }
 
-impl Columns {
+impl RecordingColumns {
     /// The meaning of the columns of `table`, a recording of `rig`.
     ///
     /// # Errors
-    /// [`TableError`] if a column is unknown, missing or ambiguous, or does not suit the rig.
-    pub(in crate::identify) fn of(rig: &Rig, reading: &Reading, table: &Table) -> Result<Self, TableError> {
+    /// [`RecordingError`] if a column is unknown, missing or ambiguous, or does not suit the rig.
+    pub(in crate::identify) fn of(
+        rig: &Rig,
+        reading: &Reading,
+        table: &RecordingTable,
+    ) -> Result<Self, RecordingError> {
         let sensors = rig.sensors();
         let links = sensors.len() - 1;
         let meanings = meanings(table, links)?;
@@ -72,9 +76,9 @@ impl Columns {
         };
         for (index, meaning) in meanings.iter().enumerate() {
             let sign = if reading.reversed.contains(&table.names[index]) { -1.0 } else { 1.0 };
-            let scaled = |scale: Scale, step: f64| match scale {
-                Scale::Factor(factor) => (index, sign * factor),
-                Scale::Counts => (index, sign * step),
+            let scaled = |scale: ColumnScale, step: f64| match scale {
+                ColumnScale::Factor(factor) => (index, sign * factor),
+                ColumnScale::Counts => (index, sign * step),
             };
             match *meaning {
                 Column::Ignored => (),
@@ -102,8 +106,8 @@ impl Columns {
         self.drive.is_some()
     }
 
-    fn check(&self, reading: &Reading, table: &Table) -> Result<(), TableError> {
-        let open = |what: String, remedy: &str| Err(TableError::Open { what, remedy: remedy.to_owned() });
+    fn check(&self, reading: &Reading, table: &RecordingTable) -> Result<(), RecordingError> {
+        let open = |what: String, remedy: &str| Err(RecordingError::Open { what, remedy: remedy.to_owned() });
         if let Some(unknown) = reading.reversed.iter().find(|name| !table.names.contains(name)) {
             return open(format!("--reversed names {unknown}, which is no column"), "correct the name");
         }
@@ -137,13 +141,16 @@ impl Columns {
     /// The measurements of a table, in pieces without a gap.
     ///
     /// # Errors
-    /// [`TableError`] if times do not increase or the values contradict the reading.
-    pub(in crate::identify) fn pieces(&self, table: &Table) -> Result<Vec<Rows>, TableError> {
+    /// [`RecordingError`] if times do not increase or the values contradict the reading.
+    pub(in crate::identify) fn pieces(
+        &self,
+        table: &RecordingTable,
+    ) -> Result<Vec<RecordingRows>, RecordingError> {
         let times = self.times(table)?;
         let period_s =
             self.period_s.unwrap_or_else(|| median(times.windows(2).map(|pair| pair[1] - pair[0])));
         if !(period_s > 0.0 && period_s <= LONGEST_S) {
-            return Err(TableError::Open {
+            return Err(RecordingError::Open {
                 what: format!("{:.1} ms lie between two rows", 1e3 * period_s),
                 remedy: format!("record every {:.0} ms or more often", 1e3 * LONGEST_S),
             });
@@ -161,14 +168,14 @@ impl Columns {
     }
 
     /// Time of each row (s).
-    fn times(&self, table: &Table) -> Result<Vec<f64>, TableError> {
+    fn times(&self, table: &RecordingTable) -> Result<Vec<f64>, RecordingError> {
         let rows = 0..table.lines.len();
         let Some((index, factor)) = self.time else {
             return Ok(rows.map(|row| row as f64 * self.period_s.unwrap_or_default()).collect());
         };
         let times: Vec<f64> = rows.map(|row| factor * table.row(row)[index]).collect();
         match times.windows(2).position(|pair| pair[1] <= pair[0]) {
-            Some(row) => Err(TableError::Contradicts {
+            Some(row) => Err(RecordingError::Contradicts {
                 line: table.lines[row + 1],
                 column: table.names[index].clone(),
                 what: "the time does not increase".to_owned(),
@@ -179,7 +186,7 @@ impl Columns {
     }
 
     /// Deviations from hanging of all rows, cart and joints, continuous across full turns.
-    fn deviations(&self, table: &Table) -> Result<Vec<f64>, TableError> {
+    fn deviations(&self, table: &RecordingTable) -> Result<Vec<f64>, RecordingError> {
         let channels = self.angles.len() + 1;
         let mut y = Vec::with_capacity(table.lines.len() * channels);
         for row in 0..table.lines.len() {
@@ -202,9 +209,9 @@ impl Columns {
     }
 
     /// What the values say against the reading.
-    fn contradiction(&self, table: &Table, y: &[f64]) -> Option<TableError> {
+    fn contradiction(&self, table: &RecordingTable, y: &[f64]) -> Option<RecordingError> {
         let channels = self.angles.len() + 1;
-        let at_first_row = |index: usize, what: String, remedy: &str| TableError::Contradicts {
+        let at_first_row = |index: usize, what: String, remedy: &str| RecordingError::Contradicts {
             line: table.lines[0],
             column: table.names[index].clone(),
             what,
@@ -239,12 +246,12 @@ impl Columns {
     /// The rows of `range`, at equal intervals.
     fn piece(
         &self,
-        table: &Table,
+        table: &RecordingTable,
         times: &[f64],
         y: &[f64],
         range: core::ops::Range<usize>,
         period_s: f64,
-    ) -> Rows {
+    ) -> RecordingRows {
         let (channels, start) = (self.angles.len() + 1, times[range.start]);
         let drive = |row: usize| self.drive.map(|(index, factor)| factor * table.row(row)[index]);
         let is_even = range.clone().all(|row| {
@@ -252,9 +259,9 @@ impl Columns {
         });
         if is_even {
             let y = y[range.start * channels..range.end * channels].to_vec();
-            return Rows { period_s, y, drive: range.map(drive).collect() };
+            return RecordingRows { period_s, y, drive: range.map(drive).collect() };
         }
-        let mut even = Rows { period_s, y: Vec::new(), drive: Vec::new() };
+        let mut even = RecordingRows { period_s, y: Vec::new(), drive: Vec::new() };
         let (mut row, mut time) = (range.start, start);
         while row + 1 < range.end {
             let share = (time - times[row]) / (times[row + 1] - times[row]);
@@ -271,11 +278,11 @@ impl Columns {
 }
 
 /// The meaning of each column; angles only of links that the rig has, and nothing twice.
-fn meanings(table: &Table, links: usize) -> Result<Vec<Column>, TableError> {
+fn meanings(table: &RecordingTable, links: usize) -> Result<Vec<Column>, RecordingError> {
     let refused = |index: usize, problem: String| {
         let names = table.names.iter().enumerate();
         let columns: Vec<&str> = names.map(|(other, name)| if other == index { "-" } else { name }).collect();
-        TableError::Column {
+        RecordingError::Column {
             column: index + 1,
             name: table.names[index].clone(),
             problem,
@@ -300,8 +307,8 @@ fn meanings(table: &Table, links: usize) -> Result<Vec<Column>, TableError> {
     Ok(found)
 }
 
-fn without_motor(table: &Table, index: usize) -> TableError {
-    TableError::Contradicts {
+fn without_motor(table: &RecordingTable, index: usize) -> RecordingError {
+    RecordingError::Contradicts {
         line: table.lines[0],
         column: table.names[index].clone(),
         what: "the rig has no motor".to_owned(),
@@ -310,20 +317,24 @@ fn without_motor(table: &Table, index: usize) -> TableError {
 }
 
 /// Names of the columns with angles, and whether all are named as angles of joints.
-fn angles(table: &Table, meanings: &[Column]) -> (String, bool) {
+fn angles(table: &RecordingTable, meanings: &[Column]) -> (String, bool) {
     let named = table.names.iter().zip(meanings).filter(|(_, column)| matches!(column, Column::Angle { .. }));
     let is_of_joint = |column: &Column| !matches!(column, Column::Angle { is_of_joint: false, .. });
     (named.map(|(name, _)| name.as_str()).collect::<Vec<_>>().join(", "), meanings.iter().all(is_of_joint))
 }
 
 /// What the angles are measured against: as `reading` says, or as their names say.
-fn reference(reading: &Reading, table: &Table, meanings: &[Column]) -> Result<AngleReference, TableError> {
+fn reference(
+    reading: &Reading,
+    table: &RecordingTable,
+    meanings: &[Column],
+) -> Result<AngleReference, RecordingError> {
     let (names, are_of_joints) = angles(table, meanings);
     let is_one = meanings.iter().filter(|column| matches!(column, Column::Angle { .. })).count() < 2;
     match reading.angles {
         Some(reference) => Ok(reference),
         None if is_one || are_of_joints => Ok(AngleReference::Relative),
-        None => Err(TableError::Open {
+        None => Err(RecordingError::Open {
             what: format!("{names} may be measured against the vertical or against the link below"),
             remedy: "say --angles absolute or --angles relative".to_owned(),
         }),
@@ -331,12 +342,12 @@ fn reference(reading: &Reading, table: &Table, meanings: &[Column]) -> Result<An
 }
 
 /// Where the angles are 0: as `reading` says; the angles of joints of our own tables are 0 when the links hang.
-fn zero(reading: &Reading, table: &Table, meanings: &[Column]) -> Result<AngleZero, TableError> {
+fn zero(reading: &Reading, table: &RecordingTable, meanings: &[Column]) -> Result<AngleZero, RecordingError> {
     let (names, are_of_joints) = angles(table, meanings);
     match reading.zero {
         Some(zero) => Ok(zero),
         None if are_of_joints => Ok(AngleZero::Hanging),
-        None => Err(TableError::Open {
+        None => Err(RecordingError::Open {
             what: format!("{names} may be 0 with the links upright or hanging"),
             remedy: "say --zero upright or --zero hanging".to_owned(),
         }),
@@ -370,15 +381,15 @@ mod tests {
         }
     }
 
-    fn pieces(text: &str, reading: &Reading) -> Result<Vec<Rows>, TableError> {
-        let table = Table::from_text(text, reading, 2)?;
-        Columns::of(&rig(), reading, &table)?.pieces(&table)
+    fn pieces(text: &str, reading: &Reading) -> Result<Vec<RecordingRows>, RecordingError> {
+        let table = RecordingTable::from_text(text, reading, 2)?;
+        RecordingColumns::of(&rig(), reading, &table)?.pieces(&table)
     }
 
     #[test]
     fn every_convention_gives_the_same_deviations_from_hanging() {
         let wanted = pieces(&format!("{HEADER}0,3.0,3.2\n0.002,3.1,3.1\n"), &reading()).unwrap();
-        let near = |rows: &[Rows]| {
+        let near = |rows: &[RecordingRows]| {
             let angles = [0.0, 3.0 - PI, 0.2, 0.0, 3.1 - PI, 0.0];
             assert!(
                 rows[0].y.iter().zip(angles).all(|(found, wanted)| (found - wanted).abs() < 1e-9),
@@ -419,21 +430,15 @@ mod tests {
         refused(&all, &Reading { zero: None, ..reading() }, &["--zero"]);
         refused(&all, &Reading { is_clamped: false, ..reading() }, &["--clamped"]);
         refused(&all, &Reading { period_s: Some(0.002), ..reading() }, &["--period"]);
-        refused(
-            &all,
-            &Reading { zero: Some(AngleZero::Hanging), ..reading() },
-            &["line 3", "angle_1_rad", "--zero upright"],
-        );
+        let hanging = Reading { zero: Some(AngleZero::Hanging), ..reading() };
+        refused(&all, &hanging, &["line 3", "angle_1_rad", "--zero upright"]);
         refused(&all, &Reading { reversed: vec!["angle_3".to_owned()], ..reading() }, &["angle_3"]);
         refused(row, &reading(), &["line 1", "--columns time_s,angle_1_rad,angle_2_rad"]);
         refused(&format!("{HEADER}0,3,x\n"), &reading(), &["line 3", "angle_2_rad", "\"x\""]);
         refused(&format!("{HEADER}0,3\n"), &reading(), &["line 3", "2 fields instead of 3"]);
         refused(&format!("{HEADER}0.002,3,3\n0,3,3\n"), &reading(), &["line 4", "does not increase"]);
-        refused(
-            &all.replace("angle_2_rad", "current_a"),
-            &reading(),
-            &["column 3", "current_a", "time_s,angle_1_rad,-"],
-        );
+        let current = all.replace("angle_2_rad", "current_a");
+        refused(&current, &reading(), &["column 3", "current_a", "time_s,angle_1_rad,-"]);
         refused(&all.replace("angle_2_rad", "angle_3_rad"), &reading(), &["column 3", "only 2 links"]);
         refused(&all.replace("angle_2_rad", "theta2"), &reading(), &["column 3", "unit"]);
         let cart = "time_s,angle_1_rad,angle_2_rad,x_mm\n0,3,3,0\n0.002,3,3,5\n";

@@ -2,7 +2,7 @@
 
 /// Why a table of measurements cannot be used. Lines and columns are counted from 1.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
-pub enum TableError {
+pub enum RecordingError {
     /// The file cannot be opened or read; the text is that of the operating system.
     #[error("cannot be read ({0}); check path and permissions")]
     Unreadable(String),

@@ -1,8 +1,8 @@
 //! Recordings of other programs: tables of measurements as text.
 //!
-//! - [`Table`]: the columns of a file and its rows of numbers.
+//! - [`RecordingTable`]: the columns of a file and its rows of numbers.
 //! - [`Reading`]: what the columns mean, where their names leave it open.
-//! - [`Columns`]: the columns by their meaning, checked against the rig.
+//! - [`RecordingColumns`]: the columns by their meaning, checked against the rig.
 
 mod column;
 mod columns;
@@ -10,7 +10,7 @@ mod error;
 mod reading;
 mod text;
 
-pub(super) use columns::{Columns, Rows};
-pub use error::TableError;
+pub(super) use columns::{RecordingColumns, RecordingRows};
+pub use error::RecordingError;
 pub use reading::{AngleReference, AngleZero, Reading};
-pub use text::Table;
+pub use text::RecordingTable;

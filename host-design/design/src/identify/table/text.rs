@@ -3,7 +3,7 @@
 use std::io::Read;
 use std::path::Path;
 
-use super::error::TableError;
+use super::error::RecordingError;
 use super::reading::Reading;
 
 /// Largest file that is read (bytes).
@@ -11,7 +11,7 @@ const MOST_BYTES: u64 = 1 << 30;
 
 /// The rows of a table of numbers. Lines that begin with `#` and empty lines are skipped.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Table {
+pub struct RecordingTable {
     /// Names of the columns.
     pub(super) names: Vec<String>,
     /// All numbers, row by row.
@@ -20,29 +20,29 @@ pub struct Table {
     pub(super) lines: Vec<usize>,
 }
 
-impl Table {
+impl RecordingTable {
     /// Reads a table from a file; `links` is the number of links of the rig.
     ///
     /// # Errors
-    /// [`TableError`], with line and column.
-    pub fn from_path(file: &Path, reading: &Reading, links: usize) -> Result<Self, TableError> {
+    /// [`RecordingError`], with line and column.
+    pub fn from_path(file: &Path, reading: &Reading, links: usize) -> Result<Self, RecordingError> {
         let mut bytes = Vec::new();
         std::fs::File::open(file)
             .and_then(|open| open.take(MOST_BYTES).read_to_end(&mut bytes))
-            .map_err(|error| TableError::Unreadable(error.to_string()))?;
-        let text = String::from_utf8(bytes).map_err(|_| TableError::NotText)?;
+            .map_err(|error| RecordingError::Unreadable(error.to_string()))?;
+        let text = String::from_utf8(bytes).map_err(|_| RecordingError::NotText)?;
         Self::from_text(&text, reading, links)
     }
 
     /// Reads a table whose fields are separated by commas, semicolons, tabs or spaces.
     ///
     /// # Errors
-    /// [`TableError`], with line and column.
-    pub fn from_text(text: &str, reading: &Reading, links: usize) -> Result<Self, TableError> {
+    /// [`RecordingError`], with line and column.
+    pub fn from_text(text: &str, reading: &Reading, links: usize) -> Result<Self, RecordingError> {
         let text = text.trim_start_matches('\u{feff}');
         let numbered = text.lines().enumerate().map(|(index, line)| (index + 1, line.trim()));
         let mut lines = numbered.filter(|(_, line)| !line.is_empty() && !line.starts_with('#')).peekable();
-        let &(line, first) = lines.peek().ok_or(TableError::Empty)?;
+        let &(line, first) = lines.peek().ok_or(RecordingError::Empty)?;
         let split = split_at(first);
         let has_names = split(first).iter().any(|field| field.parse::<f64>().is_err());
         if has_names {
@@ -53,26 +53,26 @@ impl Table {
             (true, true) => split(first).into_iter().map(str::to_owned).collect(),
             (true, false) => {
                 let (fields, example) = (split(first).len(), example(links));
-                return Err(TableError::NoHeader { line, fields, example });
+                return Err(RecordingError::NoHeader { line, fields, example });
             }
         };
         let mut table = Self { names, values: Vec::new(), lines: Vec::new() };
         for (line, text) in lines {
             table.add(line, &split(text))?;
         }
-        if table.lines.is_empty() { Err(TableError::Empty) } else { Ok(table) }
+        if table.lines.is_empty() { Err(RecordingError::Empty) } else { Ok(table) }
     }
 
-    fn add(&mut self, line: usize, fields: &[&str]) -> Result<(), TableError> {
+    fn add(&mut self, line: usize, fields: &[&str]) -> Result<(), RecordingError> {
         let (found, wanted) = (fields.len(), self.names.len());
         if found != wanted {
-            return Err(TableError::Fields { line, found, wanted });
+            return Err(RecordingError::Fields { line, found, wanted });
         }
         for (name, field) in self.names.iter().zip(fields) {
             let number = field.parse().ok().filter(|number: &f64| number.is_finite());
             // A column that is not used may hold anything.
             let number = if name == "-" { Some(0.0) } else { number };
-            self.values.push(number.ok_or_else(|| TableError::Number {
+            self.values.push(number.ok_or_else(|| RecordingError::Number {
                 line,
                 column: name.clone(),
                 text: (*field).to_owned(),
