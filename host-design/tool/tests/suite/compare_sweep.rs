@@ -68,9 +68,9 @@ fn what_the_file_could_not_say_is_refused_as_in_a_file() {
         ("nam", 1.0, ["nam: unknown", "did you mean `name`?"]),
         ("tick.delay_ticks", 0.5, ["tick.delay_ticks", "0 or 1"]),
         ("pole_placement.far_poles", 1.0, ["pole_placement.far_poles: found 1", "a list"]),
-        ("link[5].mass_kg", 1.0, ["link[5].mass_kg: missing", "a line of its own"]),
-        ("lqr.state_weights[11]", 1.0, ["lqr.state_weights[11]: missing", "a line of its own"]),
-        ("link.mass_kg", 1.0, ["link.mass_kg: missing", "a line of its own"]),
+        ("link[5].mass_kg", 1.0, ["link[5].mass_kg: missing", "then it can be changed"]),
+        ("lqr.state_weights[11]", 1.0, ["lqr.state_weights[11]: missing", "then it can be changed"]),
+        ("link.mass_kg", 1.0, ["link.mass_kg: missing", "then it can be changed"]),
     ] {
         let message = message(key, value);
         assert!(parts.iter().all(|part| message.contains(part)), "{key}: {message}");
