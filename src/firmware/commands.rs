@@ -30,10 +30,8 @@ impl<const NX: usize, const NY: usize, S: SwingUp<NX, NY>> Firmware<'_, NX, NY, 
     pub(super) fn answer(&mut self, command: &Command) -> Answer {
         let done = |result: Result<(), _>| result.map_or_else(Answer::NotNow, |()| Answer::Done);
         let taken = |result: Result<(), _>| result.map_or_else(Answer::Rejected, |()| Answer::Done);
-        match command.request {
-            Request::Arm | Request::Goto(_) => self.restart_lockout(),
-            Request::Shake(_) => self.restart_lockout(),
-            _ => {}
+        if let Request::Arm | Request::Goto(_) | Request::Shake(_) = command.request {
+            self.restart_lockout();
         }
         match command.request {
             Request::KeepAlive => Answer::Done,

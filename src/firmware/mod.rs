@@ -179,8 +179,7 @@ impl<'t, const NX: usize, const NY: usize, S: SwingUp<NX, NY>> Firmware<'t, NX, 
     /// cleared, and [`Info::tick_s`](crate::protocol::message::Info::tick_s) is that of the timer.
     pub(crate) fn compare_tick(&mut self, timer_tick_s: f32) {
         let difference = f32::abs(timer_tick_s - self.table.tick_s);
-        // Also if it is NaN.
-        if !(difference <= TICK_TOLERANCE * self.table.tick_s) {
+        if difference.is_nan() || difference > TICK_TOLERANCE * self.table.tick_s {
             (self.timer_tick_s, self.is_usable) = (timer_tick_s, false);
             self.trip(Fault::Table, None);
         }
@@ -297,8 +296,8 @@ impl<'t, const NX: usize, const NY: usize, S: SwingUp<NX, NY>> Firmware<'t, NX, 
             | State::Balancing
             | State::Holding
             | State::Lowering
+            | State::Identifying
             | State::Fault => {}
-            State::Identifying => {}
         }
     }
 

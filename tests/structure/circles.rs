@@ -118,7 +118,7 @@ fn rings<'a>(uses: &Uses<'a>) -> BTreeSet<Vec<&'a str>> {
         let back = |other: &&&str| all.get(**other).is_some_and(|reached| reached.contains(thing));
         all[thing].iter().filter(back).copied().collect::<Vec<_>>()
     };
-    uses.keys().map(|thing| ring(thing)).filter(|ring| ring.len() > 1).collect()
+    uses.keys().map(ring).filter(|ring| ring.len() > 1).collect()
 }
 
 /// Each circle of files, and each circle of files and folders in a folder, as one line.

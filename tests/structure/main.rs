@@ -114,7 +114,7 @@ fn is_known(finding: &str, known: &[&str]) -> bool {
             same == kind && of.split(", ").all(|one| all.split(", ").any(|other| other == one))
         })
     };
-    known.iter().any(|line| holds(line))
+    known.iter().any(holds)
 }
 
 #[test]

@@ -5,6 +5,7 @@ use crate::chip::Chip;
 
 /// Typical thresholds of the detector's levels (V): the falling supply that it reports, and the rising one that
 /// releases it again (datasheet DS8626, embedded reset and power control block).
+#[expect(clippy::approx_constant, reason = "3.14 V is not pi")]
 const THRESHOLDS_V: [(f32, f32); 8] = [
     (2.04, 2.14),
     (2.19, 2.30),

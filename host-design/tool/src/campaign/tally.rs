@@ -23,7 +23,7 @@ pub enum CampaignError {
         /// Name of its kind.
         kind: &'static str,
         /// The cause.
-        source: RunError,
+        source: Box<RunError>,
     },
     /// The outcomes of other processes cannot be merged.
     #[error(transparent)]
@@ -114,7 +114,11 @@ pub fn one(
         During::Jog => trial.in_jog(setup.rig),
         During::Shaking(_) => trial.in_shaking(setup.rig),
     };
-    judge(setup, &trial).map_err(|source| CampaignError::Trial { number, kind: trial.kind.name(), source })
+    judge(setup, &trial).map_err(|source| CampaignError::Trial {
+        number,
+        kind: trial.kind.name(),
+        source: Box::new(source),
+    })
 }
 
 /// Runs `runs` trials of `kinds`, in turn, which are the part `part` of `study`; `done` is called after each.

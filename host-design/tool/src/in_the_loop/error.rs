@@ -19,6 +19,13 @@ pub enum RunError {
     Shaken(#[from] IdentifyError),
 }
 
+impl RunError {
+    /// Whether there is no QEMU on this computer.
+    pub fn lacks_emulator(&self) -> bool {
+        matches!(self, Self::Emulator(EmulatorError::Missing | EmulatorError::NeedsUnix))
+    }
+}
+
 impl From<ShakeError> for RunError {
     fn from(error: ShakeError) -> Self {
         match error {

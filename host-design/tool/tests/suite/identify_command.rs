@@ -101,12 +101,12 @@ fn a_log_that_is_not_there_ends_with_status_2() {
 
 #[test]
 fn an_empty_log_ends_with_status_2() {
-    refused(&path_of(SINGLE), b"", 2, "holds no tick");
+    refused(&path_of(SINGLE), b"", 2, "holds no row of numbers");
 }
 
 #[test]
 fn a_foreign_file_ends_with_status_2() {
-    refused(&path_of(SINGLE), b"tick,time_s\n0,0\n", 2, "not a log of Upright");
+    refused(&path_of(SINGLE), b"tick,time_s\n0,0\n", 2, "column 1 (\"tick\"): has no known meaning");
 }
 
 #[test]

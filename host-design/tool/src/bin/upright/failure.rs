@@ -16,7 +16,7 @@ use upright_tool::campaign::CampaignError;
 use upright_tool::commission::Stop;
 use upright_tool::figure::FigureError;
 use upright_tool::image::{ElfError, ImageError, SizeError};
-use upright_tool::in_the_loop::{EmulatorError, RelayError, RunError};
+use upright_tool::in_the_loop::{RelayError, RunError};
 use upright_tool::monitor::OpenError;
 use upright_tool::report::ReportError;
 use upright_tool::reproduce::ReproduceError;
@@ -131,15 +131,11 @@ impl Failure {
             Failure::SwingUp { source, .. } if source.is_without_solution() => 3,
             Failure::NotIdentified(_) | Failure::MustNotRun(_) => 3,
             Failure::Identify(error) if error.is_without_solution() => 3,
-            Failure::NoProgram(_)
-            | Failure::Image(ImageError::NoCompiler)
-            | Failure::InTheLoop(RunError::Emulator(EmulatorError::Missing | EmulatorError::NeedsUnix)) => 4,
+            Failure::NoProgram(_) | Failure::Image(ImageError::NoCompiler) => 4,
+            Failure::InTheLoop(error) if error.lacks_emulator() => 4,
             Failure::InTheLoop(RunError::Harness(error)) if is_bad_scenario(error) => 2,
             Failure::InTheLoop(_) => 1,
-            Failure::Campaign(CampaignError::Trial {
-                source: RunError::Emulator(EmulatorError::Missing | EmulatorError::NeedsUnix),
-                ..
-            }) => 4,
+            Failure::Campaign(CampaignError::Trial { source, .. }) if source.lacks_emulator() => 4,
             Failure::Campaign(CampaignError::Trial { .. }) => 1,
             Failure::SwingUp { .. }
             | Failure::Campaign(CampaignError::Study(_))
