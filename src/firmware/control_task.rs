@@ -2,7 +2,7 @@
 
 use heapless::spsc::{Consumer, Producer};
 
-use crate::board::Board;
+use crate::board::{Board, Inputs, Output};
 use crate::firmware::Firmware;
 use crate::protocol::message::{Command, Message};
 use crate::protocol::queue;
@@ -41,15 +41,25 @@ impl<'q, 't, B: Board<NY>, const NX: usize, const NY: usize, S: SwingUp<NX, NY>>
 
     /// One tick.
     pub fn tick(&mut self) {
+        self.tick_with(Firmware::act, Firmware::predict);
+    }
+
+    /// One tick, with the caller's own compiled versions of [`Firmware::act`] and [`Firmware::predict`].
+    #[inline(always)]
+    pub fn tick_with(
+        &mut self,
+        act: impl for<'f> FnOnce(&'f mut Firmware<'t, NX, NY, S>, &Inputs<NY>) -> &'f Output,
+        predict: impl FnOnce(&mut Firmware<'t, NX, NY, S>),
+    ) {
         let begin = self.board.cycles();
         let inputs = self.board.inputs();
         self.firmware.accept(&inputs);
-        let output = self.firmware.act(&inputs);
+        let output = act(&mut self.firmware, &inputs);
         self.board.drive(output);
         let log = self.firmware.log_tick();
         let command = queue::take(&mut self.commands);
         let telemetry = self.firmware.report(self.cycles);
-        self.firmware.predict();
+        predict(&mut self.firmware);
         let reply = self.firmware.complete(command.as_ref());
         // The reply goes first: it is sent only once, telemetry again and again.
         if let Some(reply) = reply {

@@ -25,6 +25,8 @@
 mod balancing;
 mod commands;
 pub mod control_task;
+#[cfg(feature = "image")]
+pub mod hot_path;
 mod jog;
 mod posture;
 mod shake;
@@ -223,7 +225,7 @@ impl<'t, const NX: usize, const NY: usize, S: SwingUp<NX, NY>> Firmware<'t, NX, 
 
     /// The first part of [`control`](Self::control): checks the contacts that turn the motor off, and does all of a
     /// tick in states without the control law.
-    pub(crate) fn accept(&mut self, inputs: &Inputs<NY>) {
+    pub fn accept(&mut self, inputs: &Inputs<NY>) {
         (self.raw_counts, self.contacts, self.supply_v) =
             (inputs.raw_counts, inputs.contacts, inputs.supply_v);
         self.statistics.overruns =
@@ -247,7 +249,7 @@ impl<'t, const NX: usize, const NY: usize, S: SwingUp<NX, NY>> Firmware<'t, NX, 
 
     /// The second part of [`control`](Self::control): the output, from the control law or a planned motion while one
     /// of them commands the motor.
-    pub(crate) fn act(&mut self, inputs: &Inputs<NY>) -> &Output {
+    pub fn act(&mut self, inputs: &Inputs<NY>) -> &Output {
         self.output = match self.supervisor.state() {
             State::Balancing => self.balance(inputs),
             State::Jogging => self.output,
@@ -314,7 +316,7 @@ impl<'t, const NX: usize, const NY: usize, S: SwingUp<NX, NY>> Firmware<'t, NX, 
     }
 
     /// The first part of [`finish`](Self::finish): telemetry, if it is due.
-    pub(crate) fn report(&mut self, cycles: u32) -> Option<Telemetry<NX, NY>> {
+    pub fn report(&mut self, cycles: u32) -> Option<Telemetry<NX, NY>> {
         self.cycles = cycles;
         self.statistics.ticks = self.statistics.ticks.wrapping_add(1);
         self.worst_cycles = self.worst_cycles.max(cycles);
@@ -324,7 +326,7 @@ impl<'t, const NX: usize, const NY: usize, S: SwingUp<NX, NY>> Firmware<'t, NX, 
     }
 
     /// The second part of [`finish`](Self::finish): the prediction, while the controller commands the motor.
-    pub(crate) fn predict(&mut self) {
+    pub fn predict(&mut self) {
         match self.supervisor.state() {
             State::Raising | State::Holding | State::Lowering if S::IS_POSSIBLE => self.predict_motion(),
             state if state.controls() => self.predict_balancing(),
@@ -333,7 +335,7 @@ impl<'t, const NX: usize, const NY: usize, S: SwingUp<NX, NY>> Firmware<'t, NX, 
     }
 
     /// The last part of [`finish`](Self::finish): checks of link and table, and the reply.
-    pub(crate) fn complete(&mut self, command: Option<&Command>) -> Option<Reply> {
+    pub fn complete(&mut self, command: Option<&Command>) -> Option<Reply> {
         if self.supervisor.state().controls()
             && let Some(fault) =
                 self.debounce.check_link(&self.table.limits, command.is_some(), self.setpoint_commanded)

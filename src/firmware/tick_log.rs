@@ -11,7 +11,7 @@ impl<const NX: usize, const NY: usize, S: SwingUp<NX, NY>> Firmware<'_, NX, NY, 
     }
 
     /// Logs this tick, once its output is known; returns the message that the previous tick completed, if it did.
-    pub(crate) fn log_tick(&mut self) -> Option<TickLog<NY>> {
+    pub fn log_tick(&mut self) -> Option<TickLog<NY>> {
         let log = self.log.as_mut()?;
         let mut complete = None;
         if log.ticks.is_empty() || log.is_complete(&self.contacts) {

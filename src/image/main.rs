@@ -35,8 +35,8 @@ const CYCLES_PER_TICK: u32 = {
 mod app {
     use heapless::spsc::Queue;
     use upright::board::Board;
-    use upright::firmware::Firmware;
     use upright::firmware::control_task::{COMMANDS, ControlTask, MESSAGES};
+    use upright::firmware::{Firmware, hot_path};
     use upright::gains::{SENSORS, STATES, SWING_UP, SwingUp, TABLE};
     use upright::protocol::message::{Command, Message};
     use upright::protocol::serial_link::SerialLink;
@@ -75,7 +75,7 @@ mod app {
 
     #[task(binds = SysTick, priority = 3, local = [control])]
     fn tick(cx: tick::Context) {
-        cx.local.control.tick();
+        cx.local.control.tick_with(hot_path::act, hot_path::predict);
     }
 
     #[idle(local = [link, line])]

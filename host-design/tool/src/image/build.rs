@@ -144,8 +144,12 @@ fn compile(kind: Kind, gains: Option<&Path>, name: &str) -> Result<PathBuf, Imag
     };
     cargo
         .current_dir(&root)
-        .args(["build", "--quiet", "--package", "upright", "--bin", "upright-image"])
+        .args(["rustc", "--quiet", "--package", "upright", "--bin", "upright-image"])
         .args(["--profile", PROFILE, "--target", TARGET, "--features", &features]);
+    if kind.board().is_some() {
+        // Only the image's own crate is optimised for size: the library holds the part of a tick that has to be fast.
+        cargo.args(["--", "-C", "opt-level=s"]);
+    }
     let image = images()?.join(format!("{name}.elf"));
     if kept::is_current(&image, &cargo, &version) {
         return Ok(image);
