@@ -25,7 +25,7 @@ const MOST_TICKS: u32 = 32;
 /// Runs what `bytes` encode.
 ///
 /// # Panics
-/// If the firmware panics or an [invariant](invariants) does not hold.
+/// If the firmware panics or an invariant does not hold.
 pub fn check(bytes: &[u8]) {
     static STARTS: OnceLock<[Start; 6]> = OnceLock::new();
     let Some((&first, bytes)) = bytes.split_first() else { return };
