@@ -1,6 +1,6 @@
 //! The format of gain tables.
 
-/// Version of the layout of [`GainTable`]; a table with another version is refused.
+/// Version of the layout of [`GainTable`](super::GainTable); a table with another version is refused.
 pub const TABLE_FORMAT: u32 = crate::table_format!(8);
 
 /// The format of a generated gain table, if it is [`TABLE_FORMAT`]. Any other one is an error at compile time that says
