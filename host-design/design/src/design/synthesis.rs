@@ -113,13 +113,17 @@ impl<R: Real> Design<R> {
 
         let mut sampled = Laws::none();
         if let Some(weights) = &rig.lqr {
-            let cost = sampled_cost(&a, &b, &lqr_cost(weights), &period);
+            let cost = match lqr_cost(weights) {
+                of_a_tick if weights.cost_is_sum => of_a_tick,
+                over_time => sampled_cost(&a, &b, &over_time, &period),
+            };
             let k = lqr(Task::SampledLqr, &ad, &bd, &cost, residuals)?;
             sampled.lqr = Some(sampled_feedback(k, &ad, &bd, output, late));
             if let Some(integral) = &rig.integral {
                 let (a_z, b_z) = with_integral(&ad, &bd, output, &period, &R::one());
                 // z is constant during a tick: its cost over the tick is T w z².
-                let weight = R::from_f64(integral.position_weight) * &period;
+                let duration = if weights.cost_is_sum { &R::one() } else { &period };
+                let weight = R::from_f64(integral.position_weight) * duration;
                 let cost = with_integral_weight(&cost, &weight);
                 let k = lqr(Task::SampledIntegral, &a_z, &b_z, &cost, residuals)?;
                 let feedback = sampled_feedback_over(k, &ad, &bd, &a_z, &b_z, output, late);
@@ -340,8 +344,12 @@ fn precompensation<R: Real>(m: &Matrix<R>, b: &Matrix<R>, output: usize) -> Opti
 }
 
 fn lqr_cost<R: Real>(weights: &Lqr) -> Cost<R> {
-    let q: Vec<R> = weights.state_weights.iter().map(|&w| R::from_f64(w)).collect();
-    Cost::new(Matrix::from_diagonal(&q), Matrix::from_diagonal(&[R::from_f64(weights.force_weight)]))
+    let (q, s) = weights.weights();
+    Cost {
+        q: Matrix::from_f64_rows(&q),
+        r: Matrix::from_diagonal(&[R::from_f64(weights.force_weight)]),
+        s: Matrix::from_fn(s.len(), 1, |i, _| R::from_f64(s[i])),
+    }
 }
 
 /// The continuous-time poles that the rig file asks for (1/s).

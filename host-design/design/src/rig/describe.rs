@@ -241,11 +241,27 @@ impl Page {
         self.rows(&REALITY, &reality.parameters);
     }
 
+    fn lqr(&mut self, lqr: &Lqr) {
+        self.heading("lqr");
+        match &lqr.mixed_weights[..] {
+            [] => self.numbers("state weights", &lqr.state_weights, ""),
+            _ => lqr.weight_rows().iter().for_each(|row| self.numbers("state weights", row, "")),
+        }
+        if !lqr.cross_weights.is_empty() {
+            self.numbers("cross weights", &lqr.cross_weights, "");
+        }
+        self.value("force weight", lqr.force_weight, "", "");
+        if lqr.angles_are_absolute {
+            self.line("angles", "absolute", "", "");
+        }
+        if lqr.cost_is_sum {
+            self.line("cost", "sum", "", "(over the ticks)");
+        }
+    }
+
     fn design(&mut self, rig: &Rig) {
-        if let Some(Lqr { state_weights, force_weight }) = &rig.lqr {
-            self.heading("lqr");
-            self.numbers("state weights", state_weights, "");
-            self.value("force weight", *force_weight, "", "");
+        if let Some(lqr) = &rig.lqr {
+            self.lqr(lqr);
         }
         match &rig.pole_placement {
             None => {}

@@ -59,6 +59,14 @@ pub enum RigErrorKind {
         /// Offset of the first bad byte, from 0.
         offset: usize,
     },
+    /// The text is in a format of other programs.
+    #[error(
+        "this is {format}, accepted: TOML; copy one of the files in rigs/ and type lengths, masses and inertias into it"
+    )]
+    OtherFormat {
+        /// Name of the format.
+        format: &'static str,
+    },
     /// The text is not TOML.
     #[error("not TOML: {message}; a line is `[table]`, `key = value` or `# comment`")]
     NotToml {

@@ -38,6 +38,9 @@ impl<'a> Source<'a> {
                 let key = self.text.get(span.clone()).map(excerpt);
                 return self.error(span.start, key, RigErrorKind::Duplicate);
             }
+            if let Some(format) = other_format(self.text) {
+                return self.error(0, None, RigErrorKind::OtherFormat { format });
+            }
             let message = error.message().lines().collect::<Vec<_>>().join(", ");
             self.error(span.start, self.key_before(span.start), RigErrorKind::NotToml { message })
         })
@@ -49,6 +52,16 @@ impl<'a> Source<'a> {
         let key = key.trim();
         let is_bare = |c: char| c.is_ascii_alphanumeric() || "_-.".contains(c);
         (!key.is_empty() && key.chars().all(is_bare)).then(|| excerpt(key))
+    }
+}
+
+/// The format of a text that other programs describe machines in.
+fn other_format(text: &str) -> Option<&'static str> {
+    let formats = [("<robot", "URDF"), ("<sdf", "SDF"), ("<mujoco", "MJCF")];
+    match text.trim_start_matches('\u{feff}').trim_start().chars().next()? {
+        '<' => Some(formats.iter().find(|(tag, _)| text.contains(tag)).map_or("XML", |&(_, format)| format)),
+        '{' => Some("JSON"),
+        _ => None,
     }
 }
 
@@ -154,6 +167,14 @@ impl<'a> Node<'a> {
             Found::Value(Value::String(text)) => Ok(text.value()),
             _ => Err(self.wrong_type(accepts, &format!("give {meaning}"))),
         }
+    }
+
+    /// The index of the string among those accepted.
+    pub(super) fn one_of(&self, accepted: [&str; 2], meaning: &str) -> Result<usize, RigError> {
+        let accepts = accepted.map(|word| format!("\"{word}\"")).join(" or ");
+        let text = self.text(&accepts, meaning)?;
+        let index = accepted.iter().position(|&word| word == text);
+        index.ok_or_else(|| self.out_of_range(&accepts, &format!("give {meaning}")))
     }
 
     /// Whether the value is a list of values.

@@ -28,7 +28,9 @@ pub(super) fn rig(source: &Source<'_>) -> Result<Rig, RigError> {
         robust: given(&robust::ROBUST)
             .map(|node| robust::robust(&node, &plant, tick.period_s))
             .transpose()?,
-        lqr: given(&lqr::LQR).map(|node| lqr::lqr(&node, states)).transpose()?,
+        lqr: given(&lqr::LQR)
+            .map(|node| lqr::lqr(&node, states, matches!(plant, PlantDescription::Chain(_))))
+            .transpose()?,
         pole_placement: given(&pole_placement::POLE_PLACEMENT)
             .map(|node| pole_placement::pole_placement(&node, states))
             .transpose()?,

@@ -67,7 +67,7 @@ fn weighted(own: &Lqr) -> Vec<Candidate> {
             _ => format!("angle weights × {angles}, force_weight × {force}"),
         };
         let force_weight = rounded(force * own.force_weight, DIGITS);
-        Candidate { name, numbers: LawNumbers::Weights(Lqr { state_weights, force_weight }) }
+        Candidate { name, numbers: LawNumbers::Weights(Lqr { state_weights, force_weight, ..own.clone() }) }
     };
     pairs.map(candidate).collect()
 }

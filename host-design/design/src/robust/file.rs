@@ -28,7 +28,14 @@ pub fn rewritten(
     for chosen in &choice.laws {
         match &chosen.candidate.numbers {
             LawNumbers::Weights(weights) => {
-                text.set("lqr.state_weights", &list(&weights.state_weights))?;
+                let written = match &weights.mixed_weights[..] {
+                    [] => list(&weights.state_weights),
+                    _ => format!(
+                        "[{}]",
+                        weights.weight_rows().iter().map(|row| list(row)).collect::<Vec<_>>().join(", ")
+                    ),
+                };
+                text.set("lqr.state_weights", &written)?;
                 text.set("lqr.force_weight", &significant(weights.force_weight, DIGITS))?;
             }
             LawNumbers::Poles(PolePlacement::Response { far_poles, .. }) => {

@@ -78,7 +78,7 @@ impl<'a> Setting<'a> {
         let rules = rig.swing_up.clone().unwrap_or_default();
         let rounding = |(sensor, step): (&Sensor, &f64)| (sensor.state, step * step / 12.0);
         let noise = noise(chain, kalman, &rules, sensors.iter().zip(&steps).map(rounding).collect());
-        let weights = Matrix::from_diagonal(&lqr.state_weights);
+        let weights = Matrix::from_f64_rows(&lqr.weights().0);
         let (states, force_weight) = (rig.states(), lqr.force_weight);
         let at_rest = |at: Equilibrium| -> Result<AtRest, SwingUpError> {
             let state = rest(at, states);

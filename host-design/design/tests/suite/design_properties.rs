@@ -27,7 +27,7 @@ fn any_rig(links: core::ops::RangeInclusive<usize>) -> impl Strategy<Value = Rig
                 .collect();
             Rig {
                 tick: Tick { period_s, delay_ticks: 0 },
-                lqr: Some(Lqr { state_weights: weights[..states].to_vec(), force_weight }),
+                lqr: Some(Lqr { state_weights: weights[..states].to_vec(), force_weight, ..Lqr::default() }),
                 pole_placement: Some(PolePlacement::Response {
                     overshoot_percent,
                     settling_time_s,

@@ -12,6 +12,7 @@ mod plant_linearisation;
 mod plant_motion;
 mod plant_rigs;
 mod plant_sines;
+mod public_machines;
 mod reality_friction;
 mod reality_loop;
 mod rig_errors;

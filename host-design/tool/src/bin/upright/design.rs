@@ -10,7 +10,7 @@ use upright_design::rig::Rig;
 use upright_design::simulate::{Scenario, simulate};
 use upright_design::swing_up::{Stored, SwingUpError};
 use upright_design::table::{Gains, TableValues, gains_source, write_atomically};
-use upright_tool::project::checkout;
+use upright_tool::project::gain_table;
 
 use crate::failure::Failure;
 use crate::progress::with_spinner;
@@ -36,7 +36,7 @@ Examples:
 pub(crate) struct DesignCommand {
     /// Rig file (TOML)
     rig: PathBuf,
-    /// Write the table here [default: src/gains.rs of the checkout]
+    /// Write the table here [default: src/gains.rs of the crate in this folder, or of the checkout around it]
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
     /// Write nothing; fail if the table file differs from what would be written
@@ -99,7 +99,8 @@ impl DesignCommand {
             return Err(Failure::SwingUp { rig: name(), source });
         }
         let source = gains_source(&rig, &table);
-        let path = self.out.map_or_else(default_table, Ok)?;
+        let path =
+            self.out.map_or_else(gain_table, Ok).map_err(|error| Failure::BadArgument(error.to_string()))?;
         if self.check {
             return check(&path, &source);
         }
@@ -159,14 +160,6 @@ fn refuse_failing_table(rig: &Rig, reports: &[LawReport]) -> Result<(), Failure>
         }
     }
     Ok(())
-}
-
-/// `src/gains.rs` of the checkout.
-fn default_table() -> Result<PathBuf, Failure> {
-    let checkout = checkout().map_err(|error| {
-        Failure::BadArgument(format!("{error}; or give the file for the gain table with --out FILE"))
-    })?;
-    Ok(checkout.join("src").join("gains.rs"))
 }
 
 /// Compares line by line: a checkout on Windows may have changed the line endings.
