@@ -2,10 +2,8 @@
 
 use core::f64::consts::PI;
 
-use upright::table::Law;
-
 use super::number::number;
-use crate::figure::{Axis, Curve, Figure, Panel};
+use crate::figure::{Curve, Figure, FigureAxis, Panel};
 use upright_design::design::Certified;
 use upright_design::rig::Rig;
 use upright_design::table::TableValues;
@@ -32,14 +30,14 @@ pub(super) fn figures(
     rig: &Rig,
     certified: &Certified,
     table: &TableValues,
-    laws: &[(Law, &LinearReport)],
+    reports: &[&LinearReport],
 ) -> [Vec<Figure>; 2] {
     let (mut bodes, mut nyquists) = (Vec::new(), Vec::new());
-    for &(law, report) in laws {
-        let model = LoopModel::<f64>::as_it_runs(certified, table, law);
+    for &report in reports {
+        let model = LoopModel::<f64>::as_it_runs(certified, table, report.law);
         let (Some(margins), Some(model)) = (&report.margins, model) else { continue };
         let points = sweep(&model, report, rig.tick.period_s);
-        let title = |what: &str| format!("{}: {what}, {}", rig.name, law.title());
+        let title = |what: &str| format!("{}: {what}, {}", rig.name, report.law.title());
         bodes.push(bode(&points, margins, title("Bode plot")));
         nyquists.push(nyquist(&points, margins, title("Nyquist plot")));
     }
@@ -100,9 +98,9 @@ fn bode(points: &[Point], margins: &Margins, title: String) -> Figure {
     let curve =
         |value: &dyn Fn(&Point) -> f64| points.iter().map(|p| [p.omega, value(p)]).collect::<Vec<_>>();
     let ends = [points.first(), points.last()].map(|point| point.map_or(1.0, |point| point.omega));
-    let frequency = || Axis::log("frequency (rad/s)").range(ends[0], ends[1]);
+    let frequency = || FigureAxis::log("frequency (rad/s)").range(ends[0], ends[1]);
     let level = |name: &str, at: f64| Curve::limit(name, vec![[ends[0], at], [ends[1], at]]);
-    let mut gain = Panel::new(frequency(), Axis::log("|L|"))
+    let mut gain = Panel::new(frequency(), FigureAxis::log("|L|"))
         .high(230)
         .with(level("|L| = 1", 1.0))
         .with(Curve::line("|L|", 0, curve(&Point::gain)));
@@ -112,7 +110,8 @@ fn bode(points: &[Point], margins: &Margins, title: String) -> Figure {
         .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), p| (low.min(p.phase), high.max(p.phase)));
     let criticals = ((low + 180.0) / 360.0).floor() as i32..=((high + 180.0) / 360.0).ceil() as i32;
     let mut phase =
-        Panel::new(frequency(), Axis::linear("phase of L (°)").range(low - 20.0, high + 20.0)).high(220);
+        Panel::new(frequency(), FigureAxis::linear("phase of L (°)").range(low - 20.0, high + 20.0))
+            .high(220);
     for turn in criticals {
         phase = phase.with(level("", 360.0 * f64::from(turn) - 180.0));
     }
@@ -134,14 +133,15 @@ fn bode(points: &[Point], margins: &Margins, title: String) -> Figure {
 fn nyquist(points: &[Point], margins: &Margins, title: String) -> Figure {
     let line = |sign: f64| points.iter().map(|point| [point.l[0], sign * point.l[1]]).collect::<Vec<_>>();
     let most = margins.lowest_gain.max(0.2).recip().clamp(1.0, 5.0) + 0.6;
-    let mut panel = Panel::new(Axis::linear("Re L").range(-most, 1.2), Axis::linear("Im L").range(-1.6, 1.6))
-        .high(430)
-        .equal()
-        .unit_circle()
-        .with(around_critical(margins))
-        .with(Curve::line("L, ω > 0", 0, line(1.0)))
-        .with(Curve::line("ω < 0", 1, line(-1.0)))
-        .with(Curve::markers("−1", 0, vec![[-1.0, 0.0]]));
+    let mut panel =
+        Panel::new(FigureAxis::linear("Re L").range(-most, 1.2), FigureAxis::linear("Im L").range(-1.6, 1.6))
+            .high(430)
+            .equal()
+            .unit_circle()
+            .with(around_critical(margins))
+            .with(Curve::line("L, ω > 0", 0, line(1.0)))
+            .with(Curve::line("ω < 0", 1, line(-1.0)))
+            .with(Curve::markers("−1", 0, vec![[-1.0, 0.0]]));
     for (number, (name, factor)) in gain_margins(margins).into_iter().enumerate() {
         panel = panel.with(Curve::markers(name, number + 1, vec![[-1.0 / factor, 0.0]]));
     }

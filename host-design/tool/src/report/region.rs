@@ -2,7 +2,7 @@
 
 use upright::table::Law;
 
-use crate::figure::{Axis as FigureAxis, Figure, HeatMap, Panel};
+use crate::figure::{Figure, FigureAxis, HeatMap, Panel};
 use upright_design::rig::Rig;
 use upright_design::table::TableValues;
 use upright_design::verify::{Axis, Horizon, Map, Unverifiable, attraction_map};

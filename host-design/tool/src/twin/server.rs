@@ -17,7 +17,7 @@ use super::property::Properties;
 use super::simulated::{RunEnd, SimulatedMachine};
 use crate::campaign::{Defect, kinds};
 use crate::in_the_loop::{EmulatorError, Place, RunError};
-use crate::monitor::{Monitor, SerialLine};
+use crate::monitor::{MachineLine, Monitor};
 
 /// Most connections at a time, including those that have not been let in yet.
 const MAX_CONNECTIONS: usize = 32;
@@ -133,7 +133,7 @@ impl Server {
         self,
         rig: &Rig,
         table: &TableValues,
-        line: SerialLine,
+        line: MachineLine,
         name: &str,
         goes_on: &dyn Fn() -> bool,
     ) -> Result<(), TwinError> {

@@ -15,7 +15,7 @@ use upright_tool::commission::{
     Simulated,
 };
 use upright_tool::in_the_loop::Link;
-use upright_tool::monitor::SerialLine;
+use upright_tool::monitor::MachineLine;
 
 use crate::failure::Failure;
 use crate::firmware::lines_of_stdin;
@@ -113,7 +113,7 @@ impl CommissionCommand {
         for signal in [SIGINT, SIGTERM] {
             signal_hook::flag::register(signal, Arc::clone(&stop))?;
         }
-        let mut machine = AtPort::new(SerialLine::open(port)?, lines_of_stdin(), stop, self.show());
+        let mut machine = AtPort::new(MachineLine::open(port)?, lines_of_stdin(), stop, self.show());
         let designed = Commissioning::first(plan, &mut machine, journal)?;
         self.write(&designed)?;
         let new = self.write.as_deref().unwrap_or(&self.rig).display();

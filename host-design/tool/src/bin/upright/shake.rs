@@ -13,7 +13,7 @@ use upright_design::rig::Rig;
 use upright_design::table::{Gains, write_atomically};
 use upright_tool::in_the_loop::Link;
 use upright_tool::in_the_loop::run_shaken;
-use upright_tool::monitor::{SerialLine, now};
+use upright_tool::monitor::{MachineLine, now};
 
 use crate::failure::Failure;
 use crate::progress::with_spinner;
@@ -101,7 +101,7 @@ impl ShakeCommand {
         for signal in [SIGINT, SIGTERM] {
             signal_hook::flag::register(signal, Arc::clone(&stop))?;
         }
-        let mut line = SerialLine::open(port)?;
+        let mut line = MachineLine::open(port)?;
         let mut shaking = OverLine::new(rig, &table, seconds, self.seed, now())?;
         let failed = |error: LineError| Failure::CheckFailed(format!("{port}: {error}"));
         let ended = with_spinner("shaking; Ctrl-C turns the motor off", || {
@@ -124,7 +124,7 @@ impl ShakeCommand {
 }
 
 /// Sends pending bytes, and receives.
-fn exchange(line: &mut SerialLine, shaking: &mut OverLine) -> Result<Result<(), LineError>, std::io::Error> {
+fn exchange(line: &mut MachineLine, shaking: &mut OverLine) -> Result<Result<(), LineError>, std::io::Error> {
     let mut buffer = [0; 4096];
     let bytes = line.exchange(&shaking.take_outgoing(), &mut buffer)?;
     Ok(shaking.receive(bytes, now()))

@@ -12,7 +12,7 @@ use upright_design::rig::Rig;
 use upright_design::simulate::{Scenario, Sensing};
 use upright_design::table::TableValues;
 use upright_tool::in_the_loop::{Link, Place};
-use upright_tool::monitor::SerialLine;
+use upright_tool::monitor::MachineLine;
 use upright_tool::twin::{Server, SimulatedMachine};
 
 use crate::failure::Failure;
@@ -90,7 +90,7 @@ pub(crate) fn show(
     address: SocketAddr,
     goes_on: &dyn Fn() -> bool,
 ) -> Result<(), Failure> {
-    let line = SerialLine::open(port)?;
+    let line = MachineLine::open(port)?;
     Ok(listening(address)?.connect(rig, table, line, port, goes_on)?)
 }
 
