@@ -17,10 +17,10 @@
 //! | [`project`] | finds the checkout that images are built from |
 //!
 //! ```
-//! use upright_tool::figure::{Curve, Figure, FigureAxis, Panel};
+//! use upright_tool::figure::{Curve, Figure, Axis, Panel};
 //!
 //! let points = (0..100).map(|i| 0.1 * f64::from(i)).map(|t| [t, (-t).exp()]).collect();
-//! let panel = Panel::new(FigureAxis::linear("time (s)"), FigureAxis::linear("angle (°)"));
+//! let panel = Panel::new(Axis::linear("time (s)"), Axis::linear("angle (°)"));
 //! let svg = Figure::new("decay").with(panel.with(Curve::line("θ1", 0, points))).svg()?;
 //! assert!(svg.contains("time (s)"));
 //! # Ok::<(), Box<dyn std::error::Error>>(())

@@ -3,7 +3,7 @@
 use super::candidate::ComparedRig;
 use super::row::{ComparedRow, Fate, LawFigures};
 use super::sweep::Sweep;
-use crate::figure::{Curve, Figure, FigureAxis, Panel};
+use crate::figure::{Axis, Curve, Figure, Panel};
 use upright_design::rig::Rig;
 
 /// Reads one figure of a row.
@@ -40,11 +40,7 @@ fn over_key(rows: &[ComparedRow], sweep: &Sweep) -> Figure {
         .fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], value| [low.min(value), high.max(value)]);
     let pad = if sweep.log { 0.0 } else { 0.02 * (ends[1] - ends[0]) };
     let x_axis = || {
-        let axis = if sweep.log {
-            FigureAxis::log(sweep.key.as_str())
-        } else {
-            FigureAxis::linear(sweep.key.as_str())
-        };
+        let axis = if sweep.log { Axis::log(sweep.key.as_str()) } else { Axis::linear(sweep.key.as_str()) };
         axis.range(ends[0] - pad, ends[1] + pad)
     };
     let groups = groups(rows);
@@ -64,7 +60,7 @@ fn over_key(rows: &[ComparedRow], sweep: &Sweep) -> Figure {
     ];
     for (index, (label, value)) in panels.into_iter().enumerate() {
         let of_run = index < 4;
-        let mut panel = Panel::new(x_axis(), FigureAxis::linear(label)).high(165);
+        let mut panel = Panel::new(x_axis(), Axis::linear(label)).high(165);
         let mut lost: Vec<[f64; 2]> = Vec::new();
         for (number, (name, group)) in groups.iter().enumerate() {
             let points: Vec<[f64; 2]> = group
@@ -93,13 +89,13 @@ fn over_key(rows: &[ComparedRow], sweep: &Sweep) -> Figure {
 }
 
 fn over_time(rows: &[ComparedRow], candidates: &[ComparedRig]) -> Figure {
-    let time = || FigureAxis::linear("time (s)");
+    let time = || Axis::linear("time (s)");
     let is_chain = |rig: &Rig| rig.chain().is_some();
     let all_chains = candidates.iter().all(|candidate| is_chain(&candidate.rig));
     let label = if all_chains { "position (m)" } else { "position (m), or output" };
-    let mut position = Panel::new(time(), FigureAxis::linear(label));
-    let mut angle = Panel::new(time(), FigureAxis::linear("largest angle (°)"));
-    let mut force = Panel::new(time(), FigureAxis::linear("force (N)"));
+    let mut position = Panel::new(time(), Axis::linear(label));
+    let mut angle = Panel::new(time(), Axis::linear("largest angle (°)"));
+    let mut force = Panel::new(time(), Axis::linear("force (N)"));
     for (number, (name, group)) in groups(rows).into_iter().enumerate() {
         let Some(trace) = group.first().and_then(|row| row.trace.as_ref()) else { continue };
         let Some(candidate) = candidates.iter().find(|candidate| candidate.label == group[0].rig) else {

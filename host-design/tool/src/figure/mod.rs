@@ -26,7 +26,7 @@ pub(crate) use theme::{
 pub use draw::{Drawing, PlotArea};
 pub use front::front_figure;
 pub use heat::HeatMap;
-pub use panel::{Curve, Figure, FigureAxis, FigureError, Panel, Style};
+pub use panel::{Axis, Curve, Figure, FigureError, Panel, Style};
 pub(crate) use run::run_figure;
 pub use run::run_svg;
 pub use stroboscope::stroboscope_svg;

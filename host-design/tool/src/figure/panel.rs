@@ -40,9 +40,9 @@ pub struct Figure {
 #[derive(Debug, Clone, PartialEq)]
 pub struct Panel {
     /// Horizontal axis.
-    pub x: FigureAxis,
+    pub x: Axis,
     /// Vertical axis.
-    pub y: FigureAxis,
+    pub y: Axis,
     /// Height with labels and legend (px).
     pub height: u32,
     /// Whether both axes have the same scale.
@@ -55,7 +55,7 @@ pub struct Panel {
 
 /// An axis of a panel.
 #[derive(Debug, Clone, PartialEq)]
-pub struct FigureAxis {
+pub struct Axis {
     /// Quantity and unit, as in `time (s)`.
     pub label: String,
     /// Whether the axis is logarithmic instead of linear.
@@ -131,7 +131,7 @@ impl Figure {
 
 impl Panel {
     /// A panel without curves, 230 px high.
-    pub fn new(x: FigureAxis, y: FigureAxis) -> Self {
+    pub fn new(x: Axis, y: Axis) -> Self {
         Self { x, y, height: 230, equal: false, heat: None, curves: Vec::new() }
     }
 
@@ -159,7 +159,7 @@ impl Panel {
     }
 }
 
-impl FigureAxis {
+impl Axis {
     /// A linear axis, fitted to the curves.
     pub fn linear(label: impl Into<String>) -> Self {
         Self { label: label.into(), log: false, range: None }

@@ -4,7 +4,7 @@ use upright_design::number::significant;
 use upright_design::rig::{Chain, PlantDescription, Rig};
 use upright_design::simulate::{Sample, Trace};
 
-use super::{Curve, Figure, FigureAxis, FigureError, Panel};
+use super::{Axis, Curve, Figure, FigureError, Panel};
 
 /// Position, angles, rates and force of a run over time, one below the other, as an SVG document.
 ///
@@ -36,7 +36,7 @@ struct DrawnRun<'a> {
 
 impl DrawnRun<'_> {
     fn panel(&self, label: &str) -> Panel {
-        Panel::new(FigureAxis::linear("time (s)").range(0.0, self.end_s), FigureAxis::linear(label)).high(178)
+        Panel::new(Axis::linear("time (s)").range(0.0, self.end_s), Axis::linear(label)).high(178)
     }
 
     fn curve(&self, value: impl Fn(&Sample<&[f64]>) -> f64) -> Vec<[f64; 2]> {

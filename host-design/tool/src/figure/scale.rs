@@ -5,7 +5,7 @@ use core::ops::Range;
 use plotters::coord::ranged1d::{KeyPointHint, NoDefaultFormatting, Ranged, ValueFormatter};
 use plotters::coord::types::RangedCoordf64;
 
-use super::{Curve, FigureAxis, FigureError, Panel, Style};
+use super::{Axis, Curve, FigureError, Panel, Style};
 
 /// An axis with both ends known.
 #[derive(Debug, Clone)]
@@ -36,7 +36,7 @@ impl Panel {
 }
 
 /// Range that the curves need, including zero on a linear axis, with `margin` times its width added at both ends.
-fn around(axis: &FigureAxis, curves: &[Curve], which: usize, margin: f64) -> [f64; 2] {
+fn around(axis: &Axis, curves: &[Curve], which: usize, margin: f64) -> [f64; 2] {
     let scaled = |value: f64| if axis.log { value.log10() } else { value };
     let extent = |limits: bool, start: [f64; 2]| {
         let of_kind = curves.iter().filter(move |curve| (curve.style == Style::Limit) == limits);
@@ -63,7 +63,7 @@ fn around(axis: &FigureAxis, curves: &[Curve], which: usize, margin: f64) -> [f6
 }
 
 impl Scale {
-    pub(super) fn of(axis: &FigureAxis, range: [f64; 2], ticks: usize) -> Result<Self, FigureError> {
+    pub(super) fn of(axis: &Axis, range: [f64; 2], ticks: usize) -> Result<Self, FigureError> {
         let [from, to] = range;
         let possible = from.is_finite() && to.is_finite() && from < to && (!axis.log || from > 0.0);
         if !possible {

@@ -3,14 +3,14 @@
 use upright_design::motion::Transition;
 use upright_design::swing_up::{Margin, RandomRuns, SolvedCandidate};
 
-use super::{Curve, Figure, FigureAxis, Panel};
+use super::{Axis, Curve, Figure, Panel};
 
 /// Two panels for each motion, one for pushes against each link's angle and one along it, with a curve for each link.
 pub fn margins_figure(title: &str, motions: &[(Transition, Vec<Margin>)]) -> Figure {
     let panel = |transition: &Transition, margins: &[Margin], side: usize| {
         let label = format!("{transition}: push {} (N)", ["against", "along"][side]);
         let links = margins.first().map_or(0, |margin| margin.links_n.len());
-        (0..links).fold(Panel::new(FigureAxis::linear("time (s)"), FigureAxis::log(label)), |panel, link| {
+        (0..links).fold(Panel::new(Axis::linear("time (s)"), Axis::log(label)), |panel, link| {
             // A margin of 0 cannot be shown on a logarithmic axis.
             let point = |margin: &Margin| {
                 let size = margin.links_n[link][side];
@@ -32,13 +32,13 @@ pub fn trade_figure(title: &str, solved: &[SolvedCandidate]) -> Figure {
     let (shortest, longest) =
         (durations.clone().fold(f64::INFINITY, f64::min), durations.fold(0.0, f64::max));
     let duration = || {
-        let x = FigureAxis::linear("duration (s)");
+        let x = Axis::linear("duration (s)");
         if shortest <= longest { x.range(0.98 * shortest, 1.02 * longest) } else { x }
     };
     let arrive = |runs: fn(&SolvedCandidate) -> &RandomRuns| {
         solved.iter().map(|one| [one.duration_s, percent(runs(one))]).collect::<Vec<_>>()
     };
-    let panel = |y: FigureAxis, value: fn(&SolvedCandidate) -> f64| {
+    let panel = |y: Axis, value: fn(&SolvedCandidate) -> f64| {
         let points = |is_robust: bool| -> Vec<[f64; 2]> {
             let of_group = solved.iter().filter(|one| (percent(&one.wider) >= ROBUST_PERCENT) == is_robust);
             of_group.map(|one| [one.duration_s, value(one)]).collect()
@@ -52,14 +52,14 @@ pub fn trade_figure(title: &str, solved: &[SolvedCandidate]) -> Figure {
             .with(Curve::markers("fewer", 0, points(false)))
     };
     Figure::new(title)
-        .with(panel(FigureAxis::linear("largest force (N)"), |one| one.force_n))
-        .with(panel(FigureAxis::linear("farthest (m)"), |one| one.position_m))
+        .with(panel(Axis::linear("largest force (N)"), |one| one.force_n))
+        .with(panel(Axis::linear("farthest (m)"), |one| one.position_m))
         .with(
-            Panel::new(duration(), FigureAxis::linear("runs that arrive (%)").range(-5.0, 105.0))
+            Panel::new(duration(), Axis::linear("runs that arrive (%)").range(-5.0, 105.0))
                 .with(Curve::markers("with the errors of [swing_up]", 2, arrive(|one| &one.runs)))
                 .with(Curve::markers("with twice the errors", 3, arrive(|one| &one.wider))),
         )
-        .with(panel(FigureAxis::log("fragility"), |one| one.score))
+        .with(panel(Axis::log("fragility"), |one| one.score))
 }
 
 /// A candidate is robust if at least this share of the random runs with twice the errors arrive (%).

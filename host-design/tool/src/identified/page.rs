@@ -3,7 +3,7 @@
 use askama::Template;
 
 use super::text::{notes, row_texts, window_rows, windows};
-use crate::figure::{COLOURS_CSS, Curve, Figure, FigureAxis, Panel, style_sheet};
+use crate::figure::{Axis, COLOURS_CSS, Curve, Figure, Panel, style_sheet};
 use crate::report::{Plot, ReportError};
 use upright_design::identify::{ChannelFit, Identification, Predicted, Settings};
 use upright_design::number::significant;
@@ -98,7 +98,7 @@ fn panels(channels: &[ChannelFit], curves: impl Fn(usize, &ChannelFit, f64) -> V
     let mut figure = Figure::new("");
     for (index, fit) in channels.iter().enumerate() {
         let (factor, unit) = unit_of(index);
-        let axes = (FigureAxis::linear("time (s)"), FigureAxis::linear(format!("{} ({unit})", fit.name)));
+        let axes = (Axis::linear("time (s)"), Axis::linear(format!("{} ({unit})", fit.name)));
         let panel =
             curves(index, fit, factor).into_iter().fold(Panel::new(axes.0, axes.1).high(200), Panel::with);
         figure = figure.with(panel);
@@ -129,8 +129,7 @@ fn residuals(channels: &[ChannelFit]) -> Figure {
 
 /// Spectral densities of the innovations, relative to white noise of variance 1; `None` if the log is too short.
 fn spectra(found: &Identification) -> Option<Figure> {
-    let mut panel =
-        Panel::new(FigureAxis::log("frequency (Hz)"), FigureAxis::log("density / expected")).high(300);
+    let mut panel = Panel::new(Axis::log("frequency (Hz)"), Axis::log("density / expected")).high(300);
     let white = 2.0 * found.sample_s;
     let mut ends = [f64::INFINITY, 0.0f64];
     for (index, fit) in found.channels.iter().enumerate() {

@@ -3,7 +3,7 @@
 use core::f64::consts::PI;
 
 use super::number::number;
-use crate::figure::{Curve, Figure, FigureAxis, Panel};
+use crate::figure::{Axis, Curve, Figure, Panel};
 use upright_design::design::Certified;
 use upright_design::rig::Rig;
 use upright_design::table::TableValues;
@@ -98,9 +98,9 @@ fn bode(points: &[Point], margins: &Margins, title: String) -> Figure {
     let curve =
         |value: &dyn Fn(&Point) -> f64| points.iter().map(|p| [p.omega, value(p)]).collect::<Vec<_>>();
     let ends = [points.first(), points.last()].map(|point| point.map_or(1.0, |point| point.omega));
-    let frequency = || FigureAxis::log("frequency (rad/s)").range(ends[0], ends[1]);
+    let frequency = || Axis::log("frequency (rad/s)").range(ends[0], ends[1]);
     let level = |name: &str, at: f64| Curve::limit(name, vec![[ends[0], at], [ends[1], at]]);
-    let mut gain = Panel::new(frequency(), FigureAxis::log("|L|"))
+    let mut gain = Panel::new(frequency(), Axis::log("|L|"))
         .high(230)
         .with(level("|L| = 1", 1.0))
         .with(Curve::line("|L|", 0, curve(&Point::gain)));
@@ -110,8 +110,7 @@ fn bode(points: &[Point], margins: &Margins, title: String) -> Figure {
         .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), p| (low.min(p.phase), high.max(p.phase)));
     let criticals = ((low + 180.0) / 360.0).floor() as i32..=((high + 180.0) / 360.0).ceil() as i32;
     let mut phase =
-        Panel::new(frequency(), FigureAxis::linear("phase of L (°)").range(low - 20.0, high + 20.0))
-            .high(220);
+        Panel::new(frequency(), Axis::linear("phase of L (°)").range(low - 20.0, high + 20.0)).high(220);
     for turn in criticals {
         phase = phase.with(level("", 360.0 * f64::from(turn) - 180.0));
     }
@@ -133,15 +132,14 @@ fn bode(points: &[Point], margins: &Margins, title: String) -> Figure {
 fn nyquist(points: &[Point], margins: &Margins, title: String) -> Figure {
     let line = |sign: f64| points.iter().map(|point| [point.l[0], sign * point.l[1]]).collect::<Vec<_>>();
     let most = margins.lowest_gain.max(0.2).recip().clamp(1.0, 5.0) + 0.6;
-    let mut panel =
-        Panel::new(FigureAxis::linear("Re L").range(-most, 1.2), FigureAxis::linear("Im L").range(-1.6, 1.6))
-            .high(430)
-            .equal()
-            .unit_circle()
-            .with(around_critical(margins))
-            .with(Curve::line("L, ω > 0", 0, line(1.0)))
-            .with(Curve::line("ω < 0", 1, line(-1.0)))
-            .with(Curve::markers("−1", 0, vec![[-1.0, 0.0]]));
+    let mut panel = Panel::new(Axis::linear("Re L").range(-most, 1.2), Axis::linear("Im L").range(-1.6, 1.6))
+        .high(430)
+        .equal()
+        .unit_circle()
+        .with(around_critical(margins))
+        .with(Curve::line("L, ω > 0", 0, line(1.0)))
+        .with(Curve::line("ω < 0", 1, line(-1.0)))
+        .with(Curve::markers("−1", 0, vec![[-1.0, 0.0]]));
     for (number, (name, factor)) in gain_margins(margins).into_iter().enumerate() {
         panel = panel.with(Curve::markers(name, number + 1, vec![[-1.0 / factor, 0.0]]));
     }

@@ -1,7 +1,7 @@
 //! How much of each imperfection of the machine each law survives, as tables and figures.
 
 use super::ReportSource;
-use crate::figure::{Curve, Figure, FigureAxis, Panel};
+use crate::figure::{Axis, Curve, Figure, Panel};
 use upright_design::verify::{CornerSettings, Imperfections, Survival, Unverifiable, corners, limit_cycle};
 
 /// Errors of the masses for which every combination is run (%).
@@ -61,8 +61,8 @@ impl SurvivalRow {
 /// Amplitude of the limit cycle over the friction of the joints, a curve for each law.
 pub(super) fn limit_cycles(source: &ReportSource<'_>) -> Result<Figure, Unverifiable> {
     let ReportSource { rig, table, imperfections, .. } = *source;
-    let x = FigureAxis::log("Coulomb friction of each joint (N·m)");
-    let mut panel = Panel::new(x, FigureAxis::linear("largest angle of a link (mrad)")).high(360);
+    let x = Axis::log("Coulomb friction of each joint (N·m)");
+    let mut panel = Panel::new(x, Axis::linear("largest angle of a link (mrad)")).high(360);
     for (number, found) in imperfections.iter().enumerate() {
         let friction = found.alone.iter().find(|one| one.imperfection.key == "joint_friction_n_m");
         let Some(friction) = friction else { continue };
@@ -82,8 +82,8 @@ pub(super) fn wrong_masses(source: &ReportSource<'_>) -> Result<Option<Figure>, 
     if rig.links() > MOST_LINKS {
         return Ok(None);
     }
-    let x = FigureAxis::linear("error of the masses (±%)");
-    let y = FigureAxis::linear("combinations that survive (%)").range(0.0, 105.0);
+    let x = Axis::linear("error of the masses (±%)");
+    let y = Axis::linear("combinations that survive (%)").range(0.0, 105.0);
     let mut panel = Panel::new(x, y).high(360);
     for (number, found) in imperfections.iter().enumerate() {
         let settings = CornerSettings { duration_s: found.settings.duration_s, ..CornerSettings::of(rig) };

@@ -1,6 +1,6 @@
 //! Pole plots.
 
-use crate::figure::{Curve, Figure, FigureAxis, Panel};
+use crate::figure::{Axis, Curve, Figure, Panel};
 use upright_design::design::DesignPoles;
 use upright_design::rig::Rig;
 use upright_design::verify::LinearReport;
@@ -12,13 +12,13 @@ pub(super) fn figure(rig: &Rig, designed: &DesignPoles, report: &LinearReport) -
     let tick = rig.tick.period_s;
     // s = ln z / T; a pole at z = 0 has no place in the s-plane.
     let to_s = |&[re, im]: &[f64; 2]| [re.hypot(im).ln() / tick, im.atan2(re) / tick];
-    let z = Panel::new(FigureAxis::linear("Re z"), FigureAxis::linear("Im z"))
+    let z = Panel::new(Axis::linear("Re z"), Axis::linear("Im z"))
         .high(400)
         .equal()
         .unit_circle()
         .with(Curve::markers("designed", 0, points(sampled)))
         .with(Curve::markers("whole loop in f32, as it runs", 1, report.poles.clone()));
-    let s = Panel::new(FigureAxis::linear("Re s (1/s)"), FigureAxis::linear("Im s (1/s)"))
+    let s = Panel::new(Axis::linear("Re s (1/s)"), Axis::linear("Im s (1/s)"))
         .high(300)
         .with(Curve::limit("", vec![[0.0, -1e9], [0.0, 1e9]]))
         .with(Curve::markers("designed for continuous time", 0, points(continuous)))

@@ -2,7 +2,7 @@
 
 use upright::table::Law;
 
-use crate::figure::{Figure, FigureAxis, HeatMap, Panel};
+use crate::figure::{Axis, Figure, HeatMap, Panel};
 use upright_design::rig::Rig;
 use upright_design::table::TableValues;
 use upright_design::verify::{Axis, Horizon, Map, Unverifiable, attraction_map};
@@ -74,7 +74,6 @@ fn drawn(title: String, map: &Map) -> Figure {
         rows: centres(&map.down),
         values: map.settled_s.clone(),
     };
-    let axes =
-        Panel::new(FigureAxis::linear("θ1 at the start (°)"), FigureAxis::linear("θ1' at the start (°/s)"));
+    let axes = Panel::new(Axis::linear("θ1 at the start (°)"), Axis::linear("θ1' at the start (°/s)"));
     Figure::narrow(title).with(Panel { heat: Some(heat), ..axes.high(400) })
 }

@@ -1,7 +1,7 @@
 //! The comparison as files: the paper's figures 5 to 8, Table 2 over the length of its runs, spectra; and their data.
 
 use super::{BAND, Loop, Reproduction, Robustness, Settling, StepResponse, Trajectory, printed};
-use crate::figure::{Curve, Figure, FigureAxis, FigureError, Panel};
+use crate::figure::{Axis, Curve, Figure, FigureError, Panel};
 
 impl Reproduction {
     /// Names and contents of all files: `summary.md`, figures as SVG, and for each its data as CSV.
@@ -56,20 +56,20 @@ fn over_time(trajectory: &Trajectory, value: impl Fn(usize) -> f64) -> Vec<[f64;
 /// One of the paper's figures: position in all loops; angles, rates and force in the paper's loop.
 fn response(responses: &[&StepResponse]) -> Figure {
     let Some(first) = responses.first() else { return Figure::new("") };
-    let time = || FigureAxis::linear("time (s)");
+    let time = || Axis::linear("time (s)");
     let disturbed = if first.figure >= 7 { ", with disturbances" } else { "" };
     let title = format!("Figure {} of the paper: {}{disturbed}", first.figure, first.law);
 
     let set_point = over_time(&first.trajectory, |_| 1.0);
     let mut position =
-        Panel::new(time(), FigureAxis::linear("position (m)")).with(Curve::reference("set-point", set_point));
+        Panel::new(time(), Axis::linear("position (m)")).with(Curve::reference("set-point", set_point));
     for (number, one) in responses.iter().enumerate() {
         let trajectory = over_time(&one.trajectory, |index| one.trajectory.states[index][0]);
         position = position.with(Curve::line(one.kind.name(), number, trajectory));
     }
     let joints = first.figures.peak_angles_deg.len();
-    let mut angles = Panel::new(time(), FigureAxis::linear("angles (°)"));
-    let mut rates = Panel::new(time(), FigureAxis::linear("rates (°/s)"));
+    let mut angles = Panel::new(time(), Axis::linear("angles (°)"));
+    let mut rates = Panel::new(time(), Axis::linear("rates (°/s)"));
     let degrees = |state: usize| {
         over_time(&first.trajectory, |index| first.trajectory.states[index][state].to_degrees())
     };
@@ -78,7 +78,7 @@ fn response(responses: &[&StepResponse]) -> Figure {
         rates = rates.with(Curve::line(format!("rate of θ{}", joint + 1), joint, degrees(3 + 2 * joint)));
     }
     let force = over_time(&first.trajectory, |index| first.trajectory.forces_n[index]);
-    let force = Panel::new(time(), FigureAxis::linear("force (N)")).with(Curve::line("", 0, force));
+    let force = Panel::new(time(), Axis::linear("force (N)")).with(Curve::line("", 0, force));
     Figure::new(title).with(position).with(angles).with(rates).with(force)
 }
 
@@ -86,10 +86,9 @@ impl Settling {
     /// Distance of the cart from the set-point over time for each row, and how many verdicts a run of that length
     /// shares with the paper.
     fn figure(&self) -> Figure {
-        let time = || FigureAxis::linear("length of the run (s)").range(0.0, 12.0);
+        let time = || Axis::linear("length of the run (s)").range(0.0, 12.0);
         let mut distance =
-            Panel::new(time(), FigureAxis::log("distance from the set-point (%)").range(0.1, 200.0))
-                .high(360);
+            Panel::new(time(), Axis::log("distance from the set-point (%)").range(0.1, 200.0)).high(360);
         for (number, row) in self.rows.iter().enumerate() {
             let trajectory = &row.trajectory;
             let name = match &row.fall {
@@ -109,7 +108,7 @@ impl Settling {
             };
             [horizon, self.rows.iter().zip(printed()).map(same).filter(|&same| same).count() as f64]
         });
-        let mut count = Panel::new(time(), FigureAxis::linear("verdicts as printed, of 7").range(0.0, 7.5))
+        let mut count = Panel::new(time(), Axis::linear("verdicts as printed, of 7").range(0.0, 7.5))
             .high(190)
             .with(Curve::line("", 0, agreeing.collect()));
         if let Some([first, last]) = self.horizons_s {
@@ -132,8 +131,7 @@ fn spectra(all: &[Robustness]) -> Figure {
         [("x", "cart (mm/√Hz)", 1e3), ("theta1", "θ1 (mrad/√Hz)", 1e3), ("u", "force (N/√Hz)", 1.0)]
     {
         let mut panel =
-            Panel::new(FigureAxis::log("frequency (Hz)").range(0.1, HIGHEST_HZ), FigureAxis::log(label))
-                .high(250);
+            Panel::new(Axis::log("frequency (Hz)").range(0.1, HIGHEST_HZ), Axis::log(label)).high(250);
         let shown = all.iter().filter(|one| one.kind != Loop::FullState);
         for (number, one) in shown.enumerate() {
             let Some(ripple) = one.ripples.iter().find(|ripple| ripple.signal == signal) else { continue };

@@ -5,7 +5,7 @@ use serde::Serialize;
 use super::designs::{Designs, designs};
 use super::errata::{Erratum, errata};
 use super::error::ReproduceError;
-use super::responses::{RigLoops, StepResponse, responses};
+use super::responses::{Loops, StepResponse, responses};
 use super::rigs::{PaperDesigns, PaperRigs};
 use super::robustness::{Robustness, robustness};
 use super::settling::{Settling, settling};
@@ -42,7 +42,7 @@ pub fn reproduce(rigs: &PaperRigs, stage: &dyn Fn(&'static str)) -> Result<Repro
     stage(of_errata);
     let errata = errata(rigs, &designed)?;
     stage(of_responses);
-    let loops = RigLoops::with(&rigs.exact, designed.exact)?;
+    let loops = Loops::with(&rigs.exact, designed.exact)?;
     let responses = responses(&loops)?;
     stage(of_settling);
     let settling = settling(rigs)?;

@@ -42,7 +42,7 @@ impl Loop {
 
 /// Both laws for one rig, in every loop. The set-point is a step: there is no governor, as in the paper.
 #[derive(Debug, Clone, PartialEq)]
-pub struct RigLoops {
+pub struct Loops {
     /// The rig.
     pub rig: Rig,
     /// Its design.
@@ -54,7 +54,7 @@ pub struct RigLoops {
 /// A law in a kind of loop, and what happens in the run.
 pub(super) type LoopRun = (Law, Loop, ContinuousRun);
 
-impl RigLoops {
+impl Loops {
     /// Designs `rig`.
     ///
     /// # Errors
@@ -135,7 +135,7 @@ pub struct StepResponse {
 ///
 /// # Errors
 /// [`ReproduceError`] if a run cannot be made.
-pub fn responses(loops: &RigLoops) -> Result<Vec<StepResponse>, ReproduceError> {
+pub fn responses(loops: &Loops) -> Result<Vec<StepResponse>, ReproduceError> {
     let mut wanted = Vec::new();
     for disturbances in [None, Some(SEED)] {
         let run = ContinuousRun { disturbances, ..ContinuousRun::STEP };

@@ -6,7 +6,7 @@ use upright::table::Law;
 
 use super::continuous_loop::ContinuousRun;
 use super::designs::open_loop_poles;
-use super::responses::{Loop, LoopRun, RigLoops};
+use super::responses::{Loop, LoopRun, Loops};
 use super::trajectory::Trajectory;
 use super::{ReproduceError, SEED};
 use upright_design::numerics::{Bandwidth, SEGMENT, Spectrum};
@@ -38,7 +38,7 @@ pub struct Robustness {
     /// Margins of the linear loop, broken at the force.
     pub margins: Option<Margins>,
     /// Cart, joints and force at rest under the paper's disturbances, the same for every law and loop.
-    pub ripples: Vec<SignalRipple>,
+    pub ripples: Vec<Ripple>,
     /// Largest force in this run (N).
     pub peak_force_n: f64,
     /// Mean squared force (N²): control energy per second.
@@ -47,7 +47,7 @@ pub struct Robustness {
 
 /// One signal of a run at rest under disturbances.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct SignalRipple {
+pub struct Ripple {
     /// `x`, `theta1` … or `u`.
     pub signal: String,
     /// Root mean square (m, rad or N).
@@ -63,7 +63,7 @@ pub struct SignalRipple {
 ///
 /// # Errors
 /// [`ReproduceError`] if a run or the margins fail.
-pub fn robustness(loops: &RigLoops) -> Result<Vec<Robustness>, ReproduceError> {
+pub fn robustness(loops: &Loops) -> Result<Vec<Robustness>, ReproduceError> {
     let open = open_loop_poles(&loops.rig)?;
     let full_state = {
         let rig = Rig { kalman: None, ..loops.rig.clone() };
@@ -101,7 +101,7 @@ fn after(trajectory: &Trajectory) -> usize {
     ((FORGOTTEN_S / trajectory.sample_s).round() as usize).min(trajectory.forces_n.len())
 }
 
-fn ripples(trajectory: &Trajectory) -> Vec<SignalRipple> {
+fn ripples(trajectory: &Trajectory) -> Vec<Ripple> {
     let joints = trajectory.states.first().map_or(0, |state| state.len() / 2 - 1);
     let angles = (1..=joints).map(|joint| (format!("theta{joint}"), trajectory.state(2 * joint)));
     let signals = [("x".to_owned(), trajectory.state(0))].into_iter().chain(angles);
@@ -110,7 +110,7 @@ fn ripples(trajectory: &Trajectory) -> Vec<SignalRipple> {
         let values = &values[after(trajectory)..];
         let spectrum = Spectrum::welch(values, trajectory.sample_s)?;
         let rms = (values.iter().map(|value| value * value).sum::<f64>() / values.len() as f64).sqrt();
-        Some(SignalRipple { signal, rms, bandwidth: spectrum.bandwidth(), spectrum })
+        Some(Ripple { signal, rms, bandwidth: spectrum.bandwidth(), spectrum })
     };
     signals.chain([force]).filter_map(ripple).collect()
 }

@@ -1,6 +1,6 @@
 //! Figures: their contents, and that they are legible without colour.
 
-use upright_tool::figure::{Curve, Figure, FigureAxis, FigureError, HeatMap, Panel};
+use upright_tool::figure::{Axis, Curve, Figure, FigureError, HeatMap, Panel};
 
 fn wave(amplitude: f64) -> Vec<[f64; 2]> {
     (0..=200).map(|i| f64::from(i) * 0.05).map(|t| [t, amplitude * t.sin()]).collect()
@@ -11,7 +11,7 @@ fn one(panel: Panel) -> Figure {
 }
 
 fn plain() -> Panel {
-    Panel::new(FigureAxis::linear("time (s)"), FigureAxis::linear("angle (°)"))
+    Panel::new(Axis::linear("time (s)"), Axis::linear("angle (°)"))
 }
 
 #[test]
@@ -43,7 +43,7 @@ fn axes_name_quantity_and_unit() {
 fn ticks_of_a_logarithmic_axis_are_short_numbers() {
     for power in -9..6 {
         let low = 10f64.powi(power);
-        let panel = Panel::new(FigureAxis::log("x"), FigureAxis::linear("y"));
+        let panel = Panel::new(Axis::log("x"), Axis::linear("y"));
         let svg = one(panel.with(Curve::line("", 0, vec![[low, 0.0], [60.0 * low, 1.0]]))).svg().unwrap();
         // 5 times a millionth is 4.9999999999999996e-6.
         assert!(!svg.contains("99999") && !svg.contains("00000000"), "{power}");
@@ -59,9 +59,8 @@ fn text_from_a_rig_file_cannot_become_markup() {
 
 #[test]
 fn the_plot_area_maps_values_to_the_drawing() {
-    let figure =
-        one(Panel::new(FigureAxis::linear("t").range(0.0, 10.0), FigureAxis::linear("y").range(-1.0, 1.0))
-            .with(Curve::line("", 0, vec![[0.0, -1.0], [10.0, 1.0]])));
+    let figure = one(Panel::new(Axis::linear("t").range(0.0, 10.0), Axis::linear("y").range(-1.0, 1.0))
+        .with(Curve::line("", 0, vec![[0.0, -1.0], [10.0, 1.0]])));
     let drawing = figure.draw().unwrap();
     let area = drawing.panels[0];
     assert_eq!((area.x, area.y), ([0.0, 10.0], [-1.0, 1.0]));
@@ -95,8 +94,7 @@ fn a_far_limit_does_not_flatten_the_curves() {
 #[test]
 fn one_unit_is_as_long_both_ways_in_a_map_of_poles() {
     let poles = Curve::markers("poles", 0, vec![[0.99, 0.01], [0.99, -0.01]]);
-    let panel =
-        Panel::new(FigureAxis::linear("Re z"), FigureAxis::linear("Im z")).equal().unit_circle().with(poles);
+    let panel = Panel::new(Axis::linear("Re z"), Axis::linear("Im z")).equal().unit_circle().with(poles);
     let area = one(panel).draw().unwrap().panels[0];
     let per_unit =
         |ends: [i32; 2], range: [f64; 2]| f64::from(ends[1] - ends[0]).abs() / (range[1] - range[0]);
@@ -106,14 +104,12 @@ fn one_unit_is_as_long_both_ways_in_a_map_of_poles() {
 
 #[test]
 fn an_impossible_range_is_an_error_that_names_the_axis() {
-    let of = |axis: FigureAxis| {
-        one(Panel::new(axis, FigureAxis::linear("y")).with(Curve::line("", 0, wave(1.0)))).svg()
-    };
-    let error = of(FigureAxis::log("frequency (rad/s)").range(0.0, 1.0)).unwrap_err();
+    let of = |axis: Axis| one(Panel::new(axis, Axis::linear("y")).with(Curve::line("", 0, wave(1.0)))).svg();
+    let error = of(Axis::log("frequency (rad/s)").range(0.0, 1.0)).unwrap_err();
     assert!(matches!(&error, FigureError::Range { label, .. } if label == "frequency (rad/s)"));
-    assert!(of(FigureAxis::linear("t").range(1.0, 1.0)).is_err());
-    assert!(of(FigureAxis::linear("t").range(0.0, f64::NAN)).is_err());
-    assert!(of(FigureAxis::linear("t").range(0.0, 1.0)).is_ok());
+    assert!(of(Axis::linear("t").range(1.0, 1.0)).is_err());
+    assert!(of(Axis::linear("t").range(0.0, f64::NAN)).is_err());
+    assert!(of(Axis::linear("t").range(0.0, 1.0)).is_ok());
 }
 
 #[test]
@@ -126,7 +122,7 @@ fn csv_has_every_point_of_every_curve() {
         rows: vec![0.5],
         values,
     };
-    let map = Panel { heat: Some(heat), ..Panel::new(FigureAxis::linear("a"), FigureAxis::linear("b")) };
+    let map = Panel { heat: Some(heat), ..Panel::new(Axis::linear("a"), Axis::linear("b")) };
     let figure = one(plain().with(Curve::line("θ1, first", 0, wave(1.0)))).with(map);
     let csv = figure.csv().unwrap();
     assert_eq!(csv.lines().count(), 1 + 201 + 2);

@@ -10,7 +10,7 @@ use upright_design::plant::reference::Tolerance;
 use upright_design::rig::{Chain, PlantDescription, PolePlacement, Rig};
 use upright_design::simulate::FallKind;
 use upright_design::verify::continuous_margins;
-use upright_tool::reproduce::{ContinuousRun, Loop, PaperRigs, RigLoops, printed, published};
+use upright_tool::reproduce::{ContinuousRun, Loop, Loops, PaperRigs, printed, published};
 
 use crate::reproduced::REPRODUCED;
 
@@ -410,9 +410,9 @@ fn every_joint_swings_slower_under_the_lqr_and_the_force_does_not() {
 #[test]
 fn a_rig_with_one_law_or_without_links_is_refused_with_a_remedy() {
     let one_law = Rig { lqr: None, ..RIGS.exact.clone() };
-    let message = RigLoops::of(&one_law).unwrap_err().to_string();
+    let message = Loops::of(&one_law).unwrap_err().to_string();
     assert!(message.contains("add [lqr]"), "{message}");
-    let message = RigLoops::of(&RIGS.printed).unwrap_err().to_string();
+    let message = Loops::of(&RIGS.printed).unwrap_err().to_string();
     assert!(message.contains("[cart]"), "{message}");
 }
 
