@@ -40,8 +40,8 @@ fn write_source(out: &mut String, rig: &Rig, table: &TableValues) -> core::fmt::
     )?;
     constant("Hash of the rig file's values.", "RIG_HASH", "u64", &hexadecimal(table.rig_hash, 4))?;
     constant("Control period (s).", "TICK_S", "f32", &literal(TableNumber::Float(table.tick_s)))?;
-    constant("TableNumber of states.", "STATES", "usize", &table.states().to_string())?;
-    constant("TableNumber of sensors.", "SENSORS", "usize", &table.sensors().to_string())?;
+    constant("Number of states.", "STATES", "usize", &table.states().to_string())?;
+    constant("Number of sensors.", "SENSORS", "usize", &table.sensors().to_string())?;
     let gains = (table.fields(), table.crc());
     let mut writer = Writer {
         out,
