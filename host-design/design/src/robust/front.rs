@@ -4,7 +4,7 @@ use serde::Serialize;
 use upright::table::Law;
 
 use super::error::RobustError;
-use super::loops::Loops;
+use super::loops::CandidateLoops;
 use crate::design::DesignError;
 use crate::parallel::{self, Progress};
 use crate::verify::PlantModel;
@@ -48,7 +48,11 @@ pub struct LawRipple {
 }
 
 /// The front over `scales`, which are in ascending order.
-pub(super) fn front(loops: &Loops<'_>, scales: &[f64], progress: Progress<'_>) -> Result<Front, RobustError> {
+pub(super) fn front(
+    loops: &CandidateLoops<'_>,
+    scales: &[f64],
+    progress: Progress<'_>,
+) -> Result<Front, RobustError> {
     let climbed = climbed(loops, scales, progress)?;
     let at = |(level, &scale): (usize, &f64)| {
         let heads: Vec<Vec<usize>> = climbed
@@ -73,7 +77,7 @@ pub(super) fn front(loops: &Loops<'_>, scales: &[f64], progress: Progress<'_>) -
 /// The place of the loop with the least ripple at each scale, for every pair of a law and an observer. A loop that
 /// falls at a smaller scale is not tried at a larger one.
 fn climbed(
-    loops: &Loops<'_>,
+    loops: &CandidateLoops<'_>,
     scales: &[f64],
     progress: Progress<'_>,
 ) -> Result<Vec<Vec<usize>>, RobustError> {

@@ -87,7 +87,7 @@ pub fn judge(
     }
     let machines = SHARES.into_iter().map(|share| {
         let machine = machine(rig, tolerances, share);
-        let of_number = |number: u64| -> Result<Outcome, Unverifiable> {
+        let of_number = |number: u64| -> Result<JudgedRun, Unverifiable> {
             Ok(one(&machine, table, law, settings, number + 1)?)
         };
         let part = format!("{}, share {share}", law.key());
@@ -116,9 +116,9 @@ pub(super) fn machine(rig: &Rig, tolerances: &Tolerances, share: f64) -> Rig {
     rig
 }
 
-/// Outcome of one run.
+/// Result of one run.
 #[derive(Serialize, Deserialize)]
-pub(super) struct Outcome {
+pub(super) struct JudgedRun {
     pub(super) survives: bool,
     /// Time of the last tick (s): that of a fall.
     #[serde(skip)]
@@ -139,7 +139,7 @@ pub(super) fn one(
     law: Law,
     settings: &JudgeSettings,
     seed: u64,
-) -> Result<Outcome, SimulationError> {
+) -> Result<JudgedRun, SimulationError> {
     let scenario = Scenario {
         start: leaning(machine, &vec![LEAN_RAD; machine.links()]),
         force_noise_n: settings.disturbance.force_n,
@@ -147,8 +147,14 @@ pub(super) fn one(
         seed,
         ..scenario(machine, law, settings.duration_s)
     };
-    let mut outcome =
-        Outcome { survives: false, survived_s: 0.0, ticks: 0.0, force: 0.0, angle_rad: 0.0, position_m: 0.0 };
+    let mut outcome = JudgedRun {
+        survives: false,
+        survived_s: 0.0,
+        ticks: 0.0,
+        force: 0.0,
+        angle_rad: 0.0,
+        position_m: 0.0,
+    };
     let fall = run(machine, table, &scenario, &mut |sample| {
         outcome.survived_s = sample.t;
         let angles = absolute_angles(sample.state);
@@ -167,7 +173,7 @@ pub(super) fn one(
     Ok(outcome)
 }
 
-fn summary(share: f64, all: &[Outcome]) -> Runs {
+fn summary(share: f64, all: &[JudgedRun]) -> Runs {
     let survived = || all.iter().filter(|outcome| outcome.survives);
     let ticks: f64 = survived().map(|outcome| outcome.ticks).sum();
     Runs {

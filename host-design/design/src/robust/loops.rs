@@ -27,7 +27,7 @@ pub(super) struct Pool {
     designs: Vec<Option<Uncertified>>,
 }
 
-pub(super) struct Observer {
+pub(super) struct CandidateObserver {
     pub(super) factor: f64,
     pub(super) joint_noise: Vec<f64>,
     design: Uncertified,
@@ -40,12 +40,12 @@ pub(super) struct Ranked {
     pub(super) ripple_n: f64,
     controller: ControllerModel<f64>,
     /// What it survives of the full tolerances; empty until it is tried.
-    trial: OnceLock<Trial>,
+    trial: OnceLock<LoopTrial>,
 }
 
 /// What a loop survives.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Trial {
+pub(super) struct LoopTrial {
     /// Whether its linear loop is stable, with a margin, at every combination of wrong masses.
     pub(super) is_stable: bool,
     /// Total time for which it survived in the short runs (s). A loop that is not stable is not run.
@@ -54,18 +54,18 @@ pub(super) struct Trial {
     pub(super) holds: bool,
 }
 
-pub(super) struct Loops<'a> {
+pub(super) struct CandidateLoops<'a> {
     rig: &'a Rig,
     tolerances: &'a Tolerances,
     settings: &'a JudgeSettings,
     pub(super) plants: LinearPlants<'a>,
     pub(super) pools: Vec<Pool>,
-    pub(super) observers: Vec<Observer>,
+    pub(super) observers: Vec<CandidateObserver>,
     /// For each pool and each observer: the stable loops, the least ripple first.
     pub(super) ranked: Vec<Vec<Vec<Ranked>>>,
 }
 
-impl<'a> Loops<'a> {
+impl<'a> CandidateLoops<'a> {
     /// Designs every candidate, without certification, and sorts the loops.
     pub(super) fn of(
         rig: &'a Rig,
@@ -95,7 +95,7 @@ impl<'a> Loops<'a> {
             of_laws.into_iter().map(pool).filter(|pool| pool.designs.iter().any(Option::is_some)).collect();
         let observers = parallel::map(&noises, |(factor, joint_noise)| {
             let design = designed(&observer_alone(rig, joint_noise))?;
-            Some(Observer { factor: *factor, joint_noise: joint_noise.clone(), design })
+            Some(CandidateObserver { factor: *factor, joint_noise: joint_noise.clone(), design })
         });
         let observers = observers.into_iter().flatten().collect();
         let mut loops = Self { rig, tolerances, settings, plants, pools, observers, ranked: Vec::new() };
@@ -112,7 +112,7 @@ impl<'a> Loops<'a> {
     }
 
     /// The stable loops of a law with an observer.
-    fn rank(&self, pool: &Pool, observer: &Observer) -> Vec<Ranked> {
+    fn rank(&self, pool: &Pool, observer: &CandidateObserver) -> Vec<Ranked> {
         let Some(kalman) = &observer.design.double.kalman else { return Vec::new() };
         let loop_of = |(candidate, design): (usize, &Option<Uncertified>)| {
             let controller = self.plants.controller(&design.as_ref()?.double, pool.law, kalman)?;
@@ -159,7 +159,7 @@ impl<'a> Loops<'a> {
 
     /// What this loop survives of the full tolerances; `corners` are the plants with their combinations of wrong
     /// masses. It is tried only once.
-    pub(super) fn trial(&self, at: At, corners: &[PlantModel<f64>]) -> Result<Trial, RobustError> {
+    pub(super) fn trial(&self, at: At, corners: &[PlantModel<f64>]) -> Result<LoopTrial, RobustError> {
         let [pool, observer, place] = at;
         let one = &self.ranked[pool][observer][place];
         if let Some(known) = one.trial.get() {
@@ -167,13 +167,13 @@ impl<'a> Loops<'a> {
         }
         let trial = match self.is_stable(at, corners)? {
             true => self.runs(at, 1.0)?,
-            false => Trial { is_stable: false, survived_s: 0.0, holds: false },
+            false => LoopTrial { is_stable: false, survived_s: 0.0, holds: false },
         };
         Ok(*one.trial.get_or_init(|| trial))
     }
 
     /// The result of [`trial`](Self::trial), if it was made.
-    pub(super) fn known(&self, [pool, observer, place]: At) -> Option<Trial> {
+    pub(super) fn known(&self, [pool, observer, place]: At) -> Option<LoopTrial> {
         self.ranked[pool][observer].get(place)?.trial.get().copied()
     }
 
@@ -187,8 +187,8 @@ impl<'a> Loops<'a> {
     }
 
     /// Short runs with each share of `scale` times the tolerances, up to the first that falls.
-    pub(super) fn runs(&self, at: At, scale: f64) -> Result<Trial, RobustError> {
-        let mut trial = Trial { is_stable: true, survived_s: 0.0, holds: false };
+    pub(super) fn runs(&self, at: At, scale: f64) -> Result<LoopTrial, RobustError> {
+        let mut trial = LoopTrial { is_stable: true, survived_s: 0.0, holds: false };
         let rig = self.rig_of(at);
         let Some(table) = self.trial_table(&rig, at) else { return Ok(trial) };
         let settings = JudgeSettings { duration_s: SHORT_RUN_S, ..*self.settings };
@@ -202,7 +202,7 @@ impl<'a> Loops<'a> {
                 return Ok(trial);
             }
         }
-        Ok(Trial { holds: true, ..trial })
+        Ok(LoopTrial { holds: true, ..trial })
     }
 
     /// The observers in ascending order of the total ripple of all laws, each relative to that of the file's own

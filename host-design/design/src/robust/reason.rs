@@ -1,7 +1,7 @@
 //! Why no candidate survives the tolerances, and what share of them is within reach.
 
 use super::error::RobustError;
-use super::loops::{At, Loops};
+use super::loops::{At, CandidateLoops};
 use crate::parallel::{self, Progress};
 use crate::rig::Tolerances;
 use crate::verify::PlantModel;
@@ -14,7 +14,7 @@ const TRIED: usize = 8;
 
 /// The reason in words, after the search has tried all loops that might have been chosen.
 pub(super) fn reason(
-    loops: &Loops<'_>,
+    loops: &CandidateLoops<'_>,
     tolerances: &Tolerances,
     progress: Progress<'_>,
 ) -> Result<String, RobustError> {
@@ -53,7 +53,7 @@ pub(super) fn reason(
 }
 
 /// The largest share of the tolerances that some of the loops tried survive, by bisection.
-fn within_reach(loops: &Loops<'_>, progress: Progress<'_>) -> Result<Option<f64>, RobustError> {
+fn within_reach(loops: &CandidateLoops<'_>, progress: Progress<'_>) -> Result<Option<f64>, RobustError> {
     let [mut held, mut lost] = [0, SHARES.len() + 1];
     while lost - held > 1 {
         let middle = (held + lost) / 2;
@@ -63,7 +63,7 @@ fn within_reach(loops: &Loops<'_>, progress: Progress<'_>) -> Result<Option<f64>
 }
 
 /// Whether there is an observer with which a loop of each law survives this share of the tolerances.
-fn serves(loops: &Loops<'_>, share: f64, progress: Progress<'_>) -> Result<bool, RobustError> {
+fn serves(loops: &CandidateLoops<'_>, share: f64, progress: Progress<'_>) -> Result<bool, RobustError> {
     let corners = loops.plants.corners(share)?;
     progress(Some(("what is within reach", loops.observers.len() as u64)));
     let survives = |pool: usize, observer: usize| -> Result<bool, RobustError> {
@@ -99,7 +99,7 @@ fn serves(loops: &Loops<'_>, share: f64, progress: Progress<'_>) -> Result<bool,
 /// The loops of a law and an observer that are tried: of those that are stable with `corners`, the ones that survived
 /// longest and the ones with the least ripple.
 fn tried(
-    loops: &Loops<'_>,
+    loops: &CandidateLoops<'_>,
     [pool, observer]: [usize; 2],
     corners: &[PlantModel<f64>],
 ) -> Result<Vec<At>, RobustError> {

@@ -7,7 +7,7 @@ use super::candidate::Candidate;
 use super::error::RobustError;
 use super::front::{Front, SCALES, front};
 use super::judge::{JudgeSettings, Judgement, judge};
-use super::loops::{At, Loops};
+use super::loops::{At, CandidateLoops};
 use super::reason::reason;
 use crate::design::design;
 use crate::parallel::{self, Progress};
@@ -70,14 +70,14 @@ pub fn choose(
         return Err(Unverifiable::Setting { what, value, accepts }.into());
     }
     let own = design(rig)?;
-    let loops = Loops::of(rig, tolerances, settings, &own, progress)?;
+    let loops = CandidateLoops::of(rig, tolerances, settings, &own, progress)?;
     let choice = Search { loops: &loops, tolerances, settings }.choice(progress)?;
     let front = with_front.then(|| front(&loops, &SCALES, progress)).transpose()?;
     Ok((choice, front))
 }
 
 struct Search<'a> {
-    loops: &'a Loops<'a>,
+    loops: &'a CandidateLoops<'a>,
     tolerances: &'a Tolerances,
     settings: &'a JudgeSettings,
 }

@@ -241,7 +241,7 @@ fn sides(links: usize, mirrored: bool) -> Vec<Vec<i8>> {
 
 /// One axis of a map: a state, and its values at the start.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct Axis {
+pub struct MapAxis {
     /// Index of the state (relative angles, as everywhere).
     pub state: usize,
     /// First and last value (SI).
@@ -250,7 +250,7 @@ pub struct Axis {
     pub points: usize,
 }
 
-impl Axis {
+impl MapAxis {
     fn value(&self, index: usize) -> f64 {
         let [low, high] = self.range;
         low + (high - low) * index as f64 / (self.points.max(2) - 1) as f64
@@ -261,9 +261,9 @@ impl Axis {
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Map {
     /// Horizontal axis, from left to right.
-    pub across: Axis,
+    pub across: MapAxis,
     /// Vertical axis, from the first row to the last.
-    pub down: Axis,
+    pub down: MapAxis,
     /// For each row, the time after which each start has come near rest (s); none if it falls or does not settle.
     pub settled_s: Vec<Vec<Option<f64>>>,
 }
@@ -279,7 +279,7 @@ pub fn attraction_map(
     rig: &Rig,
     table: &TableValues,
     law: Law,
-    [across, down]: [Axis; 2],
+    [across, down]: [MapAxis; 2],
     horizon: &Horizon,
     done: &(dyn Fn() + Sync),
 ) -> Result<Map, Unverifiable> {

@@ -30,7 +30,7 @@ pub(crate) use loop_model::{Numbers, radius};
 pub(crate) use trial::{leaning, scenario};
 
 pub use attraction::{
-    Attraction, AttractionSettings, Axis, Edge, Map, Tilt, WorstTilt, attraction, attraction_map,
+    Attraction, AttractionSettings, Edge, Map, MapAxis, Tilt, WorstTilt, attraction, attraction_map,
     largest_tilts,
 };
 pub use certificate::Certificate;
@@ -43,17 +43,17 @@ pub use covariance::NoiseShare;
 pub use encoder::{CoarsestEncoder, EncoderSettings, coarser, coarsest_encoder};
 pub use error::{Unverifiable, VerifyError};
 pub use imperfections::{
-    IMPERFECTIONS, Imperfection, ImperfectionSettings, Imperfections, RequiredSurvival, Survival, Verdict,
+    IMPERFECTIONS, Imperfection, ImperfectionSettings, Imperfections, RequiredSurvival, SizeRuns, Survival,
     imperfections, limit_cycle, required_imperfections,
 };
 pub use linear::{LinearReport, linear, margins_of};
 pub use loop_model::{ControllerModel, LoopModel, PlantModel};
 pub use margins::Margins;
 pub use monte_carlo::{Effort, MonteCarlo, Spread, WorstCase, monte_carlo, sample, spread, wilson};
-pub use noise_runs::{Endurance, NoiseRun, Ripple, endurance, noise_run};
+pub use noise_runs::{Endurance, MeasuredRipple, NoiseRun, endurance, noise_run};
 pub use report::{Check, LawTrust, TrustReport, brief, trust};
 pub use response::Response;
 pub use rounding::Rounding;
-pub use rows::{Quantity, Row, quantities, rows};
+pub use rows::{FoundRow, TrustQuantity, quantities, rows};
 pub use tick::TickLimits;
 pub use trial::{Disturbance, Horizon, Outcome, at_rest_disturbed, trial, trials};

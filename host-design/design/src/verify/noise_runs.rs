@@ -22,12 +22,12 @@ pub struct NoiseRun {
     pub duration_s: f64,
     /// What was measured in the runs that survived; none if all fell.
     #[serde(flatten)]
-    pub ripple: Option<Ripple>,
+    pub ripple: Option<MeasuredRipple>,
 }
 
 /// Root mean squares over the runs that survived, after the first tenth of each.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Ripple {
+pub struct MeasuredRipple {
     /// Force on the cart (N rms).
     pub force_rms_n: f64,
     /// Largest force on the cart (N).
@@ -96,7 +96,7 @@ pub fn noise_run(
     let survived: Vec<Sums> = all.into_iter().filter(|sums| sums.survives).collect();
     let ticks: f64 = survived.iter().map(|sums| sums.ticks).sum();
     let rms = |part: &dyn Fn(&Sums) -> f64| (survived.iter().map(part).sum::<f64>() / ticks.max(1.0)).sqrt();
-    let ripple = (!survived.is_empty()).then(|| Ripple {
+    let ripple = (!survived.is_empty()).then(|| MeasuredRipple {
         force_rms_n: rms(&|sums| sums.force),
         force_peak_n: survived.iter().map(|sums| sums.peak).fold(0.0, f64::max),
         state_rms: (0..states).map(|i| rms(&|sums| sums.state[i])).collect(),

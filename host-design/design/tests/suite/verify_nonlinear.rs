@@ -11,7 +11,7 @@ use upright_design::simulate::run;
 use upright_design::study::Study;
 use upright_design::table::TableValues;
 use upright_design::verify::{
-    AttractionSettings, Axis, CornerSettings, Disturbance, Effort, EncoderSettings, Horizon, Mass, Spread,
+    AttractionSettings, CornerSettings, Disturbance, Effort, EncoderSettings, Horizon, MapAxis, Mass, Spread,
     attraction, attraction_map, coarser, coarsest_encoder, corners, endurance, largest_percent,
     mass_tolerances, monte_carlo, noise_run, sample, trial,
 };
@@ -54,7 +54,7 @@ fn the_edges_of_attraction_are_edges() {
     assert!(found.raw_step.as_ref().unwrap().size > 0.05, "{found:?}");
 
     // The map agrees with the edge on both of its sides.
-    let axis = |state, range| Axis { state, range, points: 2 };
+    let axis = |state, range| MapAxis { state, range, points: 2 };
     let axes = [axis(2, [0.9 * tilt.size, 1.1 * tilt.size]), axis(3, [0.0, 0.01])];
     let map = attraction_map(rig, table, Law::Lqr, axes, &settings.horizon, &|| ()).unwrap();
     assert!(map.settled_s[0][0].is_some() && map.settled_s[0][1].is_none(), "{map:?}");
@@ -65,15 +65,15 @@ fn the_edges_of_attraction_are_edges() {
 #[test]
 fn a_map_of_which_half_is_run_is_the_whole_map() {
     let (rig, table) = &*SINGLE;
-    let axis = |state, end: f64| Axis { state, range: [-end, end], points: 4 };
+    let axis = |state, end: f64| MapAxis { state, range: [-end, end], points: 4 };
     let axes = [axis(2, 0.6), axis(3, 3.0)];
     let horizon = Horizon::default();
     let map =
-        |axes: [Axis; 2]| attraction_map(rig, table, Law::Lqr, axes, &horizon, &|| ()).unwrap().settled_s;
+        |axes: [MapAxis; 2]| attraction_map(rig, table, Law::Lqr, axes, &horizon, &|| ()).unwrap().settled_s;
     let whole = map(axes);
-    let start = |axis: Axis, index: usize| {
+    let start = |axis: MapAxis, index: usize| {
         let value = axis.range[0] + 2.0 * axis.range[1] * index as f64 / 3.0;
-        Axis { range: [value, value], points: 1, ..axis }
+        MapAxis { range: [value, value], points: 1, ..axis }
     };
     for (row, column) in [(0, 0), (1, 1), (1, 2), (2, 1), (2, 2), (2, 3), (3, 0), (3, 3)] {
         let alone = map([start(axes[0], column), start(axes[1], row)]);

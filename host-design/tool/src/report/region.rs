@@ -2,10 +2,10 @@
 
 use upright::table::Law;
 
-use crate::figure::{Axis as FigureAxis, Figure, HeatMap, Panel};
+use crate::figure::{Axis, Figure, HeatMap, Panel};
 use upright_design::rig::Rig;
 use upright_design::table::TableValues;
-use upright_design::verify::{Axis, Horizon, Map, Unverifiable, attraction_map};
+use upright_design::verify::{Horizon, Map, MapAxis, Unverifiable, attraction_map};
 
 const ANGLE: usize = 2;
 const RATE: usize = 3;
@@ -21,9 +21,9 @@ pub(super) fn figure(
     points: usize,
 ) -> Result<Figure, Unverifiable> {
     const WIDER: f64 = 1.6;
-    let axis = |state: usize, largest: f64| -> Result<Axis, Unverifiable> {
+    let axis = |state: usize, largest: f64| -> Result<MapAxis, Unverifiable> {
         let end = 1.4 * extent(rig, table, law, state, largest)?;
-        Ok(Axis { state, range: [-end, end], points })
+        Ok(MapAxis { state, range: [-end, end], points })
     };
     let mut axes = [axis(ANGLE, LARGEST[0])?, axis(RATE, LARGEST[1])?];
     let map = loop {
@@ -31,7 +31,7 @@ pub(super) fn figure(
         if !reaches_edge(&map) || axes[0].range[1] > LARGEST[0] || axes[1].range[1] > LARGEST[1] {
             break map;
         }
-        axes = axes.map(|axis| Axis { range: axis.range.map(|end| WIDER * end), ..axis });
+        axes = axes.map(|axis| MapAxis { range: axis.range.map(|end| WIDER * end), ..axis });
     };
     let title = format!("{}: region of attraction, {}", rig.name, law.title());
     Ok(drawn(title, &map))
@@ -49,10 +49,10 @@ fn reaches_edge(map: &Map) -> bool {
 /// ends below a hundredth of it.
 fn extent(rig: &Rig, table: &TableValues, law: Law, state: usize, largest: f64) -> Result<f64, Unverifiable> {
     const TRIED: usize = 13;
-    let still = Axis { state: if state == ANGLE { RATE } else { ANGLE }, range: [0.0, 0.0], points: 1 };
+    let still = MapAxis { state: if state == ANGLE { RATE } else { ANGLE }, range: [0.0, 0.0], points: 1 };
     let mut end = largest;
     loop {
-        let moved = Axis { state, range: [0.0, end], points: TRIED };
+        let moved = MapAxis { state, range: [0.0, end], points: TRIED };
         let map = attraction_map(rig, table, law, [moved, still], &Horizon::default(), &|| {})?;
         let recovered = map.settled_s.concat().iter().take_while(|settled| settled.is_some()).count();
         if recovered >= 4 || end < 1e-2 * largest {
@@ -63,7 +63,7 @@ fn extent(rig: &Rig, table: &TableValues, law: Law, state: usize, largest: f64) 
 }
 
 fn drawn(title: String, map: &Map) -> Figure {
-    let centres = |axis: &Axis| -> Vec<f64> {
+    let centres = |axis: &MapAxis| -> Vec<f64> {
         let [low, high] = axis.range.map(f64::to_degrees);
         (0..axis.points).map(|i| low + (high - low) * i as f64 / (axis.points - 1) as f64).collect()
     };
@@ -74,7 +74,6 @@ fn drawn(title: String, map: &Map) -> Figure {
         rows: centres(&map.down),
         values: map.settled_s.clone(),
     };
-    let axes =
-        Panel::new(FigureAxis::linear("θ1 at the start (°)"), FigureAxis::linear("θ1' at the start (°/s)"));
+    let axes = Panel::new(Axis::linear("θ1 at the start (°)"), Axis::linear("θ1' at the start (°/s)"));
     Figure::narrow(title).with(Panel { heat: Some(heat), ..axes.high(400) })
 }

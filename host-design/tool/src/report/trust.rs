@@ -1,7 +1,7 @@
 //! The trust report as tables of the page.
 
 use upright_design::rig::Rig;
-use upright_design::verify::{Row, TrustReport, rows};
+use upright_design::verify::{FoundRow, TrustReport, rows};
 
 /// One quantity with its value for each law.
 pub(super) struct TrustRow {
@@ -32,14 +32,14 @@ pub(super) fn check_rows(report: &TrustReport) -> Vec<CheckRow> {
 
 /// The rows of all laws side by side. A law without a row that another has gets a dash.
 pub(super) fn trust_rows(rig: &Rig, report: &TrustReport) -> Vec<TrustRow> {
-    let laws: Vec<Vec<Row>> = report.laws.iter().map(|law| rows(rig, law)).collect();
+    let laws: Vec<Vec<FoundRow>> = report.laws.iter().map(|law| rows(rig, law)).collect();
     // An unstable law has some of the rows of a stable one, and no others.
     let Some(names) = laws.iter().max_by_key(|rows| rows.len()) else { return Vec::new() };
-    let value = |rows: &Vec<Row>, name: &str| {
+    let value = |rows: &Vec<FoundRow>, name: &str| {
         let row = rows.iter().find(|row| row.name == name);
         row.map_or("—".to_owned(), |row| row.value.clone())
     };
-    let row = |named: &Row| TrustRow {
+    let row = |named: &FoundRow| TrustRow {
         name: named.name.clone(),
         values: laws.iter().map(|rows| value(rows, &named.name)).collect(),
         meaning: named.meaning,

@@ -13,7 +13,7 @@ use upright::table::Law;
 use upright_design::design::design;
 use upright_design::harness::{Harness, HarnessError, Pins, Target, with_firmware};
 use upright_design::identify::{
-    Feed, Kind as Parameter, LineError, Log, OverLine, Settings, ShakeError, Shaken, checked_and_hanging,
+    Feed, LineError, Log, OverLine, ParameterKind, Settings, ShakeError, Shaken, checked_and_hanging,
     identify,
 };
 use upright_design::plant::ChainParameters;
@@ -59,7 +59,7 @@ fn the_log_of_the_firmware_gives_the_parameters_of_the_machine() {
     let chain = machine.chain().unwrap();
     let real = real_chain(chain, &machine.reality.parameters);
     let constants = ChainParameters::<f64>::of(&real);
-    let close = |kind: Parameter, wanted: f64| {
+    let close = |kind: ParameterKind, wanted: f64| {
         let estimate = found.estimate(kind).unwrap();
         let error = (estimate.new - wanted).abs();
         assert!(
@@ -69,12 +69,12 @@ fn the_log_of_the_firmware_gives_the_parameters_of_the_machine() {
         );
         assert!(estimate.deviation < 0.02 * wanted.abs().max(0.05), "{estimate:?}");
     };
-    close(Parameter::TotalMass, constants.total_mass);
-    close(Parameter::Length(0), real.links[0].length_m);
+    close(ParameterKind::TotalMass, constants.total_mass);
+    close(ParameterKind::Length(0), real.links[0].length_m);
     for joint in 0..2 {
-        close(Parameter::FirstMoment(joint), constants.a[joint]);
-        close(Parameter::SecondMoment(joint), constants.b[(joint, joint)]);
-        close(Parameter::Zero(joint), machine.reality.sensors.homing_error_rad.of(joint));
+        close(ParameterKind::FirstMoment(joint), constants.a[joint]);
+        close(ParameterKind::SecondMoment(joint), constants.b[(joint, joint)]);
+        close(ParameterKind::Zero(joint), machine.reality.sensors.homing_error_rad.of(joint));
     }
 }
 

@@ -39,7 +39,7 @@ impl ImperfectionSettings {
 
 /// Results of the runs with one size.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct Verdict {
+pub struct SizeRuns {
     /// Number of runs that survive.
     pub survived: u64,
     /// Number of runs that survive within the supervisor's limits of angle and rail, so that the motor stays on.
@@ -92,7 +92,7 @@ pub struct Imperfections {
     /// Each imperfection alone.
     pub alone: Vec<Survival>,
     /// All imperfections of the rig file's `[reality]` together; none if it has none.
-    pub together: Option<Verdict>,
+    pub together: Option<SizeRuns>,
 }
 
 /// A size that the loop has to survive according to `[verify]`, and the results of its runs.
@@ -107,7 +107,7 @@ pub struct RequiredSurvival {
     /// Number of runs with this size.
     pub runs: u64,
     /// Results of these runs.
-    pub verdict: Verdict,
+    pub verdict: SizeRuns,
 }
 
 /// Sizes are tried from this share of a good machine's to this multiple of a poor one's.
@@ -129,7 +129,7 @@ pub fn imperfections(
 ) -> Result<Imperfections, Unverifiable> {
     chain(rig, "imperfections")?;
     within("relative", settings.relative, 1e-3..=1.0, "a width from 0.001 to 1")?;
-    let search = Search { rig, table, law, settings };
+    let search = SizeSearch { rig, table, law, settings };
     let one = |imperfection: &'static Imperfection| {
         let survival = search.survival(imperfection);
         done();
@@ -153,7 +153,7 @@ pub fn required_imperfections(
     settings: &ImperfectionSettings,
 ) -> Result<Vec<RequiredSurvival>, Unverifiable> {
     chain(rig, "imperfections")?;
-    let search = Search { rig, table, law, settings };
+    let search = SizeSearch { rig, table, law, settings };
     let required = |imperfection: &'static Imperfection| {
         let size = (imperfection.required)(&rig.verify)?;
         let Imperfection { key, requirement, .. } = *imperfection;
@@ -174,9 +174,9 @@ pub fn limit_cycle(
     law: Law,
     settings: &ImperfectionSettings,
     survival: &Survival,
-) -> Result<Vec<(f64, Verdict)>, Unverifiable> {
+) -> Result<Vec<(f64, SizeRuns)>, Unverifiable> {
     chain(rig, "imperfections")?;
-    let search = Search { rig, table, law, settings };
+    let search = SizeSearch { rig, table, law, settings };
     let end = survival.falls_at.unwrap_or(survival.largest_tried);
     let at = |share: f64| {
         let size = share * end;
@@ -185,14 +185,14 @@ pub fn limit_cycle(
     Ok(SHARES.into_iter().map(at).collect::<Result<_, SimulationError>>()?)
 }
 
-struct Search<'a> {
+struct SizeSearch<'a> {
     rig: &'a Rig,
     table: &'a TableValues,
     law: Law,
     settings: &'a ImperfectionSettings,
 }
 
-impl Search<'_> {
+impl SizeSearch<'_> {
     fn survival(&self, imperfection: &'static Imperfection) -> Result<Survival, SimulationError> {
         let [good, poor] = imperfection.typical;
         // Masses and lengths cannot be wrong by more than nine tenths.
@@ -200,7 +200,7 @@ impl Search<'_> {
         let sizes = [RANGE[0] * good, (RANGE[1] * poor).min(most)];
         // Both searches try many of the same sizes.
         let mut known = BTreeMap::new();
-        let mut at = |size: f64| -> Result<Verdict, SimulationError> {
+        let mut at = |size: f64| -> Result<SizeRuns, SimulationError> {
             if let Some(verdict) = known.get(&size.to_bits()) {
                 return Ok(*verdict);
             }
@@ -226,14 +226,14 @@ impl Search<'_> {
     }
 
     /// Runs of all seeds on a machine with this imperfection alone.
-    fn alone(&self, imperfection: &Imperfection, size: f64) -> Result<Verdict, SimulationError> {
+    fn alone(&self, imperfection: &Imperfection, size: f64) -> Result<SizeRuns, SimulationError> {
         let mut reality = Reality::default();
         (imperfection.set)(&mut reality, size);
         self.verdict(reality)
     }
 
     /// Runs of all seeds on a machine with these imperfections.
-    fn verdict(&self, reality: Reality) -> Result<Verdict, SimulationError> {
+    fn verdict(&self, reality: Reality) -> Result<SizeRuns, SimulationError> {
         let real = Rig { reality, ..self.rig.clone() };
         let one = |seed: u64| {
             let scenario = Scenario {
@@ -245,7 +245,7 @@ impl Search<'_> {
             trial(&real, self.table, &scenario, &Horizon::default())
         };
         let all: Vec<_> = parallel::try_map(1..=self.settings.seeds, one)?;
-        Ok(Verdict {
+        Ok(SizeRuns {
             survived: all.iter().filter(|outcome| outcome.survives()).count() as u64,
             within_limits: all.iter().filter(|outcome| self.is_within_limits(outcome)).count() as u64,
             peak_angle_rad: all.iter().map(|outcome| outcome.peak_angle_rad).fold(0.0, f64::max),

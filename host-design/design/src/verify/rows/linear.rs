@@ -1,12 +1,12 @@
 //! Rows from the linear model of the loop.
 
 use super::quantity::Values::{Each, One};
-use super::quantity::{Quantity, force, is_chain, number};
+use super::quantity::{TrustQuantity, force, is_chain, number};
 use crate::rig::Rig;
 use crate::verify::{LawTrust, Margins, NoiseShare};
 
-pub(super) const QUANTITIES: &[Quantity] = &[
-    Quantity {
+pub(super) const QUANTITIES: &[TrustQuantity] = &[
+    TrustQuantity {
         name: "spectral radius",
         meaning: "largest absolute value of a pole of the sampled loop: stable below 1",
         values: One(|_, law| {
@@ -14,7 +14,7 @@ pub(super) const QUANTITIES: &[Quantity] = &[
             Some(format!("{:.6}{suffix}", law.linear.spectral_radius))
         }),
     },
-    Quantity {
+    TrustQuantity {
         name: "gain margin",
         meaning: "factors by which the real force may constantly differ from the commanded force before the loop is \
                   unstable",
@@ -24,7 +24,7 @@ pub(super) const QUANTITIES: &[Quantity] = &[
             Some(format!("factor {} to {highest}", number(margins.lowest_gain)))
         }),
     },
-    Quantity {
+    TrustQuantity {
         name: "phase margin",
         meaning: "phase that the loop may lose or gain",
         values: One(|_, law| {
@@ -32,7 +32,7 @@ pub(super) const QUANTITIES: &[Quantity] = &[
             Some(phase.map_or("no limit".to_owned(), |phase| format!("{:.1}°", phase.to_degrees())))
         }),
     },
-    Quantity {
+    TrustQuantity {
         name: "delay margin",
         meaning: "additional delay of the force, including fractions of a tick, at which the loop becomes unstable",
         values: One(|_, law| {
@@ -43,7 +43,7 @@ pub(super) const QUANTITIES: &[Quantity] = &[
             })
         }),
     },
-    Quantity {
+    TrustQuantity {
         name: "peak sensitivity",
         meaning: "largest amplification of a disturbance over all frequencies (Ms), and where it occurs",
         values: One(|_, law| {
@@ -52,12 +52,12 @@ pub(super) const QUANTITIES: &[Quantity] = &[
             Some(format!("{} at {frequency} rad/s", number(margins.peak_sensitivity)))
         }),
     },
-    Quantity {
+    TrustQuantity {
         name: "disk margin",
         meaning: "size of the disk in which gain and phase may change together; 0: no margin",
         values: One(|_, law| Some(number(margins(law)?.disk_margin))),
     },
-    Quantity {
+    TrustQuantity {
         name: "longest stable tick",
         meaning: "longest period at which the same table still gives a stable loop",
         values: One(|_, law| {
@@ -65,13 +65,13 @@ pub(super) const QUANTITIES: &[Quantity] = &[
             Some(longest.map_or("30 ticks or more".to_owned(), |s| format!("{} ms", number(1e3 * s))))
         }),
     },
-    Quantity {
+    TrustQuantity {
         name: "jitter margin",
         meaning: "each force may be late by any time up to this, differently in every tick (C.-Y. Kao and B. Lincoln, \
                   Automatica 40, 2004); sufficient, not necessary",
         values: One(|_, law| Some(format!("{} ms", number(1e3 * law.linear.tick.as_ref()?.jitter_s)))),
     },
-    Quantity {
+    TrustQuantity {
         name: "f32 gains",
         meaning: "largest rounding error of a gain in units in the last place (at most 0.5: all are correctly rounded), and \
                   the change of the spectral radius",
@@ -81,7 +81,7 @@ pub(super) const QUANTITIES: &[Quantity] = &[
             Some(format!("{} ULP, spectral radius {change:+.1e}", number(rounding.gain_ulp)))
         }),
     },
-    Quantity {
+    TrustQuantity {
         name: "f32 against f64",
         meaning: "largest difference of the force, tick by tick, from the same controller in f64 with exact gains, and \
                   relative to the peak force of that run",
@@ -91,7 +91,7 @@ pub(super) const QUANTITIES: &[Quantity] = &[
             Some(format!("{}, {relative:.1e} of the peak", force(rig, force_n)))
         }),
     },
-    Quantity {
+    TrustQuantity {
         name: "RMS, ",
         meaning: "ripple at rest from this source, and from all, as the linear model predicts it; encoder resolution \
                   counts as white noise",
@@ -101,7 +101,7 @@ pub(super) const QUANTITIES: &[Quantity] = &[
             shares.map(|share| (share.source.clone(), row(share))).collect()
         }),
     },
-    Quantity {
+    TrustQuantity {
         name: "simulated RMS",
         meaning: "the same in four runs of 20 s against the nonlinear plant, with real encoder steps and the dead zone of \
                   the motor: trust this row more",

@@ -5,7 +5,7 @@ mod linear;
 mod quantity;
 mod runs;
 
-pub use quantity::Quantity;
+pub use quantity::TrustQuantity;
 use quantity::Values;
 
 use super::LawTrust;
@@ -13,7 +13,7 @@ use crate::rig::Rig;
 
 /// One row of the trust report.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Row {
+pub struct FoundRow {
     /// Name of the quantity, with its link or source.
     pub name: String,
     /// What was found, with its unit.
@@ -23,19 +23,19 @@ pub struct Row {
 }
 
 /// Every quantity, in the order in which they are shown.
-pub fn quantities() -> impl Iterator<Item = &'static Quantity> {
+pub fn quantities() -> impl Iterator<Item = &'static TrustQuantity> {
     linear::QUANTITIES.iter().chain(runs::QUANTITIES)
 }
 
 /// The rows of one law. Those that the report does not have, because the rig has no such part or the loop is unstable,
 /// are left out.
-pub fn rows(rig: &Rig, law: &LawTrust) -> Vec<Row> {
-    let rows_of = |quantity: &'static Quantity| {
+pub fn rows(rig: &Rig, law: &LawTrust) -> Vec<FoundRow> {
+    let rows_of = |quantity: &'static TrustQuantity| {
         let values = match quantity.values {
             Values::One(value) => value(rig, law).map(|value| (String::new(), value)).into_iter().collect(),
             Values::Each(values) => values(rig, law),
         };
-        values.into_iter().map(|(part, value)| Row {
+        values.into_iter().map(|(part, value)| FoundRow {
             name: format!("{}{part}", quantity.name),
             value,
             meaning: quantity.meaning,

@@ -6,7 +6,7 @@ use crate::verify::LawTrust;
 
 /// One quantity of the trust report.
 #[derive(Debug, Clone, Copy)]
-pub struct Quantity {
+pub struct TrustQuantity {
     /// Name of its row, or beginning of the names of its rows.
     pub name: &'static str,
     /// What the value means.

@@ -1,17 +1,17 @@
 //! Rows from runs against the nonlinear plant.
 
 use super::quantity::Values::{Each, One};
-use super::quantity::{Quantity, force, is_chain, number, signs};
+use super::quantity::{TrustQuantity, force, is_chain, number, signs};
 use crate::verify::LawTrust;
 
-pub(super) const QUANTITIES: &[Quantity] = &[
-    Quantity {
+pub(super) const QUANTITIES: &[TrustQuantity] = &[
+    TrustQuantity {
         name: "largest tilt, ",
         meaning: "largest initial angle from the vertical of this link alone, all others vertical, from which the loop \
                   recovers",
         values: Each(|_, law| tilts(law)),
     },
-    Quantity {
+    TrustQuantity {
         name: "largest tilt, all links",
         meaning: "the same for all links at once, in the combination of sides with the smallest angle",
         values: One(|_, law| {
@@ -20,7 +20,7 @@ pub(super) const QUANTITIES: &[Quantity] = &[
             Some(format!("{size} rad, sides {sides}, of {} combinations", worst.tried))
         }),
     },
-    Quantity {
+    TrustQuantity {
         name: "largest ungoverned step",
         meaning: "largest step of the set-point without the governor; 2 m is the largest tried",
         values: One(|rig, law| {
@@ -30,7 +30,7 @@ pub(super) const QUANTITIES: &[Quantity] = &[
             Some(format!("{}{m}{largest}, {peak} {}", number(step.size), force(rig, step.peak_force_n)))
         }),
     },
-    Quantity {
+    TrustQuantity {
         name: "coarsest encoders",
         meaning: "how many times coarser all encoders may be, with gains redesigned for them",
         values: One(|_, law| {
@@ -42,7 +42,7 @@ pub(super) const QUANTITIES: &[Quantity] = &[
             Some(format!("{factor} (links: {} counts per turn)", counts.join(" ")))
         }),
     },
-    Quantity {
+    TrustQuantity {
         name: "mass errors",
         meaning: "every combination of too heavy and too light cart and links, 10 s with disturbances, the table unchanged",
         values: One(|_, law| {
@@ -51,7 +51,7 @@ pub(super) const QUANTITIES: &[Quantity] = &[
             Some(format!("±{percent} %: {} of {} combinations survive", corners.survived, corners.corners))
         }),
     },
-    Quantity {
+    TrustQuantity {
         name: "worst mass errors",
         meaning: "the combination that falls first or, if none falls, has the largest angle",
         values: One(|_, law| {
@@ -59,7 +59,7 @@ pub(super) const QUANTITIES: &[Quantity] = &[
             Some(format!("{weakest} (cart, then links: + heavier, - lighter)"))
         }),
     },
-    Quantity {
+    TrustQuantity {
         name: "most critical mass",
         meaning: "the mass with the smallest tolerance when it alone is wrong",
         values: One(|_, law| {
@@ -68,7 +68,7 @@ pub(super) const QUANTITIES: &[Quantity] = &[
             Some(format!("{}: alone -{lighter} % to +{heavier} %", critical.mass))
         }),
     },
-    Quantity {
+    TrustQuantity {
         name: "random plants",
         meaning: "Monte Carlo: masses, lengths and inertias (by spread_percent) and friction (±20 %) drawn at random, with \
                   the 95 % interval of the share that survives (Wilson): 200 of 200 is not 100 %",

@@ -11,8 +11,8 @@ use upright_design::simulate::simulate;
 use upright_design::study::Study;
 use upright_design::table::{TableValues, write_atomically};
 use upright_design::verify::{
-    Axis, Effort, Horizon, IMPERFECTIONS, ImperfectionSettings, Imperfections, TrustReport, attraction_map,
-    monte_carlo, sample, spread, trust,
+    Effort, Horizon, IMPERFECTIONS, ImperfectionSettings, Imperfections, MapAxis, TrustReport,
+    attraction_map, monte_carlo, sample, spread, trust,
 };
 
 use crate::failure::Failure;
@@ -62,7 +62,7 @@ pub(crate) struct VerifyCommand {
     /// With --map: two states and their ranges, as index:from:to (SI; state order x, xdot, theta1, theta1dot …)
     #[arg(long, value_name = "S:A:B", num_args = 2, value_delimiter = ',', requires = "map", allow_negative_numbers = true,
           value_parser = axis, default_values = ["2:-0.5:0.5", "3:-4:4"])]
-    axes: Vec<Axis>,
+    axes: Vec<MapAxis>,
     /// Share of the random plants with one more tick of delay than designed for (0 to 1)
     #[arg(long, value_name = "SHARE", default_value_t = 0.0, value_parser = share)]
     late: f64,
@@ -76,7 +76,7 @@ pub(crate) struct VerifyCommand {
 /// Initial values along each axis of a map.
 const POINTS: usize = 41;
 
-fn axis(text: &str) -> Result<Axis, String> {
+fn axis(text: &str) -> Result<MapAxis, String> {
     let accepted = || "give index:from:to, such as 2:-0.5:0.5".to_owned();
     let mut parts = text.split(':');
     let mut next = || parts.next().ok_or_else(accepted);
@@ -86,7 +86,7 @@ fn axis(text: &str) -> Result<Axis, String> {
     if !(from.is_finite() && to.is_finite() && from < to) {
         return Err("give a range from a smaller to a larger finite number".to_owned());
     }
-    Ok(Axis { state, range: [from, to], points: POINTS })
+    Ok(MapAxis { state, range: [from, to], points: POINTS })
 }
 
 fn share(text: &str) -> Result<f64, String> {
