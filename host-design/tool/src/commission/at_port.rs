@@ -9,14 +9,14 @@ use std::time::Duration;
 use super::machine::{MachineAtHand, Stop};
 use super::step::CommissionStep;
 use super::task::PersonTask;
-use crate::monitor::{MachineLine, now};
+use crate::monitor::{SerialLine, now};
 
 /// How long a person may take for a task.
 const PATIENCE: Duration = Duration::from_secs(180);
 
 /// A machine behind a port. The journal shows what the person is asked to do; the person's answers arrive as lines.
 pub struct AtPort {
-    line: MachineLine,
+    line: SerialLine,
     said: Receiver<String>,
     /// Whether the person has asked to stop.
     stop: Arc<AtomicBool>,
@@ -27,7 +27,7 @@ impl AtPort {
     /// The machine behind `line`, with the lines that the person types. `stop` is set when everything has to end,
     /// `show` is for what the person has to read.
     pub fn new(
-        line: MachineLine,
+        line: SerialLine,
         said: Receiver<String>,
         stop: Arc<AtomicBool>,
         show: Box<dyn FnMut(&str)>,

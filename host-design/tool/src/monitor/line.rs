@@ -43,14 +43,14 @@ pub enum OpenError {
 }
 
 /// A serial device or a TCP connection.
-pub enum MachineLine {
+pub enum SerialLine {
     /// A serial device.
     Serial(Box<dyn SerialPort>),
     /// A connection to a relay, as `upright firmware run --serve` offers it.
     Tcp(TcpStream),
 }
 
-impl MachineLine {
+impl SerialLine {
     /// Opens a serial port at [`BAUD`], such as `/dev/ttyACM0` (Linux), `/dev/cu.usbmodem1101` (macOS) or `COM3`
     /// (Windows), or a relay (`tcp:HOST:PORT`).
     ///
@@ -60,7 +60,7 @@ impl MachineLine {
         let Some(address) = port.strip_prefix("tcp:") else {
             let serial = serialport::new(port, BAUD).timeout(PATIENCE).open();
             return serial
-                .map(MachineLine::Serial)
+                .map(SerialLine::Serial)
                 .map_err(|source| OpenError::Serial { port: port.to_owned(), source });
         };
         let connect = || {
@@ -71,7 +71,7 @@ impl MachineLine {
             Ok(stream)
         };
         connect()
-            .map(MachineLine::Tcp)
+            .map(SerialLine::Tcp)
             .map_err(|source| OpenError::Tcp { address: address.to_owned(), source })
     }
 
@@ -81,8 +81,8 @@ impl MachineLine {
     /// If the line is closed.
     pub fn receive<'a>(&mut self, buffer: &'a mut [u8]) -> std::io::Result<&'a [u8]> {
         let (read, serial) = match self {
-            MachineLine::Serial(port) => (port.read(buffer), true),
-            MachineLine::Tcp(stream) => (stream.read(buffer), false),
+            SerialLine::Serial(port) => (port.read(buffer), true),
+            SerialLine::Tcp(stream) => (stream.read(buffer), false),
         };
         match read {
             Ok(0) if !serial => Err(ErrorKind::UnexpectedEof.into()),
@@ -105,8 +105,8 @@ impl MachineLine {
     /// If the line is closed, or accepts no bytes.
     pub fn send(&mut self, bytes: &[u8]) -> std::io::Result<()> {
         match self {
-            MachineLine::Serial(port) => port.write_all(bytes),
-            MachineLine::Tcp(stream) => stream.write_all(bytes),
+            SerialLine::Serial(port) => port.write_all(bytes),
+            SerialLine::Tcp(stream) => stream.write_all(bytes),
         }
     }
 

@@ -2,7 +2,7 @@
 //! [client](upright_design::client).
 //!
 //! [`Monitor`] holds the state and knows neither terminal nor line: bytes and keys go in, bytes come out. [`view`]
-//! draws it, [`MachineLine`] is a serial device or a TCP connection, [`record`] writes telemetry.
+//! draws it, [`SerialLine`] is a serial device or a TCP connection, [`record`] writes telemetry.
 
 mod command;
 mod line;
@@ -12,5 +12,5 @@ pub mod view;
 pub mod words;
 
 pub use command::{BadCommand, MonitorAction, action, request};
-pub use line::{MachineLine, OpenError, now};
+pub use line::{OpenError, SerialLine, now};
 pub use model::{Ended, Monitor};

@@ -13,7 +13,7 @@ use upright_design::motion::posture_name;
 use upright_design::plant::absolute_angles;
 
 use super::command::MonitorAction;
-use super::line::{MachineLine, now};
+use super::line::{SerialLine, now};
 use super::words;
 
 /// Time span of the plots (s).
@@ -271,7 +271,7 @@ impl Monitor {
 
     /// Sends what is due over `line`, and receives for at most 5 ms; returns the telemetry. A line that fails ends the
     /// conversation.
-    pub fn exchange(&mut self, line: &mut MachineLine) -> Vec<AnyTelemetry> {
+    pub fn exchange(&mut self, line: &mut SerialLine) -> Vec<AnyTelemetry> {
         self.poll(now());
         match line.exchange(&self.take_outgoing(), &mut [0; 4096]) {
             Ok(bytes) => self.receive(bytes, now()),

@@ -6,7 +6,7 @@ use serde_json::Value;
 
 use super::dispatcher::Dispatcher;
 use super::pace::PICTURE;
-use crate::monitor::{MachineLine, now};
+use crate::monitor::{SerialLine, now};
 
 /// Longest wait at the end, when the motor is turned off, for the answer.
 const LAST_WAIT: Duration = Duration::from_millis(500);
@@ -14,7 +14,7 @@ const LAST_WAIT: Duration = Duration::from_millis(500);
 /// Passes bytes between the line and the viewers while `goes_on` holds. The firmware has to be that of the rig with
 /// this hash; commands to another one are not sent.
 pub(super) fn run(
-    mut line: MachineLine,
+    mut line: SerialLine,
     dispatcher: &mut Dispatcher,
     rig_hash: u64,
     goes_on: &dyn Fn() -> bool,
@@ -43,7 +43,7 @@ pub(super) fn run(
 }
 
 /// Sends pending bytes, and receives.
-fn exchange(line: &mut MachineLine, dispatcher: &mut Dispatcher) {
+fn exchange(line: &mut SerialLine, dispatcher: &mut Dispatcher) {
     let telemetry = dispatcher.monitor.exchange(line);
     dispatcher.take(telemetry);
 }

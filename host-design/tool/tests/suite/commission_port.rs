@@ -16,7 +16,7 @@ use upright_tool::commission::{
     AtPort, CommissionPlan, CommissionRecord, CommissionStep, Commissioning, Journal, MachineAtHand,
     PersonTask, Planted, Simulated, Stop,
 };
-use upright_tool::monitor::MachineLine;
+use upright_tool::monitor::SerialLine;
 
 use crate::command::{SINGLE, path_of};
 
@@ -114,7 +114,7 @@ fn commissioned(
         };
         let stop = Arc::new(AtomicBool::new(false));
         stop.store(is_stopped, Ordering::Relaxed);
-        let port = AtPort::new(MachineLine::open(&address).unwrap(), said, stop, Box::new(show));
+        let port = AtPort::new(SerialLine::open(&address).unwrap(), said, stop, Box::new(show));
         let mut machine = Heard { port, hand };
         let mut journal = Journal::new(CommissionRecord::new(rig, &address), None, Box::new(|_| ()));
         let plan =

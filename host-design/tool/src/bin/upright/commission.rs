@@ -14,8 +14,8 @@ use upright_tool::commission::{
     AtPort, CommissionPlan, CommissionRecord, CommissionStep, Commissioning, Designed, Journal, Planted,
     Simulated,
 };
-use upright_tool::in_the_loop::Link;
-use upright_tool::monitor::MachineLine;
+use upright_tool::in_the_loop::PinLink;
+use upright_tool::monitor::SerialLine;
 
 use crate::failure::Failure;
 use crate::firmware::lines_of_stdin;
@@ -93,7 +93,7 @@ impl CommissionCommand {
             (None, target) => {
                 let target = target.unwrap_or(TargetOption::Host);
                 let machine = self.true_machine(&rig)?;
-                let built = target.built(Link::Files, &rig, &table)?;
+                let built = target.built(PinLink::Files, &rig, &table)?;
                 let mut journal = journal(built.place(self.seed).name());
                 let result = self.simulated(plan, &machine, target, &built, &mut journal);
                 (journal, result)
@@ -113,7 +113,7 @@ impl CommissionCommand {
         for signal in [SIGINT, SIGTERM] {
             signal_hook::flag::register(signal, Arc::clone(&stop))?;
         }
-        let mut machine = AtPort::new(MachineLine::open(port)?, lines_of_stdin(), stop, self.show());
+        let mut machine = AtPort::new(SerialLine::open(port)?, lines_of_stdin(), stop, self.show());
         let designed = Commissioning::first(plan, &mut machine, journal)?;
         self.write(&designed)?;
         let new = self.write.as_deref().unwrap_or(&self.rig).display();
@@ -140,7 +140,7 @@ impl CommissionCommand {
         self.write(&designed)?;
         let (rig, table) = (&designed.rig, &designed.table);
         let built = journal.step(CommissionStep::Image, |journal| {
-            let built = target.built(Link::Files, rig, table)?;
+            let built = target.built(PinLink::Files, rig, table)?;
             journal.found(format!("rig {:016x}, table {:08x}", table.rig_hash, table.crc()));
             Ok::<_, Failure>(built)
         })?;

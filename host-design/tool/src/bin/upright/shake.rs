@@ -11,9 +11,9 @@ use signal_hook::consts::{SIGINT, SIGTERM};
 use upright_design::identify::{LineError, Log, OverLine, shake};
 use upright_design::rig::Rig;
 use upright_design::table::{Gains, write_atomically};
-use upright_tool::in_the_loop::Link;
+use upright_tool::in_the_loop::PinLink;
 use upright_tool::in_the_loop::run_shaken;
-use upright_tool::monitor::{MachineLine, now};
+use upright_tool::monitor::{SerialLine, now};
 
 use crate::failure::Failure;
 use crate::progress::with_spinner;
@@ -91,7 +91,7 @@ impl ShakeCommand {
             return Ok(with_spinner("shaking", || shake(rig, seconds, self.seed))?);
         };
         let (_, table) = with_table(rig, &self.rig, Gains::Sampled)?;
-        let built = target.built(Link::Files, rig, &table)?;
+        let built = target.built(PinLink::Files, rig, &table)?;
         Ok(with_spinner("shaking", || run_shaken(rig, &table, seconds, self.seed, built.place(self.seed)))?)
     }
     /// Shakes the machine behind a port and returns its log.
@@ -101,7 +101,7 @@ impl ShakeCommand {
         for signal in [SIGINT, SIGTERM] {
             signal_hook::flag::register(signal, Arc::clone(&stop))?;
         }
-        let mut line = MachineLine::open(port)?;
+        let mut line = SerialLine::open(port)?;
         let mut shaking = OverLine::new(rig, &table, seconds, self.seed, now())?;
         let failed = |error: LineError| Failure::CheckFailed(format!("{port}: {error}"));
         let ended = with_spinner("shaking; Ctrl-C turns the motor off", || {
@@ -124,7 +124,7 @@ impl ShakeCommand {
 }
 
 /// Sends pending bytes, and receives.
-fn exchange(line: &mut MachineLine, shaking: &mut OverLine) -> Result<Result<(), LineError>, std::io::Error> {
+fn exchange(line: &mut SerialLine, shaking: &mut OverLine) -> Result<Result<(), LineError>, std::io::Error> {
     let mut buffer = [0; 4096];
     let bytes = line.exchange(&shaking.take_outgoing(), &mut buffer)?;
     Ok(shaking.receive(bytes, now()))

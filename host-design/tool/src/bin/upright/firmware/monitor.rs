@@ -16,7 +16,7 @@ use ratatui::crossterm::event::{self, Event, KeyEventKind};
 use signal_hook::consts::SIGHUP;
 use signal_hook::consts::{SIGINT, SIGTERM};
 use upright_tool::monitor::record::{TelemetryCsv, json};
-use upright_tool::monitor::{MachineLine, MonitorAction, action, now, request, view};
+use upright_tool::monitor::{MonitorAction, SerialLine, action, now, request, view};
 
 use super::built::designed;
 use crate::failure::Failure;
@@ -80,7 +80,7 @@ impl MonitorCommand {
         }
         let mut conversation = Conversation {
             model: upright_tool::monitor::Monitor::new(&self.port),
-            line: MachineLine::open(&self.port)?,
+            line: SerialLine::open(&self.port)?,
             recorder: None,
             stop,
             until,
@@ -117,7 +117,7 @@ impl Drop for Screen {
 
 struct Conversation {
     model: upright_tool::monitor::Monitor,
-    line: MachineLine,
+    line: SerialLine,
     recorder: Option<TelemetryCsv<File>>,
     stop: Arc<AtomicBool>,
     until: Option<Instant>,
