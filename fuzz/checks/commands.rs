@@ -82,21 +82,6 @@ impl Run<'_> {
     fn step(&mut self, what: u8, bytes: &mut impl Iterator<Item = u8>) {
         let mut next = || bytes.next().unwrap_or_default();
         match what >> 3 {
-            0 => self.send(Request::KeepAlive),
-            1 => self.send(Request::Home),
-            2 => self.send(Request::HomeRail),
-            3 => self.send(Request::CheckSigns),
-            4 | 5 => self.send(Request::Arm),
-            6 => self.send(Request::Disarm),
-            7 => self.send(Request::Clear),
-            8 => self.send(Request::Setpoint(f32::from_le_bytes([next(), next(), next(), next()]))),
-            9 => self.send(Request::Setpoint(setpoint(next()))),
-            10 => self.send(Request::Select(if next() % 2 == 0 { Law::Lqr } else { Law::PolePlacement })),
-            11 => self.send(Request::Info),
-            12 => self.send(Request::Cause),
-            13 => self.send(Request::Statistics),
-            14 => self.send(Request::ResetStatistics),
-            15 => self.send(Request::Telemetry(u16::from_le_bytes([next(), next()]))),
             16 => {
                 let length = next() % 32;
                 (0..length).for_each(|_| self.link.receive(next()));
@@ -126,19 +111,12 @@ impl Run<'_> {
                     self.tick();
                 }
             }
-            28 => self.send(Request::Log(next() % 2 == 0)),
-            29 => {
-                let [most_n, stiffness_n_per_m, damping_n_s_per_m] =
-                    core::array::from_fn(|_| setpoint(next()));
-                self.send(Request::Shake(Shaking { most_n, stiffness_n_per_m, damping_n_s_per_m }));
-            }
             30 => {
                 let first = self.control.firmware().statistics().ticks as u16;
                 let forces = core::array::from_fn(|_| next() as i8);
                 self.send(Request::Forces { first: first.wrapping_add(u16::from(next())), forces });
             }
-            26 | 27 => self.send(Request::Jog { along: next() % 2 == 0 }),
-            _ => {}
+            which => self.send(request(which, next)),
         }
         const TICKS: [u8; 8] = [1, 0, 1, 2, 1, 3, 0, 4];
         (0..TICKS[usize::from(what % 8)]).for_each(|_| self.tick());
@@ -183,6 +161,33 @@ impl Run<'_> {
         }
         let rig = self.control.board().clone();
         self.invariants.check(self.control.firmware(), &rig, answered.as_ref());
+    }
+}
+
+/// The request of a step that sends one, with operands from `next`.
+fn request(which: u8, mut next: impl FnMut() -> u8) -> Request {
+    match which {
+        0 => Request::KeepAlive,
+        1 => Request::Home,
+        2 => Request::HomeRail,
+        3 => Request::CheckSigns,
+        4 | 5 => Request::Arm,
+        6 => Request::Disarm,
+        7 => Request::Clear,
+        8 => Request::Setpoint(f32::from_le_bytes([next(), next(), next(), next()])),
+        9 => Request::Setpoint(setpoint(next())),
+        10 => Request::Select(if next() % 2 == 0 { Law::Lqr } else { Law::PolePlacement }),
+        11 => Request::Info,
+        12 => Request::Cause,
+        13 => Request::Statistics,
+        14 => Request::ResetStatistics,
+        15 => Request::Telemetry(u16::from_le_bytes([next(), next()])),
+        28 => Request::Log(next() % 2 == 0),
+        29 => {
+            let [most_n, stiffness_n_per_m, damping_n_s_per_m] = core::array::from_fn(|_| setpoint(next()));
+            Request::Shake(Shaking { most_n, stiffness_n_per_m, damping_n_s_per_m })
+        }
+        _ => Request::Jog { along: next() % 2 == 0 },
     }
 }
 

@@ -105,7 +105,7 @@ struct Columns<'t> {
 
 /// The four knots nearest to a tick, and their interpolation weights.
 #[derive(Debug, Clone, Copy)]
-struct Window {
+struct KnotWindow {
     /// Length of a column.
     knots: usize,
     /// The first of the four nearest knots.
@@ -116,7 +116,7 @@ struct Window {
 }
 
 impl Columns<'_> {
-    fn window(&self, tick: u32, ticks_per_knot: u32) -> Window {
+    fn window(&self, tick: u32, ticks_per_knot: u32) -> KnotWindow {
         let knots = self.values.len() / self.units.len().max(1);
         // A checked table has at least four knots.
         let last = knots.saturating_sub(4) as u32;
@@ -125,14 +125,14 @@ impl Columns<'_> {
         let [a, b, c, d] = [p, p - 1.0, p - 2.0, p - 3.0];
         let cubics = [b * c * d * (-1.0 / 6.0), a * b * d * -0.5, a * b * c * (1.0 / 6.0)];
         let [w_a, w_c, w_d] = cubics.map(|weight| (weight * ONE as f32) as i32);
-        Window { knots, first: first as usize, weights: [w_a, ONE - w_a - w_c - w_d, w_c, w_d] }
+        KnotWindow { knots, first: first as usize, weights: [w_a, ONE - w_a - w_c - w_d, w_c, w_d] }
     }
 
     /// Interpolates the columns from number `column` on and writes them to `to`, in SI units.
     // Not inlined: a copy for each number of columns would have to be fetched from flash in every tick.
     #[inline(never)]
-    fn blend(&self, window: &Window, column: usize, to: &mut [f32]) {
-        let Window { knots, first, weights: [w_a, w_b, w_c, w_d] } = *window;
+    fn blend(&self, window: &KnotWindow, column: usize, to: &mut [f32]) {
+        let KnotWindow { knots, first, weights: [w_a, w_b, w_c, w_d] } = *window;
         let columns = self.values.get(column * knots..).unwrap_or_default().chunks_exact(knots.max(1));
         let units = self.units.get(column..).unwrap_or_default();
         for ((to, column), unit) in to.iter_mut().zip(columns).zip(units) {

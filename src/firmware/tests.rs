@@ -131,11 +131,10 @@ fn a_rail_of_another_length_is_not_homed() {
 /// Ticks of balancing in [`cause_of`], at the end of a pass of the table's checksum.
 const TICKS: u32 = 3;
 
-/// The cause that is latched when all of `faults` are due in the same tick of balancing, the last of [`TICKS`].
-fn cause_of(faults: &[Fault], ticks_of_a_pass: u32) -> Option<Cause> {
+/// Two tables. The limits of the first one catch only a bad encoder, because it takes three measurements in a row.
+/// Those of the second one catch each of `faults` that is found with a table.
+fn calm_and_strict(faults: &[Fault]) -> [GainTable<STATES, SENSORS>; 2] {
     let due = |fault| faults.contains(&fault);
-    // The limits of the first table catch only a bad encoder, because it takes three measurements in a row. Those of
-    // the second one catch whatever is due.
     let mut calm = TABLE;
     calm.limits.angle_rad = f32::MAX;
     calm.thresholds.innovation = [f32::MAX; SENSORS];
@@ -156,7 +155,13 @@ fn cause_of(faults: &[Fault], ticks_of_a_pass: u32) -> Option<Cause> {
         calm.thresholds.motor.b = [1.0; 2];
     }
     strict.crc ^= u32::from(due(Fault::Table));
+    [calm, strict]
+}
 
+/// The cause that is latched when all of `faults` are due in the same tick of balancing, the last of [`TICKS`].
+fn cause_of(faults: &[Fault], ticks_of_a_pass: u32) -> Option<Cause> {
+    let due = |fault| faults.contains(&fault);
+    let [calm, strict] = calm_and_strict(faults);
     let mut firmware = firmware(&TABLE, Reset::Power);
     // If a table fault is due, the pass ends in the last tick. Otherwise it ends later: it would find that the tables
     // differ.

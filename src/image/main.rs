@@ -48,7 +48,7 @@ mod app {
     struct Shared {}
 
     #[local]
-    struct Local {
+    struct TaskState {
         control: ControlTask<'static, 'static, Hardware, STATES, SENSORS, SwingUp>,
         link: SerialLink<'static, STATES, SENSORS>,
         line: SerialLine,
@@ -61,7 +61,7 @@ mod app {
         // In RAM, which is read without wait states: in flash, many words cost five.
         table: GainTable<STATES, SENSORS> = TABLE,
     ])]
-    fn init(cx: init::Context) -> (Shared, Local) {
+    fn init(cx: init::Context) -> (Shared, TaskState) {
         let table = &*cx.local.table;
         let (hardware, line, start) = set_up(cx.device, cx.local.buffer);
         let (to_control, commands) = cx.local.commands.split();
@@ -70,7 +70,7 @@ mod app {
         let mut control = ControlTask::new(firmware, hardware, commands, messages);
         control.board().start_watchdog();
         start_ticks(cx.core.SYST, crate::CYCLES_PER_TICK);
-        (Shared {}, Local { control, link: SerialLink::new(to_control, to_link), line })
+        (Shared {}, TaskState { control, link: SerialLink::new(to_control, to_link), line })
     }
 
     #[task(binds = SysTick, priority = 3, local = [control])]

@@ -36,7 +36,6 @@ impl<const N: usize, T: Number> ChainModel<N, T> {
         let zero = force.constant(0.0);
         let ([a], [weight]) = (&self.a.data.0, &self.weight.data.0);
         let (b, b_reduced) = (&self.b.data.0, &self.b_reduced.data.0);
-        let [joint_frictions] = &self.joint_frictions.data.0;
         let (sin, cos) = T::sines_and_cosines(&state.phi);
 
         let mut sin_w2 = [zero; N];
@@ -66,17 +65,7 @@ impl<const N: usize, T: Number> ChainModel<N, T> {
                 s[j][k] = b_reduced[j][k] * (cos[j] * cos[k]) + b[j][k] * (sin[j] * sin[k]);
             }
         }
-        // Q_j = τ_j - τ_{j+1}: each joint torque acts on its own link and, with opposite sign, on the link below.
-        let mut rate_below = zero;
-        for j in 0..N {
-            let tau = torques[j] - joint_frictions[j] * (state.phidot[j] - rate_below);
-            rate_below = state.phidot[j];
-            r[j] += tau;
-            if j > 0 {
-                r[j - 1] -= tau;
-            }
-        }
-
+        self.add_joint_torques(&mut r, &state.phidot, torques, zero);
         let phiddot = solve_symmetric(s, r, zero);
         let mut reaction = zero;
         for k in 0..N {
@@ -87,6 +76,22 @@ impl<const N: usize, T: Number> ChainModel<N, T> {
             xdot: (f + reaction) * self.inverse_mass,
             phi: state.phidot,
             phidot: phiddot,
+        }
+    }
+
+    /// Adds Q_j = τ_j - τ_{j+1}, friction included, to `r`: each joint torque acts on its own link and, with opposite
+    /// sign, on the link below.
+    #[inline(always)]
+    fn add_joint_torques(&self, r: &mut [T; N], phidot: &[T; N], torques: &[T; N], zero: T) {
+        let [joint_frictions] = &self.joint_frictions.data.0;
+        let mut rate_below = zero;
+        for j in 0..N {
+            let tau = torques[j] - joint_frictions[j] * (phidot[j] - rate_below);
+            rate_below = phidot[j];
+            r[j] += tau;
+            if j > 0 {
+                r[j - 1] -= tau;
+            }
         }
     }
 }

@@ -312,21 +312,20 @@ mod tests {
         Ok(())
     }
 
-    #[test]
-    fn every_event_in_every_state_leads_where_the_table_says() {
+    const RUNNING: [State; 8] = [Jogging, Identifying, Armed, Raising, Balancing, Holding, Lowering, Fault];
+    const NOT_CALIBRATED: [State; 10] =
+        [Disarmed, Homing, Jogging, Identifying, Armed, Raising, Balancing, Holding, Lowering, Fault];
+    const NOT_BALANCING: [State; 9] =
+        [Disarmed, Homing, Calibrated, Jogging, Identifying, Armed, Raising, Lowering, Fault];
+
+    /// One row per event: the state it leads to from each of STATES, and where it is refused.
+    fn transitions() -> [(Event, [State; 11], &'static [State]); 23] {
         use Event::*;
-        let known = [Calibrated, Jogging, Identifying, Armed, Raising, Balancing, Holding, Lowering];
-        let running = [Jogging, Identifying, Armed, Raising, Balancing, Holding, Lowering, Fault];
-        let not_calibrated =
-            [Disarmed, Homing, Jogging, Identifying, Armed, Raising, Balancing, Holding, Lowering, Fault];
-        let not_balancing =
-            [Disarmed, Homing, Calibrated, Jogging, Identifying, Armed, Raising, Lowering, Fault];
         // Where an event leads to from each of STATES, if not to the same state.
         let but = |changes: &[(State, State)]| {
             STATES.map(|from| changes.iter().find(|(state, _)| *state == from).map_or(from, |(_, to)| *to))
         };
-        // One row per event: the state it leads to from each of STATES, and where it is refused.
-        let table: [(Event, [State; 11], &[State]); 23] = [
+        [
             (Trip, [Fault; 11], &[]),
             (TripEncoder, [Fault; 11], &[]),
             (
@@ -343,28 +342,33 @@ mod tests {
                 ]),
                 &[],
             ),
-            (StartHoming, but(&[(Disarmed, Homing), (Calibrated, Homing)]), &running),
-            (CompleteHoming, but(&[(Disarmed, Calibrated), (Homing, Calibrated)]), &running),
-            (StartJogging, but(&[(Calibrated, Jogging)]), &not_calibrated),
+            (StartHoming, but(&[(Disarmed, Homing), (Calibrated, Homing)]), &RUNNING),
+            (CompleteHoming, but(&[(Disarmed, Calibrated), (Homing, Calibrated)]), &RUNNING),
+            (StartJogging, but(&[(Calibrated, Jogging)]), &NOT_CALIBRATED),
             (StartJoggingInhibited, STATES, &STATES),
-            (StartIdentifying, but(&[(Calibrated, Identifying)]), &not_calibrated),
+            (StartIdentifying, but(&[(Calibrated, Identifying)]), &NOT_CALIBRATED),
             (StartIdentifyingInhibited, STATES, &STATES),
-            (Arm, but(&[(Calibrated, Armed)]), &not_calibrated),
+            (Arm, but(&[(Calibrated, Armed)]), &NOT_CALIBRATED),
             (ArmInhibited, STATES, &STATES),
             (StartBalancing, but(&[(Armed, Balancing)]), &[]),
             (CancelArming, but(&[(Armed, Calibrated)]), &[]),
-            (Raise, but(&[(Calibrated, Raising)]), &not_calibrated),
+            (Raise, but(&[(Calibrated, Raising)]), &NOT_CALIBRATED),
             (RaiseInhibited, STATES, &STATES),
-            (Lower, but(&[(Balancing, Lowering), (Holding, Lowering)]), &not_balancing),
+            (Lower, but(&[(Balancing, Lowering), (Holding, Lowering)]), &NOT_BALANCING),
             (LowerInhibited, STATES, &STATES),
-            (MoveOn, but(&[(Balancing, Raising), (Holding, Raising)]), &not_balancing),
+            (MoveOn, but(&[(Balancing, Raising), (Holding, Raising)]), &NOT_BALANCING),
             (MoveOnInhibited, STATES, &STATES),
             (FinishMotion, but(&[(Raising, Balancing), (Lowering, Calibrated)]), &[]),
             (FinishMotionElsewhere, but(&[(Raising, Holding), (Lowering, Calibrated)]), &[]),
             (Clear, but(&[(Fault, Disarmed)]), &[]),
             (ClearInhibited, STATES, &[Fault]),
-        ];
-        for (event, leads_to, refused_in) in table {
+        ]
+    }
+
+    #[test]
+    fn every_event_in_every_state_leads_where_the_table_says() {
+        let known = [Calibrated, Jogging, Identifying, Armed, Raising, Balancing, Holding, Lowering];
+        for (event, leads_to, refused_in) in transitions() {
             for (from, to) in STATES.into_iter().zip(leads_to) {
                 let mut supervisor = supervisor(from, known.contains(&from));
                 let outcome = apply(&mut supervisor, event);

@@ -8,6 +8,32 @@ use nalgebra::{SMatrix, SVector};
 
 use super::*;
 
+const LIMITS: Limits<2> = Limits {
+    rail_m: [-1.0, 1.0],
+    angle_rad: 0.35,
+    speed_m_per_s: 2.0,
+    jog_force_n: 1.5,
+    supply_min_v: 9.0,
+    supply_ticks: 2,
+    saturated_ticks: 3,
+    link_ticks: 4,
+    arm_angle_rad: 0.05,
+    arm_ticks: 5,
+    still_ticks: 6,
+    travel_counts: [2000, 20],
+    middle_counts: 7,
+    slow_counts: [8, 9],
+    rest_counts: [0, 2048],
+    turn_counts: [0, 4096],
+    sign_counts: [50, 130],
+};
+
+const THRESHOLDS: Thresholds<2> = Thresholds {
+    innovation: [0.1, 0.2],
+    frozen: [0.3, 0.4],
+    motor: MotorTest { a: [1.0, 2.0, 3.0, 4.0], b: [5.0, 6.0], ratio: 0.5, energy: 7.0 },
+};
+
 /// A table with every optional part, all numbers different.
 fn full() -> GainTable<4, 2> {
     let mut number = 0.5;
@@ -52,30 +78,8 @@ fn full() -> GainTable<4, 2> {
             slew_v_per_tick: next(),
             supply_v: next(),
         }),
-        limits: Limits {
-            rail_m: [-1.0, 1.0],
-            angle_rad: 0.35,
-            speed_m_per_s: 2.0,
-            jog_force_n: 1.5,
-            supply_min_v: 9.0,
-            supply_ticks: 2,
-            saturated_ticks: 3,
-            link_ticks: 4,
-            arm_angle_rad: 0.05,
-            arm_ticks: 5,
-            still_ticks: 6,
-            travel_counts: [2000, 20],
-            middle_counts: 7,
-            slow_counts: [8, 9],
-            rest_counts: [0, 2048],
-            turn_counts: [0, 4096],
-            sign_counts: [50, 130],
-        },
-        thresholds: Thresholds {
-            innovation: [0.1, 0.2],
-            frozen: [0.3, 0.4],
-            motor: MotorTest { a: [1.0, 2.0, 3.0, 4.0], b: [5.0, 6.0], ratio: 0.5, energy: 7.0 },
-        },
+        limits: LIMITS,
+        thresholds: THRESHOLDS,
         crc: 0,
     };
     table.crc = table.checksum();

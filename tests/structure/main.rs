@@ -207,17 +207,22 @@ fn a_name_for_two_types_and_what_is_too_long_are_found() {
     let [long, short] =
         [60, 58].map(|lines| format!("pub struct Same;\nfn f() {{\n{}}}\n", "g();\n".repeat(lines - 1)));
     let seven = "fn f(a: u8, b: u8, c: u8, d: u8, e: u8, f: u8, g: u8) {}";
+    let of_a_trait =
+        format!("trait T {{ {}; }} impl T for u8 {{ {seven} }}", seven.trim_end_matches("{}").trim());
     let found = planted(&[
         ("src/a.rs", &long),
         ("host-design/board/src/b.rs", &short),
         ("host-design/board/src/tests.rs", &short),
         ("tests/c.rs", seven),
+        ("tests/e.rs", &of_a_trait),
+        ("tests/f.rs", &format!("impl T for u8 {{ {seven} }}")),
         ("fuzz/d.rs", &"const A: u8 = 1;\n".repeat(451)),
     ]);
     let wanted = [
         "fuzz/d.rs: more than 450 lines",
         "src/a.rs: fn f: more than 60 lines",
         "tests/c.rs: fn f: more than 6 arguments",
+        "tests/e.rs: fn f: more than 6 arguments",
         "type Same: src/a.rs, host-design/board/src/b.rs",
     ];
     assert_eq!(found, wanted);

@@ -13,7 +13,8 @@ pub(crate) struct Import {
     pub(crate) name: String,
 }
 
-/// A function with its length in lines and its number of arguments.
+/// A function with its length in lines and its number of arguments: 0 for one that implements a trait, which says what
+/// the arguments are.
 pub(crate) struct Function {
     pub(crate) name: String,
     pub(crate) lines: usize,
@@ -30,6 +31,8 @@ pub(crate) struct Source {
     pub(crate) functions: Vec<Function>,
     /// How many test modules the visitor is in.
     in_tests: usize,
+    /// Whether the visitor is in the implementation of a trait.
+    in_trait: bool,
 }
 
 impl Source {
@@ -40,10 +43,11 @@ impl Source {
         Ok(source)
     }
 
-    fn add_function(&mut self, signature: &syn::Signature, body: &syn::Block) {
-        let [start, end] =
-            [signature.fn_token.span, body.brace_token.span.close()].map(|span| span.end().line);
-        let (name, arguments) = (signature.ident.to_string(), signature.inputs.len());
+    fn add_function(&mut self, signature: &syn::Signature, body: Option<&syn::Block>) {
+        let start = signature.fn_token.span.end().line;
+        let end = body.map_or(start, |body| body.brace_token.span.close().end().line);
+        let arguments = if self.in_trait { 0 } else { signature.inputs.len() };
+        let name = signature.ident.to_string();
         self.functions.push(Function { name, lines: end - start + 1, arguments });
     }
 
@@ -160,12 +164,22 @@ impl Visit<'_> for Source {
     }
 
     fn visit_item_fn(&mut self, function: &syn::ItemFn) {
-        self.add_function(&function.sig, &function.block);
+        self.add_function(&function.sig, Some(&function.block));
         visit::visit_item_fn(self, function);
     }
 
     fn visit_impl_item_fn(&mut self, function: &syn::ImplItemFn) {
-        self.add_function(&function.sig, &function.block);
+        self.add_function(&function.sig, Some(&function.block));
         visit::visit_impl_item_fn(self, function);
+    }
+    fn visit_trait_item_fn(&mut self, function: &syn::TraitItemFn) {
+        self.add_function(&function.sig, function.default.as_ref());
+        visit::visit_trait_item_fn(self, function);
+    }
+
+    fn visit_item_impl(&mut self, item: &syn::ItemImpl) {
+        let outer = std::mem::replace(&mut self.in_trait, item.trait_.is_some());
+        visit::visit_item_impl(self, item);
+        self.in_trait = outer;
     }
 }

@@ -9,9 +9,9 @@ mod f4 {
 }
 
 use f4::boards::ALL;
-use f4::boards::data::{BoardData, Chip, Source};
+use f4::boards::data::{BoardData, ChipFamily, HseSource};
 use f4::wiring::{STANDARD, Signal, Wire, encoders};
-use upright_tool::image::Board;
+use upright_tool::image::BoardName;
 
 const PAGE: &str = include_str!("../../docs/board.md");
 
@@ -45,12 +45,12 @@ fn row(wire: &Wire) -> String {
 
 fn board_row(board: &BoardData) -> String {
     let chip = match board.chip {
-        Chip::F405OrF407 => "STM32F405 or F407",
-        Chip::F446 => "STM32F446",
+        ChipFamily::F405OrF407 => "STM32F405 or F407",
+        ChipFamily::F446 => "STM32F446",
     };
     let sources = board.sources.iter().map(|source| match source {
-        Source::Crystal => "crystal",
-        Source::Clock => "clock input",
+        HseSource::Crystal => "crystal",
+        HseSource::Clock => "clock input",
     });
     let led = if board.status_led_is_low { "low" } else { "high" };
     format!(
@@ -96,6 +96,6 @@ fn the_page_shows_the_boards_of_the_image_and_the_tool_names_them() {
     let boards: Vec<_> = ALL.into_iter().map(board_row).collect();
     assert_eq!(documented(PAGE, "boards"), boards, "write src/image/board/f4/boards/ into docs/board.md");
     assert_ne!(documented(&PAGE.replace("| 3 V |", "| 3.3 V |"), "boards"), boards);
-    assert_eq!(ALL.map(|board| board.name), Board::ALL.map(Board::name));
-    assert_eq!(ALL.map(|board| encoders(board.wiring)), Board::ALL.map(Board::encoders));
+    assert_eq!(ALL.map(|board| board.name), BoardName::ALL.map(BoardName::name));
+    assert_eq!(ALL.map(|board| encoders(board.wiring)), BoardName::ALL.map(BoardName::encoders));
 }

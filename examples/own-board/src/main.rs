@@ -5,14 +5,16 @@
 
 mod board;
 
-use cortex_m::peripheral::syst::SystClkSource;
+use cortex_m::peripheral::{SYST, syst::SystClkSource};
 use heapless::spsc::Queue;
 use own_board::gains::{SWING_UP, TABLE, TICK_S};
 use panic_halt as _;
 use stm32f4xx_hal::adc::{Adc, config::AdcConfig};
+use stm32f4xx_hal::pac::{self, USART1};
 use stm32f4xx_hal::rcc::Config;
+use stm32f4xx_hal::serial::{self, Serial};
 use stm32f4xx_hal::watchdog::IndependentWatchdog;
-use stm32f4xx_hal::{pac, prelude::*, qei::Qei, serial};
+use stm32f4xx_hal::{prelude::*, qei::Qei};
 use upright::board::Board;
 use upright::firmware::Firmware;
 use upright::firmware::control_task::{COMMANDS, ControlTask, MESSAGES};
@@ -28,9 +30,6 @@ fn main() -> ! {
     let (Some(chip), Some(core)) = (pac::Peripherals::take(), cortex_m::Peripherals::take()) else {
         loop {}
     };
-    let mut timer = core.SYST;
-    timer.set_clock_source(SystClkSource::Core);
-    timer.set_reload((TICK_S * CLOCK_HZ as f32) as u32 - 1);
     let mut rcc = chip.RCC.freeze(Config::hse(8.MHz()).sysclk(CLOCK_HZ.Hz()));
     let (a, b) = (chip.GPIOA.split(&mut rcc), chip.GPIOB.split(&mut rcc));
     let (_, (pwm, ..)) = chip.TIM1.pwm_hz(20.kHz(), &mut rcc);
@@ -52,8 +51,12 @@ fn main() -> ! {
     board.watchdog.start(10.millis());
     let line = serial::config::Config::default().baudrate(460_800.bps());
     let Ok(line) = chip.USART1.serial((a.pa9, a.pa10), line, &mut rcc) else { loop {} };
-    let (mut to_host, mut from_host) = line.split();
+    run(board, core.SYST, line)
+}
 
+/// Runs the control task every tick, and the serial link in between.
+fn run(board: OwnBoard, mut timer: SYST, line: Serial<USART1>) -> ! {
+    let (mut to_host, mut from_host) = line.split();
     let (mut commands, mut messages) = (Queue::<_, COMMANDS>::new(), Queue::<_, MESSAGES>::new());
     let (to_control, from_link) = commands.split();
     let (from_control, to_link) = messages.split();
@@ -61,6 +64,8 @@ fn main() -> ! {
     let mut control = ControlTask::new(firmware, board, from_link, from_control);
     let mut link = SerialLink::new(to_control, to_link);
 
+    timer.set_clock_source(SystClkSource::Core);
+    timer.set_reload((TICK_S * CLOCK_HZ as f32) as u32 - 1);
     timer.clear_current();
     timer.enable_counter();
     let mut frame = heapless::Deque::<u8, 512>::new();

@@ -5,7 +5,7 @@
 
 use std::time::Instant;
 
-use upright_board::{Board, Conditions, Image, Input, Rules, Wire, pin, seconds};
+use upright_board::{Conditions, ExternalLevel, Image, Input, Rules, SimulatedBoard, pin, seconds};
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let arguments: Vec<String> = std::env::args().collect();
@@ -24,18 +24,18 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     conditions.crystal.hz = value("crystal").map_or(8_000_000, |hz| hz as u32);
     conditions.lsi_hz = value("lsi").map_or(32_000, |hz| hz as u32);
     let begin = Instant::now();
-    let mut board = Board::power_on(&image, &conditions, rules)?;
+    let mut board = SimulatedBoard::power_on(&image, &conditions, rules)?;
     board.skip_waiting(!has("no-skip"));
     if let Some(at) = value("stop-crystal") {
         board.at(seconds(at), Input::StopCrystal);
     }
     if let Some(at) = value("open") {
-        board.at(seconds(at), Input::Level(pin('B', 12), Wire::Open));
+        board.at(seconds(at), Input::Level(pin('B', 12), ExternalLevel::Open));
     }
     for contact in [pin('B', 12), pin('C', 0), pin('C', 1)] {
-        board.apply(Input::Level(contact, Wire::Low));
+        board.apply(Input::Level(contact, ExternalLevel::Low));
     }
-    board.apply(Input::Level(pin('B', 13), Wire::High));
+    board.apply(Input::Level(pin('B', 13), ExternalLevel::High));
     board.apply(Input::Supply(24.0));
     let ended = board.run_until(seconds(arguments[2].parse()?));
     let wall = begin.elapsed().as_secs_f64();

@@ -8,28 +8,29 @@ use crate::clock::{Time, UNITS_PER_MICROSECOND, UNITS_PER_SECOND};
 use crate::error::{Note, Rules, Stopped, Violation};
 use crate::image::Image;
 use crate::instruction::Unit;
-use crate::machine::Machine;
-use crate::peripherals::gpio::Wire;
+use crate::machine::Microcontroller;
+use crate::peripherals::gpio::ExternalLevel;
 use crate::peripherals::power::{BrownOut, POWER_DOWN_V};
 use crate::peripherals::rcc::{BROWN_OUT_FLAG, Crystal, PIN_FLAG, POWER_FLAG, SOFTWARE_FLAG};
 use crate::peripherals::usart::LineByte;
-use crate::wiring::{Pin, Wiring};
+use crate::wiring::{BoardWiring, Pin};
 
 /// Size of the reserved space below the SRAM that the firmware's MPU region covers.
 const BELOW_SRAM_BYTES: usize = 64 << 10;
 
-/// A change outside the chip, or an injected fault: applied by [`Board::apply`] or scheduled by [`Board::at`].
+/// A change outside the chip, or an injected fault: applied by [`SimulatedBoard::apply`] or scheduled by
+/// [`SimulatedBoard::at`].
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Input {
     /// An external level is applied to a pin, or removed from it.
-    Level(Pin, Wire),
+    Level(Pin, ExternalLevel),
     /// Supply voltage of the motor (V), which the converter measures through the divider.
     Supply(f32),
     /// Supply voltage of the chip (V).
     ChipSupply(f32),
     /// An encoder turns at constant speed so that it reaches `position` at `end`.
     Encoder {
-        /// Index into [`Wiring::encoders`].
+        /// Index into [`BoardWiring::encoders`].
         encoder: usize,
         /// Target position (edges).
         position: i64,
@@ -98,20 +99,20 @@ pub struct PowerStage {
 /// A virtual board after power-on, with its inputs to come.
 ///
 /// ```
-/// use upright_board::{Board, Conditions, Image, Rules, seconds};
+/// use upright_board::{Conditions, Image, Rules, SimulatedBoard, seconds};
 ///
 /// // The vectors (stack pointer, first instruction), then a program: `movs r0, #42`, and a branch to itself.
 /// let mut flash = [0x2000_1000_u32, 0x0800_0009].map(u32::to_le_bytes).concat();
 /// flash.extend([0x202a_u16, 0xe7fe].map(u16::to_le_bytes).concat());
-/// let mut board = Board::power_on(&Image::from_flash(flash), &Conditions::f405(1), Rules::STRICT)?;
+/// let mut board = SimulatedBoard::power_on(&Image::from_flash(flash), &Conditions::f405(1), Rules::STRICT)?;
 /// board.run_until(seconds(0.001))?;
 /// assert_eq!(board.registers()[0], 42);
 /// assert_eq!(board.program_counter(), 0x0800_000a);
 /// # Ok::<(), upright_board::Stopped>(())
 /// ```
 #[derive(Debug, Clone)]
-pub struct Board {
-    machine: Machine,
+pub struct SimulatedBoard {
+    machine: Microcontroller,
     /// By time and, at equal times, in the order of scheduling.
     scheduled: BTreeMap<(Time, u64), Input>,
     order: u64,
@@ -130,7 +131,7 @@ impl Conditions {
     pub fn typical(chip: Chip, seed: u64) -> Self {
         Self {
             chip,
-            wiring: Wiring::upright(),
+            wiring: BoardWiring::upright(),
             crystal: Crystal { hz: 8_000_000, start: 2_000 * UNITS_PER_MICROSECOND, is_clock_input: false },
             hsi_hz: 16_000_000,
             lsi_hz: 32_000,
@@ -142,7 +143,7 @@ impl Conditions {
     }
 }
 
-impl Board {
+impl SimulatedBoard {
     /// Switches power on: the contents of memory are random, and the processor starts at the reset vector.
     ///
     /// # Errors
@@ -152,7 +153,7 @@ impl Board {
         bus.rcc.status = POWER_FLAG | PIN_FLAG | BROWN_OUT_FLAG;
         // The internal reference of 1.21 V.
         bus.adc.inputs[17] = 1.21 / conditions.chip_v;
-        let mut machine = Machine::new(bus, image.end());
+        let mut machine = Microcontroller::new(bus, image.end());
         let started = machine.reset();
         machine.resets = 0;
         let stopped = |violation| Stopped { violation, program_counter: 0, time: 0 };

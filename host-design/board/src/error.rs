@@ -100,7 +100,7 @@ pub struct Note {
 
 /// Treatment of a violation that real hardware tolerates in one way or another.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Rule {
+pub enum Strictness {
     /// The run ends.
     Stop,
     /// It is noted, and the board does what the hardware most likely does.
@@ -113,16 +113,16 @@ pub enum Rule {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Rules {
     /// Reserved bits written.
-    pub reserved_bits: Rule,
+    pub reserved_bits: Strictness,
     /// Ones written to read-only bits.
-    pub read_only_bits: Rule,
+    pub read_only_bits: Strictness,
     /// A peripheral accessed too early after its clock was enabled.
-    pub early: Rule,
+    pub early: Strictness,
     /// Where `early` does not end the run: whether a write that comes too early is lost.
     pub early_is_lost: bool,
     /// Unaligned accesses of one register to memory: the processor splits them, and compilers rely on that. All
     /// others (to peripherals, of several words) end the run or fault.
-    pub unaligned: Rule,
+    pub unaligned: Strictness,
     /// Whether unmapped accesses, unknown instructions and UDF raise the processor's faults instead of ending the run.
     pub faults_are_taken: bool,
 }
@@ -130,21 +130,21 @@ pub struct Rules {
 impl Rules {
     /// Every violation ends the run; unaligned accesses of one register to memory are allowed.
     pub const STRICT: Self = Self {
-        reserved_bits: Rule::Stop,
-        read_only_bits: Rule::Stop,
-        early: Rule::Stop,
+        reserved_bits: Strictness::Stop,
+        read_only_bits: Strictness::Stop,
+        early: Strictness::Stop,
         early_is_lost: false,
-        unaligned: Rule::Allow,
+        unaligned: Strictness::Allow,
         faults_are_taken: false,
     };
 
     /// What hardware tolerates is noted; unaligned accesses of one register to memory are allowed.
     pub const NOTED: Self = Self {
-        reserved_bits: Rule::Note,
-        read_only_bits: Rule::Note,
-        early: Rule::Note,
+        reserved_bits: Strictness::Note,
+        read_only_bits: Strictness::Note,
+        early: Strictness::Note,
         early_is_lost: false,
-        unaligned: Rule::Allow,
+        unaligned: Strictness::Allow,
         faults_are_taken: false,
     };
 }
@@ -157,7 +157,7 @@ impl Default for Rules {
 
 /// The processor's own faults (B1.5.2).
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Fault {
+pub(crate) enum ProcessorFault {
     /// A precise data bus error, at this address.
     Bus(u32),
     /// The MPU denies a data access to this address.
@@ -180,7 +180,7 @@ pub(crate) enum Fault {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Trap {
     /// The processor takes an exception.
-    Fault(Fault),
+    Fault(ProcessorFault),
     /// The run ends.
     Stop(Violation),
 }
@@ -194,8 +194,8 @@ impl From<Violation> for Trap {
     }
 }
 
-impl From<Fault> for Trap {
-    fn from(fault: Fault) -> Self {
+impl From<ProcessorFault> for Trap {
+    fn from(fault: ProcessorFault) -> Self {
         Trap::Fault(fault)
     }
 }

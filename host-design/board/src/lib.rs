@@ -1,17 +1,17 @@
 //! A virtual board with an STM32F405, STM32F407 or STM32F446: it runs the very ELF file that is flashed.
 //!
-//! A [`Board`] interprets the image's instructions against models of the registers that the firmware uses. It is
-//! strict: anything that the manuals forbid or that is not modelled ends the run with a [`Stopped`] that says where
+//! A [`SimulatedBoard`] interprets the image's instructions against models of the registers that the firmware uses. It
+//! is strict: anything that the manuals forbid or that is not modelled ends the run with a [`Stopped`] that says where
 //! and why.
 //! Inputs are encoder edges, pin levels, supply voltages and serial bytes at their baud rate; outputs are pin levels
 //! and the bytes sent.
 //!
 //! ```no_run
-//! use upright_board::{Board, Conditions, Image, Input, Rules, Wire, pin, seconds};
+//! use upright_board::{Conditions, ExternalLevel, Image, Input, Rules, SimulatedBoard, pin, seconds};
 //!
 //! let image = Image::from_elf(&std::fs::read("upright-image")?)?;
-//! let mut board = Board::power_on(&image, &Conditions::f405(1), Rules::NOTED)?;
-//! board.apply(Input::Level(pin('B', 12), Wire::Low));
+//! let mut board = SimulatedBoard::power_on(&image, &Conditions::f405(1), Rules::NOTED)?;
+//! board.apply(Input::Level(pin('B', 12), ExternalLevel::Low));
 //! board.apply(Input::Supply(24.0));
 //! board.run_until(seconds(0.1))?;
 //! println!("{} bytes sent", board.sent().len());
@@ -60,18 +60,18 @@ mod processor;
 pub mod single_step;
 mod wiring;
 
-pub use board::{Board, Input, PowerStage};
+pub use board::{Input, PowerStage, SimulatedBoard};
 pub use bus::{Conditions, Driven};
 pub use chip::Chip;
 pub use clock::{Time, UNITS_PER_MICROSECOND, UNITS_PER_SECOND, seconds};
 pub use decode::is_wide;
 pub use effect::{Effect, effect};
-pub use error::{Note, Rule, Rules, Stopped, Violation};
+pub use error::{Note, Rules, Stopped, Strictness, Violation};
 pub use image::{Image, ImageError};
 pub use lines::{Lines, LinesError};
-pub use meter::{Meter, Part, Place, TickCost};
-pub use peripherals::gpio::Wire;
+pub use meter::{CodePlace, Meter, TickCost, TickPart};
+pub use peripherals::gpio::ExternalLevel;
 pub use peripherals::power::BrownOut;
 pub use peripherals::rcc::Crystal;
 pub use peripherals::usart::LineByte;
-pub use wiring::{Pin, Wiring, pin};
+pub use wiring::{BoardWiring, Pin, pin};

@@ -3,7 +3,7 @@
 use crate::bus::Bus;
 use crate::clock::Time;
 use crate::decode::{Undecodable, decode, is_wide};
-use crate::error::{Fault, Trap, Violation};
+use crate::error::{ProcessorFault, Trap, Violation};
 use crate::instruction::{Instruction, Op, Unit};
 use crate::processor::mpu::Purpose;
 use crate::processor::registers::Registers;
@@ -13,7 +13,7 @@ pub(crate) const FLASH: u32 = 0x0800_0000;
 
 /// The core, and the bus with everything it can address.
 #[derive(Debug, Clone)]
-pub(crate) struct Machine {
+pub(crate) struct Microcontroller {
     pub(crate) registers: Registers,
     pub(crate) bus: Bus,
     /// Decoded instructions, one entry per half-word of flash. The last entry is for code elsewhere, which is decoded
@@ -41,7 +41,7 @@ pub(crate) struct Machine {
     pub(crate) skips: bool,
 }
 
-impl Machine {
+impl Microcontroller {
     /// The state at power-on; instructions in the first `code_bytes` of flash are cached in decoded form.
     pub(crate) fn new(mut bus: Bus, code_bytes: usize) -> Self {
         let registers = Registers::after_reset(|| bus.random() as u32);
@@ -117,7 +117,7 @@ impl Machine {
     #[inline]
     pub(crate) fn decoded_at(&mut self, pc: u32) -> Result<usize, Trap> {
         if self.bus.system.mpu.enabled() && !self.allowed(pc, Purpose::Execute) {
-            return Err(Fault::MemoryInstruction.into());
+            return Err(ProcessorFault::MemoryInstruction.into());
         }
         let elsewhere = self.decoded.len() - 1;
         let place = (pc.wrapping_sub(FLASH) >> 1) as usize;
@@ -143,7 +143,7 @@ impl Machine {
         };
         decode(first, second, pc).map_err(|undecodable| {
             if self.bus.rules.faults_are_taken {
-                return Fault::UndefinedInstruction.into();
+                return ProcessorFault::UndefinedInstruction.into();
             }
             let code = self.code_at(pc);
             Trap::Stop(match undecodable {
@@ -165,7 +165,7 @@ impl Machine {
     pub(crate) fn load(&mut self, address: u32, unit: Unit) -> Result<u32, Trap> {
         let bytes = unit.bytes();
         if self.bus.system.mpu.enabled() && !self.allowed(address, Purpose::Read) {
-            return Err(Fault::MemoryData(address).into());
+            return Err(ProcessorFault::MemoryData(address).into());
         }
         if address & (bytes - 1) != 0 {
             self.unaligned(address)?;
@@ -192,7 +192,7 @@ impl Machine {
     pub(crate) fn store(&mut self, address: u32, unit: Unit, value: u32) -> Result<(), Trap> {
         let bytes = unit.bytes();
         if self.bus.system.mpu.enabled() && !self.allowed(address, Purpose::Write) {
-            return Err(Fault::MemoryData(address).into());
+            return Err(ProcessorFault::MemoryData(address).into());
         }
         if address & (bytes - 1) != 0 {
             self.unaligned(address)?;

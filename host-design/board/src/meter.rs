@@ -1,6 +1,6 @@
 //! Measures where each tick spends its time, instruction by instruction.
 
-use crate::board::Board;
+use crate::board::SimulatedBoard;
 use crate::clock::Time;
 use crate::error::Stopped;
 use crate::machine::FLASH;
@@ -11,7 +11,7 @@ const SYS_TICK: u16 = nvic::SYS_TICK as u16;
 
 /// A part of the tick, in order of execution.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Part {
+pub enum TickPart {
     /// From the time at which the tick is due to the first input: exception entry.
     Entry,
     /// Reading of all inputs.
@@ -24,14 +24,14 @@ pub enum Part {
     Rest,
 }
 
-/// Number of [`Part`]s.
+/// Number of [`TickPart`]s.
 const PARTS: usize = 5;
 
 /// What an instruction is counted as, by its source; `None`: the same as the code that called it.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
-pub struct Place {
+pub struct CodePlace {
     /// Part of the tick it is counted in.
-    pub part: Option<Part>,
+    pub part: Option<TickPart>,
     /// Whether it is counted as controller code.
     pub controller: Option<bool>,
 }
@@ -42,7 +42,7 @@ pub struct TickCost {
     /// From the time at which the tick is due to the restart of the motor's timer with its new duty; `None` with the
     /// motor off.
     pub latency: Option<Time>,
-    /// Time in each [`Part`], in their order.
+    /// Time in each [`TickPart`], in their order.
     pub parts: [Time; PARTS],
     /// Share of these times spent in the controller: control law with estimate, and prediction.
     pub controller: Time,
@@ -54,7 +54,7 @@ pub struct TickCost {
 #[derive(Debug)]
 pub struct Meter {
     /// One per half-word of flash.
-    places: Vec<Place>,
+    places: Vec<CodePlace>,
     running: Option<Running>,
     ticks: Vec<TickCost>,
 }
@@ -62,14 +62,14 @@ pub struct Meter {
 #[derive(Debug, Clone, Copy)]
 struct Running {
     due: Time,
-    part: Part,
+    part: TickPart,
     in_controller: bool,
     cost: TickCost,
 }
 
 impl Meter {
     /// A meter with one place per half-word of flash; code beyond the list is counted as its caller.
-    pub fn new(places: Vec<Place>) -> Self {
+    pub fn new(places: Vec<CodePlace>) -> Self {
         Self { places, running: None, ticks: Vec::new() }
     }
 
@@ -82,7 +82,7 @@ impl Meter {
     ///
     /// # Errors
     /// [`Stopped`] at the first violation that ends the run.
-    pub fn run(&mut self, board: &mut Board, end: Time) -> Result<(), Stopped> {
+    pub fn run(&mut self, board: &mut SimulatedBoard, end: Time) -> Result<(), Stopped> {
         while board.now() < end {
             let Some(running) = &mut self.running else {
                 let due = board.next_tick().unwrap_or(end);
@@ -108,11 +108,11 @@ impl Meter {
 
 impl Running {
     fn new(due: Time) -> Self {
-        Self { due, part: Part::Entry, in_controller: false, cost: TickCost::default() }
+        Self { due, part: TickPart::Entry, in_controller: false, cost: TickCost::default() }
     }
 
-    fn enter(&mut self, place: Option<&Place>) {
-        let Place { part, controller } = place.copied().unwrap_or_default();
+    fn enter(&mut self, place: Option<&CodePlace>) {
+        let CodePlace { part, controller } = place.copied().unwrap_or_default();
         self.part = part.unwrap_or(self.part);
         self.in_controller = controller.unwrap_or(self.in_controller);
     }
@@ -124,7 +124,7 @@ impl Running {
         }
     }
 
-    fn end(&self, board: &mut Board) -> TickCost {
+    fn end(&self, board: &mut SimulatedBoard) -> TickCost {
         let stage = board.power_stage();
         let drives = stage.main_output && stage.started_at >= self.due;
         let latency = drives.then(|| stage.started_at - self.due);

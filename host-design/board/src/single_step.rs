@@ -2,11 +2,11 @@
 
 use crate::bus::{Bus, Conditions};
 use crate::error::{Rules, Stopped};
-use crate::machine::Machine;
+use crate::machine::Microcontroller;
 
 /// The registers that are compared.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct State {
+pub struct CoreState {
     /// R0 to R14 and the program counter.
     pub r: [u32; 16],
     /// Flags N, Z, C, V, Q (bits 31 to 27) and GE (19 to 16).
@@ -20,7 +20,7 @@ pub struct State {
 /// A processor without program in flash, which executes what is written to SRAM.
 #[derive(Debug)]
 pub struct Stepper {
-    machine: Machine,
+    machine: Microcontroller,
 }
 
 impl Default for Stepper {
@@ -36,7 +36,7 @@ impl Stepper {
         // CPACR: full access to the floating-point unit.
         let _ = bus.system.write(0xe000_ed88, 0x00f0_0000, 0, 1);
         bus.rules = Rules::NOTED;
-        Self { machine: Machine::new(bus, 0) }
+        Self { machine: Microcontroller::new(bus, 0) }
     }
 
     /// Writes bytes to memory.
@@ -59,7 +59,7 @@ impl Stepper {
     ///
     /// # Errors
     /// [`Stopped`] at a violation that ends the run of a board.
-    pub fn run(&mut self, state: &State, count: u32) -> Result<State, Stopped> {
+    pub fn run(&mut self, state: &CoreState, count: u32) -> Result<CoreState, Stopped> {
         let machine = &mut self.machine;
         machine.bus.notes.clear();
         machine.asleep = false;
@@ -79,6 +79,6 @@ impl Stepper {
         let registers = &machine.registers;
         let mut r = registers.r;
         r[15] = registers.pc;
-        Ok(State { r, apsr: registers.apsr(), s: registers.s, fpscr: registers.fpscr })
+        Ok(CoreState { r, apsr: registers.apsr(), s: registers.s, fpscr: registers.fpscr })
     }
 }

@@ -19,7 +19,7 @@ pub const fn pin(letter: char, number: u8) -> Pin {
 
 /// The power stage, the encoders, the contacts and the serial line.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Wiring {
+pub struct BoardWiring {
     /// Channels A and B of each encoder.
     pub encoders: &'static [(Pin, Pin)],
     /// PWM of the power stage; channel 1 of TIM1, or its complementary output.
@@ -57,10 +57,10 @@ const STANDARD_ENCODERS: [(Pin, Pin); 5] = [
 ];
 const FEATHER_ENCODERS: [(Pin, Pin); 2] = [(pin('C', 6), pin('C', 7)), (pin('B', 6), pin('B', 7))];
 
-impl Wiring {
+impl BoardWiring {
     /// The standard wiring, tabulated in docs/board.md.
     pub const fn upright() -> &'static Self {
-        const WIRING: Wiring = Wiring {
+        const WIRING: BoardWiring = BoardWiring {
             encoders: &STANDARD_ENCODERS,
             pwm: pin('A', 8),
             direction: pin('B', 14),
@@ -80,7 +80,7 @@ impl Wiring {
 
     /// The wiring of the Feather, tabulated in docs/board.md.
     pub const fn feather() -> &'static Self {
-        const WIRING: Wiring = Wiring {
+        const WIRING: BoardWiring = BoardWiring {
             encoders: &FEATHER_ENCODERS,
             pwm: pin('B', 13),
             direction: pin('B', 9),
@@ -91,7 +91,7 @@ impl Wiring {
             tick: pin('B', 8),
             receive: pin('B', 11),
             usart: 3,
-            ..*Wiring::upright()
+            ..*BoardWiring::upright()
         };
         &WIRING
     }

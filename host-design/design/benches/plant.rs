@@ -7,7 +7,7 @@ use std::hint::black_box;
 use std::time::Duration;
 
 use criterion::{BenchmarkGroup, Criterion, criterion_group, criterion_main, measurement::WallTime};
-use upright_design::plant::{ChainPlant, ChainState, chain_plant};
+use upright_design::plant::{ChainPlant, WideChainState, chain_plant};
 use upright_design::rig::{Cart, Chain, Link};
 
 /// Uniform rods like the paper's, with friction, so that no term vanishes.
@@ -27,8 +27,8 @@ fn rods(links: usize) -> Chain {
     }
 }
 
-fn bent<const N: usize>() -> ChainState<N> {
-    ChainState {
+fn bent<const N: usize>() -> WideChainState<N> {
+    WideChainState {
         x: 0.1,
         xdot: -0.3,
         phi: core::array::from_fn(|i| 0.2 - 0.9 * i as f64),

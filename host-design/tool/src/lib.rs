@@ -17,7 +17,7 @@
 //! | [`project`] | finds the checkout that images are built from |
 //!
 //! ```
-//! use upright_tool::figure::{Axis, Curve, Figure, Panel};
+//! use upright_tool::figure::{Curve, Figure, Axis, Panel};
 //!
 //! let points = (0..100).map(|i| 0.1 * f64::from(i)).map(|t| [t, (-t).exp()]).collect();
 //! let panel = Panel::new(Axis::linear("time (s)"), Axis::linear("angle (°)"));

@@ -43,11 +43,16 @@ mod in_the_loop;
 #[cfg(not(any(feature = "in-the-loop", feature = "in-the-loop-usart")))]
 use f4::sleep;
 #[cfg(not(any(feature = "in-the-loop", feature = "in-the-loop-usart")))]
-pub(crate) use f4::{Buffer, CLOCK_HZ, Hardware, SerialLine, set_up, start_ticks, stop};
+pub(crate) use f4::{
+    CLOCK_HZ, DmaBuffer as Buffer, DmaLine as SerialLine, F4Board as Hardware, set_up, start_ticks, stop,
+};
 #[cfg(any(feature = "in-the-loop", feature = "in-the-loop-usart"))]
 use in_the_loop::sleep;
 #[cfg(any(feature = "in-the-loop", feature = "in-the-loop-usart"))]
-pub(crate) use in_the_loop::{Buffer, CLOCK_HZ, Hardware, SerialLine, set_up, start_ticks, stop};
+pub(crate) use in_the_loop::{
+    CLOCK_HZ, ReceivedBytes as Buffer, SimulatedLine as SerialLine, SimulatedPins as Hardware, set_up,
+    start_ticks, stop,
+};
 
 /// Waits for the next interrupt.
 ///

@@ -1,7 +1,7 @@
 //! Flash, SRAM and the chip's own data.
 
 use super::Bus;
-use crate::error::{Fault, Trap, Violation};
+use crate::error::{ProcessorFault, Trap, Violation};
 use crate::instruction::Unit;
 
 /// Reads a little-endian value, not sign-extended; `None` beyond the end.
@@ -103,6 +103,6 @@ impl Bus {
 
     /// The trap for an access to an address that does not support it: a bus fault, or the end of the run.
     pub(crate) fn nothing_at(&self, address: u32, violation: Violation) -> Trap {
-        if self.rules.faults_are_taken { Fault::Bus(address).into() } else { violation.into() }
+        if self.rules.faults_are_taken { ProcessorFault::Bus(address).into() } else { violation.into() }
     }
 }

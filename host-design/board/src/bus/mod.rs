@@ -6,7 +6,7 @@ mod signals;
 
 use crate::chip::Chip;
 use crate::clock::{NEVER, Time};
-use crate::error::{Note, Rule, Rules, Stopped, Trap, Violation};
+use crate::error::{Note, Rules, Stopped, Strictness, Trap, Violation};
 use crate::peripherals::adc::Adc;
 use crate::peripherals::capture_timer::CaptureTimer;
 use crate::peripherals::dma::Dma;
@@ -20,7 +20,7 @@ use crate::peripherals::rcc::{Crystal, Rcc};
 use crate::peripherals::usart::Usart;
 use crate::processor::flash_cache::FlashCache;
 use crate::processor::system::System;
-use crate::wiring::Wiring;
+use crate::wiring::BoardWiring;
 
 /// Number of ports, A to I.
 pub(crate) const PORTS: usize = 9;
@@ -44,7 +44,7 @@ pub struct Conditions {
     /// The chip.
     pub chip: Chip,
     /// What is connected to it.
-    pub wiring: &'static Wiring,
+    pub wiring: &'static BoardWiring,
     /// Clock source at HSE.
     pub crystal: Crystal,
     /// Actual frequency of HSI, the internal oscillator of nominally 16 MHz (Hz).
@@ -90,7 +90,7 @@ pub(crate) struct Bus {
     pub(crate) notes: Vec<Note>,
     pub(crate) chip: Chip,
     is_calibrated: bool,
-    pub(crate) wiring: &'static Wiring,
+    pub(crate) wiring: &'static BoardWiring,
     pub(crate) noise: u64,
     pub(crate) flash: Vec<u8>,
     pub(crate) sram: Vec<u8>,
@@ -222,11 +222,11 @@ impl Bus {
     }
 
     /// Treats a violation that hardware tolerates as `rule` says.
-    pub(crate) fn tolerate(&mut self, rule: Rule, violation: Violation) -> Result<(), Trap> {
+    pub(crate) fn tolerate(&mut self, rule: Strictness, violation: Violation) -> Result<(), Trap> {
         match rule {
-            Rule::Stop => return Err(violation.into()),
-            Rule::Allow => return Ok(()),
-            Rule::Note => {}
+            Strictness::Stop => return Err(violation.into()),
+            Strictness::Allow => return Ok(()),
+            Strictness::Note => {}
         }
         let stopped = Stopped { violation, program_counter: self.pc, time: self.now };
         let known = self.notes.iter_mut().find(|note| {

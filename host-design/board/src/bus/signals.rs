@@ -3,7 +3,7 @@
 use super::{Bus, Driven};
 use crate::clock::Time;
 use crate::peripherals::encoder_timer::Shaft;
-use crate::peripherals::gpio::Wire;
+use crate::peripherals::gpio::ExternalLevel;
 use crate::peripherals::rcc::Domain;
 use crate::wiring::{BREAK_PINS, COMPLEMENTARY_PINS, ENCODER_INPUTS, PWM_PINS, Pin, SERIAL_PINS};
 
@@ -93,7 +93,7 @@ impl Bus {
     }
 
     /// Applies an external level to a pin, or removes it.
-    pub(crate) fn connect(&mut self, pin: Pin, wire: Wire) {
+    pub(crate) fn connect(&mut self, pin: Pin, wire: ExternalLevel) {
         self.settle_output();
         let before = self.ports[pin.port].input(pin.number);
         self.ports[pin.port].wires[usize::from(pin.number)] = wire;

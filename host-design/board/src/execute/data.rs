@@ -3,9 +3,9 @@
 use super::arithmetic::{add_with_carry, shifted};
 use crate::error::Done;
 use crate::instruction::{Alu, Compare, Extend, Op, Operand, Sets, Unary};
-use crate::machine::Machine;
+use crate::machine::Microcontroller;
 
-impl Machine {
+impl Microcontroller {
     /// Value of an operand, and the carry out of the barrel shifter.
     #[inline]
     fn operand(&self, operand: Operand) -> (u32, bool) {

@@ -1,8 +1,8 @@
 //! Entry to and return from exceptions, faults and their escalation (ARMv7-M Architecture Reference Manual, B1.5).
 
-use crate::error::{Fault, Trap, Violation};
+use crate::error::{ProcessorFault, Trap, Violation};
 use crate::instruction::Unit;
-use crate::machine::Machine;
+use crate::machine::Microcontroller;
 use crate::processor::nvic;
 
 /// Cycles of exception entry and return without contention (TRM, 3.9.1).
@@ -14,7 +14,7 @@ const LAZY_ACTIVE: u32 = 1;
 const LAZY: u32 = 1 << 30;
 const AUTOMATIC: u32 = 1 << 31;
 
-impl Machine {
+impl Microcontroller {
     pub(crate) fn executing_priority(&self) -> i32 {
         let registers = &self.registers;
         self.bus.system.nvic.executing(registers.primask, registers.faultmask, registers.basepri)
@@ -53,7 +53,7 @@ impl Machine {
             // The frame is lost, and the handler of the derived fault comes first.
             Err(Trap::Fault(fault)) => {
                 let bit = match fault {
-                    Fault::MemoryData(_) => 1 << 4,
+                    ProcessorFault::MemoryData(_) => 1 << 4,
                     _ => 1 << 12,
                 };
                 self.derived(fault, bit)
@@ -152,7 +152,7 @@ impl Machine {
             return self.exception_return(target);
         }
         if target & 1 == 0 {
-            return Err(Fault::InvalidState.into());
+            return Err(ProcessorFault::InvalidState.into());
         }
         self.branch(target & !1);
         Ok(())
@@ -224,9 +224,9 @@ impl Machine {
     }
 
     /// Takes the exception of the instruction at the program counter: SVC returns after it, a fault returns to it.
-    pub(crate) fn fault(&mut self, fault: Fault) -> Result<(), Violation> {
+    pub(crate) fn fault(&mut self, fault: ProcessorFault) -> Result<(), Violation> {
         let pc = self.registers.pc;
-        if let Fault::Supervisor = fault {
+        if let ProcessorFault::Supervisor = fault {
             return self.synchronous(nvic::SV_CALL, pc.wrapping_add(2));
         }
         let exception = self.record(fault);
@@ -234,23 +234,23 @@ impl Machine {
     }
 
     /// Sets the fault status and address registers (B3.2.15 to B3.2.18); returns the fault's exception.
-    fn record(&mut self, fault: Fault) -> usize {
+    fn record(&mut self, fault: ProcessorFault) -> usize {
         let system = &mut self.bus.system;
         let (exception, bits) = match fault {
-            Fault::MemoryInstruction => (nvic::MEM_MANAGE, 1),
-            Fault::MemoryData(address) => {
+            ProcessorFault::MemoryInstruction => (nvic::MEM_MANAGE, 1),
+            ProcessorFault::MemoryData(address) => {
                 system.mmfar = address;
                 (nvic::MEM_MANAGE, 1 << 7 | 1 << 1)
             }
-            Fault::Bus(address) => {
+            ProcessorFault::Bus(address) => {
                 system.bfar = address;
                 (nvic::BUS_FAULT, 1 << 15 | 1 << 9)
             }
-            Fault::UndefinedInstruction => (nvic::USAGE_FAULT, 1 << 16),
-            Fault::InvalidState => (nvic::USAGE_FAULT, 1 << 17),
-            Fault::NoCoprocessor => (nvic::USAGE_FAULT, 1 << 19),
-            Fault::Unaligned => (nvic::USAGE_FAULT, 1 << 24),
-            Fault::Supervisor => (nvic::SV_CALL, 0),
+            ProcessorFault::UndefinedInstruction => (nvic::USAGE_FAULT, 1 << 16),
+            ProcessorFault::InvalidState => (nvic::USAGE_FAULT, 1 << 17),
+            ProcessorFault::NoCoprocessor => (nvic::USAGE_FAULT, 1 << 19),
+            ProcessorFault::Unaligned => (nvic::USAGE_FAULT, 1 << 24),
+            ProcessorFault::Supervisor => (nvic::SV_CALL, 0),
         };
         system.cfsr |= bits;
         exception
@@ -275,14 +275,14 @@ impl Machine {
     }
 
     /// A derived fault: one that occurs while a frame is stacked.
-    fn derived(&mut self, fault: Fault, bit: u32) -> Result<(), Violation> {
+    fn derived(&mut self, fault: ProcessorFault, bit: u32) -> Result<(), Violation> {
         self.bus.system.cfsr |= bit;
         // HardFault and NMI are entered without a frame: no fault can preempt them, and this is no lock-up.
         if matches!(usize::from(self.registers.ipsr), nvic::NMI | nvic::HARD_FAULT) {
             return Ok(());
         }
         let exception = match fault {
-            Fault::MemoryData(_) => nvic::MEM_MANAGE,
+            ProcessorFault::MemoryData(_) => nvic::MEM_MANAGE,
             _ => nvic::BUS_FAULT,
         };
         let executing = self.executing_priority();

@@ -1,14 +1,14 @@
 //! Floating-point instructions.
 
 use super::float_arithmetic as number;
-use crate::error::{Done, Fault, Violation};
+use crate::error::{Done, ProcessorFault, Violation};
 use crate::instruction::{Float1, Float2, Op};
-use crate::machine::Machine;
+use crate::machine::Microcontroller;
 
 /// FPSCR bits that change the arithmetic: AHP, DN, FZ, RMode.
 const MODES: u32 = 0x07c0_0000;
 
-impl Machine {
+impl Microcontroller {
     pub(super) fn float(&mut self, op: Op) -> Done {
         self.prepare_float()?;
         match op {
@@ -55,7 +55,7 @@ impl Machine {
     /// Completes lazy stacking if it is pending, and marks the floating-point unit as in use (B1.5.7).
     fn prepare_float(&mut self) -> Done {
         if !self.bus.system.float_enabled(self.registers.privileged()) {
-            return Err(Fault::NoCoprocessor.into());
+            return Err(ProcessorFault::NoCoprocessor.into());
         }
         if self.bus.system.fpccr & 1 != 0 {
             self.save_float_lazily()?;

@@ -1,10 +1,10 @@
 //! Loads and stores of more than one register, exclusive accesses and table branches.
 
-use crate::error::{Done, Fault};
+use crate::error::{Done, ProcessorFault};
 use crate::instruction::{Addressing, Op, Unit};
-use crate::machine::Machine;
+use crate::machine::Microcontroller;
 
-impl Machine {
+impl Microcontroller {
     /// Address of an access, and the new base if it is written back.
     #[inline]
     fn place(&self, rn: u8, place: Addressing) -> (u32, Option<u32>) {
@@ -147,7 +147,7 @@ impl Machine {
 
     /// Faults for an unaligned address, in accesses that must be aligned (A3.2.1).
     fn aligned(&self, address: u32, unit: Unit) -> Done {
-        if address & (unit.bytes() - 1) != 0 { Err(Fault::Unaligned.into()) } else { Ok(()) }
+        if address & (unit.bytes() - 1) != 0 { Err(ProcessorFault::Unaligned.into()) } else { Ok(()) }
     }
 
     fn store_multiple(&mut self, rn: u8, list: u16, down: bool, write_back: bool) -> Done {

@@ -18,9 +18,9 @@ mod waiting;
 
 use crate::error::Done;
 use crate::instruction::Op;
-use crate::machine::Machine;
+use crate::machine::Microcontroller;
 
-impl Machine {
+impl Microcontroller {
     /// Executes one instruction whose IT condition, if any, holds.
     #[inline]
     pub(crate) fn execute(&mut self, op: Op) -> Done {

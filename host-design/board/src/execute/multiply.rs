@@ -2,7 +2,7 @@
 
 use crate::error::Done;
 use crate::instruction::{LongMultiply, Multiply, Op};
-use crate::machine::Machine;
+use crate::machine::Microcontroller;
 
 fn half(value: u32, top: bool) -> i64 {
     i64::from((if top { value >> 16 } else { value }) as i16)
@@ -13,7 +13,7 @@ fn products(x: u32, y: u32, exchange: bool) -> (i64, i64) {
     (half(x, false) * half(y, false), half(x, true) * half(y, true))
 }
 
-impl Machine {
+impl Microcontroller {
     pub(super) fn multiply(&mut self, op: Op) -> Done {
         match op {
             Op::Multiply { multiply, sets, rd, rn, rm, ra } => {

@@ -3,9 +3,9 @@
 use super::arithmetic::{shifted, signed_saturated, unsigned_saturated};
 use crate::error::Done;
 use crate::instruction::{Op, ParallelLanes, Prefix};
-use crate::machine::Machine;
+use crate::machine::Microcontroller;
 
-impl Machine {
+impl Microcontroller {
     pub(super) fn parallel(&mut self, op: Op) -> Done {
         match op {
             Op::Parallel { prefix, lanes, rd, rn, rm } => {

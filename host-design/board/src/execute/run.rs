@@ -3,10 +3,10 @@
 use crate::clock::{NEVER, Time};
 use crate::error::{Stopped, Trap, Violation};
 use crate::instruction::Op;
-use crate::machine::Machine;
+use crate::machine::Microcontroller;
 use crate::peripherals::rcc::{SOFTWARE_FLAG, WATCHDOG_FLAG};
 
-impl Machine {
+impl Microcontroller {
     /// Runs until a time.
     pub(crate) fn run_until(&mut self, end: Time) -> Result<(), Stopped> {
         self.run(end).map_err(|violation| Stopped {

@@ -1,10 +1,10 @@
 //! Calls and returns, IT, barriers, masks, special registers, and waiting for interrupts and events.
 
-use crate::error::{Done, Fault, Violation};
+use crate::error::{Done, ProcessorFault, Violation};
 use crate::instruction::{Op, Special};
-use crate::machine::Machine;
+use crate::machine::Microcontroller;
 
-impl Machine {
+impl Microcontroller {
     pub(super) fn system(&mut self, op: Op) -> Done {
         match op {
             Op::Nop => {}
@@ -19,7 +19,7 @@ impl Machine {
             Op::CallTo { rm } => {
                 let target = self.registers.get(rm);
                 if target & 1 == 0 {
-                    return Err(Fault::InvalidState.into());
+                    return Err(ProcessorFault::InvalidState.into());
                 }
                 self.registers.set(14, self.next | 1);
                 self.branch(target & !1);
@@ -34,10 +34,10 @@ impl Machine {
             Op::WaitForInterrupt => self.asleep = true,
             Op::WaitForEvent => self.asleep = !std::mem::take(&mut self.event),
             Op::SendEvent => self.event = true,
-            Op::Svc => return Err(Fault::Supervisor.into()),
+            Op::Svc => return Err(ProcessorFault::Supervisor.into()),
             Op::Breakpoint | Op::Undefined => {
                 return if self.bus.rules.faults_are_taken {
-                    Err(Fault::UndefinedInstruction.into())
+                    Err(ProcessorFault::UndefinedInstruction.into())
                 } else {
                     Err(Violation::Trap.into())
                 };

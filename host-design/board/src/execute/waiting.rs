@@ -6,7 +6,7 @@
 
 use crate::clock::Time;
 use crate::instruction::{Alu, Op, Operand};
-use crate::machine::Machine;
+use crate::machine::Microcontroller;
 use crate::processor::registers::Registers;
 
 /// Number of iterations that may be skipped, and the register that counts them down, with its step.
@@ -15,7 +15,7 @@ type Skip = (u64, Option<(usize, u32)>);
 /// Longest loop that is considered (instructions).
 const LONGEST: u64 = 32;
 
-impl Machine {
+impl Microcontroller {
     /// Called after a backward branch, with the program counter at the loop's head.
     pub(crate) fn skip_waiting(&mut self, end: Time) {
         let head = self.registers.pc;

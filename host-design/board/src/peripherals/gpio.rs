@@ -5,7 +5,7 @@ use crate::error::Violation;
 
 /// What is connected to a pin from outside.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub enum Wire {
+pub enum ExternalLevel {
     /// Nothing: the pin follows its pull-up or pull-down, or floats and reads as noise.
     #[default]
     Open,
@@ -24,7 +24,7 @@ pub(crate) struct Port {
     pull: u32,
     pub(crate) output: u32,
     alternate: [u32; 2],
-    pub(crate) wires: [Wire; 16],
+    pub(crate) wires: [ExternalLevel; 16],
 }
 
 impl Port {
@@ -35,7 +35,15 @@ impl Port {
             b'B' => (0x0000_0280, 0x0000_00c0, 0x0000_0100),
             _ => (0, 0, 0),
         };
-        Self { mode, output_type: 0, speed, pull, output: 0, alternate: [0; 2], wires: [Wire::Open; 16] }
+        Self {
+            mode,
+            output_type: 0,
+            speed,
+            pull,
+            output: 0,
+            alternate: [0; 2],
+            wires: [ExternalLevel::Open; 16],
+        }
     }
 
     /// Resets the registers; what is connected stays.
@@ -99,11 +107,11 @@ impl Port {
     /// Level of an input; `None` if it floats.
     pub(crate) fn input(&self, pin: u8) -> Option<bool> {
         match (self.wires[usize::from(pin)], self.pull >> (2 * pin) & 3) {
-            (Wire::Low, _) => Some(false),
-            (Wire::High, _) => Some(true),
-            (Wire::Open, 1) => Some(true),
-            (Wire::Open, 2) => Some(false),
-            (Wire::Open, _) => None,
+            (ExternalLevel::Low, _) => Some(false),
+            (ExternalLevel::High, _) => Some(true),
+            (ExternalLevel::Open, 1) => Some(true),
+            (ExternalLevel::Open, 2) => Some(false),
+            (ExternalLevel::Open, _) => None,
         }
     }
 

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::io::Read;
 
-use upright_board::single_step::{State, Stepper};
+use upright_board::single_step::{CoreState, Stepper};
 
 const SRAM: u32 = 0x2000_0000;
 const CODE: u32 = 0x2000_1000;
@@ -42,7 +42,7 @@ impl Mix {
 }
 
 /// The state that a seed stands for, as in `make_cases.py`.
-fn state_of(seed: u32, kind: u8, index: u8) -> State {
+fn state_of(seed: u32, kind: u8, index: u8) -> CoreState {
     let mut mix = Mix(seed.into());
     let mut r = [0; 16];
     for (i, register) in r.iter_mut().enumerate().take(15) {
@@ -77,7 +77,7 @@ fn state_of(seed: u32, kind: u8, index: u8) -> State {
             ((k >> 3 & 1) << 31 | (119 + (k >> 8 & 15)) << 23 | k >> 40 & 0x7f_ffff) as u32
         }
     });
-    State { r, apsr, s, fpscr }
+    CoreState { r, apsr, s, fpscr }
 }
 
 /// One case.
@@ -145,7 +145,7 @@ fn memory() -> Vec<u8> {
     (0..SIZE / 4).flat_map(|i| (Mix(u64::from(SRAM + 4 * i)).next() as u32).to_le_bytes()).collect()
 }
 
-fn expected(case: &Case, before: &State) -> State {
+fn expected(case: &Case, before: &CoreState) -> CoreState {
     let mut after = *before;
     for &(register, value) in &case.changes {
         match register {
@@ -185,7 +185,7 @@ fn disagreement(stepper: &mut Stepper, memory: &[u8], case: &Case) -> Option<Str
     }
 }
 
-fn differences(state: &State, wanted: &State) -> String {
+fn differences(state: &CoreState, wanted: &CoreState) -> String {
     let mut text = String::new();
     let mut differ = |name: String, got: u32, want: u32| {
         if got != want {

@@ -2,8 +2,8 @@
 
 use crate::program::{Code, FOREVER, LOG, NOP, RETURN, WFI, appended, board, clocks_on, image, logged};
 use upright_board::{
-    Board, Conditions, Input, Rules, Time, UNITS_PER_MICROSECOND as US, UNITS_PER_SECOND, Violation, Wire,
-    pin,
+    Conditions, ExternalLevel, Input, Rules, SimulatedBoard, Time, UNITS_PER_MICROSECOND as US,
+    UNITS_PER_SECOND, Violation, pin,
 };
 
 const TIM1: u32 = 0x4001_0000;
@@ -39,7 +39,7 @@ fn start() -> Code {
         .write(0x4002_0418, 1 << 15 | 1 << 14)
 }
 
-fn after(main: &Code, inputs: &[Input], microseconds: Time) -> Board {
+fn after(main: &Code, inputs: &[Input], microseconds: Time) -> SimulatedBoard {
     let mut board = board(main, &[], Rules::STRICT);
     for &input in inputs {
         board.apply(input);
@@ -48,7 +48,7 @@ fn after(main: &Code, inputs: &[Input], microseconds: Time) -> Board {
     board
 }
 
-const CLOSED: Input = Input::Level(pin('B', 12), Wire::Low);
+const CLOSED: Input = Input::Level(pin('B', 12), ExternalLevel::Low);
 
 #[test]
 fn one_pulse_drives_its_periods_and_stops_low() {
@@ -78,7 +78,7 @@ fn the_break_input_takes_the_output_away_at_its_edge() {
     let main = Code(main.0.into_iter().chain(start().0).collect());
     let mut broken = board(&main, &[], Rules::STRICT);
     broken.apply(CLOSED);
-    broken.at(200 * US + 12_345, Input::Level(pin('B', 12), Wire::Open));
+    broken.at(200 * US + 12_345, Input::Level(pin('B', 12), ExternalLevel::Open));
     broken.run_until(200 * US + 12_345).unwrap();
     let high = broken.driven().pwm_high;
     assert!(high > 100 * US);
@@ -89,7 +89,7 @@ fn the_break_input_takes_the_output_away_at_its_edge() {
     let mut unwired = board(&main, &[], Rules::STRICT);
     unwired.apply(CLOSED);
     unwired.apply(Input::IgnoreBreak);
-    unwired.at(200 * US + 12_345, Input::Level(pin('B', 12), Wire::Open));
+    unwired.at(200 * US + 12_345, Input::Level(pin('B', 12), ExternalLevel::Open));
     unwired.run_until(1_000 * US).unwrap();
     assert!(unwired.driven().pwm_high > high);
 }
@@ -293,7 +293,7 @@ fn the_crystal_can_be_measured_against_the_internal_oscillator() {
     for (hz, clocks) in [(8_000_000, 400), (12_000_000, 267), (16_000_000, 200)] {
         let mut conditions = Conditions::f405(1);
         conditions.crystal.hz = hz;
-        let mut board = Board::power_on(&image(&main, &[]), &conditions, Rules::STRICT).unwrap();
+        let mut board = SimulatedBoard::power_on(&image(&main, &[]), &conditions, Rules::STRICT).unwrap();
         board.run_until(20_000 * US).unwrap();
         let between = logged(&board, 5).wrapping_sub(logged(&board, 4)) & 0xffff;
         let turns = (between + clocks / 2) / clocks;
@@ -314,9 +314,9 @@ fn external_edges_stay_until_they_are_cleared() {
         .log(0x4001_3c14, 5)
         .raw(&[FOREVER]);
     let mut board = board(&main, &[], Rules::STRICT);
-    board.apply(Input::Level(pin('B', 13), Wire::High));
-    board.at(50 * US, Input::Level(pin('B', 13), Wire::Low));
-    board.at(50 * US + 100, Input::Level(pin('B', 13), Wire::High));
+    board.apply(Input::Level(pin('B', 13), ExternalLevel::High));
+    board.at(50 * US, Input::Level(pin('B', 13), ExternalLevel::Low));
+    board.at(50 * US + 100, Input::Level(pin('B', 13), ExternalLevel::High));
     board.run_until(400 * US).unwrap();
     assert_eq!((logged(&board, 4), logged(&board, 5)), (1 << 13, 0));
 }
@@ -326,7 +326,7 @@ fn memory_is_random_at_power_on_and_stays_over_a_reset() {
     let main = Code::new().raw(&[NOP]);
     let word = |seed| {
         let conditions = Conditions::f405(seed);
-        let board = Board::power_on(&image(&main, &[]), &conditions, Rules::STRICT).unwrap();
+        let board = SimulatedBoard::power_on(&image(&main, &[]), &conditions, Rules::STRICT).unwrap();
         board.word(0x2000_8000).unwrap()
     };
     assert_ne!(word(1), word(2));

@@ -1,6 +1,6 @@
 //! Small programs for the board, put together from instructions.
 
-use upright_board::{Board, Conditions, Image, Rules, Stopped};
+use upright_board::{Conditions, Image, Rules, SimulatedBoard, Stopped};
 
 /// End of the stack of every program.
 pub(crate) const STACK: u32 = 0x2000_2000;
@@ -94,24 +94,28 @@ pub(crate) fn image(main: &Code, handlers: &[(usize, Code)]) -> Image {
 }
 
 /// A board with this program.
-pub(crate) fn board(main: &Code, handlers: &[(usize, Code)], rules: Rules) -> Board {
-    Board::power_on(&image(main, handlers), &Conditions::f405(7), rules).expect("good vectors")
+pub(crate) fn board(main: &Code, handlers: &[(usize, Code)], rules: Rules) -> SimulatedBoard {
+    SimulatedBoard::power_on(&image(main, handlers), &Conditions::f405(7), rules).expect("good vectors")
 }
 
 /// Runs a program for some microseconds.
-pub(crate) fn run(main: &Code, handlers: &[(usize, Code)], microseconds: u64) -> Result<Board, Stopped> {
+pub(crate) fn run(
+    main: &Code,
+    handlers: &[(usize, Code)],
+    microseconds: u64,
+) -> Result<SimulatedBoard, Stopped> {
     let mut board = board(main, handlers, Rules::STRICT);
     board.run_until(microseconds * upright_board::UNITS_PER_MICROSECOND)?;
     Ok(board)
 }
 
 /// The bytes that a program has appended.
-pub(crate) fn appended(board: &Board) -> Vec<u8> {
+pub(crate) fn appended(board: &SimulatedBoard) -> Vec<u8> {
     let length = board.word(LOG).unwrap_or(0);
     (0..length).map(|i| (board.word((LOG + 4 + i) & !3).unwrap_or(0) >> (8 * (i & 3))) as u8).collect()
 }
 
 /// A word that a program has logged.
-pub(crate) fn logged(board: &Board, place: u32) -> u32 {
+pub(crate) fn logged(board: &SimulatedBoard, place: u32) -> u32 {
     board.word(LOG + 4 * place).unwrap_or(0)
 }

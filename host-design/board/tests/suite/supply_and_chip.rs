@@ -2,7 +2,7 @@
 
 use crate::program::{Code, FOREVER, LOG, RETURN, SYNC, appended, image, logged};
 use upright_board::{
-    Board, BrownOut, Chip, Conditions, Input, Rules, Stopped, UNITS_PER_MICROSECOND as US, Violation,
+    BrownOut, Chip, Conditions, Input, Rules, SimulatedBoard, Stopped, UNITS_PER_MICROSECOND as US, Violation,
 };
 
 const PWR: u32 = 0x4000_7000;
@@ -26,11 +26,11 @@ impl Code {
     }
 }
 
-fn power_on(conditions: &Conditions, main: &Code, handlers: &[(usize, Code)]) -> Board {
-    Board::power_on(&image(main, handlers), conditions, Rules::STRICT).unwrap()
+fn power_on(conditions: &Conditions, main: &Code, handlers: &[(usize, Code)]) -> SimulatedBoard {
+    SimulatedBoard::power_on(&image(main, handlers), conditions, Rules::STRICT).unwrap()
 }
 
-fn f405(main: &Code) -> Board {
+fn f405(main: &Code) -> SimulatedBoard {
     power_on(&Conditions::f405(7), main, &[])
 }
 

@@ -33,7 +33,7 @@ pub(super) fn kalman<R: Real>(
     a: &Matrix<R>,
     ad: &Matrix<R>,
     inputs: &Matrix<R>,
-    noise: &rig::Kalman,
+    noise: &rig::KalmanNoise,
     rig: &Rig,
     period: &R,
 ) -> Result<(Kalman<R>, R), DesignError> {

@@ -118,7 +118,7 @@ impl<R: Real> Design<R> {
                 over_time => sampled_cost(&a, &b, &over_time, &period),
             };
             let k = lqr(Task::SampledLqr, &ad, &bd, &cost, residuals)?;
-            sampled.lqr = Some(sampled_feedback(k, &ad, &bd, output, late));
+            sampled.lqr = Some(sampled_feedback(k, [&ad, &bd], [&ad, &bd], output, late));
             if let Some(integral) = &rig.integral {
                 let (a_z, b_z) = with_integral(&ad, &bd, output, &period, &R::one());
                 // z is constant during a tick: its cost over the tick is T w z².
@@ -126,7 +126,7 @@ impl<R: Real> Design<R> {
                 let weight = R::from_f64(integral.position_weight) * duration;
                 let cost = with_integral_weight(&cost, &weight);
                 let k = lqr(Task::SampledIntegral, &a_z, &b_z, &cost, residuals)?;
-                let feedback = sampled_feedback_over(k, &ad, &bd, &a_z, &b_z, output, late);
+                let feedback = sampled_feedback(k, [&ad, &bd], [&a_z, &b_z], output, late);
                 sampled.integral = Some(feedback.with_share_of_n(&R::from_f64(integral.setpoint_weight)));
             }
         }
@@ -134,7 +134,7 @@ impl<R: Real> Design<R> {
             let poles = wanted_poles(placement, rig)?;
             let poles: Vec<Pole<R>> = poles.iter().map(|pole| pole.sampled(&period)).collect();
             let k = placed(Task::SampledPlacement, &ad, &bd, &poles)?;
-            sampled.pole_placement = Some(sampled_feedback(k, &ad, &bd, output, late));
+            sampled.pole_placement = Some(sampled_feedback(k, [&ad, &bd], [&ad, &bd], output, late));
         }
         let kalman = rig.kalman.as_ref().map(|noise| {
             let inputs = noise_inputs(rig, &b, &torque_inputs);
@@ -283,28 +283,16 @@ fn feedback<R: Real>(k: Matrix<R>, a: &Matrix<R>, b: &Matrix<R>, output: usize) 
     Feedback { integral: k.cols() > a.cols(), k, n }
 }
 
-/// Sampled feedback K, adapted to the delay: with one tick of delay, `u⁺ = N r - K (Ad x + Bd u)` acts on the
-/// predicted state.
+/// Sampled feedback K over the states of the plant `over` (A, B), which is `plant` or contains it, adapted to the delay:
+/// with one tick of delay, `u⁺ = N r - K (Ad x + Bd u)` acts on the predicted state.
 fn sampled_feedback<R: Real>(
     k: Matrix<R>,
-    ad: &Matrix<R>,
-    bd: &Matrix<R>,
+    plant: [&Matrix<R>; 2],
+    over: [&Matrix<R>; 2],
     output: usize,
     late: bool,
 ) -> Feedback<R> {
-    sampled_feedback_over(k, ad, bd, ad, bd, output, late)
-}
-
-/// As [`sampled_feedback`], with K over the states of a larger plant (`a_z`, `b_z`) that contains (`ad`, `bd`).
-fn sampled_feedback_over<R: Real>(
-    k: Matrix<R>,
-    ad: &Matrix<R>,
-    bd: &Matrix<R>,
-    a_z: &Matrix<R>,
-    b_z: &Matrix<R>,
-    output: usize,
-    late: bool,
-) -> Feedback<R> {
+    let ([ad, bd], [a_z, b_z]) = (plant, over);
     // The steady state of x = Ad x + Bd u.
     let k_x = k.block(0, 0, 1, ad.cols());
     let n = precompensation(&(&Matrix::identity(ad.rows()) - &(ad - &(bd * &k_x))), bd, output);

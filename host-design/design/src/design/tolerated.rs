@@ -60,8 +60,8 @@ impl Tolerated {
             inputs.push((zero.block(0, angle, states, 1), tolerances.homing_error_rad));
         }
         let measured: Vec<usize> = rig.sensors().iter().map(|sensor| sensor.state).collect();
-        for (input, largest) in inputs.iter().filter(|(_, largest)| *largest > 0.0) {
-            bounds.add(input, *largest, design, kalman, &measured, keep);
+        for (input, largest) in inputs.into_iter().filter(|(_, largest)| *largest > 0.0) {
+            bounds.add((input, largest), design, kalman, &measured, keep);
         }
         Some(bounds)
     }
@@ -69,16 +69,15 @@ impl Tolerated {
     /// Adds the effect of an input of magnitude at most `largest`.
     fn add(
         &mut self,
-        input: &Matrix<f64>,
-        largest: f64,
+        (input, largest): (Matrix<f64>, f64),
         design: &Design<f64>,
         kalman: &Kalman<f64>,
         measured: &[usize],
         keep: f64,
     ) {
-        let mut error = input.clone();
-        let mut sums = vec![0.0; measured.len()];
         let end = DECAYED * input.norm();
+        let mut error = input;
+        let mut sums = vec![0.0; measured.len()];
         for _ in 0..LONGEST {
             let seen: Vec<f64> = measured.iter().map(|&state| error[(state, 0)]).collect();
             let correction = &kalman.l_filter * &Matrix::column(&seen);

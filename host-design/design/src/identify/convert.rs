@@ -116,10 +116,10 @@ fn text(text: &str) -> Vec<u8> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::identify::{Header, Tick};
+    use crate::identify::{LogHeader, Tick};
 
     fn log() -> Log {
-        let mut log = Log::new(Header {
+        let mut log = Log::new(LogHeader {
             rig: "one".to_owned(),
             hash: 1,
             period_ns: 2_000_000,

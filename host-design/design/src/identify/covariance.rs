@@ -1,7 +1,7 @@
 //! Standard deviations of the estimates: those of the prediction-error fit, widened by how much other modelling
 //! choices change the estimates.
 
-use super::parameters::{Kind, Prior};
+use super::parameters::{ParameterKind, Prior};
 use super::prediction::Filter;
 use super::record::Record;
 
@@ -18,20 +18,22 @@ struct Widening {
 }
 
 /// Tuned with `upright coverage` on the machines of seeds 1 and 2, so that 95 % of the intervals cover the truth.
-fn widening(kind: Kind) -> Widening {
+fn widening(kind: ParameterKind) -> Widening {
     let [of_change, least] = match kind {
-        Kind::TotalMass => [0.6, 4e-4],
-        Kind::FirstMoment(_) | Kind::SecondMoment(_) => [0.45, 2e-4],
-        Kind::Length(_) => [0.8, 2e-4],
-        Kind::CartViscous => [1.2, 0.0],
-        Kind::JointViscous(_) => [1.0, 2e-3],
-        Kind::CartDry => [0.8, 4e-3],
-        Kind::JointDry(_) => [0.8, 0.018],
-        Kind::Tilt => [0.4, 1.5e-6],
-        Kind::Delay => [0.5, 8e-3],
-        Kind::DeadZone => [0.65, 0.0],
-        Kind::Zero(_) => [0.35, 7e-3],
-        Kind::AirDrag(_) | Kind::EccentricSine(_) | Kind::EccentricCosine(_) => [1.0, 0.0],
+        ParameterKind::TotalMass => [0.6, 4e-4],
+        ParameterKind::FirstMoment(_) | ParameterKind::SecondMoment(_) => [0.45, 2e-4],
+        ParameterKind::Length(_) => [0.8, 2e-4],
+        ParameterKind::CartViscous => [1.2, 0.0],
+        ParameterKind::JointViscous(_) => [1.0, 2e-3],
+        ParameterKind::CartDry => [0.8, 4e-3],
+        ParameterKind::JointDry(_) => [0.8, 0.018],
+        ParameterKind::Tilt => [0.4, 1.5e-6],
+        ParameterKind::Delay => [0.5, 8e-3],
+        ParameterKind::DeadZone => [0.65, 0.0],
+        ParameterKind::Zero(_) => [0.35, 7e-3],
+        ParameterKind::AirDrag(_) | ParameterKind::EccentricSine(_) | ParameterKind::EccentricCosine(_) => {
+            [1.0, 0.0]
+        }
     };
     Widening { of_change, least }
 }
@@ -61,7 +63,7 @@ pub(super) fn changes(filter: &Filter<'_>, finer: Option<&Record>, p: &[f64], no
 /// Standard deviation of each parameter, from `inverse`, the inverse of the scaled normal matrix, and `changes`, the
 /// result of [`changes`]. `steps` holds the travel per count of each channel.
 pub(super) fn deviations(
-    kinds: &[Kind],
+    kinds: &[ParameterKind],
     priors: &[Prior],
     inverse: &[f64],
     changes: &[f64],
@@ -75,8 +77,8 @@ pub(super) fn deviations(
         }
         let Widening { of_change, least } = widening(kinds[i]);
         let unit = match kinds[i] {
-            Kind::Zero(joint) => steps[joint + 1],
-            Kind::Tilt | Kind::Delay => 1.0,
+            ParameterKind::Zero(joint) => steps[joint + 1],
+            ParameterKind::Tilt | ParameterKind::Delay => 1.0,
             _ => p[i],
         };
         let statistical = priors[i].deviation * inverse[i * size + i].sqrt();

@@ -9,8 +9,8 @@ use super::error::IdentifyError;
 use super::estimate::{Settings, identify};
 use super::estimated::Identification;
 use super::excite::shake_machine;
-use super::machines::Machine;
-use super::parameters::Kind;
+use super::machines::DrawnMachine;
+use super::parameters::ParameterKind;
 use crate::rig::Rig;
 use crate::study::{Study, StudyError};
 
@@ -32,7 +32,7 @@ pub enum CoverageError {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 #[allow(missing_docs)] // `ALL` says what each is
-pub enum Quantity {
+pub enum CoveredQuantity {
     Length,
     Moment,
     TotalMass,
@@ -48,42 +48,44 @@ pub enum Quantity {
     Scale,
 }
 
-impl Quantity {
+impl CoveredQuantity {
     /// Every quantity with its name, the unit in which its error is shown, and the factor that converts
     /// [`Missed::error`] to that unit.
-    pub const ALL: [(Quantity, &str, &str, f64); 13] = {
+    pub const ALL: [(CoveredQuantity, &str, &str, f64); 13] = {
         let degrees = 180.0 / core::f64::consts::PI;
         [
-            (Quantity::Length, "lengths", "%", 100.0),
-            (Quantity::Moment, "moments a, J", "%", 100.0),
-            (Quantity::TotalMass, "total mass", "%", 100.0),
-            (Quantity::CartViscous, "viscous friction, cart", "%", 100.0),
-            (Quantity::JointViscous, "viscous friction, joints", "%", 100.0),
-            (Quantity::CartDry, "dry friction, cart", "%", 100.0),
-            (Quantity::JointDry, "dry friction, joints", "%", 100.0),
-            (Quantity::DeadZone, "dead zone", "%", 100.0),
-            (Quantity::Tilt, "tilt", "°", degrees),
-            (Quantity::Delay, "delay", "ticks", 1.0),
-            (Quantity::Zero, "zeros", "°", degrees),
-            (Quantity::Shape, "shape: lengths, a/a_n, J/a_n", "%", 100.0),
-            (Quantity::Scale, "scale: a_n", "%", 100.0),
+            (CoveredQuantity::Length, "lengths", "%", 100.0),
+            (CoveredQuantity::Moment, "moments a, J", "%", 100.0),
+            (CoveredQuantity::TotalMass, "total mass", "%", 100.0),
+            (CoveredQuantity::CartViscous, "viscous friction, cart", "%", 100.0),
+            (CoveredQuantity::JointViscous, "viscous friction, joints", "%", 100.0),
+            (CoveredQuantity::CartDry, "dry friction, cart", "%", 100.0),
+            (CoveredQuantity::JointDry, "dry friction, joints", "%", 100.0),
+            (CoveredQuantity::DeadZone, "dead zone", "%", 100.0),
+            (CoveredQuantity::Tilt, "tilt", "°", degrees),
+            (CoveredQuantity::Delay, "delay", "ticks", 1.0),
+            (CoveredQuantity::Zero, "zeros", "°", degrees),
+            (CoveredQuantity::Shape, "shape: lengths, a/a_n, J/a_n", "%", 100.0),
+            (CoveredQuantity::Scale, "scale: a_n", "%", 100.0),
         ]
     };
 
-    fn of(kind: Kind) -> Option<Self> {
+    fn of(kind: ParameterKind) -> Option<Self> {
         Some(match kind {
-            Kind::Length(_) => Self::Length,
-            Kind::FirstMoment(_) | Kind::SecondMoment(_) => Self::Moment,
-            Kind::TotalMass => Self::TotalMass,
-            Kind::CartViscous => Self::CartViscous,
-            Kind::JointViscous(_) => Self::JointViscous,
-            Kind::CartDry => Self::CartDry,
-            Kind::JointDry(_) => Self::JointDry,
-            Kind::DeadZone => Self::DeadZone,
-            Kind::Tilt => Self::Tilt,
-            Kind::Delay => Self::Delay,
-            Kind::Zero(_) => Self::Zero,
-            Kind::AirDrag(_) | Kind::EccentricSine(_) | Kind::EccentricCosine(_) => return None,
+            ParameterKind::Length(_) => Self::Length,
+            ParameterKind::FirstMoment(_) | ParameterKind::SecondMoment(_) => Self::Moment,
+            ParameterKind::TotalMass => Self::TotalMass,
+            ParameterKind::CartViscous => Self::CartViscous,
+            ParameterKind::JointViscous(_) => Self::JointViscous,
+            ParameterKind::CartDry => Self::CartDry,
+            ParameterKind::JointDry(_) => Self::JointDry,
+            ParameterKind::DeadZone => Self::DeadZone,
+            ParameterKind::Tilt => Self::Tilt,
+            ParameterKind::Delay => Self::Delay,
+            ParameterKind::Zero(_) => Self::Zero,
+            ParameterKind::AirDrag(_)
+            | ParameterKind::EccentricSine(_)
+            | ParameterKind::EccentricCosine(_) => return None,
         })
     }
 
@@ -96,7 +98,7 @@ impl Quantity {
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Missed {
     /// The quantity that the number belongs to.
-    pub quantity: Quantity,
+    pub quantity: CoveredQuantity,
     /// Identified minus true value: in rad for a tilt or zero, in ticks for the delay, else relative to the truth.
     pub error: f64,
     /// Stated standard deviation in the same unit; a shape and a scale have none.
@@ -118,7 +120,7 @@ pub struct Identified {
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct CoverageRow {
     /// The quantity that is summarised.
-    pub quantity: Quantity,
+    pub quantity: CoveredQuantity,
     /// Its name in a table.
     pub name: &'static str,
     /// Unit of `rms`, `worst` and `stated`.
@@ -179,7 +181,7 @@ pub fn coverage(
     };
     let all = study.outcomes("machines", drawn.runs, one)?;
     let written = || all.iter().filter(|one| one.refused.is_none()).flat_map(|one| &one.missed);
-    let row = |(quantity, name, unit, factor): (Quantity, &'static str, &'static str, f64)| {
+    let row = |(quantity, name, unit, factor): (CoveredQuantity, &'static str, &'static str, f64)| {
         let of: Vec<&Missed> = written().filter(|missed| missed.quantity == quantity).collect();
         let rms = |values: &mut dyn Iterator<Item = f64>| {
             factor * (values.map(|value| value * value).sum::<f64>() / of.len() as f64).sqrt()
@@ -200,7 +202,7 @@ pub fn coverage(
     Ok(Coverage {
         machines: all.len(),
         refused: all.iter().filter_map(|one| Some((one.number, one.refused.clone()?))).collect(),
-        rows: Quantity::ALL.into_iter().filter_map(row).collect(),
+        rows: CoveredQuantity::ALL.into_iter().filter_map(row).collect(),
     })
 }
 
@@ -209,7 +211,7 @@ pub fn coverage(
 /// # Errors
 /// [`IdentifyError`] if the rig has no chain with encoders; later failures are in [`Identified::refused`].
 pub fn identified(file: &Rig, drawn: &Drawn, number: u64) -> Result<Identified, CoverageError> {
-    let machine = Machine::draw(file, drawn.off_percent, drawn.seed, number)?;
+    let machine = DrawnMachine::draw(file, drawn.off_percent, drawn.seed, number)?;
     let settings = Settings { trust_wiring: drawn.trust_wiring, ..Settings::default() };
     let found = shake_machine(file, &machine.rig, drawn.seconds, number)
         .and_then(|log| identify(file, &[(PathBuf::from("log"), log)], &settings, &|_| ()));
@@ -223,10 +225,11 @@ pub fn identified(file: &Rig, drawn: &Drawn, number: u64) -> Result<Identified, 
     })
 }
 
-fn missed(machine: &Machine, found: &Identification) -> Vec<Missed> {
+fn missed(machine: &DrawnMachine, found: &Identification) -> Vec<Missed> {
     let mut all = Vec::new();
     for estimate in &found.estimates {
-        let (Some(truth), Some(quantity)) = (machine.truth(estimate.kind), Quantity::of(estimate.kind))
+        let (Some(truth), Some(quantity)) =
+            (machine.truth(estimate.kind), CoveredQuantity::of(estimate.kind))
         else {
             continue;
         };
@@ -235,20 +238,25 @@ fn missed(machine: &Machine, found: &Identification) -> Vec<Missed> {
         all.push(Missed { quantity, error, deviation: Some(estimate.deviation / unit) });
     }
     // The shape is what does not depend on the scale of the force.
-    let ratio = |kind: Kind| Some(found.estimate(kind)?.new / machine.truth(kind)?);
+    let ratio = |kind: ParameterKind| Some(found.estimate(kind)?.new / machine.truth(kind)?);
     let moments = found.estimates.iter().filter_map(|estimate| match estimate.kind {
-        Kind::FirstMoment(link) => Some(link),
+        ParameterKind::FirstMoment(link) => Some(link),
         _ => None,
     });
     let Some(last) = moments.max() else { return all };
-    let Some(scale) = ratio(Kind::FirstMoment(last)) else { return all };
-    let error = |quantity: Quantity, error: f64| Missed { quantity, error, deviation: None };
+    let Some(scale) = ratio(ParameterKind::FirstMoment(last)) else { return all };
+    let error = |quantity: CoveredQuantity, error: f64| Missed { quantity, error, deviation: None };
     for link in 0..=last {
-        let [first, second] = [Kind::FirstMoment(link), Kind::SecondMoment(link)].map(ratio);
+        let [first, second] =
+            [ParameterKind::FirstMoment(link), ParameterKind::SecondMoment(link)].map(ratio);
         let first = first.filter(|_| link < last);
         let shapes = first.into_iter().chain(second).map(|ratio| ratio / scale);
-        all.extend(shapes.chain(ratio(Kind::Length(link))).map(|ratio| error(Quantity::Shape, ratio - 1.0)));
+        all.extend(
+            shapes
+                .chain(ratio(ParameterKind::Length(link)))
+                .map(|ratio| error(CoveredQuantity::Shape, ratio - 1.0)),
+        );
     }
-    all.push(error(Quantity::Scale, scale - 1.0));
+    all.push(error(CoveredQuantity::Scale, scale - 1.0));
     all
 }

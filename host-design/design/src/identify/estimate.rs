@@ -9,7 +9,7 @@ use super::estimated::{Estimate, Identification};
 use super::free;
 use super::log::Log;
 use super::old_values::old_values;
-use super::parameters::{Kind, Layout, Prior, priors};
+use super::parameters::{Layout, ParameterKind, Prior, priors};
 use super::prediction::Filter;
 use super::realise::realise;
 use super::record::Record;
@@ -151,8 +151,9 @@ impl Fitted<'_> {
     /// All parameters in the order of [`Layout`]: the estimates, and the prior values of those not identified.
     fn full(&self, found: &Identification) -> Vec<f64> {
         let kinds = Layout { links: self.used.channels - 1 }.kinds();
-        let of =
-            |(kind, prior): (Kind, &Prior)| found.estimate(kind).map_or(prior.value, |estimate| estimate.new);
+        let of = |(kind, prior): (ParameterKind, &Prior)| {
+            found.estimate(kind).map_or(prior.value, |estimate| estimate.new)
+        };
         kinds.into_iter().zip(self.priors).map(of).collect()
     }
 

@@ -1,17 +1,17 @@
 //! What an identification finds.
 
-use super::parameters::Kind;
+use super::parameters::ParameterKind;
 use super::realise::Realised;
 use super::record::Record;
 use super::verdict::{ChannelFit, Refusal};
 use super::window_errors::WindowErrors;
 use super::wiring::WiringFound;
 
-/// An identified parameter, in the unit of its [`Kind`].
+/// An identified parameter, in the unit of its [`ParameterKind`].
 #[derive(Debug, Clone, PartialEq)]
 pub struct Estimate {
     /// Which parameter it is.
-    pub kind: Kind,
+    pub kind: ParameterKind,
     /// Value of the rig file, or the start value that is assumed if the file has none.
     pub old: f64,
     /// Identified value.
@@ -79,13 +79,13 @@ impl Identification {
     }
 
     /// The estimate of a parameter, if it was identified.
-    pub fn estimate(&self, kind: Kind) -> Option<&Estimate> {
+    pub fn estimate(&self, kind: ParameterKind) -> Option<&Estimate> {
         self.estimates.iter().find(|estimate| estimate.kind == kind)
     }
 
     /// The delay that the rig file should state (ticks), if that differs from the one it states.
     pub fn other_delay(&self) -> Option<u8> {
-        let delay = self.estimate(Kind::Delay)?;
+        let delay = self.estimate(ParameterKind::Delay)?;
         match self.delay_ticks {
             0 if delay.new > 0.5 + 2.0 * delay.deviation => Some(1),
             1 if delay.new < -0.5 - 2.0 * delay.deviation => Some(0),

@@ -9,8 +9,8 @@ use upright::table::{Equilibrium, Law};
 
 use super::channel::chain_of;
 use super::error::IdentifyError;
-use super::log::{DriveScale, Header, Log, Tick};
-use super::model::Input;
+use super::log::{DriveScale, Log, LogHeader, Tick};
+use super::model::CartForce;
 use super::model::Model;
 use super::parameters::{Layout, priors};
 use super::record::Record;
@@ -129,7 +129,7 @@ impl Excitation {
         let mut step = Step::new(model, false);
         for k in 0..(TRIAL_S.min(self.duration_s) / dt_s) as usize {
             let force = self.force_n(k as f64 * dt_s, state[0], state[m]);
-            step.take(model, p, &state, &Input { force, ..Input::default() }, dt_s);
+            step.take(model, p, &state, &CartForce { force, ..CartForce::default() }, dt_s);
             state.copy_from_slice(&step.end);
             let turned = state[1..m].iter().map(|phi| (phi - PI).abs()).fold(0.0, f64::max);
             // Written so that NaN counts as leaving the limits.
@@ -230,7 +230,7 @@ fn run(rig: &Rig, machine: &Rig, excitation: &Excitation, seed: u64) -> Result<O
         .collect();
     let full_n = rig.force_limit_n().unwrap_or(10.0 * excitation.amplitude_n * excitation.lines.len() as f64);
     let scale = if rig.actuator.motor.is_some() { DriveScale::Duty } else { DriveScale::Force(full_n) };
-    let mut log = Log::new(Header {
+    let mut log = Log::new(LogHeader {
         rig: rig.name.clone(),
         hash: rig.hash(),
         period_ns: (rig.tick.period_s * 1e9).round() as u32,

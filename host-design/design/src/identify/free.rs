@@ -138,7 +138,7 @@ fn jackknife(without: &[f64]) -> f64 {
 mod tests {
     use std::path::Path;
 
-    use super::super::model::Input;
+    use super::super::model::CartForce;
     use super::super::parameters::priors;
     use super::super::step::Step;
     use super::super::table::RecordingRows;
@@ -166,7 +166,7 @@ mod tests {
                 counts[channel] * (value / counts[channel]).round()
             }));
             for _ in 0..4 {
-                step.take(&model, &p, &state, &Input::default(), 0.0005);
+                step.take(&model, &p, &state, &CartForce::default(), 0.0005);
                 state.copy_from_slice(&step.end);
             }
         }

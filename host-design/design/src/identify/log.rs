@@ -28,7 +28,7 @@ pub enum DriveScale {
 
 /// Header of a log: the rig, and how its ticks are to be read.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Header {
+pub struct LogHeader {
     /// Name of the rig.
     pub rig: String,
     /// Hash of the rig file that the firmware was designed for.
@@ -58,7 +58,7 @@ pub struct Tick {
 #[derive(Debug, Clone, PartialEq)]
 pub struct Log {
     /// The rig, and how the ticks are to be read.
-    pub header: Header,
+    pub header: LogHeader,
     ticks: Vec<Tick>,
     /// Counters of all ticks, one row per tick.
     counts: Vec<u16>,
@@ -69,7 +69,7 @@ impl Log {
     pub const MARK: &'static [u8; 8] = b"UPRTLOG1";
 
     /// An empty log.
-    pub fn new(header: Header) -> Self {
+    pub fn new(header: LogHeader) -> Self {
         Self { header, ticks: Vec::new(), counts: Vec::new() }
     }
 
@@ -214,7 +214,7 @@ impl Log {
     }
 }
 
-impl Header {
+impl LogHeader {
     fn to_bytes(&self) -> Vec<u8> {
         let name = &self.rig.as_bytes()[..self.rig.len().min(255)];
         let (kind, full) = match self.drive {
@@ -234,7 +234,7 @@ impl Header {
 }
 
 /// Reads the header; returns it with the bytes that follow.
-fn header(bytes: &[u8]) -> Result<(Header, &[u8]), LogError> {
+fn header(bytes: &[u8]) -> Result<(LogHeader, &[u8]), LogError> {
     if bytes.is_empty() {
         return Err(LogError::Empty);
     }
@@ -265,7 +265,7 @@ fn header(bytes: &[u8]) -> Result<(Header, &[u8]), LogError> {
         return Err(damaged());
     }
     let hanging = hanging.chunks_exact(2).map(|word| u16::from_le_bytes([word[0], word[1]])).collect();
-    Ok((Header { rig, hash: u64::from_le_bytes(*hash), period_ns, drive, hanging }, rest))
+    Ok((LogHeader { rig, hash: u64::from_le_bytes(*hash), period_ns, drive, hanging }, rest))
 }
 
 fn with_checksum(mut body: Vec<u8>) -> Vec<u8> {
@@ -286,7 +286,7 @@ mod tests {
     use proptest::prelude::*;
 
     fn log(numbers: &[u32]) -> Log {
-        let header = Header {
+        let header = LogHeader {
             rig: "two".to_owned(),
             hash: 7,
             period_ns: 1_000_000,

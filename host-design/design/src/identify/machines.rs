@@ -7,7 +7,7 @@ use rand_pcg::Pcg64;
 
 use super::channel::chain_of;
 use super::error::IdentifyError;
-use super::parameters::{FRICTION, Kind, Layout, priors};
+use super::parameters::{FRICTION, Layout, ParameterKind, priors};
 use crate::plant::ChainParameters;
 use crate::reality::real_chain;
 use crate::rig::{PerJoint, Rig};
@@ -24,13 +24,13 @@ const DEAD_ZONE: f64 = 0.5;
 
 /// A simulated machine, and the true value of each parameter that is identified.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Machine {
+pub struct DrawnMachine {
     /// The rig as it is simulated, with the drawn errors.
     pub rig: Rig,
-    truth: Vec<(Kind, f64)>,
+    truth: Vec<(ParameterKind, f64)>,
 }
 
-impl Machine {
+impl DrawnMachine {
     /// Draws machine `number` of those that differ from `file` by up to `off_percent` in masses, lengths and inertias.
     /// Friction, homing, tilt, latency and dead zone are drawn, too; the motor's other constants are the file's.
     ///
@@ -77,30 +77,32 @@ impl Machine {
     }
 
     /// The true value of a parameter, if the machine has it.
-    pub fn truth(&self, kind: Kind) -> Option<f64> {
+    pub fn truth(&self, kind: ParameterKind) -> Option<f64> {
         self.truth.iter().find(|(known, _)| *known == kind).map(|(_, value)| *value)
     }
 }
 
 /// The true parameters of the machine of `rig`, including its `[reality]`.
-fn truth(rig: &Rig) -> Result<Vec<(Kind, f64)>, IdentifyError> {
+fn truth(rig: &Rig) -> Result<Vec<(ParameterKind, f64)>, IdentifyError> {
     let real = real_chain(chain_of(rig)?, &rig.reality.parameters);
     let constants = ChainParameters::<f64>::of(&real);
     let (friction, sensors) = (&rig.reality.friction, &rig.reality.sensors);
-    let value = |kind: Kind| match kind {
-        Kind::TotalMass => Some(constants.total_mass),
-        Kind::FirstMoment(j) => Some(constants.a[j]),
-        Kind::Length(j) => Some(real.links[j].length_m),
-        Kind::SecondMoment(j) => Some(constants.b[(j, j)]),
-        Kind::CartViscous => Some(constants.cart_friction),
-        Kind::JointViscous(j) => Some(constants.joint_frictions[j]),
-        Kind::CartDry => Some(friction.cart_friction_n),
-        Kind::JointDry(j) => Some(friction.joint_friction_n_m.of(j)),
-        Kind::Tilt => Some(sensors.rail_tilt_rad),
-        Kind::Delay => Some(rig.reality.driver.latency_s / rig.tick.period_s),
-        Kind::DeadZone => rig.actuator.motor.as_ref().map(|motor| motor.dead_zone_v),
-        Kind::Zero(j) => Some(sensors.homing_error_rad.of(j)),
-        Kind::AirDrag(_) | Kind::EccentricSine(_) | Kind::EccentricCosine(_) => None,
+    let value = |kind: ParameterKind| match kind {
+        ParameterKind::TotalMass => Some(constants.total_mass),
+        ParameterKind::FirstMoment(j) => Some(constants.a[j]),
+        ParameterKind::Length(j) => Some(real.links[j].length_m),
+        ParameterKind::SecondMoment(j) => Some(constants.b[(j, j)]),
+        ParameterKind::CartViscous => Some(constants.cart_friction),
+        ParameterKind::JointViscous(j) => Some(constants.joint_frictions[j]),
+        ParameterKind::CartDry => Some(friction.cart_friction_n),
+        ParameterKind::JointDry(j) => Some(friction.joint_friction_n_m.of(j)),
+        ParameterKind::Tilt => Some(sensors.rail_tilt_rad),
+        ParameterKind::Delay => Some(rig.reality.driver.latency_s / rig.tick.period_s),
+        ParameterKind::DeadZone => rig.actuator.motor.as_ref().map(|motor| motor.dead_zone_v),
+        ParameterKind::Zero(j) => Some(sensors.homing_error_rad.of(j)),
+        ParameterKind::AirDrag(_) | ParameterKind::EccentricSine(_) | ParameterKind::EccentricCosine(_) => {
+            None
+        }
     };
     let kinds = Layout { links: real.links.len() }.kinds();
     Ok(kinds.into_iter().filter_map(|kind| Some((kind, value(kind)?))).collect())

@@ -44,22 +44,22 @@ mod wiring;
 mod with_firmware;
 
 pub use coverage::{
-    Coverage, CoverageError, CoverageRow, Drawn, Identified, Missed, Quantity, coverage, identified,
+    Coverage, CoverageError, CoverageRow, CoveredQuantity, Drawn, Identified, Missed, coverage, identified,
 };
 pub use error::{IdentifyError, LogError};
 pub use estimate::{Settings, identify, identify_recordings};
 pub use estimated::{Estimate, Identification};
 pub use excite::{Excitation, shake};
 pub use feed::Feed;
-pub use log::{CONTACTS, DriveScale, Header, Log, Tick};
-pub use machines::Machine;
+pub use log::{CONTACTS, DriveScale, Log, LogHeader, Tick};
+pub use machines::DrawnMachine;
 pub use over_line::{LineError, OverLine};
-pub use parameters::Kind;
+pub use parameters::ParameterKind;
 pub use realise::{Realised, RealisedLink};
 pub use recorder::Recorder;
 pub use recordings::Recordings;
 pub use table::{AngleReference, AngleZero, Reading, RecordingError, RecordingTable};
 pub use verdict::{ChannelFit, Predicted, Refusal};
 pub use window_errors::{ChannelError, WindowErrors};
-pub use wiring::{Wiring, WiringFound};
+pub use wiring::{WiringFault, WiringFound};
 pub use with_firmware::{ShakeError, Shaken, checked_and_hanging, shake_with};

@@ -37,7 +37,7 @@ pub(super) struct Model {
 
 /// Force on the cart in a step (N), and its derivatives.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub(super) struct Input {
+pub(super) struct CartForce {
     pub(super) force: f64,
     /// Derivative by the delay (N/tick).
     pub(super) by_delay: f64,
@@ -49,7 +49,7 @@ pub(super) struct Input {
 
 /// Accelerations at one state, and their derivatives.
 #[derive(Debug, Clone)]
-pub(super) struct Local {
+pub(super) struct Accelerations {
     /// Number of columns of `jacobian`: s, or s and the number of parameters of the motion.
     columns: usize,
     /// ẍ, φ̈_1 …, m entries.
@@ -101,7 +101,7 @@ impl Model {
     }
 }
 
-impl Local {
+impl Accelerations {
     /// Storage for derivatives by the state, and by the parameters if `parameters`.
     pub(super) fn new(layout: Layout, parameters: bool) -> Self {
         let m = layout.links + 1;
@@ -117,7 +117,7 @@ impl Local {
     }
 
     /// Accelerations at the state `at` with the parameters `p`.
-    pub(super) fn accelerate(&mut self, model: &Model, p: &[f64], at: &[f64], input: &Input) {
+    pub(super) fn accelerate(&mut self, model: &Model, p: &[f64], at: &[f64], input: &CartForce) {
         let (n, m, layout) = (model.layout.links, model.coordinates(), model.layout);
         let (v, w, bristle) = (at[m], &at[m + 1..2 * m], at[2 * m]);
         let (total, (slope_sine, slope_cosine)) = (p[Layout::TOTAL_MASS], libm::sincos(p[layout.tilt()]));
@@ -160,7 +160,7 @@ impl Local {
     }
 
     /// Accelerations, and their derivatives: with the equations written r = 0, `-M⁻¹ ∂r`.
-    pub(super) fn differentiate(&mut self, model: &Model, p: &[f64], at: &[f64], input: &Input) {
+    pub(super) fn differentiate(&mut self, model: &Model, p: &[f64], at: &[f64], input: &CartForce) {
         self.accelerate(model, p, at, input);
         self.jacobian.fill(0.0);
         self.by_state(model, p, at, input);
@@ -174,7 +174,7 @@ impl Local {
     }
 
     /// `-∂r` by the state.
-    fn by_state(&mut self, model: &Model, p: &[f64], at: &[f64], input: &Input) {
+    fn by_state(&mut self, model: &Model, p: &[f64], at: &[f64], input: &CartForce) {
         let (n, m, layout, columns) = (model.layout.links, model.coordinates(), model.layout, self.columns);
         let w = &at[m + 1..2 * m];
         let (xdd, wdot) = (self.acceleration[0], &self.acceleration[1..]);
@@ -210,7 +210,7 @@ impl Local {
     }
 
     /// `-∂r` by the parameters.
-    fn by_parameters(&mut self, model: &Model, p: &[f64], at: &[f64], input: &Input) {
+    fn by_parameters(&mut self, model: &Model, p: &[f64], at: &[f64], input: &CartForce) {
         let (n, m, layout, columns) = (model.layout.links, model.coordinates(), model.layout, self.columns);
         let (v, w, s, gravity) = (at[m], &at[m + 1..2 * m], model.states(), model.gravity);
         let (xdd, wdot) = (self.acceleration[0], &self.acceleration[1..]);
@@ -317,7 +317,7 @@ fn solve(factors: &[f64], m: usize, columns: usize, rows: &mut [f64]) {
 pub(super) mod tests {
     use super::super::parameters::{SMOOTHING, priors};
     use super::*;
-    use crate::plant::{ChainPlant, ChainState};
+    use crate::plant::{ChainPlant, WideChainState};
     use crate::rig::Rig;
     use std::path::Path;
 
@@ -342,9 +342,9 @@ pub(super) mod tests {
         let (model, mut p, plant) = triple();
         (0..=3).for_each(|contact| p[model.layout.dry(contact)] = 0.0);
         (0..3).for_each(|link| p[model.layout.drag(link)] = 0.0);
-        let mut local = Local::new(model.layout, false);
-        local.accelerate(&model, &p, &AT, &Input { force: 17.0, ..Input::default() });
-        let state = ChainState { x: 0.1, xdot: -0.7, phi: [2.0, -1.1, 0.4], phidot: [3.0, -5.0, 1.5] };
+        let mut local = Accelerations::new(model.layout, false);
+        local.accelerate(&model, &p, &AT, &CartForce { force: 17.0, ..CartForce::default() });
+        let state = WideChainState { x: 0.1, xdot: -0.7, phi: [2.0, -1.1, 0.4], phidot: [3.0, -5.0, 1.5] };
         let rate = plant.derivative(&state, 17.0, &[0.0; 3]);
         let wanted = [rate.xdot, rate.phidot[0], rate.phidot[1], rate.phidot[2]];
         for (found, wanted) in local.acceleration.iter().zip(wanted) {
@@ -356,17 +356,17 @@ pub(super) mod tests {
     fn derivatives_agree_with_differences() {
         let (model, mut p, _) = triple();
         p[model.layout.tilt()] = 0.1;
-        let mut exact = Local::new(model.layout, true);
+        let mut exact = Accelerations::new(model.layout, true);
         exact.differentiate(
             &model,
             &p,
             &AT,
-            &Input { force: 17.0, by_delay: 2.0, by_dead_zone: -3.0, back_emf: 0.7 },
+            &CartForce { force: 17.0, by_delay: 2.0, by_dead_zone: -3.0, back_emf: 0.7 },
         );
         let columns = 9 + model.layout.of_motion();
-        let mut other = Local::new(model.layout, false);
+        let mut other = Accelerations::new(model.layout, false);
         let mut at = |p: &[f64], state: &[f64], force: f64| {
-            other.accelerate(&model, p, state, &Input { force, back_emf: 0.7, ..Input::default() });
+            other.accelerate(&model, p, state, &CartForce { force, back_emf: 0.7, ..CartForce::default() });
             other.acceleration.clone()
         };
         for column in 0..columns {

@@ -9,7 +9,7 @@ pub(super) const SMOOTHING: [f64; 2] = [3e-5, 0.02];
 
 /// A parameter of a chain; links and joints are counted from 0.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Kind {
+pub enum ParameterKind {
     /// M_t: mass of cart and links (kg).
     TotalMass,
     /// a_j: first moment at the joint of link j, of everything it carries (kg·m).
@@ -42,26 +42,26 @@ pub enum Kind {
     EccentricCosine(usize),
 }
 
-impl Kind {
+impl ParameterKind {
     /// Name, with links and joints counted from 1, and SI unit.
     pub fn name_and_unit(self) -> (String, &'static str) {
         let of = |what: &str, joint: usize| format!("{what} {}", joint + 1);
         match self {
-            Kind::TotalMass => ("total mass".to_owned(), "kg"),
-            Kind::FirstMoment(j) => (of("first moment, link", j), "kg·m"),
-            Kind::Length(j) => (of("length, link", j), "m"),
-            Kind::SecondMoment(j) => (of("second moment, link", j), "kg·m²"),
-            Kind::CartViscous => ("viscous friction, cart".to_owned(), "N·s/m"),
-            Kind::JointViscous(j) => (of("viscous friction, joint", j), "N·m·s/rad"),
-            Kind::CartDry => ("dry friction, cart".to_owned(), "N"),
-            Kind::JointDry(j) => (of("dry friction, joint", j), "N·m"),
-            Kind::AirDrag(j) => (of("air drag, link", j), "N·m·s²/rad²"),
-            Kind::Tilt => ("tilt of the rail".to_owned(), "rad"),
-            Kind::Delay => ("delay".to_owned(), "ticks"),
-            Kind::DeadZone => ("dead zone".to_owned(), "V"),
-            Kind::Zero(j) => (of("zero, joint", j), "rad"),
-            Kind::EccentricSine(j) => (of("eccentricity (sine), joint", j), "rad"),
-            Kind::EccentricCosine(j) => (of("eccentricity (cosine), joint", j), "rad"),
+            ParameterKind::TotalMass => ("total mass".to_owned(), "kg"),
+            ParameterKind::FirstMoment(j) => (of("first moment, link", j), "kg·m"),
+            ParameterKind::Length(j) => (of("length, link", j), "m"),
+            ParameterKind::SecondMoment(j) => (of("second moment, link", j), "kg·m²"),
+            ParameterKind::CartViscous => ("viscous friction, cart".to_owned(), "N·s/m"),
+            ParameterKind::JointViscous(j) => (of("viscous friction, joint", j), "N·m·s/rad"),
+            ParameterKind::CartDry => ("dry friction, cart".to_owned(), "N"),
+            ParameterKind::JointDry(j) => (of("dry friction, joint", j), "N·m"),
+            ParameterKind::AirDrag(j) => (of("air drag, link", j), "N·m·s²/rad²"),
+            ParameterKind::Tilt => ("tilt of the rail".to_owned(), "rad"),
+            ParameterKind::Delay => ("delay".to_owned(), "ticks"),
+            ParameterKind::DeadZone => ("dead zone".to_owned(), "V"),
+            ParameterKind::Zero(j) => (of("zero, joint", j), "rad"),
+            ParameterKind::EccentricSine(j) => (of("eccentricity (sine), joint", j), "rad"),
+            ParameterKind::EccentricCosine(j) => (of("eccentricity (cosine), joint", j), "rad"),
         }
     }
 }
@@ -124,21 +124,21 @@ impl Layout {
     }
 
     /// What each parameter is, in order.
-    pub(super) fn kinds(self) -> Vec<Kind> {
+    pub(super) fn kinds(self) -> Vec<ParameterKind> {
         let n = self.links;
-        let mut kinds = vec![Kind::TotalMass];
-        kinds.extend((0..n).map(Kind::FirstMoment));
-        kinds.extend((0..n - 1).map(Kind::Length));
-        kinds.extend((0..n).map(Kind::SecondMoment));
-        kinds.push(Kind::CartViscous);
-        kinds.extend((0..n).map(Kind::JointViscous));
-        kinds.push(Kind::CartDry);
-        kinds.extend((0..n).map(Kind::JointDry));
-        kinds.extend((0..n).map(Kind::AirDrag));
-        kinds.extend([Kind::Tilt, Kind::Delay, Kind::DeadZone]);
-        kinds.extend((0..n).map(Kind::Zero));
-        kinds.extend((0..n).map(Kind::EccentricSine));
-        kinds.extend((0..n).map(Kind::EccentricCosine));
+        let mut kinds = vec![ParameterKind::TotalMass];
+        kinds.extend((0..n).map(ParameterKind::FirstMoment));
+        kinds.extend((0..n - 1).map(ParameterKind::Length));
+        kinds.extend((0..n).map(ParameterKind::SecondMoment));
+        kinds.push(ParameterKind::CartViscous);
+        kinds.extend((0..n).map(ParameterKind::JointViscous));
+        kinds.push(ParameterKind::CartDry);
+        kinds.extend((0..n).map(ParameterKind::JointDry));
+        kinds.extend((0..n).map(ParameterKind::AirDrag));
+        kinds.extend([ParameterKind::Tilt, ParameterKind::Delay, ParameterKind::DeadZone]);
+        kinds.extend((0..n).map(ParameterKind::Zero));
+        kinds.extend((0..n).map(ParameterKind::EccentricSine));
+        kinds.extend((0..n).map(ParameterKind::EccentricCosine));
         kinds
     }
 }
@@ -187,24 +187,26 @@ pub(super) fn priors(rig: &Rig, chain: &Chain, eccentricity: bool) -> Vec<Prior>
         deviation: FRICTION * given.max(usual),
     };
     let friction = &rig.reality.friction;
-    let prior = |kind: Kind| match kind {
-        Kind::TotalMass => shape(constants.total_mass),
-        Kind::FirstMoment(j) => shape(constants.a[j]),
-        Kind::Length(j) => shape(chain.links[j].length_m),
-        Kind::SecondMoment(j) => shape(constants.b[(j, j)]),
-        Kind::CartViscous => viscous(constants.cart_friction, constants.total_mass),
-        Kind::JointViscous(j) => viscous(constants.joint_frictions[j], joint_viscous(j)),
-        Kind::CartDry => dry(friction.cart_friction_n, 0.01 * weight),
-        Kind::JointDry(j) => dry(friction.joint_friction_n_m.of(j), 0.001 * gravity * constants.a[j]),
-        Kind::AirDrag(_) => Prior { value: 0.0, deviation: 0.0 },
-        Kind::Tilt => Prior { value: 0.0, deviation: ZERO_RAD },
-        Kind::Delay => Prior { value: 0.5, deviation: 0.5 },
-        Kind::DeadZone => motor.map_or(Prior { value: 0.0, deviation: 0.0 }, |motor| Prior {
+    let prior = |kind: ParameterKind| match kind {
+        ParameterKind::TotalMass => shape(constants.total_mass),
+        ParameterKind::FirstMoment(j) => shape(constants.a[j]),
+        ParameterKind::Length(j) => shape(chain.links[j].length_m),
+        ParameterKind::SecondMoment(j) => shape(constants.b[(j, j)]),
+        ParameterKind::CartViscous => viscous(constants.cart_friction, constants.total_mass),
+        ParameterKind::JointViscous(j) => viscous(constants.joint_frictions[j], joint_viscous(j)),
+        ParameterKind::CartDry => dry(friction.cart_friction_n, 0.01 * weight),
+        ParameterKind::JointDry(j) => {
+            dry(friction.joint_friction_n_m.of(j), 0.001 * gravity * constants.a[j])
+        }
+        ParameterKind::AirDrag(_) => Prior { value: 0.0, deviation: 0.0 },
+        ParameterKind::Tilt => Prior { value: 0.0, deviation: ZERO_RAD },
+        ParameterKind::Delay => Prior { value: 0.5, deviation: 0.5 },
+        ParameterKind::DeadZone => motor.map_or(Prior { value: 0.0, deviation: 0.0 }, |motor| Prior {
             value: motor.dead_zone_v,
             deviation: motor.dead_zone_v.max(0.02 * motor.supply_v),
         }),
-        Kind::Zero(_) => Prior { value: 0.0, deviation: ZERO_RAD },
-        Kind::EccentricSine(_) | Kind::EccentricCosine(_) => {
+        ParameterKind::Zero(_) => Prior { value: 0.0, deviation: ZERO_RAD },
+        ParameterKind::EccentricSine(_) | ParameterKind::EccentricCosine(_) => {
             Prior { value: 0.0, deviation: if eccentricity { ECCENTRICITY_RAD } else { 0.0 } }
         }
     };

@@ -3,7 +3,7 @@
 // The indices are those of the equations.
 #![allow(clippy::needless_range_loop)]
 
-use super::model::{Input, Model};
+use super::model::{CartForce, Model};
 use super::normal::Normal;
 use super::parameters::{Layout, Prior, room_below};
 use super::record::Record;
@@ -61,7 +61,7 @@ impl Filter<'_> {
     /// residuals.
     pub(super) fn run(&self, p: &[f64], noise: &[f64], free: bool) -> Normal {
         let layout = self.model.layout;
-        let inputs: Vec<Vec<Input>> =
+        let inputs: Vec<Vec<CartForce>> =
             (0..self.record.pieces.len()).map(|piece| self.record.inputs(layout, p, piece)).collect();
         let size = if free { layout.count() } else { 0 };
         let one = |segment: (usize, usize, usize)| self.segment(p, noise, &inputs[segment.0], segment, free);
@@ -150,13 +150,20 @@ impl Filter<'_> {
         Some((p, normal))
     }
 
-    fn segment(&self, p: &[f64], noise: &[f64], inputs: &[Input], segment: Segment, free: bool) -> Normal {
+    fn segment(
+        &self,
+        p: &[f64],
+        noise: &[f64],
+        inputs: &[CartForce],
+        segment: Segment,
+        free: bool,
+    ) -> Normal {
         let (piece, first, samples) = segment;
         let (m, s, dt_s) = (self.record.channels, self.model.states(), self.record.dt_s);
         let size = if free { self.model.layout.count() } else { 0 };
         let mut normal = Normal::new(size, m);
         let mut step = Step::new(self.model, free);
-        let mut filter = State::new(self.record.state_near(p, self.model.layout, piece, first), size);
+        let mut filter = FilterState::new(self.record.state_near(p, self.model.layout, piece, first), size);
         for channel in 0..m {
             let step = self.record.steps[channel];
             // Absolute angles are sums of measured joint angles.
@@ -171,8 +178,7 @@ impl Filter<'_> {
         for sample in first..first + samples {
             for channel in 0..m {
                 let measured = y[sample * m + channel];
-                let variance = self.record.steps[channel].powi(2) / 12.0;
-                let (error, predicted) = filter.correct(self, p, channel, measured, variance, &mut jacobian);
+                let (error, predicted) = filter.correct(self, p, channel, measured, &mut jacobian);
                 if sample >= settled {
                     normal.add(&jacobian, error, 1.0 / predicted);
                     normal.cost += error * error / predicted + libm::log(predicted);
@@ -192,7 +198,7 @@ impl Filter<'_> {
 }
 
 /// Estimate, its covariance, and its derivatives by the parameters.
-struct State {
+struct FilterState {
     at: Vec<f64>,
     /// s×s.
     covariance: Vec<f64>,
@@ -204,7 +210,7 @@ struct State {
     next_by: Vec<f64>,
 }
 
-impl State {
+impl FilterState {
     fn new(at: Vec<f64>, size: usize) -> Self {
         let s = at.len();
         Self {
@@ -226,7 +232,6 @@ impl State {
         p: &[f64],
         channel: usize,
         y: f64,
-        variance: f64,
         jacobian: &mut [f64],
     ) -> (f64, f64) {
         let (s, size) = (self.at.len(), self.size);
@@ -237,6 +242,7 @@ impl State {
             let row = &self.covariance[i * s..][..s];
             *column = by * (row[channel] - below.map_or(0.0, |below| row[below]));
         }
+        let variance = filter.record.steps[channel].powi(2) / 12.0;
         let predicted =
             variance + by * (self.column[channel] - below.map_or(0.0, |below| self.column[below]));
         let error = y - measured.value;

@@ -10,7 +10,7 @@ use upright::protocol::tick_log::OFF;
 use super::channel::channel_name;
 use super::error::IdentifyError;
 use super::log::{DriveScale, Log};
-use super::model::{Input, Model};
+use super::model::{CartForce, Model};
 use super::parameters::Layout;
 use super::table::RecordingRows;
 use crate::rig::{Motor, Rig};
@@ -181,7 +181,7 @@ impl Record {
 
     /// Force of each interval between two samples of a piece, with the delay and the dead zone of `p`:
     /// `u = (1 - δ) u_k + δ u_{k-1}`, averaged over the interval.
-    pub(super) fn inputs(&self, layout: Layout, p: &[f64], piece: usize) -> Vec<Input> {
+    pub(super) fn inputs(&self, layout: Layout, p: &[f64], piece: usize) -> Vec<CartForce> {
         let (delay, dead_zone) = (p[layout.delay()], p[layout.dead_zone()]);
         let drive = &self.pieces[piece].drive;
         let force = |tick: Option<usize>| {
@@ -196,7 +196,7 @@ impl Record {
         for first in (0..drive.len()).step_by(self.stride) {
             let ticks = first..(first + self.stride).min(drive.len());
             let share = 1.0 / ticks.len() as f64;
-            let mut input = Input::default();
+            let mut input = CartForce::default();
             for tick in ticks {
                 let now = tick.checked_sub(self.delay_ticks);
                 let ([new, new_by], [old, old_by]) =

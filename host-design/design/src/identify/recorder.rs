@@ -1,7 +1,7 @@
 //! Assembles the log of a firmware that sends every tick.
 
 use super::error::IdentifyError;
-use super::log::{DriveScale, Header, Log, Tick};
+use super::log::{DriveScale, Log, LogHeader, Tick};
 use crate::client::AnyTickLog;
 use crate::rig::Rig;
 use crate::table::TableValues;
@@ -24,7 +24,7 @@ impl Recorder {
             Some(_) => DriveScale::Duty,
             None => DriveScale::Force(table.force_limit_n.into()),
         };
-        let log = Log::new(Header {
+        let log = Log::new(LogHeader {
             rig: rig.name.clone(),
             hash: rig.hash(),
             period_ns: (rig.tick.period_s * 1e9).round() as u32,

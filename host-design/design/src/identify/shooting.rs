@@ -3,7 +3,7 @@
 // The indices are those of the equations.
 #![allow(clippy::needless_range_loop)]
 
-use super::model::{Input, Model};
+use super::model::{CartForce, Model};
 use super::normal::{Cholesky, Normal};
 use super::parameters::{Prior, room_below};
 use super::record::Record;
@@ -22,7 +22,7 @@ const SETTLED: f64 = 1e-3;
 
 /// A window with its initial state.
 #[derive(Debug, Clone)]
-pub(super) struct Window {
+pub(super) struct ShootingWindow {
     piece: usize,
     first: usize,
     samples: usize,
@@ -44,7 +44,7 @@ pub(super) struct Shooting<'a> {
 #[derive(Debug, Clone)]
 pub(super) struct Fit {
     pub(super) p: Vec<f64>,
-    windows: Vec<Window>,
+    windows: Vec<ShootingWindow>,
     /// Root mean square of the residuals of each channel (m, rad).
     pub(super) rms: Vec<f64>,
 }
@@ -58,7 +58,7 @@ struct Reduced {
 
 impl Shooting<'_> {
     /// Consecutive windows over all pieces, with initial states from the measurements.
-    fn windows(&self, p: &[f64], seconds: f64) -> Vec<Window> {
+    fn windows(&self, p: &[f64], seconds: f64) -> Vec<ShootingWindow> {
         let samples = ((seconds / self.record.dt_s).round() as usize).max(4);
         let mut windows = Vec::new();
         for piece in 0..self.record.pieces.len() {
@@ -67,7 +67,7 @@ impl Shooting<'_> {
                 if 2 * samples as u64 >= (seconds / self.record.dt_s) as u64 {
                     let state = self.record.state_near(p, self.model.layout, piece, first);
                     let bristle = state[state.len() - 1];
-                    windows.push(Window { piece, first, samples, state, bristle });
+                    windows.push(ShootingWindow { piece, first, samples, state, bristle });
                 }
             }
         }
@@ -89,7 +89,7 @@ impl Shooting<'_> {
         self.fit_windows(p, windows, iterations, rounds)
     }
 
-    fn fit_windows(&self, p: &[f64], windows: Vec<Window>, iterations: usize, rounds: usize) -> Fit {
+    fn fit_windows(&self, p: &[f64], windows: Vec<ShootingWindow>, iterations: usize, rounds: usize) -> Fit {
         let mut fit = Fit { p: p.to_vec(), windows, rms: self.record.steps.clone() };
         let channels = self.record.channels;
         for _ in 0..rounds {
@@ -157,7 +157,13 @@ impl Shooting<'_> {
 
     /// Gauss–Newton on the initial states alone. Each window takes its own steps, so one that cannot improve does not
     /// hold up the others.
-    fn settled(&self, p: &[f64], windows: &[Window], weights: &[f64], iterations: usize) -> Vec<Window> {
+    fn settled(
+        &self,
+        p: &[f64],
+        windows: &[ShootingWindow],
+        weights: &[f64],
+        iterations: usize,
+    ) -> Vec<ShootingWindow> {
         let inputs = self.inputs(p);
         parallel::map(windows, |window| {
             let fit = Fit { p: p.to_vec(), windows: vec![window.clone()], rms: Vec::new() };
@@ -165,7 +171,13 @@ impl Shooting<'_> {
         })
     }
 
-    fn descend_alone(&self, inputs: &[Vec<Input>], mut fit: Fit, weights: &[f64], iterations: usize) -> Fit {
+    fn descend_alone(
+        &self,
+        inputs: &[Vec<CartForce>],
+        mut fit: Fit,
+        weights: &[f64],
+        iterations: usize,
+    ) -> Fit {
         let (mut normal, mut reduced) = self.linearise_with(inputs, &fit, weights);
         for _ in 0..iterations {
             let better = STEPS.iter().find_map(|share| {
@@ -221,13 +233,18 @@ impl Shooting<'_> {
     }
 
     /// The inputs of all pieces.
-    fn inputs(&self, p: &[f64]) -> Vec<Vec<Input>> {
+    fn inputs(&self, p: &[f64]) -> Vec<Vec<CartForce>> {
         let pieces = 0..self.record.pieces.len();
         pieces.map(|piece| self.record.inputs(self.model.layout, p, piece)).collect()
     }
 
     /// [`Self::linearise`] with `inputs` computed before: they depend only on the parameters.
-    fn linearise_with(&self, inputs: &[Vec<Input>], fit: &Fit, weights: &[f64]) -> (Normal, Vec<Reduced>) {
+    fn linearise_with(
+        &self,
+        inputs: &[Vec<CartForce>],
+        fit: &Fit,
+        weights: &[f64],
+    ) -> (Normal, Vec<Reduced>) {
         let each = parallel::map(&fit.windows, |window| {
             let whole = self.window(&fit.p, &inputs[window.piece], window, weights);
             self.reduce(whole)
@@ -249,7 +266,7 @@ impl Shooting<'_> {
     }
 
     /// The normal equations of a window in its initial state and the parameters.
-    fn window(&self, p: &[f64], inputs: &[Input], window: &Window, weights: &[f64]) -> Normal {
+    fn window(&self, p: &[f64], inputs: &[CartForce], window: &ShootingWindow, weights: &[f64]) -> Normal {
         let (model, m, s) = (self.model, self.record.channels, self.model.states());
         let mut step = Step::new(model, self.free);
         let columns = step.columns;
@@ -372,11 +389,11 @@ mod tests {
         let mut windows = shooting.windows(&p, 0.5);
         windows[2].state.fill(f64::NAN);
         let weights: Vec<f64> = record.steps.iter().map(|step| step.powi(-2)).collect();
-        let cost = |window: &Window| {
+        let cost = |window: &ShootingWindow| {
             let fit = Fit { p: p.clone(), windows: vec![window.clone()], rms: Vec::new() };
             shooting.linearise(&fit, &weights).0.cost
         };
-        let sum = |windows: &[Window]| windows[3..].iter().map(cost).sum::<f64>();
+        let sum = |windows: &[ShootingWindow]| windows[3..].iter().map(cost).sum::<f64>();
         let alone = shooting.settled(&p, &windows, &weights, 10);
         assert!(sum(&alone) < 0.5 * sum(&windows), "{} {}", sum(&alone), sum(&windows));
         // The negative control: steps of all windows together.

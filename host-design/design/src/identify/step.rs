@@ -2,13 +2,13 @@
 
 use core::f64::consts::PI;
 
-use super::model::{Input, Local, Model};
+use super::model::{Accelerations, CartForce, Model};
 use super::rows::{add_multiple, set_multiple};
 
 /// A step of the classical Runge–Kutta method, with derivatives by the state at its start and by the parameters.
 #[derive(Debug, Clone)]
 pub(super) struct Step {
-    local: Local,
+    local: Accelerations,
     /// Number of columns: s, or s and the number of parameters of the motion.
     pub(super) columns: usize,
     /// State at the end, s entries.
@@ -31,7 +31,7 @@ impl Step {
         let columns = s + if parameters { model.layout.of_motion() } else { 0 };
         let (of_state, of_columns) = (vec![0.0; s], vec![0.0; s * columns]);
         Self {
-            local: Local::new(model.layout, parameters),
+            local: Accelerations::new(model.layout, parameters),
             columns,
             end: of_state.clone(),
             by: of_columns.clone(),
@@ -43,7 +43,7 @@ impl Step {
     }
 
     /// Integrates from `start` over `dt` (s) under `input`; the result is in `end` and `by`.
-    pub(super) fn take(&mut self, model: &Model, p: &[f64], start: &[f64], input: &Input, dt: f64) {
+    pub(super) fn take(&mut self, model: &Model, p: &[f64], start: &[f64], input: &CartForce, dt: f64) {
         let (m, s, columns) = (model.coordinates(), model.states(), self.columns);
         self.end.copy_from_slice(start);
         self.by.fill(0.0);
@@ -78,7 +78,7 @@ impl Step {
         bend(model, start, &mut self.end, &mut self.by);
     }
 
-    /// Accelerations per unit of force and torque at the last stage of the step; see [`Local::inputs`].
+    /// Accelerations per unit of force and torque at the last stage of the step; see [`Accelerations::inputs`].
     pub(super) fn inputs(&self) -> Vec<f64> {
         self.local.inputs()
     }
@@ -154,7 +154,7 @@ mod tests {
         let (model, p, _) = triple();
         // The cart moves by a fraction of the length of its bristle; at 0 its travel is exact.
         let start = [0.0, 2.0, -1.1, 0.4, -0.005, 3.0, -5.0, 1.5, 0.4];
-        let input = Input { force: 3.0, ..Input::default() };
+        let input = CartForce { force: 3.0, ..CartForce::default() };
         let after = |p: &[f64], start: &[f64]| {
             let mut step = Step::new(&model, true);
             step.take(&model, p, start, &input, 0.002);

@@ -18,7 +18,7 @@ const MARGIN: f64 = 2.0;
 
 /// A wiring. Channels are cart (0) and joints.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Wiring {
+pub enum WiringFault {
     /// As in the file.
     AsInFile,
     /// The motor turns the other way.
@@ -35,7 +35,7 @@ pub enum Wiring {
 #[derive(Debug, Clone, PartialEq)]
 pub struct WiringFound {
     /// The wiring that explains the log best.
-    pub best: Wiring,
+    pub best: WiringFault,
     /// Factor by which the residuals of the second-best wiring are larger (geometric mean over the channels).
     pub margin: f64,
     /// Factor by which the residuals of the file's wiring are larger; 1 if it is the best.
@@ -45,26 +45,26 @@ pub struct WiringFound {
 impl WiringFound {
     /// Whether the wiring is taken to be that of the file: no other explains the log clearly better.
     pub fn is_as_in_file(&self) -> bool {
-        self.best == Wiring::AsInFile || self.file_is_worse_by < MARGIN
+        self.best == WiringFault::AsInFile || self.file_is_worse_by < MARGIN
     }
 }
 
-impl core::fmt::Display for Wiring {
+impl core::fmt::Display for WiringFault {
     fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
         match *self {
-            Wiring::AsInFile => write!(f, "as in the file"),
-            Wiring::MotorReversed => write!(f, "the motor is reversed: exchange its two wires"),
-            Wiring::Reversed(channel) => {
+            WiringFault::AsInFile => write!(f, "as in the file"),
+            WiringFault::MotorReversed => write!(f, "the motor is reversed: exchange its two wires"),
+            WiringFault::Reversed(channel) => {
                 write!(
                     f,
                     "the encoder of {} counts backwards: exchange its channels A and B",
                     channel_name(channel)
                 )
             }
-            Wiring::Swapped(one, other) => {
+            WiringFault::Swapped(one, other) => {
                 write!(f, "the encoders of joint {one} and joint {other} are exchanged: exchange their plugs")
             }
-            Wiring::Counts(channel, factor) => write!(
+            WiringFault::Counts(channel, factor) => write!(
                 f,
                 "the encoder of {} gives {factor} times the counts of the file: correct its resolution in the file",
                 channel_name(channel)
@@ -74,13 +74,13 @@ impl core::fmt::Display for Wiring {
 }
 
 /// The record as it would have been with the wiring of the file, if it was recorded with `wiring`.
-fn undone(record: &Record, wiring: Wiring) -> Record {
+fn undone(record: &Record, wiring: WiringFault) -> Record {
     match wiring {
-        Wiring::AsInFile => record.clone(),
-        Wiring::MotorReversed => record.reversed(),
-        Wiring::Reversed(channel) => record.rewired(|row| scaled(row, channel, -1.0)),
-        Wiring::Counts(channel, factor) => record.rewired(|row| scaled(row, channel, 1.0 / factor)),
-        Wiring::Swapped(one, other) => record.rewired(|row| {
+        WiringFault::AsInFile => record.clone(),
+        WiringFault::MotorReversed => record.reversed(),
+        WiringFault::Reversed(channel) => record.rewired(|row| scaled(row, channel, -1.0)),
+        WiringFault::Counts(channel, factor) => record.rewired(|row| scaled(row, channel, 1.0 / factor)),
+        WiringFault::Swapped(one, other) => record.rewired(|row| {
             let mut row = row.to_vec();
             row.swap(one, other);
             row
@@ -95,13 +95,13 @@ fn scaled(row: &[f64], channel: usize, factor: f64) -> Vec<f64> {
 }
 
 /// All wirings that are tried, that of the file first.
-fn wirings(channels: usize) -> Vec<Wiring> {
-    let mut all = vec![Wiring::AsInFile, Wiring::MotorReversed];
-    all.extend((0..channels).map(Wiring::Reversed));
+fn wirings(channels: usize) -> Vec<WiringFault> {
+    let mut all = vec![WiringFault::AsInFile, WiringFault::MotorReversed];
+    all.extend((0..channels).map(WiringFault::Reversed));
     for one in 1..channels {
-        all.extend((one + 1..channels).map(|other| Wiring::Swapped(one, other)));
+        all.extend((one + 1..channels).map(|other| WiringFault::Swapped(one, other)));
     }
-    all.extend((0..channels).flat_map(|channel| FACTORS.map(|factor| Wiring::Counts(channel, factor))));
+    all.extend((0..channels).flat_map(|channel| FACTORS.map(|factor| WiringFault::Counts(channel, factor))));
     all
 }
 
@@ -116,7 +116,7 @@ pub(super) fn find(
     let short = if short.pieces.is_empty() { record.clone() } else { short };
     let start: Vec<f64> = priors.iter().map(|prior| prior.value).collect();
     let all = wirings(record.channels);
-    let score = |&wiring: &Wiring| {
+    let score = |&wiring: &WiringFault| {
         let record = undone(&short, wiring);
         let shooting = Shooting { model, record: &record, priors, free: true };
         let fit = shooting.fit_settled(&start, WINDOW_S, ITERATIONS, 1);

@@ -195,26 +195,7 @@ fn eigenvalues_of_block<R: Real>(h: &Matrix<R>, i: usize) -> [Complex<R>; 2] {
 
 /// One implicit double-shift QR step on the block from `start` to `last`.
 fn francis_step<R: Real>(h: &mut Matrix<R>, start: usize, last: usize, exceptional: bool) {
-    let n = h.rows();
-    let (mut sum, mut product) = {
-        let (a, b) = (&h[(last - 1, last - 1)], &h[(last - 1, last)]);
-        let (c, d) = (&h[(last, last - 1)], &h[(last, last)]);
-        (a.clone() + d, a.clone() * d - &(b.clone() * c))
-    };
-    if exceptional {
-        // The iteration may cycle: shift by values of the right size that are not eigenvalues of the corner block.
-        let size = h[(last, last - 1)].abs() + &h[(last - 1, last - 2)].abs();
-        sum = size.clone() * &R::from_f64(1.5);
-        product = size.clone() * &size;
-    }
-    // First column of H² - sum·H + product·I.
-    let mut p = h[(start, start)].clone() * &h[(start, start)]
-        + &(h[(start, start + 1)].clone() * &h[(start + 1, start)])
-        - &(sum.clone() * &h[(start, start)])
-        + &product;
-    let mut q =
-        h[(start + 1, start)].clone() * &(h[(start, start)].clone() + &h[(start + 1, start + 1)] - &sum);
-    let mut r = h[(start + 1, start)].clone() * &h[(start + 2, start + 1)];
+    let [mut p, mut q, mut r] = first_column(h, start, last, exceptional);
     for k in start..last {
         let three = k + 2 <= last;
         if k > start {
@@ -241,26 +222,53 @@ fn francis_step<R: Real>(h: &mut Matrix<R>, start: usize, last: usize, exception
                 h[(k + 2, k - 1)] = R::zero();
             }
         }
-        let width = if three { 3 } else { 2 };
-        for j in k..n {
-            let mut dot = R::zero();
-            for (i, component) in v.iter().enumerate().take(width) {
-                dot = dot + &component.times(&h[(k + i, j)]);
-            }
-            let dot = dot * &scale;
-            for (i, component) in v.iter().enumerate().take(width) {
-                h[(k + i, j)] = h[(k + i, j)].minus(&component.times(&dot));
-            }
+        reflect(h, k, last, &v[..if three { 3 } else { 2 }], &scale);
+    }
+}
+
+/// The entries of the first column of H² - sum·H + product·I that are not 0, for the block from `start` to `last`. Sum and
+/// product are those of the shifts.
+fn first_column<R: Real>(h: &Matrix<R>, start: usize, last: usize, exceptional: bool) -> [R; 3] {
+    let (mut sum, mut product) = {
+        let (a, b) = (&h[(last - 1, last - 1)], &h[(last - 1, last)]);
+        let (c, d) = (&h[(last, last - 1)], &h[(last, last)]);
+        (a.clone() + d, a.clone() * d - &(b.clone() * c))
+    };
+    if exceptional {
+        // The iteration may cycle: shift by values of the right size that are not eigenvalues of the corner block.
+        let size = h[(last, last - 1)].abs() + &h[(last - 1, last - 2)].abs();
+        sum = size.clone() * &R::from_f64(1.5);
+        product = size.clone() * &size;
+    }
+    let p = h[(start, start)].clone() * &h[(start, start)]
+        + &(h[(start, start + 1)].clone() * &h[(start + 1, start)])
+        - &(sum.clone() * &h[(start, start)])
+        + &product;
+    let q = h[(start + 1, start)].clone() * &(h[(start, start)].clone() + &h[(start + 1, start + 1)] - &sum);
+    let r = h[(start + 1, start)].clone() * &h[(start + 2, start + 1)];
+    [p, q, r]
+}
+
+/// Multiplies `h` from both sides by the reflection I - v vᵀ·scale of rows and columns from `k` on.
+fn reflect<R: Real>(h: &mut Matrix<R>, k: usize, last: usize, v: &[R], scale: &R) {
+    for j in k..h.rows() {
+        let mut dot = R::zero();
+        for (i, component) in v.iter().enumerate() {
+            dot = dot + &component.times(&h[(k + i, j)]);
         }
-        for i in 0..=(k + 3).min(last) {
-            let mut dot = R::zero();
-            for (j, component) in v.iter().enumerate().take(width) {
-                dot = dot + &component.times(&h[(i, k + j)]);
-            }
-            let dot = dot * &scale;
-            for (j, component) in v.iter().enumerate().take(width) {
-                h[(i, k + j)] = h[(i, k + j)].minus(&component.times(&dot));
-            }
+        let dot = dot * scale;
+        for (i, component) in v.iter().enumerate() {
+            h[(k + i, j)] = h[(k + i, j)].minus(&component.times(&dot));
+        }
+    }
+    for i in 0..=(k + 3).min(last) {
+        let mut dot = R::zero();
+        for (j, component) in v.iter().enumerate() {
+            dot = dot + &component.times(&h[(i, k + j)]);
+        }
+        let dot = dot * scale;
+        for (j, component) in v.iter().enumerate() {
+            h[(i, k + j)] = h[(i, k + j)].minus(&component.times(&dot));
         }
     }
 }

@@ -10,7 +10,7 @@ use super::{ChainParameters, PlantError};
 use crate::rig;
 
 /// State of the chain in absolute angles, in `f64`.
-pub type ChainState<const N: usize> = upright::plant::ChainState<N, f64>;
+pub type WideChainState<const N: usize> = upright::plant::ChainState<N, f64>;
 
 /// Mechanical energy (J); the potential energy is zero where every centre of mass is level with the first joint.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -76,12 +76,12 @@ impl<const N: usize> ChainPlant<N> {
     /// Rate of change of `state` under a force on the cart (N, along +x) and torques at the joints (N·m): see
     /// [`ChainModel::derivative`].
     #[inline]
-    pub fn derivative(&self, state: &ChainState<N>, force: f64, torques: &[f64; N]) -> ChainState<N> {
+    pub fn derivative(&self, state: &WideChainState<N>, force: f64, torques: &[f64; N]) -> WideChainState<N> {
         self.model.derivative(state, force, torques)
     }
 
     /// Mechanical energy in `state`: T and V of [`ChainParameters`].
-    pub fn energy(&self, state: &ChainState<N>) -> Energy {
+    pub fn energy(&self, state: &WideChainState<N>) -> Energy {
         let (sin, cos) = f64::sines_and_cosines(&state.phi);
         let (v, w) = (state.xdot, &state.phidot);
         let mut kinetic = 0.5 * self.total_mass * v * v;

@@ -5,7 +5,7 @@
 
 use upright::table::Number;
 
-use super::{ChainPlant, ChainState};
+use super::{ChainPlant, WideChainState};
 
 /// Partial derivatives of one acceleration, `ẍ` or `φ̈_j`. None depends on x.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -54,7 +54,11 @@ impl<const N: usize> ChainPlant<N> {
     /// Partial derivatives of `ẍ` and of each `φ̈_j` at `state`, where the plant's rate of change is `rate`.
     ///
     /// With the equations written `M(φ) q̈ = h`, they are `M⁻¹ (∂h - ∂M q̈)`.
-    pub fn partials(&self, state: &ChainState<N>, rate: &ChainState<N>) -> (Partials<N>, [Partials<N>; N]) {
+    pub fn partials(
+        &self,
+        state: &WideChainState<N>,
+        rate: &WideChainState<N>,
+    ) -> (Partials<N>, [Partials<N>; N]) {
         let model = self.model();
         let (sin, cos) = f64::sines_and_cosines(&state.phi);
         let (w, wdot) = (&state.phidot, &rate.phidot);
@@ -138,11 +142,11 @@ mod tests {
         let rig = Rig::from_path(Path::new("../../rigs/triple-glueck-eder-kugi.toml")).unwrap();
         let chain = rig.chain().unwrap();
         let plant = ChainPlant::<3>::new(&ChainParameters::of(chain)).unwrap();
-        let state = ChainState { x: 0.1, xdot: -0.7, phi: [2.0, -1.1, 0.4], phidot: [3.0, -5.0, 1.5] };
+        let state = WideChainState { x: 0.1, xdot: -0.7, phi: [2.0, -1.1, 0.4], phidot: [3.0, -5.0, 1.5] };
         let (force, torques) = (17.0, [0.3, -0.2, 0.1]);
         let rate = plant.derivative(&state, force, &torques);
         let (cart, links) = plant.partials(&state, &rate);
-        let agrees = |by: &str, of: &dyn Fn(&Partials<3>) -> f64, at: &dyn Fn(f64) -> ChainState<3>| {
+        let agrees = |by: &str, of: &dyn Fn(&Partials<3>) -> f64, at: &dyn Fn(f64) -> WideChainState<3>| {
             let step = 1e-5;
             let (above, below) = (at(step), at(-step));
             let difference = |a: f64, b: f64| (a - b) / (2.0 * step);
@@ -154,7 +158,7 @@ mod tests {
                 close(of(&links[j]), difference(above.phidot[j], below.phidot[j]));
             }
         };
-        let moved = |change: &dyn Fn(&mut ChainState<3>)| {
+        let moved = |change: &dyn Fn(&mut WideChainState<3>)| {
             let mut moved = state;
             change(&mut moved);
             plant.derivative(&moved, force, &torques)

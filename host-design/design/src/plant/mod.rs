@@ -36,7 +36,7 @@ mod simulation;
 mod together;
 
 pub use angles::{absolute_angles, whole_turns, without_turns};
-pub use chain::{ChainPlant, ChainState, Energy};
+pub use chain::{ChainPlant, Energy, WideChainState};
 pub use error::PlantError;
 pub use jacobian::Partials;
 pub use linear::{LinearModel, linearise};

@@ -1,6 +1,6 @@
 //! Simulation of a plant of any size behind one object-safe trait.
 
-use super::{ChainPlant, ChainState, Energy, PlantError};
+use super::{ChainPlant, Energy, PlantError, WideChainState};
 use crate::rig;
 
 /// A plant that can be simulated.
@@ -47,7 +47,7 @@ pub struct ChainSimulation<const N: usize> {
     /// The equations of motion.
     pub plant: ChainPlant<N>,
     /// The current state, in absolute angles.
-    pub state: ChainState<N>,
+    pub state: WideChainState<N>,
 }
 
 impl<const N: usize> ChainSimulation<N> {
@@ -80,7 +80,7 @@ impl<const N: usize> Plant for ChainSimulation<N> {
 
     fn set_state(&mut self, state: &[f64]) {
         self.check_length(state);
-        self.state = ChainState::from_relative(state);
+        self.state = WideChainState::from_relative(state);
     }
 
     fn rate(&self, state: &[f64], force: f64, disturbances: &[f64], rate: &mut [f64]) {
@@ -88,7 +88,7 @@ impl<const N: usize> Plant for ChainSimulation<N> {
         self.check_length(rate);
         // The conversion from absolute to relative angles is linear, so it converts rates as well as states.
         self.plant
-            .derivative(&ChainState::from_relative(state), force, &joint_torques(disturbances))
+            .derivative(&WideChainState::from_relative(state), force, &joint_torques(disturbances))
             .write_relative(rate);
     }
 
@@ -150,7 +150,7 @@ pub fn chain_plant(chain: &rig::Chain) -> Result<Box<dyn Plant>, PlantError> {
 
         fn run<const N: usize>(self) -> Self::Output {
             let plant = ChainPlant::<N>::of(self.0)?;
-            Ok(Box::new(ChainSimulation { plant, state: ChainState::upright() }))
+            Ok(Box::new(ChainSimulation { plant, state: WideChainState::upright() }))
         }
     }
     with_links(chain.links.len(), Ideal(chain))?

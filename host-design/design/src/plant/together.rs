@@ -17,7 +17,7 @@ use crate::rig;
 pub const LANES: usize = 8;
 
 /// One number for each chain.
-type Row = [f64; LANES];
+type LaneRow = [f64; LANES];
 
 /// [`LANES`] chains with the same number of links. Each gives the same bits as a
 /// [`ChainSimulation`](super::ChainSimulation) with the same inputs. Every method panics on a slice of the wrong
@@ -61,16 +61,16 @@ struct Together<const N: usize> {
 
 /// [`ChainModel`], state and inputs of each chain.
 struct Chains<const N: usize> {
-    inverse_mass: Row,
-    a: [Row; N],
-    weight: [Row; N],
-    b: [[Row; N]; N],
-    b_reduced: [[Row; N]; N],
-    cart_friction: Row,
-    joint_frictions: [Row; N],
-    state: ChainState<N, Row>,
-    force: Row,
-    torques: [Row; N],
+    inverse_mass: LaneRow,
+    a: [LaneRow; N],
+    weight: [LaneRow; N],
+    b: [[LaneRow; N]; N],
+    b_reduced: [[LaneRow; N]; N],
+    cart_friction: LaneRow,
+    joint_frictions: [LaneRow; N],
+    state: ChainState<N, LaneRow>,
+    force: LaneRow,
+    torques: [LaneRow; N],
 }
 
 impl<const N: usize> Together<N> {

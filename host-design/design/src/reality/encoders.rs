@@ -10,7 +10,7 @@ use crate::rig::{Rig, SensorErrors};
 /// for the first joint and 0 for the others, and there the eccentricity causes no error. (Amplitude and phase of an
 /// encoder on an eccentric disk: Heidenhain, *Rotary Encoders*, "Measuring accuracy".)
 #[derive(Debug, Clone, PartialEq)]
-pub struct Encoders {
+pub struct RealEncoders {
     joints: Vec<Joint>,
 }
 
@@ -22,7 +22,7 @@ struct Joint {
     at_homing: f64,
 }
 
-impl Encoders {
+impl RealEncoders {
     /// The encoders of a rig; none if they have no error.
     pub fn of(rig: &Rig) -> Option<Self> {
         let errors = &rig.reality.sensors;

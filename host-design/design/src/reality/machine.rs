@@ -10,7 +10,8 @@ use super::bristle::{Bristle, Contact};
 use super::parameters::real_chain;
 use crate::numerics::{Lu, Matrix};
 use crate::plant::{
-    ChainParameters, ChainPlant, ChainState, Energy, Plant, PlantError, WithLinks, chain_plant, with_links,
+    ChainParameters, ChainPlant, Energy, Plant, PlantError, WideChainState, WithLinks, chain_plant,
+    with_links,
 };
 use crate::rig::{Chain, Rig};
 
@@ -37,7 +38,7 @@ pub struct RealChain<const N: usize> {
 /// The moving parts: chain and rotor.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Motion<const N: usize> {
-    chain: ChainState<N>,
+    chain: WideChainState<N>,
     rotor: Rotor,
 }
 
@@ -95,7 +96,7 @@ impl<const N: usize> RealChain<N> {
         let rotor = Rotor { position: 0.0, speed: 0.0 };
         let mut machine = Self {
             plant: ChainPlant::new(&parameters)?,
-            motion: Motion { chain: ChainState::upright(), rotor },
+            motion: Motion { chain: WideChainState::upright(), rotor },
             joints,
             cart,
             bent: ([0.0; N], 0.0),
@@ -250,7 +251,7 @@ impl<const N: usize> Plant for RealChain<N> {
     /// Also relaxes the bristles and centres the rotor in its backlash.
     fn set_state(&mut self, state: &[f64]) {
         assert_eq!(state.len(), self.states(), "a chain of {N} links has 2n + 2 states");
-        let mut chain = ChainState::from_relative(state);
+        let mut chain = WideChainState::from_relative(state);
         for phi in &mut chain.phi {
             *phi -= self.slope.angle;
         }
@@ -306,8 +307,8 @@ impl<const N: usize> Plant for RealChain<N> {
 /// # Errors
 /// [`PlantError::UnsupportedLinks`] unless the chain has 1 to [`MAX_LINKS`](crate::rig::MAX_LINKS) links.
 pub fn real_plant(chain: &Chain, rig: &Rig) -> Result<Box<dyn Plant>, PlantError> {
-    struct Real<'a>(&'a Chain, &'a Rig);
-    impl WithLinks for Real<'_> {
+    struct WithReality<'a>(&'a Chain, &'a Rig);
+    impl WithLinks for WithReality<'_> {
         type Output = Result<Box<dyn Plant>, PlantError>;
 
         fn run<const N: usize>(self) -> Self::Output {
@@ -316,7 +317,7 @@ pub fn real_plant(chain: &Chain, rig: &Rig) -> Result<Box<dyn Plant>, PlantError
     }
     match ideal_chain(chain, rig) {
         Some(ideal) => chain_plant(&ideal),
-        None => with_links(chain.links.len(), Real(chain, rig))?,
+        None => with_links(chain.links.len(), WithReality(chain, rig))?,
     }
 }
 

@@ -5,7 +5,7 @@
 //! - [`real_plant`]: the chain with both, on a tilted rail, with its real masses and lengths.
 //! - [`Driver`]: motor driver and supply.
 //! - [`Timing`]: when the force of a tick begins and ends.
-//! - [`Encoders`]: errors of encoders and of their zeros.
+//! - [`RealEncoders`]: errors of encoders and of their zeros.
 //!
 //! Equations, sources and the step size are in `docs/reality.md`. What a rig file leaves out is not simulated:
 //! the simulation then does the same operations as without `[reality]`, and has the same bits.
@@ -21,7 +21,7 @@ mod timing;
 pub use belt::{Belt, Rotor};
 pub use bristle::{Bristle, Contact};
 pub use driver::Driver;
-pub use encoders::{Encoders, hanging_by_hand};
+pub use encoders::{RealEncoders, hanging_by_hand};
 pub use machine::{RealChain, ideal_chain, real_plant};
 pub use parameters::real_chain;
 pub use timing::Timing;

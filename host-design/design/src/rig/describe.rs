@@ -20,8 +20,8 @@ use super::sections::tick::TICK;
 use super::sections::verify::VERIFY;
 use super::value::Keys;
 use super::{
-    Actuator, Chain, Kalman, LinearPlant, Link, LinkEncoder, Lqr, Motor, PlantDescription, PolePlacement,
-    Reality, Rig,
+    Actuator, Chain, KalmanNoise, LinearPlant, Link, LinkEncoder, Lqr, Motor, PlantDescription,
+    PolePlacement, Reality, Rig,
 };
 
 const DEFAULT: &str = "(default)";
@@ -30,7 +30,7 @@ impl Rig {
     /// The rig's values as plain text, narrower than 80 columns. Values that equal their default or were left out are
     /// marked `(default)`.
     pub fn describe(&self) -> String {
-        let mut page = Page::default();
+        let mut page = Description::default();
         page.heading(&self.name);
         page.note("hash", &format!("{:016x}", self.hash()));
         match &self.plant {
@@ -64,11 +64,11 @@ fn digits(x: f64) -> String {
 }
 
 #[derive(Default)]
-struct Page {
+struct Description {
     text: String,
 }
 
-impl Page {
+impl Description {
     fn heading(&mut self, title: impl Display) {
         if !self.text.is_empty() {
             self.text.push('\n');
@@ -281,7 +281,7 @@ impl Page {
                 self.list("poles", poles.iter().map(pole), "1/s");
             }
         }
-        if let Some(Kalman { force_noise_n2_s, joint_noise }) = &rig.kalman {
+        if let Some(KalmanNoise { force_noise_n2_s, joint_noise }) = &rig.kalman {
             self.heading("kalman");
             self.value("force noise intensity", *force_noise_n2_s, "N²·s", "");
             self.numbers("joint noise intensities", joint_noise, "(N·m)²·s");

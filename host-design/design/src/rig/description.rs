@@ -8,7 +8,7 @@ use super::sections::actuator::{Actuator, Motor};
 use super::sections::chain::{Chain, PlantDescription};
 use super::sections::friction::KnownFriction;
 use super::sections::integral::Integral;
-use super::sections::kalman::Kalman;
+use super::sections::kalman::KalmanNoise;
 use super::sections::limits::Limits;
 use super::sections::lqr::Lqr;
 use super::sections::pole_placement::PolePlacement;
@@ -34,7 +34,7 @@ pub struct Rig {
     /// Poles to place, if a placement is wanted.
     pub pole_placement: Option<PolePlacement>,
     /// Noise intensities for the observer, if one is wanted.
-    pub kalman: Option<Kalman>,
+    pub kalman: Option<KalmanNoise>,
     /// Integral action on the controlled output, if wanted.
     pub integral: Option<Integral>,
     /// Coulomb friction that the controller compensates, if any is known.

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use toml_edit::{DocumentMut, Item, Table, Value};
 
 use super::error::{RigError, RigErrorKind};
-use super::node::Source;
+use super::node::RigSource;
 
 /// The text of a rig file, in which values can be changed. Displayed, it is the new text.
 ///
@@ -33,7 +33,7 @@ impl RigText {
     /// # Errors
     /// [`RigError`] if the text is not TOML.
     pub fn parse(text: &str, file: &Path) -> Result<Self, RigError> {
-        let document = Source { file, text }.document()?.into_mut();
+        let document = RigSource { file, text }.document()?.into_mut();
         Ok(Self { document, file: file.to_owned(), has_crlf: text.contains("\r\n") })
     }
 

@@ -5,7 +5,7 @@ use std::io::{self, Read};
 use std::path::Path;
 
 use super::error::{MAX_BYTES, RigError, RigErrorKind};
-use super::node::Source;
+use super::node::RigSource;
 use super::{Rig, read};
 
 impl Rig {
@@ -20,7 +20,7 @@ impl Rig {
             Err(error) => {
                 let offset = error.valid_up_to();
                 let readable = String::from_utf8_lossy(&bytes[..offset]);
-                let source = Source { file, text: &readable };
+                let source = RigSource { file, text: &readable };
                 Err(source.error(offset, None, RigErrorKind::NotUtf8 { offset }))
             }
         }
@@ -34,7 +34,7 @@ impl Rig {
         if text.len() as u64 > MAX_BYTES {
             return Err(RigError::of_file(file, RigErrorKind::TooLarge));
         }
-        read::rig(&Source { file, text })
+        read::rig(&RigSource { file, text })
     }
 }
 

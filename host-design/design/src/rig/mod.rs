@@ -29,7 +29,7 @@ pub use sections::actuator::{Actuator, Motor};
 pub use sections::chain::{Cart, Chain, Link, LinkEncoder, MAX_LINKS, PlantDescription};
 pub use sections::friction::KnownFriction;
 pub use sections::integral::Integral;
-pub use sections::kalman::Kalman;
+pub use sections::kalman::KalmanNoise;
 pub use sections::limits::Limits;
 pub use sections::lqr::Lqr;
 pub use sections::model::LinearPlant;

@@ -11,14 +11,14 @@ use super::rule::Rule;
 
 /// A rig file's text and name.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Source<'a> {
+pub(super) struct RigSource<'a> {
     /// Name of the file, as printed in errors.
     pub(super) file: &'a Path,
     /// Its text.
     pub(super) text: &'a str,
 }
 
-impl<'a> Source<'a> {
+impl<'a> RigSource<'a> {
     /// An error at a byte offset.
     pub(super) fn error(&self, offset: usize, key: Option<String>, kind: RigErrorKind) -> RigError {
         let before = &self.text.as_bytes()[..offset.min(self.text.len())];
@@ -77,7 +77,7 @@ pub(super) fn excerpt(text: &str) -> String {
 
 /// What a key holds.
 #[derive(Clone, Copy)]
-enum Found<'a> {
+enum RigItem<'a> {
     Table(&'a dyn TableLike),
     Tables(&'a ArrayOfTables),
     Value(&'a Value),
@@ -86,11 +86,11 @@ enum Found<'a> {
 /// A value with its key and place.
 #[derive(Clone)]
 pub(super) struct Node<'a> {
-    source: &'a Source<'a>,
+    source: &'a RigSource<'a>,
     /// Full key, such as `link[2].mass_kg`.
     pub(super) key: String,
     span: Range<usize>,
-    found: Found<'a>,
+    found: RigItem<'a>,
 }
 
 impl<'a> Node<'a> {
@@ -102,9 +102,9 @@ impl<'a> Node<'a> {
     /// The value as written in the file.
     pub(super) fn as_written(&self) -> String {
         match self.found {
-            Found::Table(_) => "a table".to_owned(),
-            Found::Tables(_) => "a list of tables".to_owned(),
-            Found::Value(value) => {
+            RigItem::Table(_) => "a table".to_owned(),
+            RigItem::Tables(_) => "a list of tables".to_owned(),
+            RigItem::Value(value) => {
                 let text = excerpt(self.source.text.get(self.span.clone()).unwrap_or_default());
                 format!("{text} ({})", value.type_name())
             }
@@ -131,8 +131,8 @@ impl<'a> Node<'a> {
         let remedy = format!("give {meaning}");
         let value = match self.found {
             // Rounds beyond 2^53, which the bound below rejects anyway.
-            Found::Value(Value::Integer(integer)) => *integer.value() as f64,
-            Found::Value(Value::Float(float)) => *float.value(),
+            RigItem::Value(Value::Integer(integer)) => *integer.value() as f64,
+            RigItem::Value(Value::Float(float)) => *float.value(),
             _ => return Err(self.wrong_type(rule.accepts, &remedy)),
         };
         if !value.is_finite() {
@@ -152,7 +152,7 @@ impl<'a> Node<'a> {
     /// An integer from 0 to `last`.
     pub(super) fn index(&self, last: usize, accepts: &str, meaning: &str) -> Result<usize, RigError> {
         let remedy = format!("give {meaning}");
-        let Found::Value(Value::Integer(integer)) = self.found else {
+        let RigItem::Value(Value::Integer(integer)) = self.found else {
             return Err(self.wrong_type(accepts, &remedy));
         };
         usize::try_from(*integer.value())
@@ -164,7 +164,7 @@ impl<'a> Node<'a> {
     /// A string.
     pub(super) fn text(&self, accepts: &str, meaning: &str) -> Result<&'a str, RigError> {
         match self.found {
-            Found::Value(Value::String(text)) => Ok(text.value()),
+            RigItem::Value(Value::String(text)) => Ok(text.value()),
             _ => Err(self.wrong_type(accepts, &format!("give {meaning}"))),
         }
     }
@@ -179,24 +179,24 @@ impl<'a> Node<'a> {
 
     /// Whether the value is a list of values.
     pub(super) fn is_list(&self) -> bool {
-        matches!(self.found, Found::Value(Value::Array(_)))
+        matches!(self.found, RigItem::Value(Value::Array(_)))
     }
 
     /// The entries of a list, keyed `key[1]`, `key[2]`, ...
     pub(super) fn list(&self, accepts: &str, meaning: &str) -> Result<Vec<Node<'a>>, RigError> {
-        let entry = |(index, span, found): (usize, Option<Range<usize>>, Found<'a>)| Node {
+        let entry = |(index, span, found): (usize, Option<Range<usize>>, RigItem<'a>)| Node {
             source: self.source,
             key: format!("{}[{}]", self.key, index + 1),
             span: span.unwrap_or_else(|| self.span.clone()),
             found,
         };
         match self.found {
-            Found::Tables(tables) => Ok(tables
+            RigItem::Tables(tables) => Ok(tables
                 .iter()
                 .enumerate()
-                .map(|(index, table)| entry((index, table.span(), Found::Table(table))))
+                .map(|(index, table)| entry((index, table.span(), RigItem::Table(table))))
                 .collect()),
-            Found::Value(Value::Array(array)) => Ok(array
+            RigItem::Value(Value::Array(array)) => Ok(array
                 .iter()
                 .enumerate()
                 .map(|(index, value)| entry((index, value.span(), of_value(value))))
@@ -225,7 +225,7 @@ impl<'a> Node<'a> {
 
     /// A table that holds keys of `section` only.
     pub(super) fn table(&self, section: &'static Section) -> Result<Table<'a>, RigError> {
-        let Found::Table(table) = self.found else {
+        let RigItem::Table(table) = self.found else {
             let remedy = format!("write it as [{0}] with its keys below", self.key);
             return Err(self.wrong_type("a table", &remedy));
         };
@@ -236,16 +236,16 @@ impl<'a> Node<'a> {
     }
 }
 
-fn of_value(value: &Value) -> Found<'_> {
+fn of_value(value: &Value) -> RigItem<'_> {
     match value {
-        Value::InlineTable(table) => Found::Table(table),
-        other => Found::Value(other),
+        Value::InlineTable(table) => RigItem::Table(table),
+        other => RigItem::Value(other),
     }
 }
 
 /// A table of the file with its key and place.
 pub(super) struct Table<'a> {
-    source: &'a Source<'a>,
+    source: &'a RigSource<'a>,
     pub(super) section: &'static Section,
     key: String,
     start: usize,
@@ -255,7 +255,7 @@ pub(super) struct Table<'a> {
 impl<'a> Table<'a> {
     /// The document itself, with the keys of `section` and the sections of these names.
     pub(super) fn root(
-        source: &'a Source<'a>,
+        source: &'a RigSource<'a>,
         document: &'a Document<&'a str>,
         section: &'static Section,
         sections: &[&str],
@@ -290,8 +290,8 @@ impl<'a> Table<'a> {
     pub(super) fn get(&self, name: &str) -> Option<Node<'a>> {
         let (key, item) = self.table.get_key_value(name)?;
         let found = match item {
-            Item::Table(table) => Found::Table(table),
-            Item::ArrayOfTables(tables) => Found::Tables(tables),
+            Item::Table(table) => RigItem::Table(table),
+            Item::ArrayOfTables(tables) => RigItem::Tables(tables),
             Item::Value(value) => of_value(value),
             Item::None => return None,
         };

@@ -2,7 +2,7 @@
 
 use super::error::RigError;
 use super::key::Section;
-use super::node::{Node, Source, Table};
+use super::node::{Node, RigSource, Table};
 use super::sections::{
     SECTIONS, TOP, actuator, chain, friction, integral, kalman, limits, lqr, model, pole_placement, reality,
     robust, swing_up, tick, verify,
@@ -11,7 +11,7 @@ use super::value::Keys;
 use super::{Actuator, Integral, Limits, PlantDescription, Reality, Requirements, Rig, Tick};
 
 /// Checks a whole rig file.
-pub(super) fn rig(source: &Source<'_>) -> Result<Rig, RigError> {
+pub(super) fn rig(source: &RigSource<'_>) -> Result<Rig, RigError> {
     let document = source.document()?;
     let root = Table::root(source, &document, &TOP, &SECTIONS.map(|section| section.name))?;
     let name = name(&root)?;

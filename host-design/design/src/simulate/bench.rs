@@ -9,7 +9,7 @@ use upright::control::encoder::CounterWidth;
 use super::error::SimulationError;
 use super::scenario::Scenario;
 use crate::plant::{ChainLanes, LinearSimulation, MotorPlant, Plant};
-use crate::reality::{Driver, Encoders, Timing, ideal_chain, real_plant};
+use crate::reality::{Driver, RealEncoders, Timing, ideal_chain, real_plant};
 use crate::rig::{Chain, PlantDescription, Rig};
 
 /// The simulated rig: everything outside the controller.
@@ -18,7 +18,7 @@ pub struct Bench {
     motor: Option<MotorPlant>,
     driver: Option<Driver>,
     timing: Timing,
-    encoders: Option<Encoders>,
+    encoders: Option<RealEncoders>,
     sensors: Vec<(usize, f64)>,
     counter_start: u32,
     random: Pcg64,
@@ -60,7 +60,7 @@ impl Bench {
             motor: rig.actuator.motor.as_ref().map(MotorPlant::of),
             driver: Driver::of(rig),
             timing: Timing::of(rig, scenario.seed),
-            encoders: Encoders::of(rig),
+            encoders: RealEncoders::of(rig),
             sensors: rig.sensors().iter().map(|sensor| (sensor.state, sensor.step())).collect(),
             counter_start: scenario.counter_start,
             random: Pcg64::seed_from_u64(scenario.seed),

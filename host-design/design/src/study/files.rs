@@ -12,7 +12,7 @@ use super::shard::Shard;
 
 /// The first line of a file: the study, and the shard of it that follows.
 #[derive(Debug, Serialize, Deserialize)]
-pub(super) struct Header {
+pub(super) struct StudyHeader {
     pub(super) study: Value,
     pub(super) shard: Shard,
     /// Number of runs of each part, including those of the other shards.
@@ -32,7 +32,7 @@ pub(super) type Outcomes = BTreeMap<String, BTreeMap<u64, Value>>;
 
 struct File {
     path: PathBuf,
-    header: Header,
+    header: StudyHeader,
     lines: Vec<Line>,
 }
 
@@ -78,7 +78,7 @@ fn every_shard_once(files: &[File], of: u64) -> Result<(), StudyError> {
 
 /// Adds the outcomes of a file to those of the other shards.
 fn place(file: File, all: &mut Outcomes) -> Result<(), StudyError> {
-    let File { path, header: Header { shard, parts, .. }, lines } = file;
+    let File { path, header: StudyHeader { shard, parts, .. }, lines } = file;
     let wrong = |part: &str, run: u64, what: &'static str| {
         Err(StudyError::Runs { file: path.clone(), shard: shard.number(), part: part.to_owned(), run, what })
     };
@@ -107,7 +107,7 @@ fn read(path: &Path) -> Result<File, StudyError> {
     let text = std::fs::read_to_string(path)
         .map_err(|error| StudyError::Unreadable { file: path.to_owned(), reason: error.to_string() })?;
     let mut lines = text.lines().enumerate();
-    let header: Header = parsed(path, lines.next().unwrap_or((0, "")))?;
+    let header: StudyHeader = parsed(path, lines.next().unwrap_or((0, "")))?;
     if !header.shard.is_valid() {
         let reason = "no such shard".to_owned();
         return Err(StudyError::NotAShard { file: path.to_owned(), line: 1, reason });

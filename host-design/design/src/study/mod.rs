@@ -23,14 +23,14 @@ pub use shard::Shard;
 
 use crate::parallel;
 use crate::rig::Rig;
-use files::{Header, Line, Outcomes};
+use files::{Line, Outcomes, StudyHeader};
 
 /// Source of the outcomes of numbered runs: they are made here, in part or all, or read from files.
 #[derive(Debug)]
-pub struct Study(Source);
+pub struct Study(OutcomeSource);
 
 #[derive(Debug)]
-enum Source {
+enum OutcomeSource {
     /// All runs are made.
     All,
     /// The runs of the shard are made, and their outcomes kept.
@@ -50,12 +50,12 @@ struct Made {
 impl Study {
     /// A study that makes every run.
     pub fn whole() -> Self {
-        Self(Source::All)
+        Self(OutcomeSource::All)
     }
 
     /// A study that makes the runs of one shard.
     pub fn shard(shard: Shard) -> Self {
-        Self(Source::Shard(shard, RefCell::default()))
+        Self(OutcomeSource::Shard(shard, RefCell::default()))
     }
 
     /// A study that takes the outcomes of all shards from files. `about` is the result of [`about`] for this study.
@@ -63,7 +63,7 @@ impl Study {
     /// # Errors
     /// [`StudyError`] if a file is not of this study, or a shard or a run is missing or comes twice.
     pub fn merged(files: &[PathBuf], about: &Value) -> Result<Self, StudyError> {
-        Ok(Self(Source::Files(files::merged(files, about)?)))
+        Ok(Self(OutcomeSource::Files(files::merged(files, about)?)))
     }
 
     /// Outcomes of the runs 0 to `runs` - 1 of this part of the study, in order; for a shard, only those it makes.
@@ -102,8 +102,8 @@ impl Study {
     {
         let made = |numbers: &[u64]| parallel::try_map_in_batches(numbers, size, &batch);
         match &self.0 {
-            Source::All => made(&(0..runs).collect::<Vec<u64>>()),
-            Source::Shard(shard, kept) => {
+            OutcomeSource::All => made(&(0..runs).collect::<Vec<u64>>()),
+            OutcomeSource::Shard(shard, kept) => {
                 let numbers: Vec<u64> = shard.numbers(runs).collect();
                 let outcomes = made(&numbers)?;
                 let mut kept = kept.borrow_mut();
@@ -115,7 +115,7 @@ impl Study {
                 }
                 Ok(outcomes)
             }
-            Source::Files(parts) => {
+            OutcomeSource::Files(parts) => {
                 let outcomes = parts
                     .get(part)
                     .filter(|outcomes| outcomes.len() as u64 == runs)
@@ -130,7 +130,7 @@ impl Study {
 
     /// Whether this study makes the runs of one shard only.
     pub fn is_shard(&self) -> bool {
-        matches!(self.0, Source::Shard(..))
+        matches!(self.0, OutcomeSource::Shard(..))
     }
 
     /// Writes what a shard has made: a line that describes the study, then one for each run. Writes nothing if this is
@@ -139,9 +139,9 @@ impl Study {
     /// # Errors
     /// That of the writer.
     pub fn write(&self, about: &Value, mut out: impl Write) -> std::io::Result<()> {
-        let Source::Shard(shard, made) = &self.0 else { return Ok(()) };
+        let OutcomeSource::Shard(shard, made) = &self.0 else { return Ok(()) };
         let made = made.borrow();
-        let header = Header { study: about.clone(), shard: *shard, parts: made.parts.clone() };
+        let header = StudyHeader { study: about.clone(), shard: *shard, parts: made.parts.clone() };
         writeln!(out, "{}", serde_json::to_string(&header)?)?;
         for line in &made.lines {
             writeln!(out, "{}", serde_json::to_string(line)?)?;

@@ -7,7 +7,7 @@ use core::array::from_fn;
 
 use super::SwingUpError;
 use crate::numerics::Matrix;
-use crate::plant::{ChainPlant, ChainState, Partials};
+use crate::plant::{ChainPlant, Partials, WideChainState};
 use crate::rig;
 
 /// The state at the end of a step, and its derivatives.
@@ -64,7 +64,7 @@ impl<const N: usize, const S: usize, const C: usize> Relative<N, S, C> {
     /// Rate of change of `state`, and its derivatives by the state and, in column S, by the force. Only the odd rows
     /// of the derivatives are filled: the rate of a position is itself a state.
     fn linearised(&self, state: &[f64; S], force: f64) -> ([f64; S], [[f64; C]; S]) {
-        let absolute = ChainState::from_relative(state);
+        let absolute = WideChainState::from_relative(state);
         let rate = self.0.derivative(&absolute, force, &[0.0; N]);
         let (cart, links) = self.0.partials(&absolute, &rate);
         let mut relative = [0.0; S];
@@ -124,7 +124,7 @@ fn through<const S: usize, const C: usize>(
 
 impl<const N: usize, const S: usize, const C: usize> Dynamics for Relative<N, S, C> {
     fn step(&self, state: &mut [f64], force: [f64; 2], dt: f64) {
-        let (at, none) = (ChainState::from_relative(state), [0.0; N]);
+        let (at, none) = (WideChainState::from_relative(state), [0.0; N]);
         let middle = 0.5 * (force[0] + force[1]);
         let k1 = self.0.derivative(&at, force[0], &none);
         let k2 = self.0.derivative(&at.plus(0.5 * dt, &k1), middle, &none);
@@ -174,7 +174,7 @@ impl<const N: usize, const S: usize, const C: usize> Dynamics for Relative<N, S,
     }
 
     fn inputs(&self, state: &[f64]) -> Matrix<f64> {
-        let absolute = ChainState::from_relative(state);
+        let absolute = WideChainState::from_relative(state);
         let rate = self.0.derivative(&absolute, 0.0, &[0.0; N]);
         let (cart, links) = self.0.partials(&absolute, &rate);
         let entry = |row: usize, input: usize| {

@@ -12,7 +12,7 @@ use super::problem::Bounds;
 use super::tracking::{Noise, PathFilter, stationary};
 use crate::motion::{Transition, rest};
 use crate::numerics::Matrix;
-use crate::rig::{Chain, Kalman, Motor, Rig, Sensor, SwingUpRules};
+use crate::rig::{Chain, KalmanNoise, Motor, Rig, Sensor, SwingUpRules};
 use crate::verify::Disturbance;
 
 /// Process noise that the filter expects in motion, as multiples of the rig's: wrong masses disturb it more in motion
@@ -129,7 +129,7 @@ impl<'a> Setting<'a> {
 
 /// The noise that the filter expects in motion; `sensors` are the states that are measured, and the variances of their
 /// rounding errors.
-fn noise(chain: &Chain, kalman: &Kalman, rules: &SwingUpRules, sensors: Vec<(usize, f64)>) -> Noise {
+fn noise(chain: &Chain, kalman: &KalmanNoise, rules: &SwingUpRules, sensors: Vec<(usize, f64)>) -> Noise {
     let wrong = rules.friction_spread_percent / 100.0;
     let of_links = chain.links.iter().map(|link| link.friction_n_m_s_per_rad);
     let frictions = [chain.cart.friction_n_s_per_m].into_iter().chain(of_links);

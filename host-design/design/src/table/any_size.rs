@@ -3,6 +3,11 @@
 //! Everything inside a [`WithSize`] is compiled once per size: only code that needs the numbers in a type belongs
 //! there.
 
+use nalgebra::SMatrix;
+use upright::table::{GainTable, Scalar};
+
+use crate::numerics::Matrix;
+
 /// The largest number of states a gain table can hold.
 pub const MAX_STATES: usize = 30;
 /// The largest number of sensors a gain table can hold: cart and links of the longest chain.
@@ -46,4 +51,14 @@ pub fn with_firmware_size<A: WithSize>(states: usize, sensors: usize, action: A)
     dispatch! { states, sensors, action,
         1: 1; 2: 1; 3: 1; 4: 1 2; 5: 1; 6: 1 3; 8: 4; 10: 5; 12: 6; 14: 7;
     }
+}
+
+/// The firmware's table in the largest size.
+pub(super) type WidestTable = GainTable<MAX_STATES, MAX_SENSORS>;
+
+/// `matrix`, padded with zeros to R×C.
+pub(crate) fn widest<T: Scalar, const R: usize, const C: usize>(matrix: &Matrix<T>) -> SMatrix<T, R, C> {
+    SMatrix::from_fn(|row, column| {
+        if row < matrix.rows() && column < matrix.cols() { matrix[(row, column)] } else { T::default() }
+    })
 }

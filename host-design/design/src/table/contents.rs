@@ -5,21 +5,21 @@ use upright::table::{Part, Reader, Shape, Words};
 
 /// A value of the tree.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) enum Node {
+pub(super) enum TableNode {
     /// A number.
-    Value(Number),
+    Value(TableNumber),
     /// An array.
-    List(Vec<Number>),
+    List(Vec<TableNumber>),
     /// A list whose length is not part of its type.
-    Slice(Vec<Number>),
+    Slice(Vec<TableNumber>),
     /// A matrix, column by column.
-    Columns(Vec<Vec<Number>>),
+    Columns(Vec<Vec<TableNumber>>),
     /// A struct.
     Struct(&'static str, Vec<Field>),
     /// A struct that may be missing.
-    Optional(Option<Box<Node>>),
+    Optional(Option<Box<TableNode>>),
     /// A list of structs.
-    Structs(Vec<Node>),
+    Structs(Vec<TableNode>),
 }
 
 /// A field of a struct.
@@ -27,12 +27,12 @@ pub(super) enum Node {
 pub(super) struct Field {
     pub(super) name: &'static str,
     pub(super) documentation: Vec<&'static str>,
-    pub(super) value: Node,
+    pub(super) value: TableNode,
 }
 
 /// A number of a table.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) enum Number {
+pub(super) enum TableNumber {
     Float(f32),
     Integer(i64),
     Hash(u64),
@@ -53,19 +53,19 @@ struct Builder {
     waiting: Vec<(&'static str, Vec<&'static str>, bool)>,
     /// Open lists of structs, innermost last: the number of structs that are open around the list, the number of its
     /// structs that are still missing, and those that are complete.
-    lists: Vec<(usize, usize, Vec<Node>)>,
-    done: Option<Node>,
+    lists: Vec<(usize, usize, Vec<TableNode>)>,
+    done: Option<TableNode>,
 }
 
 impl Builder {
     fn fields(self) -> Vec<Field> {
         match self.done {
-            Some(Node::Struct(_, fields)) => fields,
+            Some(TableNode::Struct(_, fields)) => fields,
             _ => Vec::new(),
         }
     }
 
-    fn value(&mut self, node: Node) {
+    fn value(&mut self, node: TableNode) {
         if let Some((depth, missing, nodes)) = self.lists.last_mut()
             && *depth == self.open.len()
             && *missing > 0
@@ -81,14 +81,14 @@ impl Builder {
             self.done = Some(node);
             return;
         };
-        let value = if is_optional { Node::Optional(Some(Box::new(node))) } else { node };
+        let value = if is_optional { TableNode::Optional(Some(Box::new(node))) } else { node };
         fields.push(Field { name, documentation, value });
     }
 
     /// Passes the innermost list on as the value of its field, once all of its structs are there.
     fn complete_list(&mut self) {
         if let Some((_, _, nodes)) = self.lists.pop_if(|(_, missing, _)| *missing == 0) {
-            self.value(Node::Structs(nodes));
+            self.value(TableNode::Structs(nodes));
         }
     }
 }
@@ -103,18 +103,18 @@ impl Reader for Builder {
     }
 
     fn words(&mut self, words: Words<'_>, shape: Shape) {
-        let numbers: Vec<Number> = match words {
-            Words::F32(values) => values.iter().map(|&value| Number::Float(value)).collect(),
-            Words::U32(values) => values.iter().map(|&value| Number::Integer(value.into())).collect(),
-            Words::I32(values) => values.iter().map(|&value| Number::Integer(value.into())).collect(),
-            Words::I16(values) => values.iter().map(|&value| Number::Integer(value.into())).collect(),
-            Words::U64(value) => vec![Number::Hash(*value)],
+        let numbers: Vec<TableNumber> = match words {
+            Words::F32(values) => values.iter().map(|&value| TableNumber::Float(value)).collect(),
+            Words::U32(values) => values.iter().map(|&value| TableNumber::Integer(value.into())).collect(),
+            Words::I32(values) => values.iter().map(|&value| TableNumber::Integer(value.into())).collect(),
+            Words::I16(values) => values.iter().map(|&value| TableNumber::Integer(value.into())).collect(),
+            Words::U64(value) => vec![TableNumber::Hash(*value)],
         };
         self.value(match shape {
-            Shape::Value => Node::Value(numbers[0]),
-            Shape::List => Node::List(numbers),
-            Shape::Slice => Node::Slice(numbers),
-            Shape::Columns { rows } => Node::Columns(numbers.chunks(rows).map(<[_]>::to_vec).collect()),
+            Shape::Value => TableNode::Value(numbers[0]),
+            Shape::List => TableNode::List(numbers),
+            Shape::Slice => TableNode::Slice(numbers),
+            Shape::Columns { rows } => TableNode::Columns(numbers.chunks(rows).map(<[_]>::to_vec).collect()),
         });
     }
 
@@ -124,7 +124,7 @@ impl Reader for Builder {
                 *is_optional = true;
             }
         } else {
-            self.value(Node::Optional(None));
+            self.value(TableNode::Optional(None));
         }
     }
 
@@ -135,18 +135,18 @@ impl Reader for Builder {
 
     fn end(&mut self) {
         if let Some((name, fields)) = self.open.pop() {
-            self.value(Node::Struct(name, fields));
+            self.value(TableNode::Struct(name, fields));
         }
     }
 }
 
 /// As JSON: a vector is an array, a matrix is an array of its rows, a missing struct is null.
-impl Serialize for Node {
+impl Serialize for TableNode {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         match self {
-            Node::Value(number) => number.serialize(serializer),
-            Node::List(numbers) | Node::Slice(numbers) => serializer.collect_seq(numbers),
-            Node::Columns(columns) => match columns.as_slice() {
+            TableNode::Value(number) => number.serialize(serializer),
+            TableNode::List(numbers) | TableNode::Slice(numbers) => serializer.collect_seq(numbers),
+            TableNode::Columns(columns) => match columns.as_slice() {
                 [column] => serializer.collect_seq(column),
                 columns => {
                     let rows = columns.first().map_or(0, Vec::len);
@@ -154,19 +154,19 @@ impl Serialize for Node {
                     serializer.collect_seq((0..rows).map(row))
                 }
             },
-            Node::Struct(_, fields) => object(fields.iter(), serializer),
-            Node::Optional(node) => node.serialize(serializer),
-            Node::Structs(nodes) => serializer.collect_seq(nodes),
+            TableNode::Struct(_, fields) => object(fields.iter(), serializer),
+            TableNode::Optional(node) => node.serialize(serializer),
+            TableNode::Structs(nodes) => serializer.collect_seq(nodes),
         }
     }
 }
 
-impl Serialize for Number {
+impl Serialize for TableNumber {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         match *self {
-            Number::Float(value) => serializer.serialize_f32(value),
-            Number::Integer(value) => serializer.serialize_i64(value),
-            Number::Hash(value) => serializer.collect_str(&format_args!("{value:016x}")),
+            TableNumber::Float(value) => serializer.serialize_f32(value),
+            TableNumber::Integer(value) => serializer.serialize_i64(value),
+            TableNumber::Hash(value) => serializer.collect_str(&format_args!("{value:016x}")),
         }
     }
 }
@@ -179,7 +179,7 @@ pub(super) fn object<'a, S: Serializer>(
     let mut object = serializer.serialize_map(None)?;
     for field in fields {
         match &field.value {
-            Node::Struct("PerLaw", laws) => {
+            TableNode::Struct("PerLaw", laws) => {
                 for law in laws {
                     object.serialize_entry(law.name, &law.value)?;
                 }

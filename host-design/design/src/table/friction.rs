@@ -3,7 +3,8 @@
 use nalgebra::SMatrix;
 use upright::table::FrictionMap;
 
-use super::{MAX_SENSORS, MAX_STATES, NoTable, finite, widest};
+use super::any_size::{MAX_SENSORS, MAX_STATES, widest};
+use super::error::{NoTable, finite};
 use crate::design::{Design, continuous_plant, zero_order_hold};
 use crate::numerics::{Matrix, solve};
 use crate::rig::Rig;

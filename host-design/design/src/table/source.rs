@@ -6,8 +6,8 @@ use core::fmt::Write;
 
 use upright::table::{MotionTable, TABLE_FORMAT};
 
-use super::TableValues;
-use super::contents::{Field, Node, Number};
+use super::contents::{Field, TableNode, TableNumber};
+use super::values::TableValues;
 use crate::rig::{PlantDescription, Rig};
 
 /// The source of a `gains.rs` for `table`, designed from `rig`. It compiles in any crate that depends on `upright`.
@@ -39,7 +39,7 @@ fn write_source(out: &mut String, rig: &Rig, table: &TableValues) -> core::fmt::
         &format!("{:?}", env!("CARGO_PKG_VERSION")),
     )?;
     constant("Hash of the rig file's values.", "RIG_HASH", "u64", &hexadecimal(table.rig_hash, 4))?;
-    constant("Control period (s).", "TICK_S", "f32", &literal(Number::Float(table.tick_s)))?;
+    constant("Control period (s).", "TICK_S", "f32", &literal(TableNumber::Float(table.tick_s)))?;
     constant("Number of states.", "STATES", "usize", &table.states().to_string())?;
     constant("Number of sensors.", "SENSORS", "usize", &table.sensors().to_string())?;
     let gains = (table.fields(), table.crc());
@@ -129,16 +129,16 @@ impl Writer<'_> {
         Ok(())
     }
 
-    fn value(&mut self, name: &str, value: &Node) -> core::fmt::Result {
+    fn value(&mut self, name: &str, value: &TableNode) -> core::fmt::Result {
         match value {
-            Node::Value(number) => match name {
+            TableNode::Value(number) => match name {
                 "format" => self.line(&format!("format: upright::table_format!({TABLE_FORMAT}),")),
                 "rig_hash" => self.line("rig_hash: RIG_HASH,"),
                 "tick_s" => self.line("tick_s: TICK_S,"),
                 name => self.line(&format!("{name}: {},", literal(*number))),
             },
-            Node::List(numbers) => self.line(&format!("{name}: [{}],", row(numbers))),
-            Node::Columns(columns) => match columns.as_slice() {
+            TableNode::List(numbers) => self.line(&format!("{name}: [{}],", row(numbers))),
+            TableNode::Columns(columns) => match columns.as_slice() {
                 [column] => self.line(&format!("{name}: columns([[{}]]),", row(column))),
                 columns => {
                     let lines = |writer: &mut Self| {
@@ -147,7 +147,7 @@ impl Writer<'_> {
                     self.block(&format!("{name}: columns(["), lines, "]),")
                 }
             },
-            Node::Slice(numbers) => {
+            TableNode::Slice(numbers) => {
                 let columns = match name {
                     "reference" => self.reference,
                     "filter" => self.filter,
@@ -159,21 +159,21 @@ impl Writer<'_> {
                 };
                 self.block(&format!("{name}: &["), lines, "],")
             }
-            Node::Struct(kind, fields) => {
+            TableNode::Struct(kind, fields) => {
                 self.block(&format!("{name}: {kind} {{"), |writer| writer.fields(fields), "},")
             }
-            Node::Optional(None) => self.line(&format!("{name}: None,")),
-            Node::Optional(Some(node)) => match &**node {
-                Node::Struct(kind, fields) => {
+            TableNode::Optional(None) => self.line(&format!("{name}: None,")),
+            TableNode::Optional(Some(node)) => match &**node {
+                TableNode::Struct(kind, fields) => {
                     self.block(&format!("{name}: Some({kind} {{"), |writer| writer.fields(fields), "}),")
                 }
                 _ => Err(core::fmt::Error),
             },
-            Node::Structs(nodes) if nodes.is_empty() => self.line(&format!("{name}: &[],")),
-            Node::Structs(nodes) => {
+            TableNode::Structs(nodes) if nodes.is_empty() => self.line(&format!("{name}: &[],")),
+            TableNode::Structs(nodes) => {
                 let lines = |writer: &mut Self| {
                     nodes.iter().try_for_each(|node| match node {
-                        Node::Struct(kind, fields) => {
+                        TableNode::Struct(kind, fields) => {
                             writer.block(&format!("{kind} {{"), |writer| writer.fields(fields), "},")
                         }
                         _ => Err(core::fmt::Error),
@@ -185,16 +185,16 @@ impl Writer<'_> {
     }
 }
 
-fn row(numbers: &[Number]) -> String {
+fn row(numbers: &[TableNumber]) -> String {
     numbers.iter().map(|&number| literal(number)).collect::<Vec<_>>().join(", ")
 }
 
 /// The shortest decimal that reads back as the same number.
-fn literal(number: Number) -> String {
+fn literal(number: TableNumber) -> String {
     match number {
-        Number::Float(value) => format!("{value:?}"),
-        Number::Integer(value) => value.to_string(),
-        Number::Hash(value) => hexadecimal(value, 4),
+        TableNumber::Float(value) => format!("{value:?}"),
+        TableNumber::Integer(value) => value.to_string(),
+        TableNumber::Hash(value) => hexadecimal(value, 4),
     }
 }
 

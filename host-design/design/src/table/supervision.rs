@@ -2,7 +2,8 @@
 
 use upright::table::{Limits, MotorTest, Thresholds};
 
-use super::{MAX_SENSORS, NoTable, finite};
+use super::any_size::MAX_SENSORS;
+use super::error::{NoTable, finite};
 use crate::design::DetectionDesign;
 use crate::rig::{Chain, Rig, defaults};
 

@@ -5,7 +5,8 @@ use upright::table::{
     ChainModel, MotionLimits, MotionTable, SwingUpTable, TABLE_FORMAT, Thresholds, TransitionTable,
 };
 
-use super::{MAX_SENSORS, NoTable, TableValues, finite};
+use super::any_size::{MAX_SENSORS, WidestTable};
+use super::error::{NoTable, finite};
 use crate::motion::{PlannedMotion, RaiseAndLower, Transition};
 use crate::plant::{ChainParameters, ChainPlant};
 use crate::rig::Rig;
@@ -62,7 +63,7 @@ impl SwingUpValues {
     /// # Errors
     /// [`NoTable`] if the rig has no chain, a delay, or no observer, if the motions are those of another rig, or if a
     /// value does not fit into single precision.
-    pub fn of(rig: &Rig, table: &TableValues, motions: &RaiseAndLower) -> Result<Self, NoTable> {
+    pub fn of(rig: &Rig, table: &WidestTable, motions: &RaiseAndLower) -> Result<Self, NoTable> {
         let Some(chain) = rig.chain() else {
             return Err(NoTable::SwingUp("a [model] has no nonlinear equations of motion"));
         };
@@ -91,7 +92,7 @@ impl SwingUpValues {
     /// As for [`of`](Self::of).
     pub(crate) fn add(
         &mut self,
-        table: &TableValues,
+        table: &WidestTable,
         transition: Transition,
         motion: &PlannedMotion,
     ) -> Result<(), NoTable> {
@@ -146,8 +147,8 @@ impl SwingUpValues {
 }
 
 impl MotionValues {
-    fn of(table: &TableValues, motion: &PlannedMotion) -> Result<Self, NoTable> {
-        let (states, sensors, ticks) = (table.states(), table.sensors(), motion.steps());
+    fn of(table: &WidestTable, motion: &PlannedMotion) -> Result<Self, NoTable> {
+        let (states, sensors, ticks) = (table.states as usize, table.sensors as usize, motion.steps());
         let sizes = motion.x.first().map(Vec::len) == Some(states)
             && motion.l.first().map(|l| (l.rows(), l.cols())) == Some((states, sensors));
         if !sizes || motion.tick_s as f32 != table.tick_s {

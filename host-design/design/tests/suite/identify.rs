@@ -4,7 +4,8 @@ use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
 
 use upright_design::identify::{
-    Excitation, Identification, IdentifyError, Kind, Log, Refusal, Settings, Wiring, identify, shake,
+    Excitation, Identification, IdentifyError, Log, ParameterKind, Refusal, Settings, WiringFault, identify,
+    shake,
 };
 use upright_design::plant::ChainParameters;
 use upright_design::reality::real_chain;
@@ -58,26 +59,27 @@ fn the_parameters_of_a_double_pendulum_are_found_with_their_deviations() {
     let chain = truth.chain().unwrap();
     let real = real_chain(chain, &truth.reality.parameters);
     let constants = ChainParameters::<f64>::of(&real);
-    let of = |kind: Kind| found.estimate(kind).unwrap();
-    let within = |kind: Kind, wanted: f64, most: f64| {
+    let of = |kind: ParameterKind| found.estimate(kind).unwrap();
+    let within = |kind: ParameterKind, wanted: f64, most: f64| {
         let estimate = of(kind);
         let error = (estimate.new - wanted).abs();
         assert!(error < most, "{kind:?}: {} instead of {wanted}", estimate.new);
         assert!(error < 4.0 * estimate.deviation, "{kind:?}: {error} with deviation {}", estimate.deviation);
     };
     // The ratios that make up the shape are known much better than the common scale.
-    let ratio = |one: Kind, other: Kind| of(one).new / of(other).new;
-    let shape = ratio(Kind::FirstMoment(0), Kind::FirstMoment(1)) / (constants.a[0] / constants.a[1]);
+    let ratio = |one: ParameterKind, other: ParameterKind| of(one).new / of(other).new;
+    let shape = ratio(ParameterKind::FirstMoment(0), ParameterKind::FirstMoment(1))
+        / (constants.a[0] / constants.a[1]);
     assert!((shape - 1.0).abs() < 1e-3, "{shape}");
-    within(Kind::Length(0), real.links[0].length_m, 1e-3 * real.links[0].length_m);
+    within(ParameterKind::Length(0), real.links[0].length_m, 1e-3 * real.links[0].length_m);
     for j in 0..2 {
-        within(Kind::FirstMoment(j), constants.a[j], 0.01 * constants.a[j]);
-        within(Kind::SecondMoment(j), constants.b[(j, j)], 0.01 * constants.b[(j, j)]);
-        within(Kind::Zero(j), truth.reality.sensors.homing_error_rad.of(j), 0.0009);
-        within(Kind::JointViscous(j), 0.0024, 0.00024);
+        within(ParameterKind::FirstMoment(j), constants.a[j], 0.01 * constants.a[j]);
+        within(ParameterKind::SecondMoment(j), constants.b[(j, j)], 0.01 * constants.b[(j, j)]);
+        within(ParameterKind::Zero(j), truth.reality.sensors.homing_error_rad.of(j), 0.0009);
+        within(ParameterKind::JointViscous(j), 0.0024, 0.00024);
     }
-    within(Kind::TotalMass, constants.total_mass, 0.02 * constants.total_mass);
-    within(Kind::Tilt, 0.003, 0.001);
+    within(ParameterKind::TotalMass, constants.total_mass, 0.02 * constants.total_mass);
+    within(ParameterKind::Tilt, 0.003, 0.001);
     // The old file predicts the held-out samples at least five times worse.
     for channel in &found.channels {
         assert!(channel.held_out[0] > 5.0 * channel.held_out[1], "{channel:?}");
@@ -89,7 +91,7 @@ fn the_parameters_of_a_double_pendulum_are_found_with_their_deviations() {
 }
 
 fn of_total(estimates: &[upright_design::identify::Estimate]) -> f64 {
-    estimates.iter().find(|estimate| estimate.kind == Kind::TotalMass).unwrap().new
+    estimates.iter().find(|estimate| estimate.kind == ParameterKind::TotalMass).unwrap().new
 }
 
 #[test]
@@ -99,11 +101,11 @@ fn faults_of_the_wiring_are_named() {
         let found = run(&file, log, &Settings::default()).unwrap();
         (found.wiring.unwrap().best, found.refusal, found.estimates.len())
     };
-    let faults: [(Wiring, Log); 4] = [
-        (Wiring::Reversed(2), rewired(log(), |row| row[2] = -row[2])),
-        (Wiring::Swapped(1, 2), rewired(log(), |row| row.swap(1, 2))),
-        (Wiring::Counts(1, 2.0), rewired(log(), |row| row[1] *= 2)),
-        (Wiring::MotorReversed, rewired(log(), |row| row.iter_mut().for_each(|count| *count = -*count))),
+    let faults: [(WiringFault, Log); 4] = [
+        (WiringFault::Reversed(2), rewired(log(), |row| row[2] = -row[2])),
+        (WiringFault::Swapped(1, 2), rewired(log(), |row| row.swap(1, 2))),
+        (WiringFault::Counts(1, 2.0), rewired(log(), |row| row[1] *= 2)),
+        (WiringFault::MotorReversed, rewired(log(), |row| row.iter_mut().for_each(|count| *count = -*count))),
     ];
     for (wiring, log) in faults {
         let (best, refusal, estimates) = first(&log);

@@ -2,7 +2,9 @@
 
 use std::path::Path;
 
-use upright_design::identify::{CoverageError, Drawn, Kind, Machine, Missed, Quantity, coverage, identified};
+use upright_design::identify::{
+    CoverageError, CoveredQuantity, Drawn, DrawnMachine, Missed, ParameterKind, coverage, identified,
+};
 use upright_design::rig::Rig;
 use upright_design::study::Study;
 
@@ -15,24 +17,25 @@ const DRAWN: Drawn = Drawn { runs: 2, off_percent: 10.0, seconds: 8.0, seed: 5, 
 #[test]
 fn a_machine_is_the_same_every_time_and_within_what_is_stated() {
     let file = rig("triple-glueck-eder-kugi");
-    let draw = |off_percent: f64, number: u64| Machine::draw(&file, off_percent, 5, number).unwrap();
+    let draw = |off_percent: f64, number: u64| DrawnMachine::draw(&file, off_percent, 5, number).unwrap();
     for number in 0..20 {
         let machine = draw(10.0, number);
         let parameters = &machine.rig.reality.parameters;
         let of_links = [&parameters.link_mass_percent, &parameters.link_length_percent];
         assert!(of_links.iter().all(|each| (0..3).all(|link| each.of(link).abs() <= 10.0)), "{parameters:?}");
-        let delay = machine.truth(Kind::Delay).unwrap();
+        let delay = machine.truth(ParameterKind::Delay).unwrap();
         assert!((0.0..1.0).contains(&delay), "{delay}");
         // The file has 10 N s/m and 1 % of the weight is 0.62 N.
-        let [viscous, dry] = [Kind::CartViscous, Kind::CartDry].map(|kind| machine.truth(kind).unwrap());
+        let [viscous, dry] =
+            [ParameterKind::CartViscous, ParameterKind::CartDry].map(|kind| machine.truth(kind).unwrap());
         assert!((10.0 / 3.0..=30.0).contains(&viscous) && (0.2..=1.9).contains(&dry), "{viscous} {dry}");
     }
     assert_eq!(draw(10.0, 3), draw(10.0, 3));
     assert_ne!(draw(10.0, 3).rig, draw(10.0, 4).rig);
     // The file has the right masses and lengths here.
     let exact = draw(0.0, 3);
-    assert_eq!(exact.truth(Kind::Length(1)), Some(0.419));
-    assert!((exact.truth(Kind::TotalMass).unwrap() - 6.367).abs() < 1e-9);
+    assert_eq!(exact.truth(ParameterKind::Length(1)), Some(0.419));
+    assert!((exact.truth(ParameterKind::TotalMass).unwrap() - 6.367).abs() < 1e-9);
 }
 
 #[test]
@@ -40,10 +43,10 @@ fn intervals_that_cover_the_truth_are_counted() {
     let file = rig("single-quanser-ip02");
     let found = coverage(&file, &DRAWN, &Study::whole(), &|| ()).unwrap();
     assert_eq!((found.machines, found.refused.len()), (2, 0), "{found:?}");
-    let row = |quantity: Quantity| found.rows.iter().find(|row| row.quantity == quantity);
+    let row = |quantity: CoveredQuantity| found.rows.iter().find(|row| row.quantity == quantity);
     // One link has no length that matters, and two moments.
-    assert!(row(Quantity::Length).is_none());
-    let (moments, scale) = (row(Quantity::Moment).unwrap(), row(Quantity::Scale).unwrap());
+    assert!(row(CoveredQuantity::Length).is_none());
+    let (moments, scale) = (row(CoveredQuantity::Moment).unwrap(), row(CoveredQuantity::Scale).unwrap());
     assert_eq!((moments.count, scale.covered), (4, None));
     let [numbers, covered] = [|row: &_| count(row).0, |row: &_| count(row).1].map(
         |of: fn(&upright_design::identify::CoverageRow) -> usize| found.rows.iter().map(of).sum::<usize>(),

@@ -4,7 +4,7 @@
 use crate::plant_rigs::{any_chain_in_motion, paper, unequal_rods};
 use proptest::prelude::*;
 use upright_design::numerics::Matrix;
-use upright_design::plant::{ChainParameters, ChainPlant, ChainState, Plant, chain_plant};
+use upright_design::plant::{ChainParameters, ChainPlant, Plant, WideChainState, chain_plant};
 use upright_design::rig::Chain;
 
 fn rate_of(plant: &dyn Plant, state: &[f64], force: f64, torques: &[f64]) -> Vec<f64> {
@@ -193,8 +193,8 @@ fn a_joint_torque_turns_its_link_counter_clockwise() {
 fn a_mirrored_start_and_force_give_exactly_the_mirrored_motion() {
     let plant = ChainPlant::<4>::of(&crate::plant_rigs::with_friction(paper(), 1e-3)).unwrap();
     let mut right =
-        ChainState { x: 0.3, xdot: -0.2, phi: [0.1, -0.4, 2.0, 0.3], phidot: [3.0, -1.0, 0.5, 7.0] };
-    let mirror = |state: &ChainState<4>| ChainState {
+        WideChainState { x: 0.3, xdot: -0.2, phi: [0.1, -0.4, 2.0, 0.3], phidot: [3.0, -1.0, 0.5, 7.0] };
+    let mirror = |state: &WideChainState<4>| WideChainState {
         x: -state.x,
         xdot: -state.xdot,
         phi: state.phi.map(|angle| -angle),
@@ -213,7 +213,7 @@ fn a_mirrored_start_and_force_give_exactly_the_mirrored_motion() {
 #[test]
 fn relative_and_absolute_angles_convert_both_ways() {
     let relative = [0.5, -1.0, 0.25, 1.0, -0.5, 2.0, 0.125, -4.0];
-    let absolute = ChainState::<3>::from_relative(&relative);
+    let absolute = WideChainState::<3>::from_relative(&relative);
     assert_eq!(absolute.phi, [0.25, -0.25, -0.125]);
     assert_eq!(absolute.phidot, [1.0, 3.0, -1.0]);
     let mut back = [0.0; 8];

@@ -5,7 +5,7 @@ use upright::table::Equilibrium;
 use upright_design::numerics::{Matrix, Real, Wide};
 use upright_design::plant::reference::{ReferenceError, Tolerance, integrate};
 use upright_design::plant::{
-    ChainParameters, ChainPlant, ChainState, Plant, PlantError, chain_plant, linearise,
+    ChainParameters, ChainPlant, Plant, PlantError, WideChainState, chain_plant, linearise,
 };
 use upright_design::rig::{Chain, Link, MAX_LINKS};
 
@@ -258,7 +258,7 @@ fn every_size_of_chain_rests_upright_and_falls_when_disturbed() {
         plant.advance(0.0, &vec![0.0; n], 0.1, 10);
         plant.write_state(&mut state);
         assert_eq!((plant.links(), state), (n, vec![0.0; 2 * n + 2]));
-        let mut start = ChainState::<1>::upright();
+        let mut start = WideChainState::<1>::upright();
         start.phi[0] = 1e-3;
         let mut tilted = vec![0.0; 2 * n + 2];
         start.write_relative(&mut tilted[..4]);

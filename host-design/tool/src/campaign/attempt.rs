@@ -12,7 +12,7 @@ use super::expected::{Expected, Phase};
 use super::injection::Injection;
 use super::observed::Observed;
 use super::trial::Trial;
-use crate::in_the_loop::{Events, Place, RunError, VirtualBoard};
+use crate::in_the_loop::{Events, RunError, RunPlace, VirtualBoard};
 use upright_design::harness::{Harness, HarnessError, Pins, RailEnds, Session, Target, goals, healthy};
 use upright_design::identify::Feed;
 use upright_design::plant::absolute_angles;
@@ -28,7 +28,7 @@ pub struct Setup<'a> {
     /// Its gain table.
     pub table: &'a TableValues,
     /// Where the firmware runs; it is started again for each trial.
-    pub place: Place<'a>,
+    pub place: RunPlace<'a>,
     /// Whether the firmware has its thresholds and limits. Without them it cannot detect most defects.
     pub detection: bool,
     /// Whether a board has its guards: watchdog, break input, MPU, registers that are read back.
@@ -78,7 +78,7 @@ pub(super) fn attempt(setup: &Setup<'_>, trial: &Trial, with_defect: bool) -> Re
     };
     let mut attempt =
         DefectRun { setup, rig: setup.rig, table: setup.table, trial, with_defect, board: None };
-    let Place::Board { image, conditions } = setup.place else {
+    let RunPlace::Board { image, conditions } = setup.place else {
         return setup.place.with_target(table, |target| Ok(attempt.run(target)?));
     };
     let conditions = trial.kind.conditions(trial, conditions);

@@ -13,7 +13,7 @@ use super::expected::Phase;
 use super::expected::{Expected, Ticks};
 use super::observed::Observed;
 use super::trial::Trial;
-use crate::in_the_loop::{Place, RunError};
+use crate::in_the_loop::{RunError, RunPlace};
 use upright_design::table::TableValues;
 
 /// Class of an outcome.
@@ -90,7 +90,7 @@ fn class(
     ticks: Option<u32>,
     from_onset: Option<u32>,
 ) -> Result<Class, RunError> {
-    let on_board = matches!(setup.place, Place::Board { .. });
+    let on_board = matches!(setup.place, RunPlace::Board { .. });
     Ok(match trial.expected() {
         _ if observed.on_again => Class::Missed,
         Expected::Fault(fault, within) => of_fault(setup.table, observed, fault, within, ticks, on_board),

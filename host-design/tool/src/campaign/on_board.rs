@@ -3,7 +3,7 @@
 
 use rand::RngExt;
 use upright_board::{
-    Chip, Conditions, Image, Input, Pin, Time, UNITS_PER_MICROSECOND as US, UNITS_PER_SECOND, Wire,
+    Chip, Conditions, ExternalLevel, Image, Input, Pin, Time, UNITS_PER_MICROSECOND as US, UNITS_PER_SECOND,
 };
 
 use super::defect::Defect;
@@ -104,7 +104,7 @@ impl Defect {
                 let volts = 2.0 + 0.6 * trial.size as f32;
                 vec![at(anywhere, Input::ChipSupply(volts)), at(anywhere + DIP, Input::ChipSupply(3.3))]
             }
-            Defect::HostWireOpen => vec![at(0, Input::Level(receive, Wire::Open)), Event::CutLine],
+            Defect::HostWireOpen => vec![at(0, Input::Level(receive, ExternalLevel::Open)), Event::CutLine],
             Defect::LineNoise => {
                 let bauds = [9_600, 57_600, 115_200, 460_800, 500_000, 1_000_000];
                 let mut bytes = |count: usize| (0..count).map(|_| random.random()).collect::<Vec<u8>>();

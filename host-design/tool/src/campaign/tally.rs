@@ -8,7 +8,7 @@ use super::defect::{Defect, Needs};
 use super::expected::Expected;
 use super::judge::{Class, TrialOutcome, allowed, judge, silence_ticks};
 use super::trial::Trial;
-use crate::in_the_loop::{Place, RunError};
+use crate::in_the_loop::{RunError, RunPlace};
 use upright_design::study::{Study, StudyError};
 use upright_design::table::TableValues;
 
@@ -78,7 +78,7 @@ pub struct Campaign {
 }
 
 /// The kinds of defects that are possible with this rig and this place.
-pub fn kinds(table: &TableValues, place: Place<'_>) -> Vec<Defect> {
+pub fn kinds(table: &TableValues, place: RunPlace<'_>) -> Vec<Defect> {
     let has_supply = table.limits.supply_min_v > 0.0;
     let has_links = table.sensors() > 1;
     Defect::ALL
@@ -91,9 +91,9 @@ pub fn kinds(table: &TableValues, place: Place<'_>) -> Vec<Defect> {
             _ => true,
         })
         .filter(|kind| match place {
-            Place::Host => !matches!(kind.needs(), Needs::Image | Needs::Board),
-            Place::Qemu { .. } => !matches!(kind.needs(), Needs::Process | Needs::Board),
-            Place::Board { .. } => kind.needs() != Needs::SimulatedPins,
+            RunPlace::Host => !matches!(kind.needs(), Needs::Image | Needs::Board),
+            RunPlace::Qemu { .. } => !matches!(kind.needs(), Needs::Process | Needs::Board),
+            RunPlace::Board { .. } => kind.needs() != Needs::SimulatedPins,
         })
         .collect()
 }

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use upright::table::Law;
 use upright_design::design::{Certified, design};
-use upright_design::identify::{Estimate, Identification, Kind, Log, Settings, identify};
+use upright_design::identify::{Estimate, Identification, Log, ParameterKind, Settings, identify};
 use upright_design::number::significant;
 use upright_design::rig::{Rig, RigText, Tolerances};
 use upright_design::robust::{JudgeSettings, RobustError, choose, judge, rewritten, set_tolerances};
@@ -94,24 +94,30 @@ pub(super) fn designed(
 /// How far the machine may differ from the new file: by the deviations of the estimates, by its friction, and by the
 /// zeros and the delay of this run.
 fn tolerances(rig: &Rig, found: &Identification) -> Tolerances {
-    let largest = |which: fn(Kind) -> bool, value: fn(&Estimate) -> f64| {
+    let largest = |which: fn(ParameterKind) -> bool, value: fn(&Estimate) -> f64| {
         found.estimates.iter().filter(|one| which(one.kind)).map(value).fold(0.0, f64::max)
     };
     let upper = |one: &Estimate| one.new.abs() + DEVIATIONS * one.deviation;
     let mass = largest(
-        |kind| matches!(kind, Kind::TotalMass | Kind::FirstMoment(_) | Kind::SecondMoment(_)),
+        |kind| {
+            matches!(
+                kind,
+                ParameterKind::TotalMass | ParameterKind::FirstMoment(_) | ParameterKind::SecondMoment(_)
+            )
+        },
         |one| DEVIATIONS * one.deviation / one.new.abs(),
     );
     // The new file may have another delay than the old one.
     let delay_ticks =
         found.other_delay().map_or(0.0, |delay| f64::from(delay) - f64::from(found.delay_ticks));
-    let late_ticks = found.estimate(Kind::Delay).map_or(0.0, |one| one.new + DEVIATIONS * one.deviation);
+    let late_ticks =
+        found.estimate(ParameterKind::Delay).map_or(0.0, |one| one.new + DEVIATIONS * one.deviation);
     let period_s = rig.tick.period_s;
     Tolerances {
         mass_percent: (100.0 * mass).clamp(LEAST_PERCENT, MOST_PERCENT),
-        joint_friction_n_m: largest(|kind| matches!(kind, Kind::JointDry(_)), upper),
-        cart_friction_n: largest(|kind| kind == Kind::CartDry, upper),
-        homing_error_rad: largest(|kind| matches!(kind, Kind::Zero(_)), upper),
+        joint_friction_n_m: largest(|kind| matches!(kind, ParameterKind::JointDry(_)), upper),
+        cart_friction_n: largest(|kind| kind == ParameterKind::CartDry, upper),
+        homing_error_rad: largest(|kind| matches!(kind, ParameterKind::Zero(_)), upper),
         latency_s: (late_ticks - delay_ticks).clamp(0.0, MOST_LATENCY) * period_s,
     }
 }

@@ -3,7 +3,9 @@
 use std::fmt::Write as _;
 
 use serde_json::{Value, json};
-use upright_design::identify::{ChannelError, Estimate, Identification, Kind, Settings, WindowErrors};
+use upright_design::identify::{
+    ChannelError, Estimate, Identification, ParameterKind, Settings, WindowErrors,
+};
 use upright_design::number::significant;
 
 /// Below this angle the scale of the force is poorly known (rad).
@@ -120,7 +122,10 @@ pub(super) fn row_texts(estimate: &Estimate) -> [String; 7] {
 
 /// Whether a length or a moment from one half of the recordings contradicts that from the other.
 fn halves_differ(estimate: &Estimate) -> bool {
-    let is_shape = matches!(estimate.kind, Kind::FirstMoment(_) | Kind::Length(_) | Kind::SecondMoment(_));
+    let is_shape = matches!(
+        estimate.kind,
+        ParameterKind::FirstMoment(_) | ParameterKind::Length(_) | ParameterKind::SecondMoment(_)
+    );
     let differs =
         |[first, second]: [f64; 2]| (first - second).abs() > 0.01 * HALVES_PERCENT * estimate.new.abs();
     is_shape && estimate.halves.is_some_and(differs)
@@ -150,7 +155,8 @@ fn scale_note(found: &Identification, settings: &Settings) -> String {
 /// Where the model or the rig file falls short of the machine.
 fn model_notes(found: &Identification) -> Vec<String> {
     let mut notes = Vec::new();
-    let is_drag = |estimate: &Estimate| matches!(estimate.kind, Kind::AirDrag(_)) && estimate.new > 0.0;
+    let is_drag =
+        |estimate: &Estimate| matches!(estimate.kind, ParameterKind::AirDrag(_)) && estimate.new > 0.0;
     if found.estimates.iter().any(is_drag) {
         notes.push(
             "The rig file has no air drag: large motion of the new file decays more slowly than the machine's.".to_owned(),
@@ -190,7 +196,7 @@ pub(super) fn notes(found: &Identification, settings: &Settings) -> Vec<String> 
             found.largest_angle_rad.to_degrees()
         ));
     }
-    match (found.other_delay(), found.estimate(Kind::Delay)) {
+    match (found.other_delay(), found.estimate(ParameterKind::Delay)) {
         (Some(delay), Some(estimate)) => notes.push(format!(
             "The force comes {:.2} ticks later than delay_ticks: set delay_ticks = {delay}; the new file has it.",
             estimate.new
@@ -200,7 +206,7 @@ pub(super) fn notes(found: &Identification, settings: &Settings) -> Vec<String> 
         }
         _ => (),
     }
-    let zeros = found.estimates.iter().filter(|estimate| matches!(estimate.kind, Kind::Zero(_)));
+    let zeros = found.estimates.iter().filter(|estimate| matches!(estimate.kind, ParameterKind::Zero(_)));
     let worst = zeros.map(|zero| zero.new.abs()).fold(0.0, f64::max);
     notes.push(format!(
         "The zeros of the links are off by up to {:.2}°. This belongs to this homing and is not in the file.",

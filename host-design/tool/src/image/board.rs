@@ -1,10 +1,10 @@
 //! The boards by name. Each is described in the firmware, in `src/image/board/f4/boards/`.
 
-use upright_board::{Chip, Conditions, Wiring};
+use upright_board::{BoardWiring, Chip, Conditions};
 
 /// A board that there is an image for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Board {
+pub enum BoardName {
     /// WeAct Studio STM32F405 core board.
     WeactF405,
     /// Olimex STM32-H405.
@@ -17,7 +17,7 @@ pub enum Board {
     NucleoF446,
 }
 
-impl Board {
+impl BoardName {
     /// All boards; the first one is the default.
     pub const ALL: [Self; 5] =
         [Self::WeactF405, Self::OlimexH405, Self::FeatherF405, Self::DiscoveryF407, Self::NucleoF446];
@@ -25,20 +25,20 @@ impl Board {
     /// Name on the command line, and of the cargo feature.
     pub const fn name(self) -> &'static str {
         match self {
-            Board::WeactF405 => "weact-f405",
-            Board::OlimexH405 => "olimex-h405",
-            Board::FeatherF405 => "feather-f405",
-            Board::DiscoveryF407 => "discovery-f407",
-            Board::NucleoF446 => "nucleo-f446",
+            BoardName::WeactF405 => "weact-f405",
+            BoardName::OlimexH405 => "olimex-h405",
+            BoardName::FeatherF405 => "feather-f405",
+            BoardName::DiscoveryF407 => "discovery-f407",
+            BoardName::NucleoF446 => "nucleo-f446",
         }
     }
 
     /// Name of its microcontroller in probe-rs.
     pub const fn chip(self) -> &'static str {
         match self {
-            Board::WeactF405 | Board::OlimexH405 | Board::FeatherF405 => "STM32F405RGTx",
-            Board::DiscoveryF407 => "STM32F407VGTx",
-            Board::NucleoF446 => "STM32F446RETx",
+            BoardName::WeactF405 | BoardName::OlimexH405 | BoardName::FeatherF405 => "STM32F405RGTx",
+            BoardName::DiscoveryF407 => "STM32F407VGTx",
+            BoardName::NucleoF446 => "STM32F446RETx",
         }
     }
 
@@ -51,13 +51,13 @@ impl Board {
     pub fn conditions(self, seed: u64) -> Conditions {
         let mut conditions = Conditions::f405(seed);
         match self {
-            Board::WeactF405 | Board::OlimexH405 => {}
-            Board::FeatherF405 => {
-                conditions.wiring = Wiring::feather();
+            BoardName::WeactF405 | BoardName::OlimexH405 => {}
+            BoardName::FeatherF405 => {
+                conditions.wiring = BoardWiring::feather();
                 conditions.crystal.hz = 12_000_000;
             }
-            Board::DiscoveryF407 => (conditions.chip, conditions.chip_v) = (Chip::F407, 3.0),
-            Board::NucleoF446 => {
+            BoardName::DiscoveryF407 => (conditions.chip, conditions.chip_v) = (Chip::F407, 3.0),
+            BoardName::NucleoF446 => {
                 conditions.chip = Chip::F446;
                 conditions.crystal.is_clock_input = true;
             }
@@ -68,18 +68,18 @@ impl Board {
 
 /// A name that no board has.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-#[error("no board has this name; choose one of {}", Board::ALL.map(Board::name).join(", "))]
+#[error("no board has this name; choose one of {}", BoardName::ALL.map(BoardName::name).join(", "))]
 pub struct NoBoard;
 
-impl std::str::FromStr for Board {
+impl std::str::FromStr for BoardName {
     type Err = NoBoard;
 
     fn from_str(name: &str) -> Result<Self, NoBoard> {
-        Board::ALL.into_iter().find(|board| board.name() == name).ok_or(NoBoard)
+        BoardName::ALL.into_iter().find(|board| board.name() == name).ok_or(NoBoard)
     }
 }
 
-impl std::fmt::Display for Board {
+impl std::fmt::Display for BoardName {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         f.pad(self.name())
     }

@@ -4,93 +4,53 @@ use std::fs::File;
 use std::path::{Path, PathBuf};
 use std::time::SystemTime;
 
-use super::board::Board;
+use super::board::BoardName;
 use super::compiler::{Compiler, compiler, target_directory};
+use super::error::{BuildError, TARGET};
 use super::kept;
-use crate::project::{NoCheckout, checkout};
+use crate::project::checkout;
 use upright::gains::SENSORS;
 use upright_design::rig::Rig;
-use upright_design::table::{TableValues, WriteError, gains_source, write_atomically};
+use upright_design::table::{TableValues, gains_source, write_atomically};
 
-/// The target that images are compiled for: Cortex-M4 with single-precision floating point.
-pub const TARGET: &str = "thumbv7em-none-eabihf";
 /// The cargo profile that images are compiled with.
 pub const PROFILE: &str = "firmware";
 
 /// Kind of an image: what it is for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Kind {
+pub enum ImageKind {
     /// For a board.
-    Board(Board),
+    Board(BoardName),
     /// For QEMU, with the pins connected through files.
     InTheLoop,
     /// For QEMU, with the pins connected through a serial line.
     InTheLoopUsart,
 }
 
-impl Kind {
+impl ImageKind {
     /// The cargo feature that selects it, and the beginning of the image's file name.
     fn name(self) -> &'static str {
         match self {
-            Kind::Board(board) => board.name(),
-            Kind::InTheLoop => "in-the-loop",
-            Kind::InTheLoopUsart => "in-the-loop-usart",
+            ImageKind::Board(board) => board.name(),
+            ImageKind::InTheLoop => "in-the-loop",
+            ImageKind::InTheLoopUsart => "in-the-loop-usart",
         }
     }
 
     /// The board that it is for; `None` for QEMU.
-    fn board(self) -> Option<Board> {
+    fn board(self) -> Option<BoardName> {
         match self {
-            Kind::Board(board) => Some(board),
-            Kind::InTheLoop | Kind::InTheLoopUsart => None,
+            ImageKind::Board(board) => Some(board),
+            ImageKind::InTheLoop | ImageKind::InTheLoopUsart => None,
         }
     }
-}
-
-/// Why an image could not be built.
-#[derive(Debug, thiserror::Error)]
-pub enum ImageError {
-    /// No compiler for the target.
-    #[error(
-        "no compiler for {TARGET}: run `rustup target add {TARGET}`, or on Debian \
-         `apt-get install lld rustc-web cargo-web rust-web-src`"
-    )]
-    NoCompiler,
-    /// The rig has more encoders than the board has timers for.
-    #[error("{board} counts {} encoders, and this rig has {needed}: use another board (docs/board.md)", board.encoders())]
-    Encoders {
-        /// Which board.
-        board: Board,
-        /// Number of the rig's sensors.
-        needed: usize,
-    },
-    /// There is no source to build from.
-    #[error(transparent)]
-    NoCheckout(#[from] NoCheckout),
-    /// The compiler cannot be started.
-    #[error("{0} cannot be started: {1}")]
-    Start(&'static str, std::io::Error),
-    /// The compiler reports errors.
-    #[error("the image cannot be built; the compiler says:\n{0}")]
-    Compiler(String),
-    /// Its gain table, or the image itself, cannot be written.
-    #[error(transparent)]
-    Write(#[from] WriteError),
-    /// A file of the image cannot be read.
-    #[error("{}: {source}", path.display())]
-    File {
-        /// Path of the file.
-        path: PathBuf,
-        /// Why.
-        source: std::io::Error,
-    },
 }
 
 /// Builds the image with the committed gain table, `src/gains.rs`; returns the path of the ELF file.
 ///
 /// # Errors
-/// [`ImageError`] if there is no compiler, or it fails.
-pub fn build(kind: Kind) -> Result<PathBuf, ImageError> {
+/// [`BuildError`] if there is no compiler, or it fails.
+pub fn build(kind: ImageKind) -> Result<PathBuf, BuildError> {
     check_encoders(kind, SENSORS)?;
     compile(kind, None, kind.name())
 }
@@ -99,7 +59,7 @@ pub fn build(kind: Kind) -> Result<PathBuf, ImageError> {
 ///
 /// # Errors
 /// As for [`build`].
-pub fn build_for(kind: Kind, rig: &Rig, table: &TableValues) -> Result<PathBuf, ImageError> {
+pub fn build_for(kind: ImageKind, rig: &Rig, table: &TableValues) -> Result<PathBuf, BuildError> {
     check_encoders(kind, table.sensors())?;
     let source = gains_source(rig, table);
     // An included file cannot have module documentation.
@@ -116,22 +76,22 @@ pub fn build_for(kind: Kind, rig: &Rig, table: &TableValues) -> Result<PathBuf, 
     compile(kind, Some(&gains), &name)
 }
 
-fn check_encoders(kind: Kind, needed: usize) -> Result<(), ImageError> {
+fn check_encoders(kind: ImageKind, needed: usize) -> Result<(), BuildError> {
     match kind.board() {
-        Some(board) if needed > board.encoders() => Err(ImageError::Encoders { board, needed }),
+        Some(board) if needed > board.encoders() => Err(BuildError::Encoders { board, needed }),
         _ => Ok(()),
     }
 }
 
 /// Waits until no other process compiles an image, and keeps others waiting until the file is dropped. The compiler
 /// writes all images to the same place, and each has to be copied from there before the next is compiled.
-fn one_at_a_time() -> Result<File, ImageError> {
+fn one_at_a_time() -> Result<File, BuildError> {
     let path = images()?.join("compiling");
     let locked = File::create(&path).and_then(|file| file.lock().map(|()| file));
-    locked.map_err(|source| ImageError::File { path, source })
+    locked.map_err(|source| BuildError::File { path, source })
 }
 
-fn compile(kind: Kind, gains: Option<&Path>, name: &str) -> Result<PathBuf, ImageError> {
+fn compile(kind: ImageKind, gains: Option<&Path>, name: &str) -> Result<PathBuf, BuildError> {
     let root = checkout()?;
     let _others_wait = one_at_a_time()?;
     let Compiler { program, version, mut cargo, target_directory } = compiler()?;
@@ -156,24 +116,24 @@ fn compile(kind: Kind, gains: Option<&Path>, name: &str) -> Result<PathBuf, Imag
     }
     kept::forget(&image);
     let begin = SystemTime::now();
-    let output = cargo.output().map_err(|source| ImageError::Start(program, source))?;
+    let output = cargo.output().map_err(|source| BuildError::Start(program, source))?;
     if !output.status.success() {
-        return Err(ImageError::Compiler(String::from_utf8_lossy(&output.stderr).into_owned()));
+        return Err(BuildError::Compiler(String::from_utf8_lossy(&output.stderr).into_owned()));
     }
     let built = target_directory.join(TARGET).join(PROFILE).join("upright-image");
     let list = built.with_extension("d");
-    let elf = std::fs::read(&built).map_err(|source| ImageError::File { path: built, source })?;
+    let elf = std::fs::read(&built).map_err(|source| BuildError::File { path: built, source })?;
     write_atomically(&image, &elf)?;
     kept::keep(&image, &cargo, &version, begin, &list, &root)
-        .map_err(|source| ImageError::File { path: list, source })?;
+        .map_err(|source| BuildError::File { path: list, source })?;
     Ok(image)
 }
 
 /// Directory in which images are kept; it is created if it does not exist.
-fn images() -> Result<PathBuf, ImageError> {
+fn images() -> Result<PathBuf, BuildError> {
     let directory = target_directory()?.join("images");
     match std::fs::create_dir_all(&directory) {
         Ok(()) => Ok(directory),
-        Err(source) => Err(ImageError::File { path: directory, source }),
+        Err(source) => Err(BuildError::File { path: directory, source }),
     }
 }

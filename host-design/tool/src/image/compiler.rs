@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
-use super::build::{ImageError, TARGET};
+use super::error::{BuildError, TARGET};
 use crate::project::checkout;
 
 /// Debian's compiler, which can build Rust's core library from `rust-web-src`.
@@ -27,8 +27,8 @@ pub struct Compiler {
 /// The compiler that is installed.
 ///
 /// # Errors
-/// [`ImageError::NoCompiler`] if there is none.
-pub fn compiler() -> Result<Compiler, ImageError> {
+/// [`BuildError::NoCompiler`] if there is none.
+pub fn compiler() -> Result<Compiler, BuildError> {
     let target_directory = target_directory()?;
     let mut compiler = if rustup_has_the_target() {
         Compiler {
@@ -49,7 +49,7 @@ pub fn compiler() -> Result<Compiler, ImageError> {
             target_directory: target_directory.join("debian"),
         }
     } else {
-        return Err(ImageError::NoCompiler);
+        return Err(BuildError::NoCompiler);
     };
     // Variables set by an outer cargo are for the host.
     for (name, _) in std::env::vars_os() {
@@ -64,7 +64,7 @@ pub fn compiler() -> Result<Compiler, ImageError> {
 }
 
 /// A separate target directory: the caller may run under cargo, which holds a lock on the usual one.
-pub(super) fn target_directory() -> Result<PathBuf, ImageError> {
+pub(super) fn target_directory() -> Result<PathBuf, BuildError> {
     let base = match std::env::var_os("CARGO_TARGET_DIR") {
         Some(directory) => std::path::absolute(directory).unwrap_or_default(),
         None => checkout()?.join("target"),

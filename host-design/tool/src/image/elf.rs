@@ -36,7 +36,7 @@ pub enum ElfError {
 
 /// A section that is loaded or cleared.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub(crate) struct Section {
+pub(crate) struct LinkedSection {
     pub(crate) name: String,
     pub(crate) bytes: u32,
     pub(crate) in_flash: bool,
@@ -61,9 +61,9 @@ pub(crate) struct Code {
 
 /// An image, read from its ELF file.
 #[derive(Debug)]
-pub struct Image {
+pub struct LinkedImage {
     pub(crate) bytes: Vec<u8>,
-    pub(crate) sections: Vec<Section>,
+    pub(crate) sections: Vec<LinkedSection>,
     /// By address, none overlapping.
     pub(crate) functions: Vec<Item>,
     pub(crate) data: Vec<Item>,
@@ -77,7 +77,7 @@ pub struct Image {
     pub(crate) stack_reserved: u32,
 }
 
-impl Image {
+impl LinkedImage {
     /// Reads an ELF file.
     ///
     /// # Errors
@@ -88,17 +88,7 @@ impl Image {
         let missing = |what| ElfError::Missing { path: path.to_owned(), what };
         let elf: ElfFile32 = ElfFile32::parse(&bytes[..]).map_err(format)?;
 
-        let mut sections = Vec::new();
-        for section in elf.sections() {
-            let (name, address) = (section.name().map_err(format)?, section.address());
-            if address == 0 || section.size() == 0 {
-                continue; // debugging information
-            }
-            let in_ram = !(0x0800_0000..0x1000_0000).contains(&address);
-            let in_flash = section.kind() != SectionKind::UninitializedData
-                && section.file_range().is_some_and(|(_, size)| size > 0);
-            sections.push(Section { name: name.to_owned(), bytes: section.size() as u32, in_flash, in_ram });
-        }
+        let sections = sections(&elf).map_err(format)?;
         let text = elf.section_by_name(".text").ok_or_else(|| missing("section .text"))?;
         let text = (text.address() as u32, text.data().map_err(format)?.to_vec());
         let table = elf.section_by_name(".vector_table").ok_or_else(|| missing("section .vector_table"))?;
@@ -178,6 +168,27 @@ impl Image {
         let function = &self.functions[index];
         (address < function.address + function.size).then_some(index)
     }
+}
+
+/// The sections that are loaded or cleared.
+fn sections(elf: &ElfFile32) -> Result<Vec<LinkedSection>, object::Error> {
+    let mut sections = Vec::new();
+    for section in elf.sections() {
+        let (name, address) = (section.name()?, section.address());
+        if address == 0 || section.size() == 0 {
+            continue; // debugging information
+        }
+        let in_ram = !(0x0800_0000..0x1000_0000).contains(&address);
+        let in_flash = section.kind() != SectionKind::UninitializedData
+            && section.file_range().is_some_and(|(_, size)| size > 0);
+        sections.push(LinkedSection {
+            name: name.to_owned(),
+            bytes: section.size() as u32,
+            in_flash,
+            in_ram,
+        });
+    }
+    Ok(sections)
 }
 
 /// Counts each byte once: the compiler merges small variables into one, and keeps their names.

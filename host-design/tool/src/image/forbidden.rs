@@ -1,6 +1,6 @@
 //! Check that an image for a board contains no code that panics or allocates.
 
-use super::elf::Image;
+use super::elf::LinkedImage;
 
 /// Parts of the names of functions that only a panic, its message or an allocation brings into an image.
 const FORBIDDEN: [&str; 9] = [
@@ -18,7 +18,7 @@ const FORBIDDEN: [&str; 9] = [
 /// Names of functions in the image that panic, format a panic's message, or allocate; none in a good image.
 ///
 /// An optimised build drops functions that are never called, so a function in the image may be reached.
-pub fn forbidden_functions(image: &Image) -> Vec<&str> {
+pub fn forbidden_functions(image: &LinkedImage) -> Vec<&str> {
     let names = image.functions.iter().map(|function| function.name.as_str());
     names.filter(|name| is_forbidden(name)).collect()
 }

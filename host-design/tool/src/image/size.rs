@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use upright_board::{Lines, LinesError};
 
-use super::elf::{Image, Item};
+use super::elf::{Item, LinkedImage};
 
 /// Limit of an image's code (bytes): its flash without constants, among them the motions, and without the gain table.
 pub const CODE_LIMIT: u32 = 48 * 1024;
@@ -29,9 +29,9 @@ pub struct Size {
     /// The gain table, which takes this much in flash and again in RAM.
     pub table: u32,
     /// By section, in the order of addresses.
-    pub sections: Vec<Part>,
+    pub sections: Vec<ImagePart>,
     /// By crate, the largest first. Code belongs to the crate of its source line, also where it is inlined.
-    pub crates: Vec<Part>,
+    pub crates: Vec<ImagePart>,
 }
 
 impl Size {
@@ -48,7 +48,7 @@ impl Size {
 
 /// A part of an image, in bytes.
 #[derive(Debug, Clone, Default, PartialEq, Eq, serde::Serialize)]
-pub struct Part {
+pub struct ImagePart {
     /// Name of a section or crate; in parentheses, a description of bytes that belong to none.
     pub name: String,
     /// Its bytes in flash.
@@ -66,17 +66,17 @@ pub struct SizeError(#[from] LinesError);
 ///
 /// # Errors
 /// [`SizeError`] if the debug information, which gives the source of code, is damaged.
-pub fn size(image: &Image) -> Result<Size, SizeError> {
-    let mut sections: Vec<Part> = Vec::new();
+pub fn size(image: &LinkedImage) -> Result<Size, SizeError> {
+    let mut sections: Vec<ImagePart> = Vec::new();
     for section in &image.sections {
         let bytes = |counts: bool| if counts { section.bytes } else { 0 };
         let (flash, ram) = (bytes(section.in_flash), bytes(section.in_ram));
-        sections.push(Part { name: section.name.clone(), flash, ram });
+        sections.push(ImagePart { name: section.name.clone(), flash, ram });
     }
     let flash: u32 = sections.iter().map(|part| part.flash).sum();
     let ram: u32 = sections.iter().map(|part| part.ram).sum();
 
-    let mut shares: BTreeMap<String, Part> = BTreeMap::new();
+    let mut shares: BTreeMap<String, ImagePart> = BTreeMap::new();
     for (name, bytes) in code_by_crate(image)? {
         shares.entry(name).or_default().flash += bytes;
     }
@@ -96,14 +96,15 @@ pub fn size(image: &Image) -> Result<Size, SizeError> {
     let rest = shares.entry("(alignment, constants without a name)".to_owned()).or_default();
     rest.flash += flash.saturating_sub(counted_flash);
     rest.ram += ram.saturating_sub(counted_ram);
-    let mut crates: Vec<Part> = shares.into_iter().map(|(name, part)| Part { name, ..part }).collect();
+    let mut crates: Vec<ImagePart> =
+        shares.into_iter().map(|(name, part)| ImagePart { name, ..part }).collect();
     crates.sort_by_key(|part| std::cmp::Reverse((part.flash, part.ram)));
     let constants = sections.iter().filter(|part| part.name == CONSTANTS).map(|part| part.flash).sum();
     Ok(Size { flash, constants, ram, table, sections, crates })
 }
 
 /// Bytes of machine code by the crate of their source line.
-fn code_by_crate(image: &Image) -> Result<BTreeMap<String, u32>, SizeError> {
+fn code_by_crate(image: &LinkedImage) -> Result<BTreeMap<String, u32>, SizeError> {
     let lines = Lines::of(&image.bytes)?;
     let mut crates = BTreeMap::new();
     for function in &image.functions {

@@ -5,7 +5,7 @@
 
 use upright_board::{Effect, effect, is_wide};
 
-use super::elf::Image;
+use super::elf::LinkedImage;
 
 /// Largest frame that the processor stacks at exception entry (bytes; Armv7-M Architecture Reference Manual, B1.5.7):
 /// 8 words, 18 of the floating-point unit, and one for alignment.
@@ -65,7 +65,7 @@ pub enum StackError {
 
 /// Stack frame and calls of a function.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
-struct Node {
+struct FunctionFrame {
     name: String,
     /// Bytes that it pushes itself.
     frame: u32,
@@ -77,7 +77,7 @@ struct Node {
 ///
 /// # Errors
 /// [`StackError`] if functions call each other recursively or through pointers.
-pub fn stack_bound(image: &Image) -> Result<StackBound, StackError> {
+pub fn stack_bound(image: &LinkedImage) -> Result<StackBound, StackError> {
     let nodes = reachable(image)?;
     let mut levels: Vec<StackLevel> = Vec::new();
     let mut entries: Vec<(usize, u32)> = Vec::new();
@@ -96,12 +96,12 @@ pub fn stack_bound(image: &Image) -> Result<StackBound, StackError> {
     Ok(StackBound { bytes, reserved: image.stack_reserved, levels })
 }
 
-fn index_of(image: &Image, caller: &str, target: u32) -> Result<usize, StackError> {
+fn index_of(image: &LinkedImage, caller: &str, target: u32) -> Result<usize, StackError> {
     image.function_at(target).ok_or_else(|| StackError::Nowhere { function: caller.to_owned(), target })
 }
 
 /// All functions of the image; those that no handler reaches are empty.
-fn reachable(image: &Image) -> Result<Vec<Node>, StackError> {
+fn reachable(image: &LinkedImage) -> Result<Vec<FunctionFrame>, StackError> {
     let mut nodes = vec![None; image.functions.len()];
     let mut waiting = Vec::new();
     for (_, address) in &image.vectors {
@@ -118,7 +118,7 @@ fn reachable(image: &Image) -> Result<Vec<Node>, StackError> {
 }
 
 /// The effect of each instruction of a function, with its address.
-fn effects(image: &Image, index: usize) -> Vec<(u32, Effect)> {
+fn effects(image: &LinkedImage, index: usize) -> Vec<(u32, Effect)> {
     let mut effects = Vec::new();
     for code in image.code(&image.functions[index]) {
         let mut place = 0;
@@ -132,9 +132,9 @@ fn effects(image: &Image, index: usize) -> Vec<(u32, Effect)> {
     effects
 }
 
-fn node(image: &Image, index: usize) -> Result<Node, StackError> {
+fn node(image: &LinkedImage, index: usize) -> Result<FunctionFrame, StackError> {
     let name = image.functions[index].name.clone();
-    let mut node = Node { name: name.clone(), ..Node::default() };
+    let mut node = FunctionFrame { name: name.clone(), ..FunctionFrame::default() };
     let effects = effects(image, index);
     for (place, &(address, effect)) in effects.iter().enumerate() {
         match effect {
@@ -185,7 +185,7 @@ fn is_in_a_table(before: &[Effect], register: u8) -> bool {
 }
 
 /// Largest growth of the stack when its pointer becomes this register's value; `None` if unknown.
-fn growth(image: &Image, effects: &[(u32, Effect)], place: usize, register: u8) -> Option<u32> {
+fn growth(image: &LinkedImage, effects: &[(u32, Effect)], place: usize, register: u8) -> Option<u32> {
     // r7 is the frame pointer: the stack pointer returns to where it was.
     if register == 7 {
         return Some(0);
@@ -204,9 +204,9 @@ fn growth(image: &Image, effects: &[(u32, Effect)], place: usize, register: u8) 
 }
 
 /// The deepest chain of calls from a function: bytes and names.
-fn deepest(nodes: &[Node], from: usize) -> Result<(u32, Vec<String>), StackError> {
+fn deepest(nodes: &[FunctionFrame], from: usize) -> Result<(u32, Vec<String>), StackError> {
     fn walk(
-        nodes: &[Node],
+        nodes: &[FunctionFrame],
         index: usize,
         path: &mut Vec<usize>,
         known: &mut [Option<(u32, Option<usize>)>],
@@ -243,10 +243,10 @@ fn deepest(nodes: &[Node], from: usize) -> Result<(u32, Vec<String>), StackError
 
 #[cfg(test)]
 mod tests {
-    use super::{Node, StackError, deepest};
+    use super::{FunctionFrame, StackError, deepest};
 
-    fn node(name: &str, frame: u32, calls: &[usize]) -> Node {
-        Node { name: name.to_owned(), frame, calls: calls.to_vec() }
+    fn node(name: &str, frame: u32, calls: &[usize]) -> FunctionFrame {
+        FunctionFrame { name: name.to_owned(), frame, calls: calls.to_vec() }
     }
 
     #[test]

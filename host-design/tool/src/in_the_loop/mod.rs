@@ -11,6 +11,6 @@ pub use board::{
     Compared, Event, Events, RULES, Span, TickCycles, TickFigures, TooLong, VirtualBoard, measure,
 };
 pub use error::RunError;
-pub use place::{Place, run, run_compared, run_shaken};
-pub use qemu::{Emulator, EmulatorError, Link};
+pub use place::{RunPlace, run, run_compared, run_shaken};
+pub use qemu::{Emulator, EmulatorError, PinLink};
 pub use relay::{RelayError, serve};

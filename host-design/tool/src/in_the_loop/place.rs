@@ -11,11 +11,11 @@ use upright_design::table::TableValues;
 
 use super::board::{Compared, VirtualBoard};
 use super::error::RunError;
-use super::qemu::{Emulator, EmulatorError, Link};
+use super::qemu::{Emulator, EmulatorError, PinLink};
 
 /// Where the firmware runs.
 #[derive(Debug, Clone, Copy)]
-pub enum Place<'a> {
+pub enum RunPlace<'a> {
     /// In this process.
     Host,
     /// As an image in QEMU.
@@ -23,7 +23,7 @@ pub enum Place<'a> {
         /// The ELF file.
         image: &'a Path,
         /// How its pins are connected.
-        link: Link,
+        link: PinLink,
     },
     /// As the image that is flashed, on the virtual board.
     Board {
@@ -34,13 +34,13 @@ pub enum Place<'a> {
     },
 }
 
-impl Place<'_> {
+impl RunPlace<'_> {
     /// Its name, as shown to the user.
     pub fn name(self) -> &'static str {
         match self {
-            Place::Host => "this computer",
-            Place::Qemu { .. } => "QEMU",
-            Place::Board { .. } => "the virtual board",
+            RunPlace::Host => "this computer",
+            RunPlace::Qemu { .. } => "QEMU",
+            RunPlace::Board { .. } => "the virtual board",
         }
     }
 
@@ -57,9 +57,9 @@ impl Place<'_> {
         E: From<HarnessError> + From<EmulatorError>,
     {
         match self {
-            Place::Host => with_firmware(table, action)?,
-            Place::Qemu { image, link } => action(&mut Emulator::start(image, link)?),
-            Place::Board { image, conditions } => {
+            RunPlace::Host => with_firmware(table, action)?,
+            RunPlace::Qemu { image, link } => action(&mut Emulator::start(image, link)?),
+            RunPlace::Board { image, conditions } => {
                 action(&mut VirtualBoard::start(image, &conditions, table)?)
             }
         }
@@ -74,7 +74,7 @@ pub fn run(
     rig: &Rig,
     table: &TableValues,
     scenario: &Scenario,
-    place: Place<'_>,
+    place: RunPlace<'_>,
 ) -> Result<Recording, RunError> {
     place.with_target(table, |target| Ok(record(rig, table, scenario, target)?))
 }
@@ -88,7 +88,7 @@ pub fn run_shaken(
     table: &TableValues,
     duration_s: f64,
     seed: u64,
-    place: Place<'_>,
+    place: RunPlace<'_>,
 ) -> Result<Log, RunError> {
     place.with_target(table, |target| Ok(shake_with(rig, table, target, duration_s, seed)?))
 }

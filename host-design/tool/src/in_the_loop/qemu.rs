@@ -24,7 +24,7 @@ const PROGRAM: &str = "qemu-system-arm";
 
 /// How the pins of the image are connected.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Link {
+pub enum PinLink {
     /// Files of the emulator (semihosting): the image with the feature `in-the-loop`. They are FIFOs, which only Unix
     /// has.
     Files,
@@ -47,7 +47,7 @@ impl Emulator {
     ///
     /// # Errors
     /// [`EmulatorError`] if QEMU is missing, or the image is not one for the loop.
-    pub fn start(image: &Path, link: Link) -> Result<Self, EmulatorError> {
+    pub fn start(image: &Path, link: PinLink) -> Result<Self, EmulatorError> {
         let directory = tempfile::tempdir().map_err(EmulatorError::at("no directory for its files"))?;
         let mut command = Command::new(PROGRAM);
         // One instruction is one nanosecond, and idle time is skipped: the same run every time.
@@ -58,10 +58,10 @@ impl Emulator {
         command.stdin(Stdio::null()).stdout(Stdio::piped()).stderr(Stdio::piped());
         let (process, channels) = match link {
             #[cfg(unix)]
-            Link::Files => fifos::open(command, directory.path(), image)?,
+            PinLink::Files => fifos::open(command, directory.path(), image)?,
             #[cfg(not(unix))]
-            Link::Files => return Err(EmulatorError::NeedsUnix),
-            Link::Usart => serial_lines(command, image)?,
+            PinLink::Files => return Err(EmulatorError::NeedsUnix),
+            PinLink::Usart => serial_lines(command, image)?,
         };
         Ok(Self { process, channels, receiver: Receiver::new(), received: 0, _directory: directory })
     }

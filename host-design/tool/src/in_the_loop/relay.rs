@@ -10,7 +10,7 @@ use upright_design::simulate::Scenario;
 use upright_design::table::TableValues;
 
 use super::error::RunError;
-use super::place::Place;
+use super::place::RunPlace;
 use super::qemu::EmulatorError;
 
 /// Why a relay has ended early.
@@ -49,7 +49,7 @@ pub fn serve(
     rig: &Rig,
     table: &TableValues,
     scenario: &Scenario,
-    place: Place<'_>,
+    place: RunPlace<'_>,
     listener: &TcpListener,
 ) -> Result<(), RelayError> {
     place.with_target(table, |target| Relay { rig, table, scenario, listener }.run(target))

@@ -2,8 +2,6 @@
 
 use core::f64::consts::PI;
 
-use upright::table::Law;
-
 use super::number::number;
 use crate::figure::{Axis, Curve, Figure, Panel};
 use upright_design::design::Certified;
@@ -32,14 +30,14 @@ pub(super) fn figures(
     rig: &Rig,
     certified: &Certified,
     table: &TableValues,
-    laws: &[(Law, &LinearReport)],
+    reports: &[&LinearReport],
 ) -> [Vec<Figure>; 2] {
     let (mut bodes, mut nyquists) = (Vec::new(), Vec::new());
-    for &(law, report) in laws {
-        let model = LoopModel::<f64>::as_it_runs(certified, table, law);
+    for &report in reports {
+        let model = LoopModel::<f64>::as_it_runs(certified, table, report.law);
         let (Some(margins), Some(model)) = (&report.margins, model) else { continue };
         let points = sweep(&model, report, rig.tick.period_s);
-        let title = |what: &str| format!("{}: {what}, {}", rig.name, law.title());
+        let title = |what: &str| format!("{}: {what}, {}", rig.name, report.law.title());
         bodes.push(bode(&points, margins, title("Bode plot")));
         nyquists.push(nyquist(&points, margins, title("Nyquist plot")));
     }

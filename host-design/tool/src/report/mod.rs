@@ -20,6 +20,7 @@ pub use error::ReportError;
 pub use source::ReportSource;
 
 use upright::table::Law;
+use upright_design::design::DesignPoles;
 
 use self::page::ReportPage;
 pub(crate) use self::plot::Plot;
@@ -57,6 +58,10 @@ impl Picture {
         pixels(&self.svg, 2.0)
     }
 
+    fn of_law(id: &str, law: Law, figure: &Figure) -> Result<Self, FigureError> {
+        Self::of(format!("{id}-{}", law.option()), figure)
+    }
+
     fn of(name: String, figure: &Figure) -> Result<Self, FigureError> {
         Ok(Self { name, svg: figure.svg()?, csv: Some(figure.csv()?) })
     }
@@ -73,7 +78,6 @@ pub fn report(source: &ReportSource<'_>, stage: &dyn Fn(&str)) -> Result<Report,
     let mut scenes = runs::scenes(rig, &designed_poles, table, trust, source.seed)?;
     scenes.extend(source.swing_up.map(|run| runs::swing_up(rig, run, source.seed)));
     scenes.extend(source.route.map(|run| runs::route(rig, run, source.seed)));
-    let laws = runs::laws(table);
     let mut pictures = Vec::new();
     let mut page = ReportPage::new(source, &designed_poles, &scenes)?;
     if let Some(chain) = rig.chain() {
@@ -81,42 +85,22 @@ pub fn report(source: &ReportSource<'_>, stage: &dyn Fn(&str)) -> Result<Report,
         page.drawing = Some(svg.clone());
         pictures.push(Picture { name: "rig".to_owned(), svg, csv: None });
     }
-    let mut keep = |id: &str, law: Law, figure: &Figure| -> Result<(), ReportError> {
-        let law = law.option();
-        pictures.push(Picture::of(format!("{id}-{law}"), figure)?);
-        Ok(())
-    };
     stage("figures of the runs");
     for (scene, entry) in scenes.iter().zip(&mut page.scenes) {
         for (run, figure) in scene.runs.iter().zip(responses::figures(rig, scene)) {
-            keep(scene.id, run.law, &figure)?;
+            pictures.push(Picture::of_law(scene.id, run.law, &figure)?);
             entry.plots.push(Plot::over_time(&figure, format!("{}, {}", scene.name, run.law.title()))?);
         }
     }
     stage("poles and frequency");
-    let parts: Vec<_> = laws.iter().copied().zip(trust.laws.iter().map(|part| &part.linear)).collect();
-    let mut poles: Vec<Figure> =
-        parts.iter().map(|(law, part)| poles::figure(rig, &designed_poles, *law, part)).collect();
-    Figure::same_scale(&mut poles);
-    for (figure, &(law, _)) in poles.iter().zip(&parts) {
-        keep("poles", law, figure)?;
-        page.poles.push(Plot::of(figure, law.title().to_owned())?);
-    }
-    let stable: Vec<Law> = parts.iter().filter(|(_, part)| part.stable).map(|(law, _)| *law).collect();
-    let [mut bode, mut nyquist] = frequency::figures(rig, certified, table, &parts);
-    Figure::same_scale(&mut bode);
-    Figure::same_scale(&mut nyquist);
-    for (&law, (bode, nyquist)) in stable.iter().zip(bode.iter().zip(&nyquist)) {
-        keep("bode", law, bode)?;
-        page.bode.push(Plot::of(bode, format!("Bode plot, {}", law.title()))?);
-        keep("nyquist", law, nyquist)?;
-        page.nyquist.push(Plot::of(nyquist, format!("Nyquist plot, {}", law.title()))?);
-    }
-    if page.drawing.is_some() && !stable.is_empty() {
+    show_linear_loops(source, &designed_poles, &mut page, &mut pictures)?;
+    let mut stable =
+        trust.laws.iter().filter(|part| part.linear.stable).map(|part| part.linear.law).peekable();
+    if page.drawing.is_some() && stable.peek().is_some() {
         stage("region of attraction");
         for law in stable {
             let figure = region::figure(rig, table, law, source.region_points)?;
-            keep("region", law, &figure)?;
+            pictures.push(Picture::of_law("region", law, &figure)?);
             page.regions.push(Plot::of(&figure, law.title().to_owned())?);
         }
     }
@@ -127,6 +111,34 @@ pub fn report(source: &ReportSource<'_>, stage: &dyn Fn(&str)) -> Result<Report,
         show_imperfections(source, stage, &mut page, &mut pictures)?;
     }
     Ok(Report { html: page.html()?, pictures })
+}
+
+fn show_linear_loops(
+    source: &ReportSource<'_>,
+    designed: &DesignPoles,
+    page: &mut ReportPage<'_>,
+    pictures: &mut Vec<Picture>,
+) -> Result<(), ReportError> {
+    let ReportSource { rig, certified, table, trust, .. } = *source;
+    let reports: Vec<_> = trust.laws.iter().map(|part| &part.linear).collect();
+    let mut poles: Vec<Figure> = reports.iter().map(|report| poles::figure(rig, designed, report)).collect();
+    Figure::same_scale(&mut poles);
+    for (figure, report) in poles.iter().zip(&reports) {
+        pictures.push(Picture::of_law("poles", report.law, figure)?);
+        page.poles.push(Plot::of(figure, report.law.title().to_owned())?);
+    }
+    let stable = reports.iter().filter(|report| report.stable);
+    let [mut bode, mut nyquist] = frequency::figures(rig, certified, table, &reports);
+    Figure::same_scale(&mut bode);
+    Figure::same_scale(&mut nyquist);
+    for (report, (bode, nyquist)) in stable.zip(bode.iter().zip(&nyquist)) {
+        let law = report.law;
+        pictures.push(Picture::of_law("bode", law, bode)?);
+        page.bode.push(Plot::of(bode, format!("Bode plot, {}", law.title()))?);
+        pictures.push(Picture::of_law("nyquist", law, nyquist)?);
+        page.nyquist.push(Plot::of(nyquist, format!("Nyquist plot, {}", law.title()))?);
+    }
+    Ok(())
 }
 
 fn show_margins(

@@ -1,15 +1,13 @@
 //! Pole plots.
 
-use upright::table::Law;
-
 use crate::figure::{Axis, Curve, Figure, Panel};
 use upright_design::design::DesignPoles;
 use upright_design::rig::Rig;
 use upright_design::verify::LinearReport;
 
 /// The poles in the z-plane with the unit circle, and in the s-plane.
-pub(super) fn figure(rig: &Rig, designed: &DesignPoles, law: Law, report: &LinearReport) -> Figure {
-    let [continuous, sampled] = designed.in_table(law);
+pub(super) fn figure(rig: &Rig, designed: &DesignPoles, report: &LinearReport) -> Figure {
+    let [continuous, sampled] = designed.in_table(report.law);
     let points = |poles: Option<&Vec<[f64; 2]>>| poles.cloned().unwrap_or_default();
     let tick = rig.tick.period_s;
     // s = ln z / T; a pole at z = 0 has no place in the s-plane.
@@ -25,5 +23,5 @@ pub(super) fn figure(rig: &Rig, designed: &DesignPoles, law: Law, report: &Linea
         .with(Curve::limit("", vec![[0.0, -1e9], [0.0, 1e9]]))
         .with(Curve::markers("designed for continuous time", 0, points(continuous)))
         .with(Curve::markers("whole loop, ln z / T", 1, report.poles.iter().map(to_s).collect()));
-    Figure::narrow(format!("{}: poles, {}", rig.name, law.title())).with(z).with(s)
+    Figure::narrow(format!("{}: poles, {}", rig.name, report.law.title())).with(z).with(s)
 }

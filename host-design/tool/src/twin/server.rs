@@ -16,7 +16,7 @@ use super::greeting::greeting;
 use super::property::Properties;
 use super::simulated::{RunEnd, SimulatedMachine};
 use crate::campaign::{Defect, kinds};
-use crate::in_the_loop::{EmulatorError, Place, RunError};
+use crate::in_the_loop::{EmulatorError, RunError, RunPlace};
 use crate::monitor::{Monitor, SerialLine};
 
 /// Most connections at a time, including those that have not been let in yet.
@@ -86,7 +86,7 @@ impl Server {
     pub fn simulate(
         self,
         machine: SimulatedMachine<'_>,
-        place: Place<'_>,
+        place: RunPlace<'_>,
         upright: bool,
         goes_on: &dyn Fn() -> bool,
     ) -> Result<(), TwinError> {
@@ -97,7 +97,7 @@ impl Server {
         let _accepting = accepting(self.listener, self.secret, viewers.clone(), Arc::clone(&self.recording))?;
         let monitor = || match place {
             // Its serial line carries no more than the usual rate.
-            Place::Board { .. } => Monitor::new(&rig.name),
+            RunPlace::Board { .. } => Monitor::new(&rig.name),
             _ => Monitor::with_telemetry_every(TELEMETRY_S, &rig.name),
         };
         let mut dispatcher = Dispatcher::new(monitor(), (viewers, events), self.recording);

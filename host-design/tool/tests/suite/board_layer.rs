@@ -3,87 +3,22 @@
 use std::ops::Range;
 
 use upright::board::Contacts;
-use upright::gains::{SENSORS, STATES, TABLE, TICK_S};
-use upright::protocol::frame::{self, Receiver};
-use upright::protocol::message::{
-    Answer, Command, CrashRecord, Info, Message, Reply, Request, Reset, Telemetry,
-};
+use upright::gains::{TABLE, TICK_S};
+use upright::protocol::message::{Answer, CrashRecord, Info, Reply, Request, Reset};
 use upright::supervision::fault::Fault;
 use upright::supervision::inhibits::Inhibits;
 use upright::supervision::supervisor::State;
 use upright_board::{
-    Board as VirtualBoard, Chip, Conditions, Crystal, Image, Input, Rules, Wire, pin, seconds,
+    Chip, Conditions, Crystal, ExternalLevel, Image, Input, Rules, SimulatedBoard, pin, seconds,
 };
-use upright_tool::image::{Board, Kind, flash_checksum};
+use upright_tool::image::{BoardName, ImageKind, flash_checksum};
 use upright_tool::monitor::Monitor;
 
 use crate::equipment::built;
+use crate::powered::{BAUD, Powered, image};
 
-const BAUD: u32 = 460_800;
 const TIM1: u32 = 0x4001_0000;
 const RCC_CR: u32 = 0x4002_3800;
-
-/// The image; none without a compiler.
-fn image() -> Option<Image> {
-    let elf = built(Kind::Board(Board::WeactF405))?;
-    Some(Image::from_elf(&std::fs::read(elf).unwrap()).unwrap())
-}
-
-/// A board with all contacts closed and the motor's supply on.
-struct Powered {
-    board: VirtualBoard,
-    frames: Receiver<512>,
-    telemetry: Vec<Telemetry<STATES, SENSORS>>,
-    replies: Vec<Reply>,
-}
-
-impl Powered {
-    fn with(image: &Image, conditions: &Conditions, rules: Rules) -> Self {
-        let mut board = VirtualBoard::power_on(image, conditions, rules).unwrap();
-        let [low, high] = conditions.wiring.limits;
-        for contact in [conditions.wiring.emergency_stop, low, high] {
-            board.apply(Input::Level(contact, Wire::Low));
-        }
-        board.apply(Input::Supply(24.0));
-        Self { board, frames: Receiver::new(), telemetry: Vec::new(), replies: Vec::new() }
-    }
-
-    fn strict(image: &Image, conditions: &Conditions) -> Self {
-        Self::with(image, conditions, Rules::STRICT)
-    }
-
-    /// Runs to this time after power-on, and reads what the board sends. Checks the baud rate: a byte with another bit
-    /// time could not be read.
-    fn run(&mut self, time_s: f64) {
-        self.board.run_until(seconds(time_s)).unwrap();
-        for byte in self.board.sent() {
-            let baud = seconds(1.0) as f64 / byte.bit as f64;
-            assert!((baud / f64::from(BAUD) - 1.0).abs() < 0.03, "{baud} baud");
-            match self.frames.push::<Message<STATES, SENSORS>>(byte.value) {
-                Some(Ok(Message::Telemetry(telemetry))) => self.telemetry.push(telemetry),
-                Some(Ok(Message::Reply(reply))) => self.replies.push(reply),
-                Some(Ok(Message::Log(_))) => panic!("nobody has asked for a log"),
-                Some(Err(error)) => panic!("{error:?}"),
-                None => {}
-            }
-        }
-    }
-
-    fn ask(&mut self, id: u64, request: Request) {
-        let (mut scratch, mut out) = ([0; 64], [0; 64]);
-        let frame = frame::encode(&Command { id, request }, &mut scratch, &mut out).unwrap();
-        self.board.send(frame, BAUD);
-    }
-
-    /// Time since power-on (s).
-    fn seconds(&self) -> f64 {
-        self.board.now() as f64 / seconds(1.0) as f64
-    }
-
-    fn last(&self) -> (State, Option<Fault>) {
-        self.telemetry.last().map(|telemetry| (telemetry.state, telemetry.fault)).expect("telemetry")
-    }
-}
 
 fn with_crystal(hz: u32, hsi_hz: u32) -> Conditions {
     let mut conditions = Conditions { hsi_hz, ..Conditions::f405(3) };
@@ -176,16 +111,16 @@ fn another_chip_is_noticed() {
 }
 
 /// Address of the table's first gain in flash, among the initial values of variables.
-fn first_gain(board: &VirtualBoard) -> u32 {
+fn first_gain(board: &SimulatedBoard) -> u32 {
     gain_within(board, 0x0800_0000..0x0801_0000)
 }
 
 /// Address in RAM of the first gain that the image uses.
-fn first_gain_in_use(board: &VirtualBoard) -> u32 {
+fn first_gain_in_use(board: &SimulatedBoard) -> u32 {
     gain_within(board, 0x2000_1400..0x2000_3000)
 }
 
-fn gain_within(board: &VirtualBoard, addresses: Range<u32>) -> u32 {
+fn gain_within(board: &SimulatedBoard, addresses: Range<u32>) -> u32 {
     let gains: Vec<u32> =
         TABLE.laws.lqr.as_ref().unwrap().k.iter().take(3).map(|gain| gain.to_bits()).collect();
     let here = |at: &u32| (0..3).all(|i| board.word(at + 4 * i) == Some(gains[i as usize]));
@@ -328,12 +263,12 @@ fn a_pin_shows_the_tick() {
 #[test]
 fn every_board_starts_with_its_own_chip_clock_and_led_and_with_no_other() {
     for (board, led, is_low) in [
-        (Board::WeactF405, pin('B', 2), false),
-        (Board::OlimexH405, pin('C', 12), true),
-        (Board::DiscoveryF407, pin('D', 12), false),
-        (Board::NucleoF446, pin('A', 5), false),
+        (BoardName::WeactF405, pin('B', 2), false),
+        (BoardName::OlimexH405, pin('C', 12), true),
+        (BoardName::DiscoveryF407, pin('D', 12), false),
+        (BoardName::NucleoF446, pin('A', 5), false),
     ] {
-        let Some(elf) = built(Kind::Board(board)) else { return };
+        let Some(elf) = built(ImageKind::Board(board)) else { return };
         let image = Image::from_elf(&std::fs::read(elf).unwrap()).unwrap();
         let started = |conditions: &Conditions| {
             let mut run = Powered::strict(&image, conditions);
@@ -342,7 +277,7 @@ fn every_board_starts_with_its_own_chip_clock_and_led_and_with_no_other() {
         };
         let own = board.conditions(1);
         assert_eq!(started(&own), ((State::Disarmed, None), true, 168_000_000), "{board}");
-        if board == Board::NucleoF446 {
+        if board == BoardName::NucleoF446 {
             // MB1136 C-01 with a crystal fitted, and as it comes: without any clock.
             let crystal = Crystal { is_clock_input: false, ..own.crystal };
             let fitted = Conditions { crystal, ..own };
@@ -350,7 +285,7 @@ fn every_board_starts_with_its_own_chip_clock_and_led_and_with_no_other() {
             let bare = Conditions { crystal: Crystal { hz: 0, ..crystal }, ..own };
             assert_eq!(started(&bare), ((State::Fault, Some(Fault::Clock)), false, 16_000_000));
         }
-        if board == Board::DiscoveryF407 {
+        if board == BoardName::DiscoveryF407 {
             // It runs from 3.0 V at most; the first revision of its chip has another identity.
             for other in [Conditions { chip_v: 2.8, ..own }, Conditions { chip: Chip::F407RevisionA, ..own }]
             {
@@ -380,10 +315,10 @@ fn contacts_supply_and_the_longest_tick_are_reported_with_the_motor_off() {
         (pin('B', 12), Contacts { emergency_stop: true, ..Contacts::default() }),
     ] {
         // An open wire: the internal pull-up pulls it high.
-        run.board.apply(Input::Level(wire, Wire::Open));
+        run.board.apply(Input::Level(wire, ExternalLevel::Open));
         run.run(run.seconds() + 0.05);
         assert_eq!(run.telemetry.last().unwrap().contacts, expected);
-        run.board.apply(Input::Level(wire, Wire::Low));
+        run.board.apply(Input::Level(wire, ExternalLevel::Low));
     }
     run.board.apply(Input::Supply(11.0));
     run.run(run.seconds() + 0.05);

@@ -6,14 +6,14 @@ use upright_design::rig::Rig;
 use upright_design::study::Study;
 use upright_design::table::TableValues;
 use upright_tool::campaign::{Campaign, Defect, During, Setup, Trial, campaign, feed, kinds, one};
-use upright_tool::image::{self, Board};
-use upright_tool::in_the_loop::Place;
+use upright_tool::image::{self, BoardName};
+use upright_tool::in_the_loop::RunPlace;
 
 use crate::equipment::built;
 use crate::published::rig_and_table;
 
 fn on_host<'a>(rig: &'a Rig, table: &'a TableValues) -> Setup<'a> {
-    Setup { rig, table, place: Place::Host, detection: true, guards: true, during: During::Balancing }
+    Setup { rig, table, place: RunPlace::Host, detection: true, guards: true, during: During::Balancing }
 }
 
 fn run(setup: &Setup<'_>, kinds: &[Defect], runs: u64) -> Campaign {
@@ -24,7 +24,7 @@ fn run(setup: &Setup<'_>, kinds: &[Defect], runs: u64) -> Campaign {
 fn every_defect_is_found_and_nothing_else() {
     for name in ["quadruple-paper", "single-quanser-ip02"] {
         let (rig, table) = rig_and_table(name);
-        let kinds = kinds(table, Place::Host);
+        let kinds = kinds(table, RunPlace::Host);
         let result = run(&on_host(rig, table), &kinds, 5 * kinds.len() as u64);
         for row in &result.rows {
             assert!(row.wrong.is_empty() && row.runs == 5, "{name}: {row:?}");
@@ -36,7 +36,7 @@ fn every_defect_is_found_and_nothing_else() {
 fn without_detection_every_defect_that_needs_it_is_missed() {
     let (rig, table) = rig_and_table("quadruple-paper");
     let kinds: Vec<Defect> =
-        kinds(table, Place::Host).into_iter().filter(|kind| kind.needs_detection()).collect();
+        kinds(table, RunPlace::Host).into_iter().filter(|kind| kind.needs_detection()).collect();
     let blind = Setup { detection: false, ..on_host(rig, table) };
     let result = run(&blind, &kinds, 4 * kinds.len() as u64);
     for row in &result.rows {
@@ -45,7 +45,7 @@ fn without_detection_every_defect_that_needs_it_is_missed() {
 }
 
 /// The kinds of defects that prove something during a jog.
-fn while_jogging(table: &TableValues, place: Place<'_>) -> Vec<Defect> {
+fn while_jogging(table: &TableValues, place: RunPlace<'_>) -> Vec<Defect> {
     kinds(table, place).into_iter().filter(|kind| kind.while_jogging().is_some()).collect()
 }
 
@@ -53,7 +53,7 @@ fn while_jogging(table: &TableValues, place: Place<'_>) -> Vec<Defect> {
 fn every_defect_of_a_jog_is_found_and_nothing_else() {
     for name in ["quadruple-paper", "single-quanser-ip02"] {
         let (rig, table) = rig_and_table(name);
-        let kinds = while_jogging(table, Place::Host);
+        let kinds = while_jogging(table, RunPlace::Host);
         let setup = Setup { during: During::Jog, ..on_host(rig, table) };
         let result = run(&setup, &kinds, 3 * kinds.len() as u64);
         for row in &result.rows {
@@ -72,9 +72,9 @@ fn every_defect_of_a_jog_is_found_and_nothing_else() {
 #[test]
 fn on_the_virtual_board_a_jog_ends_with_its_defects_and_does_not_without_the_guards() {
     let (rig, table) = rig_and_table("quadruple-paper");
-    let Some(elf) = built(image::Kind::Board(Board::WeactF405)) else { return };
+    let Some(elf) = built(image::ImageKind::Board(BoardName::WeactF405)) else { return };
     let image = Image::from_elf(&std::fs::read(elf).unwrap()).unwrap();
-    let place = Place::Board { image: &image, conditions: Conditions::f405(1) };
+    let place = RunPlace::Board { image: &image, conditions: Conditions::f405(1) };
     let setup = Setup { place, during: During::Jog, ..on_host(rig, table) };
     let kinds = while_jogging(table, place);
     for row in run(&setup, &kinds, kinds.len() as u64).rows {
@@ -96,7 +96,7 @@ fn every_defect_of_a_rig_that_is_shaken_is_found_and_nothing_else() {
         let during = During::Shaking(&forces);
         let setup = Setup { during, ..on_host(rig, table) };
         let kinds: Vec<Defect> =
-            kinds(table, Place::Host).into_iter().filter(|&kind| during.is_proof(kind)).collect();
+            kinds(table, RunPlace::Host).into_iter().filter(|&kind| during.is_proof(kind)).collect();
         for row in &run(&setup, &kinds, 2 * kinds.len() as u64).rows {
             assert!(row.wrong.is_empty() && row.runs == 2, "{name}: {row:?}");
         }

@@ -1,11 +1,11 @@
 //! What a tick of the flashed image costs, on the virtual board.
 
 use upright::table::Law;
-use upright_board::{Board as VirtualBoard, Conditions, Image, Rules};
+use upright_board::{Conditions, Image, Rules, SimulatedBoard};
 use upright_design::rig::Rig;
 use upright_design::simulate::Scenario;
 use upright_design::table::TableValues;
-use upright_tool::image::{Board, Kind};
+use upright_tool::image::{BoardName, ImageKind};
 use upright_tool::in_the_loop::{Span, TickCycles, measure};
 
 use crate::equipment::built;
@@ -56,7 +56,7 @@ fn beyond(cycles: &TickCycles) -> Vec<&'static str> {
 fn slower(image: &Image, turns: u8) -> Image {
     const SYS_TICK: u32 = 0x0800_0000 + 4 * 15;
     const DIVIDE: [u16; 2] = [0xfbb1, 0xf3f2]; // udiv r3, r1, r2
-    let board = VirtualBoard::power_on(image, &Conditions::f405(1), Rules::STRICT).unwrap();
+    let board = SimulatedBoard::power_on(image, &Conditions::f405(1), Rules::STRICT).unwrap();
     let handler = board.word(SYS_TICK).unwrap();
     let at = (0x0800_0000 + image.end() as u32).next_multiple_of(16);
     let mut half_words = vec![
@@ -80,7 +80,7 @@ fn slower(image: &Image, turns: u8) -> Image {
 
 #[test]
 fn the_ticks_of_the_image_stay_within_their_limits_and_those_of_a_slower_one_do_not() {
-    let Some(elf) = built(Kind::Board(Board::WeactF405)) else { return };
+    let Some(elf) = built(ImageKind::Board(BoardName::WeactF405)) else { return };
     let image = Image::from_elf(&std::fs::read(elf).unwrap()).unwrap();
     let (rig, table) = rig_and_table("quadruple-paper").clone();
     let measured = |image: &Image| measured(&rig, &table, image);

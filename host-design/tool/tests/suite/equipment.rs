@@ -4,22 +4,22 @@ use std::path::PathBuf;
 
 use upright_design::rig::Rig;
 use upright_design::table::TableValues;
-use upright_tool::image::{ImageError, Kind, build, build_for};
+use upright_tool::image::{BuildError, ImageKind, build, build_for};
 
 pub(crate) use upright_test_support::equipment::{in_qemu, is_required, not_exercised};
 
 /// What was built or found; `None` if it needs the missing compiler for the image. `what` it is for.
-pub(crate) fn if_possible<T>(result: Result<T, ImageError>, what: &str) -> Option<T> {
-    let is_missing = |error: &ImageError| matches!(error, ImageError::NoCompiler);
+pub(crate) fn if_possible<T>(result: Result<T, BuildError>, what: &str) -> Option<T> {
+    let is_missing = |error: &BuildError| matches!(error, BuildError::NoCompiler);
     upright_test_support::equipment::if_possible(result, is_missing, what)
 }
 
 /// The image with the committed gain table.
-pub(crate) fn built(kind: Kind) -> Option<PathBuf> {
+pub(crate) fn built(kind: ImageKind) -> Option<PathBuf> {
     if_possible(build(kind), "an image")
 }
 
 /// The image with this table.
-pub(crate) fn built_for(kind: Kind, rig: &Rig, table: &TableValues) -> Option<PathBuf> {
+pub(crate) fn built_for(kind: ImageKind, rig: &Rig, table: &TableValues) -> Option<PathBuf> {
     if_possible(build_for(kind, rig, table), "an image")
 }

@@ -9,14 +9,14 @@ use std::sync::mpsc::{self, RecvTimeoutError};
 use std::time::{Duration, Instant};
 
 use serde_json::Value;
-use upright_tool::image::{Image, Kind, StackError, forbidden_functions, size, stack_bound};
+use upright_tool::image::{ImageKind, LinkedImage, StackError, forbidden_functions, size, stack_bound};
 
 use crate::equipment::built;
 
 /// Path of the image for the emulator; `None` without a compiler for it.
 fn path_in_the_loop() -> Option<&'static Path> {
     static PATH: OnceLock<Option<PathBuf>> = OnceLock::new();
-    PATH.get_or_init(|| built(Kind::InTheLoop)).as_deref()
+    PATH.get_or_init(|| built(ImageKind::InTheLoop)).as_deref()
 }
 
 fn upright(arguments: &[&str]) -> Output {
@@ -35,12 +35,12 @@ fn an_image_waits_for_the_one_that_is_being_compiled() {
     let Some(path) = path_in_the_loop() else { return };
     // Several times as long as for an image that does not wait and has been compiled before.
     let begin = Instant::now();
-    built(Kind::InTheLoop);
+    built(ImageKind::InTheLoop);
     let patience = (4 * begin.elapsed()).min(Duration::from_secs(3));
     let other = File::create(path.with_file_name("compiling")).unwrap();
     other.lock().unwrap();
     let (done, is_done) = mpsc::channel();
-    let builder = std::thread::spawn(move || done.send(built(Kind::InTheLoop)).unwrap());
+    let builder = std::thread::spawn(move || done.send(built(ImageKind::InTheLoop)).unwrap());
     assert_eq!(is_done.recv_timeout(patience), Err(RecvTimeoutError::Timeout));
     other.unlock().unwrap();
     assert_eq!(is_done.recv().unwrap().as_deref(), Some(path));
@@ -50,7 +50,7 @@ fn an_image_waits_for_the_one_that_is_being_compiled() {
 #[test]
 fn a_panic_is_found() {
     let Some(path) = path_in_the_loop() else { return };
-    let image = Image::read(path).unwrap();
+    let image = LinkedImage::read(path).unwrap();
     let found = forbidden_functions(&image);
     assert!(found.contains(&"core::panicking::panic_fmt"), "{found:?}");
 }
@@ -58,7 +58,7 @@ fn a_panic_is_found() {
 #[test]
 fn a_recursion_has_no_bound_on_the_stack() {
     let Some(path) = path_in_the_loop() else { return };
-    let image = Image::read(path).unwrap();
+    let image = LinkedImage::read(path).unwrap();
     match stack_bound(&image) {
         Err(StackError::Recursion(name)) => assert!(name.ends_with("::dig"), "{name}"),
         other => panic!("{other:?}"),
@@ -68,9 +68,9 @@ fn a_recursion_has_no_bound_on_the_stack() {
 #[test]
 fn each_byte_is_counted_once() {
     let Some(path) = path_in_the_loop() else { return };
-    let image = Image::read(path).unwrap();
+    let image = LinkedImage::read(path).unwrap();
     let size = size(&image).unwrap();
-    let sum = |parts: &[upright_tool::image::Part]| {
+    let sum = |parts: &[upright_tool::image::ImagePart]| {
         parts.iter().fold((0, 0), |(flash, ram), part| (flash + part.flash, ram + part.ram))
     };
     assert_eq!(sum(&size.sections), (size.flash, size.ram));

@@ -16,8 +16,8 @@ use upright_board::{Conditions, Image};
 use upright_design::client::AnyTelemetry;
 use upright_design::harness::Harness;
 use upright_design::simulate::Scenario;
-use upright_tool::image::{Board, Kind};
-use upright_tool::in_the_loop::{Link, Place, RunError};
+use upright_tool::image::{BoardName, ImageKind};
+use upright_tool::in_the_loop::{PinLink, RunError, RunPlace};
 
 use crate::equipment::{built, in_qemu};
 use crate::published::rig_and_table;
@@ -131,7 +131,7 @@ impl Person<'_, '_> {
 }
 
 /// Runs `test` on a rig that is homed, with signs checked and links hanging. Returns all telemetry.
-fn at_the_bench(place: Place<'_>, test: impl FnOnce(&mut Person<'_, '_>)) -> Vec<AnyTelemetry> {
+fn at_the_bench(place: RunPlace<'_>, test: impl FnOnce(&mut Person<'_, '_>)) -> Vec<AnyTelemetry> {
     let (rig, table) = rig_and_table("quadruple-paper");
     let scenario = Scenario::at_rest(rig, Law::Lqr);
     let run = place.with_target(table, |target| -> Result<_, RunError> {
@@ -200,7 +200,7 @@ fn whole_check(person: &mut Person<'_, '_>) {
 
 #[test]
 fn on_the_host_the_motor_moves_the_cart_a_little_while_a_key_is_held() {
-    let telemetry = at_the_bench(Place::Host, whole_check);
+    let telemetry = at_the_bench(RunPlace::Host, whole_check);
     let driving = telemetry.iter().filter(|telemetry| telemetry.state == State::Jogging);
     // Never with more than a tenth of the force limit of 20 N, and up to it.
     let most = driving.map(|telemetry| telemetry.applied_n.abs()).fold(0.0, f32::max);
@@ -209,12 +209,12 @@ fn on_the_host_the_motor_moves_the_cart_a_little_while_a_key_is_held() {
 
 #[test]
 fn the_image_in_qemu_does_it_with_the_bits_of_the_host() {
-    let Some(image) = in_qemu(built(Kind::InTheLoop)) else { return };
-    let host = at_the_bench(Place::Host, whole_check);
-    let qemu = at_the_bench(Place::Qemu { image: &image, link: Link::Files }, whole_check);
+    let Some(image) = in_qemu(built(ImageKind::InTheLoop)) else { return };
+    let host = at_the_bench(RunPlace::Host, whole_check);
+    let qemu = at_the_bench(RunPlace::Qemu { image: &image, link: PinLink::Files }, whole_check);
     assert!(host == qemu);
     // Negative control: the comparison sees a key that is pressed once more.
-    let once_more = at_the_bench(Place::Host, |person| {
+    let once_more = at_the_bench(RunPlace::Host, |person| {
         whole_check(person);
         person.push(ALONG, 1);
     });
@@ -223,9 +223,9 @@ fn the_image_in_qemu_does_it_with_the_bits_of_the_host() {
 
 #[test]
 fn the_flashed_image_does_it_on_the_virtual_board() {
-    let Some(elf) = built(Kind::Board(Board::WeactF405)) else { return };
+    let Some(elf) = built(ImageKind::Board(BoardName::WeactF405)) else { return };
     let image = Image::from_elf(&std::fs::read(Path::new(&elf)).unwrap()).unwrap();
-    at_the_bench(Place::Board { image: &image, conditions: Conditions::f405(1) }, whole_check);
+    at_the_bench(RunPlace::Board { image: &image, conditions: Conditions::f405(1) }, whole_check);
 }
 
 #[test]
@@ -239,7 +239,7 @@ fn every_contact_ends_it_at_once() {
         (|contacts| contacts.clock_fault = true, Fault::Clock),
         (|contacts| contacts.board_fault = true, Fault::Board),
     ];
-    at_the_bench(Place::Host, |person| {
+    at_the_bench(RunPlace::Host, |person| {
         for (open, fault) in cases {
             person.tick(Some(ALONG));
             person.wait(30);
@@ -263,7 +263,7 @@ fn every_contact_ends_it_at_once() {
 
 #[test]
 fn it_is_refused_when_links_swing_and_at_an_end_of_the_rail() {
-    at_the_bench(Place::Host, |person| {
+    at_the_bench(RunPlace::Host, |person| {
         let place = |person: &mut Person<'_, '_>, index: usize, position: f64| {
             let mut state = person.hanging.clone();
             state[index] = position;

@@ -21,6 +21,7 @@ mod monitor;
 mod observer_design;
 mod paper;
 mod paper_matrices;
+mod powered;
 mod report_browser;
 mod report_command;
 mod report_devtools;

@@ -30,7 +30,7 @@ use upright_design::design::design;
 use upright_design::rig::Rig;
 use upright_design::simulate::Scenario;
 use upright_design::table::{Gains, TableValues};
-use upright_tool::in_the_loop::{Place, serve};
+use upright_tool::in_the_loop::{RunPlace, serve};
 use upright_tool::monitor::{Ended, Monitor, action, view};
 
 const NOW: Duration = Duration::from_secs(1_800_000_000);
@@ -321,7 +321,7 @@ fn monitored(said: &str) -> Vec<Value> {
     let port = format!("tcp:{}", listener.local_addr().unwrap());
     let server = std::thread::spawn(move || {
         let scenario = Scenario { duration_s: 4.0, ..Scenario::at_rest(&rig, Law::Lqr) };
-        serve(&rig, &table, &scenario, Place::Host, &listener)
+        serve(&rig, &table, &scenario, RunPlace::Host, &listener)
     });
     let mut monitor = Command::new(env!("CARGO_BIN_EXE_upright"))
         .args(["firmware", "monitor", &port, "--json", "--duration", "3"])

@@ -3,8 +3,8 @@
 use upright::gains::{SENSORS, STATES};
 use upright::protocol::frame::{self, Receiver};
 use upright::protocol::message::{Command, Message, Request};
-use upright_board::{Board as VirtualBoard, Conditions, Image, Input, Rules, seconds};
-use upright_tool::image::{Board, Kind};
+use upright_board::{Conditions, Image, Input, Rules, SimulatedBoard, seconds};
+use upright_tool::image::{BoardName, ImageKind};
 
 use crate::equipment::built;
 
@@ -12,7 +12,7 @@ const BAUD: u32 = 460_800;
 
 /// Identifiers of the commands that are answered within 50 ms each: 1 before the line is disturbed, 2 and 3 after it.
 fn answered(image: &Image, disturbance: Option<Input>) -> Vec<u64> {
-    let mut board = VirtualBoard::power_on(image, &Conditions::f405(1), Rules::STRICT).unwrap();
+    let mut board = SimulatedBoard::power_on(image, &Conditions::f405(1), Rules::STRICT).unwrap();
     let (mut frames, mut answered) = (Receiver::<512>::new(), Vec::new());
     board.run_until(seconds(0.1)).unwrap();
     for id in 1..=3 {
@@ -36,7 +36,7 @@ fn answered(image: &Image, disturbance: Option<Input>) -> Vec<u64> {
 
 #[test]
 fn an_overrun_or_a_dma_error_does_not_make_the_board_deaf() {
-    let Some(elf) = built(Kind::Board(Board::WeactF405)) else { return };
+    let Some(elf) = built(ImageKind::Board(BoardName::WeactF405)) else { return };
     let image = Image::from_elf(&std::fs::read(elf).unwrap()).unwrap();
     for disturbance in [None, Some(Input::Overrun), Some(Input::ReceiveError)] {
         assert_eq!(answered(&image, disturbance), [1, 2, 3], "{disturbance:?}");

@@ -13,7 +13,7 @@ use upright::table::Law;
 use upright_design::design::design;
 use upright_design::harness::{Harness, HarnessError, Pins, Target, with_firmware};
 use upright_design::identify::{
-    Feed, Kind as Parameter, LineError, Log, OverLine, Settings, ShakeError, Shaken, checked_and_hanging,
+    Feed, LineError, Log, OverLine, ParameterKind, Settings, ShakeError, Shaken, checked_and_hanging,
     identify,
 };
 use upright_design::plant::ChainParameters;
@@ -21,8 +21,8 @@ use upright_design::reality::real_chain;
 use upright_design::rig::Rig;
 use upright_design::simulate::Scenario;
 use upright_design::table::{Gains, TableValues};
-use upright_tool::image::Kind;
-use upright_tool::in_the_loop::{Link, Place, run_shaken};
+use upright_tool::image::ImageKind;
+use upright_tool::in_the_loop::{PinLink, RunPlace, run_shaken};
 
 use crate::equipment::{built_for, in_qemu};
 use crate::published::{rig_and_table, rig_and_table_with_motions};
@@ -50,7 +50,7 @@ fn the_log_of_the_firmware_gives_the_parameters_of_the_machine() {
     let machine = Rig::from_toml(&text, &path).unwrap();
     let table = TableValues::of(&machine, &design(&machine).unwrap(), Gains::Sampled).unwrap();
     let (file, _) = double();
-    let log = run_shaken(&machine, &table, 15.0, 3, Place::Host).unwrap();
+    let log = run_shaken(&machine, &table, 15.0, 3, RunPlace::Host).unwrap();
     assert_eq!(log.lost(), 0);
     assert!(log.ticks().iter().any(|tick| tick.drive == OFF), "the motor goes off at the end");
     let settings = Settings { trust_wiring: true, ..Settings::default() };
@@ -59,7 +59,7 @@ fn the_log_of_the_firmware_gives_the_parameters_of_the_machine() {
     let chain = machine.chain().unwrap();
     let real = real_chain(chain, &machine.reality.parameters);
     let constants = ChainParameters::<f64>::of(&real);
-    let close = |kind: Parameter, wanted: f64| {
+    let close = |kind: ParameterKind, wanted: f64| {
         let estimate = found.estimate(kind).unwrap();
         let error = (estimate.new - wanted).abs();
         assert!(
@@ -69,12 +69,12 @@ fn the_log_of_the_firmware_gives_the_parameters_of_the_machine() {
         );
         assert!(estimate.deviation < 0.02 * wanted.abs().max(0.05), "{estimate:?}");
     };
-    close(Parameter::TotalMass, constants.total_mass);
-    close(Parameter::Length(0), real.links[0].length_m);
+    close(ParameterKind::TotalMass, constants.total_mass);
+    close(ParameterKind::Length(0), real.links[0].length_m);
     for joint in 0..2 {
-        close(Parameter::FirstMoment(joint), constants.a[joint]);
-        close(Parameter::SecondMoment(joint), constants.b[(joint, joint)]);
-        close(Parameter::Zero(joint), machine.reality.sensors.homing_error_rad.of(joint));
+        close(ParameterKind::FirstMoment(joint), constants.a[joint]);
+        close(ParameterKind::SecondMoment(joint), constants.b[(joint, joint)]);
+        close(ParameterKind::Zero(joint), machine.reality.sensors.homing_error_rad.of(joint));
     }
 }
 
@@ -82,12 +82,12 @@ fn the_log_of_the_firmware_gives_the_parameters_of_the_machine() {
 fn the_image_in_qemu_logs_the_ticks_of_the_host() {
     // With its motions, so that this test and the swing-up in QEMU share one image.
     let (machine, table) = rig_and_table_with_motions("single-quanser-ip02").clone();
-    let Some(image) = in_qemu(built_for(Kind::InTheLoop, &machine, &table)) else { return };
-    let log = |seed: u64, place: Place<'_>| run_shaken(&machine, &table, 3.0, seed, place).unwrap();
-    let qemu = log(1, Place::Qemu { image: Path::new(&image), link: Link::Files });
-    assert!(qemu.ticks().len() > 2_000 && qemu == log(1, Place::Host));
+    let Some(image) = in_qemu(built_for(ImageKind::InTheLoop, &machine, &table)) else { return };
+    let log = |seed: u64, place: RunPlace<'_>| run_shaken(&machine, &table, 3.0, seed, place).unwrap();
+    let qemu = log(1, RunPlace::Qemu { image: Path::new(&image), link: PinLink::Files });
+    assert!(qemu.ticks().len() > 2_000 && qemu == log(1, RunPlace::Host));
     // Negative control: other phases give another log.
-    assert!(qemu != log(2, Place::Host));
+    assert!(qemu != log(2, RunPlace::Host));
 }
 
 /// A defect of the inputs: changes what the firmware reads, given its inputs before the defect and the ticks since

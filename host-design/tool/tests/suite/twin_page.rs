@@ -160,34 +160,7 @@ fn a_link_that_is_pulled_comes_back_and_one_that_is_pulled_too_far_is_a_fault_th
 
     // Caught and calibrated by hand, raised and armed with keys alone: a fault of an encoder or of the motor loses the
     // positions and the signs.
-    set_speed(&mut browser, FASTEST);
-    browser.key("j");
-    until(&mut browser, &format!("{MACHINE}.holding === 'hanging'"));
-    until(
-        &mut browser,
-        &format!("Math.abs({MACHINE}.state[0]) < 1e-9 && Math.abs(Math.cos({MACHINE}.state[2]) + 1) < 1e-9"),
-    );
-    browser.key("c");
-    until(&mut browser, &format!("({STATE}) !== 'Fault'"));
-    until_done(&mut browser, "h", &format!("({STATE}) === 'Calibrated'"));
-    if browser.value("upright.seen.telemetry.against_arming.join().includes('signs')") == true {
-        until_done(&mut browser, "g", "upright.seen.telemetry.now !== null");
-        browser.key("k");
-        until(&mut browser, "!upright.seen.telemetry.against_arming.join().includes('signs')");
-    }
-    // The page sends a held key again in real time.
-    set_speed(&mut browser, 1.0);
-    let sign_is_known = "!upright.seen.telemetry.against_arming.join().includes('motor')";
-    for _ in 0..10 {
-        if browser.value(sign_is_known) == true {
-            break;
-        }
-        // A key that is held until the motor has moved the cart.
-        browser.value("document.dispatchEvent(new KeyboardEvent('keydown', { key: 'm' }))");
-        comes_within(&mut browser, 1.0, sign_is_known);
-        browser.value("document.dispatchEvent(new KeyboardEvent('keyup', { key: 'm' }))");
-        comes_within(&mut browser, 0.5, sign_is_known);
-    }
+    catch_and_calibrate(&mut browser);
     set_speed(&mut browser, FASTEST);
     browser.key("u");
     until(&mut browser, &format!("Math.abs(Math.sin({MACHINE}.state[2] / 2)) < 1e-9"));
@@ -202,6 +175,38 @@ fn a_link_that_is_pulled_comes_back_and_one_that_is_pulled_too_far_is_a_fault_th
     browser.key("Escape");
     until(&mut browser, &format!("({STATE}) !== 'Balancing'"));
     assert_eq!(browser.errors(), Vec::<String>::new());
+}
+
+/// Catches the rig, then homes it and checks the signs of encoders and motor, with keys alone.
+fn catch_and_calibrate(browser: &mut Browser) {
+    set_speed(browser, FASTEST);
+    browser.key("j");
+    until(browser, &format!("{MACHINE}.holding === 'hanging'"));
+    until(
+        browser,
+        &format!("Math.abs({MACHINE}.state[0]) < 1e-9 && Math.abs(Math.cos({MACHINE}.state[2]) + 1) < 1e-9"),
+    );
+    browser.key("c");
+    until(browser, &format!("({STATE}) !== 'Fault'"));
+    until_done(browser, "h", &format!("({STATE}) === 'Calibrated'"));
+    if browser.value("upright.seen.telemetry.against_arming.join().includes('signs')") == true {
+        until_done(browser, "g", "upright.seen.telemetry.now !== null");
+        browser.key("k");
+        until(browser, "!upright.seen.telemetry.against_arming.join().includes('signs')");
+    }
+    // The page sends a held key again in real time.
+    set_speed(browser, 1.0);
+    let sign_is_known = "!upright.seen.telemetry.against_arming.join().includes('motor')";
+    for _ in 0..10 {
+        if browser.value(sign_is_known) == true {
+            break;
+        }
+        // A key that is held until the motor has moved the cart.
+        browser.value("document.dispatchEvent(new KeyboardEvent('keydown', { key: 'm' }))");
+        comes_within(browser, 1.0, sign_is_known);
+        browser.value("document.dispatchEvent(new KeyboardEvent('keyup', { key: 'm' }))");
+        comes_within(browser, 0.5, sign_is_known);
+    }
 }
 
 /// Presses a key every half second until an expression is true, as a person does whose command is refused for now.

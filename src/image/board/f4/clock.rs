@@ -14,7 +14,7 @@ use crate::pac::{FLASH, RCC, TIM11};
 use upright::protocol::message::Reset;
 
 use super::boards::BOARD;
-use super::boards::data::Source;
+use super::boards::data::HseSource;
 use super::serial;
 
 /// Core clock (Hz).
@@ -113,7 +113,7 @@ fn start_crystal(rcc: &RCC) -> Option<()> {
         // The bypass can be changed only while the oscillator is off.
         clear(rcc, HSEON);
         clear(rcc, HSEBYP);
-        set(rcc, if source == Source::Clock { HSEBYP } else { 0 });
+        set(rcc, if source == HseSource::Clock { HSEBYP } else { 0 });
         set(rcc, HSEON);
         wait(|| rcc.cr().read().hserdy().bit_is_set())
     })

@@ -23,12 +23,12 @@ use upright::protocol::message::Start;
 pub(crate) use clock::CLOCK_HZ;
 use clock::Clock;
 use motor::Motor;
-pub(crate) use serial::{Buffer, SerialLine};
+pub(crate) use serial::{DmaBuffer, DmaLine};
 use supply::Supply;
 use watchdog::Watchdog;
 
 /// The pins and peripherals of the control task.
-pub(crate) struct Hardware {
+pub(crate) struct F4Board {
     motor: Motor,
     supply: Supply,
     exti: EXTI,
@@ -45,7 +45,7 @@ pub(crate) struct Hardware {
 
 /// Sets up all peripherals but the watchdog, with the motor off. Takes at most 150 ms, even if a peripheral does not
 /// respond. Also returns what the board knows about the start.
-pub(crate) fn set_up(device: Peripherals, buffer: &'static mut Buffer) -> (Hardware, SerialLine, Start) {
+pub(crate) fn set_up(device: Peripherals, buffer: &'static mut DmaBuffer) -> (F4Board, DmaLine, Start) {
     let rcc = &device.RCC;
     clock::enable_peripherals(rcc);
     pins::set_up(&device.SYSCFG, &device.EXTI);
@@ -66,7 +66,7 @@ pub(crate) fn set_up(device: Peripherals, buffer: &'static mut Buffer) -> (Hardw
     pins::set_status_led(clock == Clock::Full && !wrong_chip && !motor.has_failed());
     // Clears flags that were set while the pull-ups charged the inputs.
     let _ = (motor.was_stopped(), pins::driver_fault_was_reported(&device.EXTI));
-    let hardware = Hardware {
+    let hardware = F4Board {
         motor,
         supply,
         exti: device.EXTI,
@@ -81,14 +81,14 @@ pub(crate) fn set_up(device: Peripherals, buffer: &'static mut Buffer) -> (Hardw
     (hardware, line, Start { reset, crash, image: crash::image_checksum() })
 }
 
-impl Hardware {
+impl F4Board {
     /// Starts the watchdog. Everything has to be ready for the first tick.
     pub(crate) fn start_watchdog(&self) {
         self.watchdog.start(if self.clock_fault { Clock::Fallback } else { Clock::Full });
     }
 }
 
-impl Board<SENSORS> for Hardware {
+impl Board<SENSORS> for F4Board {
     const WIDTHS: [CounterWidth; SENSORS] = encoders::WIDTHS;
 
     fn inputs(&mut self) -> Inputs<SENSORS> {

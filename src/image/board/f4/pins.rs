@@ -3,7 +3,7 @@
 use crate::pac::{EXTI, SYSCFG};
 
 use super::boards::BOARD;
-use super::wiring::{Mode, Signal, Wire, wire_of};
+use super::wiring::{PinMode, Signal, Wire, wire_of};
 
 const DIRECTION: Wire = wire_of(BOARD.wiring, Signal::Direction);
 const ENABLE: Wire = wire_of(BOARD.wiring, Signal::Enable);
@@ -17,7 +17,7 @@ const PORTS: usize = 4;
 
 /// Values for the registers of a port, and the bits that they cover (RM0090, 8.4).
 #[derive(Clone, Copy)]
-struct Port {
+struct PortSettings {
     mode: u32,
     pull: u32,
     two_bits: u32,
@@ -25,8 +25,9 @@ struct Port {
     four_bits: [u32; 2],
 }
 
-const SET_UP: [Port; PORTS] = {
-    let mut ports = [Port { mode: 0, pull: 0, two_bits: 0, alternate: [0; 2], four_bits: [0; 2] }; PORTS];
+const SET_UP: [PortSettings; PORTS] = {
+    let mut ports =
+        [PortSettings { mode: 0, pull: 0, two_bits: 0, alternate: [0; 2], four_bits: [0; 2] }; PORTS];
     let mut i = 0;
     while i <= BOARD.wiring.len() {
         let wire = if i < BOARD.wiring.len() { BOARD.wiring[i] } else { BOARD.status_led };
@@ -35,13 +36,13 @@ const SET_UP: [Port; PORTS] = {
         assert!(port.two_bits & (3 << at) == 0, "a pin is used twice");
         port.two_bits |= 3 << at;
         port.mode |= match wire.mode {
-            Mode::Input => 0,
-            Mode::Output => 1,
-            Mode::Alternate(_) => 2,
-            Mode::Analog => 3,
+            PinMode::Input => 0,
+            PinMode::Output => 1,
+            PinMode::Alternate(_) => 2,
+            PinMode::Analog => 3,
         } << at;
         port.pull |= (wire.pull_up as u32) << at;
-        if let Mode::Alternate(number) = wire.mode {
+        if let PinMode::Alternate(number) = wire.mode {
             port.alternate[half] |= (number as u32) << (4 * (wire.pin % 8));
             port.four_bits[half] |= 15 << (4 * (wire.pin % 8));
         }

@@ -14,14 +14,14 @@ use super::wiring::{Signal, wire_of};
 const RECEIVED: usize = 512;
 
 /// Memory for both directions, which the DMA controller shares with the code.
-pub(crate) struct Buffer {
+pub(crate) struct DmaBuffer {
     /// Circular buffer of received bytes.
     received: UnsafeCell<[u8; RECEIVED]>,
     /// The frame that is being sent.
     sent: UnsafeCell<[u8; MAX_MESSAGE]>,
 }
 
-impl Buffer {
+impl DmaBuffer {
     /// Nothing received, nothing to send.
     pub(crate) const fn new() -> Self {
         Self { received: UnsafeCell::new([0; RECEIVED]), sent: UnsafeCell::new([0; MAX_MESSAGE]) }
@@ -43,16 +43,16 @@ const RECEIVE_FLAGS: u32 = 0x3d << 6;
 const SEND_FLAGS: u32 = if NUMBER == 2 { 0x3d << 16 } else { 0x3d << 22 };
 
 /// Both directions of the line.
-pub(crate) struct SerialLine {
+pub(crate) struct DmaLine {
     usart: &'static usart1::RegisterBlock,
     dma: DMA1,
-    buffer: &'static mut Buffer,
+    buffer: &'static mut DmaBuffer,
     /// The next received byte to read.
     next: usize,
 }
 
 /// Enables both directions; `clock` is the frequency of the bus (Hz).
-pub(super) fn set_up(dma: DMA1, clock: u32, buffer: &'static mut Buffer) -> SerialLine {
+pub(super) fn set_up(dma: DMA1, clock: u32, buffer: &'static mut DmaBuffer) -> DmaLine {
     let registers: *const usart1::RegisterBlock = if NUMBER == 2 { USART2::PTR } else { USART3::PTR };
     // SAFETY: the registers of this USART, which nothing else uses.
     let usart = unsafe { &*registers };
@@ -70,12 +70,12 @@ pub(super) fn set_up(dma: DMA1, clock: u32, buffer: &'static mut Buffer) -> Seri
     usart.brr().write(|w| unsafe { w.bits(((clock + BAUD / 2) / BAUD) as u16) });
     usart.cr3().write(|w| w.dmar().set_bit().dmat().set_bit());
     usart.cr1().write(|w| w.ue().set_bit().te().set_bit().re().set_bit());
-    let mut line = SerialLine { usart, dma, buffer, next: 0 };
+    let mut line = DmaLine { usart, dma, buffer, next: 0 };
     line.start_receiving();
     line
 }
 
-impl SerialLine {
+impl DmaLine {
     /// Starts the stream that receives, at the beginning of the buffer.
     fn start_receiving(&mut self) {
         self.next = 0;

@@ -13,7 +13,7 @@ pub(crate) struct Wire {
     /// Number within the port.
     pub(crate) pin: u8,
     /// Electrical mode of the pin.
-    pub(crate) mode: Mode,
+    pub(crate) mode: PinMode,
     /// Whether the pin is pulled to 3.3 V inside the microcontroller (about 40 kΩ).
     pub(crate) pull_up: bool,
     /// The peripheral behind the pin, which says which timer and which USART are used.
@@ -86,7 +86,7 @@ impl Signal {
 
 /// Mode of a pin; the numbers are those of the register GPIOx_MODER (RM0090, 8.4.1).
 #[derive(Clone, Copy, PartialEq)]
-pub(crate) enum Mode {
+pub(crate) enum PinMode {
     /// Digital input.
     Input,
     /// Push-pull output, initially low.
@@ -110,16 +110,16 @@ pub(crate) const STANDARD: [Wire; 21] = [
     encoder(3, b'B', b'B', 7, 2, "TIM4_CH2"),
     encoder(4, b'A', b'C', 6, 3, "TIM8_CH1"),
     encoder(4, b'B', b'C', 7, 3, "TIM8_CH2"),
-    wire(Signal::Pwm, b'A', 8, Mode::Alternate(1), false, "TIM1_CH1"),
+    wire(Signal::Pwm, b'A', 8, PinMode::Alternate(1), false, "TIM1_CH1"),
     output(Signal::Direction, b'B', 14),
     output(Signal::Enable, b'B', 15),
-    wire(Signal::DriverFault, b'B', 13, Mode::Input, true, "input"),
-    wire(Signal::EmergencyStop, b'B', 12, Mode::Alternate(1), true, "TIM1_BKIN"),
-    wire(Signal::LimitLow, b'C', 0, Mode::Input, true, "input"),
-    wire(Signal::LimitHigh, b'C', 1, Mode::Input, true, "input"),
-    wire(Signal::Supply, b'C', 2, Mode::Analog, false, "ADC1_IN12"),
-    wire(Signal::Transmit, b'A', 2, Mode::Alternate(7), false, "USART2_TX"),
-    wire(Signal::Receive, b'A', 3, Mode::Alternate(7), true, "USART2_RX"),
+    wire(Signal::DriverFault, b'B', 13, PinMode::Input, true, "input"),
+    wire(Signal::EmergencyStop, b'B', 12, PinMode::Alternate(1), true, "TIM1_BKIN"),
+    wire(Signal::LimitLow, b'C', 0, PinMode::Input, true, "input"),
+    wire(Signal::LimitHigh, b'C', 1, PinMode::Input, true, "input"),
+    wire(Signal::Supply, b'C', 2, PinMode::Analog, false, "ADC1_IN12"),
+    wire(Signal::Transmit, b'A', 2, PinMode::Alternate(7), false, "USART2_TX"),
+    wire(Signal::Receive, b'A', 3, PinMode::Alternate(7), true, "USART2_RX"),
     output(Signal::Tick, b'B', 1),
 ];
 
@@ -151,7 +151,7 @@ pub(crate) const fn wire(
     signal: Signal,
     port: u8,
     pin: u8,
-    mode: Mode,
+    mode: PinMode,
     pull_up: bool,
     function: &'static str,
 ) -> Wire {
@@ -160,7 +160,7 @@ pub(crate) const fn wire(
 
 /// An output, such as a status LED.
 pub(crate) const fn output(signal: Signal, port: u8, pin: u8) -> Wire {
-    wire(signal, port, pin, Mode::Output, false, "output")
+    wire(signal, port, pin, PinMode::Output, false, "output")
 }
 
 /// An encoder input, with the internal pull-up: the least that an open-collector encoder needs.
@@ -172,5 +172,5 @@ pub(crate) const fn encoder(
     number: u8,
     function: &'static str,
 ) -> Wire {
-    wire(Signal::Encoder(sensor, channel), port, pin, Mode::Alternate(number), true, function)
+    wire(Signal::Encoder(sensor, channel), port, pin, PinMode::Alternate(number), true, function)
 }

@@ -24,9 +24,9 @@ use upright::protocol::message::Start;
 use upright::protocol::simulated_pins::{InjectedFault, MAX_PINS_IN, MAX_PINS_OUT, PinsIn, PinsOut};
 
 #[cfg(feature = "in-the-loop")]
-use semihosting::{Channel, Serial, exit, open};
+use semihosting::{PinFiles as Channel, SerialFile as Serial, exit, open};
 #[cfg(feature = "in-the-loop-usart")]
-use usart::{Channel, Serial, exit, open};
+use usart::{PinUsart as Channel, SerialUsart as Serial, exit, open};
 
 /// The emulator's core clock (Hz); nothing depends on real time.
 pub(crate) const CLOCK_HZ: u32 = 168_000_000;
@@ -35,7 +35,7 @@ pub(crate) const CLOCK_HZ: u32 = 168_000_000;
 static SENT: AtomicU32 = AtomicU32::new(0);
 
 /// The simulated pins and the counter of instructions.
-pub(crate) struct Hardware {
+pub(crate) struct SimulatedPins {
     pins: Channel,
     frames: Frames<MAX_PINS_IN>,
     received: Producer<'static, u8>,
@@ -46,9 +46,9 @@ pub(crate) struct Hardware {
 }
 
 /// Queue of the serial bytes that have arrived with the pins.
-pub(crate) struct Buffer(Queue<u8, 128>);
+pub(crate) struct ReceivedBytes(Queue<u8, 128>);
 
-impl Buffer {
+impl ReceivedBytes {
     /// Empty.
     pub(crate) const fn new() -> Self {
         Self(Queue::new())
@@ -56,12 +56,12 @@ impl Buffer {
 }
 
 /// The serial line to the host.
-pub(crate) struct SerialLine {
+pub(crate) struct SimulatedLine {
     received: Consumer<'static, u8>,
     serial: Serial,
 }
 
-impl SerialLine {
+impl SimulatedLine {
     /// The next byte from the host, if any.
     pub(crate) fn read(&mut self) -> Option<u8> {
         self.received.dequeue()
@@ -81,15 +81,18 @@ impl SerialLine {
 }
 
 /// Opens the channels and starts the counter of instructions.
-pub(crate) fn set_up(device: Peripherals, buffer: &'static mut Buffer) -> (Hardware, SerialLine, Start) {
+pub(crate) fn set_up(
+    device: Peripherals,
+    buffer: &'static mut ReceivedBytes,
+) -> (SimulatedPins, SimulatedLine, Start) {
     let clock = device.TIM5;
     // 32 bits, one count per instruction.
     clock.arr().write(|w| w.arr().set(u32::MAX));
     clock.cr1().write(|w| w.cen().enabled());
     let (pins, serial) = open(device.USART1, device.USART2);
     let (producer, consumer) = buffer.0.split();
-    let hardware = Hardware { pins, frames: Frames::new(), received: producer, clock, spent: 0 };
-    (hardware, SerialLine { received: consumer, serial }, Start::default())
+    let hardware = SimulatedPins { pins, frames: Frames::new(), received: producer, clock, spent: 0 };
+    (hardware, SimulatedLine { received: consumer, serial }, Start::default())
 }
 
 /// Starts nothing: each tick is made due by [`sleep`].
@@ -102,12 +105,12 @@ pub(crate) fn sleep() {
     cortex_m::asm::isb();
 }
 
-impl Hardware {
+impl SimulatedPins {
     /// Does nothing: the emulated board has no watchdog.
     pub(crate) fn start_watchdog(&self) {}
 }
 
-impl Board<SENSORS> for Hardware {
+impl Board<SENSORS> for SimulatedPins {
     const WIDTHS: [CounterWidth; SENSORS] = {
         let mut widths = [CounterWidth::Bits16; SENSORS];
         widths[0] = CounterWidth::Bits32;
@@ -140,7 +143,7 @@ impl Board<SENSORS> for Hardware {
     }
 }
 
-impl Hardware {
+impl SimulatedPins {
     fn instructions(&self) -> u32 {
         self.clock.cnt().read().bits()
     }

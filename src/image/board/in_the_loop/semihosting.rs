@@ -9,7 +9,7 @@ const READ_BINARY: usize = 1;
 const WRITE_BINARY: usize = 5;
 
 /// The channel that carries the simulated pins.
-pub(super) struct Channel {
+pub(super) struct PinFiles {
     input: usize,
     output: usize,
     buffer: [u8; 256],
@@ -18,30 +18,30 @@ pub(super) struct Channel {
 }
 
 /// The channel that carries the serial line's output.
-pub(super) struct Serial {
+pub(super) struct SerialFile {
     output: usize,
 }
 
 /// Opens the files `pins.in`, `pins.out` and `serial.out` in the emulator's directory, in this order.
-pub(super) fn open(_: USART1, _: USART2) -> (Channel, Serial) {
+pub(super) fn open(_: USART1, _: USART2) -> (PinFiles, SerialFile) {
     let input = open_file("pins.in\0", READ_BINARY);
     let output = open_file("pins.out\0", WRITE_BINARY);
     PINS_OUT.store(output, Ordering::Relaxed);
     let serial = open_file("serial.out\0", WRITE_BINARY);
-    (Channel { input, output, buffer: [0; 256], next: 0, filled: 0 }, Serial { output: serial })
+    (PinFiles { input, output, buffer: [0; 256], next: 0, filled: 0 }, SerialFile { output: serial })
 }
 
 /// Handle of the open `pins.out`.
 static PINS_OUT: AtomicUsize = AtomicUsize::new(usize::MAX);
 
-impl Channel {
+impl PinFiles {
     /// A second handle on the channel, for writing.
     ///
     /// # Safety
     /// The owner of the channel must no longer run.
     pub(super) unsafe fn steal() -> Self {
         let output = PINS_OUT.load(Ordering::Relaxed);
-        Channel { input: usize::MAX, output, buffer: [0; 256], next: 0, filled: 0 }
+        PinFiles { input: usize::MAX, output, buffer: [0; 256], next: 0, filled: 0 }
     }
 
     /// Waits for the next byte. Ends the run if the host has closed the file.
@@ -67,7 +67,7 @@ impl Channel {
     }
 }
 
-impl Serial {
+impl SerialFile {
     /// Sends bytes to the host.
     pub(super) fn write(&mut self, bytes: &[u8]) {
         write(self.output, bytes);

@@ -9,33 +9,33 @@ use cortex_m::peripheral::NVIC;
 use crate::pac::{Interrupt, USART1, USART2};
 
 /// The channel that carries the simulated pins.
-pub(super) struct Channel {
+pub(super) struct PinUsart {
     usart: USART1,
 }
 
 /// The channel that carries the serial line's output.
-pub(super) struct Serial {
+pub(super) struct SerialUsart {
     usart: USART2,
 }
 
 /// Enables both lines. The emulator has no baud rate.
-pub(super) fn open(pins: USART1, serial: USART2) -> (Channel, Serial) {
+pub(super) fn open(pins: USART1, serial: USART2) -> (PinUsart, SerialUsart) {
     pins.cr1().write(|w| w.ue().enabled().te().enabled().re().enabled().rxneie().enabled());
     serial.cr1().write(|w| w.ue().enabled().te().enabled());
-    let mut pins = Channel { usart: pins };
+    let mut pins = PinUsart { usart: pins };
     // Bytes that the host sends before the receiver is on are lost, so the host waits for this empty frame.
     pins.write(&[0]);
-    (pins, Serial { usart: serial })
+    (pins, SerialUsart { usart: serial })
 }
 
-impl Channel {
+impl PinUsart {
     /// A second handle on the channel, for writing.
     ///
     /// # Safety
     /// The owner of the channel must no longer run.
     pub(super) unsafe fn steal() -> Self {
         // SAFETY: as above.
-        Channel { usart: unsafe { crate::pac::Peripherals::steal() }.USART1 }
+        PinUsart { usart: unsafe { crate::pac::Peripherals::steal() }.USART1 }
     }
 
     /// Waits for the next byte.
@@ -58,7 +58,7 @@ impl Channel {
     }
 }
 
-impl Serial {
+impl SerialUsart {
     /// Sends bytes to the host.
     pub(super) fn write(&mut self, bytes: &[u8]) {
         for &byte in bytes {

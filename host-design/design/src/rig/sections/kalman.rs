@@ -35,7 +35,7 @@ pub(crate) static KALMAN: Section = Section {
 
 /// `[kalman]`: continuous noise intensities.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Kalman {
+pub struct KalmanNoise {
     /// Intensity of the force noise (N²·s).
     pub force_noise_n2_s: f64,
     /// Intensity of the torque noise at each joint ((N·m)²·s); with `[model]`, of each further noise column.
@@ -43,7 +43,7 @@ pub struct Kalman {
 }
 
 /// Reads `[kalman]`, with one intensity per noise input.
-pub(crate) fn kalman(node: &Node<'_>, plant: &PlantDescription) -> Result<Kalman, RigError> {
+pub(crate) fn kalman(node: &Node<'_>, plant: &PlantDescription) -> Result<KalmanNoise, RigError> {
     let table = node.table(&KALMAN)?;
     let further = match plant {
         PlantDescription::Chain(chain) => chain.links.len(),
@@ -55,5 +55,5 @@ pub(crate) fn kalman(node: &Node<'_>, plant: &PlantDescription) -> Result<Kalman
     } else {
         table.numbers("joint_noise", further, Rule::NOT_NEGATIVE)?
     };
-    Ok(Kalman { force_noise_n2_s, joint_noise })
+    Ok(KalmanNoise { force_noise_n2_s, joint_noise })
 }

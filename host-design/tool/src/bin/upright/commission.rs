@@ -14,7 +14,7 @@ use upright_tool::commission::{
     AtPort, CommissionPlan, CommissionRecord, CommissionStep, Commissioning, Designed, Journal, Planted,
     Simulated,
 };
-use upright_tool::in_the_loop::Link;
+use upright_tool::in_the_loop::PinLink;
 use upright_tool::monitor::SerialLine;
 
 use crate::failure::Failure;
@@ -93,7 +93,7 @@ impl CommissionCommand {
             (None, target) => {
                 let target = target.unwrap_or(TargetOption::Host);
                 let machine = self.true_machine(&rig)?;
-                let built = target.built(Link::Files, &rig, &table)?;
+                let built = target.built(PinLink::Files, &rig, &table)?;
                 let mut journal = journal(built.place(self.seed).name());
                 let result = self.simulated(plan, &machine, target, &built, &mut journal);
                 (journal, result)
@@ -140,7 +140,7 @@ impl CommissionCommand {
         self.write(&designed)?;
         let (rig, table) = (&designed.rig, &designed.table);
         let built = journal.step(CommissionStep::Image, |journal| {
-            let built = target.built(Link::Files, rig, table)?;
+            let built = target.built(PinLink::Files, rig, table)?;
             journal.found(format!("rig {:016x}, table {:08x}", table.rig_hash, table.crc()));
             Ok::<_, Failure>(built)
         })?;

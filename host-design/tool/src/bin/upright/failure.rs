@@ -15,7 +15,7 @@ use upright_design::verify::{Unverifiable, VerifyError};
 use upright_tool::campaign::CampaignError;
 use upright_tool::commission::Stop;
 use upright_tool::figure::FigureError;
-use upright_tool::image::{ElfError, ImageError, SizeError};
+use upright_tool::image::{BuildError, ElfError, SizeError};
 use upright_tool::in_the_loop::{RelayError, RunError};
 use upright_tool::monitor::OpenError;
 use upright_tool::report::ReportError;
@@ -50,7 +50,7 @@ pub(crate) enum Failure {
     #[error(transparent)]
     Unverifiable(#[from] Unverifiable),
     #[error(transparent)]
-    Image(#[from] ImageError),
+    Image(#[from] BuildError),
     #[error(transparent)]
     Elf(#[from] ElfError),
     #[error(transparent)]
@@ -131,7 +131,7 @@ impl Failure {
             Failure::SwingUp { source, .. } if source.is_without_solution() => 3,
             Failure::NotIdentified(_) | Failure::MustNotRun(_) => 3,
             Failure::Identify(error) if error.is_without_solution() => 3,
-            Failure::NoProgram(_) | Failure::Image(ImageError::NoCompiler) => 4,
+            Failure::NoProgram(_) | Failure::Image(BuildError::NoCompiler) => 4,
             Failure::InTheLoop(error) if error.lacks_emulator() => 4,
             Failure::InTheLoop(RunError::Harness(error)) if is_bad_scenario(error) => 2,
             Failure::InTheLoop(_) => 1,

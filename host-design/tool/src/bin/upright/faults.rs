@@ -8,7 +8,7 @@ use upright_design::rig::Rig;
 use upright_design::study::Study;
 use upright_design::swing_up::SwingUpError;
 use upright_tool::campaign::{Campaign, Defect, DefectRow, During, Setup, campaign, feed, kinds, one};
-use upright_tool::in_the_loop::{Link, Place};
+use upright_tool::in_the_loop::{PinLink, RunPlace};
 
 use crate::failure::Failure;
 use crate::progress::with_bar;
@@ -89,7 +89,7 @@ impl FaultsCommand {
         if self.swing_up && table.swing_up.is_none() {
             return Err(Failure::SwingUp { rig: rig.name, source: SwingUpError::NoMotions });
         }
-        let built = self.target.built(Link::Files, &rig, &table)?;
+        let built = self.target.built(PinLink::Files, &rig, &table)?;
         let place = built.place(self.seed);
         let mut possible = kinds(&table, place);
         let forces = if self.shake { Some(feed(&rig, &table, self.seed)?) } else { None };
@@ -145,7 +145,7 @@ impl FaultsCommand {
         if chosen.is_empty() {
             return Ok(None);
         }
-        let setup = Setup { place: Place::Host, detection: false, ..*setup };
+        let setup = Setup { place: RunPlace::Host, detection: false, ..*setup };
         let runs = CONTROL_RUNS * chosen.len() as u64;
         let part = "without detection";
         let result =

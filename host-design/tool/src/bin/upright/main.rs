@@ -56,11 +56,11 @@ Exit status:
 #[command(name = "upright", version, before_help = EXAMPLES, arg_required_else_help = true)]
 struct Arguments {
     #[command(subcommand)]
-    command: Command,
+    command: UprightCommand,
 }
 
 #[derive(Subcommand)]
-enum Command {
+enum UprightCommand {
     Check(check::CheckCommand),
     Commission(commission::CommissionCommand),
     Design(design::DesignCommand),
@@ -83,24 +83,24 @@ enum Command {
 
 fn main() -> ExitCode {
     let result = match Arguments::parse().command {
-        Command::Check(command) => command.run(),
-        Command::Commission(command) => command.run(),
-        Command::Design(command) => command.run(),
-        Command::FalseAlarms(command) => command.run(),
-        Command::Faults(command) => command.run(),
-        Command::Firmware(command) => command.run(),
-        Command::Report(command) => command.run(),
-        Command::Compare(command) => command.run(),
-        Command::Coverage(command) => command.run(),
-        Command::Reproduce(command) => command.run(),
-        Command::Robust(command) => command.run(),
-        Command::Shake(command) => command.run(),
-        Command::Identify(command) => command.run(),
-        Command::Simulate(command) => command.run(),
-        Command::Twin(command) => command.run(),
-        Command::SwingUp(command) => command.run(),
-        Command::Transitions(command) => command.run(),
-        Command::Verify(command) => command.run(),
+        UprightCommand::Check(command) => command.run(),
+        UprightCommand::Commission(command) => command.run(),
+        UprightCommand::Design(command) => command.run(),
+        UprightCommand::FalseAlarms(command) => command.run(),
+        UprightCommand::Faults(command) => command.run(),
+        UprightCommand::Firmware(command) => command.run(),
+        UprightCommand::Report(command) => command.run(),
+        UprightCommand::Compare(command) => command.run(),
+        UprightCommand::Coverage(command) => command.run(),
+        UprightCommand::Reproduce(command) => command.run(),
+        UprightCommand::Robust(command) => command.run(),
+        UprightCommand::Shake(command) => command.run(),
+        UprightCommand::Identify(command) => command.run(),
+        UprightCommand::Simulate(command) => command.run(),
+        UprightCommand::Twin(command) => command.run(),
+        UprightCommand::SwingUp(command) => command.run(),
+        UprightCommand::Transitions(command) => command.run(),
+        UprightCommand::Verify(command) => command.run(),
     };
     match result {
         Ok(()) => ExitCode::SUCCESS,

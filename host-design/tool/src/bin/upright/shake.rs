@@ -11,7 +11,7 @@ use signal_hook::consts::{SIGINT, SIGTERM};
 use upright_design::identify::{LineError, Log, OverLine, shake};
 use upright_design::rig::Rig;
 use upright_design::table::{Gains, write_atomically};
-use upright_tool::in_the_loop::Link;
+use upright_tool::in_the_loop::PinLink;
 use upright_tool::in_the_loop::run_shaken;
 use upright_tool::monitor::{SerialLine, now};
 
@@ -91,7 +91,7 @@ impl ShakeCommand {
             return Ok(with_spinner("shaking", || shake(rig, seconds, self.seed))?);
         };
         let (_, table) = with_table(rig, &self.rig, Gains::Sampled)?;
-        let built = target.built(Link::Files, rig, &table)?;
+        let built = target.built(PinLink::Files, rig, &table)?;
         Ok(with_spinner("shaking", || run_shaken(rig, &table, seconds, self.seed, built.place(self.seed)))?)
     }
     /// Shakes the machine behind a port and returns its log.

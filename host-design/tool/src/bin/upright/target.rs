@@ -6,14 +6,14 @@ use clap::ValueEnum;
 use upright_board::Image;
 use upright_design::rig::Rig;
 use upright_design::table::TableValues;
-use upright_tool::image::{self, Board, Kind};
-use upright_tool::in_the_loop::{Link, Place};
+use upright_tool::image::{self, BoardName, ImageKind};
+use upright_tool::in_the_loop::{PinLink, RunPlace};
 
 use crate::failure::Failure;
 use crate::progress::with_spinner;
 
 /// The board that the virtual board simulates.
-const BOARD: Board = Board::WeactF405;
+const BOARD: BoardName = BoardName::WeactF405;
 
 /// Where the firmware runs.
 #[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
@@ -29,7 +29,7 @@ pub(crate) enum TargetOption {
 /// A firmware, built for its target.
 pub(crate) enum Built {
     Host,
-    Qemu { image: PathBuf, link: Link },
+    Qemu { image: PathBuf, link: PinLink },
     Board(Image),
 }
 
@@ -45,12 +45,12 @@ impl TargetOption {
 
     /// Builds the image with the table of the rig and prints its path and hash; on the host, no image is needed.
     /// `link` connects the pins of an image in QEMU.
-    pub(crate) fn built(self, link: Link, rig: &Rig, table: &TableValues) -> Result<Built, Failure> {
+    pub(crate) fn built(self, link: PinLink, rig: &Rig, table: &TableValues) -> Result<Built, Failure> {
         let kind = match (self, link) {
             (TargetOption::Host, _) => return Ok(Built::Host),
-            (TargetOption::Qemu, Link::Files) => Kind::InTheLoop,
-            (TargetOption::Qemu, Link::Usart) => Kind::InTheLoopUsart,
-            (TargetOption::Board, _) => Kind::Board(BOARD),
+            (TargetOption::Qemu, PinLink::Files) => ImageKind::InTheLoop,
+            (TargetOption::Qemu, PinLink::Usart) => ImageKind::InTheLoopUsart,
+            (TargetOption::Board, _) => ImageKind::Board(BOARD),
         };
         let image = with_spinner("building the image", || image::build_for(kind, rig, table))?;
         if self == TargetOption::Board {
@@ -63,11 +63,11 @@ impl TargetOption {
 
 impl Built {
     /// The place to run it; `seed` determines everything random about the virtual board.
-    pub(crate) fn place(&self, seed: u64) -> Place<'_> {
+    pub(crate) fn place(&self, seed: u64) -> RunPlace<'_> {
         match self {
-            Built::Host => Place::Host,
-            Built::Qemu { image, link } => Place::Qemu { image, link: *link },
-            Built::Board(image) => Place::Board { image, conditions: BOARD.conditions(seed) },
+            Built::Host => RunPlace::Host,
+            Built::Qemu { image, link } => RunPlace::Qemu { image, link: *link },
+            Built::Board(image) => RunPlace::Board { image, conditions: BOARD.conditions(seed) },
         }
     }
 }

@@ -11,7 +11,7 @@ use upright::table::Law;
 use upright_design::rig::Rig;
 use upright_design::simulate::{Scenario, Sensing};
 use upright_design::table::TableValues;
-use upright_tool::in_the_loop::{Link, Place};
+use upright_tool::in_the_loop::{PinLink, RunPlace};
 use upright_tool::monitor::SerialLine;
 use upright_tool::twin::{Server, SimulatedMachine};
 
@@ -63,7 +63,7 @@ impl TwinCommand {
         let (rig, _, table) = self.variation.designed()?;
         let table = with_stored_motions(&self.variation.rig, &rig, table, Wanted::of(self.transitions))?;
         let built = match self.port {
-            None => Some(self.target.built(Link::Files, &rig, &table)?),
+            None => Some(self.target.built(PinLink::Files, &rig, &table)?),
             Some(_) => None,
         };
         let stop = Arc::new(AtomicBool::new(false));
@@ -75,7 +75,7 @@ impl TwinCommand {
         if let Some(port) = &self.port {
             return show(port, &rig, &table, self.listen, &goes_on);
         }
-        let place = built.as_ref().map_or(Place::Host, |built| built.place(1));
+        let place = built.as_ref().map_or(RunPlace::Host, |built| built.place(1));
         let scenario = Scenario { sensing: Sensing::Encoders, ..Scenario::at_rest(&rig, self.law) };
         let machine = SimulatedMachine { rig: &rig, table: &table, scenario: &scenario };
         Ok(listening(self.listen)?.simulate(machine, place, !self.hanging, &goes_on)?)

@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 use upright::supervision::fault::Fault;
-use upright_board::{Conditions, Image, Part, TickCost, Time, UNITS_PER_MICROSECOND};
+use upright_board::{Conditions, Image, TickCost, TickPart, Time, UNITS_PER_MICROSECOND};
 use upright_design::harness::{Harness, HarnessError, record};
 use upright_design::rig::Rig;
 use upright_design::simulate::Scenario;
@@ -142,18 +142,18 @@ impl TickFigures {
         let chosen = |of: &dyn Fn(&TickCost) -> Option<Time>| {
             choose(&mut ticks.iter().filter_map(of).collect::<Vec<_>>()).map(span)
         };
-        let part = |part: Part| chosen(&|tick| Some(tick.parts[part as usize]));
+        let part = |part: TickPart| chosen(&|tick| Some(tick.parts[part as usize]));
         let quickest = ticks.iter().filter_map(|tick| tick.latency).min().unwrap_or(0);
         Some(Self {
             ticks: ticks.len(),
             latency: chosen(&|tick| tick.latency),
             jitter: chosen(&|tick| tick.latency.map(|latency| latency - quickest)),
             whole: chosen(&|tick| Some(tick.whole))?,
-            entry: part(Part::Entry)?,
-            inputs: part(Part::Inputs)?,
-            control: part(Part::Control)?,
-            output: part(Part::Output)?,
-            rest: part(Part::Rest)?,
+            entry: part(TickPart::Entry)?,
+            inputs: part(TickPart::Inputs)?,
+            control: part(TickPart::Control)?,
+            output: part(TickPart::Output)?,
+            rest: part(TickPart::Rest)?,
             controller: chosen(&|tick| Some(tick.controller))?,
         })
     }

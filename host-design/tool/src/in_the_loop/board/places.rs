@@ -3,13 +3,13 @@
 use std::collections::HashMap;
 
 use rustc_demangle::demangle;
-use upright_board::{Image, Part, Place};
+use upright_board::{CodePlace, Image, TickPart};
 
 /// Address of flash, where the code is.
 const FLASH: u32 = 0x0800_0000;
 
 /// The places of all half-words of flash, by the image's debug information; without it, every place is unknown.
-pub(super) fn places(image: &Image) -> Vec<Place> {
+pub(super) fn places(image: &Image) -> Vec<CodePlace> {
     let lines = image.lines();
     // A cache by name: thousands of instructions belong to a few hundred functions.
     let mut known = HashMap::new();
@@ -21,31 +21,31 @@ pub(super) fn places(image: &Image) -> Vec<Place> {
 }
 
 /// The place of an instruction, by the functions that it is in, the innermost first; `known` caches each function's.
-fn place_of(names: Vec<String>, known: &mut HashMap<String, Place>) -> Place {
-    names.into_iter().fold(Place::default(), |place, name| {
+fn place_of(names: Vec<String>, known: &mut HashMap<String, CodePlace>) -> CodePlace {
+    names.into_iter().fold(CodePlace::default(), |place, name| {
         let own = known.entry(name).or_insert_with_key(|name| {
             let path = format!("{:#}", demangle(name));
-            Place { part: part_of(&path), controller: is_controller(&path) }
+            CodePlace { part: part_of(&path), controller: is_controller(&path) }
         });
-        Place { part: place.part.or(own.part), controller: place.controller.or(own.controller) }
+        CodePlace { part: place.part.or(own.part), controller: place.controller.or(own.controller) }
     })
 }
 
 /// The part of the tick that a function belongs to, by its path; `None` if that depends on its caller.
-fn part_of(path: &str) -> Option<Part> {
+fn part_of(path: &str) -> Option<TickPart> {
     let is =
         |owner: &str, names: &[&str]| path.contains(owner) && names.iter().any(|name| path.ends_with(name));
     if is("Hardware", &["::inputs"]) {
-        Some(Part::Inputs)
+        Some(TickPart::Inputs)
     } else if is("Hardware", &["::drive"]) {
-        Some(Part::Output)
+        Some(TickPart::Output)
     } else if is("firmware::Firmware", &["::accept", "::act"]) {
-        Some(Part::Control)
+        Some(TickPart::Control)
     } else if is("firmware::Firmware", &["::report", "::predict", "::complete"])
         || path.contains("protocol::queue")
         || is("Hardware", &["::feed_watchdog"])
     {
-        Some(Part::Rest)
+        Some(TickPart::Rest)
     } else {
         None
     }
@@ -72,9 +72,9 @@ mod tests {
             ["core::f32::abs", "upright::control::controller::Controller::predict"].map(str::to_owned);
         let mut chain = names.to_vec();
         let place_of = |chain: &[String]| place_of(chain.to_vec(), &mut HashMap::new());
-        assert_eq!(place_of(&chain), Place { part: None, controller: Some(true) });
+        assert_eq!(place_of(&chain), CodePlace { part: None, controller: Some(true) });
         chain.push("upright::firmware::Firmware<_,_,_>::complete".to_owned());
-        assert_eq!(place_of(&chain), Place { part: Some(Part::Rest), controller: Some(true) });
-        assert_eq!(place_of(&[]), Place::default());
+        assert_eq!(place_of(&chain), CodePlace { part: Some(TickPart::Rest), controller: Some(true) });
+        assert_eq!(place_of(&[]), CodePlace::default());
     }
 }

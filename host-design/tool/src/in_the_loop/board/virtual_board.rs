@@ -9,8 +9,8 @@ use upright::control::actuator::Drive;
 use upright::protocol::simulated_pins::InjectedFault;
 use upright::protocol::{BAUD, telemetry_ticks};
 use upright_board::{
-    Board, Conditions, Image, Input, Meter, Place, PowerStage, Rules, Stopped, TickCost, Time,
-    UNITS_PER_MICROSECOND, UNITS_PER_SECOND, Wire, Wiring, seconds,
+    BoardWiring, CodePlace, Conditions, ExternalLevel, Image, Input, Meter, PowerStage, Rules,
+    SimulatedBoard, Stopped, TickCost, Time, UNITS_PER_MICROSECOND, UNITS_PER_SECOND, seconds,
 };
 use upright_design::harness::{HarnessError, Pace, Pins, Target};
 use upright_design::simulate::Bench;
@@ -68,8 +68,8 @@ pub type Events = Rc<RefCell<Vec<Event>>>;
 
 /// A board that runs the image in lock step with its caller, tick by tick.
 pub struct VirtualBoard {
-    board: Board,
-    wiring: &'static Wiring,
+    board: SimulatedBoard,
+    wiring: &'static BoardWiring,
     /// Force at full duty (N); `None` for a rig with motor data.
     pub(super) force_limit_n: Option<f32>,
     tick_s: f64,
@@ -110,7 +110,8 @@ impl VirtualBoard {
         table: &TableValues,
         at_power_up: &[Input],
     ) -> Result<Self, HarnessError> {
-        let mut board = Board::power_on(image, conditions, RULES).map_err(|error| stopped(image, error))?;
+        let mut board =
+            SimulatedBoard::power_on(image, conditions, RULES).map_err(|error| stopped(image, error))?;
         let stage = board.power_stage();
         let mut target = Self {
             board,
@@ -146,7 +147,7 @@ impl VirtualBoard {
     }
 
     /// The board itself, without the harness.
-    pub fn board(&mut self) -> &mut Board {
+    pub fn board(&mut self) -> &mut SimulatedBoard {
         &mut self.board
     }
 
@@ -161,7 +162,7 @@ impl VirtualBoard {
     }
 
     /// Measures every tick from now on, with these places of the half-words: slower, but with the same results.
-    pub(super) fn measure_ticks(&mut self, places: Vec<Place>) {
+    pub(super) fn measure_ticks(&mut self, places: Vec<CodePlace>) {
         self.meter = Some(Meter::new(places));
     }
 
@@ -206,9 +207,9 @@ impl VirtualBoard {
     /// Applies contacts as levels: emergency stop and limit switches are normally closed to ground; the driver pulls
     /// its line low when it has a fault.
     fn connect(&mut self, contacts: &Contacts) {
-        let level = |low: bool| if low { Wire::Low } else { Wire::High };
-        let closed = |open: bool| if open { Wire::Open } else { Wire::Low };
-        let Wiring { emergency_stop, limits: [low, high], driver_fault, .. } = *self.wiring;
+        let level = |low: bool| if low { ExternalLevel::Low } else { ExternalLevel::High };
+        let closed = |open: bool| if open { ExternalLevel::Open } else { ExternalLevel::Low };
+        let BoardWiring { emergency_stop, limits: [low, high], driver_fault, .. } = *self.wiring;
         for (at, wire) in [
             (emergency_stop, closed(contacts.emergency_stop)),
             (low, closed(contacts.limit_low)),
@@ -269,8 +270,8 @@ impl VirtualBoard {
     fn press_stop(&mut self, edge: Time, open: Time) -> Result<(), HarnessError> {
         self.run(edge)?;
         let edge = self.board.now();
-        self.board.apply(Input::Level(self.wiring.emergency_stop, Wire::Open));
-        self.board.at(edge + open, Input::Level(self.wiring.emergency_stop, Wire::Low));
+        self.board.apply(Input::Level(self.wiring.emergency_stop, ExternalLevel::Open));
+        self.board.at(edge + open, Input::Level(self.wiring.emergency_stop, ExternalLevel::Low));
         let end = self.board.next_tick().map_or(edge, |next| next.saturating_sub(LEAD));
         while self.board.power_stage().main_output && self.board.now() < end {
             self.step()?;

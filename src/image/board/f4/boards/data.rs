@@ -11,11 +11,11 @@ pub(crate) struct BoardData {
     #[cfg_attr(target_os = "none", allow(dead_code, reason = "for the table of the documentation"))]
     pub(crate) title: &'static str,
     /// Type of the microcontroller, which the image checks at start-up.
-    pub(crate) chip: Chip,
+    pub(crate) chip: ChipFamily,
     /// Frequency at HSE (Hz), a multiple of 1 MHz; the image measures it at start-up.
     pub(crate) crystal_hz: u32,
     /// Sources of the clock at HSE, in the order in which they are tried.
-    pub(crate) sources: &'static [Source],
+    pub(crate) sources: &'static [HseSource],
     /// The pins, except that of the status LED.
     pub(crate) wiring: &'static [Wire],
     /// The status LED.
@@ -33,7 +33,7 @@ pub(crate) struct BoardData {
 
 /// A type of microcontroller, with its device identifier (DBGMCU_IDCODE).
 #[derive(Clone, Copy)]
-pub(crate) enum Chip {
+pub(crate) enum ChipFamily {
     /// STM32F405 and STM32F407, which share an identifier.
     F405OrF407 = 0x413,
     /// STM32F446.
@@ -42,7 +42,7 @@ pub(crate) enum Chip {
 
 /// Source of the clock at HSE.
 #[derive(Clone, Copy, PartialEq)]
-pub(crate) enum Source {
+pub(crate) enum HseSource {
     /// A crystal.
     Crystal,
     /// An external clock signal: the oscillator is bypassed.

@@ -1,14 +1,14 @@
 //! ST STM32F407G-DISC1 and its predecessor STM32F4DISCOVERY.
 
 use super::super::wiring::{STANDARD, Signal, output};
-use super::data::{BoardData, Chip, Source};
+use super::data::{BoardData, ChipFamily, HseSource};
 
 pub(crate) const BOARD: BoardData = BoardData {
     name: "discovery-f407",
     title: "STM32F407G-DISC1 (Discovery)",
-    chip: Chip::F405OrF407,
+    chip: ChipFamily::F405OrF407,
     crystal_hz: 8_000_000,
-    sources: &[Source::Crystal],
+    sources: &[HseSource::Crystal],
     wiring: &STANDARD,
     status_led: output(Signal::StatusLed, b'D', 12),
     status_led_is_low: false,

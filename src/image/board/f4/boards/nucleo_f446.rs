@@ -1,14 +1,14 @@
 //! ST NUCLEO-F446RE, all revisions.
 
 use super::super::wiring::{STANDARD, Signal, output};
-use super::data::{BoardData, Chip, Source};
+use super::data::{BoardData, ChipFamily, HseSource};
 
 pub(crate) const BOARD: BoardData = BoardData {
     name: "nucleo-f446",
     title: "NUCLEO-F446RE",
-    chip: Chip::F446,
+    chip: ChipFamily::F446,
     crystal_hz: 8_000_000,
-    sources: &[Source::Clock, Source::Crystal],
+    sources: &[HseSource::Clock, HseSource::Crystal],
     wiring: &STANDARD,
     status_led: output(Signal::StatusLed, b'A', 5),
     status_led_is_low: false,

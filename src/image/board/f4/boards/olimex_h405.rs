@@ -1,14 +1,14 @@
 //! Olimex STM32-H405.
 
 use super::super::wiring::{STANDARD, Signal, output};
-use super::data::{BoardData, Chip, Source};
+use super::data::{BoardData, ChipFamily, HseSource};
 
 pub(crate) const BOARD: BoardData = BoardData {
     name: "olimex-h405",
     title: "Olimex STM32-H405",
-    chip: Chip::F405OrF407,
+    chip: ChipFamily::F405OrF407,
     crystal_hz: 8_000_000,
-    sources: &[Source::Crystal],
+    sources: &[HseSource::Crystal],
     wiring: &STANDARD,
     status_led: output(Signal::StatusLed, b'C', 12),
     status_led_is_low: true,

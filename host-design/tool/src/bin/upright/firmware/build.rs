@@ -4,7 +4,7 @@ use std::io::Write;
 use std::path::PathBuf;
 
 use clap::Args;
-use upright_tool::image::Kind;
+use upright_tool::image::ImageKind;
 
 use super::board::BoardOption;
 use super::built::built;
@@ -35,7 +35,8 @@ pub(crate) struct BuildCommand {
 
 impl BuildCommand {
     pub(crate) fn run(self) -> Result<(), Failure> {
-        let image = built(Kind::Board(self.on.board), self.rig.as_deref(), Wanted::of(self.transitions))?;
+        let image =
+            built(ImageKind::Board(self.on.board), self.rig.as_deref(), Wanted::of(self.transitions))?;
         check_ticks(self.on.board, self.rig.as_deref(), Wanted::of(self.transitions), &image)?;
         writeln!(std::io::stdout(), "{}", image.display())?;
         Ok(())

@@ -4,14 +4,14 @@ use std::path::{Path, PathBuf};
 
 use upright_design::rig::Rig;
 use upright_design::table::{Gains, TableValues};
-use upright_tool::image::{self, Kind};
+use upright_tool::image::{self, ImageKind};
 
 use crate::failure::Failure;
 use crate::progress::with_spinner;
 use crate::variation::{Wanted, with_stored_motions, with_table};
 
 /// Builds the image with the table of the rig and its stored motions, or with src/gains.rs as it is.
-pub(super) fn built(kind: Kind, rig: Option<&Path>, wanted: Wanted) -> Result<PathBuf, Failure> {
+pub(super) fn built(kind: ImageKind, rig: Option<&Path>, wanted: Wanted) -> Result<PathBuf, Failure> {
     let Some(path) = rig else {
         return Ok(with_spinner("building the image", || image::build(kind))?);
     };

@@ -13,7 +13,7 @@ use upright_design::rig::Rig;
 use upright_design::simulate::{Scenario, Sensing};
 use upright_design::table::TableValues;
 use upright_design::verify::at_rest_disturbed;
-use upright_tool::image::{self, Board, Kind};
+use upright_tool::image::{self, BoardName, ImageKind};
 use upright_tool::in_the_loop::{self, Span, TickFigures};
 use upright_tool::project::checkout;
 
@@ -56,7 +56,7 @@ impl CyclesCommand {
     pub(crate) fn run(self) -> Result<(), Failure> {
         let (rig, table) = designed(&self.rig, Wanted::SwingUp)?;
         let image = with_spinner("building the image", || {
-            image::build_for(Kind::Board(self.on.board), &rig, &table)
+            image::build_for(ImageKind::Board(self.on.board), &rig, &table)
         })?;
         let image = read(&image)?;
         let cycles = measured(&rig, &table, &image, self.on.board, self.law, self.duration)?;
@@ -79,7 +79,7 @@ pub(super) fn measured(
     rig: &Rig,
     table: &TableValues,
     image: &Image,
-    board: Board,
+    board: BoardName,
     law: Law,
     duration_s: f64,
 ) -> Result<in_the_loop::TickCycles, Failure> {
@@ -95,7 +95,7 @@ const CHECKED_S: f64 = 0.5;
 /// Refuses an image with a tick that is too long for the board, and one that has an observer but does not balance, so
 /// that its ticks cannot be measured. Without `rig`, the rig of src/gains.rs is looked up in `rigs/`.
 pub(super) fn check_ticks(
-    board: Board,
+    board: BoardName,
     rig: Option<&Path>,
     wanted: Wanted,
     image: &Path,

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 
 use clap::Args;
-use upright_tool::image::Kind;
+use upright_tool::image::ImageKind;
 
 use super::board::BoardOption;
 use super::built::built;
@@ -41,7 +41,8 @@ impl FlashCommand {
                 "probe-rs is missing: install it (https://probe.rs, or `cargo install probe-rs-tools --locked`)",
             ));
         }
-        let image = built(Kind::Board(self.on.board), self.rig.as_deref(), Wanted::of(self.transitions))?;
+        let image =
+            built(ImageKind::Board(self.on.board), self.rig.as_deref(), Wanted::of(self.transitions))?;
         check_ticks(self.on.board, self.rig.as_deref(), Wanted::of(self.transitions), &image)?;
         probe_rs(&["download", "--verify", "--chip", self.on.board.chip()], Some(&image))?;
         probe_rs(&["reset", "--chip", self.on.board.chip()], None)

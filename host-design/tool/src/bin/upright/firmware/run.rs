@@ -9,7 +9,7 @@ use upright_design::harness::Recording;
 use upright_design::rig::Rig;
 use upright_design::simulate::Scenario;
 use upright_design::table::TableValues;
-use upright_tool::in_the_loop::{Link, Place, RunError, VirtualBoard, run, run_compared, serve};
+use upright_tool::in_the_loop::{PinLink, RunError, RunPlace, VirtualBoard, run, run_compared, serve};
 
 use crate::failure::Failure;
 use crate::progress::with_spinner;
@@ -77,10 +77,10 @@ impl RunCommand {
         })
     }
 
-    fn link(&self) -> Link {
+    fn link(&self) -> PinLink {
         match self.link {
-            LinkName::Files => Link::Files,
-            LinkName::Usart => Link::Usart,
+            LinkName::Files => PinLink::Files,
+            LinkName::Usart => PinLink::Usart,
         }
     }
 
@@ -109,9 +109,9 @@ impl RunCommand {
     ) -> Result<Recording, Failure> {
         let built = self.target.built(self.link(), ours, table)?;
         match built.place(scenario.seed) {
-            Place::Host => Ok(with_spinner("running it", || run(real, table, scenario, Place::Host))?),
-            Place::Board { image, conditions } => on_the_board(real, table, scenario, image, &conditions),
-            place @ Place::Qemu { .. } => {
+            RunPlace::Host => Ok(with_spinner("running it", || run(real, table, scenario, RunPlace::Host))?),
+            RunPlace::Board { image, conditions } => on_the_board(real, table, scenario, image, &conditions),
+            place @ RunPlace::Qemu { .. } => {
                 let recording = with_spinner("running it in QEMU", || run(real, table, scenario, place))?;
                 compare(real, table, scenario, &recording)?;
                 Ok(recording)
@@ -147,7 +147,7 @@ fn on_the_board(
 
 /// Repeats the run on the host and compares the ticks bit by bit.
 fn compare(rig: &Rig, table: &TableValues, scenario: &Scenario, qemu: &Recording) -> Result<(), Failure> {
-    let host = run(rig, table, scenario, Place::Host)?;
+    let host = run(rig, table, scenario, RunPlace::Host)?;
     let difference = host.ticks.iter().zip(&qemu.ticks).position(|(host, qemu)| host != qemu);
     match difference {
         Some(tick) => {

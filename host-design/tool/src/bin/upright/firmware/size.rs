@@ -7,7 +7,8 @@ use std::path::PathBuf;
 use clap::Args;
 use serde_json::json;
 use upright_tool::image::{
-    CODE_LIMIT, Image, Kind, Part, RAM_LIMIT, StackBound, StackError, forbidden_functions, size, stack_bound,
+    CODE_LIMIT, ImageKind, ImagePart, LinkedImage, RAM_LIMIT, StackBound, StackError, forbidden_functions,
+    size, stack_bound,
 };
 
 use super::board::BoardOption;
@@ -41,9 +42,9 @@ impl SizeCommand {
     pub(crate) fn run(self) -> Result<(), Failure> {
         let path = match self.elf {
             Some(path) => path,
-            None => built(Kind::Board(self.on.board), self.rig.as_deref(), Wanted::SwingUp)?,
+            None => built(ImageKind::Board(self.on.board), self.rig.as_deref(), Wanted::SwingUp)?,
         };
-        let image = Image::read(&path)?;
+        let image = LinkedImage::read(&path)?;
         let (size, stack, forbidden) = (size(&image)?, stack_bound(&image), forbidden_functions(&image));
         let wrong = wrong(&size, &stack, &forbidden);
         let text = if self.json {
@@ -95,7 +96,7 @@ fn wrong(
 
 fn table(size: &upright_tool::image::Size, stack: &Result<StackBound, StackError>) -> String {
     let mut text = String::new();
-    let mut rows = |head: &str, parts: &[Part]| {
+    let mut rows = |head: &str, parts: &[ImagePart]| {
         // Writing to a string cannot fail.
         _ = writeln!(text, "{head:<40} {:>8} {:>8}", "flash", "RAM");
         for part in parts {
@@ -106,9 +107,9 @@ fn table(size: &upright_tool::image::Size, stack: &Result<StackBound, StackError
     rows("section (bytes)", &size.sections);
     rows("crate (bytes)", &size.crates);
     let all = [
-        Part { name: "sum".to_owned(), flash: size.flash, ram: size.ram },
-        Part { name: "without tables".to_owned(), flash: size.code(), ram: size.variables() },
-        Part { name: "limit of that".to_owned(), flash: CODE_LIMIT, ram: RAM_LIMIT },
+        ImagePart { name: "sum".to_owned(), flash: size.flash, ram: size.ram },
+        ImagePart { name: "without tables".to_owned(), flash: size.code(), ram: size.variables() },
+        ImagePart { name: "limit of that".to_owned(), flash: CODE_LIMIT, ram: RAM_LIMIT },
     ];
     rows("image (bytes)", &all);
     if let Ok(stack) = stack {

@@ -1,0 +1,50 @@
+//! Why an image cannot be built.
+
+use std::path::PathBuf;
+
+use upright_design::table::WriteError;
+
+use super::board::BoardName;
+use crate::project::NoCheckout;
+
+/// The target that images are compiled for: Cortex-M4 with single-precision floating point.
+pub const TARGET: &str = "thumbv7em-none-eabihf";
+
+/// Why an image could not be built.
+#[derive(Debug, thiserror::Error)]
+pub enum BuildError {
+    /// No compiler for the target.
+    #[error(
+        "no compiler for {TARGET}: run `rustup target add {TARGET}`, or on Debian \
+         `apt-get install lld rustc-web cargo-web rust-web-src`"
+    )]
+    NoCompiler,
+    /// The rig has more encoders than the board has timers for.
+    #[error("{board} counts {} encoders, and this rig has {needed}: use another board (docs/board.md)", board.encoders())]
+    Encoders {
+        /// Which board.
+        board: BoardName,
+        /// Number of the rig's sensors.
+        needed: usize,
+    },
+    /// There is no source to build from.
+    #[error(transparent)]
+    NoCheckout(#[from] NoCheckout),
+    /// The compiler cannot be started.
+    #[error("{0} cannot be started: {1}")]
+    Start(&'static str, std::io::Error),
+    /// The compiler reports errors.
+    #[error("the image cannot be built; the compiler says:\n{0}")]
+    Compiler(String),
+    /// Its gain table, or the image itself, cannot be written.
+    #[error(transparent)]
+    Write(#[from] WriteError),
+    /// A file of the image cannot be read.
+    #[error("{}: {source}", path.display())]
+    File {
+        /// Path of the file.
+        path: PathBuf,
+        /// Why.
+        source: std::io::Error,
+    },
+}
