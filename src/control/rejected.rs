@@ -15,9 +15,6 @@ pub enum Rejected {
     Setpoint,
     /// The table holds no observer, so the controller cannot run from encoders.
     NoObserver,
-    /// Invalid parameters for shaking: the largest force is not positive or exceeds the force limit, or the spring or
-    /// damper constant is negative or not finite.
-    Shaking,
 }
 
 impl core::fmt::Display for Rejected {
@@ -29,7 +26,6 @@ impl core::fmt::Display for Rejected {
             Rejected::NoObserver => {
                 "the gain table holds no observer: give the rig its encoders and [kalman]"
             }
-            Rejected::Shaking => "the rig cannot be shaken with these forces",
         })
     }
 }

@@ -3,7 +3,7 @@
 use super::Firmware;
 use crate::board::Contacts;
 use crate::control::controller::Rejected;
-use crate::protocol::message::{Answer, Command, Info, PROTOCOL, Request, Statistics};
+use crate::protocol::message::{Answer, Command, Info, InvalidRequest, PROTOCOL, Request, Statistics};
 use crate::supervision::calibration::links_hang;
 use crate::supervision::inhibits::Inhibits;
 use crate::supervision::supervisor::State;
@@ -29,7 +29,8 @@ impl<const NX: usize, const NY: usize, S: SwingUp<NX, NY>> Firmware<'_, NX, NY, 
     /// Carries out a command and returns the answer.
     pub(super) fn answer(&mut self, command: &Command) -> Answer {
         let done = |result: Result<(), _>| result.map_or_else(Answer::NotNow, |()| Answer::Done);
-        let taken = |result: Result<(), _>| result.map_or_else(Answer::Rejected, |()| Answer::Done);
+        let rejected = |reason| Answer::Rejected(InvalidRequest::Controller(reason));
+        let taken = |result: Result<(), _>| result.map_or_else(rejected, |()| Answer::Done);
         if let Request::Arm | Request::Goto(_) | Request::Shake(_) = command.request {
             self.restart_lockout();
         }

@@ -3,8 +3,7 @@
 use super::Firmware;
 use crate::board::{Inputs, Output};
 use crate::control::actuator::Drive;
-use crate::control::controller::Rejected;
-use crate::protocol::message::Answer;
+use crate::protocol::message::{Answer, InvalidRequest};
 use crate::supervision::calibration::links_hang;
 use crate::supervision::inhibits::Inhibits;
 use crate::supervision::shaking::{FORCES, Shaking};
@@ -18,7 +17,7 @@ impl<const NX: usize, const NY: usize, S: SwingUp<NX, NY>> Firmware<'_, NX, NY, 
     /// Begins to shake the rig. `id` is that of the command.
     pub(super) fn begin_shaking(&mut self, shaking: Shaking, id: u64) -> Answer {
         if !shaking.is_sound(self.table.force_limit_n) {
-            return Answer::Rejected(Rejected::Shaking);
+            return Answer::Rejected(InvalidRequest::Shaking);
         }
         let counts = *self.controller.encoders().counts();
         let limits = &self.table.limits;

@@ -19,7 +19,7 @@ use crate::supervision::supervisor::State;
 use crate::table::{Equilibrium, Law};
 
 /// Version of these messages; a host with another version must not send commands.
-pub const PROTOCOL: u8 = 7;
+pub const PROTOCOL: u8 = 8;
 
 /// A command, host to firmware.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -118,7 +118,7 @@ pub enum Answer {
     /// Refused for now, because of these inhibits.
     NotNow(Inhibits),
     /// Refused: the request is invalid.
-    Rejected(Rejected),
+    Rejected(InvalidRequest),
     /// Answer to [`Request::Info`].
     Info(Info),
     /// Answer to [`Request::Cause`].
@@ -127,6 +127,25 @@ pub enum Answer {
     Crash(Option<CrashRecord>),
     /// Answer to [`Request::Statistics`].
     Statistics(Statistics),
+}
+
+/// Why a request is invalid.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+pub enum InvalidRequest {
+    /// The controller rejects it.
+    Controller(Rejected),
+    /// Invalid parameters for shaking: the largest force is not positive or exceeds the force limit, or the spring or
+    /// damper constant is negative or not finite.
+    Shaking,
+}
+
+impl core::fmt::Display for InvalidRequest {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        match self {
+            InvalidRequest::Controller(rejected) => rejected.fmt(f),
+            InvalidRequest::Shaking => f.write_str("the rig cannot be shaken with these forces"),
+        }
+    }
 }
 
 /// Identity of a firmware: version, rig and image.

@@ -37,20 +37,4 @@ pub mod simulated_pins;
 pub mod tick_log;
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn the_longest_telemetry_fits_on_the_line_at_every_tick() {
-        for microseconds in 119..20_000 {
-            let tick_s = microseconds as f32 * 1e-6;
-            let ticks = telemetry_ticks(tick_s);
-            let bits_per_s = 10.0 * serial_link::MAX_MESSAGE as f32 / (f32::from(ticks) * tick_s);
-            assert!(bits_per_s < BAUD as f32, "{tick_s} s, {ticks} ticks: {bits_per_s} Bd");
-            // Negative control: at every tenth tick it does not fit if the tick is short.
-            let at_tenth = serial_link::MAX_MESSAGE as f32 / tick_s;
-            assert_eq!(at_tenth > BAUD as f32, microseconds < 738);
-        }
-        assert_eq!([0.000_5, 0.001, 0.002, 0.005, 0.02].map(telemetry_ticks), [20, 10, 5, 2, 1]);
-    }
-}
+mod tests;
