@@ -9,7 +9,9 @@ use serde::{Deserialize, Serialize};
 
 #[cfg(feature = "firmware")]
 use crate::table::columns::columns;
-use crate::table::part::{Part, Reader, Resize, Words, WordsMut, part};
+#[cfg(test)]
+use crate::table::part::WordsMut;
+use crate::table::part::{Part, Reader, Resize, Words, part};
 
 /// A control law.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -150,6 +152,7 @@ impl<P: Part> Part for PerLaw<P> {
         self.lqr.part(at).or_else(|| self.pole_placement.part(at))
     }
 
+    #[cfg(test)]
     fn part_mut(&mut self, at: &mut usize) -> Option<WordsMut<'_>> {
         match self.lqr.part_mut(at) {
             Some(words) => Some(words),

@@ -44,7 +44,9 @@ pub use law::{Law, LawGains, PerLaw};
 pub use limits::Limits;
 pub use motor::MotorMap;
 pub use observer::ObserverGains;
-pub use part::{Part, Reader, Resize, Shape, Words, WordsMut};
+#[cfg(test)]
+pub(crate) use part::WordsMut;
+pub use part::{Part, Reader, Resize, Shape, Words};
 pub use swing_up::{MotionLimits, MotionTable, Motions, NoSwingUp, SwingUp, SwingUpTable, TransitionTable};
 pub use thresholds::{MotorTest, Thresholds};
 

@@ -52,7 +52,8 @@ impl Words<'_> {
     }
 }
 
-/// The same words as [`Words`], mutable.
+/// The same words as [`Words`], mutable, with which tests damage a table.
+#[cfg(test)]
 #[derive(Debug, PartialEq)]
 pub enum WordsMut<'a> {
     /// Floating-point numbers.
@@ -90,6 +91,7 @@ pub trait Part {
     fn part(&self, at: &mut usize) -> Option<Words<'_>>;
 
     /// The same as [`part`](Self::part), mutable.
+    #[cfg(test)]
     fn part_mut(&mut self, at: &mut usize) -> Option<WordsMut<'_>>;
 
     /// Passes all names, documentation and values to `reader`, in the order of declaration.
@@ -131,6 +133,7 @@ macro_rules! words {
                 leaf(at, Words::$kind(core::slice::from_ref(self)))
             }
 
+            #[cfg(test)]
             fn part_mut(&mut self, at: &mut usize) -> Option<WordsMut<'_>> {
                 leaf(at, WordsMut::$kind(core::slice::from_mut(self)))
             }
@@ -152,6 +155,7 @@ macro_rules! words {
                 leaf(at, Words::$kind(self))
             }
 
+            #[cfg(test)]
             fn part_mut(&mut self, at: &mut usize) -> Option<WordsMut<'_>> {
                 leaf(at, WordsMut::$kind(self))
             }
@@ -181,6 +185,7 @@ impl Part for u64 {
         leaf(at, Words::U64(self))
     }
 
+    #[cfg(test)]
     fn part_mut(&mut self, at: &mut usize) -> Option<WordsMut<'_>> {
         leaf(at, WordsMut::U64(self))
     }
@@ -210,6 +215,7 @@ macro_rules! slice {
                 leaf(at, Words::$kind(self))
             }
 
+            #[cfg(test)]
             fn part_mut(&mut self, at: &mut usize) -> Option<WordsMut<'_>> {
                 leaf(at, WordsMut::Fixed)
             }
@@ -236,6 +242,7 @@ impl<const R: usize, const C: usize> Part for SMatrix<f32, R, C> {
         leaf(at, Words::F32(self.as_slice()))
     }
 
+    #[cfg(test)]
     fn part_mut(&mut self, at: &mut usize) -> Option<WordsMut<'_>> {
         leaf(at, WordsMut::F32(self.as_mut_slice()))
     }
@@ -267,6 +274,7 @@ impl<P: Part> Part for Option<P> {
         }
     }
 
+    #[cfg(test)]
     fn part_mut(&mut self, at: &mut usize) -> Option<WordsMut<'_>> {
         match (leaf(at, WordsMut::Fixed), self) {
             (None, Some(part)) => part.part_mut(at),
@@ -340,6 +348,7 @@ macro_rules! part {
                 None
             }
 
+            #[cfg(test)]
             fn part_mut(&mut self, at: &mut usize) -> Option<$crate::table::part::WordsMut<'_>> {
                 let Self { $($field,)+ $($seal: _)? } = self;
                 $(if let Some(words) = $crate::table::part::Part::part_mut($field, at) {

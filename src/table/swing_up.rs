@@ -10,7 +10,9 @@ use crate::table::equilibrium::Equilibrium;
 use crate::table::error::TableError;
 use crate::table::format::TABLE_FORMAT;
 use crate::table::gain_table::GainTable;
-use crate::table::part::{Part, Reader, Resize, Words, WordsMut, is_finite, part};
+#[cfg(test)]
+use crate::table::part::WordsMut;
+use crate::table::part::{Part, Reader, Resize, Words, is_finite, part};
 use crate::table::thresholds::Thresholds;
 
 part! {
@@ -54,6 +56,7 @@ impl Part for &[TransitionTable<'_>] {
         self.iter().find_map(|transition| transition.part(at))
     }
 
+    #[cfg(test)]
     fn part_mut(&mut self, _: &mut usize) -> Option<WordsMut<'_>> {
         None
     }
