@@ -23,12 +23,10 @@ use upright::gains;
 
 /// Processor cycles per tick, at the period for which the gains were designed.
 const CYCLES_PER_TICK: u32 = {
-    let cycles = gains::TICK_S as f64 * board::CLOCK_HZ as f64 + 0.5;
-    assert!(
-        cycles >= 20_000.0 && cycles < 16_777_216.0,
-        "tick.period_s: the board's timer cannot make this tick"
-    );
-    cycles as u32
+    let tick_us = (gains::TICK_S as f64 * 1e6 + 0.5) as u32;
+    let [shortest, longest] = board::TICK_US;
+    assert!(tick_us >= shortest && tick_us <= longest, "tick.period_s: the board cannot make this tick");
+    (gains::TICK_S as f64 * board::CLOCK_HZ as f64 + 0.5) as u32
 };
 
 #[rtic::app(device = crate::pac, peripherals = true)]

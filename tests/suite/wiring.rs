@@ -5,6 +5,7 @@
 #[path = "../../src/image/board/f4"]
 mod f4 {
     pub mod boards;
+    pub mod ticks;
     pub mod wiring;
 }
 
@@ -98,4 +99,14 @@ fn the_page_shows_the_boards_of_the_image_and_the_tool_names_them() {
     assert_ne!(documented(&PAGE.replace("| 3 V |", "| 3.3 V |"), "boards"), boards);
     assert_eq!(ALL.map(|board| board.name), BoardName::ALL.map(BoardName::name));
     assert_eq!(ALL.map(|board| encoders(board.wiring)), BoardName::ALL.map(BoardName::encoders));
+}
+
+#[test]
+fn the_tool_knows_the_ticks_that_the_boards_can_make() {
+    let image = f4::ticks::TICK_US.map(|us| f64::from(us) * 1e-6);
+    for board in BoardName::ALL {
+        let close =
+            board.tick_s().into_iter().zip(image).all(|(tool, image)| (tool / image - 1.0).abs() < 1e-9);
+        assert!(close, "{board}: {:?} s, the image {image:?} s", board.tick_s());
+    }
 }

@@ -47,6 +47,11 @@ impl BoardName {
         self.conditions(0).wiring.encoders.len()
     }
 
+    /// Shortest and longest tick that it can make (s).
+    pub const fn tick_s(self) -> [f64; 2] {
+        [0.000_12, 0.033]
+    }
+
     /// Conditions of the virtual board, at typical values; `seed` determines everything random.
     pub fn conditions(self, seed: u64) -> Conditions {
         let mut conditions = Conditions::f405(seed);

@@ -9,7 +9,7 @@ use super::compiler::{Compiler, compiler, target_directory};
 use super::error::{BuildError, TARGET};
 use super::kept;
 use crate::project::checkout;
-use upright::gains::SENSORS;
+use upright::gains::{SENSORS, TICK_S};
 use upright_design::rig::Rig;
 use upright_design::table::{TableValues, gains_source, write_atomically};
 
@@ -49,9 +49,9 @@ impl ImageKind {
 /// Builds the image with the committed gain table, `src/gains.rs`; returns the path of the ELF file.
 ///
 /// # Errors
-/// [`BuildError`] if there is no compiler, or it fails.
+/// [`BuildError`] if the board cannot serve the table's rig, there is no compiler, or it fails.
 pub fn build(kind: ImageKind) -> Result<PathBuf, BuildError> {
-    check_encoders(kind, SENSORS)?;
+    check_board(kind, SENSORS, f64::from(TICK_S))?;
     compile(kind, None, kind.name())
 }
 
@@ -60,7 +60,7 @@ pub fn build(kind: ImageKind) -> Result<PathBuf, BuildError> {
 /// # Errors
 /// As for [`build`].
 pub fn build_for(kind: ImageKind, rig: &Rig, table: &TableValues) -> Result<PathBuf, BuildError> {
-    check_encoders(kind, table.sensors())?;
+    check_board(kind, table.sensors(), rig.tick.period_s)?;
     let source = gains_source(rig, table);
     // An included file cannot have module documentation.
     let included = source.lines().filter(|line| !line.starts_with("//!")).collect::<Vec<_>>().join("\n");
@@ -76,11 +76,16 @@ pub fn build_for(kind: ImageKind, rig: &Rig, table: &TableValues) -> Result<Path
     compile(kind, Some(&gains), &name)
 }
 
-fn check_encoders(kind: ImageKind, needed: usize) -> Result<(), BuildError> {
-    match kind.board() {
-        Some(board) if needed > board.encoders() => Err(BuildError::Encoders { board, needed }),
-        _ => Ok(()),
+/// Checks what the board of the image can do before the compiler is started, whose errors would name lines of the image.
+fn check_board(kind: ImageKind, needed: usize, tick_s: f64) -> Result<(), BuildError> {
+    let Some(board) = kind.board() else { return Ok(()) };
+    if needed > board.encoders() {
+        return Err(BuildError::Encoders { board, needed });
     }
+    let [shortest_s, longest_s] = board.tick_s();
+    // The committed table has the tick as f32.
+    let is_possible = (shortest_s * (1.0 - 1e-6)..=longest_s * (1.0 + 1e-6)).contains(&tick_s);
+    if is_possible { Ok(()) } else { Err(BuildError::Tick { board, tick_s }) }
 }
 
 /// Waits until no other process compiles an image, and keeps others waiting until the file is dropped. The compiler
@@ -135,5 +140,26 @@ fn images() -> Result<PathBuf, BuildError> {
     match std::fs::create_dir_all(&directory) {
         Ok(()) => Ok(directory),
         Err(source) => Err(BuildError::File { path: directory, source }),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_the_board_cannot_do_is_refused_before_the_compiler_is_started() {
+        let feather = ImageKind::Board(BoardName::FeatherF405);
+        for tick_s in [0.05, 1.1e-4] {
+            let refused = check_board(feather, 2, tick_s).unwrap_err().to_string();
+            let tick = format!("0.12 to 33 ms, and this rig's is {} ms", tick_s * 1e3);
+            assert!(refused.starts_with("feather-f405") && refused.contains(&tick), "{refused}");
+        }
+        assert!(check_board(feather, 3, 1e-3).unwrap_err().to_string().contains("counts 2 encoders"));
+        // As in the rig file, and as rounded in the table.
+        for tick_s in [1.2e-4, f64::from(1.2e-4_f32), 1e-3, 0.033, f64::from(0.033_f32)] {
+            assert!(check_board(feather, 2, tick_s).is_ok(), "{tick_s}");
+        }
+        assert!(check_board(ImageKind::InTheLoop, 5, 0.05).is_ok());
     }
 }

@@ -27,6 +27,17 @@ pub enum BuildError {
         /// Number of the rig's sensors.
         needed: usize,
     },
+    /// The board cannot make the rig's tick.
+    #[error(
+        "{board} makes ticks of {} to {} ms, and this rig's is {} ms: change tick.period_s (docs/board.md)",
+        board.tick_s()[0] * 1e3, board.tick_s()[1] * 1e3, (tick_s * 1e6).round() / 1e3
+    )]
+    Tick {
+        /// Which board.
+        board: BoardName,
+        /// The rig's tick (s).
+        tick_s: f64,
+    },
     /// There is no source to build from.
     #[error(transparent)]
     NoCheckout(#[from] NoCheckout),

@@ -9,6 +9,7 @@ mod motor;
 mod pins;
 mod serial;
 mod supply;
+mod ticks;
 mod watchdog;
 mod wiring;
 
@@ -25,6 +26,7 @@ use clock::Clock;
 use motor::Motor;
 pub(crate) use serial::{DmaBuffer, DmaLine};
 use supply::Supply;
+pub(crate) use ticks::TICK_US;
 use watchdog::Watchdog;
 
 /// The pins and peripherals of the control task.

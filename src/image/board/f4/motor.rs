@@ -36,8 +36,7 @@ const PERIODS_PER_TICK: u32 = {
 };
 /// Timer clocks per PWM period.
 const PERIOD: u32 = CYCLES_PER_TICK / PERIODS_PER_TICK;
-const _: () =
-    assert!(PERIOD <= 65_535, "tick.period_s: this board's PWM cannot be kept up over so long a tick");
+const _: () = assert!(PERIOD <= 65_535, "the longest tick is too long for this timer");
 /// PWM periods until the motor is off after ticks stop.
 const PERIODS: u32 = 3 * PERIODS_PER_TICK;
 /// Shortest inactive time of the output in each period (timer clocks): power stages with a bootstrap supply need the

@@ -31,6 +31,9 @@ use usart::{PinUsart as Channel, SerialUsart as Serial, exit, open};
 /// The emulator's core clock (Hz); nothing depends on real time.
 pub(crate) const CLOCK_HZ: u32 = 168_000_000;
 
+/// Any tick (µs): the emulator takes as long for it as it needs.
+pub(crate) const TICK_US: [u32; 2] = [1, u32::MAX];
+
 /// Number of bytes sent over the serial line.
 static SENT: AtomicU32 = AtomicU32::new(0);
 
