@@ -22,7 +22,8 @@ macro_rules! table_format {
             "this gain table has format ",
             $other,
             ", but this version of `upright` has another one: write the table again with `upright design RIG` of the \
-             same version"
+             same version; if it is src/gains.rs of the tool's own checkout, put the committed one back first: `git \
+             checkout src/gains.rs`"
         ))
     };
 }

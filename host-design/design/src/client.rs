@@ -13,7 +13,8 @@ use upright::protocol::message::{Answer, Command, Info, Message, PROTOCOL, Reply
 use upright::protocol::serial_link::{MAX_COMMAND, MAX_MESSAGE};
 use upright::protocol::tick_log::TickLog;
 
-use crate::table::{MAX_SENSORS, MAX_STATES};
+use crate::rig::Rig;
+use crate::table::{MAX_SENSORS, MAX_STATES, TableValues};
 
 /// Telemetry of a firmware of any size: its frames are the same bytes whatever the capacity of the lists.
 pub type AnyTelemetry = Telemetry<MAX_STATES, MAX_SENSORS>;
@@ -21,8 +22,29 @@ pub type AnyTelemetry = Telemetry<MAX_STATES, MAX_SENSORS>;
 /// A part of the tick log (a record of every tick), of a firmware of any size.
 pub type AnyTickLog = TickLog<MAX_SENSORS>;
 
+/// The rig that the host believes to talk to, by the facts that the firmware reports in [`Info`].
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ExpectedRig {
+    /// Hash of the rig file's values.
+    pub hash: u64,
+    /// Control period (s).
+    pub tick_s: f32,
+}
+
+impl From<&Rig> for ExpectedRig {
+    fn from(rig: &Rig) -> Self {
+        Self { hash: rig.hash(), tick_s: rig.tick.period_s as f32 }
+    }
+}
+
+impl From<&TableValues> for ExpectedRig {
+    fn from(table: &TableValues) -> Self {
+        Self { hash: table.rig_hash, tick_s: table.tick_s }
+    }
+}
+
 /// The firmware is not the one that the host believes to talk to.
-#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum Mismatch {
     /// It uses another version of the messages.
     #[error(
@@ -32,14 +54,26 @@ pub enum Mismatch {
     Protocol(u8),
     /// It was built for another rig.
     #[error(
-        "the firmware was built for a rig with hash {found:016x}, the rig file has {wanted:016x}: build and flash the \
-         firmware again, or give its own rig file"
+        "the firmware was built for a rig with hash {:016x} and runs at a tick of {} s, the rig file has {:016x} and \
+         {} s: build and flash the firmware again, or give its own rig file",
+        .found.hash, .found.tick_s, .wanted.hash, .wanted.tick_s
     )]
     Rig {
-        /// Hash in the firmware.
-        found: u64,
-        /// Hash of the rig file.
-        wanted: u64,
+        /// The firmware's rig.
+        found: ExpectedRig,
+        /// The rig file's.
+        wanted: ExpectedRig,
+    },
+    /// It was built for the rig, but its timer makes another tick.
+    #[error(
+        "the firmware was built for this rig, but its board's timer makes a tick of {found_s} s instead of {wanted_s} s: \
+         set the timer to TICK_S of the gain table, and flash the firmware again"
+    )]
+    Tick {
+        /// Tick of the timer (s).
+        found_s: f32,
+        /// Tick of the rig file (s).
+        wanted_s: f32,
     },
 }
 
@@ -52,14 +86,20 @@ impl Mismatch {
         if info.protocol == PROTOCOL { Ok(()) } else { Err(Self::Protocol(info.protocol)) }
     }
 
-    /// Checks the version of the messages, and that the firmware is that of the rig with the hash `wanted`.
+    /// Checks the version of the messages, and that the firmware is that of the rig `wanted`.
     ///
     /// # Errors
     /// [`Mismatch`]
-    pub fn check(info: &Info, wanted: u64) -> Result<(), Self> {
+    pub fn check(info: &Info, wanted: ExpectedRig) -> Result<(), Self> {
         Self::check_protocol(info)?;
-        let found = info.rig_hash;
-        if found == wanted { Ok(()) } else { Err(Self::Rig { found, wanted }) }
+        let found = ExpectedRig { hash: info.rig_hash, tick_s: info.tick_s };
+        if found.hash != wanted.hash {
+            return Err(Self::Rig { found, wanted });
+        }
+        if found.tick_s != wanted.tick_s {
+            return Err(Self::Tick { found_s: found.tick_s, wanted_s: wanted.tick_s });
+        }
+        Ok(())
     }
 }
 

@@ -14,7 +14,7 @@ use upright::supervision::supervisor::State;
 use super::error::HarnessError;
 use super::operator::Status;
 use super::target::{Pace, Pins, Target};
-use crate::client::{AnyTelemetry, AnyTickLog, Client, Mismatch, Received};
+use crate::client::{AnyTelemetry, AnyTickLog, Client, ExpectedRig, Mismatch, Received};
 
 /// Commands are numbered from 1, not by the time.
 const NOW: Duration = Duration::ZERO;
@@ -193,13 +193,13 @@ impl<'a> Session<'a> {
         Ok(None)
     }
 
-    /// Asks for the firmware's identity, and checks that it was built for the rig with this hash.
+    /// Asks for the firmware's identity, and checks that it was built for the rig `wanted`.
     ///
     /// # Errors
     /// [`HarnessError`] if it is for another rig, or does not answer.
-    pub fn check_info(&mut self, rig_hash: u64, inputs: &Pins) -> Result<Info, HarnessError> {
+    pub fn check_info(&mut self, wanted: ExpectedRig, inputs: &Pins) -> Result<Info, HarnessError> {
         match self.ask(Request::Info, inputs)? {
-            Answer::Info(info) => Ok(Mismatch::check(&info, rig_hash).map(|()| info)?),
+            Answer::Info(info) => Ok(Mismatch::check(&info, wanted).map(|()| info)?),
             answer => Err(HarnessError::Refused { request: Request::Info, answer }),
         }
     }

@@ -70,7 +70,7 @@ impl<'t> Harness<'t> {
             is_held: false,
         };
         let hanging = harness.inputs();
-        harness.session.check_info(table.rig_hash, &hanging)?;
+        harness.session.check_info(table.into(), &hanging)?;
         harness.session.ask(Request::Select(scenario.law), &hanging)?;
         let every = harness.session.pace().telemetry_ticks;
         harness.session.ask(Request::Telemetry(every), &hanging)?;

@@ -14,7 +14,7 @@ use super::error::IdentifyError;
 use super::feed::Feed;
 use super::log::Log;
 use super::recorder::Recorder;
-use crate::client::{Client, Mismatch, PATIENCE, Received};
+use crate::client::{Client, ExpectedRig, Mismatch, PATIENCE, Received};
 use crate::harness::HarnessError;
 use crate::rig::Rig;
 use crate::table::TableValues;
@@ -56,7 +56,7 @@ pub enum LineError {
 
 /// The host's part while a firmware at the other end of a line shakes its machine: requests, forces, and the log.
 pub struct OverLine {
-    rig_hash: u64,
+    expected: ExpectedRig,
     requests: VecDeque<Request>,
     client: Client,
     /// Time of the last message.
@@ -86,7 +86,7 @@ impl OverLine {
         let requests =
             [Request::Info, Request::Telemetry(telemetry_ticks), Request::Log(true), feed.begin()].into();
         Ok(Self {
-            rig_hash: rig.hash(),
+            expected: rig.into(),
             requests,
             client: Client::default(),
             heard: now,
@@ -167,7 +167,7 @@ impl OverLine {
         match answer {
             Answer::NotNow(inhibits) => return Err(LineError::NotNow(inhibits)),
             Answer::Rejected(_) => return Err(HarnessError::Refused { request, answer }.into()),
-            Answer::Info(info) => Mismatch::check(&info, self.rig_hash).map_err(HarnessError::from)?,
+            Answer::Info(info) => Mismatch::check(&info, self.expected).map_err(HarnessError::from)?,
             _ => self.is_shaken |= matches!(request, Request::Shake(_)),
         }
         Ok(())

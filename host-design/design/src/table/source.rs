@@ -18,6 +18,25 @@ pub fn gains_source(rig: &Rig, table: &TableValues) -> String {
     out
 }
 
+/// The facts of a generated source that say what its table is for: what each is called, and the text before its value.
+const IDENTITY: [(&str, &str); 4] = [
+    ("format", "format: upright::table_format!("),
+    ("rig", "pub const RIG: &str = "),
+    ("tick (s)", "pub const TICK_S: f32 = "),
+    ("rig hash", "pub const RIG_HASH: u64 = "),
+];
+
+/// The format, rig, tick and rig hash in which the generated source `found` differs from `wanted`: "rig "a", not "b"".
+pub fn identity_differences(found: &str, wanted: &str) -> Vec<String> {
+    let value = |source: &str, before: &str| {
+        let line = source.lines().find_map(|line| line.trim_start().strip_prefix(before));
+        line.map_or("unknown".to_owned(), |value| value.trim_end_matches([')', ',', ';']).to_owned())
+    };
+    let values = IDENTITY.map(|(name, before)| (name, value(found, before), value(wanted, before)));
+    let differing = values.into_iter().filter(|(_, found, wanted)| found != wanted);
+    differing.map(|(name, found, wanted)| format!("{name} {found}, not {wanted}")).collect()
+}
+
 fn write_source(out: &mut String, rig: &Rig, table: &TableValues) -> core::fmt::Result {
     let states = state_names(rig);
     let sensors: Vec<&str> = table.measured().into_iter().map(|state| states[state].as_str()).collect();

@@ -15,7 +15,7 @@ pub(super) fn connect(guide: &mut Guide<'_>, plan: CommissionPlan<'_>) -> Result
     while guide.conversation().telemetry.is_none() {
         guide.turn()?;
     }
-    guide.expect_rig(plan.table.rig_hash)?;
+    guide.expect_rig(plan.table.into())?;
     if let Some(info) = guide.conversation().info {
         let [major, minor, patch] = info.version;
         guide.found(format!(

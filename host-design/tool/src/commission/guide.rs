@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use upright::protocol::message::{Answer, Request};
 use upright::supervision::supervisor::State;
-use upright_design::client::AnyTelemetry;
+use upright_design::client::{AnyTelemetry, ExpectedRig};
 
 use super::machine::{MachineAtHand, Stop};
 use super::record::Journal;
@@ -40,9 +40,9 @@ impl<'a> Guide<'a> {
         &self.conversation
     }
 
-    /// Ends the conversation unless the firmware is that of the rig with this hash.
-    pub(super) fn expect_rig(&mut self, hash: u64) -> Result<(), Stop> {
-        self.conversation.expect_rig(hash);
+    /// Ends the conversation unless the firmware is that of `rig`.
+    pub(super) fn expect_rig(&mut self, rig: ExpectedRig) -> Result<(), Stop> {
+        self.conversation.expect_rig(rig);
         self.ended()
     }
 

@@ -8,7 +8,7 @@ use upright::supervision::fault::Cause;
 use upright::supervision::inhibits::Inhibits;
 use upright::supervision::supervisor::State;
 use upright::table::{Equilibrium, Law};
-use upright_design::client::{AnyTelemetry, Client, Mismatch, Received, Unanswered};
+use upright_design::client::{AnyTelemetry, Client, ExpectedRig, Mismatch, Received, Unanswered};
 use upright_design::motion::posture_name;
 use upright_design::plant::absolute_angles;
 
@@ -24,7 +24,7 @@ const STATISTICS: Duration = Duration::from_secs(1);
 const LOG_LINES: usize = 100;
 
 /// Why a conversation has ended.
-#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum Ended {
     /// The firmware is another one; only the request for its identity was sent.
     #[error(transparent)]
@@ -92,8 +92,8 @@ impl Monitor {
         Self { telemetry_s: seconds, ..Self::new(connection) }
     }
 
-    /// Ends the conversation if the firmware is not that of the rig with this hash.
-    pub fn expect_rig(&mut self, wanted: u64) {
+    /// Ends the conversation if the firmware is not that of this rig.
+    pub fn expect_rig(&mut self, wanted: ExpectedRig) {
         if let Some(Err(mismatch)) = self.info.map(|info| Mismatch::check(&info, wanted)) {
             self.end(mismatch);
         }

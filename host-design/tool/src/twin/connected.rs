@@ -3,6 +3,7 @@
 use std::time::{Duration, Instant};
 
 use serde_json::Value;
+use upright_design::client::ExpectedRig;
 
 use super::dispatcher::Dispatcher;
 use super::pace::PICTURE;
@@ -11,12 +12,12 @@ use crate::monitor::{SerialLine, now};
 /// Longest wait at the end, when the motor is turned off, for the answer.
 const LAST_WAIT: Duration = Duration::from_millis(500);
 
-/// Passes bytes between the line and the viewers while `goes_on` holds. The firmware has to be that of the rig with
-/// this hash; commands to another one are not sent.
+/// Passes bytes between the line and the viewers while `goes_on` holds. The firmware has to be that of `rig`;
+/// commands to another one are not sent.
 pub(super) fn run(
     mut line: SerialLine,
     dispatcher: &mut Dispatcher,
-    rig_hash: u64,
+    rig: ExpectedRig,
     goes_on: &dyn Fn() -> bool,
 ) {
     let mut next = Instant::now();
@@ -25,7 +26,7 @@ pub(super) fn run(
         let _ = dispatcher.requests(now());
         if dispatcher.monitor.ended.is_none() {
             exchange(&mut line, dispatcher);
-            dispatcher.monitor.expect_rig(rig_hash);
+            dispatcher.monitor.expect_rig(rig);
         } else {
             std::thread::sleep(PICTURE);
         }

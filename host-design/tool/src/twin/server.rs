@@ -140,7 +140,7 @@ impl Server {
         let (viewers, events) = Connections::new(greeting(rig, table, name, None));
         let _accepting = accepting(self.listener, self.secret, viewers.clone(), Arc::clone(&self.recording))?;
         let mut dispatcher = Dispatcher::new(Monitor::new(name), (viewers, events), self.recording);
-        connected::run(line, &mut dispatcher, rig.hash(), goes_on);
+        connected::run(line, &mut dispatcher, rig.into(), goes_on);
         Ok(())
     }
 }

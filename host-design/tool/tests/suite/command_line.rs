@@ -154,6 +154,53 @@ fn the_same_rig_gives_the_same_table_to_the_byte_and_check_tells_any_other() {
     assert_eq!(check(&folder.path().join("none.rs")).0, 1);
 }
 
+/// A table in tests/fixtures/.
+fn fixture(name: &str) -> PathBuf {
+    upright_test_support::repository().join("tests/fixtures").join(name)
+}
+
+#[test]
+fn check_names_the_format_the_rig_and_the_tick_of_a_table_that_has_another() {
+    let told = |table: &str| {
+        let path = fixture(table);
+        let output = upright(&["design", &path_of(SINGLE), "--check", "--out", path.to_str().unwrap()]);
+        assert_eq!(status(&output), 1, "{table}");
+        stderr(&output).to_owned()
+    };
+    let format = format!("format 7, not {}", upright::table::TABLE_FORMAT);
+    assert!(told("older-format.gains").contains(&format));
+    let rig = told("another-rig.gains");
+    assert!(
+        rig.contains("rig \"double-quanser-dbpen\", not \"single-quanser-ip02\"; tick (s) 0.001, not 0.002"),
+        "{rig}"
+    );
+    let tick = told("another-tick.gains");
+    assert!(tick.contains("(tick (s) 0.001, not 0.002; rig hash 0x"), "{tick}");
+}
+
+/// The compiler reads the table; the tool is not needed for this error.
+#[test]
+fn a_table_of_an_older_format_does_not_compile_and_the_error_says_what_to_do() {
+    let folder = tempfile::tempdir().unwrap();
+    let compiled = |table: &str| {
+        // An included file cannot have module documentation.
+        let source = std::fs::read_to_string(fixture(table)).unwrap();
+        let included: Vec<_> = source.lines().filter(|line| !line.starts_with("//!")).collect();
+        let path = folder.path().join(table);
+        std::fs::write(&path, included.join("\n")).unwrap();
+        let arguments = "check --quiet --offline --package upright --lib --features gains-from-env";
+        let mut cargo = Command::new(env!("CARGO"));
+        cargo.args(arguments.split(' '));
+        cargo.current_dir(upright_test_support::repository()).env("UPRIGHT_GAINS", path).output().unwrap()
+    };
+    let refused = compiled("older-format.gains");
+    assert!(stderr(&refused).contains("this gain table has format 7"), "{}", stderr(&refused));
+    assert!(stderr(&refused).contains("upright design RIG"), "{}", stderr(&refused));
+    // Control: a table of today's format compiles.
+    let taken = compiled("another-rig.gains");
+    assert!(taken.status.success(), "{}", stderr(&taken));
+}
+
 /// Dimensions of a matrix in the JSON.
 fn shape(value: &Value) -> (usize, usize) {
     let rows = value.as_array().unwrap();

@@ -25,7 +25,7 @@ use upright::supervision::jog::MotorSign;
 use upright::supervision::sign_check::Signs;
 use upright::supervision::supervisor::State;
 use upright::table::{Equilibrium, Law};
-use upright_design::client::Mismatch;
+use upright_design::client::{ExpectedRig, Mismatch};
 use upright_design::design::design;
 use upright_design::rig::Rig;
 use upright_design::simulate::Scenario;
@@ -288,6 +288,21 @@ fn another_version_of_the_messages_is_refused_and_nothing_more_is_sent() {
     assert_eq!(told(&mut monitor, telemetry(1, State::Balancing, None)), 0);
     assert!(press(&mut monitor, KeyCode::Char('a')).is_empty());
     assert!(screen(&monitor).contains("speaks version"));
+}
+
+#[test]
+fn the_firmware_of_another_rig_or_tick_is_refused_and_both_are_named() {
+    let refused = |hash, tick_s| {
+        let mut monitor = met(PROTOCOL);
+        monitor.expect_rig(ExpectedRig { hash, tick_s });
+        monitor.ended.map(|ended| ended.to_string())
+    };
+    assert_eq!(refused(0xabcd, 0.001), None);
+    let rig = refused(0xabce, 0.002).unwrap();
+    assert!(rig.contains("hash 000000000000abcd and runs at a tick of 0.001 s"), "{rig}");
+    assert!(rig.contains("the rig file has 000000000000abce and 0.002 s"), "{rig}");
+    let tick = refused(0xabcd, 0.002).unwrap();
+    assert!(tick.contains("timer makes a tick of 0.001 s instead of 0.002 s"), "{tick}");
 }
 
 #[test]

@@ -9,7 +9,8 @@ use upright_design::design::{Assessment, DesignPoles, design};
 use upright_design::rig::Rig;
 use upright_design::simulate::{Scenario, simulate};
 use upright_design::swing_up::{Stored, SwingUpError};
-use upright_design::table::{Gains, TableValues, gains_source, write_atomically};
+use upright_design::table::{Gains, TableValues, gains_source, identity_differences, write_atomically};
+use upright_tool::image::BoardName;
 use upright_tool::project::gain_table;
 
 use crate::failure::Failure;
@@ -98,6 +99,7 @@ impl DesignCommand {
             let source = Stored::beside(&self.rig).err().unwrap_or(SwingUpError::Outdated);
             return Err(Failure::SwingUp { rig: name(), source });
         }
+        warn_of_tick(&rig);
         let source = gains_source(&rig, &table);
         let path =
             self.out.map_or_else(gain_table, Ok).map_err(|error| Failure::BadArgument(error.to_string()))?;
@@ -162,6 +164,15 @@ fn refuse_failing_table(rig: &Rig, reports: &[LawReport]) -> Result<(), Failure>
     Ok(())
 }
 
+/// Warns of a tick that none of the boards can make: the table would compile for another one only.
+fn warn_of_tick(rig: &Rig) {
+    let period_s = rig.tick.period_s;
+    let is_possible = |[shortest_s, longest_s]: [f64; 2]| shortest_s <= period_s && period_s <= longest_s;
+    if !BoardName::ALL.into_iter().any(|board| is_possible(board.tick_s())) {
+        eprintln!("warning: tick.period_s = {period_s} s: no board of docs/board.md can make this tick");
+    }
+}
+
 /// Compares line by line: a checkout on Windows may have changed the line endings.
 fn check(path: &Path, source: &str) -> Result<(), Failure> {
     let found = std::fs::read_to_string(path)
@@ -170,8 +181,12 @@ fn check(path: &Path, source: &str) -> Result<(), Failure> {
         eprintln!("{} is up to date", path.display());
         return Ok(());
     };
+    let origin = match &identity_differences(&found, source)[..] {
+        [] => String::new(),
+        differences => format!(" ({})", differences.join("; ")),
+    };
     Err(Failure::CheckFailed(format!(
-        "{}:{line}: differs from what `upright design` would write; run it without --check",
+        "{}:{line}: differs from what `upright design` would write{origin}; run it without --check",
         path.display()
     )))
 }

@@ -15,6 +15,8 @@ use ratatui::crossterm::event::{self, Event, KeyEventKind};
 #[cfg(unix)]
 use signal_hook::consts::SIGHUP;
 use signal_hook::consts::{SIGINT, SIGTERM};
+use upright_design::client::ExpectedRig;
+use upright_design::rig::Rig;
 use upright_tool::monitor::record::{TelemetryCsv, json};
 use upright_tool::monitor::{MonitorAction, SerialLine, action, now, request, view};
 
@@ -50,8 +52,8 @@ pub(crate) struct MonitorCommand {
     /// Show it on the page of `upright twin` instead, served on this port of this computer; 0 picks a free one
     #[arg(long, value_name = "PORT", requires = "rig", conflicts_with_all = ["csv", "json"])]
     web: Option<u16>,
-    /// Rig file of the machine, for the page
-    #[arg(long, value_name = "FILE", requires = "web")]
+    /// Rig file of the machine: the firmware of another rig or tick is refused; the page needs it
+    #[arg(long, value_name = "FILE")]
     rig: Option<PathBuf>,
     /// End after this time (s)
     #[arg(long, value_name = "S", value_parser = positive)]
@@ -81,6 +83,7 @@ impl MonitorCommand {
         let mut conversation = Conversation {
             model: upright_tool::monitor::Monitor::new(&self.port),
             line: SerialLine::open(&self.port)?,
+            expected: self.rig.as_deref().map(Rig::from_path).transpose()?.as_ref().map(ExpectedRig::from),
             recorder: None,
             stop,
             until,
@@ -118,6 +121,8 @@ impl Drop for Screen {
 struct Conversation {
     model: upright_tool::monitor::Monitor,
     line: SerialLine,
+    /// The rig that the firmware has to be built for, if a rig file is given.
+    expected: Option<ExpectedRig>,
     recorder: Option<TelemetryCsv<File>>,
     stop: Arc<AtomicBool>,
     until: Option<Instant>,
@@ -152,6 +157,9 @@ impl Conversation {
             if let Some(recorder) = &mut self.recorder {
                 recorder.push(&telemetry)?;
             }
+        }
+        if let Some(rig) = self.expected {
+            self.model.expect_rig(rig);
         }
         Ok(())
     }
