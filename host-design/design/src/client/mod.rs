@@ -4,104 +4,26 @@
 //! A [`Session`](crate::harness::Session) talks through it to a firmware in lock step; monitor, commissioning, twin and
 //! identification talk through it over a line.
 
+mod mismatch;
+
 use std::collections::VecDeque;
 use std::time::Duration;
 
 use upright::protocol::KEEP_ALIVE;
 use upright::protocol::frame::{self, Receiver};
-use upright::protocol::message::{Answer, Command, Info, Message, PROTOCOL, Reply, Request, Telemetry};
+use upright::protocol::message::{Answer, Command, Message, Reply, Request, Telemetry};
 use upright::protocol::serial_link::{MAX_COMMAND, MAX_MESSAGE};
 use upright::protocol::tick_log::TickLog;
 
-use crate::rig::Rig;
-use crate::table::{MAX_SENSORS, MAX_STATES, TableValues};
+use crate::table::{MAX_SENSORS, MAX_STATES};
+
+pub use mismatch::{ExpectedRig, Mismatch};
 
 /// Telemetry of a firmware of any size: its frames are the same bytes whatever the capacity of the lists.
 pub type AnyTelemetry = Telemetry<MAX_STATES, MAX_SENSORS>;
 
 /// A part of the tick log (a record of every tick), of a firmware of any size.
 pub type AnyTickLog = TickLog<MAX_SENSORS>;
-
-/// The rig that the host believes to talk to, by the facts that the firmware reports in [`Info`].
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct ExpectedRig {
-    /// Hash of the rig file's values.
-    pub hash: u64,
-    /// Control period (s).
-    pub tick_s: f32,
-}
-
-impl From<&Rig> for ExpectedRig {
-    fn from(rig: &Rig) -> Self {
-        Self { hash: rig.hash(), tick_s: rig.tick.period_s as f32 }
-    }
-}
-
-impl From<&TableValues> for ExpectedRig {
-    fn from(table: &TableValues) -> Self {
-        Self { hash: table.rig_hash, tick_s: table.tick_s }
-    }
-}
-
-/// The firmware is not the one that the host believes to talk to.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
-pub enum Mismatch {
-    /// It uses another version of the messages.
-    #[error(
-        "the firmware speaks version {0} of the messages, this tool version {PROTOCOL}: build and flash the firmware \
-         again, or use its own tool"
-    )]
-    Protocol(u8),
-    /// It was built for another rig.
-    #[error(
-        "the firmware was built for a rig with hash {:016x} and runs at a tick of {} s, the rig file has {:016x} and \
-         {} s: build and flash the firmware again, or give its own rig file",
-        .found.hash, .found.tick_s, .wanted.hash, .wanted.tick_s
-    )]
-    Rig {
-        /// The firmware's rig.
-        found: ExpectedRig,
-        /// The rig file's.
-        wanted: ExpectedRig,
-    },
-    /// It was built for the rig, but its timer makes another tick.
-    #[error(
-        "the firmware was built for this rig, but its board's timer makes a tick of {found_s} s instead of {wanted_s} s: \
-         set the timer to TICK_S of the gain table, and flash the firmware again"
-    )]
-    Tick {
-        /// Tick of the timer (s).
-        found_s: f32,
-        /// Tick of the rig file (s).
-        wanted_s: f32,
-    },
-}
-
-impl Mismatch {
-    /// Checks the version of the messages.
-    ///
-    /// # Errors
-    /// [`Mismatch::Protocol`]
-    pub fn check_protocol(info: &Info) -> Result<(), Self> {
-        if info.protocol == PROTOCOL { Ok(()) } else { Err(Self::Protocol(info.protocol)) }
-    }
-
-    /// Checks the version of the messages, and that the firmware is that of the rig `wanted`.
-    ///
-    /// # Errors
-    /// [`Mismatch`]
-    pub fn check(info: &Info, wanted: ExpectedRig) -> Result<(), Self> {
-        Self::check_protocol(info)?;
-        let found = ExpectedRig { hash: info.rig_hash, tick_s: info.tick_s };
-        if found.hash != wanted.hash {
-            return Err(Self::Rig { found, wanted });
-        }
-        if found.tick_s != wanted.tick_s {
-            return Err(Self::Tick { found_s: found.tick_s, wanted_s: wanted.tick_s });
-        }
-        Ok(())
-    }
-}
 
 /// A request that has no answer after this time is reported.
 pub const PATIENCE: Duration = Duration::from_secs(1);
