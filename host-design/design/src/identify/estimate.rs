@@ -57,8 +57,8 @@ pub fn identify(
     identify_recordings(rig, &Recordings::Logs(logs.to_vec()), None, settings, progress)
 }
 
-/// Identifies the machine of `rig` from its recordings. Without a drive in them, the scale of masses and frictions stays
-/// that of the file. The recordings `predict` are not used, but predicted with the old and the new numbers.
+/// Identifies the machine of `rig` from its recordings. Without a drive in them, the scale of masses and frictions
+/// stays that of the file. The recordings `predict` are not used, but predicted with the old and the new numbers.
 ///
 /// # Errors
 /// [`IdentifyError`] if a recording is not of the rig, they are too short, or a channel does not move in them. A misfit

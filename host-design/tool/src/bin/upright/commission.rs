@@ -25,7 +25,8 @@ use crate::variation::with_table;
 /// Guides you from a wired rig to a balancing one, step by step: what to do, what was found, and whether it is right.
 ///
 /// With --target, the machine and the person beside it are simulated. With --port, the machine is real: its board runs
-/// the image of the rig file (upright firmware flash RIG), and Ctrl-C turns the motor off. The command stops at the first step that shows that the machine must not be run: exit status 3.
+/// the image of the rig file (upright firmware flash RIG), and Ctrl-C turns the motor off. The command stops at the
+/// first step that shows that the machine must not be run: exit status 3.
 #[derive(Args)]
 #[command(before_help = "\
 Examples:

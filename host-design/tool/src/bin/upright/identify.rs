@@ -14,7 +14,8 @@ use crate::progress::with_steps;
 use crate::reading::ReadingArgs;
 use crate::variation::positive;
 
-/// Identifies the parameters of the real machine from logs of the hanging machine being shaken, or from tables of its motion.
+/// Identifies the parameters of the real machine from logs of the hanging machine being shaken, or from tables of its
+/// motion.
 ///
 /// Files that are no logs of Upright are read as tables (CSV): a row of names such as time_s,angle_1_rad, and rows of
 /// numbers. Several files are pieces of one machine, each with an unknown start. Without a drive, the links swing
