@@ -19,6 +19,7 @@ use upright_tool::monitor::SerialLine;
 
 use crate::failure::Failure;
 use crate::firmware::lines_of_stdin;
+use crate::output::print;
 use crate::target::{Built, TargetOption};
 use crate::variation::with_table;
 
@@ -101,9 +102,7 @@ impl CommissionCommand {
             }
         };
         if self.json {
-            let mut out = std::io::stdout().lock();
-            serde_json::to_writer(&mut out, &journal.record).map_err(std::io::Error::from)?;
-            writeln!(out)?;
+            print(true, &journal.record, String::new)?;
         }
         result
     }
@@ -181,7 +180,7 @@ impl CommissionCommand {
         commissionable(&machine)?;
         let differs = |what: &str| {
             let [path, rig] = [path, &self.rig].map(|path: &PathBuf| Path::display(path));
-            Failure::BadArgument(format!(
+            Failure::argument(format!(
                 "{path}: has another {what} than {rig}; give a file of the same machine"
             ))
         };

@@ -106,7 +106,7 @@ impl IdentifyCommand {
             eprintln!("{} written", path.display());
         }
         if let Some(refusal) = &found.refusal {
-            return Err(Failure::NotIdentified(format!("{}: {refusal}; nothing is written", rig.name)));
+            return Err(Failure::no_solution(format!("{}: {refusal}; nothing is written", rig.name)));
         }
         match &self.write {
             Some(path) => self.write_rig(path, &rig, &found),
@@ -145,7 +145,7 @@ impl IdentifyCommand {
             names.join(", ")
         );
         let text = rig_file(&old, rig, found, &note.replace(['\n', '\r'], " "), path)
-            .map_err(|error| Failure::BadArgument(format!("{}: {error}", self.rig.display())))?;
+            .map_err(|error| Failure::argument(format!("{}: {error}", self.rig.display())))?;
         write_atomically(path, text.as_bytes())?;
         eprintln!("{} written", path.display());
         Ok(())
@@ -160,14 +160,14 @@ fn convert(
     write: impl Fn(&Log, &[f64], &mut dyn Write) -> std::io::Result<()>,
 ) -> Result<(), Failure> {
     let Recordings::Logs(logs) = recordings else {
-        return Err(Failure::BadArgument("--csv and --mcap convert logs of Upright".to_owned()));
+        return Err(Failure::argument("--csv and --mcap convert logs of Upright".to_owned()));
     };
     let [(file, log)] = logs.as_slice() else {
-        return Err(Failure::BadArgument("--csv and --mcap convert one log; name one".to_owned()));
+        return Err(Failure::argument("--csv and --mcap convert one log; name one".to_owned()));
     };
     let steps: Vec<f64> = rig.sensors().iter().map(|sensor| sensor.step()).collect();
     if steps.len() != log.channels() {
-        return Err(Failure::BadArgument(format!(
+        return Err(Failure::argument(format!(
             "{}: {} encoders, the rig file has {}; name the rig file of this machine",
             file.display(),
             log.channels(),
