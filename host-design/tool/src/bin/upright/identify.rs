@@ -10,7 +10,7 @@ use upright_design::table::write_atomically;
 use upright_tool::identified::{json, page, rig_file, text};
 
 use crate::failure::Failure;
-use crate::progress::with_steps;
+use crate::progress::with_progress;
 use crate::reading::ReadingArgs;
 use crate::variation::positive;
 
@@ -91,7 +91,7 @@ impl IdentifyCommand {
             weighed_kg_m: self.weigh,
             trust_wiring: self.trust_wiring,
         };
-        let found = with_steps(|progress| {
+        let found = with_progress(|progress| {
             identify_recordings(&rig, &recordings, unused.as_ref(), &settings, progress)
         })?;
         let mut out = std::io::stdout().lock();

@@ -16,7 +16,7 @@ use super::swing_up::with_margins;
 use super::verify::search;
 use crate::failure::Failure;
 use crate::output::print;
-use crate::progress::{with_random_plants, with_spinner};
+use crate::progress::{with_progress, with_spinner};
 use crate::variation::{Variation, Wanted, with_stored_motions};
 
 /// Writes one HTML page about a rig and its loop: animated runs, model, gains, margins, trust report.
@@ -71,7 +71,6 @@ impl ReportCommand {
     pub(crate) fn run(self) -> Result<(), Failure> {
         self.prepare()?;
         let (rig, certified, table) = self.variation.designed()?;
-        let laws = table.laws.present().count() as u64;
         let imperfections = if self.imperfections { search(&rig, &table)? } else { Vec::new() };
         let motions = with_swing_up(&self.variation.rig, &rig, &table);
         let pushes = match &motions {
@@ -87,28 +86,26 @@ impl ReportCommand {
             if self.transitions { Some(route(&self.variation.rig, &rig, &table, self.seed)?) } else { None };
         let study = Study::whole();
         let effort = Effort { runs: self.runs as usize, seed: self.seed, late: 0.0, study: &study };
-        let (trust, files) =
-            with_random_plants(laws * u64::from(self.runs), |stage, done| -> Result<_, Failure> {
-                let trust = trust(&rig, &certified, &table, effort, stage, done)?;
-                let run = motions.as_ref().and_then(|table| demonstration(&rig, table, self.seed));
-                let source = ReportSource {
-                    rig: &rig,
-                    certified: &certified,
-                    table: &table,
-                    trust: &trust,
-                    imperfections: &imperfections,
-                    seed: self.seed,
-                    swing_up: run.as_ref(),
-                    route: route.as_ref(),
-                    margins: &pushes,
-                    region_points: REGION_POINTS,
-                    command: &self.as_typed(),
-                };
-                let page = report(&source, stage)?;
-                stage("writing");
-                let files = self.write(&page)?;
-                Ok((trust, files))
-            })?;
+        let (trust, files) = with_progress(|progress| -> Result<_, Failure> {
+            let trust = trust(&rig, &certified, &table, effort, progress)?;
+            let run = motions.as_ref().and_then(|table| demonstration(&rig, table, self.seed));
+            let source = ReportSource {
+                rig: &rig,
+                certified: &certified,
+                table: &table,
+                trust: &trust,
+                imperfections: &imperfections,
+                seed: self.seed,
+                swing_up: run.as_ref(),
+                route: route.as_ref(),
+                margins: &pushes,
+                region_points: REGION_POINTS,
+                command: &self.as_typed(),
+            };
+            let page = report(&source, progress)?;
+            let files = self.write(&page)?;
+            Ok((trust, files))
+        })?;
         let object = json!({ "rig": rig.name, "hash": format!("{:016x}", rig.hash()), "files": files, "trust": trust });
         print(self.json, &object, || files.iter().map(|file| format!("{}\n", file.display())).collect())?;
         let failed = trust.checks.iter().filter(|check| !check.holds).count();

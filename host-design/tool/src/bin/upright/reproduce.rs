@@ -5,11 +5,11 @@ use std::path::PathBuf;
 use clap::Args;
 use upright_design::table::write_atomically;
 use upright_tool::project::checkout;
-use upright_tool::reproduce::{PaperRigs, STAGES, reproduce};
+use upright_tool::reproduce::{PaperRigs, reproduce};
 
 use crate::failure::Failure;
 use crate::output::print;
-use crate::progress::with_stages;
+use crate::progress::with_progress;
 
 /// Compares the results of the paper with ours, number by number, and writes its figures 5 to 8 and Table 2 as figures
 /// and data.
@@ -42,7 +42,7 @@ impl ReproduceCommand {
                 Failure::argument(format!("--out {}: cannot be created: {error}", self.out.display()))
             })?;
         }
-        let found = with_stages(STAGES.len() as u64, |stage| reproduce(&rigs, stage))?;
+        let found = with_progress(|progress| reproduce(&rigs, progress))?;
         if !self.no_write {
             let mut files = found.files()?;
             let numbers = serde_json::to_vec(&found).map_err(std::io::Error::from)?;

@@ -13,7 +13,7 @@ use upright_tool::figure::front_figure;
 
 use crate::failure::Failure;
 use crate::output::print;
-use crate::progress::{with_spinner, with_steps};
+use crate::progress::{with_progress, with_spinner};
 use crate::split::Split;
 use crate::variation::{not_negative, positive, with_table};
 
@@ -91,7 +91,7 @@ impl RobustCommand {
         }
         let failed = |source: RobustError| Failure::of(&rig.name, source);
         let (choice, front) =
-            with_steps(|progress| choose(&rig, &tolerances, &settings, self.front, progress))
+            with_progress(|progress| choose(&rig, &tolerances, &settings, self.front, progress))
                 .map_err(failed)?;
         if let (Some(path), Some(front)) = (&self.svg, &front) {
             let figure = front_figure(front, &format!("{}: least ripple that survives", rig.name));

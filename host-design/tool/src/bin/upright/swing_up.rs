@@ -20,7 +20,7 @@ use upright_tool::in_the_loop::RunError;
 
 use crate::failure::Failure;
 use crate::output::print;
-use crate::progress::{with_bar, with_search, with_spinner};
+use crate::progress::{with_bar, with_progress, with_spinner};
 use crate::split::Split;
 
 /// Plans the motions with which the rig raises itself from hanging to upright, and lowers itself again.
@@ -125,7 +125,7 @@ impl SwingUpCommand {
     /// Prints and draws duration, force and robustness of the candidates of a search.
     fn trade(&self, rig: &Rig) -> Result<(), Failure> {
         let failed = |source: SwingUpError| Failure::of(&rig.name, source);
-        let solved = with_search(|progress| solved(rig, TRADED, self.seed, progress)).map_err(failed)?;
+        let solved = with_progress(|progress| solved(rig, TRADED, self.seed, progress)).map_err(failed)?;
         self.draw(&trade_figure(&format!("{}: candidates of a raising", rig.name), &solved))?;
         let object = json!({ "rig": rig.name, "tried": TRADED, "solved": solved });
         print(self.json, &object, || traded_text(&solved))
@@ -166,9 +166,9 @@ impl SwingUpCommand {
         let old = Stored::beside(&self.rig);
         let plan = if self.stored {
             let old = old.clone().map_err(failed)?;
-            with_search(|progress| judge(&rig, &old, progress)).map_err(failed)?
+            with_progress(|progress| judge(&rig, &old, progress)).map_err(failed)?
         } else {
-            with_search(|progress| search(&rig, progress)).map_err(failed)?
+            with_progress(|progress| search(&rig, progress)).map_err(failed)?
         };
         let script = Script::of(&rig, &plan.table, self.seed, false).map_err(failed)?;
         let demonstration = script.run(&plan.table).map_err(RunError::from)?;

@@ -16,7 +16,7 @@ use upright_design::table::write_atomically;
 
 use crate::failure::Failure;
 use crate::output::print;
-use crate::progress::{with_search, with_spinner};
+use crate::progress::{with_progress, with_spinner};
 
 /// Plans motions between any two equilibria, in which each link is up or down, and tries them one after the other.
 ///
@@ -112,7 +112,7 @@ impl TransitionsCommand {
         let (first, end) = self.candidates;
         let mut searched = Vec::new();
         for transition in self.wanted(links)? {
-            let found = with_search(|progress| stored.search(rig, transition, first..end, progress))
+            let found = with_progress(|progress| stored.search(rig, transition, first..end, progress))
                 .map_err(|source| failed(rig, source))?;
             eprintln!("{}", searched_line(&found, end - first, links));
             self.write(stored)?;

@@ -16,7 +16,7 @@ use upright_design::verify::{
 
 use crate::failure::Failure;
 use crate::output::print;
-use crate::progress::{with_bar, with_random_plants, with_spinner};
+use crate::progress::{with_bar, with_progress, with_spinner};
 use crate::split::Split;
 use crate::variation::{Variation, law_option};
 
@@ -148,14 +148,10 @@ impl VerifyCommand {
             let runs = table.laws.present().count() as u64 * u64::from(self.runs);
             // A shard runs the random plants only.
             if study.is_shard() {
-                with_random_plants(runs, |stage, done| {
-                    stage("random plants");
-                    random_plants(&rig, &table, &effort, done)
-                })?;
+                with_bar("random plants", runs, |done| random_plants(&rig, &table, &effort, done))?;
                 return Ok(None);
             }
-            let report =
-                with_random_plants(runs, |stage, done| trust(&rig, &certified, &table, effort, stage, done));
+            let report = with_progress(|progress| trust(&rig, &certified, &table, effort, progress));
             Ok(Some(report?))
         };
         self.split.study("verify", &rig, &options, work, |report| {
