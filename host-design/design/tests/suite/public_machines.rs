@@ -1,14 +1,12 @@
-//! Machines that others have published, with gains computed elsewhere (SciPy), and the weights that their papers use.
+//! Machines that others have published, with gains computed elsewhere (SciPy): those that docs/coming-from-matlab.md
+//! prints, and the weights that papers use.
 
 use std::path::Path;
 
-use upright_design::design::{Laws, design};
+use upright_design::design::{Design, design};
 use upright_design::rig::Rig;
 
-/// The cart of the Control Tutorials for MATLAB and Simulink (University of Michigan), with weights 5000 and 100.
-const CTMS: &str = "name = \"ctms\"\n[cart]\nmass_kg = 0.5\nfriction_n_s_per_m = 0.1\n\
-    [[link]]\nmass_kg = 0.2\nlength_m = 0.6\ncentre_of_mass_m = 0.3\ninertia_kg_m2 = 0.006\n\
-    [gravity]\nm_per_s2 = 9.8\n[tick]\nperiod_s = 0.01\n[lqr]\nforce_weight = 1\nstate_weights = [5000, 0, 100, 0]\n";
+const PAGE: &str = include_str!("../../../../docs/coming-from-matlab.md");
 
 /// Two links on a cart.
 const DOUBLE: &str = "name = \"double\"\n[cart]\nmass_kg = 0.6\n[[link]]\nmass_kg = 0.2\nlength_m = 0.3\n\
@@ -17,11 +15,14 @@ const DOUBLE: &str = "name = \"double\"\n[cart]\nmass_kg = 0.6\n[[link]]\nmass_k
 /// Relative error of a number that is printed with six digits.
 const SIX_DIGITS: f64 = 5e-6;
 
+fn designed(text: &str) -> Design<f64> {
+    design(&Rig::from_toml(text, Path::new("test.toml")).unwrap()).unwrap().double
+}
+
+/// Gains of the LQR: continuous, and of the tick.
 fn gains(text: &str) -> [Vec<f64>; 2] {
-    let rig = Rig::from_toml(text, Path::new("test.toml")).unwrap();
-    let designed = design(&rig).unwrap().double;
-    let k = |laws: Laws<f64>| laws.lqr.unwrap().k.entries().to_vec();
-    [k(designed.continuous), k(designed.sampled)]
+    let Design { continuous, sampled, .. } = designed(text);
+    [continuous, sampled].map(|laws| laws.lqr.unwrap().k.entries().to_vec())
 }
 
 #[track_caller]
@@ -30,15 +31,62 @@ fn assert_close(found: &[f64], wanted: &[f64], digits: f64) {
     assert!(found.len() == wanted.len() && found.iter().zip(wanted).all(close), "{found:?} {wanted:?}");
 }
 
+/// The rows of the page's gains whose label is `label`, from the top.
+fn rows_of_the_page(label: &str) -> Vec<Vec<f64>> {
+    let rows = PAGE.lines().filter_map(|line| line.strip_prefix(&format!("| {label} |")));
+    let numbers = rows.map(|row| row.split('|').filter_map(|cell| cell.trim().parse().ok()).collect());
+    numbers.filter(|numbers: &Vec<f64>| !numbers.is_empty()).collect()
+}
+
+/// The example of a rig file on the page: the cart of the Control Tutorials for MATLAB and Simulink.
+fn ctms() -> String {
+    PAGE.split("```toml\n").nth(1).and_then(|rest| rest.split("```").next()).unwrap().to_owned()
+}
+
+fn rig_file(name: &str) -> String {
+    std::fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("../../rigs").join(name)).unwrap()
+}
+
+/// The text with these lines more in `[lqr]`.
+fn with_lqr(text: &str, lines: &str) -> String {
+    assert!(text.contains("[lqr]\n"));
+    text.replace("[lqr]\n", &format!("[lqr]\n{lines}\n"))
+}
+
 #[test]
-fn gains_of_the_tick_are_those_of_lqrd_or_dlqr_as_the_rig_file_says() {
-    let [continuous, sampled] = gains(CTMS);
-    assert_close(&continuous, &[-70.7107, -37.8345, 105.53, 20.9238], SIX_DIGITS);
-    assert_close(&sampled, &[-61.9933, -33.5039, 95.0597, 18.83], SIX_DIGITS);
-    let [continuous, sum] = gains(&format!("{CTMS}cost = \"sum\"\n"));
-    assert_close(&continuous, &[-70.7107, -37.8345, 105.53, 20.9238], SIX_DIGITS);
-    assert_close(&sum, &[-61.9933, -33.5040, 95.0597, 18.8300], SIX_DIGITS);
-    assert_ne!(sum, sampled);
+fn gains_that_the_page_for_users_of_matlab_prints_are_those_of_the_design() {
+    let machines = [ctms(), rig_file("single-quanser-ip02.toml"), rig_file("double-quanser-dbpen.toml")];
+    let sum = "cost = \"sum\"";
+    let of_lqr = |suffix: &str, text: &str, row: usize| {
+        let [lqr, lqrd] = gains(text);
+        let [_, dlqr] = gains(&with_lqr(text, sum));
+        for (name, found) in [("lqr", lqr), ("lqrd", lqrd), ("dlqr", dlqr)] {
+            assert_close(&found, &rows_of_the_page(&format!("`{name}`{suffix}"))[row], SIX_DIGITS);
+        }
+    };
+    for (row, text) in machines.iter().enumerate() {
+        of_lqr("", text, row);
+    }
+    of_lqr(", absolute", &with_lqr(&machines[2], "angles = \"absolute\""), 0);
+    for (row, text) in machines[..2].iter().enumerate() {
+        let Design { continuous, sampled, .. } = designed(text);
+        for (laws, label) in [(continuous, "`acker`"), (sampled, "`acker`, sampled")] {
+            assert_close(laws.pole_placement.unwrap().k.entries(), &rows_of_the_page(label)[row], SIX_DIGITS);
+        }
+    }
+    let l = designed(&machines[1]).kalman.unwrap().l_filter;
+    for (column, sensor) in ["cart", "link"].iter().enumerate() {
+        let found: Vec<f64> = (0..4).map(|state| l[(state, column)]).collect();
+        assert_close(&found, &rows_of_the_page(&format!("`kalmd`, {sensor}"))[0], SIX_DIGITS);
+    }
+}
+
+#[test]
+fn a_sum_over_the_ticks_is_another_cost_than_the_integral() {
+    let [continuous, integral] = gains(&ctms());
+    let [same, sum] = gains(&with_lqr(&ctms(), "cost = \"sum\""));
+    assert_eq!(continuous, same);
+    assert!(integral.iter().zip(&sum).all(|(x, y)| x != y));
 }
 
 #[test]
