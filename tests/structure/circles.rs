@@ -1,7 +1,7 @@
 //! Circles of files and of folders in a crate.
 //!
-//! A file uses another one if a path in it leads to an item that the other one defines, also through a `pub use`. What a
-//! file imports or re-exports from another one counts as used, and so does what a `mod.rs` imports from its children.
+//! A file uses another one if a path in it leads to an item that the other one defines, also through a `pub use`. What
+//! a file imports or re-exports from another one counts as used, and so does what a `mod.rs` imports from its children.
 
 use std::collections::{BTreeMap, BTreeSet};
 

@@ -43,8 +43,8 @@ impl<'a> Lines<'a> {
         Ok(with_bytes.collect())
     }
 
-    /// File and line of an instruction, as `src/image/main.rs:42`. If a library function is inlined there, this is the line
-    /// of the program's own code that it is inlined into.
+    /// File and line of an instruction, as `src/image/main.rs:42`. If a library function is inlined there, this is the
+    /// line of the program's own code that it is inlined into.
     pub fn line(&self, address: u32) -> Option<String> {
         let mut frames = self.context.find_frames(address.into()).skip_all_loads().ok()?;
         let mut innermost = None;

@@ -7,9 +7,19 @@ use std::sync::atomic::{AtomicUsize, Ordering::Relaxed};
 
 use rayon::prelude::*;
 
-/// Progress callback: called with a stage's name and number of steps before the stage, and with `None` after each
-/// step.
-pub type Progress<'a> = &'a (dyn Fn(Option<(&str, u64)>) + Sync);
+/// What a long computation reports.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum ProgressStep<'a> {
+    /// A stage with this name and number of steps begins.
+    Begin(&'a str, u64),
+    /// A step is done.
+    Done,
+    /// A step of a search is done, and has solved a candidate with this figure of merit; less is better.
+    Solved(f64),
+}
+
+/// Called with each step, from any thread.
+pub type Progress<'a> = &'a (dyn Fn(ProgressStep<'_>) + Sync);
 
 /// Applies `one` to every item in parallel and returns the results in the order of the items.
 pub fn map<I, T>(items: impl IntoIterator<Item = I>, one: impl Fn(I) -> T + Sync) -> Vec<T>

@@ -1,6 +1,6 @@
 //! How many random machines balance with the identified file, with their true parameters, and with the original ones:
-//! `cargo bench -p upright-tool --bench commissioned_machines`. Fails if the identified file does clearly worse than the
-//! true parameters. `UPRIGHT_MACHINES` says how many, `UPRIGHT_RIG` which rig; it takes minutes.
+//! `cargo bench -p upright-tool --bench commissioned_machines`. Fails if the identified file does clearly worse than
+//! the true parameters. `UPRIGHT_MACHINES` says how many, `UPRIGHT_RIG` which rig; it takes minutes.
 
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;

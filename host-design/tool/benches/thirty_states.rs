@@ -1,5 +1,5 @@
-//! What a tick with 30 states costs on the virtual board: `cargo bench -p upright-tool --bench thirty_states`. Fails if it
-//! takes more than a quarter of its period. The design takes half a minute.
+//! What a tick with 30 states costs on the virtual board: `cargo bench -p upright-tool --bench thirty_states`. Fails if
+//! it takes more than a quarter of its period. The design takes half a minute.
 
 use upright::table::Law;
 use upright_board::{Conditions, Image};

@@ -283,8 +283,8 @@ fn feedback<R: Real>(k: Matrix<R>, a: &Matrix<R>, b: &Matrix<R>, output: usize) 
     Feedback { integral: k.cols() > a.cols(), k, n }
 }
 
-/// Sampled feedback K over the states of the plant `over` (A, B), which is `plant` or contains it, adapted to the delay:
-/// with one tick of delay, `u⁺ = N r - K (Ad x + Bd u)` acts on the predicted state.
+/// Sampled feedback K over the states of the plant `over` (A, B), which is `plant` or contains it, adapted to the
+/// delay: with one tick of delay, `u⁺ = N r - K (Ad x + Bd u)` acts on the predicted state.
 fn sampled_feedback<R: Real>(
     k: Matrix<R>,
     plant: [&Matrix<R>; 2],

@@ -1,5 +1,5 @@
-//! The simulated person at the rig: homes, checks the signs and the motor, then raises the links and holds them upright until the
-//! motor is on, or lets them hang for the swing-up.
+//! The simulated person at the rig: homes, checks the signs and the motor, then raises the links and holds them upright
+//! until the motor is on, or lets them hang for the swing-up.
 
 use upright::board::Output;
 use upright::control::actuator::Drive;
@@ -70,8 +70,8 @@ enum Doing {
 pub(super) const RETRY_S: f64 = 0.05;
 
 impl Operator {
-    /// An operator who moves `rig` from hanging to the start of `scenario`, and lets go there: when the firmware balances,
-    /// or for a swing-up when it begins to raise the links.
+    /// An operator who moves `rig` from hanging to the start of `scenario`, and lets go there: when the firmware
+    /// balances, or for a swing-up when it begins to raise the links.
     ///
     /// # Errors
     /// [`SimulationError`] if the plant cannot be built.

@@ -18,7 +18,7 @@ use super::shooting::{Shooting, WINDOW_S};
 use super::verdict::{HeldOut, Predicted, Refusal, channels, judge, judge_windows};
 use super::window_errors::{WindowErrors, window_errors};
 use super::wiring;
-use crate::parallel::Progress;
+use crate::parallel::{Progress, ProgressStep};
 use crate::rig::Rig;
 
 /// Shortest log (s).
@@ -57,8 +57,8 @@ pub fn identify(
     identify_recordings(rig, &Recordings::Logs(logs.to_vec()), None, settings, progress)
 }
 
-/// Identifies the machine of `rig` from its recordings. Without a drive in them, the scale of masses and frictions stays
-/// that of the file. The recordings `predict` are not used, but predicted with the old and the new numbers.
+/// Identifies the machine of `rig` from its recordings. Without a drive in them, the scale of masses and frictions
+/// stays that of the file. The recordings `predict` are not used, but predicted with the old and the new numbers.
 ///
 /// # Errors
 /// [`IdentifyError`] if a recording is not of the rig, they are too short, or a channel does not move in them. A misfit
@@ -86,8 +86,8 @@ pub fn identify_recordings(
         free::known(rig, model.layout, &mut priors, record.is_clamped);
     }
     if is_driven && !settings.trust_wiring {
-        progress(Some(("wiring", wiring::count(record.channels))));
-        let wiring = wiring::find(&model, &record, &priors, &|| progress(None));
+        progress(ProgressStep::Begin("wiring", wiring::count(record.channels)));
+        let wiring = wiring::find(&model, &record, &priors, &|| progress(ProgressStep::Done));
         found.wiring = Some(wiring.clone());
         if !wiring.is_as_in_file() {
             found.refusal = Some(Refusal::Wiring(wiring));
@@ -103,8 +103,8 @@ pub fn identify_recordings(
         fitted.run(&model, &mut found, progress)?;
         fitted.full(&found)
     } else {
-        progress(Some(("free swings", free::FITS)));
-        let free = free::fit(&model, &record, &priors, &|| progress(None))?;
+        progress(ProgressStep::Begin("free swings", free::FITS));
+        let free = free::fit(&model, &record, &priors, &|| progress(ProgressStep::Done))?;
         free.write(rig, &model, &priors, &mut found);
         free.p
     };
@@ -165,11 +165,11 @@ impl Fitted<'_> {
         progress: Progress<'_>,
     ) -> Result<(), IdentifyError> {
         let start: Vec<f64> = self.priors.iter().map(|prior| prior.value).collect();
-        progress(Some(("multiple shooting", 1)));
+        progress(ProgressStep::Begin("multiple shooting", 1));
         let first = self.used.part(0.0, SHOOTING_S);
         let shooting = Shooting { model, record: &first, priors: self.priors, free: true };
         let shot = shooting.fit(&start, WINDOW_S, ITERATIONS.0, ITERATIONS.1);
-        progress(Some(("prediction error", 1)));
+        progress(ProgressStep::Begin("prediction error", 1));
         let filter = Filter { model, record: self.used, priors: self.priors };
         let noise = filter.tuned(&shot.p);
         let undetermined = || IdentifyError::Undetermined("the equations have no solution");
@@ -180,7 +180,7 @@ impl Fitted<'_> {
         let filter = Filter { model: &model, ..filter };
         let noise = filter.tuned(&p);
         let (p, normal) = filter.fit(&p, &noise, ITERATIONS.2).ok_or_else(undetermined)?;
-        progress(Some(("deviations", 1)));
+        progress(ProgressStep::Begin("deviations", 1));
         let inverse = normal.factor(0.0).ok_or_else(undetermined)?.inverse();
         let changes = changes(&filter, self.finer, &p, &noise);
         let kinds = model.layout.kinds();
@@ -203,7 +203,7 @@ impl Fitted<'_> {
         };
         found.correlations =
             active.iter().flat_map(|&i| active.iter().map(move |&j| (i, j))).map(|(i, j)| of(i, j)).collect();
-        progress(Some(("held-out log", 1)));
+        progress(ProgressStep::Begin("held-out log", 1));
         let over = filter.run(&p, &noise, false).merge(&Filter { record: self.held, ..filter }.run(
             &p,
             &noise,

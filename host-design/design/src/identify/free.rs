@@ -144,8 +144,8 @@ mod tests {
     use super::super::table::RecordingRows;
     use super::*;
 
-    /// 24 s of a clamped double pendulum that swings down from 100°, in counts, and its true parameters. Its lengths and
-    /// moments are not those of the file.
+    /// 24 s of a clamped double pendulum that swings down from 100°, in counts, and its true parameters. Its lengths
+    /// and moments are not those of the file.
     fn swing(rig: &Rig, priors: &[Prior]) -> (Record, Vec<f64>) {
         let mut p: Vec<f64> = priors.iter().map(|prior| prior.value).collect();
         let layout = Layout { links: 2 };

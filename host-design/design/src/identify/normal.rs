@@ -92,8 +92,8 @@ impl Normal {
         self.size
     }
 
-    /// The solution δ with the diagonal of A multiplied by 1 + `damping` and each `δ_i >= low_i`: an entry that would fall
-    /// below is held there, and the others are solved again (active set). None if A is not positive definite.
+    /// The solution δ with the diagonal of A multiplied by 1 + `damping` and each `δ_i >= low_i`: an entry that would
+    /// fall below is held there, and the others are solved again (active set). None if A is not positive definite.
     pub(super) fn bounded_step(&self, damping: f64, low: &[f64]) -> Option<Vec<f64>> {
         let is_held = |(&low, &gradient): (&f64, &f64)| low >= 0.0 && gradient <= 0.0;
         let mut held: Vec<bool> = low.iter().zip(&self.gradient).map(is_held).collect();

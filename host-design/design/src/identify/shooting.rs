@@ -107,7 +107,8 @@ impl Shooting<'_> {
         fit
     }
 
-    /// Inverse of the normal matrix of the scaled parameters, with the initial states eliminated; none if there is none.
+    /// Inverse of the normal matrix of the scaled parameters, with the initial states eliminated; none if there is
+    /// none.
     pub(super) fn inverse(&self, fit: &Fit) -> Option<Vec<f64>> {
         let weights: Vec<f64> =
             fit.rms.iter().zip(&self.record.steps).map(|(rms, step)| rms.max(0.2 * step).powi(-2)).collect();

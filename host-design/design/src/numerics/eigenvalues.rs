@@ -226,8 +226,8 @@ fn francis_step<R: Real>(h: &mut Matrix<R>, start: usize, last: usize, exception
     }
 }
 
-/// The entries of the first column of H² - sum·H + product·I that are not 0, for the block from `start` to `last`. Sum and
-/// product are those of the shifts.
+/// The entries of the first column of H² - sum·H + product·I that are not 0, for the block from `start` to `last`. Sum
+/// and product are those of the shifts.
 fn first_column<R: Real>(h: &Matrix<R>, start: usize, last: usize, exceptional: bool) -> [R; 3] {
     let (mut sum, mut product) = {
         let (a, b) = (&h[(last - 1, last - 1)], &h[(last - 1, last)]);

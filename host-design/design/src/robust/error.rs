@@ -3,7 +3,7 @@
 use crate::design::DesignError;
 use crate::simulate::SimulationError;
 use crate::table::NoTable;
-use crate::verify::{Unverifiable, VerifyError};
+use crate::verify::VerifyError;
 
 /// Why no gains were chosen.
 #[derive(Debug, thiserror::Error)]
@@ -16,9 +16,6 @@ pub enum RobustError {
     /// No candidate survives the tolerances.
     #[error("nothing helps: {0}")]
     Unhelped(String),
-    /// The rig has no chain or no observer, or too many links.
-    #[error(transparent)]
-    Unverifiable(#[from] Unverifiable),
     /// The rig file's own numbers have no design.
     #[error(transparent)]
     Design(#[from] DesignError),
@@ -28,7 +25,7 @@ pub enum RobustError {
     /// A run cannot be started.
     #[error(transparent)]
     Simulation(#[from] SimulationError),
-    /// A figure of a linear loop cannot be computed.
+    /// The rig has no chain or no observer, or a figure of its loop cannot be computed.
     #[error(transparent)]
     Verify(#[from] VerifyError),
 }

@@ -12,7 +12,7 @@ use crate::harness::{Harness, HarnessError, with_firmware};
 use crate::rig::{PerJoint, Rig};
 use crate::study::Study;
 use crate::table::TableValues;
-use crate::verify::{Unverifiable, at_rest_disturbed, chain};
+use crate::verify::{VerifyError, at_rest_disturbed, chain};
 
 /// Time after which the set-point changes sides (s).
 const SIDE_S: f64 = 60.0;
@@ -116,7 +116,7 @@ pub fn corner_machine(rig: &Rig, number: u64) -> Rig {
 /// Balances `machines` for `seconds` each, a part of `study`. `done` is called after each, from any thread.
 ///
 /// # Errors
-/// [`Unverifiable`] if a run cannot be started.
+/// [`VerifyError`] if a run cannot be started.
 pub fn false_alarms(
     rig: &Rig,
     table: &TableValues,
@@ -124,12 +124,12 @@ pub fn false_alarms(
     (machines, seconds): (Machines, f64),
     study: &Study,
     done: &(dyn Fn() + Sync),
-) -> Result<FalseAlarms, Unverifiable> {
+) -> Result<FalseAlarms, VerifyError> {
     chain(rig, "healthy machines")?;
-    let one = |number: u64| -> Result<(u64, Healthy), Unverifiable> {
+    let one = |number: u64| -> Result<(u64, Healthy), VerifyError> {
         let found = balance(&machines.machine(rig, number), table, law, number, seconds);
         done();
-        Ok((number, found.map_err(|error| Unverifiable::Firmware(error.to_string()))?))
+        Ok((number, found.map_err(|error| VerifyError::Firmware(error.to_string()))?))
     };
     let all = study.outcomes(law.key(), machines.count(rig), one)?;
     let hours = all.iter().map(|(_, one)| one.balanced_s).sum::<f64>() / 3600.0;

@@ -6,7 +6,7 @@ use upright::table::Law;
 use super::error::RobustError;
 use super::loops::CandidateLoops;
 use crate::design::DesignError;
-use crate::parallel::{self, Progress};
+use crate::parallel::{self, Progress, ProgressStep};
 use crate::verify::PlantModel;
 
 /// Multiples of the tolerances for which the front is made.
@@ -86,7 +86,7 @@ fn climbed(
     let pairs: Vec<[usize; 2]> = (0..loops.pools.len())
         .flat_map(|pool| (0..loops.observers.len()).map(move |one| [pool, one]))
         .collect();
-    progress(Some(("the front", pairs.len() as u64)));
+    progress(ProgressStep::Begin("the front", pairs.len() as u64));
     let climb = |&[pool, observer]: &[usize; 2]| -> Result<Vec<usize>, RobustError> {
         let mut best = Vec::new();
         for place in 0..loops.ranked[pool][observer].len() {
@@ -99,7 +99,7 @@ fn climbed(
             }
         }
         best.resize(scales.len(), NONE);
-        progress(None);
+        progress(ProgressStep::Done);
         Ok(best)
     };
     parallel::try_map(&pairs, climb)

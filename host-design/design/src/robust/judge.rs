@@ -8,7 +8,7 @@ use crate::rig::{PerJoint, Rig, Tolerances};
 use crate::simulate::{Scenario, SimulationError, run};
 use crate::study::{Study, infinite_if_null};
 use crate::table::TableValues;
-use crate::verify::{CornerSettings, Disturbance, Unverifiable, corners, leaning, scenario};
+use crate::verify::{CornerSettings, Disturbance, VerifyError, corners, leaning, scenario};
 
 /// Shares of the tolerances that are tried. A loop may survive with much friction and fall with little.
 pub(super) const SHARES: [f64; 4] = [0.0, 0.5, 1.0, 1.25];
@@ -73,7 +73,7 @@ impl Judgement {
 /// machines with each share are a part of `study`; a shard leaves the combinations of mass errors to the merge.
 ///
 /// # Errors
-/// [`Unverifiable`] if the runs cannot be started.
+/// [`VerifyError`] if the runs cannot be started.
 pub fn judge(
     rig: &Rig,
     table: &TableValues,
@@ -81,19 +81,19 @@ pub fn judge(
     tolerances: &Tolerances,
     settings: &JudgeSettings,
     study: &Study,
-) -> Result<Judgement, Unverifiable> {
+) -> Result<Judgement, VerifyError> {
     if let Some((what, value, accepts)) = tolerances.too_large(rig.tick.period_s) {
-        return Err(Unverifiable::Setting { what, value, accepts });
+        return Err(VerifyError::Setting { what, value, accepts });
     }
     let machines = SHARES.into_iter().map(|share| {
         let machine = machine(rig, tolerances, share);
-        let of_number = |number: u64| -> Result<JudgedRun, Unverifiable> {
+        let of_number = |number: u64| -> Result<JudgedRun, VerifyError> {
             Ok(one(&machine, table, law, settings, number + 1)?)
         };
         let part = format!("{}, share {share}", law.key());
         Ok(summary(share, &study.outcomes(&part, settings.runs, of_number)?))
     });
-    let machines = machines.collect::<Result<_, Unverifiable>>()?;
+    let machines = machines.collect::<Result<_, VerifyError>>()?;
     let corners = if tolerances.mass_percent > 0.0 && !study.is_shard() {
         let settings = CornerSettings { disturbance: settings.disturbance, ..CornerSettings::of(rig) };
         let ideal = machine(rig, tolerances, 0.0);

@@ -9,7 +9,7 @@ use super::error::RobustError;
 use super::judge::{JudgeSettings, SHARES, machine, one};
 use super::linear::LinearPlants;
 use crate::design::{Certified, Uncertified};
-use crate::parallel::{self, Progress};
+use crate::parallel::{self, Progress, ProgressStep};
 use crate::rig::{Rig, Tolerances};
 use crate::table::TableValues;
 use crate::verify::{ControllerModel, PlantModel};
@@ -80,11 +80,11 @@ impl<'a> CandidateLoops<'a> {
             Law::ALL.map(of_law).into_iter().collect::<Result<_, RobustError>>()?;
         let noises = joint_noises(rig.kalman.as_ref().map_or(&[][..], |kalman| &kalman.joint_noise));
         let count = noises.len() + of_laws.iter().map(|(_, all)| all.len()).sum::<usize>();
-        progress(Some(("designing the candidates", count as u64)));
+        progress(ProgressStep::Begin("designing the candidates", count as u64));
         let designed = |rig: &Rig| {
             // A candidate without a design is left out.
             let design = Uncertified::sampled_alone(rig).ok();
-            progress(None);
+            progress(ProgressStep::Done);
             design
         };
         let pool = |(law, candidates): (Law, Vec<Candidate>)| {
@@ -99,11 +99,14 @@ impl<'a> CandidateLoops<'a> {
         });
         let observers = observers.into_iter().flatten().collect();
         let mut loops = Self { rig, tolerances, settings, plants, pools, observers, ranked: Vec::new() };
-        progress(Some(("sorting the loops", (loops.pools.len() * loops.observers.len()) as u64)));
+        progress(ProgressStep::Begin(
+            "sorting the loops",
+            (loops.pools.len() * loops.observers.len()) as u64,
+        ));
         let of_pool = |pool| {
             parallel::map(&loops.observers, |one| {
                 let ranked = loops.rank(pool, one);
-                progress(None);
+                progress(ProgressStep::Done);
                 ranked
             })
         };

@@ -2,7 +2,7 @@
 
 use super::error::RobustError;
 use super::loops::{At, CandidateLoops};
-use crate::parallel::{self, Progress};
+use crate::parallel::{self, Progress, ProgressStep};
 use crate::rig::Tolerances;
 use crate::verify::PlantModel;
 
@@ -65,7 +65,7 @@ fn within_reach(loops: &CandidateLoops<'_>, progress: Progress<'_>) -> Result<Op
 /// Whether there is an observer with which a loop of each law survives this share of the tolerances.
 fn serves(loops: &CandidateLoops<'_>, share: f64, progress: Progress<'_>) -> Result<bool, RobustError> {
     let corners = loops.plants.corners(share)?;
-    progress(Some(("what is within reach", loops.observers.len() as u64)));
+    progress(ProgressStep::Begin("what is within reach", loops.observers.len() as u64));
     let survives = |pool: usize, observer: usize| -> Result<bool, RobustError> {
         for at in tried(loops, [pool, observer], &corners)? {
             if loops.runs(at, share)?.holds {
@@ -77,7 +77,7 @@ fn serves(loops: &CandidateLoops<'_>, share: f64, progress: Progress<'_>) -> Res
     let of_observer = |observer: usize| -> Result<bool, RobustError> {
         for pool in 0..loops.pools.len() {
             if !survives(pool, observer)? {
-                progress(None);
+                progress(ProgressStep::Done);
                 return Ok(false);
             }
         }

@@ -10,11 +10,11 @@ use super::judge::{JudgeSettings, Judgement, judge};
 use super::loops::{At, CandidateLoops};
 use super::reason::reason;
 use crate::design::design;
-use crate::parallel::{self, Progress};
+use crate::parallel::{self, Progress, ProgressStep};
 use crate::rig::{Rig, Tolerances};
 use crate::study::Study;
 use crate::table::{Gains, TableValues};
-use crate::verify::{PlantModel, Unverifiable, chain};
+use crate::verify::{PlantModel, VerifyError, chain};
 
 /// Number of loops that are tried at the same time. It does not follow the number of processors, so that the same
 /// loops are tried on every computer.
@@ -61,13 +61,13 @@ pub fn choose(
 ) -> Result<(Choice, Option<Front>), RobustError> {
     chain(rig, "tolerances")?;
     if rig.kalman.is_none() {
-        return Err(Unverifiable::NoObserver.into());
+        return Err(VerifyError::NoObserver.into());
     }
     if tolerances.each().all(|(_, _, value)| value == 0.0) {
         return Err(RobustError::NoTolerance);
     }
     if let Some((what, value, accepts)) = tolerances.too_large(rig.tick.period_s) {
-        return Err(Unverifiable::Setting { what, value, accepts }.into());
+        return Err(VerifyError::Setting { what, value, accepts }.into());
     }
     let own = design(rig)?;
     let loops = CandidateLoops::of(rig, tolerances, settings, &own, progress)?;
@@ -93,7 +93,7 @@ impl Search<'_> {
         let mut heads = vec![vec![0; loops.observers.len()]; loops.pools.len()];
         let trying = || {
             let count: usize = (0..loops.pools.len()).map(|pool| loops.of_pool(pool).count()).sum();
-            progress(Some(("trying the loops", count as u64)));
+            progress(ProgressStep::Begin("trying the loops", count as u64));
         };
         trying();
         loop {
@@ -107,7 +107,7 @@ impl Search<'_> {
                 self.skip_fallen(&mut heads);
                 continue;
             }
-            progress(Some(("judging the choice", loops.pools.len() as u64)));
+            progress(ProgressStep::Begin("judging the choice", loops.pools.len() as u64));
             match self.judged(best, &heads, progress)? {
                 Ok(laws) => {
                     let observer = &loops.observers[best];
@@ -140,7 +140,7 @@ impl Search<'_> {
     ) -> Result<(), RobustError> {
         let one = |at: &At| -> Result<(), RobustError> {
             self.loops.trial(*at, corners)?;
-            progress(None);
+            progress(ProgressStep::Done);
             Ok(())
         };
         parallel::try_map(all, one).map(|_: Vec<()>| ())
@@ -175,7 +175,7 @@ impl Search<'_> {
             let Some(table) = table else { return Ok(Err(pool)) };
             let law = self.loops.pools[pool].law;
             let judgement = judge(&rig, &table, law, self.tolerances, self.settings, &Study::whole())?;
-            progress(None);
+            progress(ProgressStep::Done);
             if !judgement.survives() {
                 return Ok(Err(pool));
             }

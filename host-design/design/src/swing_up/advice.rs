@@ -2,12 +2,12 @@
 
 use super::SwingUpError;
 use super::check::check;
-use super::progress::{SearchProgress, SearchStep};
 use super::remedy::{Remedy, RigLimit};
 use super::robustness::{JUDGING_RUNS, RandomRuns, random_runs};
 use super::search::{SearchRanges, candidates};
 use super::setting::Setting;
 use crate::motion::Transition;
+use crate::parallel::{Progress, ProgressStep};
 use crate::rig::Rig;
 
 /// Candidates tried with each change, and how many of them, those with the best scores, go through the random runs.
@@ -74,14 +74,11 @@ pub(super) fn is_enough(rig: &Rig, runs: &RandomRuns) -> bool {
 pub(super) fn advice(
     rig: &Rig,
     transition: Transition,
-    progress: SearchProgress<'_>,
+    progress: Progress<'_>,
 ) -> Result<String, SwingUpError> {
-    progress(SearchStep::Stage {
-        transition,
-        what: "what would help",
-        steps: (RigLimit::ALL.len() * FACTORS.len()) as u64,
-    });
-    advice_from(rig, transition, TRIED, &|| progress(SearchStep::Step { score: None }))
+    let steps = (RigLimit::ALL.len() * FACTORS.len()) as u64;
+    progress(ProgressStep::Begin(&format!("{transition}: what would help"), steps));
+    advice_from(rig, transition, TRIED, &|| progress(ProgressStep::Done))
 }
 
 fn advice_from(

@@ -108,8 +108,8 @@ struct Reached {
 #[derive(Debug, Clone, Copy, Default, Serialize, Deserialize)]
 struct Deviation(#[serde(deserialize_with = "infinite_if_null")] f64);
 
-/// Runs of the firmware of `table`, which is designed for `rig`, one with each of the `seeds`, on all threads; the outcome does not depend on their number. `motions` are those of the table. The condition is a part of
-/// `study`.
+/// Runs of the firmware of `table`, which is designed for `rig`, one with each of the `seeds`, on all threads; the
+/// outcome does not depend on their number. `motions` are those of the table. The condition is a part of `study`.
 ///
 /// # Errors
 /// [`SwingUpError`] if the table has no motions, or the firmware does not run.

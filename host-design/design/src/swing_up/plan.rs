@@ -10,14 +10,13 @@ use super::check::{Peaks, check};
 use super::firmware_runs::{Condition, firmware_runs};
 use super::gains::{POSITION_WEIGHT, motion};
 use super::in_table::designed_table;
-use super::progress::{SearchProgress, SearchStep};
 use super::refine::refine;
 use super::robustness::{JUDGING_RUNS, MotionSpread, RandomRuns, random_runs, score};
 use super::search::{MotionCandidate, SearchRanges, candidates, ticks_per_knot};
 use super::setting::Setting;
 use super::stored::{Stored, StoredKnots};
 use crate::motion::{PlannedMotion, RaiseAndLower, Transition};
-use crate::parallel;
+use crate::parallel::{self, Progress, ProgressStep};
 use crate::rig::Rig;
 use crate::study::Study;
 use crate::table::TableValues;
@@ -66,7 +65,7 @@ pub struct MotionJudgement {
 /// # Errors
 /// [`SwingUpError`]: the rig cannot be raised at all, no candidate was solved, or the best one fails its check or too
 /// many random runs.
-pub fn search(rig: &Rig, progress: SearchProgress<'_>) -> Result<SwingUpPlan, SwingUpError> {
+pub fn search(rig: &Rig, progress: Progress<'_>) -> Result<SwingUpPlan, SwingUpError> {
     let setting = Setting::of(rig)?;
     let request = SearchRanges::of(&setting);
     let found = |transition| -> Result<FoundMotion, SwingUpError> {
@@ -89,7 +88,7 @@ pub fn search(rig: &Rig, progress: SearchProgress<'_>) -> Result<SwingUpPlan, Sw
 ///
 /// # Errors
 /// As for [`search`]; [`SwingUpError::Outdated`] if a stored motion does not fit the rig any more.
-pub fn judge(rig: &Rig, stored: &Stored, progress: SearchProgress<'_>) -> Result<SwingUpPlan, SwingUpError> {
+pub fn judge(rig: &Rig, stored: &Stored, progress: Progress<'_>) -> Result<SwingUpPlan, SwingUpError> {
     let setting = Setting::of(rig)?;
     let (raise, lower) = parallel::both(
         || found(&setting, Transition::Up, stored.raise.clone()),
@@ -163,12 +162,12 @@ pub(super) fn best(
     request: &SearchRanges,
     transition: Transition,
     numbers: Range<u64>,
-    progress: SearchProgress<'_>,
+    progress: Progress<'_>,
 ) -> Result<Option<FoundMotion>, SwingUpError> {
     let tried = numbers.end.saturating_sub(numbers.start);
-    progress(SearchStep::Stage { transition, what: "trajectories", steps: tried });
-    let mut solved =
-        candidates(setting, request, transition, numbers, &|score| progress(SearchStep::Step { score }))?;
+    progress(ProgressStep::Begin(&format!("{transition}: trajectories"), tried));
+    let done = |score: Option<f64>| progress(score.map_or(ProgressStep::Done, ProgressStep::Solved));
+    let mut solved = candidates(setting, request, transition, numbers, &done)?;
     if solved.is_empty() {
         return Ok(None);
     }
@@ -193,18 +192,15 @@ fn ranked(
     transition: Transition,
     candidates: Vec<MotionCandidate>,
     runs: usize,
-    progress: SearchProgress<'_>,
+    progress: Progress<'_>,
 ) -> Result<Vec<MotionCandidate>, SwingUpError> {
-    progress(SearchStep::Stage {
-        transition,
-        what: "random runs of the best",
-        steps: candidates.len() as u64,
-    });
+    let stage = format!("{transition}: random runs of the best");
+    progress(ProgressStep::Begin(&stage, candidates.len() as u64));
     let mut all: Vec<(RandomRuns, MotionCandidate)> = Vec::new();
     for candidate in candidates {
         let seed = JUDGING_RUNS as u64 + 1;
         let found = random_runs(setting, &candidate.motion, transition, &request.spread, seed, runs)?;
-        progress(SearchStep::Step { score: Some(candidate.score) });
+        progress(ProgressStep::Solved(candidate.score));
         all.push((found, candidate));
     }
     all.sort_by(|(a, _), (b, _)| b.arrived.cmp(&a.arrived).then(a.deviation_rad.total_cmp(&b.deviation_rad)));
@@ -216,7 +212,7 @@ fn judged(
     setting: &Setting<'_>,
     raise: FoundMotion,
     lower: FoundMotion,
-    progress: SearchProgress<'_>,
+    progress: Progress<'_>,
 ) -> Result<SwingUpPlan, SwingUpError> {
     let rig = setting.rig;
     let peaks =
@@ -225,9 +221,9 @@ fn judged(
     let stored = Stored::new(rig, raise.stored, lower.stored);
     let motions = RaiseAndLower { raise: raise.motion, lower: lower.motion };
     let table = designed_table(rig, &motions)?;
-    progress(SearchStep::Stage { transition: Transition::Up, what: "random runs of the firmware", steps: 1 });
+    progress(ProgressStep::Begin("random runs of the firmware", 1));
     let runs = arriving(rig, &table, &motions)?;
-    progress(SearchStep::Step { score: None });
+    progress(ProgressStep::Done);
     let is_searched = raise.search.is_some();
     for (transition, runs) in Transition::BOTH.into_iter().zip(&runs) {
         if is_enough(rig, runs) {

@@ -3,11 +3,11 @@
 use serde::Serialize;
 
 use super::SwingUpError;
-use super::progress::{SearchProgress, SearchStep};
 use super::robustness::{MotionSpread, RandomRuns, random_runs};
 use super::search::{MotionCandidate, SearchRanges, candidates};
 use super::setting::Setting;
 use crate::motion::Transition;
+use crate::parallel::{Progress, ProgressStep};
 use crate::rig::Rig;
 
 /// Random runs of each candidate.
@@ -39,15 +39,15 @@ pub fn solved(
     rig: &Rig,
     tried: u64,
     seed: u64,
-    progress: SearchProgress<'_>,
+    progress: Progress<'_>,
 ) -> Result<Vec<SolvedCandidate>, SwingUpError> {
     let setting = Setting::of(rig)?;
     let (request, transition) = (SearchRanges::of(&setting), Transition::Up);
     let first = seed.saturating_sub(1).saturating_mul(tried);
-    progress(SearchStep::Stage { transition, what: "trajectories", steps: tried });
-    let step = |score| progress(SearchStep::Step { score });
+    progress(ProgressStep::Begin("trajectories", tried));
+    let step = |score: Option<f64>| progress(score.map_or(ProgressStep::Done, ProgressStep::Solved));
     let found = candidates(&setting, &request, transition, first..first.saturating_add(tried), &step)?;
-    progress(SearchStep::Stage { transition, what: "random runs", steps: found.len() as u64 });
+    progress(ProgressStep::Begin("random runs", found.len() as u64));
     let MotionSpread { mass, friction, .. } = request.spread;
     let twice = MotionSpread { mass: 2.0 * mass, friction: 2.0 * friction, ..request.spread };
     let largest = |most: f64, value: f64| most.max(value.abs());

@@ -11,13 +11,12 @@ use serde::{Deserialize, Serialize};
 use super::SwingUpError;
 use super::check::check;
 use super::plan::{FoundMotion, best, restored};
-use super::progress::SearchProgress;
 use super::robustness::{JUDGING_RUNS, MotionSpread, RandomRuns, random_runs};
 use super::search::SearchRanges;
 use super::setting::Setting;
 use super::stored::{StoredKnots, header, read, request_hash};
 use crate::motion::{PlannedMotion, Transition};
-use crate::parallel;
+use crate::parallel::{self, Progress};
 use crate::rig::Rig;
 
 /// Share of random runs with the law alone that have to arrive before the firmware tries a motion.
@@ -64,7 +63,7 @@ impl StoredTransitions {
         rig: &Rig,
         transition: Transition,
         numbers: Range<u64>,
-        progress: SearchProgress<'_>,
+        progress: Progress<'_>,
     ) -> Result<Searched, SwingUpError> {
         let setting = Setting::with_transitions(rig, &[transition])?;
         let none = Searched { transition, solved: 0, runs: None, is_stored: false };

@@ -4,7 +4,7 @@
 use serde::Serialize;
 use upright::table::Law;
 
-use super::error::{Unverifiable, chain, within};
+use super::error::{VerifyError, chain, within};
 use super::trial::{Horizon, edge, leaning, scenario, trial, trials};
 use crate::parallel;
 use crate::plant::LANES;
@@ -88,13 +88,13 @@ const LINKS_FOR_ALL_SIDES: usize = 7;
 /// Of two mirror images only one is tried if the rail is symmetric, because then the loop is, too.
 ///
 /// # Errors
-/// [`Unverifiable`] if the runs cannot be started or a setting is invalid.
+/// [`VerifyError`] if the runs cannot be started or a setting is invalid.
 pub fn attraction(
     rig: &Rig,
     table: &TableValues,
     law: Law,
     settings: &AttractionSettings,
-) -> Result<Attraction, Unverifiable> {
+) -> Result<Attraction, VerifyError> {
     let settings = &settings.widened(rig, table, law)?;
     // All searches run at once, so that none waits for the slowest of another kind.
     let ((tilts, worst), raw_step) = rayon::join(
@@ -113,13 +113,13 @@ pub fn largest_tilts(
     table: &TableValues,
     law: Law,
     settings: &AttractionSettings,
-) -> Result<Vec<Tilt>, Unverifiable> {
+) -> Result<Vec<Tilt>, VerifyError> {
     Ok(single_tilts(rig, table, law, &settings.widened(rig, table, law)?)?)
 }
 
 impl AttractionSettings {
     /// With the horizon [widened](Horizon::widened) for the law's limit cycle.
-    fn widened(&self, rig: &Rig, table: &TableValues, law: Law) -> Result<Self, Unverifiable> {
+    fn widened(&self, rig: &Rig, table: &TableValues, law: Law) -> Result<Self, VerifyError> {
         within("relative", self.relative, 1e-6..=1.0, "a width from 1e-6 to 1")?;
         within("largest_angle_rad", self.largest_angle_rad, 1e-6..=1.5, "an angle from 1e-6 to 1.5 rad")?;
         within("largest_step_m", self.largest_step_m, 1e-6..=1e6, "a step from 1e-6 to 1e6 m")?;
@@ -274,7 +274,7 @@ pub struct Map {
 /// Of two mirror images only one is run if rail and plane are symmetric, because then the loop is, too.
 ///
 /// # Errors
-/// [`Unverifiable`] if the runs cannot be started or an axis names no state.
+/// [`VerifyError`] if the runs cannot be started or an axis names no state.
 pub fn attraction_map(
     rig: &Rig,
     table: &TableValues,
@@ -282,7 +282,7 @@ pub fn attraction_map(
     [across, down]: [MapAxis; 2],
     horizon: &Horizon,
     done: &(dyn Fn() + Sync),
-) -> Result<Map, Unverifiable> {
+) -> Result<Map, VerifyError> {
     for axis in [across, down] {
         let last = rig.states() as f64 - 1.0;
         within("the axis' state", axis.state as f64, 0.0..=last, "the index of a state")?;

@@ -3,7 +3,7 @@
 use serde::Serialize;
 use upright::table::Law;
 
-use super::error::{Unverifiable, chain, within};
+use super::error::{VerifyError, chain, within};
 use super::trial::{Disturbance, Horizon, Outcome, edge, leaning, scenario, trial, trials};
 use crate::parallel;
 use crate::plant::LANES;
@@ -104,14 +104,14 @@ fn run_of(rig: &Rig, law: Law, settings: &CornerSettings) -> Scenario {
 /// Runs every combination of cart and link masses wrong by ±`percent`; the controller stays that of `table`.
 ///
 /// # Errors
-/// [`Unverifiable`] for a model, a chain of more than 9 links, or runs that cannot be started.
+/// [`VerifyError`] for a model, a chain of more than 9 links, or runs that cannot be started.
 pub fn corners(
     rig: &Rig,
     table: &TableValues,
     law: Law,
     percent: f64,
     settings: &CornerSettings,
-) -> Result<Corners, Unverifiable> {
+) -> Result<Corners, VerifyError> {
     let links = chain(rig, "masses")?.links.len();
     within("percent", percent, 0.0..=90.0, "0 to 90 %")?;
     within("links", links as f64, 1.0..=MOST_LINKS as f64, "a chain of at most 9 links")?;
@@ -158,7 +158,7 @@ pub fn largest_percent(
     settings: &CornerSettings,
     step: f64,
     largest: f64,
-) -> Result<f64, Unverifiable> {
+) -> Result<f64, VerifyError> {
     within("largest", largest, 0.0..=90.0, "0 to 90 %")?;
     within("step", step, 0.01..=90.0, "0.01 to 90 %")?;
     let (mut held, mut lost) = (0, (largest / step).floor() as usize + 1);
@@ -192,13 +192,13 @@ impl MassTolerance {
 /// critical mass comes first.
 ///
 /// # Errors
-/// [`Unverifiable`] for a model, or runs that cannot be started.
+/// [`VerifyError`] for a model, or runs that cannot be started.
 pub fn mass_tolerances(
     rig: &Rig,
     table: &TableValues,
     law: Law,
     settings: &CornerSettings,
-) -> Result<Vec<MassTolerance>, Unverifiable> {
+) -> Result<Vec<MassTolerance>, VerifyError> {
     let parts = chain(rig, "masses")?.links.len() + 1;
     let scenario = run_of(rig, law, settings);
     let tolerated = |(part, side, largest): (usize, f64, f64)| {

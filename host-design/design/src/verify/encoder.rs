@@ -3,7 +3,7 @@
 use serde::Serialize;
 use upright::table::Law;
 
-use super::error::{Unverifiable, chain, within};
+use super::error::{VerifyError, chain, within};
 use super::trial::{Disturbance, Horizon, edge, scenario, trial};
 use crate::design::{DesignError, Uncertified, design};
 use crate::parallel;
@@ -92,12 +92,12 @@ fn with_observer_of(own: &Uncertified, rig: &Rig) -> Result<Uncertified, DesignE
 /// factor, as a user with such encoders would do: it knows their resolution. The law does not depend on it.
 ///
 /// # Errors
-/// [`Unverifiable`] for a model or a rig without observer, and if a design or run fails.
+/// [`VerifyError`] for a model or a rig without observer, and if a design or run fails.
 pub fn coarsest_encoder(
     rig: &Rig,
     law: Law,
     settings: &EncoderSettings,
-) -> Result<CoarsestEncoder, Unverifiable> {
+) -> Result<CoarsestEncoder, VerifyError> {
     chain(rig, "encoders")?;
     // The gains of the other law, which is not run, would be designed for nothing.
     let rig = &rig.with_law_alone(law);
@@ -108,7 +108,7 @@ pub fn coarsest_encoder(
         let coarse = coarser(rig, factor);
         let table = TableValues::of_uncertified(&coarse, &with_observer_of(&own, &coarse)?)?;
         if table.observer.is_none() {
-            return Err(Unverifiable::NoObserver);
+            return Err(VerifyError::NoObserver);
         }
         let survives = |seed: u64| {
             let scenario = Scenario {

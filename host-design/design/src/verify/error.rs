@@ -6,7 +6,7 @@ use crate::simulate::SimulationError;
 use crate::study::StudyError;
 use crate::table::NoTable;
 
-/// Why a report cannot be made.
+/// Why a report, or a quantity of it, cannot be computed for a rig.
 #[derive(Debug, thiserror::Error)]
 pub enum VerifyError {
     /// The eigenvalue iteration failed.
@@ -15,26 +15,12 @@ pub enum VerifyError {
     /// The noise grows without bound.
     #[error("the loop is so close to instability that its noise has no computable steady state")]
     NoStationaryState,
-    /// The design could not be repeated.
+    /// The design could not be repeated, or a changed rig, for which the gains have to be redesigned, has none.
     #[error(transparent)]
     Design(#[from] DesignError),
-    /// The standard run could not be made.
+    /// A run cannot be started.
     #[error(transparent)]
     Simulation(#[from] SimulationError),
-    /// Some runs could not be made.
-    #[error(transparent)]
-    Runs(#[from] Unverifiable),
-}
-
-/// A quantity that cannot be computed for this rig.
-#[derive(Debug, thiserror::Error)]
-pub enum Unverifiable {
-    /// The runs cannot be started.
-    #[error(transparent)]
-    Simulation(#[from] SimulationError),
-    /// A changed rig, for which the gains have to be redesigned, has no design.
-    #[error(transparent)]
-    Design(#[from] DesignError),
     /// No gain table can be made for a changed rig.
     #[error(transparent)]
     NoTable(#[from] NoTable),
@@ -63,8 +49,8 @@ pub enum Unverifiable {
 }
 
 /// The chain of a rig that has one.
-pub(crate) fn chain<'a>(rig: &'a Rig, what: &'static str) -> Result<&'a Chain, Unverifiable> {
-    rig.chain().ok_or(Unverifiable::NotAChain(what))
+pub(crate) fn chain<'a>(rig: &'a Rig, what: &'static str) -> Result<&'a Chain, VerifyError> {
+    rig.chain().ok_or(VerifyError::NotAChain(what))
 }
 
 /// Checks that a setting is within its range.
@@ -73,6 +59,6 @@ pub(super) fn within(
     value: f64,
     range: core::ops::RangeInclusive<f64>,
     accepts: &'static str,
-) -> Result<(), Unverifiable> {
-    if range.contains(&value) { Ok(()) } else { Err(Unverifiable::Setting { what, value, accepts }) }
+) -> Result<(), VerifyError> {
+    if range.contains(&value) { Ok(()) } else { Err(VerifyError::Setting { what, value, accepts }) }
 }

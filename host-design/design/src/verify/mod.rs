@@ -41,7 +41,7 @@ pub use corners::{
 };
 pub use covariance::NoiseShare;
 pub use encoder::{CoarsestEncoder, EncoderSettings, coarser, coarsest_encoder};
-pub use error::{Unverifiable, VerifyError};
+pub use error::VerifyError;
 pub use imperfections::{
     IMPERFECTIONS, Imperfection, ImperfectionSettings, Imperfections, RequiredSurvival, SizeRuns, Survival,
     imperfections, limit_cycle, required_imperfections,

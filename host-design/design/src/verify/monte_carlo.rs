@@ -5,7 +5,7 @@ use rand_pcg::Pcg64;
 use serde::{Deserialize, Serialize};
 use upright::table::Law;
 
-use super::error::{Unverifiable, within};
+use super::error::{VerifyError, within};
 use super::trial::{Disturbance, Horizon, Outcome, leaning, scenario, trials};
 use crate::plant::LANES;
 use crate::rig::{Chain, Link, Rig};
@@ -143,7 +143,7 @@ fn draw_chain(chain: &mut Chain, spread: &Spread, between: &mut impl FnMut(f64) 
 /// number. `done` is called after each run, from any thread.
 ///
 /// # Errors
-/// [`Unverifiable`] if a run cannot be started or a setting is invalid.
+/// [`VerifyError`] if a run cannot be started or a setting is invalid.
 pub fn monte_carlo(
     rig: &Rig,
     table: &TableValues,
@@ -151,7 +151,7 @@ pub fn monte_carlo(
     spread: &Spread,
     effort: &Effort<'_>,
     done: &(dyn Fn() + Sync),
-) -> Result<MonteCarlo, Unverifiable> {
+) -> Result<MonteCarlo, VerifyError> {
     for (what, share) in [
         ("mass", spread.mass),
         ("length", spread.length),
@@ -163,7 +163,7 @@ pub fn monte_carlo(
     within("other_delay", spread.other_delay, 0.0..=1.0, "a share from 0 to 1")?;
     within("tilt_rad", spread.tilt_rad, 0.0..=1.5, "an angle from 0 to 1.5 rad")?;
     let &Effort { runs, seed: base_seed, study, .. } = effort;
-    let batch = |numbers: &[u64]| -> Result<Vec<WorstCase>, Unverifiable> {
+    let batch = |numbers: &[u64]| -> Result<Vec<WorstCase>, VerifyError> {
         let seeds: Vec<u64> = numbers.iter().map(|number| base_seed.wrapping_add(*number)).collect();
         let cases: Vec<(Rig, Scenario)> = seeds.iter().map(|&seed| sample(rig, law, spread, seed)).collect();
         let outcomes = trials(table, &cases, &Horizon::default())?;

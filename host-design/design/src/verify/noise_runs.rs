@@ -3,7 +3,7 @@
 use serde::Serialize;
 use upright::table::Law;
 
-use super::error::Unverifiable;
+use super::error::VerifyError;
 use super::trial::{Disturbance, Horizon, scenario, trial};
 use crate::parallel;
 use crate::plant::absolute_angles;
@@ -54,7 +54,7 @@ struct Sums {
 /// Measures the root mean squares over runs of `duration_s` with the seeds 1 to `seeds`: nominal plant, set-point 0.
 ///
 /// # Errors
-/// [`Unverifiable`] if the runs cannot be started.
+/// [`VerifyError`] if the runs cannot be started.
 pub fn noise_run(
     rig: &Rig,
     table: &TableValues,
@@ -62,7 +62,7 @@ pub fn noise_run(
     disturbance: &Disturbance,
     seeds: u64,
     duration_s: f64,
-) -> Result<NoiseRun, Unverifiable> {
+) -> Result<NoiseRun, VerifyError> {
     let states = rig.states();
     let links = rig.links();
     let one = |seed: u64| -> Result<Sums, SimulationError> {
@@ -135,7 +135,7 @@ pub struct Endurance {
 /// Runs the nominal plant from rest for `duration_s` with each of the seeds 1 to `seeds`.
 ///
 /// # Errors
-/// [`Unverifiable`] if the runs cannot be started.
+/// [`VerifyError`] if the runs cannot be started.
 pub fn endurance(
     rig: &Rig,
     table: &TableValues,
@@ -143,7 +143,7 @@ pub fn endurance(
     disturbance: &Disturbance,
     seeds: u64,
     duration_s: f64,
-) -> Result<Endurance, Unverifiable> {
+) -> Result<Endurance, VerifyError> {
     let one = |seed: u64| {
         let scenario = disturbed(rig, law, disturbance, seed, duration_s);
         Ok((seed, trial(rig, table, &scenario, &Horizon::default())?))

@@ -7,11 +7,12 @@ use super::corners::MOST_LINKS;
 use super::{
     Attraction, AttractionSettings, CoarsestEncoder, CornerSettings, Corners, Disturbance, Effort,
     EncoderSettings, ImperfectionSettings, LinearReport, Margins, MassTolerance, MonteCarlo, NoiseRun,
-    RequiredSurvival, Unverifiable, VerifyError, attraction, coarsest_encoder, corners, linear,
-    mass_tolerances, monte_carlo, noise_run, required_imperfections, spread,
+    RequiredSurvival, VerifyError, attraction, coarsest_encoder, corners, linear, mass_tolerances,
+    monte_carlo, noise_run, required_imperfections, spread,
 };
 use crate::design::Certified;
 use crate::number::significant;
+use crate::parallel::{Progress, ProgressStep};
 use crate::rig::{Requirements, Rig};
 use crate::table::TableValues;
 
@@ -69,7 +70,7 @@ pub struct Check {
     pub holds: bool,
 }
 
-/// Makes the report. `done` is called after each Monte Carlo run, `stage` before each part.
+/// Makes the report.
 ///
 /// # Errors
 /// [`VerifyError`] if a value cannot be computed.
@@ -78,13 +79,12 @@ pub fn trust(
     certified: &Certified,
     table: &TableValues,
     effort: Effort<'_>,
-    stage: &dyn Fn(&str),
-    done: &(dyn Fn() + Sync),
+    progress: Progress<'_>,
 ) -> Result<TrustReport, VerifyError> {
-    stage("margins, tick, noise and rounding");
+    progress(ProgressStep::Begin("margins, tick, noise and rounding", 1));
     let mut laws = Vec::new();
     for part in linear(rig, certified, table)? {
-        laws.push(law_trust(rig, table, part, effort, stage, done)?);
+        laws.push(law_trust(rig, table, part, effort, progress)?);
     }
     let checks = laws.iter().flat_map(|law| checks(rig, law)).collect();
     Ok(TrustReport { laws, checks })
@@ -133,9 +133,9 @@ fn law_trust(
     table: &TableValues,
     linear: LinearReport,
     effort: Effort<'_>,
-    stage: &dyn Fn(&str),
-    done: &(dyn Fn() + Sync),
+    progress: Progress<'_>,
 ) -> Result<LawTrust, VerifyError> {
+    let stage = |name| progress(ProgressStep::Begin(name, 1));
     let law = linear.law;
     let is_chain = rig.chain().is_some();
     let mut trust = LawTrust::of(linear);
@@ -163,17 +163,18 @@ fn law_trust(
         stage("imperfections");
         let found = required_imperfections(rig, table, law, &ImperfectionSettings::of(rig));
         trust.imperfections = known(found)?.unwrap_or_default();
-        stage("random plants");
-        trust.monte_carlo = known(monte_carlo(rig, table, law, &spread(rig, effort.late), &effort, done))?;
+        progress(ProgressStep::Begin("random plants", effort.runs as u64));
+        let done = || progress(ProgressStep::Done);
+        trust.monte_carlo = known(monte_carlo(rig, table, law, &spread(rig, effort.late), &effort, &done))?;
     }
     Ok(trust)
 }
 
 /// A part for which the rig file has no data is left out; any other failure is an error.
-fn known<T>(part: Result<T, Unverifiable>) -> Result<Option<T>, VerifyError> {
+fn known<T>(part: Result<T, VerifyError>) -> Result<Option<T>, VerifyError> {
     match part {
         Ok(part) => Ok(Some(part)),
-        Err(Unverifiable::NotAChain(_) | Unverifiable::NoObserver) => Ok(None),
+        Err(VerifyError::NotAChain(_) | VerifyError::NoObserver) => Ok(None),
         Err(error) => Err(error.into()),
     }
 }

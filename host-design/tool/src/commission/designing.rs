@@ -10,7 +10,7 @@ use upright_design::rig::{Rig, RigText, Tolerances};
 use upright_design::robust::{JudgeSettings, RobustError, choose, judge, rewritten, set_tolerances};
 use upright_design::study::Study;
 use upright_design::table::{Gains, TableValues};
-use upright_design::verify::{Unverifiable, brief};
+use upright_design::verify::{VerifyError, brief};
 
 use super::machine::Stop;
 use super::plan::CommissionPlan;
@@ -131,7 +131,7 @@ fn robust(
 ) -> Result<Designed, Stop> {
     let settings = JudgeSettings { runs: 1, duration_s: RUN_S, ..JudgeSettings::of(&own.rig) };
     let laws: Vec<Law> = own.table.laws.present().map(|(law, _)| law).collect();
-    let survives = |law: &Law| -> Result<bool, Unverifiable> {
+    let survives = |law: &Law| -> Result<bool, VerifyError> {
         Ok(judge(&own.rig, &own.table, *law, tolerances, &settings, &Study::whole())?.survives())
     };
     let all = laws.iter().map(survives).collect::<Result<Vec<_>, _>>();

@@ -1,8 +1,8 @@
 //! From a wired rig to a balancing one, step by step.
 //!
 //! A [`MachineAtHand`] is a rig with its firmware and the person beside it: the real ones, or simulated ones. The guide
-//! tells the person what to do ([`PersonTask`]), watches the telemetry, and stops at the first [`CommissionStep`] in which the machine
-//! is not as it has to be. Everything goes into a [`CommissionRecord`].
+//! tells the person what to do ([`PersonTask`]), watches the telemetry, and stops at the first [`CommissionStep`] in
+//! which the machine is not as it has to be. Everything goes into a [`CommissionRecord`].
 //!
 //! - [`AtPort`]: the real machine behind a port, and the person at the terminal.
 //! - [`Simulated`]: a machine that differs from its file, with a person who does what is asked; [`Planted`] defects.

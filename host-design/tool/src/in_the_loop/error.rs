@@ -17,6 +17,9 @@ pub enum RunError {
     /// The rig cannot be shaken, or does not do what it should.
     #[error(transparent)]
     Shaken(#[from] IdentifyError),
+    /// The listening socket has failed.
+    #[error("no client can connect: {0}")]
+    Socket(#[from] std::io::Error),
 }
 
 impl RunError {

@@ -13,4 +13,4 @@ pub use board::{
 pub use error::RunError;
 pub use place::{RunPlace, run, run_compared, run_shaken};
 pub use qemu::{Emulator, EmulatorError, PinLink};
-pub use relay::{RelayError, serve};
+pub use relay::serve;

@@ -4,37 +4,13 @@ use std::io::{ErrorKind, Read, Write};
 use std::net::{TcpListener, TcpStream};
 use std::time::{Duration, Instant};
 
-use upright_design::harness::{Harness, HarnessError, Target};
+use upright_design::harness::{Harness, Target};
 use upright_design::rig::Rig;
 use upright_design::simulate::Scenario;
 use upright_design::table::TableValues;
 
 use super::error::RunError;
 use super::place::RunPlace;
-use super::qemu::EmulatorError;
-
-/// Why a relay has ended early.
-#[derive(Debug, thiserror::Error)]
-pub enum RelayError {
-    /// The firmware or the rig could not be run.
-    #[error(transparent)]
-    Run(#[from] RunError),
-    /// The listening socket failed.
-    #[error("no client can connect: {0}")]
-    Socket(#[from] std::io::Error),
-}
-
-impl From<HarnessError> for RelayError {
-    fn from(error: HarnessError) -> Self {
-        RelayError::Run(error.into())
-    }
-}
-
-impl From<EmulatorError> for RelayError {
-    fn from(error: EmulatorError) -> Self {
-        RelayError::Run(error.into())
-    }
-}
 
 /// Runs the firmware of `table` with the plant of `rig` for the duration of `scenario`, in real time from the first
 /// client on, and passes the bytes of its serial line to and from whoever is connected to `listener`, one at a time.
@@ -43,7 +19,7 @@ impl From<EmulatorError> for RelayError {
 /// off, the hand holds the rig at the scenario's start, so that it can be armed again.
 ///
 /// # Errors
-/// [`RelayError`] if the firmware does not run, the socket fails, or no client connects within the duration of the
+/// [`RunError`] if the firmware does not run, the socket fails, or no client connects within the duration of the
 /// run.
 pub fn serve(
     rig: &Rig,
@@ -51,7 +27,7 @@ pub fn serve(
     scenario: &Scenario,
     place: RunPlace<'_>,
     listener: &TcpListener,
-) -> Result<(), RelayError> {
+) -> Result<(), RunError> {
     place.with_target(table, |target| Relay { rig, table, scenario, listener }.run(target))
 }
 
@@ -63,7 +39,7 @@ struct Relay<'a> {
 }
 
 impl Relay<'_> {
-    fn run(self, target: &mut dyn Target) -> Result<(), RelayError> {
+    fn run(self, target: &mut dyn Target) -> Result<(), RunError> {
         let period_s = self.rig.tick.period_s;
         let mut harness = Harness::new(self.rig, self.table, self.scenario, target)?;
         // No set-point is commanded, so the firmware needs no keep-alives.

@@ -3,7 +3,7 @@
 use crate::figure::FigureError;
 use upright_design::design::DesignError;
 use upright_design::simulate::SimulationError;
-use upright_design::verify::{Unverifiable, VerifyError};
+use upright_design::verify::VerifyError;
 
 /// Why a report cannot be made.
 #[derive(Debug, thiserror::Error)]
@@ -17,12 +17,9 @@ pub enum ReportError {
     /// The poles of the design cannot be computed.
     #[error(transparent)]
     Design(#[from] DesignError),
-    /// The trust report cannot be computed.
+    /// The trust report or the region of attraction cannot be computed.
     #[error(transparent)]
     Verify(#[from] VerifyError),
-    /// The region of attraction cannot be computed.
-    #[error(transparent)]
-    Runs(#[from] Unverifiable),
     /// The page cannot be rendered.
     #[error("the page cannot be made: {0}")]
     Page(String),

@@ -2,7 +2,7 @@
 
 use super::ReportSource;
 use crate::figure::{Axis, Curve, Figure, Panel};
-use upright_design::verify::{CornerSettings, Imperfections, Survival, Unverifiable, corners, limit_cycle};
+use upright_design::verify::{CornerSettings, Imperfections, Survival, VerifyError, corners, limit_cycle};
 
 /// Errors of the masses for which every combination is run (%).
 const PERCENTS: [f64; 9] = [2.0, 5.0, 7.0, 10.0, 15.0, 20.0, 30.0, 50.0, 70.0];
@@ -59,7 +59,7 @@ impl SurvivalRow {
 }
 
 /// Amplitude of the limit cycle over the friction of the joints, a curve for each law.
-pub(super) fn limit_cycles(source: &ReportSource<'_>) -> Result<Figure, Unverifiable> {
+pub(super) fn limit_cycles(source: &ReportSource<'_>) -> Result<Figure, VerifyError> {
     let ReportSource { rig, table, imperfections, .. } = *source;
     let x = Axis::log("Coulomb friction of each joint (N·m)");
     let mut panel = Panel::new(x, Axis::linear("largest angle of a link (mrad)")).high(360);
@@ -77,7 +77,7 @@ pub(super) fn limit_cycles(source: &ReportSource<'_>) -> Result<Figure, Unverifi
 
 /// Share of the combinations of wrong masses that survive, over the percentage, a curve for each law; none for a chain
 /// with too many combinations.
-pub(super) fn wrong_masses(source: &ReportSource<'_>) -> Result<Option<Figure>, Unverifiable> {
+pub(super) fn wrong_masses(source: &ReportSource<'_>) -> Result<Option<Figure>, VerifyError> {
     let ReportSource { rig, table, imperfections, .. } = *source;
     if rig.links() > MOST_LINKS {
         return Ok(None);

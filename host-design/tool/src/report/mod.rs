@@ -21,6 +21,7 @@ pub use source::ReportSource;
 
 use upright::table::Law;
 use upright_design::design::DesignPoles;
+use upright_design::parallel::{Progress, ProgressStep};
 
 use self::page::ReportPage;
 pub(crate) use self::plot::Plot;
@@ -67,13 +68,13 @@ impl Picture {
     }
 }
 
-/// Makes the report; calls `stage` before each part.
+/// Makes the report.
 ///
 /// # Errors
 /// [`ReportError`] if a run cannot be started or a figure cannot be drawn; a rig that falls is not an error.
-pub fn report(source: &ReportSource<'_>, stage: &dyn Fn(&str)) -> Result<Report, ReportError> {
+pub fn report(source: &ReportSource<'_>, progress: Progress<'_>) -> Result<Report, ReportError> {
     let ReportSource { rig, certified, table, trust, .. } = *source;
-    stage("runs");
+    progress(ProgressStep::Begin("runs", 1));
     let designed_poles = certified.poles(rig)?;
     let mut scenes = runs::scenes(rig, &designed_poles, table, trust, source.seed)?;
     scenes.extend(source.swing_up.map(|run| runs::swing_up(rig, run, source.seed)));
@@ -85,19 +86,19 @@ pub fn report(source: &ReportSource<'_>, stage: &dyn Fn(&str)) -> Result<Report,
         page.drawing = Some(svg.clone());
         pictures.push(Picture { name: "rig".to_owned(), svg, csv: None });
     }
-    stage("figures of the runs");
+    progress(ProgressStep::Begin("figures of the runs", 1));
     for (scene, entry) in scenes.iter().zip(&mut page.scenes) {
         for (run, figure) in scene.runs.iter().zip(responses::figures(rig, scene)) {
             pictures.push(Picture::of_law(scene.id, run.law, &figure)?);
             entry.plots.push(Plot::over_time(&figure, format!("{}, {}", scene.name, run.law.title()))?);
         }
     }
-    stage("poles and frequency");
+    progress(ProgressStep::Begin("poles and frequency", 1));
     show_linear_loops(source, &designed_poles, &mut page, &mut pictures)?;
     let mut stable =
         trust.laws.iter().filter(|part| part.linear.stable).map(|part| part.linear.law).peekable();
     if page.drawing.is_some() && stable.peek().is_some() {
-        stage("region of attraction");
+        progress(ProgressStep::Begin("region of attraction", 1));
         for law in stable {
             let figure = region::figure(rig, table, law, source.region_points)?;
             pictures.push(Picture::of_law("region", law, &figure)?);
@@ -108,7 +109,7 @@ pub fn report(source: &ReportSource<'_>, stage: &dyn Fn(&str)) -> Result<Report,
         show_margins(source, &mut page, &mut pictures)?;
     }
     if !source.imperfections.is_empty() {
-        show_imperfections(source, stage, &mut page, &mut pictures)?;
+        show_imperfections(source, progress, &mut page, &mut pictures)?;
     }
     Ok(Report { html: page.html()?, pictures })
 }
@@ -154,15 +155,15 @@ fn show_margins(
 
 fn show_imperfections(
     source: &ReportSource<'_>,
-    stage: &dyn Fn(&str),
+    progress: Progress<'_>,
     page: &mut ReportPage<'_>,
     pictures: &mut Vec<Picture>,
 ) -> Result<(), ReportError> {
-    stage("imperfections");
+    progress(ProgressStep::Begin("imperfections", 1));
     let limit_cycles = imperfections::limit_cycles(source)?;
     pictures.push(Picture::of("limit-cycle".to_owned(), &limit_cycles)?);
     page.imperfect.push(Plot::of(&limit_cycles, "Limit cycle over the friction of the joints".to_owned())?);
-    stage("wrong masses");
+    progress(ProgressStep::Begin("wrong masses", 1));
     if let Some(masses) = imperfections::wrong_masses(source)? {
         pictures.push(Picture::of("wrong-masses".to_owned(), &masses)?);
         page.imperfect.push(Plot::of(&masses, "Every combination of wrong masses".to_owned())?);

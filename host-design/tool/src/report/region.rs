@@ -5,7 +5,7 @@ use upright::table::Law;
 use crate::figure::{Axis, Figure, HeatMap, Panel};
 use upright_design::rig::Rig;
 use upright_design::table::TableValues;
-use upright_design::verify::{Horizon, Map, MapAxis, Unverifiable, attraction_map};
+use upright_design::verify::{Horizon, Map, MapAxis, VerifyError, attraction_map};
 
 const ANGLE: usize = 2;
 const RATE: usize = 3;
@@ -14,14 +14,9 @@ const LARGEST: [f64; 2] = [0.8, 8.0];
 
 /// Map over angle and rate of the first joint, wide enough to show the whole region, with `points` starts along each
 /// axis.
-pub(super) fn figure(
-    rig: &Rig,
-    table: &TableValues,
-    law: Law,
-    points: usize,
-) -> Result<Figure, Unverifiable> {
+pub(super) fn figure(rig: &Rig, table: &TableValues, law: Law, points: usize) -> Result<Figure, VerifyError> {
     const WIDER: f64 = 1.6;
-    let axis = |state: usize, largest: f64| -> Result<MapAxis, Unverifiable> {
+    let axis = |state: usize, largest: f64| -> Result<MapAxis, VerifyError> {
         let end = 1.4 * extent(rig, table, law, state, largest)?;
         Ok(MapAxis { state, range: [-end, end], points })
     };
@@ -47,7 +42,7 @@ fn reaches_edge(map: &Map) -> bool {
 
 /// Approximate largest deviation in one state alone from which the loop recovers; the search starts at `largest` and
 /// ends below a hundredth of it.
-fn extent(rig: &Rig, table: &TableValues, law: Law, state: usize, largest: f64) -> Result<f64, Unverifiable> {
+fn extent(rig: &Rig, table: &TableValues, law: Law, state: usize, largest: f64) -> Result<f64, VerifyError> {
     const TRIED: usize = 13;
     let still = MapAxis { state: if state == ANGLE { RATE } else { ANGLE }, range: [0.0, 0.0], points: 1 };
     let mut end = largest;

@@ -28,7 +28,8 @@ pub struct ReportSource<'a> {
     pub route: Option<&'a Demonstration>,
     /// How hard its links may be pushed during the stored motions; empty: the page has no such part.
     pub margins: &'a [(Transition, Vec<Margin>)],
-    /// Initial states along each axis of the map of the region of attraction, at least 2; usually [`super::REGION_POINTS`].
+    /// Initial states along each axis of the map of the region of attraction, at least 2; usually
+    /// [`super::REGION_POINTS`].
     pub region_points: usize,
     /// The command line that makes this report, shown on the page.
     pub command: &'a str,

@@ -30,7 +30,7 @@ pub use designs::{Designs, PoleSet, designs};
 pub use errata::{Erratum, Evidence, errata};
 pub use error::ReproduceError;
 pub use markdown::markdown_table;
-pub use reproduction::{Reproduction, STAGES, reproduce};
+pub use reproduction::{Reproduction, reproduce};
 pub use responses::{Loop, Loops, StepResponse, responses};
 pub use rigs::{PaperDesigns, PaperRigs, SEED};
 pub use robustness::{Ripple, Robustness, robustness};

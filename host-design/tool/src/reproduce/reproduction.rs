@@ -1,6 +1,7 @@
 //! All comparisons, one after the other.
 
 use serde::Serialize;
+use upright_design::parallel::{Progress, ProgressStep};
 
 use super::designs::{Designs, designs};
 use super::errata::{Erratum, errata};
@@ -25,28 +26,23 @@ pub struct Reproduction {
     pub robustness: Vec<Robustness>,
 }
 
-/// The stages of [`reproduce`], in their order.
-pub const STAGES: [&str; 5] =
-    ["matrices, gains and poles", "errata", "step responses", "Table 2", "spectra and margins"];
-
-/// Computes everything; `stage` is called with the name of each of the [`STAGES`] before it starts.
+/// Computes everything.
 ///
 /// # Errors
 /// [`ReproduceError`] if a result cannot be computed.
-pub fn reproduce(rigs: &PaperRigs, stage: &dyn Fn(&'static str)) -> Result<Reproduction, ReproduceError> {
-    // Each name is used once, or the compiler complains.
-    let [of_designs, of_errata, of_responses, of_settling, of_robustness] = STAGES;
-    stage(of_designs);
+pub fn reproduce(rigs: &PaperRigs, progress: Progress<'_>) -> Result<Reproduction, ReproduceError> {
+    let stage = |name| progress(ProgressStep::Begin(name, 1));
+    stage("matrices, gains and poles");
     let designed = PaperDesigns::of(rigs)?;
     let designs = designs(rigs, &designed)?;
-    stage(of_errata);
+    stage("errata");
     let errata = errata(rigs, &designed)?;
-    stage(of_responses);
+    stage("step responses");
     let loops = Loops::with(&rigs.exact, designed.exact)?;
     let responses = responses(&loops)?;
-    stage(of_settling);
+    stage("Table 2");
     let settling = settling(rigs)?;
-    stage(of_robustness);
+    stage("spectra and margins");
     let robustness = robustness(&loops)?;
     Ok(Reproduction { designs, errata, responses, settling, robustness })
 }

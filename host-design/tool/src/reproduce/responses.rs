@@ -79,7 +79,8 @@ impl Loops {
         laws.each()[law].ok_or_else(|| ReproduceError::OneLaw(self.rig.name.clone()))
     }
 
-    /// Simulates each law in its kind of loop, from rest. Sampled loops are recorded at the tick, whatever the run says.
+    /// Simulates each law in its kind of loop, from rest. Sampled loops are recorded at the tick, whatever the run
+    /// says.
     pub(super) fn trajectories(&self, wanted: &[LoopRun]) -> Result<Vec<Trajectory>, ReproduceError> {
         // The runs of the firmware advance together, the others by themselves.
         let (alone, together): (Vec<usize>, Vec<usize>) =

@@ -29,5 +29,5 @@ mod request;
 mod server;
 mod simulated;
 
-pub use server::{Server, TwinError};
+pub use server::Server;
 pub use simulated::SimulatedMachine;

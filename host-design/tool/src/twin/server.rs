@@ -4,7 +4,6 @@ use std::net::{IpAddr, SocketAddr, TcpListener, TcpStream};
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::{Arc, PoisonError};
 
-use upright_design::harness::HarnessError;
 use upright_design::rig::Rig;
 use upright_design::table::TableValues;
 
@@ -16,36 +15,13 @@ use super::greeting::greeting;
 use super::property::Properties;
 use super::simulated::{RunEnd, SimulatedMachine};
 use crate::campaign::{Defect, kinds};
-use crate::in_the_loop::{EmulatorError, RunError, RunPlace};
+use crate::in_the_loop::{RunError, RunPlace};
 use crate::monitor::{Monitor, SerialLine};
 
 /// Most connections at a time, including those that have not been let in yet.
 const MAX_CONNECTIONS: usize = 32;
 /// Time between two telemetry messages if nothing limits them (s).
 const TELEMETRY_S: f32 = 0.005;
-
-/// Why a twin has ended early.
-#[derive(Debug, thiserror::Error)]
-pub enum TwinError {
-    /// The firmware or the simulated rig has failed.
-    #[error(transparent)]
-    Run(#[from] RunError),
-    /// The listening socket has failed.
-    #[error("the page cannot be served: {0}")]
-    Socket(#[from] std::io::Error),
-}
-
-impl From<HarnessError> for TwinError {
-    fn from(error: HarnessError) -> Self {
-        TwinError::Run(error.into())
-    }
-}
-
-impl From<EmulatorError> for TwinError {
-    fn from(error: EmulatorError) -> Self {
-        TwinError::Run(error.into())
-    }
-}
 
 /// Serves a page at an address that only the person who started it knows.
 pub struct Server {
@@ -82,14 +58,14 @@ impl Server {
     /// `goes_on` holds. If `upright`, the rig is raised at the start; otherwise it hangs.
     ///
     /// # Errors
-    /// [`TwinError`] if the firmware cannot be started.
+    /// [`RunError`] if the firmware cannot be started.
     pub fn simulate(
         self,
         machine: SimulatedMachine<'_>,
         place: RunPlace<'_>,
         upright: bool,
         goes_on: &dyn Fn() -> bool,
-    ) -> Result<(), TwinError> {
+    ) -> Result<(), RunError> {
         let SimulatedMachine { rig, table, .. } = machine;
         let defects: Vec<Defect> =
             kinds(table, place).into_iter().filter(|kind| kind.can_begin_while_balancing()).collect();
@@ -107,7 +83,7 @@ impl Server {
             let ended = place.with_target(table, |target| {
                 machine
                     .run(target, &mut dispatcher, &mut properties, upright, goes_on)
-                    .map_err(TwinError::from)
+                    .map_err(RunError::from)
             });
             upright = match ended {
                 Ok(RunEnd::Stopped) => return Ok(()),
@@ -128,7 +104,7 @@ impl Server {
     /// Shows the machine behind `line`, which has to be that of `rig`, while `goes_on` holds.
     ///
     /// # Errors
-    /// [`TwinError`] if the page cannot be served.
+    /// [`RunError`] if the page cannot be served.
     pub fn connect(
         self,
         rig: &Rig,
@@ -136,7 +112,7 @@ impl Server {
         line: SerialLine,
         name: &str,
         goes_on: &dyn Fn() -> bool,
-    ) -> Result<(), TwinError> {
+    ) -> Result<(), RunError> {
         let (viewers, events) = Connections::new(greeting(rig, table, name, None));
         let _accepting = accepting(self.listener, self.secret, viewers.clone(), Arc::clone(&self.recording))?;
         let mut dispatcher = Dispatcher::new(Monitor::new(name), (viewers, events), self.recording);

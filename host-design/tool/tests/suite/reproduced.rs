@@ -6,6 +6,8 @@ use std::sync::LazyLock;
 
 use serde_json::Value;
 
+use crate::documents::read;
+
 /// What the command printed and wrote.
 pub(crate) struct Reproduced {
     pub(crate) output: Output,
@@ -48,10 +50,11 @@ fn numbers(text: &str) -> Vec<f64> {
         .collect()
 }
 
-/// The first number of one text that differs from that of the other one.
-fn differing(committed: &str, found: &str) -> Option<String> {
+/// The first number of one text that differs from that of the other one by more than `least`, or 0.01 % if this is
+/// more.
+fn differing(committed: &str, found: &str, least: f64) -> Option<String> {
     let (committed, found) = (numbers(committed), numbers(found));
-    let same = |a: f64, b: f64| (a - b).abs() <= 1e-4 * a.abs() + 1e-9;
+    let same = |a: f64, b: f64| (a - b).abs() <= least.max(1e-4 * a.abs());
     let pair = committed.iter().zip(&found).position(|(a, b)| !same(*a, *b));
     match pair {
         Some(at) => Some(format!("number {at}: {} is {} now", committed[at], found[at])),
@@ -65,13 +68,28 @@ fn differing(committed: &str, found: &str) -> Option<String> {
 /// Every number that the command prints.
 #[test]
 fn the_numbers_of_the_committed_summary_come_out() {
-    let file = upright_test_support::repository().join("docs/reproduction.md");
-    let committed = std::fs::read_to_string(file).unwrap();
+    let committed = read("docs/reproduction.md");
     assert!(numbers(&committed).len() > 500);
     let found = REPRODUCED.text("summary.md");
-    assert_eq!(differing(&committed, found), None, "docs/reproduction.md: run `upright reproduce` again?");
+    let differing = |found: &str| differing(&committed, found, 1e-9);
+    assert_eq!(differing(found), None, "docs/reproduction.md: run `upright reproduce` again?");
     // Another layout is the same; one other digit, or a number more, is not.
-    assert_eq!(differing(&committed, &found.replace(" |", "\t|").replace("--", "-")), None);
-    assert!(differing(&committed, &found.replacen("11.0075", "11.0175", 1)).is_some());
-    assert!(differing(&committed, &format!("{found} 1")).is_some());
+    assert_eq!(differing(&found.replace(" |", "\t|").replace("--", "-")), None);
+    assert!(differing(&found.replacen("11.0075", "11.0175", 1)).is_some());
+    assert!(differing(&format!("{found} 1")).is_some());
+}
+
+/// To half a pixel, which are two units of the drawing.
+#[test]
+fn the_committed_figures_come_out() {
+    for name in ["table-2.svg", "spectra.svg"] {
+        let committed = read(&format!("docs/{name}"));
+        assert!(numbers(&committed).len() > 500);
+        let found = REPRODUCED.text(name);
+        assert_eq!(differing(&committed, found, 2.0), None, "docs/{name}: copy it again?");
+        // A point that is elsewhere, or one more, is not the same.
+        let (before, after) = found.split_once("points=\"").unwrap();
+        assert!(differing(&committed, &format!("{before}points=\"7777,7777 {after}"), 2.0).is_some());
+        assert!(differing(&committed, &found.replacen("points=\"", "points=\"9", 1), 2.0).is_some());
+    }
 }

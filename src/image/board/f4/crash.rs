@@ -34,8 +34,9 @@ pub(super) fn take() -> (bool, Option<CrashRecord>) {
     }
 }
 
-/// Records a crash: PC, LR, CFSR, HFSR, BFAR (ARM DDI 0403, B3.2), PC and LR 0 if they are not saved. At `frame` the processor has saved R0 to R3, R12, LR, PC and XPSR (ARM DDI 0403, B1.5.6), unless
-/// `frame` is outside the memory: null after a panic, below the memory after a stack overflow.
+/// Records a crash: PC, LR, CFSR, HFSR, BFAR (ARM DDI 0403, B3.2), PC and LR 0 if they are not saved. At `frame` the
+/// processor has saved R0 to R3, R12, LR, PC and XPSR (ARM DDI 0403, B1.5.6), unless `frame` is outside the memory:
+/// null after a panic, below the memory after a stack overflow.
 pub(super) fn record(frame: *const u32) {
     let is_saved = (0x2000_0000..=0x2001_ffe0).contains(&(frame as u32)) && frame.is_aligned();
     // SAFETY: the frame is in memory; nothing else runs any more; reading these registers has no side effect.

@@ -9,8 +9,8 @@ use super::boards::data::ChipFamily;
 /// Bit of the EXTI line to which the voltage detector is connected (RM0090, 12.2.5).
 const DETECTOR: u32 = 1 << 16;
 
-/// Identity of an STM32F2, which an STM32F405 or STM32F407 of revision A has, too (ES0182). No image gets as far as this
-/// on an STM32F2: it has no floating-point unit.
+/// Identity of an STM32F2, which an STM32F405 or STM32F407 of revision A has, too (ES0182). No image gets as far as
+/// this on an STM32F2: it has no floating-point unit.
 const F2_OR_REVISION_A: u32 = 0x411;
 
 /// Whether this is the chip that the image is for (RM0090, 38.6.1; RM0390, 33.6.1). Also makes the watchdog wait while

@@ -103,9 +103,8 @@ impl Lqr {
             // An absolute angle is the sum of the relative ones up to it, so that Tᵀ Q T adds up what comes after.
             for i in (2..states.saturating_sub(2)).rev() {
                 s[i] += s[i + 2];
-                for column in 0..states {
-                    q[i][column] += q[i + 2][column];
-                }
+                let (rows, below) = q.split_at_mut(i + 2);
+                rows[i].iter_mut().zip(&below[0]).for_each(|(sum, entry)| *sum += entry);
             }
             for row in &mut q {
                 for i in (2..states.saturating_sub(2)).rev() {

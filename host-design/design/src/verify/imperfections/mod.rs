@@ -7,7 +7,7 @@ use std::collections::BTreeMap;
 use serde::Serialize;
 use upright::table::Law;
 
-use super::error::{Unverifiable, chain, within};
+use super::error::{VerifyError, chain, within};
 use super::trial::{Disturbance, Horizon, Outcome, scenario, trial};
 use crate::number::significant;
 use crate::parallel;
@@ -119,14 +119,14 @@ const SHARES: [f64; 7] = [1.0 / 32.0, 1.0 / 16.0, 0.125, 0.25, 0.5, 0.7, 0.9];
 /// called after each imperfection, from any thread.
 ///
 /// # Errors
-/// [`Unverifiable`] for a model, and if a run cannot be started.
+/// [`VerifyError`] for a model, and if a run cannot be started.
 pub fn imperfections(
     rig: &Rig,
     table: &TableValues,
     law: Law,
     settings: &ImperfectionSettings,
     done: &(dyn Fn() + Sync),
-) -> Result<Imperfections, Unverifiable> {
+) -> Result<Imperfections, VerifyError> {
     chain(rig, "imperfections")?;
     within("relative", settings.relative, 1e-3..=1.0, "a width from 0.001 to 1")?;
     let search = SizeSearch { rig, table, law, settings };
@@ -151,7 +151,7 @@ pub fn required_imperfections(
     table: &TableValues,
     law: Law,
     settings: &ImperfectionSettings,
-) -> Result<Vec<RequiredSurvival>, Unverifiable> {
+) -> Result<Vec<RequiredSurvival>, VerifyError> {
     chain(rig, "imperfections")?;
     let search = SizeSearch { rig, table, law, settings };
     let required = |imperfection: &'static Imperfection| {
@@ -174,7 +174,7 @@ pub fn limit_cycle(
     law: Law,
     settings: &ImperfectionSettings,
     survival: &Survival,
-) -> Result<Vec<(f64, SizeRuns)>, Unverifiable> {
+) -> Result<Vec<(f64, SizeRuns)>, VerifyError> {
     chain(rig, "imperfections")?;
     let search = SizeSearch { rig, table, law, settings };
     let end = survival.falls_at.unwrap_or(survival.largest_tried);

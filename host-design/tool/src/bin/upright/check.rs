@@ -7,6 +7,7 @@ use clap::Args;
 use upright_design::rig::{Rig, key_table};
 
 use crate::failure::Failure;
+use crate::output::print;
 
 /// Reads a rig file and prints all its values, with defaults filled in.
 ///
@@ -31,18 +32,10 @@ pub(crate) struct CheckCommand {
 
 impl CheckCommand {
     pub(crate) fn run(self) -> Result<(), Failure> {
-        let mut out = std::io::stdout().lock();
         let Some(file) = self.rig else {
-            write!(out, "{}", key_table())?;
-            return Ok(());
+            return Ok(write!(std::io::stdout(), "{}", key_table())?);
         };
         let rig = Rig::from_path(&file)?;
-        if self.json {
-            serde_json::to_writer(&mut out, &rig).map_err(std::io::Error::from)?;
-            writeln!(out)?;
-        } else {
-            write!(out, "{}", rig.describe())?;
-        }
-        Ok(())
+        print(self.json, &rig, || rig.describe())
     }
 }

@@ -19,13 +19,15 @@ use upright_tool::monitor::SerialLine;
 
 use crate::failure::Failure;
 use crate::firmware::lines_of_stdin;
+use crate::output::print;
 use crate::target::{Built, TargetOption};
 use crate::variation::with_table;
 
 /// Guides you from a wired rig to a balancing one, step by step: what to do, what was found, and whether it is right.
 ///
 /// With --target, the machine and the person beside it are simulated. With --port, the machine is real: its board runs
-/// the image of the rig file (upright firmware flash RIG), and Ctrl-C turns the motor off. The command stops at the first step that shows that the machine must not be run: exit status 3.
+/// the image of the rig file (upright firmware flash RIG), and Ctrl-C turns the motor off. The command stops at the
+/// first step that shows that the machine must not be run: exit status 3.
 #[derive(Args)]
 #[command(before_help = "\
 Examples:
@@ -100,9 +102,7 @@ impl CommissionCommand {
             }
         };
         if self.json {
-            let mut out = std::io::stdout().lock();
-            serde_json::to_writer(&mut out, &journal.record).map_err(std::io::Error::from)?;
-            writeln!(out)?;
+            print(true, &journal.record, String::new)?;
         }
         result
     }
@@ -180,7 +180,7 @@ impl CommissionCommand {
         commissionable(&machine)?;
         let differs = |what: &str| {
             let [path, rig] = [path, &self.rig].map(|path: &PathBuf| Path::display(path));
-            Failure::BadArgument(format!(
+            Failure::argument(format!(
                 "{path}: has another {what} than {rig}; give a file of the same machine"
             ))
         };

@@ -1,6 +1,5 @@
 //! `upright compare`
 
-use std::io::Write;
 use std::path::{Path, PathBuf};
 
 use clap::Args;
@@ -13,6 +12,7 @@ use upright_tool::compare::{
 };
 
 use crate::failure::Failure;
+use crate::output::print;
 use crate::progress::with_bar;
 use crate::variation::{finite, law_option, positive};
 
@@ -86,7 +86,7 @@ impl CompareCommand {
         };
         let rows = jobs(&candidates, &conditions).len();
         if rows == 0 {
-            return Err(Failure::BadArgument(
+            return Err(Failure::argument(
                 "no rig asks for such a control law: add [lqr] or [pole_placement], or leave out --law"
                     .to_owned(),
             ));
@@ -106,17 +106,9 @@ impl CompareCommand {
                 write_atomically(path, &figure.png(2.0)?)?;
             }
         }
-        let mut out = std::io::stdout().lock();
-        if self.json {
-            let all = json!({ "key": key, "conditions": conditions, "rows": rows });
-            writeln!(out, "{all}")?;
-        } else {
-            write!(out, "{}", table(&rows, key))?;
-            for note in notes(&rows, key) {
-                writeln!(out, "{note}")?;
-            }
-        }
-        Ok(())
+        let notes = || notes(&rows, key).iter().map(|note| format!("{note}\n")).collect::<String>();
+        let object = json!({ "key": key, "conditions": conditions, "rows": rows });
+        print(self.json, &object, || table(&rows, key) + &notes())
     }
 
     /// The rig of a file, or one rig for each value of the sweep.
@@ -124,7 +116,7 @@ impl CompareCommand {
         let named = |rig, value| ComparedRig { label: label.to_owned(), rig, value };
         let Some(sweep) = &self.sweep else { return Ok(vec![named(rig.clone(), None)]) };
         let text = std::fs::read_to_string(path).map_err(|error| {
-            Failure::BadArgument(format!("{}: cannot be read again for --sweep: {error}", path.display()))
+            Failure::argument(format!("{}: cannot be read again for --sweep: {error}", path.display()))
         })?;
         let candidate = |&value: &f64| sweep.rig(&text, path, value).map(|rig| named(rig, Some(value)));
         Ok(sweep.values.iter().map(candidate).collect::<Result<_, _>>()?)

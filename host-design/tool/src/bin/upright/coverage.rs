@@ -1,6 +1,5 @@
 //! `upright coverage`
 
-use std::io::Write;
 use std::path::PathBuf;
 
 use clap::Args;
@@ -10,6 +9,7 @@ use upright_design::rig::Rig;
 use upright_design::study::Study;
 
 use crate::failure::Failure;
+use crate::output::print;
 use crate::progress::with_bar;
 use crate::split::Split;
 use crate::variation::not_negative;
@@ -79,30 +79,24 @@ impl IdentifiedMachinesCommand {
     }
 
     fn print(&self, rig: &Rig, found: &Coverage) -> Result<(), Failure> {
-        let mut out = std::io::stdout().lock();
-        if self.json {
-            writeln!(out, "{}", json!({ "rig": rig.name, "off_percent": self.off, "coverage": found }))?;
-            return Ok(());
-        }
-        writeln!(
-            out,
-            "{:28}{:>8}{:>9}{:>11}{:>11}{:>11}",
-            "", "numbers", "covered", "stated", "rms", "worst"
-        )?;
-        for row in &found.rows {
-            let share = |covered: usize| format!("{:.0} %", 100.0 * covered as f64 / row.count as f64);
-            let covered = row.covered.map_or("-".to_owned(), share);
-            let stated = row.stated.map_or("-".to_owned(), |stated| format!("{stated:.3}"));
-            writeln!(
-                out,
-                "{:28}{:>8}{covered:>9}{stated:>11}{:>11.3}{:>11.3} {}",
-                row.name, row.count, row.rms, row.worst, row.unit
-            )?;
-        }
-        writeln!(out, "{} of {} machines are refused", found.refused.len(), found.machines)?;
-        for (number, reason) in &found.refused {
-            writeln!(out, "{number}: {reason}")?;
-        }
-        Ok(())
+        let object = json!({ "rig": rig.name, "off_percent": self.off, "coverage": found });
+        print(self.json, &object, || text(found))
     }
+}
+
+fn text(found: &Coverage) -> String {
+    let mut text =
+        format!("{:28}{:>8}{:>9}{:>11}{:>11}{:>11}\n", "", "numbers", "covered", "stated", "rms", "worst");
+    for row in &found.rows {
+        let share = |covered: usize| format!("{:.0} %", 100.0 * covered as f64 / row.count as f64);
+        let covered = row.covered.map_or("-".to_owned(), share);
+        let stated = row.stated.map_or("-".to_owned(), |stated| format!("{stated:.3}"));
+        text += &format!(
+            "{:28}{:>8}{covered:>9}{stated:>11}{:>11.3}{:>11.3} {}\n",
+            row.name, row.count, row.rms, row.worst, row.unit
+        );
+    }
+    text += &format!("{} of {} machines are refused\n", found.refused.len(), found.machines);
+    let refused = found.refused.iter().map(|(number, reason)| format!("{number}: {reason}\n"));
+    text + &refused.collect::<String>()
 }

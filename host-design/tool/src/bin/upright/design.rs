@@ -1,6 +1,5 @@
 //! `upright design`
 
-use std::io::Write;
 use std::path::{Path, PathBuf};
 
 use clap::Args;
@@ -14,6 +13,7 @@ use upright_tool::image::BoardName;
 use upright_tool::project::gain_table;
 
 use crate::failure::Failure;
+use crate::output::print;
 use crate::progress::with_spinner;
 use crate::variation::{Wanted, with_stored_motions};
 use law_report::LawReport;
@@ -62,7 +62,7 @@ impl DesignCommand {
         let rig = Rig::from_path(&self.rig)?;
         let name = || self.rig.display().to_string();
         let (certified, poles, reports, table) = with_spinner("designing", || -> Result<_, Failure> {
-            let failed = |source| Failure::Design { rig: name(), source };
+            let failed = |source| Failure::of(name(), source);
             let certified = design(&rig).map_err(failed)?;
             let poles = certified.poles(&rig).map_err(failed)?;
             let assessments = certified.assess(&rig).map_err(failed)?;
@@ -71,17 +71,8 @@ impl DesignCommand {
             Ok((certified, poles, reports, table))
         })?;
 
-        let mut out = std::io::stdout().lock();
-        if self.json {
-            serde_json::to_writer(
-                &mut out,
-                &data::DesignData::of(&rig, &certified, &poles, table.as_ref().ok()),
-            )
-            .map_err(std::io::Error::from)?;
-            writeln!(out)?;
-        } else {
-            write!(out, "{}", text::design(&rig, &certified, &poles, &reports))?;
-        }
+        let object = data::DesignData::of(&rig, &certified, &poles, table.as_ref().ok());
+        print(self.json, &object, || text::design(&rig, &certified, &poles, &reports))?;
         for warning in text::warnings(&rig, &certified, &reports, table.as_ref().ok()) {
             eprintln!("warning: {warning}");
         }
@@ -89,20 +80,18 @@ impl DesignCommand {
         if self.no_write {
             return Ok(());
         }
-        let table = table.map_err(|source| Failure::NoTable { rig: name(), source })?;
-        let table = match (self.swing_up, self.transitions) {
-            (_, true) => with_stored_motions(&self.rig, &rig, table, Wanted::Transitions)?,
-            (true, false) => with_stored_motions(&self.rig, &rig, table, Wanted::SwingUp)?,
-            (false, false) => table,
-        };
+        let mut table = table.map_err(|source| Failure::of(name(), source))?;
+        if self.swing_up || self.transitions {
+            table = with_stored_motions(&self.rig, &rig, table, Wanted::of(self.transitions))?;
+        }
         if (self.swing_up || self.transitions) && table.swing_up.is_none() {
             let source = Stored::beside(&self.rig).err().unwrap_or(SwingUpError::Outdated);
-            return Err(Failure::SwingUp { rig: name(), source });
+            return Err(Failure::of(name(), source));
         }
         warn_of_tick(&rig);
         let source = gains_source(&rig, &table);
         let path =
-            self.out.map_or_else(gain_table, Ok).map_err(|error| Failure::BadArgument(error.to_string()))?;
+            self.out.map_or_else(gain_table, Ok).map_err(|error| Failure::argument(error.to_string()))?;
         if self.check {
             return check(&path, &source);
         }
@@ -148,14 +137,14 @@ fn slowest_time_constant(rig: &Rig, poles: &DesignPoles, law: Law) -> f64 {
 fn refuse_failing_table(rig: &Rig, reports: &[LawReport]) -> Result<(), Failure> {
     for LawReport { law, assessment, run } in reports {
         if assessment.rounded >= 1.0 {
-            return Err(Failure::NoSolution(format!(
+            return Err(Failure::no_solution(format!(
                 "{}: {law}: rounded to f32 the gains no longer stabilise the plant (spectral radius {:.6}): tick.period_s = {} s \
                  is too long for single precision; shorten it. Nothing was written",
                 rig.name, assessment.rounded, rig.tick.period_s
             )));
         }
         if let Some(fall) = run.as_ref().and_then(|run| run.fall.as_ref()) {
-            return Err(Failure::CheckFailed(format!(
+            return Err(Failure::check(format!(
                 "{}: {law}: {fall} in the closed loop with the new table. Nothing was written",
                 rig.name
             )));
@@ -176,7 +165,7 @@ fn warn_of_tick(rig: &Rig) {
 /// Compares line by line: a checkout on Windows may have changed the line endings.
 fn check(path: &Path, source: &str) -> Result<(), Failure> {
     let found = std::fs::read_to_string(path)
-        .map_err(|error| Failure::CheckFailed(format!("{}: cannot be read: {error}", path.display())))?;
+        .map_err(|error| Failure::check(format!("{}: cannot be read: {error}", path.display())))?;
     let Some(line) = first_difference(&found, source) else {
         eprintln!("{} is up to date", path.display());
         return Ok(());
@@ -185,7 +174,7 @@ fn check(path: &Path, source: &str) -> Result<(), Failure> {
         [] => String::new(),
         differences => format!(" ({})", differences.join("; ")),
     };
-    Err(Failure::CheckFailed(format!(
+    Err(Failure::check(format!(
         "{}:{line}: differs from what `upright design` would write{origin}; run it without --check",
         path.display()
     )))

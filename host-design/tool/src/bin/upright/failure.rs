@@ -1,5 +1,8 @@
 //! Errors of the tool and their exit status.
 
+use std::error::Error;
+use std::fmt::{self, Display};
+use std::io::ErrorKind;
 use std::process::ExitCode;
 
 use upright_design::design::DesignError;
@@ -7,178 +10,116 @@ use upright_design::harness::HarnessError;
 use upright_design::identify::{CoverageError, IdentifyError};
 use upright_design::rig::RigError;
 use upright_design::robust::RobustError;
-use upright_design::simulate::SimulationError;
-use upright_design::study::StudyError;
 use upright_design::swing_up::SwingUpError;
-use upright_design::table::{NoTable, WriteError};
-use upright_design::verify::{Unverifiable, VerifyError};
+use upright_design::table::NoTable;
 use upright_tool::campaign::CampaignError;
 use upright_tool::commission::Stop;
-use upright_tool::figure::FigureError;
-use upright_tool::image::{BuildError, ElfError, SizeError};
-use upright_tool::in_the_loop::{RelayError, RunError};
-use upright_tool::monitor::OpenError;
-use upright_tool::report::ReportError;
-use upright_tool::reproduce::ReproduceError;
-use upright_tool::twin::TwinError;
+use upright_tool::image::BuildError;
+use upright_tool::in_the_loop::RunError;
 
-/// Why a command fails; each kind has an exit status.
-#[derive(Debug, thiserror::Error)]
-pub(crate) enum Failure {
-    #[error(transparent)]
-    Rig(#[from] RigError),
-    #[error("{rig}: {source}")]
-    Design { rig: String, source: DesignError },
-    #[error("{rig}: {source}")]
-    NoTable { rig: String, source: NoTable },
-    #[error("{0}")]
-    NoSolution(String),
-    #[error("{rig}: {source}")]
-    SwingUp { rig: String, source: SwingUpError },
-    #[error("{rig}: {source}")]
-    Robust { rig: String, source: RobustError },
-    #[error(transparent)]
-    Identify(#[from] IdentifyError),
-    #[error("{0}")]
-    NotIdentified(String),
-    #[error("{0}")]
-    MustNotRun(String),
-    #[error(transparent)]
-    Simulation(#[from] SimulationError),
-    #[error(transparent)]
-    Verify(#[from] VerifyError),
-    #[error(transparent)]
-    Unverifiable(#[from] Unverifiable),
-    #[error(transparent)]
-    Image(#[from] BuildError),
-    #[error(transparent)]
-    Elf(#[from] ElfError),
-    #[error(transparent)]
-    Size(#[from] SizeError),
-    #[error("{0}")]
-    NoProgram(&'static str),
-    #[error(transparent)]
-    InTheLoop(#[from] RunError),
-    #[error("no client can connect: {0}")]
-    Relay(std::io::Error),
-    #[error(transparent)]
-    Monitor(#[from] OpenError),
-    #[error(transparent)]
-    Campaign(#[from] CampaignError),
-    #[error(transparent)]
-    Study(#[from] StudyError),
-    #[error(transparent)]
-    Reproduce(#[from] ReproduceError),
-    #[error(transparent)]
-    Figure(#[from] FigureError),
-    #[error(transparent)]
-    Report(#[from] ReportError),
-    #[error(transparent)]
-    Write(#[from] WriteError),
-    #[error("the output cannot be written: {0}")]
-    Output(#[from] std::io::Error),
-    #[error("{0}")]
-    BadArgument(String),
-    #[error("{0}")]
-    CheckFailed(String),
+/// Why a command ends without its result, and with which exit status.
+pub(crate) struct Failure {
+    words: String,
+    exit_status: u8,
 }
 
-impl From<RelayError> for Failure {
-    fn from(error: RelayError) -> Self {
-        match error {
-            RelayError::Run(error) => Failure::InTheLoop(error),
-            RelayError::Socket(error) => Failure::Relay(error),
+impl<E: Error + 'static> From<E> for Failure {
+    fn from(error: E) -> Self {
+        let exit_status = exit_status(&error);
+        match (&error as &dyn Error).is::<std::io::Error>() {
+            true => Self { words: format!("the output cannot be written: {error}"), exit_status },
+            false => Self { words: error.to_string(), exit_status },
         }
     }
 }
 
-impl From<Stop> for Failure {
-    fn from(stop: Stop) -> Self {
-        match stop {
-            Stop::Machine(words) => Failure::MustNotRun(words),
-            Stop::Line(_) | Stop::Aborted => Failure::CheckFailed(stop.to_string()),
-            Stop::Simulated(error) => Failure::InTheLoop(error),
-            Stop::Record(error) => Failure::Write(error),
-        }
-    }
-}
-
-impl From<CoverageError> for Failure {
-    fn from(error: CoverageError) -> Self {
-        match error {
-            CoverageError::Identify(error) => Failure::Identify(error),
-            CoverageError::Study(error) => Failure::Study(error),
-        }
-    }
-}
-
-impl From<TwinError> for Failure {
-    fn from(error: TwinError) -> Self {
-        match error {
-            TwinError::Run(error) => Failure::InTheLoop(error),
-            TwinError::Socket(error) => Failure::Relay(error),
-        }
+impl Display for Failure {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&self.words)
     }
 }
 
 impl Failure {
-    fn exit_status(&self) -> u8 {
-        match self {
-            Failure::CheckFailed(_) => 1,
-            Failure::Rig(error) => error.exit_code(),
-            Failure::Design { .. } | Failure::NoTable { .. } | Failure::NoSolution(_) => 3,
-            Failure::Robust { source: RobustError::Unhelped(_) | RobustError::Design(_), .. } => 3,
-            Failure::SwingUp { source, .. } if source.is_without_solution() => 3,
-            Failure::NotIdentified(_) | Failure::MustNotRun(_) => 3,
-            Failure::Identify(error) if error.is_without_solution() => 3,
-            Failure::NoProgram(_) | Failure::Image(BuildError::NoCompiler) => 4,
-            Failure::InTheLoop(error) if error.lacks_emulator() => 4,
-            Failure::InTheLoop(RunError::Harness(error)) if is_bad_scenario(error) => 2,
-            Failure::InTheLoop(_) => 1,
-            Failure::Campaign(CampaignError::Trial { source, .. }) if source.lacks_emulator() => 4,
-            Failure::Campaign(CampaignError::Trial { .. }) => 1,
-            Failure::SwingUp { .. }
-            | Failure::Campaign(CampaignError::Study(_))
-            | Failure::Study(_)
-            | Failure::Robust { .. }
-            | Failure::Identify(_)
-            | Failure::Image(_)
-            | Failure::Elf(_)
-            | Failure::Size(_)
-            | Failure::Relay(_)
-            | Failure::Monitor(_)
-            | Failure::Simulation(_)
-            | Failure::Verify(_)
-            | Failure::Unverifiable(_)
-            | Failure::Reproduce(_)
-            | Failure::Figure(_)
-            | Failure::Report(_)
-            | Failure::Write(_)
-            | Failure::Output(_)
-            | Failure::BadArgument(_) => 2,
-        }
+    /// An error of the rig with this name, or in this file.
+    pub(crate) fn of(rig: impl Display, error: impl Error + 'static) -> Self {
+        Self { words: format!("{rig}: {error}"), exit_status: exit_status(&error) }
+    }
+
+    /// A check has failed.
+    pub(crate) fn check(words: impl Into<String>) -> Self {
+        Self { words: words.into(), exit_status: 1 }
+    }
+
+    /// An argument cannot be used.
+    pub(crate) fn argument(words: impl Into<String>) -> Self {
+        Self { words: words.into(), exit_status: 2 }
+    }
+
+    /// The problem has no solution.
+    pub(crate) fn no_solution(words: impl Into<String>) -> Self {
+        Self { words: words.into(), exit_status: 3 }
+    }
+
+    /// A program is missing.
+    pub(crate) fn no_program(words: impl Into<String>) -> Self {
+        Self { words: words.into(), exit_status: 4 }
     }
 
     /// Prints the error and returns the exit status.
     pub(crate) fn report(&self) -> ExitCode {
-        match self {
-            // The reader of a pipe has closed it: not an error.
-            Failure::Output(error) if error.kind() == std::io::ErrorKind::BrokenPipe => {
-                return ExitCode::SUCCESS;
-            }
-            _ => eprintln!("upright: {self}"),
+        if self.exit_status != 0 {
+            eprintln!("upright: {self}");
         }
-        ExitCode::from(self.exit_status())
+        ExitCode::from(self.exit_status)
     }
 }
 
-/// Whether the scenario is at fault, not the firmware.
-fn is_bad_scenario(error: &HarnessError) -> bool {
-    matches!(
-        error,
-        HarnessError::Simulation(_)
+/// The exit status of an error: 2, bad input, for all that are not named here.
+fn exit_status(error: &(dyn Error + 'static)) -> u8 {
+    if let Some(error) = error.downcast_ref::<RigError>() {
+        error.exit_code()
+    } else if error.is::<DesignError>()
+        || error.is::<NoTable>()
+        || matches!(error.downcast_ref(), Some(RobustError::Unhelped(_) | RobustError::Design(_)))
+        || error.downcast_ref().is_some_and(SwingUpError::is_without_solution)
+        || error.downcast_ref().is_some_and(IdentifyError::is_without_solution)
+    {
+        3
+    } else if let Some(CoverageError::Identify(error)) = error.downcast_ref() {
+        exit_status(error)
+    } else if let Some(error) = error.downcast_ref::<RunError>() {
+        exit_status_of_a_run(error)
+    } else if let Some(CampaignError::Trial { source, .. }) = error.downcast_ref() {
+        if source.lacks_emulator() { 4 } else { 1 }
+    } else if let Some(BuildError::NoCompiler) = error.downcast_ref() {
+        4
+    } else if let Some(stop) = error.downcast_ref() {
+        match stop {
+            Stop::Machine(_) => 3,
+            Stop::Line(_) | Stop::Aborted => 1,
+            Stop::Simulated(error) => exit_status(error),
+            Stop::Record(error) => exit_status(error),
+        }
+    } else if error.downcast_ref().is_some_and(|error: &std::io::Error| error.kind() == ErrorKind::BrokenPipe)
+    {
+        // The reader of a pipe has closed it: not an error.
+        0
+    } else {
+        2
+    }
+}
+
+fn exit_status_of_a_run(error: &RunError) -> u8 {
+    match error {
+        error if error.lacks_emulator() => 4,
+        // The scenario is at fault, not the firmware.
+        RunError::Harness(
+            HarnessError::Simulation(_)
             | HarnessError::FullState
             | HarnessError::StepAt { .. }
-            | HarnessError::Lost(_)
-    )
+            | HarnessError::Lost(_),
+        )
+        | RunError::Socket(_) => 2,
+        _ => 1,
+    }
 }

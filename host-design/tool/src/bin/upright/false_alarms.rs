@@ -1,7 +1,5 @@
 //! `upright false-alarms`
 
-use std::io::Write;
-
 use clap::Args;
 use serde_json::json;
 use upright::table::Law;
@@ -10,6 +8,7 @@ use upright_design::robust::{FalseAlarms, Machines, false_alarms};
 use upright_design::study::Study;
 
 use crate::failure::Failure;
+use crate::output::print;
 use crate::progress::with_bar;
 use crate::split::Split;
 use crate::variation::{Variation, law_option, positive};
@@ -61,7 +60,7 @@ impl HealthyHoursCommand {
             .filter(|law| self.law.is_none_or(|only| only == *law))
             .collect();
         if laws.is_empty() {
-            return Err(Failure::BadArgument(
+            return Err(Failure::argument(
                 "--law: the rig file does not ask for this control law".to_owned(),
             ));
         }
@@ -69,7 +68,7 @@ impl HealthyHoursCommand {
             _ if !self.corners => Machines::Drawn(self.runs.into()),
             Some(tolerances) if tolerances.mass_percent > 0.0 => Machines::Corners,
             _ => {
-                return Err(Failure::BadArgument(
+                return Err(Failure::argument(
                     "--corners: the rig file has no mass_percent in [robust]".to_owned(),
                 ));
             }
@@ -89,13 +88,8 @@ impl HealthyHoursCommand {
     }
 
     fn print(&self, rig: &Rig, found: &[FalseAlarms]) -> Result<(), Failure> {
-        let mut out = std::io::stdout().lock();
-        if self.json {
-            let duration_s = self.duration;
-            writeln!(out, "{}", json!({ "rig": rig.name, "duration_s": duration_s, "laws": found }))?;
-        } else {
-            write!(out, "{}", text(found))?;
-        }
+        let object = json!({ "rig": rig.name, "duration_s": self.duration, "laws": found });
+        print(self.json, &object, || text(found))?;
         let alarms: Vec<String> = found
             .iter()
             .flat_map(|one| {
@@ -105,7 +99,7 @@ impl HealthyHoursCommand {
         if alarms.is_empty() {
             return Ok(());
         }
-        Err(Failure::CheckFailed(format!("{}: turned off: {}", rig.name, alarms.join("; "))))
+        Err(Failure::check(format!("{}: turned off: {}", rig.name, alarms.join("; "))))
     }
 }
 

@@ -11,6 +11,7 @@ use upright_tool::campaign::{Campaign, Defect, DefectRow, During, Setup, campaig
 use upright_tool::in_the_loop::{PinLink, RunPlace};
 
 use crate::failure::Failure;
+use crate::output::print;
 use crate::progress::with_bar;
 use crate::split::Split;
 use crate::target::TargetOption;
@@ -87,7 +88,7 @@ impl FaultsCommand {
             table
         };
         if self.swing_up && table.swing_up.is_none() {
-            return Err(Failure::SwingUp { rig: rig.name, source: SwingUpError::NoMotions });
+            return Err(Failure::of(rig.name, SwingUpError::NoMotions));
         }
         let built = self.target.built(PinLink::Files, &rig, &table)?;
         let place = built.place(self.seed);
@@ -102,7 +103,7 @@ impl FaultsCommand {
         let chosen: Vec<Defect> = match self.kind {
             Some(kind) if possible.contains(&kind) => vec![kind],
             Some(kind) => {
-                return Err(Failure::BadArgument(format!(
+                return Err(Failure::argument(format!(
                     "--kind {}: not possible with this rig and --target",
                     kind.name()
                 )));
@@ -111,7 +112,7 @@ impl FaultsCommand {
         };
         let setup = Setup { rig: &rig, table: &table, place, detection: true, guards: true, during };
         if let Some(number) = self.only {
-            return self.replay(&setup, &chosen, number);
+            return print(true, &one(&setup, &chosen, self.seed, number)?, String::new);
         }
         let options = json!({
             "gains": self.variation.changes(), "swing_up": self.swing_up, "jog": self.jog,
@@ -183,7 +184,7 @@ impl FaultsCommand {
             writeln!(std::io::stdout(), "{text}")?
         }
         match unguarded.rows.iter().find(|row| row.missed == 0) {
-            Some(row) => Err(Failure::CheckFailed(format!(
+            Some(row) => Err(Failure::check(format!(
                 "without guards, `{}` is never missed: the campaign proves nothing",
                 row.kind.name()
             ))),
@@ -191,72 +192,18 @@ impl FaultsCommand {
         }
     }
 
-    fn replay(&self, setup: &Setup<'_>, kinds: &[Defect], number: u64) -> Result<(), Failure> {
-        let outcome = one(setup, kinds, self.seed, number)?;
-        writeln!(std::io::stdout(), "{}", serde_json::to_string(&outcome).map_err(std::io::Error::from)?)?;
-        Ok(())
-    }
-
     fn print(&self, rig: &Rig, result: &Campaign, control: Option<&Campaign>) -> Result<(), Failure> {
-        let mut out = std::io::stdout().lock();
-        if self.json {
-            let target = self.target.name();
-            let all = json!({
-                "rig": rig.name, "hash": format!("{:016x}", rig.hash()), "target": target,
-                "campaign": result, "without_detection": control,
-            });
-            writeln!(out, "{all}")?;
-            return Ok(());
-        }
-        writeln!(
-            out,
-            "{:22}{:>6}{:>8}{:>9}{:>9}{:>6}{:>7}{:>7}{:>9}{:>8}{:>8}  faults",
-            "defect",
-            "runs",
-            "masked",
-            "rejected",
-            "detected",
-            "late",
-            "missed",
-            "false",
-            "allowed",
-            "worst",
-            "onset"
-        )?;
-        for row in &result.rows {
-            let ticks = |ticks: Option<u32>| ticks.map_or("-".to_owned(), |ticks| ticks.to_string());
-            writeln!(
-                out,
-                "{:22}{:>6}{:>8}{:>9}{:>9}{:>6}{:>7}{:>7}{:>9}{:>8}{:>8}  {}",
-                row.kind.name(),
-                row.runs,
-                row.masked,
-                row.rejected,
-                row.detected,
-                row.late,
-                row.missed,
-                row.false_alarms,
-                ticks(row.allowed),
-                ticks(row.worst),
-                ticks(row.worst_from_onset),
-                row.faults.join(", ")
-            )?;
-        }
-        if let Some(us) = result.rows.iter().find_map(|row| row.stop_to_off_us) {
-            writeln!(out, "emergency stop between ticks: PWM inactive at most {us:.3} µs after the edge")?;
-        }
-        if let Some(control) = control {
-            let missed: usize = control.rows.iter().map(|row| row.missed).sum();
-            let runs: usize = control.rows.iter().map(|row| row.runs).sum();
-            writeln!(out, "without detection, {missed} of {runs} runs miss the defect, as they must")?;
-        }
-        Ok(())
+        let object = json!({
+            "rig": rig.name, "hash": format!("{:016x}", rig.hash()), "target": self.target.name(),
+            "campaign": result, "without_detection": control,
+        });
+        print(self.json, &object, || text(result, control))
     }
 
     fn verdict(&self, result: &Campaign, control: Option<&Campaign>) -> Result<(), Failure> {
         let seen = |row: &&DefectRow| row.missed == 0;
         if let Some(row) = control.and_then(|control| control.rows.iter().find(seen)) {
-            return Err(Failure::CheckFailed(format!(
+            return Err(Failure::check(format!(
                 "without detection, `{}` is never missed: the campaign proves nothing",
                 row.kind.name()
             )));
@@ -279,7 +226,7 @@ impl FaultsCommand {
             (.., true) => " --shake",
             _ => "",
         };
-        Err(Failure::CheckFailed(format!(
+        Err(Failure::check(format!(
             "{wrong} of {} runs have a wrong outcome; to repeat the first of `{}`: upright faults {} --seed {}{target}{kind}{phase} --only {number}",
             result.runs,
             row.kind.name(),
@@ -287,4 +234,32 @@ impl FaultsCommand {
             self.seed
         )))
     }
+}
+
+/// The campaign as a table, a line for each defect.
+fn text(result: &Campaign, control: Option<&Campaign>) -> String {
+    let line = |name: &str, numbers: Vec<String>, faults: &str| {
+        let widths = [6, 8, 9, 9, 6, 7, 7, 9, 8, 8];
+        let cells = numbers.iter().zip(widths).map(|(number, width)| format!("{number:>width$}"));
+        format!("{name:22}{}  {faults}\n", cells.collect::<String>())
+    };
+    let head = "runs masked rejected detected late missed false allowed worst onset";
+    let mut text = line("defect", head.split(' ').map(str::to_owned).collect(), "faults");
+    for row in &result.rows {
+        let counts =
+            [row.runs, row.masked, row.rejected, row.detected, row.late, row.missed, row.false_alarms];
+        let ticks = [row.allowed, row.worst, row.worst_from_onset];
+        let ticks = ticks.map(|ticks| ticks.map_or("-".to_owned(), |ticks| ticks.to_string()));
+        let numbers = counts.map(|count| count.to_string()).into_iter().chain(ticks).collect();
+        text += &line(row.kind.name(), numbers, &row.faults.join(", "));
+    }
+    if let Some(us) = result.rows.iter().find_map(|row| row.stop_to_off_us) {
+        text += &format!("emergency stop between ticks: PWM inactive at most {us:.3} µs after the edge\n");
+    }
+    if let Some(control) = control {
+        let missed: usize = control.rows.iter().map(|row| row.missed).sum();
+        let runs: usize = control.rows.iter().map(|row| row.runs).sum();
+        text += &format!("without detection, {missed} of {runs} runs miss the defect, as they must\n");
+    }
+    text
 }

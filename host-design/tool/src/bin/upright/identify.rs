@@ -10,11 +10,12 @@ use upright_design::table::write_atomically;
 use upright_tool::identified::{json, page, rig_file, text};
 
 use crate::failure::Failure;
-use crate::progress::with_steps;
+use crate::progress::with_progress;
 use crate::reading::ReadingArgs;
 use crate::variation::positive;
 
-/// Identifies the parameters of the real machine from logs of the hanging machine being shaken, or from tables of its motion.
+/// Identifies the parameters of the real machine from logs of the hanging machine being shaken, or from tables of its
+/// motion.
 ///
 /// Files that are no logs of Upright are read as tables (CSV): a row of names such as time_s,angle_1_rad, and rows of
 /// numbers. Several files are pieces of one machine, each with an unknown start. Without a drive, the links swing
@@ -90,7 +91,7 @@ impl IdentifyCommand {
             weighed_kg_m: self.weigh,
             trust_wiring: self.trust_wiring,
         };
-        let found = with_steps(|progress| {
+        let found = with_progress(|progress| {
             identify_recordings(&rig, &recordings, unused.as_ref(), &settings, progress)
         })?;
         let mut out = std::io::stdout().lock();
@@ -105,7 +106,7 @@ impl IdentifyCommand {
             eprintln!("{} written", path.display());
         }
         if let Some(refusal) = &found.refusal {
-            return Err(Failure::NotIdentified(format!("{}: {refusal}; nothing is written", rig.name)));
+            return Err(Failure::no_solution(format!("{}: {refusal}; nothing is written", rig.name)));
         }
         match &self.write {
             Some(path) => self.write_rig(path, &rig, &found),
@@ -144,7 +145,7 @@ impl IdentifyCommand {
             names.join(", ")
         );
         let text = rig_file(&old, rig, found, &note.replace(['\n', '\r'], " "), path)
-            .map_err(|error| Failure::BadArgument(format!("{}: {error}", self.rig.display())))?;
+            .map_err(|error| Failure::argument(format!("{}: {error}", self.rig.display())))?;
         write_atomically(path, text.as_bytes())?;
         eprintln!("{} written", path.display());
         Ok(())
@@ -159,14 +160,14 @@ fn convert(
     write: impl Fn(&Log, &[f64], &mut dyn Write) -> std::io::Result<()>,
 ) -> Result<(), Failure> {
     let Recordings::Logs(logs) = recordings else {
-        return Err(Failure::BadArgument("--csv and --mcap convert logs of Upright".to_owned()));
+        return Err(Failure::argument("--csv and --mcap convert logs of Upright".to_owned()));
     };
     let [(file, log)] = logs.as_slice() else {
-        return Err(Failure::BadArgument("--csv and --mcap convert one log; name one".to_owned()));
+        return Err(Failure::argument("--csv and --mcap convert one log; name one".to_owned()));
     };
     let steps: Vec<f64> = rig.sensors().iter().map(|sensor| sensor.step()).collect();
     if steps.len() != log.channels() {
-        return Err(Failure::BadArgument(format!(
+        return Err(Failure::argument(format!(
             "{}: {} encoders, the rig file has {}; name the rig file of this machine",
             file.display(),
             log.channels(),

@@ -10,6 +10,7 @@ mod false_alarms;
 mod faults;
 mod firmware;
 mod identify;
+mod output;
 mod progress;
 mod reading;
 mod report;

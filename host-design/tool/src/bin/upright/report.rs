@@ -1,6 +1,5 @@
 //! `upright report`
 
-use std::io::Write;
 use std::path::{Path, PathBuf};
 
 use clap::Args;
@@ -16,7 +15,8 @@ use upright_tool::report::{REGION_POINTS, Report as Page, ReportSource, report};
 use super::swing_up::with_margins;
 use super::verify::search;
 use crate::failure::Failure;
-use crate::progress::{with_random_plants, with_spinner};
+use crate::output::print;
+use crate::progress::{with_progress, with_spinner};
 use crate::variation::{Variation, Wanted, with_stored_motions};
 
 /// Writes one HTML page about a rig and its loop: animated runs, model, gains, margins, trust report.
@@ -71,7 +71,6 @@ impl ReportCommand {
     pub(crate) fn run(self) -> Result<(), Failure> {
         self.prepare()?;
         let (rig, certified, table) = self.variation.designed()?;
-        let laws = table.laws.present().count() as u64;
         let imperfections = if self.imperfections { search(&rig, &table)? } else { Vec::new() };
         let motions = with_swing_up(&self.variation.rig, &rig, &table);
         let pushes = match &motions {
@@ -79,7 +78,7 @@ impl ReportCommand {
             None if self.margins => {
                 let text =
                     "--margins needs motions that are stored for this rig: make them with upright swing-up";
-                return Err(Failure::BadArgument(text.to_owned()));
+                return Err(Failure::argument(text.to_owned()));
             }
             _ => Vec::new(),
         };
@@ -87,37 +86,28 @@ impl ReportCommand {
             if self.transitions { Some(route(&self.variation.rig, &rig, &table, self.seed)?) } else { None };
         let study = Study::whole();
         let effort = Effort { runs: self.runs as usize, seed: self.seed, late: 0.0, study: &study };
-        let (trust, files) =
-            with_random_plants(laws * u64::from(self.runs), |stage, done| -> Result<_, Failure> {
-                let trust = trust(&rig, &certified, &table, effort, stage, done)?;
-                let run = motions.as_ref().and_then(|table| demonstration(&rig, table, self.seed));
-                let source = ReportSource {
-                    rig: &rig,
-                    certified: &certified,
-                    table: &table,
-                    trust: &trust,
-                    imperfections: &imperfections,
-                    seed: self.seed,
-                    swing_up: run.as_ref(),
-                    route: route.as_ref(),
-                    margins: &pushes,
-                    region_points: REGION_POINTS,
-                    command: &self.as_typed(),
-                };
-                let page = report(&source, stage)?;
-                stage("writing");
-                let files = self.write(&page)?;
-                Ok((trust, files))
-            })?;
-        let mut out = std::io::stdout().lock();
-        if self.json {
-            let object = json!({ "rig": rig.name, "hash": format!("{:016x}", rig.hash()), "files": files, "trust": trust });
-            writeln!(out, "{object}")?;
-        } else {
-            for file in &files {
-                writeln!(out, "{}", file.display())?;
-            }
-        }
+        let (trust, files) = with_progress(|progress| -> Result<_, Failure> {
+            let trust = trust(&rig, &certified, &table, effort, progress)?;
+            let run = motions.as_ref().and_then(|table| demonstration(&rig, table, self.seed));
+            let source = ReportSource {
+                rig: &rig,
+                certified: &certified,
+                table: &table,
+                trust: &trust,
+                imperfections: &imperfections,
+                seed: self.seed,
+                swing_up: run.as_ref(),
+                route: route.as_ref(),
+                margins: &pushes,
+                region_points: REGION_POINTS,
+                command: &self.as_typed(),
+            };
+            let page = report(&source, progress)?;
+            let files = self.write(&page)?;
+            Ok((trust, files))
+        })?;
+        let object = json!({ "rig": rig.name, "hash": format!("{:016x}", rig.hash()), "files": files, "trust": trust });
+        print(self.json, &object, || files.iter().map(|file| format!("{}\n", file.display())).collect())?;
         let failed = trust.checks.iter().filter(|check| !check.holds).count();
         if failed > 0 {
             eprintln!(
@@ -132,13 +122,13 @@ impl ReportCommand {
     fn prepare(&self) -> Result<(), Failure> {
         for folder in [&self.svg, &self.png, &self.csv].into_iter().flatten() {
             std::fs::create_dir_all(folder).map_err(|error| {
-                Failure::BadArgument(format!("{}: the folder cannot be created: {error}", folder.display()))
+                Failure::argument(format!("{}: the folder cannot be created: {error}", folder.display()))
             })?;
         }
         let parent =
             self.out.as_deref().and_then(Path::parent).filter(|parent| !parent.as_os_str().is_empty());
         match parent {
-            Some(parent) if !parent.is_dir() => Err(Failure::BadArgument(format!(
+            Some(parent) if !parent.is_dir() => Err(Failure::argument(format!(
                 "{}: there is no such folder: create it, or give another --out",
                 parent.display()
             ))),
@@ -203,8 +193,7 @@ fn demonstration(rig: &Rig, table: &TableValues, seed: u64) -> Option<Demonstrat
 /// A simulated run through all motions that are stored beside the rig file.
 fn route(file: &Path, rig: &Rig, table: &TableValues, seed: u64) -> Result<Demonstration, Failure> {
     let table = with_stored_motions(file, rig, table.clone(), Wanted::Transitions)?;
-    let failed = |source| Failure::SwingUp { rig: rig.name.clone(), source };
-    let script = Script::route(rig, &table, seed).map_err(failed)?;
+    let script = Script::route(rig, &table, seed).map_err(|source| Failure::of(&rig.name, source))?;
     Ok(with_spinner("the route", || script.run(&table)).map_err(RunError::from)?)
 }
 

@@ -1,15 +1,15 @@
 //! `upright reproduce`
 
-use std::io::Write;
 use std::path::PathBuf;
 
 use clap::Args;
 use upright_design::table::write_atomically;
 use upright_tool::project::checkout;
-use upright_tool::reproduce::{PaperRigs, STAGES, reproduce};
+use upright_tool::reproduce::{PaperRigs, reproduce};
 
 use crate::failure::Failure;
-use crate::progress::with_stages;
+use crate::output::print;
+use crate::progress::with_progress;
 
 /// Compares the results of the paper with ours, number by number, and writes its figures 5 to 8 and Table 2 as figures
 /// and data.
@@ -39,14 +39,14 @@ impl ReproduceCommand {
         let rigs = PaperRigs::from_folder(&self.rigs.map_or_else(default_rigs, Ok)?)?;
         if !self.no_write {
             std::fs::create_dir_all(&self.out).map_err(|error| {
-                Failure::BadArgument(format!("--out {}: cannot be created: {error}", self.out.display()))
+                Failure::argument(format!("--out {}: cannot be created: {error}", self.out.display()))
             })?;
         }
-        let found = with_stages(STAGES.len() as u64, |stage| reproduce(&rigs, stage))?;
-        let numbers = serde_json::to_vec(&found).map_err(std::io::Error::from)?;
+        let found = with_progress(|progress| reproduce(&rigs, progress))?;
         if !self.no_write {
             let mut files = found.files()?;
-            files.push(("numbers.json".to_owned(), numbers.clone()));
+            let numbers = serde_json::to_vec(&found).map_err(std::io::Error::from)?;
+            files.push(("numbers.json".to_owned(), numbers));
             for (name, contents) in &files {
                 write_atomically(&self.out.join(name), contents)?;
             }
@@ -56,20 +56,13 @@ impl ReproduceCommand {
                 self.out.display()
             );
         }
-        let mut out = std::io::stdout().lock();
-        if self.json {
-            out.write_all(&numbers)?;
-            writeln!(out)?;
-        } else {
-            write!(out, "{}", found.summary())?;
-        }
-        Ok(())
+        print(self.json, &found, || found.summary())
     }
 }
 
 fn default_rigs() -> Result<PathBuf, Failure> {
     let checkout = checkout().map_err(|error| {
-        Failure::BadArgument(format!("{error}; or name the folder of the paper's rig files with --rigs"))
+        Failure::argument(format!("{error}; or name the folder of the paper's rig files with --rigs"))
     })?;
     Ok(checkout.join("rigs"))
 }

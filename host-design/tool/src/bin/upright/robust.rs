@@ -1,24 +1,21 @@
 //! `upright robust`
 
-use std::io::Write;
 use std::path::{Path, PathBuf};
 
 use clap::Args;
 use serde_json::json;
 use upright::table::Law;
-use upright_design::design::design;
 use upright_design::rig::{Rig, Tolerances};
-use upright_design::robust::{
-    Choice, Front, JudgeSettings, Judgement, RobustError, choose, judge, rewritten,
-};
+use upright_design::robust::{Choice, JudgeSettings, Judgement, RobustError, choose, judge, rewritten};
 use upright_design::study::Study;
-use upright_design::table::{Gains, TableValues, write_atomically};
+use upright_design::table::{Gains, write_atomically};
 use upright_tool::figure::front_figure;
 
 use crate::failure::Failure;
-use crate::progress::{with_spinner, with_steps};
+use crate::output::print;
+use crate::progress::{with_progress, with_spinner};
 use crate::split::Split;
-use crate::variation::{not_negative, positive};
+use crate::variation::{not_negative, positive, with_table};
 
 mod text;
 
@@ -90,11 +87,11 @@ impl RobustCommand {
             return self.judge(&rig, &tolerances, &settings);
         }
         if self.split.is_used() {
-            return Err(Failure::BadArgument("--shard and --merge are for --as-it-is".to_owned()));
+            return Err(Failure::argument("--shard and --merge are for --as-it-is".to_owned()));
         }
-        let failed = |source: RobustError| Failure::Robust { rig: rig.name.clone(), source };
+        let failed = |source: RobustError| Failure::of(&rig.name, source);
         let (choice, front) =
-            with_steps(|progress| choose(&rig, &tolerances, &settings, self.front, progress))
+            with_progress(|progress| choose(&rig, &tolerances, &settings, self.front, progress))
                 .map_err(failed)?;
         if let (Some(path), Some(front)) = (&self.svg, &front) {
             let figure = front_figure(front, &format!("{}: least ripple that survives", rig.name));
@@ -104,10 +101,11 @@ impl RobustCommand {
             Some(path) => self.write(path, &rig, &tolerances, &choice)?,
             None => false,
         };
-        self.print(&rig, &tolerances, &choice, front.as_ref())?;
+        let object = json!({ "rig": rig.name, "tolerances": tolerances, "choice": choice, "front": front });
+        print(self.json, &object, || text::chosen(&rig, &tolerances, &choice, front.as_ref()))?;
         match &self.out {
             Some(path) if self.check && differs => {
-                Err(Failure::CheckFailed(format!("{} differs from this choice", path.display())))
+                Err(Failure::check(format!("{} differs from this choice", path.display())))
             }
             _ => Ok(()),
         }
@@ -127,10 +125,7 @@ impl RobustCommand {
 
     /// Judges the numbers of the file as they are.
     fn judge(&self, rig: &Rig, tolerances: &Tolerances, settings: &JudgeSettings) -> Result<(), Failure> {
-        let name = || self.rig.display().to_string();
-        let certified = design(rig).map_err(|source| Failure::Design { rig: name(), source })?;
-        let table = TableValues::of(rig, &certified, Gains::Sampled)
-            .map_err(|source| Failure::NoTable { rig: name(), source })?;
+        let (_, table) = with_table(rig, &self.rig, Gains::Sampled)?;
         let laws: Vec<Law> = table.laws.present().map(|(law, _)| law).collect();
         let options = json!({ "tolerances": tolerances, "settings": settings });
         let work = |study: &Study| -> Result<Vec<Judgement>, Failure> {
@@ -151,23 +146,14 @@ impl RobustCommand {
         settings: &JudgeSettings,
         judgements: &[Judgement],
     ) -> Result<(), Failure> {
-        let mut out = std::io::stdout().lock();
-        if self.json {
-            let object = json!({ "rig": rig.name, "tolerances": tolerances, "laws": judgements });
-            writeln!(out, "{object}")?;
-        } else {
-            write!(out, "{}", text::judged(rig, tolerances, settings, judgements))?;
-        }
+        let object = json!({ "rig": rig.name, "tolerances": tolerances, "laws": judgements });
+        print(self.json, &object, || text::judged(rig, tolerances, settings, judgements))?;
         let fallen: Vec<&str> =
             judgements.iter().filter(|one| !one.survives()).map(|one| one.law.key()).collect();
         if fallen.is_empty() {
             return Ok(());
         }
-        Err(Failure::CheckFailed(format!(
-            "{}: runs fall or leave the limits: {}",
-            rig.name,
-            fallen.join(", ")
-        )))
+        Err(Failure::check(format!("{}: runs fall or leave the limits: {}", rig.name, fallen.join(", "))))
     }
 
     /// Writes the rig file with the choice, unless --check is given. Returns whether it differs from the existing
@@ -179,7 +165,7 @@ impl RobustCommand {
         tolerances: &Tolerances,
         choice: &Choice,
     ) -> Result<bool, Failure> {
-        let bad = |reason: &str| Failure::BadArgument(format!("{}: {reason}", self.rig.display()));
+        let bad = |reason: &str| Failure::argument(format!("{}: {reason}", self.rig.display()));
         let text = std::fs::read_to_string(&self.rig)?;
         let part = |name: Option<&std::ffi::OsStr>| name.and_then(|name| name.to_str()).map(str::to_owned);
         let name = part(path.file_stem()).ok_or_else(|| bad("--out needs a file name"))?;
@@ -192,23 +178,5 @@ impl RobustCommand {
             write_atomically(path, text.as_bytes())?;
         }
         Ok(differs)
-    }
-
-    fn print(
-        &self,
-        rig: &Rig,
-        tolerances: &Tolerances,
-        choice: &Choice,
-        front: Option<&Front>,
-    ) -> Result<(), Failure> {
-        let mut out = std::io::stdout().lock();
-        if self.json {
-            let object =
-                json!({ "rig": rig.name, "tolerances": tolerances, "choice": choice, "front": front });
-            writeln!(out, "{object}")?;
-        } else {
-            write!(out, "{}", text::chosen(rig, tolerances, choice, front))?;
-        }
-        Ok(())
     }
 }

@@ -103,11 +103,11 @@ impl ShakeCommand {
         }
         let mut line = SerialLine::open(port)?;
         let mut shaking = OverLine::new(rig, &table, seconds, self.seed, now())?;
-        let failed = |error: LineError| Failure::CheckFailed(format!("{port}: {error}"));
+        let failed = |error: LineError| Failure::check(format!("{port}: {error}"));
         let ended = with_spinner("shaking; Ctrl-C turns the motor off", || {
             while !shaking.is_over() {
                 if stop.load(Ordering::Relaxed) {
-                    return Err(Failure::CheckFailed(format!("{port}: stopped; no log is written")));
+                    return Err(Failure::check(format!("{port}: stopped; no log is written")));
                 }
                 shaking.poll(now()).map_err(failed)?;
                 exchange(&mut line, &mut shaking)?.map_err(failed)?;

@@ -133,7 +133,7 @@ impl SimulateCommand {
         let (trace, summary) = run(&rig, &table, &scenario)?;
         self.write(&rig, &trace, &summary)?;
         match &summary.fall {
-            Some(fall) => Err(Failure::CheckFailed(format!("{}: {fall}", rig.name))),
+            Some(fall) => Err(Failure::check(format!("{}: {fall}", rig.name))),
             None => Ok(()),
         }
     }
@@ -156,12 +156,11 @@ impl SimulateCommand {
         run: impl FnOnce(&Rig, &TableValues, &Script) -> Result<Demonstration, Failure>,
     ) -> Result<(), Failure> {
         let (rig, table) = self.with_motions()?;
-        let failed = |source| Failure::SwingUp { rig: rig.name.clone(), source };
         let script = match self.transitions {
             true => Script::route(&rig, &table, self.seed),
             false => Script::of(&rig, &table, self.seed, self.wrong),
         };
-        let script = script.map_err(failed)?;
+        let script = script.map_err(|source| Failure::of(&rig.name, source))?;
         let run = run(&rig, &table, &script)?;
         let parts: Vec<_> =
             run.parts.iter().map(|(at_s, name)| json!({ "at_s": at_s, "part": name })).collect();
@@ -181,7 +180,7 @@ impl SimulateCommand {
             return Ok(());
         }
         let fault = run.fault.map_or_else(String::new, |fault| format!(": {fault}"));
-        Err(Failure::CheckFailed(format!("{}, seed {}: it does not arrive{fault}", rig.name, self.seed)))
+        Err(Failure::check(format!("{}, seed {}: it does not arrive{fault}", rig.name, self.seed)))
     }
 
     /// The rig, its table and the scenario that the options ask for.
@@ -226,12 +225,12 @@ impl SimulateCommand {
         let links = rig.links();
         let [values, angles] = [self.start.len(), self.tilt.len()];
         if values != 0 && values != states {
-            return Err(Failure::BadArgument(format!(
+            return Err(Failure::argument(format!(
                 "--start: {values} values for {states} states; give {states}"
             )));
         }
         if angles > links {
-            return Err(Failure::BadArgument(format!(
+            return Err(Failure::argument(format!(
                 "--tilt: {angles} angles for {links} links; give at most {links}"
             )));
         }

@@ -1,10 +1,10 @@
 //! `upright swing-up`
 
 use std::fmt::Write as _;
-use std::io::Write as _;
 use std::path::PathBuf;
 
 use clap::Args;
+use serde::Serialize;
 use serde_json::json;
 use upright_design::motion::Transition;
 use upright_design::rig::Rig;
@@ -19,7 +19,8 @@ use upright_tool::figure::{Figure, margins_figure, run_svg, stroboscope_svg, tra
 use upright_tool::in_the_loop::RunError;
 
 use crate::failure::Failure;
-use crate::progress::{with_bar, with_search, with_spinner};
+use crate::output::print;
+use crate::progress::{with_bar, with_progress, with_spinner};
 use crate::split::Split;
 
 /// Plans the motions with which the rig raises itself from hanging to upright, and lowers itself again.
@@ -107,47 +108,27 @@ impl SwingUpCommand {
 
     /// Prints and draws the margins of both stored motions.
     fn margins(&self, rig: &Rig) -> Result<(), Failure> {
-        let failed = |source: SwingUpError| Failure::SwingUp { rig: rig.name.clone(), source };
+        let failed = |source: SwingUpError| Failure::of(&rig.name, source);
         let stored = Stored::beside(&self.rig).map_err(failed)?;
         let table =
             motions(rig, &stored).and_then(|motions| designed_table(rig, &motions)).map_err(failed)?;
         let both = with_margins(rig, &table)?;
         let title = format!("{}: how hard a link may be pushed", rig.name);
         self.draw(&margins_figure(&title, &both))?;
-        let mut out = std::io::stdout().lock();
-        if self.json {
-            let transitions = both
-                .iter()
-                .map(|(transition, margins)| json!({ "transition": transition, "margins": margins }));
-            return Ok(writeln!(
-                out,
-                "{}",
-                json!({ "rig": rig.name, "transitions": transitions.collect::<Vec<_>>() })
-            )?);
-        }
-        for (transition, margins) in &both {
-            write!(out, "{}", margins_text(*transition, margins))?;
-        }
-        Ok(())
+        let one = |(transition, margins): &(_, _)| json!({ "transition": transition, "margins": margins });
+        let transitions: Vec<_> = both.iter().map(one).collect();
+        print(self.json, &json!({ "rig": rig.name, "transitions": transitions }), || {
+            both.iter().map(|(transition, margins)| margins_text(*transition, margins)).collect()
+        })
     }
 
     /// Prints and draws duration, force and robustness of the candidates of a search.
     fn trade(&self, rig: &Rig) -> Result<(), Failure> {
-        let failed = |source: SwingUpError| Failure::SwingUp { rig: rig.name.clone(), source };
-        let solved = with_search(|progress| solved(rig, TRADED, self.seed, progress)).map_err(failed)?;
+        let failed = |source: SwingUpError| Failure::of(&rig.name, source);
+        let solved = with_progress(|progress| solved(rig, TRADED, self.seed, progress)).map_err(failed)?;
         self.draw(&trade_figure(&format!("{}: candidates of a raising", rig.name), &solved))?;
-        let mut out = std::io::stdout().lock();
-        if self.json {
-            return Ok(writeln!(out, "{}", json!({ "rig": rig.name, "tried": TRADED, "solved": solved }))?);
-        }
-        writeln!(out, "{} of {TRADED} candidates are solved", solved.len())?;
-        writeln!(out, "duration (s)  force (N)  farthest (m)  fragility     arrive  with twice the errors")?;
-        for SolvedCandidate { duration_s, force_n, position_m, score, runs, wider } in &solved {
-            let [arrive, twice] = [runs, wider].map(|runs| format!("{} of {}", runs.arrived, runs.runs));
-            write!(out, "{duration_s:>12.2} {force_n:>10.2} {position_m:>13.3} {score:>10.2} ")?;
-            writeln!(out, "{arrive:>10} {twice:>22}")?;
-        }
-        Ok(())
+        let object = json!({ "rig": rig.name, "tried": TRADED, "solved": solved });
+        print(self.json, &object, || traded_text(&solved))
     }
 
     /// Writes a figure as --svg and --csv say.
@@ -163,7 +144,7 @@ impl SwingUpCommand {
 
     pub(crate) fn run(self) -> Result<(), Failure> {
         let rig = Rig::from_path(&self.rig)?;
-        let failed = |source: SwingUpError| Failure::SwingUp { rig: rig.name.clone(), source };
+        let failed = |source: SwingUpError| Failure::of(&rig.name, source);
         if self.table {
             // The outcome depends on the motions as well as on the rig file.
             let stored = Stored::beside(&self.rig).map_err(failed)?.to_json();
@@ -174,7 +155,7 @@ impl SwingUpCommand {
                 .study("swing-up --table", &rig, &options, work, |rows| print_rows(&rig, &rows, self.json));
         }
         if self.split.is_used() {
-            return Err(Failure::BadArgument("--shard and --merge are for --table".to_owned()));
+            return Err(Failure::argument("--shard and --merge are for --table".to_owned()));
         }
         if self.margins {
             return self.margins(&rig);
@@ -185,9 +166,9 @@ impl SwingUpCommand {
         let old = Stored::beside(&self.rig);
         let plan = if self.stored {
             let old = old.clone().map_err(failed)?;
-            with_search(|progress| judge(&rig, &old, progress)).map_err(failed)?
+            with_progress(|progress| judge(&rig, &old, progress)).map_err(failed)?
         } else {
-            with_search(|progress| search(&rig, progress)).map_err(failed)?
+            with_progress(|progress| search(&rig, progress)).map_err(failed)?
         };
         let script = Script::of(&rig, &plan.table, self.seed, false).map_err(failed)?;
         let demonstration = script.run(&plan.table).map_err(RunError::from)?;
@@ -197,15 +178,10 @@ impl SwingUpCommand {
         if !self.check && !self.no_write && differs {
             write_atomically(&file, plan.stored.to_json().as_bytes())?;
         }
-        let mut out = std::io::stdout().lock();
-        if self.json {
-            let object = json!({ "rig": rig.name, "raise": plan.raise, "lower": plan.lower });
-            writeln!(out, "{object}")?;
-        } else {
-            write!(out, "{}", text(&rig, &plan))?;
-        }
+        let object = json!({ "rig": rig.name, "raise": plan.raise, "lower": plan.lower });
+        print(self.json, &object, || text(&rig, &plan))?;
         if self.check && differs {
-            return Err(Failure::CheckFailed(format!("{} differs from these motions", file.display())));
+            return Err(Failure::check(format!("{} differs from these motions", file.display())));
         }
         Ok(())
     }
@@ -241,7 +217,20 @@ pub(crate) fn with_margins(
         with_bar("margins", (Transition::BOTH.len() * MOMENTS) as u64, |done| {
             Transition::BOTH.into_iter().map(|transition| of(transition, done)).collect()
         });
-    both.map_err(|source| Failure::SwingUp { rig: rig.name.clone(), source })
+    both.map_err(|source| Failure::of(&rig.name, source))
+}
+
+/// Duration, force and robustness of each candidate.
+fn traded_text(solved: &[SolvedCandidate]) -> String {
+    let head = "duration (s)  force (N)  farthest (m)  fragility     arrive  with twice the errors";
+    let line = |SolvedCandidate { duration_s, force_n, position_m, score, runs, wider }: &SolvedCandidate| {
+        let [arrive, twice] = [runs, wider].map(|runs| format!("{} of {}", runs.arrived, runs.runs));
+        format!(
+            "{duration_s:>12.2} {force_n:>10.2} {position_m:>13.3} {score:>10.2} {arrive:>10} {twice:>22}\n"
+        )
+    };
+    format!("{} of {TRADED} candidates are solved\n{head}\n", solved.len())
+        + &solved.iter().map(line).collect::<String>()
 }
 
 /// Both margins of each link at each moment, and the least of each link.
@@ -268,6 +257,7 @@ fn margins_text(transition: Transition, margins: &[Margin]) -> String {
 }
 
 /// Runs under a condition.
+#[derive(Serialize)]
 struct SwingUpRow {
     condition: Condition,
     runs: FirmwareRuns,
@@ -275,31 +265,15 @@ struct SwingUpRow {
 
 /// Prints the rows as Markdown, or as one JSON object.
 fn print_rows(rig: &Rig, rows: &[SwingUpRow], is_json: bool) -> Result<(), Failure> {
-    let mut out = std::io::stdout().lock();
-    if is_json {
-        let rows: Vec<_> = rows
-            .iter()
-            .map(|SwingUpRow { condition, runs }| json!({ "condition": condition, "runs": runs }))
-            .collect();
-        return Ok(writeln!(out, "{}", json!({ "rig": rig.name, "rows": rows }))?);
-    }
-    for SwingUpRow { condition, runs: FirmwareRuns { refused, raise, lower, faults } } in rows {
+    let line = |SwingUpRow { condition, runs }: &SwingUpRow| {
+        let FirmwareRuns { refused, raise, lower, faults } = runs;
         let refused = (*refused > 0).then(|| format!("not hanging: {refused}"));
         let faults = faults.iter().map(|(fault, count)| format!("{fault}: {count}"));
-        let ended: Vec<String> = refused.into_iter().chain(faults).collect();
-        writeln!(
-            out,
-            "| {} | {} | {} of {} | {} of {} | {} |",
-            rig.name,
-            condition.name,
-            raise.arrived,
-            raise.runs,
-            lower.arrived,
-            lower.runs,
-            ended.join(", ")
-        )?;
-    }
-    Ok(())
+        let ended = refused.into_iter().chain(faults).collect::<Vec<_>>().join(", ");
+        let [raised, lowered] = [raise, lower].map(|runs| format!("{} of {}", runs.arrived, runs.runs));
+        format!("| {} | {} | {raised} | {lowered} | {ended} |\n", rig.name, condition.name)
+    };
+    print(is_json, &json!({ "rig": rig.name, "rows": rows }), || rows.iter().map(line).collect())
 }
 
 fn text(rig: &Rig, plan: &SwingUpPlan) -> String {

@@ -75,7 +75,7 @@ impl Built {
 /// Reads the image that is flashed; prints its path and hash, and the checksum that the monitor shows.
 pub(crate) fn read(path: &Path) -> Result<Image, Failure> {
     let image = Image::from_elf(&announced(path)?)
-        .map_err(|error| Failure::BadArgument(format!("{}: {error}", path.display())))?;
+        .map_err(|error| Failure::argument(format!("{}: {error}", path.display())))?;
     eprintln!("the monitor shows it as image {:08x}", image::flash_checksum(&image));
     Ok(image)
 }

@@ -1,7 +1,6 @@
 //! `upright transitions`
 
 use std::fmt::Write as _;
-use std::io::Write as _;
 use std::path::PathBuf;
 
 use clap::Args;
@@ -16,7 +15,8 @@ use upright_design::swing_up::{
 use upright_design::table::write_atomically;
 
 use crate::failure::Failure;
-use crate::progress::{with_search, with_spinner};
+use crate::output::print;
+use crate::progress::{with_progress, with_spinner};
 
 /// Plans motions between any two equilibria, in which each link is up or down, and tries them one after the other.
 ///
@@ -76,19 +76,16 @@ impl TransitionsCommand {
             searched = self.search(&rig, &mut stored)?;
             self.judge(&rig, &swing_up, &mut stored)?
         };
-        let mut out = std::io::stdout().lock();
-        if self.json {
-            let fault = |(transition, fault): &(Transition, String)| json!([transition.name(links), fault]);
-            let faults: Vec<_> = runs.faults.iter().map(fault).collect();
-            let transitions = runs.transitions;
-            let object = json!({ "rig": rig.name, "searched": searched, "transitions": transitions, "faults": faults });
-            return Ok(writeln!(out, "{object}")?);
-        }
-        write!(out, "{}", text(&rig, &swing_up, &transitions, &runs.transitions))?;
-        for (transition, fault) in runs.faults {
-            writeln!(out, "a run ended at {}: {fault}", transition.name(links))?;
-        }
-        Ok(())
+        let fault = |(transition, fault): &(Transition, String)| json!([transition.name(links), fault]);
+        let faults: Vec<_> = runs.faults.iter().map(fault).collect();
+        let object = json!({ "rig": rig.name, "searched": searched, "transitions": runs.transitions, "faults": faults });
+        print(self.json, &object, || {
+            let ended = |(transition, fault): &(Transition, String)| {
+                format!("a run ended at {}: {fault}\n", transition.name(links))
+            };
+            text(&rig, &swing_up, &transitions, &runs.transitions)
+                + &runs.faults.iter().map(ended).collect::<String>()
+        })
     }
 
     /// The motions beside the rig file; none if there are none yet, and those of another rig do not count.
@@ -115,7 +112,7 @@ impl TransitionsCommand {
         let (first, end) = self.candidates;
         let mut searched = Vec::new();
         for transition in self.wanted(links)? {
-            let found = with_search(|progress| stored.search(rig, transition, first..end, progress))
+            let found = with_progress(|progress| stored.search(rig, transition, first..end, progress))
                 .map_err(|source| failed(rig, source))?;
             eprintln!("{}", searched_line(&found, end - first, links));
             self.write(stored)?;
@@ -193,10 +190,10 @@ impl TransitionsCommand {
         }
         let named = |name: &String| match Transition::named(name, links) {
             Some(transition) if !Transition::BOTH.contains(&transition) => Ok(transition),
-            Some(_) => Err(Failure::BadArgument(format!("{name} belongs to `upright swing-up`"))),
+            Some(_) => Err(Failure::argument(format!("{name} belongs to `upright swing-up`"))),
             None => {
                 let example = format!("{}-{}", "u".repeat(links), "d".repeat(links));
-                Err(Failure::BadArgument(format!("{name}: give a letter for each link, as in {example}")))
+                Err(Failure::argument(format!("{name}: give a letter for each link, as in {example}")))
             }
         };
         self.only.iter().map(named).collect()
@@ -213,7 +210,7 @@ struct Judged {
 }
 
 fn failed(rig: &Rig, source: SwingUpError) -> Failure {
-    Failure::SwingUp { rig: rig.name.clone(), source }
+    Failure::of(&rig.name, source)
 }
 
 fn searched_line(searched: &Searched, tried: u64, links: usize) -> String {

@@ -97,7 +97,7 @@ pub(crate) fn show(
 /// Starts the server and prints the address of its page.
 fn listening(address: SocketAddr) -> Result<Server, Failure> {
     let server = Server::listen(address).map_err(|error| {
-        Failure::BadArgument(format!("{address}: {error}; the page needs another port, or 0 for a free one"))
+        Failure::argument(format!("{address}: {error}; the page needs another port, or 0 for a free one"))
     })?;
     println!("{}", server.address()?);
     eprintln!("open this address in a browser; Ctrl-C ends");

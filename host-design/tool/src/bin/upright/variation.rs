@@ -85,10 +85,9 @@ impl Variation {
 /// Designs the rig of this file, and makes the table with these gains.
 pub(crate) fn with_table(rig: &Rig, file: &Path, gains: Gains) -> Result<(Certified, TableValues), Failure> {
     let name = || file.display().to_string();
-    let certified = with_spinner("designing", || design(rig))
-        .map_err(|source| Failure::Design { rig: name(), source })?;
-    let table =
-        TableValues::of(rig, &certified, gains).map_err(|source| Failure::NoTable { rig: name(), source })?;
+    let certified =
+        with_spinner("designing", || design(rig)).map_err(|source| Failure::of(name(), source))?;
+    let table = TableValues::of(rig, &certified, gains).map_err(|source| Failure::of(name(), source))?;
     Ok((certified, table))
 }
 
@@ -115,7 +114,7 @@ pub(crate) fn with_stored_motions(
     table: TableValues,
     wanted: Wanted,
 ) -> Result<TableValues, Failure> {
-    let failed = |source| Failure::SwingUp { rig: rig.name.clone(), source };
+    let failed = |source| Failure::of(&rig.name, source);
     let stored = match Stored::beside(rig_file) {
         Ok(stored) => stored,
         Err(SwingUpError::NoFile { .. }) if wanted == Wanted::SwingUp => return Ok(table),

@@ -1,6 +1,5 @@
 //! `upright verify`
 
-use std::io::Write;
 use std::path::PathBuf;
 
 use clap::Args;
@@ -16,7 +15,8 @@ use upright_design::verify::{
 };
 
 use crate::failure::Failure;
-use crate::progress::{with_bar, with_random_plants, with_spinner};
+use crate::output::print;
+use crate::progress::{with_bar, with_progress, with_spinner};
 use crate::split::Split;
 use crate::variation::{Variation, law_option};
 
@@ -126,7 +126,7 @@ impl VerifyCommand {
             table.laws[other] = None;
         }
         if table.laws.present().next().is_none() {
-            return Err(Failure::BadArgument(
+            return Err(Failure::argument(
                 "--law: the rig file does not ask for this control law".to_owned(),
             ));
         }
@@ -148,14 +148,10 @@ impl VerifyCommand {
             let runs = table.laws.present().count() as u64 * u64::from(self.runs);
             // A shard runs the random plants only.
             if study.is_shard() {
-                with_random_plants(runs, |stage, done| {
-                    stage("random plants");
-                    random_plants(&rig, &table, &effort, done)
-                })?;
+                with_bar("random plants", runs, |done| random_plants(&rig, &table, &effort, done))?;
                 return Ok(None);
             }
-            let report =
-                with_random_plants(runs, |stage, done| trust(&rig, &certified, &table, effort, stage, done));
+            let report = with_progress(|progress| trust(&rig, &certified, &table, effort, progress));
             Ok(Some(report?))
         };
         self.split.study("verify", &rig, &options, work, |report| {
@@ -170,31 +166,18 @@ impl VerifyCommand {
     }
 
     fn print(&self, rig: &Rig, report: &TrustReport) -> Result<(), Failure> {
-        let mut out = std::io::stdout().lock();
-        if self.json {
-            serde_json::to_writer(&mut out, report).map_err(std::io::Error::from)?;
-            writeln!(out)?;
-        } else {
-            write!(out, "{}", text::report(rig, report, &self.as_typed()))?;
-        }
+        print(self.json, report, || text::report(rig, report, &self.as_typed()))?;
         let failed = report.failed();
         if failed.is_empty() {
             return Ok(());
         }
-        Err(Failure::CheckFailed(format!("{}: not met: {}", rig.name, failed.join("; "))))
+        Err(Failure::check(format!("{}: not met: {}", rig.name, failed.join("; "))))
     }
 
     fn imperfections(&self, rig: &Rig, table: &TableValues) -> Result<(), Failure> {
         let found = search(rig, table)?;
-        let mut out = std::io::stdout().lock();
-        if self.json {
-            serde_json::to_writer(&mut out, &found).map_err(std::io::Error::from)?;
-            writeln!(out)?;
-        } else {
-            let tables: Vec<String> = found.iter().map(imperfections::table).collect();
-            write!(out, "{}", tables.join("\n"))?;
-        }
-        Ok(())
+        let text = || found.iter().map(imperfections::table).collect::<Vec<_>>().join("\n");
+        print(self.json, &found, text)
     }
 
     fn replay(&self, rig: &Rig, table: &TableValues, law: Law, seed: u64) -> Result<(), Failure> {
@@ -205,15 +188,9 @@ impl VerifyCommand {
             trace.write_csv(&mut bytes)?;
             write_atomically(path, &bytes)?;
         }
-        let mut out = std::io::stdout().lock();
-        if self.json {
-            serde_json::to_writer(&mut out, &summary).map_err(std::io::Error::from)?;
-            writeln!(out)?;
-        } else {
-            writeln!(out, "{}\n{summary}", plant.describe())?;
-        }
+        print(self.json, &summary, || format!("{}\n{summary}\n", plant.describe()))?;
         match &summary.fall {
-            Some(fall) => Err(Failure::CheckFailed(format!("{}, seed {seed}: {fall}", rig.name))),
+            Some(fall) => Err(Failure::check(format!("{}, seed {seed}: {fall}", rig.name))),
             None => Ok(()),
         }
     }
@@ -222,11 +199,11 @@ impl VerifyCommand {
     fn map(&self, rig: &Rig, table: &TableValues, path: &std::path::Path) -> Result<(), Failure> {
         let law = table.laws.present().next().map_or(Law::Lqr, |(law, _)| law);
         let &[across, down] = self.axes.as_slice() else {
-            return Err(Failure::BadArgument("--axes: give two".to_owned()));
+            return Err(Failure::argument("--axes: give two".to_owned()));
         };
         let axes = [across, down];
         if axes.iter().any(|axis| axis.state >= rig.states()) || across.state == down.state {
-            return Err(Failure::BadArgument(format!(
+            return Err(Failure::argument(format!(
                 "--axes: give two different states from 0 to {}",
                 rig.states() - 1
             )));

@@ -1,7 +1,6 @@
 //! `upright firmware cycles`
 
 use std::fmt::Write as _;
-use std::io::Write;
 use std::path::{Path, PathBuf};
 
 use clap::Args;
@@ -20,6 +19,7 @@ use upright_tool::project::checkout;
 use super::board::BoardOption;
 use super::built::designed;
 use crate::failure::Failure;
+use crate::output::print;
 use crate::progress::with_spinner;
 use crate::target::read;
 use crate::variation::{Wanted, law_option, positive};
@@ -60,17 +60,13 @@ impl CyclesCommand {
         })?;
         let image = read(&image)?;
         let cycles = measured(&rig, &table, &image, self.on.board, self.law, self.duration)?;
-        let text = if self.json {
-            json!({ "rig": rig.name, "board": self.on.board.name(), "law": self.law.option(), "cycles": cycles })
-                .to_string()
-        } else {
-            table_of(&cycles)
-        };
-        writeln!(std::io::stdout(), "{}", text.trim_end())?;
+        let (board, law) = (self.on.board.name(), self.law.option());
+        let object = json!({ "rig": rig.name, "board": board, "law": law, "cycles": cycles });
+        print(self.json, &object, || table_of(&cycles))?;
         if let Some(ended) = &cycles.ended {
             eprintln!("it does not balance for {} s: {ended}", self.duration);
         }
-        cycles.check().map_err(|error| Failure::CheckFailed(error.to_string()))
+        cycles.check().map_err(|error| Failure::check(error.to_string()))
     }
 }
 
@@ -120,9 +116,9 @@ pub(super) fn check_ticks(
         cycles.all.ticks,
         100.0 * us / cycles.period.us
     );
-    cycles.check().map_err(|error| Failure::CheckFailed(error.to_string()))?;
+    cycles.check().map_err(|error| Failure::check(error.to_string()))?;
     match &cycles.ended {
-        Some(ended) if table.observer.is_some() => Err(Failure::CheckFailed(format!(
+        Some(ended) if table.observer.is_some() => Err(Failure::check(format!(
             "the ticks of this image cannot be measured on the virtual board: {ended}"
         ))),
         Some(_) => {
@@ -178,7 +174,7 @@ fn table_of(cycles: &in_the_loop::TickCycles) -> String {
     row("controller alone", &|worst| Some(worst.controller));
     _ = write!(
         text,
-        "\n{} ticks from power-up on, at {} MHz; the longest takes {:.1} % of its period. Cycles are approximate.",
+        "\n{} ticks from power-up on, at {} MHz; the longest takes {:.1} % of its period. Cycles are approximate.\n",
         cycles.all.ticks,
         cycles.core_hz / 1_000_000,
         100.0 * cycles.all.whole.us / cycles.period.us

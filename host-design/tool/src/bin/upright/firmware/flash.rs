@@ -37,7 +37,7 @@ impl FlashCommand {
     pub(crate) fn run(self) -> Result<(), Failure> {
         // Checked first, because building the image takes longer.
         if Command::new(PROBE_RS).arg("--version").output().is_err() {
-            return Err(Failure::NoProgram(
+            return Err(Failure::no_program(
                 "probe-rs is missing: install it (https://probe.rs, or `cargo install probe-rs-tools --locked`)",
             ));
         }
@@ -55,7 +55,7 @@ fn probe_rs(arguments: &[&str], image: Option<&Path>) -> Result<(), Failure> {
     if status.success() {
         Ok(())
     } else {
-        Err(Failure::CheckFailed(format!(
+        Err(Failure::check(format!(
             "probe-rs {} ended with {status}; is the probe connected and the board powered?",
             arguments[0]
         )))

@@ -97,7 +97,7 @@ impl MonitorCommand {
             conversation.on_screen(&mut Screen::new()?)?;
         }
         match &conversation.model.ended {
-            Some(ended) => Err(Failure::CheckFailed(format!("{}: {ended}", self.port))),
+            Some(ended) => Err(Failure::check(format!("{}: {ended}", self.port))),
             None => Ok(()),
         }
     }
@@ -135,7 +135,7 @@ impl Conversation {
 
     fn record(&mut self, path: &Path) -> Result<(), Failure> {
         let file = File::create_new(path).map_err(|error| {
-            Failure::BadArgument(format!("{}: {error}; give the name of a new file", path.display()))
+            Failure::argument(format!("{}: {error}; give the name of a new file", path.display()))
         })?;
         self.recorder = Some(TelemetryCsv::new(file));
         self.model.recording = Some(path.display().to_string());

@@ -86,7 +86,7 @@ impl RunCommand {
 
     fn serve(&self, address: &str) -> Result<(), Failure> {
         let listener = TcpListener::bind(address)
-            .map_err(|error| Failure::BadArgument(format!("--serve {address}: {error}; give HOST:PORT")))?;
+            .map_err(|error| Failure::argument(format!("--serve {address}: {error}; give HOST:PORT")))?;
         let (rig, table, scenario) = if self.simulate.is_swing_up() {
             let (rig, table) = self.simulate.with_motions()?;
             let hanging = Scenario::swing_up(&rig, SERVED_S, None);
@@ -150,10 +150,8 @@ fn compare(rig: &Rig, table: &TableValues, scenario: &Scenario, qemu: &Recording
     let host = run(rig, table, scenario, RunPlace::Host)?;
     let difference = host.ticks.iter().zip(&qemu.ticks).position(|(host, qemu)| host != qemu);
     match difference {
-        Some(tick) => {
-            Err(Failure::CheckFailed(format!("QEMU and host differ in tick {tick} after the release")))
-        }
-        None if host.ticks.len() != qemu.ticks.len() => Err(Failure::CheckFailed(format!(
+        Some(tick) => Err(Failure::check(format!("QEMU and host differ in tick {tick} after the release"))),
+        None if host.ticks.len() != qemu.ticks.len() => Err(Failure::check(format!(
             "{} ticks in QEMU, {} on the host",
             qemu.ticks.len(),
             host.ticks.len()

@@ -1,7 +1,6 @@
 //! `upright firmware size`
 
 use std::fmt::Write as _;
-use std::io::Write;
 use std::path::PathBuf;
 
 use clap::Args;
@@ -14,6 +13,7 @@ use upright_tool::image::{
 use super::board::BoardOption;
 use super::built::built;
 use crate::failure::Failure;
+use crate::output::print;
 use crate::variation::Wanted;
 
 /// Measures the image of a board: flash and RAM by section and by crate, a bound on its stack, and whether it can
@@ -47,26 +47,21 @@ impl SizeCommand {
         let image = LinkedImage::read(&path)?;
         let (size, stack, forbidden) = (size(&image)?, stack_bound(&image), forbidden_functions(&image));
         let wrong = wrong(&size, &stack, &forbidden);
-        let text = if self.json {
-            json!({
-                "image": path,
-                "flash": size.flash,
-                "ram": size.ram,
-                "table": size.table,
-                "constants": size.constants,
-                "limits": { "code": CODE_LIMIT, "ram": RAM_LIMIT },
-                "sections": size.sections,
-                "crates": size.crates,
-                "stack": stack.as_ref().ok(),
-                "forbidden_functions": forbidden,
-                "wrong": wrong,
-            })
-            .to_string()
-        } else {
-            table(&size, &stack)
-        };
-        writeln!(std::io::stdout(), "{}", text.trim_end())?;
-        if wrong.is_empty() { Ok(()) } else { Err(Failure::CheckFailed(wrong.join("; "))) }
+        let object = json!({
+            "image": path,
+            "flash": size.flash,
+            "ram": size.ram,
+            "table": size.table,
+            "constants": size.constants,
+            "limits": { "code": CODE_LIMIT, "ram": RAM_LIMIT },
+            "sections": size.sections,
+            "crates": size.crates,
+            "stack": stack.as_ref().ok(),
+            "forbidden_functions": forbidden,
+            "wrong": wrong,
+        });
+        print(self.json, &object, || table(&size, &stack))?;
+        if wrong.is_empty() { Ok(()) } else { Err(Failure::check(wrong.join("; "))) }
     }
 }
 
