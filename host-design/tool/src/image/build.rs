@@ -76,7 +76,7 @@ pub fn build_for(kind: ImageKind, rig: &Rig, table: &TableValues) -> Result<Path
     compile(kind, Some(&gains), &name)
 }
 
-/// Checks what the board of the image can do before the compiler is started, whose errors would name lines of the image.
+/// Checks what the board of the image can do before the compiler is started, whose errors name lines of the image.
 fn check_board(kind: ImageKind, needed: usize, tick_s: f64) -> Result<(), BuildError> {
     let Some(board) = kind.board() else { return Ok(()) };
     if needed > board.encoders() {
