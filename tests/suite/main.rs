@@ -15,6 +15,5 @@ mod lost_loops;
 mod own_board;
 mod plain_equations;
 mod rig_fuzz;
-mod wiring;
 
 use upright_test_support::published;
