@@ -3,6 +3,7 @@
 //! Without gcc, g++ or the tools for the AVR, the tests that need them say so and pass. If the environment variable
 //! `UPRIGHT_REQUIRE_GCC` is set, they fail.
 
+mod avr;
 mod program;
 mod recorded;
 

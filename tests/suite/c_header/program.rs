@@ -45,6 +45,11 @@ impl Program {
         Self { folder }
     }
 
+    /// Adds a file beside the header.
+    pub(crate) fn add(&self, name: &str, text: &str) {
+        std::fs::write(self.folder.path().join(name), text).unwrap();
+    }
+
     pub(crate) fn path(&self) -> PathBuf {
         self.folder.path().join("program")
     }
