@@ -14,6 +14,7 @@ mod lost_loops;
 mod own_board;
 mod plain_equations;
 mod rig_fuzz;
+mod verdicts;
 mod wiring;
 
 use upright_test_support::published;
