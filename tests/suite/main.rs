@@ -15,6 +15,5 @@ mod own_board;
 mod plain_equations;
 mod rig_fuzz;
 mod verdicts;
-mod wiring;
 
 use upright_test_support::published;
