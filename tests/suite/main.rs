@@ -2,6 +2,7 @@
 //! happens once.
 
 mod bench;
+mod c_header;
 mod closed_loop;
 mod encoders_only;
 mod equipment;
