@@ -15,5 +15,6 @@ mod lost_loops;
 mod own_board;
 mod plain_equations;
 mod rig_fuzz;
+mod verdicts;
 
 use upright_test_support::published;
