@@ -14,7 +14,7 @@ use upright_design::table::TableValues;
 use upright_test_support::equipment::{is_required, not_exercised};
 use upright_test_support::repository;
 
-const UNO: Dialect =
+const UNO: Dialect<'_> =
     Dialect { compiler: "avr-gcc", flags: &["-mmcu=atmega328p", "-O2", "-Wall", "-Wextra", "-Werror"] };
 
 /// What the AVR has sent: hash, number of ticks of balancing, cycles of a tick, mean and largest.
