@@ -58,7 +58,7 @@ pub use encoder::{CoarsestEncoder, EncoderSettings, coarser, coarsest_encoder};
 pub use error::VerifyError;
 pub use imperfections::{
     IMPERFECTIONS, Imperfection, ImperfectionSettings, Imperfections, RequiredSurvival, SizeRuns, Survival,
-    imperfections, limit_cycle, required_imperfections,
+    imperfections, limit_cycle, required_imperfections, survival,
 };
 pub use linear::{LinearReport, linear, margins_of};
 pub use loop_model::{ControllerModel, LoopModel, PlantModel};
