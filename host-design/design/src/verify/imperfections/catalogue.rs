@@ -41,7 +41,7 @@ pub static IMPERFECTIONS: [Imperfection; 10] = [
         key: "joint_friction_n_m",
         unit: "N·m",
         typical: [1e-4, 1e-3],
-        source: "estimate: greased ball bearings of 3 to 8 mm bore",
+        source: "measured: 1.9e-4 to 6.3e-4 in five of six ball bearings (docs/reality.md); greased or large ones have more",
         remedy: "smaller bearings without seals, with oil instead of grease; more weight on the angles",
         requirement: "runs within the limits (joint_friction_n_m)",
         required: |verify| verify.joint_friction_n_m,
