@@ -3,6 +3,40 @@
 //!
 //! To use your own board, implement [`Board`] in your own crate. The boards of this project are part of the image
 //! (`src/image/board/`), not of this library.
+//!
+//! ```
+//! use upright::board::{Board, Contacts, Inputs, Output};
+//! use upright::control::encoder::CounterWidth;
+//!
+//! /// A counter for the cart's encoder, and the registers of a power stage.
+//! struct Bench {
+//!     counter: u16,
+//!     duty: f32,
+//!     enable: bool,
+//! }
+//!
+//! impl Board<1> for Bench {
+//!     const WIDTHS: [CounterWidth; 1] = [CounterWidth::Bits16];
+//!     fn tick_s(&self) -> f32 {
+//!         0.001
+//!     }
+//!     fn inputs(&mut self) -> Inputs<1> {
+//!         Inputs { raw_counts: [self.counter.into()], supply_v: 24.0, contacts: Contacts::default() }
+//!     }
+//!     fn drive(&mut self, output: &Output) {
+//!         (self.enable, self.duty) = (output.enable, output.duty);
+//!     }
+//!     fn feed_watchdog(&mut self) {}
+//!     fn cycles(&self) -> u32 {
+//!         0
+//!     }
+//! }
+//!
+//! let mut bench = Bench { counter: 7, duty: 0.5, enable: true };
+//! bench.drive(&Output::OFF);
+//! assert!(!bench.enable && bench.duty == 0.0);
+//! assert_eq!(bench.inputs().raw_counts, [7]);
+//! ```
 
 use serde::{Deserialize, Serialize};
 

@@ -13,20 +13,25 @@ impl<const NX: usize, const NY: usize, T: Scalar> ObserverGains<NX, NY, T> {
     fn sensors_are_in_order(&self) -> bool {
         self.measured.iter().zip(0..).all(|(&state, sensor)| state == 2 * sensor)
     }
+
+    /// The entries of Ad that the prediction uses without multiplying.
+    pub fn pattern(&self) -> PredictionPattern {
+        PredictionPattern::of(&self.ad.data.0)
+    }
 }
 
 /// The observer of a table, with the pattern of its Ad, which saves operations in every tick.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Observer<'t, const NX: usize, const NY: usize, T: Scalar = f32> {
     pub(crate) gains: &'t ObserverGains<NX, NY, T>,
-    pattern: Pattern,
+    pattern: PredictionPattern,
     /// Whether sensor i measures state 2i.
     is_in_order: bool,
 }
 
 /// Entries of Ad that are known in advance. They make the prediction faster; the result is the same, bit for bit.
 #[derive(Debug, Clone, Copy, PartialEq)]
-enum Pattern {
+pub enum PredictionPattern {
     /// No entry is known.
     Any,
     /// The first column is 1, 0, 0 …, as in every chain: the motion does not depend on the position of the cart.
@@ -37,7 +42,7 @@ enum Pattern {
     Frictionless,
 }
 
-impl Pattern {
+impl PredictionPattern {
     fn of<T: Scalar, const NX: usize>(ad: &[[T; NX]; NX]) -> Self {
         let (zero, one) = (T::default(), T::from_f32(1.0));
         let zero_from = |first: usize, column: usize| {
@@ -50,16 +55,16 @@ impl Pattern {
         });
         let starts_with_one = ad.as_flattened().first() == Some(&one);
         match starts_with_one && zero_from(1, 0) {
-            true if alone.is_empty() && diagonals_agree && zero_from(2, 1) => Pattern::Frictionless,
-            true => Pattern::SameEverywhere,
-            false => Pattern::Any,
+            true if alone.is_empty() && diagonals_agree && zero_from(2, 1) => PredictionPattern::Frictionless,
+            true => PredictionPattern::SameEverywhere,
+            false => PredictionPattern::Any,
         }
     }
 }
 
 impl<'t, const NX: usize, const NY: usize, T: Scalar> Observer<'t, NX, NY, T> {
     pub(crate) fn new(gains: &'t ObserverGains<NX, NY, T>) -> Self {
-        Self { gains, pattern: Pattern::of(&gains.ad.data.0), is_in_order: gains.sensors_are_in_order() }
+        Self { gains, pattern: gains.pattern(), is_in_order: gains.sensors_are_in_order() }
     }
 
     /// Innovation `e = y - C x̂⁻` (m or rad): measurement minus prediction, for the measured positions y. It is
@@ -133,11 +138,11 @@ impl<'t, const NX: usize, const NY: usize, T: Scalar> Observer<'t, NX, NY, T> {
         for next in &mut next {
             *next *= u;
         }
-        if self.pattern == Pattern::Frictionless {
+        if self.pattern == PredictionPattern::Frictionless {
             self.add_frictionless(&mut next, estimate);
         } else {
             let (mut columns, mut states) = (&self.gains.ad.data.0[..], &estimate[..]);
-            if let (Pattern::SameEverywhere, [_, others @ ..], [x, rest @ ..]) =
+            if let (PredictionPattern::SameEverywhere, [_, others @ ..], [x, rest @ ..]) =
                 (self.pattern, columns, states)
             {
                 next[0] += *x;
@@ -217,26 +222,29 @@ mod tests {
 
     #[test]
     fn a_shortcut_is_taken_only_where_every_entry_allows_it() {
-        let pattern = |ad: SMatrix<f32, 4, 4>| Pattern::of(&ad.data.0);
+        let pattern = |ad: SMatrix<f32, 4, 4>| PredictionPattern::of(&ad.data.0);
         let frictionless = matrix![
             1.0, 0.1, 0.2, 0.3;
             0.0, 1.0, 0.4, 0.2;
             0.0, 0.0, 1.5, 0.7;
             0.0, 0.0, 0.8, 1.5
         ];
-        assert_eq!(pattern(frictionless), Pattern::Frictionless);
+        assert_eq!(pattern(frictionless), PredictionPattern::Frictionless);
         for (row, column) in (0..4).flat_map(|row| (0..4).map(move |column| (row, column))) {
             let mut other = frictionless;
             other[(row, column)] += 0.01;
             let expected = match (row, column) {
-                (_, 0) => Pattern::Any,
+                (_, 0) => PredictionPattern::Any,
                 // The blocks' diagonals have to agree, and the links must not depend on the cart's speed.
-                (2 | 3, 1) | (0, 2) | (1, 3) | (2, 2) | (3, 3) | (1, 1) => Pattern::SameEverywhere,
-                _ => Pattern::Frictionless,
+                (2 | 3, 1) | (0, 2) | (1, 3) | (2, 2) | (3, 3) | (1, 1) => PredictionPattern::SameEverywhere,
+                _ => PredictionPattern::Frictionless,
             };
             assert_eq!(pattern(other), expected, "{row} {column}");
         }
-        assert_eq!(Pattern::of(&[[1.0f32]]), Pattern::SameEverywhere);
-        assert_eq!(Pattern::of(&SMatrix::<f32, 3, 3>::identity().data.0), Pattern::SameEverywhere);
+        assert_eq!(PredictionPattern::of(&[[1.0f32]]), PredictionPattern::SameEverywhere);
+        assert_eq!(
+            PredictionPattern::of(&SMatrix::<f32, 3, 3>::identity().data.0),
+            PredictionPattern::SameEverywhere
+        );
     }
 }

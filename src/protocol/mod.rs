@@ -3,6 +3,18 @@
 //! [`message`] defines the requests, answers and telemetry: a new message belongs there. [`frame`] defines the frames
 //! for all of them, [`serial_link`] sends and receives them beside the control task, [`queue`] connects the two, and
 //! [`simulated_pins`] replaces the wires when an image runs in the loop with a simulation.
+//!
+//! ```
+//! use upright::protocol::frame::{Receiver, encode};
+//! use upright::protocol::message::{Command, Request};
+//!
+//! let command = Command { id: 1, request: Request::Disarm };
+//! let (mut scratch, mut frame) = ([0; 64], [0; 64]);
+//! let frame = encode(&command, &mut scratch, &mut frame).unwrap();
+//! let mut receiver = Receiver::<64>::new();
+//! let received = frame.iter().find_map(|&byte| receiver.push::<Command>(byte));
+//! assert_eq!(received, Some(Ok(command)));
+//! ```
 
 use core::time::Duration;
 

@@ -2,6 +2,7 @@
 //! happens once.
 
 mod bench;
+mod c_header;
 mod closed_loop;
 mod encoders_only;
 mod equipment;
@@ -14,6 +15,6 @@ mod lost_loops;
 mod own_board;
 mod plain_equations;
 mod rig_fuzz;
-mod wiring;
+mod verdicts;
 
 use upright_test_support::published;

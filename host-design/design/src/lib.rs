@@ -12,6 +12,7 @@
 //! | [`design`] | linear model, weights, poles, noise | certified gains and observer |
 //! | [`motion`] | | planned motions between equilibria, as the search for a swing-up makes them |
 //! | [`table`] | gains and limits | the gain table of the firmware, as values and as Rust source |
+//! | [`export`] | gain table | the controller as a C header |
 //! | [`simulate`] | table and scenario | a run of the firmware's controller against the nonlinear plant |
 //! | [`client`] | bytes of a serial line | commands with their answers, telemetry, logs |
 //! | [`harness`] | a target and a scenario | a run of the whole firmware, from power-up on |
@@ -27,6 +28,7 @@
 
 pub mod client;
 pub mod design;
+pub mod export;
 pub mod harness;
 pub mod identify;
 pub mod motion;

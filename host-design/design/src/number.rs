@@ -1,4 +1,11 @@
 //! Numbers formatted for people to read.
+//!
+//! ```
+//! use upright_design::number::significant;
+//!
+//! assert_eq!(significant(0.0123456, 3), "0.0123");
+//! assert_eq!(significant(1.5e-9, 3), "1.5e-9");
+//! ```
 
 /// `x` rounded to `digits` significant digits.
 pub fn rounded(x: f64, digits: usize) -> f64 {

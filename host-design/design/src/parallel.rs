@@ -1,6 +1,10 @@
 //! Independent computations, spread over all processors.
 //!
 //! The threads are rayon's. Its own iterators are compiled again for each use; the functions here share one loop.
+//!
+//! ```
+//! assert_eq!(upright_design::parallel::map(1..4, |x| x * x), [1, 4, 9]);
+//! ```
 
 use std::sync::OnceLock;
 use std::sync::atomic::{AtomicUsize, Ordering::Relaxed};

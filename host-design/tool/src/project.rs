@@ -1,4 +1,10 @@
 //! Finds the checkout of the project, which holds the source of the firmware.
+//!
+//! ```
+//! let project = upright_tool::project::checkout()?;
+//! assert!(project.join("src/gains.rs").is_file());
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
 
 use std::path::{Path, PathBuf};
 

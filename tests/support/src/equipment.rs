@@ -1,5 +1,6 @@
-//! What some tests need and not every machine has: a compiler for the image, QEMU, a browser. A test without it says so
-//! and passes; if the environment variable `UPRIGHT_REQUIRE_IMAGE` or `UPRIGHT_REQUIRE_BROWSER` is set, it fails.
+//! What some tests need and not every machine has: a compiler for the image, QEMU, a browser, gcc. A test without it
+//! says so and passes; if the environment variable `UPRIGHT_REQUIRE_IMAGE`, `UPRIGHT_REQUIRE_BROWSER` or
+//! `UPRIGHT_REQUIRE_GCC` is set, it fails.
 
 use std::fmt::Debug;
 use std::io::Write;

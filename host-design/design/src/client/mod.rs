@@ -3,6 +3,20 @@
 //!
 //! A [`Session`](crate::harness::Session) talks through it to a firmware in lock step; monitor, commissioning, twin and
 //! identification talk through it over a line.
+//!
+//! ```
+//! use std::time::Duration;
+//! use upright::protocol::message::Request;
+//! use upright_design::client::{Client, PATIENCE};
+//!
+//! let (mut client, start) = (Client::default(), Duration::ZERO);
+//! client.send(Request::Info, start);
+//! assert!(!client.take_outgoing().is_empty() && client.is_waiting());
+//! // Nobody answers: the client says so once.
+//! let unanswered = client.poll(start + PATIENCE * 2);
+//! assert_eq!(unanswered.len(), 1);
+//! assert_eq!(unanswered[0].request, Request::Info);
+//! ```
 
 mod mismatch;
 

@@ -1,4 +1,15 @@
 //! Control design: from a linear model to gains, each the correctly rounded exact answer.
+//!
+//! ```
+//! use upright_design::design::design;
+//! use upright_design::rig::Rig;
+//!
+//! let rig = Rig::from_path("../../rigs/single-quanser-ip02.toml".as_ref())?;
+//! let certified = design(&rig)?;
+//! let lqr = certified.double.sampled.lqr.ok_or("the file has [lqr]")?;
+//! assert_eq!(lqr.k.cols(), rig.states());
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
 
 mod assessment;
 mod certified;

@@ -7,6 +7,23 @@
 //! raises it, and [`record`] runs a scenario.
 //!
 //! No type here depends on the numbers of states and sensors, except the firmware itself.
+//!
+//! ```
+//! use upright::table::Law;
+//! use upright_design::design::design;
+//! use upright_design::harness::{record, with_firmware};
+//! use upright_design::rig::Rig;
+//! use upright_design::simulate::Scenario;
+//! use upright_design::table::{Gains, TableValues};
+//!
+//! let rig = Rig::from_path("../../rigs/single-quanser-ip02.toml".as_ref())?;
+//! let table = TableValues::of(&rig, &design(&rig)?, Gains::Sampled)?;
+//! let mut scenario = Scenario::at_rest(&rig, Law::Lqr);
+//! scenario.duration_s = 1.0;
+//! let recording = with_firmware(&table, |firmware| record(&rig, &table, &scenario, firmware))??;
+//! assert!(recording.fault.is_none() && recording.summary.survives());
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
 
 mod error;
 mod held_rig;

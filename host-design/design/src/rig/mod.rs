@@ -3,6 +3,21 @@
 //! [`Rig`] holds the values as the file gives them; defaults that follow from other values (the centre of mass of a
 //! uniform rod, its inertia, an encoder's step from its counts) stay `None` here and are computed where they are used,
 //! in the precision used there.
+//!
+//! ```
+//! use upright_design::rig::{Rig, RigText};
+//!
+//! let file = "../../rigs/single-quanser-ip02.toml".as_ref();
+//! let mut text = RigText::parse(&std::fs::read_to_string(file)?, file)?;
+//! text.set("link[1].mass_kg", "0.25")?;
+//! let rig = Rig::from_toml(&text.to_string(), file)?;
+//! assert_eq!(rig.chain().map(|chain| chain.links[0].mass_kg), Some(0.25));
+//! // An error names file, line and key.
+//! text.set("link[1].mass_kg", "-0.25")?;
+//! let error = Rig::from_toml(&text.to_string(), file).unwrap_err().to_string();
+//! assert!(error.contains("link[1].mass_kg"), "{error}");
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
 
 pub mod defaults;
 mod describe;

@@ -4,6 +4,22 @@
 //! stable at all mass errors. The choice is designed again and certified. Friction is judged by simulation only:
 //! neither margins nor norms rank designs as friction does. [`false_alarms`] balances machines within the tolerances
 //! with the whole firmware.
+//!
+//! ```
+//! use upright::table::Law;
+//! use upright_design::design::design;
+//! use upright_design::rig::{Rig, Tolerances};
+//! use upright_design::robust::{JudgeSettings, judge};
+//! use upright_design::study::Study;
+//! use upright_design::table::{Gains, TableValues};
+//!
+//! let rig = Rig::from_path("../../rigs/single-quanser-ip02.toml".as_ref())?;
+//! let table = TableValues::of(&rig, &design(&rig)?, Gains::Sampled)?;
+//! let tolerances = Tolerances { mass_percent: 5.0, ..Tolerances::default() };
+//! let settings = JudgeSettings { runs: 1, duration_s: 1.0, ..JudgeSettings::of(&rig) };
+//! assert!(judge(&rig, &table, Law::Lqr, &tolerances, &settings, &Study::whole())?.survives());
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
 
 mod candidate;
 mod error;

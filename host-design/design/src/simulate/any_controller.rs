@@ -5,14 +5,18 @@
 
 use nalgebra::SVector;
 use upright::control::controller::{Controller, MotorCommand, Rejected};
-use upright::table::Law;
+use upright::supervision::debounce::Debounce;
+use upright::supervision::detection::Detection;
+use upright::supervision::envelope;
+use upright::supervision::fault::Fault;
+use upright::table::{GainTable, Law};
 
 use super::bench::Bench;
 use super::error::SimulationError;
 use super::summary::Fall;
 use crate::table::{TableValues, WithSize, with_size};
 
-/// [`Controller`] with slices instead of arrays. A slice holds as many numbers as the table has states or sensors;
+/// A [`Controller`], and its supervision, with slices instead of arrays. A slice holds as many numbers as the table has states or sensors;
 /// anything else panics.
 pub(super) trait AnyController {
     /// See [`Controller::select`].
@@ -33,44 +37,104 @@ pub(super) trait AnyController {
     fn estimate(&self) -> &[f32];
     /// Governed set-point (m).
     fn governed_setpoint_m(&self) -> f32;
+    /// Supervises the run from here on, as the firmware does while it balances.
+    fn supervise(&mut self);
+    /// The fault with which the firmware turns the motor off in this tick.
+    fn fault(&self) -> Option<Fault>;
 }
 
-impl<const NX: usize, const NY: usize> AnyController for Controller<'_, NX, NY> {
+/// The firmware's controller, and its supervision, if a run has one.
+#[derive(Clone)]
+struct SupervisedController<'t, const NX: usize, const NY: usize> {
+    table: &'t GainTable<NX, NY>,
+    controller: Controller<'t, NX, NY>,
+    supervision: Option<BalancingSupervision<NY>>,
+}
+
+/// Fault detection, and the limits on state and force.
+#[derive(Clone, Default)]
+struct BalancingSupervision<const NY: usize> {
+    detection: Detection<NY>,
+    debounce: Debounce,
+    fault: Option<Fault>,
+}
+
+impl<const NX: usize, const NY: usize> AnyController for SupervisedController<'_, NX, NY> {
     fn select(&mut self, law: Law) -> Result<(), Rejected> {
-        Controller::select(self, law)
+        self.controller.select(law)
     }
 
     fn home_and_start(&mut self, at_zero: &[u32], counters: &[u32]) -> Result<(), Rejected> {
-        self.encoders_mut().home(array(at_zero), &[0; NY]);
-        self.start(array(counters))
+        self.controller.encoders_mut().home(array(at_zero), &[0; NY]);
+        self.controller.start(array(counters))
     }
 
     fn start_in_state(&mut self, state: &[f32]) {
-        Controller::start_in_state(self, &SVector::from_column_slice(state));
+        self.controller.start_in_state(&SVector::from_column_slice(state));
     }
 
     fn set_setpoint(&mut self, position_m: f32) -> Result<(), Rejected> {
-        Controller::set_setpoint(self, position_m)
+        self.controller.set_setpoint(position_m)
     }
 
     fn control(&mut self, counters: &[u32]) -> MotorCommand {
-        Controller::control(self, array(counters))
+        let Some(BalancingSupervision { detection, .. }) = &mut self.supervision else {
+            return self.controller.control(array(counters));
+        };
+        let mut found = None;
+        let command = self.controller.control_with(array(counters), |counts, y, e| {
+            found = detection.test(&self.table.thresholds, counts, y, e);
+        });
+        self.judge(&command, found.map(|finding| finding.fault));
+        command
     }
 
     fn control_from_state(&mut self, state: &[f32]) -> MotorCommand {
-        Controller::control_from_state(self, &SVector::from_column_slice(state))
+        let command = self.controller.control_from_state(&SVector::from_column_slice(state));
+        self.judge(&command, None);
+        command
     }
 
     fn predict(&mut self) {
-        Controller::predict(self);
+        match &mut self.supervision {
+            None => self.controller.predict(),
+            Some(BalancingSupervision { detection, .. }) => {
+                self.controller.predict_with(|corrected, force| {
+                    detection.finish_tick(&self.table.thresholds.motor, corrected, force);
+                })
+            }
+        }
     }
 
     fn estimate(&self) -> &[f32] {
-        Controller::estimate(self).as_slice()
+        self.controller.estimate().as_slice()
     }
 
     fn governed_setpoint_m(&self) -> f32 {
-        self.law_state().setpoint
+        self.controller.law_state().setpoint
+    }
+
+    fn supervise(&mut self) {
+        let mut supervision = BalancingSupervision::default();
+        let positions = self.controller.positions();
+        supervision.detection.start(self.controller.encoders().counts(), &positions.data.0[0]);
+        self.supervision = Some(supervision);
+    }
+
+    fn fault(&self) -> Option<Fault> {
+        self.supervision.as_ref()?.fault
+    }
+}
+
+impl<const NX: usize, const NY: usize> SupervisedController<'_, NX, NY> {
+    /// The fault of this tick, in the firmware's order: limits on the state, what detection has `found`, force.
+    fn judge(&mut self, command: &MotorCommand, found: Option<Fault>) {
+        let Some(supervision) = &mut self.supervision else { return };
+        let limits = &self.table.limits;
+        let is_limited = command.requested_n != command.applied_n;
+        let of_force = supervision.debounce.check_force(limits, is_limited);
+        let exceeded = envelope::exceeded(limits, self.controller.estimate().as_slice(), command.requested_n);
+        supervision.fault = exceeded.or(found).or(of_force);
     }
 }
 
@@ -126,9 +190,10 @@ impl WithSize for WithControllers<'_> {
     fn run<const NX: usize, const NY: usize, const N: usize>(self) -> Self::Output {
         let table = self.table.table::<NX, NY>();
         let controller = Controller::new(&table, Bench::widths())?;
+        let one = SupervisedController { table: &table, controller, supervision: None };
         let mut controllers: Vec<Box<dyn AnyController>> = Vec::with_capacity(self.count);
         for _ in 0..self.count {
-            controllers.push(Box::new(controller.clone()));
+            controllers.push(Box::new(one.clone()));
         }
         (self.action)(controllers)
     }

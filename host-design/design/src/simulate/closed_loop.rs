@@ -2,19 +2,21 @@
 
 use core::ops::ControlFlow;
 
+use upright::control::actuator::Drive;
 use upright::control::controller::MotorCommand;
 
 use super::any_controller::{AnyController, with_controllers};
 use super::bench::Bench;
 use super::error::{MAX_TICKS, SimulationError};
 use super::scenario::{Scenario, Sensing};
-use super::summary::{Fall, Summary};
+use super::summary::{Fall, FallKind, Summary};
 use super::trace::{Sample, Trace};
 use crate::rig::Rig;
 use crate::table::TableValues;
 
 /// Runs `scenario`: the firmware's controller, built from `table`, against the nonlinear plant of `rig` (or the given
-/// linear model). A run ends early when the pendulum has fallen.
+/// linear model). A run ends early when the pendulum has fallen, or when the
+/// firmware's supervision turns the motor off, if the scenario asks for that.
 ///
 /// # Errors
 /// [`SimulationError`] if the firmware refuses the table or the scenario, or the plant cannot be built.
@@ -115,6 +117,9 @@ impl<'a> ClosedLoopRun<'a> {
                 controller.home_and_start(&at_zero, &counters)?;
             }
         }
+        if scenario.is_supervised {
+            controller.supervise();
+        }
         let (state, estimate) = (bench.state().to_vec(), vec![0.0; measured.len()]);
         let last_tick = ticks(rig, scenario)?;
         Ok(Self { rig, scenario, controller, bench, counters, measured, state, estimate, tick: 0, last_tick })
@@ -128,7 +133,7 @@ impl<'a> ClosedLoopRun<'a> {
     pub(super) fn control(&mut self) -> Result<MotorCommand, SimulationError> {
         self.controller.set_setpoint(self.scenario.target_m(self.time_s()) as f32)?;
         self.state.copy_from_slice(self.bench.state());
-        let command = match self.scenario.sensing {
+        let mut command = match self.scenario.sensing {
             Sensing::FullState => {
                 copy_converted(&mut self.measured, &self.state, |value| value as f32);
                 self.controller.control_from_state(&self.measured)
@@ -139,6 +144,9 @@ impl<'a> ClosedLoopRun<'a> {
             }
         };
         copy_converted(&mut self.estimate, self.controller.estimate(), f64::from);
+        if self.controller.fault().is_some() {
+            command.drive = Drive::OFF;
+        }
         Ok(command)
     }
 
@@ -160,7 +168,8 @@ impl<'a> ClosedLoopRun<'a> {
             state: &self.state,
             estimate: &self.estimate,
         });
-        let fall = Fall::of(self.rig, t, &self.state);
+        let off = self.controller.fault().map(|fault| Fall { at_s: t, kind: FallKind::MotorOff(fault) });
+        let fall = Fall::of(self.rig, t, &self.state).or(off);
         if fall.is_some() || self.tick == self.last_tick {
             return ControlFlow::Break(fall);
         }

@@ -33,6 +33,8 @@ pub struct Scenario {
     pub substeps: usize,
     /// Reading of the encoder counters at position 0.
     pub counter_start: u32,
+    /// Whether a run of the controller ends where the firmware's limits or its fault detection turn the motor off.
+    pub is_supervised: bool,
     /// How a run with the whole firmware begins.
     pub begin: Begin,
     /// Equilibria to which the whole firmware is then told to go, in this order.
@@ -83,6 +85,7 @@ impl Scenario {
             seed: 1,
             substeps: 4,
             counter_start: 0,
+            is_supervised: false,
             begin: Begin::ByHand,
             goals: Vec::new(),
         }

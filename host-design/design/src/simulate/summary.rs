@@ -3,6 +3,7 @@
 use core::fmt;
 
 use serde::{Deserialize, Serialize};
+use upright::supervision::fault::Fault;
 
 use super::scenario::Scenario;
 use super::trace::Trace;
@@ -30,6 +31,8 @@ pub enum FallKind {
     Diverged,
     /// A state is NaN or infinite.
     NotFinite,
+    /// The firmware turned the motor off, with this fault.
+    MotorOff(Fault),
 }
 
 impl Fall {
@@ -60,13 +63,19 @@ impl Fall {
 
 impl fmt::Display for Fall {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self.kind {
-            FallKind::Link(link) => write!(f, "link {link} fell")?,
-            FallKind::EndOfRail => f.write_str("the cart left its rail")?,
-            FallKind::Diverged => f.write_str("the state diverged")?,
-            FallKind::NotFinite => f.write_str("the state is no longer finite")?,
+        write!(f, "{} at {:.3} s", self.kind, self.at_s)
+    }
+}
+
+impl fmt::Display for FallKind {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Link(link) => write!(f, "link {link} fell"),
+            Self::EndOfRail => f.write_str("the cart left its rail"),
+            Self::Diverged => f.write_str("the state diverged"),
+            Self::NotFinite => f.write_str("the state is no longer finite"),
+            Self::MotorOff(fault) => write!(f, "fault {fault}"),
         }
-        write!(f, " at {:.3} s", self.at_s)
     }
 }
 

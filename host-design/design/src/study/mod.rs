@@ -3,6 +3,14 @@
 //! A run depends on nothing but its number, so it does not matter where it is made. A shard makes every N-th run and
 //! writes the outcomes, one JSON object per line. A merged study reads them from these files instead of making runs.
 //! Everything after that is the same code as for a study that makes every run, so it prints the same bytes.
+//!
+//! ```
+//! use upright_design::study::{Study, StudyError};
+//!
+//! let squares = Study::whole().outcomes("squares", 4, |number| Ok::<_, StudyError>(number * number))?;
+//! assert_eq!(squares, [0, 1, 4, 9]);
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
 
 mod error;
 mod files;

@@ -92,6 +92,20 @@ impl FirmwareRuns {
         let runs = self.refused + self.raise.runs;
         RandomRuns { runs, interval: wilson(self.raise.arrived, runs), ..self.raise.clone() }
     }
+
+    /// The raising, counted over all runs, or the lowering of those that were raised.
+    pub(super) fn of(&self, transition: Transition) -> RandomRuns {
+        if transition == Transition::Up { self.raise_in_all() } else { self.lower.clone() }
+    }
+
+    /// What ended the runs that did not arrive, the most frequent first, as text.
+    pub(super) fn ended_text(&self) -> String {
+        let mut faults: Vec<_> = self.faults.iter().collect();
+        faults.sort_by_key(|(_, count)| core::cmp::Reverse(**count));
+        let faults = faults.into_iter().map(|(fault, count)| format!("fault {fault} ended {count}"));
+        let refused = (self.refused > 0).then(|| format!("{} did not hang at the start", self.refused));
+        faults.chain(refused).collect::<Vec<_>>().join(", ")
+    }
 }
 
 /// Result of one run.

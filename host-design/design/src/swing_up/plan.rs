@@ -5,9 +5,9 @@ use core::ops::Range;
 use serde::Serialize;
 
 use super::SwingUpError;
-use super::advice::{advice, is_enough, narrower};
+use super::advice::{advice, is_enough, smaller_errors};
 use super::check::{Peaks, check};
-use super::firmware_runs::{Condition, firmware_runs};
+use super::firmware_runs::{Condition, FirmwareRuns, firmware_runs};
 use super::gains::{POSITION_WEIGHT, motion};
 use super::in_table::designed_table;
 use super::refine::refine;
@@ -225,28 +225,30 @@ fn judged(
     let runs = arriving(rig, &table, &motions)?;
     progress(ProgressStep::Done);
     let is_searched = raise.search.is_some();
-    for (transition, runs) in Transition::BOTH.into_iter().zip(&runs) {
-        if is_enough(rig, runs) {
+    for transition in Transition::BOTH {
+        let found = runs.of(transition);
+        if is_enough(rig, &found) {
             continue;
         }
-        let mut help = narrower(rig, |rig| {
+        let help = smaller_errors(rig, |rig| {
             let motions = refined(rig, &stored)?;
-            let [raise, lower] = arriving(rig, &designed_table(rig, &motions)?, &motions)?;
-            Ok(if transition == Transition::Up { raise } else { lower })
+            Ok(arriving(rig, &designed_table(rig, &motions)?, &motions)?.of(transition))
         })?;
+        let mut help = format!("{}; {help}", runs.ended_text());
         if is_searched {
             help = format!("{help}; {}", advice(rig, transition, progress)?);
         }
         let needed = setting.rules.success_percent;
         return Err(SwingUpError::NotRobust {
             transition,
-            arrived: runs.arrived,
-            runs: runs.runs,
+            arrived: found.arrived,
+            runs: found.runs,
             needed,
             help,
         });
     }
-    let ([up, down], [raised, lowered]) = (peaks, runs);
+    let [up, down] = peaks;
+    let [raised, lowered] = Transition::BOTH.map(|transition| runs.of(transition));
     let judgement =
         |transition, (search, score), peaks, runs| MotionJudgement { transition, search, score, peaks, runs };
     Ok(SwingUpPlan {
@@ -258,22 +260,10 @@ fn judged(
     })
 }
 
-/// Runs of the whole firmware of `table` with the errors of `[swing_up]`: how many are raised, and how many of those
-/// are lowered. A run that the supervisor ends or does not begin has not arrived.
-fn arriving(
-    rig: &Rig,
-    table: &TableValues,
-    motions: &RaiseAndLower,
-) -> Result<[RandomRuns; 2], SwingUpError> {
-    let found = firmware_runs(
-        rig,
-        table,
-        motions,
-        &Condition::asked(rig),
-        1..1 + JUDGING_RUNS as u64,
-        &Study::whole(),
-    )?;
-    Ok([found.raise_in_all(), found.lower])
+/// Runs of the whole firmware of `table` with the errors of `[swing_up]`.
+fn arriving(rig: &Rig, table: &TableValues, motions: &RaiseAndLower) -> Result<FirmwareRuns, SwingUpError> {
+    let seeds = 1..1 + JUDGING_RUNS as u64;
+    firmware_runs(rig, table, motions, &Condition::asked(rig), seeds, &Study::whole())
 }
 
 #[cfg(test)]

@@ -1,4 +1,16 @@
 //! The gain table on the host: its values for any number of states, as a firmware table and as Rust source.
+//!
+//! ```
+//! use upright_design::design::design;
+//! use upright_design::rig::Rig;
+//! use upright_design::table::{Gains, TableValues, gains_source};
+//!
+//! let rig = Rig::from_path("../../rigs/single-quanser-ip02.toml".as_ref())?;
+//! let table = TableValues::of(&rig, &design(&rig)?, Gains::Sampled)?;
+//! assert_eq!((table.states(), table.sensors()), (4, 2));
+//! assert!(gains_source(&rig, &table).contains("pub const STATES: usize = 4;"));
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
 
 mod any_size;
 mod contents;

@@ -4,7 +4,7 @@ use serde::Serialize;
 use upright::table::Law;
 
 use super::error::{VerifyError, chain, within};
-use super::trial::{Disturbance, Horizon, Outcome, edge, leaning, scenario, trial, trials};
+use super::trial::{Disturbance, Horizon, Outcome, disturbed, edge, leaning, trial, trials};
 use crate::parallel;
 use crate::plant::LANES;
 use crate::rig::Rig;
@@ -94,10 +94,7 @@ pub fn wrong_masses(rig: &Rig, percent: f64, factors: &[f64]) -> Rig {
 fn run_of(rig: &Rig, law: Law, settings: &CornerSettings) -> Scenario {
     Scenario {
         start: leaning(rig, &vec![settings.tilt_rad; rig.links()]),
-        force_noise_n: settings.disturbance.force_n,
-        torque_noise_n_m: settings.disturbance.torque_n_m,
-        seed: settings.seed,
-        ..scenario(rig, law, settings.duration_s)
+        ..disturbed(rig, law, settings.duration_s, &settings.disturbance, settings.seed)
     }
 }
 

@@ -4,11 +4,11 @@ use serde::Serialize;
 use upright::table::Law;
 
 use super::error::{VerifyError, chain, within};
-use super::trial::{Disturbance, Horizon, edge, scenario, trial};
+use super::trial::{Disturbance, Horizon, disturbed, edge, trial};
 use crate::design::{DesignError, Uncertified, design};
 use crate::parallel;
 use crate::rig::{LinkEncoder, PlantDescription, Rig};
-use crate::simulate::{Scenario, SimulationError};
+use crate::simulate::SimulationError;
 use crate::table::TableValues;
 
 /// Settings of the search for the coarsest encoders.
@@ -111,12 +111,7 @@ pub fn coarsest_encoder(
             return Err(VerifyError::NoObserver);
         }
         let survives = |seed: u64| {
-            let scenario = Scenario {
-                force_noise_n: settings.disturbance.force_n,
-                torque_noise_n_m: settings.disturbance.torque_n_m,
-                seed,
-                ..scenario(&coarse, law, settings.duration_s)
-            };
+            let scenario = disturbed(&coarse, law, settings.duration_s, &settings.disturbance, seed);
             Ok(trial(&coarse, &table, &scenario, &Horizon::default())?.survives())
         };
         let all: Vec<bool> = parallel::try_map::<_, _, SimulationError>(1..=settings.seeds, survives)?;

@@ -3,6 +3,20 @@
 //! [`linear`] examines the linear model: margins, tick, noise, rounding, certificates. The rest runs the firmware's
 //! own controller against nonlinear plants: [`attraction`], [`corners`], [`monte_carlo`], [`noise_run`],
 //! [`coarsest_encoder`], [`imperfections()`].
+//!
+//! ```
+//! use upright_design::design::design;
+//! use upright_design::rig::Rig;
+//! use upright_design::table::{Gains, TableValues};
+//! use upright_design::verify::linear;
+//!
+//! let rig = Rig::from_path("../../rigs/single-quanser-ip02.toml".as_ref())?;
+//! let certified = design(&rig)?;
+//! let table = TableValues::of(&rig, &certified, Gains::Sampled)?;
+//! let reports = linear(&rig, &certified, &table)?;
+//! assert!(reports.iter().all(|report| report.spectral_radius < 1.0));
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
 
 mod attraction;
 mod certificate;
@@ -44,7 +58,7 @@ pub use encoder::{CoarsestEncoder, EncoderSettings, coarser, coarsest_encoder};
 pub use error::VerifyError;
 pub use imperfections::{
     IMPERFECTIONS, Imperfection, ImperfectionSettings, Imperfections, RequiredSurvival, SizeRuns, Survival,
-    imperfections, limit_cycle, required_imperfections,
+    imperfections, limit_cycle, required_imperfections, survival,
 };
 pub use linear::{LinearReport, linear, margins_of};
 pub use loop_model::{ControllerModel, LoopModel, PlantModel};

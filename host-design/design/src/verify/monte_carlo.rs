@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 use upright::table::Law;
 
 use super::error::{VerifyError, within};
-use super::trial::{Disturbance, Horizon, Outcome, leaning, scenario, trials};
+use super::trial::{Disturbance, Horizon, Outcome, disturbed, leaning, trials};
 use crate::plant::LANES;
 use crate::rig::{Chain, Link, Rig};
 use crate::simulate::Scenario;
@@ -112,12 +112,7 @@ pub fn sample(rig: &Rig, law: Law, spread: &Spread, seed: u64) -> (Rig, Scenario
     if 0.5 * (1.0 + between(1.0)) < spread.other_delay {
         drawn.tick.delay_ticks = 1 - drawn.tick.delay_ticks.min(1);
     }
-    let mut scenario = Scenario {
-        force_noise_n: spread.disturbance.force_n,
-        torque_noise_n_m: spread.disturbance.torque_n_m,
-        seed,
-        ..scenario(rig, law, spread.duration_s)
-    };
+    let mut scenario = disturbed(rig, law, spread.duration_s, &spread.disturbance, seed);
     if rig.links() > 0 {
         scenario.start = leaning(rig, &angles);
     }

@@ -4,11 +4,11 @@ use serde::Serialize;
 use upright::table::Law;
 
 use super::error::VerifyError;
-use super::trial::{Disturbance, Horizon, scenario, trial};
+use super::trial::{Disturbance, Horizon, disturbed, trial};
 use crate::parallel;
 use crate::plant::absolute_angles;
 use crate::rig::Rig;
-use crate::simulate::{Scenario, SimulationError, run};
+use crate::simulate::{SimulationError, run};
 use crate::table::TableValues;
 
 /// Several runs at rest.
@@ -16,7 +16,7 @@ use crate::table::TableValues;
 pub struct NoiseRun {
     /// Number of runs, with the seeds from 1.
     pub seeds: u64,
-    /// How many of them survived to the end.
+    /// How many of them survived to the end, with the motor on.
     pub survived: u64,
     /// Duration of each run (s).
     pub duration_s: f64,
@@ -72,7 +72,7 @@ pub fn noise_run(
             angle: vec![0.0; links],
             ..Sums::default()
         };
-        let fall = run(rig, table, &disturbed(rig, law, disturbance, seed, duration_s), &mut |sample| {
+        let fall = run(rig, table, &disturbed(rig, law, duration_s, disturbance, seed), &mut |sample| {
             sums.peak = sums.peak.max(sample.force.abs());
             if sample.t < 0.1 * duration_s {
                 return;
@@ -106,15 +106,6 @@ pub fn noise_run(
     Ok(NoiseRun { seeds, survived: survived.len() as u64, duration_s, ripple })
 }
 
-fn disturbed(rig: &Rig, law: Law, disturbance: &Disturbance, seed: u64, duration_s: f64) -> Scenario {
-    Scenario {
-        force_noise_n: disturbance.force_n,
-        torque_noise_n_m: disturbance.torque_n_m,
-        seed,
-        ..scenario(rig, law, duration_s)
-    }
-}
-
 /// Results of long runs.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Endurance {
@@ -145,7 +136,7 @@ pub fn endurance(
     duration_s: f64,
 ) -> Result<Endurance, VerifyError> {
     let one = |seed: u64| {
-        let scenario = disturbed(rig, law, disturbance, seed, duration_s);
+        let scenario = disturbed(rig, law, duration_s, disturbance, seed);
         Ok((seed, trial(rig, table, &scenario, &Horizon::default())?))
     };
     let all: Vec<_> = parallel::try_map::<_, _, SimulationError>(1..=seeds, one)?;

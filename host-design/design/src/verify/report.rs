@@ -275,7 +275,7 @@ fn counted_checks(trust: &LawTrust) -> Vec<Check> {
         Check::all_survive(law, "nominal runs that survive", noise.seeds as f64, noise.survived as f64)
     });
     let imperfections = trust.imperfections.iter().map(|required| {
-        let (runs, within) = (required.runs as f64, required.verdict.within_limits as f64);
+        let (runs, within) = (required.runs as f64, required.verdict.stayed_on as f64);
         Check::all_survive(law, required.requirement, runs, within)
     });
     corners.into_iter().chain(nominal).chain(imperfections).collect()

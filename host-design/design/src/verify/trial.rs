@@ -81,7 +81,7 @@ impl Horizon {
 /// Outcome of a run.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Outcome {
-    /// How it fell, if it did.
+    /// How it fell, if it did, or was turned off.
     pub fall: Option<Fall>,
     /// Time from which it stayed near rest (s); none if it was not near rest when the run ended.
     pub at_rest_after_s: Option<f64>,
@@ -97,7 +97,8 @@ pub struct Outcome {
 }
 
 impl Outcome {
-    /// Whether there was no fall: the criterion for runs whose disturbances never let the rig come to rest.
+    /// Whether there was no fall and, in a supervised run, no fault: the criterion for runs whose disturbances never let
+    /// the rig come to rest.
     pub fn survives(&self) -> bool {
         self.fall.is_none()
     }
@@ -189,6 +190,23 @@ pub(crate) fn scenario(rig: &Rig, law: Law, duration_s: f64) -> Scenario {
     let steps = (rig.tick.period_s / 1e-3 - 1e-9).ceil().clamp(1.0, 1e4) as usize;
     let finer = if rig.actuator.motor.is_some() { 2 } else { 1 };
     Scenario { duration_s, substeps: finer * steps, ..Scenario::at_rest(rig, law) }
+}
+
+/// [`scenario`] with disturbances, as the firmware runs it: it ends where the motor is turned off.
+pub(crate) fn disturbed(
+    rig: &Rig,
+    law: Law,
+    duration_s: f64,
+    disturbance: &Disturbance,
+    seed: u64,
+) -> Scenario {
+    Scenario {
+        force_noise_n: disturbance.force_n,
+        torque_noise_n_m: disturbance.torque_n_m,
+        seed,
+        is_supervised: true,
+        ..scenario(rig, law, duration_s)
+    }
 }
 
 /// The rig at rest with the disturbances that its file expects, for runs of the whole firmware: with two integration

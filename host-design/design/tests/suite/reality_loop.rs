@@ -270,7 +270,7 @@ fn the_size_of_each_imperfection_that_makes_the_loop_fall_is_found() {
     let friction = of("joint_friction_n_m");
     let falls_at = friction.falls_at.unwrap();
     assert!((0.8e-4..3e-4).contains(&falls_at) && friction.danger > 1.0, "{friction:?}");
-    assert!(friction.leaves_limits_at.unwrap() <= falls_at);
+    assert!(friction.turned_off_at.unwrap() <= falls_at);
     assert!(found.alone.windows(2).all(|pair| pair[0].danger >= pair[1].danger));
     assert_eq!(found.together.map(|verdict| verdict.survived), Some(1));
 }
@@ -286,7 +286,7 @@ fn every_imperfection_is_a_key_of_reality() {
     let required = |key: &str, unit: &str| verify.keys().any(|one| one.name == key && one.unit == unit);
     for one in &IMPERFECTIONS {
         assert!(required(one.key, one.unit), "{}", one.key);
-        assert_eq!(one.requirement, format!("runs within the limits ({})", one.key));
+        assert_eq!(one.requirement, format!("runs with the motor on ({})", one.key));
     }
 }
 
@@ -296,7 +296,7 @@ fn a_required_size_is_run_and_one_that_makes_the_loop_fall_is_found() {
     let settings = ImperfectionSettings { duration_s: 4.0, seeds: 2, ..ImperfectionSettings::of(&rig) };
     let survived = |rig: &Rig| {
         let found = required_imperfections(rig, &table, Law::Lqr, &settings).unwrap();
-        found.iter().map(|one| (one.key, one.size, one.verdict.within_limits)).collect::<Vec<_>>()
+        found.iter().map(|one| (one.key, one.size, one.verdict.stayed_on)).collect::<Vec<_>>()
     };
     assert_eq!(survived(&rig), []);
     rig.verify.driver_lag_s = Some(2e-4);

@@ -7,6 +7,14 @@
 //! - [`AtPort`]: the real machine behind a port, and the person at the terminal.
 //! - [`Simulated`]: a machine that differs from its file, with a person who does what is asked; [`Planted`] defects.
 //! - [`Commissioning`]: the steps.
+//!
+//! ```
+//! use upright_tool::commission::{CommissionStep, Planted};
+//!
+//! let reversed: Planted = "motor-reversed".parse()?;
+//! assert_eq!(reversed.found_in(1), CommissionStep::Motor);
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
 
 mod at_port;
 mod balance;

@@ -30,7 +30,7 @@ pub enum BuildError {
     /// The board cannot make the rig's tick.
     #[error(
         "{board} makes ticks of {} to {} ms, and this rig's is {} ms: change tick.period_s (docs/board.md)",
-        board.tick_s()[0] * 1e3, board.tick_s()[1] * 1e3, (tick_s * 1e6).round() / 1e3
+        rounded_ms(board.tick_s()[0]), rounded_ms(board.tick_s()[1]), rounded_ms(*tick_s)
     )]
     Tick {
         /// Which board.
@@ -58,4 +58,9 @@ pub enum BuildError {
         /// Why.
         source: std::io::Error,
     },
+}
+
+/// A time in milliseconds, to the microsecond.
+fn rounded_ms(time_s: f64) -> f64 {
+    (time_s * 1e6).round() / 1e3
 }

@@ -3,6 +3,15 @@
 //!
 //! [`Monitor`] holds the state and knows neither terminal nor line: bytes and keys go in, bytes come out. [`view`]
 //! draws it, [`SerialLine`] is a serial device or a TCP connection, [`record`] writes telemetry.
+//!
+//! ```
+//! use upright::protocol::message::Request;
+//! use upright_tool::monitor::request;
+//!
+//! assert_eq!(request("disarm")?, Request::Disarm);
+//! assert!(request("dissarm").is_err());
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
 
 mod command;
 mod line;

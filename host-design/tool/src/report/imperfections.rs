@@ -11,7 +11,7 @@ const ENOUGH_PERCENT: f64 = 30.0;
 /// With more links there are too many combinations for each percentage.
 const MOST_LINKS: usize = 5;
 
-/// The size of each imperfection at which one law falls, and at which it leaves the limits.
+/// The size of each imperfection at which one law falls, and at which the motor is turned off.
 pub(super) struct SurvivalTable {
     pub(super) law: &'static str,
     pub(super) rows: Vec<SurvivalRow>,
@@ -23,7 +23,7 @@ pub(super) struct SurvivalRow {
     pub(super) is_dangerous: bool,
     pub(super) key: &'static str,
     pub(super) falls_at: String,
-    pub(super) leaves_limits_at: String,
+    pub(super) turned_off_at: String,
     pub(super) typical: String,
     pub(super) source: &'static str,
     pub(super) remedy: &'static str,
@@ -31,13 +31,7 @@ pub(super) struct SurvivalRow {
 
 impl SurvivalTable {
     pub(super) fn of(found: &Imperfections) -> Self {
-        let together = found.together.map(|all| {
-            let (angle_rad, position_m) = (all.peak_angle_rad, all.peak_position_m);
-            format!(
-                "{} of {} survive, up to {angle_rad:.3} rad and {position_m:.3} m",
-                all.survived, found.settings.seeds
-            )
-        });
+        let together = found.together.map(|all| all.text(found.settings.seeds));
         Self { law: found.law.title(), rows: found.alone.iter().map(SurvivalRow::of).collect(), together }
     }
 }
@@ -50,7 +44,10 @@ impl SurvivalRow {
             is_dangerous: survival.danger > 1.0,
             key: one.key,
             falls_at: format!("{} {unit}", survival.falls_text()),
-            leaves_limits_at: format!("{} {unit}", survival.leaves_limits_text()),
+            turned_off_at: match survival.ended_by {
+                Some(kind) => format!("{} {unit} ({kind})", survival.turned_off_text()),
+                None => format!("{} {unit}", survival.turned_off_text()),
+            },
             typical: format!("{} {unit}", one.typical_text()),
             source: one.source,
             remedy: one.remedy,

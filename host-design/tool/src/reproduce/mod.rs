@@ -5,6 +5,14 @@
 //! what the paper leaves open or misprints, [`responses`] are its figures 5 to 8, [`settling`] its Table 2,
 //! [`robustness`] what it says about the two laws without numbers. [`ContinuousRun`] is the loop that the paper
 //! simulates; where a tick is involved, the firmware's own controller runs.
+//!
+//! ```
+//! use upright_tool::reproduce::{Agreement, ComparedValue, Digits};
+//!
+//! let gain = |ours| ComparedValue::printed("K[1]", "A, B", "3.1623", Digits::Decimals(4), ours).verdict;
+//! assert_eq!(gain(3.162_278), Agreement::EveryDigit);
+//! assert_eq!(gain(3.162_4), Agreement::UnitsOfLastDigit(1));
+//! ```
 
 mod claims;
 mod comparison;

@@ -8,7 +8,7 @@ use upright::supervision::fault::Fault;
 use upright::supervision::inhibits::Inhibits;
 use upright_tool::campaign::Defect;
 use upright_tool::commission::{CommissionStep, Planted};
-use upright_tool::image::{CODE_LIMIT, RAM_LIMIT};
+use upright_tool::image::{BoardName, CODE_LIMIT, RAM_LIMIT};
 use upright_tool::monitor::{MonitorAction, action, request};
 
 use crate::documents::{read, root};
@@ -278,4 +278,26 @@ fn the_page_about_the_board_names_the_limits_of_the_image() {
     let page = read("docs/board.md");
     assert!(page.contains(&limits(CODE_LIMIT, RAM_LIMIT)));
     assert!(!page.contains(&limits(2 * CODE_LIMIT, RAM_LIMIT)));
+}
+
+/// Name, number of links and ticks of each board.
+fn known_boards() -> Vec<[String; 3]> {
+    let known = |board: BoardName| {
+        let [shortest_ms, longest_ms] = board.tick_s().map(|tick_s| (tick_s * 1e6).round() / 1e3);
+        let links = board.encoders() - 1;
+        [format!("`{board}`"), links.to_string(), format!("{shortest_ms} to {longest_ms} ms")]
+    };
+    BoardName::ALL.into_iter().map(known).collect()
+}
+
+/// A test of the image compares this table with the image.
+#[test]
+fn the_tool_knows_the_boards_of_the_page() {
+    let documented = |page: &str| -> Vec<[String; 3]> {
+        let rows = rows(between(page, "boards").unwrap());
+        rows.iter().map(|cells| [cells[0], cells[3], cells[4]].map(str::to_owned)).collect()
+    };
+    let page = read("docs/board.md");
+    assert_eq!(known_boards(), documented(&page));
+    assert_ne!(known_boards(), documented(&page.replace("| 0.12 to 33 ms |", "| 0.1 to 33 ms |")));
 }

@@ -207,7 +207,7 @@ fn an_imperfection_that_the_file_requires_to_be_stood_is_a_requirement() {
         let output = verify(&path, &["--law", "lqr", "--runs", "1", "--json"], None);
         let report = object(&output);
         let mut checks = report["checks"].as_array().unwrap().iter();
-        let check = checks.find(|check| check["requirement"] == "runs within the limits (driver_lag_s)");
+        let check = checks.find(|check| check["requirement"] == "runs with the motor on (driver_lag_s)");
         (check.unwrap()["holds"].as_bool().unwrap(), check.unwrap()["required"].as_f64().unwrap())
     };
     assert_eq!(required("1e-3"), (true, 4.0));

@@ -3,7 +3,7 @@
 use serde::Serialize;
 
 use crate::number::significant;
-use crate::rig::{PerJoint, Reality, Requirements};
+use crate::rig::{PerJoint, Reality, Requirements, Rig};
 
 /// One kind of imperfection.
 #[derive(Debug, Serialize)]
@@ -28,6 +28,13 @@ pub struct Imperfection {
 }
 
 impl Imperfection {
+    /// The machine of `rig` with this imperfection alone, of this size.
+    pub fn on(&self, rig: &Rig, size: f64) -> Rig {
+        let mut reality = Reality::default();
+        (self.set)(&mut reality, size);
+        Rig { reality, ..rig.clone() }
+    }
+
     /// The typical sizes as text: `1e-4 to 0.001`.
     pub fn typical_text(&self) -> String {
         let [good, poor] = self.typical.map(|size| significant(size, 2));
@@ -43,7 +50,7 @@ pub static IMPERFECTIONS: [Imperfection; 10] = [
         typical: [1e-4, 1e-3],
         source: "measured: 1.9e-4 to 6.3e-4 in five of six ball bearings (docs/reality.md); greased or large ones have more",
         remedy: "smaller bearings without seals, with oil instead of grease; more weight on the angles",
-        requirement: "runs within the limits (joint_friction_n_m)",
+        requirement: "runs with the motor on (joint_friction_n_m)",
         required: |verify| verify.joint_friction_n_m,
         set: |reality, size| reality.friction.joint_friction_n_m = PerJoint::all(size),
     },
@@ -53,7 +60,7 @@ pub static IMPERFECTIONS: [Imperfection; 10] = [
         typical: [0.2, 2.0],
         source: "estimate: miniature ball guides, light to sealed",
         remedy: "a guide without seals; less preload",
-        requirement: "runs within the limits (cart_friction_n)",
+        requirement: "runs with the motor on (cart_friction_n)",
         required: |verify| verify.cart_friction_n,
         set: |reality, size| reality.friction.cart_friction_n = size,
     },
@@ -63,7 +70,7 @@ pub static IMPERFECTIONS: [Imperfection; 10] = [
         typical: [1e-3, 1e-2],
         source: "a hanging link stops within F / (m g c) of the vertical: friction over weight times distance",
         remedy: "home while the links swing out; integral action brings the cart back",
-        requirement: "runs within the limits (homing_error_rad)",
+        requirement: "runs with the motor on (homing_error_rad)",
         required: |verify| verify.homing_error_rad,
         set: |reality, size| reality.sensors.homing_error_rad = PerJoint::all(size),
     },
@@ -73,7 +80,7 @@ pub static IMPERFECTIONS: [Imperfection; 10] = [
         typical: [1e-3, 5e-3],
         source: "2 e / D: a disk of 20 mm, 0.01 to 0.05 mm off its centre",
         remedy: "centre the disk; an encoder with its own bearing",
-        requirement: "runs within the limits (eccentricity_rad)",
+        requirement: "runs with the motor on (eccentricity_rad)",
         required: |verify| verify.eccentricity_rad,
         set: |reality, size| {
             reality.sensors.eccentricity_rad = PerJoint::all(size);
@@ -86,7 +93,7 @@ pub static IMPERFECTIONS: [Imperfection; 10] = [
         typical: [5e-4, 5e-3],
         source: "estimate: 0.5 to 5 mm over a metre, with and without a spirit level",
         remedy: "level the rail; integral action brings the cart back",
-        requirement: "runs within the limits (rail_tilt_rad)",
+        requirement: "runs with the motor on (rail_tilt_rad)",
         required: |verify| verify.rail_tilt_rad,
         set: |reality, size| reality.sensors.rail_tilt_rad = size,
     },
@@ -96,7 +103,7 @@ pub static IMPERFECTIONS: [Imperfection; 10] = [
         typical: [2e-5, 2e-4],
         source: "estimate: toothed belt under tension, to rack and pinion",
         remedy: "a tensioned belt instead of a rack; an encoder on the cart",
-        requirement: "runs within the limits (backlash_m)",
+        requirement: "runs with the motor on (backlash_m)",
         required: |verify| verify.backlash_m,
         set: |reality, size| reality.drive_train.backlash_m = size,
     },
@@ -106,7 +113,7 @@ pub static IMPERFECTIONS: [Imperfection; 10] = [
         typical: [2e-6, 2e-5],
         source: "estimate: toothed belts 6 to 15 mm wide, a metre long",
         remedy: "a wider or shorter belt, or one with steel cords",
-        requirement: "runs within the limits (belt_compliance_m_per_n)",
+        requirement: "runs with the motor on (belt_compliance_m_per_n)",
         required: |verify| verify.belt_compliance_m_per_n,
         set: |reality, size| reality.drive_train.belt_compliance_m_per_n = size,
     },
@@ -116,7 +123,7 @@ pub static IMPERFECTIONS: [Imperfection; 10] = [
         typical: [5e-5, 1e-3],
         source: "L / R of small motors (0.18 mH / 2.6 Ω: 70 µs) to large ones",
         remedy: "a driver with a current loop; tell the design with delay_ticks",
-        requirement: "runs within the limits (driver_lag_s)",
+        requirement: "runs with the motor on (driver_lag_s)",
         required: |verify| verify.driver_lag_s,
         set: |reality, size| reality.driver.driver_lag_s = size,
     },
@@ -126,7 +133,7 @@ pub static IMPERFECTIONS: [Imperfection; 10] = [
         typical: [2.0, 15.0],
         source: "estimate: measured, to the tolerance of a catalogue's torque constant with that of the gear",
         remedy: "measure the force at standstill and correct torque_constant_n_m_per_a",
-        requirement: "runs within the limits (force_percent)",
+        requirement: "runs with the motor on (force_percent)",
         required: |verify| verify.force_percent,
         set: |reality, size| reality.driver.force_percent = size,
     },
@@ -136,7 +143,7 @@ pub static IMPERFECTIONS: [Imperfection; 10] = [
         typical: [0.5, 5.0],
         source: "estimate: weighed and measured parts, to a drawing",
         remedy: "weigh and measure the links with their screws and encoders",
-        requirement: "runs within the limits (parameter_spread_percent)",
+        requirement: "runs with the motor on (parameter_spread_percent)",
         required: |verify| verify.parameter_spread_percent,
         set: |reality, size| reality.parameters.parameter_spread_percent = size,
     },

@@ -1,18 +1,17 @@
-//! The sizes at which the imperfections of a machine, each one alone, make the loop fall, beside their typical sizes.
+//! The sizes at which the imperfections of a machine, each one alone, make the loop fall, and those at which the
+//! firmware turns the motor off, beside their typical sizes.
 
 mod catalogue;
-
-use std::collections::BTreeMap;
 
 use serde::Serialize;
 use upright::table::Law;
 
 use super::error::{VerifyError, chain, within};
-use super::trial::{Disturbance, Horizon, Outcome, scenario, trial};
+use super::trial::{Disturbance, Horizon, Outcome, disturbed, trial};
 use crate::number::significant;
 use crate::parallel;
 use crate::rig::{Reality, Rig};
-use crate::simulate::{Scenario, SimulationError};
+use crate::simulate::{FallKind, Scenario, SimulationError};
 use crate::table::TableValues;
 
 pub use catalogue::{IMPERFECTIONS, Imperfection};
@@ -40,10 +39,13 @@ impl ImperfectionSettings {
 /// Results of the runs with one size.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct SizeRuns {
-    /// Number of runs that survive.
+    /// Number of runs that the controller alone survives.
     pub survived: u64,
-    /// Number of runs that survive within the supervisor's limits of angle and rail, so that the motor stays on.
-    pub within_limits: u64,
+    /// Number of runs in which the whole firmware survives: neither its limits nor its fault detection turns the motor
+    /// off.
+    pub stayed_on: u64,
+    /// How the first of the others ended.
+    pub ended_by: Option<FallKind>,
     /// Largest angle of any link from the vertical in any run (rad).
     pub peak_angle_rad: f64,
     /// Largest distance of the cart from its set-point in any run (m).
@@ -55,11 +57,12 @@ pub struct SizeRuns {
 pub struct Survival {
     /// The imperfection.
     pub imperfection: &'static Imperfection,
-    /// Size from which a run falls; none: the law survives the largest one tried.
+    /// Size from which a run of the controller alone falls; none: it survives the largest one tried.
     pub falls_at: Option<f64>,
-    /// Size from which a link or the cart leaves the supervisor's limits, so that the motor is turned off; none: the
-    /// largest one tried stays within.
-    pub leaves_limits_at: Option<f64>,
+    /// Size from which the whole firmware turns the motor off in a run; none: it stays on with the largest one tried.
+    pub turned_off_at: Option<f64>,
+    /// What ends the run of the whole firmware at that size.
+    pub ended_by: Option<FallKind>,
     /// Largest size tried.
     pub largest_tried: f64,
     /// Typical size in a poor machine over the smaller of both sizes: above 1 the imperfection is dangerous.
@@ -72,9 +75,14 @@ impl Survival {
         self.size_text(self.falls_at)
     }
 
-    /// [`Self::leaves_limits_at`] as text.
-    pub fn leaves_limits_text(&self) -> String {
-        self.size_text(self.leaves_limits_at)
+    /// [`Self::turned_off_at`] as text.
+    pub fn turned_off_text(&self) -> String {
+        self.size_text(self.turned_off_at)
+    }
+
+    /// What ends the run of the whole firmware at that size, as text; empty if it stays on.
+    pub fn ended_by_text(&self) -> String {
+        self.ended_by.map_or(String::new(), |kind| kind.to_string())
     }
 
     fn size_text(&self, size: Option<f64>) -> String {
@@ -93,6 +101,19 @@ pub struct Imperfections {
     pub alone: Vec<Survival>,
     /// All imperfections of the rig file's `[reality]` together; none if it has none.
     pub together: Option<SizeRuns>,
+}
+
+impl SizeRuns {
+    /// How many of `runs` survive, as text: the controller alone, too, if the firmware turns the motor off in some.
+    pub fn text(&self, runs: u64) -> String {
+        let Self { survived, stayed_on, peak_angle_rad, peak_position_m, .. } = self;
+        let off = self.ended_by.map_or(String::new(), |kind| format!(" ({kind})"));
+        let alone =
+            if survived == stayed_on { String::new() } else { format!("; the controller alone {survived}") };
+        format!(
+            "{stayed_on} of {runs} survive{off}{alone}, up to {peak_angle_rad:.3} rad and {peak_position_m:.3} m"
+        )
+    }
 }
 
 /// A size that the loop has to survive according to `[verify]`, and the results of its runs.
@@ -115,7 +136,7 @@ const RANGE: [f64; 2] = [1.0 / 64.0, 64.0];
 /// Sizes at which a limit cycle is shown, as shares of the one at which the loop falls.
 const SHARES: [f64; 7] = [1.0 / 32.0, 1.0 / 16.0, 0.125, 0.25, 0.5, 0.7, 0.9];
 
-/// Searches for every imperfection alone the sizes at which `law` falls and at which it leaves the limits. `done` is
+/// Searches for every imperfection alone the sizes at which `law` falls and at which the motor is turned off. `done` is
 /// called after each imperfection, from any thread.
 ///
 /// # Errors
@@ -137,9 +158,23 @@ pub fn imperfections(
     };
     let mut alone: Vec<Survival> = parallel::try_map(&IMPERFECTIONS, one)?;
     alone.sort_by(|a, b| b.danger.total_cmp(&a.danger));
-    let together =
-        (rig.reality != Reality::default()).then(|| search.verdict(rig.reality.clone())).transpose()?;
+    let together = (rig.reality != Reality::default()).then(|| search.verdict(rig)).transpose()?;
     Ok(Imperfections { law, settings: *settings, alone, together })
+}
+
+/// Searches for one imperfection alone.
+///
+/// # Errors
+/// As [`imperfections()`].
+pub fn survival(
+    rig: &Rig,
+    table: &TableValues,
+    law: Law,
+    settings: &ImperfectionSettings,
+    imperfection: &'static Imperfection,
+) -> Result<Survival, VerifyError> {
+    chain(rig, "imperfections")?;
+    Ok(SizeSearch { rig, table, law, settings }.survival(imperfection)?)
 }
 
 /// Runs `law` with the imperfections that it has to survive according to `[verify]`; empty if there are none.
@@ -198,67 +233,64 @@ impl SizeSearch<'_> {
         // Masses and lengths cannot be wrong by more than nine tenths.
         let most = if imperfection.key == "parameter_spread_percent" { 80.0 } else { f64::INFINITY };
         let sizes = [RANGE[0] * good, (RANGE[1] * poor).min(most)];
-        // Both searches try many of the same sizes.
-        let mut known = BTreeMap::new();
-        let mut at = |size: f64| -> Result<SizeRuns, SimulationError> {
-            if let Some(verdict) = known.get(&size.to_bits()) {
-                return Ok(*verdict);
+        let at = |size: f64, is_supervised: bool| -> Result<Option<FallKind>, SimulationError> {
+            let real = imperfection.on(self.rig, size);
+            for seed in 1..=self.settings.seeds {
+                if let Some(fall) = self.run(&real, seed, is_supervised)?.fall {
+                    return Ok(Some(fall.kind));
+                }
             }
-            let verdict = self.alone(imperfection, size)?;
-            known.insert(size.to_bits(), verdict);
-            Ok(verdict)
+            Ok(None)
         };
-        let all = self.settings.seeds;
-        let falls_at = first(sizes, poor, self.settings.relative, |size| {
-            at(size).map(|verdict| verdict.survived == all)
-        })?;
-        let leaves_limits_at = first(sizes, poor, self.settings.relative, |size| {
-            at(size).map(|verdict| verdict.within_limits == all)
-        })?;
-        let least = falls_at.unwrap_or(sizes[1]).min(leaves_limits_at.unwrap_or(sizes[1]));
+        let relative = self.settings.relative;
+        let falls_at = first(sizes, poor, relative, |size| at(size, false).map(|end| end.is_none()))?;
+        let turned_off_at = first(sizes, poor, relative, |size| at(size, true).map(|end| end.is_none()))?;
+        let ended_by = turned_off_at.map_or(Ok(None), |size| at(size, true))?;
+        let least = falls_at.unwrap_or(sizes[1]).min(turned_off_at.unwrap_or(sizes[1]));
         Ok(Survival {
             imperfection,
             falls_at,
-            leaves_limits_at,
+            turned_off_at,
+            ended_by,
             largest_tried: sizes[1],
             danger: poor / least,
         })
     }
 
+    fn run(&self, real: &Rig, seed: u64, is_supervised: bool) -> Result<Outcome, SimulationError> {
+        let ImperfectionSettings { duration_s, disturbance, .. } = self.settings;
+        let scenario =
+            Scenario { is_supervised, ..disturbed(real, self.law, *duration_s, disturbance, seed) };
+        trial(real, self.table, &scenario, &Horizon::default())
+    }
+
     /// Runs of all seeds on a machine with this imperfection alone.
     fn alone(&self, imperfection: &Imperfection, size: f64) -> Result<SizeRuns, SimulationError> {
-        let mut reality = Reality::default();
-        (imperfection.set)(&mut reality, size);
-        self.verdict(reality)
+        self.verdict(&imperfection.on(self.rig, size))
     }
 
-    /// Runs of all seeds on a machine with these imperfections.
-    fn verdict(&self, reality: Reality) -> Result<SizeRuns, SimulationError> {
-        let real = Rig { reality, ..self.rig.clone() };
+    /// Runs of all seeds on this machine, by the whole firmware and, where it turns the motor off, by the controller
+    /// alone.
+    fn verdict(&self, real: &Rig) -> Result<SizeRuns, SimulationError> {
         let one = |seed: u64| {
-            let scenario = Scenario {
-                force_noise_n: self.settings.disturbance.force_n,
-                torque_noise_n_m: self.settings.disturbance.torque_n_m,
-                seed,
-                ..scenario(&real, self.law, self.settings.duration_s)
+            let by_firmware = self.run(real, seed, true)?;
+            let alone = match by_firmware.fall {
+                Some(_) => self.run(real, seed, false)?,
+                None => by_firmware.clone(),
             };
-            trial(&real, self.table, &scenario, &Horizon::default())
+            Ok::<_, SimulationError>((by_firmware, alone))
         };
         let all: Vec<_> = parallel::try_map(1..=self.settings.seeds, one)?;
+        let ended: Vec<FallKind> =
+            all.iter().filter_map(|(by_firmware, _)| Some(by_firmware.fall.as_ref()?.kind)).collect();
+        let largest = |of: fn(&Outcome) -> f64| all.iter().map(|(_, alone)| of(alone)).fold(0.0, f64::max);
         Ok(SizeRuns {
-            survived: all.iter().filter(|outcome| outcome.survives()).count() as u64,
-            within_limits: all.iter().filter(|outcome| self.is_within_limits(outcome)).count() as u64,
-            peak_angle_rad: all.iter().map(|outcome| outcome.peak_angle_rad).fold(0.0, f64::max),
-            peak_position_m: all.iter().map(|outcome| outcome.peak_error_m).fold(0.0, f64::max),
+            survived: all.iter().filter(|(_, alone)| alone.survives()).count() as u64,
+            stayed_on: self.settings.seeds - ended.len() as u64,
+            ended_by: ended.first().copied(),
+            peak_angle_rad: largest(|outcome| outcome.peak_angle_rad),
+            peak_position_m: largest(|outcome| outcome.peak_error_m),
         })
-    }
-
-    fn is_within_limits(&self, outcome: &Outcome) -> bool {
-        let limits = &self.table.limits;
-        let [low, high] = limits.rail_m.map(f64::from);
-        outcome.survives()
-            && outcome.peak_angle_rad <= f64::from(limits.angle_rad)
-            && outcome.peak_error_m <= high.min(-low)
     }
 }
 

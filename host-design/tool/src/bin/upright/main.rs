@@ -5,6 +5,7 @@ mod commission;
 mod compare;
 mod coverage;
 mod design;
+mod export;
 mod failure;
 mod false_alarms;
 mod faults;
@@ -41,6 +42,7 @@ Examples:
   upright swing-up rigs/quadruple-paper.toml    plan how the rig raises itself, and lowers itself again
   upright robust rigs/quadruple-robust.toml     gains that survive wrong masses, friction, wrong zeros
   upright identify my.toml run.log --write new.toml   the real machine's parameters, from a log
+  upright export my.toml --c controller.h       table and controller as one C header, for Arduino and others
   upright report rigs/quadruple-paper.toml      all of it on one page, with an animation
   upright compare rigs/quadruple-paper.toml --sweep tick.period_s=0.0005..0.01
   upright reproduce                             the results of the paper compared with ours
@@ -65,6 +67,7 @@ enum UprightCommand {
     Check(check::CheckCommand),
     Commission(commission::CommissionCommand),
     Design(design::DesignCommand),
+    Export(export::ExportCommand),
     FalseAlarms(false_alarms::HealthyHoursCommand),
     Faults(faults::FaultsCommand),
     Firmware(firmware::FirmwareCommand),
@@ -87,6 +90,7 @@ fn main() -> ExitCode {
         UprightCommand::Check(command) => command.run(),
         UprightCommand::Commission(command) => command.run(),
         UprightCommand::Design(command) => command.run(),
+        UprightCommand::Export(command) => command.run(),
         UprightCommand::FalseAlarms(command) => command.run(),
         UprightCommand::Faults(command) => command.run(),
         UprightCommand::Firmware(command) => command.run(),

@@ -19,24 +19,20 @@ fn write_table(out: &mut String, found: &Imperfections) -> core::fmt::Result {
         found.law.key(),
         found.settings.seeds
     )?;
-    writeln!(out, "  {:<26}{:<6}{:>12}{:>12}   typical", "", "", "falls at", "motor off")?;
+    writeln!(out, "  {:<26}{:<6}{:>12}{:>12}   {:<22}typical", "", "", "falls at", "motor off", "by")?;
     for survival in &found.alone {
         write_survival(out, survival)?;
     }
     match &found.together {
         None => writeln!(out, "  the rig file has no [reality]"),
-        Some(all) => writeln!(
-            out,
-            "  [reality] of the rig file: {} of {} survive, up to {:.3} rad and {:.3} m",
-            all.survived, found.settings.seeds, all.peak_angle_rad, all.peak_position_m
-        ),
+        Some(all) => writeln!(out, "  [reality] of the rig file: {}", all.text(found.settings.seeds)),
     }
 }
 
 fn write_survival(out: &mut String, survival: &Survival) -> core::fmt::Result {
     let one = survival.imperfection;
-    let (falls, off) = (survival.falls_text(), survival.leaves_limits_text());
+    let (falls, off, by) = (survival.falls_text(), survival.turned_off_text(), survival.ended_by_text());
     let (key, unit, typical, source) = (one.key, one.unit, one.typical_text(), one.source);
-    writeln!(out, "  {key:<26}{unit:<6}{falls:>12}{off:>12}   {typical} ({source})")?;
+    writeln!(out, "  {key:<26}{unit:<6}{falls:>12}{off:>12}   {by:<22}{typical} ({source})")?;
     if survival.danger > 1.0 { writeln!(out, "      do: {}", one.remedy) } else { Ok(()) }
 }

@@ -1,0 +1,192 @@
+//! The header: what it is for, constants, table, and the controller itself, which is the C source beside this file.
+
+use core::fmt::Write;
+
+use upright::control::observer::PredictionPattern;
+use upright::supervision::fault::Fault;
+use upright::table::{Law, LawGains, ObserverGains};
+
+use super::initializer::Initializer;
+use crate::rig::Rig;
+use crate::table::{MAX_SENSORS, MAX_STATES, TableValues, WithSize, with_size};
+
+const HEAD: &str = include_str!("head.txt");
+const COMPILER: &str = include_str!("compiler.h");
+const PARTS: &str = include_str!("parts.h");
+const CALLS: &str = include_str!("calls.h");
+
+/// The faults that the controller in C knows, with their names there; the codes are those of the firmware.
+const FAULTS: [(&str, Fault); 9] = [
+    ("NOT_FINITE", Fault::NotFinite),
+    ("ANGLE", Fault::Angle),
+    ("RAIL", Fault::Rail),
+    ("SPEED", Fault::Speed),
+    ("ENCODER", Fault::Encoder),
+    ("FROZEN", Fault::Frozen),
+    ("MOTOR", Fault::Motor),
+    ("SATURATED", Fault::Saturated),
+    ("TABLE", Fault::Table),
+];
+
+/// Why a rig cannot have a C header.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum NoHeader {
+    /// Without an observer, the controller would need every speed measured.
+    #[error(
+        "a C header computes the speeds from encoder counts, and this rig has no observer: give it [kalman], and encoders \
+         on the cart and on every link"
+    )]
+    NoObserver,
+}
+
+/// The C99 header with the table and the controller of `rig`.
+///
+/// # Errors
+/// [`NoHeader`] if the controller in C cannot serve this rig.
+pub fn c_header(rig: &Rig, table: &TableValues) -> Result<String, NoHeader> {
+    let observer = table.observer.as_ref().ok_or(NoHeader::NoObserver)?;
+    let name = plain(&rig.name);
+    let title = format!("Controller of the rig \"{name}\", written by `upright export --c`; do not edit.");
+    let mut out = format!("/* {title}\n\n{HEAD}*/\n\n");
+    out += "#ifndef UPRIGHT_CONTROLLER_H\n#define UPRIGHT_CONTROLLER_H\n\n";
+    // Writing into a String cannot fail.
+    let _ = constants(&mut out, &name, table);
+    out.push_str(COMPILER);
+    out += &format!(
+        "static const upright_table_type upright_table = {{\n{}}};\n\n",
+        initializer(table, observer)
+    );
+    out.push_str(PARTS);
+    out.push_str(CALLS);
+    out += "\n#endif\n";
+    Ok(out)
+}
+
+/// A rig's name as the text of a C comment and string.
+fn plain(name: &str) -> String {
+    name.chars().map(|c| if c.is_ascii_alphanumeric() || "-_. ".contains(c) { c } else { '_' }).collect()
+}
+
+type WidestObserver = ObserverGains<MAX_STATES, MAX_SENSORS>;
+
+/// The preprocessor's constants, and the faults.
+fn constants(out: &mut String, name: &str, table: &TableValues) -> core::fmt::Result {
+    let laws: Vec<Law> = table.laws.present().map(|(law, _)| law).collect();
+    let pattern = match with_size(table.states(), table.sensors(), Pattern(table)) {
+        Some(PredictionPattern::Frictionless) => 2,
+        Some(PredictionPattern::SameEverywhere) => 1,
+        Some(PredictionPattern::Any) | None => 0,
+    };
+    let mut define = |name: &str, value: String| writeln!(out, "#define UPRIGHT_{name} {value}");
+    define("RIG", format!("\"{name}\""))?;
+    define("RIG_HASH", format!("\"{:016x}\"", table.rig_hash))?;
+    define("TICK_S", format!("{:?}f", table.tick_s))?;
+    define("ARM_S", format!("({:?}f * {}ul)", table.tick_s, table.limits.arm_ticks))?;
+    define("STATES", table.states().to_string())?;
+    define("SENSORS", table.sensors().to_string())?;
+    define("OUTPUT", table.output.to_string())?;
+    define("DELAY_TICKS", table.delay_ticks.to_string())?;
+    define("LAWS", laws.len().to_string())?;
+    for (index, law) in laws.into_iter().enumerate() {
+        define(&law.key().to_uppercase(), index.to_string())?;
+    }
+    define("HAS_MOTOR", u8::from(table.motor.is_some()).to_string())?;
+    define("HAS_FRICTION", u8::from(table.friction.is_some()).to_string())?;
+    define("PATTERN", format!("{pattern} /* of Ad: see upright_predict_state */"))?;
+    writeln!(
+        out,
+        "\n/* Why the motor was turned off; the codes are those of the firmware. */\ntypedef enum {{"
+    )?;
+    writeln!(out, "    UPRIGHT_NO_FAULT = 0,")?;
+    for (name, fault) in FAULTS {
+        writeln!(out, "    UPRIGHT_{name} = {}, /* {} */", fault.code(), condition(fault))?;
+    }
+    writeln!(out, "    UPRIGHT_CALLER = 100, /* upright_trip() */")?;
+    writeln!(
+        out,
+        "    UPRIGHT_ARITHMETIC = 101 /* processor or compiler do not round as IEEE single precision */"
+    )?;
+    writeln!(out, "}} upright_fault;\n")
+}
+
+/// When a fault is raised, in a word or two.
+fn condition(fault: Fault) -> &'static str {
+    match fault {
+        Fault::Table => "the table has other values than those exported",
+        fault => fault.entry().name,
+    }
+}
+
+struct Pattern<'a>(&'a TableValues);
+
+impl WithSize for Pattern<'_> {
+    type Output = PredictionPattern;
+
+    fn run<const NX: usize, const NY: usize, const N: usize>(self) -> PredictionPattern {
+        let table = self.0.table::<NX, NY>();
+        table.observer.map_or(PredictionPattern::Any, |observer| observer.pattern())
+    }
+}
+
+/// The members of `upright_table_type`, in the order of their declaration.
+fn initializer(table: &TableValues, observer: &WidestObserver) -> String {
+    let (states, sensors) = (table.states(), table.sensors());
+    let mut out = Initializer::new();
+    out.line("    {");
+    for (_, gains) in table.laws.present() {
+        law(&mut out, gains, states);
+    }
+    out.line("    },");
+    out.float("force_limit_n", table.force_limit_n);
+    let column = |values: &[f32]| values[..states].to_vec();
+    out.columns("ad", observer.ad.data.0[..states].iter().map(|values| column(values)));
+    out.floats("bd", column(&observer.bd.data.0[0]));
+    out.columns("l", observer.l.data.0[..sensors].iter().map(|values| column(values)));
+    out.floats("step", observer.step.data.0[0][..sensors].iter().copied());
+    if let Some(friction) = &table.friction {
+        let laws: Vec<usize> = table.laws.present().map(|(law, _)| 2 + law as usize).collect();
+        let axis = |values: &[f32; 4]| [0, 1].iter().chain(&laws).map(|&row| values[row]).collect();
+        out.columns("friction", friction.axes.data.0[..sensors].iter().map(axis));
+        out.columns("friction_effect", friction.effect.data.0[..sensors].iter().map(|values| column(values)));
+    }
+    if let Some(motor) = &table.motor {
+        out.float("volts_per_newton", motor.volts_per_newton);
+        out.float("volts_per_speed", motor.volts_per_speed);
+        out.float("dead_zone_v", motor.dead_zone_v);
+        out.float("slew_v_per_tick", motor.slew_v_per_tick);
+        out.float("supply_v", motor.supply_v);
+    }
+    supervision(&mut out, table);
+    out.indices("measured", &observer.measured[..sensors]);
+    out.counts("slow_counts", &table.limits.slow_counts[..sensors]);
+    out.counts("rest_counts", &table.limits.rest_counts[..sensors]);
+    out.counts("turn_counts", &table.limits.turn_counts[..sensors]);
+    out.sealed()
+}
+
+fn law(out: &mut Initializer, gains: &LawGains<MAX_STATES>, states: usize) {
+    out.line("    {");
+    out.floats("k", gains.k.data.0[0][..states].iter().copied());
+    out.float("k_pending", gains.k_pending);
+    out.float("k_integral", gains.k_integral);
+    out.float("n", gains.n);
+    out.float("setpoint_step_m", gains.setpoint_step);
+    out.line("    },");
+}
+
+/// Limits and thresholds, up to those that are numbers of ticks.
+fn supervision(out: &mut Initializer, table: &TableValues) {
+    let (limits, thresholds, sensors) = (&table.limits, &table.thresholds, table.sensors());
+    out.floats("rail_m", limits.rail_m);
+    out.float("angle_rad", limits.angle_rad);
+    out.float("speed_m_per_s", limits.speed_m_per_s);
+    out.float("arm_angle_rad", limits.arm_angle_rad);
+    out.floats("innovation", thresholds.innovation[..sensors].iter().copied());
+    out.floats("frozen", thresholds.frozen[..sensors].iter().copied());
+    out.floats("motor_a", thresholds.motor.a);
+    out.floats("motor_b", thresholds.motor.b);
+    out.float("motor_ratio", thresholds.motor.ratio);
+    out.float("motor_energy", thresholds.motor.energy);
+    out.ticks("saturated_ticks", limits.saturated_ticks);
+    out.ticks("arm_ticks", limits.arm_ticks);
+}

@@ -1,0 +1,186 @@
+/* ---- Checks at the start ---- */
+
+/* Whether products, sums and quotients are rounded one by one here, and small numbers kept. */
+UPRIGHT_CALL bool upright_arithmetic_is_exact(void)
+{
+    volatile float one = 1.0f, factor = 1.000244140625f, square = 1.00048828125f, least = FLT_MIN, half = 0.5f;
+    volatile float third = one / 3.0f, tenth = one / 10.0f;
+    float a = factor, b = square;
+    volatile float difference = a * a - b, sum = b - a * a;
+    volatile float subnormal = least * half;
+    volatile float twice = subnormal + subnormal;
+    return difference == 0.0f && sum == 0.0f && subnormal > 0.0f && twice == FLT_MIN && third == 0.333333343f
+        && tenth == 0.100000001f;
+}
+
+/* Whether the table has the values that were exported. */
+UPRIGHT_CALL bool upright_table_is_intact(void)
+{
+    uint32_t hash = 2166136261ul;
+    for (uint16_t at = 0; at + sizeof hash < sizeof upright_table; at = (uint16_t)(at + sizeof hash)) {
+        uint32_t word;
+        memcpy(&word, (const char *)&upright_table + at, sizeof word);
+        hash = (uint32_t)((hash ^ word) * (uint32_t)16777619ul);
+    }
+    return hash == upright_table.checksum;
+}
+
+/* ---- What a program calls ---- */
+
+/* Before all else. After a fault of table or arithmetic the controller never leaves UPRIGHT_FAULT. */
+UPRIGHT_CALL void upright_init(upright_controller *c)
+{
+    memset(c, 0, sizeof *c);
+    if (!upright_table_is_intact()) {
+        upright_trip_at(c, UPRIGHT_TABLE, 0);
+    } else if (!upright_arithmetic_is_exact()) {
+        upright_trip_at(c, UPRIGHT_ARITHMETIC, 0);
+    }
+}
+
+/* Declares that the counters read `raw` at the positions `counts`; upright_table.rest_counts: the links hang at rest
+   and the cart is in the middle. Refused while armed, balancing or after a fault. */
+UPRIGHT_CALL bool upright_home(upright_controller *c, const uint32_t *raw, const int32_t *counts)
+{
+    if (c->state > UPRIGHT_READY) {
+        return false;
+    }
+    memcpy(c->last, raw, sizeof c->last);
+    memcpy(c->counts, counts, sizeof c->counts);
+    c->state = UPRIGHT_READY;
+    return true;
+}
+
+/* Selects UPRIGHT_LQR or UPRIGHT_POLE_PLACEMENT, with the motor off. */
+UPRIGHT_CALL bool upright_select(upright_controller *c, uint8_t law)
+{
+    if (law >= UPRIGHT_LAWS || c->state == UPRIGHT_BALANCING) {
+        return false;
+    }
+    c->law = law;
+    return true;
+}
+
+/* Requests a position of the cart (m), within the soft limits of the rail. */
+UPRIGHT_CALL bool upright_set_setpoint(upright_controller *c, float position_m)
+{
+    if (!(position_m >= upright_table.rail_m[0] && position_m <= upright_table.rail_m[1])) {
+        return false;
+    }
+    c->target_m = position_m;
+    c->setpoint_is_given = true;
+    return true;
+}
+
+/* Arms, if the rig is homed, its links are upright and its cart is within the soft limits. */
+UPRIGHT_CALL bool upright_arm(upright_controller *c)
+{
+    int32_t upright[UPRIGHT_SENSORS];
+    upright_unwind(c->counts, upright);
+    if (c->state != UPRIGHT_READY || upright_lean(upright) > upright_table.arm_angle_rad || upright_is_off_centre(c)) {
+        return false;
+    }
+    upright_restart_slow(c);
+    c->state = UPRIGHT_ARMED;
+    return true;
+}
+
+/* Turns the motor off. */
+UPRIGHT_CALL void upright_disarm(upright_controller *c)
+{
+    if (c->state == UPRIGHT_ARMED || c->state == UPRIGHT_BALANCING) {
+        c->state = UPRIGHT_READY;
+    }
+    c->setpoint_is_given = false;
+    c->requested_n = c->applied_n = 0.0f;
+}
+
+/* Turns the motor off until upright_clear(): limit switch, emergency stop, supply, a tick that came late ... */
+UPRIGHT_CALL void upright_trip(upright_controller *c) { upright_trip_at(c, UPRIGHT_CALLER, 0); }
+
+/* Clears a fault. After one of an encoder, the rig has to be homed again. */
+UPRIGHT_CALL bool upright_clear(upright_controller *c)
+{
+    if (c->state != UPRIGHT_FAULT || c->fault == UPRIGHT_TABLE || c->fault == UPRIGHT_ARITHMETIC) {
+        return c->state != UPRIGHT_FAULT;
+    }
+    bool loses_positions = c->fault == UPRIGHT_ENCODER || c->fault == UPRIGHT_FROZEN;
+    c->state = loses_positions ? UPRIGHT_NOT_HOMED : UPRIGHT_READY;
+    c->fault = UPRIGHT_NO_FAULT;
+    return true;
+}
+
+/* First half of a tick: from the readings of the counters to the duty cycle, -1 to 1, positive along +x. Drive the
+   motor with it at once; 0 and c->state != UPRIGHT_BALANCING: turn it off. */
+UPRIGHT_CALL float upright_control(upright_controller *c, const uint32_t *raw)
+{
+    float y[UPRIGHT_SENSORS];
+    upright_measure(c, raw, y);
+    if (c->state == UPRIGHT_ARMED) {
+        upright_wait(c);
+        upright_measure(c, raw, y);
+    }
+    if (c->state != UPRIGHT_BALANCING) {
+        return 0.0f;
+    }
+    upright_govern(c, upright_gains(c)->setpoint_step_m);
+    for (uint8_t i = 0; i < UPRIGHT_SENSORS; i++) {
+        c->innovation[i] = y[i] - c->estimate[upright_table.measured[i]];
+    }
+    uint8_t sensor = 0;
+    upright_fault of_sensors = upright_test(c, y, &sensor);
+    c->requested_n = upright_request(c);
+    float duty = upright_actuate(c);
+    upright_fault fault = upright_exceeded(c);
+    upright_count(&c->saturated, c->requested_n != c->applied_n);
+    if (fault != UPRIGHT_NO_FAULT) {
+        upright_trip_at(c, fault, 0);
+    } else if (of_sensors != UPRIGHT_NO_FAULT) {
+        upright_trip_at(c, of_sensors, sensor);
+    } else if (c->saturated > upright_table.saturated_ticks) {
+        upright_trip_at(c, UPRIGHT_SATURATED, 0);
+    } else {
+        return duty;
+    }
+    return 0.0f;
+}
+
+/* Second half of a tick, any time before the next one: the prediction. */
+UPRIGHT_CALL void upright_predict(upright_controller *c)
+{
+    const upright_law_gains *gains = upright_gains(c);
+    if (c->state != UPRIGHT_BALANCING) {
+        return;
+    }
+    float acting = UPRIGHT_DELAY_TICKS == 1 ? c->pending_n : c->applied_n;
+    if (upright_has_memory(gains)) {
+        if (gains->k_integral != 0.0f) {
+            float moved = UPRIGHT_TICK_S * (c->estimate[UPRIGHT_OUTPUT] - c->setpoint_m);
+            float excess = c->requested_n - c->applied_n;
+            /* While the force is limited, the integral moves only in the direction that reduces the excess. */
+            if (excess * (-gains->k_integral * moved) <= 0.0f) {
+                c->integral += moved;
+            }
+        }
+        c->pending_n = c->applied_n;
+    }
+    for (uint8_t i = 0; i < UPRIGHT_SENSORS; i++) {
+        c->sensors[i].corrected = c->estimate[upright_table.measured[i]];
+    }
+    const float *a = upright_table.motor_a, *b = upright_table.motor_b;
+    float p = c->missing[0], v = c->missing[1];
+    c->missing[0] = a[0] * p + a[1] * v - b[0] * acting;
+    c->missing[1] = a[2] * p + a[3] * v - b[1] * acting;
+    upright_predict_state(c, acting);
+#if UPRIGHT_HAS_FRICTION
+    for (uint8_t i = 0; i < UPRIGHT_SENSORS; i++) {
+        for (uint8_t row = 0; row < UPRIGHT_STATES; row++) {
+            c->estimate[row] += upright_table.friction_effect[i][row] * c->friction[i];
+        }
+    }
+#endif
+}
+
+#if defined(__GNUC__) && !defined(__clang__)
+#pragma GCC pop_options
+#endif

@@ -1,0 +1,52 @@
+/* Replays recorded ticks on the controller in controller.h. Reads and writes words of 32 bits.
+
+   In, for each tick: what to do before it (1: home at rest, 2: select the law in the next byte, 4: arm, 8: take the
+   set-point), the set-point, the readings of the counters. Out: state, fault, duty, requested and applied force, governed
+   set-point, estimate, innovation. */
+
+/* As on the simulated bench: 32 bits for the cart, 16 for the links. */
+#define UPRIGHT_COUNTERS_OF_16_BITS 0x7ffeul
+#include "controller.h"
+
+#include <stdio.h>
+
+static void put(float value)
+{
+    uint32_t word;
+    memcpy(&word, &value, sizeof word);
+    fwrite(&word, sizeof word, 1, stdout);
+}
+
+static void put_all(const float *values, int count)
+{
+    for (int i = 0; i < count; i++) {
+        put(values[i]);
+    }
+}
+
+int main(void)
+{
+    static upright_controller c;
+    uint32_t in[2 + UPRIGHT_SENSORS];
+    upright_init(&c);
+    while (fread(in, sizeof in, 1, stdin) == 1) {
+        float setpoint_m;
+        memcpy(&setpoint_m, &in[1], sizeof setpoint_m);
+        bool done = true;
+        done = (!(in[0] & 1) || upright_home(&c, in + 2, upright_table.rest_counts)) && done;
+        done = (!(in[0] & 2) || upright_select(&c, (uint8_t)(in[0] >> 8))) && done;
+        done = (!(in[0] & 4) || upright_arm(&c)) && done;
+        done = (!(in[0] & 8) || upright_set_setpoint(&c, setpoint_m)) && done;
+        float duty = upright_control(&c, in + 2);
+        uint32_t head[2] = {done ? (uint32_t)c.state : 99u, (uint32_t)c.fault};
+        fwrite(head, sizeof head, 1, stdout);
+        put(duty);
+        put(c.requested_n);
+        put(c.applied_n);
+        put(c.setpoint_m);
+        put_all(c.estimate, UPRIGHT_STATES);
+        put_all(c.innovation, UPRIGHT_SENSORS);
+        upright_predict(&c);
+    }
+    return 0;
+}
