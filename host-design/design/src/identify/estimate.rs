@@ -19,7 +19,7 @@ use super::verdict::{HeldOut, Predicted, Refusal, channels, judge, judge_windows
 use super::window_errors::{WindowErrors, window_errors};
 use super::wiring;
 use crate::parallel::{Progress, ProgressStep};
-use crate::rig::Rig;
+use crate::rig::{Chain, Rig};
 
 /// Shortest log (s).
 const LEAST_S: f64 = 5.0;
@@ -127,17 +127,24 @@ pub fn identify_recordings(
     if let Some(recordings) = predict {
         found.predicted = predicted(rig, &model, &priors, &p, recordings)?;
     }
-    match realise(chain, &p, settings.weighed_kg_m) {
+    decide(chain, settings, &p, &mut found);
+    Ok(found)
+}
+
+/// The numbers for the rig file, and whether they may be written.
+fn decide(chain: &Chain, settings: &Settings, p: &[f64], found: &mut Identification) {
+    match realise(chain, p, settings.weighed_kg_m) {
         Ok(realised) => found.realised = Some(realised),
         Err(error) => found.refusal = Some(error.into()),
     }
-    if is_driven && let Err(refusal) = judge(&found.channels) {
+    if found.is_driven
+        && let Err(refusal) = judge(&found.channels)
+    {
         found.refusal = Some(refusal);
     }
     if let Err(refusal) = judge_windows(&found.left_out) {
         found.refusal = Some(refusal);
     }
-    Ok(found)
 }
 
 /// Errors of predictions of `recordings`, with the old file and with the parameters `p`.

@@ -47,8 +47,8 @@ pub(super) struct FreeFit {
     doubts: Vec<Doubt>,
 }
 
-/// Number of fits: with all terms of friction, without those left out on request, with those that the record wants, without
-/// each part, and each half.
+/// Number of fits: with all terms of friction, without those left out on request, with those that the record wants,
+/// without each part, and each half.
 pub(super) const FITS: u64 = 5 + PARTS as u64;
 
 impl FreeFit {
@@ -107,14 +107,14 @@ pub(super) fn known(rig: &Rig, layout: Layout, priors: &mut [Prior], is_clamped:
 }
 
 /// A fit of a part of the record.
-struct Part {
+struct FittedPart {
     fit: Fit,
     /// Standard deviations, as of the scatter between the windows.
     deviations: Vec<f64>,
     inverse: Vec<f64>,
 }
 
-impl Part {
+impl FittedPart {
     fn of(model: &Model, record: &Record, priors: &[Prior], from: &[f64]) -> Result<Self, IdentifyError> {
         let shooting = Shooting { model, record, priors, free: true };
         let fit = shooting.fit_settled(from, WINDOW_S, ITERATIONS.0, ITERATIONS.1);
@@ -141,7 +141,7 @@ pub(super) fn fit(
 ) -> Result<FreeFit, IdentifyError> {
     let shoot = |record: &Record, priors: &[Prior], from: &[f64]| {
         step();
-        Part::of(model, record, priors, from)
+        FittedPart::of(model, record, priors, from)
     };
     let kinds = model.layout.kinds();
     let start: Vec<f64> = priors.iter().map(|prior| prior.value).collect();
@@ -204,7 +204,7 @@ fn values(priors: &[Prior], p: &[f64]) -> Vec<f64> {
 }
 
 /// Parameters whose halves contradict each other.
-fn contradictions(kinds: &[ParameterKind], halves: &[Part; 2]) -> Option<Doubt> {
+fn contradictions(kinds: &[ParameterKind], halves: &[FittedPart; 2]) -> Option<Doubt> {
     let deviations = |i: usize| {
         let difference = (halves[0].fit.p[i] - halves[1].fit.p[i]).abs();
         difference / halves[0].deviations[i].hypot(halves[1].deviations[i])
@@ -302,8 +302,8 @@ mod tests {
             "{:?}",
             found.doubts
         );
-        // The negative controls: without drag, the friction of a joint is wrong by far more than 10 %, and this is said;
-        // so it is without dry friction.
+        // The negative controls: without drag, the friction of a joint is wrong by far more than 10 %, and this is
+        // said; so it is without dry friction.
         let drag = |kind| matches!(kind, ParameterKind::AirDrag(_));
         let without = fit(&model, &record, &priors, &drag, &|| ()).unwrap();
         let error = |index: usize| (without.p[index] / truth[index] - 1.0).abs();

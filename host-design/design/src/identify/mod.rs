@@ -9,8 +9,8 @@
 //! - [`coverage`]: how often the stated intervals cover the truth, over many machines that differ from their file.
 //! - [`Realised`]: the numbers of a rig file with the identified parameters.
 //!
-//! `docs/identify.md` describes the experiment and the file format, `docs/identified.md` what can be identified, how it is
-//! done, and the accuracy reached.
+//! `docs/identify.md` describes the experiment and the file format, `docs/identified.md` what can be identified, how it
+//! is done, and the accuracy reached.
 
 mod channel;
 mod convert;

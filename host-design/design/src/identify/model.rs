@@ -9,8 +9,8 @@ use super::rows::add_multiple;
 /// The chain in the notation of `ChainParameters`, for any number of links n, in the m = n + 1 coordinates x, φ_1 …
 /// φ_n.
 ///
-/// The state has s = 2m + 1 entries: coordinates, their rates, and the bristle deflection ζ of the cart's friction; with
-/// bristles in the joints, too, s = 3m.
+/// The state has s = 2m + 1 entries: coordinates, their rates, and the bristle deflection ζ of the cart's friction;
+/// with bristles in the joints, too, s = 3m.
 /// Angles are absolute and measured from the normal of the rail, which rises at the angle α. With `b_jk = l_j a_k` for
 /// j < k and `b_jj = J_j` the equations are
 ///
@@ -96,8 +96,8 @@ impl Model {
         p[self.layout.length(low)] * p[self.layout.first_moment(high)]
     }
 
-    /// Friction in a joint of the state `at` that turns at `rate` (rad/s): torque (N·m), its derivative by the rate, and
-    /// the tanh or the bristle deflection.
+    /// Friction in a joint of the state `at` that turns at `rate` (rad/s): torque (N·m), its derivative by the rate,
+    /// and the tanh or the bristle deflection.
     fn friction(&self, p: &[f64], at: &[f64], joint: usize, rate: f64) -> [f64; 3] {
         let smoothing = self.smoothing[1];
         let (viscous, dry) = (p[self.layout.viscous(joint + 1)], p[self.layout.dry(joint + 1)]);

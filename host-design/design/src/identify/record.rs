@@ -243,8 +243,8 @@ impl Record {
         state
     }
 
-    /// Error (rms; m, rad) that the sensor of a channel alone makes: quantisation, or more if the measurements are noisier,
-    /// as fourth differences show, in which smooth motion vanishes.
+    /// Error (rms; m, rad) that the sensor of a channel alone makes: quantisation, or more if the measurements are
+    /// noisier, as fourth differences show, in which smooth motion vanishes.
     pub(super) fn sensor_error(&self, channel: usize) -> f64 {
         let (mut squares, mut count) = (0.0, 0usize);
         for piece in &self.pieces {

@@ -111,9 +111,9 @@ impl Shooting<'_> {
     }
 
     /// Inverse of the normal matrix of the scaled parameters, with the initial states eliminated, and the standard
-    /// deviation of each scaled parameter from the scatter of the windows' gradients `g`: `A⁻¹ Σ g gᵀ A⁻¹` (P. J. Huber, 5th
-    /// Berkeley Symposium, 1967), so the residuals within a window may depend on each other. A parameter at its bound is
-    /// not free for the others. None if the matrix has no inverse.
+    /// deviation of each scaled parameter from the scatter of the windows' gradients `g`: `A⁻¹ Σ g gᵀ A⁻¹` (P. J.
+    /// Huber, 5th Berkeley Symposium, 1967), so the residuals within a window may depend on each other. A parameter at
+    /// its bound is not free for the others. None if the matrix has no inverse.
     pub(super) fn deviations(&self, fit: &Fit) -> Option<(Vec<f64>, Vec<f64>)> {
         let weights: Vec<f64> =
             fit.rms.iter().zip(&self.record.steps).map(|(rms, step)| rms.max(0.2 * step).powi(-2)).collect();
