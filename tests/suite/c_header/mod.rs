@@ -1,8 +1,10 @@
 //! The C header gives the bits of the firmware, whatever the compiler is told.
 //!
-//! Without gcc, g++ or the tools for the AVR, the tests that need them say so and pass. If the environment variable
+//! Without gcc, g++ or the tools for AVR and ARM, the tests that need them say so and pass. If the environment variable
 //! `UPRIGHT_REQUIRE_GCC` is set, they fail.
 
+mod arm;
+mod avr;
 mod program;
 mod recorded;
 
@@ -17,12 +19,12 @@ use upright_design::rig::{Integral, KnownFriction, PerJoint, Rig};
 use upright_design::table::TableValues;
 
 const TICKS: u32 = 10_000;
-const STRICT: Dialect = Dialect {
+const STRICT: Dialect<'_> = Dialect {
     compiler: "gcc",
     flags: &["-std=c99", "-pedantic", "-Wall", "-Wextra", "-Wdouble-promotion", "-Werror", "-O2"],
 };
 /// Flags with which gcc fuses products into sums and changes the order of sums, where the header does not forbid it.
-const HOSTILE: Dialect = Dialect {
+const HOSTILE: Dialect<'_> = Dialect {
     compiler: "gcc",
     flags: &[
         "-O3",
@@ -37,7 +39,7 @@ const HOSTILE: Dialect = Dialect {
     ],
 };
 /// As the Arduino IDE compiles, with fused products allowed.
-const ARDUINO: Dialect = Dialect {
+const ARDUINO: Dialect<'_> = Dialect {
     compiler: "g++",
     flags: &[
         "-std=gnu++11",
@@ -81,7 +83,7 @@ fn first_difference(run: &FirmwareRun, answers: &[ControllerTick]) -> String {
     format!("{first:#x?}")
 }
 
-fn assert_equal(rig: &Rig, table: &TableValues, dialects: &[Dialect]) {
+fn assert_equal(rig: &Rig, table: &TableValues, dialects: &[Dialect<'_>]) {
     let header = c_header(rig, table).unwrap();
     let programs = dialects.iter().map(|&dialect| (dialect, Program::that_replays(&header, dialect)));
     let programs: Vec<_> = programs.collect();

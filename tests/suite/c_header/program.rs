@@ -8,13 +8,14 @@ use super::recorded::ControllerTick;
 use tempfile::TempDir;
 use upright_test_support::equipment::{is_required, not_exercised};
 
-const REPLAY: &str = include_str!("replay.c");
+/// The program that replays recorded ticks.
+pub(crate) const REPLAY: &str = include_str!("replay.c");
 
 /// How the header is compiled.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Dialect {
-    pub(crate) compiler: &'static str,
-    pub(crate) flags: &'static [&'static str],
+pub(crate) struct Dialect<'a> {
+    pub(crate) compiler: &'a str,
+    pub(crate) flags: &'a [&'a str],
 }
 
 /// Whether this compiler can be started. Where compilers are required, a missing one is an error.
@@ -45,18 +46,23 @@ impl Program {
         Self { folder }
     }
 
+    /// Adds a file beside the header.
+    pub(crate) fn add(&self, name: &str, text: &str) {
+        std::fs::write(self.folder.path().join(name), text).unwrap();
+    }
+
     pub(crate) fn path(&self) -> PathBuf {
         self.folder.path().join("program")
     }
 
     /// Compiles it; the compiler's output.
-    pub(crate) fn compiled(&self, Dialect { compiler, flags }: Dialect) -> Output {
+    pub(crate) fn compiled(&self, Dialect { compiler, flags }: Dialect<'_>) -> Output {
         let source = self.folder.path().join("program.c");
         Command::new(compiler).args(flags).arg(source).arg("-o").arg(self.path()).output().unwrap()
     }
 
     /// The program that replays recorded ticks, compiled in this way.
-    pub(crate) fn that_replays(header: &str, dialect: Dialect) -> Self {
+    pub(crate) fn that_replays(header: &str, dialect: Dialect<'_>) -> Self {
         let program = Self::new(header, REPLAY);
         let output = program.compiled(dialect);
         assert!(output.status.success(), "{dialect:?}: {}", String::from_utf8_lossy(&output.stderr));
@@ -65,8 +71,12 @@ impl Program {
 
     /// What it answers to the recorded input.
     pub(crate) fn replayed(&self, input: &[Vec<u32>]) -> Vec<ControllerTick> {
-        let mut child =
-            Command::new(self.path()).stdin(Stdio::piped()).stdout(Stdio::piped()).spawn().unwrap();
+        self.replayed_by(Command::new(self.path()), input)
+    }
+
+    /// The same, started by this command.
+    pub(crate) fn replayed_by(&self, mut command: Command, input: &[Vec<u32>]) -> Vec<ControllerTick> {
+        let mut child = command.stdin(Stdio::piped()).stdout(Stdio::piped()).spawn().unwrap();
         let bytes: Vec<u8> = input.iter().flatten().flat_map(|word| word.to_ne_bytes()).collect();
         let mut stdin = child.stdin.take().unwrap();
         let writer = std::thread::spawn(move || stdin.write_all(&bytes));
@@ -80,6 +90,6 @@ impl Program {
 }
 
 /// What a header answers when it is compiled in this way.
-pub(crate) fn replayed(header: &str, dialect: Dialect, input: &[Vec<u32>]) -> Vec<ControllerTick> {
+pub(crate) fn replayed(header: &str, dialect: Dialect<'_>, input: &[Vec<u32>]) -> Vec<ControllerTick> {
     Program::that_replays(header, dialect).replayed(input)
 }

@@ -8,9 +8,16 @@
 #if defined(__FAST_MATH__) || (defined(__FINITE_MATH_ONLY__) && __FINITE_MATH_ONLY__)
 #error "upright: compile without -ffast-math, -Ofast and -ffinite-math-only: they change the controller's results"
 #endif
-#if !defined(FLT_EVAL_METHOD)
+#if !defined(__cplusplus) && (!defined(__STDC_VERSION__) || __STDC_VERSION__ < 199901L)
 #error "upright: compile as C99 or C++11, or later"
-#elif FLT_EVAL_METHOD != 0 && FLT_EVAL_METHOD != 16 /* 16: only numbers of 16 bits are another matter */
+#endif
+/* 0: a float is computed as a float; 16: so it is, only numbers of 16 bits are another matter. */
+#if defined(__FLT_EVAL_METHOD__)
+#define UPRIGHT_EVAL_METHOD __FLT_EVAL_METHOD__
+#else
+#define UPRIGHT_EVAL_METHOD FLT_EVAL_METHOD
+#endif
+#if UPRIGHT_EVAL_METHOD != 0 && UPRIGHT_EVAL_METHOD != 16
 #error "upright: float is computed with more digits here: compile for SSE (-msse2 -mfpmath=sse), not for the x87"
 #endif
 #if FLT_RADIX != 2 || FLT_MANT_DIG != 24 || FLT_MAX_EXP != 128

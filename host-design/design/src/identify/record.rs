@@ -187,7 +187,7 @@ impl Record {
         let force = |tick: Option<usize>| {
             let value = tick.and_then(|tick| drive[tick]).unwrap_or_default();
             let Some(motor) = &self.motor else { return [value, 0.0] };
-            let per_volt = motor.volts_per_speed() / motor.resistance_ohm;
+            let per_volt = motor.newtons_per_volt();
             let left = value.abs() - dead_zone;
             if left > 0.0 { [per_volt * left.copysign(value), -per_volt.copysign(value)] } else { [0.0; 2] }
         };
@@ -307,10 +307,7 @@ impl Record {
 
     /// Back-EMF as damping (N·s/m).
     fn back_emf(&self) -> f64 {
-        self.motor.as_ref().map_or(0.0, |motor| {
-            let per_speed = motor.volts_per_speed();
-            per_speed * per_speed / motor.resistance_ohm
-        })
+        self.motor.as_ref().map_or(0.0, Motor::braking_n_s_per_m)
     }
 
     /// The model of the recorded chain with the usual smoothing of dry friction; `gravity` in m/s².

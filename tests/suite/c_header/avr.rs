@@ -1,0 +1,156 @@
+//! The header on an Arduino's processor, in simavr, and the sketch for an Arduino Uno.
+
+use std::fmt::Write;
+use std::path::Path;
+use std::process::Command;
+
+use super::program::{Dialect, Program, is_there};
+use super::recorded::{FirmwareRun, recorded, scenario};
+use crate::published::rig_and_table;
+use upright::table::Law;
+use upright_design::export::c_header;
+use upright_design::simulate::Scenario;
+use upright_design::table::TableValues;
+use upright_test_support::equipment::{is_required, not_exercised};
+use upright_test_support::repository;
+
+const UNO: Dialect<'_> =
+    Dialect { compiler: "avr-gcc", flags: &["-mmcu=atmega328p", "-O2", "-Wall", "-Wextra", "-Werror"] };
+
+/// What the AVR has sent: hash, number of ticks of balancing, cycles of a tick, mean and largest.
+fn in_simavr(header: &str, recording: &str) -> [u32; 4] {
+    let program = Program::new(header, include_str!("avr.c"));
+    program.add("recording.h", recording);
+    let output = program.compiled(UNO);
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    let run = ["-m", "atmega328p", "-f", "16000000"];
+    let output = Command::new("simavr").args(run).arg(program.path()).output().unwrap();
+    let said =
+        String::from_utf8_lossy(&output.stdout).into_owned() + &String::from_utf8_lossy(&output.stderr);
+    // Numbers among the simulator's own words and colours.
+    let numbers = |line: &str| {
+        let words = line
+            .split(|c: char| !c.is_ascii_digit() && c != ' ')
+            .find(|part| part.matches(' ').count() >= 3)?;
+        words.split_whitespace().map(|word| word.parse().ok()).collect::<Option<Vec<u32>>>()?.try_into().ok()
+    };
+    said.lines().find_map(numbers).unwrap_or_else(|| panic!("{said}"))
+}
+
+/// The recorded run as C constants, from the tick in which the controller is armed.
+fn recording(run: &FirmwareRun, scenario: &Scenario, table: &TableValues) -> String {
+    let counters = |tick: usize| &run.input[tick][2..];
+    let armed = run.first + 1 - table.limits.arm_ticks as usize;
+    let ticks = armed..run.first + run.wanted.len();
+    let step = |at_s: f64| (at_s / f64::from(table.tick_s)).round() as usize + run.first - armed;
+    let list = |values: &[u32]| values.iter().map(|value| format!("{value}ul, ")).collect::<String>();
+    let mut text = String::from("#include <avr/pgmspace.h>\n");
+    writeln!(text, "#define TICKS {}u", ticks.len()).unwrap();
+    writeln!(text, "#define STEP_M {:?}f", scenario.step_m as f32).unwrap();
+    writeln!(text, "#define STEP_AT {}u", step(scenario.step_at_s)).unwrap();
+    writeln!(text, "#define STEP_UNTIL {}u", step(scenario.step_until_s)).unwrap();
+    writeln!(text, "static const uint32_t at_rest[] = {{{}}};", list(counters(0))).unwrap();
+    writeln!(text, "static const uint32_t before_arming[] = {{{}}};", list(counters(armed - 1))).unwrap();
+    text += "static const int8_t moved[][UPRIGHT_SENSORS] PROGMEM = {\n";
+    for tick in ticks {
+        let moved = counters(tick).iter().zip(counters(tick - 1)).map(|(now, before)| {
+            // The low byte is enough, as long as a counter moves by less than 128.
+            let moved = i32::from(now.wrapping_sub(*before) as i16);
+            i8::try_from(moved).unwrap().to_string()
+        });
+        writeln!(text, "{{{}}},", moved.collect::<Vec<_>>().join(", ")).unwrap();
+    }
+    text + "};\n"
+}
+
+/// The hash that the AVR computes if its bits are those of the firmware.
+fn hash(run: &FirmwareRun) -> u32 {
+    let words =
+        run.wanted.iter().flat_map(|tick| [tick.fault, tick.duty].into_iter().chain(tick.values.clone()));
+    words.fold(2_166_136_261, |hash: u32, word| (hash ^ word).wrapping_mul(16_777_619))
+}
+
+/// Checks a run of `ticks` ticks on the AVR; returns the mean and the largest number of cycles.
+fn on_the_uno(name: &'static str, ticks: u32) -> [u32; 2] {
+    let (rig, table) = rig_and_table(name);
+    let scenario = scenario(rig, Law::Lqr, ticks);
+    let run = recorded(rig, table, &scenario, None);
+    let header = c_header(rig, table).unwrap();
+    let recording = recording(&run, &scenario, table);
+    let [found, balanced, mean, worst] = in_simavr(&header, &recording);
+    println!("{name}: {mean} cycles, at most {worst}");
+    assert_eq!((found, balanced as usize), (hash(&run), run.wanted.len()), "{name}");
+    // Negative control: another gain gives another hash.
+    let other = c_header(rig, &super::with_another_gain(table)).unwrap();
+    if ticks < 2000 {
+        assert_ne!(in_simavr(&other, &recording)[0], hash(&run), "{name}");
+    }
+    [mean, worst]
+}
+
+/// The bounds are 5 % above the cycles in docs/c-header.md.
+#[test]
+fn an_arduino_uno_has_the_bits_of_the_firmware_in_no_more_cycles_than_documented() {
+    if !is_there("avr-gcc") || !is_there("simavr") {
+        return;
+    }
+    let [mean, worst] = on_the_uno("single-quanser-ip02", 10_000);
+    assert!(mean <= 17_200 && worst <= 18_600, "{mean} {worst}");
+    let [mean, worst] = on_the_uno("quadruple-paper", 1000);
+    assert!(mean <= 59_000 && worst <= 60_800, "{mean} {worst}");
+}
+
+/// Debian's package `arduino-core-avr`.
+const ARDUINO_AVR: &str = "/usr/share/arduino/hardware/arduino/avr";
+
+/// Whether the Arduino's own library is installed.
+fn has_core() -> bool {
+    let is_there = Path::new(ARDUINO_AVR).exists();
+    assert!(is_there || !is_required("UPRIGHT_REQUIRE_GCC"), "install arduino-core-avr");
+    if !is_there {
+        not_exercised("the Arduino sketch: install arduino-core-avr");
+    }
+    is_there
+}
+
+/// Compiles a sketch for the Uno and links it with the Arduino's library. Returns what the compiler has said, and
+/// whether it has succeeded.
+fn sketch(text: &str, header: &str) -> (String, bool) {
+    let program = Program::new(header, "");
+    program.add("sketch.cpp", &format!("#include <Arduino.h>\n{text}"));
+    let core = format!("{ARDUINO_AVR}/cores/arduino");
+    let run = |arguments: &str| {
+        let mut gcc = Command::new("avr-gcc");
+        gcc.current_dir(program.path().parent().unwrap()).args([
+            "-std=gnu++11",
+            "-fno-threadsafe-statics",
+            "-Os",
+        ]);
+        gcc.args(["-mmcu=atmega328p", "-DF_CPU=16000000L", "-DARDUINO=10807", "-ffunction-sections"]);
+        gcc.args([format!("-I{core}"), format!("-I{ARDUINO_AVR}/variants/standard")]);
+        let output = gcc.args(arguments.split(' ')).output().unwrap();
+        (String::from_utf8_lossy(&output.stderr).into_owned(), output.status.success())
+    };
+    let compiled = run("-Wall -Wextra -Werror -c sketch.cpp -o sketch.o");
+    let library =
+        ["main.cpp", "wiring.c", "wiring_digital.c", "hooks.c"].map(|file| format!("{core}/{file}"));
+    let linked = run(&format!("-w -Wl,--gc-sections sketch.o {} -o program", library.join(" ")));
+    (compiled.0 + &linked.0, compiled.1 && linked.1)
+}
+
+#[test]
+fn the_sketch_compiles_for_an_arduino_uno_and_only_for_a_rig_with_one_link() {
+    if !is_there("avr-gcc") || !has_core() {
+        return;
+    }
+    let path = repository().join("examples/arduino/balance/balance.ino");
+    let text = std::fs::read_to_string(path).unwrap();
+    let header = |name| {
+        let (rig, table) = rig_and_table(name);
+        c_header(rig, table).unwrap()
+    };
+    let (said, is_built) = sketch(&text, &header("single-quanser-ip02"));
+    assert!(is_built, "{said}");
+    let (said, is_built) = sketch(&text, &header("quadruple-paper"));
+    assert!(!is_built && said.contains("this sketch has two encoders"), "{said}");
+}
