@@ -37,7 +37,7 @@ impl Imperfection {
     pub(super) fn on_with(&self, rig: &Rig, size: f64, bristle_rad: Option<f64>) -> Rig {
         let mut reality = Reality::default();
         if let Some(bristle_rad) = bristle_rad {
-            reality.friction.presliding_rad = bristle_rad;
+            reality.friction.presliding_rad = PerJoint::all(bristle_rad);
         }
         (self.set)(&mut reality, size);
         Rig { reality, ..rig.clone() }
