@@ -131,7 +131,7 @@ fn the_limit_cycle_of_the_single_pendulum_is_that_of_the_describing_function() {
     for law in Law::ALL {
         for friction in [2e-3, 5e-3] {
             rig.reality.friction.joint_friction_n_m = PerJoint::all(friction);
-            rig.reality.friction.presliding_rad = 1e-5;
+            rig.reality.friction.presliding_rad = PerJoint::all(1e-5);
             let found = swing(&rig, &table, law, 1, 60.0).unwrap();
             let predicted = predicted_swing(&rig, law, friction);
             // The describing function neglects the harmonics, which the loop with pole placement hardly filters.
