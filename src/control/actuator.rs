@@ -43,7 +43,7 @@ impl<T: Scalar> MotorMap<T> {
     /// from `last_v`; and the force that this voltage produces.
     ///
     /// ```text
-    /// V = (R r / (gear Kt)) F + (gear Kt / r) ẋ
+    /// V = (R r / (efficiency gear Kt)) F + (gear Ke / r) ẋ
     /// ```
     pub fn volts_and_force(&self, force: T, speed: T, last_v: T) -> (T, T) {
         let back_emf = self.volts_per_speed * speed;

@@ -4,10 +4,7 @@
 //! f_i = -clamp(slope_i ω_i, ±coulomb_i),   u = … + Σ p_i f_i,   x̂⁻(next tick) = … + Σ g_i f_i
 //! ```
 //!
-//! The rate ω_i of axis i is state 2i + 1. The compiler is kept from unrolling the loops, which would take 2 KiB of
-//! flash.
-
-use core::hint::black_box;
+//! The rate ω_i of axis i is state 2i + 1.
 
 use crate::control::state_feedback::saturate;
 use crate::table::{FrictionMap, Law, Scalar};
@@ -15,11 +12,10 @@ use crate::table::{FrictionMap, Law, Scalar};
 impl<const NX: usize, const NY: usize, T: Scalar> FrictionMap<NX, NY, T> {
     /// Force on the cart (N) that compensates the friction of all axes at the rates of `estimate`. Writes the friction
     /// of each axis to `friction` (N, for joints N m).
-    #[inline(never)]
     pub(crate) fn force(&self, law: Law, estimate: &[T; NX], friction: &mut [T; NY]) -> T {
         let mut force = T::default();
         let axes = self.axes.data.0.iter().zip(estimate.as_chunks::<2>().0);
-        for (friction, (axis, [_, rate])) in black_box(&mut friction[..]).iter_mut().zip(axes) {
+        for (friction, (axis, [_, rate])) in friction.iter_mut().zip(axes) {
             let [coulomb, slope, lqr, pole_placement] = axis;
             let per_friction = match law {
                 Law::Lqr => *lqr,
@@ -32,10 +28,9 @@ impl<const NX: usize, const NY: usize, T: Scalar> FrictionMap<NX, NY, T> {
     }
 
     /// Adds the effect of this friction during one tick to the prediction.
-    #[inline(never)]
     pub(crate) fn add_to(&self, prediction: &mut [T; NX], friction: &[T; NY]) {
-        for (column, friction) in black_box(&self.effect.data.0[..]).iter().zip(friction) {
-            for (x, effect) in black_box(&mut prediction[..]).iter_mut().zip(column) {
+        for (column, friction) in self.effect.data.0.iter().zip(friction) {
+            for (x, effect) in prediction.iter_mut().zip(column) {
                 *x += *effect * *friction;
             }
         }

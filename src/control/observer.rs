@@ -4,8 +4,6 @@
 //! e = y - C x̂⁻,   x̂ = x̂⁻ + L e,   x̂⁻(next tick) = Ad x̂ + Bd u
 //! ```
 
-use core::hint::black_box;
-
 use crate::table::{ObserverGains, Scalar};
 
 impl<const NX: usize, const NY: usize, T: Scalar> ObserverGains<NX, NY, T> {
@@ -89,7 +87,6 @@ impl<'t, const NX: usize, const NY: usize, T: Scalar> Observer<'t, NX, NY, T> {
     }
 
     #[cold]
-    #[inline(never)]
     fn measured_looking_up(&self, estimate: &[T; NX]) -> [T; NY] {
         let measured = &self.gains.measured;
         select(|sensor| measured.get(sensor).map_or(NX, |&state| state as usize), estimate)
@@ -148,8 +145,7 @@ impl<'t, const NX: usize, const NY: usize, T: Scalar> Observer<'t, NX, NY, T> {
                 next[0] += *x;
                 (columns, states) = (others, rest);
             }
-            // Hides the number of columns from the compiler, which would otherwise unroll the loop into 2 KiB.
-            for (column, x) in black_box(columns).iter().zip(states) {
+            for (column, x) in columns.iter().zip(states) {
                 for (row, next) in next.iter_mut().enumerate() {
                     *next += column[row] * *x;
                 }

@@ -357,7 +357,6 @@ impl<'t, const NX: usize, const NY: usize, S: SwingUp<NX, NY>> Firmware<'t, NX, 
     }
 
     #[cold]
-    #[inline(never)]
     fn trip(&mut self, fault: Fault, sensor: Option<u8>) {
         if self.supervisor.state() != State::Fault {
             if fault.loses_positions() {

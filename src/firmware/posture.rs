@@ -31,7 +31,6 @@ impl<const NX: usize, const NY: usize, S: SwingUp<NX, NY>> Firmware<'_, NX, NY, 
     }
 
     /// [`Inhibits::OFF_CENTRE`] if the cart is outside the soft limits of the rail at these counts.
-    #[inline(never)]
     pub(super) fn off_centre_inhibit(&self, counts: &[i32; NY]) -> Inhibits {
         let [low, high] = self.table.limits.rail_m;
         let step = self
@@ -44,7 +43,6 @@ impl<const NX: usize, const NY: usize, S: SwingUp<NX, NY>> Firmware<'_, NX, NY, 
     }
 
     /// Inhibits that follow from the contacts and the supply.
-    #[inline(never)]
     pub(super) fn input_inhibits(&self) -> Inhibits {
         let Contacts { limit_low, limit_high, emergency_stop, driver_fault, .. } = self.contacts;
         let supply_v = self.table.limits.supply_min_v..=self.table.supply_max_v();

@@ -69,7 +69,6 @@ impl<const NY: usize> Calibration<NY> {
     ///
     /// # Errors
     /// The inhibits of homing.
-    #[inline(never)]
     pub fn hanging(&self, counts: &[i32; NY], limits: &Limits<NY>) -> Result<[i32; NY], Inhibits> {
         let mut home = limits.rest_counts;
         match self.swinging.zeros() {

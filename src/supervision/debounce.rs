@@ -49,7 +49,6 @@ impl Debounce {
 
     /// [`check_inputs`](Self::check_inputs), if anything is wrong.
     #[cold]
-    #[inline(never)]
     fn check_bad_inputs<const NY: usize>(
         &mut self,
         limits: &Limits<NY>,

@@ -118,7 +118,6 @@ impl<const NY: usize> Detection<NY> {
 
     /// Sets implausible innovations to 0, and counts them.
     #[cold]
-    #[inline(never)]
     fn reject(&mut self, thresholds: &Thresholds<NY>, e: &mut [f32; NY]) -> Option<Finding> {
         let (mut rejected_now, mut implausible) = (0, None);
         let limits = thresholds.innovation.iter().zip(0..);

@@ -61,7 +61,6 @@ impl<const NY: usize> Default for Swinging<NY> {
 impl<const NY: usize> Swinging<NY> {
     /// Takes the counts of a tick. `steps` is the travel per count (m or rad), `turn_counts` a whole turn of each
     /// joint, 0 for the cart.
-    #[inline(never)]
     pub fn update(&mut self, counts: &[i32; NY], steps: &[f32; NY], turn_counts: &[i32; NY], tick_s: f32) {
         let part = tick_s / WINDOW_S;
         let weight = self.time - self.time * self.time;

@@ -3,7 +3,6 @@
 use crate::table::part::{Part, Words};
 
 /// Continues the CRC-32 (ISO-HDLC) `crc` of earlier bytes (0 if there are none) with `bytes`.
-#[inline(never)]
 pub fn crc32(crc: u32, bytes: &[u8]) -> u32 {
     #[cfg(target_os = "none")]
     return with_a_small_table(crc, bytes);
@@ -99,7 +98,6 @@ impl<'t> ChecksumScan<'t> {
     /// The same with up to `words` words. The end of a leaf counts as one, and so does the end of the table.
     ///
     /// Generic, because a call through a pointer would leave the stack of the image without a bound.
-    #[inline(never)]
     pub fn next_words(&mut self, table: &'t impl Part, words: u32) -> Option<u32> {
         for _ in 0..words {
             if self.leaf.is_none() {
@@ -114,7 +112,6 @@ impl<'t> ChecksumScan<'t> {
     }
 
     /// Adds the next word of the current leaf, or, at its end, moves on to the next leaf.
-    #[inline(never)]
     fn next_of(&mut self, leaf: Words<'t>) {
         match leaf.get(usize::from(self.word)) {
             Some(word) => (self.crc, self.word) = (crc32_of_word(self.crc, word), self.word + 1),

@@ -6,9 +6,9 @@ part! {
     /// A DC motor that drives the cart through a gear and a pulley.
     #[derive(Copy)]
     pub struct MotorMap<; T> {
-        /// Voltage per force at standstill, `R r / (gear Kt)` (V/N).
+        /// Voltage per force at standstill, `R r / (efficiency gear Kt)` (V/N).
         pub volts_per_newton: T,
-        /// Back-EMF per cart speed, `gear Kt / r` (V s/m).
+        /// Back-EMF per cart speed, `gear Ke / r` (V s/m).
         pub volts_per_speed: T,
         /// Voltage below which the motor does not move (V).
         pub dead_zone_v: T,

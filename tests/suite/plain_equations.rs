@@ -177,8 +177,9 @@ fn ticks<const NY: usize>() -> impl Strategy<Value = Ticks<NY>> {
 }
 
 fn numbers() -> impl Strategy<Value = Vec<f32>> {
+    // Both ends are powers of two: for 0.1, an assertion inside proptest fails about once in ten million samples.
     let number =
-        (0.1f32..1.0, any::<bool>()).prop_map(|(size, negative)| if negative { -size } else { size });
+        (0.125f32..1.0, any::<bool>()).prop_map(|(size, negative)| if negative { -size } else { size });
     prop::collection::vec(number, 251)
 }
 

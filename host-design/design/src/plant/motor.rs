@@ -6,6 +6,7 @@ use crate::rig;
 #[derive(Debug, Clone, PartialEq)]
 pub struct MotorPlant {
     newtons_per_volt: f64,
+    newtons_per_amp: f64,
     volts_per_speed: f64,
     dead_zone_v: f64,
     supply_v: f64,
@@ -14,10 +15,10 @@ pub struct MotorPlant {
 impl MotorPlant {
     /// The motor that a rig file describes.
     pub fn of(motor: &rig::Motor) -> Self {
-        let volts_per_speed = motor.volts_per_speed();
         Self {
-            newtons_per_volt: volts_per_speed / motor.resistance_ohm,
-            volts_per_speed,
+            newtons_per_volt: motor.newtons_per_volt(),
+            newtons_per_amp: motor.newtons_per_amp(),
+            volts_per_speed: motor.volts_per_speed(),
             dead_zone_v: motor.dead_zone_v,
             supply_v: motor.supply_v,
         }
@@ -38,10 +39,15 @@ impl MotorPlant {
 
     /// Winding resistance (Ω).
     pub fn resistance_ohm(&self) -> f64 {
-        self.volts_per_speed / self.newtons_per_volt
+        self.newtons_per_amp / self.newtons_per_volt
     }
 
-    /// Back-EMF per speed of the cart (V·s/m), which is also the force per current (N/A).
+    /// Force on the cart per current (N/A).
+    pub fn newtons_per_amp(&self) -> f64 {
+        self.newtons_per_amp
+    }
+
+    /// Back-EMF per speed of the cart (V·s/m).
     pub fn volts_per_speed(&self) -> f64 {
         self.volts_per_speed
     }
@@ -58,8 +64,13 @@ mod tests {
 
     #[test]
     fn force_follows_voltage_less_dead_zone_and_back_emf() {
-        let motor =
-            MotorPlant { newtons_per_volt: 0.5, volts_per_speed: 4.0, dead_zone_v: 1.0, supply_v: 12.0 };
+        let motor = MotorPlant {
+            newtons_per_volt: 0.5,
+            newtons_per_amp: 4.0,
+            volts_per_speed: 4.0,
+            dead_zone_v: 1.0,
+            supply_v: 12.0,
+        };
         assert_eq!(motor.force(0.5, 0.0), 2.5);
         assert_eq!(motor.force(-0.5, 0.25), -3.0);
         assert_eq!(motor.force(0.05, 0.0), 0.0);

@@ -79,8 +79,7 @@ impl Driver {
         let loaded = (supply + ratio * duty * emf) / (1.0 + ratio * duty * duty);
         let volts = if self.supply_resistance_ohm > 0.0 { loaded.min(supply) } else { supply };
         self.supply_share = volts / supply;
-        // The force per current is the back-EMF per speed.
-        let most = self.current_limit_a * motor.volts_per_speed();
+        let most = self.current_limit_a * motor.newtons_per_amp();
         motor.force_at_supply(duty, speed, volts).clamp(-most, most)
     }
 }

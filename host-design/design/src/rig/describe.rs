@@ -221,13 +221,10 @@ impl Description {
     }
 
     fn motor(&mut self, motor: &Motor) {
-        let volts_per_speed = motor.volts_per_speed();
         self.rows(&ACTUATOR, motor);
         self.value("force at standstill", motor.stall_force_n(), "N", "(largest)");
-        self.value("speed without load", motor.supply_v / volts_per_speed, "m/s", "(largest)");
-        // (gear Kt / r)² / R: back-EMF acts on the cart as viscous friction.
-        let braking = volts_per_speed * volts_per_speed / motor.resistance_ohm;
-        self.value("braking by back-EMF", braking, "N·s/m", "");
+        self.value("speed without load", motor.supply_v / motor.volts_per_speed(), "m/s", "(largest)");
+        self.value("braking by back-EMF", motor.braking_n_s_per_m(), "N·s/m", "");
     }
 
     fn reality(&mut self, reality: &Reality) {

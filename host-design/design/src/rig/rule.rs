@@ -35,6 +35,9 @@ impl Rule {
     /// A share of a whole.
     pub(super) const SHARE: Rule =
         Rule { accepts: "a number from 0 to 1", admits: |x| x.iter().all(|&x| (0.0..=1.0).contains(&x)) };
+    /// A share of power that is not lost.
+    pub(super) const EFFICIENCY: Rule =
+        Rule { accepts: "a number > 0 and <= 1", admits: |x| x.iter().all(|&x| x > 0.0 && x <= 1.0) };
     /// A share (%).
     pub(super) const PERCENT: Rule =
         Rule { accepts: "a number > 0 and < 100 (%)", admits: |x| x.iter().all(|&x| x > 0.0 && x < 100.0) };

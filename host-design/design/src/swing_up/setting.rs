@@ -143,7 +143,6 @@ fn noise(chain: &Chain, kalman: &KalmanNoise, rules: &SwingUpRules, sensors: Vec
 
 /// Force at standstill with the voltage beyond the dead zone (N), and its loss with speed by back-EMF (N·s/m).
 fn motor(motor: &Motor) -> [f64; 2] {
-    let volts_per_speed = motor.volts_per_speed();
-    let newtons_per_volt = volts_per_speed / motor.resistance_ohm;
-    [newtons_per_volt * (motor.supply_v - motor.dead_zone_v), newtons_per_volt * volts_per_speed]
+    let newtons_per_volt = motor.newtons_per_volt();
+    [newtons_per_volt * (motor.supply_v - motor.dead_zone_v), newtons_per_volt * motor.volts_per_speed()]
 }

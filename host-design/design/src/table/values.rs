@@ -288,10 +288,10 @@ fn law_gains(law: &Feedback<f32>, states: usize, setpoint_step: Option<f64>) -> 
 }
 
 fn motor_map(motor: &Motor, period_s: f64) -> Result<MotorMap, NoTable> {
-    let speed = motor.volts_per_speed();
+    let volts_per_newton = motor.resistance_ohm / motor.newtons_per_amp();
     Ok(MotorMap {
-        volts_per_newton: finite("the motor's voltage per force", (motor.resistance_ohm / speed) as f32)?,
-        volts_per_speed: finite("the motor's voltage per speed", speed as f32)?,
+        volts_per_newton: finite("the motor's voltage per force", volts_per_newton as f32)?,
+        volts_per_speed: finite("the motor's voltage per speed", motor.volts_per_speed() as f32)?,
         dead_zone_v: finite("actuator.dead_zone_v", motor.dead_zone_v as f32)?,
         slew_v_per_tick: motor
             .slew_v_per_s

@@ -2,6 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
+use upright_design::plant::MotorPlant;
 use upright_design::rig::{
     Absent, Actuator, Cart, Chain, Limits, Link, LinkEncoder, PlantDescription, PolePlacement, Rig, SECTIONS,
     TOP, Tick, defaults, key_table, unit_in_names,
@@ -97,6 +98,68 @@ fn defaults_of_the_motor() {
     let motor = "[actuator]\ntorque_constant_n_m_per_a = 0.01\nresistance_ohm = 1\npulley_radius_m = 0.01\nsupply_v = 12\n";
     let motor = parse(&format!("{MINIMAL}{motor}")).actuator.motor.unwrap();
     assert_eq!((motor.gear_ratio, motor.dead_zone_v, motor.slew_v_per_s), (1.0, 0.0, None));
+}
+
+/// A published machine: 0.1336 N·m/A and 0.2842 V·s/rad at a pulley of 19.8 mm, 12 V.
+#[test]
+fn torque_and_back_emf_constants_may_differ() {
+    let motor = |more: &str| {
+        let data = "torque_constant_n_m_per_a = 0.1336\nresistance_ohm = 10.692\npulley_radius_m = 0.0198\nsupply_v = 12\n";
+        parse(&format!("{MINIMAL}[actuator]\n{data}{more}")).actuator.motor.unwrap()
+    };
+    let close = |x: f64, wanted: f64| assert!((x / wanted - 1.0).abs() < 1e-3, "{x} instead of {wanted}");
+    let real = motor("back_emf_constant_v_s_per_rad = 0.2842\n");
+    close(real.volts_per_speed(), 14.35);
+    close(real.stall_force_n(), 7.573);
+    close(real.newtons_per_amp(), 6.747);
+    // With one constant for both, as without the key, the back-EMF is half of the real one.
+    close(motor("").volts_per_speed(), 6.747);
+    // Losses in the gear take force, not back-EMF.
+    let lossy = motor("back_emf_constant_v_s_per_rad = 0.2842\nefficiency = 0.8\n");
+    close(lossy.stall_force_n(), 0.8 * 7.573);
+    close(lossy.braking_n_s_per_m(), 0.8 * 6.747 * 14.35 / 10.692);
+    close(lossy.volts_per_speed(), 14.35);
+}
+
+/// v' = -a v - c sign(v) + b V, with a = 13.2 1/s, c = 0.9 m/s², b = 0.925 m/(s² V), and 1.2 kg in motion.
+#[test]
+fn a_motor_that_is_known_by_its_motion_is_described_by_one_ohm_and_one_metre() {
+    let (a, b, c, mass) = (13.2, 0.925, 0.9, 1.2);
+    let text = format!(
+        "{MINIMAL}[actuator]\nresistance_ohm = 1\npulley_radius_m = 1\ntorque_constant_n_m_per_a = {}\n\
+         back_emf_constant_v_s_per_rad = {}\ndead_zone_v = {}\nsupply_v = 12\n",
+        mass * b,
+        a / b,
+        c / b
+    );
+    let motor = parse(&text).actuator.motor.unwrap();
+    let plant = MotorPlant::of(&motor);
+    for (duty, speed) in [(1.0, 0.0), (0.5, 0.3), (-0.75, -0.2)] {
+        let wanted = mass * (b * duty * 12.0 - a * speed - c * f64::signum(duty));
+        assert!((plant.force(duty, speed) - wanted).abs() < 1e-12, "duty {duty} at {speed} m/s");
+    }
+}
+
+#[test]
+fn values_of_another_unit_are_doubted_and_those_of_the_benches_are_not() {
+    let unusual = |from: &str, to: &str| parse(&MINIMAL.replace(from, to)).unusual_values();
+    assert_eq!(parse(MINIMAL).unusual_values(), Vec::<String>::new());
+    let length = unusual("length_m = ", "length_m = 100");
+    assert!(matches!(&length[..], [doubt] if doubt.starts_with("link[1].length_m = 100")), "{length:?}");
+    for rig in std::fs::read_dir(Path::new(env!("CARGO_MANIFEST_DIR")).join("../../rigs")).unwrap() {
+        let path = rig.unwrap().path();
+        if path.extension().is_some_and(|ending| ending == "toml") {
+            assert_eq!(
+                Rig::from_path(&path).unwrap().unusual_values(),
+                Vec::<String>::new(),
+                "{}",
+                path.display()
+            );
+        }
+    }
+    let pulley = "[actuator]\ntorque_constant_n_m_per_a = 0.01\nresistance_ohm = 1\npulley_radius_m = 6.35\nsupply_v = 12\n";
+    let doubts = parse(&format!("{MINIMAL}{pulley}")).unusual_values();
+    assert!(doubts[0].contains("pulley_radius_m = 6.35 m") && doubts[1].contains("m/s"), "{doubts:?}");
 }
 
 #[test]

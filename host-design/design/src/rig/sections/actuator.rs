@@ -42,7 +42,14 @@ keys! {
     /// A DC motor with gear and pulley.
     pub struct Motor {
         torque_constant_n_m_per_a: f64, "N·m/A", Rule::POSITIVE,
-            "torque constant of the motor, equal to its back-EMF constant in V·s/rad", WITH_A_MOTOR;
+            "torque constant of the motor", WITH_A_MOTOR;
+        #[serde(skip_serializing_if = "Option::is_none")]
+        back_emf_constant_v_s_per_rad: Option<f64>, "V·s/rad", Rule::POSITIVE,
+            "back-EMF constant of the motor, the reciprocal of its speed constant",
+            Absent::Follows("equal to the torque constant");
+        #[serde(skip_serializing_if = "Option::is_none")]
+        efficiency: Option<f64>, "", Rule::EFFICIENCY,
+            "share of the motor's torque that gear and belt hand on", Absent::Follows("1");
         resistance_ohm: f64, "Ω", Rule::POSITIVE, "winding resistance of the motor", WITH_A_MOTOR;
         gear_ratio: f64, "", Rule::POSITIVE, "number of motor turns per pulley turn", Absent::Numbers(&[1.0]);
         pulley_radius_m: f64, "m", Rule::POSITIVE, "radius of the pulley or pinion", WITH_A_MOTOR;
@@ -55,15 +62,36 @@ keys! {
 }
 
 impl Motor {
-    /// Back-EMF per cart speed, `gear Kt / r` (V·s/m), which is also the force per current (N/A).
+    /// Back-EMF per cart speed, `gear Ke / r` (V·s/m).
     pub fn volts_per_speed(&self) -> f64 {
-        self.gear_ratio * self.torque_constant_n_m_per_a / self.pulley_radius_m
+        let constant = self.back_emf_constant_v_s_per_rad.unwrap_or(self.torque_constant_n_m_per_a);
+        self.gear_ratio * constant / self.pulley_radius_m
     }
 
-    /// Force on the cart at standstill and full supply, `gear Kt V / (R r)` (N).
+    /// Force on the cart per current, `efficiency gear Kt / r` (N/A).
+    pub fn newtons_per_amp(&self) -> f64 {
+        self.delivered_torque_n_m_per_a() * self.gear_ratio / self.pulley_radius_m
+    }
+
+    /// Force on the cart per voltage at standstill, `efficiency gear Kt / (R r)` (N/V).
+    pub fn newtons_per_volt(&self) -> f64 {
+        self.newtons_per_amp() / self.resistance_ohm
+    }
+
+    /// Back-EMF as viscous friction of the cart with the motor's terminals held at a voltage (N·s/m).
+    pub fn braking_n_s_per_m(&self) -> f64 {
+        self.newtons_per_amp() * self.volts_per_speed() / self.resistance_ohm
+    }
+
+    /// Force on the cart at standstill and full supply, `efficiency gear Kt V / (R r)` (N).
     pub fn stall_force_n(&self) -> f64 {
-        self.gear_ratio * self.torque_constant_n_m_per_a * self.supply_v
+        self.gear_ratio * self.delivered_torque_n_m_per_a() * self.supply_v
             / (self.resistance_ohm * self.pulley_radius_m)
+    }
+
+    /// The torque constant less what gear and belt lose.
+    fn delivered_torque_n_m_per_a(&self) -> f64 {
+        self.torque_constant_n_m_per_a * self.efficiency.unwrap_or(1.0)
     }
 }
 

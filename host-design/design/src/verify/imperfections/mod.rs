@@ -2,19 +2,23 @@
 //! firmware turns the motor off, beside their typical sizes.
 
 mod catalogue;
+mod cure;
+mod search;
 
 use serde::Serialize;
 use upright::table::Law;
 
 use super::error::{VerifyError, chain, within};
-use super::trial::{Disturbance, Horizon, Outcome, disturbed, trial};
+use super::trial::Disturbance;
 use crate::number::significant;
 use crate::parallel;
 use crate::rig::{Reality, Rig};
-use crate::simulate::{FallKind, Scenario, SimulationError};
+use crate::simulate::{FallKind, SimulationError};
 use crate::table::TableValues;
 
 pub use catalogue::{IMPERFECTIONS, Imperfection};
+use cure::Cures;
+use search::SizeSearch;
 
 /// Settings of the search for the sizes.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
@@ -63,13 +67,55 @@ pub struct Survival {
     pub turned_off_at: Option<f64>,
     /// What ends the run of the whole firmware at that size.
     pub ended_by: Option<FallKind>,
+    /// The best change of the rig file that was tried; none if none of them helps.
+    pub cure: Option<Cure>,
+    /// For joint friction, the sizes for each of the bristle lengths; the sizes above are the smaller ones.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub bristles: Vec<OfBristle>,
     /// Largest size tried.
     pub largest_tried: f64,
     /// Typical size in a poor machine over the smaller of both sizes: above 1 the imperfection is dangerous.
     pub danger: f64,
 }
 
+/// A change of the rig file with which the motor stays on up to a larger size.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Cure {
+    /// Key and value.
+    pub change: String,
+    /// Size from which the whole firmware then turns the motor off, or the largest one tried.
+    pub turned_off_at: f64,
+}
+
+/// Sizes of joint friction that builds up over this angle.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct OfBristle {
+    /// The angle (rad): `presliding_rad` of `[reality]`.
+    pub bristle_rad: f64,
+    /// As in [`Survival`].
+    pub falls_at: Option<f64>,
+    /// As in [`Survival`].
+    pub turned_off_at: Option<f64>,
+}
+
 impl Survival {
+    /// What was found beside the sizes: the sizes for each bristle length, and the cure.
+    pub fn remarks(&self) -> Vec<String> {
+        let of_bristle = |of: &OfBristle| {
+            let [falls, off] = [of.falls_at, of.turned_off_at].map(|size| self.size_text(size));
+            let bristle = significant(of.bristle_rad, 2);
+            format!("friction that builds up over {bristle} rad: falls at {falls}, motor off {off}")
+        };
+        let cure = match (&self.cure, self.turned_off_at) {
+            (Some(Cure { change, turned_off_at }), _) => {
+                Some(format!("with {change}: motor off {}", significant(*turned_off_at, 2)))
+            }
+            (None, Some(_)) => Some(format!("no cure found; tried: {}", cure::TRIED)),
+            (None, None) => None,
+        };
+        self.bristles.iter().map(of_bristle).chain(cure).collect()
+    }
+
     /// [`Self::falls_at`] as text.
     pub fn falls_text(&self) -> String {
         self.size_text(self.falls_at)
@@ -131,8 +177,6 @@ pub struct RequiredSurvival {
     pub verdict: SizeRuns,
 }
 
-/// Sizes are tried from this share of a good machine's to this multiple of a poor one's.
-const RANGE: [f64; 2] = [1.0 / 64.0, 64.0];
 /// Sizes at which a limit cycle is shown, as shares of the one at which the loop falls.
 const SHARES: [f64; 7] = [1.0 / 32.0, 1.0 / 16.0, 0.125, 0.25, 0.5, 0.7, 0.9];
 
@@ -151,8 +195,9 @@ pub fn imperfections(
     chain(rig, "imperfections")?;
     within("relative", settings.relative, 1e-3..=1.0, "a width from 0.001 to 1")?;
     let search = SizeSearch { rig, table, law, settings };
+    let cures = Cures::of(rig, table, law)?;
     let one = |imperfection: &'static Imperfection| {
-        let survival = search.survival(imperfection);
+        let survival = search.survival(imperfection, &cures.of_imperfection(imperfection));
         done();
         survival
     };
@@ -162,7 +207,7 @@ pub fn imperfections(
     Ok(Imperfections { law, settings: *settings, alone, together })
 }
 
-/// Searches for one imperfection alone.
+/// Searches for the sizes of one imperfection alone, and for no cure.
 ///
 /// # Errors
 /// As [`imperfections()`].
@@ -174,7 +219,7 @@ pub fn survival(
     imperfection: &'static Imperfection,
 ) -> Result<Survival, VerifyError> {
     chain(rig, "imperfections")?;
-    Ok(SizeSearch { rig, table, law, settings }.survival(imperfection)?)
+    Ok(SizeSearch { rig, table, law, settings }.survival(imperfection, &[])?)
 }
 
 /// Runs `law` with the imperfections that it has to survive according to `[verify]`; empty if there are none.
@@ -188,6 +233,8 @@ pub fn required_imperfections(
     settings: &ImperfectionSettings,
 ) -> Result<Vec<RequiredSurvival>, VerifyError> {
     chain(rig, "imperfections")?;
+    let latency_s = rig.verify.latency_s.unwrap_or_default();
+    within("latency_s", latency_s, 0.0..=0.999 * rig.tick.period_s, "less than period_s")?;
     let search = SizeSearch { rig, table, law, settings };
     let required = |imperfection: &'static Imperfection| {
         let size = (imperfection.required)(&rig.verify)?;
@@ -218,127 +265,4 @@ pub fn limit_cycle(
         search.alone(survival.imperfection, size).map(|verdict| (size, verdict))
     };
     Ok(SHARES.into_iter().map(at).collect::<Result<_, SimulationError>>()?)
-}
-
-struct SizeSearch<'a> {
-    rig: &'a Rig,
-    table: &'a TableValues,
-    law: Law,
-    settings: &'a ImperfectionSettings,
-}
-
-impl SizeSearch<'_> {
-    fn survival(&self, imperfection: &'static Imperfection) -> Result<Survival, SimulationError> {
-        let [good, poor] = imperfection.typical;
-        // Masses and lengths cannot be wrong by more than nine tenths.
-        let most = if imperfection.key == "parameter_spread_percent" { 80.0 } else { f64::INFINITY };
-        let sizes = [RANGE[0] * good, (RANGE[1] * poor).min(most)];
-        let at = |size: f64, is_supervised: bool| -> Result<Option<FallKind>, SimulationError> {
-            let real = imperfection.on(self.rig, size);
-            for seed in 1..=self.settings.seeds {
-                if let Some(fall) = self.run(&real, seed, is_supervised)?.fall {
-                    return Ok(Some(fall.kind));
-                }
-            }
-            Ok(None)
-        };
-        let relative = self.settings.relative;
-        let falls_at = first(sizes, poor, relative, |size| at(size, false).map(|end| end.is_none()))?;
-        let turned_off_at = first(sizes, poor, relative, |size| at(size, true).map(|end| end.is_none()))?;
-        let ended_by = turned_off_at.map_or(Ok(None), |size| at(size, true))?;
-        let least = falls_at.unwrap_or(sizes[1]).min(turned_off_at.unwrap_or(sizes[1]));
-        Ok(Survival {
-            imperfection,
-            falls_at,
-            turned_off_at,
-            ended_by,
-            largest_tried: sizes[1],
-            danger: poor / least,
-        })
-    }
-
-    fn run(&self, real: &Rig, seed: u64, is_supervised: bool) -> Result<Outcome, SimulationError> {
-        let ImperfectionSettings { duration_s, disturbance, .. } = self.settings;
-        let scenario =
-            Scenario { is_supervised, ..disturbed(real, self.law, *duration_s, disturbance, seed) };
-        trial(real, self.table, &scenario, &Horizon::default())
-    }
-
-    /// Runs of all seeds on a machine with this imperfection alone.
-    fn alone(&self, imperfection: &Imperfection, size: f64) -> Result<SizeRuns, SimulationError> {
-        self.verdict(&imperfection.on(self.rig, size))
-    }
-
-    /// Runs of all seeds on this machine, by the whole firmware and, where it turns the motor off, by the controller
-    /// alone.
-    fn verdict(&self, real: &Rig) -> Result<SizeRuns, SimulationError> {
-        let one = |seed: u64| {
-            let by_firmware = self.run(real, seed, true)?;
-            let alone = match by_firmware.fall {
-                Some(_) => self.run(real, seed, false)?,
-                None => by_firmware.clone(),
-            };
-            Ok::<_, SimulationError>((by_firmware, alone))
-        };
-        let all: Vec<_> = parallel::try_map(1..=self.settings.seeds, one)?;
-        let ended: Vec<FallKind> =
-            all.iter().filter_map(|(by_firmware, _)| Some(by_firmware.fall.as_ref()?.kind)).collect();
-        let largest = |of: fn(&Outcome) -> f64| all.iter().map(|(_, alone)| of(alone)).fold(0.0, f64::max);
-        Ok(SizeRuns {
-            survived: all.iter().filter(|(_, alone)| alone.survives()).count() as u64,
-            stayed_on: self.settings.seeds - ended.len() as u64,
-            ended_by: ended.first().copied(),
-            peak_angle_rad: largest(|outcome| outcome.peak_angle_rad),
-            peak_position_m: largest(|outcome| outcome.peak_error_m),
-        })
-    }
-}
-
-/// The first size that does not hold: searched from `start` by factors of 4, up if it holds and down if not, then by
-/// bisection of the logarithm to within `relative`. None if even the largest holds; the smallest if that does not.
-///
-/// Small backlash and stiff belts take long to simulate, so the search does not begin with them.
-fn first<E>(
-    [smallest, largest]: [f64; 2],
-    start: f64,
-    relative: f64,
-    mut holds: impl FnMut(f64) -> Result<bool, E>,
-) -> Result<Option<f64>, E> {
-    let (mut held, mut lost) = (None, None);
-    let mut size = start.clamp(smallest, largest);
-    while held.is_none() || lost.is_none() {
-        if holds(size)? {
-            held = Some(size);
-            if size >= largest {
-                return Ok(None);
-            }
-            size = (4.0 * size).min(largest);
-        } else {
-            lost = Some(size);
-            if size <= smallest {
-                return Ok(lost);
-            }
-            size = (0.25 * size).max(smallest);
-        }
-    }
-    let (mut held, mut lost) = (held.unwrap_or(smallest), lost.unwrap_or(largest));
-    while lost - held > relative * held {
-        let middle = (held * lost).sqrt();
-        if holds(middle)? { held = middle } else { lost = middle }
-    }
-    Ok(Some(lost))
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn the_first_size_that_is_not_held_is_found() {
-        for start in [0.01, 0.3, 2.0, 10.0] {
-            let find = |edge: f64| first::<()>([0.01, 10.0], start, 0.01, |size| Ok(size < edge)).unwrap();
-            assert!(find(0.5).is_some_and(|found| (0.5..0.505).contains(&found)));
-            assert_eq!((find(20.0), find(0.001)), (None, Some(0.01)));
-        }
-    }
 }

@@ -7,7 +7,7 @@ use clap::Args;
 use upright_design::rig::{Rig, key_table};
 
 use crate::failure::Failure;
-use crate::output::print;
+use crate::output::{print, warn_of_unusual_values};
 
 /// Reads a rig file and prints all its values, with defaults filled in.
 ///
@@ -36,6 +36,7 @@ impl CheckCommand {
             return Ok(write!(std::io::stdout(), "{}", key_table())?);
         };
         let rig = Rig::from_path(&file)?;
+        warn_of_unusual_values(&rig);
         print(self.json, &rig, || rig.describe())
     }
 }

@@ -13,7 +13,7 @@ use upright_tool::image::BoardName;
 use upright_tool::project::gain_table;
 
 use crate::failure::Failure;
-use crate::output::print;
+use crate::output::{print, warn_of_unusual_values};
 use crate::progress::with_spinner;
 use crate::variation::{Wanted, with_stored_motions};
 use law_report::LawReport;
@@ -76,6 +76,7 @@ impl DesignCommand {
         for warning in text::warnings(&rig, &certified, &reports, table.as_ref().ok()) {
             eprintln!("warning: {warning}");
         }
+        warn_of_unusual_values(&rig);
         refuse_failing_table(&rig, &reports)?;
         if self.no_write {
             return Ok(());

@@ -3,6 +3,7 @@
 use std::io::Write;
 
 use serde::Serialize;
+use upright_design::rig::Rig;
 
 use crate::failure::Failure;
 
@@ -17,4 +18,11 @@ pub(crate) fn print(
         false => text(),
     };
     Ok(std::io::stdout().lock().write_all(text.as_bytes())?)
+}
+
+/// Warns of values that no bench has.
+pub(crate) fn warn_of_unusual_values(rig: &Rig) {
+    for value in rig.unusual_values() {
+        eprintln!("warning: {value}");
+    }
 }
