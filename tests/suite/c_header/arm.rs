@@ -21,6 +21,11 @@ const M4: Machine = Machine {
     name: "mps2-an386",
     flags: &["-mcpu=cortex-m4", "-mfpu=fpv4-sp-d16", "-mfloat-abi=hard", "-O3", "-ffp-contract=fast"],
 };
+/// The same, with the floating-point unit set to take small numbers as 0.
+const FLUSHING: Machine = Machine {
+    name: "mps2-an386",
+    flags: &["-mcpu=cortex-m4", "-mfpu=fpv4-sp-d16", "-mfloat-abi=hard", "-O2", "-DFLUSH_SUBNORMALS"],
+};
 const MACHINES: [Machine; 4] = [
     Machine { name: "microbit", flags: &["-mcpu=cortex-m0", "-Os"] },
     Machine { name: "mps2-an385", flags: &["-mcpu=cortex-m3", "-O2"] },
@@ -80,7 +85,7 @@ fn four_cortex_m_have_the_bits_of_the_firmware_although_two_of_them_may_fuse() {
 }
 
 #[test]
-fn fused_products_on_a_cortex_m4_are_noticed() {
+fn fused_products_and_flushed_subnormals_on_a_cortex_m4_are_noticed() {
     if !can_run() {
         return;
     }
@@ -90,6 +95,7 @@ fn fused_products_on_a_cortex_m4_are_noticed() {
     let undefended = header.replace("#pragma GCC optimize", "//");
     // Refused from the first tick on.
     assert_eq!(differing_on(&M4, &undefended, &run).0, run.wanted.len());
+    assert_eq!(differing_on(&FLUSHING, &header, &run).0, run.wanted.len());
     let unchecked = undefended.replace("!upright_arithmetic_is_exact()", "false");
     assert!(differing_on(&M4, &unchecked, &run).0 > 900);
 }

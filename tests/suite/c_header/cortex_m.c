@@ -10,6 +10,9 @@ void reset(void)
     *(volatile uint32_t *)0xe000ed88 |= 0xful << 20; /* turns the floating-point unit on */
     __asm__ volatile("dsb\nisb");
 #endif
+#if defined(FLUSH_SUBNORMALS)
+    __asm__ volatile("vmsr fpscr, %0" : : "r"(1ul << 24));
+#endif
     _start();
 }
 __attribute__((section(".vectors"), used)) static const void *const vectors[] = {&stack_top, (void *)reset};

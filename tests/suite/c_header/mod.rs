@@ -1,6 +1,6 @@
 //! The C header gives the bits of the firmware, whatever the compiler is told.
 //!
-//! Without gcc, g++ or the tools for AVR and ARM, the tests that need them say so and pass. If the environment variable
+//! Without gcc, g++, clang or the tools for AVR and ARM, the tests that need them say so and pass. If the environment variable
 //! `UPRIGHT_REQUIRE_GCC` is set, they fail.
 
 mod arm;
@@ -225,6 +225,22 @@ fn fused_products_are_noticed_by_the_header_and_by_the_comparison() {
     let unchecked = undefended.replace("!upright_arithmetic_is_exact()", "false");
     let answers = replayed(&unchecked, fast, &run.input);
     assert!(differing(&run, &answers) > 900, "{}", differing(&run, &answers));
+}
+
+#[test]
+fn clang_gives_the_same_bits_unless_it_is_told_to_ignore_pragmas_which_is_noticed_at_the_start() {
+    if !is_there("clang") || !fuses() {
+        return;
+    }
+    let (rig, table) = rig_and_table("quadruple-paper");
+    let run = recorded(rig, table, &scenario(rig, Law::Lqr, 1000), None);
+    let header = c_header(rig, table).unwrap();
+    let usual =
+        Dialect { compiler: "clang", flags: &["-O3", "-march=native", "-Wall", "-Wextra", "-Werror"] };
+    assert_eq!(differing(&run, &replayed(&header, usual, &run.input)), 0);
+    let fast = Dialect { compiler: "clang", flags: &["-O3", "-march=native", "-ffp-contract=fast"] };
+    let first = replayed(&header, fast, &run.input).swap_remove(0);
+    assert_eq!((first.state, first.fault), (99, 101), "UPRIGHT_ARITHMETIC");
 }
 
 #[test]

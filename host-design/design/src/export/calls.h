@@ -5,8 +5,11 @@ UPRIGHT_CALL bool upright_arithmetic_is_exact(void)
 {
     volatile float one = 1.0f, factor = 1.000244140625f, square = 1.00048828125f, least = FLT_MIN, half = 0.5f;
     volatile float third = one / 3.0f, tenth = one / 10.0f;
+    /* The square is used once in each: only then would a compiler fuse it. */
     float a = factor, b = square;
-    volatile float difference = a * a - b, sum = b - a * a;
+    volatile float difference = a * a - b;
+    float c = factor, d = square;
+    volatile float sum = d - c * c;
     volatile float subnormal = least * half;
     volatile float twice = subnormal + subnormal;
     return difference == 0.0f && sum == 0.0f && subnormal > 0.0f && twice == FLT_MIN && third == 0.333333343f

@@ -84,6 +84,7 @@ impl CoveredQuantity {
             ParameterKind::Delay => Self::Delay,
             ParameterKind::Zero(_) => Self::Zero,
             ParameterKind::AirDrag(_)
+            | ParameterKind::Presliding(_)
             | ParameterKind::EccentricSine(_)
             | ParameterKind::EccentricCosine(_) => return None,
         })

@@ -19,7 +19,7 @@ use super::verdict::{HeldOut, Predicted, Refusal, channels, judge, judge_windows
 use super::window_errors::{WindowErrors, window_errors};
 use super::wiring;
 use crate::parallel::{Progress, ProgressStep};
-use crate::rig::Rig;
+use crate::rig::{Chain, Rig};
 
 /// Shortest log (s).
 const LEAST_S: f64 = 5.0;
@@ -41,6 +41,20 @@ pub struct Settings {
     pub weighed_kg_m: Option<f64>,
     /// Whether to take the wiring of the file on trust instead of checking it.
     pub trust_wiring: bool,
+    /// Whether to leave the air drag of the links out, of free swings.
+    pub without_drag: bool,
+    /// Whether to leave the dry friction of the joints out, of free swings.
+    pub without_dry: bool,
+}
+
+impl Settings {
+    fn leaves_out(&self, kind: ParameterKind) -> bool {
+        match kind {
+            ParameterKind::AirDrag(_) => self.without_drag,
+            ParameterKind::JointDry(_) => self.without_dry,
+            _ => false,
+        }
+    }
 }
 
 /// Identifies the machine of `rig` from its logs, each with the path of its file.
@@ -74,7 +88,8 @@ pub fn identify_recordings(
     let Recorded { record, finer, lost_ticks, is_driven } = recordings.recorded(rig)?;
     record.at_least(LEAST_S)?;
     record.moves()?;
-    let model = record.model(chain.gravity_m_per_s2);
+    let mut model = record.model(chain.gravity_m_per_s2);
+    model.has_bristles = !is_driven;
     let mut priors = priors(rig, chain, settings.eccentricity);
     let mut found = Identification {
         lost_ticks,
@@ -104,24 +119,32 @@ pub fn identify_recordings(
         fitted.full(&found)
     } else {
         progress(ProgressStep::Begin("free swings", free::FITS));
-        let free = free::fit(&model, &record, &priors, &|| progress(ProgressStep::Done))?;
+        let left_out = |kind| settings.leaves_out(kind);
+        let free = free::fit(&model, &record, &priors, &left_out, &|| progress(ProgressStep::Done))?;
         free.write(rig, &model, &priors, &mut found);
         free.p
     };
     if let Some(recordings) = predict {
         found.predicted = predicted(rig, &model, &priors, &p, recordings)?;
     }
-    match realise(chain, &p, settings.weighed_kg_m) {
+    decide(chain, settings, &p, &mut found);
+    Ok(found)
+}
+
+/// The numbers for the rig file, and whether they may be written.
+fn decide(chain: &Chain, settings: &Settings, p: &[f64], found: &mut Identification) {
+    match realise(chain, p, settings.weighed_kg_m) {
         Ok(realised) => found.realised = Some(realised),
         Err(error) => found.refusal = Some(error.into()),
     }
-    if is_driven && let Err(refusal) = judge(&found.channels) {
+    if found.is_driven
+        && let Err(refusal) = judge(&found.channels)
+    {
         found.refusal = Some(refusal);
     }
     if let Err(refusal) = judge_windows(&found.left_out) {
         found.refusal = Some(refusal);
     }
-    Ok(found)
 }
 
 /// Errors of predictions of `recordings`, with the old file and with the parameters `p`.

@@ -1,5 +1,6 @@
 //! What an identification finds.
 
+use super::doubt::Doubt;
 use super::parameters::ParameterKind;
 use super::realise::Realised;
 use super::record::Record;
@@ -53,6 +54,8 @@ pub struct Identification {
     pub realised: Option<Realised>,
     /// Delay that the rig file states (ticks).
     pub delay_ticks: u8,
+    /// What casts doubt on the numbers; only without a drive.
+    pub doubts: Vec<Doubt>,
     /// Why no rig file may be written; none if it may.
     pub refusal: Option<Refusal>,
 }
@@ -74,6 +77,7 @@ impl Identification {
             predicted: Vec::new(),
             realised: None,
             delay_ticks: 0,
+            doubts: Vec::new(),
             refusal: None,
         }
     }

@@ -3,13 +3,15 @@
 //! Without a drive, a common factor of all masses and frictions changes no motion: the first moment of the last link is
 //! that of the file. With a clamped cart, nothing is seen of the cart, and a tilt of the rail looks like a common zero.
 
+use super::channel::channel_name;
+use super::doubt::Doubt;
 use super::error::IdentifyError;
 use super::estimated::{Estimate, Identification};
 use super::model::Model;
 use super::old_values::old_values;
-use super::parameters::{Layout, Prior};
+use super::parameters::{Layout, ParameterKind, Prior};
 use super::record::Record;
-use super::shooting::Shooting;
+use super::shooting::{Fit, Shooting};
 use super::window_errors::{Predicting, window_errors};
 use crate::rig::Rig;
 
@@ -24,6 +26,13 @@ const USUAL_DRAG: f64 = 0.005;
 /// Prior deviation of a drag, as a multiple of the usual one.
 const DRAG: f64 = 10.0;
 
+/// Prior deviation of a presliding, as a multiple of the usual one.
+const PRESLIDING: f64 = 2.0;
+/// Least difference between the halves, in its deviations, that is named.
+const CONTRADICTION: f64 = 4.0;
+/// Least residuals that are named, as a multiple of what the sensor allows.
+const COARSE: f64 = 5.0;
+
 /// The result of a fit of free swings.
 pub(super) struct FreeFit {
     pub(super) p: Vec<f64>,
@@ -35,16 +44,23 @@ pub(super) struct FreeFit {
     halves: [Vec<f64>; 2],
     /// Each part of the record, with the parameters that were found without it.
     left_out: Vec<(Record, Vec<f64>)>,
+    doubts: Vec<Doubt>,
 }
 
-/// Number of fits: the whole, without each part, and each half.
-pub(super) const FITS: u64 = 3 + PARTS as u64;
+/// Number of fits: with all terms of friction, without those left out on request, with those that the record wants,
+/// without each part, and each half.
+pub(super) const FITS: u64 = 5 + PARTS as u64;
 
 impl FreeFit {
-    /// Writes estimates, correlations and errors of predictions into `found`.
+    /// Writes estimates, correlations, doubts and errors of predictions into `found`.
     pub(super) fn write(&self, rig: &Rig, model: &Model, priors: &[Prior], found: &mut Identification) {
         let (size, kinds) = (self.p.len(), model.layout.kinds());
-        let active: Vec<usize> = (0..size).filter(|&i| priors[i].deviation > 0.0).collect();
+        // Without dry friction there is no bristle.
+        let layout = model.layout;
+        let is_bare = |i: usize| {
+            (0..layout.links).any(|j| i == layout.presliding(j) && self.p[layout.dry(j + 1)] == 0.0)
+        };
+        let active: Vec<usize> = (0..size).filter(|&i| priors[i].deviation > 0.0 && !is_bare(i)).collect();
         let estimate = |&i: &usize| Estimate {
             kind: kinds[i],
             old: priors[i].value,
@@ -68,10 +84,12 @@ impl FreeFit {
             .map(|((part, p), old)| (part, [old.as_slice(), p.as_slice()]))
             .collect();
         found.left_out = window_errors(model, priors, &parts);
+        found.doubts.clone_from(&self.doubts);
     }
 }
 
-/// Fixes what free swings do not show at the values of the file, and frees the drag of the links.
+/// Fixes what free swings do not show at the values of the file, and frees the drag of the links and the presliding of
+/// the joints.
 pub(super) fn known(rig: &Rig, layout: Layout, priors: &mut [Prior], is_clamped: bool) {
     let mut fixed = vec![layout.first_moment(layout.links - 1), layout.delay(), layout.dead_zone()];
     if is_clamped {
@@ -82,47 +100,129 @@ pub(super) fn known(rig: &Rig, layout: Layout, priors: &mut [Prior], is_clamped:
     fixed.into_iter().for_each(|index| priors[index].deviation = 0.0);
     for link in 0..layout.links {
         let usual = USUAL_DRAG * priors[layout.second_moment(link)].value;
-        priors[layout.drag(link)] = Prior { value: 0.0, deviation: DRAG * usual };
+        priors[layout.drag(link)].deviation = DRAG * usual;
+        let presliding = &mut priors[layout.presliding(link)];
+        presliding.deviation = PRESLIDING * presliding.value;
     }
 }
 
-/// Fits `record` from the values of `priors`.
+/// A fit of a part of the record.
+struct FittedPart {
+    fit: Fit,
+    /// Standard deviations, as of the scatter between the windows.
+    deviations: Vec<f64>,
+    inverse: Vec<f64>,
+}
+
+impl FittedPart {
+    fn of(model: &Model, record: &Record, priors: &[Prior], from: &[f64]) -> Result<Self, IdentifyError> {
+        let shooting = Shooting { model, record, priors, free: true };
+        let fit = shooting.fit_settled(from, WINDOW_S, ITERATIONS.0, ITERATIONS.1);
+        let undetermined = IdentifyError::Undetermined("the equations have no solution");
+        let (inverse, scaled) = shooting.deviations(&fit).ok_or(undetermined)?;
+        let deviations = scaled.iter().zip(priors).map(|(scaled, prior)| scaled * prior.deviation).collect();
+        Ok(Self { fit, deviations, inverse })
+    }
+
+    /// By how much -2 ln L would rise without a term of friction, to second order.
+    fn worth(&self, index: usize) -> f64 {
+        if self.fit.p[index] <= 0.0 { 0.0 } else { (self.fit.p[index] / self.deviations[index]).powi(2) }
+    }
+}
+
+/// Fits `record` from the values of `priors`, without the terms of friction that it does not want, and those that are
+/// left out on request.
 pub(super) fn fit(
     model: &Model,
     record: &Record,
     priors: &[Prior],
+    is_left_out: &dyn Fn(ParameterKind) -> bool,
     step: &dyn Fn(),
 ) -> Result<FreeFit, IdentifyError> {
-    let start: Vec<f64> = priors.iter().map(|prior| prior.value).collect();
-    let shoot = |model: &Model, record: &Record, from: &[f64]| {
-        let shooting = Shooting { model, record, priors, free: true };
-        let found = shooting.fit_settled(from, WINDOW_S, ITERATIONS.0, ITERATIONS.1);
+    let shoot = |record: &Record, priors: &[Prior], from: &[f64]| {
         step();
-        found
+        FittedPart::of(model, record, priors, from)
     };
-    let whole = shoot(model, record, &start);
+    let kinds = model.layout.kinds();
+    let start: Vec<f64> = priors.iter().map(|prior| prior.value).collect();
+    let all = shoot(record, priors, &start)?;
+    // What a parameter costs by the Bayesian information criterion (G. Schwarz, Annals of Statistics 6, 1978).
+    let cost = (record.seconds() / WINDOW_S).ln();
+    let doubted = |&(i, kind): &(usize, &ParameterKind)| is_left_out(*kind) && all.worth(i) > cost;
+    let doubts = kinds.iter().enumerate().filter(doubted);
+    let mut doubts: Vec<Doubt> =
+        doubts.map(|(i, &kind)| Doubt::LeftOut { kind, worth: all.worth(i) }).collect();
+    let asked = without(model.layout, priors, |i| is_left_out(kinds[i]));
+    let rest = shoot(record, &asked, &values(&asked, &all.fit.p))?;
+    let wanted = without(model.layout, &asked, |i| rest.worth(i) <= cost);
+    let whole = shoot(record, &wanted, &values(&wanted, &rest.fit.p))?;
+    let p = whole.fit.p.clone();
     let seconds = record.seconds();
     let cut = |from: f64, to: f64| record.part(from * seconds, to * seconds);
     let share = |part: usize| part as f64 / PARTS as f64;
-    let without: Vec<Record> =
-        (0..PARTS).map(|part| cut(0.0, share(part)).with(cut(share(part + 1), 1.0))).collect();
-    let left_out: Vec<(Record, Vec<f64>)> = without
-        .iter()
-        .enumerate()
-        .map(|(part, others)| (cut(share(part), share(part + 1)), shoot(model, others, &whole.p).p))
-        .collect();
-    let halves = [[0.0, 0.5], [0.5, 1.0]].map(|[from, to]| shoot(model, &cut(from, to), &whole.p).p);
-    let undetermined = || IdentifyError::Undetermined("the equations have no solution");
-    let shooting = Shooting { model, record, priors, free: true };
-    let inverse = shooting.inverse(&whole).ok_or_else(undetermined)?;
-    let size = whole.p.len();
+    let others = |part: usize| cut(0.0, share(part)).with(cut(share(part + 1), 1.0));
+    let one = |part: usize| Ok((cut(share(part), share(part + 1)), shoot(&others(part), &wanted, &p)?.fit.p));
+    let left_out = (0..PARTS).map(one).collect::<Result<Vec<_>, IdentifyError>>()?;
+    let half = |from: f64, to: f64| shoot(&cut(from, to), &wanted, &p);
+    let halves = [half(0.0, 0.5)?, half(0.5, 1.0)?];
+    doubts.extend(contradictions(&kinds, &halves));
+    doubts.extend(coarse(record, &whole.fit.rms));
     let deviation = |i: usize| {
-        let statistical = priors[i].deviation * inverse[i * size + i].sqrt();
         let parts: Vec<f64> = left_out.iter().map(|(_, p)| p[i]).collect();
-        let half = 0.5 * (halves[0][i] - halves[1][i]).abs();
-        statistical.hypot(jackknife(&parts)).max(half)
+        let half = 0.5 * (halves[0].fit.p[i] - halves[1].fit.p[i]).abs();
+        let is_off = wanted[i].deviation == 0.0 && priors[i].deviation > 0.0;
+        let off = if is_off { all.deviations[i].hypot(all.fit.p[i] - p[i]) } else { 0.0 };
+        whole.deviations[i].max(jackknife(&parts)).max(half).max(off)
     };
-    Ok(FreeFit { deviations: (0..size).map(deviation).collect(), inverse, halves, left_out, p: whole.p })
+    Ok(FreeFit {
+        deviations: (0..p.len()).map(deviation).collect(),
+        halves: halves.map(|half| half.fit.p),
+        inverse: whole.inverse,
+        left_out,
+        doubts,
+        p,
+    })
+}
+
+/// The priors without the terms of friction that are `unwanted`; a joint without dry friction has no bristle.
+fn without(layout: Layout, priors: &[Prior], unwanted: impl Fn(usize) -> bool) -> Vec<Prior> {
+    let mut wanted = priors.to_vec();
+    for index in (0..priors.len()).filter(|&index| layout.is_dissipative(index) && unwanted(index)) {
+        wanted[index] = Prior { value: 0.0, deviation: 0.0 };
+    }
+    for joint in 0..layout.links {
+        if wanted[layout.dry(joint + 1)].deviation == 0.0 {
+            wanted[layout.presliding(joint)].deviation = 0.0;
+        }
+    }
+    wanted
+}
+
+/// Start values: `p`, but the values of the priors where these are fixed.
+fn values(priors: &[Prior], p: &[f64]) -> Vec<f64> {
+    priors.iter().zip(p).map(|(prior, &p)| if prior.deviation > 0.0 { p } else { prior.value }).collect()
+}
+
+/// Parameters whose halves contradict each other.
+fn contradictions(kinds: &[ParameterKind], halves: &[FittedPart; 2]) -> Option<Doubt> {
+    let deviations = |i: usize| {
+        let difference = (halves[0].fit.p[i] - halves[1].fit.p[i]).abs();
+        difference / halves[0].deviations[i].hypot(halves[1].deviations[i])
+    };
+    let differ: Vec<usize> = (0..kinds.len()).filter(|&i| deviations(i) > CONTRADICTION).collect();
+    let largest = differ.iter().map(|&i| deviations(i)).fold(0.0, f64::max);
+    let kinds = differ.iter().map(|&i| kinds[i]).collect();
+    (largest > 0.0).then_some(Doubt::Halves { kinds, deviations: largest })
+}
+
+/// Channels whose residuals `rms` are far above what their sensor allows.
+fn coarse(record: &Record, rms: &[f64]) -> Vec<Doubt> {
+    let one = |channel: usize| {
+        let allowed = record.sensor_error(channel);
+        let times = rms[channel] / allowed;
+        (times > COARSE).then(|| Doubt::Residual { channel: channel_name(channel), allowed, times })
+    };
+    (usize::from(record.is_clamped)..record.channels).filter_map(one).collect()
 }
 
 /// Standard deviation of an estimate, from its values without one part of the data each (B. Efron, C. Stein, "The
@@ -181,8 +281,8 @@ mod tests {
         let mut priors = priors(&rig, chain, false);
         known(&rig, layout, &mut priors, true);
         let (record, truth) = swing(&rig, &priors);
-        let model = record.model(9.81);
-        let found = fit(&model, &record, &priors, &|| ()).unwrap();
+        let model = Model { has_bristles: true, ..record.model(9.81) };
+        let found = fit(&model, &record, &priors, &|_| false, &|| ()).unwrap();
         let near = |index: usize, most: f64| {
             let error = (found.p[index] - truth[index]).abs();
             assert!(error < most, "{index}: {} instead of {}", found.p[index], truth[index]);
@@ -192,20 +292,26 @@ mod tests {
         near(layout.drag(1), 0.1 * truth[layout.drag(1)]);
         near(layout.dry(1), 0.1 * truth[layout.dry(1)]);
         near(layout.dry(2), 0.1 * truth[layout.dry(2)]);
-        for index in (0..found.p.len()).filter(|&index| layout.is_dissipative(index)) {
-            assert!(found.p[index] >= 0.0, "{index}: {}", found.p[index]);
-        }
-        // The negative control: without drag in the model, the friction of a joint is wrong by far more than 10 %.
-        (0..2).for_each(|link| priors[layout.drag(link)].deviation = 0.0);
-        let start: Vec<f64> = priors.iter().map(|prior| prior.value).collect();
-        let without = Shooting { model: &model, record: &record, priors: &priors, free: true }.fit_settled(
-            &start,
-            WINDOW_S,
-            ITERATIONS.0,
-            ITERATIONS.1,
+        // What the machine does not have is switched off, or as good as.
+        assert!(found.p[layout.drag(0)] == 0.0 && found.p[layout.viscous(2)] < 1e-6, "{:?}", found.p);
+        let left_out = |doubts: &[Doubt], wanted: ParameterKind| {
+            doubts.iter().any(|doubt| matches!(doubt, Doubt::LeftOut { kind, .. } if *kind == wanted))
+        };
+        assert!(
+            !found.doubts.iter().any(|doubt| matches!(doubt, Doubt::LeftOut { .. })),
+            "{:?}",
+            found.doubts
         );
+        // The negative controls: without drag, the friction of a joint is wrong by far more than 10 %, and this is
+        // said; so it is without dry friction.
+        let drag = |kind| matches!(kind, ParameterKind::AirDrag(_));
+        let without = fit(&model, &record, &priors, &drag, &|| ()).unwrap();
         let error = |index: usize| (without.p[index] / truth[index] - 1.0).abs();
         let worst = error(layout.dry(1)).max(error(layout.dry(2))).max(error(layout.viscous(1)));
         assert!(worst > 0.3, "{worst}");
+        assert!(left_out(&without.doubts, ParameterKind::AirDrag(1)), "{:?}", without.doubts);
+        let dry = |kind| matches!(kind, ParameterKind::JointDry(_));
+        let without = fit(&model, &record, &priors, &dry, &|| ()).unwrap();
+        assert!(left_out(&without.doubts, ParameterKind::JointDry(0)), "{:?}", without.doubts);
     }
 }

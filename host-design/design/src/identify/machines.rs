@@ -100,9 +100,10 @@ fn truth(rig: &Rig) -> Result<Vec<(ParameterKind, f64)>, IdentifyError> {
         ParameterKind::Delay => Some(rig.reality.driver.latency_s / rig.tick.period_s),
         ParameterKind::DeadZone => rig.actuator.motor.as_ref().map(|motor| motor.dead_zone_v),
         ParameterKind::Zero(j) => Some(sensors.homing_error_rad.of(j)),
-        ParameterKind::AirDrag(_) | ParameterKind::EccentricSine(_) | ParameterKind::EccentricCosine(_) => {
-            None
-        }
+        ParameterKind::AirDrag(j) => Some(rig.reality.air_drag.air_drag_n_m_s2_per_rad2.of(j)),
+        ParameterKind::Presliding(_)
+        | ParameterKind::EccentricSine(_)
+        | ParameterKind::EccentricCosine(_) => None,
     };
     let kinds = Layout { links: real.links.len() }.kinds();
     Ok(kinds.into_iter().filter_map(|kind| Some((kind, value(kind)?))).collect())

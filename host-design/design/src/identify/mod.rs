@@ -9,12 +9,14 @@
 //! - [`coverage`]: how often the stated intervals cover the truth, over many machines that differ from their file.
 //! - [`Realised`]: the numbers of a rig file with the identified parameters.
 //!
-//! `docs/identify.md` describes the experiment, the file format, what can be identified, and the accuracy reached.
+//! `docs/identify.md` describes the experiment and the file format, `docs/identified.md` what can be identified, how it
+//! is done, and the accuracy reached.
 
 mod channel;
 mod convert;
 mod covariance;
 mod coverage;
+mod doubt;
 mod error;
 mod estimate;
 mod estimated;
@@ -46,6 +48,7 @@ mod with_firmware;
 pub use coverage::{
     Coverage, CoverageError, CoverageRow, CoveredQuantity, Drawn, Identified, Missed, coverage, identified,
 };
+pub use doubt::Doubt;
 pub use error::{IdentifyError, LogError};
 pub use estimate::{Settings, identify, identify_recordings};
 pub use estimated::{Estimate, Identification};

@@ -9,7 +9,8 @@ use super::rows::add_multiple;
 /// The chain in the notation of `ChainParameters`, for any number of links n, in the m = n + 1 coordinates x, φ_1 …
 /// φ_n.
 ///
-/// The state has s = 2m + 1 entries: coordinates, their rates, and the bristle deflection ζ of the cart's friction.
+/// The state has s = 2m + 1 entries: coordinates, their rates, and the bristle deflection ζ of the cart's friction;
+/// with bristles in the joints, too, s = 3m.
 /// Angles are absolute and measured from the normal of the rail, which rises at the angle α. With `b_jk = l_j a_k` for
 /// j < k and `b_jj = J_j` the equations are
 ///
@@ -21,7 +22,8 @@ use super::rows::add_multiple;
 /// dζ/dx = (1 - ζ sgn ẋ)/δ
 /// ```
 ///
-/// where e is the damping by the motor's back-EMF, and q_j the air drag of link j. A cart that is clamped has ẍ = 0
+/// with ζ_i of the joint instead of the tanh if it has a bristle, δ_i long. Here
+/// e is the damping by the motor's back-EMF, and q_j the air drag of link j. A cart that is clamped has ẍ = 0
 /// instead of the first equation. A cart that reverses is held by its friction until the bristle has
 /// reversed, too (P. R. Dahl, "Solid friction damping of mechanical vibrations", AIAA Journal 14(12), 1976); with a
 /// friction model without memory it would creep instead.
@@ -33,6 +35,8 @@ pub(super) struct Model {
     pub(super) smoothing: [f64; 2],
     /// Whether the cart cannot move.
     pub(super) is_clamped: bool,
+    /// Whether the friction of each joint has a bristle, as that of the cart has.
+    pub(super) has_bristles: bool,
 }
 
 /// Force on the cart in a step (N), and its derivatives.
@@ -70,16 +74,17 @@ impl Model {
 
     /// Number of states, s.
     pub(super) fn states(&self) -> usize {
-        2 * self.coordinates() + 1
+        2 * self.coordinates() + self.contacts()
     }
 
-    /// Bristle deflection after a travel of the cart (m) from the deflection `bristle`, and its derivatives by the old
-    /// deflection and by the travel.
-    pub(super) fn bristle(&self, bristle: f64, travel: f64) -> [f64; 3] {
-        let direction = 1f64.copysign(travel);
-        let left = libm::exp(-travel.abs() / self.smoothing[0]);
-        let after = direction + (bristle - direction) * left;
-        [after, left, (1.0 - direction * bristle) * left / self.smoothing[0]]
+    /// Number of bristles: that of the cart, and those of the joints.
+    pub(super) fn contacts(&self) -> usize {
+        if self.has_bristles { self.coordinates() } else { 1 }
+    }
+
+    /// Length of a bristle (m, rad).
+    pub(super) fn bristle_length(&self, p: &[f64], contact: usize) -> f64 {
+        contact.checked_sub(1).map_or(self.smoothing[0], |joint| p[self.layout.presliding(joint)])
     }
 
     /// `b_jk` (kg·m²).
@@ -91,11 +96,16 @@ impl Model {
         p[self.layout.length(low)] * p[self.layout.first_moment(high)]
     }
 
-    /// Friction in a joint that turns at `rate` (rad/s): torque (N·m), its derivative by the rate, and the tanh.
-    fn friction(&self, p: &[f64], joint: usize, rate: f64) -> [f64; 3] {
+    /// Friction in a joint of the state `at` that turns at `rate` (rad/s): torque (N·m), its derivative by the rate,
+    /// and the tanh or the bristle deflection.
+    fn friction(&self, p: &[f64], at: &[f64], joint: usize, rate: f64) -> [f64; 3] {
         let smoothing = self.smoothing[1];
-        let direction = libm::tanh(rate / smoothing);
         let (viscous, dry) = (p[self.layout.viscous(joint + 1)], p[self.layout.dry(joint + 1)]);
+        if self.has_bristles {
+            let bristle = at[2 * self.coordinates() + 1 + joint];
+            return [viscous * rate + dry * bristle, viscous, bristle];
+        }
+        let direction = libm::tanh(rate / smoothing);
         let slope = viscous + dry * (1.0 - direction * direction) / smoothing;
         [viscous * rate + dry * direction, slope, direction]
     }
@@ -103,9 +113,9 @@ impl Model {
 
 impl Accelerations {
     /// Storage for derivatives by the state, and by the parameters if `parameters`.
-    pub(super) fn new(layout: Layout, parameters: bool) -> Self {
-        let m = layout.links + 1;
-        let columns = 2 * m + 1 + if parameters { layout.of_motion() } else { 0 };
+    pub(super) fn new(model: &Model, parameters: bool) -> Self {
+        let m = model.coordinates();
+        let columns = model.states() + if parameters { model.layout.of_motion() } else { 0 };
         Self {
             columns,
             acceleration: vec![0.0; m],
@@ -144,7 +154,7 @@ impl Accelerations {
                     self.factors[(j + 1) * m + k + 1] = b * (cosine[j] * cosine[k] + sine[j] * sine[k]);
                 }
             }
-            let friction = model.friction(p, j, w[j] - below)[0];
+            let friction = model.friction(p, at, j, w[j] - below)[0];
             below = w[j];
             right[j + 1] = torque - friction - p[layout.drag(j)] * w[j].abs() * w[j];
             if j > 0 {
@@ -198,13 +208,20 @@ impl Accelerations {
                 by[row + 1 + k] -= turn;
                 by[row + m + 1 + k] -= 2.0 * across * w[k];
             }
-            let slope = model.friction(p, j, w[j] - below)[1];
+            let slope = model.friction(p, at, j, w[j] - below)[1];
             below = w[j];
             by[row + m + 1 + j] -= slope + 2.0 * p[layout.drag(j)] * w[j].abs();
             if j > 0 {
                 by[row + m + j] += slope;
                 by[row - columns + m + 1 + j] += slope;
                 by[row - columns + m + j] -= slope;
+            }
+            if model.has_bristles {
+                let (dry, bristle) = (p[layout.dry(j + 1)], 2 * m + 1 + j);
+                by[row + bristle] -= dry;
+                if j > 0 {
+                    by[row - columns + bristle] += dry;
+                }
             }
         }
     }
@@ -245,7 +262,7 @@ impl Accelerations {
             }
             let rate = w[j] - below;
             below = w[j];
-            let direction = model.friction(p, j, rate)[2];
+            let direction = model.friction(p, at, j, rate)[2];
             by[row + layout.drag(j)] -= w[j].abs() * w[j];
             by[row + layout.viscous(j + 1)] -= rate;
             by[row + layout.dry(j + 1)] -= direction;
@@ -329,20 +346,21 @@ pub(super) mod tests {
             gravity: chain.gravity_m_per_s2,
             smoothing: SMOOTHING,
             is_clamped: false,
+            has_bristles: false,
         };
         let mut p: Vec<f64> = priors(&rig, chain, true).iter().map(|prior| prior.value).collect();
         (0..3).for_each(|link| p[Layout { links: 3 }.drag(link)] = 0.02);
         (model, p, ChainPlant::of(chain).unwrap())
     }
 
-    const AT: [f64; 9] = [0.1, 2.0, -1.1, 0.4, -0.7, 3.0, -5.0, 1.5, 0.4];
+    const AT: [f64; 12] = [0.1, 2.0, -1.1, 0.4, -0.7, 3.0, -5.0, 1.5, 0.4, 0.9, -0.5, 0.2];
 
     #[test]
     fn without_dry_friction_and_tilt_it_is_the_plant() {
         let (model, mut p, plant) = triple();
         (0..=3).for_each(|contact| p[model.layout.dry(contact)] = 0.0);
         (0..3).for_each(|link| p[model.layout.drag(link)] = 0.0);
-        let mut local = Accelerations::new(model.layout, false);
+        let mut local = Accelerations::new(&model, false);
         local.accelerate(&model, &p, &AT, &CartForce { force: 17.0, ..CartForce::default() });
         let state = WideChainState { x: 0.1, xdot: -0.7, phi: [2.0, -1.1, 0.4], phidot: [3.0, -5.0, 1.5] };
         let rate = plant.derivative(&state, 17.0, &[0.0; 3]);
@@ -354,17 +372,24 @@ pub(super) mod tests {
 
     #[test]
     fn derivatives_agree_with_differences() {
-        let (model, mut p, _) = triple();
+        derivatives_agree(false);
+        derivatives_agree(true);
+    }
+
+    fn derivatives_agree(has_bristles: bool) {
+        let (mut model, mut p, _) = triple();
+        model.has_bristles = has_bristles;
         p[model.layout.tilt()] = 0.1;
-        let mut exact = Accelerations::new(model.layout, true);
+        let mut exact = Accelerations::new(&model, true);
         exact.differentiate(
             &model,
             &p,
             &AT,
             &CartForce { force: 17.0, by_delay: 2.0, by_dead_zone: -3.0, back_emf: 0.7 },
         );
-        let columns = 9 + model.layout.of_motion();
-        let mut other = Accelerations::new(model.layout, false);
+        let states = model.states();
+        let columns = states + model.layout.of_motion();
+        let mut other = Accelerations::new(&model, false);
         let mut at = |p: &[f64], state: &[f64], force: f64| {
             other.accelerate(&model, p, state, &CartForce { force, back_emf: 0.7, ..CartForce::default() });
             other.acceleration.clone()
@@ -372,8 +397,8 @@ pub(super) mod tests {
         for column in 0..columns {
             let mut ends = [1.0, -1.0].map(|sign| {
                 let (mut p, mut state, mut force) = (p.clone(), AT.to_vec(), 17.0);
-                let step = if column < 9 { 1e-6 } else { 1e-6 * p[column - 9].abs().max(1e-2) };
-                match column.checked_sub(9) {
+                let step = if column < states { 1e-6 } else { 1e-6 * p[column - states].abs().max(1e-2) };
+                match column.checked_sub(states) {
                     None => state[column] += sign * step,
                     Some(index) if index == model.layout.delay() => force += sign * step * 2.0,
                     Some(index) if index == model.layout.dead_zone() => force -= sign * step * 3.0,

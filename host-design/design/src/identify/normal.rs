@@ -112,7 +112,7 @@ impl Normal {
     }
 
     /// Replaces the equation of one unknown by `δ_index = value`.
-    fn hold(&mut self, index: usize, value: f64) {
+    pub(super) fn hold(&mut self, index: usize, value: f64) {
         for other in 0..self.size {
             let entry = self.entry(index, other);
             self.gradient[other] -= entry * value;

@@ -1,6 +1,7 @@
 //! What is identified: the parameters of a chain, their start values from the rig file, and their prior deviations.
 
 use crate::plant::ChainParameters;
+use crate::reality::PRESLIDING_PER_DEFLECTION;
 use crate::rig::{Chain, Rig};
 
 /// Travel (m) over which the bristle of the cart reverses, and rate (rad/s) below which the dry friction of a joint is
@@ -28,6 +29,8 @@ pub enum ParameterKind {
     JointDry(usize),
     /// q_j: air drag of a link, by the square of its rate (N·m·s²/rad²).
     AirDrag(usize),
+    /// δ_j: deflection of a joint's bristle under its dry friction (rad).
+    Presliding(usize),
     /// Slope of the rail (rad).
     Tilt,
     /// Delay of the force beyond `delay_ticks` (ticks).
@@ -56,6 +59,7 @@ impl ParameterKind {
             ParameterKind::CartDry => ("dry friction, cart".to_owned(), "N"),
             ParameterKind::JointDry(j) => (of("dry friction, joint", j), "N·m"),
             ParameterKind::AirDrag(j) => (of("air drag, link", j), "N·m·s²/rad²"),
+            ParameterKind::Presliding(j) => (of("bristle, joint", j), "rad"),
             ParameterKind::Tilt => ("tilt of the rail".to_owned(), "rad"),
             ParameterKind::Delay => ("delay".to_owned(), "ticks"),
             ParameterKind::DeadZone => ("dead zone".to_owned(), "V"),
@@ -93,34 +97,37 @@ impl Layout {
     pub(super) fn drag(self, link: usize) -> usize {
         5 * self.links + 2 + link
     }
+    pub(super) fn presliding(self, joint: usize) -> usize {
+        6 * self.links + 2 + joint
+    }
     pub(super) fn tilt(self) -> usize {
-        6 * self.links + 2
+        7 * self.links + 2
     }
     pub(super) fn delay(self) -> usize {
-        6 * self.links + 3
+        7 * self.links + 3
     }
     pub(super) fn dead_zone(self) -> usize {
-        6 * self.links + 4
+        7 * self.links + 4
     }
     pub(super) fn zero(self, joint: usize) -> usize {
-        6 * self.links + 5 + joint
-    }
-    pub(super) fn sine(self, joint: usize) -> usize {
         7 * self.links + 5 + joint
     }
-    pub(super) fn cosine(self, joint: usize) -> usize {
+    pub(super) fn sine(self, joint: usize) -> usize {
         8 * self.links + 5 + joint
+    }
+    pub(super) fn cosine(self, joint: usize) -> usize {
+        9 * self.links + 5 + joint
     }
     /// Whether a parameter is the friction of a joint or the drag of a link.
     pub(super) fn is_dissipative(self, index: usize) -> bool {
-        (self.viscous(1)..self.tilt()).contains(&index) && index != self.dry(0)
+        (self.viscous(1)..self.presliding(0)).contains(&index) && index != self.dry(0)
     }
     /// Number of parameters on which the motion depends: they come first; the others belong to the encoders.
     pub(super) fn of_motion(self) -> usize {
-        6 * self.links + 5
+        7 * self.links + 5
     }
     pub(super) fn count(self) -> usize {
-        9 * self.links + 5
+        10 * self.links + 5
     }
 
     /// What each parameter is, in order.
@@ -135,6 +142,7 @@ impl Layout {
         kinds.push(ParameterKind::CartDry);
         kinds.extend((0..n).map(ParameterKind::JointDry));
         kinds.extend((0..n).map(ParameterKind::AirDrag));
+        kinds.extend((0..n).map(ParameterKind::Presliding));
         kinds.extend([ParameterKind::Tilt, ParameterKind::Delay, ParameterKind::DeadZone]);
         kinds.extend((0..n).map(ParameterKind::Zero));
         kinds.extend((0..n).map(ParameterKind::EccentricSine));
@@ -152,14 +160,20 @@ pub(super) struct Prior {
     pub(super) deviation: f64,
 }
 
-/// How far each parameter may fall, in its prior deviations: frictions of joints and drags of links are at least 0.
+/// How far each parameter may fall, in its prior deviations: frictions of joints and drags of links are at least 0, and
+/// a bristle has a length.
 pub(super) fn room_below(layout: Layout, priors: &[Prior], p: &[f64]) -> Vec<f64> {
     let of = |(index, (prior, p)): (usize, (&Prior, &f64))| {
-        let is_bounded = layout.is_dissipative(index) && prior.deviation > 0.0;
-        if is_bounded { -p / prior.deviation } else { f64::NEG_INFINITY }
+        let is_length = (layout.presliding(0)..layout.tilt()).contains(&index);
+        let least = if is_length { LEAST_PRESLIDING_RAD } else { 0.0 };
+        let is_bounded = (is_length || layout.is_dissipative(index)) && prior.deviation > 0.0;
+        if is_bounded { (least - p) / prior.deviation } else { f64::NEG_INFINITY }
     };
     priors.iter().zip(p).enumerate().map(of).collect()
 }
+
+/// Least length of a joint's bristle (rad).
+const LEAST_PRESLIDING_RAD: f64 = 5e-5;
 
 /// Relative deviation of masses, lengths and moments.
 const SHAPE: f64 = 0.5;
@@ -198,7 +212,12 @@ pub(super) fn priors(rig: &Rig, chain: &Chain, eccentricity: bool) -> Vec<Prior>
         ParameterKind::JointDry(j) => {
             dry(friction.joint_friction_n_m.of(j), 0.001 * gravity * constants.a[j])
         }
-        ParameterKind::AirDrag(_) => Prior { value: 0.0, deviation: 0.0 },
+        ParameterKind::AirDrag(j) => {
+            Prior { value: rig.reality.air_drag.air_drag_n_m_s2_per_rad2.of(j), deviation: 0.0 }
+        }
+        ParameterKind::Presliding(j) => {
+            Prior { value: friction.presliding_rad.of(j) / PRESLIDING_PER_DEFLECTION, deviation: 0.0 }
+        }
         ParameterKind::Tilt => Prior { value: 0.0, deviation: ZERO_RAD },
         ParameterKind::Delay => Prior { value: 0.5, deviation: 0.5 },
         ParameterKind::DeadZone => motor.map_or(Prior { value: 0.0, deviation: 0.0 }, |motor| Prior {

@@ -163,7 +163,7 @@ impl Filter<'_> {
         let size = if free { self.model.layout.count() } else { 0 };
         let mut normal = Normal::new(size, m);
         let mut step = Step::new(self.model, free);
-        let mut filter = FilterState::new(self.record.state_near(p, self.model.layout, piece, first), size);
+        let mut filter = FilterState::new(self.record.state_near(p, self.model, piece, first), size);
         for channel in 0..m {
             let step = self.record.steps[channel];
             // Absolute angles are sums of measured joint angles.

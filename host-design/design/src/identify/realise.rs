@@ -2,6 +2,7 @@
 
 use super::error::IdentifyError;
 use super::parameters::Layout;
+use crate::reality::PRESLIDING_PER_DEFLECTION;
 use crate::rig::Chain;
 
 /// The numbers of a rig file that an identification changes.
@@ -38,6 +39,10 @@ pub struct RealisedLink {
     pub viscous: f64,
     /// Dry friction of the joint (N·m).
     pub dry_n_m: f64,
+    /// Angle over which the dry friction builds up (rad).
+    pub presliding_rad: f64,
+    /// Air drag of the link (N·m·s²/rad²).
+    pub air_drag: f64,
 }
 
 /// Relative margin of a mass above the least that its moments allow.
@@ -85,6 +90,8 @@ pub(super) fn realise(chain: &Chain, p: &[f64], weighed: Option<f64>) -> Result<
             inertia_kg_m2: second - mass_kg * centre_m * centre_m,
             viscous: (scale * p[layout.viscous(j + 1)]).max(0.0),
             dry_n_m: (scale * p[layout.dry(j + 1)]).max(0.0),
+            presliding_rad: PRESLIDING_PER_DEFLECTION * p[layout.presliding(j)],
+            air_drag: (scale * p[layout.drag(j)]).max(0.0),
         });
         outer += mass_kg;
     }

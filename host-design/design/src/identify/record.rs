@@ -214,12 +214,12 @@ impl Record {
     }
 
     /// The state at a sample, from a parabola through the measurements around it.
-    pub(super) fn state_near(&self, p: &[f64], layout: Layout, piece: usize, sample: usize) -> Vec<f64> {
-        let m = self.channels;
+    pub(super) fn state_near(&self, p: &[f64], model: &Model, piece: usize, sample: usize) -> Vec<f64> {
+        let (m, layout) = (self.channels, model.layout);
         let half = ((0.016 / self.dt_s).ceil() as usize).max(2);
         let last = self.samples(piece) - 1;
         let (low, high) = (sample.saturating_sub(half), (sample + half).min(last));
-        let mut state = vec![0.0; 2 * m + 1];
+        let mut state = vec![0.0; model.states()];
         for channel in 0..m {
             let points = (low..=high).map(|at| {
                 let time = (at as f64 - sample as f64) * self.dt_s;
@@ -227,6 +227,10 @@ impl Record {
             });
             let [value, rate] = parabola(points);
             (state[channel], state[m + channel]) = (value, rate);
+        }
+        // What moves by a count in a few samples bends its bristle.
+        for contact in 0..model.contacts() {
+            state[2 * m + contact] = libm::tanh(state[m + contact] / (self.steps[contact] / 0.016));
         }
         for joint in 0..m - 1 {
             state[joint + 1] -= p[layout.zero(joint)];
@@ -236,9 +240,24 @@ impl Record {
             state[joint + 1] += state[joint];
             state[m + joint + 1] += state[m + joint];
         }
-        // A moving cart deflects its bristle.
-        state[2 * m] = libm::tanh(state[m] / (self.steps[0] / 0.016));
         state
+    }
+
+    /// Error (rms; m, rad) that the sensor of a channel alone makes: quantisation, or more if the measurements are
+    /// noisier, as fourth differences show, in which smooth motion vanishes.
+    pub(super) fn sensor_error(&self, channel: usize) -> f64 {
+        let (mut squares, mut count) = (0.0, 0usize);
+        for piece in &self.pieces {
+            let y = |sample: usize| piece.y[sample * self.channels + channel];
+            for at in 2..(piece.y.len() / self.channels).saturating_sub(2) {
+                let fourth = y(at - 2) - 4.0 * y(at - 1) + 6.0 * y(at) - 4.0 * y(at + 1) + y(at + 2);
+                squares += fourth * fourth;
+                count += 1;
+            }
+        }
+        // 1 + 16 + 36 + 16 + 1.
+        let noise = (squares / (70.0 * count.max(1) as f64)).sqrt();
+        noise.max(self.steps[channel] / 12f64.sqrt())
     }
 
     /// Largest deviation of a channel from hanging, and its range from end to end (m, rad).
@@ -298,6 +317,7 @@ impl Record {
             gravity,
             smoothing: super::parameters::SMOOTHING,
             is_clamped: self.is_clamped,
+            has_bristles: false,
         }
     }
 }

@@ -27,8 +27,8 @@ pub(super) struct ShootingWindow {
     first: usize,
     samples: usize,
     state: Vec<f64>,
-    /// Expected bristle deflection at the start; its prior deviation is 1.
-    bristle: f64,
+    /// Expected bristle deflections at the start, and their prior deviations.
+    bristles: Vec<[f64; 2]>,
 }
 
 /// Multiple shooting on a record.
@@ -65,9 +65,12 @@ impl Shooting<'_> {
             for first in (0..self.record.samples(piece)).step_by(samples) {
                 let samples = samples.min(self.record.samples(piece) - first);
                 if 2 * samples as u64 >= (seconds / self.record.dt_s) as u64 {
-                    let state = self.record.state_near(p, self.model.layout, piece, first);
-                    let bristle = state[state.len() - 1];
-                    windows.push(ShootingWindow { piece, first, samples, state, bristle });
+                    let state = self.record.state_near(p, self.model, piece, first);
+                    let bristles = state[2 * self.model.coordinates()..].iter().enumerate();
+                    // A joint that turns has bent its bristle.
+                    let deviation = |of: usize, at: f64| if of == 0 { 1.0 } else { 1.01 - at * at };
+                    let bristles = bristles.map(|(of, &at)| [at, deviation(of, at)]).collect();
+                    windows.push(ShootingWindow { piece, first, samples, state, bristles });
                 }
             }
         }
@@ -107,12 +110,31 @@ impl Shooting<'_> {
         fit
     }
 
-    /// Inverse of the normal matrix of the scaled parameters, with the initial states eliminated; none if there is
-    /// none.
-    pub(super) fn inverse(&self, fit: &Fit) -> Option<Vec<f64>> {
+    /// Inverse of the normal matrix of the scaled parameters, with the initial states eliminated, and the standard
+    /// deviation of each scaled parameter from the scatter of the windows' gradients `g`: `A⁻¹ Σ g gᵀ A⁻¹` (P. J.
+    /// Huber, 5th Berkeley Symposium, 1967), so the residuals within a window may depend on each other. A parameter at
+    /// its bound is not free for the others. None if the matrix has no inverse.
+    pub(super) fn deviations(&self, fit: &Fit) -> Option<(Vec<f64>, Vec<f64>)> {
         let weights: Vec<f64> =
             fit.rms.iter().zip(&self.record.steps).map(|(rms, step)| rms.max(0.2 * step).powi(-2)).collect();
-        Some(self.linearise(fit, &weights).0.factor(0.0)?.inverse())
+        let mut windows = Vec::new();
+        let (normal, _) = self.linearise_each(&self.inputs(&fit.p), fit, &weights, &mut windows);
+        let inverse = normal.factor(0.0)?.inverse();
+        let mut bounded = normal;
+        let room = room_below(self.model.layout, self.priors, &fit.p);
+        let held: Vec<usize> = (0..fit.p.len()).filter(|&i| room[i] > -1e-9).collect();
+        held.iter().for_each(|&i| bounded.hold(i, 0.0));
+        let factor = bounded.factor(0.0)?;
+        let mut squares = vec![0.0; fit.p.len()];
+        for gradient in &mut windows {
+            held.iter().for_each(|&i| gradient[i] = 0.0);
+            factor.solve(gradient);
+            squares.iter_mut().zip(&*gradient).for_each(|(sum, by)| *sum += by * by);
+        }
+        let deviation =
+            |i: usize| if held.contains(&i) { inverse[i * fit.p.len() + i] } else { squares[i] }.sqrt();
+        let deviations = (0..fit.p.len()).map(deviation).collect();
+        Some((inverse, deviations))
     }
 
     /// Predictions of `fit` in its windows: piece, sample, and the predicted measurements of all channels.
@@ -221,9 +243,8 @@ impl Shooting<'_> {
             }
             reduced.states.solve(&mut move_by);
             window.state.iter_mut().zip(move_by).for_each(|(state, by)| *state += share * by);
-            if let Some(bristle) = window.state.last_mut() {
-                *bristle = bristle.clamp(-1.0, 1.0);
-            }
+            let bristles = &mut window.state[2 * self.model.coordinates()..];
+            bristles.iter_mut().for_each(|bristle| *bristle = bristle.clamp(-1.0, 1.0));
         }
         Some(trial)
     }
@@ -246,6 +267,17 @@ impl Shooting<'_> {
         fit: &Fit,
         weights: &[f64],
     ) -> (Normal, Vec<Reduced>) {
+        self.linearise_each(inputs, fit, weights, &mut Vec::new())
+    }
+
+    /// [`Self::linearise_with`]; adds the gradient of each window to `gradients`.
+    fn linearise_each(
+        &self,
+        inputs: &[Vec<CartForce>],
+        fit: &Fit,
+        weights: &[f64],
+        gradients: &mut Vec<Vec<f64>>,
+    ) -> (Normal, Vec<Reduced>) {
         let each = parallel::map(&fit.windows, |window| {
             let whole = self.window(&fit.p, &inputs[window.piece], window, weights);
             self.reduce(whole)
@@ -255,6 +287,7 @@ impl Shooting<'_> {
         let mut kept = Vec::with_capacity(each.len());
         for (normal, reduced) in each {
             sum = sum.merge(&normal);
+            gradients.push(normal.gradient);
             match reduced {
                 Some(reduced) => kept.push(reduced),
                 None => sum.cost = f64::NAN,
@@ -278,10 +311,13 @@ impl Shooting<'_> {
         (0..s).for_each(|i| by[i * columns + i] = 1.0);
         let mut next = by.clone();
         let mut row = vec![0.0; size];
-        row[s - 1] = 1.0;
-        let off = window.bristle - state[s - 1];
-        normal.add(&row, off, 1.0);
-        normal.cost += off * off;
+        for (index, [expected, deviation]) in (2 * m..).zip(&window.bristles) {
+            row[index] = 1.0 / deviation;
+            let off = (expected - state[index]) / deviation;
+            normal.add(&row, off, 1.0);
+            normal.cost += off * off;
+            row[index] = 0.0;
+        }
         let y = &self.record.pieces[window.piece].y;
         for sample in window.first..window.first + window.samples {
             for channel in 0..m {

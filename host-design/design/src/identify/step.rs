@@ -31,7 +31,7 @@ impl Step {
         let columns = s + if parameters { model.layout.of_motion() } else { 0 };
         let (of_state, of_columns) = (vec![0.0; s], vec![0.0; s * columns]);
         Self {
-            local: Accelerations::new(model.layout, parameters),
+            local: Accelerations::new(model, parameters),
             columns,
             end: of_state.clone(),
             by: of_columns.clone(),
@@ -55,7 +55,7 @@ impl Step {
             (0..s).for_each(|i| self.at[i] = start[i] + h * self.rate[i]);
             set_multiple(&mut self.at_by, h, &self.rate_by);
             (0..s).for_each(|i| self.at_by[i * columns + i] += 1.0);
-            bend(model, start, &mut self.at, &mut self.at_by);
+            bend(model, p, start, &mut self.at, &mut self.at_by);
             self.local.differentiate(model, p, &self.at, input);
             self.rate[..m].copy_from_slice(&self.at[m..2 * m]);
             self.rate[m..2 * m].copy_from_slice(&self.local.acceleration);
@@ -75,7 +75,7 @@ impl Step {
             add_multiple(&mut self.end, h, &self.rate);
             add_multiple(&mut self.by, h, &self.rate_by);
         }
-        bend(model, start, &mut self.end, &mut self.by);
+        bend(model, p, start, &mut self.end, &mut self.by);
     }
 
     /// Accelerations per unit of force and torque at the last stage of the step; see [`Accelerations::inputs`].
@@ -84,16 +84,35 @@ impl Step {
     }
 }
 
-/// Sets the bristle deflection of the state `at`, and its derivatives in `by`, after the travel since `start`.
-fn bend(model: &Model, start: &[f64], at: &mut [f64], by: &mut [f64]) {
-    let last = at.len() - 1;
-    let [bent, by_start, by_travel] = model.bristle(start[last], at[0] - start[0]);
-    at[last] = bent;
+/// Sets the bristle deflections of the state `at`, and their derivatives in `by`, after the travel since `start`.
+fn bend(model: &Model, p: &[f64], start: &[f64], at: &mut [f64], by: &mut [f64]) {
     let columns = by.len() / at.len();
-    let (others, row) = by.split_at_mut(last * columns);
-    set_multiple(row, by_travel, &others[..columns]);
-    row[0] -= by_travel;
-    row[last] += by_start;
+    for contact in 0..model.contacts() {
+        let index = 2 * model.coordinates() + contact;
+        // A joint turns by its link less the link below it.
+        let below = contact.checked_sub(1).filter(|below| *below > 0);
+        let turned = |state: &[f64]| state[contact] - below.map_or(0.0, |below| state[below]);
+        let (travel, length) = (turned(at) - turned(start), model.bristle_length(p, contact));
+        let direction = 1f64.copysign(travel);
+        let left = libm::exp(-travel.abs() / length);
+        let off = start[index] - direction;
+        let by_travel = -direction * off * left / length;
+        at[index] = direction + off * left;
+        let (others, row) = by.split_at_mut(index * columns);
+        let row = &mut row[..columns];
+        set_multiple(row, by_travel, &others[contact * columns..][..columns]);
+        row[contact] -= by_travel;
+        if let Some(below) = below {
+            add_multiple(row, -by_travel, &others[below * columns..][..columns]);
+            row[below] += by_travel;
+        }
+        row[index] += left;
+        if let Some(joint) = contact.checked_sub(1)
+            && columns > at.len()
+        {
+            row[at.len() + model.layout.presliding(joint)] += off * left * travel.abs() / (length * length);
+        }
+    }
 }
 
 /// Predicted measurement of one channel (0: cart, then the joints) as deviation from hanging, and terms of its
@@ -151,18 +170,26 @@ mod tests {
 
     #[test]
     fn the_derivatives_of_a_step_agree_with_differences() {
-        let (model, p, _) = triple();
+        derivatives_agree(false);
+        derivatives_agree(true);
+    }
+
+    fn derivatives_agree(has_bristles: bool) {
+        let (mut model, mut p, _) = triple();
+        model.has_bristles = has_bristles;
+        (0..3).for_each(|joint| p[model.layout.presliding(joint)] = 0.01);
         // The cart moves by a fraction of the length of its bristle; at 0 its travel is exact.
-        let start = [0.0, 2.0, -1.1, 0.4, -0.005, 3.0, -5.0, 1.5, 0.4];
+        let start = [0.0, 2.0, -1.1, 0.4, -0.005, 3.0, -5.0, 1.5, 0.4, 0.9, -0.5, 0.2];
+        let (states, start) = (model.states(), &start[..model.states()]);
         let input = CartForce { force: 3.0, ..CartForce::default() };
         let after = |p: &[f64], start: &[f64]| {
             let mut step = Step::new(&model, true);
             step.take(&model, p, start, &input, 0.002);
             step
         };
-        let exact = after(&p, &start);
+        let exact = after(&p, start);
         let check = |column: usize, high: Step, low: Step, width: f64| {
-            for row in 0..9 {
+            for row in 0..states {
                 let wanted = (high.end[row] - low.end[row]) / width;
                 let found = exact.by[row * exact.columns + column];
                 assert!(
@@ -171,9 +198,9 @@ mod tests {
                 );
             }
         };
-        for i in 0..9 {
+        for i in 0..states {
             let moved = |by: f64| {
-                let mut start = start;
+                let mut start = start.to_vec();
                 start[i] += by;
                 after(&p, &start)
             };
@@ -186,9 +213,9 @@ mod tests {
             let moved = |by: f64| {
                 let mut p = p.clone();
                 p[i] += by;
-                after(&p, &start)
+                after(&p, start)
             };
-            check(9 + i, moved(width), moved(-width), 2.0 * width);
+            check(states + i, moved(width), moved(-width), 2.0 * width);
         }
     }
 }

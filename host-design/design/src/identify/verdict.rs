@@ -3,13 +3,17 @@
 use super::channel::channel_name;
 use super::error::IdentifyError;
 use super::normal::Normal;
-use super::window_errors::WindowErrors;
+use super::window_errors::{WINDOWS_S, WindowErrors};
 use super::wiring::WiringFound;
 
 /// Largest accepted variance of the innovations, as a multiple of what the filter expects.
 const MOST_VARIANCE: f64 = 1.5;
 /// Largest accepted prediction error (rms) over a window, as a share of the channel's range.
 const MOST_ERROR: f64 = 0.02;
+/// The same for windows of free swings of each length.
+const MOST_ERRORS: [f64; WINDOWS_S.len()] = [0.003, 0.005, 0.008];
+/// What the sensors may add to that, as a multiple of their error.
+const OF_SENSOR: f64 = 3.0;
 
 /// How well the model explains a channel.
 #[derive(Debug, Clone, PartialEq)]
@@ -95,19 +99,21 @@ pub(super) fn judge(channels: &[ChannelFit]) -> Result<(), Refusal> {
 
 /// Checks that parts of a recording are predicted with numbers from its other parts.
 pub(super) fn judge_windows(left_out: &[WindowErrors]) -> Result<(), Refusal> {
-    let Some(shortest) = left_out.first() else { return Ok(()) };
-    for channel in &shortest.channels {
-        let percent = channel.percent()[1];
-        // Written so that NaN counts as a misfit.
-        let fits = percent <= 100.0 * MOST_ERROR;
-        if !fits {
-            return Err(Refusal::Misfit(format!(
-                "{} does not fit: predictions over {} s are off by {percent:.1} % of its motion, at most {:.0} % are accepted; \
-                 is this the recording of this machine, and are --angles, --zero, --reversed and the counts right?",
-                channel.name,
-                shortest.window_s,
-                100.0 * MOST_ERROR
-            )));
+    for (windows, most) in left_out.iter().zip(MOST_ERRORS) {
+        for channel in &windows.channels {
+            let most = most + OF_SENSOR * channel.sensor_error / channel.range;
+            let percent = channel.percent()[1];
+            // Written so that NaN counts as a misfit.
+            let fits = percent <= 100.0 * most;
+            if !fits {
+                return Err(Refusal::Misfit(format!(
+                    "{} does not fit: predictions over {} s are off by {percent:.2} % of its motion, at most {:.2} % are accepted; \
+                     is this the recording of this machine, and are --angles, --zero, --reversed and the counts right?",
+                    channel.name,
+                    windows.window_s,
+                    100.0 * most
+                )));
+            }
         }
     }
     Ok(())

@@ -27,6 +27,8 @@ pub struct ChannelError {
     pub name: String,
     /// Range of the measured motion from end to end (m, rad).
     pub range: f64,
+    /// Error (rms) that quantisation and noise of the sensor alone make (m, rad).
+    pub sensor_error: f64,
     /// Error (rms) with the old file and with the new numbers (m, rad).
     pub errors: [f64; 2],
 }
@@ -71,6 +73,7 @@ fn over(model: &Model, priors: &[Prior], records: &[Predicting<'_>], window_s: f
     let error = |channel: usize| ChannelError {
         name: channel_name(channel),
         range: extent[channel][1] - extent[channel][0],
+        sensor_error: records.iter().map(|(record, _)| record.sensor_error(channel)).fold(0.0, f64::max),
         errors: squares[channel].map(|sum| (sum / count.max(1) as f64).sqrt()),
     };
     WindowErrors { window_s, channels: (usize::from(model.is_clamped)..channels).map(error).collect() }

@@ -3,6 +3,10 @@
 /// Share of the Coulomb friction up to which the contact deforms elastically: 0.7169 in the example of Dupont et al.
 const ELASTIC_SHARE: f64 = 0.7;
 
+/// Travel over which the friction builds up, as a multiple of the deflection under the Coulomb friction: beyond z_e,
+/// the parabola needs twice the remaining deflection.
+pub const PRESLIDING_PER_DEFLECTION: f64 = 2.0 - ELASTIC_SHARE;
+
 /// Damping ratio of a stuck contact: a bristle that is released rings down, as metal does.
 const DAMPING_RATIO: f64 = 0.1;
 
@@ -62,8 +66,7 @@ struct Moved {
 impl Bristle {
     /// The bristle of a contact with these properties.
     pub fn new(contact: &Contact) -> Self {
-        // From z_e on, the parabola needs a travel of twice the remaining deflection.
-        let coulomb = contact.presliding / (2.0 - ELASTIC_SHARE);
+        let coulomb = contact.presliding / PRESLIDING_PER_DEFLECTION;
         let stiffness = contact.coulomb / coulomb;
         Self {
             stiffness,

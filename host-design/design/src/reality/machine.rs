@@ -1,4 +1,4 @@
-//! The chain with dry friction, belt and tilted rail.
+//! The chain with dry friction, air drag, belt and tilted rail.
 
 // The indices are those of the equations, and all are below N.
 #![allow(clippy::needless_range_loop)]
@@ -19,7 +19,7 @@ use crate::rig::{Chain, Rig};
 /// of about 1e-5 of the contact's swing; half of this phase changes the runs less than another seed does.
 const LARGEST_PHASE: f64 = 0.25;
 
-/// A chain with dry friction, belt and tilted rail.
+/// A chain with dry friction, air drag, belt and tilted rail.
 ///
 /// Angles of its state are from the vertical, as in a plant without tilt; internally they are from the rail's normal.
 #[derive(Debug, Clone, PartialEq)]
@@ -30,6 +30,8 @@ pub struct RealChain<const N: usize> {
     cart: Option<Bristle>,
     /// Deflections of the bristles in the joints (rad), and under the cart (m).
     bent: ([f64; N], f64),
+    /// Torque on each link per square of its rate (N·m·s²/rad²), where there is air drag.
+    drag: Option<[f64; N]>,
     belt: Option<Belt>,
     slope: Slope<N>,
     longest_step_s: f64,
@@ -83,6 +85,7 @@ impl<const N: usize> RealChain<N> {
             links_n_m: core::array::from_fn(|j| along * parameters.a[j]),
         };
         let mobility = mobility(&parameters);
+        let air_drag = &rig.reality.air_drag.air_drag_n_m_s2_per_rad2;
         let (joints, cart) = bristles(rig, &mobility);
         let mut stiffness_per_mass = 0.0;
         if let Some(joints) = &joints {
@@ -100,6 +103,7 @@ impl<const N: usize> RealChain<N> {
             joints,
             cart,
             bent: ([0.0; N], 0.0),
+            drag: air_drag.is_any().then(|| core::array::from_fn(|j| air_drag.of(j))),
             belt,
             slope,
             longest_step_s: LARGEST_PHASE / stiffness_per_mass.sqrt(),
@@ -138,6 +142,14 @@ impl<const N: usize> RealChain<N> {
             let (travel, rate) = (relative(&here.phi, &start.phi), relative(&here.phidot, &[0.0; N]));
             for j in 0..N {
                 torques[j] -= bristles[j].force(self.bent.0[j], travel[j], rate[j]);
+            }
+        }
+        if let Some(drag) = &self.drag {
+            // Q_j = τ_j - τ_{j+1}.
+            let mut above = 0.0;
+            for j in (0..N).rev() {
+                above += drag[j] * here.phidot[j].abs() * here.phidot[j];
+                torques[j] -= above;
             }
         }
         if self.slope.angle != 0.0 {
@@ -220,7 +232,7 @@ fn bristles<const N: usize>(rig: &Rig, mobility: &[f64]) -> (Option<[Bristle; N]
     };
     let joint = |j: usize| {
         let coulomb = friction.joint_friction_n_m.of(j);
-        contact(coulomb, friction.stribeck_rad_per_s, friction.presliding_rad, mobility[j + 1])
+        contact(coulomb, friction.stribeck_rad_per_s, friction.presliding_rad.of(j), mobility[j + 1])
     };
     let joints = friction.joint_friction_n_m.is_any().then(|| core::array::from_fn(joint));
     let cart = (friction.cart_friction_n > 0.0).then(|| {
@@ -326,6 +338,7 @@ pub fn ideal_chain(chain: &Chain, rig: &Rig) -> Option<Chain> {
     let (friction, drive_train) = (&rig.reality.friction, &rig.reality.drive_train);
     let is_ideal = !friction.joint_friction_n_m.is_any()
         && friction.cart_friction_n == 0.0
+        && !rig.reality.air_drag.air_drag_n_m_s2_per_rad2.is_any()
         && drive_train.backlash_m == 0.0
         && drive_train.belt_compliance_m_per_n == 0.0
         && rig.reality.sensors.rail_tilt_rad == 0.0;

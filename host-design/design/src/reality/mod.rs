@@ -2,7 +2,7 @@
 //!
 //! - [`Bristle`]: dry friction with sticking.
 //! - [`Belt`]: backlash and an elastic belt.
-//! - [`real_plant`]: the chain with both, on a tilted rail, with its real masses and lengths.
+//! - [`real_plant`]: the chain with both and with air drag, on a tilted rail, with its real masses and lengths.
 //! - [`Driver`]: motor driver and supply.
 //! - [`Timing`]: when the force of a tick begins and ends.
 //! - [`RealEncoders`]: errors of encoders and of their zeros.
@@ -19,7 +19,7 @@ mod parameters;
 mod timing;
 
 pub use belt::{Belt, Rotor};
-pub use bristle::{Bristle, Contact};
+pub use bristle::{Bristle, Contact, PRESLIDING_PER_DEFLECTION};
 pub use driver::Driver;
 pub use encoders::{RealEncoders, hanging_by_hand};
 pub use machine::{RealChain, ideal_chain, real_plant};

@@ -33,7 +33,13 @@ fn run(rig: &Rig, log: &Log, settings: &Settings) -> Result<Identification, Iden
     identify(rig, &[(PathBuf::from("run.log"), log.clone())], settings, &|_| ())
 }
 
-const TRUSTED: Settings = Settings { eccentricity: false, weighed_kg_m: None, trust_wiring: true };
+const TRUSTED: Settings = Settings {
+    eccentricity: false,
+    weighed_kg_m: None,
+    trust_wiring: true,
+    without_drag: false,
+    without_dry: false,
+};
 
 /// The log with each row of deviations from hanging (counts) changed.
 fn rewired(log: &Log, change: impl Fn(&mut [i64])) -> Log {

@@ -1,4 +1,4 @@
-//! Dry friction, compared with known results.
+//! Dry friction and air drag, compared with known results.
 
 use crate::plant_rigs::{chain, rod, unequal_rods};
 use core::f64::consts::PI;
@@ -66,7 +66,7 @@ fn a_block_on_an_incline_sticks_for_minutes_or_slides_as_in_the_textbook() {
 /// Turning points (rad, from hanging) of a pendulum that is let go at `angle`; its cart is too heavy to move.
 fn turning_points(friction_n_m: f64, angle: f64, count: usize) -> Vec<f64> {
     let mut reality = joint_friction(friction_n_m);
-    reality.friction.presliding_rad = 1e-5;
+    reality.friction.presliding_rad = PerJoint::all(1e-5);
     let mut pendulum = machine(&chain(1e12, vec![rod(1.0, 1.0)]), reality);
     pendulum.set_state(&[0.0, 0.0, PI + angle, 0.0]);
     let (mut points, mut before) = (vec![angle], 0.0);
@@ -94,6 +94,36 @@ fn the_swing_of_a_pendulum_with_dry_friction_decays_linearly() {
     // With viscous friction the losses would shrink with the swing, to 35 % here.
     let (first, last) = (points[0].abs() - points[1].abs(), points[9].abs() - points[10].abs());
     assert!(last > 0.99 * first, "{first} {last}");
+}
+
+#[test]
+fn air_drag_takes_the_cube_of_each_links_rate() {
+    let drag = [0.05, 0.02];
+    let swing = |drag: PerJoint| {
+        let mut reality = Reality::default();
+        reality.air_drag.air_drag_n_m_s2_per_rad2 = drag;
+        let mut links = machine(&unequal_rods(2), reality);
+        links.set_state(&[0.0, 0.0, 1.5, 0.0, -2.0, 0.0]);
+        links
+    };
+    let energy = |plant: &dyn Plant| plant.energy().map(|energy| energy.kinetic + energy.potential).unwrap();
+    let mut swinging = swing(PerJoint::each(drag.to_vec()));
+    let (before, mut lost) = (energy(&*swinging), 0.0);
+    let mut last = 0.0;
+    for _ in 0..20_000 {
+        swinging.advance(0.0, &[0.0; 2], 1e-4, 1);
+        let now = state(&*swinging);
+        // The drag acts on the rate of a link, not of a joint.
+        let power = drag[0] * now[3].abs().powi(3) + drag[1] * (now[3] + now[5]).abs().powi(3);
+        lost += 0.5e-4 * (last + power);
+        last = power;
+    }
+    let found = before - energy(&*swinging);
+    assert!(found > 0.1 && (found / lost - 1.0).abs() < 1e-4, "{found} {lost}");
+    // The negative control: without the key nothing is lost.
+    let mut free = swing(PerJoint::all(0.0));
+    free.advance(0.0, &[0.0; 2], 2.0, 20_000);
+    assert!((before - energy(&*free)).abs() < 1e-6 * found);
 }
 
 #[test]

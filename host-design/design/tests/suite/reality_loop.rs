@@ -131,7 +131,7 @@ fn the_limit_cycle_of_the_single_pendulum_is_that_of_the_describing_function() {
     for law in Law::ALL {
         for friction in [2e-3, 5e-3] {
             rig.reality.friction.joint_friction_n_m = PerJoint::all(friction);
-            rig.reality.friction.presliding_rad = 1e-5;
+            rig.reality.friction.presliding_rad = PerJoint::all(1e-5);
             let found = swing(&rig, &table, law, 1, 60.0).unwrap();
             let predicted = predicted_swing(&rig, law, friction);
             // The describing function neglects the harmonics, which the loop with pole placement hardly filters.
@@ -271,6 +271,13 @@ fn the_size_of_each_imperfection_that_makes_the_loop_fall_is_found() {
     let falls_at = friction.falls_at.unwrap();
     assert!((0.8e-4..3e-4).contains(&falls_at) && friction.danger > 1.0, "{friction:?}");
     assert!(friction.turned_off_at.unwrap() <= falls_at);
+    let least = friction.bristles.iter().filter_map(|one| one.turned_off_at).fold(f64::INFINITY, f64::min);
+    assert_eq!((friction.bristles.len(), friction.turned_off_at), (2, Some(least)));
+    // Fault detection ends the runs with cart friction, and a tolerance cures that; no tolerance cures a fall.
+    let (cart, spread) = (of("cart_friction_n"), of("parameter_spread_percent"));
+    let cure = cart.cure.as_ref().unwrap();
+    assert!(cure.turned_off_at > 2.0 * cart.turned_off_at.unwrap() && cure.change.starts_with("robust."));
+    assert!(spread.cure.as_ref().is_none_or(|cure| !cure.change.starts_with("robust.")), "{spread:?}");
     assert!(found.alone.windows(2).all(|pair| pair[0].danger >= pair[1].danger));
     assert_eq!(found.together.map(|verdict| verdict.survived), Some(1));
 }

@@ -2,9 +2,9 @@
 
 use std::path::Path;
 
-use upright_design::identify::{Identification, Realised};
+use upright_design::identify::{Identification, Realised, RealisedLink};
 use upright_design::number::rounded;
-use upright_design::rig::{Actuator, Rig, RigError, RigText};
+use upright_design::rig::{Rig, RigError, RigText};
 
 /// Errors of masses and lengths in `[reality]`. The identified numbers include them, so they are set to 0.
 const WITHIN: [&str; 5] = [
@@ -28,7 +28,7 @@ pub fn rig_file(
 ) -> Result<String, RigError> {
     let mut text = RigText::parse(old, file)?;
     if let Some(realised) = &found.realised {
-        for (key, value) in values(realised, &rig.actuator) {
+        for (key, value) in values(realised, rig, found.is_driven) {
             text.set(&key, &value)?;
         }
     }
@@ -46,7 +46,7 @@ pub fn rig_file(
 }
 
 /// Keys and values, with six digits: more than the identification knows.
-fn values(realised: &Realised, actuator: &Actuator) -> Vec<(String, String)> {
+fn values(realised: &Realised, rig: &Rig, is_driven: bool) -> Vec<(String, String)> {
     let number = |value: f64| rounded(value, 6).to_string();
     let mut values = vec![
         ("cart.mass_kg".to_owned(), number(realised.cart_kg)),
@@ -64,9 +64,17 @@ fn values(realised: &Realised, actuator: &Actuator) -> Vec<(String, String)> {
             (key("friction_n_m_s_per_rad"), number(link.viscous)),
         ]);
     }
-    let dry: Vec<String> = realised.links.iter().map(|link| number(link.dry_n_m)).collect();
-    values.push(("reality.joint_friction_n_m".to_owned(), format!("[{}]", dry.join(", "))));
-    if let Some(motor) = &actuator.motor {
+    let mut each = |key: &str, of: fn(&RealisedLink) -> f64| {
+        let numbers: Vec<String> = realised.links.iter().map(|link| number(of(link))).collect();
+        values.push((format!("reality.{key}"), format!("[{}]", numbers.join(", "))));
+    };
+    each("joint_friction_n_m", |link| link.dry_n_m);
+    // Only free swings show these.
+    if !is_driven {
+        each("presliding_rad", |link| link.presliding_rad);
+        each("air_drag_n_m_s2_per_rad2", |link| link.air_drag);
+    }
+    if let Some(motor) = &rig.actuator.motor {
         values.push(("actuator.dead_zone_v".to_owned(), number(realised.dead_zone_v)));
         let resistance = motor.resistance_ohm * realised.resistance_factor;
         if realised.resistance_factor != 1.0 {
@@ -95,6 +103,7 @@ mod tests {
         refusal: None,
         is_driven: true,
         left_out: Vec::new(),
+        doubts: Vec::new(),
         predicted: Vec::new(),
     };
 

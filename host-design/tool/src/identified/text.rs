@@ -10,8 +10,6 @@ use upright_design::number::significant;
 
 /// Below this angle the scale of the force is poorly known (rad).
 const LARGE_ENOUGH_RAD: f64 = 30.0 * std::f64::consts::PI / 180.0;
-/// Lengths and moments from the halves of a recording that differ by more than this (%) are named.
-const HALVES_PERCENT: f64 = 0.5;
 /// Share by which lengths and moments may be wrong without a model of the encoders' eccentricity.
 const WITHOUT_ECCENTRICITY: f64 = 0.003;
 
@@ -120,17 +118,6 @@ pub(super) fn row_texts(estimate: &Estimate) -> [String; 7] {
     ]
 }
 
-/// Whether a length or a moment from one half of the recordings contradicts that from the other.
-fn halves_differ(estimate: &Estimate) -> bool {
-    let is_shape = matches!(
-        estimate.kind,
-        ParameterKind::FirstMoment(_) | ParameterKind::Length(_) | ParameterKind::SecondMoment(_)
-    );
-    let differs =
-        |[first, second]: [f64; 2]| (first - second).abs() > 0.01 * HALVES_PERCENT * estimate.new.abs();
-    is_shape && estimate.halves.is_some_and(differs)
-}
-
 /// What fixes the scale of masses and frictions.
 fn scale_note(found: &Identification, settings: &Settings) -> String {
     match settings.weighed_kg_m {
@@ -152,32 +139,10 @@ fn scale_note(found: &Identification, settings: &Settings) -> String {
     }
 }
 
-/// Where the model or the rig file falls short of the machine.
-fn model_notes(found: &Identification) -> Vec<String> {
-    let mut notes = Vec::new();
-    let is_drag =
-        |estimate: &Estimate| matches!(estimate.kind, ParameterKind::AirDrag(_)) && estimate.new > 0.0;
-    if found.estimates.iter().any(is_drag) {
-        notes.push(
-            "The rig file has no air drag: large motion of the new file decays more slowly than the machine's.".to_owned(),
-        );
-    }
-    let moved = found.estimates.iter().filter(|one| halves_differ(one));
-    let moved: Vec<String> = moved.map(|one| one.kind.name_and_unit().0).collect();
-    if !moved.is_empty() {
-        notes.push(format!(
-            "From the first and from the second half of the recordings these differ by more than {HALVES_PERCENT} %, so the model \
-             lacks something, such as play, an eccentric encoder or another law of friction: {}.",
-            moved.join(", ")
-        ));
-    }
-    notes
-}
-
 /// What a reader has to know to judge the numbers.
 pub(super) fn notes(found: &Identification, settings: &Settings) -> Vec<String> {
     let mut notes = vec![scale_note(found, settings)];
-    notes.extend(model_notes(found));
+    notes.extend(found.doubts.iter().map(ToString::to_string));
     notes.push(
         "Single masses cannot be seen from outside: the new file keeps those of the old one where it can, and centres and \
          inertias follow."
@@ -253,6 +218,7 @@ pub fn json(rig: &str, found: &Identification) -> Value {
         "largest_angle_rad": found.largest_angle_rad, "wiring": wiring, "estimates": estimates,
         "is_driven": found.is_driven, "left_out": windows_json(&found.left_out), "predicted": windows_json(&found.predicted),
         "channels": channels, "delay_ticks": found.other_delay().unwrap_or(found.delay_ticks),
+        "doubts": found.doubts.iter().map(ToString::to_string).collect::<Vec<_>>(),
         "refused": found.refusal.as_ref().map(ToString::to_string),
     })
 }
@@ -262,7 +228,7 @@ fn windows_json(errors: &[WindowErrors]) -> Vec<Value> {
         let channel = |channel: &ChannelError| {
             let [file, found] = channel.percent();
             json!({
-                "name": channel.name, "range": channel.range, "error_file": channel.errors[0], "error_found": channel.errors[1],
+                "name": channel.name, "range": channel.range, "sensor_error": channel.sensor_error, "error_file": channel.errors[0], "error_found": channel.errors[1],
                 "percent_file": file, "percent_found": found,
             })
         };

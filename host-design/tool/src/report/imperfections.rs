@@ -27,6 +27,7 @@ pub(super) struct SurvivalRow {
     pub(super) typical: String,
     pub(super) source: &'static str,
     pub(super) remedy: &'static str,
+    pub(super) remarks: Vec<String>,
 }
 
 impl SurvivalTable {
@@ -51,6 +52,7 @@ impl SurvivalRow {
             typical: format!("{} {unit}", one.typical_text()),
             source: one.source,
             remedy: one.remedy,
+            remarks: survival.remarks(),
         }
     }
 }

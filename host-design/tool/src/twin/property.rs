@@ -23,7 +23,7 @@ pub(super) struct Property {
 }
 
 /// All properties of a machine as designed for, in the order of the page.
-const PROPERTIES: [Property; 12] = {
+const PROPERTIES: [Property; 13] = {
     const fn property(
         name: &'static str,
         label: &'static str,
@@ -39,6 +39,7 @@ const PROPERTIES: [Property; 12] = {
         property("joint-dry", "dry friction in each joint", "mN·m more", [0.0, 20.0, 0.01]),
         property("cart-dry", "dry friction of the cart", "N more", [0.0, 5.0, 0.05]),
         property("joint-viscous", "viscous friction in each joint", "mN·m·s/rad more", [0.0, 1.0, 0.01]),
+        property("air-drag", "air drag of each link", "mN·m·s²/rad² more", [0.0, 1.0, 0.001]),
         property("cart-viscous", "viscous friction of the cart", "N·s/m more", [0.0, 10.0, 0.1]),
         property("tilt", "slope of the rail", "°", [-5.0, 5.0, 0.1]),
         property("force-noise", "force noise", "N rms", [0.0, 2.0, 0.01]),
@@ -111,6 +112,8 @@ impl Properties {
         let friction = &mut reality.friction;
         friction.joint_friction_n_m = friction.joint_friction_n_m.plus(1e-3 * self.get("joint-dry"));
         friction.cart_friction_n += self.get("cart-dry");
+        let drag = &mut reality.air_drag.air_drag_n_m_s2_per_rad2;
+        *drag = drag.plus(1e-3 * self.get("air-drag"));
         reality.sensors.rail_tilt_rad += self.get("tilt").to_radians();
         reality.driver.force_percent += self.get("force");
         reality.driver.jitter_s += 0.01 * self.get("jitter") * rig.tick.period_s;

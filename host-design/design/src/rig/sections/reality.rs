@@ -15,6 +15,7 @@ pub(crate) static REALITY: Section = Section {
     absent: Absent::Follows("the machine matches the model"),
     keys: &[
         DryFriction::KEYS,
+        AirDrag::KEYS,
         DriveTrain::KEYS,
         DriverFaults::KEYS,
         SensorErrors::KEYS,
@@ -24,6 +25,7 @@ pub(crate) static REALITY: Section = Section {
 
 const NONE: Absent = Absent::Numbers(&[0.0]);
 const EACH_NOT_NEGATIVE: Rule = Rule::NOT_NEGATIVE.worded("a number >= 0, or one per joint");
+const EACH_PRESLIDING: Rule = Rule::AT_LEAST_A_MILLIONTH.worded("a number >= 1e-6, or one per joint");
 const EACH_ANGLE: Rule = Rule::SIGNED_ANGLE.worded("a number from -pi to pi (rad), or one per joint");
 const EACH_PERCENT: Rule = Rule::SIGNED_PERCENT.worded("a number > -100 and <= 900 (%), or one per joint");
 
@@ -38,10 +40,18 @@ keys! {
             "rate of a joint at which half of that excess is left", Absent::Numbers(&[0.1]);
         stribeck_m_per_s: f64, "m/s", Rule::POSITIVE,
             "speed of the cart at which half of that excess is left", Absent::Numbers(&[0.01]);
-        presliding_rad: f64, "rad", Rule::AT_LEAST_A_MILLIONTH,
-            "angle over which the friction of a joint builds up", Absent::Numbers(&[0.001]);
+        presliding_rad: PerJoint, "rad", EACH_PRESLIDING,
+            "angle over which the friction of each joint builds up", Absent::Numbers(&[0.001]);
         presliding_m: f64, "m", Rule::AT_LEAST_A_MILLIONTH,
             "travel over which the friction of the cart builds up", Absent::Numbers(&[5e-5]);
+    }
+}
+
+keys! {
+    /// Air drag of the links.
+    pub struct AirDrag {
+        air_drag_n_m_s2_per_rad2: PerJoint, "N·m·s²/rad²", EACH_NOT_NEGATIVE,
+            "air drag of each link: torque per square of its rate", NONE;
     }
 }
 
@@ -107,6 +117,8 @@ keys! {
 pub struct Reality {
     /// Dry friction of joints and cart.
     pub friction: DryFriction,
+    /// Air drag of the links.
+    pub air_drag: AirDrag,
     /// Backlash and belt.
     pub drive_train: DriveTrain,
     /// Motor driver, supply and timing.
@@ -125,6 +137,7 @@ impl Default for Reality {
         }
         Self {
             friction: absent(),
+            air_drag: absent(),
             drive_train: absent(),
             driver: absent(),
             sensors: absent(),
@@ -147,6 +160,7 @@ pub(crate) fn reality(
     let table = node.table(&REALITY)?;
     let reality = Reality {
         friction: DryFriction::read(&table)?,
+        air_drag: AirDrag::read(&table)?,
         drive_train: DriveTrain::read(&table)?,
         driver: DriverFaults::read(&table)?,
         sensors: SensorErrors::read(&table)?,

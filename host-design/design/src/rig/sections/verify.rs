@@ -63,6 +63,8 @@ keys! {
             "stretch of belt or gear per force that the loop has to survive as the only imperfection", NOT_REQUIRED;
         driver_lag_s: Option<f64>, "s", Rule::POSITIVE,
             "time constant of the motor driver that the loop has to survive as the only imperfection", NOT_REQUIRED;
+        latency_s: Option<f64>, "s", Rule::POSITIVE.worded("a number > 0 and < period_s"),
+            "additional delay of the force that the loop has to survive as the only imperfection", NOT_REQUIRED;
         force_percent: Option<f64>, "%", Rule::POSITIVE,
             "excess of the real force that the loop has to survive as the only imperfection", NOT_REQUIRED;
         parameter_spread_percent: Option<f64>, "%", Rule::SPREAD,

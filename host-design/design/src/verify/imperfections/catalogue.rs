@@ -30,9 +30,27 @@ pub struct Imperfection {
 impl Imperfection {
     /// The machine of `rig` with this imperfection alone, of this size.
     pub fn on(&self, rig: &Rig, size: f64) -> Rig {
+        self.on_with(rig, size, None)
+    }
+
+    /// The same with this angle over which joint friction builds up (rad), or the default.
+    pub(super) fn on_with(&self, rig: &Rig, size: f64, bristle_rad: Option<f64>) -> Rig {
         let mut reality = Reality::default();
+        if let Some(bristle_rad) = bristle_rad {
+            reality.friction.presliding_rad = PerJoint::all(bristle_rad);
+        }
         (self.set)(&mut reality, size);
         Rig { reality, ..rig.clone() }
+    }
+
+    /// The angles over which joint friction may build up (rad); a single none for another imperfection.
+    pub(super) fn bristles_rad(&self) -> Vec<Option<f64>> {
+        if self.key == "joint_friction_n_m" { BRISTLES_RAD.map(Some).to_vec() } else { vec![None] }
+    }
+
+    /// One machine for each of these angles.
+    pub(super) fn on_each(&self, rig: &Rig, size: f64) -> Vec<Rig> {
+        self.bristles_rad().into_iter().map(|bristle_rad| self.on_with(rig, size, bristle_rad)).collect()
     }
 
     /// The typical sizes as text: `1e-4 to 0.001`.
@@ -42,13 +60,17 @@ impl Imperfection {
     }
 }
 
+/// Angles over which the friction of a joint builds up (rad). Real bearings have 0.3 to 1 mrad; which end of a wider
+/// range is worse depends on the law.
+const BRISTLES_RAD: [f64; 2] = [1e-3, 1e-4];
+
 /// Every imperfection that a size can be searched for.
-pub static IMPERFECTIONS: [Imperfection; 10] = [
+pub static IMPERFECTIONS: [Imperfection; 11] = [
     Imperfection {
         key: "joint_friction_n_m",
         unit: "N·m",
         typical: [1e-4, 1e-3],
-        source: "estimate: greased ball bearings of 3 to 8 mm bore",
+        source: "measured: 1.9e-4 to 6.3e-4 in five of six ball bearings (docs/reality.md); greased or large ones have more",
         remedy: "smaller bearings without seals, with oil instead of grease; more weight on the angles",
         requirement: "runs with the motor on (joint_friction_n_m)",
         required: |verify| verify.joint_friction_n_m,
@@ -122,10 +144,20 @@ pub static IMPERFECTIONS: [Imperfection; 10] = [
         unit: "s",
         typical: [5e-5, 1e-3],
         source: "L / R of small motors (0.18 mH / 2.6 Ω: 70 µs) to large ones",
-        remedy: "a driver with a current loop; tell the design with delay_ticks",
+        remedy: "a driver with a current loop; more force_noise_n2_s",
         requirement: "runs with the motor on (driver_lag_s)",
         required: |verify| verify.driver_lag_s,
         set: |reality, size| reality.driver.driver_lag_s = size,
+    },
+    Imperfection {
+        key: "latency_s",
+        unit: "s",
+        typical: [5e-5, 5e-4],
+        source: "a period of a PWM of 20 kHz, to a command over a bus",
+        remedy: "PWM instead of a bus; a longer tick with delay_ticks = 1",
+        requirement: "runs with the motor on (latency_s)",
+        required: |verify| verify.latency_s,
+        set: |reality, size| reality.driver.latency_s = size,
     },
     Imperfection {
         key: "force_percent",

@@ -59,6 +59,12 @@ pub(crate) struct IdentifyCommand {
     /// Take the wiring from the file instead of identifying it
     #[arg(long)]
     trust_wiring: bool,
+    /// Leave the air drag of the links out, of free swings
+    #[arg(long)]
+    without_drag: bool,
+    /// Leave the dry friction of the joints out, of free swings
+    #[arg(long)]
+    without_dry: bool,
     /// Write a page with the fits, residuals, spectra and correlations, even if the numbers do not fit
     #[arg(long, value_name = "PAGE.html")]
     report: Option<PathBuf>,
@@ -90,6 +96,8 @@ impl IdentifyCommand {
             eccentricity: self.eccentricity,
             weighed_kg_m: self.weigh,
             trust_wiring: self.trust_wiring,
+            without_drag: self.without_drag,
+            without_dry: self.without_dry,
         };
         let found = with_progress(|progress| {
             identify_recordings(&rig, &recordings, unused.as_ref(), &settings, progress)
@@ -131,6 +139,12 @@ impl IdentifyCommand {
         }
         if self.trust_wiring {
             typed.push_str(" --trust-wiring");
+        }
+        if self.without_drag {
+            typed.push_str(" --without-drag");
+        }
+        if self.without_dry {
+            typed.push_str(" --without-dry");
         }
         typed
     }

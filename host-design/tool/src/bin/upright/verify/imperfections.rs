@@ -34,5 +34,6 @@ fn write_survival(out: &mut String, survival: &Survival) -> core::fmt::Result {
     let (falls, off, by) = (survival.falls_text(), survival.turned_off_text(), survival.ended_by_text());
     let (key, unit, typical, source) = (one.key, one.unit, one.typical_text(), one.source);
     writeln!(out, "  {key:<26}{unit:<6}{falls:>12}{off:>12}   {by:<22}{typical} ({source})")?;
+    survival.remarks().iter().try_for_each(|remark| writeln!(out, "      {remark}"))?;
     if survival.danger > 1.0 { writeln!(out, "      do: {}", one.remedy) } else { Ok(()) }
 }

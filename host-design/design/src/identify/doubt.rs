@@ -1,0 +1,60 @@
+//! What casts doubt on an identification that may be written nevertheless.
+
+use super::parameters::ParameterKind;
+use crate::number::significant;
+
+/// A reason to doubt an identification from free swings.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Doubt {
+    /// A term of friction was left out on request, but the recordings want it.
+    LeftOut {
+        /// The term.
+        kind: ParameterKind,
+        /// By how much -2 ln L falls with it.
+        worth: f64,
+    },
+    /// The first and the second half of the recordings contradict each other.
+    Halves {
+        /// The parameters that differ.
+        kinds: Vec<ParameterKind>,
+        /// Their largest difference, in the deviations that follow from the scatter within the halves.
+        deviations: f64,
+    },
+    /// The model leaves far more of the measurements unexplained than the sensor would.
+    Residual {
+        /// The cart, or a joint from 1.
+        channel: String,
+        /// Quantisation and noise of its sensor (rms; m, rad).
+        allowed: f64,
+        /// Residuals of windows of 0.5 s (rms), as a multiple of that.
+        times: f64,
+    },
+}
+
+impl core::fmt::Display for Doubt {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        match self {
+            Doubt::LeftOut { kind, worth } => write!(
+                f,
+                "The recordings want what was left out: {}, with which -2 ln L falls by {worth:.0}. The other frictions are wrong \
+                 without it.",
+                kind.name_and_unit().0
+            ),
+            Doubt::Halves { kinds, deviations } => {
+                let names: Vec<String> = kinds.iter().map(|kind| kind.name_and_unit().0).collect();
+                write!(
+                    f,
+                    "The halves of the recordings contradict each other by up to {deviations:.1} deviations: {}. The model lacks \
+                     something, such as play, an eccentric encoder or another law of friction.",
+                    names.join("; ")
+                )
+            }
+            Doubt::Residual { channel, allowed, times } => write!(
+                f,
+                "The residuals of {channel} are {times:.1} times what quantisation and noise of its encoder allow ({}): the model \
+                 lacks something, or the times of the samples are not even.",
+                significant(*allowed, 2)
+            ),
+        }
+    }
+}

@@ -1,0 +1,84 @@
+//! Changes of the rig file that are tried as cures: what fault detection and observer are told about the machine.
+
+use upright::table::Law;
+
+use super::catalogue::Imperfection;
+use crate::design::Uncertified;
+use crate::number::{rounded, significant};
+use crate::rig::{Rig, Tolerances};
+use crate::table::TableValues;
+use crate::verify::VerifyError;
+
+/// Every change that is tried, in words.
+pub(super) const TRIED: &str = "its tolerance in [robust], robust.cart_friction_n, robust.homing_error_rad, 100 times \
+                                kalman.force_noise_n2_s, 10 times kalman.joint_noise";
+/// Friction of the cart, as a share of the largest force, for what acts like an unknown force.
+const FORCE_SHARE: f64 = 0.05;
+/// Wrong zeros (rad) for what acts like them.
+const ZERO_RAD: f64 = 0.005;
+
+/// The changes that are tried for every imperfection, and the rig as it is.
+pub(super) struct Cures<'a> {
+    rig: &'a Rig,
+    table: &'a TableValues,
+    own: Uncertified,
+    of_all: Vec<(String, TableValues)>,
+}
+
+impl<'a> Cures<'a> {
+    pub(super) fn of(rig: &'a Rig, table: &'a TableValues, law: Law) -> Result<Self, VerifyError> {
+        let own = Uncertified::sampled_alone(&rig.with_law_alone(law))?;
+        let mut cures = Self { rig, table, own, of_all: Vec::new() };
+        let friction_n = rounded(FORCE_SHARE * rig.force_limit_n().unwrap_or_default(), 2);
+        cures.of_all = [("cart_friction_n", friction_n), ("homing_error_rad", ZERO_RAD)]
+            .into_iter()
+            .filter_map(|(key, size)| cures.tolerating(key, size))
+            .collect();
+        for (name, factors) in [("force_noise_n2_s", [100.0, 1.0]), ("joint_noise", [1.0, 10.0])] {
+            cures.of_all.extend(cures.noisier(law, name, factors));
+        }
+        Ok(cures)
+    }
+
+    /// The changes that are tried for this imperfection.
+    pub(super) fn of_imperfection(&self, imperfection: &Imperfection) -> Vec<(String, TableValues)> {
+        let [good, poor] = imperfection.typical;
+        let key = match imperfection.key {
+            "parameter_spread_percent" => "mass_percent",
+            key => key,
+        };
+        let own = [poor, (good * poor).sqrt()].map(|size| self.tolerating(key, rounded(size, 2)));
+        own.into_iter().flatten().chain(self.of_all.iter().cloned()).collect()
+    }
+
+    /// `[robust]` with this tolerance, which widens the thresholds of fault detection; none if there is no such key.
+    fn tolerating(&self, key: &str, size: f64) -> Option<(String, TableValues)> {
+        let mut tolerances = self.rig.robust.clone().unwrap_or_default();
+        let Tolerances { mass_percent, joint_friction_n_m, cart_friction_n, homing_error_rad, .. } =
+            &mut tolerances;
+        *match key {
+            "mass_percent" => mass_percent,
+            "joint_friction_n_m" => joint_friction_n_m,
+            "cart_friction_n" => cart_friction_n,
+            "homing_error_rad" => homing_error_rad,
+            _ => return None,
+        } = size;
+        let rig = Rig { robust: Some(tolerances), ..self.rig.clone() };
+        let mut table = self.table.clone();
+        table.thresholds = TableValues::of_uncertified(&rig, &self.own).ok()?.thresholds;
+        Some((format!("robust.{key} = {}", significant(size, 2)), table))
+    }
+
+    /// `[kalman]` with more noise of force and joints, by these factors, which changes the observer, too.
+    fn noisier(&self, law: Law, name: &str, [force, joints]: [f64; 2]) -> Option<(String, TableValues)> {
+        let mut rig = self.rig.with_law_alone(law);
+        let kalman = rig.kalman.as_mut()?;
+        kalman.force_noise_n2_s *= force;
+        kalman.joint_noise.iter_mut().for_each(|noise| *noise *= joints);
+        let design = Uncertified::sampled_alone(&rig).ok()?;
+        let changed = TableValues::of_uncertified(&rig, &design).ok()?;
+        let mut table = self.table.clone();
+        (table.observer, table.thresholds) = (changed.observer, changed.thresholds);
+        Some((format!("{} times kalman.{name}", force.max(joints)), table))
+    }
+}
