@@ -16,8 +16,8 @@ use super::error::SimulationError;
 use super::summary::Fall;
 use crate::table::{TableValues, WithSize, with_size};
 
-/// A [`Controller`], and its supervision, with slices instead of arrays. A slice holds as many numbers as the table has states or sensors;
-/// anything else panics.
+/// A [`Controller`], and its supervision, with slices instead of arrays. A slice holds as many numbers as the table has
+/// states or sensors; anything else panics.
 pub(super) trait AnyController {
     /// See [`Controller::select`].
     fn select(&mut self, law: Law) -> Result<(), Rejected>;

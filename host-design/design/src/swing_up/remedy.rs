@@ -118,8 +118,8 @@ impl Remedy {
         Some(())
     }
 
-    /// States friction and wrong zeros of `[reality]` in `[robust]`, where they widen the thresholds of fault detection;
-    /// returns whether that changes anything.
+    /// States friction and wrong zeros of `[reality]` in `[robust]`, where they widen the thresholds of fault
+    /// detection; returns whether that changes anything.
     pub(super) fn tolerate_reality(&mut self) -> bool {
         let Some(links) = self.rig.chain().map(|chain| chain.links.len()) else { return false };
         let reality = &self.rig.reality;

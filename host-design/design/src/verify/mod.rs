@@ -57,8 +57,8 @@ pub use covariance::NoiseShare;
 pub use encoder::{CoarsestEncoder, EncoderSettings, coarser, coarsest_encoder};
 pub use error::VerifyError;
 pub use imperfections::{
-    IMPERFECTIONS, Imperfection, ImperfectionSettings, Imperfections, RequiredSurvival, SizeRuns, Survival,
-    imperfections, limit_cycle, required_imperfections, survival,
+    Cure, IMPERFECTIONS, Imperfection, ImperfectionSettings, Imperfections, OfBristle, RequiredSurvival,
+    SizeRuns, Survival, imperfections, limit_cycle, required_imperfections, survival,
 };
 pub use linear::{LinearReport, linear, margins_of};
 pub use loop_model::{ControllerModel, LoopModel, PlantModel};

@@ -175,7 +175,7 @@ fn known<T>(part: Result<T, VerifyError>) -> Result<Option<T>, VerifyError> {
     match part {
         Ok(part) => Ok(Some(part)),
         Err(VerifyError::NotAChain(_) | VerifyError::NoObserver) => Ok(None),
-        Err(error) => Err(error.into()),
+        Err(error) => Err(error),
     }
 }
 

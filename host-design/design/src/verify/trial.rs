@@ -97,8 +97,8 @@ pub struct Outcome {
 }
 
 impl Outcome {
-    /// Whether there was no fall and, in a supervised run, no fault: the criterion for runs whose disturbances never let
-    /// the rig come to rest.
+    /// Whether there was no fall and, in a supervised run, no fault: the criterion for runs whose disturbances never
+    /// let the rig come to rest.
     pub fn survives(&self) -> bool {
         self.fall.is_none()
     }

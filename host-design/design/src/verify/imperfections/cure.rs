@@ -2,7 +2,7 @@
 
 use upright::table::Law;
 
-use super::Imperfection;
+use super::catalogue::Imperfection;
 use crate::design::Uncertified;
 use crate::number::{rounded, significant};
 use crate::rig::{Rig, Tolerances};

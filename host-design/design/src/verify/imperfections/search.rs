@@ -4,7 +4,8 @@ use std::collections::BTreeMap;
 
 use upright::table::Law;
 
-use super::{Cure, Imperfection, ImperfectionSettings, OfBristle, SizeRuns, Survival};
+use super::catalogue::Imperfection;
+use super::survival::{Cure, ImperfectionSettings, OfBristle, SizeRuns, Survival};
 use crate::parallel;
 use crate::rig::Rig;
 use crate::simulate::{FallKind, Scenario, SimulationError};
