@@ -5,7 +5,7 @@
 
 use std::io::{Read, Write};
 use std::net::{IpAddr, TcpStream};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use tungstenite::handshake::derive_accept_key;
 
@@ -15,7 +15,7 @@ use super::assets::{ASSETS, Asset};
 const MAX_REQUEST: usize = 8192;
 /// Most header lines of a request.
 const MAX_HEADERS: usize = 64;
-/// Longest wait for bytes of a request, and for a client to accept bytes of the answer.
+/// Longest time from the first byte to the last of a request, and wait for a client to accept bytes of the answer.
 const PATIENCE: Duration = Duration::from_secs(2);
 /// Headers of every answer. Nothing is loaded from elsewhere, no page may embed this one, and the secret does not leave
 /// the address.
@@ -76,7 +76,6 @@ impl Access {
 
     /// Reads the request that a client sends first, and decides. A refusal is answered here.
     pub(super) fn answer(&self, stream: &mut TcpStream) -> std::io::Result<Option<Admitted>> {
-        stream.set_read_timeout(Some(PATIENCE))?;
         stream.set_write_timeout(Some(PATIENCE))?;
         let admitted = match read_head(stream)? {
             Some(head) => self.admit(&head),
@@ -151,10 +150,16 @@ fn is_same(given: &[u8], secret: &[u8]) -> bool {
     given.len() == secret.len() && given.iter().zip(secret).fold(0, |all, (a, b)| all | (a ^ b)) == 0
 }
 
-/// Reads up to the empty line; `None` if that does not come within [`MAX_REQUEST`] bytes.
+/// Reads up to the empty line; `None` if that does not come within [`MAX_REQUEST`] bytes and [`PATIENCE`].
 fn read_head(stream: &mut TcpStream) -> std::io::Result<Option<Vec<u8>>> {
     let (mut head, mut buffer) = (Vec::new(), [0; 1024]);
+    let begin = Instant::now();
     while !head.ends_with(b"\r\n\r\n") {
+        let left = PATIENCE.saturating_sub(begin.elapsed());
+        if left.is_zero() {
+            return Ok(None);
+        }
+        stream.set_read_timeout(Some(left))?;
         let length = stream.read(&mut buffer)?;
         head.extend_from_slice(&buffer[..length]);
         if length == 0 || head.len() > MAX_REQUEST {

@@ -7,6 +7,7 @@
 //! | file | what is in it |
 //! |---|---|
 //! | `access.rs` | which requests are let in |
+//! | `half_open.rs` | connections that have not asked yet |
 //! | `connections.rs` | connections of pages |
 //! | `request.rs` | what a page asks for |
 //! | `dispatcher.rs` | conversation with the firmware, command, recording |
@@ -21,6 +22,7 @@ mod connected;
 mod connections;
 mod dispatcher;
 mod greeting;
+mod half_open;
 mod holding;
 mod pace;
 mod property;

@@ -1,7 +1,7 @@
 //! The server: listens, lets viewers in, and runs the machine.
 
 use std::net::{IpAddr, SocketAddr, TcpListener, TcpStream};
-use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, PoisonError};
 
 use upright_design::rig::Rig;
@@ -12,14 +12,13 @@ use super::connected;
 use super::connections::Connections;
 use super::dispatcher::{Dispatcher, SharedCsv};
 use super::greeting::greeting;
+use super::half_open::HalfOpen;
 use super::property::Properties;
 use super::simulated::{RunEnd, SimulatedMachine};
 use crate::campaign::{Defect, kinds};
 use crate::in_the_loop::{RunError, RunPlace};
 use crate::monitor::{Monitor, SerialLine};
 
-/// Most connections at a time, including those that have not been let in yet.
-const MAX_CONNECTIONS: usize = 32;
 /// Time between two telemetry messages if nothing limits them (s).
 const TELEMETRY_S: f32 = 0.005;
 
@@ -145,23 +144,23 @@ fn accepting(
     let access = Arc::new(Access::new(secret, address.ip(), address.port()));
     let stop = Arc::new(AtomicBool::new(false));
     let stopped = Arc::clone(&stop);
-    let connections = Arc::new(AtomicUsize::new(0));
+    let half_open = HalfOpen::default();
     std::thread::spawn(move || {
-        for stream in listener.incoming() {
+        for (number, stream) in (0..).zip(listener.incoming()) {
             if stopped.load(Ordering::Relaxed) {
                 return;
             }
-            let Ok(stream) = stream else { continue };
-            if connections.fetch_add(1, Ordering::Relaxed) >= MAX_CONNECTIONS {
-                connections.fetch_sub(1, Ordering::Relaxed);
+            let Ok(mut stream) = stream else { continue };
+            if half_open.begin(number, &stream).is_err() {
                 continue;
             }
             let (access, viewers, recording) = (Arc::clone(&access), viewers.clone(), Arc::clone(&recording));
-            let connections = Arc::clone(&connections);
+            let half_open = half_open.clone();
             std::thread::spawn(move || {
+                let admitted = access.answer(&mut stream);
+                half_open.end(number);
                 // A client that goes away in the middle is no error of the server.
-                let _ = let_in(stream, &access, &viewers, &recording);
-                connections.fetch_sub(1, Ordering::Relaxed);
+                let _ = admitted.and_then(|admitted| let_in(stream, admitted, &viewers, &recording));
             });
         }
     });
@@ -170,11 +169,11 @@ fn accepting(
 
 fn let_in(
     mut stream: TcpStream,
-    access: &Access,
+    admitted: Option<Admitted>,
     viewers: &Connections,
     recording: &SharedCsv,
 ) -> std::io::Result<()> {
-    match access.answer(&mut stream)? {
+    match admitted {
         Some(Admitted::File(asset)) => {
             send(&mut stream, "200 OK", asset.media_type, asset.content.as_bytes())
         }

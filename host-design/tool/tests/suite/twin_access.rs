@@ -105,6 +105,36 @@ fn a_foreign_page_and_a_wrong_secret_are_refused() {
     assert!(answer.starts_with("HTTP/1.1 421"), "{answer}");
 }
 
+/// 60 connections that send a byte now and then do not keep a person out, and are cut.
+#[test]
+fn slow_connections_keep_nobody_out() {
+    let twin = Twin::start("single-quanser-ip02", &[]);
+    let (host, path) = parts(&twin.address);
+    let begin = Instant::now();
+    let mut slow: Vec<TcpStream> = (0..60).map(|_| TcpStream::connect(host).unwrap()).collect();
+    let mut open = slow.len();
+    while open > 0 {
+        assert!(begin.elapsed() < Duration::from_secs(5), "{open} slow connections are still open");
+        for stream in &mut slow {
+            let _ = stream.write_all(b"G");
+        }
+        let asked = Instant::now();
+        assert!(connect(host, &format!("{path}socket"), &format!("http://{host}")).is_ok());
+        assert!(asked.elapsed() < Duration::from_secs(1), "a person waits for {:?}", asked.elapsed());
+        std::thread::sleep(Duration::from_millis(300));
+        open = slow.iter().filter(|stream| is_open(stream)).count();
+    }
+}
+
+fn is_open(stream: &TcpStream) -> bool {
+    stream.set_nonblocking(true).unwrap();
+    let mut peeked = [0; 1];
+    let is_waiting =
+        matches!(stream.peek(&mut peeked), Err(error) if error.kind() == std::io::ErrorKind::WouldBlock);
+    stream.set_nonblocking(false).unwrap();
+    is_waiting
+}
+
 #[test]
 fn a_second_viewer_sees_and_stops_but_does_not_command() {
     let twin = Twin::start("single-quanser-ip02", &[]);
