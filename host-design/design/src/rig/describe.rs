@@ -96,6 +96,10 @@ impl Description {
     fn row(&mut self, section: &Section, key: &Key, numbers: &[f64]) {
         let label = match key.label() {
             label if label.is_empty() => section.name.to_owned(),
+            // Only their units tell `stribeck_rad_per_s` and `stribeck_m_per_s` apart.
+            label if section.keys().filter(|other| other.label() == label).count() > 1 => {
+                key.name.replace('_', " ")
+            }
             label => label,
         };
         let (numbers, remark) = match key.absent {
@@ -232,6 +236,7 @@ impl Description {
             return;
         }
         self.section(&REALITY, &reality.friction);
+        self.rows(&REALITY, &reality.air_drag);
         self.rows(&REALITY, &reality.drive_train);
         self.rows(&REALITY, &reality.driver);
         self.rows(&REALITY, &reality.sensors);

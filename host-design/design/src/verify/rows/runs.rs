@@ -2,7 +2,7 @@
 
 use super::quantity::Values::{Each, One};
 use super::quantity::{TrustQuantity, force, is_chain, number, signs};
-use crate::verify::LawTrust;
+use crate::verify::{LawTrust, Outcome};
 
 pub(super) const QUANTITIES: &[TrustQuantity] = &[
     TrustQuantity {
@@ -55,8 +55,9 @@ pub(super) const QUANTITIES: &[TrustQuantity] = &[
         name: "worst mass errors",
         meaning: "the combination that falls first or, if none falls, has the largest angle",
         values: One(|_, law| {
-            let weakest = signs(&law.corners.as_ref()?.weakest.signs);
-            Some(format!("{weakest} (cart, then links: + heavier, - lighter)"))
+            let weakest = &law.corners.as_ref()?.weakest;
+            let (masses, end) = (signs(&weakest.signs), end(&weakest.outcome));
+            Some(format!("{masses} (cart, then links: + heavier, - lighter){end}"))
         }),
     },
     TrustQuantity {
@@ -78,12 +79,18 @@ pub(super) const QUANTITIES: &[TrustQuantity] = &[
             let spread = number(rig.verify.spread_percent);
             let share = 100.0 * runs.success_rate;
             let (survived, made) = (runs.survived, runs.runs);
+            let end = runs.worst.as_ref().map_or(String::new(), |worst| end(&worst.outcome));
             Some(format!(
-                "±{spread} %: {survived} of {made} survive ({share:.1} %, 95 % interval {low:.1} to {high:.1} %)"
+                "±{spread} %: {survived} of {made} survive ({share:.1} %, 95 % interval {low:.1} to {high:.1} %){end}"
             ))
         }),
     },
 ];
+
+/// How a run ended that did not survive; empty for one that did.
+fn end(outcome: &Outcome) -> String {
+    outcome.fall.as_ref().map_or(String::new(), |fall| format!("; {fall}"))
+}
 
 fn tilts(law: &LawTrust) -> Vec<(String, String)> {
     let tilts = law.attraction.iter().flat_map(|attraction| &attraction.tilts);
