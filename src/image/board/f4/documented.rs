@@ -1,5 +1,5 @@
-//! The boards, their pins and their ticks in docs/board.md are those of the image. This file is the test `boards` of the
-//! package; the image does not contain it.
+//! The boards, their pins and their ticks in docs/board.md are those of the image. This file is the test `boards` of
+//! the package; the image does not contain it.
 
 #![allow(
     dead_code,
