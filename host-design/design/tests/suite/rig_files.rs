@@ -214,7 +214,7 @@ fn the_hash_sees_every_value() {
         }
         let hash = rig.hash();
         let mut changed = 0;
-        // Thresholds of `upright verify` and the imperfections of the machine affect no gain and are not part of the hash.
+        // Thresholds of `upright verify` and the imperfections of the machine are not part of the hash.
         let counted = ["[verify]", "[reality]"].iter().filter_map(|section| text.find(section)).min();
         let counted = &text[..counted.unwrap_or(text.len())];
         for (index, line) in
