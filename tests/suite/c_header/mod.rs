@@ -1,7 +1,7 @@
 //! The C header gives the bits of the firmware, whatever the compiler is told.
 //!
-//! Without gcc, g++, clang or the tools for AVR and ARM, the tests that need them say so and pass. If the environment variable
-//! `UPRIGHT_REQUIRE_GCC` is set, they fail.
+//! Without gcc, g++, clang or the tools for AVR and ARM, the tests that need them say so and pass. If the environment
+//! variable `UPRIGHT_REQUIRE_GCC` is set, they fail.
 
 mod arm;
 mod avr;

@@ -107,10 +107,10 @@ fn a_wrong_knot_spacing_is_refused_and_a_wrong_tick_falls() {
     assert!(!arrives_with(&rig, &fast));
 }
 
-/// For a motion that does not survive the required errors, the message says which smaller ones it would survive,
-/// and with these it does.
+/// For a motion that does not survive the required errors, the message says which fault ends it and which smaller
+/// errors it would survive, and with these it does.
 #[test]
-fn the_errors_that_a_fragile_motion_would_stand_are_reported() {
+fn what_ends_a_fragile_motion_and_the_errors_that_it_would_survive_are_reported() {
     let (rig, stored) = rig_and_stored("single-quanser-ip02");
     let with = |mass: f64, friction: f64| {
         let mut rig = rig.clone();
@@ -125,7 +125,8 @@ fn the_errors_that_a_fragile_motion_would_stand_are_reported() {
         rest.split_whitespace().next().unwrap().parse().unwrap()
     };
     let found = with(number("mass"), number("friction")).unwrap();
-    assert!(found > arrived && help.starts_with(&format!("{found} of 200 arrive with ")), "{found}: {help}");
+    assert!(found > arrived && help.contains(&format!("; {found} of 200 arrive with ")), "{found}: {help}");
+    assert!(help.starts_with("fault tracking error ended "), "{help}");
 }
 
 #[test]
