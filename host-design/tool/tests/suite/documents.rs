@@ -127,7 +127,7 @@ fn every_command_works_in_powershell_too() {
 }
 
 #[test]
-fn every_command_survives_in_one_document() {
+fn every_command_appears_in_one_document() {
     let repeated = |documents: &[(String, String)]| {
         let mut places: BTreeMap<String, Vec<String>> = BTreeMap::new();
         for (name, text) in documents {
