@@ -176,18 +176,18 @@ fn request(which: u8, mut next: impl FnMut() -> u8) -> Request {
         7 => Request::Clear,
         8 => Request::Setpoint(f32::from_le_bytes([next(), next(), next(), next()])),
         9 => Request::Setpoint(setpoint(next())),
-        10 => Request::Select(if next() % 2 == 0 { Law::Lqr } else { Law::PolePlacement }),
+        10 => Request::Select(if next().is_multiple_of(2) { Law::Lqr } else { Law::PolePlacement }),
         11 => Request::Info,
         12 => Request::Cause,
         13 => Request::Statistics,
         14 => Request::ResetStatistics,
         15 => Request::Telemetry(u16::from_le_bytes([next(), next()])),
-        28 => Request::Log(next() % 2 == 0),
+        28 => Request::Log(next().is_multiple_of(2)),
         29 => {
             let [most_n, stiffness_n_per_m, damping_n_s_per_m] = core::array::from_fn(|_| setpoint(next()));
             Request::Shake(Shaking { most_n, stiffness_n_per_m, damping_n_s_per_m })
         }
-        _ => Request::Jog { along: next() % 2 == 0 },
+        _ => Request::Jog { along: next().is_multiple_of(2) },
     }
 }
 
