@@ -6,6 +6,7 @@
 //! | [`figure`] | figures as SVG, PNG and CSV |
 //! | [`report`] | the HTML page |
 //! | [`image`] | builds firmware images, measures flash, stack and panics |
+//! | [`import`] | rig files from a URDF |
 //! | [`in_the_loop`] | runs the whole firmware, on the host or as an image in QEMU |
 //! | [`campaign`] | fault injection |
 //! | [`commission`] | from a wired rig to a balancing one, step by step |
@@ -34,6 +35,7 @@ pub mod compare;
 pub mod figure;
 pub mod identified;
 pub mod image;
+pub mod import;
 pub mod in_the_loop;
 pub mod monitor;
 pub mod project;

@@ -61,7 +61,8 @@ pub enum RigErrorKind {
     },
     /// The text is in a format of other programs.
     #[error(
-        "this is {format}, accepted: TOML; copy one of the files in rigs/ and type lengths, masses and inertias into it"
+        "this is {format}, accepted: TOML; `upright import` reads URDF; otherwise copy one of the files in rigs/ and type \
+         lengths, masses and inertias into it"
     )]
     OtherFormat {
         /// Name of the format.

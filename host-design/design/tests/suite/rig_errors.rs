@@ -171,7 +171,7 @@ const CASES: &[Case] = &[
         "12:10", "lqr.angles", &["a [model] has no angles"], 2),
     (GOOD, "force_weight = 0.1", "force_weight = 0.1\ncost = \"mean\"", "35:8", "lqr.cost", &["\"integral\" or \"sum\""], 2),
     (GOOD, "force_weight = 0.1", "force_weight = 0.1\ncross_weights = [1]", "35:17", "lqr.cross_weights", &["accepted: 6"], 2),
-    ("<?xml version=\"1.0\"?>\n<robot name=\"x\"/>\n", "", "", "1:1", "", &["this is URDF", "type lengths"], 2),
+    ("<?xml version=\"1.0\"?>\n<robot name=\"x\"/>\n", "", "", "1:1", "", &["this is URDF", "upright import"], 2),
     ("{\"name\": \"x\"}\n", "", "", "1:1", "", &["this is JSON"], 2),
     (GOOD, "force_weight = 0.1", "force_weight = 0", "34:16", "lqr.force_weight", &["a number > 0"], 2),
     (GOOD, "overshoot_percent = 5", "overshoot_percent = 100", "36:21", "pole_placement.overshoot_percent", &["< 100"], 2),

@@ -15,6 +15,7 @@ mod equipment;
 mod first_power_up;
 mod identify_command;
 mod image;
+mod import_command;
 mod jog;
 mod lossy_line;
 mod monitor;

@@ -11,6 +11,7 @@ mod false_alarms;
 mod faults;
 mod firmware;
 mod identify;
+mod import;
 mod output;
 mod progress;
 mod reading;
@@ -78,6 +79,7 @@ enum UprightCommand {
     Robust(robust::RobustCommand),
     Shake(shake::ShakeCommand),
     Identify(identify::IdentifyCommand),
+    Import(import::ImportCommand),
     Simulate(simulate::SimulateCommand),
     Twin(twin::TwinCommand),
     SwingUp(swing_up::SwingUpCommand),
@@ -101,6 +103,7 @@ fn main() -> ExitCode {
         UprightCommand::Robust(command) => command.run(),
         UprightCommand::Shake(command) => command.run(),
         UprightCommand::Identify(command) => command.run(),
+        UprightCommand::Import(command) => command.run(),
         UprightCommand::Simulate(command) => command.run(),
         UprightCommand::Twin(command) => command.run(),
         UprightCommand::SwingUp(command) => command.run(),
