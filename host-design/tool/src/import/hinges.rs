@@ -30,13 +30,13 @@ pub(super) struct HingedLink<'r> {
 }
 
 /// What moves together: the joint that it moves in, the body, and the pose of the joint; all in the world's frame.
-struct Part<'r> {
+struct MovingPart<'r> {
     joint: Option<&'r RobotJoint>,
     pose: Isometry3<f64>,
     body: Body,
 }
 
-impl Part<'_> {
+impl MovingPart<'_> {
     fn axis(&self) -> Vector3<f64> {
         self.joint.map_or(Vector3::zeros(), |joint| (self.pose.rotation * joint.axis).normalize())
     }
@@ -88,8 +88,8 @@ impl<'r> Machine<'r> {
 
 fn hinged_link<'r>(
     hinge: &'r RobotJoint,
-    part: &Part<'r>,
-    next: Option<&Part<'r>>,
+    part: &MovingPart<'r>,
+    next: Option<&MovingPart<'r>>,
     across: Vector3<f64>,
 ) -> Result<HingedLink<'r>, ImportError> {
     let in_plane = |v: Vector3<f64>| v - across * across.dot(&v);
@@ -119,7 +119,7 @@ fn hinged_link<'r>(
 }
 
 /// The parts from the ground outwards, with the bodies that are fixed to each other as one.
-fn parts(robot: &Robot) -> Result<Vec<Part<'_>>, ImportError> {
+fn parts(robot: &Robot) -> Result<Vec<MovingPart<'_>>, ImportError> {
     for joint in &robot.joints {
         for link in [&joint.parent, &joint.child] {
             if !robot.links.iter().any(|known| known.name == *link) {
@@ -149,7 +149,7 @@ fn parts(robot: &Robot) -> Result<Vec<Part<'_>>, ImportError> {
                 }
             }
         }
-        parts.push(Part { joint, pose, body });
+        parts.push(MovingPart { joint, pose, body });
         match moving[..] {
             [] => {}
             [(next, pose)] => at = Some((Some(next), next.child.as_str(), pose)),

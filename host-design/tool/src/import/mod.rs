@@ -4,7 +4,9 @@
 //! let urdf = r#"<robot name="p">
 //!   <link name="rail"/>
 //!   <link name="cart"><inertial><mass value="0.5"/></inertial></link>
-//!   <link name="rod"><inertial><origin xyz="0 0 0.3"/><mass value="0.2"/><inertia ixx="6e-3" iyy="6e-3" izz="0"/></inertial></link>
+//!   <link name="rod"><inertial>
+//!     <origin xyz="0 0 0.3"/><mass value="0.2"/><inertia ixx="6e-3" iyy="6e-3" izz="0"/>
+//!   </inertial></link>
 //!   <joint name="slide" type="prismatic"><parent link="rail"/><child link="cart"/><axis xyz="1 0 0"/></joint>
 //!   <joint name="hinge" type="continuous"><parent link="cart"/><child link="rod"/><axis xyz="0 1 0"/></joint>
 //! </robot>"#;
