@@ -14,6 +14,12 @@
 //! | `simulated.rs` | the simulated machine, with `pull.rs`, `holding.rs`, `property.rs`, `challenge.rs`, `pace.rs` |
 //! | `connected.rs` | a machine behind a serial line |
 //! | `page/` | the page |
+//!
+//! ```
+//! let server = upright_tool::twin::Server::listen("127.0.0.1:0".parse()?)?;
+//! assert!(server.address()?.starts_with("http://127.0.0.1:"));
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
 
 mod access;
 mod assets;
