@@ -15,8 +15,8 @@ use crate::rig::Rig;
 use crate::table::TableValues;
 
 /// Runs `scenario`: the firmware's controller, built from `table`, against the nonlinear plant of `rig` (or the given
-/// linear model). A run ends early when the pendulum has fallen, or when the
-/// firmware's supervision turns the motor off, if the scenario asks for that.
+/// linear model). A run ends early when the pendulum has fallen, or when the firmware's supervision turns the motor
+/// off, if the scenario asks for that.
 ///
 /// # Errors
 /// [`SimulationError`] if the firmware refuses the table or the scenario, or the plant cannot be built.

@@ -3,12 +3,12 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use upright_design::design::design;
 use upright_design::export::c_header;
 use upright_design::rig::Rig;
-use upright_design::table::{Gains, TableValues, write_atomically};
+use upright_design::table::{Gains, write_atomically};
 
 use crate::failure::Failure;
+use crate::variation::with_table;
 
 /// Writes the controller for programs that are not written in Rust.
 ///
@@ -31,10 +31,8 @@ pub(crate) struct ExportCommand {
 impl ExportCommand {
     pub(crate) fn run(self) -> Result<(), Failure> {
         let rig = Rig::from_path(&self.rig)?;
-        let design = design(&rig).map_err(|error| Failure::of(&rig.name, error))?;
-        let table =
-            TableValues::of(&rig, &design, Gains::Sampled).map_err(|error| Failure::of(&rig.name, error))?;
-        let header = c_header(&rig, &table).map_err(|error| Failure::of(&rig.name, error))?;
+        let (_, table) = with_table(&rig, &self.rig, Gains::Sampled)?;
+        let header = c_header(&rig, &table).map_err(|error| Failure::of(self.rig.display(), error))?;
         Ok(write_atomically(&self.c, header.as_bytes())?)
     }
 }
