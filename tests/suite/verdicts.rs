@@ -83,16 +83,15 @@ fn a_firmware_without_detection_stays_on_with_a_size_at_which_verify_says_that_i
 #[test]
 fn a_swing_up_that_detection_ends_names_the_fault_and_the_tolerances_that_cure_it() {
     let mut rig = rig("double-quanser-dbpen");
-    rig.reality.friction.cart_friction_n = 0.5;
+    // More than twice what fault detection tolerates of this rig in any case.
+    rig.reality.friction.cart_friction_n = 1.2;
     rig.reality.friction.joint_friction_n_m = PerJoint::all(5e-4);
     let stored = Stored::beside(&rig_path("double-quanser-dbpen")).unwrap();
     let Err(SwingUpError::NotRobust { arrived, help, .. }) = judge(&rig, &stored, &|_| ()) else {
         panic!("enough arrive");
     };
-    assert_eq!(arrived, 64);
+    assert_eq!(arrived, 116);
     let (fault, cure) = help.split_once("; ").unwrap();
-    assert!(fault.starts_with("fault motor ended 1"), "{help}");
-    let cured =
-        "188 of 200 arrive with robust.joint_friction_n_m = 0.0005 and robust.cart_friction_n = 0.5; ";
-    assert!(cure.starts_with(cured), "{help}");
+    assert!(fault.starts_with("fault motor ended 40"), "{help}");
+    assert!(cure.starts_with("156 of 200 arrive with robust.cart_friction_n = 1.2; "), "{help}");
 }
