@@ -25,8 +25,8 @@ pub struct Kalman<T> {
     pub innovation_variances: Matrix<T>,
 }
 
-/// Gains of the observer and the relative residual of the equation that they solve. Process noise has the intensities in `noise`,
-/// enters through the columns of `inputs` and is integrated over one tick (Van Loan). Each sensor has a rounding error
+/// Gains of the observer and the relative residual of the equation that they solve. Process noise has the intensities
+/// in `noise`, enters through the columns of `inputs` and is integrated over one tick (Van Loan). Each sensor has a rounding error
 /// with the variance of [`rounding_variances`].
 ///
 /// The error covariance P of the prediction solves the sampled Riccati equation of (Adᵀ, Cᵀ);
