@@ -71,8 +71,9 @@ impl Judgement {
     }
 }
 
-/// Runs the loop of `table`, with the firmware's limits and fault detection, on machines with shares of the tolerances, and at every combination of mass errors. The
-/// machines with each share are a part of `study`; a shard leaves the combinations of mass errors to the merge.
+/// Runs the loop of `table`, with the firmware's limits and fault detection, on machines with shares of the tolerances,
+/// and at every combination of mass errors. The machines with each share are a part of `study`; a shard leaves the
+/// combinations of mass errors to the merge.
 ///
 /// # Errors
 /// [`VerifyError`] if the runs cannot be started.
