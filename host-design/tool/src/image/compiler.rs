@@ -10,7 +10,7 @@ use crate::project::checkout;
 const DEBIAN_CARGO: &str = "/usr/bin/cargo";
 const DEBIAN_RUSTC: &str = "/usr/bin/rustc";
 
-/// A `cargo` that compiles for [`TARGET`].
+/// A `cargo` that compiles for microcontrollers.
 #[derive(Debug)]
 pub struct Compiler {
     /// Name of the program, for messages.
@@ -24,13 +24,21 @@ pub struct Compiler {
     pub target_directory: PathBuf,
 }
 
-/// The compiler that is installed.
+/// The compiler for [`TARGET`] that is installed.
 ///
 /// # Errors
 /// [`BuildError::NoCompiler`] if there is none.
 pub fn compiler() -> Result<Compiler, BuildError> {
+    compiler_for(&[TARGET])
+}
+
+/// The compiler for all of these targets that is installed.
+///
+/// # Errors
+/// [`BuildError::NoCompiler`] if there is none.
+pub fn compiler_for(targets: &[&str]) -> Result<Compiler, BuildError> {
     let target_directory = target_directory()?;
-    let mut compiler = if rustup_has_the_target() {
+    let mut compiler = if targets.iter().all(|target| rustup_has(target)) {
         Compiler {
             program: "cargo",
             version: version("rustc"),
@@ -40,7 +48,10 @@ pub fn compiler() -> Result<Compiler, BuildError> {
     } else if debian_has_a_compiler() {
         let mut cargo = Command::new(DEBIAN_CARGO);
         cargo.env("RUSTC_BOOTSTRAP", "1").env("RUSTC", DEBIAN_RUSTC).arg("-Zbuild-std=core");
-        cargo.env("CARGO_TARGET_THUMBV7EM_NONE_EABIHF_LINKER", "ld.lld");
+        for target in targets {
+            let name = target.replace(['-', '.'], "_").to_uppercase();
+            cargo.env(format!("CARGO_TARGET_{name}_LINKER"), "ld.lld");
+        }
         // Two compilers cannot share a directory.
         Compiler {
             program: DEBIAN_CARGO,
@@ -49,7 +60,7 @@ pub fn compiler() -> Result<Compiler, BuildError> {
             target_directory: target_directory.join("debian"),
         }
     } else {
-        return Err(BuildError::NoCompiler);
+        return Err(BuildError::NoCompiler(targets.join(" ")));
     };
     // Variables set by an outer cargo are for the host.
     for (name, _) in std::env::vars_os() {
@@ -77,8 +88,8 @@ fn version(rustc: &str) -> String {
     output.map(|output| String::from_utf8_lossy(&output.stdout).into_owned()).unwrap_or_default()
 }
 
-fn rustup_has_the_target() -> bool {
-    let output = Command::new("rustc").args(["--print", "target-libdir", "--target", TARGET]).output();
+fn rustup_has(target: &str) -> bool {
+    let output = Command::new("rustc").args(["--print", "target-libdir", "--target", target]).output();
     output.is_ok_and(|output| {
         output.status.success() && Path::new(String::from_utf8_lossy(&output.stdout).trim()).is_dir()
     })

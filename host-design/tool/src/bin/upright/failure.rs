@@ -91,7 +91,7 @@ fn exit_status(error: &(dyn Error + 'static)) -> u8 {
         exit_status_of_a_run(error)
     } else if let Some(CampaignError::Trial { source, .. }) = error.downcast_ref() {
         if source.lacks_emulator() { 4 } else { 1 }
-    } else if let Some(BuildError::NoCompiler) = error.downcast_ref() {
+    } else if let Some(BuildError::NoCompiler(_)) = error.downcast_ref() {
         4
     } else if let Some(stop) = error.downcast_ref() {
         match stop {
