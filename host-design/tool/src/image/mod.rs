@@ -22,6 +22,7 @@ pub use board::{BoardName, NoBoard};
 pub use build::{ImageKind, PROFILE, build, build_for};
 pub use checksum::{file_hash, flash_checksum};
 pub use compiler::{Compiler, compiler};
+pub(crate) use compiler::{ForeignTarget, compiler_for};
 pub use elf::{ElfError, LinkedImage};
 pub use error::{BuildError, TARGET};
 pub use forbidden::forbidden_functions;
