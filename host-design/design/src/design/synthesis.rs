@@ -5,10 +5,10 @@ use super::error::{DesignError, Task};
 use super::kalman::{Kalman, kalman};
 use super::place::{Pole, dominant_pair, place};
 use super::riccati::{Cost, care, dare};
-use super::zero_order_hold::{sampled_cost, zero_order_hold};
+use super::zero_order_hold::{mean_speed_hold, sampled_cost, zero_order_hold};
 use crate::numerics::{Complex, Matrix, Real, Wide, eigenvalues, solve};
 use crate::plant::{ChainParameters, LinearModel, linearise};
-use crate::rig::{LinearPlant, Lqr, PlantDescription, PolePlacement, Rig};
+use crate::rig::{CartInput, LinearPlant, Lqr, PlantDescription, PolePlacement, Rig};
 use upright::table::{Equilibrium, PerLaw};
 
 /// Plant and gains with entries of type `T`: a working precision, or the type they were rounded to.
@@ -23,7 +23,7 @@ pub struct Design<T> {
     pub b: Matrix<T>,
     /// Ad of `x⁺ = Ad x + Bd u` for a force held over one tick, s×s.
     pub ad: Matrix<T>,
-    /// Bd, s×1.
+    /// Bd, s×1; of the mean speed during the tick if the drive imposes the cart's acceleration.
     pub bd: Matrix<T>,
     /// Gains for continuous time.
     pub continuous: Laws<T>,
@@ -107,7 +107,11 @@ impl<R: Real> Design<R> {
     ) -> Result<Self, DesignError> {
         let LinearModel { a, b, torque_inputs } = plant;
         let period = R::from_f64(rig.tick.period_s);
-        let (ad, bd) = zero_order_hold(&a, &b, &period);
+        let (ad, held) = zero_order_hold(&a, &b, &period);
+        let bd = match rig.actuator.input() {
+            CartInput::Force => held,
+            CartInput::Acceleration => mean_speed_hold(&ad, &b, &period),
+        };
         let output = rig.output();
         let late = rig.tick.delay_ticks == 1;
 

@@ -16,6 +16,8 @@ use crate::rig::{Chain, PlantDescription, Rig};
 pub struct Bench {
     plant: Box<dyn Plant>,
     motor: Option<MotorPlant>,
+    /// Travel per pulse (m) of a drive that imposes the cart's motion.
+    step_m: Option<f64>,
     driver: Option<Driver>,
     timing: Timing,
     encoders: Option<RealEncoders>,
@@ -58,6 +60,7 @@ impl Bench {
             pull_n_m: vec![0.0; plant.disturbances()],
             plant,
             motor: rig.actuator.motor.as_ref().map(MotorPlant::of),
+            step_m: rig.actuator.acceleration.as_ref().map(|drive| drive.step_m),
             driver: Driver::of(rig),
             timing: Timing::of(rig, scenario.seed),
             encoders: RealEncoders::of(rig),
@@ -163,8 +166,12 @@ impl Bench {
     }
 
     /// Simulates one tick with the command `drive`, issued at its start; returns the motor's force on the cart at the
-    /// start of the tick (N), without the disturbance.
+    /// start of the tick (N), without the disturbance; 0 for a drive that imposes the cart's motion.
     pub fn tick(&mut self, drive: Drive) -> f64 {
+        if let Some(step_m) = self.step_m {
+            self.step(if let Drive::Steps(pulses) = drive { pulses } else { 0 }, step_m);
+            return 0.0;
+        }
         let (now, disturbance) = self.begin(drive);
         let before = std::mem::replace(&mut self.acting_drive, now);
         let [latency, rest] = self.timing.next_tick();
@@ -172,6 +179,15 @@ impl Bench {
             self.advance(before, disturbance, latency);
         }
         self.advance(now, disturbance, rest)
+    }
+
+    /// Simulates one tick of a drive that imposes the cart's motion by `pulses`, spread evenly: a constant speed. Forces
+    /// on the cart change nothing. Without pulses, as when the drive is off, the cart stands.
+    fn step(&mut self, pulses: i32, step_m: f64) {
+        self.begin(Drive::OFF);
+        self.plant.set_cart_speed(f64::from(pulses) * step_m / self.period_s);
+        self.plant.advance(0.0, &self.torques, self.period_s, self.substeps);
+        self.plant.write_state(&mut self.state);
     }
 
     /// Begins a tick with the command `drive`: returns the command that acts in it, which is that of the tick before
@@ -199,6 +215,7 @@ impl Bench {
         let chain = rig.chain()?;
         let driver = &rig.reality.driver;
         let is_simple = rig.actuator.motor.is_none()
+            && rig.actuator.acceleration.is_none()
             && Driver::of(rig).is_none()
             && driver.latency_s == 0.0
             && driver.jitter_s == 0.0;
@@ -256,7 +273,7 @@ impl Bench {
             (Some(driver), _, motor) => driver.force(drive, motor.as_ref(), speed, dt),
             (None, Drive::Force(force), _) => f64::from(force),
             (None, Drive::Duty(duty), Some(motor)) => motor.force(f64::from(duty), speed),
-            (None, Drive::Duty(_), None) => 0.0,
+            (None, Drive::Duty(_), None) | (None, Drive::Steps(_), _) => 0.0,
         }
     }
 }

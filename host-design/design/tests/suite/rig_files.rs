@@ -4,8 +4,8 @@ use std::path::{Path, PathBuf};
 
 use upright_design::plant::MotorPlant;
 use upright_design::rig::{
-    Absent, Actuator, Cart, Chain, Limits, Link, LinkEncoder, PlantDescription, PolePlacement, Rig, SECTIONS,
-    TOP, Tick, defaults, key_table, unit_in_names,
+    Absent, Actuator, Cart, CartInput, Chain, Limits, Link, LinkEncoder, PlantDescription, PolePlacement,
+    Rig, SECTIONS, TOP, Tick, defaults, key_table, unit_in_names,
 };
 
 const MINIMAL: &str = r#"
@@ -49,7 +49,7 @@ fn the_paper_rig_has_the_papers_values() {
     let rig = Rig::from_path(&Path::new(env!("CARGO_MANIFEST_DIR")).join("../../rigs/quadruple-paper.toml"))
         .unwrap();
     let chain = rig.chain().unwrap();
-    assert_eq!(chain.cart.mass_kg, 0.1);
+    assert_eq!(chain.cart.mass_kg, Some(0.1));
     assert_eq!(chain.links.iter().map(|link| link.length_m).collect::<Vec<_>>(), [0.03, 0.04, 0.07, 0.10]);
     assert!(chain.links.iter().all(|link| link.mass_kg == 0.1 && link.inertia_kg_m2.is_none()));
     assert_eq!(rig.states(), 10);
@@ -73,15 +73,21 @@ fn what_is_left_out_gets_its_documented_default() {
         friction_n_m_s_per_rad: 0.0,
         encoder: None,
     };
-    let cart = Cart { mass_kg: 1.0, friction_n_s_per_m: 0.0, travel_m: [-2.0, 2.0], encoder_step_m: None };
+    let cart =
+        Cart { mass_kg: Some(1.0), friction_n_s_per_m: 0.0, travel_m: [-2.0, 2.0], encoder_step_m: None };
     let expected = Rig {
         verify: Default::default(),
         reality: Default::default(),
         robust: None,
         swing_up: None,
         name: "minimal".to_owned(),
-        plant: PlantDescription::Chain(Chain { cart, links: vec![link], gravity_m_per_s2: 9.81 }),
-        actuator: Actuator { force_limit_n: None, motor: None },
+        plant: PlantDescription::Chain(Chain {
+            cart,
+            links: vec![link],
+            gravity_m_per_s2: 9.81,
+            input: CartInput::Force,
+        }),
+        actuator: Actuator { force_limit_n: None, motor: None, acceleration: None },
         tick: Tick { period_s: 0.001, delay_ticks: 0 },
         lqr: None,
         pole_placement: None,

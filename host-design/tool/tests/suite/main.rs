@@ -35,6 +35,7 @@ mod robust_command;
 mod serial_errors;
 mod shaken;
 mod split_command;
+mod stepper_command;
 mod transitions_command;
 mod twin_access;
 mod twin_page;

@@ -5,7 +5,7 @@ use super::super::key::{Absent, Section};
 use super::super::node::{Node, Table};
 use super::super::rule::Rule;
 use super::super::value::{Keys, PerJoint, keys};
-use super::chain::{Chain, PlantDescription};
+use super::chain::{CartInput, Chain, PlantDescription};
 
 /// `[reality]`
 pub(crate) static REALITY: Section = Section {
@@ -193,7 +193,18 @@ fn within_the_rig(
         Some(node) => Err(node.out_of_range(accepts, remedy)),
         None => Ok(()),
     };
-    if reality.drive_train.rotor_mass_kg.is_some_and(|mass| mass >= chain.cart.mass_kg) {
+    if chain.input == CartInput::Acceleration {
+        let keys = [DriveTrain::KEYS, DriverFaults::KEYS].concat();
+        let of_force: Vec<&str> = keys.iter().map(|key| key.name).collect();
+        table.refuse_for_acceleration(&of_force)?;
+        table.refuse_for_acceleration(&[
+            "cart_friction_n",
+            "stribeck_m_per_s",
+            "presliding_m",
+            "cart_mass_percent",
+        ])?;
+    }
+    if reality.drive_train.rotor_mass_kg.zip(chain.cart.mass_kg).is_some_and(|(mass, cart)| mass >= cart) {
         refused("rotor_mass_kg", "a number > 0 and < mass_kg of [cart]", "give the smaller part of it")?;
     }
     let DriverFaults { latency_s, jitter_s, .. } = reality.driver;

@@ -128,7 +128,7 @@ pub(super) fn warnings(
             "the loop is too slow for a bound on its step response: the set-point is not governed".to_owned(),
         );
     }
-    if rig.force_limit_n().is_none() {
+    if rig.input_limit().is_none() {
         warnings
             .push("no force limit: give actuator.force_limit_n or a motor before connecting one".to_owned());
     }
