@@ -21,6 +21,7 @@ mod governor;
 mod kalman;
 mod loops;
 mod place;
+mod placed_observer;
 mod riccati;
 mod synthesis;
 mod thresholds;

@@ -9,10 +9,11 @@ use crate::number::significant;
 
 use super::key::{Absent, Key, Section};
 use super::sections::actuator::ACTUATOR;
-use super::sections::chain::{CART, GRAVITY, LINK};
+use super::sections::chain::{CART, GRAVITY};
 use super::sections::friction::FRICTION;
 use super::sections::integral::INTEGRAL;
 use super::sections::limits::LIMITS;
+use super::sections::link::LINK;
 use super::sections::reality::REALITY;
 use super::sections::robust::ROBUST;
 use super::sections::swing_up::SWING_UP;
@@ -57,6 +58,15 @@ impl Rig {
 
 fn mark(is_default: bool) -> &'static str {
     if is_default { DEFAULT } else { "" }
+}
+
+/// A pole [re, im].
+fn pole(&[re, im]: &[f64; 2]) -> String {
+    match digits(im.abs()) {
+        _ if im == 0.0 => digits(re),
+        part if im < 0.0 => format!("{}-{part}i", digits(re)),
+        part => format!("{}+{part}i", digits(re)),
+    }
 }
 
 /// Six significant digits.
@@ -287,15 +297,10 @@ impl Description {
             }
             Some(PolePlacement::Poles(poles)) => {
                 self.heading("pole placement");
-                let pole = |&[re, im]: &[f64; 2]| match digits(im.abs()) {
-                    _ if im == 0.0 => digits(re),
-                    part if im < 0.0 => format!("{}-{part}i", digits(re)),
-                    part => format!("{}+{part}i", digits(re)),
-                };
                 self.list("poles", poles.iter().map(pole), "1/s");
             }
         }
-        if let Some(KalmanNoise { force_noise_n2_s, joint_noise }) = &rig.kalman {
+        if let Some(KalmanNoise { force_noise_n2_s, joint_noise, observer_poles }) = &rig.kalman {
             self.heading("kalman");
             let (name, unit) = match self.is_acceleration {
                 false => ("force noise intensity", "N²·s"),
@@ -303,6 +308,9 @@ impl Description {
             };
             self.value(name, *force_noise_n2_s, unit, "");
             self.numbers("joint noise intensities", joint_noise, "(N·m)²·s");
+            if !observer_poles.is_empty() {
+                self.list("observer poles", observer_poles.iter().map(pole), "1/s");
+            }
         }
         if let Some(integral) = &rig.integral {
             self.section(&INTEGRAL, integral);

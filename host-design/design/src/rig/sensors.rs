@@ -1,7 +1,8 @@
 //! The sensors of a rig.
 
 use super::description::Rig;
-use super::sections::chain::{LinkEncoder, PlantDescription};
+use super::sections::chain::PlantDescription;
+use super::sections::link::LinkEncoder;
 use crate::numerics::Real;
 
 /// A sensor that measures one state in discrete steps.

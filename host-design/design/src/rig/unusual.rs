@@ -1,7 +1,7 @@
 //! Values that no bench has: most often a number in another unit.
 
 use super::description::Rig;
-use super::sections::chain::LinkEncoder;
+use super::sections::link::LinkEncoder;
 use crate::number::significant;
 
 /// Largest and smallest value that a rig on a bench has, of each kind.

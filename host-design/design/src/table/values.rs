@@ -307,7 +307,7 @@ fn step_map(drive: &AccelerationDrive, period_s: f64) -> Result<StepMap, NoTable
 }
 
 fn motor_map(motor: &Motor, period_s: f64) -> Result<MotorMap, NoTable> {
-    let volts_per_newton = motor.resistance_ohm / motor.newtons_per_amp();
+    let volts_per_newton = motor.resistance_before_bridge_ohm() / motor.newtons_per_amp();
     Ok(MotorMap {
         volts_per_newton: finite("the motor's voltage per force", volts_per_newton as f32)?,
         volts_per_speed: finite("the motor's voltage per speed", motor.volts_per_speed() as f32)?,

@@ -39,6 +39,8 @@ const FORCE_LIMIT: &[Key] = &[Key {
 
 /// Accepted voltages of the dead zone; the section's own code compares them with the supply.
 const DEAD_ZONE: Rule = Rule::NOT_NEGATIVE.worded("a number >= 0 and < supply_v (V)");
+/// Accepted drops, likewise.
+const BRIDGE_DROP: Rule = Rule::NOT_NEGATIVE.worded("a number >= 0 and < supply_v (V)");
 const WITH_A_MOTOR: Absent = Absent::RequiredIf("with a motor");
 
 /// The actuator, `[actuator]`: force limit and motor, or a drive that imposes the cart's acceleration.
@@ -104,6 +106,9 @@ keys! {
         gear_ratio: f64, "", Rule::POSITIVE, "number of motor turns per pulley turn", Absent::Numbers(&[1.0]);
         pulley_radius_m: f64, "m", Rule::POSITIVE, "radius of the pulley or pinion", WITH_A_MOTOR;
         supply_v: f64, "V", Rule::POSITIVE, "supply voltage of the motor driver", WITH_A_MOTOR;
+        #[serde(skip_serializing_if = "Option::is_none")]
+        bridge_drop_v: Option<f64>, "V", BRIDGE_DROP,
+            "voltage that the transistors of the motor driver lose, about 2 V in an L298N", Absent::Follows("0");
         dead_zone_v: f64, "V", DEAD_ZONE,
             "voltage below which the motor does not move", Absent::Numbers(&[0.0]);
         slew_v_per_s: Option<f64>, "V/s", Rule::POSITIVE,
@@ -111,11 +116,17 @@ keys! {
     }
 }
 
+/// Voltages of the motor are given before the driver's bridge, where the full duty cycle is the supply: a motor behind
+/// transistors that lose a part of the supply has the resistance and the back-EMF of [`Motor::before_bridge`].
 impl Motor {
     /// Back-EMF per cart speed, `gear Ke / r` (V·s/m).
     pub fn volts_per_speed(&self) -> f64 {
-        let constant = self.back_emf_constant_v_s_per_rad.unwrap_or(self.torque_constant_n_m_per_a);
-        self.gear_ratio * constant / self.pulley_radius_m
+        self.before_bridge() * self.back_emf_v_s_per_m()
+    }
+
+    /// Resistance of the winding (Ω).
+    pub fn resistance_before_bridge_ohm(&self) -> f64 {
+        self.before_bridge() * self.resistance_ohm
     }
 
     /// Force on the cart per current, `efficiency gear Kt / r` (N/A).
@@ -125,18 +136,28 @@ impl Motor {
 
     /// Force on the cart per voltage at standstill, `efficiency gear Kt / (R r)` (N/V).
     pub fn newtons_per_volt(&self) -> f64 {
-        self.newtons_per_amp() / self.resistance_ohm
+        self.newtons_per_amp() / self.resistance_before_bridge_ohm()
     }
 
     /// Back-EMF as viscous friction of the cart with the motor's terminals held at a voltage (N·s/m).
     pub fn braking_n_s_per_m(&self) -> f64 {
-        self.newtons_per_amp() * self.volts_per_speed() / self.resistance_ohm
+        self.newtons_per_amp() * self.back_emf_v_s_per_m() / self.resistance_ohm
     }
 
     /// Force on the cart at standstill and full supply, `efficiency gear Kt V / (R r)` (N).
     pub fn stall_force_n(&self) -> f64 {
         self.gear_ratio * self.delivered_torque_n_m_per_a() * self.supply_v
-            / (self.resistance_ohm * self.pulley_radius_m)
+            / (self.resistance_before_bridge_ohm() * self.pulley_radius_m)
+    }
+
+    fn back_emf_v_s_per_m(&self) -> f64 {
+        let constant = self.back_emf_constant_v_s_per_rad.unwrap_or(self.torque_constant_n_m_per_a);
+        self.gear_ratio * constant / self.pulley_radius_m
+    }
+
+    /// Voltage before the bridge per voltage at the motor: 1 without `bridge_drop_v`.
+    fn before_bridge(&self) -> f64 {
+        self.supply_v / (self.supply_v - self.bridge_drop_v.unwrap_or(0.0))
     }
 
     /// The torque constant less what gear and belt lose.
@@ -194,11 +215,54 @@ fn acceleration(table: &Table<'_>, tick: &Tick) -> Result<AccelerationDrive, Rig
 
 fn motor(table: &Table<'_>) -> Result<Motor, RigError> {
     let motor = Motor::read(table)?;
-    match table.get("dead_zone_v") {
-        Some(node) if motor.dead_zone_v >= motor.supply_v => Err(node.out_of_range(
-            DEAD_ZONE.accepts,
-            &format!("give {}, less than supply_v", table.asks_for("dead_zone_v")),
-        )),
-        _ => Ok(motor),
+    let less_than_supply = |key: &str, volts: f64| match table.get(key) {
+        Some(node) if volts >= motor.supply_v => Err(node
+            .out_of_range(DEAD_ZONE.accepts, &format!("give {}, less than supply_v", table.asks_for(key)))),
+        _ => Ok(()),
+    };
+    less_than_supply("dead_zone_v", motor.dead_zone_v)?;
+    less_than_supply("bridge_drop_v", motor.bridge_drop_v.unwrap_or(0.0))?;
+    Ok(motor)
+}
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use super::*;
+    use crate::plant::MotorPlant;
+    use crate::rig::Rig;
+
+    fn parse(key: &str) -> Result<Motor, RigError> {
+        let text = format!(
+            "name = \"a\"\n[cart]\nmass_kg = 1\n[[link]]\nmass_kg = 1\nlength_m = 1\n[actuator]\nresistance_ohm = 2.9011\n\
+             torque_constant_n_m_per_a = 0.05\npulley_radius_m = 0.01\nsupply_v = 6\n{key}\n"
+        );
+        Rig::from_toml(&text, Path::new("rig.toml")).map(|rig| rig.actuator.motor.unwrap())
+    }
+
+    /// An L298N takes 2 V of the 6 V of a motor that would push with 10.341 N.
+    #[test]
+    fn a_bridge_that_loses_volts_leaves_less_force_and_less_speed_but_the_same_braking() {
+        let (all, less) = (parse("").unwrap(), parse("bridge_drop_v = 2").unwrap());
+        let near = |found: f64, wanted: f64| (found - wanted).abs() < 5e-4;
+        assert!(
+            near(all.stall_force_n(), 10.341) && near(less.stall_force_n(), 6.894),
+            "{}",
+            less.stall_force_n()
+        );
+        assert!(
+            near(all.supply_v / all.volts_per_speed(), 1.2)
+                && near(less.supply_v / less.volts_per_speed(), 0.8)
+        );
+        assert_eq!(all.braking_n_s_per_m(), less.braking_n_s_per_m());
+        // At the full duty cycle the motor sees 4 V, less 5 V·s/m · 0.4 m/s of back-EMF.
+        let force = MotorPlant::of(&less).force(1.0, 0.4);
+        assert!(near(force, (4.0 - 5.0 * 0.4) / 2.9011 * 5.0), "{force}");
+        let error = parse("bridge_drop_v = 6").unwrap_err().to_string();
+        assert!(
+            error.contains("actuator.bridge_drop_v: found 6, accepted: a number >= 0 and < supply_v"),
+            "{error}"
+        );
     }
 }

@@ -7,6 +7,7 @@ use super::super::key::{Absent, Key, Section};
 use super::super::node::{Node, Table};
 use super::super::rule::Rule;
 use super::super::value::{Keys, keys};
+use super::link::{self, LINK, Link};
 use super::model::{self, LinearPlant};
 
 /// Largest number of links of a chain; plants with more are not compiled.
@@ -19,15 +20,6 @@ pub(crate) static CART: Section = Section {
     meaning: "the cart and its rail",
     absent: Absent::RequiredIf("unless [model]"),
     keys: &[Cart::KEYS],
-};
-
-/// `[[link]]`
-pub(crate) static LINK: Section = Section {
-    name: "link",
-    title: "[[link]]",
-    meaning: "one table per link, from the cart outwards, 1 to 14 of them",
-    absent: Absent::RequiredIf("unless [model]"),
-    keys: &[LINK_KEYS],
 };
 
 /// `[gravity]`
@@ -47,58 +39,6 @@ pub(crate) static GRAVITY: Section = Section {
 
 /// Acceleration of gravity (m/s²) without `[gravity]`.
 const GRAVITY_M_PER_S2: f64 = 9.81;
-
-const LINK_KEYS: &[Key] = &[
-    Key {
-        name: "mass_kg",
-        unit: "kg",
-        rule: Rule::POSITIVE,
-        meaning: "mass of the link",
-        absent: Absent::Required,
-    },
-    Key {
-        name: "length_m",
-        unit: "m",
-        rule: Rule::POSITIVE,
-        meaning: "length of the link from its joint to the next one, or to its tip",
-        absent: Absent::Required,
-    },
-    Key {
-        name: "centre_of_mass_m",
-        unit: "m",
-        rule: Rule::POSITIVE.worded("a number > 0, at most 10 times length_m"),
-        meaning: "distance from the link's joint to its centre of mass",
-        absent: Absent::Follows("half the length"),
-    },
-    Key {
-        name: "inertia_kg_m2",
-        unit: "kg·m²",
-        rule: Rule::NOT_NEGATIVE,
-        meaning: "moment of inertia about the centre of mass (0 for a point mass)",
-        absent: Absent::Follows("a uniform rod, mass · length² / 12"),
-    },
-    Key {
-        name: "friction_n_m_s_per_rad",
-        unit: "N·m·s/rad",
-        rule: Rule::NOT_NEGATIVE,
-        meaning: "viscous friction in the link's lower joint",
-        absent: Absent::Numbers(&[0.0]),
-    },
-    Key {
-        name: "encoder_step_rad",
-        unit: "rad",
-        rule: Rule::ANGLE,
-        meaning: "angle per encoder count",
-        absent: Absent::Follows("what encoder_counts_per_rev gives"),
-    },
-    Key {
-        name: "encoder_counts_per_rev",
-        unit: "counts/rev",
-        rule: Rule::COUNTS,
-        meaning: "resolution of the encoder after quadrature (four counts per line)",
-        absent: Absent::Follows("what encoder_step_rad gives; neither, no encoder"),
-    },
-];
 
 keys! {
     /// The cart and its rail, `[cart]`.
@@ -187,32 +127,6 @@ pub struct Chain {
     pub input: CartInput,
 }
 
-/// One link of a chain, `[[link]]`.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Link {
-    /// Mass (kg).
-    pub mass_kg: f64,
-    /// Distance from this link's joint to the next one (m).
-    pub length_m: f64,
-    /// Distance from the joint to the centre of mass (m); half the length if not given.
-    pub centre_of_mass_m: Option<f64>,
-    /// Moment of inertia about the centre of mass (kg·m²); that of a uniform rod, m l²/12, if not given.
-    pub inertia_kg_m2: Option<f64>,
-    /// Viscous friction in the lower joint, on the relative rate (N·m·s/rad).
-    pub friction_n_m_s_per_rad: f64,
-    /// Resolution of the joint's encoder.
-    pub encoder: Option<LinkEncoder>,
-}
-
-/// Resolution of a joint encoder, in the form that the file gives.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub enum LinkEncoder {
-    /// `encoder_step_rad`: angle per count (rad).
-    StepRad(f64),
-    /// `encoder_counts_per_rev`: counts per revolution; the step is 2π / counts (rad).
-    CountsPerRev(f64),
-}
-
 impl PlantDescription {
     /// Number of states: 2n + 2 for n links, or the order of the model.
     pub fn states(&self) -> usize {
@@ -248,12 +162,9 @@ fn chain(root: &Table<'_>, input: CartInput) -> Result<Chain, RigError> {
     if !(1..=MAX_LINKS).contains(&entries.len()) {
         return Err(links.wrong_length(entries.len(), &format!("1 to {MAX_LINKS}"), LINKS));
     }
-    Ok(Chain {
-        cart,
-        links: entries.iter().map(link).collect::<Result<_, _>>()?,
-        gravity_m_per_s2: root.get("gravity").map_or(Ok(GRAVITY_M_PER_S2), |node| gravity(&node))?,
-        input,
-    })
+    let gravity_m_per_s2 = root.get("gravity").map_or(Ok(GRAVITY_M_PER_S2), |node| gravity(&node))?;
+    let links = entries.iter().map(|entry| link::link(entry, gravity_m_per_s2)).collect::<Result<_, _>>()?;
+    Ok(Chain { cart, links, gravity_m_per_s2, input })
 }
 
 /// A force moves a mass; a drive that imposes an acceleration also knows where it has put the cart.
@@ -269,40 +180,6 @@ fn cart_driven_by(input: CartInput, table: &Table<'_>) -> Result<Cart, RigError>
         )),
         _ => Ok(cart),
     }
-}
-
-fn link(node: &Node<'_>) -> Result<Link, RigError> {
-    let table = node.table(&LINK)?;
-    let length_m = table.value("length_m")?;
-    let centre_of_mass_m = table.value("centre_of_mass_m")?;
-    within_reach(&table, centre_of_mass_m, length_m)?;
-    Ok(Link {
-        mass_kg: table.value("mass_kg")?,
-        length_m,
-        centre_of_mass_m,
-        inertia_kg_m2: table.value("inertia_kg_m2")?,
-        friction_n_m_s_per_rad: table.value("friction_n_m_s_per_rad")?,
-        encoder: link_encoder(&table)?,
-    })
-}
-
-/// The centre of mass may lie beyond the next joint (a link with an extension), but not far beyond.
-fn within_reach(table: &Table<'_>, centre_of_mass_m: Option<f64>, length_m: f64) -> Result<(), RigError> {
-    let most = 10.0 * length_m;
-    match (table.get("centre_of_mass_m"), centre_of_mass_m) {
-        (Some(node), Some(distance)) if distance > most => Err(node.out_of_range(
-            &format!("a number > 0 and <= 10 times length_m, {most} (m)"),
-            "give the distance from the joint to the centre of mass in m, or correct length_m",
-        )),
-        _ => Ok(()),
-    }
-}
-
-fn link_encoder(table: &Table<'_>) -> Result<Option<LinkEncoder>, RigError> {
-    table.not_both("encoder_step_rad", "encoder_counts_per_rev", "keep the one the data sheet gives")?;
-    let step: Option<f64> = table.value("encoder_step_rad")?;
-    let counts: Option<f64> = table.value("encoder_counts_per_rev")?;
-    Ok(step.map(LinkEncoder::StepRad).or(counts.map(LinkEncoder::CountsPerRev)))
 }
 
 fn gravity(node: &Node<'_>) -> Result<f64, RigError> {
