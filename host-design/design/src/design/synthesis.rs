@@ -5,10 +5,10 @@ use super::error::{DesignError, Task};
 use super::kalman::{Kalman, kalman};
 use super::place::{Pole, dominant_pair, place};
 use super::riccati::{Cost, care, dare};
-use super::zero_order_hold::{mean_speed_hold, sampled_cost, zero_order_hold};
+use super::zero_order_hold::{mean_speed_cost, mean_speed_hold, sampled_cost, zero_order_hold};
 use crate::numerics::{Complex, Matrix, Real, Wide, eigenvalues, solve};
 use crate::plant::{ChainParameters, LinearModel, linearise};
-use crate::rig::{CartInput, LinearPlant, Lqr, PlantDescription, PolePlacement, Rig};
+use crate::rig::{LinearPlant, Lqr, PlantDescription, PolePlacement, Rig};
 use upright::table::{Equilibrium, PerLaw};
 
 /// Plant and gains with entries of type `T`: a working precision, or the type they were rounded to.
@@ -108,10 +108,8 @@ impl<R: Real> Design<R> {
         let LinearModel { a, b, torque_inputs } = plant;
         let period = R::from_f64(rig.tick.period_s);
         let (ad, held) = zero_order_hold(&a, &b, &period);
-        let bd = match rig.actuator.input() {
-            CartInput::Force => held,
-            CartInput::Acceleration => mean_speed_hold(&ad, &b, &period),
-        };
+        let is_force = rig.actuator.input().is_force();
+        let bd = if is_force { held } else { mean_speed_hold(&ad, &b, &period) };
         let output = rig.output();
         let late = rig.tick.delay_ticks == 1;
 
@@ -119,7 +117,8 @@ impl<R: Real> Design<R> {
         if let Some(weights) = &rig.lqr {
             let cost = match lqr_cost(weights) {
                 of_a_tick if weights.cost_is_sum => of_a_tick,
-                over_time => sampled_cost(&a, &b, &over_time, &period),
+                over_time if is_force => sampled_cost(&a, &b, &over_time, &period),
+                over_time => mean_speed_cost(&a, &b, &over_time, &period),
             };
             let k = lqr(Task::SampledLqr, &ad, &bd, &cost, residuals)?;
             sampled.lqr = Some(sampled_feedback(k, [&ad, &bd], [&ad, &bd], output, late));

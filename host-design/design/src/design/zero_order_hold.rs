@@ -54,6 +54,17 @@ pub fn sampled_cost<R: Real>(a: &Matrix<R>, b: &Matrix<R>, cost: &Cost<R>, t: &R
     }
 }
 
+/// [`sampled_cost`] for [`mean_speed_hold`]: after the first half of the jump, `B u t/2`, the state moves freely.
+pub(super) fn mean_speed_cost<R: Real>(a: &Matrix<R>, b: &Matrix<R>, cost: &Cost<R>, t: &R) -> Cost<R> {
+    let states = a.rows();
+    let without_input = Matrix::zeros(states, b.cols());
+    let free = sampled_cost(a, &without_input, cost, t);
+    let jump = b.scaled(&t.scale_by_power_of_two(-1));
+    let q_jump = &free.q * &jump;
+    let both = &jump.transpose() * &(&free.s + &free.s);
+    Cost { r: &(&free.r + &(&jump.transpose() * &q_jump)) + &both, s: &q_jump + &free.s, q: free.q }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

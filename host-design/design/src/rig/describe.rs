@@ -260,6 +260,7 @@ impl Description {
         self.rows(&REALITY, &reality.air_drag);
         self.rows(&REALITY, &reality.drive_train);
         self.rows(&REALITY, &reality.driver);
+        self.rows(&REALITY, &reality.step_motor);
         self.rows(&REALITY, &reality.sensors);
         self.rows(&REALITY, &reality.parameters);
     }

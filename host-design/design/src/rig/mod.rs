@@ -53,7 +53,9 @@ pub use sections::link::{Link, LinkEncoder, MEASUREMENTS_OF_A_LINK};
 pub use sections::lqr::Lqr;
 pub use sections::model::LinearPlant;
 pub use sections::pole_placement::PolePlacement;
-pub use sections::reality::{DriveTrain, DriverFaults, DryFriction, ParameterErrors, Reality, SensorErrors};
+pub use sections::reality::{
+    DriveTrain, DriverFaults, DryFriction, ParameterErrors, Reality, SensorErrors, StepMotorData,
+};
 pub use sections::robust::Tolerances;
 pub use sections::swing_up::SwingUpRules;
 pub use sections::tick::Tick;
