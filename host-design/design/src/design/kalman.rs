@@ -26,8 +26,8 @@ pub struct Kalman<T> {
 }
 
 /// Gains of the observer and the relative residual of the equation that they solve. Process noise has the intensities
-/// in `noise`, enters through the columns of `inputs` and is integrated over one tick (Van Loan). Each sensor has a rounding error
-/// with the variance of [`rounding_variances`].
+/// in `noise`, enters through the columns of `inputs` and is integrated over one tick (Van Loan). Each sensor has a
+/// rounding error with the variance of [`rounding_variances`].
 ///
 /// The error covariance P of the prediction solves the sampled Riccati equation of (Adᵀ, Cᵀ);
 /// `L = P Cᵀ (C P Cᵀ + R)⁻¹` (Anderson & Moore, *Optimal Filtering*, chapter 4). With `observer_poles`, L follows from

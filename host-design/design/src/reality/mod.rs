@@ -8,8 +8,8 @@
 //! - [`Timing`]: when the force of a tick begins and ends.
 //! - [`RealEncoders`]: errors of encoders and of their zeros.
 //!
-//! Equations, sources and the step size are in `docs/reality.md`. What a rig file leaves out is not simulated:
-//! the simulation then does the same operations as without `[reality]`, and has the same bits.
+//! What a rig file leaves out is not simulated: the simulation then does the same operations as without `[reality]`,
+//! and has the same bits. `docs/reality.md` describes the keys.
 
 mod belt;
 mod bristle;
