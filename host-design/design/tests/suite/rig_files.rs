@@ -39,7 +39,8 @@ fn every_rig_file_is_good_and_named_after_its_rig() {
     for file in files {
         let rig = Rig::from_path(&file).unwrap_or_else(|error| panic!("{error}"));
         assert_eq!(file.file_stem().unwrap().to_str().unwrap(), rig.name);
-        assert!(rig.lqr.is_some() && rig.pole_placement.is_some());
+        assert!(rig.lqr.is_some());
+        assert!(rig.pole_placement.is_some() || rig.actuator.acceleration.is_some());
         assert!(rig.kalman.is_some() || matches!(rig.plant, PlantDescription::Model(_)));
     }
 }
@@ -229,6 +230,9 @@ fn the_hash_sees_every_value() {
             let Some((key, value)) = line.split('#').next().unwrap_or_default().split_once('=') else {
                 continue;
             };
+            if key.trim() == "kind" {
+                continue; // another kind has other keys
+            }
             let value = if key.trim() == "name" {
                 value.replacen('"', "\"x", 1)
             } else if key.trim() == "delay_ticks" {
@@ -247,7 +251,7 @@ fn the_hash_sees_every_value() {
             assert_ne!(parse(&lines.join("\n")).hash(), hash, "{}: {}", file.display(), lines[index]);
             changed += 1;
         }
-        assert!(changed > 20);
+        assert!(changed > 15);
     }
 }
 
