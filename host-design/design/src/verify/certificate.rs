@@ -21,7 +21,7 @@ pub struct Certificate {
     pub bits: [usize; 2],
     /// Of an LQR or Kalman gain: residual of the solution in its Riccati equation, relative to the
     /// sum of the norms of the terms. Of a pole placement: the largest distance of a requested pole from the
-    /// nearest pole of the loop.
+    /// nearest pole of the loop; of an observer with chosen poles: the relative error of the equation that they state.
     pub residual: f64,
     /// Largest relative change of the gain per relative change of the plant: `max |ΔK| / max |K| / 1e-20` for
     /// independent random changes up to 1e-20 (relative) of every entry of A and B that is neither 0 nor 1, the worst

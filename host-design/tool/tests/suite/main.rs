@@ -37,6 +37,7 @@ mod shaken;
 mod site_bits;
 mod site_page;
 mod split_command;
+mod stepper_command;
 mod transitions_command;
 mod twin_access;
 mod twin_page;
