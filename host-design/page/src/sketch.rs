@@ -1,7 +1,7 @@
 //! What a page draws of a rig before it is designed.
 
 use serde_json::{Value, json};
-use upright_design::rig::{PlantDescription, Rig};
+use upright_design::rig::{CartInput, PlantDescription, Rig};
 
 /// Names, lengths and travel; the weights that can be changed while one looks; values that no bench has.
 pub(crate) fn of(rig: &Rig) -> Value {
@@ -13,7 +13,12 @@ pub(crate) fn of(rig: &Rig) -> Value {
     };
     // Without a limit, JSON has null.
     let travel_m = travel_m.map(|end| end.filter(|end: &f64| end.is_finite()));
+    let input = match rig.actuator.input() {
+        CartInput::Force => "force (N)",
+        CartInput::Acceleration => "acceleration (m/s²)",
+    };
     json!({
+        "input": input,
         "rig": rig.name,
         "lengths_m": lengths_m,
         "travel_m": travel_m,
@@ -30,12 +35,10 @@ fn fields(rig: &Rig) -> Vec<Value> {
     let field = |key: String, label: String, unit: &str, value: f64| json!({ "key": key, "label": label, "unit": unit, "value": value });
     let mut fields = Vec::new();
     if let PlantDescription::Chain(chain) = &rig.plant {
-        fields.push(field(
-            "cart.mass_kg".to_owned(),
-            "mass of the cart".to_owned(),
-            "kg",
-            chain.cart.mass_kg,
-        ));
+        // A drive that imposes the cart's acceleration does not care for its mass.
+        if let Some(mass_kg) = chain.cart.mass_kg {
+            fields.push(field("cart.mass_kg".to_owned(), "mass of the cart".to_owned(), "kg", mass_kg));
+        }
         for (number, link) in (1..).zip(&chain.links) {
             fields.push(field(
                 format!("link[{number}].mass_kg"),

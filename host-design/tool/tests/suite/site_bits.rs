@@ -13,8 +13,8 @@ use upright_tool::site::module;
 
 use crate::equipment::{is_required, not_exercised};
 
-/// A model with ten states: the firmware is not compiled for its size on the host.
-const NO_FIRMWARE: &str = "quadruple-paper-printed";
+/// Rigs that have no table or firmware in a browser: a model with ten states has a table on the host alone.
+const NO_FIRMWARE: [&str; 1] = ["quadruple-paper-printed"];
 
 /// All rigs of the project: name, text, stored motions.
 fn rigs() -> Vec<(String, String, Option<String>)> {
@@ -70,7 +70,7 @@ fn tables_and_runs_of_all_rigs_have_the_same_bits_in_webassembly() {
     eprintln!("module and answers in {there_s:.0} s, here in {:.0} s", begin.elapsed().as_secs_f64());
     for ((name, _, motions), (here, there)) in rigs.iter().zip(here.iter().zip(&there)) {
         eprintln!("{name}: {there}");
-        if name == NO_FIRMWARE {
+        if NO_FIRMWARE.contains(&name.as_str()) {
             assert!(here["failed"].is_object() && there["failed"].is_object(), "{name}: {here}, {there}");
             continue;
         }

@@ -90,7 +90,7 @@ function showLoop() {
   const plots = [
     ['position (m)', [{ name: 'cart', value: state(0), colour: curveColour(0) }, { name: 'set-point', value: (row) => row[1], colour: 'var(--limit)' }]],
     ['angles (°)', desk.sketch.lengths_m.map((_, link) => ({ name: `link ${link + 1}`, value: state(2 + 2 * link, DEGREES), colour: curveColour(link) }))],
-    ['force (N)', [{ name: 'applied', value: (row) => row[2], colour: curveColour(1) }]],
+    [desk.sketch.input, [{ name: 'applied', value: (row) => row[2], colour: curveColour(1) }]],
   ].filter(([, curves]) => links > 0 || curves[0].name === 'applied');
   byId('plots').replaceChildren(...plots.map(([title, curves]) => {
     const caption = element('figcaption', { textContent: title });
@@ -182,7 +182,7 @@ function csvOfRun() {
   const { rows } = chosen().run;
   const states = rows[0][3].map((_, state) => `state${state}`);
   const lines = rows.map(([t, setpoint, force, state]) => [t, setpoint, force, ...state].join());
-  return `${['t_s', 'setpoint_m', 'force_n', ...states].join()}\n${lines.join('\n')}\n`;
+  return `${['t_s', 'setpoint_m', desk.sketch.input, ...states].join()}\n${lines.join('\n')}\n`;
 }
 
 // The rig in the address, behind the mark that is never sent to a server.

@@ -92,7 +92,7 @@ class Weights {
       return;
     }
     const all = [...weights.states.map((value, state) => ({ key: `lqr.state_weights[${state + 1}]`, value, label: stateName(state) })),
-      { key: 'lqr.force_weight', value: weights.force, label: 'weight of the force' }];
+      { key: 'lqr.force_weight', value: weights.force, label: 'weight of the input' }];
     if (all.length !== this.count) {
       this.count = all.length;
       place.replaceChildren(element('h3', { textContent: 'Weights of the LQR' }), ...all.map((weight) => this.slider(weight)));
