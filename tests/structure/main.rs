@@ -1,7 +1,8 @@
-//! The shape of the sources: no circles, nothing too long, no name for two types. And the bugs that CI plants in a copy
-//! of them still fit.
+//! The shape of the sources: no circles, nothing too long, no name for two types. The length of the guides. And the
+//! bugs that CI plants in a copy of the sources still fit.
 
 mod circles;
+mod documents;
 mod source;
 
 use std::collections::{BTreeMap, BTreeSet};

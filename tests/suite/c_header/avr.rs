@@ -88,7 +88,7 @@ fn on_the_uno(name: &'static str, ticks: u32) -> [u32; 2] {
     [mean, worst]
 }
 
-/// The bounds are 5 % above the cycles in docs/c-header.md.
+/// The bounds are 5 % above the cycles in docs/results/c-header.md.
 #[test]
 fn an_arduino_uno_has_the_bits_of_the_firmware_in_no_more_cycles_than_documented() {
     if !is_there("avr-gcc") || !is_there("simavr") {

@@ -7,7 +7,7 @@ use super::recorded::Replay;
 use crate::published::rig_and_table_with_motions;
 use upright_design::table::gains_source;
 use upright_test_support::repository;
-use upright_tool::image::{BuildError, Compiler, compiler_for};
+use upright_tool::image::{BuildError, Compiler, compiler_for_chips};
 
 /// An instruction set, and a machine of QEMU that has it.
 pub(super) struct Machine {
@@ -64,7 +64,7 @@ pub(super) fn images() -> Result<Vec<Image>, BuildError> {
 
 /// Calls cargo; returns the directory into which it builds.
 fn compile(subcommand: &str, targets: &[&str], for_rustc: &[&str]) -> Result<PathBuf, BuildError> {
-    let Compiler { mut cargo, target_directory, .. } = compiler_for(targets)?;
+    let Compiler { mut cargo, target_directory, .. } = compiler_for_chips(targets)?;
     for (variable, rig) in
         [("UPRIGHT_QUADRUPLE", "quadruple-paper"), ("UPRIGHT_SINGLE", "single-quanser-ip02")]
     {

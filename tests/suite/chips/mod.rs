@@ -101,10 +101,10 @@ fn table(measured: &[Instructions]) -> String {
     table
 }
 
-/// Holds the measured numbers to those of docs/chips.md, which may be a tenth lower. With UPRIGHT_BLESS=1 in the
+/// Holds the measured numbers to those of docs/results/chips.md, which may be a tenth lower. With UPRIGHT_BLESS=1 in the
 /// environment, writes them there instead.
 fn hold_the_document(measured: &[Instructions]) {
-    let path: PathBuf = repository().join("docs/chips.md");
+    let path: PathBuf = repository().join("docs/results/chips.md");
     let page = std::fs::read_to_string(&path).unwrap();
     let (before, rest) = page.split_once("<!-- instructions -->\n").unwrap();
     let (found, after) = rest.split_once("<!-- /instructions -->").unwrap();
@@ -114,7 +114,7 @@ fn hold_the_document(measured: &[Instructions]) {
     }
     let rows: Vec<Vec<&str>> =
         found.lines().skip(2).map(|row| row.trim_matches('|').split('|').collect()).collect();
-    assert_eq!(rows.len(), measured.len(), "rows of docs/chips.md");
+    assert_eq!(rows.len(), measured.len(), "rows of docs/results/chips.md");
     for (row, Instructions { run, target, mean, most }) in rows.iter().zip(measured) {
         assert_eq!([row[0].trim(), row[1].trim()], [*target, *run]);
         for (cell, number) in [(row[2], mean), (row[3], most)] {

@@ -263,8 +263,8 @@ fn driven(rig: &Rig, scale: DriveScale, force_n: f64, speed: f64) -> (Drive, i16
     let of = |part: f64| (part.clamp(-1.0, 1.0) * f64::from(i16::MAX)).round() as i16;
     match (&rig.actuator.motor, scale) {
         (Some(motor), _) => {
-            let volts =
-                force_n * motor.resistance_ohm / motor.newtons_per_amp() + motor.volts_per_speed() * speed;
+            let volts = force_n * motor.resistance_before_bridge_ohm() / motor.newtons_per_amp()
+                + motor.volts_per_speed() * speed;
             // The dead zone is compensated as in the firmware: without a jump.
             let lift = (10.0 * volts).clamp(-motor.dead_zone_v, motor.dead_zone_v);
             let part = of((volts + lift) / motor.supply_v);

@@ -1,6 +1,26 @@
 //! The log of a machine that is shaken: counters, motor drive, supply and contacts of every tick.
 //!
-//! A file is a header and frames; all numbers are little-endian. `docs/identify.md` describes it byte by byte.
+//! A file is a header and frames. All numbers are little-endian; a checksum is the CRC-32 (ISO-HDLC) of the part before
+//! it.
+//!
+//! | part | bytes | what |
+//! |---|---|---|
+//! | mark | 8 | `UPRTLOG1` |
+//! | header | 1 | encoders: cart and joints, y |
+//! | | 1 | 0: the drive is a duty; 1: a force |
+//! | | 1 | length of the name |
+//! | | | name of the rig, UTF-8 |
+//! | | 8 | hash of the rig |
+//! | | 4 | control period (ns) |
+//! | | 8 | force at full scale (N), as a 64-bit float; 1 with a duty |
+//! | | 2 y | counter values with the cart at 0 and the links hanging, low 16 bits |
+//! | | 4 | checksum of the header |
+//! | frame | 4 | number of its first tick |
+//! | | 1 | ticks k, 1 to 10 |
+//! | | 1 | contacts: bit 0 lower limit, 1 upper limit, 2 emergency stop, 3 driver fault |
+//! | | 2 | supply (mV), 0 if it is not measured |
+//! | | k (2 y + 2) | for each tick the counters, and the drive from -32767 to 32767; -32768 while the motor is off and coasts |
+//! | | 4 | checksum of the frame |
 
 use std::io::{self, Read};
 use std::path::Path;

@@ -1,4 +1,11 @@
 //! Dry friction with sticking: the elasto-plastic bristle.
+//!
+//! At a given speed the deflection is a function of the travel alone. It is computed exactly over the travel during a
+//! step, not integrated over time (V. Hayward, B. Armstrong, F. Altpeter, P. Dupont, "Discrete-time elasto-plastic
+//! friction estimation", IEEE Trans. Control Systems Technology 17, 2009), so a step has to resolve only the motion of
+//! a stuck contact on its spring. With stiffness σ_i and mobility m_i (acceleration per force in contact i, all links
+//! in line), no natural frequency exceeds `ω² = Σ σ_i m_i`, because the trace of a matrix bounds its largest
+//! eigenvalue. A step is at most `0.25 / ω`.
 
 /// Share of the Coulomb friction up to which the contact deforms elastically: 0.7169 in the example of Dupont et al.
 const ELASTIC_SHARE: f64 = 0.7;

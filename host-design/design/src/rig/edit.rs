@@ -73,6 +73,18 @@ impl RigText {
         Ok(())
     }
 
+    /// Takes `key` out, with the comment on its line. A key that is not there stays absent.
+    pub fn remove(&mut self, key: &str) {
+        let (parent, name) = key.rsplit_once('.').unwrap_or(("", key));
+        let table = match parent {
+            "" => Some(self.document.as_item_mut()),
+            _ => place(self.document.as_item_mut(), parent),
+        };
+        if let Some(table) = table.and_then(Item::as_table_like_mut) {
+            table.remove(name);
+        }
+    }
+
     /// Adds an empty section below all of the text.
     fn add(&mut self, section: &str) {
         let comments = self.document.trailing().as_str().unwrap_or_default().to_owned();
@@ -138,6 +150,16 @@ mod tests {
         assert_eq!(changed(lists, "lqr.state_weights[2]", "7").unwrap(), lists.replace("2,", "7,"));
         let windows = TEXT.replace('\n', "\r\n");
         assert_eq!(changed(&windows, "tick.period_s", "2").unwrap(), windows.replace("0.001", "2"));
+    }
+
+    #[test]
+    fn a_key_that_is_removed_takes_its_line_along() {
+        let mut text = RigText::parse(TEXT, "rig.toml".as_ref()).unwrap();
+        text.remove("link[2].mass_kg");
+        text.remove("link[2].tip_mass_kg");
+        text.remove("link[3].mass_kg");
+        text.remove("motor.mass_kg");
+        assert_eq!(text.to_string(), TEXT.replace("mass_kg = 2 # second\n", ""));
     }
 
     #[test]

@@ -1,4 +1,15 @@
 //! The search for a motion: many candidates, of which the most robust is kept.
+//!
+//! 1. Candidates: for each, a duration, the largest force, the usable part of the rail and the weight of the links'
+//!    rates are drawn at random, and multiple shooting with knots 5 or 10 ms apart solves the problem. If the
+//!    interior-point method stalls, the cost is dropped, and Newton steps on the gaps alone finish the solution.
+//! 2. Refinement from knots to ticks, with the force held over each tick, until the gaps are below 2e-8.
+//! 3. Gains: a linear quadratic regulator along the motion with the weights of `[lqr]`, but four times those of the
+//!    positions, because a link that leaves its plan soon falls. The terminal cost is the stationary one. A Kalman
+//!    filter expects more noise than at rest: 100 times at the joints, 10 times at the cart, plus wrong friction.
+//! 4. Selection: the score is from runs with every mass wrong by 0.5 % and all friction wrong by the spread, without
+//!    noise. The 30 best are tested with 40 random runs each, and the best four of these with 160, with the control law
+//!    alone in f64 and the unmodified weights of `[lqr]`, so that weak motions are exposed.
 
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use upright_design::identify::{Identification, Realised, RealisedLink};
 use upright_design::number::rounded;
-use upright_design::rig::{Rig, RigError, RigText};
+use upright_design::rig::{MEASUREMENTS_OF_A_LINK, Rig, RigError, RigText};
 
 /// Errors of masses and lengths in `[reality]`. The identified numbers include them, so they are set to 0.
 const WITHIN: [&str; 5] = [
@@ -30,6 +30,11 @@ pub fn rig_file(
     if let Some(realised) = &found.realised {
         for (key, value) in values(realised, rig, found.is_driven) {
             text.set(&key, &value)?;
+        }
+        for number in 1..=realised.links.len() {
+            for key in MEASUREMENTS_OF_A_LINK {
+                text.remove(&format!("link[{number}].{key}"));
+            }
         }
     }
     if let Some(delay) = found.other_delay() {
@@ -137,5 +142,44 @@ mod tests {
             );
         }
         assert!(!written("", false).contains("cart_mass_percent"), "what the file leaves out stays out");
+    }
+    /// A file may give a link by its swing and its tip mass; what was identified includes them.
+    #[test]
+    fn measurements_of_a_link_give_way_to_the_identified_numbers() {
+        let file: &Path = "../../rigs/single-quanser-ip02.toml".as_ref();
+        let text = std::fs::read_to_string(file).unwrap();
+        let old = text.replace("[[link]]\n", "[[link]]\ntip_mass_kg = 0.1\nswing_half_life_s = 9\n");
+        let old: String = old
+            .lines()
+            .filter(|line| !line.starts_with("friction_n_m_s"))
+            .fold(String::new(), |all, line| all + line + "\n");
+        let rig = Rig::from_toml(&old, file).unwrap();
+        let link = RealisedLink {
+            mass_kg: 0.2,
+            length_m: 0.5,
+            centre_m: 0.3,
+            inertia_kg_m2: 0.004,
+            viscous: 0.001,
+            dry_n_m: 0.0,
+            presliding_rad: 1e-3,
+            air_drag: 0.0,
+        };
+        let realised = Realised {
+            cart_kg: 1.0,
+            cart_viscous: 2.0,
+            cart_dry_n: 0.0,
+            links: vec![link],
+            tilt_rad: 0.0,
+            dead_zone_v: 0.0,
+            resistance_factor: 1.0,
+        };
+        let found = Identification { realised: Some(realised), ..NOTHING };
+        let new = rig_file(&old, &rig, &found, "identified", file).unwrap();
+        let new = Rig::from_toml(&new, file).unwrap();
+        let link = &new.chain().unwrap().links[0];
+        assert_eq!(
+            (link.mass_kg, link.centre_of_mass_m, link.friction_n_m_s_per_rad),
+            (0.2, Some(0.3), 0.001)
+        );
     }
 }

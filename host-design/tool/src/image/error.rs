@@ -13,12 +13,12 @@ pub const TARGET: &str = "thumbv7em-none-eabihf";
 /// Why an image could not be built.
 #[derive(Debug, thiserror::Error)]
 pub enum BuildError {
-    /// No compiler for these targets, which are separated by spaces.
+    /// No compiler for the target.
     #[error(
-        "no compiler for {0}: run `rustup target add {0}`, or on Debian \
+        "no compiler for {TARGET}: run `rustup target add {TARGET}`, or on Debian \
          `apt-get install lld rustc-web cargo-web rust-web-src`"
     )]
-    NoCompiler(String),
+    NoCompiler,
     /// The rig has more encoders than the board has timers for.
     #[error("{board} counts {} encoders, and this rig has {needed}: use another board (docs/board.md)", board.encoders())]
     Encoders {

@@ -20,7 +20,7 @@ fn upright(arguments: &[&str]) -> String {
 }
 
 /// The text between the markers called `name`.
-fn between<'a>(page: &'a str, name: &str) -> Option<&'a str> {
+pub(crate) fn between<'a>(page: &'a str, name: &str) -> Option<&'a str> {
     let (_, rest) = page.split_once(&format!("<!-- {name} -->"))?;
     Some(rest.split_once(&format!("<!-- /{name} -->"))?.0.trim())
 }
@@ -123,8 +123,8 @@ fn the_page_about_faults_holds_the_reasons_against_a_command() {
 }
 
 #[test]
-fn the_page_about_faults_holds_the_kinds_of_defects() {
-    hold("docs/faults.md", "defects", &defects());
+fn the_page_about_injection_holds_the_kinds_of_defects() {
+    hold("docs/fault-injection.md", "defects", &defects());
 }
 
 #[test]

@@ -1,4 +1,4 @@
-//! "First power-up" and "First balance" of docs/board.md, followed step by step: the flashed image on the virtual
+//! "First power-up" and "First balance" of docs/power-up.md, followed step by step: the flashed image on the virtual
 //! board, with the keys and the screen of the monitor.
 
 use std::time::Duration;
@@ -61,8 +61,7 @@ impl Person<'_> {
         self.monitor.receive(self.session.last_bytes(), now);
         self.session.forget_received();
         if output.enable {
-            let (Drive::Force(drive) | Drive::Duty(drive)) = output.drive;
-            self.bench.tick(Drive::Force(self.motor * drive));
+            self.bench.tick(Drive::Force(self.motor * output.drive.value()));
             self.held[0] = self.bench.state()[0];
         } else {
             self.bench.hold(&self.held);

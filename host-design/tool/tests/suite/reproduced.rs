@@ -6,6 +6,7 @@ use std::sync::LazyLock;
 
 use serde_json::Value;
 
+use crate::documented_tables::between;
 use crate::documents::read;
 
 /// What the command printed and wrote.
@@ -68,11 +69,12 @@ fn differing(committed: &str, found: &str, least: f64) -> Option<String> {
 /// Every number that the command prints.
 #[test]
 fn the_numbers_of_the_committed_summary_come_out() {
-    let committed = read("docs/reproduction.md");
-    assert!(numbers(&committed).len() > 500);
+    let page = read("docs/results/reproduction.md");
+    let committed = between(&page, "summary").unwrap();
+    assert!(numbers(committed).len() > 500);
     let found = REPRODUCED.text("summary.md");
-    let differing = |found: &str| differing(&committed, found, 1e-9);
-    assert_eq!(differing(found), None, "docs/reproduction.md: run `upright reproduce` again?");
+    let differing = |found: &str| differing(committed, found, 1e-9);
+    assert_eq!(differing(found), None, "docs/results/reproduction.md: run `upright reproduce` again?");
     // Another layout is the same; one other digit, or a number more, is not.
     assert_eq!(differing(&found.replace(" |", "\t|").replace("--", "-")), None);
     assert!(differing(&found.replacen("11.0075", "11.0175", 1)).is_some());
@@ -83,10 +85,10 @@ fn the_numbers_of_the_committed_summary_come_out() {
 #[test]
 fn the_committed_figures_come_out() {
     for name in ["table-2.svg", "spectra.svg"] {
-        let committed = read(&format!("docs/{name}"));
+        let committed = read(&format!("docs/results/{name}"));
         assert!(numbers(&committed).len() > 500);
         let found = REPRODUCED.text(name);
-        assert_eq!(differing(&committed, found, 2.0), None, "docs/{name}: copy it again?");
+        assert_eq!(differing(&committed, found, 2.0), None, "docs/results/{name}: copy it again?");
         // A point that is elsewhere, or one more, is not the same.
         let (before, after) = found.split_once("points=\"").unwrap();
         assert!(differing(&committed, &format!("{before}points=\"7777,7777 {after}"), 2.0).is_some());

@@ -11,6 +11,7 @@ pub(super) mod friction;
 pub(super) mod integral;
 pub(super) mod kalman;
 pub(super) mod limits;
+pub(super) mod link;
 pub(super) mod lqr;
 pub(super) mod model;
 pub(super) mod pole_placement;
@@ -41,7 +42,7 @@ pub static TOP: Section = Section {
 /// All sections, in the order of the documentation.
 pub static SECTIONS: [&Section; 16] = [
     &chain::CART,
-    &chain::LINK,
+    &link::LINK,
     &chain::GRAVITY,
     &actuator::ACTUATOR,
     &tick::TICK,

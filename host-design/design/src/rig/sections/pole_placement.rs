@@ -98,7 +98,8 @@ fn response(table: &Table<'_>, states: usize) -> Result<PolePlacement, RigError>
     Ok(PolePlacement::Response { overshoot_percent, settling_time_s, far_poles })
 }
 
-fn poles(node: &Node<'_>, states: usize, asks_for: &str) -> Result<Vec<[f64; 2]>, RigError> {
+/// One pole per state, complex ones in conjugate pairs.
+pub(super) fn poles(node: &Node<'_>, states: usize, asks_for: &str) -> Result<Vec<[f64; 2]>, RigError> {
     let entries = node.list("a list of [re, im] pairs", asks_for)?;
     if entries.len() != states {
         return Err(pole_count(node, entries.len(), format!("{states}, one per state"), asks_for));

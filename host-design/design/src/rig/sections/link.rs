@@ -1,0 +1,326 @@
+//! `[[link]]`: one link of a chain, from data sheets and drawings or from measurements of the link alone.
+
+use std::f64::consts::{LN_2, TAU};
+
+use serde::Serialize;
+
+use super::super::error::RigError;
+use super::super::key::{Absent, Key, Section};
+use super::super::node::{Node, Table};
+use super::super::rule::Rule;
+use crate::number::significant;
+
+/// `[[link]]`
+pub(crate) static LINK: Section = Section {
+    name: "link",
+    title: "[[link]]",
+    meaning: "one table per link, from the cart outwards, 1 to 14 of them",
+    absent: Absent::RequiredIf("unless [model]"),
+    keys: &[LINK_KEYS],
+};
+
+const LINK_KEYS: &[Key] = &[
+    Key {
+        name: "mass_kg",
+        unit: "kg",
+        rule: Rule::POSITIVE,
+        meaning: "mass of the link",
+        absent: Absent::Required,
+    },
+    Key {
+        name: "length_m",
+        unit: "m",
+        rule: Rule::POSITIVE,
+        meaning: "length of the link from its joint to the next one, or to its tip",
+        absent: Absent::Required,
+    },
+    Key {
+        name: "centre_of_mass_m",
+        unit: "m",
+        rule: Rule::POSITIVE.worded("a number > 0, at most 10 times length_m"),
+        meaning: "distance from the link's joint to its centre of mass",
+        absent: Absent::Follows("half the length"),
+    },
+    Key {
+        name: "inertia_kg_m2",
+        unit: "kg·m²",
+        rule: Rule::NOT_NEGATIVE,
+        meaning: "moment of inertia about the centre of mass (0 for a point mass)",
+        absent: Absent::Follows("a uniform rod, mass · length² / 12"),
+    },
+    Key {
+        name: "inertia_about_joint_kg_m2",
+        unit: "kg·m²",
+        rule: Rule::POSITIVE.worded("a number >= mass · centre of mass²"),
+        meaning: "moment of inertia about the link's lower joint",
+        absent: Absent::Follows("what inertia_kg_m2 gives"),
+    },
+    Key {
+        name: "tip_mass_kg",
+        unit: "kg",
+        rule: Rule::POSITIVE,
+        meaning: "point mass at length_m, in addition to the link that the keys above describe",
+        absent: Absent::Follows("none"),
+    },
+    Key {
+        name: "swing_period_s",
+        unit: "s",
+        rule: Rule::POSITIVE.worded("a number > 0, longer than that of a point mass at the centre of mass"),
+        meaning: "period of small swings of this link alone, hanging from its joint, with its tip mass",
+        absent: Absent::Follows("what inertia_kg_m2 gives"),
+    },
+    Key {
+        name: "friction_n_m_s_per_rad",
+        unit: "N·m·s/rad",
+        rule: Rule::NOT_NEGATIVE,
+        meaning: "viscous friction in the link's lower joint",
+        absent: Absent::Numbers(&[0.0]),
+    },
+    Key {
+        name: "swing_half_life_s",
+        unit: "s",
+        rule: Rule::POSITIVE,
+        meaning: "time in which the amplitude of these swings falls to half",
+        absent: Absent::Follows("what friction_n_m_s_per_rad gives"),
+    },
+    Key {
+        name: "encoder_step_rad",
+        unit: "rad",
+        rule: Rule::ANGLE,
+        meaning: "angle per encoder count",
+        absent: Absent::Follows("what encoder_counts_per_rev gives"),
+    },
+    Key {
+        name: "encoder_counts_per_rev",
+        unit: "counts/rev",
+        rule: Rule::COUNTS,
+        meaning: "resolution of the encoder after quadrature (four counts per line)",
+        absent: Absent::Follows("what encoder_step_rad gives; neither, no encoder"),
+    },
+];
+
+/// One link of a chain, `[[link]]`.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Link {
+    /// Mass (kg).
+    pub mass_kg: f64,
+    /// Distance from this link's joint to the next one (m).
+    pub length_m: f64,
+    /// Distance from the joint to the centre of mass (m); half the length if not given.
+    pub centre_of_mass_m: Option<f64>,
+    /// Moment of inertia about the centre of mass (kg·m²); that of a uniform rod, m l²/12, if not given.
+    pub inertia_kg_m2: Option<f64>,
+    /// Viscous friction in the lower joint, on the relative rate (N·m·s/rad).
+    pub friction_n_m_s_per_rad: f64,
+    /// Resolution of the joint's encoder.
+    pub encoder: Option<LinkEncoder>,
+}
+
+/// Resolution of a joint encoder, in the form that the file gives.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub enum LinkEncoder {
+    /// `encoder_step_rad`: angle per count (rad).
+    StepRad(f64),
+    /// `encoder_counts_per_rev`: counts per revolution; the step is 2π / counts (rad).
+    CountsPerRev(f64),
+}
+
+/// Keys of measurements of a link, which [`link`] turns into the fields of [`Link`]. A program that writes those fields
+/// into a rig file takes these keys out.
+pub const MEASUREMENTS_OF_A_LINK: [&str; 4] =
+    ["inertia_about_joint_kg_m2", "tip_mass_kg", "swing_period_s", "swing_half_life_s"];
+
+/// Reads one `[[link]]`.
+pub(super) fn link(node: &Node<'_>, gravity_m_per_s2: f64) -> Result<Link, RigError> {
+    const ONE_INERTIA: &str = "keep the one that you measured";
+    let table = node.table(&LINK)?;
+    table.not_both("inertia_kg_m2", "inertia_about_joint_kg_m2", ONE_INERTIA)?;
+    table.not_both("inertia_kg_m2", "swing_period_s", ONE_INERTIA)?;
+    table.not_both("inertia_about_joint_kg_m2", "swing_period_s", ONE_INERTIA)?;
+    table.not_both("friction_n_m_s_per_rad", "swing_half_life_s", "keep the one that you measured")?;
+    let length_m = table.value("length_m")?;
+    let centre_of_mass_m = table.value("centre_of_mass_m")?;
+    within_reach(&table, centre_of_mass_m, length_m)?;
+    let mut link = Link {
+        mass_kg: table.value("mass_kg")?,
+        length_m,
+        centre_of_mass_m,
+        inertia_kg_m2: table.value("inertia_kg_m2")?,
+        friction_n_m_s_per_rad: table.value("friction_n_m_s_per_rad")?,
+        encoder: link_encoder(&table)?,
+    };
+    if let Some(about_joint) = table.value("inertia_about_joint_kg_m2")? {
+        link.set_inertia_about_joint(&table, "inertia_about_joint_kg_m2", about_joint, |least| least)?;
+    }
+    if let Some(tip_mass_kg) = table.value("tip_mass_kg")? {
+        link.add_tip_mass(tip_mass_kg);
+    }
+    link.take_swing(&table, gravity_m_per_s2)?;
+    Ok(link)
+}
+
+impl Link {
+    /// Distance from the joint to the centre of mass (m).
+    fn centre_m(&self) -> f64 {
+        self.centre_of_mass_m.unwrap_or(0.5 * self.length_m)
+    }
+
+    /// Moment of inertia about the joint (kg·m²), `J + m c²`.
+    fn inertia_about_joint_kg_m2(&self) -> f64 {
+        let about_centre = self.inertia_kg_m2.unwrap_or(self.mass_kg * self.length_m.powi(2) / 12.0);
+        about_centre + self.mass_kg * self.centre_m().powi(2)
+    }
+
+    /// The inertia about the centre of mass, `J - m c²`, from the one about the joint, which `key` gives. `in_key`
+    /// turns the least inertia about the joint into the least value of the key.
+    fn set_inertia_about_joint(
+        &mut self,
+        table: &Table<'_>,
+        key: &str,
+        about_joint: f64,
+        in_key: impl Fn(f64) -> f64,
+    ) -> Result<(), RigError> {
+        let of_a_point = self.mass_kg * self.centre_m().powi(2);
+        if about_joint < of_a_point {
+            let accepts = format!(
+                "a number >= {}, as for a point mass at the centre of mass",
+                significant(in_key(of_a_point), 6)
+            );
+            let remedy =
+                "measure again, or correct mass_kg and centre_of_mass_m (half of length_m if left out)";
+            return Err(table.required(key)?.out_of_range(&accepts, remedy));
+        }
+        self.inertia_kg_m2 = Some(about_joint - of_a_point);
+        Ok(())
+    }
+
+    /// Adds a point mass at the end of the link: masses and first moments about the joint add up, and so do the
+    /// inertias about the joint.
+    fn add_tip_mass(&mut self, tip_mass_kg: f64) {
+        let about_joint = self.inertia_about_joint_kg_m2() + tip_mass_kg * self.length_m.powi(2);
+        let mass_kg = self.mass_kg + tip_mass_kg;
+        let centre_m = (self.mass_kg * self.centre_m() + tip_mass_kg * self.length_m) / mass_kg;
+        self.mass_kg = mass_kg;
+        self.centre_of_mass_m = Some(centre_m);
+        // Rounding must not make it negative for a point mass at the end of a massless rod.
+        self.inertia_kg_m2 = Some((about_joint - mass_kg * centre_m.powi(2)).max(0.0));
+    }
+
+    /// Inertia and friction from small swings `J θ̈ + b θ̇ + m g c θ = 0` about the joint: the amplitude decays with
+    /// `σ = b / (2 J) = ln 2 / half-life`, and `(2π / period)² = m g c / J - σ²`.
+    fn take_swing(&mut self, table: &Table<'_>, gravity_m_per_s2: f64) -> Result<(), RigError> {
+        let half_life_s: Option<f64> = table.value("swing_half_life_s")?;
+        let decay_per_s = half_life_s.map_or(0.0, |half_life_s| LN_2 / half_life_s);
+        if let Some(period_s) = table.value::<Option<f64>>("swing_period_s")? {
+            let stiffness = self.mass_kg * gravity_m_per_s2 * self.centre_m();
+            let about_joint = stiffness / ((TAU / period_s).powi(2) + decay_per_s.powi(2));
+            let period_of = |about_joint: f64| TAU / (stiffness / about_joint - decay_per_s.powi(2)).sqrt();
+            self.set_inertia_about_joint(table, "swing_period_s", about_joint, period_of)?;
+        }
+        if half_life_s.is_some() {
+            self.friction_n_m_s_per_rad = 2.0 * decay_per_s * self.inertia_about_joint_kg_m2();
+        }
+        Ok(())
+    }
+}
+
+/// The centre of mass may lie beyond the next joint (a link with an extension), but not far beyond.
+fn within_reach(table: &Table<'_>, centre_of_mass_m: Option<f64>, length_m: f64) -> Result<(), RigError> {
+    let most = 10.0 * length_m;
+    match (table.get("centre_of_mass_m"), centre_of_mass_m) {
+        (Some(node), Some(distance)) if distance > most => Err(node.out_of_range(
+            &format!("a number > 0 and <= 10 times length_m, {most} (m)"),
+            "give the distance from the joint to the centre of mass in m, or correct length_m",
+        )),
+        _ => Ok(()),
+    }
+}
+
+fn link_encoder(table: &Table<'_>) -> Result<Option<LinkEncoder>, RigError> {
+    table.not_both("encoder_step_rad", "encoder_counts_per_rev", "keep the one the data sheet gives")?;
+    let step: Option<f64> = table.value("encoder_step_rad")?;
+    let counts: Option<f64> = table.value("encoder_counts_per_rev")?;
+    Ok(step.map(LinkEncoder::StepRad).or(counts.map(LinkEncoder::CountsPerRev)))
+}
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use super::*;
+    use crate::rig::Rig;
+
+    fn parse(keys: &str) -> Result<Link, RigError> {
+        let text =
+            format!("name = \"a\"\n[cart]\nmass_kg = 1\n[[link]]\nmass_kg = 0.2\nlength_m = 0.5\n{keys}");
+        Rig::from_toml(&text, Path::new("rig.toml")).map(|rig| rig.chain().unwrap().links[0].clone())
+    }
+
+    fn near(found: f64, wanted: f64) -> bool {
+        (found - wanted).abs() < 1e-12 * wanted.abs().max(1e-3)
+    }
+
+    #[test]
+    fn an_inertia_about_the_joint_is_moved_to_the_centre_of_mass() {
+        let link = parse("centre_of_mass_m = 0.3\ninertia_about_joint_kg_m2 = 0.02").unwrap();
+        assert!(near(link.inertia_kg_m2.unwrap(), 0.002), "{link:?}");
+        let error =
+            parse("centre_of_mass_m = 0.3\ninertia_about_joint_kg_m2 = 0.0179").unwrap_err().to_string();
+        assert!(
+            error.contains(
+                ":8:29: link[1].inertia_about_joint_kg_m2: found 0.0179, accepted: a number >= 0.018"
+            ),
+            "{error}"
+        );
+    }
+
+    /// A rod of 0.2 kg and 0.5 m with 0.1 kg at its end, about the joint: 0.2 · 0.5²/3 + 0.1 · 0.5².
+    #[test]
+    fn a_tip_mass_adds_its_mass_moment_and_inertia() {
+        let link = parse("tip_mass_kg = 0.1").unwrap();
+        assert!(near(link.mass_kg, 0.3) && near(link.centre_of_mass_m.unwrap(), 0.1 / 0.3), "{link:?}");
+        let about_joint = link.inertia_kg_m2.unwrap() + link.mass_kg * link.centre_of_mass_m.unwrap().powi(2);
+        assert!(near(about_joint, 0.05 / 3.0 + 0.025), "{about_joint}");
+    }
+
+    /// The swing of a link whose inertia and friction are known, simulated by its own solution, gives them back.
+    #[test]
+    fn period_and_half_life_of_a_swing_give_inertia_and_friction() {
+        let (mass, centre, inertia, friction): (f64, f64, f64, f64) = (0.2, 0.25, 0.004, 0.003);
+        let about_joint = inertia + mass * centre * centre;
+        let decay = friction / (2.0 * about_joint);
+        let period = TAU / (mass * 9.81 * centre / about_joint - decay * decay).sqrt();
+        let swing = format!("swing_period_s = {period}\nswing_half_life_s = {}", LN_2 / decay);
+        let link = parse(&swing).unwrap();
+        assert!(
+            near(link.inertia_kg_m2.unwrap(), inertia) && near(link.friction_n_m_s_per_rad, friction),
+            "{link:?}"
+        );
+        // A tip mass swings with the link: the same period belongs to a larger inertia about the joint.
+        let with_tip = parse(&format!("{swing}\ntip_mass_kg = 0.05")).unwrap();
+        let grown = with_tip.inertia_about_joint_kg_m2() / link.inertia_about_joint_kg_m2();
+        assert!(near(grown, (0.2 * 0.25 + 0.05 * 0.5) / (0.2 * 0.25)), "{grown}");
+        let damping = with_tip.friction_n_m_s_per_rad / link.friction_n_m_s_per_rad;
+        assert!(near(damping, grown), "{damping}");
+    }
+
+    #[test]
+    fn a_swing_that_no_such_link_has_is_refused_with_the_shortest_period() {
+        // A point mass at 0.25 m: 2π √(0.25 / 9.81) = 1.00303 s.
+        assert!(parse("swing_period_s = 1.0031").is_ok());
+        let error = parse("swing_period_s = 1.0030").unwrap_err().to_string();
+        assert!(
+            error.contains("link[1].swing_period_s: found 1.0030, accepted: a number >= 1.00303"),
+            "{error}"
+        );
+        for (first, second) in [
+            ("inertia_kg_m2 = 1", "swing_period_s = 2"),
+            ("inertia_kg_m2 = 1", "inertia_about_joint_kg_m2 = 2"),
+            ("inertia_about_joint_kg_m2 = 1", "swing_period_s = 2"),
+            ("friction_n_m_s_per_rad = 1", "swing_half_life_s = 2"),
+        ] {
+            let error = parse(&format!("{first}\n{second}")).unwrap_err().to_string();
+            assert!(error.contains("keep the one that you measured"), "{error}");
+        }
+    }
+}
